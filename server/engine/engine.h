@@ -1,0 +1,154 @@
+// The engine's face to the network: values in, values out. All methods are thread-safe. Callbacks and listener calls
+// come from the solve thread and must not block; a session posts them to its own strand.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <glm/vec2.hpp>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/bytes.h"
+#include "common/image.h"
+#include "common/result.h"
+
+namespace radiosity::engine {
+
+enum class SolveState { kEmpty, kLoading, kSolving, kPaused, kConverged, kTimeLimit, kFailed };
+
+/// Relative RMS errors of irradiance over all texels, area-weighted; estimates. total^2 = sum of squares.
+struct ErrorEstimate {
+  double total = 1.0, residual = 1.0, sampling = 0.0, discretization = 0.0;
+};
+
+/// Luminous flux, lumens (sum of the three channels). emitted = absorbed + escaped + backface + unshot.
+struct EnergyBalance {
+  double emitted = 0.0, absorbed = 0.0, escaped = 0.0, backface = 0.0, unshot = 0.0;
+};
+
+struct SolveSettings {
+  double target_error = 0.02;          ///< relative; stops when the estimate reaches it
+  std::optional<double> time_limit_s;  ///< solve time
+  std::uint64_t texels = 16'000;       ///< leaf patches in all, about; used when texel_size_m is 0
+  double texel_size_m = 0.0;
+  std::uint64_t seed = 1;
+  bool paper_mode = false;  ///< Lum, Ma and Max 2002 to the letter (server option, comparisons)
+};
+
+struct Status {
+  SolveState state = SolveState::kEmpty;
+  std::uint64_t revision = 0;      ///< of the scene; raised by load and patch
+  std::uint64_t tile_version = 0;  ///< raised whenever lightmaps are published
+  std::uint64_t shots = 0;
+  double shots_per_second = 0.0;
+  double seconds = 0.0;                ///< solve time, without start-up and loading
+  std::optional<double> seconds_left;  ///< estimate to the target error
+  ErrorEstimate error;
+  EnergyBalance energy;
+  std::uint64_t patches = 0;  ///< leaf patches with area
+  std::uint64_t nodes = 0, surfaces = 0, polygons = 0;
+  std::map<std::string, double> counters;  ///< skips, culls, times: whatever the solver counts
+  std::string gl_renderer;
+  std::vector<std::string> warnings;
+  std::string failure;  ///< why, when kFailed
+  SolveSettings settings;
+};
+
+/// One published page: mip 0 is the page itself; values are irradiance in lux. Immutable.
+struct PageSnapshot {
+  std::vector<Image> mips;
+  /// tile_version[mip][ty * tiles_x + tx]: Status::tile_version at which the tile's 64 x 64 texels last changed; 0:
+  /// never.
+  std::vector<std::vector<std::uint64_t>> tile_version;
+  /// mean relative change of each tile in that version, for "largest change first"
+  std::vector<std::vector<float>> tile_change;
+};
+
+inline constexpr std::uint32_t kTileSize = 64;
+
+/// Everything a viewer can see at one moment. Immutable, shared.
+struct Lightmaps {
+  std::uint64_t layout = 0;  ///< raised when pages, sizes or UVs change (viewers must fetch /scene.glb again)
+  std::uint64_t revision = 0;
+  std::uint64_t tile_version = 0;
+  std::uint32_t shots = 0;
+  float error = 1.0F;
+  bool final = false;  ///< the solve has stopped at its target
+  std::vector<std::shared_ptr<const PageSnapshot>> pages;
+};
+
+struct LoadOutcome {
+  std::uint64_t revision = 0;
+  std::vector<std::string> warnings;
+};
+
+struct PatchRequest {
+  std::string patch;  ///< JSON text of the RFC 6902 array, depth and size already bounded
+  std::optional<std::uint64_t> base_revision;
+  bool dry_run = false;
+  std::string by;  ///< who, for scene.patched
+};
+
+/// Errors of a patch: Error::where = JSON pointer; `operation` in PatchError is the index of the failing operation.
+struct PatchOutcome {
+  std::uint64_t revision = 0;
+  std::uint64_t affected_surfaces = 0, affected_shots = 0;
+};
+
+struct SnapshotRequest {
+  std::string camera;  ///< name or index of a scene camera; empty: the first, or one that frames the scene
+  int width = 960, height = 720;
+  std::string quantity = "lit";  ///< lit, irradiance, radiosity, error, patchId, mipLevel, normal
+};
+
+class Listener {
+ public:
+  virtual ~Listener() = default;
+  virtual void onProgress(const Status& status) = 0;
+  virtual void onScenePatched(std::uint64_t revision, const std::string& patch, const std::string& by) = 0;
+  virtual void onSceneLoaded(std::uint64_t revision) = 0;
+  virtual void onLightmaps(const std::shared_ptr<const Lightmaps>& lightmaps) = 0;
+};
+
+class Engine {
+ public:
+  template <typename T>
+  using Callback = std::function<void(Result<T>)>;
+
+  virtual ~Engine() = default;
+
+  /// `name` is for messages and file names ("room.glb"). `file` (a path) or `bytes`, not both.
+  virtual void loadBytes(std::string name, SharedBytes bytes, Callback<LoadOutcome> done) = 0;
+  virtual void loadFile(std::string path, Callback<LoadOutcome> done) = 0;
+  virtual void patch(PatchRequest request, Callback<PatchOutcome> done) = 0;
+  virtual void configure(SolveSettings settings, Callback<SolveSettings> done) = 0;
+  virtual void pause(Callback<SolveState> done) = 0;
+  virtual void resume(Callback<SolveState> done) = 0;
+  virtual void restart(Callback<SolveState> done) = 0;
+
+  [[nodiscard]] virtual Status status() const = 0;
+  [[nodiscard]] virtual std::shared_ptr<const Lightmaps> lightmaps() const = 0;
+
+  /// The document as JSON text (buffers and images by URL), with its revision.
+  struct SceneText {
+    std::uint64_t revision = 0;
+    std::string gltf;
+  };
+  virtual void sceneText(Callback<SceneText> done) = 0;
+  /// GLB with TEXCOORD_1 and extras.lightmap on every lit primitive.
+  virtual void sceneGlb(Callback<SharedBytes> done) = 0;
+  /// GLB with KHR_materials_unlit textures, tone-mapped.
+  virtual void unlitGlb(Callback<SharedBytes> done) = 0;
+  /// OpenEXR, 32-bit float RGB, irradiance in lux, row 0 = v 0.
+  virtual void lightmapExr(std::uint32_t page, Callback<SharedBytes> done) = 0;
+  /// PNG.
+  virtual void snapshot(SnapshotRequest request, Callback<SharedBytes> done) = 0;
+
+  /// Kept by weak pointer; a listener that is gone is forgotten. With none, nothing is published.
+  virtual void addListener(std::weak_ptr<Listener> listener) = 0;
+};
+
+}  // namespace radiosity::engine

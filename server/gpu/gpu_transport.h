@@ -1,0 +1,28 @@
+// Ways to get a Transport that renders hemicubes with OpenGL.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "common/result.h"
+#include "server/solver/transport.h"
+
+namespace radiosity::gpu {
+
+/// One EGL context in the calling thread, which must also be the thread that uses and destroys it.
+/// kUnavailable, naming every platform tried and why it failed, when there is no OpenGL 4.5 core.
+[[nodiscard]] Result<std::unique_ptr<solver::Transport>> makeInProcessTransport();
+
+struct WorkerOptions {
+  int workers = 0;         ///< 0: one for each core with llvmpipe, one on a GPU
+  std::string executable;  ///< started as `executable --worker ...`; normally /proc/self/exe
+};
+
+/// Worker processes, each with its own EGL display, results in shared memory. A worker that dies is replaced and its
+/// part of the batch done again.
+[[nodiscard]] Result<std::unique_ptr<solver::Transport>> makeWorkerTransport(const WorkerOptions& options);
+
+/// The body of a worker process; returns its exit status. argv as received by main after `--worker`.
+int workerMain(int argc, char** argv);
+
+}  // namespace radiosity::gpu

@@ -1,0 +1,53 @@
+// The glTF document: the JSON that clients see and edit, and the immutable buffers and images it refers to.
+// A value: copies are cheap (buffers are shared). Owned by the engine's solve thread; const copies go anywhere.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/bytes.h"
+#include "common/result.h"
+#include "server/scene/scene.h"
+
+namespace radiosity::scene {
+
+/// Bounds on what a file may make us allocate; checked before use.
+struct ImportLimits {
+  std::size_t max_json_depth = 64;
+  std::size_t max_file_bytes = std::size_t{1} << 30;
+  std::size_t max_image_pixels = std::size_t{1} << 26;  ///< each image
+  std::size_t max_vertices = std::size_t{1} << 26;      ///< all accessors together
+  std::size_t max_triangles = std::size_t{1} << 24;     ///< after instancing
+  std::size_t max_nodes = std::size_t{1} << 20;
+};
+
+struct Document {
+  std::string name;                  ///< for messages: "room.glb"
+  nlohmann::json gltf;               ///< defaults materialised, `matrix` turned into TRS (protocol.md)
+  std::vector<SharedBytes> buffers;  ///< one for each /buffers entry
+  std::vector<SharedBytes> images;   ///< encoded bytes (PNG, JPEG), one for each /images entry
+};
+
+/// Reads .glb or .gltf. External buffers and images are read from the file's own folder and nowhere above it.
+[[nodiscard]] Result<Document> loadDocument(const std::filesystem::path& file, const ImportLimits& limits = {});
+
+/// The same from memory (an upload): only data URIs and the GLB chunk can be used.
+[[nodiscard]] Result<Document> parseDocument(std::string name, std::span<const std::uint8_t> bytes,
+                                             const ImportLimits& limits = {});
+
+/// Every index, offset, count and string is checked here; errors carry file, JSON pointer and reason.
+[[nodiscard]] Result<Scene> importScene(const Document& document, const ImportLimits& limits = {});
+
+/// RFC 6902 on a copy, then validated by the caller with importScene. Pointers may name things:
+/// /nodes/@lamp/translation.
+[[nodiscard]] Result<Document> applyPatch(const Document& document, const nlohmann::json& patch);
+
+/// The document as one GLB file (JSON chunk + one BIN chunk; buffers and images embedded).
+[[nodiscard]] Bytes writeGlb(const Document& document);
+
+}  // namespace radiosity::scene

@@ -1,0 +1,137 @@
+// What the light transport sees: triangles in a unit box, charts with mip pyramids of patches, and where each leaf
+// patch lies. Built once per geometry; immutable; shared by const pointer between solve thread and workers.
+//
+// Leaf patch == lightmap texel. A chart ("surface") is a width x height grid of leaves. Level l has
+// ceil(width / 2^l) x ceil(height / 2^l) nodes; node (x, y) of level l covers leaves [x 2^l, (x+1) 2^l) x [y 2^l, ...),
+// so the ancestor of leaf (x, y) at level l is (x >> l, y >> l). The last level is 1 x 1. A surface side's nodes lie
+// consecutively, level 0 first, row-major. A double-sided surface has a second set of nodes for its back.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <string>
+#include <vector>
+
+#include "common/result.h"
+#include "server/scene/scene.h"
+
+namespace radiosity::scene {
+
+/// A corner of a triangle as drawn. Corners are shared only between triangles of the same plane and chart, so `normal`
+/// (the triangle's geometric normal, front side) is constant over a triangle.
+struct PatchVertex {
+  glm::vec3 position;  ///< unit box
+  std::uint32_t surface;
+  glm::vec2 texel;  ///< chart coordinates in leaf texels: leaf (x, y) covers [x, x+1) x [y, y+1)
+  glm::vec3 normal;
+};
+
+/// Affine map of a triangle: position(texel) = origin + texel.x du + texel.y dv (unit box). normal = front side.
+struct TriangleFrame {
+  glm::vec3 origin, du, dv, normal;
+};
+
+/// Where a leaf is: a point (texel coordinates) on the part of the leaf that is covered and not buried inside another
+/// solid, and the triangle that holds it. kFull: wholly covered by coplanar triangles and wholly unburied, so any point
+/// of the texel may be used with the triangle's frame.
+struct LeafPoint {
+  glm::vec2 texel;
+  std::uint32_t triangle = kNone;  ///< kNone: the leaf is empty
+  bool full = false;
+};
+
+struct Surface {
+  std::uint32_t instance = kNone;
+  std::uint32_t material = kNone;
+  std::uint32_t width = 0, height = 0, level_count = 0;
+  std::array<std::uint32_t, 2> first_node{kNone, kNone};  ///< front, back; kNone: that side only absorbs
+  std::uint32_t first_leaf = 0;                           ///< into PatchScene::leaves; shared by both sides
+  std::uint32_t page = 0, page_x = 0, page_y = 0;         ///< leaf (0, 0) is page texel (page_x, page_y)
+  std::uint32_t first_triangle = 0, triangle_count = 0;
+  glm::vec3 bounds_min{0.0F}, bounds_max{0.0F};
+  bool planar = false;
+  float texel_area = 0.0F;  ///< area of a full leaf, unit box squared
+};
+
+struct Page {
+  std::uint32_t width = 0, height = 0;
+};
+
+struct PatchScene {
+  // unit = (world - centre) / scale; areas in the unit box times scale^2 are m^2
+  glm::dvec3 centre{0.0};
+  double scale = 1.0;
+
+  std::vector<PatchVertex> vertices;
+  std::vector<std::uint32_t> indices;    ///< 3 a triangle; triangles of a surface lie together
+  std::vector<TriangleFrame> triangles;  ///< one for each triangle
+  std::vector<std::uint32_t> triangle_surface;
+  std::vector<Surface> surfaces;
+  std::vector<LeafPoint> leaves;
+  std::vector<float> node_area;  ///< unit box squared: covered and unburied part; parent = sum of children; 0 = empty
+  std::vector<Page> pages;
+
+  /// Lightmap coordinates of the imported vertices: one for each corner of each instance's triangles, in page UV [0, 1]
+  /// (v down, row 0 = v 0), and the page of each triangle (kNone: dropped). For the exporter and the viewer.
+  struct InstanceUv {
+    std::vector<std::array<glm::vec2, 3>> corners;  ///< by triangle of the primitive
+    std::vector<std::uint32_t> page;                ///< by triangle of the primitive
+  };
+  std::vector<InstanceUv> instance_uvs;  ///< one for each Scene::instances entry
+
+  std::vector<std::string> warnings;
+  std::uint64_t polygons = 0;  ///< coplanar facets (what the paper calls polygons)
+  std::uint64_t triangles_dropped = 0;
+
+  [[nodiscard]] std::size_t nodeCount() const { return node_area.size(); }
+};
+
+/// Grid size and first node of one level, relative to a surface side's first node.
+struct LevelGrid {
+  std::uint32_t width, height, offset;
+};
+
+[[nodiscard]] inline LevelGrid levelGrid(std::uint32_t width, std::uint32_t height, std::uint32_t level) {
+  std::uint32_t offset = 0;
+  for (std::uint32_t l = 0; l < level; ++l) {
+    const auto round = (1U << l) - 1;
+    offset += ((width + round) >> l) * ((height + round) >> l);
+  }
+  const auto round = (1U << level) - 1;
+  return {(width + round) >> level, (height + round) >> level, offset};
+}
+
+[[nodiscard]] inline std::uint32_t levelCount(std::uint32_t width, std::uint32_t height) {
+  std::uint32_t levels = 1;
+  for (auto size = width > height ? width : height; size > 1; size = (size + 1) >> 1) ++levels;
+  return levels;
+}
+
+struct ChartOptions {
+  std::uint64_t texel_budget = 16'000;  ///< leaf patches in all, about; used when texel_size_m is 0
+  double texel_size_m = 0.0;
+  std::uint32_t max_page_size = 4096;
+  std::uint32_t gutter = 2;       ///< empty texels between charts
+  double curve_angle_deg = 15.0;  ///< normal spread of a curved chart
+};
+
+/// Flattens instances, drops degenerate triangles (counted), makes charts or takes a valid TEXCOORD_1, packs pages,
+/// measures coverage and burial. kTooLarge when a limit of nodes (2^31) or pages is passed.
+[[nodiscard]] Result<PatchScene> buildPatchScene(const Scene& scene, const ChartOptions& options);
+
+/// Emission (exitance E = pi L_e, lux) and reflectance of every node: leaves integrated over textures and vertex
+/// colours (16 samples a leaf), parents area-weighted means. Index = node. Reflectance is clamped to 0.999.
+struct PatchMaterials {
+  std::vector<glm::vec3> emission;
+  std::vector<glm::vec3> reflectance;
+  std::vector<std::string> warnings;
+};
+[[nodiscard]] PatchMaterials shadePatches(const Scene& scene, const PatchScene& patches);
+
+/// Recomputes the nodes of the surfaces that use `material`; returns those surfaces.
+std::vector<std::uint32_t> reshadeMaterial(const Scene& scene, const PatchScene& patches, std::uint32_t material,
+                                           PatchMaterials& materials);
+
+}  // namespace radiosity::scene

@@ -1,0 +1,105 @@
+// The scene as plain values, imported from a glTF document: what the chart builder, the exporter and the snapshot
+// renderer read. No GL, no sockets, no JSON. Immutable once built; shared between threads by const pointer.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/mat4x4.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace radiosity::scene {
+
+inline constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+
+/// Decoded image, 8 bits a channel, RGBA, row 0 at v = 0 (glTF convention: top row first).
+struct Texture {
+  int width = 0;
+  int height = 0;
+  bool srgb = true;  ///< colour textures are sRGB-encoded; convert to linear before use
+  std::vector<std::uint8_t> rgba;
+};
+
+/// A texture as a material refers to it: which image, which TEXCOORD set, KHR_texture_transform already combined.
+struct TextureUse {
+  std::uint32_t texture = kNone;
+  int texcoord = 0;
+  glm::vec2 offset{0.0F};
+  glm::vec2 scale{1.0F};
+  float rotation = 0.0F;
+  bool repeat_u = true, repeat_v = true;  ///< false: clamp (mirror is treated as repeat with mirrored flag)
+  bool mirror_u = false, mirror_v = false;
+};
+
+enum class AlphaMode { kOpaque, kMask, kBlend };
+
+struct Material {
+  std::string name;
+  glm::vec3 base_color{1.0F};  ///< linear sRGB factor
+  float alpha = 1.0F;
+  float alpha_cutoff = 0.5F;
+  float metallic = 0.0F;      ///< factor x mean of the metallic texture; reflectance = base_color x (1 - metallic)
+  float transmission = 0.0F;  ///< KHR_materials_transmission factor
+  glm::vec3 emission{0.0F};   ///< L_e in nits: emissiveFactor x emissiveStrength
+  AlphaMode alpha_mode = AlphaMode::kOpaque;
+  bool double_sided = false;
+  TextureUse base_color_texture, emissive_texture;
+};
+
+/// One glTF primitive as a triangle list in mesh space. All per-vertex arrays are empty or positions.size() long.
+struct Primitive {
+  std::uint32_t mesh = kNone;       ///< index into /meshes
+  std::uint32_t primitive = kNone;  ///< index into /meshes/<mesh>/primitives
+  std::uint32_t material = 0;  ///< index into Scene::materials (a default material is appended where none is named)
+  std::vector<glm::dvec3> positions;
+  std::vector<glm::vec2> texcoord0, texcoord1;
+  std::vector<glm::vec4> color0;       ///< linear
+  std::vector<std::uint32_t> indices;  ///< 3 a triangle, counter-clockwise = front, all < positions.size()
+};
+
+/// A primitive placed in the world by a node (or by one element of EXT_mesh_gpu_instancing).
+struct Instance {
+  std::uint32_t node = kNone;       ///< index into /nodes
+  std::uint32_t primitive = kNone;  ///< index into Scene::primitives
+  glm::dmat4 world{1.0};            ///< mesh to world, metres; a negative determinant flips the front
+  bool visible = true;
+};
+
+struct Camera {
+  std::string name;
+  glm::dmat4 world{1.0};  ///< camera looks along -Z, Y up
+  double yfov_rad = 0.8;
+  double aspect = 0.0;  ///< width / height; 0: the picture's own
+  double znear = 0.01;
+};
+
+enum class LightKind { kPoint, kSpot, kDirectional };
+
+/// KHR_lights_punctual, in world space.
+struct PunctualLight {
+  LightKind kind = LightKind::kPoint;
+  glm::dvec3 position{0.0};
+  glm::dvec3 direction{0.0, 0.0, -1.0};
+  glm::vec3 intensity{0.0F};  ///< candela (point, spot) or lux (directional), colour included
+  double range = 0.0;         ///< metres; 0: infinite
+  double inner_cone_rad = 0.0;
+  double outer_cone_rad = 0.785398163;
+};
+
+struct Scene {
+  std::vector<Texture> textures;
+  std::vector<Material> materials;
+  std::vector<Primitive> primitives;
+  std::vector<Instance> instances;
+  std::vector<Camera> cameras;
+  std::vector<PunctualLight> lights;
+  std::vector<std::string> warnings;    ///< "room.glb: /materials/3: ..." in the order found
+  std::uint64_t triangles_dropped = 0;  ///< zero-area, non-finite or duplicate triangles left out
+};
+
+}  // namespace radiosity::scene

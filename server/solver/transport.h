@@ -1,0 +1,109 @@
+// The interface between the solver, which decides what to shoot, and whoever carries the light (the GL hemicube
+// renderer and its worker processes; a ray caster in the tests). Lengths are in the unit box of PatchScene, flux in lux
+// x unit^2.
+//
+// Everything a shot delivers is rounded to integers, once a node and shot, and added: the order of shots, and the
+// number of workers, cannot change a bit of the result, and a shot replayed with the opposite sign cancels exactly.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/result.h"
+#include "server/scene/patch_scene.h"
+
+namespace radiosity::solver {
+
+/// Number of subpixel offsets of the hemicube's lattice: a kLatticeSide x kLatticeSide grid, so that the exact pixel
+/// weights of each can be tabulated.
+inline constexpr std::uint32_t kLatticeSide = 4;
+/// Pixel weights of one hemicube are integers that sum to exactly this.
+inline constexpr std::uint32_t kWeightOne = 1U << 30;
+
+/// Where a hemicube stands. tangent is a unit vector in the surface's plane, random rotation included.
+struct HemicubeFrame {
+  glm::vec3 origin, normal, tangent;
+  std::uint32_t lattice = 0;  ///< index of the subpixel offset, < kLatticeSide^2
+};
+
+/// Scatter: a full hemicube of mip-level node IDs; each pixel delivers flux x weight to the node it names.
+struct ScatterShot {
+  HemicubeFrame frame;
+  std::uint32_t resolution = 64;  ///< N: the top face is N x N pixels
+  float level_bias = 0.0F;        ///< added to the exact level before floor; includes the shot's random u in [0, 1)
+  std::array<double, 3> flux{};   ///< signed, per channel
+  std::uint32_t half = 0;         ///< which of the two independent accumulators receives it
+};
+
+/// Gather: direct light of one convex planar polygon at every leaf. For each point on the polygon an item buffer gives
+/// visibility; irradiance = radiosity x exact polygon form factor (Lambert) x mean visibility weighted by cos cos /
+/// r^2.
+struct GatherShot {
+  std::array<glm::vec3, 4> corners{};
+  std::uint32_t corner_count = 3;  ///< 3 or 4, counter-clockwise seen from the lit side
+  glm::vec3 normal{0.0F};
+  std::array<double, 3> radiosity{};  ///< signed, lux, times the shot's weight in the average
+  std::uint32_t resolution = 128;
+  glm::vec2 receiver_jitter{0.5F};  ///< where in a full leaf's texel the receiving point lies
+  std::uint32_t half = 0;
+  std::uint32_t first_point = 0, point_count = 0;  ///< into ShotBatch::points
+};
+
+enum class LinkMode : std::uint32_t {
+  kFormula,      ///< level from the exact pixel footprint, node ID by arithmetic (default)
+  kPaperMipmap,  ///< NEAREST_MIPMAP_NEAREST usampler2D with composed IDs, the hardware chooses the level (Lum, Ma, Max
+                 ///< 2002)
+};
+
+/// Work that may be done in any order and by anyone.
+struct ShotBatch {
+  LinkMode mode = LinkMode::kFormula;
+  double flux_scale = 1.0;  ///< integers = round(flux x flux_scale); a power of two
+  std::vector<ScatterShot> scatter;
+  std::vector<GatherShot> gather;
+  std::vector<HemicubeFrame> points;  ///< light points of the gather shots
+};
+
+using Flux3 = std::array<std::int64_t, 3>;
+
+/// What came of it. `node[half][id]` is the flux delivered directly to that node (not yet pushed or pulled).
+struct FluxAccumulators {
+  std::array<std::vector<Flux3>, 2> node;
+  Flux3 escaped{};    ///< left the scene
+  Flux3 backface{};   ///< absorbed by the unlit side of a single-sided surface
+  Flux3 scattered{};  ///< sum delivered to nodes by scatter shots
+  Flux3 gathered{};   ///< sum delivered to leaves by gather shots
+
+  void reset(std::size_t node_count);
+};
+
+/// What was done, for reports. Times are summed over workers.
+struct TransportCounters {
+  std::uint64_t scatter_shots = 0, gather_shots = 0, gather_points = 0;
+  std::uint64_t pixels = 0;  ///< visibility samples rendered and accumulated
+  std::uint64_t links = 0;   ///< (shot, node) pairs that received flux
+  std::uint64_t triangles_drawn = 0, triangles_culled = 0;
+  double render_seconds = 0.0, accumulate_seconds = 0.0, gather_seconds = 0.0;
+};
+
+class Transport {
+ public:
+  virtual ~Transport() = default;
+
+  /// Uploads geometry; must come before run(). Blocks.
+  [[nodiscard]] virtual Result<void> setScene(std::shared_ptr<const scene::PatchScene> patches) = 0;
+
+  /// Carries out the batch and adds what it delivered to `into` (sized by the caller). Blocks. On error `into` is
+  /// unchanged.
+  [[nodiscard]] virtual Result<TransportCounters> run(const ShotBatch& batch, FluxAccumulators& into) = 0;
+
+  /// "llvmpipe (LLVM 15.0.6, 256 bits), 2 workers"
+  [[nodiscard]] virtual std::string description() const = 0;
+};
+
+}  // namespace radiosity::solver
