@@ -19,7 +19,12 @@ struct LightPolygon {
   double area = 0.0;         ///< unit box squared
   std::uint32_t key = 0;     ///< stable across edits of emission: for sample sequences
 
-  [[nodiscard]] double power() const { return area * static_cast<double>(emission.x + emission.y + emission.z); }
+  glm::dvec3 delivered{0.0};  ///< S of the emission: exitance gathered so far, summed over rounds
+
+  /// What a round still owes, exitance summed over rounds; signed.
+  [[nodiscard]] glm::dvec3 undelivered(std::uint32_t rounds) const {
+    return static_cast<double>(rounds) * glm::dvec3(emission) - delivered;
+  }
   /// The point at (u, v) in [0, 1)^2, uniform in area.
   [[nodiscard]] glm::vec3 point(double u, double v) const;
 };
