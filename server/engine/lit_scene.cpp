@@ -1,6 +1,7 @@
 #include "server/engine/lit_scene.h"
 
 #include <algorithm>
+#include <glm/common.hpp>
 #include <set>
 
 namespace radiosity::engine {
@@ -124,6 +125,23 @@ std::vector<std::string> LitScene::warnings() const {
 
 std::vector<scene::LightmapPage> LitScene::pages() const {
   return scene::assemblePages(*patches_, solver_->irradiance());
+}
+
+std::vector<scene::LightmapPage> LitScene::errorPages() const {
+  std::vector<glm::vec3> error(patches_->nodeCount(), glm::vec3(0.0F));
+  const auto& state = solver_->state();
+  std::vector<glm::vec3> first, second;
+  for (const auto& side : state.sides()) {
+    first.resize(side.leaf_count);
+    second.resize(side.leaf_count);
+    state.halfIrradiance(side, 0, first);
+    state.halfIrradiance(side, 1, second);
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+      const glm::vec3 mean = 0.5F * (first[leaf] + second[leaf]);
+      error[side.first_node + leaf] = 0.5F * glm::abs(first[leaf] - second[leaf]) / glm::max(mean, glm::vec3(1e-30F));
+    }
+  }
+  return scene::assemblePages(*patches_, error);
 }
 
 }  // namespace radiosity::engine

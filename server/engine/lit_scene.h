@@ -40,8 +40,16 @@ class LitScene {
   /// Starts the solve over, with other settings that leave the charts as they are.
   void restart(const SolveSettings& settings);
 
+  /// Another target or time limit: the solve goes on from where it is.
+  void retarget(const SolveSettings& settings) {
+    settings_ = settings;
+    solver_->setTargetError(settings.target_error);
+  }
+
   /// Finished pages of the solver's present irradiance (filled, stitched, dilated).
   [[nodiscard]] std::vector<scene::LightmapPage> pages() const;
+  /// The same of the estimated sampling error, relative to the irradiance.
+  [[nodiscard]] std::vector<scene::LightmapPage> errorPages() const;
 
  private:
   LitScene(scene::Document document, const SolveSettings& settings, solver::Transport& transport)
