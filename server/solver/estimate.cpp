@@ -100,9 +100,9 @@ double meanReflectance(const RadiosityState& state) {
   return received > 0.0 ? std::clamp(reflected / received, 0.0, 0.999) : 0.0;
 }
 
-ErrorParts estimateError(const RadiosityState& state) {
+ErrorParts estimateError(const RadiosityState& state, double owed) {
   Sums sums;
-  double unshot = 0.0;
+  double unshot = owed;
   for (const auto& side : state.sides()) {
     addSide(state, side, sums);
     unshot += side.unshot_power;

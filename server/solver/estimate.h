@@ -25,8 +25,8 @@ struct EnergyParts {
   std::array<double, 3> imbalance{};
 };
 
-/// Needs pushPullAll().
-[[nodiscard]] ErrorParts estimateError(const RadiosityState& state);
+/// Needs pushPullAll(). `owed`: flux that light polygons have yet to deliver, all channels, over all rounds.
+[[nodiscard]] ErrorParts estimateError(const RadiosityState& state, double owed);
 [[nodiscard]] EnergyParts energyBalance(const RadiosityState& state, const std::array<double, 3>& planner_imbalance,
                                         const std::array<double, 3>& gather_emitted);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 
 namespace radiosity::solver {
 namespace {
@@ -93,6 +94,15 @@ Result<StepOutcome> Solver::gatherDirect() {
   return StepOutcome::kShot;
 }
 
+double Solver::owedPower() const {
+  double power = 0.0;
+  for (const auto& light : lights_) {
+    const glm::dvec3 owed = glm::abs(light.undelivered(state_.rounds()));
+    power += light.area * (owed.x + owed.y + owed.z);
+  }
+  return power;
+}
+
 double Solver::remainder() const {
   double received = 0.0;
   for (const auto& half : {state_.gathered(), state_.scattered()}) {
@@ -112,7 +122,7 @@ Result<StepOutcome> Solver::scatterIndirect() {
 StepOutcome Solver::finishRound() {
   publish();
   live_ = false;
-  error_ = estimateError(state_);
+  error_ = estimateError(state_, owedPower());
   const double reached = settings_.paper_mode ? error_.residual : error_.total;
   if (reached <= settings_.target_error || settings_.paper_mode || state_.rounds() >= kMaxRounds) {
     phase_ = Phase::kDone;
@@ -154,7 +164,7 @@ void Solver::setMaterials(const scene::PatchMaterials& materials) {
   live_ = true;
   startRound();
   publish();
-  error_ = estimateError(state_);
+  error_ = estimateError(state_, owedPower());
 }
 
 EnergyParts Solver::energy() const { return energyBalance(state_, planner_.imbalance(), gather_emitted_); }

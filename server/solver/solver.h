@@ -69,6 +69,7 @@ class Solver {
   [[nodiscard]] Result<void> run(const ShotBatch& batch, bool gathering);
   void startRound();
   void publish();
+  [[nodiscard]] double owedPower() const;
   [[nodiscard]] double remainder() const;
 
   RadiosityState state_;
