@@ -1,12 +1,12 @@
 #include "client/lib/connection.h"
 
 #include <algorithm>
+#include <boost/beast/core/buffers_to_string.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/http/string_body.hpp>
 #include <boost/beast/websocket.hpp>
 #include <deque>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <random>
 
 #include "client/lib/pump.h"

@@ -2,6 +2,7 @@
 // that may want to stop. Everything happens on the caller's thread.
 #pragma once
 
+#include <algorithm>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/beast/core/error.hpp>
@@ -33,11 +34,10 @@ class Pump {
         interrupted_ = true;
         return false;
       }
-      if (done()) return true;  // keep_going may have run handlers
-      const auto now = Clock::now();
-      if (now >= deadline) return false;
       if (context_.stopped()) context_.restart();
-      context_.run_one_for(std::min<Clock::duration>(kSlice, deadline - now));
+      const auto left = deadline - Clock::now();
+      context_.run_one_for(std::clamp<Clock::duration>(left, Clock::duration::zero(), kSlice));
+      if (left <= Clock::duration::zero()) return done();
     }
     return true;
   }
