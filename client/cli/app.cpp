@@ -5,7 +5,8 @@ namespace radiosity::cli {
 void buildApp(CLI::App& app, Run& run) {
   app.description(
       "Global illumination for glTF scenes: solves a scene into lightmaps, or talks to a running radiosityd.\n"
-      "URL is HOST:PORT, http://HOST:PORT or ws://HOST:PORT/ws. Results go to stdout, progress and messages to stderr.");
+      "URL is HOST:PORT, http://HOST:PORT or ws://HOST:PORT/ws. Results go to stdout, progress and messages to "
+      "stderr.");
   app.footer(
       "Exit codes: 0 done, the asked error reached; 1 failed; 2 bad usage or bad input;\n"
       "            3 time limit reached before the error, output written; 75 interrupted.\n"

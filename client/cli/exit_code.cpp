@@ -10,7 +10,8 @@ namespace {
 
 /// Texts come from files and peers: control characters must not reach the terminal.
 std::string oneLine(std::string text) {
-  std::replace_if(text.begin(), text.end(), [](unsigned char c) { return c < ' ' || c == 0x7f; }, ' ');
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return c < ' ' || c == 0x7f; }, ' ');
   return text;
 }
 
@@ -46,8 +47,8 @@ ExitCode complain(const Error& error) {
 
 ExitCode complain(const client::CallFailure& failure) {
   Error error = failure.error;
-  if (failure.rpc && failure.rpc->op) error.where = "operation " + std::to_string(*failure.rpc->op) +
-                                                    (error.where.empty() ? "" : ": " + error.where);
+  if (failure.rpc && failure.rpc->op)
+    error.where = "operation " + std::to_string(*failure.rpc->op) + (error.where.empty() ? "" : ": " + error.where);
   return complain(error);
 }
 

@@ -109,8 +109,9 @@ void addSnapshot(CLI::App& app, Run& run) {
   auto& command = *app.add_subcommand("snapshot", "save a picture of a server's scene as it is now");
   addRemoteOptions(command, options->server);
   command.add_option("-o,--output", options->output, "the picture")->required()->type_name("FILE.png");
-  command.add_option("--camera", options->camera,
-                     "name or index of a camera of the scene (default: the first, or one that frames the scene)")
+  command
+      .add_option("--camera", options->camera,
+                  "name or index of a camera of the scene (default: the first, or one that frames the scene)")
       ->type_name("NAME");
   const CLI::Range side(16, protocol::kMaxSnapshotSide);
   command.add_option("--width", options->width, "pixels")->check(side)->type_name("PX")->capture_default_str();

@@ -9,15 +9,15 @@
 namespace radiosity::cli {
 
 struct ProgressView {
-  std::string state;          ///< "solving", "loading", ... as the server says
-  double error = 1.0;         ///< relative, total
+  std::string state;   ///< "solving", "loading", ... as the server says
+  double error = 1.0;  ///< relative, total
   double residual = 0.0, sampling = 0.0, discretization = 0.0;
   double target_error = 0.02;
   std::uint64_t shots = 0;
   double shots_per_second = 0.0;
-  double seconds = 0.0;       ///< of solving
+  double seconds = 0.0;  ///< of solving
   std::optional<double> seconds_left;
-  bool show_parts = false;    ///< the three parts of the error too
+  bool show_parts = false;  ///< the three parts of the error too
 };
 
 /// Share of the way from an error of 1 to the target, on a log scale, in [0, 1].

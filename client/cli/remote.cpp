@@ -67,8 +67,10 @@ ErrorCode codeOfStatus(unsigned status) {
 client::TransferProgress showTransfer(ProgressDisplay& display, std::string what) {
   return [&display, what = std::move(what)](std::uint64_t done_bytes, std::uint64_t total_bytes) {
     constexpr double kMega = 1e6;
-    const double share = total_bytes > 0 ? 100.0 * static_cast<double>(done_bytes) / static_cast<double>(total_bytes) : 0.0;
-    display.showText(total_bytes > 0 ? fmt::format("{} {:.1f} of {:.1f} MB, {:.0f} %", what, static_cast<double>(done_bytes) / kMega,
+    const double share =
+        total_bytes > 0 ? 100.0 * static_cast<double>(done_bytes) / static_cast<double>(total_bytes) : 0.0;
+    display.showText(total_bytes > 0 ? fmt::format("{} {:.1f} of {:.1f} MB, {:.0f} %", what,
+                                                   static_cast<double>(done_bytes) / kMega,
                                                    static_cast<double>(total_bytes) / kMega, share)
                                      : fmt::format("{} {:.1f} MB", what, static_cast<double>(done_bytes) / kMega));
   };
@@ -132,8 +134,7 @@ void addRemoteOptions(CLI::App& command, RemoteOptions& options) {
 }
 
 client::CallResult<client::Connection> Remote::connect() const {
-  return client::Connection::open(
-      {.url = url, .client = "radiosity/0.1.0", .token = token, .keep_going = keep_going});
+  return client::Connection::open({.url = url, .client = "radiosity/0.1.0", .token = token, .keep_going = keep_going});
 }
 
 Result<Remote> remoteFrom(const RemoteOptions& options) {
@@ -181,8 +182,8 @@ Result<Loaded> uploadScene(const Remote& remote, const std::string& path, Progre
 Result<std::string> glbStem(const std::string& path) {
   constexpr std::string_view kEnding = ".glb";
   if (path.size() <= kEnding.size() || !path.ends_with(kEnding) || path[path.size() - kEnding.size() - 1] == '/')
-    return fail(ErrorCode::kBadUsage, "the output's name must end with .glb (lightmaps become NAME.lightmap.0.exr, ...)",
-                path);
+    return fail(ErrorCode::kBadUsage,
+                "the output's name must end with .glb (lightmaps become NAME.lightmap.0.exr, ...)", path);
   return path.substr(0, path.size() - kEnding.size());
 }
 

@@ -38,12 +38,13 @@ Result<Bytes> readWhole(const std::string& path, const std::string& where) {
 
 std::string extensionOf(const std::string& path) {
   std::string extension = fs::path(path).extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return std::tolower(c); });
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return std::tolower(c); });
   return extension;
 }
 
 std::string notGltf(const std::string& path) {
-  static constexpr std::array<std::string_view, 9> kOthers = {".blend", ".fbx", ".obj", ".usd",  ".usdz",
+  static constexpr std::array<std::string_view, 9> kOthers = {".blend", ".fbx", ".obj", ".usd",   ".usdz",
                                                               ".dae",   ".3ds", ".ply", ".blend1"};
   const std::string extension = extensionOf(path);
   std::string text = "this is neither a GLB nor a glTF JSON file";
@@ -114,7 +115,8 @@ Result<void> inlineEntry(nlohmann::json& entry, const std::string& list, const f
   std::error_code error;
   const fs::path file = fs::weakly_canonical(folder / fs::path(percentDecode(uri)), error);
   if (error || !isInside(file, folder))
-    return fail(ErrorCode::kBadInput, "\"" + uri + "\" lies outside the .gltf's folder and is not sent to a server", where);
+    return fail(ErrorCode::kBadInput, "\"" + uri + "\" lies outside the .gltf's folder and is not sent to a server",
+                where);
   auto bytes = readWhole(file.string(), where);
   if (!bytes) return tl::unexpected(bytes.error());
   entry["uri"] = "data:" + mediaType(entry, list, file.string()) + ";base64," + base64(*bytes);
@@ -126,7 +128,8 @@ Result<void> inlineEntry(nlohmann::json& entry, const std::string& list, const f
 Result<SceneKind> sceneKind(const std::string& path) {
   std::error_code error;
   if (!fs::exists(path, error)) return fail(ErrorCode::kBadInput, "no such file", path);
-  if (fs::is_directory(path, error)) return fail(ErrorCode::kBadInput, "this is a folder; name the .glb or .gltf in it", path);
+  if (fs::is_directory(path, error))
+    return fail(ErrorCode::kBadInput, "this is a folder; name the .glb or .gltf in it", path);
   std::ifstream file(path, std::ios::binary);
   if (!file) return fail(ErrorCode::kBadInput, std::string("cannot be opened: ") + std::strerror(errno), path);
   std::array<char, 64> start{};
@@ -137,7 +140,8 @@ Result<SceneKind> sceneKind(const std::string& path) {
     if (head.size() < kGlbHeaderBytes) return fail(ErrorCode::kBadInput, "the GLB is cut off inside its header", path);
     return SceneKind::kGlb;
   }
-  auto first = head.starts_with("\xEF\xBB\xBF") ? head.find_first_not_of(" \t\r\n", 3) : head.find_first_not_of(" \t\r\n");
+  auto first =
+      head.starts_with("\xEF\xBB\xBF") ? head.find_first_not_of(" \t\r\n", 3) : head.find_first_not_of(" \t\r\n");
   if (first != std::string_view::npos && head[first] == '{') return SceneKind::kGltf;
   return fail(ErrorCode::kBadInput, notGltf(path), path);
 }

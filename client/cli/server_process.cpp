@@ -119,9 +119,9 @@ Result<std::string> findServerProgram() {
   for (const auto& place : places)
     if (fs::is_regular_file(place, error) && access(place.c_str(), X_OK) == 0)
       return fs::weakly_canonical(place, error).string();
-  return fail(ErrorCode::kUnavailable,
-              "radiosityd was not found beside " + self.string() + " nor in PATH; install it, or name a running one with "
-              "--server");
+  return fail(ErrorCode::kUnavailable, "radiosityd was not found beside " + self.string() +
+                                           " nor in PATH; install it, or name a running one with "
+                                           "--server");
 }
 
 Result<ServerProcess> ServerProcess::start(const Options& options) {

@@ -49,8 +49,9 @@ class Solve {
     }
     if (code != ExitCode::kInterrupted) return code;
     std::fprintf(stderr, "%s\n",
-                 server_ ? "radiosity: nothing was written; a private solve keeps no state, so it starts anew next time"
-                         : "radiosity: nothing was written; the server goes on solving (radiosity save gets the result)");
+                 server_
+                     ? "radiosity: nothing was written; a private solve keeps no state, so it starts anew next time"
+                     : "radiosity: nothing was written; the server goes on solving (radiosity save gets the result)");
     return code;
   }
 
@@ -120,7 +121,10 @@ class Solve {
     if (by_path_) return {};  // the server was started with it
     // The connection is kept alive while the upload runs.
     Remote uploader = remote_;
-    uploader.keep_going = [this, &connection] { return remote_.keep_going() && connection.poll(0ms).has_value(); };
+    uploader.keep_going = [this, &connection] {
+      (void)connection.poll(0ms);  // one that broke shows in the next call
+      return remote_.keep_going();
+    };
     auto loaded = uploadScene(uploader, options_.scene, display_);
     if (!loaded) return tl::unexpected(CallFailure{loaded.error()});
     revision_ = loaded->revision;
@@ -169,8 +173,8 @@ class Solve {
     if (!reached && status.progress.state == "converged")
       warn(fmt::format("the server stopped at {}: another client changed its settings",
                        percentText(status.progress.error.total)));
-    auto written = saveScene(remote_, {.glb_path = options_.output, .unlit = options_.unlit, .png_path = options_.png},
-                             display_);
+    auto written =
+        saveScene(remote_, {.glb_path = options_.output, .unlit = options_.unlit, .png_path = options_.png}, display_);
     if (!written) return complainOf(CallFailure{written.error()});
     if (!options_.report.empty()) {
       auto done = writeReport(status, reached);
@@ -179,7 +183,7 @@ class Solve {
     display_.clear();
     passOnLog();
     for (const auto& warning : status.warnings)
-      if (!passed_on_.contains(warning)) warn(warning);
+      if (passed_on_.find(warning) == std::string::npos) warn(warning);
     for (const auto& name : *written) std::printf("%s\n", name.c_str());
     std::fprintf(stderr, "%s%s\n", reached ? "" : "time limit: ", outcomeText(status.progress).c_str());
     return reached ? ExitCode::kOk : ExitCode::kTimeLimit;
@@ -218,16 +222,19 @@ class Solve {
   ProgressDisplay display_;
   std::optional<ServerProcess> server_;
   Remote remote_;
-  bool by_path_ = false;          ///< the private server reads the scene itself
-  std::uint64_t revision_ = 0;    ///< of our scene; 0: not known
+  bool by_path_ = false;        ///< the private server reads the scene itself
+  std::uint64_t revision_ = 0;  ///< of our scene; 0: not known
   bool ask_now_ = false, replaced_ = false;
-  std::string passed_on_;         ///< warnings that were printed already
+  std::string passed_on_;  ///< warnings that were printed already
 };
 
 void addOutputOptions(CLI::App& command, SolveOptions& options) {
-  command.add_option("SCENE", options.scene, "the scene: .glb, or .gltf with its files beside it")->required()->type_name("");
-  command.add_option("-o,--output", options.output,
-                     "the scene with lightmap UVs; lightmaps go to NAME.lightmap.<page>.exr beside it")
+  command.add_option("SCENE", options.scene, "the scene: .glb, or .gltf with its files beside it")
+      ->required()
+      ->type_name("");
+  command
+      .add_option("-o,--output", options.output,
+                  "the scene with lightmap UVs; lightmaps go to NAME.lightmap.<page>.exr beside it")
       ->required()
       ->type_name("OUT.glb");
   command.add_flag("--unlit", options.unlit, "OUT.glb shows the tone-mapped result in any glTF viewer instead");
@@ -246,7 +253,8 @@ void addSolve(CLI::App& app, Run& run) {
       ->check(CLI::Range(1e-6, 1.0))
       ->type_name("FRACTION")
       ->capture_default_str();
-  command.add_option("--time-limit", options->time_limit_s, "solving stops after this many seconds (default: no limit)")
+  command
+      .add_option("--time-limit", options->time_limit_s, "solving stops after this many seconds (default: no limit)")
       ->check(CLI::Range(0.001, 1e6))
       ->type_name("SECONDS");
   auto* texels = command.add_option("--texels", options->texels, "lightmap texels (leaf patches) in all, about")
@@ -257,11 +265,13 @@ void addSolve(CLI::App& app, Run& run) {
       ->check(CLI::Range(1e-6, 1e6))
       ->type_name("METRES")
       ->excludes(texels);
-  command.add_option("--seed", options->seed, "the same seed gives the same bits")->type_name("N")->capture_default_str();
-  auto* workers = command.add_option("--workers", options->workers,
-                                     "render processes of the private server (default: one a core)")
-                      ->check(CLI::Range(1U, 256U))
-                      ->type_name("N");
+  command.add_option("--seed", options->seed, "the same seed gives the same bits")
+      ->type_name("N")
+      ->capture_default_str();
+  auto* workers =
+      command.add_option("--workers", options->workers, "render processes of the private server (default: one a core)")
+          ->check(CLI::Range(1U, 256U))
+          ->type_name("N");
   command.add_option("--server", options->server.url, "solve there rather than on a private radiosityd")
       ->type_name("URL")
       ->excludes(workers);

@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <optional>
+#include <thread>
 
 #include "client/cli/commands.h"
 #include "client/cli/interrupt.h"
@@ -104,8 +105,8 @@ class Watch {
       show(progress->progress);
       ask_now_ = ask_now_ || (!options_.follow && progress->progress.state != "solving");
     } else if (const auto* patched = std::get_if<protocol::ScenePatched>(&note)) {
-      display_.message(fmt::format("revision {}: edited by {}", patched->revision,
-                                   patched->by.empty() ? "somebody" : patched->by));
+      display_.message(
+          fmt::format("revision {}: edited by {}", patched->revision, patched->by.empty() ? "somebody" : patched->by));
     } else if (const auto* loaded = std::get_if<protocol::SceneLoaded>(&note)) {
       display_.message(fmt::format("revision {}: another scene", loaded->revision));
     } else if (std::holds_alternative<protocol::Draining>(note)) {
@@ -115,8 +116,8 @@ class Watch {
 
   void waitBeforeRetry(const std::string& why) {
     const auto wait = back_off_.next();
-    display_.message(fmt::format("{}; trying again in {}", why,
-                                 durationText(static_cast<double>(wait.count()) / 1000.0)));
+    display_.message(
+        fmt::format("{}; trying again in {}", why, durationText(static_cast<double>(wait.count()) / 1000.0)));
     const auto until = std::chrono::steady_clock::now() + wait;
     while (!interrupted() && std::chrono::steady_clock::now() < until) std::this_thread::sleep_for(20ms);
   }

@@ -25,7 +25,8 @@ constexpr std::uint64_t kMaxDownloadBytes = 64ULL << 30U;  // a bound where ther
 /// One request and its answer over one connection.
 class Exchange {
  public:
-  explicit Exchange(const HttpOptions& options) : options_(options), pump_(options.keep_going), stream_(pump_.context()) {}
+  explicit Exchange(const HttpOptions& options)
+      : options_(options), pump_(options.keep_going), stream_(pump_.context()) {}
 
   Result<void> connect() { return detail::connectTo(pump_, stream_, options_.url, options_.connect_timeout); }
 

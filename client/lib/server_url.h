@@ -10,9 +10,9 @@
 namespace radiosity::client {
 
 struct ServerUrl {
-  std::string host;            ///< name or address; IPv6 without its brackets
-  std::uint16_t port = 8765;   ///< without a scheme 8765; with http:// or ws:// 80, as everywhere
-  std::string prefix;          ///< path before the service's own paths, for a reverse proxy: "" or "/gi"
+  std::string host;           ///< name or address; IPv6 without its brackets
+  std::uint16_t port = 8765;  ///< without a scheme 8765; with http:// or ws:// 80, as everywhere
+  std::string prefix;         ///< path before the service's own paths, for a reverse proxy: "" or "/gi"
 
   /// "host:port" as in a Host header; IPv6 in brackets.
   [[nodiscard]] std::string authority() const;
