@@ -1,0 +1,107 @@
+"""What ./dev does with what is typed, as far as it needs neither a build nor an installation: those are played by
+stand-ins."""
+
+import os
+import shutil
+import subprocess
+import tempfile
+import unittest
+from pathlib import Path
+
+DEV = Path(__file__).resolve().parents[2] / "dev"
+
+
+def dev(*arguments, cwd=None):
+    return subprocess.run([DEV, *arguments], capture_output=True, text=True, stdin=subprocess.DEVNULL, cwd=cwd, timeout=60)
+
+
+class Dev(unittest.TestCase):
+    def test_help_goes_to_stdout_and_succeeds(self):
+        for spelling in ("--help", "-h", "help"):
+            done = dev(spelling)
+            self.assertEqual((done.returncode, done.stderr), (0, ""))
+            for command in ("run", "test", "build", "bench", "format", "lint", "clean"):
+                self.assertRegex(done.stdout, rf"\n  {command} ")
+
+    def test_an_unknown_command_is_named_and_fails_with_the_help(self):
+        done = dev("bulid")
+        self.assertEqual((done.returncode, done.stdout), (2, ""))
+        self.assertIn('"bulid"', done.stderr)
+        self.assertIn("Usage:", done.stderr)
+
+    def test_no_command_fails_with_the_help(self):
+        done = dev()
+        self.assertEqual((done.returncode, done.stdout), (2, ""))
+        self.assertIn("Usage:", done.stderr)
+
+    def test_a_missing_scene_is_refused_before_anything_is_built(self):
+        done = dev("run", "no-such-scene.glb")
+        self.assertEqual((done.returncode, done.stdout), (2, ""))
+        self.assertIn("no-such-scene.glb", done.stderr)
+        self.assertNotIn("building", done.stderr)
+
+    def test_works_from_any_folder(self):
+        with tempfile.TemporaryDirectory() as folder:
+            self.assertEqual(dev("--help", cwd=folder).returncode, 0)
+
+
+class DevRun(unittest.TestCase):
+    """`./dev run` in a copy of the checkout that is built already; the two programs tell how they were called."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.root = Path(folder.name).resolve()
+        shutil.copy(DEV, self.root / "dev")
+        self.stand_in("bin/dpkg-query", 'for name; do echo "ii $name"; done')
+        self.stand_in("bin/ninja", 'echo "ninja: no work to do."')
+        self.stand_in("build/client/cli/radiosity", 'printf "client|%s" "$@"; exit "${SOLVE_STATUS:-0}"')
+        self.stand_in("build/server/radiosityd", 'printf "server|%s" "$@"')
+        (self.root / "build/build.ninja").touch()
+        (self.root / "my room.glb").touch()
+
+    def stand_in(self, name, script):
+        path = self.root / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(f"#!/bin/bash\n{script}\n")
+        path.chmod(0o755)
+
+    def run_dev(self, *arguments, solve_status=0, cwd=None):
+        environment = dict(os.environ, PATH=f"{self.root}/bin:{os.environ['PATH']}", SOLVE_STATUS=str(solve_status))
+        return subprocess.run([self.root / "dev", "run", *arguments], capture_output=True, text=True, timeout=60,
+                              stdin=subprocess.DEVNULL, cwd=cwd or self.root, env=environment)
+
+    def test_a_built_tree_is_run_without_a_word(self):
+        done = self.run_dev("--no-serve")
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+
+    def test_the_default_scene_is_the_cornell_box(self):
+        called = self.run_dev("--no-serve").stdout.split("client|")
+        self.assertEqual(called, ["", "solve", f"{self.root}/build/scenes/cornell.glb", "-o", "out/cornell-lit.glb",
+                                  "--png", "out/cornell.png", "--report", "out/cornell.json"])
+
+    def test_a_scene_with_a_blank_in_its_name_and_options_reach_the_client(self):
+        called = self.run_dev("my room.glb", "--error", "0.01", "--no-serve").stdout.split("client|")
+        self.assertEqual(called[2:5], ["my room.glb", "-o", "out/my room-lit.glb"])
+        self.assertEqual(called[-2:], ["--error", "0.01"])
+
+    def test_serves_the_scene_after_it_is_solved_or_timed_out_but_not_when_asked_not_to(self):
+        for status in (0, 3):
+            self.assertIn("server|my room.glb", self.run_dev("my room.glb", solve_status=status).stdout)
+            self.assertNotIn("server|", self.run_dev("my room.glb", "--no-serve", solve_status=status).stdout)
+
+    def test_the_exit_code_of_solve_is_passed_on(self):
+        for status in (1, 2, 75):
+            done = self.run_dev("my room.glb", solve_status=status)
+            self.assertEqual(done.returncode, status)
+            self.assertNotIn("server|", done.stdout)
+        self.assertEqual(self.run_dev("my room.glb", "--no-serve", solve_status=3).returncode, 3)
+
+    def test_paths_are_the_callers_and_outputs_lie_in_the_checkout(self):
+        (self.root / "elsewhere").mkdir()
+        called = self.run_dev("../my room.glb", "--no-serve", cwd=self.root / "elsewhere").stdout.split("client|")
+        self.assertEqual(called[2:5], ["../my room.glb", "-o", f"{self.root}/out/my room-lit.glb"])
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,167 @@
+"""The rules of the house that a machine can check: who may include whom, what may lie at the top level, how long a file
+may be, and what must not be left in one. Each rule takes a Tree and yields sentences that name the file and the line."""
+
+import re
+import subprocess
+from pathlib import Path
+
+CODE_SUFFIXES = {".cpp", ".h", ".glsl", ".vert", ".frag", ".comp", ".py", ".sh", ".js", ".mjs", ".ts", ".css", ".html"}
+TEXT_SUFFIXES = CODE_SUFFIXES | {".md", ".txt", ".json", ".cmake", ".yml", ".yaml", ""}
+MAX_LINES = 500
+
+TOP_LEVEL = {
+    "CMakeLists.txt", "server", "protocol", "client", "common", "tests", "docker", "README.md",
+    "dev", "LICENSE", ".ci", ".clang-format", ".clang-tidy", ".gitignore", "CMakePresets.json",
+}
+
+# What a file may include of ours: the first row whose pattern matches its path decides. Patterns match from the start.
+OWN_INCLUDES = [
+    ("tests/", ["common/", "protocol/", "server/", "client/", "tests/"]),
+    ("common/", ["common/"]),
+    ("protocol/", ["common/", "protocol/"]),
+    ("server/scene/", ["common/", "server/scene/"]),
+    ("server/solver/", ["common/", "server/solver/", r"server/scene/(scene|patch_scene)\.h"]),
+    ("server/gpu/", ["common/", "server/gpu/", "server/solver/", r"server/scene/(scene|patch_scene)\.h"]),
+    ("server/engine/", ["common/", "server/engine/", "server/scene/", "server/solver/", "server/gpu/", "server/store/"]),
+    ("server/store/", ["common/", "server/store/"]),
+    ("server/net/", ["common/", "protocol/", "server/net/", r"server/engine/engine\.h"]),
+    (r"server/(main|options)[^/]*$", ["common/", "protocol/", "server/"]),
+    ("client/lib/", ["common/", "protocol/", "client/lib/"]),
+    ("client/cli/", ["common/", "protocol/", "client/lib/", "client/cli/"]),
+]
+
+# Libraries that have one home: pattern of the header's name, its name in the message, the folders that may include it.
+LIBRARY_HOMES = [
+    (r"(GL|EGL|GLES\d?|KHR|epoxy)/", "OpenGL and EGL headers", ["server/gpu/", "tests/"]),
+    (r"boost/", "Boost", ["server/net/", r"server/(main|options)[^/]*$", "client/lib/", "tests/"]),
+    (r"nlohmann/", "the JSON library", ["protocol/", "server/scene/", "client/cli/", "client/lib/", "tests/"]),
+    (r"tiny_gltf", "the glTF reader", ["server/scene/", "tests/"]),
+    (r"(gtest|gmock|benchmark|embree\d)/", "test libraries", ["tests/"]),
+]
+
+INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
+# Written in pieces, or this file would break its own rule.
+LEFTOVER = re.compile(r"\b(" + "|".join(["TO" "DO", "FIX" "ME", "X" "XX", "HA" "CK", "place" "holder", "not " "implemented"]) + r")\b")
+MACHINE_PATH = re.compile(r"(?<![\w.~${}*)\]-])/(work|home|root|Users)/")
+
+
+class Tree:
+    """The files under a folder: those that git knows where the folder is a checkout, else all that are not built."""
+
+    def __init__(self, root):
+        self.root = Path(root)
+        tracked = self._git("--cached")
+        self.top_level_known = tracked is not None
+        known = self._git("--cached", "--others", "--exclude-standard")
+        self.files = sorted(f for f in (known if known is not None else self._walk()) if (self.root / f).is_file())
+        # A user's own stray file at the top level is no fault of the house: only tracked files count there.
+        self.top_level = sorted({f.split("/")[0] for f in (tracked if tracked is not None else self.files)})
+
+    def _git(self, *options):
+        try:
+            done = subprocess.run(["git", "ls-files", "-z", *options], cwd=self.root, capture_output=True, check=True)
+        except (OSError, subprocess.CalledProcessError):
+            return None
+        return [f for f in done.stdout.decode().split("\0") if f]
+
+    def _walk(self):
+        skipped = re.compile(r"^(build[^/]*|out|\.git)/|(^|/)(node_modules|__pycache__)/")
+        found = (p.relative_to(self.root).as_posix() for p in self.root.rglob("*"))
+        return [f for f in found if not skipped.search(f + ("/" if (self.root / f).is_dir() else ""))]
+
+    def code(self):
+        return [f for f in self.files if Path(f).suffix in CODE_SUFFIXES or f == "dev"]
+
+    def text(self):
+        return [f for f in self.files if Path(f).suffix in TEXT_SUFFIXES and not f.endswith("LICENSE")]
+
+    def lines(self, file):
+        text = (self.root / file).read_text(encoding="utf-8", errors="replace")
+        return list(enumerate(text.splitlines(), 1))
+
+    def includes(self):
+        """(file, line number, header, whether written with quotes) of every include in C++ sources."""
+        for file in self.files:
+            if Path(file).suffix not in {".cpp", ".h"}:
+                continue
+            for number, line in self.lines(file):
+                match = INCLUDE.match(line)
+                if match:
+                    yield file, number, match.group(2), match.group(1) == '"'
+
+
+def matches(path, patterns):
+    return any(re.match(pattern, path) for pattern in patterns)
+
+
+def own_includes_follow_the_arrows(tree):
+    ours = re.compile(r"(common|protocol|server|client|tests)/")
+    for file, number, header, quoted in tree.includes():
+        if header.startswith("."):
+            yield f"{file}:{number}: includes {header} by a relative path; write it from the top level"
+            continue
+        if not ours.match(header):
+            if quoted and "/" not in header and (tree.root / file).parent.joinpath(header).exists():
+                yield f"{file}:{number}: includes {header} by a relative path; write it from the top level"
+            continue
+        allowed = next((to for pattern, to in OWN_INCLUDES if re.match(pattern, file)), None)
+        if allowed is None:
+            yield f"{file}:{number}: no rule says what this file may include; add a row to OWN_INCLUDES"
+        elif not matches(header, allowed):
+            yield f"{file}:{number}: includes {header}, but may include of ours only {', '.join(allowed)}"
+
+
+def libraries_stay_at_home(tree):
+    for file, number, header, _ in tree.includes():
+        for pattern, name, homes in LIBRARY_HOMES:
+            if re.match(pattern, header) and not matches(file, homes):
+                yield f"{file}:{number}: includes {header}; {name} may appear only in {', '.join(homes)}"
+
+
+def top_level_is_fixed(tree):
+    for entry in tree.top_level:
+        if entry not in TOP_LEVEL:
+            yield f"{entry}: not one of the top-level entries that the house allows"
+
+
+def files_are_short(tree):
+    for file in tree.code():
+        count = len(tree.lines(file))
+        if count > MAX_LINES:
+            yield f"{file}: {count} lines, more than {MAX_LINES}; split it"
+
+
+def nothing_is_left_over(tree):
+    for file in tree.code():
+        for number, line in tree.lines(file):
+            if LEFTOVER.search(line):
+                yield f"{file}:{number}: left over: {line.strip()}"
+
+
+def no_machine_is_named(tree):
+    for file in tree.text():
+        for number, line in tree.lines(file):
+            if MACHINE_PATH.search(line):
+                yield f"{file}:{number}: names a path of one machine: {line.strip()}"
+
+
+def readme_explains_every_package(tree):
+    """`dev` installs only what README.md gives a reason for, and README.md lists nothing that `dev` does not install."""
+    dev = (tree.root / "dev").read_text(encoding="utf-8")
+    installed = set()
+    for body in re.findall(r"^\w*packages=\(([^)]*)\)", dev, re.M):
+        installed |= set(body.split())
+    readme = (tree.root / "README.md").read_text(encoding="utf-8")
+    table = readme.partition("\n## Dependencies\n")[2].partition("\n## ")[0]
+    first_cells = " ".join(re.findall(r"^\|([^|]*)\|", table, re.M))
+    explained = set(re.findall(r"`([^`\s]+)`", first_cells))
+    for package in sorted(installed - explained):
+        yield f"README.md: Dependencies does not say why {package} is installed"
+    for package in sorted(explained - installed):
+        yield f"README.md: Dependencies lists {package}, which dev does not install"
+
+
+RULES = [
+    own_includes_follow_the_arrows, libraries_stay_at_home, top_level_is_fixed, files_are_short,
+    nothing_is_left_over, no_machine_is_named, readme_explains_every_package,
+]

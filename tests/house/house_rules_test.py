@@ -1,0 +1,135 @@
+"""Checks this checkout against the rules of the house, and each rule against small trees that break it."""
+
+import tempfile
+import unittest
+from pathlib import Path
+
+import house_rules
+from house_rules import Tree
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+class ThisCheckout(unittest.TestCase):
+    def test_keeps_every_rule(self):
+        tree = Tree(ROOT)
+        self.assertGreater(len(list(tree.includes())), 20, "the rules saw no sources")
+        for rule in house_rules.RULES:
+            with self.subTest(rule=rule.__name__):
+                broken = list(rule(tree))
+                self.assertFalse(broken, "\n" + "\n".join(broken))
+
+
+class EachRule(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.root = Path(folder.name)
+
+    def write(self, file, text):
+        path = self.root / file
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+
+    def complaints(self, rule):
+        return list(rule(Tree(self.root)))
+
+    def including(self, rule, file, *headers):
+        self.write(file, "".join(f"#include {header}\n" for header in headers))
+        found = self.complaints(rule)
+        (self.root / file).unlink()
+        return len(found)
+
+    def test_arrows_between_folders(self):
+        def count(file, header):
+            return self.including(house_rules.own_includes_follow_the_arrows, file, f'"{header}"')
+
+        for file, header in [
+            ("common/a.h", "server/scene/scene.h"), ("protocol/a.cpp", "server/engine/engine.h"),
+            ("server/scene/a.cpp", "server/solver/transport.h"), ("server/scene/a.cpp", "protocol/codec.h"),
+            ("server/solver/a.cpp", "server/scene/document.h"), ("server/solver/a.cpp", "server/gpu/view_renderer.h"),
+            ("server/gpu/a.cpp", "server/engine/engine.h"), ("server/engine/a.cpp", "protocol/messages.h"),
+            ("server/engine/a.cpp", "server/net/listener.h"), ("server/net/a.cpp", "server/engine/solve_loop.h"),
+            ("server/net/a.cpp", "server/scene/scene.h"), ("client/lib/a.cpp", "server/scene/scene.h"),
+            ("client/lib/a.cpp", "client/cli/solve.h"), ("server/engine/a.cpp", "tests/oracle/oracle.h"),
+            ("server/main.cpp", "tests/oracle/oracle.h"), ("server/unruly/a.cpp", "common/result.h"),
+            ("server/solver/a.cpp", "../scene/scene.h"),
+        ]:
+            self.assertEqual(count(file, header), 1, f"{file} -> {header} must be refused")
+        for file, header in [
+            ("common/a.h", "common/result.h"), ("server/solver/a.cpp", "server/scene/patch_scene.h"),
+            ("server/net/a.cpp", "server/engine/engine.h"), ("server/main.cpp", "server/net/listener.h"),
+            ("server/options.cpp", "server/engine/engine.h"), ("client/cli/a.cpp", "client/lib/connection.h"),
+            ("tests/unit/solver/a_test.cpp", "server/solver/state.h"), ("tests/oracle/a.cpp", "tests/scenes/room.h"),
+        ]:
+            self.assertEqual(count(file, header), 0, f"{file} -> {header} must be accepted")
+
+    def test_an_include_is_seen_however_it_is_written(self):
+        rule = house_rules.own_includes_follow_the_arrows
+        self.assertEqual(self.including(rule, "common/a.h", "<server/scene/scene.h>"), 1)
+        self.write("common/b.h", '  #  include "server/scene/scene.h" // why\n')
+        self.assertEqual(len(self.complaints(rule)), 1)
+        self.write("common/b.h", '#include "c.h"\n')
+        self.write("common/c.h", "")
+        self.assertEqual(len(self.complaints(rule)), 1)
+
+    def test_homes_of_libraries(self):
+        def count(file, header):
+            return self.including(house_rules.libraries_stay_at_home, file, f"<{header}>")
+
+        for file, header in [
+            ("server/solver/a.cpp", "epoxy/gl.h"), ("server/engine/a.cpp", "EGL/egl.h"), ("common/a.h", "GL/gl.h"),
+            ("server/engine/a.cpp", "boost/asio.hpp"), ("client/cli/a.cpp", "boost/beast.hpp"),
+            ("protocol/a.h", "boost/crc.hpp"), ("server/engine/a.cpp", "nlohmann/json.hpp"),
+            ("server/net/a.cpp", "nlohmann/json.hpp"), ("common/a.h", "nlohmann/json_fwd.hpp"),
+            ("server/solver/a.cpp", "gtest/gtest.h"), ("server/gpu/a.cpp", "embree3/rtcore.h"),
+        ]:
+            self.assertEqual(count(file, header), 1, f"{file} -> {header} must be refused")
+        for file, header in [
+            ("server/gpu/a.cpp", "epoxy/gl.h"), ("tests/gl/a.cpp", "EGL/egl.h"), ("server/net/a.cpp", "boost/beast.hpp"),
+            ("server/main.cpp", "boost/asio.hpp"), ("client/lib/a.cpp", "boost/asio.hpp"),
+            ("server/scene/a.cpp", "nlohmann/json.hpp"), ("tests/oracle/a.cpp", "embree3/rtcore.h"),
+        ]:
+            self.assertEqual(count(file, header), 0, f"{file} -> {header} must be accepted")
+
+    def test_top_level(self):
+        self.write("README.md", "")
+        self.write("server/main.cpp", "")
+        self.assertEqual(self.complaints(house_rules.top_level_is_fixed), [])
+        self.write("notes/a.md", "")
+        self.write("setup.py", "")
+        self.assertEqual(len(self.complaints(house_rules.top_level_is_fixed)), 2)
+
+    def test_length(self):
+        self.write("common/a.h", "\n" * house_rules.MAX_LINES)
+        self.assertEqual(self.complaints(house_rules.files_are_short), [])
+        self.write("common/a.h", "\n" * (house_rules.MAX_LINES + 1))
+        self.assertEqual(len(self.complaints(house_rules.files_are_short)), 1)
+
+    def test_leftovers(self):
+        self.write("common/a.h", "// the method of todos and hacks that were never made\n")
+        self.assertEqual(self.complaints(house_rules.nothing_is_left_over), [])
+        self.write("common/a.h", "// TO" + "DO: finish\nint a;  // FIX" + "ME\n")
+        self.assertEqual(len(self.complaints(house_rules.nothing_is_left_over)), 2)
+
+    def test_machine_paths(self):
+        self.write("README.md", "at/home/a, ~/home/a, ../home/b, $HOME/home/c, https://example.org/home/\n")
+        self.assertEqual(self.complaints(house_rules.no_machine_is_named), [])
+        self.write("README.md", "see /ho" + "me/ada/scene.glb\nand \"/ro" + "ot/scenes\"\n")
+        self.assertEqual(len(self.complaints(house_rules.no_machine_is_named)), 2)
+
+    def test_packages(self):
+        self.write("dev", "packages=(\n  cmake g++\n)\nlint_packages=(clang)\n")
+        self.write("README.md", "# a\n\n## Dependencies\n\n| `cmake` | why |\n| `clang` | why |\n| `g++` | why |\n\n## b\n`other`\n")
+        self.assertEqual(self.complaints(house_rules.readme_explains_every_package), [])
+        self.write("README.md", "# a\n\n## Dependencies\n\n| `cmake` | why |\n| `g++` | why |\n| `tool` | why |\n")
+        self.assertEqual(len(self.complaints(house_rules.readme_explains_every_package)), 2)
+
+    def test_build_outputs_are_not_judged(self):
+        self.write("build/common/a.h", "\n" * 1000)
+        self.write("tests/web/node_modules/a/b.js", "\n" * 1000)
+        self.assertEqual(Tree(self.root).files, [])
+
+
+if __name__ == "__main__":
+    unittest.main()
