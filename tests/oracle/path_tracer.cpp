@@ -299,6 +299,9 @@ class PathTracer::Scene {
     std::vector<double> cumulative;
     double sum = 0.0;
     for (const auto& piece : footprint.pieces) cumulative.push_back(sum += triangleArea(piece.corners));
+    if (!(sum > 0.0)) {  // points: all alike
+      for (std::size_t i = 0; i < cumulative.size(); ++i) cumulative[i] = static_cast<double>(i + 1);
+    }
     return cumulative;
   }
 

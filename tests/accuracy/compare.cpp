@@ -1,0 +1,123 @@
+#include "tests/accuracy/compare.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "tests/oracle/random.h"
+
+namespace radiosity::accuracy {
+namespace {
+
+/// Below this visible share a texel is filled from its neighbours, so its own mean says nothing about the solver.
+constexpr double kLeastVisible = 0.25;
+constexpr double kWholeTexel = 0.999;
+
+std::vector<Texel> chooseTexels(const LitScene& lit, const ReferenceOptions& options) {
+  auto texels = findTexels(lit);
+  std::erase_if(texels, [](const Texel& texel) { return texel.coverage < kWholeTexel; });
+  if (options.texels == 0 || texels.size() <= options.texels) return texels;
+  oracle::Random random(options.seed);
+  for (std::size_t i = 0; i < options.texels; ++i) {
+    const auto left = static_cast<double>(texels.size() - i);
+    std::swap(texels[i], texels[i + static_cast<std::size_t>(random.uniform() * left)]);
+  }
+  texels.resize(options.texels);
+  return texels;
+}
+
+struct SurfacePoint {
+  Reference::Point where;
+  oracle::Footprint footprint;
+};
+
+/// Points spread evenly over the area of all lit triangles.
+std::vector<SurfacePoint> choosePoints(const LitScene& lit, const ReferenceOptions& options) {
+  std::vector<double> cumulative;
+  double sum = 0.0;
+  for (const auto& triangle : lit.scene.triangles) {
+    cumulative.push_back(sum += triangle.lightmap_page >= 0 ? oracle::area(triangle) : 0.0);
+  }
+  oracle::Random random(options.seed + 1);
+  std::vector<SurfacePoint> points;
+  for (std::size_t i = 0; i < options.points && sum > 0.0; ++i) {
+    const double target = (static_cast<double>(i) + random.uniform()) / static_cast<double>(options.points) * sum;
+    const auto found = std::upper_bound(cumulative.begin(), cumulative.end() - 1, target);
+    const auto& triangle = lit.scene.triangles[static_cast<std::size_t>(found - cumulative.begin())];
+    const double root = std::sqrt(random.uniform());
+    const double v = random.uniform();
+    const auto mix = [&](const auto& c) { return c[0] * (1.0 - root) + c[1] * (root * (1.0 - v)) + c[2] * (root * v); };
+    SurfacePoint point{{triangle.lightmap_page, mix(triangle.lightmap_uv), {}}, {}};
+    point.footprint = oracle::Footprint::at(mix(triangle.corners), triangle.normal);
+    if (triangle.double_sided) {
+      auto back = point.footprint.pieces[0];
+      back.normal = -back.normal;
+      point.footprint.pieces.push_back(back);
+    }
+    points.push_back(std::move(point));
+  }
+  return points;
+}
+
+template <typename Item>
+std::vector<oracle::Irradiance> trace(const oracle::PathTracer& tracer, const std::vector<Item>& items,
+                                      std::uint32_t samples, std::uint64_t seed) {
+  std::vector<oracle::Footprint> footprints;
+  footprints.reserve(items.size());
+  for (const auto& item : items) footprints.push_back(item.footprint);
+  return tracer.irradiance(footprints, {.samples = samples, .seed = seed});
+}
+
+}  // namespace
+
+Reference makeReference(const LitScene& lit, const ReferenceOptions& options) {
+  const auto start = std::chrono::steady_clock::now();
+  const oracle::PathTracer tracer(lit.scene);
+  Reference reference;
+  const auto texels = chooseTexels(lit, options);
+  const auto texel_means = trace(tracer, texels, options.texel_samples, options.seed + 2);
+  for (std::size_t i = 0; i < texels.size(); ++i) {
+    const auto& texel = texels[i];
+    if (texel_means[i].visible_fraction < kLeastVisible) continue;
+    const double area = texel.footprint.area() * texel_means[i].visible_fraction;
+    reference.texels.push_back({texel.page, texel.x, texel.y, area, texel_means[i]});
+  }
+  const auto points = choosePoints(lit, options);
+  const auto point_values = trace(tracer, points, options.point_samples, options.seed + 3);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!(point_values[i].visible_fraction > 0.0)) continue;
+    reference.points.push_back({points[i].where.page, points[i].where.uv, point_values[i]});
+  }
+  reference.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return reference;
+}
+
+Accuracy measure(const LitScene& lit, const Reference& reference) {
+  std::vector<oracle::Comparison> texels;
+  for (const auto& texel : reference.texels) {
+    texels.push_back({lit.pages.at(static_cast<std::size_t>(texel.page)).at(texel.x, texel.y),
+                      texel.irradiance.mean_lux, texel.irradiance.standard_error, texel.area});
+  }
+  std::vector<oracle::Comparison> points;
+  for (const auto& point : reference.points) {
+    points.push_back({lit.pages.at(static_cast<std::size_t>(point.page)).bilinear(point.uv), point.irradiance.mean_lux,
+                      point.irradiance.standard_error, 1.0});
+  }
+  return {oracle::measureError(texels), oracle::measureError(points)};
+}
+
+nlohmann::json toJson(const oracle::ErrorMetrics& metrics) {
+  return {{"relative_rms", metrics.solverRms()},
+          {"relative_rms_with_noise", metrics.relative_rms},
+          {"reference_noise", metrics.reference_noise},
+          {"mean", metrics.mean},
+          {"median", metrics.median},
+          {"p99", metrics.p99},
+          {"bias", metrics.bias},
+          {"count", metrics.count}};
+}
+
+}  // namespace radiosity::accuracy

@@ -1,0 +1,51 @@
+// A solved lightmap against the path tracer, two ways. Solver error: the mean irradiance of whole texels. Total error:
+// a bilinear lookup at random points of the surface, so that the size of the texels counts too.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec2.hpp>
+#include <nlohmann/json_fwd.hpp>
+#include <vector>
+
+#include "tests/accuracy/lit_scene.h"
+#include "tests/oracle/error_metrics.h"
+
+namespace radiosity::accuracy {
+
+struct ReferenceOptions {
+  std::uint32_t texel_samples = 1024;  ///< paths a texel
+  std::uint32_t point_samples = 1024;  ///< paths a point
+  std::size_t texels = 4000;           ///< drawn at random among the whole ones; 0: all
+  std::size_t points = 2000;           ///< drawn by area
+  std::uint64_t seed = 1;
+};
+
+/// What the path tracer says for one layout of texels.
+struct Reference {
+  struct TexelMean {
+    int page = 0, x = 0, y = 0;
+    double area = 0.0;  ///< visible, m^2
+    oracle::Irradiance irradiance;
+  };
+  struct Point {
+    int page = 0;
+    glm::dvec2 uv{0.0};
+    oracle::Irradiance irradiance;
+  };
+  std::vector<TexelMean> texels;
+  std::vector<Point> points;
+  double seconds = 0.0;  ///< that it took
+};
+
+[[nodiscard]] Reference makeReference(const LitScene& lit, const ReferenceOptions& options);
+
+struct Accuracy {
+  oracle::ErrorMetrics solver, total;
+};
+
+/// `lit` must have the layout that the reference was made for.
+[[nodiscard]] Accuracy measure(const LitScene& lit, const Reference& reference);
+
+[[nodiscard]] nlohmann::json toJson(const oracle::ErrorMetrics& metrics);
+
+}  // namespace radiosity::accuracy

@@ -1,0 +1,50 @@
+// The product of a solve as a stranger reads it: the lit GLB (TEXCOORD_1 and extras.lightmap) and its EXR pages.
+// Nothing of the server's code. A value; any thread.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <vector>
+
+#include "tests/oracle/path_tracer.h"
+#include "tests/oracle/triangle_scene.h"
+
+namespace radiosity::accuracy {
+
+/// Irradiance in lux, row 0 = v 0.
+struct Page {
+  int width = 0, height = 0;
+  std::vector<glm::vec3> pixels;
+
+  [[nodiscard]] glm::dvec3 at(int x, int y) const;  ///< clamped to the edge
+  /// As a shader looks it up: texel centres at half integers, linear between them.
+  [[nodiscard]] glm::dvec3 bilinear(const glm::dvec2& uv) const;
+};
+
+struct LitScene {
+  oracle::TriangleScene scene;
+  std::vector<Page> pages;
+};
+
+/// NAME.glb with NAME.lightmap.<page>.exr beside it, for as many pages as the GLB names. Throws std::runtime_error.
+[[nodiscard]] LitScene readLitScene(const std::filesystem::path& glb);
+
+[[nodiscard]] Page readExr(const std::filesystem::path& file);
+void writeExr(const Page& page, const std::filesystem::path& file);
+
+/// A lightmap texel: which part of the scene lies under it.
+struct Texel {
+  int page = 0, x = 0, y = 0;
+  double coverage = 0.0;  ///< share of the texel that triangles cover
+  oracle::Footprint footprint;
+};
+
+/// All texels that any triangle touches, in a fixed order. Double-sided triangles count with both sides.
+[[nodiscard]] std::vector<Texel> findTexels(const LitScene& lit);
+
+/// Whether texels of one lie where those of the other do, so that references can be shared.
+[[nodiscard]] bool sameLayout(const LitScene& a, const LitScene& b);
+
+}  // namespace radiosity::accuracy

@@ -1,0 +1,96 @@
+// The program as a whole against the independent references. Exit code 3 (time limit) is allowed: the claim is about
+// the result, not about the machine's speed.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "tests/accuracy/compare.h"
+#include "tests/accuracy/solve_run.h"
+#include "tests/scenes/glb_writer.h"
+#include "tests/scenes/scenes.h"
+
+namespace radiosity::accuracy {
+namespace {
+
+LitScene solve(const test_scenes::TestScene& scene, const std::vector<std::string>& arguments,
+               nlohmann::json* report = nullptr) {
+  const auto* test = testing::UnitTest::GetInstance()->current_test_info();
+  const auto folder = std::filesystem::path(RADIOSITY_BINARY_DIR) / "accuracy" /
+                      (std::string(test->test_suite_name()) + "." + test->name());
+  std::filesystem::create_directories(folder);
+  const auto file = folder / (scene.name + ".glb");
+  test_scenes::writeGlb(scene, file);
+  const auto run = runSolve(RADIOSITY_CLIENT, file, folder, arguments);
+  EXPECT_TRUE(run.exit_code == 0 || run.exit_code == 3) << "exit code " << run.exit_code;
+  if (report != nullptr) *report = run.report;
+  return readLitScene(run.output);
+}
+
+/// The largest relative distance of any whole texel from the one value they all should have, any channel.
+double worstFromConstant(const LitScene& lit, double exact) {
+  double worst = 0.0;
+  for (const auto& texel : findTexels(lit)) {
+    if (texel.coverage < 0.999) continue;
+    const auto value = lit.pages.at(static_cast<std::size_t>(texel.page)).at(texel.x, texel.y);
+    for (int c = 0; c < 3; ++c) worst = std::max(worst, std::abs(value[c] / exact - 1.0));
+  }
+  return worst;
+}
+
+double rmsFromConstant(const LitScene& lit, double exact) {
+  std::vector<oracle::Comparison> comparisons;
+  for (const auto& texel : findTexels(lit)) {
+    const auto value = lit.pages.at(static_cast<std::size_t>(texel.page)).at(texel.x, texel.y);
+    if (texel.coverage > 0.25) comparisons.push_back({value, glm::dvec3(exact), {}, texel.footprint.area()});
+  }
+  EXPECT_FALSE(comparisons.empty());
+  return oracle::measureError(comparisons).relative_rms;
+}
+
+TEST(SolvedScene, FurnaceOfReflectanceHalfIsWithinHalfAPercent) {
+  const auto lit = solve(test_scenes::furnace(glm::dvec3(0.5), glm::dvec3(1.0)),
+                         {"--error", "0.002", "--time-limit", "20", "--texels", "1500"});
+  EXPECT_LT(rmsFromConstant(lit, 2.0 * std::numbers::pi), 0.005);
+  EXPECT_LT(worstFromConstant(lit, 2.0 * std::numbers::pi), 0.05);
+}
+
+TEST(SolvedScene, FurnaceOfReflectanceNineTenthsIsWithinOnePercent) {
+  const auto lit = solve(test_scenes::furnace(glm::dvec3(0.9), glm::dvec3(1.0)),
+                         {"--error", "0.004", "--time-limit", "20", "--texels", "1500"});
+  EXPECT_LT(rmsFromConstant(lit, 10.0 * std::numbers::pi), 0.01);
+}
+
+TEST(SolvedScene, CornellBoxIsWithinFivePercentOfThePathTracer) {
+  nlohmann::json report;
+  const auto lit = solve(test_scenes::cornell(), {"--error", "0.02", "--time-limit", "30"}, &report);
+  const auto reference =
+      makeReference(lit, {.texel_samples = 1024, .point_samples = 1024, .texels = 1500, .points = 1000});
+  const auto accuracy = measure(lit, reference);
+  RecordProperty("solver_error", std::to_string(accuracy.solver.solverRms()));
+  RecordProperty("total_error", std::to_string(accuracy.total.solverRms()));
+  EXPECT_LT(accuracy.solver.solverRms(), 0.05);
+  EXPECT_LT(accuracy.total.solverRms(), 0.05);
+  EXPECT_LT(std::abs(accuracy.solver.bias), 0.01);
+  ASSERT_TRUE(report.contains("error"));
+  // the stated error is a promise: the truth is not much worse
+  EXPECT_LT(accuracy.solver.solverRms(), 2.0 * report["error"]["total"].get<double>() + 0.005);
+}
+
+TEST(SolvedScene, EnergyOfTheReportBalances) {
+  nlohmann::json report;
+  solve(test_scenes::cornell(), {"--error", "0.1", "--time-limit", "10", "--texels", "2000"}, &report);
+  const auto& e = report.at("energy");
+  const double emitted = e.at("emitted");
+  const double found = e.at("absorbed").get<double>() + e.at("escaped").get<double>() + e.at("backface").get<double>() +
+                       e.at("unshot").get<double>();
+  EXPECT_NEAR(found / emitted, 1.0, 1e-6);
+  // lumens as the report sums them: pi x luminance x area, three channels
+  const auto scene = test_scenes::cornell();
+  const auto& light = scene.materials.back().emission_nits;
+  EXPECT_NEAR(emitted, std::numbers::pi * (light.x + light.y + light.z) * 0.130 * 0.105, 1e-3 * emitted);
+}
+
+}  // namespace
+}  // namespace radiosity::accuracy

@@ -1,0 +1,25 @@
+// Runs `radiosity solve` as a user does and collects what it wrote.
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "tests/accuracy/lit_scene.h"
+
+namespace radiosity::accuracy {
+
+struct SolveRun {
+  int exit_code = -1;  ///< 128 + signal when it was killed
+  double wall_seconds = 0.0;
+  nlohmann::json report;  ///< of --report; null when none was written
+  std::filesystem::path output;
+};
+
+/// `client` is the radiosity program (or a name in PATH); `arguments` come after those for files. Output and report go
+/// to `folder`, which is made. Throws std::runtime_error when the program cannot be started.
+[[nodiscard]] SolveRun runSolve(const std::filesystem::path& client, const std::filesystem::path& scene,
+                                const std::filesystem::path& folder, const std::vector<std::string>& arguments);
+
+}  // namespace radiosity::accuracy

@@ -1,0 +1,33 @@
+// How far values are from a reference, as one set of figures. Pure function.
+#pragma once
+
+#include <cstddef>
+#include <glm/vec3.hpp>
+#include <span>
+
+namespace radiosity::oracle {
+
+struct ErrorMetrics {
+  double relative_rms = 0.0;  ///< sqrt(sum a |H - Href|^2 / sum a |Href|^2), over RGB
+  double mean = 0.0;          ///< of the relative error of luminance, area-weighted
+  double median = 0.0;
+  double p99 = 0.0;
+  double bias = 0.0;             ///< sum a Y / sum a Yref - 1
+  double reference_noise = 0.0;  ///< relative RMS standard error of the reference: part of relative_rms
+  std::size_t count = 0;
+
+  /// relative_rms without the reference's own noise (independent errors add in squares).
+  [[nodiscard]] double solverRms() const;
+};
+
+struct Comparison {
+  glm::dvec3 value{0.0}, reference{0.0}, standard_error{0.0};
+  double weight = 0.0;  ///< visible area; 0: left out
+};
+
+[[nodiscard]] ErrorMetrics measureError(std::span<const Comparison> comparisons);
+
+/// Luminance of linear sRGB (Rec. 709 weights).
+[[nodiscard]] double luminance(const glm::dvec3& rgb);
+
+}  // namespace radiosity::oracle

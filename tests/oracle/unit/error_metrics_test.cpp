@@ -1,0 +1,54 @@
+#include "tests/oracle/error_metrics.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+namespace radiosity::oracle {
+namespace {
+
+TEST(ErrorMetrics, UniformScaleIsBiasMedianAndRmsAlike) {
+  std::vector<Comparison> comparisons;
+  for (int i = 1; i < 50; ++i) {
+    const glm::dvec3 reference(i, 2 * i, 0.5 * i);
+    comparisons.push_back({1.1 * reference, reference, glm::dvec3(0.0), 1.0 / i});
+  }
+  const auto metrics = measureError(comparisons);
+  for (const double figure : {metrics.relative_rms, metrics.mean, metrics.median, metrics.p99, metrics.bias}) {
+    EXPECT_NEAR(figure, 0.1, 1e-12);
+  }
+  EXPECT_EQ(metrics.count, 49U);
+}
+
+TEST(ErrorMetrics, AreaDecidesTheMedian) {
+  const glm::dvec3 one(1.0);
+  const auto metrics = measureError(
+      std::vector<Comparison>{{1.5 * one, one, {}, 1.0}, {1.4 * one, one, {}, 1.0}, {0.99 * one, one, {}, 10.0}});
+  EXPECT_NEAR(metrics.median, 0.01, 1e-12);
+  EXPECT_NEAR(metrics.p99, 0.5, 1e-12);
+}
+
+TEST(ErrorMetrics, WeightlessAndDarkEntriesDoNotSpoilTheRest) {
+  const glm::dvec3 one(1.0);
+  const auto metrics = measureError(std::vector<Comparison>{
+      {one, one, {}, 1.0}, {5.0 * one, one, {}, 0.0}, {glm::dvec3(0.0), glm::dvec3(0.0), {}, 1.0}});
+  EXPECT_EQ(metrics.relative_rms, 0.0);
+  EXPECT_EQ(metrics.p99, 0.0);
+}
+
+TEST(ErrorMetrics, ReferenceNoiseIsTakenOutInSquares) {
+  const glm::dvec3 one(1.0);
+  const auto metrics = measureError(std::vector<Comparison>{{1.05 * one, one, 0.03 * one, 1.0}});
+  EXPECT_NEAR(metrics.reference_noise, 0.03, 1e-12);
+  EXPECT_NEAR(metrics.solverRms(), 0.04, 1e-12);
+}
+
+TEST(ErrorMetrics, NothingToCompareGivesZeros) {
+  const auto metrics = measureError({});
+  EXPECT_EQ(metrics.count, 0U);
+  EXPECT_EQ(metrics.solverRms(), 0.0);
+}
+
+}  // namespace
+}  // namespace radiosity::oracle
