@@ -1,0 +1,57 @@
+#include "client/cli/exit_code.h"
+
+#include <algorithm>
+#include <cstdio>
+
+#include "client/cli/interrupt.h"
+
+namespace radiosity::cli {
+namespace {
+
+/// Texts come from files and peers: control characters must not reach the terminal.
+std::string oneLine(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return c < ' ' || c == 0x7f; }, ' ');
+  return text;
+}
+
+}  // namespace
+
+ExitCode exitCodeOf(ErrorCode code) {
+  switch (code) {
+    case ErrorCode::kBadUsage:
+    case ErrorCode::kBadInput:
+    case ErrorCode::kInvalidScene:
+    case ErrorCode::kUnsupported:
+    case ErrorCode::kNotFound:
+    case ErrorCode::kTooLarge:
+    case ErrorCode::kStaleRevision:
+    case ErrorCode::kTestFailed:
+      return ExitCode::kBadInput;
+    case ErrorCode::kBusy:
+    case ErrorCode::kUnavailable:
+    case ErrorCode::kInternal:
+      break;
+  }
+  return ExitCode::kFailed;
+}
+
+ExitCode complain(const Error& error) {
+  if (interrupted()) {
+    std::fputs("radiosity: interrupted\n", stderr);
+    return ExitCode::kInterrupted;
+  }
+  std::fprintf(stderr, "radiosity: error: %s\n", oneLine(error.text()).c_str());
+  return exitCodeOf(error.code);
+}
+
+ExitCode complain(const client::CallFailure& failure) {
+  Error error = failure.error;
+  if (failure.rpc && failure.rpc->op)
+    error.where = "operation " + std::to_string(*failure.rpc->op) + (error.where.empty() ? "" : ": " + error.where);
+  return complain(error);
+}
+
+void warn(const std::string& text) { std::fprintf(stderr, "radiosity: warning: %s\n", oneLine(text).c_str()); }
+
+}  // namespace radiosity::cli

@@ -1,0 +1,220 @@
+#include "client/cli/remote.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "client/cli/interrupt.h"
+#include "client/cli/scene_file.h"
+#include "protocol/json_rpc.h"
+
+namespace radiosity::cli {
+namespace {
+
+constexpr unsigned kMaxPages = 4096;
+constexpr int kSaveAttempts = 3;
+constexpr std::size_t kMaxErrorTextBytes = 500;
+
+Result<std::string> readToken(const std::string& path) {
+  if (path.empty()) return std::string();
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return fail(ErrorCode::kBadUsage, "the token file cannot be read", path);
+  std::string token(protocol::kMaxTokenBytes + 1, '\0');
+  file.read(token.data(), static_cast<std::streamsize>(token.size()));
+  token.resize(static_cast<std::size_t>(file.gcount()));
+  const auto end = token.find_last_not_of(" \t\r\n");
+  token.resize(end == std::string::npos ? 0 : end + 1);
+  if (token.empty()) return fail(ErrorCode::kBadUsage, "the token file is empty", path);
+  if (token.size() > protocol::kMaxTokenBytes) return fail(ErrorCode::kBadUsage, "the token is over 4096 bytes", path);
+  if (token.find_first_of("\r\n") != std::string::npos)
+    return fail(ErrorCode::kBadUsage, "the token file must hold one line", path);
+  return token;
+}
+
+/// Body of an error answer: {"error": {code, message, data}} as on the WebSocket, or plain text.
+std::optional<Error> errorInBody(const std::string& body) {
+  const auto messages = protocol::parseRpc(body, client::kMaxReplyBytes);
+  if (messages.items.size() == 1)
+    if (const auto* response = std::get_if<protocol::RpcResponse>(&messages.items.front()); response != nullptr)
+      if (response->error) return protocol::fromRpcError(*response->error);
+  return std::nullopt;
+}
+
+ErrorCode codeOfStatus(unsigned status) {
+  switch (status) {
+    case 400:
+    case 415:
+    case 422:
+      return ErrorCode::kBadInput;
+    case 404:
+      return ErrorCode::kNotFound;
+    case 409:
+      return ErrorCode::kStaleRevision;
+    case 413:
+      return ErrorCode::kTooLarge;
+    case 429:
+    case 503:
+      return ErrorCode::kBusy;
+    default:
+      return ErrorCode::kUnavailable;
+  }
+}
+
+/// Numbers of a transfer for the progress line.
+client::TransferProgress showTransfer(ProgressDisplay& display, std::string what) {
+  return [&display, what = std::move(what)](std::uint64_t done_bytes, std::uint64_t total_bytes) {
+    constexpr double kMega = 1e6;
+    const double share =
+        total_bytes > 0 ? 100.0 * static_cast<double>(done_bytes) / static_cast<double>(total_bytes) : 0.0;
+    display.showText(total_bytes > 0 ? fmt::format("{} {:.1f} of {:.1f} MB, {:.0f} %", what,
+                                                   static_cast<double>(done_bytes) / kMega,
+                                                   static_cast<double>(total_bytes) / kMega, share)
+                                     : fmt::format("{} {:.1f} MB", what, static_cast<double>(done_bytes) / kMega));
+  };
+}
+
+/// GET into a new file; no value where the server says 404.
+Result<std::optional<client::AtomicFile>> download(const Remote& remote, const std::string& target,
+                                                   const std::string& path, ProgressDisplay& display) {
+  auto file = client::AtomicFile::create(path);
+  if (!file) return tl::unexpected(file.error());
+  auto http = remote.http();
+  http.progress = showTransfer(display, "writing " + path);
+  const auto reply = client::httpGetToFile(http, target, *file);
+  if (!reply) return tl::unexpected(reply.error());
+  if (reply->status == 404) return std::optional<client::AtomicFile>();
+  if (!reply->ok()) return tl::unexpected(httpError(*reply, target));
+  return std::optional<client::AtomicFile>(std::move(*file));
+}
+
+Result<std::vector<client::AtomicFile>> downloadAll(const Remote& remote, const SaveRequest& request,
+                                                    const std::string& stem, ProgressDisplay& display) {
+  std::vector<client::AtomicFile> files;
+  const std::string glb_target = request.unlit ? "/scene-unlit.glb" : "/scene.glb";
+  auto glb = download(remote, glb_target, request.glb_path, display);
+  if (!glb) return tl::unexpected(glb.error());
+  if (!*glb) return fail(ErrorCode::kNotFound, "the server has no scene to save yet", remote.url.text());
+  files.push_back(std::move(**glb));
+  for (unsigned page = 0; page < kMaxPages; ++page) {
+    auto exr = download(remote, fmt::format("/lightmaps/{}.exr", page), fmt::format("{}.lightmap.{}.exr", stem, page),
+                        display);
+    if (!exr) return tl::unexpected(exr.error());
+    if (!*exr) break;  // past the last page
+    files.push_back(std::move(**exr));
+  }
+  if (!request.png_path.empty()) {
+    auto png = download(remote, "/snapshot.png", request.png_path, display);
+    if (!png) return tl::unexpected(png.error());
+    if (!*png) return fail(ErrorCode::kNotFound, "the server has no picture of this scene", remote.url.text());
+    files.push_back(std::move(**png));
+  }
+  return files;
+}
+
+Result<std::uint64_t> currentRevision(const Remote& remote) {
+  auto connection = remote.connect();
+  if (!connection) return tl::unexpected(connection.error().error);
+  return connection->serverInfo().revision;
+}
+
+}  // namespace
+
+void addTokenOption(CLI::App& command, RemoteOptions& options) {
+  command.add_option("--token-file", options.token_file, "file that holds the server's token")->type_name("FILE");
+}
+
+void addRemoteOptions(CLI::App& command, RemoteOptions& options) {
+  command.add_option("URL", options.url, "the server: HOST:PORT, http://HOST:PORT or ws://HOST:PORT/ws")
+      ->required()
+      ->type_name("");
+  addTokenOption(command, options);
+}
+
+client::CallResult<client::Connection> Remote::connect() const {
+  return client::Connection::open({.url = url, .client = "radiosity/0.1.0", .token = token, .keep_going = keep_going});
+}
+
+Result<Remote> remoteFrom(const RemoteOptions& options) {
+  auto url = client::parseServerUrl(options.url);
+  if (!url) return tl::unexpected(url.error());
+  auto token = readToken(options.token_file);
+  if (!token) return tl::unexpected(token.error());
+  return Remote{*url, *token, [] { return !interrupted(); }};
+}
+
+Error httpError(const client::HttpReply& reply, const std::string& where) {
+  if (auto error = errorInBody(reply.body)) {
+    error->where = error->where.empty() ? where : where + ": " + error->where;
+    return *error;
+  }
+  std::string text = reply.body.substr(0, kMaxErrorTextBytes);
+  while (!text.empty() && (text.back() == '\n' || text.back() == '\r')) text.pop_back();
+  if (text.empty()) text = "the server answered with HTTP status " + std::to_string(reply.status);
+  if (reply.status == 401 || reply.status == 403) text += " (is the token right? --token-file)";
+  return {codeOfStatus(reply.status), text, where};
+}
+
+Result<Loaded> uploadScene(const Remote& remote, const std::string& path, ProgressDisplay& display) {
+  const auto kind = sceneKind(path);
+  if (!kind) return tl::unexpected(kind.error());
+  auto http = remote.http();
+  http.progress = showTransfer(display, "uploading " + path);
+  Result<client::HttpReply> reply = client::HttpReply{};
+  if (*kind == SceneKind::kGlb) {
+    reply = client::httpPutFile(http, "/scene", "model/gltf-binary", path);
+  } else {
+    auto text = inlineExternalFiles(path);
+    if (!text) return tl::unexpected(text.error());
+    reply = client::httpPutText(http, "/scene", "model/gltf+json", std::move(*text));
+  }
+  if (!reply) return tl::unexpected(reply.error());
+  if (!reply->ok()) return tl::unexpected(httpError(*reply, path));
+  const auto body = protocol::parseJson(reply->body);
+  if (!body) return fail(ErrorCode::kUnavailable, "the server's answer to the upload is not JSON", remote.url.text());
+  auto loaded = protocol::decodeReply<protocol::SceneLoadReply>(**body);
+  if (!loaded) return tl::unexpected(loaded.error());
+  return Loaded{loaded->revision, std::move(loaded->warnings)};
+}
+
+Result<std::string> glbStem(const std::string& path) {
+  constexpr std::string_view kEnding = ".glb";
+  if (path.size() <= kEnding.size() || !path.ends_with(kEnding) || path[path.size() - kEnding.size() - 1] == '/')
+    return fail(ErrorCode::kBadUsage,
+                "the output's name must end with .glb (lightmaps become NAME.lightmap.0.exr, ...)", path);
+  return path.substr(0, path.size() - kEnding.size());
+}
+
+Result<void> checkOutputs(const std::vector<std::string>& paths) {
+  for (const auto& path : paths) {
+    if (path.empty()) continue;
+    if (auto probe = client::AtomicFile::create(path); !probe) return tl::unexpected(probe.error());
+  }
+  return {};
+}
+
+Result<std::vector<std::string>> saveScene(const Remote& remote, const SaveRequest& request, ProgressDisplay& display) {
+  const auto stem = glbStem(request.glb_path);
+  if (!stem) return tl::unexpected(stem.error());
+  for (int attempt = 0; attempt < kSaveAttempts; ++attempt) {
+    const auto before = currentRevision(remote);
+    if (!before) return tl::unexpected(before.error());
+    auto files = downloadAll(remote, request, *stem, display);
+    if (!files) return tl::unexpected(files.error());
+    const auto after = currentRevision(remote);
+    if (!after) return tl::unexpected(after.error());
+    if (*before != *after) continue;  // somebody edited the scene in between: UVs and pages might not belong together
+    std::vector<std::string> names;
+    for (auto& file : *files) {
+      if (auto done = file.commit(); !done) return tl::unexpected(done.error());
+      names.push_back(file.path());
+    }
+    return names;
+  }
+  return fail(ErrorCode::kBusy, "the scene is being edited faster than it can be downloaded; try again",
+              remote.url.text());
+}
+
+}  // namespace radiosity::cli

@@ -1,0 +1,112 @@
+#include "client/cli/report.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "common/check.h"
+#include "protocol/codec.h"
+
+namespace radiosity::cli {
+namespace {
+
+using nlohmann::json;
+constexpr auto kReplace = json::error_handler_t::replace;  // texts come from files and may not be UTF-8
+
+json numberOrNull(bool known, double value) { return known ? json(value) : json(nullptr); }
+
+json settingsJson(const protocol::Settings& settings) {
+  return {{"target_error", settings.target_error},
+          {"time_limit_s", numberOrNull(settings.time_limit_ms.has_value(),
+                                        static_cast<double>(settings.time_limit_ms.value_or(0)) / 1000.0)},
+          {"texels", settings.texels},
+          {"texel_size_m", settings.texel_size_m},
+          {"seed", settings.seed}};
+}
+
+std::string stateWord(const std::string& state) { return state == "timeLimit" ? "time limit" : state; }
+
+}  // namespace
+
+std::string reportJson(const protocol::StatusReply& status, bool reached) {
+  const auto& progress = status.progress;
+  json out = {{"seconds", progress.seconds},
+              {"shots", progress.shots},
+              {"patches", progress.patches},
+              {"surfaces", progress.surfaces},
+              {"polygons", progress.polygons},
+              {"nodes", progress.nodes},
+              {"error",
+               {{"total", progress.error.total},
+                {"residual", progress.error.residual},
+                {"sampling", progress.error.sampling},
+                {"discretization", progress.error.discretization}}},
+              {"energy",
+               {{"emitted", progress.energy.emitted},
+                {"absorbed", progress.energy.absorbed},
+                {"escaped", progress.energy.escaped},
+                {"backface", progress.energy.backface},
+                {"unshot", progress.energy.unshot}}},
+              {"revision", progress.revision},
+              {"gl_renderer", status.gl_renderer},
+              {"reached", reached},
+              {"settings", settingsJson(status.settings)},
+              {"warnings", status.warnings},
+              {"warning_count", status.warning_count},
+              {"counters", status.counters}};
+  return out.dump(2, ' ', false, kReplace) + "\n";
+}
+
+std::string statusJson(const protocol::StatusReply& status) {
+  const auto message = json::parse(protocol::encodeReply("0", status));
+  return message.at("result").dump(2, ' ', false, kReplace) + "\n";
+}
+
+std::string statusText(const protocol::StatusReply& status) {
+  const auto& p = status.progress;
+  const auto& s = status.settings;
+  std::string out;
+  const auto row = [&out](std::string_view name, const std::string& value) {
+    out += fmt::format("{:<10} {}\n", name, value);
+  };
+  row("state", stateWord(p.state) + (p.failure.empty() ? "" : ": " + p.failure));
+  row("revision", std::to_string(p.revision));
+  row("error", fmt::format("{} of {} (residual {}, sampling {}, discretization {})", percentText(p.error.total),
+                           percentText(s.target_error), percentText(p.error.residual), percentText(p.error.sampling),
+                           percentText(p.error.discretization)));
+  row("shots", fmt::format("{}, {:.0f}/s", countText(p.shots), p.shots_per_second));
+  row("time", durationText(p.seconds) + (p.seconds_left ? ", " + durationText(*p.seconds_left) + " left" : "") +
+                  (s.time_limit_ms ? ", limit " + durationText(static_cast<double>(*s.time_limit_ms) / 1000.0) : ""));
+  row("scene", fmt::format("{} polygons, {} surfaces, {} patches, {} nodes", countText(p.polygons),
+                           countText(p.surfaces), countText(p.patches), countText(p.nodes)));
+  row("energy", fmt::format("emitted {:.6g} lm: absorbed {:.6g}, escaped {:.6g}, back faces {:.6g}, unshot {:.6g}",
+                            p.energy.emitted, p.energy.absorbed, p.energy.escaped, p.energy.backface, p.energy.unshot));
+  row("texels", s.texel_size_m > 0.0 ? fmt::format("{:g} m each", s.texel_size_m) : "about " + countText(s.texels));
+  row("seed", std::to_string(s.seed));
+  row("OpenGL", status.gl_renderer);
+  row("warnings", countText(status.warning_count));
+  for (const auto& warning : status.warnings) out += "  " + warning + "\n";
+  return out;
+}
+
+ProgressView viewOf(const protocol::Progress& progress, double target_error) {
+  return {.state = stateWord(progress.state),
+          .error = progress.error.total,
+          .residual = progress.error.residual,
+          .sampling = progress.error.sampling,
+          .discretization = progress.error.discretization,
+          .target_error = target_error,
+          .shots = progress.shots,
+          .shots_per_second = progress.shots_per_second,
+          .seconds = progress.seconds,
+          .seconds_left = progress.seconds_left,
+          .show_parts = false};
+}
+
+std::string outcomeText(const protocol::Progress& progress) {
+  return fmt::format("error {} after {}, {} shots, {} patches, revision {}", percentText(progress.error.total),
+                     durationText(progress.seconds), countText(progress.shots), countText(progress.patches),
+                     progress.revision);
+}
+
+}  // namespace radiosity::cli

@@ -1,0 +1,283 @@
+// radiosity solve: scene in, lightmaps out, on a private server or on one that runs already.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <memory>
+#include <optional>
+
+#include "client/cli/commands.h"
+#include "client/cli/interrupt.h"
+#include "client/cli/remote.h"
+#include "client/cli/report.h"
+#include "client/cli/scene_file.h"
+#include "client/cli/server_process.h"
+
+namespace radiosity::cli {
+namespace {
+
+using namespace std::chrono_literals;
+using client::CallFailure;
+using client::CallResult;
+
+constexpr auto kStatusInterval = 250ms;
+constexpr auto kStopGrace = 5000ms;
+constexpr auto kInterruptGrace = 500ms;
+
+struct SolveOptions {
+  std::string scene, output, report, png;
+  RemoteOptions server;
+  double error = 0.02;
+  double time_limit_s = 0.0;  ///< 0: none
+  std::uint64_t texels = 16'000;
+  double texel_size_m = 0.0;  ///< 0: by number
+  std::uint64_t seed = 1;
+  unsigned workers = 0;  ///< 0: the server's choice
+  bool unlit = false, quiet = false;
+};
+
+/// One run of the command; members in the order in which they must go.
+class Solve {
+ public:
+  explicit Solve(const SolveOptions& options) : options_(options), display_(options.quiet) {}
+
+  ExitCode run() {
+    const ExitCode code = solve();
+    display_.clear();
+    if (server_) {
+      server_->stop(interrupted() ? kInterruptGrace : kStopGrace);
+      passOnLog();
+    }
+    if (code != ExitCode::kInterrupted) return code;
+    std::fprintf(stderr, "%s\n",
+                 server_
+                     ? "radiosity: nothing was written; a private solve keeps no state, so it starts anew next time"
+                     : "radiosity: nothing was written; the server goes on solving (radiosity save gets the result)");
+    return code;
+  }
+
+ private:
+  ExitCode solve() {
+    if (auto ready = checkInputs(); !ready) return complain(ready.error());
+    if (auto ready = findServer(); !ready) return complain(ready.error());
+    auto connection = remote_.connect();
+    if (!connection) return complainOf(connection.error());
+    connection->onNotification([this](const protocol::Notification& note) { onNotification(note); });
+    if (auto set = connection->call(settings()); !set) return complainOf(set.error());
+    if (auto loaded = load(*connection); !loaded) return complainOf(loaded.error());
+    auto status = waitForEnd(*connection);
+    if (!status) return complainOf(status.error());
+    return finish(*status);
+  }
+
+  Result<void> checkInputs() {
+    const auto kind = sceneKind(options_.scene);
+    if (!kind) return tl::unexpected(kind.error());
+    if (const auto stem = glbStem(options_.output); !stem) return tl::unexpected(stem.error());
+    if (*kind == SceneKind::kGltf && options_.server.url.empty()) {
+      const auto external = hasExternalFiles(options_.scene);
+      if (!external) return tl::unexpected(external.error());
+      by_path_ = *external;
+    }
+    return checkOutputs({options_.output, options_.report, options_.png});
+  }
+
+  Result<void> findServer() {
+    if (!options_.server.url.empty()) {
+      auto remote = remoteFrom(options_.server);
+      if (!remote) return tl::unexpected(remote.error());
+      remote_ = std::move(*remote);
+      return {};
+    }
+    auto program = findServerProgram();
+    if (!program) return tl::unexpected(program.error());
+    ServerProcess::Options start{.program = *program, .arguments = {}, .keep_going = [] { return !interrupted(); }};
+    if (options_.workers > 0) start.arguments = {"--workers", std::to_string(options_.workers)};
+    if (by_path_) start.arguments.push_back(options_.scene);
+    display_.showText("starting radiosityd");
+    auto server = ServerProcess::start(start);
+    if (!server) return tl::unexpected(server.error());
+    server_.emplace(std::move(*server));
+    remote_.url = server_->url();
+    remote_.keep_going = [this] {
+      passOnLog();
+      return !interrupted();
+    };
+    return {};
+  }
+
+  [[nodiscard]] protocol::SolveConfigureCall settings() const {
+    protocol::SolveConfigureCall call{.target_error = options_.error,
+                                      .no_time_limit = options_.time_limit_s <= 0.0,
+                                      .texels = options_.texels,
+                                      .texel_size_m = options_.texel_size_m,
+                                      .seed = options_.seed};
+    constexpr double kMillisecondsPerSecond = 1000.0;
+    if (!call.no_time_limit)
+      call.time_limit_ms = static_cast<std::uint64_t>(std::llround(options_.time_limit_s * kMillisecondsPerSecond));
+    return call;
+  }
+
+  CallResult<void> load(client::Connection& connection) {
+    if (by_path_) return {};  // the server was started with it
+    // The connection is kept alive while the upload runs.
+    Remote uploader = remote_;
+    uploader.keep_going = [this, &connection] {
+      (void)connection.poll(0ms);  // one that broke shows in the next call
+      return remote_.keep_going();
+    };
+    auto loaded = uploadScene(uploader, options_.scene, display_);
+    if (!loaded) return tl::unexpected(CallFailure{loaded.error()});
+    revision_ = loaded->revision;
+    return {};
+  }
+
+  void onNotification(const protocol::Notification& note) {
+    if (const auto* progress = std::get_if<protocol::ProgressNote>(&note)) {
+      if (progress->progress.revision < revision_) return;
+      display_.show(viewOf(progress->progress, options_.error));
+      ask_now_ = ask_now_ || (progress->progress.state != "solving" && progress->progress.state != "loading");
+    } else if (const auto* loaded = std::get_if<protocol::SceneLoaded>(&note)) {
+      if (revision_ > 0 && loaded->revision > revision_) replaced_ = true;
+    }
+  }
+
+  /// Asks for the status now and then, and at once when a notification says that the solve has stopped: so the end is
+  /// seen whatever else happens on the server.
+  CallResult<protocol::StatusReply> waitForEnd(client::Connection& connection) {
+    for (;;) {
+      ask_now_ = false;
+      auto status = connection.call(protocol::StatusCall{});
+      if (!status) return status;
+      const auto& progress = status->progress;
+      if (replaced_)
+        return tl::unexpected(CallFailure{
+            {ErrorCode::kUnavailable, "another client loaded another scene into this server", remote_.url.text()}});
+      if (progress.state == "failed")
+        return tl::unexpected(CallFailure{{ErrorCode::kUnavailable, "the solve failed: " + progress.failure, {}}});
+      if (progress.state == "empty" && (!by_path_ || revision_ > 0))
+        return tl::unexpected(CallFailure{{ErrorCode::kUnavailable, "the server lost the scene", remote_.url.text()}});
+      display_.show(viewOf(progress, options_.error));
+      const bool is_ours = progress.revision >= std::max<std::uint64_t>(revision_, 1);
+      if (is_ours && (progress.state == "converged" || progress.state == "timeLimit")) return status;
+      const auto next = std::chrono::steady_clock::now() + kStatusInterval;
+      while (!ask_now_ && std::chrono::steady_clock::now() < next) {
+        if (interrupted()) return tl::unexpected(CallFailure{{ErrorCode::kUnavailable, "interrupted", {}}});
+        auto polled = connection.poll(kStatusInterval);
+        if (!polled) return tl::unexpected(CallFailure{polled.error()});
+      }
+    }
+  }
+
+  ExitCode finish(const protocol::StatusReply& status) {
+    const bool reached = status.progress.error.total <= options_.error;
+    if (!reached && status.progress.state == "converged")
+      warn(fmt::format("the server stopped at {}: another client changed its settings",
+                       percentText(status.progress.error.total)));
+    auto written =
+        saveScene(remote_, {.glb_path = options_.output, .unlit = options_.unlit, .png_path = options_.png}, display_);
+    if (!written) return complainOf(CallFailure{written.error()});
+    if (!options_.report.empty()) {
+      auto done = writeReport(status, reached);
+      if (!done) return complain(done.error());
+    }
+    display_.clear();
+    passOnLog();
+    for (const auto& warning : status.warnings)
+      if (passed_on_.find(warning) == std::string::npos) warn(warning);
+    for (const auto& name : *written) std::printf("%s\n", name.c_str());
+    std::fprintf(stderr, "%s%s\n", reached ? "" : "time limit: ", outcomeText(status.progress).c_str());
+    return reached ? ExitCode::kOk : ExitCode::kTimeLimit;
+  }
+
+  Result<void> writeReport(const protocol::StatusReply& status, bool reached) const {
+    auto file = client::AtomicFile::create(options_.report);
+    if (!file) return tl::unexpected(file.error());
+    if (auto done = file->write(reportJson(status, reached)); !done) return done;
+    return file->commit();
+  }
+
+  /// A connection that broke because our own server ended is explained by the server's last words.
+  ExitCode complainOf(const CallFailure& failure) {
+    display_.clear();
+    if (server_ && !failure.rpc && !interrupted() && !server_->running()) {
+      passOnLog();
+      return complain(server_->epitaph());
+    }
+    Error error = failure.error;
+    if (error.code == ErrorCode::kInvalidScene && error.where.find(options_.scene) == std::string::npos)
+      error.where = options_.scene + (error.where.empty() ? "" : ": " + error.where);
+    return complain(error);
+  }
+
+  void passOnLog() {
+    if (!server_) return;
+    for (const auto& line : server_->takeLog()) {
+      if (!line.isWarning() && !line.isError()) continue;
+      passed_on_ += line.text + "\n";
+      if (!interrupted()) display_.message("radiosityd: " + line.level + ": " + line.text);
+    }
+  }
+
+  const SolveOptions& options_;
+  ProgressDisplay display_;
+  std::optional<ServerProcess> server_;
+  Remote remote_;
+  bool by_path_ = false;        ///< the private server reads the scene itself
+  std::uint64_t revision_ = 0;  ///< of our scene; 0: not known
+  bool ask_now_ = false, replaced_ = false;
+  std::string passed_on_;  ///< warnings that were printed already
+};
+
+void addOutputOptions(CLI::App& command, SolveOptions& options) {
+  command.add_option("SCENE", options.scene, "the scene: .glb, or .gltf with its files beside it")
+      ->required()
+      ->type_name("");
+  command
+      .add_option("-o,--output", options.output,
+                  "the scene with lightmap UVs; lightmaps go to NAME.lightmap.<page>.exr beside it")
+      ->required()
+      ->type_name("OUT.glb");
+  command.add_flag("--unlit", options.unlit, "OUT.glb shows the tone-mapped result in any glTF viewer instead");
+  command.add_option("--png", options.png, "also a picture from the scene's camera, or from one that frames it")
+      ->type_name("FILE");
+  command.add_option("--report", options.report, "also figures about the solve, as JSON")->type_name("FILE");
+}
+
+}  // namespace
+
+void addSolve(CLI::App& app, Run& run) {
+  auto options = std::make_shared<SolveOptions>();
+  auto& command = *app.add_subcommand("solve", "solve a scene and write its lightmaps");
+  addOutputOptions(command, *options);
+  command.add_option("--error", options->error, "target: relative RMS error of irradiance, 0.02 is 2 %")
+      ->check(CLI::Range(1e-6, 1.0))
+      ->type_name("FRACTION")
+      ->capture_default_str();
+  command
+      .add_option("--time-limit", options->time_limit_s, "solving stops after this many seconds (default: no limit)")
+      ->check(CLI::Range(0.001, 1e6))
+      ->type_name("SECONDS");
+  auto* texels = command.add_option("--texels", options->texels, "lightmap texels (leaf patches) in all, about")
+                     ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 28U))
+                     ->type_name("COUNT")
+                     ->capture_default_str();
+  command.add_option("--texel-size", options->texel_size_m, "side of a texel in metres, instead of --texels")
+      ->check(CLI::Range(1e-6, 1e6))
+      ->type_name("METRES")
+      ->excludes(texels);
+  command.add_option("--seed", options->seed, "the same seed gives the same bits")
+      ->type_name("N")
+      ->capture_default_str();
+  auto* workers =
+      command.add_option("--workers", options->workers, "render processes of the private server (default: one a core)")
+          ->check(CLI::Range(1U, 256U))
+          ->type_name("N");
+  command.add_option("--server", options->server.url, "solve there rather than on a private radiosityd")
+      ->type_name("URL")
+      ->excludes(workers);
+  addTokenOption(command, options->server);
+  command.add_flag("-q,--quiet", options->quiet, "no progress on stderr");
+  command.callback([options, &run] { run = [options] { return Solve(*options).run(); }; });
+}
+
+}  // namespace radiosity::cli

@@ -1,0 +1,149 @@
+// radiosity watch: follows a solve from afar.
+#include <fmt/format.h>
+
+#include <memory>
+#include <optional>
+#include <thread>
+
+#include "client/cli/commands.h"
+#include "client/cli/interrupt.h"
+#include "client/cli/remote.h"
+#include "client/cli/report.h"
+
+namespace radiosity::cli {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto kStatusInterval = 1000ms;
+
+struct WatchOptions {
+  RemoteOptions server;
+  bool follow = false, quiet = false;
+};
+
+class Watch {
+ public:
+  Watch(const WatchOptions& options, Remote remote)
+      : options_(options), remote_(std::move(remote)), display_(options.quiet) {}
+
+  ExitCode run() {
+    bool was_connected = false;
+    while (!interrupted()) {
+      auto connection = remote_.connect();
+      // At first a wrong address should be told at once; later a server that restarts is worth waiting for.
+      const bool refused = !connection && connection.error().rpc.has_value();
+      if (!connection && (!was_connected || refused)) return end(complainCleared(connection.error()));
+      std::string why;
+      if (connection) {
+        was_connected = true;
+        back_off_.reset();
+        if (const auto code = follow(*connection, why)) return end(*code);
+      } else {
+        why = connection.error().error.text();
+      }
+      if (!interrupted()) waitBeforeRetry(why);
+    }
+    return end(ExitCode::kInterrupted);
+  }
+
+ private:
+  ExitCode end(ExitCode code) {
+    display_.clear();
+    return interrupted() ? ExitCode::kInterrupted : code;
+  }
+
+  ExitCode complainCleared(const client::CallFailure& failure) {
+    display_.clear();
+    return complain(failure);
+  }
+
+  /// Until the solve ends (a value) or the connection breaks (none, with the reason in `why`).
+  std::optional<ExitCode> follow(client::Connection& connection, std::string& why) {
+    connection.onNotification([this](const protocol::Notification& note) { onNotification(note); });
+    while (!interrupted()) {
+      ask_now_ = false;
+      const auto status = connection.call(protocol::StatusCall{});
+      if (!status && status.error().rpc) return complainCleared(status.error());
+      if (!status) {
+        why = status.error().error.text();
+        return std::nullopt;
+      }
+      target_error_ = status->settings.target_error;
+      show(status->progress);
+      if (const auto code = ending(status->progress)) return code;
+      const auto next = std::chrono::steady_clock::now() + kStatusInterval;
+      while (!interrupted() && !ask_now_ && std::chrono::steady_clock::now() < next) {
+        if (const auto polled = connection.poll(kStatusInterval); !polled) {
+          why = polled.error().text();
+          return std::nullopt;
+        }
+      }
+    }
+    return ExitCode::kInterrupted;
+  }
+
+  std::optional<ExitCode> ending(const protocol::Progress& progress) {
+    if (options_.follow) return std::nullopt;
+    const bool stopped = progress.state == "converged" || progress.state == "timeLimit" || progress.state == "failed";
+    if (!stopped) return std::nullopt;
+    display_.clear();
+    if (progress.state == "failed")
+      return complain(Error{ErrorCode::kUnavailable, "the solve failed: " + progress.failure, remote_.url.text()});
+    std::printf("%s: %s\n", progress.state == "converged" ? "converged" : "time limit", outcomeText(progress).c_str());
+    return progress.state == "converged" ? ExitCode::kOk : ExitCode::kTimeLimit;
+  }
+
+  void show(const protocol::Progress& progress) {
+    ProgressView view = viewOf(progress, target_error_);
+    view.show_parts = true;
+    display_.show(view);
+  }
+
+  void onNotification(const protocol::Notification& note) {
+    if (const auto* progress = std::get_if<protocol::ProgressNote>(&note)) {
+      show(progress->progress);
+      ask_now_ = ask_now_ || (!options_.follow && progress->progress.state != "solving");
+    } else if (const auto* patched = std::get_if<protocol::ScenePatched>(&note)) {
+      display_.message(
+          fmt::format("revision {}: edited by {}", patched->revision, patched->by.empty() ? "somebody" : patched->by));
+    } else if (const auto* loaded = std::get_if<protocol::SceneLoaded>(&note)) {
+      display_.message(fmt::format("revision {}: another scene", loaded->revision));
+    } else if (std::holds_alternative<protocol::Draining>(note)) {
+      display_.message("the server is shutting down");
+    }
+  }
+
+  void waitBeforeRetry(const std::string& why) {
+    const auto wait = back_off_.next();
+    display_.message(
+        fmt::format("{}; trying again in {}", why, durationText(static_cast<double>(wait.count()) / 1000.0)));
+    const auto until = std::chrono::steady_clock::now() + wait;
+    while (!interrupted() && std::chrono::steady_clock::now() < until) std::this_thread::sleep_for(20ms);
+  }
+
+  const WatchOptions& options_;
+  Remote remote_;
+  ProgressDisplay display_;
+  client::BackOff back_off_;
+  double target_error_ = 0.02;
+  bool ask_now_ = false;
+};
+
+}  // namespace
+
+void addWatch(CLI::App& app, Run& run) {
+  auto options = std::make_shared<WatchOptions>();
+  auto& command = *app.add_subcommand("watch", "follow a server's solve until it has converged");
+  addRemoteOptions(command, options->server);
+  command.add_flag("--follow", options->follow, "go on after the solve has converged, until Ctrl-C");
+  command.add_flag("-q,--quiet", options->quiet, "no progress on stderr, only the outcome on stdout");
+  command.callback([options, &run] {
+    run = [options] {
+      auto remote = remoteFrom(options->server);
+      return remote ? Watch(*options, std::move(*remote)).run() : complain(remote.error());
+    };
+  });
+}
+
+}  // namespace radiosity::cli

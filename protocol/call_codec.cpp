@@ -1,0 +1,203 @@
+// Calls: a client encodes them, the server decodes them.
+#include <fmt/format.h>
+#include <array>
+#include <functional>
+#include <utility>
+
+#include "protocol/codec.h"
+#include "protocol/json_text.h"
+#include "protocol/message_parts.h"
+
+namespace radiosity::protocol {
+namespace {
+
+using nlohmann::json;
+
+// ---- to JSON; a call without parameters is an empty object ----
+
+json params(const HelloCall& c) {
+  json out = {{"client", c.client}, {"creditBytes", c.credit_bytes}};
+  if (!c.token.empty()) out["token"] = c.token;
+  for (const auto format : c.tile_formats) out["tileFormats"].push_back(name(format));
+  for (const auto codec : c.codecs) out["codecs"].push_back(name(codec));
+  if (c.resume)
+    out["resume"] = {
+        {"epoch", c.resume->epoch}, {"revision", c.resume->revision}, {"tileVersion", c.resume->tile_version}};
+  return out;
+}
+json params(const SceneLoadCall& c) { return {{"url", c.url}}; }
+json params(const ScenePatchCall& c) {
+  json out = {{"patch", json::parse(c.patch, nullptr, false)}};
+  if (out["patch"].is_discarded()) out["patch"] = c.patch;  // the server says what is wrong with it
+  if (c.base_revision) out["baseRevision"] = *c.base_revision;
+  if (!c.request_id.empty()) out["requestId"] = c.request_id;
+  if (c.dry_run) out["dryRun"] = true;
+  return out;
+}
+json params(const SolveConfigureCall& c) {
+  json out = json::object();
+  if (c.target_error) out["targetError"] = *c.target_error;
+  if (c.time_limit_ms) out["timeLimitMs"] = *c.time_limit_ms;
+  if (c.no_time_limit) out["timeLimitMs"] = nullptr;
+  if (c.texels) out["texels"] = *c.texels;
+  if (c.texel_size_m) out["texelSize"] = *c.texel_size_m;
+  if (c.seed) out["seed"] = *c.seed;
+  return out;
+}
+json params(const SolveWaitCall& c) {
+  json out = json::object();
+  if (c.error) out["error"] = *c.error;
+  if (c.revision) out["revision"] = *c.revision;
+  if (c.timeout_ms) out["timeoutMs"] = *c.timeout_ms;
+  return out;
+}
+json params(const SubscribeCall& c) {
+  json out = {{"minMip", c.min_mip}, {"maxMip", c.max_mip}, {"maxHz", c.max_hz}, {"quantity", name(c.quantity)}};
+  if (!c.lightmaps.empty()) out["lightmaps"] = c.lightmaps;
+  return out;
+}
+json params(const CreditCall& c) { return {{"bytes", c.bytes}}; }
+json params(const SnapshotCall& c) {
+  json out = {{"width", c.width}, {"height", c.height}, {"quantity", c.quantity}};
+  if (!c.camera.empty()) out["camera"] = c.camera;
+  return out;
+}
+template <typename C>
+json params(const C& /*no parameters*/) {
+  return json::object();
+}
+
+// ---- from JSON ----
+
+void read(Reader& r, HelloCall& c) {
+  r.text("client", c.client, Need::kRequired, kMaxTextBytes);
+  r.text("token", c.token, Need::kOptional, kMaxTokenBytes);
+  // Names that this version does not know are skipped: a newer client may offer them first.
+  std::vector<std::string> names;
+  readStrings(r, "tileFormats", Need::kOptional, kMaxListEntries, names);
+  for (const auto& text : names)
+    if (const auto format = pixelFormatFrom(text)) c.tile_formats.push_back(*format);
+  names.clear();
+  readStrings(r, "codecs", Need::kOptional, kMaxListEntries, names);
+  for (const auto& text : names)
+    if (const auto codec = codecFrom(text)) c.codecs.push_back(*codec);
+  r.narrow("creditBytes", c.credit_bytes, Need::kOptional, 0, kMaxCreditBytes);
+  if (r.find("resume") == nullptr) return;
+  r.object("resume", Need::kOptional, [&](Reader& inner) {
+    Resume resume;
+    inner.text("epoch", resume.epoch, Need::kRequired, kMaxTextBytes);
+    inner.integer("revision", resume.revision, Need::kRequired, 0, kAnyInteger);
+    inner.integer("tileVersion", resume.tile_version, Need::kRequired, 0, kAnyInteger);
+    c.resume = std::move(resume);
+  });
+}
+void read(Reader& r, SceneLoadCall& c) { r.text("url", c.url, Need::kRequired, 4096); }
+
+/// The shape of the patch: enough for the engine to be handed an array of operations.
+void readPatch(Reader& r, ScenePatchCall& c) {
+  const auto* patch = r.find("patch");
+  if (patch == nullptr) return r.refuse(r.pointerOf("patch"), "is missing");
+  r.array("patch", Need::kRequired, kMaxPatchOperations, [&](const json& op, const std::string& pointer) {
+    Reader inner(&op, pointer);
+    std::string text;
+    inner.text("op", text, Need::kRequired, 16);
+    inner.text("path", text, Need::kRequired, 4096);
+    if (inner.failed()) r.refuse(inner.pointer(), inner.message().substr(inner.pointer().size() + 1));
+  });
+  if (!r.failed()) c.patch = dumpJson(*patch);
+}
+
+void read(Reader& r, ScenePatchCall& c) {
+  readPatch(r, c);
+  r.optionalInteger("baseRevision", c.base_revision, 0, kAnyInteger);
+  r.text("requestId", c.request_id, Need::kOptional, kMaxTextBytes);
+  r.boolean("dryRun", c.dry_run, Need::kOptional);
+}
+void read(Reader& r, SolveConfigureCall& c) {
+  r.optionalNumber("targetError", c.target_error, kErrorRange);
+  if (const auto* limit = r.find("timeLimitMs"); limit != nullptr && limit->is_null())
+    c.no_time_limit = true;
+  else
+    r.optionalInteger("timeLimitMs", c.time_limit_ms, 1, kAnyInteger);
+  r.optionalInteger("texels", c.texels, 1, kMaxTexels);
+  r.optionalNumber("texelSize", c.texel_size_m, kTexelSizeRange);
+  r.optionalInteger("seed", c.seed, 0, std::numeric_limits<std::uint64_t>::max());
+}
+void read(Reader& r, SolveWaitCall& c) {
+  r.optionalNumber("error", c.error, kErrorRange);
+  r.optionalInteger("revision", c.revision, 0, kAnyInteger);
+  r.optionalInteger("timeoutMs", c.timeout_ms, 0, kMaxWaitMs);
+}
+void read(Reader& r, SubscribeCall& c) {
+  readIndices(r, "lightmaps", c.lightmaps);
+  r.narrow("minMip", c.min_mip, Need::kOptional, 0, kMaxMip);
+  r.narrow("maxMip", c.max_mip, Need::kOptional, 0, kMaxMip);
+  if (!r.failed() && c.min_mip > c.max_mip) r.refuse(r.pointerOf("minMip"), "must not be above maxMip");
+  r.number("maxHz", c.max_hz, Need::kOptional, {0.0, 1000.0, false});
+  r.choice("quantity", c.quantity, Need::kOptional, quantityFrom, kQuantityNames);
+}
+void read(Reader& r, CreditCall& c) { r.narrow("bytes", c.bytes, Need::kRequired, 0, kMaxCreditBytes); }
+void read(Reader& r, SnapshotCall& c) {
+  r.text("camera", c.camera, Need::kOptional, kMaxTextBytes);
+  r.narrow("width", c.width, Need::kOptional, 1, kMaxSnapshotSide);
+  r.narrow("height", c.height, Need::kOptional, 1, kMaxSnapshotSide);
+  r.text("quantity", c.quantity, Need::kOptional, 64);
+}
+template <typename C>
+void read(Reader& /*reader*/, C& /*no parameters*/) {}
+
+/// /params/patch/3/op -> 3.
+std::optional<std::uint64_t> patchOperation(const std::string& pointer) {
+  constexpr std::string_view kPrefix = "/params/patch/";
+  if (!pointer.starts_with(kPrefix)) return std::nullopt;
+  std::uint64_t op = 0;
+  for (std::size_t i = kPrefix.size(); i < pointer.size() && pointer[i] != '/'; ++i)
+    op = op * 10 + static_cast<std::uint64_t>(pointer[i] - '0');
+  return op;
+}
+
+using Decoded = tl::expected<Call, RpcError>;
+
+template <typename C>
+Decoded decodeAs(const json* object) {
+  Reader reader(object, "/params");
+  C call;
+  read(reader, call);
+  if (!reader.failed()) return Call(std::move(call));
+  return tl::unexpected(
+      RpcError{RpcCode::kInvalidParams, reader.message(), reader.pointer(), patchOperation(reader.pointer())});
+}
+
+struct Method {
+  std::string_view name;
+  Decoded (*decode)(const json*);
+};
+
+template <typename... C>
+constexpr auto methodsOf(std::variant<C...>* /*only its type counts*/) {
+  return std::array{Method{C::kMethod, &decodeAs<C>}...};
+}
+
+constexpr auto kMethods = methodsOf(static_cast<Call*>(nullptr));
+
+}  // namespace
+
+tl::expected<Call, RpcError> decodeCall(const RpcRequest& request) {
+  for (const auto& method : kMethods)
+    if (method.name == request.method) return method.decode(request.params.get());
+  return tl::unexpected(RpcError{RpcCode::kMethodNotFound,
+                                 fmt::format("there is no method \"{}\"", request.method.substr(0, 64)), "/method"});
+}
+
+std::string encodeCall(const RequestId& id, const Call& call) {
+  return std::visit(
+      [&](const auto& c) {
+        json message = {{"jsonrpc", "2.0"}, {"method", std::decay_t<decltype(c)>::kMethod}};
+        if (auto body = params(c); !body.empty()) message["params"] = std::move(body);
+        if (!id.empty()) message["id"] = json::parse(id);
+        return dumpJson(message);
+      },
+      call);
+}
+
+}  // namespace radiosity::protocol

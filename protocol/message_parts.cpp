@@ -1,0 +1,98 @@
+#include "protocol/message_parts.h"
+
+namespace radiosity::protocol {
+
+using nlohmann::json;
+
+json toJson(const Settings& s) {
+  return {{"targetError", s.target_error},
+          {"timeLimitMs", s.time_limit_ms ? json(*s.time_limit_ms) : json(nullptr)},
+          {"texels", s.texels},
+          {"texelSize", s.texel_size_m},
+          {"seed", s.seed}};
+}
+
+void read(Reader& r, Settings& s) {
+  r.number("targetError", s.target_error, Need::kRequired, {});
+  if (const auto* limit = r.find("timeLimitMs"); limit != nullptr && !limit->is_null())
+    r.optionalInteger("timeLimitMs", s.time_limit_ms, 0, kAnyInteger);
+  r.integer("texels", s.texels, Need::kRequired, 0, kAnyInteger);
+  r.number("texelSize", s.texel_size_m, Need::kOptional, {});
+  r.integer("seed", s.seed, Need::kOptional, 0, std::numeric_limits<std::uint64_t>::max());
+}
+
+json toJson(const Progress& p) {
+  json out = {{"revision", p.revision},
+              {"state", p.state},
+              {"tileVersion", p.tile_version},
+              {"shots", p.shots},
+              {"shotsPerSecond", p.shots_per_second},
+              {"seconds", p.seconds},
+              {"error",
+               {{"total", p.error.total},
+                {"residual", p.error.residual},
+                {"sampling", p.error.sampling},
+                {"discretization", p.error.discretization}}},
+              {"energy",
+               {{"emitted", p.energy.emitted},
+                {"absorbed", p.energy.absorbed},
+                {"escaped", p.energy.escaped},
+                {"backface", p.energy.backface},
+                {"unshot", p.energy.unshot}}},
+              {"patches", p.patches},
+              {"nodes", p.nodes},
+              {"surfaces", p.surfaces},
+              {"polygons", p.polygons}};
+  if (p.seconds_left) out["secondsLeft"] = *p.seconds_left;
+  if (!p.failure.empty()) out["failure"] = p.failure;
+  return out;
+}
+
+void read(Reader& r, Progress& p) {
+  constexpr Range kAny{-std::numeric_limits<double>::max(), std::numeric_limits<double>::max(), false};
+  r.integer("revision", p.revision, Need::kRequired, 0, kAnyInteger);
+  r.text("state", p.state, Need::kRequired, kMaxTextBytes);
+  r.integer("tileVersion", p.tile_version, Need::kRequired, 0, kAnyInteger);
+  r.integer("shots", p.shots, Need::kRequired, 0, kAnyInteger);
+  r.number("shotsPerSecond", p.shots_per_second, Need::kRequired, {});
+  r.number("seconds", p.seconds, Need::kRequired, {});
+  r.optionalNumber("secondsLeft", p.seconds_left, {});
+  r.object("error", Need::kRequired, [&](Reader& e) {
+    e.number("total", p.error.total, Need::kRequired, {});
+    e.number("residual", p.error.residual, Need::kRequired, {});
+    e.number("sampling", p.error.sampling, Need::kRequired, {});
+    e.number("discretization", p.error.discretization, Need::kRequired, {});
+  });
+  r.object("energy", Need::kOptional, [&](Reader& e) {
+    e.number("emitted", p.energy.emitted, Need::kRequired, kAny);
+    e.number("absorbed", p.energy.absorbed, Need::kRequired, kAny);
+    e.number("escaped", p.energy.escaped, Need::kRequired, kAny);
+    e.number("backface", p.energy.backface, Need::kRequired, kAny);
+    e.number("unshot", p.energy.unshot, Need::kRequired, kAny);
+  });
+  r.integer("patches", p.patches, Need::kOptional, 0, kAnyInteger);
+  r.integer("nodes", p.nodes, Need::kOptional, 0, kAnyInteger);
+  r.integer("surfaces", p.surfaces, Need::kOptional, 0, kAnyInteger);
+  r.integer("polygons", p.polygons, Need::kOptional, 0, kAnyInteger);
+  r.text("failure", p.failure, Need::kOptional, kAnyText);
+}
+
+void readStrings(Reader& r, const char* key, Need need, std::size_t max, std::vector<std::string>& out) {
+  r.array(key, need, max, [&](const json& element, const std::string& pointer) {
+    if (element.is_string())
+      out.push_back(element.get<std::string>());
+    else
+      r.refuse(pointer, "must be a string");
+  });
+}
+
+void readIndices(Reader& r, const char* key, std::vector<std::uint32_t>& out) {
+  r.array(key, Need::kOptional, kMaxListEntries, [&](const json& element, const std::string& pointer) {
+    if (element.is_number_unsigned() && element.get<std::uint64_t>() <= 0xffffffffU)
+      out.push_back(element.get<std::uint32_t>());
+    else
+      r.refuse(pointer, "must be the index of a lightmap page");
+  });
+}
+
+}  // namespace radiosity::protocol

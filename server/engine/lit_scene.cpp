@@ -1,0 +1,147 @@
+#include "server/engine/lit_scene.h"
+
+#include <algorithm>
+#include <glm/common.hpp>
+#include <set>
+
+namespace radiosity::engine {
+namespace {
+
+/// Members of a material that only change how bright or how reflecting it is.
+bool sameButShading(nlohmann::json a, nlohmann::json b) {
+  for (auto* material : {&a, &b}) {
+    material->erase("name");
+    material->erase("extras");
+    material->erase("emissiveFactor");
+    material->erase("emissiveTexture");
+    if (material->contains("extensions")) (*material)["extensions"].erase("KHR_materials_emissive_strength");
+    if (material->contains("pbrMetallicRoughness")) (*material)["pbrMetallicRoughness"].clear();
+  }
+  return a == b;
+}
+
+/// Members of the document that do not touch light at all.
+void eraseHarmless(nlohmann::json& gltf) {
+  for (const char* member : {"asset", "extras", "cameras", "animations", "extensionsUsed"}) gltf.erase(member);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<LitScene>> LitScene::make(scene::Document document, const SolveSettings& settings,
+                                                 solver::Transport& transport) {
+  auto lit = std::unique_ptr<LitScene>(new LitScene(std::move(document), settings, transport));
+  auto imported = scene::importScene(lit->document_);
+  if (!imported) return tl::unexpected<Error>(imported.error());
+  lit->scene_ = std::make_shared<const scene::Scene>(std::move(*imported));
+  scene::ChartOptions charts;
+  charts.texel_budget = settings.texels;
+  charts.texel_size_m = settings.texel_size_m;
+  auto patches = scene::buildPatchScene(*lit->scene_, charts);
+  if (!patches) return tl::unexpected<Error>(patches.error());
+  lit->patches_ = std::make_shared<const scene::PatchScene>(std::move(*patches));
+  lit->materials_ = scene::shadePatches(*lit->scene_, *lit->patches_);
+  if (const auto uploaded = transport.setScene(lit->patches_); !uploaded) {
+    return tl::unexpected<Error>(uploaded.error());
+  }
+  lit->makeSolver();
+  return lit;
+}
+
+double LitScene::emittedPower(const scene::PatchMaterials& materials) const {
+  double power = 0.0;
+  for (const auto& surface : patches_->surfaces) {
+    for (const auto first : surface.first_node) {
+      if (first == scene::kNone) continue;
+      const auto root = first + scene::levelGrid(surface.width, surface.height, surface.level_count - 1).offset;
+      const glm::vec3 e = materials.emission[root];
+      power += static_cast<double>(e.x + e.y + e.z) * static_cast<double>(patches_->node_area[root]);
+    }
+  }
+  return power;
+}
+
+void LitScene::makeSolver() {
+  solver::SolverSettings settings;
+  settings.target_error = settings_.target_error;
+  settings.seed = settings_.seed;
+  settings.paper_mode = settings_.paper_mode;
+  solver_ = std::make_unique<solver::Solver>(patches_, materials_, transport_, settings);
+  solver_power_ = emittedPower(materials_);
+}
+
+void LitScene::restart(const SolveSettings& settings) {
+  settings_ = settings;
+  makeSolver();
+}
+
+LitScene::Change LitScene::changeTo(const scene::Document& next) const {
+  nlohmann::json before = document_.gltf, after = next.gltf;
+  eraseHarmless(before);
+  eraseHarmless(after);
+  if (before == after) return Change::kNothing;
+  const nlohmann::json none = nlohmann::json::array();
+  const nlohmann::json materials = before.value("materials", none), changed = after.value("materials", none);
+  before.erase("materials");
+  after.erase("materials");
+  if (before != after || materials.size() != changed.size()) return Change::kGeometry;
+  for (std::size_t i = 0; i < materials.size(); ++i) {
+    if (!sameButShading(materials[i], changed[i])) return Change::kGeometry;
+  }
+  return Change::kShading;
+}
+
+Result<std::uint64_t> LitScene::reshade(scene::Document next, Change change) {
+  auto imported = scene::importScene(next);
+  if (!imported) return tl::unexpected<Error>(imported.error());
+  std::set<std::uint32_t> affected;
+  if (change == Change::kShading) {
+    const auto& before = document_.gltf["materials"];
+    const auto& after = next.gltf["materials"];
+    for (std::uint32_t m = 0; m < before.size(); ++m) {
+      if (before[m] == after[m]) continue;
+      for (const auto surface : scene::reshadeMaterial(*imported, *patches_, m, materials_)) affected.insert(surface);
+    }
+  }
+  document_ = std::move(next);
+  scene_ = std::make_shared<const scene::Scene>(std::move(*imported));
+  if (affected.empty()) return std::uint64_t{0};
+  // The integers' scale was chosen for the power at the start. Far outside it they could overflow or lose the small
+  // lights.
+  const double power = emittedPower(materials_);
+  if (power > 64.0 * solver_power_ || power < solver_power_ / 4096.0) {
+    makeSolver();
+  } else {
+    solver_->setMaterials(materials_);
+  }
+  return affected.size();
+}
+
+std::vector<std::string> LitScene::warnings() const {
+  std::vector<std::string> all = scene_->warnings;
+  all.insert(all.end(), patches_->warnings.begin(), patches_->warnings.end());
+  all.insert(all.end(), materials_.warnings.begin(), materials_.warnings.end());
+  return all;
+}
+
+std::vector<scene::LightmapPage> LitScene::pages() const {
+  return scene::assemblePages(*patches_, solver_->irradiance());
+}
+
+std::vector<scene::LightmapPage> LitScene::errorPages() const {
+  std::vector<glm::vec3> error(patches_->nodeCount(), glm::vec3(0.0F));
+  const auto& state = solver_->state();
+  std::vector<glm::vec3> first, second;
+  for (const auto& side : state.sides()) {
+    first.resize(side.leaf_count);
+    second.resize(side.leaf_count);
+    state.halfIrradiance(side, 0, first);
+    state.halfIrradiance(side, 1, second);
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+      const glm::vec3 mean = 0.5F * (first[leaf] + second[leaf]);
+      error[side.first_node + leaf] = 0.5F * glm::abs(first[leaf] - second[leaf]) / glm::max(mean, glm::vec3(1e-30F));
+    }
+  }
+  return scene::assemblePages(*patches_, error);
+}
+
+}  // namespace radiosity::engine

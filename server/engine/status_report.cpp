@@ -1,0 +1,67 @@
+#include "server/engine/status_report.h"
+
+#include <algorithm>
+#include <array>
+
+namespace radiosity::engine {
+namespace {
+
+double lumens(const std::array<double, 3>& flux, double scale_m) {
+  return (flux[0] + flux[1] + flux[2]) * scale_m * scale_m;
+}
+
+void addCounters(const LitScene& lit, Status& status) {
+  const auto& transport = lit.solver().transportCounters();
+  const auto& planner = lit.solver().plannerCounters();
+  const auto& scene = lit.scene();
+  const auto& patches = lit.patches();
+  auto& counters = status.counters;
+  counters["rounds"] = lit.solver().rounds();
+  counters["scatter.shots"] = static_cast<double>(transport.scatter_shots);
+  counters["scatter.links"] = static_cast<double>(transport.links);
+  counters["gather.points"] = static_cast<double>(transport.gather_points);
+  counters["pixels"] = static_cast<double>(transport.pixels);
+  counters["triangles.drawn"] = static_cast<double>(transport.triangles_drawn);
+  counters["triangles.culled"] = static_cast<double>(transport.triangles_culled);
+  counters["triangles.dropped"] = static_cast<double>(scene.triangles_dropped + patches.triangles_dropped);
+  counters["seconds.render"] = transport.render_seconds;
+  counters["seconds.accumulate"] = transport.accumulate_seconds;
+  counters["seconds.gather"] = transport.gather_seconds;
+  counters["skip.rouletteKills"] = static_cast<double>(planner.roulette_kills);
+  counters["skip.wholeSubtrees"] = static_cast<double>(planner.whole_subtrees);
+  counters["pushPulls"] = static_cast<double>(planner.push_pulls);
+}
+
+}  // namespace
+
+Status reportStatus(const LitScene& lit, double seconds) {
+  Status status;
+  const auto& solver = lit.solver();
+  const auto& patches = lit.patches();
+  status.shots = solver.shots();
+  status.shots_per_second = seconds > 0.0 ? static_cast<double>(status.shots) / seconds : 0.0;
+  const auto& error = solver.error();
+  status.error = {error.total, error.residual, error.sampling, error.discretization};
+  const double target = lit.settings().target_error;
+  // Sampling error falls with the square root of time.
+  if (error.total > target && error.total < 1.0)
+    status.seconds_left = seconds * (error.total * error.total / (target * target) - 1.0);
+  const auto energy = solver.energy();
+  const double scale = patches.scale;
+  status.energy = {lumens(energy.emitted, scale), lumens(energy.absorbed, scale), lumens(energy.escaped, scale),
+                   lumens(energy.backface, scale), lumens(energy.unshot, scale)};
+  status.counters["energy.imbalance"] = lumens(energy.imbalance, scale);
+  status.nodes = patches.nodeCount();
+  status.surfaces = patches.surfaces.size();
+  status.polygons = patches.polygons;
+  for (const auto& side : solver.state().sides()) {
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+      if (solver.state().leafArea(side, leaf) > 0.0F) ++status.patches;
+    }
+  }
+  status.warnings = lit.warnings();
+  addCounters(lit, status);
+  return status;
+}
+
+}  // namespace radiosity::engine

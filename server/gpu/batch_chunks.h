@@ -1,0 +1,23 @@
+// Cuts a batch into chunks of similar cost that workers take one after another. Pure values.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "server/solver/transport.h"
+
+namespace radiosity::gpu {
+
+/// Consecutive shots of one kind.
+struct Chunk {
+  bool gather = false;
+  std::size_t first = 0, count = 0;
+};
+
+/// Gather shots first: they are the longest. Cost of a shot: its pixels and, for each hemicube, the scene's triangles.
+[[nodiscard]] std::vector<Chunk> cutBatch(const solver::ShotBatch& batch, std::size_t triangles, std::size_t workers);
+
+/// The chunk as the body of a message.
+[[nodiscard]] std::vector<std::byte> packChunk(const solver::ShotBatch& batch, const Chunk& chunk, std::uint64_t id);
+
+}  // namespace radiosity::gpu

@@ -1,0 +1,13 @@
+# Writes OUTPUT: the text of CONSTANTS and of each file in SHADERS ("|"-separated) as raw strings, found by file name.
+file(READ ${CONSTANTS} constants)
+set(text "// Generated from server/gpu/shaders by embed_shaders.cmake.\n#include \"server/gpu/shader_source.h\"\n\n")
+string(APPEND text "namespace radiosity::gpu {\n\nconst char* const kShaderConstants = R\"GLSL(${constants})GLSL\";\n\n")
+string(APPEND text "const EmbeddedShader kEmbeddedShaders[] = {\n")
+string(REPLACE "|" ";" files "${SHADERS}")
+foreach(path IN LISTS files)
+  get_filename_component(name ${path} NAME)
+  file(READ ${path} source)
+  string(APPEND text "    {\"${name}\", R\"GLSL(${source})GLSL\"},\n")
+endforeach()
+string(APPEND text "    {nullptr, nullptr},\n};\n\n}  // namespace radiosity::gpu\n")
+file(WRITE ${OUTPUT} "${text}")

@@ -1,0 +1,106 @@
+#include "server/gpu/gpu_scene.h"
+
+#include <glm/vec4.hpp>
+#include <numeric>
+#include <vector>
+
+#include "common/check.h"
+#include "server/gpu/shader_constants.h"
+
+namespace radiosity::gpu {
+namespace {
+
+struct Vertex {
+  glm::vec4 position_area;
+  glm::vec3 normal;
+  glm::vec2 texel;
+  std::array<std::uint32_t, 4> nodes;  // front, back, level table, triangle
+};
+
+struct LevelEntry {
+  std::uint32_t offset, size;  // size: width | height << 16
+};
+
+/// The level table of all surfaces; table[s] is what the shaders take as a reference to surface s's levels.
+Result<std::vector<LevelEntry>> makeLevels(const scene::PatchScene& patches, std::vector<std::uint32_t>& table) {
+  std::vector<LevelEntry> levels{{0, 1U | 1U << 16U}};
+  for (const auto& surface : patches.surfaces) {
+    if (surface.width > 0xFFFF || surface.height > 0xFFFF || surface.level_count > RAD_LEVEL_MASK ||
+        levels.size() >= std::size_t{1} << (32U - RAD_LEVEL_BITS)) {
+      return fail(ErrorCode::kTooLarge, "a chart is larger than 65535 texels, or there are too many charts");
+    }
+    table.push_back(static_cast<std::uint32_t>(levels.size()) << RAD_LEVEL_BITS | surface.level_count);
+    for (std::uint32_t level = 0; level < surface.level_count; ++level) {
+      const auto grid = scene::levelGrid(surface.width, surface.height, level);
+      levels.push_back({grid.offset, grid.width | grid.height << 16U});
+    }
+  }
+  return levels;
+}
+
+}  // namespace
+
+Result<GpuScene> GpuScene::upload(const EglContext& context, std::shared_ptr<const scene::PatchScene> patches) {
+  GpuScene gpu;
+  gpu.patches_ = std::move(patches);
+  const auto& scene = *gpu.patches_;
+  if (scene.nodeCount() >= scene::kNone - 2) return fail(ErrorCode::kTooLarge, "more than 2^32 - 3 nodes");
+  std::vector<std::uint32_t> table;
+  const auto levels = makeLevels(scene, table);
+  if (!levels) return tl::unexpected(levels.error());
+
+  std::vector<Vertex> vertices(scene.vertices.size());
+  const auto side = [&](std::uint32_t first) { return first == scene::kNone ? gpu.absorbedId() : first; };
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    const auto& from = scene.vertices[i];
+    const auto& surface = scene.surfaces[from.surface];
+    vertices[i] = {{from.position, surface.texel_area},
+                   from.normal,
+                   from.texel,
+                   {side(surface.first_node[0]), side(surface.first_node[1]), table[from.surface], 0}};
+  }
+  // Corners are shared only within a plane, so any triangle of a vertex stands for the plane in an item buffer.
+  for (std::size_t i = 0; i < scene.indices.size(); ++i) {
+    vertices[scene.indices[i]].nodes[3] = static_cast<std::uint32_t>(i / 3);
+  }
+
+  gpu.vertices_ = Buffer(context, "scene vertices");
+  fill(gpu.vertices_, std::span<const Vertex>(vertices), GL_STATIC_DRAW);
+  gpu.levels_ = Buffer(context, "level table");
+  fill(gpu.levels_, std::span<const LevelEntry>(*levels), GL_STATIC_DRAW);
+  gpu.view_indices_ = Buffer(context, "view indices");
+  gpu.vertex_array_ = VertexArray(context, "scene");
+
+  const auto array = gpu.vertex_array_.name();
+  glVertexArrayVertexBuffer(array, 0, gpu.vertices_.name(), 0, sizeof(Vertex));
+  const auto attribute = [&](GLuint index, GLint size, std::size_t offset) {
+    glEnableVertexArrayAttrib(array, index);
+    glVertexArrayAttribFormat(array, index, size, GL_FLOAT, GL_FALSE, static_cast<GLuint>(offset));
+    glVertexArrayAttribBinding(array, index, 0);
+  };
+  attribute(RAD_ATTRIBUTE_POSITION, 4, offsetof(Vertex, position_area));
+  attribute(RAD_ATTRIBUTE_NORMAL, 3, offsetof(Vertex, normal));
+  attribute(RAD_ATTRIBUTE_TEXEL, 2, offsetof(Vertex, texel));
+  glEnableVertexArrayAttrib(array, RAD_ATTRIBUTE_NODES);
+  glVertexArrayAttribIFormat(array, RAD_ATTRIBUTE_NODES, 4, GL_UNSIGNED_INT, offsetof(Vertex, nodes));
+  glVertexArrayAttribBinding(array, RAD_ATTRIBUTE_NODES, 0);
+  glEnableVertexArrayAttrib(array, RAD_ATTRIBUTE_VIEW);
+  glVertexArrayAttribIFormat(array, RAD_ATTRIBUTE_VIEW, 1, GL_UNSIGNED_INT, 0);
+  glVertexArrayAttribBinding(array, RAD_ATTRIBUTE_VIEW, 1);
+  glVertexArrayBindingDivisor(array, 1, 1);
+  gpu.reserveViews(RAD_FACES);
+  return gpu;
+}
+
+void GpuScene::reserveViews(std::size_t views) {
+  if (views <= view_capacity_) return;
+  view_capacity_ = views;
+  std::vector<std::uint32_t> indices(views);
+  std::iota(indices.begin(), indices.end(), 0U);
+  fill(view_indices_, std::span<const std::uint32_t>(indices), GL_STATIC_DRAW);
+  glVertexArrayVertexBuffer(vertex_array_.name(), 1, view_indices_.name(), 0, sizeof(std::uint32_t));
+}
+
+void GpuScene::bindLevels() const { glBindBufferBase(GL_SHADER_STORAGE_BUFFER, RAD_BINDING_LEVELS, levels_.name()); }
+
+}  // namespace radiosity::gpu

@@ -1,0 +1,36 @@
+// The scene as the hemicube shaders read it: vertices, level table, and the ids that mean "nothing" and "a side that
+// only absorbs". Belongs to one context and its thread.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "server/gpu/gl_objects.h"
+#include "server/scene/patch_scene.h"
+
+namespace radiosity::gpu {
+
+class GpuScene {
+ public:
+  [[nodiscard]] static Result<GpuScene> upload(const EglContext& context,
+                                               std::shared_ptr<const scene::PatchScene> patches);
+
+  /// Ids that follow the nodes' own, so that all of them index one array.
+  [[nodiscard]] std::uint32_t escapedId() const { return static_cast<std::uint32_t>(patches_->nodeCount()); }
+  [[nodiscard]] std::uint32_t absorbedId() const { return escapedId() + 1; }
+  [[nodiscard]] const scene::PatchScene& patches() const { return *patches_; }
+  [[nodiscard]] GLuint vertexArray() const { return vertex_array_.name(); }
+  /// Instance attribute of draw i reads view i; there are at least `views` of them after this.
+  void reserveViews(std::size_t views);
+  void bindLevels() const;
+
+ private:
+  GpuScene() = default;
+
+  std::shared_ptr<const scene::PatchScene> patches_;
+  Buffer vertices_, levels_, view_indices_;
+  VertexArray vertex_array_;
+  std::size_t view_capacity_ = 0;
+};
+
+}  // namespace radiosity::gpu

@@ -1,0 +1,140 @@
+#include "server/gpu/hemicube_renderer.h"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+
+#include "common/check.h"
+
+namespace radiosity::gpu {
+namespace {
+
+/// Pixels of one atlas. On a CPU it should stay in the second-level cache with its depth; on a GPU a large one hides
+/// the latency of the readback.
+constexpr std::size_t kSoftwareAtlasPixels = std::size_t{1} << 16U;
+constexpr std::size_t kGpuAtlasPixels = std::size_t{1} << 24U;
+constexpr std::size_t kMaxLayers = 256;
+
+}  // namespace
+
+Result<HemicubeRenderer> HemicubeRenderer::create(const EglContext& context) {
+  HemicubeRenderer renderer(context);
+  auto nodes = buildProgram(context, "hemicube.vert", "hemicube_nodes.frag", {"SCATTER"});
+  if (!nodes) return tl::unexpected(nodes.error());
+  auto items = buildProgram(context, "hemicube.vert", "hemicube_items.frag");
+  if (!items) return tl::unexpected(items.error());
+  renderer.nodes_program_ = std::move(*nodes);
+  renderer.items_program_ = std::move(*items);
+  renderer.views_buffer_ = Buffer(context, "hemicube views");
+  renderer.indices_buffer_ = Buffer(context, "visible triangles");
+  renderer.commands_buffer_ = Buffer(context, "draw commands");
+  return renderer;
+}
+
+void HemicubeRenderer::setScene(GpuScene scene) {
+  culler_ = TriangleCuller(scene.patches());
+  scene_ = std::move(scene);
+}
+
+std::size_t HemicubeRenderer::capacity(std::uint32_t resolution) const {
+  const auto budget = context_->software() ? kSoftwareAtlasPixels : kGpuAtlasPixels;
+  return std::clamp<std::size_t>(budget / hemicubePixels(resolution), 1, kMaxLayers);
+}
+
+HemicubeRenderer::Target& HemicubeRenderer::target(std::uint32_t resolution) {
+  auto found = targets_.find(resolution);
+  if (found != targets_.end()) return found->second;
+  const auto width = static_cast<GLsizei>(resolution);
+  const auto height = static_cast<GLsizei>(3 * resolution);
+  const auto layers = static_cast<GLsizei>(capacity(resolution));
+  Target made{Texture(*context_, "hemicube ids", GL_TEXTURE_2D_ARRAY),
+              Texture(*context_, "hemicube depth", GL_TEXTURE_2D_ARRAY), Framebuffer(*context_, "hemicubes")};
+  glTextureStorage3D(made.ids.name(), 1, GL_R32UI, width, height, layers);
+  glTextureStorage3D(made.depth.name(), 1, GL_DEPTH_COMPONENT32F, width, height, layers);
+  glNamedFramebufferTexture(made.framebuffer.name(), GL_COLOR_ATTACHMENT0, made.ids.name(), 0);
+  glNamedFramebufferTexture(made.framebuffer.name(), GL_DEPTH_ATTACHMENT, made.depth.name(), 0);
+  RAD_CHECK_EQ(glCheckNamedFramebufferStatus(made.framebuffer.name(), GL_DRAW_FRAMEBUFFER),
+               GLenum{GL_FRAMEBUFFER_COMPLETE});
+  return targets_.emplace(resolution, std::move(made)).first->second;
+}
+
+void HemicubeRenderer::collect(std::uint32_t resolution, std::span<const HemicubeView> views,
+                               solver::TransportCounters& counters) {
+  face_views_.clear();
+  indices_.clear();
+  commands_.clear();
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const auto faces = faceViews(views[i].frame, resolution, views[i].level_bias, static_cast<std::uint32_t>(i));
+    face_views_.insert(face_views_.end(), faces.begin(), faces.end());
+    auto first = static_cast<std::uint32_t>(indices_.size());
+    const auto counts = culler_.cull(hemicubeAxes(views[i].frame), indices_);
+    for (std::uint32_t face = 0; face < RAD_FACES; ++face) {
+      const auto count = counts[face];
+      if (count > 0) commands_.push_back({count, 1, first, 0, static_cast<std::uint32_t>(i) * RAD_FACES + face});
+      first += count;
+      counters.triangles_drawn += count / 3;
+      counters.triangles_culled += culler_.triangleCount() - count / 3;
+    }
+  }
+}
+
+void HemicubeRenderer::setState(HemicubePass pass, std::uint32_t resolution, const Target& target) {
+  const auto n = static_cast<float>(resolution);
+  std::array<std::array<float, 4>, RAD_FACES> viewports{};
+  viewports[0] = {0.0F, 0.0F, n, n};
+  for (int face = 1; face < RAD_FACES; ++face) {
+    viewports[static_cast<std::size_t>(face)] = {0.0F, n + static_cast<float>(face - 1) * n / 2.0F, n, n / 2.0F};
+  }
+  glViewportArrayv(0, RAD_FACES, viewports[0].data());
+  glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
+  glEnable(GL_DEPTH_TEST);
+  glDisable(GL_CULL_FACE);
+  glDisable(GL_BLEND);
+  glDisable(GL_MULTISAMPLE);
+  glDepthFunc(GL_GREATER);
+  glDepthMask(GL_TRUE);
+  glBindFramebuffer(GL_FRAMEBUFFER, target.framebuffer.name());
+  glUseProgram((pass == HemicubePass::kNodes ? nodes_program_ : items_program_).name());
+  if (pass == HemicubePass::kNodes) {
+    glProgramUniform1ui(nodes_program_.name(), RAD_UNIFORM_ABSORBED_ID, scene_->absorbedId());
+    scene_->bindLevels();
+  }
+  glBindVertexArray(scene_->vertexArray());
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, RAD_BINDING_VIEWS, views_buffer_.name());
+  glVertexArrayElementBuffer(scene_->vertexArray(), indices_buffer_.name());
+  glBindBuffer(GL_DRAW_INDIRECT_BUFFER, commands_buffer_.name());
+}
+
+std::span<const std::uint32_t> HemicubeRenderer::render(HemicubePass pass, std::uint32_t resolution,
+                                                        std::span<const HemicubeView> views,
+                                                        solver::TransportCounters& counters) {
+  RAD_CHECK(scene_.has_value());
+  RAD_CHECK_LE(views.size(), capacity(resolution));
+  const auto start = std::chrono::steady_clock::now();
+  context_->makeCurrent();
+  auto& into = target(resolution);
+  collect(resolution, views, counters);
+  scene_->reserveViews(face_views_.size());
+  fill(views_buffer_, std::span<const FaceView>(face_views_), GL_STREAM_DRAW);
+  fill(indices_buffer_, std::span<const std::uint32_t>(indices_), GL_STREAM_DRAW);
+  fill(commands_buffer_, std::span<const DrawCommand>(commands_), GL_STREAM_DRAW);
+
+  setState(pass, resolution, into);
+  const GLuint background = pass == HemicubePass::kNodes ? scene_->escapedId() : RAD_ITEM_NONE;
+  const float far_depth = 0.0F;
+  glClearNamedFramebufferuiv(into.framebuffer.name(), GL_COLOR, 0, &background);
+  glClearNamedFramebufferfv(into.framebuffer.name(), GL_DEPTH, 0, &far_depth);
+  if (!commands_.empty()) {
+    glMultiDrawElementsIndirect(GL_TRIANGLES, GL_UNSIGNED_INT, nullptr, static_cast<GLsizei>(commands_.size()), 0);
+  }
+
+  pixels_.resize(views.size() * hemicubePixels(resolution));
+  glGetTextureSubImage(into.ids.name(), 0, 0, 0, 0, static_cast<GLsizei>(resolution),
+                       static_cast<GLsizei>(3 * resolution), static_cast<GLsizei>(views.size()), GL_RED_INTEGER,
+                       GL_UNSIGNED_INT, static_cast<GLsizei>(pixels_.size() * sizeof(std::uint32_t)), pixels_.data());
+  counters.pixels += pixels_.size();
+  counters.render_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return pixels_;
+}
+
+}  // namespace radiosity::gpu

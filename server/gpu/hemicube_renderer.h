@@ -1,0 +1,73 @@
+// Renders hemicubes: five faces of several shooters into the layers of one image, read back at once. Belongs to one
+// context and its thread.
+//
+// Each shooter has its own layer, with its faces always in the same place, so that its pixels are the same whatever
+// else is rendered with it.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "server/gpu/gl_objects.h"
+#include "server/gpu/gpu_scene.h"
+#include "server/gpu/triangle_culler.h"
+#include "server/solver/transport.h"
+
+namespace radiosity::gpu {
+
+struct HemicubeView {
+  solver::HemicubeFrame frame;
+  float level_bias = 0.0F;
+};
+
+/// What the pixels hold.
+enum class HemicubePass {
+  kNodes,  ///< patch nodes, level by formula; GpuScene::escapedId where nothing is seen
+  kItems,  ///< a triangle of the plane seen; RAD_ITEM_NONE where nothing is seen
+};
+
+class HemicubeRenderer {
+ public:
+  [[nodiscard]] static Result<HemicubeRenderer> create(const EglContext& context);
+
+  void setScene(GpuScene scene);
+  [[nodiscard]] const GpuScene& scene() const { return *scene_; }
+
+  /// How many views one render() may take at this resolution.
+  [[nodiscard]] std::size_t capacity(std::uint32_t resolution) const;
+
+  /// hemicubePixels(resolution) ids for each view, in the layout of hemicube_weights.h. Valid until the next call.
+  std::span<const std::uint32_t> render(HemicubePass pass, std::uint32_t resolution,
+                                        std::span<const HemicubeView> views, solver::TransportCounters& counters);
+
+ private:
+  struct Target {
+    Texture ids, depth;
+    Framebuffer framebuffer;
+  };
+  struct DrawCommand {  // as glMultiDrawElementsIndirect reads it
+    std::uint32_t count, instance_count, first_index;
+    std::int32_t base_vertex;
+    std::uint32_t base_instance;
+  };
+
+  explicit HemicubeRenderer(const EglContext& context) : context_(&context) {}
+  Target& target(std::uint32_t resolution);
+  void collect(std::uint32_t resolution, std::span<const HemicubeView> views, solver::TransportCounters& counters);
+  void setState(HemicubePass pass, std::uint32_t resolution, const Target& target);
+
+  const EglContext* context_;
+  std::optional<GpuScene> scene_;
+  TriangleCuller culler_;
+  Program nodes_program_, items_program_;
+  Buffer views_buffer_, indices_buffer_, commands_buffer_;
+  std::map<std::uint32_t, Target> targets_;  ///< by resolution
+  std::vector<FaceView> face_views_;
+  std::vector<std::uint32_t> indices_;
+  std::vector<DrawCommand> commands_;
+  std::vector<std::uint32_t> pixels_;
+};
+
+}  // namespace radiosity::gpu

@@ -1,0 +1,47 @@
+#include <fmt/format.h>
+
+#include "common/check.h"
+#include "server/gpu/gpu_transport.h"
+#include "server/gpu/shot_runner.h"
+
+namespace radiosity::gpu {
+namespace {
+
+class InProcessTransport final : public solver::Transport {
+ public:
+  explicit InProcessTransport(std::unique_ptr<ShotRunner> runner) : runner_(std::move(runner)) {}
+
+  Result<void> setScene(std::shared_ptr<const scene::PatchScene> patches) override {
+    store_ = FluxStore(patches->nodeCount());
+    return runner_->setScene(std::move(patches));
+  }
+
+  Result<solver::TransportCounters> run(const solver::ShotBatch& batch, solver::FluxAccumulators& into) override {
+    const auto sink = store_.sink();
+    auto counters = runner_->run({batch.mode, batch.flux_scale, batch.scatter, batch.gather, batch.points}, sink);
+    if (counters) {
+      sink.drainInto(into);
+    } else {
+      sink.clear();
+    }
+    return counters;
+  }
+
+  [[nodiscard]] std::string description() const override {
+    return fmt::format("{}, in process", runner_->context().renderer());
+  }
+
+ private:
+  std::unique_ptr<ShotRunner> runner_;
+  FluxStore store_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<solver::Transport>> makeInProcessTransport() {
+  auto runner = ShotRunner::create();
+  if (!runner) return tl::unexpected(runner.error());
+  return std::make_unique<InProcessTransport>(std::move(*runner));
+}
+
+}  // namespace radiosity::gpu

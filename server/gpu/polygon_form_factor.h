@@ -1,0 +1,16 @@
+// Lambert's formula: the exact form factor from a small receiver to a convex polygon, clipped to the receiver's
+// horizon. Pure functions, any thread.
+#pragma once
+
+#include <glm/vec3.hpp>
+#include <span>
+
+namespace radiosity::gpu {
+
+/// Irradiance at `point` (unit `normal`) from a polygon of radiosity 1 with nothing in between: 1/(2 pi) |sum of
+/// theta_k (gamma_k . n)| over the edges of the polygon's part above the receiver's plane (Lambert 1760; Baum,
+/// Rushmeier and Winget 1989). At most 4 corners. The polygon must face the point; 0 when it is below the horizon.
+[[nodiscard]] double polygonFormFactor(const glm::dvec3& point, const glm::dvec3& normal,
+                                       std::span<const glm::vec3> corners);
+
+}  // namespace radiosity::gpu

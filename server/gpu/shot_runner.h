@@ -1,0 +1,50 @@
+// Carries out shots in one OpenGL context: what the in-process transport and every worker process have inside. One
+// thread.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+
+#include "server/gpu/egl_context.h"
+#include "server/gpu/flux_sink.h"
+#include "server/gpu/hemicube_renderer.h"
+#include "server/gpu/light_gatherer.h"
+#include "server/gpu/scatter_accumulator.h"
+
+namespace radiosity::gpu {
+
+/// Part of a batch (or all of it). Gather shots index `points`.
+struct ShotSpan {
+  solver::LinkMode mode = solver::LinkMode::kFormula;
+  double flux_scale = 1.0;
+  std::span<const solver::ScatterShot> scatter;
+  std::span<const solver::GatherShot> gather;
+  std::span<const solver::HemicubeFrame> points;
+};
+
+class ShotRunner {
+ public:
+  [[nodiscard]] static Result<std::unique_ptr<ShotRunner>> create();
+
+  [[nodiscard]] Result<void> setScene(std::shared_ptr<const scene::PatchScene> patches);
+  [[nodiscard]] Result<solver::TransportCounters> run(const ShotSpan& shots, const FluxSink& sink);
+  [[nodiscard]] const EglContext& context() const { return *context_; }
+
+ private:
+  ShotRunner(std::unique_ptr<EglContext> context, HemicubeRenderer renderer)
+      : context_(std::move(context)), renderer_(std::move(renderer)) {}
+  void scatter(const ShotSpan& shots, const FluxSink& sink, solver::TransportCounters& counters);
+
+  std::unique_ptr<EglContext> context_;  // outlives what lives in it
+  HemicubeRenderer renderer_;
+  WeightCache weights_;
+  ScatterAccumulator accumulator_;
+  LightGatherer gatherer_;
+  bool has_scene_ = false;
+};
+
+/// kInternal, naming the shot, if the batch breaks the contract of transport.h (a peer process sent it).
+[[nodiscard]] Result<void> checkShots(const ShotSpan& shots);
+
+}  // namespace radiosity::gpu

@@ -1,0 +1,88 @@
+#include "server/gpu/triangle_culler.h"
+
+#include <algorithm>
+
+namespace radiosity::gpu {
+namespace {
+
+/// Heights above the shooter's plane that are taken for the plane itself: rounding puts neighbours in the same plane up
+/// to 1e-7 above it, where they would cover everything.
+constexpr float kCoplanar = 1.0e-6F;
+
+struct Corners {
+  const float* x;
+  const float* y;
+  const float* z;
+};
+
+std::uint8_t bit(bool set, int face) { return static_cast<std::uint8_t>(static_cast<int>(set) << face); }
+
+/// A face's pyramid is cut by planes through the origin; a triangle is out when all corners lie outside one of them.
+void classify(const HemicubeAxes& axes, const std::array<Corners, 3>& corners, std::size_t count,
+              std::uint8_t* __restrict faces) {
+  const auto [o, t, b, n] = axes;
+  for (std::size_t i = 0; i < count; ++i) {
+    float x[3], y[3], z[3];
+    for (int c = 0; c < 3; ++c) {
+      const float dx = corners[c].x[i] - o.x;
+      const float dy = corners[c].y[i] - o.y;
+      const float dz = corners[c].z[i] - o.z;
+      x[c] = dx * t.x + dy * t.y + dz * t.z;
+      y[c] = dx * b.x + dy * b.y + dz * b.z;
+      z[c] = dx * n.x + dy * n.y + dz * n.z;
+    }
+    const auto low = [](const float(&v)[3], const float(&w)[3], float s) {
+      return std::min({v[0] + s * w[0], v[1] + s * w[1], v[2] + s * w[2]});
+    };
+    const auto high = [](const float(&v)[3], const float(&w)[3], float s) {
+      return std::max({v[0] + s * w[0], v[1] + s * w[1], v[2] + s * w[2]});
+    };
+    const bool above = std::max({z[0], z[1], z[2]}) > kCoplanar;
+    // highest and lowest of z -+ x, z -+ y, x -+ y over the corners
+    const float zx_high = high(z, x, -1), zx_low = low(z, x, -1), zpx_high = high(z, x, 1), zpx_low = low(z, x, 1);
+    const float zy_high = high(z, y, -1), zy_low = low(z, y, -1), zpy_high = high(z, y, 1), zpy_low = low(z, y, 1);
+    const float xy_high = high(x, y, -1), xy_low = low(x, y, -1), xpy_high = high(x, y, 1), xpy_low = low(x, y, 1);
+    const bool top = above & (zx_high > 0) & (zpx_high > 0) & (zy_high > 0) & (zpy_high > 0);
+    const bool px = above & (zx_low < 0) & (xy_high > 0) & (xpy_high > 0);
+    const bool mx = above & (zpx_low < 0) & (xpy_low < 0) & (xy_low < 0);
+    const bool py = above & (zy_low < 0) & (xy_low < 0) & (xpy_high > 0);
+    const bool my = above & (zpy_low < 0) & (xpy_low < 0) & (xy_high > 0);
+    faces[i] = static_cast<std::uint8_t>(bit(top, 0) | bit(px, 1) | bit(mx, 2) | bit(py, 3) | bit(my, 4));
+  }
+}
+
+}  // namespace
+
+TriangleCuller::TriangleCuller(const scene::PatchScene& patches)
+    : triangle_count_(patches.indices.size() / 3), indices_(patches.indices), faces_(triangle_count_) {
+  for (int c = 0; c < 3; ++c) {
+    for (auto& axis : corner_[c]) axis.resize(triangle_count_);
+    for (std::size_t i = 0; i < triangle_count_; ++i) {
+      const auto& position = patches.vertices[indices_[3 * i + c]].position;
+      for (int axis = 0; axis < 3; ++axis) corner_[c][axis][i] = position[axis];
+    }
+  }
+  for (auto& face : seen_) face.resize(3 * triangle_count_);
+}
+
+std::array<std::uint32_t, RAD_FACES> TriangleCuller::cull(const HemicubeAxes& axes,
+                                                          std::vector<std::uint32_t>& indices) {
+  std::array<Corners, 3> corners{};
+  for (int c = 0; c < 3; ++c) corners[c] = {corner_[c][0].data(), corner_[c][1].data(), corner_[c][2].data()};
+  classify(axes, corners, triangle_count_, faces_.data());
+  std::array<std::uint32_t, RAD_FACES> count{};
+  for (std::size_t i = 0; i < triangle_count_; ++i) {
+    if (faces_[i] == 0) continue;
+    for (int face = 0; face < RAD_FACES; ++face) {
+      if ((faces_[i] >> face & 1) == 0) continue;
+      std::copy_n(&indices_[3 * i], 3, &seen_[face][count[face]]);
+      count[face] += 3;
+    }
+  }
+  for (int face = 0; face < RAD_FACES; ++face) {
+    indices.insert(indices.end(), seen_[face].begin(), seen_[face].begin() + count[face]);
+  }
+  return count;
+}
+
+}  // namespace radiosity::gpu

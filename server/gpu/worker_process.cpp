@@ -1,0 +1,159 @@
+#include "server/gpu/worker_process.h"
+
+#include <spawn.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+
+#include "common/check.h"
+
+namespace radiosity::gpu {
+namespace {
+
+constexpr int kWorkerSocket = 3;  ///< the worker's only descriptor beside the standard three
+
+/// posix_spawn's attributes: no inherited signal mask, own process group (so that Ctrl-C never reaches it).
+class SpawnSetup {
+ public:
+  explicit SpawnSetup(int socket) {
+    posix_spawn_file_actions_init(&actions_);
+    posix_spawn_file_actions_adddup2(&actions_, socket, kWorkerSocket);
+    // A server's sockets must not live on in a worker.
+    posix_spawn_file_actions_addclosefrom_np(&actions_, kWorkerSocket + 1);
+    posix_spawnattr_init(&attributes_);
+    sigset_t none;
+    sigemptyset(&none);
+    posix_spawnattr_setsigmask(&attributes_, &none);
+    sigset_t defaults;
+    sigemptyset(&defaults);
+    for (const int signal : {SIGTERM, SIGPIPE, SIGHUP}) sigaddset(&defaults, signal);
+    posix_spawnattr_setsigdefault(&attributes_, &defaults);
+    posix_spawnattr_setpgroup(&attributes_, 0);
+    posix_spawnattr_setflags(&attributes_, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
+  }
+  ~SpawnSetup() {
+    posix_spawn_file_actions_destroy(&actions_);
+    posix_spawnattr_destroy(&attributes_);
+  }
+  SpawnSetup(const SpawnSetup&) = delete;
+  SpawnSetup& operator=(const SpawnSetup&) = delete;
+
+  [[nodiscard]] const posix_spawn_file_actions_t* actions() const { return &actions_; }
+  [[nodiscard]] const posix_spawnattr_t* attributes() const { return &attributes_; }
+
+ private:
+  posix_spawn_file_actions_t actions_{};
+  posix_spawnattr_t attributes_{};
+};
+
+}  // namespace
+
+Result<WorkerProcess> WorkerProcess::start(const std::string& executable) {
+  std::array<int, 2> pair{};
+  if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair.data()) != 0) {
+    return fail(ErrorCode::kUnavailable, std::string("cannot make a socket pair: ") + std::strerror(errno));
+  }
+  WorkerProcess worker;
+  worker.socket_ = FileDescriptor(pair[0]);
+  const FileDescriptor theirs(pair[1]);
+  const SpawnSetup setup(theirs.get());
+  auto socket = std::to_string(kWorkerSocket);
+  auto parent = std::to_string(getpid());
+  std::string flag = "--worker";
+  std::string program = executable;
+  std::array<char*, 5> arguments{program.data(), flag.data(), socket.data(), parent.data(), nullptr};
+  const int error =
+      posix_spawn(&worker.pid_, program.c_str(), setup.actions(), setup.attributes(), arguments.data(), environ);
+  if (error != 0) {
+    worker.pid_ = -1;
+    return fail(ErrorCode::kUnavailable, std::string("cannot start a worker process: ") + std::strerror(error),
+                executable);
+  }
+  return worker;
+}
+
+WorkerProcess::WorkerProcess(WorkerProcess&& other) noexcept
+    : pid_(std::exchange(other.pid_, -1)),
+      socket_(std::move(other.socket_)),
+      renderer_(std::move(other.renderer_)),
+      software_(other.software_),
+      flux_(std::move(other.flux_)),
+      nodes_(other.nodes_) {}
+
+WorkerProcess& WorkerProcess::operator=(WorkerProcess&& other) noexcept {
+  if (this != &other) {
+    stop();
+    pid_ = std::exchange(other.pid_, -1);
+    socket_ = std::move(other.socket_);
+    renderer_ = std::move(other.renderer_);
+    software_ = other.software_;
+    flux_ = std::move(other.flux_);
+    nodes_ = other.nodes_;
+  }
+  return *this;
+}
+
+WorkerProcess::~WorkerProcess() { stop(); }
+
+void WorkerProcess::stop() {
+  if (pid_ < 0) return;
+  // It holds nothing that would need an orderly end; waiting for a long draw call to finish would.
+  kill(pid_, SIGKILL);
+  while (waitpid(pid_, nullptr, 0) < 0 && errno == EINTR) {
+  }
+  pid_ = -1;
+}
+
+std::string WorkerProcess::epitaph() const {
+  int status = 0;
+  siginfo_t info{};
+  // WNOWAIT: stop() still reaps it. A closed socket means it is ending, so this does not wait long.
+  if (waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOWAIT) != 0) return "a worker process is gone";
+  status = info.si_status;
+  return "worker process " + std::to_string(pid_) +
+         (info.si_code == CLD_EXITED ? " ended with status " : " was killed by signal ") + std::to_string(status);
+}
+
+Result<Message> WorkerProcess::receive(MessageKind kind) const {
+  auto message = receiveMessage(socket_.get());
+  if (!message) return fail(ErrorCode::kUnavailable, epitaph());
+  if (message->kind == MessageKind::kFailed) {
+    const auto* text = reinterpret_cast<const char*>(message->body.data());
+    return fail(ErrorCode::kUnavailable, std::string(text, message->body.size()));
+  }
+  if (message->kind != kind) return fail(ErrorCode::kInternal, "a worker process answered out of turn");
+  return message;
+}
+
+Result<void> WorkerProcess::awaitReady() {
+  const auto message = receive(MessageKind::kReady);
+  if (!message) return tl::unexpected(message.error());
+  BodyReader from(message->body);
+  software_ = from.value<ReadyBody>().software != 0;
+  renderer_.assign(reinterpret_cast<const char*>(from.rest().data()), from.rest().size());
+  return {};
+}
+
+Result<void> WorkerProcess::sendScene(const SharedMemory& packed, std::size_t nodes) {
+  auto flux = SharedMemory::create("radiosity flux", fluxRegionBytes(nodes));
+  if (!flux) return tl::unexpected(flux.error());
+  flux_ = std::move(*flux);
+  nodes_ = nodes;
+  const SceneBody body{nodes};
+  const std::array<int, 2> fds{packed.fd(), flux_.fd()};
+  if (sendMessage(socket_.get(), MessageKind::kScene, std::as_bytes(std::span(&body, 1)), fds)) return {};
+  return fail(ErrorCode::kUnavailable, epitaph());
+}
+
+Result<void> WorkerProcess::awaitScene() {
+  const auto message = receive(MessageKind::kSceneDone);
+  if (!message) return tl::unexpected(message.error());
+  return {};
+}
+
+}  // namespace radiosity::gpu

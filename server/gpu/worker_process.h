@@ -1,0 +1,54 @@
+// One worker process as its transport sees it. Owned and used by the transport's thread.
+#pragma once
+
+#include <sys/types.h>
+
+#include <cstdint>
+#include <string>
+
+#include "server/gpu/worker_protocol.h"
+
+namespace radiosity::gpu {
+
+class WorkerProcess {
+ public:
+  /// Starts `executable --worker ...`. It is not ready until awaitReady().
+  [[nodiscard]] static Result<WorkerProcess> start(const std::string& executable);
+
+  /// Kills and reaps the process: no zombie, nothing left running.
+  ~WorkerProcess();
+  WorkerProcess(WorkerProcess&& other) noexcept;
+  WorkerProcess& operator=(WorkerProcess&& other) noexcept;
+  WorkerProcess(const WorkerProcess&) = delete;
+  WorkerProcess& operator=(const WorkerProcess&) = delete;
+
+  /// Blocks until the worker has a context; its own message when it has none.
+  [[nodiscard]] Result<void> awaitReady();
+  /// Gives it the scene and fresh accumulators; answer with awaitScene().
+  [[nodiscard]] Result<void> sendScene(const SharedMemory& packed, std::size_t nodes);
+  [[nodiscard]] Result<void> awaitScene();
+  /// Blocks for its next message, which must be of this kind; an error (the worker's own, where it sent one) means that
+  /// the worker is of no more use.
+  [[nodiscard]] Result<Message> receive(MessageKind kind) const;
+
+  [[nodiscard]] int socket() const { return socket_.get(); }
+  [[nodiscard]] pid_t pid() const { return pid_; }
+  [[nodiscard]] const std::string& renderer() const { return renderer_; }
+  [[nodiscard]] bool software() const { return software_; }
+  [[nodiscard]] FluxSink sink() { return fluxRegionSink(flux_.bytes(), nodes_); }
+
+ private:
+  WorkerProcess() = default;
+  /// "worker 4711 was killed by signal 9" after its socket closed.
+  [[nodiscard]] std::string epitaph() const;
+  void stop();
+
+  pid_t pid_ = -1;
+  FileDescriptor socket_;
+  std::string renderer_;
+  bool software_ = false;
+  SharedMemory flux_;
+  std::size_t nodes_ = 0;
+};
+
+}  // namespace radiosity::gpu

@@ -1,0 +1,176 @@
+#include "server/gpu/worker_protocol.h"
+
+#include <poll.h>
+#include <sys/socket.h>
+
+#include <cerrno>
+#include <cstring>
+
+#include "common/check.h"
+
+namespace radiosity::gpu {
+namespace {
+
+struct Header {
+  MessageKind kind;
+  std::uint32_t bytes;
+};
+
+template <typename T>
+void packVector(std::vector<std::byte>& to, const std::vector<T>& values) {
+  appendValue(to, static_cast<std::uint64_t>(values.size()));
+  appendSpan(to, std::span<const T>(values));
+}
+
+template <typename T>
+void unpackVector(BodyReader& from, std::vector<T>& values) {
+  values = from.values<T>(from.value<std::uint64_t>());
+}
+
+/// Calls visit(vector) for each part of a scene that travels.
+template <typename Scene, typename Visit>
+void visitScene(Scene& scene, Visit visit) {
+  visit(scene.vertices);
+  visit(scene.indices);
+  visit(scene.triangles);
+  visit(scene.triangle_surface);
+  visit(scene.surfaces);
+  visit(scene.leaves);
+  visit(scene.node_area);
+}
+
+bool receiveBytes(int socket, void* to, std::size_t bytes) {
+  auto* at = static_cast<std::byte*>(to);
+  while (bytes > 0) {
+    const auto got = recv(socket, at, bytes, 0);
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) return false;
+    at += got;
+    bytes -= static_cast<std::size_t>(got);
+  }
+  return true;
+}
+
+/// The header, and the descriptors that came with it.
+bool receiveHeader(int socket, Header& header, std::array<FileDescriptor, 2>& fds) {
+  alignas(cmsghdr) std::array<char, CMSG_SPACE(2 * sizeof(int))> control{};
+  iovec part{&header, sizeof(header)};
+  msghdr message{};
+  message.msg_iov = &part;
+  message.msg_iovlen = 1;
+  message.msg_control = control.data();
+  message.msg_controllen = control.size();
+  ssize_t got = 0;
+  do {
+    got = recvmsg(socket, &message, MSG_CMSG_CLOEXEC);
+  } while (got < 0 && errno == EINTR);
+  if (got <= 0) return false;
+  for (auto* item = CMSG_FIRSTHDR(&message); item != nullptr; item = CMSG_NXTHDR(&message, item)) {
+    if (item->cmsg_level != SOL_SOCKET || item->cmsg_type != SCM_RIGHTS) continue;
+    const auto count = (item->cmsg_len - CMSG_LEN(0)) / sizeof(int);
+    for (std::size_t i = 0; i < count && i < fds.size(); ++i) {
+      int fd = -1;
+      std::memcpy(&fd, CMSG_DATA(item) + i * sizeof(int), sizeof(int));
+      fds[i] = FileDescriptor(fd);
+    }
+  }
+  const auto have = static_cast<std::size_t>(got);
+  return receiveBytes(socket, reinterpret_cast<std::byte*>(&header) + have, sizeof(header) - have);
+}
+
+}  // namespace
+
+void append(std::vector<std::byte>& to, const void* data, std::size_t bytes) {
+  const auto* from = static_cast<const std::byte*>(data);
+  to.insert(to.end(), from, from + bytes);
+}
+
+void BodyReader::take(void* to, std::size_t bytes) {
+  if (bytes > rest_.size()) {
+    good_ = false;
+    return;
+  }
+  if (bytes > 0) std::memcpy(to, rest_.data(), bytes);
+  rest_ = rest_.subspan(bytes);
+}
+
+bool sendMessage(int socket, MessageKind kind, std::span<const std::byte> body, std::span<const int> fds) {
+  RAD_CHECK_LE(body.size(), kMaxBody);
+  RAD_CHECK_LE(fds.size(), std::size_t{2});
+  Header header{kind, static_cast<std::uint32_t>(body.size())};
+  std::array<iovec, 2> parts{iovec{&header, sizeof(header)}, iovec{const_cast<std::byte*>(body.data()), body.size()}};
+  alignas(cmsghdr) std::array<char, CMSG_SPACE(2 * sizeof(int))> control{};
+  msghdr message{};
+  message.msg_iov = parts.data();
+  message.msg_iovlen = parts.size();
+  if (!fds.empty()) {
+    message.msg_control = control.data();
+    message.msg_controllen = CMSG_SPACE(fds.size_bytes());
+    auto* item = CMSG_FIRSTHDR(&message);
+    item->cmsg_level = SOL_SOCKET;
+    item->cmsg_type = SCM_RIGHTS;
+    item->cmsg_len = CMSG_LEN(fds.size_bytes());
+    std::memcpy(CMSG_DATA(item), fds.data(), fds.size_bytes());
+  }
+  while (parts[0].iov_len + parts[1].iov_len > 0) {
+    const auto sent = sendmsg(socket, &message, MSG_NOSIGNAL);
+    if (sent < 0 && errno == EINTR) continue;
+    if (sent < 0) return false;
+    auto left = static_cast<std::size_t>(sent);
+    for (auto& part : parts) {
+      const auto from_part = std::min(left, part.iov_len);
+      part.iov_base = static_cast<std::byte*>(part.iov_base) + from_part;
+      part.iov_len -= from_part;
+      left -= from_part;
+    }
+    message.msg_control = nullptr;  // descriptors go once
+    message.msg_controllen = 0;
+  }
+  return true;
+}
+
+Result<Message> receiveMessage(int socket) {
+  Header header{};
+  Message message;
+  if (!receiveHeader(socket, header, message.fds)) return fail(ErrorCode::kUnavailable, "the other process is gone");
+  if (header.bytes > kMaxBody) return fail(ErrorCode::kInternal, "a message is too long");
+  message.kind = header.kind;
+  message.body.resize(header.bytes);
+  if (!receiveBytes(socket, message.body.data(), message.body.size())) {
+    return fail(ErrorCode::kUnavailable, "the other process went away in the middle of a message");
+  }
+  return message;
+}
+
+Result<SharedMemory> packScene(const scene::PatchScene& patches) {
+  std::vector<std::byte> packed;
+  visitScene(patches, [&](const auto& values) { packVector(packed, values); });
+  auto memory = SharedMemory::create("radiosity scene", packed.size());
+  if (memory) std::memcpy(memory->bytes().data(), packed.data(), packed.size());
+  return memory;
+}
+
+Result<std::shared_ptr<const scene::PatchScene>> unpackScene(std::span<const std::byte> packed) {
+  auto scene = std::make_shared<scene::PatchScene>();
+  BodyReader from(packed);
+  visitScene(*scene, [&](auto& values) { unpackVector(from, values); });
+  if (!from.good()) return fail(ErrorCode::kInternal, "a packed scene is cut short");
+  return scene;
+}
+
+std::size_t fluxRegionBytes(std::size_t nodes) {
+  return sizeof(FluxTotals) + 2 * (nodes * sizeof(solver::Flux3) + markCount(nodes));
+}
+
+FluxSink fluxRegionSink(std::span<std::byte> region, std::size_t nodes) {
+  RAD_CHECK_LE(fluxRegionBytes(nodes), region.size());
+  auto* totals = reinterpret_cast<FluxTotals*>(region.data());
+  auto* node = reinterpret_cast<solver::Flux3*>(region.data() + sizeof(FluxTotals));
+  auto* mark = reinterpret_cast<std::uint8_t*>(node + 2 * nodes);
+  const auto marks = markCount(nodes);
+  return {{std::span(node, nodes), std::span(node + nodes, nodes)},
+          {std::span(mark, marks), std::span(mark + marks, marks)},
+          totals};
+}
+
+}  // namespace radiosity::gpu

@@ -1,0 +1,110 @@
+// What a transport and its worker processes say to each other: small binary messages over a stream socket, big things
+// in shared memory. Both ends are this same program, so the layout is that of the structs.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/result.h"
+#include "server/gpu/flux_sink.h"
+#include "server/gpu/shared_memory.h"
+#include "server/gpu/shot_runner.h"
+
+namespace radiosity::gpu {
+
+enum class MessageKind : std::uint32_t {
+  kReady,      ///< worker: has a context; body: ReadyBody, renderer's name
+  kFailed,     ///< worker: body: text. It goes on only after a failed chunk
+  kScene,      ///< transport: two descriptors follow (scene, flux); body: SceneBody
+  kSceneDone,  ///< worker
+  kChunk,      ///< transport: body: ChunkBody, scatter shots, gather shots, points
+  kChunkDone,  ///< worker: body: ChunkDoneBody
+};
+
+struct Message {
+  MessageKind kind{};
+  std::vector<std::byte> body;
+  std::array<FileDescriptor, 2> fds;
+};
+
+struct ReadyBody {
+  std::uint32_t software = 0;
+};
+struct SceneBody {
+  std::uint64_t nodes = 0;
+};
+struct ChunkBody {
+  std::uint64_t chunk = 0;
+  double flux_scale = 1.0;
+  std::uint32_t mode = 0;
+  std::uint32_t scatter = 0, gather = 0, points = 0;
+};
+struct ChunkDoneBody {
+  std::uint64_t chunk = 0;
+  solver::TransportCounters counters;
+};
+
+/// Bound on a message's body; a longer one is a broken peer.
+inline constexpr std::size_t kMaxBody = std::size_t{1} << 30;
+
+/// Appends the bytes of a value or of a span.
+void append(std::vector<std::byte>& to, const void* data, std::size_t bytes);
+template <typename T>
+void appendValue(std::vector<std::byte>& to, const T& value) {
+  static_assert(std::is_trivially_copyable_v<T>);
+  append(to, &value, sizeof(T));
+}
+template <typename T>
+void appendSpan(std::vector<std::byte>& to, std::span<const T> values) {
+  static_assert(std::is_trivially_copyable_v<T>);
+  append(to, values.data(), values.size_bytes());
+}
+
+/// Takes values from the front of a body. After taking too much, good() is false and values are zero.
+class BodyReader {
+ public:
+  explicit BodyReader(std::span<const std::byte> body) : rest_(body) {}
+  template <typename T>
+  T value() {
+    T value{};
+    take(&value, sizeof(T));
+    return value;
+  }
+  template <typename T>
+  std::vector<T> values(std::uint64_t count) {
+    std::vector<T> values;
+    if (count > rest_.size() / sizeof(T)) {
+      good_ = false;
+      return values;
+    }
+    values.resize(count);
+    take(values.data(), count * sizeof(T));
+    return values;
+  }
+  [[nodiscard]] bool good() const { return good_; }
+  [[nodiscard]] std::span<const std::byte> rest() const { return rest_; }
+
+ private:
+  void take(void* to, std::size_t bytes);
+
+  std::span<const std::byte> rest_;
+  bool good_ = true;
+};
+
+/// Blocks until all is sent. False when the peer is gone. Never raises SIGPIPE.
+[[nodiscard]] bool sendMessage(int socket, MessageKind kind, std::span<const std::byte> body,
+                               std::span<const int> fds = {});
+/// Blocks for a whole message. Fails when the peer is gone or sends nonsense.
+[[nodiscard]] Result<Message> receiveMessage(int socket);
+
+/// What the renderer needs of a scene, as one block of shared memory, and back.
+[[nodiscard]] Result<SharedMemory> packScene(const scene::PatchScene& patches);
+[[nodiscard]] Result<std::shared_ptr<const scene::PatchScene>> unpackScene(std::span<const std::byte> packed);
+
+/// Accumulators in shared memory.
+[[nodiscard]] std::size_t fluxRegionBytes(std::size_t nodes);
+[[nodiscard]] FluxSink fluxRegionSink(std::span<std::byte> region, std::size_t nodes);
+
+}  // namespace radiosity::gpu

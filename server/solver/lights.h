@@ -1,0 +1,36 @@
+// Emissive surfaces as convex polygons, for gathered direct light.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <vector>
+
+#include "server/solver/state.h"
+
+namespace radiosity::solver {
+
+/// A convex planar polygon of uniform emission: a quad where two triangles make one, else a triangle.
+struct LightPolygon {
+  std::array<glm::vec3, 4> corners{};
+  std::uint32_t corner_count = 3;
+  glm::vec3 normal{0.0F};    ///< towards the lit side
+  glm::vec3 emission{0.0F};  ///< exitance, lux
+  double area = 0.0;         ///< unit box squared
+  std::uint32_t key = 0;     ///< stable across edits of emission: for sample sequences
+
+  glm::dvec3 delivered{0.0};  ///< S of the emission: exitance gathered so far, summed over rounds
+
+  /// What a round still owes, exitance summed over rounds; signed.
+  [[nodiscard]] glm::dvec3 undelivered(std::uint32_t rounds) const {
+    return static_cast<double>(rounds) * glm::dvec3(emission) - delivered;
+  }
+  /// The point at (u, v) in [0, 1)^2, uniform in area.
+  [[nodiscard]] glm::vec3 point(double u, double v) const;
+};
+
+/// Emissive planar surfaces of few polygons and uniform emission become light polygons, and their sides are marked
+/// `gathered`; the emission of all others is scattered like reflected light.
+[[nodiscard]] std::vector<LightPolygon> findLightPolygons(RadiosityState& state);
+
+}  // namespace radiosity::solver

@@ -1,0 +1,211 @@
+#include "server/solver/planner.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <numbers>
+#include <queue>
+#include <tuple>
+
+#include "server/solver/sampling.h"
+
+namespace radiosity::solver {
+namespace {
+
+/// Nodes weaker than this part of a shot's share play Russian roulette: they shoot a full part, or nothing.
+constexpr double kRouletteShare = 0.25;
+
+/// A leaf of `side` under a node chosen with probability proportional to its unshot power, by warping the point (u, v)
+/// down the quadtree, which keeps its stratification. On return (u, v) are uniform in [0, 1)^2 again.
+std::uint32_t warpToLeaf(const RadiosityState& state, const Side& side, std::uint32_t level, std::uint32_t x,
+                         std::uint32_t y, double& u, double& v) {
+  while (level > 0) {
+    const auto grid = scene::levelGrid(side.width, side.height, level - 1);
+    const auto power = [&](std::uint32_t cx, std::uint32_t cy) {
+      if (cx >= grid.width || cy >= grid.height) return 0.0;
+      return static_cast<double>(state.nodePower(side.first_node + grid.offset + cy * grid.width + cx));
+    };
+    const double p00 = power(2 * x, 2 * y), p10 = power(2 * x + 1, 2 * y);
+    const double p01 = power(2 * x, 2 * y + 1), p11 = power(2 * x + 1, 2 * y + 1);
+    const double left = (p00 + p01) / (p00 + p10 + p01 + p11);
+    const bool right = u >= left;
+    u = right ? (u - left) / (1.0 - left) : u / left;
+    const double upper = right ? p10 : p00, lower = right ? p11 : p01;
+    const double split = upper / (upper + lower);
+    const bool down = v >= split;
+    v = down ? (v - split) / (1.0 - split) : v / split;
+    u = std::clamp(u, 0.0, 1.0 - 1e-12);
+    v = std::clamp(v, 0.0, 1.0 - 1e-12);
+    x = 2 * x + (right ? 1 : 0);
+    y = 2 * y + (down ? 1 : 0);
+    --level;
+  }
+  return y * side.width + x;
+}
+
+}  // namespace
+
+HemicubeFrame Planner::frameAt(const glm::vec3& origin, const glm::vec3& normal, double rotation,
+                               std::uint64_t key) const {
+  const glm::vec3 helper = std::abs(normal.x) < 0.6F ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0);
+  const glm::vec3 a = glm::normalize(glm::cross(helper, normal));
+  const glm::vec3 b = glm::cross(normal, a);
+  const double angle = 0.5 * std::numbers::pi * rotation;  // the hemicube has fourfold symmetry
+  HemicubeFrame frame;
+  frame.origin = origin;
+  frame.normal = normal;
+  frame.tangent = glm::normalize(a * static_cast<float>(std::cos(angle)) + b * static_cast<float>(std::sin(angle)));
+  frame.lattice = static_cast<std::uint32_t>(mixKeys(key, 5) % (kLatticeSide * kLatticeSide));
+  return frame;
+}
+
+std::uint32_t Planner::resolutionFor(double power) const {
+  // Unshot power steers resolution (paper, section 3): a shot with a quarter of the power needs half the hemicube.
+  std::uint32_t n = settings_.resolution;
+  for (double p = power; p < 0.25 * share_ && n > 32; p *= 4.0) n /= 2;
+  for (double p = power; p > 4.0 * share_ && n < 256; p *= 0.25) n *= 2;
+  return n;
+}
+
+void Planner::addShot(const RadiosityState& state, const Side& side, const Node& node, double weight,
+                      std::uint32_t half, std::uint64_t node_key, ShotBatch& batch) {
+  const auto& patches = state.patches();
+  // Later waves of a round may come back to a node; they must not repeat its points.
+  const std::uint32_t visit = 8 * (state.rounds() - 1) + std::min(wave_, 7U);
+  const glm::dvec4 point = sobol4(2 * visit + half, node_key);
+  double u = point.x, v = point.y;
+  const std::uint32_t leaf = warpToLeaf(state, side, node.level, node.x, node.y, u, v);
+  const auto& place = patches.leaves[patches.surfaces[side.surface].first_leaf + leaf];
+  const glm::dvec3 unshot(state.unshot(side, leaf));
+  const double sum = std::abs(unshot.x) + std::abs(unshot.y) + std::abs(unshot.z);
+  if (place.triangle == scene::kNone || sum <= 0.0) return;
+  const auto& triangle = patches.triangles[place.triangle];
+  const glm::vec2 texel =
+      place.full ? glm::vec2(glm::dvec2(leaf % side.width, leaf / side.width) + glm::dvec2(u, v)) : place.texel;
+  ScatterShot shot;
+  shot.frame = frameAt(triangle.origin + texel.x * triangle.du + texel.y * triangle.dv,
+                       side.side == 0 ? triangle.normal : -triangle.normal, point.z,
+                       mixKeys(node_key, shots_planned_ * 2 + half));
+  shot.resolution = resolutionFor(node.power * weight);
+  shot.level_bias = settings_.level_bias + static_cast<float>(point.w);
+  shot.half = half;
+  for (int c = 0; c < 3; ++c) {
+    const double flux = 0.5 * weight * node.power * unshot[c] / sum;
+    shot.flux[static_cast<std::size_t>(c)] = flux;
+    imbalance_[static_cast<std::size_t>(c)] -= flux;
+  }
+  batch.scatter.push_back(shot);
+}
+
+void Planner::shoot(RadiosityState& state, Side& side, const Node& node, ShotBatch& batch) {
+  const std::uint64_t place = (std::uint64_t{node.level} << 58) ^ (std::uint64_t{node.y} << 29) ^ std::uint64_t{node.x};
+  const std::uint64_t node_key = mixKeys(mixKeys(settings_.seed, side.first_node), place);
+  const double floor = kRouletteShare * share_;
+  const double chance = std::min(1.0, node.power / floor);
+  ++shots_planned_;
+  if (chance >= 1.0 || uniformFromKey(mixKeys(node_key, shots_planned_)) < chance) {
+    for (std::uint32_t half = 0; half < 2; ++half) addShot(state, side, node, 1.0 / chance, half, node_key, batch);
+    ++counters_.shooters;
+    if (node.level > 0) ++counters_.whole_subtrees;
+  } else {
+    ++counters_.roulette_kills;
+  }
+  const glm::dvec3 shot = state.markShot(side, node.level, node.x, node.y);
+  for (int c = 0; c < 3; ++c) imbalance_[static_cast<std::size_t>(c)] += shot[c];
+}
+
+ShotBatch Planner::scatterWave(RadiosityState& state, double remainder) {
+  ShotBatch batch;
+  batch.mode = settings_.mode;
+  batch.flux_scale = state.fluxScale();
+  const auto weaker = [](const Node& a, const Node& b) {
+    if (a.power != b.power) return a.power < b.power;
+    return std::tie(a.side, a.level, a.y, a.x) > std::tie(b.side, b.level, b.y, b.x);
+  };
+  std::priority_queue<Node, std::vector<Node>, decltype(weaker)> queue(weaker);
+  auto& sides = state.sides();
+  double total = 0.0;
+  for (std::uint32_t s = 0; s < sides.size(); ++s) {
+    total += sides[s].unshot_power;
+    if (sides[s].unshot_power > 0.0) queue.push({sides[s].unshot_power, s, sides[s].level_count - 1, 0, 0});
+  }
+  while (!queue.empty() && batch.scatter.size() < 2 * std::size_t{settings_.pairs_a_wave} && total > remainder) {
+    const Node node = queue.top();
+    queue.pop();
+    Side& side = sides[node.side];
+    if (side.dirty) {  // its power was an estimate
+      state.pushPull(side);
+      ++counters_.push_pulls;
+      total += side.unshot_power - node.power;
+      if (side.unshot_power > 0.0) queue.push({side.unshot_power, node.side, node.level, 0, 0});
+      continue;
+    }
+    if (node.power > share_ && node.level > 0) {
+      const auto grid = scene::levelGrid(side.width, side.height, node.level - 1);
+      for (std::uint32_t y = 2 * node.y; y < std::min(2 * node.y + 2, grid.height); ++y) {
+        for (std::uint32_t x = 2 * node.x; x < std::min(2 * node.x + 2, grid.width); ++x) {
+          const float power = state.nodePower(side.first_node + grid.offset + y * grid.width + x);
+          if (power > 0.0F) queue.push({static_cast<double>(power), node.side, node.level - 1, x, y});
+        }
+      }
+      continue;
+    }
+    total -= node.power;
+    shoot(state, side, node, batch);
+  }
+  ++wave_;
+  return batch;
+}
+
+void Planner::addGatherShot(const LightPolygon& light, std::uint32_t rounds, std::uint32_t shot_index,
+                            std::uint32_t shots, std::uint32_t points, ShotBatch& batch) {
+  const std::uint64_t key = mixKeys(settings_.seed, 0x4c49474854ULL + light.key);
+  const std::uint32_t index = gather_rounds_ * 2 * shots + shot_index;
+  const glm::dvec4 jitter = sobol4(index, mixKeys(key, 1));
+  const glm::dvec3 radiosity = light.undelivered(rounds) / (2.0 * shots);
+  GatherShot shot;
+  shot.corners = light.corners;
+  shot.corner_count = light.corner_count;
+  shot.normal = light.normal;
+  for (int c = 0; c < 3; ++c) shot.radiosity[static_cast<std::size_t>(c)] = radiosity[c];
+  shot.resolution = settings_.light_resolution;
+  shot.half = shot_index < shots ? 0 : 1;
+  shot.receiver_jitter = glm::vec2(jitter.x, jitter.y);
+  shot.first_point = static_cast<std::uint32_t>(batch.points.size());
+  shot.point_count = points;
+  for (std::uint32_t p = 0; p < points; ++p) {
+    const std::uint32_t sequence = index * points + p;
+    const glm::dvec4 sample = sobol4(sequence, key);
+    batch.points.push_back(frameAt(light.point(sample.x, sample.y), light.normal, sample.z, mixKeys(key, sequence)));
+  }
+  batch.gather.push_back(shot);
+}
+
+ShotBatch Planner::gatherRound(const RadiosityState& state, std::vector<LightPolygon>& lights) {
+  // One gather shot holds up to this many points: enough for the ratio of weighted visibilities to have little bias,
+  // few enough to be shared out between workers.
+  constexpr std::uint32_t kPointsAShot = 8;
+  ShotBatch batch;
+  batch.mode = settings_.mode;
+  batch.flux_scale = state.fluxScale();
+  const auto power = [&](const LightPolygon& light) {
+    const glm::dvec3 flux = light.area * glm::abs(light.undelivered(state.rounds()));
+    return flux.x + flux.y + flux.z;
+  };
+  double total = 0.0;
+  for (const auto& light : lights) total += power(light);
+  for (auto& light : lights) {
+    if (power(light) <= 0.0) continue;
+    const auto wanted = static_cast<std::uint32_t>(std::lround(settings_.light_points * power(light) / total));
+    const std::uint32_t shots = std::max(1U, (wanted + kPointsAShot - 1) / kPointsAShot);
+    const std::uint32_t points = std::clamp(wanted, 2U, kPointsAShot);
+    for (std::uint32_t k = 0; k < 2 * shots; ++k) addGatherShot(light, state.rounds(), k, shots, points, batch);
+    light.delivered += light.undelivered(state.rounds());
+  }
+  ++gather_rounds_;
+  return batch;
+}
+
+}  // namespace radiosity::solver

@@ -1,0 +1,85 @@
+// Chooses what to shoot next (Lum, Ma and Max 2002, 4.2): the side with most unshot power is pushed and pulled, its
+// quadtree is walked down along the strongest child until a node's power falls to the share of one shot, and that node
+// shoots.
+//
+// A wave is a batch of such shots chosen from one state. Its size depends on settings alone, never on the number of
+// workers or on time, so that the same seed gives the same bits everywhere.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "server/solver/lights.h"
+#include "server/solver/state.h"
+#include "server/solver/transport.h"
+
+namespace radiosity::solver {
+
+struct PlannerSettings {
+  std::uint64_t seed = 1;
+  LinkMode mode = LinkMode::kFormula;
+  std::uint32_t pairs_a_wave = 64;       ///< shooters; each shoots once into either half
+  std::uint32_t shooters_a_round = 256;  ///< a round's power is divided into about this many shots
+  std::uint32_t resolution = 64;         ///< N of a hemicube that carries a full share of power
+  std::uint32_t light_resolution = 128;  ///< N of the item buffers of gathered light
+  std::uint32_t light_points = 16;       ///< points on lights in a round and half, shared by power
+  float level_bias = 0.0F;               ///< positive: coarser links
+};
+
+/// What a wave skipped, for reports.
+struct PlannerCounters {
+  std::uint64_t shooters = 0, push_pulls = 0;
+  std::uint64_t roulette_kills = 0;  ///< weak nodes whose light another node carried in the mean
+  std::uint64_t whole_subtrees = 0;  ///< nodes above leaf level shot as one
+};
+
+class Planner {
+ public:
+  explicit Planner(PlannerSettings settings) : settings_(settings) {}
+
+  /// A round begins with `power` to shoot: sets the share of one shot.
+  void startRound(double power) {
+    share_ = power / static_cast<double>(settings_.shooters_a_round);
+    wave_ = 0;
+  }
+
+  /// Next wave of scatter shots; the leaves they stand for are marked as shot. Stops early when the power that remains
+  /// is below `remainder`. An empty batch: nothing worth shooting.
+  [[nodiscard]] ShotBatch scatterWave(RadiosityState& state, double remainder);
+
+  /// Direct light: what every light polygon has not delivered yet, from fresh points. The lights are marked as
+  /// delivered.
+  [[nodiscard]] ShotBatch gatherRound(const RadiosityState& state, std::vector<LightPolygon>& lights);
+
+  /// Flux that shooters stood for minus flux that was shot, per channel, lux unit^2: what roulette and choosing one
+  /// point of a coloured node leave out or add. Zero in the mean; kept so that the energy balance closes exactly.
+  [[nodiscard]] const std::array<double, 3>& imbalance() const { return imbalance_; }
+
+  [[nodiscard]] const PlannerCounters& counters() const { return counters_; }
+  [[nodiscard]] PlannerSettings& settings() { return settings_; }
+
+ private:
+  struct Node {
+    double power;
+    std::uint32_t side, level, x, y;
+  };
+  void shoot(RadiosityState& state, Side& side, const Node& node, ShotBatch& batch);
+  void addShot(const RadiosityState& state, const Side& side, const Node& node, double weight, std::uint32_t half,
+               std::uint64_t node_key, ShotBatch& batch);
+  void addGatherShot(const LightPolygon& light, std::uint32_t rounds, std::uint32_t shot_index, std::uint32_t shots,
+                     std::uint32_t points, ShotBatch& batch);
+  [[nodiscard]] HemicubeFrame frameAt(const glm::vec3& origin, const glm::vec3& normal, double rotation,
+                                      std::uint64_t key) const;
+  [[nodiscard]] std::uint32_t resolutionFor(double power) const;
+
+  PlannerSettings settings_;
+  PlannerCounters counters_;
+  std::array<double, 3> imbalance_{};
+  double share_ = 0.0;      // power of one shot in this round
+  std::uint32_t wave_ = 0;  // of this round
+  std::uint64_t shots_planned_ = 0;
+  std::uint32_t gather_rounds_ = 0;
+};
+
+}  // namespace radiosity::solver

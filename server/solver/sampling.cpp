@@ -1,0 +1,79 @@
+#include "server/solver/sampling.h"
+
+#include <array>
+
+namespace radiosity::solver {
+namespace {
+
+std::uint32_t reverseBits(std::uint32_t x) {
+  x = ((x >> 1) & 0x55555555U) | ((x & 0x55555555U) << 1);
+  x = ((x >> 2) & 0x33333333U) | ((x & 0x33333333U) << 2);
+  x = ((x >> 4) & 0x0F0F0F0FU) | ((x & 0x0F0F0F0FU) << 4);
+  x = ((x >> 8) & 0x00FF00FFU) | ((x & 0x00FF00FFU) << 8);
+  return (x >> 16) | (x << 16);
+}
+
+/// Laine-Karras style permutation with Vegdahl's constants; acts on reversed bits, so that it is an Owen scramble.
+std::uint32_t owenScramble(std::uint32_t x, std::uint32_t seed) {
+  x = reverseBits(x);
+  x ^= x * 0x3d20adeaU;
+  x += seed;
+  x *= (seed >> 16) | 1U;
+  x ^= x * 0x05526c56U;
+  x ^= x * 0x53a22864U;
+  return reverseBits(x);
+}
+
+/// Direction numbers of Sobol dimensions 1..3 (Joe and Kuo); dimension 0 is the radical inverse.
+using Directions = std::array<std::uint32_t, 32>;
+
+constexpr Directions makeDirections(std::uint32_t degree, std::uint32_t polynomial,
+                                    std::array<std::uint32_t, 3> first) {
+  Directions v{};
+  for (std::uint32_t i = 0; i < 32; ++i) {
+    if (i < degree) {
+      v[i] = first[i] << (31U - i);
+      continue;
+    }
+    v[i] = v[i - degree] ^ (v[i - degree] >> degree);
+    for (std::uint32_t k = 1; k < degree; ++k) {
+      if ((polynomial >> (degree - 1 - k)) & 1U) v[i] ^= v[i - k];
+    }
+  }
+  return v;
+}
+
+constexpr std::array<Directions, 3> kDirections = {makeDirections(1, 0, {1, 0, 0}), makeDirections(2, 1, {1, 3, 0}),
+                                                   makeDirections(3, 1, {1, 3, 1})};
+
+std::uint32_t sobolBits(std::uint32_t index, std::uint32_t dimension) {
+  if (dimension == 0) return reverseBits(index);
+  std::uint32_t x = 0;
+  for (std::uint32_t bit = 0; index != 0; ++bit, index >>= 1) {
+    if (index & 1U) x ^= kDirections[dimension - 1][bit];
+  }
+  return x;
+}
+
+}  // namespace
+
+std::uint64_t mixKeys(std::uint64_t a, std::uint64_t b) {
+  std::uint64_t z = a + 0x9e3779b97f4a7c15ULL * (b + 1);
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
+  return z ^ (z >> 31);
+}
+
+glm::dvec4 sobol4(std::uint32_t index, std::uint64_t key) {
+  const std::uint32_t shuffled = owenScramble(index, static_cast<std::uint32_t>(mixKeys(key, 0)));
+  glm::dvec4 point;
+  for (std::uint32_t d = 0; d < 4; ++d) {
+    const auto seed = static_cast<std::uint32_t>(mixKeys(key, d + 1));
+    point[static_cast<int>(d)] = owenScramble(sobolBits(shuffled, d), seed) * 0x1p-32;
+  }
+  return point;
+}
+
+double uniformFromKey(std::uint64_t key) { return static_cast<double>(mixKeys(key, 77) >> 11) * 0x1p-53; }
+
+}  // namespace radiosity::solver

@@ -1,0 +1,128 @@
+// The state of a solve: what every node has received (H, as integers) and what every leaf has shot (S). Radiosity and
+// unshot radiosity are derived, never accumulated, so that nothing drifts:
+//
+//   B = E + rho H,   H = received / (rounds area),   unshot = rounds B' - S,   B' = the part of B that scatter shots
+//   carry.
+//
+// Rounds: the first shoots until little is left; each further round adds one to `rounds`, which makes the whole B
+// unshot once more, to be shot with fresh samples. H is thereby the mean over rounds, and what a round left over is
+// carried to the next.
+//
+// Push-pull is delayed (Lum, Ma and Max 2002, 4.1): a batch only adds flux to the nodes it linked to; a side is pushed
+// and pulled when it is about to shoot or to be read. Owned by the Solver; one thread.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "server/scene/patch_scene.h"
+#include "server/solver/transport.h"
+
+namespace radiosity::solver {
+
+/// One side of a surface that has patches: the paper's "polygon" with its quadtree.
+struct Side {
+  std::uint32_t surface = 0;
+  std::uint32_t side = 0;        ///< 0 front, 1 back
+  std::uint32_t first_node = 0;  ///< level 0 starts here
+  std::uint32_t node_count = 0;
+  std::uint32_t first_value = 0;  ///< leaf values of this side start here
+  std::uint32_t leaf_count = 0;
+  std::uint32_t width = 0, height = 0, level_count = 0;
+  bool gathered = false;      ///< its emission is delivered by gather shots, not by scatter
+  bool dirty = true;          ///< received since its last push-pull
+  double unshot_power = 0.0;  ///< sum of |unshot| area, all channels; an estimate while dirty
+};
+
+class RadiosityState {
+ public:
+  RadiosityState(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials);
+
+  [[nodiscard]] std::vector<Side>& sides() { return sides_; }
+  [[nodiscard]] const std::vector<Side>& sides() const { return sides_; }
+  [[nodiscard]] const scene::PatchScene& patches() const { return *patches_; }
+  [[nodiscard]] double fluxScale() const { return flux_scale_; }
+  [[nodiscard]] std::uint32_t rounds() const { return rounds_; }
+
+  /// Emission and reflectance of `side` changed: nothing is invalidated, its unshot radiosity follows.
+  void setMaterials(const scene::PatchMaterials& materials);
+
+  /// Makes the whole radiosity unshot once more.
+  void startRound();
+
+  /// Adds what a batch delivered. Flux that landed on a node without area (a sliver that only the rasteriser saw) goes
+  /// to the nearest ancestor that has some, so none is lost.
+  /// A batch holds either gather shots or scatter shots, `gathering` says which.
+  void receive(const FluxAccumulators& batch, bool gathering);
+
+  /// Push: irradiance of every leaf. Pull: unshot power of every node. No-op when clean.
+  void pushPull(Side& side);
+  void pushPullAll();
+
+  /// A 3 x 3 Gaussian over the unpushed flux of `side` at each level, weighted by area (paper, section 5). Conserves
+  /// flux up to rounding, which is given to the centre. Used by the paper-faithful mode on what a batch delivered.
+  void smoothUnpushed(FluxAccumulators& batch, const Side& side) const;
+
+  /// Sum of |unshot| area over the subtree, all channels. Valid after pushPull of the side.
+  [[nodiscard]] float nodePower(std::uint32_t node) const { return node_power_[node]; }
+  [[nodiscard]] glm::vec3 unshot(const Side& side, std::uint32_t leaf) const {
+    return unshot_[side.first_value + leaf];
+  }
+  [[nodiscard]] glm::vec3 irradiance(const Side& side, std::uint32_t leaf) const {
+    return irradiance_[side.first_value + leaf];
+  }
+
+  /// The leaves under a node are as good as shot: S becomes rounds B' there. Keeps power pyramids right. Returns the
+  /// flux, per channel, that was unshot there.
+  glm::dvec3 markShot(Side& side, std::uint32_t level, std::uint32_t x, std::uint32_t y);
+
+  /// Irradiance (lux) by node id for level 0; other levels are 0. Needs pushPullAll().
+  [[nodiscard]] std::vector<glm::vec3> nodeIrradiance() const;
+
+  /// Irradiance by leaf value from one of the two independent halves; pushed on the fly. `out` is leaf_count long.
+  void halfIrradiance(const Side& side, std::uint32_t half, std::span<glm::vec3> out) const;
+
+  [[nodiscard]] glm::vec3 emission(const Side& side, std::uint32_t leaf) const {
+    return emission_[side.first_value + leaf];
+  }
+  [[nodiscard]] glm::vec3 reflectance(const Side& side, std::uint32_t leaf) const {
+    return reflectance_[side.first_value + leaf];
+  }
+  [[nodiscard]] float leafArea(const Side& side, std::uint32_t leaf) const {
+    return patches_->node_area[side.first_node + leaf];
+  }
+  /// Flux that left, or fell on unlit sides, summed over all rounds; integers as in FluxAccumulators.
+  [[nodiscard]] const Flux3& escaped() const { return escaped_; }
+  [[nodiscard]] const Flux3& backface() const { return backface_; }
+  /// Flux of the gather shots that reached leaves, summed over all rounds.
+  [[nodiscard]] const Flux3& gathered() const { return gathered_; }
+  [[nodiscard]] const Flux3& scattered() const { return scattered_; }
+  /// Flux of the gather shots that left or fell on unlit sides; part of escaped() and backface().
+  [[nodiscard]] const Flux3& gatherLost() const { return gather_lost_; }
+
+ private:
+  void makeSides();
+  void chooseFluxScale();
+  void pull(Side& side);
+  void spreadFlux(const std::vector<Flux3>& from, const scene::LevelGrid& grid, std::uint32_t first, std::uint32_t i,
+                  std::vector<Flux3>& to) const;
+  [[nodiscard]] glm::vec3 scatterRadiosity(const Side& side, std::uint32_t leaf) const;
+  void pushHalf(const Side& side, std::uint32_t half, std::vector<glm::dvec3>& density) const;
+
+  std::shared_ptr<const scene::PatchScene> patches_;
+  std::vector<Side> sides_;
+  std::vector<glm::vec3> emission_, reflectance_;  // by leaf value
+  std::array<std::vector<Flux3>, 2> received_;     // by node, H as integers, unpushed
+  std::vector<glm::vec3> shot_;                    // by leaf value: S, summed over rounds
+  std::vector<glm::vec3> irradiance_, unshot_;     // by leaf value, derived by pushPull
+  std::vector<float> node_power_;                  // by node, derived by pushPull
+  Flux3 escaped_{}, backface_{}, gathered_{}, scattered_{}, gather_lost_{};
+  double flux_scale_ = 1.0;
+  std::uint32_t rounds_ = 1;
+};
+
+}  // namespace radiosity::solver

@@ -1,0 +1,188 @@
+// Direct light gathered at leaves: exact where nothing is in between, exact umbra, penumbra and energy.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
+
+#include "server/gpu/gpu_transport.h"
+#include "server/gpu/polygon_form_factor.h"
+#include "tests/gl/scene_builder.h"
+
+namespace radiosity::test {
+namespace {
+
+/// A gather shot of a quad surface with points on a jittered grid.
+solver::ShotBatch gatherFrom(const scene::PatchScene& scene, std::uint32_t surface, std::uint32_t points_a_side,
+                             std::mt19937& random) {
+  const auto& chart = scene.surfaces[surface];
+  const auto first_vertex = scene.indices[3 * static_cast<std::size_t>(chart.first_triangle)];
+  solver::ShotBatch batch;
+  batch.flux_scale = kFluxScale;
+  solver::GatherShot shot;
+  shot.corner_count = 4;
+  for (std::uint32_t i = 0; i < 4; ++i) shot.corners[i] = scene.vertices[first_vertex + i].position;
+  shot.normal = scene.triangles[chart.first_triangle].normal;
+  shot.radiosity = {1.0, 2.0, 0.0};
+  shot.point_count = points_a_side * points_a_side;
+  std::uniform_real_distribution<float> unit(0.0F, 1.0F);
+  for (std::uint32_t i = 0; i < shot.point_count; ++i) {
+    const auto side = static_cast<float>(points_a_side);
+    const float u = (static_cast<float>(i % points_a_side) + unit(random)) / side;
+    const float v = (static_cast<float>(i / points_a_side) + unit(random)) / side;
+    batch.points.push_back(shotFrom(scene, surface, u, v, 64, random).frame);
+  }
+  batch.gather = {shot};
+  return batch;
+}
+
+/// Irradiance of leaf (x, y), channel 0.
+double irradiance(const scene::PatchScene& scene, const solver::FluxAccumulators& flux, std::uint32_t surface,
+                  std::uint32_t x, std::uint32_t y) {
+  const auto& chart = scene.surfaces[surface];
+  const auto id = chart.first_node[0] + y * chart.width + x;
+  return static_cast<double>(flux.node[0][id][0]) / kFluxScale / static_cast<double>(scene.node_area[id]);
+}
+
+class Gather : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    auto made = gpu::makeInProcessTransport();
+    if (!made) GTEST_SKIP() << made.error().text();
+    transport_ = std::move(*made);
+  }
+  solver::FluxAccumulators run(const std::shared_ptr<const scene::PatchScene>& scene, const solver::ShotBatch& batch) {
+    EXPECT_TRUE(transport_->setScene(scene).has_value());
+    auto flux = accumulators(*scene);
+    const auto counters = transport_->run(batch, flux);
+    EXPECT_TRUE(counters.has_value()) << counters.error().text();
+    return flux;
+  }
+  std::unique_ptr<solver::Transport> transport_;
+};
+
+TEST(PolygonFormFactor, MatchesTheClosedFormOfAPointFacingARectangle) {
+  // receiver under the corner of an a x b rectangle at distance c
+  const double a = 0.7, b = 0.4, c = 0.9;
+  const double x = a / c, y = b / c;
+  const double exact = (x / std::sqrt(1 + x * x) * std::atan(y / std::sqrt(1 + x * x)) +
+                        y / std::sqrt(1 + y * y) * std::atan(x / std::sqrt(1 + y * y))) /
+                       (2 * std::numbers::pi);
+  const std::array<glm::vec3, 4> corners{glm::vec3(0, 0, 0.9F), {0, 0.4F, 0.9F}, {0.7F, 0.4F, 0.9F}, {0.7F, 0, 0.9F}};
+  EXPECT_NEAR(gpu::polygonFormFactor({0, 0, 0}, {0, 0, 1}, corners), exact, 1e-7);
+}
+
+TEST(PolygonFormFactor, ClipsAtTheHorizon) {
+  // an upright rectangle of height 2h centred on the horizon gives the same as its upper half
+  const std::array<glm::vec3, 4> whole{glm::vec3(-1, 1, -0.5F), {1, 1, -0.5F}, {1, 1, 0.5F}, {-1, 1, 0.5F}};
+  const std::array<glm::vec3, 4> half{glm::vec3(-1, 1, 0), {1, 1, 0}, {1, 1, 0.5F}, {-1, 1, 0.5F}};
+  const auto expected = gpu::polygonFormFactor({0, 0, 0}, {0, 0, 1}, half);
+  EXPECT_GT(expected, 0.01);
+  EXPECT_NEAR(gpu::polygonFormFactor({0, 0, 0}, {0, 0, 1}, whole), expected, 1e-12);
+  EXPECT_EQ(gpu::polygonFormFactor({0, 0, 1}, {0, 0, 1}, half), 0.0);
+}
+
+TEST_F(Gather, UnoccludedIrradianceIsLambertsFormula) {
+  SceneBuilder builder;
+  const auto floor = builder.add({{-0.5F, -0.5F, -0.5F}, {1, 0, 0}, {0, 1, 0}, 16, 16});
+  const auto lamp = builder.add({{-0.1F, -0.2F, 0.4F}, {0, 0.3F, 0}, {0.2F, 0, 0}, 1, 1});
+  const auto scene = builder.build();
+  std::mt19937 random(1);
+  const auto batch = gatherFrom(*scene, lamp, 4, random);
+  const auto flux = run(scene, batch);
+  for (std::uint32_t y = 0; y < 16; ++y) {
+    for (std::uint32_t x = 0; x < 16; ++x) {
+      const glm::dvec3 point(-0.5 + (x + 0.5) / 16, -0.5 + (y + 0.5) / 16, -0.5);
+      const auto exact = gpu::polygonFormFactor(point, {0, 0, 1}, batch.gather[0].corners);
+      EXPECT_NEAR(irradiance(*scene, flux, floor, x, y), exact, 1e-5 * exact) << x << ", " << y;
+    }
+  }
+}
+
+TEST_F(Gather, TheReceiverJitterMovesTheReceivingPoint) {
+  SceneBuilder builder;
+  const auto floor = builder.add({{-0.5F, -0.5F, -0.5F}, {1, 0, 0}, {0, 1, 0}, 4, 4});
+  const auto lamp = builder.add({{-0.1F, -0.2F, 0.4F}, {0, 0.3F, 0}, {0.2F, 0, 0}, 1, 1});
+  const auto scene = builder.build();
+  std::mt19937 random(1);
+  auto batch = gatherFrom(*scene, lamp, 2, random);
+  batch.gather[0].receiver_jitter = {0.125F, 0.75F};
+  const auto flux = run(scene, batch);
+  const auto exact =
+      gpu::polygonFormFactor({-0.5 + 1.125 / 4, -0.5 + 2.75 / 4, -0.5}, {0, 0, 1}, batch.gather[0].corners);
+  EXPECT_NEAR(irradiance(*scene, flux, floor, 1, 2), exact, 1e-5 * exact);
+}
+
+/// Share of the lamp's interval [-0.1, 0.1] that a point at distance x from the blocker's edge line sees past a
+/// half-plane: similar triangles, blocker half-way between lamp and floor.
+double visibleShare(double x) { return std::clamp((x + 0.1) / 0.2, 0.0, 1.0); }
+
+TEST_F(Gather, AHalfPlaneCastsAnExactUmbraAndPenumbra) {
+  SceneBuilder builder;
+  const auto floor = builder.add({{-0.5F, -0.5F, -0.5F}, {1, 0, 0}, {0, 1, 0}, 64, 2});
+  const auto lamp = builder.add({{-0.1F, -0.01F, 0.5F}, {0, 0.02F, 0}, {0.2F, 0, 0}, 1, 1});
+  builder.add({{-2.0F, -2.0F, 0.0F}, {2, 0, 0}, {0, 4, 0}, 4, 4, true});  // covers x < 0 half-way up
+  const auto scene = builder.build();
+  std::mt19937 random(4);
+  auto batch = gatherFrom(*scene, lamp, 16, random);
+  batch.gather[0].resolution = 512;
+  const auto flux = run(scene, batch);
+  for (std::uint32_t x = 0; x < 64; ++x) {
+    const double at = -0.5 + (x + 0.5) / 64;
+    const auto open = gpu::polygonFormFactor({at, -0.25, -0.5}, {0, 0, 1}, batch.gather[0].corners);
+    const double share = irradiance(*scene, flux, floor, x, 0) / open;
+    if (at < -0.11) {
+      EXPECT_EQ(share, 0.0) << at;
+    } else if (at > 0.11) {
+      EXPECT_NEAR(share, 1.0, 1e-4) << at;
+    } else {
+      EXPECT_NEAR(share, visibleShare(at), 0.05) << at;
+    }
+  }
+}
+
+TEST_F(Gather, AClosedBoxReceivesWhatTheLampEmits) {
+  SceneBuilder builder;
+  builder.addBox(glm::vec3(-0.5F), glm::vec3(0.5F), 48, true);
+  const auto lamp = builder.add({{-0.1F, -0.1F, 0.3F}, {0, 0.2F, 0}, {0.2F, 0, 0}, 1, 1});
+  const auto scene = builder.build();
+  std::mt19937 random(9);
+  const auto flux = run(scene, gatherFrom(*scene, lamp, 4, random));
+  const double emitted = 0.04 * kFluxScale;
+  EXPECT_NEAR(static_cast<double>(flux.gathered[0]), emitted, 0.01 * emitted);
+  EXPECT_NEAR(static_cast<double>(flux.gathered[1]), 2 * emitted, 0.02 * emitted);
+  EXPECT_EQ(flux.gathered[2], 0);
+  EXPECT_EQ(flux.escaped[0], 0);
+  EXPECT_EQ(flux.backface[0], 0);
+}
+
+TEST_F(Gather, LightLeavingTheSceneIsCountedByHowItIsLost) {
+  SceneBuilder builder;
+  const auto lamp = builder.add({{-0.5F, -0.5F, -0.5F}, {1, 0, 0}, {0, 1, 0}, 1, 1});
+  builder.add({{-0.5F, -0.5F, 0.5F}, {1, 0, 0}, {0, 1, 0}, 8, 8});  // shows its back
+  const auto scene = builder.build();
+  std::mt19937 random(9);
+  auto batch = gatherFrom(*scene, lamp, 16, random);
+  const auto flux = run(scene, batch);
+  EXPECT_EQ(flux.gathered[0], 0);
+  EXPECT_NEAR(static_cast<double>(flux.backface[0]) / kFluxScale, 0.1998248957, 0.001);
+  EXPECT_NEAR(static_cast<double>(flux.backface[0] + flux.escaped[0]) / kFluxScale, 1.0, 1e-9);
+}
+
+TEST_F(Gather, OppositeShotsCancelToExactlyNothing) {
+  const auto scene = randomRoom(60, 4000, 1);
+  std::mt19937 random(9);
+  auto batch = gatherFrom(*scene, 5, 4, random);
+  batch.gather[0].radiosity = {0.3, 1.0 / 3.0, 7e-4};
+  batch.gather.push_back(batch.gather[0]);
+  for (auto& channel : batch.gather[1].radiosity) channel = -channel;
+  const auto flux = run(scene, batch);
+  for (const auto& node : flux.node[0]) ASSERT_EQ(node, solver::Flux3{});
+  EXPECT_EQ(flux.gathered, solver::Flux3{});
+  EXPECT_EQ(flux.backface, solver::Flux3{});
+}
+
+}  // namespace
+}  // namespace radiosity::test

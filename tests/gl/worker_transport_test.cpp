@@ -1,0 +1,207 @@
+// Worker processes: the same bits as one process, whatever the number of workers and whoever dies.
+#include <gtest/gtest.h>
+#include <sys/types.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
+#include "server/gpu/batch_chunks.h"
+#include "server/gpu/gpu_transport.h"
+#include "tests/gl/scene_builder.h"
+
+namespace radiosity::test {
+namespace {
+
+solver::ShotBatch mixedBatch(const scene::PatchScene& scene, std::uint32_t shots) {
+  std::mt19937 random(23);
+  solver::ShotBatch batch;
+  batch.flux_scale = kFluxScale;
+  for (std::uint32_t i = 0; i < shots; ++i) {
+    batch.scatter.push_back(shotFrom(scene, i % 40, 0.27F, 0.7F, i % 7 == 0 ? 128 : 64, random));
+    batch.scatter.back().half = i % 2;
+  }
+  for (std::uint32_t light = 0; light < 3; ++light) {
+    const auto& chart = scene.surfaces[6 + light];
+    const auto first = scene.indices[3 * static_cast<std::size_t>(chart.first_triangle)];
+    solver::GatherShot shot;
+    shot.corner_count = 4;
+    for (std::uint32_t i = 0; i < 4; ++i) shot.corners[i] = scene.vertices[first + i].position;
+    shot.normal = scene.triangles[chart.first_triangle].normal;
+    shot.radiosity = {3.0, 2.0, 1.0 / 3.0};
+    shot.first_point = static_cast<std::uint32_t>(batch.points.size());
+    shot.point_count = 5;
+    shot.half = light % 2;
+    for (int i = 0; i < 5; ++i) batch.points.push_back(shotFrom(scene, 6 + light, 0.5F, 0.5F, 64, random).frame);
+    batch.gather.push_back(shot);
+  }
+  return batch;
+}
+
+void expectSame(const solver::FluxAccumulators& a, const solver::FluxAccumulators& b) {
+  EXPECT_EQ(a.node, b.node);
+  EXPECT_EQ(a.escaped, b.escaped);
+  EXPECT_EQ(a.backface, b.backface);
+  EXPECT_EQ(a.scattered, b.scattered);
+  EXPECT_EQ(a.gathered, b.gathered);
+}
+
+/// Processes whose parent is this one and whose executable is the test's worker.
+std::vector<pid_t> childWorkers() {
+  std::vector<pid_t> found;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc")) {
+    const auto name = entry.path().filename().string();
+    if (name.find_first_not_of("0123456789") != std::string::npos) continue;
+    std::ifstream file(entry.path() / "stat");
+    std::string line;
+    if (!std::getline(file, line)) continue;
+    const auto close = line.rfind(')');
+    if (close == std::string::npos || line.find("(gl_worker") == std::string::npos) continue;
+    const pid_t parent = std::stoi(line.substr(line.find(' ', close + 2)));
+    if (parent == getpid()) found.push_back(std::stoi(name));
+  }
+  return found;
+}
+
+class Workers : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    auto made = gpu::makeInProcessTransport();
+    if (!made) GTEST_SKIP() << made.error().text();
+    in_process_ = std::move(*made);
+  }
+  static std::unique_ptr<solver::Transport> make(int workers) {
+    auto made = gpu::makeWorkerTransport({workers, RADIOSITY_GL_WORKER});
+    EXPECT_TRUE(made.has_value()) << made.error().text();
+    return made ? std::move(*made) : nullptr;
+  }
+  static solver::FluxAccumulators run(solver::Transport& transport, const scene::PatchScene& scene,
+                                      const solver::ShotBatch& batch) {
+    auto flux = accumulators(scene);
+    const auto counters = transport.run(batch, flux);
+    EXPECT_TRUE(counters.has_value()) << counters.error().text();
+    if (counters) {
+      EXPECT_EQ(counters->scatter_shots, batch.scatter.size());
+      EXPECT_EQ(counters->gather_shots, batch.gather.size());
+    }
+    return flux;
+  }
+  std::unique_ptr<solver::Transport> in_process_;
+};
+
+TEST(BatchChunks, CoverEveryShotOnce) {
+  const auto scene = randomRoom(60, 2000, 1);
+  const auto batch = mixedBatch(*scene, 101);
+  for (const std::size_t workers : {1U, 2U, 7U}) {
+    std::size_t scatter = 0;
+    std::size_t gather = 0;
+    for (const auto& chunk : gpu::cutBatch(batch, 120, workers)) {
+      auto& next = chunk.gather ? gather : scatter;
+      EXPECT_EQ(chunk.first, next);
+      EXPECT_GT(chunk.count, 0U);
+      next += chunk.count;
+    }
+    EXPECT_EQ(scatter, batch.scatter.size());
+    EXPECT_EQ(gather, batch.gather.size());
+  }
+  EXPECT_TRUE(gpu::cutBatch({}, 0, 2).empty());
+}
+
+TEST_F(Workers, AnyNumberOfWorkersGivesTheBitsOfOneProcess) {
+  const auto scene = randomRoom(402, 13742, 2);
+  const auto batch = mixedBatch(*scene, 150);
+  ASSERT_TRUE(in_process_->setScene(scene).has_value());
+  const auto expected = run(*in_process_, *scene, batch);
+  EXPECT_NE(expected.scattered, solver::Flux3{});
+  EXPECT_NE(expected.gathered, solver::Flux3{});
+  for (const int workers : {1, 2, 3}) {
+    const auto transport = make(workers);
+    ASSERT_TRUE(transport);
+    ASSERT_TRUE(transport->setScene(scene).has_value());
+    for (int i = 0; i < 2; ++i) expectSame(run(*transport, *scene, batch), expected);
+  }
+}
+
+TEST_F(Workers, ANewSceneReplacesTheOld) {
+  const auto transport = make(2);
+  ASSERT_TRUE(transport);
+  for (const std::uint32_t quads : {60U, 402U, 120U}) {
+    const auto scene = randomRoom(quads, 5000, quads);
+    const auto batch = mixedBatch(*scene, 30);
+    ASSERT_TRUE(in_process_->setScene(scene).has_value());
+    ASSERT_TRUE(transport->setScene(scene).has_value());
+    expectSame(run(*transport, *scene, batch), run(*in_process_, *scene, batch));
+  }
+}
+
+TEST_F(Workers, AnEmptyBatchDoesNothing) {
+  const auto scene = randomRoom(60, 500, 1);
+  const auto transport = make(2);
+  ASSERT_TRUE(transport);
+  ASSERT_TRUE(transport->setScene(scene).has_value());
+  expectSame(run(*transport, *scene, {}), accumulators(*scene));
+}
+
+TEST_F(Workers, KilledWorkersAreReplacedAndChangeNoBit) {
+  const auto scene = randomRoom(402, 13742, 2);
+  const auto batch = mixedBatch(*scene, 1200);
+  ASSERT_TRUE(in_process_->setScene(scene).has_value());
+  const auto expected = run(*in_process_, *scene, batch);
+  const auto transport = make(2);
+  ASSERT_TRUE(transport);
+  ASSERT_TRUE(transport->setScene(scene).has_value());
+  for (int round = 0; round < 3; ++round) {
+    const auto before = childWorkers();
+    ASSERT_EQ(before.size(), 2U);
+    std::thread killer([&] {
+      std::this_thread::sleep_for(std::chrono::milliseconds(20 + 30 * round));
+      kill(before[static_cast<std::size_t>(round % 2)], SIGKILL);
+    });
+    expectSame(run(*transport, *scene, batch), expected);
+    killer.join();
+    // killed in the run or just after it, the next run finds two living workers
+    expectSame(run(*transport, *scene, batch), expected);
+    const auto after = childWorkers();
+    EXPECT_EQ(after.size(), 2U);
+    EXPECT_EQ(std::count(after.begin(), after.end(), before[static_cast<std::size_t>(round % 2)]), 0);
+  }
+}
+
+TEST_F(Workers, NoProcessIsLeftBehind) {
+  {
+    const auto transport = make(3);
+    EXPECT_EQ(childWorkers().size(), 3U);
+  }
+  EXPECT_TRUE(childWorkers().empty());
+}
+
+TEST_F(Workers, AnExecutableThatIsNoWorkerIsAnErrorNotAHang) {
+  const auto missing = gpu::makeWorkerTransport({1, "/nonexistent/program"});
+  ASSERT_FALSE(missing.has_value());
+  EXPECT_EQ(missing.error().code, ErrorCode::kUnavailable);
+  const auto wrong = gpu::makeWorkerTransport({1, "/bin/false"});
+  ASSERT_FALSE(wrong.has_value());
+  EXPECT_EQ(wrong.error().code, ErrorCode::kUnavailable);
+  EXPECT_NE(wrong.error().message.find("status 1"), std::string::npos) << wrong.error().message;
+}
+
+TEST_F(Workers, ABadShotIsRefusedAndTheWorkersLiveOn) {
+  const auto scene = randomRoom(60, 500, 1);
+  const auto transport = make(2);
+  ASSERT_TRUE(transport);
+  ASSERT_TRUE(transport->setScene(scene).has_value());
+  const auto before = childWorkers();
+  auto batch = mixedBatch(*scene, 4);
+  batch.gather[0].point_count = 1000;
+  auto flux = accumulators(*scene);
+  EXPECT_FALSE(transport->run(batch, flux).has_value());
+  EXPECT_EQ(childWorkers(), before);
+}
+
+}  // namespace
+}  // namespace radiosity::test

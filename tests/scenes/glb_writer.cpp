@@ -1,0 +1,202 @@
+#include "tests/scenes/glb_writer.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <fstream>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/mat3x3.hpp>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string>
+
+namespace radiosity::test_scenes {
+namespace {
+
+using nlohmann::json;
+using Bytes = std::vector<std::uint8_t>;
+
+constexpr int kFloat = 5126;
+constexpr int kUnsignedShort = 5123;
+constexpr int kUnsignedInt = 5125;
+
+template <typename T>
+void put(Bytes& out, T value) {
+  static_assert(std::endian::native == std::endian::little);
+  const auto raw = std::bit_cast<std::array<std::uint8_t, sizeof(T)>>(value);
+  out.insert(out.end(), raw.begin(), raw.end());
+}
+
+json toJson(glm::dvec3 v) { return json::array({v.x, v.y, v.z}); }
+
+struct Writer {
+  Bytes bin;
+  json views = json::array();
+  json accessors = json::array();
+
+  std::size_t view(const Bytes& bytes, int target) {
+    while (bin.size() % 4 != 0) bin.push_back(0);
+    views.push_back({{"buffer", 0}, {"byteOffset", bin.size()}, {"byteLength", bytes.size()}, {"target", target}});
+    bin.insert(bin.end(), bytes.begin(), bytes.end());
+    return views.size() - 1;
+  }
+
+  std::size_t vectors(const std::vector<glm::vec3>& values, bool with_bounds) {
+    Bytes bytes;
+    glm::vec3 low(INFINITY);
+    glm::vec3 high(-INFINITY);
+    for (const auto& v : values) {
+      for (int axis = 0; axis < 3; ++axis) put(bytes, v[axis]);
+      low = glm::min(low, v);
+      high = glm::max(high, v);
+    }
+    json accessor{
+        {"bufferView", view(bytes, 34962)}, {"componentType", kFloat}, {"count", values.size()}, {"type", "VEC3"}};
+    if (with_bounds) {
+      accessor["min"] = toJson(low);
+      accessor["max"] = toJson(high);
+    }
+    accessors.push_back(std::move(accessor));
+    return accessors.size() - 1;
+  }
+
+  std::size_t indices(const std::vector<std::uint32_t>& values, std::size_t vertex_count) {
+    const bool wide = vertex_count > 65535;
+    Bytes bytes;
+    for (const auto index : values) {
+      if (wide) {
+        put(bytes, index);
+      } else {
+        put(bytes, static_cast<std::uint16_t>(index));
+      }
+    }
+    accessors.push_back({{"bufferView", view(bytes, 34963)},
+                         {"componentType", wide ? kUnsignedInt : kUnsignedShort},
+                         {"count", values.size()},
+                         {"type", "SCALAR"}});
+    return accessors.size() - 1;
+  }
+
+  /// The polygons of one material of an object, each with its own corners, as a fan of triangles.
+  json primitive(const Object& object, std::uint32_t material) {
+    std::vector<glm::vec3> positions;
+    std::vector<glm::vec3> normals;
+    std::vector<std::uint32_t> triangles;
+    for (const auto& polygon : object.polygons) {
+      if (polygon.material != material) continue;
+      const auto first = static_cast<std::uint32_t>(positions.size());
+      const glm::vec3 normal(glm::normalize(polygonNormal(polygon)));
+      for (const auto& corner : polygon.corners) {
+        positions.emplace_back(corner - object.origin);
+        normals.push_back(normal);
+      }
+      for (std::uint32_t i = 1; i + 1 < polygon.corners.size(); ++i) {
+        triangles.insert(triangles.end(), {first, first + i, first + i + 1});
+      }
+    }
+    const auto vertex_count = positions.size();
+    return {{"attributes", {{"POSITION", vectors(positions, true)}, {"NORMAL", vectors(normals, false)}}},
+            {"indices", indices(triangles, vertex_count)},
+            {"material", material}};
+  }
+};
+
+json materialJson(const Material& material) {
+  const auto& rho = material.reflectance;
+  json result{{"name", material.name},
+              {"pbrMetallicRoughness",
+               {{"baseColorFactor", json::array({rho.x, rho.y, rho.z, 1.0})},
+                {"metallicFactor", 0.0},
+                {"roughnessFactor", 1.0}}}};
+  const auto& emission = material.emission_nits;
+  const double strength = std::max({emission.x, emission.y, emission.z});
+  if (strength <= 0.0) return result;
+  result["emissiveFactor"] = toJson(emission / strength);
+  result["extensions"] = {{"KHR_materials_emissive_strength", {{"emissiveStrength", strength}}}};
+  return result;
+}
+
+json cameraNode(const Camera& camera) {
+  const auto back = glm::normalize(camera.position - camera.target);
+  const auto right = glm::normalize(glm::cross(glm::dvec3(0.0, 1.0, 0.0), back));
+  const glm::dquat q(glm::dmat3(right, glm::cross(back, right), back));
+  return {{"name", "camera"},
+          {"camera", 0},
+          {"translation", toJson(camera.position)},
+          {"rotation", json::array({q.x, q.y, q.z, q.w})}};
+}
+
+json cameraJson(const Camera& camera) {
+  json perspective{{"yfov", camera.yfov_rad}, {"znear", 0.01}};
+  if (camera.aspect > 0.0) perspective["aspectRatio"] = camera.aspect;
+  return {{"type", "perspective"}, {"perspective", perspective}};
+}
+
+json document(const TestScene& scene, Writer& writer) {
+  json gltf{{"asset", {{"version", "2.0"}, {"generator", "radiosity test scenes"}}},
+            {"scene", 0},
+            {"nodes", json::array()},
+            {"meshes", json::array()},
+            {"materials", json::array()},
+            {"cameras", json::array({cameraJson(scene.camera)})}};
+  for (const auto& material : scene.materials) {
+    gltf["materials"].push_back(materialJson(material));
+    if (gltf["materials"].back().contains("extensions")) {
+      gltf["extensionsUsed"] = json::array({"KHR_materials_emissive_strength"});
+    }
+  }
+  for (const auto& object : scene.objects) {
+    json primitives = json::array();
+    for (std::uint32_t m = 0; m < scene.materials.size(); ++m) {
+      const bool used = std::any_of(object.polygons.begin(), object.polygons.end(),
+                                    [m](const Polygon& polygon) { return polygon.material == m; });
+      if (used) primitives.push_back(writer.primitive(object, m));
+    }
+    gltf["nodes"].push_back({{"name", object.name}, {"mesh", gltf["meshes"].size()}});
+    if (object.origin != glm::dvec3(0.0)) gltf["nodes"].back()["translation"] = toJson(object.origin);
+    gltf["meshes"].push_back({{"name", object.name}, {"primitives", std::move(primitives)}});
+  }
+  gltf["nodes"].push_back(cameraNode(scene.camera));
+  json roots = json::array();
+  for (std::size_t i = 0; i < gltf["nodes"].size(); ++i) roots.push_back(i);
+  gltf["scenes"] = json::array({{{"name", scene.name}, {"nodes", std::move(roots)}}});
+  return gltf;
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> encodeGlb(const TestScene& scene) {
+  Writer writer;
+  auto gltf = document(scene, writer);
+  while (writer.bin.size() % 4 != 0) writer.bin.push_back(0);
+  gltf["buffers"] = json::array({{{"byteLength", writer.bin.size()}}});
+  gltf["bufferViews"] = std::move(writer.views);
+  gltf["accessors"] = std::move(writer.accessors);
+  auto text = gltf.dump();
+  while (text.size() % 4 != 0) text.push_back(' ');
+
+  Bytes out;
+  put(out, std::uint32_t{0x46546C67});  // "glTF"
+  put(out, std::uint32_t{2});
+  put(out, static_cast<std::uint32_t>(12 + 8 + text.size() + 8 + writer.bin.size()));
+  put(out, static_cast<std::uint32_t>(text.size()));
+  put(out, std::uint32_t{0x4E4F534A});  // "JSON"
+  out.insert(out.end(), text.begin(), text.end());
+  put(out, static_cast<std::uint32_t>(writer.bin.size()));
+  put(out, std::uint32_t{0x004E4942});  // "BIN"
+  out.insert(out.end(), writer.bin.begin(), writer.bin.end());
+  return out;
+}
+
+void writeGlb(const TestScene& scene, const std::filesystem::path& file) {
+  const auto bytes = encodeGlb(scene);
+  std::ofstream out(file, std::ios::binary);
+  out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  out.close();
+  if (!out) throw std::runtime_error("cannot write " + file.string());
+}
+
+}  // namespace radiosity::test_scenes

@@ -1,0 +1,127 @@
+// Two furnished rooms with the polygon counts of the scenes in Lum, Ma and Max 2002 (figures 1 and 2); the originals
+// were never published, so the layout is ours.
+#include <array>
+#include <numbers>
+#include <string>
+#include <utility>
+
+#include "tests/scenes/scenes.h"
+#include "tests/scenes/shapes.h"
+
+namespace radiosity::test_scenes {
+namespace {
+
+constexpr double kHalfTurn = std::numbers::pi;
+constexpr double kQuarterTurn = std::numbers::pi / 2;
+
+/// Chairs never stand quite straight. A fixed pattern of angles within 0.1 rad of straight.
+double disorder(int index) { return 0.02 * ((index * 7) % 11 - 5); }
+
+void place(TestScene& scene, Object object, double x, double z, double angle_rad) {
+  turn(object, angle_rad);
+  move(object, {x, 0.0, z});
+  scene.objects.push_back(std::move(object));
+}
+
+struct Palette {
+  std::uint32_t white, floor, wood, metal, left, right, chair_a, chair_b, light;
+};
+
+void appendRoom(TestScene& scene, glm::dvec3 half, double height, const Palette& palette) {
+  // BoxFace order: left, right, floor, ceiling, back, front
+  Object room{"room", {}, {}};
+  const BoxMaterials materials{palette.left, palette.right, palette.floor, palette.white, palette.white, palette.white};
+  appendBox(room, {-half.x, 0.0, -half.z}, {half.x, height, half.z}, materials, kNoFace, true);
+  scene.objects.push_back(std::move(room));
+}
+
+}  // namespace
+
+TestScene smallRoom() {
+  TestScene scene;
+  scene.name = "room_small";
+  const Palette p{scene.add({"white", glm::dvec3(0.75), glm::dvec3(0.0)}),
+                  scene.add({"floor", {0.45, 0.42, 0.38}, glm::dvec3(0.0)}),
+                  scene.add({"wood", {0.55, 0.38, 0.22}, glm::dvec3(0.0)}),
+                  scene.add({"metal", glm::dvec3(0.30), glm::dvec3(0.0)}),
+                  scene.add({"red_wall", {0.65, 0.20, 0.15}, glm::dvec3(0.0)}),
+                  scene.add({"green_wall", {0.18, 0.55, 0.20}, glm::dvec3(0.0)}),
+                  scene.add({"red_seat", {0.60, 0.08, 0.06}, glm::dvec3(0.0)}),
+                  scene.add({"green_seat", {0.08, 0.50, 0.12}, glm::dvec3(0.0)}),
+                  scene.add({"lamp_light", glm::dvec3(0.50), {60.0, 57.0, 50.0}})};
+  constexpr double kHeight = 2.7;
+  appendRoom(scene, {3.2, 0.0, 2.3}, kHeight, p);
+  scene.objects.push_back(makeCeilingLamp("lamp", {0.0, kHeight - 0.15, 0.0}, 1.2, 0.6, p.white, p.light));
+  int chair = 0;
+  for (int t = 0; t < 3; ++t) {
+    const double x = 2.0 * (t - 1);
+    place(scene, makeTable("table" + std::to_string(t + 1), 0.8, 1.6, p.metal, p.wood), x, 0.0, 0.0);
+    for (const double side : {-1.0, 1.0}) {
+      for (const double z : {-0.4, 0.4}) {
+        const auto seat = side < 0.0 ? p.chair_a : p.chair_b;
+        auto object = makeChair("chair" + std::to_string(chair + 1), p.metal, seat);
+        // the sitter looks along +Z: turn towards the table
+        place(scene, std::move(object), x + 0.62 * side, z, -side * kQuarterTurn + disorder(chair));
+        ++chair;
+      }
+    }
+  }
+  scene.camera = {{2.4, 1.7, 2.1}, {-0.4, 0.6, -0.5}, 1.0, 0.0};
+  return scene;
+}
+
+TestScene seminarRoom() {
+  TestScene scene;
+  scene.name = "room_seminar";
+  const Palette p{scene.add({"white", glm::dvec3(0.75), glm::dvec3(0.0)}),
+                  scene.add({"floor", {0.35, 0.33, 0.32}, glm::dvec3(0.0)}),
+                  scene.add({"wood", {0.55, 0.42, 0.28}, glm::dvec3(0.0)}),
+                  scene.add({"metal", glm::dvec3(0.35), glm::dvec3(0.0)}),
+                  scene.add({"blue_wall", {0.20, 0.30, 0.65}, glm::dvec3(0.0)}),
+                  scene.add({"yellow_wall", {0.70, 0.60, 0.30}, glm::dvec3(0.0)}),
+                  scene.add({"grey_seat", glm::dvec3(0.45), glm::dvec3(0.0)}),
+                  scene.add({"red_seat", {0.50, 0.15, 0.12}, glm::dvec3(0.0)}),
+                  scene.add({"lamp_light", glm::dvec3(0.50), {60.0, 57.0, 50.0}})};
+  constexpr double kHeight = 3.0;
+  appendRoom(scene, {5.2, 0.0, 6.2}, kHeight, p);
+  for (int i = 0; i < 8; ++i) {
+    const glm::dvec3 origin((i % 2) * 5.0 - 2.5, kHeight - 0.15, (i / 2) * 3.0 - 4.5);
+    scene.objects.push_back(makeCeilingLamp("lamp" + std::to_string(i + 1), origin, 1.2, 0.6, p.white, p.light));
+  }
+  int chair = 0;
+  for (int row = 0; row < 8; ++row) {
+    for (int column = 0; column < 5; ++column) {
+      const double x = 1.9 * (column - 2);
+      const double z = 1.15 * row - 2.6;
+      const auto name = std::to_string(row * 5 + column + 1);
+      place(scene, makeTable("table" + name, 1.4, 0.5, p.metal, p.wood), x, z, 0.0);
+      for (const double dx : {-0.35, 0.35}) {
+        auto object = makeChair("chair" + std::to_string(chair + 1), p.metal, chair % 7 == 3 ? p.chair_b : p.chair_a);
+        place(scene, std::move(object), x + dx, z + 0.45, kHalfTurn + disorder(chair));
+        ++chair;
+      }
+    }
+  }
+  place(scene, makeTable("desk1", 1.6, 0.7, p.metal, p.wood), -0.85, -4.6, 0.0);
+  place(scene, makeTable("desk2", 1.6, 0.7, p.metal, p.wood), 0.85, -4.6, 0.0);
+  scene.camera = {{4.4, 2.2, 5.9}, {-0.8, 0.7, -1.0}, 0.95, 0.0};
+  return scene;
+}
+
+std::vector<std::pair<std::string, std::function<TestScene()>>> allScenes() {
+  const auto grey = [](double rho) { return [rho] { return furnace(glm::dvec3(rho), glm::dvec3(1.0)); }; };
+  return {{"cornell", cornell},
+          {"furnace", grey(0.5)},
+          {"furnace_90", grey(0.9)},
+          {"lumped_cube", [] { return lumpedCube(0.5); }},
+          {"plates_parallel", [] { return parallelPlates(1.0, 1.0, 1.0, 1.0, 0.5); }},
+          {"plates_perpendicular", [] { return perpendicularPlates(1.0, 1.0, 1.0, 1.0, 0.5); }},
+          {"sphere_in_sphere",
+           [] {
+             return concentricSpheres({0.5, 0.5, 1.0}, {1.0, 0.6, 0.0});
+           }},
+          {"room_small", smallRoom},
+          {"room_seminar", seminarRoom}};
+}
+
+}  // namespace radiosity::test_scenes

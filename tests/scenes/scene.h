@@ -1,0 +1,53 @@
+// A test scene as plain numbers: what the generators make, what the GLB writer writes and what the oracles consume.
+// Knows nothing of the server. A value; any thread.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <string>
+#include <vector>
+
+namespace radiosity::test_scenes {
+
+struct Material {
+  std::string name;
+  glm::dvec3 reflectance{0.0};    ///< linear sRGB, each channel in [0, 1)
+  glm::dvec3 emission_nits{0.0};  ///< luminance of the front side
+};
+
+/// Convex, planar, counter-clockwise seen from the side that reflects and emits.
+struct Polygon {
+  std::vector<glm::dvec3> corners;  ///< world space, metres
+  std::uint32_t material = 0;
+};
+
+/// Becomes one glTF node and mesh; `origin` is the node's translation, so that moving the node moves the thing.
+struct Object {
+  std::string name;
+  glm::dvec3 origin{0.0};
+  std::vector<Polygon> polygons;
+};
+
+struct Camera {
+  glm::dvec3 position{0.0};
+  glm::dvec3 target{0.0, 0.0, -1.0};
+  double yfov_rad = 0.8;
+  double aspect = 0.0;  ///< width / height; 0: the picture's own
+};
+
+struct TestScene {
+  std::string name;
+  std::vector<Material> materials;
+  std::vector<Object> objects;
+  Camera camera;
+
+  /// Adds a material and returns its index.
+  std::uint32_t add(Material material);
+  [[nodiscard]] std::size_t polygonCount() const;
+};
+
+/// Sum of the normals of a fan of triangles, each twice its area long; not a unit vector.
+[[nodiscard]] glm::dvec3 polygonNormal(const Polygon& polygon);
+[[nodiscard]] double polygonArea(const Polygon& polygon);
+
+}  // namespace radiosity::test_scenes

@@ -1,0 +1,51 @@
+// The scenes themselves, with parameters. Each is a pure function of its arguments.
+#pragma once
+
+#include <functional>
+#include <glm/vec3.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tests/scenes/scene.h"
+
+namespace radiosity::test_scenes {
+
+/// The Cornell box as measured at Cornell's Program of Computer Graphics (published vertices and spectra), in metres,
+/// with the front open as the original. The light shines through a hole of its size in the ceiling, where it lies flush
+/// in the original, so that no two faces coincide. The camera is the published one: red left, green right.
+[[nodiscard]] TestScene cornell();
+
+/// A closed cube, facing inwards, the same reflectance and emission everywhere: H = pi L / (1 - rho) on every point.
+[[nodiscard]] TestScene furnace(glm::dvec3 reflectance, glm::dvec3 emission_nits, double side_m = 1.0);
+
+/// A unit cube, facing inwards, whose floor alone shines with radiosity 1 (luminance 1 / pi).
+[[nodiscard]] TestScene lumpedCube(double reflectance);
+
+/// Two rectangles width_x by depth_z that face each other at a distance: the lower shines, the upper receives.
+[[nodiscard]] TestScene parallelPlates(double width_x, double depth_z, double distance, double emission_nits,
+                                       double reflectance);
+
+/// Two rectangles that share an edge of length `edge` at 90 degrees: the floor (edge x depth) receives, the wall
+/// (edge x height) shines.
+[[nodiscard]] TestScene perpendicularPlates(double edge, double depth, double height, double emission_nits,
+                                            double reflectance);
+
+struct SphereSpec {
+  double radius_m = 1.0;
+  double reflectance = 0.5;
+  double emission_nits = 0.0;
+};
+/// A sphere that faces outwards inside one that faces inwards; both tessellated to the exact area of the sphere.
+[[nodiscard]] TestScene concentricSpheres(const SphereSpec& inner, const SphereSpec& outer, unsigned subdivisions = 3);
+
+/// Closed room of 402 polygons like figure 1 of Lum, Ma and Max 2002: three tables, twelve chairs, a ceiling lamp.
+[[nodiscard]] TestScene smallRoom();
+
+/// Closed seminar room of 3,138 polygons like their figure 2: 42 tables, 80 chairs, eight ceiling lamps.
+[[nodiscard]] TestScene seminarRoom();
+
+/// Everything that make_scenes writes, by file name without extension.
+[[nodiscard]] std::vector<std::pair<std::string, std::function<TestScene()>>> allScenes();
+
+}  // namespace radiosity::test_scenes

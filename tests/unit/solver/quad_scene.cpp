@@ -1,0 +1,175 @@
+#include "tests/unit/solver/quad_scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
+
+#include "server/solver/sampling.h"
+
+namespace radiosity::test {
+namespace {
+
+void addQuad(const Quad& quad, QuadScene& out) {
+  auto& patches = *out.patches;
+  const auto s = static_cast<std::uint32_t>(patches.surfaces.size());
+  scene::Surface surface;
+  surface.width = quad.width;
+  surface.height = quad.height;
+  surface.level_count = scene::levelCount(quad.width, quad.height);
+  surface.first_node = {static_cast<std::uint32_t>(patches.node_area.size()), scene::kNone};
+  surface.first_leaf = static_cast<std::uint32_t>(patches.leaves.size());
+  surface.first_triangle = static_cast<std::uint32_t>(patches.triangles.size());
+  surface.triangle_count = 2;
+  surface.planar = true;
+  surface.material = s;
+  const glm::vec3 cross = glm::cross(quad.du, quad.dv), normal = glm::normalize(cross);
+  surface.texel_area = glm::length(cross) / static_cast<float>(quad.width * quad.height);
+  const auto first = static_cast<std::uint32_t>(patches.vertices.size());
+  const auto w = static_cast<float>(quad.width), h = static_cast<float>(quad.height);
+  for (const glm::vec2 c : {glm::vec2(0, 0), glm::vec2(1, 0), glm::vec2(1, 1), glm::vec2(0, 1)}) {
+    patches.vertices.push_back({quad.origin + c.x * quad.du + c.y * quad.dv, s, glm::vec2(c.x * w, c.y * h), normal});
+  }
+  for (const std::uint32_t i : {0U, 1U, 2U, 0U, 2U, 3U}) patches.indices.push_back(first + i);
+  for (int t = 0; t < 2; ++t) {
+    patches.triangles.push_back({quad.origin, quad.du / w, quad.dv / h, normal});
+    patches.triangle_surface.push_back(s);
+  }
+  for (std::uint32_t leaf = 0; leaf < quad.width * quad.height; ++leaf) {
+    patches.leaves.push_back(
+        {glm::vec2(static_cast<float>(leaf % quad.width) + 0.5F, static_cast<float>(leaf / quad.width) + 0.5F),
+         surface.first_triangle, true});
+  }
+  for (std::uint32_t level = 0; level < surface.level_count; ++level) {
+    const auto grid = scene::levelGrid(quad.width, quad.height, level);
+    for (std::uint32_t y = 0; y < grid.height; ++y) {
+      for (std::uint32_t x = 0; x < grid.width; ++x) {
+        const auto leaves = (std::min((x + 1) << level, quad.width) - (x << level)) *
+                            (std::min((y + 1) << level, quad.height) - (y << level));
+        patches.node_area.push_back(surface.texel_area * static_cast<float>(leaves));
+        out.materials.emission.push_back(quad.emission);
+        out.materials.reflectance.push_back(quad.reflectance);
+      }
+    }
+  }
+  patches.surfaces.push_back(surface);
+}
+
+}  // namespace
+
+QuadScene makeQuadScene(const std::vector<Quad>& quads) {
+  QuadScene out;
+  out.patches = std::make_shared<scene::PatchScene>();
+  for (const auto& quad : quads) addQuad(quad, out);
+  return out;
+}
+
+std::vector<Quad> cubeQuads(std::uint32_t leaves, const std::array<float, 6>& emission,
+                            const std::array<float, 6>& reflectance) {
+  const glm::vec3 x(1, 0, 0), y(0, 1, 0), z(0, 0, 1), low(-0.5F), high(0.5F);
+  std::vector<Quad> quads = {{low, z, x, leaves, leaves},      // y = -1/2, looks up: z x x = +y
+                             {high, -x, -z, leaves, leaves},   // y = +1/2: (-x) x (-z) = x x z = -y
+                             {low, x, y, leaves, leaves},      // z = -1/2: +z
+                             {high, -y, -x, leaves, leaves},   // z = +1/2: y x x = -z
+                             {low, y, z, leaves, leaves},      // x = -1/2: +x
+                             {high, -z, -y, leaves, leaves}};  // x = +1/2: z x y = -x
+  for (std::size_t i = 0; i < 6; ++i) {
+    quads[i].emission = glm::vec3(emission[i]);
+    quads[i].reflectance = glm::vec3(reflectance[i]);
+  }
+  return quads;
+}
+
+Result<void> RayTransport::setScene(std::shared_ptr<const scene::PatchScene> patches) {
+  patches_ = std::move(patches);
+  return {};
+}
+
+RayTransport::Hit RayTransport::cast(const glm::vec3& origin, const glm::vec3& direction) const {
+  Hit nearest;
+  nearest.distance = 1e30F;
+  for (std::uint32_t s = 0; s < patches_->surfaces.size(); ++s) {
+    const auto& surface = patches_->surfaces[s];
+    const auto& frame = patches_->triangles[surface.first_triangle];
+    const float towards = glm::dot(direction, frame.normal);
+    const float t = glm::dot(frame.origin - origin, frame.normal) / towards;
+    if (!(t > 1e-5F && t < nearest.distance)) continue;
+    const glm::vec3 p = origin + t * direction - frame.origin;
+    const glm::vec2 texel(glm::dot(p, frame.du) / glm::dot(frame.du, frame.du),
+                          glm::dot(p, frame.dv) / glm::dot(frame.dv, frame.dv));
+    const auto w = static_cast<float>(surface.width), h = static_cast<float>(surface.height);
+    if (texel.x < 0.0F || texel.y < 0.0F || texel.x >= w || texel.y >= h) continue;
+    nearest = {s, towards < 0.0F, texel, t};
+  }
+  return nearest;
+}
+
+void RayTransport::scatter(const solver::ScatterShot& shot, double scale, solver::FluxAccumulators& into) const {
+  const glm::vec3 n = shot.frame.normal, a = shot.frame.tangent, b = glm::cross(n, a);
+  const auto key = solver::mixKeys(static_cast<std::uint64_t>(shot.frame.origin.x * 1e6F),
+                                   static_cast<std::uint64_t>(shot.frame.origin.y * 1e6F));
+  for (std::uint32_t i = 0; i < rays_; ++i) {
+    const glm::dvec4 u = solver::sobol4(i, key);
+    const double radius = std::sqrt(u.x), angle = 2.0 * std::numbers::pi * u.y;
+    const glm::vec3 d = a * static_cast<float>(radius * std::cos(angle)) +
+                        b * static_cast<float>(radius * std::sin(angle)) + n * static_cast<float>(std::sqrt(1.0 - u.x));
+    const Hit hit = cast(shot.frame.origin, d);
+    solver::Flux3 flux{};
+    for (std::size_t c = 0; c < 3; ++c) flux[c] = std::llround(shot.flux[c] * scale / rays_);
+    auto& target =
+        hit.surface == scene::kNone ? into.escaped
+        : !hit.front
+            ? into.backface
+            : into.node[shot.half][patches_->surfaces[hit.surface].first_node[0] +
+                                   static_cast<std::uint32_t>(hit.texel.y) * patches_->surfaces[hit.surface].width +
+                                   static_cast<std::uint32_t>(hit.texel.x)];
+    for (std::size_t c = 0; c < 3; ++c) {
+      target[c] += flux[c];
+      if (hit.surface != scene::kNone && hit.front) into.scattered[c] += flux[c];
+    }
+  }
+}
+
+void RayTransport::gather(const solver::GatherShot& shot, const solver::ShotBatch& batch,
+                          solver::FluxAccumulators& into) const {
+  glm::vec3 cross(0.0F);
+  for (std::uint32_t k = 1; k + 1 < shot.corner_count; ++k)
+    cross += glm::cross(shot.corners[k] - shot.corners[0], shot.corners[k + 1] - shot.corners[0]);
+  const double light_area = 0.5 * static_cast<double>(glm::length(cross));
+  for (const auto& surface : patches_->surfaces) {
+    const auto& frame = patches_->triangles[surface.first_triangle];
+    for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf) {
+      const glm::vec2 texel(static_cast<float>(leaf % surface.width) + 0.5F,
+                            static_cast<float>(leaf / surface.width) + 0.5F);
+      const glm::vec3 p = frame.origin + texel.x * frame.du + texel.y * frame.dv;
+      double factor = 0.0;
+      for (std::uint32_t k = 0; k < shot.point_count; ++k) {
+        const glm::vec3 to = batch.points[shot.first_point + k].origin - p;
+        const float distance = glm::length(to);
+        const float cosines = std::max(0.0F, glm::dot(to, frame.normal)) * std::max(0.0F, -glm::dot(to, shot.normal));
+        if (cosines <= 0.0F || cast(p, to / distance).distance < distance * 0.999F) continue;
+        factor += static_cast<double>(cosines / (distance * distance * distance * distance)) * light_area /
+                  std::numbers::pi / shot.point_count;
+      }
+      const auto node = surface.first_node[0] + leaf;
+      for (std::size_t c = 0; c < 3; ++c) {
+        const auto flux = std::llround(shot.radiosity[c] * factor * static_cast<double>(patches_->node_area[node]) *
+                                       batch.flux_scale);
+        into.node[shot.half][node][c] += flux;
+        into.gathered[c] += flux;
+      }
+    }
+  }
+}
+
+Result<solver::TransportCounters> RayTransport::run(const solver::ShotBatch& batch, solver::FluxAccumulators& into) {
+  for (const auto& shot : batch.scatter) scatter(shot, batch.flux_scale, into);
+  for (const auto& shot : batch.gather) gather(shot, batch, into);
+  solver::TransportCounters counters;
+  counters.scatter_shots = batch.scatter.size();
+  counters.gather_shots = batch.gather.size();
+  counters.gather_points = batch.points.size();
+  return counters;
+}
+
+}  // namespace radiosity::test

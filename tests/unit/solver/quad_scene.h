@@ -1,0 +1,56 @@
+// Scenes of a few rectangles and a transport that casts rays at them: lets the solver be tested without OpenGL,
+// importer or chart builder.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "server/scene/patch_scene.h"
+#include "server/solver/transport.h"
+
+namespace radiosity::test {
+
+struct Quad {
+  glm::vec3 origin, du, dv;  // corners origin, +du, +du+dv, +dv; front = du x dv
+  std::uint32_t width = 8, height = 8;
+  glm::vec3 emission{0.0F}, reflectance{0.0F};
+};
+
+struct QuadScene {
+  std::shared_ptr<scene::PatchScene> patches;
+  scene::PatchMaterials materials;
+};
+
+/// Full, unburied leaves; emission and reflectance uniform over a quad.
+[[nodiscard]] QuadScene makeQuadScene(const std::vector<Quad>& quads);
+
+/// The six inward faces of a cube of side 1 around the origin, each with `emission[i]`, `reflectance[i]`.
+[[nodiscard]] std::vector<Quad> cubeQuads(std::uint32_t leaves, const std::array<float, 6>& emission,
+                                          const std::array<float, 6>& reflectance);
+
+/// Brute force: `rays` cosine-distributed rays a scatter shot, links to leaves; gathered light at leaf centres from the
+/// light points with Lambert's formula and shadow rays.
+class RayTransport final : public solver::Transport {
+ public:
+  explicit RayTransport(std::uint32_t rays) : rays_(rays) {}
+  Result<void> setScene(std::shared_ptr<const scene::PatchScene> patches) override;
+  Result<solver::TransportCounters> run(const solver::ShotBatch& batch, solver::FluxAccumulators& into) override;
+  [[nodiscard]] std::string description() const override { return "rays"; }
+
+ private:
+  struct Hit {
+    std::uint32_t surface = scene::kNone;
+    bool front = false;
+    glm::vec2 texel{0.0F};
+    float distance = 0.0F;
+  };
+  [[nodiscard]] Hit cast(const glm::vec3& origin, const glm::vec3& direction) const;
+  void scatter(const solver::ScatterShot& shot, double scale, solver::FluxAccumulators& into) const;
+  void gather(const solver::GatherShot& shot, const solver::ShotBatch& batch, solver::FluxAccumulators& into) const;
+
+  std::uint32_t rays_;
+  std::shared_ptr<const scene::PatchScene> patches_;
+};
+
+}  // namespace radiosity::test
