@@ -68,6 +68,7 @@ struct PatchScene {
   std::vector<std::uint32_t> indices;    ///< 3 a triangle; triangles of a surface lie together
   std::vector<TriangleFrame> triangles;  ///< one for each triangle
   std::vector<std::uint32_t> triangle_surface;
+  std::vector<std::uint32_t> triangle_source;  ///< by triangle: which one of its instance's primitive it was
   std::vector<Surface> surfaces;
   std::vector<LeafPoint> leaves;
   std::vector<float> node_area;  ///< unit box squared: covered and unburied part; parent = sum of children; 0 = empty
@@ -80,6 +81,14 @@ struct PatchScene {
     std::vector<std::uint32_t> page;                ///< by triangle of the primitive
   };
   std::vector<InstanceUv> instance_uvs;  ///< one for each Scene::instances entry
+
+  /// An edge two charts share where the surface is smooth across it (so irradiance is continuous): its ends in the
+  /// texel coordinates of both. assemblePages makes bilinear lookups agree along it.
+  struct Seam {
+    std::array<std::uint32_t, 2> surface;
+    std::array<std::array<glm::vec2, 2>, 2> texel;  ///< by side, by end
+  };
+  std::vector<Seam> seams;
 
   std::vector<std::string> warnings;
   std::uint64_t polygons = 0;  ///< coplanar facets (what the paper calls polygons)
@@ -118,7 +127,7 @@ struct ChartOptions {
 };
 
 /// Flattens instances, drops degenerate triangles (counted), makes charts or takes a valid TEXCOORD_1, packs pages,
-/// measures coverage and burial. kTooLarge when a limit of nodes (2^31) or pages is passed.
+/// measures coverage and burial. kTooLarge when a limit of leaves (2^28) or pages (1024) is passed.
 [[nodiscard]] Result<PatchScene> buildPatchScene(const Scene& scene, const ChartOptions& options);
 
 /// Emission (exitance E = pi L_e, lux) and reflectance of every node: leaves integrated over textures and vertex

@@ -1,0 +1,314 @@
+#include "server/scene/atlas.h"
+
+#include <fmt/format.h>
+#include <stb_rect_pack.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <unordered_map>
+
+#include "common/check.h"
+
+namespace radiosity::scene {
+namespace {
+
+double triangleArea(const std::array<glm::dvec2, 3>& t) {
+  const glm::dvec2 a = t[1] - t[0], b = t[2] - t[0];
+  return 0.5 * std::abs(a.x * b.y - a.y * b.x);
+}
+
+std::uint32_t texelsAlong(double length, double texel) {
+  return static_cast<std::uint32_t>(std::clamp(std::round(length / texel), 1.0, 1e9));
+}
+
+/// What is needed to predict how many leaves a chart covers at a given texel size, without rasterising it: of a random
+/// grid's cells, a shape touches area + half of its outline's extent along either axis.
+struct ChartMeasure {
+  double area = 0.0;             ///< plane coordinates
+  glm::dvec2 border{0.0};        ///< sum of |dx|, |dy| over outline edges that do not lie on the rectangle
+  glm::dvec2 size{0.0};          ///< of the rectangle (file's charts: of the bounds)
+  double units_per_length{1.0};  ///< plane coordinates a unit-box length
+};
+
+std::uint64_t edgeKey(std::uint32_t a, std::uint32_t b) {
+  return (std::uint64_t{std::min(a, b)} << 32) | std::max(a, b);
+}
+
+/// Outline edges are those that occur once; found by the corners' coordinates, which neighbours share exactly.
+ChartMeasure measure(const Chart& chart) {
+  ChartMeasure result;
+  glm::dvec2 low(std::numeric_limits<double>::infinity()), high(-std::numeric_limits<double>::infinity());
+  std::map<std::pair<double, double>, std::uint32_t> ids;
+  std::unordered_map<std::uint64_t, std::pair<int, std::array<glm::dvec2, 2>>> edges;
+  for (const auto& t : chart.corners) {
+    result.area += triangleArea(t);
+    std::array<std::uint32_t, 3> id{};
+    for (std::size_t c = 0; c < 3; ++c) {
+      low = glm::min(low, t[c]);
+      high = glm::max(high, t[c]);
+      id[c] = ids.try_emplace({t[c].x, t[c].y}, static_cast<std::uint32_t>(ids.size())).first->second;
+    }
+    for (std::size_t e = 0; e < 3; ++e) {
+      auto& edge = edges[edgeKey(id[e], id[(e + 1) % 3])];
+      ++edge.first;
+      edge.second = {t[e], t[(e + 1) % 3]};
+    }
+  }
+  result.size = chart.from_file ? high - low : chart.size;
+  for (const auto& [key, edge] : edges) {
+    if (edge.first != 1) continue;
+    const auto& [a, b] = edge.second;
+    for (int axis = 0; axis < 2; ++axis) {
+      const int across = 1 - axis;
+      const double slack = 1e-6 * result.size[across];
+      const auto on = [&](double side) {
+        return std::abs(a[across] - side) < slack && std::abs(b[across] - side) < slack;
+      };
+      if (!chart.from_file && (on(0.0) || on(result.size[across]))) continue;
+      result.border[axis] += std::abs(b[axis] - a[axis]);
+    }
+  }
+  return result;
+}
+
+double predictedLeaves(const ChartMeasure& m, bool from_file, double texel) {
+  if (from_file) {
+    const double t = texel * m.units_per_length;
+    return std::max(1.0, m.area / (t * t) + 0.5 * (m.border.x + m.border.y) / t);
+  }
+  const double w = texelsAlong(m.size.x, texel), h = texelsAlong(m.size.y, texel);
+  const double covered =
+      m.area / (m.size.x * m.size.y) * w * h + 0.5 * (m.border.x / m.size.x * w + m.border.y / m.size.y * h);
+  return std::clamp(covered, 1.0, w * h);
+}
+
+/// Plane coordinates (UV) a unit-box length, over all of an instance's file charts.
+std::unordered_map<std::uint32_t, double> uvDensities(const std::vector<Chart>& charts) {
+  std::unordered_map<std::uint32_t, std::pair<double, double>> sums;
+  for (const Chart& chart : charts) {
+    if (!chart.from_file) continue;
+    auto& [uv, world] = sums[chart.instance];
+    for (const auto& t : chart.corners) uv += triangleArea(t);
+    world += chart.area;
+  }
+  std::unordered_map<std::uint32_t, double> densities;
+  for (const auto& [instance, sum] : sums) densities[instance] = std::sqrt(sum.first / sum.second);
+  return densities;
+}
+
+/// One rectangle to pack: a chart of our own, or all charts of an instance that keeps its TEXCOORD_1 layout.
+struct Block {
+  std::uint32_t width = 1, height = 1;
+  std::vector<std::uint32_t> charts;
+  std::uint32_t page = 0, x = 0, y = 0;
+};
+
+class LayoutMaker {
+ public:
+  LayoutMaker(const Scene& scene, const std::vector<Chart>& charts, double texel, const ChartOptions& options)
+      : scene_(scene), charts_(charts), texel_(texel), gutter_(options.gutter) {
+    max_page_ = std::clamp(options.max_page_size, 16U, 32768U) & ~3U;
+    max_chart_ = max_page_ - std::min(gutter_, max_page_ / 2);
+  }
+
+  Result<Atlas> make() {
+    atlas_.grids.resize(charts_.size());
+    const auto densities = uvDensities(charts_);
+    for (std::uint32_t c = 0; c < charts_.size();) {
+      if (charts_[c].from_file) {
+        c = addRegion(c, densities.at(charts_[c].instance));
+      } else {
+        addChart(c++);
+      }
+    }
+    std::uint64_t leaves = 0;
+    for (const ChartGrid& grid : atlas_.grids) leaves += std::uint64_t{grid.width} * grid.height;
+    if (leaves > kMaxLeaves)
+      return fail(
+          ErrorCode::kTooLarge,
+          fmt::format("{} leaf patches, more than the {} allowed: ask for fewer or larger texels", leaves, kMaxLeaves));
+    if (clamped_ > 0)
+      atlas_.warnings.push_back(
+          fmt::format("{} charts would be wider than a page of {} texels and got coarser texels (the first: {}); raise "
+                      "the page size "
+                      "or split the mesh",
+                      clamped_, max_page_, first_clamped_));
+    if (auto packed = pack(); !packed) return tl::unexpected(packed.error());
+    for (const Block& block : blocks_)
+      for (const std::uint32_t c : block.charts) {
+        atlas_.grids[c].page = block.page;
+        atlas_.grids[c].page_x += block.x;
+        atlas_.grids[c].page_y += block.y;
+      }
+    return std::move(atlas_);
+  }
+
+ private:
+  void noteClamped(std::uint32_t chart) {
+    if (clamped_++ == 0) first_clamped_ = describeInstance(scene_, charts_[chart].instance);
+  }
+
+  void addChart(std::uint32_t c) {
+    const Chart& chart = charts_[c];
+    ChartGrid& grid = atlas_.grids[c];
+    grid.width = texelsAlong(chart.size.x, texel_);
+    grid.height = texelsAlong(chart.size.y, texel_);
+    if (grid.width > max_chart_ || grid.height > max_chart_) {
+      noteClamped(c);
+      grid.width = std::min(grid.width, max_chart_);
+      grid.height = std::min(grid.height, max_chart_);
+    }
+    grid.texels_per_unit = glm::dvec2(grid.width, grid.height) / chart.size;
+    blocks_.push_back({grid.width, grid.height, {c}});
+  }
+
+  struct Bounds {
+    glm::dvec2 low{std::numeric_limits<double>::infinity()}, high{-std::numeric_limits<double>::infinity()};
+    void add(const Chart& chart) {
+      for (const auto& t : chart.corners)
+        for (const auto& p : t) {
+          low = glm::min(low, p);
+          high = glm::max(high, p);
+        }
+    }
+  };
+
+  /// Consecutive charts of one instance; returns the first chart after them.
+  std::uint32_t addRegion(std::uint32_t first, double density) {
+    Block block;
+    Bounds all;
+    std::uint32_t end = first;
+    for (; end < charts_.size() && charts_[end].from_file && charts_[end].instance == charts_[first].instance; ++end) {
+      all.add(charts_[end]);
+      block.charts.push_back(end);
+    }
+    double resolution = 1.0 / (texel_ * density);  // texels a unit of UV
+    const glm::dvec2 extent = all.high - all.low;
+    if (std::max(extent.x, extent.y) * resolution > max_chart_ - 1.0) {
+      noteClamped(first);
+      resolution = (max_chart_ - 1.0) / std::max(extent.x, extent.y);
+    }
+    const glm::dvec2 origin = glm::floor(all.low * resolution + 1e-6);
+    for (std::uint32_t c = first; c < end; ++c) {
+      Bounds bounds;
+      bounds.add(charts_[c]);
+      const glm::dvec2 low = glm::max(glm::floor(bounds.low * resolution + 1e-6), origin);
+      const glm::dvec2 high = glm::max(glm::ceil(bounds.high * resolution - 1e-6), low + 1.0);
+      ChartGrid& grid = atlas_.grids[c];
+      grid.width = static_cast<std::uint32_t>(high.x - low.x);
+      grid.height = static_cast<std::uint32_t>(high.y - low.y);
+      grid.texels_per_unit = glm::dvec2(resolution);
+      grid.offset = low;
+      grid.page_x = static_cast<std::uint32_t>(low.x - origin.x);
+      grid.page_y = static_cast<std::uint32_t>(low.y - origin.y);
+      block.width = std::max(block.width, grid.page_x + grid.width);
+      block.height = std::max(block.height, grid.page_y + grid.height);
+    }
+    blocks_.push_back(std::move(block));
+    return end;
+  }
+
+  [[nodiscard]] bool packInto(std::vector<stbrp_rect>& rects, std::uint32_t width, std::uint32_t height) const {
+    std::vector<stbrp_node> nodes(width);
+    stbrp_context context;
+    stbrp_init_target(&context, static_cast<int>(width), static_cast<int>(height), nodes.data(),
+                      static_cast<int>(nodes.size()));
+    return stbrp_pack_rects(&context, rects.data(), static_cast<int>(rects.size())) != 0;
+  }
+
+  /// The smallest near-square page that holds everything, or a page of the largest size and what is left over.
+  Result<void> pack() {
+    std::vector<stbrp_rect> rects;
+    for (std::size_t i = 0; i < blocks_.size(); ++i)
+      rects.push_back({static_cast<int>(i), static_cast<int>(blocks_[i].width + gutter_),
+                       static_cast<int>(blocks_[i].height + gutter_), 0, 0, 0});
+    while (!rects.empty()) {
+      if (atlas_.pages.size() >= kMaxPages)
+        return fail(ErrorCode::kTooLarge,
+                    fmt::format("more than {} lightmap pages of {} texels: ask for fewer or larger "
+                                "texels, or for larger pages",
+                                kMaxPages, max_page_));
+      packPage(rects);
+      commitPage(rects);
+    }
+    return {};
+  }
+
+  void packPage(std::vector<stbrp_rect>& rects) const {
+    double area = 0.0;
+    std::uint32_t widest = 0;
+    for (const auto& rect : rects) {
+      area += static_cast<double>(rect.w) * rect.h;
+      widest = std::max({widest, static_cast<std::uint32_t>(rect.w), static_cast<std::uint32_t>(rect.h)});
+    }
+    const auto up = [](double v) { return (static_cast<std::uint32_t>(std::ceil(v)) + 3U) & ~3U; };
+    auto side = std::max(up(std::sqrt(area)), up(widest));
+    for (; side < max_page_; side = std::max(side + 4, up(side * 1.04)))
+      if (packInto(rects, side, side)) return;
+    static_cast<void>(packInto(rects, max_page_, max_page_));
+  }
+
+  void commitPage(std::vector<stbrp_rect>& rects) {
+    const auto page = static_cast<std::uint32_t>(atlas_.pages.size());
+    Page size;
+    std::vector<stbrp_rect> left;
+    for (const auto& rect : rects) {
+      if (rect.was_packed == 0) {
+        left.push_back(rect);
+        continue;
+      }
+      Block& block = blocks_[static_cast<std::size_t>(rect.id)];
+      block.page = page;
+      block.x = static_cast<std::uint32_t>(rect.x) + gutter_ / 2;
+      block.y = static_cast<std::uint32_t>(rect.y) + gutter_ / 2;
+      size.width = std::max(size.width, static_cast<std::uint32_t>(rect.x + rect.w));
+      size.height = std::max(size.height, static_cast<std::uint32_t>(rect.y + rect.h));
+    }
+    RAD_CHECK_LT(left.size(), rects.size());
+    size.width = (size.width + 3U) & ~3U;
+    size.height = (size.height + 3U) & ~3U;
+    atlas_.pages.push_back(size);
+    std::ranges::sort(left, [](const auto& a, const auto& b) { return a.id < b.id; });
+    rects = std::move(left);
+  }
+
+  const Scene& scene_;
+  const std::vector<Chart>& charts_;
+  double texel_;
+  std::uint32_t gutter_, max_page_, max_chart_;
+  Atlas atlas_;
+  std::vector<Block> blocks_;
+  std::uint64_t clamped_ = 0;
+  std::string first_clamped_;
+};
+
+}  // namespace
+
+double texelSizeFor(const std::vector<Chart>& charts, std::uint64_t texel_budget) {
+  std::vector<ChartMeasure> measures;
+  const auto densities = uvDensities(charts);
+  for (const Chart& chart : charts) {
+    measures.push_back(measure(chart));
+    if (chart.from_file) measures.back().units_per_length = densities.at(chart.instance);
+  }
+  const auto leavesAt = [&](double texel) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < charts.size(); ++i) sum += predictedLeaves(measures[i], charts[i].from_file, texel);
+    return sum;
+  };
+  const auto budget = static_cast<double>(std::max<std::uint64_t>(texel_budget, 1));
+  double fine = 1e-7, coarse = 4.0;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = std::sqrt(fine * coarse);
+    (leavesAt(middle) > budget ? fine : coarse) = middle;
+  }
+  return std::abs(leavesAt(fine) - budget) < std::abs(leavesAt(coarse) - budget) ? fine : coarse;
+}
+
+Result<Atlas> layOut(const Scene& scene, const std::vector<Chart>& charts, double texel_size,
+                     const ChartOptions& options) {
+  return LayoutMaker(scene, charts, texel_size, options).make();
+}
+
+}  // namespace radiosity::scene

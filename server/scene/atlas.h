@@ -1,0 +1,39 @@
+// Texel grids of charts and their places on lightmap pages. Third step of buildPatchScene (charts.h).
+#pragma once
+
+#include <cstdint>
+#include <glm/vec2.hpp>
+#include <string>
+#include <vector>
+
+#include "common/result.h"
+#include "server/scene/charts.h"
+
+namespace radiosity::scene {
+
+/// texel = plane coordinate x texels_per_unit - offset.
+struct ChartGrid {
+  std::uint32_t width = 1, height = 1;
+  glm::dvec2 texels_per_unit{1.0};
+  glm::dvec2 offset{0.0};
+  std::uint32_t page = 0, page_x = 0, page_y = 0;
+};
+
+struct Atlas {
+  std::vector<ChartGrid> grids;  ///< one for each chart
+  std::vector<Page> pages;
+  std::vector<std::string> warnings;
+};
+
+/// The texel edge (unit box) at which about `texel_budget` leaves are covered.
+[[nodiscard]] double texelSizeFor(const std::vector<Chart>& charts, std::uint64_t texel_budget);
+
+/// Grids for texels of about `texel_size`, packed with `options.gutter` empty texels between. Charts that would not fit
+/// a page get coarser texels, with a warning. kTooLarge: more than kMaxPages pages or kMaxLeaves leaves.
+[[nodiscard]] Result<Atlas> layOut(const Scene& scene, const std::vector<Chart>& charts, double texel_size,
+                                   const ChartOptions& options);
+
+inline constexpr std::size_t kMaxPages = 1024;
+inline constexpr std::uint64_t kMaxLeaves = std::uint64_t{1} << 28;  ///< some 6 GiB of patches
+
+}  // namespace radiosity::scene

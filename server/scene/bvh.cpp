@@ -1,0 +1,218 @@
+#include "server/scene/bvh.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <numeric>
+
+namespace radiosity::scene {
+namespace {
+
+constexpr std::uint32_t kLeafSize = 4;
+constexpr int kBins = 16;
+constexpr std::size_t kStackDepth = 128;
+
+struct Box {
+  glm::vec3 min{std::numeric_limits<float>::infinity()}, max{-std::numeric_limits<float>::infinity()};
+  void add(const glm::vec3& p) {
+    min = glm::min(min, p);
+    max = glm::max(max, p);
+  }
+  void add(const Box& other) {
+    min = glm::min(min, other.min);
+    max = glm::max(max, other.max);
+  }
+  [[nodiscard]] float halfArea() const {
+    if (min.x > max.x) return 0.0F;
+    const glm::vec3 d = max - min;
+    return d.x * d.y + d.y * d.z + d.z * d.x;
+  }
+};
+
+/// Slab test, boxes grown by an ulp or two so that flat ones are not missed.
+bool meetsBox(const glm::vec3& low, const glm::vec3& high, const glm::dvec3& origin, const glm::dvec3& inverse,
+              double t_min, double t_max) {
+  for (int axis = 0; axis < 3; ++axis) {
+    double near = (low[axis] - origin[axis]) * inverse[axis];
+    double far = (high[axis] - origin[axis]) * inverse[axis];
+    if (near > far) std::swap(near, far);
+    t_min = std::max(t_min, near - std::abs(near) * 1e-12);
+    t_max = std::min(t_max, far + std::abs(far) * 1e-12);
+  }
+  return t_min <= t_max;
+}
+
+/// Moller and Trumbore 1997, in double so that edges leak less than a part in 1e12.
+bool meetsTriangle(const Bvh::Triangle& triangle, const glm::dvec3& origin, const glm::dvec3& direction, RayHit& hit) {
+  const glm::dvec3 a(triangle[0]);
+  const glm::dvec3 e1 = glm::dvec3(triangle[1]) - a;
+  const glm::dvec3 e2 = glm::dvec3(triangle[2]) - a;
+  const glm::dvec3 p = glm::cross(direction, e2);
+  const double determinant = glm::dot(e1, p);
+  if (determinant == 0.0) return false;
+  const glm::dvec3 s = origin - a;
+  const double u = glm::dot(s, p) / determinant;
+  if (!(u >= 0.0 && u <= 1.0)) return false;
+  const glm::dvec3 q = glm::cross(s, e1);
+  const double v = glm::dot(direction, q) / determinant;
+  if (!(v >= 0.0 && u + v <= 1.0)) return false;
+  hit.t = glm::dot(e2, q) / determinant;
+  hit.front = determinant > 0.0;
+  return true;
+}
+
+/// Separating axes of a triangle and a box (Akenine-Moller 2001): box faces, triangle plane, nine edge products.
+bool touchesBox(const Bvh::Triangle& triangle, const glm::vec3& low, const glm::vec3& high) {
+  const glm::vec3 centre = 0.5F * (low + high);
+  const glm::vec3 half = 0.5F * (high - low);
+  const std::array<glm::vec3, 3> v{triangle[0] - centre, triangle[1] - centre, triangle[2] - centre};
+  const auto separates = [&](const glm::vec3& axis) {
+    const float a = glm::dot(v[0], axis), b = glm::dot(v[1], axis), c = glm::dot(v[2], axis);
+    const float reach = glm::dot(half, glm::abs(axis));
+    return std::min({a, b, c}) > reach || std::max({a, b, c}) < -reach;
+  };
+  const std::array<glm::vec3, 3> axes{glm::vec3(1, 0, 0), glm::vec3(0, 1, 0), glm::vec3(0, 0, 1)};
+  for (const auto& axis : axes)
+    if (separates(axis)) return false;
+  const std::array<glm::vec3, 3> edges{v[1] - v[0], v[2] - v[1], v[0] - v[2]};
+  if (separates(glm::cross(edges[0], edges[1]))) return false;
+  for (const auto& edge : edges)
+    for (const auto& axis : axes)
+      if (separates(glm::cross(edge, axis))) return false;
+  return true;
+}
+
+}  // namespace
+
+Bvh::Bvh(std::vector<Triangle> triangles) : triangles_(std::move(triangles)), order_(triangles_.size()) {
+  if (triangles_.empty()) return;
+  std::iota(order_.begin(), order_.end(), 0U);
+  centres_.reserve(triangles_.size());
+  for (const auto& t : triangles_) centres_.push_back((t[0] + t[1] + t[2]) / 3.0F);
+  build();
+  centres_ = {};
+}
+
+void Bvh::build() {
+  nodes_.push_back({{}, {}, 0, static_cast<std::uint32_t>(triangles_.size())});
+  struct Task {
+    std::uint32_t node, depth;
+  };
+  std::vector<Task> pending{{0, 0}};
+  while (!pending.empty()) {
+    const Task task = pending.back();
+    pending.pop_back();
+    const std::uint32_t first = nodes_[task.node].first, count = nodes_[task.node].count;
+    Box box;
+    for (std::uint32_t i = first; i < first + count; ++i)
+      for (const auto& p : triangles_[order_[i]]) box.add(p);
+    nodes_[task.node].min = box.min;
+    nodes_[task.node].max = box.max;
+    if (count <= kLeafSize || task.depth + 2 >= kStackDepth / 2) continue;
+    const std::uint32_t left = split(first, count);
+    const auto child = static_cast<std::uint32_t>(nodes_.size());
+    nodes_[task.node].first = child;
+    nodes_[task.node].count = 0;
+    nodes_.push_back({{}, {}, first, left});
+    nodes_.push_back({{}, {}, first + left, count - left});
+    pending.push_back({child, task.depth + 1});
+    pending.push_back({child + 1, task.depth + 1});
+  }
+}
+
+/// Reorders order_[first, first + count) and returns how many go left; never all or none.
+std::uint32_t Bvh::split(std::uint32_t first, std::uint32_t count) {
+  Box spread;
+  for (std::uint32_t i = first; i < first + count; ++i) spread.add(centres_[order_[i]]);
+  const glm::vec3 extent = spread.max - spread.min;
+  const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0 : (extent.y >= extent.z ? 1 : 2);
+  if (!(extent[axis] > 0.0F)) return count / 2;
+  const auto binOf = [&](std::uint32_t t) {
+    const float where = (centres_[t][axis] - spread.min[axis]) / extent[axis];
+    return std::min(kBins - 1, static_cast<int>(where * static_cast<float>(kBins)));
+  };
+  std::array<Box, kBins> boxes;
+  std::array<std::uint32_t, kBins> counts{};
+  for (std::uint32_t i = first; i < first + count; ++i) {
+    const auto bin = static_cast<std::size_t>(binOf(order_[i]));
+    ++counts[bin];
+    for (const auto& p : triangles_[order_[i]]) boxes[bin].add(p);
+  }
+  std::array<float, kBins> right_cost{};
+  Box right;
+  std::uint32_t right_count = 0;
+  for (std::size_t bin = kBins - 1; bin > 0; --bin) {
+    right.add(boxes[bin]);
+    right_count += counts[bin];
+    right_cost[bin] = right.halfArea() * static_cast<float>(right_count);
+  }
+  Box left;
+  std::uint32_t left_count = 0;
+  int best = 0;
+  float best_cost = std::numeric_limits<float>::infinity();
+  for (std::size_t bin = 0; bin + 1 < kBins; ++bin) {
+    left.add(boxes[bin]);
+    left_count += counts[bin];
+    const float cost = left.halfArea() * static_cast<float>(left_count) + right_cost[bin + 1];
+    if (left_count > 0 && left_count < count && cost < best_cost) {
+      best_cost = cost;
+      best = static_cast<int>(bin);
+    }
+  }
+  const auto begin = order_.begin() + first;
+  const auto middle = std::partition(begin, begin + count, [&](std::uint32_t t) { return binOf(t) <= best; });
+  const auto size = static_cast<std::uint32_t>(middle - begin);
+  return size == 0 || size == count ? count / 2 : size;
+}
+
+void Bvh::collectHits(const glm::dvec3& origin, const glm::dvec3& direction, double t_min, double t_max,
+                      std::vector<RayHit>& hits) const {
+  if (triangles_.empty()) return;
+  glm::dvec3 inverse;
+  for (int axis = 0; axis < 3; ++axis)  // a zero component would make 0 x infinity in the slab test
+    inverse[axis] = 1.0 / (std::abs(direction[axis]) > 1e-30 ? direction[axis] : std::copysign(1e-30, direction[axis]));
+  std::array<std::uint32_t, kStackDepth> stack;
+  std::size_t depth = 0;
+  stack[depth++] = 0;
+  while (depth > 0) {
+    const Node& node = nodes_[stack[--depth]];
+    if (!meetsBox(node.min, node.max, origin, inverse, t_min, t_max)) continue;
+    if (node.count == 0) {
+      stack[depth++] = node.first;
+      stack[depth++] = node.first + 1;
+      continue;
+    }
+    for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
+      RayHit hit{0.0, order_[i], false};
+      if (meetsTriangle(triangles_[order_[i]], origin, direction, hit) && hit.t > t_min && hit.t < t_max)
+        hits.push_back(hit);
+    }
+  }
+}
+
+bool Bvh::touches(const glm::vec3& box_min, const glm::vec3& box_max, std::span<const std::uint32_t> tags,
+                  std::uint32_t ignored_tag) const {
+  if (triangles_.empty()) return false;
+  std::array<std::uint32_t, kStackDepth> stack;
+  std::size_t depth = 0;
+  stack[depth++] = 0;
+  while (depth > 0) {
+    const Node& node = nodes_[stack[--depth]];
+    bool apart = false;
+    for (int axis = 0; axis < 3; ++axis)
+      apart = apart || node.min[axis] > box_max[axis] || node.max[axis] < box_min[axis];
+    if (apart) continue;
+    if (node.count == 0) {
+      stack[depth++] = node.first;
+      stack[depth++] = node.first + 1;
+      continue;
+    }
+    for (std::uint32_t i = node.first; i < node.first + node.count; ++i)
+      if (tags[order_[i]] != ignored_tag && touchesBox(triangles_[order_[i]], box_min, box_max)) return true;
+  }
+  return false;
+}
+
+}  // namespace radiosity::scene

@@ -1,0 +1,54 @@
+// A small bounding volume hierarchy over triangles: which triangles does a ray meet, which touch a box. Used while a
+// scene is built (burial, coverage.h); immutable once built, so any number of threads may ask.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <span>
+#include <vector>
+
+namespace radiosity::scene {
+
+struct RayHit {
+  double t;                ///< in units of the direction's length
+  std::uint32_t triangle;  ///< index into the list the tree was built from
+  bool front;              ///< the ray meets the counter-clockwise side
+};
+
+class Bvh {
+ public:
+  using Triangle = std::array<glm::vec3, 3>;
+
+  Bvh() = default;
+  /// Binned surface area heuristic (Wald 2007, "On fast construction of SAH-based bounding volume hierarchies"),
+  /// O(n log n).
+  explicit Bvh(std::vector<Triangle> triangles);
+
+  /// All hits with t in (t_min, t_max), unsorted, appended to `hits`.
+  void collectHits(const glm::dvec3& origin, const glm::dvec3& direction, double t_min, double t_max,
+                   std::vector<RayHit>& hits) const;
+
+  /// True when a triangle other than those marked with `ignored_tag` touches the box. `tags`: one for each triangle.
+  [[nodiscard]] bool touches(const glm::vec3& box_min, const glm::vec3& box_max, std::span<const std::uint32_t> tags,
+                             std::uint32_t ignored_tag) const;
+
+  [[nodiscard]] bool empty() const { return triangles_.empty(); }
+  [[nodiscard]] std::size_t size() const { return triangles_.size(); }
+
+ private:
+  struct Node {
+    glm::vec3 min, max;
+    std::uint32_t first;  ///< leaf: into order_; inner: left child (the right one follows it)
+    std::uint32_t count;  ///< 0: inner
+  };
+  void build();
+  [[nodiscard]] std::uint32_t split(std::uint32_t first, std::uint32_t count);
+
+  std::vector<Triangle> triangles_;
+  std::vector<glm::vec3> centres_;  ///< while building
+  std::vector<std::uint32_t> order_;
+  std::vector<Node> nodes_;
+};
+
+}  // namespace radiosity::scene

@@ -1,0 +1,245 @@
+#include "server/scene/charts.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <unordered_map>
+
+#include "server/scene/atlas.h"
+#include "server/scene/coverage.h"
+
+namespace radiosity::scene {
+namespace {
+
+/// A facet at least this many texels across stays a planar chart even beside smooth neighbours.
+constexpr double kPlanarTexels = 8.0;
+/// Curved charts may bend up to 45 degrees until they are this many texels large.
+constexpr double kSmallTexels = 4.0;
+
+const Material& materialOf(const Scene& scene, std::uint32_t instance) {
+  static const Material kDefault;
+  const std::uint32_t material = scene.primitives[scene.instances[instance].primitive].material;
+  return material < scene.materials.size() ? scene.materials[material] : kDefault;
+}
+
+class Builder {
+ public:
+  Builder(const Scene& scene, const ChartOptions& options) : scene_(scene), options_(options) {}
+
+  Result<PatchScene> build() {
+    flat_ = flatten(scene_);
+    patches_.centre = flat_.centre;
+    patches_.scale = flat_.scale;
+    patches_.triangles_dropped = flat_.dropped;
+    patches_.warnings = flat_.warnings;
+    neighbours_ = edgeNeighbours(flat_);
+    makeCharts();
+    const double texel = texelSize();
+    auto atlas = layOut(scene_, charts_, texel, options_);
+    if (!atlas) return tl::unexpected(atlas.error());
+    atlas_ = std::move(*atlas);
+    patches_.pages = atlas_.pages;
+    patches_.warnings.insert(patches_.warnings.end(), atlas_.warnings.begin(), atlas_.warnings.end());
+    for (std::uint32_t c = 0; c < charts_.size(); ++c) addSurface(c);
+    if (auto sized = numberNodes(); !sized) return tl::unexpected(sized.error());
+    const std::vector<LeafPiece> pieces = measureCoverage(patches_);
+    setTexelAreas();
+    std::vector<bool> single_sided;
+    for (const Surface& surface : patches_.surfaces)
+      single_sided.push_back(!materialOf(scene_, surface.instance).double_sided);
+    removeBuried(patches_, pieces, single_sided);
+    sumAncestors(patches_);
+    writeInstanceUvs();
+    findSeams(flat_, neighbours_, sources_, 2.0 * options_.curve_angle_deg, patches_);
+    return std::move(patches_);
+  }
+
+ private:
+  void makeCharts() {
+    std::vector<bool> own(flat_.triangles.size(), true);
+    std::vector<Chart> from_file;
+    for (std::uint32_t i = 0; i < scene_.instances.size(); ++i) {
+      const std::uint32_t first = flat_.first_triangle[i], end = flat_.first_triangle[i + 1];
+      if (first == end || scene_.primitives[scene_.instances[i].primitive].texcoord1.empty()) continue;
+      if (const std::string fault = lightmapUvFault(scene_, flat_, i); !fault.empty()) {
+        patches_.warnings.push_back(fmt::format("{}: TEXCOORD_1 is no lightmap layout ({}); charts were made instead",
+                                                describeInstance(scene_, i), fault));
+        continue;
+      }
+      std::fill(own.begin() + first, own.begin() + end, false);
+      for (Chart& chart : uvCharts(scene_, flat_, neighbours_, i)) from_file.push_back(std::move(chart));
+    }
+    const Facets facets = findFacets(flat_, neighbours_, own);
+    patches_.polygons = facets.facets.size() + from_file.size();
+    const double texel = roughTexelSize();
+    const auto groups = groupFacets(flat_, neighbours_, facets, kPlanarTexels * texel, kSmallTexels * texel * texel,
+                                    options_.curve_angle_deg);
+    charts_ = fitCharts(flat_, facets, groups);
+    charts_.insert(charts_.end(), std::make_move_iterator(from_file.begin()), std::make_move_iterator(from_file.end()));
+    std::ranges::stable_sort(charts_, {}, &Chart::instance);
+  }
+
+  /// Before there are charts: as if all area were covered by whole texels.
+  [[nodiscard]] double roughTexelSize() const {
+    if (options_.texel_size_m > 0.0) return options_.texel_size_m / flat_.scale;
+    double area = 0.0;
+    for (const FlatTriangle& triangle : flat_.triangles) area += triangle.area;
+    return std::sqrt(area / static_cast<double>(std::max<std::uint64_t>(options_.texel_budget, 1)));
+  }
+
+  [[nodiscard]] double texelSize() const {
+    if (options_.texel_size_m > 0.0) return options_.texel_size_m / flat_.scale;
+    return texelSizeFor(charts_, options_.texel_budget);
+  }
+
+  void addSurface(std::uint32_t c) {
+    const Chart& chart = charts_[c];
+    const ChartGrid& grid = atlas_.grids[c];
+    const auto id = static_cast<std::uint32_t>(patches_.surfaces.size());
+    Surface surface;
+    surface.instance = chart.instance;
+    surface.material = scene_.primitives[scene_.instances[chart.instance].primitive].material;
+    surface.width = grid.width;
+    surface.height = grid.height;
+    surface.level_count = levelCount(grid.width, grid.height);
+    surface.page = grid.page;
+    surface.page_x = grid.page_x;
+    surface.page_y = grid.page_y;
+    surface.first_triangle = static_cast<std::uint32_t>(patches_.triangles.size());
+    surface.triangle_count = static_cast<std::uint32_t>(chart.triangles.size());
+    surface.planar = chart.planar;
+    std::unordered_map<std::uint32_t, std::uint32_t> shared;  // welded point -> vertex, for planar charts of our own
+    glm::vec3 low(std::numeric_limits<float>::infinity()), high(-low);
+    for (std::size_t i = 0; i < chart.triangles.size(); ++i) {
+      const FlatTriangle& triangle = flat_.triangles[chart.triangles[i]];
+      const std::array<glm::dvec2, 3> texels = texelsOf(chart.corners[i], grid);
+      const TriangleFrame frame = frameOf(chart, grid, triangle, texels);
+      for (std::size_t k = 0; k < 3; ++k) {
+        const glm::vec3 position(flat_.points[triangle.points[k]]);
+        low = glm::min(low, position);
+        high = glm::max(high, position);
+        auto vertex = static_cast<std::uint32_t>(patches_.vertices.size());
+        if (chart.planar && !chart.from_file) vertex = shared.try_emplace(triangle.points[k], vertex).first->second;
+        if (vertex == patches_.vertices.size())
+          patches_.vertices.push_back({position, id, glm::vec2(texels[k]), frame.normal});
+        patches_.indices.push_back(vertex);
+      }
+      patches_.triangles.push_back(frame);
+      patches_.triangle_surface.push_back(id);
+      patches_.triangle_source.push_back(triangle.source);
+      sources_.push_back(chart.triangles[i]);
+    }
+    surface.bounds_min = low;
+    surface.bounds_max = high;
+    patches_.surfaces.push_back(surface);
+  }
+
+  [[nodiscard]] static std::array<glm::dvec2, 3> texelsOf(const std::array<glm::dvec2, 3>& corners,
+                                                          const ChartGrid& grid) {
+    std::array<glm::dvec2, 3> texels;
+    for (std::size_t k = 0; k < 3; ++k)
+      texels[k] = glm::clamp(corners[k] * grid.texels_per_unit - grid.offset, glm::dvec2(0.0),
+                             glm::dvec2(grid.width, grid.height));
+    return texels;
+  }
+
+  /// Own charts: one texel step in the chart's plane, slid along the plane's normal onto the triangle; well-conditioned
+  /// even for slivers. File's charts: the triangle's own inverse.
+  [[nodiscard]] TriangleFrame frameOf(const Chart& chart, const ChartGrid& grid, const FlatTriangle& triangle,
+                                      const std::array<glm::dvec2, 3>& texels) const {
+    const glm::dvec3 p0 = flat_.points[triangle.points[0]];
+    glm::dvec3 du, dv, normal = triangle.normal;
+    if (chart.from_file) {
+      const glm::dmat2 inverse = glm::inverse(glm::dmat2(texels[1] - texels[0], texels[2] - texels[0]));
+      const glm::dvec3 e1 = flat_.points[triangle.points[1]] - p0, e2 = flat_.points[triangle.points[2]] - p0;
+      du = e1 * inverse[0][0] + e2 * inverse[0][1];
+      dv = e1 * inverse[1][0] + e2 * inverse[1][1];
+    } else {
+      if (chart.planar) normal = chart.normal;
+      const double facing = glm::dot(normal, chart.normal);
+      du = (chart.axis_u - chart.normal * (glm::dot(normal, chart.axis_u) / facing)) / grid.texels_per_unit.x;
+      dv = (chart.axis_v - chart.normal * (glm::dot(normal, chart.axis_v) / facing)) / grid.texels_per_unit.y;
+    }
+    const glm::dvec3 origin = p0 - texels[0].x * du - texels[0].y * dv;
+    return {glm::vec3(origin), glm::vec3(du), glm::vec3(dv), glm::vec3(normal)};
+  }
+
+  Result<void> numberNodes() {
+    std::uint64_t leaves = 0, nodes = 0;
+    for (Surface& surface : patches_.surfaces) {
+      const LevelGrid last = levelGrid(surface.width, surface.height, surface.level_count - 1);
+      const std::uint64_t per_side = std::uint64_t{last.offset} + 1;
+      surface.first_leaf = static_cast<std::uint32_t>(leaves);
+      leaves += std::uint64_t{surface.width} * surface.height;
+      const int sides = materialOf(scene_, surface.instance).double_sided ? 2 : 1;
+      for (int side = 0; side < sides; ++side) {
+        surface.first_node[static_cast<std::size_t>(side)] = static_cast<std::uint32_t>(nodes);
+        nodes += per_side;
+      }
+      if (nodes >= (std::uint64_t{1} << 31))
+        return fail(ErrorCode::kTooLarge, "more than 2^31 patches: ask for fewer or larger texels");
+    }
+    patches_.leaves.resize(leaves);
+    patches_.node_area.resize(nodes, 0.0F);
+    return {};
+  }
+
+  /// Mean over the surface: exact where it is planar.
+  void setTexelAreas() {
+    for (Surface& surface : patches_.surfaces) {
+      double area = 0.0, texels = 0.0;
+      for (std::uint32_t t = surface.first_triangle; t < surface.first_triangle + surface.triangle_count; ++t) {
+        std::array<glm::dvec2, 3> c;
+        for (std::size_t k = 0; k < 3; ++k)
+          c[k] = glm::dvec2(patches_.vertices[patches_.indices[std::size_t{3} * t + k]].texel);
+        const glm::dvec2 a = c[1] - c[0], b = c[2] - c[0];
+        texels += 0.5 * std::abs(a.x * b.y - a.y * b.x);
+        area += flat_.triangles[sources_[t]].area;
+      }
+      surface.texel_area = static_cast<float>(texels > 0.0 ? area / texels : 0.0);
+    }
+  }
+
+  void writeInstanceUvs() {
+    patches_.instance_uvs.resize(scene_.instances.size());
+    for (std::size_t i = 0; i < scene_.instances.size(); ++i) {
+      const std::uint32_t primitive = scene_.instances[i].primitive;
+      const std::size_t count =
+          primitive < scene_.primitives.size() ? scene_.primitives[primitive].indices.size() / 3 : 0;
+      patches_.instance_uvs[i].corners.resize(count);
+      patches_.instance_uvs[i].page.assign(count, kNone);
+    }
+    for (std::uint32_t t = 0; t < patches_.triangles.size(); ++t) {
+      const FlatTriangle& source = flat_.triangles[sources_[t]];
+      const Surface& surface = patches_.surfaces[patches_.triangle_surface[t]];
+      const Page& page = patches_.pages[surface.page];
+      PatchScene::InstanceUv& uvs = patches_.instance_uvs[source.instance];
+      uvs.page[source.source] = surface.page;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const glm::vec2 texel = patches_.vertices[patches_.indices[std::size_t{3} * t + k]].texel;
+        uvs.corners[source.source][source.source_corner[k]] =
+            (texel + glm::vec2(surface.page_x, surface.page_y)) / glm::vec2(page.width, page.height);
+      }
+    }
+  }
+
+  const Scene& scene_;
+  const ChartOptions& options_;
+  PatchScene patches_;
+  FlatScene flat_;
+  std::vector<std::uint32_t> neighbours_;
+  std::vector<Chart> charts_;
+  Atlas atlas_;
+  std::vector<std::uint32_t> sources_;  ///< flat triangle of each patch triangle
+};
+
+}  // namespace
+
+Result<PatchScene> buildPatchScene(const Scene& scene, const ChartOptions& options) {
+  return Builder(scene, options).build();
+}
+
+}  // namespace radiosity::scene

@@ -1,0 +1,36 @@
+// How much of each leaf is covered by triangles, how much of that is buried inside other solids, and where on the leaf
+// one may stand. Last step of buildPatchScene (charts.h). Areas in unit box squared.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec2.hpp>
+#include <vector>
+
+#include "server/scene/patch_scene.h"
+
+namespace radiosity::scene {
+
+/// The part of a leaf that one triangle covers; kept only for leaves that no single triangle covers wholly.
+struct LeafPiece {
+  std::uint32_t leaf;  ///< into PatchScene::leaves
+  std::uint32_t triangle;
+  float area;
+};
+
+/// Fills leaves and level 0 of node_area (both sides) for every surface: each triangle clipped against the texels it
+/// touches (Sutherland and Hodgman 1974), in double, in bands of rows so that memory stays bounded. Needs surfaces,
+/// vertices and frames; sizes leaves and node_area. Returns the pieces, sorted by leaf.
+[[nodiscard]] std::vector<LeafPiece> measureCoverage(PatchScene& patches);
+
+/// Takes the part of each leaf that lies inside another solid out of node_area and moves leaf points to what is left.
+/// `single_sided`: by surface; only those bound solids. Adds warnings about coincident faces.
+void removeBuried(PatchScene& patches, const std::vector<LeafPiece>& pieces, const std::vector<bool>& single_sided);
+
+/// Sums level 0 of node_area up all pyramids.
+void sumAncestors(PatchScene& patches);
+
+/// Barycentric test in texel coordinates, borders included within `slack` texels.
+[[nodiscard]] bool triangleHolds(const PatchScene& patches, std::uint32_t triangle, const glm::dvec2& texel,
+                                 double slack = 1e-6);
+
+}  // namespace radiosity::scene

@@ -1,0 +1,231 @@
+#include "server/scene/pages.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/common.hpp>
+
+#include "common/check.h"
+
+namespace radiosity::scene {
+namespace {
+
+constexpr float kMinVisible = 0.25F;  // below that a texel's own value is too little light to be trusted
+constexpr std::uint8_t kMaxRing = 250;
+
+/// A surface's texels with a margin of gutter around them.
+struct Patchwork {
+  std::int64_t x0 = 0, y0 = 0;  ///< page texel of the buffer's first
+  std::int64_t width = 0, height = 0;
+  std::vector<glm::vec3> value;
+  std::vector<float> visible;      ///< fraction; 0 in the margin
+  std::vector<std::uint8_t> ring;  ///< 0: own value; kMaxRing: none yet
+  [[nodiscard]] std::size_t at(std::int64_t x, std::int64_t y) const { return static_cast<std::size_t>(y * width + x); }
+  [[nodiscard]] bool inside(std::int64_t x, std::int64_t y) const {
+    return x >= 0 && y >= 0 && x < width && y < height;
+  }
+};
+
+/// The margin that no other chart's margin overlaps: pages are packed with `gutter` texels between charts, and a
+/// bilinear lookup on a chart reaches one texel beyond it at most.
+constexpr std::int64_t kMargin = 1;
+
+Patchwork gather(const PatchScene& patches, const Surface& surface, std::span<const glm::vec3> values) {
+  const Page& page = patches.pages[surface.page];
+  Patchwork p;
+  p.x0 = std::max<std::int64_t>(0, std::int64_t{surface.page_x} - kMargin);
+  p.y0 = std::max<std::int64_t>(0, std::int64_t{surface.page_y} - kMargin);
+  p.width = std::min<std::int64_t>(page.width, std::int64_t{surface.page_x} + surface.width + kMargin) - p.x0;
+  p.height = std::min<std::int64_t>(page.height, std::int64_t{surface.page_y} + surface.height + kMargin) - p.y0;
+  const auto count = static_cast<std::size_t>(p.width * p.height);
+  p.value.assign(count, glm::vec3(0.0F));
+  p.visible.assign(count, 0.0F);
+  p.ring.assign(count, kMaxRing);
+  float most = 0.0F;
+  for (std::uint32_t y = 0; y < surface.height; ++y)
+    for (std::uint32_t x = 0; x < surface.width; ++x) {
+      glm::dvec3 sum(0.0);
+      double area = 0.0, largest = 0.0;
+      for (const std::uint32_t first : surface.first_node) {
+        if (first == kNone) continue;
+        const std::uint32_t node = first + y * surface.width + x;
+        const double side = patches.node_area[node];
+        sum += glm::dvec3(values[node]) * side;
+        area += side;
+        largest = std::max(largest, side);
+      }
+      if (area <= 0.0) continue;
+      const std::size_t i = p.at(surface.page_x + x - p.x0, surface.page_y + y - p.y0);
+      p.value[i] = glm::vec3(sum / area);
+      p.visible[i] =
+          surface.texel_area > 0.0F ? std::min(1.0F, static_cast<float>(largest / surface.texel_area)) : 1.0F;
+      most = std::max(most, p.visible[i]);
+    }
+  // A chart of slivers has nothing better than what it has.
+  const float enough = std::min(kMinVisible, most);
+  for (std::size_t i = 0; i < count; ++i)
+    if (p.visible[i] > 0.0F && p.visible[i] >= enough) p.ring[i] = 0;
+  return p;
+}
+
+/// Continues the slope from `near` (adjacent) and `far` (one further), held to half of the near value either way, so
+/// that it is never negative and one noisy texel does not shoot off.
+glm::vec3 extrapolate(const glm::vec3& near, const glm::vec3& far) {
+  const glm::vec3 bound = 0.5F * glm::abs(near);
+  return near + glm::clamp(near - far, -bound, bound);
+}
+
+/// What the neighbours of earlier rings say about an unknown texel; false: nothing yet.
+bool fromNeighbours(const Patchwork& p, std::int64_t x, std::int64_t y, std::uint8_t ring, glm::vec3& value) {
+  glm::vec3 sum(0.0F);
+  float weight = 0.0F;
+  for (std::int64_t dy = -1; dy <= 1; ++dy)
+    for (std::int64_t dx = -1; dx <= 1; ++dx) {
+      if ((dx == 0 && dy == 0) || !p.inside(x + dx, y + dy)) continue;
+      const std::size_t near = p.at(x + dx, y + dy);
+      if (p.ring[near] >= ring) continue;
+      glm::vec3 guess = p.value[near];
+      if (ring == 1 && p.inside(x + 2 * dx, y + 2 * dy)) {
+        const std::size_t far = p.at(x + 2 * dx, y + 2 * dy);
+        if (p.ring[far] == 0) guess = extrapolate(p.value[near], p.value[far]);
+      }
+      const float w = dx == 0 || dy == 0 ? 1.0F : 0.25F;
+      sum += guess * w;
+      weight += w;
+    }
+  if (weight <= 0.0F) return false;
+  value = sum / weight;
+  return true;
+}
+
+/// Ring by ring outward from texels with a value of their own; the first ring continues slopes, later ones copy.
+void fillUnknown(Patchwork& p) {
+  std::vector<std::size_t> unknown;
+  for (std::size_t i = 0; i < p.ring.size(); ++i)
+    if (p.ring[i] != 0) unknown.push_back(i);
+  if (unknown.size() == p.ring.size()) {  // wholly buried or empty: black, but somebody's
+    std::ranges::fill(p.value, glm::vec3(0.0F));
+    return;
+  }
+  for (std::uint8_t ring = 1; ring < kMaxRing && !unknown.empty(); ++ring) {
+    std::vector<std::size_t> later, now;
+    for (const std::size_t i : unknown) {
+      const auto x = static_cast<std::int64_t>(i) % p.width, y = static_cast<std::int64_t>(i) / p.width;
+      (fromNeighbours(p, x, y, ring, p.value[i]) ? now : later).push_back(i);
+    }
+    for (const std::size_t i : now) p.ring[i] = ring;
+    unknown = std::move(later);
+  }
+}
+
+class PageMaker {
+ public:
+  PageMaker(const PatchScene& patches, std::span<const glm::vec3> values) : patches_(patches), values_(values) {
+    for (const Page& page : patches.pages) {
+      const std::size_t count = std::size_t{page.width} * page.height;
+      pages_.push_back(
+          {Image(static_cast<int>(page.width), static_cast<int>(page.height)), std::vector<float>(count, 0.0F)});
+      owners_.push_back({std::vector<std::uint32_t>(count, kNone), std::vector<std::uint8_t>(count, kMaxRing)});
+    }
+  }
+
+  std::vector<LightmapPage> make() {
+    for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
+      Patchwork p = gather(patches_, patches_.surfaces[s], values_);
+      fillUnknown(p);
+      place(s, p);
+    }
+    stitchSeams(patches_, owners_, pages_);
+    for (std::size_t page = 0; page < pages_.size(); ++page) dilate(pages_[page], owners_[page]);
+    return std::move(pages_);
+  }
+
+ private:
+  /// Where charts of a file's own layout share texels: the one that sees more of it wins, then the nearer.
+  void place(std::uint32_t s, const Patchwork& p) {
+    const std::uint32_t page_id = patches_.surfaces[s].page;
+    LightmapPage& page = pages_[page_id];
+    PageOwners& owners = owners_[page_id];
+    for (std::int64_t y = 0; y < p.height; ++y)
+      for (std::int64_t x = 0; x < p.width; ++x) {
+        const std::size_t from = p.at(x, y);
+        if (p.ring[from] == kMaxRing) continue;
+        const std::size_t to = page.irradiance.index(static_cast<int>(p.x0 + x), static_cast<int>(p.y0 + y));
+        const bool better = owners.surface[to] == kNone || p.visible[from] > page.coverage[to] ||
+                            (p.visible[from] == page.coverage[to] && p.ring[from] < owners.ring[to]);
+        if (!better) continue;
+        page.irradiance.pixels[to] = p.value[from];
+        page.coverage[to] = p.visible[from];
+        owners.surface[to] = s;
+        owners.ring[to] = p.ring[from];
+      }
+  }
+
+  /// Plain dilation of what is left of the gutters, for coarser mips and imprecise lookups.
+  void dilate(LightmapPage& page, PageOwners& owners) const {
+    const int width = page.irradiance.width, height = page.irradiance.height;
+    for (int round = 0; round < 4; ++round) {
+      std::vector<std::pair<std::size_t, glm::vec3>> found;
+      for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x) {
+          const std::size_t i = page.irradiance.index(x, y);
+          if (owners.surface[i] != kNone) continue;
+          glm::vec3 sum(0.0F);
+          float weight = 0.0F;
+          for (int ny = std::max(0, y - 1); ny <= std::min(height - 1, y + 1); ++ny)
+            for (int nx = std::max(0, x - 1); nx <= std::min(width - 1, x + 1); ++nx) {
+              const std::size_t n = page.irradiance.index(nx, ny);
+              if (owners.surface[n] == kNone) continue;
+              sum += page.irradiance.pixels[n];
+              weight += 1.0F;
+            }
+          if (weight > 0.0F) found.emplace_back(i, sum / weight);
+        }
+      if (found.empty()) return;
+      for (const auto& [i, value] : found) {
+        page.irradiance.pixels[i] = value;
+        owners.surface[i] = kNone - 1;
+      }
+    }
+  }
+
+  const PatchScene& patches_;
+  std::span<const glm::vec3> values_;
+  std::vector<LightmapPage> pages_;
+  std::vector<PageOwners> owners_;
+};
+
+}  // namespace
+
+std::vector<LightmapPage> assemblePages(const PatchScene& patches, std::span<const glm::vec3> node_values) {
+  RAD_CHECK_EQ(node_values.size(), patches.nodeCount());
+  return PageMaker(patches, node_values).make();
+}
+
+LightmapPage coarserMip(const LightmapPage& page) {
+  const int width = page.irradiance.width, height = page.irradiance.height;
+  LightmapPage coarse;
+  coarse.irradiance = Image(std::max(1, (width + 1) / 2), std::max(1, (height + 1) / 2));
+  coarse.coverage.assign(coarse.irradiance.pixels.size(), 0.0F);
+  for (int y = 0; y < coarse.irradiance.height; ++y)
+    for (int x = 0; x < coarse.irradiance.width; ++x) {
+      glm::vec3 seen(0.0F), plain(0.0F);
+      float weight = 0.0F;
+      int count = 0;
+      for (int cy = 2 * y; cy < std::min(2 * y + 2, height); ++cy)
+        for (int cx = 2 * x; cx < std::min(2 * x + 2, width); ++cx) {
+          const std::size_t i = page.irradiance.index(cx, cy);
+          seen += page.irradiance.pixels[i] * page.coverage[i];
+          weight += page.coverage[i];
+          plain += page.irradiance.pixels[i];
+          ++count;
+        }
+      if (count == 0) continue;
+      const std::size_t to = coarse.irradiance.index(x, y);
+      coarse.irradiance.pixels[to] = weight > 0.0F ? seen / weight : plain / static_cast<float>(count);
+      coarse.coverage[to] = weight / static_cast<float>(count);
+    }
+  return coarse;
+}
+
+}  // namespace radiosity::scene

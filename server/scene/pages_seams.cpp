@@ -1,0 +1,114 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "server/scene/pages.h"
+
+namespace radiosity::scene {
+namespace {
+
+constexpr int kSweeps = 12;
+constexpr float kPointsATexel = 2.0F;
+constexpr float kMobileVisible = 0.25F;  // how much a texel gives way: visible ones little, gutter ones fully
+
+/// One bilinear lookup: four texels of a page.
+struct Lookup {
+  std::uint32_t page = 0;
+  std::array<std::uint32_t, 4> texel{};
+  std::array<float, 4> weight{};
+};
+
+/// Two lookups that should agree.
+struct Tie {
+  std::array<Lookup, 2> side;
+  float inverse_norm = 0.0F;  ///< of the weights, mobility included
+};
+
+class Stitcher {
+ public:
+  Stitcher(const PatchScene& patches, const std::vector<PageOwners>& owners, std::vector<LightmapPage>& pages)
+      : patches_(patches), owners_(owners), pages_(pages) {}
+
+  void run() {
+    for (const PatchScene::Seam& seam : patches_.seams) addTies(seam);
+    for (int sweep = 0; sweep < kSweeps; ++sweep)
+      for (const Tie& tie : ties_) project(tie);
+  }
+
+ private:
+  [[nodiscard]] float mobility(std::uint32_t page, std::uint32_t texel) const {
+    return owners_[page].ring[texel] == 0 ? kMobileVisible : 1.0F;
+  }
+
+  /// False when the lookup would touch texels of another chart: those must not be pulled.
+  bool lookUp(std::uint32_t surface_id, const glm::vec2& texel, Lookup& lookup) const {
+    const Surface& surface = patches_.surfaces[surface_id];
+    const Image& image = pages_[surface.page].irradiance;
+    const glm::vec2 place = texel + glm::vec2(surface.page_x, surface.page_y) - 0.5F;
+    const glm::vec2 base = glm::floor(place);
+    const glm::vec2 f = place - base;
+    lookup.page = surface.page;
+    for (std::size_t k = 0; k < 4; ++k) {
+      const int dx = static_cast<int>(k & 1U), dy = static_cast<int>(k >> 1U);
+      const int x = std::clamp(static_cast<int>(base.x) + dx, 0, image.width - 1);
+      const int y = std::clamp(static_cast<int>(base.y) + dy, 0, image.height - 1);
+      lookup.weight[k] = (dx == 1 ? f.x : 1.0F - f.x) * (dy == 1 ? f.y : 1.0F - f.y);
+      lookup.texel[k] = static_cast<std::uint32_t>(image.index(x, y));
+      if (lookup.weight[k] > 1e-4F && owners_[surface.page].surface[lookup.texel[k]] != surface_id) return false;
+    }
+    return true;
+  }
+
+  void addTies(const PatchScene::Seam& seam) {
+    const float length =
+        std::max(glm::distance(seam.texel[0][0], seam.texel[0][1]), glm::distance(seam.texel[1][0], seam.texel[1][1]));
+    const int count = std::max(1, static_cast<int>(std::ceil(length * kPointsATexel)));
+    for (int i = 0; i < count; ++i) {
+      const float where = (static_cast<float>(i) + 0.5F) / static_cast<float>(count);
+      Tie tie;
+      float norm = 0.0F;
+      bool usable = true;
+      for (std::size_t s = 0; s < 2 && usable; ++s) {
+        usable = lookUp(seam.surface[s], glm::mix(seam.texel[s][0], seam.texel[s][1], where), tie.side[s]);
+        for (std::size_t k = 0; k < 4; ++k)
+          norm += tie.side[s].weight[k] * tie.side[s].weight[k] * mobility(tie.side[s].page, tie.side[s].texel[k]);
+      }
+      if (!usable || !(norm > 0.0F)) continue;
+      tie.inverse_norm = 1.0F / norm;
+      ties_.push_back(tie);
+    }
+  }
+
+  [[nodiscard]] glm::vec3 valueOf(const Lookup& lookup) const {
+    glm::vec3 sum(0.0F);
+    for (std::size_t k = 0; k < 4; ++k)
+      sum += pages_[lookup.page].irradiance.pixels[lookup.texel[k]] * lookup.weight[k];
+    return sum;
+  }
+
+  void project(const Tie& tie) {
+    const glm::vec3 step = (valueOf(tie.side[1]) - valueOf(tie.side[0])) * tie.inverse_norm;
+    for (std::size_t s = 0; s < 2; ++s)
+      for (std::size_t k = 0; k < 4; ++k) {
+        const Lookup& lookup = tie.side[s];
+        glm::vec3& value = pages_[lookup.page].irradiance.pixels[lookup.texel[k]];
+        const float reach = lookup.weight[k] * mobility(lookup.page, lookup.texel[k]) * (s == 0 ? 1.0F : -1.0F);
+        value = glm::max(value + step * reach, glm::vec3(0.0F));
+      }
+  }
+
+  const PatchScene& patches_;
+  const std::vector<PageOwners>& owners_;
+  std::vector<LightmapPage>& pages_;
+  std::vector<Tie> ties_;
+};
+
+}  // namespace
+
+void stitchSeams(const PatchScene& patches, const std::vector<PageOwners>& owners, std::vector<LightmapPage>& pages) {
+  Stitcher(patches, owners, pages).run();
+}
+
+}  // namespace radiosity::scene

@@ -1,0 +1,249 @@
+// Emission and reflectance of patches: materials integrated over leaves, means above them (patch_scene.h).
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <optional>
+
+#include "server/scene/patch_scene.h"
+#include "server/scene/shade_texture.h"
+
+namespace radiosity::scene {
+namespace {
+
+constexpr float kMaxReflectance = 0.999F;
+constexpr int kSide = 4;  ///< kSide^2 samples a leaf
+
+struct Value {
+  glm::vec3 emission{0.0F}, reflectance{0.0F};
+};
+
+class MaterialShader {
+ public:
+  MaterialShader(const Scene& scene, const PatchScene& patches, std::uint32_t material, PatchMaterials& out)
+      : scene_(scene), patches_(patches), out_(out) {
+    if (material < scene.materials.size()) material_ = scene.materials[material];
+    base_ = pyramidFor(material_.base_color_texture);
+    emissive_ = pyramidFor(material_.emissive_texture);
+  }
+
+  void shade(std::uint32_t id) {
+    surface_ = patches_.surfaces[id];
+    instance_ = &scene_.instances[surface_.instance];
+    primitive_ = &scene_.primitives[instance_->primitive];
+    if (!base_ && !emissive_ && primitive_->color0.empty()) {
+      fill(clamped(constant()));
+      return;
+    }
+    shadeLeaves();
+    for (const std::uint32_t first : surface_.first_node)
+      if (first != kNone) average(first);
+  }
+
+  [[nodiscard]] bool wasClamped() const { return was_clamped_; }
+  [[nodiscard]] const std::string& name() const { return material_.name; }
+
+ private:
+  [[nodiscard]] std::optional<TexturePyramid> pyramidFor(const TextureUse& use) const {
+    if (use.texture >= scene_.textures.size()) return std::nullopt;
+    const Texture& texture = scene_.textures[use.texture];
+    const auto bytes = static_cast<std::size_t>(std::max(0, texture.width)) *
+                       static_cast<std::size_t>(std::max(0, texture.height)) * 4;
+    if (bytes == 0 || texture.rgba.size() < bytes) return std::nullopt;
+    return std::optional<TexturePyramid>(std::in_place, texture);
+  }
+
+  [[nodiscard]] Value constant() const {
+    return {material_.emission * static_cast<float>(M_PI), material_.base_color * (1.0F - material_.metallic)};
+  }
+
+  Value clamped(Value value) {
+    for (int c = 0; c < 3; ++c) {
+      float& rho = value.reflectance[c];
+      if (rho > kMaxReflectance) {
+        was_clamped_ = true;
+        rho = kMaxReflectance;
+      }
+      if (!(rho > 0.0F)) rho = 0.0F;
+      if (!(value.emission[c] > 0.0F) || !std::isfinite(value.emission[c])) value.emission[c] = 0.0F;
+    }
+    return value;
+  }
+
+  void fill(const Value& value) {
+    const LevelGrid last = levelGrid(surface_.width, surface_.height, surface_.level_count - 1);
+    for (const std::uint32_t first : surface_.first_node) {
+      if (first == kNone) continue;
+      std::fill_n(out_.emission.begin() + first, last.offset + 1, value.emission);
+      std::fill_n(out_.reflectance.begin() + first, last.offset + 1, value.reflectance);
+    }
+  }
+
+  /// A triangle's vertex attributes as affine functions of texel coordinates are found by barycentric weights.
+  struct Corners {
+    std::array<glm::dvec2, 3> texel;
+    std::array<std::uint32_t, 3> vertex;
+    double inverse_area;
+  };
+
+  [[nodiscard]] Corners cornersOf(std::uint32_t triangle) const {
+    Corners corners{};
+    const bool mirrored = glm::determinant(glm::dmat3(instance_->world)) < 0.0;
+    const std::size_t source = std::size_t{3} * patches_.triangle_source[triangle];
+    for (std::size_t k = 0; k < 3; ++k) {
+      corners.texel[k] = glm::dvec2(patches_.vertices[patches_.indices[std::size_t{3} * triangle + k]].texel);
+      corners.vertex[k] = primitive_->indices[source + (mirrored ? (3 - k) % 3 : k)];
+    }
+    const glm::dvec2 a = corners.texel[1] - corners.texel[0], b = corners.texel[2] - corners.texel[0];
+    const double twice = a.x * b.y - a.y * b.x;
+    corners.inverse_area = twice != 0.0 ? 1.0 / twice : 0.0;
+    return corners;
+  }
+
+  static glm::vec3 weightsAt(const Corners& c, const glm::dvec2& p) {
+    const auto cross = [](const glm::dvec2& a, const glm::dvec2& b) { return a.x * b.y - a.y * b.x; };
+    const double w1 = cross(p - c.texel[0], c.texel[2] - c.texel[0]) * c.inverse_area;
+    const double w2 = cross(c.texel[1] - c.texel[0], p - c.texel[0]) * c.inverse_area;
+    return {1.0 - w1 - w2, w1, w2};
+  }
+
+  [[nodiscard]] glm::vec2 uvAt(const TextureUse& use, const Corners& c, const glm::vec3& w) const {
+    const auto& set = use.texcoord == 1 ? primitive_->texcoord1 : primitive_->texcoord0;
+    if (set.empty()) return glm::vec2(0.0F);
+    return set[c.vertex[0]] * w[0] + set[c.vertex[1]] * w[1] + set[c.vertex[2]] * w[2];
+  }
+
+  [[nodiscard]] glm::vec3 textureAt(const std::optional<TexturePyramid>& texture, const TextureUse& use,
+                                    const Corners& c, const glm::dvec2& p) const {
+    if (!texture) return glm::vec3(1.0F);
+    const double step = 1.0 / kSide;
+    const glm::vec2 uv = uvAt(use, c, weightsAt(c, p));
+    const glm::vec2 right = uvAt(use, c, weightsAt(c, p + glm::dvec2(step, 0.0))) - uv;
+    const glm::vec2 down = uvAt(use, c, weightsAt(c, p + glm::dvec2(0.0, step))) - uv;
+    return texture->sample(use, uv, glm::max(glm::abs(right), glm::abs(down)));
+  }
+
+  Value valueAt(const Corners& c, const glm::dvec2& p) {
+    Value value = constant();
+    if (!primitive_->color0.empty()) {
+      const glm::vec3 w = glm::clamp(weightsAt(c, p), 0.0F, 1.0F);
+      const auto& color = primitive_->color0;
+      value.reflectance *= glm::vec3(color[c.vertex[0]] * w[0] + color[c.vertex[1]] * w[1] + color[c.vertex[2]] * w[2]);
+    }
+    value.reflectance *= textureAt(base_, material_.base_color_texture, c, p);
+    value.emission *= textureAt(emissive_, material_.emissive_texture, c, p);
+    return clamped(value);
+  }
+
+  /// Triangle by triangle, each sample point of the leaf grid that lies in it.
+  void shadeLeaves() {
+    const std::size_t count = std::size_t{surface_.width} * surface_.height;
+    sums_.assign(count, Value{});
+    samples_.assign(count, 0);
+    for (std::uint32_t t = surface_.first_triangle; t < surface_.first_triangle + surface_.triangle_count; ++t)
+      sampleTriangle(cornersOf(t));
+    for (std::size_t i = 0; i < count; ++i) {
+      const LeafPoint& point = patches_.leaves[surface_.first_leaf + i];
+      Value value;
+      if (samples_[i] > 0) {
+        value = {sums_[i].emission / static_cast<float>(samples_[i]),
+                 sums_[i].reflectance / static_cast<float>(samples_[i])};
+      } else if (point.triangle != kNone) {
+        value = valueAt(cornersOf(point.triangle), glm::dvec2(point.texel));
+      }
+      for (const std::uint32_t first : surface_.first_node) {
+        if (first == kNone) continue;
+        out_.emission[first + i] = value.emission;
+        out_.reflectance[first + i] = value.reflectance;
+      }
+    }
+  }
+
+  void sampleTriangle(const Corners& c) {
+    const glm::dvec2 low = glm::min(glm::min(c.texel[0], c.texel[1]), c.texel[2]) * double{kSide};
+    const glm::dvec2 high = glm::max(glm::max(c.texel[0], c.texel[1]), c.texel[2]) * double{kSide};
+    const auto end_y = std::min(static_cast<int>(std::ceil(high.y)), static_cast<int>(surface_.height) * kSide);
+    const auto end_x = std::min(static_cast<int>(std::ceil(high.x)), static_cast<int>(surface_.width) * kSide);
+    for (int y = std::max(0, static_cast<int>(std::floor(low.y))); y < end_y; ++y)
+      for (int x = std::max(0, static_cast<int>(std::floor(low.x))); x < end_x; ++x) {
+        const glm::dvec2 p((x + 0.5) / kSide, (y + 0.5) / kSide);
+        const glm::vec3 w = weightsAt(c, p);
+        if (std::min({w.x, w.y, w.z}) < -1e-6F) continue;
+        const std::size_t leaf =
+            static_cast<std::size_t>(y / kSide) * surface_.width + static_cast<std::size_t>(x / kSide);
+        const Value value = valueAt(c, p);
+        sums_[leaf].emission += value.emission;
+        sums_[leaf].reflectance += value.reflectance;
+        ++samples_[leaf];
+      }
+  }
+
+  void average(std::uint32_t first) {
+    LevelGrid below = levelGrid(surface_.width, surface_.height, 0);
+    for (std::uint32_t level = 1; level < surface_.level_count; ++level) {
+      const LevelGrid grid = levelGrid(surface_.width, surface_.height, level);
+      for (std::uint32_t y = 0; y < grid.height; ++y)
+        for (std::uint32_t x = 0; x < grid.width; ++x) {
+          glm::dvec3 emission(0.0), reflectance(0.0);
+          double weight = 0.0;
+          for (std::uint32_t cy = 2 * y; cy < std::min(2 * y + 2, below.height); ++cy)
+            for (std::uint32_t cx = 2 * x; cx < std::min(2 * x + 2, below.width); ++cx) {
+              const std::uint32_t child = first + below.offset + cy * below.width + cx;
+              const double area = patches_.node_area[child];
+              weight += area;
+              emission += glm::dvec3(out_.emission[child]) * area;
+              reflectance += glm::dvec3(out_.reflectance[child]) * area;
+            }
+          const std::uint32_t node = first + grid.offset + y * grid.width + x;
+          out_.emission[node] = weight > 0.0 ? glm::vec3(emission / weight) : glm::vec3(0.0F);
+          out_.reflectance[node] = weight > 0.0 ? glm::vec3(reflectance / weight) : glm::vec3(0.0F);
+        }
+      below = grid;
+    }
+  }
+
+  const Scene& scene_;
+  const PatchScene& patches_;
+  PatchMaterials& out_;
+  Material material_;
+  std::optional<TexturePyramid> base_, emissive_;
+  Surface surface_;
+  const Instance* instance_ = nullptr;
+  const Primitive* primitive_ = nullptr;
+  std::vector<Value> sums_;
+  std::vector<std::uint32_t> samples_;
+  bool was_clamped_ = false;
+};
+
+}  // namespace
+
+std::vector<std::uint32_t> reshadeMaterial(const Scene& scene, const PatchScene& patches, std::uint32_t material,
+                                           PatchMaterials& materials) {
+  std::vector<std::uint32_t> surfaces;
+  for (std::uint32_t s = 0; s < patches.surfaces.size(); ++s)
+    if (patches.surfaces[s].material == material) surfaces.push_back(s);
+  if (surfaces.empty()) return surfaces;
+  MaterialShader shader(scene, patches, material, materials);
+  for (const std::uint32_t s : surfaces) shader.shade(s);
+  if (shader.wasClamped())
+    materials.warnings.push_back(fmt::format("/materials/{} ({}): reflectance above {} was lowered to it", material,
+                                             shader.name(), kMaxReflectance));
+  return surfaces;
+}
+
+PatchMaterials shadePatches(const Scene& scene, const PatchScene& patches) {
+  PatchMaterials materials;
+  materials.emission.resize(patches.nodeCount(), glm::vec3(0.0F));
+  materials.reflectance.resize(patches.nodeCount(), glm::vec3(0.0F));
+  std::vector<std::uint32_t> used;
+  for (const Surface& surface : patches.surfaces) used.push_back(surface.material);
+  std::ranges::sort(used);
+  used.erase(std::unique(used.begin(), used.end()), used.end());
+  for (const std::uint32_t material : used) reshadeMaterial(scene, patches, material, materials);
+  return materials;
+}
+
+}  // namespace radiosity::scene

@@ -1,0 +1,112 @@
+#include "server/scene/shade_texture.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/common.hpp>
+
+namespace radiosity::scene {
+namespace {
+
+const std::array<float, 256>& srgbTable() {
+  static const std::array<float, 256> kTable = [] {
+    std::array<float, 256> table{};
+    for (int i = 0; i < 256; ++i) {
+      const double v = i / 255.0;
+      table[static_cast<std::size_t>(i)] =
+          static_cast<float>(v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4));
+    }
+    return table;
+  }();
+  return kTable;
+}
+
+int wrap(int i, int size, bool repeat, bool mirror) {
+  if (!repeat) return std::clamp(i, 0, size - 1);
+  const int period = mirror ? 2 * size : size;
+  int m = i % period;
+  if (m < 0) m += period;
+  return mirror && m >= size ? 2 * size - 1 - m : m;
+}
+
+/// Source pixels and weights of target pixel `i` when `from` pixels become `to`: exact overlap, so the mean is kept for
+/// odd sizes too.
+struct Taps {
+  int first, count;
+  std::array<float, 4> weight;
+};
+Taps tapsOf(int i, int from, int to) {
+  const double ratio = static_cast<double>(from) / to;
+  const double low = i * ratio, high = low + ratio;
+  Taps taps{static_cast<int>(std::floor(low + 1e-9)), 0, {}};
+  for (int p = taps.first; p < from && p < high - 1e-9 && taps.count < 4; ++p)
+    taps.weight[static_cast<std::size_t>(taps.count++)] =
+        static_cast<float>((std::min(high, p + 1.0) - std::max(low, static_cast<double>(p))) / ratio);
+  return taps;
+}
+
+}  // namespace
+
+glm::vec2 transformUv(const TextureUse& use, const glm::vec2& uv) {
+  const glm::vec2 s = uv * use.scale;
+  const float c = std::cos(use.rotation), d = std::sin(use.rotation);
+  return use.offset + glm::vec2(c * s.x + d * s.y, -d * s.x + c * s.y);
+}
+
+TexturePyramid::TexturePyramid(const Texture& texture) : texture_(&texture) {
+  int width = texture.width, height = texture.height;
+  for (std::size_t level = 0; width > 1 || height > 1; ++level) {
+    Level next{std::max(1, width / 2), std::max(1, height / 2), {}};
+    next.pixels.resize(static_cast<std::size_t>(next.width) * static_cast<std::size_t>(next.height));
+    for (int y = 0; y < next.height; ++y) {
+      const Taps rows = tapsOf(y, height, next.height);
+      for (int x = 0; x < next.width; ++x) {
+        const Taps columns = tapsOf(x, width, next.width);
+        glm::vec3 sum(0.0F);
+        for (int j = 0; j < rows.count; ++j)
+          for (int i = 0; i < columns.count; ++i)
+            sum += pixel(level, columns.first + i, rows.first + j) * columns.weight[static_cast<std::size_t>(i)] *
+                   rows.weight[static_cast<std::size_t>(j)];
+        next.pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(next.width) + static_cast<std::size_t>(x)] =
+            sum;
+      }
+    }
+    width = next.width;
+    height = next.height;
+    levels_.push_back(std::move(next));
+  }
+}
+
+glm::vec3 TexturePyramid::pixel(std::size_t level, int x, int y) const {
+  const auto index =
+      static_cast<std::size_t>(y) * static_cast<std::size_t>(widthOf(level)) + static_cast<std::size_t>(x);
+  if (level > 0) return levels_[level - 1].pixels[index];
+  const std::uint8_t* p = &texture_->rgba[index * 4];
+  if (!texture_->srgb) return glm::vec3(p[0], p[1], p[2]) / 255.0F;
+  return {srgbTable()[p[0]], srgbTable()[p[1]], srgbTable()[p[2]]};
+}
+
+glm::vec3 TexturePyramid::bilinear(std::size_t level, const TextureUse& use, const glm::vec2& uv) const {
+  const int width = widthOf(level), height = heightOf(level);
+  // Bounded first: a wild UV must not overflow the integer below.
+  const glm::vec2 place = glm::clamp(uv, glm::vec2(-1e5F), glm::vec2(1e5F)) * glm::vec2(width, height) - 0.5F;
+  const glm::vec2 base = glm::clamp(glm::floor(place), glm::vec2(-1e9F), glm::vec2(1e9F));
+  const glm::vec2 f = place - base;
+  const int x0 = static_cast<int>(base.x), y0 = static_cast<int>(base.y);
+  const auto at = [&](int x, int y) {
+    return pixel(level, wrap(x, width, use.repeat_u, use.mirror_u), wrap(y, height, use.repeat_v, use.mirror_v));
+  };
+  return glm::mix(glm::mix(at(x0, y0), at(x0 + 1, y0), f.x), glm::mix(at(x0, y0 + 1), at(x0 + 1, y0 + 1), f.x), f.y);
+}
+
+glm::vec3 TexturePyramid::sample(const TextureUse& use, const glm::vec2& uv, const glm::vec2& footprint) const {
+  if (texture_->width <= 0 || texture_->height <= 0) return glm::vec3(1.0F);
+  const glm::vec2 place = transformUv(use, uv);
+  if (!std::isfinite(place.x) || !std::isfinite(place.y)) return glm::vec3(1.0F);
+  const glm::vec2 extent = glm::abs(footprint * use.scale) * glm::vec2(texture_->width, texture_->height);
+  const float pixels = std::max({extent.x, extent.y, 1.0F});
+  const auto level = std::min(levels_.size(), static_cast<std::size_t>(std::lround(std::log2(std::min(pixels, 1e6F)))));
+  return bilinear(level, use, place);
+}
+
+}  // namespace radiosity::scene

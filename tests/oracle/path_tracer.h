@@ -1,0 +1,62 @@
+// The reference: irradiance by path tracing, with its own visibility (Embree) and its own sampling, accumulated in
+// double. Unbiased: paths end by Russian roulette only. Light leaves and arrives at the fronts of single-sided
+// triangles; their backs absorb.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "tests/oracle/triangle_scene.h"
+
+namespace radiosity::oracle {
+
+/// Where irradiance is wanted: the mean over the area of some triangles (a texel), or at a point (one triangle with
+/// three equal corners).
+struct Footprint {
+  struct Piece {
+    std::array<glm::dvec3, 3> corners{};
+    glm::dvec3 normal{0.0};  ///< unit; light arrives on this side
+  };
+  std::vector<Piece> pieces;
+
+  [[nodiscard]] static Footprint at(const glm::dvec3& point, const glm::dvec3& normal);
+  [[nodiscard]] double area() const;
+};
+
+struct Irradiance {
+  glm::dvec3 mean_lux{0.0};
+  glm::dvec3 standard_error{0.0};
+  double visible_fraction = 1.0;  ///< of the footprint's area: the rest lies inside another solid and is left out
+};
+
+struct PathOptions {
+  std::uint32_t samples = 1024;  ///< paths for each footprint, rounded up to a multiple of 8
+  std::uint64_t seed = 1;
+  unsigned threads = 0;  ///< 0: all cores. The result does not depend on it.
+  bool leave_out_buried = true;
+};
+
+class PathTracer {
+ public:
+  /// Keeps its own copy of the triangles.
+  explicit PathTracer(const TriangleScene& scene);
+  ~PathTracer();
+  PathTracer(const PathTracer&) = delete;
+  PathTracer& operator=(const PathTracer&) = delete;
+
+  [[nodiscard]] std::vector<Irradiance> irradiance(std::span<const Footprint> footprints,
+                                                   const PathOptions& options) const;
+
+  /// Whether the point lies inside another solid: most rays from it meet the back of a surface.
+  [[nodiscard]] bool buried(const glm::dvec3& point, const glm::dvec3& normal) const;
+
+ private:
+  class Scene;
+  std::unique_ptr<Scene> scene_;
+};
+
+}  // namespace radiosity::oracle
