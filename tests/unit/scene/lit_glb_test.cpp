@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <glm/common.hpp>
 #include <set>
 
 #include "server/scene/lightmap.h"
@@ -48,6 +49,9 @@ struct Corner {
   bool operator==(const Corner&) const = default;
 };
 
+/// To 1e-7 m: an instance's transform is normalised once more when it is read as a node.
+glm::dvec3 rounded(const glm::dvec4& p) { return glm::round(glm::dvec3(p) * 1e7) / 1e7; }
+
 /// World position, lightmap UV and page of each corner that `patches` asked for.
 std::multiset<Corner> expected(const Scene& scene, const PatchScene& patches) {
   std::multiset<Corner> out;
@@ -56,7 +60,7 @@ std::multiset<Corner> expected(const Scene& scene, const PatchScene& patches) {
     for (std::size_t k = 0; k < primitive.indices.size(); ++k) {
       const auto position = scene.instances[i].world * glm::dvec4(primitive.positions[primitive.indices[k]], 1.0);
       const auto& uv = patches.instance_uvs[i];
-      out.insert({glm::dvec3(position), uv.corners[k / 3][k % 3], uv.page[k / 3]});
+      out.insert({rounded(position), uv.corners[k / 3][k % 3], uv.page[k / 3]});
     }
   }
   return out;
@@ -70,7 +74,7 @@ std::multiset<Corner> found(const Document& document, const Scene& scene) {
     const auto& json = document.gltf["meshes"][primitive.mesh]["primitives"][primitive.primitive];
     for (const auto index : primitive.indices) {
       const auto position = instance.world * glm::dvec4(primitive.positions[index], 1.0);
-      out.insert({glm::dvec3(position), primitive.texcoord1[index], json["extras"]["lightmap"].get<std::uint32_t>()});
+      out.insert({rounded(position), primitive.texcoord1[index], json["extras"]["lightmap"].get<std::uint32_t>()});
     }
   }
   return out;
@@ -87,7 +91,7 @@ Document roundTrip(const Document& document, std::uint32_t page_count) {
   const auto read = importScene(*again);
   EXPECT_TRUE(read) << read.error().text();
   if (!read) return {};
-  EXPECT_EQ(found(*again, *read), expected(scene, patches)) << document.name;
+  EXPECT_TRUE(found(*again, *read) == expected(scene, patches)) << document.name;
   return *again;
 }
 

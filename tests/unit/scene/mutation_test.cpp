@@ -12,6 +12,7 @@ namespace radiosity::scene {
 namespace {
 
 namespace fs = std::filesystem;
+using Json = nlohmann::json;
 
 // Small, so that a mutated file cannot ask for much before it is refused.
 const ImportLimits kLimits = {.max_json_depth = 64,
