@@ -1,0 +1,106 @@
+#include "server/scene/document_defaults.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>
+
+namespace radiosity::scene {
+namespace {
+
+constexpr const char* kEmissiveStrength = "KHR_materials_emissive_strength";
+
+void setDefault(Json& object, const char* member, Json value) {
+  if (!object.contains(member)) object[member] = std::move(value);
+}
+
+Json toJson(const glm::dvec3& v) { return Json::array({v.x, v.y, v.z}); }
+
+bool readMatrix(const Json& matrix, double (&m)[16]) {
+  if (!matrix.is_array() || matrix.size() != 16) return false;
+  for (std::size_t i = 0; i < 16; ++i) {
+    if (!matrix[i].is_number()) return false;
+    m[i] = matrix[i].get<double>();
+  }
+  return true;
+}
+
+/// Column-major M = T R S when there is such a thing: the columns must be at right angles and none zero.
+bool decompose(const double (&m)[16], Json& node) {
+  if (m[3] != 0 || m[7] != 0 || m[11] != 0 || m[15] != 1) return false;
+  glm::dmat3 rotation(m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]);
+  glm::dvec3 scale(glm::length(rotation[0]), glm::length(rotation[1]), glm::length(rotation[2]));
+  if (!(scale.x > 0 && scale.y > 0 && scale.z > 0)) return false;
+  if (glm::determinant(rotation) < 0) scale.x = -scale.x;
+  for (int c = 0; c < 3; ++c) rotation[c] /= scale[c];
+  constexpr double kTolerance = 1e-5;  // matrices written in 32-bit float are orthogonal to about 1e-6
+  const auto error = glm::transpose(rotation) * rotation - glm::dmat3(1.0);
+  for (int c = 0; c < 3; ++c) {
+    for (int r = 0; r < 3; ++r) {
+      if (!(std::abs(error[c][r]) < kTolerance)) return false;
+    }
+  }
+  const auto q = glm::normalize(glm::quat_cast(rotation));
+  node["translation"] = toJson({m[12], m[13], m[14]});
+  node["rotation"] = Json::array({q.x, q.y, q.z, q.w});
+  node["scale"] = toJson(scale);
+  return true;
+}
+
+void materialiseNode(Json& node) {
+  if (!node.is_object()) return;
+  const bool has_trs = node.contains("translation") || node.contains("rotation") || node.contains("scale");
+  if (node.contains("matrix")) {
+    double m[16];
+    if (has_trs || !readMatrix(node["matrix"], m) || !decompose(m, node)) return;
+    node.erase("matrix");
+    return;
+  }
+  setDefault(node, "translation", toJson(glm::dvec3(0.0)));
+  setDefault(node, "rotation", Json::array({0.0, 0.0, 0.0, 1.0}));
+  setDefault(node, "scale", toJson(glm::dvec3(1.0)));
+}
+
+bool materialiseMaterial(Json& material) {
+  if (!material.is_object()) return false;
+  setDefault(material, "pbrMetallicRoughness", Json::object());
+  if (auto& pbr = material["pbrMetallicRoughness"]; pbr.is_object()) {
+    setDefault(pbr, "baseColorFactor", Json::array({1.0, 1.0, 1.0, 1.0}));
+    setDefault(pbr, "metallicFactor", 1.0);
+    setDefault(pbr, "roughnessFactor", 1.0);
+  }
+  setDefault(material, "emissiveFactor", toJson(glm::dvec3(0.0)));
+  setDefault(material, "alphaMode", "OPAQUE");
+  setDefault(material, "alphaCutoff", 0.5);
+  setDefault(material, "doubleSided", false);
+  setDefault(material, "extensions", Json::object());
+  auto& extensions = material["extensions"];
+  if (!extensions.is_object()) return false;
+  setDefault(extensions, kEmissiveStrength, Json::object());
+  auto& strength = extensions[kEmissiveStrength];
+  if (strength.is_object()) setDefault(strength, "emissiveStrength", 1.0);
+  return true;
+}
+
+void markUsed(Json& gltf, const char* extension) {
+  setDefault(gltf, "extensionsUsed", Json::array());
+  auto& used = gltf["extensionsUsed"];
+  if (used.is_array() && std::find(used.begin(), used.end(), extension) == used.end()) used.push_back(extension);
+}
+
+}  // namespace
+
+void materialiseDefaults(Json& gltf) {
+  if (!gltf.is_object()) return;
+  if (const auto nodes = gltf.find("nodes"); nodes != gltf.end() && nodes->is_array()) {
+    for (auto& node : *nodes) materialiseNode(node);
+  }
+  bool strength = false;
+  if (const auto materials = gltf.find("materials"); materials != gltf.end() && materials->is_array()) {
+    for (auto& material : *materials) strength |= materialiseMaterial(material);
+  }
+  if (strength) markUsed(gltf, kEmissiveStrength);
+}
+
+}  // namespace radiosity::scene

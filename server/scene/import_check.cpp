@@ -1,0 +1,192 @@
+#include "server/scene/import_check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "server/scene/accessor.h"
+
+namespace radiosity::scene {
+namespace {
+
+Result<void> checkBuffers(const ImportContext& context) {
+  const auto& gltf = context.document.gltf;
+  const auto size = [&](const char* list) { return gltf.contains(list) ? gltf[list].size() : 0; };
+  if (size("buffers") != context.document.buffers.size())
+    return context.bad("/buffers", "buffers cannot be added or removed");
+  if (size("images") != context.document.images.size())
+    return context.bad("/images", "images cannot be added or removed");
+  for (std::size_t i = 0; i < context.document.buffers.size(); ++i) {
+    if (gltf["buffers"][i]["byteLength"].get<std::size_t>() > context.document.buffers[i]->size()) {
+      return context.bad("/buffers/" + std::to_string(i) + "/byteLength", "is more than the data has");
+    }
+  }
+  return {};
+}
+
+Result<void> checkAccessors(const ImportContext& context) {
+  for (std::size_t i = 0; i + 1 < context.model.bufferViews.size(); ++i) {
+    if (auto ok = checkBufferView(context.document, context.model, i); !ok) return ok;
+  }
+  std::size_t total = 0;
+  for (std::size_t i = 0; i < context.model.accessors.size(); ++i) {
+    const auto pointer = "/accessors/" + std::to_string(i);
+    const auto type = context.document.gltf["accessors"][i]["type"].get<std::string>();
+    if (type.rfind("MAT", 0) != 0 && type != "SCALAR" && type.rfind("VEC", 0) != 0) return context.bad(pointer, "type");
+    if (auto ok = checkAccessor(context.document, context.model, i); !ok) return ok;
+    total += context.model.accessors[i].count;
+    if (total > context.limits.max_vertices) {
+      return context.tooLarge(pointer + "/count",
+                              "accessors have more than " + std::to_string(context.limits.max_vertices) + " elements");
+    }
+  }
+  return {};
+}
+
+struct AttributeRule {
+  const char* name;
+  bool scalar, vec2, vec3, vec4;
+};
+
+constexpr AttributeRule kAttributes[] = {{"POSITION", false, false, true, false},
+                                         {"TEXCOORD_0", false, true, false, false},
+                                         {"TEXCOORD_1", false, true, false, false},
+                                         {"COLOR_0", false, false, true, true}};
+
+bool allowed(const AttributeRule& rule, int type) {
+  return (rule.vec2 && type == TINYGLTF_TYPE_VEC2) || (rule.vec3 && type == TINYGLTF_TYPE_VEC3) ||
+         (rule.vec4 && type == TINYGLTF_TYPE_VEC4);
+}
+
+Result<void> checkAttributes(const ImportContext& context, const tinygltf::Primitive& primitive,
+                             const std::string& pointer) {
+  std::size_t count = 0;
+  for (const auto& [name, index] : primitive.attributes) {
+    const auto& accessor = context.model.accessors[static_cast<std::size_t>(index)];
+    const auto where = pointer + "/attributes/" + escapeToken(name);
+    if (count != 0 && accessor.count != count) return context.bad(where, "attributes differ in count");
+    count = accessor.count;
+    for (const auto& rule : kAttributes) {
+      if (name == rule.name && !allowed(rule, accessor.type)) return context.bad(where, "accessor has the wrong type");
+    }
+    if (name == "POSITION" && accessor.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT) {
+      return context.bad(where, "accessor has the wrong component type");
+    }
+  }
+  return {};
+}
+
+/// Draco and meshopt data can stand where we would read zeros; refuse that by name rather than draw nothing.
+Result<void> checkCompression(const ImportContext& context, const tinygltf::Primitive& primitive, const Json& json,
+                              const std::string& pointer) {
+  if (extensionOf(json, "KHR_draco_mesh_compression") == nullptr) return {};
+  for (const auto& [name, index] : primitive.attributes) {
+    if (viewOf(context.model, context.model.accessors[static_cast<std::size_t>(index)].bufferView) == nullptr) {
+      return fail(ErrorCode::kUnsupported,
+                  "geometry is only there as KHR_draco_mesh_compression, which is not supported; export without it",
+                  place(context.document.name, pointer + "/extensions/KHR_draco_mesh_compression"));
+    }
+  }
+  return {};
+}
+
+Result<void> checkIndices(const ImportContext& context, const tinygltf::Primitive& primitive,
+                          const std::string& pointer) {
+  if (primitive.indices < 0) return {};
+  const auto& accessor = context.model.accessors[static_cast<std::size_t>(primitive.indices)];
+  const bool integer = accessor.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE ||
+                       accessor.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT ||
+                       accessor.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT;
+  if (accessor.type != TINYGLTF_TYPE_SCALAR || !integer) {
+    return context.bad(pointer + "/indices", "accessor must be SCALAR of an unsigned integer type");
+  }
+  return {};
+}
+
+Result<void> checkMeshes(const ImportContext& context) {
+  for (std::size_t m = 0; m < context.model.meshes.size(); ++m) {
+    const auto& primitives = context.model.meshes[m].primitives;
+    for (std::size_t p = 0; p < primitives.size(); ++p) {
+      const auto pointer = "/meshes/" + std::to_string(m) + "/primitives/" + std::to_string(p);
+      const auto& json = context.document.gltf["meshes"][m]["primitives"][p];
+      if (auto ok = checkCompression(context, primitives[p], json, pointer); !ok) return ok;
+      if (auto ok = checkAttributes(context, primitives[p], pointer); !ok) return ok;
+      if (auto ok = checkIndices(context, primitives[p], pointer); !ok) return ok;
+    }
+  }
+  return {};
+}
+
+/// One parent at most, no cycles.
+Result<void> checkTree(const ImportContext& context) {
+  const auto& nodes = context.model.nodes;
+  if (nodes.size() > context.limits.max_nodes) {
+    return context.tooLarge("/nodes", "has more than " + std::to_string(context.limits.max_nodes) + " entries");
+  }
+  std::vector<bool> has_parent(nodes.size(), false);
+  for (std::size_t n = 0; n < nodes.size(); ++n) {
+    for (std::size_t c = 0; c < nodes[n].children.size(); ++c) {
+      const auto child = static_cast<std::size_t>(nodes[n].children[c]);
+      if (has_parent[child]) {
+        return context.bad("/nodes/" + std::to_string(n) + "/children/" + std::to_string(c),
+                           "node " + std::to_string(child) + " has two parents");
+      }
+      has_parent[child] = true;
+    }
+  }
+  std::vector<std::size_t> stack;
+  std::vector<bool> reached(nodes.size(), false);
+  for (std::size_t n = 0; n < nodes.size(); ++n) {
+    if (!has_parent[n]) stack.push_back(n);
+  }
+  while (!stack.empty()) {
+    const auto node = stack.back();
+    stack.pop_back();
+    reached[node] = true;
+    for (const auto child : nodes[node].children) stack.push_back(static_cast<std::size_t>(child));
+  }
+  const auto lost = std::find(reached.begin(), reached.end(), false);
+  if (lost != reached.end()) {
+    return context.bad("/nodes/" + std::to_string(lost - reached.begin()) + "/children", "nodes form a cycle");
+  }
+  for (std::size_t s = 0; s < context.model.scenes.size(); ++s) {
+    std::vector<bool> listed(nodes.size(), false);
+    for (std::size_t i = 0; i < context.model.scenes[s].nodes.size(); ++i) {
+      const auto node = static_cast<std::size_t>(context.model.scenes[s].nodes[i]);
+      const auto pointer = "/scenes/" + std::to_string(s) + "/nodes/" + std::to_string(i);
+      if (has_parent[node]) return context.bad(pointer, "is not a root node");
+      if (listed[node]) return context.bad(pointer, "is listed twice");
+      listed[node] = true;
+    }
+  }
+  return {};
+}
+
+Result<void> checkTransforms(const ImportContext& context) {
+  for (std::size_t n = 0; n < context.model.nodes.size(); ++n) {
+    const auto& json = context.document.gltf["nodes"][n];
+    const auto pointer = "/nodes/" + std::to_string(n);
+    if (json.contains("matrix") &&
+        (json.contains("translation") || json.contains("rotation") || json.contains("scale"))) {
+      return context.bad(pointer, "has both matrix and translation, rotation or scale");
+    }
+    const auto& q = context.model.nodes[n].rotation;
+    if (!q.empty() && !(std::hypot(std::hypot(q[0], q[1]), std::hypot(q[2], q[3])) > 1e-6)) {
+      return context.bad(pointer + "/rotation", "is not a rotation: its length is zero");
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<void> checkModel(ImportContext& context) {
+  if (auto ok = checkBuffers(context); !ok) return ok;
+  if (auto ok = checkAccessors(context); !ok) return ok;
+  if (auto ok = checkMeshes(context); !ok) return ok;
+  if (auto ok = checkTree(context); !ok) return ok;
+  return checkTransforms(context);
+}
+
+}  // namespace radiosity::scene

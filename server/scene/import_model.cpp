@@ -1,0 +1,110 @@
+#include "server/scene/import_model.h"
+
+#include <array>
+#include <limits>
+
+#include "server/scene/json_text.h"
+
+namespace radiosity::scene {
+namespace {
+
+constexpr std::array<const char*, 12> kKept = {"asset",          "accessors", "bufferViews", "cameras",
+                                               "extensionsUsed", "scene",     "materials",   "meshes",
+                                               "samplers",       "scenes",    "nodes",       "textures"};
+
+/// The part of the JSON that tinygltf is to see. It copies extras and extensions into values of its own; ours are read
+/// from Document::gltf, so they need not go there, except lights.
+Json reduced(const Json& gltf) {
+  Json out = Json::object();
+  for (const auto* member : kKept) {
+    if (const auto found = gltf.find(member); found != gltf.end()) out[member] = *found;
+  }
+  for (auto& [key, list] : out.items()) {
+    if (!list.is_array()) continue;
+    for (auto& entry : list) {
+      if (!entry.is_object()) continue;
+      entry.erase("extras");
+      entry.erase("extensions");
+    }
+  }
+  const auto extensions = gltf.value("extensions", Json::object());
+  if (extensions.contains("KHR_lights_punctual")) {
+    out["extensions"]["KHR_lights_punctual"] = extensions["KHR_lights_punctual"];
+  }
+  return out;
+}
+
+/// See parseModel: gives index accessors without a view the index of the extra one.
+void addZeroView(Json& gltf) {
+  auto& views = gltf["bufferViews"];
+  if (views.is_null()) views = Json::array();
+  const auto zero_view = views.size();
+  views.push_back({{"buffer", 0}, {"byteLength", 1}});
+  if (!gltf.contains("meshes")) return;
+  for (const auto& mesh : gltf["meshes"]) {
+    for (const auto& primitive : mesh["primitives"]) {
+      if (!primitive.contains("indices")) continue;
+      auto& accessor = gltf["accessors"][primitive["indices"].get<std::size_t>()];
+      if (!accessor.contains("bufferView")) accessor["bufferView"] = zero_view;
+    }
+  }
+}
+
+bool sameShape(const tinygltf::Model& model, const Json& gltf) {
+  const auto size = [&](const char* list) { return gltf.contains(list) ? gltf[list].size() : 0; };
+  if (model.nodes.size() != size("nodes") || model.meshes.size() != size("meshes") ||
+      model.materials.size() != size("materials") || model.accessors.size() != size("accessors") ||
+      model.textures.size() != size("textures") || model.cameras.size() != size("cameras") ||
+      model.bufferViews.size() != size("bufferViews") || model.samplers.size() != size("samplers") ||
+      model.scenes.size() != size("scenes")) {
+    return false;
+  }
+  for (std::size_t m = 0; m < model.meshes.size(); ++m) {
+    if (model.meshes[m].primitives.size() != gltf["meshes"][m]["primitives"].size()) return false;
+  }
+  return true;
+}
+
+/// Nothing may be opened: everything that tinygltf needs is in the text.
+tinygltf::FsCallbacks closedFileSystem() {
+  tinygltf::FsCallbacks fs{};
+  fs.FileExists = [](const std::string&, void*) { return false; };
+  fs.ExpandFilePath = [](const std::string&, void*) { return std::string(); };
+  fs.ReadWholeFile = [](std::vector<unsigned char>*, std::string*, const std::string&, void*) { return false; };
+  fs.WriteWholeFile = [](std::string*, const std::string&, const std::vector<unsigned char>&, void*) { return false; };
+  return fs;
+}
+
+bool refuseImage(tinygltf::Image*, int, std::string*, std::string*, int, int, const unsigned char*, int, void*) {
+  return false;
+}
+
+}  // namespace
+
+Result<tinygltf::Model> parseModel(const Document& document) {
+  auto json = reduced(document.gltf);
+  addZeroView(json);
+  const auto text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  if (text.size() > std::numeric_limits<unsigned>::max()) {
+    return fail(ErrorCode::kTooLarge, "JSON has more than 4 GiB", document.name);
+  }
+  tinygltf::TinyGLTF loader;
+  loader.SetFsCallbacks(closedFileSystem());
+  loader.SetImageLoader(refuseImage, nullptr);
+  tinygltf::Model model;
+  std::string error;
+  std::string warning;
+  const bool ok =
+      loader.LoadASCIIFromString(&model, &error, &warning, text.c_str(), static_cast<unsigned>(text.size()), "");
+  if (!ok || !sameShape(model, json)) {
+    return fail(ErrorCode::kInvalidScene, "tinygltf cannot read it: " + error, place(document.name, "/"));
+  }
+  return model;
+}
+
+const tinygltf::BufferView* viewOf(const tinygltf::Model& model, int view) {
+  if (view < 0 || static_cast<std::size_t>(view) + 1 >= model.bufferViews.size()) return nullptr;
+  return &model.bufferViews[static_cast<std::size_t>(view)];
+}
+
+}  // namespace radiosity::scene

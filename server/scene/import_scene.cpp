@@ -1,0 +1,213 @@
+// importScene: checks, then materials, then a walk over the node tree that places meshes, cameras and lights.
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/gtc/type_ptr.hpp>
+#include <numbers>
+
+#include "server/scene/import_check.h"
+#include "server/scene/import_context.h"
+#include "server/scene/import_instancing.h"
+#include "server/scene/import_material.h"
+#include "server/scene/import_mesh.h"
+#include "server/scene/import_schema.h"
+
+namespace radiosity::scene {
+namespace {
+
+glm::dmat4 localMatrix(const tinygltf::Node& node) {
+  if (!node.matrix.empty()) return glm::make_mat4(node.matrix.data());
+  const auto vec3 = [](const std::vector<double>& v, double otherwise) {
+    return v.empty() ? glm::dvec3(otherwise) : glm::dvec3(v[0], v[1], v[2]);
+  };
+  const auto& q = node.rotation;
+  const auto rotation = q.empty() ? glm::dquat(1.0, 0.0, 0.0, 0.0) : glm::dquat(q[3], q[0], q[1], q[2]);
+  return Trs{vec3(node.translation, 0.0), glm::normalize(rotation), vec3(node.scale, 1.0)}.matrix();
+}
+
+bool isFinite(const glm::dmat4& m) {
+  for (int c = 0; c < 4; ++c) {
+    for (int r = 0; r < 4; ++r) {
+      if (!std::isfinite(m[c][r])) return false;
+    }
+  }
+  return true;
+}
+
+class NodeWalk {
+ public:
+  explicit NodeWalk(ImportContext& context) : context_(context), meshes_(context) {}
+
+  Result<void> run() {
+    const auto roots = rootNodes();
+    for (auto root = roots.rbegin(); root != roots.rend(); ++root) stack_.push_back({*root, glm::dmat4(1.0), true});
+    while (!stack_.empty()) {
+      const auto place = stack_.back();
+      stack_.pop_back();
+      if (auto ok = visit(place); !ok) return ok;
+    }
+    return {};
+  }
+
+ private:
+  struct Place {
+    int node;
+    glm::dmat4 parent;
+    bool visible;
+  };
+
+  /// Nodes of the scene to show: /scene, else the first of /scenes, else every node without a parent.
+  [[nodiscard]] std::vector<int> rootNodes() const {
+    const auto& model = context_.model;
+    if (!model.scenes.empty()) return model.scenes[static_cast<std::size_t>(std::max(model.defaultScene, 0))].nodes;
+    std::vector<bool> has_parent(model.nodes.size(), false);
+    for (const auto& node : model.nodes) {
+      for (const auto child : node.children) has_parent[static_cast<std::size_t>(child)] = true;
+    }
+    std::vector<int> roots;
+    for (std::size_t n = 0; n < model.nodes.size(); ++n) {
+      if (!has_parent[n]) roots.push_back(static_cast<int>(n));
+    }
+    return roots;
+  }
+
+  Result<void> visit(const Place& at) {
+    const auto index = static_cast<std::size_t>(at.node);
+    const auto& node = context_.model.nodes[index];
+    const auto& json = context_.document.gltf["nodes"][index];
+    pointer_ = "/nodes/" + std::to_string(index);
+    const auto world = at.parent * localMatrix(node);
+    if (!isFinite(world)) return context_.bad(pointer_, "world transform is not finite");
+    if (!node.matrix.empty()) {
+      context_.warn(pointer_ + "/matrix",
+                    "shears or flattens, so it cannot be edited as translation, rotation and scale");
+    }
+    const auto* visibility = extensionOf(json, "KHR_node_visibility");
+    const bool visible = at.visible && (visibility == nullptr || visibility->value("visible", true));
+    if (node.mesh >= 0) {
+      if (auto ok = placeMesh(index, node, json, world, visible); !ok) return ok;
+    }
+    if (node.camera >= 0) {
+      if (auto ok = placeCamera(static_cast<std::size_t>(node.camera), world); !ok) return ok;
+    }
+    if (const auto* light = extensionOf(json, "KHR_lights_punctual"); light != nullptr && visible) {
+      if (auto ok = placeLight((*light)["light"].get<std::size_t>(), world); !ok) return ok;
+    }
+    for (auto child = node.children.rbegin(); child != node.children.rend(); ++child) {
+      stack_.push_back({*child, world, visible});
+    }
+    return {};
+  }
+
+  Result<void> placeMesh(std::size_t index, const tinygltf::Node& node, const Json& json, const glm::dmat4& world,
+                         bool visible) {
+    if (node.skin >= 0) context_.warn(pointer_, "skin is ignored; the mesh is lit in the pose it was modelled in");
+    const auto primitives = meshes_.primitivesOf(static_cast<std::size_t>(node.mesh));
+    if (!primitives) return tl::unexpected(primitives.error());
+    std::vector<glm::dmat4> worlds{world};
+    if (const auto* instancing = extensionOf(json, "EXT_mesh_gpu_instancing")) {
+      const auto locals = readInstancing(context_.document, context_.model, (*instancing)["attributes"],
+                                         pointer_ + "/extensions/EXT_mesh_gpu_instancing/attributes");
+      if (!locals) return tl::unexpected(locals.error());
+      worlds.clear();
+      for (const auto& local : *locals) worlds.push_back(world * local.matrix());
+    }
+    for (const auto& instance_world : worlds) {
+      if (!isFinite(instance_world)) return context_.bad(pointer_, "world transform is not finite");
+      for (const auto primitive : **primitives) {
+        if (auto ok = addInstance({static_cast<std::uint32_t>(index), primitive, instance_world, visible}); !ok)
+          return ok;
+      }
+    }
+    return {};
+  }
+
+  Result<void> addInstance(const Instance& instance) {
+    triangles_ += context_.scene.primitives[instance.primitive].indices.size() / 3;
+    if (triangles_ > context_.limits.max_triangles) {
+      return context_.tooLarge(pointer_, "more than " + std::to_string(context_.limits.max_triangles) + " triangles");
+    }
+    if (context_.scene.instances.size() >= context_.limits.max_nodes) {
+      return context_.tooLarge(pointer_, "more than " + std::to_string(context_.limits.max_nodes) + " instances");
+    }
+    context_.scene.instances.push_back(instance);
+    return {};
+  }
+
+  Result<void> placeCamera(std::size_t index, const glm::dmat4& world) {
+    const auto& source = context_.model.cameras[index];
+    const auto pointer = "/cameras/" + std::to_string(index);
+    if (source.type != "perspective") {
+      context_.warn(pointer, "only perspective cameras are used; skipped");
+      return {};
+    }
+    if (!(source.perspective.yfov > 0 && source.perspective.yfov < std::numbers::pi)) {
+      return context_.bad(pointer + "/perspective/yfov", "must be between 0 and pi");
+    }
+    if (!(source.perspective.znear > 0)) return context_.bad(pointer + "/perspective/znear", "must be above 0");
+    Camera camera;
+    camera.name = source.name;
+    camera.world = world;
+    camera.yfov_rad = source.perspective.yfov;
+    camera.aspect = source.perspective.aspectRatio;
+    camera.znear = source.perspective.znear;
+    context_.scene.cameras.push_back(std::move(camera));
+    return {};
+  }
+
+  Result<void> placeLight(std::size_t index, const glm::dmat4& world) {
+    const auto& source = context_.model.lights[index];
+    const auto pointer = "/extensions/KHR_lights_punctual/lights/" + std::to_string(index);
+    PunctualLight light;
+    if (source.type == "spot") {
+      light.kind = LightKind::kSpot;
+    } else if (source.type == "directional") {
+      light.kind = LightKind::kDirectional;
+    } else if (source.type != "point") {
+      return context_.bad(pointer + "/type", "must be point, spot or directional");
+    }
+    light.position = glm::dvec3(world[3]);
+    const auto axis = -glm::dvec3(world[2]);
+    if (glm::length(axis) > 0) light.direction = glm::normalize(axis);
+    const auto color = source.color.empty() ? std::vector<double>{1, 1, 1} : source.color;
+    for (int c = 0; c < 3; ++c) {
+      light.intensity[c] = static_cast<float>(color[static_cast<std::size_t>(c)] * source.intensity);
+      if (!std::isfinite(light.intensity[c])) return context_.bad(pointer + "/intensity", "is too bright to hold");
+    }
+    light.range = source.range;
+    light.inner_cone_rad = source.spot.innerConeAngle;
+    light.outer_cone_rad = source.spot.outerConeAngle;
+    const bool cone =
+        light.inner_cone_rad < light.outer_cone_rad && light.outer_cone_rad <= std::numbers::pi / 2 + 1e-6;
+    if (light.kind == LightKind::kSpot && !cone) {
+      return context_.bad(pointer + "/spot", "needs innerConeAngle < outerConeAngle <= pi/2");
+    }
+    context_.scene.lights.push_back(light);
+    return {};
+  }
+
+  ImportContext& context_;
+  MeshImporter meshes_;
+  std::vector<Place> stack_;
+  std::string pointer_;
+  std::size_t triangles_ = 0;
+};
+
+}  // namespace
+
+Result<Scene> importScene(const Document& document, const ImportLimits& limits) {
+  Scene scene;
+  if (auto ok = checkSchema(document.gltf, document.name, scene.warnings); !ok) return tl::unexpected(ok.error());
+  if (auto ok = checkExtensions(document.gltf, document.name, scene.warnings); !ok) return tl::unexpected(ok.error());
+  const auto model = parseModel(document);
+  if (!model) return tl::unexpected(model.error());
+  ImportContext context{document, limits, *model, scene};
+  if (auto ok = checkModel(context); !ok) return tl::unexpected(ok.error());
+  if (auto ok = importMaterials(context); !ok) return tl::unexpected(ok.error());
+  if (auto ok = NodeWalk(context).run(); !ok) return tl::unexpected(ok.error());
+  if (document.gltf.contains("animations")) context.warn("/animations", "are ignored; the scene is lit at rest");
+  return scene;
+}
+
+}  // namespace radiosity::scene

@@ -1,0 +1,29 @@
+// Text to JSON, bounded before parsing: the parser of Debian 12 recurses, so depth and size are checked by a linear
+// scan. Pure functions; any thread.
+#pragma once
+
+#include <cstddef>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+
+#include "common/result.h"
+
+namespace radiosity::scene {
+
+using Json = nlohmann::json;
+
+/// `text` as JSON. Refuses nesting over `max_depth`, more than 2^24 values, and what is not RFC 8259; the error's
+/// `where` is "name: line L, column C".
+[[nodiscard]] Result<Json> parseJson(std::string_view text, const std::string& name, std::size_t max_depth);
+
+/// Levels of nesting of a value that is already parsed; walks with a stack of its own.
+[[nodiscard]] std::size_t jsonDepth(const Json& value);
+
+/// RFC 6901 escaping of one token: ~ -> ~0, / -> ~1.
+[[nodiscard]] std::string escapeToken(std::string_view token);
+
+/// "room.glb: /accessors/4".
+[[nodiscard]] std::string place(const std::string& name, std::string_view pointer);
+
+}  // namespace radiosity::scene
