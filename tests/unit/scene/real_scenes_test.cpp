@@ -1,0 +1,73 @@
+// Scenes that others made, where the shared folder has them.
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+
+#include "server/scene/document.h"
+#include "server/scene/lightmap.h"
+#include "tests/unit/scene/shapes.h"
+
+namespace radiosity::scene::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<fs::path> sharedScenes() {
+  const char* folder = std::getenv("RADIOSITY_SHARED_DIR");
+  const fs::path root = fs::path(folder != nullptr ? folder : RADIOSITY_SHARED_DIR) / "scenes";
+  std::vector<fs::path> files;
+  if (!fs::exists(root)) return files;
+  for (const auto& entry : fs::recursive_directory_iterator(root))
+    if (entry.path().extension() == ".glb" || entry.path().extension() == ".gltf") files.push_back(entry.path());
+  std::ranges::sort(files);
+  return files;
+}
+
+void expectUsable(const Scene& scene, const PatchScene& patches) {
+  const double area = triangleArea(scene);
+  const double front = leafArea(patches);
+  EXPECT_LE(front, area * 1.0001);
+  EXPECT_GE(front, area * 0.5) << "more than half of the scene is buried";
+  for (const float a : patches.node_area) ASSERT_TRUE(std::isfinite(a) && a >= 0.0F);
+  for (const Surface& s : patches.surfaces) {
+    ASSERT_LE(s.page_x + s.width, patches.pages[s.page].width);
+    ASSERT_LE(s.page_y + s.height, patches.pages[s.page].height);
+  }
+  const PatchMaterials materials = shadePatches(scene, patches);
+  for (const glm::vec3& rho : materials.reflectance)
+    for (int c = 0; c < 3; ++c) ASSERT_TRUE(rho[c] >= 0.0F && rho[c] <= 0.999F);
+  for (const glm::vec3& e : materials.emission)
+    for (int c = 0; c < 3; ++c) ASSERT_TRUE(e[c] >= 0.0F && std::isfinite(e[c]));
+  const auto pages = assemblePages(patches, std::vector<glm::vec3>(patches.nodeCount(), glm::vec3(1.0F)));
+  for (const LightmapPage& page : pages)
+    for (std::size_t i = 0; i < page.coverage.size(); ++i)
+      if (page.coverage[i] > 0.0F) {
+        ASSERT_NEAR(page.irradiance.pixels[i].x, 1.0F, 1e-4F);
+      }
+}
+
+TEST(RealScenes, BecomePatchesThatAddUp) {
+  const auto files = sharedScenes();
+  if (files.empty()) GTEST_SKIP() << "no shared scenes here (set RADIOSITY_SHARED_DIR)";
+  for (const fs::path& file : files) {
+    const auto document = loadDocument(file);
+    if (!document) continue;  // the importer's own tests judge that
+    const auto scene = importScene(*document);
+    if (!scene) continue;
+    SCOPED_TRACE(file.filename().string());
+    const auto patches = buildPatchScene(*scene, {});
+    ASSERT_TRUE(patches) << patches.error().text();
+    if (patches->triangles.empty()) continue;
+    std::printf("%-36s %7zu triangles %6zu charts %7zu leaves %5.1f %% buried, %zu seams, page %ux%u\n",
+                file.filename().c_str(), patches->triangles.size(), patches->surfaces.size(), coveredLeaves(*patches),
+                100.0 * (1.0 - leafArea(*patches) / triangleArea(*scene)), patches->seams.size(),
+                patches->pages[0].width, patches->pages[0].height);
+    for (const auto& warning : patches->warnings) std::printf("    %s\n", warning.c_str());
+    expectUsable(*scene, *patches);
+  }
+}
+
+}  // namespace
+}  // namespace radiosity::scene::test
