@@ -15,6 +15,7 @@ struct Vertex {
   glm::vec3 normal;
   glm::vec2 texel;
   std::array<std::uint32_t, 4> nodes;  // front, back, level table, triangle
+  std::uint32_t surface;
 };
 
 struct LevelEntry {
@@ -57,7 +58,8 @@ Result<GpuScene> GpuScene::upload(const EglContext& context, std::shared_ptr<con
     vertices[i] = {{from.position, surface.texel_area},
                    from.normal,
                    from.texel,
-                   {side(surface.first_node[0]), side(surface.first_node[1]), table[from.surface], 0}};
+                   {side(surface.first_node[0]), side(surface.first_node[1]), table[from.surface], 0},
+                   from.surface};
   }
   // Corners are shared only within a plane, so any triangle of a vertex stands for the plane in an item buffer.
   for (std::size_t i = 0; i < scene.indices.size(); ++i) {
@@ -84,6 +86,9 @@ Result<GpuScene> GpuScene::upload(const EglContext& context, std::shared_ptr<con
   glEnableVertexArrayAttrib(array, RAD_ATTRIBUTE_NODES);
   glVertexArrayAttribIFormat(array, RAD_ATTRIBUTE_NODES, 4, GL_UNSIGNED_INT, offsetof(Vertex, nodes));
   glVertexArrayAttribBinding(array, RAD_ATTRIBUTE_NODES, 0);
+  glEnableVertexArrayAttrib(array, RAD_ATTRIBUTE_SURFACE);
+  glVertexArrayAttribIFormat(array, RAD_ATTRIBUTE_SURFACE, 1, GL_UNSIGNED_INT, offsetof(Vertex, surface));
+  glVertexArrayAttribBinding(array, RAD_ATTRIBUTE_SURFACE, 0);
   glEnableVertexArrayAttrib(array, RAD_ATTRIBUTE_VIEW);
   glVertexArrayAttribIFormat(array, RAD_ATTRIBUTE_VIEW, 1, GL_UNSIGNED_INT, 0);
   glVertexArrayAttribBinding(array, RAD_ATTRIBUTE_VIEW, 1);

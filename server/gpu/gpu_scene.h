@@ -19,6 +19,7 @@ class GpuScene {
   [[nodiscard]] std::uint32_t escapedId() const { return static_cast<std::uint32_t>(patches_->nodeCount()); }
   [[nodiscard]] std::uint32_t absorbedId() const { return escapedId() + 1; }
   [[nodiscard]] const scene::PatchScene& patches() const { return *patches_; }
+  [[nodiscard]] const std::shared_ptr<const scene::PatchScene>& sharedPatches() const { return patches_; }
   [[nodiscard]] GLuint vertexArray() const { return vertex_array_.name(); }
   /// Instance attribute of draw i reads view i; there are at least `views` of them after this.
   void reserveViews(std::size_t views);

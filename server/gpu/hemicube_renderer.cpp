@@ -21,9 +21,12 @@ Result<HemicubeRenderer> HemicubeRenderer::create(const EglContext& context) {
   HemicubeRenderer renderer(context);
   auto nodes = buildProgram(context, "hemicube.vert", "hemicube_nodes.frag", {"SCATTER"});
   if (!nodes) return tl::unexpected(nodes.error());
+  auto paper = buildProgram(context, "hemicube.vert", "hemicube_paper.frag", {"PAPER"});
+  if (!paper) return tl::unexpected(paper.error());
   auto items = buildProgram(context, "hemicube.vert", "hemicube_items.frag");
   if (!items) return tl::unexpected(items.error());
   renderer.nodes_program_ = std::move(*nodes);
+  renderer.paper_program_ = std::move(*paper);
   renderer.items_program_ = std::move(*items);
   renderer.views_buffer_ = Buffer(context, "hemicube views");
   renderer.indices_buffer_ = Buffer(context, "visible triangles");
@@ -34,6 +37,28 @@ Result<HemicubeRenderer> HemicubeRenderer::create(const EglContext& context) {
 void HemicubeRenderer::setScene(GpuScene scene) {
   culler_ = TriangleCuller(scene.patches());
   scene_ = std::move(scene);
+  paper_ids_.reset();
+}
+
+Result<void> HemicubeRenderer::preparePaper() {
+  if (paper_ids_) return {};
+  auto ids = PaperIds::create(scene_->sharedPatches());
+  if (!ids) return tl::unexpected(ids.error());
+  paper_texture_ = Texture(*context_, "patch ids", GL_TEXTURE_2D);
+  const auto name = paper_texture_.name();
+  glTextureStorage2D(name, static_cast<GLsizei>(ids->levels()), GL_R32UI, static_cast<GLsizei>(ids->size()),
+                     static_cast<GLsizei>(ids->size()));
+  for (std::uint32_t level = 0; level < ids->levels(); ++level) {
+    const auto width = static_cast<GLsizei>(ids->size() >> level);
+    glTextureSubImage2D(name, static_cast<GLint>(level), 0, 0, width, width, GL_RED_INTEGER, GL_UNSIGNED_INT,
+                        ids->level(level).data());
+  }
+  glTextureParameteri(name, GL_TEXTURE_MIN_FILTER, GL_NEAREST_MIPMAP_NEAREST);
+  glTextureParameteri(name, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+  glTextureParameteri(name, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+  glTextureParameteri(name, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+  paper_ids_ = std::move(*ids);
+  return {};
 }
 
 std::size_t HemicubeRenderer::capacity(std::uint32_t resolution) const {
@@ -96,21 +121,33 @@ void HemicubeRenderer::setState(HemicubePass pass, std::uint32_t resolution, con
   glDepthFunc(GL_GREATER);
   glDepthMask(GL_TRUE);
   glBindFramebuffer(GL_FRAMEBUFFER, target.framebuffer.name());
-  glUseProgram((pass == HemicubePass::kNodes ? nodes_program_ : items_program_).name());
-  if (pass == HemicubePass::kNodes) {
-    glProgramUniform1ui(nodes_program_.name(), RAD_UNIFORM_ABSORBED_ID, scene_->absorbedId());
-    scene_->bindLevels();
-  }
+  useProgram(pass);
   glBindVertexArray(scene_->vertexArray());
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, RAD_BINDING_VIEWS, views_buffer_.name());
   glVertexArrayElementBuffer(scene_->vertexArray(), indices_buffer_.name());
   glBindBuffer(GL_DRAW_INDIRECT_BUFFER, commands_buffer_.name());
 }
 
+void HemicubeRenderer::useProgram(HemicubePass pass) const {
+  if (pass == HemicubePass::kNodes) {
+    glUseProgram(nodes_program_.name());
+    glProgramUniform1ui(nodes_program_.name(), RAD_UNIFORM_ABSORBED_ID, scene_->absorbedId());
+    scene_->bindLevels();
+  } else if (pass == HemicubePass::kPaper) {
+    glUseProgram(paper_program_.name());
+    glProgramUniform1ui(paper_program_.name(), RAD_UNIFORM_PATCH_BITS, paper_ids_->patchBits());
+    glProgramUniform1f(paper_program_.name(), RAD_UNIFORM_TEXEL_TO_UV, 1.0F / static_cast<float>(paper_ids_->size()));
+    glBindTextureUnit(0, paper_texture_.name());
+  } else {
+    glUseProgram(items_program_.name());
+  }
+}
+
 std::span<const std::uint32_t> HemicubeRenderer::render(HemicubePass pass, std::uint32_t resolution,
                                                         std::span<const HemicubeView> views,
                                                         solver::TransportCounters& counters) {
   RAD_CHECK(scene_.has_value());
+  RAD_CHECK(pass != HemicubePass::kPaper || paper_ids_.has_value());
   RAD_CHECK_LE(views.size(), capacity(resolution));
   const auto start = std::chrono::steady_clock::now();
   context_->makeCurrent();
@@ -134,6 +171,7 @@ std::span<const std::uint32_t> HemicubeRenderer::render(HemicubePass pass, std::
   glGetTextureSubImage(into.ids.name(), 0, 0, 0, 0, static_cast<GLsizei>(resolution),
                        static_cast<GLsizei>(3 * resolution), static_cast<GLsizei>(views.size()), GL_RED_INTEGER,
                        GL_UNSIGNED_INT, static_cast<GLsizei>(pixels_.size() * sizeof(std::uint32_t)), pixels_.data());
+  if (pass == HemicubePass::kPaper) paper_ids_->decode(pixels_, scene_->escapedId());
   counters.pixels += pixels_.size();
   counters.render_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return pixels_;

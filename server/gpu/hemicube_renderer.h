@@ -12,6 +12,7 @@
 
 #include "server/gpu/gl_objects.h"
 #include "server/gpu/gpu_scene.h"
+#include "server/gpu/paper_ids.h"
 #include "server/gpu/triangle_culler.h"
 #include "server/solver/transport.h"
 
@@ -25,6 +26,7 @@ struct HemicubeView {
 /// What the pixels hold.
 enum class HemicubePass {
   kNodes,  ///< patch nodes, level by formula; GpuScene::escapedId where nothing is seen
+  kPaper,  ///< the same, level by the hardware's mipmapping (Lum, Ma and Max 2002)
   kItems,  ///< a triangle of the plane seen; RAD_ITEM_NONE where nothing is seen
 };
 
@@ -33,6 +35,8 @@ class HemicubeRenderer {
   [[nodiscard]] static Result<HemicubeRenderer> create(const EglContext& context);
 
   void setScene(GpuScene scene);
+  /// Makes the ID texture, once a scene; must come before HemicubePass::kPaper.
+  [[nodiscard]] Result<void> preparePaper();
   [[nodiscard]] const GpuScene& scene() const { return *scene_; }
 
   /// How many views one render() may take at this resolution.
@@ -56,12 +60,15 @@ class HemicubeRenderer {
   explicit HemicubeRenderer(const EglContext& context) : context_(&context) {}
   Target& target(std::uint32_t resolution);
   void collect(std::uint32_t resolution, std::span<const HemicubeView> views, solver::TransportCounters& counters);
+  void useProgram(HemicubePass pass) const;
   void setState(HemicubePass pass, std::uint32_t resolution, const Target& target);
 
   const EglContext* context_;
   std::optional<GpuScene> scene_;
   TriangleCuller culler_;
-  Program nodes_program_, items_program_;
+  Program nodes_program_, paper_program_, items_program_;
+  std::optional<PaperIds> paper_ids_;
+  Texture paper_texture_;
   Buffer views_buffer_, indices_buffer_, commands_buffer_;
   std::map<std::uint32_t, Target> targets_;  ///< by resolution
   std::vector<FaceView> face_views_;

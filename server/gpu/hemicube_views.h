@@ -45,10 +45,10 @@ struct FaceView {
     return FaceView{{right + shift_x * depth, footprint},
                     {2.0F * n + shift_side * depth, static_cast<float>(face)},
                     {depth, static_cast<float>(layer)},
-                    {origin, 0.0F}};
+                    {origin, level_bias}};
   };
   const FaceView top{
-      {t + shift_x * n, footprint}, {b + shift_top * n, 0.0F}, {n, static_cast<float>(layer)}, {origin, 0.0F}};
+      {t + shift_x * n, footprint}, {b + shift_top * n, 0.0F}, {n, static_cast<float>(layer)}, {origin, level_bias}};
   return {top, side(1, b, t), side(2, b, -t), side(3, t, b), side(4, t, -b)};
 }
 

@@ -15,7 +15,7 @@
 #define RAD_LEVEL_MASK 31u
 #define RAD_ABSORBING_LEVELS 1u
 
-// Item buffer: a pixel that shows nothing.
+// Item buffer and composed ids: a pixel that shows nothing.
 #define RAD_ITEM_NONE 0xFFFFFFFFu
 
 // Vertex attributes.
@@ -24,6 +24,7 @@
 #define RAD_ATTRIBUTE_TEXEL 2
 #define RAD_ATTRIBUTE_NODES 3
 #define RAD_ATTRIBUTE_VIEW 4
+#define RAD_ATTRIBUTE_SURFACE 5
 
 // Shader storage bindings.
 #define RAD_BINDING_VIEWS 0
@@ -31,5 +32,7 @@
 
 // Uniform locations.
 #define RAD_UNIFORM_ABSORBED_ID 0
+#define RAD_UNIFORM_PATCH_BITS 1
+#define RAD_UNIFORM_TEXEL_TO_UV 2
 
 #endif

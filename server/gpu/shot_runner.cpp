@@ -63,6 +63,9 @@ Result<void> ShotRunner::setScene(std::shared_ptr<const scene::PatchScene> patch
 Result<solver::TransportCounters> ShotRunner::run(const ShotSpan& shots, const FluxSink& sink) {
   if (!has_scene_) return fail(ErrorCode::kInternal, "setScene must come before run");
   if (const auto good = checkShots(shots); !good) return tl::unexpected(good.error());
+  if (shots.mode == solver::LinkMode::kPaperMipmap) {
+    if (auto prepared = renderer_.preparePaper(); !prepared) return tl::unexpected(prepared.error());
+  }
   solver::TransportCounters counters;
   scatter(shots, sink, counters);
   for (const auto& shot : shots.gather) {
@@ -73,6 +76,7 @@ Result<solver::TransportCounters> ShotRunner::run(const ShotSpan& shots, const F
 }
 
 void ShotRunner::scatter(const ShotSpan& shots, const FluxSink& sink, solver::TransportCounters& counters) {
+  const auto pass = shots.mode == solver::LinkMode::kPaperMipmap ? HemicubePass::kPaper : HemicubePass::kNodes;
   std::vector<HemicubeView> views;
   for (std::size_t first = 0; first < shots.scatter.size();) {
     // Neighbours of equal resolution share an atlas.
@@ -84,7 +88,7 @@ void ShotRunner::scatter(const ShotSpan& shots, const FluxSink& sink, solver::Tr
          ++last) {
       views.push_back({shots.scatter[last].frame, shots.scatter[last].level_bias});
     }
-    const auto images = renderer_.render(HemicubePass::kNodes, resolution, views, counters);
+    const auto images = renderer_.render(pass, resolution, views, counters);
     const auto start = std::chrono::steady_clock::now();
     const auto pixels = hemicubePixels(resolution);
     for (auto i = first; i < last; ++i) {

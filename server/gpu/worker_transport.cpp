@@ -14,6 +14,7 @@
 #include "common/log.h"
 #include "server/gpu/batch_chunks.h"
 #include "server/gpu/gpu_transport.h"
+#include "server/gpu/paper_ids.h"
 #include "server/gpu/worker_process.h"
 
 namespace radiosity::gpu {
@@ -56,6 +57,9 @@ class WorkerTransport final : public solver::Transport {
     packed_ = std::move(*packed);
     nodes_ = patches->nodeCount();
     triangles_ = patches->triangles.size();
+    const auto paper = PaperIds::fits(*patches);
+    paper_fits_ = paper.has_value();
+    if (!paper) paper_error_ = paper.error();
     has_scene_ = true;
     deaths_ = 0;
     // All upload at the same time.
@@ -77,6 +81,7 @@ class WorkerTransport final : public solver::Transport {
     if (!has_scene_) return fail(ErrorCode::kInternal, "setScene must come before run");
     const ShotSpan shots{batch.mode, batch.flux_scale, batch.scatter, batch.gather, batch.points};
     if (auto good = checkShots(shots); !good) return tl::unexpected(good.error());
+    if (batch.mode == solver::LinkMode::kPaperMipmap && !paper_fits_) return tl::unexpected(paper_error_);
     deaths_ = 0;
     chunks_ = cutBatch(batch, triangles_, slots_.size());
     queue_.clear();
@@ -206,6 +211,8 @@ class WorkerTransport final : public solver::Transport {
   SharedMemory packed_;
   std::size_t nodes_ = 0, triangles_ = 0;
   bool has_scene_ = false;
+  bool paper_fits_ = true;  ///< whether the scene can be lit in paper mode, and why not
+  Error paper_error_;
   std::vector<Chunk> chunks_;
   std::deque<std::size_t> queue_;
   int deaths_ = 0;

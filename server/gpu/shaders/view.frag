@@ -1,0 +1,54 @@
+// One quantity of the lit scene, linear (ViewQuantity in view_renderer.h, same order).
+in vec3 view_normal;
+in vec3 albedo_factor;
+in vec4 texture_uv;
+in vec2 page_uv;
+flat in vec3 emission_factor;
+layout(location = 0) out vec4 shade;
+
+layout(binding = 0) uniform sampler2D base_color;
+layout(binding = 1) uniform sampler2D emissive;
+layout(binding = 2) uniform sampler2D page;
+layout(location = 1) uniform int quantity;
+layout(location = 2) uniform float alpha_cutoff;  // negative: no test
+layout(location = 3) uniform float base_alpha;
+layout(location = 4) uniform float data_scale;    // brings the data of kError and kMipLevel to 0..1
+
+const float kPi = 3.14159265358979;
+
+// Blue, cyan, green, yellow, red over 0..1.
+vec3 falseColor(float t) {
+  t = clamp(t, 0.0, 1.0) * 4.0;
+  return clamp(vec3(t - 2.0, t < 3.0 ? t : 4.0 - t, 2.0 - t), 0.0, 1.0);
+}
+
+vec3 hashColor(uint id) {
+  id = (id ^ 61u) ^ (id >> 16);
+  id *= 9u;
+  id ^= id >> 4;
+  id *= 0x27d4eb2du;
+  id ^= id >> 15;
+  return vec3(id & 255u, id >> 8 & 255u, id >> 16 & 255u) / 255.0;
+}
+
+void main() {
+  vec4 base = texture(base_color, texture_uv.xy);
+  if (base.a * base_alpha < alpha_cutoff) discard;
+  vec3 albedo = min(base.rgb * albedo_factor, vec3(0.999));
+  vec3 emission = texture(emissive, texture_uv.zw).rgb * emission_factor;
+  vec3 irradiance = max(texture(page, page_uv).rgb, vec3(0.0));
+  vec3 result = irradiance;
+  if (quantity == 0) {
+    result = albedo * irradiance / kPi + emission;
+  } else if (quantity == 2) {
+    result = albedo * irradiance + kPi * emission;
+  } else if (quantity == 3 || quantity == 5) {
+    result = falseColor(dot(irradiance, vec3(1.0 / 3.0)) * data_scale);
+  } else if (quantity == 4) {
+    ivec2 texel = ivec2(page_uv * vec2(textureSize(page, 0)));
+    result = hashColor(uint(texel.y) * 65536u + uint(texel.x));
+  } else if (quantity == 6) {
+    result = normalize(gl_FrontFacing ? view_normal : -view_normal) * 0.5 + 0.5;
+  }
+  shade = vec4(result, 1.0);
+}

@@ -1,0 +1,41 @@
+// The scene as one list of vertices for pictures: instances flattened, each triangle with its lightmap coordinates.
+// Pure functions of values.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+#include <vector>
+
+#include "server/scene/patch_scene.h"
+#include "server/scene/scene.h"
+
+namespace radiosity::gpu {
+
+/// As view.vert reads it.
+struct ViewVertex {
+  glm::vec3 position;  ///< metres, relative to the camera
+  glm::vec3 normal;
+  glm::vec4 color;
+  glm::vec4 uv;
+  glm::vec2 lightmap_uv;
+  glm::vec3 emission;
+};
+
+/// Consecutive vertices with one material and one page.
+struct ViewDraw {
+  std::uint32_t material = 0, page = scene::kNone;
+  std::uint32_t first = 0, count = 0;
+};
+
+struct ViewGeometry {
+  std::vector<ViewVertex> vertices;
+  std::vector<ViewDraw> draws;
+};
+
+/// `eye`: subtracted in double, so that scenes far from the origin keep their precision.
+[[nodiscard]] ViewGeometry makeViewGeometry(const scene::Scene& scene, const scene::PatchScene& patches,
+                                            const glm::dvec3& eye);
+
+}  // namespace radiosity::gpu

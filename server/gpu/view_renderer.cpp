@@ -1,0 +1,243 @@
+#include "server/gpu/view_renderer.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/gtc/matrix_inverse.hpp>
+#include <glm/gtc/type_ptr.hpp>
+#include <map>
+
+#include "common/check.h"
+#include "server/gpu/gl_objects.h"
+#include "server/gpu/view_geometry.h"
+
+namespace radiosity::gpu {
+namespace {
+
+constexpr int kMaxPicture = 8192;  ///< pixels a side
+constexpr int kSamples = 4;
+
+// Locations in view.vert and view.frag.
+enum Uniform : GLint { kClipFromView = 0, kQuantity = 1, kAlphaCutoff = 2, kBaseAlpha = 3, kDataScale = 4 };
+
+/// Infinite, reversed depth: 1 at the near plane, 0 far away.
+glm::mat4 projection(const scene::Camera& camera, int width, int height) {
+  const double aspect = static_cast<double>(width) / height;
+  double half_height = std::tan(camera.yfov_rad / 2.0);
+  // A picture narrower than the camera's own view keeps the view's width.
+  if (camera.aspect > 0.0 && aspect < camera.aspect) half_height *= camera.aspect / aspect;
+  glm::mat4 matrix(0.0F);
+  matrix[0][0] = static_cast<float>(1.0 / (half_height * aspect));
+  matrix[1][1] = static_cast<float>(1.0 / half_height);
+  matrix[2][3] = -1.0F;
+  matrix[3][2] = static_cast<float>(std::max(camera.znear, 1.0e-6));
+  return matrix;
+}
+
+class GlViewRenderer final : public ViewRenderer {
+ public:
+  static Result<std::unique_ptr<ViewRenderer>> create() {
+    auto context = EglContext::create();
+    if (!context) return tl::unexpected(context.error());
+    auto program = buildProgram(**context, "view.vert", "view.frag");
+    if (!program) return tl::unexpected(program.error());
+    return std::unique_ptr<ViewRenderer>(new GlViewRenderer(std::move(*context), std::move(*program)));
+  }
+
+  Result<Image> render(const scene::Scene& scene, const scene::PatchScene& patches, std::span<const Image> pages,
+                       const ViewRequest& request) override {
+    if (request.width < 1 || request.height < 1 || request.width > kMaxPicture || request.height > kMaxPicture) {
+      return fail(ErrorCode::kBadUsage, "a picture is 1 to 8192 pixels wide and high");
+    }
+    context_->makeCurrent();
+    const auto target = makeTarget(request.width, request.height);
+    const auto geometry = makeViewGeometry(scene, patches, glm::dvec3(request.camera.world[3]));
+    setState(request, target);
+    draw(scene, pages, request, geometry);
+    return read(request, target);
+  }
+
+ private:
+  struct Target {
+    Texture color, depth, resolved;
+    Framebuffer framebuffer, resolve;
+  };
+
+  GlViewRenderer(std::unique_ptr<EglContext> context, Program program)
+      : context_(std::move(context)),
+        program_(std::move(program)),
+        vertices_(*context_, "view vertices"),
+        vertex_array_(*context_, "view"),
+        white_(*context_, "white", GL_TEXTURE_2D) {
+    const auto array = vertex_array_.name();
+    glVertexArrayVertexBuffer(array, 0, vertices_.name(), 0, sizeof(ViewVertex));
+    const auto attribute = [&](GLuint index, GLint size, std::size_t offset) {
+      glEnableVertexArrayAttrib(array, index);
+      glVertexArrayAttribFormat(array, index, size, GL_FLOAT, GL_FALSE, static_cast<GLuint>(offset));
+      glVertexArrayAttribBinding(array, index, 0);
+    };
+    attribute(0, 3, offsetof(ViewVertex, position));
+    attribute(1, 3, offsetof(ViewVertex, normal));
+    attribute(2, 4, offsetof(ViewVertex, color));
+    attribute(3, 4, offsetof(ViewVertex, uv));
+    attribute(4, 2, offsetof(ViewVertex, lightmap_uv));
+    attribute(5, 3, offsetof(ViewVertex, emission));
+    const std::array<float, 4> one{1.0F, 1.0F, 1.0F, 1.0F};
+    glTextureStorage2D(white_.name(), 1, GL_RGBA8, 1, 1);
+    glTextureSubImage2D(white_.name(), 0, 0, 0, 1, 1, GL_RGBA, GL_FLOAT, one.data());
+  }
+
+  Target makeTarget(int width, int height) {
+    Target target{Texture(*context_, "picture", GL_TEXTURE_2D_MULTISAMPLE),
+                  Texture(*context_, "picture depth", GL_TEXTURE_2D_MULTISAMPLE),
+                  Texture(*context_, "picture resolved", GL_TEXTURE_2D), Framebuffer(*context_, "picture"),
+                  Framebuffer(*context_, "picture resolved")};
+    glTextureStorage2DMultisample(target.color.name(), kSamples, GL_RGBA32F, width, height, GL_TRUE);
+    glTextureStorage2DMultisample(target.depth.name(), kSamples, GL_DEPTH_COMPONENT32F, width, height, GL_TRUE);
+    glTextureStorage2D(target.resolved.name(), 1, GL_RGBA32F, width, height);
+    glNamedFramebufferTexture(target.framebuffer.name(), GL_COLOR_ATTACHMENT0, target.color.name(), 0);
+    glNamedFramebufferTexture(target.framebuffer.name(), GL_DEPTH_ATTACHMENT, target.depth.name(), 0);
+    glNamedFramebufferTexture(target.resolve.name(), GL_COLOR_ATTACHMENT0, target.resolved.name(), 0);
+    return target;
+  }
+
+  void setState(const ViewRequest& request, const Target& target) const {
+    glViewport(0, 0, request.width, request.height);
+    glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
+    glEnable(GL_DEPTH_TEST);
+    glDepthFunc(GL_GREATER);
+    glEnable(GL_MULTISAMPLE);
+    glCullFace(GL_BACK);
+    glBindFramebuffer(GL_FRAMEBUFFER, target.framebuffer.name());
+    const std::array<float, 4> black{};
+    const float far_depth = 0.0F;
+    glClearNamedFramebufferfv(target.framebuffer.name(), GL_COLOR, 0, black.data());
+    glClearNamedFramebufferfv(target.framebuffer.name(), GL_DEPTH, 0, &far_depth);
+    glUseProgram(program_.name());
+    glBindVertexArray(vertex_array_.name());
+    // The eye is the origin of the vertices, so only the rotation is left of the camera's placement.
+    const auto rotation = glm::mat4(glm::transpose(glm::mat3(request.camera.world)));
+    const auto clip = projection(request.camera, request.width, request.height) * rotation;
+    glProgramUniformMatrix4fv(program_.name(), kClipFromView, 1, GL_FALSE, glm::value_ptr(clip));
+    glProgramUniform1i(program_.name(), kQuantity, static_cast<GLint>(request.quantity));
+  }
+
+  void draw(const scene::Scene& scene, std::span<const Image> pages, const ViewRequest& request,
+            const ViewGeometry& geometry) {
+    fill(vertices_, std::span<const ViewVertex>(geometry.vertices), GL_STREAM_DRAW);
+    const auto lightmaps = uploadPages(pages);
+    glProgramUniform1f(program_.name(), kDataScale, dataScale(pages, request.quantity));
+    std::map<std::uint32_t, Texture> textures;
+    for (const auto& draw : geometry.draws) {
+      const auto& material = scene.materials[draw.material];
+      if (material.double_sided) {
+        glDisable(GL_CULL_FACE);
+      } else {
+        glEnable(GL_CULL_FACE);
+      }
+      bindTexture(0, scene, material.base_color_texture, textures);
+      bindTexture(1, scene, material.emissive_texture, textures);
+      glBindTextureUnit(2, draw.page < lightmaps.size() ? lightmaps[draw.page].name() : black());
+      const bool masked = material.alpha_mode == scene::AlphaMode::kMask;
+      glProgramUniform1f(program_.name(), kAlphaCutoff, masked ? material.alpha_cutoff : -1.0F);
+      glProgramUniform1f(program_.name(), kBaseAlpha, material.alpha);
+      glDrawArrays(GL_TRIANGLES, static_cast<GLint>(draw.first), static_cast<GLsizei>(draw.count));
+    }
+  }
+
+  /// False colours span the data's own range for errors, and 16 levels for mip levels.
+  static float dataScale(std::span<const Image> pages, ViewQuantity quantity) {
+    if (quantity == ViewQuantity::kMipLevel) return 1.0F / 16.0F;
+    float largest = 0.0F;
+    for (const auto& page : pages) {
+      for (const auto& texel : page.pixels) largest = std::max(largest, (texel.x + texel.y + texel.z) / 3.0F);
+    }
+    return largest > 0.0F ? 1.0F / largest : 0.0F;
+  }
+
+  std::vector<Texture> uploadPages(std::span<const Image> pages) const {
+    std::vector<Texture> textures;
+    for (const auto& page : pages) {
+      Texture texture(*context_, "lightmap", GL_TEXTURE_2D);
+      const auto name = texture.name();
+      glTextureStorage2D(name, 1, GL_RGB32F, std::max(page.width, 1), std::max(page.height, 1));
+      if (!page.pixels.empty()) {
+        glTextureSubImage2D(name, 0, 0, 0, page.width, page.height, GL_RGB, GL_FLOAT, page.pixels.data());
+      }
+      setSampling(name, GL_LINEAR, GL_CLAMP_TO_EDGE, GL_CLAMP_TO_EDGE);
+      textures.push_back(std::move(texture));
+    }
+    return textures;
+  }
+
+  void bindTexture(GLuint unit, const scene::Scene& scene, const scene::TextureUse& use,
+                   std::map<std::uint32_t, Texture>& textures) {
+    if (use.texture >= scene.textures.size() || scene.textures[use.texture].width < 1) {
+      glBindTextureUnit(unit, white_.name());
+      return;
+    }
+    auto found = textures.find(use.texture);
+    if (found == textures.end()) found = textures.emplace(use.texture, upload(scene.textures[use.texture])).first;
+    const auto wrap = [](bool repeat, bool mirror) {
+      if (mirror) return GL_MIRRORED_REPEAT;
+      return repeat ? GL_REPEAT : GL_CLAMP_TO_EDGE;
+    };
+    // One texture may be used with several wrappings, one draw at a time.
+    setSampling(found->second.name(), GL_LINEAR_MIPMAP_LINEAR, wrap(use.repeat_u, use.mirror_u),
+                wrap(use.repeat_v, use.mirror_v));
+    glBindTextureUnit(unit, found->second.name());
+  }
+
+  [[nodiscard]] Texture upload(const scene::Texture& from) const {
+    Texture texture(*context_, "material texture", GL_TEXTURE_2D);
+    const auto levels = 1 + static_cast<GLsizei>(std::log2(std::max(from.width, from.height)));
+    glTextureStorage2D(texture.name(), levels, from.srgb ? GL_SRGB8_ALPHA8 : GL_RGBA8, from.width, from.height);
+    glTextureSubImage2D(texture.name(), 0, 0, 0, from.width, from.height, GL_RGBA, GL_UNSIGNED_BYTE, from.rgba.data());
+    glGenerateTextureMipmap(texture.name());
+    return texture;
+  }
+
+  static void setSampling(GLuint texture, GLenum minify, GLenum wrap_u, GLenum wrap_v) {
+    glTextureParameteri(texture, GL_TEXTURE_MIN_FILTER, static_cast<GLint>(minify));
+    glTextureParameteri(texture, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+    glTextureParameteri(texture, GL_TEXTURE_WRAP_S, static_cast<GLint>(wrap_u));
+    glTextureParameteri(texture, GL_TEXTURE_WRAP_T, static_cast<GLint>(wrap_v));
+  }
+
+  /// A page that was not given is dark.
+  GLuint black() {
+    if (black_.name() == 0) {
+      black_ = Texture(*context_, "black", GL_TEXTURE_2D);
+      const std::array<float, 4> zero{};
+      glTextureStorage2D(black_.name(), 1, GL_RGBA8, 1, 1);
+      glTextureSubImage2D(black_.name(), 0, 0, 0, 1, 1, GL_RGBA, GL_FLOAT, zero.data());
+    }
+    return black_.name();
+  }
+
+  static Image read(const ViewRequest& request, const Target& target) {
+    const int w = request.width;
+    const int h = request.height;
+    glBlitNamedFramebuffer(target.framebuffer.name(), target.resolve.name(), 0, 0, w, h, 0, 0, w, h,
+                           GL_COLOR_BUFFER_BIT, GL_NEAREST);
+    Image flipped(w, h);
+    glPixelStorei(GL_PACK_ALIGNMENT, 4);
+    glGetTextureImage(target.resolved.name(), 0, GL_RGB, GL_FLOAT,
+                      static_cast<GLsizei>(flipped.pixels.size() * sizeof(glm::vec3)), flipped.pixels.data());
+    Image picture(w, h);  // GL's rows start at the bottom
+    for (int y = 0; y < h; ++y) std::copy_n(&flipped.at(0, h - 1 - y), w, &picture.at(0, y));
+    return picture;
+  }
+
+  std::unique_ptr<EglContext> context_;
+  Program program_;
+  Buffer vertices_;
+  VertexArray vertex_array_;
+  Texture white_, black_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<ViewRenderer>> makeViewRenderer() { return GlViewRenderer::create(); }
+
+}  // namespace radiosity::gpu

@@ -1,0 +1,162 @@
+// Pictures: radiance of a textured, emitting, lit square, half-texel exact lightmap look-ups, back faces.
+#include "server/gpu/view_renderer.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/gtc/matrix_transform.hpp>
+#include <numbers>
+
+namespace radiosity::gpu {
+namespace {
+
+constexpr float kPi = std::numbers::pi_v<float>;
+
+/// A unit square at z = 0 facing +z, seen squarely from z = 1, filling the picture. Page of 4 x 4 texels.
+struct SquareScene {
+  scene::Scene scene;
+  scene::PatchScene patches;
+  std::vector<Image> pages;
+  ViewRequest request;
+
+  SquareScene() {
+    scene::Material material;
+    material.base_color = {0.5F, 0.25F, 1.0F};
+    material.emission = {0.0F, 2.0F, 0.0F};
+    material.metallic = 0.5F;
+    scene.materials = {material};
+    scene::Primitive primitive;
+    primitive.positions = {{-0.5, -0.5, 0}, {0.5, -0.5, 0}, {0.5, 0.5, 0}, {-0.5, 0.5, 0}};
+    primitive.texcoord0 = {{0, 1}, {1, 1}, {1, 0}, {0, 0}};
+    primitive.indices = {0, 1, 2, 0, 2, 3};
+    scene.primitives = {primitive};
+    scene::Instance instance;
+    instance.primitive = 0;
+    scene.instances = {instance};
+    scene::PatchScene::InstanceUv uvs;
+    uvs.corners = {{glm::vec2(0, 0), {1, 0}, {1, 1}}, {glm::vec2(0, 0), {1, 1}, {0, 1}}};
+    uvs.page = {0, 0};
+    patches.instance_uvs = {uvs};
+    patches.pages = {{4, 4}};
+    pages = {Image(4, 4, glm::vec3(kPi))};
+    request.camera.yfov_rad = 2.0 * std::atan(0.5);
+    request.camera.world = glm::translate(glm::dmat4(1.0), glm::dvec3(0, 0, 1));
+    request.width = request.height = 32;
+  }
+};
+
+class View : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    auto made = makeViewRenderer();
+    if (!made) GTEST_SKIP() << made.error().text();
+    renderer_ = std::move(*made);
+  }
+  Image picture(const SquareScene& square) {
+    auto image = renderer_->render(square.scene, square.patches, square.pages, square.request);
+    EXPECT_TRUE(image.has_value()) << image.error().text();
+    return image ? *image : Image(1, 1);
+  }
+  static void expectNear(glm::vec3 actual, glm::vec3 expected, float tolerance = 1e-4F) {
+    for (int channel = 0; channel < 3; ++channel) EXPECT_NEAR(actual[channel], expected[channel], tolerance);
+  }
+  std::unique_ptr<ViewRenderer> renderer_;
+};
+
+TEST_F(View, LitIsAlbedoTimesIrradianceOverPiPlusEmission) {
+  const SquareScene square;
+  const auto image = picture(square);
+  for (const auto& pixel : image.pixels) expectNear(pixel, {0.25F, 2.125F, 0.5F});
+}
+
+TEST_F(View, QuantitiesAreWhatTheirNamesSay) {
+  SquareScene square;
+  square.request.quantity = ViewQuantity::kIrradiance;
+  expectNear(picture(square).at(5, 9), glm::vec3(kPi));
+  square.request.quantity = ViewQuantity::kRadiosity;
+  expectNear(picture(square).at(5, 9), kPi * glm::vec3(0.25F, 2.125F, 0.5F), 1e-3F);
+  square.request.quantity = ViewQuantity::kNormal;
+  expectNear(picture(square).at(5, 9), {0.5F, 0.5F, 1.0F}, 0.01F);
+}
+
+TEST_F(View, TheLightmapIsLookedUpBilinearlyAtTexelCentres) {
+  SquareScene square;
+  square.request.quantity = ViewQuantity::kIrradiance;
+  square.request.width = square.request.height = 4;  // a pixel's centre is a texel's centre
+  for (int y = 0; y < 4; ++y) {
+    for (int x = 0; x < 4; ++x) square.pages[0].at(x, y) = glm::vec3(x, y, 0);
+  }
+  const auto image = picture(square);
+  // v = 0 is row 0 of the page and lies at the square's lower edge here, the picture's last row
+  for (int y = 0; y < 4; ++y) {
+    for (int x = 0; x < 4; ++x) expectNear(image.at(x, 3 - y), glm::vec3(x, y, 0), 0.02F);
+  }
+}
+
+TEST_F(View, BackFacesOfSingleSidedSurfacesAreNotDrawn) {
+  SquareScene square;
+  square.request.camera.world =
+      glm::rotate(glm::dmat4(1.0), std::numbers::pi, glm::dvec3(0, 1, 0)) * square.request.camera.world;
+  expectNear(picture(square).at(16, 16), glm::vec3(0.0F));
+  square.scene.materials[0].double_sided = true;
+  expectNear(picture(square).at(16, 16), {0.25F, 2.125F, 0.5F});
+}
+
+TEST_F(View, AMirroredInstanceShowsItsFront) {
+  SquareScene square;
+  square.scene.instances[0].world = glm::scale(glm::dmat4(1.0), glm::dvec3(-1, 1, 1));
+  expectNear(picture(square).at(16, 16), {0.25F, 2.125F, 0.5F});
+}
+
+TEST_F(View, TexturesAreDecodedFromSrgb) {
+  SquareScene square;
+  scene::Texture texture;
+  texture.width = texture.height = 1;
+  texture.rgba = {188, 188, 188, 255};  // 0.5029 linear
+  square.scene.textures = {texture};
+  square.scene.materials[0].base_color_texture.texture = 0;
+  expectNear(picture(square).at(3, 3), {0.25F * 0.503F, 2.0F + 0.125F * 0.503F, 0.5F * 0.503F}, 2e-3F);
+}
+
+TEST_F(View, AnAlphaMaskCutsOut) {
+  SquareScene square;
+  scene::Texture texture;
+  texture.width = 2;
+  texture.height = 1;
+  texture.rgba = {255, 255, 255, 0, 255, 255, 255, 255};
+  square.scene.textures = {texture};
+  square.scene.materials[0].base_color_texture.texture = 0;
+  square.scene.materials[0].alpha_mode = scene::AlphaMode::kMask;
+  const auto image = picture(square);
+  expectNear(image.at(8, 16), glm::vec3(0.0F));
+  EXPECT_GT(image.at(24, 16).y, 2.0F);
+}
+
+TEST_F(View, EdgesAreAntialiased) {
+  SquareScene square;
+  square.request.camera.world =
+      glm::rotate(glm::dmat4(1.0), 0.3, glm::dvec3(0, 0, 1)) * glm::translate(glm::dmat4(1.0), glm::dvec3(0, 0, 1.7));
+  const auto image = picture(square);
+  const auto between =
+      std::count_if(image.pixels.begin(), image.pixels.end(), [](glm::vec3 p) { return p.y > 0.1F && p.y < 2.0F; });
+  EXPECT_GT(between, 20);
+}
+
+TEST_F(View, ASceneFarFromTheOriginKeepsItsEdges) {
+  SquareScene square;
+  const auto away = glm::translate(glm::dmat4(1.0), glm::dvec3(1e7, -3e7, 2e7));
+  const auto near_picture = picture(square);
+  square.scene.instances[0].world = away;
+  square.request.camera.world = away * square.request.camera.world;
+  EXPECT_EQ(picture(square).pixels, near_picture.pixels);
+}
+
+TEST_F(View, AnAbsurdSizeIsRefused) {
+  SquareScene square;
+  square.request.width = 100000;
+  EXPECT_FALSE(renderer_->render(square.scene, square.patches, square.pages, square.request).has_value());
+}
+
+}  // namespace
+}  // namespace radiosity::gpu
