@@ -1,0 +1,270 @@
+#include "server/net/calls.h"
+
+#include <fmt/format.h>
+#include <algorithm>
+#include <mutex>
+#include <utility>
+
+#include "server/net/access.h"
+#include "server/net/convert.h"
+
+namespace radiosity::net {
+
+using protocol::RpcCode;
+using protocol::RpcError;
+
+/// Collects the answers of one frame: a single one is sent as it comes, those of a batch together when all are there.
+class Calls::Answers {
+ public:
+  Answers(std::weak_ptr<Peer> peer, bool batch, std::size_t expected)
+      : peer_(std::move(peer)), batch_(batch), open_(expected) {}
+
+  void add(std::string text) {
+    std::string whole;
+    {
+      const std::lock_guard lock(mutex_);
+      if (!text.empty()) texts_.push_back(std::move(text));
+      if (--open_ > 0 || texts_.empty()) return;
+      whole = batch_ ? protocol::encodeBatch(texts_) : std::move(texts_.front());
+    }
+    if (const auto peer = peer_.lock()) peer->sendText(std::make_shared<const std::string>(std::move(whole)));
+  }
+
+ private:
+  std::weak_ptr<Peer> peer_;
+  bool batch_;
+  std::mutex mutex_;
+  std::size_t open_;
+  std::vector<std::string> texts_;
+};
+
+/// Copies go into engine callbacks; the first answer counts. A notification gives its place up without text.
+struct Calls::Slot {
+  protocol::RequestId id;
+  std::shared_ptr<Answers> answers;
+  std::shared_ptr<std::atomic<std::size_t>> in_flight;
+  Counters* counters;
+
+  template <typename Reply>
+  void reply(const Reply& value) const {
+    finish(id.empty() ? std::string() : encodeReply(id, value));
+  }
+  void error(const RpcError& error) const {
+    ++counters->calls_failed;
+    finish(id.empty() ? std::string() : encodeError(id, error));
+  }
+  void drop() const { finish({}); }
+  template <typename T>
+  void fail(const Result<T>& result) const {
+    error(protocol::toRpcError(result.error()));
+  }
+
+ private:
+  void finish(std::string text) const {
+    in_flight->fetch_sub(1);
+    answers->add(std::move(text));
+  }
+};
+
+Calls::Calls(Hub& hub, std::weak_ptr<Peer> peer, TileLane& tiles, bool authenticated)
+    : hub_(hub), peer_(std::move(peer)), tiles_(tiles), authenticated_(authenticated) {}
+
+void Calls::handle(std::string_view text) {
+  const auto message = protocol::parseRpc(text, protocol::kMaxMessageBytes);
+  const auto answers = std::make_shared<Answers>(peer_, message.batch, message.items.size());
+  for (const auto& item : message.items) {
+    ++hub_.counters().calls;
+    in_flight_->fetch_add(1);
+    handleItem(item, Slot{{}, answers, in_flight_, &hub_.counters()});
+  }
+}
+
+void Calls::handleItem(const protocol::RpcItem& item, Slot slot) {
+  if (const auto* malformed = std::get_if<protocol::RpcMalformed>(&item)) {
+    slot.id = malformed->id;
+    return greeted_ ? slot.error(malformed->error) : turnAway(slot, malformed->error);
+  }
+  if (std::holds_alternative<protocol::RpcResponse>(item)) return slot.drop();  // this server asks nothing
+  const auto& request = std::get<protocol::RpcRequest>(item);
+  slot.id = request.id;
+  const auto call = protocol::decodeCall(request);
+  if (!call) return greeted_ ? slot.error(call.error()) : turnAway(slot, call.error());
+  if (!admit(*call, slot)) return;
+  std::visit([&](const auto& typed) { run(typed, std::move(slot)); }, *call);
+}
+
+/// Hello first, once; not while draining; not too many at a time.
+bool Calls::admit(const protocol::Call& call, Slot& slot) {
+  const bool hello = std::holds_alternative<protocol::HelloCall>(call);
+  if (!greeted_ && !hello)
+    turnAway(slot, {RpcCode::kUnauthenticated, "the first request must be hello", "/method"});
+  else if (greeted_ && hello)
+    slot.error({RpcCode::kInvalidRequest, "hello was said before", "/method"});
+  else if (hub_.draining())
+    slot.error({RpcCode::kDraining, "the server is shutting down; connect again later"});
+  else if (in_flight_->load() > protocol::kMaxCallsInFlight)
+    slot.error(
+        {RpcCode::kRateLimited, fmt::format("more than {} calls wait for their answer", protocol::kMaxCallsInFlight)});
+  else
+    return true;
+  return false;
+}
+
+/// Answers, and closes: who cannot say hello has no business here.
+void Calls::turnAway(const Slot& slot, RpcError error) {
+  slot.error(error);
+  if (const auto peer = peer_.lock())
+    peer->closeAfterWrites(protocol::CloseCode::kPolicy, error.message.substr(0, 100));
+}
+
+void Calls::run(const protocol::HelloCall& call, Slot slot) {
+  if (!authenticated_ && !hub_.options().token.empty() && !sameSecret(call.token, hub_.options().token))
+    return turnAway(slot, {RpcCode::kUnauthenticated, "token is missing or wrong", "/params/token"});
+  protocol::HelloReply reply;
+  reply.epoch = hub_.epoch();
+  reply.revision = hub_.revision();
+  const auto streamed = [](protocol::PixelFormat f) { return f != protocol::PixelFormat::kR32ui; };
+  const auto format = std::find_if(call.tile_formats.begin(), call.tile_formats.end(), streamed);
+  if (format != call.tile_formats.end()) reply.tile_format = *format;
+  if (!call.codecs.empty()) reply.codec = call.codecs.front();
+  reply.credit_bytes = call.credit_bytes;
+  const auto peer = peer_.lock();
+  if (peer == nullptr) return;
+  tiles_.setFormat(reply.tile_format, reply.codec);
+  tiles_.setCredit(reply.credit_bytes);
+  greeted_ = true;
+  client_ = call.client;
+  std::optional<std::vector<SharedText>> missed;
+  if (call.resume) missed = hub_.missedSince(*call.resume);
+  reply.resumed = missed.has_value();
+  if (missed) tiles_.resumeFrom(call.resume->tile_version);
+  slot.reply(reply);
+  if (missed)
+    for (const auto& text : *missed) peer->sendText(text);
+  peer->greeted();
+}
+
+void Calls::run(const protocol::SceneGetCall& /*call*/, Slot slot) {
+  hub_.engine().sceneText(hub_.fromEngine<engine::Engine::SceneText>([slot](Result<engine::Engine::SceneText> text) {
+    if (!text) return slot.fail(text);
+    protocol::SceneGetReply reply{text->revision, {}, {}};
+    if (text->gltf.size() <= protocol::kMaxInlineSceneBytes)
+      reply.gltf = std::move(text->gltf);
+    else
+      reply.url = "/scene.gltf";
+    slot.reply(reply);
+  }));
+}
+
+void Calls::run(const protocol::SceneLoadCall& call, Slot slot) {
+  auto done = hub_.fromEngine<engine::LoadOutcome>([slot, hub = &hub_](const Result<engine::LoadOutcome>& outcome) {
+    if (!outcome) return slot.fail(outcome);
+    hub->sawRevision(outcome->revision);
+    slot.reply(protocol::SceneLoadReply{outcome->revision, outcome->warnings});
+  });
+  constexpr std::string_view kUpload = "/uploads/";
+  constexpr std::string_view kFile = "file:";
+  if (call.url.starts_with(kUpload)) {
+    const auto blob = hub_.uploads().find(std::string_view(call.url).substr(kUpload.size()));
+    if (!blob)
+      return slot.error({RpcCode::kNotFound, "there is no such upload (any more); PUT it to /uploads", "/params/url"});
+    return hub_.engine().loadBytes(blob->name, blob->bytes, std::move(done));
+  }
+  if (!call.url.starts_with(kFile))
+    return slot.error({RpcCode::kInvalidParams, "/params/url must be /uploads/<id> or file:<name>", "/params/url"});
+  if (hub_.options().scene_root.empty())
+    return slot.error({RpcCode::kForbidden, "this server reads no files of its own (--scene-root)", "/params/url"});
+  auto path = fileBelow(hub_.options().scene_root, std::string_view(call.url).substr(kFile.size()));
+  if (!path) return slot.error({RpcCode::kNotFound, path.error().message, "/params/url"});
+  hub_.engine().loadFile(std::move(*path), std::move(done));
+}
+
+void Calls::run(const protocol::ScenePatchCall& call, Slot slot) {
+  hub_.patch(call, client_, [slot](const tl::expected<protocol::ScenePatchReply, RpcError>& answer) {
+    answer ? slot.reply(*answer) : slot.error(answer.error());
+  });
+}
+
+void Calls::run(const protocol::SolveConfigureCall& call, Slot slot) {
+  hub_.engine().configure(merged(hub_.engine().status().settings, call),
+                          hub_.fromEngine<engine::SolveSettings>([slot](const Result<engine::SolveSettings>& settings) {
+                            settings ? slot.reply(toSettings(*settings)) : slot.fail(settings);
+                          }));
+}
+
+namespace {
+
+template <typename Slot>
+engine::Engine::Callback<engine::SolveState> stateAnswer(Hub& hub, Slot slot) {
+  return hub.fromEngine<engine::SolveState>([slot](const Result<engine::SolveState>& state) {
+    if (!state) return slot.fail(state);
+    slot.reply(protocol::StateReply{std::string(stateName(*state))});
+  });
+}
+
+}  // namespace
+
+void Calls::run(const protocol::SolvePauseCall& /*call*/, Slot slot) { hub_.engine().pause(stateAnswer(hub_, slot)); }
+void Calls::run(const protocol::SolveResumeCall& /*call*/, Slot slot) { hub_.engine().resume(stateAnswer(hub_, slot)); }
+void Calls::run(const protocol::SolveRestartCall& /*call*/, Slot slot) {
+  hub_.engine().restart(stateAnswer(hub_, slot));
+}
+
+void Calls::run(const protocol::SolveWaitCall& call, Slot slot) {
+  const auto waiter = hub_.wait(call, peer_, [slot](const std::optional<protocol::StatusReply>& status) {
+    if (status) return slot.reply(*status);
+    slot.error({RpcCode::kDraining, "the server is shutting down; connect again later"});
+  });
+  const auto peer = peer_.lock();
+  if (peer == nullptr || !call.timeout_ms) return;
+  peer->later(std::chrono::milliseconds(*call.timeout_ms),
+              [hub = hub_.shared_from_this(), waiter] { hub->giveUp(waiter); });
+}
+
+void Calls::run(const protocol::StatusCall& /*call*/, Slot slot) { slot.reply(toStatusReply(hub_.engine().status())); }
+
+void Calls::run(const protocol::SubscribeCall& call, Slot slot) {
+  if (call.quantity != protocol::Quantity::kIrradiance)
+    return slot.error({RpcCode::kInvalidParams,
+                       fmt::format("/params/quantity: {} is not streamed by this server; see capabilities, or take a "
+                                   "snapshot of it",
+                                   name(call.quantity)),
+                       "/params/quantity"});
+  tiles_.subscribe(call);
+  slot.reply(protocol::SubscribeReply{call.lightmaps, call.min_mip, call.max_mip, call.max_hz, call.quantity});
+  if (const auto peer = peer_.lock()) peer->lightmapsChanged();
+}
+
+void Calls::run(const protocol::CreditCall& call, Slot slot) {
+  tiles_.addCredit(call.bytes);
+  slot.reply(protocol::CreditReply{tiles_.credit()});
+  if (const auto peer = peer_.lock()) peer->tilesWanted();
+}
+
+void Calls::run(const protocol::SnapshotCall& call, Slot slot) {
+  engine::SnapshotRequest request{call.camera, call.width, call.height, call.quantity};
+  hub_.engine().snapshot(std::move(request), hub_.fromEngine<SharedBytes>([slot, hub = &hub_](
+                                                                              const Result<SharedBytes>& png) {
+    if (!png) return slot.fail(png);
+    slot.reply(protocol::SnapshotReply{fmt::format("/snapshots/{}.png", hub->snapshots().put("snapshot.png", *png))});
+  }));
+}
+
+void Calls::run(const protocol::ViewersCall& /*call*/, Slot slot) {
+  slot.reply(protocol::ViewersReply{hub_.viewerCount()});
+}
+
+Result<std::string> fileBelow(const std::filesystem::path& root, std::string_view relative) {
+  std::error_code error;
+  const auto base = std::filesystem::canonical(root, error);
+  if (error) return fail(ErrorCode::kNotFound, "the server's scene root cannot be read");
+  const std::filesystem::path asked{std::string(relative)};
+  const auto full = std::filesystem::canonical(base / asked, error);
+  const bool inside = !error && asked.is_relative() &&
+                      std::mismatch(base.begin(), base.end(), full.begin(), full.end()).first == base.end();
+  if (!inside || !std::filesystem::is_regular_file(full, error))
+    return fail(ErrorCode::kNotFound, fmt::format("there is no file \"{}\" in the server's scene root", relative));
+  return full.string();
+}
+
+}  // namespace radiosity::net

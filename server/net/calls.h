@@ -1,0 +1,72 @@
+// The methods of radiosity.v1 for one session: text in, answers out through the peer. Knows no sockets. Lives and is
+// called on its session's strand; engine callbacks come back through Peer::sendText, which any thread may call.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "protocol/codec.h"
+#include "server/net/hub.h"
+#include "server/net/tile_lane.h"
+
+namespace radiosity::net {
+
+/// The session as its calls see it.
+class Peer : public Viewer {
+ public:
+  /// Runs `task` on the session's strand after a while, if the session still lives.
+  virtual void later(std::chrono::milliseconds delay, std::function<void()> task) = 0;
+  virtual void greeted() = 0;      ///< hello was accepted
+  virtual void tilesWanted() = 0;  ///< subscription or credit changed
+  virtual void closeAfterWrites(protocol::CloseCode code, std::string reason) = 0;
+};
+
+class Calls {
+ public:
+  /// `authenticated`: the upgrade request brought the token. `peer` owns this.
+  Calls(Hub& hub, std::weak_ptr<Peer> peer, TileLane& tiles, bool authenticated);
+
+  /// One text frame.
+  void handle(std::string_view text);
+
+ private:
+  class Answers;
+  struct Slot;  ///< where one answer goes
+
+  void handleItem(const protocol::RpcItem& item, Slot slot);
+  bool admit(const protocol::Call& call, Slot& slot);
+  void turnAway(const Slot& slot, protocol::RpcError error);
+
+  void run(const protocol::HelloCall& call, Slot slot);
+  void run(const protocol::SceneGetCall& call, Slot slot);
+  void run(const protocol::SceneLoadCall& call, Slot slot);
+  void run(const protocol::ScenePatchCall& call, Slot slot);
+  void run(const protocol::SolveConfigureCall& call, Slot slot);
+  void run(const protocol::SolvePauseCall& call, Slot slot);
+  void run(const protocol::SolveResumeCall& call, Slot slot);
+  void run(const protocol::SolveRestartCall& call, Slot slot);
+  void run(const protocol::SolveWaitCall& call, Slot slot);
+  void run(const protocol::StatusCall& call, Slot slot);
+  void run(const protocol::SubscribeCall& call, Slot slot);
+  void run(const protocol::CreditCall& call, Slot slot);
+  void run(const protocol::SnapshotCall& call, Slot slot);
+  void run(const protocol::ViewersCall& call, Slot slot);
+
+  Hub& hub_;
+  std::weak_ptr<Peer> peer_;
+  TileLane& tiles_;
+  bool authenticated_;
+  bool greeted_ = false;
+  std::string client_;
+  std::shared_ptr<std::atomic<std::size_t>> in_flight_ = std::make_shared<std::atomic<std::size_t>>(0);
+};
+
+/// "file:room.glb" below `root` as a path; kNotFound when it is not there or leads outside.
+[[nodiscard]] Result<std::string> fileBelow(const std::filesystem::path& root, std::string_view relative);
+
+}  // namespace radiosity::net

@@ -1,0 +1,22 @@
+// The engine's values as protocol messages, and its errors as HTTP. Pure functions.
+#pragma once
+
+#include <string_view>
+
+#include "protocol/messages.h"
+#include "server/engine/engine.h"
+
+namespace radiosity::net {
+
+[[nodiscard]] std::string_view stateName(engine::SolveState state);
+[[nodiscard]] protocol::Progress toProgress(const engine::Status& status);
+[[nodiscard]] protocol::StatusReply toStatusReply(const engine::Status& status);
+[[nodiscard]] protocol::Settings toSettings(const engine::SolveSettings& settings);
+/// `current` with what the call names replaced.
+[[nodiscard]] engine::SolveSettings merged(engine::SolveSettings current, const protocol::SolveConfigureCall& call);
+[[nodiscard]] protocol::LightmapsNote toLightmapsNote(const engine::Lightmaps& lightmaps);
+
+/// True when the solve will not come nearer its target without a call.
+[[nodiscard]] bool hasStopped(engine::SolveState state);
+
+}  // namespace radiosity::net

@@ -1,0 +1,22 @@
+// What the server has done since it started; shown by /metrics. Any thread.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+
+namespace radiosity::net {
+
+struct Counters {
+  using Count = std::atomic<std::uint64_t>;
+  Count connections{0};  ///< open now, HTTP and WebSocket
+  Count connections_refused{0};
+  std::array<Count, 6> http_responses{};  ///< by first digit of the status
+  Count upload_bytes{0};
+  Count calls{0}, calls_failed{0};
+  Count text_messages_sent{0}, text_bytes_sent{0};
+  Count tiles_sent{0}, tile_bytes_sent{0};
+  Count closed_too_slow{0}, closed_overload{0}, closed_policy{0};
+};
+
+}  // namespace radiosity::net

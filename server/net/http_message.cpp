@@ -1,0 +1,98 @@
+#include "server/net/http_message.h"
+
+#include <optional>
+
+#include "protocol/http_bodies.h"
+
+namespace radiosity::net {
+namespace {
+
+constexpr std::size_t kMaxQueryMembers = 32;
+
+int hexDigit(char c) {
+  if (c >= '0' && c <= '9') return c - '0';
+  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
+  if (c >= 'A' && c <= 'F') return c - 'A' + 10;
+  return -1;
+}
+
+std::optional<std::string> percentDecoded(std::string_view text, bool plus_is_space) {
+  std::string out;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] == '%') {
+      const int high = i + 2 < text.size() ? hexDigit(text[i + 1]) : -1;
+      const int low = i + 2 < text.size() ? hexDigit(text[i + 2]) : -1;
+      if (high < 0 || low < 0 || high + low == 0) return std::nullopt;
+      out += static_cast<char>(high * 16 + low);
+      i += 2;
+    } else {
+      out += plus_is_space && text[i] == '+' ? ' ' : text[i];
+    }
+  }
+  return out;
+}
+
+int statusOf(ErrorCode code) {
+  switch (code) {
+    case ErrorCode::kBadUsage:
+    case ErrorCode::kBadInput:
+    case ErrorCode::kInvalidScene:
+    case ErrorCode::kUnsupported:
+      return 400;
+    case ErrorCode::kNotFound:
+      return 404;
+    case ErrorCode::kTooLarge:
+      return 413;
+    case ErrorCode::kStaleRevision:
+    case ErrorCode::kTestFailed:
+      return 409;
+    case ErrorCode::kBusy:
+    case ErrorCode::kUnavailable:
+      return 503;
+    case ErrorCode::kInternal:
+      return 500;
+  }
+  return 500;
+}
+
+}  // namespace
+
+Result<HttpRequest> parseTarget(std::string_view method, std::string_view target) {
+  HttpRequest request;
+  request.method = method == "HEAD" ? "GET" : method;
+  const auto question = target.find('?');
+  const auto path = percentDecoded(target.substr(0, question), false);
+  if (!path || path->empty() || path->front() != '/') return fail(ErrorCode::kBadInput, "bad request target");
+  request.path = *path;
+  auto rest = question == std::string_view::npos ? std::string_view() : target.substr(question + 1);
+  while (!rest.empty()) {
+    const auto part = rest.substr(0, rest.find('&'));
+    rest.remove_prefix(std::min(part.size() + 1, rest.size()));
+    const auto equals = std::min(part.find('='), part.size());
+    const auto key = percentDecoded(part.substr(0, equals), true);
+    const auto value = percentDecoded(part.substr(std::min(equals + 1, part.size())), true);
+    if (!key || !value || request.query.size() == kMaxQueryMembers)
+      return fail(ErrorCode::kBadInput, "bad query in the request target");
+    request.query[*key] = *value;
+  }
+  return request;
+}
+
+HttpResponse errorResponse(int status, std::string_view code, std::string_view message) {
+  HttpResponse response;
+  response.status = status;
+  response.content_type = "application/json";
+  response.text = protocol::encodeHttpError({std::string(code), std::string(message), {}});
+  return response;
+}
+
+HttpResponse errorResponse(const Error& error) {
+  HttpResponse response;
+  response.status = statusOf(error.code);
+  response.content_type = "application/json";
+  response.text = protocol::encodeHttpError({std::string(protocol::httpCode(error.code)), error.message, error.where});
+  if (response.status == 503) response.headers.emplace_back("Retry-After", "1");
+  return response;
+}
+
+}  // namespace radiosity::net

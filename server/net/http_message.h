@@ -1,0 +1,39 @@
+// HTTP requests and responses as plain values, so that routes know no sockets.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "common/bytes.h"
+#include "common/result.h"
+
+namespace radiosity::net {
+
+struct HttpRequest {
+  std::string method;                        ///< "GET"; HEAD comes as GET
+  std::string path;                          ///< "/scene.glb", percent-decoded
+  std::map<std::string, std::string> query;  ///< percent-decoded
+  std::string content_type, name;            ///< name: header X-Name, or ?name=
+  Bytes body;
+};
+
+struct HttpResponse {
+  int status = 200;
+  std::string content_type = "text/plain; charset=utf-8";
+  std::string text;  ///< the body, unless `bytes` is set
+  SharedBytes bytes;
+  std::vector<std::pair<std::string, std::string>> headers;
+};
+
+/// Path and query of a request target; kBadInput for a bad escape, a NUL or too many members.
+[[nodiscard]] Result<HttpRequest> parseTarget(std::string_view method, std::string_view target);
+
+/// {"error": {"code", "message", "where"}} with the status that suits the code.
+[[nodiscard]] HttpResponse errorResponse(const Error& error);
+[[nodiscard]] HttpResponse errorResponse(int status, std::string_view code, std::string_view message);
+
+}  // namespace radiosity::net

@@ -1,0 +1,231 @@
+#include "server/net/http_routes.h"
+
+#include <fmt/format.h>
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <utility>
+
+#include "protocol/http_bodies.h"
+#include "server/net/convert.h"
+#include "server/net/metrics.h"
+#include "server/net/status_page.h"
+
+namespace radiosity::net {
+namespace {
+
+using Handler = void (*)(const std::shared_ptr<Hub>&, HttpRequest&, const Respond&);
+
+HttpResponse file(SharedBytes bytes, std::string_view type) {
+  HttpResponse response;
+  response.content_type = type;
+  response.bytes = std::move(bytes);
+  return response;
+}
+
+HttpResponse plain(int status, std::string text) {
+  HttpResponse response;
+  response.status = status;
+  response.text = std::move(text);
+  return response;
+}
+
+engine::Engine::Callback<SharedBytes> fileAnswer(Hub& hub, const Respond& done, std::string_view type) {
+  return hub.fromEngine<SharedBytes>([done, type](Result<SharedBytes> bytes) {
+    done(bytes ? file(std::move(*bytes), type) : errorResponse(bytes.error()));
+  });
+}
+
+/// An integer member of the query in [low, high]; `otherwise` where it is absent.
+Result<int> queryInt(const HttpRequest& request, const char* key, int otherwise, int low, int high) {
+  const auto found = request.query.find(key);
+  if (found == request.query.end()) return otherwise;
+  int value = 0;
+  const auto& text = found->second;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || value < low || value > high)
+    return fail(ErrorCode::kBadInput, fmt::format("must be an integer in [{}, {}]", low, high),
+                fmt::format("?{}=", key));
+  return value;
+}
+
+std::string queryText(const HttpRequest& request, const char* key, std::string otherwise) {
+  const auto found = request.query.find(key);
+  return found == request.query.end() ? std::move(otherwise) : found->second.substr(0, protocol::kMaxTextBytes);
+}
+
+// ---- handlers ----
+
+void getPage(const std::shared_ptr<Hub>& hub, HttpRequest& /*request*/, const Respond& done) {
+  HttpResponse response;
+  response.content_type = "text/html; charset=utf-8";
+  response.text = statusPage(hub->engine().status(), hub->viewerCount(), hub->options().version);
+  response.headers.emplace_back("Content-Security-Policy", "default-src 'self'; style-src 'unsafe-inline'");
+  done(std::move(response));
+}
+
+void putScene(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond& done) {
+  if (hub->draining()) return done(errorResponse({ErrorCode::kBusy, "the server is shutting down", {}}));
+  auto bytes = std::make_shared<const Bytes>(std::move(request.body));
+  auto answer = [hub = hub.get(), done](const Result<engine::LoadOutcome>& outcome) {
+    if (!outcome) return done(errorResponse(outcome.error()));
+    hub->sawRevision(outcome->revision);
+    auto response = plain(200, protocol::encodeHttpLoad({outcome->revision, outcome->warnings}));
+    response.content_type = "application/json";
+    done(std::move(response));
+  };
+  hub->engine().loadBytes(request.name, std::move(bytes), hub->fromEngine<engine::LoadOutcome>(std::move(answer)));
+}
+
+void putUpload(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond& done) {
+  const auto id = hub->uploads().put(request.name, std::make_shared<const Bytes>(std::move(request.body)));
+  auto response = plain(201, protocol::encodeHttpUrl("/uploads/" + id));
+  response.content_type = "application/json";
+  response.headers.emplace_back("Location", "/uploads/" + id);
+  done(std::move(response));
+}
+
+void getSceneGltf(const std::shared_ptr<Hub>& hub, HttpRequest& /*request*/, const Respond& done) {
+  hub->engine().sceneText(hub->fromEngine<engine::Engine::SceneText>([done](Result<engine::Engine::SceneText> text) {
+    if (!text) return done(errorResponse(text.error()));
+    auto response = plain(200, std::move(text->gltf));
+    response.content_type = "model/gltf+json";
+    response.headers.emplace_back("X-Revision", std::to_string(text->revision));
+    done(std::move(response));
+  }));
+}
+
+void getSceneGlb(const std::shared_ptr<Hub>& hub, HttpRequest& /*request*/, const Respond& done) {
+  hub->engine().sceneGlb(fileAnswer(*hub, done, "model/gltf-binary"));
+}
+
+void getUnlitGlb(const std::shared_ptr<Hub>& hub, HttpRequest& /*request*/, const Respond& done) {
+  hub->engine().unlitGlb(fileAnswer(*hub, done, "model/gltf-binary"));
+}
+
+void getLightmap(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond& done) {
+  std::uint32_t page = 0;
+  const auto text = std::string_view(request.path).substr(std::string_view("/lightmaps/").size());
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), page);
+  if (error != std::errc() || std::string_view(end, text.data() + text.size()) != ".exr")
+    return done(
+        errorResponse({ErrorCode::kNotFound, "lightmaps are /lightmaps/<page>.exr, counted from 0", request.path}));
+  hub->engine().lightmapExr(page, fileAnswer(*hub, done, "image/x-exr"));
+}
+
+void getSnapshot(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond& done) {
+  const auto width = queryInt(request, "width", 960, 1, protocol::kMaxSnapshotSide);
+  const auto height = queryInt(request, "height", 720, 1, protocol::kMaxSnapshotSide);
+  if (!width || !height) return done(errorResponse(width ? height.error() : width.error()));
+  hub->engine().snapshot({queryText(request, "camera", ""), *width, *height, queryText(request, "quantity", "lit")},
+                         fileAnswer(*hub, done, "image/png"));
+}
+
+void getStoredSnapshot(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond& done) {
+  auto id = std::string_view(request.path).substr(std::string_view("/snapshots/").size());
+  if (id.ends_with(".png")) id.remove_suffix(4);
+  const auto blob = hub->snapshots().find(id);
+  if (!blob) return done(errorResponse({ErrorCode::kNotFound, "there is no such snapshot (any more)", request.path}));
+  done(file(blob->bytes, "image/png"));
+}
+
+void getHealth(const std::shared_ptr<Hub>& /*hub*/, HttpRequest& /*request*/, const Respond& done) {
+  done(plain(200, "ok\n"));
+}
+
+void getReady(const std::shared_ptr<Hub>& hub, HttpRequest& /*request*/, const Respond& done) {
+  const auto status = hub->engine().status();
+  if (hub->draining()) return done(plain(503, "draining\n"));
+  if (status.state == engine::SolveState::kLoading) return done(plain(503, "loading\n"));
+  if (status.state == engine::SolveState::kFailed) return done(plain(503, "failed: " + status.failure + "\n"));
+  done(plain(200, "ready\n"));
+}
+
+void getMetrics(const std::shared_ptr<Hub>& hub, HttpRequest& /*request*/, const Respond& done) {
+  auto response = plain(200, metricsText(*hub));
+  response.content_type = "text/plain; version=0.0.4; charset=utf-8";
+  done(std::move(response));
+}
+
+// ---- the table ----
+
+struct Route {
+  std::string_view path;  ///< ending in '/': everything below
+  std::string_view method;
+  Handler handle;
+  bool open = false;  ///< without a token
+};
+
+constexpr std::array kRoutes = {
+    Route{"/", "GET", getPage},
+    Route{"/scene", "PUT", putScene},
+    Route{"/uploads", "PUT", putUpload},
+    Route{"/scene.gltf", "GET", getSceneGltf},
+    Route{"/scene.glb", "GET", getSceneGlb},
+    Route{"/scene-unlit.glb", "GET", getUnlitGlb},
+    Route{"/lightmaps/", "GET", getLightmap},
+    Route{"/snapshot.png", "GET", getSnapshot},
+    Route{"/snapshots/", "GET", getStoredSnapshot},
+    Route{"/healthz", "GET", getHealth, true},
+    Route{"/readyz", "GET", getReady, true},
+    Route{"/metrics", "GET", getMetrics},
+    Route{protocol::kWebSocketPath, "GET", nullptr},
+};
+
+const Route* routeOf(const HttpRequest& request) {
+  for (const auto& route : kRoutes) {
+    const bool folder = route.path.size() > 1 && route.path.ends_with('/');
+    if (folder ? request.path.starts_with(route.path) && request.path.size() > route.path.size()
+               : request.path == route.path)
+      return &route;
+  }
+  return nullptr;
+}
+
+bool sceneType(std::string_view type) {
+  constexpr std::array kTypes = {"", "model/gltf-binary", "model/gltf+json", "application/json",
+                                 "application/octet-stream"};
+  type = type.substr(0, type.find(';'));
+  while (type.ends_with(' ')) type.remove_suffix(1);
+  return std::find(kTypes.begin(), kTypes.end(), type) != kTypes.end();
+}
+
+}  // namespace
+
+bool needsToken(const HttpRequest& request) {
+  const auto* route = routeOf(request);
+  return route == nullptr || !route->open;
+}
+
+std::optional<HttpResponse> refusal(const HttpRequest& request) {
+  const auto* route = routeOf(request);
+  if (route == nullptr) return errorResponse({ErrorCode::kNotFound, "there is nothing at this path", request.path});
+  const auto allow = route->method == "GET" ? "GET, HEAD, OPTIONS" : fmt::format("{}, OPTIONS", route->method);
+  if (request.method == "OPTIONS") {
+    auto response = plain(204, "");
+    response.headers.emplace_back("Allow", allow);
+    return response;
+  }
+  if (request.method != route->method) {
+    auto response = errorResponse(405, "methodNotAllowed", fmt::format("{} allows {}", request.path, allow));
+    response.headers.emplace_back("Allow", allow);
+    return response;
+  }
+  if (route->handle == nullptr) {
+    auto response = errorResponse(426, "upgradeRequired", "this path speaks WebSocket, subprotocol radiosity.v1");
+    response.headers.emplace_back("Upgrade", "websocket");
+    return response;
+  }
+  if (request.method == "PUT" && !sceneType(request.content_type))
+    return errorResponse(415, "unsupportedMediaType",
+                         fmt::format("Content-Type {}; send model/gltf-binary, model/gltf+json or "
+                                     "application/octet-stream (curl -T FILE does)",
+                                     request.content_type));
+  return std::nullopt;
+}
+
+void respond(const std::shared_ptr<Hub>& hub, HttpRequest request, const Respond& done) {
+  routeOf(request)->handle(hub, request, done);
+}
+
+}  // namespace radiosity::net

@@ -1,0 +1,285 @@
+#include "server/net/http_session.h"
+
+#include <fmt/format.h>
+#include <array>
+#include <boost/asio/dispatch.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/write.hpp>
+#include <boost/beast/http/parser.hpp>
+#include <boost/beast/http/read.hpp>
+#include <boost/beast/http/serializer.hpp>
+#include <boost/beast/http/span_body.hpp>
+#include <boost/beast/http/write.hpp>
+#include <boost/beast/websocket/rfc6455.hpp>
+#include <ctime>
+#include <optional>
+#include <utility>
+
+#include "server/net/access.h"
+#include "server/net/http_routes.h"
+#include "server/net/websocket_session.h"
+
+namespace radiosity::net {
+namespace {
+
+constexpr std::uint32_t kHeaderLimit = 16 * 1024;
+constexpr std::size_t kBufferLimit = 64 * 1024;
+constexpr std::uint64_t kBodyOfGet = 64 * 1024;
+constexpr std::size_t kLingerBytes = std::size_t{64} << 20;  ///< read and dropped so that a refusal can be read
+
+using Parser = http::request_parser<http::vector_body<std::uint8_t>>;
+using Response = http::response<http::span_body<const char>>;
+using Serializer = http::response_serializer<http::span_body<const char>>;
+
+std::string_view view(boost::core::string_view text) { return {text.data(), text.size()}; }
+
+/// RFC 9110 section 5.6.7.
+std::string httpDate() {
+  std::array<char, 64> text{};
+  const auto now = std::time(nullptr);
+  std::tm parts{};
+  gmtime_r(&now, &parts);
+  const auto length = std::strftime(text.data(), text.size(), "%a, %d %b %Y %H:%M:%S GMT", &parts);
+  return {text.data(), length};
+}
+
+class HttpSession : public Connection, public std::enable_shared_from_this<HttpSession> {
+ public:
+  HttpSession(Stream stream, std::shared_ptr<Hub> hub, ConnectionSlot slot)
+      : stream_(std::move(stream)), hub_(std::move(hub)), slot_(std::move(slot)), buffer_(kBufferLimit) {}
+
+  void start() {
+    hub_->add(weak_from_this());
+    asio::dispatch(stream_.get_executor(), [self = shared_from_this()] { self->readHeader(); });
+  }
+
+  void drain() override {
+    asio::post(stream_.get_executor(), [self = shared_from_this()] {
+      if (self->idle_) self->stream_.close();
+    });
+  }
+
+ private:
+  void readHeader();
+  void onHeader(BoostError error);
+  void upgrade();
+  bool refuseEarly();
+  void readBody();
+  void onBody(BoostError error);
+  void onWhole();
+  void send(HttpResponse response, bool close);
+  void prepare(bool close);
+  void writeSome();
+  void onWritten();
+  void linger();
+
+  [[nodiscard]] std::string_view field(http::field name) const { return view(parser_->get()[name]); }
+
+  Stream stream_;
+  std::shared_ptr<Hub> hub_;
+  ConnectionSlot slot_;
+  beast::flat_buffer buffer_;
+  std::optional<Parser> parser_;
+  HttpRequest request_;
+  bool head_ = false, keep_alive_ = false, idle_ = false, waiting_ = false;
+  std::string origin_;
+  HttpResponse response_;  ///< holds the bytes that message_ points to
+  std::optional<Response> message_;
+  std::optional<Serializer> serializer_;
+  std::size_t lingered_ = 0;
+};
+
+void HttpSession::readHeader() {
+  if (hub_->draining()) return stream_.close();
+  parser_.emplace();
+  parser_->header_limit(kHeaderLimit);
+  parser_->body_limit(hub_->options().max_upload_bytes);
+  head_ = keep_alive_ = false;
+  origin_.clear();
+  idle_ = buffer_.size() == 0;
+  stream_.expires_after(hub_->options().header_timeout);  // for the whole header, however slowly it drips
+  http::async_read_header(stream_, buffer_, *parser_, [self = shared_from_this()](BoostError error, std::size_t) {
+    self->idle_ = false;
+    self->onHeader(error);
+  });
+}
+
+void HttpSession::onHeader(BoostError error) {
+  if (error == http::error::body_limit)
+    return send(
+        errorResponse(413, "tooLarge",
+                      fmt::format("a body may have at most {} bytes (--max-upload)", hub_->options().max_upload_bytes)),
+        true);
+  if (error == http::error::header_limit || error == http::error::buffer_overflow)
+    return send(errorResponse(431, "tooLarge", fmt::format("a header may have at most {} bytes", kHeaderLimit)), true);
+  if (error == beast::error::timeout || error == http::error::end_of_stream) return stream_.close();
+  if (error.category() == http::make_error_code(http::error::bad_method).category())
+    return send(errorResponse(400, "badInput", "not HTTP/1.1: " + error.message()), true);
+  if (error) return stream_.close();
+  const auto& message = parser_->get();
+  head_ = message.method() == http::verb::head;
+  keep_alive_ = message.keep_alive();
+  origin_ = field(http::field::origin);
+  auto request = parseTarget(view(message.method_string()), view(message.target()));
+  if (!request) return send(errorResponse(request.error()), true);
+  request_ = std::move(*request);
+  request_.content_type = field(http::field::content_type);
+  const auto named = request_.query.find("name");
+  request_.name = named != request_.query.end() ? named->second : std::string(view(message["X-Name"]));
+  if (request_.name.empty()) request_.name = "upload";
+  if (refuseEarly()) return;
+  readBody();
+}
+
+/// Everything that can be decided without the body. True: answered, or handed over.
+bool HttpSession::refuseEarly() {
+  const auto& options = hub_->options();
+  const bool no_body = parser_->is_done();
+  const auto refuse = [&](HttpResponse response) {
+    send(std::move(response), !no_body);
+    return true;
+  };
+  if (!hostAllowed(field(http::field::host), options))
+    return refuse(errorResponse(403, "forbidden",
+                                "this name is not served (Host); use localhost or an IP address, or --allow-origin"));
+  if (!originAllowed(origin_, field(http::field::host), options))
+    return refuse(errorResponse(403, "forbidden", "this Origin may not use the server; see --allow-origin"));
+  const bool ours = request_.path == protocol::kWebSocketPath && boost::beast::websocket::is_upgrade(parser_->get());
+  if (ours) {
+    upgrade();
+    return true;
+  }
+  if (request_.method != "OPTIONS" && needsToken(request_) && !hasToken(field(http::field::authorization), options)) {
+    auto response = errorResponse(401, "unauthenticated", "send Authorization: Bearer <token>");
+    response.headers.emplace_back("WWW-Authenticate", "Bearer realm=\"radiosityd\"");
+    return refuse(std::move(response));
+  }
+  if (request_.name.size() > protocol::kMaxTextBytes || request_.name.find_first_of("\r\n\t") != std::string::npos)
+    return refuse(errorResponse(400, "badInput", "the name is too long or has control characters"));
+  if (auto refused = refusal(request_)) return refuse(std::move(*refused));
+  return false;
+}
+
+void HttpSession::upgrade() {
+  const auto authorization = field(http::field::authorization);
+  const bool authenticated = hasToken(authorization, hub_->options());
+  if (!authorization.empty() && !authenticated)
+    return send(errorResponse(401, "unauthenticated", "the token is wrong"), true);
+  const auto offered = field(http::field::sec_websocket_protocol);
+  bool speaks = false;
+  for (std::string_view rest = offered; !rest.empty();) {
+    auto name = rest.substr(0, rest.find(','));
+    rest.remove_prefix(std::min(name.size() + 1, rest.size()));
+    while (name.starts_with(' ')) name.remove_prefix(1);
+    while (name.ends_with(' ')) name.remove_suffix(1);
+    speaks = speaks || name == protocol::kSubprotocol;
+  }
+  if (!speaks)
+    return send(errorResponse(400, "badInput", "ask for the subprotocol radiosity.v1 (Sec-WebSocket-Protocol)"), true);
+  if (hub_->draining()) return send(errorResponse({ErrorCode::kBusy, "the server is shutting down", {}}), true);
+  stream_.expires_never();
+  serveWebSocket(std::move(stream_), parser_->release(), hub_, slot_, authenticated);
+}
+
+void HttpSession::readBody() {
+  if (parser_->is_done()) return onWhole();
+  if (request_.method != "PUT") parser_->body_limit(kBodyOfGet);
+  if (!beast::iequals(parser_->get()[http::field::expect], "100-continue")) return onBody({});
+  static constexpr std::string_view kContinue = "HTTP/1.1 100 Continue\r\n\r\n";
+  stream_.expires_after(hub_->options().idle_timeout);
+  asio::async_write(stream_, asio::buffer(kContinue),
+                    [self = shared_from_this()](BoostError error, std::size_t) { self->onBody(error); });
+}
+
+void HttpSession::onBody(BoostError error) {
+  if (error == http::error::body_limit)
+    return send(errorResponse(413, "tooLarge", "the body is larger than this path accepts (--max-upload)"), true);
+  if (error) return stream_.close();
+  if (parser_->is_done()) return onWhole();
+  stream_.expires_after(hub_->options().idle_timeout);
+  http::async_read_some(stream_, buffer_, *parser_,
+                        [self = shared_from_this()](BoostError e, std::size_t) { self->onBody(e); });
+}
+
+void HttpSession::onWhole() {
+  request_.body = std::move(parser_->get().body());
+  hub_->counters().upload_bytes += request_.body.size();
+  stream_.expires_never();  // the engine takes its time
+  respond(hub_, std::move(request_), [self = shared_from_this()](HttpResponse response) {
+    asio::post(self->stream_.get_executor(),
+               [self, response = std::move(response)]() mutable { self->send(std::move(response), false); });
+  });
+}
+
+void HttpSession::send(HttpResponse response, bool close) {
+  response_ = std::move(response);
+  const auto kind = static_cast<std::size_t>(response_.status / 100);
+  ++hub_->counters().http_responses.at(std::min<std::size_t>(kind, 5));
+  prepare(close || !keep_alive_ || hub_->draining());
+  serializer_.emplace(*message_);
+  if (head_) serializer_->split(true);
+  writeSome();
+}
+
+void HttpSession::prepare(bool close) {
+  const auto* data = response_.bytes ? reinterpret_cast<const char*>(response_.bytes->data()) : response_.text.data();
+  const auto size = response_.bytes ? response_.bytes->size() : response_.text.size();
+  message_.emplace();
+  auto& m = *message_;
+  m.version(11);
+  m.result(static_cast<unsigned>(response_.status));
+  m.keep_alive(!close);
+  m.body() = beast::span<const char>(data, size);
+  if (response_.status != 204) m.content_length(size);
+  m.set(http::field::date, httpDate());
+  m.set(http::field::server, "radiosityd/" + hub_->options().version);
+  if (size > 0) m.set(http::field::content_type, response_.content_type);
+  m.set(http::field::cache_control, "no-store");
+  m.set("X-Content-Type-Options", "nosniff");
+  if (!origin_.empty() && originListed(origin_, hub_->options())) {
+    m.set(http::field::access_control_allow_origin, origin_);
+    m.set(http::field::vary, "Origin");
+    m.set(http::field::access_control_allow_methods, "GET, HEAD, PUT, OPTIONS");
+    m.set(http::field::access_control_allow_headers, "Authorization, Content-Type, X-Name");
+  }
+  for (const auto& [name, value] : response_.headers) m.set(name, value);
+}
+
+void HttpSession::writeSome() {
+  if (serializer_->is_done() || (head_ && serializer_->is_header_done())) return onWritten();
+  stream_.expires_after(hub_->options().idle_timeout);  // each time some of it was taken
+  http::async_write_some(stream_, *serializer_, [self = shared_from_this()](BoostError error, std::size_t) {
+    if (error) return self->stream_.close();
+    self->writeSome();
+  });
+}
+
+void HttpSession::onWritten() {
+  const bool keep = message_->keep_alive();
+  serializer_.reset();
+  message_.reset();
+  response_ = {};
+  if (keep) return readHeader();
+  BoostError ignored;
+  stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
+  linger();
+}
+
+/// Closing with unread bytes would reset the connection and take the response away from the client.
+void HttpSession::linger() {
+  if (lingered_ == 0) stream_.expires_after(hub_->options().close_patience);
+  buffer_.clear();
+  stream_.async_read_some(buffer_.prepare(kBufferLimit), [self = shared_from_this()](BoostError error, std::size_t n) {
+    self->lingered_ += n;
+    if (error || self->lingered_ > kLingerBytes) return self->stream_.close();
+    self->linger();
+  });
+}
+
+}  // namespace
+
+void serveHttp(Stream stream, std::shared_ptr<Hub> hub, ConnectionSlot slot) {
+  std::make_shared<HttpSession>(std::move(stream), std::move(hub), std::move(slot))->start();
+}
+
+}  // namespace radiosity::net

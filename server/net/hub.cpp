@@ -1,0 +1,343 @@
+#include "server/net/hub.h"
+
+#include <fmt/format.h>
+#include <algorithm>
+#include <utility>
+
+#include "server/net/convert.h"
+
+namespace radiosity::net {
+namespace {
+
+constexpr std::size_t kHistoryPatches = 256;
+constexpr std::size_t kHistoryBytes = std::size_t{4} << 20;
+constexpr std::size_t kSnapshotsKept = 32;
+constexpr std::size_t kSnapshotBytes = std::size_t{64} << 20;
+constexpr std::size_t kUploadsKept = 16;
+
+SharedText shared(std::string text) { return std::make_shared<const std::string>(std::move(text)); }
+
+}  // namespace
+
+Hub::Hub(const ServerOptions& options, engine::Engine& engine)
+    : options_(options),
+      engine_(engine),
+      epoch_(randomHex(8)),
+      uploads_(kUploadsKept, options.max_upload_bytes),
+      snapshots_(kSnapshotsKept, kSnapshotBytes) {}
+
+void Hub::start() {
+  const auto status = engine_.status();
+  {
+    const std::lock_guard lock(mutex_);
+    revision_ = history_from_ = status.revision;
+    last_state_ = status.state;
+  }
+  engine_.addListener(weak_from_this());
+  if (auto lightmaps = engine_.lightmaps()) onLightmaps(lightmaps);
+}
+
+std::uint64_t Hub::revision() const {
+  const std::lock_guard lock(mutex_);
+  return revision_;
+}
+
+void Hub::sawRevision(std::uint64_t revision) {
+  const std::lock_guard lock(mutex_);
+  revision_ = std::max(revision_, revision);
+}
+
+std::shared_ptr<const engine::Lightmaps> Hub::lightmaps() {
+  const std::lock_guard lock(mutex_);
+  return lightmaps_;
+}
+
+protocol::ServerInfo Hub::serverInfo() {
+  protocol::ServerInfo info;
+  info.server = "radiosityd/" + options_.version;
+  info.epoch = epoch_;
+  info.revision = revision();
+  info.capabilities = {"scene.get",
+                       "scene.load",
+                       "scene.patch",
+                       "solve",
+                       "status",
+                       "subscribe",
+                       "credit",
+                       "snapshot",
+                       "viewers",
+                       "resume",
+                       "batch",
+                       "tiles.rgba16f",
+                       "tiles.rgb9e5",
+                       "tiles.rgba32f",
+                       "codec.none",
+                       "codec.deflate",
+                       "quantity.irradiance"};
+  if (!options_.scene_root.empty()) info.capabilities.emplace_back("scene.load.file");
+  info.limits = {{"messageBytes", protocol::kMaxMessageBytes},
+                 {"jsonDepth", protocol::kMaxJsonDepth},
+                 {"patchOperations", protocol::kMaxPatchOperations},
+                 {"batchCalls", protocol::kMaxBatch},
+                 {"callsInFlight", protocol::kMaxCallsInFlight},
+                 {"uploadBytes", options_.max_upload_bytes},
+                 {"clients", options_.max_clients},
+                 {"snapshotSide", protocol::kMaxSnapshotSide},
+                 {"creditBytes", static_cast<std::uint64_t>(protocol::kMaxCreditBytes)}};
+  if (const auto now = lightmaps()) info.lightmaps = now->pages.size();
+  info.gl_renderer = engine_.status().gl_renderer;
+  info.auth_required = !options_.token.empty();
+  return info;
+}
+
+// ---- who is there ----
+
+void Hub::add(const std::weak_ptr<Connection>& connection) {
+  const std::lock_guard lock(mutex_);
+  std::erase_if(connections_, [](const auto& c) { return c.expired(); });
+  connections_.push_back(connection);
+}
+
+void Hub::join(const std::weak_ptr<Viewer>& viewer) {
+  {
+    const std::lock_guard lock(mutex_);
+    viewers_.push_back(viewer);
+  }
+  broadcast(protocol::ViewersNote{viewerCount()});
+}
+
+void Hub::leave(const Viewer& viewer) {
+  std::size_t before = 0;
+  std::size_t after = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    before = viewers_.size();
+    std::erase_if(viewers_, [&](const std::weak_ptr<Viewer>& v) {
+      const auto alive = v.lock();
+      return alive == nullptr || alive.get() == &viewer;
+    });
+    after = viewers_.size();
+  }
+  if (before != after) broadcast(protocol::ViewersNote{after});
+}
+
+std::size_t Hub::viewerCount() const { return viewers().size(); }
+
+std::vector<std::shared_ptr<Viewer>> Hub::viewers() const {
+  std::vector<std::shared_ptr<Viewer>> alive;
+  const std::lock_guard lock(mutex_);
+  for (const auto& weak : viewers_)
+    if (auto viewer = weak.lock()) alive.push_back(std::move(viewer));
+  return alive;
+}
+
+void Hub::broadcast(const protocol::Notification& notification) {
+  const auto text = shared(protocol::encodeNotification(notification));
+  for (const auto& viewer : viewers()) viewer->sendText(text);
+}
+
+void Hub::drain() {
+  if (draining_.exchange(true)) return;
+  broadcast(protocol::Draining{static_cast<std::uint64_t>(options_.drain_grace.count())});
+  std::vector<Waiter> waiters;
+  std::vector<std::weak_ptr<Connection>> connections;
+  {
+    const std::lock_guard lock(mutex_);
+    waiters.swap(waiters_);
+    connections = connections_;
+  }
+  for (const auto& waiter : waiters) waiter.done(std::nullopt);
+  for (const auto& weak : connections)
+    if (const auto connection = weak.lock()) connection->drain();
+}
+
+// ---- patches ----
+
+std::optional<std::vector<SharedText>> Hub::missedSince(const protocol::Resume& resume) const {
+  const std::lock_guard lock(mutex_);
+  if (resume.epoch != epoch_ || resume.revision > revision_ || resume.revision < history_from_) return std::nullopt;
+  if (lightmaps_ == nullptr || resume.tile_version < layout_since_) return std::nullopt;
+  std::vector<SharedText> missed;
+  for (const auto& past : history_)
+    if (past.revision > resume.revision) missed.push_back(past.text);
+  return missed;
+}
+
+void Hub::patch(const protocol::ScenePatchCall& call, const std::string& by, PatchAnswer done) {
+  engine::PatchRequest request{call.patch, call.base_revision, call.dry_run, by};
+  if (!call.request_id.empty()) {
+    const auto fingerprint =
+        std::hash<std::string>()(fmt::format("{}|{}|{}", call.base_revision.value_or(0), call.dry_run, call.patch));
+    const std::lock_guard lock(mutex_);
+    const auto [found, inserted] = remembered_.try_emplace(call.request_id);
+    auto& known = found->second;
+    if (inserted) known.fingerprint = fingerprint;
+    if (known.fingerprint != fingerprint)
+      return done(tl::unexpected(protocol::RpcError{protocol::RpcCode::kInvalidParams,
+                                                    "this requestId was used for another patch", "/params/requestId"}));
+    if (known.answer) return done(*known.answer);
+    known.waiting.push_back(std::move(done));
+    if (!inserted) return;
+    done = [this, id = call.request_id](const auto& answer) { remember(id, answer); };
+  }
+  engine_.patch(
+      std::move(request), fromEngine<engine::PatchOutcome>([this, done](const Result<engine::PatchOutcome>& outcome) {
+        if (outcome) {
+          sawRevision(outcome->revision);
+          return done(
+              protocol::ScenePatchReply{outcome->revision, outcome->affected_surfaces, outcome->affected_shots});
+        }
+        auto error = protocol::toRpcError(outcome.error());
+        error.revision = revision();
+        done(tl::unexpected(std::move(error)));
+      }));
+}
+
+void Hub::remember(const std::string& request_id,
+                   const tl::expected<protocol::ScenePatchReply, protocol::RpcError>& answer) {
+  constexpr std::size_t kKept = 1024;
+  std::vector<PatchAnswer> waiting;
+  {
+    const std::lock_guard lock(mutex_);
+    auto& known = remembered_[request_id];
+    waiting.swap(known.waiting);
+    const bool again = !answer && (answer.error().code == protocol::RpcCode::kRateLimited ||
+                                   answer.error().code == protocol::RpcCode::kUnavailable);
+    if (again) {  // nothing was decided: the same id may be tried again
+      remembered_.erase(request_id);
+    } else {
+      known.answer = answer;
+      remembered_order_.push_back(request_id);
+    }
+    while (remembered_order_.size() > kKept) {
+      remembered_.erase(remembered_order_.front());
+      remembered_order_.pop_front();
+    }
+  }
+  for (const auto& done : waiting) done(answer);
+}
+
+// ---- waiting for the solve ----
+
+std::optional<bool> Hub::reached(const Waiter& waiter, const engine::Status& status) {
+  if (status.revision < waiter.revision || status.state == engine::SolveState::kLoading) return std::nullopt;
+  const double wanted = waiter.error.value_or(status.settings.target_error);
+  const bool solved = status.state != engine::SolveState::kEmpty && status.state != engine::SolveState::kFailed;
+  if (solved && status.error.total <= wanted) return true;
+  if (hasStopped(status.state)) return solved && !waiter.error && status.state == engine::SolveState::kConverged;
+  return std::nullopt;
+}
+
+std::uint64_t Hub::wait(const protocol::SolveWaitCall& call, std::weak_ptr<void> owner, WaitAnswer done) {
+  std::uint64_t id = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    id = next_waiter_++;
+    std::erase_if(waiters_, [](const Waiter& waiter) { return waiter.owner.expired(); });
+    waiters_.push_back({id, call.revision.value_or(revision_), call.error, std::move(owner), std::move(done)});
+  }
+  // The state may be right already, and then nothing more need happen. Asked after the waiter is in the list, so that
+  // no change falls between.
+  announceProgress(engine_.status());
+  return id;
+}
+
+void Hub::giveUp(std::uint64_t waiter) {
+  std::optional<Waiter> found;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto place = std::find_if(waiters_.begin(), waiters_.end(), [&](const auto& w) { return w.id == waiter; });
+    if (place == waiters_.end()) return;
+    found = std::move(*place);
+    waiters_.erase(place);
+  }
+  auto reply = toStatusReply(engine_.status());
+  reply.reached = false;
+  found->done(std::move(reply));
+}
+
+// ---- from the engine ----
+
+void Hub::shut() {
+  const std::lock_guard lock(gate_);
+  shut_ = true;
+}
+
+void Hub::onProgress(const engine::Status& status) {
+  enter([&] { announceProgress(status); });
+}
+
+void Hub::announceProgress(const engine::Status& status) {
+  std::vector<std::pair<Waiter, bool>> ready;
+  bool due = false;
+  {
+    const std::lock_guard lock(mutex_);
+    revision_ = std::max(revision_, status.revision);
+    std::erase_if(waiters_, [&](Waiter& waiter) {
+      const auto outcome = reached(waiter, status);
+      if (outcome) ready.emplace_back(std::move(waiter), *outcome);
+      return outcome.has_value();
+    });
+    const auto now = std::chrono::steady_clock::now();
+    due = now - last_progress_ >= options_.progress_interval || status.state != last_state_ ||
+          status.revision != last_progress_revision_;
+    if (due) last_progress_ = now;
+    last_state_ = status.state;
+    last_progress_revision_ = status.revision;
+  }
+  for (auto& [waiter, outcome] : ready) {
+    auto reply = toStatusReply(status);
+    reply.reached = outcome;
+    waiter.done(std::move(reply));
+  }
+  if (!due) return;
+  const auto everyone = viewers();
+  if (everyone.empty()) return;
+  const auto text = shared(protocol::encodeNotification(protocol::ProgressNote{toProgress(status)}));
+  for (const auto& viewer : everyone) viewer->sendProgress(text);
+}
+
+void Hub::onScenePatched(std::uint64_t revision, const std::string& patch, const std::string& by) {
+  const auto text = shared(protocol::encodeNotification(protocol::ScenePatched{revision, patch, by}));
+  {
+    const std::lock_guard lock(mutex_);
+    revision_ = std::max(revision_, revision);
+    history_.push_back({revision, text});
+    history_bytes_ += text->size();
+    while (history_.size() > kHistoryPatches || history_bytes_ > kHistoryBytes) {
+      history_from_ = history_.front().revision;
+      history_bytes_ -= history_.front().text->size();
+      history_.pop_front();
+    }
+  }
+  enter([&] {
+    for (const auto& viewer : viewers()) viewer->sendText(text);
+  });
+}
+
+void Hub::onSceneLoaded(std::uint64_t revision) {
+  {
+    const std::lock_guard lock(mutex_);
+    revision_ = std::max(revision_, revision);
+    history_.clear();  // patches of another scene
+    history_bytes_ = 0;
+    history_from_ = revision;
+  }
+  enter([&] { broadcast(protocol::SceneLoaded{revision}); });
+}
+
+void Hub::onLightmaps(const std::shared_ptr<const engine::Lightmaps>& lightmaps) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (lightmaps_ == nullptr || lightmaps->layout != layout_) {
+      layout_ = lightmaps->layout;
+      layout_since_ = lightmaps->tile_version;
+    }
+    lightmaps_ = lightmaps;
+  }
+  enter([&] {
+    for (const auto& viewer : viewers()) viewer->lightmapsChanged();
+  });
+}
+
+}  // namespace radiosity::net

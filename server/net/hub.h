@@ -1,0 +1,158 @@
+// What all sessions share: the engine, the viewers, the history of patches for those who come back, answers of patches
+// that may be asked twice, uploads and encoded tiles. Owned by Server, outlives every session. Thread-safe: engine
+// callbacks enter on the solve thread, hold the lock for a copy and hand over to each session's strand.
+#pragma once
+
+#include <chrono>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "protocol/codec.h"
+#include "server/engine/engine.h"
+#include "server/net/blob_store.h"
+#include "server/net/counters.h"
+#include "server/net/server_options.h"
+#include "server/net/tile_cache.h"
+
+namespace radiosity::net {
+
+using SharedText = std::shared_ptr<const std::string>;
+
+/// A TCP connection of any kind, as the server's shutdown sees it. Any thread.
+class Connection {
+ public:
+  virtual ~Connection() = default;
+  /// Finish what was begun, then close.
+  virtual void drain() = 0;
+};
+
+/// A WebSocket session that has said hello, as the hub sees it. Any thread.
+class Viewer {
+ public:
+  virtual ~Viewer() = default;
+  virtual void sendText(SharedText text) = 0;      ///< in order, none lost
+  virtual void sendProgress(SharedText text) = 0;  ///< only the newest counts
+  virtual void lightmapsChanged() = 0;
+};
+
+class Hub : public engine::Listener, public std::enable_shared_from_this<Hub> {
+ public:
+  Hub(const ServerOptions& options, engine::Engine& engine);
+  void start();  ///< listens to the engine
+
+  [[nodiscard]] const ServerOptions& options() const { return options_; }
+  [[nodiscard]] engine::Engine& engine() { return engine_; }
+  [[nodiscard]] const std::string& epoch() const { return epoch_; }
+  [[nodiscard]] std::uint64_t revision() const;  ///< the highest anyone has told us of
+  void sawRevision(std::uint64_t revision);
+  [[nodiscard]] std::shared_ptr<const engine::Lightmaps> lightmaps();
+  [[nodiscard]] protocol::ServerInfo serverInfo();
+
+  void add(const std::weak_ptr<Connection>& connection);
+  void join(const std::weak_ptr<Viewer>& viewer);  ///< tells everyone the new count
+  void leave(const Viewer& viewer);
+  [[nodiscard]] std::size_t viewerCount() const;
+
+  /// From now on calls are refused; tells viewers and connections.
+  void drain();
+  [[nodiscard]] bool draining() const { return draining_.load(); }
+
+  /// What a viewer who has seen `resume` has missed: notifications in order; nothing when it must start afresh.
+  [[nodiscard]] std::optional<std::vector<SharedText>> missedSince(const protocol::Resume& resume) const;
+
+  using PatchAnswer = std::function<void(const tl::expected<protocol::ScenePatchReply, protocol::RpcError>&)>;
+  /// The same requestId gets the same answer; the engine sees it once.
+  void patch(const protocol::ScenePatchCall& call, const std::string& by, PatchAnswer done);
+
+  /// `done` is called once: with reached = true or false (solve stopped), or nothing while draining. Forgotten when
+  /// `owner` is gone.
+  using WaitAnswer = std::function<void(std::optional<protocol::StatusReply>)>;
+  std::uint64_t wait(const protocol::SolveWaitCall& call, std::weak_ptr<void> owner, WaitAnswer done);
+  /// The waiter's time is up: answers it as not reached.
+  void giveUp(std::uint64_t waiter);
+
+  BlobStore& uploads() { return uploads_; }
+  BlobStore& snapshots() { return snapshots_; }
+  TileCache& tiles() { return tiles_; }
+  Counters& counters() { return counters_; }
+
+  /// Everything that comes from the engine passes here, so that nothing reaches for a socket once shut() has returned
+  /// (the engine may still be at work when the server goes). Does nothing after shut().
+  template <typename F>
+  void enter(F&& visit) {
+    const std::lock_guard lock(gate_);
+    if (!shut_) visit();
+  }
+  /// An engine callback that enters before it does anything. `visit` must not own a session.
+  template <typename T, typename F>
+  [[nodiscard]] engine::Engine::Callback<T> fromEngine(F visit) {
+    return [self = shared_from_this(), visit = std::move(visit)](Result<T> result) {
+      self->enter([&] { visit(std::move(result)); });
+    };
+  }
+  void shut();
+
+  void onProgress(const engine::Status& status) override;
+  void onScenePatched(std::uint64_t revision, const std::string& patch, const std::string& by) override;
+  void onSceneLoaded(std::uint64_t revision) override;
+  void onLightmaps(const std::shared_ptr<const engine::Lightmaps>& lightmaps) override;
+
+ private:
+  struct Waiter {
+    std::uint64_t id, revision;
+    std::optional<double> error;
+    std::weak_ptr<void> owner;
+    WaitAnswer done;
+  };
+  struct Remembered {
+    std::size_t fingerprint = 0;
+    std::optional<tl::expected<protocol::ScenePatchReply, protocol::RpcError>> answer;
+    std::vector<PatchAnswer> waiting;
+  };
+  struct PastPatch {
+    std::uint64_t revision;
+    SharedText text;
+  };
+
+  void announceProgress(const engine::Status& status);
+  [[nodiscard]] std::vector<std::shared_ptr<Viewer>> viewers() const;
+  void broadcast(const protocol::Notification& notification);
+  void remember(const std::string& request_id,
+                const tl::expected<protocol::ScenePatchReply, protocol::RpcError>& answer);
+  [[nodiscard]] static std::optional<bool> reached(const Waiter& waiter, const engine::Status& status);
+
+  ServerOptions options_;
+  engine::Engine& engine_;
+  std::string epoch_;
+  std::atomic<bool> draining_{false};
+  BlobStore uploads_, snapshots_;
+  TileCache tiles_;
+  Counters counters_;
+  std::recursive_mutex gate_;  ///< recursive: an engine may call back before its method returns
+  bool shut_ = false;
+
+  mutable std::mutex mutex_;  ///< everything below
+  std::vector<std::weak_ptr<Connection>> connections_;
+  std::vector<std::weak_ptr<Viewer>> viewers_;
+  std::shared_ptr<const engine::Lightmaps> lightmaps_;
+  std::uint64_t layout_ = 0, layout_since_ = 0;  ///< tile version at which the layout was first published
+  std::uint64_t revision_ = 0;
+  std::deque<PastPatch> history_;
+  std::size_t history_bytes_ = 0;
+  std::uint64_t history_from_ = 0;  ///< a client at this revision or later can resume
+  std::map<std::string, Remembered> remembered_;
+  std::deque<std::string> remembered_order_;
+  std::vector<Waiter> waiters_;
+  std::uint64_t next_waiter_ = 1;
+  std::chrono::steady_clock::time_point last_progress_;
+  engine::SolveState last_state_ = engine::SolveState::kEmpty;
+  std::uint64_t last_progress_revision_ = 0;
+};
+
+}  // namespace radiosity::net

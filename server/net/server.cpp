@@ -1,0 +1,172 @@
+#include "server/net/server.h"
+
+#include <fmt/format.h>
+#include <boost/asio/post.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <cerrno>
+#include <chrono>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "common/log.h"
+#include "server/net/access.h"
+#include "server/net/beast.h"
+#include "server/net/http_session.h"
+#include "server/net/hub.h"
+
+namespace radiosity::net {
+
+using Clock = std::chrono::steady_clock;
+
+class Server::State {
+ public:
+  State(const ServerOptions& options, engine::Engine& engine)
+      : hub_(std::make_shared<Hub>(options, engine)),
+        context_(options.threads),
+        strand_(asio::make_strand(context_)),
+        acceptor_(strand_),
+        signals_(strand_),
+        drain_timer_(strand_),
+        retry_timer_(strand_) {}
+
+  ~State() { hub_->shut(); }  // before the sockets go
+  State(const State&) = delete;
+  State& operator=(const State&) = delete;
+
+  Result<void> open();
+  void accept();
+  void watchSignals();
+  void drain();
+  void run();
+
+  std::shared_ptr<Hub> hub_;
+  asio::io_context context_;
+  Strand strand_;
+  asio::basic_socket_acceptor<tcp, Strand> acceptor_;
+  asio::basic_signal_set<Strand> signals_;
+  asio::basic_waitable_timer<Clock, asio::wait_traits<Clock>, Strand> drain_timer_, retry_timer_;
+  bool signalled_ = false;
+  Clock::time_point drain_until_;
+  std::uint16_t port_ = 0;
+
+ private:
+  void waitForLast();
+};
+
+Result<void> Server::State::open() {
+  const auto& options = hub_->options();
+  if (auto safe = checkExposure(options); !safe) return safe;
+  const tcp::endpoint endpoint(asio::ip::make_address(options.address), options.port);
+  BoostError error;
+  acceptor_.open(endpoint.protocol(), error);
+  if (!error) acceptor_.set_option(asio::socket_base::reuse_address(true), error);
+  if (!error) acceptor_.bind(endpoint, error);
+  if (!error) acceptor_.listen(asio::socket_base::max_listen_connections, error);
+  if (!error) port_ = acceptor_.local_endpoint(error).port();
+  if (!error) return {};
+  const auto* advice =
+      error == asio::error::address_in_use ? "; another server is there: choose another --listen port" : "";
+  return fail(ErrorCode::kUnavailable, error.message() + advice,
+              fmt::format("cannot listen on {}:{}", options.address, options.port));
+}
+
+void Server::State::accept() {
+  acceptor_.async_accept(asio::make_strand(context_), [this](BoostError error, auto socket) {
+    if (error == asio::error::operation_aborted) return;
+    if (!error) {
+      ++hub_->counters().connections;
+      const ConnectionSlot slot(nullptr, [hub = hub_](void*) { --hub->counters().connections; });
+      BoostError ignored;
+      socket.set_option(tcp::no_delay(true), ignored);
+      if (hub_->counters().connections.load() <= hub_->options().max_clients) {
+        serveHttp(Stream(std::move(socket)), hub_, slot);
+      } else {
+        // A short answer that fits the socket's buffer: no session is spent on it.
+        static constexpr std::string_view kFull =
+            "HTTP/1.1 503 Service Unavailable\r\nRetry-After: 5\r\nContent-Length: 0\r\nConnection: close\r\n\r\n";
+        ++hub_->counters().connections_refused;
+        socket.non_blocking(true, ignored);
+        socket.send(asio::buffer(kFull), 0, ignored);
+      }
+      return accept();
+    }
+    // Out of file descriptors, usually: trying again at once would spin.
+    log::warn("accept: {}", error.message());
+    retry_timer_.expires_after(std::chrono::milliseconds(100));
+    retry_timer_.async_wait([this](BoostError aborted) {
+      if (!aborted) accept();
+    });
+  });
+}
+
+void Server::State::watchSignals() {
+  signals_.async_wait([this](BoostError error, int number) {
+    if (error) return;
+    if (std::exchange(signalled_, true)) return context_.stop();
+    log::info("signal {}: draining", number);
+    drain();
+    watchSignals();
+  });
+}
+
+void Server::State::drain() {
+  asio::post(strand_, [this] {
+    if (hub_->draining()) return;
+    BoostError ignored;
+    acceptor_.close(ignored);
+    retry_timer_.cancel();
+    drain_until_ = Clock::now() + hub_->options().drain_grace;
+    hub_->drain();
+    waitForLast();
+  });
+}
+
+void Server::State::waitForLast() {
+  if (hub_->counters().connections.load() == 0 || Clock::now() >= drain_until_) return context_.stop();
+  drain_timer_.expires_after(std::chrono::milliseconds(20));
+  drain_timer_.async_wait([this](BoostError error) {
+    if (!error) waitForLast();
+  });
+}
+
+void Server::State::run() {
+  hub_->start();
+  asio::post(strand_, [this] {
+    if (acceptor_.is_open()) accept();
+  });
+  std::vector<std::thread> helpers;
+  for (int i = 1; i < hub_->options().threads; ++i) helpers.emplace_back([this] { context_.run(); });
+  context_.run();
+  for (auto& helper : helpers) helper.join();
+}
+
+Server::Server(std::unique_ptr<State> state) : state_(std::move(state)) {}
+Server::~Server() = default;
+
+Result<std::unique_ptr<Server>> Server::open(const ServerOptions& options, engine::Engine& engine) {
+  auto state = std::make_unique<State>(options, engine);
+  if (auto opened = state->open(); !opened) return tl::unexpected(std::move(opened.error()));
+  return std::unique_ptr<Server>(new Server(std::move(state)));
+}
+
+std::uint16_t Server::port() const { return state_->port_; }
+
+std::string Server::url() const {
+  const auto& address = state_->hub_->options().address;
+  const bool six = address.find(':') != std::string::npos;
+  return six ? fmt::format("http://[{}]:{}", address, state_->port_)
+             : fmt::format("http://{}:{}", address, state_->port_);
+}
+
+void Server::drainOnSignals() {
+  state_->signals_.add(SIGINT);
+  state_->signals_.add(SIGTERM);
+  state_->watchSignals();
+}
+
+void Server::run() { state_->run(); }
+void Server::drain() { state_->drain(); }
+
+}  // namespace radiosity::net

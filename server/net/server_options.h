@@ -1,0 +1,37 @@
+// What the network side can be told. Plain values, set before the server opens; server/options.cpp fills them from the
+// command line, tests shorten the times.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "protocol/limits.h"
+
+namespace radiosity::net {
+
+struct ServerOptions {
+  std::string address = "127.0.0.1";       ///< IP address, no name
+  std::uint16_t port = 8765;               ///< 0: any free one
+  std::string token;                       ///< empty: none needed
+  bool insecure = false;                   ///< allow another than a loopback address without a token
+  std::vector<std::string> allow_origins;  ///< "https://viewer.example.org", beside the server's own
+  std::filesystem::path scene_root;        ///< empty: no server-side files
+  std::size_t max_upload_bytes = protocol::kMaxUploadBytes;
+  std::size_t max_clients = protocol::kMaxClients;
+  int threads = 2;
+  std::string version = "0.0.0";
+
+  std::chrono::milliseconds hello_timeout{protocol::kHelloTimeoutMs};
+  std::chrono::milliseconds write_deadline{protocol::kWriteDeadlineMs};
+  std::chrono::milliseconds close_patience{2'000};   ///< for the closing handshake, then the socket is cut
+  std::chrono::milliseconds header_timeout{10'000};  ///< for a whole HTTP header
+  std::chrono::milliseconds idle_timeout{30'000};    ///< of a kept-alive connection, between bytes of a body, pings
+  std::chrono::milliseconds progress_interval{100};  ///< at least this between two progress notifications
+  std::chrono::milliseconds drain_grace{5'000};
+};
+
+}  // namespace radiosity::net
