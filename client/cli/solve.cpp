@@ -250,19 +250,19 @@ void addSolve(CLI::App& app, Run& run) {
   auto& command = *app.add_subcommand("solve", "solve a scene and write its lightmaps");
   addOutputOptions(command, *options);
   command.add_option("--error", options->error, "target: relative RMS error of irradiance, 0.02 is 2 %")
-      ->check(CLI::Range(1e-6, 1.0))
+      ->check(CLI::Range(1e-6, 1.0).description(""))
       ->type_name("FRACTION")
       ->capture_default_str();
   command
       .add_option("--time-limit", options->time_limit_s, "solving stops after this many seconds (default: no limit)")
-      ->check(CLI::Range(0.001, 1e6))
+      ->check(CLI::Range(0.001, 1e6).description(""))
       ->type_name("SECONDS");
   auto* texels = command.add_option("--texels", options->texels, "lightmap texels (leaf patches) in all, about")
-                     ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 28U))
+                     ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 28U).description(""))
                      ->type_name("COUNT")
                      ->capture_default_str();
   command.add_option("--texel-size", options->texel_size_m, "side of a texel in metres, instead of --texels")
-      ->check(CLI::Range(1e-6, 1e6))
+      ->check(CLI::Range(1e-6, 1e6).description(""))
       ->type_name("METRES")
       ->excludes(texels);
   command.add_option("--seed", options->seed, "the same seed gives the same bits")
@@ -270,7 +270,7 @@ void addSolve(CLI::App& app, Run& run) {
       ->capture_default_str();
   auto* workers =
       command.add_option("--workers", options->workers, "render processes of the private server (default: one a core)")
-          ->check(CLI::Range(1U, 256U))
+          ->check(CLI::Range(1U, 256U).description(""))
           ->type_name("N");
   command.add_option("--server", options->server.url, "solve there rather than on a private radiosityd")
       ->type_name("URL")

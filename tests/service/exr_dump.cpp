@@ -28,7 +28,9 @@ int main(int argc, char** argv) try {
   const std::size_t row_bytes = kPixelBytes * static_cast<std::size_t>(width);
   Imf::FrameBuffer frame;
   for (int c = 0; c < 3; ++c) {
-    frame.insert(c == 0 ? "R" : c == 1 ? "G" : "B",
+    frame.insert(c == 0   ? "R"
+                 : c == 1 ? "G"
+                          : "B",
                  Imf::Slice::Make(Imf::FLOAT, pixels.data() + c, window, kPixelBytes, row_bytes));
   }
   file.setFrameBuffer(frame);
