@@ -1,6 +1,7 @@
 // `radiosity`: the command-line client.
 #include <cstdio>
 #include <exception>
+#include <string>
 
 #include "client/cli/commands.h"
 #include "client/cli/interrupt.h"
@@ -17,7 +18,9 @@ int main(int argc, char** argv) {
   } catch (const CLI::Success& wanted) {  // --help, --version
     return app.exit(wanted);
   } catch (const CLI::ParseError& error) {
-    std::fprintf(stderr, "radiosity: error: %s\nTry: radiosity --help, or radiosity COMMAND --help\n", error.what());
+    const auto commands = app.get_subcommands();
+    const std::string command = commands.empty() ? "" : " " + commands.front()->get_name();
+    std::fprintf(stderr, "radiosity: error: %s\nTry: radiosity%s --help\n", error.what(), command.c_str());
     return static_cast<int>(ExitCode::kBadInput);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "radiosity: error: %s\n", error.what());

@@ -4,12 +4,11 @@
 
 #include <filesystem>
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "client/cli/interrupt.h"
 #include "client/cli/scene_file.h"
-#include "protocol/json_rpc.h"
+#include "protocol/http_bodies.h"
 
 namespace radiosity::cli {
 namespace {
@@ -32,35 +31,6 @@ Result<std::string> readToken(const std::string& path) {
   if (token.find_first_of("\r\n") != std::string::npos)
     return fail(ErrorCode::kBadUsage, "the token file must hold one line", path);
   return token;
-}
-
-/// Body of an error answer: {"error": {code, message, data}} as on the WebSocket, or plain text.
-std::optional<Error> errorInBody(const std::string& body) {
-  const auto messages = protocol::parseRpc(body, client::kMaxReplyBytes);
-  if (messages.items.size() == 1)
-    if (const auto* response = std::get_if<protocol::RpcResponse>(&messages.items.front()); response != nullptr)
-      if (response->error) return protocol::fromRpcError(*response->error);
-  return std::nullopt;
-}
-
-ErrorCode codeOfStatus(unsigned status) {
-  switch (status) {
-    case 400:
-    case 415:
-    case 422:
-      return ErrorCode::kBadInput;
-    case 404:
-      return ErrorCode::kNotFound;
-    case 409:
-      return ErrorCode::kStaleRevision;
-    case 413:
-      return ErrorCode::kTooLarge;
-    case 429:
-    case 503:
-      return ErrorCode::kBusy;
-    default:
-      return ErrorCode::kUnavailable;
-  }
 }
 
 /// Numbers of a transfer for the progress line.
@@ -146,15 +116,20 @@ Result<Remote> remoteFrom(const RemoteOptions& options) {
 }
 
 Error httpError(const client::HttpReply& reply, const std::string& where) {
-  if (auto error = errorInBody(reply.body)) {
-    error->where = error->where.empty() ? where : where + ": " + error->where;
-    return *error;
+  Error error = protocol::decodeHttpError(static_cast<int>(reply.status), reply.body);
+  error.message.resize(std::min(error.message.size(), kMaxErrorTextBytes));
+  if (reply.status == 401 || reply.status == 403) error.message += " (is the token right? --token-file)";
+  if (reply.status == 503) error.code = ErrorCode::kBusy;
+  // The server knows the upload by its file name; we know where the file lies.
+  const std::string name = std::filesystem::path(where).filename().string();
+  if (error.where.empty() || error.where == name) {
+    error.where = where;
+  } else if (error.where.starts_with(name + ":")) {
+    error.where = where + error.where.substr(name.size());
+  } else {
+    error.where = where + ": " + error.where;
   }
-  std::string text = reply.body.substr(0, kMaxErrorTextBytes);
-  while (!text.empty() && (text.back() == '\n' || text.back() == '\r')) text.pop_back();
-  if (text.empty()) text = "the server answered with HTTP status " + std::to_string(reply.status);
-  if (reply.status == 401 || reply.status == 403) text += " (is the token right? --token-file)";
-  return {codeOfStatus(reply.status), text, where};
+  return error;
 }
 
 Result<Loaded> uploadScene(const Remote& remote, const std::string& path, ProgressDisplay& display) {
@@ -162,20 +137,20 @@ Result<Loaded> uploadScene(const Remote& remote, const std::string& path, Progre
   if (!kind) return tl::unexpected(kind.error());
   auto http = remote.http();
   http.progress = showTransfer(display, "uploading " + path);
+  const std::string target = "/scene?name=" + client::percentEncode(std::filesystem::path(path).filename().string());
   Result<client::HttpReply> reply = client::HttpReply{};
   if (*kind == SceneKind::kGlb) {
-    reply = client::httpPutFile(http, "/scene", "model/gltf-binary", path);
+    reply = client::httpPutFile(http, target, "model/gltf-binary", path);
   } else {
     auto text = inlineExternalFiles(path);
     if (!text) return tl::unexpected(text.error());
-    reply = client::httpPutText(http, "/scene", "model/gltf+json", std::move(*text));
+    reply = client::httpPutText(http, target, "model/gltf+json", std::move(*text));
   }
   if (!reply) return tl::unexpected(reply.error());
   if (!reply->ok()) return tl::unexpected(httpError(*reply, path));
-  const auto body = protocol::parseJson(reply->body);
-  if (!body) return fail(ErrorCode::kUnavailable, "the server's answer to the upload is not JSON", remote.url.text());
-  auto loaded = protocol::decodeReply<protocol::SceneLoadReply>(**body);
-  if (!loaded) return tl::unexpected(loaded.error());
+  auto loaded = protocol::decodeHttpLoad(reply->body);
+  if (!loaded)
+    return fail(ErrorCode::kUnavailable, "the answer to the upload: " + loaded.error().text(), remote.url.text());
   return Loaded{loaded->revision, std::move(loaded->warnings)};
 }
 

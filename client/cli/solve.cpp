@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <filesystem>
 #include <memory>
 #include <optional>
 
@@ -92,7 +93,10 @@ class Solve {
     if (!program) return tl::unexpected(program.error());
     ServerProcess::Options start{.program = *program, .arguments = {}, .keep_going = [] { return !interrupted(); }};
     if (options_.workers > 0) start.arguments = {"--workers", std::to_string(options_.workers)};
-    if (by_path_) start.arguments.push_back(options_.scene);
+    if (by_path_) {
+      const auto folder = std::filesystem::canonical(options_.scene).parent_path();
+      start.arguments.insert(start.arguments.end(), {"--scene-root", folder.string()});
+    }
     display_.showText("starting radiosityd");
     auto server = ServerProcess::start(start);
     if (!server) return tl::unexpected(server.error());
@@ -118,7 +122,7 @@ class Solve {
   }
 
   CallResult<void> load(client::Connection& connection) {
-    if (by_path_) return {};  // the server was started with it
+    if (by_path_) return loadByPath(connection);
     // The connection is kept alive while the upload runs.
     Remote uploader = remote_;
     uploader.keep_going = [this, &connection] {
@@ -129,6 +133,27 @@ class Solve {
     if (!loaded) return tl::unexpected(CallFailure{loaded.error()});
     revision_ = loaded->revision;
     return {};
+  }
+
+  /// Our private server reads the .gltf and its files itself, from their folder.
+  CallResult<void> loadByPath(client::Connection& connection) {
+    constexpr auto kLoadTimeout = 10min;
+    display_.showText("loading " + options_.scene);
+    const auto name = std::filesystem::canonical(options_.scene).filename().string();
+    const auto loaded = connection.call(protocol::SceneLoadCall{.url = "file:" + name}, kLoadTimeout);
+    if (!loaded) return tl::unexpected(placed(loaded.error()));
+    revision_ = loaded->revision;
+    return {};
+  }
+
+  /// The server knows the scene by its bare name; the message names it as the user did.
+  [[nodiscard]] CallFailure placed(CallFailure failure) const {
+    const auto name = std::filesystem::path(options_.scene).filename().string();
+    auto& where = failure.error.where;
+    if (where.starts_with(name)) where.erase(0, name.size());
+    if (where.starts_with(": ")) where.erase(0, 2);
+    where = options_.scene + (where.empty() ? "" : ": " + where);
+    return failure;
   }
 
   void onNotification(const protocol::Notification& note) {
@@ -154,10 +179,10 @@ class Solve {
             {ErrorCode::kUnavailable, "another client loaded another scene into this server", remote_.url.text()}});
       if (progress.state == "failed")
         return tl::unexpected(CallFailure{{ErrorCode::kUnavailable, "the solve failed: " + progress.failure, {}}});
-      if (progress.state == "empty" && (!by_path_ || revision_ > 0))
+      if (progress.state == "empty")
         return tl::unexpected(CallFailure{{ErrorCode::kUnavailable, "the server lost the scene", remote_.url.text()}});
       display_.show(viewOf(progress, options_.error));
-      const bool is_ours = progress.revision >= std::max<std::uint64_t>(revision_, 1);
+      const bool is_ours = progress.revision >= revision_;
       if (is_ours && (progress.state == "converged" || progress.state == "timeLimit")) return status;
       const auto next = std::chrono::steady_clock::now() + kStatusInterval;
       while (!ask_now_ && std::chrono::steady_clock::now() < next) {
@@ -203,10 +228,7 @@ class Solve {
       passOnLog();
       return complain(server_->epitaph());
     }
-    Error error = failure.error;
-    if (error.code == ErrorCode::kInvalidScene && error.where.find(options_.scene) == std::string::npos)
-      error.where = options_.scene + (error.where.empty() ? "" : ": " + error.where);
-    return complain(error);
+    return complain(failure);
   }
 
   void passOnLog() {
@@ -250,19 +272,19 @@ void addSolve(CLI::App& app, Run& run) {
   auto& command = *app.add_subcommand("solve", "solve a scene and write its lightmaps");
   addOutputOptions(command, *options);
   command.add_option("--error", options->error, "target: relative RMS error of irradiance, 0.02 is 2 %")
-      ->check(CLI::Range(1e-6, 1.0))
+      ->check(CLI::Range(1e-6, 1.0).description(""))
       ->type_name("FRACTION")
       ->capture_default_str();
   command
       .add_option("--time-limit", options->time_limit_s, "solving stops after this many seconds (default: no limit)")
-      ->check(CLI::Range(0.001, 1e6))
+      ->check(CLI::Range(0.001, 1e6).description(""))
       ->type_name("SECONDS");
   auto* texels = command.add_option("--texels", options->texels, "lightmap texels (leaf patches) in all, about")
-                     ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 28U))
+                     ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 28U).description(""))
                      ->type_name("COUNT")
                      ->capture_default_str();
   command.add_option("--texel-size", options->texel_size_m, "side of a texel in metres, instead of --texels")
-      ->check(CLI::Range(1e-6, 1e6))
+      ->check(CLI::Range(1e-6, 1e6).description(""))
       ->type_name("METRES")
       ->excludes(texels);
   command.add_option("--seed", options->seed, "the same seed gives the same bits")
@@ -270,7 +292,7 @@ void addSolve(CLI::App& app, Run& run) {
       ->capture_default_str();
   auto* workers =
       command.add_option("--workers", options->workers, "render processes of the private server (default: one a core)")
-          ->check(CLI::Range(1U, 256U))
+          ->check(CLI::Range(1U, 256U).description(""))
           ->type_name("N");
   command.add_option("--server", options->server.url, "solve there rather than on a private radiosityd")
       ->type_name("URL")

@@ -1,0 +1,120 @@
+"""The client's other commands against a server that runs already."""
+import json
+import signal
+import struct
+import unittest
+
+import plates
+from harness import ServiceCase, waitForLine
+
+EDIT = json.dumps([{"op": "replace", "path": f"/materials/{plates.LAMP_MATERIAL}/emissiveFactor", "value": [1, 1, 1]}])
+QUICK = ("--error", 0.05, "--texels", 2000)
+
+
+class RemoteTest(ServiceCase):
+    def setUp(self):
+        super().setUp()
+        self.scene = self.folder / "plates.glb"
+        plates.write_glb(self.scene, plates.document())
+
+    def solved(self, *arguments):
+        """A server that has solved the scene; the client did it."""
+        server = self.server(*arguments)
+        self.client("solve", self.scene, "-o", "lit.glb", "--server", server.url, *QUICK)
+        return server
+
+    def test_solveOnAServerLeavesItRunning(self):
+        server = self.solved()
+        self.assertIsNone(server.process.poll())
+        status = json.loads(self.client("status", server.url, "--json")[0])
+        self.assertEqual(status["state"], "converged")
+        self.assertIn("plates.glb", self.files())
+        self.assertIn("lit.lightmap.0.exr", self.files())
+
+    def test_everyFormOfAddressIsUnderstood(self):
+        server = self.server()
+        for url in (f"127.0.0.1:{server.port}", f"http://127.0.0.1:{server.port}/", f"ws://127.0.0.1:{server.port}/ws"):
+            self.assertIn("state", self.client("status", url)[0])
+
+    def test_gltfWithExternalFilesIsPackedForTheServer(self):
+        server = self.server()
+        plates.write_gltf(self.folder / "room.gltf", plates.document(), "my data.bin")
+        out, _ = self.client("load", server.url, "room.gltf")
+        self.assertRegex(out, r"^revision \d+\n$")
+
+    def test_editPrintsRevisionAndWhatItAffects(self):
+        server = self.solved()
+        before = json.loads(self.client("status", server.url, "--json")[0])["revision"]
+        dry, _ = self.client("edit", server.url, "-", "--dry-run", stdin=EDIT)
+        self.assertIn("dry run", dry)
+        self.assertEqual(json.loads(self.client("status", server.url, "--json")[0])["revision"], before)
+        (self.folder / "patch.json").write_text(EDIT)
+        out, _ = self.client("edit", server.url, "patch.json", "--base-revision", before)
+        self.assertRegex(out, rf"^revision {before + 1}, affected: \d+ surfaces, \d+ shots\n$")
+        self.assertIn("revision", self.complaint("edit", server.url, "patch.json", "--base-revision", before))
+
+    def test_badEditsExit2WithOperationPointerAndReason(self):
+        server = self.solved()
+        line = self.complaint("edit", server.url, "-", stdin='[{"op":"replace","path":"/materials/99/name","value":1}]')
+        self.assertIn("operation 0", line)
+        self.assertIn("/materials/99", line)
+        self.assertIn("standard input", self.complaint("edit", server.url, "-", stdin='[{"op":'))
+        self.assertIn("no such file", self.complaint("edit", server.url, "gone.json"))
+
+    def test_snapshotWritesAPicture(self):
+        server = self.solved()
+        for extra in ((), ("--camera", "front"), ("--quantity", "irradiance")):
+            self.client("snapshot", server.url, "-o", "a.png", "--width", 64, "--height", 48, *extra)
+            png = (self.folder / "a.png").read_bytes()
+            self.assertEqual(png[:8], b"\x89PNG\r\n\x1a\n")
+            self.assertEqual(struct.unpack(">2I", png[16:24]), (64, 48))
+        self.assertIn("nosuch", self.complaint("snapshot", server.url, "-o", "b.png", "--camera", "nosuch"))
+        self.assertNotIn("b.png", self.files())
+
+    def test_saveWritesSceneAndLightmaps(self):
+        server = self.solved()
+        out, _ = self.client("save", server.url, "-o", "again.glb")
+        self.assertEqual(out.splitlines(), ["again.glb", "again.lightmap.0.exr"])
+        for ending in (".glb", ".lightmap.0.exr"):
+            self.assertEqual((self.folder / f"again{ending}").read_bytes(), (self.folder / f"lit{ending}").read_bytes())
+
+    def test_watchEndsWhenTheSolveHasConverged(self):
+        server = self.solved()
+        out, _ = self.client("watch", server.url)
+        self.assertTrue(out.startswith("converged: error "), out)
+
+    def test_watchComesBackAfterTheServerHasRestarted(self):
+        server = self.solved()
+        watching = self.start("watch", server.url, "--follow")
+        waitForLine(watching.stderr, "shots")
+        server.terminate()
+        waitForLine(watching.stderr, "trying again")
+        self.server(port=server.port)
+        waitForLine(watching.stderr, "empty")
+        watching.send_signal(signal.SIGINT)
+        self.assertEqual(watching.wait(10), 75)
+
+    def test_tokenIsNeededAndSuffices(self):
+        (self.folder / "token").write_text("a-long-enough-token-for-a-test\n")
+        (self.folder / "wrong").write_text("another-long-enough-token\n")
+        server = self.server("--token-file", self.folder / "token")
+        self.assertIn("state", self.client("status", server.url, "--token-file", "token")[0])
+        self.assertIn("token", self.complaint("status", server.url, expect=1))
+        self.assertIn("token", self.complaint("load", server.url, self.scene, "--token-file", "wrong", expect=1))
+
+    def test_nobodyListeningIsSaidPlainly(self):
+        server = self.server()
+        server.terminate()
+        for command in (("status", server.url), ("watch", server.url), ("load", server.url, self.scene),
+                        ("save", server.url, "-o", "a.glb"), ("snapshot", server.url, "-o", "a.png")):
+            with self.subTest(command=command[0]):
+                self.assertIn("connection refused", self.complaint(*command, expect=1))
+        self.assertEqual(self.files(), ["plates.glb"])
+
+    def test_emptyServerHasNothingToSave(self):
+        server = self.server()
+        self.assertIn("no scene", self.complaint("save", server.url, "-o", "a.glb"))
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,164 @@
+"""`radiosity solve` with a private server: files, report, exit codes, and nothing left behind."""
+import json
+import os
+import signal
+import struct
+import time
+import unittest
+
+import plates
+from harness import ServiceCase, marked_processes, program, waitForLine
+
+QUICK = ("--error", 0.05, "--texels", 2000)
+ENDLESS = ("--error", 1e-6, "--texels", 20000)
+
+
+class SolveTest(ServiceCase):
+    def setUp(self):
+        super().setUp()
+        self.scene = self.folder / "plates.glb"
+        plates.write_glb(self.scene, plates.lit_document())
+
+    def floor_mean(self, stem):
+        glb = plates.Glb((self.folder / f"{stem}.glb").read_bytes())
+        page, uvs = plates.floor_place(glb)
+        return plates.Page.from_exr(self.folder / f"{stem}.lightmap.{page}.exr", program("EXR_DUMP")).mean_in(uvs)
+
+    def test_writesSceneLightmapsPictureAndReport(self):
+        out, _ = self.client("solve", self.scene, "-o", "lit.glb", "--png", "lit.png", "--report", "r.json", *QUICK)
+        self.assertEqual(out.splitlines(), [f for f in ("lit.glb", "lit.lightmap.0.exr", "lit.png")])
+        self.assertEqual(self.files(), ["lit.glb", "lit.lightmap.0.exr", "lit.png", "plates.glb", "r.json"])
+
+        glb = plates.Glb((self.folder / "lit.glb").read_bytes())
+        for mesh in glb.json["meshes"]:
+            for primitive in mesh["primitives"]:
+                self.assertEqual(primitive["extras"]["lightmap"], 0)
+                for u, v in glb.vec2s(primitive["attributes"]["TEXCOORD_1"]):
+                    self.assertTrue(0 <= u <= 1 and 0 <= v <= 1, (u, v))
+        self.assertAlmostEqual(self.floor_mean("lit") / plates.FLOOR_MEAN_LUX, 1, delta=0.15)
+
+        png = (self.folder / "lit.png").read_bytes()
+        self.assertEqual(png[:8], b"\x89PNG\r\n\x1a\n")
+        self.assertEqual(struct.unpack(">2I", png[16:24]), (960, 720))
+        self.check_report(json.loads((self.folder / "r.json").read_text()))
+
+    def check_report(self, report):
+        for name in ("seconds", "shots", "patches", "surfaces", "polygons", "revision"):
+            self.assertIsInstance(report[name], (int, float), name)
+        self.assertEqual(set(report["error"]), {"total", "residual", "sampling", "discretization"})
+        self.assertEqual(set(report["energy"]), {"emitted", "absorbed", "escaped", "backface", "unshot"})
+        self.assertLessEqual(report["error"]["total"], 0.05)
+        self.assertGreater(report["patches"], 500)
+        self.assertEqual(report["polygons"], 2)
+        self.assertIsInstance(report["gl_renderer"], str)
+        self.assertTrue(report["gl_renderer"])
+        self.assertIsInstance(report["warnings"], list)
+        energy = report["energy"]
+        # both faces of the lamp's square: its front emits pi * L * 1 m2, times three channels
+        self.assertAlmostEqual(energy["emitted"], 3 * 3.14159265 * plates.LUMINANCE_NITS, delta=0.01)
+
+    def test_readsAGltfWithItsBufferBesideIt(self):
+        plates.write_gltf(self.folder / "room.gltf", plates.lit_document(), "my data.bin")
+        self.client("solve", "room.gltf", "-o", "lit.glb", *QUICK)
+        self.assertAlmostEqual(self.floor_mean("lit") / plates.FLOOR_MEAN_LUX, 1, delta=0.15)
+
+    def test_unlitShowsTheResultInAnyViewer(self):
+        self.client("solve", self.scene, "-o", "lit.glb", "--unlit", *QUICK)
+        glb = plates.Glb((self.folder / "lit.glb").read_bytes())
+        self.assertIn("KHR_materials_unlit", glb.json["extensionsUsed"])
+        self.assertTrue(glb.json["images"])
+
+    def test_sameSeedGivesTheSameBytesForAnyNumberOfWorkers(self):
+        for name, workers in (("one", 1), ("two", 2)):
+            self.client("solve", self.scene, "-o", f"{name}.glb", "--seed", 7, "--workers", workers, *QUICK)
+        for ending in (".glb", ".lightmap.0.exr"):
+            self.assertEqual((self.folder / f"one{ending}").read_bytes(), (self.folder / f"two{ending}").read_bytes())
+
+    def test_timeLimitWritesWhatThereIsAndExits3(self):
+        _, errors = self.client("solve", self.scene, "-o", "lit.glb", *ENDLESS, "--time-limit", 1, "--report", "r.json",
+                                expect=3)
+        self.assertIn("time limit", errors)
+        self.assertEqual(self.files(), ["lit.glb", "lit.lightmap.0.exr", "plates.glb", "r.json"])
+        report = json.loads((self.folder / "r.json").read_text())
+        self.assertGreater(report["error"]["total"], 1e-6)
+        self.assertFalse(report["reached"])
+
+    def test_interruptionExits75AtOnceAndLeavesNothing(self):
+        for number in (signal.SIGINT, signal.SIGTERM):
+            process = self.start("solve", self.scene, "-o", "lit.glb", *ENDLESS)
+            waitForLine(process.stderr, "shots")
+            asked = time.monotonic()
+            process.send_signal(number)
+            self.assertEqual(process.wait(10), 75)
+            self.assertLess(time.monotonic() - asked, 5)  # generous: "at once" on a loaded machine
+            self.assertIn("interrupted", process.stderr.read())
+            self.assertNothingLeft()
+            self.assertEqual(self.files(), ["plates.glb"])
+
+    def test_killedClientTakesItsServerAlong(self):
+        process = self.start("solve", self.scene, "-o", "lit.glb", *ENDLESS)
+        waitForLine(process.stderr, "shots")
+        self.assertGreater(len(marked_processes(self.mark)), 1)
+        process.kill()
+        process.wait()
+        self.assertNothingLeft()
+
+    def test_killedPrivateServerIsReported(self):
+        process = self.start("solve", self.scene, "-o", "lit.glb", *ENDLESS)
+        waitForLine(process.stderr, "shots")
+        children = (f"/proc/{process.pid}/task/{process.pid}/children")
+        with open(children, encoding="ascii") as file:
+            os.kill(int(file.read().split()[0]), signal.SIGKILL)
+        self.assertEqual(process.wait(20), 1)
+        self.assertIn("signal", process.stderr.read())
+        self.assertEqual(self.files(), ["plates.glb"])
+
+    def test_wrongInputExits2WithOneClearLine(self):
+        (self.folder / "empty.glb").touch()
+        (self.folder / "notes.obj").write_text("v 0 0 0\n")
+        (self.folder / "broken.glb").write_bytes(self.scene.read_bytes()[:200])
+        (self.folder / "away.gltf").write_text('{"asset":{"version":"2.0"},"buffers":[{"uri":"gone.bin","byteLength":4}]}')
+        cases = {
+            ("missing.glb",): "no such file",
+            (".",): "folder",
+            ("empty.glb",): "empty",
+            ("notes.obj",): "export",
+            ("broken.glb",): "broken.glb",
+            ("away.gltf",): "gone.bin",
+        }
+        for scene, reason in cases.items():
+            with self.subTest(scene=scene):
+                self.assertIn(reason, self.complaint("solve", *scene, "-o", "lit.glb"))
+        self.assertNotIn("lit.glb", self.files())
+
+    def test_badSceneNamesFilePointerAndReason(self):
+        scene = plates.lit_document()
+        scene["accessors"][0]["count"] = 1000000
+        plates.write_glb(self.folder / "bad.glb", scene)
+        line = self.complaint("solve", "bad.glb", "-o", "lit.glb")
+        self.assertIn("bad.glb", line)
+        self.assertIn("/accessors/0", line)
+
+    def test_wrongUsageExits2WithAHint(self):
+        for arguments, reason in {
+            ("solve", "plates.glb"): "--output",
+            ("solve", "plates.glb", "-o", "lit.png"): ".glb",
+            ("solve", "plates.glb", "-o", "no/such/lit.glb"): "does not exist",
+            ("solve", "plates.glb", "-o", "lit.glb", "--eror", "1"): "--eror",
+            ("solve", "plates.glb", "-o", "lit.glb", "--error", "2"): "--error",
+            ("solve", "plates.glb", "-o", "lit.glb", "--texels", "9", "--texel-size", "1"): "--texel",
+            (): "subcommand",
+        }.items():
+            with self.subTest(arguments=arguments):
+                self.assertIn(reason, self.complaint(*arguments))
+        _, errors = self.client("solve", "--eror", expect=2)
+        self.assertIn("radiosity solve --help", errors)
+
+    def test_noDriverIsPassedOnInOneLine(self):
+        nowhere = {"__EGL_VENDOR_LIBRARY_DIRS": str(self.folder), "__EGL_VENDOR_LIBRARY_FILENAMES": ""}
+        line = self.complaint("solve", self.scene, "-o", "lit.glb", *QUICK, expect=1, env=nowhere)
+        self.assertIn("EGL", line)
+
+
+if __name__ == "__main__":
+    unittest.main()
