@@ -16,7 +16,7 @@ struct ProgressView {
   std::uint64_t shots = 0;
   double shots_per_second = 0.0;
   double seconds = 0.0;  ///< of solving
-  std::optional<double> seconds_left;
+  std::optional<double> seconds_left = {};
   bool show_parts = false;  ///< the three parts of the error too
 };
 

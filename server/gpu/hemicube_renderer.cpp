@@ -69,11 +69,13 @@ void HemicubeRenderer::collect(std::uint32_t resolution, std::span<const Hemicub
     auto first = static_cast<std::uint32_t>(indices_.size());
     const auto counts = culler_.cull(hemicubeAxes(views[i].frame), indices_);
     for (std::uint32_t face = 0; face < RAD_FACES; ++face) {
-      const auto count = counts[face];
-      if (count > 0) commands_.push_back({count, 1, first, 0, static_cast<std::uint32_t>(i) * RAD_FACES + face});
-      first += count;
-      counters.triangles_drawn += count / 3;
-      counters.triangles_culled += culler_.triangleCount() - count / 3;
+      const auto view = static_cast<std::uint32_t>(i) * RAD_FACES + face;
+      for (const auto count : {counts[face].inside, counts[face].crossing}) {
+        if (count > 0) commands_.push_back({count, 1, first, 0, view});
+        first += count;
+        counters.triangles_drawn += count / 3;
+      }
+      counters.triangles_culled += culler_.triangleCount() - (counts[face].inside + counts[face].crossing) / 3;
     }
   }
 }

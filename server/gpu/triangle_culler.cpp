@@ -1,6 +1,7 @@
 #include "server/gpu/triangle_culler.h"
 
 #include <algorithm>
+#include <bit>
 
 namespace radiosity::gpu {
 namespace {
@@ -15,11 +16,11 @@ struct Corners {
   const float* z;
 };
 
-std::uint8_t bit(bool set, int face) { return static_cast<std::uint8_t>(static_cast<int>(set) << face); }
+std::uint16_t bit(bool set, int place) { return static_cast<std::uint16_t>(static_cast<int>(set) << place); }
 
 /// A face's pyramid is cut by planes through the origin; a triangle is out when all corners lie outside one of them.
 void classify(const HemicubeAxes& axes, const std::array<Corners, 3>& corners, std::size_t count,
-              std::uint8_t* __restrict faces) {
+              std::uint16_t* __restrict faces) {
   const auto [o, t, b, n] = axes;
   for (std::size_t i = 0; i < count; ++i) {
     float x[3], y[3], z[3];
@@ -47,7 +48,15 @@ void classify(const HemicubeAxes& axes, const std::array<Corners, 3>& corners, s
     const bool mx = above & (zpx_low < 0) & (xpy_low < 0) & (xy_low < 0);
     const bool py = above & (zy_low < 0) & (xy_low < 0) & (xpy_high > 0);
     const bool my = above & (zpy_low < 0) & (xpy_low < 0) & (xy_high > 0);
-    faces[i] = static_cast<std::uint8_t>(bit(top, 0) | bit(px, 1) | bit(mx, 2) | bit(py, 3) | bit(my, 4));
+    const bool risen = std::min({z[0], z[1], z[2]}) > 0;
+    const bool top_in = top & (zx_low > 0) & (zpx_low > 0) & (zy_low > 0) & (zpy_low > 0);
+    const bool px_in = px & risen & (zx_high < 0) & (xy_low > 0) & (xpy_low > 0);
+    const bool mx_in = mx & risen & (zpx_high < 0) & (xpy_high < 0) & (xy_high < 0);
+    const bool py_in = py & risen & (zy_high < 0) & (xy_high < 0) & (xpy_low > 0);
+    const bool my_in = my & risen & (zpy_high < 0) & (xpy_high < 0) & (xy_low > 0);
+    faces[i] =
+        static_cast<std::uint16_t>(bit(top, 0) | bit(px, 1) | bit(mx, 2) | bit(py, 3) | bit(my, 4) | bit(top_in, 8) |
+                                   bit(px_in, 9) | bit(mx_in, 10) | bit(py_in, 11) | bit(my_in, 12));
   }
 }
 
@@ -62,27 +71,28 @@ TriangleCuller::TriangleCuller(const scene::PatchScene& patches)
       for (int axis = 0; axis < 3; ++axis) corner_[c][axis][i] = position[axis];
     }
   }
-  for (auto& face : seen_) face.resize(3 * triangle_count_);
+  for (auto& list : seen_) list.resize(3 * triangle_count_);
 }
 
-std::array<std::uint32_t, RAD_FACES> TriangleCuller::cull(const HemicubeAxes& axes,
-                                                          std::vector<std::uint32_t>& indices) {
+TriangleCuller::Counts TriangleCuller::cull(const HemicubeAxes& axes, std::vector<std::uint32_t>& indices) {
   std::array<Corners, 3> corners{};
   for (int c = 0; c < 3; ++c) corners[c] = {corner_[c][0].data(), corner_[c][1].data(), corner_[c][2].data()};
   classify(axes, corners, triangle_count_, faces_.data());
-  std::array<std::uint32_t, RAD_FACES> count{};
+  std::array<std::uint32_t, 2 * RAD_FACES> count{};
   for (std::size_t i = 0; i < triangle_count_; ++i) {
-    if (faces_[i] == 0) continue;
-    for (int face = 0; face < RAD_FACES; ++face) {
-      if ((faces_[i] >> face & 1) == 0) continue;
-      std::copy_n(&indices_[3 * i], 3, &seen_[face][count[face]]);
-      count[face] += 3;
+    for (auto faces = faces_[i] & 0xFFU; faces != 0; faces &= faces - 1) {
+      const auto face = static_cast<unsigned>(std::countr_zero(faces));
+      const auto list = 2 * face + 1 - (faces_[i] >> (8 + face) & 1U);
+      std::copy_n(&indices_[3 * i], 3, &seen_[list][count[list]]);
+      count[list] += 3;
     }
   }
-  for (int face = 0; face < RAD_FACES; ++face) {
-    indices.insert(indices.end(), seen_[face].begin(), seen_[face].begin() + count[face]);
+  Counts counts{};
+  for (std::size_t list = 0; list < seen_.size(); ++list) {
+    indices.insert(indices.end(), seen_[list].begin(), seen_[list].begin() + count[list]);
+    (list % 2 == 0 ? counts[list / 2].inside : counts[list / 2].crossing) = count[list];
   }
-  return count;
+  return counts;
 }
 
 }  // namespace radiosity::gpu

@@ -16,9 +16,16 @@ class TriangleCuller {
   TriangleCuller() = default;
   explicit TriangleCuller(const scene::PatchScene& patches);
 
-  /// Appends to `indices` the corners of the triangles that may be seen through each face, in scene order, and returns
-  /// how many indices each face got. Nothing at or below the plane of the shooter is seen.
-  std::array<std::uint32_t, RAD_FACES> cull(const HemicubeAxes& axes, std::vector<std::uint32_t>& indices);
+  /// Index counts of one face: triangles that lie wholly inside its pyramid, then triangles that cross its border. They
+  /// are drawn apart: llvmpipe takes a slow path for a whole draw as soon as one of its triangles must be clipped.
+  struct FaceCount {
+    std::uint32_t inside = 0, crossing = 0;
+  };
+  using Counts = std::array<FaceCount, RAD_FACES>;
+
+  /// Appends to `indices` the corners of the triangles that may be seen through each face (inside, then crossing, face
+  /// by face, in scene order). Nothing at or below the plane of the shooter is seen.
+  Counts cull(const HemicubeAxes& axes, std::vector<std::uint32_t>& indices);
 
   [[nodiscard]] std::size_t triangleCount() const { return triangle_count_; }
 
@@ -27,8 +34,8 @@ class TriangleCuller {
   /// corner_[c][axis][triangle]
   std::array<std::array<std::vector<float>, 3>, 3> corner_;
   std::vector<std::uint32_t> indices_;
-  std::vector<std::uint8_t> faces_;  ///< bit f: face f may see the triangle
-  std::array<std::vector<std::uint32_t>, RAD_FACES> seen_;
+  std::vector<std::uint16_t> faces_;  ///< bit f: face f may see the triangle; bit 8 + f: it lies inside
+  std::array<std::vector<std::uint32_t>, 2 * RAD_FACES> seen_;  ///< face f: 2 f inside, 2 f + 1 crossing
 };
 
 }  // namespace radiosity::gpu

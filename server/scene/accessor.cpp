@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstring>
 
-#include "common/check.h"
 #include "server/scene/json_text.h"
 
 namespace radiosity::scene {
@@ -175,7 +174,6 @@ Result<AccessorReader> AccessorReader::open(const Document& document, const tiny
   reader.normalized_ = accessor.normalized;
   reader.count_ = accessor.count;
   reader.components_ = componentCount(accessor);
-  RAD_CHECK_LE(reader.components_, std::size_t{4});
   reader.element_bytes_ = elementBytes(accessor);
   if (const auto* view = viewOf(model, accessor.bufferView)) {
     reader.stride_ = view->byteStride == 0 ? reader.element_bytes_ : view->byteStride;
@@ -216,7 +214,8 @@ std::array<double, 4> AccessorReader::at(std::size_t i) const {
   const auto* bytes = bytesAt(i);
   if (bytes == nullptr) return out;
   const auto step = componentBytes(component_type_);
-  for (std::size_t c = 0; c < components_; ++c) out[c] = loadNumber(bytes + c * step, component_type_, normalized_);
+  for (std::size_t c = 0; c < std::min(components_, out.size()); ++c)
+    out[c] = loadNumber(bytes + c * step, component_type_, normalized_);
   return out;
 }
 

@@ -24,7 +24,7 @@ namespace radiosity::scene {
 
 class AccessorReader {
  public:
-  /// The accessor must have passed checkAccessor and have at most 4 components. Reads sparse indices and refuses those
+  /// The accessor must have passed checkAccessor. Reads sparse indices and refuses those
   /// that are not increasing or not below count.
   [[nodiscard]] static Result<AccessorReader> open(const Document& document, const tinygltf::Model& model,
                                                    std::size_t index);
@@ -32,8 +32,16 @@ class AccessorReader {
   [[nodiscard]] std::size_t size() const { return count_; }
   [[nodiscard]] std::size_t components() const { return components_; }
 
-  /// Element `i`, missing components 0. Normalised integers are scaled to [-1, 1] or [0, 1] (glTF 2.0, 3.6.2.2).
+  /// The first 4 components of element `i`, missing ones 0. Normalised integers are scaled to [-1, 1] or [0, 1]
+  /// (glTF 2.0, 3.6.2.2).
   [[nodiscard]] std::array<double, 4> at(std::size_t i) const;
+
+  /// The same elements with integers as they are stored.
+  [[nodiscard]] AccessorReader unnormalized() const {
+    auto copy = *this;
+    copy.normalized_ = false;
+    return copy;
+  }
 
   /// First component of element `i`, not normalised; for indices.
   [[nodiscard]] std::uint32_t indexAt(std::size_t i) const;

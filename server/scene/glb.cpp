@@ -53,7 +53,11 @@ Result<GlbChunks> splitGlb(const std::string& name, std::span<const std::uint8_t
     if (length > bytes.size() - data) return bad(name, offset, "GLB chunk is longer than the file");
     if (length % 4 != 0) return bad(name, offset, "GLB chunk length is not a multiple of 4");
     if ((index == 0) != (type == kJsonChunk)) return bad(name, offset, "GLB must have one JSON chunk, and it first");
-    if (type == kJsonChunk) chunks.json = {reinterpret_cast<const char*>(bytes.data()) + data, length};
+    if (type == kJsonChunk) {
+      chunks.json = {reinterpret_cast<const char*>(bytes.data()) + data, length};
+      // Some exporters pad with zeros where the specification asks for spaces.
+      chunks.json = chunks.json.substr(0, chunks.json.find_last_not_of('\0') + 1);
+    }
     if (type == kBinChunk) {
       if (chunks.has_bin) return bad(name, offset, "GLB has two BIN chunks");
       chunks.bin = bytes.subspan(data, length);

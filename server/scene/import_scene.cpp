@@ -2,26 +2,19 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <glm/gtc/matrix_transform.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/gtc/type_ptr.hpp>
 #include <numbers>
-#include <optional>
 
-#include "server/scene/accessor.h"
 #include "server/scene/import_check.h"
 #include "server/scene/import_context.h"
+#include "server/scene/import_instancing.h"
 #include "server/scene/import_material.h"
 #include "server/scene/import_mesh.h"
 #include "server/scene/import_schema.h"
 
 namespace radiosity::scene {
 namespace {
-
-glm::dmat4 composed(const glm::dvec3& translation, const glm::dquat& rotation, const glm::dvec3& scale) {
-  return glm::translate(glm::dmat4(1.0), translation) * glm::mat4_cast(glm::normalize(rotation)) *
-         glm::scale(glm::dmat4(1.0), scale);
-}
 
 glm::dmat4 localMatrix(const tinygltf::Node& node) {
   if (!node.matrix.empty()) return glm::make_mat4(node.matrix.data());
@@ -30,7 +23,7 @@ glm::dmat4 localMatrix(const tinygltf::Node& node) {
   };
   const auto& q = node.rotation;
   const auto rotation = q.empty() ? glm::dquat(1.0, 0.0, 0.0, 0.0) : glm::dquat(q[3], q[0], q[1], q[2]);
-  return composed(vec3(node.translation, 0.0), rotation, vec3(node.scale, 1.0));
+  return Trs{vec3(node.translation, 0.0), glm::normalize(rotation), vec3(node.scale, 1.0)}.matrix();
 }
 
 bool isFinite(const glm::dmat4& m) {
@@ -114,10 +107,11 @@ class NodeWalk {
     if (!primitives) return tl::unexpected(primitives.error());
     std::vector<glm::dmat4> worlds{world};
     if (const auto* instancing = extensionOf(json, "EXT_mesh_gpu_instancing")) {
-      auto locals = instanceMatrices((*instancing)["attributes"]);
+      const auto locals = readInstancing(context_.document, context_.model, (*instancing)["attributes"],
+                                         pointer_ + "/extensions/EXT_mesh_gpu_instancing/attributes");
       if (!locals) return tl::unexpected(locals.error());
       worlds.clear();
-      for (const auto& local : *locals) worlds.push_back(world * local);
+      for (const auto& local : *locals) worlds.push_back(world * local.matrix());
     }
     for (const auto& instance_world : worlds) {
       if (!isFinite(instance_world)) return context_.bad(pointer_, "world transform is not finite");
@@ -139,36 +133,6 @@ class NodeWalk {
     }
     context_.scene.instances.push_back(instance);
     return {};
-  }
-
-  /// EXT_mesh_gpu_instancing: TRANSLATION, ROTATION, SCALE, one element an instance; each is optional.
-  Result<std::vector<glm::dmat4>> instanceMatrices(const Json& attributes) {
-    const auto where = pointer_ + "/extensions/EXT_mesh_gpu_instancing/attributes";
-    std::optional<AccessorReader> readers[3];
-    constexpr const char* kNames[3] = {"TRANSLATION", "ROTATION", "SCALE"};
-    std::optional<std::size_t> count;
-    for (int k = 0; k < 3; ++k) {
-      if (!attributes.contains(kNames[k])) continue;
-      const auto accessor = attributes[kNames[k]].get<std::size_t>();
-      const auto type = context_.model.accessors[accessor].type;
-      if (type != (k == 1 ? TINYGLTF_TYPE_VEC4 : TINYGLTF_TYPE_VEC3)) {
-        return context_.bad(where + "/" + kNames[k], "accessor has the wrong type");
-      }
-      auto reader = AccessorReader::open(context_.document, context_.model, accessor);
-      if (!reader) return tl::unexpected(reader.error());
-      if (count && *count != reader->size()) return context_.bad(where, "attributes differ in count");
-      count = reader->size();
-      readers[k] = std::move(*reader);
-    }
-    if (!count) return context_.bad(where, "has none of TRANSLATION, ROTATION and SCALE");
-    std::vector<glm::dmat4> out;
-    for (std::size_t i = 0; i < *count; ++i) {
-      const auto t = readers[0] ? readers[0]->at(i) : std::array<double, 4>{0, 0, 0, 0};
-      const auto r = readers[1] ? readers[1]->at(i) : std::array<double, 4>{0, 0, 0, 1};
-      const auto s = readers[2] ? readers[2]->at(i) : std::array<double, 4>{1, 1, 1, 0};
-      out.push_back(composed({t[0], t[1], t[2]}, glm::dquat(r[3], r[0], r[1], r[2]), {s[0], s[1], s[2]}));
-    }
-    return out;
   }
 
   Result<void> placeCamera(std::size_t index, const glm::dmat4& world) {

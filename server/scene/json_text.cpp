@@ -26,6 +26,9 @@ Result<void> scan(std::string_view text, const std::string& name, std::size_t ma
   bool in_string = false;
   for (std::size_t i = 0; i < text.size(); ++i) {
     const char c = text[i];
+    if (c == '\0') {  // the parser takes it for the end and would not look at what follows
+      return fail(ErrorCode::kBadInput, "not JSON: zero byte", linePlace(name, text, i));
+    }
     if (in_string) {
       if (c == '\\') ++i;
       in_string = c != '"';

@@ -75,26 +75,27 @@ glm::vec3 extrapolate(const glm::vec3& near, const glm::vec3& far) {
   return near + glm::clamp(near - far, -bound, bound);
 }
 
-/// What the neighbours of earlier rings say about an unknown texel; false: nothing yet.
+/// What the neighbours of earlier rings say about an unknown texel; false: nothing yet. Continued slopes count, plain
+/// copies only where there is no slope to continue.
 bool fromNeighbours(const Patchwork& p, std::int64_t x, std::int64_t y, std::uint8_t ring, glm::vec3& value) {
-  glm::vec3 sum(0.0F);
-  float weight = 0.0F;
+  glm::vec3 sloped(0.0F), plain(0.0F);
+  float sloped_weight = 0.0F, plain_weight = 0.0F;
   for (std::int64_t dy = -1; dy <= 1; ++dy)
     for (std::int64_t dx = -1; dx <= 1; ++dx) {
       if ((dx == 0 && dy == 0) || !p.inside(x + dx, y + dy)) continue;
       const std::size_t near = p.at(x + dx, y + dy);
       if (p.ring[near] >= ring) continue;
-      glm::vec3 guess = p.value[near];
-      if (ring == 1 && p.inside(x + 2 * dx, y + 2 * dy)) {
-        const std::size_t far = p.at(x + 2 * dx, y + 2 * dy);
-        if (p.ring[far] == 0) guess = extrapolate(p.value[near], p.value[far]);
-      }
       const float w = dx == 0 || dy == 0 ? 1.0F : 0.25F;
-      sum += guess * w;
-      weight += w;
+      plain += p.value[near] * w;
+      plain_weight += w;
+      if (ring != 1 || !p.inside(x + 2 * dx, y + 2 * dy)) continue;
+      const std::size_t far = p.at(x + 2 * dx, y + 2 * dy);
+      if (p.ring[far] != 0) continue;
+      sloped += extrapolate(p.value[near], p.value[far]) * w;
+      sloped_weight += w;
     }
-  if (weight <= 0.0F) return false;
-  value = sum / weight;
+  if (plain_weight <= 0.0F) return false;
+  value = sloped_weight > 0.0F ? sloped / sloped_weight : plain / plain_weight;
   return true;
 }
 

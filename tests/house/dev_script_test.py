@@ -66,8 +66,9 @@ class DevRun(unittest.TestCase):
         path.write_text(f"#!/bin/bash\n{script}\n")
         path.chmod(0o755)
 
-    def run_dev(self, *arguments, solve_status=0, cwd=None):
-        environment = dict(os.environ, PATH=f"{self.root}/bin:{os.environ['PATH']}", SOLVE_STATUS=str(solve_status))
+    def run_dev(self, *arguments, solve_status=0, cwd=None, listen=""):
+        environment = dict(os.environ, PATH=f"{self.root}/bin:{os.environ['PATH']}", SOLVE_STATUS=str(solve_status),
+                           RADIOSITY_LISTEN=listen)
         return subprocess.run([self.root / "dev", "run", *arguments], capture_output=True, text=True, timeout=60,
                               stdin=subprocess.DEVNULL, cwd=cwd or self.root, env=environment)
 
@@ -89,6 +90,10 @@ class DevRun(unittest.TestCase):
         for status in (0, 3):
             self.assertIn("server|my room.glb", self.run_dev("my room.glb", solve_status=status).stdout)
             self.assertNotIn("server|", self.run_dev("my room.glb", "--no-serve", solve_status=status).stdout)
+
+    def test_serves_where_asked(self):
+        self.assertTrue(self.run_dev("my room.glb").stdout.endswith("server|my room.glb"))
+        self.assertTrue(self.run_dev("my room.glb", listen="127.0.0.1:9").stdout.endswith("server|--listenserver|127.0.0.1:9"))
 
     def test_the_exit_code_of_solve_is_passed_on(self):
         for status in (1, 2, 75):

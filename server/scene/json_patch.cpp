@@ -1,0 +1,264 @@
+#include "server/scene/json_patch.h"
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+namespace radiosity::scene {
+namespace {
+
+constexpr std::size_t kMaxOperations = 1000;
+constexpr std::size_t kMaxDepth = 64;
+// `copy` can double a document with each operation; what is added is bounded, not the count of operations alone.
+constexpr std::size_t kMaxAddedBytes = std::size_t{64} << 20;
+
+/// About what a value costs in memory.
+std::size_t weightOf(const Json& value) {
+  std::size_t bytes = 0;
+  std::vector<const Json*> stack{&value};
+  while (!stack.empty()) {
+    const auto* at = stack.back();
+    stack.pop_back();
+    bytes += 32;
+    if (at->is_string()) bytes += at->get_ref<const std::string&>().size();
+    if (at->is_object()) {
+      for (const auto& [key, child] : at->items()) bytes += key.size() + 32;
+    }
+    if (at->is_structured()) {
+      for (const auto& child : *at) stack.push_back(&child);
+    }
+  }
+  return bytes;
+}
+
+/// One operation at a time on `document_`; `fault` builds its error.
+class Patcher {
+ public:
+  Patcher(const Json& document, const PatchGuard& guard) : document_(document), guard_(guard) {}
+
+  Result<void> apply(const Json& operation, std::size_t number) {
+    number_ = number;
+    where_.clear();
+    if (!operation.is_object()) return fault("is not an object");
+    const auto op = stringOf(operation, "op");
+    const auto path = stringOf(operation, "path");
+    if (path) where_ = *path;
+    if (!op) return fault("has no 'op'");
+    if (!path) return fault("has no 'path'");
+    if (*op == "add" || *op == "replace" || *op == "test") {
+      if (!operation.contains("value")) return fault("has no 'value'");
+      return withValue(*op, *path, operation["value"]);
+    }
+    if (*op == "remove") return remove(*path);
+    if (*op == "move" || *op == "copy") {
+      const auto from = stringOf(operation, "from");
+      if (!from) return fault("has no 'from'");
+      return transfer(*op, *from, *path);
+    }
+    return fault("unknown op '" + *op + "'");
+  }
+
+  Json take() { return std::move(document_); }
+
+ private:
+  struct Target {
+    Tokens path;             ///< names and "-" resolved
+    Json* parent = nullptr;  ///< null for the whole document
+    std::string key;         ///< of an object parent
+    std::size_t index = 0;   ///< of an array parent; may be its size
+    Json* value = nullptr;   ///< null where there is none yet
+  };
+
+  static std::optional<std::string> stringOf(const Json& object, const char* member) {
+    const auto found = object.find(member);
+    if (found == object.end() || !found->is_string()) return std::nullopt;
+    return found->get<std::string>();
+  }
+
+  [[nodiscard]] tl::unexpected<Error> fault(const std::string& what, ErrorCode code = ErrorCode::kBadInput) const {
+    return fail(code, "operation " + std::to_string(number_) + ": " + what, where_);
+  }
+
+  [[nodiscard]] Result<Tokens> split(const std::string& pointer) const {
+    Tokens tokens;
+    if (pointer.empty()) return tokens;
+    if (pointer[0] != '/') return fault("a pointer must start with '/': '" + pointer + "'");
+    for (const char c : pointer) {
+      if (c == '/') {
+        tokens.emplace_back();
+      } else {
+        tokens.back() += c;
+      }
+    }
+    if (tokens.size() > kMaxDepth) return fault("pointer has more than 64 levels", ErrorCode::kTooLarge);
+    for (auto& token : tokens) {
+      std::string plain;
+      for (std::size_t i = 0; i < token.size(); ++i) {
+        if (token[i] != '~') {
+          plain += token[i];
+        } else if (i + 1 < token.size() && (token[i + 1] == '0' || token[i + 1] == '1')) {
+          plain += token[++i] == '0' ? '~' : '/';
+        } else {
+          return fault("'~' must be followed by 0 or 1 in '" + pointer + "'");
+        }
+      }
+      token = plain;
+    }
+    return tokens;
+  }
+
+  /// "@lamp": the one element whose `name` is lamp. Digits without leading zeros: that element. "-": past the end.
+  [[nodiscard]] Result<std::size_t> arrayIndex(const Json& array, const std::string& token) const {
+    if (token == "-") return array.size();
+    if (!token.empty() && token[0] == '@') return namedIndex(array, token.substr(1));
+    const bool digits =
+        !token.empty() && std::all_of(token.begin(), token.end(), [](char c) { return c >= '0' && c <= '9'; });
+    if (!digits || token.size() > 9 || (token.size() > 1 && token[0] == '0')) {
+      return fault("'" + token + "' is not an array index");
+    }
+    return static_cast<std::size_t>(std::stoul(token));
+  }
+
+  [[nodiscard]] Result<std::size_t> namedIndex(const Json& array, const std::string& name) const {
+    std::optional<std::size_t> found;
+    for (std::size_t i = 0; i < array.size(); ++i) {
+      if (!array[i].is_object() || stringOf(array[i], "name") != name) continue;
+      if (found) return fault("'" + name + "' names more than one element; use its index");
+      found = i;
+    }
+    if (!found) return fault("nothing is named '" + name + "'");
+    return *found;
+  }
+
+  [[nodiscard]] Result<Target> resolve(const std::string& pointer) {
+    auto tokens = split(pointer);
+    if (!tokens) return tl::unexpected(tokens.error());
+    Target target;
+    target.value = &document_;
+    for (const auto& token : *tokens) {
+      if (target.value == nullptr) return fault("there is no parent for '" + token + "' in '" + pointer + "'");
+      target.parent = target.value;
+      target.value = nullptr;
+      if (target.parent->is_object()) {
+        target.key = token;
+        if (const auto found = target.parent->find(token); found != target.parent->end()) target.value = &*found;
+        target.path.push_back(token);
+      } else if (target.parent->is_array()) {
+        const auto index = arrayIndex(*target.parent, token);
+        if (!index) return tl::unexpected(index.error());
+        target.index = *index;
+        if (*index < target.parent->size()) target.value = &(*target.parent)[*index];
+        target.path.push_back(std::to_string(*index));
+      } else {
+        return fault("'" + token + "' in '" + pointer + "' is below a value that has no members");
+      }
+    }
+    return target;
+  }
+
+  [[nodiscard]] Result<void> permit(const std::string& op, const Tokens& path) const {
+    const auto why = guard_ ? guard_(document_, op, path) : std::string();
+    if (!why.empty()) return fault(why);
+    return {};
+  }
+
+  [[nodiscard]] Result<void> afford(const Json& value, const Tokens& path) {
+    if (path.size() + jsonDepth(value) > kMaxDepth)
+      return fault("would nest deeper than 64 levels", ErrorCode::kTooLarge);
+    added_ += weightOf(value);
+    if (added_ > kMaxAddedBytes) return fault("the patch adds more than 64 MiB", ErrorCode::kTooLarge);
+    return {};
+  }
+
+  Result<void> withValue(const std::string& op, const std::string& path, const Json& value) {
+    auto target = resolve(path);
+    if (!target) return tl::unexpected(target.error());
+    if (op == "add") return add(*target, value);
+    if (target->value == nullptr) return fault("there is no such value");
+    if (op == "test") {
+      if (*target->value == value) return {};
+      return fault("test failed: the value is " + shortened(*target->value), ErrorCode::kTestFailed);
+    }
+    if (auto ok = permit(op, target->path); !ok) return ok;
+    if (auto ok = afford(value, target->path); !ok) return ok;
+    *target->value = value;
+    return {};
+  }
+
+  static std::string shortened(const Json& value) {
+    constexpr std::size_t kLongest = 200;
+    if (value.is_structured() && weightOf(value) > 32 * kLongest) return value.type_name();
+    auto text = value.dump(-1, ' ', true, Json::error_handler_t::replace);  // ASCII, so it can be cut anywhere
+    if (text.size() > kLongest) text = text.substr(0, kLongest) + "...";
+    return text;
+  }
+
+  Result<void> add(Target& target, Json value) {
+    if (target.parent != nullptr && target.parent->is_array() && target.index > target.parent->size()) {
+      return fault("index " + std::to_string(target.index) + " is past the end");
+    }
+    if (auto ok = permit("add", target.path); !ok) return ok;
+    if (auto ok = afford(value, target.path); !ok) return ok;
+    if (target.parent == nullptr) {
+      document_ = std::move(value);
+    } else if (target.parent->is_array()) {
+      target.parent->insert(target.parent->begin() + static_cast<std::ptrdiff_t>(target.index), std::move(value));
+    } else {
+      (*target.parent)[target.key] = std::move(value);
+    }
+    return {};
+  }
+
+  Result<void> remove(const std::string& path) {
+    const auto target = resolve(path);
+    if (!target) return tl::unexpected(target.error());
+    if (target->value == nullptr) return fault("there is no such value");
+    if (auto ok = permit("remove", target->path); !ok) return ok;
+    if (target->parent == nullptr) {
+      document_ = nullptr;
+    } else if (target->parent->is_array()) {
+      target->parent->erase(target->index);
+    } else {
+      target->parent->erase(target->key);
+    }
+    return {};
+  }
+
+  Result<void> transfer(const std::string& op, const std::string& from, const std::string& path) {
+    const auto source = resolve(from);
+    if (!source) return tl::unexpected(source.error());
+    if (source->value == nullptr) return fault("there is no value at 'from' (" + from + ")");
+    Json value = *source->value;
+    if (op == "move") {
+      if (path.rfind(from + "/", 0) == 0) return fault("cannot move a value into itself");
+      if (path == from) return {};
+      if (auto ok = remove(from); !ok) return ok;
+    }
+    auto target = resolve(path);
+    if (!target) return tl::unexpected(target.error());
+    return add(*target, std::move(value));
+  }
+
+  Json document_;
+  const PatchGuard& guard_;
+  std::size_t number_ = 0;
+  std::size_t added_ = 0;
+  std::string where_;
+};
+
+}  // namespace
+
+Result<Json> applyJsonPatch(const Json& document, const Json& patch, const PatchGuard& guard) {
+  if (!patch.is_array()) return fail(ErrorCode::kBadInput, "a JSON Patch is an array of operations", "patch");
+  if (patch.size() > kMaxOperations) {
+    return fail(ErrorCode::kTooLarge, "a patch may have " + std::to_string(kMaxOperations) + " operations", "patch");
+  }
+  if (jsonDepth(patch) > kMaxDepth) return fail(ErrorCode::kTooLarge, "patch is nested deeper than 64 levels", "patch");
+  Patcher patcher(document, guard);
+  for (std::size_t i = 0; i < patch.size(); ++i) {
+    if (auto ok = patcher.apply(patch[i], i); !ok) return tl::unexpected(ok.error());
+  }
+  return patcher.take();
+}
+
+}  // namespace radiosity::scene

@@ -1,0 +1,24 @@
+// RFC 6902 JSON Patch on a copy. Our own, because the library of Debian 12 (nlohmann 3.11.2) aborts on `add` through a
+// scalar parent, ignores `remove` through one, and leaves a half-edited value when it throws. Pure; any thread.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "common/result.h"
+#include "server/scene/json_text.h"
+
+namespace radiosity::scene {
+
+using Tokens = std::vector<std::string>;
+
+/// Asked before each change, with names resolved to indices: a reason to refuse, or "".
+using PatchGuard = std::function<std::string(const Json& document, const std::string& op, const Tokens& path)>;
+
+/// At most 1000 operations, 64 levels, 64 MiB of added values. An array element may be named: /nodes/@lamp. The error's
+/// message starts with "operation N: " (from 0), its `where` is the pointer; kTestFailed for a failed `test`, kTooLarge
+/// over a limit, else kBadInput.
+[[nodiscard]] Result<Json> applyJsonPatch(const Json& document, const Json& patch, const PatchGuard& guard = {});
+
+}  // namespace radiosity::scene

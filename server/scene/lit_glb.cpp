@@ -1,0 +1,206 @@
+// withLightmapUvs: the input document with TEXCOORD_1 and the lightmap page on every lit primitive.
+#include <algorithm>
+#include <map>
+#include <set>
+#include <string>
+
+#include "common/check.h"
+#include "server/scene/import_context.h"
+#include "server/scene/import_instancing.h"
+#include "server/scene/lightmap.h"
+#include "server/scene/lit_glb_mesh.h"
+
+namespace radiosity::scene {
+namespace {
+
+constexpr const char* kInstancing = "EXT_mesh_gpu_instancing";
+
+/// One placement of a mesh: a node, or one element of its EXT_mesh_gpu_instancing.
+struct Placement {
+  std::uint32_t node;
+  std::map<std::uint32_t, LitPrimitive> lit;  ///< by primitive index in the file's mesh
+};
+
+/// The importer places a node's primitives behind each other, element by element: a primitive seen again starts the
+/// next element.
+std::vector<Placement> placements(const Scene& scene, const PatchScene& patches) {
+  RAD_CHECK_EQ(scene.instances.size(), patches.instance_uvs.size());
+  std::vector<Placement> out;
+  std::set<std::uint32_t> seen;
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    const auto& instance = scene.instances[i];
+    const auto& primitive = scene.primitives[instance.primitive];
+    if (out.empty() || out.back().node != instance.node || seen.count(primitive.primitive) != 0) {
+      out.push_back({instance.node, {}});
+      seen.clear();
+    }
+    seen.insert(primitive.primitive);
+    const auto& uv = patches.instance_uvs[i];
+    if (!uv.page.empty()) out.back().lit[primitive.primitive] = {&primitive, &uv};  // empty: hidden, so not charted
+  }
+  return out;
+}
+
+/// Calls `visit(texcoord)` for each texCoord member in a value.
+template <typename Visit>
+void forEachTexcoord(Json& value, const Visit& visit) {
+  for (auto& [key, child] : value.items()) {
+    if (key == "texCoord" && child.is_number_integer()) visit(child);
+    if (child.is_structured()) forEachTexcoord(child, visit);
+  }
+}
+
+/// Lightmap UVs take TEXCOORD_1. Where materials look up textures with the file's own set 1, that set moves to the
+/// first free number, for every primitive and material alike.
+void freeTexcoord1(Json& gltf) {
+  if (!gltf.contains("materials") || !gltf.contains("meshes")) return;
+  bool used = false;
+  forEachTexcoord(gltf["materials"], [&](const Json& texcoord) { used |= texcoord == 1; });
+  if (!used) return;
+  const std::string prefix = "TEXCOORD_";
+  std::size_t free = 2;
+  const auto taken = [&](const std::string& name) {
+    for (const auto& mesh : gltf["meshes"]) {
+      for (const auto& primitive : mesh["primitives"]) {
+        if (primitive["attributes"].contains(name)) return true;
+      }
+    }
+    return false;
+  };
+  while (taken(prefix + std::to_string(free))) ++free;
+  for (auto& mesh : gltf["meshes"]) {
+    for (auto& primitive : mesh["primitives"]) {
+      auto& attributes = primitive["attributes"];
+      if (!attributes.contains("TEXCOORD_1")) continue;
+      attributes[prefix + std::to_string(free)] = attributes["TEXCOORD_1"];
+      attributes.erase("TEXCOORD_1");
+    }
+  }
+  forEachTexcoord(gltf["materials"], [&](Json& texcoord) {
+    if (texcoord == 1) texcoord = free;
+  });
+}
+
+/// "lightmap" in extras comes from here alone: what an earlier export left would name pages that are gone.
+void dropOldPages(Json& gltf) {
+  if (!gltf.contains("meshes")) return;
+  for (auto& mesh : gltf["meshes"]) {
+    for (auto& primitive : mesh["primitives"]) {
+      if (primitive.contains("extras") && primitive["extras"].is_object()) primitive["extras"].erase("lightmap");
+    }
+  }
+}
+
+class Exporter {
+ public:
+  Exporter(const Document& document, const tinygltf::Model& model, Document& out)
+      : document_(document), model_(model), out_(out), builder_(document, model, out.gltf, document.buffers.size()) {}
+
+  Result<void> run(const std::vector<Placement>& all) {
+    source_meshes_ = out_.gltf.value("meshes", Json::array());
+    for (std::size_t i = 0; i < all.size();) {
+      auto end = i;
+      while (end < all.size() && all[end].node == all[i].node) ++end;
+      if (auto ok =
+              place({all.begin() + static_cast<std::ptrdiff_t>(i), all.begin() + static_cast<std::ptrdiff_t>(end)});
+          !ok) {
+        return ok;
+      }
+      i = end;
+    }
+    auto bytes = builder_.takeBytes();
+    if (!bytes.empty()) {
+      out_.gltf["buffers"].push_back({{"byteLength", bytes.size()}});
+      out_.buffers.push_back(std::make_shared<const Bytes>(std::move(bytes)));
+    }
+    dropUnusedInstancing();
+    return {};
+  }
+
+ private:
+  /// All placements of one node.
+  Result<void> place(std::span<const Placement> placed) {
+    const auto node = placed.front().node;
+    const auto mesh = document_.gltf["nodes"][node]["mesh"].get<std::size_t>();
+    if (extensionOf(document_.gltf["nodes"][node], kInstancing) != nullptr) return expand(node, mesh, placed);
+    RAD_CHECK_EQ(placed.size(), std::size_t{1});
+    const auto index = litMesh(mesh, placed.front());
+    if (!index) return tl::unexpected(index.error());
+    out_.gltf["nodes"][node]["mesh"] = *index;
+    return {};
+  }
+
+  /// An instanced node becomes a node with a child for each element, for each needs UVs of its own.
+  Result<void> expand(std::uint32_t node, std::size_t mesh, std::span<const Placement> placed) {
+    const auto& attributes = document_.gltf["nodes"][node]["extensions"][kInstancing]["attributes"];
+    const auto locals = readInstancing(document_, model_, attributes, "/nodes/" + std::to_string(node));
+    if (!locals) return tl::unexpected(locals.error());
+    RAD_CHECK_EQ(locals->size(), placed.size());
+    const auto name = document_.gltf["nodes"][node].value("name", "node " + std::to_string(node));
+    Json children = document_.gltf["nodes"][node].value("children", Json::array());
+    for (std::size_t i = 0; i < placed.size(); ++i) {
+      const auto index = litMesh(mesh, placed[i]);
+      if (!index) return tl::unexpected(index.error());
+      const auto& [t, q, s] = (*locals)[i];
+      Json child = {{"name", name + " #" + std::to_string(i)}, {"mesh", *index}};
+      child["translation"] = {t.x, t.y, t.z};
+      child["rotation"] = {q.x, q.y, q.z, q.w};
+      child["scale"] = {s.x, s.y, s.z};
+      children.push_back(out_.gltf["nodes"].size());
+      out_.gltf["nodes"].push_back(std::move(child));
+    }
+    auto& parent = out_.gltf["nodes"][node];
+    parent["children"] = std::move(children);
+    for (const auto* member : {"mesh", "skin", "weights"}) parent.erase(member);
+    parent["extensions"].erase(kInstancing);
+    if (parent["extensions"].empty()) parent.erase("extensions");
+    return {};
+  }
+
+  /// The first placement takes the mesh's own index, so that a scene without instancing keeps its numbering.
+  Result<std::size_t> litMesh(std::size_t mesh, const Placement& placement) {
+    auto built = builder_.build(source_meshes_[mesh], placement.lit);
+    if (!built) return tl::unexpected(built.error());
+    if (taken_.insert(mesh).second) {
+      out_.gltf["meshes"][mesh] = std::move(*built);
+      return mesh;
+    }
+    out_.gltf["meshes"].push_back(std::move(*built));
+    return out_.gltf["meshes"].size() - 1;
+  }
+
+  /// Takes the extension off the lists when its last user is gone.
+  void dropUnusedInstancing() {
+    for (const auto& node : out_.gltf.value("nodes", Json::array())) {
+      if (extensionOf(node, kInstancing) != nullptr) return;
+    }
+    for (const auto* list : {"extensionsUsed", "extensionsRequired"}) {
+      if (!out_.gltf.contains(list)) continue;
+      auto& names = out_.gltf[list];
+      if (const auto found = std::find(names.begin(), names.end(), kInstancing); found != names.end())
+        names.erase(found);
+      if (names.empty()) out_.gltf.erase(list);
+    }
+  }
+
+  const Document& document_;
+  const tinygltf::Model& model_;
+  Document& out_;
+  LitMeshBuilder builder_;
+  Json source_meshes_;
+  std::set<std::size_t> taken_;
+};
+
+}  // namespace
+
+Result<Document> withLightmapUvs(const Document& document, const Scene& scene, const PatchScene& patches) {
+  const auto model = parseModel(document);
+  if (!model) return tl::unexpected(model.error());
+  Document out = document;
+  freeTexcoord1(out.gltf);
+  dropOldPages(out.gltf);
+  if (auto ok = Exporter(document, *model, out).run(placements(scene, patches)); !ok) return tl::unexpected(ok.error());
+  return out;
+}
+
+}  // namespace radiosity::scene

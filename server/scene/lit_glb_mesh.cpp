@@ -1,0 +1,187 @@
+#include "server/scene/lit_glb_mesh.h"
+
+#include <algorithm>
+#include <bit>
+#include <set>
+#include <unordered_map>
+
+#include "common/check.h"
+#include "server/scene/accessor.h"
+
+namespace radiosity::scene {
+namespace {
+
+// A GLB counts its bytes in 32 bits, and the input's own data is in the file too.
+constexpr std::size_t kMaxNewBytes = std::size_t{1} << 30;
+constexpr int kArrayBuffer = 34962;
+constexpr int kElementArrayBuffer = 34963;
+
+struct CornerKey {
+  std::uint32_t vertex;
+  glm::vec2 uv;
+  bool operator==(const CornerKey&) const = default;
+};
+
+struct CornerHash {
+  std::size_t operator()(const CornerKey& key) const {
+    return key.vertex * 0x9E3779B97F4A7C15U ^ std::bit_cast<std::uint32_t>(key.uv.x) * 0xC2B2AE3D27D4EB4FU ^
+           std::bit_cast<std::uint32_t>(key.uv.y) * 0x165667B19E3779F9U;
+  }
+};
+
+}  // namespace
+
+void LitMeshBuilder::append(const void* data, std::size_t size) {
+  const auto* first = static_cast<const std::uint8_t*>(data);
+  bytes_.insert(bytes_.end(), first, first + size);
+}
+
+std::size_t LitMeshBuilder::addView(std::size_t first_byte, std::size_t stride) {
+  Json view = {{"buffer", buffer_}, {"byteOffset", first_byte}, {"byteLength", bytes_.size() - first_byte}};
+  view["target"] = stride == 0 ? kElementArrayBuffer : kArrayBuffer;
+  if (stride != 0) view["byteStride"] = stride;
+  auto& views = gltf_["bufferViews"];
+  views.push_back(std::move(view));
+  return views.size() - 1;
+}
+
+std::size_t LitMeshBuilder::addAccessor(Json accessor) {
+  gltf_["accessors"].push_back(std::move(accessor));
+  return gltf_["accessors"].size() - 1;
+}
+
+std::size_t LitMeshBuilder::addIndices(const std::vector<std::uint32_t>& indices) {
+  const auto first = bytes_.size();
+  append(indices.data(), indices.size() * sizeof(std::uint32_t));
+  return addAccessor({{"bufferView", addView(first, 0)},
+                      {"componentType", TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT},
+                      {"count", indices.size()},
+                      {"type", "SCALAR"}});
+}
+
+std::size_t LitMeshBuilder::addUvs(const std::vector<glm::vec2>& uvs) {
+  const auto first = bytes_.size();
+  append(uvs.data(), uvs.size() * sizeof(glm::vec2));
+  return addAccessor({{"bufferView", addView(first, sizeof(glm::vec2))},
+                      {"componentType", TINYGLTF_COMPONENT_TYPE_FLOAT},
+                      {"count", uvs.size()},
+                      {"type", "VEC2"}});
+}
+
+Result<std::size_t> LitMeshBuilder::copyAccessor(std::size_t accessor, const std::vector<std::uint32_t>& elements,
+                                                 bool with_bounds) {
+  const auto reader = AccessorReader::open(document_, model_, accessor);
+  if (!reader) return tl::unexpected(reader.error());
+  const auto size = elementBytes(model_.accessors[accessor]);
+  const auto stride = (size + 3) / 4 * 4;  // vertex data must be aligned to 4 bytes
+  const auto first = bytes_.size();
+  if (first + stride * elements.size() > kMaxNewBytes) {
+    return fail(ErrorCode::kTooLarge, "the lit scene would have more than 1 GiB of new vertex data", document_.name);
+  }
+  bytes_.reserve(first + stride * elements.size());
+  for (const auto element : elements) {
+    const auto next = bytes_.size() + stride;
+    if (const auto* data = reader->bytesAt(element)) append(data, size);
+    bytes_.resize(next, 0);
+  }
+  auto json = document_.gltf["accessors"][accessor];
+  for (const auto* member : {"sparse", "byteOffset", "min", "max"}) json.erase(member);
+  json["bufferView"] = addView(first, stride);
+  json["count"] = elements.size();
+  if (with_bounds) {
+    const auto unscaled = reader->unnormalized();
+    glm::dvec3 low(std::numeric_limits<double>::max());
+    glm::dvec3 high(std::numeric_limits<double>::lowest());
+    for (const auto element : elements) {
+      const auto v = unscaled.at(element);
+      low = glm::min(low, glm::dvec3(v[0], v[1], v[2]));
+      high = glm::max(high, glm::dvec3(v[0], v[1], v[2]));
+    }
+    json["min"] = {low.x, low.y, low.z};
+    json["max"] = {high.x, high.y, high.z};
+  }
+  return addAccessor(std::move(json));
+}
+
+Result<Json> LitMeshBuilder::copyAttributes(const Json& attributes, const std::vector<std::uint32_t>& elements) {
+  Json out = Json::object();
+  for (const auto& [name, accessor] : attributes.items()) {
+    const auto copied = copyAccessor(accessor.get<std::size_t>(), elements, name == "POSITION");
+    if (!copied) return tl::unexpected(copied.error());
+    out[name] = *copied;
+  }
+  return out;
+}
+
+LitMeshBuilder::Vertices LitMeshBuilder::collect(const LitPrimitive& lit, std::uint32_t page) {
+  Vertices out;
+  std::unordered_map<CornerKey, std::uint32_t, CornerHash> ids;
+  const auto& indices = lit.primitive->indices;
+  for (std::size_t t = 0; t < lit.uv->page.size(); ++t) {
+    if (lit.uv->page[t] != page) continue;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const CornerKey key{indices[3 * t + c], lit.uv->corners[t][c]};
+      const auto [found, added] = ids.try_emplace(key, static_cast<std::uint32_t>(out.source.size()));
+      if (added) {
+        out.source.push_back(key.vertex);
+        out.uv.push_back(key.uv);
+      }
+      out.indices.push_back(found->second);
+    }
+  }
+  return out;
+}
+
+Result<Json> LitMeshBuilder::pagePrimitive(const Json& source, const LitPrimitive& lit, std::uint32_t page) {
+  const auto vertices = collect(lit, page);
+  auto primitive = source;
+  auto attributes = source["attributes"];
+  attributes.erase("TEXCOORD_1");
+  auto copied = copyAttributes(attributes, vertices.source);
+  if (!copied) return copied;
+  primitive["attributes"] = std::move(*copied);
+  primitive["attributes"]["TEXCOORD_1"] = addUvs(vertices.uv);
+  if (primitive.contains("targets")) {
+    for (auto& target : primitive["targets"]) {
+      auto morph = copyAttributes(target, vertices.source);
+      if (!morph) return morph;
+      target = std::move(*morph);
+    }
+  }
+  primitive["indices"] = addIndices(vertices.indices);
+  primitive["mode"] = TINYGLTF_MODE_TRIANGLES;
+  if (primitive.contains("extensions")) {  // its compressed copy knows nothing of the new vertices
+    primitive["extensions"].erase("KHR_draco_mesh_compression");
+    if (primitive["extensions"].empty()) primitive.erase("extensions");
+  }
+  if (!primitive.contains("extras") || !primitive["extras"].is_object()) primitive["extras"] = Json::object();
+  primitive["extras"]["lightmap"] = page;
+  return primitive;
+}
+
+Result<Json> LitMeshBuilder::build(const Json& mesh, const std::map<std::uint32_t, LitPrimitive>& lit) {
+  auto out = mesh;
+  out["primitives"] = Json::array();
+  for (std::size_t p = 0; p < mesh["primitives"].size(); ++p) {
+    const auto& source = mesh["primitives"][p];
+    const auto found = lit.find(static_cast<std::uint32_t>(p));
+    if (found == lit.end()) {
+      out["primitives"].push_back(source);
+      continue;
+    }
+    const auto& use = found->second;
+    RAD_CHECK_EQ(use.uv->page.size() * 3, use.primitive->indices.size());
+    RAD_CHECK_EQ(use.uv->page.size(), use.uv->corners.size());
+    std::set<std::uint32_t> pages(use.uv->page.begin(), use.uv->page.end());
+    pages.erase(kNone);
+    if (pages.empty()) out["primitives"].push_back(source);
+    for (const auto page : pages) {
+      auto primitive = pagePrimitive(source, use, page);
+      if (!primitive) return primitive;
+      out["primitives"].push_back(std::move(*primitive));
+    }
+  }
+  return out;
+}
+
+}  // namespace radiosity::scene

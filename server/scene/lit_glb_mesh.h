@@ -1,0 +1,57 @@
+// One mesh of the file with lightmap UVs for one placed instance. Used by the exporters; lives for one call.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include "server/scene/import_model.h"
+#include "server/scene/json_text.h"
+#include "server/scene/patch_scene.h"
+
+namespace radiosity::scene {
+
+/// A primitive as imported and where its triangles lie in the lightmap.
+struct LitPrimitive {
+  const Primitive* primitive = nullptr;
+  const PatchScene::InstanceUv* uv = nullptr;
+};
+
+/// Appends accessors, buffer views and bytes to `gltf`; the bytes become buffer `buffer`.
+class LitMeshBuilder {
+ public:
+  LitMeshBuilder(const Document& document, const tinygltf::Model& model, Json& gltf, std::size_t buffer)
+      : document_(document), model_(model), gltf_(gltf), buffer_(buffer) {}
+
+  /// `mesh` with each primitive in `lit` (by index in the file's mesh) turned into one triangle list a page, vertices
+  /// split where lightmap UVs differ, all other attributes copied byte by byte. kTooLarge past 1 GiB of new data.
+  [[nodiscard]] Result<Json> build(const Json& mesh, const std::map<std::uint32_t, LitPrimitive>& lit);
+
+  [[nodiscard]] Bytes takeBytes() { return std::move(bytes_); }
+
+ private:
+  struct Vertices {
+    std::vector<std::uint32_t> source;   ///< vertex of the file's primitive
+    std::vector<glm::vec2> uv;           ///< lightmap
+    std::vector<std::uint32_t> indices;  ///< 3 a triangle
+  };
+
+  static Vertices collect(const LitPrimitive& lit, std::uint32_t page);
+  [[nodiscard]] Result<Json> pagePrimitive(const Json& source, const LitPrimitive& lit, std::uint32_t page);
+  [[nodiscard]] Result<std::size_t> copyAccessor(std::size_t accessor, const std::vector<std::uint32_t>& elements,
+                                                 bool with_bounds);
+  [[nodiscard]] Result<Json> copyAttributes(const Json& attributes, const std::vector<std::uint32_t>& elements);
+  [[nodiscard]] std::size_t addView(std::size_t first_byte, std::size_t stride);
+  [[nodiscard]] std::size_t addAccessor(Json accessor);
+  [[nodiscard]] std::size_t addIndices(const std::vector<std::uint32_t>& indices);
+  [[nodiscard]] std::size_t addUvs(const std::vector<glm::vec2>& uvs);
+  void append(const void* data, std::size_t size);
+
+  const Document& document_;
+  const tinygltf::Model& model_;
+  Json& gltf_;
+  std::size_t buffer_;
+  Bytes bytes_;
+};
+
+}  // namespace radiosity::scene

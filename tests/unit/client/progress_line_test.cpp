@@ -1,0 +1,79 @@
+#include "client/cli/progress_line.h"
+
+#include <gmock/gmock.h>
+
+#include <limits>
+
+namespace radiosity::cli {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+TEST(ProgressFraction, isLogarithmicBetweenOneAndTheTarget) {
+  EXPECT_DOUBLE_EQ(progressFraction(1.0, 0.01), 0.0);
+  EXPECT_DOUBLE_EQ(progressFraction(0.1, 0.01), 0.5);
+  EXPECT_DOUBLE_EQ(progressFraction(0.01, 0.01), 1.0);
+}
+
+TEST(ProgressFraction, staysInRangeForAnyInput) {
+  EXPECT_EQ(progressFraction(5.0, 0.01), 0.0);
+  EXPECT_EQ(progressFraction(0.0, 0.01), 1.0);
+  EXPECT_EQ(progressFraction(kNan, 0.01), 0.0);
+  EXPECT_EQ(progressFraction(0.5, 0.0), 0.0);
+  EXPECT_EQ(progressFraction(0.5, 1.0), 1.0);
+}
+
+TEST(ProgressLine, showsErrorTargetRateAndTimeLeft) {
+  const ProgressView view{.state = "solving",
+                          .error = 0.1,
+                          .target_error = 0.01,
+                          .shots = 12345,
+                          .shots_per_second = 2300.7,
+                          .seconds = 3.21,
+                          .seconds_left = 65.0};
+  const auto line = progressLine(view, 200);
+  EXPECT_EQ(line,
+            "solving [############............] error 10 % of 1 %  12,345 shots, 2,300/s  3.2 s, 1 min 05 s left");
+}
+
+TEST(ProgressLine, hasPartsOfTheErrorWhereAsked) {
+  const ProgressView view{.state = "solving", .residual = 0.001, .sampling = 0.02, .show_parts = true};
+  EXPECT_THAT(progressLine(view, 300), HasSubstr("residual 0.1 %, sampling 2 %"));
+}
+
+TEST(ProgressLine, saysNoTimeLeftOnceThere) {
+  const ProgressView view{.state = "converged", .error = 0.01, .target_error = 0.02, .seconds_left = 4.0};
+  EXPECT_THAT(progressLine(view, 200), Not(HasSubstr("left")));
+}
+
+TEST(ProgressLine, neverExceedsTheTerminal) {
+  const ProgressView view{.state = "solving", .seconds_left = 1.0, .show_parts = true};
+  for (int columns = 1; columns < 200; ++columns)
+    EXPECT_LE(progressLine(view, columns).size(), static_cast<std::size_t>(columns));
+}
+
+TEST(Text, ofDurations) {
+  EXPECT_EQ(durationText(0.0), "0.0 s");
+  EXPECT_EQ(durationText(9.94), "9.9 s");
+  EXPECT_EQ(durationText(9.96), "10 s");
+  EXPECT_EQ(durationText(59.6), "1 min 00 s");
+  EXPECT_EQ(durationText(3605.0), "1 h 00 min");
+  EXPECT_EQ(durationText(kNan), "?");
+  EXPECT_EQ(durationText(-1.0), "?");
+}
+
+TEST(Text, ofCountsAndPercentages) {
+  EXPECT_EQ(countText(0), "0");
+  EXPECT_EQ(countText(999), "999");
+  EXPECT_EQ(countText(1000), "1,000");
+  EXPECT_EQ(countText(1234567), "1,234,567");
+  EXPECT_EQ(countText(std::numeric_limits<std::uint64_t>::max()), "18,446,744,073,709,551,615");
+  EXPECT_EQ(percentText(0.0198), "1.98 %");
+  EXPECT_EQ(percentText(kNan), "?");
+}
+
+}  // namespace
+}  // namespace radiosity::cli

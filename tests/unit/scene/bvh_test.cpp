@@ -1,0 +1,81 @@
+#include "server/scene/bvh.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+#include <random>
+
+#include "server/scene/scene.h"
+
+namespace radiosity::scene {
+namespace {
+
+std::vector<Bvh::Triangle> soup(std::size_t count) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> uniform(-0.5F, 0.5F);
+  std::vector<Bvh::Triangle> triangles(count);
+  for (auto& t : triangles) {
+    const glm::vec3 centre(uniform(random), uniform(random), uniform(random));
+    for (auto& p : t) p = centre + 0.2F * glm::vec3(uniform(random), uniform(random), uniform(random));
+  }
+  return triangles;
+}
+
+TEST(Bvh, FindsTheHitsThatASearchOfAllTrianglesFinds) {
+  const auto triangles = soup(500);
+  const Bvh tree(triangles);
+  std::vector<Bvh> single;
+  for (const auto& t : triangles) single.emplace_back(std::vector<Bvh::Triangle>{t});
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> uniform(-0.5, 0.5);
+  std::size_t total = 0;
+  for (int ray = 0; ray < 300; ++ray) {
+    const glm::dvec3 origin(uniform(random), uniform(random), uniform(random));
+    glm::dvec3 direction(uniform(random), uniform(random), uniform(random));
+    if (ray % 10 == 0) direction = {0.0, 1.0, 0.0};
+    std::vector<RayHit> hits;
+    tree.collectHits(origin, direction, 0.0, 1.0, hits);
+    std::vector<std::uint32_t> found, expected;
+    for (const auto& hit : hits) found.push_back(hit.triangle);
+    for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+      std::vector<RayHit> alone;
+      single[t].collectHits(origin, direction, 0.0, 1.0, alone);
+      if (!alone.empty()) expected.push_back(t);
+    }
+    std::ranges::sort(found);
+    EXPECT_EQ(found, expected);
+    total += found.size();
+  }
+  EXPECT_GT(total, 100U);
+}
+
+TEST(Bvh, KnowsFrontFromBack) {
+  const Bvh tree({{glm::vec3(0, 0, 0), glm::vec3(1, 0, 0), glm::vec3(0, 1, 0)}});
+  std::vector<RayHit> hits;
+  tree.collectHits({0.2, 0.2, 1.0}, {0, 0, -1}, 0.0, 2.0, hits);
+  tree.collectHits({0.2, 0.2, -1.0}, {0, 0, 1}, 0.0, 2.0, hits);
+  ASSERT_EQ(hits.size(), 2U);
+  EXPECT_TRUE(hits[0].front);
+  EXPECT_FALSE(hits[1].front);
+  EXPECT_DOUBLE_EQ(hits[0].t, 1.0);
+}
+
+TEST(Bvh, TouchesIgnoresTheTagAndMissesBoxesBesideADiagonal) {
+  const Bvh tree({{glm::vec3(0, 0, 0), glm::vec3(1, 1, 0), glm::vec3(1, 1, 1)}});
+  const std::vector<std::uint32_t> tags{7};
+  EXPECT_TRUE(tree.touches(glm::vec3(0.4F), glm::vec3(0.6F), tags, kNone));
+  EXPECT_FALSE(tree.touches(glm::vec3(0.4F), glm::vec3(0.6F), tags, 7));
+  EXPECT_FALSE(tree.touches({0.7F, 0.1F, 0.0F}, {0.9F, 0.3F, 0.5F}, tags, kNone));
+}
+
+TEST(Bvh, ManyEqualTrianglesDoNotOverflow) {
+  std::vector<Bvh::Triangle> triangles(5000, {glm::vec3(0, 0, 0), glm::vec3(1, 0, 0), glm::vec3(0, 1, 0)});
+  const Bvh tree(std::move(triangles));
+  std::vector<RayHit> hits;
+  tree.collectHits({0.2, 0.2, 1.0}, {0, 0, -1}, 0.0, 2.0, hits);
+  EXPECT_EQ(hits.size(), 5000U);
+}
+
+}  // namespace
+}  // namespace radiosity::scene

@@ -1,0 +1,177 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/scene/patch_scene.h"
+#include "tests/unit/scene/shapes.h"
+
+namespace radiosity::scene::test {
+namespace {
+
+PatchScene build(const Scene& scene, std::uint64_t budget) {
+  ChartOptions options;
+  options.texel_budget = budget;
+  return buildPatchScene(scene, options).value();
+}
+
+Texture textureOf(int width, int height, const std::vector<std::uint8_t>& grey, bool srgb) {
+  Texture texture;
+  texture.width = width;
+  texture.height = height;
+  texture.srgb = srgb;
+  for (const std::uint8_t g : grey) texture.rgba.insert(texture.rgba.end(), {g, g, g, 255});
+  return texture;
+}
+
+/// One floor whose texture spans it once.
+Scene texturedFloor(Texture texture, double size = 1.0) {
+  Scene scene;
+  scene.textures.push_back(std::move(texture));
+  Primitive p = floorQuad(size);
+  p.texcoord0 = {{0, 0}, {0, 1}, {1, 1}, {1, 0}};
+  Material material;
+  material.base_color = glm::vec3(0.5F);
+  material.base_color_texture.texture = 0;
+  place(scene, p, glm::dmat4(1.0), material);
+  return scene;
+}
+
+double meanReflectance(const PatchScene& patches, const PatchMaterials& materials) {
+  double sum = 0.0, area = 0.0;
+  for (const Surface& s : patches.surfaces)
+    for (std::uint32_t n = s.first_node[0]; n < s.first_node[0] + s.width * s.height; ++n) {
+      sum += static_cast<double>(materials.reflectance[n].x) * patches.node_area[n];
+      area += patches.node_area[n];
+    }
+  return sum / area;
+}
+
+TEST(Shade, UniformMaterialFillsEveryNode) {
+  Scene scene;
+  Material material;
+  material.base_color = {0.2F, 0.4F, 0.6F};
+  material.metallic = 0.5F;
+  material.emission = {1.0F, 2.0F, 3.0F};
+  place(scene, floorQuad(1.0), glm::dmat4(1.0), material);
+  const PatchScene patches = build(scene, 100);
+  const PatchMaterials materials = shadePatches(scene, patches);
+  ASSERT_EQ(materials.emission.size(), patches.nodeCount());
+  for (std::size_t i = 0; i < patches.nodeCount(); ++i) {
+    EXPECT_NEAR(materials.reflectance[i].y, 0.2, 1e-6);
+    EXPECT_NEAR(materials.emission[i].z, 3.0 * M_PI, 1e-5);
+  }
+  EXPECT_TRUE(materials.warnings.empty());
+}
+
+TEST(Shade, ReflectanceOfOneIsLoweredWithAWarning) {
+  const Scene scene = sceneOf(floorQuad(1.0));
+  const PatchScene patches = build(scene, 10);
+  const PatchMaterials materials = shadePatches(scene, patches);
+  for (const glm::vec3& rho : materials.reflectance) EXPECT_EQ(rho.x, 0.999F);
+  EXPECT_THAT(materials.warnings, testing::ElementsAre(testing::HasSubstr("/materials/0")));
+}
+
+TEST(Shade, SrgbTexturesAreAveragedAsLight) {
+  // A fine checkerboard of black and white is half the light, not sRGB 188's.
+  std::vector<std::uint8_t> checker;
+  for (int y = 0; y < 64; ++y)
+    for (int x = 0; x < 64; ++x) checker.push_back((x + y) % 2 == 0 ? 255 : 0);
+  const Scene scene = texturedFloor(textureOf(64, 64, checker, true));
+  const PatchScene patches = build(scene, 16);
+  const PatchMaterials materials = shadePatches(scene, patches);
+  for (std::uint32_t n = 0; n < 16; ++n) EXPECT_NEAR(materials.reflectance[n].x, 0.25, 1e-3);
+}
+
+TEST(Shade, MeanOfAnOddSizedTextureIsKeptAtAnyResolution) {
+  std::vector<std::uint8_t> values;
+  double mean = 0.0;
+  for (int i = 0; i < 37 * 53; ++i) {
+    values.push_back(static_cast<std::uint8_t>((i * 7919) % 251));
+    mean += 0.5 * values.back() / 255.0 / (37 * 53);
+  }
+  Scene scene = texturedFloor(textureOf(37, 53, values, false));
+  for (const std::uint64_t budget : {1U, 9U, 400U, 40'000U}) {
+    const PatchScene patches = build(scene, budget);
+    EXPECT_NEAR(meanReflectance(patches, shadePatches(scene, patches)), mean, 0.01 * mean) << budget;
+  }
+}
+
+TEST(Shade, EmissiveTextureLightsOnlyItsPart) {
+  Scene scene;
+  scene.textures.push_back(textureOf(2, 1, {0, 255}, false));
+  Primitive p = floorQuad(1.0);
+  p.texcoord0 = {{0, 0}, {0, 1}, {1, 1}, {1, 0}};
+  Material material;
+  material.emission = glm::vec3(2.0F);
+  material.emissive_texture.texture = 0;
+  material.emissive_texture.repeat_u = false;
+  place(scene, p, glm::dmat4(1.0), material);
+  const PatchScene patches = build(scene, 4096);
+  const PatchMaterials materials = shadePatches(scene, patches);
+  const LevelGrid top =
+      levelGrid(patches.surfaces[0].width, patches.surfaces[0].height, patches.surfaces[0].level_count - 1);
+  EXPECT_NEAR(materials.emission[top.offset].x, M_PI, 0.01);  // half of 2 pi
+  float low = 1e9F, high = 0.0F;
+  for (std::uint32_t n = 0; n < 4096; ++n) {
+    low = std::min(low, materials.emission[n].x);
+    high = std::max(high, materials.emission[n].x);
+  }
+  EXPECT_EQ(low, 0.0F);
+  EXPECT_NEAR(high, 2.0 * M_PI, 1e-4);
+}
+
+TEST(Shade, VertexColoursAreInterpolatedAndMirroringKeepsTheirCorners) {
+  Primitive p = floorQuad(1.0);
+  p.color0 = {{0, 0, 0, 1}, {0, 0, 0, 1}, {0.8F, 0, 0, 1}, {0.8F, 0, 0, 1}};  // red grows with x
+  for (const double sign : {1.0, -1.0}) {
+    Scene scene;
+    place(scene, p, glm::scale(glm::dmat4(1.0), glm::dvec3(sign, 1, 1)));
+    const PatchScene patches = build(scene, 100);
+    const PatchMaterials materials = shadePatches(scene, patches);
+    for (std::uint32_t i = 0; i < 100; ++i) {
+      const TriangleFrame& frame = patches.triangles[patches.leaves[i].triangle];
+      const glm::vec3 unit = frame.origin + frame.du * patches.leaves[i].texel.x + frame.dv * patches.leaves[i].texel.y;
+      const double x = unit.x * patches.scale + patches.centre.x;
+      EXPECT_NEAR(materials.reflectance[i].x, 0.8 * x * sign, 1e-4);
+    }
+  }
+}
+
+TEST(Shade, ParentsAreAreaWeighted) {
+  std::vector<std::uint8_t> values;
+  for (int i = 0; i < 256; ++i) values.push_back(static_cast<std::uint8_t>(i));
+  Scene scene;
+  scene.textures.push_back(textureOf(16, 16, values, false));
+  Primitive p;
+  p.positions = {{0, 0, 0}, {0, 0, 1}, {1, 0, 0.3}};
+  p.texcoord0 = {{0, 0}, {0, 1}, {1, 0.3}};
+  p.indices = {0, 1, 2};
+  Material material;
+  material.base_color_texture.texture = 0;
+  place(scene, p, glm::dmat4(1.0), material);
+  const PatchScene patches = build(scene, 300);
+  const PatchMaterials materials = shadePatches(scene, patches);
+  const Surface& s = patches.surfaces[0];
+  const LevelGrid top = levelGrid(s.width, s.height, s.level_count - 1);
+  EXPECT_NEAR(materials.reflectance[s.first_node[0] + top.offset].x, meanReflectance(patches, materials), 1e-5);
+}
+
+TEST(Shade, ReshadingTouchesOnlyTheMaterialsSurfaces) {
+  Scene scene;
+  Material grey;
+  grey.base_color = glm::vec3(0.5F);
+  place(scene, floorQuad(1.0), glm::dmat4(1.0), grey);
+  place(scene, box({2, 0, 0}, {3, 1, 1}), glm::dmat4(1.0), grey);
+  const PatchScene patches = build(scene, 500);
+  PatchMaterials materials = shadePatches(scene, patches);
+  scene.materials[1].base_color = glm::vec3(0.25F);
+  const std::vector<std::uint32_t> touched = reshadeMaterial(scene, patches, 1, materials);
+  EXPECT_EQ(touched.size(), 6U);
+  for (const Surface& surface : patches.surfaces)
+    EXPECT_NEAR(materials.reflectance[surface.first_node[0]].x, surface.material == 1 ? 0.25 : 0.5, 1e-6);
+  const PatchMaterials fresh = shadePatches(scene, patches);
+  EXPECT_EQ(fresh.reflectance, materials.reflectance);
+  EXPECT_EQ(fresh.emission, materials.emission);
+}
+
+}  // namespace
+}  // namespace radiosity::scene::test
