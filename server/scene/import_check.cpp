@@ -32,8 +32,6 @@ Result<void> checkAccessors(const ImportContext& context) {
   std::size_t total = 0;
   for (std::size_t i = 0; i < context.model.accessors.size(); ++i) {
     const auto pointer = "/accessors/" + std::to_string(i);
-    const auto type = context.document.gltf["accessors"][i]["type"].get<std::string>();
-    if (type.rfind("MAT", 0) != 0 && type != "SCALAR" && type.rfind("VEC", 0) != 0) return context.bad(pointer, "type");
     if (auto ok = checkAccessor(context.document, context.model, i); !ok) return ok;
     total += context.model.accessors[i].count;
     if (total > context.limits.max_vertices) {
