@@ -1,0 +1,21 @@
+// A log-log plot of error against time as SVG text. Pure function.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace radiosity::benchmark {
+
+struct ErrorPlot {
+  struct Curve {
+    std::string name, colour;
+    std::vector<std::pair<double, double>> points;  ///< seconds, relative error (0.02 is 2 %); non-positive left out
+  };
+  std::string title;
+  std::vector<Curve> curves;
+};
+
+[[nodiscard]] std::string toSvg(const ErrorPlot& plot);
+
+}  // namespace radiosity::benchmark
