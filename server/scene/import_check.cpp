@@ -18,7 +18,8 @@ Result<void> checkBuffers(const ImportContext& context) {
   if (size("images") != context.document.images.size())
     return context.bad("/images", "images cannot be added or removed");
   for (std::size_t i = 0; i < context.document.buffers.size(); ++i) {
-    if (gltf["buffers"][i]["byteLength"].get<std::size_t>() > context.document.buffers[i]->size()) {
+    const auto size = context.document.buffers[i]->size();
+    if (size != 0 && gltf["buffers"][i]["byteLength"].get<std::size_t>() > size) {
       return context.bad("/buffers/" + std::to_string(i) + "/byteLength", "is more than the data has");
     }
   }
