@@ -1,16 +1,10 @@
 // radiosityd: options -> engine and network -> run until a signal.
-//
-// Needs server/engine/make_engine.h with
-//   struct EngineOptions { engine::SolveSettings settings; gpu::WorkerOptions workers; };
-//   std::unique_ptr<engine::Engine> engine::makeEngine(const engine::EngineOptions& options);
-// and the renderer's worker entry, gpu::workerMain.
-#include <fmt/format.h>
 #include <cstdio>
 #include <exception>
 #include <string_view>
 
 #include "common/log.h"
-#include "server/engine/make_engine.h"
+#include "server/engine/solve_loop.h"
 #include "server/gpu/gpu_transport.h"
 #include "server/net/server.h"
 #include "server/options.h"
@@ -37,13 +31,15 @@ void loadFirstScene(engine::Engine& engine, const std::string& path) {
 int serve(const Options& options) {
   engine::EngineOptions engine_options;
   engine_options.settings = options.solve;
-  engine_options.workers.workers = options.workers;
-  engine_options.workers.executable = "/proc/self/exe";
-  const auto engine = engine::makeEngine(engine_options);
-  auto server = net::Server::open(options.server, *engine);
+  engine_options.make_transport = [workers = options.workers] {
+    return gpu::makeWorkerTransport({workers, "/proc/self/exe"});
+  };
+  const auto engine = engine::makeEngine(std::move(engine_options));
+  if (!engine) return report(engine.error());
+  auto server = net::Server::open(options.server, **engine);
   if (!server) return report(server.error());
   (*server)->drainOnSignals();
-  if (!options.scene.empty()) loadFirstScene(*engine, options.scene);
+  if (!options.scene.empty()) loadFirstScene(**engine, options.scene);
   std::printf("listening on %s\n", (*server)->url().c_str());
   std::fflush(stdout);
   (*server)->run();
@@ -51,7 +47,7 @@ int serve(const Options& options) {
 }
 
 int run(int argc, char** argv) {
-  if (argc > 1 && std::string_view(argv[1]) == "--worker") return gpu::workerMain(argc - 1, argv + 1);
+  if (argc > 1 && std::string_view(argv[1]) == "--worker") return gpu::workerMain(argc - 2, argv + 2);
   const auto parsed = parseOptions(argc, argv, RADIOSITY_VERSION);
   if (parsed.exit_code) return *parsed.exit_code;
   startLog("radiosityd", parsed.options.log_level);
