@@ -18,12 +18,12 @@ namespace {
 /// Rays start this far from the surface (unit box): well above the rounding of 32-bit positions (6e-8), well below
 /// anything modelled.
 constexpr double kLift = 2e-5;
-constexpr std::uint32_t kFewSamples = 16, kManySamples = 256;
+constexpr std::uint32_t kFewSamples = 16, kManySamples = 64;
 constexpr std::uint64_t kMaxSamples = 2'000'000;  ///< a scene; beyond it leaves get fewer
 
 /// Rank-1 lattice: every point has its own x and its own y, so axis-parallel borders are placed within 1/count.
 glm::dvec2 samplePoint(std::uint32_t i, std::uint32_t count) {
-  const std::uint32_t generator = count == kManySamples ? 119 : 5;
+  const std::uint32_t generator = count == kManySamples ? 19 : 5;
   return {(i + 0.5) / count, ((std::uint64_t{i} * generator) % count + 0.5) / count};
 }
 
