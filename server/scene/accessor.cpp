@@ -137,7 +137,8 @@ Result<void> checkBufferView(const Document& document, const tinygltf::Model& mo
   if (view.byteOffset + view.byteLength > size) {
     return fail(ErrorCode::kInvalidScene,
                 "ends at byte " + std::to_string(view.byteOffset + view.byteLength) + " of buffer " +
-                    std::to_string(view.buffer) + ", which has " + std::to_string(size),
+                    std::to_string(view.buffer) + ", which has " + std::to_string(size) +
+                    (size == 0 ? " (no uri, and no BIN chunk for it)" : ""),
                 place(document.name, pointer + "/byteLength"));
   }
   return {};

@@ -74,7 +74,7 @@ class Loader {
     } else if (index == 0 && chunks_.has_bin) {
       bytes = Bytes(chunks_.bin.begin(), chunks_.bin.end());
     } else {
-      return fail(ErrorCode::kBadInput, "has no uri and there is no BIN chunk for it", at("buffers", index));
+      return Bytes();  // allowed where nothing refers to it; any view into it is refused by its bounds
     }
     if (bytes->size() < length) {
       return fail(

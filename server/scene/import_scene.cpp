@@ -9,6 +9,7 @@
 #include "server/scene/import_check.h"
 #include "server/scene/import_context.h"
 #include "server/scene/import_instancing.h"
+#include "server/scene/import_lint.h"
 #include "server/scene/import_material.h"
 #include "server/scene/import_mesh.h"
 #include "server/scene/import_schema.h"
@@ -206,7 +207,7 @@ Result<Scene> importScene(const Document& document, const ImportLimits& limits) 
   if (auto ok = checkModel(context); !ok) return tl::unexpected(ok.error());
   if (auto ok = importMaterials(context); !ok) return tl::unexpected(ok.error());
   if (auto ok = NodeWalk(context).run(); !ok) return tl::unexpected(ok.error());
-  if (document.gltf.contains("animations")) context.warn("/animations", "are ignored; the scene is lit at rest");
+  warnAboutOddities(context);
   return scene;
 }
 

@@ -65,6 +65,7 @@ struct Member {
   double min = -kBig;
   double max = kBig;
   bool required = false;
+  std::span<const std::string_view> choices = {};  ///< of kString; empty: any
 };
 
 constexpr Member req(Member m) {
@@ -73,6 +74,9 @@ constexpr Member req(Member m) {
 }
 constexpr Member boolean(const char* name) { return {.name = name, .kind = Kind::kBool}; }
 constexpr Member string(const char* name) { return {.name = name, .kind = Kind::kString}; }
+constexpr Member oneOf(const char* name, std::span<const std::string_view> choices) {
+  return {.name = name, .kind = Kind::kString, .choices = choices};
+}
 constexpr Member strings(const char* name) { return {.name = name, .kind = Kind::kStrings}; }
 constexpr Member number(const char* name, double min = -kBig, double max = kBig) {
   return {.name = name, .kind = Kind::kNumber, .min = min, .max = max};
@@ -94,6 +98,11 @@ constexpr Member objects(const char* name, std::span<const Member> child) {
   return {.name = name, .kind = Kind::kObjects, .child = child};
 }
 
+constexpr std::string_view kAccessorTypes[] = {"SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"};
+constexpr std::string_view kAlphaModes[] = {"OPAQUE", "MASK", "BLEND"};
+constexpr std::string_view kCameraTypes[] = {"perspective", "orthographic"};
+constexpr std::string_view kLightTypes[] = {"point", "spot", "directional"};
+
 constexpr Member kAsset[] = {req(string("version")), string("minVersion"), string("generator"), string("copyright")};
 constexpr Member kBuffer[] = {string("name"), string("uri"), req(uint("byteLength", 1))};
 constexpr Member kBufferView[] = {string("name"),
@@ -107,11 +116,16 @@ constexpr Member kSparseIndices[] = {req(index("bufferView", Ref::kBufferViews))
 constexpr Member kSparseValues[] = {req(index("bufferView", Ref::kBufferViews)), uint("byteOffset")};
 constexpr Member kSparse[] = {req(uint("count", 1)), req(object("indices", kSparseIndices)),
                               req(object("values", kSparseValues))};
-constexpr Member kAccessor[] = {string("name"),        index("bufferView", Ref::kBufferViews),
-                                uint("byteOffset"),    req(uint("componentType")),
-                                boolean("normalized"), req(uint("count", 1)),
-                                req(string("type")),   object("sparse", kSparse),
-                                numbers("min", 0),     numbers("max", 0)};
+constexpr Member kAccessor[] = {string("name"),
+                                index("bufferView", Ref::kBufferViews),
+                                uint("byteOffset"),
+                                req(uint("componentType")),
+                                boolean("normalized"),
+                                req(uint("count", 1)),
+                                req(oneOf("type", kAccessorTypes)),
+                                object("sparse", kSparse),
+                                numbers("min", 0),
+                                numbers("max", 0)};
 constexpr Member kPrimitive[] = {req(indexMap("attributes", Ref::kAccessors)), index("indices", Ref::kAccessors),
                                  index("material", Ref::kMaterials), uint("mode", 0, 6),
                                  indexMaps("targets", Ref::kAccessors)};
@@ -157,7 +171,7 @@ constexpr Member kMaterial[] = {string("name"),
                                 object("occlusionTexture", kTextureInfo),
                                 object("emissiveTexture", kTextureInfo),
                                 numbers("emissiveFactor", 3, 0),
-                                string("alphaMode"),
+                                oneOf("alphaMode", kAlphaModes),
                                 number("alphaCutoff", 0),
                                 boolean("doubleSided"),
                                 object("extensions", kMaterialExtensions)};
@@ -169,14 +183,15 @@ constexpr Member kPerspective[] = {number("aspectRatio", 0), req(number("yfov", 
                                    req(number("znear", 0))};
 constexpr Member kOrthographic[] = {req(number("xmag")), req(number("ymag")), req(number("zfar", 0)),
                                     req(number("znear", 0))};
-constexpr Member kCamera[] = {string("name"), req(string("type")), object("perspective", kPerspective),
+constexpr Member kCamera[] = {string("name"), req(oneOf("type", kCameraTypes)), object("perspective", kPerspective),
                               object("orthographic", kOrthographic)};
 constexpr Member kSkin[] = {string("name"), req(indices("joints", Ref::kNodes)), index("skeleton", Ref::kNodes),
                             index("inverseBindMatrices", Ref::kAccessors)};
 constexpr Member kScene[] = {string("name"), indices("nodes", Ref::kNodes)};
 constexpr Member kSpot[] = {number("innerConeAngle", 0), number("outerConeAngle", 0)};
-constexpr Member kLight[] = {string("name"),         req(string("type")), numbers("color", 3, 0),
-                             number("intensity", 0), number("range", 0),  object("spot", kSpot)};
+constexpr Member kLight[] = {string("name"),         req(oneOf("type", kLightTypes)),
+                             numbers("color", 3, 0), number("intensity", 0),
+                             number("range", 0),     object("spot", kSpot)};
 constexpr Member kLights[] = {objects("lights", kLight)};
 constexpr Member kRootExtensions[] = {object("KHR_lights_punctual", kLights)};
 constexpr Member kRoot[] = {req(object("asset", kAsset)),
@@ -242,8 +257,7 @@ class Checker {
         if (!value.is_boolean()) return bad(pointer, "must be true or false");
         return {};
       case Kind::kString:
-        if (!value.is_string()) return bad(pointer, "must be a string");
-        return {};
+        return stringAt(value, member, pointer);
       case Kind::kNumber:
         return numberAt(value, member, pointer);
       case Kind::kUint:
@@ -286,6 +300,17 @@ class Checker {
     }
   }
 
+  Result<void> stringAt(const Json& value, const Member& member, const std::string& pointer) {
+    if (!value.is_string()) return bad(pointer, "must be a string");
+    if (member.choices.empty()) return {};
+    std::string known;
+    for (const auto choice : member.choices) {
+      if (value.get_ref<const std::string&>() == choice) return {};
+      known += (known.empty() ? "" : ", ") + std::string(choice);
+    }
+    return bad(pointer, "must be one of " + known);
+  }
+
   Result<void> numberAt(const Json& value, const Member& member, const std::string& pointer) {
     if (!value.is_number()) return bad(pointer, "must be a number");
     const auto x = value.get<double>();
@@ -323,6 +348,24 @@ class Checker {
   std::array<std::size_t, kRefPointers.size()> sizes_{};
 };
 
+/// A camera must have the object that its type names, and so must a spot light.
+Result<void> checkTypeObjects(const Json& gltf, const std::string& name) {
+  const auto check = [&](const Json& list, const std::string& pointer, bool spots_only) -> Result<void> {
+    for (std::size_t i = 0; i < list.size(); ++i) {
+      const auto& type = list[i]["type"].get_ref<const std::string&>();
+      if ((spots_only && type != "spot") || list[i].contains(type)) continue;
+      return fail(ErrorCode::kInvalidScene, "'" + type + "' is missing",
+                  place(name, pointer + "/" + std::to_string(i)));
+    }
+    return {};
+  };
+  if (gltf.contains("cameras")) {
+    if (auto ok = check(gltf["cameras"], "/cameras", false); !ok) return ok;
+  }
+  const auto lights = Json::json_pointer("/extensions/KHR_lights_punctual/lights");
+  return gltf.contains(lights) ? check(gltf.at(lights), lights.to_string(), true) : Result<void>{};
+}
+
 /// glTF versions are "major.minor"; only 2.x is known, and minVersion may not ask for more than 2.0.
 Result<void> checkVersion(const Json& asset, const std::string& name) {
   const auto version = asset["version"].get<std::string>();
@@ -351,6 +394,7 @@ bool isSupported(const std::string& extension) {
 Result<void> checkSchema(const Json& gltf, const std::string& name, std::vector<std::string>& warnings) {
   Checker checker(gltf, name, warnings);
   if (auto ok = checker.objectAt(gltf, kRoot, ""); !ok) return ok;
+  if (auto ok = checkTypeObjects(gltf, name); !ok) return ok;
   return checkVersion(gltf["asset"], name);
 }
 

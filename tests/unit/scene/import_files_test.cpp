@@ -68,5 +68,19 @@ TEST(ImportFiles, everyValidatorFileIsAcceptedOrRefusedWithAPlace) {
   }
 }
 
+TEST(ImportFiles, validFilesOfTheValidatorAreAccepted) {
+  const auto root = kShared / "suites/gltf-validator/test/base/data";
+  if (!fs::exists(root)) GTEST_SKIP() << "no shared suites here";
+  std::size_t valid = 0;
+  for (const auto& file : sceneFiles(root)) {
+    if (file.filename() != "valid.gltf" && file.filename() != "valid.glb") continue;
+    if (file.parent_path().filename() == "accessor") continue;  // its buffer has no data, and accessors that read it
+    const auto scene = load(file);
+    EXPECT_TRUE(scene) << file << ": " << scene.error().text();
+    ++valid;
+  }
+  EXPECT_GT(valid, 5U);
+}
+
 }  // namespace
 }  // namespace radiosity::scene

@@ -92,6 +92,7 @@ TEST(Import, bytesAndIntsAndNoIndicesMeanTheSame) {
 TEST(Import, sparseValuesReplaceTheirElements) {
   GltfBuilder builder;
   const auto mesh = builder.square();
+  builder.gltf["meshes"][mesh]["primitives"][0]["indices"] = builder.indices({0, 1, 3});
   const auto which = builder.indices({1, 3});
   const auto values = builder.vec3({9, 0, 0, 0, 8, 0});
   auto& accessor = builder.gltf["accessors"][0];

@@ -1,0 +1,134 @@
+#include "server/scene/import_lint.h"
+
+#include <algorithm>
+#include <array>
+#include <numbers>
+#include <set>
+#include <string>
+
+#include "server/scene/image_decode.h"
+
+namespace radiosity::scene {
+namespace {
+
+/// Names of all extensions used in a document; values nest at most 64 deep.
+void collectExtensions(const Json& value, std::set<std::string>& names) {
+  if (!value.is_structured()) return;
+  for (const auto& [key, child] : value.items()) {
+    if (value.is_object() && key == "extras") continue;
+    if (value.is_object() && key == "extensions" && child.is_object()) {
+      for (const auto& extension : child.items()) names.insert(extension.key());
+    }
+    collectExtensions(child, names);
+  }
+}
+
+void warnUndeclared(ImportContext& context) {
+  const auto& gltf = context.document.gltf;
+  std::set<std::string> names;
+  collectExtensions(gltf, names);
+  const auto declared = gltf.value("extensionsUsed", Json::array());
+  for (const auto& name : names) {
+    if (std::find(declared.begin(), declared.end(), name) != declared.end()) continue;
+    context.warn("/extensionsUsed", name + " is used but not listed");
+  }
+}
+
+void warnAccessors(ImportContext& context) {
+  for (std::size_t i = 0; i < context.model.accessors.size(); ++i) {
+    const auto& accessor = context.model.accessors[i];
+    const bool wide = accessor.componentType == TINYGLTF_COMPONENT_TYPE_FLOAT ||
+                      accessor.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT;
+    if (accessor.normalized && wide) {
+      context.warn("/accessors/" + std::to_string(i) + "/normalized", "means nothing for this component type");
+    }
+  }
+}
+
+bool isKnownAttribute(const std::string& name) {
+  constexpr std::array<const char*, 4> kNumbered = {"TEXCOORD_", "COLOR_", "JOINTS_", "WEIGHTS_"};
+  if (name == "POSITION" || name == "NORMAL" || name == "TANGENT" || name.rfind('_', 0) == 0) return true;
+  return std::any_of(kNumbered.begin(), kNumbered.end(), [&](const char* p) { return name.rfind(p, 0) == 0; });
+}
+
+void warnMeshes(ImportContext& context) {
+  std::set<int> placed;
+  for (const auto& node : context.model.nodes) placed.insert(node.mesh);
+  for (std::size_t m = 0; m < context.model.meshes.size(); ++m) {
+    const auto mesh = "/meshes/" + std::to_string(m);
+    if (placed.count(static_cast<int>(m)) == 0) context.warn(mesh, "no node places it; not read");
+    for (std::size_t p = 0; p < context.model.meshes[m].primitives.size(); ++p) {
+      const auto pointer = mesh + "/primitives/" + std::to_string(p) + "/attributes/";
+      for (const auto& [name, accessor] : context.model.meshes[m].primitives[p].attributes) {
+        if (!isKnownAttribute(name)) context.warn(pointer + escapeToken(name), "unknown attribute; ignored");
+      }
+    }
+  }
+}
+
+void warnNodes(ImportContext& context) {
+  for (std::size_t n = 0; n < context.model.nodes.size(); ++n) {
+    const auto& node = context.model.nodes[n];
+    const auto pointer = "/nodes/" + std::to_string(n);
+    if (node.mesh < 0 && node.skin >= 0) context.warn(pointer + "/skin", "means nothing without a mesh");
+    if (node.mesh < 0 && !node.weights.empty()) context.warn(pointer + "/weights", "mean nothing without a mesh");
+  }
+}
+
+void warnCameras(ImportContext& context) {
+  for (std::size_t i = 0; i < context.model.cameras.size(); ++i) {
+    const auto& json = context.document.gltf["cameras"][i];
+    const auto pointer = "/cameras/" + std::to_string(i);
+    if (json.contains("perspective") && json.contains("orthographic")) context.warn(pointer, "has two projections");
+    const auto& projection = json[json["type"].get<std::string>()];
+    if (projection.contains("zfar") && projection["zfar"].get<double>() <= projection["znear"].get<double>()) {
+      context.warn(pointer, "zfar is not beyond znear");
+    }
+  }
+}
+
+void warnLights(ImportContext& context) {
+  for (std::size_t i = 0; i < context.model.lights.size(); ++i) {
+    const auto& light = context.model.lights[i];
+    const bool narrow = light.spot.innerConeAngle >= light.spot.outerConeAngle;
+    if (light.type != "spot" || (!narrow && light.spot.outerConeAngle <= std::numbers::pi / 2 + 1e-6)) continue;
+    context.warn("/extensions/KHR_lights_punctual/lights/" + std::to_string(i), "needs inner < outer <= pi/2");
+  }
+}
+
+void warnBuffers(ImportContext& context) {
+  for (std::size_t i = 0; i < context.document.buffers.size(); ++i) {
+    if (context.document.buffers[i]->empty()) context.warn("/buffers/" + std::to_string(i), "has no data");
+  }
+}
+
+void warnImages(ImportContext& context) {
+  for (std::size_t i = 0; i < context.document.images.size(); ++i) {
+    const auto type = sniffImageType(*context.document.images[i]);
+    const auto pointer = "/images/" + std::to_string(i);
+    const auto said = context.document.gltf["images"][i].value("mimeType", type);
+    if (type.empty()) {
+      context.warn(pointer, "is neither PNG nor JPEG");
+    } else if (said != type) {
+      context.warn(pointer + "/mimeType", "says " + said + ", but the data is " + type);
+    }
+  }
+}
+
+}  // namespace
+
+void warnAboutOddities(ImportContext& context) {
+  warnUndeclared(context);
+  warnAccessors(context);
+  warnMeshes(context);
+  warnNodes(context);
+  warnCameras(context);
+  warnLights(context);
+  warnBuffers(context);
+  warnImages(context);
+  const auto& gltf = context.document.gltf;
+  if (gltf.contains("animations")) context.warn("/animations", "are ignored; the scene is lit at rest");
+  if (gltf.contains("skins")) context.warn("/skins", "are ignored; meshes are lit in the pose they were modelled in");
+}
+
+}  // namespace radiosity::scene

@@ -1,0 +1,228 @@
+// The exporters, on UVs made by hand: every triangle corner gets a UV of its own unless said otherwise.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <glm/common.hpp>
+#include <set>
+
+#include "server/scene/lightmap.h"
+#include "tests/unit/scene/gltf_builder.h"
+
+namespace radiosity::scene {
+namespace {
+
+using test::GltfBuilder;
+using Json = nlohmann::json;
+namespace fs = std::filesystem;
+
+glm::vec2 uvOf(std::size_t instance, std::size_t triangle, std::size_t corner) {
+  return {static_cast<float>(instance * 1000 + triangle), static_cast<float>(corner)};
+}
+
+/// Triangles in turn on `page_count` pages.
+PatchScene patchesFor(const Scene& scene, std::uint32_t page_count) {
+  PatchScene patches;
+  patches.pages.resize(page_count, {2, 2});
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    PatchScene::InstanceUv uv;
+    const auto triangles = scene.primitives[scene.instances[i].primitive].indices.size() / 3;
+    for (std::size_t t = 0; t < triangles; ++t) {
+      uv.page.push_back(static_cast<std::uint32_t>(t) % page_count);
+      uv.corners.push_back({uvOf(i, t, 0), uvOf(i, t, 1), uvOf(i, t, 2)});
+    }
+    patches.instance_uvs.push_back(std::move(uv));
+  }
+  return patches;
+}
+
+struct Corner {
+  glm::dvec3 position;
+  glm::vec2 uv;
+  std::uint32_t page;
+  bool operator<(const Corner& o) const {
+    const auto key = [](const Corner& c) {
+      return std::tuple(c.position.x, c.position.y, c.position.z, c.uv.x, c.uv.y, c.page);
+    };
+    return key(*this) < key(o);
+  }
+  bool operator==(const Corner&) const = default;
+};
+
+/// To 1e-7 m: an instance's transform is normalised once more when it is read as a node.
+glm::dvec3 rounded(const glm::dvec4& p) { return glm::round(glm::dvec3(p) * 1e7) / 1e7; }
+
+/// World position, lightmap UV and page of each corner that `patches` asked for.
+std::multiset<Corner> expected(const Scene& scene, const PatchScene& patches) {
+  std::multiset<Corner> out;
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    const auto& primitive = scene.primitives[scene.instances[i].primitive];
+    for (std::size_t k = 0; k < primitive.indices.size(); ++k) {
+      const auto position = scene.instances[i].world * glm::dvec4(primitive.positions[primitive.indices[k]], 1.0);
+      const auto& uv = patches.instance_uvs[i];
+      out.insert({rounded(position), uv.corners[k / 3][k % 3], uv.page[k / 3]});
+    }
+  }
+  return out;
+}
+
+/// The same, read back from a file.
+std::multiset<Corner> found(const Document& document, const Scene& scene) {
+  std::multiset<Corner> out;
+  for (const auto& instance : scene.instances) {
+    const auto& primitive = scene.primitives[instance.primitive];
+    const auto& json = document.gltf["meshes"][primitive.mesh]["primitives"][primitive.primitive];
+    for (const auto index : primitive.indices) {
+      const auto position = instance.world * glm::dvec4(primitive.positions[index], 1.0);
+      out.insert({rounded(position), primitive.texcoord1[index], json["extras"]["lightmap"].get<std::uint32_t>()});
+    }
+  }
+  return out;
+}
+
+/// Exports, writes, reads again and compares corner by corner; returns what was read.
+Document roundTrip(const Document& document, std::uint32_t page_count) {
+  const auto scene = importScene(document).value();
+  const auto patches = patchesFor(scene, page_count);
+  const auto lit = withLightmapUvs(document, scene, patches);
+  EXPECT_TRUE(lit) << lit.error().text();
+  const auto again = parseDocument("lit.glb", writeGlb(*lit));
+  EXPECT_TRUE(again) << again.error().text();
+  const auto read = importScene(*again);
+  EXPECT_TRUE(read) << read.error().text();
+  if (!read) return {};
+  EXPECT_TRUE(found(*again, *read) == expected(scene, patches)) << document.name;
+  return *again;
+}
+
+TEST(LitGlb, aSquareOnTwoPagesBecomesTwoPrimitives) {
+  GltfBuilder builder;
+  builder.node({{"mesh", builder.square()}});
+  const auto lit = roundTrip(*builder.document(), 2);
+  const auto& primitives = lit.gltf["meshes"][0]["primitives"];
+  ASSERT_EQ(primitives.size(), 2U);
+  EXPECT_EQ(primitives[0]["extras"]["lightmap"], 0);
+  EXPECT_EQ(primitives[1]["extras"]["lightmap"], 1);
+}
+
+TEST(LitGlb, instancesGetAMeshEach) {
+  GltfBuilder builder;
+  const auto mesh = builder.square();
+  builder.node({{"mesh", mesh}});
+  builder.node({{"mesh", mesh}, {"translation", {0, 0, 1}}});
+  const auto lit = roundTrip(*builder.document(), 1);
+  EXPECT_EQ(lit.gltf["meshes"].size(), 2U);
+  EXPECT_NE(lit.gltf["nodes"][0]["mesh"], lit.gltf["nodes"][1]["mesh"]);
+}
+
+TEST(LitGlb, gpuInstancesBecomeChildNodes) {
+  GltfBuilder builder;
+  const auto mesh = builder.square();
+  const Json attributes = {{"TRANSLATION", builder.vec3({0, 0, 0, 0, 5, 0})}};
+  builder.gltf["extensionsUsed"] = {"EXT_mesh_gpu_instancing"};
+  builder.gltf["extensionsRequired"] = {"EXT_mesh_gpu_instancing"};
+  builder.node({{"mesh", mesh},
+                {"name", "trees"},
+                {"translation", {1, 0, 0}},
+                {"extensions", {{"EXT_mesh_gpu_instancing", {{"attributes", attributes}}}}}});
+  const auto lit = roundTrip(*builder.document(), 1);
+  EXPECT_EQ(lit.gltf["nodes"][0]["children"].size(), 2U);
+  EXPECT_FALSE(lit.gltf["nodes"][0].contains("mesh"));
+  EXPECT_FALSE(lit.gltf.contains("extensionsRequired"));
+  EXPECT_EQ(lit.gltf["nodes"][2]["name"], "trees #1");
+}
+
+TEST(LitGlb, otherAttributesAreCopiedAndOldLightmapUvsReplaced) {
+  GltfBuilder builder;
+  const auto mesh = builder.square();
+  auto& primitive = builder.gltf["meshes"][mesh]["primitives"][0];
+  primitive["attributes"]["TEXCOORD_0"] = builder.vec2({0, 0, 1, 0, 1, 1, 0, 1});
+  primitive["attributes"]["TEXCOORD_1"] = builder.vec2({9, 9, 9, 9, 9, 9, 9, 9});
+  const auto colors =
+      builder.accessor<std::uint8_t>({1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16}, 5121, "VEC4", 4);
+  builder.gltf["accessors"][colors]["normalized"] = true;
+  primitive["attributes"]["COLOR_0"] = colors;
+  primitive["attributes"]["_TAG"] = builder.accessor<std::uint8_t>({7, 8, 9, 10}, 5121, "SCALAR", 1);
+  primitive["extras"] = {{"lightmap", "old"}, {"mine", 1}};
+  builder.node({{"mesh", mesh}});
+  const auto lit = roundTrip(*builder.document(), 1);
+  EXPECT_EQ(lit.gltf["meshes"][0]["primitives"][0]["extras"]["mine"], 1);
+  EXPECT_TRUE(lit.gltf["meshes"][0]["primitives"][0]["attributes"].contains("_TAG"));
+  const auto scene = importScene(lit).value();
+  const auto& read = scene.primitives.at(0);
+  ASSERT_EQ(read.positions.size(), 6U);  // every corner has its own UV
+  for (std::size_t v = 0; v < 6; ++v) {
+    const glm::vec2 xy(read.positions[v]);
+    EXPECT_EQ(read.texcoord0[v], xy);
+    const auto corner = xy == glm::vec2(0, 0) ? 0 : xy == glm::vec2(1, 0) ? 1 : xy == glm::vec2(1, 1) ? 2 : 3;
+    EXPECT_EQ(read.color0[v].r * 255.0F, static_cast<float>(4 * corner + 1));
+  }
+}
+
+TEST(LitGlb, verticesAreSplitOnlyWhereUvsDiffer) {
+  GltfBuilder builder;
+  builder.node({{"mesh", builder.square()}});
+  const auto document = *builder.document();
+  const auto scene = importScene(document).value();
+  PatchScene patches;
+  patches.pages.resize(1, {2, 2});
+  patches.instance_uvs.push_back(
+      {{{glm::vec2(0, 0), glm::vec2(1, 0), glm::vec2(1, 1)}, {glm::vec2(0, 0), glm::vec2(1, 1), glm::vec2(0, 1)}},
+       {0, 0}});
+  const auto lit = withLightmapUvs(document, scene, patches);
+  EXPECT_EQ(importScene(*lit)->primitives.at(0).positions.size(), 4U);
+}
+
+TEST(LitGlb, texturesThatUsedTheSecondSetFollowItToAFreeNumber) {
+  GltfBuilder builder;
+  const auto mesh = builder.square();
+  auto& primitive = builder.gltf["meshes"][mesh]["primitives"][0];
+  primitive["attributes"]["TEXCOORD_1"] = builder.vec2({0, 0, 1, 0, 1, 1, 0, 1});
+  primitive["material"] = 0;
+  builder.gltf["textures"] = Json::array({Json::object()});
+  builder.gltf["materials"] = Json::array({{{"emissiveTexture", {{"index", 0}, {"texCoord", 1}}}}});
+  builder.node({{"mesh", mesh}});
+  const auto lit = roundTrip(*builder.document(), 1);
+  EXPECT_EQ(lit.gltf["materials"][0]["emissiveTexture"]["texCoord"], 2);
+  EXPECT_TRUE(lit.gltf["meshes"][0]["primitives"][0]["attributes"].contains("TEXCOORD_2"));
+}
+
+TEST(LitGlb, everySharedSceneRoundTrips) {
+  const auto folder = fs::path(RADIOSITY_SHARED_DIR) / "scenes";
+  if (!fs::exists(folder)) GTEST_SKIP() << "no shared scenes here";
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    const auto extension = entry.path().extension();
+    const auto name = entry.path().filename().string();
+    if ((extension != ".glb" && extension != ".gltf") || name.rfind("REFUSE_", 0) == 0) continue;
+    const auto document = loadDocument(entry.path());
+    ASSERT_TRUE(document) << name;
+    roundTrip(*document, 3);
+  }
+}
+
+TEST(LitGlb, unlitShowsThePages) {
+  GltfBuilder builder;
+  const auto mesh = builder.square();
+  builder.gltf["materials"] = Json::array({{{"name", "wall"}, {"doubleSided", true}}});
+  builder.gltf["meshes"][mesh]["primitives"][0]["material"] = 0;
+  builder.node({{"mesh", mesh}});
+  const auto document = *builder.document();
+  const auto scene = importScene(document).value();
+  const std::vector<Image> pages = {Image(2, 2, glm::vec3(1.0F, 0.0F, 0.5F)), Image(2, 2, glm::vec3(0.0F))};
+  const auto glb = writeUnlitGlb(document, scene, patchesFor(scene, 2), pages);
+  ASSERT_TRUE(glb) << glb.error().text();
+  const auto read = parseDocument("unlit.glb", *glb);
+  ASSERT_TRUE(read) << read.error().text();
+  EXPECT_THAT(read->gltf["extensionsUsed"], testing::Contains("KHR_materials_unlit"));
+  const auto shown = importScene(*read);
+  ASSERT_TRUE(shown) << shown.error().text();
+  const auto& material = shown->materials.at(shown->primitives.at(0).material);
+  EXPECT_TRUE(material.double_sided);
+  EXPECT_EQ(material.base_color_texture.texcoord, 1);
+  const auto& texture = shown->textures.at(material.base_color_texture.texture);
+  EXPECT_EQ(texture.rgba[0], 255);
+  EXPECT_EQ(texture.rgba[2], 128);
+}
+
+}  // namespace
+}  // namespace radiosity::scene
