@@ -58,7 +58,7 @@ ChartMeasure measure(const Chart& chart) {
   result.size = chart.from_file ? high - low : chart.size;
   for (const auto& [key, edge] : edges) {
     if (edge.first != 1) continue;
-    const auto& [a, b] = edge.second;
+    const glm::dvec2 &a = edge.second[0], &b = edge.second[1];
     for (int axis = 0; axis < 2; ++axis) {
       const int across = 1 - axis;
       const double slack = 1e-6 * result.size[across];

@@ -47,10 +47,12 @@ class Builder {
     if (auto sized = numberNodes(); !sized) return tl::unexpected(sized.error());
     const std::vector<LeafPiece> pieces = measureCoverage(patches_);
     setTexelAreas();
-    std::vector<bool> single_sided;
-    for (const Surface& surface : patches_.surfaces)
-      single_sided.push_back(!materialOf(scene_, surface.instance).double_sided);
-    removeBuried(patches_, pieces, single_sided);
+    std::vector<bool> solid;  // what one can see through, or see from behind, bounds no solid
+    for (const Surface& surface : patches_.surfaces) {
+      const Material& material = materialOf(scene_, surface.instance);
+      solid.push_back(!material.double_sided && material.alpha_mode == AlphaMode::kOpaque);
+    }
+    removeBuried(patches_, pieces, solid);
     sumAncestors(patches_);
     writeInstanceUvs();
     findSeams(flat_, neighbours_, sources_, 2.0 * options_.curve_angle_deg, patches_);

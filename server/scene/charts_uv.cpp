@@ -15,6 +15,8 @@ using Triangle2 = std::array<glm::dvec2, 3>;
 
 constexpr double kRangeSlack = 1e-4;     // exporters round
 constexpr double kDensityFactor = 64.0;  // a triangle's texel density against the instance's
+constexpr double kNoUvArea = 1e-9;       // area ratio below which a triangle's map cannot be inverted
+constexpr double kMaxOddShare = 0.01;
 constexpr double kSameUv = 1e-6;
 
 Triangle2 cornersOf(const Primitive& primitive, const FlatTriangle& triangle) {
@@ -92,10 +94,13 @@ std::string lightmapUvFault(const Scene& scene, const FlatScene& flat, std::uint
   }
   if (!(uv_area > 1e-9)) return "it has no area";
   const double density = uv_area / area;
+  double odd_area = 0.0;  // a few odd triangles are an exporter's rounding
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const FlatTriangle& triangle = flat.triangles[flat.first_triangle[instance] + i];
     const double ratio = std::abs(areaOf(corners[i])) / (triangle.area * density);
-    if (ratio < 1.0 / (kDensityFactor * kDensityFactor) || ratio > kDensityFactor * kDensityFactor)
+    const bool odd = ratio < 1.0 / (kDensityFactor * kDensityFactor) || ratio > kDensityFactor * kDensityFactor;
+    if (odd) odd_area += triangle.area;
+    if (ratio < kNoUvArea || odd_area > kMaxOddShare * area)
       return fmt::format("triangle {} has {:.3g} times the mean texel density", triangle.source, std::sqrt(ratio));
   }
   if (!overlapFree(corners)) return "triangles overlap in it";

@@ -23,8 +23,8 @@ struct LeafPiece {
 [[nodiscard]] std::vector<LeafPiece> measureCoverage(PatchScene& patches);
 
 /// Takes the part of each leaf that lies inside another solid out of node_area and moves leaf points to what is left.
-/// `single_sided`: by surface; only those bound solids. Adds warnings about coincident faces.
-void removeBuried(PatchScene& patches, const std::vector<LeafPiece>& pieces, const std::vector<bool>& single_sided);
+/// `solid`: by surface; opaque and single-sided, so that it can bound a solid. Adds warnings about coincident faces.
+void removeBuried(PatchScene& patches, const std::vector<LeafPiece>& pieces, const std::vector<bool>& solid);
 
 /// Sums level 0 of node_area up all pyramids.
 void sumAncestors(PatchScene& patches);

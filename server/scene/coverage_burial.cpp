@@ -18,12 +18,12 @@ namespace {
 /// Rays start this far from the surface (unit box): well above the rounding of 32-bit positions (6e-8), well below
 /// anything modelled.
 constexpr double kLift = 2e-5;
-constexpr std::uint32_t kFewSamples = 16, kManySamples = 256;
+constexpr std::uint32_t kFewSamples = 16, kManySamples = 64;
 constexpr std::uint64_t kMaxSamples = 2'000'000;  ///< a scene; beyond it leaves get fewer
 
 /// Rank-1 lattice: every point has its own x and its own y, so axis-parallel borders are placed within 1/count.
 glm::dvec2 samplePoint(std::uint32_t i, std::uint32_t count) {
-  const std::uint32_t generator = count == kManySamples ? 119 : 5;
+  const std::uint32_t generator = count == kManySamples ? 19 : 5;
   return {(i + 0.5) / count, ((std::uint64_t{i} * generator) % count + 0.5) / count};
 }
 
@@ -47,10 +47,10 @@ glm::vec3 positionAt(const TriangleFrame& frame, const glm::dvec2& texel) {
 /// The triangles that bound solids, and the question whether a point lies inside one.
 class Solids {
  public:
-  Solids(const PatchScene& patches, const std::vector<bool>& single_sided) {
+  Solids(const PatchScene& patches, const std::vector<bool>& solid) {
     std::vector<Bvh::Triangle> triangles;
     for (std::uint32_t t = 0; t < patches.triangles.size(); ++t) {
-      if (!single_sided[patches.triangle_surface[t]]) continue;
+      if (!solid[patches.triangle_surface[t]]) continue;
       Bvh::Triangle triangle;
       for (std::size_t c = 0; c < 3; ++c)
         triangle[c] = patches.vertices[patches.indices[std::size_t{3} * t + c]].position;
@@ -165,8 +165,8 @@ class NodeBoxes {
 
 class Burial {
  public:
-  Burial(PatchScene& patches, const std::vector<LeafPiece>& pieces, const std::vector<bool>& single_sided)
-      : patches_(patches), pieces_(pieces), solids_(patches, single_sided) {}
+  Burial(PatchScene& patches, const std::vector<LeafPiece>& pieces, const std::vector<bool>& solid)
+      : patches_(patches), pieces_(pieces), solids_(patches, solid) {}
 
   void run() {
     if (solids_.empty()) return;
@@ -404,9 +404,10 @@ class Coincidence {
     }
     if (count == 0) return;
     patches_.warnings.push_back(
-        fmt::format("{} surfaces lie exactly on another that faces the same way; the earlier one is seen (the first: "
-                    "/nodes of instances {} and {})",
-                    count, patches_.surfaces[first.first].instance, patches_.surfaces[first.second].instance));
+        fmt::format("{} surfaces lie exactly on an earlier one that faces the same way and is seen instead (the first: "
+                    "surface {} of instance {} on surface {} of instance {})",
+                    count, first.second, patches_.surfaces[first.second].instance, first.first,
+                    patches_.surfaces[first.first].instance));
   }
 
  private:
@@ -437,9 +438,9 @@ class Coincidence {
 
 }  // namespace
 
-void removeBuried(PatchScene& patches, const std::vector<LeafPiece>& pieces, const std::vector<bool>& single_sided) {
+void removeBuried(PatchScene& patches, const std::vector<LeafPiece>& pieces, const std::vector<bool>& solid) {
   Coincidence(patches).run();
-  Burial(patches, pieces, single_sided).run();
+  Burial(patches, pieces, solid).run();
 }
 
 }  // namespace radiosity::scene

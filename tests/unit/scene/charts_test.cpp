@@ -223,6 +223,26 @@ TEST(Charts, InterpenetratingBlocksHideEachOthersInside) {
   EXPECT_NEAR(leafArea(patches), (24.0 - 1.0) + (10.0 - 1.0 - 4.0), 0.05);
 }
 
+TEST(Charts, NothingIsBuriedInWhatOneCanSeeInto) {
+  Scene scene;
+  place(scene, floorQuad(10.0, -5.0, -5.0));
+  Material material;
+  material.alpha_mode = AlphaMode::kMask;
+  place(scene, box({-1, 0, -1}, {1, 2, 1}), glm::dmat4(1.0), material);
+  EXPECT_NEAR(leafArea(build(scene, 2000)), 100.0 + 24.0, 1e-3);
+  scene.materials[1].alpha_mode = AlphaMode::kOpaque;
+  EXPECT_NEAR(leafArea(build(scene, 2000)), 100.0 + 24.0 - 4.0, 0.03);
+}
+
+TEST(Charts, AFloorUnderARoofSeenFromOutsideOnlyStaysVisible) {
+  Scene scene;
+  place(scene, floorQuad(4.0));
+  Primitive roof;
+  addQuad(roof, {0, 2, 0}, {0, 2, 4}, {4, 2, 4}, {4, 2, 0});  // faces up: its back is over the floor
+  place(scene, roof);
+  EXPECT_NEAR(leafArea(build(scene, 2000)), 32.0, 1e-3);
+}
+
 TEST(Charts, DoubleSidedSurfacesHaveTwoSides) {
   Scene scene;
   Material material;
@@ -375,7 +395,7 @@ TEST(Charts, CoincidentFacesAreReported) {
   place(scene, floorQuad(1.0));
   place(scene, floorQuad(1.0));
   const PatchScene patches = build(scene, 100);
-  EXPECT_THAT(patches.warnings, testing::Contains(testing::HasSubstr("exactly on another")));
+  EXPECT_THAT(patches.warnings, testing::Contains(testing::HasSubstr("exactly on an earlier one")));
   EXPECT_THAT(build(sceneOf(box({0, 0, 0}, {1, 1, 1}))).warnings, testing::IsEmpty());
 }
 
