@@ -15,8 +15,9 @@ layout(location = RAD_ATTRIBUTE_VIEW + 3) in vec4 view_origin;  // shooter; w: l
 #ifdef SCATTER
 layout(location = RAD_UNIFORM_ABSORBED_ID) uniform uint absorbed_id;
 out vec2 chart_texel;
-flat out float footprint;   // area of a pixel's footprint / texel area = footprint x z^3
-flat out uvec2 node_level;  // first node of the side seen, level table
+// First node of the side seen, level table, and as float bits the area of a pixel's footprint at z = 1 / texel area: one
+// varying, since each costs setup time for every triangle.
+flat out uvec3 node_level_footprint;
 #elif defined(PAPER)
 layout(location = RAD_ATTRIBUTE_SURFACE) in uint surface;
 layout(location = RAD_UNIFORM_PATCH_BITS) uniform uint patch_bits;
@@ -36,9 +37,9 @@ void main() {
 #ifdef SCATTER
   float side = dot(normal, d);
   chart_texel = texel;
-  footprint = view_right.w / (abs(side) * position_area.w);
   uint first = side < 0.0 ? nodes.x : nodes.y;
-  node_level = uvec2(first, first == absorbed_id ? RAD_ABSORBING_LEVELS : nodes.z);
+  node_level_footprint = uvec3(first, first == absorbed_id ? RAD_ABSORBING_LEVELS : nodes.z,
+                               floatBitsToUint(view_right.w / (abs(side) * position_area.w)));
 #elif defined(PAPER)
   patch_uv = texel * texel_to_uv;
   polygon = (2u * surface + (dot(normal, d) < 0.0 ? 0u : 1u)) << patch_bits;
