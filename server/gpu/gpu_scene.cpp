@@ -1,7 +1,6 @@
 #include "server/gpu/gpu_scene.h"
 
 #include <glm/vec4.hpp>
-#include <numeric>
 #include <vector>
 
 #include "common/check.h"
@@ -70,7 +69,6 @@ Result<GpuScene> GpuScene::upload(const EglContext& context, std::shared_ptr<con
   fill(gpu.vertices_, std::span<const Vertex>(vertices), GL_STATIC_DRAW);
   gpu.levels_ = Buffer(context, "level table");
   fill(gpu.levels_, std::span<const LevelEntry>(*levels), GL_STATIC_DRAW);
-  gpu.view_indices_ = Buffer(context, "view indices");
   gpu.vertex_array_ = VertexArray(context, "scene");
 
   const auto array = gpu.vertex_array_.name();
@@ -89,21 +87,12 @@ Result<GpuScene> GpuScene::upload(const EglContext& context, std::shared_ptr<con
   glEnableVertexArrayAttrib(array, RAD_ATTRIBUTE_SURFACE);
   glVertexArrayAttribIFormat(array, RAD_ATTRIBUTE_SURFACE, 1, GL_UNSIGNED_INT, offsetof(Vertex, surface));
   glVertexArrayAttribBinding(array, RAD_ATTRIBUTE_SURFACE, 0);
-  glEnableVertexArrayAttrib(array, RAD_ATTRIBUTE_VIEW);
-  glVertexArrayAttribIFormat(array, RAD_ATTRIBUTE_VIEW, 1, GL_UNSIGNED_INT, 0);
-  glVertexArrayAttribBinding(array, RAD_ATTRIBUTE_VIEW, 1);
+  for (GLuint i = 0; i < 4; ++i) {  // binding 1: the renderer's FaceViews
+    attribute(RAD_ATTRIBUTE_VIEW + i, 4, i * sizeof(glm::vec4));
+    glVertexArrayAttribBinding(array, RAD_ATTRIBUTE_VIEW + i, 1);
+  }
   glVertexArrayBindingDivisor(array, 1, 1);
-  gpu.reserveViews(RAD_FACES);
   return gpu;
-}
-
-void GpuScene::reserveViews(std::size_t views) {
-  if (views <= view_capacity_) return;
-  view_capacity_ = views;
-  std::vector<std::uint32_t> indices(views);
-  std::iota(indices.begin(), indices.end(), 0U);
-  fill(view_indices_, std::span<const std::uint32_t>(indices), GL_STATIC_DRAW);
-  glVertexArrayVertexBuffer(vertex_array_.name(), 1, view_indices_.name(), 0, sizeof(std::uint32_t));
 }
 
 void GpuScene::bindLevels() const { glBindBufferBase(GL_SHADER_STORAGE_BUFFER, RAD_BINDING_LEVELS, levels_.name()); }

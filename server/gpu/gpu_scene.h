@@ -21,17 +21,14 @@ class GpuScene {
   [[nodiscard]] const scene::PatchScene& patches() const { return *patches_; }
   [[nodiscard]] const std::shared_ptr<const scene::PatchScene>& sharedPatches() const { return patches_; }
   [[nodiscard]] GLuint vertexArray() const { return vertex_array_.name(); }
-  /// Instance attribute of draw i reads view i; there are at least `views` of them after this.
-  void reserveViews(std::size_t views);
   void bindLevels() const;
 
  private:
   GpuScene() = default;
 
   std::shared_ptr<const scene::PatchScene> patches_;
-  Buffer vertices_, levels_, view_indices_;
+  Buffer vertices_, levels_;
   VertexArray vertex_array_;
-  std::size_t view_capacity_ = 0;
 };
 
 }  // namespace radiosity::gpu

@@ -123,7 +123,7 @@ void HemicubeRenderer::setState(HemicubePass pass, std::uint32_t resolution, con
   glBindFramebuffer(GL_FRAMEBUFFER, target.framebuffer.name());
   useProgram(pass);
   glBindVertexArray(scene_->vertexArray());
-  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, RAD_BINDING_VIEWS, views_buffer_.name());
+  glVertexArrayVertexBuffer(scene_->vertexArray(), 1, views_buffer_.name(), 0, sizeof(FaceView));
   glVertexArrayElementBuffer(scene_->vertexArray(), indices_buffer_.name());
   glBindBuffer(GL_DRAW_INDIRECT_BUFFER, commands_buffer_.name());
 }
@@ -153,7 +153,6 @@ std::span<const std::uint32_t> HemicubeRenderer::render(HemicubePass pass, std::
   context_->makeCurrent();
   auto& into = target(resolution);
   collect(resolution, views, counters);
-  scene_->reserveViews(face_views_.size());
   fill(views_buffer_, std::span<const FaceView>(face_views_), GL_STREAM_DRAW);
   fill(indices_buffer_, std::span<const std::uint32_t>(indices_), GL_STREAM_DRAW);
   fill(commands_buffer_, std::span<const DrawCommand>(commands_), GL_STREAM_DRAW);

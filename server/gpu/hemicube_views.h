@@ -23,7 +23,7 @@ struct HemicubeAxes {
   return {frame.origin, frame.tangent, glm::cross(frame.normal, frame.tangent), frame.normal};
 }
 
-/// One face as hemicube.vert reads it (std430).
+/// One face as hemicube.vert reads it.
 struct FaceView {
   glm::vec4 right, up, depth, origin;
 };

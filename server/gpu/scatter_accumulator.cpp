@@ -7,10 +7,19 @@ namespace radiosity::gpu {
 std::size_t findRuns(std::span<const std::uint32_t> ids, std::span<std::uint32_t> starts) {
   std::size_t count = 0;
   starts[count++] = 0;
-  for (std::size_t i = 1; i < ids.size(); ++i) {
+  const auto step = [&](std::size_t i) {
     starts[count] = static_cast<std::uint32_t>(i);  // kept only if a run begins here: no branch to mispredict
     count += static_cast<std::size_t>(ids[i] != ids[i - 1]);
+  };
+  constexpr std::size_t kBlock = 16;
+  std::size_t i = 1;
+  for (; i + kBlock <= ids.size(); i += kBlock) {
+    std::uint32_t changes = 0;  // a vectorised look ahead: large images are mostly long runs
+    for (std::size_t k = i; k < i + kBlock; ++k) changes |= ids[k] ^ ids[k - 1];
+    if (changes == 0) continue;
+    for (std::size_t k = i; k < i + kBlock; ++k) step(k);
   }
+  for (; i < ids.size(); ++i) step(i);
   starts[count] = static_cast<std::uint32_t>(ids.size());
   return count;
 }

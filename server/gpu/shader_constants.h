@@ -23,12 +23,11 @@
 #define RAD_ATTRIBUTE_NORMAL 1
 #define RAD_ATTRIBUTE_TEXEL 2
 #define RAD_ATTRIBUTE_NODES 3
-#define RAD_ATTRIBUTE_VIEW 4
-#define RAD_ATTRIBUTE_SURFACE 5
+#define RAD_ATTRIBUTE_SURFACE 4
+#define RAD_ATTRIBUTE_VIEW 5  // four vec4
 
 // Shader storage bindings.
-#define RAD_BINDING_VIEWS 0
-#define RAD_BINDING_LEVELS 1
+#define RAD_BINDING_LEVELS 0
 
 // Uniform locations.
 #define RAD_UNIFORM_ABSORBED_ID 0

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <glm/vector_relational.hpp>
 
 namespace radiosity::gpu {
 namespace {
@@ -9,6 +10,10 @@ namespace {
 /// Heights above the shooter's plane that are taken for the plane itself: rounding puts neighbours in the same plane up
 /// to 1e-7 above it, where they would cover everything.
 constexpr float kCoplanar = 1.0e-6F;
+
+/// The shooter must be this far (unit box) outside a solid's bounds to count as outside.
+constexpr float kOutside = 1.0e-6F;
+constexpr int kBackBit = 7;
 
 struct Corners {
   const float* x;
@@ -19,8 +24,8 @@ struct Corners {
 std::uint16_t bit(bool set, int place) { return static_cast<std::uint16_t>(static_cast<int>(set) << place); }
 
 /// A face's pyramid is cut by planes through the origin; a triangle is out when all corners lie outside one of them.
-void classify(const HemicubeAxes& axes, const std::array<Corners, 3>& corners, std::size_t count,
-              std::uint16_t* __restrict faces) {
+void classify(const HemicubeAxes& axes, const std::array<Corners, 3>& corners, const std::array<const float*, 4>& plane,
+              std::size_t count, std::uint16_t* __restrict faces) {
   const auto [o, t, b, n] = axes;
   for (std::size_t i = 0; i < count; ++i) {
     float x[3], y[3], z[3];
@@ -54,16 +59,27 @@ void classify(const HemicubeAxes& axes, const std::array<Corners, 3>& corners, s
     const bool mx_in = mx & risen & (zpx_high < 0) & (xpy_high < 0) & (xy_high < 0);
     const bool py_in = py & risen & (zy_high < 0) & (xy_high < 0) & (xpy_low > 0);
     const bool my_in = my & risen & (zpy_high < 0) & (xpy_high < 0) & (xy_low > 0);
-    faces[i] =
-        static_cast<std::uint16_t>(bit(top, 0) | bit(px, 1) | bit(mx, 2) | bit(py, 3) | bit(my, 4) | bit(top_in, 8) |
-                                   bit(px_in, 9) | bit(mx_in, 10) | bit(py_in, 11) | bit(my_in, 12));
+    const bool back = plane[0][i] * o.x + plane[1][i] * o.y + plane[2][i] * o.z < plane[3][i];
+    faces[i] = static_cast<std::uint16_t>(bit(back, kBackBit) | bit(top, 0) | bit(px, 1) | bit(mx, 2) | bit(py, 3) |
+                                          bit(my, 4) | bit(top_in, 8) | bit(px_in, 9) | bit(mx_in, 10) |
+                                          bit(py_in, 11) | bit(my_in, 12));
   }
 }
 
 }  // namespace
 
 TriangleCuller::TriangleCuller(const scene::PatchScene& patches)
-    : triangle_count_(patches.indices.size() / 3), indices_(patches.indices), faces_(triangle_count_) {
+    : triangle_count_(patches.indices.size() / 3),
+      solids_(findClosedSolids(patches)),
+      outside_(solids_.bounds.size()),
+      indices_(patches.indices),
+      faces_(triangle_count_) {
+  for (auto& part : plane_) part.resize(triangle_count_);
+  for (std::size_t i = 0; i < triangle_count_; ++i) {
+    const auto& corner = patches.vertices[indices_[3 * i]];
+    for (int axis = 0; axis < 3; ++axis) plane_[static_cast<std::size_t>(axis)][i] = corner.normal[axis];
+    plane_[3][i] = glm::dot(corner.normal, corner.position);
+  }
   for (int c = 0; c < 3; ++c) {
     for (auto& axis : corner_[c]) axis.resize(triangle_count_);
     for (std::size_t i = 0; i < triangle_count_; ++i) {
@@ -77,10 +93,17 @@ TriangleCuller::TriangleCuller(const scene::PatchScene& patches)
 TriangleCuller::Counts TriangleCuller::cull(const HemicubeAxes& axes, std::vector<std::uint32_t>& indices) {
   std::array<Corners, 3> corners{};
   for (int c = 0; c < 3; ++c) corners[c] = {corner_[c][0].data(), corner_[c][1].data(), corner_[c][2].data()};
-  classify(axes, corners, triangle_count_, faces_.data());
+  classify(axes, corners, {plane_[0].data(), plane_[1].data(), plane_[2].data(), plane_[3].data()}, triangle_count_,
+           faces_.data());
+  for (std::size_t i = 0; i < outside_.size(); ++i) {
+    const auto& [low, high] = solids_.bounds[i];
+    outside_[i] = static_cast<std::uint8_t>(glm::any(glm::lessThan(axes.origin, low - kOutside)) ||
+                                            glm::any(glm::greaterThan(axes.origin, high + kOutside)));
+  }
   std::array<std::uint32_t, 2 * RAD_FACES> count{};
   for (std::size_t i = 0; i < triangle_count_; ++i) {
-    for (auto faces = faces_[i] & 0xFFU; faces != 0; faces &= faces - 1) {
+    if ((faces_[i] >> kBackBit & 1) != 0 && backHidden(i)) continue;
+    for (auto faces = faces_[i] & 0x1FU; faces != 0; faces &= faces - 1) {
       const auto face = static_cast<unsigned>(std::countr_zero(faces));
       const auto list = 2 * face + 1 - (faces_[i] >> (8 + face) & 1U);
       std::copy_n(&indices_[3 * i], 3, &seen_[list][count[list]]);

@@ -5,21 +5,19 @@ layout(location = RAD_ATTRIBUTE_POSITION) in vec4 position_area;  // unit box; w
 layout(location = RAD_ATTRIBUTE_NORMAL) in vec3 normal;
 layout(location = RAD_ATTRIBUTE_TEXEL) in vec2 texel;
 layout(location = RAD_ATTRIBUTE_NODES) in uvec4 nodes;  // first node of front and back, level table, triangle
-layout(location = RAD_ATTRIBUTE_VIEW) in uint view;     // one for each draw (instance divisor 1)
 
-struct View {
-  vec4 right;   // clip.x axis, subpixel offset included; w: footprint of a pixel at distance 1, times 4^bias
-  vec4 up;      // clip.y axis, subpixel offset included; w: face
-  vec4 depth;   // clip.w axis; w: layer
-  vec4 origin;  // shooter; w: level bias
-};
-layout(std430, binding = RAD_BINDING_VIEWS) readonly buffer Views { View views[]; };
+// The view, one for each draw (instance divisor 1). Attributes, since llvmpipe reads storage buffers lane by lane.
+layout(location = RAD_ATTRIBUTE_VIEW) in vec4 view_right;       // clip.x; w: pixel's footprint at distance 1, times 4^bias
+layout(location = RAD_ATTRIBUTE_VIEW + 1) in vec4 view_up;      // clip.y axis; w: face
+layout(location = RAD_ATTRIBUTE_VIEW + 2) in vec4 view_depth;   // clip.w axis; w: layer
+layout(location = RAD_ATTRIBUTE_VIEW + 3) in vec4 view_origin;  // shooter; w: level bias
 
 #ifdef SCATTER
 layout(location = RAD_UNIFORM_ABSORBED_ID) uniform uint absorbed_id;
 out vec2 chart_texel;
-flat out float footprint;   // area of a pixel's footprint / texel area = footprint x z^3
-flat out uvec2 node_level;  // first node of the side seen, level table
+// First node of the side seen, level table, and as float bits the area of a pixel's footprint at z = 1 / texel area: one
+// varying, since each costs setup time for every triangle.
+flat out uvec3 node_level_footprint;
 #elif defined(PAPER)
 layout(location = RAD_ATTRIBUTE_SURFACE) in uint surface;
 layout(location = RAD_UNIFORM_PATCH_BITS) uniform uint patch_bits;
@@ -32,22 +30,21 @@ flat out uint item;
 #endif
 
 void main() {
-  View v = views[view];
-  vec3 d = position_area.xyz - v.origin.xyz;
-  gl_Position = vec4(dot(v.right.xyz, d), dot(v.up.xyz, d), RAD_NEAR, dot(v.depth.xyz, d));
-  gl_ViewportIndex = int(v.up.w);
-  gl_Layer = int(v.depth.w);
+  vec3 d = position_area.xyz - view_origin.xyz;
+  gl_Position = vec4(dot(view_right.xyz, d), dot(view_up.xyz, d), RAD_NEAR, dot(view_depth.xyz, d));
+  gl_ViewportIndex = int(view_up.w);
+  gl_Layer = int(view_depth.w);
 #ifdef SCATTER
   float side = dot(normal, d);
   chart_texel = texel;
-  footprint = v.right.w / (abs(side) * position_area.w);
   uint first = side < 0.0 ? nodes.x : nodes.y;
-  node_level = uvec2(first, first == absorbed_id ? RAD_ABSORBING_LEVELS : nodes.z);
+  node_level_footprint = uvec3(first, first == absorbed_id ? RAD_ABSORBING_LEVELS : nodes.z,
+                               floatBitsToUint(view_right.w / (abs(side) * position_area.w)));
 #elif defined(PAPER)
   patch_uv = texel * texel_to_uv;
   polygon = (2u * surface + (dot(normal, d) < 0.0 ? 0u : 1u)) << patch_bits;
   // NEAREST_MIPMAP_NEAREST rounds where the formula takes the floor.
-  bias = v.origin.w - 0.5;
+  bias = view_origin.w - 0.5;
 #else
   item = nodes.w;
 #endif

@@ -4,11 +4,12 @@
 layout(std430, binding = RAD_BINDING_LEVELS) readonly buffer Levels { uvec2 levels[]; };  // offset, width | height << 16
 
 in vec2 chart_texel;
-flat in float footprint;
-flat in uvec2 node_level;
+flat in uvec3 node_level_footprint;
 layout(location = 0) out uint node;
 
 void main() {
+  uvec2 node_level = node_level_footprint.xy;
+  float footprint = uintBitsToFloat(node_level_footprint.z);
   float z = 1.0 / gl_FragCoord.w;
   // floor(log2(f) / 2) is the halved exponent of the float: exact, and no logarithm.
   int exponent = int(floatBitsToUint(footprint * z * z * z) >> 23) - 127;

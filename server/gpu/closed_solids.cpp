@@ -1,0 +1,116 @@
+#include "server/gpu/closed_solids.h"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <numeric>
+#include <unordered_map>
+
+namespace radiosity::gpu {
+namespace {
+
+struct PositionHash {
+  std::size_t operator()(const std::array<std::uint32_t, 3>& bits) const {
+    std::uint64_t hash = 0x9E3779B97F4A7C15U;
+    for (const auto word : bits) hash = (hash ^ word) * 0xFF51AFD7ED558CCDU ^ hash >> 29U;
+    return hash;
+  }
+};
+
+/// The same number for corners at the same place.
+std::vector<std::uint32_t> weld(const scene::PatchScene& patches) {
+  std::unordered_map<std::array<std::uint32_t, 3>, std::uint32_t, PositionHash> known;
+  std::vector<std::uint32_t> place(patches.vertices.size());
+  for (std::size_t i = 0; i < place.size(); ++i) {
+    const auto position = patches.vertices[i].position + 0.0F;  // -0 becomes 0
+    std::array<std::uint32_t, 3> bits{};
+    std::memcpy(bits.data(), &position, sizeof(bits));
+    place[i] = known.emplace(bits, static_cast<std::uint32_t>(known.size())).first->second;
+  }
+  return place;
+}
+
+class UnionFind {
+ public:
+  explicit UnionFind(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0U); }
+  std::uint32_t find(std::uint32_t item) {
+    while (parent_[item] != item) item = parent_[item] = parent_[parent_[item]];
+    return item;
+  }
+  void join(std::uint32_t a, std::uint32_t b) { parent_[find(a)] = find(b); }
+
+ private:
+  std::vector<std::uint32_t> parent_;
+};
+
+struct Edge {
+  std::uint64_t key;  ///< its two places, the smaller first
+  std::uint32_t triangle;
+  bool forward;  ///< from the smaller to the larger
+};
+
+std::vector<Edge> sortedEdges(const scene::PatchScene& patches) {
+  const auto place = weld(patches);
+  std::vector<Edge> edges;
+  edges.reserve(patches.indices.size());
+  for (std::size_t i = 0; i < patches.indices.size(); ++i) {
+    const auto triangle = i / 3;
+    const std::uint64_t from = place[patches.indices[i]];
+    const std::uint64_t to = place[patches.indices[3 * triangle + (i + 1) % 3]];
+    edges.push_back({std::min(from, to) << 32U | std::max(from, to), static_cast<std::uint32_t>(triangle), from < to});
+  }
+  std::sort(edges.begin(), edges.end(),
+            [](const Edge& a, const Edge& b) { return a.key != b.key ? a.key < b.key : a.triangle < b.triangle; });
+  return edges;
+}
+
+}  // namespace
+
+ClosedSolids findClosedSolids(const scene::PatchScene& patches) {
+  const auto triangles = patches.indices.size() / 3;
+  UnionFind parts(triangles);
+  std::vector<bool> open(triangles, false);
+  const auto edges = sortedEdges(patches);
+  for (std::size_t first = 0, last = 0; first < edges.size(); first = last) {
+    while (last < edges.size() && edges[last].key == edges[first].key) ++last;
+    const bool closed = last - first == 2 && edges[first].forward != edges[first + 1].forward;
+    for (auto i = first; i < last; ++i) {
+      parts.join(edges[i].triangle, edges[first].triangle);
+      if (!closed) open[edges[i].triangle] = true;
+    }
+  }
+  std::vector<bool> part_open(triangles, false);
+  std::vector<double> volume(triangles, 0.0);
+  for (std::uint32_t i = 0; i < triangles; ++i) {
+    const auto part = parts.find(i);
+    if (open[i]) part_open[part] = true;
+    const auto corner = [&](std::size_t c) {
+      return glm::dvec3(patches.vertices[patches.indices[3 * i + c]].position);
+    };
+    volume[part] += glm::dot(corner(0), glm::cross(corner(1), corner(2)));
+  }
+
+  ClosedSolids solids;
+  solids.solid_of.assign(triangles, scene::kNone);
+  std::vector<std::uint32_t> number(triangles, scene::kNone);
+  for (std::uint32_t i = 0; i < triangles; ++i) {
+    const auto part = parts.find(i);
+    if (part_open[part] || volume[part] <= 0.0) continue;
+    if (number[part] == scene::kNone) {
+      number[part] = static_cast<std::uint32_t>(solids.bounds.size());
+      solids.bounds.push_back({glm::vec3(1e30F), glm::vec3(-1e30F)});
+    }
+    solids.solid_of[i] = number[part];
+    auto& bounds = solids.bounds[number[part]];
+    for (std::size_t c = 0; c < 3; ++c) {
+      const auto& position = patches.vertices[patches.indices[3 * i + c]].position;
+      bounds.low = glm::min(bounds.low, position);
+      bounds.high = glm::max(bounds.high, position);
+    }
+  }
+  return solids;
+}
+
+}  // namespace radiosity::gpu
