@@ -114,6 +114,9 @@ RpcMessage whole(RpcMalformed item) {
 Result<json> parseChecked(std::string_view text) {
   if (isDeeperThan(text, kMaxJsonDepth))
     return fail(ErrorCode::kTooLarge, fmt::format("JSON is nested deeper than {} levels", kMaxJsonDepth));
+  // nlohmann 3.11.2 takes a NUL for the end and would accept what stands before it.
+  if (const auto nul = text.find('\0'); nul != std::string_view::npos)
+    return fail(ErrorCode::kBadInput, fmt::format("not JSON: NUL at byte {}", nul));
   try {
     return json::parse(text);
   } catch (const json::exception& e) {

@@ -32,7 +32,7 @@ int scaleExponent(float largest) {
   if (largest == 0.0F || (largest >= 0x1p-8F && largest < 0x1p15F)) return 0;
   int exponent = 0;
   std::frexp(largest, &exponent);  // largest < 2^exponent
-  return exponent - (largest < 1.0F ? 0 : 15);
+  return exponent - 15;
 }
 
 void putPixel(Bytes& raw, std::size_t offset, PixelFormat format, glm::vec3 v) {

@@ -57,9 +57,9 @@ struct Region {
 [[nodiscard]] std::size_t pixelBytes(PixelFormat format);
 
 /// Encodes a region (at most kTileSide x kTileSide, inside the image) of finite values as rgba16f, rgb9e5 or rgba32f.
-/// The exponent is 0 while the brightest value lies in [2^-8, 2^15) and otherwise the power of two that brings it
-/// there, so nothing overflows. Accuracy: rgba16f 2^-11 relative for stored values >= 2^-14; rgb9e5 2^-9 of the pixel's
-/// largest channel, negative values become 0. kInternal: not finite, or the region is not as promised.
+/// The exponent is 0 while the brightest value lies in [2^-8, 2^15) and otherwise the power of two that brings it into
+/// [2^14, 2^15), so nothing overflows. Accuracy: rgba16f 2^-11 relative for stored values >= 2^-14; rgb9e5 1/511 of the
+/// pixel's largest channel, negative values become 0. kInternal: not finite, or the region is not as promised.
 [[nodiscard]] Result<EncodedPixels> encodePixels(const Image& image, Region region, PixelFormat format, Codec codec);
 
 /// The same for r32ui (patch IDs): width x height values, row-major.

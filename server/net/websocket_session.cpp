@@ -297,11 +297,14 @@ void WebSocketSession::onWritten(BoostError error, bool tile) {
 
 // ---- going ----
 
+/// Posted, so that it takes its place behind answers that were sent before.
 void WebSocketSession::closeAfterWrites(CloseCode code, std::string reason) {
-  if (close_when_written_ || closing_) return;
-  if (code == CloseCode::kPolicy) ++hub_->counters().closed_policy;
-  close_when_written_.emplace(code, std::move(reason));
-  pump();
+  onStrand([code, reason = std::move(reason)](WebSocketSession& s) {
+    if (s.close_when_written_ || s.closing_) return;
+    if (code == CloseCode::kPolicy) ++s.hub_->counters().closed_policy;
+    s.close_when_written_.emplace(code, reason);
+    s.pump();
+  });
 }
 
 /// Asks for the closing handshake; a peer that does not take part is cut off. Behind a write that hangs the close frame

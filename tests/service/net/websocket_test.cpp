@@ -229,8 +229,8 @@ TEST(Scene, AFileIsLoadedOnlyFromBelowTheSceneRoot) {
     socket.hello();
     EXPECT_EQ(codeOf(socket.call(SceneLoadCall{"file:sub/a.glb"})), 0);
     EXPECT_THAT(server.engine.lastLoad(), HasSubstr("root/sub/a.glb"));
-    for (const std::string name : {"../outside.glb", "link.glb", "sub", "none.glb", "sub/../../outside.glb"})
-      EXPECT_EQ(codeOf(socket.call(SceneLoadCall{"file:" + name})), -32004) << name;
+    for (const auto* name : {"../outside.glb", "link.glb", "sub", "none.glb", "sub/../../outside.glb"})
+      EXPECT_EQ(codeOf(socket.call(SceneLoadCall{std::string("file:") + name})), -32004) << name;
     EXPECT_EQ(codeOf(socket.call(SceneLoadCall{"file:" + (folder / "outside.glb").string()})), -32004);
   }
   std::filesystem::remove_all(folder);
@@ -379,7 +379,7 @@ TEST(Tiles, AllArriveCoarseFirstAndHoldWhatTheEngineMade) {
       last_mip = h.mip;
       seen.insert(keyOf(h));
       const auto image = tileImage(*tile);
-      for (const auto [x, y] : {std::pair{0, 0}, std::pair{7, 5}, std::pair{h.width - 1, h.height - 1}}) {
+      for (const auto& [x, y] : {std::pair{0, 0}, std::pair{7, 5}, std::pair{h.width - 1, h.height - 1}}) {
         const auto expected =
             FakeEngine::pattern(static_cast<int>(h.x) + x, static_cast<int>(h.y) + y, version, 100.0F);
         EXPECT_NEAR(image->at(x, y).x, expected.x, expected.x * 0x1p-11F);
