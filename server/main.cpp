@@ -1,0 +1,71 @@
+// radiosityd: options -> engine and network -> run until a signal.
+//
+// Needs server/engine/make_engine.h with
+//   struct EngineOptions { engine::SolveSettings settings; gpu::WorkerOptions workers; };
+//   std::unique_ptr<engine::Engine> engine::makeEngine(const engine::EngineOptions& options);
+// and the renderer's worker entry, gpu::workerMain.
+#include <fmt/format.h>
+#include <cstdio>
+#include <exception>
+#include <string_view>
+
+#include "common/log.h"
+#include "server/engine/make_engine.h"
+#include "server/gpu/gpu_transport.h"
+#include "server/net/server.h"
+#include "server/options.h"
+
+#ifndef RADIOSITY_VERSION
+#define RADIOSITY_VERSION "0.0.0"
+#endif
+
+namespace radiosity {
+namespace {
+
+int report(const Error& error) {
+  std::fprintf(stderr, "radiosityd: %s\n", error.text().c_str());
+  return exitCodeOf(error);
+}
+
+void loadFirstScene(engine::Engine& engine, const std::string& path) {
+  engine.loadFile(path, [path](const Result<engine::LoadOutcome>& outcome) {
+    if (!outcome) return log::error("{}", outcome.error().text());
+    for (const auto& warning : outcome->warnings) log::warn("{}", warning);
+  });
+}
+
+int serve(const Options& options) {
+  engine::EngineOptions engine_options;
+  engine_options.settings = options.solve;
+  engine_options.workers.workers = options.workers;
+  engine_options.workers.executable = "/proc/self/exe";
+  const auto engine = engine::makeEngine(engine_options);
+  auto server = net::Server::open(options.server, *engine);
+  if (!server) return report(server.error());
+  (*server)->drainOnSignals();
+  if (!options.scene.empty()) loadFirstScene(*engine, options.scene);
+  std::printf("listening on %s\n", (*server)->url().c_str());
+  std::fflush(stdout);
+  (*server)->run();
+  return 0;
+}
+
+int run(int argc, char** argv) {
+  if (argc > 1 && std::string_view(argv[1]) == "--worker") return gpu::workerMain(argc - 1, argv + 1);
+  const auto parsed = parseOptions(argc, argv, RADIOSITY_VERSION);
+  if (parsed.exit_code) return *parsed.exit_code;
+  startLog("radiosityd", parsed.options.log_level);
+  return serve(parsed.options);
+}
+
+}  // namespace
+}  // namespace radiosity
+
+int main(int argc, char** argv) {
+  try {
+    return radiosity::run(argc, argv);
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "radiosityd: %s\n", e.what());
+    return radiosity::kExitFailed;
+  }
+}

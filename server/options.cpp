@@ -1,0 +1,137 @@
+#include "server/options.h"
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <cstdio>
+#include <fstream>
+#include <utility>
+
+namespace radiosity {
+namespace {
+
+struct Raw {
+  std::string listen = "127.0.0.1:8765", token_file;
+  double time_limit_s = 0.0;
+};
+
+/// "127.0.0.1:8765", "[::1]:0".
+Result<void> readListen(const std::string& text, net::ServerOptions& server) {
+  const auto colon = text.rfind(':');
+  const auto port = colon == std::string::npos ? std::string() : text.substr(colon + 1);
+  auto address = text.substr(0, colon);
+  if (address.starts_with('[') && address.ends_with(']')) address = address.substr(1, address.size() - 2);
+  const auto [end, error] = std::from_chars(port.data(), port.data() + port.size(), server.port);
+  if (port.empty() || address.empty() || error != std::errc() || end != port.data() + port.size())
+    return fail(ErrorCode::kBadUsage, "must be ADDRESS:PORT, for example 127.0.0.1:8765", "--listen " + text);
+  server.address = address;
+  return {};
+}
+
+/// The first line, without white space around it.
+Result<std::string> readToken(const std::string& path) {
+  std::ifstream file(path);
+  std::string token;
+  if (!std::getline(file, token))
+    return fail(ErrorCode::kBadUsage, "cannot be read, or is empty", "--token-file " + path);
+  const auto first = token.find_first_not_of(" \t\r");
+  const auto last = token.find_last_not_of(" \t\r");
+  token = first == std::string::npos ? std::string() : token.substr(first, last - first + 1);
+  if (token.size() < 16 || token.size() > protocol::kMaxTokenBytes)
+    return fail(ErrorCode::kBadUsage, "a token needs 16 to 4096 characters (try: openssl rand -hex 32)",
+                "--token-file " + path);
+  return token;
+}
+
+void addSolveOptions(CLI::App& app, Options& o, Raw& raw) {
+  app.add_option("--error", o.solve.target_error,
+                 "Stop when the estimated relative RMS error of irradiance is this small (0.02 = 2 %)")
+      ->check(CLI::Range(1e-9, 1.0))
+      ->capture_default_str();
+  app.add_option("--time-limit", raw.time_limit_s, "Stop after this many seconds of solving; 0: no limit")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  app.add_option("--texels", o.solve.texels, "Lightmap texels (leaf patches) in all, about")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--texel-size", o.solve.texel_size_m, "Side of a texel in metres; 0: from --texels")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  app.add_option("--seed", o.solve.seed, "Seed of the sampling; the same seed gives the same bits")
+      ->capture_default_str();
+  app.add_option("--workers", o.workers, "Renderer processes; 0: one for each core in software, one on a GPU")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
+  app.add_flag("--paper-mode", o.solve.paper_mode, "Lum, Ma and Max 2002 to the letter, for comparisons");
+}
+
+void addServerOptions(CLI::App& app, Options& o, Raw& raw) {
+  app.add_option("--listen", raw.listen, "ADDRESS:PORT of HTTP and WebSocket; port 0: any free one, printed on stdout")
+      ->capture_default_str();
+  app.add_option("--token-file", raw.token_file, "File whose first line every client must present as bearer token");
+  app.add_flag("--insecure", o.server.insecure, "Listen beyond this machine without a token");
+  app.add_option("--allow-origin", o.server.allow_origins,
+                 "Let web pages of this origin in, beside the server's own (https://viewer.example.org); repeatable");
+  app.add_option("--scene-root", o.server.scene_root, "Folder from which clients may load scenes as file:NAME")
+      ->check(CLI::ExistingDirectory);
+  app.add_option("--max-upload", o.server.max_upload_bytes, "Largest upload, bytes (suffixes KiB, MiB, GiB)")
+      ->transform(CLI::AsSizeValue(false))
+      ->capture_default_str();
+  app.add_option("--max-clients", o.server.max_clients, "Connections at a time")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  app.add_option("--log-level", o.log_level, "debug, info, warn, error or off; the log goes to stderr")
+      ->check(CLI::IsMember({"debug", "info", "warn", "error", "off"}))
+      ->capture_default_str();
+}
+
+Result<void> finish(Options& o, const Raw& raw) {
+  if (raw.time_limit_s > 0.0) o.solve.time_limit_s = raw.time_limit_s;
+  if (auto listen = readListen(raw.listen, o.server); !listen) return listen;
+  if (raw.token_file.empty()) return {};
+  auto token = readToken(raw.token_file);
+  if (!token) return tl::unexpected(std::move(token.error()));
+  o.server.token = std::move(*token);
+  return {};
+}
+
+}  // namespace
+
+ParsedOptions parseOptions(int argc, const char* const* argv, const std::string& version) {
+  ParsedOptions parsed;
+  auto& options = parsed.options;
+  options.server.version = version;
+  Raw raw;
+  CLI::App app{"radiosityd computes global illumination and streams the lightmaps as they sharpen.", "radiosityd"};
+  app.set_version_flag("--version", "radiosityd " + version);
+  app.add_option("SCENE", options.scene, "glTF scene (.glb or .gltf) to start with; clients can send others");
+  addSolveOptions(app, options, raw);
+  addServerOptions(app, options, raw);
+  app.footer("Exit codes: 0 stopped by a signal, 1 failed, 2 bad usage or bad input.");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    parsed.exit_code = app.exit(error) == 0 ? 0 : kExitBadUsage;
+    return parsed;
+  }
+  if (const auto finished = finish(options, raw); !finished) {
+    std::fprintf(stderr, "radiosityd: %s\n", finished.error().text().c_str());
+    parsed.exit_code = kExitBadUsage;
+  }
+  return parsed;
+}
+
+int exitCodeOf(const Error& error) {
+  switch (error.code) {
+    case ErrorCode::kBadUsage:
+    case ErrorCode::kBadInput:
+    case ErrorCode::kInvalidScene:
+    case ErrorCode::kUnsupported:
+    case ErrorCode::kNotFound:
+    case ErrorCode::kTooLarge:
+      return kExitBadUsage;
+    default:
+      return kExitFailed;
+  }
+}
+
+}  // namespace radiosity

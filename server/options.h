@@ -1,0 +1,35 @@
+// The command line of radiosityd. Used by main only.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "common/result.h"
+#include "server/engine/engine.h"
+#include "server/net/server_options.h"
+
+namespace radiosity {
+
+struct Options {
+  std::string scene;  ///< path; empty: start without one
+  net::ServerOptions server;
+  engine::SolveSettings solve;
+  int workers = 0;  ///< 0: one for each core with a software renderer, one on a GPU
+  std::string log_level = "info";
+};
+
+/// `argc`, `argv` as main got them. With an exit code instead of options, everything was said already: 0 after --help
+/// and --version, 2 for bad usage.
+struct ParsedOptions {
+  Options options;
+  std::optional<int> exit_code;
+};
+[[nodiscard]] ParsedOptions parseOptions(int argc, const char* const* argv, const std::string& version);
+
+/// Exit codes shared by both programs.
+inline constexpr int kExitFailed = 1;
+inline constexpr int kExitBadUsage = 2;
+/// kBadUsage, kBadInput and the like are the user's to mend (2); the rest is ours or the machine's (1).
+[[nodiscard]] int exitCodeOf(const Error& error);
+
+}  // namespace radiosity

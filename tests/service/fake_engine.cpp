@@ -1,0 +1,267 @@
+#include "tests/service/fake_engine.h"
+
+#include <fmt/format.h>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace radiosity::testing {
+namespace {
+
+SharedBytes bytesOf(const std::string& text) { return std::make_shared<const Bytes>(text.begin(), text.end()); }
+
+int across(int texels) {
+  return (texels + static_cast<int>(engine::kTileSize) - 1) / static_cast<int>(engine::kTileSize);
+}
+
+void fillTile(Image& image, int tile, std::uint64_t version, float brightest) {
+  const int side = static_cast<int>(engine::kTileSize);
+  const int x0 = tile % across(image.width) * side;
+  const int y0 = tile / across(image.width) * side;
+  for (int y = y0; y < std::min(y0 + side, image.height); ++y)
+    for (int x = x0; x < std::min(x0 + side, image.width); ++x)
+      image.at(x, y) = FakeEngine::pattern(x, y, version, brightest);
+}
+
+}  // namespace
+
+glm::vec3 FakeEngine::pattern(int x, int y, std::uint64_t version, float brightest) {
+  // Random to the eye, so that deflate cannot make it small; 1 somewhere in every tile.
+  auto hash = static_cast<std::uint32_t>(x) * 2654435761U ^ static_cast<std::uint32_t>(y) * 2246822519U ^
+              static_cast<std::uint32_t>(version) * 3266489917U;
+  hash ^= hash >> 15;
+  hash *= 2246822519U;
+  hash ^= hash >> 13;
+  const float value = (x % 64 == 0 && y % 64 == 0) ? 1.0F : static_cast<float>(hash & 0xffffU) / 65536.0F;
+  return glm::vec3(value, 0.5F * value, 0.25F * value) * brightest;
+}
+
+FakeEngine::FakeEngine(Layout layout) : layout_(layout) {
+  status_.gl_renderer = "none (fake)";
+  status_.patches = 1000;
+  status_.counters["skipped_shots"] = 7;
+}
+
+std::shared_ptr<engine::PageSnapshot> FakeEngine::emptyPage() const {
+  auto page = std::make_shared<engine::PageSnapshot>();
+  for (int m = 0; m < layout_.mips; ++m) {
+    const int width = std::max(1, layout_.width >> m);
+    const int height = std::max(1, layout_.height >> m);
+    page->mips.emplace_back(width, height);
+    const auto tiles = static_cast<std::size_t>(across(width)) * static_cast<std::size_t>(across(height));
+    page->tile_version.emplace_back(tiles, 0);
+    page->tile_change.emplace_back(tiles, 0.0F);
+  }
+  return page;
+}
+
+std::uint64_t FakeEngine::publish(float brightest) {
+  std::uint64_t version = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    version = ++status_.tile_version;
+    auto next = std::make_shared<engine::Lightmaps>();
+    for (int p = 0; p < layout_.pages; ++p) {
+      auto page = emptyPage();
+      for (std::size_t m = 0; m < page->mips.size(); ++m)
+        for (std::size_t t = 0; t < page->tile_version[m].size(); ++t) {
+          fillTile(page->mips[m], static_cast<int>(t), version, brightest);
+          page->tile_version[m][t] = version;
+          page->tile_change[m][t] = 1.0F;
+        }
+      next->pages.push_back(std::move(page));
+    }
+    next->layout = layout_number_;
+    next->revision = status_.revision;
+    next->tile_version = version;
+    next->shots = static_cast<std::uint32_t>(status_.shots);
+    next->error = static_cast<float>(status_.error.total);
+    next->final = status_.state == engine::SolveState::kConverged;
+    lightmaps_ = std::move(next);
+  }
+  announceLightmaps();
+  return version;
+}
+
+std::uint64_t FakeEngine::publishTile(std::uint32_t page, std::uint32_t tile) {
+  std::uint64_t version = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    version = ++status_.tile_version;
+    auto next = std::make_shared<engine::Lightmaps>(*lightmaps_);
+    auto changed = std::make_shared<engine::PageSnapshot>(*next->pages.at(page));
+    fillTile(changed->mips[0], static_cast<int>(tile), version, 100.0F);
+    changed->tile_version[0].at(tile) = version;
+    changed->tile_change[0].at(tile) = 0.5F;
+    next->pages[page] = std::move(changed);
+    next->tile_version = version;
+    lightmaps_ = std::move(next);
+  }
+  announceLightmaps();
+  return version;
+}
+
+void FakeEngine::changeLayout(Layout layout) {
+  const std::lock_guard lock(mutex_);
+  layout_ = layout;
+  ++layout_number_;
+}
+
+void FakeEngine::announceLightmaps() {
+  const auto now = lightmaps();
+  for (const auto& listener : listeners()) listener->onLightmaps(now);
+}
+
+void FakeEngine::progress(double error, engine::SolveState state) {
+  {
+    const std::lock_guard lock(mutex_);
+    status_.state = state;
+    status_.error.total = error;
+    status_.shots += 100;
+    status_.seconds += 0.1;
+  }
+  const auto now = status();
+  for (const auto& listener : listeners()) listener->onProgress(now);
+}
+
+void FakeEngine::holdAnswers() {
+  const std::lock_guard lock(mutex_);
+  holding_ = true;
+}
+
+void FakeEngine::release() {
+  std::vector<std::function<void()>> calls;
+  {
+    const std::lock_guard lock(mutex_);
+    holding_ = false;
+    calls.swap(held_);
+  }
+  for (const auto& call : calls) call();
+}
+
+void FakeEngine::answer(std::function<void()> call) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (holding_) return held_.push_back(std::move(call));
+  }
+  call();
+}
+
+std::uint64_t FakeEngine::patchesSeen() const {
+  const std::lock_guard lock(mutex_);
+  return patches_;
+}
+
+std::string FakeEngine::lastLoad() const {
+  const std::lock_guard lock(mutex_);
+  return last_load_;
+}
+
+void FakeEngine::loaded(std::string what, Callback<engine::LoadOutcome> done) {
+  std::uint64_t revision = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    last_load_ = std::move(what);
+    revision = ++status_.revision;
+    status_.state = engine::SolveState::kSolving;
+    ++layout_number_;
+  }
+  for (const auto& listener : listeners()) listener->onSceneLoaded(revision);
+  answer([done, revision] { done(engine::LoadOutcome{revision, {"room.glb: /materials/0: clamped"}}); });
+}
+
+void FakeEngine::loadBytes(std::string name, SharedBytes bytes, Callback<engine::LoadOutcome> done) {
+  if (bytes->size() >= 3 && std::equal(bytes->begin(), bytes->begin() + 3, "bad"))
+    return answer([done, name] {
+      done(fail(ErrorCode::kInvalidScene, "count is larger than the buffer view", name + ": /accessors/4/count"));
+    });
+  loaded(fmt::format("{}: {} bytes", name, bytes->size()), std::move(done));
+}
+
+void FakeEngine::loadFile(std::string path, Callback<engine::LoadOutcome> done) {
+  loaded("file " + path, std::move(done));
+}
+
+void FakeEngine::patch(engine::PatchRequest request, Callback<engine::PatchOutcome> done) {
+  std::uint64_t revision = 0;
+  bool stale = false;
+  {
+    const std::lock_guard lock(mutex_);
+    ++patches_;
+    stale = request.base_revision && *request.base_revision != status_.revision;
+    if (!stale) revision = request.dry_run ? status_.revision : ++status_.revision;
+  }
+  if (stale)
+    return answer([done] { done(fail(ErrorCode::kStaleRevision, "another edit came first; fetch it and try again")); });
+  if (!request.dry_run)
+    for (const auto& listener : listeners()) listener->onScenePatched(revision, request.patch, request.by);
+  answer([done, revision] { done(engine::PatchOutcome{revision, 3, 40}); });
+}
+
+void FakeEngine::configure(engine::SolveSettings settings, Callback<engine::SolveSettings> done) {
+  {
+    const std::lock_guard lock(mutex_);
+    status_.settings = settings;
+  }
+  answer([done, settings] { done(settings); });
+}
+
+void FakeEngine::setState(engine::SolveState state, Callback<engine::SolveState> done) {
+  {
+    const std::lock_guard lock(mutex_);
+    status_.state = state;
+  }
+  answer([done, state] { done(state); });
+}
+
+void FakeEngine::pause(Callback<engine::SolveState> done) { setState(engine::SolveState::kPaused, std::move(done)); }
+void FakeEngine::resume(Callback<engine::SolveState> done) { setState(engine::SolveState::kSolving, std::move(done)); }
+void FakeEngine::restart(Callback<engine::SolveState> done) { setState(engine::SolveState::kSolving, std::move(done)); }
+
+engine::Status FakeEngine::status() const {
+  const std::lock_guard lock(mutex_);
+  return status_;
+}
+
+std::shared_ptr<const engine::Lightmaps> FakeEngine::lightmaps() const {
+  const std::lock_guard lock(mutex_);
+  return lightmaps_;
+}
+
+void FakeEngine::sceneText(Callback<SceneText> done) {
+  const auto revision = status().revision;
+  answer([done, revision] { done(SceneText{revision, R"({"asset":{"version":"2.0"}})"}); });
+}
+void FakeEngine::sceneGlb(Callback<SharedBytes> done) {
+  answer([done] { done(bytesOf("glTF scene")); });
+}
+void FakeEngine::unlitGlb(Callback<SharedBytes> done) {
+  answer([done] { done(bytesOf("glTF unlit")); });
+}
+void FakeEngine::lightmapExr(std::uint32_t page, Callback<SharedBytes> done) {
+  answer([done, page] {
+    if (page > 0) return done(fail(ErrorCode::kNotFound, "there is one lightmap page", fmt::format("page {}", page)));
+    done(bytesOf("exr"));
+  });
+}
+void FakeEngine::snapshot(engine::SnapshotRequest request, Callback<SharedBytes> done) {
+  answer([done, request] {
+    if (request.camera == "nobody") return done(fail(ErrorCode::kNotFound, "there is no camera \"nobody\""));
+    done(bytesOf(fmt::format("png {}x{} {} {}", request.width, request.height, request.quantity, request.camera)));
+  });
+}
+
+void FakeEngine::addListener(std::weak_ptr<engine::Listener> listener) {
+  const std::lock_guard lock(mutex_);
+  listeners_.push_back(std::move(listener));
+}
+
+std::vector<std::shared_ptr<engine::Listener>> FakeEngine::listeners() const {
+  std::vector<std::shared_ptr<engine::Listener>> alive;
+  const std::lock_guard lock(mutex_);
+  for (const auto& weak : listeners_)
+    if (auto listener = weak.lock()) alive.push_back(std::move(listener));
+  return alive;
+}
+
+}  // namespace radiosity::testing

@@ -1,0 +1,75 @@
+// An engine without a solver, for tests of the network: scenes are opaque, lightmaps are a pattern, progress is made
+// when the test says so. Thread-safe; callbacks come on the calling thread, as an engine may do.
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "server/engine/engine.h"
+
+namespace radiosity::testing {
+
+struct FakeLayout {
+  int pages = 1, width = 160, height = 96, mips = 3;
+};
+
+class FakeEngine : public engine::Engine {
+ public:
+  using Layout = FakeLayout;
+  explicit FakeEngine(Layout layout = {});
+
+  // ---- what a test does to it ----
+  /// All tiles change; the brightest texel is `brightest` lux. Returns the tile version.
+  std::uint64_t publish(float brightest = 100.0F);
+  /// Only this tile of mip 0 changes.
+  std::uint64_t publishTile(std::uint32_t page, std::uint32_t tile);
+  void changeLayout(Layout layout);
+  void progress(double error, engine::SolveState state = engine::SolveState::kSolving);
+  /// Callbacks are kept until release().
+  void holdAnswers();
+  void release();
+  [[nodiscard]] std::uint64_t patchesSeen() const;
+  [[nodiscard]] std::string lastLoad() const;  ///< "name: 123 bytes" or "file PATH"
+
+  // ---- engine::Engine ----
+  void loadBytes(std::string name, SharedBytes bytes, Callback<engine::LoadOutcome> done) override;
+  void loadFile(std::string path, Callback<engine::LoadOutcome> done) override;
+  void patch(engine::PatchRequest request, Callback<engine::PatchOutcome> done) override;
+  void configure(engine::SolveSettings settings, Callback<engine::SolveSettings> done) override;
+  void pause(Callback<engine::SolveState> done) override;
+  void resume(Callback<engine::SolveState> done) override;
+  void restart(Callback<engine::SolveState> done) override;
+  [[nodiscard]] engine::Status status() const override;
+  [[nodiscard]] std::shared_ptr<const engine::Lightmaps> lightmaps() const override;
+  void sceneText(Callback<SceneText> done) override;
+  void sceneGlb(Callback<SharedBytes> done) override;
+  void unlitGlb(Callback<SharedBytes> done) override;
+  void lightmapExr(std::uint32_t page, Callback<SharedBytes> done) override;
+  void snapshot(engine::SnapshotRequest request, Callback<SharedBytes> done) override;
+  void addListener(std::weak_ptr<engine::Listener> listener) override;
+
+  /// The value that publish() put at a texel: for tests to compare what arrives.
+  [[nodiscard]] static glm::vec3 pattern(int x, int y, std::uint64_t version, float brightest);
+
+ private:
+  void answer(std::function<void()> call);
+  void setState(engine::SolveState state, Callback<engine::SolveState> done);
+  void loaded(std::string what, Callback<engine::LoadOutcome> done);
+  [[nodiscard]] std::vector<std::shared_ptr<engine::Listener>> listeners() const;
+  [[nodiscard]] std::shared_ptr<engine::PageSnapshot> emptyPage() const;
+  void announceLightmaps();
+
+  mutable std::mutex mutex_;
+  Layout layout_;
+  engine::Status status_;
+  std::shared_ptr<const engine::Lightmaps> lightmaps_;
+  std::uint64_t layout_number_ = 1, patches_ = 0;
+  std::string last_load_;
+  std::vector<std::weak_ptr<engine::Listener>> listeners_;
+  bool holding_ = false;
+  std::vector<std::function<void()>> held_;
+};
+
+}  // namespace radiosity::testing

@@ -1,0 +1,554 @@
+// The WebSocket side over real sockets against the fake engine.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <tuple>
+
+#include "protocol/http_bodies.h"
+#include "protocol/tile_frame.h"
+#include "tests/service/net/running_server.h"
+#include "tests/service/net/test_client.h"
+
+namespace radiosity::testing {
+namespace {
+
+using namespace protocol;  // NOLINT: the test speaks the protocol
+using std::chrono::milliseconds;
+using ::testing::HasSubstr;
+
+constexpr const char* kSecret = "0123456789abcdef0123456789abcdef";
+
+int codeOf(const RpcResponse& response) { return response.error ? static_cast<int>(response.error->code) : 0; }
+
+template <typename Reply>
+Reply replyOf(const RpcResponse& response) {
+  EXPECT_FALSE(response.error.has_value()) << response.error->message;
+  if (response.error) return {};
+  const auto reply = decodeReply<Reply>(*response.result);
+  EXPECT_TRUE(reply.has_value()) << reply.error().text();
+  return reply.value_or(Reply{});
+}
+
+/// Reads to the end of the connection.
+int closeCodeOf(TestSocket& socket) {
+  while (socket.read()) {
+  }
+  return socket.closeCode();
+}
+
+TEST(Handshake, TheServerIntroducesItselfFirst) {
+  RunningServer server;
+  TestSocket socket(server.port());
+  EXPECT_EQ(socket.status(), 101);
+  const auto info = socket.waitFor("serverInfo");
+  ASSERT_TRUE(info.has_value());
+  const auto note = decodeNotification(*info);
+  ASSERT_TRUE(note.has_value());
+  const auto& read = std::get<ServerInfo>(*note);
+  EXPECT_THAT(read.capabilities, ::testing::Contains("tiles.rgb9e5"));
+  const auto hello = replyOf<HelloReply>(socket.hello({}, {PixelFormat::kR32ui, PixelFormat::kRgb9e5}));
+  EXPECT_EQ(hello.epoch, read.epoch);
+  EXPECT_EQ(hello.tile_format, PixelFormat::kRgb9e5) << "the first that can be streamed";
+  EXPECT_FALSE(hello.resumed);
+}
+
+TEST(Handshake, WithoutTheSubprotocolThereIsNoUpgrade) {
+  RunningServer server;
+  Upgraded how;
+  how.subprotocol = "";
+  EXPECT_EQ(TestSocket(server.port(), how).status(), 400);
+  how.subprotocol = "radiosity.v2";
+  EXPECT_EQ(TestSocket(server.port(), how).status(), 400);
+  how.subprotocol = "radiosity.v2, radiosity.v1";
+  EXPECT_EQ(TestSocket(server.port(), how).status(), 101);
+}
+
+TEST(Handshake, AForeignOriginIsRefused) {
+  net::ServerOptions options;
+  options.allow_origins = {"https://viewer.example.org"};
+  RunningServer server(options);
+  Upgraded how;
+  how.origin = "https://elsewhere.example";
+  EXPECT_EQ(TestSocket(server.port(), how).status(), 403);
+  how.origin = "https://viewer.example.org";
+  EXPECT_EQ(TestSocket(server.port(), how).status(), 101);
+}
+
+TEST(Handshake, WhoDoesNotSayHelloIsClosed) {
+  net::ServerOptions options;
+  options.hello_timeout = milliseconds(100);
+  RunningServer server(options);
+  TestSocket silent(server.port());
+  EXPECT_EQ(closeCodeOf(silent), 1008);
+}
+
+TEST(Handshake, TheFirstRequestMustBeHello) {
+  RunningServer server;
+  TestSocket socket(server.port());
+  EXPECT_EQ(codeOf(socket.call(StatusCall{})), -32001);
+  EXPECT_EQ(closeCodeOf(socket), 1008);
+}
+
+TEST(Handshake, TheTokenMayComeInHelloOrInTheHeader) {
+  net::ServerOptions options;
+  options.token = kSecret;
+  RunningServer server(options);
+  TestSocket none(server.port());
+  EXPECT_EQ(codeOf(none.hello()), -32001);
+  EXPECT_EQ(closeCodeOf(none), 1008);
+  TestSocket wrong(server.port());
+  EXPECT_EQ(codeOf(wrong.hello("0123456789abcdef0123456789abcdeX")), -32001);
+  EXPECT_EQ(codeOf(TestSocket(server.port()).hello(kSecret)), 0);
+  Upgraded how;
+  how.authorization = std::string("Bearer ") + kSecret;
+  EXPECT_EQ(codeOf(TestSocket(server.port(), how).hello()), 0);
+  how.authorization = "Bearer wrong";
+  EXPECT_EQ(TestSocket(server.port(), how).status(), 401);
+}
+
+TEST(Messages, WhatIsNotUnderstoodIsAnsweredAndTheSessionLives) {
+  RunningServer server;
+  TestSocket socket(server.port());
+  socket.hello();
+  const auto answer = [&](const std::string& text) {
+    socket.sendText(text);
+    while (const auto message = socket.read()) {
+      if (message->binary) continue;
+      const auto parsed = parseRpc(message->text(), kMaxMessageBytes);
+      if (const auto* response = std::get_if<RpcResponse>(&parsed.items.at(0))) return *response;
+    }
+    return RpcResponse{};
+  };
+  EXPECT_EQ(codeOf(answer("{")), -32700);
+  EXPECT_EQ(codeOf(answer(std::string(100'000, '['))), -32700);
+  EXPECT_EQ(codeOf(answer("[]")), -32600);
+  EXPECT_EQ(codeOf(answer(R"({"jsonrpc":"2.0","id":4,"method":"no.such"})")), -32601);
+  const auto bad = answer(R"({"jsonrpc":"2.0","id":"x","method":"solve.configure","params":{"targetError":7}})");
+  EXPECT_EQ(codeOf(bad), -32602);
+  EXPECT_EQ(bad.id, "\"x\"");
+  EXPECT_EQ(bad.error->pointer, "/params/targetError");
+  EXPECT_EQ(codeOf(socket.hello()), -32600) << "hello once";
+  EXPECT_EQ(codeOf(socket.call(StatusCall{})), 0);
+}
+
+TEST(Messages, ABatchIsAnsweredInOneArray) {
+  RunningServer server;
+  TestSocket socket(server.port());
+  socket.hello();
+  socket.sendText(
+      R"([{"jsonrpc":"2.0","id":1,"method":"viewers"},{"jsonrpc":"2.0","method":"credit","params":{"bytes":1}},
+                      {"jsonrpc":"2.0","id":2,"method":"nope"},5])");
+  while (const auto message = socket.read()) {
+    const auto parsed = nlohmann::json::parse(message->text());
+    if (!parsed.is_array()) continue;
+    EXPECT_EQ(parsed.size(), 3U) << "a notification is not answered";
+    return;
+  }
+  FAIL() << "no answer";
+}
+
+TEST(Messages, OneOverTheLimitClosesTheSession) {
+  RunningServer server;
+  TestSocket socket(server.port());
+  socket.hello();
+  socket.sendText("\"" + std::string(kMaxMessageBytes, 'x') + "\"");
+  EXPECT_EQ(closeCodeOf(socket), 1009);
+}
+
+TEST(Messages, ABinaryFrameClosesTheSession) {
+  RunningServer server;
+  TestSocket socket(server.port());
+  socket.hello();
+  socket.sendBinary("RADT");
+  EXPECT_EQ(closeCodeOf(socket), 1003);
+}
+
+TEST(Messages, TextThatIsNotUtf8OrAFrameThatIsNotMaskedClosesTheSession) {
+  RunningServer server;
+  TestSocket bad_text(server.port());
+  bad_text.hello();
+  bad_text.sendText("\"\xff\xfe\"");
+  EXPECT_EQ(closeCodeOf(bad_text), 1007);
+  TestSocket unmasked(server.port());
+  unmasked.hello();
+  unmasked.sendRaw(std::string("\x81\x02{}", 4));
+  EXPECT_EQ(closeCodeOf(unmasked), 1002);
+}
+
+TEST(Messages, TooManyCallsAtATimeAreRefused) {
+  RunningServer server;
+  TestSocket socket(server.port());
+  socket.hello();
+  server.engine.holdAnswers();
+  for (std::size_t i = 0; i < kMaxCallsInFlight; ++i)
+    socket.sendText(R"({"jsonrpc":"2.0","id":"held","method":"scene.get"})");
+  EXPECT_EQ(codeOf(socket.call(StatusCall{})), -32029);
+  server.engine.release();
+  EXPECT_EQ(codeOf(socket.call(StatusCall{})), 0);
+}
+
+TEST(Scene, GetGivesTheDocument) {
+  RunningServer server;
+  TestSocket socket(server.port());
+  socket.hello();
+  const auto reply = replyOf<SceneGetReply>(socket.call(SceneGetCall{}));
+  EXPECT_THAT(reply.gltf, HasSubstr("2.0"));
+}
+
+TEST(Scene, AnUploadIsLoadedByItsUrl) {
+  RunningServer server;
+  TestSocket socket(server.port());
+  socket.hello();
+  const auto put = request(server.port(), "PUT", "/uploads?name=hall.glb", {}, "12345");
+  EXPECT_EQ(put.status, 201);
+  const auto reply = replyOf<SceneLoadReply>(socket.call(SceneLoadCall{*decodeHttpUrl(put.body)}));
+  EXPECT_EQ(reply.revision, 1U);
+  EXPECT_EQ(server.engine.lastLoad(), "hall.glb: 5 bytes");
+  EXPECT_TRUE(socket.waitFor("scene.loaded").has_value());
+  EXPECT_EQ(codeOf(socket.call(SceneLoadCall{"/uploads/none"})), -32004);
+  EXPECT_EQ(codeOf(socket.call(SceneLoadCall{"http://elsewhere.example/a.glb"})), -32602);
+  EXPECT_EQ(codeOf(socket.call(SceneLoadCall{"file:hall.glb"})), -32003);
+}
+
+TEST(Scene, AFileIsLoadedOnlyFromBelowTheSceneRoot) {
+  const auto folder = std::filesystem::temp_directory_path() / ("radiosity-net-" + std::to_string(getpid()));
+  std::filesystem::create_directories(folder / "root" / "sub");
+  std::ofstream(folder / "outside.glb") << "x";
+  std::ofstream(folder / "root" / "sub" / "a.glb") << "x";
+  std::filesystem::create_symlink(folder / "outside.glb", folder / "root" / "link.glb");
+  net::ServerOptions options;
+  options.scene_root = folder / "root";
+  {
+    RunningServer server(options);
+    TestSocket socket(server.port());
+    socket.hello();
+    EXPECT_EQ(codeOf(socket.call(SceneLoadCall{"file:sub/a.glb"})), 0);
+    EXPECT_THAT(server.engine.lastLoad(), HasSubstr("root/sub/a.glb"));
+    for (const std::string name : {"../outside.glb", "link.glb", "sub", "none.glb", "sub/../../outside.glb"})
+      EXPECT_EQ(codeOf(socket.call(SceneLoadCall{"file:" + name})), -32004) << name;
+    EXPECT_EQ(codeOf(socket.call(SceneLoadCall{"file:" + (folder / "outside.glb").string()})), -32004);
+  }
+  std::filesystem::remove_all(folder);
+}
+
+ScenePatchCall somePatch(std::optional<std::uint64_t> base = {}, std::string id = {}) {
+  return {R"([{"op":"replace","path":"/nodes/@lamp/translation","value":[0,2,0]}])", base, std::move(id), false};
+}
+
+TEST(Scene, APatchReachesEveryoneAndTheSecondOfTwoRacersLoses) {
+  RunningServer server;
+  TestSocket first(server.port());
+  TestSocket second(server.port());
+  first.hello();
+  second.hello();
+  EXPECT_EQ(replyOf<ScenePatchReply>(first.call(somePatch(0))).revision, 1U);
+  const auto stale = second.call(somePatch(0));
+  EXPECT_EQ(codeOf(stale), -32009);
+  EXPECT_EQ(stale.error->revision, 1U);
+  const auto note = second.waitFor("scene.patched");
+  ASSERT_TRUE(note.has_value());
+  EXPECT_EQ(note->params->at("by"), "test");
+  EXPECT_EQ(note->params->at("patch").at(0).at("op"), "replace");
+}
+
+TEST(Scene, TheSameRequestIdGetsTheSameAnswerOnce) {
+  RunningServer server;
+  TestSocket socket(server.port());
+  socket.hello();
+  EXPECT_EQ(replyOf<ScenePatchReply>(socket.call(somePatch({}, "edit-1"))).revision, 1U);
+  EXPECT_EQ(replyOf<ScenePatchReply>(socket.call(somePatch({}, "edit-1"))).revision, 1U);
+  EXPECT_EQ(server.engine.patchesSeen(), 1U);
+  EXPECT_EQ(replyOf<ScenePatchReply>(socket.call(somePatch({}, "edit-2"))).revision, 2U);
+  auto other = somePatch({}, "edit-1");
+  other.dry_run = true;
+  EXPECT_EQ(codeOf(socket.call(other)), -32602);
+}
+
+TEST(Solve, ConfigureKeepsWhatIsNotNamed) {
+  RunningServer server;
+  TestSocket socket(server.port());
+  socket.hello();
+  SolveConfigureCall call;
+  call.time_limit_ms = 1500;
+  auto settings = replyOf<Settings>(socket.call(call));
+  EXPECT_EQ(settings.time_limit_ms, 1500U);
+  EXPECT_EQ(settings.target_error, 0.02);
+  call = {};
+  call.target_error = 0.1;
+  call.no_time_limit = true;
+  settings = replyOf<Settings>(socket.call(call));
+  EXPECT_EQ(settings.time_limit_ms, std::nullopt);
+  EXPECT_EQ(settings.target_error, 0.1);
+  EXPECT_EQ(replyOf<StateReply>(socket.call(SolvePauseCall{})).state, "paused");
+  EXPECT_EQ(replyOf<StateReply>(socket.call(SolveResumeCall{})).state, "solving");
+}
+
+TEST(Solve, WaitAnswersWhenTheErrorIsReached) {
+  RunningServer server;
+  TestSocket socket(server.port());
+  socket.hello();
+  server.engine.progress(0.5);
+  SolveWaitCall wait;
+  wait.error = 0.1;
+  socket.sendText(encodeCall("99", wait));
+  EXPECT_EQ(codeOf(socket.call(StatusCall{})), 0) << "waiting does not hold up other calls";
+  server.engine.progress(0.2);
+  server.engine.progress(0.09);
+  while (const auto message = socket.read()) {
+    const auto parsed = parseRpc(message->text(), kMaxMessageBytes);
+    const auto* response = std::get_if<RpcResponse>(&parsed.items.at(0));
+    if (response == nullptr || response->id != "99") continue;
+    const auto status = replyOf<StatusReply>(*response);
+    EXPECT_EQ(status.reached, true);
+    EXPECT_EQ(status.progress.error.total, 0.09);
+    return;
+  }
+  FAIL() << "no answer";
+}
+
+TEST(Solve, WaitGivesUpWhenTimeIsUpOrTheSolveHasStopped) {
+  RunningServer server;
+  TestSocket socket(server.port());
+  socket.hello();
+  server.engine.progress(0.5);
+  SolveWaitCall wait;
+  wait.timeout_ms = 20;
+  EXPECT_EQ(replyOf<StatusReply>(socket.call(wait)).reached, false);
+  wait.timeout_ms.reset();
+  server.engine.progress(0.3, engine::SolveState::kTimeLimit);
+  EXPECT_EQ(replyOf<StatusReply>(socket.call(wait)).reached, false);
+  server.engine.progress(0.01, engine::SolveState::kConverged);
+  EXPECT_EQ(replyOf<StatusReply>(socket.call(wait)).reached, true);
+}
+
+TEST(Snapshot, IsTakenAtOnceAndFetchedByUrl) {
+  RunningServer server;
+  TestSocket socket(server.port());
+  socket.hello();
+  const auto reply = replyOf<SnapshotReply>(socket.call(SnapshotCall{"desk", 64, 48, "lit"}));
+  EXPECT_EQ(request(server.port(), "GET", reply.url).body, "png 64x48 lit desk");
+  EXPECT_EQ(codeOf(socket.call(SnapshotCall{"nobody", 64, 48, "lit"})), -32004);
+}
+
+TEST(Viewers, AreCountedForEveryone) {
+  RunningServer server;
+  TestSocket first(server.port());
+  first.hello();
+  EXPECT_EQ(first.waitFor("viewers")->params->at("count"), 1);
+  {
+    TestSocket second(server.port());
+    second.hello();
+    EXPECT_EQ(first.waitFor("viewers")->params->at("count"), 2);
+  }
+  EXPECT_EQ(first.waitFor("viewers")->params->at("count"), 1);
+}
+
+// ---- tiles ----
+
+using TileKey = std::tuple<std::uint32_t, int, std::uint32_t, std::uint32_t>;
+TileKey keyOf(const TileHeader& h) { return {h.page, h.mip, h.x, h.y}; }
+
+TEST(Tiles, AllArriveCoarseFirstAndHoldWhatTheEngineMade) {
+  RunningServer server;
+  const auto version = server.engine.publish();
+  for (const auto codec : {Codec::kNone, Codec::kDeflate}) {
+    TestSocket socket(server.port());
+    HelloCall hello;
+    hello.client = "test";
+    hello.codecs = {codec};
+    socket.call(hello);
+    EXPECT_EQ(codeOf(socket.call(SubscribeCall{})), 0);
+    ASSERT_TRUE(socket.waitFor("lightmaps").has_value());
+    EXPECT_TRUE(socket.tiles.empty()) << "lightmaps comes before the first tile";
+    std::set<TileKey> seen;
+    int last_mip = 100;
+    for (int i = 0; i < 6 + 2 + 1; ++i) {  // 160x96, 80x48, 40x24 in tiles of 64
+      const auto frame = socket.nextTile();
+      ASSERT_TRUE(frame.has_value());
+      const auto tile = decodeTile(*frame);
+      ASSERT_TRUE(tile.has_value()) << tile.error().text();
+      const auto& h = tile->header;
+      EXPECT_LE(h.mip, last_mip);
+      EXPECT_EQ((h.flags & kTileReset) != 0, i == 0);
+      EXPECT_EQ(h.tile_version, version);
+      last_mip = h.mip;
+      seen.insert(keyOf(h));
+      const auto image = tileImage(*tile);
+      for (const auto [x, y] : {std::pair{0, 0}, std::pair{7, 5}, std::pair{h.width - 1, h.height - 1}}) {
+        const auto expected =
+            FakeEngine::pattern(static_cast<int>(h.x) + x, static_cast<int>(h.y) + y, version, 100.0F);
+        EXPECT_NEAR(image->at(x, y).x, expected.x, expected.x * 0x1p-11F);
+      }
+    }
+    EXPECT_EQ(seen.size(), 9U);
+    EXPECT_EQ(socket.waitFor("bookmark")->params->at("tileVersion"), version);
+    EXPECT_TRUE(socket.tiles.empty());
+  }
+}
+
+TEST(Tiles, OnlyWhatChangedIsSentAgain) {
+  RunningServer server;
+  server.engine.publish();
+  TestSocket socket(server.port());
+  socket.hello();
+  socket.call(SubscribeCall{});
+  ASSERT_TRUE(socket.waitFor("bookmark").has_value());
+  socket.tiles.clear();
+  const auto version = server.engine.publishTile(0, 2);
+  const auto tile = decodeTile(*socket.nextTile());
+  EXPECT_EQ(tile->header.tile_version, version);
+  EXPECT_EQ(tile->header.x, 128U);
+  EXPECT_EQ(socket.waitFor("bookmark")->params->at("tileVersion"), version);
+  EXPECT_TRUE(socket.tiles.empty());
+}
+
+TEST(Tiles, TheSubscriptionChoosesPagesAndMips) {
+  RunningServer server({}, {2, 160, 96, 3});
+  server.engine.publish();
+  TestSocket socket(server.port());
+  socket.hello();
+  SubscribeCall call;
+  call.lightmaps = {1};
+  call.min_mip = call.max_mip = 1;
+  socket.call(call);
+  ASSERT_TRUE(socket.waitFor("bookmark").has_value());
+  ASSERT_EQ(socket.tiles.size(), 2U);
+  for (const auto& frame : socket.tiles) {
+    EXPECT_EQ(decodeTile(frame)->header.page, 1U);
+    EXPECT_EQ(decodeTile(frame)->header.mip, 1U);
+  }
+  call.quantity = Quantity::kPatchId;
+  EXPECT_EQ(codeOf(socket.call(call)), -32602);
+}
+
+TEST(Tiles, ANewLayoutIsAnnouncedBeforeItsTiles) {
+  RunningServer server;
+  server.engine.publish();
+  TestSocket socket(server.port());
+  socket.hello();
+  socket.call(SubscribeCall{});
+  ASSERT_TRUE(socket.waitFor("bookmark").has_value());
+  socket.tiles.clear();
+  socket.notes.clear();
+  server.engine.changeLayout({1, 64, 64, 1});
+  server.engine.publish();
+  const auto note = socket.waitFor("lightmaps");
+  ASSERT_TRUE(note.has_value());
+  EXPECT_EQ(note->params->at("pages").at(0).at("width"), 64);
+  EXPECT_TRUE(socket.tiles.empty());
+  EXPECT_NE(decodeTile(*socket.nextTile())->header.flags & kTileReset, 0);
+}
+
+TEST(Tiles, NoMoreIsSentThanTheClientGaveCreditFor) {
+  RunningServer server;
+  server.engine.publish();
+  TestSocket socket(server.port());
+  socket.hello({}, {}, 1);
+  socket.call(SubscribeCall{});
+  ASSERT_TRUE(socket.nextTile().has_value()) << "one byte of credit lets one frame through";
+  EXPECT_FALSE(socket.nextTile(Seconds(0.3)).has_value());
+  const auto owed = replyOf<CreditReply>(socket.call(CreditCall{0})).credit_bytes;
+  EXPECT_LT(owed, 0);
+  socket.call(CreditCall{1 - owed});
+  EXPECT_TRUE(socket.nextTile().has_value());
+  EXPECT_FALSE(socket.nextTile(Seconds(0.3)).has_value());
+}
+
+TEST(Tiles, TheSameTileIsEncodedOnceForEveryone) {
+  RunningServer server;
+  server.engine.publish();
+  for (int i = 0; i < 4; ++i) {
+    TestSocket socket(server.port());
+    socket.hello();
+    socket.call(SubscribeCall{});
+    ASSERT_TRUE(socket.waitFor("bookmark").has_value());
+  }
+  const auto metrics = request(server.port(), "GET", "/metrics").body;
+  EXPECT_THAT(metrics, HasSubstr("radiosityd_tiles_encoded_total 9\n"));
+  EXPECT_THAT(metrics, HasSubstr("radiosityd_tiles_sent_total 36\n"));
+}
+
+TEST(Tiles, AReaderThatStallsIsClosedAndHoldsNobodyUp) {
+  net::ServerOptions options;
+  options.write_deadline = milliseconds(500);
+  options.close_patience = milliseconds(200);
+  RunningServer server(options, {4, 512, 512, 1});
+  server.engine.publish();
+  Upgraded how;
+  how.receive_buffer_bytes = 4096;
+  TestSocket stalled(server.port(), how);
+  stalled.hello({}, {PixelFormat::kRgba32f}, kMaxCreditBytes);
+  stalled.sendText(encodeCall("1", SubscribeCall{}));  // and never reads again
+  TestSocket reader(server.port());
+  reader.hello({}, {}, kMaxCreditBytes);
+  reader.call(SubscribeCall{});
+  for (int i = 0; i < 3; ++i) {
+    const auto version = server.engine.publish();
+    nlohmann::json seen;
+    while (seen != version) {
+      const auto note = reader.waitFor("bookmark");
+      ASSERT_TRUE(note.has_value());
+      seen = note->params->at("tileVersion");
+    }
+  }
+  ASSERT_TRUE(reader.waitFor("viewers").has_value());
+  while (true) {  // the stalled one leaves
+    const auto note = reader.waitFor("viewers");
+    ASSERT_TRUE(note.has_value());
+    if (note->params->at("count") == 1) break;
+  }
+  EXPECT_THAT(request(server.port(), "GET", "/metrics").body,
+              HasSubstr("radiosityd_sessions_closed_total{reason=\"too_slow\"} 1\n"));
+}
+
+TEST(Tiles, AClientThatComesBackGetsOnlyWhatItMissed) {
+  RunningServer server;
+  server.engine.publish();
+  HelloCall hello;
+  hello.client = "test";
+  {
+    TestSocket socket(server.port());
+    hello.resume = Resume{replyOf<HelloReply>(socket.hello()).epoch, 0, 0};
+    socket.call(SubscribeCall{});
+    hello.resume->tile_version = socket.waitFor("bookmark")->params->at("tileVersion");
+  }
+  TestSocket editor(server.port());
+  editor.hello();
+  editor.call(somePatch());
+  server.engine.publishTile(0, 1);
+  TestSocket back(server.port());
+  EXPECT_TRUE(replyOf<HelloReply>(back.call(hello)).resumed);
+  EXPECT_EQ(back.waitFor("scene.patched")->params->at("revision"), 1);
+  back.call(SubscribeCall{});
+  ASSERT_TRUE(back.waitFor("bookmark").has_value());
+  ASSERT_EQ(back.tiles.size(), 1U);
+  EXPECT_EQ(decodeTile(back.tiles[0])->header.flags & kTileReset, 0);
+  hello.resume->epoch = "another";
+  TestSocket fresh(server.port());
+  EXPECT_FALSE(replyOf<HelloReply>(fresh.call(hello)).resumed);
+}
+
+TEST(Drain, TellsClientsFinishesAndCloses) {
+  RunningServer server;
+  TestSocket socket(server.port());
+  socket.hello();
+  server.engine.progress(0.5);
+  socket.sendText(encodeCall("7", SolveWaitCall{}));
+  EXPECT_EQ(codeOf(socket.call(StatusCall{})), 0);
+  RawHttp idle(server.port());
+  idle.send("GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  EXPECT_EQ(idle.receive().status, 200);
+  server.drain();
+  EXPECT_TRUE(socket.waitFor("draining").has_value());
+  EXPECT_EQ(closeCodeOf(socket), 1001);
+  EXPECT_TRUE(idle.closed(Seconds(10)));
+  server.stop();
+}
+
+}  // namespace
+}  // namespace radiosity::testing
