@@ -225,6 +225,8 @@ Error ServerProcess::epitaph() {
   stop(0ms);
   const int status = wait_status_.value_or(0);
   std::string why = !last_error_.empty() ? last_error_ : last_text_;
+  constexpr std::string_view kItsName = "radiosityd: ";  // it may have named itself already
+  if (why.starts_with(kItsName)) why.erase(0, kItsName.size());
   ErrorCode code = ErrorCode::kUnavailable;
   if (WIFSIGNALED(status)) {
     why = std::string("ended by signal ") + strsignal(WTERMSIG(status)) + (why.empty() ? "" : ": " + why);
