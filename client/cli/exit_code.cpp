@@ -49,6 +49,8 @@ ExitCode complain(const client::CallFailure& failure) {
   Error error = failure.error;
   if (failure.rpc && failure.rpc->op)
     error.where = "operation " + std::to_string(*failure.rpc->op) + (error.where.empty() ? "" : ": " + error.where);
+  if (failure.rpc && failure.rpc->revision)
+    error.message += " (the scene is at revision " + std::to_string(*failure.rpc->revision) + ")";
   return complain(error);
 }
 

@@ -212,10 +212,21 @@ bool ServerProcess::running() {
   return waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == 0;
 }
 
+bool ServerProcess::endsWithin(std::chrono::milliseconds wait) {
+  const auto deadline = Clock::now() + wait;
+  while (running() && Clock::now() < deadline) {
+    readPipes(5ms);
+    std::this_thread::sleep_for(5ms);
+  }
+  return !running();
+}
+
 Error ServerProcess::epitaph() {
   stop(0ms);
   const int status = wait_status_.value_or(0);
   std::string why = !last_error_.empty() ? last_error_ : last_text_;
+  constexpr std::string_view kItsName = "radiosityd: ";  // it may have named itself already
+  if (why.starts_with(kItsName)) why.erase(0, kItsName.size());
   ErrorCode code = ErrorCode::kUnavailable;
   if (WIFSIGNALED(status)) {
     why = std::string("ended by signal ") + strsignal(WTERMSIG(status)) + (why.empty() ? "" : ": " + why);
@@ -229,8 +240,7 @@ Error ServerProcess::epitaph() {
 void ServerProcess::stop(std::chrono::milliseconds grace) {
   if (pid_ < 0 || wait_status_) return;
   if (running()) kill(pid_, SIGTERM);
-  const auto deadline = Clock::now() + grace;
-  while (running() && Clock::now() < deadline) readPipes(5ms);
+  (void)endsWithin(grace);
   kill(-pid_, SIGKILL);
   int status = 0;
   while (waitpid(pid_, &status, 0) < 0 && errno == EINTR) {

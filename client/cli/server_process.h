@@ -54,6 +54,8 @@ class ServerProcess {
 
   /// False once it has ended.
   [[nodiscard]] bool running();
+  /// Waits for its end, at most so long; true once it has ended.
+  [[nodiscard]] bool endsWithin(std::chrono::milliseconds wait);
   /// Why it ended: its last error line, and its status or signal.
   [[nodiscard]] Error epitaph();
 

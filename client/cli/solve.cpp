@@ -23,6 +23,7 @@ using client::CallResult;
 constexpr auto kStatusInterval = 250ms;
 constexpr auto kStopGrace = 5000ms;
 constexpr auto kInterruptGrace = 500ms;
+constexpr auto kEndGrace = 300ms;  // a dying process closes its sockets before it can be waited for
 
 struct SolveOptions {
   std::string scene, output, report, png;
@@ -224,7 +225,7 @@ class Solve {
   /// A connection that broke because our own server ended is explained by the server's last words.
   ExitCode complainOf(const CallFailure& failure) {
     display_.clear();
-    if (server_ && !failure.rpc && !interrupted() && !server_->running()) {
+    if (server_ && !failure.rpc && !interrupted() && server_->endsWithin(kEndGrace)) {
       passOnLog();
       return complain(server_->epitaph());
     }

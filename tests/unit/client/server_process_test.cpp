@@ -64,7 +64,8 @@ TEST(ServerProcess, handsOverWhyItDidNotStart) {
   EXPECT_EQ(no_driver.error().code, ErrorCode::kUnavailable);
   EXPECT_EQ(no_driver.error().text(), "radiosityd: no EGL driver");
 
-  const auto bad_scene = ServerProcess::start(script(folder, "echo 'room.gltf: /buffers/0: cut off' >&2; exit 2"));
+  const auto bad_scene =
+      ServerProcess::start(script(folder, "echo 'radiosityd: room.gltf: /buffers/0: cut off' >&2; exit 2"));
   ASSERT_FALSE(bad_scene);
   EXPECT_EQ(bad_scene.error().code, ErrorCode::kBadInput);
   EXPECT_EQ(bad_scene.error().text(), "radiosityd: room.gltf: /buffers/0: cut off");
