@@ -66,7 +66,7 @@ TEST(SolvedScene, CornellBoxIsWithinFivePercentOfThePathTracer) {
   nlohmann::json report;
   const auto lit = solve(test_scenes::cornell(), {"--error", "0.02", "--time-limit", "30"}, &report);
   const auto reference =
-      makeReference(lit, {.texel_samples = 1024, .point_samples = 1024, .texels = 1500, .points = 1000});
+      makeReference(lit, {.texel_samples = 4096, .point_samples = 4096, .texels = 800, .points = 500});
   const auto accuracy = measure(lit, reference);
   RecordProperty("solver_error", std::to_string(accuracy.solver.solverRms()));
   RecordProperty("total_error", std::to_string(accuracy.total.solverRms()));
