@@ -40,7 +40,7 @@ struct FaceView {
   const auto shift_top = static_cast<float>((1.0 - 2.0 * up) / columns);
   const auto shift_side = static_cast<float>((1.0 - 2.0 * up) / (columns / 2.0) - 1.0);
   const float footprint = 4.0F / static_cast<float>(resolution * resolution) * std::exp2(2.0F * level_bias);
-  const auto& [origin, t, b, n] = axes;
+  const auto origin = axes.origin, t = axes.tangent, b = axes.bitangent, n = axes.normal;
   const auto side = [&](int face, glm::vec3 right, glm::vec3 depth) {
     return FaceView{{right + shift_x * depth, footprint},
                     {2.0F * n + shift_side * depth, static_cast<float>(face)},
