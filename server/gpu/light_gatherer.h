@@ -31,36 +31,47 @@ class LightGatherer {
     std::uint32_t node, triangle;
     glm::vec2 texel;  ///< corner of the leaf when full, else the point itself
     bool full;
+  };
+  /// Receivers of one side of a surface; they lie together.
+  struct Group {
+    std::uint32_t surface;
+    std::size_t first, count;
     float side;  ///< +1 front, -1 back
   };
   struct Plane {
     glm::vec3 normal;
     float distance;
   };
-  /// Receivers that the polygon faces and that face it, with what the points found so far.
+  /// Receivers that the polygon faces and that face it, with what the points found so far in either half.
   struct Lit {
-    std::vector<float> x, y, z, nx, ny, nz;
-    std::vector<float> weight, visible_weight, visible;
-    std::vector<double> form_factor;
+    std::vector<float> x, y, z, nx, ny, nz, form_factor;
     std::vector<std::uint32_t> receiver;
-    std::vector<std::uint32_t> pixel;
+    std::array<std::vector<float>, 2> weight, visible_weight, visible;
+    std::vector<float> point_weight;   ///< of the point being tested
+    std::vector<std::uint32_t> pixel;  ///< in which it sees the receiver
+
+    void resize(std::size_t count);
   };
 
   void findLit(const solver::GatherShot& shot);
+  void findLitGroup(const solver::GatherShot& shot, const Group& group);
+  [[nodiscard]] bool behind(const solver::GatherShot& shot, const scene::Surface& surface) const;
   void testPoint(const solver::GatherShot& shot, const solver::HemicubeFrame& point,
-                 std::span<const std::uint32_t> items);
+                 std::span<const std::uint32_t> items, std::size_t half);
   void weighLost(const solver::HemicubeFrame& point, std::span<const std::uint32_t> items,
                  const HemicubeWeights& weights, std::uint64_t& escaped, std::uint64_t& absorbed);
-  void deliver(const solver::GatherShot& shot, double flux_scale, const FluxSink& sink,
-               solver::TransportCounters& counters) const;
+  void deliver(const solver::GatherShot& shot, std::size_t half, std::size_t points, double share, double flux_scale,
+               const FluxSink& sink, solver::TransportCounters& counters) const;
 
   std::shared_ptr<const scene::PatchScene> patches_;
   std::vector<Receiver> receivers_;
+  std::vector<Group> groups_;
   std::vector<Plane> planes_;                 ///< by triangle
   std::vector<std::array<bool, 2>> absorbs_;  ///< by triangle: front, back
   solver::GatherShot lit_for_;                ///< what lit_ was made for
   bool lit_valid_ = false;
   Lit lit_;
+  std::size_t lit_count_ = 0;
   std::vector<std::uint32_t> starts_;
 };
 

@@ -12,7 +12,7 @@ namespace {
 
 /// A convex polygon clipped by one plane has at most one corner more.
 struct Polygon {
-  std::array<glm::dvec3, 5> corner;
+  std::array<glm::dvec3, 9> corner;
   std::size_t count = 0;
 };
 
@@ -34,7 +34,7 @@ Polygon clipToHorizon(const glm::dvec3& point, const glm::dvec3& normal, std::sp
 }  // namespace
 
 double polygonFormFactor(const glm::dvec3& point, const glm::dvec3& normal, std::span<const glm::vec3> corners) {
-  RAD_CHECK_LE(corners.size(), std::size_t{4});
+  RAD_CHECK_LE(corners.size(), std::size_t{8});
   const auto polygon = clipToHorizon(point, normal, corners);
   if (polygon.count < 3) return 0.0;
   double sum = 0.0;

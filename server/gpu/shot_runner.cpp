@@ -27,10 +27,10 @@ Result<void> checkShots(const ShotSpan& shots) {
     const auto& shot = shots.gather[i];
     const bool points_fit =
         shot.point_count <= shots.points.size() && shot.first_point <= shots.points.size() - shot.point_count;
-    if (!goodResolution(shot.resolution) || shot.half > 1 || shot.corner_count < 3 || shot.corner_count > 4 ||
-        !points_fit) {
+    if (!goodResolution(shot.resolution) || shot.half > solver::kBothHalves || shot.corner_count < 3 ||
+        shot.corner_count > solver::kMaxCorners || !points_fit) {
       return fail(ErrorCode::kInternal,
-                  "resolution must be even and 4..2048, half 0 or 1, 3 or 4 corners, points inside the batch",
+                  "resolution must be even and 4..2048, half 0, 1 or both, 3 to 8 corners, points inside the batch",
                   "gather shot " + std::to_string(i));
     }
     for (const auto& point : shots.points.subspan(shot.first_point, shot.point_count)) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <span>
 
@@ -102,27 +103,31 @@ double meanReflectance(const RadiosityState& state) {
 
 ErrorParts estimateError(const RadiosityState& state, double owed) {
   Sums sums;
-  double unshot = owed;
+  double unshot = owed, varying = 0.0;
   for (const auto& side : state.sides()) {
     addSide(state, side, sums);
-    unshot += side.unshot_power;
+    const glm::vec3 net = glm::abs(state.nodeFlux(side.first_node + side.node_count - 1));
+    unshot += static_cast<double>(net.x + net.y + net.z);
+    varying += std::max(0.0, side.unshot_power - static_cast<double>(net.x + net.y + net.z));
   }
   ErrorParts parts;
   if (sums.square <= 0.0) {
-    parts.residual = unshot > 0.0 ? 1.0 : 0.0;  // nothing received: all or nothing is missing
+    parts.residual = unshot + varying > 0.0 ? 1.0 : 0.0;  // nothing received: all or nothing is missing
     parts.total = parts.residual;
     return parts;
   }
   parts.sampling = std::sqrt(sums.spread / sums.square);
-  parts.residual = unshot / (1.0 - meanReflectance(state)) / std::max(receivedFlux(state), 1e-300);
+  // Net unshot light is multiplied by its further bounces; what only varies inside nodes cancels after the first.
+  parts.residual = (unshot / (1.0 - meanReflectance(state)) + varying) / std::max(receivedFlux(state), 1e-300);
   if (sums.bent_square > 0.0) parts.discretization = std::sqrt(std::max(0.0, sums.bent) / sums.bent_square) / 3.0;
   parts.total = std::hypot(parts.residual, parts.sampling);
   return parts;
 }
 
-EnergyParts energyBalance(const RadiosityState& state, const std::array<double, 3>& planner_imbalance,
+EnergyParts energyBalance(const RadiosityState& state, const std::array<double, 3>& shot,
                           const std::array<double, 3>& gather_emitted) {
   EnergyParts parts;
+  std::array<double, 3> received{};
   const double quantum = 1.0 / (state.fluxScale() * static_cast<double>(state.rounds()));
   const double rounds = static_cast<double>(state.rounds());
   for (const auto& side : state.sides()) {
@@ -131,6 +136,7 @@ EnergyParts energyBalance(const RadiosityState& state, const std::array<double, 
       if (area <= 0.0) continue;
       for (int c = 0; c < 3; ++c) {
         const auto i = static_cast<std::size_t>(c);
+        received[i] += area * static_cast<double>(state.irradiance(side, leaf)[c]);
         parts.emitted[i] += area * static_cast<double>(state.emission(side, leaf)[c]);
         parts.absorbed[i] += area * (1.0 - static_cast<double>(state.reflectance(side, leaf)[c])) *
                              static_cast<double>(state.irradiance(side, leaf)[c]);
@@ -143,9 +149,7 @@ EnergyParts energyBalance(const RadiosityState& state, const std::array<double, 
     parts.unshot[i] -= gather_emitted[i] / rounds;
     parts.escaped[i] = static_cast<double>(state.escaped()[i]) * quantum;
     parts.backface[i] = static_cast<double>(state.backface()[i]) * quantum;
-    const double gathered = static_cast<double>(state.gathered()[i]) * quantum;
-    const double left = static_cast<double>(state.gatherLost()[i]) * quantum;
-    parts.imbalance[i] = planner_imbalance[i] / rounds + gather_emitted[i] / rounds - gathered - left;
+    parts.imbalance[i] = (shot[i] + gather_emitted[i]) / rounds - received[i] - parts.escaped[i] - parts.backface[i];
   }
   return parts;
 }

@@ -27,7 +27,7 @@ struct EnergyParts {
 
 /// Needs pushPullAll(). `owed`: flux that light polygons have yet to deliver, all channels, over all rounds.
 [[nodiscard]] ErrorParts estimateError(const RadiosityState& state, double owed);
-[[nodiscard]] EnergyParts energyBalance(const RadiosityState& state, const std::array<double, 3>& planner_imbalance,
+[[nodiscard]] EnergyParts energyBalance(const RadiosityState& state, const std::array<double, 3>& shot,
                                         const std::array<double, 3>& gather_emitted);
 
 /// Mean reflectance weighted by received flux, at most 0.999: each unit of unshot flux becomes 1 / (1 - this) in all.

@@ -66,7 +66,7 @@ void addPolygons(const RadiosityState& state, const Side& side, const glm::vec3&
     const glm::vec3 normal = patches.triangles[triangle].normal;
     const auto corners = triangleCorners(patches, triangle);
     LightPolygon light;
-    light.corners = {corners[0], corners[1], corners[2], corners[2]};
+    std::copy(corners.begin(), corners.end(), light.corners.begin());
     light.key = 2 * triangle + side.side;
     for (std::uint32_t k = i + 1; k < surface.triangle_count && light.corner_count == 3; ++k) {
       if (used[k]) continue;

@@ -16,6 +16,8 @@ namespace {
 
 /// Nodes weaker than this part of a shot's share play Russian roulette: they shoot a full part, or nothing.
 constexpr double kRouletteShare = 0.25;
+/// Nodes of less than this part of a share may shoot as a polygon though a part of it is empty or buried.
+constexpr double kPartialShare = 0.05;
 
 /// A leaf of `side` under a node chosen with probability proportional to its unshot power, by warping the point (u, v)
 /// down the quadtree, which keeps its stratification. On return (u, v) are uniform in [0, 1)^2 again.
@@ -25,7 +27,7 @@ std::uint32_t warpToLeaf(const RadiosityState& state, const Side& side, std::uin
     const auto grid = scene::levelGrid(side.width, side.height, level - 1);
     const auto power = [&](std::uint32_t cx, std::uint32_t cy) {
       if (cx >= grid.width || cy >= grid.height) return 0.0;
-      return static_cast<double>(state.nodePower(side.first_node + grid.offset + cy * grid.width + cx));
+      return static_cast<double>(state.nodeRough(side.first_node + grid.offset + cy * grid.width + cx));
     };
     const double p00 = power(2 * x, 2 * y), p10 = power(2 * x + 1, 2 * y);
     const double p01 = power(2 * x, 2 * y + 1), p11 = power(2 * x + 1, 2 * y + 1);
@@ -84,6 +86,8 @@ void Planner::addShot(const RadiosityState& state, const Side& side, const Node&
   const auto& triangle = patches.triangles[place.triangle];
   const glm::vec2 texel =
       place.full ? glm::vec2(glm::dvec2(leaf % side.width, leaf / side.width) + glm::dvec2(u, v)) : place.texel;
+  const auto grid = scene::levelGrid(side.width, side.height, node.level);
+  const auto rough = static_cast<double>(state.nodeRough(side.first_node + grid.offset + node.y * grid.width + node.x));
   ScatterShot shot;
   shot.frame = frameAt(triangle.origin + texel.x * triangle.du + texel.y * triangle.dv,
                        side.side == 0 ? triangle.normal : -triangle.normal, point.z,
@@ -92,11 +96,88 @@ void Planner::addShot(const RadiosityState& state, const Side& side, const Node&
   shot.level_bias = settings_.level_bias + static_cast<float>(point.w);
   shot.half = half;
   for (int c = 0; c < 3; ++c) {
-    const double flux = 0.5 * weight * node.power * unshot[c] / sum;
+    const double flux = 0.5 * weight * rough * unshot[c] / sum;
     shot.flux[static_cast<std::size_t>(c)] = flux;
-    imbalance_[static_cast<std::size_t>(c)] -= flux;
   }
   batch.scatter.push_back(shot);
+}
+
+bool Planner::isWhole(const RadiosityState& state, const Side& side, const Node& node) const {
+  const auto& surface = state.patches().surfaces[side.surface];
+  const auto polygon = outlines_.node(side.surface, node.level, node.x, node.y);
+  const auto grid = scene::levelGrid(side.width, side.height, node.level);
+  const auto area =
+      static_cast<double>(state.patches().node_area[side.first_node + grid.offset + node.y * grid.width + node.x]);
+  const double whole = polygon.area() * static_cast<double>(surface.texel_area);
+  return std::abs(area - whole) <= 2e-3 * whole;
+}
+
+bool Planner::mustSplit(const RadiosityState& state, const Side& side, const Node& node) const {
+  if (node.level == 0) return false;
+  if (node.power > share_) return true;
+  if (!canGather(state, side)) return false;
+  // A node that is partly empty or buried is no polygon, until it is too weak for that to be seen.
+  if (node.power > kPartialShare * share_ && !isWhole(state, side, node)) return true;
+  const auto grid = scene::levelGrid(side.width, side.height, node.level);
+  const std::uint32_t id = side.first_node + grid.offset + node.y * grid.width + node.x;
+  const glm::vec3 flux = glm::abs(state.nodeFlux(id));
+  const auto net = static_cast<double>(flux.x + flux.y + flux.z);
+  // What varies inside the node would be blurred: worth a split when it weighs as much as a weak shot of its own.
+  return node.power - net > settings_.variation_share * share_;
+}
+
+bool Planner::isSpent(const RadiosityState& state, const Side& side, const Node& node) const {
+  if (!canGather(state, side)) return false;
+  const auto grid = scene::levelGrid(side.width, side.height, node.level);
+  const glm::vec3 flux = glm::abs(state.nodeFlux(side.first_node + grid.offset + node.y * grid.width + node.x));
+  return static_cast<double>(flux.x + flux.y + flux.z) < 0.1 * node.power;
+}
+
+glm::dvec2 Planner::openPoint(const RadiosityState& state, const Side& side, const Node& node, double u, double v) {
+  const std::uint32_t leaf = warpToLeaf(state, side, node.level, node.x, node.y, u, v);
+  const auto& place = state.patches().leaves[state.patches().surfaces[side.surface].first_leaf + leaf];
+  return place.full ? glm::dvec2(leaf % side.width, leaf / side.width) + glm::dvec2(u, v) : glm::dvec2(place.texel);
+}
+
+void Planner::addNodeGather(const RadiosityState& state, const Side& side, const Node& node, double weight,
+                            std::uint64_t node_key, ShotBatch& batch) {
+  const auto& patches = state.patches();
+  const auto& surface = patches.surfaces[side.surface];
+  const auto& frame = patches.triangles[surface.first_triangle];
+  const auto grid = scene::levelGrid(side.width, side.height, node.level);
+  const std::uint32_t id = side.first_node + grid.offset + node.y * grid.width + node.x;
+  const bool whole = isWhole(state, side, node);
+  const auto polygon = outlines_.node(side.surface, node.level, node.x, node.y);
+  const auto at = [&](const glm::dvec2& texel) {
+    return frame.origin + static_cast<float>(texel.x) * frame.du + static_cast<float>(texel.y) * frame.dv;
+  };
+  GatherShot shot;
+  shot.normal = side.side == 0 ? frame.normal : -frame.normal;
+  shot.corner_count = polygon.count;
+  const bool turned = glm::dot(glm::cross(frame.du, frame.dv), shot.normal) < 0.0F;
+  for (std::uint32_t k = 0; k < polygon.count; ++k) {
+    shot.corners[turned ? polygon.count - 1 - k : k] = at(polygon.corner[k]);
+  }
+  const double area = polygon.area() * static_cast<double>(surface.texel_area);
+  if (polygon.count < 3 || area <= 0.0) return;
+  const auto node_area = static_cast<double>(patches.node_area[id]);
+  shot.fill = whole ? 1.0F : static_cast<float>(std::min(1.0, node_area / area));
+  const glm::dvec3 radiosity = glm::dvec3(state.nodeFlux(id)) * (weight / (area * static_cast<double>(shot.fill)));
+  for (int c = 0; c < 3; ++c) shot.radiosity[static_cast<std::size_t>(c)] = radiosity[c];
+  shot.resolution = settings_.node_resolution;
+  shot.half = kBothHalves;
+  shot.first_point = static_cast<std::uint32_t>(batch.points.size());
+  shot.point_count = 2;
+  const std::uint32_t visit = 8 * (state.rounds() - 1) + std::min(wave_, 7U);
+  const glm::dvec4 jitter = sobol4(visit, mixKeys(node_key, 2));
+  shot.receiver_jitter = glm::vec2(jitter.x, jitter.y);
+  for (std::uint32_t p = 0; p < 2; ++p) {
+    const glm::dvec4 sample = sobol4(2 * visit + p, node_key);
+    const glm::dvec2 texel =
+        whole ? polygon.point(sample.x, sample.y) : openPoint(state, side, node, sample.x, sample.y);
+    batch.points.push_back(frameAt(at(texel), shot.normal, sample.z, mixKeys(node_key, shots_planned_ * 2 + p)));
+  }
+  batch.gather.push_back(shot);
 }
 
 void Planner::shoot(RadiosityState& state, Side& side, const Node& node, ShotBatch& batch) {
@@ -104,16 +185,23 @@ void Planner::shoot(RadiosityState& state, Side& side, const Node& node, ShotBat
   const std::uint64_t node_key = mixKeys(mixKeys(settings_.seed, side.first_node), place);
   const double floor = kRouletteShare * share_;
   const double chance = std::min(1.0, node.power / floor);
+  const bool gather = canGather(state, side);
   ++shots_planned_;
   if (chance >= 1.0 || uniformFromKey(mixKeys(node_key, shots_planned_)) < chance) {
-    for (std::uint32_t half = 0; half < 2; ++half) addShot(state, side, node, 1.0 / chance, half, node_key, batch);
+    if (gather) {
+      addNodeGather(state, side, node, 1.0 / chance, node_key, batch);
+      ++counters_.gathered_nodes;
+    } else {
+      for (std::uint32_t half = 0; half < 2; ++half) addShot(state, side, node, 1.0 / chance, half, node_key, batch);
+    }
     ++counters_.shooters;
     if (node.level > 0) ++counters_.whole_subtrees;
   } else {
     ++counters_.roulette_kills;
   }
-  const glm::dvec3 shot = state.markShot(side, node.level, node.x, node.y);
-  for (int c = 0; c < 3; ++c) imbalance_[static_cast<std::size_t>(c)] += shot[c];
+  const glm::dvec3 shot =
+      gather ? state.markMeanShot(side, node.level, node.x, node.y) : state.markShot(side, node.level, node.x, node.y);
+  for (int c = 0; c < 3; ++c) intended_[static_cast<std::size_t>(c)] += shot[c];
 }
 
 ShotBatch Planner::scatterWave(RadiosityState& state, double remainder) {
@@ -131,7 +219,8 @@ ShotBatch Planner::scatterWave(RadiosityState& state, double remainder) {
     total += sides[s].unshot_power;
     if (sides[s].unshot_power > 0.0) queue.push({sides[s].unshot_power, s, sides[s].level_count - 1, 0, 0});
   }
-  while (!queue.empty() && batch.scatter.size() < 2 * std::size_t{settings_.pairs_a_wave} && total > remainder) {
+  while (!queue.empty() && batch.scatter.size() / 2 + batch.gather.size() < settings_.pairs_a_wave &&
+         total > remainder) {
     const Node node = queue.top();
     queue.pop();
     Side& side = sides[node.side];
@@ -142,7 +231,7 @@ ShotBatch Planner::scatterWave(RadiosityState& state, double remainder) {
       if (side.unshot_power > 0.0) queue.push({side.unshot_power, node.side, node.level, 0, 0});
       continue;
     }
-    if (node.power > share_ && node.level > 0) {
+    if (mustSplit(state, side, node)) {
       const auto grid = scene::levelGrid(side.width, side.height, node.level - 1);
       for (std::uint32_t y = 2 * node.y; y < std::min(2 * node.y + 2, grid.height); ++y) {
         for (std::uint32_t x = 2 * node.x; x < std::min(2 * node.x + 2, grid.width); ++x) {
@@ -153,9 +242,10 @@ ShotBatch Planner::scatterWave(RadiosityState& state, double remainder) {
       continue;
     }
     total -= node.power;
-    shoot(state, side, node, batch);
+    if (!isSpent(state, side, node)) shoot(state, side, node, batch);
   }
   ++wave_;
+  exhausted_ = queue.empty() || total <= remainder;
   return batch;
 }
 
@@ -166,7 +256,7 @@ void Planner::addGatherShot(const LightPolygon& light, std::uint32_t rounds, std
   const glm::dvec4 jitter = sobol4(index, mixKeys(key, 1));
   const glm::dvec3 radiosity = light.undelivered(rounds) / (2.0 * shots);
   GatherShot shot;
-  shot.corners = light.corners;
+  std::copy(light.corners.begin(), light.corners.end(), shot.corners.begin());
   shot.corner_count = light.corner_count;
   shot.normal = light.normal;
   for (int c = 0; c < 3; ++c) shot.radiosity[static_cast<std::size_t>(c)] = radiosity[c];

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "server/solver/lights.h"
+#include "server/solver/outlines.h"
 #include "server/solver/state.h"
 #include "server/solver/transport.h"
 
@@ -23,7 +24,10 @@ struct PlannerSettings {
   std::uint32_t shooters_a_round = 256;  ///< a round's power is divided into about this many shots
   std::uint32_t resolution = 64;         ///< N of a hemicube that carries a full share of power
   std::uint32_t light_resolution = 128;  ///< N of the item buffers of gathered light
+  std::uint32_t node_resolution = 64;    ///< N of the item buffers of gathered nodes
+  bool gather_nodes = true;              ///< nodes of planar surfaces are gathered as polygons; false: all is scattered
   std::uint32_t light_points = 16;       ///< points on lights in a round and half, shared by power
+  double variation_share = 0.25;         ///< split a node whose inner variation weighs this part of a share
   float level_bias = 0.0F;               ///< positive: coarser links
 };
 
@@ -31,12 +35,13 @@ struct PlannerSettings {
 struct PlannerCounters {
   std::uint64_t shooters = 0, push_pulls = 0;
   std::uint64_t roulette_kills = 0;  ///< weak nodes whose light another node carried in the mean
+  std::uint64_t gathered_nodes = 0;  ///< of the shooters, those gathered as polygons
   std::uint64_t whole_subtrees = 0;  ///< nodes above leaf level shot as one
 };
 
 class Planner {
  public:
-  explicit Planner(PlannerSettings settings) : settings_(settings) {}
+  Planner(const scene::PatchScene& patches, PlannerSettings settings) : settings_(settings), outlines_(patches) {}
 
   /// A round begins with `power` to shoot: sets the share of one shot.
   void startRound(double power) {
@@ -52,9 +57,12 @@ class Planner {
   /// delivered.
   [[nodiscard]] ShotBatch gatherRound(const RadiosityState& state, std::vector<LightPolygon>& lights);
 
-  /// Flux that shooters stood for minus flux that was shot, per channel, lux unit^2: what roulette and choosing one
-  /// point of a coloured node leave out or add. Zero in the mean; kept so that the energy balance closes exactly.
-  [[nodiscard]] const std::array<double, 3>& imbalance() const { return imbalance_; }
+  /// Flux that the shooters so far stood for, per channel, lux unit^2. What was delivered differs by chance (roulette,
+  /// one point of a coloured node, visibility from few points); the balance of energy shows by how much.
+  [[nodiscard]] const std::array<double, 3>& intended() const { return intended_; }
+
+  /// The last wave found nothing left worth shooting (a wave can be empty because roulette killed all it chose).
+  [[nodiscard]] bool exhausted() const { return exhausted_; }
 
   [[nodiscard]] const PlannerCounters& counters() const { return counters_; }
   [[nodiscard]] PlannerSettings& settings() { return settings_; }
@@ -71,11 +79,27 @@ class Planner {
                      std::uint32_t points, ShotBatch& batch);
   [[nodiscard]] HemicubeFrame frameAt(const glm::vec3& origin, const glm::vec3& normal, double rotation,
                                       std::uint64_t key) const;
+  void addNodeGather(const RadiosityState& state, const Side& side, const Node& node, double weight,
+                     std::uint64_t node_key, ShotBatch& batch);
+  /// Nodes of planar surfaces shoot as polygons of their mean radiosity, gathered; others from one point, scattered.
+  [[nodiscard]] bool canGather(const RadiosityState& state, const Side& side) const {
+    return settings_.gather_nodes && state.patches().surfaces[side.surface].planar;
+  }
+  /// A point (texel coordinates) of the part of the node that is covered and not buried, chosen by unshot power.
+  [[nodiscard]] static glm::dvec2 openPoint(const RadiosityState& state, const Side& side, const Node& node, double u,
+                                            double v);
+  /// All of the node's polygon is covered and not buried.
+  [[nodiscard]] bool isWhole(const RadiosityState& state, const Side& side, const Node& node) const;
+  [[nodiscard]] bool mustSplit(const RadiosityState& state, const Side& side, const Node& node) const;
+  /// Only what varies inside the node is left, and too little to split it: nothing to shoot in this round.
+  [[nodiscard]] bool isSpent(const RadiosityState& state, const Side& side, const Node& node) const;
   [[nodiscard]] std::uint32_t resolutionFor(double power) const;
 
   PlannerSettings settings_;
+  Outlines outlines_;
   PlannerCounters counters_;
-  std::array<double, 3> imbalance_{};
+  std::array<double, 3> intended_{};
+  bool exhausted_ = false;
   double share_ = 0.0;      // power of one shot in this round
   std::uint32_t wave_ = 0;  // of this round
   std::uint64_t shots_planned_ = 0;

@@ -17,6 +17,7 @@ PlannerSettings plannerSettings(const SolverSettings& settings) {
   planner.seed = settings.seed;
   if (settings.paper_mode) {
     planner.mode = LinkMode::kPaperMipmap;
+    planner.gather_nodes = false;
     planner.level_bias = 1.0F;  // "a LOD bias of one, with filtering by a 3 by 3 Gaussian filter"
   }
   return planner;
@@ -42,7 +43,7 @@ Solver::Solver(std::shared_ptr<const scene::PatchScene> patches, const scene::Pa
     : state_(std::move(patches), materials),
       transport_(transport),
       settings_(settings),
-      planner_(plannerSettings(settings)) {
+      planner_(state_.patches(), plannerSettings(settings)) {
   if (!settings_.paper_mode) lights_ = findLightPolygons(state_);
   startRound();
   publish();
@@ -56,12 +57,17 @@ void Solver::startRound() {
     const auto rounds = static_cast<float>(state_.rounds());
     planner_.settings().level_bias = settings_.planner.level_bias - std::min(2.0F, 0.5F * std::log2(rounds));
   }
-  double power = 0.0;
-  for (const auto& side : state_.sides()) power += side.unshot_power;
-  planner_.startRound(power);
+  planner_.startRound(roundPower());
 }
 
-Result<void> Solver::run(const ShotBatch& batch, bool gathering) {
+/// What this round will shoot in all: in later rounds that is unshot already, in the first it is still to be reflected.
+double Solver::roundPower() const {
+  double power = 0.0;
+  for (const auto& side : state_.sides()) power += side.unshot_power;
+  return live_ ? power / (1.0 - meanReflectance(state_)) : power;
+}
+
+Result<void> Solver::run(const ShotBatch& batch) {
   batch_.reset(state_.patches().nodeCount());
   const auto counters = transport_.run(batch, batch_);
   if (!counters) return tl::unexpected<Error>(counters.error());
@@ -69,7 +75,7 @@ Result<void> Solver::run(const ShotBatch& batch, bool gathering) {
   if (settings_.paper_mode) {
     for (const auto& side : state_.sides()) state_.smoothUnpushed(batch_, side);
   }
-  state_.receive(batch_, gathering);
+  state_.receive(batch_);
   return {};
 }
 
@@ -84,12 +90,10 @@ Result<StepOutcome> Solver::gatherDirect() {
     for (int c = 0; c < 3; ++c) gather_emitted_[static_cast<std::size_t>(c)] += light.area * owed[c];
   }
   const ShotBatch batch = planner_.gatherRound(state_, lights_);
-  if (const auto done = run(batch, true); !done) return tl::unexpected<Error>(done.error());
+  if (const auto done = run(batch); !done) return tl::unexpected<Error>(done.error());
   phase_ = Phase::kIndirect;
   state_.pushPullAll();
-  double power = 0.0;
-  for (const auto& side : state_.sides()) power += side.unshot_power;
-  planner_.startRound(power);
+  planner_.startRound(roundPower());
   if (live_) publish();
   return StepOutcome::kShot;
 }
@@ -113,8 +117,8 @@ double Solver::remainder() const {
 
 Result<StepOutcome> Solver::scatterIndirect() {
   const ShotBatch batch = planner_.scatterWave(state_, remainder());
-  if (batch.scatter.empty()) return finishRound();
-  if (const auto done = run(batch, false); !done) return tl::unexpected<Error>(done.error());
+  if (batch.scatter.empty() && batch.gather.empty() && planner_.exhausted()) return finishRound();
+  if (const auto done = run(batch); !done) return tl::unexpected<Error>(done.error());
   if (live_) publish();
   return StepOutcome::kShot;
 }
@@ -167,6 +171,6 @@ void Solver::setMaterials(const scene::PatchMaterials& materials) {
   error_ = estimateError(state_, owedPower());
 }
 
-EnergyParts Solver::energy() const { return energyBalance(state_, planner_.imbalance(), gather_emitted_); }
+EnergyParts Solver::energy() const { return energyBalance(state_, planner_.intended(), gather_emitted_); }
 
 }  // namespace radiosity::solver

@@ -66,10 +66,11 @@ class Solver {
   [[nodiscard]] Result<StepOutcome> gatherDirect();
   [[nodiscard]] Result<StepOutcome> scatterIndirect();
   [[nodiscard]] StepOutcome finishRound();
-  [[nodiscard]] Result<void> run(const ShotBatch& batch, bool gathering);
+  [[nodiscard]] Result<void> run(const ShotBatch& batch);
   void startRound();
   void publish();
   [[nodiscard]] double owedPower() const;
+  [[nodiscard]] double roundPower() const;
   [[nodiscard]] double remainder() const;
 
   RadiosityState state_;

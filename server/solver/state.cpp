@@ -34,7 +34,8 @@ RadiosityState::RadiosityState(std::shared_ptr<const scene::PatchScene> patches,
   shot_.assign(values, glm::vec3(0.0F));
   irradiance_.assign(values, glm::vec3(0.0F));
   unshot_.assign(values, glm::vec3(0.0F));
-  node_power_.assign(patches_->nodeCount(), 0.0F);
+  node_rough_.assign(patches_->nodeCount(), 0.0F);
+  node_flux_.assign(patches_->nodeCount(), glm::vec3(0.0F));
   for (auto& half : received_) half.assign(patches_->nodeCount(), Flux3{});
   setMaterials(materials);
   chooseFluxScale();
@@ -91,7 +92,7 @@ void RadiosityState::startRound() {
   }
 }
 
-void RadiosityState::receive(const FluxAccumulators& batch, bool gathering) {
+void RadiosityState::receive(const FluxAccumulators& batch) {
   for (auto& side : sides_) {
     double arrived = 0.0;
     for (std::size_t half = 0; half < 2; ++half) {
@@ -128,10 +129,6 @@ void RadiosityState::receive(const FluxAccumulators& batch, bool gathering) {
   addTo(backface_, batch.backface);
   addTo(gathered_, batch.gathered);
   addTo(scattered_, batch.scattered);
-  if (gathering) {
-    addTo(gather_lost_, batch.escaped);
-    addTo(gather_lost_, batch.backface);
-  }
 }
 
 glm::vec3 RadiosityState::scatterRadiosity(const Side& side, std::uint32_t leaf) const {
@@ -181,27 +178,49 @@ void RadiosityState::pushPull(Side& side) {
   side.dirty = false;
 }
 
-void RadiosityState::pull(Side& side) {
-  for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
-    node_power_[side.first_node + leaf] = channelSum(unshot_[side.first_value + leaf]) * leafArea(side, leaf);
+float RadiosityState::nodePower(std::uint32_t node) const {
+  // Light that only differs between the leaves of a node cancels at a distance. What part of it still counts was chosen
+  // by measurement: less leaves corners blurred, more spends shots on noise.
+  constexpr float kVariationWorth = 0.1F;
+  const float net = channelSum(node_flux_[node]);
+  return net + kVariationWorth * std::max(0.0F, node_rough_[node] - net);
+}
+
+void RadiosityState::pullNode(const Side& side, std::uint32_t level, std::uint32_t x, std::uint32_t y) {
+  const auto grid = scene::levelGrid(side.width, side.height, level);
+  const std::uint32_t node = side.first_node + grid.offset + y * grid.width + x;
+  if (level == 0) {
+    node_flux_[node] = unshot_[side.first_value + y * side.width + x] * patches_->node_area[node];
+    node_rough_[node] = channelSum(node_flux_[node]);
+    return;
   }
-  for (std::uint32_t level = 1; level < side.level_count; ++level) {
-    const auto grid = scene::levelGrid(side.width, side.height, level);
-    const auto child = scene::levelGrid(side.width, side.height, level - 1);
-    for (std::uint32_t y = 0; y < grid.height; ++y) {
-      for (std::uint32_t x = 0; x < grid.width; ++x) {
-        float sum = 0.0F;
-        for (std::uint32_t cy = 2 * y; cy < std::min(2 * y + 2, child.height); ++cy) {
-          for (std::uint32_t cx = 2 * x; cx < std::min(2 * x + 2, child.width); ++cx) {
-            sum += node_power_[side.first_node + child.offset + cy * child.width + cx];
-          }
-        }
-        node_power_[side.first_node + grid.offset + y * grid.width + x] = sum;
-      }
+  const auto child = scene::levelGrid(side.width, side.height, level - 1);
+  glm::vec3 flux(0.0F);
+  float rough = 0.0F;
+  for (std::uint32_t cy = 2 * y; cy < std::min(2 * y + 2, child.height); ++cy) {
+    for (std::uint32_t cx = 2 * x; cx < std::min(2 * x + 2, child.width); ++cx) {
+      const std::uint32_t below = side.first_node + child.offset + cy * child.width + cx;
+      flux += node_flux_[below];
+      rough += node_rough_[below];
     }
   }
-  const auto root = scene::levelGrid(side.width, side.height, side.level_count - 1);
-  side.unshot_power = static_cast<double>(node_power_[side.first_node + root.offset]);
+  node_flux_[node] = flux;
+  node_rough_[node] = rough;
+}
+
+void RadiosityState::pull(Side& side) { pullAround(side, side.level_count - 1, 0, 0); }
+
+/// Recomputes the subtree of a node, and its ancestors.
+void RadiosityState::pullAround(Side& side, std::uint32_t level, std::uint32_t x, std::uint32_t y) {
+  for (std::uint32_t l = 0; l <= level; ++l) {
+    const auto grid = scene::levelGrid(side.width, side.height, l);
+    const std::uint32_t shift = level - l;
+    for (std::uint32_t ny = y << shift; ny < std::min((y + 1) << shift, grid.height); ++ny) {
+      for (std::uint32_t nx = x << shift; nx < std::min((x + 1) << shift, grid.width); ++nx) pullNode(side, l, nx, ny);
+    }
+  }
+  for (std::uint32_t l = level + 1; l < side.level_count; ++l) pullNode(side, l, x >> (l - level), y >> (l - level));
+  side.unshot_power = static_cast<double>(nodePower(side.first_node + side.node_count - 1));
 }
 
 void RadiosityState::pushPullAll() {
@@ -212,39 +231,35 @@ glm::dvec3 RadiosityState::markShot(Side& side, std::uint32_t level, std::uint32
   RAD_CHECK(!side.dirty);
   const auto rounds = static_cast<float>(rounds_);
   glm::dvec3 flux(0.0);
-  const std::uint32_t x_end = std::min((x + 1) << level, side.width);
-  const std::uint32_t y_end = std::min((y + 1) << level, side.height);
-  for (std::uint32_t ly = y << level; ly < y_end; ++ly) {
-    for (std::uint32_t lx = x << level; lx < x_end; ++lx) {
-      const std::uint32_t leaf = ly * side.width + lx;
+  for (std::uint32_t ly = y << level; ly < std::min((y + 1) << level, side.height); ++ly) {
+    for (std::uint32_t lx = x << level; lx < std::min((x + 1) << level, side.width); ++lx) {
+      const std::uint32_t leaf = ly * side.width + lx, v = side.first_value + leaf;
       if (leafArea(side, leaf) <= 0.0F) continue;
-      flux += glm::dvec3(unshot_[side.first_value + leaf]) * static_cast<double>(leafArea(side, leaf));
-      shot_[side.first_value + leaf] = rounds * scatterRadiosity(side, leaf);
-      unshot_[side.first_value + leaf] = glm::vec3(0.0F);
+      flux += glm::dvec3(unshot_[v]) * static_cast<double>(leafArea(side, leaf));
+      shot_[v] = rounds * scatterRadiosity(side, leaf);
+      unshot_[v] = glm::vec3(0.0F);
     }
   }
-  for (std::uint32_t l = 0; l <= level; ++l) {
-    const auto grid = scene::levelGrid(side.width, side.height, l);
-    const std::uint32_t shift = level - l;
-    for (std::uint32_t ny = y << shift; ny < std::min((y + 1) << shift, grid.height); ++ny) {
-      for (std::uint32_t nx = x << shift; nx < std::min((x + 1) << shift, grid.width); ++nx) {
-        node_power_[side.first_node + grid.offset + ny * grid.width + nx] = 0.0F;
-      }
+  pullAround(side, level, x, y);
+  return flux;
+}
+
+glm::dvec3 RadiosityState::markMeanShot(Side& side, std::uint32_t level, std::uint32_t x, std::uint32_t y) {
+  RAD_CHECK(!side.dirty);
+  const auto grid = scene::levelGrid(side.width, side.height, level);
+  const std::uint32_t node = side.first_node + grid.offset + y * grid.width + x;
+  const glm::vec3 mean = node_flux_[node] / patches_->node_area[node];
+  const auto rounds = static_cast<float>(rounds_);
+  glm::dvec3 flux(0.0);
+  for (std::uint32_t ly = y << level; ly < std::min((y + 1) << level, side.height); ++ly) {
+    for (std::uint32_t lx = x << level; lx < std::min((x + 1) << level, side.width); ++lx) {
+      const std::uint32_t leaf = ly * side.width + lx, v = side.first_value + leaf;
+      shot_[v] += mean;
+      flux += glm::dvec3(mean) * static_cast<double>(leafArea(side, leaf));
+      unshot_[v] = rounds * scatterRadiosity(side, leaf) - shot_[v];
     }
   }
-  for (std::uint32_t l = level + 1; l < side.level_count; ++l) {
-    const auto grid = scene::levelGrid(side.width, side.height, l);
-    const auto child = scene::levelGrid(side.width, side.height, l - 1);
-    const std::uint32_t px = x >> (l - level), py = y >> (l - level);
-    float sum = 0.0F;
-    for (std::uint32_t cy = 2 * py; cy < std::min(2 * py + 2, child.height); ++cy) {
-      for (std::uint32_t cx = 2 * px; cx < std::min(2 * px + 2, child.width); ++cx) {
-        sum += node_power_[side.first_node + child.offset + cy * child.width + cx];
-      }
-    }
-    node_power_[side.first_node + grid.offset + py * grid.width + px] = sum;
-  }
-  side.unshot_power = static_cast<double>(node_power_[side.first_node + side.node_count - 1]);
+  pullAround(side, level, x, y);
   return flux;
 }
 

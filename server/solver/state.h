@@ -56,8 +56,7 @@ class RadiosityState {
 
   /// Adds what a batch delivered. Flux that landed on a node without area (a sliver that only the rasteriser saw) goes
   /// to the nearest ancestor that has some, so none is lost.
-  /// A batch holds either gather shots or scatter shots, `gathering` says which.
-  void receive(const FluxAccumulators& batch, bool gathering);
+  void receive(const FluxAccumulators& batch);
 
   /// Push: irradiance of every leaf. Pull: unshot power of every node. No-op when clean.
   void pushPull(Side& side);
@@ -67,8 +66,12 @@ class RadiosityState {
   /// flux up to rounding, which is given to the centre. Used by the paper-faithful mode on what a batch delivered.
   void smoothUnpushed(FluxAccumulators& batch, const Side& side) const;
 
-  /// Sum of |unshot| area over the subtree, all channels. Valid after pushPull of the side.
-  [[nodiscard]] float nodePower(std::uint32_t node) const { return node_power_[node]; }
+  /// Sum of |unshot| area over the leaves of the subtree, all channels. Valid after pushPull of the side.
+  [[nodiscard]] float nodeRough(std::uint32_t node) const { return node_rough_[node]; }
+  /// Unshot flux of the subtree per channel, signed: what the node would shoot as one.
+  [[nodiscard]] const glm::vec3& nodeFlux(std::uint32_t node) const { return node_flux_[node]; }
+  /// What a node is worth shooting: its net flux, and a part of what varies inside it, which only matters near by.
+  [[nodiscard]] float nodePower(std::uint32_t node) const;
   [[nodiscard]] glm::vec3 unshot(const Side& side, std::uint32_t leaf) const {
     return unshot_[side.first_value + leaf];
   }
@@ -76,9 +79,13 @@ class RadiosityState {
     return irradiance_[side.first_value + leaf];
   }
 
-  /// The leaves under a node are as good as shot: S becomes rounds B' there. Keeps power pyramids right. Returns the
+  /// The leaves under a node are as good as shot: S becomes rounds B' there. Keeps the pyramids right. Returns the
   /// flux, per channel, that was unshot there.
   glm::dvec3 markShot(Side& side, std::uint32_t level, std::uint32_t x, std::uint32_t y);
+
+  /// The node has shot its mean: S grows by the mean of what was unshot; how leaves differ from it stays unshot,
+  /// signed. Returns the flux shot, per channel.
+  glm::dvec3 markMeanShot(Side& side, std::uint32_t level, std::uint32_t x, std::uint32_t y);
 
   /// Irradiance (lux) by node id for level 0; other levels are 0. Needs pushPullAll().
   [[nodiscard]] std::vector<glm::vec3> nodeIrradiance() const;
@@ -101,13 +108,13 @@ class RadiosityState {
   /// Flux of the gather shots that reached leaves, summed over all rounds.
   [[nodiscard]] const Flux3& gathered() const { return gathered_; }
   [[nodiscard]] const Flux3& scattered() const { return scattered_; }
-  /// Flux of the gather shots that left or fell on unlit sides; part of escaped() and backface().
-  [[nodiscard]] const Flux3& gatherLost() const { return gather_lost_; }
 
  private:
   void makeSides();
   void chooseFluxScale();
   void pull(Side& side);
+  void pullNode(const Side& side, std::uint32_t level, std::uint32_t x, std::uint32_t y);
+  void pullAround(Side& side, std::uint32_t level, std::uint32_t x, std::uint32_t y);
   void spreadFlux(const std::vector<Flux3>& from, const scene::LevelGrid& grid, std::uint32_t first, std::uint32_t i,
                   std::vector<Flux3>& to) const;
   [[nodiscard]] glm::vec3 scatterRadiosity(const Side& side, std::uint32_t leaf) const;
@@ -119,8 +126,9 @@ class RadiosityState {
   std::array<std::vector<Flux3>, 2> received_;     // by node, H as integers, unpushed
   std::vector<glm::vec3> shot_;                    // by leaf value: S, summed over rounds
   std::vector<glm::vec3> irradiance_, unshot_;     // by leaf value, derived by pushPull
-  std::vector<float> node_power_;                  // by node, derived by pushPull
-  Flux3 escaped_{}, backface_{}, gathered_{}, scattered_{}, gather_lost_{};
+  std::vector<float> node_rough_;                  // by node, derived by pushPull
+  std::vector<glm::vec3> node_flux_;               // by node, derived by pushPull
+  Flux3 escaped_{}, backface_{}, gathered_{}, scattered_{};
   double flux_scale_ = 1.0;
   std::uint32_t rounds_ = 1;
 };

@@ -40,14 +40,23 @@ struct ScatterShot {
   std::uint32_t half = 0;         ///< which of the two independent accumulators receives it
 };
 
-/// Gather: direct light of one convex planar polygon at every leaf. For each point on the polygon an item buffer gives
-/// visibility; irradiance = radiosity x exact polygon form factor (Lambert) x mean visibility weighted by cos cos /
-/// r^2.
+/// Where the flux of a shot goes: one of the two independent halves, or, for a gather shot, the first half of its
+/// points to the first and the rest to the second, each carrying half of the radiosity.
+inline constexpr std::uint32_t kBothHalves = 2;
+
+/// Gather: light of one convex planar polygon of uniform radiosity at every leaf. For each point on the polygon an item
+/// buffer gives visibility; irradiance = radiosity x exact polygon form factor (Lambert) x mean visibility weighted by
+/// cos cos / r^2.
+inline constexpr std::size_t kMaxCorners = 8;  ///< a rectangle clipped by a quadrilateral
 struct GatherShot {
-  std::array<glm::vec3, 4> corners{};
-  std::uint32_t corner_count = 3;  ///< 3 or 4, counter-clockwise seen from the lit side
+  std::array<glm::vec3, kMaxCorners> corners{};
+  std::uint32_t corner_count = 3;  ///< 3 to kMaxCorners, counter-clockwise seen from the lit side
   glm::vec3 normal{0.0F};
   std::array<double, 3> radiosity{};  ///< signed, lux, times the shot's weight in the average
+  /// The part of the polygon that shines, when something covers the rest (a floor under a block). Nobody knows which
+  /// part; a receiver whose horizon cuts the polygon is taken to see the shining part first, as the block's own sides
+  /// do.
+  float fill = 1.0F;
   std::uint32_t resolution = 128;
   glm::vec2 receiver_jitter{0.5F};  ///< where in a full leaf's texel the receiving point lies
   std::uint32_t half = 0;

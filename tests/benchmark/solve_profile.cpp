@@ -104,6 +104,30 @@ void printTruth(const std::vector<Leaf>& leaves, const std::vector<glm::dvec3>& 
               100.0 * relative[relative.size() * 99 / 100], mine / theirs);
 }
 
+/// Which surfaces are wrong, and which way.
+void printSurfaces(const scene::PatchScene& patches, const std::vector<Leaf>& leaves,
+                   const std::vector<glm::dvec3>& truth, const std::vector<glm::vec3>& solved) {
+  for (std::size_t s = 0; s < patches.surfaces.size() && s < 40; ++s) {
+    const auto first = patches.surfaces[s].first_node[0];
+    const auto count = patches.surfaces[s].width * patches.surfaces[s].height;
+    double mine = 0.0, theirs = 0.0, difference = 0.0, square = 0.0, worst = 0.0;
+    std::uint32_t worst_leaf = 0;
+    for (std::size_t i = 0; i < leaves.size(); ++i) {
+      if (leaves[i].node < first || leaves[i].node >= first + count) continue;
+      const glm::dvec3 value(solved[leaves[i].node]), d = value - truth[i];
+      mine += leaves[i].area * (value.x + value.y + value.z);
+      theirs += leaves[i].area * (truth[i].x + truth[i].y + truth[i].z);
+      difference += leaves[i].area * glm::dot(d, d);
+      square += leaves[i].area * glm::dot(truth[i], truth[i]);
+      if (glm::dot(d, d) > worst) worst = glm::dot(d, d), worst_leaf = leaves[i].node - first;
+    }
+    std::printf("  surface %2zu %3ux%3u ratio %.4f rms %.2f %% mean %.4g worst off %.3g at (%u, %u)\n", s,
+                patches.surfaces[s].width, patches.surfaces[s].height, mine / theirs,
+                100.0 * std::sqrt(difference / square), theirs, std::sqrt(worst),
+                worst_leaf % patches.surfaces[s].width, worst_leaf / patches.surfaces[s].width);
+  }
+}
+
 int profile(const std::string& file, std::map<std::string, std::string> options) {
   const auto number = [&](const char* name, double fallback) {
     return options.count(name) != 0 ? std::atof(options[name].c_str()) : fallback;
@@ -152,6 +176,7 @@ int profile(const std::string& file, std::map<std::string, std::string> options)
     const auto outcome = solver.step();
     if (!outcome) return std::fprintf(stderr, "%s\n", outcome.error().text().c_str()), 1;
     seconds += std::chrono::duration<double>(Clock::now() - begin).count();
+    if (std::getenv("PROFILE_WAVES") != nullptr) { double u = 0; for (const auto& s : solver.state().sides()) u += s.unshot_power; std::printf("wave %.3f s unshot %g shooters %llu gathered %llu kills %llu shots %llu+%llu\n", seconds, u, (unsigned long long)solver.plannerCounters().shooters, (unsigned long long)solver.plannerCounters().gathered_nodes, (unsigned long long)solver.plannerCounters().roulette_kills, (unsigned long long)solver.transportCounters().scatter_shots, (unsigned long long)solver.transportCounters().gather_points); }
     if (*outcome == solver::StepOutcome::kShot ||
         (seconds < 1.15 * shown && *outcome != solver::StepOutcome::kConverged))
       continue;
@@ -166,6 +191,10 @@ int profile(const std::string& file, std::map<std::string, std::string> options)
     std::printf(" | render %.2f acc %.2f gather %.2f\n", c.render_seconds, c.accumulate_seconds, c.gather_seconds);
     if (*outcome == solver::StepOutcome::kConverged) break;
   }
+  if (options.count("--surfaces") != 0) printSurfaces(*patches, leaves, truth, solver.irradiance());
+  const auto energy = solver.energy();
+  std::printf("energy: emitted %.6g absorbed %.6g escaped %.6g backface %.6g unshot %.6g imbalance %.6g\n", energy.emitted[0],
+              energy.absorbed[0], energy.escaped[0], energy.backface[0], energy.unshot[0], energy.imbalance[0]);
   return 0;
 }
 

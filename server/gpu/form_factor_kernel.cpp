@@ -1,0 +1,111 @@
+#include "server/gpu/form_factor_kernel.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
+#include <type_traits>
+
+namespace radiosity::gpu {
+namespace {
+
+/// acos(x) = sqrt(1 - x) P(x) on [0, 1], error 2e-8 (Abramowitz and Stegun 4.4.46).
+inline float acosPolynomial(float x) {
+  float p = -0.0012624911F;
+  p = p * x + 0.0066700901F;
+  p = p * x - 0.0170881256F;
+  p = p * x + 0.0308918810F;
+  p = p * x - 0.0501743046F;
+  p = p * x + 0.0889789874F;
+  p = p * x - 0.2145988016F;
+  return p * x + 1.5707963050F;
+}
+
+/// theta / sin(theta) for cos(theta) = x; no cancellation at small angles, where sqrt(1 - x) divides out.
+inline float angleOverSine(float x) {
+  const float t = std::abs(x);
+  const float small = acosPolynomial(t) / std::sqrt(1.0F + t);
+  const float large = std::numbers::pi_v<float> / std::sqrt(std::max(1.0F - t * t, 1e-12F)) - small;
+  return x >= 0.0F ? small : large;
+}
+
+template <std::size_t kCorners>
+[[gnu::always_inline]] inline float lambertSum(const float* cx, const float* cy, const float* cz, float nx, float ny,
+                                               float nz, float x, float y, float z) {
+  float ux[kCorners], uy[kCorners], uz[kCorners];
+#pragma GCC unroll 9
+  for (std::size_t k = 0; k < kCorners; ++k) {
+    const float dx = cx[k] - x, dy = cy[k] - y, dz = cz[k] - z;
+    const float inverse = 1.0F / std::sqrt(std::max(dx * dx + dy * dy + dz * dz, 1e-20F));
+    ux[k] = dx * inverse;
+    uy[k] = dy * inverse;
+    uz[k] = dz * inverse;
+  }
+  float sum = 0.0F;
+#pragma GCC unroll 9
+  for (std::size_t k = 0; k < kCorners; ++k) {
+    const std::size_t m = (k + 1) % kCorners;
+    const float dot = ux[k] * ux[m] + uy[k] * uy[m] + uz[k] * uz[m];
+    const float along = (uy[k] * uz[m] - uz[k] * uy[m]) * nx + (uz[k] * ux[m] - ux[k] * uz[m]) * ny +
+                        (ux[k] * uy[m] - uy[k] * ux[m]) * nz;
+    sum += angleOverSine(dot) * along;
+  }
+  return std::min(std::abs(sum) * (0.5F * std::numbers::inv_pi_v<float>), 1.0F);
+}
+
+}  // namespace
+
+ClippedPolygon clipToPlane(std::span<const glm::vec3> corners, const glm::vec3& point, const glm::vec3& normal) {
+  ClippedPolygon clipped;
+  const std::size_t count = corners.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    const glm::dvec3 a(corners[i]), b(corners[(i + 1) % count]);
+    const double height_a = glm::dot(a - glm::dvec3(point), glm::dvec3(normal));
+    const double height_b = glm::dot(b - glm::dvec3(point), glm::dvec3(normal));
+    if (height_a >= 0.0) clipped.corner[clipped.count++] = corners[i];
+    if ((height_a < 0.0) != (height_b < 0.0) && height_a != 0.0 && height_b != 0.0) {
+      clipped.corner[clipped.count++] = glm::vec3(a + (b - a) * (height_a / (height_a - height_b)));
+    }
+  }
+  if (clipped.count < 3) clipped.count = 0;
+  return clipped;
+}
+
+// One clone for processors with 256-bit vectors. No fused multiply-add in either, so both give the same bits.
+__attribute__((target_clones("avx2", "default"))) void planarFormFactors(const ClippedPolygon& polygon,
+                                                                         const glm::vec3& normal, const float* x,
+                                                                         const float* y, const float* z,
+                                                                         std::size_t count, float* form_factor) {
+  float cx[9] = {}, cy[9] = {}, cz[9] = {};
+  for (std::size_t k = 0; k < polygon.count; ++k) {
+    cx[k] = polygon.corner[k].x;
+    cy[k] = polygon.corner[k].y;
+    cz[k] = polygon.corner[k].z;
+  }
+  const float nx = normal.x, ny = normal.y, nz = normal.z;
+  // The number of corners is a constant in each loop, so that the loop over receivers vectorises.
+  const auto all = [&]<std::size_t kCorners>(std::integral_constant<std::size_t, kCorners>)
+      __attribute__((always_inline)) {
+    for (std::size_t i = 0; i < count; ++i) {
+      form_factor[i] = lambertSum<kCorners>(cx, cy, cz, nx, ny, nz, x[i], y[i], z[i]);
+    }
+  };
+  switch (polygon.count) {
+    case 3:
+      return all(std::integral_constant<std::size_t, 3>());
+    case 4:
+      return all(std::integral_constant<std::size_t, 4>());
+    case 5:
+      return all(std::integral_constant<std::size_t, 5>());
+    case 6:
+      return all(std::integral_constant<std::size_t, 6>());
+    case 7:
+      return all(std::integral_constant<std::size_t, 7>());
+    case 8:
+      return all(std::integral_constant<std::size_t, 8>());
+    default:
+      return all(std::integral_constant<std::size_t, 9>());
+  }
+}
+
+}  // namespace radiosity::gpu

@@ -1,0 +1,27 @@
+// Point-to-polygon form factors of many receivers in one plane, in single precision and vectorised.
+// polygon_form_factor.h is the plain version, which the tests hold this one against.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <glm/vec3.hpp>
+#include <span>
+
+namespace radiosity::gpu {
+
+/// A convex polygon of at most eight corners clipped by the receivers' plane.
+struct ClippedPolygon {
+  std::array<glm::vec3, 9> corner{};
+  std::size_t count = 0;  ///< 0 or 3..9
+};
+
+/// The part of the polygon in front of the plane through `point` with `normal`. In double inside.
+[[nodiscard]] ClippedPolygon clipToPlane(std::span<const glm::vec3> corners, const glm::vec3& point,
+                                         const glm::vec3& normal);
+
+/// Receivers at (x, y, z)[i], all with the same normal, in the plane that `polygon` was clipped to. form_factor[i] in
+/// [0, 1]; about 1e-7 absolute.
+void planarFormFactors(const ClippedPolygon& polygon, const glm::vec3& normal, const float* x, const float* y,
+                       const float* z, std::size_t count, float* form_factor);
+
+}  // namespace radiosity::gpu
