@@ -16,8 +16,9 @@ namespace {
 
 /// Nodes weaker than this part of a shot's share play Russian roulette: they shoot a full part, or nothing.
 constexpr double kRouletteShare = 0.25;
-/// Nodes of less than this part of a share may shoot as a polygon though a part of it is empty or buried.
-constexpr double kPartialShare = 0.05;
+/// Nodes of less than this part of a share may shoot as a polygon though a part of it is empty or buried. Not below the
+/// roulette's share: what is right beside a buried edge would see single leaves come and go.
+constexpr double kPartialShare = 0.3;
 
 /// A leaf of `side` under a node chosen with probability proportional to its unshot power, by warping the point (u, v)
 /// down the quadtree, which keeps its stratification. On return (u, v) are uniform in [0, 1)^2 again.

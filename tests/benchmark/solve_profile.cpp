@@ -176,7 +176,6 @@ int profile(const std::string& file, std::map<std::string, std::string> options)
     const auto outcome = solver.step();
     if (!outcome) return std::fprintf(stderr, "%s\n", outcome.error().text().c_str()), 1;
     seconds += std::chrono::duration<double>(Clock::now() - begin).count();
-    if (std::getenv("PROFILE_WAVES") != nullptr) { double u = 0; for (const auto& s : solver.state().sides()) u += s.unshot_power; std::printf("wave %.3f s unshot %g shooters %llu gathered %llu kills %llu shots %llu+%llu\n", seconds, u, (unsigned long long)solver.plannerCounters().shooters, (unsigned long long)solver.plannerCounters().gathered_nodes, (unsigned long long)solver.plannerCounters().roulette_kills, (unsigned long long)solver.transportCounters().scatter_shots, (unsigned long long)solver.transportCounters().gather_points); }
     if (*outcome == solver::StepOutcome::kShot ||
         (seconds < 1.15 * shown && *outcome != solver::StepOutcome::kConverged))
       continue;
@@ -193,8 +192,9 @@ int profile(const std::string& file, std::map<std::string, std::string> options)
   }
   if (options.count("--surfaces") != 0) printSurfaces(*patches, leaves, truth, solver.irradiance());
   const auto energy = solver.energy();
-  std::printf("energy: emitted %.6g absorbed %.6g escaped %.6g backface %.6g unshot %.6g imbalance %.6g\n", energy.emitted[0],
-              energy.absorbed[0], energy.escaped[0], energy.backface[0], energy.unshot[0], energy.imbalance[0]);
+  std::printf("energy: emitted %.6g absorbed %.6g escaped %.6g backface %.6g unshot %.6g imbalance %.6g\n",
+              energy.emitted[0], energy.absorbed[0], energy.escaped[0], energy.backface[0], energy.unshot[0],
+              energy.imbalance[0]);
   return 0;
 }
 
