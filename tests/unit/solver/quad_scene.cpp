@@ -142,21 +142,29 @@ void RayTransport::gather(const solver::GatherShot& shot, const solver::ShotBatc
       const glm::vec2 texel(static_cast<float>(leaf % surface.width) + 0.5F,
                             static_cast<float>(leaf / surface.width) + 0.5F);
       const glm::vec3 p = frame.origin + texel.x * frame.du + texel.y * frame.dv;
-      double factor = 0.0;
+      std::array<double, 2> factor{};
       for (std::uint32_t k = 0; k < shot.point_count; ++k) {
         const glm::vec3 to = batch.points[shot.first_point + k].origin - p;
         const float distance = glm::length(to);
         const float cosines = std::max(0.0F, glm::dot(to, frame.normal)) * std::max(0.0F, -glm::dot(to, shot.normal));
         if (cosines <= 0.0F || cast(p, to / distance).distance < distance * 0.999F) continue;
-        factor += static_cast<double>(cosines / (distance * distance * distance * distance)) * light_area /
-                  std::numbers::pi / shot.point_count;
+        factor[2 * k >= shot.point_count ? 1 : 0] += static_cast<double>(cosines / (distance * distance * distance * distance)) * light_area /
+                  std::numbers::pi;
       }
       const auto node = surface.first_node[0] + leaf;
       for (std::size_t c = 0; c < 3; ++c) {
-        const auto flux = std::llround(shot.radiosity[c] * factor * static_cast<double>(patches_->node_area[node]) *
-                                       batch.flux_scale);
-        into.node[shot.half][node][c] += flux;
-        into.gathered[c] += flux;
+        const double share = static_cast<double>(patches_->node_area[node]) * batch.flux_scale;
+        if (shot.half != solver::kBothHalves) {
+          const auto flux = std::llround(shot.radiosity[c] * (factor[0] + factor[1]) / shot.point_count * share);
+          into.node[shot.half][node][c] += flux;
+          into.gathered[c] += flux;
+          continue;
+        }
+        for (std::size_t half = 0; half < 2; ++half) {  // each half of the points carries half of the radiosity
+          const auto flux = std::llround(shot.radiosity[c] * factor[half] / shot.point_count * share);
+          into.node[half][node][c] += flux;
+          into.gathered[c] += flux;
+        }
       }
     }
   }

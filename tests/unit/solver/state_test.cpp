@@ -29,7 +29,7 @@ TEST(PushPull, FluxOfACoarseNodeReachesItsLeavesOnly) {
   ASSERT_EQ(level1.width, 3U);
   const auto node = side.first_node + level1.offset + 1 * level1.width + 2;  // covers leaf (4, 2) alone
   batch.node[0][node] = {1 << 20, 1 << 20, 1 << 20};
-  state.receive(batch, false);
+  state.receive(batch);
   state.pushPull(side);
   for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
     if (leaf == 2 * 5 + 4) {
@@ -51,7 +51,7 @@ TEST(PushPull, ReceivedFluxEqualsIrradianceTimesAreaAtAnyMixOfLevels) {
     batch.node[node % 2][node] = {1000 * (node + 1), 0, 0};
     sum += 1000 * (node + 1);
   }
-  state.receive(batch, false);
+  state.receive(batch);
   state.pushPull(side);
   double flux = 0.0;
   for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
@@ -80,7 +80,7 @@ TEST(Receive, FluxOnANodeWithoutAreaGoesToItsParent) {
   FluxAccumulators batch;
   batch.reset(made.patches->nodeCount());
   batch.node[0][5] = {1 << 20, 0, 0};
-  state.receive(batch, false);
+  state.receive(batch);
   state.pushPull(side);
   EXPECT_EQ(state.irradiance(side, 5).x, 0.0F);
   EXPECT_GT(state.irradiance(side, 0).x, 0.0F);  // same parent
