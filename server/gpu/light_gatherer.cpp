@@ -183,14 +183,27 @@ void LightGatherer::testPoint(const solver::GatherShot& shot, const solver::Hemi
     bool visible = true;
     if (item != RAD_ITEM_NONE) {
       const auto& plane = planes_[item];
+      const glm::vec3 at(lit_.x[i], lit_.y[i], lit_.z[i]);
       const float light = glm::dot(plane.normal, o) - plane.distance;
-      const float receiver = glm::dot(plane.normal, glm::vec3(lit_.x[i], lit_.y[i], lit_.z[i])) - plane.distance;
-      visible = (light > 0.0F ? receiver : -receiver) >= -kInPlane;
+      const float receiver = glm::dot(plane.normal, at) - plane.distance;
+      const float before = light > 0.0F ? receiver : -receiver;
+      visible = before >= -kInPlane || !risesBefore(item, at, glm::vec3(lit_.nx[i], lit_.ny[i], lit_.nz[i]));
     }
     weight[i] += lit_.point_weight[i];
     visible_weight[i] += visible ? lit_.point_weight[i] : 0.0F;
     visible_count[i] += visible ? 1.0F : 0.0F;
   }
+}
+
+/// Whether a part of the triangle lies in front of the receiver. What is wholly behind its horizon cannot hide a light
+/// from it, although a pixel on a convex edge may show it: the top of a block, seen instead of the topmost texels of
+/// its side.
+bool LightGatherer::risesBefore(std::uint32_t triangle, const glm::vec3& point, const glm::vec3& normal) const {
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto& corner = patches_->vertices[patches_->indices[3 * std::size_t{triangle} + k]].position;
+    if (glm::dot(normal, corner - point) > kInPlane) return true;
+  }
+  return false;
 }
 
 void LightGatherer::weighLost(const solver::HemicubeFrame& point, std::span<const std::uint32_t> items,

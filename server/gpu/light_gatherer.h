@@ -2,7 +2,8 @@
 // on the light decide. One thread.
 //
 // A leaf is hidden from a light point only if it lies behind the plane of the triangle seen in its direction: no depth
-// bias, hence no acne, and light does not leak under blocks.
+// bias, hence no acne, and light does not leak under blocks. At convex edges, where the pixel may belong to the surface
+// on the other side, the next pixels are asked too.
 #pragma once
 
 #include <cstdint>
@@ -58,6 +59,7 @@ class LightGatherer {
   [[nodiscard]] bool behind(const solver::GatherShot& shot, const scene::Surface& surface) const;
   void testPoint(const solver::GatherShot& shot, const solver::HemicubeFrame& point,
                  std::span<const std::uint32_t> items, std::size_t half);
+  [[nodiscard]] bool risesBefore(std::uint32_t triangle, const glm::vec3& point, const glm::vec3& normal) const;
   void weighLost(const solver::HemicubeFrame& point, std::span<const std::uint32_t> items,
                  const HemicubeWeights& weights, std::uint64_t& escaped, std::uint64_t& absorbed);
   void deliver(const solver::GatherShot& shot, std::size_t half, std::size_t points, double share, double flux_scale,
