@@ -207,32 +207,48 @@ bool LightGatherer::risesBefore(std::uint32_t triangle, const glm::vec3& point, 
 }
 
 void LightGatherer::weighLost(const solver::HemicubeFrame& point, std::span<const std::uint32_t> items,
-                              const HemicubeWeights& weights, std::uint64_t& escaped, std::uint64_t& absorbed) {
+                              const HemicubeWeights& weights, Lost& lost) {
   starts_.resize(items.size() + 1);
   const auto runs = findRuns(items, starts_);
   for (std::size_t run = 0; run < runs; ++run) {
     const auto item = items[starts_[run]];
     const std::uint64_t weight = weights.before[starts_[run + 1]] - weights.before[starts_[run]];
     if (item == RAD_ITEM_NONE) {
-      escaped += weight;
+      lost.escaped += weight;
       continue;
     }
     const bool back = glm::dot(planes_[item].normal, point.origin) <= planes_[item].distance;
-    if (absorbs_[item][static_cast<std::size_t>(back)]) absorbed += weight;
+    if (absorbs_[item][static_cast<std::size_t>(back)]) lost.absorbed += weight;
   }
 }
 
+float LightGatherer::visibility(std::size_t sums, std::size_t i, std::size_t points) const {
+  const float weight = lit_.weight[sums][i];
+  return weight > 0.0F ? lit_.visible_weight[sums][i] / weight : lit_.visible[sums][i] / static_cast<float>(points);
+}
+
+/// What leaves a polygon arrives: the flux of its form factors is scaled to what, by the weights of the item buffers,
+/// neither escapes nor is absorbed. Otherwise small errors (one point for a whole leaf, pixels on edges) would be
+/// multiplied by interreflection. Bounded, for polygons that see next to nothing.
+double LightGatherer::conserve(std::size_t sums, std::size_t points, double area, double kept) const {
+  if (kept < 0.999) return 1.0;
+  double delivered = 0.0;
+  for (std::size_t i = 0; i < lit_count_; ++i) {
+    const auto node = receivers_[lit_.receiver[i]].node;
+    delivered += static_cast<double>(lit_.form_factor[i] * visibility(sums, i, points) * patches_->node_area[node]);
+  }
+  return delivered > 0.0 ? std::clamp(kept * area / delivered, 0.5, 2.0) : 1.0;
+}
+
 void LightGatherer::deliver(const solver::GatherShot& shot, std::size_t half, std::size_t points, double share,
-                            double flux_scale, const FluxSink& sink, solver::TransportCounters& counters) const {
+                            const FluxSink& sink, solver::TransportCounters& counters) const {
   const std::size_t sums = shot.half == solver::kBothHalves ? half : 0;
   for (std::size_t i = 0; i < lit_count_; ++i) {
-    const float weight = lit_.weight[sums][i];
-    const float visibility =
-        weight > 0.0F ? lit_.visible_weight[sums][i] / weight : lit_.visible[sums][i] / static_cast<float>(points);
-    if (visibility <= 0.0F) continue;
+    const float seen = visibility(sums, i, points);
+    if (seen <= 0.0F) continue;
     const auto node = receivers_[lit_.receiver[i]].node;
-    const double factor = share * static_cast<double>(lit_.form_factor[i] * visibility) *
-                          static_cast<double>(patches_->node_area[node]) * flux_scale;
+    const double factor =
+        share * static_cast<double>(lit_.form_factor[i] * seen) * static_cast<double>(patches_->node_area[node]);
     solver::Flux3 flux{};
     for (std::size_t channel = 0; channel < 3; ++channel) {
       flux[channel] = std::lrint(shot.radiosity[channel] * factor);
@@ -257,8 +273,7 @@ void LightGatherer::gather(const solver::GatherShot& shot, std::span<const solve
       std::fill_n(sum->begin(), lit_count_, 0.0F);
     }
   }
-  std::uint64_t escaped = 0;
-  std::uint64_t absorbed = 0;
+  std::array<Lost, 2> lost{};
   const auto capacity = renderer.capacity(shot.resolution);
   std::vector<HemicubeView> views;
   for (std::size_t first = 0; first < points.size(); first += capacity) {
@@ -268,23 +283,25 @@ void LightGatherer::gather(const solver::GatherShot& shot, std::span<const solve
     const auto pixels = hemicubePixels(shot.resolution);
     for (std::size_t i = 0; i < views.size(); ++i) {
       const auto items = images.subspan(i * pixels, pixels);
-      testPoint(shot, views[i].frame, items, both && 2 * (first + i) >= points.size() ? 1 : 0);
-      weighLost(views[i].frame, items, weights.get(shot.resolution, views[i].frame.lattice), escaped, absorbed);
+      const std::size_t half = both && 2 * (first + i) >= points.size() ? 1 : 0;
+      testPoint(shot, views[i].frame, items, half);
+      weighLost(views[i].frame, items, weights.get(shot.resolution, views[i].frame.lattice), lost[half]);
     }
   }
-  if (both) {
-    const std::size_t first_half = (points.size() + 1) / 2;
-    deliver(shot, 0, first_half, 0.5, flux_scale, sink, counters);
-    deliver(shot, 1, points.size() - first_half, 0.5, flux_scale, sink, counters);
-  } else {
-    deliver(shot, shot.half % 2, points.size(), 1.0, flux_scale, sink, counters);
-  }
   const double area = static_cast<double>(shot.fill) * polygonArea(std::span(shot.corners.data(), shot.corner_count));
-  const double power = area * flux_scale / (static_cast<double>(points.size()) * solver::kWeightOne);
-  for (std::size_t channel = 0; channel < 3; ++channel) {
-    const double flux = shot.radiosity[channel] * power;
-    sink.totals->escaped[channel] += std::lrint(flux * static_cast<double>(escaped));
-    sink.totals->backface[channel] += std::lrint(flux * static_cast<double>(absorbed));
+  const std::size_t first_half = both ? (points.size() + 1) / 2 : points.size();
+  for (std::size_t sums = 0; sums < (both ? 2U : 1U); ++sums) {
+    const std::size_t count = sums == 0 ? first_half : points.size() - first_half;
+    const double share = (both ? 0.5 : 1.0) * flux_scale, one = static_cast<double>(count) * solver::kWeightOne;
+    const double escaped = static_cast<double>(lost[sums].escaped) / one;
+    const double absorbed = static_cast<double>(lost[sums].absorbed) / one;
+    const double scale = conserve(sums, count, area, 1.0 - escaped - absorbed);
+    deliver(shot, both ? sums : shot.half % 2, count, share * scale, sink, counters);
+    for (std::size_t channel = 0; channel < 3; ++channel) {
+      const double flux = shot.radiosity[channel] * area * share;
+      sink.totals->escaped[channel] += std::lrint(flux * escaped);
+      sink.totals->backface[channel] += std::lrint(flux * absorbed);
+    }
   }
   counters.gather_points += points.size();
   ++counters.gather_shots;

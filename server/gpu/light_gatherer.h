@@ -53,6 +53,10 @@ class LightGatherer {
 
     void resize(std::size_t count);
   };
+  /// Weight of what left the scene, and of what fell on unlit sides, summed over points.
+  struct Lost {
+    std::uint64_t escaped = 0, absorbed = 0;
+  };
 
   void findLit(const solver::GatherShot& shot);
   void findLitGroup(const solver::GatherShot& shot, const Group& group);
@@ -61,9 +65,11 @@ class LightGatherer {
                  std::span<const std::uint32_t> items, std::size_t half);
   [[nodiscard]] bool risesBefore(std::uint32_t triangle, const glm::vec3& point, const glm::vec3& normal) const;
   void weighLost(const solver::HemicubeFrame& point, std::span<const std::uint32_t> items,
-                 const HemicubeWeights& weights, std::uint64_t& escaped, std::uint64_t& absorbed);
-  void deliver(const solver::GatherShot& shot, std::size_t half, std::size_t points, double share, double flux_scale,
-               const FluxSink& sink, solver::TransportCounters& counters) const;
+                 const HemicubeWeights& weights, Lost& lost);
+  [[nodiscard]] float visibility(std::size_t sums, std::size_t i, std::size_t points) const;
+  [[nodiscard]] double conserve(std::size_t sums, std::size_t points, double area, double kept) const;
+  void deliver(const solver::GatherShot& shot, std::size_t half, std::size_t points, double share, const FluxSink& sink,
+               solver::TransportCounters& counters) const;
 
   std::shared_ptr<const scene::PatchScene> patches_;
   std::vector<Receiver> receivers_;

@@ -15,10 +15,10 @@ namespace radiosity::solver {
 namespace {
 
 /// Nodes weaker than this part of a shot's share play Russian roulette: they shoot a full part, or nothing.
-constexpr double kRouletteShare = 0.25;
+constexpr double kRouletteShare = 0.05;
 /// Nodes of less than this part of a share may shoot as a polygon though a part of it is empty or buried. Not below the
 /// roulette's share: what is right beside a buried edge would see single leaves come and go.
-constexpr double kPartialShare = 0.3;
+constexpr double kPartialShare = 1.2 * kRouletteShare;
 
 /// A leaf of `side` under a node chosen with probability proportional to its unshot power, by warping the point (u, v)
 /// down the quadtree, which keeps its stratification. On return (u, v) are uniform in [0, 1)^2 again.
@@ -123,8 +123,9 @@ bool Planner::mustSplit(const RadiosityState& state, const Side& side, const Nod
   const std::uint32_t id = side.first_node + grid.offset + node.y * grid.width + node.x;
   const glm::vec3 flux = glm::abs(state.nodeFlux(id));
   const auto net = static_cast<double>(flux.x + flux.y + flux.z);
-  // What varies inside the node would be blurred: worth a split when it weighs as much as a weak shot of its own.
-  return node.power - net > settings_.variation_share * share_;
+  // What varies inside the node would be blurred: worth a split when it weighs as much as a weak shot of its own, and
+  // when the children do not fall to roulette.
+  return node.power > 4.0 * kRouletteShare * share_ && node.power - net > settings_.variation_share * share_;
 }
 
 bool Planner::isSpent(const RadiosityState& state, const Side& side, const Node& node) const {
@@ -141,7 +142,7 @@ glm::dvec2 Planner::openPoint(const RadiosityState& state, const Side& side, con
 }
 
 void Planner::addNodeGather(const RadiosityState& state, const Side& side, const Node& node, double weight,
-                            std::uint64_t node_key, ShotBatch& batch) {
+                            const std::array<bool, 2>& plays, std::uint64_t node_key, ShotBatch& batch) {
   const auto& patches = state.patches();
   const auto& surface = patches.surfaces[side.surface];
   const auto& frame = patches.triangles[surface.first_triangle];
@@ -166,18 +167,22 @@ void Planner::addNodeGather(const RadiosityState& state, const Side& side, const
   const glm::dvec3 radiosity = glm::dvec3(state.nodeFlux(id)) * (weight / (area * static_cast<double>(shot.fill)));
   for (int c = 0; c < 3; ++c) shot.radiosity[static_cast<std::size_t>(c)] = radiosity[c];
   shot.resolution = settings_.node_resolution;
-  shot.half = kBothHalves;
+  shot.half = plays[0] && plays[1] ? kBothHalves : plays[0] ? 0 : 1;
+  if (shot.half != kBothHalves) {
+    for (auto& channel : shot.radiosity) channel *= 0.5;  // each half carries half
+  }
   shot.first_point = static_cast<std::uint32_t>(batch.points.size());
-  shot.point_count = 2;
   const std::uint32_t visit = 8 * (state.rounds() - 1) + std::min(wave_, 7U);
   const glm::dvec4 jitter = sobol4(visit, mixKeys(node_key, 2));
   shot.receiver_jitter = glm::vec2(jitter.x, jitter.y);
   for (std::uint32_t p = 0; p < 2; ++p) {
+    if (!plays[p]) continue;
     const glm::dvec4 sample = sobol4(2 * visit + p, node_key);
     const glm::dvec2 texel =
         whole ? polygon.point(sample.x, sample.y) : openPoint(state, side, node, sample.x, sample.y);
     batch.points.push_back(frameAt(at(texel), shot.normal, sample.z, mixKeys(node_key, shots_planned_ * 2 + p)));
   }
+  shot.point_count = static_cast<std::uint32_t>(batch.points.size()) - shot.first_point;
   batch.gather.push_back(shot);
 }
 
@@ -188,17 +193,22 @@ void Planner::shoot(RadiosityState& state, Side& side, const Node& node, ShotBat
   const double chance = std::min(1.0, node.power / floor);
   const bool gather = canGather(state, side);
   ++shots_planned_;
-  if (chance >= 1.0 || uniformFromKey(mixKeys(node_key, shots_planned_)) < chance) {
-    if (gather) {
-      addNodeGather(state, side, node, 1.0 / chance, node_key, batch);
-      ++counters_.gathered_nodes;
-    } else {
-      for (std::uint32_t half = 0; half < 2; ++half) addShot(state, side, node, 1.0 / chance, half, node_key, batch);
-    }
+  // Each half plays on its own, so that the difference between the halves shows what roulette costs.
+  std::array<bool, 2> plays{};
+  for (std::uint32_t half = 0; half < 2; ++half) {
+    plays[half] = chance >= 1.0 || uniformFromKey(mixKeys(node_key, shots_planned_ * 2 + half)) < chance;
+  }
+  if (gather && (plays[0] || plays[1])) {
+    addNodeGather(state, side, node, 1.0 / chance, plays, node_key, batch);
+    ++counters_.gathered_nodes;
+  }
+  for (std::uint32_t half = 0; half < 2; ++half) {
+    if (!gather && plays[half]) addShot(state, side, node, 1.0 / chance, half, node_key, batch);
+    if (!plays[half]) ++counters_.roulette_kills;
+  }
+  if (plays[0] || plays[1]) {
     ++counters_.shooters;
     if (node.level > 0) ++counters_.whole_subtrees;
-  } else {
-    ++counters_.roulette_kills;
   }
   const glm::dvec3 shot =
       gather ? state.markMeanShot(side, node.level, node.x, node.y) : state.markShot(side, node.level, node.x, node.y);

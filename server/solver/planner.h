@@ -80,7 +80,7 @@ class Planner {
   [[nodiscard]] HemicubeFrame frameAt(const glm::vec3& origin, const glm::vec3& normal, double rotation,
                                       std::uint64_t key) const;
   void addNodeGather(const RadiosityState& state, const Side& side, const Node& node, double weight,
-                     std::uint64_t node_key, ShotBatch& batch);
+                     const std::array<bool, 2>& plays, std::uint64_t node_key, ShotBatch& batch);
   /// Nodes of planar surfaces shoot as polygons of their mean radiosity, gathered; others from one point, scattered.
   [[nodiscard]] bool canGather(const RadiosityState& state, const Side& side) const {
     return settings_.gather_nodes && state.patches().surfaces[side.surface].planar;

@@ -192,6 +192,11 @@ int profile(const std::string& file, std::map<std::string, std::string> options)
   }
   if (options.count("--surfaces") != 0) printSurfaces(*patches, leaves, truth, solver.irradiance());
   const auto energy = solver.energy();
+  const auto& counters = solver.plannerCounters();
+  std::printf("shooters %llu, of which gathered %llu; roulette kills %llu\n",
+              static_cast<unsigned long long>(counters.shooters),
+              static_cast<unsigned long long>(counters.gathered_nodes),
+              static_cast<unsigned long long>(counters.roulette_kills));
   std::printf("energy: emitted %.6g absorbed %.6g escaped %.6g backface %.6g unshot %.6g imbalance %.6g\n",
               energy.emitted[0], energy.absorbed[0], energy.escaped[0], energy.backface[0], energy.unshot[0],
               energy.imbalance[0]);

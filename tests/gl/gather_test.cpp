@@ -1,5 +1,6 @@
 // Direct light gathered at leaves: exact where nothing is in between, exact umbra, penumbra and energy.
 #include <gtest/gtest.h>
+#include <span>
 
 #include <algorithm>
 #include <array>
@@ -95,7 +96,8 @@ TEST_F(Gather, UnoccludedIrradianceIsLambertsFormula) {
   for (std::uint32_t y = 0; y < 16; ++y) {
     for (std::uint32_t x = 0; x < 16; ++x) {
       const glm::dvec3 point(-0.5 + (x + 0.5) / 16, -0.5 + (y + 0.5) / 16, -0.5);
-      const auto exact = gpu::polygonFormFactor(point, {0, 0, 1}, batch.gather[0].corners);
+      const auto exact = gpu::polygonFormFactor(point, {0, 0, 1},
+                                                std::span(batch.gather[0].corners).first(batch.gather[0].corner_count));
       EXPECT_NEAR(irradiance(*scene, flux, floor, x, y), exact, 1e-5 * exact) << x << ", " << y;
     }
   }
@@ -110,8 +112,8 @@ TEST_F(Gather, TheReceiverJitterMovesTheReceivingPoint) {
   auto batch = gatherFrom(*scene, lamp, 2, random);
   batch.gather[0].receiver_jitter = {0.125F, 0.75F};
   const auto flux = run(scene, batch);
-  const auto exact =
-      gpu::polygonFormFactor({-0.5 + 1.125 / 4, -0.5 + 2.75 / 4, -0.5}, {0, 0, 1}, batch.gather[0].corners);
+  const auto exact = gpu::polygonFormFactor({-0.5 + 1.125 / 4, -0.5 + 2.75 / 4, -0.5}, {0, 0, 1},
+                                            std::span(batch.gather[0].corners).first(batch.gather[0].corner_count));
   EXPECT_NEAR(irradiance(*scene, flux, floor, 1, 2), exact, 1e-5 * exact);
 }
 
@@ -131,7 +133,8 @@ TEST_F(Gather, AHalfPlaneCastsAnExactUmbraAndPenumbra) {
   const auto flux = run(scene, batch);
   for (std::uint32_t x = 0; x < 64; ++x) {
     const double at = -0.5 + (x + 0.5) / 64;
-    const auto open = gpu::polygonFormFactor({at, -0.25, -0.5}, {0, 0, 1}, batch.gather[0].corners);
+    const auto open = gpu::polygonFormFactor({at, -0.25, -0.5}, {0, 0, 1},
+                                             std::span(batch.gather[0].corners).first(batch.gather[0].corner_count));
     const double share = irradiance(*scene, flux, floor, x, 0) / open;
     if (at < -0.11) {
       EXPECT_EQ(share, 0.0) << at;

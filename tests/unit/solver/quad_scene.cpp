@@ -57,6 +57,17 @@ void addQuad(const Quad& quad, QuadScene& out) {
 
 }  // namespace
 
+namespace {
+
+glm::vec3 cosineDirection(const solver::HemicubeFrame& frame, const glm::dvec4& u) {
+  const glm::vec3 n = frame.normal, a = frame.tangent, b = glm::cross(n, a);
+  const double radius = std::sqrt(u.x), angle = 2.0 * std::numbers::pi * u.y;
+  return a * static_cast<float>(radius * std::cos(angle)) + b * static_cast<float>(radius * std::sin(angle)) +
+         n * static_cast<float>(std::sqrt(1.0 - u.x));
+}
+
+}  // namespace
+
 QuadScene makeQuadScene(const std::vector<Quad>& quads) {
   QuadScene out;
   out.patches = std::make_shared<scene::PatchScene>();
@@ -105,14 +116,11 @@ RayTransport::Hit RayTransport::cast(const glm::vec3& origin, const glm::vec3& d
 }
 
 void RayTransport::scatter(const solver::ScatterShot& shot, double scale, solver::FluxAccumulators& into) const {
-  const glm::vec3 n = shot.frame.normal, a = shot.frame.tangent, b = glm::cross(n, a);
   const auto key = solver::mixKeys(static_cast<std::uint64_t>(shot.frame.origin.x * 1e6F),
                                    static_cast<std::uint64_t>(shot.frame.origin.y * 1e6F));
   for (std::uint32_t i = 0; i < rays_; ++i) {
     const glm::dvec4 u = solver::sobol4(i, key);
-    const double radius = std::sqrt(u.x), angle = 2.0 * std::numbers::pi * u.y;
-    const glm::vec3 d = a * static_cast<float>(radius * std::cos(angle)) +
-                        b * static_cast<float>(radius * std::sin(angle)) + n * static_cast<float>(std::sqrt(1.0 - u.x));
+    const glm::vec3 d = cosineDirection(shot.frame, u);
     const Hit hit = cast(shot.frame.origin, d);
     solver::Flux3 flux{};
     for (std::size_t c = 0; c < 3; ++c) flux[c] = std::llround(shot.flux[c] * scale / rays_);
@@ -130,12 +138,29 @@ void RayTransport::scatter(const solver::ScatterShot& shot, double scale, solver
   }
 }
 
+/// What escapes, and what falls on backs, seen from the light points by cosine-distributed rays.
+void RayTransport::countLost(const solver::GatherShot& shot, const solver::ShotBatch& batch, double light_area,
+                             solver::FluxAccumulators& into) const {
+  for (std::uint32_t k = 0; k < shot.point_count; ++k) {
+    const auto& point = batch.points[shot.first_point + k];
+    for (std::uint32_t i = 0; i < rays_; ++i) {
+      const Hit hit = cast(point.origin, cosineDirection(point, solver::sobol4(i, k)));
+      if (hit.surface != scene::kNone && hit.front) continue;
+      auto& target = hit.surface == scene::kNone ? into.escaped : into.backface;
+      for (std::size_t c = 0; c < 3; ++c) {
+        target[c] += std::llround(shot.radiosity[c] * light_area * batch.flux_scale / (rays_ * shot.point_count));
+      }
+    }
+  }
+}
+
 void RayTransport::gather(const solver::GatherShot& shot, const solver::ShotBatch& batch,
                           solver::FluxAccumulators& into) const {
   glm::vec3 cross(0.0F);
   for (std::uint32_t k = 1; k + 1 < shot.corner_count; ++k)
     cross += glm::cross(shot.corners[k] - shot.corners[0], shot.corners[k + 1] - shot.corners[0]);
   const double light_area = 0.5 * static_cast<double>(glm::length(cross));
+  countLost(shot, batch, light_area, into);
   for (const auto& surface : patches_->surfaces) {
     const auto& frame = patches_->triangles[surface.first_triangle];
     for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf) {
@@ -148,8 +173,8 @@ void RayTransport::gather(const solver::GatherShot& shot, const solver::ShotBatc
         const float distance = glm::length(to);
         const float cosines = std::max(0.0F, glm::dot(to, frame.normal)) * std::max(0.0F, -glm::dot(to, shot.normal));
         if (cosines <= 0.0F || cast(p, to / distance).distance < distance * 0.999F) continue;
-        factor[2 * k >= shot.point_count ? 1 : 0] += static_cast<double>(cosines / (distance * distance * distance * distance)) * light_area /
-                  std::numbers::pi;
+        factor[2 * k >= shot.point_count ? 1 : 0] +=
+            static_cast<double>(cosines / (distance * distance * distance * distance)) * light_area / std::numbers::pi;
       }
       const auto node = surface.first_node[0] + leaf;
       for (std::size_t c = 0; c < 3; ++c) {

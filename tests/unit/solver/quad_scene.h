@@ -49,6 +49,9 @@ class RayTransport final : public solver::Transport {
   void scatter(const solver::ScatterShot& shot, double scale, solver::FluxAccumulators& into) const;
   void gather(const solver::GatherShot& shot, const solver::ShotBatch& batch, solver::FluxAccumulators& into) const;
 
+  void countLost(const solver::GatherShot& shot, const solver::ShotBatch& batch, double light_area,
+                 solver::FluxAccumulators& into) const;
+
   std::uint32_t rays_;
   std::shared_ptr<const scene::PatchScene> patches_;
 };

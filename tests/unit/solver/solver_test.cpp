@@ -67,8 +67,6 @@ TEST(Solver, EnergyBalanceClosesToOneMillionth) {
   for (std::size_t c = 0; c < 3; ++c) {
     EXPECT_NEAR(energy.emitted[c], 3.0, 1e-5);
     EXPECT_GT(energy.escaped[c], 0.1);
-    // The ray caster's gather does not report what escaped, so that part stands in the imbalance; the sum must close
-    // all the same.
     const double sum =
         energy.absorbed[c] + energy.escaped[c] + energy.backface[c] + energy.unshot[c] + energy.imbalance[c];
     EXPECT_NEAR(sum / energy.emitted[c], 1.0, 1e-5);  // irradiance and S are single precision
