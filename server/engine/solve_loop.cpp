@@ -14,6 +14,7 @@
 
 #include "common/log.h"
 #include "server/engine/exports.h"
+#include "server/engine/framing.h"
 #include "server/engine/lit_scene.h"
 #include "server/engine/publisher.h"
 #include "server/engine/status_report.h"
@@ -464,7 +465,7 @@ Result<SharedBytes> SolveLoop::renderSnapshot(const SnapshotRequest& request) {
   if (quantity == kQuantities.end())
     return fail(ErrorCode::kBadUsage, "no quantity \"" + request.quantity + "\"", "quantity");
   gpu::ViewRequest view;
-  auto camera = chooseCamera(lit_->scene(), request.camera);
+  auto camera = chooseCamera(*lit_, request.camera, static_cast<double>(request.width) / request.height);
   if (!camera) return tl::unexpected<Error>(camera.error());
   view.camera = *camera;
   view.width = request.width;
