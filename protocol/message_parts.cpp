@@ -38,7 +38,8 @@ json toJson(const Progress& p) {
                 {"absorbed", p.energy.absorbed},
                 {"escaped", p.energy.escaped},
                 {"backface", p.energy.backface},
-                {"unshot", p.energy.unshot}}},
+                {"unshot", p.energy.unshot},
+                {"imbalance", p.energy.imbalance}}},
               {"patches", p.patches},
               {"nodes", p.nodes},
               {"surfaces", p.surfaces},
@@ -69,6 +70,7 @@ void read(Reader& r, Progress& p) {
     e.number("escaped", p.energy.escaped, Need::kRequired, kAny);
     e.number("backface", p.energy.backface, Need::kRequired, kAny);
     e.number("unshot", p.energy.unshot, Need::kRequired, kAny);
+    e.number("imbalance", p.energy.imbalance, Need::kRequired, kAny);
   });
   r.integer("patches", p.patches, Need::kOptional, 0, kAnyInteger);
   r.integer("nodes", p.nodes, Need::kOptional, 0, kAnyInteger);

@@ -37,6 +37,7 @@ struct ErrorParts {
 
 struct EnergyParts {
   double emitted = 0.0, absorbed = 0.0, escaped = 0.0, backface = 0.0, unshot = 0.0;
+  double imbalance = 0.0;  ///< may be negative
 };
 
 struct Settings {

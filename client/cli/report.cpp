@@ -46,7 +46,8 @@ std::string reportJson(const protocol::StatusReply& status, bool reached) {
                 {"absorbed", progress.energy.absorbed},
                 {"escaped", progress.energy.escaped},
                 {"backface", progress.energy.backface},
-                {"unshot", progress.energy.unshot}}},
+                {"unshot", progress.energy.unshot},
+                {"imbalance", progress.energy.imbalance}}},
               {"revision", progress.revision},
               {"gl_renderer", status.gl_renderer},
               {"reached", reached},
@@ -79,8 +80,10 @@ std::string statusText(const protocol::StatusReply& status) {
                   (s.time_limit_ms ? ", limit " + durationText(static_cast<double>(*s.time_limit_ms) / 1000.0) : ""));
   row("scene", fmt::format("{} polygons, {} surfaces, {} patches, {} nodes", countText(p.polygons),
                            countText(p.surfaces), countText(p.patches), countText(p.nodes)));
-  row("energy", fmt::format("emitted {:.6g} lm: absorbed {:.6g}, escaped {:.6g}, back faces {:.6g}, unshot {:.6g}",
-                            p.energy.emitted, p.energy.absorbed, p.energy.escaped, p.energy.backface, p.energy.unshot));
+  row("energy", fmt::format("emitted {:.6g} lm: absorbed {:.6g}, escaped {:.6g}, back faces {:.6g}, unshot {:.6g}, "
+                            "imbalance {:.3g}",
+                            p.energy.emitted, p.energy.absorbed, p.energy.escaped, p.energy.backface, p.energy.unshot,
+                            p.energy.imbalance));
   row("texels", s.texel_size_m > 0.0 ? fmt::format("{:g} m each", s.texel_size_m) : "about " + countText(s.texels));
   row("seed", std::to_string(s.seed));
   row("OpenGL", status.gl_renderer);

@@ -24,9 +24,12 @@ struct ErrorEstimate {
   double total = 1.0, residual = 1.0, sampling = 0.0, discretization = 0.0;
 };
 
-/// Luminous flux, lumens (sum of the three channels). emitted = absorbed + escaped + backface + unshot.
+/// Luminous flux, lumens (sum of the three channels).
+/// emitted = absorbed + escaped + backface + unshot + imbalance.
 struct EnergyBalance {
   double emitted = 0.0, absorbed = 0.0, escaped = 0.0, backface = 0.0, unshot = 0.0;
+  /// What unbiased sampling lost by chance (negative: gained); it falls with the sampling error.
+  double imbalance = 0.0;
 };
 
 struct SolveSettings {

@@ -14,9 +14,10 @@
 namespace radiosity::engine {
 namespace {
 
-constexpr double kInsideFov = 1.05, kOutsideFov = 0.7;  // radians, vertical
+constexpr double kInsideFov = 1.15, kOutsideFov = 0.7;  // radians, vertical
 constexpr double kOutsideWeight = 0.8;                  // of equally good views, the one from inside the room is taken
 constexpr std::size_t kFinalists = 8;
+constexpr double kLandmarks = 200.0;
 
 double luminance(const glm::vec3& c) {
   return 0.2126 * static_cast<double>(c.r) + 0.7152 * static_cast<double>(c.g) + 0.0722 * static_cast<double>(c.b);
@@ -73,6 +74,11 @@ class Scout {
   [[nodiscard]] double score(const View& view, int columns);
 
  private:
+  /// A point that stands for an equal share of the scene's light.
+  struct Landmark {
+    glm::dvec3 position, normal;
+    bool double_sided;
+  };
   /// What a ray sees first that is drawn.
   struct Sight {
     double distance = 0.0;
@@ -83,6 +89,7 @@ class Scout {
   [[nodiscard]] double irradianceAt(std::uint32_t triangle, const glm::dvec3& point) const;
   [[nodiscard]] double pageValue(const scene::Surface& surface, glm::vec2 texel) const;
   void measureLight();
+  [[nodiscard]] double overview(const View& view);
 
   const scene::Scene& scene_;
   const scene::PatchScene& patches_;
@@ -90,6 +97,7 @@ class Scout {
   scene::Bvh bvh_;
   Box bounds_, lit_;
   glm::dvec3 centre_{0.0};
+  std::vector<Landmark> landmarks_;
   double typical_ = 0.0;  // irradiance of the lit part; 0: all is black
   std::vector<scene::RayHit> hits_;
 };
@@ -121,6 +129,7 @@ double Scout::pageValue(const scene::Surface& surface, glm::vec2 texel) const {
 void Scout::measureLight() {
   struct Sample {
     glm::dvec3 position;
+    std::uint32_t triangle;
     double area, irradiance;
   };
   std::vector<Sample> samples;
@@ -130,7 +139,8 @@ void Scout::measureLight() {
       if (leaf.triangle == scene::kNone) continue;
       const auto& frame = patches_.triangles[leaf.triangle];
       const glm::dvec3 position(frame.origin + leaf.texel.x * frame.du + leaf.texel.y * frame.dv);
-      samples.push_back({position, static_cast<double>(surface.texel_area), pageValue(surface, leaf.texel)});
+      samples.push_back(
+          {position, leaf.triangle, static_cast<double>(surface.texel_area), pageValue(surface, leaf.texel)});
     }
   }
   const auto quantile = [&samples](const auto& value, const auto& weight, double share) {
@@ -156,6 +166,29 @@ void Scout::measureLight() {
     centre_[axis] = quantile(coordinate, weight, 0.5);
   }
   centre_ = 0.5 * (centre_ + lit_.middle());
+  double total = 0.0, sum = 0.0;
+  for (const auto& sample : samples) total += weight(sample);
+  for (const auto& sample : samples) {
+    sum += weight(sample);
+    if (sum * kLandmarks < total * (static_cast<double>(landmarks_.size()) + 0.5)) continue;
+    const auto& material = scene_.materials[patches_.surfaces[patches_.triangle_surface[sample.triangle]].material];
+    landmarks_.push_back(
+        {sample.position, glm::dvec3(patches_.triangles[sample.triangle].normal), material.double_sided});
+  }
+}
+
+/// The share of the scene's light that is in the picture.
+double Scout::overview(const View& view) {
+  double seen = 0.0;
+  for (const auto& landmark : landmarks_) {
+    const auto to = landmark.position - view.eye;
+    const double depth = -glm::dot(to, view.back);
+    if (depth <= 0.0 || std::abs(glm::dot(to, view.right)) > depth * view.tan_x) continue;
+    if (std::abs(glm::dot(to, view.up)) > depth * view.tan_y) continue;
+    if (!landmark.double_sided && glm::dot(to, landmark.normal) >= 0.0) continue;
+    if (cast(view.eye, to).distance > 0.998) seen += 1.0;
+  }
+  return seen / std::max(1.0, static_cast<double>(landmarks_.size()));
 }
 
 Scout::Sight Scout::cast(const glm::dvec3& eye, const glm::dvec3& direction) {
@@ -219,14 +252,14 @@ double Scout::score(const View& view, int columns) {
     if (light > 0.0) entropy -= light / lit * std::log2(light / lit);
   }
   const double rays = static_cast<double>(columns) * rows;
-  const double detail = 0.3 + 0.7 * std::min(1.0, entropy / 4.0);
+  const double interest = 0.3 * std::min(1.0, entropy / 4.0) + 0.7 * std::min(1.0, overview(view) / 0.6);
   if (!view.inside) {
     // A room seen through its culled walls is a doll's house: better than nothing.
-    return kOutsideWeight * lit / seen * std::min(1.0, 2.0 * seen / rays) * detail * (1.0 - 0.5 * backs / rays);
+    return kOutsideWeight * lit / seen * std::min(1.0, 2.0 * seen / rays) * interest * (1.0 - 0.5 * backs / rays);
   }
   const double enclosed = std::clamp((seen / rays - 0.4) / 0.4, 0.0, 1.0);  // an open place has no inside
   const double clear = std::max(0.0, 1.0 - 3.0 * close / rays), solid = std::max(0.0, 1.0 - 8.0 * backs / rays);
-  return lit / rays * enclosed * detail * clear * solid;
+  return lit / rays * enclosed * interest * clear * solid;
 }
 
 /// Eyes along the sides and in the corners of the lit part, at some heights, looking across it; at most 25 degrees up

@@ -40,9 +40,6 @@ Result<std::unique_ptr<LitScene>> LitScene::make(scene::Document document, const
   if (!patches) return tl::unexpected<Error>(patches.error());
   lit->patches_ = std::make_shared<const scene::PatchScene>(std::move(*patches));
   lit->materials_ = scene::shadePatches(*lit->scene_, *lit->patches_);
-  if (const auto uploaded = transport.setScene(lit->patches_); !uploaded) {
-    return tl::unexpected<Error>(uploaded.error());
-  }
   lit->makeSolver();
   return lit;
 }
@@ -99,6 +96,8 @@ Result<std::uint64_t> LitScene::reshade(scene::Document next, Change change) {
     const auto& after = next.gltf["materials"];
     for (std::uint32_t m = 0; m < before.size(); ++m) {
       if (before[m] == after[m]) continue;
+      const std::string place = "/materials/" + std::to_string(m) + " ";  // what was said of its former self
+      std::erase_if(materials_.warnings, [&](const auto& warning) { return warning.starts_with(place); });
       for (const auto surface : scene::reshadeMaterial(*imported, *patches_, m, materials_)) affected.insert(surface);
     }
   }

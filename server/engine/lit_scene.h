@@ -17,9 +17,12 @@ namespace radiosity::engine {
 
 class LitScene {
  public:
-  /// Imports, charts, uploads to `transport` and prepares a solve.
+  /// Imports, charts and prepares a solve. The transport stays as it is until upload().
   [[nodiscard]] static Result<std::unique_ptr<LitScene>> make(scene::Document document, const SolveSettings& settings,
                                                               solver::Transport& transport);
+
+  /// Gives the geometry to the transport; must come before the solver's first step.
+  [[nodiscard]] Result<void> upload() const { return transport_.setScene(patches_); }
 
   /// What a patch would do. kShading: emission and reflectance only; kNothing: names, extras, cameras; else kGeometry.
   enum class Change { kNothing, kShading, kGeometry };

@@ -64,6 +64,7 @@ void solveMetrics(Text& text, const engine::Status& status) {
   text.sample("energy_lumens", status.energy.escaped, "{part=\"escaped\"}");
   text.sample("energy_lumens", status.energy.backface, "{part=\"backface\"}");
   text.sample("energy_lumens", status.energy.unshot, "{part=\"unshot\"}");
+  text.sample("energy_lumens", status.energy.imbalance, "{part=\"imbalance\"}");
   text.gauge("patches", "Leaf patches with area.", status.patches);
   text.gauge("surfaces", "Charts.", status.surfaces);
   text.gauge("polygons", "Coplanar facets.", status.polygons);

@@ -46,7 +46,7 @@ class SolveTest(ServiceCase):
         for name in ("seconds", "shots", "patches", "surfaces", "polygons", "revision"):
             self.assertIsInstance(report[name], (int, float), name)
         self.assertEqual(set(report["error"]), {"total", "residual", "sampling", "discretization"})
-        self.assertEqual(set(report["energy"]), {"emitted", "absorbed", "escaped", "backface", "unshot"})
+        self.assertEqual(set(report["energy"]), {"emitted", "absorbed", "escaped", "backface", "unshot", "imbalance"})
         self.assertLessEqual(report["error"]["total"], 0.05)
         self.assertGreater(report["patches"], 500)
         self.assertEqual(report["polygons"], 2)

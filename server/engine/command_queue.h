@@ -1,0 +1,37 @@
+// What other threads ask of the solve thread: commands in the order they came, never more than a fixed number. push()
+// and close() from any thread, take() from the solve thread alone.
+#pragma once
+
+#include <condition_variable>
+#include <cstddef>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <vector>
+
+namespace radiosity::engine {
+
+class CommandQueue {
+ public:
+  using Command = std::function<void()>;
+
+  explicit CommandQueue(std::size_t capacity) : capacity_(capacity) {}
+
+  /// False: the queue is full or closed, and the command will never run.
+  [[nodiscard]] bool push(Command command);
+
+  /// All that is due, oldest first. `wait`: sleeps until there is something. Nothing: the queue was closed.
+  [[nodiscard]] std::optional<std::vector<Command>> take(bool wait);
+
+  /// Wakes the solve thread for the last time. Commands that still wait are dropped unanswered.
+  void close();
+
+ private:
+  const std::size_t capacity_;
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  std::vector<Command> commands_;
+  bool closed_ = false;
+};
+
+}  // namespace radiosity::engine
