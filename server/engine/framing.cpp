@@ -252,10 +252,11 @@ double Scout::score(const View& view, int columns) {
     if (light > 0.0) entropy -= light / lit * std::log2(light / lit);
   }
   const double rays = static_cast<double>(columns) * rows;
-  const double interest = 0.3 * std::min(1.0, entropy / 4.0) + 0.7 * std::min(1.0, overview(view) / 0.6);
+  const double interest = 0.5 * std::min(1.0, entropy / 4.0) + 0.5 * std::min(1.0, overview(view) / 0.6);
   if (!view.inside) {
     // A room seen through its culled walls is a doll's house: better than nothing.
-    return kOutsideWeight * lit / seen * std::min(1.0, 2.0 * seen / rays) * interest * (1.0 - 0.5 * backs / rays);
+    return kOutsideWeight * lit / seen * std::min(1.0, 2.0 * seen / rays) * interest *
+           (1.0 - 0.8 * backs / std::max(seen, backs));
   }
   const double enclosed = std::clamp((seen / rays - 0.4) / 0.4, 0.0, 1.0);  // an open place has no inside
   const double clear = std::max(0.0, 1.0 - 3.0 * close / rays), solid = std::max(0.0, 1.0 - 8.0 * backs / rays);
