@@ -7,11 +7,21 @@
 namespace radiosity::engine {
 namespace {
 
-/// Members of a material that only change how bright or how reflecting it is.
+void eraseLabels(nlohmann::json& object) {
+  object.erase("name");
+  object.erase("extras");
+}
+
+bool sameButLabels(nlohmann::json a, nlohmann::json b) {
+  eraseLabels(a);
+  eraseLabels(b);
+  return a == b;
+}
+
+/// Whether two materials differ only in how bright or how reflecting they are.
 bool sameButShading(nlohmann::json a, nlohmann::json b) {
   for (auto* material : {&a, &b}) {
-    material->erase("name");
-    material->erase("extras");
+    eraseLabels(*material);
     material->erase("emissiveFactor");
     material->erase("emissiveTexture");
     if (material->contains("extensions")) (*material)["extensions"].erase("KHR_materials_emissive_strength");
@@ -23,6 +33,10 @@ bool sameButShading(nlohmann::json a, nlohmann::json b) {
 /// Members of the document that do not touch light at all.
 void eraseHarmless(nlohmann::json& gltf) {
   for (const char* member : {"asset", "extras", "cameras", "animations", "extensionsUsed"}) gltf.erase(member);
+  for (const char* member : {"nodes", "meshes", "scenes"}) {
+    if (!gltf.contains(member)) continue;
+    for (auto& object : gltf[member]) eraseLabels(object);
+  }
 }
 
 }  // namespace
@@ -95,7 +109,7 @@ Result<std::uint64_t> LitScene::reshade(scene::Document next, Change change) {
     const auto& before = document_.gltf["materials"];
     const auto& after = next.gltf["materials"];
     for (std::uint32_t m = 0; m < before.size(); ++m) {
-      if (before[m] == after[m]) continue;
+      if (sameButLabels(before[m], after[m])) continue;
       const std::string place = "/materials/" + std::to_string(m) + " ";  // what was said of its former self
       std::erase_if(materials_.warnings, [&](const auto& warning) { return warning.starts_with(place); });
       for (const auto surface : scene::reshadeMaterial(*imported, *patches_, m, materials_)) affected.insert(surface);

@@ -1,0 +1,42 @@
+#include "server/engine/command_queue.h"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <thread>
+
+namespace radiosity::engine {
+namespace {
+
+TEST(CommandQueue, CommandsComeOutInTheOrderTheyWentIn) {
+  CommandQueue queue(8);
+  std::vector<int> done;
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(queue.push([&done, i] { done.push_back(i); }));
+  const auto due = queue.take(true);
+  ASSERT_TRUE(due);
+  for (const auto& command : *due) command();
+  EXPECT_EQ(done, (std::vector<int>{0, 1, 2}));
+  EXPECT_TRUE(queue.take(false)->empty());
+}
+
+TEST(CommandQueue, FullQueueRefusesUntilItIsEmptied) {
+  CommandQueue queue(2);
+  EXPECT_TRUE(queue.push([] {}));
+  EXPECT_TRUE(queue.push([] {}));
+  EXPECT_FALSE(queue.push([] {}));
+  EXPECT_EQ(queue.take(false)->size(), 2U);
+  EXPECT_TRUE(queue.push([] {}));
+}
+
+TEST(CommandQueue, ClosingWakesTheSleeperAndRefusesFromThenOn) {
+  CommandQueue queue(2);
+  bool ended = false;
+  std::thread sleeper([&] { ended = !queue.take(true).has_value(); });
+  queue.close();
+  sleeper.join();
+  EXPECT_TRUE(ended);
+  EXPECT_FALSE(queue.push([] {}));
+}
+
+}  // namespace
+}  // namespace radiosity::engine

@@ -1,0 +1,167 @@
+#include "tests/unit/engine/engine_driver.h"
+
+#include "tests/scenes/glb_writer.h"
+#include "tests/unit/solver/quad_scene.h"
+
+namespace radiosity::test {
+namespace {
+
+class ScriptedTransport final : public solver::Transport {
+ public:
+  explicit ScriptedTransport(std::shared_ptr<TransportScript> script) : script_(std::move(script)) {}
+
+  Result<void> setScene(std::shared_ptr<const scene::PatchScene> patches) override {
+    if (script_->uploads_to_fail > 0 && script_->uploads_to_fail-- > 0)
+      return fail(ErrorCode::kUnavailable, "out of memory on the device");
+    ++script_->uploads;
+    return rays_.setScene(std::move(patches));
+  }
+  Result<solver::TransportCounters> run(const solver::ShotBatch& batch, solver::FluxAccumulators& into) override {
+    if (script_->run_fails) return fail(ErrorCode::kUnavailable, "the device was lost");
+    return rays_.run(batch, into);
+  }
+  [[nodiscard]] std::string description() const override { return "rays"; }
+
+ private:
+  std::shared_ptr<TransportScript> script_;
+  RayTransport rays_{16};
+};
+
+}  // namespace
+
+void Recorder::onProgress(const engine::Status& status) {
+  const std::scoped_lock lock(mutex_);
+  progress_.push_back(status);
+}
+
+void Recorder::onScenePatched(std::uint64_t revision, const std::string& patch, const std::string& by) {
+  const std::scoped_lock lock(mutex_);
+  patched_.push_back({revision, patch, by});
+}
+
+void Recorder::onSceneLoaded(std::uint64_t revision) {
+  const std::scoped_lock lock(mutex_);
+  loaded_.push_back(revision);
+}
+
+void Recorder::onLightmaps(const std::shared_ptr<const engine::Lightmaps>& lightmaps) {
+  const std::scoped_lock lock(mutex_);
+  lightmaps_.push_back(lightmaps);
+}
+
+std::vector<engine::Status> Recorder::progress() const {
+  const std::scoped_lock lock(mutex_);
+  return progress_;
+}
+
+std::vector<Recorder::Patched> Recorder::patched() const {
+  const std::scoped_lock lock(mutex_);
+  return patched_;
+}
+
+std::vector<std::uint64_t> Recorder::loaded() const {
+  const std::scoped_lock lock(mutex_);
+  return loaded_;
+}
+
+std::vector<std::shared_ptr<const engine::Lightmaps>> Recorder::lightmaps() const {
+  const std::scoped_lock lock(mutex_);
+  return lightmaps_;
+}
+
+void Recorder::forget() {
+  const std::scoped_lock lock(mutex_);
+  progress_.clear();
+  patched_.clear();
+  loaded_.clear();
+  lightmaps_.clear();
+}
+
+engine::EngineOptions rayOptions(std::shared_ptr<TransportScript> script) {
+  engine::EngineOptions options;
+  options.settings.target_error = kEasy;
+  options.settings.texels = 150;
+  options.make_transport = [script = std::move(script)]() -> Result<std::unique_ptr<solver::Transport>> {
+    return std::make_unique<ScriptedTransport>(script);
+  };
+  return options;
+}
+
+void EngineTest::SetUp() {
+  auto made = engine::makeEngine(rayOptions(script_));
+  ASSERT_TRUE(made) << made.error().text();
+  engine_ = std::move(*made);
+  engine_->addListener(recorder_);
+}
+
+Result<engine::LoadOutcome> EngineTest::load(const test_scenes::TestScene& scene) {
+  const auto bytes = std::make_shared<const Bytes>(test_scenes::encodeGlb(scene));
+  return call<engine::LoadOutcome>([&](auto done) { engine_->loadBytes(scene.name + ".glb", bytes, std::move(done)); });
+}
+
+Result<engine::PatchOutcome> EngineTest::patch(engine::PatchRequest request) {
+  return call<engine::PatchOutcome>([&](auto done) { engine_->patch(std::move(request), std::move(done)); });
+}
+
+Result<engine::SolveSettings> EngineTest::configure(const std::function<void(engine::SolveSettings&)>& change) {
+  auto settings = status().settings;
+  change(settings);
+  return call<engine::SolveSettings>([&](auto done) { engine_->configure(settings, std::move(done)); });
+}
+
+Result<engine::SolveState> EngineTest::pause() {
+  return call<State>([&](auto done) { engine_->pause(std::move(done)); });
+}
+
+Result<engine::SolveState> EngineTest::resume() {
+  return call<State>([&](auto done) { engine_->resume(std::move(done)); });
+}
+
+Result<engine::SolveState> EngineTest::restart() {
+  return call<State>([&](auto done) { engine_->restart(std::move(done)); });
+}
+
+std::string EngineTest::sceneText() {
+  const auto text = call<engine::Engine::SceneText>([&](auto done) { engine_->sceneText(std::move(done)); });
+  return text ? text->gltf : text.error().text();
+}
+
+testing::AssertionResult EngineTest::reaches(State state) {
+  const auto deadline = std::chrono::steady_clock::now() + kPatience;
+  while (std::chrono::steady_clock::now() < deadline) {
+    const auto now = status();
+    if (now.state == state) return testing::AssertionSuccess();
+    if (now.state != State::kSolving && now.state != State::kLoading && now.state != State::kEmpty) {
+      return testing::AssertionFailure() << "state " << static_cast<int>(now.state) << ", error " << now.error.total
+                                         << " " << now.failure;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return testing::AssertionFailure() << "still in state " << static_cast<int>(status().state);
+}
+
+void EngineTest::solve(const test_scenes::TestScene& scene) {
+  const auto loaded = load(scene);
+  ASSERT_TRUE(loaded) << loaded.error().text();
+  ASSERT_TRUE(reaches(State::kConverged));
+  (void)sceneText();  // the final lightmaps are published after the state
+}
+
+std::string emissionPatch(int index, double nits) {
+  const std::string material = "/materials/" + std::to_string(index);
+  return R"([{"op":"replace","path":")" + material + R"(/emissiveFactor","value":[1,1,1]},)" +
+         R"({"op":"add","path":")" + material + R"(/extensions","value":{"KHR_materials_emissive_strength":)" +
+         R"({"emissiveStrength":)" + std::to_string(nits) + "}}}]";
+}
+
+double meanIrradiance(const engine::Lightmaps& lightmaps) {
+  double sum = 0.0;
+  std::size_t count = 0;
+  for (const auto& page : lightmaps.pages) {
+    for (const auto& texel : page->mips.front().pixels) sum += static_cast<double>(texel.x + texel.y + texel.z) / 3.0;
+    count += page->mips.front().pixels.size();
+  }
+  return sum / static_cast<double>(std::max<std::size_t>(count, 1));
+}
+
+}  // namespace radiosity::test

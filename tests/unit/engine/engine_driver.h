@@ -1,0 +1,119 @@
+// The engine with a ray caster in place of OpenGL, and the means to ask it things from a test's thread.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <future>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "server/engine/solve_loop.h"
+#include "tests/scenes/scene.h"
+
+namespace radiosity::test {
+
+/// What a test decides about the transport while the solve thread uses it.
+struct TransportScript {
+  std::atomic<bool> run_fails{false};
+  std::atomic<int> uploads_to_fail{0};
+  std::atomic<int> uploads{0};
+};
+
+/// Everything a listener is told, in order.
+class Recorder final : public engine::Listener {
+ public:
+  void onProgress(const engine::Status& status) override;
+  void onScenePatched(std::uint64_t revision, const std::string& patch, const std::string& by) override;
+  void onSceneLoaded(std::uint64_t revision) override;
+  void onLightmaps(const std::shared_ptr<const engine::Lightmaps>& lightmaps) override;
+
+  struct Patched {
+    std::uint64_t revision = 0;
+    std::string patch, by;
+  };
+  [[nodiscard]] std::vector<engine::Status> progress() const;
+  [[nodiscard]] std::vector<Patched> patched() const;
+  [[nodiscard]] std::vector<std::uint64_t> loaded() const;
+  [[nodiscard]] std::vector<std::shared_ptr<const engine::Lightmaps>> lightmaps() const;
+  void forget();
+
+ private:
+  mutable std::mutex mutex_;
+  std::vector<engine::Status> progress_;
+  std::vector<Patched> patched_;
+  std::vector<std::uint64_t> loaded_;
+  std::vector<std::shared_ptr<const engine::Lightmaps>> lightmaps_;
+};
+
+/// A target that these small scenes reach in well under a second; and one that they never reach.
+inline constexpr double kEasy = 0.2, kNever = 1e-9;
+
+class EngineTest : public testing::Test {
+ protected:
+  using State = engine::SolveState;
+
+  void SetUp() override;
+  void TearDown() override { engine_.reset(); }
+
+  /// Asks and waits for the answer: call<LoadOutcome>([&](auto done) { engine().loadBytes("a.glb", bytes, done); }).
+  template <typename T, typename Ask>
+  Result<T> call(Ask ask) {
+    auto promise = std::make_shared<std::promise<Result<T>>>();
+    auto answer = promise->get_future();
+    ask([promise](Result<T> result) { promise->set_value(std::move(result)); });
+    if (answer.wait_for(kPatience) != std::future_status::ready)
+      return fail(ErrorCode::kInternal, "the engine did not answer");
+    return answer.get();
+  }
+
+  Result<engine::LoadOutcome> load(const test_scenes::TestScene& scene);
+  Result<engine::PatchOutcome> patch(engine::PatchRequest request);
+  Result<engine::PatchOutcome> patch(std::string json) { return patch({std::move(json), {}, false, "test"}); }
+  Result<engine::SolveSettings> configure(const std::function<void(engine::SolveSettings&)>& change);
+  Result<State> pause();
+  Result<State> resume();
+  Result<State> restart();
+  /// Returns when everything asked before has been done.
+  std::string sceneText();
+
+  /// Waits until `holds()`; false: it never did.
+  template <typename Condition>
+  [[nodiscard]] bool eventually(const Condition& holds) {
+    const auto deadline = std::chrono::steady_clock::now() + kPatience;
+    while (!holds()) {
+      if (std::chrono::steady_clock::now() > deadline) return false;
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    return true;
+  }
+  /// Waits for the state; false: another state that lasts came instead.
+  [[nodiscard]] testing::AssertionResult reaches(State state);
+  /// Loads and waits for the target error.
+  void solve(const test_scenes::TestScene& scene);
+
+  [[nodiscard]] engine::Engine& engine() { return *engine_; }
+  [[nodiscard]] engine::Status status() const { return engine_->status(); }
+
+  static constexpr std::chrono::seconds kPatience{60};
+  std::shared_ptr<TransportScript> script_ = std::make_shared<TransportScript>();
+  std::shared_ptr<Recorder> recorder_ = std::make_shared<Recorder>();
+  std::unique_ptr<engine::Engine> engine_;
+};
+
+/// Options for an engine that casts rays as `script` says.
+[[nodiscard]] engine::EngineOptions rayOptions(std::shared_ptr<TransportScript> script);
+
+/// Patch that gives material `index` the luminance `nits`.
+[[nodiscard]] std::string emissionPatch(int index, double nits);
+
+/// Mean of all texels of all pages.
+[[nodiscard]] double meanIrradiance(const engine::Lightmaps& lightmaps);
+
+}  // namespace radiosity::test
