@@ -9,16 +9,11 @@
 #include <stb_image_write.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <exception>
 #include <glm/common.hpp>
-#include <glm/exponential.hpp>
-#include <glm/geometric.hpp>
-#include <glm/gtc/matrix_inverse.hpp>
-#include <glm/gtc/matrix_transform.hpp>
-#include <limits>
+#include <string>
 
 namespace radiosity::engine {
 namespace {
@@ -67,29 +62,6 @@ void appendBytes(void* context, void* data, int size) {
   bytes.insert(bytes.end(), first, first + size);
 }
 
-/// Looks at the middle of the scene from outside, a little from above; back faces are not drawn, so one sees into a
-/// room.
-scene::Camera framingCamera(const scene::Scene& scene) {
-  glm::dvec3 low(std::numeric_limits<double>::max()), high(std::numeric_limits<double>::lowest());
-  for (const auto& instance : scene.instances) {
-    if (!instance.visible) continue;
-    for (const auto& p : scene.primitives[instance.primitive].positions) {
-      const glm::dvec3 world(instance.world * glm::dvec4(p, 1.0));
-      low = glm::min(low, world);
-      high = glm::max(high, world);
-    }
-  }
-  if (low.x > high.x) low = glm::dvec3(-1.0), high = glm::dvec3(1.0);
-  scene::Camera camera;
-  const glm::dvec3 middle = 0.5 * (low + high), direction = glm::normalize(glm::dvec3(0.55, 0.45, 1.0));
-  const double radius = std::max(0.5 * glm::length(high - low), 1e-6);
-  const glm::dvec3 eye = middle + direction * (radius / std::tan(0.5 * camera.yfov_rad) * 1.05);
-  camera.name = "framed";
-  camera.world = glm::inverse(glm::lookAt(eye, middle, glm::dvec3(0.0, 1.0, 0.0)));
-  camera.znear = radius * 1e-3;
-  return camera;
-}
-
 }  // namespace
 
 Result<Bytes> encodeExr(const Image& irradiance) {
@@ -134,19 +106,6 @@ Result<Bytes> encodePng(const Image& display) {
   return bytes;
 }
 
-float autoExposure(const Image& radiance) {
-  double sum = 0.0;
-  std::size_t count = 0;
-  for (const auto& pixel : radiance.pixels) {
-    const double luminance = 0.2126 * static_cast<double>(pixel.r) + 0.7152 * static_cast<double>(pixel.g) +
-                             0.0722 * static_cast<double>(pixel.b);
-    if (luminance <= 0.0) continue;
-    sum += std::log(luminance);
-    ++count;
-  }
-  return count == 0 ? 1.0F : static_cast<float>(0.18 / std::exp(sum / static_cast<double>(count)));
-}
-
 Image toneMap(const Image& radiance, float exposure) {
   Image display(radiance.width, radiance.height);
   std::transform(radiance.pixels.begin(), radiance.pixels.end(), display.pixels.begin(),
@@ -155,20 +114,6 @@ Image toneMap(const Image& radiance, float exposure) {
                    return glm::vec3(encodeSrgb(mapped.r), encodeSrgb(mapped.g), encodeSrgb(mapped.b));
                  });
   return display;
-}
-
-Result<scene::Camera> chooseCamera(const scene::Scene& scene, const std::string& wanted) {
-  if (wanted.empty()) return scene.cameras.empty() ? framingCamera(scene) : scene.cameras.front();
-  for (const auto& camera : scene.cameras) {
-    if (camera.name == wanted) return camera;
-  }
-  std::size_t index = 0;
-  const auto parsed = std::from_chars(wanted.data(), wanted.data() + wanted.size(), index);
-  if (parsed.ec == std::errc() && parsed.ptr == wanted.data() + wanted.size() && index < scene.cameras.size()) {
-    return scene.cameras[index];
-  }
-  return fail(ErrorCode::kNotFound,
-              "the scene has no camera \"" + wanted + "\" (it has " + std::to_string(scene.cameras.size()) + ")");
 }
 
 }  // namespace radiosity::engine

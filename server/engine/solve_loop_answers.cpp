@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "server/engine/exports.h"
+#include "server/engine/framing.h"
 #include "server/engine/solve_loop_class.h"
 #include "server/scene/lightmap.h"
 
@@ -69,7 +70,7 @@ Result<SharedBytes> SolveLoop::renderSnapshot(const SnapshotRequest& request) {
   if (quantity == kQuantities.end())
     return fail(ErrorCode::kBadUsage, "no quantity \"" + request.quantity + "\"", "quantity");
   gpu::ViewRequest view;
-  auto camera = chooseCamera(lit_->scene(), request.camera);
+  auto camera = chooseCamera(*lit_, request.camera, static_cast<double>(request.width) / request.height);
   if (!camera) return tl::unexpected<Error>(camera.error());
   view.camera = *camera;
   view.width = request.width;

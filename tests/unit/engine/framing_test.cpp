@@ -1,0 +1,138 @@
+// Which view is chosen for a scene without cameras, and how bright a picture is shown.
+#include "server/engine/framing.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <glm/gtc/matrix_inverse.hpp>
+
+namespace radiosity::engine {
+namespace {
+
+/// A box of quads; `inward`: a room, seen from inside only.
+scene::Scene boxScene(const glm::dvec3& low, const glm::dvec3& high, bool inward, unsigned faces = 6) {
+  scene::Scene scene;
+  scene.materials.resize(1);
+  scene::Primitive primitive;
+  for (unsigned corner = 0; corner < 8; ++corner) {
+    primitive.positions.emplace_back((corner & 1U) != 0U ? high.x : low.x, (corner & 2U) != 0U ? high.y : low.y,
+                                     (corner & 4U) != 0U ? high.z : low.z);
+  }
+  // counter-clockwise from outside: -x, +x, -y, +y, -z, +z
+  constexpr std::array<std::array<std::uint32_t, 4>, 6> kFaces = {
+      {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}}};
+  for (unsigned f = 0; f < faces; ++f) {
+    const auto& q = kFaces[f];
+    const std::array<std::uint32_t, 4> c = inward ? std::array<std::uint32_t, 4>{q[3], q[2], q[1], q[0]} : q;
+    for (const auto i : {c[0], c[1], c[2], c[0], c[2], c[3]}) primitive.indices.push_back(i);
+  }
+  scene.primitives = {primitive};
+  scene.instances.resize(1);
+  scene.instances[0].primitive = 0;
+  return scene;
+}
+
+struct Framed {
+  scene::PatchScene patches;
+  scene::Camera camera;
+  glm::dvec3 eye{0.0};
+};
+
+Framed frame(const scene::Scene& scene, double aspect = 4.0 / 3.0) {
+  Framed framed;
+  scene::ChartOptions options;
+  options.texel_budget = 600;
+  auto patches = scene::buildPatchScene(scene, options);
+  EXPECT_TRUE(patches.has_value());
+  framed.patches = std::move(*patches);
+  std::vector<Image> pages;
+  for (const auto& page : framed.patches.pages) {
+    pages.emplace_back(static_cast<int>(page.width), static_cast<int>(page.height), glm::vec3(1.0F));
+  }
+  framed.camera = frameScene(scene, framed.patches, pages, aspect);
+  framed.eye = glm::dvec3(framed.camera.world[3]);
+  return framed;
+}
+
+bool within(const glm::dvec3& p, const glm::dvec3& low, const glm::dvec3& high) {
+  return p.x > low.x && p.y > low.y && p.z > low.z && p.x < high.x && p.y < high.y && p.z < high.z;
+}
+
+/// Largest |x| or |y| of the box's corners in the picture, whose border is 1; infinite for a corner behind the eye.
+double reach(const scene::Camera& camera, const glm::dvec3& low, const glm::dvec3& high, double aspect) {
+  const auto to_camera = glm::inverse(camera.world);
+  const double half = std::tan(0.5 * camera.yfov_rad);
+  double largest = 0.0;
+  for (unsigned corner = 0; corner < 8; ++corner) {
+    const auto p = to_camera * glm::dvec4((corner & 1U) != 0U ? high.x : low.x, (corner & 2U) != 0U ? high.y : low.y,
+                                          (corner & 4U) != 0U ? high.z : low.z, 1.0);
+    if (p.z >= 0.0) return INFINITY;
+    largest = std::max({largest, std::abs(p.x / (-p.z * half * aspect)), std::abs(p.y / (-p.z * half))});
+  }
+  return largest;
+}
+
+TEST(Framing, AClosedRoomIsSeenFromInside) {
+  const glm::dvec3 low(10, 0, -3), high(16, 2.6, 1);
+  EXPECT_TRUE(within(frame(boxScene(low, high, true)).eye, low, high));
+}
+
+TEST(Framing, AnObjectSeenFromOutsideIsWhollyInThePicture) {
+  const glm::dvec3 low(-1, 0, 5), high(3, 1, 6);
+  for (const double aspect : {0.5, 4.0 / 3.0, 2.5}) {
+    const auto framed = frame(boxScene(low, high, false), aspect);
+    EXPECT_FALSE(within(framed.eye, low, high));
+    const double border = reach(framed.camera, low, high, aspect);
+    EXPECT_LE(border, 1.0) << aspect;
+    EXPECT_GT(border, 0.8) << "lost in the picture at aspect " << aspect;
+  }
+}
+
+TEST(Framing, AnEyeInsideASolidIsNotTaken) {
+  auto scene = boxScene({0, 0, 0}, {6, 3, 6}, true);
+  // A cupboard that fills half of the room: a third of the candidates stand in it.
+  scene.primitives.push_back(boxScene({0.1, 0.1, 0.1}, {3, 2.9, 5.9}, false).primitives[0]);
+  scene.instances.push_back(scene.instances[0]);
+  scene.instances[1].primitive = 1;
+  const auto framed = frame(scene);
+  EXPECT_TRUE(within(framed.eye, {0, 0, 0}, {6, 3, 6}));
+  EXPECT_FALSE(within(framed.eye, {0.1, 0.1, 0.1}, {3, 2.9, 5.9}));
+}
+
+TEST(Framing, TheSameSceneGivesTheSameCamera) {
+  const auto scene = boxScene({0, 0, 0}, {4, 3, 5}, true);
+  EXPECT_EQ(frame(scene).camera.world, frame(scene).camera.world);
+}
+
+TEST(Framing, AnEmptySceneHasAFiniteCamera) {
+  const auto camera = frameScene(scene::Scene{}, scene::PatchScene{}, {}, 1.5);
+  for (int column = 0; column < 4; ++column) {
+    for (int row = 0; row < 4; ++row) EXPECT_TRUE(std::isfinite(camera.world[column][row]));
+  }
+}
+
+TEST(AutoExposure, ADarkSurroundingDoesNotBleachTheLitPart) {
+  Image picture(100, 100, glm::vec3(1e-3F));
+  for (int y = 0; y < 10; ++y) {
+    for (int x = 0; x < 100; ++x) picture.at(x, y) = glm::vec3(50.0F);
+  }
+  EXPECT_NEAR(autoExposure(picture) * 50.0F, 0.18F, 0.01F);
+}
+
+TEST(AutoExposure, ATinyBrightLampDoesNotDarkenTheRoom) {
+  Image picture(100, 100, glm::vec3(2.0F));
+  for (int x = 0; x < 50; ++x) picture.at(x, 0) = glm::vec3(2e4F);
+  EXPECT_NEAR(autoExposure(picture) * 2.0F, 0.18F, 0.01F);
+}
+
+TEST(AutoExposure, IsTheLogarithmicMeanWhereContrastIsModest) {
+  Image picture(2, 1);
+  picture.pixels = {glm::vec3(1.0F), glm::vec3(4.0F)};
+  EXPECT_NEAR(autoExposure(picture), 0.09F, 1e-4F);
+}
+
+TEST(AutoExposure, ABlackPictureStaysAsItIs) { EXPECT_EQ(autoExposure(Image(4, 4)), 1.0F); }
+
+}  // namespace
+}  // namespace radiosity::engine
