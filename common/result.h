@@ -1,6 +1,8 @@
 // Errors that a peer, a file or a driver can cause travel as values. Our own bugs use CHECK (check.h).
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <tl/expected.hpp>
 #include <utility>
@@ -28,6 +30,7 @@ struct Error {
   ErrorCode code = ErrorCode::kInternal;
   std::string message;
   std::string where = {};
+  std::optional<std::uint32_t> operation = {};  ///< index of the JSON Patch operation that failed
 
   /// "where: message", or just the message.
   [[nodiscard]] std::string text() const { return where.empty() ? message : where + ": " + message; }

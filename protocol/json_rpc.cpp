@@ -191,8 +191,8 @@ std::string encodeBatch(const std::vector<std::string>& answers) {
 
 RpcError toRpcError(const Error& error) {
   for (const auto& pair : kCodes)
-    if (pair.ours == error.code) return {pair.wire, error.message, error.where};
-  return {RpcCode::kInternalError, error.message, error.where};
+    if (pair.ours == error.code) return {pair.wire, error.message, error.where, error.operation};
+  return {RpcCode::kInternalError, error.message, error.where, error.operation};
 }
 
 Error fromRpcError(const RpcError& error) {

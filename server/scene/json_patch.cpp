@@ -76,7 +76,9 @@ class Patcher {
   }
 
   [[nodiscard]] tl::unexpected<Error> fault(const std::string& what, ErrorCode code = ErrorCode::kBadInput) const {
-    return fail(code, "operation " + std::to_string(number_) + ": " + what, where_);
+    Error error{code, "operation " + std::to_string(number_) + ": " + what, where_};
+    error.operation = static_cast<std::uint32_t>(number_);
+    return tl::unexpected<Error>(std::move(error));
   }
 
   [[nodiscard]] Result<Tokens> split(const std::string& pointer) const {

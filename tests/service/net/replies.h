@@ -1,0 +1,30 @@
+// What tests of the WebSocket side ask of replies and connections.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include "tests/service/net/test_client.h"
+
+namespace radiosity::testing {
+
+inline int codeOf(const protocol::RpcResponse& response) {
+  return response.error ? static_cast<int>(response.error->code) : 0;
+}
+
+template <typename Reply>
+Reply replyOf(const protocol::RpcResponse& response) {
+  EXPECT_FALSE(response.error.has_value()) << response.error->message;
+  if (response.error) return {};
+  const auto reply = protocol::decodeReply<Reply>(*response.result);
+  EXPECT_TRUE(reply.has_value()) << reply.error().text();
+  return reply.value_or(Reply{});
+}
+
+/// Reads to the end of the connection.
+inline int closeCodeOf(TestSocket& socket) {
+  while (socket.read()) {
+  }
+  return socket.closeCode();
+}
+
+}  // namespace radiosity::testing
