@@ -71,7 +71,10 @@ void SolveLoop::solveSlice() {
   } else {
     const auto now = Clock::now();
     if (now - last_publish_ >= kPublishInterval) publishLightmaps(false);
-    if (now - last_progress_ >= kProgressInterval) updateStatus(true);
+    if (now - last_progress_ >= kProgressInterval) {
+      lit_->solver().assess();
+      updateStatus(true);
+    }
   }
 }
 
@@ -85,6 +88,7 @@ void SolveLoop::beginSolve() {
 
 void SolveLoop::endSolve(SolveState state) {
   state_ = state;
+  if (lit_) lit_->solver().assess();
   updateStatus(false);
   publishLightmaps(true);
   updateStatus(true);

@@ -49,8 +49,9 @@ class Planner {
     wave_ = 0;
   }
 
-  /// Next wave of scatter shots; the leaves they stand for are marked as shot. Stops early when the power that remains
-  /// is below `remainder`. An empty batch: nothing worth shooting.
+  /// Next wave of shots of reflected light (and of emission that is not gathered as direct light); the leaves they
+  /// stand for are marked as shot. Stops early when the power that remains is below `remainder`. An empty batch:
+  /// nothing worth shooting.
   [[nodiscard]] ShotBatch scatterWave(RadiosityState& state, double remainder);
 
   /// Direct light: what every light polygon has not delivered yet, from fresh points. The lights are marked as

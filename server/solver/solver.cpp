@@ -137,6 +137,12 @@ StepOutcome Solver::finishRound() {
   return StepOutcome::kRoundDone;
 }
 
+void Solver::assess() {
+  if (!live_) return;
+  publish();
+  error_ = estimateError(state_, owedPower());
+}
+
 void Solver::publish() {
   state_.pushPullAll();
   irradiance_ = state_.nodeIrradiance();

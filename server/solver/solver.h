@@ -1,4 +1,5 @@
-// Progressive radiosity of one scene: direct light gathered, indirect light scattered wave by wave, whole rounds
+// Progressive radiosity of one scene: waves of shots from the strongest nodes (planar ones gathered as polygons, others
+// scattered through hemicubes of mip-level patch IDs), direct light gathered from many points, whole rounds
 // averaged until the stated error is reached. Owned by the solve loop; one thread. Carries no light itself: that is the
 // Transport's.
 #pragma once
@@ -47,6 +48,9 @@ class Solver {
   void setMaterials(const scene::PatchMaterials& materials);
   /// Goes on with further rounds when the solve had stopped at a larger error.
   void setTargetError(double target);
+
+  /// Brings irradiance() and error() up to date when the solve is stopped before its first round ended.
+  void assess();
 
   /// Irradiance (lux) by node, level 0. In the first round it grows with every wave; later it is that of the last whole
   /// round.
