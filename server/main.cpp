@@ -24,7 +24,6 @@ int report(const Error& error) {
 void loadFirstScene(engine::Engine& engine, const std::string& path) {
   engine.loadFile(path, [path](const Result<engine::LoadOutcome>& outcome) {
     if (!outcome) return log::error("{}", outcome.error().text());
-    for (const auto& warning : outcome->warnings) log::warn("{}", warning);
   });
 }
 

@@ -8,6 +8,7 @@ namespace radiosity::engine {
 namespace {
 
 void eraseLabels(nlohmann::json& object) {
+  if (!object.is_object()) return;  // the document is compared before it is checked
   object.erase("name");
   object.erase("extras");
 }
@@ -21,11 +22,14 @@ bool sameButLabels(nlohmann::json a, nlohmann::json b) {
 /// Whether two materials differ only in how bright or how reflecting they are.
 bool sameButShading(nlohmann::json a, nlohmann::json b) {
   for (auto* material : {&a, &b}) {
+    if (!material->is_object()) continue;
     eraseLabels(*material);
     material->erase("emissiveFactor");
     material->erase("emissiveTexture");
-    if (material->contains("extensions")) (*material)["extensions"].erase("KHR_materials_emissive_strength");
-    if (material->contains("pbrMetallicRoughness")) (*material)["pbrMetallicRoughness"].clear();
+    const auto extensions = material->find("extensions");
+    if (extensions != material->end() && extensions->is_object()) extensions->erase("KHR_materials_emissive_strength");
+    const auto reflection = material->find("pbrMetallicRoughness");
+    if (reflection != material->end() && reflection->is_object()) reflection->clear();
   }
   return a == b;
 }
@@ -121,7 +125,7 @@ Result<std::uint64_t> LitScene::reshade(scene::Document next, Change change) {
   // The integers' scale was chosen for the power at the start. Far outside it they could overflow or lose the small
   // lights.
   const double power = emittedPower(materials_);
-  if (power > 64.0 * solver_power_ || power < solver_power_ / 4096.0) {
+  if (power > 4.0 * solver_power_ || power < solver_power_ / 64.0) {
     makeSolver();
   } else {
     solver_->setMaterials(materials_);

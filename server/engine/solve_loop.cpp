@@ -66,6 +66,9 @@ void SolveLoop::solveSlice() {
   unpublished_ = true;
   if (*outcome == solver::StepOutcome::kConverged) {
     endSolve(SolveState::kConverged);
+  } else if (*outcome == solver::StepOutcome::kExhausted) {
+    failure_ = "the target error is smaller than this solver can reach: no further round fits its integers";
+    endSolve(SolveState::kFailed);
   } else if (settings_.time_limit_s && seconds_ >= *settings_.time_limit_s) {
     endSolve(SolveState::kTimeLimit);
   } else {

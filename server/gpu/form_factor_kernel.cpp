@@ -68,6 +68,7 @@ ClippedPolygon clipToPlane(std::span<const glm::vec3> corners, const glm::vec3& 
     }
   }
   if (clipped.count < 3) clipped.count = 0;
+  clipped.count = std::min(clipped.count, std::size_t{9});
   return clipped;
 }
 

@@ -11,8 +11,8 @@ namespace radiosity::gpu {
 
 /// A convex polygon of at most eight corners clipped by the receivers' plane.
 struct ClippedPolygon {
-  std::array<glm::vec3, 9> corner{};
-  std::size_t count = 0;  ///< 0 or 3..9
+  std::array<glm::vec3, 16> corner{};  // rounding may make the signs of heights alternate
+  std::size_t count = 0;               ///< 0 or 3..9
 };
 
 /// The part of the polygon in front of the plane through `point` with `normal`. In double inside.

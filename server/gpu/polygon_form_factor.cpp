@@ -12,7 +12,7 @@ namespace {
 
 /// A convex polygon clipped by one plane has at most one corner more.
 struct Polygon {
-  std::array<glm::dvec3, 9> corner;
+  std::array<glm::dvec3, 16> corner;
   std::size_t count = 0;
 };
 

@@ -66,7 +66,8 @@ class MaterialImporter {
     for (int c = 0; c < 3; ++c) {
       const auto factor = source.emissiveFactor[static_cast<std::size_t>(c)];
       out.emission[c] = static_cast<float>(factor * strength);
-      if (!std::isfinite(out.emission[c])) return context_.bad(pointer_ + "/emissiveFactor", "is too bright to hold");
+      // Beyond this, sums of squares in the error estimate would leave single precision.
+      if (!(out.emission[c] <= 1e15F)) return context_.bad(pointer_ + "/emissiveFactor", "is too bright to hold");
     }
     if (*std::max_element(source.emissiveFactor.begin(), source.emissiveFactor.end()) > 1.0) {
       context_.warn(pointer_ + "/emissiveFactor",

@@ -185,6 +185,7 @@ class NodeWalk {
       return context_.bad(pointer + "/spot", "needs innerConeAngle < outerConeAngle <= pi/2");
     }
     context_.scene.lights.push_back(light);
+    context_.warn(pointer, "gives no light yet: only emissive surfaces do");
     return {};
   }
 

@@ -67,15 +67,15 @@ void addSide(const RadiosityState& state, const Side& side, Sums& sums) {
   for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
     const auto area = static_cast<double>(state.leafArea(side, leaf));
     if (area <= 0.0) continue;
-    const glm::vec3 mean = state.irradiance(side, leaf), difference = 0.5F * (first[leaf] - second[leaf]);
-    const double square = area * static_cast<double>(glm::dot(mean, mean));
+    const glm::dvec3 mean(state.irradiance(side, leaf)), difference(0.5F * (first[leaf] - second[leaf]));
+    const double square = area * glm::dot(mean, mean);
     sums.square += square;
-    sums.spread += area * static_cast<double>(glm::dot(difference, difference));
+    sums.spread += area * glm::dot(difference, difference);
     glm::vec3 a, b;
     if (coarse_first.at(leaf % side.width, leaf / side.width, a) &&
         coarse_second.at(leaf % side.width, leaf / side.width, b)) {
       // The halves are independent, so their noise cancels in the product and the bend of the surface remains.
-      sums.bent += area * static_cast<double>(glm::dot(first[leaf] - a, second[leaf] - b));
+      sums.bent += area * glm::dot(glm::dvec3(first[leaf] - a), glm::dvec3(second[leaf] - b));
       sums.bent_square += square;
     }
   }

@@ -48,7 +48,7 @@ TexelPolygon cut(const TexelPolygon& polygon, const glm::dvec2& a, const glm::dv
   for (std::uint32_t i = 0; i < polygon.count; ++i) {
     const glm::dvec2 p = polygon.corner[i], q = polygon.corner[(i + 1) % polygon.count];
     const double at_p = cross(b - a, p - a), at_q = cross(b - a, q - a);
-    if (at_p >= 0.0) left.corner[left.count++] = p;
+    if (at_p >= 0.0 && left.count < 8) left.corner[left.count++] = p;
     if (((at_p < 0.0 && at_q > 0.0) || (at_p > 0.0 && at_q < 0.0)) && left.count < 8)
       left.corner[left.count++] = p + (q - p) * (at_p / (at_p - at_q));
   }

@@ -10,7 +10,7 @@ namespace {
 /// A round may leave this part of the target error unshot: it is carried over, and small beside the sampling error.
 constexpr double kResidualShare = 0.3;
 /// Flux sums have headroom for this many rounds (RadiosityState::chooseFluxScale).
-constexpr std::uint32_t kMaxRounds = 4096;
+constexpr std::uint32_t kMaxRounds = 1024;
 
 PlannerSettings plannerSettings(const SolverSettings& settings) {
   PlannerSettings planner = settings.planner;
@@ -128,9 +128,10 @@ StepOutcome Solver::finishRound() {
   live_ = false;
   error_ = estimateError(state_, owedPower());
   const double reached = settings_.paper_mode ? error_.residual : error_.total;
-  if (reached <= settings_.target_error || settings_.paper_mode || state_.rounds() >= kMaxRounds) {
+  const bool exhausted = state_.rounds() >= kMaxRounds;
+  if (reached <= settings_.target_error || settings_.paper_mode || exhausted) {
     phase_ = Phase::kDone;
-    return StepOutcome::kConverged;
+    return reached > settings_.target_error && exhausted ? StepOutcome::kExhausted : StepOutcome::kConverged;
   }
   state_.startRound();
   startRound();
@@ -150,7 +151,7 @@ void Solver::publish() {
 
 void Solver::setTargetError(double target) {
   settings_.target_error = target;
-  if (phase_ != Phase::kDone || settings_.paper_mode || error_.total <= target) return;
+  if (phase_ != Phase::kDone || settings_.paper_mode || error_.total <= target || state_.rounds() >= kMaxRounds) return;
   state_.startRound();
   startRound();
 }

@@ -33,6 +33,7 @@ enum class StepOutcome {
   kShot,       ///< a wave was shot; the lightmaps are on their way
   kRoundDone,  ///< a round ended; irradiance() and error() are new
   kConverged,  ///< and the error is at most the target
+  kExhausted,  ///< no further round fits the integers\' headroom; the error stays above the target
 };
 
 class Solver {

@@ -66,14 +66,15 @@ void RadiosityState::setMaterials(const scene::PatchMaterials& materials) {
       emission_[side.first_value + leaf] = materials.emission[side.first_node + leaf];
       reflectance_[side.first_value + leaf] = materials.reflectance[side.first_node + leaf];
     }
+    side.mean_reflectance = channelSum(materials.reflectance[side.first_node + side.node_count - 1]) / 3.0F;
     side.dirty = true;
     side.unshot_power = HUGE_VAL;  // unknown until pulled; infinite makes sure that it is
   }
 }
 
 void RadiosityState::chooseFluxScale() {
-  // 2^40 quanta for the emitted flux leaves 2^22 for interreflection (at most 1 / (1 - 0.999) = 2^10) times rounds
-  // (2^12) before a 64-bit sum could overflow, if all of it fell on one node.
+  // 2^40 quanta for the emitted flux leave 2^22 in a 64-bit sum: for interreflection (at most 1 / (1 - 0.999) = 2^10),
+  // rounds (2^10), and lamps made brighter by edits before a new scale is chosen (2^2).
   double emitted = 0.0;
   for (const auto& side : sides_) {
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
@@ -120,9 +121,7 @@ void RadiosityState::receive(const FluxAccumulators& batch) {
     }
     if (arrived > 0.0) {
       side.dirty = true;
-      const std::uint32_t middle = side.leaf_count / 2;
-      const float rho = channelSum(reflectance_[side.first_value + middle]) / 3.0F;
-      side.unshot_power += arrived / flux_scale_ * static_cast<double>(rho);
+      side.unshot_power += arrived / flux_scale_ * static_cast<double>(side.mean_reflectance);
     }
   }
   addTo(escaped_, batch.escaped);

@@ -33,9 +33,10 @@ struct Side {
   std::uint32_t first_value = 0;  ///< leaf values of this side start here
   std::uint32_t leaf_count = 0;
   std::uint32_t width = 0, height = 0, level_count = 0;
-  bool gathered = false;      ///< its emission is delivered by gather shots, not by scatter
-  bool dirty = true;          ///< received since its last push-pull
-  double unshot_power = 0.0;  ///< sum of |unshot| area, all channels; an estimate while dirty
+  bool gathered = false;          ///< its emission is delivered by gather shots, not by scatter
+  float mean_reflectance = 0.0F;  ///< of the channels too
+  bool dirty = true;              ///< received since its last push-pull
+  double unshot_power = 0.0;      ///< sum of |unshot| area, all channels; an estimate while dirty
 };
 
 class RadiosityState {

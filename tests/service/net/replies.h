@@ -20,6 +20,10 @@ Reply replyOf(const protocol::RpcResponse& response) {
   return reply.value_or(Reply{});
 }
 
+inline protocol::ScenePatchCall somePatch(std::optional<std::uint64_t> base = {}, std::string id = {}) {
+  return {R"([{"op":"replace","path":"/nodes/@lamp/translation","value":[0,2,0]}])", base, std::move(id), false};
+}
+
 /// Reads to the end of the connection.
 inline int closeCodeOf(TestSocket& socket) {
   while (socket.read()) {

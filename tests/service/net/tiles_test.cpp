@@ -20,6 +20,7 @@ namespace {
 
 using namespace protocol;  // NOLINT: the test speaks the protocol
 using std::chrono::milliseconds;
+using ::testing::HasSubstr;
 
 // ---- tiles ----
 

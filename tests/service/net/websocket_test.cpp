@@ -219,10 +219,6 @@ TEST(Scene, AFileIsLoadedOnlyFromBelowTheSceneRoot) {
   std::filesystem::remove_all(folder);
 }
 
-ScenePatchCall somePatch(std::optional<std::uint64_t> base = {}, std::string id = {}) {
-  return {R"([{"op":"replace","path":"/nodes/@lamp/translation","value":[0,2,0]}])", base, std::move(id), false};
-}
-
 TEST(Scene, APatchReachesEveryoneAndTheSecondOfTwoRacersLoses) {
   RunningServer server;
   TestSocket first(server.port());

@@ -71,6 +71,9 @@ TEST_F(Edits, AnInvalidSceneLeavesSceneAndSolveGoing) {
   const auto before = status();
   expectRefused(R"([{"op":"replace","path":"/nodes/0/mesh","value":99}])", ErrorCode::kInvalidScene);
   expectRefused(R"([{"op":"replace","path":"/nodes/0/translation","value":[0,"up",0]}])", ErrorCode::kInvalidScene);
+  for (const char* path : {"/materials/0", "/nodes/0", "/materials/0/extensions"}) {  // compared before it is checked
+    expectRefused(std::string(R"([{"op":"replace","path":")") + path + R"(","value":5}])", ErrorCode::kInvalidScene);
+  }
   expectRefused("no json", ErrorCode::kBadInput);
   EXPECT_EQ(status().state, SolveState::kSolving);
   EXPECT_GE(status().shots, before.shots);  // it did not start over

@@ -116,8 +116,8 @@ RayTransport::Hit RayTransport::cast(const glm::vec3& origin, const glm::vec3& d
 }
 
 void RayTransport::scatter(const solver::ScatterShot& shot, double scale, solver::FluxAccumulators& into) const {
-  const auto key = solver::mixKeys(static_cast<std::uint64_t>(shot.frame.origin.x * 1e6F),
-                                   static_cast<std::uint64_t>(shot.frame.origin.y * 1e6F));
+  const auto key = solver::mixKeys(static_cast<std::uint64_t>(static_cast<std::int64_t>(shot.frame.origin.x * 1e6F)),
+                                   static_cast<std::uint64_t>(static_cast<std::int64_t>(shot.frame.origin.y * 1e6F)));
   for (std::uint32_t i = 0; i < rays_; ++i) {
     const glm::dvec4 u = solver::sobol4(i, key);
     const glm::vec3 d = cosineDirection(shot.frame, u);
