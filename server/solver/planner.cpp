@@ -75,9 +75,9 @@ std::uint32_t Planner::resolutionFor(double power) const {
 void Planner::addShot(const RadiosityState& state, const Side& side, const Node& node, double weight,
                       std::uint32_t half, std::uint64_t node_key, ShotBatch& batch) {
   const auto& patches = state.patches();
-  // Later waves of a round may come back to a node; they must not repeat its points.
-  const std::uint32_t visit = 8 * (state.rounds() - 1) + std::min(wave_, 7U);
-  const glm::dvec4 point = sobol4(2 * visit + half, node_key);
+  // Later waves of a round may come back to a node: each has a sequence of its own, which goes on from round to round.
+  const std::uint64_t wave_key = mixKeys(node_key, 0x100 + wave_);
+  const glm::dvec4 point = sobol4(2 * (state.rounds() - 1) + half, wave_key);
   double u = point.x, v = point.y;
   const std::uint32_t leaf = warpToLeaf(state, side, node.level, node.x, node.y, u, v);
   const auto& place = patches.leaves[patches.surfaces[side.surface].first_leaf + leaf];
@@ -172,12 +172,12 @@ void Planner::addNodeGather(const RadiosityState& state, const Side& side, const
     for (auto& channel : shot.radiosity) channel *= 0.5;  // each half carries half
   }
   shot.first_point = static_cast<std::uint32_t>(batch.points.size());
-  const std::uint32_t visit = 8 * (state.rounds() - 1) + std::min(wave_, 7U);
-  const glm::dvec4 jitter = sobol4(visit, mixKeys(node_key, 2));
+  const std::uint64_t wave_key = mixKeys(node_key, 0x100 + wave_);
+  const glm::dvec4 jitter = sobol4(state.rounds() - 1, mixKeys(wave_key, 2));
   shot.receiver_jitter = glm::vec2(jitter.x, jitter.y);
   for (std::uint32_t p = 0; p < 2; ++p) {
     if (!plays[p]) continue;
-    const glm::dvec4 sample = sobol4(2 * visit + p, node_key);
+    const glm::dvec4 sample = sobol4(2 * (state.rounds() - 1) + p, wave_key);
     const glm::dvec2 texel =
         whole ? polygon.point(sample.x, sample.y) : openPoint(state, side, node, sample.x, sample.y);
     batch.points.push_back(frameAt(at(texel), shot.normal, sample.z, mixKeys(node_key, shots_planned_ * 2 + p)));
