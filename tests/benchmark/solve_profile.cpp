@@ -160,6 +160,7 @@ int profile(const std::string& file, std::map<std::string, std::string> options)
   settings.target_error = number("--error", 0.002);
   settings.seed = static_cast<std::uint64_t>(number("--seed", 1));
   settings.paper_mode = options.count("--paper") != 0;
+  settings.planner.gather_nodes = number("--gather", 1) != 0.0;  // 0: reflected light is scattered instead
   settings.planner.shooters_a_round =
       static_cast<std::uint32_t>(number("--shooters", settings.planner.shooters_a_round));
   settings.planner.resolution = static_cast<std::uint32_t>(number("--resolution", settings.planner.resolution));
