@@ -178,8 +178,8 @@ void RadiosityState::pushPull(Side& side) {
 }
 
 float RadiosityState::nodePower(std::uint32_t node) const {
-  // Light that only differs between the leaves of a node cancels at a distance and counts near by. How much is an estimate
-  // that has not been tuned: less blurs corners, more spends shots on noise.
+  // Light that only differs between the leaves of a node cancels at a distance and counts near by. How much is an
+  // estimate that has not been tuned: less blurs corners, more spends shots on noise.
   constexpr float kVariationWorth = 0.1F;
   const float net = channelSum(node_flux_[node]);
   return net + kVariationWorth * std::max(0.0F, node_rough_[node] - net);
