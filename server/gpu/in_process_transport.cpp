@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <iterator>
+
 #include "common/check.h"
 #include "server/gpu/gpu_transport.h"
 #include "server/gpu/shot_runner.h"
@@ -13,6 +15,7 @@ class InProcessTransport final : public solver::Transport {
 
   Result<void> setScene(std::shared_ptr<const scene::PatchScene> patches) override {
     store_ = FluxStore(patches->nodeCount());
+    patches_ = patches;
     return runner_->setScene(std::move(patches));
   }
 
@@ -27,12 +30,30 @@ class InProcessTransport final : public solver::Transport {
     return counters;
   }
 
+  Result<solver::TransportCounters> measure(const solver::ShotBatch& batch,
+                                            std::vector<solver::LinkSample>& samples) override {
+    auto counters = runner_->measure({batch.mode, batch.flux_scale, {}, batch.gather, batch.points}, samples);
+    if (!counters || batch.scatter.empty()) return counters;
+    solver::ShotBatch scatter;
+    scatter.mode = batch.mode;
+    scatter.scatter = batch.scatter;
+    std::vector<solver::LinkSample> more;
+    const auto done = Transport::measure(scatter, more);
+    if (!done) return done;
+    samples.insert(samples.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
+    return *counters += *done;
+  }
+
   [[nodiscard]] std::string description() const override {
     return fmt::format("{}, in process", runner_->context().renderer());
   }
 
+ protected:
+  [[nodiscard]] std::shared_ptr<const scene::PatchScene> scene() const override { return patches_; }
+
  private:
   std::unique_ptr<ShotRunner> runner_;
+  std::shared_ptr<const scene::PatchScene> patches_;
   FluxStore store_;
 };
 

@@ -259,6 +259,42 @@ void LightGatherer::deliver(const solver::GatherShot& shot, std::size_t half, st
   }
 }
 
+void LightGatherer::beginLinks(const solver::GatherShot& shot) {
+  findLit(shot);
+  for (auto* sum : {&lit_.weight[0], &lit_.visible_weight[0], &lit_.visible[0]}) {
+    std::fill_n(sum->begin(), lit_count_, 0.0F);
+  }
+  look_lost_ = {};
+  look_count_ = 0;
+}
+
+void LightGatherer::look(const solver::GatherShot& shot, const solver::HemicubeFrame& point,
+                         std::span<const std::uint32_t> items, const HemicubeWeights& weights) {
+  testPoint(shot, point, items, 0);
+  weighLost(point, items, weights, look_lost_);
+  ++look_count_;
+}
+
+void LightGatherer::finishLinks(const solver::GatherShot& shot, solver::LinkSample& sample,
+                                solver::TransportCounters& counters) {
+  const double area = static_cast<double>(shot.fill) * polygonArea(std::span(shot.corners.data(), shot.corner_count));
+  const double one = static_cast<double>(look_count_) * solver::kWeightOne;
+  const double escaped = static_cast<double>(look_lost_.escaped) / one;
+  const double absorbed = static_cast<double>(look_lost_.absorbed) / one;
+  const auto scale = static_cast<float>(conserve(0, look_count_, area, 1.0 - escaped - absorbed));
+  sample.runs.clear();
+  sample.irradiance.clear();
+  for (std::size_t i = 0; i < lit_count_; ++i) {
+    // What is hidden is sent too: zeros inside a run cost less than a new run.
+    sample.add(receivers_[lit_.receiver[i]].node, scale * lit_.form_factor[i] * visibility(0, i, look_count_));
+  }
+  sample.escaped = escaped * area;
+  sample.absorbed = absorbed * area;
+  counters.links += sample.irradiance.size();
+  counters.gather_points += look_count_;
+  ++counters.gather_shots;
+}
+
 void LightGatherer::gather(const solver::GatherShot& shot, std::span<const solver::HemicubeFrame> points,
                            double flux_scale, HemicubeRenderer& renderer, WeightCache& weights, const FluxSink& sink,
                            solver::TransportCounters& counters) {

@@ -25,19 +25,6 @@ constexpr std::size_t kChunksAhead = 2;
 /// Deaths of workers in one call after which it gives up.
 constexpr int kMaxDeaths = 5;
 
-void add(solver::TransportCounters& into, const solver::TransportCounters& from) {
-  into.scatter_shots += from.scatter_shots;
-  into.gather_shots += from.gather_shots;
-  into.gather_points += from.gather_points;
-  into.pixels += from.pixels;
-  into.links += from.links;
-  into.triangles_drawn += from.triangles_drawn;
-  into.triangles_culled += from.triangles_culled;
-  into.render_seconds += from.render_seconds;
-  into.accumulate_seconds += from.accumulate_seconds;
-  into.gather_seconds += from.gather_seconds;
-}
-
 /// A process and what it has of the current batch.
 struct Slot {
   std::optional<WorkerProcess> process;  ///< none: died, to be replaced
@@ -57,6 +44,7 @@ class WorkerTransport final : public solver::Transport {
     packed_ = std::move(*packed);
     nodes_ = patches->nodeCount();
     triangles_ = patches->triangles.size();
+    patches_ = patches;
     const auto paper = PaperIds::fits(*patches);
     paper_fits_ = paper.has_value();
     if (!paper) paper_error_ = paper.error();
@@ -100,7 +88,7 @@ class WorkerTransport final : public solver::Transport {
     for (auto& slot : slots_) {
       if (!slot.process) continue;
       slot.process->sink().drainInto(into);
-      add(counters, slot.counters);
+      counters += slot.counters;
     }
     return counters;
   }
@@ -108,6 +96,9 @@ class WorkerTransport final : public solver::Transport {
   [[nodiscard]] std::string description() const override {
     return fmt::format("{}, {} worker{}", renderer_, slots_.size(), slots_.size() == 1 ? "" : "s");
   }
+
+ protected:
+  [[nodiscard]] std::shared_ptr<const scene::PatchScene> scene() const override { return patches_; }
 
  private:
   [[nodiscard]] bool finished() const {
@@ -164,7 +155,7 @@ class WorkerTransport final : public solver::Transport {
     }
     slot.held.pop_front();
     slot.done.push_back(report.chunk);
-    add(slot.counters, report.counters);
+    slot.counters += report.counters;
   }
 
   /// A worker is gone: its chunks go back into the queue, its accumulators with it into the grave.
@@ -208,6 +199,7 @@ class WorkerTransport final : public solver::Transport {
   std::string executable_;
   std::vector<Slot> slots_;
   std::string renderer_;
+  std::shared_ptr<const scene::PatchScene> patches_;
   SharedMemory packed_;
   std::size_t nodes_ = 0, triangles_ = 0;
   bool has_scene_ = false;
