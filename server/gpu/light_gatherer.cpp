@@ -284,6 +284,7 @@ void LightGatherer::finishLinks(const solver::GatherShot& shot, solver::LinkSamp
   const auto scale = static_cast<float>(conserve(0, look_count_, area, 1.0 - escaped - absorbed));
   sample.runs.clear();
   sample.irradiance.clear();
+  sample.irradiance.reserve(lit_count_);
   for (std::size_t i = 0; i < lit_count_; ++i) {
     // What is hidden is sent too: zeros inside a run cost less than a new run.
     sample.add(receivers_[lit_.receiver[i]].node, scale * lit_.form_factor[i] * visibility(0, i, look_count_));
