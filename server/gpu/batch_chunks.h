@@ -12,6 +12,7 @@ namespace radiosity::gpu {
 struct Chunk {
   bool gather = false;
   std::size_t first = 0, count = 0;
+  double cost = 0.0;  ///< pixels, and what takes as long as so many
 };
 
 /// Gather shots first: they are the longest. Cost of a shot: its pixels and, for each hemicube, the scene's triangles.

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -93,11 +95,25 @@ class BodyReader {
   bool good_ = true;
 };
 
-/// Blocks until all is sent. False when the peer is gone. Never raises SIGPIPE.
-[[nodiscard]] bool sendMessage(int socket, MessageKind kind, std::span<const std::byte> body,
-                               std::span<const int> fds = {});
-/// Blocks for a whole message. Fails when the peer is gone or sends nonsense.
-[[nodiscard]] Result<Message> receiveMessage(int socket);
+/// How long one process waits for the other. By default for ever, as a worker does: its transport may have nothing to
+/// say for hours.
+struct Patience {
+  std::optional<std::chrono::steady_clock::time_point> deadline;
+  int wake_fd = -1;  ///< ends the wait as soon as it can be read
+};
+/// Why there was no message.
+enum class Lapse {
+  kGone,      ///< the socket is closed
+  kLate,      ///< the deadline passed; the peer may have stopped in the middle of a message
+  kWoken,     ///< by wake_fd
+  kNonsense,  ///< longer than kMaxBody
+};
+
+/// Blocks until all is sent. Never raises SIGPIPE.
+[[nodiscard]] tl::expected<void, Lapse> sendMessage(int socket, MessageKind kind, std::span<const std::byte> body,
+                                                    std::span<const int> fds = {}, const Patience& patience = {});
+/// Blocks for a whole message.
+[[nodiscard]] tl::expected<Message, Lapse> receiveMessage(int socket, const Patience& patience = {});
 
 /// What the renderer needs of a scene, as one block of shared memory, and back.
 [[nodiscard]] Result<SharedMemory> packScene(const scene::PatchScene& patches);

@@ -111,6 +111,10 @@ class Transport {
   /// unchanged.
   [[nodiscard]] virtual Result<TransportCounters> run(const ShotBatch& batch, FluxAccumulators& into) = 0;
 
+  /// What runs in setScene() or run() fails soon, and everything after it at once: the solve thread is wanted for its
+  /// end. From any thread. A transport whose calls are short need not do anything.
+  virtual void interrupt() {}
+
   /// "llvmpipe (LLVM 15.0.6, 256 bits), 2 workers"
   [[nodiscard]] virtual std::string description() const = 0;
 };
