@@ -23,19 +23,6 @@ PlannerSettings plannerSettings(const SolverSettings& settings) {
   return planner;
 }
 
-void addTo(TransportCounters& sum, const TransportCounters& term) {
-  sum.scatter_shots += term.scatter_shots;
-  sum.gather_shots += term.gather_shots;
-  sum.gather_points += term.gather_points;
-  sum.pixels += term.pixels;
-  sum.links += term.links;
-  sum.triangles_drawn += term.triangles_drawn;
-  sum.triangles_culled += term.triangles_culled;
-  sum.render_seconds += term.render_seconds;
-  sum.accumulate_seconds += term.accumulate_seconds;
-  sum.gather_seconds += term.gather_seconds;
-}
-
 }  // namespace
 
 Solver::Solver(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
@@ -67,39 +54,75 @@ double Solver::roundPower() const {
   return live_ ? power / (1.0 - meanReflectance(state_)) : power;
 }
 
-Result<void> Solver::run(const ShotBatch& batch) {
-  batch_.reset(state_.patches().nodeCount());
-  const auto counters = transport_.run(batch, batch_);
-  if (!counters) return tl::unexpected<Error>(counters.error());
-  addTo(transport_counters_, *counters);
-  if (settings_.paper_mode) {
-    for (const auto& side : state_.sides()) state_.smoothUnpushed(batch_, side);
-  }
-  state_.receive(batch_);
-  return {};
-}
-
 Result<StepOutcome> Solver::step() {
+  if (wave_.underWay()) return advanceWave();
   if (phase_ == Phase::kDone) return StepOutcome::kConverged;
-  return phase_ == Phase::kDirect ? gatherDirect() : scatterIndirect();
+  if (phase_ == Phase::kDirect) {
+    planDirect();
+  } else if (!planIndirect()) {
+    return finishRound();
+  }
+  return advanceWave();
 }
 
-Result<StepOutcome> Solver::gatherDirect() {
+std::array<double, 3> Solver::emittedFlux() const {
+  auto flux = gather_emitted_;
+  for (std::size_t c = 0; c < 3; ++c) flux[c] += planner_.intended()[c];
+  return flux;
+}
+
+void Solver::beginWave(ShotBatch batch, const std::array<double, 3>& emitted_before) {
+  const auto emitted = emittedFlux();
+  for (std::size_t c = 0; c < 3; ++c) wave_flux_[c] = emitted[c] - emitted_before[c];
+  wave_.begin(std::move(batch), state_.patches().nodeCount(), state_.patches().triangles.size());
+}
+
+void Solver::planDirect() {
+  const auto before = emittedFlux();
   for (const auto& light : lights_) {
     const glm::dvec3 owed = light.undelivered(state_.rounds());
     for (int c = 0; c < 3; ++c) gather_emitted_[static_cast<std::size_t>(c)] += light.area * owed[c];
   }
-  const ShotBatch batch = planner_.gatherRound(state_, lights_);
-  if (const auto done = run(batch); !done) return tl::unexpected<Error>(done.error());
-  phase_ = Phase::kIndirect;
-  state_.pushPullAll();
-  planner_.startRound(roundPower());
-  if (live_) publish();
+  wave_is_direct_ = true;
+  phase_ = Phase::kIndirect;  // an edit may send it back before the wave has landed
+  beginWave(planner_.gatherRound(state_, lights_), before);
+}
+
+/// False: the round has nothing more to shoot.
+bool Solver::planIndirect() {
+  const auto before = emittedFlux();
+  ShotBatch batch = planner_.scatterWave(state_, remainder());
+  if (batch.scatter.empty() && batch.gather.empty() && planner_.exhausted()) return false;
+  wave_is_direct_ = false;
+  beginWave(std::move(batch), before);
+  return true;
+}
+
+Result<StepOutcome> Solver::advanceWave() {
+  const auto whole = wave_.advance(transport_, transport_counters_);
+  if (!whole) return tl::unexpected<Error>(whole.error());
+  if (!*whole) return StepOutcome::kSlice;
+  land();
   return StepOutcome::kShot;
 }
 
+void Solver::land() {
+  wave_flux_ = {};
+  if (settings_.paper_mode) {
+    for (const auto& side : state_.sides()) state_.smoothUnpushed(wave_.flux(), side);
+  }
+  state_.receive(wave_.flux());
+  if (wave_is_direct_) {
+    state_.pushPullAll();
+    planner_.startRound(roundPower());
+  }
+  if (live_) publish();
+}
+
+/// Light polygons' light that is still to be shot, and all light that is on its way.
 double Solver::owedPower() const {
   double power = 0.0;
+  for (const double flux : wave_flux_) power += std::abs(flux);
   for (const auto& light : lights_) {
     const glm::dvec3 owed = glm::abs(light.undelivered(state_.rounds()));
     power += light.area * (owed.x + owed.y + owed.z);
@@ -113,14 +136,6 @@ double Solver::remainder() const {
     for (const auto flux : half) received += static_cast<double>(flux) / state_.fluxScale();
   }
   return kResidualShare * settings_.target_error * received * (1.0 - meanReflectance(state_));
-}
-
-Result<StepOutcome> Solver::scatterIndirect() {
-  const ShotBatch batch = planner_.scatterWave(state_, remainder());
-  if (batch.scatter.empty() && batch.gather.empty() && planner_.exhausted()) return finishRound();
-  if (const auto done = run(batch); !done) return tl::unexpected<Error>(done.error());
-  if (live_) publish();
-  return StepOutcome::kShot;
 }
 
 StepOutcome Solver::finishRound() {
@@ -178,6 +193,14 @@ void Solver::setMaterials(const scene::PatchMaterials& materials) {
   error_ = estimateError(state_, owedPower());
 }
 
-EnergyParts Solver::energy() const { return energyBalance(state_, planner_.intended(), gather_emitted_); }
+EnergyParts Solver::energy() const {
+  EnergyParts parts = energyBalance(state_, planner_.intended(), gather_emitted_);
+  for (std::size_t c = 0; c < 3; ++c) {  // on its way: as good as unshot
+    const double flux = wave_flux_[c] / static_cast<double>(state_.rounds());
+    parts.unshot[c] += flux;
+    parts.imbalance[c] -= flux;
+  }
+  return parts;
+}
 
 }  // namespace radiosity::solver

@@ -16,6 +16,7 @@
 #include "server/solver/planner.h"
 #include "server/solver/state.h"
 #include "server/solver/transport.h"
+#include "server/solver/wave.h"
 
 namespace radiosity::solver {
 
@@ -30,6 +31,7 @@ struct SolverSettings {
 };
 
 enum class StepOutcome {
+  kSlice,      ///< a part of a wave was shot; nothing new to show
   kShot,       ///< a wave was shot; the lightmaps are on their way
   kRoundDone,  ///< a round ended; irradiance() and error() are new
   kConverged,  ///< and the error is at most the target
@@ -41,11 +43,12 @@ class Solver {
   Solver(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
          solver::Transport& transport, const SolverSettings& settings);
 
-  /// One batch: some 10 to 100 ms of work. On error nothing has changed, except that the wave's light is taken as shot;
-  /// the caller starts over with a new Solver.
+  /// A slice of a wave: some 10 to 100 ms of work. On error nothing has changed, except that the wave's light is taken
+  /// as shot; the caller starts over with a new Solver.
   [[nodiscard]] Result<StepOutcome> step();
 
-  /// Emission or reflectance changed: what was received stays, what is unshot follows. Shooting goes on.
+  /// Emission or reflectance changed: what was received stays, what is unshot follows. Shooting goes on, and so does
+  /// a wave that is under way: what it carries was shot by the scene as it was, and counts as that.
   void setMaterials(const scene::PatchMaterials& materials);
   /// Goes on with further rounds when the solve had stopped at a larger error.
   void setTargetError(double target);
@@ -68,10 +71,14 @@ class Solver {
 
  private:
   enum class Phase { kDirect, kIndirect, kDone };
-  [[nodiscard]] Result<StepOutcome> gatherDirect();
-  [[nodiscard]] Result<StepOutcome> scatterIndirect();
+  void planDirect();
+  [[nodiscard]] bool planIndirect();
+  void beginWave(ShotBatch batch, const std::array<double, 3>& emitted_before);
+  [[nodiscard]] Result<StepOutcome> advanceWave();
+  void land();
   [[nodiscard]] StepOutcome finishRound();
-  [[nodiscard]] Result<void> run(const ShotBatch& batch);
+  /// Flux that all shots planned so far stand for.
+  [[nodiscard]] std::array<double, 3> emittedFlux() const;
   void startRound();
   void publish();
   [[nodiscard]] double owedPower() const;
@@ -85,7 +92,9 @@ class Solver {
   Planner planner_;
   Phase phase_ = Phase::kDirect;
   bool live_ = true;  // show every wave: in the first round, and after an edit until the round ends
-  FluxAccumulators batch_;
+  Wave wave_;
+  bool wave_is_direct_ = false;
+  std::array<double, 3> wave_flux_{};  // what the wave under way stands for
   TransportCounters transport_counters_;
   std::array<double, 3> gather_emitted_{};  // flux the gather shots stood for, over all rounds
   std::vector<glm::vec3> irradiance_;
