@@ -58,7 +58,10 @@ void SolveLoop::threadMain(std::promise<Result<void>> started) {
 bool SolveLoop::runCommands() {
   const auto due = queue_.take(state_ != SolveState::kSolving);
   if (!due) return false;
-  for (const auto& command : *due) command();
+  for (const auto& command : *due) {
+    if (queue_.closed()) return false;
+    command();
+  }
   return true;
 }
 
