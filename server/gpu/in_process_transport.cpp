@@ -1,7 +1,5 @@
 #include <fmt/format.h>
 
-#include <iterator>
-
 #include "common/check.h"
 #include "server/gpu/gpu_transport.h"
 #include "server/gpu/shot_runner.h"
@@ -32,16 +30,7 @@ class InProcessTransport final : public solver::Transport {
 
   Result<solver::TransportCounters> measure(const solver::ShotBatch& batch,
                                             std::vector<solver::LinkSample>& samples) override {
-    auto counters = runner_->measure({batch.mode, batch.flux_scale, {}, batch.gather, batch.points}, samples);
-    if (!counters || batch.scatter.empty()) return counters;
-    solver::ShotBatch scatter;
-    scatter.mode = batch.mode;
-    scatter.scatter = batch.scatter;
-    std::vector<solver::LinkSample> more;
-    const auto done = Transport::measure(scatter, more);
-    if (!done) return done;
-    samples.insert(samples.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
-    return *counters += *done;
+    return runner_->measure({batch.mode, batch.flux_scale, batch.scatter, batch.gather, batch.points}, samples);
   }
 
   [[nodiscard]] std::string description() const override {

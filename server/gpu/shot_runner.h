@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -41,11 +42,16 @@ class ShotRunner {
   void measureGather(const ShotSpan& shots, std::vector<solver::LinkSample>& samples,
                      solver::TransportCounters& counters);
 
+  void measureScatter(const ShotSpan& shots, std::span<solver::LinkSample> samples,
+                      solver::TransportCounters& counters);
+
   std::unique_ptr<EglContext> context_;  // outlives what lives in it
   HemicubeRenderer renderer_;
   WeightCache weights_;
   ScatterAccumulator accumulator_;
   LightGatherer gatherer_;
+  std::shared_ptr<const scene::PatchScene> patches_;
+  std::optional<FluxStore> link_store_;
   bool has_scene_ = false;
 };
 

@@ -1,6 +1,7 @@
 #include "server/solver/linked_solver.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -19,6 +20,8 @@ constexpr double kRefinement = 1.5;
 /// More refinements than this find nothing: everything is split to its leaves.
 constexpr double kMinShare = 1e-9;
 constexpr std::uint32_t kMaxRounds = 100'000;
+/// Short enough that nobody notices the wait, long enough that the workers' waiting for the last of them does not count.
+constexpr double kSliceSeconds = 0.06;
 
 }  // namespace
 
@@ -73,11 +76,14 @@ void LinkedSolver::takeLights() {
   }
 }
 
-Result<void> LinkedSolver::measure(const std::vector<Measurement>& wanted) {
-  if (wanted.empty()) return {};
+/// Measures the next part of the wave: short, so that an edit, a pause or the end of the server need not wait for all.
+/// Where the cuts lie, which depends on time, changes no bit.
+Result<void> LinkedSolver::measureSlice() {
+  const auto start = std::chrono::steady_clock::now();
+  const auto slice = std::span(wanted_).subspan(measured_, std::min(slice_, wanted_.size() - measured_));
   ShotBatch batch;
   std::vector<const Measurement*> gathered, scattered;
-  for (const auto& want : wanted) {
+  for (const auto& want : slice) {
     const auto& shooter = system_.shooters()[want.shooter];
     if (shooter.isLight()) {
       shots_.add(lights_[shooter.light], want.half, want.index, want.points, settings_.planner.light_resolution, batch);
@@ -90,18 +96,16 @@ Result<void> LinkedSolver::measure(const std::vector<Measurement>& wanted) {
   const auto done = transport_.measure(batch, samples);
   if (!done) return tl::unexpected<Error>(done.error());
   counters_ += *done;
+  gathered.insert(gathered.end(), scattered.begin(), scattered.end());
   for (std::size_t i = 0; i < samples.size(); ++i) {
-    const bool is_gathered = i < gathered.size();
-    const auto& want = is_gathered ? *gathered[i] : *scattered[i - gathered.size()];
-    if (!is_gathered) {  // a scatter shot carries a flux of one
-      const double area = system_.shooters()[want.shooter].area;
-      for (auto& value : samples[i].irradiance) value *= static_cast<float>(area);
-      samples[i].escaped *= area;
-      samples[i].absorbed *= area;
-    }
+    const auto& want = *gathered[i];
+    if (i >= batch.gather.size()) samples[i].scale(system_.shooters()[want.shooter].area);  // it carried a flux of one
     expander_.expand(samples[i]);
     system_.addSample(want.shooter, want.half, expander_, samples[i], want.points);
   }
+  measured_ += slice.size();
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  slice_ = static_cast<std::size_t>(std::clamp(static_cast<double>(slice.size()) * kSliceSeconds / std::max(seconds, 1e-6), 8.0, 4096.0));
   return {};
 }
 
@@ -152,19 +156,25 @@ void LinkedSolver::startGrowth() {
   phase_ = Phase::kGrow;
 }
 
+std::vector<Measurement> LinkedSolver::plan() {
+  if (phase_ == Phase::kLights) return planner_.firstLight(system_);
+  if (phase_ == Phase::kSample) return planner_.sample(system_);
+  const std::size_t limit = std::max<std::size_t>(settings_.planner.pairs_a_wave, system_.shooters().size() / 2);
+  if (planner_.share() > 0.0) return planner_.grow(system_, unshot_, *patches_, limit);
+  return {};
+}
+
 Result<StepOutcome> LinkedSolver::step() {
   if (phase_ == Phase::kDone) return StepOutcome::kConverged;
-  std::vector<Measurement> wanted;
-  if (phase_ == Phase::kLights) {
-    wanted = planner_.firstLight(system_);
-  } else if (phase_ == Phase::kGrow) {
-    const std::size_t limit = std::max<std::size_t>(settings_.planner.pairs_a_wave, system_.shooters().size() / 2);
-    if (planner_.share() > 0.0) wanted = planner_.grow(system_, unshot_, *patches_, limit);
-    if (wanted.empty()) return finishRound();
-  } else {
-    wanted = planner_.sample(system_);
+  if (measured_ == wanted_.size()) {
+    wanted_ = plan();
+    measured_ = 0;
+    if (wanted_.empty() && phase_ != Phase::kLights) return finishRound();
   }
-  if (const auto done = measure(wanted); !done) return tl::unexpected<Error>(done.error());
+  if (!wanted_.empty()) {
+    if (const auto done = measureSlice(); !done) return tl::unexpected<Error>(done.error());
+    if (measured_ < wanted_.size()) return StepOutcome::kSlice;
+  }
   settle();
   if (phase_ == Phase::kSample) return finishRound();
   if (phase_ == Phase::kLights) startGrowth();
@@ -235,6 +245,8 @@ void LinkedSolver::setTargetError(double target) {
 
 void LinkedSolver::setMaterials(const scene::PatchMaterials& materials) {
   takeMaterials(materials);
+  wanted_.clear();  // what was still to be measured will be asked for again
+  measured_ = 0;
   // From scratch, so that the result depends on the links and the materials alone: an edit and its inverse give the
   // same bits as long as no link was added in between.
   for (int pass = 0; pass < 2; ++pass) {

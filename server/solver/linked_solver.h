@@ -44,7 +44,8 @@ class LinkedSolver final : public Solver {
  private:
   enum class Phase { kLights, kGrow, kSample, kDone };
 
-  [[nodiscard]] Result<void> measure(const std::vector<Measurement>& wanted);
+  [[nodiscard]] std::vector<Measurement> plan();
+  [[nodiscard]] Result<void> measureSlice();
   void takeMaterials(const scene::PatchMaterials& materials);
   void takeLights();
   void settle();
@@ -65,6 +66,9 @@ class LinkedSolver final : public Solver {
   UnshotPyramid unshot_;
   LinkPlanner planner_;
   Phase phase_ = Phase::kLights;
+  std::vector<Measurement> wanted_;  // the wave under way
+  std::size_t measured_ = 0;         // of the wave
+  std::size_t slice_ = 16;           // measurements that take some 50 ms
   bool growing_ = true;  // light is still missing: until the first walk found nothing more to add
   std::uint32_t rounds_ = 0;
   double varying_ = 0.0, net_unshot_ = 0.0;  // flux, all channels

@@ -54,35 +54,69 @@ double ShootingSolver::roundPower() const {
   return live_ ? power / (1.0 - meanReflectance(state_)) : power;
 }
 
-Result<void> ShootingSolver::run(const ShotBatch& batch) {
-  batch_.reset(state_.patches().nodeCount());
-  const auto counters = transport_.run(batch, batch_);
-  if (!counters) return tl::unexpected<Error>(counters.error());
-  transport_counters_ += *counters;
-  if (settings_.paper_mode) {
-    for (const auto& side : state_.sides()) state_.smoothUnpushed(batch_, side);
-  }
-  state_.receive(batch_);
-  return {};
-}
-
 Result<StepOutcome> ShootingSolver::step() {
+  if (wave_.underWay()) return advanceWave();
   if (phase_ == Phase::kDone) return StepOutcome::kConverged;
-  return phase_ == Phase::kDirect ? gatherDirect() : scatterIndirect();
+  if (phase_ == Phase::kDirect) {
+    planDirect();
+  } else if (!planIndirect()) {
+    return finishRound();
+  }
+  return advanceWave();
 }
 
-Result<StepOutcome> ShootingSolver::gatherDirect() {
+std::array<double, 3> ShootingSolver::emittedFlux() const {
+  auto flux = gather_emitted_;
+  for (std::size_t c = 0; c < 3; ++c) flux[c] += planner_.intended()[c];
+  return flux;
+}
+
+void ShootingSolver::beginWave(ShotBatch batch, const std::array<double, 3>& emitted_before) {
+  const auto emitted = emittedFlux();
+  for (std::size_t c = 0; c < 3; ++c) wave_flux_[c] = emitted[c] - emitted_before[c];
+  wave_.begin(std::move(batch), state_.patches().nodeCount(), state_.patches().triangles.size());
+}
+
+void ShootingSolver::planDirect() {
+  const auto before = emittedFlux();
   for (const auto& light : lights_) {
     const glm::dvec3 owed = light.undelivered(state_.rounds());
     for (int c = 0; c < 3; ++c) gather_emitted_[static_cast<std::size_t>(c)] += light.area * owed[c];
   }
-  const ShotBatch batch = planner_.gatherRound(state_, lights_);
-  if (const auto done = run(batch); !done) return tl::unexpected<Error>(done.error());
-  phase_ = Phase::kIndirect;
-  state_.pushPullAll();
-  planner_.startRound(roundPower());
-  if (live_) publish();
+  wave_is_direct_ = true;
+  phase_ = Phase::kIndirect;  // an edit may send it back before the wave has landed
+  beginWave(planner_.gatherRound(state_, lights_), before);
+}
+
+/// False: the round has nothing more to shoot.
+bool ShootingSolver::planIndirect() {
+  const auto before = emittedFlux();
+  ShotBatch batch = planner_.scatterWave(state_, remainder());
+  if (batch.scatter.empty() && batch.gather.empty() && planner_.exhausted()) return false;
+  wave_is_direct_ = false;
+  beginWave(std::move(batch), before);
+  return true;
+}
+
+Result<StepOutcome> ShootingSolver::advanceWave() {
+  const auto whole = wave_.advance(transport_, transport_counters_);
+  if (!whole) return tl::unexpected<Error>(whole.error());
+  if (!*whole) return StepOutcome::kSlice;
+  land();
   return StepOutcome::kShot;
+}
+
+void ShootingSolver::land() {
+  wave_flux_ = {};
+  if (settings_.paper_mode) {
+    for (const auto& side : state_.sides()) state_.smoothUnpushed(wave_.flux(), side);
+  }
+  state_.receive(wave_.flux());
+  if (wave_is_direct_) {
+    state_.pushPullAll();
+    planner_.startRound(roundPower());
+  }
+  if (live_) publish();
 }
 
 double ShootingSolver::owedPower() const {
@@ -100,14 +134,6 @@ double ShootingSolver::remainder() const {
     for (const auto flux : half) received += static_cast<double>(flux) / state_.fluxScale();
   }
   return kResidualShare * settings_.target_error * received * (1.0 - meanReflectance(state_));
-}
-
-Result<StepOutcome> ShootingSolver::scatterIndirect() {
-  const ShotBatch batch = planner_.scatterWave(state_, remainder());
-  if (batch.scatter.empty() && batch.gather.empty() && planner_.exhausted()) return finishRound();
-  if (const auto done = run(batch); !done) return tl::unexpected<Error>(done.error());
-  if (live_) publish();
-  return StepOutcome::kShot;
 }
 
 StepOutcome ShootingSolver::finishRound() {
@@ -173,6 +199,14 @@ std::vector<glm::vec3> ShootingSolver::halfIrradiance(std::uint32_t half) const 
   return values;
 }
 
-EnergyParts ShootingSolver::energy() const { return energyBalance(state_, planner_.intended(), gather_emitted_); }
+EnergyParts ShootingSolver::energy() const {
+  EnergyParts parts = energyBalance(state_, planner_.intended(), gather_emitted_);
+  for (std::size_t c = 0; c < 3; ++c) {  // on its way: as good as unshot
+    const double flux = wave_flux_[c] / static_cast<double>(state_.rounds());
+    parts.unshot[c] += flux;
+    parts.imbalance[c] -= flux;
+  }
+  return parts;
+}
 
 }  // namespace radiosity::solver

@@ -16,6 +16,7 @@
 #include "server/solver/solver.h"
 #include "server/solver/state.h"
 #include "server/solver/transport.h"
+#include "server/solver/wave.h"
 
 namespace radiosity::solver {
 
@@ -40,10 +41,14 @@ class ShootingSolver final : public Solver {
 
  private:
   enum class Phase { kDirect, kIndirect, kDone };
-  [[nodiscard]] Result<StepOutcome> gatherDirect();
-  [[nodiscard]] Result<StepOutcome> scatterIndirect();
+  void planDirect();
+  [[nodiscard]] bool planIndirect();
+  void beginWave(ShotBatch batch, const std::array<double, 3>& emitted_before);
+  [[nodiscard]] Result<StepOutcome> advanceWave();
+  void land();
   [[nodiscard]] StepOutcome finishRound();
-  [[nodiscard]] Result<void> run(const ShotBatch& batch);
+  /// Flux that all shots planned so far stand for.
+  [[nodiscard]] std::array<double, 3> emittedFlux() const;
   void startRound();
   void publish();
   [[nodiscard]] double owedPower() const;
@@ -57,7 +62,9 @@ class ShootingSolver final : public Solver {
   Planner planner_;
   Phase phase_ = Phase::kDirect;
   bool live_ = true;  // show every wave: in the first round, and after an edit until the round ends
-  FluxAccumulators batch_;
+  Wave wave_;
+  bool wave_is_direct_ = false;
+  std::array<double, 3> wave_flux_{};  // what the wave under way stands for
   TransportCounters transport_counters_;
   std::array<double, 3> gather_emitted_{};  // flux the gather shots stood for, over all rounds
   std::vector<glm::vec3> irradiance_;

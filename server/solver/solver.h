@@ -29,6 +29,7 @@ struct SolverSettings {
 };
 
 enum class StepOutcome {
+  kSlice,      ///< a part of a wave was shot; nothing new to show
   kShot,       ///< a wave was shot; the lightmaps are on their way
   kRoundDone,  ///< irradiance() and error() are new
   kConverged,  ///< and the error is at most the target
@@ -39,7 +40,7 @@ class Solver {
  public:
   virtual ~Solver() = default;
 
-  /// One batch: some 10 to 100 ms of work. On an error of the transport the caller starts over with a new Solver.
+  /// A slice of a wave: some 10 to 100 ms of work. On an error of the transport the caller starts over with a new Solver.
   [[nodiscard]] virtual Result<StepOutcome> step() = 0;
 
   /// Emission or reflectance changed: nothing is invalidated; shooting goes on.

@@ -1,31 +1,25 @@
 #include "server/solver/transport.h"
 
-#include <cmath>
+#include <utility>
 
 namespace radiosity::solver {
-namespace {
 
-/// Integers of one measured shot: its flux is at most about the area of the unit box's faces.
-constexpr double kMeasureScale = 1125899906842624.0;  // 2^50
-
-LinkSample readLinks(const FluxAccumulators& flux, const scene::PatchScene& patches) {
-  LinkSample links;
-  for (std::size_t node = 0; node < patches.nodeCount(); ++node) {
-    const auto sum = static_cast<double>(flux.node[0][node][0]) / kMeasureScale;
-    if (sum == 0.0) continue;
-    const auto area = static_cast<double>(patches.node_area[node]);
-    if (area <= 0.0) {
-      links.absorbed += sum;  // a sliver that only the rasteriser saw
-      continue;
-    }
-    links.add(static_cast<std::uint32_t>(node), static_cast<float>(sum / area));
+void LinkSample::addFlux(std::uint32_t node, std::int64_t flux, const scene::PatchScene& patches) {
+  if (flux == 0) return;
+  const auto sum = static_cast<double>(flux) / kMeasureScale;
+  const auto area = static_cast<double>(patches.node_area[node]);
+  if (area > 0.0) {
+    add(node, static_cast<float>(sum / area));
+  } else {
+    absorbed += sum;
   }
-  links.escaped += static_cast<double>(flux.escaped[0]) / kMeasureScale;
-  links.absorbed += static_cast<double>(flux.backface[0]) / kMeasureScale;
-  return links;
 }
 
-}  // namespace
+void LinkSample::scale(double factor) {
+  for (auto& value : irradiance) value *= static_cast<float>(factor);
+  escaped *= factor;
+  absorbed *= factor;
+}
 
 TransportCounters& TransportCounters::operator+=(const TransportCounters& other) {
   scatter_shots += other.scatter_shots;
@@ -65,7 +59,11 @@ Result<TransportCounters> Transport::measure(const ShotBatch& batch, std::vector
     const auto done = run(one, flux);
     if (!done) return done;
     counters += *done;
-    samples.push_back(readLinks(flux, *patches));
+    LinkSample links;
+    for (std::uint32_t node = 0; node < patches->nodeCount(); ++node) links.addFlux(node, flux.node[0][node][0], *patches);
+    links.escaped += static_cast<double>(flux.escaped[0]) / kMeasureScale;
+    links.absorbed += static_cast<double>(flux.backface[0]) / kMeasureScale;
+    samples.push_back(std::move(links));
   }
   return counters;
 }

@@ -102,6 +102,9 @@ struct TransportCounters {
   TransportCounters& operator+=(const TransportCounters& other);
 };
 
+/// Integers of a shot whose links are measured: its flux is at most about the area of the unit box's faces.
+inline constexpr double kMeasureScale = 1125899906842624.0;  // 2^50
+
 /// What one shot brings where, for a radiosity (gather) or flux (scatter) of one: its links. Nodes of any level may be
 /// named; a node that is named twice receives both.
 struct LinkSample {
@@ -117,6 +120,10 @@ struct LinkSample {
     ++runs.back().count;
     irradiance.push_back(value);
   }
+  /// The same from a flux in units of 1 / kMeasureScale. What fell on a node without area (a sliver that only the
+  /// rasteriser saw) is absorbed.
+  void addFlux(std::uint32_t node, std::int64_t flux, const scene::PatchScene& patches);
+  void scale(double factor);
 };
 
 class Transport {
@@ -134,6 +141,10 @@ class Transport {
   /// ignored. samples[i] belongs to gather shot i, then come the scatter shots. Blocks. On error `samples` is undefined.
   /// The default carries out one shot after the other with run().
   [[nodiscard]] virtual Result<TransportCounters> measure(const ShotBatch& batch, std::vector<LinkSample>& samples);
+
+  /// What runs in setScene(), run() or measure() fails soon, and everything after it at once: the solve thread is wanted for its
+  /// end. From any thread. A transport whose calls are short need not do anything.
+  virtual void interrupt() {}
 
   /// "llvmpipe (LLVM 15.0.6, 256 bits), 2 workers"
   [[nodiscard]] virtual std::string description() const = 0;

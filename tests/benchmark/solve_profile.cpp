@@ -198,6 +198,7 @@ void printSurfaces(const scene::PatchScene& patches, const std::vector<Leaf>& le
     if (!outcome) return std::fprintf(stderr, "%s\n", outcome.error().text().c_str()), 1;
     seconds += std::chrono::duration<double>(Clock::now() - begin).count();
     const bool last = *outcome == solver::StepOutcome::kConverged || *outcome == solver::StepOutcome::kExhausted;
+    if (*outcome == solver::StepOutcome::kSlice) continue;
     if (!last && ((*outcome == solver::StepOutcome::kShot && number("--all", 0) == 0.0) || seconds < 1.15 * shown))
       continue;
     if (*outcome == solver::StepOutcome::kShot) solver.assess();
