@@ -19,6 +19,8 @@ constexpr double kMaxWeight = 20.0;
 constexpr double kPartialShare = 1.2 * kRouletteShare;
 /// Light that only differs between the leaves of a node cancels at a distance and counts near by.
 constexpr double kVariationWorth = 0.1;
+/// Square of the part of a node's links to its near receivers that feels what varies inside it.
+constexpr double kVariation = 0.5;
 /// Points of one sample of a light: enough for the ratio of weighted visibilities to have little bias.
 constexpr std::uint32_t kLightPoints = 8;
 /// A light's item buffers cost about so many times those of a node, for their resolution.
@@ -49,8 +51,8 @@ void LinkPlanner::weigh(LinkSystem& system) {
     if (shooter.isLight()) continue;
     const double power = shooter.power();
     for (std::size_t half = 0; half < 2; ++half) {
-      const bool in = shooter.column[half].points() > 0.0 && plays(shooter.place, half, power);
-      shooter.weight[half] = in ? 1.0 / chance(power) : 0.0;
+      const bool in = shooter.column[half].points() > 0.0 && (shooter.certain || plays(shooter.place, half, power));
+      shooter.weight[half] = !in ? 0.0 : shooter.certain ? 1.0 : 1.0 / chance(power);
     }
   }
 }
@@ -77,13 +79,10 @@ bool LinkPlanner::mustSplit(const Node& node, const LinkSystem& system) const {
   if (node.place.level == 0) return false;
   const auto id = nodeId(sides_[node.place.side], node.place);
   if (system.hasBelow(id)) return true;
-  const bool varies = node.power - node.net > settings_.variation_share * share_;
-  if (system.at(id) != scene::kNone) return varies;
+  if (system.at(id) != scene::kNone) return false;
   if (node.power > share_) return true;
   // A node that is partly empty or buried is no polygon, until it is too weak for that to be seen.
-  if (node.power > kPartialShare * share_ && shots_.gathers(node.place) && !shots_.isWhole(node.place)) return true;
-  // What varies inside the node would be blurred: worth a split when the children do not fall to roulette.
-  return node.power > 4.0 * kRouletteShare * share_ && varies;
+  return node.power > kPartialShare * share_ && shots_.gathers(node.place) && !shots_.isWhole(node.place);
 }
 
 void LinkPlanner::addShooter(const Node& node, LinkSystem& system, const UnshotPyramid& unshot,
@@ -147,34 +146,96 @@ std::vector<Measurement> LinkPlanner::grow(LinkSystem& system, const UnshotPyram
   return wanted;
 }
 
-std::vector<Measurement> LinkPlanner::sample(const LinkSystem& system) const {
-  const auto& shooters = system.shooters();
+double LinkPlanner::rouletteShare(const LinkSystem& system) {
+  double all = 0.0, roulette = 0.0;
+  for (const auto& shooter : system.shooters()) {
+    const double spread = shooter.spread();
+    all += spread;
+    if (!shooter.isLight() && (shooter.weight[0] != 1.0 || shooter.weight[1] != 1.0)) roulette += spread;
+  }
+  return all > 0.0 ? roulette / all : 0.0;
+}
+
+/// What differs from the mean inside a node reaches a receiver with as much of its links as is near: far away it
+/// cancels, close by it does not. The sum of squared links weighs the near ones most.
+double LinkPlanner::variation(const Shooter& shooter, const LinkSystem& system, const UnshotPyramid& unshot,
+                              const scene::PatchScene& patches) const {
+  if (shooter.isLight() || shooter.place.level == 0) return 0.0;
+  const auto id = nodeId(sides_[shooter.place.side], shooter.place);
+  if (system.hasBelow(id)) return 0.0;
+  const double rough = static_cast<double>(unshot.rough(id)) / static_cast<double>(patches.node_area[id]);
+  const double reach = std::max(shooter.products[0], shooter.products[2]);
+  return kVariation * rough * rough * reach;
+}
+
+double LinkPlanner::variation(const LinkSystem& system, const UnshotPyramid& unshot,
+                              const scene::PatchScene& patches) const {
+  double sum = 0.0;
+  for (const auto& shooter : system.shooters()) sum += variation(shooter, system, unshot, patches);
+  return sum;
+}
+
+void LinkPlanner::split(const NodePlace& place, LinkSystem& system, const UnshotPyramid& unshot,
+                        const scene::PatchScene& patches, std::vector<Measurement>& wanted) {
+  const Side& side = sides_[place.side];
+  const auto grid = scene::levelGrid(side.width, side.height, place.level - 1);
+  for (std::uint32_t y = 2 * place.y; y < std::min(2 * place.y + 2, grid.height); ++y) {
+    for (std::uint32_t x = 2 * place.x; x < std::min(2 * place.x + 2, grid.width); ++x) {
+      const NodePlace child{place.side, place.level - 1, x, y};
+      const auto id = nodeId(side, child);
+      if (patches.node_area[id] <= 0.0F) continue;
+      Shooter shooter;
+      shooter.place = child;
+      shooter.area = static_cast<double>(patches.node_area[id]);
+      shooter.sent.fill(unshot.flux(id) / patches.node_area[id]);
+      shooter.certain = true;
+      const auto index = system.add(shooter);
+      ++counters_.shooters;
+      if (shots_.gathers(child)) ++counters_.gathered_nodes;
+      if (child.level > 0) ++counters_.whole_subtrees;
+      for (std::size_t half = 0; half < 2; ++half) wanted.push_back({index, half, 1, 0});
+    }
+  }
+}
+
+std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPyramid& unshot,
+                                              const scene::PatchScene& patches) {
   double spread = 0.0, squares = 0.0;
-  for (const auto& shooter : shooters) spread += shooter.spread(), squares += shooter.power() * shooter.power();
+  for (const auto& shooter : system.shooters()) {
+    spread += shooter.spread();
+    squares += shooter.power() * shooter.power();
+  }
   struct Gain {
     double gain;
-    std::uint32_t shooter, points;
+    std::uint32_t shooter, points;  // 0 points: split
   };
   std::vector<Gain> gains;
-  for (std::uint32_t n = 0; n < shooters.size(); ++n) {
-    const auto& shooter = shooters[n];
+  for (std::uint32_t n = 0; n < system.shooters().size(); ++n) {
+    const auto& shooter = system.shooters()[n];
     if (shooter.column[0].points() == 0.0 || shooter.column[1].points() == 0.0) continue;
     const std::uint32_t points = shooter.isLight() ? kLightPoints : 1;
     const double taken = shooter.column[0].points();
     // The spread of few samples is itself uncertain: half a sample's worth of what is usual for such power is mixed in.
     const double usual = spread / squares * shooter.power() * shooter.power();
-    const double variance = (shooter.spread() * taken + 0.5 * usual) / (taken + 0.5);
-    gains.push_back({variance / (taken + points) / (shooter.isLight() ? kLightCost : 1.0), n, points});
+    const double variance = 0.25 * (shooter.spread() * taken + 0.5 * usual) / (taken + 0.5);
+    gains.push_back({variance / (2.0 * (taken + points) * (shooter.isLight() ? kLightCost : 1.0)), n, points});
+    const double varying = variation(shooter, system, unshot, patches);
+    if (varying > 0.0) gains.push_back({varying / 8.0, n, 0});
   }
-  const std::size_t count =
-      std::min(std::max<std::size_t>(settings_.pairs_a_wave, shooters.size() / 8), gains.size());
-  std::partial_sort(gains.begin(), gains.begin() + static_cast<std::ptrdiff_t>(count), gains.end(),
-                    [](const Gain& a, const Gain& b) { return std::tie(b.gain, a.shooter) < std::tie(a.gain, b.shooter); });
+  std::sort(gains.begin(), gains.end(), [](const Gain& a, const Gain& b) {
+    return std::tie(b.gain, a.shooter, a.points) < std::tie(a.gain, b.shooter, b.points);
+  });
+  const std::size_t limit = 2 * std::max<std::size_t>(settings_.pairs_a_wave, system.shooters().size() / 8);
   std::vector<Measurement> wanted;
-  for (std::size_t i = 0; i < count; ++i) {
-    const auto& column = shooters[gains[i].shooter].column;
+  for (const auto& gain : gains) {
+    if (wanted.size() >= limit || gain.gain <= 0.0) break;
+    if (gain.points == 0) {
+      split(NodePlace(system.shooters()[gain.shooter].place), system, unshot, patches, wanted);
+      continue;
+    }
+    const auto& column = system.shooters()[gain.shooter].column;
     for (std::size_t half = 0; half < 2; ++half)
-      wanted.push_back({gains[i].shooter, half, gains[i].points, column[half].samples()});
+      wanted.push_back({gain.shooter, half, gain.points, column[half].samples()});
   }
   return wanted;
 }

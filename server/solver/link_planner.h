@@ -38,8 +38,18 @@ class LinkPlanner {
   [[nodiscard]] std::vector<Measurement> grow(LinkSystem& system, const UnshotPyramid& unshot,
                                               const scene::PatchScene& patches, std::size_t limit);
 
-  /// The shooters whose further samples lower the error most for their cost.
-  [[nodiscard]] std::vector<Measurement> sample(const LinkSystem& system) const;
+  /// Whatever lowers the error most for its cost: further samples of shooters whose halves differ, or shooters for the
+  /// children of nodes inside which light varies.
+  [[nodiscard]] std::vector<Measurement> improve(LinkSystem& system, const UnshotPyramid& unshot,
+                                                 const scene::PatchScene& patches);
+
+  /// Square of the error of irradiance, summed over leaves by area and over channels, that light which varies inside
+  /// the shooters causes.
+  [[nodiscard]] double variation(const LinkSystem& system, const UnshotPyramid& unshot,
+                                 const scene::PatchScene& patches) const;
+
+  /// The part of the sampling error's square that is due to roulette: only smaller shares lower it.
+  [[nodiscard]] static double rouletteShare(const LinkSystem& system);
 
   /// Russian roulette: weights of weak shooters, so that those which play stand for all.
   void weigh(LinkSystem& system);
@@ -55,6 +65,10 @@ class LinkPlanner {
   [[nodiscard]] bool mustSplit(const Node& node, const LinkSystem& system) const;
   [[nodiscard]] double chance(double power) const;
   [[nodiscard]] bool plays(const NodePlace& place, std::size_t half, double power) const;
+  [[nodiscard]] double variation(const Shooter& shooter, const LinkSystem& system, const UnshotPyramid& unshot,
+                                 const scene::PatchScene& patches) const;
+  void split(const NodePlace& place, LinkSystem& system, const UnshotPyramid& unshot, const scene::PatchScene& patches,
+             std::vector<Measurement>& wanted);
   void addShooter(const Node& node, LinkSystem& system, const UnshotPyramid& unshot, const scene::PatchScene& patches,
                   std::vector<Measurement>& wanted);
 

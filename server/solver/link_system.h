@@ -24,6 +24,7 @@ struct Shooter {
   NodePlace place;                         ///< of a node; of a light polygon only `light` counts
   std::uint32_t light = scene::kNone;      ///< index of the light polygon, or kNone
   std::uint32_t parent = scene::kNone;     ///< nearest shooter above
+  bool certain = false;                    ///< never plays roulette
   double area = 0.0;                       ///< that shines, unit box squared
   std::array<LinkColumn, 2> column;        ///< by half
   std::array<double, 2> weight{1.0, 1.0};  ///< 0: does not play in that half

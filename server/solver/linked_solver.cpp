@@ -12,11 +12,8 @@
 namespace radiosity::solver {
 namespace {
 
-/// What light that only varies inside shooters costs near by, for each unit of its flux. Calibrated against the path
-/// tracer on the Cornell box.
-constexpr double kVariationError = 0.2;
 /// A refinement divides the share of power of a shooter by this.
-constexpr double kRefinement = 1.5;
+constexpr double kRefinement = 2.0;
 /// More refinements than this find nothing: everything is split to its leaves.
 constexpr double kMinShare = 1e-9;
 constexpr std::uint32_t kMaxRounds = 100'000;
@@ -158,7 +155,7 @@ void LinkedSolver::startGrowth() {
 
 std::vector<Measurement> LinkedSolver::plan() {
   if (phase_ == Phase::kLights) return planner_.firstLight(system_);
-  if (phase_ == Phase::kSample) return planner_.sample(system_);
+  if (phase_ == Phase::kImprove) return planner_.improve(system_, unshot_, *patches_);
   const std::size_t limit = std::max<std::size_t>(settings_.planner.pairs_a_wave, system_.shooters().size() / 2);
   if (planner_.share() > 0.0) return planner_.grow(system_, unshot_, *patches_, limit);
   return {};
@@ -176,7 +173,7 @@ Result<StepOutcome> LinkedSolver::step() {
     if (measured_ < wanted_.size()) return StepOutcome::kSlice;
   }
   settle();
-  if (phase_ == Phase::kSample) return finishRound();
+  if (phase_ == Phase::kImprove) return finishRound();
   if (phase_ == Phase::kLights) startGrowth();
   return StepOutcome::kShot;
 }
@@ -194,15 +191,16 @@ StepOutcome LinkedSolver::chooseNext() {
     return StepOutcome::kConverged;
   }
   const bool full = system_.bytes() >= settings_.link_memory || planner_.share() < kMinShare * net_unshot_;
-  if (rounds_ >= kMaxRounds || (full && error_.sampling < 0.1 * error_.residual)) {
+  if (rounds_ >= kMaxRounds) {
     phase_ = Phase::kDone;
     return StepOutcome::kExhausted;
   }
-  if (error_.residual > error_.sampling && !full) {
+  // Roulette's part of the sampling error falls with the share alone.
+  if (!full && LinkPlanner::rouletteShare(system_) > 0.5 && error_.sampling > error_.residual) {
     planner_.setShare(planner_.share() / kRefinement);
     phase_ = Phase::kGrow;
   } else {
-    phase_ = Phase::kSample;
+    phase_ = Phase::kImprove;
   }
   return StepOutcome::kRoundDone;
 }
@@ -234,7 +232,8 @@ void LinkedSolver::assess() {
   const double kept = std::min(0.999, reflected / received);
   error_.sampling = field.sampling();
   error_.discretization = field.discretization();
-  error_.residual = (owed / (1.0 - kept) + kVariationError * varying_) / received;
+  const double varying = std::sqrt(planner_.variation(system_, unshot_, *patches_) / field.square());
+  error_.residual = owed / (1.0 - kept) / received + varying;
   error_.total = std::hypot(error_.residual, error_.sampling);
 }
 

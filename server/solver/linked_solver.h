@@ -2,8 +2,9 @@
 // bounce, edit of light or colour and repeated shot runs over the links it left.
 //
 // Lights: direct light, from many points. Grow: the strongest unshot nodes become shooters, wave by wave, until what is
-// left is stood for by others. Then whichever error is larger is mended: sampling, by measuring again the shooters
-// whose two halves differ most; variation, by a smaller share of power for each shooter, which splits nodes.
+// left is stood for by others. Improve, until the stated error is reached: whatever lowers it most for its cost, be it
+// further samples of a shooter whose two halves differ, or shooters for the children of a node inside which light
+// varies.
 #pragma once
 
 #include <memory>
@@ -42,7 +43,7 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] const LinkSystem& system() const { return system_; }
 
  private:
-  enum class Phase { kLights, kGrow, kSample, kDone };
+  enum class Phase { kLights, kGrow, kImprove, kDone };
 
   [[nodiscard]] std::vector<Measurement> plan();
   [[nodiscard]] Result<void> measureSlice();

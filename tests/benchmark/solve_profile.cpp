@@ -142,7 +142,29 @@ void printSurfaces(const scene::PatchScene& patches, const std::vector<Leaf>& le
   }
 }
 
-[[maybe_unused]] int profile(const std::string& file, std::map<std::string, std::string> options) {
+[[maybe_unused]] /// Errors of one surface's leaves as a picture of characters: tenths of its mean, upper case where too bright.
+void printMap(const scene::PatchScene& patches, std::uint32_t surface, const std::vector<Leaf>& leaves,
+              const std::vector<glm::dvec3>& truth, const std::vector<glm::vec3>& solved) {
+  const auto& s = patches.surfaces[surface];
+  std::vector<std::string> rows(s.height, std::string(s.width, ' '));
+  double mean = 0.0, count = 0.0;
+  const auto each = [&](auto visit) {
+    for (std::size_t i = 0; i < leaves.size(); ++i) {
+      const auto local = leaves[i].node - s.first_node[0];
+      if (leaves[i].node >= s.first_node[0] && local < s.width * s.height) visit(i, local);
+    }
+  };
+  each([&](std::size_t i, std::uint32_t) { mean += truth[i].y, count += 1.0; });
+  mean /= count;
+  each([&](std::size_t i, std::uint32_t local) {
+    const double off = (static_cast<double>(solved[leaves[i].node].y) - truth[i].y) / mean;
+    const int step = std::min(25, static_cast<int>(std::abs(off) * 20.0));
+    rows[local / s.width][local % s.width] = static_cast<char>(step == 0 ? '.' : (off > 0 ? 'A' : 'a') + step);
+  });
+  for (const auto& row : rows) std::printf("  %s\n", row.c_str());
+}
+
+int profile(const std::string& file, std::map<std::string, std::string> options) {
   const auto number = [&](const char* name, double fallback) {
     return options.count(name) != 0 ? std::atof(options[name].c_str()) : fallback;
   };
@@ -214,6 +236,9 @@ void printSurfaces(const scene::PatchScene& patches, const std::vector<Leaf>& le
     if (last) break;
   }
   if (options.count("--surfaces") != 0) printSurfaces(*patches, leaves, truth, solver.irradiance());
+  if (options.count("--map") != 0) {
+    printMap(*patches, static_cast<std::uint32_t>(number("--map", 0)), leaves, truth, solver.irradiance());
+  }
   const auto energy = solver.energy();
   const auto& counters = solver.plannerCounters();
   std::printf("shooters %llu, of which gathered %llu; roulette kills %llu\n",
