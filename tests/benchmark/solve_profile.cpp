@@ -177,7 +177,7 @@ int profile(const std::string& file, std::map<std::string, std::string> options)
     const auto outcome = solver.step();
     if (!outcome) return std::fprintf(stderr, "%s\n", outcome.error().text().c_str()), 1;
     seconds += std::chrono::duration<double>(Clock::now() - begin).count();
-    if (*outcome == solver::StepOutcome::kShot ||
+    if (*outcome == solver::StepOutcome::kSlice || *outcome == solver::StepOutcome::kShot ||
         (seconds < 1.15 * shown && *outcome != solver::StepOutcome::kConverged))
       continue;
     shown = seconds;
