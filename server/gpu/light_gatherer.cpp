@@ -229,7 +229,8 @@ float LightGatherer::visibility(std::size_t sums, std::size_t i, std::size_t poi
 
 /// What leaves a polygon arrives: the flux of its form factors is scaled to what, by the weights of the item buffers,
 /// neither escapes nor is absorbed. Otherwise small errors (one point for a whole leaf, pixels on edges) would be
-/// multiplied by interreflection. Bounded, for polygons that see next to nothing.
+/// multiplied by interreflection. Bounded, for polygons that see next to nothing; the bounds are wider than what one
+/// random point a wall makes of the walls of a cube (0.3 to 3), or such a room would lose light with every bounce.
 double LightGatherer::conserve(std::size_t sums, std::size_t points, double area, double kept) const {
   if (kept < 0.999) return 1.0;
   double delivered = 0.0;
@@ -237,7 +238,7 @@ double LightGatherer::conserve(std::size_t sums, std::size_t points, double area
     const auto node = receivers_[lit_.receiver[i]].node;
     delivered += static_cast<double>(lit_.form_factor[i] * visibility(sums, i, points) * patches_->node_area[node]);
   }
-  return delivered > 0.0 ? std::clamp(kept * area / delivered, 0.5, 2.0) : 1.0;
+  return delivered > 0.0 ? std::clamp(kept * area / delivered, 0.25, 4.0) : 1.0;
 }
 
 void LightGatherer::deliver(const solver::GatherShot& shot, std::size_t half, std::size_t points, double share,

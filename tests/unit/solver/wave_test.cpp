@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/solver/solver.h"
+#include "server/solver/shooting_solver.h"
 #include "tests/unit/solver/quad_scene.h"
 
 namespace radiosity::solver {
@@ -22,7 +22,7 @@ QuadScene litCube() { return makeQuadScene(cubeQuads(4, {0, 4, 0, 0, 0, 0}, {0.5
 /// Direct light of the scene and shots from a wall: too much for the first slice.
 ShotBatch someBatch(const QuadScene& made) {
   RadiosityState state(made.patches, made.materials);
-  auto lights = findLightPolygons(state);
+  auto lights = findLightPolygons(*made.patches, state.sides(), state.emissions());
   Planner planner(*made.patches, {});
   ShotBatch batch = planner.gatherRound(state, lights);
   for (std::uint32_t i = 0; i < 60; ++i) {
@@ -79,7 +79,7 @@ TEST(Wave, LightUnderWayIsUnshotInTheBalanceAndInTheError) {
   const auto made = litCube();
   RayTransport rays(64);
   ASSERT_TRUE(rays.setScene(made.patches));
-  Solver solver(made.patches, made.materials, rays, SolverSettings{});
+  ShootingSolver solver(made.patches, made.materials, rays, SolverSettings{});
   ASSERT_EQ(solver.step().value(), StepOutcome::kSlice) << "all direct light in one slice";
   const auto energy = solver.energy();
   EXPECT_NEAR(energy.unshot[0], energy.emitted[0], 1e-5 * energy.emitted[0]);
@@ -104,7 +104,7 @@ double solvedMean(bool edit) {
   EXPECT_TRUE(rays.setScene(made.patches));
   SolverSettings settings;
   settings.target_error = 0.02;
-  Solver solver(made.patches, made.materials, rays, settings);
+  ShootingSolver solver(made.patches, made.materials, rays, settings);
   EXPECT_EQ(solver.step().value(), StepOutcome::kSlice);
   if (edit) solver.setMaterials(makeQuadScene(bright).materials);
   for (int i = 0; i < 100000 && solver.step().value() != StepOutcome::kConverged; ++i) {
