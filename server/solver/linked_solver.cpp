@@ -166,7 +166,8 @@ Result<StepOutcome> LinkedSolver::step() {
   if (measured_ == wanted_.size()) {
     wanted_ = plan();
     measured_ = 0;
-    if (wanted_.empty() && phase_ != Phase::kLights) return finishRound();
+    const bool dark = phase_ == Phase::kLights && net_unshot_ + varying_ <= 0.0;
+    if (wanted_.empty() && (dark || phase_ != Phase::kLights)) return finishRound();
   }
   if (!wanted_.empty()) {
     if (const auto done = measureSlice(); !done) return tl::unexpected<Error>(done.error());
@@ -265,6 +266,7 @@ void LinkedSolver::setMaterials(const scene::PatchMaterials& materials) {
   growing_ = true;
   phase_ = Phase::kLights;
   assess();
+  if (error_.total <= settings_.target_error) phase_ = Phase::kDone;  // the links there are carry it all
 }
 
 std::vector<glm::vec3> LinkedSolver::halfIrradiance(std::uint32_t half) const {

@@ -119,8 +119,10 @@ void ShootingSolver::land() {
   if (live_) publish();
 }
 
+/// Light polygons' light that is still to be shot, and all light that is on its way.
 double ShootingSolver::owedPower() const {
   double power = 0.0;
+  for (const double flux : wave_flux_) power += std::abs(flux);
   for (const auto& light : lights_) {
     const glm::dvec3 owed = glm::abs(light.undelivered(state_.rounds()));
     power += light.area * (owed.x + owed.y + owed.z);

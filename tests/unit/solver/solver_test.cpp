@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <type_traits>
 
 #include "server/solver/linked_solver.h"
 #include "server/solver/shooting_solver.h"
@@ -111,9 +112,14 @@ TYPED_TEST(AnySolver, HalvedLampHalvesIrradianceWithoutStartingOver) {
   const auto dimmed = makeQuadScene(quads);
   const auto shots = solver.shots();
   solver.setMaterials(dimmed.materials);
-  EXPECT_GT(solver.error().total, 0.1);  // it knows that it is not done
-  solve(solver);
-  EXPECT_GT(solver.shots(), shots);
+  if (std::is_same_v<TypeParam, LinkedSolver>) {
+    solve(solver);
+    EXPECT_EQ(solver.shots(), shots) << "the links there are carry it all";
+  } else {
+    EXPECT_GT(solver.error().total, 0.1);  // it knows that it is not done
+    solve(solver);
+    EXPECT_GT(solver.shots(), shots);
+  }
   EXPECT_NEAR(meanIrradiance(made, solver, 0) / before, 0.5, 0.01);
 }
 
