@@ -13,8 +13,9 @@ namespace {
 /// Short enough that nobody notices the wait, long enough that the workers' waiting for the last of them does not
 /// count.
 constexpr double kSliceSeconds = 0.06;
-/// The first slice of all, before anything was measured: some milliseconds on a processor's core.
-constexpr double kFirstSlice = 250'000.0;
+/// Never less, and the first of all, before anything was measured: 30 ms on a processor's core. On a crowded machine
+/// shorter slices would mostly be waiting for the last worker.
+constexpr double kLeastSlice = 1'000'000.0;
 
 }  // namespace
 
@@ -40,7 +41,7 @@ void Wave::fill(const std::vector<Shot>& shots, std::size_t& next, double target
 }
 
 ShotBatch Wave::nextSlice() {
-  const double most = cost_per_second_ > 0.0 ? kSliceSeconds * cost_per_second_ : kFirstSlice;
+  const double most = std::max(kLeastSlice, kSliceSeconds * cost_per_second_);
   // Slices of equal cost, or the last would often be a crumb.
   const double target = cost_left_ / std::max(1.0, std::ceil(cost_left_ / most));
   ShotBatch slice;
