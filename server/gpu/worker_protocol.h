@@ -19,7 +19,7 @@ enum class MessageKind : std::uint32_t {
   kFailed,     ///< worker: body: text. It goes on only after a failed chunk
   kScene,      ///< transport: two descriptors follow (scene, flux); body: SceneBody
   kSceneDone,  ///< worker
-  kChunk,      ///< transport: body: ChunkBody, scatter shots, gather shots, points
+  kChunk,      ///< transport: body: ChunkBody, then the arrays it counts
   kChunkDone,  ///< worker: body: ChunkDoneBody
 };
 
@@ -39,7 +39,7 @@ struct ChunkBody {
   std::uint64_t chunk = 0;
   double flux_scale = 1.0;
   std::uint32_t mode = 0;
-  std::uint32_t scatter = 0, gather = 0, points = 0;
+  std::uint32_t scatter = 0, gather = 0, points = 0, point_lights = 0, parallel = 0, views = 0;
 };
 struct ChunkDoneBody {
   std::uint64_t chunk = 0;

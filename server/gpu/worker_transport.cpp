@@ -29,6 +29,8 @@ void add(solver::TransportCounters& into, const solver::TransportCounters& from)
   into.scatter_shots += from.scatter_shots;
   into.gather_shots += from.gather_shots;
   into.gather_points += from.gather_points;
+  into.point_images += from.point_images;
+  into.parallel_images += from.parallel_images;
   into.pixels += from.pixels;
   into.links += from.links;
   into.triangles_drawn += from.triangles_drawn;
@@ -79,7 +81,7 @@ class WorkerTransport final : public solver::Transport {
 
   Result<solver::TransportCounters> run(const solver::ShotBatch& batch, solver::FluxAccumulators& into) override {
     if (!has_scene_) return fail(ErrorCode::kInternal, "setScene must come before run");
-    const ShotSpan shots{batch.mode, batch.flux_scale, batch.scatter, batch.gather, batch.points};
+    const ShotSpan shots = spanOf(batch);
     if (auto good = checkShots(shots); !good) return tl::unexpected(good.error());
     if (batch.mode == solver::LinkMode::kPaperMipmap && !paper_fits_) return tl::unexpected(paper_error_);
     deaths_ = 0;

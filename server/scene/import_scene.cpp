@@ -184,8 +184,10 @@ class NodeWalk {
     if (light.kind == LightKind::kSpot && !cone) {
       return context_.bad(pointer + "/spot", "needs innerConeAngle < outerConeAngle <= pi/2");
     }
+    if (context_.scene.lights.size() >= context_.limits.max_nodes) {
+      return context_.tooLarge(pointer_, "more than " + std::to_string(context_.limits.max_nodes) + " lights");
+    }
     context_.scene.lights.push_back(light);
-    context_.warn(pointer, "gives no light yet: only emissive surfaces do");
     return {};
   }
 

@@ -23,10 +23,18 @@ PlannerSettings plannerSettings(const SolverSettings& settings) {
   return planner;
 }
 
+PunctualSettings punctualSettings(const SolverSettings& settings) {
+  PunctualSettings punctual;
+  punctual.seed = settings.seed;
+  return punctual;
+}
+
 void addTo(TransportCounters& sum, const TransportCounters& term) {
   sum.scatter_shots += term.scatter_shots;
   sum.gather_shots += term.gather_shots;
   sum.gather_points += term.gather_points;
+  sum.point_images += term.point_images;
+  sum.parallel_images += term.parallel_images;
   sum.pixels += term.pixels;
   sum.links += term.links;
   sum.triangles_drawn += term.triangles_drawn;
@@ -36,11 +44,19 @@ void addTo(TransportCounters& sum, const TransportCounters& term) {
   sum.gather_seconds += term.gather_seconds;
 }
 
+void addEmitted(const ShotBatch& batch, std::array<double, 3>& sum) {
+  for (std::size_t c = 0; c < 3; ++c) {
+    for (const auto& shot : batch.point_lights) sum[c] += shot.emitted[c];
+    for (const auto& shot : batch.parallel) sum[c] += shot.emitted[c];
+  }
+}
+
 }  // namespace
 
 Solver::Solver(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
-               solver::Transport& transport, const SolverSettings& settings)
-    : state_(std::move(patches), materials),
+               solver::Transport& transport, const SolverSettings& settings, const LightSources& sources)
+    : punctual_(*patches, sources, punctualSettings(settings)),
+      state_(std::move(patches), materials, punctual_.owed(1)),
       transport_(transport),
       settings_(settings),
       planner_(state_.patches(), plannerSettings(settings)) {
@@ -51,7 +67,8 @@ Solver::Solver(std::shared_ptr<const scene::PatchScene> patches, const scene::Pa
 
 void Solver::startRound() {
   state_.pushPullAll();
-  phase_ = lights_.empty() ? Phase::kIndirect : Phase::kDirect;
+  polygons_due_ = !lights_.empty();
+  phase_ = !polygons_due_ && !punctual_.hasSlice(state_.rounds()) ? Phase::kIndirect : Phase::kDirect;
   if (!settings_.paper_mode) {
     // More rounds can pay for finer links, and finer links leak less: half a level for each doubling.
     const auto rounds = static_cast<float>(state_.rounds());
@@ -85,21 +102,33 @@ Result<StepOutcome> Solver::step() {
 }
 
 Result<StepOutcome> Solver::gatherDirect() {
-  for (const auto& light : lights_) {
-    const glm::dvec3 owed = light.undelivered(state_.rounds());
-    for (int c = 0; c < 3; ++c) gather_emitted_[static_cast<std::size_t>(c)] += light.area * owed[c];
+  ShotBatch batch;
+  if (polygons_due_) {
+    polygons_due_ = false;
+    for (const auto& light : lights_) {
+      const glm::dvec3 owed = light.undelivered(state_.rounds());
+      for (int c = 0; c < 3; ++c) gather_emitted_[static_cast<std::size_t>(c)] += light.area * owed[c];
+    }
+    batch = planner_.gatherRound(state_, lights_);
+  } else {
+    batch.flux_scale = state_.fluxScale();
+    punctual_.addSlice(state_.rounds(), batch);
+    addEmitted(batch, gather_emitted_);
   }
-  const ShotBatch batch = planner_.gatherRound(state_, lights_);
   if (const auto done = run(batch); !done) return tl::unexpected<Error>(done.error());
-  phase_ = Phase::kIndirect;
   state_.pushPullAll();
+  if (punctual_.hasSlice(state_.rounds())) {
+    if (live_) publish();
+    return StepOutcome::kShot;
+  }
+  phase_ = Phase::kIndirect;
   planner_.startRound(roundPower());
   if (live_) publish();
   return StepOutcome::kShot;
 }
 
 double Solver::owedPower() const {
-  double power = 0.0;
+  double power = punctual_.owed(state_.rounds());
   for (const auto& light : lights_) {
     const glm::dvec3 owed = glm::abs(light.undelivered(state_.rounds()));
     power += light.area * (owed.x + owed.y + owed.z);
@@ -172,12 +201,24 @@ void Solver::setMaterials(const scene::PatchMaterials& materials) {
       }
     }
   }
+  restartRound();
+}
+
+void Solver::setLights(const LightSources& sources) {
+  punctual_.setSources(state_.patches(), sources);
+  restartRound();
+}
+
+/// After an edit: the round goes on with what is now owed.
+void Solver::restartRound() {
   live_ = true;
   startRound();
   publish();
   error_ = estimateError(state_, owedPower());
 }
 
-EnergyParts Solver::energy() const { return energyBalance(state_, planner_.intended(), gather_emitted_); }
+EnergyParts Solver::energy() const {
+  return energyBalance(state_, planner_.intended(), gather_emitted_, punctual_.flux());
+}
 
 }  // namespace radiosity::solver

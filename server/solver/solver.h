@@ -14,6 +14,7 @@
 #include "server/solver/estimate.h"
 #include "server/solver/lights.h"
 #include "server/solver/planner.h"
+#include "server/solver/punctual_lights.h"
 #include "server/solver/state.h"
 #include "server/solver/transport.h"
 
@@ -39,7 +40,7 @@ enum class StepOutcome {
 class Solver {
  public:
   Solver(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
-         solver::Transport& transport, const SolverSettings& settings);
+         solver::Transport& transport, const SolverSettings& settings, const LightSources& sources = {});
 
   /// One batch: some 10 to 100 ms of work. On error nothing has changed, except that the wave's light is taken as shot;
   /// the caller starts over with a new Solver.
@@ -47,6 +48,8 @@ class Solver {
 
   /// Emission or reflectance changed: what was received stays, what is unshot follows. Shooting goes on.
   void setMaterials(const scene::PatchMaterials& materials);
+  /// Lights without extent, or the sky, changed: only what they deliver is shot again, with opposite sign where less.
+  void setLights(const LightSources& sources);
   /// Goes on with further rounds when the solve had stopped at a larger error.
   void setTargetError(double target);
 
@@ -62,7 +65,8 @@ class Solver {
   [[nodiscard]] const PlannerCounters& plannerCounters() const { return planner_.counters(); }
   [[nodiscard]] std::uint32_t rounds() const { return state_.rounds(); }
   [[nodiscard]] std::uint64_t shots() const {
-    return transport_counters_.scatter_shots + transport_counters_.gather_points;
+    const auto& done = transport_counters_;
+    return done.scatter_shots + done.gather_points + done.point_images + done.parallel_images;
   }
   [[nodiscard]] const RadiosityState& state() const { return state_; }
 
@@ -73,17 +77,20 @@ class Solver {
   [[nodiscard]] StepOutcome finishRound();
   [[nodiscard]] Result<void> run(const ShotBatch& batch);
   void startRound();
+  void restartRound();
   void publish();
   [[nodiscard]] double owedPower() const;
   [[nodiscard]] double roundPower() const;
   [[nodiscard]] double remainder() const;
 
+  PunctualLights punctual_;
   RadiosityState state_;
   std::vector<LightPolygon> lights_;
   solver::Transport& transport_;
   SolverSettings settings_;
   Planner planner_;
   Phase phase_ = Phase::kDirect;
+  bool polygons_due_ = false;  // the round's light polygons are still to be gathered
   bool live_ = true;  // show every wave: in the first round, and after an edit until the round ends
   FluxAccumulators batch_;
   TransportCounters transport_counters_;

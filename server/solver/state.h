@@ -41,7 +41,9 @@ struct Side {
 
 class RadiosityState {
  public:
-  RadiosityState(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials);
+  /// `other_flux`: what lights that are no surfaces will add, all channels, lux unit^2; for the scale of the integers.
+  RadiosityState(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
+                 double other_flux = 0.0);
 
   [[nodiscard]] std::vector<Side>& sides() { return sides_; }
   [[nodiscard]] const std::vector<Side>& sides() const { return sides_; }
@@ -112,7 +114,7 @@ class RadiosityState {
 
  private:
   void makeSides();
-  void chooseFluxScale();
+  void chooseFluxScale(double other_flux);
   void pull(Side& side);
   void pullNode(const Side& side, std::uint32_t level, std::uint32_t x, std::uint32_t y);
   void pullAround(Side& side, std::uint32_t level, std::uint32_t x, std::uint32_t y);

@@ -1,4 +1,4 @@
-// World to one face of a hemicube. Every view is rendered at the same place of its own layer, so a shot's pixels do not
+// World to one face of a hemicube, or to a parallel projection of the whole scene. Every view is rendered at the same place of its own layer, so a shot's pixels do not
 // depend on what else is in the batch.
 
 layout(location = RAD_ATTRIBUTE_POSITION) in vec4 position_area;  // unit box; w: area of a leaf texel
@@ -31,8 +31,14 @@ flat out uint item;
 
 void main() {
   vec3 d = position_area.xyz - view_origin.xyz;
+#ifdef PARALLEL
+  // w of right and up: shift of the image; the depth axis points towards the light
+  gl_Position = vec4(dot(view_right.xyz, d) + view_right.w, dot(view_up.xyz, d) + view_up.w,
+                     0.5 + dot(view_depth.xyz, d), 1.0);
+#else
   gl_Position = vec4(dot(view_right.xyz, d), dot(view_up.xyz, d), RAD_NEAR, dot(view_depth.xyz, d));
   gl_ViewportIndex = int(view_up.w);
+#endif
   gl_Layer = int(view_depth.w);
 #ifdef SCATTER
   float side = dot(normal, d);
