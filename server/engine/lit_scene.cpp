@@ -19,17 +19,28 @@ bool sameButLabels(nlohmann::json a, nlohmann::json b) {
   return a == b;
 }
 
+/// What of a material decides where one can see through it; null where it is opaque.
+nlohmann::json opacityOf(const nlohmann::json& material) {
+  const auto mode = material.find("alphaMode");
+  const auto reflection = material.find("pbrMetallicRoughness");
+  if (mode == material.end() || *mode == "OPAQUE" || reflection == material.end() || !reflection->is_object()) return {};
+  const nlohmann::json color = reflection->value("baseColorFactor", nlohmann::json());
+  const bool has_alpha = color.is_array() && color.size() == 4;
+  return {reflection->value("baseColorTexture", nlohmann::json()), has_alpha ? color[3] : nlohmann::json()};
+}
+
 /// Whether two materials differ only in how bright or how reflecting they are.
 bool sameButShading(nlohmann::json a, nlohmann::json b) {
   for (auto* material : {&a, &b}) {
     if (!material->is_object()) continue;
     eraseLabels(*material);
+    const auto opacity = opacityOf(*material);
     material->erase("emissiveFactor");
     material->erase("emissiveTexture");
     const auto extensions = material->find("extensions");
     if (extensions != material->end() && extensions->is_object()) extensions->erase("KHR_materials_emissive_strength");
     const auto reflection = material->find("pbrMetallicRoughness");
-    if (reflection != material->end() && reflection->is_object()) reflection->clear();
+    if (reflection != material->end() && reflection->is_object()) *reflection = {{"opacity", opacity}};
   }
   return a == b;
 }
@@ -103,7 +114,9 @@ Result<std::unique_ptr<LitScene>> LitScene::make(scene::Document document, const
 }
 
 solver::LightSources LitScene::lightSources() const {
-  return {scene_->lights, scene_->sky.value_or(scene::Sky{})};
+  if (scene_->sky) return {scene_->lights, *scene_->sky};
+  const auto sky = settings_.sky.value_or(SkySetting{});
+  return {scene_->lights, {sky.upper, sky.lower}};
 }
 
 double LitScene::emittedPower() const {
@@ -126,7 +139,7 @@ void LitScene::makeSolver() {
   settings.paper_mode = settings_.paper_mode;
   sources_ = lightSources();
   solver_ = std::make_unique<solver::Solver>(patches_, materials_, transport_, settings, sources_);
-  solver_power_ = emittedPower();
+  solver_power_ = power_ = emittedPower();
 }
 
 void LitScene::restart(const SolveSettings& settings) {
@@ -168,23 +181,38 @@ Result<std::uint64_t> LitScene::reshade(scene::Document next, Change change) {
   scene_ = std::make_shared<const scene::Scene>(std::move(*imported));
   const bool other_lights = sources_ != lightSources();
   if (affected.empty() && !other_lights) return std::uint64_t{0};
+  updateSolver(!affected.empty(), other_lights);
+  return other_lights ? patches_->surfaces.size() : affected.size();  // a light may reach them all
+}
+
+/// Goes on with what changed: materials_, or the sources of light that are no surfaces.
+void LitScene::updateSolver(bool materials, bool lights) {
   sources_ = lightSources();
+  power_ = emittedPower();
   // The integers' scale was chosen for the power at the start. Far outside it they could overflow or lose the small
   // lights.
-  const double power = emittedPower();
-  if (power > 4.0 * solver_power_ || power < solver_power_ / 64.0) {
+  if (power_ > 4.0 * solver_power_ || power_ < solver_power_ / 64.0) {
     makeSolver();
-  } else {
-    if (!affected.empty()) solver_->setMaterials(materials_);
-    if (other_lights) solver_->setLights(sources_);
+    return;
   }
-  return other_lights ? patches_->surfaces.size() : affected.size();  // a light may reach them all
+  if (materials) solver_->setMaterials(materials_);
+  if (lights) solver_->setLights(sources_);
+}
+
+bool LitScene::setSky(const SolveSettings& settings) {
+  settings_ = settings;
+  if (sources_ == lightSources()) return false;
+  updateSolver(false, true);
+  return true;
 }
 
 std::vector<std::string> LitScene::warnings() const {
   std::vector<std::string> all = scene_->warnings;
   all.insert(all.end(), patches_->warnings.begin(), patches_->warnings.end());
   all.insert(all.end(), materials_.warnings.begin(), materials_.warnings.end());
+  if (power_ <= 0.0 && !patches_->surfaces.empty()) {
+    all.emplace_back("nothing shines: the scene has no emissive surface, no light and no sky; --sky 1000 adds one");
+  }
   return all;
 }
 

@@ -50,6 +50,9 @@ class LitScene {
     solver_->setTargetError(settings.target_error);
   }
 
+  /// Another sky for scenes that have none of their own. True: it changes the light.
+  bool setSky(const SolveSettings& settings);
+
   /// Finished pages of the solver's present irradiance (filled, stitched, dilated).
   [[nodiscard]] std::vector<scene::LightmapPage> pages() const;
   /// The same of the estimated sampling error, relative to the irradiance.
@@ -59,6 +62,7 @@ class LitScene {
   LitScene(scene::Document document, const SolveSettings& settings, solver::Transport& transport)
       : document_(std::move(document)), settings_(settings), transport_(transport) {}
   void makeSolver();
+  void updateSolver(bool materials, bool lights);
   [[nodiscard]] double emittedPower() const;
   [[nodiscard]] solver::LightSources lightSources() const;
 
@@ -70,6 +74,7 @@ class LitScene {
   scene::PatchMaterials materials_;
   std::unique_ptr<solver::Solver> solver_;
   solver::LightSources sources_;  // that the solver knows of
+  double power_ = 0.0;            // emitted, all channels
   double solver_power_ = 0.0;     // emitted power the solver's flux scale was chosen for
 };
 

@@ -27,7 +27,12 @@ Result<ParallelRenderer> ParallelRenderer::create(const EglContext& context) {
   return renderer;
 }
 
-void ParallelRenderer::setScene(const GpuScene& scene) {
+Result<void> ParallelRenderer::setScene(const GpuScene& scene) {
+  if (scene.seeThrough() && !see_through_) {
+    auto program = buildProgram(*context_, "hemicube.vert", "hemicube_items.frag", {"PARALLEL", kSeeThrough});
+    if (!program) return tl::unexpected(program.error());
+    see_through_ = std::move(*program);
+  }
   context_->makeCurrent();
   const auto& indices = scene.patches().indices;
   fill(indices_buffer_, std::span<const std::uint32_t>(indices), GL_STATIC_DRAW);
@@ -35,6 +40,7 @@ void ParallelRenderer::setScene(const GpuScene& scene) {
   const auto box = solver::sceneBox(scene.patches());
   centre_ = 0.5F * (box[0] + box[1]);
   radius_ = std::max(0.5F * glm::length(box[1] - box[0]), 1.0e-6F);
+  return {};
 }
 
 std::size_t ParallelRenderer::capacity(std::uint32_t resolution) const {
@@ -94,7 +100,8 @@ std::span<const std::uint32_t> ParallelRenderer::render(const GpuScene& scene, s
   glDepthFunc(GL_GREATER);
   glDepthMask(GL_TRUE);
   glBindFramebuffer(GL_FRAMEBUFFER, into.framebuffer.name());
-  glUseProgram(program_.name());
+  glUseProgram(scene.seeThrough() ? see_through_->name() : program_.name());
+  if (scene.seeThrough()) scene.bindOpacity();
   glBindVertexArray(scene.vertexArray());
   glVertexArrayVertexBuffer(scene.vertexArray(), 1, views_buffer_.name(), 0, sizeof(FaceView));
   glVertexArrayElementBuffer(scene.vertexArray(), indices_buffer_.name());

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <map>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -24,8 +25,8 @@ class ParallelRenderer {
  public:
   [[nodiscard]] static Result<ParallelRenderer> create(const EglContext& context);
 
-  /// `scene` must outlive the renderer's use of it.
-  void setScene(const GpuScene& scene);
+  /// Fails when the driver does not compile the variant for scenes that one can see through.
+  [[nodiscard]] Result<void> setScene(const GpuScene& scene);
 
   /// How many views one render() may take at this resolution.
   [[nodiscard]] std::size_t capacity(std::uint32_t resolution) const;
@@ -48,6 +49,7 @@ class ParallelRenderer {
 
   const EglContext* context_;
   Program program_;
+  std::optional<Program> see_through_;  ///< made for the first scene that needs it
   Buffer indices_buffer_, views_buffer_;
   std::size_t index_count_ = 0;
   glm::vec3 centre_{0.0F};

@@ -94,8 +94,8 @@ Result<std::unique_ptr<ShotRunner>> ShotRunner::create() {
 Result<void> ShotRunner::setScene(std::shared_ptr<const scene::PatchScene> patches) {
   auto scene = GpuScene::upload(*context_, patches);
   if (!scene) return tl::unexpected(scene.error());
-  renderer_.setScene(std::move(*scene));
-  parallel_.setScene(renderer_.scene());
+  if (auto set = renderer_.setScene(std::move(*scene)); !set) return set;
+  if (auto set = parallel_.setScene(renderer_.scene()); !set) return set;
   punctual_ = PunctualGatherer(patches);
   accumulator_ = ScatterAccumulator(patches->nodeCount());
   gatherer_ = LightGatherer(std::move(patches));

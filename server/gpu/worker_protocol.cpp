@@ -37,6 +37,7 @@ void visitScene(Scene& scene, Visit visit) {
   visit(scene.surfaces);
   visit(scene.leaves);
   visit(scene.node_area);
+  visit(scene.opacity);
 }
 
 bool receiveBytes(int socket, void* to, std::size_t bytes) {

@@ -110,7 +110,7 @@ std::vector<LightPolygon> findLightPolygons(RadiosityState& state) {
   for (auto& side : state.sides()) {
     const auto& surface = state.patches().surfaces[side.surface];
     glm::vec3 emission(0.0F);
-    side.gathered = surface.planar && surface.triangle_count <= 2 * kMaxPolygonsPerSurface &&
+    side.gathered = surface.planar && !surface.see_through && surface.triangle_count <= 2 * kMaxPolygonsPerSurface &&
                     uniformEmission(state, side, emission);
     if (side.gathered) addPolygons(state, side, emission, lights);
   }
