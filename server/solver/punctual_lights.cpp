@@ -84,8 +84,8 @@ bool PunctualLights::Source::sameShape(const Source& other) const {
 
 std::uint64_t PunctualLights::Source::shapeKey() const {
   std::uint64_t key = static_cast<std::uint64_t>(kind);
-  for (const float value : {position.x, position.y, position.z, direction.x, direction.y, direction.z, cone_scale,
-                            cone_offset, range}) {
+  for (const float value :
+       {position.x, position.y, position.z, direction.x, direction.y, direction.z, cone_scale, cone_offset, range}) {
     key = mixKeys(key, std::bit_cast<std::uint32_t>(value));
   }
   return key;
@@ -182,8 +182,8 @@ double PunctualLights::owed(std::uint32_t rounds) const {
   }
   for (const auto& source : sources_) {
     const double fresh = static_cast<double>(rounds) - static_cast<double>(source.sequences);
-    sum += source.flux_per_intensity * (channelSum(source.intensity - source.delivered) * source.sequences +
-                                        channelSum(source.intensity) * fresh);
+    sum += source.flux_per_intensity *
+           (channelSum(source.intensity - source.delivered) * source.sequences + channelSum(source.intensity) * fresh);
   }
   return sum;
 }

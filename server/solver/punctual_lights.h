@@ -59,8 +59,8 @@ class PunctualLights {
   /// One light, or one hemisphere of the sky.
   struct Source {
     enum class Kind { kPoint, kSpot, kDirectional, kSky } kind = Kind::kPoint;
-    glm::vec3 position{0.0F};         ///< unit box
-    glm::vec3 direction{0.0F};        ///< axis of a spot; towards the light, or to the middle of the hemisphere
+    glm::vec3 position{0.0F};   ///< unit box
+    glm::vec3 direction{0.0F};  ///< axis of a spot; towards the light, or to the middle of the hemisphere
     float cone_scale = 0.0F, cone_offset = 1.0F, range = 0.0F;
     glm::dvec3 intensity{0.0};        ///< lux unit^2 / sr; lux; of the sky radiance, nits
     double flux_per_intensity = 0.0;  ///< unit^2 sr; unit^2

@@ -91,7 +91,7 @@ class Solver {
   Planner planner_;
   Phase phase_ = Phase::kDirect;
   bool polygons_due_ = false;  // the round's light polygons are still to be gathered
-  bool live_ = true;  // show every wave: in the first round, and after an edit until the round ends
+  bool live_ = true;           // show every wave: in the first round, and after an edit until the round ends
   FluxAccumulators batch_;
   TransportCounters transport_counters_;
   std::array<double, 3> gather_emitted_{};  // flux the gather shots stood for, over all rounds

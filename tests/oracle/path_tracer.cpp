@@ -239,7 +239,9 @@ class PathTracer::Scene {
     }
   }
 
-  [[nodiscard]] double opacityAt(const Hit& hit) const { return opacityAt(triangles_[hit.triangle], hit.point.position); }
+  [[nodiscard]] double opacityAt(const Hit& hit) const {
+    return opacityAt(triangles_[hit.triangle], hit.point.position);
+  }
 
   [[nodiscard]] double opacityAt(const Triangle& triangle, const glm::dvec3& position) const {
     if (!triangle.see_through) return 1.0;
@@ -306,8 +308,8 @@ class PathTracer::Scene {
       }
       if (lamp.kind == Lamp::Kind::kSpot) {
         const double outer = std::cos(lamp.outer_rad);
-        const double fade = (-glm::dot(lamp.direction, direction) - outer) /
-                            std::max(0.001, std::cos(lamp.inner_rad) - outer);
+        const double fade =
+            (-glm::dot(lamp.direction, direction) - outer) / std::max(0.001, std::cos(lamp.inner_rad) - outer);
         strength *= std::pow(std::clamp(fade, 0.0, 1.0), 2.0);
       }
       const double infinity = std::numeric_limits<double>::infinity();
@@ -439,7 +441,7 @@ class PathTracer::Scene {
     return result;
   }
 
-  static constexpr double kLift = 2e-6;  // of a box of size 2
+  static constexpr double kLift = 2e-6;    // of a box of size 2
   static constexpr int kMaxLayers = 1000;  // that a ray may pass through
 
   std::vector<Triangle> triangles_;

@@ -106,7 +106,8 @@ TEST(SolvedLights, PointLightOverAPlane) {
 
 TEST(SolvedLights, SunOnAPlane) {
   auto scene = blackFloor("sun");
-  scene.lights.push_back({.kind = Light::Kind::kDirectional, .position = {1, 2, 1}, .target = {}, .intensity = glm::dvec3(1000.0)});
+  scene.lights.push_back(
+      {.kind = Light::Kind::kDirectional, .position = {1, 2, 1}, .target = {}, .intensity = glm::dvec3(1000.0)});
   const auto solved = solve(scene, {"--error", "0.005", "--time-limit", "10", "--texels", "1600"});
   const double exact = 1000.0 * 2.0 / std::sqrt(6.0);
   EXPECT_LT(rmsFrom(solved.lit, [&](const glm::dvec3&) { return glm::dvec3(exact); }), 1e-4);
@@ -138,8 +139,8 @@ TestScene furnishedRoom(const std::string& name) {
                          test_scenes::kZMax, true);
   scene.objects.push_back(std::move(room));
   test_scenes::Object block{"block", {}, {}};
-  test_scenes::appendBox(block, {-0.3, 0.0, -0.4}, {0.2, 0.7, 0.1}, test_scenes::allFaces(white),
-                         test_scenes::kYMin, false);
+  test_scenes::appendBox(block, {-0.3, 0.0, -0.4}, {0.2, 0.7, 0.1}, test_scenes::allFaces(white), test_scenes::kYMin,
+                         false);
   scene.objects.push_back(std::move(block));
   return scene;
 }
@@ -158,7 +159,8 @@ TEST(SolvedLights, ARoomWithAPointLightASpotAndTheSunMatchesThePathTracer) {
                           .intensity = {10.0, 60.0, 20.0},
                           .inner_cone_rad = 0.2,
                           .outer_cone_rad = 0.5});
-  scene.lights.push_back({.kind = Light::Kind::kDirectional, .position = {0.3, 0.6, 1.0}, .target = {}, .intensity = glm::dvec3(30.0)});
+  scene.lights.push_back(
+      {.kind = Light::Kind::kDirectional, .position = {0.3, 0.6, 1.0}, .target = {}, .intensity = glm::dvec3(30.0)});
   const auto solved = solve(scene, kRoomArguments);
   const auto accuracy = compare(solved);
   EXPECT_LT(accuracy.solver.solverRms(), kRoomError);

@@ -83,8 +83,7 @@ TEST_F(Lights, TheSettingServesScenesWithoutASkyOfTheirOwnAndAPatchGivesThemOne)
 
 TEST_F(Lights, ASkyThatIsNoneIsRefusedAtItsPointer) {
   solve(lampRoom(10.0));
-  const auto outcome =
-      patch(R"([{"op": "add", "path": "/extras", "value": {"radiositySky": {"upper": [1, -2, 3]}}}])");
+  const auto outcome = patch(R"([{"op": "add", "path": "/extras", "value": {"radiositySky": {"upper": [1, -2, 3]}}}])");
   ASSERT_FALSE(outcome);
   EXPECT_EQ(outcome.error().code, ErrorCode::kInvalidScene);
   EXPECT_THAT(outcome.error().where, testing::HasSubstr("/extras/radiositySky/upper"));

@@ -60,8 +60,8 @@ TEST(PunctualLights, CandelaAreScaledFromMetresToTheUnitBox) {
   auto made = makeQuadScene(cubeQuads(4, {}, {}));
   made.patches->scale = 10.0;
   made.patches->centre = {5.0, 0.0, 0.0};
-  PunctualLights lights(*made.patches, {{{.position = {6.0, 0.0, 0.0}, .intensity = glm::vec3(200.0F), .range = 5.0}}, {}},
-                        {});
+  PunctualLights lights(*made.patches,
+                        {{{.position = {6.0, 0.0, 0.0}, .intensity = glm::vec3(200.0F), .range = 5.0}}, {}}, {});
   ShotBatch batch;
   lights.addSlice(1, batch);
   ASSERT_FALSE(batch.point_lights.empty());
@@ -128,7 +128,8 @@ TEST(SolverLights, AClosedGreyRoomReceivesTheLampOverOneMinusReflectance) {
   EXPECT_NEAR(received(*made.patches, solver), 4.0 * kPi / 0.5, 0.02 * 8.0 * kPi);
   const auto energy = solver.energy();
   EXPECT_NEAR(energy.emitted[0], 4.0 * kPi, 1e-5);
-  const double sum = energy.absorbed[0] + energy.escaped[0] + energy.backface[0] + energy.unshot[0] + energy.imbalance[0];
+  const double sum =
+      energy.absorbed[0] + energy.escaped[0] + energy.backface[0] + energy.unshot[0] + energy.imbalance[0];
   EXPECT_NEAR(sum / energy.emitted[0], 1.0, 1e-5);
 }
 
