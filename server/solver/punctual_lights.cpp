@@ -14,6 +14,23 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
+constexpr std::uint32_t kMostPointPixels = 512, kMostParallelPixels = 2048;
+
+/// Pixels across `extent` that are half as large as a leaf of middling size; a power of two.
+std::uint32_t pixelsForLeaves(const scene::PatchScene& patches, float extent) {
+  double area = 0.0, leaves = 0.0;
+  for (const auto& surface : patches.surfaces) {
+    const double count = double{1.0} * surface.width * surface.height;
+    area += count * static_cast<double>(surface.texel_area);
+    leaves += count;
+  }
+  if (area <= 0.0) return 0;
+  const double wanted = 2.0 * static_cast<double>(extent) / std::sqrt(area / leaves);
+  std::uint32_t pixels = 2;
+  while (pixels < 4096 && pixels < wanted) pixels *= 2;
+  return pixels;
+}
+
 double channelSum(const glm::dvec3& v) { return std::abs(v.x) + std::abs(v.y) + std::abs(v.z); }
 
 std::array<double, 3> channels(const glm::dvec3& v) { return {v.x, v.y, v.z}; }
@@ -92,7 +109,11 @@ std::uint64_t PunctualLights::Source::shapeKey() const {
 }
 
 PunctualLights::PunctualLights(const scene::PatchScene& patches, const LightSources& sources, PunctualSettings settings)
-    : settings_(settings), box_(sceneBox(patches)), sources_(makeSources(patches, sources)) {}
+    : settings_(settings), box_(sceneBox(patches)), sources_(makeSources(patches, sources)) {
+  const std::uint32_t wanted = pixelsForLeaves(patches, glm::length(box_[1] - box_[0]));
+  settings_.point_resolution = std::max(settings_.point_resolution, std::min(wanted, kMostPointPixels));
+  settings_.parallel_resolution = std::max(settings_.parallel_resolution, std::min(wanted, kMostParallelPixels));
+}
 
 PunctualLights::Source PunctualLights::makeLight(const scene::PatchScene& patches,
                                                  const scene::PunctualLight& light) const {

@@ -28,8 +28,8 @@ struct LightSources {
 
 struct PunctualSettings {
   std::uint64_t seed = 1;
-  std::uint32_t point_resolution = 256;     ///< N of a point light's hemicubes
-  std::uint32_t parallel_resolution = 512;  ///< of a directional light's images
+  std::uint32_t point_resolution = 256;     ///< N of a point light's hemicubes, at least: more where leaves are finer
+  std::uint32_t parallel_resolution = 512;  ///< of a directional light's images, at least
   std::uint32_t sky_resolution = 256;
   std::uint32_t images = 2;           ///< of a point or directional light, each round and half
   std::uint32_t sky_directions = 64;  ///< of either hemisphere of the sky, each round and half

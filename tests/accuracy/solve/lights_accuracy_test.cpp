@@ -222,12 +222,17 @@ TEST(SolvedLights, AlphaBlendModeTestUnderASkyMatchesThePathTracer) {
   if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is not there";
   const auto solved =
       solveFile(file, {"--error", "0.03", "--time-limit", "60", "--texels", "6000", "--sky", "1000/300"});
-  auto with_sky = solved;
-  with_sky.lit.scene.sky_upper = glm::dvec3(1000.0);
-  with_sky.lit.scene.sky_lower = glm::dvec3(300.0);
-  const auto accuracy = compare(with_sky);
-  EXPECT_LT(accuracy.solver.solverRms(), 0.10);
-  EXPECT_LT(std::abs(accuracy.solver.bias), 0.03);
+  auto compared = solved;
+  compared.lit.scene.sky_upper = glm::dvec3(1000.0);
+  compared.lit.scene.sky_lower = glm::dvec3(300.0);
+  // Labels lie on the sloping front of the bed, one on another, closer than single precision tells apart: what is below
+  // them is not seen and not compared. They stay in the scene.
+  for (auto& triangle : compared.lit.scene.triangles) {
+    if (std::abs(triangle.normal.y - 0.83) < 0.01) triangle.lightmap_page = -1;
+  }
+  const auto accuracy = compare(compared);
+  EXPECT_LT(accuracy.solver.solverRms(), 0.05);
+  EXPECT_LT(std::abs(accuracy.solver.bias), 0.01);
 }
 
 }  // namespace
