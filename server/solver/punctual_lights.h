@@ -75,6 +75,7 @@ class PunctualLights {
 
   [[nodiscard]] std::vector<Source> makeSources(const scene::PatchScene& patches, const LightSources& sources) const;
   [[nodiscard]] Source makeLight(const scene::PatchScene& patches, const scene::PunctualLight& light) const;
+  [[nodiscard]] Source makeDirectional(const glm::dvec3& irradiance, const glm::dvec3& towards) const;
   [[nodiscard]] Source makeSky(const glm::vec3& radiance, float up) const;
   /// What a sequence of one source delivers to one half.
   struct Task {

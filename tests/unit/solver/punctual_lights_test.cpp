@@ -72,6 +72,24 @@ TEST(PunctualLights, CandelaAreScaledFromMetresToTheUnitBox) {
   EXPECT_NEAR(shot.intensity[0], 0.5, 1e-9);
 }
 
+TEST(PunctualLights, APointLightVeryFarAwayShinesAsADirectionalOneOfTheSameIrradiance) {
+  const auto made = makeQuadScene(cubeQuads(4, {}, {}));
+  PunctualLights lights(*made.patches, {{{.position = {0.0, 3e8, 4e8}, .intensity = glm::vec3(5e17F)}}, {}}, {});
+  ShotBatch batch;
+  lights.addSlice(1, batch);
+  EXPECT_TRUE(batch.point_lights.empty());
+  ASSERT_EQ(batch.parallel.size(), 4U);
+  EXPECT_NEAR(batch.parallel[0].irradiance[0], 0.5, 1e-6);  // a quarter of 5e17 / (5e8)^2 lux
+  EXPECT_NEAR(static_cast<double>(batch.views[0].direction.y), 0.6, 1e-6);
+  // positions and ranges that no float holds give no NaN
+  const PunctualLights odd(*made.patches,
+                           {{{.position = {1e300, 0, 0}, .intensity = glm::vec3(1.0F)},
+                             {.position = {0.1, 0, 0}, .intensity = glm::vec3(1.0F), .range = 1e-60}},
+                            {}},
+                           {});
+  EXPECT_TRUE(std::isfinite(odd.flux()[0]));
+}
+
 TEST(PunctualLights, EveryRoundOwesTheSourcesOnceAndAnEditOwesTheDifferenceOfAllRounds) {
   const auto made = makeQuadScene(cubeQuads(4, {}, {}));
   PunctualLights lights(*made.patches, lamp(2.0F), {});
