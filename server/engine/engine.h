@@ -46,7 +46,7 @@ struct SolveSettings {
   double texel_size_m = 0.0;
   std::uint64_t seed = 1;
   std::optional<SkySetting> sky;  ///< for scenes that have none of their own
-  bool paper_mode = false;  ///< Lum, Ma and Max 2002 to the letter (server option, comparisons)
+  bool paper_mode = false;        ///< Lum, Ma and Max 2002 to the letter (server option, comparisons)
 };
 
 struct Status {

@@ -23,7 +23,8 @@ bool sameButLabels(nlohmann::json a, nlohmann::json b) {
 nlohmann::json opacityOf(const nlohmann::json& material) {
   const auto mode = material.find("alphaMode");
   const auto reflection = material.find("pbrMetallicRoughness");
-  if (mode == material.end() || *mode == "OPAQUE" || reflection == material.end() || !reflection->is_object()) return {};
+  if (mode == material.end() || *mode == "OPAQUE" || reflection == material.end() || !reflection->is_object())
+    return {};
   const nlohmann::json color = reflection->value("baseColorFactor", nlohmann::json());
   const bool has_alpha = color.is_array() && color.size() == 4;
   return {reflection->value("baseColorTexture", nlohmann::json()), has_alpha ? color[3] : nlohmann::json()};

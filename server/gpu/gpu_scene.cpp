@@ -105,8 +105,8 @@ Result<void> GpuScene::uploadOpacity(const EglContext& context) {
   std::vector<std::array<std::uint32_t, 4>> grids;
   for (const auto& surface : scene.surfaces) {
     const auto scale = surface.opacity_scale;
-    grids.push_back({surface.first_opacity, surface.width * scale, surface.height * scale,
-                     surface.see_through ? scale : 0});
+    grids.push_back(
+        {surface.first_opacity, surface.width * scale, surface.height * scale, surface.see_through ? scale : 0});
   }
   auto cells = scene.opacity;
   cells.resize((cells.size() + 3) / 4 * 4, 255);

@@ -114,9 +114,9 @@ std::span<const std::uint32_t> ParallelRenderer::render(const GpuScene& scene, s
                             static_cast<GLsizei>(views.size()));
   }
   pixels_.resize(views.size() * resolution * resolution);
-  glGetTextureSubImage(into.ids.name(), 0, 0, 0, 0, static_cast<GLsizei>(resolution),
-                       static_cast<GLsizei>(resolution), static_cast<GLsizei>(views.size()), GL_RED_INTEGER,
-                       GL_UNSIGNED_INT, static_cast<GLsizei>(pixels_.size() * sizeof(std::uint32_t)), pixels_.data());
+  glGetTextureSubImage(into.ids.name(), 0, 0, 0, 0, static_cast<GLsizei>(resolution), static_cast<GLsizei>(resolution),
+                       static_cast<GLsizei>(views.size()), GL_RED_INTEGER, GL_UNSIGNED_INT,
+                       static_cast<GLsizei>(pixels_.size() * sizeof(std::uint32_t)), pixels_.data());
   counters.pixels += pixels_.size();
   counters.triangles_drawn += index_count_ / 3 * views.size();
   counters.render_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -38,30 +38,66 @@ double solidAngle(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c)
   return 2.0 * std::atan2(volume, base);
 }
 
-/// Where a direction, in the axes of a hemicube, falls in its image (the cells of hemicube_weights.h).
-struct PixelFinder {
+/// Where a receiver lies in a picture of `columns` x `rows` pixels: at (x, y), where pixel i reaches from i to i + 1.
+struct PixelPlace {
+  const std::uint32_t* picture;
+  int columns, rows;
+  float x, y;
+
+  [[nodiscard]] std::uint32_t item(float px, float py) const {
+    const int column = std::clamp(static_cast<int>(px), 0, columns - 1);
+    const int row = std::clamp(static_cast<int>(py), 0, rows - 1);
+    return picture[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
+                   static_cast<std::size_t>(column)];
+  }
+};
+
+/// By the receiver's own pixel and the four whose samples lie around it. Near an edge, all sixteen: where three edges
+/// meet, the one that matters may not be among the four.
+bool isHidden(const Receivers& receivers, const PixelPlace& place, const Receivers::Ray& ray) {
+  const float left = std::floor(place.x - 0.5F), below = std::floor(place.y - 0.5F);
+  const auto own = place.item(place.x, place.y);
+  std::array<std::uint32_t, 4> around{};
+  bool edge = false;
+  for (std::size_t i = 0; i < 4; ++i) {
+    around[i] = place.item(left + static_cast<float>(i % 2), below + static_cast<float>(i / 2));
+    edge = edge || around[i] != own;
+  }
+  if (!edge && own != RAD_ITEM_NONE) return receivers.hides(own, ray);
+  if (receivers.hidesAtEdge(own, ray) || receivers.anyMeets(around, ray)) return true;
+  std::array<std::uint32_t, 16> wider{};
+  for (std::size_t i = 0; i < 16; ++i) {
+    wider[i] = place.item(left - 1.0F + static_cast<float>(i % 4), below - 1.0F + static_cast<float>(i / 4));
+  }
+  return receivers.anyMeets(wider, ray);
+}
+
+/// A hemicube's image, looked up by direction in the axes of the hemicube (the cells of hemicube_weights.h).
+struct HemicubeItems {
+  std::span<const std::uint32_t> items;
   int size;
   float shift_x, shift_y;
 
-  [[nodiscard]] std::size_t operator()(const glm::vec3& l) const {
+  HemicubeItems(std::span<const std::uint32_t> image, std::uint32_t resolution, std::uint32_t lattice)
+      : items(image), size(static_cast<int>(resolution)) {
+    const auto [across, up] = latticePhase(lattice);
+    shift_x = static_cast<float>(0.5 - across);
+    shift_y = static_cast<float>(0.5 - up);
+  }
+
+  [[nodiscard]] PixelPlace at(const glm::vec3& l) const {
     const float ax = std::abs(l.x), ay = std::abs(l.y), side = std::max(ax, ay);
     const bool top = l.z >= side, along_x = ax >= ay;
     const float depth = std::max(std::max(l.z, side), 1.0e-9F);
     const float scale = static_cast<float>(size) / 2.0F / depth;
     const float across = top || !along_x ? l.x : l.y;
     const float up = top ? l.y + depth : l.z;
-    const int rows = top ? size : size / 2;
-    const int column = std::clamp(static_cast<int>((across + depth) * scale + shift_x), 0, size - 1);
-    const int row = std::clamp(static_cast<int>(up * scale + shift_y), 0, rows - 1);
     const int face = along_x ? (l.x > 0.0F ? 0 : 1) : (l.y > 0.0F ? 2 : 3);
-    return static_cast<std::size_t>(((top ? 0 : size + face * size / 2) + row) * size + column);
+    const int first_row = top ? 0 : size + face * size / 2;
+    return {items.data() + static_cast<std::size_t>(first_row) * static_cast<std::size_t>(size), size,
+            top ? size : size / 2, (across + depth) * scale + shift_x, up * scale + shift_y};
   }
 };
-
-PixelFinder pixelFinder(std::uint32_t resolution, std::uint32_t lattice) {
-  const auto [across, up] = latticePhase(lattice);
-  return {static_cast<int>(resolution), static_cast<float>(0.5 - across), static_cast<float>(0.5 - up)};
-}
 
 /// The corner of the box that lies farthest along a direction.
 glm::vec3 farthest(const scene::Surface& surface, const glm::vec3& d) {
@@ -82,7 +118,7 @@ void PunctualGatherer::lightGroup(const solver::PointShot& shot, const Receivers
   const auto& patches = receivers_.patches();
   const auto& surface = patches.surfaces[group.surface];
   const auto [o, t, b, n] = hemicubeAxes(shot.frame);
-  const auto pixel = pixelFinder(shot.resolution, shot.frame.lattice);
+  const HemicubeItems image(items, shot.resolution, shot.frame.lattice);
   for (std::size_t i = group.first; i < group.first + group.count; ++i) {
     const auto& receiver = receivers_.all()[i];
     const auto& frame = patches.triangles[receiver.triangle];
@@ -110,8 +146,8 @@ void PunctualGatherer::lightGroup(const solver::PointShot& shot, const Receivers
       if (local.z <= 0.0F || cosine <= 0.0F) continue;
       const float strength = coneFalloff(shot, local.z / distance) * rangeFade(shot, distance);
       if (strength <= 0.0F) continue;
-      const auto item = items[pixel(local)];
-      if (item != RAD_ITEM_NONE && receivers_.hides(item, receivers_.plane(item).height(o), at, normal)) continue;
+      const float pixel_size = 2.0F * distance / static_cast<float>(shot.resolution);
+      if (isHidden(receivers_, image.at(local), {at, normal, -d, 1.0F, pixel_size})) continue;
       sum += strength * (near_mean >= 0.0F ? near_mean : cosine / square);
     }
     sum_[i] += sum / static_cast<float>(count);
@@ -149,8 +185,8 @@ PunctualGatherer::Lost PunctualGatherer::weighLost(const solver::PointShot& shot
       const float height = plane.height(o);
       double reached = weight;
       if (shot.range > 0.0F) {
-        const auto d = axes[face][0] + static_cast<float>(u) * axes[face][1] +
-                       static_cast<float>(v) * (face == 0 ? b : n);
+        const auto d =
+            axes[face][0] + static_cast<float>(u) * axes[face][1] + static_cast<float>(v) * (face == 0 ? b : n);
         const float towards = std::max(std::abs(glm::dot(d, plane.normal)), 1.0e-9F);
         const float distance = std::abs(height) / towards * static_cast<float>(length);
         reached = weight * static_cast<double>(rangeFade(shot, distance));
@@ -187,6 +223,7 @@ void PunctualGatherer::lightGroup(const solver::ParallelShot& shot, const Parall
   const auto& surface = patches.surfaces[group.surface];
   const auto size = static_cast<int>(shot.resolution);
   const bool sky = shot.sky_count > 0;  // one point for each direction, all for a single one
+  const auto pixel_size = static_cast<float>(std::sqrt(axes.pixel_area));
   const auto sky_point = static_cast<std::uint32_t>(view_index) % shot.receivers.count;
   for (std::size_t i = group.first; i < group.first + group.count; ++i) {
     const auto& receiver = receivers_.all()[i];
@@ -202,12 +239,10 @@ void PunctualGatherer::lightGroup(const solver::ParallelShot& shot, const Parall
     for (std::uint32_t p = first; p < first + count; ++p) {
       const auto at = receivers_.point(receiver, shot.receivers.at[p]);
       const auto d = at - axes.centre;
-      const int column = std::clamp(static_cast<int>(glm::dot(axes.right, d) + axes.shift.x), 0, size - 1);
-      const int row = std::clamp(static_cast<int>(glm::dot(axes.up, d) + axes.shift.y), 0, size - 1);
-      const auto item = items[static_cast<std::size_t>(row * size + column)];
-      const bool hidden =
-          item != RAD_ITEM_NONE &&
-          receivers_.hides(item, glm::dot(receivers_.plane(item).normal, view.direction), at, normal);
+      const PixelPlace place{items.data(), size, size, glm::dot(axes.right, d) + axes.shift.x,
+                             glm::dot(axes.up, d) + axes.shift.y};
+      // Far enough to be beyond everything: the scene fits a box of side 1 or so.
+      const bool hidden = isHidden(receivers_, place, {at, normal, view.direction, 4.0F, pixel_size});
       visible += hidden ? 0 : 1;
     }
     sum_[i] += cosine * static_cast<float>(visible) / static_cast<float>(count);

@@ -87,8 +87,7 @@ Result<std::unique_ptr<ShotRunner>> ShotRunner::create() {
   if (!renderer) return tl::unexpected(renderer.error());
   auto parallel = ParallelRenderer::create(**context);
   if (!parallel) return tl::unexpected(parallel.error());
-  return std::unique_ptr<ShotRunner>(
-      new ShotRunner(std::move(*context), std::move(*renderer), std::move(*parallel)));
+  return std::unique_ptr<ShotRunner>(new ShotRunner(std::move(*context), std::move(*renderer), std::move(*parallel)));
 }
 
 Result<void> ShotRunner::setScene(std::shared_ptr<const scene::PatchScene> patches) {

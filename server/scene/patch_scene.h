@@ -52,7 +52,8 @@ struct Surface {
   std::uint32_t first_triangle = 0, triangle_count = 0;
   glm::vec3 bounds_min{0.0F}, bounds_max{0.0F};
   bool planar = false;
-  bool see_through = false;  ///< some of it is cut out, blends or transmits: PatchScene::opacity says where and how much
+  bool see_through =
+      false;  ///< some of it is cut out, blends or transmits: PatchScene::opacity says where and how much
   std::uint32_t opacity_scale = 1;  ///< cells of the opacity grid across a leaf
   std::uint32_t first_opacity = 0;  ///< of width x opacity_scale by height x opacity_scale cells, row-major
   float texel_area = 0.0F;          ///< area of a full leaf, unit box squared

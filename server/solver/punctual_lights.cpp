@@ -5,6 +5,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <numbers>
 
 #include "server/solver/sampling.h"
@@ -13,6 +14,26 @@ namespace radiosity::solver {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
+
+constexpr std::uint32_t kMostPointPixels = 512, kMostParallelPixels = 2048;
+
+/// A point light this far away (unit box) is a directional one: its irradiance differs by 2e-4 at most over the scene.
+constexpr double kFar = 1.0e4;
+
+/// Pixels across `extent` that are half as large as a leaf of middling size; a power of two.
+std::uint32_t pixelsForLeaves(const scene::PatchScene& patches, float extent) {
+  double area = 0.0, leaves = 0.0;
+  for (const auto& surface : patches.surfaces) {
+    const double count = double{1.0} * surface.width * surface.height;
+    area += count * static_cast<double>(surface.texel_area);
+    leaves += count;
+  }
+  if (area <= 0.0) return 0;
+  const double wanted = 2.0 * static_cast<double>(extent) / std::sqrt(area / leaves);
+  std::uint32_t pixels = 2;
+  while (pixels < 4096 && pixels < wanted) pixels *= 2;
+  return pixels;
+}
 
 double channelSum(const glm::dvec3& v) { return std::abs(v.x) + std::abs(v.y) + std::abs(v.z); }
 
@@ -84,29 +105,26 @@ bool PunctualLights::Source::sameShape(const Source& other) const {
 
 std::uint64_t PunctualLights::Source::shapeKey() const {
   std::uint64_t key = static_cast<std::uint64_t>(kind);
-  for (const float value : {position.x, position.y, position.z, direction.x, direction.y, direction.z, cone_scale,
-                            cone_offset, range}) {
+  for (const float value :
+       {position.x, position.y, position.z, direction.x, direction.y, direction.z, cone_scale, cone_offset, range}) {
     key = mixKeys(key, std::bit_cast<std::uint32_t>(value));
   }
   return key;
 }
 
 PunctualLights::PunctualLights(const scene::PatchScene& patches, const LightSources& sources, PunctualSettings settings)
-    : settings_(settings), box_(sceneBox(patches)), sources_(makeSources(patches, sources)) {}
+    : settings_(settings), box_(sceneBox(patches)), sources_(makeSources(patches, sources)) {
+  const std::uint32_t wanted = pixelsForLeaves(patches, glm::length(box_[1] - box_[0]));
+  settings_.point_resolution = std::max(settings_.point_resolution, std::min(wanted, kMostPointPixels));
+  settings_.parallel_resolution = std::max(settings_.parallel_resolution, std::min(wanted, kMostParallelPixels));
+}
 
 PunctualLights::Source PunctualLights::makeLight(const scene::PatchScene& patches,
                                                  const scene::PunctualLight& light) const {
+  if (light.kind == scene::LightKind::kDirectional) return makeDirectional(light.intensity, -light.direction);
   Source source;
-  source.intensity = glm::dvec3(light.intensity);
-  if (light.kind == scene::LightKind::kDirectional) {
-    source.kind = Source::Kind::kDirectional;
-    source.direction = -glm::normalize(glm::vec3(light.direction));
-    source.flux_per_intensity = boxSilhouette(box_, source.direction);
-    return source;
-  }
-  source.position = glm::vec3((light.position - patches.centre) / patches.scale);
-  source.intensity /= patches.scale * patches.scale;
-  source.range = static_cast<float>(light.range / patches.scale);
+  const glm::dvec3 position = (light.position - patches.centre) / patches.scale;
+  source.intensity = glm::dvec3(light.intensity) / (patches.scale * patches.scale);
   source.flux_per_intensity = 4.0 * kPi;
   if (light.kind == scene::LightKind::kSpot) {
     source.kind = Source::Kind::kSpot;
@@ -119,6 +137,28 @@ PunctualLights::Source PunctualLights::makeLight(const scene::PatchScene& patche
     source.flux_per_intensity =
         coneSolidAngle(static_cast<double>(source.cone_scale), static_cast<double>(source.cone_offset));
   }
+  const double range = light.range / patches.scale;
+  const double largest = std::max({std::abs(position.x), std::abs(position.y), std::abs(position.z)});
+  if (largest > kFar) {
+    const glm::dvec3 towards = glm::normalize(position / largest);  // squares of 1e300 are no numbers
+    const double distance = largest * glm::length(position / largest);
+    const double cosine = -glm::dot(glm::dvec3(source.direction), towards);
+    const double fade =
+        std::clamp(cosine * static_cast<double>(source.cone_scale) + static_cast<double>(source.cone_offset), 0.0, 1.0);
+    const double window = range > 0.0 ? std::clamp(1.0 - std::pow(distance / range, 4.0), 0.0, 1.0) : 1.0;
+    return makeDirectional(source.intensity * (fade * fade * window / distance / distance), towards);
+  }
+  source.position = glm::vec3(position);
+  if (range > 0.0) source.range = std::max(static_cast<float>(range), std::numeric_limits<float>::min());
+  return source;
+}
+
+PunctualLights::Source PunctualLights::makeDirectional(const glm::dvec3& irradiance, const glm::dvec3& towards) const {
+  Source source;
+  source.kind = Source::Kind::kDirectional;
+  source.intensity = irradiance;
+  source.direction = glm::vec3(glm::normalize(towards));
+  source.flux_per_intensity = boxSilhouette(box_, source.direction);
   return source;
 }
 
@@ -182,8 +222,8 @@ double PunctualLights::owed(std::uint32_t rounds) const {
   }
   for (const auto& source : sources_) {
     const double fresh = static_cast<double>(rounds) - static_cast<double>(source.sequences);
-    sum += source.flux_per_intensity * (channelSum(source.intensity - source.delivered) * source.sequences +
-                                        channelSum(source.intensity) * fresh);
+    sum += source.flux_per_intensity *
+           (channelSum(source.intensity - source.delivered) * source.sequences + channelSum(source.intensity) * fresh);
   }
   return sum;
 }

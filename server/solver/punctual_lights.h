@@ -28,8 +28,8 @@ struct LightSources {
 
 struct PunctualSettings {
   std::uint64_t seed = 1;
-  std::uint32_t point_resolution = 256;     ///< N of a point light's hemicubes
-  std::uint32_t parallel_resolution = 512;  ///< of a directional light's images
+  std::uint32_t point_resolution = 256;     ///< N of a point light's hemicubes, at least: more where leaves are finer
+  std::uint32_t parallel_resolution = 512;  ///< of a directional light's images, at least
   std::uint32_t sky_resolution = 256;
   std::uint32_t images = 2;           ///< of a point or directional light, each round and half
   std::uint32_t sky_directions = 64;  ///< of either hemisphere of the sky, each round and half
@@ -42,8 +42,8 @@ class PunctualLights {
   /// One light, or one hemisphere of the sky.
   struct Source {
     enum class Kind { kPoint, kSpot, kDirectional, kSky } kind = Kind::kPoint;
-    glm::vec3 position{0.0F};         ///< unit box
-    glm::vec3 direction{0.0F};        ///< axis of a spot; towards the light, or to the middle of the hemisphere
+    glm::vec3 position{0.0F};   ///< unit box
+    glm::vec3 direction{0.0F};  ///< axis of a spot; towards the light, or to the middle of the hemisphere
     float cone_scale = 0.0F, cone_offset = 1.0F, range = 0.0F;
     glm::dvec3 intensity{0.0};        ///< lux unit^2 / sr; lux; of the sky radiance, nits
     double flux_per_intensity = 0.0;  ///< unit^2 sr; unit^2
@@ -79,6 +79,7 @@ class PunctualLights {
 
  private:
   [[nodiscard]] Source makeLight(const scene::PatchScene& patches, const scene::PunctualLight& light) const;
+  [[nodiscard]] Source makeDirectional(const glm::dvec3& irradiance, const glm::dvec3& towards) const;
   [[nodiscard]] Source makeSky(const glm::vec3& radiance, float up) const;
   /// What a sequence of one source delivers to one half.
   struct Task {

@@ -70,15 +70,15 @@ struct ReceiverPoints {
   std::uint32_t count = 1;  ///< 1 to kMaxReceiverPoints
 };
 
-/// Half of the space around a point light, or a spot: irradiance I cos / d^2, exact at every receiving point; visibility
-/// from one hemicube image.
+/// Half of the space around a point light, or a spot: irradiance I cos / d^2, exact at every receiving point;
+/// visibility from one hemicube image.
 struct PointShot {
-  HemicubeFrame frame;                 ///< at the light; normal: axis of the half space, or of the spot's cone
-  std::array<double, 3> intensity{};   ///< signed, lux x unit^2 (candela in the unit box), times the shot's weight
-  float cone_scale = 0.0F;             ///< falloff clamp(cos x scale + offset, 0, 1)^2 about the normal
-  float cone_offset = 1.0F;            ///< (KHR_lights_punctual, "Inner and Outer Cone Angles")
-  float range = 0.0F;                  ///< unit; beyond it nothing arrives (faded, "Range Property"); 0: no limit
-  std::array<double, 3> emitted{};     ///< flux the shot stands for, lux x unit^2; what the scene does not catch escapes
+  HemicubeFrame frame;                ///< at the light; normal: axis of the half space, or of the spot's cone
+  std::array<double, 3> intensity{};  ///< signed, lux x unit^2 (candela in the unit box), times the shot's weight
+  float cone_scale = 0.0F;            ///< falloff clamp(cos x scale + offset, 0, 1)^2 about the normal
+  float cone_offset = 1.0F;           ///< (KHR_lights_punctual, "Inner and Outer Cone Angles")
+  float range = 0.0F;                 ///< unit; beyond it nothing arrives (faded, "Range Property"); 0: no limit
+  std::array<double, 3> emitted{};    ///< flux the shot stands for, lux x unit^2; what the scene does not catch escapes
   std::uint32_t resolution = 256;
   std::uint32_t half = 0;
   ReceiverPoints receivers;
@@ -144,8 +144,8 @@ struct FluxAccumulators {
 struct TransportCounters {
   std::uint64_t scatter_shots = 0, gather_shots = 0, gather_points = 0;
   std::uint64_t point_images = 0, parallel_images = 0;  ///< of lights without extent
-  std::uint64_t pixels = 0;  ///< visibility samples rendered and accumulated
-  std::uint64_t links = 0;   ///< (shot, node) pairs that received flux
+  std::uint64_t pixels = 0;                             ///< visibility samples rendered and accumulated
+  std::uint64_t links = 0;                              ///< (shot, node) pairs that received flux
   std::uint64_t triangles_drawn = 0, triangles_culled = 0;
   double render_seconds = 0.0, accumulate_seconds = 0.0, gather_seconds = 0.0;
 

@@ -128,7 +128,8 @@ TEST_F(Punctual, ASpotFadesBetweenItsConesAsTheExtensionSays) {
       const double cosine = d.z / glm::length(d);
       const double fade = std::clamp((cosine - outer) / (inner - outer), 0.0, 1.0);
       const double exact = 3.0 * cosine / glm::dot(d, d) * fade * fade;
-      EXPECT_NEAR(irradiance(*scene, flux, floor, x, y), exact, 1e-4 * exact + 1e-9) << x << ", " << y;
+      // The cosine is rounded to 6e-8: near the outer cone that is all there is.
+      EXPECT_NEAR(irradiance(*scene, flux, floor, x, y), exact, 1e-4 * exact + 1e-7) << x << ", " << y;
     }
   }
 }
@@ -157,7 +158,8 @@ TEST_F(Punctual, ALeafCloseToALightReceivesItsSolidAngle) {
   SceneBuilder builder;
   const auto floor = addFloor(builder, 4);
   const auto scene = builder.build();
-  auto shot = downwardShot({0.125F, 0.125F, -0.49F});  // over the middle of leaf (2, 2), a twenty-fifth of its side away
+  auto shot =
+      downwardShot({0.125F, 0.125F, -0.49F});  // over the middle of leaf (2, 2), a twenty-fifth of its side away
   solver::ShotBatch batch;
   batch.point_lights = {shot};
   const auto flux = run(scene, batch);
@@ -202,7 +204,7 @@ TEST_F(Punctual, ADirectionalLightGivesECosAndItsEnergyIsAccountedFor) {
 TEST_F(Punctual, AnOpenPlaneUnderTheSkyReceivesPiTimesItsRadiance) {
   SceneBuilder builder;
   const auto floor = builder.add({{-0.5F, -0.5F, 0.0F}, {0, 0, 0.5F}, {0.5F, 0, 0}, 4, 4});  // normal +Y
-  const auto wall = builder.add({{0.4F, -0.5F, -0.5F}, {0, 0.2F, 0}, {0, 0, -0.2F}, 4, 4});   // normal -X: sees half
+  const auto wall = builder.add({{0.4F, -0.5F, -0.5F}, {0, 0.2F, 0}, {0, 0, -0.2F}, 4, 4});  // normal -X: sees half
   const auto scene = builder.build();
   solver::LightSources sources;
   sources.sky = {glm::vec3(2.0F, 0, 0), glm::vec3(0.5F, 0, 0)};
@@ -232,31 +234,39 @@ TEST_F(Punctual, AConvexSolidUnderATwoColouredSkyReceivesTheHemisphereFormulaExa
   EXPECT_NEAR(total(flux), entered, 0.01 * entered);
 }
 
-TEST_F(Punctual, InsideAClosedRoomTheSkyIsNotSeen) {
+TEST_F(Punctual, NothingLeaksIntoAClosedRoomAlongItsEdges) {
   SceneBuilder builder;
   builder.addBox(glm::vec3(-0.4F), glm::vec3(0.4F), 8, true);
+  builder.add({{-1.0F, -0.401F, -1.0F}, {0, 0, 2}, {2, 0, 0}, 4, 4});  // the ground outside
   const auto scene = builder.build();
   solver::LightSources sources;
   sources.sky = {glm::vec3(1.0F), glm::vec3(1.0F)};
+  sources.lights = {
+      {.kind = scene::LightKind::kDirectional, .direction = {0.3, -0.8, 0.4}, .intensity = glm::vec3(1e5F)},
+      {.position = {0.9, 0.9, 0.9}, .intensity = glm::vec3(1e5F)}};
   const auto flux = runRound(scene, sources);
-  EXPECT_EQ(flux.gathered[0], 0);
+  for (std::uint32_t surface = 0; surface < 6; ++surface) {
+    for (std::uint32_t leaf = 0; leaf < 64; ++leaf) {
+      EXPECT_EQ(irradiance(*scene, flux, surface, leaf % 8, leaf / 8), 0.0) << surface << ": " << leaf;
+    }
+  }
 }
 
 TEST_F(Punctual, AHalfPlaneHidesAPointLightBehindAStraightEdge) {
   SceneBuilder builder;
-  const auto floor = builder.add({{-0.5F, -0.5F, -0.5F}, {1, 0, 0}, {0, 1, 0}, 64, 2});
+  const auto floor = builder.add({{-0.5F, -0.5F, -0.5F}, {1, 0, 0}, {0, 1, 0}, 64, 16});
   builder.add({{-2.0F, -2.0F, 0.0F}, {2, 0, 0}, {0, 4, 0}, 4, 4, true});  // covers x < 0 half-way up
   const auto scene = builder.build();
   const solver::LightSources sources{{{.position = {0.0, 0.0, 0.5}, .intensity = {1.0F, 0.0F, 0.0F}}}, {}};
   const auto flux = runRound(scene, sources);
   for (std::uint32_t x = 0; x < 64; ++x) {
-    const glm::dvec3 d = glm::dvec3(0.0, 0.0, 0.5) - glm::dvec3(-0.5 + (x + 0.5) / 64.0, -0.25, -0.5);
+    const glm::dvec3 d = glm::dvec3(0.0, 0.0, 0.5) - glm::dvec3(-0.5 + (x + 0.5) / 64.0, -0.5 + 8.5 / 16.0, -0.5);
     const double open = 1.0 / std::pow(glm::length(d), 3.0);
-    const double share = irradiance(*scene, flux, floor, x, 0) / open;
-    if (x < 31) {
-      EXPECT_EQ(share, 0.0) << x;
-    } else if (x > 32) {
-      EXPECT_NEAR(share, 1.0, 0.02) << x;  // a leaf is half a unit long: irradiance varies along it
+    const double share = irradiance(*scene, flux, floor, x, 8) / open;
+    if (x < 32) {
+      EXPECT_EQ(share, 0.0) << x;  // the edge lies between leaves 31 and 32, and is kept to less than a pixel
+    } else {
+      EXPECT_NEAR(share, 1.0, 0.01) << x;  // receiving points are jittered
     }
   }
 }

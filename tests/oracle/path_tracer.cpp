@@ -12,6 +12,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "tests/oracle/lamps.h"
 #include "tests/oracle/random.h"
 
 namespace radiosity::oracle {
@@ -239,7 +240,9 @@ class PathTracer::Scene {
     }
   }
 
-  [[nodiscard]] double opacityAt(const Hit& hit) const { return opacityAt(triangles_[hit.triangle], hit.point.position); }
+  [[nodiscard]] double opacityAt(const Hit& hit) const {
+    return opacityAt(triangles_[hit.triangle], hit.point.position);
+  }
 
   [[nodiscard]] double opacityAt(const Triangle& triangle, const glm::dvec3& position) const {
     if (!triangle.see_through) return 1.0;
@@ -290,30 +293,12 @@ class PathTracer::Scene {
     return !blocked(lifted(a), std::isfinite(distance) ? direction * (distance * scale_) : direction * 10.0);
   }
 
-  /// Light of the lamps at a point: I cos / d^2 with the cone and range of KHR_lights_punctual.
   [[nodiscard]] glm::dvec3 lampLight(const Point& at, Random& random) const {
     glm::dvec3 sum(0.0);
     for (const auto& lamp : lamps_) {
-      const bool sun = lamp.kind == Lamp::Kind::kSun;
-      const auto way = sun ? -lamp.direction : lamp.position - at.position;
-      const double distance = glm::length(way);
-      const auto direction = way / distance;
-      double strength = glm::dot(direction, at.normal);
-      if (strength <= 0.0) continue;
-      if (!sun) {
-        strength /= distance * distance;
-        if (lamp.range > 0.0) strength *= std::clamp(1.0 - std::pow(distance / lamp.range, 4.0), 0.0, 1.0);
-      }
-      if (lamp.kind == Lamp::Kind::kSpot) {
-        const double outer = std::cos(lamp.outer_rad);
-        const double fade = (-glm::dot(lamp.direction, direction) - outer) /
-                            std::max(0.001, std::cos(lamp.inner_rad) - outer);
-        strength *= std::pow(std::clamp(fade, 0.0, 1.0), 2.0);
-      }
-      const double infinity = std::numeric_limits<double>::infinity();
-      if (strength > 0.0 && seesLamp(at, direction, sun ? infinity : distance, random)) {
-        sum += strength * lamp.intensity;
-      }
+      const auto light = lightOf(lamp, at.position, at.normal);
+      if (light.irradiance == glm::dvec3(0.0)) continue;
+      if (seesLamp(at, light.direction, light.distance, random)) sum += light.irradiance;
     }
     return sum;
   }
@@ -439,7 +424,7 @@ class PathTracer::Scene {
     return result;
   }
 
-  static constexpr double kLift = 2e-6;  // of a box of size 2
+  static constexpr double kLift = 2e-6;    // of a box of size 2
   static constexpr int kMaxLayers = 1000;  // that a ray may pass through
 
   std::vector<Triangle> triangles_;

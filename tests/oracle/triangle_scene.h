@@ -45,7 +45,7 @@ struct Triangle {
   std::array<glm::dvec2, 3> texture_uv{};   ///< of the texture, which multiplies reflectance and alpha
   bool see_through = false;                 ///< masked, blended or transmitting
   double alpha = 1.0;
-  double cutoff = -1.0;                     ///< alpha mask; below 0: blended
+  double cutoff = -1.0;  ///< alpha mask; below 0: blended
   double transmission = 0.0;
   std::uint32_t node = 0, material = 0;
 };

@@ -22,7 +22,8 @@ TEST(Sky, TwoColoursAreAboveAndBelowTheHorizon) {
 }
 
 TEST(Sky, AnythingElseIsBadUsageAndSaysWhatIsMeant) {
-  for (const char* text : {"", "/", "1,2", "1,2,3,4", "-1", "nan", "inf", "1e13", "1/", "1/2/3", "a", "1, 2,3", "1,2,"}) {
+  for (const char* text :
+       {"", "/", "1,2", "1,2,3,4", "-1", "nan", "inf", "1e13", "1/", "1/2/3", "a", "1, 2,3", "1,2,"}) {
     const auto sky = parseSky(text);
     ASSERT_FALSE(sky) << text;
     EXPECT_EQ(sky.error().code, ErrorCode::kBadUsage);

@@ -106,7 +106,8 @@ TEST(SolvedLights, PointLightOverAPlane) {
 
 TEST(SolvedLights, SunOnAPlane) {
   auto scene = blackFloor("sun");
-  scene.lights.push_back({.kind = Light::Kind::kDirectional, .position = {1, 2, 1}, .target = {}, .intensity = glm::dvec3(1000.0)});
+  scene.lights.push_back(
+      {.kind = Light::Kind::kDirectional, .position = {1, 2, 1}, .target = {}, .intensity = glm::dvec3(1000.0)});
   const auto solved = solve(scene, {"--error", "0.005", "--time-limit", "10", "--texels", "1600"});
   const double exact = 1000.0 * 2.0 / std::sqrt(6.0);
   EXPECT_LT(rmsFrom(solved.lit, [&](const glm::dvec3&) { return glm::dvec3(exact); }), 1e-4);
@@ -138,16 +139,16 @@ TestScene furnishedRoom(const std::string& name) {
                          test_scenes::kZMax, true);
   scene.objects.push_back(std::move(room));
   test_scenes::Object block{"block", {}, {}};
-  test_scenes::appendBox(block, {-0.3, 0.0, -0.4}, {0.2, 0.7, 0.1}, test_scenes::allFaces(white),
-                         test_scenes::kYMin, false);
+  test_scenes::appendBox(block, {-0.3, 0.0, -0.4}, {0.2, 0.7, 0.1}, test_scenes::allFaces(white), test_scenes::kYMin,
+                         false);
   scene.objects.push_back(std::move(block));
   return scene;
 }
 
 const std::vector<std::string> kRoomArguments{"--error", "0.01", "--time-limit", "40", "--texels", "4000"};
 
-// Texels that a shadow's edge crosses, and corners, hold most of the error; the Cornell box is held to the same bound.
-constexpr double kRoomError = 0.05;
+// The stated error of these solves is 0.01; texels that a shadow's edge crosses, and corners, may double it.
+constexpr double kRoomError = 0.025;
 
 TEST(SolvedLights, ARoomWithAPointLightASpotAndTheSunMatchesThePathTracer) {
   auto scene = furnishedRoom("room_lights");
@@ -158,7 +159,8 @@ TEST(SolvedLights, ARoomWithAPointLightASpotAndTheSunMatchesThePathTracer) {
                           .intensity = {10.0, 60.0, 20.0},
                           .inner_cone_rad = 0.2,
                           .outer_cone_rad = 0.5});
-  scene.lights.push_back({.kind = Light::Kind::kDirectional, .position = {0.3, 0.6, 1.0}, .target = {}, .intensity = glm::dvec3(30.0)});
+  scene.lights.push_back(
+      {.kind = Light::Kind::kDirectional, .position = {0.3, 0.6, 1.0}, .target = {}, .intensity = glm::dvec3(30.0)});
   const auto solved = solve(scene, kRoomArguments);
   const auto accuracy = compare(solved);
   EXPECT_LT(accuracy.solver.solverRms(), kRoomError);
@@ -220,12 +222,17 @@ TEST(SolvedLights, AlphaBlendModeTestUnderASkyMatchesThePathTracer) {
   if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is not there";
   const auto solved =
       solveFile(file, {"--error", "0.03", "--time-limit", "60", "--texels", "6000", "--sky", "1000/300"});
-  auto with_sky = solved;
-  with_sky.lit.scene.sky_upper = glm::dvec3(1000.0);
-  with_sky.lit.scene.sky_lower = glm::dvec3(300.0);
-  const auto accuracy = compare(with_sky);
-  EXPECT_LT(accuracy.solver.solverRms(), 0.10);
-  EXPECT_LT(std::abs(accuracy.solver.bias), 0.03);
+  auto compared = solved;
+  compared.lit.scene.sky_upper = glm::dvec3(1000.0);
+  compared.lit.scene.sky_lower = glm::dvec3(300.0);
+  // Labels lie on the sloping front of the bed, one on another, closer than single precision tells apart: what is below
+  // them is not seen and not compared. They stay in the scene.
+  for (auto& triangle : compared.lit.scene.triangles) {
+    if (std::abs(triangle.normal.y - 0.83) < 0.01) triangle.lightmap_page = -1;
+  }
+  const auto accuracy = compare(compared);
+  EXPECT_LT(accuracy.solver.solverRms(), 0.05);
+  EXPECT_LT(std::abs(accuracy.solver.bias), 0.01);
 }
 
 }  // namespace

@@ -34,7 +34,8 @@ Scene veiledFloor(AlphaMode mode, int width, int height, const std::vector<std::
 double leafArea(const PatchScene& patches) {
   double sum = 0.0;
   for (const auto& s : patches.surfaces) {
-    for (std::uint32_t i = 0; i < s.width * s.height; ++i) sum += static_cast<double>(patches.node_area[s.first_node[0] + i]);
+    for (std::uint32_t i = 0; i < s.width * s.height; ++i)
+      sum += static_cast<double>(patches.node_area[s.first_node[0] + i]);
   }
   return sum * patches.scale * patches.scale;
 }
@@ -101,7 +102,8 @@ TEST(Opacity, AGlassBoxBuriesNothing) {
   double floor_area = 0.0;
   for (const auto& s : patches.surfaces) {
     if (s.see_through) continue;
-    floor_area += static_cast<double>(patches.node_area[s.first_node[0] + levelGrid(s.width, s.height, s.level_count - 1).offset]);
+    floor_area += static_cast<double>(
+        patches.node_area[s.first_node[0] + levelGrid(s.width, s.height, s.level_count - 1).offset]);
   }
   EXPECT_NEAR(floor_area * patches.scale * patches.scale, 1.0, 1e-4);
 }

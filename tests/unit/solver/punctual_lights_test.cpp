@@ -62,8 +62,8 @@ TEST(PunctualLights, CandelaAreScaledFromMetresToTheUnitBox) {
   auto made = makeQuadScene(cubeQuads(4, {}, {}));
   made.patches->scale = 10.0;
   made.patches->centre = {5.0, 0.0, 0.0};
-  PunctualLights lights(*made.patches, {{{.position = {6.0, 0.0, 0.0}, .intensity = glm::vec3(200.0F), .range = 5.0}}, {}},
-                        {});
+  PunctualLights lights(*made.patches,
+                        {{{.position = {6.0, 0.0, 0.0}, .intensity = glm::vec3(200.0F), .range = 5.0}}, {}}, {});
   ShotBatch batch;
   lights.addSlice(1, batch);
   ASSERT_FALSE(batch.point_lights.empty());
@@ -72,6 +72,24 @@ TEST(PunctualLights, CandelaAreScaledFromMetresToTheUnitBox) {
   EXPECT_NEAR(static_cast<double>(shot.range), 0.5, 1e-6);
   // four images in a round, two of either half: each carries a quarter of 200 cd / (10 m)^2
   EXPECT_NEAR(shot.intensity[0], 0.5, 1e-9);
+}
+
+TEST(PunctualLights, APointLightVeryFarAwayShinesAsADirectionalOneOfTheSameIrradiance) {
+  const auto made = makeQuadScene(cubeQuads(4, {}, {}));
+  PunctualLights lights(*made.patches, {{{.position = {0.0, 3e8, 4e8}, .intensity = glm::vec3(5e17F)}}, {}}, {});
+  ShotBatch batch;
+  lights.addSlice(1, batch);
+  EXPECT_TRUE(batch.point_lights.empty());
+  ASSERT_EQ(batch.parallel.size(), 4U);
+  EXPECT_NEAR(batch.parallel[0].irradiance[0], 0.5, 1e-6);  // a quarter of 5e17 / (5e8)^2 lux
+  EXPECT_NEAR(static_cast<double>(batch.views[0].direction.y), 0.6, 1e-6);
+  // positions and ranges that no float holds give no NaN
+  const PunctualLights odd(*made.patches,
+                           {{{.position = {1e300, 0, 0}, .intensity = glm::vec3(1.0F)},
+                             {.position = {0.1, 0, 0}, .intensity = glm::vec3(1.0F), .range = 1e-60}},
+                            {}},
+                           {});
+  EXPECT_TRUE(std::isfinite(odd.flux()[0]));
 }
 
 TEST(PunctualLights, EveryRoundOwesTheSourcesOnceAndAnEditOwesTheDifferenceOfAllRounds) {
@@ -136,7 +154,8 @@ TYPED_TEST(SolverLights, AClosedGreyRoomReceivesTheLampOverOneMinusReflectance) 
   EXPECT_NEAR(received(*made.patches, solver), 4.0 * kPi / 0.5, 0.02 * 8.0 * kPi);
   const auto energy = solver.energy();
   EXPECT_NEAR(energy.emitted[0], 4.0 * kPi, 1e-5);
-  const double sum = energy.absorbed[0] + energy.escaped[0] + energy.backface[0] + energy.unshot[0] + energy.imbalance[0];
+  const double sum =
+      energy.absorbed[0] + energy.escaped[0] + energy.backface[0] + energy.unshot[0] + energy.imbalance[0];
   EXPECT_NEAR(sum / energy.emitted[0], 1.0, 1e-5);
 }
 
