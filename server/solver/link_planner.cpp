@@ -48,15 +48,20 @@ bool LinkPlanner::plays(const NodePlace& place, std::size_t half, double power) 
   return p >= 1.0 || uniformFromKey(mixKeys(mixKeys(shots_.key(place), half), 77)) < p;
 }
 
-void LinkPlanner::weigh(LinkSystem& system) {
+double LinkPlanner::weigh(LinkSystem& system) {
+  double changed = 0.0, all = 0.0;
   for (auto& shooter : system.shooters()) {
     if (shooter.isLight()) continue;
     const double power = shooter.power();
     for (std::size_t half = 0; half < 2; ++half) {
       const bool in = shooter.column[half].points() > 0.0 && (shooter.certain || plays(shooter.place, half, power));
-      shooter.weight[half] = !in ? 0.0 : shooter.certain ? 1.0 : 1.0 / chance(power);
+      const double weight = !in ? 0.0 : shooter.certain ? 1.0 : 1.0 / chance(power);
+      changed += power * std::abs(weight - shooter.weight[half]);
+      all += power;
+      shooter.weight[half] = weight;
     }
   }
+  return all > 0.0 ? changed / all : 0.0;
 }
 
 std::vector<Measurement> LinkPlanner::firstLight(const LinkSystem& system) const {

@@ -51,8 +51,9 @@ class LinkPlanner {
   /// The part of the sampling error's square that is due to roulette: only smaller shares lower it.
   [[nodiscard]] static double rouletteShare(const LinkSystem& system);
 
-  /// Russian roulette: weights of weak shooters, so that those which play stand for all.
-  void weigh(LinkSystem& system);
+  /// Russian roulette: weights of weak shooters, so that those which play stand for all. Returns the part of all
+  /// power whose weight that changed.
+  double weigh(LinkSystem& system);
 
   [[nodiscard]] const PlannerCounters& counters() const { return counters_; }
 
