@@ -27,7 +27,7 @@ class Lights : public EngineTest {
   }
   double mean() {
     (void)sceneText();  // the final lightmaps are published after the state
-   
+
     const auto shown = engine().lightmaps();
     return shown ? meanIrradiance(*shown) : 0.0;
   }
