@@ -15,6 +15,8 @@ namespace {
 /// Below this visible share a texel is filled from its neighbours, so its own mean says nothing about the solver.
 constexpr double kLeastVisible = 0.25;
 constexpr double kWholeTexel = 0.999;
+/// Dividing reflected light by less than this would amplify rounding.
+constexpr double kLeastReflectance = 0.01;
 
 std::vector<Texel> chooseTexels(const LitScene& lit, const ReferenceOptions& options) {
   auto texels = findTexels(lit);
@@ -83,7 +85,9 @@ Reference makeReference(const LitScene& lit, const ReferenceOptions& options) {
     const auto& texel = texels[i];
     if (texel_means[i].visible_fraction < kLeastVisible) continue;
     const double area = texel.footprint.area() * texel_means[i].visible_fraction;
-    reference.texels.push_back({texel.page, texel.x, texel.y, area, texel_means[i]});
+    const bool plain = texel_means[i].visible_fraction > kWholeTexel && !texel.two_sided &&
+                       texel.least_reflectance >= kLeastReflectance;
+    reference.texels.push_back({texel.page, texel.x, texel.y, area, plain, texel_means[i]});
   }
   const auto points = choosePoints(lit, options);
   const auto point_values = trace(tracer, points, options.point_samples, options.seed + 3);
@@ -95,18 +99,23 @@ Reference makeReference(const LitScene& lit, const ReferenceOptions& options) {
   return reference;
 }
 
-Accuracy measure(const LitScene& lit, const Reference& reference) {
+oracle::ErrorMetrics measureTexels(const std::vector<Page>& pages, const Reference& reference, TexelChoice choice) {
   std::vector<oracle::Comparison> texels;
   for (const auto& texel : reference.texels) {
-    texels.push_back({lit.pages.at(static_cast<std::size_t>(texel.page)).at(texel.x, texel.y),
-                      texel.irradiance.mean_lux, texel.irradiance.standard_error, texel.area});
+    if (choice == TexelChoice::kPlain && !texel.plain) continue;
+    texels.push_back({pages.at(static_cast<std::size_t>(texel.page)).at(texel.x, texel.y), texel.irradiance.mean_lux,
+                      texel.irradiance.standard_error, texel.area});
   }
+  return oracle::measureError(texels);
+}
+
+Accuracy measure(const LitScene& lit, const Reference& reference) {
   std::vector<oracle::Comparison> points;
   for (const auto& point : reference.points) {
     points.push_back({lit.pages.at(static_cast<std::size_t>(point.page)).bilinear(point.uv), point.irradiance.mean_lux,
                       point.irradiance.standard_error, 1.0});
   }
-  return {oracle::measureError(texels), oracle::measureError(points)};
+  return {measureTexels(lit.pages, reference, TexelChoice::kAll), oracle::measureError(points)};
 }
 
 nlohmann::json toJson(const oracle::ErrorMetrics& metrics) {

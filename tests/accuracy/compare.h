@@ -25,6 +25,9 @@ struct Reference {
   struct TexelMean {
     int page = 0, x = 0, y = 0;
     double area = 0.0;  ///< visible, m^2
+    /// Wholly visible, one-sided, and reflecting in every channel. Other bakers agree with us on what the value of such
+    /// a texel is: they average over buried parts too, and derive irradiance from reflected light.
+    bool plain = false;
     oracle::Irradiance irradiance;
   };
   struct Point {
@@ -45,6 +48,12 @@ struct Accuracy {
 
 /// `lit` must have the layout that the reference was made for.
 [[nodiscard]] Accuracy measure(const LitScene& lit, const Reference& reference);
+
+enum class TexelChoice { kAll, kPlain };
+
+/// The first half of measure(), for pages in the layout that the reference was made for.
+[[nodiscard]] oracle::ErrorMetrics measureTexels(const std::vector<Page>& pages, const Reference& reference,
+                                                 TexelChoice choice);
 
 [[nodiscard]] nlohmann::json toJson(const oracle::ErrorMetrics& metrics);
 
