@@ -18,6 +18,7 @@ struct ReferenceOptions {
   std::size_t texels = 4000;           ///< drawn at random among the whole ones; 0: all
   std::size_t points = 2000;           ///< drawn by area
   std::uint64_t seed = 1;
+  bool closed_form = false;  ///< take the exact value, without noise, where the scene has one (closed_form.h)
 };
 
 /// What the path tracer says for one layout of texels.
@@ -38,6 +39,7 @@ struct Reference {
   std::vector<TexelMean> texels;
   std::vector<Point> points;
   double seconds = 0.0;  ///< that it took
+  bool exact = false;    ///< not traced but known
 };
 
 [[nodiscard]] Reference makeReference(const LitScene& lit, const ReferenceOptions& options);

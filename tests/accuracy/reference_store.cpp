@@ -57,7 +57,7 @@ void visitPoint(Reference::Point& point, Visit visit) {
 
 template <typename Visit>
 void visitReference(Reference& reference, Visit visit) {
-  visit(reference.seconds);
+  visit(reference.seconds), visit(reference.exact);
   for (auto& texel : reference.texels) visitTexel(texel, visit);
   for (auto& point : reference.points) visitPoint(point, visit);
 }
@@ -79,6 +79,7 @@ std::string referenceKey(const LitScene& lit, const ReferenceOptions& options) {
   hash.add(options.texels);
   hash.add(options.points);
   hash.add(options.seed);
+  hash.add(options.closed_form);
   addProbe(lit, hash);
   char text[17];
   std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(hash.value()));

@@ -16,6 +16,13 @@ std::string orDash(const std::optional<TimeToError>& time) {
   return fmt::format("{}{:.2f}", kMarks[static_cast<int>(time->kind)], time->seconds);
 }
 
+std::string truth(const SolveRow& row) {
+  if (row.resolved()) return percent(row.solver.solverRms());
+  return "< " + percent(SolveRow::kResolved * row.solver.reference_noise);
+}
+
+std::string outcome(const SolveRow& row) { return fmt::format("{:.2f}, {}", row.seconds, truth(row)); }
+
 std::string summaryTable(const std::vector<SceneSeries>& scenes) {
   std::string out =
       "| scene | polygons | patches | s to 2 % | last row: s, error % | stated / true | slope | Cycles: s to 2 % | "
@@ -23,15 +30,15 @@ std::string summaryTable(const std::vector<SceneSeries>& scenes) {
       "Cycles | whole commands |\n|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
   for (const auto& series : scenes) {
     if (!series.unmeasured.empty()) {
-      out += fmt::format("| {} | {} | {} | not judged: {} | | | | | | |\n", series.name, series.polygons,
+      out += fmt::format("| {} | {} | {} | not judged: {} | | | | | | | |\n", series.name, series.polygons,
                          series.patches, series.unmeasured);
       continue;
     }
     const auto summary = summarize(series);
     const auto& last = series.rows.back();
-    out += fmt::format("| {} | {} | {} | {} | {:.2f}, {} | {} | {} | {} | {} | {} |\n", series.name, series.polygons,
-                       series.patches, orDash(summary.to_goal), last.seconds, percent(last.solver.solverRms()),
-                       orDash(summary.stated_over_true), orDash(summary.slope),
+    out += fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |\n", series.name, series.polygons,
+                       series.patches, orDash(summary.to_goal), series.asked ? outcome(*series.asked) : "-",
+                       outcome(last), orDash(summary.stated_over_true), orDash(summary.slope),
                        series.cycles ? orDash(summary.cycles) : "-", orDash(summary.ratio), orDash(summary.ratio_wall));
   }
   return out;
@@ -43,13 +50,11 @@ std::string solveTable(const SceneSeries& series) {
       "discretization stated % | shots |\n|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
   for (const auto& row : series.rows) {
     if (!row.measured) continue;
-    const double truth = row.solver.solverRms();
-    out += fmt::format(
-        "| {:.2f} | {:.2f} | {}{} | {} | {} | {:+.2f} | {} | {} | {} | {} | {} |\n", row.seconds, row.wall_seconds,
-        row.resolved() ? "" : "< ", percent(row.resolved() ? truth : 0.5 * row.solver.reference_noise),
-        percent(row.solver.median), percent(row.solver.p99), 100.0 * row.solver.bias, percent(row.total.solverRms()),
-        percent(row.stated.total), row.resolved() ? fmt::format("{:.2f}", row.stated.total / truth) : "-",
-        percent(row.stated.discretization), row.shots);
+    out += fmt::format("| {:.2f} | {:.2f} | {} | {} | {} | {:+.2f} | {} | {} | {} | {} | {} |\n", row.seconds,
+                       row.wall_seconds, truth(row), percent(row.solver.median), percent(row.solver.p99),
+                       100.0 * row.solver.bias, percent(row.total.solverRms()), percent(row.stated.total),
+                       row.resolved() ? fmt::format("{:.2f}", row.stated.total / row.solver.solverRms()) : "-",
+                       percent(row.stated.discretization), row.shots);
   }
   return out;
 }
@@ -78,18 +83,29 @@ std::string cyclesTable(const SceneSeries& series, const Summary& summary) {
   return out;
 }
 
+std::string referenceText(const SceneSeries& series) {
+  if (series.reference_exact) {
+    return fmt::format("Reference: the closed form, exact, at {} texels and {} points.", series.reference_texels,
+                       series.reference_points);
+  }
+  return fmt::format(
+      "Reference: path traced, {} texels with noise {} % (subtracted), {} points with {} %; {:.0f} s to trace{}.",
+      series.reference_texels, percent(series.texel_noise), series.reference_points, percent(series.point_noise),
+      series.reference_seconds, series.reference_from_disk ? ", kept from an earlier run" : "");
+}
+
 std::string sceneSection(const SceneSeries& series) {
   std::string out = fmt::format("\n## {}\n\n", series.name);
   if (!series.unmeasured.empty()) return out + "Not judged: " + series.unmeasured + ".\n";
   const auto summary = summarize(series);
-  out += fmt::format(
-      "{} polygons, {} patches; {}. Reference: {} texels with noise {} % (subtracted), {} points with {} %; {:.0f} s "
-      "to "
-      "trace{}.\n\n![{} against time]({}.svg)\n\n",
-      series.polygons, series.patches, series.renderer, series.reference_texels, percent(series.texel_noise),
-      series.reference_points, percent(series.point_noise), series.reference_seconds,
-      series.reference_from_disk ? ", kept from an earlier run" : "", series.name, series.name);
+  out += fmt::format("{} polygons, {} patches; {}. {}\n\n![{} against time]({}.svg)\n\n", series.polygons,
+                     series.patches, series.renderer, referenceText(series), series.name, series.name);
   out += solveTable(series);
+  if (series.asked) {
+    const auto& row = *series.asked;
+    out += fmt::format("\nAsked for a stated 2 %: {:.2f} s of solving, {:.2f} s in all; stated {} %, true {} %.\n",
+                       row.seconds, row.wall_seconds, percent(row.stated.total), truth(row));
+  }
   if (summary.slope) out += fmt::format("\nSlope of solver RMS in log-log: {:.2f}.\n", *summary.slope);
   if (series.cycles) out += cyclesTable(series, summary);
   return out;

@@ -111,8 +111,10 @@ json toJson(const SceneSeries& series) {
             {"texel_noise", series.texel_noise},
             {"point_noise", series.point_noise},
             {"seconds", series.reference_seconds},
-            {"from_disk", series.reference_from_disk}}},
+            {"from_disk", series.reference_from_disk},
+            {"exact", series.reference_exact}}},
           {"rows", rows},
+          {"asked", series.asked ? toJson(*series.asked) : json(nullptr)},
           {"cycles", series.cycles ? toJson(*series.cycles) : json(nullptr)},
           {"slope", orNull(summary.slope)},
           {"stated_over_true", orNull(summary.stated_over_true)},
@@ -171,7 +173,7 @@ ErrorPlot plotOf(const SceneSeries& series) {
   for (const auto& curve : plot.curves) {
     for (const auto& [seconds, value] : curve.points) first = std::min(first, seconds), last = std::max(last, seconds);
   }
-  if (last > 0.0) {
+  if (last > 0.0 && !series.reference_exact) {
     plot.curves.push_back(
         {"noise of reference", "#c0a030", {{first, series.texel_noise}, {last, series.texel_noise}}, true});
   }

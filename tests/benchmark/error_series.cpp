@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
@@ -12,6 +13,7 @@ namespace {
 
 using nlohmann::json;
 
+constexpr double kPatience = 30.0;           // seconds of solving for the run that asks for an error
 constexpr int kReached = 0, kTimeLimit = 3;  // exit codes of `radiosity solve` that come with an output
 
 /// What the rows of one scene share. Runs of one scene nearly always have the same texels, so the same reference.
@@ -26,6 +28,7 @@ struct Judge {
     auto found = accuracy::findReference(*lit, options.reference, options.reference_folder);
     reference = std::move(found.reference);
     series.reference_from_disk = found.from_disk;
+    series.reference_exact = reference.exact;
     series.reference_seconds = reference.seconds;
     series.reference_texels = reference.texels.size();
     series.reference_points = reference.points.size();
@@ -49,18 +52,18 @@ std::string whyNotJudged(const json& report, const accuracy::LitScene& lit) {
   return text.empty() ? text : "by the reference, " + text;
 }
 
-SolveRow solveOnce(const std::filesystem::path& scene, double time, const SeriesOptions& options, Judge& judge,
-                   SceneSeries& series) {
+SolveRow solveOnce(const std::filesystem::path& scene, double time, double error, const SeriesOptions& options,
+                   Judge& judge, SceneSeries& series) {
   SolveRow row;
   row.asked_seconds = time;
-  std::vector<std::string> arguments{"--time-limit", fmt::format("{:g}", time), "--error",
-                                     fmt::format("{:g}", options.floor)};
+  std::vector<std::string> arguments{"--time-limit", fmt::format("{:g}", time), "--error", fmt::format("{:g}", error)};
   arguments.insert(arguments.end(), options.solve_arguments.begin(), options.solve_arguments.end());
   const auto run = accuracy::runSolve(options.client, scene, options.work_folder / series.name, arguments);
   row.exit_code = run.exit_code;
   row.wall_seconds = run.wall_seconds;
   if (run.exit_code != kReached && run.exit_code != kTimeLimit) {
-    series.unmeasured = fmt::format("`radiosity solve` ended with exit code {}", run.exit_code);
+    series.unmeasured =
+        run.last_line.empty() ? fmt::format("`radiosity solve` ended with exit code {}", run.exit_code) : run.last_line;
     return row;
   }
   row.seconds = run.report.value("seconds", time);
@@ -89,7 +92,7 @@ SceneSeries measureScene(const std::filesystem::path& scene, const SeriesOptions
   series.name = scene.stem().string();
   Judge judge;
   for (const double time : options.times) {
-    series.rows.push_back(solveOnce(scene, time, options, judge, series));
+    series.rows.push_back(solveOnce(scene, time, options.floor, options, judge, series));
     const auto& row = series.rows.back();
     if (!row.measured) {
       std::fprintf(stderr, "%s: not judged: %s\n", series.name.c_str(), series.unmeasured.c_str());
@@ -98,6 +101,9 @@ SceneSeries measureScene(const std::filesystem::path& scene, const SeriesOptions
     std::fprintf(stderr, "%s %g s: solver error %.2f %%, total %.2f %%, stated %.2f %%\n", series.name.c_str(), time,
                  100 * row.solver.solverRms(), 100 * row.total.solverRms(), 100 * row.stated.total);
     if (row.exit_code == kReached) break;  // a longer run would stop at the same place
+  }
+  if (!options.times.empty()) {
+    series.asked = solveOnce(scene, std::max(kPatience, options.times.back()), options.goal, options, judge, series);
   }
   if (options.cycles && judge.lit) {
     const auto glb = options.work_folder / series.name / (series.name + "-lit.glb");

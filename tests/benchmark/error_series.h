@@ -14,6 +14,7 @@ namespace radiosity::benchmark {
 
 struct SeriesOptions {
   std::vector<double> times{0.1, 0.2, 0.5, 1, 2, 5, 10, 30};  ///< limits of solve time in seconds, rising
+  double goal = 0.02;                                         ///< stated error that one more run asks for
   double floor = 0.002;                                       ///< stated error at which longer runs add nothing
   std::string client = "radiosity";
   std::vector<std::string> solve_arguments;
@@ -41,7 +42,9 @@ struct SolveRow {
   oracle::ErrorMetrics solver, total, plain;  ///< plain: solver error of the texels that Cycles can be judged on
 
   /// The truth is known: not lost in the reference's own noise.
-  [[nodiscard]] bool resolved() const { return measured && solver.solverRms() > 0.5 * solver.reference_noise; }
+  [[nodiscard]] bool resolved() const { return measured && solver.solverRms() > kResolved * solver.reference_noise; }
+  /// An error this part of the noise makes a ninth of what is measured, so that subtracting leaves something to trust.
+  static constexpr double kResolved = 1.0 / 3.0;
 };
 
 struct CyclesRow {
@@ -64,8 +67,9 @@ struct SceneSeries {
   std::string renderer;
   std::size_t reference_texels = 0, plain_texels = 0, reference_points = 0;
   double texel_noise = 0.0, point_noise = 0.0, reference_seconds = 0.0;
-  bool reference_from_disk = false;
+  bool reference_from_disk = false, reference_exact = false;
   std::vector<SolveRow> rows;
+  std::optional<SolveRow> asked;  ///< one that was asked for a stated error of `goal`: what a user gets for it
   std::optional<CyclesSeries> cycles;
 };
 

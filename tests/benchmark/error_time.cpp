@@ -125,7 +125,7 @@ void applyMode(CLI::App& app, Options& options) {
   auto& series = options.series;
   if (options.full) return;
   if (app.count("--times") == 0) series.times = {0.1, 0.2, 0.5, 1, 2, 4};
-  if (app.count("--reference-samples") == 0) series.reference.texel_samples = 1024;
+  if (app.count("--reference-samples") == 0) series.reference.texel_samples = 4096;
   if (app.count("--texels") == 0) series.reference.texels = 2000;
   if (app.count("--points") == 0) series.reference.points = 1000;
   if (app.count("--cycles-seconds") == 0) series.cycles_seconds = 8.0;
@@ -136,7 +136,7 @@ void applyMode(CLI::App& app, Options& options) {
 int main(int argc, char** argv) {
   Options options;
   options.series.client = RADIOSITY_CLIENT;
-  options.series.reference = {.texel_samples = 4096, .point_samples = 4096, .texels = 4000, .points = 2000};
+  options.series.reference = {.texel_samples = 8192, .texels = 4000, .points = 2000, .closed_form = true};
   auto& series = options.series;
   CLI::App app{
       "Error of `radiosity solve` against time, judged by an independent path tracer, beside Cycles where Blender is "
@@ -152,7 +152,7 @@ int main(int argc, char** argv) {
   app.add_option("-o,--output", options.output, "folder for results")
       ->envname("RADIOSITY_BENCH_OUTPUT")
       ->capture_default_str();
-  app.add_option("--reference-samples", series.reference.texel_samples, "paths a texel and point; quick: 1024")
+  app.add_option("--reference-samples", series.reference.texel_samples, "paths a texel and point; quick: 4096")
       ->capture_default_str();
   app.add_option("--texels", series.reference.texels, "texels compared, 0: all; quick: 2000")->capture_default_str();
   app.add_option("--points", series.reference.points, "surface points compared; quick: 1000")->capture_default_str();
