@@ -58,6 +58,7 @@ void addPieces(Texel& texel, const Polygon& polygon, const oracle::Triangle& tri
   texel.coverage += texelArea(polygon);
   const auto& rho = triangle.reflectance;
   texel.least_reflectance = std::min({texel.least_reflectance, rho.x, rho.y, rho.z});
+  texel.node = triangle.node;
   texel.two_sided = texel.two_sided || triangle.double_sided;
   for (std::size_t i = 1; i + 1 < polygon.size(); ++i) {
     const std::array<glm::dvec3, 3> corners{polygon[0].world, polygon[i].world, polygon[i + 1].world};

@@ -42,6 +42,7 @@ struct Texel {
   double coverage = 0.0;           ///< share of the texel that triangles cover
   double least_reflectance = 1.0;  ///< of any triangle and channel in it
   bool two_sided = false;          ///< some of it is a double-sided triangle
+  std::uint32_t node = 0;          ///< of the last of its triangles
   oracle::Footprint footprint;
 };
 

@@ -61,7 +61,7 @@ class Glb:
         return matrix
 
     def primitives(self):
-        """(corners n x 3 x 3, uvs n x 3 x 2, material or None, page or -1) of every primitive placed in the scene."""
+        """(corners n x 3 x 3, uvs n x 3 x 2, material or None, page or -1, colour) of every primitive in the scene."""
         scene = self.gltf["scenes"][self.gltf.get("scene", 0)]
         open_nodes = [(index, np.eye(4)) for index in scene.get("nodes", [])]
         while open_nodes:
@@ -84,7 +84,17 @@ class Glb:
         order = order[:len(order) // 3 * 3].reshape(-1, 3)
         if np.linalg.det(world[:3, :3]) < 0:
             order = order[:, ::-1]
-        return position[order], uv[order], primitive.get("material"), primitive.get("extras", {}).get("lightmap", -1)
+        return position[order], uv[order], primitive.get("material"), primitive.get("extras", {}).get("lightmap", -1), self.colour(attributes)
+
+    def colour(self, attributes):
+        """The one vertex colour of a primitive. Several cannot be had: the reference has no scene of that kind either."""
+        if "COLOR_0" not in attributes:
+            return (1.0, 1.0, 1.0)
+        values = self.accessor(attributes["COLOR_0"])
+        colours = np.unique(values[:, :3] / (np.iinfo(values.dtype).max if values.dtype != np.float32 else 1.0), axis=0)
+        if len(colours) != 1:
+            raise ValueError("a primitive has several vertex colours")
+        return tuple(float(channel) for channel in colours[0])
 
 
 def light_and_reflectance(gltf, index):
@@ -157,7 +167,7 @@ def load(path, sizes):
         bpy.data.objects.remove(old)
     glb = Glb(path)
     parts = list(glb.primitives())
-    pages = 1 + max((page for *_, page in parts), default=-1)
+    pages = 1 + max((page for *_, page, _ in parts), default=-1)
     if pages < 1:
         raise ValueError("no primitive names a lightmap page")
     if len(sizes) != pages:
@@ -166,16 +176,18 @@ def load(path, sizes):
     for page, (width, height) in enumerate(sizes):
         images.append(bpy.data.images.new(f"page {page}", width, height, float_buffer=True, is_data=True))
     spare = bpy.data.images.new("no page", 4, 4, float_buffer=True, is_data=True)
-    slots = sorted({(-1 if material is None else material, page) for *_, material, page in parts})
+    slot = [(-1 if material is None else material, page, colour) for _, _, material, page, colour in parts]
+    slots = sorted(set(slot))
     corners = np.concatenate([part[0] for part in parts])
     uvs = np.concatenate([part[1] for part in parts])
-    slot_of = np.concatenate([np.full(len(c), slots.index((-1 if m is None else m, page))) for c, _, m, page in parts])
+    slot_of = np.concatenate([np.full(len(part[0]), slots.index(own)) for part, own in zip(parts, slot)])
     edges = corners[:, 1:] - corners[:, :1]
     real = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1) > 0
     mesh = make_mesh(corners[real], uvs[real], slot_of[real])
     shines = False
-    for material, page in slots:
+    for material, page, colour in slots:
         reflectance, nits, double_sided = light_and_reflectance(glb.gltf, None if material < 0 else material)
+        reflectance = np.minimum(reflectance * colour, 0.999)
         shines = shines or nits.max() > 0
         mesh.materials.append(make_material(f"{material}.{page}", reflectance, nits, double_sided, images[page] if page >= 0 else spare))
     if not shines:

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <exception>
 #include <nlohmann/json.hpp>
 
 #include "tests/accuracy/solve_run.h"
@@ -85,29 +86,36 @@ SolveRow solveOnce(const std::filesystem::path& scene, double time, double error
   return row;
 }
 
+/// False: the truth is unknown, and series.unmeasured says why.
+bool solveAll(const std::filesystem::path& scene, const SeriesOptions& options, Judge& judge, SceneSeries& series) {
+  for (const double time : options.times) {
+    series.rows.push_back(solveOnce(scene, time, options.floor, options, judge, series));
+    const auto& row = series.rows.back();
+    if (!row.measured) {
+      std::fprintf(stderr, "%s: not judged: %s\n", series.name.c_str(), series.unmeasured.c_str());
+      return false;
+    }
+    std::fprintf(stderr, "%s %g s: solver error %.2f %%, total %.2f %%, stated %.2f %%\n", series.name.c_str(), time,
+                 100 * row.solver.solverRms(), 100 * row.total.solverRms(), 100 * row.stated.total);
+    if (row.exit_code == kReached) break;  // a longer run would stop at the same place
+  }
+  series.asked = solveOnce(scene, std::max(kPatience, options.times.back()), options.goal, options, judge, series);
+  return series.asked->measured;
+}
+
 }  // namespace
 
 SceneSeries measureScene(const std::filesystem::path& scene, const SeriesOptions& options) {
   SceneSeries series;
   series.name = scene.stem().string();
   Judge judge;
-  for (const double time : options.times) {
-    series.rows.push_back(solveOnce(scene, time, options.floor, options, judge, series));
-    const auto& row = series.rows.back();
-    if (!row.measured) {
-      std::fprintf(stderr, "%s: not judged: %s\n", series.name.c_str(), series.unmeasured.c_str());
-      return series;
-    }
-    std::fprintf(stderr, "%s %g s: solver error %.2f %%, total %.2f %%, stated %.2f %%\n", series.name.c_str(), time,
-                 100 * row.solver.solverRms(), 100 * row.total.solverRms(), 100 * row.stated.total);
-    if (row.exit_code == kReached) break;  // a longer run would stop at the same place
-  }
-  if (!options.times.empty()) {
-    series.asked = solveOnce(scene, std::max(kPatience, options.times.back()), options.goal, options, judge, series);
-  }
-  if (options.cycles && judge.lit) {
+  try {
+    if (!solveAll(scene, options, judge, series)) return series;
     const auto glb = options.work_folder / series.name / (series.name + "-lit.glb");
-    series.cycles = bakeWithCycles(glb, *judge.lit, judge.reference, options);
+    if (options.cycles) series.cycles = bakeWithCycles(glb, *judge.lit, judge.reference, options);
+  } catch (const std::exception& error) {  // a scene that the reference's reader refuses; the others go on
+    series.unmeasured = error.what();
+    std::fprintf(stderr, "%s: not judged: %s\n", series.name.c_str(), error.what());
   }
   return series;
 }

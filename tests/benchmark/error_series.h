@@ -73,8 +73,7 @@ struct SceneSeries {
   std::optional<CyclesSeries> cycles;
 };
 
-/// Prints a line a run to stderr. A scene that cannot be solved or judged says why in `unmeasured`. Throws
-/// std::runtime_error when the programs cannot be started.
+/// Prints a line a run to stderr. A scene that cannot be solved or judged says why in `unmeasured`.
 [[nodiscard]] SceneSeries measureScene(const std::filesystem::path& scene, const SeriesOptions& options);
 
 /// Bakes `glb`, whose pages `lit` has, and compares with its reference.

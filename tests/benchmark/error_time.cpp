@@ -146,6 +146,8 @@ int main(int argc, char** argv) {
   app.add_flag("--full", options.full, "all scenes, all times, finer references");
   app.add_option("--times", series.times, "limits of solve time in seconds; quick: 0.1 to 4")
       ->delimiter(',')
+      ->expected(1, 100)
+      ->check(CLI::PositiveNumber)
       ->capture_default_str();
   app.add_option("--floor", series.floor, "stated error at which longer runs are left out")->capture_default_str();
   app.add_option("--client", series.client, "the radiosity program")->capture_default_str();

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -84,6 +85,12 @@ TEST(Report, JsonHoldsRowsAndSummaryAndMarkdownHasATableRow) {
   const auto text = toMarkdown(run, {series()});
   EXPECT_THAT(text, HasSubstr("| a<b | 0 | 0 | 1.00 |"));
   EXPECT_THAT(text, HasSubstr("Cycles 3.4.1"));
+  const auto bars = [&text](const char* from) {
+    const auto line = text.substr(text.find(from), text.find('\n', text.find(from)) - text.find(from));
+    return std::count(line.begin(), line.end(), '|');
+  };
+  EXPECT_EQ(bars("| scene |"), bars("| a<b |"));
+  EXPECT_EQ(bars("| solve s |"), bars("| 0.50 |"));
 }
 
 TEST(Report, ASceneWithoutTruthSaysWhyAndHasNoFigures) {
