@@ -24,7 +24,7 @@ struct SeriesOptions {
   bool cycles = true;
   std::string blender = "blender";
   std::filesystem::path bake_script;
-  double cycles_seconds = 20.0;  ///< of the longest bake, about
+  double cycles_seconds = 45.0;  ///< of the longest bake, about
 };
 
 struct StatedError {
