@@ -116,12 +116,12 @@ std::string sceneSection(const SceneSeries& series) {
 std::string toMarkdown(const RunDescription& run, const std::vector<SceneSeries>& scenes) {
   std::string out = fmt::format(
       "# Error against time\n\n{} run on {} cores of {}; load when it began {:.1f} (0: the machine was ours alone).\n\n"
-      "Solver error: means of whole texels. Total error: bilinear lookups at random surface points. Both are relative "
-      "RMS "
-      "of irradiance over area against the path tracer, with its noise subtracted. Stated: what the server says "
-      "itself. "
-      "Each row is a fresh `radiosity solve`. `<=`: the first row was below already; `~`: extrapolated as time^-0.5; "
-      "`<`: lost in the reference's noise.\n\n",
+      "Solver error: means of whole texels over their visible part. Total error: bilinear lookups at random surface "
+      "points. Both are relative RMS of irradiance over area against the path tracer, with its noise subtracted "
+      "(medians "
+      "and p99 contain it). Stated: what the server says itself. Each row is a fresh `radiosity solve`. `<=`: the "
+      "first "
+      "row was below already; `~`: extrapolated as time^-0.5; `<`: lost in the reference's noise.\n\n",
       run.mode, run.cores, run.processor, run.load);
   out += summaryTable(scenes);
   for (const auto& series : scenes) out += sceneSection(series);

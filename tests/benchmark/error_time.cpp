@@ -72,7 +72,7 @@ std::vector<fs::path> chosenScenes(const Options& options) {
   return chosen;
 }
 
-/// The rooms of the paper have its numbers of patches (Lum, Ma and Max 2002, section 6); other scenes the default.
+/// The rooms of the paper have its numbers of patches (Lum, Ma and Max 2002, section 5); other scenes the default.
 std::vector<std::string> argumentsFor(const fs::path& scene, const std::vector<std::string>& asked) {
   const bool chosen = std::any_of(asked.begin(), asked.end(), [](const auto& a) { return a.rfind("--texel", 0) == 0; });
   auto arguments = asked;

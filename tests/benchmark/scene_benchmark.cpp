@@ -1,7 +1,7 @@
 // From triangles to patches: import, charts, shading, pages; and how much memory a patch takes.
 #include <benchmark/benchmark.h>
 
-#include <numeric>
+#include <vector>
 
 #include "server/scene/document.h"
 #include "server/scene/lightmap.h"
@@ -32,6 +32,22 @@ void shade(benchmark::State& state) {
   label(state);
   const auto& patches = *patchesOf(state.range(0)).patches;
   for (auto _ : state) benchmark::DoNotOptimize(scene::shadePatches(importedScene(state.range(0)), patches));
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(patches.leaves.size()));
+}
+
+/// Irradiance into finished pages with their mips: what a publication costs before encoding, and what is saved while
+/// no client watches.
+void pages(benchmark::State& state) {
+  label(state);
+  const auto& patches = *patchesOf(state.range(0)).patches;
+  const std::vector<glm::vec3> irradiance(patches.nodeCount(), glm::vec3(1.0F));
+  for (auto _ : state) {
+    auto made = scene::assemblePages(patches, irradiance);
+    for (auto& page : made) {
+      while (page.irradiance.width > 1 || page.irradiance.height > 1) page = scene::coarserMip(page);
+    }
+    benchmark::DoNotOptimize(made.data());
+  }
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(patches.leaves.size()));
 }
 
@@ -75,6 +91,7 @@ BENCHMARK(charts)
     ->ArgsProduct({{kCornell, kSmallRoom, kSeminarRoom}, {16, 64, 256}})
     ->Unit(benchmark::kMillisecond);
 BENCHMARK(shade)->ArgNames({"scene"})->DenseRange(kCornell, kSeminarRoom)->Unit(benchmark::kMillisecond);
+BENCHMARK(pages)->ArgNames({"scene"})->DenseRange(kCornell, kSeminarRoom)->Unit(benchmark::kMillisecond);
 BENCHMARK(memory)
     ->ArgNames({"scene"})
     ->DenseRange(kCornell, kSeminarRoom)

@@ -1,5 +1,5 @@
 // Speed of light transport: shots/s and samples/s of scatter, points/s of gather, in rooms of 402 and 3138 polygons
-// (the sizes of the two scenes in Lum, Ma and Max 2002).
+// (the sizes of the two scenes in Lum, Ma and Max 2002), of fewer and of more.
 //   transport_benchmark --benchmark_filter=scatter/402
 #include <benchmark/benchmark.h>
 
@@ -14,7 +14,7 @@ namespace {
 std::shared_ptr<const scene::PatchScene> room(std::int64_t polygons) {
   static std::map<std::int64_t, std::shared_ptr<const scene::PatchScene>> rooms;
   auto& found = rooms[polygons];
-  if (!found) found = test::randomRoom(static_cast<std::uint32_t>(polygons), polygons == 402 ? 13742 : 27382, 5);
+  if (!found) found = test::randomRoom(static_cast<std::uint32_t>(polygons), polygons <= 402 ? 13742 : 27382, 5);
   return found;
 }
 
@@ -99,7 +99,7 @@ void gather(benchmark::State& state) {
 
 BENCHMARK(scatter)
     ->ArgNames({"polygons", "resolution", "workers"})
-    ->ArgsProduct({{402, 3138}, {32, 64, 128, 256}, benchmarks::workerCounts()})
+    ->ArgsProduct({{102, 402, 3138, 12006}, {32, 64, 128, 256}, benchmarks::workerCounts()})
     ->UseRealTime()
     ->Unit(benchmark::kMillisecond);
 BENCHMARK(gather)
