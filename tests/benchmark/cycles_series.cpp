@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <sys/wait.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdio>
@@ -52,6 +53,11 @@ ProgramOutput runBlender(const std::string& command) {
 
 CyclesSeries bakeWithCycles(const std::filesystem::path& glb, const accuracy::LitScene& lit,
                             const accuracy::Reference& reference, const SeriesOptions& options) {
+  CyclesSeries series;
+  if (std::none_of(reference.texels.begin(), reference.texels.end(), [](const auto& texel) { return texel.plain; })) {
+    series.missing = "all surfaces are double-sided or black, and a bake knows one side and what it reflects";
+    return series;
+  }
   const auto folder = glb.parent_path() / "cycles";
   std::string sizes;
   for (const auto& page : lit.pages) sizes += fmt::format("{}{}x{}", sizes.empty() ? "" : ",", page.width, page.height);
@@ -59,7 +65,6 @@ CyclesSeries bakeWithCycles(const std::filesystem::path& glb, const accuracy::Li
       fmt::format("{} --background --factory-startup --python {} -- {} {} --seconds {:g} --page-sizes {} 2>&1",
                   quoted(options.blender), quoted(options.bake_script.string()), quoted(glb.string()),
                   quoted(folder.string()), options.cycles_seconds, sizes));
-  CyclesSeries series;
   series.start_seconds = output.seconds;
   for (const auto& line : output.lines) {
     series.version = line.value("version", series.version);
