@@ -16,6 +16,8 @@ namespace {
 
 using nlohmann::json;
 
+constexpr std::size_t kLeastPlainShare = 4;  // a quarter of the texels stands for the scene; less does not
+
 std::string quoted(const std::string& word) {
   std::string out = "'";
   for (const char c : word) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
@@ -54,8 +56,12 @@ ProgramOutput runBlender(const std::string& command) {
 CyclesSeries bakeWithCycles(const std::filesystem::path& glb, const accuracy::LitScene& lit,
                             const accuracy::Reference& reference, const SeriesOptions& options) {
   CyclesSeries series;
-  if (std::none_of(reference.texels.begin(), reference.texels.end(), [](const auto& texel) { return texel.plain; })) {
-    series.missing = "all surfaces are double-sided or black, and a bake knows one side and what it reflects";
+  const auto plain = static_cast<std::size_t>(
+      std::count_if(reference.texels.begin(), reference.texels.end(), [](const auto& texel) { return texel.plain; }));
+  if (plain * kLeastPlainShare < reference.texels.size() || plain == 0) {
+    series.missing = fmt::format(
+        "only {} of {} texels are one-sided, visible and not black, and a bake knows one side and what it reflects",
+        plain, reference.texels.size());
     return series;
   }
   const auto folder = glb.parent_path() / "cycles";

@@ -23,11 +23,20 @@ std::string truth(const SolveRow& row) {
 
 std::string outcome(const SolveRow& row) { return fmt::format("{:.2f}, {}", row.seconds, truth(row)); }
 
+std::string cyclesTime(const SceneSeries& series, const Summary& summary) {
+  return series.cycles && !series.cycles->rows.empty() ? orDash(summary.cycles) : "-";
+}
+
+std::string ratioText(const Summary& summary) {
+  if (!summary.ratio_at_best) return orDash(summary.ratio);
+  return fmt::format("{:.2f} at {} %", summary.ratio_at_best->ratio, percent(summary.ratio_at_best->error));
+}
+
 std::string summaryTable(const std::vector<SceneSeries>& scenes) {
   std::string out =
       "| scene | polygons | patches | s to 2 % | asked for 2 %: s, true % | last row: s, true % | stated / true | "
-      "slope | "
-      "Cycles: s to 2 % | ours / Cycles | whole commands |\n|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
+      "late slope | Cycles: s to 2 % | ours / Cycles | whole commands "
+      "|\n|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
   for (const auto& series : scenes) {
     if (!series.unmeasured.empty()) {
       out += fmt::format("| {} | {} | {} | not judged: {} | | | | | | | |\n", series.name, series.polygons,
@@ -38,8 +47,8 @@ std::string summaryTable(const std::vector<SceneSeries>& scenes) {
     const auto& last = series.rows.back();
     out += fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |\n", series.name, series.polygons,
                        series.patches, orDash(summary.to_goal), series.asked ? outcome(*series.asked) : "-",
-                       outcome(last), orDash(summary.stated_over_true), orDash(summary.slope),
-                       series.cycles ? orDash(summary.cycles) : "-", orDash(summary.ratio), orDash(summary.ratio_wall));
+                       outcome(last), orDash(summary.stated_over_true), orDash(summary.late_slope),
+                       cyclesTime(series, summary), ratioText(summary), orDash(summary.ratio_wall));
   }
   return out;
 }
@@ -78,7 +87,7 @@ std::string cyclesTable(const SceneSeries& series, const Summary& summary) {
         "commands: "
         "{}.\n",
         summary.cycles_cost->setup_seconds, cycles.start_seconds, orDash(summary.plain), orDash(summary.plain_wall),
-        orDash(summary.cycles), orDash(summary.cycles_wall), orDash(summary.ratio), orDash(summary.ratio_wall));
+        orDash(summary.cycles), orDash(summary.cycles_wall), ratioText(summary), orDash(summary.ratio_wall));
   }
   return out;
 }
@@ -106,7 +115,8 @@ std::string sceneSection(const SceneSeries& series) {
     out += fmt::format("\nAsked for a stated 2 %: {:.2f} s of solving, {:.2f} s in all; stated {} %, true {} %.\n",
                        row.seconds, row.wall_seconds, percent(row.stated.total), truth(row));
   }
-  if (summary.slope) out += fmt::format("\nSlope of solver RMS in log-log: {:.2f}.\n", *summary.slope);
+  out += fmt::format("\nSlope of solver RMS in log-log: {}; over the last decade of time {}.\n", orDash(summary.slope),
+                     orDash(summary.late_slope));
   if (series.cycles) out += cyclesTable(series, summary);
   return out;
 }

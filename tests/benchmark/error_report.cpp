@@ -58,7 +58,15 @@ void summarizeCycles(const SceneSeries& series, const std::vector<SolveRow>& row
   }
   summary.ratio = ratioOf(summary.plain, summary.cycles);
   summary.ratio_wall = ratioOf(summary.plain_wall, summary.cycles_wall);
+  if (summary.plain || rows.empty()) return;
+  const auto best =
+      *std::min_element(rows.begin(), rows.end(), [&](const auto& a, const auto& b) { return plain(a) < plain(b); });
+  const auto theirs = timeToError(curveOf(cycles.rows, rendering, plain), plain(best), kMonteCarlo);
+  if (const auto ratio = ratioOf(TimeToError{best.seconds}, theirs)) summary.ratio_at_best = {plain(best), *ratio};
 }
+
+/// A tenth, and a little for limits that were overrun: of rows at 1, 2, 5 and 10 s all belong to the last decade.
+constexpr double kLate = 0.09;
 
 json orNull(const std::optional<double>& value) { return value ? json(*value) : json(nullptr); }
 
@@ -117,6 +125,7 @@ json toJson(const SceneSeries& series) {
           {"asked", series.asked ? toJson(*series.asked) : json(nullptr)},
           {"cycles", series.cycles ? toJson(*series.cycles) : json(nullptr)},
           {"slope", orNull(summary.slope)},
+          {"late_slope", orNull(summary.late_slope)},
           {"stated_over_true", orNull(summary.stated_over_true)},
           {"to_2_percent",
            {{"solver", toJson(summary.to_goal)},
@@ -125,7 +134,10 @@ json toJson(const SceneSeries& series) {
             {"cycles_render", toJson(summary.cycles)},
             {"cycles_wall", toJson(summary.cycles_wall)},
             {"ratio", orNull(summary.ratio)},
-            {"ratio_wall", orNull(summary.ratio_wall)}}}};
+            {"ratio_wall", orNull(summary.ratio_wall)}}},
+          {"ratio_at_best", summary.ratio_at_best
+                                ? json{{"error", summary.ratio_at_best->error}, {"ratio", summary.ratio_at_best->ratio}}
+                                : json(nullptr)}};
 }
 
 }  // namespace
@@ -138,6 +150,9 @@ Summary summarize(const SceneSeries& series) {
   auto resolved = rows;
   std::erase_if(resolved, [](const SolveRow& row) { return !row.resolved(); });
   summary.slope = logLogSlope(curveOf(resolved, seconds, error));
+  auto late = resolved;
+  std::erase_if(late, [&](const SolveRow& row) { return row.seconds < kLate * resolved.back().seconds; });
+  summary.late_slope = logLogSlope(curveOf(late, seconds, error));
   std::vector<double> ratios;
   for (const auto& row : resolved) ratios.push_back(row.stated.total / row.solver.solverRms());
   summary.stated_over_true = geometricMean(ratios);

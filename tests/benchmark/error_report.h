@@ -18,6 +18,7 @@ inline constexpr double kGoal = 0.02;
 /// What is drawn from a scene's rows.
 struct Summary {
   std::optional<double> slope;             ///< of solver error against solve time, resolved rows
+  std::optional<double> late_slope;        ///< the same over the last decade of time: whether it still falls
   std::optional<double> stated_over_true;  ///< geometric mean, resolved rows
   std::optional<TimeToError> to_goal;      ///< solver error, solve seconds
   // The same texels for both, from here on (texels that both can be judged on).
@@ -26,6 +27,11 @@ struct Summary {
   std::optional<LinearCost> cycles_cost;
   /// Ours over Cycles, smaller is better; only where neither is a bound.
   std::optional<double> ratio, ratio_wall;
+  /// Where ours never comes down to the goal: the same at the smallest error it reached.
+  struct RatioAt {
+    double error = 0.0, ratio = 0.0;
+  };
+  std::optional<RatioAt> ratio_at_best;
 };
 [[nodiscard]] Summary summarize(const SceneSeries& series);
 

@@ -51,6 +51,15 @@ TEST(Summary, StatedIsComparedWithTheTruthWithoutTheReferencesNoise) {
   EXPECT_NEAR(summary.to_goal->seconds, 1.0, 1e-9);
 }
 
+TEST(Summary, ACurveThatHasFlattenedHasAFlatLateSlope) {
+  SceneSeries flat;
+  for (const double t : {0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0})
+    flat.rows.push_back(rowAt(t, std::max(0.02, 0.02 / t), 0.02));
+  const auto summary = summarize(flat);
+  EXPECT_NEAR(summary.late_slope.value(), 0.0, 1e-9);
+  EXPECT_LT(summary.slope.value(), -0.3);
+}
+
 TEST(Summary, CyclesIsChargedForRenderingAndInAllForItsWholeRun) {
   const auto summary = summarize(series());
   EXPECT_NEAR(summary.cycles_cost->setup_seconds, 1.0, 1e-9);
@@ -67,6 +76,16 @@ TEST(Summary, NoRatioFromABound) {
   const auto summary = summarize(bounded);
   EXPECT_EQ(summary.plain->kind, TimeToError::Kind::kAtMost);
   EXPECT_FALSE(summary.ratio);
+}
+
+TEST(Summary, ACurveThatNeverReachesTheGoalIsComparedAtItsBest) {
+  auto high = series();
+  for (auto& row : high.rows) row.plain = metrics(0.1 / std::sqrt(row.seconds), 0.003);
+  const auto summary = summarize(high);
+  EXPECT_FALSE(summary.ratio);
+  ASSERT_TRUE(summary.ratio_at_best);
+  EXPECT_NEAR(summary.ratio_at_best->error, 0.1 / std::sqrt(2.0), 1e-9);
+  EXPECT_NEAR(summary.ratio_at_best->ratio, 2.0 / 0.08, 1e-6);  // Cycles is there with 8 samples
 }
 
 TEST(Summary, RowsLostInTheReferencesNoiseDecideNothing) {
