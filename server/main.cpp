@@ -1,7 +1,10 @@
 // radiosityd: options -> engine and network -> run until a signal.
+#include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <string_view>
+#include <thread>
 
 #include "common/log.h"
 #include "server/engine/solve_loop.h"
@@ -27,6 +30,16 @@ void loadFirstScene(engine::Engine& engine, const std::string& path) {
   });
 }
 
+/// The engine ends between two steps of a load, and a step of a big scene takes seconds. Whoever asked for the end does
+/// not wait for that: nothing a load has made so far is worth keeping. The workers die with this process.
+void leaveWithin(std::chrono::milliseconds patience) {
+  std::thread([patience] {
+    std::this_thread::sleep_for(patience);
+    log::info("leaving in the middle of a load");
+    std::_Exit(0);
+  }).detach();
+}
+
 int serve(const Options& options) {
   engine::EngineOptions engine_options;
   engine_options.settings = options.solve;
@@ -42,6 +55,7 @@ int serve(const Options& options) {
   std::printf("listening on %s\n", (*server)->url().c_str());
   std::fflush(stdout);
   (*server)->run();
+  leaveWithin(std::chrono::milliseconds(200));
   return 0;
 }
 

@@ -18,7 +18,6 @@ namespace beast = boost::beast;
 namespace http = beast::http;
 namespace websocket = beast::websocket;
 using detail::Clock;
-using protocol::RpcError;
 
 constexpr std::size_t kMaxErrorBodyBytes = 200;
 
@@ -265,11 +264,11 @@ Result<void> Connection::poll(std::chrono::milliseconds duration) {
 }
 
 std::chrono::milliseconds BackOff::next() {
-  constexpr double kFirst_ms = 250.0;
+  constexpr double kFirstMs = 250.0;
   constexpr unsigned kDoublings = 5;  // 8 s
   static std::minstd_rand random(std::random_device{}());
   std::uniform_real_distribution<double> spread(0.5, 1.0);
-  const double wait_ms = kFirst_ms * static_cast<double>(1U << std::min(attempts_++, kDoublings)) * spread(random);
+  const double wait_ms = kFirstMs * static_cast<double>(1U << std::min(attempts_++, kDoublings)) * spread(random);
   return std::chrono::milliseconds(static_cast<std::int64_t>(wait_ms));
 }
 

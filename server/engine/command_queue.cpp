@@ -21,6 +21,11 @@ std::optional<std::vector<CommandQueue::Command>> CommandQueue::take(bool wait) 
   return std::exchange(commands_, {});
 }
 
+bool CommandQueue::closed() const {
+  const std::scoped_lock lock(mutex_);
+  return closed_;
+}
+
 void CommandQueue::close() {
   {
     const std::scoped_lock lock(mutex_);

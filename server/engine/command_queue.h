@@ -23,12 +23,14 @@ class CommandQueue {
   /// All that is due, oldest first. `wait`: sleeps until there is something. Nothing: the queue was closed.
   [[nodiscard]] std::optional<std::vector<Command>> take(bool wait);
 
+  [[nodiscard]] bool closed() const;
+
   /// Wakes the solve thread for the last time. Commands that still wait are dropped unanswered.
   void close();
 
  private:
   const std::size_t capacity_;
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::condition_variable wake_;
   std::vector<Command> commands_;
   bool closed_ = false;

@@ -214,7 +214,7 @@ double Scout::irradianceAt(std::uint32_t triangle, const glm::dvec3& point) cons
   std::array<glm::dvec3, 3> p{};
   std::array<glm::vec2, 3> texel{};
   for (std::size_t c = 0; c < 3; ++c) {
-    const auto& vertex = patches_.vertices[patches_.indices[3 * triangle + c]];
+    const auto& vertex = patches_.vertices[patches_.indices[std::size_t{3} * triangle + c]];
     p[c] = glm::dvec3(vertex.position);
     texel[c] = vertex.texel;
   }

@@ -80,7 +80,7 @@ void LitScene::makeSolver() {
   settings.target_error = settings_.target_error;
   settings.seed = settings_.seed;
   settings.paper_mode = settings_.paper_mode;
-  solver_ = std::make_unique<solver::Solver>(patches_, materials_, transport_, settings);
+  solver_ = solver::makeSolver(patches_, materials_, transport_, settings);
   solver_power_ = emittedPower(materials_);
 }
 
@@ -122,10 +122,10 @@ Result<std::uint64_t> LitScene::reshade(scene::Document next, Change change) {
   document_ = std::move(next);
   scene_ = std::make_shared<const scene::Scene>(std::move(*imported));
   if (affected.empty()) return std::uint64_t{0};
-  // The integers' scale was chosen for the power at the start. Far outside it they could overflow or lose the small
-  // lights.
+  // Integers have a scale that was chosen for the power at the start. Far outside it they could overflow or lose the
+  // small lights.
   const double power = emittedPower(materials_);
-  if (power > 4.0 * solver_power_ || power < solver_power_ / 64.0) {
+  if (solver_->hasFluxScale() && (power > 4.0 * solver_power_ || power < solver_power_ / 64.0)) {
     makeSolver();
   } else {
     solver_->setMaterials(materials_);
@@ -146,17 +146,10 @@ std::vector<scene::LightmapPage> LitScene::pages() const {
 
 std::vector<scene::LightmapPage> LitScene::errorPages() const {
   std::vector<glm::vec3> error(patches_->nodeCount(), glm::vec3(0.0F));
-  const auto& state = solver_->state();
-  std::vector<glm::vec3> first, second;
-  for (const auto& side : state.sides()) {
-    first.resize(side.leaf_count);
-    second.resize(side.leaf_count);
-    state.halfIrradiance(side, 0, first);
-    state.halfIrradiance(side, 1, second);
-    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
-      const glm::vec3 mean = 0.5F * (first[leaf] + second[leaf]);
-      error[side.first_node + leaf] = 0.5F * glm::abs(first[leaf] - second[leaf]) / glm::max(mean, glm::vec3(1e-30F));
-    }
+  const auto first = solver_->halfIrradiance(0), second = solver_->halfIrradiance(1);
+  for (std::size_t node = 0; node < error.size(); ++node) {
+    const glm::vec3 mean = 0.5F * (first[node] + second[node]);
+    error[node] = 0.5F * glm::abs(first[node] - second[node]) / glm::max(mean, glm::vec3(1e-30F));
   }
   return scene::assemblePages(*patches_, error);
 }

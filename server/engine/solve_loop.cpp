@@ -18,23 +18,31 @@ SolveLoop::SolveLoop(EngineOptions options)
 
 SolveLoop::~SolveLoop() {
   queue_.close();
+  {
+    const std::scoped_lock lock(mutex_);
+    if (transport_) transport_->interrupt();
+  }
   if (thread_.joinable()) thread_.join();
 }
 
 Result<void> SolveLoop::start() {
+  // The thread owns the promise: here it would go while set_value() is still at work on it.
   std::promise<Result<void>> started;
   auto outcome = started.get_future();
-  thread_ = std::thread([this, &started] { threadMain(started); });
+  thread_ = std::thread([this, started = std::move(started)]() mutable { threadMain(std::move(started)); });
   return outcome.get();
 }
 
-void SolveLoop::threadMain(std::promise<Result<void>>& started) {
+void SolveLoop::threadMain(std::promise<Result<void>> started) {
   auto transport = options_.make_transport();
   if (!transport) {
     started.set_value(tl::unexpected<Error>(transport.error()));
     return;
   }
-  transport_ = std::move(*transport);
+  {
+    const std::scoped_lock lock(mutex_);
+    transport_ = std::move(*transport);
+  }
   updateStatus(false);
   started.set_value({});
   while (runCommands()) {
@@ -42,6 +50,7 @@ void SolveLoop::threadMain(std::promise<Result<void>>& started) {
   }
   lit_.reset();
   view_.reset();
+  const std::scoped_lock lock(mutex_);
   transport_.reset();
 }
 
@@ -49,7 +58,10 @@ void SolveLoop::threadMain(std::promise<Result<void>>& started) {
 bool SolveLoop::runCommands() {
   const auto due = queue_.take(state_ != SolveState::kSolving);
   if (!due) return false;
-  for (const auto& command : *due) command();
+  for (const auto& command : *due) {
+    if (queue_.closed()) return false;
+    command();
+  }
   return true;
 }
 
@@ -57,12 +69,14 @@ void SolveLoop::solveSlice() {
   const auto begin = Clock::now();
   const auto outcome = lit_->solver().step();
   seconds_ += std::chrono::duration<double>(Clock::now() - begin).count();
+  if (queue_.closed()) return;  // nobody is left to be told
   if (!outcome) {
     failure_ = outcome.error().text();
     log::error("solve stopped: {}", failure_);
     endSolve(SolveState::kFailed);
     return;
   }
+  if (*outcome == solver::StepOutcome::kSlice) return tellProgress(false);
   unpublished_ = true;
   if (*outcome == solver::StepOutcome::kConverged) {
     endSolve(SolveState::kConverged);
@@ -72,13 +86,15 @@ void SolveLoop::solveSlice() {
   } else if (settings_.time_limit_s && seconds_ >= *settings_.time_limit_s) {
     endSolve(SolveState::kTimeLimit);
   } else {
-    const auto now = Clock::now();
-    if (now - last_publish_ >= kPublishInterval) publishLightmaps(false);
-    if (now - last_progress_ >= kProgressInterval) {
-      lit_->solver().assess();
-      updateStatus(true);
-    }
+    if (Clock::now() - last_publish_ >= kPublishInterval) publishLightmaps(false);
+    tellProgress(true);
   }
+}
+
+void SolveLoop::tellProgress(bool assess) {
+  if (Clock::now() - last_progress_ < kProgressInterval) return;
+  if (assess) lit_->solver().assess();
+  updateStatus(true);
 }
 
 void SolveLoop::beginSolve() {
@@ -91,6 +107,7 @@ void SolveLoop::beginSolve() {
 
 void SolveLoop::endSolve(SolveState state) {
   state_ = state;
+  if (queue_.closed()) return;
   if (lit_) lit_->solver().assess();
   updateStatus(false);
   publishLightmaps(true);

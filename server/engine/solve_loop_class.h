@@ -61,9 +61,10 @@ class SolveLoop final : public Engine {
   void askLit(Callback<T> done, Work work);
 
   // All below: solve thread only.
-  void threadMain(std::promise<Result<void>>& started);
+  void threadMain(std::promise<Result<void>> started);
   [[nodiscard]] bool runCommands();
   void solveSlice();
+  void tellProgress(bool assess);  ///< not oftener than anyone can see; `assess`: with a new error
   /// The clock starts over: another scene, another seed, an edit. A paused solve stays paused.
   void beginSolve();
   void endSolve(SolveState state);
@@ -90,7 +91,7 @@ class SolveLoop final : public Engine {
 
   // solve thread only
   SolveSettings settings_;
-  std::unique_ptr<solver::Transport> transport_;
+  std::unique_ptr<solver::Transport> transport_;  // made and ended under mutex_: the destructor interrupts it
   std::unique_ptr<gpu::ViewRenderer> view_;
   std::unique_ptr<LitScene> lit_;
   Publisher publisher_;
@@ -101,7 +102,7 @@ class SolveLoop final : public Engine {
   bool unpublished_ = false;
   Clock::time_point last_publish_{}, last_progress_{};
 
-  mutable std::mutex mutex_;  // for the two that any thread may read
+  mutable std::mutex mutex_;  // for the two that any thread may read, and transport_ coming and going
   Status status_;
   std::shared_ptr<const Lightmaps> lightmaps_;
   std::thread thread_;

@@ -37,7 +37,7 @@ Result<LoadOutcome> SolveLoop::install(Result<scene::Document> document) {
 Result<void> SolveLoop::relight(scene::Document document, const SolveSettings& settings) {
   auto made = LitScene::make(std::move(document), settings, *transport_);
   if (!made) return tl::unexpected<Error>(made.error());
-  if (const auto uploaded = (*made)->upload(); !uploaded) {
+  if (auto uploaded = (*made)->upload(); !uploaded) {
     if (lit_) {
       if (const auto back = lit_->upload(); !back) {
         failure_ = back.error().text();

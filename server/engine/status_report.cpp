@@ -53,9 +53,12 @@ Status reportStatus(const LitScene& lit, double seconds) {
   status.nodes = patches.nodeCount();
   status.surfaces = patches.surfaces.size();
   status.polygons = patches.polygons;
-  for (const auto& side : solver.state().sides()) {
-    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
-      if (solver.state().leafArea(side, leaf) > 0.0F) ++status.patches;
+  for (const auto& surface : patches.surfaces) {
+    for (const auto first : surface.first_node) {
+      if (first == scene::kNone) continue;
+      const auto leaves = patches.node_area.begin() + first;
+      status.patches += static_cast<std::uint64_t>(std::count_if(
+          leaves, leaves + surface.width * surface.height, [](const float area) { return area > 0.0F; }));
     }
   }
   status.warnings = lit.warnings();

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <span>
 
-#include "server/gpu/hemicube_weights.h"
 #include "server/gpu/worker_protocol.h"
+#include "server/solver/shot_cost.h"
 
 namespace radiosity::gpu {
 namespace {
@@ -13,27 +13,18 @@ namespace {
 constexpr double kMinChunkCost = 500'000.0;  // pixels
 /// So many chunks for each worker even out the differences between them.
 constexpr double kChunksPerWorker = 8.0;
-/// Culling and drawing a triangle costs about as much as this many pixels.
-constexpr double kTrianglePixels = 4.0;
-
-struct Coster {
-  double triangles;
-  [[nodiscard]] double operator()(const solver::ScatterShot& shot) const {
-    return hemicubePixels(shot.resolution) + kTrianglePixels * triangles;
-  }
-  [[nodiscard]] double operator()(const solver::GatherShot& shot) const {
-    return shot.point_count * (hemicubePixels(shot.resolution) + kTrianglePixels * triangles);
-  }
-};
+/// Links of so many shots fit into one report.
+constexpr std::size_t kMaxShots = 64;
 
 template <typename Shot>
-void cut(const std::vector<Shot>& shots, bool gather, double target, const Coster& cost, std::vector<Chunk>& chunks) {
+void cut(const std::vector<Shot>& shots, bool gather, double target, const solver::ShotCost& cost,
+         std::vector<Chunk>& chunks) {
   double sum = 0.0;
   std::size_t first = 0;
   for (std::size_t i = 0; i < shots.size(); ++i) {
     sum += cost(shots[i]);
-    if (sum < target && i + 1 < shots.size()) continue;
-    chunks.push_back({gather, first, i + 1 - first});
+    if (sum < target && i + 1 < shots.size() && i + 1 - first < kMaxShots) continue;
+    chunks.push_back({gather, first, i + 1 - first, sum});
     first = i + 1;
     sum = 0.0;
   }
@@ -42,7 +33,7 @@ void cut(const std::vector<Shot>& shots, bool gather, double target, const Coste
 }  // namespace
 
 std::vector<Chunk> cutBatch(const solver::ShotBatch& batch, std::size_t triangles, std::size_t workers) {
-  const Coster cost{static_cast<double>(triangles)};
+  const solver::ShotCost cost{static_cast<double>(triangles)};
   double total = 0.0;
   for (const auto& shot : batch.scatter) total += cost(shot);
   for (const auto& shot : batch.gather) total += cost(shot);
@@ -55,7 +46,8 @@ std::vector<Chunk> cutBatch(const solver::ShotBatch& batch, std::size_t triangle
   return chunks;
 }
 
-std::vector<std::byte> packChunk(const solver::ShotBatch& batch, const Chunk& chunk, std::uint64_t id) {
+std::vector<std::byte> packChunk(const solver::ShotBatch& batch, const Chunk& chunk, std::uint64_t id,
+                                 bool measure) {
   std::vector<solver::GatherShot> gather;
   std::vector<solver::HemicubeFrame> points;
   std::span<const solver::ScatterShot> scatter;
@@ -74,6 +66,7 @@ std::vector<std::byte> packChunk(const solver::ShotBatch& batch, const Chunk& ch
   head.chunk = id;
   head.flux_scale = batch.flux_scale;
   head.mode = static_cast<std::uint32_t>(batch.mode);
+  head.measure = measure ? 1 : 0;
   head.scatter = static_cast<std::uint32_t>(scatter.size());
   head.gather = static_cast<std::uint32_t>(gather.size());
   head.points = static_cast<std::uint32_t>(points.size());

@@ -12,12 +12,14 @@ namespace radiosity::gpu {
 struct Chunk {
   bool gather = false;
   std::size_t first = 0, count = 0;
+  double cost = 0.0;  ///< pixels, and what takes as long as so many
 };
 
 /// Gather shots first: they are the longest. Cost of a shot: its pixels and, for each hemicube, the scene's triangles.
 [[nodiscard]] std::vector<Chunk> cutBatch(const solver::ShotBatch& batch, std::size_t triangles, std::size_t workers);
 
-/// The chunk as the body of a message.
-[[nodiscard]] std::vector<std::byte> packChunk(const solver::ShotBatch& batch, const Chunk& chunk, std::uint64_t id);
+/// The chunk as the body of a message; `measure`: links are wanted, shot by shot.
+[[nodiscard]] std::vector<std::byte> packChunk(const solver::ShotBatch& batch, const Chunk& chunk, std::uint64_t id,
+                                               bool measure);
 
 }  // namespace radiosity::gpu

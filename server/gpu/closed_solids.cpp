@@ -87,7 +87,7 @@ ClosedSolids findClosedSolids(const scene::PatchScene& patches) {
     const auto part = parts.find(i);
     if (open[i]) part_open[part] = true;
     const auto corner = [&](std::size_t c) {
-      return glm::dvec3(patches.vertices[patches.indices[3 * i + c]].position);
+      return glm::dvec3(patches.vertices[patches.indices[std::size_t{3} * i + c]].position);
     };
     volume[part] += glm::dot(corner(0), glm::cross(corner(1), corner(2)));
   }
@@ -105,7 +105,7 @@ ClosedSolids findClosedSolids(const scene::PatchScene& patches) {
     solids.solid_of[i] = number[part];
     auto& bounds = solids.bounds[number[part]];
     for (std::size_t c = 0; c < 3; ++c) {
-      const auto& position = patches.vertices[patches.indices[3 * i + c]].position;
+      const auto& position = patches.vertices[patches.indices[std::size_t{3} * i + c]].position;
       bounds.low = glm::min(bounds.low, position);
       bounds.high = glm::max(bounds.high, position);
     }

@@ -188,12 +188,12 @@ EglContext::EglContext(void* display, void* context, std::string platform)
   for (const auto* name : {"llvmpipe", "softpipe", "SWR", "swrast"}) {
     software_ = software_ || renderer_.find(name) != std::string::npos;
   }
-  static const int fatal = 1;
+  static const int kFatal = 1;
   if (debugWanted()) {
     glEnable(GL_DEBUG_OUTPUT);
     glEnable(GL_DEBUG_OUTPUT_SYNCHRONOUS);
   }
-  glDebugMessageCallback(onDebugMessage, debugWanted() ? &fatal : nullptr);
+  glDebugMessageCallback(onDebugMessage, debugWanted() ? &kFatal : nullptr);
 }
 
 EglContext::~EglContext() {

@@ -1,6 +1,7 @@
 // Ways to get a Transport that renders hemicubes with OpenGL.
 #pragma once
 
+#include <chrono>
 #include <memory>
 #include <string>
 
@@ -16,10 +17,13 @@ namespace radiosity::gpu {
 struct WorkerOptions {
   int workers = 0;         ///< 0: one for each core with llvmpipe, one on a GPU
   std::string executable;  ///< started as `executable --worker ...`; normally /proc/self/exe
+  /// A worker that owes an answer for longer than this, and 2 us for each pixel it has to draw (50 times what llvmpipe
+  /// takes), counts as hung. Long, because to be wrong costs its work twice.
+  std::chrono::milliseconds patience{30'000};
 };
 
-/// Worker processes, each with its own EGL display, results in shared memory. A worker that dies is replaced and its
-/// part of the batch done again.
+/// Worker processes, each with its own EGL display, results in shared memory. A worker that dies or hangs is replaced
+/// and its part of the batch done again.
 [[nodiscard]] Result<std::unique_ptr<solver::Transport>> makeWorkerTransport(const WorkerOptions& options);
 
 /// The body of a worker process; returns its exit status. argv as received by main after `--worker`.

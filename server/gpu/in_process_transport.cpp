@@ -13,6 +13,7 @@ class InProcessTransport final : public solver::Transport {
 
   Result<void> setScene(std::shared_ptr<const scene::PatchScene> patches) override {
     store_ = FluxStore(patches->nodeCount());
+    patches_ = patches;
     return runner_->setScene(std::move(patches));
   }
 
@@ -27,12 +28,21 @@ class InProcessTransport final : public solver::Transport {
     return counters;
   }
 
+  Result<solver::TransportCounters> measure(const solver::ShotBatch& batch,
+                                            std::vector<solver::LinkSample>& samples) override {
+    return runner_->measure({batch.mode, batch.flux_scale, batch.scatter, batch.gather, batch.points}, samples);
+  }
+
   [[nodiscard]] std::string description() const override {
     return fmt::format("{}, in process", runner_->context().renderer());
   }
 
+ protected:
+  [[nodiscard]] std::shared_ptr<const scene::PatchScene> scene() const override { return patches_; }
+
  private:
   std::unique_ptr<ShotRunner> runner_;
+  std::shared_ptr<const scene::PatchScene> patches_;
   FluxStore store_;
 };
 

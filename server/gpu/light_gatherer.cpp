@@ -229,7 +229,8 @@ float LightGatherer::visibility(std::size_t sums, std::size_t i, std::size_t poi
 
 /// What leaves a polygon arrives: the flux of its form factors is scaled to what, by the weights of the item buffers,
 /// neither escapes nor is absorbed. Otherwise small errors (one point for a whole leaf, pixels on edges) would be
-/// multiplied by interreflection. Bounded, for polygons that see next to nothing.
+/// multiplied by interreflection. Bounded, for polygons that see next to nothing; the bounds are wider than what one
+/// random point a wall makes of the walls of a cube (0.3 to 3), or such a room would lose light with every bounce.
 double LightGatherer::conserve(std::size_t sums, std::size_t points, double area, double kept) const {
   if (kept < 0.999) return 1.0;
   double delivered = 0.0;
@@ -237,7 +238,7 @@ double LightGatherer::conserve(std::size_t sums, std::size_t points, double area
     const auto node = receivers_[lit_.receiver[i]].node;
     delivered += static_cast<double>(lit_.form_factor[i] * visibility(sums, i, points) * patches_->node_area[node]);
   }
-  return delivered > 0.0 ? std::clamp(kept * area / delivered, 0.5, 2.0) : 1.0;
+  return delivered > 0.0 ? std::clamp(kept * area / delivered, 0.25, 4.0) : 1.0;
 }
 
 void LightGatherer::deliver(const solver::GatherShot& shot, std::size_t half, std::size_t points, double share,
@@ -257,6 +258,43 @@ void LightGatherer::deliver(const solver::GatherShot& shot, std::size_t half, st
     sink.add(static_cast<std::uint32_t>(half), node, flux);
     ++counters.links;
   }
+}
+
+void LightGatherer::beginLinks(const solver::GatherShot& shot) {
+  findLit(shot);
+  for (auto* sum : {&lit_.weight[0], &lit_.visible_weight[0], &lit_.visible[0]}) {
+    std::fill_n(sum->begin(), lit_count_, 0.0F);
+  }
+  look_lost_ = {};
+  look_count_ = 0;
+}
+
+void LightGatherer::look(const solver::GatherShot& shot, const solver::HemicubeFrame& point,
+                         std::span<const std::uint32_t> items, const HemicubeWeights& weights) {
+  testPoint(shot, point, items, 0);
+  weighLost(point, items, weights, look_lost_);
+  ++look_count_;
+}
+
+void LightGatherer::finishLinks(const solver::GatherShot& shot, solver::LinkSample& sample,
+                                solver::TransportCounters& counters) {
+  const double area = static_cast<double>(shot.fill) * polygonArea(std::span(shot.corners.data(), shot.corner_count));
+  const double one = static_cast<double>(look_count_) * solver::kWeightOne;
+  const double escaped = static_cast<double>(look_lost_.escaped) / one;
+  const double absorbed = static_cast<double>(look_lost_.absorbed) / one;
+  const auto scale = static_cast<float>(conserve(0, look_count_, area, 1.0 - escaped - absorbed));
+  sample.runs.clear();
+  sample.irradiance.clear();
+  sample.irradiance.reserve(lit_count_);
+  for (std::size_t i = 0; i < lit_count_; ++i) {
+    // What is hidden is sent too: zeros inside a run cost less than a new run.
+    sample.add(receivers_[lit_.receiver[i]].node, scale * lit_.form_factor[i] * visibility(0, i, look_count_));
+  }
+  sample.escaped = escaped * area;
+  sample.absorbed = absorbed * area;
+  counters.links += sample.irradiance.size();
+  counters.gather_points += look_count_;
+  ++counters.gather_shots;
 }
 
 void LightGatherer::gather(const solver::GatherShot& shot, std::span<const solver::HemicubeFrame> points,

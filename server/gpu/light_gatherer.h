@@ -26,6 +26,13 @@ class LightGatherer {
               HemicubeRenderer& renderer, WeightCache& weights, const FluxSink& sink,
               solver::TransportCounters& counters);
 
+  /// Links of one shot, in steps, so that item buffers of several shots can be drawn at once: begin, one look for each
+  /// point, finish.
+  void beginLinks(const solver::GatherShot& shot);
+  void look(const solver::GatherShot& shot, const solver::HemicubeFrame& point, std::span<const std::uint32_t> items,
+            const HemicubeWeights& weights);
+  void finishLinks(const solver::GatherShot& shot, solver::LinkSample& sample, solver::TransportCounters& counters);
+
  private:
   /// A side of a leaf that can receive light.
   struct Receiver {
@@ -80,6 +87,8 @@ class LightGatherer {
   bool lit_valid_ = false;
   Lit lit_;
   std::size_t lit_count_ = 0;
+  Lost look_lost_;              ///< of the looks since beginLinks
+  std::size_t look_count_ = 0;
   std::vector<std::uint32_t> starts_;
 };
 

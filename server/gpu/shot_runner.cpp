@@ -55,7 +55,9 @@ Result<void> ShotRunner::setScene(std::shared_ptr<const scene::PatchScene> patch
   if (!scene) return tl::unexpected(scene.error());
   renderer_.setScene(std::move(*scene));
   accumulator_ = ScatterAccumulator(patches->nodeCount());
-  gatherer_ = LightGatherer(std::move(patches));
+  gatherer_ = LightGatherer(patches);
+  patches_ = std::move(patches);
+  link_store_.reset();
   has_scene_ = true;
   return {};
 }

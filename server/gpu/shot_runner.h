@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -29,18 +30,28 @@ class ShotRunner {
 
   [[nodiscard]] Result<void> setScene(std::shared_ptr<const scene::PatchScene> patches);
   [[nodiscard]] Result<solver::TransportCounters> run(const ShotSpan& shots, const FluxSink& sink);
+  /// Links of every gather shot, then of every scatter shot, each by itself (Transport::measure).
+  [[nodiscard]] Result<solver::TransportCounters> measure(const ShotSpan& shots,
+                                                          std::vector<solver::LinkSample>& samples);
   [[nodiscard]] const EglContext& context() const { return *context_; }
 
  private:
   ShotRunner(std::unique_ptr<EglContext> context, HemicubeRenderer renderer)
       : context_(std::move(context)), renderer_(std::move(renderer)) {}
   void scatter(const ShotSpan& shots, const FluxSink& sink, solver::TransportCounters& counters);
+  void measureGather(const ShotSpan& shots, std::vector<solver::LinkSample>& samples,
+                     solver::TransportCounters& counters);
+
+  void measureScatter(const ShotSpan& shots, std::span<solver::LinkSample> samples,
+                      solver::TransportCounters& counters);
 
   std::unique_ptr<EglContext> context_;  // outlives what lives in it
   HemicubeRenderer renderer_;
   WeightCache weights_;
   ScatterAccumulator accumulator_;
   LightGatherer gatherer_;
+  std::shared_ptr<const scene::PatchScene> patches_;
+  std::optional<FluxStore> link_store_;
   bool has_scene_ = false;
 };
 

@@ -100,7 +100,7 @@ TriangleCuller::Counts TriangleCuller::cull(const HemicubeAxes& axes, std::vecto
     outside_[i] = static_cast<std::uint8_t>(glm::any(glm::lessThan(axes.origin, low - kOutside)) ||
                                             glm::any(glm::greaterThan(axes.origin, high + kOutside)));
   }
-  std::array<std::uint32_t, 2 * RAD_FACES> count{};
+  std::array<std::uint32_t, std::size_t{2} * RAD_FACES> count{};
   for (std::size_t i = 0; i < triangle_count_; ++i) {
     if ((faces_[i] >> kBackBit & 1) != 0 && backHidden(i)) continue;
     for (auto faces = faces_[i] & 0x1FU; faces != 0; faces &= faces - 1) {

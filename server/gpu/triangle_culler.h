@@ -45,7 +45,7 @@ class TriangleCuller {
   std::vector<std::uint32_t> indices_;
   std::vector<std::uint16_t>
       faces_;  ///< bit f: face f may see the triangle; bit 8 + f: it lies inside; bit 7: shows its back
-  std::array<std::vector<std::uint32_t>, 2 * RAD_FACES> seen_;  ///< face f: 2 f inside, 2 f + 1 crossing
+  std::array<std::vector<std::uint32_t>, std::size_t{2} * RAD_FACES> seen_;  ///< face f: 2 f inside, 2 f + 1 crossing
 };
 
 }  // namespace radiosity::gpu

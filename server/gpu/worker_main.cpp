@@ -66,10 +66,14 @@ class Worker {
     const auto points = from.values<solver::HemicubeFrame>(head.points);
     if (!from.good() || !sink_) return fail(ErrorCode::kInternal, "a chunk is cut short or came before the scene");
     const auto mode = static_cast<solver::LinkMode>(head.mode);
-    const auto counters = runner_->run({mode, head.flux_scale, scatter, gather, points}, *sink_);
+    const ShotSpan shots{mode, head.flux_scale, scatter, gather, points};
+    std::vector<solver::LinkSample> links;
+    const auto counters = head.measure != 0 ? runner_->measure(shots, links) : runner_->run(shots, *sink_);
     if (!counters) return tl::unexpected(counters.error());
-    const ChunkDoneBody done{head.chunk, *counters};
-    return reply(MessageKind::kChunkDone, std::as_bytes(std::span(&done, 1)));
+    std::vector<std::byte> report;
+    appendValue(report, ChunkDoneBody{head.chunk, *counters});
+    for (const auto& sample : links) packLinks(report, sample);
+    return reply(MessageKind::kChunkDone, report);
   }
 
   Result<void> reply(MessageKind kind, std::span<const std::byte> body) const {

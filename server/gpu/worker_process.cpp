@@ -100,10 +100,14 @@ WorkerProcess& WorkerProcess::operator=(WorkerProcess&& other) noexcept {
 
 WorkerProcess::~WorkerProcess() { stop(); }
 
+void WorkerProcess::kill() const {
+  if (pid_ >= 0) ::kill(pid_, SIGKILL);
+}
+
 void WorkerProcess::stop() {
   if (pid_ < 0) return;
   // It holds nothing that would need an orderly end; waiting for a long draw call to finish would.
-  kill(pid_, SIGKILL);
+  kill();
   while (waitpid(pid_, nullptr, 0) < 0 && errno == EINTR) {
   }
   pid_ = -1;
@@ -119,19 +123,41 @@ std::string WorkerProcess::epitaph() const {
          (info.si_code == CLD_EXITED ? " ended with status " : " was killed by signal ") + std::to_string(status);
 }
 
-Result<Message> WorkerProcess::receive(MessageKind kind) const {
-  auto message = receiveMessage(socket_.get());
-  if (!message) return fail(ErrorCode::kUnavailable, epitaph());
+Error WorkerProcess::errorOf(Lapse lapse) const {
+  const std::string name = "worker process " + std::to_string(pid_);
+  switch (lapse) {
+    case Lapse::kGone:
+      return {ErrorCode::kUnavailable, epitaph()};
+    case Lapse::kLate:
+      return {ErrorCode::kUnavailable, name + " hangs"};
+    case Lapse::kWoken:
+      return {ErrorCode::kUnavailable, "interrupted"};
+    case Lapse::kNonsense:
+      break;
+  }
+  return {ErrorCode::kInternal, name + " sent too long a message"};
+}
+
+Result<void> WorkerProcess::send(MessageKind kind, std::span<const std::byte> body, const Patience& patience) const {
+  if (const auto sent = sendMessage(socket_.get(), kind, body, {}, patience); !sent) {
+    return tl::unexpected(errorOf(sent.error()));
+  }
+  return {};
+}
+
+Result<Message> WorkerProcess::receive(MessageKind kind, const Patience& patience) const {
+  auto message = receiveMessage(socket_.get(), patience);
+  if (!message) return tl::unexpected(errorOf(message.error()));
   if (message->kind == MessageKind::kFailed) {
     const auto* text = reinterpret_cast<const char*>(message->body.data());
     return fail(ErrorCode::kUnavailable, std::string(text, message->body.size()));
   }
   if (message->kind != kind) return fail(ErrorCode::kInternal, "a worker process answered out of turn");
-  return message;
+  return std::move(*message);
 }
 
-Result<void> WorkerProcess::awaitReady() {
-  const auto message = receive(MessageKind::kReady);
+Result<void> WorkerProcess::awaitReady(const Patience& patience) {
+  const auto message = receive(MessageKind::kReady, patience);
   if (!message) return tl::unexpected(message.error());
   BodyReader from(message->body);
   software_ = from.value<ReadyBody>().software != 0;
@@ -139,19 +165,22 @@ Result<void> WorkerProcess::awaitReady() {
   return {};
 }
 
-Result<void> WorkerProcess::sendScene(const SharedMemory& packed, std::size_t nodes) {
+Result<void> WorkerProcess::sendScene(const SharedMemory& packed, std::size_t nodes, const Patience& patience) {
   auto flux = SharedMemory::create("radiosity flux", fluxRegionBytes(nodes));
   if (!flux) return tl::unexpected(flux.error());
   flux_ = std::move(*flux);
   nodes_ = nodes;
   const SceneBody body{nodes};
   const std::array<int, 2> fds{packed.fd(), flux_.fd()};
-  if (sendMessage(socket_.get(), MessageKind::kScene, std::as_bytes(std::span(&body, 1)), fds)) return {};
-  return fail(ErrorCode::kUnavailable, epitaph());
+  const auto bytes = std::as_bytes(std::span(&body, 1));
+  if (const auto sent = sendMessage(socket_.get(), MessageKind::kScene, bytes, fds, patience); !sent) {
+    return tl::unexpected(errorOf(sent.error()));
+  }
+  return {};
 }
 
-Result<void> WorkerProcess::awaitScene() {
-  const auto message = receive(MessageKind::kSceneDone);
+Result<void> WorkerProcess::awaitScene(const Patience& patience) {
+  const auto message = receive(MessageKind::kSceneDone, patience);
   if (!message) return tl::unexpected(message.error());
   return {};
 }

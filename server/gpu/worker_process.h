@@ -22,14 +22,20 @@ class WorkerProcess {
   WorkerProcess(const WorkerProcess&) = delete;
   WorkerProcess& operator=(const WorkerProcess&) = delete;
 
-  /// Blocks until the worker has a context; its own message when it has none.
-  [[nodiscard]] Result<void> awaitReady();
+  // Each blocks as long as `patience` allows; after an error (the worker's own message, where it sent one; how it
+  // ended; that it hangs) the worker is of no more use.
+
+  /// Until the worker has a context.
+  [[nodiscard]] Result<void> awaitReady(const Patience& patience);
   /// Gives it the scene and fresh accumulators; answer with awaitScene().
-  [[nodiscard]] Result<void> sendScene(const SharedMemory& packed, std::size_t nodes);
-  [[nodiscard]] Result<void> awaitScene();
-  /// Blocks for its next message, which must be of this kind; an error (the worker's own, where it sent one) means that
-  /// the worker is of no more use.
-  [[nodiscard]] Result<Message> receive(MessageKind kind) const;
+  [[nodiscard]] Result<void> sendScene(const SharedMemory& packed, std::size_t nodes, const Patience& patience);
+  [[nodiscard]] Result<void> awaitScene(const Patience& patience);
+  [[nodiscard]] Result<void> send(MessageKind kind, std::span<const std::byte> body, const Patience& patience) const;
+  /// Its next message, which must be of this kind.
+  [[nodiscard]] Result<Message> receive(MessageKind kind, const Patience& patience) const;
+
+  /// Starts its end; the destructor waits for it. For several to end at the same time.
+  void kill() const;
 
   [[nodiscard]] int socket() const { return socket_.get(); }
   [[nodiscard]] pid_t pid() const { return pid_; }
@@ -41,6 +47,7 @@ class WorkerProcess {
   WorkerProcess() = default;
   /// "worker 4711 was killed by signal 9" after its socket closed.
   [[nodiscard]] std::string epitaph() const;
+  [[nodiscard]] Error errorOf(Lapse lapse) const;
   void stop();
 
   pid_t pid_ = -1;

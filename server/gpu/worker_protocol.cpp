@@ -3,6 +3,7 @@
 #include <poll.h>
 #include <sys/socket.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 
@@ -39,20 +40,47 @@ void visitScene(Scene& scene, Visit visit) {
   visit(scene.node_area);
 }
 
-bool receiveBytes(int socket, void* to, std::size_t bytes) {
+using Done = tl::expected<void, Lapse>;
+
+/// poll()'s timeout, rounded up so that the deadline has passed when it returns; -1: none.
+int timeoutMs(const Patience& patience) {
+  if (!patience.deadline) return -1;
+  const auto left = std::chrono::ceil<std::chrono::milliseconds>(*patience.deadline - std::chrono::steady_clock::now());
+  constexpr std::chrono::milliseconds kMost = std::chrono::hours(24);  // fits an int
+  return static_cast<int>(std::clamp(left, std::chrono::milliseconds(0), kMost).count());
+}
+
+/// Until the socket can be written (POLLOUT) or read (POLLIN), or is closed, which the call after this finds out.
+Done await(int socket, short events, const Patience& patience) {
+  std::array<pollfd, 2> polls{pollfd{socket, events, 0}, pollfd{patience.wake_fd, POLLIN, 0}};
+  while (true) {
+    const int ready = poll(polls.data(), polls.size(), timeoutMs(patience));
+    if (ready < 0 && errno == EINTR) continue;
+    if (ready < 0) return tl::unexpected(Lapse::kGone);
+    if (polls[1].revents != 0) return tl::unexpected(Lapse::kWoken);
+    if (ready == 0) return tl::unexpected(Lapse::kLate);
+    return {};
+  }
+}
+
+/// Whether the call just made would have had to wait, or was interrupted: then it is to be made again.
+bool again() { return errno == EINTR || errno == EAGAIN || errno == EWOULDBLOCK; }
+
+Done receiveBytes(int socket, void* to, std::size_t bytes, const Patience& patience) {
   auto* at = static_cast<std::byte*>(to);
   while (bytes > 0) {
-    const auto got = recv(socket, at, bytes, 0);
-    if (got < 0 && errno == EINTR) continue;
-    if (got <= 0) return false;
+    if (auto ready = await(socket, POLLIN, patience); !ready) return ready;
+    const auto got = recv(socket, at, bytes, MSG_DONTWAIT);
+    if (got < 0 && again()) continue;
+    if (got <= 0) return tl::unexpected(Lapse::kGone);
     at += got;
     bytes -= static_cast<std::size_t>(got);
   }
-  return true;
+  return {};
 }
 
 /// The header, and the descriptors that came with it.
-bool receiveHeader(int socket, Header& header, std::array<FileDescriptor, 2>& fds) {
+Done receiveHeader(int socket, Header& header, std::array<FileDescriptor, 2>& fds, const Patience& patience) {
   alignas(cmsghdr) std::array<char, CMSG_SPACE(2 * sizeof(int))> control{};
   iovec part{&header, sizeof(header)};
   msghdr message{};
@@ -62,9 +90,10 @@ bool receiveHeader(int socket, Header& header, std::array<FileDescriptor, 2>& fd
   message.msg_controllen = control.size();
   ssize_t got = 0;
   do {
-    got = recvmsg(socket, &message, MSG_CMSG_CLOEXEC);
-  } while (got < 0 && errno == EINTR);
-  if (got <= 0) return false;
+    if (auto ready = await(socket, POLLIN, patience); !ready) return ready;
+    got = recvmsg(socket, &message, MSG_CMSG_CLOEXEC | MSG_DONTWAIT);
+  } while (got < 0 && again());
+  if (got <= 0) return tl::unexpected(Lapse::kGone);
   for (auto* item = CMSG_FIRSTHDR(&message); item != nullptr; item = CMSG_NXTHDR(&message, item)) {
     if (item->cmsg_level != SOL_SOCKET || item->cmsg_type != SCM_RIGHTS) continue;
     const auto count = (item->cmsg_len - CMSG_LEN(0)) / sizeof(int);
@@ -75,7 +104,7 @@ bool receiveHeader(int socket, Header& header, std::array<FileDescriptor, 2>& fd
     }
   }
   const auto have = static_cast<std::size_t>(got);
-  return receiveBytes(socket, reinterpret_cast<std::byte*>(&header) + have, sizeof(header) - have);
+  return receiveBytes(socket, reinterpret_cast<std::byte*>(&header) + have, sizeof(header) - have, patience);
 }
 
 }  // namespace
@@ -94,7 +123,8 @@ void BodyReader::take(void* to, std::size_t bytes) {
   rest_ = rest_.subspan(bytes);
 }
 
-bool sendMessage(int socket, MessageKind kind, std::span<const std::byte> body, std::span<const int> fds) {
+tl::expected<void, Lapse> sendMessage(int socket, MessageKind kind, std::span<const std::byte> body,
+                                      std::span<const int> fds, const Patience& patience) {
   RAD_CHECK_LE(body.size(), kMaxBody);
   RAD_CHECK_LE(fds.size(), std::size_t{2});
   Header header{kind, static_cast<std::uint32_t>(body.size())};
@@ -113,9 +143,10 @@ bool sendMessage(int socket, MessageKind kind, std::span<const std::byte> body, 
     std::memcpy(CMSG_DATA(item), fds.data(), fds.size_bytes());
   }
   while (parts[0].iov_len + parts[1].iov_len > 0) {
-    const auto sent = sendmsg(socket, &message, MSG_NOSIGNAL);
-    if (sent < 0 && errno == EINTR) continue;
-    if (sent < 0) return false;
+    if (auto ready = await(socket, POLLOUT, patience); !ready) return ready;
+    const auto sent = sendmsg(socket, &message, MSG_NOSIGNAL | MSG_DONTWAIT);
+    if (sent < 0 && again()) continue;
+    if (sent < 0) return tl::unexpected(Lapse::kGone);
     auto left = static_cast<std::size_t>(sent);
     for (auto& part : parts) {
       const auto from_part = std::min(left, part.iov_len);
@@ -126,18 +157,18 @@ bool sendMessage(int socket, MessageKind kind, std::span<const std::byte> body, 
     message.msg_control = nullptr;  // descriptors go once
     message.msg_controllen = 0;
   }
-  return true;
+  return {};
 }
 
-Result<Message> receiveMessage(int socket) {
+tl::expected<Message, Lapse> receiveMessage(int socket, const Patience& patience) {
   Header header{};
   Message message;
-  if (!receiveHeader(socket, header, message.fds)) return fail(ErrorCode::kUnavailable, "the other process is gone");
-  if (header.bytes > kMaxBody) return fail(ErrorCode::kInternal, "a message is too long");
+  if (auto come = receiveHeader(socket, header, message.fds, patience); !come) return tl::unexpected(come.error());
+  if (header.bytes > kMaxBody) return tl::unexpected(Lapse::kNonsense);
   message.kind = header.kind;
   message.body.resize(header.bytes);
-  if (!receiveBytes(socket, message.body.data(), message.body.size())) {
-    return fail(ErrorCode::kUnavailable, "the other process went away in the middle of a message");
+  if (auto come = receiveBytes(socket, message.body.data(), message.body.size(), patience); !come) {
+    return tl::unexpected(come.error());
   }
   return message;
 }
@@ -156,6 +187,26 @@ Result<std::shared_ptr<const scene::PatchScene>> unpackScene(std::span<const std
   visitScene(*scene, [&](auto& values) { unpackVector(from, values); });
   if (!from.good()) return fail(ErrorCode::kInternal, "a packed scene is cut short");
   return scene;
+}
+
+void packLinks(std::vector<std::byte>& to, const solver::LinkSample& links) {
+  appendValue(to, links.escaped);
+  appendValue(to, links.absorbed);
+  packVector(to, links.runs);
+  packVector(to, links.irradiance);
+}
+
+bool unpackLinks(BodyReader& from, std::size_t nodes, solver::LinkSample& links) {
+  links.escaped = from.value<double>();
+  links.absorbed = from.value<double>();
+  unpackVector(from, links.runs);
+  unpackVector(from, links.irradiance);
+  std::size_t values = 0;
+  for (const auto& run : links.runs) {
+    if (run.first_node > nodes || run.count > nodes - run.first_node) return false;
+    values += run.count;
+  }
+  return from.good() && values == links.irradiance.size();
 }
 
 std::size_t fluxRegionBytes(std::size_t nodes) {

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -20,7 +22,7 @@ enum class MessageKind : std::uint32_t {
   kScene,      ///< transport: two descriptors follow (scene, flux); body: SceneBody
   kSceneDone,  ///< worker
   kChunk,      ///< transport: body: ChunkBody, scatter shots, gather shots, points
-  kChunkDone,  ///< worker: body: ChunkDoneBody
+  kChunkDone,  ///< worker: body: ChunkDoneBody, then the links of each shot if they were wanted
 };
 
 struct Message {
@@ -39,6 +41,7 @@ struct ChunkBody {
   std::uint64_t chunk = 0;
   double flux_scale = 1.0;
   std::uint32_t mode = 0;
+  std::uint32_t measure = 0;  ///< 1: links are wanted, shot by shot, with the report
   std::uint32_t scatter = 0, gather = 0, points = 0;
 };
 struct ChunkDoneBody {
@@ -93,15 +96,34 @@ class BodyReader {
   bool good_ = true;
 };
 
-/// Blocks until all is sent. False when the peer is gone. Never raises SIGPIPE.
-[[nodiscard]] bool sendMessage(int socket, MessageKind kind, std::span<const std::byte> body,
-                               std::span<const int> fds = {});
-/// Blocks for a whole message. Fails when the peer is gone or sends nonsense.
-[[nodiscard]] Result<Message> receiveMessage(int socket);
+/// How long one process waits for the other. By default for ever, as a worker does: its transport may have nothing to
+/// say for hours.
+struct Patience {
+  std::optional<std::chrono::steady_clock::time_point> deadline;
+  int wake_fd = -1;  ///< ends the wait as soon as it can be read
+};
+/// Why there was no message.
+enum class Lapse {
+  kGone,      ///< the socket is closed
+  kLate,      ///< the deadline passed; the peer may have stopped in the middle of a message
+  kWoken,     ///< by wake_fd
+  kNonsense,  ///< longer than kMaxBody
+};
+
+/// Blocks until all is sent. Never raises SIGPIPE.
+[[nodiscard]] tl::expected<void, Lapse> sendMessage(int socket, MessageKind kind, std::span<const std::byte> body,
+                                                    std::span<const int> fds = {}, const Patience& patience = {});
+/// Blocks for a whole message.
+[[nodiscard]] tl::expected<Message, Lapse> receiveMessage(int socket, const Patience& patience = {});
 
 /// What the renderer needs of a scene, as one block of shared memory, and back.
 [[nodiscard]] Result<SharedMemory> packScene(const scene::PatchScene& patches);
 [[nodiscard]] Result<std::shared_ptr<const scene::PatchScene>> unpackScene(std::span<const std::byte> packed);
+
+/// Links at the end of a report.
+void packLinks(std::vector<std::byte>& to, const solver::LinkSample& links);
+/// False when they are cut short, or name nodes from `nodes` on.
+[[nodiscard]] bool unpackLinks(BodyReader& from, std::size_t nodes, solver::LinkSample& links);
 
 /// Accumulators in shared memory.
 [[nodiscard]] std::size_t fluxRegionBytes(std::size_t nodes);

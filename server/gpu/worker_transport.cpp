@@ -1,12 +1,14 @@
 // A transport that hands chunks of a batch to worker processes.
 //
 // A worker adds up whatever it does for a batch in its own accumulators in shared memory; they are merged once, when
-// the whole batch is done. If a worker dies, its accumulators are thrown away and every chunk it had for this batch,
-// done or not, goes back into the queue: nothing is lost and nothing counted twice.
+// the whole batch is done. If a worker dies, or is killed because it hangs, its accumulators are thrown away and every
+// chunk it had for this batch, done or not, goes back into the queue: nothing is lost and nothing counted twice.
 #include <fmt/format.h>
 #include <poll.h>
+#include <sys/eventfd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <deque>
 #include <thread>
 
@@ -24,18 +26,17 @@ namespace {
 constexpr std::size_t kChunksAhead = 2;
 /// Deaths of workers in one call after which it gives up.
 constexpr int kMaxDeaths = 5;
+/// A cold driver compiles its shaders, perhaps on a busy machine.
+constexpr auto kStartPatience = std::chrono::seconds(60);
+/// WorkerOptions::patience, for each pixel.
+constexpr double kSlowPixelSeconds = 2e-6;
+/// A worker takes in a scene at ten times this rate at least.
+constexpr double kSlowSceneBytesPerSecond = 5e6;
 
-void add(solver::TransportCounters& into, const solver::TransportCounters& from) {
-  into.scatter_shots += from.scatter_shots;
-  into.gather_shots += from.gather_shots;
-  into.gather_points += from.gather_points;
-  into.pixels += from.pixels;
-  into.links += from.links;
-  into.triangles_drawn += from.triangles_drawn;
-  into.triangles_culled += from.triangles_culled;
-  into.render_seconds += from.render_seconds;
-  into.accumulate_seconds += from.accumulate_seconds;
-  into.gather_seconds += from.gather_seconds;
+using Clock = std::chrono::steady_clock;
+
+Clock::duration seconds(double value) {
+  return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(value));
 }
 
 /// A process and what it has of the current batch.
@@ -43,13 +44,20 @@ struct Slot {
   std::optional<WorkerProcess> process;  ///< none: died, to be replaced
   std::deque<std::size_t> held;          ///< chunks sent, not yet reported
   std::vector<std::size_t> done;         ///< chunks reported, still only in its accumulators
+  Clock::time_point deadline;            ///< of the chunk it has held longest
   solver::TransportCounters counters;
 };
 
 class WorkerTransport final : public solver::Transport {
  public:
-  WorkerTransport(std::string executable, std::vector<Slot> slots)
-      : executable_(std::move(executable)), slots_(std::move(slots)), renderer_(slots_.front().process->renderer()) {}
+  WorkerTransport(WorkerOptions options, std::vector<Slot> slots, FileDescriptor wake)
+      : options_(std::move(options)),
+        slots_(std::move(slots)),
+        renderer_(slots_.front().process->renderer()),
+        wake_(std::move(wake)) {}
+  ~WorkerTransport() override { killAll(); }
+  WorkerTransport(const WorkerTransport&) = delete;
+  WorkerTransport& operator=(const WorkerTransport&) = delete;
 
   Result<void> setScene(std::shared_ptr<const scene::PatchScene> patches) override {
     auto packed = packScene(*patches);
@@ -57,6 +65,7 @@ class WorkerTransport final : public solver::Transport {
     packed_ = std::move(*packed);
     nodes_ = patches->nodeCount();
     triangles_ = patches->triangles.size();
+    patches_ = patches;
     const auto paper = PaperIds::fits(*patches);
     paper_fits_ = paper.has_value();
     if (!paper) paper_error_ = paper.error();
@@ -66,23 +75,59 @@ class WorkerTransport final : public solver::Transport {
     std::vector<std::optional<Error>> failed(slots_.size());
     for (std::size_t i = 0; i < slots_.size(); ++i) {
       if (!slots_[i].process) continue;
-      if (auto sent = slots_[i].process->sendScene(packed_, nodes_); !sent) failed[i] = sent.error();
+      if (auto sent = slots_[i].process->sendScene(packed_, nodes_, scenePatience()); !sent) failed[i] = sent.error();
     }
     for (std::size_t i = 0; i < slots_.size(); ++i) {
       if (slots_[i].process && !failed[i]) {
-        if (auto taken = slots_[i].process->awaitScene(); !taken) failed[i] = taken.error();
+        if (auto taken = slots_[i].process->awaitScene(scenePatience()); !taken) failed[i] = taken.error();
       }
-      if (failed[i]) bury(slots_[i], *failed[i]);
+      if (failed[i] && !interrupted_) bury(slots_[i], *failed[i]);
     }
     return replaceDead();
   }
 
   Result<solver::TransportCounters> run(const solver::ShotBatch& batch, solver::FluxAccumulators& into) override {
+    links_ = nullptr;
+    if (auto done = carryOut(batch); !done) return tl::unexpected(done.error());
+    solver::TransportCounters counters;
+    for (auto& slot : slots_) {
+      if (!slot.process) continue;
+      slot.process->sink().drainInto(into);
+      counters += slot.counters;
+    }
+    return counters;
+  }
+
+  Result<solver::TransportCounters> measure(const solver::ShotBatch& batch,
+                                            std::vector<solver::LinkSample>& samples) override {
+    samples.assign(batch.gather.size() + batch.scatter.size(), {});
+    links_ = &samples;
+    if (auto done = carryOut(batch); !done) return tl::unexpected(done.error());
+    solver::TransportCounters counters;
+    for (const auto& slot : slots_) counters += slot.counters;
+    return counters;
+  }
+
+  void interrupt() override {
+    interrupted_ = true;
+    (void)eventfd_write(wake_.get(), 1);  // never read: whoever waits now or later is woken
+  }
+
+  [[nodiscard]] std::string description() const override {
+    return fmt::format("{}, {} worker{}", renderer_, slots_.size(), slots_.size() == 1 ? "" : "s");
+  }
+
+ protected:
+  [[nodiscard]] std::shared_ptr<const scene::PatchScene> scene() const override { return patches_; }
+
+ private:
+  Result<void> carryOut(const solver::ShotBatch& batch) {
     if (!has_scene_) return fail(ErrorCode::kInternal, "setScene must come before run");
     const ShotSpan shots{batch.mode, batch.flux_scale, batch.scatter, batch.gather, batch.points};
-    if (auto good = checkShots(shots); !good) return tl::unexpected(good.error());
+    if (auto good = checkShots(shots); !good) return good;
     if (batch.mode == solver::LinkMode::kPaperMipmap && !paper_fits_) return tl::unexpected(paper_error_);
     deaths_ = 0;
+    gather_shots_ = batch.gather.size();
     chunks_ = cutBatch(batch, triangles_, slots_.size());
     queue_.clear();
     for (std::size_t i = 0; i < chunks_.size(); ++i) queue_.push_back(i);
@@ -91,31 +136,33 @@ class WorkerTransport final : public solver::Transport {
       slot.done.clear();
       slot.counters = {};
     }
-    if (auto done = work(batch); !done) {
-      // What the workers have of this batch is void; so are they.
-      for (auto& slot : slots_) slot.process.reset();
-      return tl::unexpected(done.error());
-    }
-    solver::TransportCounters counters;
-    for (auto& slot : slots_) {
-      if (!slot.process) continue;
-      slot.process->sink().drainInto(into);
-      add(counters, slot.counters);
-    }
-    return counters;
+    auto done = work(batch);
+    if (!done) killAll();  // what the workers have of this batch is void; so are they
+    return done;
   }
 
-  [[nodiscard]] std::string description() const override {
-    return fmt::format("{}, {} worker{}", renderer_, slots_.size(), slots_.size() == 1 ? "" : "s");
-  }
-
- private:
   [[nodiscard]] bool finished() const {
     return queue_.empty() && std::all_of(slots_.begin(), slots_.end(), [](const Slot& s) { return s.held.empty(); });
   }
 
+  [[nodiscard]] Patience patienceUntil(Clock::time_point deadline) const { return {deadline, wake_.get()}; }
+  [[nodiscard]] Patience startPatience() const { return patienceUntil(Clock::now() + kStartPatience); }
+  [[nodiscard]] Patience scenePatience() const {
+    const auto bytes = static_cast<double>(packed_.bytes().size() + fluxRegionBytes(nodes_));
+    return patienceUntil(Clock::now() + kStartPatience + seconds(bytes / kSlowSceneBytesPerSecond));
+  }
+
+  /// All at the same time: a dying worker needs some milliseconds to give its memory back.
+  void killAll() {
+    for (const auto& slot : slots_) {
+      if (slot.process) slot.process->kill();
+    }
+    for (auto& slot : slots_) slot.process.reset();
+  }
+
   Result<void> work(const solver::ShotBatch& batch) {
     while (!finished()) {
+      if (interrupted_) return fail(ErrorCode::kUnavailable, "interrupted");
       if (auto replaced = replaceDead(); !replaced) return replaced;
       for (auto& slot : slots_) feed(slot, batch);
       listen();
@@ -130,30 +177,50 @@ class WorkerTransport final : public solver::Transport {
       const auto chunk = queue_.front();
       queue_.pop_front();
       slot.held.push_back(chunk);
-      if (!sendMessage(slot.process->socket(), MessageKind::kChunk, packChunk(batch, chunks_[chunk], chunk))) {
-        bury(slot, Error{ErrorCode::kUnavailable, "a worker process does not take work"});
+      if (slot.held.size() == 1) startClock(slot);
+      const auto sent = slot.process->send(MessageKind::kChunk, packChunk(batch, chunks_[chunk], chunk, links_ != nullptr),
+                                           patienceUntil(slot.deadline));
+      if (!sent && !interrupted_) bury(slot, sent.error());
+      if (!sent) return;
+    }
+  }
+
+  /// The worker starts on the chunk it has held longest.
+  void startClock(Slot& slot) const {
+    slot.deadline = Clock::now() + options_.patience + seconds(kSlowPixelSeconds * chunks_[slot.held.front()].cost);
+  }
+
+  /// Waits until some worker has something to say and hears it, or until one is late and buries it, or for a wake-up.
+  void listen() {
+    std::vector<pollfd> polls;
+    auto deadline = Clock::time_point::max();
+    for (const auto& slot : slots_) {
+      const bool owes = slot.process && !slot.held.empty();
+      polls.push_back({owes ? slot.process->socket() : -1, POLLIN, 0});
+      if (owes) deadline = std::min(deadline, slot.deadline);
+    }
+    if (deadline == Clock::time_point::max()) return;  // a death emptied the hands of all; go on
+    polls.push_back({wake_.get(), POLLIN, 0});
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now()).count();
+    constexpr std::int64_t kLongestMs = 60'000;  // then it looks again
+    if (poll(polls.data(), polls.size(), static_cast<int>(std::clamp<std::int64_t>(left, 0, kLongestMs))) < 0) return;
+    if (polls.back().revents != 0) return;
+    const auto now = Clock::now();
+    for (std::size_t i = 0; i < slots_.size(); ++i) {
+      if (polls[i].fd < 0) continue;
+      if (polls[i].revents != 0) {
+        hear(slots_[i]);
+      } else if (now >= slots_[i].deadline) {
+        bury(slots_[i],
+             Error{ErrorCode::kUnavailable, fmt::format("worker process {} hangs", slots_[i].process->pid())});
       }
     }
   }
 
-  /// Waits until some worker has something to say, and hears it.
-  void listen() {
-    std::vector<pollfd> polls;
-    for (const auto& slot : slots_) {
-      polls.push_back({slot.process && !slot.held.empty() ? slot.process->socket() : -1, POLLIN, 0});
-    }
-    const bool any = std::any_of(polls.begin(), polls.end(), [](const pollfd& p) { return p.fd >= 0; });
-    if (!any) return;                                      // a death emptied the hands of all; go on
-    if (poll(polls.data(), polls.size(), -1) < 0) return;  // interrupted: look again
-    for (std::size_t i = 0; i < polls.size(); ++i) {
-      if (polls[i].fd >= 0 && polls[i].revents != 0) hear(slots_[i]);
-    }
-  }
-
   void hear(Slot& slot) {
-    const auto message = slot.process->receive(MessageKind::kChunkDone);
+    const auto message = slot.process->receive(MessageKind::kChunkDone, patienceUntil(slot.deadline));
     if (!message) {
-      bury(slot, message.error());
+      if (!interrupted_) bury(slot, message.error());
       return;
     }
     BodyReader from(message->body);
@@ -162,9 +229,22 @@ class WorkerTransport final : public solver::Transport {
       bury(slot, Error{ErrorCode::kInternal, "a worker process reports work it was not given"});
       return;
     }
+    if (links_ != nullptr && !takeLinks(from, chunks_[report.chunk])) {
+      bury(slot, Error{ErrorCode::kInternal, "a worker process reports links that make no sense"});
+      return;
+    }
     slot.held.pop_front();
     slot.done.push_back(report.chunk);
-    add(slot.counters, report.counters);
+    if (!slot.held.empty()) startClock(slot);
+    slot.counters += report.counters;
+  }
+
+  [[nodiscard]] bool takeLinks(BodyReader& from, const Chunk& chunk) {
+    const auto first = chunk.first + (chunk.gather ? 0 : gather_shots_);
+    for (auto i = first; i < first + chunk.count; ++i) {
+      if (!unpackLinks(from, nodes_, (*links_)[i])) return false;
+    }
+    return true;
   }
 
   /// A worker is gone: its chunks go back into the queue, its accumulators with it into the grave.
@@ -180,6 +260,7 @@ class WorkerTransport final : public solver::Transport {
   Result<void> replaceDead() {
     for (auto& slot : slots_) {
       while (!slot.process) {
+        if (interrupted_) return fail(ErrorCode::kUnavailable, "interrupted");
         if (deaths_ >= kMaxDeaths) {
           return fail(ErrorCode::kUnavailable,
                       fmt::format("gave up after {} worker processes died; the last: {}", deaths_, last_death_));
@@ -196,24 +277,29 @@ class WorkerTransport final : public solver::Transport {
   }
 
   Result<WorkerProcess> startOne() {
-    auto process = WorkerProcess::start(executable_);
+    auto process = WorkerProcess::start(options_.executable);
     if (!process) return process;
-    if (auto ready = process->awaitReady(); !ready) return tl::unexpected(ready.error());
+    if (auto ready = process->awaitReady(startPatience()); !ready) return tl::unexpected(ready.error());
     if (!has_scene_) return process;
-    if (auto sent = process->sendScene(packed_, nodes_); !sent) return tl::unexpected(sent.error());
-    if (auto taken = process->awaitScene(); !taken) return tl::unexpected(taken.error());
+    if (auto sent = process->sendScene(packed_, nodes_, scenePatience()); !sent) return tl::unexpected(sent.error());
+    if (auto taken = process->awaitScene(scenePatience()); !taken) return tl::unexpected(taken.error());
     return process;
   }
 
-  std::string executable_;
+  WorkerOptions options_;
   std::vector<Slot> slots_;
   std::string renderer_;
+  FileDescriptor wake_;
+  std::atomic<bool> interrupted_{false};
+  std::shared_ptr<const scene::PatchScene> patches_;
   SharedMemory packed_;
   std::size_t nodes_ = 0, triangles_ = 0;
   bool has_scene_ = false;
   bool paper_fits_ = true;  ///< whether the scene can be lit in paper mode, and why not
   Error paper_error_;
   std::vector<Chunk> chunks_;
+  std::size_t gather_shots_ = 0;                          ///< of the batch
+  std::vector<solver::LinkSample>* links_ = nullptr;  ///< of the batch, where they are wanted; else none
   std::deque<std::size_t> queue_;
   int deaths_ = 0;
   std::string last_death_;
@@ -228,19 +314,23 @@ Result<std::unique_ptr<solver::Transport>> makeWorkerTransport(const WorkerOptio
   }
   const auto cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   const auto count = options.workers == 0 ? cores : options.workers;
-  const std::string executable = options.executable.empty() ? "/proc/self/exe" : options.executable;
+  auto chosen = options;
+  if (chosen.executable.empty()) chosen.executable = "/proc/self/exe";
+  FileDescriptor wake(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
+  if (wake.get() < 0) return fail(ErrorCode::kUnavailable, "cannot make an event descriptor: too many are open");
   std::vector<Slot> slots(static_cast<std::size_t>(count));
   for (auto& slot : slots) {  // all start at the same time
-    auto process = WorkerProcess::start(executable);
+    auto process = WorkerProcess::start(chosen.executable);
     if (!process) return tl::unexpected(process.error());
     slot.process = std::move(*process);
   }
   for (auto& slot : slots) {
-    if (auto ready = slot.process->awaitReady(); !ready) return tl::unexpected(ready.error());
+    const Patience patience{Clock::now() + kStartPatience, -1};
+    if (auto ready = slot.process->awaitReady(patience); !ready) return tl::unexpected(ready.error());
   }
   // One context keeps a GPU busy; more only take its memory.
   if (options.workers == 0 && !slots.front().process->software()) slots.erase(slots.begin() + 1, slots.end());
-  return std::make_unique<WorkerTransport>(executable, std::move(slots));
+  return std::make_unique<WorkerTransport>(std::move(chosen), std::move(slots), std::move(wake));
 }
 
 }  // namespace radiosity::gpu

@@ -90,7 +90,7 @@ void Calls::handleItem(const protocol::RpcItem& item, Slot slot) {
   const auto call = protocol::decodeCall(request);
   if (!call) return greeted_ ? slot.error(call.error()) : turnAway(slot, call.error());
   if (!admit(*call, slot)) return;
-  std::visit([&](const auto& typed) { run(typed, std::move(slot)); }, *call);
+  std::visit([&](const auto& typed) { run(typed, slot); }, *call);
 }
 
 /// Hello first, once; not while draining; not too many at a time.
@@ -111,13 +111,13 @@ bool Calls::admit(const protocol::Call& call, Slot& slot) {
 }
 
 /// Answers, and closes: who cannot say hello has no business here.
-void Calls::turnAway(const Slot& slot, RpcError error) {
+void Calls::turnAway(const Slot& slot, const RpcError& error) {
   slot.error(error);
   if (const auto peer = peer_.lock())
     peer->closeAfterWrites(protocol::CloseCode::kPolicy, error.message.substr(0, 100));
 }
 
-void Calls::run(const protocol::HelloCall& call, Slot slot) {
+void Calls::run(const protocol::HelloCall& call, const Slot& slot) {
   if (!authenticated_ && !hub_.options().token.empty() && !sameSecret(call.token, hub_.options().token))
     return turnAway(slot, {RpcCode::kUnauthenticated, "token is missing or wrong", "/params/token"});
   protocol::HelloReply reply;
@@ -144,7 +144,7 @@ void Calls::run(const protocol::HelloCall& call, Slot slot) {
   peer->greeted();
 }
 
-void Calls::run(const protocol::SceneGetCall& /*call*/, Slot slot) {
+void Calls::run(const protocol::SceneGetCall& /*call*/, const Slot& slot) {
   hub_.engine().sceneText(hub_.fromEngine<engine::Engine::SceneText>([slot](Result<engine::Engine::SceneText> text) {
     if (!text) return slot.fail(text);
     protocol::SceneGetReply reply{text->revision, {}, {}};
@@ -156,7 +156,7 @@ void Calls::run(const protocol::SceneGetCall& /*call*/, Slot slot) {
   }));
 }
 
-void Calls::run(const protocol::SceneLoadCall& call, Slot slot) {
+void Calls::run(const protocol::SceneLoadCall& call, const Slot& slot) {
   auto done = hub_.fromEngine<engine::LoadOutcome>([slot, hub = &hub_](const Result<engine::LoadOutcome>& outcome) {
     if (!outcome) return slot.fail(outcome);
     hub->sawRevision(outcome->revision);
@@ -179,13 +179,13 @@ void Calls::run(const protocol::SceneLoadCall& call, Slot slot) {
   hub_.engine().loadFile(std::move(*path), std::move(done));
 }
 
-void Calls::run(const protocol::ScenePatchCall& call, Slot slot) {
+void Calls::run(const protocol::ScenePatchCall& call, const Slot& slot) {
   hub_.patch(call, client_, [slot](const tl::expected<protocol::ScenePatchReply, RpcError>& answer) {
     answer ? slot.reply(*answer) : slot.error(answer.error());
   });
 }
 
-void Calls::run(const protocol::SolveConfigureCall& call, Slot slot) {
+void Calls::run(const protocol::SolveConfigureCall& call, const Slot& slot) {
   hub_.engine().configure(merged(hub_.engine().status().settings, call),
                           hub_.fromEngine<engine::SolveSettings>([slot](const Result<engine::SolveSettings>& settings) {
                             settings ? slot.reply(toSettings(*settings)) : slot.fail(settings);
@@ -204,13 +204,17 @@ engine::Engine::Callback<engine::SolveState> stateAnswer(Hub& hub, Slot slot) {
 
 }  // namespace
 
-void Calls::run(const protocol::SolvePauseCall& /*call*/, Slot slot) { hub_.engine().pause(stateAnswer(hub_, slot)); }
-void Calls::run(const protocol::SolveResumeCall& /*call*/, Slot slot) { hub_.engine().resume(stateAnswer(hub_, slot)); }
-void Calls::run(const protocol::SolveRestartCall& /*call*/, Slot slot) {
+void Calls::run(const protocol::SolvePauseCall& /*call*/, const Slot& slot) {
+  hub_.engine().pause(stateAnswer(hub_, slot));
+}
+void Calls::run(const protocol::SolveResumeCall& /*call*/, const Slot& slot) {
+  hub_.engine().resume(stateAnswer(hub_, slot));
+}
+void Calls::run(const protocol::SolveRestartCall& /*call*/, const Slot& slot) {
   hub_.engine().restart(stateAnswer(hub_, slot));
 }
 
-void Calls::run(const protocol::SolveWaitCall& call, Slot slot) {
+void Calls::run(const protocol::SolveWaitCall& call, const Slot& slot) {
   const auto waiter = hub_.wait(call, peer_, [slot](const std::optional<protocol::StatusReply>& status) {
     if (status) return slot.reply(*status);
     slot.error({RpcCode::kDraining, "the server is shutting down; connect again later"});
@@ -221,9 +225,11 @@ void Calls::run(const protocol::SolveWaitCall& call, Slot slot) {
               [hub = hub_.shared_from_this(), waiter] { hub->giveUp(waiter); });
 }
 
-void Calls::run(const protocol::StatusCall& /*call*/, Slot slot) { slot.reply(toStatusReply(hub_.engine().status())); }
+void Calls::run(const protocol::StatusCall& /*call*/, const Slot& slot) {
+  slot.reply(toStatusReply(hub_.engine().status()));
+}
 
-void Calls::run(const protocol::SubscribeCall& call, Slot slot) {
+void Calls::run(const protocol::SubscribeCall& call, const Slot& slot) {
   if (call.quantity != protocol::Quantity::kIrradiance)
     return slot.error({RpcCode::kInvalidParams,
                        fmt::format("/params/quantity: {} is not streamed by this server; see capabilities, or take a "
@@ -235,13 +241,13 @@ void Calls::run(const protocol::SubscribeCall& call, Slot slot) {
   if (const auto peer = peer_.lock()) peer->lightmapsChanged();
 }
 
-void Calls::run(const protocol::CreditCall& call, Slot slot) {
+void Calls::run(const protocol::CreditCall& call, const Slot& slot) {
   tiles_.addCredit(call.bytes);
   slot.reply(protocol::CreditReply{tiles_.credit()});
   if (const auto peer = peer_.lock()) peer->tilesWanted();
 }
 
-void Calls::run(const protocol::SnapshotCall& call, Slot slot) {
+void Calls::run(const protocol::SnapshotCall& call, const Slot& slot) {
   engine::SnapshotRequest request{call.camera, call.width, call.height, call.quantity};
   hub_.engine().snapshot(std::move(request), hub_.fromEngine<SharedBytes>([slot, hub = &hub_](
                                                                               const Result<SharedBytes>& png) {
@@ -250,7 +256,7 @@ void Calls::run(const protocol::SnapshotCall& call, Slot slot) {
   }));
 }
 
-void Calls::run(const protocol::ViewersCall& /*call*/, Slot slot) {
+void Calls::run(const protocol::ViewersCall& /*call*/, const Slot& slot) {
   slot.reply(protocol::ViewersReply{hub_.viewerCount()});
 }
 

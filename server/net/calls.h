@@ -40,22 +40,22 @@ class Calls {
 
   void handleItem(const protocol::RpcItem& item, Slot slot);
   bool admit(const protocol::Call& call, Slot& slot);
-  void turnAway(const Slot& slot, protocol::RpcError error);
+  void turnAway(const Slot& slot, const protocol::RpcError& error);
 
-  void run(const protocol::HelloCall& call, Slot slot);
-  void run(const protocol::SceneGetCall& call, Slot slot);
-  void run(const protocol::SceneLoadCall& call, Slot slot);
-  void run(const protocol::ScenePatchCall& call, Slot slot);
-  void run(const protocol::SolveConfigureCall& call, Slot slot);
-  void run(const protocol::SolvePauseCall& call, Slot slot);
-  void run(const protocol::SolveResumeCall& call, Slot slot);
-  void run(const protocol::SolveRestartCall& call, Slot slot);
-  void run(const protocol::SolveWaitCall& call, Slot slot);
-  void run(const protocol::StatusCall& call, Slot slot);
-  void run(const protocol::SubscribeCall& call, Slot slot);
-  void run(const protocol::CreditCall& call, Slot slot);
-  void run(const protocol::SnapshotCall& call, Slot slot);
-  void run(const protocol::ViewersCall& call, Slot slot);
+  void run(const protocol::HelloCall& call, const Slot& slot);
+  void run(const protocol::SceneGetCall& call, const Slot& slot);
+  void run(const protocol::SceneLoadCall& call, const Slot& slot);
+  void run(const protocol::ScenePatchCall& call, const Slot& slot);
+  void run(const protocol::SolveConfigureCall& call, const Slot& slot);
+  void run(const protocol::SolvePauseCall& call, const Slot& slot);
+  void run(const protocol::SolveResumeCall& call, const Slot& slot);
+  void run(const protocol::SolveRestartCall& call, const Slot& slot);
+  void run(const protocol::SolveWaitCall& call, const Slot& slot);
+  void run(const protocol::StatusCall& call, const Slot& slot);
+  void run(const protocol::SubscribeCall& call, const Slot& slot);
+  void run(const protocol::CreditCall& call, const Slot& slot);
+  void run(const protocol::SnapshotCall& call, const Slot& slot);
+  void run(const protocol::ViewersCall& call, const Slot& slot);
 
   Hub& hub_;
   std::weak_ptr<Peer> peer_;

@@ -23,8 +23,8 @@ namespace radiosity::net {
 namespace {
 
 constexpr std::uint32_t kHeaderLimit = 16 * 1024;
-constexpr std::size_t kBufferLimit = 64 * 1024;
-constexpr std::uint64_t kBodyOfGet = 64 * 1024;
+constexpr std::size_t kBufferLimit = std::size_t{64} * 1024;
+constexpr std::uint64_t kBodyOfGet = std::uint64_t{64} * 1024;
 constexpr std::size_t kLingerBytes = std::size_t{64} << 20;  ///< read and dropped so that a refusal can be read
 
 using Parser = http::request_parser<http::vector_body<std::uint8_t>>;
@@ -81,7 +81,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   beast::flat_buffer buffer_;
   std::optional<Parser> parser_;
   HttpRequest request_;
-  bool head_ = false, keep_alive_ = false, idle_ = false, waiting_ = false;
+  bool head_ = false, keep_alive_ = false, idle_ = false;
   std::string origin_;
   HttpResponse response_;  ///< holds the bytes that message_ points to
   std::optional<Response> message_;

@@ -41,6 +41,11 @@ class Server::State {
   void drain();
   void run();
 
+ private:
+  friend class Server;
+
+  void waitForLast();
+
   std::shared_ptr<Hub> hub_;
   asio::io_context context_;
   Strand strand_;
@@ -50,9 +55,6 @@ class Server::State {
   bool signalled_ = false;
   Clock::time_point drain_until_;
   std::uint16_t port_ = 0;
-
- private:
-  void waitForLast();
 };
 
 Result<void> Server::State::open() {

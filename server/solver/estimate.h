@@ -4,26 +4,10 @@
 #include <array>
 #include <vector>
 
+#include "server/solver/error_parts.h"
 #include "server/solver/state.h"
 
 namespace radiosity::solver {
-
-/// Relative RMS errors of irradiance: sqrt(sum a |dH|^2 / sum a |H|^2) over leaves and channels, a = visible area.
-struct ErrorParts {
-  double total = 1.0;     ///< residual and sampling together: what further shots will remove
-  double residual = 1.0;  ///< light not yet shot, spread evenly, with all its further bounces
-  double sampling = 0.0;  ///< half the difference of the two independent halves
-  double discretization =
-      0.0;  ///< leaf against the bilinear interpolation of its parents, a third of it (second order)
-};
-
-/// Flux per channel, lux unit^2, as a mean over rounds.
-/// emitted = absorbed + escaped + backface + unshot + imbalance.
-struct EnergyParts {
-  std::array<double, 3> emitted{}, absorbed{}, escaped{}, backface{}, unshot{};
-  /// What unbiased sampling created or destroyed by chance (gathered light, roulette): zero in the mean.
-  std::array<double, 3> imbalance{};
-};
 
 /// Needs pushPullAll(). `owed`: flux that light polygons have yet to deliver, all channels, over all rounds.
 [[nodiscard]] ErrorParts estimateError(const RadiosityState& state, double owed);

@@ -11,11 +11,12 @@ namespace {
 /// More polygons than this on one surface (a tessellated lamp) cost more as gather shots than as scatter shots.
 constexpr std::uint32_t kMaxPolygonsPerSurface = 16;
 
-bool uniformEmission(const RadiosityState& state, const Side& side, glm::vec3& emission) {
+bool uniformEmission(const scene::PatchScene& patches, const Side& side, std::span<const glm::vec3> emissions,
+                     glm::vec3& emission) {
   bool found = false;
   for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
-    if (state.leafArea(side, leaf) <= 0.0F) continue;
-    const glm::vec3 here = state.emission(side, leaf);
+    if (patches.node_area[side.first_node + leaf] <= 0.0F) continue;
+    const glm::vec3 here = emissions[side.first_value + leaf];
     if (found && here != emission) return false;
     emission = here;
     found = true;
@@ -55,9 +56,8 @@ double polygonArea(const LightPolygon& light) {
   return 0.5 * glm::length(sum);
 }
 
-void addPolygons(const RadiosityState& state, const Side& side, const glm::vec3& emission,
+void addPolygons(const scene::PatchScene& patches, const Side& side, const glm::vec3& emission,
                  std::vector<LightPolygon>& lights) {
-  const auto& patches = state.patches();
   const auto& surface = patches.surfaces[side.surface];
   std::vector<bool> used(surface.triangle_count, false);
   for (std::uint32_t i = 0; i < surface.triangle_count; ++i) {
@@ -105,14 +105,15 @@ glm::vec3 LightPolygon::point(double u, double v) const {
   return glm::vec3((1.0 - root) * a + root * ((1.0 - v) * p + v * q));
 }
 
-std::vector<LightPolygon> findLightPolygons(RadiosityState& state) {
+std::vector<LightPolygon> findLightPolygons(const scene::PatchScene& patches, std::vector<Side>& sides,
+                                            std::span<const glm::vec3> emission) {
   std::vector<LightPolygon> lights;
-  for (auto& side : state.sides()) {
-    const auto& surface = state.patches().surfaces[side.surface];
-    glm::vec3 emission(0.0F);
+  for (auto& side : sides) {
+    const auto& surface = patches.surfaces[side.surface];
+    glm::vec3 uniform(0.0F);
     side.gathered = surface.planar && surface.triangle_count <= 2 * kMaxPolygonsPerSurface &&
-                    uniformEmission(state, side, emission);
-    if (side.gathered) addPolygons(state, side, emission, lights);
+                    uniformEmission(patches, side, emission, uniform);
+    if (side.gathered) addPolygons(patches, side, uniform, lights);
   }
   return lights;
 }

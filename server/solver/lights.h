@@ -4,9 +4,10 @@
 #include <array>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <span>
 #include <vector>
 
-#include "server/solver/state.h"
+#include "server/solver/side.h"
 
 namespace radiosity::solver {
 
@@ -30,7 +31,8 @@ struct LightPolygon {
 };
 
 /// Emissive planar surfaces of few polygons and uniform emission become light polygons, and their sides are marked
-/// `gathered`; the emission of all others is scattered like reflected light.
-[[nodiscard]] std::vector<LightPolygon> findLightPolygons(RadiosityState& state);
+/// `gathered`; the emission of all others is shot like reflected light. `emission` by leaf value.
+[[nodiscard]] std::vector<LightPolygon> findLightPolygons(const scene::PatchScene& patches, std::vector<Side>& sides,
+                                                          std::span<const glm::vec3> emission);
 
 }  // namespace radiosity::solver

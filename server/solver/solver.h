@@ -1,20 +1,16 @@
-// Progressive radiosity of one scene: waves of shots from the strongest nodes (planar ones gathered as polygons, others
-// scattered through hemicubes of mip-level patch IDs), direct light gathered from many points, whole rounds
-// averaged until the stated error is reached. Owned by the solve loop; one thread. Carries no light itself: that is the
-// Transport's.
+// Progressive radiosity of one scene. Two ways: LinkedSolver remembers every link that a hemicube found (the default);
+// ShootingSolver forgets them, as Lum, Ma and Max (2002) do, for the mode that follows their paper and for scenes whose
+// links would not fit in memory. Owned by the solve loop; one thread. Carries no light itself: that is the Transport's.
 #pragma once
 
 #include <cstdint>
 #include <memory>
-#include <string>
 #include <vector>
 
 #include "common/result.h"
 #include "server/scene/patch_scene.h"
-#include "server/solver/estimate.h"
-#include "server/solver/lights.h"
+#include "server/solver/error_parts.h"
 #include "server/solver/planner.h"
-#include "server/solver/state.h"
 #include "server/solver/transport.h"
 
 namespace radiosity::solver {
@@ -26,70 +22,54 @@ struct SolverSettings {
   /// Gaussian over the unpushed irradiance. It stops when the residual reaches the target; its sampling error is what
   /// it is.
   bool paper_mode = false;
+  /// Bytes for remembered links. When they are used up no more nodes become shooters; a scene that could not even have
+  /// a few hundred is solved without.
+  std::size_t link_memory = std::size_t{1} << 30;
   PlannerSettings planner;
 };
 
 enum class StepOutcome {
+  kSlice,      ///< a part of a wave was shot; nothing new to show
   kShot,       ///< a wave was shot; the lightmaps are on their way
-  kRoundDone,  ///< a round ended; irradiance() and error() are new
+  kRoundDone,  ///< irradiance() and error() are new
   kConverged,  ///< and the error is at most the target
-  kExhausted,  ///< no further round fits the integers\' headroom; the error stays above the target
+  kExhausted,  ///< nothing more can be done here; the error stays above the target
 };
 
 class Solver {
  public:
-  Solver(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
-         solver::Transport& transport, const SolverSettings& settings);
+  virtual ~Solver() = default;
 
-  /// One batch: some 10 to 100 ms of work. On error nothing has changed, except that the wave's light is taken as shot;
-  /// the caller starts over with a new Solver.
-  [[nodiscard]] Result<StepOutcome> step();
+  /// A slice of a wave: some 10 to 100 ms of work. On an error of the transport the caller starts over with a new Solver.
+  [[nodiscard]] virtual Result<StepOutcome> step() = 0;
 
-  /// Emission or reflectance changed: what was received stays, what is unshot follows. Shooting goes on.
-  void setMaterials(const scene::PatchMaterials& materials);
-  /// Goes on with further rounds when the solve had stopped at a larger error.
-  void setTargetError(double target);
-
+  /// Emission or reflectance changed: nothing is invalidated; shooting goes on.
+  virtual void setMaterials(const scene::PatchMaterials& materials) = 0;
+  /// Goes on when the solve had stopped at a larger error.
+  virtual void setTargetError(double target) = 0;
   /// Brings irradiance() and error() up to date when the solve is stopped before its first round ended.
-  void assess();
+  virtual void assess() = 0;
 
-  /// Irradiance (lux) by node, level 0. In the first round it grows with every wave; later it is that of the last whole
-  /// round.
-  [[nodiscard]] const std::vector<glm::vec3>& irradiance() const { return irradiance_; }
-  [[nodiscard]] const ErrorParts& error() const { return error_; }
-  [[nodiscard]] EnergyParts energy() const;
-  [[nodiscard]] const TransportCounters& transportCounters() const { return transport_counters_; }
-  [[nodiscard]] const PlannerCounters& plannerCounters() const { return planner_.counters(); }
-  [[nodiscard]] std::uint32_t rounds() const { return state_.rounds(); }
+  /// Irradiance (lux) by node, level 0. Grows with every wave at first; later it changes from round to round.
+  [[nodiscard]] virtual const std::vector<glm::vec3>& irradiance() const = 0;
+  /// The same from one of the two independent halves of the samples.
+  [[nodiscard]] virtual std::vector<glm::vec3> halfIrradiance(std::uint32_t half) const = 0;
+  [[nodiscard]] virtual const ErrorParts& error() const = 0;
+  [[nodiscard]] virtual EnergyParts energy() const = 0;
+  [[nodiscard]] virtual const TransportCounters& transportCounters() const = 0;
+  [[nodiscard]] virtual const PlannerCounters& plannerCounters() const = 0;
+  [[nodiscard]] virtual std::uint32_t rounds() const = 0;
+  /// Flux is kept as integers whose scale was chosen for the light at the start: very different light needs a new
+  /// solver.
+  [[nodiscard]] virtual bool hasFluxScale() const = 0;
+
   [[nodiscard]] std::uint64_t shots() const {
-    return transport_counters_.scatter_shots + transport_counters_.gather_points;
+    return transportCounters().scatter_shots + transportCounters().gather_points;
   }
-  [[nodiscard]] const RadiosityState& state() const { return state_; }
-
- private:
-  enum class Phase { kDirect, kIndirect, kDone };
-  [[nodiscard]] Result<StepOutcome> gatherDirect();
-  [[nodiscard]] Result<StepOutcome> scatterIndirect();
-  [[nodiscard]] StepOutcome finishRound();
-  [[nodiscard]] Result<void> run(const ShotBatch& batch);
-  void startRound();
-  void publish();
-  [[nodiscard]] double owedPower() const;
-  [[nodiscard]] double roundPower() const;
-  [[nodiscard]] double remainder() const;
-
-  RadiosityState state_;
-  std::vector<LightPolygon> lights_;
-  solver::Transport& transport_;
-  SolverSettings settings_;
-  Planner planner_;
-  Phase phase_ = Phase::kDirect;
-  bool live_ = true;  // show every wave: in the first round, and after an edit until the round ends
-  FluxAccumulators batch_;
-  TransportCounters transport_counters_;
-  std::array<double, 3> gather_emitted_{};  // flux the gather shots stood for, over all rounds
-  std::vector<glm::vec3> irradiance_;
-  ErrorParts error_;
 };
+
+[[nodiscard]] std::unique_ptr<Solver> makeSolver(std::shared_ptr<const scene::PatchScene> patches,
+                                                 const scene::PatchMaterials& materials, Transport& transport,
+                                                 const SolverSettings& settings);
 
 }  // namespace radiosity::solver

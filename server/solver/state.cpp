@@ -22,13 +22,9 @@ void FluxAccumulators::reset(std::size_t node_count) {
 }
 
 RadiosityState::RadiosityState(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials)
-    : patches_(std::move(patches)) {
-  makeSides();
+    : patches_(std::move(patches)), sides_(makeSides(*patches_)) {
   std::size_t values = 0;
-  for (auto& side : sides_) {
-    side.first_value = static_cast<std::uint32_t>(values);
-    values += side.leaf_count;
-  }
+  for (const auto& side : sides_) values += side.leaf_count;
   emission_.resize(values);
   reflectance_.resize(values);
   shot_.assign(values, glm::vec3(0.0F));
@@ -39,25 +35,6 @@ RadiosityState::RadiosityState(std::shared_ptr<const scene::PatchScene> patches,
   for (auto& half : received_) half.assign(patches_->nodeCount(), Flux3{});
   setMaterials(materials);
   chooseFluxScale();
-}
-
-void RadiosityState::makeSides() {
-  for (std::uint32_t s = 0; s < patches_->surfaces.size(); ++s) {
-    const auto& surface = patches_->surfaces[s];
-    for (std::uint32_t face = 0; face < 2; ++face) {
-      if (surface.first_node[face] == scene::kNone) continue;
-      Side side;
-      side.surface = s;
-      side.side = face;
-      side.first_node = surface.first_node[face];
-      side.width = surface.width;
-      side.height = surface.height;
-      side.level_count = surface.level_count;
-      side.leaf_count = surface.width * surface.height;
-      side.node_count = scene::levelGrid(side.width, side.height, side.level_count).offset;
-      sides_.push_back(side);
-    }
-  }
 }
 
 void RadiosityState::setMaterials(const scene::PatchMaterials& materials) {

@@ -20,24 +20,10 @@
 #include <vector>
 
 #include "server/scene/patch_scene.h"
+#include "server/solver/side.h"
 #include "server/solver/transport.h"
 
 namespace radiosity::solver {
-
-/// One side of a surface that has patches: the paper's "polygon" with its quadtree.
-struct Side {
-  std::uint32_t surface = 0;
-  std::uint32_t side = 0;        ///< 0 front, 1 back
-  std::uint32_t first_node = 0;  ///< level 0 starts here
-  std::uint32_t node_count = 0;
-  std::uint32_t first_value = 0;  ///< leaf values of this side start here
-  std::uint32_t leaf_count = 0;
-  std::uint32_t width = 0, height = 0, level_count = 0;
-  bool gathered = false;          ///< its emission is delivered by gather shots, not by scatter
-  float mean_reflectance = 0.0F;  ///< of the channels too
-  bool dirty = true;              ///< received since its last push-pull
-  double unshot_power = 0.0;      ///< sum of |unshot| area, all channels; an estimate while dirty
-};
 
 class RadiosityState {
  public:
@@ -94,6 +80,7 @@ class RadiosityState {
   /// Irradiance by leaf value from one of the two independent halves; pushed on the fly. `out` is leaf_count long.
   void halfIrradiance(const Side& side, std::uint32_t half, std::span<glm::vec3> out) const;
 
+  [[nodiscard]] std::span<const glm::vec3> emissions() const { return emission_; }  ///< by leaf value
   [[nodiscard]] glm::vec3 emission(const Side& side, std::uint32_t leaf) const {
     return emission_[side.first_value + leaf];
   }
@@ -111,7 +98,6 @@ class RadiosityState {
   [[nodiscard]] const Flux3& scattered() const { return scattered_; }
 
  private:
-  void makeSides();
   void chooseFluxScale();
   void pull(Side& side);
   void pullNode(const Side& side, std::uint32_t level, std::uint32_t x, std::uint32_t y);

@@ -98,6 +98,32 @@ struct TransportCounters {
   std::uint64_t links = 0;   ///< (shot, node) pairs that received flux
   std::uint64_t triangles_drawn = 0, triangles_culled = 0;
   double render_seconds = 0.0, accumulate_seconds = 0.0, gather_seconds = 0.0;
+
+  TransportCounters& operator+=(const TransportCounters& other);
+};
+
+/// Integers of a shot whose links are measured: its flux is at most about the area of the unit box's faces.
+inline constexpr double kMeasureScale = 1125899906842624.0;  // 2^50
+
+/// What one shot brings where, for a radiosity (gather) or flux (scatter) of one: its links. Nodes of any level may be
+/// named; a node that is named twice receives both.
+struct LinkSample {
+  struct Run {
+    std::uint32_t first_node, count;
+  };
+  std::vector<Run> runs;
+  std::vector<float> irradiance;         ///< mean over each node of the runs, one run after the other
+  double escaped = 0.0, absorbed = 0.0;  ///< flux that left the scene, and that fell on unlit sides
+
+  void add(std::uint32_t node, float value) {
+    if (runs.empty() || runs.back().first_node + runs.back().count != node) runs.push_back({node, 0});
+    ++runs.back().count;
+    irradiance.push_back(value);
+  }
+  /// The same from a flux in units of 1 / kMeasureScale. What fell on a node without area (a sliver that only the
+  /// rasteriser saw) is absorbed.
+  void addFlux(std::uint32_t node, std::int64_t flux, const scene::PatchScene& patches);
+  void scale(double factor);
 };
 
 class Transport {
@@ -111,8 +137,21 @@ class Transport {
   /// unchanged.
   [[nodiscard]] virtual Result<TransportCounters> run(const ShotBatch& batch, FluxAccumulators& into) = 0;
 
+  /// Measures the links of every shot of the batch by itself: its radiosity or flux is taken as one, its half is
+  /// ignored. samples[i] belongs to gather shot i, then come the scatter shots. Blocks. On error `samples` is undefined.
+  /// The default carries out one shot after the other with run().
+  [[nodiscard]] virtual Result<TransportCounters> measure(const ShotBatch& batch, std::vector<LinkSample>& samples);
+
+  /// What runs in setScene(), run() or measure() fails soon, and everything after it at once: the solve thread is wanted for its
+  /// end. From any thread. A transport whose calls are short need not do anything.
+  virtual void interrupt() {}
+
   /// "llvmpipe (LLVM 15.0.6, 256 bits), 2 workers"
   [[nodiscard]] virtual std::string description() const = 0;
+
+ protected:
+  /// For the default measure(): how many nodes there are and their areas.
+  [[nodiscard]] virtual std::shared_ptr<const scene::PatchScene> scene() const = 0;
 };
 
 }  // namespace radiosity::solver

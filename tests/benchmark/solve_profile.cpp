@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <ctime>
 #include <fstream>
 #include <glm/geometric.hpp>
 #include <map>
@@ -18,6 +19,7 @@
 #include "server/gpu/gpu_transport.h"
 #include "server/scene/document.h"
 #include "server/scene/patch_scene.h"
+#include "server/solver/shooting_solver.h"
 #include "server/solver/solver.h"
 #include "tests/oracle/path_tracer.h"
 #include "tests/oracle/triangle_scene.h"
@@ -25,7 +27,19 @@
 namespace radiosity {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+/// Time that this process used, of all its threads: other work on the machine does not count.
+struct Clock {
+  using duration = std::chrono::nanoseconds;
+  using rep = duration::rep;
+  using period = duration::period;
+  using time_point = std::chrono::time_point<Clock>;
+  [[maybe_unused]] static constexpr bool is_steady = true;
+  static time_point now() {
+    timespec used{};
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &used);
+    return time_point(std::chrono::seconds(used.tv_sec) + std::chrono::nanoseconds(used.tv_nsec));
+  }
+};
 
 struct Leaf {
   std::uint32_t node = 0;
@@ -128,6 +142,28 @@ void printSurfaces(const scene::PatchScene& patches, const std::vector<Leaf>& le
   }
 }
 
+[[maybe_unused]] /// Errors of one surface's leaves as a picture of characters: tenths of its mean, upper case where too bright.
+void printMap(const scene::PatchScene& patches, std::uint32_t surface, const std::vector<Leaf>& leaves,
+              const std::vector<glm::dvec3>& truth, const std::vector<glm::vec3>& solved) {
+  const auto& s = patches.surfaces[surface];
+  std::vector<std::string> rows(s.height, std::string(s.width, ' '));
+  double mean = 0.0, count = 0.0;
+  const auto each = [&](auto visit) {
+    for (std::size_t i = 0; i < leaves.size(); ++i) {
+      const auto local = leaves[i].node - s.first_node[0];
+      if (leaves[i].node >= s.first_node[0] && local < s.width * s.height) visit(i, local);
+    }
+  };
+  each([&](std::size_t i, std::uint32_t) { mean += truth[i].y, count += 1.0; });
+  mean /= count;
+  each([&](std::size_t i, std::uint32_t local) {
+    const double off = (static_cast<double>(solved[leaves[i].node].y) - truth[i].y) / mean;
+    const int step = std::min(25, static_cast<int>(std::abs(off) * 20.0));
+    rows[local / s.width][local % s.width] = static_cast<char>(step == 0 ? '.' : (off > 0 ? 'A' : 'a') + step);
+  });
+  for (const auto& row : rows) std::printf("  %s\n", row.c_str());
+}
+
 int profile(const std::string& file, std::map<std::string, std::string> options) {
   const auto number = [&](const char* name, double fallback) {
     return options.count(name) != 0 ? std::atof(options[name].c_str()) : fallback;
@@ -170,16 +206,24 @@ int profile(const std::string& file, std::map<std::string, std::string> options)
   settings.planner.pairs_a_wave = static_cast<std::uint32_t>(number("--pairs", settings.planner.pairs_a_wave));
   settings.planner.level_bias = static_cast<float>(number("--bias", 0.0));
   begin = Clock::now();
-  solver::Solver solver(patches, materials, **transport, settings);
+  std::unique_ptr<solver::Solver> made;
+  if (number("--linked", 1) != 0.0) {
+    made = solver::makeSolver(patches, materials, **transport, settings);
+  } else {
+    made = std::make_unique<solver::ShootingSolver>(patches, materials, **transport, settings);
+  }
+  auto& solver = *made;
   double seconds = std::chrono::duration<double>(Clock::now() - begin).count(), shown = 0.0;
   while (seconds < number("--seconds", 5)) {
     begin = Clock::now();
     const auto outcome = solver.step();
     if (!outcome) return std::fprintf(stderr, "%s\n", outcome.error().text().c_str()), 1;
     seconds += std::chrono::duration<double>(Clock::now() - begin).count();
-    if (*outcome == solver::StepOutcome::kShot ||
-        (seconds < 1.15 * shown && *outcome != solver::StepOutcome::kConverged))
+    const bool last = *outcome == solver::StepOutcome::kConverged || *outcome == solver::StepOutcome::kExhausted;
+    if (*outcome == solver::StepOutcome::kSlice) continue;
+    if (!last && ((*outcome == solver::StepOutcome::kShot && number("--all", 0) == 0.0) || seconds < 1.15 * shown))
       continue;
+    if (*outcome == solver::StepOutcome::kShot) solver.assess();
     shown = seconds;
     const auto& e = solver.error();
     const auto& c = solver.transportCounters();
@@ -189,9 +233,12 @@ int profile(const std::string& file, std::map<std::string, std::string> options)
                 100 * e.total, 100 * e.residual, 100 * e.sampling, 100 * e.discretization);
     printTruth(leaves, truth, solver.irradiance());
     std::printf(" | render %.2f acc %.2f gather %.2f\n", c.render_seconds, c.accumulate_seconds, c.gather_seconds);
-    if (*outcome == solver::StepOutcome::kConverged) break;
+    if (last) break;
   }
   if (options.count("--surfaces") != 0) printSurfaces(*patches, leaves, truth, solver.irradiance());
+  if (options.count("--map") != 0) {
+    printMap(*patches, static_cast<std::uint32_t>(number("--map", 0)), leaves, truth, solver.irradiance());
+  }
   const auto energy = solver.energy();
   const auto& counters = solver.plannerCounters();
   std::printf("shooters %llu, of which gathered %llu; roulette kills %llu\n",

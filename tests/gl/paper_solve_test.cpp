@@ -7,7 +7,7 @@
 #include "server/gpu/gpu_transport.h"
 #include "server/scene/document.h"
 #include "server/scene/patch_scene.h"
-#include "server/solver/solver.h"
+#include "server/solver/shooting_solver.h"
 
 namespace radiosity {
 namespace {
@@ -31,7 +31,7 @@ Solved solveCornell(bool paper) {
   EXPECT_TRUE((*transport)->setScene(patches));
   solver::SolverSettings settings;
   settings.paper_mode = paper;
-  solver::Solver solver(patches, scene::shadePatches(*imported, *patches), **transport, settings);
+  solver::ShootingSolver solver(patches, scene::shadePatches(*imported, *patches), **transport, settings);
   for (int i = 0; i < 2000; ++i) {
     const auto outcome = solver.step();
     EXPECT_TRUE(outcome.has_value()) << outcome.error().text();

@@ -75,8 +75,9 @@ class Workers : public ::testing::Test {
     if (!made) GTEST_SKIP() << made.error().text();
     in_process_ = std::move(*made);
   }
-  static std::unique_ptr<solver::Transport> make(int workers) {
-    auto made = gpu::makeWorkerTransport({workers, RADIOSITY_GL_WORKER});
+  static std::unique_ptr<solver::Transport> make(int workers,
+                                                 std::chrono::milliseconds patience = gpu::WorkerOptions().patience) {
+    auto made = gpu::makeWorkerTransport({workers, RADIOSITY_GL_WORKER, patience});
     EXPECT_TRUE(made.has_value()) << made.error().text();
     return made ? std::move(*made) : nullptr;
   }
@@ -170,6 +171,55 @@ TEST_F(Workers, KilledWorkersAreReplacedAndChangeNoBit) {
     EXPECT_EQ(after.size(), 2U);
     EXPECT_EQ(std::count(after.begin(), after.end(), before[static_cast<std::size_t>(round % 2)]), 0);
   }
+}
+
+TEST_F(Workers, HungWorkersAreReplacedAndChangeNoBit) {
+  const auto scene = randomRoom(402, 13742, 2);
+  const auto batch = mixedBatch(*scene, 600);
+  ASSERT_TRUE(in_process_->setScene(scene).has_value());
+  const auto expected = run(*in_process_, *scene, batch);
+  const auto transport = make(2, std::chrono::milliseconds(200));
+  ASSERT_TRUE(transport);
+  ASSERT_TRUE(transport->setScene(scene).has_value());
+  expectSame(run(*transport, *scene, batch), expected);
+  const auto before = childWorkers();
+  ASSERT_EQ(before.size(), 2U);
+  // Stopped before it gets its chunks, it answers none; stopped with chunks done, those must be done again.
+  for (const int delay_ms : {0, 40}) {
+    const auto living = childWorkers();
+    ASSERT_FALSE(living.empty());
+    if (delay_ms == 0) kill(living.front(), SIGSTOP);
+    std::thread stopper([&] {
+      std::this_thread::sleep_for(std::chrono::milliseconds(delay_ms));
+      kill(living.front(), SIGSTOP);
+    });
+    expectSame(run(*transport, *scene, batch), expected);
+    stopper.join();
+    expectSame(run(*transport, *scene, batch), expected);  // or it hung just after the run
+    const auto after = childWorkers();
+    EXPECT_EQ(after.size(), 2U);
+    EXPECT_EQ(std::count(after.begin(), after.end(), living.front()), 0) << "the stopped one is still there";
+  }
+}
+
+TEST_F(Workers, AnInterruptionEndsARunWithAHungWorkerAndEveryRunAfterIt) {
+  const auto scene = randomRoom(60, 2000, 1);
+  const auto batch = mixedBatch(*scene, 40);
+  const auto transport = make(2, std::chrono::hours(1));
+  ASSERT_TRUE(transport);
+  ASSERT_TRUE(transport->setScene(scene).has_value());
+  for (const auto worker : childWorkers()) kill(worker, SIGSTOP);
+  auto flux = accumulators(*scene);
+  std::thread interrupter([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    transport->interrupt();
+  });
+  EXPECT_FALSE(transport->run(batch, flux).has_value());  // within the test's time limit
+  interrupter.join();
+  expectSame(flux, accumulators(*scene));
+  EXPECT_FALSE(transport->run(batch, flux).has_value());
+  EXPECT_FALSE(transport->setScene(scene).has_value());
+  EXPECT_TRUE(childWorkers().empty());
 }
 
 TEST_F(Workers, NoProcessIsLeftBehind) {

@@ -51,8 +51,8 @@ class Dev(unittest.TestCase):
             self.assertEqual(dev("--help", cwd=folder).returncode, 0)
 
 
-class DevRun(unittest.TestCase):
-    """`./dev run` in a copy of the checkout that is built already; the two programs tell how they were called."""
+class Checkout(unittest.TestCase):
+    """A copy of `dev` where all packages are installed and programs may be played by stand-ins."""
 
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
@@ -60,17 +60,24 @@ class DevRun(unittest.TestCase):
         self.root = Path(folder.name).resolve()
         shutil.copy(DEV, self.root / "dev")
         self.stand_in("bin/dpkg-query", 'for name; do echo "ii $name"; done')
-        self.stand_in("bin/ninja", 'echo "ninja: no work to do."')
-        self.stand_in("build/client/cli/radiosity", 'printf "client|%s" "$@"; exit "${SOLVE_STATUS:-0}"')
-        self.stand_in("build/server/radiosityd", 'printf "server|%s" "$@"')
-        (self.root / "build/build.ninja").touch()
-        (self.root / "my room.glb").touch()
 
     def stand_in(self, name, script):
         path = self.root / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(f"#!/bin/bash\n{script}\n")
         path.chmod(0o755)
+
+
+class DevRun(Checkout):
+    """`./dev run` in a checkout that is built already; the two programs tell how they were called."""
+
+    def setUp(self):
+        super().setUp()
+        self.stand_in("bin/ninja", 'echo "ninja: no work to do."')
+        self.stand_in("build/client/cli/radiosity", 'printf "client|%s" "$@"; exit "${SOLVE_STATUS:-0}"')
+        self.stand_in("build/server/radiosityd", 'printf "server|%s" "$@"')
+        (self.root / "build/build.ninja").touch()
+        (self.root / "my room.glb").touch()
 
     def run_dev(self, *arguments, solve_status=0, cwd=None, listen=""):
         environment = dict(os.environ, PATH=f"{self.root}/bin:{os.environ['PATH']}", SOLVE_STATUS=str(solve_status),
@@ -112,6 +119,45 @@ class DevRun(unittest.TestCase):
         (self.root / "elsewhere").mkdir()
         called = self.run_dev("../my room.glb", "--no-serve", cwd=self.root / "elsewhere").stdout.split("client|")
         self.assertEqual(called[2:5], ["../my room.glb", "-o", f"{self.root}/out/my room-lit.glb"])
+
+
+class DevLint(Checkout):
+    """`./dev lint` where ninja tells how it was called and has nothing to do, or finds something."""
+
+    def setUp(self):
+        super().setUp()
+        (self.root / "tests").mkdir()
+        (self.root / "build-lint").mkdir()
+        (self.root / "build-lint/build.ninja").touch()
+        for rules in (".clang-tidy", "tests/.clang-tidy"):
+            (self.root / rules).write_text("Checks: a")
+        self.stand_in("bin/ninja", f'echo "$*" >>{self.root}/calls; echo "$FINDING"; [ -z "$FINDING" ]')
+
+    def lint(self, finding=""):
+        """How it ended, and the calls of ninja."""
+        (self.root / "calls").write_text("")
+        environment = dict(os.environ, PATH=f"{self.root}/bin:{os.environ['PATH']}", FINDING=finding)
+        done = subprocess.run([self.root / "dev", "lint"], capture_output=True, text=True, timeout=60,
+                              stdin=subprocess.DEVNULL, env=environment)
+        return done, (self.root / "calls").read_text().splitlines()
+
+    def test_builds_with_the_lint_preset_and_goes_on_after_a_finding(self):
+        done, calls = self.lint()
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        self.assertRegex(calls[-1], rf"^-C {self.root}/build-lint -j \d+ -k 0$")
+
+    def test_sources_are_read_again_only_when_the_rules_changed(self):
+        self.lint()
+        for rules in (".clang-tidy", "tests/.clang-tidy"):
+            self.assertEqual(len(self.lint()[1]), 1)
+            (self.root / rules).write_text("Checks: b")
+            self.assertEqual(self.lint()[1][0], f"-C {self.root}/build-lint -t clean")
+
+    def test_a_finding_is_shown_and_fails(self):
+        self.lint()
+        done, _ = self.lint(finding="room.cpp:3:1: error: unused [check]")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("room.cpp:3:1: error: unused [check]", done.stderr)
 
 
 if __name__ == "__main__":

@@ -167,7 +167,9 @@ void FakeEngine::loaded(std::string what, Callback<engine::LoadOutcome> done) {
     ++layout_number_;
   }
   for (const auto& listener : listeners()) listener->onSceneLoaded(revision);
-  answer([done, revision] { done(engine::LoadOutcome{revision, {"room.glb: /materials/0: clamped"}}); });
+  answer([done = std::move(done), revision] {
+    done(engine::LoadOutcome{revision, {"room.glb: /materials/0: clamped"}});
+  });
 }
 
 void FakeEngine::loadBytes(std::string name, SharedBytes bytes, Callback<engine::LoadOutcome> done) {
@@ -195,7 +197,7 @@ void FakeEngine::patch(engine::PatchRequest request, Callback<engine::PatchOutco
     return answer([done] { done(fail(ErrorCode::kStaleRevision, "another edit came first; fetch it and try again")); });
   if (!request.dry_run)
     for (const auto& listener : listeners()) listener->onScenePatched(revision, request.patch, request.by);
-  answer([done, revision] { done(engine::PatchOutcome{revision, 3, 40}); });
+  answer([done = std::move(done), revision] { done(engine::PatchOutcome{revision, 3, 40}); });
 }
 
 void FakeEngine::configure(engine::SolveSettings settings, Callback<engine::SolveSettings> done) {
@@ -211,7 +213,7 @@ void FakeEngine::setState(engine::SolveState state, Callback<engine::SolveState>
     const std::lock_guard lock(mutex_);
     status_.state = state;
   }
-  answer([done, state] { done(state); });
+  answer([done = std::move(done), state] { done(state); });
 }
 
 void FakeEngine::pause(Callback<engine::SolveState> done) { setState(engine::SolveState::kPaused, std::move(done)); }
@@ -230,7 +232,7 @@ std::shared_ptr<const engine::Lightmaps> FakeEngine::lightmaps() const {
 
 void FakeEngine::sceneText(Callback<SceneText> done) {
   const auto revision = status().revision;
-  answer([done, revision] { done(SceneText{revision, R"({"asset":{"version":"2.0"}})"}); });
+  answer([done = std::move(done), revision] { done(SceneText{revision, R"({"asset":{"version":"2.0"}})"}); });
 }
 void FakeEngine::sceneGlb(Callback<SharedBytes> done) {
   answer([done] { done(bytesOf("glTF scene")); });

@@ -150,7 +150,7 @@ TEST(Http, AConnectionServesManyRequestsAlsoPipelined) {
 
 TEST(Http, WhatIsNotHttpIsAnsweredAndClosed) {
   RunningServer server;
-  for (const std::string& text : {std::string("\x16\x03\x01\x02\x00\x01\r\n\r\n"), std::string("GET\r\n\r\n"),
+  for (const std::string& text : {std::string("\x16\x03\x01\x02\x00\x01\r\n\r\n", 10), std::string("GET\r\n\r\n"),
                                   std::string("GET /%zz HTTP/1.1\r\nHost: localhost\r\n\r\n"),
                                   "GET /" + std::string(20'000, 'a') + " HTTP/1.1\r\nHost: localhost\r\n\r\n"}) {
     RawHttp http(server.port());

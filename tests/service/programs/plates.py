@@ -64,8 +64,8 @@ def lit_document():
     return scene
 
 
-def write_glb(path, scene):
-    body = b"".join(_quads())
+def write_glb(path, scene, body=None):
+    body = b"".join(_quads()) if body is None else body
     text = json.dumps(scene).encode()
     text += b" " * (-len(text) % 4)
     body += b"\0" * (-len(body) % 4)

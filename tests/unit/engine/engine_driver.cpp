@@ -14,6 +14,7 @@ class ScriptedTransport final : public solver::Transport {
     if (script_->uploads_to_fail > 0 && script_->uploads_to_fail-- > 0)
       return fail(ErrorCode::kUnavailable, "out of memory on the device");
     ++script_->uploads;
+    patches_ = patches;
     return rays_.setScene(std::move(patches));
   }
   Result<solver::TransportCounters> run(const solver::ShotBatch& batch, solver::FluxAccumulators& into) override {
@@ -22,7 +23,11 @@ class ScriptedTransport final : public solver::Transport {
   }
   [[nodiscard]] std::string description() const override { return "rays"; }
 
+ protected:
+  [[nodiscard]] std::shared_ptr<const scene::PatchScene> scene() const override { return patches_; }
+
  private:
+  std::shared_ptr<const scene::PatchScene> patches_;
   std::shared_ptr<TransportScript> script_;
   RayTransport rays_{16};
 };

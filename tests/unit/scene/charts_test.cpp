@@ -33,12 +33,12 @@ void expectSound(const PatchScene& patches) {
   for (std::size_t t = 0; t < patches.triangles.size(); ++t) {
     const TriangleFrame& frame = patches.triangles[t];
     for (std::size_t k = 0; k < 3; ++k) {
-      const PatchVertex& vertex = patches.vertices[patches.indices[3 * t + k]];
+      const PatchVertex& vertex = patches.vertices[patches.indices[std::size_t{3} * t + k]];
       const glm::vec3 p = frame.origin + frame.du * vertex.texel.x + frame.dv * vertex.texel.y;
       ASSERT_LT(glm::distance(p, vertex.position), 3e-6F) << "triangle " << t;
       ASSERT_GT(glm::dot(frame.normal, vertex.normal), 0.999F);
     }
-    const auto at = [&](std::size_t k) { return patches.vertices[patches.indices[3 * t + k]].position; };
+    const auto at = [&](std::size_t k) { return patches.vertices[patches.indices[std::size_t{3} * t + k]].position; };
     const glm::vec3 cross = glm::cross(at(1) - at(0), at(2) - at(0));
     if (glm::length(cross) > 1e-8F) {
       ASSERT_GT(glm::dot(cross, frame.normal), 0.0F);
@@ -139,7 +139,9 @@ TEST(Charts, NoTexelIsCoveredTwiceInsideAChart) {
   for (const Surface& surface : patches.surfaces) {
     double texels = 0.0;
     for (std::uint32_t t = surface.first_triangle; t < surface.first_triangle + surface.triangle_count; ++t) {
-      const auto at = [&](std::size_t k) { return glm::dvec2(patches.vertices[patches.indices[3 * t + k]].texel); };
+      const auto at = [&](std::size_t k) {
+        return glm::dvec2(patches.vertices[patches.indices[std::size_t{3} * t + k]].texel);
+      };
       const glm::dvec2 a = at(1) - at(0), b = at(2) - at(0);
       texels += 0.5 * (a.x * b.y - a.y * b.x);
     }

@@ -38,6 +38,9 @@ class RayTransport final : public solver::Transport {
   Result<solver::TransportCounters> run(const solver::ShotBatch& batch, solver::FluxAccumulators& into) override;
   [[nodiscard]] std::string description() const override { return "rays"; }
 
+ protected:
+  [[nodiscard]] std::shared_ptr<const scene::PatchScene> scene() const override { return patches_; }
+
  private:
   struct Hit {
     std::uint32_t surface = scene::kNone;

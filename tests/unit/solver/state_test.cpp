@@ -48,8 +48,8 @@ TEST(PushPull, ReceivedFluxEqualsIrradianceTimesAreaAtAnyMixOfLevels) {
   batch.reset(made.patches->nodeCount());
   std::int64_t sum = 0;
   for (std::uint32_t node = 0; node < side.node_count; ++node) {
-    batch.node[node % 2][node] = {1000 * (node + 1), 0, 0};
-    sum += 1000 * (node + 1);
+    batch.node[node % 2][node] = {std::int64_t{1000} * (node + 1), 0, 0};
+    sum += std::int64_t{1000} * (node + 1);
   }
   state.receive(batch);
   state.pushPull(side);

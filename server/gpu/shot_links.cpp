@@ -1,0 +1,86 @@
+// ShotRunner::measure: item buffers of many shots share an atlas, whichever shots they belong to.
+#include <algorithm>
+#include <chrono>
+
+#include "server/gpu/shot_runner.h"
+
+namespace radiosity::gpu {
+
+Result<solver::TransportCounters> ShotRunner::measure(const ShotSpan& shots, std::vector<solver::LinkSample>& samples) {
+  if (!has_scene_) return fail(ErrorCode::kInternal, "setScene must come before measure");
+  if (const auto good = checkShots(shots); !good) return tl::unexpected(good.error());
+  solver::TransportCounters counters;
+  samples.assign(shots.gather.size() + shots.scatter.size(), {});
+  measureGather(shots, samples, counters);
+  measureScatter(shots, std::span(samples).subspan(shots.gather.size()), counters);
+  return counters;
+}
+
+/// A hemicube of node IDs is accumulated as if it carried a flux of one, into integers that are read back at once.
+void ShotRunner::measureScatter(const ShotSpan& shots, std::span<solver::LinkSample> samples,
+                                solver::TransportCounters& counters) {
+  if (shots.scatter.empty()) return;
+  if (!link_store_) link_store_.emplace(patches_->nodeCount());
+  const auto sink = link_store_->sink();
+  for (std::size_t i = 0; i < shots.scatter.size(); ++i) {
+    auto shot = shots.scatter[i];
+    shot.flux = {1.0, 0.0, 0.0};
+    shot.half = 0;
+    ShotSpan one;
+    one.mode = shots.mode;
+    one.flux_scale = solver::kMeasureScale;
+    one.scatter = std::span(&shot, 1);
+    scatter(one, sink, counters);
+    for (std::size_t block = 0; block < sink.mark[0].size(); ++block) {
+      if (sink.mark[0][block] == 0) continue;
+      const auto first = static_cast<std::uint32_t>(block * kMarkNodes);
+      const auto last = std::min<std::size_t>(first + kMarkNodes, sink.node[0].size());
+      for (auto node = first; node < last; ++node) samples[i].addFlux(node, sink.node[0][node][0], *patches_);
+    }
+    samples[i].escaped += static_cast<double>(sink.totals->escaped[0]) / solver::kMeasureScale;
+    samples[i].absorbed += static_cast<double>(sink.totals->backface[0]) / solver::kMeasureScale;
+    sink.clear();
+  }
+}
+
+void ShotRunner::measureGather(const ShotSpan& shots, std::vector<solver::LinkSample>& samples,
+                               solver::TransportCounters& counters) {
+  using Clock = std::chrono::steady_clock;
+  // Points of neighbouring shots with equal resolution, in order.
+  struct Look {
+    std::size_t shot, point;
+  };
+  std::vector<Look> looks;
+  for (std::size_t i = 0; i < shots.gather.size(); ++i) {
+    const auto& shot = shots.gather[i];
+    for (std::size_t p = 0; p < shot.point_count; ++p) looks.push_back({i, shot.first_point + p});
+  }
+  std::vector<HemicubeView> views;
+  for (std::size_t first = 0; first < looks.size();) {
+    const auto resolution = shots.gather[looks[first].shot].resolution;
+    views.clear();
+    auto last = first;
+    for (; last < looks.size() && views.size() < renderer_.capacity(resolution) &&
+           shots.gather[looks[last].shot].resolution == resolution;
+         ++last) {
+      views.push_back({shots.points[looks[last].point]});
+    }
+    const auto images = renderer_.render(HemicubePass::kItems, resolution, views, counters);
+    const auto start = Clock::now();
+    const auto pixels = hemicubePixels(resolution);
+    for (auto i = first; i < last; ++i) {
+      const auto& shot = shots.gather[looks[i].shot];
+      if (looks[i].point == shot.first_point) gatherer_.beginLinks(shot);
+      const auto& frame = shots.points[looks[i].point];
+      gatherer_.look(shot, frame, images.subspan((i - first) * pixels, pixels),
+                     weights_.get(resolution, frame.lattice));
+      if (looks[i].point + 1 == shot.first_point + shot.point_count) {
+        gatherer_.finishLinks(shot, samples[looks[i].shot], counters);
+      }
+    }
+    counters.gather_seconds += std::chrono::duration<double>(Clock::now() - start).count();
+    first = last;
+  }
+}
+
+}  // namespace radiosity::gpu

@@ -1,0 +1,23 @@
+// What a solver says of its own error, and where the energy went. Plain values.
+#pragma once
+
+#include <array>
+
+namespace radiosity::solver {
+
+/// Relative RMS errors of irradiance: sqrt(sum a |dH|^2 / sum a |H|^2) over leaves and channels, a = visible area.
+struct ErrorParts {
+  double total = 1.0;           ///< residual and sampling together: what further shots will remove
+  double residual = 1.0;        ///< light not yet shot, spread evenly, and light that varies inside shooters
+  double sampling = 0.0;        ///< half the difference of the two independent halves
+  double discretization = 0.0;  ///< leaf against the bilinear interpolation of its parents, a third (second order)
+};
+
+/// Flux per channel, lux unit^2. emitted = absorbed + escaped + backface + unshot + imbalance.
+struct EnergyParts {
+  std::array<double, 3> emitted{}, absorbed{}, escaped{}, backface{}, unshot{};
+  /// What unbiased sampling created or destroyed by chance (gathered light, roulette): zero in the mean.
+  std::array<double, 3> imbalance{};
+};
+
+}  // namespace radiosity::solver

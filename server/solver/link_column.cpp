@@ -1,0 +1,200 @@
+#include "server/solver/link_column.h"
+
+#include <algorithm>
+#include <bit>
+
+namespace radiosity::solver {
+namespace {
+
+/// The float whose exponent is the smallest of a link's, in units of a link's last bit.
+constexpr std::uint32_t kExponentBase = 97U << 11U;
+
+inline float decodeOne(std::uint16_t code) {
+  const std::uint32_t bits = (static_cast<std::uint32_t>(code) + kExponentBase) << 12U;
+  return code == 0 ? 0.0F : std::bit_cast<float>(bits);
+}
+
+// Both vectorise; clones with and without 256-bit vectors give the same bits (no fused multiply-add in either).
+__attribute__((target_clones("avx2", "default"))) void decodeAll(const std::uint16_t* code, std::size_t count,
+                                                                 float* value) {
+  for (std::size_t i = 0; i < count; ++i) value[i] = decodeOne(code[i]);
+}
+
+__attribute__((target_clones("avx2", "default"))) void addScaled(const std::uint16_t* code, std::size_t count, float r,
+                                                                 float g, float b, float* __restrict red,
+                                                                 float* __restrict green, float* __restrict blue) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const float value = decodeOne(code[i]);
+    red[i] += r * value;
+    green[i] += g * value;
+    blue[i] += b * value;
+  }
+}
+
+__attribute__((target_clones("avx2", "default"))) float productOf(const std::uint16_t* a, const std::uint16_t* b,
+                                                                  const float* area, std::size_t count) {
+  constexpr std::size_t kLanes = 8;
+  float sum[kLanes] = {};
+  std::size_t i = 0;
+  for (; i + kLanes <= count; i += kLanes) {
+    for (std::size_t k = 0; k < kLanes; ++k) sum[k] += area[i + k] * decodeOne(a[i + k]) * decodeOne(b[i + k]);
+  }
+  float rest = 0.0F;
+  for (; i < count; ++i) rest += area[i] * decodeOne(a[i]) * decodeOne(b[i]);
+  for (std::size_t k = 0; k < kLanes; ++k) rest += sum[k];
+  return rest;
+}
+
+}  // namespace
+
+std::uint16_t encodeLink(float value) {
+  if (!(value > 0.0F)) return 0;
+  const std::uint32_t rounded = (std::bit_cast<std::uint32_t>(value) + 0x800U) >> 12U;
+  if (rounded <= kExponentBase) return 0;
+  return static_cast<std::uint16_t>(std::min(rounded - kExponentBase, 0xffffU));
+}
+
+float decodeLink(std::uint16_t code) { return decodeOne(code); }
+
+LinkExpander::LinkExpander(const scene::PatchScene& patches, const std::vector<Side>& sides)
+    : patches_(patches),
+      sides_(sides),
+      side_of_node_(patches.nodeCount(), 0),
+      coarse_(patches.nodeCount(), 0.0F),
+      is_reached_(sides.size(), false),
+      has_coarse_(sides.size(), false) {
+  std::size_t values = 0;
+  for (std::uint32_t s = 0; s < sides.size(); ++s) {
+    std::fill_n(side_of_node_.begin() + sides[s].first_node, sides[s].node_count, s);
+    values += sides[s].leaf_count;
+  }
+  values_.resize(values);
+}
+
+void LinkExpander::reach(std::uint32_t side) {
+  if (is_reached_[side]) return;
+  is_reached_[side] = true;
+  reached_.push_back(side);
+  std::fill_n(values_.begin() + sides_[side].first_value, sides_[side].leaf_count, 0.0F);
+}
+
+void LinkExpander::expand(const LinkSample& sample) {
+  for (const auto side : reached_) is_reached_[side] = false;
+  reached_.clear();
+  const float* value = sample.irradiance.data();
+  for (const auto& run : sample.runs) {
+    for (std::uint32_t node = run.first_node; node < run.first_node + run.count; ++node, ++value) {
+      const std::uint32_t s = side_of_node_[node];
+      const Side& side = sides_[s];
+      reach(s);
+      const std::uint32_t local = node - side.first_node;
+      if (local < side.leaf_count) {
+        values_[side.first_value + local] += *value;
+      } else {
+        coarse_[node] += *value;
+        has_coarse_[s] = true;
+      }
+    }
+  }
+  std::sort(reached_.begin(), reached_.end());
+  for (const auto side : reached_) {
+    if (has_coarse_[side]) pushDown(side);
+  }
+}
+
+void LinkExpander::pushDown(std::uint32_t s) {
+  const Side& side = sides_[s];
+  has_coarse_[s] = false;
+  for (std::uint32_t level = side.level_count; level-- > 1;) {
+    const auto grid = scene::levelGrid(side.width, side.height, level);
+    const auto child = scene::levelGrid(side.width, side.height, level - 1);
+    for (std::uint32_t y = 0; y < child.height; ++y) {
+      for (std::uint32_t x = 0; x < child.width; ++x) {
+        const float value = coarse_[side.first_node + grid.offset + (y >> 1U) * grid.width + (x >> 1U)];
+        if (level > 1) {
+          coarse_[side.first_node + child.offset + y * child.width + x] += value;
+        } else if (patches_.node_area[side.first_node + y * child.width + x] > 0.0F) {
+          values_[side.first_value + y * child.width + x] += value;
+        }
+      }
+    }
+    std::fill_n(coarse_.begin() + side.first_node + grid.offset, grid.width * grid.height, 0.0F);
+  }
+}
+
+void LinkColumn::makeRoom(std::span<const std::uint32_t> reached, const std::vector<Side>& sides) {
+  const auto has = [&](std::uint32_t side) {
+    const auto run = std::lower_bound(runs_.begin(), runs_.end(), side, [](const Run& r, auto s) { return r.side < s; });
+    return run != runs_.end() && run->side == side;
+  };
+  if (std::all_of(reached.begin(), reached.end(), has)) return;
+  std::vector<std::uint32_t> all(reached.begin(), reached.end());
+  for (const auto& run : runs_) all.push_back(run.side);
+  std::sort(all.begin(), all.end());
+  all.erase(std::unique(all.begin(), all.end()), all.end());
+  std::vector<Run> runs;
+  std::uint32_t offset = 0;
+  for (const auto side : all) {
+    runs.push_back({side, sides[side].first_value, sides[side].leaf_count, offset});
+    offset += sides[side].leaf_count;
+  }
+  std::vector<std::uint16_t> code(offset, 0);
+  std::size_t to = 0;
+  for (const auto& run : runs_) {
+    while (runs[to].side != run.side) ++to;
+    std::copy_n(code_.begin() + run.offset, run.count, code.begin() + runs[to].offset);
+  }
+  runs_ = std::move(runs);
+  code_ = std::move(code);
+}
+
+void LinkColumn::add(const LinkExpander& sample, const LinkSample& totals, double points,
+                     const std::vector<Side>& sides) {
+  makeRoom(sample.sidesReached(), sides);
+  const double sum = points_ + points;
+  const auto old_part = static_cast<float>(points_ / sum), new_part = static_cast<float>(points / sum);
+  std::size_t next = 0;
+  for (const auto& run : runs_) {
+    const auto reached = sample.sidesReached();
+    const bool is_new = next < reached.size() && reached[next] == run.side;
+    if (is_new) ++next;
+    for (std::uint32_t i = 0; i < run.count; ++i) {
+      auto& code = code_[run.offset + i];
+      const float fresh = is_new ? sample.values()[run.first_value + i] : 0.0F;
+      code = encodeLink(old_part * decodeOne(code) + new_part * fresh);
+    }
+  }
+  escaped_ = (escaped_ * points_ + totals.escaped * points) / sum;
+  absorbed_ = (absorbed_ * points_ + totals.absorbed * points) / sum;
+  points_ = sum;
+  ++samples_;
+}
+
+void LinkColumn::apply(const std::array<float, 3>& radiosity, const std::array<float*, 3>& irradiance) const {
+  for (const auto& run : runs_) {
+    addScaled(&code_[run.offset], run.count, radiosity[0], radiosity[1], radiosity[2], irradiance[0] + run.first_value,
+              irradiance[1] + run.first_value, irradiance[2] + run.first_value);
+  }
+}
+
+double LinkColumn::product(const LinkColumn& a, const LinkColumn& b, std::span<const float> leaf_area) {
+  double sum = 0.0;
+  auto other = b.runs_.begin();
+  for (const auto& run : a.runs_) {
+    while (other != b.runs_.end() && other->side < run.side) ++other;
+    if (other == b.runs_.end()) break;
+    if (other->side != run.side) continue;
+    sum += static_cast<double>(
+        productOf(&a.code_[run.offset], &b.code_[other->offset], &leaf_area[run.first_value], run.count));
+  }
+  return sum;
+}
+
+bool LinkColumn::decode(std::uint32_t side, std::span<float> leaves) const {
+  const auto run = std::lower_bound(runs_.begin(), runs_.end(), side, [](const Run& r, auto s) { return r.side < s; });
+  if (run == runs_.end() || run->side != side) return false;
+  decodeAll(&code_[run->offset], run->count, leaves.data());
+  return true;
+}
+
+}  // namespace radiosity::solver

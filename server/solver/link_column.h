@@ -1,0 +1,76 @@
+// Links of one shooter to every leaf: irradiance there for a radiosity of one, kept so that later bounces, edits of
+// light and colour, and finer samples cost no new hemicube. Plain values; one thread at a time.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "server/solver/side.h"
+#include "server/solver/transport.h"
+
+namespace radiosity::solver {
+
+/// A link as 16 bits: 5 of exponent, 11 of mantissa, no sign; 2^-30 to 4, relative error at most 2^-12; 0 is 0.
+[[nodiscard]] std::uint16_t encodeLink(float value);
+[[nodiscard]] float decodeLink(std::uint16_t code);
+
+/// Turns what a shot delivered to nodes of any level into values of leaves.
+class LinkExpander {
+ public:
+  LinkExpander(const scene::PatchScene& patches, const std::vector<Side>& sides);
+
+  void expand(const LinkSample& sample);
+  /// Irradiance by leaf value; only that of the sides reached is valid.
+  [[nodiscard]] std::span<const float> values() const { return values_; }
+  [[nodiscard]] std::span<const std::uint32_t> sidesReached() const { return reached_; }
+
+ private:
+  void reach(std::uint32_t side);
+  void pushDown(std::uint32_t side);
+
+  const scene::PatchScene& patches_;
+  const std::vector<Side>& sides_;
+  std::vector<std::uint32_t> side_of_node_;
+  std::vector<float> values_;
+  std::vector<float> coarse_;  // by node: what was linked above level 0
+  std::vector<std::uint32_t> reached_;
+  std::vector<bool> is_reached_, has_coarse_;
+};
+
+class LinkColumn {
+ public:
+  /// Averages a new sample of `points` points into what is there.
+  void add(const LinkExpander& sample, const LinkSample& totals, double points, const std::vector<Side>& sides);
+
+  [[nodiscard]] double points() const { return points_; }
+  [[nodiscard]] std::uint32_t samples() const { return samples_; }
+  /// Flux that leaves the scene, and that falls on unlit sides, for a radiosity of one.
+  [[nodiscard]] double escaped() const { return escaped_; }
+  [[nodiscard]] double absorbed() const { return absorbed_; }
+  [[nodiscard]] std::size_t bytes() const { return code_.size() * sizeof(code_[0]) + runs_.size() * sizeof(runs_[0]); }
+
+  /// Adds radiosity[c] times the links to plane c of irradiance, by leaf value.
+  void apply(const std::array<float, 3>& radiosity, const std::array<float*, 3>& irradiance) const;
+  /// The links to the leaves of one side; false when there are none.
+  [[nodiscard]] bool decode(std::uint32_t side, std::span<float> leaves) const;
+
+  /// Sums over leaves of area times the product of two columns' links.
+  [[nodiscard]] static double product(const LinkColumn& a, const LinkColumn& b, std::span<const float> leaf_area);
+
+  struct Run {
+    std::uint32_t side, first_value, count, offset;
+  };
+  [[nodiscard]] std::span<const Run> runs() const { return runs_; }
+
+ private:
+  void makeRoom(std::span<const std::uint32_t> reached, const std::vector<Side>& sides);
+
+  std::vector<Run> runs_;  // by ascending side
+  std::vector<std::uint16_t> code_;
+  std::uint32_t samples_ = 0;
+  double points_ = 0.0, escaped_ = 0.0, absorbed_ = 0.0;
+};
+
+}  // namespace radiosity::solver

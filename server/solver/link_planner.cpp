@@ -1,0 +1,243 @@
+#include "server/solver/link_planner.h"
+
+#include <algorithm>
+#include <cmath>
+#include <queue>
+#include <tuple>
+
+#include "server/solver/sampling.h"
+
+namespace radiosity::solver {
+namespace {
+
+/// Nodes weaker than this part of a share play Russian roulette.
+constexpr double kRouletteShare = 0.05;
+/// A node that plays counts at most this often. Below, its light is left out (and stays in the residual): in a dark
+/// corner larger weights would feed on themselves.
+constexpr double kMaxWeight = 20.0;
+/// Nodes of less than this part of a share may shoot as a polygon though a part of it is empty or buried.
+constexpr double kPartialShare = 1.2 * kRouletteShare;
+/// Light that only differs between the leaves of a node cancels at a distance and counts near by.
+constexpr double kVariationWorth = 0.1;
+/// Square of the part of a node's links to its near receivers that feels what varies inside it.
+constexpr double kVariation = 0.5;
+/// Points of one sample of a light: enough for the ratio of weighted visibilities to have little bias.
+constexpr std::uint32_t kLightPoints = 8;
+/// A light's item buffers cost about so many times those of a node, for their resolution.
+constexpr double kLightCost = 3.0;
+
+}  // namespace
+
+LinkPlanner::Node LinkPlanner::nodeAt(const NodePlace& place, const UnshotPyramid& unshot) const {
+  const auto id = nodeId(sides_[place.side], place);
+  Node node;
+  node.place = place;
+  node.net = static_cast<double>(channelSum(unshot.flux(id)));
+  node.power = node.net + kVariationWorth * std::max(0.0, static_cast<double>(unshot.rough(id)) - node.net);
+  return node;
+}
+
+double LinkPlanner::chance(double power) const { return std::min(1.0, power / (kRouletteShare * share_)); }
+
+/// A node keeps its draw: as its power grows, or the share shrinks, it joins sooner or later.
+bool LinkPlanner::plays(const NodePlace& place, std::size_t half, double power) const {
+  const double p = chance(power);
+  if (p < 1.0 / kMaxWeight) return false;
+  return p >= 1.0 || uniformFromKey(mixKeys(mixKeys(shots_.key(place), half), 77)) < p;
+}
+
+void LinkPlanner::weigh(LinkSystem& system) {
+  for (auto& shooter : system.shooters()) {
+    if (shooter.isLight()) continue;
+    const double power = shooter.power();
+    for (std::size_t half = 0; half < 2; ++half) {
+      const bool in = shooter.column[half].points() > 0.0 && (shooter.certain || plays(shooter.place, half, power));
+      shooter.weight[half] = !in ? 0.0 : shooter.certain ? 1.0 : 1.0 / chance(power);
+    }
+  }
+}
+
+std::vector<Measurement> LinkPlanner::firstLight(const LinkSystem& system) const {
+  double total = 0.0;
+  for (const auto& shooter : system.shooters()) {
+    if (shooter.isLight()) total += shooter.power();
+  }
+  std::vector<Measurement> wanted;
+  for (std::uint32_t n = 0; n < system.shooters().size(); ++n) {
+    const auto& shooter = system.shooters()[n];
+    if (!shooter.isLight() || shooter.power() <= 0.0 || shooter.column[0].points() > 0.0) continue;
+    const auto share = static_cast<std::uint32_t>(std::lround(settings_.light_points * shooter.power() / total));
+    const std::uint32_t points = std::clamp(share, 2U, kLightPoints);
+    for (std::uint32_t k = 0; k < std::max(1U, (share + kLightPoints - 1) / kLightPoints); ++k) {
+      for (std::size_t half = 0; half < 2; ++half) wanted.push_back({n, half, points, k});
+    }
+  }
+  return wanted;
+}
+
+bool LinkPlanner::mustSplit(const Node& node, const LinkSystem& system) const {
+  if (node.place.level == 0) return false;
+  const auto id = nodeId(sides_[node.place.side], node.place);
+  if (system.hasBelow(id)) return true;
+  if (system.at(id) != scene::kNone) return false;
+  if (node.power > share_) return true;
+  // A node that is partly empty or buried is no polygon, until it is too weak for that to be seen.
+  return node.power > kPartialShare * share_ && shots_.gathers(node.place) && !shots_.isWhole(node.place);
+}
+
+void LinkPlanner::addShooter(const Node& node, LinkSystem& system, const UnshotPyramid& unshot,
+                             const scene::PatchScene& patches, std::vector<Measurement>& wanted) {
+  const auto id = nodeId(sides_[node.place.side], node.place);
+  if (patches.node_area[id] <= 0.0F || node.net <= 0.0) return;
+  const std::array<bool, 2> in{plays(node.place, 0, node.power), plays(node.place, 1, node.power)};
+  counters_.roulette_kills += static_cast<std::uint64_t>(!in[0]) + static_cast<std::uint64_t>(!in[1]);
+  if (!in[0] && !in[1]) return;
+  Shooter shooter;
+  shooter.place = node.place;
+  shooter.area = static_cast<double>(patches.node_area[id]);
+  shooter.sent.fill(unshot.flux(id) / patches.node_area[id]);
+  const auto index = system.add(shooter);
+  ++counters_.shooters;
+  if (shots_.gathers(node.place)) ++counters_.gathered_nodes;
+  if (node.place.level > 0) ++counters_.whole_subtrees;
+  for (std::size_t half = 0; half < 2; ++half) {
+    if (in[half]) wanted.push_back({index, half, 1, 0});
+  }
+}
+
+std::vector<Measurement> LinkPlanner::grow(LinkSystem& system, const UnshotPyramid& unshot,
+                                           const scene::PatchScene& patches, std::size_t limit) {
+  const auto weaker = [](const Node& a, const Node& b) {
+    if (a.power != b.power) return a.power < b.power;
+    return std::tie(a.place.side, a.place.level, a.place.y, a.place.x) >
+           std::tie(b.place.side, b.place.level, b.place.y, b.place.x);
+  };
+  std::priority_queue<Node, std::vector<Node>, decltype(weaker)> queue(weaker);
+  const auto push = [&](const NodePlace& place) {
+    const Node node = nodeAt(place, unshot);
+    if (node.power > 0.0) queue.push(node);
+  };
+  for (std::uint32_t s = 0; s < sides_.size(); ++s) push({s, sides_[s].level_count - 1, 0, 0});
+  std::vector<Measurement> wanted;
+  while (!queue.empty() && wanted.size() < 2 * limit) {
+    const Node node = queue.top();
+    queue.pop();
+    const NodePlace& place = node.place;
+    if (mustSplit(node, system)) {
+      const Side& side = sides_[place.side];
+      const auto grid = scene::levelGrid(side.width, side.height, place.level - 1);
+      for (std::uint32_t y = 2 * place.y; y < std::min(2 * place.y + 2, grid.height); ++y) {
+        for (std::uint32_t x = 2 * place.x; x < std::min(2 * place.x + 2, grid.width); ++x)
+          push({place.side, place.level - 1, x, y});
+      }
+      continue;
+    }
+    const auto there = system.at(nodeId(sides_[place.side], place));
+    if (there == scene::kNone) {
+      addShooter(node, system, unshot, patches, wanted);
+      continue;
+    }
+    const auto& shooter = system.shooters()[there];  // one of its halves may join late
+    for (std::size_t half = 0; half < 2; ++half) {
+      if (shooter.column[half].points() == 0.0 && plays(place, half, shooter.power()))
+        wanted.push_back({there, half, 1, 0});
+    }
+  }
+  return wanted;
+}
+
+double LinkPlanner::rouletteShare(const LinkSystem& system) {
+  double all = 0.0, roulette = 0.0;
+  for (const auto& shooter : system.shooters()) {
+    const double spread = shooter.spread();
+    all += spread;
+    if (!shooter.isLight() && (shooter.weight[0] != 1.0 || shooter.weight[1] != 1.0)) roulette += spread;
+  }
+  return all > 0.0 ? roulette / all : 0.0;
+}
+
+/// What differs from the mean inside a node reaches a receiver with as much of its links as is near: far away it
+/// cancels, close by it does not. The sum of squared links weighs the near ones most.
+double LinkPlanner::variation(const Shooter& shooter, const LinkSystem& system, const UnshotPyramid& unshot,
+                              const scene::PatchScene& patches) const {
+  if (shooter.isLight() || shooter.place.level == 0) return 0.0;
+  const auto id = nodeId(sides_[shooter.place.side], shooter.place);
+  if (system.hasBelow(id)) return 0.0;
+  const double rough = static_cast<double>(unshot.rough(id)) / static_cast<double>(patches.node_area[id]);
+  const double reach = std::max(shooter.products[0], shooter.products[2]);
+  return kVariation * rough * rough * reach;
+}
+
+double LinkPlanner::variation(const LinkSystem& system, const UnshotPyramid& unshot,
+                              const scene::PatchScene& patches) const {
+  double sum = 0.0;
+  for (const auto& shooter : system.shooters()) sum += variation(shooter, system, unshot, patches);
+  return sum;
+}
+
+void LinkPlanner::split(const NodePlace& place, LinkSystem& system, const UnshotPyramid& unshot,
+                        const scene::PatchScene& patches, std::vector<Measurement>& wanted) {
+  const Side& side = sides_[place.side];
+  const auto grid = scene::levelGrid(side.width, side.height, place.level - 1);
+  for (std::uint32_t y = 2 * place.y; y < std::min(2 * place.y + 2, grid.height); ++y) {
+    for (std::uint32_t x = 2 * place.x; x < std::min(2 * place.x + 2, grid.width); ++x) {
+      const NodePlace child{place.side, place.level - 1, x, y};
+      const auto id = nodeId(side, child);
+      if (patches.node_area[id] <= 0.0F) continue;
+      Shooter shooter;
+      shooter.place = child;
+      shooter.area = static_cast<double>(patches.node_area[id]);
+      shooter.sent.fill(unshot.flux(id) / patches.node_area[id]);
+      shooter.certain = true;
+      const auto index = system.add(shooter);
+      ++counters_.shooters;
+      if (shots_.gathers(child)) ++counters_.gathered_nodes;
+      if (child.level > 0) ++counters_.whole_subtrees;
+      for (std::size_t half = 0; half < 2; ++half) wanted.push_back({index, half, 1, 0});
+    }
+  }
+}
+
+std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPyramid& unshot,
+                                              const scene::PatchScene& patches) {
+  double spread = 0.0, squares = 0.0;
+  for (const auto& shooter : system.shooters()) {
+    spread += shooter.spread();
+    squares += shooter.power() * shooter.power();
+  }
+  struct Gain {
+    double gain;
+    std::uint32_t shooter, points;  // 0 points: split
+  };
+  std::vector<Gain> gains;
+  for (std::uint32_t n = 0; n < system.shooters().size(); ++n) {
+    const auto& shooter = system.shooters()[n];
+    if (shooter.column[0].points() == 0.0 || shooter.column[1].points() == 0.0) continue;
+    const std::uint32_t points = shooter.isLight() ? kLightPoints : 1;
+    const double taken = shooter.column[0].points();
+    // The spread of few samples is itself uncertain: half a sample's worth of what is usual for such power is mixed in.
+    const double usual = spread / squares * shooter.power() * shooter.power();
+    const double variance = 0.25 * (shooter.spread() * taken + 0.5 * usual) / (taken + 0.5);
+    gains.push_back({variance / (2.0 * (taken + points) * (shooter.isLight() ? kLightCost : 1.0)), n, points});
+    const double varying = variation(shooter, system, unshot, patches);
+    if (varying > 0.0) gains.push_back({varying / 8.0, n, 0});
+  }
+  std::sort(gains.begin(), gains.end(), [](const Gain& a, const Gain& b) {
+    return std::tie(b.gain, a.shooter, a.points) < std::tie(a.gain, b.shooter, b.points);
+  });
+  const std::size_t limit = 2 * std::max<std::size_t>(settings_.pairs_a_wave, system.shooters().size() / 8);
+  std::vector<Measurement> wanted;
+  for (const auto& gain : gains) {
+    if (wanted.size() >= limit || gain.gain <= 0.0) break;
+    if (gain.points == 0) {
+      split(NodePlace(system.shooters()[gain.shooter].place), system, unshot, patches, wanted);
+      continue;
+    }
+    const auto& column = system.shooters()[gain.shooter].column;
+    for (std::size_t half = 0; half < 2; ++half)
+      wanted.push_back({gain.shooter, half, gain.points, column[half].samples()});
+  }
+  return wanted;
+}
+
+}  // namespace radiosity::solver

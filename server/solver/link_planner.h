@@ -1,0 +1,82 @@
+// Chooses what to measure next for the solver that remembers its links: which nodes become shooters (the greedy walk of
+// Lum, Ma and Max 2002, 4.2, on unshot power), which shooters need more samples, how much weak ones count. Its choices
+// depend on the state and the seed alone, never on time or the number of workers. One thread.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "server/solver/link_system.h"
+#include "server/solver/node_shots.h"
+#include "server/solver/planner.h"
+#include "server/solver/unshot_pyramid.h"
+
+namespace radiosity::solver {
+
+/// One sample of the links of a shooter in one half.
+struct Measurement {
+  std::uint32_t shooter = 0;
+  std::size_t half = 0;
+  std::uint32_t points = 1;
+  std::uint32_t index = 0;  ///< which sample of that column: fixes its points
+};
+
+class LinkPlanner {
+ public:
+  LinkPlanner(const std::vector<Side>& sides, const NodeShots& shots, const PlannerSettings& settings)
+      : sides_(sides), shots_(shots), settings_(settings) {}
+
+  /// The power of one shooter, all channels; nodes are split until they have less.
+  void setShare(double share) { share_ = share; }
+  [[nodiscard]] double share() const { return share_; }
+
+  /// Samples of the lights that have none yet, shared out by power.
+  [[nodiscard]] std::vector<Measurement> firstLight(const LinkSystem& system) const;
+
+  /// Makes the strongest unshot nodes shooters, up to `limit` of them, and says what to measure. Empty: what is left is
+  /// below a shooter's worth, or stood for by others.
+  [[nodiscard]] std::vector<Measurement> grow(LinkSystem& system, const UnshotPyramid& unshot,
+                                              const scene::PatchScene& patches, std::size_t limit);
+
+  /// Whatever lowers the error most for its cost: further samples of shooters whose halves differ, or shooters for the
+  /// children of nodes inside which light varies.
+  [[nodiscard]] std::vector<Measurement> improve(LinkSystem& system, const UnshotPyramid& unshot,
+                                                 const scene::PatchScene& patches);
+
+  /// Square of the error of irradiance, summed over leaves by area and over channels, that light which varies inside
+  /// the shooters causes.
+  [[nodiscard]] double variation(const LinkSystem& system, const UnshotPyramid& unshot,
+                                 const scene::PatchScene& patches) const;
+
+  /// The part of the sampling error's square that is due to roulette: only smaller shares lower it.
+  [[nodiscard]] static double rouletteShare(const LinkSystem& system);
+
+  /// Russian roulette: weights of weak shooters, so that those which play stand for all.
+  void weigh(LinkSystem& system);
+
+  [[nodiscard]] const PlannerCounters& counters() const { return counters_; }
+
+ private:
+  struct Node {
+    double power = 0.0, net = 0.0;
+    NodePlace place;
+  };
+  [[nodiscard]] Node nodeAt(const NodePlace& place, const UnshotPyramid& unshot) const;
+  [[nodiscard]] bool mustSplit(const Node& node, const LinkSystem& system) const;
+  [[nodiscard]] double chance(double power) const;
+  [[nodiscard]] bool plays(const NodePlace& place, std::size_t half, double power) const;
+  [[nodiscard]] double variation(const Shooter& shooter, const LinkSystem& system, const UnshotPyramid& unshot,
+                                 const scene::PatchScene& patches) const;
+  void split(const NodePlace& place, LinkSystem& system, const UnshotPyramid& unshot, const scene::PatchScene& patches,
+             std::vector<Measurement>& wanted);
+  void addShooter(const Node& node, LinkSystem& system, const UnshotPyramid& unshot, const scene::PatchScene& patches,
+                  std::vector<Measurement>& wanted);
+
+  const std::vector<Side>& sides_;
+  const NodeShots& shots_;
+  const PlannerSettings& settings_;
+  PlannerCounters counters_;
+  double share_ = 0.0;
+};
+
+}  // namespace radiosity::solver

@@ -1,0 +1,98 @@
+// The radiosity equation on the shooters chosen so far: each shoots a uniform radiosity over its links, and all bounces
+// between them are solved without another hemicube.
+//
+//   b_m = e_m + mean over node m of rho sum_n T_n w_n s_n,     s_m = b_m - b_parent(m),
+//
+// where T_n are the links of shooter n to leaves, w_n its roulette weight, and parent(m) the nearest shooter above m in
+// its quadtree: a node shoots its mean, its children how they differ from it, signed. Solved by Gauss and Seidel, which
+// is progressive shooting on few unknowns (Cohen and others 1988). Two independent halves of all links give two
+// independent solutions, whose difference is the sampling error. Owned by LinkedSolver; one thread outside of the
+// calls.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <vector>
+
+#include "server/solver/link_column.h"
+#include "server/solver/side.h"
+
+namespace radiosity::solver {
+
+struct Shooter {
+  NodePlace place;                         ///< of a node; of a light polygon only `light` counts
+  std::uint32_t light = scene::kNone;      ///< index of the light polygon, or kNone
+  std::uint32_t parent = scene::kNone;     ///< nearest shooter above
+  bool certain = false;                    ///< never plays roulette
+  double area = 0.0;                       ///< that shines, unit box squared
+  std::array<LinkColumn, 2> column;        ///< by half
+  std::array<double, 2> weight{1.0, 1.0};  ///< 0: does not play in that half
+  std::array<glm::vec3, 2> mean{};         ///< b: mean radiosity of the node
+  std::array<glm::vec3, 2> sent{};         ///< s, before the weight
+
+  std::array<double, 3> products{};        ///< sums over leaves of area T0 T0, T0 T1, T1 T1
+
+  [[nodiscard]] bool isLight() const { return light != scene::kNone; }
+  /// Flux it shoots, all channels, mean of the halves and before roulette.
+  [[nodiscard]] double power() const;
+  /// Variance that it brings to irradiance: area-weighted square of the difference between what its halves deliver.
+  [[nodiscard]] double spread() const;
+};
+
+class LinkSystem {
+ public:
+  LinkSystem(const scene::PatchScene& patches, const std::vector<Side>& sides);
+
+  /// By leaf value. All rows are made anew.
+  void setMaterials(const std::vector<glm::vec3>& emission, const std::vector<glm::vec3>& reflectance);
+
+  /// Index of the new shooter. Ancestors must come before their descendants.
+  std::uint32_t add(const Shooter& shooter);
+  [[nodiscard]] std::vector<Shooter>& shooters() { return shooters_; }
+  [[nodiscard]] const std::vector<Shooter>& shooters() const { return shooters_; }
+  /// The shooter at exactly this node, or kNone.
+  [[nodiscard]] std::uint32_t at(std::uint32_t node) const { return shooter_of_node_[node]; }
+  /// Whether shooters lie below this node.
+  [[nodiscard]] bool hasBelow(std::uint32_t node) const { return below_[node]; }
+
+  /// Averages a new sample into the links of a shooter.
+  void addSample(std::uint32_t shooter, std::size_t half, const LinkExpander& links, const LinkSample& totals,
+                 double points);
+
+  /// Brings rows up to date and solves both halves. Returns the sweeps that the slower took.
+  int solve();
+
+  /// Irradiance of every leaf value from the solution of `half`.
+  void irradiance(std::size_t half, std::vector<glm::vec3>& values) const;
+  /// What all links take.
+  [[nodiscard]] std::size_t bytes() const;
+  /// Radiosity that stands for each leaf of a side: that of the deepest shooter above it, mean of the halves.
+  void standIn(std::uint32_t side, std::vector<glm::vec3>& leaves) const;
+
+ private:
+  struct Rows {
+    std::uint32_t first = 0, count = 0;  ///< one if the node is of one reflectance, else one a channel
+  };
+  void updateRows();
+  void updateRows(std::size_t half, std::uint32_t column, std::uint32_t first_member);
+  void fillRow(std::size_t half, std::uint32_t member, std::uint32_t column, const float* links);
+  int solveHalf(std::size_t half);
+
+  const scene::PatchScene& patches_;
+  const std::vector<Side>& sides_;
+  std::vector<Shooter> shooters_;
+  std::vector<Rows> rows_;                               // by shooter
+  std::vector<glm::vec3> emission_mean_, reflectance_mean_;  // by shooter
+  std::vector<std::uint32_t> shooter_of_node_;
+  std::vector<bool> below_;
+  std::vector<std::vector<std::uint32_t>> members_;      // nodes by side
+  std::vector<bool> changed_;                            // by shooter: its column's entries are stale
+  std::size_t known_ = 0;                                // shooters whose rows are there
+  std::array<std::vector<std::vector<float>>, 2> matrix_;  // by half and row: entries by column
+  std::vector<glm::vec3> emission_, reflectance_;        // by leaf value
+  std::vector<float> leaf_area_;                         // by leaf value
+  std::vector<bool> uniform_;                            // by side: of one reflectance
+};
+
+}  // namespace radiosity::solver

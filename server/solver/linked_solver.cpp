@@ -1,0 +1,318 @@
+#include "server/solver/linked_solver.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <thread>
+
+#include "server/solver/field_error.h"
+
+namespace radiosity::solver {
+namespace {
+
+/// A refinement divides the share of power of a shooter by this.
+constexpr double kRefinement = 2.0;
+/// More refinements than this find nothing: everything is split to its leaves.
+constexpr double kMinShare = 1e-9;
+constexpr std::uint32_t kMaxRounds = 100'000;
+/// Short enough that nobody notices the wait, long enough that the workers' waiting for the last of them does not count.
+constexpr double kSliceSeconds = 0.06;
+
+}  // namespace
+
+LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
+                           Transport& transport, const SolverSettings& settings)
+    : patches_(std::move(patches)),
+      transport_(transport),
+      settings_(settings),
+      sides_(makeSides(*patches_)),
+      shots_(*patches_, sides_, settings.seed),
+      system_(*patches_, sides_),
+      expander_(*patches_, sides_),
+      unshot_(*patches_),
+      planner_(sides_, shots_, settings_.planner),
+      irradiance_(patches_->nodeCount(), glm::vec3(0.0F)) {
+  takeMaterials(materials);
+  for (auto& half : half_) half.assign(emission_.size(), glm::vec3(0.0F));
+  findUnshot();
+}
+
+void LinkedSolver::takeMaterials(const scene::PatchMaterials& materials) {
+  emission_.clear();
+  reflectance_.clear();
+  for (const auto& side : sides_) {
+    const auto emission = materials.emission.begin() + side.first_node;
+    const auto reflectance = materials.reflectance.begin() + side.first_node;
+    emission_.insert(emission_.end(), emission, emission + side.leaf_count);
+    reflectance_.insert(reflectance_.end(), reflectance, reflectance + side.leaf_count);
+  }
+  takeLights();
+  system_.setMaterials(emission_, reflectance_);
+}
+
+/// Every light polygon that ever was is a shooter; its radiosity is what it emits now.
+void LinkedSolver::takeLights() {
+  for (auto& light : lights_) light.emission = glm::vec3(0.0F);
+  for (const auto& light : findLightPolygons(*patches_, sides_, emission_)) {
+    const auto known =
+        std::find_if(lights_.begin(), lights_.end(), [&](const LightPolygon& old) { return old.key == light.key; });
+    if (known != lights_.end()) {
+      known->emission = light.emission;
+      continue;
+    }
+    Shooter shooter;
+    shooter.light = static_cast<std::uint32_t>(lights_.size());
+    shooter.area = light.area;
+    lights_.push_back(light);
+    (void)system_.add(shooter);
+  }
+  for (auto& shooter : system_.shooters()) {
+    if (shooter.isLight()) shooter.sent.fill(lights_[shooter.light].emission);
+  }
+}
+
+/// Measures the next part of the wave: short, so that an edit, a pause or the end of the server need not wait for all.
+/// Where the cuts lie, which depends on time, changes no bit.
+Result<void> LinkedSolver::measureSlice() {
+  const auto start = std::chrono::steady_clock::now();
+  const auto slice = std::span(wanted_).subspan(measured_, std::min(slice_, wanted_.size() - measured_));
+  ShotBatch batch;
+  std::vector<const Measurement*> gathered, scattered;
+  for (const auto& want : slice) {
+    const auto& shooter = system_.shooters()[want.shooter];
+    if (shooter.isLight()) {
+      shots_.add(lights_[shooter.light], want.half, want.index, want.points, settings_.planner.light_resolution, batch);
+    } else {
+      shots_.add(shooter.place, want.half, want.index, want.points, settings_.planner.node_resolution, batch);
+    }
+    (batch.gather.size() > gathered.size() ? gathered : scattered).push_back(&want);
+  }
+  std::vector<LinkSample> samples;
+  const auto done = transport_.measure(batch, samples);
+  if (!done) return tl::unexpected<Error>(done.error());
+  counters_ += *done;
+  gathered.insert(gathered.end(), scattered.begin(), scattered.end());
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const auto& want = *gathered[i];
+    if (i >= batch.gather.size()) samples[i].scale(system_.shooters()[want.shooter].area);  // it carried a flux of one
+    expander_.expand(samples[i]);
+    system_.addSample(want.shooter, want.half, expander_, samples[i], want.points);
+  }
+  measured_ += slice.size();
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  slice_ = static_cast<std::size_t>(std::clamp(static_cast<double>(slice.size()) * kSliceSeconds / std::max(seconds, 1e-6), 8.0, 4096.0));
+  return {};
+}
+
+/// Solves all bounces over the links there are, and lights every leaf.
+void LinkedSolver::settle() {
+  planner_.weigh(system_);
+  system_.solve();
+  std::thread other([&] { system_.irradiance(1, half_[1]); });
+  system_.irradiance(0, half_[0]);
+  other.join();
+  findUnshot();
+}
+
+void LinkedSolver::findUnshot() {
+  varying_ = net_unshot_ = 0.0;
+  std::vector<glm::vec3> unshot;
+  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
+    const Side& side = sides_[s];
+    system_.standIn(s, unshot);
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+      const auto v = side.first_value + leaf;
+      const glm::vec3 h = 0.5F * (half_[0][v] + half_[1][v]);
+      irradiance_[side.first_node + leaf] = h;
+      unshot[leaf] = reflectance_[v] * h + (side.gathered ? glm::vec3(0.0F) : emission_[v]) - unshot[leaf];
+    }
+    unshot_.pull(side, unshot);
+    const auto root = side.first_node + side.node_count - 1;
+    const auto net = static_cast<double>(channelSum(unshot_.flux(root)));
+    net_unshot_ += net;
+    varying_ += std::max(0.0, static_cast<double>(unshot_.rough(root)) - net);
+  }
+}
+
+/// The share of a shooter follows from the light that there is to reflect, with all its bounces.
+void LinkedSolver::startGrowth() {
+  double reflected = 0.0, area = 0.0;
+  for (const auto& side : sides_) {
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+      const auto a = static_cast<double>(patches_->node_area[side.first_node + leaf]);
+      const glm::dvec3 received(irradiance_[side.first_node + leaf]);
+      const double weight = received.x + received.y + received.z + 1e-30;
+      area += a * weight;
+      reflected += a * weight * static_cast<double>(channelSum(reflectance_[side.first_value + leaf])) / 3.0;
+    }
+  }
+  const double kept = area > 0.0 ? std::min(0.95, reflected / area) : 0.0;
+  planner_.setShare(net_unshot_ / (1.0 - kept) / settings_.planner.shooters_a_round);
+  phase_ = Phase::kGrow;
+}
+
+std::vector<Measurement> LinkedSolver::plan() {
+  if (phase_ == Phase::kLights) return planner_.firstLight(system_);
+  if (phase_ == Phase::kImprove) return planner_.improve(system_, unshot_, *patches_);
+  const std::size_t limit = std::max<std::size_t>(settings_.planner.pairs_a_wave, system_.shooters().size() / 2);
+  if (planner_.share() > 0.0) return planner_.grow(system_, unshot_, *patches_, limit);
+  return {};
+}
+
+Result<StepOutcome> LinkedSolver::step() {
+  if (phase_ == Phase::kDone) return StepOutcome::kConverged;
+  if (measured_ == wanted_.size()) {
+    wanted_ = plan();
+    measured_ = 0;
+    const bool dark = phase_ == Phase::kLights && net_unshot_ + varying_ <= 0.0;
+    if (wanted_.empty() && (dark || phase_ != Phase::kLights)) return finishRound();
+  }
+  if (!wanted_.empty()) {
+    if (const auto done = measureSlice(); !done) return tl::unexpected<Error>(done.error());
+    if (measured_ < wanted_.size()) return StepOutcome::kSlice;
+  }
+  settle();
+  if (phase_ == Phase::kImprove) return finishRound();
+  if (phase_ == Phase::kLights) startGrowth();
+  return StepOutcome::kShot;
+}
+
+StepOutcome LinkedSolver::finishRound() {
+  growing_ = false;
+  ++rounds_;
+  assess();
+  return chooseNext();
+}
+
+StepOutcome LinkedSolver::chooseNext() {
+  if (error_.total <= settings_.target_error) {
+    phase_ = Phase::kDone;
+    return StepOutcome::kConverged;
+  }
+  const bool full = system_.bytes() >= settings_.link_memory || planner_.share() < kMinShare * net_unshot_;
+  if (rounds_ >= kMaxRounds) {
+    phase_ = Phase::kDone;
+    return StepOutcome::kExhausted;
+  }
+  // Roulette's part of the sampling error falls with the share alone.
+  if (!full && LinkPlanner::rouletteShare(system_) > 0.5 && error_.sampling > error_.residual) {
+    planner_.setShare(planner_.share() / kRefinement);
+    phase_ = Phase::kGrow;
+  } else {
+    phase_ = Phase::kImprove;
+  }
+  return StepOutcome::kRoundDone;
+}
+
+void LinkedSolver::assess() {
+  FieldError field(*patches_);
+  double received = 0.0, reflected = 0.0;
+  for (const auto& side : sides_) {
+    const auto leaves = [&](std::size_t half) {
+      return std::span<const glm::vec3>(&half_[half][side.first_value], side.leaf_count);
+    };
+    field.addSide(side, leaves(0), leaves(1));
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+      const glm::vec3 flux = irradiance_[side.first_node + leaf] * patches_->node_area[side.first_node + leaf];
+      received += static_cast<double>(channelSum(flux));
+      reflected += static_cast<double>(glm::dot(flux, reflectance_[side.first_value + leaf]));
+    }
+  }
+  error_ = {};
+  double owed = 0.0;  // by lights that are still to be measured
+  for (const auto& shooter : system_.shooters()) {
+    if (shooter.isLight() && shooter.column[0].points() == 0.0) owed += shooter.power();
+  }
+  if (growing_) owed += net_unshot_;
+  if (field.square() <= 0.0) {
+    error_.residual = error_.total = owed + varying_ > 0.0 ? 1.0 : 0.0;  // all or nothing is missing
+    return;
+  }
+  const double kept = std::min(0.999, reflected / received);
+  error_.sampling = field.sampling();
+  error_.discretization = field.discretization();
+  const double varying = std::sqrt(planner_.variation(system_, unshot_, *patches_) / field.square());
+  error_.residual = owed / (1.0 - kept) / received + varying;
+  error_.total = std::hypot(error_.residual, error_.sampling);
+}
+
+void LinkedSolver::setTargetError(double target) {
+  settings_.target_error = target;
+  if (phase_ == Phase::kDone) (void)chooseNext();
+}
+
+void LinkedSolver::setMaterials(const scene::PatchMaterials& materials) {
+  takeMaterials(materials);
+  wanted_.clear();  // what was still to be measured will be asked for again
+  measured_ = 0;
+  // From scratch, so that the result depends on the links and the materials alone: an edit and its inverse give the
+  // same bits as long as no link was added in between.
+  for (int pass = 0; pass < 2; ++pass) {
+    for (auto& shooter : system_.shooters()) {
+      if (shooter.isLight()) continue;
+      if (pass == 0) {
+        for (std::size_t half = 0; half < 2; ++half) shooter.weight[half] = shooter.column[half].points() > 0.0 ? 1.0 : 0.0;
+      }
+      shooter.mean.fill(glm::vec3(0.0F));
+      shooter.sent.fill(glm::vec3(0.0F));
+    }
+    system_.solve();
+    if (pass == 0) planner_.weigh(system_);
+  }
+  for (std::size_t half = 0; half < 2; ++half) system_.irradiance(half, half_[half]);
+  findUnshot();
+  growing_ = true;
+  phase_ = Phase::kLights;
+  assess();
+  if (error_.total <= settings_.target_error) phase_ = Phase::kDone;  // the links there are carry it all
+}
+
+std::vector<glm::vec3> LinkedSolver::halfIrradiance(std::uint32_t half) const {
+  std::vector<glm::vec3> values(patches_->nodeCount(), glm::vec3(0.0F));
+  for (const auto& side : sides_)
+    std::copy_n(half_[half].begin() + side.first_value, side.leaf_count, values.begin() + side.first_node);
+  return values;
+}
+
+EnergyParts LinkedSolver::energy() const {
+  EnergyParts parts;
+  std::array<double, 3> lit{};  // sent by lights that have links
+  for (const auto& shooter : system_.shooters()) {
+    for (std::size_t half = 0; half < 2; ++half) {
+      const auto& column = shooter.column[half];
+      if (column.points() == 0.0) continue;
+      for (std::size_t c = 0; c < 3; ++c) {
+        const double sent = 0.5 * shooter.weight[half] * static_cast<double>(shooter.sent[half][static_cast<int>(c)]);
+        parts.escaped[c] += sent * column.escaped();
+        parts.backface[c] += sent * column.absorbed();
+        if (shooter.isLight()) lit[c] += sent * shooter.area;
+      }
+    }
+  }
+  for (const auto& side : sides_) {
+    const glm::dvec3 net(unshot_.flux(side.first_node + side.node_count - 1));
+    for (int c = 0; c < 3; ++c) {
+      const auto i = static_cast<std::size_t>(c);
+      parts.unshot[i] += net[c];
+      for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+        const auto v = side.first_value + leaf;
+        const auto area = static_cast<double>(patches_->node_area[side.first_node + leaf]);
+        const double emitted = area * static_cast<double>(emission_[v][c]);
+        parts.emitted[i] += emitted;
+        if (side.gathered) parts.unshot[i] += emitted;
+        parts.absorbed[i] += area * (1.0 - static_cast<double>(reflectance_[v][c])) *
+                             static_cast<double>(irradiance_[side.first_node + leaf][c]);
+      }
+    }
+  }
+  for (std::size_t c = 0; c < 3; ++c) {
+    parts.unshot[c] -= lit[c];
+    parts.imbalance[c] =
+        parts.emitted[c] - parts.absorbed[c] - parts.escaped[c] - parts.backface[c] - parts.unshot[c];
+  }
+  return parts;
+}
+
+}  // namespace radiosity::solver

@@ -1,0 +1,82 @@
+// Progressive radiosity that remembers its links: a hemicube is rendered once for each sample of a shooter, and every
+// bounce, edit of light or colour and repeated shot runs over the links it left.
+//
+// Lights: direct light, from many points. Grow: the strongest unshot nodes become shooters, wave by wave, until what is
+// left is stood for by others. Improve, until the stated error is reached: whatever lowers it most for its cost, be it
+// further samples of a shooter whose two halves differ, or shooters for the children of a node inside which light
+// varies.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "common/result.h"
+#include "server/solver/lights.h"
+#include "server/solver/link_planner.h"
+#include "server/solver/link_system.h"
+#include "server/solver/node_shots.h"
+#include "server/solver/solver.h"
+#include "server/solver/unshot_pyramid.h"
+
+namespace radiosity::solver {
+
+class LinkedSolver final : public Solver {
+ public:
+  LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
+               Transport& transport, const SolverSettings& settings);
+
+  [[nodiscard]] Result<StepOutcome> step() override;
+  void setMaterials(const scene::PatchMaterials& materials) override;
+  void setTargetError(double target) override;
+  void assess() override;
+
+  [[nodiscard]] const std::vector<glm::vec3>& irradiance() const override { return irradiance_; }
+  [[nodiscard]] std::vector<glm::vec3> halfIrradiance(std::uint32_t half) const override;
+  [[nodiscard]] const ErrorParts& error() const override { return error_; }
+  [[nodiscard]] EnergyParts energy() const override;
+  [[nodiscard]] const TransportCounters& transportCounters() const override { return counters_; }
+  [[nodiscard]] const PlannerCounters& plannerCounters() const override { return planner_.counters(); }
+  [[nodiscard]] std::uint32_t rounds() const override { return rounds_; }
+  [[nodiscard]] bool hasFluxScale() const override { return false; }
+
+  /// What is remembered.
+  [[nodiscard]] const LinkSystem& system() const { return system_; }
+
+ private:
+  enum class Phase { kLights, kGrow, kImprove, kDone };
+
+  [[nodiscard]] std::vector<Measurement> plan();
+  [[nodiscard]] Result<void> measureSlice();
+  void takeMaterials(const scene::PatchMaterials& materials);
+  void takeLights();
+  void settle();
+  void findUnshot();
+  void startGrowth();
+  [[nodiscard]] StepOutcome finishRound();
+  [[nodiscard]] StepOutcome chooseNext();
+
+  std::shared_ptr<const scene::PatchScene> patches_;
+  Transport& transport_;
+  SolverSettings settings_;
+  std::vector<Side> sides_;
+  std::vector<glm::vec3> emission_, reflectance_;  // by leaf value
+  std::vector<LightPolygon> lights_;               // those switched off stay, dark: their links are still good
+  NodeShots shots_;
+  LinkSystem system_;
+  LinkExpander expander_;
+  UnshotPyramid unshot_;
+  LinkPlanner planner_;
+  Phase phase_ = Phase::kLights;
+  std::vector<Measurement> wanted_;  // the wave under way
+  std::size_t measured_ = 0;         // of the wave
+  std::size_t slice_ = 16;           // measurements that take some 50 ms
+  bool growing_ = true;  // light is still missing: until the first walk found nothing more to add
+  std::uint32_t rounds_ = 0;
+  double varying_ = 0.0, net_unshot_ = 0.0;  // flux, all channels
+  std::array<std::vector<glm::vec3>, 2> half_;  // irradiance by leaf value
+  std::vector<glm::vec3> irradiance_;           // by node
+  ErrorParts error_;
+  TransportCounters counters_;
+};
+
+}  // namespace radiosity::solver

@@ -1,0 +1,155 @@
+#include "server/solver/node_shots.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
+
+#include "server/solver/sampling.h"
+
+namespace radiosity::solver {
+
+HemicubeFrame hemicubeAt(const glm::vec3& origin, const glm::vec3& normal, double rotation, std::uint64_t key) {
+  const glm::vec3 helper = std::abs(normal.x) < 0.6F ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0);
+  const glm::vec3 a = glm::normalize(glm::cross(helper, normal));
+  const glm::vec3 b = glm::cross(normal, a);
+  const double angle = 0.5 * std::numbers::pi * rotation;  // the hemicube has fourfold symmetry
+  HemicubeFrame frame;
+  frame.origin = origin;
+  frame.normal = normal;
+  frame.tangent = glm::normalize(a * static_cast<float>(std::cos(angle)) + b * static_cast<float>(std::sin(angle)));
+  frame.lattice = static_cast<std::uint32_t>(mixKeys(key, 5) % (kLatticeSide * kLatticeSide));
+  return frame;
+}
+
+bool NodeShots::isWhole(const NodePlace& node) const {
+  const Side& side = sides_[node.side];
+  const auto polygon = outlines_.node(side.surface, node.level, node.x, node.y);
+  const auto area = static_cast<double>(patches_.node_area[nodeId(side, node)]);
+  const double whole = polygon.area() * static_cast<double>(patches_.surfaces[side.surface].texel_area);
+  return std::abs(area - whole) <= 2e-3 * whole;
+}
+
+std::uint64_t NodeShots::key(const NodePlace& node) const {
+  const std::uint64_t place = (std::uint64_t{node.level} << 58) ^ (std::uint64_t{node.y} << 29) ^ std::uint64_t{node.x};
+  return mixKeys(mixKeys(seed_, sides_[node.side].first_node), place);
+}
+
+void NodeShots::add(const NodePlace& node, std::size_t half, std::uint32_t index, std::uint32_t points,
+                    std::uint32_t resolution, ShotBatch& batch) const {
+  if (gathers(node)) {
+    addGather(node, half, index, points, resolution, batch);
+  } else {
+    addScatter(node, half, index, resolution, batch);
+  }
+}
+
+/// A leaf of the node chosen with probability proportional to its area; (u, v) are uniform again on return.
+std::uint32_t NodeShots::leafByArea(const NodePlace& node, double& u, double& v) const {
+  const Side& side = sides_[node.side];
+  std::uint32_t x = node.x, y = node.y;
+  for (std::uint32_t level = node.level; level-- > 0;) {
+    const auto grid = scene::levelGrid(side.width, side.height, level);
+    const auto area = [&](std::uint32_t cx, std::uint32_t cy) {
+      if (cx >= grid.width || cy >= grid.height) return 0.0;
+      return static_cast<double>(patches_.node_area[side.first_node + grid.offset + cy * grid.width + cx]);
+    };
+    const double p00 = area(2 * x, 2 * y), p10 = area(2 * x + 1, 2 * y);
+    const double p01 = area(2 * x, 2 * y + 1), p11 = area(2 * x + 1, 2 * y + 1);
+    const double left = (p00 + p01) / (p00 + p10 + p01 + p11);
+    const bool right = u >= left;
+    u = right ? (u - left) / (1.0 - left) : u / left;
+    const double upper = right ? p10 : p00, lower = right ? p11 : p01;
+    const double split = upper / (upper + lower);
+    const bool down = v >= split;
+    v = down ? (v - split) / (1.0 - split) : v / split;
+    u = std::clamp(u, 0.0, 1.0 - 1e-12);
+    v = std::clamp(v, 0.0, 1.0 - 1e-12);
+    x = 2 * x + (right ? 1 : 0);
+    y = 2 * y + (down ? 1 : 0);
+  }
+  return y * side.width + x;
+}
+
+void NodeShots::addGather(const NodePlace& node, std::size_t half, std::uint32_t index, std::uint32_t points,
+                          std::uint32_t resolution, ShotBatch& batch) const {
+  const Side& side = sides_[node.side];
+  const auto& surface = patches_.surfaces[side.surface];
+  const auto& frame = patches_.triangles[surface.first_triangle];
+  const auto polygon = outlines_.node(side.surface, node.level, node.x, node.y);
+  const bool whole = isWhole(node);
+  const auto at = [&](const glm::dvec2& texel) {
+    return frame.origin + static_cast<float>(texel.x) * frame.du + static_cast<float>(texel.y) * frame.dv;
+  };
+  GatherShot shot;
+  shot.normal = side.side == 0 ? frame.normal : -frame.normal;
+  shot.corner_count = polygon.count;
+  const bool turned = glm::dot(glm::cross(frame.du, frame.dv), shot.normal) < 0.0F;
+  for (std::uint32_t k = 0; k < polygon.count; ++k)
+    shot.corners[turned ? polygon.count - 1 - k : k] = at(polygon.corner[k]);
+  const double area = polygon.area() * static_cast<double>(surface.texel_area);
+  const auto shining = static_cast<double>(patches_.node_area[nodeId(side, node)]);
+  shot.fill = whole ? 1.0F : static_cast<float>(std::min(1.0, shining / area));
+  shot.resolution = resolution;
+  const std::uint64_t node_key = mixKeys(key(node), half);
+  // The halves look at opposite places of a texel: what is linear in it cancels in their mean and shows in their
+  // difference.
+  const glm::dvec4 jitter = sobol4(index, mixKeys(key(node), 2));
+  shot.receiver_jitter = glm::vec2(half == 0 ? glm::dvec2(jitter) : 1.0 - glm::dvec2(jitter));
+  shot.first_point = static_cast<std::uint32_t>(batch.points.size());
+  shot.point_count = points;
+  for (std::uint32_t p = 0; p < points; ++p) {
+    glm::dvec4 sample = sobol4(index * points + p, node_key);
+    glm::dvec2 texel = polygon.point(sample.x, sample.y);
+    if (!whole) {
+      const auto leaf = leafByArea(node, sample.x, sample.y);
+      const auto& place = patches_.leaves[surface.first_leaf + leaf];
+      texel = place.full ? glm::dvec2(leaf % side.width, leaf / side.width) + glm::dvec2(sample.x, sample.y)
+                         : glm::dvec2(place.texel);
+    }
+    batch.points.push_back(hemicubeAt(at(texel), shot.normal, sample.z, mixKeys(node_key, index * points + p)));
+  }
+  batch.gather.push_back(shot);
+}
+
+void NodeShots::addScatter(const NodePlace& node, std::size_t half, std::uint32_t index, std::uint32_t resolution,
+                           ShotBatch& batch) const {
+  const Side& side = sides_[node.side];
+  const std::uint64_t node_key = mixKeys(key(node), half);
+  glm::dvec4 sample = sobol4(index, node_key);
+  const auto leaf = leafByArea(node, sample.x, sample.y);
+  const auto& place = patches_.leaves[patches_.surfaces[side.surface].first_leaf + leaf];
+  const auto& triangle = patches_.triangles[place.triangle];
+  const glm::vec2 texel =
+      place.full ? glm::vec2(glm::dvec2(leaf % side.width, leaf / side.width) + glm::dvec2(sample.x, sample.y))
+                 : place.texel;
+  ScatterShot shot;
+  shot.frame = hemicubeAt(triangle.origin + texel.x * triangle.du + texel.y * triangle.dv,
+                          side.side == 0 ? triangle.normal : -triangle.normal, sample.z, mixKeys(node_key, index));
+  shot.resolution = resolution;
+  shot.level_bias = static_cast<float>(sample.w);
+  batch.scatter.push_back(shot);
+}
+
+void NodeShots::add(const LightPolygon& light, std::size_t half, std::uint32_t index, std::uint32_t points,
+                    std::uint32_t resolution, ShotBatch& batch) const {
+  const std::uint64_t light_key = mixKeys(seed_, 0x4c49474854ULL + light.key), half_key = mixKeys(light_key, half);
+  const glm::dvec4 jitter = sobol4(index, mixKeys(light_key, 1));
+  GatherShot shot;
+  std::copy(light.corners.begin(), light.corners.end(), shot.corners.begin());
+  shot.corner_count = light.corner_count;
+  shot.normal = light.normal;
+  shot.resolution = resolution;
+  shot.receiver_jitter = glm::vec2(half == 0 ? glm::dvec2(jitter) : 1.0 - glm::dvec2(jitter));
+  shot.first_point = static_cast<std::uint32_t>(batch.points.size());
+  shot.point_count = points;
+  for (std::uint32_t p = 0; p < points; ++p) {
+    const std::uint32_t sequence = index * points + p;
+    const glm::dvec4 sample = sobol4(sequence, half_key);
+    batch.points.push_back(
+        hemicubeAt(light.point(sample.x, sample.y), light.normal, sample.z, mixKeys(half_key, sequence)));
+  }
+  batch.gather.push_back(shot);
+}
+
+}  // namespace radiosity::solver

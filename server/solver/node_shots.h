@@ -1,0 +1,50 @@
+// Shots of unit radiosity from the nodes of quadtrees and from light polygons. Pure functions of the seed, the node and
+// the number of the sample: whoever asks again gets the same shot. One thread.
+#pragma once
+
+#include <cstdint>
+
+#include "server/solver/lights.h"
+#include "server/solver/outlines.h"
+#include "server/solver/side.h"
+#include "server/solver/transport.h"
+
+namespace radiosity::solver {
+
+/// A place on a surface as the standing point of a hemicube; `rotation` in [0, 1).
+[[nodiscard]] HemicubeFrame hemicubeAt(const glm::vec3& origin, const glm::vec3& normal, double rotation,
+                                       std::uint64_t key);
+
+class NodeShots {
+ public:
+  NodeShots(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed)
+      : patches_(patches), sides_(sides), outlines_(patches), seed_(seed) {}
+
+  /// Nodes of planar surfaces shoot as polygons, gathered; others from one point, scattered.
+  [[nodiscard]] bool gathers(const NodePlace& node) const {
+    return patches_.surfaces[sides_[node.side].surface].planar;
+  }
+  /// All of the node's polygon is covered and not buried.
+  [[nodiscard]] bool isWhole(const NodePlace& node) const;
+  [[nodiscard]] std::uint64_t key(const NodePlace& node) const;
+
+  /// Appends sample `index` of `half`, from `points` points; a gather or a scatter shot.
+  void add(const NodePlace& node, std::size_t half, std::uint32_t index, std::uint32_t points, std::uint32_t resolution,
+           ShotBatch& batch) const;
+  void add(const LightPolygon& light, std::size_t half, std::uint32_t index, std::uint32_t points,
+           std::uint32_t resolution, ShotBatch& batch) const;
+
+ private:
+  void addGather(const NodePlace& node, std::size_t half, std::uint32_t index, std::uint32_t points,
+                 std::uint32_t resolution, ShotBatch& batch) const;
+  void addScatter(const NodePlace& node, std::size_t half, std::uint32_t index, std::uint32_t resolution,
+                  ShotBatch& batch) const;
+  [[nodiscard]] std::uint32_t leafByArea(const NodePlace& node, double& u, double& v) const;
+
+  const scene::PatchScene& patches_;
+  const std::vector<Side>& sides_;
+  Outlines outlines_;
+  std::uint64_t seed_;
+};
+
+}  // namespace radiosity::solver

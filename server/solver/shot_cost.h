@@ -1,0 +1,23 @@
+// About how long shots take, to cut work into pieces of similar length. Pure values.
+#pragma once
+
+#include "server/solver/transport.h"
+
+namespace radiosity::solver {
+
+/// In pixels of visibility, and what takes as long as so many.
+struct ShotCost {
+  double triangles;  ///< of the scene: culling and drawing one costs about as much as kTrianglePixels
+
+  static constexpr double kTrianglePixels = 4.0;
+  [[nodiscard]] double operator()(const ScatterShot& shot) const { return hemicube(shot.resolution); }
+  [[nodiscard]] double operator()(const GatherShot& shot) const { return shot.point_count * hemicube(shot.resolution); }
+
+ private:
+  /// A top face of N x N pixels and four half faces.
+  [[nodiscard]] double hemicube(double resolution) const {
+    return 3.0 * resolution * resolution + kTrianglePixels * triangles;
+  }
+};
+
+}  // namespace radiosity::solver

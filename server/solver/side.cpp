@@ -1,0 +1,41 @@
+#include "server/solver/side.h"
+
+#include <algorithm>
+
+namespace radiosity::solver {
+
+std::vector<Side> makeSides(const scene::PatchScene& patches) {
+  std::vector<Side> sides;
+  std::uint32_t values = 0;
+  for (std::uint32_t s = 0; s < patches.surfaces.size(); ++s) {
+    const auto& surface = patches.surfaces[s];
+    for (std::uint32_t face = 0; face < 2; ++face) {
+      if (surface.first_node[face] == scene::kNone) continue;
+      Side side;
+      side.surface = s;
+      side.side = face;
+      side.first_node = surface.first_node[face];
+      side.width = surface.width;
+      side.height = surface.height;
+      side.level_count = surface.level_count;
+      side.leaf_count = surface.width * surface.height;
+      side.node_count = scene::levelGrid(side.width, side.height, side.level_count).offset;
+      side.first_value = values;
+      values += side.leaf_count;
+      sides.push_back(side);
+    }
+  }
+  return sides;
+}
+
+LeafRect leafRect(const Side& side, const NodePlace& node) {
+  return {node.x << node.level, node.y << node.level, std::min((node.x + 1) << node.level, side.width),
+          std::min((node.y + 1) << node.level, side.height)};
+}
+
+std::uint32_t nodeId(const Side& side, const NodePlace& node) {
+  const auto grid = scene::levelGrid(side.width, side.height, node.level);
+  return side.first_node + grid.offset + node.y * grid.width + node.x;
+}
+
+}  // namespace radiosity::solver

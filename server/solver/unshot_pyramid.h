@@ -1,0 +1,35 @@
+// What every node still has to shoot: net flux and what varies inside, pulled up from the leaves. Plain values; one
+// thread.
+#pragma once
+
+#include <glm/vec3.hpp>
+#include <span>
+#include <vector>
+
+#include "server/solver/side.h"
+
+namespace radiosity::solver {
+
+/// Sum of the magnitudes of the channels.
+[[nodiscard]] float channelSum(const glm::vec3& v);
+
+class UnshotPyramid {
+ public:
+  explicit UnshotPyramid(const scene::PatchScene& patches)
+      : patches_(patches), flux_(patches.nodeCount(), glm::vec3(0.0F)), rough_(patches.nodeCount(), 0.0F) {}
+
+  /// `unshot`: radiosity by leaf of the side.
+  void pull(const Side& side, std::span<const glm::vec3> unshot);
+
+  /// Unshot flux of the subtree per channel, signed: what the node would shoot as one.
+  [[nodiscard]] const glm::vec3& flux(std::uint32_t node) const { return flux_[node]; }
+  /// Sum of |unshot| area over the leaves of the subtree, all channels.
+  [[nodiscard]] float rough(std::uint32_t node) const { return rough_[node]; }
+
+ private:
+  const scene::PatchScene& patches_;
+  std::vector<glm::vec3> flux_;
+  std::vector<float> rough_;
+};
+
+}  // namespace radiosity::solver

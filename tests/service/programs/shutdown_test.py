@@ -1,0 +1,121 @@
+"""The server's end while it is at work. No claim about seconds: what must hold is that the end comes (a hang is caught
+by the harness's 20 s), with status 0, the promised words to the clients, and no process left."""
+import asyncio
+import os
+import pathlib
+import signal
+import struct
+import unittest
+
+import websockets
+
+import plates
+from harness import ServiceCase, marked_processes
+from wire import Session
+
+ENDLESS = ("--error", 1e-6, "--texels", 20000, "--workers", 2)
+
+
+def grid_document(cells):
+    """A floor of cells x cells quads: some seconds to load."""
+    side = cells + 1
+    positions = b"".join(struct.pack("<3f", x / cells, 0.01 * ((x + z) % 2), z / cells)
+                         for z in range(side) for x in range(side))
+    indices = b"".join(struct.pack("<6I", a, a + side, a + side + 1, a, a + side + 1, a + 1)
+                       for z in range(cells) for a in range(z * side, z * side + cells))
+    return {
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "accessors": [
+            {"bufferView": 0, "count": side * side, "componentType": 5126, "type": "VEC3", "min": [0, 0, 0],
+             "max": [1, 0.01, 1]},
+            {"bufferView": 1, "count": 6 * cells * cells, "componentType": 5125, "type": "SCALAR"}],
+        "bufferViews": [{"buffer": 0, "byteLength": len(positions)},
+                        {"buffer": 0, "byteOffset": len(positions), "byteLength": len(indices)}],
+        "buffers": [{"byteLength": len(positions) + len(indices)}],
+    }, positions + indices
+
+
+class ShutdownTest(ServiceCase):
+    def setUp(self):
+        super().setUp()
+        self.scene = self.folder / "plates.glb"
+        plates.write_glb(self.scene, plates.lit_document())
+
+    def run_async(self, coroutine):
+        return asyncio.run(asyncio.wait_for(coroutine, 120))
+
+    async def state_reached(self, session, wanted):
+        while (await session.call("status"))["state"] != wanted:
+            await asyncio.sleep(0.02)
+
+    def workers(self, server):
+        found = []
+        for task in pathlib.Path(f"/proc/{server.process.pid}/task").iterdir():
+            found += [int(pid) for pid in (task / "children").read_text().split()]
+        return found
+
+    def test_solvingServerSaysGoodbyeAndIsGoneWithItsWorkers(self):
+        for number in (signal.SIGINT, signal.SIGTERM):
+            server = self.server(self.scene, *ENDLESS)
+
+            async def body():
+                session = await Session.open(server.url)
+                await self.state_reached(session, "solving")
+                self.assertEqual(len(self.workers(server)), 2)
+                server.process.send_signal(number)
+                self.assertIn("graceMs", (await session.note("draining"))["params"])
+                with self.assertRaises(websockets.ConnectionClosed):
+                    while True:
+                        await session.receive()
+                self.assertEqual(session.socket.close_code, 1001)
+
+            self.run_async(body())
+            self.assertEqual(server.wait(20), 0, server.log())
+            self.assertEqual(marked_processes(self.mark), [])
+
+    def test_solvingServerNeedsNoClientToEnd(self):
+        server = self.server(self.scene, *ENDLESS)
+
+        async def body():
+            session = await Session.open(server.url)
+            await self.state_reached(session, "solving")
+            await session.close()
+
+        self.run_async(body())
+        self.assertEqual(server.terminate(), 0, server.log())
+        self.assertEqual(marked_processes(self.mark), [])
+
+    def test_hungWorkersDoNotKeepTheServer(self):
+        server = self.server(self.scene, *ENDLESS)
+
+        async def body():
+            session = await Session.open(server.url)
+            await self.state_reached(session, "solving")
+            for worker in self.workers(server):
+                os.kill(worker, signal.SIGSTOP)
+            await asyncio.sleep(0.5)  # they owe an answer by now
+            await session.close()
+
+        self.run_async(body())
+        self.assertEqual(server.terminate(), 0, server.log())
+        self.assertEqual(marked_processes(self.mark), [])
+
+    def test_loadingServerEnds(self):
+        document, buffer = grid_document(400)
+        plates.write_glb(self.folder / "grid.glb", document, buffer)
+        server = self.server(self.folder / "grid.glb", *ENDLESS)
+
+        async def body():
+            session = await Session.open(server.url)
+            while (await session.call("status"))["state"] == "empty":
+                await asyncio.sleep(0.005)
+            await session.close()
+
+        self.run_async(body())
+        self.assertEqual(server.terminate(), 0, server.log())
+        self.assertNothingLeft()
+
+
+if __name__ == "__main__":
+    unittest.main()
