@@ -61,6 +61,7 @@ void memory(benchmark::State& state) {
       return solver::TransportCounters{};
     }
     [[nodiscard]] std::string description() const override { return "none"; }
+    [[nodiscard]] std::shared_ptr<const scene::PatchScene> scene() const override { return nullptr; }
   } transport;
   (void)importedScene(state.range(0));
   double scene_bytes = 0, material_bytes = 0, solver_bytes = 0, leaves = 1, nodes = 1;
@@ -72,7 +73,7 @@ void memory(benchmark::State& state) {
     const auto with_scene = heapBytes();
     const auto materials = scene::shadePatches(importedScene(state.range(0)), *patches);
     const auto with_materials = heapBytes();
-    const solver::Solver solver(patches, materials, transport, {});
+    const auto solver = solver::makeSolver(patches, materials, transport, {});
     solver_bytes = static_cast<double>(heapBytes() - with_materials);
     material_bytes = static_cast<double>(with_materials - with_scene);
     scene_bytes = static_cast<double>(with_scene - before);
