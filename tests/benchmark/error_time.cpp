@@ -153,7 +153,7 @@ int main(int argc, char** argv) {
   CLI::App app{
       "Error of `radiosity solve` against time, judged by an independent path tracer, beside Cycles where Blender is "
       "installed. Without scenes: three built-in ones, some minutes; with --full all built-in ones and those in "
-      "../shared/scenes, about an hour. References are kept in the build folder."};
+      "../shared/scenes, about half an hour. References are kept in the build folder."};
   app.add_option("SCENE", options.scenes, "files, or names of built-in or shared scenes");
   app.add_flag("--full", options.full, "all scenes, all times, finer references");
   app.add_option("--times", series.times, "limits of solve time in seconds; quick: 0.1 to 4")
