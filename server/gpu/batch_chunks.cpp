@@ -46,7 +46,8 @@ std::vector<Chunk> cutBatch(const solver::ShotBatch& batch, std::size_t triangle
   return chunks;
 }
 
-std::vector<std::byte> packChunk(const solver::ShotBatch& batch, const Chunk& chunk, std::uint64_t id, bool measure) {
+std::vector<std::byte> packChunk(const solver::ShotBatch& batch, const Chunk& chunk, std::uint64_t id,
+                                 bool measure) {
   std::vector<solver::GatherShot> gather;
   std::vector<solver::HemicubeFrame> points;
   std::span<const solver::ScatterShot> scatter;

@@ -207,7 +207,8 @@ int LinkSystem::solveHalf(std::size_t half) {
                        ? reflectance_mean_[m][i] * dot(matrix_[half][row.first].data(), sent[c].data(), count)
                        : dot(matrix_[half][row.first + c].data(), sent[c].data(), count);
       }
-      const glm::vec3 above = shooter.parent == scene::kNone ? glm::vec3(0.0F) : shooters_[shooter.parent].mean[half];
+      const glm::vec3 above =
+          shooter.parent == scene::kNone ? glm::vec3(0.0F) : shooters_[shooter.parent].mean[half];
       const glm::vec3 next = mean - above;
       change += static_cast<double>(channelSum(next - shooter.sent[half])) * shooter.area;
       all += static_cast<double>(channelSum(next)) * shooter.area;

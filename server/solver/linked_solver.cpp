@@ -17,8 +17,7 @@ constexpr double kRefinement = 2.0;
 /// More refinements than this find nothing: everything is split to its leaves.
 constexpr double kMinShare = 1e-9;
 constexpr std::uint32_t kMaxRounds = 100'000;
-/// Short enough that nobody notices the wait, long enough that the workers' waiting for the last of them does not
-/// count.
+/// Short enough that nobody notices the wait, long enough that the workers' waiting for the last of them does not count.
 constexpr double kSliceSeconds = 0.06;
 
 }  // namespace
@@ -103,8 +102,7 @@ Result<void> LinkedSolver::measureSlice() {
   }
   measured_ += slice.size();
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  slice_ = static_cast<std::size_t>(
-      std::clamp(static_cast<double>(slice.size()) * kSliceSeconds / std::max(seconds, 1e-6), 8.0, 4096.0));
+  slice_ = static_cast<std::size_t>(std::clamp(static_cast<double>(slice.size()) * kSliceSeconds / std::max(seconds, 1e-6), 8.0, 4096.0));
   return {};
 }
 
@@ -255,8 +253,7 @@ void LinkedSolver::setMaterials(const scene::PatchMaterials& materials) {
     for (auto& shooter : system_.shooters()) {
       if (shooter.isLight()) continue;
       if (pass == 0) {
-        for (std::size_t half = 0; half < 2; ++half)
-          shooter.weight[half] = shooter.column[half].points() > 0.0 ? 1.0 : 0.0;
+        for (std::size_t half = 0; half < 2; ++half) shooter.weight[half] = shooter.column[half].points() > 0.0 ? 1.0 : 0.0;
       }
       shooter.mean.fill(glm::vec3(0.0F));
       shooter.sent.fill(glm::vec3(0.0F));
@@ -312,7 +309,8 @@ EnergyParts LinkedSolver::energy() const {
   }
   for (std::size_t c = 0; c < 3; ++c) {
     parts.unshot[c] -= lit[c];
-    parts.imbalance[c] = parts.emitted[c] - parts.absorbed[c] - parts.escaped[c] - parts.backface[c] - parts.unshot[c];
+    parts.imbalance[c] =
+        parts.emitted[c] - parts.absorbed[c] - parts.escaped[c] - parts.backface[c] - parts.unshot[c];
   }
   return parts;
 }

@@ -26,7 +26,7 @@ PlannerSettings plannerSettings(const SolverSettings& settings) {
 }  // namespace
 
 ShootingSolver::ShootingSolver(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
-                               solver::Transport& transport, const SolverSettings& settings)
+               solver::Transport& transport, const SolverSettings& settings)
     : state_(std::move(patches), materials),
       transport_(transport),
       settings_(settings),

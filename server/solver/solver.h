@@ -40,8 +40,7 @@ class Solver {
  public:
   virtual ~Solver() = default;
 
-  /// A slice of a wave: some 10 to 100 ms of work. On an error of the transport the caller starts over with a new
-  /// Solver.
+  /// A slice of a wave: some 10 to 100 ms of work. On an error of the transport the caller starts over with a new Solver.
   [[nodiscard]] virtual Result<StepOutcome> step() = 0;
 
   /// Emission or reflectance changed: nothing is invalidated; shooting goes on.
