@@ -42,6 +42,8 @@ json params(const SolveConfigureCall& c) {
   if (c.texels) out["texels"] = *c.texels;
   if (c.texel_size_m) out["texelSize"] = *c.texel_size_m;
   if (c.seed) out["seed"] = *c.seed;
+  if (c.sky) out["sky"] = toJson(*c.sky);
+  if (c.no_sky) out["sky"] = nullptr;
   return out;
 }
 json params(const SolveWaitCall& c) {
@@ -122,6 +124,9 @@ void read(Reader& r, SolveConfigureCall& c) {
   r.optionalInteger("texels", c.texels, 1, kMaxTexels);
   r.optionalNumber("texelSize", c.texel_size_m, kTexelSizeRange);
   r.optionalInteger("seed", c.seed, 0, std::numeric_limits<std::uint64_t>::max());
+  const auto* sky = r.find("sky");
+  c.no_sky = sky != nullptr && sky->is_null();
+  readSky(r, c.sky);
 }
 void read(Reader& r, SolveWaitCall& c) {
   r.optionalNumber("error", c.error, kErrorRange);

@@ -9,7 +9,34 @@ json toJson(const Settings& s) {
           {"timeLimitMs", s.time_limit_ms ? json(*s.time_limit_ms) : json(nullptr)},
           {"texels", s.texels},
           {"texelSize", s.texel_size_m},
-          {"seed", s.seed}};
+          {"seed", s.seed},
+          {"sky", s.sky ? toJson(*s.sky) : json(nullptr)}};
+}
+
+json toJson(const Sky& sky) { return {{"upper", sky.upper}, {"lower", sky.lower}}; }
+
+void read(Reader& r, Sky& sky) {
+  const auto color = [&](const char* key, Need need, std::array<double, 3>& out) {
+    std::size_t count = 0;
+    r.array(key, need, 3, [&](const json& value, const std::string& pointer) {
+      const double number = value.is_number() ? value.get<double>() : -1.0;
+      if (number >= 0.0 && number <= kMaxSkyNits) {
+        out[count++] = number;
+      } else {
+        r.refuse(pointer, "must be a number in [0, 1e12]");
+      }
+    });
+    if (r.find(key) != nullptr && count != 3) r.refuse(r.pointerOf(key), "must have 3 elements");
+  };
+  color("upper", Need::kRequired, sky.upper);
+  sky.lower = sky.upper;
+  color("lower", Need::kOptional, sky.lower);
+}
+
+void readSky(Reader& r, std::optional<Sky>& sky) {
+  const auto* given = r.find("sky");
+  if (given == nullptr || given->is_null()) return;
+  r.object("sky", Need::kOptional, [&](Reader& inner) { read(inner, sky.emplace()); });
 }
 
 void read(Reader& r, Settings& s) {
@@ -19,6 +46,7 @@ void read(Reader& r, Settings& s) {
   r.integer("texels", s.texels, Need::kRequired, 0, kAnyInteger);
   r.number("texelSize", s.texel_size_m, Need::kOptional, {});
   r.integer("seed", s.seed, Need::kOptional, 0, std::numeric_limits<std::uint64_t>::max());
+  readSky(r, s.sky);
 }
 
 json toJson(const Progress& p) {

@@ -17,7 +17,10 @@ inline constexpr const char* kQuantityNames = "irradiance, radiosity, error, pat
 
 [[nodiscard]] nlohmann::json toJson(const Settings& settings);
 [[nodiscard]] nlohmann::json toJson(const Progress& progress);
+[[nodiscard]] nlohmann::json toJson(const Sky& sky);
 void read(Reader& reader, Settings& settings);
+/// Member "sky"; none where it is missing or null.
+void readSky(Reader& reader, std::optional<Sky>& sky);
 void read(Reader& reader, Progress& progress);
 
 void readStrings(Reader& reader, const char* key, Need need, std::size_t max, std::vector<std::string>& out);

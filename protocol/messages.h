@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "protocol/limits.h"
+#include "protocol/sky.h"
 
 namespace radiosity::protocol {
 
@@ -46,6 +47,7 @@ struct Settings {
   std::uint64_t texels = 16'000;               ///< used when texel_size_m is 0
   double texel_size_m = 0.0;
   std::uint64_t seed = 1;
+  std::optional<Sky> sky;  ///< none: JSON null
 };
 
 struct PageInfo {
@@ -160,6 +162,8 @@ struct SolveConfigureCall {
   std::optional<std::uint64_t> texels = {};
   std::optional<double> texel_size_m = {};
   std::optional<std::uint64_t> seed = {};
+  std::optional<Sky> sky = {};
+  bool no_sky = false;  ///< "sky": null
 };
 struct SolvePauseCall {
   static constexpr std::string_view kMethod = "solve.pause";

@@ -6,11 +6,13 @@
 #include <fstream>
 #include <utility>
 
+#include "protocol/sky.h"
+
 namespace radiosity {
 namespace {
 
 struct Raw {
-  std::string listen = "127.0.0.1:8765", token_file;
+  std::string listen = "127.0.0.1:8765", token_file, sky;
   double time_limit_s = 0.0;
 };
 
@@ -61,6 +63,10 @@ void addSolveOptions(CLI::App& app, Options& o, Raw& raw) {
   app.add_option("--workers", o.workers, "Renderer processes; 0: one for each core in software, one on a GPU")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
+  app.add_option("--sky", raw.sky,
+                 "Radiance of everything outside the scene, nits: 1000, or R,G,B, or R,G,B/R,G,B (above / below the "
+                 "horizon); for scenes without a sky of their own")
+      ->type_name("NITS");
   app.add_flag("--paper-mode", o.solve.paper_mode, "Lum, Ma and Max 2002 to the letter, for comparisons");
 }
 
@@ -86,6 +92,12 @@ void addServerOptions(CLI::App& app, Options& o, Raw& raw) {
 
 Result<void> finish(Options& o, const Raw& raw) {
   if (raw.time_limit_s > 0.0) o.solve.time_limit_s = raw.time_limit_s;
+  if (!raw.sky.empty()) {
+    const auto sky = protocol::parseSky(raw.sky);
+    if (!sky) return tl::unexpected(sky.error());
+    const auto color = [](const std::array<double, 3>& c) { return glm::vec3(c[0], c[1], c[2]); };
+    o.solve.sky = {color(sky->upper), color(sky->lower)};
+  }
   if (auto listen = readListen(raw.listen, o.server); !listen) return listen;
   if (raw.token_file.empty()) return {};
   auto token = readToken(raw.token_file);

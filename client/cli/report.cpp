@@ -21,7 +21,8 @@ json settingsJson(const protocol::Settings& settings) {
                                         static_cast<double>(settings.time_limit_ms.value_or(0)) / 1000.0)},
           {"texels", settings.texels},
           {"texel_size_m", settings.texel_size_m},
-          {"seed", settings.seed}};
+          {"seed", settings.seed},
+          {"sky", settings.sky ? json{{"upper", settings.sky->upper}, {"lower", settings.sky->lower}} : json(nullptr)}};
 }
 
 std::string stateWord(const std::string& state) { return state == "timeLimit" ? "time limit" : state; }

@@ -26,7 +26,7 @@ constexpr auto kInterruptGrace = 500ms;
 constexpr auto kEndGrace = 300ms;  // a dying process closes its sockets before it can be waited for
 
 struct SolveOptions {
-  std::string scene, output, report, png;
+  std::string scene, output, report, png, sky;
   RemoteOptions server;
   double error = 0.02;
   double time_limit_s = 0.0;  ///< 0: none
@@ -72,6 +72,11 @@ class Solve {
   }
 
   Result<void> checkInputs() {
+    if (!options_.sky.empty()) {
+      auto sky = protocol::parseSky(options_.sky);
+      if (!sky) return tl::unexpected(sky.error());
+      sky_ = *sky;
+    }
     const auto kind = sceneKind(options_.scene);
     if (!kind) return tl::unexpected(kind.error());
     if (const auto stem = glbStem(options_.output); !stem) return tl::unexpected(stem.error());
@@ -115,7 +120,9 @@ class Solve {
                                       .no_time_limit = options_.time_limit_s <= 0.0,
                                       .texels = options_.texels,
                                       .texel_size_m = options_.texel_size_m,
-                                      .seed = options_.seed};
+                                      .seed = options_.seed,
+                                      .sky = sky_,
+                                      .no_sky = !sky_};
     constexpr double kMillisecondsPerSecond = 1000.0;
     if (!call.no_time_limit)
       call.time_limit_ms = static_cast<std::uint64_t>(std::llround(options_.time_limit_s * kMillisecondsPerSecond));
@@ -245,6 +252,7 @@ class Solve {
   ProgressDisplay display_;
   std::optional<ServerProcess> server_;
   Remote remote_;
+  std::optional<protocol::Sky> sky_;
   bool by_path_ = false;        ///< the private server reads the scene itself
   std::uint64_t revision_ = 0;  ///< of our scene; 0: not known
   bool ask_now_ = false, replaced_ = false;
@@ -291,6 +299,11 @@ void addSolve(CLI::App& app, Run& run) {
   command.add_option("--seed", options->seed, "the same seed gives the same bits")
       ->type_name("N")
       ->capture_default_str();
+  command
+      .add_option("--sky", options->sky,
+                  "light from outside, in nits: 1000, or R,G,B, or R,G,B/R,G,B (above / below the horizon); for scenes "
+                  "without a sky of their own")
+      ->type_name("NITS");
   auto* workers =
       command.add_option("--workers", options->workers, "render processes of the private server (default: one a core)")
           ->check(CLI::Range(1U, 256U).description(""))

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
 #include <map>
 #include <memory>
 #include <optional>
@@ -32,13 +33,20 @@ struct EnergyBalance {
   double imbalance = 0.0;
 };
 
+/// Radiance of everything outside the scene, nits: above the horizon (+Y), and below it.
+struct SkySetting {
+  glm::vec3 upper{0.0F}, lower{0.0F};
+  bool operator==(const SkySetting&) const = default;
+};
+
 struct SolveSettings {
   double target_error = 0.02;          ///< relative; stops when the estimate reaches it
   std::optional<double> time_limit_s;  ///< solve time
   std::uint64_t texels = 16'000;       ///< leaf patches in all, about; used when texel_size_m is 0
   double texel_size_m = 0.0;
   std::uint64_t seed = 1;
-  bool paper_mode = false;  ///< Lum, Ma and Max 2002 to the letter (server option, comparisons)
+  std::optional<SkySetting> sky;  ///< for scenes that have none of their own
+  bool paper_mode = false;        ///< Lum, Ma and Max 2002 to the letter (server option, comparisons)
 };
 
 struct Status {

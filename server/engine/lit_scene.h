@@ -24,7 +24,8 @@ class LitScene {
   /// Gives the geometry to the transport; must come before the solver's first step.
   [[nodiscard]] Result<void> upload() const { return transport_.setScene(patches_); }
 
-  /// What a patch would do. kShading: emission and reflectance only; kNothing: names, extras, cameras; else kGeometry.
+  /// What a patch would do. kShading: emission and reflectance of surfaces; kNothing: no surface (names, extras,
+  /// cameras, and lights and the sky, which reshade() looks at itself); else kGeometry.
   enum class Change { kNothing, kShading, kGeometry };
   [[nodiscard]] Change changeTo(const scene::Document& next) const;
 
@@ -49,6 +50,9 @@ class LitScene {
     solver_->setTargetError(settings.target_error);
   }
 
+  /// Another sky for scenes that have none of their own. True: it changes the light.
+  bool setSky(const SolveSettings& settings);
+
   /// Finished pages of the solver's present irradiance (filled, stitched, dilated).
   [[nodiscard]] std::vector<scene::LightmapPage> pages() const;
   /// The same of the estimated sampling error, relative to the irradiance.
@@ -58,7 +62,9 @@ class LitScene {
   LitScene(scene::Document document, const SolveSettings& settings, solver::Transport& transport)
       : document_(std::move(document)), settings_(settings), transport_(transport) {}
   void makeSolver();
-  [[nodiscard]] double emittedPower(const scene::PatchMaterials& materials) const;
+  void updateSolver(bool materials, bool lights);
+  [[nodiscard]] double emittedPower() const;
+  [[nodiscard]] solver::LightSources lightSources() const;
 
   scene::Document document_;
   SolveSettings settings_;
@@ -67,7 +73,9 @@ class LitScene {
   std::shared_ptr<const scene::PatchScene> patches_;
   scene::PatchMaterials materials_;
   std::unique_ptr<solver::Solver> solver_;
-  double solver_power_ = 0.0;  // emitted power the solver's flux scale was chosen for
+  solver::LightSources sources_;  // that the solver knows of
+  double power_ = 0.0;            // emitted, all channels
+  double solver_power_ = 0.0;     // emitted power the solver's flux scale was chosen for
 };
 
 }  // namespace radiosity::engine

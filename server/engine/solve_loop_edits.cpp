@@ -126,8 +126,12 @@ Result<SolveSettings> SolveLoop::applySettings(const SolveSettings& settings) {
     beginSolve();
   } else {
     lit_->retarget(settings);
-    reconsiderStop();
-    updateStatus(true);
+    if (before.sky != settings.sky && lit_->setSky(settings)) {
+      beginSolve();
+    } else {
+      reconsiderStop();
+      updateStatus(true);
+    }
   }
   return settings_;
 }

@@ -20,6 +20,8 @@ void addCounters(const LitScene& lit, Status& status) {
   counters["scatter.shots"] = static_cast<double>(transport.scatter_shots);
   counters["scatter.links"] = static_cast<double>(transport.links);
   counters["gather.points"] = static_cast<double>(transport.gather_points);
+  counters["lights.pointImages"] = static_cast<double>(transport.point_images);
+  counters["lights.parallelImages"] = static_cast<double>(transport.parallel_images);
   counters["pixels"] = static_cast<double>(transport.pixels);
   counters["triangles.drawn"] = static_cast<double>(transport.triangles_drawn);
   counters["triangles.culled"] = static_cast<double>(transport.triangles_culled);

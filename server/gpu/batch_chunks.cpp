@@ -17,16 +17,54 @@ constexpr double kChunksPerWorker = 8.0;
 constexpr std::size_t kMaxShots = 64;
 
 template <typename Shot>
-void cut(const std::vector<Shot>& shots, bool gather, double target, const solver::ShotCost& cost,
+void cut(const std::vector<Shot>& shots, ShotKind kind, double target, const solver::ShotCost& cost,
          std::vector<Chunk>& chunks) {
   double sum = 0.0;
   std::size_t first = 0;
   for (std::size_t i = 0; i < shots.size(); ++i) {
     sum += cost(shots[i]);
     if (sum < target && i + 1 < shots.size() && i + 1 - first < kMaxShots) continue;
-    chunks.push_back({gather, first, i + 1 - first, sum});
+    chunks.push_back({kind, first, i + 1 - first, sum});
     first = i + 1;
     sum = 0.0;
+  }
+}
+
+/// What a chunk refers to, gathered into arrays of its own.
+struct Packed {
+  std::vector<solver::GatherShot> gather;
+  std::vector<solver::HemicubeFrame> points;
+  std::vector<solver::ParallelShot> parallel;
+  std::vector<solver::ParallelView> views;
+};
+
+/// The directions of a sky come once, even where several shots of the chunk are parts of it.
+void packParallel(const solver::ShotBatch& batch, const Chunk& chunk, Packed& packed) {
+  std::uint32_t sky_from = 0, sky_to = 0;
+  for (std::size_t i = chunk.first; i < chunk.first + chunk.count; ++i) {
+    auto shot = batch.parallel[i];
+    const bool sky = shot.sky_count > 0;
+    const auto from = sky ? shot.first_of_sky : shot.first_view;
+    const auto count = sky ? shot.sky_count : shot.view_count;
+    const bool known = sky && i > chunk.first && packed.parallel.back().sky_count > 0 && from == sky_from;
+    if (!known) {
+      sky_from = from;
+      sky_to = static_cast<std::uint32_t>(packed.views.size());
+      packed.views.insert(packed.views.end(), batch.views.begin() + from, batch.views.begin() + from + count);
+    }
+    shot.first_view = shot.first_view - from + sky_to;
+    if (sky) shot.first_of_sky = sky_to;
+    packed.parallel.push_back(shot);
+  }
+}
+
+void packGather(const solver::ShotBatch& batch, const Chunk& chunk, Packed& packed) {
+  for (std::size_t i = chunk.first; i < chunk.first + chunk.count; ++i) {
+    auto shot = batch.gather[i];
+    const auto first = batch.points.begin() + shot.first_point;
+    shot.first_point = static_cast<std::uint32_t>(packed.points.size());
+    packed.points.insert(packed.points.end(), first, first + shot.point_count);
+    packed.gather.push_back(shot);
   }
 }
 
@@ -37,44 +75,47 @@ std::vector<Chunk> cutBatch(const solver::ShotBatch& batch, std::size_t triangle
   double total = 0.0;
   for (const auto& shot : batch.scatter) total += cost(shot);
   for (const auto& shot : batch.gather) total += cost(shot);
+  for (const auto& shot : batch.point_lights) total += cost(shot);
+  for (const auto& shot : batch.parallel) total += cost(shot);
   // Small batches still give every worker something to do.
   const double share = total / static_cast<double>(workers);
   const double target = std::min(std::max(kMinChunkCost, share / kChunksPerWorker), share);
   std::vector<Chunk> chunks;
-  cut(batch.gather, true, target, cost, chunks);
-  cut(batch.scatter, false, target, cost, chunks);
+  cut(batch.gather, ShotKind::kGather, target, cost, chunks);
+  cut(batch.parallel, ShotKind::kParallel, target, cost, chunks);
+  cut(batch.point_lights, ShotKind::kPoint, target, cost, chunks);
+  cut(batch.scatter, ShotKind::kScatter, target, cost, chunks);
   return chunks;
 }
 
 std::vector<std::byte> packChunk(const solver::ShotBatch& batch, const Chunk& chunk, std::uint64_t id,
                                  bool measure) {
-  std::vector<solver::GatherShot> gather;
-  std::vector<solver::HemicubeFrame> points;
+  Packed packed;
   std::span<const solver::ScatterShot> scatter;
-  if (chunk.gather) {
-    for (std::size_t i = chunk.first; i < chunk.first + chunk.count; ++i) {
-      auto shot = batch.gather[i];
-      const auto first = batch.points.begin() + shot.first_point;
-      shot.first_point = static_cast<std::uint32_t>(points.size());
-      points.insert(points.end(), first, first + shot.point_count);
-      gather.push_back(shot);
-    }
-  } else {
-    scatter = std::span(batch.scatter).subspan(chunk.first, chunk.count);
-  }
+  std::span<const solver::PointShot> point_lights;
+  if (chunk.kind == ShotKind::kScatter) scatter = std::span(batch.scatter).subspan(chunk.first, chunk.count);
+  if (chunk.kind == ShotKind::kPoint) point_lights = std::span(batch.point_lights).subspan(chunk.first, chunk.count);
+  if (chunk.kind == ShotKind::kGather) packGather(batch, chunk, packed);
+  if (chunk.kind == ShotKind::kParallel) packParallel(batch, chunk, packed);
   ChunkBody head;
   head.chunk = id;
   head.flux_scale = batch.flux_scale;
   head.mode = static_cast<std::uint32_t>(batch.mode);
   head.measure = measure ? 1 : 0;
   head.scatter = static_cast<std::uint32_t>(scatter.size());
-  head.gather = static_cast<std::uint32_t>(gather.size());
-  head.points = static_cast<std::uint32_t>(points.size());
+  head.gather = static_cast<std::uint32_t>(packed.gather.size());
+  head.points = static_cast<std::uint32_t>(packed.points.size());
+  head.point_lights = static_cast<std::uint32_t>(point_lights.size());
+  head.parallel = static_cast<std::uint32_t>(packed.parallel.size());
+  head.views = static_cast<std::uint32_t>(packed.views.size());
   std::vector<std::byte> body;
   appendValue(body, head);
   appendSpan(body, scatter);
-  appendSpan(body, std::span<const solver::GatherShot>(gather));
-  appendSpan(body, std::span<const solver::HemicubeFrame>(points));
+  appendSpan(body, std::span<const solver::GatherShot>(packed.gather));
+  appendSpan(body, std::span<const solver::HemicubeFrame>(packed.points));
+  appendSpan(body, point_lights);
+  appendSpan(body, std::span<const solver::ParallelShot>(packed.parallel));
+  appendSpan(body, std::span<const solver::ParallelView>(packed.views));
   return body;
 }
 

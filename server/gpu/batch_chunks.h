@@ -8,9 +8,11 @@
 
 namespace radiosity::gpu {
 
+enum class ShotKind { kScatter, kGather, kPoint, kParallel };
+
 /// Consecutive shots of one kind.
 struct Chunk {
-  bool gather = false;
+  ShotKind kind = ShotKind::kScatter;
   std::size_t first = 0, count = 0;
   double cost = 0.0;  ///< pixels, and what takes as long as so many
 };

@@ -85,7 +85,8 @@ ClosedSolids findClosedSolids(const scene::PatchScene& patches) {
   std::vector<double> volume(triangles, 0.0);
   for (std::uint32_t i = 0; i < triangles; ++i) {
     const auto part = parts.find(i);
-    if (open[i]) part_open[part] = true;
+    const bool see_through = patches.surfaces[patches.triangle_surface[i]].see_through;
+    if (open[i] || see_through) part_open[part] = true;
     const auto corner = [&](std::size_t c) {
       return glm::dvec3(patches.vertices[patches.indices[std::size_t{3} * i + c]].position);
     };

@@ -107,6 +107,10 @@ void fill(const Buffer& buffer, std::span<const T> values, GLenum usage) {
   glNamedBufferData(buffer.name(), static_cast<GLsizeiptr>(values.size_bytes()), values.data(), usage);
 }
 
+/// The #define of the variants for scenes that one can see through in places: see_through.frag goes in front of the
+/// fragment shader, and GpuScene::bindOpacity must come before drawing.
+inline constexpr const char* kSeeThrough = "SEE_THROUGH";
+
 /// Compiles and links embedded shaders (by file name), with a #define for each of `defines`. kInternal with the
 /// driver's log on failure: a shader that does not compile is our bug or the driver's.
 [[nodiscard]] Result<Program> buildProgram(const EglContext& context, std::string_view vertex_shader,

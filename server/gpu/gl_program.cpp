@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <cstring>
 
@@ -15,9 +16,10 @@ const char* findShader(std::string_view name) {
   detail::checkFailed(__FILE__, __LINE__, "no embedded shader " + std::string(name));
 }
 
-Result<GLuint> compile(GLenum kind, std::string_view name, const std::string& preamble) {
+/// `before`: source that goes in front of the shader's own.
+Result<GLuint> compile(GLenum kind, std::string_view name, const std::string& preamble, const char* before = "") {
   const GLuint shader = glCreateShader(kind);
-  const std::array<const char*, 4> sources{preamble.c_str(), kShaderConstants, "\n#line 1\n", findShader(name)};
+  const std::array<const char*, 5> sources{preamble.c_str(), kShaderConstants, before, "\n#line 1\n", findShader(name)};
   glShaderSource(shader, static_cast<GLsizei>(sources.size()), sources.data(), nullptr);
   glCompileShader(shader);
   GLint compiled = GL_FALSE;
@@ -40,7 +42,9 @@ Result<Program> buildProgram(const EglContext& context, std::string_view vertex_
   for (const auto& define : defines) preamble += "#define " + define + "\n";
   const auto vertex = compile(GL_VERTEX_SHADER, vertex_shader, preamble);
   if (!vertex) return tl::unexpected(vertex.error());
-  const auto fragment = compile(GL_FRAGMENT_SHADER, fragment_shader, preamble);
+  const bool see_through = std::find(defines.begin(), defines.end(), kSeeThrough) != defines.end();
+  const auto fragment =
+      compile(GL_FRAGMENT_SHADER, fragment_shader, preamble, see_through ? findShader("see_through.frag") : "");
   if (!fragment) {
     glDeleteShader(*vertex);
     return tl::unexpected(fragment.error());

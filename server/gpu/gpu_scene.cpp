@@ -1,5 +1,7 @@
 #include "server/gpu/gpu_scene.h"
 
+#include <algorithm>
+#include <array>
 #include <glm/vec4.hpp>
 #include <vector>
 
@@ -69,6 +71,9 @@ Result<GpuScene> GpuScene::upload(const EglContext& context, std::shared_ptr<con
   fill(gpu.vertices_, std::span<const Vertex>(vertices), GL_STATIC_DRAW);
   gpu.levels_ = Buffer(context, "level table");
   fill(gpu.levels_, std::span<const LevelEntry>(*levels), GL_STATIC_DRAW);
+  if (gpu.seeThrough()) {
+    if (auto done = gpu.uploadOpacity(context); !done) return tl::unexpected(done.error());
+  }
   gpu.vertex_array_ = VertexArray(context, "scene");
 
   const auto array = gpu.vertex_array_.name();
@@ -93,6 +98,33 @@ Result<GpuScene> GpuScene::upload(const EglContext& context, std::shared_ptr<con
   }
   glVertexArrayBindingDivisor(array, 1, 1);
   return gpu;
+}
+
+Result<void> GpuScene::uploadOpacity(const EglContext& context) {
+  const auto& scene = *patches_;
+  std::vector<std::array<std::uint32_t, 4>> grids;
+  for (const auto& surface : scene.surfaces) {
+    const auto scale = surface.opacity_scale;
+    grids.push_back(
+        {surface.first_opacity, surface.width * scale, surface.height * scale, surface.see_through ? scale : 0});
+  }
+  auto cells = scene.opacity;
+  cells.resize((cells.size() + 3) / 4 * 4, 255);
+  GLint64 most = 0;
+  glGetInteger64v(GL_MAX_SHADER_STORAGE_BLOCK_SIZE, &most);
+  if (static_cast<GLint64>(std::max(cells.size(), grids.size() * sizeof(grids[0]))) > most) {
+    return fail(ErrorCode::kTooLarge, "the opacity of surfaces does not fit the graphics memory; ask for fewer texels");
+  }
+  opacity_grids_ = Buffer(context, "opacity grids");
+  fill(opacity_grids_, std::span<const std::array<std::uint32_t, 4>>(grids), GL_STATIC_DRAW);
+  opacity_ = Buffer(context, "opacity");
+  fill(opacity_, std::span<const std::uint8_t>(cells), GL_STATIC_DRAW);
+  return {};
+}
+
+void GpuScene::bindOpacity() const {
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, RAD_BINDING_OPACITY_GRIDS, opacity_grids_.name());
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, RAD_BINDING_OPACITY, opacity_.name());
 }
 
 void GpuScene::bindLevels() const { glBindBufferBase(GL_SHADER_STORAGE_BUFFER, RAD_BINDING_LEVELS, levels_.name()); }

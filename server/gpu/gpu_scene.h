@@ -22,12 +22,16 @@ class GpuScene {
   [[nodiscard]] const std::shared_ptr<const scene::PatchScene>& sharedPatches() const { return patches_; }
   [[nodiscard]] GLuint vertexArray() const { return vertex_array_.name(); }
   void bindLevels() const;
+  /// Whether there is anything to see through; if so, programs with kSeeThrough must be used.
+  [[nodiscard]] bool seeThrough() const { return !patches_->opacity.empty(); }
+  void bindOpacity() const;
 
  private:
   GpuScene() = default;
+  [[nodiscard]] Result<void> uploadOpacity(const EglContext& context);
 
   std::shared_ptr<const scene::PatchScene> patches_;
-  Buffer vertices_, levels_;
+  Buffer vertices_, levels_, opacity_grids_, opacity_;
   VertexArray vertex_array_;
 };
 

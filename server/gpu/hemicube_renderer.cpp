@@ -17,27 +17,43 @@ constexpr std::size_t kMaxLayers = 256;
 
 }  // namespace
 
+Result<HemicubeRenderer::Programs> HemicubeRenderer::buildPrograms(const EglContext& context,
+                                                                   std::vector<std::string> defines) {
+  const auto build = [&](const char* fragment_shader, const char* define) {
+    auto all = defines;
+    if (define != nullptr) all.emplace_back(define);
+    return buildProgram(context, "hemicube.vert", fragment_shader, all);
+  };
+  auto nodes = build("hemicube_nodes.frag", "SCATTER");
+  if (!nodes) return tl::unexpected(nodes.error());
+  auto paper = build("hemicube_paper.frag", "PAPER");
+  if (!paper) return tl::unexpected(paper.error());
+  auto items = build("hemicube_items.frag", nullptr);
+  if (!items) return tl::unexpected(items.error());
+  return Programs{std::move(*nodes), std::move(*paper), std::move(*items)};
+}
+
 Result<HemicubeRenderer> HemicubeRenderer::create(const EglContext& context) {
   HemicubeRenderer renderer(context);
-  auto nodes = buildProgram(context, "hemicube.vert", "hemicube_nodes.frag", {"SCATTER"});
-  if (!nodes) return tl::unexpected(nodes.error());
-  auto paper = buildProgram(context, "hemicube.vert", "hemicube_paper.frag", {"PAPER"});
-  if (!paper) return tl::unexpected(paper.error());
-  auto items = buildProgram(context, "hemicube.vert", "hemicube_items.frag");
-  if (!items) return tl::unexpected(items.error());
-  renderer.nodes_program_ = std::move(*nodes);
-  renderer.paper_program_ = std::move(*paper);
-  renderer.items_program_ = std::move(*items);
+  auto programs = buildPrograms(context, {});
+  if (!programs) return tl::unexpected(programs.error());
+  renderer.opaque_ = std::move(*programs);
   renderer.views_buffer_ = Buffer(context, "hemicube views");
   renderer.indices_buffer_ = Buffer(context, "visible triangles");
   renderer.commands_buffer_ = Buffer(context, "draw commands");
   return renderer;
 }
 
-void HemicubeRenderer::setScene(GpuScene scene) {
+Result<void> HemicubeRenderer::setScene(GpuScene scene) {
+  if (scene.seeThrough() && !see_through_) {
+    auto programs = buildPrograms(*context_, {kSeeThrough});
+    if (!programs) return tl::unexpected(programs.error());
+    see_through_ = std::move(*programs);
+  }
   culler_ = TriangleCuller(scene.patches());
   scene_ = std::move(scene);
   paper_ids_.reset();
+  return {};
 }
 
 Result<void> HemicubeRenderer::preparePaper() {
@@ -129,17 +145,20 @@ void HemicubeRenderer::setState(HemicubePass pass, std::uint32_t resolution, con
 }
 
 void HemicubeRenderer::useProgram(HemicubePass pass) const {
+  const Programs& programs = scene_->seeThrough() ? *see_through_ : opaque_;
+  if (scene_->seeThrough()) scene_->bindOpacity();
   if (pass == HemicubePass::kNodes) {
-    glUseProgram(nodes_program_.name());
-    glProgramUniform1ui(nodes_program_.name(), RAD_UNIFORM_ABSORBED_ID, scene_->absorbedId());
+    glUseProgram(programs.nodes.name());
+    glProgramUniform1ui(programs.nodes.name(), RAD_UNIFORM_ABSORBED_ID, scene_->absorbedId());
     scene_->bindLevels();
   } else if (pass == HemicubePass::kPaper) {
-    glUseProgram(paper_program_.name());
-    glProgramUniform1ui(paper_program_.name(), RAD_UNIFORM_PATCH_BITS, paper_ids_->patchBits());
-    glProgramUniform1f(paper_program_.name(), RAD_UNIFORM_TEXEL_TO_UV, 1.0F / static_cast<float>(paper_ids_->size()));
+    const auto name = programs.paper.name();
+    glUseProgram(name);
+    glProgramUniform1ui(name, RAD_UNIFORM_PATCH_BITS, paper_ids_->patchBits());
+    glProgramUniform1f(name, RAD_UNIFORM_TEXEL_TO_UV, 1.0F / static_cast<float>(paper_ids_->size()));
     glBindTextureUnit(0, paper_texture_.name());
   } else {
-    glUseProgram(items_program_.name());
+    glUseProgram(programs.items.name());
   }
 }
 

@@ -34,7 +34,8 @@ class HemicubeRenderer {
  public:
   [[nodiscard]] static Result<HemicubeRenderer> create(const EglContext& context);
 
-  void setScene(GpuScene scene);
+  /// Fails when the driver does not compile the variant for scenes that one can see through.
+  [[nodiscard]] Result<void> setScene(GpuScene scene);
   /// Makes the ID texture, once a scene; must come before HemicubePass::kPaper.
   [[nodiscard]] Result<void> preparePaper();
   [[nodiscard]] const GpuScene& scene() const { return *scene_; }
@@ -66,7 +67,12 @@ class HemicubeRenderer {
   const EglContext* context_;
   std::optional<GpuScene> scene_;
   TriangleCuller culler_;
-  Program nodes_program_, paper_program_, items_program_;
+  struct Programs {
+    Program nodes, paper, items;
+  };
+  [[nodiscard]] static Result<Programs> buildPrograms(const EglContext& context, std::vector<std::string> defines);
+  Programs opaque_;
+  std::optional<Programs> see_through_;  ///< made for the first scene that needs them
   std::optional<PaperIds> paper_ids_;
   Texture paper_texture_;
   Buffer views_buffer_, indices_buffer_, commands_buffer_;

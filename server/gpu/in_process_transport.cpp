@@ -19,7 +19,7 @@ class InProcessTransport final : public solver::Transport {
 
   Result<solver::TransportCounters> run(const solver::ShotBatch& batch, solver::FluxAccumulators& into) override {
     const auto sink = store_.sink();
-    auto counters = runner_->run({batch.mode, batch.flux_scale, batch.scatter, batch.gather, batch.points}, sink);
+    auto counters = runner_->run(spanOf(batch), sink);
     if (counters) {
       sink.drainInto(into);
     } else {
@@ -30,7 +30,7 @@ class InProcessTransport final : public solver::Transport {
 
   Result<solver::TransportCounters> measure(const solver::ShotBatch& batch,
                                             std::vector<solver::LinkSample>& samples) override {
-    return runner_->measure({batch.mode, batch.flux_scale, batch.scatter, batch.gather, batch.points}, samples);
+    return runner_->measure(spanOf(batch), samples);
   }
 
   [[nodiscard]] std::string description() const override {

@@ -28,6 +28,8 @@
 
 // Shader storage bindings.
 #define RAD_BINDING_LEVELS 0
+#define RAD_BINDING_OPACITY_GRIDS 1
+#define RAD_BINDING_OPACITY 2
 
 // Uniform locations.
 #define RAD_UNIFORM_ABSORBED_ID 0

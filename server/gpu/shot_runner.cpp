@@ -10,9 +10,48 @@ constexpr std::uint32_t kLattices = solver::kLatticeSide * solver::kLatticeSide;
 
 bool goodResolution(std::uint32_t n) { return n >= kMinResolution && n <= kMaxResolution && n % 2 == 0; }
 
+bool goodReceivers(const solver::ReceiverPoints& points) {
+  return points.count >= 1 && points.count <= solver::kMaxReceiverPoints;
+}
+
+bool inside(std::uint32_t first, std::uint32_t count, std::size_t size) {
+  return count <= size && first <= size - count;
+}
+
+Result<void> checkPunctual(const ShotSpan& shots) {
+  for (std::size_t i = 0; i < shots.point_lights.size(); ++i) {
+    const auto& shot = shots.point_lights[i];
+    if (goodResolution(shot.resolution) && shot.half <= 1 && shot.frame.lattice < kLattices &&
+        goodReceivers(shot.receivers)) {
+      continue;
+    }
+    return fail(ErrorCode::kInternal,
+                "resolution must be even and 4..2048, half 0 or 1, lattice 0..15, 1 to 8 receiving points",
+                "point light shot " + std::to_string(i));
+  }
+  for (std::size_t i = 0; i < shots.parallel.size(); ++i) {
+    const auto& shot = shots.parallel[i];
+    if (goodResolution(shot.resolution) && shot.half <= 1 && goodReceivers(shot.receivers) && shot.view_count > 0 &&
+        inside(shot.first_view, shot.view_count, shots.views.size()) &&
+        inside(shot.first_of_sky, shot.sky_count, shots.views.size())) {
+      continue;
+    }
+    return fail(ErrorCode::kInternal,
+                "resolution must be even and 4..2048, half 0 or 1, 1 to 8 receiving points, views inside the batch",
+                "parallel shot " + std::to_string(i));
+  }
+  return {};
+}
+
 }  // namespace
 
+ShotSpan spanOf(const solver::ShotBatch& batch) {
+  return {batch.mode,   batch.flux_scale,   batch.scatter,  batch.gather,
+          batch.points, batch.point_lights, batch.parallel, batch.views};
+}
+
 Result<void> checkShots(const ShotSpan& shots) {
+  if (auto good = checkPunctual(shots); !good) return good;
   for (std::size_t i = 0; i < shots.scatter.size(); ++i) {
     const auto& shot = shots.scatter[i];
     if (!goodResolution(shot.resolution) || shot.half > 1 || shot.frame.lattice >= kLattices) {
@@ -25,8 +64,7 @@ Result<void> checkShots(const ShotSpan& shots) {
   }
   for (std::size_t i = 0; i < shots.gather.size(); ++i) {
     const auto& shot = shots.gather[i];
-    const bool points_fit =
-        shot.point_count <= shots.points.size() && shot.first_point <= shots.points.size() - shot.point_count;
+    const bool points_fit = inside(shot.first_point, shot.point_count, shots.points.size());
     if (!goodResolution(shot.resolution) || shot.half > solver::kBothHalves || shot.corner_count < 3 ||
         shot.corner_count > solver::kMaxCorners || !points_fit) {
       return fail(ErrorCode::kInternal,
@@ -47,13 +85,17 @@ Result<std::unique_ptr<ShotRunner>> ShotRunner::create() {
   if (!context) return tl::unexpected(context.error());
   auto renderer = HemicubeRenderer::create(**context);
   if (!renderer) return tl::unexpected(renderer.error());
-  return std::unique_ptr<ShotRunner>(new ShotRunner(std::move(*context), std::move(*renderer)));
+  auto parallel = ParallelRenderer::create(**context);
+  if (!parallel) return tl::unexpected(parallel.error());
+  return std::unique_ptr<ShotRunner>(new ShotRunner(std::move(*context), std::move(*renderer), std::move(*parallel)));
 }
 
 Result<void> ShotRunner::setScene(std::shared_ptr<const scene::PatchScene> patches) {
   auto scene = GpuScene::upload(*context_, patches);
   if (!scene) return tl::unexpected(scene.error());
-  renderer_.setScene(std::move(*scene));
+  if (auto set = renderer_.setScene(std::move(*scene)); !set) return set;
+  if (auto set = parallel_.setScene(renderer_.scene()); !set) return set;
+  punctual_ = PunctualGatherer(patches);
   accumulator_ = ScatterAccumulator(patches->nodeCount());
   gatherer_ = LightGatherer(patches);
   patches_ = std::move(patches);
@@ -73,6 +115,10 @@ Result<solver::TransportCounters> ShotRunner::run(const ShotSpan& shots, const F
   for (const auto& shot : shots.gather) {
     gatherer_.gather(shot, shots.points.subspan(shot.first_point, shot.point_count), shots.flux_scale, renderer_,
                      weights_, sink, counters);
+  }
+  for (const auto& shot : shots.point_lights) punctual_.gather(shot, shots.flux_scale, renderer_, sink, counters);
+  for (const auto& shot : shots.parallel) {
+    punctual_.gather(shot, shots.views, shots.flux_scale, renderer_.scene(), parallel_, sink, counters);
   }
   return counters;
 }

@@ -11,18 +11,24 @@
 #include "server/gpu/flux_sink.h"
 #include "server/gpu/hemicube_renderer.h"
 #include "server/gpu/light_gatherer.h"
+#include "server/gpu/parallel_renderer.h"
+#include "server/gpu/punctual_gatherer.h"
 #include "server/gpu/scatter_accumulator.h"
 
 namespace radiosity::gpu {
 
-/// Part of a batch (or all of it). Gather shots index `points`.
+/// Part of a batch (or all of it). Gather shots index `points`, parallel shots `views`.
 struct ShotSpan {
   solver::LinkMode mode = solver::LinkMode::kFormula;
   double flux_scale = 1.0;
   std::span<const solver::ScatterShot> scatter;
   std::span<const solver::GatherShot> gather;
   std::span<const solver::HemicubeFrame> points;
+  std::span<const solver::PointShot> point_lights;
+  std::span<const solver::ParallelShot> parallel;
+  std::span<const solver::ParallelView> views;
 };
+[[nodiscard]] ShotSpan spanOf(const solver::ShotBatch& batch);
 
 class ShotRunner {
  public:
@@ -36,8 +42,8 @@ class ShotRunner {
   [[nodiscard]] const EglContext& context() const { return *context_; }
 
  private:
-  ShotRunner(std::unique_ptr<EglContext> context, HemicubeRenderer renderer)
-      : context_(std::move(context)), renderer_(std::move(renderer)) {}
+  ShotRunner(std::unique_ptr<EglContext> context, HemicubeRenderer renderer, ParallelRenderer parallel)
+      : context_(std::move(context)), renderer_(std::move(renderer)), parallel_(std::move(parallel)) {}
   void scatter(const ShotSpan& shots, const FluxSink& sink, solver::TransportCounters& counters);
   void measureGather(const ShotSpan& shots, std::vector<solver::LinkSample>& samples,
                      solver::TransportCounters& counters);
@@ -47,11 +53,13 @@ class ShotRunner {
 
   std::unique_ptr<EglContext> context_;  // outlives what lives in it
   HemicubeRenderer renderer_;
+  ParallelRenderer parallel_;
   WeightCache weights_;
   ScatterAccumulator accumulator_;
   LightGatherer gatherer_;
   std::shared_ptr<const scene::PatchScene> patches_;
   std::optional<FluxStore> link_store_;
+  PunctualGatherer punctual_;
   bool has_scene_ = false;
 };
 

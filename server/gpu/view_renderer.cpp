@@ -139,7 +139,9 @@ class GlViewRenderer final : public ViewRenderer {
       bindTexture(1, scene, material.emissive_texture, textures);
       glBindTextureUnit(2, draw.page < lightmaps.size() ? lightmaps[draw.page].name() : black());
       const bool masked = material.alpha_mode == scene::AlphaMode::kMask;
-      glProgramUniform1f(program_.name(), kAlphaCutoff, masked ? material.alpha_cutoff : -1.0F);
+      const bool blended = material.alpha_mode == scene::AlphaMode::kBlend;
+      const float cutoff = masked ? material.alpha_cutoff : blended ? -2.0F : -1.0F;
+      glProgramUniform1f(program_.name(), kAlphaCutoff, cutoff);
       glProgramUniform1f(program_.name(), kBaseAlpha, material.alpha);
       glDrawArrays(GL_TRIANGLES, static_cast<GLint>(draw.first), static_cast<GLsizei>(draw.count));
     }

@@ -64,9 +64,12 @@ class Worker {
     const auto scatter = from.values<solver::ScatterShot>(head.scatter);
     const auto gather = from.values<solver::GatherShot>(head.gather);
     const auto points = from.values<solver::HemicubeFrame>(head.points);
+    const auto point_lights = from.values<solver::PointShot>(head.point_lights);
+    const auto parallel = from.values<solver::ParallelShot>(head.parallel);
+    const auto views = from.values<solver::ParallelView>(head.views);
     if (!from.good() || !sink_) return fail(ErrorCode::kInternal, "a chunk is cut short or came before the scene");
     const auto mode = static_cast<solver::LinkMode>(head.mode);
-    const ShotSpan shots{mode, head.flux_scale, scatter, gather, points};
+    const ShotSpan shots{mode, head.flux_scale, scatter, gather, points, point_lights, parallel, views};
     std::vector<solver::LinkSample> links;
     const auto counters = head.measure != 0 ? runner_->measure(shots, links) : runner_->run(shots, *sink_);
     if (!counters) return tl::unexpected(counters.error());

@@ -38,6 +38,7 @@ void visitScene(Scene& scene, Visit visit) {
   visit(scene.surfaces);
   visit(scene.leaves);
   visit(scene.node_area);
+  visit(scene.opacity);
 }
 
 using Done = tl::expected<void, Lapse>;

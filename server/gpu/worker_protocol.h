@@ -21,7 +21,7 @@ enum class MessageKind : std::uint32_t {
   kFailed,     ///< worker: body: text. It goes on only after a failed chunk
   kScene,      ///< transport: two descriptors follow (scene, flux); body: SceneBody
   kSceneDone,  ///< worker
-  kChunk,      ///< transport: body: ChunkBody, scatter shots, gather shots, points
+  kChunk,      ///< transport: body: ChunkBody, then the arrays it counts
   kChunkDone,  ///< worker: body: ChunkDoneBody, then the links of each shot if they were wanted
 };
 
@@ -42,7 +42,7 @@ struct ChunkBody {
   double flux_scale = 1.0;
   std::uint32_t mode = 0;
   std::uint32_t measure = 0;  ///< 1: links are wanted, shot by shot, with the report
-  std::uint32_t scatter = 0, gather = 0, points = 0;
+  std::uint32_t scatter = 0, gather = 0, points = 0, point_lights = 0, parallel = 0, views = 0;
 };
 struct ChunkDoneBody {
   std::uint64_t chunk = 0;

@@ -123,7 +123,7 @@ class WorkerTransport final : public solver::Transport {
  private:
   Result<void> carryOut(const solver::ShotBatch& batch) {
     if (!has_scene_) return fail(ErrorCode::kInternal, "setScene must come before run");
-    const ShotSpan shots{batch.mode, batch.flux_scale, batch.scatter, batch.gather, batch.points};
+    const ShotSpan shots = spanOf(batch);
     if (auto good = checkShots(shots); !good) return good;
     if (batch.mode == solver::LinkMode::kPaperMipmap && !paper_fits_) return tl::unexpected(paper_error_);
     deaths_ = 0;
@@ -240,7 +240,7 @@ class WorkerTransport final : public solver::Transport {
   }
 
   [[nodiscard]] bool takeLinks(BodyReader& from, const Chunk& chunk) {
-    const auto first = chunk.first + (chunk.gather ? 0 : gather_shots_);
+    const auto first = chunk.first + (chunk.kind == ShotKind::kGather ? 0 : gather_shots_);
     for (auto i = first; i < first + chunk.count; ++i) {
       if (!unpackLinks(from, nodes_, (*links_)[i])) return false;
     }

@@ -58,6 +58,10 @@ protocol::Progress toProgress(const engine::Status& s) {
   return p;
 }
 
+engine::SkySetting toSetting(const protocol::Sky& sky) {
+  return {glm::vec3(sky.upper[0], sky.upper[1], sky.upper[2]), glm::vec3(sky.lower[0], sky.lower[1], sky.lower[2])};
+}
+
 protocol::Settings toSettings(const engine::SolveSettings& s) {
   protocol::Settings out;
   out.target_error = s.target_error;
@@ -65,6 +69,12 @@ protocol::Settings toSettings(const engine::SolveSettings& s) {
   out.texels = s.texels;
   out.texel_size_m = s.texel_size_m;
   out.seed = s.seed;
+  if (s.sky) {
+    const auto color = [](const glm::vec3& c) {
+      return std::array{static_cast<double>(c.x), static_cast<double>(c.y), static_cast<double>(c.z)};
+    };
+    out.sky = {color(s.sky->upper), color(s.sky->lower)};
+  }
   return out;
 }
 
@@ -78,6 +88,8 @@ engine::SolveSettings merged(engine::SolveSettings s, const protocol::SolveConfi
   }
   if (call.texel_size_m) s.texel_size_m = *call.texel_size_m;
   if (call.seed) s.seed = *call.seed;
+  if (call.no_sky) s.sky.reset();
+  if (call.sky) s.sky = toSetting(*call.sky);
   return s;
 }
 

@@ -10,6 +10,7 @@
 
 #include "server/scene/atlas.h"
 #include "server/scene/coverage.h"
+#include "server/scene/opacity.h"
 
 namespace radiosity::scene {
 namespace {
@@ -50,9 +51,11 @@ class Builder {
     std::vector<bool> solid;  // what one can see through, or see from behind, bounds no solid
     for (const Surface& surface : patches_.surfaces) {
       const Material& material = materialOf(scene_, surface.instance);
-      solid.push_back(!material.double_sided && material.alpha_mode == AlphaMode::kOpaque);
+      solid.push_back(!material.double_sided && !isSeeThrough(material));
     }
     removeBuried(patches_, pieces, solid);
+    measureOpacity(scene_, patches_);
+    applyOpacity(patches_);
     sumAncestors(patches_);
     writeInstanceUvs();
     findSeams(flat_, neighbours_, sources_, 2.0 * options_.curve_angle_deg, patches_);

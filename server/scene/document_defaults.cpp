@@ -5,10 +5,12 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
+#include <numbers>
 
 namespace radiosity::scene {
 namespace {
 
+constexpr const char* kLights = "KHR_lights_punctual";
 constexpr const char* kEmissiveStrength = "KHR_materials_emissive_strength";
 
 void setDefault(Json& object, const char* member, Json value) {
@@ -83,6 +85,21 @@ bool materialiseMaterial(Json& material) {
   return true;
 }
 
+void materialiseLights(Json& gltf) {
+  const auto extensions = gltf.find("extensions");
+  if (extensions == gltf.end() || !extensions->is_object() || !extensions->contains(kLights)) return;
+  auto& extension = (*extensions)[kLights];
+  if (!extension.is_object() || !extension.contains("lights") || !extension["lights"].is_array()) return;
+  for (auto& light : extension["lights"]) {
+    if (!light.is_object()) continue;
+    setDefault(light, "color", Json::array({1.0, 1.0, 1.0}));
+    setDefault(light, "intensity", 1.0);
+    if (!light.contains("spot") || !light["spot"].is_object()) continue;
+    setDefault(light["spot"], "innerConeAngle", 0.0);
+    setDefault(light["spot"], "outerConeAngle", std::numbers::pi / 4.0);
+  }
+}
+
 void markUsed(Json& gltf, const char* extension) {
   setDefault(gltf, "extensionsUsed", Json::array());
   auto& used = gltf["extensionsUsed"];
@@ -100,6 +117,7 @@ void materialiseDefaults(Json& gltf) {
   if (const auto materials = gltf.find("materials"); materials != gltf.end() && materials->is_array()) {
     for (auto& material : *materials) strength |= materialiseMaterial(material);
   }
+  materialiseLights(gltf);
   if (strength) markUsed(gltf, kEmissiveStrength);
 }
 

@@ -17,6 +17,8 @@
 namespace radiosity::scene {
 namespace {
 
+constexpr double kMaxSkyNits = 1e12;
+
 glm::dmat4 localMatrix(const tinygltf::Node& node) {
   if (!node.matrix.empty()) return glm::make_mat4(node.matrix.data());
   const auto vec3 = [](const std::vector<double>& v, double otherwise) {
@@ -184,8 +186,10 @@ class NodeWalk {
     if (light.kind == LightKind::kSpot && !cone) {
       return context_.bad(pointer + "/spot", "needs innerConeAngle < outerConeAngle <= pi/2");
     }
+    if (context_.scene.lights.size() >= context_.limits.max_nodes) {
+      return context_.tooLarge(pointer_, "more than " + std::to_string(context_.limits.max_nodes) + " lights");
+    }
     context_.scene.lights.push_back(light);
-    context_.warn(pointer, "gives no light yet: only emissive surfaces do");
     return {};
   }
 
@@ -195,6 +199,39 @@ class NodeWalk {
   std::string pointer_;
   std::size_t triangles_ = 0;
 };
+
+/// Three finite numbers that are not negative.
+Result<glm::vec3> readColor(const ImportContext& context, const Json& value, const std::string& pointer) {
+  glm::vec3 color(0.0F);
+  bool good = value.is_array() && value.size() == 3;
+  for (std::size_t c = 0; good && c < 3; ++c) {
+    good = value[c].is_number() && value[c].get<double>() >= 0.0 && value[c].get<double>() <= kMaxSkyNits;
+    if (good) color[static_cast<int>(c)] = value[c].get<float>();
+  }
+  if (good) return color;
+  return context.bad(pointer, "must be three numbers in nits, each 0 to 1e12");
+}
+
+/// /extras/radiositySky: our own, so that a sky is part of the scene and can be patched; glTF has no extension for one
+/// that is no picture.
+Result<void> importSky(ImportContext& context) {
+  const auto extras = context.document.gltf.find("extras");
+  if (extras == context.document.gltf.end() || !extras->is_object() || !extras->contains("radiositySky")) return {};
+  const auto& json = (*extras)["radiositySky"];
+  const std::string pointer = "/extras/radiositySky";
+  if (json.is_null()) return {};
+  if (!json.is_object() || !json.contains("upper")) return context.bad(pointer, "must be an object with upper");
+  const auto upper = readColor(context, json["upper"], pointer + "/upper");
+  if (!upper) return tl::unexpected(upper.error());
+  Sky sky{*upper, *upper};
+  if (json.contains("lower")) {
+    const auto lower = readColor(context, json["lower"], pointer + "/lower");
+    if (!lower) return tl::unexpected(lower.error());
+    sky.lower = *lower;
+  }
+  context.scene.sky = sky;
+  return {};
+}
 
 }  // namespace
 
@@ -208,6 +245,7 @@ Result<Scene> importScene(const Document& document, const ImportLimits& limits) 
   if (auto ok = checkModel(context); !ok) return tl::unexpected(ok.error());
   if (auto ok = importMaterials(context); !ok) return tl::unexpected(ok.error());
   if (auto ok = NodeWalk(context).run(); !ok) return tl::unexpected(ok.error());
+  if (auto ok = importSky(context); !ok) return tl::unexpected(ok.error());
   warnAboutOddities(context);
   return scene;
 }

@@ -57,8 +57,9 @@ Patchwork gather(const PatchScene& patches, const Surface& surface, std::span<co
       if (area <= 0.0) continue;
       const std::size_t i = p.at(surface.page_x + x - p.x0, surface.page_y + y - p.y0);
       p.value[i] = glm::vec3(sum / area);
-      p.visible[i] =
-          surface.texel_area > 0.0F ? std::min(1.0F, static_cast<float>(largest / surface.texel_area)) : 1.0F;
+      // What is thin to the eye is no less well known.
+      const bool whole = surface.see_through || surface.texel_area <= 0.0F;
+      p.visible[i] = whole ? 1.0F : std::min(1.0F, static_cast<float>(largest / surface.texel_area));
       most = std::max(most, p.visible[i]);
     }
   // A chart of slivers has nothing better than what it has.

@@ -52,7 +52,11 @@ struct Surface {
   std::uint32_t first_triangle = 0, triangle_count = 0;
   glm::vec3 bounds_min{0.0F}, bounds_max{0.0F};
   bool planar = false;
-  float texel_area = 0.0F;  ///< area of a full leaf, unit box squared
+  bool see_through =
+      false;  ///< some of it is cut out, blends or transmits: PatchScene::opacity says where and how much
+  std::uint32_t opacity_scale = 1;  ///< cells of the opacity grid across a leaf
+  std::uint32_t first_opacity = 0;  ///< of width x opacity_scale by height x opacity_scale cells, row-major
+  float texel_area = 0.0F;          ///< area of a full leaf, unit box squared
 };
 
 struct Page {
@@ -71,7 +75,10 @@ struct PatchScene {
   std::vector<std::uint32_t> triangle_source;  ///< by triangle: which one of its instance's primitive it was
   std::vector<Surface> surfaces;
   std::vector<LeafPoint> leaves;
-  std::vector<float> node_area;  ///< unit box squared: covered and unburied part; parent = sum of children; 0 = empty
+  /// Unit box squared: covered and unburied part, times its opacity; parent = sum of children; 0 = empty. What a leaf
+  /// catches of the light is irradiance times this, so irradiance needs no opacity anywhere.
+  std::vector<float> node_area;
+  std::vector<std::uint8_t> opacity;  ///< grids of the surfaces that one can see through; 255: lets nothing through
   std::vector<Page> pages;
 
   /// Lightmap coordinates of the imported vertices: one for each corner of each instance's triangles, in page UV [0, 1]

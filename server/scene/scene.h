@@ -89,6 +89,16 @@ struct PunctualLight {
   double range = 0.0;         ///< metres; 0: infinite
   double inner_cone_rad = 0.0;
   double outer_cone_rad = 0.785398163;
+
+  bool operator==(const PunctualLight&) const = default;
+};
+
+/// Radiance of everything outside the scene, nits: one colour above the horizon (+Y), one below it. Without anything in
+/// between, a surface whose normal makes the angle theta with +Y receives pi (upper (1 + cos theta) + lower (1 - cos
+/// theta)) / 2 lux.
+struct Sky {
+  glm::vec3 upper{0.0F}, lower{0.0F};
+  bool operator==(const Sky&) const = default;
 };
 
 struct Scene {
@@ -98,6 +108,7 @@ struct Scene {
   std::vector<Instance> instances;
   std::vector<Camera> cameras;
   std::vector<PunctualLight> lights;
+  std::optional<Sky> sky;               ///< /extras/radiositySky
   std::vector<std::string> warnings;    ///< "room.glb: /materials/3: ..." in the order found
   std::uint64_t triangles_dropped = 0;  ///< zero-area, non-finite or duplicate triangles left out
 };

@@ -53,6 +53,27 @@ glm::vec2 transformUv(const TextureUse& use, const glm::vec2& uv) {
   return use.offset + glm::vec2(c * s.x + d * s.y, -d * s.x + c * s.y);
 }
 
+float sampleAlpha(const Texture& texture, const TextureUse& use, const glm::vec2& uv) {
+  const glm::vec2 turned = transformUv(use, uv);
+  const auto pixels =
+      static_cast<std::size_t>(std::max(0, texture.width)) * static_cast<std::size_t>(std::max(0, texture.height));
+  if (pixels == 0 || texture.rgba.size() < 4 * pixels || !std::isfinite(turned.x) || !std::isfinite(turned.y)) {
+    return 1.0F;
+  }
+  const glm::vec2 place =
+      glm::clamp(turned, glm::vec2(-1e5F), glm::vec2(1e5F)) * glm::vec2(texture.width, texture.height) - 0.5F;
+  const glm::vec2 base = glm::clamp(glm::floor(place), glm::vec2(-1e9F), glm::vec2(1e9F));
+  const glm::vec2 f = place - base;
+  const auto at = [&](int dx, int dy) {
+    const int x = wrap(static_cast<int>(base.x) + dx, texture.width, use.repeat_u, use.mirror_u);
+    const int y = wrap(static_cast<int>(base.y) + dy, texture.height, use.repeat_v, use.mirror_v);
+    const auto index =
+        static_cast<std::size_t>(y) * static_cast<std::size_t>(texture.width) + static_cast<std::size_t>(x);
+    return static_cast<float>(texture.rgba[4 * index + 3]) / 255.0F;
+  };
+  return glm::mix(glm::mix(at(0, 0), at(1, 0), f.x), glm::mix(at(0, 1), at(1, 1), f.x), f.y);
+}
+
 TexturePyramid::TexturePyramid(const Texture& texture) : texture_(&texture) {
   int width = texture.width, height = texture.height;
   for (std::size_t level = 0; width > 1 || height > 1; ++level) {

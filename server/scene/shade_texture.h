@@ -37,4 +37,8 @@ class TexturePyramid {
 /// uv -> offset + rotate(scale * uv), KHR_texture_transform.
 [[nodiscard]] glm::vec2 transformUv(const TextureUse& use, const glm::vec2& uv);
 
+/// Alpha of a texture around `uv` (after TextureUse's transform and wrapping), bilinear, in [0, 1]; 1 where it has no
+/// pixels.
+[[nodiscard]] float sampleAlpha(const Texture& texture, const TextureUse& use, const glm::vec2& uv);
+
 }  // namespace radiosity::scene

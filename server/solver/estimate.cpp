@@ -71,7 +71,7 @@ ErrorParts estimateError(const RadiosityState& state, double owed) {
 }
 
 EnergyParts energyBalance(const RadiosityState& state, const std::array<double, 3>& shot,
-                          const std::array<double, 3>& gather_emitted) {
+                          const std::array<double, 3>& gather_emitted, const std::array<double, 3>& other_flux) {
   EnergyParts parts;
   std::array<double, 3> received{};
   const double quantum = 1.0 / (state.fluxScale() * static_cast<double>(state.rounds()));
@@ -92,7 +92,8 @@ EnergyParts energyBalance(const RadiosityState& state, const std::array<double, 
     }
   }
   for (std::size_t i = 0; i < 3; ++i) {
-    parts.unshot[i] -= gather_emitted[i] / rounds;
+    parts.emitted[i] += other_flux[i];
+    parts.unshot[i] += other_flux[i] - gather_emitted[i] / rounds;
     parts.escaped[i] = static_cast<double>(state.escaped()[i]) * quantum;
     parts.backface[i] = static_cast<double>(state.backface()[i]) * quantum;
     parts.imbalance[i] = (shot[i] + gather_emitted[i]) / rounds - received[i] - parts.escaped[i] - parts.backface[i];

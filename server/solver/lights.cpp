@@ -111,7 +111,7 @@ std::vector<LightPolygon> findLightPolygons(const scene::PatchScene& patches, st
   for (auto& side : sides) {
     const auto& surface = patches.surfaces[side.surface];
     glm::vec3 uniform(0.0F);
-    side.gathered = surface.planar && surface.triangle_count <= 2 * kMaxPolygonsPerSurface &&
+    side.gathered = surface.planar && !surface.see_through && surface.triangle_count <= 2 * kMaxPolygonsPerSurface &&
                     uniformEmission(patches, side, emission, uniform);
     if (side.gathered) addPolygons(patches, side, uniform, lights);
   }

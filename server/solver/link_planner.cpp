@@ -25,6 +25,8 @@ constexpr double kVariation = 0.5;
 constexpr std::uint32_t kLightPoints = 8;
 /// A light's item buffers cost about so many times those of a node, for their resolution.
 constexpr double kLightCost = 3.0;
+/// So many times that of a node are the images of a light without extent (a sky has most).
+constexpr double kSourceCost = 60.0;
 
 }  // namespace
 
@@ -66,6 +68,10 @@ std::vector<Measurement> LinkPlanner::firstLight(const LinkSystem& system) const
   for (std::uint32_t n = 0; n < system.shooters().size(); ++n) {
     const auto& shooter = system.shooters()[n];
     if (!shooter.isLight() || shooter.power() <= 0.0 || shooter.column[0].points() > 0.0) continue;
+    if (shooter.source != scene::kNone) {  // a sample of it is a whole sequence of images
+      for (std::size_t half = 0; half < 2; ++half) wanted.push_back({n, half, 1, 0});
+      continue;
+    }
     const auto share = static_cast<std::uint32_t>(std::lround(settings_.light_points * shooter.power() / total));
     const std::uint32_t points = std::clamp(share, 2U, kLightPoints);
     for (std::uint32_t k = 0; k < std::max(1U, (share + kLightPoints - 1) / kLightPoints); ++k) {
@@ -213,12 +219,13 @@ std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPy
   for (std::uint32_t n = 0; n < system.shooters().size(); ++n) {
     const auto& shooter = system.shooters()[n];
     if (shooter.column[0].points() == 0.0 || shooter.column[1].points() == 0.0) continue;
-    const std::uint32_t points = shooter.isLight() ? kLightPoints : 1;
+    const std::uint32_t points = shooter.light != scene::kNone ? kLightPoints : 1;
+    const double cost = shooter.source != scene::kNone ? kSourceCost : shooter.isLight() ? kLightCost : 1.0;
     const double taken = shooter.column[0].points();
     // The spread of few samples is itself uncertain: half a sample's worth of what is usual for such power is mixed in.
     const double usual = spread / squares * shooter.power() * shooter.power();
     const double variance = 0.25 * (shooter.spread() * taken + 0.5 * usual) / (taken + 0.5);
-    gains.push_back({variance / (2.0 * (taken + points) * (shooter.isLight() ? kLightCost : 1.0)), n, points});
+    gains.push_back({variance / (2.0 * (taken + points) * cost), n, points});
     const double varying = variation(shooter, system, unshot, patches);
     if (varying > 0.0) gains.push_back({varying / 8.0, n, 0});
   }

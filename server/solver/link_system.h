@@ -21,8 +21,9 @@
 namespace radiosity::solver {
 
 struct Shooter {
-  NodePlace place;                         ///< of a node; of a light polygon only `light` counts
+  NodePlace place;                         ///< of a node; of a light only `light` or `source` counts
   std::uint32_t light = scene::kNone;      ///< index of the light polygon, or kNone
+  std::uint32_t source = scene::kNone;     ///< index of the light without extent, or kNone; `area` is its flux for one
   std::uint32_t parent = scene::kNone;     ///< nearest shooter above
   bool certain = false;                    ///< never plays roulette
   double area = 0.0;                       ///< that shines, unit box squared
@@ -33,7 +34,7 @@ struct Shooter {
 
   std::array<double, 3> products{};        ///< sums over leaves of area T0 T0, T0 T1, T1 T1
 
-  [[nodiscard]] bool isLight() const { return light != scene::kNone; }
+  [[nodiscard]] bool isLight() const { return light != scene::kNone || source != scene::kNone; }
   /// Flux it shoots, all channels, mean of the halves and before roulette.
   [[nodiscard]] double power() const;
   /// Variance that it brings to irradiance: area-weighted square of the difference between what its halves deliver.

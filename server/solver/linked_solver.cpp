@@ -20,14 +20,21 @@ constexpr std::uint32_t kMaxRounds = 100'000;
 /// Short enough that nobody notices the wait, long enough that the workers' waiting for the last of them does not count.
 constexpr double kSliceSeconds = 0.06;
 
+PunctualSettings punctualSettings(const SolverSettings& settings) {
+  PunctualSettings punctual;
+  punctual.seed = settings.seed;
+  return punctual;
+}
+
 }  // namespace
 
 LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
-                           Transport& transport, const SolverSettings& settings)
+                           Transport& transport, const SolverSettings& settings, const LightSources& sources)
     : patches_(std::move(patches)),
       transport_(transport),
       settings_(settings),
       sides_(makeSides(*patches_)),
+      punctual_(*patches_, {}, punctualSettings(settings)),
       shots_(*patches_, sides_, settings.seed),
       system_(*patches_, sides_),
       expander_(*patches_, sides_),
@@ -35,6 +42,7 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
       planner_(sides_, shots_, settings_.planner),
       irradiance_(patches_->nodeCount(), glm::vec3(0.0F)) {
   takeMaterials(materials);
+  takeSources(sources);
   for (auto& half : half_) half.assign(emission_.size(), glm::vec3(0.0F));
   findUnshot();
 }
@@ -69,15 +77,64 @@ void LinkedSolver::takeLights() {
     (void)system_.add(shooter);
   }
   for (auto& shooter : system_.shooters()) {
-    if (shooter.isLight()) shooter.sent.fill(lights_[shooter.light].emission);
+    if (shooter.light != scene::kNone) shooter.sent.fill(lights_[shooter.light].emission);
   }
+}
+
+/// So is every light without extent, for an intensity of one.
+void LinkedSolver::takeSources(const LightSources& sources) {
+  for (auto& source : sources_) source.intensity = glm::dvec3(0.0);
+  for (const auto& source : punctual_.makeSources(*patches_, sources)) {
+    const auto known =
+        std::find_if(sources_.begin(), sources_.end(), [&](const auto& old) { return old.sameShape(source); });
+    if (known != sources_.end()) {
+      known->intensity = source.intensity;
+      continue;
+    }
+    Shooter shooter;
+    shooter.source = static_cast<std::uint32_t>(sources_.size());
+    shooter.area = source.flux_per_intensity;
+    sources_.push_back(source);
+    (void)system_.add(shooter);
+  }
+  for (auto& shooter : system_.shooters()) {
+    if (shooter.source != scene::kNone) shooter.sent.fill(glm::vec3(sources_[shooter.source].intensity));
+  }
+}
+
+/// One sequence of shots of a light without extent, as links for an intensity of one.
+Result<void> LinkedSolver::measureSource(const Measurement& want) {
+  const auto& source = sources_[system_.shooters()[want.shooter].source];
+  ShotBatch batch;
+  // Half of an intensity goes to either half; the headroom is that of one.
+  batch.flux_scale = kMeasureScale * std::exp2(-std::ceil(std::log2(std::max(1.0, source.flux_per_intensity))));
+  punctual_.addSample(source, want.index, static_cast<std::uint32_t>(want.half), batch);
+  FluxAccumulators flux;
+  flux.reset(patches_->nodeCount());
+  const auto done = transport_.run(batch, flux);
+  if (!done) return tl::unexpected<Error>(done.error());
+  counters_ += *done;
+  LinkSample links;
+  for (std::uint32_t node = 0; node < patches_->nodeCount(); ++node)
+    links.addFlux(node, flux.node[want.half][node][0], *patches_);
+  links.escaped += static_cast<double>(flux.escaped[0]) / kMeasureScale;
+  links.absorbed += static_cast<double>(flux.backface[0]) / kMeasureScale;
+  links.scale(2.0 * kMeasureScale / batch.flux_scale);
+  expander_.expand(links);
+  system_.addSample(want.shooter, want.half, expander_, links, want.points);
+  return {};
 }
 
 /// Measures the next part of the wave: short, so that an edit, a pause or the end of the server need not wait for all.
 /// Where the cuts lie, which depends on time, changes no bit.
 Result<void> LinkedSolver::measureSlice() {
+  const auto isSource = [&](const Measurement& want) {
+    return system_.shooters()[want.shooter].source != scene::kNone;
+  };
+  if (isSource(wanted_[measured_])) return measureSource(wanted_[measured_++]);
   const auto start = std::chrono::steady_clock::now();
-  const auto slice = std::span(wanted_).subspan(measured_, std::min(slice_, wanted_.size() - measured_));
+  auto slice = std::span(wanted_).subspan(measured_, std::min(slice_, wanted_.size() - measured_));
+  slice = slice.first(static_cast<std::size_t>(std::find_if(slice.begin(), slice.end(), isSource) - slice.begin()));
   ShotBatch batch;
   std::vector<const Measurement*> gathered, scattered;
   for (const auto& want : slice) {
@@ -245,16 +302,24 @@ void LinkedSolver::setTargetError(double target) {
 
 void LinkedSolver::setMaterials(const scene::PatchMaterials& materials) {
   takeMaterials(materials);
+  solveAnew();
+}
+
+void LinkedSolver::setLights(const LightSources& sources) {
+  takeSources(sources);
+  solveAnew();
+}
+
+/// After an edit, from nothing but the links: the result depends on them and on the materials alone, so that an edit and
+/// its inverse give the same bits as long as no link was added in between.
+void LinkedSolver::solveAnew() {
   wanted_.clear();  // what was still to be measured will be asked for again
   measured_ = 0;
-  // From scratch, so that the result depends on the links and the materials alone: an edit and its inverse give the
-  // same bits as long as no link was added in between.
-  for (int pass = 0; pass < 2; ++pass) {
+  for (int pass = 0; pass < 2; ++pass) {  // the first shows how strong the shooters are, for their roulette
     for (auto& shooter : system_.shooters()) {
+      for (std::size_t half = 0; pass == 0 && half < 2; ++half)
+        shooter.weight[half] = shooter.column[half].points() > 0.0 ? 1.0 : 0.0;
       if (shooter.isLight()) continue;
-      if (pass == 0) {
-        for (std::size_t half = 0; half < 2; ++half) shooter.weight[half] = shooter.column[half].points() > 0.0 ? 1.0 : 0.0;
-      }
       shooter.mean.fill(glm::vec3(0.0F));
       shooter.sent.fill(glm::vec3(0.0F));
     }
@@ -280,6 +345,11 @@ EnergyParts LinkedSolver::energy() const {
   EnergyParts parts;
   std::array<double, 3> lit{};  // sent by lights that have links
   for (const auto& shooter : system_.shooters()) {
+    for (std::size_t c = 0; c < 3 && shooter.source != scene::kNone; ++c) {
+      const double flux = shooter.area * static_cast<double>(shooter.sent[0][static_cast<int>(c)]);
+      parts.emitted[c] += flux;
+      if (shooter.column[0].points() == 0.0) parts.unshot[c] += flux;
+    }
     for (std::size_t half = 0; half < 2; ++half) {
       const auto& column = shooter.column[half];
       if (column.points() == 0.0) continue;
@@ -287,7 +357,7 @@ EnergyParts LinkedSolver::energy() const {
         const double sent = 0.5 * shooter.weight[half] * static_cast<double>(shooter.sent[half][static_cast<int>(c)]);
         parts.escaped[c] += sent * column.escaped();
         parts.backface[c] += sent * column.absorbed();
-        if (shooter.isLight()) lit[c] += sent * shooter.area;
+        if (shooter.light != scene::kNone) lit[c] += sent * shooter.area;
       }
     }
   }

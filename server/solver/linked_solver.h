@@ -23,10 +23,11 @@ namespace radiosity::solver {
 class LinkedSolver final : public Solver {
  public:
   LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
-               Transport& transport, const SolverSettings& settings);
+               Transport& transport, const SolverSettings& settings, const LightSources& sources = {});
 
   [[nodiscard]] Result<StepOutcome> step() override;
   void setMaterials(const scene::PatchMaterials& materials) override;
+  void setLights(const LightSources& sources) override;
   void setTargetError(double target) override;
   void assess() override;
 
@@ -47,6 +48,9 @@ class LinkedSolver final : public Solver {
 
   [[nodiscard]] std::vector<Measurement> plan();
   [[nodiscard]] Result<void> measureSlice();
+  [[nodiscard]] Result<void> measureSource(const Measurement& want);
+  void takeSources(const LightSources& sources);
+  void solveAnew();
   void takeMaterials(const scene::PatchMaterials& materials);
   void takeLights();
   void settle();
@@ -61,6 +65,8 @@ class LinkedSolver final : public Solver {
   std::vector<Side> sides_;
   std::vector<glm::vec3> emission_, reflectance_;  // by leaf value
   std::vector<LightPolygon> lights_;               // those switched off stay, dark: their links are still good
+  PunctualLights punctual_;
+  std::vector<PunctualLights::Source> sources_;  // those switched off stay, dark
   NodeShots shots_;
   LinkSystem system_;
   LinkExpander expander_;

@@ -22,7 +22,8 @@ class NodeShots {
 
   /// Nodes of planar surfaces shoot as polygons, gathered; others from one point, scattered.
   [[nodiscard]] bool gathers(const NodePlace& node) const {
-    return patches_.surfaces[sides_[node.side].surface].planar;
+    const auto& surface = patches_.surfaces[sides_[node.side].surface];
+    return surface.planar && !surface.see_through;
   }
   /// All of the node's polygon is covered and not buried.
   [[nodiscard]] bool isWhole(const NodePlace& node) const;

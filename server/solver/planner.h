@@ -84,7 +84,8 @@ class Planner {
                      const std::array<bool, 2>& plays, std::uint64_t node_key, ShotBatch& batch);
   /// Nodes of planar surfaces shoot as polygons of their mean radiosity, gathered; others from one point, scattered.
   [[nodiscard]] bool canGather(const RadiosityState& state, const Side& side) const {
-    return settings_.gather_nodes && state.patches().surfaces[side.surface].planar;
+    const auto& surface = state.patches().surfaces[side.surface];
+    return settings_.gather_nodes && surface.planar && !surface.see_through;
   }
   /// A point (texel coordinates) of the part of the node that is covered and not buried, chosen by unshot power.
   [[nodiscard]] static glm::dvec2 openPoint(const RadiosityState& state, const Side& side, const Node& node, double u,

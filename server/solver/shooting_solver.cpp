@@ -23,11 +23,25 @@ PlannerSettings plannerSettings(const SolverSettings& settings) {
   return planner;
 }
 
+PunctualSettings punctualSettings(const SolverSettings& settings) {
+  PunctualSettings punctual;
+  punctual.seed = settings.seed;
+  return punctual;
+}
+
+void addEmitted(const ShotBatch& batch, std::array<double, 3>& sum) {
+  for (std::size_t c = 0; c < 3; ++c) {
+    for (const auto& shot : batch.point_lights) sum[c] += shot.emitted[c];
+    for (const auto& shot : batch.parallel) sum[c] += shot.emitted[c];
+  }
+}
+
 }  // namespace
 
 ShootingSolver::ShootingSolver(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
-               solver::Transport& transport, const SolverSettings& settings)
-    : state_(std::move(patches), materials),
+                               Transport& transport, const SolverSettings& settings, const LightSources& sources)
+    : punctual_(*patches, sources, punctualSettings(settings)),
+      state_(std::move(patches), materials, punctual_.owed(1)),
       transport_(transport),
       settings_(settings),
       planner_(state_.patches(), plannerSettings(settings)) {
@@ -38,7 +52,8 @@ ShootingSolver::ShootingSolver(std::shared_ptr<const scene::PatchScene> patches,
 
 void ShootingSolver::startRound() {
   state_.pushPullAll();
-  phase_ = lights_.empty() ? Phase::kIndirect : Phase::kDirect;
+  polygons_due_ = !lights_.empty();
+  phase_ = polygons_due_ || punctual_.hasSlice(state_.rounds()) ? Phase::kDirect : Phase::kIndirect;
   if (!settings_.paper_mode) {
     // More rounds can pay for finer links, and finer links leak less: half a level for each doubling.
     const auto rounds = static_cast<float>(state_.rounds());
@@ -77,15 +92,26 @@ void ShootingSolver::beginWave(ShotBatch batch, const std::array<double, 3>& emi
   wave_.begin(std::move(batch), state_.patches().nodeCount(), state_.patches().triangles.size());
 }
 
+/// The light polygons, then the other lights in slices.
 void ShootingSolver::planDirect() {
   const auto before = emittedFlux();
-  for (const auto& light : lights_) {
-    const glm::dvec3 owed = light.undelivered(state_.rounds());
-    for (int c = 0; c < 3; ++c) gather_emitted_[static_cast<std::size_t>(c)] += light.area * owed[c];
+  ShotBatch batch;
+  batch.flux_scale = state_.fluxScale();
+  if (polygons_due_) {
+    polygons_due_ = false;
+    for (const auto& light : lights_) {
+      const glm::dvec3 owed = light.undelivered(state_.rounds());
+      for (int c = 0; c < 3; ++c) gather_emitted_[static_cast<std::size_t>(c)] += light.area * owed[c];
+    }
+    batch = planner_.gatherRound(state_, lights_);
+  } else {
+    punctual_.addSlice(state_.rounds(), batch);
+    addEmitted(batch, gather_emitted_);
   }
   wave_is_direct_ = true;
-  phase_ = Phase::kIndirect;  // an edit may send it back before the wave has landed
-  beginWave(planner_.gatherRound(state_, lights_), before);
+  // An edit may send it back before the wave has landed.
+  if (!punctual_.hasSlice(state_.rounds())) phase_ = Phase::kIndirect;
+  beginWave(std::move(batch), before);
 }
 
 /// False: the round has nothing more to shoot.
@@ -121,7 +147,7 @@ void ShootingSolver::land() {
 
 /// Light polygons' light that is still to be shot, and all light that is on its way.
 double ShootingSolver::owedPower() const {
-  double power = 0.0;
+  double power = punctual_.owed(state_.rounds());
   for (const double flux : wave_flux_) power += std::abs(flux);
   for (const auto& light : lights_) {
     const glm::dvec3 owed = glm::abs(light.undelivered(state_.rounds()));
@@ -187,6 +213,16 @@ void ShootingSolver::setMaterials(const scene::PatchMaterials& materials) {
       }
     }
   }
+  restartRound();
+}
+
+void ShootingSolver::setLights(const LightSources& sources) {
+  punctual_.setSources(state_.patches(), sources);
+  restartRound();
+}
+
+/// After an edit: the round goes on with what is now owed.
+void ShootingSolver::restartRound() {
   live_ = true;
   startRound();
   publish();
@@ -202,7 +238,7 @@ std::vector<glm::vec3> ShootingSolver::halfIrradiance(std::uint32_t half) const 
 }
 
 EnergyParts ShootingSolver::energy() const {
-  EnergyParts parts = energyBalance(state_, planner_.intended(), gather_emitted_);
+  EnergyParts parts = energyBalance(state_, planner_.intended(), gather_emitted_, punctual_.flux());
   for (std::size_t c = 0; c < 3; ++c) {  // on its way: as good as unshot
     const double flux = wave_flux_[c] / static_cast<double>(state_.rounds());
     parts.unshot[c] += flux;

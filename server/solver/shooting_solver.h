@@ -23,10 +23,12 @@ namespace radiosity::solver {
 class ShootingSolver final : public Solver {
  public:
   ShootingSolver(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
-                 Transport& transport, const SolverSettings& settings);
+                 Transport& transport, const SolverSettings& settings, const LightSources& sources = {});
 
   [[nodiscard]] Result<StepOutcome> step() override;
   void setMaterials(const scene::PatchMaterials& materials) override;
+  /// Only what they deliver is shot again, with opposite sign where less.
+  void setLights(const LightSources& sources) override;
   void setTargetError(double target) override;
   void assess() override;
 
@@ -50,17 +52,20 @@ class ShootingSolver final : public Solver {
   /// Flux that all shots planned so far stand for.
   [[nodiscard]] std::array<double, 3> emittedFlux() const;
   void startRound();
+  void restartRound();
   void publish();
   [[nodiscard]] double owedPower() const;
   [[nodiscard]] double roundPower() const;
   [[nodiscard]] double remainder() const;
 
+  PunctualLights punctual_;
   RadiosityState state_;
   std::vector<LightPolygon> lights_;
   solver::Transport& transport_;
   SolverSettings settings_;
   Planner planner_;
   Phase phase_ = Phase::kDirect;
+  bool polygons_due_ = false;  // the round's light polygons are still to be gathered
   bool live_ = true;  // show every wave: in the first round, and after an edit until the round ends
   Wave wave_;
   bool wave_is_direct_ = false;

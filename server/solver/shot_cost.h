@@ -12,6 +12,10 @@ struct ShotCost {
   static constexpr double kTrianglePixels = 4.0;
   [[nodiscard]] double operator()(const ScatterShot& shot) const { return hemicube(shot.resolution); }
   [[nodiscard]] double operator()(const GatherShot& shot) const { return shot.point_count * hemicube(shot.resolution); }
+  [[nodiscard]] double operator()(const PointShot& shot) const { return hemicube(shot.resolution); }
+  [[nodiscard]] double operator()(const ParallelShot& shot) const {
+    return shot.view_count * (double{1.0} * shot.resolution * shot.resolution + kTrianglePixels * triangles);
+  }
 
  private:
   /// A top face of N x N pixels and four half faces.

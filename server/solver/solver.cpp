@@ -15,11 +15,11 @@ constexpr std::size_t kLeafBytes = 2;
 
 std::unique_ptr<Solver> makeSolver(std::shared_ptr<const scene::PatchScene> patches,
                                    const scene::PatchMaterials& materials, Transport& transport,
-                                   const SolverSettings& settings) {
+                                   const SolverSettings& settings, const LightSources& sources) {
   if (settings.paper_mode || patches->leaves.size() * kLeafBytes * kMinShooters > settings.link_memory) {
-    return std::make_unique<ShootingSolver>(std::move(patches), materials, transport, settings);
+    return std::make_unique<ShootingSolver>(std::move(patches), materials, transport, settings, sources);
   }
-  return std::make_unique<LinkedSolver>(std::move(patches), materials, transport, settings);
+  return std::make_unique<LinkedSolver>(std::move(patches), materials, transport, settings, sources);
 }
 
 }  // namespace radiosity::solver

@@ -11,6 +11,7 @@
 #include "server/scene/patch_scene.h"
 #include "server/solver/error_parts.h"
 #include "server/solver/planner.h"
+#include "server/solver/punctual_lights.h"
 #include "server/solver/transport.h"
 
 namespace radiosity::solver {
@@ -45,6 +46,8 @@ class Solver {
 
   /// Emission or reflectance changed: nothing is invalidated; shooting goes on.
   virtual void setMaterials(const scene::PatchMaterials& materials) = 0;
+  /// Lights without extent, or the sky, changed.
+  virtual void setLights(const LightSources& sources) = 0;
   /// Goes on when the solve had stopped at a larger error.
   virtual void setTargetError(double target) = 0;
   /// Brings irradiance() and error() up to date when the solve is stopped before its first round ended.
@@ -64,12 +67,14 @@ class Solver {
   [[nodiscard]] virtual bool hasFluxScale() const = 0;
 
   [[nodiscard]] std::uint64_t shots() const {
-    return transportCounters().scatter_shots + transportCounters().gather_points;
+    const auto& done = transportCounters();
+    return done.scatter_shots + done.gather_points + done.point_images + done.parallel_images;
   }
 };
 
 [[nodiscard]] std::unique_ptr<Solver> makeSolver(std::shared_ptr<const scene::PatchScene> patches,
                                                  const scene::PatchMaterials& materials, Transport& transport,
-                                                 const SolverSettings& settings);
+                                                 const SolverSettings& settings,
+                                                 const LightSources& sources = {});
 
 }  // namespace radiosity::solver

@@ -21,7 +21,8 @@ void FluxAccumulators::reset(std::size_t node_count) {
   escaped = backface = scattered = gathered = Flux3{};
 }
 
-RadiosityState::RadiosityState(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials)
+RadiosityState::RadiosityState(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
+                               double other_flux)
     : patches_(std::move(patches)), sides_(makeSides(*patches_)) {
   std::size_t values = 0;
   for (const auto& side : sides_) values += side.leaf_count;
@@ -34,7 +35,7 @@ RadiosityState::RadiosityState(std::shared_ptr<const scene::PatchScene> patches,
   node_flux_.assign(patches_->nodeCount(), glm::vec3(0.0F));
   for (auto& half : received_) half.assign(patches_->nodeCount(), Flux3{});
   setMaterials(materials);
-  chooseFluxScale();
+  chooseFluxScale(other_flux);
 }
 
 void RadiosityState::setMaterials(const scene::PatchMaterials& materials) {
@@ -49,10 +50,10 @@ void RadiosityState::setMaterials(const scene::PatchMaterials& materials) {
   }
 }
 
-void RadiosityState::chooseFluxScale() {
+void RadiosityState::chooseFluxScale(double other_flux) {
   // 2^40 quanta for the emitted flux leave 2^22 in a 64-bit sum: for interreflection (at most 1 / (1 - 0.999) = 2^10),
   // rounds (2^10), and lamps made brighter by edits before a new scale is chosen (2^2).
-  double emitted = 0.0;
+  double emitted = other_flux;
   for (const auto& side : sides_) {
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
       emitted += static_cast<double>(channelSum(emission(side, leaf))) * static_cast<double>(leafArea(side, leaf));

@@ -27,7 +27,9 @@ namespace radiosity::solver {
 
 class RadiosityState {
  public:
-  RadiosityState(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials);
+  /// `other_flux`: what lights that are no surfaces will add, all channels, lux unit^2; for the scale of the integers.
+  RadiosityState(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
+                 double other_flux = 0.0);
 
   [[nodiscard]] std::vector<Side>& sides() { return sides_; }
   [[nodiscard]] const std::vector<Side>& sides() const { return sides_; }
@@ -98,7 +100,7 @@ class RadiosityState {
   [[nodiscard]] const Flux3& scattered() const { return scattered_; }
 
  private:
-  void chooseFluxScale();
+  void chooseFluxScale(double other_flux);
   void pull(Side& side);
   void pullNode(const Side& side, std::uint32_t level, std::uint32_t x, std::uint32_t y);
   void pullAround(Side& side, std::uint32_t level, std::uint32_t x, std::uint32_t y);

@@ -63,6 +63,48 @@ struct GatherShot {
   std::uint32_t first_point = 0, point_count = 0;  ///< into ShotBatch::points
 };
 
+/// Receiving points inside a full leaf over which a shot of light without extent is averaged, as (u, v) in [0, 1)^2.
+inline constexpr std::size_t kMaxReceiverPoints = 8;
+struct ReceiverPoints {
+  std::array<glm::vec2, kMaxReceiverPoints> at{};
+  std::uint32_t count = 1;  ///< 1 to kMaxReceiverPoints
+};
+
+/// Half of the space around a point light, or a spot: irradiance I cos / d^2, exact at every receiving point;
+/// visibility from one hemicube image.
+struct PointShot {
+  HemicubeFrame frame;                ///< at the light; normal: axis of the half space, or of the spot's cone
+  std::array<double, 3> intensity{};  ///< signed, lux x unit^2 (candela in the unit box), times the shot's weight
+  float cone_scale = 0.0F;            ///< falloff clamp(cos x scale + offset, 0, 1)^2 about the normal
+  float cone_offset = 1.0F;           ///< (KHR_lights_punctual, "Inner and Outer Cone Angles")
+  float range = 0.0F;                 ///< unit; beyond it nothing arrives (faded, "Range Property"); 0: no limit
+  std::array<double, 3> emitted{};    ///< flux the shot stands for, lux x unit^2; what the scene does not catch escapes
+  std::uint32_t resolution = 256;
+  std::uint32_t half = 0;
+  ReceiverPoints receivers;
+};
+
+/// Light from infinity, seen in a parallel projection of the whole scene.
+struct ParallelView {
+  glm::vec3 direction{0.0F};  ///< unit, towards the light
+  glm::vec3 right{0.0F};      ///< unit, across; random about the direction
+  glm::vec2 shift{0.0F};      ///< of the image, in pixels, [0, 1)
+};
+
+/// One directional light, or a part of the directions that stand for a hemisphere of uniform sky.
+struct ParallelShot {
+  std::array<double, 3> irradiance{};  ///< signed, lux from each direction on a surface that faces it, times the weight
+  std::array<double, 3> emitted{};     ///< flux that enters the scene's box, lux x unit^2
+  std::uint32_t first_view = 0, view_count = 1;  ///< into ShotBatch::views
+  /// Sky: all directions that stand for the hemisphere around `axis`. Their sum is scaled to what the whole hemisphere
+  /// gives a surface of the receiver's normal, pi (1 + cos) / 2 per unit of radiance, so an open plane is exact.
+  std::uint32_t first_of_sky = 0, sky_count = 0;  ///< 0: a directional light
+  glm::vec3 axis{0.0F};
+  std::uint32_t resolution = 512;
+  std::uint32_t half = 0;
+  ReceiverPoints receivers;
+};
+
 enum class LinkMode : std::uint32_t {
   kFormula,      ///< level from the exact pixel footprint, node ID by arithmetic (default)
   kPaperMipmap,  ///< NEAREST_MIPMAP_NEAREST usampler2D with composed IDs, the hardware chooses the level (Lum, Ma, Max
@@ -76,6 +118,13 @@ struct ShotBatch {
   std::vector<ScatterShot> scatter;
   std::vector<GatherShot> gather;
   std::vector<HemicubeFrame> points;  ///< light points of the gather shots
+  std::vector<PointShot> point_lights;
+  std::vector<ParallelShot> parallel;
+  std::vector<ParallelView> views;  ///< of the parallel shots
+
+  [[nodiscard]] bool empty() const {
+    return scatter.empty() && gather.empty() && point_lights.empty() && parallel.empty();
+  }
 };
 
 using Flux3 = std::array<std::int64_t, 3>;
@@ -94,8 +143,9 @@ struct FluxAccumulators {
 /// What was done, for reports. Times are summed over workers.
 struct TransportCounters {
   std::uint64_t scatter_shots = 0, gather_shots = 0, gather_points = 0;
-  std::uint64_t pixels = 0;  ///< visibility samples rendered and accumulated
-  std::uint64_t links = 0;   ///< (shot, node) pairs that received flux
+  std::uint64_t point_images = 0, parallel_images = 0;  ///< of lights without extent
+  std::uint64_t pixels = 0;                             ///< visibility samples rendered and accumulated
+  std::uint64_t links = 0;                              ///< (shot, node) pairs that received flux
   std::uint64_t triangles_drawn = 0, triangles_culled = 0;
   double render_seconds = 0.0, accumulate_seconds = 0.0, gather_seconds = 0.0;
 
@@ -125,6 +175,12 @@ struct LinkSample {
   void addFlux(std::uint32_t node, std::int64_t flux, const scene::PatchScene& patches);
   void scale(double factor);
 };
+
+/// Corners of the box around all triangles, low and high, unit box. What light from infinity enters the scene is what
+/// enters this box. Zero for an empty scene.
+[[nodiscard]] std::array<glm::vec3, 2> sceneBox(const scene::PatchScene& patches);
+/// Area of the box as seen from a direction (unit vector), unit^2.
+[[nodiscard]] double boxSilhouette(const std::array<glm::vec3, 2>& box, const glm::vec3& direction);
 
 class Transport {
  public:

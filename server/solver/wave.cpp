@@ -28,6 +28,7 @@ void Wave::begin(ShotBatch batch, std::size_t nodes, std::size_t triangles) {
   cost_left_ = 0.0;
   for (const auto& shot : batch_.gather) cost_left_ += cost_(shot);
   for (const auto& shot : batch_.scatter) cost_left_ += cost_(shot);
+  others_left_ = !batch_.point_lights.empty() || !batch_.parallel.empty();
   under_way_ = true;
 }
 
@@ -48,6 +49,12 @@ ShotBatch Wave::nextSlice() {
   slice.mode = batch_.mode;
   slice.flux_scale = batch_.flux_scale;
   slice_cost_ = 0.0;
+  if (std::exchange(others_left_, false)) {  // lights that are no surfaces come in small batches already
+    slice.point_lights = std::move(batch_.point_lights);
+    slice.parallel = std::move(batch_.parallel);
+    slice.views = std::move(batch_.views);
+    return slice;
+  }
   fill(batch_.gather, next_gather_, target, slice_cost_, [&](GatherShot shot) {
     const auto first = batch_.points.begin() + shot.first_point;
     shot.first_point = static_cast<std::uint32_t>(slice.points.size());
@@ -68,7 +75,7 @@ Result<bool> Wave::advance(Transport& transport, TransportCounters& counters) {
     return tl::unexpected<Error>(done.error());
   }
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  cost_per_second_ = slice_cost_ / std::max(seconds, 1e-6);
+  if (slice_cost_ > 0.0) cost_per_second_ = slice_cost_ / std::max(seconds, 1e-6);
   cost_left_ -= slice_cost_;
   counters += *done;
   under_way_ = next_gather_ < batch_.gather.size() || next_scatter_ < batch_.scatter.size();

@@ -34,6 +34,7 @@ class Wave {
   std::size_t next_gather_ = 0, next_scatter_ = 0;
   double cost_left_ = 0.0, slice_cost_ = 0.0;
   double cost_per_second_ = 0.0;  // of the last slice; 0: not known
+  bool others_left_ = false;
   bool under_way_ = false;
 };
 

@@ -43,12 +43,12 @@ bool closedAndConnected(const std::vector<oracle::Triangle>& triangles) {
 }  // namespace
 
 std::optional<glm::dvec3> cavityIrradiance(const oracle::TriangleScene& scene) {
-  if (scene.triangles.empty()) return {};
+  if (scene.triangles.empty() || !scene.lamps.empty() || !scene.textures.empty()) return {};
   const auto& first = scene.triangles.front();
   double volume = 0.0;  // negative: the front is inside
   for (const auto& triangle : scene.triangles) {
     if (triangle.reflectance != first.reflectance || triangle.emission_lux != first.emission_lux ||
-        triangle.double_sided) {
+        triangle.double_sided || triangle.see_through) {
       return {};
     }
     const auto& [a, b, c] = triangle.corners;

@@ -30,6 +30,20 @@ class Hash {
   std::uint64_t state_ = 0xCBF29CE484222325ULL;
 };
 
+/// What else gives or takes light: lamps, the sky, textures.
+void addLights(const oracle::TriangleScene& scene, Hash& hash) {
+  for (const auto& lamp : scene.lamps) {
+    hash.add(static_cast<int>(lamp.kind));
+    hash.add(lamp.position), hash.add(lamp.direction), hash.add(lamp.intensity);
+    hash.add(lamp.range), hash.add(lamp.inner_rad), hash.add(lamp.outer_rad);
+  }
+  hash.add(scene.sky_upper), hash.add(scene.sky_lower);
+  for (const auto& texture : scene.textures) {
+    hash.add(texture.width), hash.add(texture.height);
+    for (const auto byte : texture.rgba) hash.add(byte);
+  }
+}
+
 void addProbe(const LitScene& lit, Hash& hash) {
   std::vector<oracle::Footprint> probes;
   const auto& triangles = lit.scene.triangles;
@@ -72,7 +86,11 @@ std::string referenceKey(const LitScene& lit, const ReferenceOptions& options) {
     hash.add(triangle.emission_lux);
     hash.add(triangle.double_sided);
     hash.add(triangle.lightmap_page);
+    for (const auto& uv : triangle.texture_uv) hash.add(uv);
+    hash.add(triangle.texture), hash.add(triangle.see_through), hash.add(triangle.alpha), hash.add(triangle.cutoff);
+    hash.add(triangle.transmission);
   }
+  addLights(lit.scene, hash);
   for (const auto& page : lit.pages) hash.add(page.width), hash.add(page.height);
   hash.add(options.texel_samples);
   hash.add(options.point_samples);

@@ -101,6 +101,9 @@ def light_and_reflectance(gltf, index):
     """(reflectance RGB, luminance RGB in nits, double-sided) as the project's conventions say."""
     material = gltf["materials"][index] if index is not None else {}
     pbr = material.get("pbrMetallicRoughness", {})
+    transmits = "KHR_materials_transmission" in material.get("extensions", {})
+    if "baseColorTexture" in pbr or "emissiveTexture" in material or material.get("alphaMode", "OPAQUE") != "OPAQUE" or transmits:
+        raise ValueError("textures and surfaces that let light through are not baked")
     colour = np.array(pbr.get("baseColorFactor", (1, 1, 1, 1))[:3], float)
     reflectance = np.minimum(colour * (1 - pbr.get("metallicFactor", 1.0)), 0.999)
     strength = material.get("extensions", {}).get("KHR_materials_emissive_strength", {}).get("emissiveStrength", 1.0)
@@ -166,6 +169,10 @@ def load(path, sizes):
     for old in list(bpy.data.objects):
         bpy.data.objects.remove(old)
     glb = Glb(path)
+    if glb.gltf.get("extensions", {}).get("KHR_lights_punctual", {}).get("lights"):
+        raise ValueError("lights without extent are not baked")
+    if "radiositySky" in (glb.gltf.get("extras") or {}):
+        raise ValueError("a sky is not baked")
     parts = list(glb.primitives())
     pages = 1 + max((page for *_, page, _ in parts), default=-1)
     if pages < 1:

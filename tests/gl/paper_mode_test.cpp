@@ -82,7 +82,7 @@ TEST_F(Paper, HardwareAndFormulaChooseLevelsWithinOneOfEachOther) {
   ASSERT_TRUE(renderer.has_value());
   auto uploaded = gpu::GpuScene::upload(*context_, scene);
   ASSERT_TRUE(uploaded.has_value());
-  renderer->setScene(std::move(*uploaded));
+  ASSERT_TRUE(renderer->setScene(std::move(*uploaded)).has_value());
   ASSERT_TRUE(renderer->preparePaper().has_value());
   const auto place = places(*scene);
   std::mt19937 random(5);

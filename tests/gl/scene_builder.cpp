@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <numbers>
 
@@ -18,6 +19,9 @@ std::uint32_t SceneBuilder::add(const Quad& quad) {
   surface.first_triangle = static_cast<std::uint32_t>(scene_.triangles.size());
   surface.triangle_count = 2;
   surface.planar = true;
+  const auto far = quad.origin + quad.u + quad.v;
+  surface.bounds_min = glm::min(glm::min(quad.origin, far), glm::min(quad.origin + quad.u, quad.origin + quad.v));
+  surface.bounds_max = glm::max(glm::max(quad.origin, far), glm::max(quad.origin + quad.u, quad.origin + quad.v));
   const float area = glm::length(glm::cross(quad.u, quad.v));
   const auto texels = static_cast<float>(quad.width * quad.height);
   surface.texel_area = area / texels;

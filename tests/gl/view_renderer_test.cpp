@@ -133,6 +133,18 @@ TEST_F(View, AnAlphaMaskCutsOut) {
   EXPECT_GT(image.at(24, 16).y, 2.0F);
 }
 
+TEST_F(View, ABlendedSurfaceCoversItsAlphaOfThePicture) {
+  SquareScene square;
+  const auto opaque = picture(square).at(16, 16);
+  square.scene.materials[0].alpha_mode = scene::AlphaMode::kBlend;
+  square.scene.materials[0].alpha = 0.6F;
+  const auto image = picture(square);
+  glm::vec3 mean(0.0F);
+  for (int i = 0; i < 256; ++i) mean += image.at(8 + i % 16, 8 + i / 16) / 256.0F;
+  // 2 or 3 of 4 samples, by chance: sigma 0.12 / sqrt(256)
+  expectNear(mean, 0.6F * opaque, 0.025F * opaque.y);
+}
+
 TEST_F(View, EdgesAreAntialiased) {
   SquareScene square;
   square.request.camera.world =

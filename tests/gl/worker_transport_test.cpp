@@ -102,7 +102,7 @@ TEST(BatchChunks, CoverEveryShotOnce) {
     std::size_t scatter = 0;
     std::size_t gather = 0;
     for (const auto& chunk : gpu::cutBatch(batch, 120, workers)) {
-      auto& next = chunk.gather ? gather : scatter;
+      auto& next = chunk.kind == gpu::ShotKind::kGather ? gather : scatter;
       EXPECT_EQ(chunk.first, next);
       EXPECT_GT(chunk.count, 0U);
       next += chunk.count;

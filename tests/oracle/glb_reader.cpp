@@ -1,4 +1,6 @@
 // A GLB reader of the oracle's own, so that a mistake in the server's importer cannot hide in both.
+#include <stb_image.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -22,6 +24,9 @@ using nlohmann::json;
 struct MaterialValues {
   glm::dvec3 reflectance{0.0}, emission_lux{0.0};
   bool double_sided = false;
+  bool see_through = false;
+  double alpha = 1.0, cutoff = -1.0, transmission = 0.0;
+  int texture = -1, texcoord = 0;
 };
 
 glm::dvec3 vector3(const json& array) {
@@ -56,13 +61,17 @@ class Reader {
     const auto bin_at = 20 + static_cast<std::size_t>(json_length);
     gltf_ = json::parse(bytes.begin() + 20, bytes.begin() + static_cast<std::ptrdiff_t>(bin_at));
     if (bin_at + 8 <= bytes.size()) bin_.assign(bytes.begin() + static_cast<std::ptrdiff_t>(bin_at) + 8, bytes.end());
-    if (gltf_.contains("extensionsRequired")) {
-      throw std::runtime_error("requires extensions: " + gltf_["extensionsRequired"].dump());
+    for (const auto& extension : member("extensionsRequired")) {
+      if (extension != "KHR_lights_punctual" && extension != "KHR_texture_transform") {
+        throw std::runtime_error("requires the extension " + extension.dump());
+      }
     }
   }
 
   TriangleScene read() {
+    for (const auto& image : member("images")) readImage(image);
     for (const auto& material : member("materials")) materials_.push_back(readMaterial(material));
+    readSky();
     for (const auto& node : member("nodes")) scene_.node_names.push_back(node.value("name", ""));
     const auto& scenes = member("scenes");
     const auto chosen = gltf_.value("scene", std::size_t{0});
@@ -94,7 +103,7 @@ class Reader {
   MaterialValues readMaterial(const json& material) {
     MaterialValues values;
     const auto pbr = material.value("pbrMetallicRoughness", json::object());
-    const double metallic = pbr.value("metallicFactor", 1.0);
+    const double metallic = pbr.value("metallicFactor", 1.0) * meanMetallic(pbr);
     values.reflectance = pbr.contains("baseColorFactor") ? vector3(pbr["baseColorFactor"]) : glm::dvec3(1.0);
     values.reflectance = glm::min(values.reflectance * (1.0 - metallic), glm::dvec3(0.999));
     if (material.contains("emissiveFactor")) {
@@ -106,10 +115,87 @@ class Reader {
       values.emission_lux = std::numbers::pi * strength * vector3(material["emissiveFactor"]);
     }
     values.double_sided = material.value("doubleSided", false);
-    if (pbr.contains("baseColorTexture")) warn("base colour textures are not modelled");
+    if (pbr.contains("baseColorTexture")) readTextureUse(pbr["baseColorTexture"], values);
     if (material.contains("emissiveTexture")) warn("emissive textures are not modelled");
-    if (material.value("alphaMode", "OPAQUE") != "OPAQUE") warn("alphaMode is not modelled");
+    readOpacity(material, pbr, values);
     return values;
+  }
+
+  /// Of the whole texture: 1 where there is none.
+  double meanMetallic(const json& pbr) {
+    if (!pbr.contains("metallicRoughnessTexture")) return 1.0;
+    const auto& use = pbr["metallicRoughnessTexture"];
+    const auto& texture = member("textures").at(use.at("index").get<std::size_t>());
+    if (!texture.contains("source")) return 1.0;
+    const auto& pixels = scene_.textures.at(texture["source"].get<std::size_t>()).rgba;
+    double sum = 0.0;
+    for (std::size_t i = 2; i < pixels.size(); i += 4) sum += pixels[i] / 255.0;
+    return sum / (static_cast<double>(pixels.size()) / 4.0);
+  }
+
+  void readTextureUse(const json& use, MaterialValues& values) {
+    if (use.contains("extensions")) warn("texture transforms are not modelled");
+    const auto& texture = member("textures").at(use.at("index").get<std::size_t>());
+    values.texture = texture.value("source", -1);
+    values.texcoord = use.value("texCoord", 0);
+  }
+
+  static void readOpacity(const json& material, const json& pbr, MaterialValues& values) {
+    const auto mode = material.value("alphaMode", std::string("OPAQUE"));
+    if (mode != "OPAQUE" && pbr.contains("baseColorFactor")) values.alpha = pbr["baseColorFactor"].at(3).get<double>();
+    if (mode == "MASK") values.cutoff = material.value("alphaCutoff", 0.5);
+    const auto extensions = material.value("extensions", json::object());
+    if (extensions.contains("KHR_materials_transmission")) {
+      values.transmission = extensions["KHR_materials_transmission"].value("transmissionFactor", 0.0);
+    }
+    values.see_through = mode != "OPAQUE" || values.transmission > 0.0;
+    // An opaque surface ignores the texture's alpha: only its transmission counts.
+    if (mode == "OPAQUE" && values.see_through) values.cutoff = 0.0;
+  }
+
+  void readImage(const json& image) {
+    Texture texture;
+    if (image.contains("bufferView")) {
+      const auto& view = member("bufferViews").at(image["bufferView"].get<std::size_t>());
+      const auto start = view.value("byteOffset", std::size_t{0});
+      const auto length = view.at("byteLength").get<std::size_t>();
+      if (start + length > bin_.size()) throw std::runtime_error("image passes the end of its buffer");
+      int channels = 0;
+      auto* pixels = stbi_load_from_memory(reinterpret_cast<const stbi_uc*>(bin_.data() + start),
+                                           static_cast<int>(length), &texture.width, &texture.height, &channels, 4);
+      if (pixels == nullptr) throw std::runtime_error("an image cannot be decoded");
+      texture.rgba.assign(pixels, pixels + std::size_t{4} * static_cast<std::size_t>(texture.width) *
+                                               static_cast<std::size_t>(texture.height));
+      stbi_image_free(pixels);
+    } else {
+      warn("images outside the GLB are taken as white");
+      texture = {1, 1, {255, 255, 255, 255}};
+    }
+    scene_.textures.push_back(std::move(texture));
+  }
+
+  void readSky() {
+    const auto extras = gltf_.value("extras", json::object());
+    if (!extras.is_object() || !extras.contains("radiositySky")) return;
+    const auto& sky = extras["radiositySky"];
+    scene_.sky_upper = vector3(sky.at("upper"));
+    scene_.sky_lower = sky.contains("lower") ? vector3(sky["lower"]) : scene_.sky_upper;
+  }
+
+  void readLight(const json& light, const glm::dmat4& world) {
+    Lamp lamp;
+    const auto type = light.at("type").get<std::string>();
+    lamp.kind = type == "point" ? Lamp::Kind::kPoint : type == "spot" ? Lamp::Kind::kSpot : Lamp::Kind::kSun;
+    lamp.position = glm::dvec3(world[3]);
+    lamp.direction = glm::normalize(-glm::dvec3(world[2]));
+    const auto color = light.contains("color") ? vector3(light["color"]) : glm::dvec3(1.0);
+    lamp.intensity = color * light.value("intensity", 1.0);
+    lamp.range = light.value("range", 0.0);
+    if (light.contains("spot")) {
+      lamp.inner_rad = light["spot"].value("innerConeAngle", 0.0);
+      lamp.outer_rad = light["spot"].value("outerConeAngle", std::numbers::pi / 4);
+    }
+    scene_.lamps.push_back(lamp);
   }
 
   static glm::dmat4 localMatrix(const json& node) {
@@ -138,6 +224,11 @@ class Reader {
     if (node.contains("mesh")) {
       const auto& mesh = member("meshes").at(node["mesh"].get<std::size_t>());
       for (const auto& primitive : mesh.at("primitives")) readPrimitive(primitive, world, index);
+    }
+    const auto extensions = node.value("extensions", json::object());
+    if (extensions.contains("KHR_lights_punctual")) {
+      const auto& lights = gltf_.at("extensions").at("KHR_lights_punctual").at("lights");
+      readLight(lights.at(extensions["KHR_lights_punctual"].at("light").get<std::size_t>()), world);
     }
     for (const auto& child : node.value("children", json::array())) {
       readNode(child.get<std::uint32_t>(), world, depth + 1);
@@ -199,6 +290,14 @@ class Reader {
       if (member("accessors").at(accessor).at("componentType") != 5126) warn("TEXCOORD_1 is not float");
       visitAccessor(accessor, 2, [&](auto i, auto c, double v) { uvs.at(i)[static_cast<int>(c)] = v; });
     }
+    std::vector<glm::dvec2> texture_uvs(positions.size());
+    int texcoord = 0;
+    if (primitive.contains("material")) texcoord = materials_.at(primitive["material"].get<std::size_t>()).texcoord;
+    if (const auto name = "TEXCOORD_" + std::to_string(texcoord); attributes.contains(name)) {
+      const auto accessor = attributes[name].get<std::size_t>();
+      if (member("accessors").at(accessor).at("componentType") != 5126) warn(name + " is not float");
+      visitAccessor(accessor, 2, [&](auto i, auto c, double v) { texture_uvs.at(i)[static_cast<int>(c)] = v; });
+    }
     std::vector<glm::dvec3> colours(positions.size(), glm::dvec3(1.0));
     if (attributes.contains("COLOR_0")) readColours(attributes["COLOR_0"].get<std::size_t>(), colours);
     std::vector<std::size_t> indices;
@@ -208,7 +307,7 @@ class Reader {
     } else {
       for (std::size_t i = 0; i < positions.size(); ++i) indices.push_back(i);
     }
-    appendTriangles(primitive, positions, uvs, colours, indices, glm::determinant(world) < 0.0, node);
+    appendTriangles(primitive, {positions, uvs, texture_uvs, colours}, indices, glm::determinant(world) < 0.0, node);
   }
 
   /// Colours multiply reflectance; integers stand for [0, 1].
@@ -230,12 +329,17 @@ class Reader {
     return colour;
   }
 
-  void appendTriangles(const json& primitive, const std::vector<glm::dvec3>& positions,
-                       const std::vector<glm::dvec2>& uvs, const std::vector<glm::dvec3>& colours,
-                       const std::vector<std::size_t>& indices, bool flipped, std::uint32_t node) {
+  struct Corners {
+    const std::vector<glm::dvec3>& positions;
+    const std::vector<glm::dvec2>&lightmap_uvs, &texture_uvs;
+    const std::vector<glm::dvec3>& colours;
+  };
+
+  void appendTriangles(const json& primitive, const Corners& corners, const std::vector<std::size_t>& indices,
+                       bool flipped, std::uint32_t node) {
     Triangle triangle;
     triangle.node = node;
-    MaterialValues values{glm::dvec3(0.0), glm::dvec3(0.0), false};  // the default material is a perfect metal
+    MaterialValues values;  // the default material is a perfect metal
     if (primitive.contains("material")) {
       triangle.material = primitive["material"].get<std::uint32_t>();
       values = materials_.at(triangle.material);
@@ -243,19 +347,25 @@ class Reader {
     triangle.reflectance = values.reflectance;
     triangle.emission_lux = values.emission_lux;
     triangle.double_sided = values.double_sided;
+    triangle.texture = values.texture;
+    triangle.see_through = values.see_through;
+    triangle.alpha = values.alpha;
+    triangle.cutoff = values.cutoff;
+    triangle.transmission = values.transmission;
     const auto extras = primitive.value("extras", json::object());
     if (extras.is_object()) triangle.lightmap_page = extras.value("lightmap", -1);
     for (std::size_t i = 0; i + 2 < indices.size(); i += 3) {
       for (std::size_t k = 0; k < 3; ++k) {
         const auto vertex = indices[i + (flipped ? 2 - k : k)];
-        triangle.corners[k] = positions.at(vertex);
-        triangle.lightmap_uv[k] = uvs.at(vertex);
+        triangle.corners[k] = corners.positions.at(vertex);
+        triangle.lightmap_uv[k] = corners.lightmap_uvs.at(vertex);
+        triangle.texture_uv[k] = corners.texture_uvs.at(vertex);
       }
       const auto& [a, b, c] = triangle.corners;
       const auto normal = glm::cross(b - a, c - a);
       if (!(glm::length(normal) > 0.0)) continue;
       triangle.normal = glm::normalize(normal);
-      triangle.reflectance = glm::min(values.reflectance * oneColour(colours, indices, i), glm::dvec3(0.999));
+      triangle.reflectance = glm::min(values.reflectance * oneColour(corners.colours, indices, i), glm::dvec3(0.999));
       scene_.triangles.push_back(triangle);
     }
   }

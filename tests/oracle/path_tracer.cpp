@@ -12,6 +12,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "tests/oracle/lamps.h"
 #include "tests/oracle/random.h"
 
 namespace radiosity::oracle {
@@ -76,7 +77,13 @@ double Footprint::area() const {
 
 class PathTracer::Scene {
  public:
-  explicit Scene(const TriangleScene& scene) : triangles_(scene.triangles) {
+  explicit Scene(const TriangleScene& scene)
+      : triangles_(scene.triangles),
+        textures_(scene.textures),
+        lamps_(scene.lamps),
+        sky_upper_(scene.sky_upper),
+        sky_lower_(scene.sky_lower) {
+    for (const auto& triangle : triangles_) see_through_ = see_through_ || triangle.see_through;
     device_ = rtcNewDevice(nullptr);
     if (device_ == nullptr) throw std::runtime_error("Embree did not start");
     measure();
@@ -113,6 +120,7 @@ class PathTracer::Scene {
         const auto point = pointOn(footprint, cumulative, u[0], u[1]);
         tallies[b].tried += 1.0;
         if (check_burial && buried(point)) continue;
+        if (see_through_ && onHole(point)) continue;
         tallies[b].visible += 1.0;
         tallies[b].sum += path(point, {u[2], u[3], u[4], u[5], u[6]}, random);
       }
@@ -219,14 +227,83 @@ class PathTracer::Scene {
     return hit;
   }
 
-  [[nodiscard]] bool meetsBack(const Point& from, const glm::dvec3& direction) const {
-    const auto hit = trace(from, direction);
-    return hit && hit->back && !triangles_[hit->triangle].double_sided;
+  /// The nearest surface that stops the ray: each that it meets does so with the probability of its opacity there.
+  [[nodiscard]] std::optional<Hit> traceThrough(const Point& from, const glm::dvec3& direction, Random& random) const {
+    Point at = from;
+    for (int met = 0;; ++met) {
+      auto hit = trace(at, direction);
+      if (!hit || met == kMaxLayers || random.uniform() < opacityAt(*hit)) {
+        if (hit) hit->distance = glm::length(hit->point.position - from.position);
+        return hit;
+      }
+      at = {hit->point.position, -hit->point.normal};  // lifted off the far side
+    }
   }
 
-  [[nodiscard]] bool sees(const Point& a, const Point& b) const {
-    const auto from = lifted(a);
-    const auto way = lifted(b) - from;
+  [[nodiscard]] double opacityAt(const Hit& hit) const {
+    return opacityAt(triangles_[hit.triangle], hit.point.position);
+  }
+
+  [[nodiscard]] double opacityAt(const Triangle& triangle, const glm::dvec3& position) const {
+    if (!triangle.see_through) return 1.0;
+    double alpha = triangle.alpha * textureAt(triangle, position).w;
+    if (triangle.cutoff >= 0.0) alpha = alpha >= triangle.cutoff ? 1.0 : 0.0;
+    return alpha * (1.0 - triangle.transmission);
+  }
+
+  [[nodiscard]] glm::dvec4 textureAt(const Triangle& triangle, const glm::dvec3& position) const {
+    if (triangle.texture < 0) return glm::dvec4(1.0);
+    const auto& [a, b, c] = triangle.corners;
+    const auto normal = glm::cross(b - a, c - a);
+    const double square = glm::dot(normal, normal);
+    const double u = glm::dot(glm::cross(position - a, c - a), normal) / square;
+    const double v = glm::dot(glm::cross(b - a, position - a), normal) / square;
+    const auto& uv = triangle.texture_uv;
+    return textures_[static_cast<std::size_t>(triangle.texture)].at(uv[0] * (1.0 - u - v) + uv[1] * u + uv[2] * v);
+  }
+
+  /// Whether the point lies where its own surface is cut out.
+  [[nodiscard]] bool onHole(const Point& point) const {
+    const Point above{point.position + point.normal * (4.0 * kLift / scale_), -point.normal};
+    const auto hit = trace(above, -point.normal);
+    return hit && triangles_[hit->triangle].see_through && opacityAt(*hit) <= 0.0;
+  }
+
+  [[nodiscard]] bool meetsBack(const Point& from, const glm::dvec3& direction) const {
+    const auto hit = trace(from, direction);
+    return hit && hit->back && !triangles_[hit->triangle].double_sided && !triangles_[hit->triangle].see_through;
+  }
+
+  [[nodiscard]] bool sees(const Point& a, const Point& b, Random& random) const {
+    const auto way = b.position - a.position;
+    const double distance = glm::length(way);
+    if (see_through_) {
+      const auto hit = traceThrough(a, way / distance, random);
+      return !hit || hit->distance >= distance - 4.0 * kLift / scale_;
+    }
+    return !blocked(lifted(a), lifted(b) - lifted(a));
+  }
+
+  /// From a point to where a lamp is, or to infinity.
+  [[nodiscard]] bool seesLamp(const Point& a, const glm::dvec3& direction, double distance, Random& random) const {
+    if (see_through_) {
+      const auto hit = traceThrough(a, direction, random);
+      return !hit || hit->distance >= distance;
+    }
+    return !blocked(lifted(a), std::isfinite(distance) ? direction * (distance * scale_) : direction * 10.0);
+  }
+
+  [[nodiscard]] glm::dvec3 lampLight(const Point& at, Random& random) const {
+    glm::dvec3 sum(0.0);
+    for (const auto& lamp : lamps_) {
+      const auto light = lightOf(lamp, at.position, at.normal);
+      if (light.irradiance == glm::dvec3(0.0)) continue;
+      if (seesLamp(at, light.direction, light.distance, random)) sum += light.irradiance;
+    }
+    return sum;
+  }
+
+  [[nodiscard]] bool blocked(const glm::dvec3& from, const glm::dvec3& way) const {
     RTCRay ray{};
     ray.org_x = static_cast<float>(from.x);
     ray.org_y = static_cast<float>(from.y);
@@ -239,12 +316,12 @@ class PathTracer::Scene {
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     rtcOccluded1(scene_, &context, &ray);
-    return ray.tfar > 0.0F;
+    return ray.tfar <= 0.0F;
   }
 
   /// Light straight from a random point of an emitter, weighted against meeting it by a cosine ray (balance heuristic,
   /// Veach and Guibas 1995).
-  [[nodiscard]] glm::dvec3 direct(const Point& at, double u0, double u1, double u2) const {
+  [[nodiscard]] glm::dvec3 direct(const Point& at, double u0, double u1, double u2, Random& random) const {
     if (lights_.empty()) return glm::dvec3(0.0);
     const auto t = lights_[pick(cumulative_power_, u0)];
     const auto& light = triangles_[t];
@@ -260,9 +337,10 @@ class PathTracer::Scene {
       y.normal = -y.normal;
     }
     if (cos_at <= 0.0 || cos_light <= 0.0) return glm::dvec3(0.0);
-    if (!sees(at, y)) return glm::dvec3(0.0);
+    if (!sees(at, y, random)) return glm::dvec3(0.0);
     const double density = light_density_[t] * distance2 / cos_light;  // per steradian
-    return light.emission_lux * (cos_at / kPi / (density + cos_at / kPi));
+    const double there = opacityAt(light, y.position);
+    return light.emission_lux * (there * cos_at / kPi / (density + cos_at / kPi));
   }
 
   /// One sample of irradiance: H(x) = direct + mean over cosine directions of rho(y) H(y).
@@ -272,10 +350,11 @@ class PathTracer::Scene {
     for (int bounce = 0;; ++bounce) {
       FirstVertex u = first;
       if (bounce > 0) std::generate(u.begin(), u.end(), [&] { return random.uniform(); });
-      sum += throughput * direct(at, u[0], u[1], u[2]);
+      sum += throughput * (direct(at, u[0], u[1], u[2], random) + lampLight(at, random));
       const auto direction = cosineDirection(at.normal, u[3], u[4]);
-      const auto hit = trace(at, direction);
-      if (!hit) return sum;
+      const auto hit = see_through_ ? traceThrough(at, direction, random) : trace(at, direction);
+      // The sky is met by cosine rays only: pi times its radiance is the mean over them.
+      if (!hit) return sum + throughput * kPi * (direction.y > 0.0 ? sky_upper_ : sky_lower_);
       const auto& triangle = triangles_[hit->triangle];
       if (hit->back && !triangle.double_sided) return sum;
       if (light_density_[hit->triangle] > 0.0) {
@@ -285,6 +364,7 @@ class PathTracer::Scene {
         sum += throughput * triangle.emission_lux * (by_cosine / (by_cosine + by_light));
       }
       throughput *= triangle.reflectance;
+      if (triangle.texture >= 0) throughput *= glm::dvec3(textureAt(triangle, hit->point.position));
       const double survival = std::min(1.0, std::max({throughput.x, throughput.y, throughput.z}));
       if (survival <= 0.0) return sum;
       if (bounce >= 1) {
@@ -344,9 +424,14 @@ class PathTracer::Scene {
     return result;
   }
 
-  static constexpr double kLift = 2e-6;  // of a box of size 2
+  static constexpr double kLift = 2e-6;    // of a box of size 2
+  static constexpr int kMaxLayers = 1000;  // that a ray may pass through
 
   std::vector<Triangle> triangles_;
+  std::vector<Texture> textures_;
+  std::vector<Lamp> lamps_;
+  glm::dvec3 sky_upper_, sky_lower_;
+  bool see_through_ = false;  // anything
   RTCDevice device_ = nullptr;
   RTCScene scene_ = nullptr;
   glm::dvec3 centre_{0.0};

@@ -108,9 +108,11 @@ json materialJson(const Material& material) {
   const auto& rho = material.reflectance;
   json result{{"name", material.name},
               {"pbrMetallicRoughness",
-               {{"baseColorFactor", json::array({rho.x, rho.y, rho.z, 1.0})},
+               {{"baseColorFactor", json::array({rho.x, rho.y, rho.z, material.opacity})},
                 {"metallicFactor", 0.0},
                 {"roughnessFactor", 1.0}}}};
+  if (material.opacity < 1.0) result["alphaMode"] = "BLEND";
+  if (material.double_sided) result["doubleSided"] = true;
   const auto& emission = material.emission_nits;
   const double strength = std::max({emission.x, emission.y, emission.z});
   if (strength <= 0.0) return result;
@@ -133,6 +135,46 @@ json cameraJson(const Camera& camera) {
   json perspective{{"yfov", camera.yfov_rad}, {"znear", 0.01}};
   if (camera.aspect > 0.0) perspective["aspectRatio"] = camera.aspect;
   return {{"type", "perspective"}, {"perspective", perspective}};
+}
+
+json lightJson(const Light& light) {
+  constexpr std::array<const char*, 3> kNames{"point", "spot", "directional"};
+  const auto& color = light.intensity;
+  const double intensity = std::max({color.x, color.y, color.z});
+  json result{{"type", kNames[static_cast<std::size_t>(light.kind)]},
+              {"color", toJson(intensity > 0.0 ? color / intensity : glm::dvec3(1.0))},
+              {"intensity", intensity}};
+  if (light.range_m > 0.0) result["range"] = light.range_m;
+  if (light.kind == Light::Kind::kSpot) {
+    result["spot"] = {{"innerConeAngle", light.inner_cone_rad}, {"outerConeAngle", light.outer_cone_rad}};
+  }
+  return result;
+}
+
+/// A light shines along its node's -Z.
+json lightNode(const Light& light, std::size_t index) {
+  const auto back = glm::normalize(light.position - light.target);
+  const auto helper = std::abs(back.y) < 0.9 ? glm::dvec3(0.0, 1.0, 0.0) : glm::dvec3(1.0, 0.0, 0.0);
+  const auto right = glm::normalize(glm::cross(helper, back));
+  const glm::dquat q(glm::dmat3(right, glm::cross(back, right), back));
+  return {{"name", "light" + std::to_string(index)},
+          {"extensions", {{"KHR_lights_punctual", {{"light", index}}}}},
+          {"translation", toJson(light.position)},
+          {"rotation", json::array({q.x, q.y, q.z, q.w})}};
+}
+
+void addLights(const TestScene& scene, json& gltf) {
+  if (scene.sky_upper_nits != glm::dvec3(0.0) || scene.sky_lower_nits != glm::dvec3(0.0)) {
+    gltf["extras"]["radiositySky"] = {{"upper", toJson(scene.sky_upper_nits)}, {"lower", toJson(scene.sky_lower_nits)}};
+  }
+  if (scene.lights.empty()) return;
+  json lights = json::array();
+  for (const auto& light : scene.lights) {
+    gltf["nodes"].push_back(lightNode(light, lights.size()));
+    lights.push_back(lightJson(light));
+  }
+  gltf["extensions"]["KHR_lights_punctual"]["lights"] = std::move(lights);
+  gltf["extensionsUsed"].push_back("KHR_lights_punctual");
 }
 
 json document(const TestScene& scene, Writer& writer) {
@@ -159,6 +201,7 @@ json document(const TestScene& scene, Writer& writer) {
     if (object.origin != glm::dvec3(0.0)) gltf["nodes"].back()["translation"] = toJson(object.origin);
     gltf["meshes"].push_back({{"name", object.name}, {"primitives", std::move(primitives)}});
   }
+  addLights(scene, gltf);
   gltf["nodes"].push_back(cameraNode(scene.camera));
   json roots = json::array();
   for (std::size_t i = 0; i < gltf["nodes"].size(); ++i) roots.push_back(i);

@@ -13,6 +13,8 @@ struct Material {
   std::string name;
   glm::dvec3 reflectance{0.0};    ///< linear sRGB, each channel in [0, 1)
   glm::dvec3 emission_nits{0.0};  ///< luminance of the front side
+  double opacity = 1.0;           ///< below 1: alphaMode BLEND
+  bool double_sided = false;
 };
 
 /// Convex, planar, counter-clockwise seen from the side that reflects and emits.
@@ -28,6 +30,16 @@ struct Object {
   std::vector<Polygon> polygons;
 };
 
+/// KHR_lights_punctual.
+struct Light {
+  enum class Kind { kPoint, kSpot, kDirectional } kind = Kind::kPoint;
+  glm::dvec3 position{0.0};
+  glm::dvec3 target{0.0, -1.0, 0.0};  ///< spot and directional: shines this way from `position`
+  glm::dvec3 intensity{1.0};          ///< candela; lux of a directional light
+  double range_m = 0.0;               ///< 0: none
+  double inner_cone_rad = 0.0, outer_cone_rad = 0.7853981633974483;
+};
+
 struct Camera {
   glm::dvec3 position{0.0};
   glm::dvec3 target{0.0, 0.0, -1.0};
@@ -39,6 +51,8 @@ struct TestScene {
   std::string name;
   std::vector<Material> materials;
   std::vector<Object> objects;
+  std::vector<Light> lights;
+  glm::dvec3 sky_upper_nits{0.0}, sky_lower_nits{0.0};  ///< written as /extras/radiositySky where not black
   Camera camera;
 
   /// Adds a material and returns its index.

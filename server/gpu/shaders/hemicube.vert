@@ -1,4 +1,4 @@
-// World to one face of a hemicube. Every view is rendered at the same place of its own layer, so a shot's pixels do not
+// World to one face of a hemicube, or to a parallel projection of the whole scene. Every view is rendered at the same place of its own layer, so a shot's pixels do not
 // depend on what else is in the batch.
 
 layout(location = RAD_ATTRIBUTE_POSITION) in vec4 position_area;  // unit box; w: area of a leaf texel
@@ -12,6 +12,14 @@ layout(location = RAD_ATTRIBUTE_VIEW + 1) in vec4 view_up;      // clip.y axis; 
 layout(location = RAD_ATTRIBUTE_VIEW + 2) in vec4 view_depth;   // clip.w axis; w: layer
 layout(location = RAD_ATTRIBUTE_VIEW + 3) in vec4 view_origin;  // shooter; w: level bias
 
+#if defined(PAPER) || defined(SEE_THROUGH)
+layout(location = RAD_ATTRIBUTE_SURFACE) in uint surface;
+#endif
+#ifdef SEE_THROUGH
+out vec2 opacity_texel;
+flat out uvec2 opacity_surface_seed;
+#endif
+
 #ifdef SCATTER
 layout(location = RAD_UNIFORM_ABSORBED_ID) uniform uint absorbed_id;
 out vec2 chart_texel;
@@ -19,7 +27,6 @@ out vec2 chart_texel;
 // varying, since each costs setup time for every triangle.
 flat out uvec3 node_level_footprint;
 #elif defined(PAPER)
-layout(location = RAD_ATTRIBUTE_SURFACE) in uint surface;
 layout(location = RAD_UNIFORM_PATCH_BITS) uniform uint patch_bits;
 layout(location = RAD_UNIFORM_TEXEL_TO_UV) uniform float texel_to_uv;
 out vec2 patch_uv;
@@ -31,9 +38,22 @@ flat out uint item;
 
 void main() {
   vec3 d = position_area.xyz - view_origin.xyz;
+#ifdef PARALLEL
+  // w of right and up: shift of the image; the depth axis points towards the light
+  gl_Position = vec4(dot(view_right.xyz, d) + view_right.w, dot(view_up.xyz, d) + view_up.w,
+                     0.5 + dot(view_depth.xyz, d), 1.0);
+#else
   gl_Position = vec4(dot(view_right.xyz, d), dot(view_up.xyz, d), RAD_NEAR, dot(view_depth.xyz, d));
   gl_ViewportIndex = int(view_up.w);
+#endif
   gl_Layer = int(view_depth.w);
+#ifdef SEE_THROUGH
+  // The view alone makes the seed, not its layer: a shot's pixels do not depend on what else is in the batch.
+  uvec3 bits = floatBitsToUint(view_right.xyz) * uvec3(0x9E3779B1u, 0x85EBCA77u, 0xC2B2AE3Du);
+  uvec3 place = floatBitsToUint(view_origin.xyz) * uvec3(0x27D4EB2Fu, 0x165667B1u, 0x9E3779B1u);
+  opacity_texel = texel;
+  opacity_surface_seed = uvec2(surface, bits.x ^ bits.y ^ bits.z ^ place.x ^ place.y ^ place.z);
+#endif
 #ifdef SCATTER
   float side = dot(normal, d);
   chart_texel = texel;

@@ -2,4 +2,9 @@
 flat in uint item;
 layout(location = 0) out uint seen;
 
-void main() { seen = item; }
+void main() {
+#ifdef SEE_THROUGH
+  seeThrough();
+#endif
+  seen = item;
+}

@@ -8,6 +8,9 @@ flat in uvec3 node_level_footprint;
 layout(location = 0) out uint node;
 
 void main() {
+#ifdef SEE_THROUGH
+  seeThrough();
+#endif
   uvec2 node_level = node_level_footprint.xy;
   float footprint = uintBitsToFloat(node_level_footprint.z);
   float z = 1.0 / gl_FragCoord.w;

@@ -7,4 +7,9 @@ flat in uint polygon;
 flat in float bias;
 layout(location = 0) out uint id;
 
-void main() { id = polygon | texture(patch_ids, patch_uv, bias).r; }
+void main() {
+#ifdef SEE_THROUGH
+  seeThrough();
+#endif
+  id = polygon | texture(patch_ids, patch_uv, bias).r;
+}

@@ -10,7 +10,7 @@ layout(binding = 0) uniform sampler2D base_color;
 layout(binding = 1) uniform sampler2D emissive;
 layout(binding = 2) uniform sampler2D page;
 layout(location = 1) uniform int quantity;
-layout(location = 2) uniform float alpha_cutoff;  // negative: no test
+layout(location = 2) uniform float alpha_cutoff;  // -1: no test; -2: alpha covers so many of the samples
 layout(location = 3) uniform float base_alpha;
 layout(location = 4) uniform float data_scale;    // brings the data of kError and kMipLevel to 0..1
 
@@ -31,9 +31,23 @@ vec3 hashColor(uint id) {
   return vec3(id & 255u, id >> 8 & 255u, id >> 16 & 255u) / 255.0;
 }
 
+// Blending without an order: alpha of the four samples are covered, by chance between two numbers, and not the same ones
+// everywhere.
+void coverSamples(float alpha) {
+  uvec2 pixel = uvec2(gl_FragCoord.xy);
+  vec3 chance = hashColor(pixel.x * 1973u + pixel.y * 9277u + uint(gl_FragCoord.z * 1048576.0) * 26699u);
+  uint count = min(uint(floor(4.0 * alpha + chance.x)), 4u);
+  if (count == 0u) discard;
+  uint samples = (1u << count) - 1u, turn = uint(chance.y * 3.999);
+  gl_SampleMask[0] = int((samples << turn | samples >> (4u - turn)) & 15u);
+}
+
 void main() {
   vec4 base = texture(base_color, texture_uv.xy);
-  if (base.a * base_alpha < alpha_cutoff) discard;
+  gl_SampleMask[0] = ~0;
+  float alpha = base.a * base_alpha;
+  if (alpha < alpha_cutoff) discard;
+  if (alpha_cutoff < -1.5) coverSamples(alpha);
   vec3 albedo = min(base.rgb * albedo_factor, vec3(0.999));
   vec3 emission = texture(emissive, texture_uv.zw).rgb * emission_factor;
   vec3 irradiance = max(texture(page, page_uv).rgb, vec3(0.0));

@@ -195,10 +195,62 @@ void RayTransport::gather(const solver::GatherShot& shot, const solver::ShotBatc
   }
 }
 
+template <typename Irradiance>
+void RayTransport::light(const std::array<double, 3>& unit, const std::array<double, 3>& emitted, std::uint32_t half,
+                         double scale, Irradiance irradiance, solver::FluxAccumulators& into) const {
+  std::array<double, 3> caught{};
+  for (const auto& surface : patches_->surfaces) {
+    const auto& frame = patches_->triangles[surface.first_triangle];
+    for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf) {
+      const glm::vec2 texel(static_cast<float>(leaf % surface.width) + 0.5F,
+                            static_cast<float>(leaf / surface.width) + 0.5F);
+      const double e = irradiance(frame.origin + texel.x * frame.du + texel.y * frame.dv, frame.normal);
+      const auto node = surface.first_node[0] + leaf;
+      for (std::size_t c = 0; c < 3; ++c) {
+        const double flux = unit[c] * e * static_cast<double>(patches_->node_area[node]);
+        into.node[half][node][c] += std::llround(flux * scale);
+        into.gathered[c] += std::llround(flux * scale);
+        caught[c] += flux;
+      }
+    }
+  }
+  for (std::size_t c = 0; c < 3; ++c) into.escaped[c] += std::llround((emitted[c] - caught[c]) * scale);
+}
+
+void RayTransport::point(const solver::PointShot& shot, double scale, solver::FluxAccumulators& into) const {
+  const auto irradiance = [&](const glm::vec3& p, const glm::vec3& normal) {
+    const glm::vec3 to = shot.frame.origin - p;
+    const float distance = glm::length(to), cosine = glm::dot(to, normal) / distance;
+    const float axis = -glm::dot(to, shot.frame.normal) / distance;
+    if (cosine <= 0.0F || axis <= 0.0F || cast(p, to / distance).distance < distance) return 0.0;
+    const float fade = std::clamp(axis * shot.cone_scale + shot.cone_offset, 0.0F, 1.0F);
+    return static_cast<double>(fade * fade * cosine / (distance * distance));
+  };
+  light(shot.intensity, shot.emitted, shot.half, scale, irradiance, into);
+}
+
+void RayTransport::parallel(const solver::ParallelShot& shot, const solver::ShotBatch& batch,
+                            solver::FluxAccumulators& into) const {
+  const auto irradiance = [&](const glm::vec3& p, const glm::vec3& normal) {
+    double sum = 0.0;
+    for (std::uint32_t v = shot.first_view; v < shot.first_view + shot.view_count; ++v) {
+      const auto& direction = batch.views[v].direction;
+      const float cosine = glm::dot(direction, normal);
+      if (cosine > 0.0F && cast(p, direction).surface == scene::kNone) sum += static_cast<double>(cosine);
+    }
+    return sum;
+  };
+  light(shot.irradiance, shot.emitted, shot.half, batch.flux_scale, irradiance, into);
+}
+
 Result<solver::TransportCounters> RayTransport::run(const solver::ShotBatch& batch, solver::FluxAccumulators& into) {
   for (const auto& shot : batch.scatter) scatter(shot, batch.flux_scale, into);
   for (const auto& shot : batch.gather) gather(shot, batch, into);
+  for (const auto& shot : batch.point_lights) point(shot, batch.flux_scale, into);
+  for (const auto& shot : batch.parallel) parallel(shot, batch, into);
   solver::TransportCounters counters;
+  counters.point_images = batch.point_lights.size();
+  counters.parallel_images = batch.views.size();
   counters.scatter_shots = batch.scatter.size();
   counters.gather_shots = batch.gather.size();
   counters.gather_points = batch.points.size();

@@ -52,6 +52,13 @@ class RayTransport final : public solver::Transport {
   void scatter(const solver::ScatterShot& shot, double scale, solver::FluxAccumulators& into) const;
   void gather(const solver::GatherShot& shot, const solver::ShotBatch& batch, solver::FluxAccumulators& into) const;
 
+  /// Irradiance at leaf middles from one direction or point, for an intensity of 1; 0 where hidden.
+  template <typename Irradiance>
+  void light(const std::array<double, 3>& unit, const std::array<double, 3>& emitted, std::uint32_t half, double scale,
+             Irradiance irradiance, solver::FluxAccumulators& into) const;
+  void point(const solver::PointShot& shot, double scale, solver::FluxAccumulators& into) const;
+  void parallel(const solver::ParallelShot& shot, const solver::ShotBatch& batch, solver::FluxAccumulators& into) const;
+
   void countLost(const solver::GatherShot& shot, const solver::ShotBatch& batch, double light_area,
                  solver::FluxAccumulators& into) const;
 

@@ -1,0 +1,61 @@
+// Item buffers of the whole scene in parallel projection: what light from infinity sees. Belongs to one context and its
+// thread.
+#pragma once
+
+#include <array>
+#include <map>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "server/gpu/gl_objects.h"
+#include "server/gpu/gpu_scene.h"
+#include "server/solver/transport.h"
+
+namespace radiosity::gpu {
+
+/// Unit box to the image of one view: pixel = floor(across (p - centre) + shift), in columns and rows.
+struct ParallelAxes {
+  glm::vec3 centre, right, up;  ///< right and up: pixels for each unit
+  glm::vec2 shift;
+  double pixel_area;  ///< unit^2
+};
+
+class ParallelRenderer {
+ public:
+  [[nodiscard]] static Result<ParallelRenderer> create(const EglContext& context);
+
+  /// Fails when the driver does not compile the variant for scenes that one can see through.
+  [[nodiscard]] Result<void> setScene(const GpuScene& scene);
+
+  /// How many views one render() may take at this resolution.
+  [[nodiscard]] std::size_t capacity(std::uint32_t resolution) const;
+  [[nodiscard]] ParallelAxes axes(const solver::ParallelView& view, std::uint32_t resolution) const;
+
+  /// resolution^2 items for each view, rows from below; a triangle of the plane seen, or RAD_ITEM_NONE. Valid until the
+  /// next call.
+  std::span<const std::uint32_t> render(const GpuScene& scene, std::uint32_t resolution,
+                                        std::span<const solver::ParallelView> views,
+                                        solver::TransportCounters& counters);
+
+ private:
+  struct Target {
+    Texture ids, depth;
+    Framebuffer framebuffer;
+  };
+
+  explicit ParallelRenderer(const EglContext& context) : context_(&context) {}
+  Target& target(std::uint32_t resolution);
+
+  const EglContext* context_;
+  Program program_;
+  std::optional<Program> see_through_;  ///< made for the first scene that needs it
+  Buffer indices_buffer_, views_buffer_;
+  std::size_t index_count_ = 0;
+  glm::vec3 centre_{0.0F};
+  float radius_ = 1.0F;
+  std::map<std::uint32_t, Target> targets_;  ///< by resolution
+  std::vector<std::uint32_t> pixels_;
+};
+
+}  // namespace radiosity::gpu

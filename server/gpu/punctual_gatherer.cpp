@@ -1,0 +1,347 @@
+#include "server/gpu/punctual_gatherer.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
+
+#include "server/gpu/hemicube_views.h"
+
+namespace radiosity::gpu {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// A leaf whose size is more than this part of its distance from the light takes its mean irradiance from its solid
+/// angle: points of it would differ too much.
+constexpr float kNear = 0.3F;
+
+/// Cone falloff of KHR_lights_punctual. `cosine`: of the angle from the axis.
+float coneFalloff(const solver::PointShot& shot, float cosine) {
+  const float value = std::clamp(cosine * shot.cone_scale + shot.cone_offset, 0.0F, 1.0F);
+  return value * value;
+}
+
+/// KHR_lights_punctual: max(min(1 - (distance / range)^4, 1), 0).
+float rangeFade(const solver::PointShot& shot, float distance) {
+  if (shot.range <= 0.0F) return 1.0F;
+  const float square = distance * distance / (shot.range * shot.range);
+  return std::clamp(1.0F - square * square, 0.0F, 1.0F);
+}
+
+/// Solid angle of a triangle seen from the origin (van Oosterom and Strackee 1983), sr; always positive.
+double solidAngle(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
+  const double la = glm::length(a), lb = glm::length(b), lc = glm::length(c);
+  const double volume = std::abs(glm::dot(a, glm::cross(b, c)));
+  const double base = la * lb * lc + glm::dot(a, b) * lc + glm::dot(b, c) * la + glm::dot(c, a) * lb;
+  return 2.0 * std::atan2(volume, base);
+}
+
+/// Where a receiver lies in a picture of `columns` x `rows` pixels: at (x, y), where pixel i reaches from i to i + 1.
+struct PixelPlace {
+  const std::uint32_t* picture;
+  int columns, rows;
+  float x, y;
+
+  [[nodiscard]] std::uint32_t item(float px, float py) const {
+    const int column = std::clamp(static_cast<int>(px), 0, columns - 1);
+    const int row = std::clamp(static_cast<int>(py), 0, rows - 1);
+    return picture[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
+                   static_cast<std::size_t>(column)];
+  }
+};
+
+/// By the receiver's own pixel and the four whose samples lie around it. Near an edge, all sixteen: where three edges
+/// meet, the one that matters may not be among the four.
+bool isHidden(const Receivers& receivers, const PixelPlace& place, const Receivers::Ray& ray) {
+  const float left = std::floor(place.x - 0.5F), below = std::floor(place.y - 0.5F);
+  const auto own = place.item(place.x, place.y);
+  std::array<std::uint32_t, 4> around{};
+  bool edge = false;
+  for (std::size_t i = 0; i < 4; ++i) {
+    around[i] = place.item(left + static_cast<float>(i % 2), below + static_cast<float>(i / 2));
+    edge = edge || around[i] != own;
+  }
+  if (!edge && own != RAD_ITEM_NONE) return receivers.hides(own, ray);
+  if (receivers.hidesAtEdge(own, ray) || receivers.anyMeets(around, ray)) return true;
+  std::array<std::uint32_t, 16> wider{};
+  for (std::size_t i = 0; i < 16; ++i) {
+    wider[i] = place.item(left - 1.0F + static_cast<float>(i % 4), below - 1.0F + static_cast<float>(i / 4));
+  }
+  return receivers.anyMeets(wider, ray);
+}
+
+/// A hemicube's image, looked up by direction in the axes of the hemicube (the cells of hemicube_weights.h).
+struct HemicubeItems {
+  std::span<const std::uint32_t> items;
+  int size;
+  float shift_x, shift_y;
+
+  HemicubeItems(std::span<const std::uint32_t> image, std::uint32_t resolution, std::uint32_t lattice)
+      : items(image), size(static_cast<int>(resolution)) {
+    const auto [across, up] = latticePhase(lattice);
+    shift_x = static_cast<float>(0.5 - across);
+    shift_y = static_cast<float>(0.5 - up);
+  }
+
+  [[nodiscard]] PixelPlace at(const glm::vec3& l) const {
+    const float ax = std::abs(l.x), ay = std::abs(l.y), side = std::max(ax, ay);
+    const bool top = l.z >= side, along_x = ax >= ay;
+    const float depth = std::max(std::max(l.z, side), 1.0e-9F);
+    const float scale = static_cast<float>(size) / 2.0F / depth;
+    const float across = top || !along_x ? l.x : l.y;
+    const float up = top ? l.y + depth : l.z;
+    const int face = along_x ? (l.x > 0.0F ? 0 : 1) : (l.y > 0.0F ? 2 : 3);
+    const int first_row = top ? 0 : size + face * size / 2;
+    return {items.data() + static_cast<std::size_t>(first_row) * static_cast<std::size_t>(size), size,
+            top ? size : size / 2, (across + depth) * scale + shift_x, up * scale + shift_y};
+  }
+};
+
+/// The corner of the box that lies farthest along a direction.
+glm::vec3 farthest(const scene::Surface& surface, const glm::vec3& d) {
+  const auto &low = surface.bounds_min, &high = surface.bounds_max;
+  return {d.x > 0.0F ? high.x : low.x, d.y > 0.0F ? high.y : low.y, d.z > 0.0F ? high.z : low.z};
+}
+
+bool beyondRange(const solver::PointShot& shot, const scene::Surface& surface) {
+  if (shot.range <= 0.0F) return false;
+  const auto nearest = glm::clamp(shot.frame.origin, surface.bounds_min, surface.bounds_max);
+  return glm::distance(nearest, shot.frame.origin) >= shot.range;
+}
+
+}  // namespace
+
+void PunctualGatherer::lightGroup(const solver::PointShot& shot, const Receivers::Group& group,
+                                  std::span<const std::uint32_t> items) {
+  const auto& patches = receivers_.patches();
+  const auto& surface = patches.surfaces[group.surface];
+  const auto [o, t, b, n] = hemicubeAxes(shot.frame);
+  const HemicubeItems image(items, shot.resolution, shot.frame.lattice);
+  for (std::size_t i = group.first; i < group.first + group.count; ++i) {
+    const auto& receiver = receivers_.all()[i];
+    const auto& frame = patches.triangles[receiver.triangle];
+    const auto normal = group.side * frame.normal;
+    if (glm::dot(normal, o - frame.origin) <= 0.0F) {
+      if (surface.planar) return;  // all of it turns away
+      continue;
+    }
+    const auto middle = receivers_.point(receiver, glm::vec2(0.5F)) - o;
+    const float size2 = glm::dot(frame.du, frame.du) + glm::dot(frame.dv, frame.dv);
+    float near_mean = -1.0F;
+    if (receiver.full && size2 > kNear * kNear * glm::dot(middle, middle)) {
+      const glm::dvec3 corner(receivers_.point(receiver, glm::vec2(0.0F)) - o), du(frame.du), dv(frame.dv);
+      const double angle =
+          solidAngle(corner, corner + du, corner + du + dv) + solidAngle(corner, corner + du + dv, corner + dv);
+      near_mean = static_cast<float>(angle / glm::length(glm::cross(du, dv)));
+    }
+    const std::uint32_t count = receiver.full ? shot.receivers.count : 1;
+    float sum = 0.0F;
+    for (std::uint32_t p = 0; p < count; ++p) {
+      const auto at = receivers_.point(receiver, shot.receivers.at[p]);
+      const auto d = at - o;
+      const glm::vec3 local(glm::dot(d, t), glm::dot(d, b), glm::dot(d, n));
+      const float square = glm::dot(d, d), distance = std::sqrt(square), cosine = -glm::dot(d, normal) / distance;
+      if (local.z <= 0.0F || cosine <= 0.0F) continue;
+      const float strength = coneFalloff(shot, local.z / distance) * rangeFade(shot, distance);
+      if (strength <= 0.0F) continue;
+      const float pixel_size = 2.0F * distance / static_cast<float>(shot.resolution);
+      if (isHidden(receivers_, image.at(local), {at, normal, -d, 1.0F, pixel_size})) continue;
+      sum += strength * (near_mean >= 0.0F ? near_mean : cosine / square);
+    }
+    sum_[i] += sum / static_cast<float>(count);
+  }
+}
+
+/// Every pixel stands for its solid angle, (2 / N)^2 / (1 + u^2 + v^2)^(3/2), at (u, v) on its face of the cube.
+PunctualGatherer::Lost PunctualGatherer::weighLost(const solver::PointShot& shot,
+                                                   std::span<const std::uint32_t> items) const {
+  Lost lost;
+  const auto [o, t, b, n] = hemicubeAxes(shot.frame);
+  const auto [across, up] = latticePhase(shot.frame.lattice);
+  const auto size = shot.resolution;
+  const double half = size / 2.0;
+  const std::array<std::array<glm::vec3, 2>, RAD_FACES> axes{
+      {{n, t}, {t, b}, {-t, b}, {b, t}, {-b, t}}};  // depth, across
+  for (std::uint32_t row = 0; row < 3 * size; ++row) {
+    const auto face = row < size ? 0 : 1 + (row - size) / (size / 2);
+    const auto face_row = face == 0 ? row : (row - size) % (size / 2);
+    const double v = (face_row + up) / half - (face == 0 ? 1.0 : 0.0);
+    for (std::uint32_t column = 0; column < size; ++column) {
+      const double u = (column + across) / half - 1.0;
+      const double length = std::sqrt(1.0 + u * u + v * v);
+      const double cosine = (face == 0 ? 1.0 : v) / length;
+      const double weight =
+          static_cast<double>(coneFalloff(shot, static_cast<float>(cosine))) / (length * length * length);
+      if (weight <= 0.0) continue;
+      lost.all += weight;
+      const auto item = items[std::size_t{row} * size + column];
+      if (item == RAD_ITEM_NONE) {
+        lost.escaped += weight;
+        continue;
+      }
+      const auto& plane = receivers_.plane(item);
+      const float height = plane.height(o);
+      double reached = weight;
+      if (shot.range > 0.0F) {
+        const auto d =
+            axes[face][0] + static_cast<float>(u) * axes[face][1] + static_cast<float>(v) * (face == 0 ? b : n);
+        const float towards = std::max(std::abs(glm::dot(d, plane.normal)), 1.0e-9F);
+        const float distance = std::abs(height) / towards * static_cast<float>(length);
+        reached = weight * static_cast<double>(rangeFade(shot, distance));
+        lost.escaped += weight - reached;  // what fades on its way arrives nowhere
+      }
+      if (receivers_.absorbs(item, height <= 0.0F)) lost.absorbed += reached;
+    }
+  }
+  return lost;
+}
+
+void PunctualGatherer::gather(const solver::PointShot& shot, double flux_scale, HemicubeRenderer& renderer,
+                              const FluxSink& sink, solver::TransportCounters& counters) {
+  const auto start = Clock::now();
+  const double rendered_before = counters.render_seconds;
+  const HemicubeView view{shot.frame, 0.0F};
+  const auto items = renderer.render(HemicubePass::kItems, shot.resolution, std::span(&view, 1), counters);
+  sum_.assign(receivers_.all().size(), 0.0F);
+  for (const auto& group : receivers_.groups()) {
+    const auto& surface = receivers_.patches().surfaces[group.surface];
+    const bool behind = glm::dot(shot.frame.normal, farthest(surface, shot.frame.normal) - shot.frame.origin) <= 0.0F;
+    if (!behind && !beyondRange(shot, surface)) lightGroup(shot, group, items);
+  }
+  deliver(shot.intensity, shot.emitted, weighLost(shot, items), shot.half, flux_scale, sink, counters);
+  ++counters.point_images;
+  counters.gather_seconds +=
+      std::chrono::duration<double>(Clock::now() - start).count() - (counters.render_seconds - rendered_before);
+}
+
+void PunctualGatherer::lightGroup(const solver::ParallelShot& shot, const ParallelAxes& axes,
+                                  const solver::ParallelView& view, std::size_t view_index,
+                                  const Receivers::Group& group, std::span<const std::uint32_t> items) {
+  const auto& patches = receivers_.patches();
+  const auto& surface = patches.surfaces[group.surface];
+  const auto size = static_cast<int>(shot.resolution);
+  const bool sky = shot.sky_count > 0;  // one point for each direction, all for a single one
+  const auto pixel_size = static_cast<float>(std::sqrt(axes.pixel_area));
+  const auto sky_point = static_cast<std::uint32_t>(view_index) % shot.receivers.count;
+  for (std::size_t i = group.first; i < group.first + group.count; ++i) {
+    const auto& receiver = receivers_.all()[i];
+    const auto normal = group.side * patches.triangles[receiver.triangle].normal;
+    const float cosine = glm::dot(normal, view.direction);
+    if (cosine <= 0.0F) {
+      if (surface.planar) return;
+      continue;
+    }
+    const std::uint32_t first = sky ? sky_point : 0;
+    const std::uint32_t count = sky || !receiver.full ? 1 : shot.receivers.count;
+    std::uint32_t visible = 0;
+    for (std::uint32_t p = first; p < first + count; ++p) {
+      const auto at = receivers_.point(receiver, shot.receivers.at[p]);
+      const auto d = at - axes.centre;
+      const PixelPlace place{items.data(), size, size, glm::dot(axes.right, d) + axes.shift.x,
+                             glm::dot(axes.up, d) + axes.shift.y};
+      // Far enough to be beyond everything: the scene fits a box of side 1 or so.
+      const bool hidden = isHidden(receivers_, place, {at, normal, view.direction, 4.0F, pixel_size});
+      visible += hidden ? 0 : 1;
+    }
+    sum_[i] += cosine * static_cast<float>(visible) / static_cast<float>(count);
+  }
+}
+
+PunctualGatherer::Lost PunctualGatherer::weighLost(const solver::ParallelView& view, double pixel_area,
+                                                   std::span<const std::uint32_t> items) const {
+  std::size_t hit = 0, absorbed = 0;
+  for (const auto item : items) {
+    if (item == RAD_ITEM_NONE) continue;
+    ++hit;
+    if (receivers_.absorbs(item, glm::dot(receivers_.plane(item).normal, view.direction) <= 0.0F)) ++absorbed;
+  }
+  Lost lost;
+  lost.all = solver::boxSilhouette(box_, view.direction);
+  lost.escaped = lost.all - static_cast<double>(hit) * pixel_area;
+  lost.absorbed = static_cast<double>(absorbed) * pixel_area;
+  return lost;
+}
+
+void PunctualGatherer::scaleToSky(const solver::ParallelShot& shot, std::span<const solver::ParallelView> sky) {
+  const auto& patches = receivers_.patches();
+  const double direction_share = 2.0 * std::numbers::pi / static_cast<double>(sky.size());
+  std::uint32_t last_triangle = scene::kNone;
+  float scale = 1.0F;
+  for (const auto& group : receivers_.groups()) {
+    last_triangle = scene::kNone;
+    for (std::size_t i = group.first; i < group.first + group.count; ++i) {
+      if (sum_[i] <= 0.0F) continue;
+      const auto triangle = receivers_.all()[i].triangle;
+      if (triangle != last_triangle) {
+        last_triangle = triangle;
+        const auto normal = group.side * patches.triangles[triangle].normal;
+        double found = 0.0;
+        for (const auto& view : sky) {
+          found += static_cast<double>(std::max(0.0F, glm::dot(normal, view.direction)));
+        }
+        const double exact = 0.5 * std::numbers::pi * (1.0 + static_cast<double>(glm::dot(normal, shot.axis)));
+        // Bounded: a surface that all but turns away from the hemisphere sees too few of its directions.
+        scale = static_cast<float>(std::clamp(exact / (found * direction_share), 0.5, 2.0));
+      }
+      sum_[i] *= scale;
+    }
+  }
+}
+
+void PunctualGatherer::gather(const solver::ParallelShot& shot, std::span<const solver::ParallelView> views,
+                              double flux_scale, const GpuScene& scene, ParallelRenderer& renderer,
+                              const FluxSink& sink, solver::TransportCounters& counters) {
+  const auto start = Clock::now();
+  const double rendered_before = counters.render_seconds;
+  const auto mine = views.subspan(shot.first_view, shot.view_count);
+  const auto pixels = std::size_t{shot.resolution} * shot.resolution;
+  const auto capacity = renderer.capacity(shot.resolution);
+  sum_.assign(receivers_.all().size(), 0.0F);
+  Lost lost;
+  for (std::size_t first = 0; first < mine.size(); first += capacity) {
+    const auto some = mine.subspan(first, std::min(capacity, mine.size() - first));
+    const auto images = renderer.render(scene, shot.resolution, some, counters);
+    for (std::size_t i = 0; i < some.size(); ++i) {
+      const auto items = images.subspan(i * pixels, pixels);
+      const auto axes = renderer.axes(some[i], shot.resolution);
+      for (const auto& group : receivers_.groups()) lightGroup(shot, axes, some[i], first + i, group, items);
+      const auto of_view = weighLost(some[i], axes.pixel_area, items);
+      lost.all += of_view.all;
+      lost.escaped += of_view.escaped;
+      lost.absorbed += of_view.absorbed;
+    }
+  }
+  if (shot.sky_count > 0) scaleToSky(shot, views.subspan(shot.first_of_sky, shot.sky_count));
+  deliver(shot.irradiance, shot.emitted, lost, shot.half, flux_scale, sink, counters);
+  counters.parallel_images += mine.size();
+  counters.gather_seconds +=
+      std::chrono::duration<double>(Clock::now() - start).count() - (counters.render_seconds - rendered_before);
+}
+
+void PunctualGatherer::deliver(const std::array<double, 3>& unit, const std::array<double, 3>& emitted,
+                               const Lost& lost, std::uint32_t half, double flux_scale, const FluxSink& sink,
+                               solver::TransportCounters& counters) const {
+  for (std::size_t i = 0; i < sum_.size(); ++i) {
+    if (sum_[i] <= 0.0F) continue;
+    const auto node = receivers_.all()[i].node;
+    const double factor =
+        flux_scale * static_cast<double>(sum_[i]) * static_cast<double>(receivers_.patches().node_area[node]);
+    solver::Flux3 flux{};
+    for (std::size_t channel = 0; channel < 3; ++channel) {
+      flux[channel] = std::lrint(unit[channel] * factor);
+      sink.totals->gathered[channel] += flux[channel];
+    }
+    sink.add(half, node, flux);
+    ++counters.links;
+  }
+  if (lost.all <= 0.0) return;
+  for (std::size_t channel = 0; channel < 3; ++channel) {
+    const double flux = emitted[channel] * flux_scale / lost.all;
+    sink.totals->escaped[channel] += std::lrint(flux * lost.escaped);
+    sink.totals->backface[channel] += std::lrint(flux * lost.absorbed);
+  }
+}
+
+}  // namespace radiosity::gpu

@@ -1,0 +1,50 @@
+// Light without extent (point, spot, directional, sky) at every leaf: exact irradiance at receiving points times
+// visibility, which item buffers decide. One thread.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "server/gpu/flux_sink.h"
+#include "server/gpu/hemicube_renderer.h"
+#include "server/gpu/parallel_renderer.h"
+#include "server/gpu/receivers.h"
+
+namespace radiosity::gpu {
+
+class PunctualGatherer {
+ public:
+  PunctualGatherer() = default;
+  explicit PunctualGatherer(std::shared_ptr<const scene::PatchScene> patches)
+      : receivers_(std::move(patches)), box_(solver::sceneBox(receivers_.patches())) {}
+
+  void gather(const solver::PointShot& shot, double flux_scale, HemicubeRenderer& renderer, const FluxSink& sink,
+              solver::TransportCounters& counters);
+  /// `views` of the whole batch.
+  void gather(const solver::ParallelShot& shot, std::span<const solver::ParallelView> views, double flux_scale,
+              const GpuScene& scene, ParallelRenderer& renderer, const FluxSink& sink,
+              solver::TransportCounters& counters);
+
+ private:
+  /// Shares of a shot's flux that left the scene, and that fell on unlit sides.
+  struct Lost {
+    double all = 0.0, escaped = 0.0, absorbed = 0.0;
+  };
+
+  void lightGroup(const solver::PointShot& shot, const Receivers::Group& group, std::span<const std::uint32_t> items);
+  void lightGroup(const solver::ParallelShot& shot, const ParallelAxes& axes, const solver::ParallelView& view,
+                  std::size_t view_index, const Receivers::Group& group, std::span<const std::uint32_t> items);
+  [[nodiscard]] Lost weighLost(const solver::PointShot& shot, std::span<const std::uint32_t> items) const;
+  [[nodiscard]] Lost weighLost(const solver::ParallelView& view, double pixel_area,
+                               std::span<const std::uint32_t> items) const;
+  void scaleToSky(const solver::ParallelShot& shot, std::span<const solver::ParallelView> sky);
+  void deliver(const std::array<double, 3>& unit, const std::array<double, 3>& emitted, const Lost& lost,
+               std::uint32_t half, double flux_scale, const FluxSink& sink, solver::TransportCounters& counters) const;
+
+  Receivers receivers_;
+  std::array<glm::vec3, 2> box_{};
+  std::vector<float> sum_;  ///< by receiver: irradiance for an intensity of 1
+};
+
+}  // namespace radiosity::gpu

@@ -1,0 +1,20 @@
+// Where one can see through surfaces: alphaMode MASK and BLEND, and KHR_materials_transmission, sampled on a grid in
+// each surface's chart, finer than its leaves where the alpha texture is. A step of buildPatchScene (charts.h).
+#pragma once
+
+#include "server/scene/patch_scene.h"
+
+namespace radiosity::scene {
+
+/// Whether a material lets any light through.
+[[nodiscard]] bool isSeeThrough(const Material& material);
+
+/// Marks the surfaces one can see through and fills their opacity grids: MASK gives the part of a cell above the
+/// cutoff, BLEND alpha, transmission 1 - factor; all of them multiplied. Grids together have at most 2^26 cells: beyond
+/// that they are coarser, with a warning. Needs surfaces, vertices and triangle_source.
+void measureOpacity(const Scene& scene, PatchScene& patches);
+
+/// Multiplies the leaf areas of those surfaces by the opacity of the leaf; what is wholly cut out becomes empty.
+void applyOpacity(PatchScene& patches);
+
+}  // namespace radiosity::scene
