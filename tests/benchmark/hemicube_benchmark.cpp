@@ -37,7 +37,9 @@ struct Stage {
     auto uploaded = gpu::GpuScene::upload(*stage->context, patchesOf(scene).patches);
     if (!uploaded) return state.SkipWithError(uploaded.error().text().c_str()), nullptr;
     stage->renderer.emplace(std::move(*renderer));
-    stage->renderer->setScene(std::move(*uploaded));
+    if (const auto set = stage->renderer->setScene(std::move(*uploaded)); !set) {
+      return state.SkipWithError(set.error().text().c_str()), nullptr;
+    }
     return stage;
   }
 
