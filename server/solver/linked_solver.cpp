@@ -81,7 +81,7 @@ void LinkedSolver::takeLights() {
   }
 }
 
-/// So is every light without extent, for an intensity of one.
+/// So is every light without extent, for an intensity so small that no link passes the largest there is.
 void LinkedSolver::takeSources(const LightSources& sources) {
   for (auto& source : sources_) source.intensity = glm::dvec3(0.0);
   for (const auto& source : punctual_.makeSources(*patches_, sources)) {
@@ -93,16 +93,18 @@ void LinkedSolver::takeSources(const LightSources& sources) {
     }
     Shooter shooter;
     shooter.source = static_cast<std::uint32_t>(sources_.size());
-    shooter.area = source.flux_per_intensity;
+    shooter.area = source.flux_per_intensity * punctual_.linkUnit(source);
     sources_.push_back(source);
     (void)system_.add(shooter);
   }
   for (auto& shooter : system_.shooters()) {
-    if (shooter.source != scene::kNone) shooter.sent.fill(glm::vec3(sources_[shooter.source].intensity));
+    if (shooter.source == scene::kNone) continue;
+    const auto& source = sources_[shooter.source];
+    shooter.sent.fill(glm::vec3(source.intensity / punctual_.linkUnit(source)));
   }
 }
 
-/// One sequence of shots of a light without extent, as links for an intensity of one.
+/// One sequence of shots of a light without extent, as links for its unit of intensity.
 Result<void> LinkedSolver::measureSource(const Measurement& want) {
   const auto& source = sources_[system_.shooters()[want.shooter].source];
   ShotBatch batch;
@@ -119,7 +121,7 @@ Result<void> LinkedSolver::measureSource(const Measurement& want) {
     links.addFlux(node, flux.node[want.half][node][0], *patches_);
   links.escaped += static_cast<double>(flux.escaped[0]) / kMeasureScale;
   links.absorbed += static_cast<double>(flux.backface[0]) / kMeasureScale;
-  links.scale(2.0 * kMeasureScale / batch.flux_scale);
+  links.scale(2.0 * punctual_.linkUnit(source) * kMeasureScale / batch.flux_scale);
   expander_.expand(links);
   system_.addSample(want.shooter, want.half, expander_, links, want.points);
   return {};
@@ -232,7 +234,10 @@ Result<StepOutcome> LinkedSolver::step() {
   }
   settle();
   if (phase_ == Phase::kImprove) return finishRound();
-  if (phase_ == Phase::kLights) startGrowth();
+  if (phase_ == Phase::kLights) {
+    settle();  // shooters that were dark until now know how strong they are, for their roulette, only after the first
+    startGrowth();
+  }
   return StepOutcome::kShot;
 }
 
@@ -318,7 +323,7 @@ void LinkedSolver::solveAnew() {
   for (int pass = 0; pass < 2; ++pass) {  // the first shows how strong the shooters are, for their roulette
     for (auto& shooter : system_.shooters()) {
       for (std::size_t half = 0; pass == 0 && half < 2; ++half)
-        shooter.weight[half] = shooter.column[half].points() > 0.0 ? 1.0 : 0.0;
+        shooter.weight[half] = shooter.isLight() || shooter.column[half].points() > 0.0 ? 1.0 : 0.0;  // lights come in
       if (shooter.isLight()) continue;
       shooter.mean.fill(glm::vec3(0.0F));
       shooter.sent.fill(glm::vec3(0.0F));
