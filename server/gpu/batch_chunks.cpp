@@ -88,8 +88,7 @@ std::vector<Chunk> cutBatch(const solver::ShotBatch& batch, std::size_t triangle
   return chunks;
 }
 
-std::vector<std::byte> packChunk(const solver::ShotBatch& batch, const Chunk& chunk, std::uint64_t id,
-                                 bool measure) {
+std::vector<std::byte> packChunk(const solver::ShotBatch& batch, const Chunk& chunk, std::uint64_t id, bool measure) {
   Packed packed;
   std::span<const solver::ScatterShot> scatter;
   std::span<const solver::PointShot> point_lights;

@@ -87,7 +87,7 @@ class LightGatherer {
   bool lit_valid_ = false;
   Lit lit_;
   std::size_t lit_count_ = 0;
-  Lost look_lost_;              ///< of the looks since beginLinks
+  Lost look_lost_;  ///< of the looks since beginLinks
   std::size_t look_count_ = 0;
   std::vector<std::uint32_t> starts_;
 };

@@ -178,8 +178,9 @@ class WorkerTransport final : public solver::Transport {
       queue_.pop_front();
       slot.held.push_back(chunk);
       if (slot.held.size() == 1) startClock(slot);
-      const auto sent = slot.process->send(MessageKind::kChunk, packChunk(batch, chunks_[chunk], chunk, links_ != nullptr),
-                                           patienceUntil(slot.deadline));
+      const auto sent =
+          slot.process->send(MessageKind::kChunk, packChunk(batch, chunks_[chunk], chunk, links_ != nullptr),
+                             patienceUntil(slot.deadline));
       if (!sent && !interrupted_) bury(slot, sent.error());
       if (!sent) return;
     }
@@ -298,7 +299,7 @@ class WorkerTransport final : public solver::Transport {
   bool paper_fits_ = true;  ///< whether the scene can be lit in paper mode, and why not
   Error paper_error_;
   std::vector<Chunk> chunks_;
-  std::size_t gather_shots_ = 0;                          ///< of the batch
+  std::size_t gather_shots_ = 0;                      ///< of the batch
   std::vector<solver::LinkSample>* links_ = nullptr;  ///< of the batch, where they are wanted; else none
   std::deque<std::size_t> queue_;
   int deaths_ = 0;

@@ -124,7 +124,8 @@ void LinkExpander::pushDown(std::uint32_t s) {
 
 void LinkColumn::makeRoom(std::span<const std::uint32_t> reached, const std::vector<Side>& sides) {
   const auto has = [&](std::uint32_t side) {
-    const auto run = std::lower_bound(runs_.begin(), runs_.end(), side, [](const Run& r, auto s) { return r.side < s; });
+    const auto run =
+        std::lower_bound(runs_.begin(), runs_.end(), side, [](const Run& r, auto s) { return r.side < s; });
     return run != runs_.end() && run->side == side;
   };
   if (std::all_of(reached.begin(), reached.end(), has)) return;

@@ -32,7 +32,7 @@ struct Shooter {
   std::array<glm::vec3, 2> mean{};         ///< b: mean radiosity of the node
   std::array<glm::vec3, 2> sent{};         ///< s, before the weight
 
-  std::array<double, 3> products{};        ///< sums over leaves of area T0 T0, T0 T1, T1 T1
+  std::array<double, 3> products{};  ///< sums over leaves of area T0 T0, T0 T1, T1 T1
 
   [[nodiscard]] bool isLight() const { return light != scene::kNone || source != scene::kNone; }
   /// Flux it shoots, all channels, mean of the halves and before roulette.
@@ -79,21 +79,23 @@ class LinkSystem {
   void updateRows(std::size_t half, std::uint32_t column, std::uint32_t first_member);
   void fillRow(std::size_t half, std::uint32_t member, std::uint32_t column, const float* links);
   int solveHalf(std::size_t half);
+  [[nodiscard]] int sweepHalf(std::size_t half);
+  [[nodiscard]] double mostSent(std::size_t half) const;
 
   const scene::PatchScene& patches_;
   const std::vector<Side>& sides_;
   std::vector<Shooter> shooters_;
-  std::vector<Rows> rows_;                               // by shooter
+  std::vector<Rows> rows_;                                   // by shooter
   std::vector<glm::vec3> emission_mean_, reflectance_mean_;  // by shooter
   std::vector<std::uint32_t> shooter_of_node_;
   std::vector<bool> below_;
-  std::vector<std::vector<std::uint32_t>> members_;      // nodes by side
-  std::vector<bool> changed_;                            // by shooter: its column's entries are stale
-  std::size_t known_ = 0;                                // shooters whose rows are there
+  std::vector<std::vector<std::uint32_t>> members_;        // nodes by side
+  std::vector<bool> changed_;                              // by shooter: its column's entries are stale
+  std::size_t known_ = 0;                                  // shooters whose rows are there
   std::array<std::vector<std::vector<float>>, 2> matrix_;  // by half and row: entries by column
-  std::vector<glm::vec3> emission_, reflectance_;        // by leaf value
-  std::vector<float> leaf_area_;                         // by leaf value
-  std::vector<bool> uniform_;                            // by side: of one reflectance
+  std::vector<glm::vec3> emission_, reflectance_;          // by leaf value
+  std::vector<float> leaf_area_;                           // by leaf value
+  std::vector<bool> uniform_;                              // by side: of one reflectance
 };
 
 }  // namespace radiosity::solver

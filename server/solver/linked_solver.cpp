@@ -17,7 +17,8 @@ constexpr double kRefinement = 2.0;
 /// More refinements than this find nothing: everything is split to its leaves.
 constexpr double kMinShare = 1e-9;
 constexpr std::uint32_t kMaxRounds = 100'000;
-/// Short enough that nobody notices the wait, long enough that the workers' waiting for the last of them does not count.
+/// Short enough that nobody notices the wait, long enough that the workers' waiting for the last of them does not
+/// count.
 constexpr double kSliceSeconds = 0.06;
 
 PunctualSettings punctualSettings(const SolverSettings& settings) {
@@ -161,7 +162,8 @@ Result<void> LinkedSolver::measureSlice() {
   }
   measured_ += slice.size();
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  slice_ = static_cast<std::size_t>(std::clamp(static_cast<double>(slice.size()) * kSliceSeconds / std::max(seconds, 1e-6), 8.0, 4096.0));
+  slice_ = static_cast<std::size_t>(
+      std::clamp(static_cast<double>(slice.size()) * kSliceSeconds / std::max(seconds, 1e-6), 8.0, 4096.0));
   return {};
 }
 
@@ -315,8 +317,8 @@ void LinkedSolver::setLights(const LightSources& sources) {
   solveAnew();
 }
 
-/// After an edit, from nothing but the links: the result depends on them and on the materials alone, so that an edit and
-/// its inverse give the same bits as long as no link was added in between.
+/// After an edit, from nothing but the links: the result depends on them and on the materials alone, so that an edit
+/// and its inverse give the same bits as long as no link was added in between.
 void LinkedSolver::solveAnew() {
   wanted_.clear();  // what was still to be measured will be asked for again
   measured_ = 0;
@@ -384,8 +386,7 @@ EnergyParts LinkedSolver::energy() const {
   }
   for (std::size_t c = 0; c < 3; ++c) {
     parts.unshot[c] -= lit[c];
-    parts.imbalance[c] =
-        parts.emitted[c] - parts.absorbed[c] - parts.escaped[c] - parts.backface[c] - parts.unshot[c];
+    parts.imbalance[c] = parts.emitted[c] - parts.absorbed[c] - parts.escaped[c] - parts.backface[c] - parts.unshot[c];
   }
   return parts;
 }

@@ -76,9 +76,9 @@ class LinkedSolver final : public Solver {
   std::vector<Measurement> wanted_;  // the wave under way
   std::size_t measured_ = 0;         // of the wave
   std::size_t slice_ = 16;           // measurements that take some 50 ms
-  bool growing_ = true;  // light is still missing: until the first walk found nothing more to add
+  bool growing_ = true;              // light is still missing: until the first walk found nothing more to add
   std::uint32_t rounds_ = 0;
-  double varying_ = 0.0, net_unshot_ = 0.0;  // flux, all channels
+  double varying_ = 0.0, net_unshot_ = 0.0;     // flux, all channels
   std::array<std::vector<glm::vec3>, 2> half_;  // irradiance by leaf value
   std::vector<glm::vec3> irradiance_;           // by node
   ErrorParts error_;

@@ -68,8 +68,8 @@ class PunctualLights {
 
   /// Lights in one place are one source; dark ones are left out.
   [[nodiscard]] std::vector<Source> makeSources(const scene::PatchScene& patches, const LightSources& sources) const;
-  /// Intensity, a power of two, for which no leaf receives more than about one lux: 1 of a directional light; of a point
-  /// light bounded by its distance from the scene's box and by the solid angle of the smallest leaf.
+  /// Intensity, a power of two, for which no leaf receives more than about one lux: 1 of a directional light; of a
+  /// point light bounded by its distance from the scene's box and by the solid angle of the smallest leaf.
   [[nodiscard]] double linkUnit(const Source& source) const;
   /// One sequence of shots of a source with intensity one, for one half.
   void addSample(const Source& source, std::uint32_t sequence, std::uint32_t half, ShotBatch& batch) const;

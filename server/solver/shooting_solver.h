@@ -66,7 +66,7 @@ class ShootingSolver final : public Solver {
   Planner planner_;
   Phase phase_ = Phase::kDirect;
   bool polygons_due_ = false;  // the round's light polygons are still to be gathered
-  bool live_ = true;  // show every wave: in the first round, and after an edit until the round ends
+  bool live_ = true;           // show every wave: in the first round, and after an edit until the round ends
   Wave wave_;
   bool wave_is_direct_ = false;
   std::array<double, 3> wave_flux_{};  // what the wave under way stands for

@@ -41,7 +41,8 @@ class Solver {
  public:
   virtual ~Solver() = default;
 
-  /// A slice of a wave: some 10 to 100 ms of work. On an error of the transport the caller starts over with a new Solver.
+  /// A slice of a wave: some 10 to 100 ms of work. On an error of the transport the caller starts over with a new
+  /// Solver.
   [[nodiscard]] virtual Result<StepOutcome> step() = 0;
 
   /// Emission or reflectance changed: nothing is invalidated; shooting goes on.
@@ -74,7 +75,6 @@ class Solver {
 
 [[nodiscard]] std::unique_ptr<Solver> makeSolver(std::shared_ptr<const scene::PatchScene> patches,
                                                  const scene::PatchMaterials& materials, Transport& transport,
-                                                 const SolverSettings& settings,
-                                                 const LightSources& sources = {});
+                                                 const SolverSettings& settings, const LightSources& sources = {});
 
 }  // namespace radiosity::solver

@@ -62,7 +62,8 @@ Result<TransportCounters> Transport::measure(const ShotBatch& batch, std::vector
     if (!done) return done;
     counters += *done;
     LinkSample links;
-    for (std::uint32_t node = 0; node < patches->nodeCount(); ++node) links.addFlux(node, flux.node[0][node][0], *patches);
+    for (std::uint32_t node = 0; node < patches->nodeCount(); ++node)
+      links.addFlux(node, flux.node[0][node][0], *patches);
     links.escaped += static_cast<double>(flux.escaped[0]) / kMeasureScale;
     links.absorbed += static_cast<double>(flux.backface[0]) / kMeasureScale;
     samples.push_back(std::move(links));

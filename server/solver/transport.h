@@ -194,12 +194,12 @@ class Transport {
   [[nodiscard]] virtual Result<TransportCounters> run(const ShotBatch& batch, FluxAccumulators& into) = 0;
 
   /// Measures the links of every shot of the batch by itself: its radiosity or flux is taken as one, its half is
-  /// ignored. samples[i] belongs to gather shot i, then come the scatter shots. Blocks. On error `samples` is undefined.
-  /// The default carries out one shot after the other with run().
+  /// ignored. samples[i] belongs to gather shot i, then come the scatter shots. Blocks. On error `samples` is
+  /// undefined. The default carries out one shot after the other with run().
   [[nodiscard]] virtual Result<TransportCounters> measure(const ShotBatch& batch, std::vector<LinkSample>& samples);
 
-  /// What runs in setScene(), run() or measure() fails soon, and everything after it at once: the solve thread is wanted for its
-  /// end. From any thread. A transport whose calls are short need not do anything.
+  /// What runs in setScene(), run() or measure() fails soon, and everything after it at once: the solve thread is
+  /// wanted for its end. From any thread. A transport whose calls are short need not do anything.
   virtual void interrupt() {}
 
   /// "llvmpipe (LLVM 15.0.6, 256 bits), 2 workers"

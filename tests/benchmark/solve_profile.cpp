@@ -142,9 +142,11 @@ void printSurfaces(const scene::PatchScene& patches, const std::vector<Leaf>& le
   }
 }
 
-[[maybe_unused]] /// Errors of one surface's leaves as a picture of characters: tenths of its mean, upper case where too bright.
-void printMap(const scene::PatchScene& patches, std::uint32_t surface, const std::vector<Leaf>& leaves,
-              const std::vector<glm::dvec3>& truth, const std::vector<glm::vec3>& solved) {
+[[maybe_unused]]  /// Errors of one surface's leaves as a picture of characters: tenths of its mean, upper case where
+                  /// too bright.
+                  void
+                  printMap(const scene::PatchScene& patches, std::uint32_t surface, const std::vector<Leaf>& leaves,
+                           const std::vector<glm::dvec3>& truth, const std::vector<glm::vec3>& solved) {
   const auto& s = patches.surfaces[surface];
   std::vector<std::string> rows(s.height, std::string(s.width, ' '));
   double mean = 0.0, count = 0.0;

@@ -120,7 +120,8 @@ TEST(SolvedLights, SunOnAPlane) {
 TEST(SolvedLights, SkyOverAPlaneFromTheCommandLine) {
   const auto solved = solve(blackFloor("sky"), {"--error", "0.005", "--time-limit", "10", "--texels", "1600", "--sky",
                                                 "100,200,300/10,20,30"});
-  EXPECT_LT(rmsFrom(solved.lit, [](const glm::dvec3&) { return std::numbers::pi * glm::dvec3(100, 200, 300); }), kLinkPrecision);
+  EXPECT_LT(rmsFrom(solved.lit, [](const glm::dvec3&) { return std::numbers::pi * glm::dvec3(100, 200, 300); }),
+            kLinkPrecision);
   expectBalance(solved.report);
 }
 
