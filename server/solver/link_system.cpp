@@ -188,7 +188,41 @@ int LinkSystem::solve() {
   return std::max(sweeps, other_sweeps);
 }
 
+/// Weights above one, of weak shooters that stand for others, can make light grow without end between surfaces that all
+/// but touch, which send most of what they have to each other. Then all weights are at most one: a little light is
+/// missing, which the balance of energy shows.
 int LinkSystem::solveHalf(std::size_t half) {
+  const auto clear = [&](double most) {
+    for (auto& shooter : shooters_) {
+      if (shooter.isLight()) continue;
+      shooter.weight[half] = std::min(shooter.weight[half], most);
+      shooter.mean[half] = shooter.sent[half] = glm::vec3(0.0F);
+    }
+  };
+  int sweeps = sweepHalf(half);
+  if (sweeps == 0) {
+    clear(1.0);
+    sweeps = sweepHalf(half);
+  }
+  if (sweeps == 0) clear(0.0);  // not even that: direct light is all that is sure
+  return sweeps;
+}
+
+/// The most that may be sent, all channels: a thousand times what shines (reflectance is at most 0.999), and room for
+/// what children send to correct their parents.
+double LinkSystem::mostSent(std::size_t half) const {
+  double shining = 0.0;
+  for (std::size_t n = 0; n < shooters_.size(); ++n) {
+    const auto& shooter = shooters_[n];
+    shining +=
+        static_cast<double>(channelSum(shooter.isLight() ? shooter.sent[half] : emission_mean_[n])) * shooter.area;
+  }
+  return 1.0e4 * shining;
+}
+
+/// Number of sweeps; 0: light grew without end.
+int LinkSystem::sweepHalf(std::size_t half) {
+  const double most = mostSent(half);
   const std::size_t count = shooters_.size();
   std::array<std::vector<float>, 3> sent;
   for (auto& channel : sent) channel.resize(count);
@@ -224,6 +258,7 @@ int LinkSystem::solveHalf(std::size_t half) {
       for (std::size_t c = 0; c < 3; ++c)
         sent[c][m] = static_cast<float>(shooter.weight[half]) * next[static_cast<int>(c)];
     }
+    if (!std::isfinite(all) || (all > most && change > 0.0)) return 0;
     if (change <= kSolved * all) return sweep;
     if (all > limit || !std::isfinite(all)) {
       // Roulette weights feed on themselves (a shooter that counts many times over lights itself): without them no node

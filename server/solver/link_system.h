@@ -79,6 +79,8 @@ class LinkSystem {
   void updateRows(std::size_t half, std::uint32_t column, std::uint32_t first_member);
   void fillRow(std::size_t half, std::uint32_t member, std::uint32_t column, const float* links);
   int solveHalf(std::size_t half);
+  [[nodiscard]] int sweepHalf(std::size_t half);
+  [[nodiscard]] double mostSent(std::size_t half) const;
 
   const scene::PatchScene& patches_;
   const std::vector<Side>& sides_;

@@ -16,7 +16,10 @@ constexpr std::size_t kLeafBytes = 2;
 std::unique_ptr<Solver> makeSolver(std::shared_ptr<const scene::PatchScene> patches,
                                    const scene::PatchMaterials& materials, Transport& transport,
                                    const SolverSettings& settings, const LightSources& sources) {
-  if (settings.paper_mode || patches->leaves.size() * kLeafBytes * kMinShooters > settings.link_memory) {
+  // Coverage by chance, pixel by pixel, makes links to what one can see through too uncertain to solve over: light
+  // between sheets that all but touch would grow from bounce to bounce.
+  const bool see_through = !patches->opacity.empty();
+  if (settings.paper_mode || see_through || patches->leaves.size() * kLeafBytes * kMinShooters > settings.link_memory) {
     return std::make_unique<ShootingSolver>(std::move(patches), materials, transport, settings, sources);
   }
   return std::make_unique<LinkedSolver>(std::move(patches), materials, transport, settings, sources);
