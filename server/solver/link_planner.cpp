@@ -17,6 +17,8 @@ constexpr double kRouletteShare = 0.05;
 constexpr double kMaxWeight = 20.0;
 /// Nodes of less than this part of a share may shoot as a polygon though a part of it is empty or buried.
 constexpr double kPartialShare = 1.2 * kRouletteShare;
+/// Their parts that have more than this do not play.
+constexpr double kCertainShare = 0.1 * kRouletteShare;
 /// Light that only differs between the leaves of a node cancels at a distance and counts near by.
 constexpr double kVariationWorth = 0.1;
 /// Square of the part of a node's links to its near receivers that feels what varies inside it.
@@ -48,15 +50,20 @@ bool LinkPlanner::plays(const NodePlace& place, std::size_t half, double power) 
   return p >= 1.0 || uniformFromKey(mixKeys(mixKeys(shots_.key(place), half), 77)) < p;
 }
 
-void LinkPlanner::weigh(LinkSystem& system) {
+double LinkPlanner::weigh(LinkSystem& system) {
+  double changed = 0.0, all = 0.0;
   for (auto& shooter : system.shooters()) {
     if (shooter.isLight()) continue;
     const double power = shooter.power();
     for (std::size_t half = 0; half < 2; ++half) {
       const bool in = shooter.column[half].points() > 0.0 && (shooter.certain || plays(shooter.place, half, power));
-      shooter.weight[half] = !in ? 0.0 : shooter.certain ? 1.0 : 1.0 / chance(power);
+      const double weight = !in ? 0.0 : shooter.certain ? 1.0 : 1.0 / chance(power);
+      changed += power * std::abs(weight - shooter.weight[half]);
+      all += power;
+      shooter.weight[half] = weight;
     }
   }
+  return all > 0.0 ? changed / all : 0.0;
 }
 
 std::vector<Measurement> LinkPlanner::firstLight(const LinkSystem& system) const {
@@ -87,7 +94,11 @@ bool LinkPlanner::mustSplit(const Node& node, const LinkSystem& system) const {
   if (system.hasBelow(id)) return true;
   if (system.at(id) != scene::kNone) return false;
   if (node.power > share_) return true;
-  // A node that is partly empty or buried is no polygon, until it is too weak for that to be seen.
+  return isPartial(node);
+}
+
+/// A node that is partly empty or buried is no polygon, until it is too weak for that to be seen.
+bool LinkPlanner::isPartial(const Node& node) const {
   return node.power > kPartialShare * share_ && shots_.gathers(node.place) && !shots_.isWhole(node.place);
 }
 
@@ -95,13 +106,17 @@ void LinkPlanner::addShooter(const Node& node, LinkSystem& system, const UnshotP
                              const scene::PatchScene& patches, std::vector<Measurement>& wanted) {
   const auto id = nodeId(sides_[node.place.side], node.place);
   if (patches.node_area[id] <= 0.0F || node.net <= 0.0) return;
-  const std::array<bool, 2> in{plays(node.place, 0, node.power), plays(node.place, 1, node.power)};
+  // Right beside a buried edge one would see single leaves come and go: there nobody plays.
+  const bool certain = node.beside_edge && node.power > kCertainShare * share_;
+  const std::array<bool, 2> in{certain || plays(node.place, 0, node.power),
+                               certain || plays(node.place, 1, node.power)};
   counters_.roulette_kills += static_cast<std::uint64_t>(!in[0]) + static_cast<std::uint64_t>(!in[1]);
   if (!in[0] && !in[1]) return;
   Shooter shooter;
   shooter.place = node.place;
   shooter.area = static_cast<double>(patches.node_area[id]);
   shooter.sent.fill(unshot.flux(id) / patches.node_area[id]);
+  shooter.certain = certain;
   const auto index = system.add(shooter);
   ++counters_.shooters;
   if (shots_.gathers(node.place)) ++counters_.gathered_nodes;
@@ -119,22 +134,24 @@ std::vector<Measurement> LinkPlanner::grow(LinkSystem& system, const UnshotPyram
            std::tie(b.place.side, b.place.level, b.place.y, b.place.x);
   };
   std::priority_queue<Node, std::vector<Node>, decltype(weaker)> queue(weaker);
-  const auto push = [&](const NodePlace& place) {
-    const Node node = nodeAt(place, unshot);
+  const auto push = [&](const NodePlace& place, bool beside_edge) {
+    Node node = nodeAt(place, unshot);
+    node.beside_edge = beside_edge;
     if (node.power > 0.0) queue.push(node);
   };
-  for (std::uint32_t s = 0; s < sides_.size(); ++s) push({s, sides_[s].level_count - 1, 0, 0});
+  for (std::uint32_t s = 0; s < sides_.size(); ++s) push({s, sides_[s].level_count - 1, 0, 0}, false);
   std::vector<Measurement> wanted;
   while (!queue.empty() && wanted.size() < 2 * limit) {
     const Node node = queue.top();
     queue.pop();
     const NodePlace& place = node.place;
     if (mustSplit(node, system)) {
+      const bool beside_edge = node.beside_edge || isPartial(node);
       const Side& side = sides_[place.side];
       const auto grid = scene::levelGrid(side.width, side.height, place.level - 1);
       for (std::uint32_t y = 2 * place.y; y < std::min(2 * place.y + 2, grid.height); ++y) {
         for (std::uint32_t x = 2 * place.x; x < std::min(2 * place.x + 2, grid.width); ++x)
-          push({place.side, place.level - 1, x, y});
+          push({place.side, place.level - 1, x, y}, beside_edge);
       }
       continue;
     }

@@ -51,8 +51,9 @@ class LinkPlanner {
   /// The part of the sampling error's square that is due to roulette: only smaller shares lower it.
   [[nodiscard]] static double rouletteShare(const LinkSystem& system);
 
-  /// Russian roulette: weights of weak shooters, so that those which play stand for all.
-  void weigh(LinkSystem& system);
+  /// Russian roulette: weights of weak shooters, so that those which play stand for all. Returns the part of all
+  /// power whose weight that changed.
+  double weigh(LinkSystem& system);
 
   [[nodiscard]] const PlannerCounters& counters() const { return counters_; }
 
@@ -60,9 +61,11 @@ class LinkPlanner {
   struct Node {
     double power = 0.0, net = 0.0;
     NodePlace place;
+    bool beside_edge = false;  ///< of the node above, a part is empty or buried
   };
   [[nodiscard]] Node nodeAt(const NodePlace& place, const UnshotPyramid& unshot) const;
   [[nodiscard]] bool mustSplit(const Node& node, const LinkSystem& system) const;
+  [[nodiscard]] bool isPartial(const Node& node) const;
   [[nodiscard]] double chance(double power) const;
   [[nodiscard]] bool plays(const NodePlace& place, std::size_t half, double power) const;
   [[nodiscard]] double variation(const Shooter& shooter, const LinkSystem& system, const UnshotPyramid& unshot,

@@ -17,9 +17,19 @@ constexpr double kRefinement = 2.0;
 /// More refinements than this find nothing: everything is split to its leaves.
 constexpr double kMinShare = 1e-9;
 constexpr std::uint32_t kMaxRounds = 100'000;
+/// Roulette weights that change for less than this part of the power need no new solution.
+constexpr double kSameWeights = 0.05;
 /// Short enough that nobody notices the wait, long enough that the workers' waiting for the last of them does not
 /// count.
 constexpr double kSliceSeconds = 0.06;
+
+/// Links of a light without extent are for this intensity (a power of two), so that they fit a link's 16 bits: close to
+/// a point light irradiance grows without bound, from afar it is bounded by pi.
+double linkIntensity(const PunctualLights::Source& source) {
+  const bool near =
+      source.kind == PunctualLights::Source::Kind::kPoint || source.kind == PunctualLights::Source::Kind::kSpot;
+  return near ? 0x1p-16 : 1.0;
+}
 
 PunctualSettings punctualSettings(const SolverSettings& settings) {
   PunctualSettings punctual;
@@ -82,7 +92,7 @@ void LinkedSolver::takeLights() {
   }
 }
 
-/// So is every light without extent, for an intensity so small that no link passes the largest there is.
+/// So is every light without extent.
 void LinkedSolver::takeSources(const LightSources& sources) {
   for (auto& source : sources_) source.intensity = glm::dvec3(0.0);
   for (const auto& source : punctual_.makeSources(*patches_, sources)) {
@@ -94,22 +104,21 @@ void LinkedSolver::takeSources(const LightSources& sources) {
     }
     Shooter shooter;
     shooter.source = static_cast<std::uint32_t>(sources_.size());
-    shooter.area = source.flux_per_intensity * punctual_.linkUnit(source);
+    shooter.area = source.flux_per_intensity * linkIntensity(source);
     sources_.push_back(source);
     (void)system_.add(shooter);
   }
   for (auto& shooter : system_.shooters()) {
     if (shooter.source == scene::kNone) continue;
     const auto& source = sources_[shooter.source];
-    shooter.sent.fill(glm::vec3(source.intensity / punctual_.linkUnit(source)));
+    shooter.sent.fill(glm::vec3(source.intensity / linkIntensity(source)));
   }
 }
 
-/// One sequence of shots of a light without extent, as links for its unit of intensity.
+/// One sequence of shots of a light without extent.
 Result<void> LinkedSolver::measureSource(const Measurement& want) {
   const auto& source = sources_[system_.shooters()[want.shooter].source];
   ShotBatch batch;
-  // Half of an intensity goes to either half; the headroom is that of one.
   batch.flux_scale = kMeasureScale * std::exp2(-std::ceil(std::log2(std::max(1.0, source.flux_per_intensity))));
   punctual_.addSample(source, want.index, static_cast<std::uint32_t>(want.half), batch);
   FluxAccumulators flux;
@@ -122,7 +131,8 @@ Result<void> LinkedSolver::measureSource(const Measurement& want) {
     links.addFlux(node, flux.node[want.half][node][0], *patches_);
   links.escaped += static_cast<double>(flux.escaped[0]) / kMeasureScale;
   links.absorbed += static_cast<double>(flux.backface[0]) / kMeasureScale;
-  links.scale(2.0 * punctual_.linkUnit(source) * kMeasureScale / batch.flux_scale);
+  // The shots of a half carry half of an intensity of one.
+  links.scale(2.0 * kMeasureScale / batch.flux_scale * linkIntensity(source));
   expander_.expand(links);
   system_.addSample(want.shooter, want.half, expander_, links, want.points);
   return {};
@@ -169,8 +179,10 @@ Result<void> LinkedSolver::measureSlice() {
 
 /// Solves all bounces over the links there are, and lights every leaf.
 void LinkedSolver::settle() {
-  planner_.weigh(system_);
+  (void)planner_.weigh(system_);
   system_.solve();
+  // Shooters that were dark before had no weight.
+  if (planner_.weigh(system_) > kSameWeights) system_.solve();
   std::thread other([&] { system_.irradiance(1, half_[1]); });
   system_.irradiance(0, half_[0]);
   other.join();
@@ -236,10 +248,7 @@ Result<StepOutcome> LinkedSolver::step() {
   }
   settle();
   if (phase_ == Phase::kImprove) return finishRound();
-  if (phase_ == Phase::kLights) {
-    settle();  // shooters that were dark until now know how strong they are, for their roulette, only after the first
-    startGrowth();
-  }
+  if (phase_ == Phase::kLights) startGrowth();
   return StepOutcome::kShot;
 }
 
@@ -324,14 +333,14 @@ void LinkedSolver::solveAnew() {
   measured_ = 0;
   for (int pass = 0; pass < 2; ++pass) {  // the first shows how strong the shooters are, for their roulette
     for (auto& shooter : system_.shooters()) {
-      for (std::size_t half = 0; pass == 0 && half < 2; ++half)
-        shooter.weight[half] = shooter.isLight() || shooter.column[half].points() > 0.0 ? 1.0 : 0.0;  // lights come in
       if (shooter.isLight()) continue;
+      for (std::size_t half = 0; pass == 0 && half < 2; ++half)
+        shooter.weight[half] = shooter.column[half].points() > 0.0 ? 1.0 : 0.0;
       shooter.mean.fill(glm::vec3(0.0F));
       shooter.sent.fill(glm::vec3(0.0F));
     }
     system_.solve();
-    if (pass == 0) planner_.weigh(system_);
+    if (pass == 0) (void)planner_.weigh(system_);
   }
   for (std::size_t half = 0; half < 2; ++half) system_.irradiance(half, half_[half]);
   findUnshot();

@@ -5,8 +5,10 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <utility>
 
+#include "tests/accuracy/closed_form.h"
 #include "tests/oracle/random.h"
 
 namespace radiosity::accuracy {
@@ -15,6 +17,8 @@ namespace {
 /// Below this visible share a texel is filled from its neighbours, so its own mean says nothing about the solver.
 constexpr double kLeastVisible = 0.25;
 constexpr double kWholeTexel = 0.999;
+/// Dividing reflected light by less than this would amplify rounding.
+constexpr double kLeastReflectance = 0.01;
 
 std::vector<Texel> chooseTexels(const LitScene& lit, const ReferenceOptions& options) {
   auto texels = findTexels(lit);
@@ -71,9 +75,20 @@ std::vector<oracle::Irradiance> trace(const oracle::PathTracer& tracer, const st
   return tracer.irradiance(footprints, {.samples = samples, .seed = seed});
 }
 
+/// Puts the exact value in place of every mean. What is buried or covered was found by tracing a few paths.
+void makeExact(const glm::dvec3& irradiance, Reference& reference) {
+  for (auto& texel : reference.texels) texel.irradiance = {irradiance, {}, texel.irradiance.visible_fraction};
+  for (auto& point : reference.points) point.irradiance = {irradiance, {}, point.irradiance.visible_fraction};
+  reference.exact = true;
+}
+
 }  // namespace
 
-Reference makeReference(const LitScene& lit, const ReferenceOptions& options) {
+Reference makeReference(const LitScene& lit, const ReferenceOptions& wanted) {
+  constexpr std::uint32_t kFewSamples = 64;
+  auto options = wanted;
+  const auto exact = options.closed_form ? cavityIrradiance(lit.scene) : std::nullopt;
+  if (exact) options.texel_samples = options.point_samples = kFewSamples;
   const auto start = std::chrono::steady_clock::now();
   const oracle::PathTracer tracer(lit.scene);
   Reference reference;
@@ -83,7 +98,9 @@ Reference makeReference(const LitScene& lit, const ReferenceOptions& options) {
     const auto& texel = texels[i];
     if (texel_means[i].visible_fraction < kLeastVisible) continue;
     const double area = texel.footprint.area() * texel_means[i].visible_fraction;
-    reference.texels.push_back({texel.page, texel.x, texel.y, area, texel_means[i]});
+    const bool plain = texel_means[i].visible_fraction > kWholeTexel && !texel.two_sided &&
+                       texel.least_reflectance >= kLeastReflectance;
+    reference.texels.push_back({texel.page, texel.x, texel.y, area, plain, texel_means[i]});
   }
   const auto points = choosePoints(lit, options);
   const auto point_values = trace(tracer, points, options.point_samples, options.seed + 3);
@@ -91,22 +108,28 @@ Reference makeReference(const LitScene& lit, const ReferenceOptions& options) {
     if (!(point_values[i].visible_fraction > 0.0)) continue;
     reference.points.push_back({points[i].where.page, points[i].where.uv, point_values[i]});
   }
+  if (exact) makeExact(*exact, reference);
   reference.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return reference;
 }
 
-Accuracy measure(const LitScene& lit, const Reference& reference) {
+oracle::ErrorMetrics measureTexels(const std::vector<Page>& pages, const Reference& reference, TexelChoice choice) {
   std::vector<oracle::Comparison> texels;
   for (const auto& texel : reference.texels) {
-    texels.push_back({lit.pages.at(static_cast<std::size_t>(texel.page)).at(texel.x, texel.y),
-                      texel.irradiance.mean_lux, texel.irradiance.standard_error, texel.area});
+    if (choice == TexelChoice::kPlain && !texel.plain) continue;
+    texels.push_back({pages.at(static_cast<std::size_t>(texel.page)).at(texel.x, texel.y), texel.irradiance.mean_lux,
+                      texel.irradiance.standard_error, texel.area});
   }
+  return oracle::measureError(texels);
+}
+
+Accuracy measure(const LitScene& lit, const Reference& reference) {
   std::vector<oracle::Comparison> points;
   for (const auto& point : reference.points) {
     points.push_back({lit.pages.at(static_cast<std::size_t>(point.page)).bilinear(point.uv), point.irradiance.mean_lux,
                       point.irradiance.standard_error, 1.0});
   }
-  return {oracle::measureError(texels), oracle::measureError(points)};
+  return {measureTexels(lit.pages, reference, TexelChoice::kAll), oracle::measureError(points)};
 }
 
 nlohmann::json toJson(const oracle::ErrorMetrics& metrics) {

@@ -18,6 +18,7 @@ struct ReferenceOptions {
   std::size_t texels = 4000;           ///< drawn at random among the whole ones; 0: all
   std::size_t points = 2000;           ///< drawn by area
   std::uint64_t seed = 1;
+  bool closed_form = false;  ///< take the exact value, without noise, where the scene has one (closed_form.h)
 };
 
 /// What the path tracer says for one layout of texels.
@@ -25,6 +26,9 @@ struct Reference {
   struct TexelMean {
     int page = 0, x = 0, y = 0;
     double area = 0.0;  ///< visible, m^2
+    /// Wholly visible, one-sided, and reflecting in every channel. Other bakers agree with us on what the value of such
+    /// a texel is: they average over buried parts too, and derive irradiance from reflected light.
+    bool plain = false;
     oracle::Irradiance irradiance;
   };
   struct Point {
@@ -35,6 +39,7 @@ struct Reference {
   std::vector<TexelMean> texels;
   std::vector<Point> points;
   double seconds = 0.0;  ///< that it took
+  bool exact = false;    ///< not traced but known
 };
 
 [[nodiscard]] Reference makeReference(const LitScene& lit, const ReferenceOptions& options);
@@ -45,6 +50,12 @@ struct Accuracy {
 
 /// `lit` must have the layout that the reference was made for.
 [[nodiscard]] Accuracy measure(const LitScene& lit, const Reference& reference);
+
+enum class TexelChoice { kAll, kPlain };
+
+/// The first half of measure(), for pages in the layout that the reference was made for.
+[[nodiscard]] oracle::ErrorMetrics measureTexels(const std::vector<Page>& pages, const Reference& reference,
+                                                 TexelChoice choice);
 
 [[nodiscard]] nlohmann::json toJson(const oracle::ErrorMetrics& metrics);
 

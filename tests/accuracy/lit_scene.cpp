@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <fstream>
 #include <glm/common.hpp>
 #include <map>
 #include <stdexcept>
@@ -55,6 +56,10 @@ double texelArea(const Polygon& polygon) {
 
 void addPieces(Texel& texel, const Polygon& polygon, const oracle::Triangle& triangle) {
   texel.coverage += texelArea(polygon);
+  const auto& rho = triangle.reflectance;
+  texel.least_reflectance = std::min({texel.least_reflectance, rho.x, rho.y, rho.z});
+  texel.node = triangle.node;
+  texel.two_sided = texel.two_sided || triangle.double_sided;
   for (std::size_t i = 1; i + 1 < polygon.size(); ++i) {
     const std::array<glm::dvec3, 3> corners{polygon[0].world, polygon[i].world, polygon[i + 1].world};
     texel.footprint.pieces.push_back({corners, triangle.normal});
@@ -139,6 +144,28 @@ void writeExr(const Page& page, const std::filesystem::path& file) {
   Imf::OutputFile out(file.c_str(), header);
   out.setFrameBuffer(frame);
   out.writePixels(page.height);
+}
+
+Page readPfm(const std::filesystem::path& file) {
+  constexpr int kMaxSide = 1 << 16;
+  std::ifstream in(file, std::ios::binary);
+  std::string magic;
+  Page page;
+  double scale = 0.0;
+  in >> magic >> page.width >> page.height >> scale;
+  in.get();  // the one blank before the pixels
+  if (!in || magic != "PF" || page.width < 1 || page.width > kMaxSide || page.height < 1 || page.height > kMaxSide ||
+      !(scale < 0.0)) {
+    throw std::runtime_error(file.string() + ": not a little-endian colour PFM");
+  }
+  const auto width = static_cast<std::size_t>(page.width);
+  page.pixels.resize(width * static_cast<std::size_t>(page.height));
+  for (auto row = static_cast<std::size_t>(page.height); row-- > 0;) {
+    in.read(reinterpret_cast<char*>(page.pixels.data() + row * width),
+            static_cast<std::streamsize>(width * sizeof(glm::vec3)));
+  }
+  if (!in) throw std::runtime_error(file.string() + ": fewer pixels than its header says");
+  return page;
 }
 
 LitScene readLitScene(const std::filesystem::path& glb) {

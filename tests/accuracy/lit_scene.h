@@ -33,11 +33,16 @@ struct LitScene {
 
 [[nodiscard]] Page readExr(const std::filesystem::path& file);
 void writeExr(const Page& page, const std::filesystem::path& file);
+/// A Portable FloatMap of three channels, little-endian, bottom row first. Throws std::runtime_error.
+[[nodiscard]] Page readPfm(const std::filesystem::path& file);
 
 /// A lightmap texel: which part of the scene lies under it.
 struct Texel {
   int page = 0, x = 0, y = 0;
-  double coverage = 0.0;  ///< share of the texel that triangles cover
+  double coverage = 0.0;           ///< share of the texel that triangles cover
+  double least_reflectance = 1.0;  ///< of any triangle and channel in it
+  bool two_sided = false;          ///< some of it is a double-sided triangle
+  std::uint32_t node = 0;          ///< of the last of its triangles
   oracle::Footprint footprint;
 };
 

@@ -15,6 +15,7 @@ struct SolveRun {
   double wall_seconds = 0.0;
   nlohmann::json report;  ///< of --report; null when none was written
   std::filesystem::path output;
+  std::string last_line;  ///< of what it printed; all of it is in NAME-solve.log beside the output
 };
 
 /// `client` is the radiosity program (or a name in PATH); `arguments` come after those for files. Output and report go

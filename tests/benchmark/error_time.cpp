@@ -1,24 +1,24 @@
-// error_time SCENE...: how the error of `radiosity solve` falls with time, against an independent path tracer. Writes
-// error_time.json, error_time.md and a plot of each scene.
+// error_time [SCENE...]: how the error of `radiosity solve` falls with time, against an independent path tracer, and
+// beside it Cycles, where Blender is installed. Writes error_time.json, error_time.md and a plot of each scene.
 #include <CLI/CLI.hpp>
-#include <cmath>
+#include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
-#include "tests/accuracy/compare.h"
-#include "tests/accuracy/solve_run.h"
-#include "tests/benchmark/error_plot.h"
+#include "tests/benchmark/error_report.h"
+#include "tests/benchmark/error_series.h"
 
 namespace {
 
 using namespace radiosity;
-using nlohmann::json;
+namespace fs = std::filesystem;
 
 #ifndef RADIOSITY_CLIENT
 #define RADIOSITY_CLIENT "radiosity"
@@ -26,144 +26,160 @@ using nlohmann::json;
 
 struct Options {
   std::vector<std::string> scenes;
-  std::vector<double> times{0.1, 0.2, 0.5, 1, 2, 5, 10};
-  std::string client = RADIOSITY_CLIENT;
-  std::filesystem::path folder = "error_time";
-  std::vector<std::string> solve_arguments;
-  accuracy::ReferenceOptions reference{.texel_samples = 2048, .point_samples = 2048};
+  bool full = false, no_cycles = false;
+  fs::path output = "error_time";
+  benchmark::SeriesOptions series;
 };
 
-/// Keeps the last reference: runs of one scene nearly always have the same texels.
-class ReferenceCache {
- public:
-  const accuracy::Reference& get(const accuracy::LitScene& lit, const accuracy::ReferenceOptions& options) {
-    if (!made_for_ || !accuracy::sameLayout(*made_for_, lit)) {
-      reference_ = accuracy::makeReference(lit, options);
-      made_for_ = lit;
+const fs::path kBuiltIn = fs::path(RADIOSITY_BINARY_DIR) / "scenes";
+const fs::path kShared = fs::path(RADIOSITY_SHARED_DIR) / "scenes";
+
+/// Scenes lent for tests, where present: those that lie in the folder itself, and .gltf one folder below. The features
+/// are single boxes and triangles, nothing to time.
+std::vector<fs::path> sharedScenes() {
+  std::vector<fs::path> found;
+  if (!fs::is_directory(kShared)) {
+    std::fprintf(stderr, "error_time: no shared scenes beside the checkout; only the built-in ones are run\n");
+    return found;
+  }
+  for (const auto& entry : fs::directory_iterator(kShared)) {
+    if (entry.path().extension() == ".glb") found.push_back(entry.path());
+    if (!entry.is_directory() || entry.path().filename() == "features") continue;
+    for (const auto& inner : fs::directory_iterator(entry.path())) {
+      if (inner.path().extension() == ".gltf") found.push_back(inner.path());
     }
-    return reference_;
   }
-
- private:
-  std::optional<accuracy::LitScene> made_for_;
-  accuracy::Reference reference_;
-};
-
-json runOnce(const Options& options, const std::filesystem::path& scene, double time, ReferenceCache& references) {
-  char limit[32];
-  std::snprintf(limit, sizeof limit, "%g", time);
-  std::vector<std::string> arguments{"--time-limit", limit, "--error", "0.000001"};
-  arguments.insert(arguments.end(), options.solve_arguments.begin(), options.solve_arguments.end());
-  const auto run = accuracy::runSolve(options.client, scene, options.folder / scene.stem() / limit, arguments);
-  json row{{"asked_seconds", time}, {"exit_code", run.exit_code}, {"wall_seconds", run.wall_seconds}};
-  if (run.exit_code != 0 && run.exit_code != 3) return row;
-  const auto lit = accuracy::readLitScene(run.output);
-  const auto measured = accuracy::measure(lit, references.get(lit, options.reference));
-  row["seconds"] = run.report.value("seconds", time);
-  row["solver"] = accuracy::toJson(measured.solver);
-  row["total"] = accuracy::toJson(measured.total);
-  row["stated"] = run.report.value("error", json::object());
-  row["shots"] = run.report.value("shots", 0);
-  row["patches"] = run.report.value("patches", 0);
-  row["gl_renderer"] = run.report.value("gl_renderer", "");
-  return row;
+  std::sort(found.begin(), found.end());
+  return found;
 }
 
-bool measured(const json& row) { return row.contains("solver"); }
-
-/// Least squares of log error against log time.
-double slope(const json& rows) {
-  double n = 0, x = 0, y = 0, xx = 0, xy = 0;
-  for (const auto& row : rows) {
-    if (!measured(row)) continue;
-    const double t = std::log(row["seconds"].get<double>());
-    const double e = std::log(row["solver"]["relative_rms"].get<double>() + 1e-12);
-    n += 1, x += t, y += e, xx += t * t, xy += t * e;
-  }
-  return n < 2 ? 0.0 : (n * xy - x * y) / (n * xx - x * x);
-}
-
-void writeMarkdown(std::FILE* out, const json& scene) {
-  std::fprintf(out, "\n### %s\n\n", scene["scene"].get<std::string>().c_str());
-  std::fprintf(out, "| solve s | solver RMS %% | total RMS %% | median %% | p99 %% | bias %% | stated %% | shots |\n");
-  std::fprintf(out, "|---:|---:|---:|---:|---:|---:|---:|---:|\n");
-  for (const auto& row : scene["runs"]) {
-    if (!measured(row)) {
-      std::fprintf(out, "| %g (asked) | failed: exit code %d | | | | | | |\n", row["asked_seconds"].get<double>(),
-                   row["exit_code"].get<int>());
-      continue;
+std::vector<fs::path> chosenScenes(const Options& options) {
+  std::vector<fs::path> chosen;
+  if (!options.scenes.empty()) {
+    for (const auto& name : options.scenes) {
+      const auto shared = kShared / (name + ".glb");
+      chosen.push_back(fs::exists(name) ? fs::path(name) : fs::exists(shared) ? shared : kBuiltIn / (name + ".glb"));
+      if (!fs::exists(chosen.back())) throw std::runtime_error("no scene file or built-in scene " + name);
     }
-    const auto percent = [](const json& group, const char* name) { return 100.0 * group.value(name, 0.0); };
-    const auto& s = row["solver"];
-    std::fprintf(out, "| %.2f | %.2f | %.2f | %.2f | %.2f | %+.2f | %.2f | %ld |\n", row["seconds"].get<double>(),
-                 percent(s, "relative_rms"), percent(row["total"], "relative_rms"), percent(s, "median"),
-                 percent(s, "p99"), percent(s, "bias"), percent(row["stated"], "total"), row["shots"].get<long>());
+    return chosen;
   }
-  std::fprintf(out, "\nSlope of solver RMS in log-log: %.2f. Reference noise: %.2f %% a texel.\n",
-               scene["slope"].get<double>(), 100.0 * scene["reference_noise"].get<double>());
+  for (const auto* name : {"cornell", "room_small", "furnace_90"})
+    chosen.push_back(kBuiltIn / (std::string(name) + ".glb"));
+  if (!options.full) return chosen;
+  for (const auto* name : {"room_seminar", "furnace"}) chosen.push_back(kBuiltIn / (std::string(name) + ".glb"));
+  const auto shared = sharedScenes();
+  chosen.insert(chosen.end(), shared.begin(), shared.end());
+  return chosen;
 }
 
-benchmark::ErrorPlot plotOf(const json& scene) {
-  benchmark::ErrorPlot plot{
-      scene["scene"].get<std::string>(),
-      {{"solver error", "#1f5fa8", {}}, {"total error", "#b0492c", {}}, {"stated", "#777777", {}}}};
-  for (const auto& row : scene["runs"]) {
-    if (!measured(row)) continue;
-    const double t = row["seconds"].get<double>();
-    plot.curves[0].points.emplace_back(t, row["solver"]["relative_rms"].get<double>());
-    plot.curves[1].points.emplace_back(t, row["total"]["relative_rms"].get<double>());
-    plot.curves[2].points.emplace_back(t, row["stated"].value("total", 0.0));
-  }
-  return plot;
+/// The rooms of the paper have its numbers of patches (Lum, Ma and Max 2002, section 5); other scenes the default.
+std::vector<std::string> argumentsFor(const fs::path& scene, const std::vector<std::string>& asked) {
+  const bool chosen = std::any_of(asked.begin(), asked.end(), [](const auto& a) { return a.rfind("--texel", 0) == 0; });
+  auto arguments = asked;
+  if (chosen || scene.parent_path() != kBuiltIn) return arguments;
+  if (scene.stem() == "room_small") arguments.insert(arguments.end(), {"--texels", "13742"});
+  if (scene.stem() == "room_seminar") arguments.insert(arguments.end(), {"--texels", "27382"});
+  return arguments;
 }
 
-json benchmarkScene(const Options& options, const std::filesystem::path& scene) {
-  ReferenceCache references;
-  json result{{"scene", scene.stem().string()}, {"runs", json::array()}, {"reference_noise", 0.0}};
-  for (const double time : options.times) {
-    result["runs"].push_back(runOnce(options, scene, time, references));
-    const auto& row = result["runs"].back();
-    if (measured(row)) result["reference_noise"] = row["solver"]["reference_noise"];
-    std::fprintf(stderr, "%s %g s: %s\n", scene.stem().c_str(), time,
-                 measured(row) ? row["solver"].dump().c_str() : "failed");
+bool inPath(const std::string& program) {
+  if (program.find('/') != std::string::npos) return fs::exists(program);
+  std::string path = std::getenv("PATH") != nullptr ? std::getenv("PATH") : "";
+  for (std::size_t at = 0; at <= path.size();) {
+    const auto end = std::min(path.find(':', at), path.size());
+    if (fs::exists(fs::path(path.substr(at, end - at)) / program)) return true;
+    at = end + 1;
   }
-  result["slope"] = slope(result["runs"]);
-  return result;
+  return false;
 }
 
-void run(const Options& options) {
-  std::filesystem::create_directories(options.folder);
-  json all = json::array();
-  for (const std::filesystem::path scene : options.scenes) {
-    all.push_back(benchmarkScene(options, scene));
-    writeMarkdown(stdout, all.back());
-    std::ofstream(options.folder / (scene.stem().string() + ".svg")) << benchmark::toSvg(plotOf(all.back()));
+benchmark::RunDescription describe(const Options& options) {
+  benchmark::RunDescription run{options.full ? "Full" : "Quick", std::thread::hardware_concurrency(), 0.0, "unknown"};
+  std::ifstream("/proc/loadavg") >> run.load;
+  std::ifstream cpu("/proc/cpuinfo");
+  for (std::string line; std::getline(cpu, line);) {
+    if (line.rfind("model name", 0) == 0) run.processor = line.substr(line.find(':') + 2);
   }
-  std::ofstream(options.folder / "error_time.json") << all.dump(2) << '\n';
-  const auto markdown = options.folder / "error_time.md";
-  if (auto* out = std::fopen(markdown.c_str(), "w"); out != nullptr) {
-    for (const auto& scene : all) writeMarkdown(out, scene);
-    std::fclose(out);
+  return run;
+}
+
+void write(const Options& options, const benchmark::RunDescription& run,
+           const std::vector<benchmark::SceneSeries>& scenes) {
+  std::ofstream(options.output / "error_time.json") << benchmark::toJson(run, scenes).dump(2) << '\n';
+  std::ofstream(options.output / "error_time.md") << benchmark::toMarkdown(run, scenes);
+  if (!scenes.back().unmeasured.empty()) return;
+  std::ofstream(options.output / (scenes.back().name + ".svg")) << benchmark::toSvg(benchmark::plotOf(scenes.back()));
+}
+
+void runAll(Options options) {
+  fs::create_directories(options.output);
+  options.series.reference.point_samples = options.series.reference.texel_samples;
+  options.series.work_folder = fs::path(RADIOSITY_BINARY_DIR) / "error_time";
+  options.series.reference_folder = fs::path(RADIOSITY_BINARY_DIR) / "references";
+  options.series.bake_script = fs::path(RADIOSITY_SOURCE_DIR) / "tests/benchmark/cycles_bake.py";
+  options.series.cycles = !options.no_cycles && inPath(options.series.blender);
+  if (!options.no_cycles && !options.series.cycles) {
+    std::fprintf(stderr, "error_time: no %s here, so nothing is compared with Cycles\n",
+                 options.series.blender.c_str());
   }
+  const auto description = describe(options);
+  std::vector<benchmark::SceneSeries> done;
+  for (const auto& scene : chosenScenes(options)) {
+    auto series = options.series;
+    series.solve_arguments = argumentsFor(scene, options.series.solve_arguments);
+    done.push_back(benchmark::measureScene(scene, series));
+    write(options, description, done);  // after each, so that an interrupted run has something to show
+  }
+  std::fputs(benchmark::toMarkdown(description, done).c_str(), stdout);
+}
+
+void applyMode(CLI::App& app, Options& options) {
+  auto& series = options.series;
+  if (options.full) return;
+  if (app.count("--times") == 0) series.times = {0.1, 0.2, 0.5, 1, 2, 4};
+  if (app.count("--reference-samples") == 0) series.reference.texel_samples = 4096;
+  if (app.count("--texels") == 0) series.reference.texels = 2000;
+  if (app.count("--points") == 0) series.reference.points = 1000;
+  if (app.count("--cycles-seconds") == 0) series.cycles_seconds = 8.0;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   Options options;
-  CLI::App app{"Error of `radiosity solve` against time, judged by an independent path tracer."};
-  app.add_option("SCENE", options.scenes, "GLB files")->required()->check(CLI::ExistingFile);
-  app.add_option("--times", options.times, "time limits in seconds")->delimiter(',')->capture_default_str();
-  app.add_option("--client", options.client, "the radiosity program")->capture_default_str();
-  app.add_option("-o,--output", options.folder, "folder for results")->capture_default_str();
-  app.add_option("--reference-samples", options.reference.texel_samples, "paths a texel")->capture_default_str();
-  app.add_option("--texels", options.reference.texels, "texels compared; 0: all")->capture_default_str();
-  app.add_option("--points", options.reference.points, "surface points compared")->capture_default_str();
-  app.add_option("--solve-argument", options.solve_arguments, "passed on to `radiosity solve` (repeat)");
+  options.series.client = RADIOSITY_CLIENT;
+  options.series.reference = {.texel_samples = 8192, .texels = 4000, .points = 2000, .closed_form = true};
+  auto& series = options.series;
+  CLI::App app{
+      "Error of `radiosity solve` against time, judged by an independent path tracer, beside Cycles where Blender is "
+      "installed. Without scenes: three built-in ones, some minutes; with --full all built-in ones and those in "
+      "../shared/scenes, about half an hour. References are kept in the build folder."};
+  app.add_option("SCENE", options.scenes, "files, or names of built-in or shared scenes");
+  app.add_flag("--full", options.full, "all scenes, all times, finer references");
+  app.add_option("--times", series.times, "limits of solve time in seconds; quick: 0.1 to 4")
+      ->delimiter(',')
+      ->expected(1, 100)
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--floor", series.floor, "stated error at which longer runs are left out")->capture_default_str();
+  app.add_option("--client", series.client, "the radiosity program")->capture_default_str();
+  app.add_option("-o,--output", options.output, "folder for results")
+      ->envname("RADIOSITY_BENCH_OUTPUT")
+      ->capture_default_str();
+  app.add_option("--reference-samples", series.reference.texel_samples, "paths a texel and point; quick: 4096")
+      ->capture_default_str();
+  app.add_option("--texels", series.reference.texels, "texels compared, 0: all; quick: 2000")->capture_default_str();
+  app.add_option("--points", series.reference.points, "surface points compared; quick: 1000")->capture_default_str();
+  app.add_option("--solve-argument", series.solve_arguments, "passed on to `radiosity solve` (repeat)");
+  app.add_flag("--no-cycles", options.no_cycles, "leave Cycles out");
+  app.add_option("--blender", series.blender, "the Blender program")->capture_default_str();
+  app.add_option("--cycles-seconds", series.cycles_seconds, "of the longest bake, about; quick: 8")
+      ->capture_default_str();
   CLI11_PARSE(app, argc, argv);
-  options.reference.point_samples = options.reference.texel_samples;
+  applyMode(app, options);
+  std::sort(series.times.begin(), series.times.end());
   try {
-    run(options);
+    runAll(options);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "error_time: %s\n", error.what());
     return 1;

@@ -1,12 +1,11 @@
 // Speed of light transport: shots/s and samples/s of scatter, points/s of gather, in rooms of 402 and 3138 polygons
-// (the sizes of the two scenes in Lum, Ma and Max 2002). This program is its own worker.
+// (the sizes of the two scenes in Lum, Ma and Max 2002), of fewer and of more.
 //   transport_benchmark --benchmark_filter=scatter/402
 #include <benchmark/benchmark.h>
 
-#include <cstring>
 #include <map>
 
-#include "server/gpu/gpu_transport.h"
+#include "tests/benchmark/built_scenes.h"
 #include "tests/gl/scene_builder.h"
 
 namespace radiosity {
@@ -15,17 +14,8 @@ namespace {
 std::shared_ptr<const scene::PatchScene> room(std::int64_t polygons) {
   static std::map<std::int64_t, std::shared_ptr<const scene::PatchScene>> rooms;
   auto& found = rooms[polygons];
-  if (!found) found = test::randomRoom(static_cast<std::uint32_t>(polygons), polygons == 402 ? 13742 : 27382, 5);
+  if (!found) found = test::randomRoom(static_cast<std::uint32_t>(polygons), polygons <= 402 ? 13742 : 27382, 5);
   return found;
-}
-
-/// 0 workers: in this process.
-std::unique_ptr<solver::Transport> transport(std::int64_t workers, benchmark::State& state) {
-  auto made = workers == 0 ? gpu::makeInProcessTransport()
-                           : gpu::makeWorkerTransport({static_cast<int>(workers), "/proc/self/exe"});
-  if (made) return std::move(*made);
-  state.SkipWithError(made.error().text().c_str());
-  return nullptr;
 }
 
 void report(benchmark::State& state, const solver::TransportCounters& sum) {
@@ -66,7 +56,7 @@ void runBatch(benchmark::State& state, solver::Transport& transport, const scene
 /// Arguments: polygons, resolution, workers.
 void scatter(benchmark::State& state) {
   const auto scene = room(state.range(0));
-  const auto carrier = transport(state.range(2), state);
+  const auto carrier = benchmarks::makeTransport(state.range(2), state);
   if (!carrier || !carrier->setScene(scene)) return;
   std::mt19937 random(1);
   std::uniform_real_distribution<float> unit(0.0F, 1.0F);
@@ -84,7 +74,7 @@ void scatter(benchmark::State& state) {
 /// Arguments: polygons, resolution, workers. A ceiling lamp seen by every leaf, 64 points in 4 shots.
 void gather(benchmark::State& state) {
   const auto scene = room(state.range(0));
-  const auto carrier = transport(state.range(2), state);
+  const auto carrier = benchmarks::makeTransport(state.range(2), state);
   if (!carrier || !carrier->setScene(scene)) return;
   std::mt19937 random(1);
   std::uniform_real_distribution<float> unit(0.45F, 0.55F);
@@ -109,21 +99,14 @@ void gather(benchmark::State& state) {
 
 BENCHMARK(scatter)
     ->ArgNames({"polygons", "resolution", "workers"})
-    ->ArgsProduct({{402, 3138}, {32, 64, 128, 256}, {0, 1, 2}})
+    ->ArgsProduct({{102, 402, 3138, 12006}, {32, 64, 128, 256}, benchmarks::workerCounts()})
     ->UseRealTime()
     ->Unit(benchmark::kMillisecond);
 BENCHMARK(gather)
     ->ArgNames({"polygons", "resolution", "workers"})
-    ->ArgsProduct({{402, 3138}, {128, 256}, {0, 1, 2}})
+    ->ArgsProduct({{402, 3138}, {128, 256}, benchmarks::workerCounts()})
     ->UseRealTime()
     ->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace radiosity
-
-int main(int argc, char** argv) {
-  if (argc > 1 && std::strcmp(argv[1], "--worker") == 0) return radiosity::gpu::workerMain(argc - 2, argv + 2);
-  benchmark::Initialize(&argc, argv);
-  benchmark::RunSpecifiedBenchmarks();
-  return 0;
-}

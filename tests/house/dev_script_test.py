@@ -40,6 +40,12 @@ class Dev(unittest.TestCase):
         self.assertIn("no-such-scene.glb", done.stderr)
         self.assertNotIn("building", done.stderr)
 
+    def test_options_of_a_benchmark_need_its_name_before_them(self):
+        done = dev("bench", "--full", "--times=1")
+        self.assertEqual((done.returncode, done.stdout), (2, ""))
+        self.assertIn("./dev bench error_time --times=1", done.stderr)
+        self.assertNotIn("building", done.stderr)
+
     def test_works_from_any_folder(self):
         with tempfile.TemporaryDirectory() as folder:
             self.assertEqual(dev("--help", cwd=folder).returncode, 0)

@@ -298,7 +298,8 @@ class Reader {
       if (member("accessors").at(accessor).at("componentType") != 5126) warn(name + " is not float");
       visitAccessor(accessor, 2, [&](auto i, auto c, double v) { texture_uvs.at(i)[static_cast<int>(c)] = v; });
     }
-    if (attributes.contains("COLOR_0")) warn("vertex colours are not modelled");
+    std::vector<glm::dvec3> colours(positions.size(), glm::dvec3(1.0));
+    if (attributes.contains("COLOR_0")) readColours(attributes["COLOR_0"].get<std::size_t>(), colours);
     std::vector<std::size_t> indices;
     if (primitive.contains("indices")) {
       const auto accessor = primitive["indices"].get<std::size_t>();
@@ -306,12 +307,32 @@ class Reader {
     } else {
       for (std::size_t i = 0; i < positions.size(); ++i) indices.push_back(i);
     }
-    appendTriangles(primitive, {positions, uvs, texture_uvs}, indices, glm::determinant(world) < 0.0, node);
+    appendTriangles(primitive, {positions, uvs, texture_uvs, colours}, indices, glm::determinant(world) < 0.0, node);
+  }
+
+  /// Colours multiply reflectance; integers stand for [0, 1].
+  void readColours(std::size_t accessor, std::vector<glm::dvec3>& colours) {
+    const auto& description = member("accessors").at(accessor);
+    const int type = description.at("componentType").get<int>();
+    const double one = type == 5121 ? 255.0 : type == 5123 ? 65535.0 : 1.0;
+    visitAccessor(accessor, description.at("type") == "VEC4" ? 4 : 3, [&](auto i, auto c, double v) {
+      if (c < 3) colours.at(i)[static_cast<int>(c)] = v / one;
+    });
+  }
+
+  /// Of the triangle whose first corner is indices[i].
+  glm::dvec3 oneColour(const std::vector<glm::dvec3>& colours, const std::vector<std::size_t>& indices, std::size_t i) {
+    const auto& colour = colours.at(indices[i]);
+    if (colours.at(indices[i + 1]) != colour || colours.at(indices[i + 2]) != colour) {
+      warn("vertex colours that vary over a triangle are not modelled");
+    }
+    return colour;
   }
 
   struct Corners {
     const std::vector<glm::dvec3>& positions;
     const std::vector<glm::dvec2>&lightmap_uvs, &texture_uvs;
+    const std::vector<glm::dvec3>& colours;
   };
 
   void appendTriangles(const json& primitive, const Corners& corners, const std::vector<std::size_t>& indices,
@@ -344,6 +365,7 @@ class Reader {
       const auto normal = glm::cross(b - a, c - a);
       if (!(glm::length(normal) > 0.0)) continue;
       triangle.normal = glm::normalize(normal);
+      triangle.reflectance = glm::min(values.reflectance * oneColour(corners.colours, indices, i), glm::dvec3(0.999));
       scene_.triangles.push_back(triangle);
     }
   }

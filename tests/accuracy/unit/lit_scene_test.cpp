@@ -54,42 +54,46 @@ TEST(LitScene, ExrSurvivesTheRoundTripWithRowZeroFirst) {
 TEST(LitScene, GlbAndPagesAreReadAsWritten) {
   // one right triangle, its node moved and turned upside down by a mirror
   const std::vector<float> numbers{0, 0, 0, 1, 0, 0, 0, 1, 0, /* uv */ 0, 0, 1, 0, 0, 1};
-  nlohmann::json gltf{{"asset", {{"version", "2.0"}}},
-                      {"scene", 0},
-                      {"scenes", {{{"nodes", {0}}}}},
-                      {"nodes", {{{"mesh", 0}, {"name", "thing"}, {"translation", {0, 0, 5}}, {"scale", {1, 1, -1}}}}},
-                      {"materials",
-                       {{{"pbrMetallicRoughness", {{"baseColorFactor", {0.2, 0.4, 0.6, 1}}, {"metallicFactor", 0.5}}},
-                         {"emissiveFactor", {1, 0, 0}},
-                         {"doubleSided", true},
-                         {"extensions", {{"KHR_materials_emissive_strength", {{"emissiveStrength", 3.0}}}}}}}},
-                      {"meshes",
-                       {{{"primitives",
-                          {{{"attributes", {{"POSITION", 0}, {"TEXCOORD_1", 1}}},
-                            {"indices", 2},
-                            {"material", 0},
-                            {"extras", {{"lightmap", 0}}}}}}}}},
-                      {"buffers", {{{"byteLength", 64}}}},
-                      {"bufferViews",
-                       {{{"buffer", 0}, {"byteOffset", 0}, {"byteLength", 36}},
-                        {{"buffer", 0}, {"byteOffset", 36}, {"byteLength", 24}},
-                        {{"buffer", 0}, {"byteOffset", 60}, {"byteLength", 3}}}},
-                      {"accessors",
-                       {{{"bufferView", 0}, {"componentType", 5126}, {"count", 3}, {"type", "VEC3"}},
-                        {{"bufferView", 1}, {"componentType", 5126}, {"count", 3}, {"type", "VEC2"}},
-                        {{"bufferView", 2}, {"componentType", 5121}, {"count", 3}, {"type", "SCALAR"}}}}};
+  nlohmann::json gltf{
+      {"asset", {{"version", "2.0"}}},
+      {"scene", 0},
+      {"scenes", {{{"nodes", {0}}}}},
+      {"nodes", {{{"mesh", 0}, {"name", "thing"}, {"translation", {0, 0, 5}}, {"scale", {1, 1, -1}}}}},
+      {"materials",
+       {{{"pbrMetallicRoughness", {{"baseColorFactor", {0.2, 0.4, 0.6, 1}}, {"metallicFactor", 0.5}}},
+         {"emissiveFactor", {1, 0, 0}},
+         {"doubleSided", true},
+         {"extensions", {{"KHR_materials_emissive_strength", {{"emissiveStrength", 3.0}}}}}}}},
+      {"meshes",
+       {{{"primitives",
+          {{{"attributes", {{"POSITION", 0}, {"TEXCOORD_1", 1}, {"COLOR_0", 3}}},
+            {"indices", 2},
+            {"material", 0},
+            {"extras", {{"lightmap", 0}}}}}}}}},
+      {"buffers", {{{"byteLength", 76}}}},
+      {"bufferViews",
+       {{{"buffer", 0}, {"byteOffset", 0}, {"byteLength", 36}},
+        {{"buffer", 0}, {"byteOffset", 36}, {"byteLength", 24}},
+        {{"buffer", 0}, {"byteOffset", 60}, {"byteLength", 3}},
+        {{"buffer", 0}, {"byteOffset", 64}, {"byteLength", 12}}}},
+      {"accessors",
+       {{{"bufferView", 0}, {"componentType", 5126}, {"count", 3}, {"type", "VEC3"}},
+        {{"bufferView", 1}, {"componentType", 5126}, {"count", 3}, {"type", "VEC2"}},
+        {{"bufferView", 2}, {"componentType", 5121}, {"count", 3}, {"type", "SCALAR"}},
+        {{"bufferView", 3}, {"componentType", 5121}, {"normalized", true}, {"count", 3}, {"type", "VEC4"}}}}};
   std::string text = gltf.dump();
   text.resize((text.size() + 3) / 4 * 4, ' ');
   std::string bytes = "glTF";
   const auto put = [&](std::uint32_t v) { bytes.append(reinterpret_cast<const char*>(&v), 4); };
   put(2);
-  put(static_cast<std::uint32_t>(28 + text.size() + 64));
+  put(static_cast<std::uint32_t>(28 + text.size() + 76));
   put(static_cast<std::uint32_t>(text.size()));
   bytes += "JSON" + text;
-  put(64);
+  put(76);
   bytes.append("BIN\0", 4);
   bytes.append(reinterpret_cast<const char*>(numbers.data()), 60);
   bytes.append("\0\1\2\0", 4);
+  for (int corner = 0; corner < 3; ++corner) bytes.append("\xFF\x33\0\xFF", 4);  // red 1, green 0.2, blue 0
   const auto glb = scratch("lit.glb");
   std::ofstream(glb, std::ios::binary) << bytes;
   writeExr({1, 1, {{7, 8, 9}}}, scratch("lit.lightmap.0.exr"));
@@ -99,7 +103,9 @@ TEST(LitScene, GlbAndPagesAreReadAsWritten) {
   const auto& triangle = lit.scene.triangles[0];
   EXPECT_NEAR(triangle.normal.z, -1.0, 1e-12);
   EXPECT_EQ(triangle.corners[0].z, 5.0);
-  EXPECT_NEAR(triangle.reflectance.y, 0.2, 1e-12);
+  EXPECT_NEAR(triangle.reflectance.x, 0.1, 1e-12);
+  EXPECT_NEAR(triangle.reflectance.y, 0.2 * 0.2, 1e-12);
+  EXPECT_EQ(triangle.reflectance.z, 0.0);
   EXPECT_NEAR(triangle.emission_lux.x, 3.0 * std::numbers::pi, 1e-12);
   EXPECT_TRUE(triangle.double_sided);
   EXPECT_EQ(lit.scene.node_names[triangle.node], "thing");

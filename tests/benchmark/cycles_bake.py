@@ -1,0 +1,264 @@
+"""Bakes the irradiance of a lit GLB with Cycles, at rising sample counts, on the texels that the GLB itself names.
+
+    blender --background --factory-startup --python cycles_bake.py -- LIT.glb FOLDER [--seconds T] [--page-sizes WxH,...]
+
+Runs inside Blender (made with 3.4). The same triangles, TEXCOORD_1 and reflectances as the GLB has, and the same
+physics as the project's conventions: a plain Diffuse BSDF; the back of a single-sided triangle is black and does not
+shine; nothing clamped; 128 bounces; no denoiser, no adaptive sampling. Everything else is as Blender starts.
+
+Sample counts grow by four for as long as the next bake should take at most T seconds. For each, every page is written as
+FOLDER/<samples>.<page>.pfm (irradiance in lux, row 0 = v 0) and a line "bake: {JSON}" is printed: samples, seconds (of
+the bake operator: scene set-up included), pages. A GLB without light or pages ends with status 1 and the reason.
+"""
+
+import argparse
+import json
+import math
+import struct
+import sys
+import time
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+COMPONENTS = {5121: np.uint8, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+
+
+class Glb:
+    """The triangles of a GLB in world space. Reads with numpy alone: Blender's importer would change the layout."""
+
+    def __init__(self, path):
+        data = Path(path).read_bytes()
+        if data[:4] != b"glTF":
+            raise ValueError(f"{path}: not a GLB file")
+        length = struct.unpack_from("<I", data, 12)[0]
+        self.gltf = json.loads(data[20:20 + length])
+        self.binary = data[28 + length:]
+
+    def accessor(self, index):
+        accessor = self.gltf["accessors"][index]
+        if "sparse" in accessor:
+            raise ValueError("sparse accessors are not read")
+        view = self.gltf["bufferViews"][accessor["bufferView"]]
+        kind = np.dtype(COMPONENTS[accessor["componentType"]])
+        width = WIDTHS[accessor["type"]]
+        start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
+        stride = view.get("byteStride", kind.itemsize * width)
+        return np.ndarray((accessor["count"], width), kind, self.binary, start, (stride, kind.itemsize))
+
+    def matrix(self, node):
+        if "matrix" in node:
+            return np.array(node["matrix"], float).reshape(4, 4).T
+        x, y, z, w = np.array(node.get("rotation", (0, 0, 0, 1)), float)
+        turn = np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                         [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                         [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
+        matrix = np.eye(4)
+        matrix[:3, :3] = turn * np.array(node.get("scale", (1, 1, 1)), float)
+        matrix[:3, 3] = node.get("translation", (0, 0, 0))
+        return matrix
+
+    def primitives(self):
+        """(corners n x 3 x 3, uvs n x 3 x 2, material or None, page or -1, colour) of every primitive in the scene."""
+        scene = self.gltf["scenes"][self.gltf.get("scene", 0)]
+        open_nodes = [(index, np.eye(4)) for index in scene.get("nodes", [])]
+        while open_nodes:
+            index, parent = open_nodes.pop()
+            node = self.gltf["nodes"][index]
+            world = parent @ self.matrix(node)
+            open_nodes += [(child, world) for child in node.get("children", [])]
+            for primitive in self.gltf["meshes"][node["mesh"]]["primitives"] if "mesh" in node else []:
+                yield self.triangles(primitive, world)
+
+    def triangles(self, primitive, world):
+        attributes = primitive["attributes"]
+        position = self.accessor(attributes["POSITION"]).astype(float) @ world[:3, :3].T + world[:3, 3]
+        uv = np.zeros((len(position), 2))
+        if "TEXCOORD_1" in attributes:
+            uv = self.accessor(attributes["TEXCOORD_1"]).astype(float)
+        order = np.arange(len(position))
+        if "indices" in primitive:
+            order = self.accessor(primitive["indices"]).astype(int).ravel()
+        order = order[:len(order) // 3 * 3].reshape(-1, 3)
+        if np.linalg.det(world[:3, :3]) < 0:
+            order = order[:, ::-1]
+        return position[order], uv[order], primitive.get("material"), primitive.get("extras", {}).get("lightmap", -1), self.colour(attributes)
+
+    def colour(self, attributes):
+        """The one vertex colour of a primitive. Several cannot be had: the reference has no scene of that kind either."""
+        if "COLOR_0" not in attributes:
+            return (1.0, 1.0, 1.0)
+        values = self.accessor(attributes["COLOR_0"])
+        colours = np.unique(values[:, :3] / (np.iinfo(values.dtype).max if values.dtype != np.float32 else 1.0), axis=0)
+        if len(colours) != 1:
+            raise ValueError("a primitive has several vertex colours")
+        return tuple(float(channel) for channel in colours[0])
+
+
+def light_and_reflectance(gltf, index):
+    """(reflectance RGB, luminance RGB in nits, double-sided) as the project's conventions say."""
+    material = gltf["materials"][index] if index is not None else {}
+    pbr = material.get("pbrMetallicRoughness", {})
+    transmits = "KHR_materials_transmission" in material.get("extensions", {})
+    if "baseColorTexture" in pbr or "emissiveTexture" in material or material.get("alphaMode", "OPAQUE") != "OPAQUE" or transmits:
+        raise ValueError("textures and surfaces that let light through are not baked")
+    colour = np.array(pbr.get("baseColorFactor", (1, 1, 1, 1))[:3], float)
+    reflectance = np.minimum(colour * (1 - pbr.get("metallicFactor", 1.0)), 0.999)
+    strength = material.get("extensions", {}).get("KHR_materials_emissive_strength", {}).get("emissiveStrength", 1.0)
+    return reflectance, strength * np.array(material.get("emissiveFactor", (0, 0, 0)), float), material.get("doubleSided", False)
+
+
+def make_material(name, reflectance, nits, double_sided, image):
+    material = bpy.data.materials.new(name)
+    material.use_nodes = True
+    nodes, link = material.node_tree.nodes, material.node_tree.links.new
+    nodes.clear()
+    output = nodes.new("ShaderNodeOutputMaterial")
+    front = nodes.new("ShaderNodeBsdfDiffuse")
+    front.inputs["Color"].default_value = (*reflectance, 1)
+    front.inputs["Roughness"].default_value = 0
+    surface = front.outputs[0]
+    if nits.max() > 0:
+        shine = nodes.new("ShaderNodeEmission")
+        shine.inputs["Color"].default_value = (*(nits / nits.max()), 1)
+        shine.inputs["Strength"].default_value = nits.max()
+        both = nodes.new("ShaderNodeAddShader")
+        link(surface, both.inputs[0])
+        link(shine.outputs[0], both.inputs[1])
+        surface = both.outputs[0]
+    if not double_sided:
+        back = nodes.new("ShaderNodeBsdfDiffuse")
+        back.inputs["Color"].default_value = (0, 0, 0, 1)
+        choose = nodes.new("ShaderNodeMixShader")
+        link(nodes.new("ShaderNodeNewGeometry").outputs["Backfacing"], choose.inputs[0])
+        link(surface, choose.inputs[1])
+        link(back.outputs[0], choose.inputs[2])
+        surface = choose.outputs[0]
+    link(surface, output.inputs["Surface"])
+    texture = nodes.new("ShaderNodeTexImage")
+    texture.image = image
+    nodes.active = texture  # where the bake goes
+    return material
+
+
+def make_mesh(corners, uvs, material_of):
+    """One object with every triangle on its own three vertices."""
+    count = len(corners)
+    mesh = bpy.data.meshes.new("scene")
+    mesh.vertices.add(3 * count)
+    mesh.loops.add(3 * count)
+    mesh.polygons.add(count)
+    mesh.vertices.foreach_set("co", corners.astype(np.float32).ravel())
+    mesh.loops.foreach_set("vertex_index", np.arange(3 * count, dtype=np.int32))
+    mesh.polygons.foreach_set("loop_start", np.arange(0, 3 * count, 3, dtype=np.int32))
+    mesh.polygons.foreach_set("loop_total", np.full(count, 3, dtype=np.int32))
+    mesh.polygons.foreach_set("material_index", material_of.astype(np.int32))
+    mesh.uv_layers.new(name="lightmap").data.foreach_set("uv", uvs.astype(np.float32).ravel())
+    mesh.update(calc_edges=True)
+    placed = bpy.data.objects.new("scene", mesh)
+    bpy.context.scene.collection.objects.link(placed)
+    bpy.context.view_layer.objects.active = placed
+    placed.select_set(True)
+    return mesh
+
+
+def load(path, sizes):
+    """Builds the Blender scene; returns the images of the pages."""
+    for old in list(bpy.data.objects):
+        bpy.data.objects.remove(old)
+    glb = Glb(path)
+    if glb.gltf.get("extensions", {}).get("KHR_lights_punctual", {}).get("lights"):
+        raise ValueError("lights without extent are not baked")
+    if "radiositySky" in (glb.gltf.get("extras") or {}):
+        raise ValueError("a sky is not baked")
+    parts = list(glb.primitives())
+    pages = 1 + max((page for *_, page, _ in parts), default=-1)
+    if pages < 1:
+        raise ValueError("no primitive names a lightmap page")
+    if len(sizes) != pages:
+        raise ValueError(f"{pages} pages, but {len(sizes)} sizes")
+    images = []
+    for page, (width, height) in enumerate(sizes):
+        images.append(bpy.data.images.new(f"page {page}", width, height, float_buffer=True, is_data=True))
+    spare = bpy.data.images.new("no page", 4, 4, float_buffer=True, is_data=True)
+    slot = [(-1 if material is None else material, page, colour) for _, _, material, page, colour in parts]
+    slots = sorted(set(slot))
+    corners = np.concatenate([part[0] for part in parts])
+    uvs = np.concatenate([part[1] for part in parts])
+    slot_of = np.concatenate([np.full(len(part[0]), slots.index(own)) for part, own in zip(parts, slot)])
+    edges = corners[:, 1:] - corners[:, :1]
+    real = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1) > 0
+    mesh = make_mesh(corners[real], uvs[real], slot_of[real])
+    shines = False
+    for material, page, colour in slots:
+        reflectance, nits, double_sided = light_and_reflectance(glb.gltf, None if material < 0 else material)
+        reflectance = np.minimum(reflectance * colour, 0.999)
+        shines = shines or nits.max() > 0
+        mesh.materials.append(make_material(f"{material}.{page}", reflectance, nits, double_sided, images[page] if page >= 0 else spare))
+    if not shines:
+        raise ValueError("no surface shines")
+    return images
+
+
+def set_up():
+    scene = bpy.context.scene
+    scene.render.engine = "CYCLES"
+    cycles = scene.cycles
+    cycles.device = "CPU"
+    cycles.use_adaptive_sampling = False
+    cycles.use_denoising = False
+    cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0
+    cycles.max_bounces = cycles.diffuse_bounces = 128
+    cycles.seed = 1
+    scene.world = bpy.data.worlds.new("black")
+    scene.world.color = (0, 0, 0)
+
+
+def write_pfm(path, image):
+    """A Portable FloatMap holds its rows bottom first; row 0 of ours, v 0, is the top one."""
+    width, height = image.size
+    pixels = np.empty(width * height * 4, np.float32)
+    image.pixels.foreach_get(pixels)
+    lux = math.pi * pixels.reshape(height, width, 4)[::-1, :, :3]  # Blender's row 0 lies at its v 0, which is our v 0
+    path.write_bytes(b"PF\n%d %d\n-1.0\n" % (width, height) + lux.astype("<f4").tobytes())
+
+
+def bake(samples, images, folder):
+    bpy.context.scene.cycles.samples = samples
+    start = time.perf_counter()
+    bpy.ops.object.bake(type="DIFFUSE", pass_filter={"DIRECT", "INDIRECT"}, margin=0, use_clear=True)
+    seconds = time.perf_counter() - start
+    pages = []
+    for page, image in enumerate(images):
+        pages.append(f"{samples}.{page}.pfm")
+        write_pfm(folder / pages[-1], image)
+    print("bake:", json.dumps({"samples": samples, "seconds": seconds, "pages": pages}), flush=True)
+    return seconds
+
+
+def main():
+    parser = argparse.ArgumentParser(prog="cycles_bake.py")
+    parser.add_argument("glb")
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--seconds", type=float, default=20.0, help="of the longest bake, about")
+    parser.add_argument("--page-sizes", required=True, help="WxH of every page, by commas")
+    arguments = parser.parse_args(sys.argv[sys.argv.index("--") + 1:])
+    sizes = [tuple(int(side) for side in size.split("x")) for size in arguments.page_sizes.split(",")]
+    arguments.folder.mkdir(parents=True, exist_ok=True)
+    set_up()
+    images = load(arguments.glb, sizes)
+    print("bake:", json.dumps({"version": bpy.app.version_string, "triangles": len(bpy.context.object.data.polygons)}), flush=True)
+    samples, first, last = 1, 0.0, 0.0
+    while samples <= 65536 and first + 4 * (last - first) <= arguments.seconds:
+        last = bake(samples, images, arguments.folder)
+        first = first or last  # nearly all set-up
+        samples *= 4
+
+
+try:
+    main()
+except Exception as error:  # Blender would go on and exit with 0
+    print(f"cycles_bake.py: {error}", file=sys.stderr)
+    sys.exit(1)

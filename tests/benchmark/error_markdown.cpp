@@ -1,0 +1,141 @@
+// The Markdown side of error_report.h.
+#include <fmt/format.h>
+
+#include "tests/benchmark/error_report.h"
+
+namespace radiosity::benchmark {
+namespace {
+
+std::string percent(double value) { return fmt::format("{:.2f}", 100.0 * value); }
+
+std::string orDash(const std::optional<double>& value) { return value ? fmt::format("{:.2f}", *value) : "-"; }
+
+std::string orDash(const std::optional<TimeToError>& time) {
+  if (!time) return "not reached";
+  constexpr const char* kMarks[] = {"", "<= ", "~ "};
+  return fmt::format("{}{:.2f}", kMarks[static_cast<int>(time->kind)], time->seconds);
+}
+
+std::string truth(const SolveRow& row) {
+  if (row.resolved()) return percent(row.solver.solverRms());
+  return "< " + percent(SolveRow::kResolved * row.solver.reference_noise);
+}
+
+std::string outcome(const SolveRow& row) { return fmt::format("{:.2f}, {}", row.seconds, truth(row)); }
+
+std::string cyclesTime(const SceneSeries& series, const Summary& summary) {
+  return series.cycles && !series.cycles->rows.empty() ? orDash(summary.cycles) : "-";
+}
+
+std::string ratioText(const Summary& summary) {
+  if (!summary.ratio_at_best) return orDash(summary.ratio);
+  return fmt::format("{:.2f} at {} %", summary.ratio_at_best->ratio, percent(summary.ratio_at_best->error));
+}
+
+std::string summaryTable(const std::vector<SceneSeries>& scenes) {
+  std::string out =
+      "| scene | polygons | patches | s to 2 % | asked for 2 %: s, true % | last row: s, true % | stated / true | "
+      "late slope | Cycles: s to 2 % | ours / Cycles | whole commands "
+      "|\n|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
+  for (const auto& series : scenes) {
+    if (!series.unmeasured.empty()) {
+      out += fmt::format("| {} | {} | {} | not judged: {} | | | | | | | |\n", series.name, series.polygons,
+                         series.patches, series.unmeasured);
+      continue;
+    }
+    const auto summary = summarize(series);
+    const auto& last = series.rows.back();
+    out += fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |\n", series.name, series.polygons,
+                       series.patches, orDash(summary.to_goal), series.asked ? outcome(*series.asked) : "-",
+                       outcome(last), orDash(summary.stated_over_true), orDash(summary.late_slope),
+                       cyclesTime(series, summary), ratioText(summary), orDash(summary.ratio_wall));
+  }
+  return out;
+}
+
+std::string solveTable(const SceneSeries& series) {
+  std::string out =
+      "| solve s | wall s | solver RMS % | median % | p99 % | bias % | total RMS % | stated % | stated / true | "
+      "discretization stated % | shots |\n|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
+  for (const auto& row : series.rows) {
+    if (!row.measured) continue;
+    out += fmt::format("| {:.2f} | {:.2f} | {} | {} | {} | {:+.2f} | {} | {} | {} | {} | {} |\n", row.seconds,
+                       row.wall_seconds, truth(row), percent(row.solver.median), percent(row.solver.p99),
+                       100.0 * row.solver.bias, percent(row.total.solverRms()), percent(row.stated.total),
+                       row.resolved() ? fmt::format("{:.2f}", row.stated.total / row.solver.solverRms()) : "-",
+                       percent(row.stated.discretization), row.shots);
+  }
+  return out;
+}
+
+std::string cyclesTable(const SceneSeries& series, const Summary& summary) {
+  const auto& cycles = *series.cycles;
+  if (cycles.rows.empty()) return fmt::format("\nCycles: no figures ({}).\n", cycles.missing);
+  std::string out = fmt::format(
+      "\nCycles {} on the same texels, those that both can be judged on ({} of {}):\n\n"
+      "| samples | bake s | solver RMS % | median % | p99 % | bias % |\n|---:|---:|---:|---:|---:|---:|\n",
+      cycles.version, series.plain_texels, series.reference_texels);
+  for (const auto& row : cycles.rows) {
+    out += fmt::format("| {} | {:.2f} | {} | {} | {} | {:+.2f} |\n", row.samples, row.seconds,
+                       percent(row.plain.solverRms()), percent(row.plain.median), percent(row.plain.p99),
+                       100.0 * row.plain.bias);
+  }
+  if (summary.cycles_cost) {
+    out += fmt::format(
+        "\nA bake takes {:.2f} s before it renders, the program {:.2f} s before it bakes. To 2 % RMS on these texels: "
+        "ours {} s of solving, {} s in all; Cycles {} s of rendering, {} s in all. Ours over Cycles: {}; whole "
+        "commands: "
+        "{}.\n",
+        summary.cycles_cost->setup_seconds, cycles.start_seconds, orDash(summary.plain), orDash(summary.plain_wall),
+        orDash(summary.cycles), orDash(summary.cycles_wall), ratioText(summary), orDash(summary.ratio_wall));
+  }
+  return out;
+}
+
+std::string referenceText(const SceneSeries& series) {
+  if (series.reference_exact) {
+    return fmt::format("Reference: the closed form, exact, at {} texels and {} points.", series.reference_texels,
+                       series.reference_points);
+  }
+  return fmt::format(
+      "Reference: path traced, {} texels with noise {} % (subtracted), {} points with {} %; {:.0f} s to trace{}.",
+      series.reference_texels, percent(series.texel_noise), series.reference_points, percent(series.point_noise),
+      series.reference_seconds, series.reference_from_disk ? ", kept from an earlier run" : "");
+}
+
+std::string sceneSection(const SceneSeries& series) {
+  std::string out = fmt::format("\n## {}\n\n", series.name);
+  if (!series.unmeasured.empty()) return out + "Not judged: " + series.unmeasured + ".\n";
+  const auto summary = summarize(series);
+  out += fmt::format("{} polygons, {} patches; {}. {}\n\n![{} against time]({}.svg)\n\n", series.polygons,
+                     series.patches, series.renderer, referenceText(series), series.name, series.name);
+  out += solveTable(series);
+  if (series.asked) {
+    const auto& row = *series.asked;
+    out += fmt::format("\nAsked for a stated 2 %: {:.2f} s of solving, {:.2f} s in all; stated {} %, true {} %.\n",
+                       row.seconds, row.wall_seconds, percent(row.stated.total), truth(row));
+  }
+  out += fmt::format("\nSlope of solver RMS in log-log: {}; over the last decade of time {}.\n", orDash(summary.slope),
+                     orDash(summary.late_slope));
+  if (series.cycles) out += cyclesTable(series, summary);
+  return out;
+}
+
+}  // namespace
+
+std::string toMarkdown(const RunDescription& run, const std::vector<SceneSeries>& scenes) {
+  std::string out = fmt::format(
+      "# Error against time\n\n{} run on {} cores of {}; load when it began {:.1f} (0: the machine was ours alone).\n\n"
+      "Solver error: means of whole texels over their visible part. Total error: bilinear lookups at random surface "
+      "points. Both are relative RMS of irradiance over area against the path tracer, with its noise subtracted "
+      "(medians "
+      "and p99 contain it). Stated: what the server says itself. Each row is a fresh `radiosity solve`. `<=`: the "
+      "first "
+      "row was below already; `~`: extrapolated as time^-0.5; `<`: lost in the reference's noise.\n\n",
+      run.mode, run.cores, run.processor, run.load);
+  out += summaryTable(scenes);
+  for (const auto& series : scenes) out += sceneSection(series);
+  return out;
+}
+
+}  // namespace radiosity::benchmark

@@ -1,0 +1,103 @@
+// From triangles to patches: import, charts, shading, pages; and how much memory a patch takes.
+#include <benchmark/benchmark.h>
+
+#include <vector>
+
+#include "server/scene/document.h"
+#include "server/scene/lightmap.h"
+#include "server/solver/solver.h"
+#include "tests/benchmark/built_scenes.h"
+
+namespace radiosity::benchmarks {
+namespace {
+
+void label(benchmark::State& state) { state.SetLabel(kSceneNames[state.range(0)]); }
+
+/// buildPatchScene: flatten, charts, packing, coverage, burial. Arguments: scene, texel budget in thousands.
+void charts(benchmark::State& state) {
+  label(state);
+  auto options = chartOptions(state.range(0));
+  options.texel_budget = static_cast<std::uint64_t>(state.range(1)) * 1000;
+  std::size_t leaves = 0;
+  for (auto _ : state) {
+    const auto patches = scene::buildPatchScene(importedScene(state.range(0)), options);
+    if (!patches) return state.SkipWithError(patches.error().text().c_str());
+    leaves += patches->leaves.size();
+  }
+  state.SetItemsProcessed(static_cast<std::int64_t>(leaves));
+}
+
+/// Emission and reflectance of every node from the materials.
+void shade(benchmark::State& state) {
+  label(state);
+  const auto& patches = *patchesOf(state.range(0)).patches;
+  for (auto _ : state) benchmark::DoNotOptimize(scene::shadePatches(importedScene(state.range(0)), patches));
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(patches.leaves.size()));
+}
+
+/// Irradiance into finished pages with their mips: what a publication costs before encoding, and what is saved while
+/// no client watches.
+void pages(benchmark::State& state) {
+  label(state);
+  const auto& patches = *patchesOf(state.range(0)).patches;
+  const std::vector<glm::vec3> irradiance(patches.nodeCount(), glm::vec3(1.0F));
+  for (auto _ : state) {
+    auto made = scene::assemblePages(patches, irradiance);
+    for (auto& page : made) {
+      while (page.irradiance.width > 1 || page.irradiance.height > 1) page = scene::coarserMip(page);
+    }
+    benchmark::DoNotOptimize(made.data());
+  }
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(patches.leaves.size()));
+}
+
+/// Bytes that stay allocated, by leaf patch: the patch scene, what materials make of it, and a solver's state with its
+/// accumulators. Workers and OpenGL not included.
+void memory(benchmark::State& state) {
+  label(state);
+  class NoTransport final : public solver::Transport {
+    Result<void> setScene(std::shared_ptr<const scene::PatchScene>) override { return {}; }
+    Result<solver::TransportCounters> run(const solver::ShotBatch&, solver::FluxAccumulators&) override {
+      return solver::TransportCounters{};
+    }
+    [[nodiscard]] std::string description() const override { return "none"; }
+    [[nodiscard]] std::shared_ptr<const scene::PatchScene> scene() const override { return nullptr; }
+  } transport;
+  (void)importedScene(state.range(0));
+  double scene_bytes = 0, material_bytes = 0, solver_bytes = 0, leaves = 1, nodes = 1;
+  for (auto _ : state) {
+    const auto before = heapBytes();
+    auto built = scene::buildPatchScene(importedScene(state.range(0)), chartOptions(state.range(0)));
+    if (!built) return state.SkipWithError(built.error().text().c_str());
+    const auto patches = std::make_shared<const scene::PatchScene>(std::move(*built));
+    const auto with_scene = heapBytes();
+    const auto materials = scene::shadePatches(importedScene(state.range(0)), *patches);
+    const auto with_materials = heapBytes();
+    const auto solver = solver::makeSolver(patches, materials, transport, {});
+    solver_bytes = static_cast<double>(heapBytes() - with_materials);
+    material_bytes = static_cast<double>(with_materials - with_scene);
+    scene_bytes = static_cast<double>(with_scene - before);
+    leaves = static_cast<double>(patches->leaves.size());
+    nodes = static_cast<double>(patches->nodeCount());
+  }
+  state.counters["patches"] = leaves;
+  state.counters["nodes_a_patch"] = nodes / leaves;
+  state.counters["B_scene"] = scene_bytes / leaves;
+  state.counters["B_materials"] = material_bytes / leaves;
+  state.counters["B_solver"] = solver_bytes / leaves;
+}
+
+BENCHMARK(charts)
+    ->ArgNames({"scene", "kilotexels"})
+    ->ArgsProduct({{kCornell, kSmallRoom, kSeminarRoom}, {16, 64, 256}})
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK(shade)->ArgNames({"scene"})->DenseRange(kCornell, kSeminarRoom)->Unit(benchmark::kMillisecond);
+BENCHMARK(pages)->ArgNames({"scene"})->DenseRange(kCornell, kSeminarRoom)->Unit(benchmark::kMillisecond);
+BENCHMARK(memory)
+    ->ArgNames({"scene"})
+    ->DenseRange(kCornell, kSeminarRoom)
+    ->Iterations(1)
+    ->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace radiosity::benchmarks

@@ -1,0 +1,51 @@
+// The bake script against the path tracer: units, orientation of the pages, and physics agree. Needs Blender.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+
+#include "tests/accuracy/solve_run.h"
+#include "tests/benchmark/error_series.h"
+#include "tests/scenes/glb_writer.h"
+#include "tests/scenes/scenes.h"
+
+namespace radiosity::benchmark {
+namespace {
+
+TEST(CyclesSeries, BakesOfTheCornellBoxConvergeToThePathTracer) {
+  if (std::system("blender --version > /dev/null 2>&1") != 0) GTEST_SKIP() << "Blender is not installed";
+  SeriesOptions options;
+  options.bake_script = std::filesystem::path(RADIOSITY_SOURCE_DIR) / "tests/benchmark/cycles_bake.py";
+  options.cycles_seconds = 3.0;
+  const auto folder = std::filesystem::path(RADIOSITY_BINARY_DIR) / "cycles_test";
+  std::filesystem::create_directories(folder);
+  test_scenes::writeGlb(test_scenes::cornell(), folder / "cornell.glb");
+  const auto run =
+      accuracy::runSolve(RADIOSITY_CLIENT, folder / "cornell.glb", folder, {"--time-limit", "0.1", "--texels", "2000"});
+  ASSERT_EQ(run.exit_code, 3) << run.last_line;
+  const auto lit = accuracy::readLitScene(run.output);
+  const auto reference =
+      accuracy::makeReference(lit, {.texel_samples = 1024, .point_samples = 8, .texels = 800, .points = 1});
+  const auto series = bakeWithCycles(run.output, lit, reference, options);
+  ASSERT_GE(series.rows.size(), 3U) << series.missing;
+  const auto& first = series.rows.front().plain;
+  const auto& last = series.rows.back().plain;
+  // Pages upside down, or a factor of pi, would leave an error that no number of samples removes. Noise falls with the
+  // root of the samples: sixteen times as many, a quarter; a half leaves room for the heavy tails of few samples.
+  EXPECT_LT(last.solverRms(), 0.5 * first.solverRms());
+  // Mean of 800 texels: the standard error of the bias is the texels' RMS error over the root of 800; 4 of them.
+  EXPECT_LT(std::abs(last.bias), 4.0 * last.solverRms() / std::sqrt(800.0) + 0.002);
+}
+
+TEST(CyclesSeries, WithoutTexelsThatABakeCanBeJudgedOnNothingIsBaked) {
+  accuracy::Reference reference;
+  reference.texels.resize(3);  // none of them plain
+  SeriesOptions options;
+  options.blender = "false";  // starting it would leave another reason
+  const auto series = bakeWithCycles("no.glb", {}, reference, options);
+  EXPECT_TRUE(series.rows.empty());
+  EXPECT_NE(series.missing.find("only 0 of 3 texels"), std::string::npos) << series.missing;
+}
+
+}  // namespace
+}  // namespace radiosity::benchmark
