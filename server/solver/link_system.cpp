@@ -217,7 +217,7 @@ double LinkSystem::mostSent(std::size_t half) const {
     shining +=
         static_cast<double>(channelSum(shooter.isLight() ? shooter.sent[half] : emission_mean_[n])) * shooter.area;
   }
-  return 1.0e4 * shining;
+  return kMostInterreflection * shining;
 }
 
 /// Number of sweeps; 0: light grew without end.
@@ -229,12 +229,6 @@ int LinkSystem::sweepHalf(std::size_t half) {
   for (std::size_t n = 0; n < count; ++n) {
     const auto weight = static_cast<float>(shooters_[n].weight[half]);
     for (std::size_t c = 0; c < 3; ++c) sent[c][n] = weight * shooters_[n].sent[half][static_cast<int>(c)];
-  }
-  double limit = 0.0;
-  for (std::size_t m = 0; m < count; ++m) {
-    const auto& shooter = shooters_[m];
-    const glm::vec3 source = shooter.isLight() ? shooter.sent[half] : emission_mean_[m];
-    limit += kMostInterreflection * static_cast<double>(channelSum(source)) * shooter.area;
   }
   for (int sweep = 1; sweep <= kMaxSweeps; ++sweep) {
     double change = 0.0, all = 0.0;
@@ -260,17 +254,6 @@ int LinkSystem::sweepHalf(std::size_t half) {
     }
     if (!std::isfinite(all) || (all > most && change > 0.0)) return 0;
     if (change <= kSolved * all) return sweep;
-    if (all > limit || !std::isfinite(all)) {
-      // Roulette weights feed on themselves (a shooter that counts many times over lights itself): without them no node
-      // reflects more than it receives.
-      for (std::size_t m = 0; m < count; ++m) {
-        auto& shooter = shooters_[m];
-        if (shooter.isLight()) continue;
-        shooter.weight[half] = std::min(shooter.weight[half], 1.0);
-        shooter.mean[half] = shooter.sent[half] = glm::vec3(0.0F);
-        for (auto& channel : sent) channel[m] = 0.0F;
-      }
-    }
   }
   return kMaxSweeps;
 }

@@ -23,6 +23,14 @@ constexpr double kSameWeights = 0.05;
 /// count.
 constexpr double kSliceSeconds = 0.06;
 
+/// Links of a light without extent are for this intensity (a power of two), so that they fit a link's 16 bits: close to
+/// a point light irradiance grows without bound, from afar it is bounded by pi.
+double linkIntensity(const PunctualLights::Source& source) {
+  const bool near =
+      source.kind == PunctualLights::Source::Kind::kPoint || source.kind == PunctualLights::Source::Kind::kSpot;
+  return near ? 0x1p-16 : 1.0;
+}
+
 PunctualSettings punctualSettings(const SolverSettings& settings) {
   PunctualSettings punctual;
   punctual.seed = settings.seed;
@@ -84,7 +92,7 @@ void LinkedSolver::takeLights() {
   }
 }
 
-/// So is every light without extent, for an intensity so small that no link passes the largest there is.
+/// So is every light without extent.
 void LinkedSolver::takeSources(const LightSources& sources) {
   for (auto& source : sources_) source.intensity = glm::dvec3(0.0);
   for (const auto& source : punctual_.makeSources(*patches_, sources)) {
@@ -96,18 +104,18 @@ void LinkedSolver::takeSources(const LightSources& sources) {
     }
     Shooter shooter;
     shooter.source = static_cast<std::uint32_t>(sources_.size());
-    shooter.area = source.flux_per_intensity * punctual_.linkUnit(source);
+    shooter.area = source.flux_per_intensity * linkIntensity(source);
     sources_.push_back(source);
     (void)system_.add(shooter);
   }
   for (auto& shooter : system_.shooters()) {
     if (shooter.source == scene::kNone) continue;
     const auto& source = sources_[shooter.source];
-    shooter.sent.fill(glm::vec3(source.intensity / punctual_.linkUnit(source)));
+    shooter.sent.fill(glm::vec3(source.intensity / linkIntensity(source)));
   }
 }
 
-/// One sequence of shots of a light without extent, as links for its unit of intensity.
+/// One sequence of shots of a light without extent.
 Result<void> LinkedSolver::measureSource(const Measurement& want) {
   const auto& source = sources_[system_.shooters()[want.shooter].source];
   ShotBatch batch;
@@ -123,7 +131,8 @@ Result<void> LinkedSolver::measureSource(const Measurement& want) {
     links.addFlux(node, flux.node[want.half][node][0], *patches_);
   links.escaped += static_cast<double>(flux.escaped[0]) / kMeasureScale;
   links.absorbed += static_cast<double>(flux.backface[0]) / kMeasureScale;
-  links.scale(2.0 * punctual_.linkUnit(source) * kMeasureScale / batch.flux_scale);
+  // The shots of a half carry half of an intensity of one.
+  links.scale(2.0 * kMeasureScale / batch.flux_scale * linkIntensity(source));
   expander_.expand(links);
   system_.addSample(want.shooter, want.half, expander_, links, want.points);
   return {};
@@ -239,10 +248,7 @@ Result<StepOutcome> LinkedSolver::step() {
   }
   settle();
   if (phase_ == Phase::kImprove) return finishRound();
-  if (phase_ == Phase::kLights) {
-    settle();  // shooters that were dark until now know how strong they are, for their roulette, only after the first
-    startGrowth();
-  }
+  if (phase_ == Phase::kLights) startGrowth();
   return StepOutcome::kShot;
 }
 

@@ -114,9 +114,6 @@ std::uint64_t PunctualLights::Source::shapeKey() const {
 
 PunctualLights::PunctualLights(const scene::PatchScene& patches, const LightSources& sources, PunctualSettings settings)
     : settings_(settings), box_(sceneBox(patches)), sources_(makeSources(patches, sources)) {
-  for (const auto& surface : patches.surfaces) {
-    if (surface.texel_area > 0.0F) smallest_leaf_ = std::min(smallest_leaf_, static_cast<double>(surface.texel_area));
-  }
   const std::uint32_t wanted = pixelsForLeaves(patches, glm::length(box_[1] - box_[0]));
   settings_.point_resolution = std::max(settings_.point_resolution, std::min(wanted, kMostPointPixels));
   settings_.parallel_resolution = std::max(settings_.parallel_resolution, std::min(wanted, kMostParallelPixels));
@@ -343,15 +340,6 @@ void PunctualLights::addTask(const Task& task, ShotBatch& batch) const {
   } else {
     addPoint(task, batch);
   }
-}
-
-double PunctualLights::linkUnit(const Source& source) const {
-  if (source.kind == Source::Kind::kDirectional || source.kind == Source::Kind::kSky) return 1.0;
-  const auto nearest = glm::clamp(source.position, box_[0], box_[1]);
-  const double distance = static_cast<double>(glm::distance(nearest, source.position));
-  // The mean over a leaf is at most 2 pi I / area, however close the light is.
-  const double most = std::min(1.0 / std::max(distance * distance, 1e-30), 2.0 * kPi / smallest_leaf_);
-  return std::exp2(-std::ceil(std::log2(most)));
 }
 
 void PunctualLights::addSample(const Source& source, std::uint32_t sequence, std::uint32_t half,

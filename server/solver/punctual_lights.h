@@ -68,9 +68,6 @@ class PunctualLights {
 
   /// Lights in one place are one source; dark ones are left out.
   [[nodiscard]] std::vector<Source> makeSources(const scene::PatchScene& patches, const LightSources& sources) const;
-  /// Intensity, a power of two, for which no leaf receives more than about one lux: 1 of a directional light; of a
-  /// point light bounded by its distance from the scene's box and by the solid angle of the smallest leaf.
-  [[nodiscard]] double linkUnit(const Source& source) const;
   /// One sequence of shots of a source with intensity one, for one half.
   void addSample(const Source& source, std::uint32_t sequence, std::uint32_t half, ShotBatch& batch) const;
 
@@ -99,7 +96,6 @@ class PunctualLights {
 
   PunctualSettings settings_;
   std::array<glm::vec3, 2> box_{};
-  double smallest_leaf_ = 1.0;  ///< area of a whole leaf, unit^2
   std::vector<Source> sources_;
   std::vector<Task> pending_;
   std::size_t next_ = 0;  ///< of pending_, not yet carried
