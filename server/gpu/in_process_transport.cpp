@@ -28,9 +28,8 @@ class InProcessTransport final : public solver::Transport {
     return counters;
   }
 
-  Result<solver::TransportCounters> measure(const solver::ShotBatch& batch,
-                                            std::vector<solver::LinkSample>& samples) override {
-    return runner_->measure(spanOf(batch), samples);
+  Result<solver::TransportCounters> measure(const solver::ShotBatch& batch, const TakeLinks& take) override {
+    return runner_->measure(spanOf(batch), take);
   }
 
   [[nodiscard]] std::string description() const override {

@@ -1,23 +1,23 @@
 // ShotRunner::measure: item buffers of many shots share an atlas, whichever shots they belong to.
 #include <algorithm>
 #include <chrono>
+#include <utility>
 
 #include "server/gpu/shot_runner.h"
 
 namespace radiosity::gpu {
 
-Result<solver::TransportCounters> ShotRunner::measure(const ShotSpan& shots, std::vector<solver::LinkSample>& samples) {
+Result<solver::TransportCounters> ShotRunner::measure(const ShotSpan& shots, const solver::Transport::TakeLinks& take) {
   if (!has_scene_) return fail(ErrorCode::kInternal, "setScene must come before measure");
   if (const auto good = checkShots(shots); !good) return tl::unexpected(good.error());
   solver::TransportCounters counters;
-  samples.assign(shots.gather.size() + shots.scatter.size(), {});
-  measureGather(shots, samples, counters);
-  measureScatter(shots, std::span(samples).subspan(shots.gather.size()), counters);
+  measureGather(shots, take, counters);
+  measureScatter(shots, take, counters);
   return counters;
 }
 
 /// A hemicube of node IDs is accumulated as if it carried a flux of one, into integers that are read back at once.
-void ShotRunner::measureScatter(const ShotSpan& shots, std::span<solver::LinkSample> samples,
+void ShotRunner::measureScatter(const ShotSpan& shots, const solver::Transport::TakeLinks& take,
                                 solver::TransportCounters& counters) {
   if (shots.scatter.empty()) return;
   if (!link_store_) link_store_.emplace(patches_->nodeCount());
@@ -31,19 +31,21 @@ void ShotRunner::measureScatter(const ShotSpan& shots, std::span<solver::LinkSam
     one.flux_scale = solver::kMeasureScale;
     one.scatter = std::span(&shot, 1);
     scatter(one, sink, counters);
+    solver::LinkSample links;
     for (std::size_t block = 0; block < sink.mark[0].size(); ++block) {
       if (sink.mark[0][block] == 0) continue;
       const auto first = static_cast<std::uint32_t>(block * kMarkNodes);
       const auto last = std::min<std::size_t>(first + kMarkNodes, sink.node[0].size());
-      for (auto node = first; node < last; ++node) samples[i].addFlux(node, sink.node[0][node][0], *patches_);
+      for (auto node = first; node < last; ++node) links.addFlux(node, sink.node[0][node][0], *patches_);
     }
-    samples[i].escaped += static_cast<double>(sink.totals->escaped[0]) / solver::kMeasureScale;
-    samples[i].absorbed += static_cast<double>(sink.totals->backface[0]) / solver::kMeasureScale;
+    links.escaped += static_cast<double>(sink.totals->escaped[0]) / solver::kMeasureScale;
+    links.absorbed += static_cast<double>(sink.totals->backface[0]) / solver::kMeasureScale;
     sink.clear();
+    take(shots.gather.size() + i, std::move(links));
   }
 }
 
-void ShotRunner::measureGather(const ShotSpan& shots, std::vector<solver::LinkSample>& samples,
+void ShotRunner::measureGather(const ShotSpan& shots, const solver::Transport::TakeLinks& take,
                                solver::TransportCounters& counters) {
   using Clock = std::chrono::steady_clock;
   // Points of neighbouring shots with equal resolution, in order.
@@ -75,7 +77,9 @@ void ShotRunner::measureGather(const ShotSpan& shots, std::vector<solver::LinkSa
       gatherer_.look(shot, frame, images.subspan((i - first) * pixels, pixels),
                      weights_.get(resolution, frame.lattice));
       if (looks[i].point + 1 == shot.first_point + shot.point_count) {
-        gatherer_.finishLinks(shot, samples[looks[i].shot], counters);
+        solver::LinkSample links;
+        gatherer_.finishLinks(shot, links, counters);
+        take(looks[i].shot, std::move(links));
       }
     }
     counters.gather_seconds += std::chrono::duration<double>(Clock::now() - start).count();

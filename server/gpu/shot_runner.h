@@ -38,17 +38,16 @@ class ShotRunner {
   [[nodiscard]] Result<solver::TransportCounters> run(const ShotSpan& shots, const FluxSink& sink);
   /// Links of every gather shot, then of every scatter shot, each by itself (Transport::measure).
   [[nodiscard]] Result<solver::TransportCounters> measure(const ShotSpan& shots,
-                                                          std::vector<solver::LinkSample>& samples);
+                                                          const solver::Transport::TakeLinks& take);
   [[nodiscard]] const EglContext& context() const { return *context_; }
 
  private:
   ShotRunner(std::unique_ptr<EglContext> context, HemicubeRenderer renderer, ParallelRenderer parallel)
       : context_(std::move(context)), renderer_(std::move(renderer)), parallel_(std::move(parallel)) {}
   void scatter(const ShotSpan& shots, const FluxSink& sink, solver::TransportCounters& counters);
-  void measureGather(const ShotSpan& shots, std::vector<solver::LinkSample>& samples,
+  void measureGather(const ShotSpan& shots, const solver::Transport::TakeLinks& take,
                      solver::TransportCounters& counters);
-
-  void measureScatter(const ShotSpan& shots, std::span<solver::LinkSample> samples,
+  void measureScatter(const ShotSpan& shots, const solver::Transport::TakeLinks& take,
                       solver::TransportCounters& counters);
 
   std::unique_ptr<EglContext> context_;  // outlives what lives in it

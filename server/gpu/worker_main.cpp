@@ -70,12 +70,13 @@ class Worker {
     if (!from.good() || !sink_) return fail(ErrorCode::kInternal, "a chunk is cut short or came before the scene");
     const auto mode = static_cast<solver::LinkMode>(head.mode);
     const ShotSpan shots{mode, head.flux_scale, scatter, gather, points, point_lights, parallel, views};
-    std::vector<solver::LinkSample> links;
-    const auto counters = head.measure != 0 ? runner_->measure(shots, links) : runner_->run(shots, *sink_);
+    std::vector<std::byte> links;
+    const auto pack = [&](std::size_t, const solver::LinkSample& sample) { packLinks(links, sample); };
+    const auto counters = head.measure != 0 ? runner_->measure(shots, pack) : runner_->run(shots, *sink_);
     if (!counters) return tl::unexpected(counters.error());
     std::vector<std::byte> report;
     appendValue(report, ChunkDoneBody{head.chunk, *counters});
-    for (const auto& sample : links) packLinks(report, sample);
+    appendSpan(report, std::span<const std::byte>(links));
     return reply(MessageKind::kChunkDone, report);
   }
 

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <atomic>
 #include <deque>
+#include <optional>
 #include <thread>
 
 #include "common/check.h"
@@ -87,7 +88,6 @@ class WorkerTransport final : public solver::Transport {
   }
 
   Result<solver::TransportCounters> run(const solver::ShotBatch& batch, solver::FluxAccumulators& into) override {
-    links_ = nullptr;
     if (auto done = carryOut(batch); !done) return tl::unexpected(done.error());
     solver::TransportCounters counters;
     for (auto& slot : slots_) {
@@ -98,11 +98,13 @@ class WorkerTransport final : public solver::Transport {
     return counters;
   }
 
-  Result<solver::TransportCounters> measure(const solver::ShotBatch& batch,
-                                            std::vector<solver::LinkSample>& samples) override {
-    samples.assign(batch.gather.size() + batch.scatter.size(), {});
-    links_ = &samples;
-    if (auto done = carryOut(batch); !done) return tl::unexpected(done.error());
+  Result<solver::TransportCounters> measure(const solver::ShotBatch& batch, const TakeLinks& take) override {
+    links_.assign(batch.gather.size() + batch.scatter.size(), std::nullopt);
+    next_taken_ = 0;
+    take_ = &take;
+    const auto done = carryOut(batch);
+    take_ = nullptr;
+    if (!done) return tl::unexpected(done.error());
     solver::TransportCounters counters;
     for (const auto& slot : slots_) counters += slot.counters;
     return counters;
@@ -178,9 +180,8 @@ class WorkerTransport final : public solver::Transport {
       queue_.pop_front();
       slot.held.push_back(chunk);
       if (slot.held.size() == 1) startClock(slot);
-      const auto sent =
-          slot.process->send(MessageKind::kChunk, packChunk(batch, chunks_[chunk], chunk, links_ != nullptr),
-                             patienceUntil(slot.deadline));
+      const auto sent = slot.process->send(
+          MessageKind::kChunk, packChunk(batch, chunks_[chunk], chunk, take_ != nullptr), patienceUntil(slot.deadline));
       if (!sent && !interrupted_) bury(slot, sent.error());
       if (!sent) return;
     }
@@ -230,7 +231,7 @@ class WorkerTransport final : public solver::Transport {
       bury(slot, Error{ErrorCode::kInternal, "a worker process reports work it was not given"});
       return;
     }
-    if (links_ != nullptr && !takeLinks(from, chunks_[report.chunk])) {
+    if (take_ != nullptr && !takeLinks(from, chunks_[report.chunk])) {
       bury(slot, Error{ErrorCode::kInternal, "a worker process reports links that make no sense"});
       return;
     }
@@ -240,10 +241,18 @@ class WorkerTransport final : public solver::Transport {
     slot.counters += report.counters;
   }
 
+  /// Links are handed on in the order of the shots; what was handed on before its worker died and was measured again is
+  /// the same, and dropped.
   [[nodiscard]] bool takeLinks(BodyReader& from, const Chunk& chunk) {
     const auto first = chunk.first + (chunk.kind == ShotKind::kGather ? 0 : gather_shots_);
     for (auto i = first; i < first + chunk.count; ++i) {
-      if (!unpackLinks(from, nodes_, (*links_)[i])) return false;
+      solver::LinkSample links;
+      if (!unpackLinks(from, nodes_, links)) return false;
+      if (i >= next_taken_) links_[i] = std::move(links);
+    }
+    for (; next_taken_ < links_.size() && links_[next_taken_]; ++next_taken_) {
+      (*take_)(next_taken_, std::move(*links_[next_taken_]));
+      links_[next_taken_].reset();
     }
     return true;
   }
@@ -299,8 +308,10 @@ class WorkerTransport final : public solver::Transport {
   bool paper_fits_ = true;  ///< whether the scene can be lit in paper mode, and why not
   Error paper_error_;
   std::vector<Chunk> chunks_;
-  std::size_t gather_shots_ = 0;                      ///< of the batch
-  std::vector<solver::LinkSample>* links_ = nullptr;  ///< of the batch, where they are wanted; else none
+  std::size_t gather_shots_ = 0;                          ///< of the batch
+  const TakeLinks* take_ = nullptr;                       ///< where links are wanted
+  std::vector<std::optional<solver::LinkSample>> links_;  ///< by shot, of those that others must go before
+  std::size_t next_taken_ = 0;
   std::deque<std::size_t> queue_;
   int deaths_ = 0;
   std::string last_death_;

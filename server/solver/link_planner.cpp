@@ -222,7 +222,7 @@ void LinkPlanner::split(const NodePlace& place, LinkSystem& system, const Unshot
 }
 
 std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPyramid& unshot,
-                                              const scene::PatchScene& patches) {
+                                              const scene::PatchScene& patches, bool may_split) {
   double spread = 0.0, squares = 0.0;
   for (const auto& shooter : system.shooters()) {
     spread += shooter.spread();
@@ -243,7 +243,7 @@ std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPy
     const double usual = spread / squares * shooter.power() * shooter.power();
     const double variance = 0.25 * (shooter.spread() * taken + 0.5 * usual) / (taken + 0.5);
     gains.push_back({variance / (2.0 * (taken + points) * cost), n, points});
-    const double varying = variation(shooter, system, unshot, patches);
+    const double varying = may_split ? variation(shooter, system, unshot, patches) : 0.0;
     if (varying > 0.0) gains.push_back({varying / 8.0, n, 0});
   }
   std::sort(gains.begin(), gains.end(), [](const Gain& a, const Gain& b) {

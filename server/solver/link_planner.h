@@ -39,9 +39,9 @@ class LinkPlanner {
                                               const scene::PatchScene& patches, std::size_t limit);
 
   /// Whatever lowers the error most for its cost: further samples of shooters whose halves differ, or shooters for the
-  /// children of nodes inside which light varies.
+  /// children of nodes inside which light varies (where `may_split`).
   [[nodiscard]] std::vector<Measurement> improve(LinkSystem& system, const UnshotPyramid& unshot,
-                                                 const scene::PatchScene& patches);
+                                                 const scene::PatchScene& patches, bool may_split);
 
   /// Square of the error of irradiance, summed over leaves by area and over channels, that light which varies inside
   /// the shooters causes.

@@ -58,9 +58,9 @@ void LinkSystem::addSample(std::uint32_t index, std::size_t half, const LinkExpa
                            double points) {
   auto& shooter = shooters_[index];
   shooter.column[half].add(links, totals, points, sides_);
-  shooter.products = {LinkColumn::product(shooter.column[0], shooter.column[0], leaf_area_),
-                      LinkColumn::product(shooter.column[0], shooter.column[1], leaf_area_),
-                      LinkColumn::product(shooter.column[1], shooter.column[1], leaf_area_)};
+  const auto& own = shooter.column[half];
+  shooter.products[half == 0 ? 0 : 2] = LinkColumn::product(own, own, leaf_area_);
+  shooter.products[1] = LinkColumn::product(shooter.column[0], shooter.column[1], leaf_area_);
   changed_[index] = true;
 }
 

@@ -17,6 +17,8 @@ constexpr double kRefinement = 2.0;
 /// More refinements than this find nothing: everything is split to its leaves.
 constexpr double kMinShare = 1e-9;
 constexpr std::uint32_t kMaxRounds = 100'000;
+/// Where nothing can be split any more, samples stop when their error is this part of the rest.
+constexpr double kIdleSampling = 0.1;
 /// Roulette weights that change for less than this part of the power need no new solution.
 constexpr double kSameWeights = 0.05;
 /// Short enough that nobody notices the wait, long enough that the workers' waiting for the last of them does not
@@ -159,17 +161,16 @@ Result<void> LinkedSolver::measureSlice() {
     }
     (batch.gather.size() > gathered.size() ? gathered : scattered).push_back(&want);
   }
-  std::vector<LinkSample> samples;
-  const auto done = transport_.measure(batch, samples);
+  gathered.insert(gathered.end(), scattered.begin(), scattered.end());
+  const auto take = [&](std::size_t i, LinkSample&& links) {
+    const auto& want = *gathered[i];
+    if (i >= batch.gather.size()) links.scale(system_.shooters()[want.shooter].area);  // it carried a flux of one
+    expander_.expand(links);
+    system_.addSample(want.shooter, want.half, expander_, links, want.points);
+  };
+  const auto done = transport_.measure(batch, take);
   if (!done) return tl::unexpected<Error>(done.error());
   counters_ += *done;
-  gathered.insert(gathered.end(), scattered.begin(), scattered.end());
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    const auto& want = *gathered[i];
-    if (i >= batch.gather.size()) samples[i].scale(system_.shooters()[want.shooter].area);  // it carried a flux of one
-    expander_.expand(samples[i]);
-    system_.addSample(want.shooter, want.half, expander_, samples[i], want.points);
-  }
   measured_ += slice.size();
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   slice_ = static_cast<std::size_t>(
@@ -183,6 +184,10 @@ void LinkedSolver::settle() {
   system_.solve();
   // Shooters that were dark before had no weight.
   if (planner_.weigh(system_) > kSameWeights) system_.solve();
+  lightLeaves();
+}
+
+void LinkedSolver::lightLeaves() {
   std::thread other([&] { system_.irradiance(1, half_[1]); });
   system_.irradiance(0, half_[0]);
   other.join();
@@ -226,12 +231,17 @@ void LinkedSolver::startGrowth() {
   phase_ = Phase::kGrow;
 }
 
+/// No memory for more shooters, or nothing left to split.
+bool LinkedSolver::isFull() const {
+  return system_.bytes() >= settings_.link_memory || planner_.share() < kMinShare * net_unshot_;
+}
+
 std::vector<Measurement> LinkedSolver::plan() {
   if (phase_ == Phase::kLights) return planner_.firstLight(system_);
-  if (phase_ == Phase::kImprove) return planner_.improve(system_, unshot_, *patches_);
+  if (phase_ == Phase::kImprove) return planner_.improve(system_, unshot_, *patches_, !isFull());
+  if (planner_.share() <= 0.0 || isFull()) return {};
   const std::size_t limit = std::max<std::size_t>(settings_.planner.pairs_a_wave, system_.shooters().size() / 2);
-  if (planner_.share() > 0.0) return planner_.grow(system_, unshot_, *patches_, limit);
-  return {};
+  return planner_.grow(system_, unshot_, *patches_, limit);
 }
 
 Result<StepOutcome> LinkedSolver::step() {
@@ -240,7 +250,11 @@ Result<StepOutcome> LinkedSolver::step() {
     wanted_ = plan();
     measured_ = 0;
     const bool dark = phase_ == Phase::kLights && net_unshot_ + varying_ <= 0.0;
-    if (wanted_.empty() && (dark || phase_ != Phase::kLights)) return finishRound();
+    if (wanted_.empty() && phase_ == Phase::kImprove) {  // no sample can lower the error
+      phase_ = Phase::kDone;
+      return StepOutcome::kExhausted;
+    }
+    if (wanted_.empty() && (dark || phase_ == Phase::kGrow)) return finishRound();
   }
   if (!wanted_.empty()) {
     if (const auto done = measureSlice(); !done) return tl::unexpected<Error>(done.error());
@@ -261,11 +275,12 @@ StepOutcome LinkedSolver::finishRound() {
 
 StepOutcome LinkedSolver::chooseNext() {
   if (error_.total <= settings_.target_error) {
+    settleFromLinks();
     phase_ = Phase::kDone;
     return StepOutcome::kConverged;
   }
-  const bool full = system_.bytes() >= settings_.link_memory || planner_.share() < kMinShare * net_unshot_;
-  if (rounds_ >= kMaxRounds) {
+  const bool full = isFull();
+  if (rounds_ >= kMaxRounds || (full && error_.sampling < kIdleSampling * error_.residual)) {
     phase_ = Phase::kDone;
     return StepOutcome::kExhausted;
   }
@@ -326,11 +341,20 @@ void LinkedSolver::setLights(const LightSources& sources) {
   solveAnew();
 }
 
-/// After an edit, from nothing but the links: the result depends on them and on the materials alone, so that an edit
-/// and its inverse give the same bits as long as no link was added in between.
+/// After an edit. What was still to be measured will be asked for again.
 void LinkedSolver::solveAnew() {
-  wanted_.clear();  // what was still to be measured will be asked for again
+  wanted_.clear();
   measured_ = 0;
+  settleFromLinks();
+  growing_ = true;
+  phase_ = Phase::kLights;
+  assess();
+  if (error_.total <= settings_.target_error) phase_ = Phase::kDone;  // the links there are carry it all
+}
+
+/// From nothing but the links: the result depends on them and on light and materials alone, so that an edit and its
+/// inverse give the same bits as long as no link was added in between.
+void LinkedSolver::settleFromLinks() {
   for (int pass = 0; pass < 2; ++pass) {  // the first shows how strong the shooters are, for their roulette
     for (auto& shooter : system_.shooters()) {
       if (shooter.isLight()) continue;
@@ -342,12 +366,7 @@ void LinkedSolver::solveAnew() {
     system_.solve();
     if (pass == 0) (void)planner_.weigh(system_);
   }
-  for (std::size_t half = 0; half < 2; ++half) system_.irradiance(half, half_[half]);
-  findUnshot();
-  growing_ = true;
-  phase_ = Phase::kLights;
-  assess();
-  if (error_.total <= settings_.target_error) phase_ = Phase::kDone;  // the links there are carry it all
+  lightLeaves();
 }
 
 std::vector<glm::vec3> LinkedSolver::halfIrradiance(std::uint32_t half) const {

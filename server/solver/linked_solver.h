@@ -46,11 +46,14 @@ class LinkedSolver final : public Solver {
  private:
   enum class Phase { kLights, kGrow, kImprove, kDone };
 
+  [[nodiscard]] bool isFull() const;
   [[nodiscard]] std::vector<Measurement> plan();
   [[nodiscard]] Result<void> measureSlice();
   [[nodiscard]] Result<void> measureSource(const Measurement& want);
   void takeSources(const LightSources& sources);
   void solveAnew();
+  void settleFromLinks();
+  void lightLeaves();
   void takeMaterials(const scene::PatchMaterials& materials);
   void takeLights();
   void settle();

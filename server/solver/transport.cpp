@@ -37,12 +37,11 @@ TransportCounters& TransportCounters::operator+=(const TransportCounters& other)
   return *this;
 }
 
-Result<TransportCounters> Transport::measure(const ShotBatch& batch, std::vector<LinkSample>& samples) {
+Result<TransportCounters> Transport::measure(const ShotBatch& batch, const TakeLinks& take) {
   const auto patches = scene();
   if (!patches) return fail(ErrorCode::kInternal, "setScene must come before measure");
   TransportCounters counters;
   FluxAccumulators flux;
-  samples.clear();
   for (std::size_t i = 0; i < batch.gather.size() + batch.scatter.size(); ++i) {
     ShotBatch one;
     one.mode = batch.mode;
@@ -66,7 +65,7 @@ Result<TransportCounters> Transport::measure(const ShotBatch& batch, std::vector
       links.addFlux(node, flux.node[0][node][0], *patches);
     links.escaped += static_cast<double>(flux.escaped[0]) / kMeasureScale;
     links.absorbed += static_cast<double>(flux.backface[0]) / kMeasureScale;
-    samples.push_back(std::move(links));
+    take(i, std::move(links));
   }
   return counters;
 }

@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <memory>
@@ -193,10 +194,13 @@ class Transport {
   /// unchanged.
   [[nodiscard]] virtual Result<TransportCounters> run(const ShotBatch& batch, FluxAccumulators& into) = 0;
 
-  /// Measures the links of every shot of the batch by itself: its radiosity or flux is taken as one, its half is
-  /// ignored. samples[i] belongs to gather shot i, then come the scatter shots. Blocks. On error `samples` is
-  /// undefined. The default carries out one shot after the other with run().
-  [[nodiscard]] virtual Result<TransportCounters> measure(const ShotBatch& batch, std::vector<LinkSample>& samples);
+  /// Takes the links of a shot of a batch.
+  using TakeLinks = std::function<void(std::size_t shot, LinkSample&& links)>;
+  /// Measures the links of every gather shot, then of every scatter shot, by itself: its radiosity or flux is taken as
+  /// one, its half is ignored. Calls `take` in the calling thread, in the order of the shots, while others are still
+  /// under way. Blocks. After an error some shots may have been taken. The default carries out one shot after the other
+  /// with run().
+  [[nodiscard]] virtual Result<TransportCounters> measure(const ShotBatch& batch, const TakeLinks& take);
 
   /// What runs in setScene(), run() or measure() fails soon, and everything after it at once: the solve thread is
   /// wanted for its end. From any thread. A transport whose calls are short need not do anything.

@@ -1,0 +1,112 @@
+// What only the solver that remembers its links promises.
+#include "server/solver/linked_solver.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tests/unit/solver/quad_scene.h"
+
+namespace radiosity::solver {
+namespace {
+
+using test::cubeQuads;
+using test::makeQuadScene;
+using test::RayTransport;
+
+void solve(Solver& solver) {
+  for (int i = 0; i < 100000; ++i) {
+    const auto outcome = solver.step();
+    ASSERT_TRUE(outcome.has_value()) << outcome.error().text();
+    if (*outcome == StepOutcome::kConverged) return;
+  }
+  FAIL() << "no convergence after 100000 steps";
+}
+
+class LinkedEdits : public testing::Test {
+ protected:
+  LinkedEdits() : quads_(cubeQuads(4, {0, 4, 0, 0, 0, 0}, {0.5F, 0.5F, 0.5F, 0.5F, 0.5F, 0.5F})) {}
+  void SetUp() override {
+    made_ = makeQuadScene(quads_);
+    ASSERT_TRUE(rays_.setScene(made_.patches));
+    solver_ = std::make_unique<LinkedSolver>(made_.patches, made_.materials, rays_, SolverSettings{});
+    solve(*solver_);
+  }
+
+  std::vector<test::Quad> quads_;
+  test::QuadScene made_;
+  RayTransport rays_{64};
+  std::unique_ptr<LinkedSolver> solver_;
+};
+
+TEST_F(LinkedEdits, OfTheLampAndBackGiveTheSameBits) {
+  const auto before = solver_->irradiance();
+  const auto shots = solver_->shots();
+  quads_[1].emission = glm::vec3(9.0F, 1.0F, 0.5F);
+  solver_->setMaterials(makeQuadScene(quads_).materials);
+  solve(*solver_);
+  EXPECT_NE(solver_->irradiance(), before);
+  solver_->setMaterials(made_.materials);
+  solve(*solver_);
+  EXPECT_EQ(solver_->shots(), shots);
+  EXPECT_EQ(solver_->irradiance(), before);
+}
+
+TEST_F(LinkedEdits, OfReflectanceAgreeWithAFreshSolveWithinTheTwoStatedErrors) {
+  quads_[3].reflectance = glm::vec3(0.8F, 0.2F, 0.1F);
+  const auto painted = makeQuadScene(quads_);
+  solver_->setMaterials(painted.materials);
+  solve(*solver_);
+  SolverSettings other;
+  other.seed = 2;
+  LinkedSolver fresh(painted.patches, painted.materials, rays_, other);
+  solve(fresh);
+  // A stated error is itself an estimate: the product promises the truth within a factor of 1.5.
+  constexpr double kCalibration = 1.5;
+  double square = 0.0, difference = 0.0;
+  for (std::size_t node = 0; node < fresh.irradiance().size(); ++node) {
+    const glm::vec3 a = solver_->irradiance()[node], b = fresh.irradiance()[node];
+    for (int c = 0; c < 3; ++c) {
+      square += static_cast<double>(b[c] * b[c]);
+      difference += static_cast<double>((a[c] - b[c]) * (a[c] - b[c]));
+    }
+  }
+  EXPECT_LT(std::sqrt(difference / square), kCalibration * std::hypot(solver_->error().total, fresh.error().total));
+}
+
+TEST_F(LinkedEdits, AThousandRandomOnesLeaveNoDriftAndNoMemory) {
+  const auto before = solver_->irradiance();
+  const auto bytes = solver_->system().bytes();
+  std::uint32_t random = 1;
+  for (int i = 0; i < 1000; ++i) {
+    random = random * 1664525U + 1013904223U;
+    auto edited = quads_;
+    edited[1].emission = glm::vec3(static_cast<float>(random >> 24U) + 1.0F);
+    solver_->setMaterials(makeQuadScene(edited).materials);
+  }
+  solver_->setMaterials(made_.materials);
+  EXPECT_EQ(solver_->irradiance(), before);
+  EXPECT_EQ(solver_->system().bytes(), bytes);
+}
+
+TEST(LinkMemory, WhenItIsUsedUpTheSolveGoesOnWithTheShootersThereAre) {
+  const auto made = makeQuadScene(cubeQuads(8, {0, 4, 0, 0, 0, 0}, {0.5F, 0.6F, 0.7F, 0.5F, 0.3F, 0.5F}));
+  RayTransport rays(64);
+  ASSERT_TRUE(rays.setScene(made.patches));
+  SolverSettings settings;
+  settings.target_error = 1e-6;
+  settings.link_memory = 40'000;
+  LinkedSolver solver(made.patches, made.materials, rays, settings);
+  std::size_t most = 0;
+  for (int i = 0; i < 400; ++i) {
+    ASSERT_TRUE(solver.step());
+    most = std::max(most, solver.system().bytes());
+  }
+  // One wave may pass the bound; none follows.
+  EXPECT_LT(most, 4 * settings.link_memory);
+  EXPECT_GT(solver.irradiance()[made.patches->surfaces[0].first_node[0]].x, 0.0F);
+}
+
+}  // namespace
+}  // namespace radiosity::solver
