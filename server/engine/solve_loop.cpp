@@ -81,7 +81,7 @@ void SolveLoop::solveSlice() {
   if (*outcome == solver::StepOutcome::kConverged) {
     endSolve(SolveState::kConverged);
   } else if (*outcome == solver::StepOutcome::kExhausted) {
-    failure_ = "the target error is smaller than this solver can reach: no further round fits its integers";
+    failure_ = "the target error is smaller than can be reached here: the room for rounds, or for links, is used up";
     endSolve(SolveState::kFailed);
   } else if (settings_.time_limit_s && seconds_ >= *settings_.time_limit_s) {
     endSolve(SolveState::kTimeLimit);

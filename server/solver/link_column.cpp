@@ -6,6 +6,17 @@
 namespace radiosity::solver {
 namespace {
 
+/// Up to so many samples the average is rounded to nearest.
+constexpr std::uint32_t kExactSamples = 64;
+
+/// 0 to 4095, as good as random for each leaf and sample.
+std::uint32_t ditherOf(std::uint32_t value, std::uint32_t sample) {
+  std::uint32_t x = value * 0x9e3779b9U ^ sample * 0x85ebca6bU;
+  x = (x ^ (x >> 16U)) * 0x7feb352dU;
+  x = (x ^ (x >> 15U)) * 0x846ca68bU;
+  return (x ^ (x >> 16U)) & 0xfffU;
+}
+
 /// The float whose exponent is the smallest of a link's, in units of a link's last bit.
 constexpr std::uint32_t kExponentBase = 97U << 11U;
 
@@ -16,8 +27,8 @@ inline float decodeOne(std::uint16_t code) {
 
 // Both vectorise; clones with and without 256-bit vectors give the same bits (no fused multiply-add in either).
 __attribute__((target_clones("avx2", "default"))) void decodeAll(const std::uint16_t* code, std::size_t count,
-                                                                 float* value) {
-  for (std::size_t i = 0; i < count; ++i) value[i] = decodeOne(code[i]);
+                                                                 float scale, float* value) {
+  for (std::size_t i = 0; i < count; ++i) value[i] = scale * decodeOne(code[i]);
 }
 
 __attribute__((target_clones("avx2", "default"))) void addScaled(const std::uint16_t* code, std::size_t count, float r,
@@ -47,9 +58,9 @@ __attribute__((target_clones("avx2", "default"))) float productOf(const std::uin
 
 }  // namespace
 
-std::uint16_t encodeLink(float value) {
+std::uint16_t encodeLink(float value, std::uint32_t dither) {
   if (!(value > 0.0F)) return 0;
-  const std::uint32_t rounded = (std::bit_cast<std::uint32_t>(value) + 0x800U) >> 12U;
+  const std::uint32_t rounded = (std::bit_cast<std::uint32_t>(std::min(value, 8.0F)) + dither) >> 12U;
   if (rounded <= kExponentBase) return 0;
   return static_cast<std::uint16_t>(std::min(rounded - kExponentBase, 0xffffU));
 }
@@ -149,11 +160,26 @@ void LinkColumn::makeRoom(std::span<const std::uint32_t> reached, const std::vec
   code_ = std::move(code);
 }
 
+/// Room for the largest link of a sample, with as much again for what averages and further samples may bring.
+void LinkColumn::grow(const LinkExpander& sample, const std::vector<Side>& sides) {
+  float largest = 0.0F;
+  for (const auto side : sample.sidesReached()) {
+    const auto values = sample.values().subspan(sides[side].first_value, sides[side].leaf_count);
+    for (const float value : values) largest = std::max(largest, value);
+  }
+  while (scale_ < 0.5F * std::min(largest, 1e30F)) scale_ *= 2.0F;
+}
+
 void LinkColumn::add(const LinkExpander& sample, const LinkSample& totals, double points,
                      const std::vector<Side>& sides) {
   makeRoom(sample.sidesReached(), sides);
   const double sum = points_ + points;
   const auto old_part = static_cast<float>(points_ / sum), new_part = static_cast<float>(points / sum);
+  const float old_scale = scale_;
+  grow(sample, sides);
+  const float kept = old_part * (old_scale / scale_), added = new_part / scale_;
+  // To the average of very many, one more adds less than half a last bit: then chance rounds, and the mean stays true.
+  const bool chance = samples_ >= kExactSamples;
   std::size_t next = 0;
   for (const auto& run : runs_) {
     const auto reached = sample.sidesReached();
@@ -162,7 +188,8 @@ void LinkColumn::add(const LinkExpander& sample, const LinkSample& totals, doubl
     for (std::uint32_t i = 0; i < run.count; ++i) {
       auto& code = code_[run.offset + i];
       const float fresh = is_new ? sample.values()[run.first_value + i] : 0.0F;
-      code = encodeLink(old_part * decodeOne(code) + new_part * fresh);
+      const std::uint32_t dither = chance ? ditherOf(run.first_value + i, samples_) : 2048;
+      code = encodeLink(kept * decodeOne(code) + added * fresh, dither);
     }
   }
   escaped_ = (escaped_ * points_ + totals.escaped * points) / sum;
@@ -173,8 +200,8 @@ void LinkColumn::add(const LinkExpander& sample, const LinkSample& totals, doubl
 
 void LinkColumn::apply(const std::array<float, 3>& radiosity, const std::array<float*, 3>& irradiance) const {
   for (const auto& run : runs_) {
-    addScaled(&code_[run.offset], run.count, radiosity[0], radiosity[1], radiosity[2], irradiance[0] + run.first_value,
-              irradiance[1] + run.first_value, irradiance[2] + run.first_value);
+    addScaled(&code_[run.offset], run.count, scale_ * radiosity[0], scale_ * radiosity[1], scale_ * radiosity[2],
+              irradiance[0] + run.first_value, irradiance[1] + run.first_value, irradiance[2] + run.first_value);
   }
 }
 
@@ -188,13 +215,13 @@ double LinkColumn::product(const LinkColumn& a, const LinkColumn& b, std::span<c
     sum += static_cast<double>(
         productOf(&a.code_[run.offset], &b.code_[other->offset], &leaf_area[run.first_value], run.count));
   }
-  return sum;
+  return sum * static_cast<double>(a.scale_) * static_cast<double>(b.scale_);
 }
 
 bool LinkColumn::decode(std::uint32_t side, std::span<float> leaves) const {
   const auto run = std::lower_bound(runs_.begin(), runs_.end(), side, [](const Run& r, auto s) { return r.side < s; });
   if (run == runs_.end() || run->side != side) return false;
-  decodeAll(&code_[run->offset], run->count, leaves.data());
+  decodeAll(&code_[run->offset], run->count, scale_, leaves.data());
   return true;
 }
 

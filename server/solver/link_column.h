@@ -12,8 +12,9 @@
 
 namespace radiosity::solver {
 
-/// A link as 16 bits: 5 of exponent, 11 of mantissa, no sign; 2^-30 to 4, relative error at most 2^-12; 0 is 0.
-[[nodiscard]] std::uint16_t encodeLink(float value);
+/// A link as 16 bits: 5 of exponent, 11 of mantissa, no sign; 2^-30 to 4, relative error at most 2^-12; 0 is 0. What is
+/// cut off is rounded up when it is more than `dither` / 4096 of the last bit: 2048 is to nearest.
+[[nodiscard]] std::uint16_t encodeLink(float value, std::uint32_t dither = 2048);
 [[nodiscard]] float decodeLink(std::uint16_t code);
 
 /// Turns what a shot delivered to nodes of any level into values of leaves.
@@ -66,8 +67,10 @@ class LinkColumn {
 
  private:
   void makeRoom(std::span<const std::uint32_t> reached, const std::vector<Side>& sides);
+  void grow(const LinkExpander& sample, const std::vector<Side>& sides);
 
-  std::vector<Run> runs_;  // by ascending side
+  std::vector<Run> runs_;    // by ascending side
+  float scale_ = 0x1p-100F;  // of the codes; a power of two that grows with the largest link
   std::vector<std::uint16_t> code_;
   std::uint32_t samples_ = 0;
   double points_ = 0.0, escaped_ = 0.0, absorbed_ = 0.0;

@@ -12,8 +12,8 @@ namespace {
 
 /// Nodes weaker than this part of a share play Russian roulette.
 constexpr double kRouletteShare = 0.05;
-/// A node that plays counts at most this often. Below, its light is left out (and stays in the residual): in a dark
-/// corner larger weights would feed on themselves.
+/// A node that plays counts at most this often. Below, its light is left out (see leftOut()): in a dark corner larger
+/// weights would feed on themselves.
 constexpr double kMaxWeight = 20.0;
 /// Nodes of less than this part of a share may shoot as a polygon though a part of it is empty or buried.
 constexpr double kPartialShare = 1.2 * kRouletteShare;
@@ -74,15 +74,19 @@ std::vector<Measurement> LinkPlanner::firstLight(const LinkSystem& system) const
   std::vector<Measurement> wanted;
   for (std::uint32_t n = 0; n < system.shooters().size(); ++n) {
     const auto& shooter = system.shooters()[n];
-    if (!shooter.isLight() || shooter.power() <= 0.0 || shooter.column[0].points() > 0.0) continue;
+    if (!shooter.isLight() || shooter.power() <= 0.0) continue;
     if (shooter.source != scene::kNone) {  // a sample of it is a whole sequence of images
-      for (std::size_t half = 0; half < 2; ++half) wanted.push_back({n, half, 1, 0});
+      for (std::size_t half = 0; half < 2; ++half) {
+        if (shooter.column[half].points() == 0.0) wanted.push_back({n, half, 1, 0});
+      }
       continue;
     }
     const auto share = static_cast<std::uint32_t>(std::lround(settings_.light_points * shooter.power() / total));
     const std::uint32_t points = std::clamp(share, 2U, kLightPoints);
     for (std::uint32_t k = 0; k < std::max(1U, (share + kLightPoints - 1) / kLightPoints); ++k) {
-      for (std::size_t half = 0; half < 2; ++half) wanted.push_back({n, half, points, k});
+      for (std::size_t half = 0; half < 2; ++half) {
+        if (shooter.column[half].points() == 0.0) wanted.push_back({n, half, points, k});
+      }
     }
   }
   return wanted;
@@ -111,6 +115,7 @@ void LinkPlanner::addShooter(const Node& node, LinkSystem& system, const UnshotP
   const std::array<bool, 2> in{certain || plays(node.place, 0, node.power),
                                certain || plays(node.place, 1, node.power)};
   counters_.roulette_kills += static_cast<std::uint64_t>(!in[0]) + static_cast<std::uint64_t>(!in[1]);
+  if (chance(node.power) < 1.0 / kMaxWeight && !certain) left_out_ += node.net;
   if (!in[0] && !in[1]) return;
   Shooter shooter;
   shooter.place = node.place;
@@ -134,6 +139,7 @@ std::vector<Measurement> LinkPlanner::grow(LinkSystem& system, const UnshotPyram
            std::tie(b.place.side, b.place.level, b.place.y, b.place.x);
   };
   std::priority_queue<Node, std::vector<Node>, decltype(weaker)> queue(weaker);
+  left_out_ = 0.0;
   const auto push = [&](const NodePlace& place, bool beside_edge) {
     Node node = nodeAt(place, unshot);
     node.beside_edge = beside_edge;
@@ -162,7 +168,7 @@ std::vector<Measurement> LinkPlanner::grow(LinkSystem& system, const UnshotPyram
     }
     const auto& shooter = system.shooters()[there];  // one of its halves may join late
     for (std::size_t half = 0; half < 2; ++half) {
-      if (shooter.column[half].points() == 0.0 && plays(place, half, shooter.power()))
+      if (shooter.column[half].points() == 0.0 && (shooter.certain || plays(place, half, shooter.power())))
         wanted.push_back({there, half, 1, 0});
     }
   }
@@ -240,7 +246,7 @@ std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPy
     const double cost = shooter.source != scene::kNone ? kSourceCost : shooter.isLight() ? kLightCost : 1.0;
     const double taken = shooter.column[0].points();
     // The spread of few samples is itself uncertain: half a sample's worth of what is usual for such power is mixed in.
-    const double usual = spread / squares * shooter.power() * shooter.power();
+    const double usual = squares > 0.0 ? spread / squares * shooter.power() * shooter.power() : 0.0;
     const double variance = 0.25 * (shooter.spread() * taken + 0.5 * usual) / (taken + 0.5);
     gains.push_back({variance / (2.0 * (taken + points) * cost), n, points});
     const double varying = may_split ? variation(shooter, system, unshot, patches) : 0.0;

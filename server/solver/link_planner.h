@@ -55,6 +55,9 @@ class LinkPlanner {
   /// power whose weight that changed.
   double weigh(LinkSystem& system);
 
+  /// Flux of the nodes that the last walk found too weak even to play roulette, all channels.
+  [[nodiscard]] double leftOut() const { return left_out_; }
+
   [[nodiscard]] const PlannerCounters& counters() const { return counters_; }
 
  private:
@@ -80,6 +83,7 @@ class LinkPlanner {
   const PlannerSettings& settings_;
   PlannerCounters counters_;
   double share_ = 0.0;
+  double left_out_ = 0.0;
 };
 
 }  // namespace radiosity::solver

@@ -102,6 +102,16 @@ std::uint32_t LinkSystem::add(const Shooter& shooter) {
   return index;
 }
 
+void LinkSystem::forget(std::uint32_t index) {
+  shooters_[index].column = {};
+  shooters_[index].products = {};
+  for (auto& half : matrix_) {
+    for (auto& row : half) {
+      if (index < row.size()) row[index] = 0.0F;
+    }
+  }
+}
+
 void LinkSystem::updateRows() {
   const std::size_t count = shooters_.size();
   emission_mean_.resize(count, glm::vec3(0.0F));

@@ -35,6 +35,10 @@ struct Shooter {
   std::array<double, 3> products{};  ///< sums over leaves of area T0 T0, T0 T1, T1 T1
 
   [[nodiscard]] bool isLight() const { return light != scene::kNone || source != scene::kNone; }
+  /// A light whose links are still to be measured, in one half at least.
+  [[nodiscard]] bool owes() const {
+    return isLight() && power() > 0.0 && (column[0].points() == 0.0 || column[1].points() == 0.0);
+  }
   /// Flux it shoots, all channels, mean of the halves and before roulette.
   [[nodiscard]] double power() const;
   /// Variance that it brings to irradiance: area-weighted square of the difference between what its halves deliver.
@@ -60,6 +64,9 @@ class LinkSystem {
   /// Averages a new sample into the links of a shooter.
   void addSample(std::uint32_t shooter, std::size_t half, const LinkExpander& links, const LinkSample& totals,
                  double points);
+
+  /// Forgets its links, so that its place can be taken by another light.
+  void forget(std::uint32_t shooter);
 
   /// Brings rows up to date and solves both halves. Returns the sweeps that the slower took.
   int solve();

@@ -16,6 +16,8 @@ namespace {
 constexpr double kRefinement = 2.0;
 /// More refinements than this find nothing: everything is split to its leaves.
 constexpr double kMinShare = 1e-9;
+/// So many lights that were moved away or switched off keep their links.
+constexpr std::ptrdiff_t kDarkSources = 8;
 constexpr std::uint32_t kMaxRounds = 100'000;
 /// Where nothing can be split any more, samples stop when their error is this part of the rest.
 constexpr double kIdleSampling = 0.1;
@@ -24,14 +26,6 @@ constexpr double kSameWeights = 0.05;
 /// Short enough that nobody notices the wait, long enough that the workers' waiting for the last of them does not
 /// count.
 constexpr double kSliceSeconds = 0.06;
-
-/// Links of a light without extent are for this intensity (a power of two), so that they fit a link's 16 bits: close to
-/// a point light irradiance grows without bound, from afar it is bounded by pi.
-double linkIntensity(const PunctualLights::Source& source) {
-  const bool near =
-      source.kind == PunctualLights::Source::Kind::kPoint || source.kind == PunctualLights::Source::Kind::kSpot;
-  return near ? 0x1p-16 : 1.0;
-}
 
 PunctualSettings punctualSettings(const SolverSettings& settings) {
   PunctualSettings punctual;
@@ -56,6 +50,7 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
       irradiance_(patches_->nodeCount(), glm::vec3(0.0F)) {
   takeMaterials(materials);
   takeSources(sources);
+  share_part_ = 1.0 / settings_.planner.shooters_a_round;
   for (auto& half : half_) half.assign(emission_.size(), glm::vec3(0.0F));
   findUnshot();
 }
@@ -104,17 +99,32 @@ void LinkedSolver::takeSources(const LightSources& sources) {
       known->intensity = source.intensity;
       continue;
     }
-    Shooter shooter;
-    shooter.source = static_cast<std::uint32_t>(sources_.size());
-    shooter.area = source.flux_per_intensity * linkIntensity(source);
-    sources_.push_back(source);
-    (void)system_.add(shooter);
+    addSource(source);
   }
   for (auto& shooter : system_.shooters()) {
-    if (shooter.source == scene::kNone) continue;
-    const auto& source = sources_[shooter.source];
-    shooter.sent.fill(glm::vec3(source.intensity / linkIntensity(source)));
+    if (shooter.source != scene::kNone) shooter.sent.fill(glm::vec3(sources_[shooter.source].intensity));
   }
+}
+
+/// In the place of one that is dark, once there are some: a lamp that is dragged about leaves no trail.
+void LinkedSolver::addSource(const PunctualLights::Source& source) {
+  const auto dark = [&](const PunctualLights::Source& s) { return s.intensity == glm::dvec3(0.0); };
+  if (std::count_if(sources_.begin(), sources_.end(), dark) >= kDarkSources) {
+    const auto old = std::find_if(sources_.begin(), sources_.end(), dark);
+    for (std::uint32_t n = 0; n < system_.shooters().size(); ++n) {
+      auto& shooter = system_.shooters()[n];
+      if (shooter.source != static_cast<std::uint32_t>(old - sources_.begin())) continue;
+      system_.forget(n);
+      shooter.area = source.flux_per_intensity;
+    }
+    *old = source;
+    return;
+  }
+  Shooter shooter;
+  shooter.source = static_cast<std::uint32_t>(sources_.size());
+  shooter.area = source.flux_per_intensity;
+  sources_.push_back(source);
+  (void)system_.add(shooter);
 }
 
 /// One sequence of shots of a light without extent.
@@ -134,7 +144,7 @@ Result<void> LinkedSolver::measureSource(const Measurement& want) {
   links.escaped += static_cast<double>(flux.escaped[0]) / kMeasureScale;
   links.absorbed += static_cast<double>(flux.backface[0]) / kMeasureScale;
   // The shots of a half carry half of an intensity of one.
-  links.scale(2.0 * kMeasureScale / batch.flux_scale * linkIntensity(source));
+  links.scale(2.0 * kMeasureScale / batch.flux_scale);
   expander_.expand(links);
   system_.addSample(want.shooter, want.half, expander_, links, want.points);
   return {};
@@ -182,8 +192,13 @@ Result<void> LinkedSolver::measureSlice() {
 void LinkedSolver::settle() {
   (void)planner_.weigh(system_);
   system_.solve();
-  // Shooters that were dark before had no weight.
-  if (planner_.weigh(system_) > kSameWeights) system_.solve();
+  std::vector<std::array<double, 2>> weights;
+  for (const auto& shooter : system_.shooters()) weights.push_back(shooter.weight);
+  if (planner_.weigh(system_) > kSameWeights) {  // shooters that were dark before had no weight
+    system_.solve();
+  } else {
+    for (std::size_t n = 0; n < weights.size(); ++n) system_.shooters()[n].weight = weights[n];
+  }
   lightLeaves();
 }
 
@@ -214,27 +229,30 @@ void LinkedSolver::findUnshot() {
   }
 }
 
-/// The share of a shooter follows from the light that there is to reflect, with all its bounces.
-void LinkedSolver::startGrowth() {
-  double reflected = 0.0, area = 0.0;
+/// Light that there is to shoot, with all its bounces: what stands in for the shooters' leaves, and what is unshot.
+double LinkedSolver::powerToShoot() const {
+  double shot = 0.0, received = 0.0, reflected = 0.0;
+  for (const auto& shooter : system_.shooters()) {
+    if (!shooter.isLight() && shooter.parent == scene::kNone) shot += shooter.power();
+  }
   for (const auto& side : sides_) {
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
-      const auto a = static_cast<double>(patches_->node_area[side.first_node + leaf]);
-      const glm::dvec3 received(irradiance_[side.first_node + leaf]);
-      const double weight = received.x + received.y + received.z + 1e-30;
-      area += a * weight;
-      reflected += a * weight * static_cast<double>(channelSum(reflectance_[side.first_value + leaf])) / 3.0;
+      const glm::vec3 flux = irradiance_[side.first_node + leaf] * patches_->node_area[side.first_node + leaf];
+      received += static_cast<double>(channelSum(flux));
+      reflected += static_cast<double>(glm::dot(flux, reflectance_[side.first_value + leaf]));
     }
   }
-  const double kept = area > 0.0 ? std::min(0.95, reflected / area) : 0.0;
-  planner_.setShare(net_unshot_ / (1.0 - kept) / settings_.planner.shooters_a_round);
+  const double kept = received > 0.0 ? std::min(0.95, reflected / received) : 0.5;
+  return shot + net_unshot_ / (1.0 - kept);
+}
+
+void LinkedSolver::startGrowth() {
+  planner_.setShare(powerToShoot() * share_part_);
   phase_ = Phase::kGrow;
 }
 
 /// No memory for more shooters, or nothing left to split.
-bool LinkedSolver::isFull() const {
-  return system_.bytes() >= settings_.link_memory || planner_.share() < kMinShare * net_unshot_;
-}
+bool LinkedSolver::isFull() const { return system_.bytes() >= settings_.link_memory || share_part_ < kMinShare; }
 
 std::vector<Measurement> LinkedSolver::plan() {
   if (phase_ == Phase::kLights) return planner_.firstLight(system_);
@@ -276,16 +294,27 @@ StepOutcome LinkedSolver::finishRound() {
 StepOutcome LinkedSolver::chooseNext() {
   if (error_.total <= settings_.target_error) {
     settleFromLinks();
+    assess();
+  }
+  if (error_.total <= settings_.target_error) {
     phase_ = Phase::kDone;
     return StepOutcome::kConverged;
   }
-  const bool full = isFull();
-  if (rounds_ >= kMaxRounds || (full && error_.sampling < kIdleSampling * error_.residual)) {
+  const auto& shooters = system_.shooters();
+  if (std::any_of(shooters.begin(), shooters.end(), [](const Shooter& shooter) { return shooter.owes(); })) {
+    phase_ = Phase::kLights;
+    return StepOutcome::kRoundDone;
+  }
+  // Roulette's part of the sampling error, and what was too weak to play, fall with the share alone.
+  const double roulette = error_.sampling * std::sqrt(LinkPlanner::rouletteShare(system_));
+  const bool by_share = std::hypot(roulette, left_out_) > 0.7 * error_.total;
+  const double by_samples = std::sqrt(std::max(0.0, error_.sampling * error_.sampling - roulette * roulette));
+  if (rounds_ >= kMaxRounds || (isFull() && (by_share || by_samples < kIdleSampling * error_.residual))) {
     phase_ = Phase::kDone;
     return StepOutcome::kExhausted;
   }
-  // Roulette's part of the sampling error falls with the share alone.
-  if (!full && LinkPlanner::rouletteShare(system_) > 0.5 && error_.sampling > error_.residual) {
+  if (by_share) {
+    share_part_ /= kRefinement;
     planner_.setShare(planner_.share() / kRefinement);
     phase_ = Phase::kGrow;
   } else {
@@ -311,9 +340,12 @@ void LinkedSolver::assess() {
   error_ = {};
   double owed = 0.0;  // by lights that are still to be measured
   for (const auto& shooter : system_.shooters()) {
-    if (shooter.isLight() && shooter.column[0].points() == 0.0) owed += shooter.power();
+    for (const auto& column : shooter.column) {
+      if (shooter.isLight() && column.points() == 0.0) owed += 0.5 * shooter.power();
+    }
   }
-  if (growing_) owed += net_unshot_;
+  const double left_out = planner_.leftOut();
+  owed += growing_ ? net_unshot_ : left_out;
   if (field.square() <= 0.0) {
     error_.residual = error_.total = owed + varying_ > 0.0 ? 1.0 : 0.0;  // all or nothing is missing
     return;
@@ -323,6 +355,7 @@ void LinkedSolver::assess() {
   error_.discretization = field.discretization();
   const double varying = std::sqrt(planner_.variation(system_, unshot_, *patches_) / field.square());
   error_.residual = owed / (1.0 - kept) / received + varying;
+  left_out_ = left_out / (1.0 - kept) / received;
   error_.total = std::hypot(error_.residual, error_.sampling);
 }
 
@@ -364,7 +397,13 @@ void LinkedSolver::settleFromLinks() {
       shooter.sent.fill(glm::vec3(0.0F));
     }
     system_.solve();
-    if (pass == 0) (void)planner_.weigh(system_);
+    if (pass == 1) continue;
+    double power = 0.0;
+    for (const auto& shooter : system_.shooters()) {
+      if (!shooter.isLight() && shooter.parent == scene::kNone) power += shooter.power();
+    }
+    if (power > 0.0) planner_.setShare(power * share_part_);  // weak beside the light that there is now
+    (void)planner_.weigh(system_);
   }
   lightLeaves();
 }
@@ -383,7 +422,9 @@ EnergyParts LinkedSolver::energy() const {
     for (std::size_t c = 0; c < 3 && shooter.source != scene::kNone; ++c) {
       const double flux = shooter.area * static_cast<double>(shooter.sent[0][static_cast<int>(c)]);
       parts.emitted[c] += flux;
-      if (shooter.column[0].points() == 0.0) parts.unshot[c] += flux;
+      for (const auto& column : shooter.column) {
+        if (column.points() == 0.0) parts.unshot[c] += 0.5 * flux;
+      }
     }
     for (std::size_t half = 0; half < 2; ++half) {
       const auto& column = shooter.column[half];

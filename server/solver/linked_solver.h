@@ -51,6 +51,8 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] Result<void> measureSlice();
   [[nodiscard]] Result<void> measureSource(const Measurement& want);
   void takeSources(const LightSources& sources);
+  void addSource(const PunctualLights::Source& source);
+  [[nodiscard]] double powerToShoot() const;
   void solveAnew();
   void settleFromLinks();
   void lightLeaves();
@@ -80,6 +82,8 @@ class LinkedSolver final : public Solver {
   std::size_t measured_ = 0;         // of the wave
   std::size_t slice_ = 16;           // measurements that take some 50 ms
   bool growing_ = true;              // light is still missing: until the first walk found nothing more to add
+  double share_part_ = 0.0;          // of all power, that one shooter should have
+  double left_out_ = 0.0;            // relative error by nodes too weak to play roulette
   std::uint32_t rounds_ = 0;
   double varying_ = 0.0, net_unshot_ = 0.0;     // flux, all channels
   std::array<std::vector<glm::vec3>, 2> half_;  // irradiance by leaf value

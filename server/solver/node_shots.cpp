@@ -77,6 +77,7 @@ void NodeShots::addGather(const NodePlace& node, std::size_t half, std::uint32_t
   const auto& surface = patches_.surfaces[side.surface];
   const auto& frame = patches_.triangles[surface.first_triangle];
   const auto polygon = outlines_.node(side.surface, node.level, node.x, node.y);
+  if (polygon.count < 3) return addScatter(node, half, index, resolution, batch);  // a sliver
   const bool whole = isWhole(node);
   const auto at = [&](const glm::dvec2& texel) {
     return frame.origin + static_cast<float>(texel.x) * frame.du + static_cast<float>(texel.y) * frame.dv;

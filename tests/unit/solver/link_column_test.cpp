@@ -60,6 +60,32 @@ TEST_F(LinkColumns, SamplesAreAveragedByTheirPointsAlsoWhereOneOfThemSawNothing)
   EXPECT_NEAR(column.escaped(), 0.0625, 1e-12);
 }
 
+TEST_F(LinkColumns, TinyAndHugeLinksAreKeptAlike) {
+  for (const float size : {1e-25F, 1e-10F, 1.0F, 3e4F}) {
+    LinkSample sample;
+    sample.add(sides_[0].first_node, size);
+    sample.add(sides_[0].first_node + 1, 1e-3F * size);
+    LinkColumn column;
+    add(column, sample, 1.0);
+    LinkSample larger;
+    larger.add(sides_[0].first_node, 100.0F * size);
+    larger.add(sides_[0].first_node + 1, 1e-3F * size);
+    add(column, larger, 1.0);
+    EXPECT_NEAR(leaf(column, 0, 0) / (50.5F * size), 1.0, 5e-4) << size;
+    EXPECT_NEAR(leaf(column, 0, 1) / (1e-3F * size), 1.0, 5e-4) << size;
+  }
+}
+
+TEST_F(LinkColumns, TheMeanOfThousandsOfSamplesIsStillTheirMean) {
+  LinkColumn column;
+  LinkSample high, low;
+  high.add(sides_[0].first_node, 1.0F);
+  for (int i = 0; i < 10; ++i) add(column, high, 1.0);
+  for (int i = 0; i < 9'990; ++i) add(column, low, 1.0);  // nothing was seen
+  // 10 in 10,000. Rounded to nearest it would stay where a ten-thousandth of it is less than half a last bit.
+  EXPECT_NEAR(leaf(column, 0, 0), 0.001, 0.0003);
+}
+
 TEST_F(LinkColumns, WhatACoarseNodeReceivesReachesAllLeavesBelowIt) {
   const Side& side = sides_[2];
   LinkSample sample;

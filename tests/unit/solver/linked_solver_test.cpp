@@ -90,6 +90,73 @@ TEST_F(LinkedEdits, AThousandRandomOnesLeaveNoDriftAndNoMemory) {
   EXPECT_EQ(solver_->system().bytes(), bytes);
 }
 
+TEST_F(LinkedEdits, ADimmedLampDimsIndirectLightWithIt) {
+  const auto before = solver_->irradiance();
+  quads_[1].emission = glm::vec3(4.0F / 1024.0F);
+  solver_->setMaterials(makeQuadScene(quads_).materials);
+  solve(*solver_);
+  const auto node = made_.patches->surfaces[1].first_node[0];  // the lamp's own wall sees indirect light only
+  EXPECT_NEAR(solver_->irradiance()[node].x * 1024.0F / before[node].x, 1.0F, 1e-3F);
+}
+
+LightSources lamp(const glm::dvec3& at, float candela) {
+  return {{{.position = at, .intensity = glm::vec3(candela)}}, {}};
+}
+
+TEST_F(LinkedEdits, WhileALampIsHalfMeasuredLoseNoHalf) {
+  LinkedSolver solver(made_.patches, made_.materials, rays_, SolverSettings{}, lamp({0.1, 0.2, 0.0}, 5.0F));
+  ASSERT_TRUE(solver.step());
+  ASSERT_TRUE(solver.step());
+  solver.setLights(lamp({0.1, 0.2, 0.0}, 10.0F));
+  solve(solver);
+  LinkedSolver fresh(made_.patches, made_.materials, rays_, SolverSettings{}, lamp({0.1, 0.2, 0.0}, 10.0F));
+  solve(fresh);
+  const auto node = made_.patches->surfaces[0].first_node[0] + 5;
+  EXPECT_NEAR(solver.irradiance()[node].x / fresh.irradiance()[node].x, 1.0F, 0.06F);
+}
+
+TEST_F(LinkedEdits, ALampTooWeakForTheTargetIsMeasuredWhenTheTargetFalls) {
+  SolverSettings settings;
+  settings.target_error = 0.1;
+  LinkedSolver solver(made_.patches, made_.materials, rays_, settings);
+  solve(solver);
+  solver.setLights(lamp({0.1, 0.2, 0.0}, 0.003F));
+  solve(solver);
+  solver.setTargetError(0.02);
+  solve(solver);
+  EXPECT_EQ(std::count_if(solver.system().shooters().begin(), solver.system().shooters().end(),
+                          [](const Shooter& shooter) { return shooter.owes(); }),
+            0);
+}
+
+TEST_F(LinkedEdits, ALampDraggedAboutLeavesNoTrail) {
+  std::size_t shooters = 0;
+  for (int i = 0; i < 200; ++i) {
+    solver_->setLights(lamp({0.002 * i - 0.2, 0.1, 0.0}, 3.0F));
+    ASSERT_TRUE(solver_->step());
+    if (i == 20) shooters = solver_->system().shooters().size();
+  }
+  EXPECT_LE(solver_->system().shooters().size(), shooters);
+  solve(*solver_);
+  LinkedSolver fresh(made_.patches, made_.materials, rays_, SolverSettings{},
+                     lamp({0.002 * 199 - 0.2, 0.1, 0.0}, 3.0F));
+  solve(fresh);
+  const auto node = made_.patches->surfaces[0].first_node[0] + 5;
+  EXPECT_NEAR(solver_->irradiance()[node].x / fresh.irradiance()[node].x, 1.0F, 0.06F);
+}
+
+TEST(LinkedSolver, ATinyLightIsNotBlack) {
+  auto quads = cubeQuads(4, {}, {0.5F, 0.5F, 0.5F, 0.5F, 0.5F, 0.5F});
+  quads.push_back({{0, 0.4F, 0}, {1e-6F, 0, 0}, {0, 0, 1e-6F}, 1, 1, glm::vec3(1e12F), glm::vec3(0.0F)});
+  const auto made = makeQuadScene(quads);
+  RayTransport rays(64);
+  ASSERT_TRUE(rays.setScene(made.patches));
+  LinkedSolver solver(made.patches, made.materials, rays, SolverSettings{});
+  solve(solver);
+  const auto energy = solver.energy();
+  EXPECT_NEAR(energy.absorbed[0] / energy.emitted[0], 1.0, 0.05);
+}
+
 TEST(LinkMemory, WhenItIsUsedUpTheSolveGoesOnWithTheShootersThereAre) {
   const auto made = makeQuadScene(cubeQuads(8, {0, 4, 0, 0, 0, 0}, {0.5F, 0.6F, 0.7F, 0.5F, 0.3F, 0.5F}));
   RayTransport rays(64);
