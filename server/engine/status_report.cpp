@@ -59,8 +59,8 @@ Status reportStatus(const LitScene& lit, double seconds) {
     for (const auto first : surface.first_node) {
       if (first == scene::kNone) continue;
       const auto leaves = patches.node_area.begin() + first;
-      status.patches += static_cast<std::uint64_t>(
-          std::count_if(leaves, leaves + surface.width * surface.height, [](const float area) { return area > 0.0F; }));
+      status.patches += static_cast<std::uint64_t>(std::count_if(
+          leaves, leaves + std::int64_t{surface.width} * surface.height, [](const float area) { return area > 0.0F; }));
     }
   }
   status.warnings = lit.warnings();

@@ -18,7 +18,7 @@ HemicubeFrame hemicubeAt(const glm::vec3& origin, const glm::vec3& normal, doubl
   frame.origin = origin;
   frame.normal = normal;
   frame.tangent = glm::normalize(a * static_cast<float>(std::cos(angle)) + b * static_cast<float>(std::sin(angle)));
-  frame.lattice = static_cast<std::uint32_t>(mixKeys(key, 5) % (kLatticeSide * kLatticeSide));
+  frame.lattice = static_cast<std::uint32_t>(mixKeys(key, 5) % (std::uint64_t{kLatticeSide} * kLatticeSide));
   return frame;
 }
 

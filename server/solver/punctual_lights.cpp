@@ -266,7 +266,8 @@ void PunctualLights::addPoint(const Task& task, ShotBatch& batch) const {
     const glm::vec3 normal = spot ? source.direction : onSphere(at.x, at.y);
     shot.frame.origin = source.position;
     shot.frame.tangent = perpendicular(normal, at.z);
-    shot.frame.lattice = static_cast<std::uint32_t>(mixKeys(key, 2 + index) % (kLatticeSide * kLatticeSide));
+    shot.frame.lattice =
+        static_cast<std::uint32_t>(mixKeys(key, 2 + index) % (std::uint64_t{kLatticeSide} * kLatticeSide));
     const glm::dvec3 weighed = task.intensity / (2.0 * settings_.images);
     shot.intensity = channels(weighed);
     shot.emitted = channels(weighed * source.flux_per_intensity * (spot ? 1.0 : 0.5));

@@ -57,7 +57,7 @@ Result<TransportCounters> Transport::measure(const ShotBatch& batch, const TakeL
       one.scatter[0].half = 0;
     }
     flux.reset(patches->nodeCount());
-    const auto done = run(one, flux);
+    auto done = run(one, flux);
     if (!done) return done;
     counters += *done;
     LinkSample links;

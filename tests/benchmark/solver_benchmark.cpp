@@ -107,7 +107,7 @@ struct Variant {
   std::function<void(solver::SolverSettings&)> change;
 };
 const std::vector<Variant>& variants() {
-  static const std::vector<Variant> all{
+  static const std::vector<Variant> kAll{
       {"default", [](auto&) {}},
       {"small item buffers (N 32)", [](auto& s) { s.planner.node_resolution = 32; }},
       {"large item buffers (N 128)", [](auto& s) { s.planner.node_resolution = 128; }},
@@ -119,7 +119,7 @@ const std::vector<Variant>& variants() {
        [](auto& s) { s.link_memory = 0, s.planner.variation_share /= 16; }},
       {"the paper to the letter", [](auto& s) { s.paper_mode = true; }},
   };
-  return all;
+  return kAll;
 }
 
 /// Arguments: scene, variant. With the paper's way the goal is for what is unshot, and its sampling error stays.

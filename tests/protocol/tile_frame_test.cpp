@@ -131,7 +131,7 @@ TEST(TilePixels, NegativeAndSubnormalValuesAreKeptOrBecomeZero) {
 }
 
 TEST(TilePixels, IdsComeBackExactly) {
-  std::vector<std::uint32_t> ids(64 * 64);
+  std::vector<std::uint32_t> ids(std::size_t{64} * 64);
   for (std::size_t i = 0; i < ids.size(); ++i) ids[i] = static_cast<std::uint32_t>(i * 2654435761U);
   const auto pixels = encodeIds(ids, 64, 64, Codec::kDeflate);
   ASSERT_TRUE(pixels.has_value());

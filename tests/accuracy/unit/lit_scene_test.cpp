@@ -24,7 +24,7 @@ std::filesystem::path scratch(const std::string& name) {
 /// The furnace cube with each face on its own 8 x 8 texels of a 32 x 16 page, of a constant irradiance.
 LitScene litFurnace(double rho, float value) {
   LitScene lit{oracle::triangulate(test_scenes::furnace(glm::dvec3(rho), glm::dvec3(1.0))), {}};
-  lit.pages.push_back({32, 16, std::vector<glm::vec3>(32 * 16, glm::vec3(value))});
+  lit.pages.push_back({32, 16, std::vector<glm::vec3>(std::size_t{32} * 16, glm::vec3(value))});
   for (std::size_t t = 0; t < lit.scene.triangles.size(); ++t) {
     auto& triangle = lit.scene.triangles[t];
     const auto face = t / 2;
