@@ -12,9 +12,6 @@
 namespace radiosity::gpu {
 namespace {
 
-/// A receiver this far (unit box) behind a plane still counts as lying in it.
-constexpr float kInPlane = 2.0e-6F;
-
 double polygonArea(std::span<const glm::vec3> corners) {
   glm::dvec3 sum(0.0);
   for (std::size_t i = 2; i < corners.size(); ++i) {
@@ -79,30 +76,8 @@ void LightGatherer::Lit::resize(std::size_t count) {
   }
 }
 
-LightGatherer::LightGatherer(std::shared_ptr<const scene::PatchScene> patches) : patches_(std::move(patches)) {
-  for (std::uint32_t s = 0; s < patches_->surfaces.size(); ++s) {
-    const auto& surface = patches_->surfaces[s];
-    for (std::size_t side = 0; side < 2; ++side) {
-      const auto first = surface.first_node[side];
-      if (first == scene::kNone) continue;
-      const std::size_t begin = receivers_.size();
-      for (std::uint32_t i = 0; i < surface.width * surface.height; ++i) {
-        const auto& leaf = patches_->leaves[surface.first_leaf + i];
-        if (leaf.triangle == scene::kNone || patches_->node_area[first + i] <= 0.0F) continue;
-        const auto texel = leaf.full ? glm::vec2(i % surface.width, i / surface.width) : leaf.texel;
-        receivers_.push_back({first + i, leaf.triangle, texel, leaf.full});
-      }
-      groups_.push_back({s, begin, receivers_.size() - begin, side == 0 ? 1.0F : -1.0F});
-    }
-  }
-  lit_.resize(receivers_.size());
-  for (std::size_t i = 0; i < patches_->triangles.size(); ++i) {
-    const auto& normal = patches_->triangles[i].normal;
-    const auto& corner = patches_->vertices[patches_->indices[3 * i]].position;
-    const auto& surface = patches_->surfaces[patches_->triangle_surface[i]];
-    planes_.push_back({normal, glm::dot(normal, corner)});
-    absorbs_.push_back({surface.first_node[0] == scene::kNone, surface.first_node[1] == scene::kNone});
-  }
+LightGatherer::LightGatherer(std::shared_ptr<const Receivers> receivers) : receivers_(std::move(receivers)) {
+  lit_.resize(receivers_->all().size());
 }
 
 /// Whether all of the surface lies behind the polygon's plane.
@@ -117,16 +92,16 @@ bool LightGatherer::behind(const solver::GatherShot& shot, const scene::Surface&
 void LightGatherer::findLit(const solver::GatherShot& shot) {
   if (lit_valid_ && sameGeometry(shot, lit_for_)) return;
   lit_count_ = 0;
-  for (const auto& group : groups_) {
-    if (!behind(shot, patches_->surfaces[group.surface])) findLitGroup(shot, group);
+  for (const auto& group : receivers_->groups()) {
+    if (!behind(shot, receivers_->patches().surfaces[group.surface])) findLitGroup(shot, group);
   }
   lit_for_ = shot;
   lit_valid_ = true;
 }
 
-void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Group& group) {
-  const auto& surface = patches_->surfaces[group.surface];
-  const auto& plane = patches_->triangles[surface.first_triangle];
+void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers::Group& group) {
+  const auto& surface = receivers_->patches().surfaces[group.surface];
+  const auto& plane = receivers_->patches().triangles[surface.first_triangle];
   const auto plane_normal = group.side * plane.normal;
   const std::span corners(shot.corners.data(), shot.corner_count);
   ClippedPolygon polygon;
@@ -136,8 +111,8 @@ void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Group& gr
   }
   const std::size_t begin = lit_count_;
   for (std::size_t i = group.first; i < group.first + group.count; ++i) {
-    const auto& receiver = receivers_[i];
-    const auto& frame = patches_->triangles[receiver.triangle];
+    const auto& receiver = receivers_->all()[i];
+    const auto& frame = receivers_->patches().triangles[receiver.triangle];
     const auto texel = receiver.full ? receiver.texel + shot.receiver_jitter : receiver.texel;
     const auto point = frame.origin + texel.x * frame.du + texel.y * frame.dv;
     if (glm::dot(shot.normal, point - shot.corners[0]) <= kInPlane) continue;
@@ -182,28 +157,18 @@ void LightGatherer::testPoint(const solver::GatherShot& shot, const solver::Hemi
     const auto item = items[lit_.pixel[i]];
     bool visible = true;
     if (item != RAD_ITEM_NONE) {
-      const auto& plane = planes_[item];
+      const auto& plane = receivers_->plane(item);
       const glm::vec3 at(lit_.x[i], lit_.y[i], lit_.z[i]);
       const float light = glm::dot(plane.normal, o) - plane.distance;
       const float receiver = glm::dot(plane.normal, at) - plane.distance;
       const float before = light > 0.0F ? receiver : -receiver;
-      visible = before >= -kInPlane || !risesBefore(item, at, glm::vec3(lit_.nx[i], lit_.ny[i], lit_.nz[i]));
+      visible =
+          before >= -kInPlane || !receivers_->risesBefore(item, at, glm::vec3(lit_.nx[i], lit_.ny[i], lit_.nz[i]));
     }
     weight[i] += lit_.point_weight[i];
     visible_weight[i] += visible ? lit_.point_weight[i] : 0.0F;
     visible_count[i] += visible ? 1.0F : 0.0F;
   }
-}
-
-/// Whether a part of the triangle lies in front of the receiver. What is wholly behind its horizon cannot hide a light
-/// from it, although a pixel on a convex edge may show it: the top of a block, seen instead of the topmost texels of
-/// its side.
-bool LightGatherer::risesBefore(std::uint32_t triangle, const glm::vec3& point, const glm::vec3& normal) const {
-  for (std::size_t k = 0; k < 3; ++k) {
-    const auto& corner = patches_->vertices[patches_->indices[3 * std::size_t{triangle} + k]].position;
-    if (glm::dot(normal, corner - point) > kInPlane) return true;
-  }
-  return false;
 }
 
 void LightGatherer::weighLost(const solver::HemicubeFrame& point, std::span<const std::uint32_t> items,
@@ -217,8 +182,8 @@ void LightGatherer::weighLost(const solver::HemicubeFrame& point, std::span<cons
       lost.escaped += weight;
       continue;
     }
-    const bool back = glm::dot(planes_[item].normal, point.origin) <= planes_[item].distance;
-    if (absorbs_[item][static_cast<std::size_t>(back)]) lost.absorbed += weight;
+    const bool back = glm::dot(receivers_->plane(item).normal, point.origin) <= receivers_->plane(item).distance;
+    if (receivers_->absorbs(item, back)) lost.absorbed += weight;
   }
 }
 
@@ -235,8 +200,9 @@ double LightGatherer::conserve(std::size_t sums, std::size_t points, double area
   if (kept < 0.999) return 1.0;
   double delivered = 0.0;
   for (std::size_t i = 0; i < lit_count_; ++i) {
-    const auto node = receivers_[lit_.receiver[i]].node;
-    delivered += static_cast<double>(lit_.form_factor[i] * visibility(sums, i, points) * patches_->node_area[node]);
+    const auto node = receivers_->all()[lit_.receiver[i]].node;
+    delivered +=
+        static_cast<double>(lit_.form_factor[i] * visibility(sums, i, points) * receivers_->patches().node_area[node]);
   }
   return delivered > 0.0 ? std::clamp(kept * area / delivered, 0.25, 4.0) : 1.0;
 }
@@ -247,9 +213,9 @@ void LightGatherer::deliver(const solver::GatherShot& shot, std::size_t half, st
   for (std::size_t i = 0; i < lit_count_; ++i) {
     const float seen = visibility(sums, i, points);
     if (seen <= 0.0F) continue;
-    const auto node = receivers_[lit_.receiver[i]].node;
-    const double factor =
-        share * static_cast<double>(lit_.form_factor[i] * seen) * static_cast<double>(patches_->node_area[node]);
+    const auto node = receivers_->all()[lit_.receiver[i]].node;
+    const double factor = share * static_cast<double>(lit_.form_factor[i] * seen) *
+                          static_cast<double>(receivers_->patches().node_area[node]);
     solver::Flux3 flux{};
     for (std::size_t channel = 0; channel < 3; ++channel) {
       flux[channel] = std::lrint(shot.radiosity[channel] * factor);
@@ -288,7 +254,7 @@ void LightGatherer::finishLinks(const solver::GatherShot& shot, solver::LinkSamp
   sample.irradiance.reserve(lit_count_);
   for (std::size_t i = 0; i < lit_count_; ++i) {
     // What is hidden is sent too: zeros inside a run cost less than a new run.
-    sample.add(receivers_[lit_.receiver[i]].node, scale * lit_.form_factor[i] * visibility(0, i, look_count_));
+    sample.add(receivers_->all()[lit_.receiver[i]].node, scale * lit_.form_factor[i] * visibility(0, i, look_count_));
   }
   sample.escaped = escaped * area;
   sample.absorbed = absorbed * area;

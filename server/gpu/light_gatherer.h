@@ -14,13 +14,14 @@
 #include "server/gpu/flux_sink.h"
 #include "server/gpu/hemicube_renderer.h"
 #include "server/gpu/hemicube_weights.h"
+#include "server/gpu/receivers.h"
 
 namespace radiosity::gpu {
 
 class LightGatherer {
  public:
   LightGatherer() = default;
-  explicit LightGatherer(std::shared_ptr<const scene::PatchScene> patches);
+  explicit LightGatherer(std::shared_ptr<const Receivers> receivers);
 
   void gather(const solver::GatherShot& shot, std::span<const solver::HemicubeFrame> points, double flux_scale,
               HemicubeRenderer& renderer, WeightCache& weights, const FluxSink& sink,
@@ -34,22 +35,6 @@ class LightGatherer {
   void finishLinks(const solver::GatherShot& shot, solver::LinkSample& sample, solver::TransportCounters& counters);
 
  private:
-  /// A side of a leaf that can receive light.
-  struct Receiver {
-    std::uint32_t node, triangle;
-    glm::vec2 texel;  ///< corner of the leaf when full, else the point itself
-    bool full;
-  };
-  /// Receivers of one side of a surface; they lie together.
-  struct Group {
-    std::uint32_t surface;
-    std::size_t first, count;
-    float side;  ///< +1 front, -1 back
-  };
-  struct Plane {
-    glm::vec3 normal;
-    float distance;
-  };
   /// Receivers that the polygon faces and that face it, with what the points found so far in either half.
   struct Lit {
     std::vector<float> x, y, z, nx, ny, nz, form_factor;
@@ -66,11 +51,10 @@ class LightGatherer {
   };
 
   void findLit(const solver::GatherShot& shot);
-  void findLitGroup(const solver::GatherShot& shot, const Group& group);
+  void findLitGroup(const solver::GatherShot& shot, const Receivers::Group& group);
   [[nodiscard]] bool behind(const solver::GatherShot& shot, const scene::Surface& surface) const;
   void testPoint(const solver::GatherShot& shot, const solver::HemicubeFrame& point,
                  std::span<const std::uint32_t> items, std::size_t half);
-  [[nodiscard]] bool risesBefore(std::uint32_t triangle, const glm::vec3& point, const glm::vec3& normal) const;
   void weighLost(const solver::HemicubeFrame& point, std::span<const std::uint32_t> items,
                  const HemicubeWeights& weights, Lost& lost);
   [[nodiscard]] float visibility(std::size_t sums, std::size_t i, std::size_t points) const;
@@ -78,12 +62,8 @@ class LightGatherer {
   void deliver(const solver::GatherShot& shot, std::size_t half, std::size_t points, double share, const FluxSink& sink,
                solver::TransportCounters& counters) const;
 
-  std::shared_ptr<const scene::PatchScene> patches_;
-  std::vector<Receiver> receivers_;
-  std::vector<Group> groups_;
-  std::vector<Plane> planes_;                 ///< by triangle
-  std::vector<std::array<bool, 2>> absorbs_;  ///< by triangle: front, back
-  solver::GatherShot lit_for_;                ///< what lit_ was made for
+  std::shared_ptr<const Receivers> receivers_;
+  solver::GatherShot lit_for_;  ///< what lit_ was made for
   bool lit_valid_ = false;
   Lit lit_;
   std::size_t lit_count_ = 0;

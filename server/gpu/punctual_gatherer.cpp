@@ -115,23 +115,23 @@ bool beyondRange(const solver::PointShot& shot, const scene::Surface& surface) {
 
 void PunctualGatherer::lightGroup(const solver::PointShot& shot, const Receivers::Group& group,
                                   std::span<const std::uint32_t> items) {
-  const auto& patches = receivers_.patches();
+  const auto& patches = receivers_->patches();
   const auto& surface = patches.surfaces[group.surface];
   const auto [o, t, b, n] = hemicubeAxes(shot.frame);
   const HemicubeItems image(items, shot.resolution, shot.frame.lattice);
   for (std::size_t i = group.first; i < group.first + group.count; ++i) {
-    const auto& receiver = receivers_.all()[i];
+    const auto& receiver = receivers_->all()[i];
     const auto& frame = patches.triangles[receiver.triangle];
     const auto normal = group.side * frame.normal;
     if (glm::dot(normal, o - frame.origin) <= 0.0F) {
       if (surface.planar) return;  // all of it turns away
       continue;
     }
-    const auto middle = receivers_.point(receiver, glm::vec2(0.5F)) - o;
+    const auto middle = receivers_->point(receiver, glm::vec2(0.5F)) - o;
     const float size2 = glm::dot(frame.du, frame.du) + glm::dot(frame.dv, frame.dv);
     float near_mean = -1.0F;
     if (receiver.full && size2 > kNear * kNear * glm::dot(middle, middle)) {
-      const glm::dvec3 corner(receivers_.point(receiver, glm::vec2(0.0F)) - o), du(frame.du), dv(frame.dv);
+      const glm::dvec3 corner(receivers_->point(receiver, glm::vec2(0.0F)) - o), du(frame.du), dv(frame.dv);
       const double angle =
           solidAngle(corner, corner + du, corner + du + dv) + solidAngle(corner, corner + du + dv, corner + dv);
       near_mean = static_cast<float>(angle / glm::length(glm::cross(du, dv)));
@@ -139,7 +139,7 @@ void PunctualGatherer::lightGroup(const solver::PointShot& shot, const Receivers
     const std::uint32_t count = receiver.full ? shot.receivers.count : 1;
     float sum = 0.0F;
     for (std::uint32_t p = 0; p < count; ++p) {
-      const auto at = receivers_.point(receiver, shot.receivers.at[p]);
+      const auto at = receivers_->point(receiver, shot.receivers.at[p]);
       const auto d = at - o;
       const glm::vec3 local(glm::dot(d, t), glm::dot(d, b), glm::dot(d, n));
       const float square = glm::dot(d, d), distance = std::sqrt(square), cosine = -glm::dot(d, normal) / distance;
@@ -147,7 +147,7 @@ void PunctualGatherer::lightGroup(const solver::PointShot& shot, const Receivers
       const float strength = coneFalloff(shot, local.z / distance) * rangeFade(shot, distance);
       if (strength <= 0.0F) continue;
       const float pixel_size = 2.0F * distance / static_cast<float>(shot.resolution);
-      if (isHidden(receivers_, image.at(local), {at, normal, -d, 1.0F, pixel_size})) continue;
+      if (isHidden(*receivers_, image.at(local), {at, normal, -d, 1.0F, pixel_size})) continue;
       sum += strength * (near_mean >= 0.0F ? near_mean : cosine / square);
     }
     sum_[i] += sum / static_cast<float>(count);
@@ -181,7 +181,7 @@ PunctualGatherer::Lost PunctualGatherer::weighLost(const solver::PointShot& shot
         lost.escaped += weight;
         continue;
       }
-      const auto& plane = receivers_.plane(item);
+      const auto& plane = receivers_->plane(item);
       const float height = plane.height(o);
       double reached = weight;
       if (shot.range > 0.0F) {
@@ -192,7 +192,7 @@ PunctualGatherer::Lost PunctualGatherer::weighLost(const solver::PointShot& shot
         reached = weight * static_cast<double>(rangeFade(shot, distance));
         lost.escaped += weight - reached;  // what fades on its way arrives nowhere
       }
-      if (receivers_.absorbs(item, height <= 0.0F)) lost.absorbed += reached;
+      if (receivers_->absorbs(item, height <= 0.0F)) lost.absorbed += reached;
     }
   }
   return lost;
@@ -204,9 +204,9 @@ void PunctualGatherer::gather(const solver::PointShot& shot, double flux_scale, 
   const double rendered_before = counters.render_seconds;
   const HemicubeView view{shot.frame, 0.0F};
   const auto items = renderer.render(HemicubePass::kItems, shot.resolution, std::span(&view, 1), counters);
-  sum_.assign(receivers_.all().size(), 0.0F);
-  for (const auto& group : receivers_.groups()) {
-    const auto& surface = receivers_.patches().surfaces[group.surface];
+  sum_.assign(receivers_->all().size(), 0.0F);
+  for (const auto& group : receivers_->groups()) {
+    const auto& surface = receivers_->patches().surfaces[group.surface];
     const bool behind = glm::dot(shot.frame.normal, farthest(surface, shot.frame.normal) - shot.frame.origin) <= 0.0F;
     if (!behind && !beyondRange(shot, surface)) lightGroup(shot, group, items);
   }
@@ -219,14 +219,14 @@ void PunctualGatherer::gather(const solver::PointShot& shot, double flux_scale, 
 void PunctualGatherer::lightGroup(const solver::ParallelShot& shot, const ParallelAxes& axes,
                                   const solver::ParallelView& view, std::size_t view_index,
                                   const Receivers::Group& group, std::span<const std::uint32_t> items) {
-  const auto& patches = receivers_.patches();
+  const auto& patches = receivers_->patches();
   const auto& surface = patches.surfaces[group.surface];
   const auto size = static_cast<int>(shot.resolution);
   const bool sky = shot.sky_count > 0;  // one point for each direction, all for a single one
   const auto pixel_size = static_cast<float>(std::sqrt(axes.pixel_area));
   const auto sky_point = static_cast<std::uint32_t>(view_index) % shot.receivers.count;
   for (std::size_t i = group.first; i < group.first + group.count; ++i) {
-    const auto& receiver = receivers_.all()[i];
+    const auto& receiver = receivers_->all()[i];
     const auto normal = group.side * patches.triangles[receiver.triangle].normal;
     const float cosine = glm::dot(normal, view.direction);
     if (cosine <= 0.0F) {
@@ -237,12 +237,12 @@ void PunctualGatherer::lightGroup(const solver::ParallelShot& shot, const Parall
     const std::uint32_t count = sky || !receiver.full ? 1 : shot.receivers.count;
     std::uint32_t visible = 0;
     for (std::uint32_t p = first; p < first + count; ++p) {
-      const auto at = receivers_.point(receiver, shot.receivers.at[p]);
+      const auto at = receivers_->point(receiver, shot.receivers.at[p]);
       const auto d = at - axes.centre;
       const PixelPlace place{items.data(), size, size, glm::dot(axes.right, d) + axes.shift.x,
                              glm::dot(axes.up, d) + axes.shift.y};
       // Far enough to be beyond everything: the scene fits a box of side 1 or so.
-      const bool hidden = isHidden(receivers_, place, {at, normal, view.direction, 4.0F, pixel_size});
+      const bool hidden = isHidden(*receivers_, place, {at, normal, view.direction, 4.0F, pixel_size});
       visible += hidden ? 0 : 1;
     }
     sum_[i] += cosine * static_cast<float>(visible) / static_cast<float>(count);
@@ -255,7 +255,7 @@ PunctualGatherer::Lost PunctualGatherer::weighLost(const solver::ParallelView& v
   for (const auto item : items) {
     if (item == RAD_ITEM_NONE) continue;
     ++hit;
-    if (receivers_.absorbs(item, glm::dot(receivers_.plane(item).normal, view.direction) <= 0.0F)) ++absorbed;
+    if (receivers_->absorbs(item, glm::dot(receivers_->plane(item).normal, view.direction) <= 0.0F)) ++absorbed;
   }
   Lost lost;
   lost.all = solver::boxSilhouette(box_, view.direction);
@@ -265,15 +265,15 @@ PunctualGatherer::Lost PunctualGatherer::weighLost(const solver::ParallelView& v
 }
 
 void PunctualGatherer::scaleToSky(const solver::ParallelShot& shot, std::span<const solver::ParallelView> sky) {
-  const auto& patches = receivers_.patches();
+  const auto& patches = receivers_->patches();
   const double direction_share = 2.0 * std::numbers::pi / static_cast<double>(sky.size());
   std::uint32_t last_triangle = scene::kNone;
   float scale = 1.0F;
-  for (const auto& group : receivers_.groups()) {
+  for (const auto& group : receivers_->groups()) {
     last_triangle = scene::kNone;
     for (std::size_t i = group.first; i < group.first + group.count; ++i) {
       if (sum_[i] <= 0.0F) continue;
-      const auto triangle = receivers_.all()[i].triangle;
+      const auto triangle = receivers_->all()[i].triangle;
       if (triangle != last_triangle) {
         last_triangle = triangle;
         const auto normal = group.side * patches.triangles[triangle].normal;
@@ -298,7 +298,7 @@ void PunctualGatherer::gather(const solver::ParallelShot& shot, std::span<const 
   const auto mine = views.subspan(shot.first_view, shot.view_count);
   const auto pixels = std::size_t{shot.resolution} * shot.resolution;
   const auto capacity = renderer.capacity(shot.resolution);
-  sum_.assign(receivers_.all().size(), 0.0F);
+  sum_.assign(receivers_->all().size(), 0.0F);
   Lost lost;
   for (std::size_t first = 0; first < mine.size(); first += capacity) {
     const auto some = mine.subspan(first, std::min(capacity, mine.size() - first));
@@ -306,7 +306,7 @@ void PunctualGatherer::gather(const solver::ParallelShot& shot, std::span<const 
     for (std::size_t i = 0; i < some.size(); ++i) {
       const auto items = images.subspan(i * pixels, pixels);
       const auto axes = renderer.axes(some[i], shot.resolution);
-      for (const auto& group : receivers_.groups()) lightGroup(shot, axes, some[i], first + i, group, items);
+      for (const auto& group : receivers_->groups()) lightGroup(shot, axes, some[i], first + i, group, items);
       const auto of_view = weighLost(some[i], axes.pixel_area, items);
       lost.all += of_view.all;
       lost.escaped += of_view.escaped;
@@ -325,9 +325,9 @@ void PunctualGatherer::deliver(const std::array<double, 3>& unit, const std::arr
                                solver::TransportCounters& counters) const {
   for (std::size_t i = 0; i < sum_.size(); ++i) {
     if (sum_[i] <= 0.0F) continue;
-    const auto node = receivers_.all()[i].node;
+    const auto node = receivers_->all()[i].node;
     const double factor =
-        flux_scale * static_cast<double>(sum_[i]) * static_cast<double>(receivers_.patches().node_area[node]);
+        flux_scale * static_cast<double>(sum_[i]) * static_cast<double>(receivers_->patches().node_area[node]);
     solver::Flux3 flux{};
     for (std::size_t channel = 0; channel < 3; ++channel) {
       flux[channel] = std::lrint(unit[channel] * factor);

@@ -16,8 +16,8 @@ namespace radiosity::gpu {
 class PunctualGatherer {
  public:
   PunctualGatherer() = default;
-  explicit PunctualGatherer(std::shared_ptr<const scene::PatchScene> patches)
-      : receivers_(std::move(patches)), box_(solver::sceneBox(receivers_.patches())) {}
+  explicit PunctualGatherer(std::shared_ptr<const Receivers> receivers)
+      : receivers_(std::move(receivers)), box_(solver::sceneBox(receivers_->patches())) {}
 
   void gather(const solver::PointShot& shot, double flux_scale, HemicubeRenderer& renderer, const FluxSink& sink,
               solver::TransportCounters& counters);
@@ -42,7 +42,7 @@ class PunctualGatherer {
   void deliver(const std::array<double, 3>& unit, const std::array<double, 3>& emitted, const Lost& lost,
                std::uint32_t half, double flux_scale, const FluxSink& sink, solver::TransportCounters& counters) const;
 
-  Receivers receivers_;
+  std::shared_ptr<const Receivers> receivers_;
   std::array<glm::vec3, 2> box_{};
   std::vector<float> sum_;  ///< by receiver: irradiance for an intensity of 1
 };

@@ -159,12 +159,4 @@ glm::vec3 Receivers::point(const Receiver& receiver, const glm::vec2& at) const 
   return frame.origin + texel.x * frame.du + texel.y * frame.dv;
 }
 
-bool Receivers::risesBefore(std::uint32_t triangle, const glm::vec3& point, const glm::vec3& normal) const {
-  for (std::size_t k = 0; k < 3; ++k) {
-    const auto& corner = patches_->vertices[patches_->indices[3 * std::size_t{triangle} + k]].position;
-    if (glm::dot(normal, corner - point) > kInPlane) return true;
-  }
-  return false;
-}
-
 }  // namespace radiosity::gpu

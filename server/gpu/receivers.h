@@ -1,9 +1,10 @@
-// Where the leaves of a scene receive light without extent: receiving points, planes, and which sides only absorb.
+// Where the leaves of a scene receive gathered light: receiving points, planes, and which sides only absorb.
 // Plain values made from a scene, any thread.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <memory>
@@ -54,6 +55,17 @@ class Receivers {
   /// Point of a receiver: `at` in [0, 1)^2 of a full leaf; others have one point.
   [[nodiscard]] glm::vec3 point(const Receiver& receiver, const glm::vec2& at) const;
 
+  /// Whether a part of the triangle lies in front of a receiver. What is wholly behind its horizon cannot hide a light
+  /// from it, although a pixel on a convex edge may show it: the top of a block, seen instead of the topmost texels of
+  /// its side.
+  [[nodiscard]] bool risesBefore(std::uint32_t triangle, const glm::vec3& point, const glm::vec3& normal) const {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto& corner = patches_->vertices[patches_->indices[3 * std::size_t{triangle} + k]].position;
+      if (glm::dot(normal, corner - point) > kInPlane) return true;
+    }
+    return false;
+  }
+
   /// A receiving point, and the way from it to the light.
   struct Ray {
     glm::vec3 at, normal;
@@ -90,7 +102,6 @@ class Receivers {
   enum class Meeting { kNothing, kChance, kSolid };
   [[nodiscard]] Meeting meet(std::uint32_t item, const Ray& ray) const;
   [[nodiscard]] Meeting opacityAt(std::uint32_t triangle, const glm::vec2& texel) const;
-  [[nodiscard]] bool risesBefore(std::uint32_t triangle, const glm::vec3& point, const glm::vec3& normal) const;
 
   std::shared_ptr<const scene::PatchScene> patches_;
   std::vector<Receiver> receivers_;

@@ -95,9 +95,10 @@ Result<void> ShotRunner::setScene(std::shared_ptr<const scene::PatchScene> patch
   if (!scene) return tl::unexpected(scene.error());
   if (auto set = renderer_.setScene(std::move(*scene)); !set) return set;
   if (auto set = parallel_.setScene(renderer_.scene()); !set) return set;
-  punctual_ = PunctualGatherer(patches);
+  const auto receivers = std::make_shared<const Receivers>(patches);
+  punctual_ = PunctualGatherer(receivers);
   accumulator_ = ScatterAccumulator(patches->nodeCount());
-  gatherer_ = LightGatherer(patches);
+  gatherer_ = LightGatherer(receivers);
   patches_ = std::move(patches);
   link_store_.reset();
   has_scene_ = true;

@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include "server/scene/chart_corners.h"
 #include "server/scene/shade_texture.h"
 
 namespace radiosity::scene {
@@ -41,7 +42,7 @@ class SurfaceOpacity {
     if (texture_ == nullptr) return 1;
     float pixels = 1.0F;  // of the texture, across a leaf
     for (std::uint32_t i = 0; i < std::min(surface_.triangle_count, 64U); ++i) {
-      const Corners corners = cornersOf(surface_.first_triangle + i);
+      const ChartCorners corners = cornersOf(patches_, surface_.first_triangle + i, instance_, primitive_);
       const glm::vec2 size = glm::vec2(texture_->width, texture_->height) * material_.base_color_texture.scale;
       const glm::vec2 at = uvAt(corners, corners.texel[0]);
       for (const glm::dvec2 step : {glm::dvec2(1.0, 0.0), glm::dvec2(0.0, 1.0)}) {
@@ -58,57 +59,31 @@ class SurfaceOpacity {
     width_ = surface_.width * surface_.opacity_scale;
     height_ = surface_.height * surface_.opacity_scale;
     known_.assign(std::size_t{width_} * height_, false);
-    for (std::uint32_t i = 0; i < surface_.triangle_count; ++i) fillTriangle(cornersOf(surface_.first_triangle + i));
+    for (std::uint32_t i = 0; i < surface_.triangle_count; ++i)
+      fillTriangle(cornersOf(patches_, surface_.first_triangle + i, instance_, primitive_));
     fillBorders();
   }
 
  private:
-  struct Corners {
-    std::array<glm::dvec2, 3> texel;
-    std::array<std::uint32_t, 3> vertex;
-    double inverse_area;
-  };
-
-  [[nodiscard]] Corners cornersOf(std::uint32_t triangle) const {
-    Corners corners{};
-    const bool mirrored = glm::determinant(glm::dmat3(instance_.world)) < 0.0;
-    const std::size_t source = std::size_t{3} * patches_.triangle_source[triangle];
-    for (std::size_t k = 0; k < 3; ++k) {
-      corners.texel[k] = glm::dvec2(patches_.vertices[patches_.indices[std::size_t{3} * triangle + k]].texel);
-      corners.vertex[k] = primitive_.indices[source + (mirrored ? (3 - k) % 3 : k)];
-    }
-    const glm::dvec2 a = corners.texel[1] - corners.texel[0], b = corners.texel[2] - corners.texel[0];
-    const double twice = a.x * b.y - a.y * b.x;
-    corners.inverse_area = twice != 0.0 ? 1.0 / twice : 0.0;
-    return corners;
-  }
-
-  static glm::vec3 weightsAt(const Corners& c, const glm::dvec2& p) {
-    const auto cross = [](const glm::dvec2& a, const glm::dvec2& b) { return a.x * b.y - a.y * b.x; };
-    const double w1 = cross(p - c.texel[0], c.texel[2] - c.texel[0]) * c.inverse_area;
-    const double w2 = cross(c.texel[1] - c.texel[0], p - c.texel[0]) * c.inverse_area;
-    return {1.0 - w1 - w2, w1, w2};
-  }
-
-  [[nodiscard]] glm::vec2 uvAt(const Corners& c, const glm::dvec2& p) const {
+  [[nodiscard]] glm::vec2 uvAt(const ChartCorners& c, const glm::dvec2& p) const {
     const auto& set = material_.base_color_texture.texcoord == 1 ? primitive_.texcoord1 : primitive_.texcoord0;
     if (set.empty()) return glm::vec2(0.0F);
-    const glm::vec3 w = weightsAt(c, p);
+    const glm::vec3 w = c.weightsAt(p);
     return set[c.vertex[0]] * w[0] + set[c.vertex[1]] * w[1] + set[c.vertex[2]] * w[2];
   }
 
-  [[nodiscard]] float alphaAt(const Corners& c, const glm::dvec2& p) const {
+  [[nodiscard]] float alphaAt(const ChartCorners& c, const glm::dvec2& p) const {
     float alpha = material_.alpha;
     if (texture_ != nullptr) alpha *= sampleAlpha(*texture_, material_.base_color_texture, uvAt(c, p));
     if (!primitive_.color0.empty()) {
-      const glm::vec3 w = glm::clamp(weightsAt(c, p), 0.0F, 1.0F);
+      const glm::vec3 w = glm::clamp(c.weightsAt(p), 0.0F, 1.0F);
       const auto& color = primitive_.color0;
       alpha *= color[c.vertex[0]].a * w[0] + color[c.vertex[1]].a * w[1] + color[c.vertex[2]].a * w[2];
     }
     return alpha;
   }
 
-  [[nodiscard]] float opacityOf(const Corners& c, const glm::dvec2& cell) const {
+  [[nodiscard]] float opacityOf(const ChartCorners& c, const glm::dvec2& cell) const {
     const float transmitted = 1.0F - material_.transmission;
     if (material_.alpha_mode == AlphaMode::kOpaque) return transmitted;
     const bool uniform = texture_ == nullptr && primitive_.color0.empty();
@@ -129,7 +104,7 @@ class SurfaceOpacity {
     return patches_.opacity[surface_.first_opacity + std::size_t{y} * width_ + x];
   }
 
-  void fillTriangle(const Corners& c) {
+  void fillTriangle(const ChartCorners& c) {
     const auto scale = static_cast<double>(surface_.opacity_scale);
     const glm::dvec2 low = glm::min(glm::min(c.texel[0], c.texel[1]), c.texel[2]) * scale;
     const glm::dvec2 high = glm::max(glm::max(c.texel[0], c.texel[1]), c.texel[2]) * scale;
@@ -137,7 +112,7 @@ class SurfaceOpacity {
     const auto end_y = std::min(height_, static_cast<std::uint32_t>(std::ceil(std::max(high.y, 0.0))));
     for (auto y = static_cast<std::uint32_t>(std::max(low.y, 0.0)); y < end_y; ++y) {
       for (auto x = static_cast<std::uint32_t>(std::max(low.x, 0.0)); x < end_x; ++x) {
-        const glm::vec3 w = weightsAt(c, (glm::dvec2(x, y) + 0.5) / scale);
+        const glm::vec3 w = c.weightsAt((glm::dvec2(x, y) + 0.5) / scale);
         if (std::min({w.x, w.y, w.z}) < -1e-6F) continue;
         cell(x, y) = static_cast<std::uint8_t>(std::lround(255.0F * opacityOf(c, glm::dvec2(x, y))));
         known_[std::size_t{y} * width_ + x] = true;

@@ -8,6 +8,7 @@
 #include <glm/matrix.hpp>
 #include <optional>
 
+#include "server/scene/chart_corners.h"
 #include "server/scene/patch_scene.h"
 #include "server/scene/shade_texture.h"
 
@@ -82,54 +83,26 @@ class MaterialShader {
     }
   }
 
-  /// A triangle's vertex attributes as affine functions of texel coordinates are found by barycentric weights.
-  struct Corners {
-    std::array<glm::dvec2, 3> texel;
-    std::array<std::uint32_t, 3> vertex;
-    double inverse_area;
-  };
-
-  [[nodiscard]] Corners cornersOf(std::uint32_t triangle) const {
-    Corners corners{};
-    const bool mirrored = glm::determinant(glm::dmat3(instance_->world)) < 0.0;
-    const std::size_t source = std::size_t{3} * patches_.triangle_source[triangle];
-    for (std::size_t k = 0; k < 3; ++k) {
-      corners.texel[k] = glm::dvec2(patches_.vertices[patches_.indices[std::size_t{3} * triangle + k]].texel);
-      corners.vertex[k] = primitive_->indices[source + (mirrored ? (3 - k) % 3 : k)];
-    }
-    const glm::dvec2 a = corners.texel[1] - corners.texel[0], b = corners.texel[2] - corners.texel[0];
-    const double twice = a.x * b.y - a.y * b.x;
-    corners.inverse_area = twice != 0.0 ? 1.0 / twice : 0.0;
-    return corners;
-  }
-
-  static glm::vec3 weightsAt(const Corners& c, const glm::dvec2& p) {
-    const auto cross = [](const glm::dvec2& a, const glm::dvec2& b) { return a.x * b.y - a.y * b.x; };
-    const double w1 = cross(p - c.texel[0], c.texel[2] - c.texel[0]) * c.inverse_area;
-    const double w2 = cross(c.texel[1] - c.texel[0], p - c.texel[0]) * c.inverse_area;
-    return {1.0 - w1 - w2, w1, w2};
-  }
-
-  [[nodiscard]] glm::vec2 uvAt(const TextureUse& use, const Corners& c, const glm::vec3& w) const {
+  [[nodiscard]] glm::vec2 uvAt(const TextureUse& use, const ChartCorners& c, const glm::vec3& w) const {
     const auto& set = use.texcoord == 1 ? primitive_->texcoord1 : primitive_->texcoord0;
     if (set.empty()) return glm::vec2(0.0F);
     return set[c.vertex[0]] * w[0] + set[c.vertex[1]] * w[1] + set[c.vertex[2]] * w[2];
   }
 
   [[nodiscard]] glm::vec3 textureAt(const std::optional<TexturePyramid>& texture, const TextureUse& use,
-                                    const Corners& c, const glm::dvec2& p) const {
+                                    const ChartCorners& c, const glm::dvec2& p) const {
     if (!texture) return glm::vec3(1.0F);
     const double step = 1.0 / kSide;
-    const glm::vec2 uv = uvAt(use, c, weightsAt(c, p));
-    const glm::vec2 right = uvAt(use, c, weightsAt(c, p + glm::dvec2(step, 0.0))) - uv;
-    const glm::vec2 down = uvAt(use, c, weightsAt(c, p + glm::dvec2(0.0, step))) - uv;
+    const glm::vec2 uv = uvAt(use, c, c.weightsAt(p));
+    const glm::vec2 right = uvAt(use, c, c.weightsAt(p + glm::dvec2(step, 0.0))) - uv;
+    const glm::vec2 down = uvAt(use, c, c.weightsAt(p + glm::dvec2(0.0, step))) - uv;
     return texture->sample(use, uv, glm::max(glm::abs(right), glm::abs(down)));
   }
 
-  Value valueAt(const Corners& c, const glm::dvec2& p) {
+  Value valueAt(const ChartCorners& c, const glm::dvec2& p) {
     Value value = constant();
     if (!primitive_->color0.empty()) {
-      const glm::vec3 w = glm::clamp(weightsAt(c, p), 0.0F, 1.0F);
+      const glm::vec3 w = glm::clamp(c.weightsAt(p), 0.0F, 1.0F);
       const auto& color = primitive_->color0;
       value.reflectance *= glm::vec3(color[c.vertex[0]] * w[0] + color[c.vertex[1]] * w[1] + color[c.vertex[2]] * w[2]);
     }
@@ -144,7 +117,7 @@ class MaterialShader {
     sums_.assign(count, Value{});
     samples_.assign(count, 0);
     for (std::uint32_t t = surface_.first_triangle; t < surface_.first_triangle + surface_.triangle_count; ++t)
-      sampleTriangle(cornersOf(t));
+      sampleTriangle(cornersOf(patches_, t, *instance_, *primitive_));
     for (std::size_t i = 0; i < count; ++i) {
       const LeafPoint& point = patches_.leaves[surface_.first_leaf + i];
       Value value;
@@ -152,7 +125,7 @@ class MaterialShader {
         value = {sums_[i].emission / static_cast<float>(samples_[i]),
                  sums_[i].reflectance / static_cast<float>(samples_[i])};
       } else if (point.triangle != kNone) {
-        value = valueAt(cornersOf(point.triangle), glm::dvec2(point.texel));
+        value = valueAt(cornersOf(patches_, point.triangle, *instance_, *primitive_), glm::dvec2(point.texel));
       }
       for (const std::uint32_t first : surface_.first_node) {
         if (first == kNone) continue;
@@ -162,7 +135,7 @@ class MaterialShader {
     }
   }
 
-  void sampleTriangle(const Corners& c) {
+  void sampleTriangle(const ChartCorners& c) {
     const glm::dvec2 low = glm::min(glm::min(c.texel[0], c.texel[1]), c.texel[2]) * double{kSide};
     const glm::dvec2 high = glm::max(glm::max(c.texel[0], c.texel[1]), c.texel[2]) * double{kSide};
     const auto end_y = std::min(static_cast<int>(std::ceil(high.y)), static_cast<int>(surface_.height) * kSide);
@@ -170,7 +143,7 @@ class MaterialShader {
     for (int y = std::max(0, static_cast<int>(std::floor(low.y))); y < end_y; ++y)
       for (int x = std::max(0, static_cast<int>(std::floor(low.x))); x < end_x; ++x) {
         const glm::dvec2 p((x + 0.5) / kSide, (y + 0.5) / kSide);
-        const glm::vec3 w = weightsAt(c, p);
+        const glm::vec3 w = c.weightsAt(p);
         if (std::min({w.x, w.y, w.z}) < -1e-6F) continue;
         const std::size_t leaf =
             static_cast<std::size_t>(y / kSide) * surface_.width + static_cast<std::size_t>(x / kSide);

@@ -46,29 +46,8 @@ void NodeShots::add(const NodePlace& node, std::size_t half, std::uint32_t index
 
 /// A leaf of the node chosen with probability proportional to its area; (u, v) are uniform again on return.
 std::uint32_t NodeShots::leafByArea(const NodePlace& node, double& u, double& v) const {
-  const Side& side = sides_[node.side];
-  std::uint32_t x = node.x, y = node.y;
-  for (std::uint32_t level = node.level; level-- > 0;) {
-    const auto grid = scene::levelGrid(side.width, side.height, level);
-    const auto area = [&](std::uint32_t cx, std::uint32_t cy) {
-      if (cx >= grid.width || cy >= grid.height) return 0.0;
-      return static_cast<double>(patches_.node_area[side.first_node + grid.offset + cy * grid.width + cx]);
-    };
-    const double p00 = area(2 * x, 2 * y), p10 = area(2 * x + 1, 2 * y);
-    const double p01 = area(2 * x, 2 * y + 1), p11 = area(2 * x + 1, 2 * y + 1);
-    const double left = (p00 + p01) / (p00 + p10 + p01 + p11);
-    const bool right = u >= left;
-    u = right ? (u - left) / (1.0 - left) : u / left;
-    const double upper = right ? p10 : p00, lower = right ? p11 : p01;
-    const double split = upper / (upper + lower);
-    const bool down = v >= split;
-    v = down ? (v - split) / (1.0 - split) : v / split;
-    u = std::clamp(u, 0.0, 1.0 - 1e-12);
-    v = std::clamp(v, 0.0, 1.0 - 1e-12);
-    x = 2 * x + (right ? 1 : 0);
-    y = 2 * y + (down ? 1 : 0);
-  }
-  return y * side.width + x;
+  return warpToLeaf(
+      sides_[node.side], node, [&](std::uint32_t id) { return patches_.node_area[id]; }, u, v);
 }
 
 void NodeShots::addGather(const NodePlace& node, std::size_t half, std::uint32_t index, std::uint32_t points,

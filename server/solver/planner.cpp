@@ -9,6 +9,7 @@
 #include <queue>
 #include <tuple>
 
+#include "server/solver/node_shots.h"
 #include "server/solver/sampling.h"
 
 namespace radiosity::solver {
@@ -20,49 +21,14 @@ constexpr double kRouletteShare = 0.05;
 /// roulette's share: what is right beside a buried edge would see single leaves come and go.
 constexpr double kPartialShare = 1.2 * kRouletteShare;
 
-/// A leaf of `side` under a node chosen with probability proportional to its unshot power, by warping the point (u, v)
-/// down the quadtree, which keeps its stratification. On return (u, v) are uniform in [0, 1)^2 again.
-std::uint32_t warpToLeaf(const RadiosityState& state, const Side& side, std::uint32_t level, std::uint32_t x,
-                         std::uint32_t y, double& u, double& v) {
-  while (level > 0) {
-    const auto grid = scene::levelGrid(side.width, side.height, level - 1);
-    const auto power = [&](std::uint32_t cx, std::uint32_t cy) {
-      if (cx >= grid.width || cy >= grid.height) return 0.0;
-      return static_cast<double>(state.nodeRough(side.first_node + grid.offset + cy * grid.width + cx));
-    };
-    const double p00 = power(2 * x, 2 * y), p10 = power(2 * x + 1, 2 * y);
-    const double p01 = power(2 * x, 2 * y + 1), p11 = power(2 * x + 1, 2 * y + 1);
-    const double left = (p00 + p01) / (p00 + p10 + p01 + p11);
-    const bool right = u >= left;
-    u = right ? (u - left) / (1.0 - left) : u / left;
-    const double upper = right ? p10 : p00, lower = right ? p11 : p01;
-    const double split = upper / (upper + lower);
-    const bool down = v >= split;
-    v = down ? (v - split) / (1.0 - split) : v / split;
-    u = std::clamp(u, 0.0, 1.0 - 1e-12);
-    v = std::clamp(v, 0.0, 1.0 - 1e-12);
-    x = 2 * x + (right ? 1 : 0);
-    y = 2 * y + (down ? 1 : 0);
-    --level;
-  }
-  return y * side.width + x;
+/// A leaf under a node chosen with probability proportional to its unshot power; (u, v) are uniform again on return.
+std::uint32_t leafByUnshot(const RadiosityState& state, const Side& side, std::uint32_t level, std::uint32_t x,
+                           std::uint32_t y, double& u, double& v) {
+  return warpToLeaf(
+      side, {0, level, x, y}, [&](std::uint32_t id) { return state.nodeRough(id); }, u, v);
 }
 
 }  // namespace
-
-HemicubeFrame Planner::frameAt(const glm::vec3& origin, const glm::vec3& normal, double rotation,
-                               std::uint64_t key) const {
-  const glm::vec3 helper = std::abs(normal.x) < 0.6F ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0);
-  const glm::vec3 a = glm::normalize(glm::cross(helper, normal));
-  const glm::vec3 b = glm::cross(normal, a);
-  const double angle = 0.5 * std::numbers::pi * rotation;  // the hemicube has fourfold symmetry
-  HemicubeFrame frame;
-  frame.origin = origin;
-  frame.normal = normal;
-  frame.tangent = glm::normalize(a * static_cast<float>(std::cos(angle)) + b * static_cast<float>(std::sin(angle)));
-  frame.lattice = static_cast<std::uint32_t>(mixKeys(key, 5) % (std::uint64_t{kLatticeSide} * kLatticeSide));
-  return frame;
-}
 
 std::uint32_t Planner::resolutionFor(double power) const {
   // Unshot power steers resolution (paper, section 3): a shot with a quarter of the power needs half the hemicube.
@@ -79,7 +45,7 @@ void Planner::addShot(const RadiosityState& state, const Side& side, const Node&
   const std::uint64_t wave_key = mixKeys(node_key, 0x100 + wave_);
   const glm::dvec4 point = sobol4(2 * (state.rounds() - 1) + half, wave_key);
   double u = point.x, v = point.y;
-  const std::uint32_t leaf = warpToLeaf(state, side, node.level, node.x, node.y, u, v);
+  const std::uint32_t leaf = leafByUnshot(state, side, node.level, node.x, node.y, u, v);
   const auto& place = patches.leaves[patches.surfaces[side.surface].first_leaf + leaf];
   const glm::dvec3 unshot(state.unshot(side, leaf));
   const double sum = std::abs(unshot.x) + std::abs(unshot.y) + std::abs(unshot.z);
@@ -90,9 +56,9 @@ void Planner::addShot(const RadiosityState& state, const Side& side, const Node&
   const auto grid = scene::levelGrid(side.width, side.height, node.level);
   const auto rough = static_cast<double>(state.nodeRough(side.first_node + grid.offset + node.y * grid.width + node.x));
   ScatterShot shot;
-  shot.frame = frameAt(triangle.origin + texel.x * triangle.du + texel.y * triangle.dv,
-                       side.side == 0 ? triangle.normal : -triangle.normal, point.z,
-                       mixKeys(node_key, shots_planned_ * 2 + half));
+  shot.frame = hemicubeAt(triangle.origin + texel.x * triangle.du + texel.y * triangle.dv,
+                          side.side == 0 ? triangle.normal : -triangle.normal, point.z,
+                          mixKeys(node_key, shots_planned_ * 2 + half));
   shot.resolution = resolutionFor(node.power * weight);
   shot.level_bias = settings_.level_bias + static_cast<float>(point.w);
   shot.half = half;
@@ -136,7 +102,7 @@ bool Planner::isSpent(const RadiosityState& state, const Side& side, const Node&
 }
 
 glm::dvec2 Planner::openPoint(const RadiosityState& state, const Side& side, const Node& node, double u, double v) {
-  const std::uint32_t leaf = warpToLeaf(state, side, node.level, node.x, node.y, u, v);
+  const std::uint32_t leaf = leafByUnshot(state, side, node.level, node.x, node.y, u, v);
   const auto& place = state.patches().leaves[state.patches().surfaces[side.surface].first_leaf + leaf];
   return place.full ? glm::dvec2(leaf % side.width, leaf / side.width) + glm::dvec2(u, v) : glm::dvec2(place.texel);
 }
@@ -180,7 +146,7 @@ void Planner::addNodeGather(const RadiosityState& state, const Side& side, const
     const glm::dvec4 sample = sobol4(2 * (state.rounds() - 1) + p, wave_key);
     const glm::dvec2 texel =
         whole ? polygon.point(sample.x, sample.y) : openPoint(state, side, node, sample.x, sample.y);
-    batch.points.push_back(frameAt(at(texel), shot.normal, sample.z, mixKeys(node_key, shots_planned_ * 2 + p)));
+    batch.points.push_back(hemicubeAt(at(texel), shot.normal, sample.z, mixKeys(node_key, shots_planned_ * 2 + p)));
   }
   shot.point_count = static_cast<std::uint32_t>(batch.points.size()) - shot.first_point;
   batch.gather.push_back(shot);
@@ -279,7 +245,7 @@ void Planner::addGatherShot(const LightPolygon& light, std::uint32_t rounds, std
   for (std::uint32_t p = 0; p < points; ++p) {
     const std::uint32_t sequence = index * points + p;
     const glm::dvec4 sample = sobol4(sequence, key);
-    batch.points.push_back(frameAt(light.point(sample.x, sample.y), light.normal, sample.z, mixKeys(key, sequence)));
+    batch.points.push_back(hemicubeAt(light.point(sample.x, sample.y), light.normal, sample.z, mixKeys(key, sequence)));
   }
   batch.gather.push_back(shot);
 }

@@ -78,8 +78,6 @@ class Planner {
                std::uint64_t node_key, ShotBatch& batch);
   void addGatherShot(const LightPolygon& light, std::uint32_t rounds, std::uint32_t shot_index, std::uint32_t shots,
                      std::uint32_t points, ShotBatch& batch);
-  [[nodiscard]] HemicubeFrame frameAt(const glm::vec3& origin, const glm::vec3& normal, double rotation,
-                                      std::uint64_t key) const;
   void addNodeGather(const RadiosityState& state, const Side& side, const Node& node, double weight,
                      const std::array<bool, 2>& plays, std::uint64_t node_key, ShotBatch& batch);
   /// Nodes of planar surfaces shoot as polygons of their mean radiosity, gathered; others from one point, scattered.

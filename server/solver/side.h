@@ -1,6 +1,7 @@
 // Sides of surfaces that have patches: the paper's polygons with their quadtrees.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <vector>
@@ -38,5 +39,35 @@ struct LeafRect {
 };
 [[nodiscard]] LeafRect leafRect(const Side& side, const NodePlace& node);
 [[nodiscard]] std::uint32_t nodeId(const Side& side, const NodePlace& node);
+
+/// A leaf under a node chosen with probability proportional to weight(id of a node), which sums up the levels, by
+/// warping the point (u, v) down the quadtree, which keeps its stratification. On return (u, v) are uniform in [0, 1)^2
+/// again.
+template <typename Weight>
+[[nodiscard]] std::uint32_t warpToLeaf(const Side& side, const NodePlace& node, const Weight& weight, double& u,
+                                       double& v) {
+  std::uint32_t x = node.x, y = node.y;
+  for (std::uint32_t level = node.level; level-- > 0;) {
+    const auto grid = scene::levelGrid(side.width, side.height, level);
+    const auto at = [&](std::uint32_t cx, std::uint32_t cy) {
+      if (cx >= grid.width || cy >= grid.height) return 0.0;
+      return static_cast<double>(weight(side.first_node + grid.offset + cy * grid.width + cx));
+    };
+    const double p00 = at(2 * x, 2 * y), p10 = at(2 * x + 1, 2 * y);
+    const double p01 = at(2 * x, 2 * y + 1), p11 = at(2 * x + 1, 2 * y + 1);
+    const double left = (p00 + p01) / (p00 + p10 + p01 + p11);
+    const bool right = u >= left;
+    u = right ? (u - left) / (1.0 - left) : u / left;
+    const double upper = right ? p10 : p00, lower = right ? p11 : p01;
+    const double split = upper / (upper + lower);
+    const bool down = v >= split;
+    v = down ? (v - split) / (1.0 - split) : v / split;
+    u = std::clamp(u, 0.0, 1.0 - 1e-12);
+    v = std::clamp(v, 0.0, 1.0 - 1e-12);
+    x = 2 * x + (right ? 1 : 0);
+    y = 2 * y + (down ? 1 : 0);
+  }
+  return y * side.width + x;
+}
 
 }  // namespace radiosity::solver

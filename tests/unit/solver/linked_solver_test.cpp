@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "tests/unit/solver/quad_scene.h"
+#include "tests/unit/solver/solve.h"
 
 namespace radiosity::solver {
 namespace {
@@ -14,15 +15,7 @@ namespace {
 using test::cubeQuads;
 using test::makeQuadScene;
 using test::RayTransport;
-
-void solve(Solver& solver) {
-  for (int i = 0; i < 100000; ++i) {
-    const auto outcome = solver.step();
-    ASSERT_TRUE(outcome.has_value()) << outcome.error().text();
-    if (*outcome == StepOutcome::kConverged) return;
-  }
-  FAIL() << "no convergence after 100000 steps";
-}
+using test::solve;
 
 class LinkedEdits : public testing::Test {
  protected:

@@ -9,6 +9,7 @@
 #include "server/solver/linked_solver.h"
 #include "server/solver/shooting_solver.h"
 #include "tests/unit/solver/quad_scene.h"
+#include "tests/unit/solver/solve.h"
 
 namespace radiosity::solver {
 namespace {
@@ -16,19 +17,11 @@ namespace {
 using test::cubeQuads;
 using test::makeQuadScene;
 using test::RayTransport;
+using test::solve;
 
 constexpr double kPi = std::numbers::pi;
 
 LightSources lamp(float candela) { return {{{.position = {0.1, 0.2, 0.0}, .intensity = glm::vec3(candela)}}, {}}; }
-
-void solve(Solver& solver) {
-  for (int i = 0; i < 100000; ++i) {
-    const auto outcome = solver.step();
-    ASSERT_TRUE(outcome.has_value()) << outcome.error().text();
-    if (*outcome == StepOutcome::kConverged) return;
-  }
-  FAIL() << "no convergence after 100000 steps";
-}
 
 double received(const scene::PatchScene& patches, const Solver& solver) {
   double sum = 0.0;

@@ -8,6 +8,7 @@
 #include "server/solver/linked_solver.h"
 #include "server/solver/shooting_solver.h"
 #include "tests/unit/solver/quad_scene.h"
+#include "tests/unit/solver/solve.h"
 
 namespace radiosity::solver {
 namespace {
@@ -16,15 +17,7 @@ using test::cubeQuads;
 using test::makeQuadScene;
 using test::QuadScene;
 using test::RayTransport;
-
-void solve(Solver& solver) {
-  for (int i = 0; i < 100000; ++i) {
-    const auto outcome = solver.step();
-    ASSERT_TRUE(outcome.has_value()) << outcome.error().text();
-    if (*outcome == StepOutcome::kConverged) return;
-  }
-  FAIL() << "no convergence after 100000 steps";
-}
+using test::solve;
 
 double meanIrradiance(const QuadScene& made, const Solver& solver, std::uint32_t surface) {
   const auto& s = made.patches->surfaces[surface];
