@@ -1,6 +1,7 @@
 // LinkedSolver: its lights. They come, change and go by edits; those switched off keep their links.
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "server/solver/linked_solver.h"
 
@@ -120,13 +121,16 @@ std::vector<Measurement> LinkedSolver::planLights() {
   return wanted;
 }
 
-/// False: none of them has links.
+/// Those that only correct a shooter above them go first: it still stands for them. False: none has links.
 bool LinkedSolver::forgetWeakest() {
   std::uint32_t weakest = scene::kNone;
   const auto& shooters = system_.shooters();
+  const auto worth = [&](std::uint32_t n) {
+    return std::pair(shooters[n].parent == scene::kNone, shooters[n].power());
+  };
   for (std::uint32_t n = 0; n < shooters.size(); ++n) {
     if (shooters[n].isLight() || shooters[n].column[0].bytes() + shooters[n].column[1].bytes() == 0) continue;
-    if (weakest == scene::kNone || shooters[n].power() < shooters[weakest].power()) weakest = n;
+    if (weakest == scene::kNone || worth(n) < worth(weakest)) weakest = n;
   }
   if (weakest == scene::kNone) return false;
   memory_.giveBack(shooters[weakest].column[0].bytes() + shooters[weakest].column[1].bytes());

@@ -166,6 +166,20 @@ class LinkMemoryBound : public testing::Test {
     solver_ = std::make_unique<LinkedSolver>(made_.patches, made_.materials, *rays_, settings_);
   }
 
+  /// Relative RMS difference of an irradiance from that of a solve with plenty of memory.
+  double awayFromTruth(const std::vector<glm::vec3>& limited, const LightSources& lamps) {
+    make(std::size_t{1} << 30, 0.01, 256);
+    solver_->setLights(lamps);
+    EXPECT_EQ(run(), StepOutcome::kConverged);
+    double square = 0.0, difference = 0.0;
+    for (std::size_t node = 0; node < limited.size(); ++node) {
+      const glm::dvec3 a(limited[node]), b(solver_->irradiance()[node]);
+      square += glm::dot(b, b);
+      difference += glm::dot(a - b, a - b);
+    }
+    return std::sqrt(difference / square);
+  }
+
   /// Until the solver has converged or is exhausted; the bound must hold after every step.
   StepOutcome run() {
     for (int i = 0; i < 20'000; ++i) {
@@ -201,16 +215,8 @@ TEST_F(LinkMemoryBound, LeavesAnErrorThatIsStated) {
   ASSERT_EQ(run(), StepOutcome::kExhausted);
   const auto limited = solver_->irradiance();
   const double stated = solver_->error().total;
-  make(std::size_t{1} << 30, 0.01, 256);
-  ASSERT_EQ(run(), StepOutcome::kConverged);
-  double square = 0.0, difference = 0.0;
-  for (std::size_t node = 0; node < limited.size(); ++node) {
-    const glm::dvec3 a(limited[node]), b(solver_->irradiance()[node]);
-    square += glm::dot(b, b);
-    difference += glm::dot(a - b, a - b);
-  }
   // As promised of any stated error: the truth lies within a factor of 1.5.
-  EXPECT_LT(std::sqrt(difference / square), 1.5 * std::hypot(stated, 0.01));
+  EXPECT_LT(awayFromTruth(limited, {}), 1.5 * std::hypot(stated, 0.01));
 }
 
 TEST_F(LinkMemoryBound, ThatIsUsedUpDoesNotMakeAnEditStartOver) {
@@ -249,12 +255,10 @@ TEST_F(LinkMemoryBound, ThatIsUsedUpStillHasRoomForNewLamps) {
   const auto limited = solver_->irradiance();
   const auto& shooters = solver_->system().shooters();
   EXPECT_TRUE(std::none_of(shooters.begin(), shooters.end(), [](const Shooter& shooter) { return shooter.owes(); }));
-  EXPECT_GT(solver_->error().residual, 0.0);  // what the weakest shooters lost their links for is not forgotten
-  make(std::size_t{1} << 30, 0.02);
-  solver_->setLights(lamps);
-  ASSERT_EQ(run(), StepOutcome::kConverged);
-  const auto node = made_.patches->surfaces[0].first_node[0] + 5;  // mostly direct light
-  EXPECT_NEAR(limited[node].x / solver_->irradiance()[node].x, 1.0F, 0.15F);
+  // What the shooters that lost their links to the lamps would have sent is missing, and stated.
+  const double stated = solver_->error().total;
+  EXPECT_LT(stated, 1.0);
+  EXPECT_LT(awayFromTruth(limited, lamps), 1.5 * std::hypot(stated, 0.01));
 }
 
 TEST(LinkMemory, IsNotAskedForWhereLightsAloneWouldTakeHalfOfIt) {
