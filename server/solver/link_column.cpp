@@ -200,6 +200,8 @@ void LinkColumn::add(const LinkExpander& sample, const LinkSample& totals, doubl
   }
   escaped_ = (escaped_ * points_ + totals.escaped * points) / sum;
   absorbed_ = (absorbed_ * points_ + totals.absorbed * points) / sum;
+  delivered_ = (delivered_ * points_ + totals.delivered * points) / sum;
+  due_ = (due_ * points_ + totals.due * points) / sum;
   points_ = sum;
   ++samples_;
 }
@@ -216,9 +218,14 @@ void LinkColumn::addTo(const Run& run, std::uint32_t first_value, std::uint32_t 
   }
 }
 
+double LinkColumn::gain() const {
+  return due_ > 0.0 && delivered_ > 0.0 ? std::clamp(due_ / delivered_, 0.25, 4.0) : 1.0;
+}
+
 void LinkColumn::apply(const std::array<float, 3>& radiosity, const std::array<float*, 3>& irradiance) const {
+  const float scale = scale_ * static_cast<float>(gain());
   for (const auto& run : runs_) {
-    addScaled(&code_[run.offset], run.count, scale_ * radiosity[0], scale_ * radiosity[1], scale_ * radiosity[2],
+    addScaled(&code_[run.offset], run.count, scale * radiosity[0], scale * radiosity[1], scale * radiosity[2],
               irradiance[0] + run.first_value, irradiance[1] + run.first_value, irradiance[2] + run.first_value);
   }
 }
@@ -237,7 +244,7 @@ double LinkColumn::product(const LinkColumn& a, const LinkColumn& b, std::span<c
                                            end - first));
     }
   }
-  return sum * static_cast<double>(a.scale_) * static_cast<double>(b.scale_);
+  return sum * a.gain() * static_cast<double>(a.scale_) * b.gain() * static_cast<double>(b.scale_);
 }
 
 bool LinkColumn::decode(std::uint32_t first_value, std::span<float> leaves) const {
@@ -246,7 +253,8 @@ bool LinkColumn::decode(std::uint32_t first_value, std::span<float> leaves) cons
   if (after == runs_.begin()) return false;
   const Run& run = *(after - 1);
   if (first_value >= run.first_value + run.count) return false;
-  decodeAll(&code_[run.offset + (first_value - run.first_value)], leaves.size(), scale_, leaves.data());
+  decodeAll(&code_[run.offset + (first_value - run.first_value)], leaves.size(), scale_ * static_cast<float>(gain()),
+            leaves.data());
   return true;
 }
 
