@@ -80,6 +80,20 @@ LinkExpander::LinkExpander(const scene::PatchScene& patches, const std::vector<S
     values += sides[s].leaf_count;
   }
   values_.resize(values);
+  leaf_area_.reserve(values);
+  for (const auto& side : sides) {
+    const auto leaves = patches.node_area.begin() + side.first_node;
+    leaf_area_.insert(leaf_area_.end(), leaves, leaves + side.leaf_count);
+  }
+}
+
+double LinkExpander::flux() const {
+  double sum = 0.0;
+  for (const auto s : reached_) {
+    for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v)
+      sum += static_cast<double>(values_[v]) * static_cast<double>(leaf_area_[v]);
+  }
+  return sum;
 }
 
 void LinkExpander::reach(std::uint32_t side) {
@@ -171,10 +185,11 @@ void LinkColumn::grow(const LinkExpander& sample, const std::vector<Side>& sides
 }
 
 void LinkColumn::add(const LinkExpander& sample, const LinkSample& totals, double points,
-                     const std::vector<Side>& sides) {
+                     const std::vector<Side>& sides, double factor) {
   makeRoom(sample.sidesReached(), sides);
   const double sum = points_ + points;
-  const auto old_part = static_cast<float>(points_ / sum), new_part = static_cast<float>(points / sum);
+  const float old_part = correction_ * static_cast<float>(points_ / sum);
+  const auto new_part = static_cast<float>(factor * points / sum);
   const float old_scale = scale_;
   grow(sample, sides);
   const float kept = old_part * (old_scale / scale_), added = new_part / scale_;
@@ -192,15 +207,32 @@ void LinkColumn::add(const LinkExpander& sample, const LinkSample& totals, doubl
       code = encodeLink(kept * decodeOne(code) + added * fresh, dither);
     }
   }
-  escaped_ = (escaped_ * points_ + totals.escaped * points) / sum;
-  absorbed_ = (absorbed_ * points_ + totals.absorbed * points) / sum;
+  const auto average = [&](double& old, double fresh) { old = (old * points_ + factor * fresh * points) / sum; };
+  average(delivered_, sample.flux());
+  average(escaped_, totals.escaped);
+  average(absorbed_, totals.absorbed);
   points_ = sum;
   ++samples_;
+  keepFlux(sample.leafAreas());
+}
+
+void LinkColumn::keepFlux(std::span<const float> leaf_area) {
+  double coded = 0.0;
+  for (const auto& run : runs_) {
+    for (std::uint32_t i = 0; i < run.count; ++i)
+      coded +=
+          static_cast<double>(decodeOne(code_[run.offset + i])) * static_cast<double>(leaf_area[run.first_value + i]);
+  }
+  coded *= static_cast<double>(scale_);
+  // Where nearly all links are too small for a code there is nothing to lay the rest on.
+  const double correction = coded > 0.0 ? delivered_ / coded : 1.0;
+  correction_ = static_cast<float>(std::clamp(correction, 0.5, 2.0));
 }
 
 void LinkColumn::apply(const std::array<float, 3>& radiosity, const std::array<float*, 3>& irradiance) const {
+  const float scale = scale_ * correction_;
   for (const auto& run : runs_) {
-    addScaled(&code_[run.offset], run.count, scale_ * radiosity[0], scale_ * radiosity[1], scale_ * radiosity[2],
+    addScaled(&code_[run.offset], run.count, scale * radiosity[0], scale * radiosity[1], scale * radiosity[2],
               irradiance[0] + run.first_value, irradiance[1] + run.first_value, irradiance[2] + run.first_value);
   }
 }
@@ -215,13 +247,13 @@ double LinkColumn::product(const LinkColumn& a, const LinkColumn& b, std::span<c
     sum += static_cast<double>(
         productOf(&a.code_[run.offset], &b.code_[other->offset], &leaf_area[run.first_value], run.count));
   }
-  return sum * static_cast<double>(a.scale_) * static_cast<double>(b.scale_);
+  return sum * static_cast<double>(a.scale_ * a.correction_) * static_cast<double>(b.scale_ * b.correction_);
 }
 
 bool LinkColumn::decode(std::uint32_t side, std::span<float> leaves) const {
   const auto run = std::lower_bound(runs_.begin(), runs_.end(), side, [](const Run& r, auto s) { return r.side < s; });
   if (run == runs_.end() || run->side != side) return false;
-  decodeAll(&code_[run->offset], run->count, scale_, leaves.data());
+  decodeAll(&code_[run->offset], run->count, scale_ * correction_, leaves.data());
   return true;
 }
 

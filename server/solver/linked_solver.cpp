@@ -5,9 +5,12 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <thread>
+#include <new>
+#include <string>
+#include <system_error>
 
 #include "server/solver/field_error.h"
+#include "server/solver/halves.h"
 
 namespace radiosity::solver {
 namespace {
@@ -26,6 +29,9 @@ constexpr double kSameWeights = 0.05;
 /// Short enough that nobody notices the wait, long enough that the workers' waiting for the last of them does not
 /// count.
 constexpr double kSliceSeconds = 0.06;
+
+/// Largest mean reflectance that is told from one.
+constexpr double kMostKept = 0.99999;
 
 PunctualSettings punctualSettings(const SolverSettings& settings) {
   PunctualSettings punctual;
@@ -188,24 +194,32 @@ Result<void> LinkedSolver::measureSlice() {
   return {};
 }
 
-/// Solves all bounces over the links there are, and lights every leaf.
-void LinkedSolver::settle() {
-  (void)planner_.weigh(system_);
-  system_.solve();
-  std::vector<std::array<double, 2>> weights;
-  for (const auto& shooter : system_.shooters()) weights.push_back(shooter.weight);
-  if (planner_.weigh(system_) > kSameWeights) {  // shooters that were dark before had no weight
-    system_.solve();
-  } else {
-    for (std::size_t n = 0; n < weights.size(); ++n) system_.shooters()[n].weight = weights[n];
+/// Solves all bounces over the links there are, and lights every leaf. False: not yet, go on with the next slice.
+bool LinkedSolver::settle() {
+  if (pass_ == Pass::kNone) {
+    (void)planner_.weigh(system_);
+    system_.begin();
+    pass_ = Pass::kFirst;
   }
+  if (pass_ == Pass::kFirst) {
+    if (!system_.advance(kSliceSeconds)) return false;
+    std::vector<std::array<double, 2>> weights;
+    for (const auto& shooter : system_.shooters()) weights.push_back(shooter.weight);
+    if (planner_.weigh(system_) > kSameWeights) {  // shooters that were dark before had no weight
+      system_.begin();
+      pass_ = Pass::kSecond;
+    } else {
+      for (std::size_t n = 0; n < weights.size(); ++n) system_.shooters()[n].weight = weights[n];
+    }
+  }
+  if (pass_ == Pass::kSecond && !system_.advance(kSliceSeconds)) return false;
+  pass_ = Pass::kNone;
   lightLeaves();
+  return true;
 }
 
 void LinkedSolver::lightLeaves() {
-  std::thread other([&] { system_.irradiance(1, half_[1]); });
-  system_.irradiance(0, half_[0]);
-  other.join();
+  inBothHalves([&](std::size_t half) { system_.irradiance(half, half_[half]); });
   findUnshot();
 }
 
@@ -263,8 +277,26 @@ std::vector<Measurement> LinkedSolver::plan() {
 }
 
 Result<StepOutcome> LinkedSolver::step() {
+  try {
+    return advance();
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::kTooLarge, "out of memory with " + std::to_string(system_.shooters().size()) +
+                                          " shooters and " + std::to_string(system_.bytes() >> 20U) +
+                                          " MiB of links; fewer texels, or a larger error, need less");
+  } catch (const std::system_error& error) {
+    return fail(ErrorCode::kUnavailable, std::string("no thread to solve with: ") + error.what());
+  }
+}
+
+Result<StepOutcome> LinkedSolver::advance() {
+  if (from_links_ == FromLinks::kAfterEdit) {
+    if (!settleFromLinks()) return StepOutcome::kSlice;
+    finishEdit();
+    return phase_ == Phase::kDone ? StepOutcome::kConverged : StepOutcome::kShot;
+  }
+  if (from_links_ == FromLinks::kToConfirm) return confirm();
   if (phase_ == Phase::kDone) return StepOutcome::kConverged;
-  if (measured_ == wanted_.size()) {
+  if (!settling_ && measured_ == wanted_.size()) {
     wanted_ = plan();
     measured_ = 0;
     const bool dark = phase_ == Phase::kLights && net_unshot_ + varying_ <= 0.0;
@@ -274,11 +306,12 @@ Result<StepOutcome> LinkedSolver::step() {
     }
     if (wanted_.empty() && (dark || phase_ == Phase::kGrow)) return finishRound();
   }
-  if (!wanted_.empty()) {
+  if (!settling_ && !wanted_.empty()) {
     if (const auto done = measureSlice(); !done) return tl::unexpected<Error>(done.error());
     if (measured_ < wanted_.size()) return StepOutcome::kSlice;
   }
-  settle();
+  settling_ = !settle();
+  if (settling_) return StepOutcome::kSlice;
   if (phase_ == Phase::kImprove) return finishRound();
   if (phase_ == Phase::kLights) startGrowth();
   return StepOutcome::kShot;
@@ -292,14 +325,22 @@ StepOutcome LinkedSolver::finishRound() {
 }
 
 StepOutcome LinkedSolver::chooseNext() {
-  if (error_.total <= settings_.target_error) {
-    settleFromLinks();
-    assess();
-  }
-  if (error_.total <= settings_.target_error) {
-    phase_ = Phase::kDone;
-    return StepOutcome::kConverged;
-  }
+  if (error_.total > settings_.target_error) return chooseFurther();
+  from_links_ = FromLinks::kToConfirm;
+  return confirm();
+}
+
+/// A solve that is done depends on its links alone, not on the way to them.
+StepOutcome LinkedSolver::confirm() {
+  if (!settleFromLinks()) return StepOutcome::kSlice;
+  from_links_ = FromLinks::kNo;
+  assess();
+  if (error_.total > settings_.target_error) return chooseFurther();
+  phase_ = Phase::kDone;
+  return StepOutcome::kConverged;
+}
+
+StepOutcome LinkedSolver::chooseFurther() {
   const auto& shooters = system_.shooters();
   if (std::any_of(shooters.begin(), shooters.end(), [](const Shooter& shooter) { return shooter.owes(); })) {
     phase_ = Phase::kLights;
@@ -324,6 +365,12 @@ StepOutcome LinkedSolver::chooseNext() {
 }
 
 void LinkedSolver::assess() {
+  if (from_links_ == FromLinks::kAfterEdit) {  // somebody wants to know before the next step
+    while (!settleFromLinks()) {
+    }
+    finishEdit();
+    return;
+  }
   FieldError field(*patches_);
   double received = 0.0, reflected = 0.0;
   for (const auto& side : sides_) {
@@ -350,18 +397,20 @@ void LinkedSolver::assess() {
     error_.residual = error_.total = owed + varying_ > 0.0 ? 1.0 : 0.0;  // all or nothing is missing
     return;
   }
-  const double kept = std::min(0.999, reflected / received);
+  const double kept = std::min(kMostKept, reflected / received);
   error_.sampling = field.sampling();
   error_.discretization = field.discretization();
   const double varying = std::sqrt(planner_.variation(system_, unshot_, *patches_) / field.square());
-  error_.residual = owed / (1.0 - kept) / received + varying;
+  error_.residual = owed / (1.0 - kept) / received + varying + system_.unsolved();
   left_out_ = left_out / (1.0 - kept) / received;
   error_.total = std::hypot(error_.residual, error_.sampling);
 }
 
 void LinkedSolver::setTargetError(double target) {
   settings_.target_error = target;
-  if (phase_ == Phase::kDone) (void)chooseNext();
+  if (phase_ != Phase::kDone || from_links_ != FromLinks::kNo) return;
+  (void)chooseNext();
+  while (from_links_ == FromLinks::kToConfirm) (void)confirm();
 }
 
 void LinkedSolver::setMaterials(const scene::PatchMaterials& materials) {
@@ -374,11 +423,18 @@ void LinkedSolver::setLights(const LightSources& sources) {
   solveAnew();
 }
 
-/// After an edit. What was still to be measured will be asked for again.
+/// After an edit: the next steps solve over the links there are. What was still to be measured will be asked for again.
 void LinkedSolver::solveAnew() {
   wanted_.clear();
   measured_ = 0;
-  settleFromLinks();
+  settling_ = false;
+  pass_ = Pass::kNone;
+  from_links_ = FromLinks::kAfterEdit;
+  error_ = {};  // unknown
+}
+
+void LinkedSolver::finishEdit() {
+  from_links_ = FromLinks::kNo;
   growing_ = true;
   phase_ = Phase::kLights;
   assess();
@@ -386,26 +442,40 @@ void LinkedSolver::solveAnew() {
 }
 
 /// From nothing but the links: the result depends on them and on light and materials alone, so that an edit and its
-/// inverse give the same bits as long as no link was added in between.
-void LinkedSolver::settleFromLinks() {
-  for (int pass = 0; pass < 2; ++pass) {  // the first shows how strong the shooters are, for their roulette
+/// inverse give the same bits as long as no link was added in between. False: not yet.
+bool LinkedSolver::settleFromLinks() {
+  const auto forgetLight = [&] {
     for (auto& shooter : system_.shooters()) {
       if (shooter.isLight()) continue;
-      for (std::size_t half = 0; pass == 0 && half < 2; ++half)
-        shooter.weight[half] = shooter.column[half].points() > 0.0 ? 1.0 : 0.0;
       shooter.mean.fill(glm::vec3(0.0F));
       shooter.sent.fill(glm::vec3(0.0F));
     }
-    system_.solve();
-    if (pass == 1) continue;
+    system_.begin();
+  };
+  if (pass_ == Pass::kNone) {
+    for (auto& shooter : system_.shooters()) {
+      for (std::size_t half = 0; half < 2 && !shooter.isLight(); ++half)
+        shooter.weight[half] = shooter.column[half].points() > 0.0 ? 1.0 : 0.0;
+    }
+    forgetLight();
+    pass_ = Pass::kFirst;
+  }
+  if (pass_ == Pass::kFirst) {
+    if (!system_.advance(kSliceSeconds)) return false;
+    // It showed how strong the shooters are, for their roulette.
     double power = 0.0;
     for (const auto& shooter : system_.shooters()) {
       if (!shooter.isLight() && shooter.parent == scene::kNone) power += shooter.power();
     }
     if (power > 0.0) planner_.setShare(power * share_part_);  // weak beside the light that there is now
     (void)planner_.weigh(system_);
+    forgetLight();
+    pass_ = Pass::kSecond;
   }
+  if (!system_.advance(kSliceSeconds)) return false;
+  pass_ = Pass::kNone;
   lightLeaves();
+  return true;
 }
 
 std::vector<glm::vec3> LinkedSolver::halfIrradiance(std::uint32_t half) const {

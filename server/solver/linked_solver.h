@@ -45,6 +45,10 @@ class LinkedSolver final : public Solver {
 
  private:
   enum class Phase { kLights, kGrow, kImprove, kDone };
+  /// Solving over links goes in slices too: which of its passes is under way.
+  enum class Pass { kNone, kFirst, kSecond };
+  /// What a solution over nothing but the links is for.
+  enum class FromLinks { kNo, kAfterEdit, kToConfirm };
 
   [[nodiscard]] bool isFull() const;
   [[nodiscard]] std::vector<Measurement> plan();
@@ -54,15 +58,19 @@ class LinkedSolver final : public Solver {
   void addSource(const PunctualLights::Source& source);
   [[nodiscard]] double powerToShoot() const;
   void solveAnew();
-  void settleFromLinks();
+  [[nodiscard]] bool settleFromLinks();
+  void finishEdit();
   void lightLeaves();
   void takeMaterials(const scene::PatchMaterials& materials);
   void takeLights();
-  void settle();
+  [[nodiscard]] bool settle();
   void findUnshot();
   void startGrowth();
+  [[nodiscard]] Result<StepOutcome> advance();
   [[nodiscard]] StepOutcome finishRound();
   [[nodiscard]] StepOutcome chooseNext();
+  [[nodiscard]] StepOutcome confirm();
+  [[nodiscard]] StepOutcome chooseFurther();
 
   std::shared_ptr<const scene::PatchScene> patches_;
   Transport& transport_;
@@ -78,6 +86,9 @@ class LinkedSolver final : public Solver {
   UnshotPyramid unshot_;
   LinkPlanner planner_;
   Phase phase_ = Phase::kLights;
+  Pass pass_ = Pass::kNone;
+  FromLinks from_links_ = FromLinks::kNo;
+  bool settling_ = false;            // a wave is measured, its light is still to be solved for
   std::vector<Measurement> wanted_;  // the wave under way
   std::size_t measured_ = 0;         // of the wave
   std::size_t slice_ = 16;           // measurements that take some 50 ms
