@@ -2,10 +2,10 @@
 // Near one an error of any column of links is multiplied by 1 / (1 - rho), and so is what a linear solver leaves.
 #include <gtest/gtest.h>
 
-#include <ctime>
+#include <cmath>
 #include <numbers>
+#include <string>
 
-#include "server/solver/linked_solver.h"
 #include "tests/accuracy/stress/stress_solve.h"
 #include "tests/scenes/scenes.h"
 #include "tests/scenes/shapes.h"
@@ -13,31 +13,60 @@
 namespace radiosity::accuracy {
 namespace {
 
-class Furnace : public testing::TestWithParam<float> {};
+using test_scenes::TestScene;
 
-TEST_P(Furnace, HasItsIrradianceWithinATenthOfAPercent) {
-  const float rho = GetParam();
-  auto loaded = load(test_scenes::furnace(glm::dvec3(0.5), glm::dvec3(1.0)), 2400);
-  paint(loaded, rho);
-  solver::SolverSettings settings;
-  settings.target_error = 0.001;
-  Solve solve(loaded, settings);
-  const auto begin = std::clock();
-  const bool reached = solve.run();
-  const double seconds = double(std::clock() - begin) / CLOCKS_PER_SEC;
-  const double exact = std::numbers::pi / (1.0 - static_cast<double>(rho));
-  const auto found = compareToConstant(solve, exact);
-  const auto& e = solve.solver().error();
-  std::printf(
-      "rho %g: mean %+.3e rms %.3e stated %.3e (residual %.3e sampling %.3e) shots %llu shooters %llu, %.2f s cpu%s\n",
-      double(rho), found.mean, found.rms, e.total, e.residual, e.sampling, (unsigned long long)solve.solver().shots(),
-      (unsigned long long)solve.solver().plannerCounters().shooters, seconds, reached ? "" : " NOT REACHED");
-  EXPECT_LT(std::abs(found.mean), 0.001);
-  EXPECT_LT(found.rms, 0.001);
-  expectSound(solve);
+/// A block in the middle, whose faces see each other not at all and the walls in part.
+TestScene furnaceWithBlock() {
+  auto scene = test_scenes::furnace(glm::dvec3(0.5), glm::dvec3(1.0));
+  scene.name = "furnace_with_block";
+  test_scenes::Object block{"block", {}, {}};
+  appendBox(block, {0.3, 0.3, 0.3}, {0.6, 0.7, 0.6}, test_scenes::allFaces(0));
+  scene.objects.push_back(block);
+  return scene;
 }
 
-INSTANTIATE_TEST_SUITE_P(Reflectance, Furnace, testing::Values(0.5F, 0.9F, 0.99F, 0.999F, 0.9999F));
+class Furnace : public testing::TestWithParam<float> {
+ protected:
+  /// Past the importer's clamp to 0.999. What is found goes into the test's report.
+  static FromConstant found(const TestScene& scene, std::uint64_t texels, double target) {
+    auto loaded = load(scene, texels);
+    paint(loaded, GetParam());
+    solver::SolverSettings settings;
+    settings.target_error = target;
+    Solve solve(loaded, settings);
+    EXPECT_TRUE(solve.run());
+    expectSound(solve);
+    const auto off = compareToConstant(solve, std::numbers::pi / (1.0 - static_cast<double>(GetParam())));
+    RecordProperty("mean", std::to_string(off.mean));
+    RecordProperty("rms", std::to_string(off.rms));
+    RecordProperty("stated", std::to_string(solve.solver().error().total));
+    return off;
+  }
+};
+
+TEST_P(Furnace, HasItsIrradianceWithinATenthOfAPercent) {
+  const auto off = found(test_scenes::furnace(glm::dvec3(0.5), glm::dvec3(1.0)), 2400, 0.001);
+  EXPECT_LT(off.rms, 0.001);
+  // No light is lost but by the rounding of floats: a few 1e-9 a bounce, and once that of the irradiance itself.
+  EXPECT_LT(std::abs(off.mean), 1e-8 / (1.0 - static_cast<double>(GetParam())) + 1e-7);
+}
+
+TEST_P(Furnace, KeepsItsLightAroundABlock) {
+  const auto off = found(furnaceWithBlock(), 2400, 0.01);
+  EXPECT_LT(std::abs(off.mean), 0.001);
+}
+
+INSTANTIATE_TEST_SUITE_P(Reflectance, Furnace, testing::Values(0.5F, 0.99F, 0.999F, 0.9999F),
+                         [](const auto& info) { return std::to_string(std::lround(info.param * 10000.0F)); });
+
+TEST(WhiteFurnace, IsLitAsOneOfTheImportersLargestReflectance) {
+  const auto loaded = load(test_scenes::furnace(glm::dvec3(1.0), glm::dvec3(1.0)), 600);
+  EXPECT_FALSE(loaded.materials.warnings.empty()) << "the clamp is a warning";
+  Solve solve(loaded);
+  EXPECT_TRUE(solve.run());
+  const double rho = static_cast<double>(0.999F);
+  EXPECT_LT(std::abs(compareToConstant(solve, std::numbers::pi / (1.0 - rho)).mean), 0.001);
+}
 
 }  // namespace
 }  // namespace radiosity::accuracy

@@ -11,6 +11,7 @@
 #include "server/gpu/gpu_transport.h"
 #include "server/scene/document.h"
 #include "tests/scenes/glb_writer.h"
+#include "tests/scenes/shapes.h"
 
 namespace radiosity::accuracy {
 namespace {
@@ -35,6 +36,27 @@ Loaded load(const test_scenes::TestScene& scene, std::uint64_t texels) {
   scene::ChartOptions charts;
   charts.texel_budget = texels;
   return loadGlb(test_scenes::encodeGlb(scene), charts);
+}
+
+test_scenes::TestScene litRoom(double scale, glm::dvec3 offset_m) {
+  test_scenes::TestScene scene;
+  scene.name = "lit_room";
+  const auto white = scene.add({"white", {0.7, 0.7, 0.7}, {0, 0, 0}});
+  const auto red = scene.add({"red", {0.7, 0.1, 0.1}, {0, 0, 0}});
+  const auto blue = scene.add({"blue", {0.2, 0.3, 0.7}, {0, 0, 0}});
+  const auto light = scene.add({"light", {0.5, 0.5, 0.5}, {30, 25, 20}});
+  test_scenes::Object room{"room", {}, {}}, block{"block", {}, {}};
+  appendBox(room, glm::dvec3(0.0), {2.0, 1.5, 2.5}, {red, white, white, white, white, white}, test_scenes::kNoFace,
+            true);
+  appendBox(block, {0.5, 0.25, 0.75}, {1.25, 0.75, 1.5}, test_scenes::allFaces(blue));
+  scene.objects = {room, block, test_scenes::makeCeilingLamp("lamp", {1.0, 1.25, 1.25}, 0.5, 0.5, white, light)};
+  for (auto& object : scene.objects) {
+    object.origin = scale * object.origin + offset_m;
+    for (auto& polygon : object.polygons) {
+      for (auto& corner : polygon.corners) corner = scale * corner + offset_m;
+    }
+  }
+  return scene;
 }
 
 void paint(Loaded& loaded, float reflectance) {

@@ -22,6 +22,10 @@ struct Loaded {
 [[nodiscard]] Loaded loadGlb(const std::vector<std::uint8_t>& glb, const scene::ChartOptions& charts);
 [[nodiscard]] Loaded load(const test_scenes::TestScene& scene, std::uint64_t texels);
 
+/// A closed room 2 x 1.5 x 2.5 m with a coloured block that hangs in it and a lamp below its ceiling. Lengths are
+/// multiplied by `scale`; every object's origin is moved by `offset_m`.
+[[nodiscard]] test_scenes::TestScene litRoom(double scale = 1.0, glm::dvec3 offset_m = glm::dvec3(0.0));
+
 /// The same reflectance everywhere, past the importer's clamp.
 void paint(Loaded& loaded, float reflectance);
 
