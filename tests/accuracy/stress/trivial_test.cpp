@@ -91,6 +91,7 @@ TEST(Trivial, ALampOutsideAClosedRoomLeavesItDark) {
   Solve solve(load(scene, kTexels));
   EXPECT_TRUE(solve.run());
   expectSound(solve);
+  EXPECT_LT(solve.solver().shots(), kFewShots);
   const auto& patches = solve.patches();
   for (const auto& surface : patches.surfaces) {
     const auto middle = 0.5F * (surface.bounds_min + surface.bounds_max);
