@@ -56,6 +56,22 @@ __attribute__((target_clones("avx2", "default"))) float productOf(const std::uin
   return rest;
 }
 
+/// In double precision, so that sums over all leaves keep their digits.
+__attribute__((target_clones("avx2", "default"))) double fluxOf(const float* value, const float* area,
+                                                                std::size_t count) {
+  constexpr std::size_t kLanes = 8;
+  double sum[kLanes] = {};
+  std::size_t i = 0;
+  for (; i + kLanes <= count; i += kLanes) {
+    for (std::size_t k = 0; k < kLanes; ++k)
+      sum[k] += static_cast<double>(value[i + k]) * static_cast<double>(area[i + k]);
+  }
+  double rest = 0.0;
+  for (; i < count; ++i) rest += static_cast<double>(value[i]) * static_cast<double>(area[i]);
+  for (std::size_t k = 0; k < kLanes; ++k) rest += sum[k];
+  return rest;
+}
+
 }  // namespace
 
 std::uint16_t encodeLink(float value, std::uint32_t dither) {
@@ -90,8 +106,8 @@ LinkExpander::LinkExpander(const scene::PatchScene& patches, const std::vector<S
 double LinkExpander::flux() const {
   double sum = 0.0;
   for (const auto s : reached_) {
-    for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v)
-      sum += static_cast<double>(values_[v]) * static_cast<double>(leaf_area_[v]);
+    const auto first = sides_[s].first_value;
+    sum += fluxOf(&values_[first], &leaf_area_[first], sides_[s].leaf_count);
   }
   return sum;
 }
@@ -217,11 +233,12 @@ void LinkColumn::add(const LinkExpander& sample, const LinkSample& totals, doubl
 }
 
 void LinkColumn::keepFlux(std::span<const float> leaf_area) {
+  thread_local std::vector<float> links;
   double coded = 0.0;
   for (const auto& run : runs_) {
-    for (std::uint32_t i = 0; i < run.count; ++i)
-      coded +=
-          static_cast<double>(decodeOne(code_[run.offset + i])) * static_cast<double>(leaf_area[run.first_value + i]);
+    links.resize(run.count);
+    decodeAll(&code_[run.offset], run.count, 1.0F, links.data());
+    coded += fluxOf(links.data(), &leaf_area[run.first_value], run.count);
   }
   coded *= static_cast<double>(scale_);
   // Where nearly all links are too small for a code there is nothing to lay the rest on.

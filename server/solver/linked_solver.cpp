@@ -29,6 +29,9 @@ constexpr double kSameWeights = 0.05;
 /// Short enough that nobody notices the wait, long enough that the workers' waiting for the last of them does not
 /// count.
 constexpr double kSliceSeconds = 0.06;
+/// Before the first was timed: as many measurements, of some images each, as draw so many triangles.
+constexpr std::size_t kFirstTriangles = 1'600'000;
+constexpr std::size_t kFewestMeasurements = 8;
 
 /// Largest mean reflectance that is told from one.
 constexpr double kMostKept = 0.99999;
@@ -57,6 +60,8 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
   takeMaterials(materials);
   takeSources(sources);
   share_part_ = 1.0 / settings_.planner.shooters_a_round;
+  slice_ = std::clamp<std::size_t>(kFirstTriangles / std::max<std::size_t>(1, patches_->triangles.size()), 2, 16);
+  fewest_a_slice_ = std::min(slice_, kFewestMeasurements);
   for (auto& half : half_) half.assign(emission_.size(), glm::vec3(0.0F));
   findUnshot();
 }
@@ -189,8 +194,9 @@ Result<void> LinkedSolver::measureSlice() {
   counters_ += *done;
   measured_ += slice.size();
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  slice_ = static_cast<std::size_t>(
-      std::clamp(static_cast<double>(slice.size()) * kSliceSeconds / std::max(seconds, 1e-6), 8.0, 4096.0));
+  slice_ =
+      static_cast<std::size_t>(std::clamp(static_cast<double>(slice.size()) * kSliceSeconds / std::max(seconds, 1e-6),
+                                          static_cast<double>(fewest_a_slice_), 4096.0));
   return {};
 }
 
@@ -366,9 +372,13 @@ StepOutcome LinkedSolver::chooseFurther() {
 
 void LinkedSolver::assess() {
   if (from_links_ == FromLinks::kAfterEdit) {  // somebody wants to know before the next step
-    while (!settleFromLinks()) {
+    try {
+      while (!settleFromLinks()) {
+      }
+      finishEdit();
+    } catch (const std::bad_alloc&) {  // the next step will try again, and can say so
+      pass_ = Pass::kNone;
     }
-    finishEdit();
     return;
   }
   FieldError field(*patches_);
@@ -409,8 +419,12 @@ void LinkedSolver::assess() {
 void LinkedSolver::setTargetError(double target) {
   settings_.target_error = target;
   if (phase_ != Phase::kDone || from_links_ != FromLinks::kNo) return;
-  (void)chooseNext();
-  while (from_links_ == FromLinks::kToConfirm) (void)confirm();
+  try {
+    (void)chooseNext();
+    while (from_links_ == FromLinks::kToConfirm) (void)confirm();
+  } catch (const std::bad_alloc&) {  // the next step will try again, and can say so
+    pass_ = Pass::kNone;
+  }
 }
 
 void LinkedSolver::setMaterials(const scene::PatchMaterials& materials) {

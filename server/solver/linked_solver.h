@@ -92,6 +92,7 @@ class LinkedSolver final : public Solver {
   std::vector<Measurement> wanted_;  // the wave under way
   std::size_t measured_ = 0;         // of the wave
   std::size_t slice_ = 16;           // measurements that take some 50 ms
+  std::size_t fewest_a_slice_ = 8;   // so many at least, for the workers
   bool growing_ = true;              // light is still missing: until the first walk found nothing more to add
   double share_part_ = 0.0;          // of all power, that one shooter should have
   double left_out_ = 0.0;            // relative error by nodes too weak to play roulette

@@ -55,7 +55,6 @@ void report(const char* name, const Loaded& loaded, double seconds, double most_
       e.absorbed[0] / e.emitted[0], built, peakGib());
   EXPECT_GT(solve.solver().shots(), 0U);
   EXPECT_GT(first, 0.0) << "no light after " << seconds << " s";
-  EXPECT_LT(solve.solver().error().total, 1.0);
   EXPECT_LT(peakGib(), most_gib);
 }
 
@@ -84,7 +83,8 @@ TestScene waves(int cells) {
 
 TEST(LargeSolve, DISABLED_WavesOfAMillionTriangles) { report("waves", load(waves(708), 16'000), 60.0, 8.0); }
 
-TEST(LargeSolve, DISABLED_WallOf8192x8192Texels) {
+/// One wall of `texels` x `texels` under a lamp, in one lightmap.
+void reportWall(const char* name, int texels, double most_gib) {
   TestScene scene;
   scene.name = "wall";
   const auto grey = scene.add({"grey", glm::dvec3(0.5), glm::dvec3(0.0)});
@@ -93,10 +93,14 @@ TEST(LargeSolve, DISABLED_WallOf8192x8192Texels) {
   scene.objects.push_back(
       {"lamp", {}, {{{{0.4, 0.5, 0.4}, {0.6, 0.5, 0.4}, {0.6, 0.5, 0.6}, {0.4, 0.5, 0.6}}, light}}});
   scene::ChartOptions charts;
-  charts.texel_size_m = 1.0 / 8192;
-  charts.max_page_size = 8196;
-  report("wall", loadGlb(test_scenes::encodeGlb(scene), charts), 60.0, 24.0);
+  charts.texel_size_m = 1.0 / texels;
+  charts.max_page_size = static_cast<std::uint32_t>(texels) + 4;
+  report(name, loadGlb(test_scenes::encodeGlb(scene), charts), 60.0, most_gib);
 }
+
+TEST(LargeSolve, DISABLED_WallOf2048x2048Texels) { reportWall("wall 2048", 2048, 3.0); }
+TEST(LargeSolve, DISABLED_WallOf4096x4096Texels) { reportWall("wall 4096", 4096, 8.0); }
+TEST(LargeSolve, DISABLED_WallOf8192x8192Texels) { reportWall("wall 8192", 8192, 24.0); }
 
 }  // namespace
 }  // namespace radiosity::accuracy
