@@ -204,8 +204,7 @@ void LinkColumn::add(const LinkExpander& sample, const LinkSample& totals, doubl
                      const std::vector<Side>& sides, double factor) {
   makeRoom(sample.sidesReached(), sides);
   const double sum = points_ + points;
-  const float old_part = correction_ * static_cast<float>(points_ / sum);
-  const auto new_part = static_cast<float>(factor * points / sum);
+  const auto old_part = static_cast<float>(points_ / sum), new_part = static_cast<float>(points / sum);
   const float old_scale = scale_;
   grow(sample, sides);
   const float kept = old_part * (old_scale / scale_), added = new_part / scale_;
@@ -223,8 +222,10 @@ void LinkColumn::add(const LinkExpander& sample, const LinkSample& totals, doubl
       code = encodeLink(kept * decodeOne(code) + added * fresh, dither);
     }
   }
+  // Of which nothing is known, that should arrive which does.
+  const double due = totals.due > 0.0 ? totals.due : sample.flux();
   const auto average = [&](double& old, double fresh) { old = (old * points_ + factor * fresh * points) / sum; };
-  average(delivered_, sample.flux());
+  average(due_, due);
   average(escaped_, totals.escaped);
   average(absorbed_, totals.absorbed);
   points_ = sum;
@@ -242,12 +243,11 @@ void LinkColumn::keepFlux(std::span<const float> leaf_area) {
   }
   coded *= static_cast<double>(scale_);
   // Where nearly all links are too small for a code there is nothing to lay the rest on.
-  const double correction = coded > 0.0 ? delivered_ / coded : 1.0;
-  correction_ = static_cast<float>(std::clamp(correction, 0.5, 2.0));
+  gain_ = due_ > 0.0 && coded > 0.0 ? static_cast<float>(std::clamp(due_ / coded, 0.25, 4.0)) : 1.0F;
 }
 
 void LinkColumn::apply(const std::array<float, 3>& radiosity, const std::array<float*, 3>& irradiance) const {
-  const float scale = scale_ * correction_;
+  const float scale = scale_ * gain_;
   for (const auto& run : runs_) {
     addScaled(&code_[run.offset], run.count, scale * radiosity[0], scale * radiosity[1], scale * radiosity[2],
               irradiance[0] + run.first_value, irradiance[1] + run.first_value, irradiance[2] + run.first_value);
@@ -264,13 +264,13 @@ double LinkColumn::product(const LinkColumn& a, const LinkColumn& b, std::span<c
     sum += static_cast<double>(
         productOf(&a.code_[run.offset], &b.code_[other->offset], &leaf_area[run.first_value], run.count));
   }
-  return sum * static_cast<double>(a.scale_ * a.correction_) * static_cast<double>(b.scale_ * b.correction_);
+  return sum * static_cast<double>(a.scale_ * a.gain_) * static_cast<double>(b.scale_ * b.gain_);
 }
 
 bool LinkColumn::decode(std::uint32_t side, std::span<float> leaves) const {
   const auto run = std::lower_bound(runs_.begin(), runs_.end(), side, [](const Run& r, auto s) { return r.side < s; });
   if (run == runs_.end() || run->side != side) return false;
-  decodeAll(&code_[run->offset], run->count, scale_ * correction_, leaves.data());
+  decodeAll(&code_[run->offset], run->count, scale_ * gain_, leaves.data());
   return true;
 }
 

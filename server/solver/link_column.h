@@ -46,15 +46,19 @@ class LinkExpander {
 
 class LinkColumn {
  public:
-  /// Averages a new sample of `points` points, times `factor`, into what is there. The flux of all links together is
-  /// kept exactly, whatever 16 bits make of each: an error of it would be multiplied by interreflection.
+  /// Averages a new sample of `points` points into what is there. `factor`: of what it says should arrive, escape and
+  /// be absorbed. The flux of all links together is kept exactly, whatever 16 bits make of each.
   void add(const LinkExpander& sample, const LinkSample& totals, double points, const std::vector<Side>& sides,
            double factor = 1.0);
 
   [[nodiscard]] double points() const { return points_; }
   [[nodiscard]] std::uint32_t samples() const { return samples_; }
-  /// Flux of all links, for a radiosity of one: sum of links times leaf areas.
-  [[nodiscard]] double delivered() const { return delivered_; }
+  /// What leaves a polygon arrives: all links are multiplied by this, the ratio of what should arrive, in the mean over
+  /// all samples, to the sum of the links as they are kept. Otherwise small errors (one point for a whole leaf, pixels
+  /// on edges, the rounding to 16 bits) would be multiplied by interreflection. Bounded, for polygons that see next to
+  /// nothing; the bounds are wider than what one random point of a wall makes of the walls of a cube (0.3 to 3), or
+  /// such a room would lose light with every bounce.
+  [[nodiscard]] double gain() const { return static_cast<double>(gain_); }
   /// Flux that leaves the scene, and that falls on unlit sides, for a radiosity of one.
   [[nodiscard]] double escaped() const { return escaped_; }
   [[nodiscard]] double absorbed() const { return absorbed_; }
@@ -80,10 +84,10 @@ class LinkColumn {
 
   std::vector<Run> runs_;    // by ascending side
   float scale_ = 0x1p-100F;  // of the codes; a power of two that grows with the largest link
-  float correction_ = 1.0F;  ///< of what rounding to codes made of the sum
+  float gain_ = 1.0F;
   std::vector<std::uint16_t> code_;
   std::uint32_t samples_ = 0;
-  double points_ = 0.0, delivered_ = 0.0, escaped_ = 0.0, absorbed_ = 0.0;
+  double points_ = 0.0, due_ = 0.0, escaped_ = 0.0, absorbed_ = 0.0;
 };
 
 }  // namespace radiosity::solver

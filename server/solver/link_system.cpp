@@ -54,7 +54,8 @@ LinkSystem::LinkSystem(const scene::PatchScene& patches, const std::vector<Side>
 void LinkSystem::addSample(std::uint32_t index, std::size_t half, const LinkExpander& links, const LinkSample& totals,
                            double points) {
   auto& shooter = shooters_[index];
-  const double all = (links.flux() + totals.escaped + totals.absorbed) / shooter.area;
+  const double arriving = totals.due > 0.0 ? totals.due : links.flux();
+  const double all = (arriving + totals.escaped + totals.absorbed) / shooter.area;
   const double factor = std::abs(all - 1.0) < kOnlyRounding ? 1.0 / all : 1.0;
   shooter.column[half].add(links, totals, points, sides_, factor);
   const auto& own = shooter.column[half];

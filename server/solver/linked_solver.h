@@ -44,6 +44,9 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] const LinkSystem& system() const { return system_; }
 
  private:
+  /// Short enough that nobody notices the wait, long enough that the workers' waiting for the last of them does not
+  /// count.
+  static constexpr double kSliceSeconds = 0.06;
   enum class Phase { kLights, kGrow, kImprove, kDone };
   /// Solving over links goes in slices too: which of its passes is under way.
   enum class Pass { kNone, kFirst, kSecond };
