@@ -97,6 +97,8 @@ Result<PatchOutcome> SolveLoop::reshade(scene::Document next, LitScene::Change c
   if (!affected) return tl::unexpected<Error>(affected.error());
   // The light of the wave that failed is counted as shot but arrived nowhere.
   if (*affected > 0 && state_ == SolveState::kFailed) lit_->restart(settings_);
+  // The solver takes an edit in with its next step, which does not come: show what can be shown.
+  if (*affected > 0 && state_ == SolveState::kPaused) lit_->solver().assess();
   PatchOutcome outcome;
   outcome.affected_surfaces = *affected;
   return outcome;

@@ -29,26 +29,46 @@ inline float angleOverSine(float x) {
   return x >= 0.0F ? small : large;
 }
 
+/// Corners, and the edges from each to the next, of a polygon, as planes of floats.
+struct Edges {
+  float x[9] = {}, y[9] = {}, z[9] = {}, ex[9] = {}, ey[9] = {}, ez[9] = {};
+
+  explicit Edges(std::span<const glm::vec3> corners) {
+    for (std::size_t k = 0; k < corners.size(); ++k) {
+      const auto edge = corners[(k + 1) % corners.size()] - corners[k];
+      x[k] = corners[k].x;
+      y[k] = corners[k].y;
+      z[k] = corners[k].z;
+      ex[k] = edge.x;
+      ey[k] = edge.y;
+      ez[k] = edge.z;
+    }
+  }
+};
+
+/// The normal of an edge's triangle with the receiver is v_k x v_m = v_k x e_k: from the edge itself, because the small
+/// difference of two directions would leave nothing of a polygon that is a ten-thousandth of its distance across.
 template <std::size_t kCorners>
-[[gnu::always_inline]] inline float lambertSum(const float* cx, const float* cy, const float* cz, float nx, float ny,
-                                               float nz, float x, float y, float z) {
-  float ux[kCorners], uy[kCorners], uz[kCorners];
+[[gnu::always_inline]] inline float lambertSum(const Edges& edges, float nx, float ny, float nz, float x, float y,
+                                               float z) {
+  float vx[kCorners], vy[kCorners], vz[kCorners], inverse[kCorners];
 #pragma GCC unroll 9
   for (std::size_t k = 0; k < kCorners; ++k) {
-    const float dx = cx[k] - x, dy = cy[k] - y, dz = cz[k] - z;
-    const float inverse = 1.0F / std::sqrt(std::max(dx * dx + dy * dy + dz * dz, 1e-20F));
-    ux[k] = dx * inverse;
-    uy[k] = dy * inverse;
-    uz[k] = dz * inverse;
+    vx[k] = edges.x[k] - x;
+    vy[k] = edges.y[k] - y;
+    vz[k] = edges.z[k] - z;
+    inverse[k] = 1.0F / std::sqrt(std::max(vx[k] * vx[k] + vy[k] * vy[k] + vz[k] * vz[k], 1e-20F));
   }
   float sum = 0.0F;
 #pragma GCC unroll 9
   for (std::size_t k = 0; k < kCorners; ++k) {
     const std::size_t m = (k + 1) % kCorners;
-    const float dot = ux[k] * ux[m] + uy[k] * uy[m] + uz[k] * uz[m];
-    const float along = (uy[k] * uz[m] - uz[k] * uy[m]) * nx + (uz[k] * ux[m] - ux[k] * uz[m]) * ny +
-                        (ux[k] * uy[m] - uy[k] * ux[m]) * nz;
-    sum += angleOverSine(dot) * along;
+    const float lengths = inverse[k] * inverse[m];
+    const float dot = vx[k] * vx[m] + vy[k] * vy[m] + vz[k] * vz[m];
+    const float along = (vy[k] * edges.ez[k] - vz[k] * edges.ey[k]) * nx +
+                        (vz[k] * edges.ex[k] - vx[k] * edges.ez[k]) * ny +
+                        (vx[k] * edges.ey[k] - vy[k] * edges.ex[k]) * nz;
+    sum += angleOverSine(dot * lengths) * (along * lengths);
   }
   return std::min(std::abs(sum) * (0.5F * std::numbers::inv_pi_v<float>), 1.0F);
 }
@@ -95,18 +115,6 @@ template <typename Loop>
   }
 }
 
-struct Corners {
-  float x[9] = {}, y[9] = {}, z[9] = {};
-
-  explicit Corners(std::span<const glm::vec3> corners) {
-    for (std::size_t k = 0; k < corners.size(); ++k) {
-      x[k] = corners[k].x;
-      y[k] = corners[k].y;
-      z[k] = corners[k].z;
-    }
-  }
-};
-
 }  // namespace
 
 // One clone for processors with 256-bit vectors. No fused multiply-add in either, so both give the same bits.
@@ -114,26 +122,26 @@ __attribute__((target_clones("avx2", "default"))) void planarFormFactors(const C
                                                                          const glm::vec3& normal, const float* x,
                                                                          const float* y, const float* z,
                                                                          std::size_t count, float* form_factor) {
-  const Corners c(std::span(polygon.corner.data(), polygon.count));
+  const Edges edges(std::span(polygon.corner.data(), polygon.count));
   const float nx = normal.x, ny = normal.y, nz = normal.z;
   withCorners(
       polygon.count, [&]<std::size_t kCorners>(std::integral_constant<std::size_t, kCorners>)
                          __attribute__((always_inline)) {
                            for (std::size_t i = 0; i < count; ++i)
-                             form_factor[i] = lambertSum<kCorners>(c.x, c.y, c.z, nx, ny, nz, x[i], y[i], z[i]);
+                             form_factor[i] = lambertSum<kCorners>(edges, nx, ny, nz, x[i], y[i], z[i]);
                          });
 }
 
 __attribute__((target_clones("avx2", "default"))) void wholeFormFactors(std::span<const glm::vec3> corners,
                                                                         const FormFactorPoints& points,
                                                                         std::size_t count, float* form_factor) {
-  const Corners c(corners);
+  const Edges edges(corners);
   const auto [x, y, z, nx, ny, nz] = points;
   withCorners(
       corners.size(), [&, x = x, y = y, z = z, nx = nx, ny = ny, nz = nz ]<std::size_t kCorners>(
                           std::integral_constant<std::size_t, kCorners>) __attribute__((always_inline)) {
         for (std::size_t i = 0; i < count; ++i)
-          form_factor[i] = lambertSum<kCorners>(c.x, c.y, c.z, nx[i], ny[i], nz[i], x[i], y[i], z[i]);
+          form_factor[i] = lambertSum<kCorners>(edges, nx[i], ny[i], nz[i], x[i], y[i], z[i]);
       });
 }
 

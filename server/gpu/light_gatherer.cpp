@@ -1,6 +1,7 @@
 #include "server/gpu/light_gatherer.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -211,13 +212,16 @@ void LightGatherer::testPoint(const solver::GatherShot& shot, const solver::Hemi
       o, t, b, n, static_cast<int>(shot.resolution), static_cast<float>(0.5 - across), static_cast<float>(0.5 - up)};
   projectReceivers(view, lit_count_, lit_.x.data(), lit_.y.data(), lit_.z.data(), lit_.nx.data(), lit_.ny.data(),
                    lit_.nz.data(), lit_.pixel.data(), lit_.point_weight.data());
+  const auto size = static_cast<std::size_t>(shot.resolution);
   float* weight = lit_.weight[half].data();
   float* visible_weight = lit_.visible_weight[half].data();
   float* visible_count = lit_.visible[half].data();
   for (std::size_t i = 0; i < lit_count_; ++i) {
     const auto item = items[lit_.pixel[i]];
     bool visible = true;
-    if (item != RAD_ITEM_NONE) {
+    if (item == RAD_ITEM_NONE) {
+      visible = !hiddenAtSilhouette(i, o, items, size);
+    } else {
       const auto& plane = receivers_->plane(item);
       const glm::vec3 at(lit_.x[i], lit_.y[i], lit_.z[i]);
       const float light = glm::dot(plane.normal, o) - plane.distance;
@@ -230,6 +234,24 @@ void LightGatherer::testPoint(const solver::GatherShot& shot, const solver::Hemi
     visible_weight[i] += visible ? lit_.point_weight[i] : 0.0F;
     visible_count[i] += visible ? 1.0F : 0.0F;
   }
+}
+
+/// The middle of a receiver's pixel misses everything, the receiver too. Where the ray to it meets a wide facet that a
+/// neighbouring pixel shows, that hides it: along the edges of a closed room, what lies behind its walls.
+bool LightGatherer::hiddenAtSilhouette(std::size_t i, const glm::vec3& light, std::span<const std::uint32_t> items,
+                                       std::size_t size) const {
+  const std::size_t pixel = lit_.pixel[i], column = pixel % size, row = pixel / size;
+  const std::size_t first_row = row < size ? 0 : size + (row - size) / (size / 2) * (size / 2);
+  const std::size_t rows = row < size ? size : size / 2;
+  std::array<std::uint32_t, 9> around{};
+  for (std::size_t k = 0; k < around.size(); ++k) {
+    const auto x = std::clamp<std::size_t>(column + k % 3, 1, size) - 1;
+    const auto y = std::clamp<std::size_t>(row - first_row + k / 3, 1, rows) - 1;
+    around[k] = items[(first_row + y) * size + x];
+  }
+  const glm::vec3 at(lit_.x[i], lit_.y[i], lit_.z[i]), normal(lit_.nx[i], lit_.ny[i], lit_.nz[i]);
+  const float pixel_size = 2.0F * glm::distance(light, at) / static_cast<float>(size);
+  return receivers_->anyMeets(around, {at, normal, light - at, 1.0F, pixel_size});
 }
 
 void LightGatherer::weighLost(const solver::HemicubeFrame& point, std::span<const std::uint32_t> items,

@@ -58,6 +58,8 @@ class LightGatherer {
   [[nodiscard]] bool behind(const solver::GatherShot& shot, const scene::Surface& surface) const;
   void testPoint(const solver::GatherShot& shot, const solver::HemicubeFrame& point,
                  std::span<const std::uint32_t> items, std::size_t half);
+  [[nodiscard]] bool hiddenAtSilhouette(std::size_t i, const glm::vec3& light, std::span<const std::uint32_t> items,
+                                        std::size_t size) const;
   void weighLost(const solver::HemicubeFrame& point, std::span<const std::uint32_t> items,
                  const HemicubeWeights& weights, Lost& lost);
   [[nodiscard]] float visibility(std::size_t sums, std::size_t i, std::size_t points) const;

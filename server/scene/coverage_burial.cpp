@@ -157,10 +157,78 @@ class NodeBoxes {
   std::vector<Bounds> boxes_;
 };
 
+/// Pairs of surfaces that lie on each other and face the same way: the earlier is seen, the later gets no light.
+class Coincidence {
+ public:
+  explicit Coincidence(PatchScene& patches) : patches_(patches) {
+    std::vector<Bvh::Triangle> triangles;
+    for (std::size_t t = 0; t < patches.triangles.size(); ++t)
+      triangles.push_back({patches.vertices[patches.indices[3 * t]].position,
+                           patches.vertices[patches.indices[3 * t + 1]].position,
+                           patches.vertices[patches.indices[3 * t + 2]].position});
+    tree_ = Bvh(std::move(triangles));
+  }
+
+  void run() {
+    std::uint64_t count = 0;
+    std::pair<std::uint32_t, std::uint32_t> first{kNone, kNone};
+    for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
+      const std::uint32_t other = coveredBy(s);
+      covered_.push_back(other != kNone);
+      if (other == kNone) continue;
+      if (count++ == 0) first = {other, s};
+    }
+    if (count == 0) return;
+    patches_.warnings.push_back(
+        fmt::format("{} surfaces lie exactly on an earlier one that faces the same way and is seen instead (the first: "
+                    "surface {} of instance {} on surface {} of instance {})",
+                    count, first.second, patches_.surfaces[first.second].instance, first.first,
+                    patches_.surfaces[first.first].instance));
+  }
+
+  /// Whether the front of `s` is covered there. Only asked of surfaces that are covered somewhere.
+  [[nodiscard]] bool covers(std::uint32_t s, const glm::vec3& position, const glm::vec3& normal) {
+    return covered_[s] && coveredAt(s, position, normal) != kNone;
+  }
+
+ private:
+  std::uint32_t coveredAt(std::uint32_t s, const glm::vec3& position, const glm::vec3& normal) {
+    const glm::dvec3 n(normal);
+    hits_.clear();
+    tree_.collectHits(glm::dvec3(position) + n * 1e-6, -n, 0.0, 2e-6, hits_);
+    for (const RayHit& hit : hits_) {
+      const std::uint32_t other = patches_.triangle_surface[hit.triangle];
+      if (other < s && glm::dot(patches_.triangles[hit.triangle].normal, normal) > 0.9999F) return other;
+    }
+    return kNone;
+  }
+
+  /// An earlier surface found right at some of this surface's leaf points.
+  std::uint32_t coveredBy(std::uint32_t s) {
+    const Surface& surface = patches_.surfaces[s];
+    const std::uint32_t leaves = surface.width * surface.height;
+    const std::uint32_t step = std::max(1U, leaves / 16);
+    for (std::uint32_t i = step / 2; i < leaves; i += step) {
+      const LeafPoint& point = patches_.leaves[surface.first_leaf + i];
+      if (point.triangle == kNone) continue;
+      const TriangleFrame& frame = patches_.triangles[point.triangle];
+      const std::uint32_t other = coveredAt(s, positionAt(frame, glm::dvec2(point.texel)), frame.normal);
+      if (other != kNone) return other;
+    }
+    return kNone;
+  }
+
+  PatchScene& patches_;
+  Bvh tree_;
+  std::vector<RayHit> hits_;
+  std::vector<bool> covered_;  ///< by surface: somewhere
+};
+
 class Burial {
  public:
-  Burial(PatchScene& patches, const std::vector<LeafPiece>& pieces, const std::vector<bool>& solid)
-      : patches_(patches), pieces_(pieces), solids_(patches, solid) {}
+  Burial(PatchScene& patches, const std::vector<LeafPiece>& pieces, const std::vector<bool>& solid,
+         Coincidence& coincidence)
+      : patches_(patches), pieces_(pieces), solids_(patches, solid), coincidence_(coincidence) {}
 
   void run() {
     if (solids_.empty()) return;
@@ -200,8 +268,12 @@ class Burial {
     const glm::vec3& n = patches_.triangles[triangle].normal;
     return side == 0 ? n : -n;
   }
+  /// Inside a solid, or under a face that lies on this one.
   [[nodiscard]] bool buried(std::uint32_t triangle, const glm::dvec2& texel, std::uint32_t side) {
-    return solids_.buries(positionAt(patches_.triangles[triangle], texel), facing(triangle, side));
+    const auto position = positionAt(patches_.triangles[triangle], texel);
+    const auto normal = facing(triangle, side);
+    if (side == 0 && coincidence_.covers(patches_.triangle_surface[triangle], position, normal)) return true;
+    return solids_.buries(position, normal);
   }
 
   /// Splits a surface into nodes that no other solid comes near (all visible or all buried: one test) and single leaves
@@ -372,6 +444,7 @@ class Burial {
   PatchScene& patches_;
   const std::vector<LeafPiece>& pieces_;
   Solids solids_;
+  Coincidence& coincidence_;
   std::vector<std::size_t> first_piece_;
   std::vector<Contact> contacts_, touched_;
   std::vector<Change> changes_;
@@ -379,65 +452,12 @@ class Burial {
   std::uint32_t few_ = kFewSamples;
 };
 
-/// Pairs of surfaces that lie on each other and face the same way: which of them is seen is decided by their order.
-class Coincidence {
- public:
-  explicit Coincidence(PatchScene& patches) : patches_(patches) {
-    std::vector<Bvh::Triangle> triangles;
-    for (std::size_t t = 0; t < patches.triangles.size(); ++t)
-      triangles.push_back({patches.vertices[patches.indices[3 * t]].position,
-                           patches.vertices[patches.indices[3 * t + 1]].position,
-                           patches.vertices[patches.indices[3 * t + 2]].position});
-    tree_ = Bvh(std::move(triangles));
-  }
-
-  void run() {
-    std::uint64_t count = 0;
-    std::pair<std::uint32_t, std::uint32_t> first{kNone, kNone};
-    for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
-      const std::uint32_t other = coveredBy(s);
-      if (other == kNone) continue;
-      if (count++ == 0) first = {other, s};
-    }
-    if (count == 0) return;
-    patches_.warnings.push_back(
-        fmt::format("{} surfaces lie exactly on an earlier one that faces the same way and is seen instead (the first: "
-                    "surface {} of instance {} on surface {} of instance {})",
-                    count, first.second, patches_.surfaces[first.second].instance, first.first,
-                    patches_.surfaces[first.first].instance));
-  }
-
- private:
-  /// An earlier surface found right at some of this surface's leaf points.
-  std::uint32_t coveredBy(std::uint32_t s) {
-    const Surface& surface = patches_.surfaces[s];
-    const std::uint32_t leaves = surface.width * surface.height;
-    const std::uint32_t step = std::max(1U, leaves / 16);
-    for (std::uint32_t i = step / 2; i < leaves; i += step) {
-      const LeafPoint& point = patches_.leaves[surface.first_leaf + i];
-      if (point.triangle == kNone) continue;
-      const TriangleFrame& frame = patches_.triangles[point.triangle];
-      const glm::dvec3 n(frame.normal);
-      hits_.clear();
-      tree_.collectHits(glm::dvec3(positionAt(frame, glm::dvec2(point.texel))) + n * 1e-6, -n, 0.0, 2e-6, hits_);
-      for (const RayHit& hit : hits_) {
-        const std::uint32_t other = patches_.triangle_surface[hit.triangle];
-        if (other < s && glm::dot(patches_.triangles[hit.triangle].normal, frame.normal) > 0.9999F) return other;
-      }
-    }
-    return kNone;
-  }
-
-  PatchScene& patches_;
-  Bvh tree_;
-  std::vector<RayHit> hits_;
-};
-
 }  // namespace
 
 void removeBuried(PatchScene& patches, const std::vector<LeafPiece>& pieces, const std::vector<bool>& solid) {
-  Coincidence(patches).run();
-  Burial(patches, pieces, solid).run();
+  Coincidence coincidence(patches);
+  coincidence.run();
+  Burial(patches, pieces, solid, coincidence).run();
 }
 
 }  // namespace radiosity::scene

@@ -56,6 +56,22 @@ __attribute__((target_clones("avx2", "default"))) float productOf(const std::uin
   return rest;
 }
 
+/// In double precision, so that sums over all leaves keep their digits.
+__attribute__((target_clones("avx2", "default"))) double fluxOf(const float* value, const float* area,
+                                                                std::size_t count) {
+  constexpr std::size_t kLanes = 8;
+  double sum[kLanes] = {};
+  std::size_t i = 0;
+  for (; i + kLanes <= count; i += kLanes) {
+    for (std::size_t k = 0; k < kLanes; ++k)
+      sum[k] += static_cast<double>(value[i + k]) * static_cast<double>(area[i + k]);
+  }
+  double rest = 0.0;
+  for (; i < count; ++i) rest += static_cast<double>(value[i]) * static_cast<double>(area[i]);
+  for (std::size_t k = 0; k < kLanes; ++k) rest += sum[k];
+  return rest;
+}
+
 }  // namespace
 
 std::uint16_t encodeLink(float value, std::uint32_t dither) {
@@ -80,6 +96,20 @@ LinkExpander::LinkExpander(const scene::PatchScene& patches, const std::vector<S
     values += sides[s].leaf_count;
   }
   values_.resize(values);
+  leaf_area_.reserve(values);
+  for (const auto& side : sides) {
+    const auto leaves = patches.node_area.begin() + side.first_node;
+    leaf_area_.insert(leaf_area_.end(), leaves, leaves + side.leaf_count);
+  }
+}
+
+double LinkExpander::flux() const {
+  double sum = 0.0;
+  for (const auto s : reached_) {
+    const auto first = sides_[s].first_value;
+    sum += fluxOf(&values_[first], &leaf_area_[first], sides_[s].leaf_count);
+  }
+  return sum;
 }
 
 void LinkExpander::reach(std::uint32_t side) {
@@ -180,7 +210,7 @@ void LinkColumn::grow(const LinkExpander& sample, const std::vector<Side>& sides
 }
 
 void LinkColumn::add(const LinkExpander& sample, const LinkSample& totals, double points,
-                     const std::vector<Side>& sides) {
+                     const std::vector<Side>& sides, double factor) {
   makeRoom(sample.sidesReached(), sides);
   const double sum = points_ + points;
   const auto old_part = static_cast<float>(points_ / sum), new_part = static_cast<float>(points / sum);
@@ -198,12 +228,15 @@ void LinkColumn::add(const LinkExpander& sample, const LinkSample& totals, doubl
             is_new ? sample.values().subspan(side.first_value, side.leaf_count) : std::span<const float>());
     }
   }
-  escaped_ = (escaped_ * points_ + totals.escaped * points) / sum;
-  absorbed_ = (absorbed_ * points_ + totals.absorbed * points) / sum;
-  delivered_ = (delivered_ * points_ + totals.delivered * points) / sum;
-  due_ = (due_ * points_ + totals.due * points) / sum;
+  // Of which nothing is known, that should arrive which does.
+  const double due = totals.due > 0.0 ? totals.due : sample.flux();
+  const auto average = [&](double& old, double fresh) { old = (old * points_ + factor * fresh * points) / sum; };
+  average(due_, due);
+  average(escaped_, totals.escaped);
+  average(absorbed_, totals.absorbed);
   points_ = sum;
   ++samples_;
+  keepFlux(sample.leafAreas());
 }
 
 /// `fresh`: what the sample brings to the `count` values from `first_value` on; empty: nothing.
@@ -218,12 +251,21 @@ void LinkColumn::addTo(const Run& run, std::uint32_t first_value, std::uint32_t 
   }
 }
 
-double LinkColumn::gain() const {
-  return due_ > 0.0 && delivered_ > 0.0 ? std::clamp(due_ / delivered_, 0.25, 4.0) : 1.0;
+void LinkColumn::keepFlux(std::span<const float> leaf_area) {
+  thread_local std::vector<float> links;
+  double coded = 0.0;
+  for (const auto& run : runs_) {
+    links.resize(run.count);
+    decodeAll(&code_[run.offset], run.count, 1.0F, links.data());
+    coded += fluxOf(links.data(), &leaf_area[run.first_value], run.count);
+  }
+  coded *= static_cast<double>(scale_);
+  // Where nearly all links are too small for a code there is nothing to lay the rest on.
+  gain_ = due_ > 0.0 && coded > 0.0 ? static_cast<float>(std::clamp(due_ / coded, 0.25, 4.0)) : 1.0F;
 }
 
 void LinkColumn::apply(const std::array<float, 3>& radiosity, const std::array<float*, 3>& irradiance) const {
-  const float scale = scale_ * static_cast<float>(gain());
+  const float scale = scale_ * gain_;
   for (const auto& run : runs_) {
     addScaled(&code_[run.offset], run.count, scale * radiosity[0], scale * radiosity[1], scale * radiosity[2],
               irradiance[0] + run.first_value, irradiance[1] + run.first_value, irradiance[2] + run.first_value);
@@ -244,7 +286,7 @@ double LinkColumn::product(const LinkColumn& a, const LinkColumn& b, std::span<c
                                            end - first));
     }
   }
-  return sum * a.gain() * static_cast<double>(a.scale_) * b.gain() * static_cast<double>(b.scale_);
+  return sum * static_cast<double>(a.scale_ * a.gain_) * static_cast<double>(b.scale_ * b.gain_);
 }
 
 bool LinkColumn::decode(std::uint32_t first_value, std::span<float> leaves) const {
@@ -253,7 +295,7 @@ bool LinkColumn::decode(std::uint32_t first_value, std::span<float> leaves) cons
   if (after == runs_.begin()) return false;
   const Run& run = *(after - 1);
   if (first_value >= run.first_value + run.count) return false;
-  decodeAll(&code_[run.offset + (first_value - run.first_value)], leaves.size(), scale_ * static_cast<float>(gain()),
+  decodeAll(&code_[run.offset + (first_value - run.first_value)], leaves.size(), scale_ * gain_,
             leaves.data());
   return true;
 }

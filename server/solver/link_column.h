@@ -26,6 +26,10 @@ class LinkExpander {
   /// Irradiance by leaf value; only that of the sides reached is valid.
   [[nodiscard]] std::span<const float> values() const { return values_; }
   [[nodiscard]] std::span<const std::uint32_t> sidesReached() const { return reached_; }
+  /// Sum of irradiance times area over all leaves.
+  [[nodiscard]] double flux() const;
+  /// Unit box squared, by leaf value.
+  [[nodiscard]] std::span<const float> leafAreas() const { return leaf_area_; }
 
  private:
   void reach(std::uint32_t side);
@@ -34,7 +38,7 @@ class LinkExpander {
   const scene::PatchScene& patches_;
   const std::vector<Side>& sides_;
   std::vector<std::uint32_t> side_of_node_;
-  std::vector<float> values_;
+  std::vector<float> values_, leaf_area_;
   std::vector<float> coarse_;  // by node: what was linked above level 0
   std::vector<std::uint32_t> reached_;
   std::vector<bool> is_reached_, has_coarse_;
@@ -42,16 +46,19 @@ class LinkExpander {
 
 class LinkColumn {
  public:
-  /// Averages a new sample of `points` points into what is there.
-  void add(const LinkExpander& sample, const LinkSample& totals, double points, const std::vector<Side>& sides);
+  /// Averages a new sample of `points` points into what is there. `factor`: of what it says should arrive, escape and
+  /// be absorbed. The flux of all links together is kept exactly, whatever 16 bits make of each.
+  void add(const LinkExpander& sample, const LinkSample& totals, double points, const std::vector<Side>& sides,
+           double factor = 1.0);
 
   [[nodiscard]] double points() const { return points_; }
   [[nodiscard]] std::uint32_t samples() const { return samples_; }
-  /// What leaves a polygon arrives: all links are multiplied by this, the ratio of what should arrive to what does, in
-  /// the mean over all samples. Otherwise small errors (one point for a whole leaf, pixels on edges) would be
-  /// multiplied by interreflection. Bounded, for polygons that see next to nothing; the bounds are wider than what one
-  /// random point of a wall makes of the walls of a cube (0.3 to 3), or such a room would lose light with every bounce.
-  [[nodiscard]] double gain() const;
+  /// What leaves a polygon arrives: all links are multiplied by this, the ratio of what should arrive, in the mean over
+  /// all samples, to the sum of the links as they are kept. Otherwise small errors (one point for a whole leaf, pixels
+  /// on edges, the rounding to 16 bits) would be multiplied by interreflection. Bounded, for polygons that see next to
+  /// nothing; the bounds are wider than what one random point of a wall makes of the walls of a cube (0.3 to 3), or
+  /// such a room would lose light with every bounce.
+  [[nodiscard]] double gain() const { return static_cast<double>(gain_); }
   /// Flux that leaves the scene, and that falls on unlit sides, for a radiosity of one.
   [[nodiscard]] double escaped() const { return escaped_; }
   [[nodiscard]] double absorbed() const { return absorbed_; }
@@ -76,15 +83,17 @@ class LinkColumn {
  private:
   void makeRoom(std::span<const std::uint32_t> reached, const std::vector<Side>& sides);
   void grow(const LinkExpander& sample, const std::vector<Side>& sides);
+  void keepFlux(std::span<const float> leaf_area);
 
   void addTo(const Run& run, std::uint32_t first_value, std::uint32_t count, float kept, float added,
              std::span<const float> fresh);
 
   std::vector<Run> runs_;    // by ascending side
   float scale_ = 0x1p-100F;  // of the codes; a power of two that grows with the largest link
+  float gain_ = 1.0F;
   std::vector<std::uint16_t> code_;
   std::uint32_t samples_ = 0;
-  double points_ = 0.0, escaped_ = 0.0, absorbed_ = 0.0, delivered_ = 0.0, due_ = 0.0;
+  double points_ = 0.0, due_ = 0.0, escaped_ = 0.0, absorbed_ = 0.0;
 };
 
 }  // namespace radiosity::solver

@@ -4,17 +4,19 @@
 //   b_m = e_m + mean over node m of rho sum_n T_n w_n s_n,     s_m = b_m - b_parent(m),
 //
 // where T_n are the links of shooter n to leaves, w_n its roulette weight, and parent(m) the nearest shooter above m in
-// its quadtree: a node shoots its mean, its children how they differ from it, signed. Solved by Gauss and Seidel, which
-// is progressive shooting on few unknowns (Cohen and others 1988). Two independent halves of all links give two
-// independent solutions, whose difference is the sampling error. Owned by LinkedSolver; one thread outside of the
-// calls.
+// its quadtree: a node shoots its mean, its children how they differ from it, signed. Solved by GMRES around sweeps of
+// Gauss and Seidel, which are progressive shooting on few unknowns (Cohen and others 1988). Two independent halves of
+// all links give two independent solutions, whose difference is the sampling error. Owned by LinkedSolver; one thread
+// outside of the calls.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <vector>
 
+#include "server/solver/gmres.h"
 #include "server/solver/link_column.h"
 #include "server/solver/side.h"
 
@@ -50,7 +52,7 @@ class LinkSystem {
  public:
   LinkSystem(const scene::PatchScene& patches, const std::vector<Side>& sides);
 
-  /// By leaf value. All rows are made anew.
+  /// By leaf value. Entries of the matrix stay unless they hold a reflectance that changed.
   void setMaterials(const std::vector<glm::vec3>& emission, const std::vector<glm::vec3>& reflectance);
 
   /// Index of the new shooter. Ancestors must come before their descendants.
@@ -62,22 +64,34 @@ class LinkSystem {
   /// Whether shooters lie below this node.
   [[nodiscard]] bool hasBelow(std::uint32_t node) const { return below_[node]; }
 
-  /// Averages a new sample into the links of a shooter.
+  /// Averages a new sample into the links of a shooter. What it delivers, loses and lets escape is brought to exactly
+  /// what the shooter sends where only rounding lies between.
   void addSample(std::uint32_t shooter, std::size_t half, const LinkExpander& links, const LinkSample& totals,
                  double points);
 
   /// Forgets its links, so that its place can be taken by another light.
   void forget(std::uint32_t shooter);
 
-  /// Brings rows up to date and solves both halves. Returns the sweeps that the slower took.
+  /// Starts to bring rows up to date and to solve both halves, from what was sent before. Nothing else may change
+  /// until it is done; begin() may come again at any time, and starts anew.
+  void begin();
+  /// Goes on for about `seconds`; longer by at most one sweep over all entries, or the links of some shooters. True:
+  /// done. Where the cuts lie changes no bit. Throws std::bad_alloc.
+  bool advance(double seconds);
+  /// All at once. Returns the sweeps that the slower half took.
   int solve();
+  /// Sweeps that the slower half took for the last solution.
+  [[nodiscard]] int sweeps() const { return std::max(halves_[0].sweeps, halves_[1].sweeps); }
+  /// Bound of the relative error that the last solution leaves: flux that its equation does not account for, of the
+  /// flux that shines. At most 1e-6 unless the sweeps were used up.
+  [[nodiscard]] double unsolved() const;
 
   /// Irradiance of every leaf value from the solution of `half`.
   void irradiance(std::size_t half, std::vector<glm::vec3>& values) const;
   /// What all links take.
   [[nodiscard]] std::size_t bytes() const;
   /// Rows of the equation in each half, and how many a node of the side has.
-  [[nodiscard]] std::size_t rowCount() const { return matrix_[0].size(); }
+  [[nodiscard]] std::size_t rowCount() const { return halves_[0].matrix.size(); }
   [[nodiscard]] std::size_t rowsOf(std::uint32_t side) const { return uniform_[side] ? 1 : 3; }
   /// Radiosity that stands for each leaf of a side: that of the deepest shooter above it, mean of the halves.
   void standIn(std::uint32_t side, std::vector<glm::vec3>& leaves) const;
@@ -86,12 +100,27 @@ class LinkSystem {
   struct Rows {
     std::uint32_t first = 0, count = 0;  ///< one if the node is of one reflectance, else one a channel
   };
-  void updateRows();
-  void updateRows(std::size_t half, std::uint32_t column, std::uint32_t first_member);
+  struct Half {
+    std::vector<std::vector<float>> matrix;  ///< by row: entries by column
+    Gmres gmres;
+    Gmres::Vectors sent, mean;  ///< of the sweep under way; weights included
+    std::array<double, 3> shining{};
+    double area = 0.0;
+    int attempt = 0, sweeps = 0;
+    double unsolved = 0.0;
+    bool done = true;
+  };
+  [[nodiscard]] double areaOf(const Shooter& shooter) const;
+  void updateMeans();
+  void makeRows();
+  void updateColumn(std::size_t half, std::uint32_t column, std::uint32_t first_member);
   void fillRow(std::size_t half, std::uint32_t member, std::uint32_t column, const float* links);
-  int solveHalf(std::size_t half);
-  [[nodiscard]] int sweepHalf(std::size_t half);
-  [[nodiscard]] double mostSent(std::size_t half) const;
+  void beginHalf(std::size_t half);
+  void advanceHalf(std::size_t half);
+  void sweep(std::size_t half, Gmres::Vectors& sent, bool affine);
+  [[nodiscard]] bool isPhysical(const Half& half) const;
+  void take(std::size_t half);
+  void lowerWeights(std::size_t half, double most);
 
   const scene::PatchScene& patches_;
   const std::vector<Side>& sides_;
@@ -100,13 +129,14 @@ class LinkSystem {
   std::vector<glm::vec3> emission_mean_, reflectance_mean_;  // by shooter
   std::vector<std::uint32_t> shooter_of_node_;
   std::vector<bool> below_;
-  std::vector<std::vector<std::uint32_t>> members_;        // nodes by side
-  std::vector<bool> changed_;                              // by shooter: its column's entries are stale
-  std::size_t known_ = 0;                                  // shooters whose rows are there
-  std::array<std::vector<std::vector<float>>, 2> matrix_;  // by half and row: entries by column
-  std::vector<glm::vec3> emission_, reflectance_;          // by leaf value
-  std::vector<float> leaf_area_;                           // by leaf value
-  std::vector<bool> uniform_;                              // by side: of one reflectance
+  std::vector<std::vector<std::uint32_t>> members_;  // nodes by side
+  std::vector<bool> changed_;                        // by shooter: its column's entries are stale
+  std::size_t known_ = 0;                            // shooters whose rows are there
+  std::uint32_t next_column_ = 0;                    // to be brought up to date
+  std::array<Half, 2> halves_;
+  std::vector<glm::vec3> emission_, reflectance_;  // by leaf value
+  std::vector<float> leaf_area_;                   // by leaf value
+  std::vector<bool> uniform_;                      // by side: of one reflectance
 };
 
 }  // namespace radiosity::solver

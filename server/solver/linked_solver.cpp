@@ -5,7 +5,9 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <thread>
+#include <new>
+#include <string>
+#include <system_error>
 
 #include "server/solver/field_error.h"
 
@@ -19,11 +21,12 @@ constexpr double kMinShare = 1e-9;
 constexpr std::uint32_t kMaxRounds = 100'000;
 /// Where nothing can be split any more, samples stop when their error is this part of the rest.
 constexpr double kIdleSampling = 0.1;
-/// Roulette weights that change for less than this part of the power need no new solution.
-constexpr double kSameWeights = 0.05;
-/// Short enough that nobody notices the wait, long enough that the workers' waiting for the last of them does not
-/// count.
-constexpr double kSliceSeconds = 0.06;
+/// Before the first was timed: as many measurements, of some images each, as draw so many triangles.
+constexpr std::size_t kFirstTriangles = 1'600'000;
+constexpr std::size_t kFewestMeasurements = 8;
+
+/// Largest mean reflectance that is told from one.
+constexpr double kMostKept = 0.99999;
 
 PunctualSettings punctualSettings(const SolverSettings& settings) {
   PunctualSettings punctual;
@@ -50,6 +53,8 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
   takeMaterials(materials);
   takeSources(sources);
   share_part_ = 1.0 / settings_.planner.shooters_a_round;
+  slice_ = std::clamp<std::size_t>(kFirstTriangles / std::max<std::size_t>(1, patches_->triangles.size()), 2, 16);
+  fewest_a_slice_ = std::min(slice_, kFewestMeasurements);
   for (auto& half : half_) half.assign(emission_.size(), glm::vec3(0.0F));
   findUnshot();
 }
@@ -100,16 +105,10 @@ Result<void> LinkedSolver::measureSlice() {
   counters_ += *done;
   measured_ += slice.size();
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  slice_ = static_cast<std::size_t>(
-      std::clamp(static_cast<double>(slice.size()) * kSliceSeconds / std::max(seconds, 1e-6), 8.0, 4096.0));
+  slice_ =
+      static_cast<std::size_t>(std::clamp(static_cast<double>(slice.size()) * kSliceSeconds / std::max(seconds, 1e-6),
+                                          static_cast<double>(fewest_a_slice_), 4096.0));
   return {};
-}
-
-void LinkedSolver::solveEquation() {
-  const auto sweeps = static_cast<std::uint64_t>(system_.solve());
-  ++solutions_;
-  sweeps_ += sweeps;
-  replayed_ += sweeps * system_.shooters().size();
 }
 
 LinkCounters LinkedSolver::linkCounters() const {
@@ -127,47 +126,6 @@ LinkCounters LinkedSolver::linkCounters() const {
   }
   counters.rows_saved = 3 * nodes > counters.rows ? 3 * nodes - counters.rows : 0;
   return counters;
-}
-
-/// Solves all bounces over the links there are, and lights every leaf.
-void LinkedSolver::settle() {
-  (void)planner_.weigh(system_);
-  solveEquation();
-  std::vector<std::array<double, 2>> weights;
-  for (const auto& shooter : system_.shooters()) weights.push_back(shooter.weight);
-  if (planner_.weigh(system_) > kSameWeights) {  // shooters that were dark before had no weight
-    solveEquation();
-  } else {
-    for (std::size_t n = 0; n < weights.size(); ++n) system_.shooters()[n].weight = weights[n];
-  }
-  lightLeaves();
-}
-
-void LinkedSolver::lightLeaves() {
-  std::thread other([&] { system_.irradiance(1, half_[1]); });
-  system_.irradiance(0, half_[0]);
-  other.join();
-  findUnshot();
-}
-
-void LinkedSolver::findUnshot() {
-  varying_ = net_unshot_ = 0.0;
-  std::vector<glm::vec3> unshot;
-  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
-    const Side& side = sides_[s];
-    system_.standIn(s, unshot);
-    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
-      const auto v = side.first_value + leaf;
-      const glm::vec3 h = 0.5F * (half_[0][v] + half_[1][v]);
-      irradiance_[side.first_node + leaf] = h;
-      unshot[leaf] = reflectance_[v] * h + (side.gathered ? glm::vec3(0.0F) : emission_[v]) - unshot[leaf];
-    }
-    unshot_.pull(side, unshot);
-    const auto root = side.first_node + side.node_count - 1;
-    const auto net = static_cast<double>(channelSum(unshot_.flux(root)));
-    net_unshot_ += net;
-    varying_ += std::max(0.0, static_cast<double>(unshot_.rough(root)) - net);
-  }
 }
 
 /// Part of what the shooters of reflected light send that leaves the scene or falls on unlit sides: it never comes
@@ -221,10 +179,28 @@ std::vector<Measurement> LinkedSolver::plan() {
 }
 
 Result<StepOutcome> LinkedSolver::step() {
+  try {
+    return advance();
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::kTooLarge, "out of memory with " + std::to_string(system_.shooters().size()) +
+                                          " shooters and " + std::to_string(system_.bytes() >> 20U) +
+                                          " MiB of links; fewer texels, or a larger error, need less");
+  } catch (const std::system_error& error) {
+    return fail(ErrorCode::kUnavailable, std::string("no thread to solve with: ") + error.what());
+  }
+}
+
+Result<StepOutcome> LinkedSolver::advance() {
+  if (from_links_ == FromLinks::kAfterEdit) {
+    if (!settleFromLinks()) return StepOutcome::kSlice;
+    if (!finishEdit()) return StepOutcome::kSlice;
+    return phase_ == Phase::kDone ? StepOutcome::kConverged : StepOutcome::kShot;
+  }
+  if (from_links_ == FromLinks::kToConfirm) return confirm();
   if (phase_ == Phase::kDone) {
     return error_.total <= settings_.target_error ? StepOutcome::kConverged : StepOutcome::kExhausted;
   }
-  if (measured_ == wanted_.size()) {
+  if (!settling_ && measured_ == wanted_.size()) {
     wanted_ = plan();
     measured_ = 0;
     const bool dark = phase_ == Phase::kLights && net_unshot_ + varying_ <= 0.0;
@@ -232,11 +208,12 @@ Result<StepOutcome> LinkedSolver::step() {
       return exhausted(memory_.lacksSamples() || memory_.isFull() ? SolveLimit::kLinkMemory : SolveLimit::kPatches);
     if (wanted_.empty() && (dark || phase_ == Phase::kGrow)) return finishRound();
   }
-  if (!wanted_.empty()) {
+  if (!settling_ && !wanted_.empty()) {
     if (const auto done = measureSlice(); !done) return tl::unexpected<Error>(done.error());
     if (measured_ < wanted_.size()) return StepOutcome::kSlice;
   }
-  settle();
+  settling_ = !settle();
+  if (settling_) return StepOutcome::kSlice;
   if (phase_ == Phase::kImprove) return finishRound();
   if (phase_ == Phase::kLights) startGrowth();
   return StepOutcome::kShot;
@@ -257,14 +234,22 @@ StepOutcome LinkedSolver::exhausted(SolveLimit limit) {
 
 StepOutcome LinkedSolver::chooseNext() {
   limit_ = SolveLimit::kNone;
-  if (error_.total <= settings_.target_error) {
-    settleFromLinks();
-    assess();
-  }
-  if (error_.total <= settings_.target_error) {
-    phase_ = Phase::kDone;
-    return StepOutcome::kConverged;
-  }
+  if (error_.total > settings_.target_error) return chooseFurther();
+  from_links_ = FromLinks::kToConfirm;
+  return confirm();
+}
+
+/// A solve that is done depends on its links alone, not on the way to them.
+StepOutcome LinkedSolver::confirm() {
+  if (!settleFromLinks()) return StepOutcome::kSlice;
+  from_links_ = FromLinks::kNo;
+  assess();
+  if (error_.total > settings_.target_error) return chooseFurther();
+  phase_ = Phase::kDone;
+  return StepOutcome::kConverged;
+}
+
+StepOutcome LinkedSolver::chooseFurther() {
   const auto& shooters = system_.shooters();
   const auto owes = [](const Shooter& shooter) { return shooter.owes(); };
   if (lights_fit_ && std::any_of(shooters.begin(), shooters.end(), owes)) {
@@ -289,6 +274,16 @@ StepOutcome LinkedSolver::chooseNext() {
 }
 
 void LinkedSolver::assess() {
+  if (from_links_ == FromLinks::kAfterEdit) {  // somebody wants to know before the next step
+    try {
+      do {
+        while (!settleFromLinks()) continue;
+      } while (!finishEdit());
+    } catch (const std::bad_alloc&) {  // the next step will try again, and can say so
+      pass_ = Pass::kNone;
+    }
+    return;
+  }
   FieldError field(*patches_);
   double received = 0.0, reflected = 0.0;
   for (const auto& side : sides_) {
@@ -315,18 +310,24 @@ void LinkedSolver::assess() {
     error_.residual = error_.total = owed + varying_ > 0.0 ? 1.0 : 0.0;  // all or nothing is missing
     return;
   }
-  const double kept = std::min(0.999, (1.0 - lostPart()) * reflected / received);
+  const double kept = std::min(kMostKept, (1.0 - lostPart()) * reflected / received);
   error_.sampling = field.sampling();
   error_.discretization = field.discretization();
   const double varying = std::sqrt(planner_.variation(system_, unshot_, *patches_) / field.square());
-  error_.residual = owed / (1.0 - kept) / received + varying;
+  error_.residual = owed / (1.0 - kept) / received + varying + system_.unsolved();
   left_out_ = left_out / (1.0 - kept) / received;
   error_.total = std::hypot(error_.residual, error_.sampling);
 }
 
 void LinkedSolver::setTargetError(double target) {
   settings_.target_error = target;
-  if (phase_ == Phase::kDone) (void)chooseNext();
+  if (phase_ != Phase::kDone || from_links_ != FromLinks::kNo) return;
+  try {
+    (void)chooseNext();
+    while (from_links_ == FromLinks::kToConfirm) (void)confirm();
+  } catch (const std::bad_alloc&) {  // the next step will try again, and can say so
+    pass_ = Pass::kNone;
+  }
 }
 
 void LinkedSolver::setMaterials(const scene::PatchMaterials& materials) {
@@ -337,47 +338,6 @@ void LinkedSolver::setMaterials(const scene::PatchMaterials& materials) {
 void LinkedSolver::setLights(const LightSources& sources) {
   takeSources(sources);
   solveAnew();
-}
-
-/// After an edit. What was still to be measured will be asked for again.
-void LinkedSolver::solveAnew() {
-  wanted_.clear();
-  measured_ = 0;
-  settleFromLinks();
-  memory_.begin(system_);
-  if (memory_.isOverdrawn()) {
-    while (memory_.isOverdrawn() && forgetWeakest()) continue;
-    settleFromLinks();
-  }
-  memory_.forgive();
-  lights_fit_ = true;
-  growing_ = true;
-  phase_ = Phase::kLights;
-  assess();
-  if (error_.total <= settings_.target_error) phase_ = Phase::kDone;  // the links there are carry it all
-}
-
-/// From nothing but the links: the result depends on them and on light and materials alone, so that an edit and its
-/// inverse give the same bits as long as no link was added in between.
-void LinkedSolver::settleFromLinks() {
-  for (int pass = 0; pass < 2; ++pass) {  // the first shows how strong the shooters are, for their roulette
-    for (auto& shooter : system_.shooters()) {
-      if (shooter.isLight()) continue;
-      for (std::size_t half = 0; pass == 0 && half < 2; ++half)
-        shooter.weight[half] = shooter.column[half].points() > 0.0 ? 1.0 : 0.0;
-      shooter.mean.fill(glm::vec3(0.0F));
-      shooter.sent.fill(glm::vec3(0.0F));
-    }
-    solveEquation();
-    if (pass == 1) continue;
-    double power = 0.0;
-    for (const auto& shooter : system_.shooters()) {
-      if (!shooter.isLight() && shooter.parent == scene::kNone) power += shooter.power();
-    }
-    if (power > 0.0) planner_.setShare(power * share_part_);  // weak beside the light that there is now
-    (void)planner_.weigh(system_);
-  }
-  lightLeaves();
 }
 
 std::vector<glm::vec3> LinkedSolver::halfIrradiance(std::uint32_t half) const {

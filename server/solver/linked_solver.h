@@ -49,7 +49,14 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] const LinkSystem& system() const { return system_; }
 
  private:
+  /// Short enough that nobody notices the wait, long enough that the workers' waiting for the last of them does not
+  /// count.
+  static constexpr double kSliceSeconds = 0.06;
   enum class Phase { kLights, kGrow, kImprove, kDone };
+  /// Solving over links goes in slices too: which of its passes is under way.
+  enum class Pass { kNone, kFirst, kSecond };
+  /// What a solution over nothing but the links is for.
+  enum class FromLinks { kNo, kAfterEdit, kToConfirm };
 
   [[nodiscard]] bool isFull() const;
   [[nodiscard]] std::vector<Measurement> plan();
@@ -62,17 +69,21 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] double powerToShoot() const;
   [[nodiscard]] double lostPart() const;
   void solveAnew();
-  void settleFromLinks();
-  void solveEquation();
+  [[nodiscard]] bool advanceSolution();
+  [[nodiscard]] bool settleFromLinks();
+  [[nodiscard]] bool finishEdit();
   void lightLeaves();
   void takeMaterials(const scene::PatchMaterials& materials);
   void takeLights();
-  void settle();
+  [[nodiscard]] bool settle();
   void findUnshot();
   void startGrowth();
+  [[nodiscard]] Result<StepOutcome> advance();
   [[nodiscard]] StepOutcome finishRound();
   [[nodiscard]] StepOutcome chooseNext();
   [[nodiscard]] StepOutcome exhausted(SolveLimit limit);
+  [[nodiscard]] StepOutcome confirm();
+  [[nodiscard]] StepOutcome chooseFurther();
 
   std::shared_ptr<const scene::PatchScene> patches_;
   Transport& transport_;
@@ -91,9 +102,13 @@ class LinkedSolver final : public Solver {
   Phase phase_ = Phase::kLights;
   SolveLimit limit_ = SolveLimit::kNone;
   bool lights_fit_ = true;           // no light goes without links for want of memory
+  Pass pass_ = Pass::kNone;
+  FromLinks from_links_ = FromLinks::kNo;
+  bool settling_ = false;            // a wave is measured, its light is still to be solved for
   std::vector<Measurement> wanted_;  // the wave under way
   std::size_t measured_ = 0;         // of the wave
   std::size_t slice_ = 16;           // measurements that take some 50 ms
+  std::size_t fewest_a_slice_ = 8;   // so many at least, for the workers
   bool growing_ = true;              // light is still missing: until the first walk found nothing more to add
   double share_part_ = 0.0;          // of all power, that one shooter should have
   double left_out_ = 0.0;            // relative error by nodes too weak to play roulette

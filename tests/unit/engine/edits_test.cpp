@@ -158,6 +158,20 @@ TEST_F(Edits, AnEditOfAPausedSolveLeavesItPausedAndShowsTheNewLayout) {
   EXPECT_EQ(engine().lightmaps()->revision, 2U);
 }
 
+TEST_F(Edits, OfLightInAPausedSolveAreSeenAtOnce) {
+  ASSERT_TRUE(configure([](auto& settings) { settings.target_error = kNever; }));
+  ASSERT_TRUE(load(lumpedCube(0.5)));
+  ASSERT_TRUE(eventually([&] { return status().energy.absorbed > 0.0; }));
+  ASSERT_EQ(pause().value(), SolveState::kPaused);
+  const auto shots = status().shots;
+  ASSERT_TRUE(patch(emissionPatch(1, 2.0 / kPi)));  // all there is, twice
+  const auto once = status();
+  ASSERT_TRUE(patch(emissionPatch(1, 4.0 / kPi)));
+  EXPECT_EQ(status().state, SolveState::kPaused);
+  EXPECT_EQ(status().shots, shots);
+  EXPECT_NEAR(status().energy.absorbed / once.energy.absorbed, 2.0, 1e-4);
+}
+
 TEST_F(Edits, WarningsSpeakOfThePresentMaterialsOnly) {
   ASSERT_TRUE(configure([](auto& settings) { settings.target_error = kNever; }));
   ASSERT_TRUE(load(lumpedCube(0.5)));

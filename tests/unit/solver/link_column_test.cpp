@@ -65,21 +65,22 @@ TEST_F(LinkColumns, SamplesAreAveragedByTheirPointsAlsoWhereOneOfThemSawNothing)
 TEST_F(LinkColumns, AreScaledToWhatShouldArriveInTheMeanOverAllSamples) {
   // One point of view finds too much, the other too little: each by itself would be scaled by 1/2 and by 2, and the
   // near leaf that both see alike would get 5/4 of its light.
+  constexpr double kLeaf = 1.0 / 16.0;  // area
   LinkSample first, second;
   first.add(sides_[1].first_node, 0.5F);
-  first.delivered = 2.0;
-  first.due = 1.0;
+  first.add(sides_[1].first_node + 1, 1.5F);
+  first.due = kLeaf;
   second.add(sides_[1].first_node, 0.5F);
-  second.delivered = 0.5;
-  second.due = 1.0;
+  second.due = kLeaf;
   LinkColumn column;
   add(column, first, 1.0);
-  EXPECT_NEAR(column.gain(), 0.5, 1e-12);
+  EXPECT_NEAR(column.gain(), 0.5, 1e-6);
   EXPECT_NEAR(leaf(column, 1, 0), 0.25, 1e-4);
   add(column, second, 1.0);
-  EXPECT_NEAR(column.gain(), 0.8, 1e-12);
+  EXPECT_NEAR(column.gain(), 0.8, 1e-6);
   EXPECT_NEAR(leaf(column, 1, 0), 0.4, 1e-4);
-  EXPECT_NEAR(LinkColumn::product(column, column, std::vector<float>(made_.patches->nodeCount(), 1.0F)), 0.16, 1e-3);
+  EXPECT_NEAR(LinkColumn::product(column, column, std::vector<float>(made_.patches->nodeCount(), 1.0F)),
+              0.4 * 0.4 + 0.6 * 0.6, 1e-3);
 }
 
 TEST_F(LinkColumns, TinyAndHugeLinksAreKeptAlike) {

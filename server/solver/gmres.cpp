@@ -1,0 +1,127 @@
+#include "server/solver/gmres.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace radiosity::solver {
+namespace {
+
+/// A cycle aims lower than asked, so that its true residual, checked afterwards, is seldom a little too large.
+constexpr double kAim = 0.3;
+
+}  // namespace
+
+double Gmres::product(const std::vector<double>& a, const std::vector<double>& b) const {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += weight_[i] * a[i] * b[i];
+  return sum;
+}
+
+void Gmres::begin(Vectors start, std::vector<double> weight, const std::array<double, 3>& tolerance, int max_sweeps) {
+  x_ = std::move(start);
+  weight_ = std::move(weight);
+  tolerance_ = tolerance;
+  max_sweeps_ = max_sweeps;
+  sweeps_ = 0;
+  in_cycle_ = false;
+}
+
+bool Gmres::advance(const Sweep& sweep) {
+  ++sweeps_;
+  if (!in_cycle_) {
+    solution_ = x_;
+    sweep(solution_, true);
+    startCycle();
+    const bool done = std::none_of(channel_.begin(), channel_.end(), [](const Channel& c) { return c.growing; });
+    return done || sweeps_ >= max_sweeps_;
+  }
+  for (std::size_t c = 0; c < 3; ++c) {
+    if (channel_[c].growing) {
+      image_[c] = channel_[c].basis.back();
+    } else {
+      image_[c].assign(weight_.size(), 0.0);
+    }
+  }
+  sweep(image_, false);
+  for (std::size_t c = 0; c < 3; ++c) {
+    if (channel_[c].growing) addColumn(c, image_[c]);
+  }
+  if (std::none_of(channel_.begin(), channel_.end(), [](const Channel& c) { return c.growing; })) endCycle();
+  return false;
+}
+
+/// Measures the residual; a channel that is not done gets it as the first vector of its basis.
+void Gmres::startCycle() {
+  for (std::size_t c = 0; c < 3; ++c) {
+    Channel& channel = channel_[c];
+    auto& residual = image_[c];
+    residual.resize(weight_.size());
+    for (std::size_t i = 0; i < residual.size(); ++i) residual[i] = weight_[i] > 0.0 ? solution_[c][i] - x_[c][i] : 0.0;
+    residual_[c] = std::sqrt(product(residual, residual));
+    channel.basis.clear();
+    channel.columns = 0;
+    // What is no number any more will not become one.
+    channel.growing = residual_[c] > tolerance_[c] && std::isfinite(residual_[c]);
+    if (!channel.growing) continue;
+    for (auto& value : residual) value /= residual_[c];
+    channel.right = {};
+    channel.right[0] = residual_[c];
+    channel.basis.push_back(std::move(residual));
+  }
+  in_cycle_ = true;
+}
+
+/// `image` is G v of the last basis vector v; the operator of the equation is v - G v.
+void Gmres::addColumn(std::size_t c, std::vector<double>& image) {
+  Channel& channel = channel_[c];
+  const std::size_t k = channel.columns++;
+  const auto& last = channel.basis.back();
+  for (std::size_t i = 0; i < image.size(); ++i) image[i] = weight_[i] > 0.0 ? last[i] - image[i] : 0.0;
+  auto& column = channel.triangle[k];
+  const double before = std::sqrt(product(image, image));
+  for (std::size_t j = 0; j <= k; ++j) {
+    column[j] = product(channel.basis[j], image);
+    for (std::size_t i = 0; i < image.size(); ++i) image[i] -= column[j] * channel.basis[j][i];
+  }
+  double length = std::sqrt(product(image, image));
+  if (!(length > 1e-14 * before)) length = 0.0;  // the basis holds the solution
+  for (std::size_t j = 0; j < k; ++j) {
+    const double upper = channel.cosine[j] * column[j] + channel.sine[j] * column[j + 1];
+    column[j + 1] = channel.cosine[j] * column[j + 1] - channel.sine[j] * column[j];
+    column[j] = upper;
+  }
+  const double diagonal = std::hypot(column[k], length);
+  channel.cosine[k] = diagonal > 0.0 ? column[k] / diagonal : 1.0;
+  channel.sine[k] = diagonal > 0.0 ? length / diagonal : 0.0;
+  column[k] = diagonal;
+  channel.right[k + 1] = -channel.sine[k] * channel.right[k];
+  channel.right[k] *= channel.cosine[k];
+  channel.growing = length > 0.0 && channel.columns < kRestart && sweeps_ + 1 < max_sweeps_ &&
+                    std::abs(channel.right[k + 1]) > kAim * tolerance_[c];
+  if (!channel.growing) return;
+  for (auto& value : image) value /= length;
+  channel.basis.push_back(std::move(image));
+}
+
+/// Adds the combinations of the basis vectors that leave the least residual.
+void Gmres::endCycle() {
+  for (std::size_t c = 0; c < 3; ++c) {
+    Channel& channel = channel_[c];
+    if (channel.columns == 0) {  // was done before
+      x_[c] = solution_[c];
+      continue;
+    }
+    std::array<double, kRestart> factor{};
+    for (std::size_t j = channel.columns; j-- > 0;) {
+      double rest = channel.right[j];
+      for (std::size_t k = j + 1; k < channel.columns; ++k) rest -= channel.triangle[k][j] * factor[k];
+      // A column of zeros: G leaves something as it is, light that nothing takes away.
+      factor[j] = channel.triangle[j][j] > 0.0 ? rest / channel.triangle[j][j] : 0.0;
+      for (std::size_t i = 0; i < x_[c].size(); ++i) x_[c][i] += factor[j] * channel.basis[j][i];
+    }
+  }
+  in_cycle_ = false;
+}
+
+}  // namespace radiosity::solver

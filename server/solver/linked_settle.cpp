@@ -1,0 +1,140 @@
+// How LinkedSolver brings light to the leaves over the links it has: slice by slice.
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <vector>
+
+#include "server/solver/halves.h"
+#include "server/solver/linked_solver.h"
+
+namespace radiosity::solver {
+namespace {
+
+/// Roulette weights that change for less than this part of the power need no new solution.
+constexpr double kSameWeights = 0.05;
+
+}  // namespace
+
+/// True: the equation is solved.
+bool LinkedSolver::advanceSolution() {
+  if (!system_.advance(kSliceSeconds)) return false;
+  const auto sweeps = static_cast<std::uint64_t>(system_.sweeps());
+  ++solutions_;
+  sweeps_ += sweeps;
+  replayed_ += sweeps * system_.shooters().size();
+  return true;
+}
+
+/// Solves all bounces over the links there are, and lights every leaf. False: not yet, go on with the next slice.
+bool LinkedSolver::settle() {
+  if (pass_ == Pass::kNone) {
+    (void)planner_.weigh(system_);
+    system_.begin();
+    pass_ = Pass::kFirst;
+  }
+  if (pass_ == Pass::kFirst) {
+    if (!advanceSolution()) return false;
+    std::vector<std::array<double, 2>> weights;
+    for (const auto& shooter : system_.shooters()) weights.push_back(shooter.weight);
+    if (planner_.weigh(system_) > kSameWeights) {  // shooters that were dark before had no weight
+      system_.begin();
+      pass_ = Pass::kSecond;
+    } else {
+      for (std::size_t n = 0; n < weights.size(); ++n) system_.shooters()[n].weight = weights[n];
+    }
+  }
+  if (pass_ == Pass::kSecond && !advanceSolution()) return false;
+  pass_ = Pass::kNone;
+  lightLeaves();
+  return true;
+}
+
+void LinkedSolver::lightLeaves() {
+  inBothHalves([&](std::size_t half) { system_.irradiance(half, half_[half]); });
+  findUnshot();
+}
+
+void LinkedSolver::findUnshot() {
+  varying_ = net_unshot_ = 0.0;
+  std::vector<glm::vec3> unshot;
+  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
+    const Side& side = sides_[s];
+    system_.standIn(s, unshot);
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+      const auto v = side.first_value + leaf;
+      const glm::vec3 h = 0.5F * (half_[0][v] + half_[1][v]);
+      irradiance_[side.first_node + leaf] = h;
+      unshot[leaf] = reflectance_[v] * h + (side.gathered ? glm::vec3(0.0F) : emission_[v]) - unshot[leaf];
+    }
+    unshot_.pull(side, unshot);
+    const auto root = side.first_node + side.node_count - 1;
+    const auto net = static_cast<double>(channelSum(unshot_.flux(root)));
+    net_unshot_ += net;
+    varying_ += std::max(0.0, static_cast<double>(unshot_.rough(root)) - net);
+  }
+}
+
+/// After an edit: the next steps solve over the links there are. What was still to be measured will be asked for again.
+void LinkedSolver::solveAnew() {
+  wanted_.clear();
+  measured_ = 0;
+  settling_ = false;
+  pass_ = Pass::kNone;
+  from_links_ = FromLinks::kAfterEdit;
+  error_ = {};  // unknown
+}
+
+/// False: there was no room for the links of a new lamp, others had to go, and the light is to be solved for again.
+bool LinkedSolver::finishEdit() {
+  memory_.begin(system_);
+  bool forgot = false;
+  while (memory_.isOverdrawn() && forgetWeakest()) forgot = true;
+  if (forgot) return false;
+  memory_.forgive();
+  from_links_ = FromLinks::kNo;
+  lights_fit_ = true;
+  growing_ = true;
+  phase_ = Phase::kLights;
+  assess();
+  if (error_.total <= settings_.target_error) phase_ = Phase::kDone;  // the links there are carry it all
+  return true;
+}
+
+/// From nothing but the links: the result depends on them and on light and materials alone, so that an edit and its
+/// inverse give the same bits as long as no link was added in between. False: not yet.
+bool LinkedSolver::settleFromLinks() {
+  const auto forgetLight = [&] {
+    for (auto& shooter : system_.shooters()) {
+      if (shooter.isLight()) continue;
+      shooter.mean.fill(glm::vec3(0.0F));
+      shooter.sent.fill(glm::vec3(0.0F));
+    }
+    system_.begin();
+  };
+  if (pass_ == Pass::kNone) {
+    for (auto& shooter : system_.shooters()) {
+      for (std::size_t half = 0; half < 2 && !shooter.isLight(); ++half)
+        shooter.weight[half] = shooter.column[half].points() > 0.0 ? 1.0 : 0.0;
+    }
+    forgetLight();
+    pass_ = Pass::kFirst;
+  }
+  if (pass_ == Pass::kFirst) {
+    if (!advanceSolution()) return false;
+    // It showed how strong the shooters are, for their roulette.
+    double power = 0.0;
+    for (const auto& shooter : system_.shooters()) {
+      if (!shooter.isLight() && shooter.parent == scene::kNone) power += shooter.power();
+    }
+    if (power > 0.0) planner_.setShare(power * share_part_);  // weak beside the light that there is now
+    (void)planner_.weigh(system_);
+    forgetLight();
+    pass_ = Pass::kSecond;
+  }
+  if (!advanceSolution()) return false;
+  pass_ = Pass::kNone;
+  lightLeaves();
+  return true;
+}
+
+}  // namespace radiosity::solver
