@@ -36,6 +36,7 @@ class LitScene {
   [[nodiscard]] const scene::Document& document() const { return document_; }
   [[nodiscard]] const scene::Scene& scene() const { return *scene_; }
   [[nodiscard]] const scene::PatchScene& patches() const { return *patches_; }
+  [[nodiscard]] const scene::PatchMaterials& materials() const { return materials_; }
   [[nodiscard]] solver::Solver& solver() { return *solver_; }
   [[nodiscard]] const solver::Solver& solver() const { return *solver_; }
   [[nodiscard]] const SolveSettings& settings() const { return settings_; }
@@ -55,8 +56,6 @@ class LitScene {
 
   /// Finished pages of the solver's present irradiance (filled, stitched, dilated).
   [[nodiscard]] std::vector<scene::LightmapPage> pages() const;
-  /// The same of the estimated sampling error, relative to the irradiance.
-  [[nodiscard]] std::vector<scene::LightmapPage> errorPages() const;
 
  private:
   LitScene(scene::Document document, const SolveSettings& settings, solver::Transport& transport)
