@@ -26,7 +26,8 @@ struct TileRect {
 };
 
 std::size_t tileCount(glm::ivec2 size) {
-  return static_cast<std::size_t>((size.x + kSide - 1) / kSide) * static_cast<std::size_t>((size.y + kSide - 1) / kSide);
+  return static_cast<std::size_t>((size.x + kSide - 1) / kSide) *
+         static_cast<std::size_t>((size.y + kSide - 1) / kSide);
 }
 
 struct Change {
@@ -66,8 +67,7 @@ Change tileChange(const IdImage& before, const IdImage& after, const TileRect& t
 }
 
 void copyTile(const Image& from, const TileRect& tile, Image& to) {
-  for (int y = tile.y0; y < tile.y1; ++y)
-    std::copy_n(&from.at(tile.x0, y), tile.x1 - tile.x0, &to.at(tile.x0, y));
+  for (int y = tile.y0; y < tile.y1; ++y) std::copy_n(&from.at(tile.x0, y), tile.x1 - tile.x0, &to.at(tile.x0, y));
 }
 void copyTile(const IdImage& /*those that did not change at all*/, const TileRect& /*tile*/, IdImage& /*to*/) {}
 
@@ -107,7 +107,7 @@ std::vector<IdImage> idMips(const IdImage& page) {
 /// Which tiles of one mip are new. `now` keeps what was sent of the others, so that many small changes cannot add up
 /// unseen.
 template <typename Mip>
-void compare(const PageSnapshot* before, const std::vector<Mip> PageSnapshot::* mips, std::size_t level,
+void compare(const PageSnapshot* before, const std::vector<Mip> PageSnapshot::*mips, std::size_t level,
              std::uint64_t version, PageSnapshot& made, Mip& now) {
   const auto tiles = tileCount(made.size(level));
   std::vector<std::uint64_t> versions(tiles, version);

@@ -10,9 +10,10 @@ namespace radiosity::engine {
 
 struct QuantityPages {
   Quantity quantity = Quantity::kIrradiance;
-  std::vector<scene::LightmapPage> values;  ///< `irradiance` of each holds the quantity; empty where it is whole numbers
-  std::vector<IdImage> ids;                 ///< the other way round
-  bool squared = false;                     ///< `values` are squares: averaged as such, shown as roots
+  std::vector<scene::LightmapPage>
+      values;                ///< `irradiance` of each holds the quantity; empty where it is whole numbers
+  std::vector<IdImage> ids;  ///< the other way round
+  bool squared = false;      ///< `values` are squares: averaged as such, shown as roots
 
   [[nodiscard]] std::size_t size() const { return values.empty() ? ids.size() : values.size(); }
 };

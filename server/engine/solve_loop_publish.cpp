@@ -14,9 +14,8 @@ constexpr auto kPublishInterval = std::chrono::milliseconds(50);
 /// Making pages takes no more than one part in so many of the solve thread's time, however large they are.
 constexpr int kPublishShare = 20;
 
-constexpr std::array kQuantities = {Quantity::kIrradiance, Quantity::kRadiosity, Quantity::kError,
-                                    Quantity::kPatchId,    Quantity::kMipLevel,  Quantity::kUnshot,
-                                    Quantity::kNormal};
+constexpr std::array kQuantities = {Quantity::kIrradiance, Quantity::kRadiosity, Quantity::kError, Quantity::kPatchId,
+                                    Quantity::kMipLevel,   Quantity::kUnshot,    Quantity::kNormal};
 static_assert(kQuantities.size() == kQuantityCount);
 
 }  // namespace

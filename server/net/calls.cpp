@@ -137,7 +137,7 @@ void Calls::run(const protocol::HelloCall& call, const Slot& slot) {
   std::optional<std::vector<SharedText>> missed;
   if (call.resume) missed = hub_.missedSince(*call.resume);
   reply.resumed = missed.has_value();
-  if (missed) tiles_.resumeFrom(call.resume->tile_version);
+  if (missed) tiles_.resumeFrom(*call.resume);
   slot.reply(reply);
   if (missed)
     for (const auto& text : *missed) peer->sendText(text);
@@ -230,15 +230,9 @@ void Calls::run(const protocol::StatusCall& /*call*/, const Slot& slot) {
 }
 
 void Calls::run(const protocol::SubscribeCall& call, const Slot& slot) {
-  if (call.quantity != protocol::Quantity::kIrradiance)
-    return slot.error({RpcCode::kInvalidParams,
-                       fmt::format("/params/quantity: {} is not streamed by this server; see capabilities, or take a "
-                                   "snapshot of it",
-                                   name(call.quantity)),
-                       "/params/quantity"});
   tiles_.subscribe(call);
   slot.reply(protocol::SubscribeReply{call.lightmaps, call.min_mip, call.max_mip, call.max_hz, call.quantity});
-  if (const auto peer = peer_.lock()) peer->lightmapsChanged();
+  if (const auto peer = peer_.lock()) peer->subscribed();
 }
 
 void Calls::run(const protocol::CreditCall& call, const Slot& slot) {

@@ -16,6 +16,9 @@ namespace radiosity::net {
 [[nodiscard]] engine::SolveSettings merged(engine::SolveSettings current, const protocol::SolveConfigureCall& call);
 [[nodiscard]] protocol::LightmapsNote toLightmapsNote(const engine::Lightmaps& lightmaps);
 
+[[nodiscard]] protocol::Quantity toQuantity(engine::Quantity quantity);
+[[nodiscard]] engine::Quantity toQuantity(protocol::Quantity quantity);
+
 /// True when the solve will not come nearer its target without a call.
 [[nodiscard]] bool hasStopped(engine::SolveState state);
 
