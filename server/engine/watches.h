@@ -16,7 +16,7 @@ class Watches {
     auto& count = state_->count[static_cast<std::size_t>(quantity)];
     ++count;
     state_->added[static_cast<std::size_t>(quantity)] = true;
-    return {nullptr, [state = state_, &count](void*) { --count; }};
+    return {&count, [state = state_, &count](void*) { --count; }};  // not null: it can be asked for
   }
 
   [[nodiscard]] bool wants(Quantity quantity) const { return state_->count[static_cast<std::size_t>(quantity)] > 0; }

@@ -93,17 +93,23 @@ engine::SolveSettings merged(engine::SolveSettings s, const protocol::SolveConfi
   return s;
 }
 
+std::vector<std::string> firstWarnings(const std::vector<std::string>& all) {
+  std::vector<std::string> first;
+  std::size_t bytes = 0;
+  for (const auto& warning : all) {
+    bytes += warning.size();
+    if (first.size() == protocol::kMaxStatusWarnings || bytes > protocol::kMaxMessageBytes / 4) break;
+    first.push_back(warning);
+  }
+  return first;
+}
+
 protocol::StatusReply toStatusReply(const engine::Status& s) {
   protocol::StatusReply out;
   out.progress = toProgress(s);
   out.settings = toSettings(s.settings);
   out.warning_count = s.warnings.size();
-  std::size_t bytes = 0;
-  for (const auto& warning : s.warnings) {
-    bytes += warning.size();
-    if (out.warnings.size() == protocol::kMaxStatusWarnings || bytes > protocol::kMaxMessageBytes / 4) break;
-    out.warnings.push_back(warning);
-  }
+  out.warnings = firstWarnings(s.warnings);
   for (const auto& [key, value] : s.counters)
     if (std::isfinite(value)) out.counters[key] = value;
   out.gl_renderer = s.gl_renderer;

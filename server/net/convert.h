@@ -10,6 +10,8 @@ namespace radiosity::net {
 
 [[nodiscard]] std::string_view stateName(engine::SolveState state);
 [[nodiscard]] protocol::Progress toProgress(const engine::Status& status);
+/// As many of the first as a message has room for.
+[[nodiscard]] std::vector<std::string> firstWarnings(const std::vector<std::string>& all);
 [[nodiscard]] protocol::StatusReply toStatusReply(const engine::Status& status);
 [[nodiscard]] protocol::Settings toSettings(const engine::SolveSettings& settings);
 /// `current` with what the call names replaced.

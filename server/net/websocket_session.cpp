@@ -160,7 +160,8 @@ void WebSocketSession::onRead(BoostError error) {
     calls_->handle({static_cast<const char*>(data.data()), data.size()});
   }
   buffer_.consume(buffer_.size());
-  read();
+  // Behind the answer, which is posted too: what comes next may end the session, and the answer is to come first.
+  onStrand([](WebSocketSession& s) { s.read(); });
 }
 
 // ---- from other threads ----
@@ -337,7 +338,13 @@ void WebSocketSession::close(CloseCode code, const std::string& reason) {
 void WebSocketSession::cutAfter(std::chrono::milliseconds patience) {
   cut_.expires_after(patience);
   cut_.async_wait([weak = weak_from_this()](BoostError error) {
-    if (const auto self = weak.lock(); self != nullptr && !error) self->cut();
+    const auto self = weak.lock();
+    if (self == nullptr || error) return;
+    BoostError ignored;
+    // What it did not read in all this time is given up, so that the system does not keep it either.
+    if (!self->draining_)
+      beast::get_lowest_layer(self->ws_).socket().set_option(asio::socket_base::linger(true, 0), ignored);
+    self->cut();
   });
 }
 

@@ -57,8 +57,8 @@ class RunningServer {
   [[nodiscard]] ProcessUsage usage() const { return usageOf(process_->pid()); }
 
   void load(const std::string& scene) const {
-    const auto reply =
-        client::httpPutFile({.url = process_->url()}, "/scene?name=scene.glb", "model/gltf-binary", scene);
+    const auto reply = client::httpPutFile({.url = process_->url(), .token = {}, .keep_going = {}, .progress = {}},
+                                           "/scene?name=scene.glb", "model/gltf-binary", scene);
     if (!reply || !reply->ok()) throw std::runtime_error("the scene was not loaded");
   }
 

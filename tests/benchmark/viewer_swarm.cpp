@@ -28,6 +28,7 @@ struct Swarm::Viewer {
   ViewerRecord record;
 };
 
+Swarm::Swarm(std::uint16_t port) : port_(port) {}
 Swarm::~Swarm() { closeAll(); }
 
 void Swarm::closeAll() {
@@ -63,9 +64,13 @@ void Swarm::add(int count, bool reads) {
 /// A text frame, masked with zeros.
 void Swarm::send(Viewer& viewer, const std::string& text) {
   viewer.out += static_cast<char>(0x81);
-  viewer.out += static_cast<char>(0x80U | 126U);
-  viewer.out += static_cast<char>(text.size() >> 8U);
-  viewer.out += static_cast<char>(text.size() & 255U);
+  if (text.size() < 126) {
+    viewer.out += static_cast<char>(0x80U | text.size());
+  } else {
+    viewer.out += static_cast<char>(0x80U | 126U);
+    viewer.out += static_cast<char>(text.size() >> 8U);
+    viewer.out += static_cast<char>(text.size() & 255U);
+  }
   viewer.out.append(4, '\0');
   viewer.out += text;
 }
@@ -167,6 +172,9 @@ bool Swarm::run(const std::function<bool()>& done, std::chrono::seconds limit) {
     if (::poll(ready.data(), ready.size(), 20) < 0) continue;
     for (std::size_t i = 0; i < ready.size(); ++i)
       if (ready[i].revents != 0) service(*viewers_[i]);
+    for (const auto& viewer : viewers_)
+      if (viewer->record.reads && viewer->record.ended)
+        throw std::runtime_error("the server closed a viewer that reads");
   }
   return true;
 }

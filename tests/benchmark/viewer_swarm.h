@@ -31,7 +31,7 @@ struct ViewerRecord {
 
 class Swarm {
  public:
-  explicit Swarm(std::uint16_t port) : port_(port) {}
+  explicit Swarm(std::uint16_t port);
   ~Swarm();
   Swarm(const Swarm&) = delete;
   Swarm& operator=(const Swarm&) = delete;

@@ -44,8 +44,13 @@ class LastingServer {
 
 /// A text frame with a mask of zeros, so that a mutation of its text is one of the text.
 std::string textFrame(const std::string& text) {
-  std::string frame{'\x81', static_cast<char>(0x80U | 126U), static_cast<char>(text.size() >> 8U),
-                    static_cast<char>(text.size() & 255U)};
+  std::string frame{'\x81'};
+  if (text.size() < 126) {
+    frame += static_cast<char>(0x80U | text.size());
+  } else {
+    frame +=
+        {static_cast<char>(0x80U | 126U), static_cast<char>(text.size() >> 8U), static_cast<char>(text.size() & 255U)};
+  }
   return frame + std::string(4, '\0') + text;
 }
 

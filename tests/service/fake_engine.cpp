@@ -136,7 +136,7 @@ std::shared_ptr<void> FakeEngine::watch(engine::Quantity quantity) {
   const auto i = static_cast<std::size_t>(quantity);
   ++(*watchers_)[i];
   if (lightmaps(quantity)) announceLightmaps(quantity);
-  return {nullptr, [watchers = watchers_, i](void*) { --(*watchers)[i]; }};
+  return {watchers_.get(), [watchers = watchers_, i](void*) { --(*watchers)[i]; }};
 }
 
 void FakeEngine::announceLightmaps(engine::Quantity quantity) {
@@ -177,6 +177,11 @@ void FakeEngine::answer(std::function<void()> call) {
     if (holding_) return held_.push_back(std::move(call));
   }
   call();
+}
+
+void FakeEngine::setSceneText(std::string gltf) {
+  const std::lock_guard lock(mutex_);
+  scene_text_ = std::move(gltf);
 }
 
 std::uint64_t FakeEngine::patchesSeen() const {
@@ -264,8 +269,12 @@ std::shared_ptr<const engine::Lightmaps> FakeEngine::lightmaps(engine::Quantity 
 }
 
 void FakeEngine::sceneText(Callback<SceneText> done) {
-  const auto revision = status().revision;
-  answer([done = std::move(done), revision] { done(SceneText{revision, R"({"asset":{"version":"2.0"}})"}); });
+  SceneText text;
+  {
+    const std::lock_guard lock(mutex_);
+    text = {status_.revision, scene_text_};
+  }
+  answer([done = std::move(done), text = std::move(text)] { done(text); });
 }
 void FakeEngine::sceneGlb(Callback<SharedBytes> done) {
   answer([done] { done(bytesOf("glTF scene")); });

@@ -32,6 +32,7 @@ class FakeEngine : public engine::Engine {
   /// Callbacks are kept until release().
   void holdAnswers();
   void release();
+  void setSceneText(std::string gltf);
   [[nodiscard]] std::uint64_t patchesSeen() const;
   [[nodiscard]] std::string lastLoad() const;  ///< "name: 123 bytes" or "file PATH"
 
@@ -77,7 +78,7 @@ class FakeEngine : public engine::Engine {
   using Watchers = std::array<std::atomic<int>, engine::kQuantityCount>;
   std::shared_ptr<Watchers> watchers_ = std::make_shared<Watchers>();
   std::uint64_t layout_number_ = 1, patches_ = 0;
-  std::string last_load_;
+  std::string last_load_, scene_text_ = R"({"asset":{"version":"2.0"}})";
   std::vector<std::weak_ptr<engine::Listener>> listeners_;
   bool holding_ = false;
   std::vector<std::function<void()>> held_;

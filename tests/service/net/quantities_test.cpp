@@ -94,7 +94,8 @@ TEST(Quantities, ChangingItStartsAfreshAndTheOldOneIsNoLongerWatched) {
   EXPECT_EQ(server.engine.watchers(Of::kIrradiance), 0);
   EXPECT_EQ(server.engine.watchers(Of::kUnshot), 1);
   server.engine.publish();  // not ours any more
-  EXPECT_EQ(server.engine.publish(4.0F, Of::kUnshot), socket.waitFor("bookmark")->params->at("tileVersion"));
+  const auto version = server.engine.publish(4.0F, Of::kUnshot);
+  EXPECT_EQ(socket.waitFor("bookmark")->params->at("tileVersion"), version);
   for (const auto& frame : socket.tiles) EXPECT_EQ(decodeTile(frame)->header.kind, Quantity::kUnshot);
 }
 
