@@ -160,8 +160,7 @@ void WebSocketSession::onRead(BoostError error) {
     calls_->handle({static_cast<const char*>(data.data()), data.size()});
   }
   buffer_.consume(buffer_.size());
-  // Behind the answer, which is posted too: what comes next may end the session, and the answer is to come first.
-  onStrand([](WebSocketSession& s) { s.read(); });
+  read();
 }
 
 // ---- from other threads ----

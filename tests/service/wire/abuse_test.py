@@ -204,7 +204,7 @@ class Abuse(ServiceCase):
         self.assertEqual(server.terminate(), 0, server.log())
         stalled.reset()
 
-    def test_a_download_that_is_never_read_does_not_hold_up_the_end(self):
+    def test_an_upload_that_stalls_does_not_hold_up_the_end(self):
         server = self.server(*self.scene, env=PATIENCE)
         half = RawSocket(server.port)
         self.addCleanup(half.socket.close)

@@ -1,5 +1,7 @@
 """RFC 6455, case by case, after the Autobahn test suite's list: what it calls an echo is here the answer to a call. A case
-number stands beside each; the last test holds them against the suite's own list, where that lies beside the checkout."""
+number stands beside each; the last test holds them against the suite's own list, where that lies beside the checkout.
+A fault fails the connection at once, as the RFC allows: the answer to what came just before it may be lost, which the
+suite accepts too."""
 import csv
 import json
 import os
@@ -148,8 +150,6 @@ class Conformance(ServiceCase):
                 for chop in (None, 1):
                     raw = self.viewer()
                     raw.send(first + data + frame(PING), chop)
-                    if first:
-                        self.assertIn("result", raw.answer("before"))
                     self.assertFails(raw)
 
     def test_reserved_opcodes_are_errors(self):
@@ -158,7 +158,6 @@ class Conformance(ServiceCase):
             for payload in (b"", b"reserved"):
                 raw = self.viewer()
                 raw.send(frame(TEXT, request("before")) + frame(opcode, payload) + frame(PING))
-                self.assertIn("result", raw.answer("before"))
                 self.assertFails(raw)
 
     def test_frames_without_a_mask_are_errors(self):
@@ -197,7 +196,6 @@ class Conformance(ServiceCase):
                 self.assertFails(raw)
                 raw = self.viewer()
                 raw.send(whole + frame(CONTINUATION, b"nothing", fin=fin) + frame(TEXT, request(1)), chop)
-                self.assertIn("result", raw.answer("whole"))
                 self.assertFails(raw)
 
     def test_a_new_message_inside_a_fragmented_one_is_an_error(self):
