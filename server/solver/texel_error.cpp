@@ -27,14 +27,30 @@ std::vector<T> boxSums(const std::vector<T>& values, std::int64_t width, std::in
   return sums;
 }
 
+/// Of all leaves by area, channel by channel.
+glm::dvec3 meanSquare(const scene::PatchScene& patches, const std::vector<Side>& sides,
+                      std::span<const glm::vec3> values) {
+  glm::dvec3 sum(0.0);
+  double area = 0.0;
+  for (const auto& side : sides) {
+    for (auto node = side.first_node; node < side.first_node + side.leaf_count; ++node) {
+      const glm::dvec3 value(values[node]);
+      sum += value * value * static_cast<double>(patches.node_area[node]);
+      area += static_cast<double>(patches.node_area[node]);
+    }
+  }
+  return area > 0.0 ? sum / area : glm::dvec3(0.0);
+}
+
 }  // namespace
 
 std::vector<glm::vec3> texelErrorSquared(const scene::PatchScene& patches, std::span<const glm::vec3> first,
                                          std::span<const glm::vec3> second, std::span<const glm::vec3> mean,
                                          const ErrorParts& stated) {
   std::vector<glm::vec3> squares(patches.nodeCount(), glm::vec3(0.0F));
-  const double residual = stated.residual * stated.residual;
-  for (const auto& side : makeSides(patches)) {
+  const auto sides = makeSides(patches);
+  const glm::dvec3 residual = stated.residual * stated.residual * meanSquare(patches, sides, mean);
+  for (const auto& side : sides) {
     std::vector<double> area(side.leaf_count);
     std::vector<glm::dvec3> share(side.leaf_count, glm::dvec3(0.0));
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
@@ -48,8 +64,7 @@ std::vector<glm::vec3> texelErrorSquared(const scene::PatchScene& patches, std::
     const auto shared = boxSums(share, side.width, side.height);
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
       if (area[leaf] <= 0.0) continue;
-      const glm::dvec3 h(mean[side.first_node + leaf]);
-      squares[side.first_node + leaf] = glm::vec3(shared[leaf] + residual * h * h);
+      squares[side.first_node + leaf] = glm::vec3(shared[leaf] + residual);
     }
   }
   return squares;

@@ -1,5 +1,5 @@
-// Runs a fuzz target without libFuzzer: every seed, then so many broken copies of them, the same ones each time; or the
-// files named. With --write-seeds DIR it leaves the seeds there for libFuzzer.
+// Runs a fuzz target without libFuzzer: every seed, then --runs N broken copies of them, the same ones each time; or
+// the files named. With --write-seeds DIR it leaves the seeds there for libFuzzer.
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
@@ -14,8 +14,6 @@
 
 namespace radiosity::fuzz {
 namespace {
-
-constexpr int kRuns = 3000;
 
 Seed readAll(const char* file) {
   std::ifstream in(file, std::ios::binary);
@@ -71,17 +69,17 @@ int writeSeeds(const std::filesystem::path& folder) {
 
 void run(const Seed& bytes) { (void)LLVMFuzzerTestOneInput(bytes.data(), bytes.size()); }
 
-int runAll() {
+int runAll(int runs) {
   const auto all = seeds();
   for (const auto& seed : all) run(seed);
   run({});
   std::mt19937 random(1);
-  for (int i = 0; i < kRuns; ++i) {
+  for (int i = 0; i < runs; ++i) {
     auto bytes = all[random() % all.size()];
     mutate(bytes, all, random);
     run(bytes);
   }
-  std::printf("%zu seeds, %d broken copies\n", all.size(), kRuns);
+  std::printf("%zu seeds, %d broken copies\n", all.size(), runs);
   return 0;
 }
 
@@ -91,7 +89,7 @@ int runAll() {
 int main(int argc, char** argv) {
   using namespace radiosity::fuzz;  // NOLINT
   if (argc == 3 && std::strcmp(argv[1], "--write-seeds") == 0) return writeSeeds(argv[2]);
-  if (argc == 1) return runAll();
+  if (argc == 3 && std::strcmp(argv[1], "--runs") == 0) return runAll(std::atoi(argv[2]));
   for (int i = 1; i < argc; ++i) run(readAll(argv[i]));
   return 0;
 }
