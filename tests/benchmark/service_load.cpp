@@ -119,15 +119,15 @@ nlohmann::json measureFirstTile(const Options& options) {
     for (const auto time : firstTiles(swarm)) many.push_back(time);
   }
   Swarm crowd(server.port());
+  const auto before = server.usage();
   crowd.add(options.viewers);
   (void)crowd.run([&] { return crowd.allHave(1); }, kPatience);
-  const auto crowded = server.usage().resident_bytes;
-  const double each = (static_cast<double>(crowded) - static_cast<double>(alone)) / options.viewers / kMiB;
-  return {{"one_p50_ms", quantile(one, 0.5)},
-          {"one_p99_ms", quantile(one, 0.99)},
-          {"many_p50_ms", quantile(many, 0.5)},
-          {"many_p99_ms", quantile(many, 0.99)},
-          {"memory_mib_a_viewer", each}};
+  const auto after = server.usage();
+  const double each = (static_cast<double>(after.resident_bytes) - static_cast<double>(alone)) / options.viewers / kMiB;
+  const double work = 1000.0 * (after.net_seconds - before.net_seconds) / options.viewers;
+  return {
+      {"one_p50_ms", quantile(one, 0.5)},    {"one_p99_ms", quantile(one, 0.99)}, {"many_p50_ms", quantile(many, 0.5)},
+      {"many_p99_ms", quantile(many, 0.99)}, {"cpu_ms_a_viewer", work},           {"memory_mib_a_viewer", each}};
 }
 
 /// How long after the first viewer that had a version the others had it.
@@ -202,6 +202,8 @@ std::string report(const nlohmann::json& all) {
   const auto readers = crowd["readers"].get<int>();
   row("connect to first tile, solved scene, 1 viewer, p99", "250 ms", number(first["one_p99_ms"]) + " ms");
   row(fmt::format("the same, {} at once, p99", readers), "250 ms", number(first["many_p99_ms"]) + " ms");
+  row("processor time of the server for a viewer, from connecting to having everything", "",
+      number(first["cpu_ms_a_viewer"]) + " ms");
   row("memory a viewer", "4 MiB", number(first["memory_mib_a_viewer"]) + " MiB");
   row(fmt::format("processor time of the solve with {} viewers, beyond that with one", readers), "5 %",
       fmt::format("{:.1f} %", 100.0 * slower));
