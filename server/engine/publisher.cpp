@@ -157,8 +157,12 @@ std::shared_ptr<const PageSnapshot> Publisher::snapshot(const QuantityPages& pag
 std::shared_ptr<const Lightmaps> Publisher::publish(const QuantityPages& pages, const Status& status, bool final) {
   auto& latest = latest_[static_cast<std::size_t>(pages.quantity)];
   auto lightmaps = std::make_shared<Lightmaps>();
-  for (std::size_t p = 0; p < pages.size(); ++p)
+  for (std::size_t p = 0; p < pages.size(); ++p) {
     lightmaps->pages.push_back(snapshot(pages, p, latest ? latest->pages[p].get() : nullptr));
+    for (const auto& mip : lightmaps->pages.back()->tile_version) {
+      for (const auto version : mip) ++(version == version_ ? tiles_.changed : tiles_.unchanged);
+    }
+  }
   lightmaps->quantity = pages.quantity;
   lightmaps->layout = layout_;
   lightmaps->revision = status.revision;

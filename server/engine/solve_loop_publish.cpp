@@ -31,7 +31,11 @@ static_assert(kQuantities.size() == kQuantityCount);
 
 void SolveLoop::publishLightmaps(bool final) {
   const bool watched = std::any_of(kQuantities.begin(), kQuantities.end(), [&](auto q) { return watches_.wants(q); });
-  if (!lit_ || !watched) return;
+  if (!lit_) return;
+  if (!watched) {
+    if (unpublished_ || final) ++unwatched_;
+    return;
+  }
   const auto begin = threadTime();
   if (unpublished_ || final) publisher_.startVersion();
   unpublished_ = false;
