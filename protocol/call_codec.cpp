@@ -21,8 +21,10 @@ json params(const HelloCall& c) {
   for (const auto format : c.tile_formats) out["tileFormats"].push_back(name(format));
   for (const auto codec : c.codecs) out["codecs"].push_back(name(codec));
   if (c.resume)
-    out["resume"] = {
-        {"epoch", c.resume->epoch}, {"revision", c.resume->revision}, {"tileVersion", c.resume->tile_version}};
+    out["resume"] = {{"epoch", c.resume->epoch},
+                     {"revision", c.resume->revision},
+                     {"tileVersion", c.resume->tile_version},
+                     {"quantity", name(c.resume->quantity)}};
   return out;
 }
 json params(const SceneLoadCall& c) { return {{"url", c.url}}; }
@@ -90,6 +92,7 @@ void read(Reader& r, HelloCall& c) {
     inner.text("epoch", resume.epoch, Need::kRequired, kMaxTextBytes);
     inner.integer("revision", resume.revision, Need::kRequired, 0, kAnyInteger);
     inner.integer("tileVersion", resume.tile_version, Need::kRequired, 0, kAnyInteger);
+    inner.choice("quantity", resume.quantity, Need::kOptional, quantityFrom, kQuantityNames);
     c.resume = std::move(resume);
   });
 }

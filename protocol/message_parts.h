@@ -13,7 +13,7 @@ namespace radiosity::protocol {
 
 inline constexpr std::uint64_t kAnyInteger = std::numeric_limits<std::int64_t>::max();
 inline constexpr std::size_t kAnyText = kMaxMessageBytes;
-inline constexpr const char* kQuantityNames = "irradiance, radiosity, error, patchId, mipLevel";
+inline constexpr const char* kQuantityNames = "irradiance, radiosity, error, patchId, mipLevel, unshot, normal";
 
 [[nodiscard]] nlohmann::json toJson(const Settings& settings);
 [[nodiscard]] nlohmann::json toJson(const Progress& progress);

@@ -21,7 +21,15 @@ namespace radiosity::protocol {
 
 enum class PixelFormat : std::uint8_t { kRgba16f = 0, kRgb9e5 = 1, kRgba32f = 2, kR32ui = 3 };
 enum class Codec : std::uint8_t { kNone = 0, kDeflate = 1 };
-enum class Quantity : std::uint8_t { kIrradiance = 0, kRadiosity = 1, kError = 2, kPatchId = 3, kMipLevel = 4 };
+enum class Quantity : std::uint8_t {
+  kIrradiance = 0,
+  kRadiosity = 1,
+  kError = 2,
+  kPatchId = 3,
+  kMipLevel = 4,
+  kUnshot = 5,
+  kNormal = 6
+};
 
 [[nodiscard]] std::string_view name(PixelFormat format);  ///< "rgba16f", ...
 [[nodiscard]] std::string_view name(Codec codec);         ///< "none", "deflate"
@@ -29,6 +37,10 @@ enum class Quantity : std::uint8_t { kIrradiance = 0, kRadiosity = 1, kError = 2
 [[nodiscard]] std::optional<PixelFormat> pixelFormatFrom(std::string_view name);
 [[nodiscard]] std::optional<Codec> codecFrom(std::string_view name);
 [[nodiscard]] std::optional<Quantity> quantityFrom(std::string_view name);
+/// Whether texels are whole numbers, which travel as r32ui whatever format was chosen.
+[[nodiscard]] constexpr bool holdsIds(Quantity quantity) {
+  return quantity == Quantity::kPatchId || quantity == Quantity::kMipLevel;
+}
 
 // ---- parts ----
 
@@ -125,6 +137,7 @@ struct ViewersReply {
 struct Resume {
   std::string epoch;
   std::uint64_t revision = 0, tile_version = 0;
+  Quantity quantity = Quantity::kIrradiance;  ///< of the tiles that the client holds
 };
 struct HelloCall {
   static constexpr std::string_view kMethod = "hello";
@@ -247,12 +260,14 @@ struct SceneLoaded {
 struct LightmapsNote {
   static constexpr std::string_view kMethod = "lightmaps";
   std::uint64_t layout = 0, revision = 0;
+  Quantity quantity = Quantity::kIrradiance;  ///< of the tiles that follow
   std::vector<PageInfo> pages;
   std::string uvs;  ///< URL of the GLB that holds the lightmap UVs of this layout
 };
 struct Bookmark {
   static constexpr std::string_view kMethod = "bookmark";
   std::uint64_t revision = 0, tile_version = 0;
+  Quantity quantity = Quantity::kIrradiance;
 };
 struct ViewersNote {
   static constexpr std::string_view kMethod = "viewers";

@@ -14,11 +14,13 @@ constexpr Names<PixelFormat, 4> kFormats{{{PixelFormat::kRgba16f, "rgba16f"},
                                           {PixelFormat::kRgba32f, "rgba32f"},
                                           {PixelFormat::kR32ui, "r32ui"}}};
 constexpr Names<Codec, 2> kCodecs{{{Codec::kNone, "none"}, {Codec::kDeflate, "deflate"}}};
-constexpr Names<Quantity, 5> kQuantities{{{Quantity::kIrradiance, "irradiance"},
+constexpr Names<Quantity, 7> kQuantities{{{Quantity::kIrradiance, "irradiance"},
                                           {Quantity::kRadiosity, "radiosity"},
                                           {Quantity::kError, "error"},
                                           {Quantity::kPatchId, "patchId"},
-                                          {Quantity::kMipLevel, "mipLevel"}}};
+                                          {Quantity::kMipLevel, "mipLevel"},
+                                          {Quantity::kUnshot, "unshot"},
+                                          {Quantity::kNormal, "normal"}}};
 
 template <typename T, std::size_t N>
 std::string_view nameIn(const Names<T, N>& names, T value) {

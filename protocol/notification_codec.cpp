@@ -31,9 +31,15 @@ std::string params(const LightmapsNote& n) {
   json pages = json::array();
   for (const auto& page : n.pages)
     pages.push_back({{"width", page.width}, {"height", page.height}, {"mips", page.mips}});
-  return dumpJson({{"layout", n.layout}, {"revision", n.revision}, {"pages", std::move(pages)}, {"uvs", n.uvs}});
+  return dumpJson({{"layout", n.layout},
+                   {"revision", n.revision},
+                   {"quantity", name(n.quantity)},
+                   {"pages", std::move(pages)},
+                   {"uvs", n.uvs}});
 }
-std::string params(const Bookmark& n) { return dumpJson({{"revision", n.revision}, {"tileVersion", n.tile_version}}); }
+std::string params(const Bookmark& n) {
+  return dumpJson({{"revision", n.revision}, {"tileVersion", n.tile_version}, {"quantity", name(n.quantity)}});
+}
 std::string params(const ViewersNote& n) { return dumpJson({{"count", n.count}}); }
 std::string params(const Draining& n) { return dumpJson({{"graceMs", n.grace_ms}}); }
 
@@ -62,6 +68,7 @@ void read(Reader& r, SceneLoaded& n) { r.integer("revision", n.revision, Need::k
 void read(Reader& r, LightmapsNote& n) {
   r.integer("layout", n.layout, Need::kRequired, 0, kAnyInteger);
   r.integer("revision", n.revision, Need::kRequired, 0, kAnyInteger);
+  r.choice("quantity", n.quantity, Need::kOptional, quantityFrom, kQuantityNames);
   r.text("uvs", n.uvs, Need::kOptional, kAnyText);
   r.array("pages", Need::kRequired, kMaxListEntries, [&](const json& element, const std::string& pointer) {
     Reader inner(&element, pointer);
@@ -76,6 +83,7 @@ void read(Reader& r, LightmapsNote& n) {
 void read(Reader& r, Bookmark& n) {
   r.integer("revision", n.revision, Need::kRequired, 0, kAnyInteger);
   r.integer("tileVersion", n.tile_version, Need::kRequired, 0, kAnyInteger);
+  r.choice("quantity", n.quantity, Need::kOptional, quantityFrom, kQuantityNames);
 }
 void read(Reader& r, ViewersNote& n) { r.integer("count", n.count, Need::kRequired, 0, kAnyInteger); }
 void read(Reader& r, Draining& n) { r.integer("graceMs", n.grace_ms, Need::kRequired, 0, kAnyInteger); }

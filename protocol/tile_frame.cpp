@@ -83,7 +83,7 @@ Result<void> checkHeader(std::span<const std::uint8_t> frame) {
     return bad(0, fmt::format("{} bytes; the header alone has {}", frame.size(), kTileHeaderBytes));
   if (take<std::uint32_t>(frame, 0) != kTileMagic) return bad(0, "magic is not RADT");
   if (frame[4] != kTileVersion) return bad(4, fmt::format("version {} is not known", frame[4]));
-  if (frame[5] > static_cast<std::uint8_t>(Quantity::kMipLevel)) return bad(5, fmt::format("kind {}", frame[5]));
+  if (frame[5] > static_cast<std::uint8_t>(Quantity::kNormal)) return bad(5, fmt::format("kind {}", frame[5]));
   if (frame[6] > static_cast<std::uint8_t>(PixelFormat::kR32ui))
     return bad(6, fmt::format("pixel format {}", frame[6]));
   if (frame[7] > static_cast<std::uint8_t>(Codec::kDeflate)) return bad(7, fmt::format("codec {}", frame[7]));

@@ -69,14 +69,16 @@ ExitCode snapshot(const SnapshotOptions& options) {
 struct SaveOptions {
   RemoteOptions server;
   std::string output;
-  bool unlit = false, quiet = false;
+  bool unlit = false, error_map = false, quiet = false;
 };
 
 ExitCode save(const SaveOptions& options) {
   const auto remote = remoteFrom(options.server);
   if (!remote) return complain(remote.error());
   ProgressDisplay display(options.quiet);
-  const auto names = saveScene(*remote, {.glb_path = options.output, .unlit = options.unlit, .png_path = {}}, display);
+  const SaveRequest request{
+      .glb_path = options.output, .unlit = options.unlit, .png_path = {}, .error_map = options.error_map};
+  const auto names = saveScene(*remote, request, display);
   display.clear();
   if (!names) return complain(names.error());
   for (const auto& name : *names) std::printf("%s\n", name.c_str());
@@ -117,9 +119,10 @@ void addSnapshot(CLI::App& app, Run& run) {
   command.add_option("--width", options->width, "pixels")->check(side)->type_name("PX")->capture_default_str();
   command.add_option("--height", options->height, "pixels")->check(side)->type_name("PX")->capture_default_str();
   command
-      .add_option("--quantity", options->quantity,
-                  "lit, irradiance, radiosity, error, patchId, mipLevel or normal; all but lit in false colours")
-      ->check(CLI::IsMember({"lit", "irradiance", "radiosity", "error", "patchId", "mipLevel", "normal"}))
+      .add_option(
+          "--quantity", options->quantity,
+          "lit, irradiance, radiosity, unshot, error, patchId, mipLevel or normal; all but light in false colours")
+      ->check(CLI::IsMember({"lit", "irradiance", "radiosity", "unshot", "error", "patchId", "mipLevel", "normal"}))
       ->type_name("WHAT")
       ->capture_default_str();
   command.callback([options, &run] { run = [options] { return snapshot(*options); }; });
@@ -135,6 +138,8 @@ void addSave(CLI::App& app, Run& run) {
       ->required()
       ->type_name("OUT.glb");
   command.add_flag("--unlit", options->unlit, "OUT.glb shows the tone-mapped result in any glTF viewer instead");
+  command.add_flag("--error-map", options->error_map,
+                   "also the standard error of each texel, in lux: NAME.error.<page>.exr");
   command.add_flag("-q,--quiet", options->quiet, "no progress on stderr");
   command.callback([options, &run] { run = [options] { return save(*options); }; });
 }

@@ -60,6 +60,19 @@ Result<std::optional<client::AtomicFile>> download(const Remote& remote, const s
   return std::optional<client::AtomicFile>(std::move(*file));
 }
 
+/// Every page of a quantity, as "STEM.<what>.<page>.exr".
+Result<void> downloadPages(const Remote& remote, const std::string& quantity, const std::string& stem,
+                           ProgressDisplay& display, std::vector<client::AtomicFile>& files) {
+  for (unsigned page = 0; page < kMaxPages; ++page) {
+    auto exr = download(remote, fmt::format("/lightmaps/{}.exr?quantity={}", page, quantity),
+                        fmt::format("{}.{}.exr", stem, page), display);
+    if (!exr) return tl::unexpected(exr.error());
+    if (!*exr) break;  // past the last page
+    files.push_back(std::move(**exr));
+  }
+  return {};
+}
+
 Result<std::vector<client::AtomicFile>> downloadAll(const Remote& remote, const SaveRequest& request,
                                                     const std::string& stem, ProgressDisplay& display) {
   std::vector<client::AtomicFile> files;
@@ -68,12 +81,11 @@ Result<std::vector<client::AtomicFile>> downloadAll(const Remote& remote, const 
   if (!glb) return tl::unexpected(glb.error());
   if (!*glb) return fail(ErrorCode::kNotFound, "the server has no scene to save yet", remote.url.text());
   files.push_back(std::move(**glb));
-  for (unsigned page = 0; page < kMaxPages; ++page) {
-    auto exr = download(remote, fmt::format("/lightmaps/{}.exr", page), fmt::format("{}.lightmap.{}.exr", stem, page),
-                        display);
-    if (!exr) return tl::unexpected(exr.error());
-    if (!*exr) break;  // past the last page
-    files.push_back(std::move(**exr));
+  if (auto done = downloadPages(remote, "irradiance", stem + ".lightmap", display, files); !done)
+    return tl::unexpected(done.error());
+  if (request.error_map) {
+    if (auto done = downloadPages(remote, "error", stem + ".error", display, files); !done)
+      return tl::unexpected(done.error());
   }
   if (!request.png_path.empty()) {
     auto png = download(remote, "/snapshot.png", request.png_path, display);

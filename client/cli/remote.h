@@ -44,12 +44,14 @@ struct Loaded {
 /// Sends a scene file (PUT /scene): GLB as it is, glTF with its external files packed in.
 [[nodiscard]] Result<Loaded> uploadScene(const Remote& remote, const std::string& path, ProgressDisplay& display);
 
-/// Downloads GLB and lightmap pages of one revision, complete or not at all: "OUT.glb" and "OUT.lightmap.<page>.exr".
+/// Downloads GLB and lightmap pages of one revision, complete or not at all: "OUT.glb" and "OUT.lightmap.<page>.exr";
+/// with `error_map` also "OUT.error.<page>.exr", the standard error of the lightmaps' texels in lux.
 /// Returns the names of the files written.
 struct SaveRequest {
   std::string glb_path;
   bool unlit = false;
   std::string png_path;  ///< empty: none
+  bool error_map = false;
 };
 [[nodiscard]] Result<std::vector<std::string>> saveScene(const Remote& remote, const SaveRequest& request,
                                                          ProgressDisplay& display);

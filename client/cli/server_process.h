@@ -48,6 +48,7 @@ class ServerProcess {
   ~ServerProcess() { stop(std::chrono::milliseconds(1000)); }
 
   [[nodiscard]] const client::ServerUrl& url() const { return url_; }
+  [[nodiscard]] pid_t pid() const { return pid_; }
 
   /// Lines of the server's log since the last call, oldest first. Never waits.
   [[nodiscard]] std::vector<LogLine> takeLog();

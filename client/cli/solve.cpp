@@ -35,7 +35,7 @@ struct SolveOptions {
   std::uint64_t seed = 1;
   unsigned workers = 0;     ///< 0: the server's choice
   std::string link_memory;  ///< as radiosityd takes it; empty: the server's choice
-  bool unlit = false, quiet = false;
+  bool unlit = false, error_map = false, quiet = false;
 };
 
 /// One run of the command; members in the order in which they must go.
@@ -210,8 +210,12 @@ class Solve {
     if (!reached && status.progress.state == "converged")
       warn(fmt::format("the server stopped at {}: another client changed its settings",
                        percentText(status.progress.error.total)));
-    auto written =
-        saveScene(remote_, {.glb_path = options_.output, .unlit = options_.unlit, .png_path = options_.png}, display_);
+    auto written = saveScene(remote_,
+                             {.glb_path = options_.output,
+                              .unlit = options_.unlit,
+                              .png_path = options_.png,
+                              .error_map = options_.error_map},
+                             display_);
     if (!written) return complainOf(CallFailure{written.error()});
     if (!options_.report.empty()) {
       auto done = writeReport(status, reached);
@@ -275,6 +279,8 @@ void addOutputOptions(CLI::App& command, SolveOptions& options) {
       ->required()
       ->type_name("OUT.glb");
   command.add_flag("--unlit", options.unlit, "OUT.glb shows the tone-mapped result in any glTF viewer instead");
+  command.add_flag("--error-map", options.error_map,
+                   "also the standard error of each texel, in lux: NAME.error.<page>.exr");
   command.add_option("--png", options.png, "also a picture from the scene's camera, or from one that frames it")
       ->type_name("FILE");
   command.add_option("--report", options.report, "also figures about the solve, as JSON")->type_name("FILE");

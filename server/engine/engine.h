@@ -35,6 +35,23 @@ struct EnergyBalance {
   double imbalance = 0.0;
 };
 
+/// What a lightmap can hold.
+enum class Quantity {
+  kIrradiance,  ///< H, lux
+  kRadiosity,   ///< B = E + rho H, lux
+  kError,       ///< standard error of H, lux: what the stated sampling and residual error amount to at this texel
+  kPatchId,     ///< whole numbers: the leaf patch's node; kNoId in gutters
+  kMipLevel,    ///< whole numbers: level of the node that last shot for the texel; kNoId where none has
+  kUnshot,      ///< radiosity still to be shot, lux, signed
+  kNormal,      ///< geometric normal of the front, (n + 1) / 2
+};
+inline constexpr std::size_t kQuantityCount = 7;
+inline constexpr std::uint32_t kNoId = 0xffffffffU;
+/// Whether texels are whole numbers, which cannot be averaged.
+[[nodiscard]] constexpr bool holdsIds(Quantity quantity) {
+  return quantity == Quantity::kPatchId || quantity == Quantity::kMipLevel;
+}
+
 /// Radiance of everything outside the scene, nits: above the horizon (+Y), and below it.
 struct SkySetting {
   glm::vec3 upper{0.0F}, lower{0.0F};
@@ -56,6 +73,7 @@ struct Status {
   SolveState state = SolveState::kEmpty;
   std::uint64_t revision = 0;      ///< of the scene; raised by load and patch
   std::uint64_t tile_version = 0;  ///< raised whenever lightmaps are published
+  std::uint64_t layout_since = 0;  ///< first tile version with the present pages, sizes and UVs
   std::uint64_t shots = 0;
   double shots_per_second = 0.0;
   double seconds = 0.0;                ///< solve time, without start-up and loading
@@ -63,7 +81,7 @@ struct Status {
   ErrorEstimate error;
   EnergyBalance energy;
   std::uint64_t patches = 0;  ///< leaf patches with area
-  std::uint64_t nodes = 0, surfaces = 0, polygons = 0;
+  std::uint64_t nodes = 0, surfaces = 0, polygons = 0, pages = 0;
   std::map<std::string, double> counters;  ///< skips, culls, times: whatever the solver counts
   std::string gl_renderer;
   std::vector<std::string> warnings;
@@ -71,20 +89,33 @@ struct Status {
   SolveSettings settings;
 };
 
-/// One published page: mip 0 is the page itself; values are irradiance in lux. Immutable.
+struct IdImage {
+  int width = 0, height = 0;
+  std::vector<std::uint32_t> ids;  ///< width * height, row-major
+};
+
+/// One published page: mip 0 is the page itself. Immutable.
 struct PageSnapshot {
-  std::vector<Image> mips;
+  std::vector<Image> mips;       ///< of values; empty where the quantity is whole numbers
+  std::vector<IdImage> id_mips;  ///< the other way round; each texel is the first of the finer four that is no kNoId
   /// tile_version[mip][ty * tiles_x + tx]: Status::tile_version at which the tile's 64 x 64 texels last changed; 0:
   /// never.
   std::vector<std::vector<std::uint64_t>> tile_version;
   /// mean relative change of each tile in that version, for "largest change first"
   std::vector<std::vector<float>> tile_change;
+
+  [[nodiscard]] std::size_t mipCount() const { return mips.empty() ? id_mips.size() : mips.size(); }
+  [[nodiscard]] glm::ivec2 size(std::size_t mip) const {
+    return mips.empty() ? glm::ivec2(id_mips[mip].width, id_mips[mip].height)
+                        : glm::ivec2(mips[mip].width, mips[mip].height);
+  }
 };
 
 inline constexpr std::uint32_t kTileSize = 64;
 
 /// Everything a viewer can see at one moment. Immutable, shared.
 struct Lightmaps {
+  Quantity quantity = Quantity::kIrradiance;
   std::uint64_t layout = 0;  ///< raised when pages, sizes or UVs change (viewers must fetch /scene.glb again)
   std::uint64_t revision = 0;
   std::uint64_t tile_version = 0;
@@ -115,7 +146,7 @@ struct PatchOutcome {
 struct SnapshotRequest {
   std::string camera;  ///< name or index of a scene camera; empty: the first, or one that frames the scene
   int width = 960, height = 720;
-  std::string quantity = "lit";  ///< lit, irradiance, radiosity, error, patchId, mipLevel, normal
+  std::string quantity = "lit";  ///< lit, irradiance, radiosity, error, patchId, mipLevel, normal, unshot
 };
 
 class Listener {
@@ -144,7 +175,13 @@ class Engine {
   virtual void restart(Callback<SolveState> done) = 0;
 
   [[nodiscard]] virtual Status status() const = 0;
-  [[nodiscard]] virtual std::shared_ptr<const Lightmaps> lightmaps() const = 0;
+
+  /// Until the last of what this returns is let go, the quantity is published: now, and whenever it has changed. What
+  /// nobody watches costs nothing.
+  [[nodiscard]] virtual std::shared_ptr<void> watch(Quantity quantity) = 0;
+  /// What was published last; nothing where nobody watches.
+  [[nodiscard]] virtual std::shared_ptr<const Lightmaps> lightmaps(Quantity quantity) const = 0;
+  [[nodiscard]] std::shared_ptr<const Lightmaps> lightmaps() const { return lightmaps(Quantity::kIrradiance); }
 
   /// The document as JSON text (buffers and images by URL), with its revision.
   struct SceneText {
@@ -156,12 +193,12 @@ class Engine {
   virtual void sceneGlb(Callback<SharedBytes> done) = 0;
   /// GLB with KHR_materials_unlit textures, tone-mapped.
   virtual void unlitGlb(Callback<SharedBytes> done) = 0;
-  /// OpenEXR, 32-bit float RGB, irradiance in lux, row 0 = v 0.
-  virtual void lightmapExr(std::uint32_t page, Callback<SharedBytes> done) = 0;
+  /// OpenEXR, row 0 = v 0: 32-bit float RGB, or one channel "Y" of 32-bit whole numbers.
+  virtual void lightmapExr(std::uint32_t page, Quantity quantity, Callback<SharedBytes> done) = 0;
   /// PNG.
   virtual void snapshot(SnapshotRequest request, Callback<SharedBytes> done) = 0;
 
-  /// Kept by weak pointer; a listener that is gone is forgotten. With none, nothing is published.
+  /// Kept by weak pointer; a listener that is gone is forgotten. Lightmaps come only while someone watches.
   virtual void addListener(std::weak_ptr<Listener> listener) = 0;
 };
 

@@ -14,6 +14,7 @@
 #include <exception>
 #include <glm/common.hpp>
 #include <string>
+#include <vector>
 
 namespace radiosity::engine {
 namespace {
@@ -56,6 +57,56 @@ float encodeSrgb(float linear) {
   return v <= 0.0031308F ? 12.92F * v : 1.055F * std::pow(v, 1.0F / 2.4F) - 0.055F;
 }
 
+const char* unitOf(Quantity quantity) {
+  switch (quantity) {
+    case Quantity::kIrradiance:
+      return "irradiance, lux";
+    case Quantity::kRadiosity:
+      return "radiosity, lux";
+    case Quantity::kError:
+      return "standard error of irradiance, lux";
+    case Quantity::kPatchId:
+      return "patch id, 4294967295 is none";
+    case Quantity::kMipLevel:
+      return "mip level that shot, 4294967295 is none";
+    case Quantity::kUnshot:
+      return "unshot radiosity, lux";
+    case Quantity::kNormal:
+      return "normal, (n + 1) / 2";
+  }
+  return "";
+}
+
+struct ExrChannel {
+  const char* name;
+  Imf::PixelType type;
+  const char* first;
+  std::size_t stride;  ///< bytes from a pixel to the next
+};
+
+Result<Bytes> writeExr(int width, int height, Quantity quantity, const std::vector<ExrChannel>& channels) {
+  try {
+    Imf::Header header(width, height);
+    header.compression() = Imf::ZIP_COMPRESSION;
+    header.insert("unit", Imf::StringAttribute(unitOf(quantity)));
+    Imf::FrameBuffer frame;
+    for (const auto& channel : channels) {
+      header.channels().insert(channel.name, Imf::Channel(channel.type));
+      frame.insert(channel.name, Imf::Slice(channel.type, const_cast<char*>(channel.first), channel.stride,
+                                            channel.stride * static_cast<std::size_t>(width)));
+    }
+    MemoryStream stream;
+    {
+      Imf::OutputFile file(stream, header);
+      file.setFrameBuffer(frame);
+      file.writePixels(height);
+    }
+    return std::move(stream.bytes);
+  } catch (const std::exception& e) {
+    return fail(ErrorCode::kInternal, std::string("OpenEXR: ") + e.what());
+  }
+}
+
 void appendBytes(void* context, void* data, int size) {
   auto& bytes = *static_cast<Bytes*>(context);
   const auto* first = static_cast<const std::uint8_t*>(data);
@@ -64,30 +115,17 @@ void appendBytes(void* context, void* data, int size) {
 
 }  // namespace
 
-Result<Bytes> encodeExr(const Image& irradiance) {
-  try {
-    Imf::Header header(irradiance.width, irradiance.height);
-    header.compression() = Imf::ZIP_COMPRESSION;
-    header.insert("unit", Imf::StringAttribute("irradiance, lux"));
-    Imf::FrameBuffer frame;
-    const auto* base = reinterpret_cast<const char*>(irradiance.pixels.data());
-    const std::size_t stride = sizeof(glm::vec3);
-    const char* names[] = {"R", "G", "B"};
-    for (std::size_t c = 0; c < 3; ++c) {
-      header.channels().insert(names[c], Imf::Channel(Imf::FLOAT));
-      frame.insert(names[c], Imf::Slice(Imf::FLOAT, const_cast<char*>(base + c * sizeof(float)), stride,
-                                        stride * static_cast<std::size_t>(irradiance.width)));
-    }
-    MemoryStream stream;
-    {
-      Imf::OutputFile file(stream, header);
-      file.setFrameBuffer(frame);
-      file.writePixels(irradiance.height);
-    }
-    return std::move(stream.bytes);
-  } catch (const std::exception& e) {
-    return fail(ErrorCode::kInternal, std::string("OpenEXR: ") + e.what());
-  }
+Result<Bytes> encodeExr(const Image& values, Quantity quantity) {
+  const auto* base = reinterpret_cast<const char*>(values.pixels.data());
+  return writeExr(values.width, values.height, quantity,
+                  {{"R", Imf::FLOAT, base, sizeof(glm::vec3)},
+                   {"G", Imf::FLOAT, base + sizeof(float), sizeof(glm::vec3)},
+                   {"B", Imf::FLOAT, base + 2 * sizeof(float), sizeof(glm::vec3)}});
+}
+
+Result<Bytes> encodeExr(const IdImage& ids, Quantity quantity) {
+  return writeExr(ids.width, ids.height, quantity,
+                  {{"Y", Imf::UINT, reinterpret_cast<const char*>(ids.ids.data()), sizeof(std::uint32_t)}});
 }
 
 Result<Bytes> encodePng(const Image& display) {

@@ -4,11 +4,14 @@
 #include "common/bytes.h"
 #include "common/image.h"
 #include "common/result.h"
+#include "server/engine/engine.h"
 
 namespace radiosity::engine {
 
-/// 32-bit float RGB, ZIP compressed, row 0 first; header attribute "unit" says lux.
-[[nodiscard]] Result<Bytes> encodeExr(const Image& irradiance);
+/// 32-bit float RGB, ZIP compressed, row 0 first; header attribute "unit" says quantity and unit.
+[[nodiscard]] Result<Bytes> encodeExr(const Image& values, Quantity quantity = Quantity::kIrradiance);
+/// The same with one channel "Y" of 32-bit whole numbers.
+[[nodiscard]] Result<Bytes> encodeExr(const IdImage& ids, Quantity quantity);
 
 /// 8-bit RGB PNG of an image already in [0, 1] and sRGB-encoded.
 [[nodiscard]] Result<Bytes> encodePng(const Image& display);

@@ -15,14 +15,8 @@ class Listeners {
  public:
   void add(std::weak_ptr<Listener> listener) {
     const std::scoped_lock lock(mutex_);
+    std::erase_if(listeners_, [](const auto& gone) { return gone.expired(); });
     listeners_.push_back(std::move(listener));
-  }
-
-  /// Whether anyone listens; forgets those who are gone.
-  [[nodiscard]] bool any() {
-    const std::scoped_lock lock(mutex_);
-    std::erase_if(listeners_, [](const auto& listener) { return listener.expired(); });
-    return !listeners_.empty();
   }
 
   /// Calls `call(Listener&)` for each, without holding the lock: a listener may add another.

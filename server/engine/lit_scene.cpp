@@ -1,7 +1,6 @@
 #include "server/engine/lit_scene.h"
 
 #include <algorithm>
-#include <glm/common.hpp>
 #include <set>
 
 namespace radiosity::engine {
@@ -220,16 +219,6 @@ std::vector<std::string> LitScene::warnings() const {
 
 std::vector<scene::LightmapPage> LitScene::pages() const {
   return scene::assemblePages(*patches_, solver_->irradiance());
-}
-
-std::vector<scene::LightmapPage> LitScene::errorPages() const {
-  std::vector<glm::vec3> error(patches_->nodeCount(), glm::vec3(0.0F));
-  const auto first = solver_->halfIrradiance(0), second = solver_->halfIrradiance(1);
-  for (std::size_t node = 0; node < error.size(); ++node) {
-    const glm::vec3 mean = 0.5F * (first[node] + second[node]);
-    error[node] = 0.5F * glm::abs(first[node] - second[node]) / glm::max(mean, glm::vec3(1e-30F));
-  }
-  return scene::assemblePages(*patches_, error);
 }
 
 }  // namespace radiosity::engine

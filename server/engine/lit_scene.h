@@ -56,8 +56,6 @@ class LitScene {
 
   /// Finished pages of the solver's present irradiance (filled, stitched, dilated).
   [[nodiscard]] std::vector<scene::LightmapPage> pages() const;
-  /// The same of the estimated sampling error, relative to the irradiance.
-  [[nodiscard]] std::vector<scene::LightmapPage> errorPages() const;
 
  private:
   LitScene(scene::Document document, const SolveSettings& settings, solver::Transport& transport)

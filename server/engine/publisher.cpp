@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
+#include <utility>
 
 namespace radiosity::engine {
 namespace {
@@ -10,13 +11,23 @@ namespace {
 /// A half float holds 11 significant bits: smaller changes would be sent for nothing.
 constexpr float kQuantum = 0x1p-11F;
 
-struct TileGrid {
-  int columns, rows;
+constexpr int kSide = static_cast<int>(kTileSize);
+
+/// Texels of tile `t` of an image that is `size` large.
+struct TileRect {
+  TileRect(glm::ivec2 size, std::size_t t) {
+    const int columns = (size.x + kSide - 1) / kSide;
+    x0 = static_cast<int>(t) % columns * kSide;
+    y0 = static_cast<int>(t) / columns * kSide;
+    x1 = std::min(x0 + kSide, size.x);
+    y1 = std::min(y0 + kSide, size.y);
+  }
+  int x0, y0, x1, y1;
 };
 
-TileGrid tileGrid(const Image& mip) {
-  const int size = static_cast<int>(kTileSize);
-  return {(mip.width + size - 1) / size, (mip.height + size - 1) / size};
+std::size_t tileCount(glm::ivec2 size) {
+  return static_cast<std::size_t>((size.x + kSide - 1) / kSide) *
+         static_cast<std::size_t>((size.y + kSide - 1) / kSide);
 }
 
 struct Change {
@@ -24,84 +35,143 @@ struct Change {
 };
 
 /// Relative change of a tile's texels, mean and largest.
-Change tileChange(const Image& before, const Image& after, int tile_x, int tile_y) {
-  const int size = static_cast<int>(kTileSize);
-  const int x_end = std::min((tile_x + 1) * size, after.width), y_end = std::min((tile_y + 1) * size, after.height);
+Change tileChange(const Image& before, const Image& after, const TileRect& tile) {
   Change change;
-  int count = 0;
-  for (int y = tile_y * size; y < y_end; ++y) {
-    for (int x = tile_x * size; x < x_end; ++x) {
+  for (int y = tile.y0; y < tile.y1; ++y) {
+    for (int x = tile.x0; x < tile.x1; ++x) {
       const glm::vec3 difference = glm::abs(after.at(x, y) - before.at(x, y));
-      const glm::vec3 level = glm::max(after.at(x, y), before.at(x, y));
+      const glm::vec3 level = glm::max(glm::abs(after.at(x, y)), glm::abs(before.at(x, y)));
       const float top = std::max({level.x, level.y, level.z});
       const float relative = top > 0.0F ? std::max({difference.x, difference.y, difference.z}) / top : 0.0F;
       change.mean += relative;
       change.largest = std::max(change.largest, relative);
-      ++count;
     }
   }
-  change.mean /= static_cast<float>(std::max(count, 1));
+  change.mean /= static_cast<float>((tile.x1 - tile.x0) * (tile.y1 - tile.y0));
   return change;
+}
+
+/// A number is the same or it is not.
+Change tileChange(const IdImage& before, const IdImage& after, const TileRect& tile) {
+  Change change;
+  for (int y = tile.y0; y < tile.y1; ++y) {
+    for (int x = tile.x0; x < tile.x1; ++x) {
+      const auto i = static_cast<std::size_t>(y) * static_cast<std::size_t>(after.width) + static_cast<std::size_t>(x);
+      if (before.ids[i] == after.ids[i]) continue;
+      change.mean += 1.0F;
+      change.largest = 1.0F;
+    }
+  }
+  change.mean /= static_cast<float>((tile.x1 - tile.x0) * (tile.y1 - tile.y0));
+  return change;
+}
+
+void copyTile(const Image& from, const TileRect& tile, Image& to) {
+  for (int y = tile.y0; y < tile.y1; ++y) std::copy_n(&from.at(tile.x0, y), tile.x1 - tile.x0, &to.at(tile.x0, y));
+}
+void copyTile(const IdImage& /*those that did not change at all*/, const TileRect& /*tile*/, IdImage& /*to*/) {}
+
+std::vector<Image> valueMips(const QuantityPages& pages, std::size_t page) {
+  std::vector<Image> mips;
+  scene::LightmapPage mip = pages.values[page];
+  while (true) {
+    mips.push_back(shown(pages, mip.irradiance));
+    if (mip.irradiance.width == 1 && mip.irradiance.height == 1) return mips;
+    mip = scene::coarserMip(mip);
+  }
+}
+
+IdImage coarser(const IdImage& fine) {
+  IdImage coarse{(fine.width + 1) / 2, (fine.height + 1) / 2, {}};
+  for (int y = 0; y < coarse.height; ++y) {
+    for (int x = 0; x < coarse.width; ++x) {
+      std::uint32_t id = kNoId;
+      for (int k = 0; k < 4 && id == kNoId; ++k) {
+        const int fx = 2 * x + k % 2, fy = 2 * y + k / 2;
+        if (fx < fine.width && fy < fine.height)
+          id = fine.ids[static_cast<std::size_t>(fy) * static_cast<std::size_t>(fine.width) +
+                        static_cast<std::size_t>(fx)];
+      }
+      coarse.ids.push_back(id);
+    }
+  }
+  return coarse;
+}
+
+std::vector<IdImage> idMips(const IdImage& page) {
+  std::vector<IdImage> mips{page};
+  while (mips.back().width > 1 || mips.back().height > 1) mips.push_back(coarser(mips.back()));
+  return mips;
+}
+
+/// Which tiles of one mip are new. `now` keeps what was sent of the others, so that many small changes cannot add up
+/// unseen.
+template <typename Mip>
+void compare(const PageSnapshot* before, const std::vector<Mip> PageSnapshot::*mips, std::size_t level,
+             std::uint64_t version, PageSnapshot& made, Mip& now) {
+  const auto tiles = tileCount(made.size(level));
+  std::vector<std::uint64_t> versions(tiles, version);
+  std::vector<float> changes(tiles, 1.0F);
+  for (std::size_t t = 0; before != nullptr && t < tiles; ++t) {
+    const TileRect tile(made.size(level), t);
+    const Mip& then = (before->*mips)[level];
+    const Change change = tileChange(then, now, tile);
+    if (change.largest < kQuantum) {
+      versions[t] = before->tile_version[level][t];
+      changes[t] = before->tile_change[level][t];
+      copyTile(then, tile, now);
+    } else {
+      changes[t] = change.mean;
+    }
+  }
+  made.tile_version.push_back(std::move(versions));
+  made.tile_change.push_back(std::move(changes));
 }
 
 }  // namespace
 
-std::shared_ptr<const PageSnapshot> Publisher::snapshot(const scene::LightmapPage& page,
+void Publisher::reset() {
+  ++layout_;
+  layout_since_ = version_ + 1;
+  for (auto& lightmaps : latest_) lightmaps.reset();
+}
+
+std::shared_ptr<const PageSnapshot> Publisher::snapshot(const QuantityPages& pages, std::size_t page,
                                                         const PageSnapshot* before) const {
   auto made = std::make_shared<PageSnapshot>();
-  scene::LightmapPage mip = page;
-  while (true) {
-    made->mips.push_back(mip.irradiance);
-    if (mip.irradiance.width == 1 && mip.irradiance.height == 1) break;
-    mip = scene::coarserMip(mip);
+  if (holdsIds(pages.quantity)) {
+    made->id_mips = idMips(pages.ids[page]);
+  } else {
+    made->mips = valueMips(pages, page);
   }
-  for (std::size_t level = 0; level < made->mips.size(); ++level) {
-    const Image& image = made->mips[level];
-    const auto [columns, rows] = tileGrid(image);
-    std::vector<std::uint64_t> versions(static_cast<std::size_t>(columns * rows), version_);
-    std::vector<float> changes(versions.size(), 1.0F);
-    for (int t = 0; before != nullptr && t < columns * rows; ++t) {
-      const auto i = static_cast<std::size_t>(t);
-      const Change change = tileChange(before->mips[level], image, t % columns, t / columns);
-      if (change.largest < kQuantum) {
-        versions[i] = before->tile_version[level][i];
-        changes[i] = before->tile_change[level][i];
-        // Keep what was sent, so that many small changes cannot add up unseen.
-        const int size = static_cast<int>(kTileSize), x0 = t % columns * size, y0 = t / columns * size;
-        for (int y = y0; y < std::min(y0 + size, image.height); ++y) {
-          const auto row = before->mips[level].pixels.begin() + static_cast<std::ptrdiff_t>(image.index(x0, y));
-          std::copy_n(row, std::min(size, image.width - x0),
-                      made->mips[level].pixels.begin() + static_cast<std::ptrdiff_t>(image.index(x0, y)));
-        }
-      } else {
-        changes[i] = change.mean;
-      }
+  for (std::size_t level = 0; level < made->mipCount(); ++level) {
+    if (holdsIds(pages.quantity)) {
+      compare(before, &PageSnapshot::id_mips, level, version_, *made, made->id_mips[level]);
+    } else {
+      compare(before, &PageSnapshot::mips, level, version_, *made, made->mips[level]);
     }
-    made->tile_version.push_back(std::move(versions));
-    made->tile_change.push_back(std::move(changes));
   }
   return made;
 }
 
-std::shared_ptr<const Lightmaps> Publisher::publish(const std::vector<scene::LightmapPage>& pages, const Status& status,
-                                                    bool final) {
-  ++version_;
+std::shared_ptr<const Lightmaps> Publisher::publish(const QuantityPages& pages, const Status& status, bool final) {
+  auto& latest = latest_[static_cast<std::size_t>(pages.quantity)];
   auto lightmaps = std::make_shared<Lightmaps>();
   for (std::size_t p = 0; p < pages.size(); ++p) {
-    const PageSnapshot* before = p < pages_.size() ? pages_[p].get() : nullptr;
-    lightmaps->pages.push_back(snapshot(pages[p], before));
+    lightmaps->pages.push_back(snapshot(pages, p, latest ? latest->pages[p].get() : nullptr));
     for (const auto& mip : lightmaps->pages.back()->tile_version) {
       for (const auto version : mip) ++(version == version_ ? tiles_.changed : tiles_.unchanged);
     }
   }
-  pages_ = lightmaps->pages;
+  lightmaps->quantity = pages.quantity;
   lightmaps->layout = layout_;
   lightmaps->revision = status.revision;
   lightmaps->tile_version = version_;
   lightmaps->shots = static_cast<std::uint32_t>(status.shots);
   lightmaps->error = static_cast<float>(status.error.total);
   lightmaps->final = final;
-  return lightmaps;
+  latest = std::move(lightmaps);
+  return latest;
 }
 
 }  // namespace radiosity::engine

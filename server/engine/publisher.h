@@ -1,28 +1,37 @@
 // Turns finished pages into what viewers see: mip chains with a version and a change for every tile. Solve thread only.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <vector>
 
 #include "server/engine/engine.h"
-#include "server/scene/lightmap.h"
+#include "server/engine/quantity_pages.h"
 
 namespace radiosity::engine {
 
 class Publisher {
  public:
   /// Forgets all tiles: the layout of the pages is new.
-  void reset() {
-    ++layout_;
-    pages_.clear();
-  }
+  void reset();
 
-  /// A new version holding `pages`; tiles that changed by less than a half-float quantum keep their version.
-  [[nodiscard]] std::shared_ptr<const Lightmaps> publish(const std::vector<scene::LightmapPage>& pages,
-                                                         const Status& status, bool final);
+  /// The light has changed since the present version: what is published from now on is another. One version holds
+  /// every quantity.
+  void startVersion() { ++version_; }
+
+  /// The present version of these pages; tiles that changed by less than a half-float quantum since the quantity was
+  /// last published keep their version.
+  [[nodiscard]] std::shared_ptr<const Lightmaps> publish(const QuantityPages& pages, const Status& status, bool final);
+
+  /// What was published of the quantity last; nothing after reset() or forget().
+  [[nodiscard]] const std::shared_ptr<const Lightmaps>& latest(Quantity quantity) const {
+    return latest_[static_cast<std::size_t>(quantity)];
+  }
+  void forget(Quantity quantity) { latest_[static_cast<std::size_t>(quantity)].reset(); }
 
   [[nodiscard]] std::uint64_t version() const { return version_; }
+  [[nodiscard]] std::uint64_t layoutSince() const { return layout_since_; }
 
   /// Tiles of all publications, of all mips: those with a new version, and those that changed by less than a quantum
   /// and need not be sent again.
@@ -32,12 +41,12 @@ class Publisher {
   [[nodiscard]] const TileCounters& tileCounters() const { return tiles_; }
 
  private:
-  [[nodiscard]] std::shared_ptr<const PageSnapshot> snapshot(const scene::LightmapPage& page,
+  [[nodiscard]] std::shared_ptr<const PageSnapshot> snapshot(const QuantityPages& pages, std::size_t page,
                                                              const PageSnapshot* before) const;
 
-  std::uint64_t layout_ = 0, version_ = 0;
+  std::uint64_t layout_ = 0, version_ = 0, layout_since_ = 0;
   TileCounters tiles_;
-  std::vector<std::shared_ptr<const PageSnapshot>> pages_;
+  std::array<std::shared_ptr<const Lightmaps>, kQuantityCount> latest_;
 };
 
 }  // namespace radiosity::engine

@@ -10,7 +10,6 @@ namespace radiosity::engine {
 namespace {
 
 constexpr std::size_t kMaxQueue = 1024;
-constexpr auto kPublishInterval = std::chrono::milliseconds(50);
 constexpr auto kProgressInterval = std::chrono::milliseconds(100);
 
 std::string limitText(solver::SolveLimit limit, std::uint64_t link_memory_bytes) {
@@ -63,6 +62,7 @@ void SolveLoop::threadMain(std::promise<Result<void>> started) {
   updateStatus(false);
   started.set_value({});
   while (runCommands()) {
+    welcomeWatchers();
     if (state_ == SolveState::kSolving) solveSlice();
   }
   lit_.reset();
@@ -104,7 +104,7 @@ void SolveLoop::solveSlice() {
   } else if (settings_.time_limit_s && seconds_ >= *settings_.time_limit_s) {
     endSolve(SolveState::kTimeLimit);
   } else {
-    if (Clock::now() - last_publish_ >= kPublishInterval) publishLightmaps(false);
+    if (Clock::now() >= next_publish_) publishLightmaps(false);
     tellProgress(true);
   }
 }
@@ -132,29 +132,12 @@ void SolveLoop::endSolve(SolveState state) {
   updateStatus(true);
 }
 
-void SolveLoop::publishLightmaps(bool final) {
-  if (!lit_ || (!unpublished_ && !final)) return;
-  if (!listeners_.any()) {
-    ++unwatched_;
-    return;
-  }
-  updateStatus(false);
-  auto published = publisher_.publish(lit_->pages(), status(), final && state_ == SolveState::kConverged);
-  {
-    const std::scoped_lock lock(mutex_);
-    lightmaps_ = published;
-    status_.tile_version = published->tile_version;
-  }
-  unpublished_ = false;
-  last_publish_ = Clock::now();
-  listeners_.tell([&](Listener& listener) { listener.onLightmaps(published); });
-}
-
 void SolveLoop::updateStatus(bool announce) {
   Status status = lit_ ? reportStatus(*lit_, seconds_) : Status{};
   status.state = state_;
   status.revision = revision_;
   status.tile_version = publisher_.version();
+  status.layout_since = publisher_.layoutSince();
   status.seconds = seconds_;
   status.settings = settings_;
   status.failure = failure_;
@@ -179,23 +162,7 @@ Status SolveLoop::status() const {
   return status_;
 }
 
-std::shared_ptr<const Lightmaps> SolveLoop::lightmaps() const {
-  const std::scoped_lock lock(mutex_);
-  return lightmaps_;
-}
-
-void SolveLoop::addListener(std::weak_ptr<Listener> listener) {
-  listeners_.add(std::move(listener));
-  // A first listener finds what was solved while nobody looked.
-  ask<bool>([](const Result<bool>&) {},
-            [this]() -> Result<bool> {
-              if (lit_ && (!lightmaps() || unpublished_)) {
-                unpublished_ = true;
-                publishLightmaps(state_ == SolveState::kConverged);
-              }
-              return true;
-            });
-}
+void SolveLoop::addListener(std::weak_ptr<Listener> listener) { listeners_.add(std::move(listener)); }
 
 Result<std::unique_ptr<Engine>> makeEngine(EngineOptions options) {
   auto loop = std::make_unique<SolveLoop>(std::move(options));

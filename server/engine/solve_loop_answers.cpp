@@ -4,6 +4,7 @@
 
 #include "server/engine/exports.h"
 #include "server/engine/framing.h"
+#include "server/engine/quantity_pages.h"
 #include "server/engine/solve_loop_class.h"
 #include "server/scene/lightmap.h"
 
@@ -43,56 +44,79 @@ void SolveLoop::unlitGlb(Callback<SharedBytes> done) {
   askLit<SharedBytes>(std::move(done), [this] { return makeUnlit(); });
 }
 
-Result<SharedBytes> SolveLoop::makeExr(std::uint32_t page) {
-  const auto pages = lit_->pages();
+Result<SharedBytes> SolveLoop::makeExr(std::uint32_t page, Quantity quantity) {
+  const auto pages = makePages(*lit_, quantity);
   if (page >= pages.size()) {
     return fail(ErrorCode::kNotFound, "there is no lightmap page " + std::to_string(page) + " (there are " +
                                           std::to_string(pages.size()) + ")");
   }
-  auto bytes = encodeExr(pages[page].irradiance);
+  auto bytes = holdsIds(quantity) ? encodeExr(pages.ids[page], quantity)
+                                  : encodeExr(shown(pages, pages.values[page].irradiance), quantity);
   if (!bytes) return tl::unexpected<Error>(bytes.error());
   return std::make_shared<const Bytes>(std::move(*bytes));
 }
 
-void SolveLoop::lightmapExr(std::uint32_t page, Callback<SharedBytes> done) {
-  askLit<SharedBytes>(std::move(done), [this, page] { return makeExr(page); });
+void SolveLoop::lightmapExr(std::uint32_t page, Quantity quantity, Callback<SharedBytes> done) {
+  askLit<SharedBytes>(std::move(done), [this, page, quantity] { return makeExr(page, quantity); });
 }
 
+namespace {
+
+struct SnapshotQuantity {
+  gpu::ViewQuantity view;
+  Quantity pages;
+  bool photometric;  ///< exposed and tone-mapped
+};
+
+/// Unshot radiosity is looked at as irradiance is: both are lux on the page.
+const std::map<std::string, SnapshotQuantity>& snapshotQuantities() {
+  static const std::map<std::string, SnapshotQuantity> kAll = {
+      {"lit", {gpu::ViewQuantity::kLit, Quantity::kIrradiance, true}},
+      {"irradiance", {gpu::ViewQuantity::kIrradiance, Quantity::kIrradiance, true}},
+      {"radiosity", {gpu::ViewQuantity::kRadiosity, Quantity::kIrradiance, true}},
+      {"unshot", {gpu::ViewQuantity::kIrradiance, Quantity::kUnshot, true}},
+      {"error", {gpu::ViewQuantity::kError, Quantity::kError, false}},
+      {"patchId", {gpu::ViewQuantity::kPatchId, Quantity::kIrradiance, false}},
+      {"mipLevel", {gpu::ViewQuantity::kMipLevel, Quantity::kMipLevel, false}},
+      {"normal", {gpu::ViewQuantity::kNormal, Quantity::kIrradiance, false}}};
+  return kAll;
+}
+
+/// Pages as the view renderer takes them; where there is no number it draws 0.
+std::vector<Image> pageImages(const LitScene& lit, Quantity quantity) {
+  auto pages = makePages(lit, quantity);
+  std::vector<Image> images;
+  for (auto& page : pages.values) images.push_back(shown(pages, std::move(page.irradiance)));
+  for (const auto& page : pages.ids) {
+    auto& image = images.emplace_back(page.width, page.height);
+    for (std::size_t i = 0; i < page.ids.size(); ++i)
+      image.pixels[i] = glm::vec3(page.ids[i] == kNoId ? 0.0F : static_cast<float>(page.ids[i]));
+  }
+  return images;
+}
+
+}  // namespace
+
 Result<SharedBytes> SolveLoop::renderSnapshot(const SnapshotRequest& request) {
-  static const std::map<std::string, gpu::ViewQuantity> kQuantities = {{"lit", gpu::ViewQuantity::kLit},
-                                                                       {"irradiance", gpu::ViewQuantity::kIrradiance},
-                                                                       {"radiosity", gpu::ViewQuantity::kRadiosity},
-                                                                       {"error", gpu::ViewQuantity::kError},
-                                                                       {"patchId", gpu::ViewQuantity::kPatchId},
-                                                                       {"mipLevel", gpu::ViewQuantity::kMipLevel},
-                                                                       {"normal", gpu::ViewQuantity::kNormal}};
-  const auto quantity = kQuantities.find(request.quantity);
-  if (quantity == kQuantities.end())
+  const auto found = snapshotQuantities().find(request.quantity);
+  if (found == snapshotQuantities().end())
     return fail(ErrorCode::kBadUsage, "no quantity \"" + request.quantity + "\"", "quantity");
+  const auto& quantity = found->second;
   gpu::ViewRequest view;
   auto camera = chooseCamera(*lit_, request.camera, static_cast<double>(request.width) / request.height);
   if (!camera) return tl::unexpected<Error>(camera.error());
   view.camera = *camera;
   view.width = request.width;
   view.height = request.height;
-  view.quantity = quantity->second;
+  view.quantity = quantity.view;
   if (!view_) {
     auto made = gpu::makeViewRenderer();
     if (!made) return tl::unexpected<Error>(made.error());
     view_ = std::move(*made);
   }
-  std::vector<Image> pages;
-  if (quantity->second == gpu::ViewQuantity::kError) {
-    for (auto& page : lit_->errorPages()) pages.push_back(std::move(page.irradiance));
-  } else {
-    for (auto& page : lit_->pages()) pages.push_back(std::move(page.irradiance));
-  }
-  const auto image = view_->render(lit_->scene(), lit_->patches(), pages, view);
+  const auto image = view_->render(lit_->scene(), lit_->patches(), pageImages(*lit_, quantity.pages), view);
   if (!image) return tl::unexpected<Error>(image.error());
-  const bool photometric = quantity->second == gpu::ViewQuantity::kLit ||
-                           quantity->second == gpu::ViewQuantity::kIrradiance ||
-                           quantity->second == gpu::ViewQuantity::kRadiosity;
-  auto png = encodePng(photometric ? toneMap(*image, autoExposure(*image)) : *image);
+  auto png = encodePng(quantity.photometric ? toneMap(*image, autoExposure(*image)) : *image);
   if (!png) return tl::unexpected<Error>(png.error());
   return std::make_shared<const Bytes>(std::move(*png));
 }

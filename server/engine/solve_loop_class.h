@@ -1,8 +1,9 @@
-// The class behind makeEngine (solve_loop.h), private to this folder. Its methods lie in three files: solve_loop.cpp
-// runs the thread and publishes, solve_loop_edits.cpp changes scene and settings, solve_loop_answers.cpp makes what can
-// be fetched.
+// The class behind makeEngine (solve_loop.h), private to this folder. Its methods lie in four files: solve_loop.cpp
+// runs the thread, solve_loop_edits.cpp changes scene and settings, solve_loop_answers.cpp makes what can be fetched,
+// solve_loop_publish.cpp shows lightmaps to those who watch.
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <future>
@@ -18,6 +19,7 @@
 #include "server/engine/lit_scene.h"
 #include "server/engine/publisher.h"
 #include "server/engine/solve_loop.h"
+#include "server/engine/watches.h"
 #include "server/gpu/view_renderer.h"
 #include "server/scene/document.h"
 #include "server/solver/transport.h"
@@ -42,11 +44,12 @@ class SolveLoop final : public Engine {
   void resume(Callback<SolveState> done) override;
   void restart(Callback<SolveState> done) override;
   [[nodiscard]] Status status() const override;
-  [[nodiscard]] std::shared_ptr<const Lightmaps> lightmaps() const override;
+  [[nodiscard]] std::shared_ptr<void> watch(Quantity quantity) override;
+  [[nodiscard]] std::shared_ptr<const Lightmaps> lightmaps(Quantity quantity) const override;
   void sceneText(Callback<SceneText> done) override;
   void sceneGlb(Callback<SharedBytes> done) override;
   void unlitGlb(Callback<SharedBytes> done) override;
-  void lightmapExr(std::uint32_t page, Callback<SharedBytes> done) override;
+  void lightmapExr(std::uint32_t page, Quantity quantity, Callback<SharedBytes> done) override;
   void snapshot(SnapshotRequest request, Callback<SharedBytes> done) override;
   void addListener(std::weak_ptr<Listener> listener) override;
 
@@ -68,7 +71,11 @@ class SolveLoop final : public Engine {
   /// The clock starts over: another scene, another seed, an edit. A paused solve stays paused.
   void beginSolve();
   void endSolve(SolveState state);
+  /// What is watched and not published yet; `final`: as a new version in any case.
   void publishLightmaps(bool final);
+  void publishQuantity(Quantity quantity);
+  /// Those who came while nothing changes are told what there is.
+  void welcomeWatchers();
   void updateStatus(bool announce);
 
   [[nodiscard]] Result<LoadOutcome> install(Result<scene::Document> document);
@@ -83,11 +90,12 @@ class SolveLoop final : public Engine {
 
   [[nodiscard]] Result<SharedBytes> renderSnapshot(const SnapshotRequest& request);
   [[nodiscard]] Result<SharedBytes> makeUnlit();
-  [[nodiscard]] Result<SharedBytes> makeExr(std::uint32_t page);
+  [[nodiscard]] Result<SharedBytes> makeExr(std::uint32_t page, Quantity quantity);
 
   EngineOptions options_;
   CommandQueue queue_;
   Listeners listeners_;
+  Watches watches_;
 
   // solve thread only
   SolveSettings settings_;
@@ -101,11 +109,11 @@ class SolveLoop final : public Engine {
   double seconds_ = 0.0;
   bool unpublished_ = false;
   std::uint64_t unwatched_ = 0;  // publications that nobody was there for
-  Clock::time_point last_publish_{}, last_progress_{};
+  Clock::time_point next_publish_{}, last_progress_{};
 
   mutable std::mutex mutex_;  // for the two that any thread may read, and transport_ coming and going
   Status status_;
-  std::shared_ptr<const Lightmaps> lightmaps_;
+  std::array<std::shared_ptr<const Lightmaps>, kQuantityCount> lightmaps_;
   std::thread thread_;
 };
 

@@ -86,6 +86,7 @@ Status reportStatus(const LitScene& lit, double seconds) {
   status.nodes = patches.nodeCount();
   status.surfaces = patches.surfaces.size();
   status.polygons = patches.polygons;
+  status.pages = patches.pages.size();
   for (const auto& surface : patches.surfaces) {
     for (const auto first : surface.first_node) {
       if (first == scene::kNone) continue;

@@ -14,15 +14,20 @@ using protocol::RpcCode;
 using protocol::RpcError;
 
 /// Collects the answers of one frame: a single one is sent as it comes, those of a batch together when all are there.
+/// Together they are no longer than a message may be: what does not fit is answered by an error in its place.
 class Calls::Answers {
  public:
   Answers(std::weak_ptr<Peer> peer, bool batch, std::size_t expected)
       : peer_(std::move(peer)), batch_(batch), open_(expected) {}
 
-  void add(std::string text) {
+  void add(const protocol::RequestId& id, std::string text) {
     std::string whole;
     {
       const std::lock_guard lock(mutex_);
+      if (batch_ && bytes_ + text.size() > kRoom)
+        text = protocol::encodeError(
+            id, {RpcCode::kTooLarge, "the answers of this batch are over 1 MiB together; ask one by one"});
+      bytes_ += text.size();
       if (!text.empty()) texts_.push_back(std::move(text));
       if (--open_ > 0 || texts_.empty()) return;
       whole = batch_ ? protocol::encodeBatch(texts_) : std::move(texts_.front());
@@ -31,10 +36,13 @@ class Calls::Answers {
   }
 
  private:
+  /// Leaves place for the errors of all others.
+  static constexpr std::size_t kRoom = protocol::kMaxMessageBytes - protocol::kMaxBatch * 512;
+
   std::weak_ptr<Peer> peer_;
   bool batch_;
   std::mutex mutex_;
-  std::size_t open_;
+  std::size_t open_, bytes_ = 0;
   std::vector<std::string> texts_;
 };
 
@@ -62,7 +70,7 @@ struct Calls::Slot {
  private:
   void finish(std::string text) const {
     in_flight->fetch_sub(1);
-    answers->add(std::move(text));
+    answers->add(id, std::move(text));
   }
 };
 
@@ -137,7 +145,7 @@ void Calls::run(const protocol::HelloCall& call, const Slot& slot) {
   std::optional<std::vector<SharedText>> missed;
   if (call.resume) missed = hub_.missedSince(*call.resume);
   reply.resumed = missed.has_value();
-  if (missed) tiles_.resumeFrom(call.resume->tile_version);
+  if (missed) tiles_.resumeFrom(*call.resume);
   slot.reply(reply);
   if (missed)
     for (const auto& text : *missed) peer->sendText(text);
@@ -160,7 +168,7 @@ void Calls::run(const protocol::SceneLoadCall& call, const Slot& slot) {
   auto done = hub_.fromEngine<engine::LoadOutcome>([slot, hub = &hub_](const Result<engine::LoadOutcome>& outcome) {
     if (!outcome) return slot.fail(outcome);
     hub->sawRevision(outcome->revision);
-    slot.reply(protocol::SceneLoadReply{outcome->revision, outcome->warnings});
+    slot.reply(protocol::SceneLoadReply{outcome->revision, firstWarnings(outcome->warnings)});
   });
   constexpr std::string_view kUpload = "/uploads/";
   constexpr std::string_view kFile = "file:";
@@ -180,6 +188,11 @@ void Calls::run(const protocol::SceneLoadCall& call, const Slot& slot) {
 }
 
 void Calls::run(const protocol::ScenePatchCall& call, const Slot& slot) {
+  // Everyone is told of it, with who made it, in one message. Written out by us it may be longer than it came.
+  constexpr std::size_t kRoomForTheRest = 4096;
+  if (call.patch.size() > protocol::kMaxMessageBytes - kRoomForTheRest)
+    return slot.error(
+        {RpcCode::kTooLarge, "the patch is too long to be told to others; make it in parts", "/params/patch"});
   hub_.patch(call, client_, [slot](const tl::expected<protocol::ScenePatchReply, RpcError>& answer) {
     answer ? slot.reply(*answer) : slot.error(answer.error());
   });
@@ -230,15 +243,9 @@ void Calls::run(const protocol::StatusCall& /*call*/, const Slot& slot) {
 }
 
 void Calls::run(const protocol::SubscribeCall& call, const Slot& slot) {
-  if (call.quantity != protocol::Quantity::kIrradiance)
-    return slot.error({RpcCode::kInvalidParams,
-                       fmt::format("/params/quantity: {} is not streamed by this server; see capabilities, or take a "
-                                   "snapshot of it",
-                                   name(call.quantity)),
-                       "/params/quantity"});
   tiles_.subscribe(call);
   slot.reply(protocol::SubscribeReply{call.lightmaps, call.min_mip, call.max_mip, call.max_hz, call.quantity});
-  if (const auto peer = peer_.lock()) peer->lightmapsChanged();
+  if (const auto peer = peer_.lock()) peer->subscribed();
 }
 
 void Calls::run(const protocol::CreditCall& call, const Slot& slot) {

@@ -22,7 +22,8 @@ class Peer : public Viewer {
   /// Runs `task` on the session's strand after a while, if the session still lives.
   virtual void later(std::chrono::milliseconds delay, std::function<void()> task) = 0;
   virtual void greeted() = 0;      ///< hello was accepted
-  virtual void tilesWanted() = 0;  ///< subscription or credit changed
+  virtual void tilesWanted() = 0;  ///< there is more credit
+  virtual void subscribed() = 0;   ///< TileLane::subscribe was called
   virtual void closeAfterWrites(protocol::CloseCode code, std::string reason) = 0;
 };
 

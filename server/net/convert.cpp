@@ -96,32 +96,52 @@ engine::SolveSettings merged(engine::SolveSettings s, const protocol::SolveConfi
   return s;
 }
 
+std::vector<std::string> firstWarnings(const std::vector<std::string>& all) {
+  std::vector<std::string> first;
+  std::size_t bytes = 0;
+  for (const auto& warning : all) {
+    bytes += warning.size();
+    if (first.size() == protocol::kMaxStatusWarnings || bytes > protocol::kMaxMessageBytes / 4) break;
+    first.push_back(warning);
+  }
+  return first;
+}
+
 protocol::StatusReply toStatusReply(const engine::Status& s) {
   protocol::StatusReply out;
   out.progress = toProgress(s);
   out.settings = toSettings(s.settings);
   out.warning_count = s.warnings.size();
-  std::size_t bytes = 0;
-  for (const auto& warning : s.warnings) {
-    bytes += warning.size();
-    if (out.warnings.size() == protocol::kMaxStatusWarnings || bytes > protocol::kMaxMessageBytes / 4) break;
-    out.warnings.push_back(warning);
-  }
+  out.warnings = firstWarnings(s.warnings);
   for (const auto& [key, value] : s.counters)
     if (std::isfinite(value)) out.counters[key] = value;
   out.gl_renderer = s.gl_renderer;
   return out;
 }
 
+// Both list the same quantities in the same order.
+static_assert(static_cast<int>(engine::Quantity::kIrradiance) == static_cast<int>(protocol::Quantity::kIrradiance));
+static_assert(static_cast<int>(engine::Quantity::kRadiosity) == static_cast<int>(protocol::Quantity::kRadiosity));
+static_assert(static_cast<int>(engine::Quantity::kError) == static_cast<int>(protocol::Quantity::kError));
+static_assert(static_cast<int>(engine::Quantity::kPatchId) == static_cast<int>(protocol::Quantity::kPatchId));
+static_assert(static_cast<int>(engine::Quantity::kMipLevel) == static_cast<int>(protocol::Quantity::kMipLevel));
+static_assert(static_cast<int>(engine::Quantity::kUnshot) == static_cast<int>(protocol::Quantity::kUnshot));
+static_assert(static_cast<int>(engine::Quantity::kNormal) == static_cast<int>(protocol::Quantity::kNormal));
+static_assert(engine::kQuantityCount == 7);
+
+protocol::Quantity toQuantity(engine::Quantity quantity) { return static_cast<protocol::Quantity>(quantity); }
+engine::Quantity toQuantity(protocol::Quantity quantity) { return static_cast<engine::Quantity>(quantity); }
+
 protocol::LightmapsNote toLightmapsNote(const engine::Lightmaps& lightmaps) {
   protocol::LightmapsNote note;
   note.layout = lightmaps.layout;
   note.revision = lightmaps.revision;
+  note.quantity = toQuantity(lightmaps.quantity);
   for (const auto& page : lightmaps.pages) {
-    if (page == nullptr || page->mips.empty()) continue;
-    const auto& base = page->mips.front();
-    note.pages.push_back({static_cast<std::uint32_t>(base.width), static_cast<std::uint32_t>(base.height),
-                          static_cast<std::uint32_t>(page->mips.size())});
+    if (page == nullptr || page->mipCount() == 0) continue;
+    const auto base = page->size(0);
+    note.pages.push_back({static_cast<std::uint32_t>(base.x), static_cast<std::uint32_t>(base.y),
+                          static_cast<std::uint32_t>(page->mipCount())});
   }
   note.uvs = fmt::format("/scene.glb?layout={}", lightmaps.layout);
   return note;

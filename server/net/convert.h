@@ -10,11 +10,16 @@ namespace radiosity::net {
 
 [[nodiscard]] std::string_view stateName(engine::SolveState state);
 [[nodiscard]] protocol::Progress toProgress(const engine::Status& status);
+/// As many of the first as a message has room for.
+[[nodiscard]] std::vector<std::string> firstWarnings(const std::vector<std::string>& all);
 [[nodiscard]] protocol::StatusReply toStatusReply(const engine::Status& status);
 [[nodiscard]] protocol::Settings toSettings(const engine::SolveSettings& settings);
 /// `current` with what the call names replaced.
 [[nodiscard]] engine::SolveSettings merged(engine::SolveSettings current, const protocol::SolveConfigureCall& call);
 [[nodiscard]] protocol::LightmapsNote toLightmapsNote(const engine::Lightmaps& lightmaps);
+
+[[nodiscard]] protocol::Quantity toQuantity(engine::Quantity quantity);
+[[nodiscard]] engine::Quantity toQuantity(protocol::Quantity quantity);
 
 /// True when the solve will not come nearer its target without a call.
 [[nodiscard]] bool hasStopped(engine::SolveState state);

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "protocol/http_bodies.h"
+#include "protocol/messages.h"
 #include "server/net/convert.h"
 #include "server/net/metrics.h"
 #include "server/net/status_page.h"
@@ -110,7 +111,12 @@ void getLightmap(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Re
   if (error != std::errc() || std::string_view(end, text.data() + text.size()) != ".exr")
     return done(
         errorResponse({ErrorCode::kNotFound, "lightmaps are /lightmaps/<page>.exr, counted from 0", request.path}));
-  hub->engine().lightmapExr(page, fileAnswer(*hub, done, "image/x-exr"));
+  const auto quantity = protocol::quantityFrom(queryText(request, "quantity", "irradiance"));
+  if (!quantity)
+    return done(
+        errorResponse({ErrorCode::kBadInput,
+                       "must be irradiance, radiosity, error, patchId, mipLevel, unshot or normal", "?quantity="}));
+  hub->engine().lightmapExr(page, toQuantity(*quantity), fileAnswer(*hub, done, "image/x-exr"));
 }
 
 void getSnapshot(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond& done) {

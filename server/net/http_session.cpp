@@ -4,6 +4,7 @@
 #include <array>
 #include <boost/asio/dispatch.hpp>
 #include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
 #include <boost/asio/write.hpp>
 #include <boost/beast/http/parser.hpp>
 #include <boost/beast/http/read.hpp>
@@ -46,7 +47,11 @@ std::string httpDate() {
 class HttpSession : public Connection, public std::enable_shared_from_this<HttpSession> {
  public:
   HttpSession(Stream stream, std::shared_ptr<Hub> hub, ConnectionSlot slot)
-      : stream_(std::move(stream)), hub_(std::move(hub)), slot_(std::move(slot)), buffer_(kBufferLimit) {}
+      : stream_(std::move(stream)),
+        hub_(std::move(hub)),
+        slot_(std::move(slot)),
+        buffer_(kBufferLimit),
+        stall_(stream_.get_executor()) {}
 
   void start() {
     hub_->add(weak_from_this());
@@ -55,7 +60,8 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
 
   void drain() override {
     asio::post(stream_.get_executor(), [self = shared_from_this()] {
-      if (self->idle_) self->stream_.close();
+      if (self->idle_) return self->stream_.close();
+      self->cutWhenStalled();
     });
   }
 
@@ -72,6 +78,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   void writeSome();
   void onWritten();
   void linger();
+  void cutWhenStalled();
 
   [[nodiscard]] std::string_view field(http::field name) const { return view(parser_->get()[name]); }
 
@@ -82,6 +89,9 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   std::optional<Parser> parser_;
   HttpRequest request_;
   bool head_ = false, keep_alive_ = false, idle_ = false;
+  bool asked_ = false;  ///< the engine, which takes its time
+  asio::steady_timer stall_;
+  std::uint64_t moved_bytes_ = 0;  ///< either way
   std::string origin_;
   HttpResponse response_;  ///< holds the bytes that message_ points to
   std::optional<Response> message_;
@@ -197,14 +207,17 @@ void HttpSession::onBody(BoostError error) {
   if (error) return stream_.close();
   if (parser_->is_done()) return onWhole();
   stream_.expires_after(hub_->options().idle_timeout);
-  http::async_read_some(stream_, buffer_, *parser_,
-                        [self = shared_from_this()](BoostError e, std::size_t) { self->onBody(e); });
+  http::async_read_some(stream_, buffer_, *parser_, [self = shared_from_this()](BoostError e, std::size_t n) {
+    self->moved_bytes_ += n;
+    self->onBody(e);
+  });
 }
 
 void HttpSession::onWhole() {
   request_.body = std::move(parser_->get().body());
   hub_->counters().upload_bytes += request_.body.size();
-  stream_.expires_never();  // the engine takes its time
+  stream_.expires_never();
+  asked_ = true;
   respond(hub_, std::move(request_), [self = shared_from_this()](HttpResponse response) {
     asio::post(self->stream_.get_executor(),
                [self, response = std::move(response)]() mutable { self->send(std::move(response), false); });
@@ -212,6 +225,7 @@ void HttpSession::onWhole() {
 }
 
 void HttpSession::send(HttpResponse response, bool close) {
+  asked_ = false;
   response_ = std::move(response);
   const auto kind = static_cast<std::size_t>(response_.status / 100);
   ++hub_->counters().http_responses.at(std::min<std::size_t>(kind, 5));
@@ -248,8 +262,9 @@ void HttpSession::prepare(bool close) {
 void HttpSession::writeSome() {
   if (serializer_->is_done() || (head_ && serializer_->is_header_done())) return onWritten();
   stream_.expires_after(hub_->options().idle_timeout);  // each time some of it was taken
-  http::async_write_some(stream_, *serializer_, [self = shared_from_this()](BoostError error, std::size_t) {
+  http::async_write_some(stream_, *serializer_, [self = shared_from_this()](BoostError error, std::size_t n) {
     if (error) return self->stream_.close();
+    self->moved_bytes_ += n;
     self->writeSome();
   });
 }
@@ -273,6 +288,17 @@ void HttpSession::linger() {
     self->lingered_ += n;
     if (error || self->lingered_ > kLingerBytes) return self->stream_.close();
     self->linger();
+  });
+}
+
+/// While the server drains: a peer that neither sends nor takes anything is not waited for.
+void HttpSession::cutWhenStalled() {
+  stall_.expires_after(hub_->options().drain_patience);
+  stall_.async_wait([weak = weak_from_this(), before = moved_bytes_](BoostError error) {
+    const auto self = weak.lock();
+    if (error || self == nullptr) return;
+    if (!self->asked_ && self->moved_bytes_ == before) return self->stream_.close();
+    self->cutWhenStalled();
   });
 }
 

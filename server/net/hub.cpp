@@ -34,7 +34,6 @@ void Hub::start() {
     last_state_ = status.state;
   }
   engine_.addListener(weak_from_this());
-  if (auto lightmaps = engine_.lightmaps()) onLightmaps(lightmaps);
 }
 
 std::uint64_t Hub::revision() const {
@@ -47,9 +46,22 @@ void Hub::sawRevision(std::uint64_t revision) {
   revision_ = std::max(revision_, revision);
 }
 
-std::shared_ptr<const engine::Lightmaps> Hub::lightmaps() {
+std::shared_ptr<const engine::Lightmaps> Hub::lightmaps(engine::Quantity quantity) {
   const std::lock_guard lock(mutex_);
-  return lightmaps_;
+  return lightmaps_[static_cast<std::size_t>(quantity)];
+}
+
+std::shared_ptr<void> Hub::watch(engine::Quantity quantity) {
+  const auto i = static_cast<std::size_t>(quantity);
+  {
+    const std::lock_guard lock(mutex_);
+    if (auto shared = watches_[i].lock()) return shared;
+    lightmaps_[i].reset();  // from before, when someone else watched: the engine may have gone on since
+  }
+  auto watching = engine_.watch(quantity);
+  const std::lock_guard lock(mutex_);
+  watches_[i] = watching;
+  return watching;
 }
 
 protocol::ServerInfo Hub::serverInfo() {
@@ -71,9 +83,16 @@ protocol::ServerInfo Hub::serverInfo() {
                        "tiles.rgba16f",
                        "tiles.rgb9e5",
                        "tiles.rgba32f",
+                       "tiles.r32ui",
                        "codec.none",
                        "codec.deflate",
-                       "quantity.irradiance"};
+                       "quantity.irradiance",
+                       "quantity.radiosity",
+                       "quantity.error",
+                       "quantity.patchId",
+                       "quantity.mipLevel",
+                       "quantity.unshot",
+                       "quantity.normal"};
   if (!options_.scene_root.empty()) info.capabilities.emplace_back("scene.load.file");
   info.limits = {{"messageBytes", protocol::kMaxMessageBytes},
                  {"jsonDepth", protocol::kMaxJsonDepth},
@@ -84,8 +103,9 @@ protocol::ServerInfo Hub::serverInfo() {
                  {"clients", options_.max_clients},
                  {"snapshotSide", protocol::kMaxSnapshotSide},
                  {"creditBytes", static_cast<std::uint64_t>(protocol::kMaxCreditBytes)}};
-  if (const auto now = lightmaps()) info.lightmaps = now->pages.size();
-  info.gl_renderer = engine_.status().gl_renderer;
+  const auto status = engine_.status();
+  info.lightmaps = status.pages;
+  info.gl_renderer = status.gl_renderer;
   info.auth_required = !options_.token.empty();
   return info;
 }
@@ -154,9 +174,10 @@ void Hub::drain() {
 // ---- patches ----
 
 std::optional<std::vector<SharedText>> Hub::missedSince(const protocol::Resume& resume) const {
+  const bool old_layout = resume.tile_version < engine_.status().layout_since;
   const std::lock_guard lock(mutex_);
   if (resume.epoch != epoch_ || resume.revision > revision_ || resume.revision < history_from_) return std::nullopt;
-  if (lightmaps_ == nullptr || resume.tile_version < layout_since_) return std::nullopt;
+  if (old_layout) return std::nullopt;
   std::vector<SharedText> missed;
   for (const auto& past : history_)
     if (past.revision > resume.revision) missed.push_back(past.text);
@@ -329,11 +350,7 @@ void Hub::onSceneLoaded(std::uint64_t revision) {
 void Hub::onLightmaps(const std::shared_ptr<const engine::Lightmaps>& lightmaps) {
   {
     const std::lock_guard lock(mutex_);
-    if (lightmaps_ == nullptr || lightmaps->layout != layout_) {
-      layout_ = lightmaps->layout;
-      layout_since_ = lightmaps->tile_version;
-    }
-    lightmaps_ = lightmaps;
+    lightmaps_[static_cast<std::size_t>(lightmaps->quantity)] = lightmaps;
   }
   enter([&] {
     for (const auto& viewer : viewers()) viewer->lightmapsChanged();

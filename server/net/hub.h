@@ -3,6 +3,7 @@
 // callbacks enter on the solve thread, hold the lock for a copy and hand over to each session's strand.
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <deque>
 #include <functional>
@@ -51,7 +52,10 @@ class Hub : public engine::Listener, public std::enable_shared_from_this<Hub> {
   [[nodiscard]] const std::string& epoch() const { return epoch_; }
   [[nodiscard]] std::uint64_t revision() const;  ///< the highest anyone has told us of
   void sawRevision(std::uint64_t revision);
-  [[nodiscard]] std::shared_ptr<const engine::Lightmaps> lightmaps();
+  /// The newest of a quantity that is being watched; nothing until it has come.
+  [[nodiscard]] std::shared_ptr<const engine::Lightmaps> lightmaps(engine::Quantity quantity);
+  /// Until it is let go, lightmaps of the quantity come and viewers are told.
+  [[nodiscard]] std::shared_ptr<void> watch(engine::Quantity quantity);
   [[nodiscard]] protocol::ServerInfo serverInfo();
 
   void add(const std::weak_ptr<Connection>& connection);
@@ -140,8 +144,8 @@ class Hub : public engine::Listener, public std::enable_shared_from_this<Hub> {
   mutable std::mutex mutex_;  ///< everything below
   std::vector<std::weak_ptr<Connection>> connections_;
   std::vector<std::weak_ptr<Viewer>> viewers_;
-  std::shared_ptr<const engine::Lightmaps> lightmaps_;
-  std::uint64_t layout_ = 0, layout_since_ = 0;  ///< tile version at which the layout was first published
+  std::array<std::shared_ptr<const engine::Lightmaps>, engine::kQuantityCount> lightmaps_;
+  std::array<std::weak_ptr<void>, engine::kQuantityCount> watches_;  ///< one of the engine's serves all viewers
   std::uint64_t revision_ = 0;
   std::deque<PastPatch> history_;
   std::size_t history_bytes_ = 0;

@@ -1,6 +1,7 @@
 #include "server/net/server.h"
 
 #include <fmt/format.h>
+#include <pthread.h>
 #include <boost/asio/post.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/steady_timer.hpp>
@@ -139,7 +140,10 @@ void Server::State::run() {
     if (acceptor_.is_open()) accept();
   });
   std::vector<std::thread> helpers;
-  for (int i = 1; i < hub_->options().threads; ++i) helpers.emplace_back([this] { context_.run(); });
+  for (int i = 1; i < hub_->options().threads; ++i) {
+    helpers.emplace_back([this] { context_.run(); });
+    (void)pthread_setname_np(helpers.back().native_handle(), "net");  // for top -H, and what the benchmarks count
+  }
   context_.run();
   for (auto& helper : helpers) helper.join();
 }

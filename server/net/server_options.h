@@ -31,7 +31,8 @@ struct ServerOptions {
   std::chrono::milliseconds header_timeout{10'000};  ///< for a whole HTTP header
   std::chrono::milliseconds idle_timeout{30'000};    ///< of a kept-alive connection, between bytes of a body, pings
   std::chrono::milliseconds progress_interval{100};  ///< at least this between two progress notifications
-  std::chrono::milliseconds drain_grace{5'000};
+  std::chrono::milliseconds drain_grace{5'000};      ///< for what is under way when the server stops
+  std::chrono::milliseconds drain_patience{1'000};   ///< then: for a peer that takes nothing, or does not close
 };
 
 }  // namespace radiosity::net

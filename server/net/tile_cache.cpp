@@ -1,16 +1,30 @@
 #include "server/net/tile_cache.h"
 
 #include <algorithm>
+#include <utility>
+#include <vector>
 
 namespace radiosity::net {
 namespace {
 
-protocol::Region regionOf(const Image& image, std::uint32_t tile) {
+protocol::Region regionOf(glm::ivec2 size, std::uint32_t tile) {
   const int side = static_cast<int>(protocol::kTileSide);
-  const int across = (image.width + side - 1) / side;
+  const int across = (size.x + side - 1) / side;
   const int x = static_cast<int>(tile) % across * side;
   const int y = static_cast<int>(tile) / across * side;
-  return {x, y, std::min(side, image.width - x), std::min(side, image.height - y)};
+  return {x, y, std::min(side, size.x - x), std::min(side, size.y - y)};
+}
+
+Result<protocol::EncodedPixels> encode(const TileCache::Key& key, const engine::PageSnapshot& page) {
+  const auto region = regionOf(page.size(key.mip), key.tile);
+  if (!engine::holdsIds(key.quantity)) return protocol::encodePixels(page.mips[key.mip], region, key.format, key.codec);
+  const auto& image = page.id_mips[key.mip];
+  std::vector<std::uint32_t> ids;
+  for (int y = region.y; y < region.y + region.height; ++y) {
+    const auto row = image.ids.begin() + std::ptrdiff_t{y} * image.width + region.x;
+    ids.insert(ids.end(), row, row + region.width);
+  }
+  return protocol::encodeIds(ids, region.width, region.height, key.codec);
 }
 
 }  // namespace
@@ -21,8 +35,7 @@ Result<TileCache::Pixels> TileCache::get(const Key& key, const engine::PageSnaps
     if (const auto found = tiles_.find(key); found != tiles_.end()) return found->second;
   }
   // Encoded outside the lock: two sessions may do the same tile at once, which costs less than waiting.
-  const auto& image = page.mips[key.mip];
-  auto encoded = protocol::encodePixels(image, regionOf(image, key.tile), key.format, key.codec);
+  auto encoded = encode(key, page);
   if (!encoded) return tl::unexpected(std::move(encoded.error()));
   ++encoded_;
   auto pixels = std::make_shared<const protocol::EncodedPixels>(std::move(*encoded));

@@ -21,6 +21,7 @@ class TileCache {
   explicit TileCache(std::size_t max_bytes = std::size_t{64} << 20) : max_bytes_(max_bytes) {}
 
   struct Key {
+    engine::Quantity quantity = engine::Quantity::kIrradiance;
     std::uint64_t layout = 0, version = 0;
     std::uint32_t page = 0, mip = 0, tile = 0;
     protocol::PixelFormat format = protocol::PixelFormat::kRgba16f;
@@ -29,7 +30,7 @@ class TileCache {
   };
   using Pixels = std::shared_ptr<const protocol::EncodedPixels>;
 
-  /// kInternal when a value is not finite.
+  /// Whole numbers are encoded as r32ui, so Key::format says nothing of them. kInternal when a value is not finite.
   [[nodiscard]] Result<Pixels> get(const Key& key, const engine::PageSnapshot& page);
 
   [[nodiscard]] std::uint64_t encoded() const { return encoded_.load(); }

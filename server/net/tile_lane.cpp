@@ -6,6 +6,7 @@
 
 #include "common/check.h"
 #include "common/log.h"
+#include "server/net/convert.h"
 
 namespace radiosity::net {
 namespace {
@@ -24,7 +25,13 @@ void TileLane::setFormat(protocol::PixelFormat format, protocol::Codec codec) {
 }
 
 void TileLane::subscribe(const protocol::SubscribeCall& call) {
+  const bool another = subscription_ && subscription_->quantity != call.quantity;
   subscription_ = call;
+  if (another) {
+    lightmaps_.reset();
+    dirty_.clear();
+  }
+  bookmarked_ = 0;  // of the new choice
   if (lightmaps_ != nullptr) findDirty();
 }
 
@@ -34,30 +41,33 @@ bool TileLane::wanted(std::uint32_t page) const {
 }
 
 void TileLane::startLayout() {
+  const bool resumes = resume_ && resume_->quantity == subscription_->quantity;
   sent_.clear();
   for (const auto& page : lightmaps_->pages) {
     SentPage sent;
-    sent.reset = !resume_from_;
-    RAD_CHECK_EQ(page->mips.size(), page->tile_version.size());
+    RAD_CHECK_EQ(page->mipCount(), page->tile_version.size());
     for (const auto& versions : page->tile_version) {
       auto& known = sent.version.emplace_back(versions.size(), 0);
-      if (!resume_from_) continue;
-      for (std::size_t t = 0; t < versions.size(); ++t)
-        if (versions[t] <= *resume_from_) known[t] = versions[t];
+      for (std::size_t t = 0; resumes && t < versions.size(); ++t) {
+        if (versions[t] > resume_->tile_version) continue;
+        known[t] = versions[t];
+        sent.reset = false;  // the client goes on with what it has
+      }
     }
     sent_.push_back(std::move(sent));
   }
-  resume_from_.reset();
+  resume_.reset();
   bookmarked_ = 0;
 }
 
 bool TileLane::setLightmaps(std::shared_ptr<const engine::Lightmaps> lightmaps) {
-  if (lightmaps == nullptr || lightmaps == lightmaps_) return false;
+  if (!subscription_ || lightmaps == nullptr || lightmaps == lightmaps_) return false;
+  if (toQuantity(lightmaps->quantity) != subscription_->quantity) return false;
   const bool new_layout = lightmaps_ == nullptr || lightmaps_->layout != lightmaps->layout ||
                           lightmaps_->pages.size() != lightmaps->pages.size();
   lightmaps_ = std::move(lightmaps);
   if (new_layout) startLayout();
-  if (subscription_) findDirty();
+  findDirty();
   return new_layout;
 }
 
@@ -66,7 +76,7 @@ void TileLane::findDirty() {
   for (std::uint32_t p = 0; p < lightmaps_->pages.size(); ++p) {
     if (!wanted(p)) continue;
     const auto& page = *lightmaps_->pages[p];
-    const auto last = std::min<std::size_t>(page.mips.size(), std::size_t{subscription_->max_mip} + 1);
+    const auto last = std::min<std::size_t>(page.mipCount(), std::size_t{subscription_->max_mip} + 1);
     for (std::uint32_t m = subscription_->min_mip; m < last; ++m) {
       const auto& now = page.tile_version[m];
       const auto& then = sent_[p].version[m];
@@ -90,11 +100,13 @@ void TileLane::findDirty() {
 Result<OutgoingTile> TileLane::frameOf(const Entry& entry, TileCache& cache) {
   const auto& page = *lightmaps_->pages[entry.page];
   const auto version = page.tile_version[entry.mip][entry.tile];
-  auto pixels = cache.get({lightmaps_->layout, version, entry.page, entry.mip, entry.tile, format_, codec_}, page);
+  auto pixels = cache.get(
+      {lightmaps_->quantity, lightmaps_->layout, version, entry.page, entry.mip, entry.tile, format_, codec_}, page);
   if (!pixels) return tl::unexpected(std::move(pixels.error()));
   const auto across =
-      (static_cast<std::uint32_t>(page.mips[entry.mip].width) + protocol::kTileSide - 1) / protocol::kTileSide;
+      (static_cast<std::uint32_t>(page.size(entry.mip).x) + protocol::kTileSide - 1) / protocol::kTileSide;
   protocol::TileHeader header;
+  header.kind = subscription_->quantity;
   header.page = entry.page;
   header.mip = static_cast<std::uint16_t>(entry.mip);
   header.x = entry.tile % across * protocol::kTileSide;
@@ -131,7 +143,7 @@ std::optional<protocol::Bookmark> TileLane::takeBookmark() {
   if (!subscription_ || lightmaps_ == nullptr || !dirty_.empty() || bookmarked_ == lightmaps_->tile_version)
     return std::nullopt;
   bookmarked_ = lightmaps_->tile_version;
-  return protocol::Bookmark{lightmaps_->revision, lightmaps_->tile_version};
+  return protocol::Bookmark{lightmaps_->revision, lightmaps_->tile_version, subscription_->quantity};
 }
 
 }  // namespace radiosity::net

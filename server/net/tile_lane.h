@@ -28,14 +28,19 @@ struct OutgoingTile {
 class TileLane {
  public:
   void setFormat(protocol::PixelFormat format, protocol::Codec codec);
-  /// Starts streaming; pages and mips outside the subscription are not sent.
+  /// Starts streaming, or changes it; pages and mips outside the subscription are not sent. Another quantity starts
+  /// afresh: nothing of it counts as sent.
   void subscribe(const protocol::SubscribeCall& call);
   [[nodiscard]] bool subscribed() const { return subscription_.has_value(); }
+  [[nodiscard]] protocol::Quantity quantity() const {
+    return subscription_ ? subscription_->quantity : protocol::Quantity::kIrradiance;
+  }
   [[nodiscard]] double maxHz() const { return subscription_ ? subscription_->max_hz : 0.0; }
-  /// The client holds every tile up to this version; to be called before setLightmaps.
-  void resumeFrom(std::uint64_t tile_version) { resume_from_ = tile_version; }
+  /// The client holds every tile of a quantity up to a version; to be called before subscribe().
+  void resumeFrom(const protocol::Resume& resume) { resume_ = resume; }
 
-  /// Takes the newest lightmaps. True: their layout is new, so `lightmaps` must be sent before the next tile.
+  /// Takes the newest lightmaps of the quantity subscribed to; others are passed over. True: their layout is new, or
+  /// they are the first, so `lightmaps` must be sent before the next tile.
   bool setLightmaps(std::shared_ptr<const engine::Lightmaps> lightmaps);
 
   /// Credit is capped; see kMaxCreditBytes.
@@ -71,7 +76,7 @@ class TileLane {
   std::shared_ptr<const engine::Lightmaps> lightmaps_;
   std::vector<SentPage> sent_;
   std::vector<Entry> dirty_;  ///< best last
-  std::optional<std::uint64_t> resume_from_;
+  std::optional<protocol::Resume> resume_;
   std::uint64_t bookmarked_ = 0;
   std::int64_t credit_ = protocol::kDefaultCreditBytes;
   std::uint64_t failed_ = 0;

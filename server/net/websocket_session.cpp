@@ -48,6 +48,7 @@ class WebSocketSession final : public Peer, public Connection, public std::enabl
   void later(std::chrono::milliseconds delay, std::function<void()> task) override;
   void greeted() override;
   void tilesWanted() override { pump(); }
+  void subscribed() override;
   void closeAfterWrites(CloseCode code, std::string reason) override;
 
  private:
@@ -57,6 +58,7 @@ class WebSocketSession final : public Peer, public Connection, public std::enabl
   void onRead(BoostError error);
   void onStrand(std::function<void(WebSocketSession&)> task);
   void enqueue(SharedText text);
+  void cutAfter(std::chrono::milliseconds patience);
   void adoptLightmaps();
   void pump();
   void writeText(SharedText text);
@@ -80,12 +82,13 @@ class WebSocketSession final : public Peer, public Connection, public std::enabl
   SharedText progress_;
   SharedText writing_text_;
   std::optional<OutgoingTile> writing_tile_;
-  bool writing_ = false, closing_ = false;
+  bool writing_ = false, closing_ = false, draining_ = false;
   std::uint64_t write_number_ = 0;
   std::optional<std::pair<CloseCode, std::string>> close_when_written_;
   asio::steady_timer deadline_, cut_;
   std::list<asio::steady_timer> timers_;
 
+  std::shared_ptr<void> watching_;  ///< keeps the quantity subscribed to coming
   std::atomic<bool> lightmaps_posted_{false};
   bool adoption_timed_ = false;
   Clock::time_point next_adoption_;
@@ -182,8 +185,13 @@ void WebSocketSession::lightmapsChanged() {
   onStrand([](WebSocketSession& s) { s.adoptLightmaps(); });
 }
 
+/// A peer that does not read would hold the server up for as long as a write may take; what the system has taken of our
+/// bytes still reaches it after the socket is closed.
 void WebSocketSession::drain() {
-  onStrand([](WebSocketSession& s) { s.closeAfterWrites(CloseCode::kGoingAway, "the server is shutting down"); });
+  onStrand([](WebSocketSession& s) {
+    if (!std::exchange(s.draining_, true)) s.cutAfter(s.hub_->options().drain_patience);
+    s.closeAfterWrites(CloseCode::kGoingAway, "the server is shutting down");
+  });
 }
 
 void WebSocketSession::later(std::chrono::milliseconds delay, std::function<void()> task) {
@@ -212,6 +220,13 @@ void WebSocketSession::enqueue(SharedText text) {
   pump();
 }
 
+/// What is new to the subscription comes at once, whatever rate was asked for.
+void WebSocketSession::subscribed() {
+  watching_ = hub_->watch(toQuantity(tiles_.quantity()));
+  next_adoption_ = {};
+  lightmapsChanged();
+}
+
 void WebSocketSession::adoptLightmaps() {
   lightmaps_posted_ = false;
   if (!tiles_.subscribed() || closing_) return;
@@ -227,7 +242,7 @@ void WebSocketSession::adoptLightmaps() {
   if (tiles_.maxHz() > 0.0)
     next_adoption_ =
         now + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / tiles_.maxHz()));
-  const auto lightmaps = hub_->lightmaps();
+  const auto lightmaps = hub_->lightmaps(toQuantity(tiles_.quantity()));
   if (tiles_.setLightmaps(lightmaps))
     enqueue(std::make_shared<const std::string>(protocol::encodeNotification(toLightmapsNote(*lightmaps))));
   pump();
@@ -312,17 +327,29 @@ void WebSocketSession::closeAfterWrites(CloseCode code, std::string reason) {
 void WebSocketSession::close(CloseCode code, const std::string& reason) {
   if (std::exchange(closing_, true)) return;
   hub_->leave(*this);
+  watching_.reset();
   control_.clear();
-  cut_.expires_after(hub_->options().close_patience);
-  cut_.async_wait([weak = weak_from_this()](BoostError error) {
-    if (const auto self = weak.lock(); self != nullptr && !error) self->cut();
-  });
+  if (!draining_) cutAfter(hub_->options().close_patience);
   const websocket::close_reason why(static_cast<websocket::close_code>(code), reason);
   ws_.async_close(why, [self = shared_from_this()](BoostError) { self->cut(); });
 }
 
+void WebSocketSession::cutAfter(std::chrono::milliseconds patience) {
+  cut_.expires_after(patience);
+  cut_.async_wait([weak = weak_from_this()](BoostError error) {
+    const auto self = weak.lock();
+    if (self == nullptr || error) return;
+    BoostError ignored;
+    // What it did not read in all this time is given up, so that the system does not keep it either.
+    if (!self->draining_)
+      beast::get_lowest_layer(self->ws_).socket().set_option(asio::socket_base::linger(true, 0), ignored);
+    self->cut();
+  });
+}
+
 void WebSocketSession::cut() {
   closing_ = true;
+  watching_.reset();
   hub_->leave(*this);
   deadline_.cancel();
   cut_.cancel();

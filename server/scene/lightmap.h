@@ -20,12 +20,14 @@ struct LightmapPage {
   std::vector<float> coverage;
 };
 
-/// `leaf_values`: by node of level 0 (index = node id; other levels ignored). Double-sided surfaces put the mean of the
-/// two sides' irradiance, weighted by visible area, on the page (a lightmap has one value a texel). Texels less than a
-/// quarter visible are filled from neighbours of the same chart; seams between charts that share an edge are stitched;
-/// gutters are dilated.
-[[nodiscard]] std::vector<LightmapPage> assemblePages(const PatchScene& patches,
-                                                      std::span<const glm::vec3> node_values);
+enum class Seams { kStitched, kLeft };
+
+/// `node_values`: by node of level 0 (index = node id; other levels ignored). Double-sided surfaces put the mean of the
+/// two sides' values, weighted by visible area, on the page (a lightmap has one value a texel). Texels less than a
+/// quarter visible are filled from neighbours of the same chart; seams between charts that share an edge are stitched
+/// (irradiance is continuous there; other values need not be: kLeft); gutters are dilated.
+[[nodiscard]] std::vector<LightmapPage> assemblePages(const PatchScene& patches, std::span<const glm::vec3> node_values,
+                                                      Seams seams = Seams::kStitched);
 
 /// Next coarser mip: coverage-weighted mean of 2x2, so that charts do not bleed into gutters.
 [[nodiscard]] LightmapPage coarserMip(const LightmapPage& page);

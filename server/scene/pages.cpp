@@ -131,13 +131,13 @@ class PageMaker {
     }
   }
 
-  std::vector<LightmapPage> make() {
+  std::vector<LightmapPage> make(Seams seams) {
     for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
       Patchwork p = gather(patches_, patches_.surfaces[s], values_);
       fillUnknown(p);
       place(s, p);
     }
-    stitchSeams(patches_, owners_, pages_);
+    if (seams == Seams::kStitched) stitchSeams(patches_, owners_, pages_);
     for (std::size_t page = 0; page < pages_.size(); ++page) dilate(pages_[page], owners_[page]);
     return std::move(pages_);
   }
@@ -199,9 +199,10 @@ class PageMaker {
 
 }  // namespace
 
-std::vector<LightmapPage> assemblePages(const PatchScene& patches, std::span<const glm::vec3> node_values) {
+std::vector<LightmapPage> assemblePages(const PatchScene& patches, std::span<const glm::vec3> node_values,
+                                        Seams seams) {
   RAD_CHECK_EQ(node_values.size(), patches.nodeCount());
-  return PageMaker(patches, node_values).make();
+  return PageMaker(patches, node_values).make(seams);
 }
 
 LightmapPage coarserMip(const LightmapPage& page) {

@@ -59,18 +59,27 @@ void LinkedSolver::findUnshot() {
   std::vector<glm::vec3> unshot;
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
     const Side& side = sides_[s];
-    system_.standIn(s, unshot);
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
       const auto v = side.first_value + leaf;
-      const glm::vec3 h = 0.5F * (half_[0][v] + half_[1][v]);
-      irradiance_[side.first_node + leaf] = h;
-      unshot[leaf] = reflectance_[v] * h + (side.gathered ? glm::vec3(0.0F) : emission_[v]) - unshot[leaf];
+      irradiance_[side.first_node + leaf] = 0.5F * (half_[0][v] + half_[1][v]);
     }
+    leafUnshot(s, unshot);
     unshot_.pull(side, unshot);
     const auto root = side.first_node + side.node_count - 1;
     const auto net = static_cast<double>(channelSum(unshot_.flux(root)));
     net_unshot_ += net;
     varying_ += std::max(0.0, static_cast<double>(unshot_.rough(root)) - net);
+  }
+}
+
+/// Radiosity less what stands for it on the deepest shooter above each leaf.
+void LinkedSolver::leafUnshot(std::uint32_t s, std::vector<glm::vec3>& leaves) const {
+  const Side& side = sides_[s];
+  system_.standIn(s, leaves);
+  for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+    const auto v = side.first_value + leaf;
+    const glm::vec3 emission = side.gathered ? glm::vec3(0.0F) : emission_[v];
+    leaves[leaf] = reflectance_[v] * irradiance_[side.first_node + leaf] + emission - leaves[leaf];
   }
 }
 

@@ -347,6 +347,32 @@ std::vector<glm::vec3> LinkedSolver::halfIrradiance(std::uint32_t half) const {
   return values;
 }
 
+std::vector<glm::vec3> LinkedSolver::unshot() const {
+  std::vector<glm::vec3> values(patches_->nodeCount(), glm::vec3(0.0F)), leaves;
+  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
+    leafUnshot(s, leaves);
+    std::copy(leaves.begin(), leaves.end(), values.begin() + sides_[s].first_node);
+  }
+  return values;
+}
+
+std::vector<std::uint8_t> LinkedSolver::shotLevels() const {
+  std::vector<std::uint8_t> levels(patches_->nodeCount(), kNeverShot);
+  for (const auto& shooter : system_.shooters()) {
+    if (shooter.isLight()) continue;
+    const Side& side = sides_[shooter.place.side];
+    const auto level = static_cast<std::uint8_t>(shooter.place.level);
+    const auto rect = leafRect(side, shooter.place);
+    for (auto y = rect.y0; y < rect.y1; ++y) {
+      for (auto x = rect.x0; x < rect.x1; ++x) {
+        auto& known = levels[side.first_node + y * side.width + x];
+        known = std::min(known, level);
+      }
+    }
+  }
+  return levels;
+}
+
 EnergyParts LinkedSolver::energy() const {
   EnergyParts parts;
   std::array<double, 3> lit{};  // sent by lights that have links

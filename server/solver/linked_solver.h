@@ -34,6 +34,8 @@ class LinkedSolver final : public Solver {
 
   [[nodiscard]] const std::vector<glm::vec3>& irradiance() const override { return irradiance_; }
   [[nodiscard]] std::vector<glm::vec3> halfIrradiance(std::uint32_t half) const override;
+  [[nodiscard]] std::vector<glm::vec3> unshot() const override;
+  [[nodiscard]] std::vector<std::uint8_t> shotLevels() const override;
   [[nodiscard]] const ErrorParts& error() const override { return error_; }
   [[nodiscard]] EnergyParts energy() const override;
   [[nodiscard]] const TransportCounters& transportCounters() const override { return counters_; }
@@ -77,6 +79,7 @@ class LinkedSolver final : public Solver {
   void takeLights();
   [[nodiscard]] bool settle();
   void findUnshot();
+  void leafUnshot(std::uint32_t side, std::vector<glm::vec3>& leaves) const;
   void startGrowth();
   [[nodiscard]] Result<StepOutcome> advance();
   [[nodiscard]] StepOutcome finishRound();

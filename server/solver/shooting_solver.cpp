@@ -238,6 +238,25 @@ std::vector<glm::vec3> ShootingSolver::halfIrradiance(std::uint32_t half) const 
   return values;
 }
 
+std::vector<glm::vec3> ShootingSolver::unshot() const {
+  std::vector<glm::vec3> values(state_.patches().nodeCount(), glm::vec3(0.0F));
+  const auto rounds = static_cast<float>(state_.rounds());
+  for (const auto& side : state_.sides()) {
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
+      values[side.first_node + leaf] = state_.unshot(side, leaf) / rounds;
+  }
+  return values;
+}
+
+std::vector<std::uint8_t> ShootingSolver::shotLevels() const {
+  std::vector<std::uint8_t> levels(state_.patches().nodeCount(), kNeverShot);
+  for (const auto& side : state_.sides()) {
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
+      levels[side.first_node + leaf] = state_.shotLevel(side, leaf);
+  }
+  return levels;
+}
+
 EnergyParts ShootingSolver::energy() const {
   EnergyParts parts = energyBalance(state_, planner_.intended(), gather_emitted_, punctual_.flux());
   for (std::size_t c = 0; c < 3; ++c) {  // on its way: as good as unshot

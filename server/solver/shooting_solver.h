@@ -34,6 +34,8 @@ class ShootingSolver final : public Solver {
 
   [[nodiscard]] const std::vector<glm::vec3>& irradiance() const override { return irradiance_; }
   [[nodiscard]] std::vector<glm::vec3> halfIrradiance(std::uint32_t half) const override;
+  [[nodiscard]] std::vector<glm::vec3> unshot() const override;
+  [[nodiscard]] std::vector<std::uint8_t> shotLevels() const override;
   [[nodiscard]] const ErrorParts& error() const override { return error_; }
   [[nodiscard]] EnergyParts energy() const override;
   [[nodiscard]] const TransportCounters& transportCounters() const override { return transport_counters_; }

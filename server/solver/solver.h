@@ -78,6 +78,12 @@ class Solver {
   [[nodiscard]] virtual const std::vector<glm::vec3>& irradiance() const = 0;
   /// The same from one of the two independent halves of the samples.
   [[nodiscard]] virtual std::vector<glm::vec3> halfIrradiance(std::uint32_t half) const = 0;
+  /// Radiosity (lux, signed) by node, level 0, that is still to be shot. What light polygons emit is not in it: they
+  /// are owed by the light, not by its leaves.
+  [[nodiscard]] virtual std::vector<glm::vec3> unshot() const = 0;
+  /// By node, level 0: the level of the node that last shot for this leaf; kNeverShot where none has.
+  [[nodiscard]] virtual std::vector<std::uint8_t> shotLevels() const = 0;
+  static constexpr std::uint8_t kNeverShot = 255;
   [[nodiscard]] virtual const ErrorParts& error() const = 0;
   [[nodiscard]] virtual EnergyParts energy() const = 0;
   [[nodiscard]] virtual const TransportCounters& transportCounters() const = 0;

@@ -29,6 +29,7 @@ RadiosityState::RadiosityState(std::shared_ptr<const scene::PatchScene> patches,
   emission_.resize(values);
   reflectance_.resize(values);
   shot_.assign(values, glm::vec3(0.0F));
+  shot_level_.assign(values, 255);
   irradiance_.assign(values, glm::vec3(0.0F));
   unshot_.assign(values, glm::vec3(0.0F));
   node_rough_.assign(patches_->nodeCount(), 0.0F);
@@ -215,6 +216,7 @@ glm::dvec3 RadiosityState::markShot(Side& side, std::uint32_t level, std::uint32
       flux += glm::dvec3(unshot_[v]) * static_cast<double>(leafArea(side, leaf));
       shot_[v] = rounds * scatterRadiosity(side, leaf);
       unshot_[v] = glm::vec3(0.0F);
+      shot_level_[v] = static_cast<std::uint8_t>(level);
     }
   }
   pullAround(side, level, x, y);
@@ -234,6 +236,7 @@ glm::dvec3 RadiosityState::markMeanShot(Side& side, std::uint32_t level, std::ui
       shot_[v] += mean;
       flux += glm::dvec3(mean) * static_cast<double>(leafArea(side, leaf));
       unshot_[v] = rounds * scatterRadiosity(side, leaf) - shot_[v];
+      shot_level_[v] = static_cast<std::uint8_t>(level);
     }
   }
   pullAround(side, level, x, y);

@@ -68,6 +68,11 @@ class RadiosityState {
     return irradiance_[side.first_value + leaf];
   }
 
+  /// Level of the node that last shot for this leaf; 255: none has.
+  [[nodiscard]] std::uint8_t shotLevel(const Side& side, std::uint32_t leaf) const {
+    return shot_level_[side.first_value + leaf];
+  }
+
   /// The leaves under a node are as good as shot: S becomes rounds B' there. Keeps the pyramids right. Returns the
   /// flux, per channel, that was unshot there.
   glm::dvec3 markShot(Side& side, std::uint32_t level, std::uint32_t x, std::uint32_t y);
@@ -114,6 +119,7 @@ class RadiosityState {
   std::vector<glm::vec3> emission_, reflectance_;  // by leaf value
   std::array<std::vector<Flux3>, 2> received_;     // by node, H as integers, unpushed
   std::vector<glm::vec3> shot_;                    // by leaf value: S, summed over rounds
+  std::vector<std::uint8_t> shot_level_;           // by leaf value
   std::vector<glm::vec3> irradiance_, unshot_;     // by leaf value, derived by pushPull
   std::vector<float> node_rough_;                  // by node, derived by pushPull
   std::vector<glm::vec3> node_flux_;               // by node, derived by pushPull

@@ -14,13 +14,25 @@ int across(int texels) {
   return (texels + static_cast<int>(engine::kTileSize) - 1) / static_cast<int>(engine::kTileSize);
 }
 
-void fillTile(Image& image, int tile, std::uint64_t version, float brightest) {
+/// Calls `set(x, y)` for the texels of a tile.
+template <typename Set>
+void overTile(glm::ivec2 size, int tile, const Set& set) {
   const int side = static_cast<int>(engine::kTileSize);
-  const int x0 = tile % across(image.width) * side;
-  const int y0 = tile / across(image.width) * side;
-  for (int y = y0; y < std::min(y0 + side, image.height); ++y)
-    for (int x = x0; x < std::min(x0 + side, image.width); ++x)
-      image.at(x, y) = FakeEngine::pattern(x, y, version, brightest);
+  const int x0 = tile % across(size.x) * side;
+  const int y0 = tile / across(size.x) * side;
+  for (int y = y0; y < std::min(y0 + side, size.y); ++y)
+    for (int x = x0; x < std::min(x0 + side, size.x); ++x) set(x, y);
+}
+
+void fillTile(engine::PageSnapshot& page, std::size_t mip, int tile, std::uint64_t version, float brightest) {
+  overTile(page.size(mip), tile, [&](int x, int y) {
+    if (!page.mips.empty()) {
+      page.mips[mip].at(x, y) = FakeEngine::pattern(x, y, version, brightest);
+    } else {
+      auto& ids = page.id_mips[mip];
+      ids.ids[static_cast<std::size_t>(y * ids.width + x)] = FakeEngine::idPattern(x, y, version);
+    }
+  });
 }
 
 }  // namespace
@@ -36,18 +48,28 @@ glm::vec3 FakeEngine::pattern(int x, int y, std::uint64_t version, float brighte
   return glm::vec3(value, 0.5F * value, 0.25F * value) * brightest;
 }
 
+std::uint32_t FakeEngine::idPattern(int x, int y, std::uint64_t version) {
+  return static_cast<std::uint32_t>(x * 1000 + y) * 100U + static_cast<std::uint32_t>(version);
+}
+
 FakeEngine::FakeEngine(Layout layout) : layout_(layout) {
   status_.gl_renderer = "none (fake)";
   status_.patches = 1000;
+  status_.pages = static_cast<std::uint64_t>(layout.pages);
   status_.counters["skipped_shots"] = 7;
 }
 
-std::shared_ptr<engine::PageSnapshot> FakeEngine::emptyPage() const {
+std::shared_ptr<engine::PageSnapshot> FakeEngine::emptyPage(engine::Quantity quantity) const {
   auto page = std::make_shared<engine::PageSnapshot>();
   for (int m = 0; m < layout_.mips; ++m) {
     const int width = std::max(1, layout_.width >> m);
     const int height = std::max(1, layout_.height >> m);
-    page->mips.emplace_back(width, height);
+    if (engine::holdsIds(quantity)) {
+      page->id_mips.push_back(
+          {width, height, std::vector<std::uint32_t>(static_cast<std::size_t>(width * height), engine::kNoId)});
+    } else {
+      page->mips.emplace_back(width, height);
+    }
     const auto tiles = static_cast<std::size_t>(across(width)) * static_cast<std::size_t>(across(height));
     page->tile_version.emplace_back(tiles, 0);
     page->tile_change.emplace_back(tiles, 0.0F);
@@ -55,31 +77,32 @@ std::shared_ptr<engine::PageSnapshot> FakeEngine::emptyPage() const {
   return page;
 }
 
-std::uint64_t FakeEngine::publish(float brightest) {
+std::uint64_t FakeEngine::publish(float brightest, engine::Quantity quantity) {
   std::uint64_t version = 0;
   {
     const std::lock_guard lock(mutex_);
     version = ++status_.tile_version;
     auto next = std::make_shared<engine::Lightmaps>();
     for (int p = 0; p < layout_.pages; ++p) {
-      auto page = emptyPage();
-      for (std::size_t m = 0; m < page->mips.size(); ++m)
+      auto page = emptyPage(quantity);
+      for (std::size_t m = 0; m < page->mipCount(); ++m)
         for (std::size_t t = 0; t < page->tile_version[m].size(); ++t) {
-          fillTile(page->mips[m], static_cast<int>(t), version, brightest);
+          fillTile(*page, m, static_cast<int>(t), version, brightest);
           page->tile_version[m][t] = version;
           page->tile_change[m][t] = 1.0F;
         }
       next->pages.push_back(std::move(page));
     }
+    next->quantity = quantity;
     next->layout = layout_number_;
     next->revision = status_.revision;
     next->tile_version = version;
     next->shots = static_cast<std::uint32_t>(status_.shots);
     next->error = static_cast<float>(status_.error.total);
     next->final = status_.state == engine::SolveState::kConverged;
-    lightmaps_ = std::move(next);
+    lightmaps_[static_cast<std::size_t>(quantity)] = std::move(next);
   }
-  announceLightmaps();
+  announceLightmaps(quantity);
   return version;
 }
 
@@ -88,16 +111,16 @@ std::uint64_t FakeEngine::publishTile(std::uint32_t page, std::uint32_t tile) {
   {
     const std::lock_guard lock(mutex_);
     version = ++status_.tile_version;
-    auto next = std::make_shared<engine::Lightmaps>(*lightmaps_);
+    auto next = std::make_shared<engine::Lightmaps>(*lightmaps_[0]);
     auto changed = std::make_shared<engine::PageSnapshot>(*next->pages.at(page));
-    fillTile(changed->mips[0], static_cast<int>(tile), version, 100.0F);
+    fillTile(*changed, 0, static_cast<int>(tile), version, 100.0F);
     changed->tile_version[0].at(tile) = version;
     changed->tile_change[0].at(tile) = 0.5F;
     next->pages[page] = std::move(changed);
     next->tile_version = version;
-    lightmaps_ = std::move(next);
+    lightmaps_[0] = std::move(next);
   }
-  announceLightmaps();
+  announceLightmaps(engine::Quantity::kIrradiance);
   return version;
 }
 
@@ -105,10 +128,19 @@ void FakeEngine::changeLayout(Layout layout) {
   const std::lock_guard lock(mutex_);
   layout_ = layout;
   ++layout_number_;
+  status_.pages = static_cast<std::uint64_t>(layout.pages);
+  status_.layout_since = status_.tile_version + 1;
 }
 
-void FakeEngine::announceLightmaps() {
-  const auto now = lightmaps();
+std::shared_ptr<void> FakeEngine::watch(engine::Quantity quantity) {
+  const auto i = static_cast<std::size_t>(quantity);
+  ++(*watchers_)[i];
+  if (lightmaps(quantity)) announceLightmaps(quantity);
+  return {watchers_.get(), [watchers = watchers_, i](void*) { --(*watchers)[i]; }};
+}
+
+void FakeEngine::announceLightmaps(engine::Quantity quantity) {
+  const auto now = lightmaps(quantity);
   for (const auto& listener : listeners()) listener->onLightmaps(now);
 }
 
@@ -147,6 +179,11 @@ void FakeEngine::answer(std::function<void()> call) {
   call();
 }
 
+void FakeEngine::setSceneText(std::string gltf) {
+  const std::lock_guard lock(mutex_);
+  scene_text_ = std::move(gltf);
+}
+
 std::uint64_t FakeEngine::patchesSeen() const {
   const std::lock_guard lock(mutex_);
   return patches_;
@@ -165,6 +202,7 @@ void FakeEngine::loaded(std::string what, Callback<engine::LoadOutcome> done) {
     revision = ++status_.revision;
     status_.state = engine::SolveState::kSolving;
     ++layout_number_;
+    status_.layout_since = status_.tile_version + 1;
   }
   for (const auto& listener : listeners()) listener->onSceneLoaded(revision);
   answer([done = std::move(done), revision] {
@@ -225,14 +263,18 @@ engine::Status FakeEngine::status() const {
   return status_;
 }
 
-std::shared_ptr<const engine::Lightmaps> FakeEngine::lightmaps() const {
+std::shared_ptr<const engine::Lightmaps> FakeEngine::lightmaps(engine::Quantity quantity) const {
   const std::lock_guard lock(mutex_);
-  return lightmaps_;
+  return lightmaps_[static_cast<std::size_t>(quantity)];
 }
 
 void FakeEngine::sceneText(Callback<SceneText> done) {
-  const auto revision = status().revision;
-  answer([done = std::move(done), revision] { done(SceneText{revision, R"({"asset":{"version":"2.0"}})"}); });
+  SceneText text;
+  {
+    const std::lock_guard lock(mutex_);
+    text = {status_.revision, scene_text_};
+  }
+  answer([done = std::move(done), text = std::move(text)] { done(text); });
 }
 void FakeEngine::sceneGlb(Callback<SharedBytes> done) {
   answer([done] { done(bytesOf("glTF scene")); });
@@ -240,10 +282,11 @@ void FakeEngine::sceneGlb(Callback<SharedBytes> done) {
 void FakeEngine::unlitGlb(Callback<SharedBytes> done) {
   answer([done] { done(bytesOf("glTF unlit")); });
 }
-void FakeEngine::lightmapExr(std::uint32_t page, Callback<SharedBytes> done) {
-  answer([done, page] {
+void FakeEngine::lightmapExr(std::uint32_t page, engine::Quantity quantity, Callback<SharedBytes> done) {
+  answer([done, page, quantity] {
     if (page > 0) return done(fail(ErrorCode::kNotFound, "there is one lightmap page", fmt::format("page {}", page)));
-    done(bytesOf("exr"));
+    done(
+        bytesOf(quantity == engine::Quantity::kIrradiance ? "exr" : fmt::format("exr {}", static_cast<int>(quantity))));
   });
 }
 void FakeEngine::snapshot(engine::SnapshotRequest request, Callback<SharedBytes> done) {

@@ -2,6 +2,8 @@
 // when the test says so. Thread-safe; callbacks come on the calling thread, as an engine may do.
 #pragma once
 
+#include <array>
+#include <atomic>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -21,8 +23,8 @@ class FakeEngine : public engine::Engine {
   explicit FakeEngine(Layout layout = {});
 
   // ---- what a test does to it ----
-  /// All tiles change; the brightest texel is `brightest` lux. Returns the tile version.
-  std::uint64_t publish(float brightest = 100.0F);
+  /// All tiles change; the brightest texel is `brightest` lux. Returns the tile version. Whole numbers are idPattern().
+  std::uint64_t publish(float brightest = 100.0F, engine::Quantity quantity = engine::Quantity::kIrradiance);
   /// Only this tile of mip 0 changes.
   std::uint64_t publishTile(std::uint32_t page, std::uint32_t tile);
   void changeLayout(Layout layout);
@@ -30,6 +32,7 @@ class FakeEngine : public engine::Engine {
   /// Callbacks are kept until release().
   void holdAnswers();
   void release();
+  void setSceneText(std::string gltf);
   [[nodiscard]] std::uint64_t patchesSeen() const;
   [[nodiscard]] std::string lastLoad() const;  ///< "name: 123 bytes" or "file PATH"
 
@@ -42,31 +45,40 @@ class FakeEngine : public engine::Engine {
   void resume(Callback<engine::SolveState> done) override;
   void restart(Callback<engine::SolveState> done) override;
   [[nodiscard]] engine::Status status() const override;
-  [[nodiscard]] std::shared_ptr<const engine::Lightmaps> lightmaps() const override;
+  using engine::Engine::lightmaps;
+  [[nodiscard]] std::shared_ptr<void> watch(engine::Quantity quantity) override;
+  [[nodiscard]] std::shared_ptr<const engine::Lightmaps> lightmaps(engine::Quantity quantity) const override;
   void sceneText(Callback<SceneText> done) override;
   void sceneGlb(Callback<SharedBytes> done) override;
   void unlitGlb(Callback<SharedBytes> done) override;
-  void lightmapExr(std::uint32_t page, Callback<SharedBytes> done) override;
+  void lightmapExr(std::uint32_t page, engine::Quantity quantity, Callback<SharedBytes> done) override;
   void snapshot(engine::SnapshotRequest request, Callback<SharedBytes> done) override;
   void addListener(std::weak_ptr<engine::Listener> listener) override;
 
   /// The value that publish() put at a texel: for tests to compare what arrives.
   [[nodiscard]] static glm::vec3 pattern(int x, int y, std::uint64_t version, float brightest);
+  [[nodiscard]] static std::uint32_t idPattern(int x, int y, std::uint64_t version);
+  /// Who watches a quantity now.
+  [[nodiscard]] int watchers(engine::Quantity quantity) const {
+    return (*watchers_)[static_cast<std::size_t>(quantity)];
+  }
 
  private:
   void answer(std::function<void()> call);
   void setState(engine::SolveState state, Callback<engine::SolveState> done);
   void loaded(std::string what, Callback<engine::LoadOutcome> done);
   [[nodiscard]] std::vector<std::shared_ptr<engine::Listener>> listeners() const;
-  [[nodiscard]] std::shared_ptr<engine::PageSnapshot> emptyPage() const;
-  void announceLightmaps();
+  [[nodiscard]] std::shared_ptr<engine::PageSnapshot> emptyPage(engine::Quantity quantity) const;
+  void announceLightmaps(engine::Quantity quantity);
 
   mutable std::mutex mutex_;
   Layout layout_;
   engine::Status status_;
-  std::shared_ptr<const engine::Lightmaps> lightmaps_;
+  std::array<std::shared_ptr<const engine::Lightmaps>, engine::kQuantityCount> lightmaps_;
+  using Watchers = std::array<std::atomic<int>, engine::kQuantityCount>;
+  std::shared_ptr<Watchers> watchers_ = std::make_shared<Watchers>();
   std::uint64_t layout_number_ = 1, patches_ = 0;
-  std::string last_load_;
+  std::string last_load_, scene_text_ = R"({"asset":{"version":"2.0"}})";
   std::vector<std::weak_ptr<engine::Listener>> listeners_;
   bool holding_ = false;
   std::vector<std::function<void()>> held_;

@@ -1,8 +1,10 @@
 // radiosityd with the fake engine: the network as it is, light that is only a pattern. For developing clients and for
-// tests of the command line; not installed.
+// tests of the command line and of the wire; not installed. RADIOSITY_FAKE_PATIENCE_MS shortens what the server waits
+// for a peer, and gives it a long grace at its end, so that what is not cut off shows.
 #include <atomic>
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <thread>
 
 #include "common/log.h"
@@ -10,10 +12,24 @@
 #include "server/options.h"
 #include "tests/service/fake_engine.h"
 
+namespace {
+
+void shorten(radiosity::net::ServerOptions& options) {
+  const char* text = std::getenv("RADIOSITY_FAKE_PATIENCE_MS");
+  if (text == nullptr) return;
+  const std::chrono::milliseconds patience(std::strtol(text, nullptr, 10));
+  options.hello_timeout = options.write_deadline = options.close_patience = options.header_timeout =
+      options.drain_patience = patience;
+  options.drain_grace = std::chrono::minutes(10);
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
   using namespace radiosity;
-  const auto parsed = parseOptions(argc, argv, "0.0.0-fake");
+  auto parsed = parseOptions(argc, argv, "0.0.0-fake");
   if (parsed.exit_code) return *parsed.exit_code;
+  shorten(parsed.options.server);
   startLog("fake_radiosityd", parsed.options.log_level);
   testing::FakeEngine fake({2, 512, 256, 4});
   fake.configure(parsed.options.solve, [](const auto&) {});

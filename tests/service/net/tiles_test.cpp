@@ -96,8 +96,6 @@ TEST(Tiles, TheSubscriptionChoosesPagesAndMips) {
     EXPECT_EQ(decodeTile(frame)->header.page, 1U);
     EXPECT_EQ(decodeTile(frame)->header.mip, 1U);
   }
-  call.quantity = Quantity::kPatchId;
-  EXPECT_EQ(codeOf(socket.call(call)), -32602);
 }
 
 TEST(Tiles, ANewLayoutIsAnnouncedBeforeItsTiles) {

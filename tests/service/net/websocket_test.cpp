@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fmt/format.h>
+
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -133,6 +135,38 @@ TEST(Messages, ABatchIsAnsweredInOneArray) {
     return;
   }
   FAIL() << "no answer";
+}
+
+TEST(Messages, ABatchIsNotAnsweredWithMoreThanAMessageHolds) {
+  RunningServer server;
+  server.engine.setSceneText(R"({"asset":{"version":"2.0"},"extras":")" + std::string(200'000, 'x') + "\"}");
+  TestSocket socket(server.port());
+  socket.hello();
+  std::string batch;
+  for (int i = 0; i < 20; ++i)
+    batch += (i == 0 ? "[" : ",") + fmt::format(R"({{"jsonrpc":"2.0","id":{},"method":"scene.get"}})", i);
+  socket.sendText(batch + "]");
+  while (const auto message = socket.read()) {
+    const auto answers = nlohmann::json::parse(message->text());
+    if (!answers.is_array()) continue;
+    EXPECT_LE(message->bytes.size(), kMaxMessageBytes);
+    ASSERT_EQ(answers.size(), 20U);
+    EXPECT_TRUE(answers[0].contains("result"));
+    EXPECT_EQ(answers[19]["error"]["code"], -32013);
+    EXPECT_EQ(answers[19]["id"], 19);
+    return;
+  }
+  FAIL() << "no answer";
+}
+
+TEST(Messages, APatchThatOthersCouldNotBeToldOfIsTooLarge) {
+  RunningServer server;
+  TestSocket socket(server.port());
+  socket.hello();
+  auto patch = somePatch();
+  patch.patch = R"([{"op":"add","path":"/extras","value":")" + std::string(kMaxMessageBytes - 1500, 'x') + "\"}]";
+  EXPECT_EQ(codeOf(socket.call(patch)), -32013);
+  EXPECT_EQ(server.engine.patchesSeen(), 0U);
 }
 
 TEST(Messages, OneOverTheLimitClosesTheSession) {

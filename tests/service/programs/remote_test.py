@@ -63,7 +63,7 @@ class RemoteTest(ServiceCase):
 
     def test_snapshotWritesAPicture(self):
         server = self.solved()
-        for extra in ((), ("--camera", "front"), ("--quantity", "irradiance")):
+        for extra in ((), ("--camera", "front"), *(("--quantity", quantity) for quantity in ("irradiance", "unshot", "error", "mipLevel", "normal"))):
             self.client("snapshot", server.url, "-o", "a.png", "--width", 64, "--height", 48, *extra)
             png = (self.folder / "a.png").read_bytes()
             self.assertEqual(png[:8], b"\x89PNG\r\n\x1a\n")
@@ -73,8 +73,8 @@ class RemoteTest(ServiceCase):
 
     def test_saveWritesSceneAndLightmaps(self):
         server = self.solved()
-        out, _ = self.client("save", server.url, "-o", "again.glb")
-        self.assertEqual(out.splitlines(), ["again.glb", "again.lightmap.0.exr"])
+        out, _ = self.client("save", server.url, "-o", "again.glb", "--error-map")
+        self.assertEqual(out.splitlines(), ["again.glb", "again.lightmap.0.exr", "again.error.0.exr"])
         for ending in (".glb", ".lightmap.0.exr"):
             self.assertEqual((self.folder / f"again{ending}").read_bytes(), (self.folder / f"lit{ending}").read_bytes())
 

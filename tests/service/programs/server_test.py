@@ -108,6 +108,37 @@ class ServerTest(ServiceCase):
         self.assertNotIn(None, page.pixels, "tiles leave holes in the page")
         return page.mean_in(uvs), (page_index, uvs)
 
+    def test_everyQuantityIsStreamedAndFetched(self):
+        async def body():
+            session, status = await self.solved()
+            finest = {}
+            for kind, quantity in enumerate(("irradiance", "radiosity", "error", "patchId", "mipLevel", "unshot", "normal")):
+                self.assertIn(f"quantity.{quantity}", session.info["capabilities"])
+                session.tiles.clear()
+                await session.call("subscribe", quantity=quantity)
+                self.assertEqual((await session.note("lightmaps"))["params"]["quantity"], quantity)
+                while (await session.note("bookmark"))["params"]["quantity"] != quantity:
+                    pass
+                tiles = [tile for tile in session.tiles if tile.kind == kind]
+                self.assertEqual({tile.format for tile in tiles}, {3 if quantity in ("patchId", "mipLevel") else 0})
+                finest[quantity] = [p for t in sorted(tiles, key=lambda t: (t.page, t.y, t.x)) if t.mip == 0
+                                    for p in t.pixels]
+                self.assertEqual((await asyncio.to_thread(self.get, f"/lightmaps/0.exr?quantity={quantity}"))[:4],
+                                 b"\x76\x2f\x31\x01")
+            patches = [i for i, (patch,) in enumerate(finest["patchId"]) if patch != 0xFFFFFFFF]
+            self.assertEqual(len(patches), status["patches"])
+            self.assertEqual(len({finest["patchId"][i] for i in patches}), len(patches))
+            for i in patches:
+                self.assertGreaterEqual(finest["radiosity"][i][0], 0)
+                n = [2 * v - 1 for v in finest["normal"][i]]
+                self.assertAlmostEqual(sum(v * v for v in n), 1, delta=0.01)
+            sums = {q: sum(v * v for i in patches for v in finest[q][i]) for q in ("error", "irradiance")}
+            # All texels are of one size; a tile that hardly changed may be a little old.
+            self.assertAlmostEqual((sums["error"] / sums["irradiance"]) ** 0.5 / status["error"]["total"], 1, delta=0.1)
+            await session.close()
+
+        self.run_async(body())
+
     def test_racingEditsHaveOneWinner(self):
         async def body():
             session, status = await self.solved()

@@ -57,6 +57,18 @@ class SolveTest(ServiceCase):
         # both faces of the lamp's square: its front emits pi * L * 1 m2, times three channels
         self.assertAlmostEqual(energy["emitted"], 3 * 3.14159265 * plates.LUMINANCE_NITS, delta=0.01)
 
+    def test_errorMapAmountsToTheStatedError(self):
+        out, _ = self.client("solve", self.scene, "-o", "lit.glb", "--error-map", "--report", "r.json", *QUICK)
+        self.assertEqual(out.splitlines(), ["lit.glb", "lit.lightmap.0.exr", "lit.error.0.exr"])
+        light, error = (plates.Page.from_exr(self.folder / f"lit.{what}.0.exr", program("EXR_DUMP"))
+                        for what in ("lightmap", "error"))
+        self.assertEqual((light.width, light.height), (error.width, error.height))
+        self.assertGreaterEqual(min(min(p) for p in error.pixels), 0)
+        # All texels are of one size here; gutters and edges, which are filled from their neighbours, count a little too.
+        squares = [sum(v * v for p in page.pixels for v in p) for page in (error, light)]
+        stated = json.loads((self.folder / "r.json").read_text())["error"]["total"]
+        self.assertAlmostEqual((squares[0] / squares[1]) ** 0.5 / stated, 1, delta=0.25)
+
     def test_readsAGltfWithItsBufferBesideIt(self):
         plates.write_gltf(self.folder / "room.gltf", plates.lit_document(), "my data.bin")
         self.client("solve", "room.gltf", "-o", "lit.glb", *QUICK)

@@ -7,7 +7,7 @@ import zlib
 import websockets
 
 HEADER = struct.Struct("<4sBBBBIHHIIHHiQQIfII")
-RGBA16F, RGBA32F = 0, 2
+RGBA16F, RGBA32F, R32UI = 0, 2, 3
 
 
 def _crc32c_table():
@@ -43,10 +43,10 @@ class Tile:
         assert 1 <= self.width <= 64 and 1 <= self.height <= 64, (self.width, self.height)
         assert self.x % 64 == 0 and self.y % 64 == 0, (self.x, self.y)
         raw = zlib.decompress(payload) if self.codec == 1 else payload
-        pixel = {RGBA16F: "<4e", RGBA32F: "<4f"}[self.format]
+        pixel = {RGBA16F: "<4e", RGBA32F: "<4f", R32UI: "<I"}[self.format]
         assert len(raw) == self.width * self.height * struct.calcsize(pixel), len(raw)
         assert crc32c(raw) == crc, "CRC-32C"
-        scale = 2.0 ** self.exponent
+        scale = 2.0 ** self.exponent if self.format != R32UI else 1
         self.pixels = [tuple(v * scale for v in p[:3]) for p in struct.iter_unpack(pixel, raw)]
 
 

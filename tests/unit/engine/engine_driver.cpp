@@ -97,6 +97,7 @@ void EngineTest::SetUp() {
   ASSERT_TRUE(made) << made.error().text();
   engine_ = std::move(*made);
   engine_->addListener(recorder_);
+  watching_ = engine_->watch(engine::Quantity::kIrradiance);
 }
 
 Result<engine::LoadOutcome> EngineTest::load(const test_scenes::TestScene& scene) {

@@ -105,6 +105,7 @@ class EngineTest : public testing::Test {
   std::shared_ptr<TransportScript> script_ = std::make_shared<TransportScript>();
   std::shared_ptr<Recorder> recorder_ = std::make_shared<Recorder>();
   std::unique_ptr<engine::Engine> engine_;
+  std::shared_ptr<void> watching_;  ///< irradiance
 };
 
 /// Options for an engine that casts rays as `script` says.

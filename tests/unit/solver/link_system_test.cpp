@@ -67,7 +67,7 @@ class LinkSystems : public testing::Test {
       a[m][m] += 1.0;
       for (std::size_t k = 0; k <= n; ++k) {
         std::vector<float> links(side.leaf_count, 0.0F);
-        if (k < n) (void)shooters[k].column[half].decode(shooters[m].place.side, links);
+        if (k < n) (void)shooters[k].column[half].decode(sides_[shooters[m].place.side].first_value, links);
         double mean = 0.0;
         for (auto y = rect.y0; y < rect.y1; ++y) {
           for (auto x = rect.x0; x < rect.x1; ++x) {

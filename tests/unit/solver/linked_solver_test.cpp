@@ -230,6 +230,7 @@ TEST_F(LinkMemoryBound, ThatIsUsedUpDoesNotMakeAnEditStartOver) {
   const auto shots = solver_->shots();
   quads_[1].emission *= 0.25F;
   solver_->setMaterials(makeQuadScene(quads_).materials);
+  solver_->assess();
   EXPECT_EQ(solver_->shots(), shots);
   const auto node = made_.patches->surfaces[0].first_node[0] + 5;
   EXPECT_NEAR(solver_->irradiance()[node].x / before[node].x, 0.25F, 0.01F);

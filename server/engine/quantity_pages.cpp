@@ -1,0 +1,102 @@
+#include "server/engine/quantity_pages.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "server/solver/texel_error.h"
+
+namespace radiosity::engine {
+namespace {
+
+using scene::Seams;
+
+std::vector<glm::vec3> radiosity(const LitScene& lit) {
+  const auto& irradiance = lit.solver().irradiance();
+  std::vector<glm::vec3> values(irradiance.size());
+  for (std::size_t n = 0; n < values.size(); ++n)
+    values[n] = lit.materials().emission[n] + lit.materials().reflectance[n] * irradiance[n];
+  return values;
+}
+
+std::vector<glm::vec3> errorSquared(const LitScene& lit) {
+  const auto& solver = lit.solver();
+  return solver::texelErrorSquared(lit.patches(), solver.halfIrradiance(0), solver.halfIrradiance(1),
+                                   solver.irradiance(), solver.error());
+}
+
+/// Of the front, for both sides: their mean would be nothing.
+std::vector<glm::vec3> normals(const LitScene& lit) {
+  const auto& patches = lit.patches();
+  std::vector<glm::vec3> values(patches.nodeCount(), glm::vec3(0.5F));
+  for (const auto& surface : patches.surfaces) {
+    for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf) {
+      const auto triangle = patches.leaves[surface.first_leaf + leaf].triangle;
+      if (triangle == scene::kNone) continue;
+      for (const auto first : surface.first_node) {
+        if (first != scene::kNone) values[first + leaf] = 0.5F + 0.5F * patches.triangles[triangle].normal;
+      }
+    }
+  }
+  return values;
+}
+
+/// `idOf(node)` of each leaf with area, front first, at its texel. Where a file's own charts overlap, the first is
+/// shown.
+template <typename IdOf>
+std::vector<IdImage> placeIds(const scene::PatchScene& patches, const IdOf& idOf) {
+  std::vector<IdImage> pages;
+  for (const auto& page : patches.pages)
+    pages.push_back({static_cast<int>(page.width), static_cast<int>(page.height),
+                     std::vector<std::uint32_t>(std::size_t{page.width} * page.height, kNoId)});
+  for (const auto& surface : patches.surfaces) {
+    auto& page = pages[surface.page];
+    for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf) {
+      const std::size_t x = surface.page_x + leaf % surface.width, y = surface.page_y + leaf / surface.width;
+      auto& id = page.ids[y * static_cast<std::size_t>(page.width) + x];
+      for (const auto first : surface.first_node) {
+        if (id == kNoId && first != scene::kNone && patches.node_area[first + leaf] > 0.0F) id = idOf(first + leaf);
+      }
+    }
+  }
+  return pages;
+}
+
+std::vector<IdImage> idPages(const LitScene& lit, Quantity quantity) {
+  if (quantity == Quantity::kPatchId) return placeIds(lit.patches(), [](std::uint32_t node) { return node; });
+  const auto levels = lit.solver().shotLevels();
+  return placeIds(lit.patches(), [&](std::uint32_t node) {
+    return levels[node] == solver::Solver::kNeverShot ? kNoId : std::uint32_t{levels[node]};
+  });
+}
+
+}  // namespace
+
+QuantityPages makePages(const LitScene& lit, Quantity quantity) {
+  const auto& patches = lit.patches();
+  switch (quantity) {
+    case Quantity::kIrradiance:
+      return {quantity, lit.pages(), {}, false};
+    case Quantity::kRadiosity:
+      return {quantity, assemblePages(patches, radiosity(lit), Seams::kLeft), {}, false};
+    case Quantity::kError:
+      return {quantity, assemblePages(patches, errorSquared(lit), Seams::kLeft), {}, true};
+    case Quantity::kUnshot:
+      return {quantity, assemblePages(patches, lit.solver().unshot(), Seams::kLeft), {}, false};
+    case Quantity::kNormal:
+      return {quantity, assemblePages(patches, normals(lit), Seams::kLeft), {}, false};
+    case Quantity::kPatchId:
+    case Quantity::kMipLevel:
+      break;
+  }
+  return {quantity, {}, idPages(lit, quantity), false};
+}
+
+Image shown(const QuantityPages& pages, Image values) {
+  if (!pages.squared) return values;
+  for (auto& pixel : values.pixels)
+    for (int c = 0; c < 3; ++c) pixel[c] = std::sqrt(std::max(0.0F, pixel[c]));
+  return values;
+}
+
+}  // namespace radiosity::engine

@@ -1,0 +1,83 @@
+// What viewers see: which quantities are published, and when.
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <ctime>
+#include <utility>
+
+#include "server/engine/quantity_pages.h"
+#include "server/engine/solve_loop_class.h"
+
+namespace radiosity::engine {
+namespace {
+
+/// Oftener than anyone can see a difference.
+constexpr auto kPublishInterval = std::chrono::milliseconds(50);
+/// Making pages takes no more than one part in so many of the solve thread's time, however large they are.
+constexpr int kPublishShare = 20;
+
+/// Processor time of this thread: on a busy machine pages are no more work than on a quiet one.
+std::chrono::nanoseconds threadTime() {
+  timespec now{};
+  (void)clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return std::chrono::seconds(now.tv_sec) + std::chrono::nanoseconds(now.tv_nsec);
+}
+
+constexpr std::array kQuantities = {Quantity::kIrradiance, Quantity::kRadiosity, Quantity::kError, Quantity::kPatchId,
+                                    Quantity::kMipLevel,   Quantity::kUnshot,    Quantity::kNormal};
+static_assert(kQuantities.size() == kQuantityCount);
+
+}  // namespace
+
+void SolveLoop::publishLightmaps(bool final) {
+  const bool watched = std::any_of(kQuantities.begin(), kQuantities.end(), [&](auto q) { return watches_.wants(q); });
+  if (!lit_) return;
+  if (!watched) {
+    if (unpublished_ || final) ++unwatched_;
+    return;
+  }
+  const auto begin = threadTime();
+  if (unpublished_ || final) publisher_.startVersion();
+  unpublished_ = false;
+  updateStatus(false);
+  for (const auto quantity : kQuantities) publishQuantity(quantity);
+  next_publish_ = Clock::now() + std::max<Clock::duration>(kPublishInterval, kPublishShare * (threadTime() - begin));
+}
+
+void SolveLoop::publishQuantity(Quantity quantity) {
+  auto shown = publisher_.latest(quantity);
+  if (watches_.wants(quantity)) {
+    const bool added = watches_.takeAdded(quantity);
+    const bool current = shown && shown->tile_version == publisher_.version();
+    if (current && !added) return;
+    if (!current) shown = publisher_.publish(makePages(*lit_, quantity), status(), state_ == SolveState::kConverged);
+  } else if (quantity == Quantity::kIrradiance) {
+    return;  // its tile versions are for viewers who come back
+  } else {
+    publisher_.forget(quantity);
+    shown.reset();
+  }
+  {
+    const std::scoped_lock lock(mutex_);
+    lightmaps_[static_cast<std::size_t>(quantity)] = shown;
+  }
+  if (shown) listeners_.tell([&](Listener& listener) { listener.onLightmaps(shown); });
+}
+
+void SolveLoop::welcomeWatchers() {
+  const bool added = std::any_of(kQuantities.begin(), kQuantities.end(), [&](auto q) { return watches_.hasAdded(q); });
+  if (added) publishLightmaps(false);
+}
+
+std::shared_ptr<void> SolveLoop::watch(Quantity quantity) {
+  auto watching = watches_.add(quantity);
+  (void)queue_.push([] {});  // wakes the thread; one whose queue is full is awake
+  return watching;
+}
+
+std::shared_ptr<const Lightmaps> SolveLoop::lightmaps(Quantity quantity) const {
+  const std::scoped_lock lock(mutex_);
+  return lightmaps_[static_cast<std::size_t>(quantity)];
+}
+
+}  // namespace radiosity::engine
