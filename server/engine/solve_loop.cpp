@@ -108,7 +108,10 @@ void SolveLoop::beginSolve() {
 void SolveLoop::endSolve(SolveState state) {
   state_ = state;
   if (queue_.closed()) return;
-  if (lit_) lit_->solver().assess();
+  if (lit_) {
+    lit_->solver().assess();
+    if (state != SolveState::kFailed) lit_->endFade();
+  }
   updateStatus(false);
   publishLightmaps(true);
   updateStatus(true);
@@ -117,7 +120,7 @@ void SolveLoop::endSolve(SolveState state) {
 void SolveLoop::publishLightmaps(bool final) {
   if (!lit_ || !listeners_.any() || (!unpublished_ && !final)) return;
   updateStatus(false);
-  auto published = publisher_.publish(lit_->pages(), status(), final && state_ == SolveState::kConverged);
+  auto published = publisher_.publish(lit_->shownPages(), status(), final && state_ == SolveState::kConverged);
   {
     const std::scoped_lock lock(mutex_);
     lightmaps_ = published;

@@ -8,6 +8,12 @@
 #include "server/scene/lightmap.h"
 
 namespace radiosity::engine {
+namespace {
+
+/// Stated error from which on a snapshot shows the solver's own light after an edit.
+constexpr double kPresentable = 0.5;
+
+}  // namespace
 
 void SolveLoop::sceneText(Callback<SceneText> done) {
   askLit<SceneText>(std::move(done), [this]() -> Result<SceneText> {
@@ -85,7 +91,9 @@ Result<SharedBytes> SolveLoop::renderSnapshot(const SnapshotRequest& request) {
   if (quantity->second == gpu::ViewQuantity::kError) {
     for (auto& page : lit_->errorPages()) pages.push_back(std::move(page.irradiance));
   } else {
-    for (auto& page : lit_->pages()) pages.push_back(std::move(page.irradiance));
+    // Nobody wants a picture of the dark after an edit; but what was waited for must not have a ghost of the old light.
+    const bool solved = lit_->solver().error().total <= kPresentable;
+    for (auto& page : solved ? lit_->pages() : lit_->shownPages()) pages.push_back(std::move(page.irradiance));
   }
   const auto image = view_->render(lit_->scene(), lit_->patches(), pages, view);
   if (!image) return tl::unexpected<Error>(image.error());

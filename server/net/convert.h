@@ -10,6 +10,8 @@ namespace radiosity::net {
 
 [[nodiscard]] std::string_view stateName(engine::SolveState state);
 [[nodiscard]] protocol::Progress toProgress(const engine::Status& status);
+/// The newest `limit` revisions.
+[[nodiscard]] protocol::SceneHistoryReply toHistoryReply(const engine::HistoryReport& report, std::uint64_t limit);
 [[nodiscard]] protocol::StatusReply toStatusReply(const engine::Status& status);
 [[nodiscard]] protocol::Settings toSettings(const engine::SolveSettings& settings);
 /// `current` with what the call names replaced.
