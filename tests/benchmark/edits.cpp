@@ -7,6 +7,7 @@
 #include <condition_variable>
 #include <cstdio>
 #include <cstdlib>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -37,16 +38,20 @@ struct Options {
   std::vector<std::string> scenes{"room_small", "room_seminar"};
   double error = 0.02;
   int repetitions = 3, workers = 0;
+  bool in_process = false;
   std::filesystem::path output = "edits";
 };
 
 double since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
+/// Of all threads of this process; with --in-process that is all there is, and other programs do not count.
+double processorSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+
 /// Notes when the first lightmaps of a revision are published and when it is solved.
 class Watcher final : public engine::Listener {
  public:
   struct Times {
-    double first_tile_s = 0.0, solved_s = 0.0;
+    double first_tile_s = 0.0, solved_s = 0.0, processor_s = 0.0;
     std::uint64_t shots = 0;
     double error = 0.0;
   };
@@ -55,6 +60,7 @@ class Watcher final : public engine::Listener {
     const std::scoped_lock lock(mutex_);
     revision_ = revision;
     start_ = Clock::now();
+    processor_start_ = processorSeconds();
     first_tile_.reset();
     solved_.reset();
   }
@@ -71,7 +77,7 @@ class Watcher final : public engine::Listener {
     const std::scoped_lock lock(mutex_);
     failed_ = status.state == engine::SolveState::kFailed;
     if (status.revision < revision_ || solved_ || (status.state != engine::SolveState::kConverged && !failed_)) return;
-    solved_ = Times{0.0, since(start_), status.shots, status.error.total};
+    solved_ = Times{0.0, since(start_), processorSeconds() - processor_start_, status.shots, status.error.total};
     changed_.notify_all();
   }
   void onLightmaps(const std::shared_ptr<const engine::Lightmaps>& lightmaps) override {
@@ -91,6 +97,7 @@ class Watcher final : public engine::Listener {
   std::mutex mutex_;
   std::condition_variable changed_;
   Clock::time_point start_;
+  double processor_start_ = 0.0;
   std::uint64_t revision_ = 0;
   std::optional<double> first_tile_;
   std::optional<Times> solved_;
@@ -126,7 +133,7 @@ constexpr Edit kEdits[] = {
 
 struct Row {
   double target = 0.0;
-  std::vector<double> first_tile_s, solved_s, ratio, shots;
+  std::vector<double> first_tile_s, solved_s, ratio, processor_s, processor_ratio, shots;
 };
 
 double median(std::vector<double> values) {
@@ -143,8 +150,9 @@ class Bench {
     engine::EngineOptions engine_options;
     engine_options.settings.target_error = options_.error;
     engine_options.settings.texels = scene_ == "room_seminar" ? 27382 : 13742;  // of the paper
-    engine_options.make_transport = [workers = options_.workers] {
-      return gpu::makeWorkerTransport({workers, RADIOSITYD});
+    engine_options.make_transport = [options = options_]() -> Result<std::unique_ptr<solver::Transport>> {
+      if (options.in_process) return gpu::makeInProcessTransport();
+      return gpu::makeWorkerTransport({options.workers, RADIOSITYD});
     };
     auto engine = engine::makeEngine(std::move(engine_options));
     if (!engine) return tl::unexpected(engine.error());
@@ -179,7 +187,7 @@ class Bench {
     if (!loaded) return tl::unexpected(loaded.error());
     const auto full = finish("full solve");
     if (!full) return tl::unexpected(full.error());
-    add("full solve", 1.0, *full, full->solved_s, 0);
+    add("full solve", 1.0, *full, *full, 0);
     if (names_.empty()) findNames();
     auto shots = full->shots;
     for (const auto& edit : kEdits) {
@@ -188,7 +196,7 @@ class Bench {
       if (!outcome) return tl::unexpected(outcome.error());
       const auto times = finish(edit.name);
       if (!times) return tl::unexpected(times.error());
-      add(edit.name, edit.target, *times, full->solved_s, outcome->affected_shots > 0 ? 0 : shots);
+      add(edit.name, edit.target, *times, *full, outcome->affected_shots > 0 ? 0 : shots);
       shots = times->shots;
     }
     return {};
@@ -237,13 +245,16 @@ class Bench {
     return text;
   }
 
-  void add(const std::string& name, double target, const Watcher::Times& times, double full_s, std::uint64_t shots) {
+  void add(const std::string& name, double target, const Watcher::Times& times, const Watcher::Times& full,
+           std::uint64_t shots) {
     if (!rows_.contains(name)) order_.push_back(name);
     auto& row = rows_[name];
     row.target = target;
     row.first_tile_s.push_back(times.first_tile_s);
     row.solved_s.push_back(times.solved_s);
-    row.ratio.push_back(times.solved_s / full_s);
+    row.ratio.push_back(times.solved_s / full.solved_s);
+    row.processor_s.push_back(times.processor_s);
+    row.processor_ratio.push_back(times.processor_s / full.processor_s);
     row.shots.push_back(static_cast<double>(times.shots - std::min(shots, times.shots)));
   }
 
@@ -255,6 +266,8 @@ class Bench {
                       {"firstTileSeconds", median(row.first_tile_s)},
                       {"solvedSeconds", median(row.solved_s)},
                       {"ratio", median(row.ratio)},
+                      {"processorSeconds", median(row.processor_s)},
+                      {"processorRatio", median(row.processor_ratio)},
                       {"target", row.target},
                       {"shots", median(row.shots)}});
     }
@@ -275,7 +288,8 @@ std::string markdown(const json& scenes, int repetitions) {
   std::string text =
       "# Live edits\n\nMedians of " + std::to_string(repetitions) +
       " runs; \"of a full solve\": of loading and solving the same scene to the same stated error in the "
-      "same run. Targets: first changed tile in 50 ms.\n";
+      "same run. Processor time is this process's: with --in-process all there is, and other programs do not "
+      "disturb it. Targets: first changed tile in 50 ms.\n";
   char line[256];
   for (const auto& scene : scenes) {
     std::snprintf(line, sizeof line, "\n## %s, to a stated %.3g %%\n\n", scene["scene"].get<std::string>().c_str(),
@@ -322,6 +336,7 @@ int main(int argc, char** argv) {
   app.add_option("--error", options.error, "stated error to solve to, as a fraction")->capture_default_str();
   app.add_option("--repetitions", options.repetitions, "runs of each scene")->capture_default_str();
   app.add_option("--workers", options.workers, "render processes; 0: one a core")->capture_default_str();
+  app.add_flag("--in-process", options.in_process, "render in this process, for its processor time");
   app.add_option("--output", options.output, "folder for edits.json and edits.md")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   try {

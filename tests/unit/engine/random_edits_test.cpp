@@ -5,10 +5,12 @@
 #include <malloc.h>
 
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 #include <random>
 
 #include "server/scene/document.h"
+#include "server/scene/patch_scene.h"
 #include "tests/scenes/glb_writer.h"
 #include "tests/scenes/scenes.h"
 #include "tests/unit/engine/block_room.h"
@@ -115,20 +117,40 @@ class Draw {
   std::mt19937 random_;
 };
 
-/// Root mean square difference, relative to the root mean square of `b`.
-double difference(const engine::Lightmaps& a, const engine::Lightmaps& b) {
+/// Area of the patches behind each texel of each page, as the stated error weighs them.
+std::vector<std::vector<double>> texelAreas(const Document& document) {
+  const auto imported = scene::importScene(document).value();
+  scene::ChartOptions charts;
+  charts.texel_budget = rayOptions(nullptr).settings.texels;
+  const auto patches = scene::buildPatchScene(imported, charts).value();
+  std::vector<std::vector<double>> areas;
+  for (const auto& page : patches.pages) areas.emplace_back(std::size_t{page.width} * page.height, 0.0);
+  for (const auto& surface : patches.surfaces) {
+    const auto& page = patches.pages[surface.page];
+    for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf) {
+      const auto x = surface.page_x + leaf % surface.width, y = surface.page_y + leaf / surface.width;
+      for (const auto first : surface.first_node) {
+        if (first != scene::kNone)
+          areas[surface.page][std::size_t{y} * page.width + x] += static_cast<double>(patches.node_area[first + leaf]);
+      }
+    }
+  }
+  return areas;
+}
+
+/// Root mean square difference over all patches, weighted by area, relative to the root mean square of `b`.
+double difference(const engine::Lightmaps& a, const engine::Lightmaps& b, const Document& document) {
+  const auto areas = texelAreas(document);
   double sum = 0.0, scale = 0.0;
   for (std::size_t p = 0; p < b.pages.size(); ++p) {
     const auto &x = a.pages.at(p)->mips.front(), &y = b.pages.at(p)->mips.front();
     EXPECT_EQ(x.width, y.width);
     EXPECT_EQ(x.height, y.height);
-    if (x.pixels.size() != y.pixels.size()) return 1e9;
+    if (x.pixels.size() != y.pixels.size() || areas.at(p).size() != y.pixels.size()) return 1e9;
     for (std::size_t i = 0; i < x.pixels.size(); ++i) {
-      for (int c = 0; c < 3; ++c) {
-        const double d = static_cast<double>(x.pixels[i][c] - y.pixels[i][c]);
-        sum += d * d;
-        scale += static_cast<double>(y.pixels[i][c]) * static_cast<double>(y.pixels[i][c]);
-      }
+      const glm::dvec3 d(x.pixels[i] - y.pixels[i]), v(y.pixels[i]);
+      sum += areas[p][i] * glm::dot(d, d);
+      scale += areas[p][i] * glm::dot(v, v);
     }
   }
   return scale > 0.0 ? std::sqrt(sum / scale) : std::sqrt(sum);
@@ -189,7 +211,10 @@ class RandomEdits : public EngineTest {
     ASSERT_TRUE(fresh.ends()) << fresh.status().failure;
     const auto other = fresh.engine().lightmaps();
     ASSERT_EQ(edited->pages.size(), other->pages.size());
-    EXPECT_LE(difference(*edited, *other), edited_error + fresh.status().error.total)
+    // Where a solve gave up, its few rays do not see the little light that chance left: nothing is promised.
+    if (status().state != SolveState::kConverged || fresh.status().state != SolveState::kConverged) return;
+    ++compared_;
+    EXPECT_LE(difference(*edited, *other, documents_[now_]), edited_error + fresh.status().error.total)
         << "after " << now_ << " edits: " << documents_[now_].gltf.dump();
   }
 
@@ -201,11 +226,13 @@ class RandomEdits : public EngineTest {
       expectFreshSolveAgrees();
     }
   }
+  [[nodiscard]] int compared() const { return compared_; }
 
  private:
   void TestBody() override {}  // also used as a plain engine
 
   Draw draw_{0};
+  int compared_ = 0;
   std::vector<Document> documents_;  ///< that undo and redo walk along
   std::size_t now_ = 0;
 };
@@ -216,12 +243,14 @@ TEST_F(RandomEdits, EndWhereAFreshSolveEnds) {
        {blockRoom(), test_scenes::lumpedCube(0.5), test_scenes::parallelPlates(1.0, 1.0, 0.5, 1.0, 0.5)}) {
     run(scene, seed++, 4, 6);
   }
+  EXPECT_GE(compared(), 8);  // of 12
 }
 
 TEST_F(RandomEdits, DISABLED_LargeEndWhereAFreshSolveEnds) {
   for (unsigned seed = 100; seed < 140; ++seed) {
     run(seed % 2 == 0 ? blockRoom() : test_scenes::lumpedCube(0.5), seed, 10, 10);
   }
+  EXPECT_GE(compared(), 250);  // of 400
 }
 
 /// Bytes in use; 0 under a sanitizer, which has an allocator of its own.
