@@ -53,6 +53,10 @@ ExitCode wait(const WaitOptions& options) {
   if (!status) return complain(status.error());
   std::fputs(fmt::format("{}\n", outcomeText(status->progress)).c_str(), stdout);
   if (status->reached.value_or(false)) return ExitCode::kOk;
+  if (status->progress.state == "limited") {
+    complain(Error{ErrorCode::kUnavailable, "the solve ended above that error: " + status->progress.failure, {}});
+    return ExitCode::kTimeLimit;
+  }
   if (!status->progress.failure.empty())
     return complain(Error{ErrorCode::kUnavailable, "the solve failed: " + status->progress.failure, {}});
   if (status->progress.state == "empty") return complain(Error{ErrorCode::kNotFound, "no scene is loaded", {}});
@@ -173,7 +177,7 @@ ExitCode runScript(const ScriptOptions& options) {
 
 void addWait(CLI::App& app, Run& run) {
   auto options = std::make_shared<WaitOptions>();
-  auto& command = *app.add_subcommand("wait", "wait until the scene is solved well enough; exit 3: not in time");
+  auto& command = *app.add_subcommand("wait", "wait until the scene is solved well enough; exit 3: not reached");
   addRemoteOptions(command, options->server);
   command
       .add_option("--error", options->error,

@@ -75,7 +75,7 @@ class Watcher final : public engine::Listener {
 
   void onProgress(const engine::Status& status) override {
     const std::scoped_lock lock(mutex_);
-    failed_ = status.state == engine::SolveState::kFailed;
+    failed_ = status.state == engine::SolveState::kFailed || status.state == engine::SolveState::kLimited;
     if (status.revision < revision_ || solved_ || (status.state != engine::SolveState::kConverged && !failed_)) return;
     solved_ = Times{0.0, since(start_), processorSeconds() - processor_start_, status.shots, status.error.total};
     changed_.notify_all();
