@@ -55,13 +55,13 @@ ExitCode wait(const WaitOptions& options) {
   if (status->reached.value_or(false)) return ExitCode::kOk;
   if (status->progress.state == "limited") {
     complain(Error{ErrorCode::kUnavailable, "the solve ended above that error: " + status->progress.failure, {}});
-    return ExitCode::kTimeLimit;
+    return ExitCode::kShort;
   }
   if (!status->progress.failure.empty())
     return complain(Error{ErrorCode::kUnavailable, "the solve failed: " + status->progress.failure, {}});
   if (status->progress.state == "empty") return complain(Error{ErrorCode::kNotFound, "no scene is loaded", {}});
   complain(Error{ErrorCode::kUnavailable, "the error was not reached in time", {}});
-  return ExitCode::kTimeLimit;
+  return ExitCode::kShort;
 }
 
 // ---- script ----
