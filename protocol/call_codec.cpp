@@ -36,6 +36,16 @@ json params(const ScenePatchCall& c) {
   if (c.dry_run) out["dryRun"] = true;
   return out;
 }
+template <typename Step>
+json stepParams(const Step& c) {
+  json out = json::object();
+  if (c.base_revision) out["baseRevision"] = *c.base_revision;
+  if (!c.request_id.empty()) out["requestId"] = c.request_id;
+  return out;
+}
+json params(const SceneUndoCall& c) { return stepParams(c); }
+json params(const SceneRedoCall& c) { return stepParams(c); }
+json params(const SceneHistoryCall& c) { return c.limit == kMaxHistory ? json::object() : json{{"limit", c.limit}}; }
 json params(const SolveConfigureCall& c) {
   json out = json::object();
   if (c.target_error) out["targetError"] = *c.target_error;
@@ -118,6 +128,14 @@ void read(Reader& r, ScenePatchCall& c) {
   r.text("requestId", c.request_id, Need::kOptional, kMaxTextBytes);
   r.boolean("dryRun", c.dry_run, Need::kOptional);
 }
+template <typename Step>
+void readStep(Reader& r, Step& c) {
+  r.optionalInteger("baseRevision", c.base_revision, 0, kAnyInteger);
+  r.text("requestId", c.request_id, Need::kOptional, kMaxTextBytes);
+}
+void read(Reader& r, SceneUndoCall& c) { readStep(r, c); }
+void read(Reader& r, SceneRedoCall& c) { readStep(r, c); }
+void read(Reader& r, SceneHistoryCall& c) { r.integer("limit", c.limit, Need::kOptional, 1, kMaxHistory); }
 void read(Reader& r, SolveConfigureCall& c) {
   r.optionalNumber("targetError", c.target_error, kErrorRange);
   if (const auto* limit = r.find("timeLimitMs"); limit != nullptr && limit->is_null())

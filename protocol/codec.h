@@ -20,6 +20,8 @@ namespace radiosity::protocol {
 [[nodiscard]] std::string encodeReply(const RequestId& id, const SceneGetReply& reply);
 [[nodiscard]] std::string encodeReply(const RequestId& id, const SceneLoadReply& reply);
 [[nodiscard]] std::string encodeReply(const RequestId& id, const ScenePatchReply& reply);
+[[nodiscard]] std::string encodeReply(const RequestId& id, const SceneStepReply& reply);
+[[nodiscard]] std::string encodeReply(const RequestId& id, const SceneHistoryReply& reply);
 [[nodiscard]] std::string encodeReply(const RequestId& id, const Settings& reply);
 [[nodiscard]] std::string encodeReply(const RequestId& id, const StateReply& reply);
 [[nodiscard]] std::string encodeReply(const RequestId& id, const StatusReply& reply);

@@ -16,6 +16,7 @@ inline constexpr std::size_t kMaxJsonDepth = 64;                       ///< arra
 inline constexpr std::size_t kMaxBatch = 64;                           ///< calls in a JSON-RPC batch
 inline constexpr std::size_t kMaxRequestIdBytes = 128;                 ///< JSON-RPC `id`, as JSON text
 inline constexpr std::size_t kMaxPatchOperations = 1000;
+inline constexpr std::size_t kMaxHistory = 256;    ///< revisions that scene.history tells of
 inline constexpr std::size_t kMaxTextBytes = 256;  ///< names, camera, requestId, client
 inline constexpr std::size_t kMaxTokenBytes = 4096;
 inline constexpr std::size_t kMaxListEntries = 4096;                       ///< e.g. subscribe.lightmaps

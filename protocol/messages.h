@@ -104,6 +104,26 @@ struct ScenePatchReply {
   std::uint64_t revision = 0;
   std::uint64_t affected_surfaces = 0, affected_shots = 0;
 };
+/// Of undo and redo.
+struct SceneStepReply {
+  std::uint64_t revision = 0;
+  std::uint64_t affected_surfaces = 0, affected_shots = 0;
+  std::uint64_t edit = 0;  ///< the revision that the edit had made when it was new
+};
+/// How a revision came about: "load", "patch", "undo" or "redo" in `kind`.
+struct PastRevision {
+  std::uint64_t revision = 0;
+  std::string kind;
+  std::string by, summary;
+  double time_s = 0.0;                ///< since 1970-01-01 UTC
+  std::optional<std::uint64_t> edit;  ///< undo, redo: as in SceneStepReply
+  bool undone = false;                ///< patch: taken back at present
+};
+struct SceneHistoryReply {
+  std::uint64_t revision = 0;
+  std::uint64_t undoable = 0, redoable = 0;
+  std::vector<PastRevision> revisions;  ///< oldest first
+};
 struct StateReply {
   std::string state;
 };
@@ -166,6 +186,23 @@ struct ScenePatchCall {
   std::string request_id = {};  ///< empty: none
   bool dry_run = false;
 };
+struct SceneUndoCall {
+  static constexpr std::string_view kMethod = "scene.undo";
+  using Reply = SceneStepReply;
+  std::optional<std::uint64_t> base_revision = {};
+  std::string request_id = {};  ///< empty: none
+};
+struct SceneRedoCall {
+  static constexpr std::string_view kMethod = "scene.redo";
+  using Reply = SceneStepReply;
+  std::optional<std::uint64_t> base_revision = {};
+  std::string request_id = {};
+};
+struct SceneHistoryCall {
+  static constexpr std::string_view kMethod = "scene.history";
+  using Reply = SceneHistoryReply;
+  std::uint64_t limit = kMaxHistory;  ///< the newest
+};
 struct SolveConfigureCall {
   static constexpr std::string_view kMethod = "solve.configure";
   using Reply = Settings;
@@ -226,9 +263,9 @@ struct ViewersCall {
   using Reply = ViewersReply;
 };
 
-using Call = std::variant<HelloCall, SceneGetCall, SceneLoadCall, ScenePatchCall, SolveConfigureCall, SolvePauseCall,
-                          SolveResumeCall, SolveRestartCall, SolveWaitCall, StatusCall, SubscribeCall, CreditCall,
-                          SnapshotCall, ViewersCall>;
+using Call = std::variant<HelloCall, SceneGetCall, SceneLoadCall, ScenePatchCall, SceneUndoCall, SceneRedoCall,
+                          SceneHistoryCall, SolveConfigureCall, SolvePauseCall, SolveResumeCall, SolveRestartCall,
+                          SolveWaitCall, StatusCall, SubscribeCall, CreditCall, SnapshotCall, ViewersCall>;
 
 // ---- notifications from the server ----
 

@@ -43,6 +43,33 @@ void read(Reader& r, ScenePatchReply& reply) {
     inner.integer("shots", reply.affected_shots, Need::kRequired, 0, kAnyInteger);
   });
 }
+void read(Reader& r, SceneStepReply& reply) {
+  ScenePatchReply common;
+  read(r, common);
+  reply.revision = common.revision;
+  reply.affected_surfaces = common.affected_surfaces;
+  reply.affected_shots = common.affected_shots;
+  r.integer("edit", reply.edit, Need::kRequired, 0, kAnyInteger);
+}
+void read(Reader& r, PastRevision& past) {
+  r.integer("revision", past.revision, Need::kRequired, 0, kAnyInteger);
+  r.text("kind", past.kind, Need::kRequired, kMaxTextBytes);
+  r.text("by", past.by, Need::kOptional, kAnyText);
+  r.text("summary", past.summary, Need::kOptional, kAnyText);
+  r.number("time", past.time_s, Need::kRequired, {});
+  r.optionalInteger("edit", past.edit, 0, kAnyInteger);
+  r.boolean("undone", past.undone, Need::kOptional);
+}
+void read(Reader& r, SceneHistoryReply& reply) {
+  r.integer("revision", reply.revision, Need::kRequired, 0, kAnyInteger);
+  r.integer("undoable", reply.undoable, Need::kRequired, 0, kAnyInteger);
+  r.integer("redoable", reply.redoable, Need::kRequired, 0, kAnyInteger);
+  r.array("revisions", Need::kRequired, kMaxListEntries, [&](const json& element, const std::string& pointer) {
+    Reader inner(&element, pointer);
+    read(inner, reply.revisions.emplace_back());
+    if (inner.failed()) r.refuse(inner.pointer(), inner.message().substr(inner.pointer().size() + 1));
+  });
+}
 void read(Reader& r, StateReply& reply) { r.text("state", reply.state, Need::kRequired, kMaxTextBytes); }
 void read(Reader& r, StatusReply& reply) {
   read(r, reply.progress);
@@ -96,6 +123,27 @@ std::string encodeReply(const RequestId& id, const ScenePatchReply& r) {
                          {"affected", {{"surfaces", r.affected_surfaces}, {"shots", r.affected_shots}}}});
 }
 
+std::string encodeReply(const RequestId& id, const SceneStepReply& r) {
+  return answer(id, json{{"revision", r.revision},
+                         {"affected", {{"surfaces", r.affected_surfaces}, {"shots", r.affected_shots}}},
+                         {"edit", r.edit}});
+}
+
+std::string encodeReply(const RequestId& id, const SceneHistoryReply& r) {
+  json revisions = json::array();
+  for (const auto& past : r.revisions) {
+    json entry = {{"revision", past.revision}, {"kind", past.kind}, {"time", past.time_s}, {"summary", past.summary}};
+    if (!past.by.empty()) entry["by"] = past.by;
+    if (past.edit) entry["edit"] = *past.edit;
+    if (past.undone) entry["undone"] = true;
+    revisions.push_back(std::move(entry));
+  }
+  return answer(id, json{{"revision", r.revision},
+                         {"undoable", r.undoable},
+                         {"redoable", r.redoable},
+                         {"revisions", std::move(revisions)}});
+}
+
 std::string encodeReply(const RequestId& id, const Settings& r) { return answer(id, toJson(r)); }
 
 std::string encodeReply(const RequestId& id, const StateReply& r) { return answer(id, json{{"state", r.state}}); }
@@ -138,6 +186,8 @@ template Result<HelloReply> decodeReply<HelloReply>(const json&);
 template Result<SceneGetReply> decodeReply<SceneGetReply>(const json&);
 template Result<SceneLoadReply> decodeReply<SceneLoadReply>(const json&);
 template Result<ScenePatchReply> decodeReply<ScenePatchReply>(const json&);
+template Result<SceneStepReply> decodeReply<SceneStepReply>(const json&);
+template Result<SceneHistoryReply> decodeReply<SceneHistoryReply>(const json&);
 template Result<Settings> decodeReply<Settings>(const json&);
 template Result<StateReply> decodeReply<StateReply>(const json&);
 template Result<StatusReply> decodeReply<StatusReply>(const json&);

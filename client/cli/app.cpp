@@ -18,6 +18,9 @@ void buildApp(CLI::App& app, Run& run) {
   addWatch(app, run);
   addLoad(app, run);
   addEdit(app, run);
+  addQuickEdits(app, run);
+  addWait(app, run);
+  addScript(app, run);
   addStatus(app, run);
   addSnapshot(app, run);
   addSave(app, run);

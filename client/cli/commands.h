@@ -15,6 +15,10 @@ void addSolve(CLI::App& app, Run& run);
 void addWatch(CLI::App& app, Run& run);
 void addLoad(CLI::App& app, Run& run);
 void addEdit(CLI::App& app, Run& run);
+/// set, move, rotate, scale, hide, show, remove, add, undo, redo, history.
+void addQuickEdits(CLI::App& app, Run& run);
+void addWait(CLI::App& app, Run& run);
+void addScript(CLI::App& app, Run& run);
 void addStatus(CLI::App& app, Run& run);
 void addSnapshot(CLI::App& app, Run& run);
 void addSave(CLI::App& app, Run& run);

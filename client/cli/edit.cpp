@@ -1,25 +1,15 @@
 // radiosity edit: applies a JSON Patch (RFC 6902) to the scene that a server holds.
-#include <fmt/format.h>
-
-#include <algorithm>
+#include <cstdio>
 #include <fstream>
 #include <iostream>
-#include <iterator>
 #include <memory>
 #include <optional>
-#include <random>
-#include <thread>
 
 #include "client/cli/commands.h"
-#include "client/cli/interrupt.h"
-#include "client/cli/remote.h"
+#include "client/cli/editor.h"
 
 namespace radiosity::cli {
 namespace {
-
-using namespace std::chrono_literals;
-
-constexpr int kAttempts = 3;
 
 struct EditOptions {
   RemoteOptions server;
@@ -55,38 +45,17 @@ Result<std::string> readPatch(const std::string& path) {
   return text;
 }
 
-std::string newRequestId() {
-  std::random_device random;
-  return fmt::format("{:08x}{:08x}{:08x}{:08x}", random(), random(), random(), random());
-}
-
-/// Sends the patch; after a lost connection again under the same request id, which the server applies once.
-client::CallResult<protocol::ScenePatchReply> send(const Remote& remote, const protocol::ScenePatchCall& call) {
-  client::BackOff back_off;
-  for (int attempt = 1;; ++attempt) {
-    auto connection = remote.connect();
-    if (!connection) return tl::unexpected(connection.error());
-    auto reply = connection->call(call);
-    if (reply || reply.error().rpc || interrupted() || attempt == kAttempts) return reply;
-    warn(reply.error().error.text() + "; sending the edit again");
-    std::this_thread::sleep_for(back_off.next());
-  }
-}
-
 ExitCode edit(const EditOptions& options) {
   const auto remote = remoteFrom(options.server);
   if (!remote) return complain(remote.error());
   auto patch = readPatch(options.patch_file);
   if (!patch) return complain(patch.error());
-  const auto reply = send(*remote, {.patch = std::move(*patch),
-                                    .base_revision = options.base_revision,
-                                    .request_id = newRequestId(),
-                                    .dry_run = options.dry_run});
+  const auto reply = sendEdit(
+      *remote, protocol::ScenePatchCall{
+                   .patch = std::move(*patch), .base_revision = options.base_revision, .dry_run = options.dry_run});
   if (!reply) return complain(reply.error());
-  std::printf("%srevision %llu, affected: %llu surfaces, %llu shots\n", options.dry_run ? "dry run: " : "",
-              static_cast<unsigned long long>(reply->revision),
-              static_cast<unsigned long long>(reply->affected_surfaces),
-              static_cast<unsigned long long>(reply->affected_shots));
+  if (options.dry_run) std::fputs("dry run: ", stdout);
+  printEdit(reply->revision, reply->affected_surfaces, reply->affected_shots);
   return ExitCode::kOk;
 }
 

@@ -8,6 +8,8 @@
 namespace radiosity::cli {
 namespace {
 
+std::string complaint_place;
+
 /// Texts come from files and peers: control characters must not reach the terminal.
 std::string oneLine(std::string text) {
   std::replace_if(
@@ -41,7 +43,8 @@ ExitCode complain(const Error& error) {
     std::fputs("radiosity: interrupted\n", stderr);
     return ExitCode::kInterrupted;
   }
-  std::fprintf(stderr, "radiosity: error: %s\n", oneLine(error.text()).c_str());
+  const auto text = complaint_place.empty() ? error.text() : complaint_place + ": " + error.text();
+  std::fprintf(stderr, "radiosity: error: %s\n", oneLine(text).c_str());
   return exitCodeOf(error.code);
 }
 
@@ -53,6 +56,8 @@ ExitCode complain(const client::CallFailure& failure) {
     error.message += " (the scene is at revision " + std::to_string(*failure.rpc->revision) + ")";
   return complain(error);
 }
+
+void complainAt(std::string place) { complaint_place = std::move(place); }
 
 void warn(const std::string& text) { std::fprintf(stderr, "radiosity: warning: %s\n", oneLine(text).c_str()); }
 

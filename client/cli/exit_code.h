@@ -22,6 +22,9 @@ ExitCode complain(const Error& error);
 /// With the index of the failing operation where the server named it.
 ExitCode complain(const client::CallFailure& failure);
 
+/// From now on errors begin with this place ("sweep.txt:7"); empty: no more.
+void complainAt(std::string place);
+
 /// "radiosity: warning: ..."
 void warn(const std::string& text);
 

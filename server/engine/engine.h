@@ -135,12 +135,39 @@ struct PatchRequest {
   std::optional<std::uint64_t> base_revision;
   bool dry_run = false;
   std::string by;  ///< who, for scene.patched
+  /// The bytes of an upload that the patch refers to; null: there is no such upload. Called on the solve thread.
+  std::function<SharedBytes(const std::string& uri)> find_upload = {};
+};
+
+/// One edit back, or forth again.
+struct StepRequest {
+  bool redo = false;
+  std::optional<std::uint64_t> base_revision;
+  std::string by;
 };
 
 /// Errors of a patch: Error::where = JSON pointer; `operation` in PatchError is the index of the failing operation.
 struct PatchOutcome {
   std::uint64_t revision = 0;
   std::uint64_t affected_surfaces = 0, affected_shots = 0;
+  std::uint64_t stepped = 0;  ///< of undo and redo: the revision that the edit had made when it was new
+};
+
+/// How a revision came about.
+struct PastRevision {
+  enum class Kind { kLoad, kPatch, kUndo, kRedo };
+  std::uint64_t revision = 0;
+  Kind kind = Kind::kLoad;
+  std::string by, summary;    ///< summary: the scene's name, or the patch's first operations; at most 200 bytes
+  double time_s = 0.0;        ///< since 1970-01-01 UTC
+  std::uint64_t stepped = 0;  ///< kUndo, kRedo: as in PatchOutcome
+  bool undone = false;        ///< kPatch: taken back at present
+};
+
+struct HistoryReport {
+  std::uint64_t revision = 0;
+  std::uint64_t undoable = 0, redoable = 0;  ///< steps that can be taken either way
+  std::vector<PastRevision> revisions;       ///< oldest first; the newest are kept
 };
 
 struct SnapshotRequest {
@@ -169,6 +196,10 @@ class Engine {
   virtual void loadBytes(std::string name, SharedBytes bytes, Callback<LoadOutcome> done) = 0;
   virtual void loadFile(std::string path, Callback<LoadOutcome> done) = 0;
   virtual void patch(PatchRequest request, Callback<PatchOutcome> done) = 0;
+  /// Takes the latest edit back that is not taken back, whoever made it, or makes it again. A new revision; kNotFound
+  /// where there is none.
+  virtual void step(StepRequest request, Callback<PatchOutcome> done) = 0;
+  virtual void history(Callback<HistoryReport> done) = 0;
   virtual void configure(SolveSettings settings, Callback<SolveSettings> done) = 0;
   virtual void pause(Callback<SolveState> done) = 0;
   virtual void resume(Callback<SolveState> done) = 0;

@@ -8,6 +8,7 @@
 
 #include "common/result.h"
 #include "server/engine/engine.h"
+#include "server/engine/scene_change.h"
 #include "server/scene/document.h"
 #include "server/scene/lightmap.h"
 #include "server/scene/patch_scene.h"
@@ -20,18 +21,24 @@ class LitScene {
   /// Imports, charts and prepares a solve. The transport stays as it is until upload().
   [[nodiscard]] static Result<std::unique_ptr<LitScene>> make(scene::Document document, const SolveSettings& settings,
                                                               solver::Transport& transport);
+  /// The same for a document that has been imported already.
+  [[nodiscard]] static Result<std::unique_ptr<LitScene>> make(scene::EditedDocument edited,
+                                                              const SolveSettings& settings,
+                                                              solver::Transport& transport);
 
   /// Gives the geometry to the transport; must come before the solver's first step.
   [[nodiscard]] Result<void> upload() const { return transport_.setScene(patches_); }
 
-  /// What a patch would do. kShading: emission and reflectance of surfaces; kNothing: no surface (names, extras,
-  /// cameras, and lights and the sky, which reshade() looks at itself); else kGeometry.
-  enum class Change { kNothing, kShading, kGeometry };
-  [[nodiscard]] Change changeTo(const scene::Document& next) const;
+  [[nodiscard]] SceneChange changeTo(const scene::Scene& next) const { return changeBetween(*scene_, next); }
 
-  /// Takes over a document that differs by kNothing or kShading. Returns the number of surfaces affected. Nothing
-  /// changes on error.
-  [[nodiscard]] Result<std::uint64_t> reshade(scene::Document next, Change change);
+  /// Surfaces that a change to `next` would touch; all of them where it changes geometry or lights.
+  [[nodiscard]] std::uint64_t affectedBy(const SceneChange& change, const scene::Scene& next) const;
+
+  /// Takes over what leaves the geometry as it is. Returns the number of surfaces affected.
+  std::uint64_t reshade(scene::EditedDocument next, const SceneChange& change);
+
+  /// Shows `before`'s light, on the charts that are still there, until this scene's own is as good.
+  void fadeFrom(LitScene& before);
 
   [[nodiscard]] const scene::Document& document() const { return document_; }
   [[nodiscard]] const scene::Scene& scene() const { return *scene_; }
@@ -56,14 +63,21 @@ class LitScene {
 
   /// Finished pages of the solver's present irradiance (filled, stitched, dilated).
   [[nodiscard]] std::vector<scene::LightmapPage> pages() const;
+  /// What viewers see: after an edit the light that was there before fades into pages() as these become as good.
+  [[nodiscard]] std::vector<scene::LightmapPage> shownPages();
+  /// From here on the solver's own light is shown, as good as it is.
+  void endFade() { old_light_.clear(); }
 
  private:
-  LitScene(scene::Document document, const SolveSettings& settings, solver::Transport& transport)
-      : document_(std::move(document)), settings_(settings), transport_(transport) {}
+  LitScene(scene::EditedDocument edited, const SolveSettings& settings, solver::Transport& transport)
+      : document_(std::move(edited.document)),
+        settings_(settings),
+        transport_(transport),
+        scene_(std::make_shared<const scene::Scene>(std::move(edited.scene))) {}
   void makeSolver();
   void updateSolver(bool materials, bool lights);
   [[nodiscard]] double emittedPower() const;
-  [[nodiscard]] solver::LightSources lightSources() const;
+  [[nodiscard]] solver::LightSources lightSources(const scene::Scene& scene) const;
 
   scene::Document document_;
   SolveSettings settings_;
@@ -72,9 +86,11 @@ class LitScene {
   std::shared_ptr<const scene::PatchScene> patches_;
   scene::PatchMaterials materials_;
   std::unique_ptr<solver::Solver> solver_;
-  solver::LightSources sources_;  // that the solver knows of
-  double power_ = 0.0;            // emitted, all channels
-  double solver_power_ = 0.0;     // emitted power the solver's flux scale was chosen for
+  solver::LightSources sources_;                // that the solver knows of
+  double power_ = 0.0;                          // emitted, all channels
+  double solver_power_ = 0.0;                   // emitted power the solver's flux scale was chosen for
+  std::vector<scene::LightmapPage> old_light_;  // what was shown before an edit; empty: no fade
+  double new_share_ = 0.0;                      // of the solver's own light in what is shown; never falls
 };
 
 }  // namespace radiosity::engine

@@ -126,7 +126,10 @@ void SolveLoop::beginSolve() {
 void SolveLoop::endSolve(SolveState state) {
   state_ = state;
   if (queue_.closed()) return;
-  if (lit_) lit_->solver().assess();
+  if (lit_) {
+    lit_->solver().assess();
+    if (state != SolveState::kFailed) lit_->endFade();
+  }
   updateStatus(false);
   publishLightmaps(true);
   updateStatus(true);

@@ -9,6 +9,12 @@
 #include "server/scene/lightmap.h"
 
 namespace radiosity::engine {
+namespace {
+
+/// Stated error from which on a snapshot shows the solver's own light after an edit.
+constexpr double kPresentable = 0.5;
+
+}  // namespace
 
 void SolveLoop::sceneText(Callback<SceneText> done) {
   askLit<SceneText>(std::move(done), [this]() -> Result<SceneText> {
@@ -83,8 +89,7 @@ const std::map<std::string, SnapshotQuantity>& snapshotQuantities() {
 }
 
 /// Pages as the view renderer takes them; where there is no number it draws 0.
-std::vector<Image> pageImages(const LitScene& lit, Quantity quantity) {
-  auto pages = makePages(lit, quantity);
+std::vector<Image> pageImages(QuantityPages pages) {
   std::vector<Image> images;
   for (auto& page : pages.values) images.push_back(shown(pages, std::move(page.irradiance)));
   for (const auto& page : pages.ids) {
@@ -114,7 +119,11 @@ Result<SharedBytes> SolveLoop::renderSnapshot(const SnapshotRequest& request) {
     if (!made) return tl::unexpected<Error>(made.error());
     view_ = std::move(*made);
   }
-  const auto image = view_->render(lit_->scene(), lit_->patches(), pageImages(*lit_, quantity.pages), view);
+  // Nobody wants a picture of the dark after an edit; but what was waited for must not have a ghost of the old light.
+  const bool dark = quantity.pages == Quantity::kIrradiance && lit_->solver().error().total > kPresentable;
+  const auto pages = dark ? pageImages({quantity.pages, lit_->shownPages(), {}, false})
+                          : pageImages(makePages(*lit_, quantity.pages));
+  const auto image = view_->render(lit_->scene(), lit_->patches(), pages, view);
   if (!image) return tl::unexpected<Error>(image.error());
   auto png = encodePng(quantity.photometric ? toneMap(*image, autoExposure(*image)) : *image);
   if (!png) return tl::unexpected<Error>(png.error());

@@ -15,6 +15,7 @@
 
 #include "server/engine/command_queue.h"
 #include "server/engine/engine.h"
+#include "server/engine/history.h"
 #include "server/engine/listeners.h"
 #include "server/engine/lit_scene.h"
 #include "server/engine/publisher.h"
@@ -39,6 +40,8 @@ class SolveLoop final : public Engine {
   void loadBytes(std::string name, SharedBytes bytes, Callback<LoadOutcome> done) override;
   void loadFile(std::string path, Callback<LoadOutcome> done) override;
   void patch(PatchRequest request, Callback<PatchOutcome> done) override;
+  void step(StepRequest request, Callback<PatchOutcome> done) override;
+  void history(Callback<HistoryReport> done) override;
   void configure(SolveSettings settings, Callback<SolveSettings> done) override;
   void pause(Callback<SolveState> done) override;
   void resume(Callback<SolveState> done) override;
@@ -73,17 +76,24 @@ class SolveLoop final : public Engine {
   void endSolve(SolveState state);
   /// What is watched and not published yet; `final`: as a new version in any case.
   void publishLightmaps(bool final);
+  [[nodiscard]] QuantityPages pagesToShow(Quantity quantity);
   void publishQuantity(Quantity quantity);
   /// Those who came while nothing changes are told what there is.
   void welcomeWatchers();
   void updateStatus(bool announce);
 
   [[nodiscard]] Result<LoadOutcome> install(Result<scene::Document> document);
-  /// Puts a lit scene made of `document` in place of the present one, which goes on if that fails.
-  [[nodiscard]] Result<void> relight(scene::Document document, const SolveSettings& settings);
+  /// Puts a lit scene in place of the present one, which goes on if `made` is an error or cannot be uploaded.
+  /// `fade`: shows the present one's light until the new one's is as good.
+  [[nodiscard]] Result<void> relight(Result<std::unique_ptr<LitScene>> made, bool fade);
+  [[nodiscard]] Result<void> checkBase(const std::optional<std::uint64_t>& base_revision) const;
   [[nodiscard]] Result<PatchOutcome> applyRequest(const PatchRequest& request);
-  [[nodiscard]] Result<PatchOutcome> rebuild(scene::Document next);
-  [[nodiscard]] Result<PatchOutcome> reshade(scene::Document next, LitScene::Change change);
+  [[nodiscard]] Result<PatchOutcome> applyStep(const StepRequest& request);
+  /// Makes the edited scene the present one; raises no revision and tells nobody yet.
+  [[nodiscard]] Result<PatchOutcome> adopt(scene::EditedDocument edited);
+  [[nodiscard]] Result<PatchOutcome> rebuild(scene::EditedDocument edited);
+  /// Tells everyone of the new revision and solves on.
+  void announceEdit(const PatchOutcome& outcome, const std::string& patch, const std::string& by);
   [[nodiscard]] Result<SolveSettings> applySettings(const SolveSettings& settings);
   /// A solve that has stopped goes on when the settings now ask for more, and is done when they ask for less.
   void reconsiderStop();
@@ -103,6 +113,7 @@ class SolveLoop final : public Engine {
   std::unique_ptr<gpu::ViewRenderer> view_;
   std::unique_ptr<LitScene> lit_;
   Publisher publisher_;
+  History history_;
   SolveState state_ = SolveState::kEmpty;
   std::string failure_;
   std::uint64_t revision_ = 0;

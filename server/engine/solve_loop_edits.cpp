@@ -21,12 +21,13 @@ Result<LoadOutcome> SolveLoop::install(Result<scene::Document> document) {
   if (!document) return tl::unexpected<Error>(document.error());
   const SolveState before = std::exchange(state_, SolveState::kLoading);
   updateStatus(true);
-  if (const auto lit = relight(std::move(*document), settings_); !lit) {
+  const auto name = document->name;
+  if (const auto lit = relight(LitScene::make(std::move(*document), settings_, *transport_), false); !lit) {
     if (state_ == SolveState::kLoading) state_ = before;
     updateStatus(true);
     return tl::unexpected<Error>(lit.error());
   }
-  ++revision_;
+  history_.loaded(++revision_, name);
   for (const auto& warning : lit_->warnings()) log::warn("{}", warning);
   beginSolve();
   listeners_.tell([this](Listener& listener) { listener.onSceneLoaded(revision_); });
@@ -34,8 +35,7 @@ Result<LoadOutcome> SolveLoop::install(Result<scene::Document> document) {
   return LoadOutcome{revision_, lit_->warnings()};
 }
 
-Result<void> SolveLoop::relight(scene::Document document, const SolveSettings& settings) {
-  auto made = LitScene::make(std::move(document), settings, *transport_);
+Result<void> SolveLoop::relight(Result<std::unique_ptr<LitScene>> made, bool fade) {
   if (!made) return tl::unexpected<Error>(made.error());
   if (auto uploaded = (*made)->upload(); !uploaded) {
     if (lit_) {
@@ -46,6 +46,7 @@ Result<void> SolveLoop::relight(scene::Document document, const SolveSettings& s
     }
     return uploaded;
   }
+  if (fade && lit_) (*made)->fadeFrom(*lit_);
   lit_ = std::move(*made);
   publisher_.reset();
   return {};
@@ -55,53 +56,90 @@ void SolveLoop::patch(PatchRequest request, Callback<PatchOutcome> done) {
   askLit<PatchOutcome>(std::move(done), [this, request = std::move(request)] { return applyRequest(request); });
 }
 
+void SolveLoop::step(StepRequest request, Callback<PatchOutcome> done) {
+  askLit<PatchOutcome>(std::move(done), [this, request = std::move(request)] { return applyStep(request); });
+}
+
+void SolveLoop::history(Callback<HistoryReport> done) {
+  ask<HistoryReport>(std::move(done), [this]() -> Result<HistoryReport> { return history_.report(revision_); });
+}
+
+Result<void> SolveLoop::checkBase(const std::optional<std::uint64_t>& base_revision) const {
+  if (!base_revision || *base_revision == revision_) return {};
+  return fail(ErrorCode::kStaleRevision,
+              "the scene is at revision " + std::to_string(revision_) + ", not " + std::to_string(*base_revision));
+}
+
 Result<PatchOutcome> SolveLoop::applyRequest(const PatchRequest& request) {
-  if (request.base_revision && *request.base_revision != revision_) {
-    return fail(ErrorCode::kStaleRevision, "the scene is at revision " + std::to_string(revision_) + ", not " +
-                                               std::to_string(*request.base_revision));
-  }
+  if (auto ok = checkBase(request.base_revision); !ok) return tl::unexpected<Error>(ok.error());
   const auto patch = nlohmann::json::parse(request.patch, nullptr, false);
   if (patch.is_discarded()) return fail(ErrorCode::kBadInput, "the patch is not JSON");
-  auto next = scene::applyPatch(lit_->document(), patch);
-  if (!next) return tl::unexpected<Error>(next.error());
+  auto edited = scene::editDocument(lit_->document(), patch, request.find_upload);
+  if (!edited) return tl::unexpected<Error>(edited.error());
   if (request.dry_run) {
-    const auto imported = scene::importScene(*next);
-    if (!imported) return tl::unexpected<Error>(imported.error());
-    return PatchOutcome{revision_, 0, 0};
+    const auto change = lit_->changeTo(edited->scene);
+    return PatchOutcome{revision_, lit_->affectedBy(change, edited->scene),
+                        change.geometry ? lit_->solver().shots() : 0};
   }
-  const auto change = lit_->changeTo(*next);
-  auto outcome = change == LitScene::Change::kGeometry ? rebuild(std::move(*next)) : reshade(std::move(*next), change);
+  const auto before = lit_->document();
+  const auto outcome = adopt(std::move(*edited));
   if (!outcome) return outcome;
-  outcome->revision = ++revision_;
-  listeners_.tell([&](Listener& listener) { listener.onScenePatched(revision_, request.patch, request.by); });
-  if (outcome->affected_surfaces > 0) {
+  history_.edited(outcome->revision, request.by, patch, before, lit_->document());
+  announceEdit(*outcome, request.patch, request.by);
+  return outcome;
+}
+
+Result<PatchOutcome> SolveLoop::applyStep(const StepRequest& request) {
+  if (auto ok = checkBase(request.base_revision); !ok) return tl::unexpected<Error>(ok.error());
+  auto step = history_.step(request.redo, lit_->document());
+  if (!step) return tl::unexpected<Error>(step.error());
+  auto scene = scene::importScene(step->document);
+  if (!scene) return tl::unexpected<Error>(scene.error());
+  auto outcome = adopt({std::move(step->document), std::move(*scene)});
+  if (!outcome) return outcome;
+  outcome->stepped = step->edit;
+  history_.stepped(outcome->revision, request.by, request.redo);
+  announceEdit(*outcome, step->patch, request.by);
+  return outcome;
+}
+
+Result<PatchOutcome> SolveLoop::adopt(scene::EditedDocument edited) {
+  const auto change = lit_->changeTo(edited.scene);
+  PatchOutcome outcome;
+  if (change.geometry) {
+    auto rebuilt = rebuild(std::move(edited));
+    if (!rebuilt) return rebuilt;
+    outcome = *rebuilt;
+  } else {
+    outcome.affected_surfaces = lit_->reshade(std::move(edited), change);
+    // The light of the wave that failed is counted as shot but arrived nowhere.
+    if (outcome.affected_surfaces > 0 && state_ == SolveState::kFailed) lit_->restart(settings_);
+    // The solver takes an edit in with its next step, which does not come: show what can be shown.
+    if (outcome.affected_surfaces > 0 && state_ == SolveState::kPaused) lit_->solver().assess();
+  }
+  outcome.revision = ++revision_;
+  return outcome;
+}
+
+Result<PatchOutcome> SolveLoop::rebuild(scene::EditedDocument edited) {
+  PatchOutcome outcome;
+  outcome.affected_shots = lit_->solver().shots();
+  outcome.affected_surfaces = lit_->patches().surfaces.size();
+  if (const auto lit = relight(LitScene::make(std::move(edited), settings_, *transport_), true); !lit)
+    return tl::unexpected<Error>(lit.error());
+  outcome.affected_surfaces = std::max<std::uint64_t>(outcome.affected_surfaces, lit_->patches().surfaces.size());
+  outcome.affected_surfaces = std::max<std::uint64_t>(outcome.affected_surfaces, 1);  // pages are new even if empty
+  return outcome;
+}
+
+void SolveLoop::announceEdit(const PatchOutcome& outcome, const std::string& patch, const std::string& by) {
+  listeners_.tell([&](Listener& listener) { listener.onScenePatched(outcome.revision, patch, by); });
+  if (outcome.affected_surfaces > 0) {
     beginSolve();
   } else {
     updateStatus(true);
   }
   publishLightmaps(false);
-  return outcome;
-}
-
-Result<PatchOutcome> SolveLoop::rebuild(scene::Document next) {
-  PatchOutcome outcome;
-  outcome.affected_shots = lit_->solver().shots();
-  outcome.affected_surfaces = lit_->patches().surfaces.size();
-  if (const auto lit = relight(std::move(next), settings_); !lit) return tl::unexpected<Error>(lit.error());
-  outcome.affected_surfaces = std::max<std::uint64_t>(outcome.affected_surfaces, lit_->patches().surfaces.size());
-  return outcome;
-}
-
-Result<PatchOutcome> SolveLoop::reshade(scene::Document next, LitScene::Change change) {
-  const auto affected = lit_->reshade(std::move(next), change);
-  if (!affected) return tl::unexpected<Error>(affected.error());
-  // The light of the wave that failed is counted as shot but arrived nowhere.
-  if (*affected > 0 && state_ == SolveState::kFailed) lit_->restart(settings_);
-  // The solver takes an edit in with its next step, which does not come: show what can be shown.
-  if (*affected > 0 && state_ == SolveState::kPaused) lit_->solver().assess();
-  PatchOutcome outcome;
-  outcome.affected_surfaces = *affected;
-  return outcome;
 }
 
 void SolveLoop::configure(SolveSettings settings, Callback<SolveSettings> done) {
@@ -115,7 +153,7 @@ Result<SolveSettings> SolveLoop::applySettings(const SolveSettings& settings) {
     return settings_;
   }
   if (before.texels != settings.texels || before.texel_size_m != settings.texel_size_m) {
-    if (const auto lit = relight(lit_->document(), settings); !lit) {
+    if (const auto lit = relight(LitScene::make(lit_->document(), settings, *transport_), true); !lit) {
       settings_ = before;
       updateStatus(true);
       return tl::unexpected<Error>(lit.error());

@@ -44,13 +44,18 @@ void SolveLoop::publishLightmaps(bool final) {
   next_publish_ = Clock::now() + std::max<Clock::duration>(kPublishInterval, kPublishShare * (threadTime() - begin));
 }
 
+QuantityPages SolveLoop::pagesToShow(Quantity quantity) {
+  if (quantity == Quantity::kIrradiance) return {quantity, lit_->shownPages(), {}, false};
+  return makePages(*lit_, quantity);
+}
+
 void SolveLoop::publishQuantity(Quantity quantity) {
   auto shown = publisher_.latest(quantity);
   if (watches_.wants(quantity)) {
     const bool added = watches_.takeAdded(quantity);
     const bool current = shown && shown->tile_version == publisher_.version();
     if (current && !added) return;
-    if (!current) shown = publisher_.publish(makePages(*lit_, quantity), status(), state_ == SolveState::kConverged);
+    if (!current) shown = publisher_.publish(pagesToShow(quantity), status(), state_ == SolveState::kConverged);
   } else if (quantity == Quantity::kIrradiance) {
     return;  // its tile versions are for viewers who come back
   } else {

@@ -193,9 +193,33 @@ void Calls::run(const protocol::ScenePatchCall& call, const Slot& slot) {
   if (call.patch.size() > protocol::kMaxMessageBytes - kRoomForTheRest)
     return slot.error(
         {RpcCode::kTooLarge, "the patch is too long to be told to others; make it in parts", "/params/patch"});
-  hub_.patch(call, client_, [slot](const tl::expected<protocol::ScenePatchReply, RpcError>& answer) {
-    answer ? slot.reply(*answer) : slot.error(answer.error());
+  hub_.patch(call, client_, [slot](const Hub::EditResult& answer) {
+    if (!answer) return slot.error(answer.error());
+    slot.reply(protocol::ScenePatchReply{answer->revision, answer->affected_surfaces, answer->affected_shots});
   });
+}
+
+namespace {
+
+template <typename Slot>
+Hub::EditAnswer stepAnswer(Slot slot) {
+  return [slot](const Hub::EditResult& answer) { answer ? slot.reply(*answer) : slot.error(answer.error()); };
+}
+
+}  // namespace
+
+void Calls::run(const protocol::SceneUndoCall& call, const Slot& slot) {
+  hub_.step(false, call.base_revision, call.request_id, client_, stepAnswer(slot));
+}
+void Calls::run(const protocol::SceneRedoCall& call, const Slot& slot) {
+  hub_.step(true, call.base_revision, call.request_id, client_, stepAnswer(slot));
+}
+
+void Calls::run(const protocol::SceneHistoryCall& call, const Slot& slot) {
+  hub_.engine().history(
+      hub_.fromEngine<engine::HistoryReport>([slot, limit = call.limit](const Result<engine::HistoryReport>& report) {
+        report ? slot.reply(toHistoryReply(*report, limit)) : slot.fail(report);
+      }));
 }
 
 void Calls::run(const protocol::SolveConfigureCall& call, const Slot& slot) {

@@ -47,6 +47,9 @@ class Calls {
   void run(const protocol::SceneGetCall& call, const Slot& slot);
   void run(const protocol::SceneLoadCall& call, const Slot& slot);
   void run(const protocol::ScenePatchCall& call, const Slot& slot);
+  void run(const protocol::SceneUndoCall& call, const Slot& slot);
+  void run(const protocol::SceneRedoCall& call, const Slot& slot);
+  void run(const protocol::SceneHistoryCall& call, const Slot& slot);
   void run(const protocol::SolveConfigureCall& call, const Slot& slot);
   void run(const protocol::SolvePauseCall& call, const Slot& slot);
   void run(const protocol::SolveResumeCall& call, const Slot& slot);

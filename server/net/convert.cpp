@@ -107,6 +107,27 @@ std::vector<std::string> firstWarnings(const std::vector<std::string>& all) {
   return first;
 }
 
+protocol::SceneHistoryReply toHistoryReply(const engine::HistoryReport& report, std::uint64_t limit) {
+  using Kind = engine::PastRevision::Kind;
+  protocol::SceneHistoryReply reply{report.revision, report.undoable, report.redoable, {}};
+  const auto& all = report.revisions;
+  for (auto i = all.size() - std::min<std::size_t>(all.size(), limit); i < all.size(); ++i) {
+    const auto& past = all[i];
+    auto& out = reply.revisions.emplace_back();
+    out.revision = past.revision;
+    out.kind = past.kind == Kind::kLoad    ? "load"
+               : past.kind == Kind::kPatch ? "patch"
+               : past.kind == Kind::kUndo  ? "undo"
+                                           : "redo";
+    out.by = past.by;
+    out.summary = past.summary;
+    out.time_s = past.time_s;
+    if (past.kind == Kind::kUndo || past.kind == Kind::kRedo) out.edit = past.stepped;
+    out.undone = past.undone;
+  }
+  return reply;
+}
+
 protocol::StatusReply toStatusReply(const engine::Status& s) {
   protocol::StatusReply out;
   out.progress = toProgress(s);

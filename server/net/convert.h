@@ -12,6 +12,8 @@ namespace radiosity::net {
 [[nodiscard]] protocol::Progress toProgress(const engine::Status& status);
 /// As many of the first as a message has room for.
 [[nodiscard]] std::vector<std::string> firstWarnings(const std::vector<std::string>& all);
+/// The newest `limit` revisions.
+[[nodiscard]] protocol::SceneHistoryReply toHistoryReply(const engine::HistoryReport& report, std::uint64_t limit);
 [[nodiscard]] protocol::StatusReply toStatusReply(const engine::Status& status);
 [[nodiscard]] protocol::Settings toSettings(const engine::SolveSettings& settings);
 /// `current` with what the call names replaced.

@@ -14,6 +14,7 @@ constexpr std::size_t kHistoryBytes = std::size_t{4} << 20;
 constexpr std::size_t kSnapshotsKept = 32;
 constexpr std::size_t kSnapshotBytes = std::size_t{64} << 20;
 constexpr std::size_t kUploadsKept = 16;
+constexpr std::size_t kNoteRoomBytes = 4096;  // of a notification, around the patch
 
 SharedText shared(std::string text) { return std::make_shared<const std::string>(std::move(text)); }
 
@@ -23,8 +24,8 @@ Hub::Hub(const ServerOptions& options, engine::Engine& engine)
     : options_(options),
       engine_(engine),
       epoch_(randomHex(8)),
-      uploads_(kUploadsKept, options.max_upload_bytes),
-      snapshots_(kSnapshotsKept, kSnapshotBytes) {}
+      uploads_(kUploadsKept, options.max_upload_bytes, BlobStore::Naming::kByContent),
+      snapshots_(kSnapshotsKept, kSnapshotBytes, BlobStore::Naming::kAtRandom) {}
 
 void Hub::start() {
   const auto status = engine_.status();
@@ -72,6 +73,8 @@ protocol::ServerInfo Hub::serverInfo() {
   info.capabilities = {"scene.get",
                        "scene.load",
                        "scene.patch",
+                       "scene.undo",
+                       "scene.history",
                        "solve",
                        "status",
                        "subscribe",
@@ -184,40 +187,59 @@ std::optional<std::vector<SharedText>> Hub::missedSince(const protocol::Resume& 
   return missed;
 }
 
-void Hub::patch(const protocol::ScenePatchCall& call, const std::string& by, PatchAnswer done) {
-  engine::PatchRequest request{call.patch, call.base_revision, call.dry_run, by};
-  if (!call.request_id.empty()) {
-    const auto fingerprint =
-        std::hash<std::string>()(fmt::format("{}|{}|{}", call.base_revision.value_or(0), call.dry_run, call.patch));
+void Hub::askOnce(const std::string& request_id, const std::string& request, EditAnswer done,
+                  const std::function<void(engine::Engine::Callback<engine::PatchOutcome>)>& ask) {
+  if (!request_id.empty()) {
+    const auto fingerprint = std::hash<std::string>()(request);
     const std::lock_guard lock(mutex_);
-    const auto [found, inserted] = remembered_.try_emplace(call.request_id);
+    const auto [found, inserted] = remembered_.try_emplace(request_id);
     auto& known = found->second;
     if (inserted) known.fingerprint = fingerprint;
     if (known.fingerprint != fingerprint)
       return done(tl::unexpected(protocol::RpcError{protocol::RpcCode::kInvalidParams,
-                                                    "this requestId was used for another patch", "/params/requestId"}));
+                                                    "this requestId was used for another edit", "/params/requestId"}));
     if (known.answer) return done(*known.answer);
     known.waiting.push_back(std::move(done));
     if (!inserted) return;
-    done = [this, id = call.request_id](const auto& answer) { remember(id, answer); };
+    done = [this, request_id](const auto& answer) { remember(request_id, answer); };
   }
-  engine_.patch(
-      std::move(request), fromEngine<engine::PatchOutcome>([this, done](const Result<engine::PatchOutcome>& outcome) {
-        if (outcome) {
-          sawRevision(outcome->revision);
-          return done(
-              protocol::ScenePatchReply{outcome->revision, outcome->affected_surfaces, outcome->affected_shots});
-        }
-        auto error = protocol::toRpcError(outcome.error());
-        error.revision = revision();
-        done(tl::unexpected(std::move(error)));
-      }));
+  ask(fromEngine<engine::PatchOutcome>([this, done](const Result<engine::PatchOutcome>& outcome) {
+    if (outcome) {
+      sawRevision(outcome->revision);
+      return done(protocol::SceneStepReply{outcome->revision, outcome->affected_surfaces, outcome->affected_shots,
+                                           outcome->stepped});
+    }
+    auto error = protocol::toRpcError(outcome.error());
+    error.revision = revision();
+    done(tl::unexpected(std::move(error)));
+  }));
 }
 
-void Hub::remember(const std::string& request_id,
-                   const tl::expected<protocol::ScenePatchReply, protocol::RpcError>& answer) {
+SharedBytes Hub::upload(const std::string& uri) const {
+  constexpr std::string_view kUpload = "/uploads/";
+  if (!uri.starts_with(kUpload)) return nullptr;
+  const auto blob = uploads_.find(std::string_view(uri).substr(kUpload.size()));
+  return blob ? blob->bytes : nullptr;
+}
+
+void Hub::patch(const protocol::ScenePatchCall& call, const std::string& by, EditAnswer done) {
+  engine::PatchRequest request{call.patch, call.base_revision, call.dry_run, by, {}};
+  request.find_upload = [self = shared_from_this()](const std::string& uri) { return self->upload(uri); };
+  askOnce(call.request_id, fmt::format("{}|{}|{}", call.base_revision.value_or(0), call.dry_run, call.patch),
+          std::move(done), [&](auto heard) { engine_.patch(std::move(request), std::move(heard)); });
+}
+
+void Hub::step(bool redo, std::optional<std::uint64_t> base_revision, const std::string& request_id,
+               const std::string& by, EditAnswer done) {
+  askOnce(request_id, fmt::format("{}|{}", base_revision.value_or(0), redo ? "redo" : "undo"), std::move(done),
+          [&](auto heard) {
+            engine_.step({redo, base_revision, by}, std::move(heard));
+          });
+}
+
+void Hub::remember(const std::string& request_id, const EditResult& answer) {
   constexpr std::size_t kKept = 1024;
-  std::vector<PatchAnswer> waiting;
+  std::vector<EditAnswer> waiting;
   {
     const std::lock_guard lock(mutex_);
     auto& known = remembered_[request_id];
@@ -319,6 +341,8 @@ void Hub::announceProgress(const engine::Status& status) {
 }
 
 void Hub::onScenePatched(std::uint64_t revision, const std::string& patch, const std::string& by) {
+  // An undo may bring back more than a message can hold.
+  if (patch.size() > protocol::kMaxMessageBytes - kNoteRoomBytes) return onSceneLoaded(revision);
   const auto text = shared(protocol::encodeNotification(protocol::ScenePatched{revision, patch, by}));
   {
     const std::lock_guard lock(mutex_);

@@ -70,9 +70,13 @@ class Hub : public engine::Listener, public std::enable_shared_from_this<Hub> {
   /// What a viewer who has seen `resume` has missed: notifications in order; nothing when it must start afresh.
   [[nodiscard]] std::optional<std::vector<SharedText>> missedSince(const protocol::Resume& resume) const;
 
-  using PatchAnswer = std::function<void(const tl::expected<protocol::ScenePatchReply, protocol::RpcError>&)>;
+  using EditResult = tl::expected<protocol::SceneStepReply, protocol::RpcError>;  ///< of a patch: `edit` is 0
+  using EditAnswer = std::function<void(const EditResult&)>;
   /// The same requestId gets the same answer; the engine sees it once.
-  void patch(const protocol::ScenePatchCall& call, const std::string& by, PatchAnswer done);
+  void patch(const protocol::ScenePatchCall& call, const std::string& by, EditAnswer done);
+  /// Undo or redo; the same holds.
+  void step(bool redo, std::optional<std::uint64_t> base_revision, const std::string& request_id, const std::string& by,
+            EditAnswer done);
 
   /// `done` is called once: with reached = true or false (solve stopped), or nothing while draining. Forgotten when
   /// `owner` is gone.
@@ -116,8 +120,8 @@ class Hub : public engine::Listener, public std::enable_shared_from_this<Hub> {
   };
   struct Remembered {
     std::size_t fingerprint = 0;
-    std::optional<tl::expected<protocol::ScenePatchReply, protocol::RpcError>> answer;
-    std::vector<PatchAnswer> waiting;
+    std::optional<EditResult> answer;
+    std::vector<EditAnswer> waiting;
   };
   struct PastPatch {
     std::uint64_t revision;
@@ -127,8 +131,11 @@ class Hub : public engine::Listener, public std::enable_shared_from_this<Hub> {
   void announceProgress(const engine::Status& status);
   [[nodiscard]] std::vector<std::shared_ptr<Viewer>> viewers() const;
   void broadcast(const protocol::Notification& notification);
-  void remember(const std::string& request_id,
-                const tl::expected<protocol::ScenePatchReply, protocol::RpcError>& answer);
+  /// Calls `ask` with what is to hear the engine's outcome, unless the request was made before.
+  void askOnce(const std::string& request_id, const std::string& request, EditAnswer done,
+               const std::function<void(engine::Engine::Callback<engine::PatchOutcome>)>& ask);
+  void remember(const std::string& request_id, const EditResult& answer);
+  [[nodiscard]] SharedBytes upload(const std::string& uri) const;
   [[nodiscard]] static std::optional<bool> reached(const Waiter& waiter, const engine::Status& status);
 
   ServerOptions options_;

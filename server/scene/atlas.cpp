@@ -149,11 +149,17 @@ class LayoutMaker {
     if (clamped_++ == 0) first_clamped_ = describeInstance(scene_, charts_[chart].instance);
   }
 
+  /// The budget is shared out as if all scales were 1: one object's scale leaves the others as they are.
+  [[nodiscard]] double texelOf(const Chart& chart) const {
+    return texel_ / static_cast<double>(scene_.instances[chart.instance].texel_scale);
+  }
+
   void addChart(std::uint32_t c) {
     const Chart& chart = charts_[c];
     ChartGrid& grid = atlas_.grids[c];
-    grid.width = texelsAlong(chart.size.x, texel_);
-    grid.height = texelsAlong(chart.size.y, texel_);
+    const double texel = texelOf(chart);
+    grid.width = texelsAlong(chart.size.x, texel);
+    grid.height = texelsAlong(chart.size.y, texel);
     if (grid.width > max_chart_ || grid.height > max_chart_) {
       noteClamped(c);
       grid.width = std::min(grid.width, max_chart_);
@@ -183,7 +189,7 @@ class LayoutMaker {
       all.add(charts_[end]);
       block.charts.push_back(end);
     }
-    double resolution = 1.0 / (texel_ * density);  // texels a unit of UV
+    double resolution = 1.0 / (texelOf(charts_[first]) * density);  // texels a unit of UV
     const glm::dvec2 extent = all.high - all.low;
     if (std::max(extent.x, extent.y) * resolution > max_chart_ - 1.0) {
       noteClamped(first);

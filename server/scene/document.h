@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <span>
@@ -43,9 +44,26 @@ struct Document {
 /// Every index, offset, count and string is checked here; errors carry file, JSON pointer and reason.
 [[nodiscard]] Result<Scene> importScene(const Document& document, const ImportLimits& limits = {});
 
+/// The bytes behind "/uploads/<id>"; null where there is no such upload (any more).
+using FindUpload = std::function<SharedBytes(const std::string& uri)>;
+
 /// RFC 6902 on a copy, then validated by the caller with importScene. Pointers may name things:
-/// /nodes/@lamp/translation.
-[[nodiscard]] Result<Document> applyPatch(const Document& document, const nlohmann::json& patch);
+/// /nodes/@lamp/translation. Buffers and images that the patch appends get their bytes from data URIs, from `uploads`,
+/// or (images) from a buffer view. `touched` as in applyJsonPatch.
+[[nodiscard]] Result<Document> applyPatch(const Document& document, const nlohmann::json& patch,
+                                          const FindUpload& uploads = {}, const ImportLimits& limits = {},
+                                          std::vector<std::vector<std::string>>* touched = nullptr);
+
+/// A document that has been edited, and the scene that it describes.
+struct EditedDocument {
+  Document document;
+  Scene scene;
+};
+
+/// applyPatch and importScene in one. `where` of an error is the JSON pointer alone; `operation` is the one that
+/// failed, or the one whose path lies nearest to what makes the result no scene.
+[[nodiscard]] Result<EditedDocument> editDocument(const Document& document, const nlohmann::json& patch,
+                                                  const FindUpload& uploads = {}, const ImportLimits& limits = {});
 
 /// The document as one GLB file (JSON chunk + one BIN chunk; buffers and images embedded).
 [[nodiscard]] Bytes writeGlb(const Document& document);

@@ -6,11 +6,13 @@
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 #include <numbers>
+#include <vector>
 
 namespace radiosity::scene {
 namespace {
 
 constexpr const char* kLights = "KHR_lights_punctual";
+constexpr const char* kVisibility = "KHR_node_visibility";
 constexpr const char* kEmissiveStrength = "KHR_materials_emissive_strength";
 
 void setDefault(Json& object, const char* member, Json value) {
@@ -50,8 +52,16 @@ bool decompose(const double (&m)[16], Json& node) {
   return true;
 }
 
-void materialiseNode(Json& node) {
-  if (!node.is_object()) return;
+bool materialiseVisibility(Json& node) {
+  setDefault(node, "extensions", Json::object());
+  auto& extensions = node["extensions"];
+  if (!extensions.is_object()) return false;
+  setDefault(extensions, kVisibility, Json::object());
+  if (extensions[kVisibility].is_object()) setDefault(extensions[kVisibility], "visible", true);
+  return true;
+}
+
+void materialiseTransform(Json& node) {
   const bool has_trs = node.contains("translation") || node.contains("rotation") || node.contains("scale");
   if (node.contains("matrix")) {
     double m[16];
@@ -62,6 +72,31 @@ void materialiseNode(Json& node) {
   setDefault(node, "translation", toJson(glm::dvec3(0.0)));
   setDefault(node, "rotation", Json::array({0.0, 0.0, 0.0, 1.0}));
   setDefault(node, "scale", toJson(glm::dvec3(1.0)));
+}
+
+/// A file without scenes shows every node that has no parent; written out, so that a node can be detached from it.
+void materialiseScenes(Json& gltf) {
+  const auto nodes = gltf.find("nodes");
+  if (nodes == gltf.end() || !nodes->is_array() || nodes->empty()) return;
+  if (const auto scenes = gltf.find("scenes"); scenes != gltf.end() && !(scenes->is_array() && scenes->empty())) {
+    setDefault(gltf, "scene", 0);
+    return;
+  }
+  std::vector<bool> has_parent(nodes->size(), false);
+  for (const auto& node : *nodes) {
+    if (!node.is_object() || !node.contains("children") || !node["children"].is_array()) continue;
+    for (const auto& child : node["children"]) {
+      if (child.is_number_unsigned() && child.get<std::size_t>() < has_parent.size())
+        has_parent[child.get<std::size_t>()] = true;
+    }
+  }
+  Json roots = Json::array();
+  for (std::size_t n = 0; n < has_parent.size(); ++n) {
+    if (!has_parent[n]) roots.push_back(n);
+  }
+  if (roots.empty()) return;  // a cycle, which importScene refuses
+  gltf["scenes"] = Json::array({{{"nodes", std::move(roots)}}});
+  gltf["scene"] = 0;
 }
 
 bool materialiseMaterial(Json& material) {
@@ -111,8 +146,15 @@ void markUsed(Json& gltf, const char* extension) {
 void materialiseDefaults(Json& gltf) {
   if (!gltf.is_object()) return;
   if (const auto nodes = gltf.find("nodes"); nodes != gltf.end() && nodes->is_array()) {
-    for (auto& node : *nodes) materialiseNode(node);
+    bool visibility = false;
+    for (auto& node : *nodes) {
+      if (!node.is_object()) continue;
+      materialiseTransform(node);
+      visibility |= materialiseVisibility(node);
+    }
+    if (visibility) markUsed(gltf, kVisibility);
   }
+  materialiseScenes(gltf);
   bool strength = false;
   if (const auto materials = gltf.find("materials"); materials != gltf.end() && materials->is_array()) {
     for (auto& material : *materials) strength |= materialiseMaterial(material);

@@ -18,6 +18,7 @@ namespace radiosity::scene {
 namespace {
 
 constexpr double kMaxSkyNits = 1e12;
+constexpr double kMinTexelScale = 1.0 / 64.0, kMaxTexelScale = 64.0;
 
 glm::dmat4 localMatrix(const tinygltf::Node& node) {
   if (!node.matrix.empty()) return glm::make_mat4(node.matrix.data());
@@ -44,7 +45,8 @@ class NodeWalk {
 
   Result<void> run() {
     const auto roots = rootNodes();
-    for (auto root = roots.rbegin(); root != roots.rend(); ++root) stack_.push_back({*root, glm::dmat4(1.0), true});
+    for (auto root = roots.rbegin(); root != roots.rend(); ++root)
+      stack_.push_back({*root, glm::dmat4(1.0), true, 1.0F});
     while (!stack_.empty()) {
       const auto place = stack_.back();
       stack_.pop_back();
@@ -58,6 +60,7 @@ class NodeWalk {
     int node;
     glm::dmat4 parent;
     bool visible;
+    float texel_scale;
   };
 
   /// Nodes of the scene to show: /scene, else the first of /scenes, else every node without a parent.
@@ -88,8 +91,12 @@ class NodeWalk {
     }
     const auto* visibility = extensionOf(json, "KHR_node_visibility");
     const bool visible = at.visible && (visibility == nullptr || visibility->value("visible", true));
+    const auto texel_scale = texelScale(json, at.texel_scale);
+    if (!texel_scale) return tl::unexpected(texel_scale.error());
     if (node.mesh >= 0) {
-      if (auto ok = placeMesh(index, node, json, world, visible); !ok) return ok;
+      if (auto ok = placeMesh(node, json, {static_cast<std::uint32_t>(index), kNone, world, visible, *texel_scale});
+          !ok)
+        return ok;
     }
     if (node.camera >= 0) {
       if (auto ok = placeCamera(static_cast<std::size_t>(node.camera), world); !ok) return ok;
@@ -98,16 +105,28 @@ class NodeWalk {
       if (auto ok = placeLight((*light)["light"].get<std::size_t>(), world); !ok) return ok;
     }
     for (auto child = node.children.rbegin(); child != node.children.rend(); ++child) {
-      stack_.push_back({*child, world, visible});
+      stack_.push_back({*child, world, visible, *texel_scale});
     }
     return {};
   }
 
-  Result<void> placeMesh(std::size_t index, const tinygltf::Node& node, const Json& json, const glm::dmat4& world,
-                         bool visible) {
+  /// /nodes/N/extras/radiosityTexelScale: our own; glTF has no word for how fine a lightmap should be. Holds for the
+  /// nodes below, unless they say otherwise.
+  Result<float> texelScale(const Json& node, float inherited) const {
+    const auto extras = node.find("extras");
+    if (extras == node.end() || !extras->is_object() || !extras->contains("radiosityTexelScale")) return inherited;
+    const auto& scale = (*extras)["radiosityTexelScale"];
+    if (scale.is_number() && scale.get<double>() >= kMinTexelScale && scale.get<double>() <= kMaxTexelScale)
+      return scale.get<float>();
+    return context_.bad(pointer_ + "/extras/radiosityTexelScale", "must be a number in [1/64, 64]");
+  }
+
+  /// `placed`: all but the primitive.
+  Result<void> placeMesh(const tinygltf::Node& node, const Json& json, Instance placed) {
     if (node.skin >= 0) context_.warn(pointer_, "skin is ignored; the mesh is lit in the pose it was modelled in");
     const auto primitives = meshes_.primitivesOf(static_cast<std::size_t>(node.mesh));
     if (!primitives) return tl::unexpected(primitives.error());
+    const auto world = placed.world;
     std::vector<glm::dmat4> worlds{world};
     if (const auto* instancing = extensionOf(json, "EXT_mesh_gpu_instancing")) {
       const auto locals = readInstancing(context_.document, context_.model, (*instancing)["attributes"],
@@ -119,8 +138,9 @@ class NodeWalk {
     for (const auto& instance_world : worlds) {
       if (!isFinite(instance_world)) return context_.bad(pointer_, "world transform is not finite");
       for (const auto primitive : **primitives) {
-        if (auto ok = addInstance({static_cast<std::uint32_t>(index), primitive, instance_world, visible}); !ok)
-          return ok;
+        placed.primitive = primitive;
+        placed.world = instance_world;
+        if (auto ok = addInstance(placed); !ok) return ok;
       }
     }
     return {};

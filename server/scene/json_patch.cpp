@@ -39,6 +39,7 @@ class Patcher {
   Result<void> apply(const Json& operation, std::size_t number) {
     number_ = number;
     where_.clear();
+    touched_.clear();
     if (!operation.is_object()) return fault("is not an object");
     const auto op = stringOf(operation, "op");
     const auto path = stringOf(operation, "path");
@@ -59,6 +60,8 @@ class Patcher {
   }
 
   Json take() { return std::move(document_); }
+  /// Of the operation applied last, names resolved to indices.
+  [[nodiscard]] const Tokens& touched() const { return touched_; }
 
  private:
   struct Target {
@@ -175,6 +178,7 @@ class Patcher {
   Result<void> withValue(const std::string& op, const std::string& path, const Json& value) {
     auto target = resolve(path);
     if (!target) return tl::unexpected(target.error());
+    touched_ = target->path;
     if (op == "add") return add(*target, value);
     if (target->value == nullptr) return fault("there is no such value");
     if (op == "test") {
@@ -215,6 +219,7 @@ class Patcher {
     const auto target = resolve(path);
     if (!target) return tl::unexpected(target.error());
     if (target->value == nullptr) return fault("there is no such value");
+    touched_ = target->path;
     if (auto ok = permit("remove", target->path); !ok) return ok;
     if (target->parent == nullptr) {
       document_ = nullptr;
@@ -232,12 +237,18 @@ class Patcher {
     if (source->value == nullptr) return fault("there is no value at 'from' (" + from + ")");
     Json value = *source->value;
     if (op == "move") {
-      if (path.rfind(from + "/", 0) == 0) return fault("cannot move a value into itself");
-      if (path == from) return {};
+      // Compared as resolved: a name and an index may mean the same element.
+      const auto to = resolve(path);
+      if (!to) return tl::unexpected(to.error());
+      const auto& inner = source->path;
+      const bool below = to->path.size() >= inner.size() && std::equal(inner.begin(), inner.end(), to->path.begin());
+      if (below && to->path.size() > inner.size()) return fault("cannot move a value into itself");
+      if (below) return {};
       if (auto ok = remove(from); !ok) return ok;
     }
     auto target = resolve(path);
     if (!target) return tl::unexpected(target.error());
+    touched_ = target->path;
     return add(*target, std::move(value));
   }
 
@@ -246,11 +257,46 @@ class Patcher {
   std::size_t number_ = 0;
   std::size_t added_ = 0;
   std::string where_;
+  Tokens touched_;
 };
+
+/// Whether elements are things of their own, which keep their index, rather than parts of one value.
+bool isListOfObjects(const Json& value) {
+  return value.is_array() && std::all_of(value.begin(), value.end(), [](const Json& e) { return e.is_object(); });
+}
+
+void addDifference(const Json& before, const Json& after, const std::string& pointer, Json& operations) {
+  if (before == after) return;
+  if (before.is_object() && after.is_object()) {
+    for (const auto& [key, value] : before.items()) {
+      const auto child = pointer + "/" + escapeToken(key);
+      if (const auto found = after.find(key); found != after.end()) {
+        addDifference(value, *found, child, operations);
+      } else {
+        operations.push_back({{"op", "remove"}, {"path", child}});
+      }
+    }
+    for (const auto& [key, value] : after.items()) {
+      if (!before.contains(key))
+        operations.push_back({{"op", "add"}, {"path", pointer + "/" + escapeToken(key)}, {"value", value}});
+    }
+  } else if (isListOfObjects(before) && isListOfObjects(after)) {
+    const auto both = std::min(before.size(), after.size());
+    for (std::size_t i = 0; i < both; ++i)
+      addDifference(before[i], after[i], pointer + "/" + std::to_string(i), operations);
+    for (std::size_t i = before.size(); i > both; --i)
+      operations.push_back({{"op", "remove"}, {"path", pointer + "/" + std::to_string(i - 1)}});
+    for (std::size_t i = both; i < after.size(); ++i)
+      operations.push_back({{"op", "add"}, {"path", pointer + "/-"}, {"value", after[i]}});
+  } else {
+    operations.push_back({{"op", "replace"}, {"path", pointer}, {"value", after}});
+  }
+}
 
 }  // namespace
 
-Result<Json> applyJsonPatch(const Json& document, const Json& patch, const PatchGuard& guard) {
+Result<Json> applyJsonPatch(const Json& document, const Json& patch, const PatchGuard& guard,
+                            std::vector<Tokens>* touched) {
   if (!patch.is_array()) return fail(ErrorCode::kBadInput, "a JSON Patch is an array of operations", "patch");
   if (patch.size() > kMaxOperations) {
     return fail(ErrorCode::kTooLarge, "a patch may have " + std::to_string(kMaxOperations) + " operations", "patch");
@@ -259,8 +305,15 @@ Result<Json> applyJsonPatch(const Json& document, const Json& patch, const Patch
   Patcher patcher(document, guard);
   for (std::size_t i = 0; i < patch.size(); ++i) {
     if (auto ok = patcher.apply(patch[i], i); !ok) return tl::unexpected(ok.error());
+    if (touched != nullptr) touched->push_back(patcher.touched());
   }
   return patcher.take();
+}
+
+Json diffJson(const Json& before, const Json& after) {
+  Json operations = Json::array();
+  addDifference(before, after, "", operations);
+  return operations;
 }
 
 }  // namespace radiosity::scene

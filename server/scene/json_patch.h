@@ -18,7 +18,12 @@ using PatchGuard = std::function<std::string(const Json& document, const std::st
 
 /// At most 1000 operations, 64 levels, 64 MiB of added values. An array element may be named: /nodes/@lamp. The error's
 /// message starts with "operation N: " (from 0), its `where` is the pointer; kTestFailed for a failed `test`, kTooLarge
-/// over a limit, else kBadInput.
-[[nodiscard]] Result<Json> applyJsonPatch(const Json& document, const Json& patch, const PatchGuard& guard = {});
+/// over a limit, else kBadInput. `touched`, where given, gets the resolved `path` of every operation.
+[[nodiscard]] Result<Json> applyJsonPatch(const Json& document, const Json& patch, const PatchGuard& guard = {},
+                                          std::vector<Tokens>* touched = nullptr);
+
+/// A patch that turns `before` into `after`, in plain RFC 6902. Arrays of objects are compared element by element and
+/// grow and shrink at their end; other arrays (vectors, lists of indices) are replaced whole. O(size of both).
+[[nodiscard]] Json diffJson(const Json& before, const Json& after);
 
 }  // namespace radiosity::scene

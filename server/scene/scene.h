@@ -23,6 +23,8 @@ struct Texture {
   int height = 0;
   bool srgb = true;  ///< colour textures are sRGB-encoded; convert to linear before use
   std::vector<std::uint8_t> rgba;
+
+  bool operator==(const Texture&) const = default;
 };
 
 /// A texture as a material refers to it: which image, which TEXCOORD set, KHR_texture_transform already combined.
@@ -34,6 +36,8 @@ struct TextureUse {
   float rotation = 0.0F;
   bool repeat_u = true, repeat_v = true;  ///< false: clamp (mirror is treated as repeat with mirrored flag)
   bool mirror_u = false, mirror_v = false;
+
+  bool operator==(const TextureUse&) const = default;
 };
 
 enum class AlphaMode { kOpaque, kMask, kBlend };
@@ -49,6 +53,8 @@ struct Material {
   AlphaMode alpha_mode = AlphaMode::kOpaque;
   bool double_sided = false;
   TextureUse base_color_texture, emissive_texture;
+
+  bool operator==(const Material&) const = default;
 };
 
 /// One glTF primitive as a triangle list in mesh space. All per-vertex arrays are empty or positions.size() long.
@@ -60,6 +66,8 @@ struct Primitive {
   std::vector<glm::vec2> texcoord0, texcoord1;
   std::vector<glm::vec4> color0;       ///< linear
   std::vector<std::uint32_t> indices;  ///< 3 a triangle, counter-clockwise = front, all < positions.size()
+
+  bool operator==(const Primitive&) const = default;
 };
 
 /// A primitive placed in the world by a node (or by one element of EXT_mesh_gpu_instancing).
@@ -68,6 +76,9 @@ struct Instance {
   std::uint32_t primitive = kNone;  ///< index into Scene::primitives
   glm::dmat4 world{1.0};            ///< mesh to world, metres; a negative determinant flips the front
   bool visible = true;
+  float texel_scale = 1.0F;  ///< texels a metre, relative to the rest of the scene: /nodes/N/extras/radiosityTexelScale
+
+  bool operator==(const Instance&) const = default;
 };
 
 struct Camera {

@@ -238,6 +238,26 @@ void FakeEngine::patch(engine::PatchRequest request, Callback<engine::PatchOutco
   answer([done = std::move(done), revision] { done(engine::PatchOutcome{revision, 3, 40}); });
 }
 
+void FakeEngine::step(engine::StepRequest request, Callback<engine::PatchOutcome> done) {
+  patch({R"([{"op":"replace","path":"/asset/generator","value":"a step"}])",
+         request.base_revision,
+         false,
+         request.by,
+         {}},
+        [done = std::move(done)](Result<engine::PatchOutcome> outcome) {
+          if (outcome) outcome->stepped = outcome->revision - 1;
+          done(std::move(outcome));
+        });
+}
+
+void FakeEngine::history(Callback<engine::HistoryReport> done) {
+  const auto revision = status().revision;
+  engine::HistoryReport report{revision, revision, 0, {}};
+  for (std::uint64_t r = 1; r <= revision; ++r)
+    report.revisions.push_back({r, engine::PastRevision::Kind::kPatch, "somebody", "replace /asset/generator"});
+  answer([done = std::move(done), report = std::move(report)] { done(report); });
+}
+
 void FakeEngine::configure(engine::SolveSettings settings, Callback<engine::SolveSettings> done) {
   {
     const std::lock_guard lock(mutex_);

@@ -40,6 +40,8 @@ class FakeEngine : public engine::Engine {
   void loadBytes(std::string name, SharedBytes bytes, Callback<engine::LoadOutcome> done) override;
   void loadFile(std::string path, Callback<engine::LoadOutcome> done) override;
   void patch(engine::PatchRequest request, Callback<engine::PatchOutcome> done) override;
+  void step(engine::StepRequest request, Callback<engine::PatchOutcome> done) override;
+  void history(Callback<engine::HistoryReport> done) override;
   void configure(engine::SolveSettings settings, Callback<engine::SolveSettings> done) override;
   void pause(Callback<engine::SolveState> done) override;
   void resume(Callback<engine::SolveState> done) override;

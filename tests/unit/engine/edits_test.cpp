@@ -2,8 +2,10 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
 #include "tests/scenes/scenes.h"
+#include "tests/unit/engine/block_room.h"
 #include "tests/unit/engine/engine_driver.h"
 
 namespace radiosity::test {
@@ -186,6 +188,141 @@ TEST_F(Edits, WarningsSpeakOfThePresentMaterialsOnly) {
   EXPECT_EQ(paint(1, "[1,1,1,1]"), 1U);
   for (const char* color : {"[1,1,0.5,1]", "[1,0.5,1,1]", "[0.5,1,1,1]"}) EXPECT_EQ(paint(0, color), 2U) << color;
   EXPECT_EQ(paint(0, "[0.5,0.5,0.5,1]"), 1U);
+}
+
+// ---- what viewers see while geometry is solved anew ----
+
+/// Mean of a page's covered texels would need coverage; a closed box has hardly any gutter.
+double darkest(const std::vector<std::shared_ptr<const engine::Lightmaps>>& published) {
+  double low = 1e30;
+  for (const auto& lightmaps : published) low = std::min(low, meanIrradiance(*lightmaps));
+  return low;
+}
+
+TEST_F(Edits, TheOldLightFadesIntoTheNewWithoutADarkMoment) {
+  solve(blockRoom());
+  const double before = meanIrradiance(*engine().lightmaps());
+  ASSERT_GT(before, 0.0);
+  recorder_->forget();
+  ASSERT_TRUE(patch(R"([{"op":"replace","path":"/nodes/@block/translation","value":[0.7,0,0.7]}])"));
+  ASSERT_TRUE(reaches(SolveState::kConverged));
+  (void)sceneText();
+  const auto published = recorder_->lightmaps();
+  ASSERT_GE(published.size(), 2U);
+  EXPECT_EQ(published.front()->revision, 2U);
+  // Nothing but the surroundings of the block changed: the mean may not leave the band of the two solves' errors.
+  EXPECT_GT(darkest(published), 0.8 * before);
+  EXPECT_NEAR(meanIrradiance(*published.front()), before, 0.02 * before);  // carried: the same light
+  EXPECT_TRUE(published.back()->final);
+  // In the end it is the solver's own light, which a server that loads the edited scene finds too.
+  const auto shown = published.back()->pages.front()->mips.front().pixels;
+  ASSERT_TRUE(restart());
+  ASSERT_TRUE(reaches(SolveState::kConverged));
+  (void)sceneText();
+  EXPECT_EQ(engine().lightmaps()->pages.front()->mips.front().pixels, shown);
+}
+
+TEST_F(Edits, WhatIsNewIsNotBlackEither) {
+  solve(lumpedCube(0.5));
+  recorder_->forget();
+  // A second cube, seen by nobody, with charts of its own: they have no old light.
+  ASSERT_TRUE(patch(R"([{"op":"add","path":"/nodes/-","value":{"mesh":0,"scale":[0.1,0.1,0.1]}},
+                        {"op":"add","path":"/scenes/0/nodes/-","value":2}])"));
+  const auto first = recorder_->lightmaps();
+  ASSERT_FALSE(first.empty());
+  for (const auto& texel : first.front()->pages.front()->mips.front().pixels) EXPECT_GE(texel.x, 0.0F);
+  EXPECT_GT(meanIrradiance(*first.front()), 0.0);
+  ASSERT_TRUE(reaches(SolveState::kConverged));
+}
+
+TEST_F(Edits, AppendingWhatNobodyPlacesYetCostsNothing) {
+  solve(lumpedCube(0.5));
+  const auto before = status();
+  const auto outcome = patch(R"([{"op":"add","path":"/materials/-","value":{"name":"new"}},
+                                 {"op":"add","path":"/nodes/-","value":{"name":"spare","mesh":0}}])");
+  ASSERT_TRUE(outcome) << outcome.error().text();
+  EXPECT_EQ(outcome->affected_surfaces, 0U);
+  EXPECT_EQ(status().state, SolveState::kConverged);
+  EXPECT_EQ(status().shots, before.shots);
+}
+
+TEST_F(Edits, ADryRunTellsWhatItWouldTouch) {
+  solve(lumpedCube(0.5));
+  const auto bright = patch({emissionPatch(1, 9.0), 1, true, "dry"});
+  ASSERT_TRUE(bright);
+  EXPECT_EQ(bright->affected_surfaces, 1U);
+  EXPECT_EQ(bright->affected_shots, 0U);
+  const auto moved = patch({R"([{"op":"replace","path":"/nodes/0/translation","value":[0,2,0]}])", {}, true, "dry"});
+  ASSERT_TRUE(moved);
+  EXPECT_EQ(moved->affected_surfaces, status().surfaces);
+  EXPECT_EQ(moved->affected_shots, status().shots);
+}
+
+// ---- undo and redo ----
+
+TEST_F(Edits, UndoOfAColourNeedsNoGeometryAndNoShot) {
+  solve(lumpedCube(0.5));
+  const auto scene = nlohmann::json::parse(sceneText());
+  const auto before = engine().lightmaps()->pages.front()->mips.front().pixels;
+  ASSERT_TRUE(patch(emissionPatch(1, 2.0)));
+  ASSERT_TRUE(reaches(SolveState::kConverged));
+  const auto uploads = script_->uploads.load();
+  const auto shots = status().shots;
+  recorder_->forget();
+  const auto back = undo();
+  ASSERT_TRUE(back) << back.error().text();
+  EXPECT_EQ(back->revision, 3U);
+  EXPECT_EQ(back->stepped, 2U);
+  EXPECT_EQ(back->affected_surfaces, 1U);
+  ASSERT_TRUE(reaches(SolveState::kConverged));
+  EXPECT_EQ(nlohmann::json::parse(sceneText()), scene);
+  EXPECT_EQ(script_->uploads, uploads);
+  EXPECT_EQ(status().shots, shots);
+  EXPECT_EQ(engine().lightmaps()->pages.front()->mips.front().pixels, before);  // the same bits
+  ASSERT_EQ(recorder_->patched().size(), 1U);
+  EXPECT_EQ(recorder_->patched()[0].by, "undoer");
+  const auto forth = redo();
+  ASSERT_TRUE(forth) << forth.error().text();
+  EXPECT_EQ(forth->revision, 4U);
+  EXPECT_NE(nlohmann::json::parse(sceneText()), scene);
+  EXPECT_EQ(redo().error().code, ErrorCode::kNotFound);
+}
+
+TEST_F(Edits, UndoAndItsPatchLeadBackThroughEveryKindOfEdit) {
+  ASSERT_TRUE(configure([](auto& settings) { settings.target_error = kNever; }));
+  ASSERT_TRUE(load(test_scenes::parallelPlates(1.0, 1.0, 1.0, 1.0, 0.3)));
+  ASSERT_TRUE(pause());
+  std::vector<nlohmann::json> seen{nlohmann::json::parse(sceneText())};
+  for (const char* edit :
+       {R"([{"op":"replace","path":"/nodes/1/translation","value":[0,2,0]}])",
+        R"([{"op":"add","path":"/nodes/-","value":{"name":"copy","mesh":0,"translation":[3,0,0]}},
+            {"op":"add","path":"/scenes/0/nodes/-","value":3}])",
+        R"([{"op":"replace","path":"/nodes/3/extensions/KHR_node_visibility/visible","value":false}])",
+        R"([{"op":"replace","path":"/scenes/0/nodes","value":[0,1]}])",
+        R"([{"op":"replace","path":"/materials/0/doubleSided","value":true},
+            {"op":"add","path":"/nodes/0/extras","value":{"radiosityTexelScale":2}}])"}) {
+    ASSERT_TRUE(patch(edit)) << edit;
+    seen.push_back(nlohmann::json::parse(sceneText()));
+  }
+  recorder_->forget();
+  for (std::size_t i = seen.size() - 1; i > 0; --i) {
+    ASSERT_TRUE(undo());
+    EXPECT_EQ(nlohmann::json::parse(sceneText()), seen[i - 1]);
+    // The patch that everyone is told does the same on a copy, with any library.
+    EXPECT_EQ(seen[i].patch(nlohmann::json::parse(recorder_->patched().back().patch)), seen[i - 1]);
+  }
+  EXPECT_FALSE(undo());
+  EXPECT_EQ(history().undoable, 0U);
+  EXPECT_EQ(history().redoable, 5U);
+}
+
+TEST_F(Edits, AStepOnAStaleRevisionIsRefused) {
+  solve(lumpedCube(0.5));
+  ASSERT_TRUE(patch(emissionPatch(1, 2.0)));
+  const auto text = sceneText();
+  EXPECT_EQ(step({false, 1, "late"}).error().code, ErrorCode::kStaleRevision);
+  EXPECT_EQ(sceneText(), text);
+  EXPECT_TRUE(step({false, 2, "in time"}));
 }
 
 }  // namespace

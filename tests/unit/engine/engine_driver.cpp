@@ -109,6 +109,14 @@ Result<engine::PatchOutcome> EngineTest::patch(engine::PatchRequest request) {
   return call<engine::PatchOutcome>([&](auto done) { engine_->patch(std::move(request), std::move(done)); });
 }
 
+Result<engine::PatchOutcome> EngineTest::step(engine::StepRequest request) {
+  return call<engine::PatchOutcome>([&](auto done) { engine_->step(std::move(request), std::move(done)); });
+}
+
+engine::HistoryReport EngineTest::history() {
+  return call<engine::HistoryReport>([&](auto done) { engine_->history(std::move(done)); }).value();
+}
+
 Result<engine::SolveSettings> EngineTest::configure(const std::function<void(engine::SolveSettings&)>& change) {
   auto settings = status().settings;
   change(settings);

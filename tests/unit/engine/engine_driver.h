@@ -76,6 +76,10 @@ class EngineTest : public testing::Test {
   Result<engine::LoadOutcome> load(const test_scenes::TestScene& scene);
   Result<engine::PatchOutcome> patch(engine::PatchRequest request);
   Result<engine::PatchOutcome> patch(std::string json) { return patch({std::move(json), {}, false, "test"}); }
+  Result<engine::PatchOutcome> step(engine::StepRequest request);
+  Result<engine::PatchOutcome> undo() { return step({false, {}, "undoer"}); }
+  Result<engine::PatchOutcome> redo() { return step({true, {}, "redoer"}); }
+  engine::HistoryReport history();
   Result<engine::SolveSettings> configure(const std::function<void(engine::SolveSettings&)>& change);
   Result<State> pause();
   Result<State> resume();

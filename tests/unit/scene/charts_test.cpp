@@ -450,5 +450,25 @@ TEST(Charts, InstancesOfOneLightmappedMeshGetTheirOwnRegions) {
               b.page_y + b.height <= a.page_y);
 }
 
+TEST(Charts, ATexelScaleMakesOneInstanceFinerAndLeavesTheOthers) {
+  Scene scene = sceneOf(quadWithLightmapUv(0.0, 0.5));
+  scene.primitives[0].texcoord1.clear();
+  scene.instances.push_back(scene.instances[0]);
+  scene.instances[1].world = glm::translate(glm::dmat4(1.0), glm::dvec3(2, 0, 0));
+  for (const bool uvs : {false, true}) {
+    if (uvs) scene.primitives[0] = quadWithLightmapUv(0.0, 0.5);
+    scene.instances[1].texel_scale = 1.0F;
+    const PatchScene plain = build(scene, 400);
+    scene.instances[1].texel_scale = 2.0F;
+    const PatchScene patches = build(scene, 400);
+    expectSound(patches);
+    ASSERT_EQ(patches.surfaces.size(), 2U);
+    EXPECT_EQ(patches.surfaces[0].width, plain.surfaces[0].width);
+    EXPECT_EQ(patches.surfaces[0].height, plain.surfaces[0].height);
+    EXPECT_NEAR(patches.surfaces[1].width, 2.0 * plain.surfaces[1].width, 1.0);
+    EXPECT_NEAR(patches.surfaces[1].height, 2.0 * plain.surfaces[1].height, 1.0);
+  }
+}
+
 }  // namespace
 }  // namespace radiosity::scene::test

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 
@@ -83,6 +84,51 @@ TEST(JsonPatch, malformedOperationsAreRefused) {
   }
 }
 
+TEST(JsonPatch, aMoveIntoItselfIsSeenThroughNames) {
+  const auto doc = R"({"l":[{"name":"a","in":{}}],"o":{"p":1}})"_json;
+  EXPECT_FALSE(applyJsonPatch(doc, R"([{"op":"move","from":"/l/@a","path":"/l/0/in"}])"_json));
+  EXPECT_FALSE(applyJsonPatch(doc, R"([{"op":"move","from":"/l/0","path":"/l/@a/in"}])"_json));
+  EXPECT_EQ(applyJsonPatch(doc, R"([{"op":"move","from":"/l/@a","path":"/l/0"}])"_json).value(), doc);
+  // A name that only begins like another is another.
+  EXPECT_EQ(applyJsonPatch(R"({"a":1})"_json, R"([{"op":"move","from":"/a","path":"/ab"}])"_json).value(),
+            (Json{{"ab", 1}}));
+}
+
+TEST(JsonPatch, theTouchedPathsAreTheResolvedOnes) {
+  std::vector<Tokens> touched;
+  const auto doc = R"({"l":[{"name":"a","x":1}]})"_json;
+  const auto result = applyJsonPatch(
+      doc, R"([{"op":"test","path":"/l/@a/x","value":1},{"op":"copy","from":"/l/0","path":"/l/-"}])"_json, {},
+      &touched);
+  ASSERT_TRUE(result);
+  EXPECT_EQ(touched, (std::vector<Tokens>{{"l", "0", "x"}, {"l", "1"}}));
+}
+
+TEST(JsonPatch, aDifferenceLeadsFromOneValueToTheOther) {
+  const auto shapes = {R"({})",
+                       R"({"a":1,"b/~":{"c":[1,2,3]}})",
+                       R"({"a":1.5,"b/~":{"c":[1,2]}})",
+                       R"({"n":[{"t":[0,0,0]},{"t":[1,1,1],"x":"y"}]})",
+                       R"({"n":[{"t":[0,5,0]}]})",
+                       R"({"n":[{"t":[0,5,0]},{},{"z":[{"q":1}]}],"a":null})",
+                       R"({"n":[]})",
+                       R"({"n":{"0":1}})"};
+  for (const auto* from : shapes) {
+    for (const auto* to : shapes) {
+      const auto before = Json::parse(from), after = Json::parse(to);
+      const auto patch = diffJson(before, after);
+      const auto result = applyJsonPatch(before, patch);
+      ASSERT_TRUE(result) << from << " to " << to << ": " << patch << result.error().text();
+      EXPECT_EQ(*result, after) << patch;
+      if (before == after) {
+        EXPECT_TRUE(patch.empty());
+      }
+    }
+  }
+  EXPECT_EQ(diffJson(Json::parse(R"({"n":[{"t":[0,0,0]}]})"), Json::parse(R"({"n":[{"t":[0,5,0]}]})")),
+            R"([{"op":"replace","path":"/n/0/t","value":[0,5,0]}])"_json);
+}
+
 TEST(JsonPatch, operationsDepthAndGrowthAreBounded) {
   Json many = Json::array();
   for (int i = 0; i < 1001; ++i) many.push_back({{"op", "add"}, {"path", "/a"}, {"value", 1}});
@@ -125,7 +171,8 @@ TEST_F(ScenePatch, findsMembersThatTheFileLeftOut) {
 }
 
 TEST_F(ScenePatch, whatIsAppendedGetsDefaultsToo) {
-  const auto once = applyPatch(document_, R"([{"op":"add","path":"/nodes/-","value":{"name":"new","mesh":0}}])"_json);
+  const auto once = applyPatch(document_, R"([{"op":"add","path":"/nodes/-","value":{"name":"new","mesh":0}},
+                                              {"op":"add","path":"/scenes/0/nodes/-","value":2}])"_json);
   ASSERT_TRUE(once) << once.error().text();
   const auto twice = applyPatch(*once, R"([{"op":"replace","path":"/nodes/@new/translation","value":[0,1,0]}])"_json);
   ASSERT_TRUE(twice) << twice.error().text();
@@ -138,12 +185,132 @@ TEST_F(ScenePatch, indicesAndBytesKeepTheirMeaning) {
         R"([{"op":"replace","path":"/nodes","value":[]}])", R"([{"op":"remove","path":"/materials"}])",
         R"([{"op":"move","from":"/nodes/0","path":"/nodes/1"}])", R"([{"op":"replace","path":"","value":{}}])",
         R"([{"op":"replace","path":"/buffers/0/byteLength","value":9}])",
-        R"([{"op":"add","path":"/images","value":[]}])",
+        R"([{"op":"replace","path":"/buffers/0","value":{"byteLength":9}}])",
+        R"([{"op":"remove","path":"/buffers/0"}])",
         R"([{"op":"replace","path":"/bufferViews/0/byteOffset","value":4}])"}) {
     const auto patched = applyPatch(document_, Json::parse(patch));
     ASSERT_FALSE(patched) << patch;
     EXPECT_THAT(patched.error().message, StartsWith("operation 0: "));
   }
+}
+
+TEST_F(ScenePatch, vectorsAreReplacedWhole) {
+  for (const auto* patch : {R"([{"op":"replace","path":"/nodes/@lamp/translation/1","value":2}])",
+                            R"([{"op":"add","path":"/nodes/@lamp/scale/-","value":2}])",
+                            R"([{"op":"remove","path":"/materials/0/emissiveFactor/0"}])",
+                            R"([{"op":"move","from":"/nodes/1/scale/0","path":"/nodes/1/name"}])"}) {
+    const auto patched = applyPatch(document_, Json::parse(patch));
+    ASSERT_FALSE(patched) << patch;
+    EXPECT_THAT(patched.error().message, HasSubstr("a vector is replaced whole: /")) << patch;
+  }
+  EXPECT_TRUE(applyPatch(document_, R"([{"op":"test","path":"/nodes/@lamp/translation/1","value":5}])"_json));
+}
+
+TEST_F(ScenePatch, aNodeIsDetachedFromTheScenesThatTheFileLeftOut) {
+  ASSERT_EQ(document_.gltf["scenes"], R"([{"nodes":[0,1]}])"_json);
+  const auto edited = editDocument(document_, R"([{"op":"replace","path":"/scenes/0/nodes","value":[1]}])"_json);
+  ASSERT_TRUE(edited) << edited.error().text();
+  EXPECT_TRUE(edited->scene.instances.empty());
+  const auto hidden = editDocument(
+      document_,
+      R"([{"op":"replace","path":"/nodes/@wall/extensions/KHR_node_visibility/visible","value":false}])"_json);
+  ASSERT_TRUE(hidden) << hidden.error().text();
+  EXPECT_FALSE(hidden->scene.instances.at(0).visible);
+}
+
+TEST_F(ScenePatch, texelsOfOneNodeAndAllBelowItAreScaled) {
+  const auto patch = R"([{"op":"add","path":"/nodes/@wall/children","value":[1]},
+                         {"op":"replace","path":"/scenes/0/nodes","value":[0]},
+                         {"op":"add","path":"/nodes/1/mesh","value":0},
+                         {"op":"add","path":"/nodes/@wall/extras","value":{"radiosityTexelScale":2}}])"_json;
+  const auto edited = editDocument(document_, patch);
+  ASSERT_TRUE(edited) << edited.error().text();
+  ASSERT_EQ(edited->scene.instances.size(), 2U);
+  for (const auto& instance : edited->scene.instances) EXPECT_EQ(instance.texel_scale, 2.0F);
+  for (const auto* value : {"0", "-1", "\"fine\"", "65", "null"}) {
+    const auto refused =
+        editDocument(document_, Json::parse(R"([{"op":"add","path":"/nodes/0/extras","value":{"radiosityTexelScale":)" +
+                                            std::string(value) + "}}]"));
+    ASSERT_FALSE(refused) << value;
+    EXPECT_EQ(refused.error().where, "/nodes/0/extras/radiosityTexelScale");
+  }
+}
+
+TEST_F(ScenePatch, aFaultOfTheSceneNamesTheOperationThatMadeIt) {
+  const auto fault = [&](const char* patch) {
+    const auto edited = editDocument(document_, Json::parse(patch));
+    EXPECT_FALSE(edited) << patch;
+    return edited ? Error{} : edited.error();
+  };
+  const auto mesh = fault(R"([{"op":"replace","path":"/nodes/@lamp/name","value":"x"},
+                              {"op":"replace","path":"/nodes/@wall/mesh","value":7},
+                              {"op":"replace","path":"/nodes/@wall/scale","value":[1,1,1]}])");
+  EXPECT_EQ(mesh.operation, 1U);
+  EXPECT_EQ(mesh.where, "/nodes/0/mesh");
+  const auto cycle = fault(R"([{"op":"add","path":"/nodes/0/children","value":[1]},
+                               {"op":"add","path":"/nodes/1/children","value":[0]},
+                               {"op":"replace","path":"/scenes/0/nodes","value":[]}])");
+  EXPECT_THAT(cycle.message, HasSubstr("cycle"));
+  EXPECT_TRUE(cycle.operation == 0U || cycle.operation == 1U);
+  EXPECT_EQ(fault(R"([{"op":"replace","path":"/nodes/1/rotation","value":[0,0,0,0]}])").operation, 0U);
+}
+
+Json accessorPatch(const std::string& uri) {
+  // A triangle: three positions of 12 bytes.
+  return Json::parse(R"([{"op":"add","path":"/buffers/-","value":{"uri":")" + uri + R"("}},
+    {"op":"add","path":"/bufferViews/-","value":{"buffer":1,"byteLength":36}},
+    {"op":"add","path":"/accessors/-","value":{"bufferView":2,"componentType":5126,"count":3,"type":"VEC3"}},
+    {"op":"add","path":"/meshes/-","value":{"primitives":[{"attributes":{"POSITION":2}}]}},
+    {"op":"replace","path":"/nodes/@wall/mesh","value":1}])");
+}
+
+TEST_F(ScenePatch, anUploadBecomesAMesh) {
+  const std::vector<float> corners = {0, 0, 0, 1, 0, 0, 0, 2, 0};
+  Bytes bytes(36);
+  std::memcpy(bytes.data(), corners.data(), bytes.size());
+  const auto upload = std::make_shared<const Bytes>(bytes);
+  const auto find = [&](const std::string& uri) { return uri == "/uploads/abc" ? upload : nullptr; };
+  const auto edited = editDocument(document_, accessorPatch("/uploads/abc"), find);
+  ASSERT_TRUE(edited) << edited.error().text();
+  EXPECT_EQ(edited->scene.primitives.at(0).positions.at(2), glm::dvec3(0, 2, 0));
+  EXPECT_EQ(edited->document.buffers.at(1), upload);  // shared, not copied
+  EXPECT_EQ(edited->document.gltf["buffers"][1], (Json{{"byteLength", 36}}));
+  const auto again = parseDocument("again.glb", writeGlb(edited->document));
+  ASSERT_TRUE(again) << again.error().text();
+  EXPECT_EQ(importScene(*again)->primitives, edited->scene.primitives);
+
+  const auto gone = editDocument(document_, accessorPatch("/uploads/abd"), find);
+  ASSERT_FALSE(gone);
+  EXPECT_EQ(gone.error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(gone.error().operation, 0U);
+  EXPECT_EQ(gone.error().where, "/buffers/1/uri");
+  EXPECT_TRUE(editDocument(document_, accessorPatch("data:;base64," + std::string(48, 'A')), {}));
+  for (const auto* uri : {"data:;base64,AAAA", "http://x/y.bin", "../x.bin", ""})
+    EXPECT_FALSE(editDocument(document_, accessorPatch(uri), find)) << uri;
+}
+
+TEST_F(ScenePatch, appendedBytesAreCheckedAndBounded) {
+  const auto upload = std::make_shared<const Bytes>(Bytes(100));
+  const auto find = [&](const std::string&) { return upload; };
+  for (const auto* value : {R"(5)", R"({})", R"({"uri":7})", R"({"uri":"/uploads/a","byteLength":101})",
+                            R"({"uri":"/uploads/a","byteLength":-1})", R"({"uri":"/uploads/a","byteLength":"x"})"}) {
+    const auto patch = Json::parse(R"([{"op":"add","path":"/buffers/-","value":)" + std::string(value) + "}]");
+    const auto edited = editDocument(document_, patch, find);
+    ASSERT_FALSE(edited) << value;
+    EXPECT_THAT(edited.error().where, StartsWith("/buffers/1")) << value;
+  }
+  for (const auto* value : {R"({"bufferView":0,"uri":"/uploads/a"})", R"({"bufferView":99})", R"({})", R"(7)"}) {
+    const auto patch = Json::parse(R"([{"op":"add","path":"/images","value":[)" + std::string(value) + "]}]");
+    const auto edited = editDocument(document_, patch, find);
+    ASSERT_FALSE(edited) << value;
+    EXPECT_THAT(edited.error().where, StartsWith("/images/0")) << value;
+  }
+  ImportLimits limits;
+  limits.max_file_bytes = 250;
+  const auto patch = R"([{"op":"add","path":"/buffers/-","value":{"uri":"/uploads/a"}},
+                         {"op":"add","path":"/buffers/-","value":{"uri":"/uploads/a"}},
+                         {"op":"add","path":"/buffers/-","value":{"uri":"/uploads/a"}}])"_json;
+  EXPECT_EQ(editDocument(document_, patch, find, limits).error().code, ErrorCode::kTooLarge);
 }
 
 TEST_F(ScenePatch, aSceneThatBecameInvalidIsRefusedWithItsPlace) {

@@ -1,0 +1,148 @@
+#include "server/engine/carried_light.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/vec2.hpp>
+#include <map>
+#include <optional>
+#include <tuple>
+
+#include "common/check.h"
+
+namespace radiosity::engine {
+namespace {
+
+using scene::kNone;
+using scene::LightmapPage;
+using scene::PatchScene;
+using scene::Scene;
+
+/// By which an instance is known again: its node, mesh and primitive, and which of the node's instances it is.
+using InstanceKey = std::tuple<std::uint32_t, std::uint32_t, std::uint32_t, std::uint32_t>;
+
+std::vector<InstanceKey> keysOf(const Scene& scene) {
+  std::map<InstanceKey, std::uint32_t> seen;
+  std::vector<InstanceKey> keys;
+  for (const auto& instance : scene.instances) {
+    const auto& primitive = scene.primitives[instance.primitive];
+    InstanceKey key{instance.node, primitive.mesh, primitive.primitive, 0};
+    std::get<3>(key) = seen[key]++;
+    keys.push_back(key);
+  }
+  return keys;
+}
+
+/// Mean over what is covered.
+glm::vec3 meanOf(const std::vector<LightmapPage>& pages) {
+  glm::dvec3 sum(0.0);
+  double weight = 0.0;
+  for (const auto& page : pages) {
+    for (std::size_t i = 0; i < page.coverage.size(); ++i) {
+      sum += glm::dvec3(page.irradiance.pixels[i]) * static_cast<double>(page.coverage[i]);
+      weight += static_cast<double>(page.coverage[i]);
+    }
+  }
+  return weight > 0.0 ? glm::vec3(sum / weight) : glm::vec3(0.0F);
+}
+
+/// Bilinear; pages are dilated, so a lookup anywhere on a chart is sound. `uv`: page coordinates in [0, 1].
+glm::vec3 lookUp(const Image& image, glm::dvec2 uv) {
+  const glm::dvec2 size(image.width, image.height);
+  const glm::dvec2 at = glm::clamp(uv * size - 0.5, glm::dvec2(0.0), size - 1.0);
+  const int x = static_cast<int>(at.x), y = static_cast<int>(at.y);
+  const int x1 = std::min(x + 1, image.width - 1), y1 = std::min(y + 1, image.height - 1);
+  const glm::vec2 f(at - glm::dvec2(x, y));
+  return glm::mix(glm::mix(image.at(x, y), image.at(x1, y), f.x), glm::mix(image.at(x, y1), image.at(x1, y1), f.x),
+                  f.y);
+}
+
+/// Carries a point from one triangle of UVs to another; nothing where the first has no area.
+std::optional<glm::dvec2> carryPoint(glm::dvec2 point, const std::array<glm::vec2, 3>& from,
+                                     const std::array<glm::vec2, 3>& to) {
+  const glm::dvec2 a(from[0]), u = glm::dvec2(from[1]) - a, v = glm::dvec2(from[2]) - a, p = point - a;
+  const double area = u.x * v.y - u.y * v.x;
+  if (std::abs(area) < 1e-14) return std::nullopt;
+  const double s = (p.x * v.y - p.y * v.x) / area, t = (u.x * p.y - u.y * p.x) / area;
+  const glm::dvec2 b(to[0]);
+  return b + s * (glm::dvec2(to[1]) - b) + t * (glm::dvec2(to[2]) - b);
+}
+
+class Carrier {
+ public:
+  Carrier(const ShownScene& before, const Scene& scene, const PatchScene& patches)
+      : before_(before), patches_(patches), mean_(meanOf(before.pages)) {
+    std::map<InstanceKey, std::uint32_t> known;
+    const auto old_keys = keysOf(before.scene);
+    for (std::uint32_t i = 0; i < old_keys.size(); ++i) known[old_keys[i]] = i;
+    for (const auto& key : keysOf(scene)) {
+      const auto found = known.find(key);
+      source_.push_back(found == known.end() ? kNone : found->second);
+    }
+  }
+
+  [[nodiscard]] std::vector<LightmapPage> run() const {
+    std::vector<glm::vec3> values(patches_.nodeCount(), mean_);
+    for (const auto& surface : patches_.surfaces) {
+      for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf) {
+        const auto value = carried(surface, leaf);
+        if (!value) continue;
+        for (const auto first : surface.first_node) {
+          if (first != kNone) values[first + leaf] = *value;
+        }
+      }
+    }
+    return scene::assemblePages(patches_, values);
+  }
+
+ private:
+  [[nodiscard]] std::optional<glm::vec3> carried(const scene::Surface& surface, std::uint32_t leaf) const {
+    const auto& place = patches_.leaves[surface.first_leaf + leaf];
+    const auto instance = source_[surface.instance];
+    if (place.triangle == kNone || instance == kNone) return std::nullopt;
+    const auto triangle = patches_.triangle_source[place.triangle];
+    const auto& old_uvs = before_.patches.instance_uvs[instance];
+    if (triangle >= old_uvs.page.size() || old_uvs.page[triangle] == kNone) return std::nullopt;
+    const auto& page = patches_.pages[surface.page];
+    const glm::dvec2 uv =
+        (glm::dvec2(place.texel) + glm::dvec2(surface.page_x, surface.page_y)) / glm::dvec2(page.width, page.height);
+    const auto& uvs = patches_.instance_uvs[surface.instance];
+    const auto old_uv = carryPoint(uv, uvs.corners[triangle], old_uvs.corners[triangle]);
+    if (!old_uv) return std::nullopt;
+    return lookUp(before_.pages[old_uvs.page[triangle]].irradiance, *old_uv);
+  }
+
+  const ShownScene& before_;
+  const PatchScene& patches_;
+  glm::vec3 mean_;
+  std::vector<std::uint32_t> source_;  ///< by instance of the new scene: the old one, or kNone
+};
+
+}  // namespace
+
+std::vector<LightmapPage> carryLight(const ShownScene& before, const Scene& scene, const PatchScene& patches) {
+  return Carrier(before, scene, patches).run();
+}
+
+double newLightShare(double error, double target_error) {
+  // An edit seldom changes more than a third of the light of what it leaves in place; above that the old is nearer.
+  const double good = std::max(0.05, target_error), bad = std::max(0.3, 4.0 * good);
+  if (!(error < bad)) return 0.0;
+  if (error <= good) return 1.0;
+  const double t = std::log(bad / error) / std::log(bad / good);
+  return t * t * (3.0 - 2.0 * t);
+}
+
+std::vector<LightmapPage> blendPages(const std::vector<LightmapPage>& carried, std::vector<LightmapPage> fresh,
+                                     double share) {
+  RAD_CHECK_EQ(carried.size(), fresh.size());
+  for (std::size_t p = 0; p < fresh.size(); ++p) {
+    auto& pixels = fresh[p].irradiance.pixels;
+    RAD_CHECK_EQ(carried[p].irradiance.pixels.size(), pixels.size());
+    for (std::size_t i = 0; i < pixels.size(); ++i)
+      pixels[i] = glm::mix(carried[p].irradiance.pixels[i], pixels[i], static_cast<float>(share));
+  }
+  return fresh;
+}
+
+}  // namespace radiosity::engine

@@ -1,0 +1,74 @@
+#include "server/engine/scene_change.h"
+
+#include <algorithm>
+
+namespace radiosity::engine {
+namespace {
+
+using scene::AlphaMode;
+using scene::Material;
+using scene::Scene;
+using scene::TextureUse;
+
+/// The same picture in the same place; textures are numbered anew by every import.
+bool sameTexture(const Scene& a, TextureUse use_a, const Scene& b, TextureUse use_b) {
+  const bool none_a = use_a.texture == scene::kNone, none_b = use_b.texture == scene::kNone;
+  if (none_a || none_b) return none_a == none_b;
+  if (a.textures[use_a.texture] != b.textures[use_b.texture]) return false;
+  use_a.texture = use_b.texture = 0;
+  return use_a == use_b;
+}
+
+/// Which sides a surface has, and where one can see through it.
+bool sameShape(const Scene& a, const Material& m, const Scene& b, const Material& n) {
+  if (m.double_sided != n.double_sided || m.alpha_mode != n.alpha_mode || m.transmission != n.transmission)
+    return false;
+  if (m.alpha_mode == AlphaMode::kOpaque) return true;
+  return m.alpha == n.alpha && m.alpha_cutoff == n.alpha_cutoff &&
+         sameTexture(a, m.base_color_texture, b, n.base_color_texture);
+}
+
+bool sameShading(const Scene& a, const Material& m, const Scene& b, const Material& n) {
+  return m.base_color == n.base_color && m.metallic == n.metallic && m.emission == n.emission &&
+         sameTexture(a, m.base_color_texture, b, n.base_color_texture) &&
+         sameTexture(a, m.emissive_texture, b, n.emissive_texture);
+}
+
+/// Where they both are hidden it does not matter where they are.
+bool sameInstance(const scene::Instance& a, const scene::Instance& b) {
+  if (a.visible || b.visible) return a == b;
+  return a.node == b.node && a.primitive == b.primitive;
+}
+
+/// By material: whether a visible surface is made of it.
+std::vector<bool> usedMaterials(const Scene& scene) {
+  std::vector<bool> used(scene.materials.size(), false);
+  for (const auto& instance : scene.instances) {
+    const auto material = scene.primitives[instance.primitive].material;
+    if (instance.visible && material < used.size()) used[material] = true;
+  }
+  return used;
+}
+
+}  // namespace
+
+SceneChange changeBetween(const Scene& before, const Scene& after) {
+  SceneChange change;
+  change.geometry =
+      before.primitives != after.primitives || !std::ranges::equal(before.instances, after.instances, sameInstance);
+  if (change.geometry) return change;
+  const auto used = usedMaterials(before);
+  const auto both = std::min(before.materials.size(), after.materials.size());
+  for (std::uint32_t m = 0; m < both; ++m) {
+    const auto &old_one = before.materials[m], &new_one = after.materials[m];
+    if (!used[m]) continue;
+    if (!sameShape(before, old_one, after, new_one)) {
+      change.geometry = true;
+      return change;
+    }
+    if (!sameShading(before, old_one, after, new_one)) change.materials.push_back(m);
+  }
+  return change;
+}
+
+}  // namespace radiosity::engine

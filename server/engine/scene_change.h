@@ -1,0 +1,25 @@
+// What an edit changed, seen from the two scenes as values rather than from their JSON: names, extras, and things that
+// nobody places change nothing, and so does appending what will be used later. Pure; solve thread.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "server/scene/scene.h"
+
+namespace radiosity::engine {
+
+struct SceneChange {
+  /// Shape, place, visibility, sides or see-through parts of a surface: charts and links are no longer true.
+  bool geometry = false;
+  /// Otherwise: the materials whose emission or reflectance differs (indices into both scenes' materials).
+  std::vector<std::uint32_t> materials;
+
+  [[nodiscard]] bool nothing() const { return !geometry && materials.empty(); }
+};
+
+/// Lights without extent and the sky are not looked at: what they deliver is compared by the solver's sources. Cost: a
+/// comparison of all vertices and decoded textures.
+[[nodiscard]] SceneChange changeBetween(const scene::Scene& before, const scene::Scene& after);
+
+}  // namespace radiosity::engine
