@@ -55,6 +55,26 @@ export class App {
   constructor() {
     // Nobody else has this name, so the page knows its own patches when it is told of them.
     const me = `viewer ${Math.random().toString(36).slice(2, 6)}`;
+    // First of all: while the server answers, the page builds itself. Nothing comes in before this is done.
+    this.connection = new Connection(
+      {
+        url: `${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws`,
+        client: me,
+        token: () => this.token,
+        resume: () => this.resume,
+        subscription: () => this.subscription(),
+      },
+      {
+        state: (state, detail) => this.onLink(state, detail),
+        ready: (info, hello) => void this.onReady(info, hello),
+        notification: (method, params) => this.onNotification(method, params),
+        tile: (frame) => {
+          if (!('firstTile' in this.marks)) this.mark('firstTile');
+          this.tiles.push(frame);
+        },
+      },
+    );
+    this.connection.open();
     this.solve = new SolvePanel({
       pauseOrResume: () => this.pauseOrResume(),
       restart: () => void this.ask('solve.restart'),
@@ -79,7 +99,12 @@ export class App {
         reconnect: () => this.connection.open(),
         giveToken: (token) => this.giveToken(token),
       },
-      { View: this.view.panel.element, Solve: this.solve.element, Scene: this.edit.panel.element, Share: sharePanel.element },
+      {
+        View: this.view.panel.element,
+        Solve: this.solve.element,
+        Scene: this.edit.panel.element,
+        Share: sharePanel.element,
+      },
     );
     this.viewer = new Viewer(this.frame.canvas, {
       used: (bytes) => this.connection.used(bytes),
@@ -105,25 +130,6 @@ export class App {
     });
     this.view.start();
     this.edit.start();
-    this.connection = new Connection(
-      {
-        url: `${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws`,
-        client: me,
-        token: () => this.token,
-        resume: () => this.resume,
-        subscription: () => this.subscription(),
-      },
-      {
-        state: (state, detail) => this.onLink(state, detail),
-        ready: (info, hello) => void this.onReady(info, hello),
-        notification: (method, params) => this.onNotification(method, params),
-        tile: (frame) => {
-          if (!('firstTile' in this.marks)) this.mark('firstTile');
-          this.tiles.push(frame);
-        },
-      },
-    );
-    this.connection.open();
     document.addEventListener('visibilitychange', () => this.onVisible());
     window.addEventListener('online', () => this.connection.open());
   }
@@ -148,7 +154,9 @@ export class App {
     if (this.token) headers.set('Authorization', `Bearer ${this.token}`);
     const response = await fetch(path, { ...init, headers, cache: 'no-store' });
     if (response.ok) return response;
-    const body = (await response.json().catch(() => undefined)) as { error?: { message: string; where?: string } } | undefined;
+    const body = (await response.json().catch(() => undefined)) as
+      | { error?: { message: string; where?: string } }
+      | undefined;
     const { message, where } = body?.error ?? { message: `HTTP ${response.status}` };
     throw new Error(where ? `${where}: ${message}` : message);
   }
@@ -180,7 +188,7 @@ export class App {
       this.frame.setState('Not connected', 'bad');
       this.frame.askToken(detail, (token) => this.giveToken(token));
     } else if (!this.everOpen) {
-      this.frame.setState('Connecting', 'busy');
+      this.frame?.setState('Connecting', 'busy'); // the first time there is no page yet
     }
   }
 
@@ -194,6 +202,7 @@ export class App {
     this.mark('ready');
     if (this.epoch !== '' && this.epoch !== hello.epoch) this.resume = undefined;
     this.epoch = hello.epoch;
+    if (!hello.resumed) this.viewer.forgetLayout();
     for (const resolve of this.awaited.splice(0)) resolve();
     this.view.onCapabilities();
     this.share.onServer(info);
@@ -231,7 +240,12 @@ export class App {
     const bad = progress.state === 'failed';
     const error = progress.state === 'empty' ? '' : `${percent(progress.error.total)} error`;
     const rate = progress.state === 'solving' ? `${readable(progress.shotsPerSecond, 2)} shots/s` : '';
-    this.frame.setState(stateName(progress.state), bad ? 'bad' : done ? 'good' : progress.state === 'solving' ? 'busy' : 'idle', error, rate);
+    this.frame.setState(
+      stateName(progress.state),
+      bad ? 'bad' : done ? 'good' : progress.state === 'solving' ? 'busy' : 'idle',
+      error,
+      rate,
+    );
     this.adaptToNetwork();
   }
 

@@ -60,7 +60,9 @@ export class EditSession {
   onPatched(note: ScenePatchedNote, fetchAnew: () => void): void {
     if (!this.document.patched(note.revision, note.patch, note.by)) fetchAnew();
     if (note.by !== this.me)
-      this.app.frame.toasts.show(`${note.by || 'Someone'} changed ${edits.describePatch(this.document.gltf, note.patch)}`);
+      this.app.frame.toasts.show(
+        `${note.by || 'Someone'} changed ${edits.describePatch(this.document.gltf, note.patch)}`,
+      );
   }
 
   /** The objects are new; what was selected may still be there. */
@@ -190,7 +192,10 @@ export class EditSession {
       });
       const { warnings } = (await response.json()) as { warnings: string[] };
       const count = warnings.length;
-      toasts.show(count ? `${file.name} loaded; ${count} warning${count > 1 ? 's' : ''}, see Solve` : `${file.name} loaded`, 'good');
+      toasts.show(
+        count ? `${file.name} loaded; ${count} warning${count > 1 ? 's' : ''}, see Solve` : `${file.name} loaded`,
+        'good',
+      );
     } catch (error) {
       toasts.show(`${file.name}: ${(error as Error).message}`, 'bad');
     }
@@ -208,7 +213,10 @@ export class EditSession {
 
   private onHistory(): void {
     const server = this.app.connection?.has('scene.undo');
-    this.app.frame?.setHistory(server || this.document.undoStack.length > 0, server || this.document.redoStack.length > 0);
+    this.app.frame?.setHistory(
+      server || this.document.undoStack.length > 0,
+      server || this.document.redoStack.length > 0,
+    );
     if (this.document.lastEdit) this.app.share?.onEdit(this.document.lastEdit);
   }
 }

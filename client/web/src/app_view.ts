@@ -255,7 +255,9 @@ export class ViewSession {
     // Where errors of single texels are not streamed, the scene's own stands for them.
     const error = reading.error ?? (lux === undefined ? undefined : lux * (this.app.progress?.error.total ?? NaN));
     const details = [
-      reading.irradiance ? `R ${readable(reading.irradiance[0])}  G ${readable(reading.irradiance[1])}  B ${readable(reading.irradiance[2])}` : '',
+      reading.irradiance
+        ? `R ${readable(reading.irradiance[0])}  G ${readable(reading.irradiance[1])}  B ${readable(reading.irradiance[2])}`
+        : '',
       reading.node === undefined ? '' : nodeName(edit.document.gltf, reading.node),
       reading.texel ? `page ${reading.page}, texel ${reading.texel.join(', ')}` : '',
       position(reading.point),
@@ -305,5 +307,8 @@ function done(_result: unknown): true {
 }
 
 function position(point: Vector3): string {
-  return `at ${point.toArray().map((v) => readable(v)).join(', ')} m`;
+  return `at ${point
+    .toArray()
+    .map((v) => readable(v))
+    .join(', ')} m`;
 }

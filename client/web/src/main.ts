@@ -11,6 +11,7 @@ declare global {
 }
 
 try {
+  if (!('WebGL2RenderingContext' in window)) throw new Error('This browser has no WebGL 2.');
   window.viewer = new App();
 } catch (error) {
   console.error(error);
@@ -20,7 +21,13 @@ try {
       { class: 'fatal' },
       h('h1', {}, 'The viewer could not start'),
       h('p', {}, (error as Error).message),
-      h('p', {}, 'It needs WebGL 2. What the server is doing also stands on its ', h('a', { href: '/status' }, 'status page'), '.'),
+      h(
+        'p',
+        {},
+        'It needs WebGL 2. What the server is doing also stands on its ',
+        h('a', { href: '/status' }, 'status page'),
+        '.',
+      ),
     ),
   );
 }

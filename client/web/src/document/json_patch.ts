@@ -126,6 +126,11 @@ function copied(operation: PatchOperation): Json {
   return structuredClone(operation.value);
 }
 
+function sourceOf(operation: PatchOperation): string {
+  if (operation.from === undefined) throw new PatchError(`${operation.path}: ${operation.op} without a source`);
+  return operation.from;
+}
+
 /** One operation on the document itself; returns the operations that undo it, in order. */
 function applyOperation(document: Json, operation: PatchOperation): Patch {
   const path = withoutNames(document, operation.path);
@@ -137,12 +142,12 @@ function applyOperation(document: Json, operation: PatchOperation): Patch {
     case 'replace':
       return [replace(document, path, copied(operation))];
     case 'copy': {
-      const value = valueAt(document, withoutNames(document, operation.from ?? ''));
+      const value = valueAt(document, withoutNames(document, sourceOf(operation)));
       if (value === undefined) throw new PatchError(`${operation.from}: there is nothing`);
       return [add(document, path, structuredClone(value))];
     }
     case 'move': {
-      const from = withoutNames(document, operation.from ?? '');
+      const from = withoutNames(document, sourceOf(operation));
       if (path.startsWith(from + '/')) throw new PatchError(`${from} cannot be moved into itself`);
       const { removed, inverse } = remove(document, from);
       return [add(document, path, removed), inverse];

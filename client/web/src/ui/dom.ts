@@ -60,7 +60,11 @@ export function iconButton(
   properties: Properties = {},
 ): HTMLButtonElement {
   const title = key ? `${label} (${key})` : label;
-  return h('button', { type: 'button', class: 'icon', title, 'aria-label': label, onclick: onClick, ...properties }, icon(name));
+  return h(
+    'button',
+    { type: 'button', class: 'icon', title, 'aria-label': label, onclick: onClick, ...properties },
+    icon(name),
+  );
 }
 
 export function pressed(element: HTMLElement, on: boolean): void {
@@ -95,7 +99,11 @@ export function select(
 }
 
 export function checkbox(checked: boolean, onChange: (on: boolean) => void): HTMLInputElement {
-  const element: HTMLInputElement = h('input', { type: 'checkbox', checked, onchange: () => onChange(element.checked) });
+  const element: HTMLInputElement = h('input', {
+    type: 'checkbox',
+    checked,
+    onchange: () => onChange(element.checked),
+  });
   return element;
 }
 
@@ -103,7 +111,9 @@ export function checkbox(checked: boolean, onChange: (on: boolean) => void): HTM
 export function readable(value: number, digits = 3): string {
   if (!Number.isFinite(value)) return '–';
   if (value !== 0 && (Math.abs(value) < 1e-3 || Math.abs(value) >= 1e7)) return value.toExponential(digits - 1);
-  return value.toLocaleString('en', { maximumSignificantDigits: Math.max(digits, 1 + Math.floor(Math.log10(Math.abs(value) || 1))) });
+  return value.toLocaleString('en', {
+    maximumSignificantDigits: Math.max(digits, 1 + Math.floor(Math.log10(Math.abs(value) || 1))),
+  });
 }
 
 export function percent(fraction: number): string {
@@ -115,7 +125,9 @@ export function toHex(rgb: readonly number[]): string {
   const byte = (v: number) => {
     const c = Math.min(1, Math.max(0, v));
     const s = c <= 0.0031308 ? 12.92 * c : 1.055 * c ** (1 / 2.4) - 0.055;
-    return Math.round(255 * s).toString(16).padStart(2, '0');
+    return Math.round(255 * s)
+      .toString(16)
+      .padStart(2, '0');
   };
   return `#${rgb.slice(0, 3).map(byte).join('')}`;
 }

@@ -19,7 +19,11 @@ const MARGIN = { left: 44, right: 8, top: 8, bottom: 22 };
 const MOST = 600;
 
 export class ErrorPlot {
-  readonly element = h('canvas', { class: 'plot', role: 'img', 'aria-label': 'Error against solve time, both logarithmic' });
+  readonly element = h('canvas', {
+    class: 'plot',
+    role: 'img',
+    'aria-label': 'Error against solve time, both logarithmic',
+  });
   private samples: Sample[] = [];
   private target = 0;
 
@@ -55,7 +59,12 @@ export class ErrorPlot {
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.clearRect(0, 0, width, height);
     const style = getComputedStyle(this.element);
-    const x = scale(this.samples.map((s) => s.seconds), [0.1, 1], MARGIN.left, width - MARGIN.right);
+    const x = scale(
+      this.samples.map((s) => s.seconds),
+      [0.1, 1],
+      MARGIN.left,
+      width - MARGIN.right,
+    );
     const errors = this.samples.flatMap((s) => [s.total, ...(s.sampling > 1e-4 ? [s.sampling] : [])]);
     const y = scale([...errors, this.target || 0.02], [0.01, 1], height - MARGIN.bottom, MARGIN.top);
     this.axes(context, style, x, y, width, height);
@@ -96,7 +105,13 @@ export class ErrorPlot {
     context.setLineDash([]);
   }
 
-  private line(context: CanvasRenderingContext2D, colour: string, key: (typeof LINES)[number]['key'], x: LogScale, y: LogScale): void {
+  private line(
+    context: CanvasRenderingContext2D,
+    colour: string,
+    key: (typeof LINES)[number]['key'],
+    x: LogScale,
+    y: LogScale,
+  ): void {
     context.beginPath();
     context.strokeStyle = colour;
     context.lineWidth = key === 'total' ? 2 : 1.2;

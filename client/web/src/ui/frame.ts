@@ -20,7 +20,12 @@ export interface FrameActions {
 const THEMES = ['auto', 'dark', 'light'] as const;
 
 export class Frame {
-  readonly canvas = h('canvas', { class: 'view', tabIndex: 0, role: 'application', 'aria-label': 'The scene. Press ? for keys.' });
+  readonly canvas = h('canvas', {
+    class: 'view',
+    tabIndex: 0,
+    role: 'application',
+    'aria-label': 'The scene. Press ? for keys.',
+  });
   readonly toasts = new Toasts();
   readonly legend = new Legend();
   readonly meter = new MeterCard();
@@ -117,8 +122,14 @@ export class Frame {
   }
 
   askToken(reason: string, give: (token: string) => void): void {
-    const input = h('input', { type: 'password', 'aria-label': 'Token', placeholder: 'Token', autocomplete: 'off' });
-    const form = h('form', { class: 'token' }, h('span', {}, `This server wants a token: ${reason}.`), input, h('button', {}, 'Connect'));
+    const input = h('input', { type: 'password', 'aria-label': 'Token', autocomplete: 'off' });
+    const form = h(
+      'form',
+      { class: 'token' },
+      h('span', {}, `This server wants a token: ${reason}.`),
+      input,
+      h('button', {}, 'Connect'),
+    );
     form.onsubmit = (event) => {
       event.preventDefault();
       if (input.value) give(input.value.trim());

@@ -34,5 +34,9 @@ export function listenToKeys(canvas: HTMLCanvasElement, actions: KeyActions): vo
 
 function isTyping(target: EventTarget | null): boolean {
   if (target instanceof HTMLInputElement) return !['checkbox', 'button', 'range', 'color'].includes(target.type);
-  return target instanceof HTMLTextAreaElement || target instanceof HTMLSelectElement || document.querySelector('dialog[open]') !== null;
+  return (
+    target instanceof HTMLTextAreaElement ||
+    target instanceof HTMLSelectElement ||
+    document.querySelector('dialog[open]') !== null
+  );
 }

@@ -7,7 +7,13 @@ export class Legend {
   private readonly bar = h('div', { class: 'bar' });
   private readonly ticks = h('div', { class: 'ticks' });
   private readonly title = h('div', { class: 'title' });
-  readonly element = h('figure', { class: 'legend card', 'aria-label': 'Scale of colours', hidden: true }, this.title, this.bar, this.ticks);
+  readonly element = h(
+    'figure',
+    { class: 'legend card', 'aria-label': 'Scale of colours', hidden: true },
+    this.title,
+    this.bar,
+    this.ticks,
+  );
 
   constructor() {
     this.bar.style.background = paletteCss('to right');
@@ -34,7 +40,12 @@ export class MeterCard {
   private readonly value = h('strong', {});
   private readonly bar = h('span', { class: 'errorbar' });
   private readonly more = h('div', { class: 'dim' });
-  readonly element = h('div', { class: 'meter card', role: 'status', hidden: true }, h('div', {}, this.value, this.bar), this.more);
+  readonly element = h(
+    'div',
+    { class: 'meter card', role: 'status', hidden: true },
+    h('div', {}, this.value, this.bar),
+    this.more,
+  );
 
   hide(): void {
     this.element.hidden = true;

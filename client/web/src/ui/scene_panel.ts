@@ -83,10 +83,14 @@ export class ScenePanel {
     const had = this.list.contains(document.activeElement);
     const items = all.slice(0, MOST_LISTED).map(({ node, depth }) => {
       const current = node === this.selection?.node;
-      const element = button(nodeName(this.gltf, node), () => this.actions.select({ node, material: this.materialsOf(node)[0] }), {
-        'aria-current': current ? 'true' : undefined,
-        class: isVisible(this.gltf, node) ? '' : 'hidden-node',
-      });
+      const element = button(
+        nodeName(this.gltf, node),
+        () => this.actions.select({ node, material: this.materialsOf(node)[0] }),
+        {
+          'aria-current': current ? 'true' : undefined,
+          class: isVisible(this.gltf, node) ? '' : 'hidden-node',
+        },
+      );
       element.style.paddingInlineStart = `${0.5 + 0.8 * Math.min(depth, 8)}rem`;
       if (lightOf(this.gltf, node)) element.append(h('span', { class: 'tag' }, 'light'));
       return h('li', {}, element);
@@ -109,9 +113,16 @@ export class ScenePanel {
     this.editor.replaceChildren(
       section(
         nodeName(gltf, selection.node),
-        field('Visible', checkbox(isVisible(gltf, selection.node), (on) => this.actions.setVisible(selection.node, on))),
+        field(
+          'Visible',
+          checkbox(isVisible(gltf, selection.node), (on) => this.actions.setVisible(selection.node, on)),
+        ),
         ...this.placement(selection.node),
-        h('div', { class: 'buttons' }, button('Remove', () => this.actions.remove(selection.node), { title: 'Delete' })),
+        h(
+          'div',
+          { class: 'buttons' },
+          button('Remove', () => this.actions.remove(selection.node), { title: 'Delete' }),
+        ),
       ),
       ...(light ? [this.lightEditor(light.index)] : []),
       ...(material !== undefined && gltf.materials?.[material] ? [this.materialEditor(material, materials)] : []),
@@ -170,7 +181,20 @@ export class ScenePanel {
     };
     const chooser =
       all.length > 1
-        ? row('Material', h('span', { class: 'list' }, ...all.map((m) => button(materialName(this.gltf, m), () => this.actions.select({ node: this.selection!.node, material: m }), { 'aria-pressed': String(m === index) }))))
+        ? row(
+            'Material',
+            h(
+              'span',
+              { class: 'list' },
+              ...all.map((m) =>
+                button(
+                  materialName(this.gltf, m),
+                  () => this.actions.select({ node: this.selection!.node, material: m }),
+                  { 'aria-pressed': String(m === index) },
+                ),
+              ),
+            ),
+          )
         : undefined;
     return section(
       `Material: ${materialName(this.gltf, index)}`,
@@ -184,7 +208,9 @@ export class ScenePanel {
   private lightEditor(index: number): HTMLElement {
     const light = this.gltf.extensions!.KHR_lights_punctual!.lights[index]!;
     const unit = light.type === 'directional' ? 'lx' : 'cd';
-    const colour = this.colour(toHex(light.color ?? [1, 1, 1]), (hex) => this.actions.setLight(index, { color: fromHex(hex) }));
+    const colour = this.colour(toHex(light.color ?? [1, 1, 1]), (hex) =>
+      this.actions.setLight(index, { color: fromHex(hex) }),
+    );
     const strength = this.number(String(Number((light.intensity ?? 1).toPrecision(5))), () => {
       const value = Number(strength.value);
       if (value >= 0) this.actions.setLight(index, { intensity: value });
@@ -205,4 +231,3 @@ export class ScenePanel {
     return h('input', { type: 'text', inputMode: 'decimal', class: 'number', value, onchange: changed });
   }
 }
-

@@ -24,7 +24,12 @@ export class SharePanel {
       {},
       section(
         'This view',
-        h('div', { class: 'buttons' }, button('Copy link', () => actions.copyLink()), button('Save picture', () => actions.download('png'))),
+        h(
+          'div',
+          { class: 'buttons' },
+          button('Copy link', () => actions.copyLink()),
+          button('Save picture', () => actions.download('png')),
+        ),
       ),
       section('Last edit', this.edit, h('div', { class: 'buttons' }, ...this.copies)),
       section(

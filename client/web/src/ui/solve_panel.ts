@@ -64,7 +64,12 @@ export class SolvePanel {
         'Progress',
         this.bar,
         this.facts,
-        h('div', { class: 'buttons' }, this.pause, button('Start again', () => actions.restart())),
+        h(
+          'div',
+          { class: 'buttons' },
+          this.pause,
+          button('Start again', () => actions.restart()),
+        ),
       ),
       section('Error against time', this.plot.element, legendLine()),
       section('Goal', field('Error, %', this.target), field('Texels, about', this.texels)),
@@ -126,5 +131,12 @@ export class SolvePanel {
 
 function legendLine(): HTMLElement {
   const swatch = (name: string, label: string) => h('span', { class: `swatch ${name}` }, label);
-  return h('p', { class: 'swatches' }, swatch('a', 'total'), swatch('b', 'sampling'), swatch('c', 'residual'), swatch('t', 'goal'));
+  return h(
+    'p',
+    { class: 'swatches' },
+    swatch('a', 'total'),
+    swatch('b', 'sampling'),
+    swatch('c', 'residual'),
+    swatch('t', 'goal'),
+  );
 }

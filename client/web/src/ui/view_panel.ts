@@ -59,8 +59,14 @@ export class ViewPanel {
         'Picture',
         field('Automatic exposure', this.auto),
         field('Exposure', this.stops, this.stopsValue),
-        field('Tone curve', select(TONE_CURVES, 'neutral', (id) => actions.setToneCurve(id))),
-        field('Background', select(BACKGROUNDS, 'theme', (id) => actions.setBackground(id))),
+        field(
+          'Tone curve',
+          select(TONE_CURVES, 'neutral', (id) => actions.setToneCurve(id)),
+        ),
+        field(
+          'Background',
+          select(BACKGROUNDS, 'theme', (id) => actions.setBackground(id)),
+        ),
       ),
       section('Cameras of the scene', this.cameras),
     );

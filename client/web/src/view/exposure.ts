@@ -32,7 +32,7 @@ export class ExposureMeter {
   fresh = true;
   private measured = 1;
   private shown = 1;
-  private busy = false;
+  private running: Promise<void> | undefined;
   private readonly target: WebGLRenderTarget;
   private readonly half: boolean;
 
@@ -65,10 +65,13 @@ export class ExposureMeter {
     return this.shown;
   }
 
-  /** Starts measuring; `done` when there is a new value. Nothing while one is on its way. */
-  async measure(scene: Scene, camera: Camera, lightsKnown: boolean, done: () => void): Promise<void> {
-    if (this.busy || !lightsKnown) return;
-    this.busy = true;
+  /** Ends when there is a new value; the one that is on its way counts. */
+  measure(scene: Scene, camera: Camera): Promise<void> {
+    this.running ??= this.read(scene, camera).finally(() => (this.running = undefined));
+    return this.running;
+  }
+
+  private async read(scene: Scene, camera: Camera): Promise<void> {
     const { renderer, target, view } = this;
     const pixels = this.half ? new Uint16Array(4 * WIDTH * HEIGHT) : new Float32Array(4 * WIDTH * HEIGHT);
     view.all.measuring.value = true;
@@ -81,11 +84,8 @@ export class ExposureMeter {
       await renderer.readRenderTargetPixelsAsync(target, 0, 0, WIDTH, HEIGHT, pixels);
       const value = exposureOf(this.luminances(pixels));
       if (value !== undefined) this.take(value);
-      done();
     } catch {
       // The context was lost on the way; it is measured again when it is back.
-    } finally {
-      this.busy = false;
     }
   }
 

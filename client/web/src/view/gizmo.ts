@@ -24,7 +24,12 @@ export class Gizmo {
   mode: GizmoMode = 'translate';
   private object: Object3D | undefined;
   private readonly controls: TransformControls;
-  private readonly lines = new LineBasicMaterial({ toneMapped: false, depthTest: false, transparent: true, opacity: 0.9 });
+  private readonly lines = new LineBasicMaterial({
+    toneMapped: false,
+    depthTest: false,
+    transparent: true,
+    opacity: 0.9,
+  });
   private outline: Object3D[] = [];
 
   constructor(
@@ -44,6 +49,10 @@ export class Gizmo {
       this.refresh();
       events.changed(this.object, this.mode);
     });
+  }
+
+  get dragging(): boolean {
+    return this.controls.dragging;
   }
 
   /** The pointer is over a handle, or holds one. */

@@ -116,7 +116,12 @@ export class LightmapPage {
     const y = Math.min(mip.height - 1, Math.max(0, v * this.used[1] * mip.height - 0.5));
     const [x0, y0] = [Math.floor(x), Math.floor(y)];
     const sum: [number, number, number] = [0, 0, 0];
-    for (const [dx, dy] of [[0, 0], [1, 0], [0, 1], [1, 1]] as const) {
+    for (const [dx, dy] of [
+      [0, 0],
+      [1, 0],
+      [0, 1],
+      [1, 1],
+    ] as const) {
       const weight = (dx ? x - x0 : 1 - x + x0) * (dy ? y - y0 : 1 - y + y0);
       const at = Math.min(mip.height - 1, y0 + dy) * mip.width + Math.min(mip.width - 1, x0 + dx);
       decodeRgb9e5(mip.texels[at]!).forEach((c, i) => (sum[i]! += weight * c * this.scale));

@@ -125,7 +125,12 @@ const REFLECTANCE = `
 `;
 
 function noPage() {
-  return { pageResident: { value: null }, pageSize: { value: [1, 1] }, pageUsed: { value: [1, 1] }, pageTiles: { value: 64 } };
+  return {
+    pageResident: { value: null },
+    pageSize: { value: [1, 1] },
+    pageUsed: { value: [1, 1] },
+    pageTiles: { value: 64 },
+  };
 }
 
 /** The server has one metallic value a material: factor x mean of the texture's blue channel. */

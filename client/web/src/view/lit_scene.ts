@@ -39,17 +39,17 @@ export class LitScene {
   private readonly textures = new Set<Texture>();
 
   /** Reads a GLB from /scene.glb. Rejects when it cannot be drawn. */
-  static async load(
-    glb: ArrayBuffer,
-    set: LightmapSet,
-    view: ViewUniforms,
-    anisotropy: number,
-  ): Promise<LitScene> {
+  static async load(glb: ArrayBuffer, set: LightmapSet, view: ViewUniforms, anisotropy: number): Promise<LitScene> {
     const gltf = await new GLTFLoader().parseAsync(glb, '');
     return new LitScene(gltf, set, view, anisotropy);
   }
 
-  private constructor(gltf: GLTF, readonly set: LightmapSet, view: ViewUniforms, anisotropy: number) {
+  private constructor(
+    gltf: GLTF,
+    readonly set: LightmapSet,
+    view: ViewUniforms,
+    anisotropy: number,
+  ) {
     const associations = gltf.parser.associations as unknown as Map<object, Association>;
     const lights: Object3D[] = [];
     gltf.scene.updateMatrixWorld(true);
@@ -133,7 +133,7 @@ export class LitScene {
     empty.quaternion.copy(light.quaternion);
     empty.scale.copy(light.scale);
     const target = (light as { target?: Object3D }).target;
-    empty.add(...light.children.filter((child) => child !== target));
+    for (const child of [...light.children]) if (child !== target) empty.add(child);
     for (const [node, object] of this.nodes) if (object === light) this.nodes.set(node, empty);
     light.parent?.add(empty);
     light.removeFromParent();
@@ -146,7 +146,7 @@ export class LitScene {
   private light(mesh: Mesh, associations: Map<object, Association>, view: ViewUniforms, anisotropy: number): void {
     const geometry = mesh.geometry as BufferGeometry;
     const source = mesh.material as MeshLambertMaterial;
-    const extras = mesh.userData as { lightmap?: number };
+    const extras = geometry.userData as { lightmap?: number };
     const page = geometry.getAttribute('uv1') ? this.set.pages[extras.lightmap ?? -1] : undefined;
     const index = associations.get(source)?.materials;
     const key = `${source.uuid}/${page ? extras.lightmap : ''}`;

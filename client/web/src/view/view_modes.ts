@@ -51,7 +51,14 @@ export const VIEW_MODES: readonly ViewMode[] = [
     unit: 'lx',
     falseColour: 'always',
   },
-  { id: 'patches', label: 'Patches', number: 5, hint: 'Texels of the lightmap', quantity: 'irradiance', falseColour: 'off' },
+  {
+    id: 'patches',
+    label: 'Patches',
+    number: 5,
+    hint: 'Texels of the lightmap',
+    quantity: 'irradiance',
+    falseColour: 'off',
+  },
   {
     id: 'mips',
     label: 'Mip level',
@@ -60,7 +67,14 @@ export const VIEW_MODES: readonly ViewMode[] = [
     quantity: 'irradiance',
     falseColour: 'off',
   },
-  { id: 'normals', label: 'Normals', number: 7, hint: 'Direction of surfaces', quantity: 'irradiance', falseColour: 'off' },
+  {
+    id: 'normals',
+    label: 'Normals',
+    number: 7,
+    hint: 'Direction of surfaces',
+    quantity: 'irradiance',
+    falseColour: 'off',
+  },
   { id: 'albedo', label: 'Albedo', number: 8, hint: 'Colour of surfaces', quantity: 'irradiance', falseColour: 'off' },
   {
     id: 'pages',

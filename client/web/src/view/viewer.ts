@@ -55,6 +55,7 @@ export class Viewer {
   private lastFrame = 0;
   private lastMeasure = 0;
   private lost = false;
+  private layoutKnown = true;
   private document: Gltf = { asset: { version: '2.0' } };
 
   constructor(
@@ -94,7 +95,8 @@ export class Viewer {
 
   /** Pages have a new layout. Returns the set whose geometry is to be fetched; undefined: it is the one that is there. */
   expectLayout(note: LightmapsNote): LightmapSet | undefined {
-    if (this.set?.note.layout === note.layout && samePages(this.set.note, note)) return undefined;
+    if (this.layoutKnown && this.set?.note.layout === note.layout && samePages(this.set.note, note)) return undefined;
+    this.layoutKnown = true;
     this.dropStaged();
     const set = new LightmapSet(this.renderer, note, 'irradiance', this.events.used);
     this.staged = { set, since: performance.now() };
@@ -102,9 +104,19 @@ export class Viewer {
     return set;
   }
 
+  /** The server may have started again: its next layout is new, whatever its number. */
+  forgetLayout(): void {
+    this.layoutKnown = false;
+  }
+
   /** Geometry of a layout. A set that was overtaken is dropped. */
   async load(glb: ArrayBuffer, set: LightmapSet): Promise<void> {
-    const scene = await LitScene.load(glb, set, this.uniforms, Math.min(8, this.renderer.capabilities.getMaxAnisotropy()));
+    const scene = await LitScene.load(
+      glb,
+      set,
+      this.uniforms,
+      Math.min(8, this.renderer.capabilities.getMaxAnisotropy()),
+    );
     if (this.staged?.set !== set) return scene.dispose();
     scene.applyDocument(this.document);
     this.staged.scene = scene;
@@ -131,8 +143,7 @@ export class Viewer {
     if (this.dataSet?.quantity === quantity) return this.dataSet;
     this.dataSet?.dispose();
     const note = this.set?.note;
-    this.dataSet =
-      quantity && note ? new LightmapSet(this.renderer, note, quantity, this.events.used) : undefined;
+    this.dataSet = quantity && note ? new LightmapSet(this.renderer, note, quantity, this.events.used) : undefined;
     this.bindData();
     return this.dataSet;
   }
@@ -166,9 +177,10 @@ export class Viewer {
 
   /** PNG of what is on the screen. */
   async picture(): Promise<Blob> {
+    await this.settle();
     this.gizmo.setVisible(false);
     this.draw();
-    this.gizmo.setVisible(true);
+    this.gizmo.setVisible(!this.mode?.flat);
     this.invalidate();
     return new Promise((resolve, reject) =>
       this.canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error('the picture could not be made')))),
@@ -208,12 +220,27 @@ export class Viewer {
     if (now - this.lastMeasure < MEASURE_EVERY_MS || !this.shown?.set.covered || this.mode?.flat) return;
     this.lastMeasure = now;
     this.updateRange();
-    if (!this.exposure.automatic) return;
+    if (this.exposure.automatic) void this.measureNow().then(() => this.invalidate());
+  }
+
+  /** Signs and handles are no part of the scene's light. */
+  private measureNow(): Promise<void> {
+    const lamps = [...(this.shown?.lamps.values() ?? [])];
     this.gizmo.setVisible(false);
-    for (const lamp of this.shown.lamps.values()) lamp.visible = false;
-    void this.exposure.measure(this.world, this.rig.camera, true, () => this.invalidate());
-    this.gizmo.setVisible(true);
-    for (const lamp of this.shown.lamps.values()) lamp.visible = true;
+    for (const lamp of lamps) lamp.visible = false;
+    const measured = this.exposure.measure(this.world, this.rig.camera);
+    this.gizmo.setVisible(!this.mode?.flat);
+    for (const lamp of lamps) lamp.visible = true;
+    return measured;
+  }
+
+  /** Ends when the picture has the exposure that the light there is now asks for. */
+  async settle(): Promise<void> {
+    while (this.shown && this.set?.waiting) await new Promise((resolve) => setTimeout(resolve, 20));
+    for (let again = 0; again < 2 && this.shown; ++again) await this.measureNow(); // the first may have been on its way
+    this.exposure.settle();
+    this.exposure.step(0);
+    this.invalidate();
   }
 
   private updateRange(): void {
@@ -225,7 +252,7 @@ export class Viewer {
   /** The first scene shows at once; a later one when its light has come, so that nothing goes dark in between. */
   private promote(now: number): void {
     const staged = this.staged;
-    if (!staged?.scene) return;
+    if (!staged?.scene || this.gizmo.dragging) return; // what is held is not taken out of the hand
     const lit = staged.set.covered && staged.set.waiting === 0 && staged.set.error < READY_ERROR;
     if (this.shown && !lit && now - staged.since < READY_AFTER_MS) return;
     this.staged = undefined;
