@@ -124,12 +124,10 @@ export class EditSession {
     const node = this.selection?.node;
     if (node === undefined) return;
     const rounded = (values: number[]) => values.map((v) => Number(v.toPrecision(7)));
-    const placement: edits.Placement =
-      mode === 'translate'
-        ? { translation: rounded(object.position.toArray()) as Vec3 }
-        : mode === 'rotate'
-          ? { rotation: unit(object.quaternion.toArray() as Vec4) }
-          : { scale: rounded(object.scale.toArray()) as Vec3 };
+    // Turning and scaling go about the object's middle, so they move its origin.
+    const placement: edits.Placement = { translation: rounded(object.position.toArray()) as Vec3 };
+    if (mode === 'rotate') placement.rotation = unit(object.quaternion.toArray() as Vec4);
+    if (mode === 'scale') placement.scale = rounded(object.scale.toArray()) as Vec3;
     const label = mode === 'translate' ? 'Move' : mode === 'rotate' ? 'Turn' : 'Scale';
     this.make(`${label} ${nodeName(this.document.gltf, node)}`, edits.setPlacement(node, placement), `${mode} ${node}`);
   }

@@ -1,13 +1,8 @@
 // Starts a real radiosityd and a real browser, and sees to it that neither is left behind.
 
-import { spawn, type ChildProcess } from "node:child_process";
-import { accessSync, constants } from "node:fs";
-import {
-  chromium,
-  type Browser,
-  type BrowserContext,
-  type Page,
-} from "playwright-core";
+import { spawn, type ChildProcess } from 'node:child_process';
+import { accessSync, constants } from 'node:fs';
+import { chromium, type Browser, type BrowserContext, type Page } from 'playwright-core';
 
 function program(variable: string, otherwise?: string): string {
   const path = process.env[variable] ?? otherwise;
@@ -16,11 +11,11 @@ function program(variable: string, otherwise?: string): string {
   return path;
 }
 
-export const SCENES = process.env["RADIOSITY_SCENES"] ?? "";
+export const SCENES = process.env['RADIOSITY_SCENES'] ?? '';
 
 export class Server {
   private process: ChildProcess | undefined;
-  url = "";
+  url = '';
 
   constructor(
     private readonly scene: string | undefined,
@@ -29,25 +24,16 @@ export class Server {
 
   /** Again on the same port after stop(). */
   async start(): Promise<void> {
-    const listen = this.url ? new URL(this.url).host : "127.0.0.1:0";
-    const args = [
-      ...(this.scene ? [this.scene] : []),
-      "--listen",
-      listen,
-      "--log-level",
-      "error",
-      ...this.options,
-    ];
-    const child = spawn(program("RADIOSITYD"), args, {
-      stdio: ["ignore", "pipe", "inherit"],
+    const listen = this.url ? new URL(this.url).host : '127.0.0.1:0';
+    const args = [...(this.scene ? [this.scene] : []), '--listen', listen, '--log-level', 'error', ...this.options];
+    const child = spawn(program('RADIOSITYD'), args, {
+      stdio: ['ignore', 'pipe', 'inherit'],
     });
     this.process = child;
-    let text = "";
+    let text = '';
     this.url = await new Promise<string>((resolve, reject) => {
-      child.once("exit", (code) =>
-        reject(new Error(`radiosityd ended with ${code}: ${text}`)),
-      );
-      child.stdout.on("data", (data: Buffer) => {
+      child.once('exit', (code) => reject(new Error(`radiosityd ended with ${code}: ${text}`)));
+      child.stdout.on('data', (data: Buffer) => {
         text += data.toString();
         const found = /listening on (http:\/\/\S+)/.exec(text);
         if (found) resolve(found[1]!);
@@ -55,11 +41,11 @@ export class Server {
     });
   }
 
-  async stop(signal: NodeJS.Signals = "SIGKILL"): Promise<void> {
+  async stop(signal: NodeJS.Signals = 'SIGKILL'): Promise<void> {
     const child = this.process;
     this.process = undefined;
     if (!child || child.exitCode !== null) return;
-    const ended = new Promise((resolve) => child.once("exit", resolve));
+    const ended = new Promise((resolve) => child.once('exit', resolve));
     child.kill(signal);
     await ended;
   }
@@ -73,40 +59,30 @@ export class Pages {
 
   async launch(): Promise<void> {
     this.browser = await chromium.launch({
-      executablePath: program("CHROMIUM", "/usr/bin/chromium"),
+      executablePath: program('CHROMIUM', '/usr/bin/chromium'),
       // Software rendering, so that the test needs no graphics card; containers have no room for Chromium's sandbox.
       args: [
-        "--no-sandbox",
-        "--use-gl=angle",
-        "--use-angle=swiftshader",
-        "--enable-unsafe-swiftshader",
-        "--ignore-gpu-blocklist",
+        '--no-sandbox',
+        '--use-gl=angle',
+        '--use-angle=swiftshader',
+        '--enable-unsafe-swiftshader',
+        '--ignore-gpu-blocklist',
       ],
     });
   }
 
-  async open(
-    url: string,
-    width = 480,
-    height = 480,
-    options: { touch?: boolean } = {},
-  ): Promise<Page> {
+  async open(url: string, width = 480, height = 480, options: { touch?: boolean } = {}): Promise<Page> {
     const context = await this.browser!.newContext({
       viewport: { width, height },
       hasTouch: options.touch ?? false,
     });
     this.contexts.push(context);
     const page = await context.newPage();
-    page.on("console", (message) => {
-      if (
-        ["error", "warning"].includes(message.type()) &&
-        !isNoise(message.text())
-      )
+    page.on('console', (message) => {
+      if (['error', 'warning'].includes(message.type()) && !isNoise(message.text()))
         this.complaints.push(`${message.type()}: ${message.text()}`);
     });
-    page.on("pageerror", (error) =>
-      this.complaints.push(`exception: ${error.message}`),
-    );
+    page.on('pageerror', (error) => this.complaints.push(`exception: ${error.message}`));
     await page.goto(url);
     return page;
   }
@@ -123,9 +99,7 @@ export class Pages {
 
 /** What Chromium says of its own software renderer, and of networks that are gone, which no page can keep it from. */
 function isNoise(text: string): boolean {
-  return /GPU stall due to ReadPixels|WebSocket connection to|ERR_CONNECTION_REFUSED|CONTEXT_LOST_WEBGL/.test(
-    text,
-  );
+  return /GPU stall due to ReadPixels|WebSocket connection to|ERR_CONNECTION_REFUSED|CONTEXT_LOST_WEBGL/.test(text);
 }
 
 /** Until the solve has stopped at its target, and all light is on the screen. */
@@ -134,12 +108,7 @@ export async function converged(page: Page): Promise<void> {
     () => {
       const app = window.viewer;
       const set = app?.viewer.shown?.set;
-      return (
-        app?.progress?.state === "converged" &&
-        set?.complete &&
-        set.waiting === 0 &&
-        app.viewer.set === set
-      );
+      return app?.progress?.state === 'converged' && set?.complete && set.waiting === 0 && app.viewer.set === set;
     },
     undefined,
     { timeout: 60_000 },
@@ -147,22 +116,16 @@ export async function converged(page: Page): Promise<void> {
 }
 
 /** What a page shows, or the picture at a URL, brought to `side` x `side` pixels: R, G, B of each, 0 to 255. */
-export async function pixels(
-  page: Page,
-  side: number,
-  url?: string,
-): Promise<number[]> {
+export async function pixels(page: Page, side: number, url?: string): Promise<number[]> {
   return page.evaluate(
     async ({ side, url }) => {
-      const blob = url
-        ? await (await fetch(url)).blob()
-        : await window.viewer!.viewer.picture();
+      const blob = url ? await (await fetch(url)).blob() : await window.viewer!.viewer.picture();
       const image = await createImageBitmap(blob, {
         resizeWidth: side,
         resizeHeight: side,
-        resizeQuality: "high",
+        resizeQuality: 'high',
       });
-      const context = new OffscreenCanvas(side, side).getContext("2d", {
+      const context = new OffscreenCanvas(side, side).getContext('2d', {
         alpha: false,
       })!; // upon black, as the server's
 
@@ -175,10 +138,7 @@ export async function pixels(
 }
 
 /** Mean and 99th percentile of the channels' differences, of 255. */
-export function difference(
-  a: readonly number[],
-  b: readonly number[],
-): { mean: number; p99: number } {
+export function difference(a: readonly number[], b: readonly number[]): { mean: number; p99: number } {
   const all = a.map((v, i) => Math.abs(v - b[i]!)).sort((x, y) => x - y);
   return {
     mean: all.reduce((sum, v) => sum + v, 0) / all.length,
@@ -186,9 +146,7 @@ export function difference(
   };
 }
 
-export async function sceneOf(
-  server: Server,
-): Promise<{
+export async function sceneOf(server: Server): Promise<{
   nodes: { name: string; translation: number[] }[];
   materials: { name: string; [member: string]: unknown }[];
   scenes: { nodes: number[] }[];
@@ -196,11 +154,7 @@ export async function sceneOf(
   return (await (await fetch(`${server.url}/scene.gltf`)).json()) as never;
 }
 
-export async function until<T>(
-  what: () => Promise<T>,
-  good: (value: T) => boolean,
-  ms = 20_000,
-): Promise<T> {
+export async function until<T>(what: () => Promise<T>, good: (value: T) => boolean, ms = 20_000): Promise<T> {
   const end = Date.now() + ms;
   for (;;) {
     const value = await what();

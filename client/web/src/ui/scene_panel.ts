@@ -32,6 +32,7 @@ export class ScenePanel {
   private readonly editor = h('div', { class: 'editor' });
   private gltf: Gltf = { asset: { version: '2.0' } };
   private selection: Selection | undefined;
+  private revealed: number | undefined;
   private materialsOf: (node: number) => number[] = () => [];
 
   constructor(private readonly actions: ScenePanelActions) {
@@ -68,7 +69,6 @@ export class ScenePanel {
   setSelection(selection: Selection | undefined): void {
     this.selection = selection;
     this.refresh();
-    this.list.querySelector('[aria-current]')?.scrollIntoView({ block: 'nearest' });
   }
 
   /** Shows other people's and our own edits; leaves what the user is typing alone. */
@@ -81,6 +81,7 @@ export class ScenePanel {
   private showList(): void {
     const all = hangingNodes(this.gltf);
     const had = this.list.contains(document.activeElement);
+    const { scrollTop } = this.list;
     const items = all.slice(0, MOST_LISTED).map(({ node, depth }) => {
       const current = node === this.selection?.node;
       const element = button(
@@ -97,7 +98,21 @@ export class ScenePanel {
     });
     if (all.length > MOST_LISTED) items.push(h('li', { class: 'dim' }, `and ${all.length - MOST_LISTED} more`));
     this.list.replaceChildren(...items);
+    this.list.scrollTop = scrollTop;
+    this.revealSelection();
     if (had) this.list.querySelector<HTMLElement>('[aria-current]')?.focus();
+  }
+
+  /** Scrolls the list, and nothing but the list, to an object that was just selected or just came. */
+  private revealSelection(): void {
+    const element = this.list.querySelector<HTMLElement>('[aria-current]')?.parentElement;
+    const node = element ? this.selection?.node : undefined;
+    if (node === this.revealed) return;
+    this.revealed = node;
+    if (!element) return;
+    const top = element.offsetTop - this.list.offsetTop;
+    if (top < this.list.scrollTop || top + element.offsetHeight > this.list.scrollTop + this.list.clientHeight)
+      this.list.scrollTop = top - this.list.clientHeight / 2;
   }
 
   private showEditor(): void {

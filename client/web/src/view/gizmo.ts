@@ -1,4 +1,5 @@
-// Handles to move, turn and scale the selected object, and the lines that show which it is.
+// Handles to move, turn and scale the selected object, and the lines that show which it is. The handles are in the middle
+// of the object, wherever its own origin may be: many scenes have all their origins in one corner.
 
 import {
   Box3,
@@ -8,12 +9,15 @@ import {
   LineBasicMaterial,
   LinearSRGBColorSpace,
   LineSegments,
+  Matrix4,
   Mesh,
-  type Object3D,
+  Object3D,
   type PerspectiveCamera,
   Scene,
+  type Vector3,
 } from 'three';
 import { TransformControls } from 'three/addons/controls/TransformControls.js';
+import { LampMarker } from './lamp_marker';
 
 export type GizmoMode = 'translate' | 'rotate' | 'scale' | 'off';
 
@@ -23,6 +27,9 @@ const MAX_EDGE_TRIANGLES = 30_000;
 export class Gizmo {
   mode: GizmoMode = 'translate';
   private object: Object3D | undefined;
+  private readonly pivot = new Object3D();
+  /** From the pivot to the object, when the handles were put there. */
+  private readonly fromPivot = new Matrix4();
   private readonly controls: TransformControls;
   private readonly lines = new LineBasicMaterial({
     toneMapped: false,
@@ -41,11 +48,15 @@ export class Gizmo {
     this.lines.color.setRGB(1, 0.66, 0.16, LinearSRGBColorSpace);
     this.controls = new TransformControls(camera, element);
     this.controls.size = 0.8;
-    scene.add(this.controls.getHelper());
+    scene.add(this.pivot, this.controls.getHelper());
     this.controls.addEventListener('change', () => events.redraw());
-    this.controls.addEventListener('dragging-changed', ({ value }) => events.dragging(value as boolean));
+    this.controls.addEventListener('dragging-changed', ({ value }) => {
+      if (!value) this.placePivot();
+      events.dragging(value as boolean);
+    });
     this.controls.addEventListener('objectChange', () => {
       if (!this.object) return;
+      this.follow(this.object);
       this.refresh();
       events.changed(this.object, this.mode);
     });
@@ -60,10 +71,16 @@ export class Gizmo {
     return this.controls.dragging || this.controls.axis !== null;
   }
 
+  /** Where the handles are, in metres. */
+  get middle(): Vector3 {
+    return this.pivot.position.clone();
+  }
+
   attach(object: Object3D | undefined): void {
     this.object = object;
     this.clearOutline();
-    if (object && this.mode !== 'off') this.controls.attach(object);
+    this.placePivot();
+    if (object && this.mode !== 'off') this.controls.attach(this.pivot);
     else this.controls.detach();
     if (object) this.makeOutline(object);
   }
@@ -74,8 +91,9 @@ export class Gizmo {
     this.attach(this.object);
   }
 
-  /** The object was moved by someone else. */
+  /** The object was moved, by these handles or by someone else. */
   refresh(): void {
+    if (!this.dragging) this.placePivot();
     for (const line of this.outline) {
       const of = line.userData['of'] as Object3D | undefined;
       if (of) {
@@ -93,11 +111,33 @@ export class Gizmo {
     for (const line of this.outline) line.visible = visible;
   }
 
+  /** Into the middle of the object, turned as it is, so that scaling along the handles does not skew it. */
+  private placePivot(): void {
+    const { object, pivot } = this;
+    if (!object) return;
+    object.updateWorldMatrix(true, true);
+    const box = new Box3().setFromObject(object);
+    if (box.isEmpty()) object.getWorldPosition(pivot.position);
+    else box.getCenter(pivot.position);
+    object.getWorldQuaternion(pivot.quaternion);
+    pivot.scale.set(1, 1, 1);
+    pivot.updateMatrixWorld(true);
+    this.fromPivot.copy(pivot.matrixWorld).invert().multiply(object.matrixWorld);
+  }
+
+  private follow(object: Object3D): void {
+    this.pivot.updateMatrixWorld(true);
+    const local = object.parent ? object.parent.matrixWorld.clone().invert() : new Matrix4();
+    local.multiply(this.pivot.matrixWorld).multiply(this.fromPivot);
+    local.decompose(object.position, object.quaternion, object.scale);
+    object.updateMatrixWorld(true);
+  }
+
   private makeOutline(object: Object3D): void {
     let triangles = 0;
     const meshes: Mesh[] = [];
     object.traverse((child) => {
-      if (!(child instanceof Mesh)) return;
+      if (!(child instanceof Mesh) || child.parent instanceof LampMarker) return;
       meshes.push(child);
       const geometry = child.geometry as BufferGeometry;
       triangles += (geometry.index?.count ?? geometry.getAttribute('position').count) / 3;

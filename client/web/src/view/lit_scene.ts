@@ -186,7 +186,7 @@ export class LitScene {
       marker.destroy();
       this.lamps.delete(node);
     }
-    const size = this.bounds.getSize(new Vector3()).length() * 0.02;
+    const size = this.bounds.getSize(new Vector3()).length() * 0.012;
     for (const node of hanging) {
       let marker = this.lamps.get(node);
       const parent = this.nodes.get(node) ?? this.root;
