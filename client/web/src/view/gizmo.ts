@@ -153,7 +153,7 @@ export class Gizmo {
         return line;
       });
     }
-    this.scene.add(...this.outline);
+    for (const line of this.outline) this.scene.add(line);
     this.refresh();
   }
 
