@@ -12,6 +12,11 @@
 namespace radiosity::gpu {
 namespace {
 
+/// A polygon of whose light less than this stays in the scene is not held to deliver it all.
+constexpr double kClosed = 0.999;
+/// So many of a receiver's spots count for one shot of a reflecting node; all of them for a light.
+constexpr std::uint32_t kNodeSpots = 4;
+
 double polygonArea(std::span<const glm::vec3> corners) {
   glm::dvec3 sum(0.0);
   for (std::size_t i = 2; i < corners.size(); ++i) {
@@ -62,7 +67,12 @@ __attribute__((target_clones("avx2", "default"))) void projectReceivers(const Po
 
 bool sameGeometry(const solver::GatherShot& a, const solver::GatherShot& b) {
   return a.corners == b.corners && a.corner_count == b.corner_count && a.normal == b.normal &&
-         a.receiver_jitter == b.receiver_jitter && a.fill == b.fill;
+         a.receiver_jitter == b.receiver_jitter && a.all_spots == b.all_spots && a.fill == b.fill;
+}
+
+/// How many points of a receiver count.
+std::uint32_t spotsOf(const solver::GatherShot& shot, const Receivers::Receiver& receiver) {
+  return !receiver.hasSpots() ? 1 : shot.all_spots ? scene::kLeafSpots : kNodeSpots;
 }
 
 }  // namespace
@@ -77,7 +87,9 @@ void LightGatherer::Lit::resize(std::size_t count) {
 }
 
 LightGatherer::LightGatherer(std::shared_ptr<const Receivers> receivers) : receivers_(std::move(receivers)) {
-  lit_.resize(receivers_->all().size());
+  std::size_t points = receivers_->all().size();
+  for (const auto& receiver : receivers_->all()) points += receiver.hasSpots() ? scene::kLeafSpots - 1 : 0;
+  lit_.resize(points);
 }
 
 /// Whether all of the surface lies behind the polygon's plane.
@@ -112,24 +124,21 @@ void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers
   const std::size_t begin = lit_count_;
   for (std::size_t i = group.first; i < group.first + group.count; ++i) {
     const auto& receiver = receivers_->all()[i];
-    const auto& frame = receivers_->patches().triangles[receiver.triangle];
-    const auto texel = receiver.full ? receiver.texel + shot.receiver_jitter : receiver.texel;
-    const auto point = frame.origin + texel.x * frame.du + texel.y * frame.dv;
-    if (glm::dot(shot.normal, point - shot.corners[0]) <= kInPlane) continue;
-    const auto normal = surface.planar ? plane_normal : group.side * frame.normal;
-    const std::size_t k = lit_count_;
-    lit_.x[k] = point.x;
-    lit_.y[k] = point.y;
-    lit_.z[k] = point.z;
-    lit_.nx[k] = normal.x;
-    lit_.ny[k] = normal.y;
-    lit_.nz[k] = normal.z;
-    lit_.receiver[k] = static_cast<std::uint32_t>(i);
-    if (!surface.planar) {
-      lit_.form_factor[k] = shot.fill * static_cast<float>(polygonFormFactor(point, normal, corners));
-      if (lit_.form_factor[k] <= 0.0F) continue;
+    const std::uint32_t spots = spotsOf(shot, receiver), apart = scene::kLeafSpots / spots;
+    const auto first =
+        std::min(apart - 1, static_cast<std::uint32_t>(shot.receiver_jitter.x * static_cast<float>(apart)));
+    for (std::uint32_t k = 0; k < spots; ++k) {
+      const auto place =
+          spots > 1 ? receivers_->spot(receiver, first + k * apart) : receivers_->place(receiver, shot.receiver_jitter);
+      if (glm::dot(shot.normal, place.point - shot.corners[0]) <= kInPlane) continue;
+      const auto normal = surface.planar ? plane_normal : group.side * place.frame->normal;
+      if (!surface.planar) {
+        const auto form_factor = static_cast<float>(polygonFormFactor(place.point, normal, corners));
+        if (form_factor <= 0.0F) continue;
+        lit_.form_factor[lit_count_] = shot.fill * form_factor;
+      }
+      addLit(i, place, normal);
     }
-    ++lit_count_;
   }
   if (surface.planar) {
     planarFormFactors(polygon, plane_normal, &lit_.x[begin], &lit_.y[begin], &lit_.z[begin], lit_count_ - begin,
@@ -140,6 +149,21 @@ void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers
       for (std::size_t k = begin; k < lit_count_; ++k) lit_.form_factor[k] *= shining;
     }
   }
+  for (std::size_t k = begin; k < lit_count_; ++k) {
+    const auto spots = spotsOf(shot, receivers_->all()[lit_.receiver[k]]);
+    if (spots > 1) lit_.form_factor[k] /= static_cast<float>(spots);
+  }
+}
+
+void LightGatherer::addLit(std::size_t receiver, const Receivers::Place& place, const glm::vec3& normal) {
+  const std::size_t k = lit_count_++;
+  lit_.x[k] = place.point.x;
+  lit_.y[k] = place.point.y;
+  lit_.z[k] = place.point.z;
+  lit_.nx[k] = normal.x;
+  lit_.ny[k] = normal.y;
+  lit_.nz[k] = normal.z;
+  lit_.receiver[k] = static_cast<std::uint32_t>(receiver);
 }
 
 void LightGatherer::testPoint(const solver::GatherShot& shot, const solver::HemicubeFrame& point,
@@ -192,19 +216,22 @@ float LightGatherer::visibility(std::size_t sums, std::size_t i, std::size_t poi
   return weight > 0.0F ? lit_.visible_weight[sums][i] / weight : lit_.visible[sums][i] / static_cast<float>(points);
 }
 
-/// What leaves a polygon arrives: the flux of its form factors is scaled to what, by the weights of the item buffers,
-/// neither escapes nor is absorbed. Otherwise small errors (one point for a whole leaf, pixels on edges) would be
-/// multiplied by interreflection. Bounded, for polygons that see next to nothing; the bounds are wider than what one
-/// random point a wall makes of the walls of a cube (0.3 to 3), or such a room would lose light with every bounce.
-double LightGatherer::conserve(std::size_t sums, std::size_t points, double area, double kept) const {
-  if (kept < 0.999) return 1.0;
+/// Flux that arrives by form factors and visibility, for a radiosity of one.
+double LightGatherer::delivered(std::size_t sums, std::size_t points) const {
   double delivered = 0.0;
   for (std::size_t i = 0; i < lit_count_; ++i) {
     const auto node = receivers_->all()[lit_.receiver[i]].node;
     delivered +=
         static_cast<double>(lit_.form_factor[i] * visibility(sums, i, points) * receivers_->patches().node_area[node]);
   }
-  return delivered > 0.0 ? std::clamp(kept * area / delivered, 0.25, 4.0) : 1.0;
+  return delivered;
+}
+
+/// As LinkColumn::gain, for one shot.
+double LightGatherer::conserve(std::size_t sums, std::size_t points, double area, double kept) const {
+  if (kept < kClosed) return 1.0;
+  const double sum = delivered(sums, points);
+  return sum > 0.0 ? std::clamp(kept * area / sum, 0.25, 4.0) : 1.0;
 }
 
 void LightGatherer::deliver(const solver::GatherShot& shot, std::size_t half, std::size_t points, double share,
@@ -248,13 +275,20 @@ void LightGatherer::finishLinks(const solver::GatherShot& shot, solver::LinkSamp
   const double one = static_cast<double>(look_count_) * solver::kWeightOne;
   const double escaped = static_cast<double>(look_lost_.escaped) / one;
   const double absorbed = static_cast<double>(look_lost_.absorbed) / one;
-  const auto scale = static_cast<float>(conserve(0, look_count_, area, 1.0 - escaped - absorbed));
+  const double kept = 1.0 - escaped - absorbed;
+  sample.delivered = delivered(0, look_count_);
+  sample.due = kept < kClosed ? sample.delivered : kept * area;
   sample.runs.clear();
   sample.irradiance.clear();
   sample.irradiance.reserve(lit_count_);
   for (std::size_t i = 0; i < lit_count_; ++i) {
     // What is hidden is sent too: zeros inside a run cost less than a new run.
-    sample.add(receivers_->all()[lit_.receiver[i]].node, scale * lit_.form_factor[i] * visibility(0, i, look_count_));
+    const float value = lit_.form_factor[i] * visibility(0, i, look_count_);
+    if (i > 0 && lit_.receiver[i] == lit_.receiver[i - 1]) {
+      sample.irradiance.back() += value;
+    } else {
+      sample.add(receivers_->all()[lit_.receiver[i]].node, value);
+    }
   }
   sample.escaped = escaped * area;
   sample.absorbed = absorbed * area;

@@ -37,7 +37,8 @@ class LightGatherer {
  private:
   /// Receivers that the polygon faces and that face it, with what the points found so far in either half.
   struct Lit {
-    std::vector<float> x, y, z, nx, ny, nz, form_factor;
+    std::vector<float> x, y, z, nx, ny, nz;
+    std::vector<float> form_factor;  ///< times the receiving point's share of its leaf
     std::vector<std::uint32_t> receiver;
     std::array<std::vector<float>, 2> weight, visible_weight, visible;
     std::vector<float> point_weight;   ///< of the point being tested
@@ -58,7 +59,9 @@ class LightGatherer {
   void weighLost(const solver::HemicubeFrame& point, std::span<const std::uint32_t> items,
                  const HemicubeWeights& weights, Lost& lost);
   [[nodiscard]] float visibility(std::size_t sums, std::size_t i, std::size_t points) const;
+  [[nodiscard]] double delivered(std::size_t sums, std::size_t points) const;
   [[nodiscard]] double conserve(std::size_t sums, std::size_t points, double area, double kept) const;
+  void addLit(std::size_t receiver, const Receivers::Place& place, const glm::vec3& normal);
   void deliver(const solver::GatherShot& shot, std::size_t half, std::size_t points, double share, const FluxSink& sink,
                solver::TransportCounters& counters) const;
 

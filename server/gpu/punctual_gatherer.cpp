@@ -122,11 +122,7 @@ void PunctualGatherer::lightGroup(const solver::PointShot& shot, const Receivers
   for (std::size_t i = group.first; i < group.first + group.count; ++i) {
     const auto& receiver = receivers_->all()[i];
     const auto& frame = patches.triangles[receiver.triangle];
-    const auto normal = group.side * frame.normal;
-    if (glm::dot(normal, o - frame.origin) <= 0.0F) {
-      if (surface.planar) return;  // all of it turns away
-      continue;
-    }
+    if (surface.planar && group.side * glm::dot(frame.normal, o - frame.origin) <= 0.0F) return;  // all turns away
     const auto middle = receivers_->point(receiver, glm::vec2(0.5F)) - o;
     const float size2 = glm::dot(frame.du, frame.du) + glm::dot(frame.dv, frame.dv);
     float near_mean = -1.0F;
@@ -136,10 +132,11 @@ void PunctualGatherer::lightGroup(const solver::PointShot& shot, const Receivers
           solidAngle(corner, corner + du, corner + du + dv) + solidAngle(corner, corner + du + dv, corner + dv);
       near_mean = static_cast<float>(angle / glm::length(glm::cross(du, dv)));
     }
-    const std::uint32_t count = receiver.full ? shot.receivers.count : 1;
+    const std::uint32_t count = (receiver.full || receiver.hasSpots()) ? shot.receivers.count : 1;
     float sum = 0.0F;
     for (std::uint32_t p = 0; p < count; ++p) {
-      const auto at = receivers_->point(receiver, shot.receivers.at[p]);
+      const auto [at, place] = receivers_->place(receiver, shot.receivers.at[p]);
+      const auto normal = group.side * place->normal;
       const auto d = at - o;
       const glm::vec3 local(glm::dot(d, t), glm::dot(d, b), glm::dot(d, n));
       const float square = glm::dot(d, d), distance = std::sqrt(square), cosine = -glm::dot(d, normal) / distance;
@@ -227,25 +224,24 @@ void PunctualGatherer::lightGroup(const solver::ParallelShot& shot, const Parall
   const auto sky_point = static_cast<std::uint32_t>(view_index) % shot.receivers.count;
   for (std::size_t i = group.first; i < group.first + group.count; ++i) {
     const auto& receiver = receivers_->all()[i];
-    const auto normal = group.side * patches.triangles[receiver.triangle].normal;
-    const float cosine = glm::dot(normal, view.direction);
-    if (cosine <= 0.0F) {
-      if (surface.planar) return;
-      continue;
-    }
+    if (surface.planar && group.side * glm::dot(patches.triangles[receiver.triangle].normal, view.direction) <= 0.0F)
+      return;
     const std::uint32_t first = sky ? sky_point : 0;
-    const std::uint32_t count = sky || !receiver.full ? 1 : shot.receivers.count;
-    std::uint32_t visible = 0;
+    const std::uint32_t count = sky || !(receiver.full || receiver.hasSpots()) ? 1 : shot.receivers.count;
+    float visible = 0.0F;
     for (std::uint32_t p = first; p < first + count; ++p) {
-      const auto at = receivers_->point(receiver, shot.receivers.at[p]);
+      const auto [at, frame] = receivers_->place(receiver, shot.receivers.at[p]);
+      const auto normal = group.side * frame->normal;
+      const float cosine = glm::dot(normal, view.direction);
+      if (cosine <= 0.0F) continue;
       const auto d = at - axes.centre;
       const PixelPlace place{items.data(), size, size, glm::dot(axes.right, d) + axes.shift.x,
                              glm::dot(axes.up, d) + axes.shift.y};
       // Far enough to be beyond everything: the scene fits a box of side 1 or so.
       const bool hidden = isHidden(*receivers_, place, {at, normal, view.direction, 4.0F, pixel_size});
-      visible += hidden ? 0 : 1;
+      visible += hidden ? 0.0F : cosine;
     }
-    sum_[i] += cosine * static_cast<float>(visible) / static_cast<float>(count);
+    sum_[i] += visible / static_cast<float>(count);
   }
 }
 

@@ -33,7 +33,7 @@ Receivers::Receivers(std::shared_ptr<const scene::PatchScene> patches) : patches
         const auto& leaf = patches_->leaves[surface.first_leaf + i];
         if (leaf.triangle == scene::kNone || patches_->node_area[first + i] <= 0.0F) continue;
         const auto texel = leaf.full ? glm::vec2(i % surface.width, i / surface.width) : leaf.texel;
-        receivers_.push_back({first + i, leaf.triangle, texel, leaf.full});
+        receivers_.push_back({first + i, leaf.triangle, texel, leaf.first_spot, leaf.full});
       }
       groups_.push_back({s, begin, receivers_.size() - begin, side == 0 ? 1.0F : -1.0F});
     }
@@ -153,10 +153,18 @@ bool Receivers::anyMeets(std::span<const std::uint32_t> items, const Ray& ray) c
   return false;
 }
 
-glm::vec3 Receivers::point(const Receiver& receiver, const glm::vec2& at) const {
-  const auto& frame = patches_->triangles[receiver.triangle];
-  const auto texel = receiver.full ? receiver.texel + at : receiver.texel;
-  return frame.origin + texel.x * frame.du + texel.y * frame.dv;
+Receivers::Place Receivers::place(const Receiver& receiver, const glm::vec2& at) const {
+  const auto [texel, triangle] =
+      receiver.full ? scene::LeafSpot{receiver.texel + at, receiver.triangle}
+                    : patches_->spotAt({receiver.texel, receiver.triangle, false, receiver.first_spot}, 0, 0, at);
+  const auto& frame = patches_->triangles[triangle];
+  return {frame.origin + texel.x * frame.du + texel.y * frame.dv, &frame};
+}
+
+Receivers::Place Receivers::spot(const Receiver& receiver, std::uint32_t spot) const {
+  const auto& [texel, triangle] = patches_->spots[receiver.first_spot + spot];
+  const auto& frame = patches_->triangles[triangle];
+  return {frame.origin + texel.x * frame.du + texel.y * frame.dv, &frame};
 }
 
 }  // namespace radiosity::gpu

@@ -23,8 +23,11 @@ class Receivers {
   /// A side of a leaf that can receive light.
   struct Receiver {
     std::uint32_t node, triangle;
-    glm::vec2 texel;  ///< corner of the leaf when full, else the point itself
+    glm::vec2 texel;           ///< corner of the leaf when full, else the point itself
+    std::uint32_t first_spot;  ///< its places (PatchScene::spots), or kNone
     bool full;
+
+    [[nodiscard]] bool hasSpots() const { return first_spot != scene::kNone; }
   };
   /// Receivers of one side of a surface; they lie together.
   struct Group {
@@ -52,8 +55,17 @@ class Receivers {
   [[nodiscard]] bool absorbs(std::uint32_t triangle, bool back) const {
     return absorbs_[triangle][static_cast<std::size_t>(back)];
   }
-  /// Point of a receiver: `at` in [0, 1)^2 of a full leaf; others have one point.
-  [[nodiscard]] glm::vec3 point(const Receiver& receiver, const glm::vec2& at) const;
+  struct Place {
+    glm::vec3 point;
+    const scene::TriangleFrame* frame;
+  };
+  /// A place on a receiver, by `at` in [0, 1)^2.
+  [[nodiscard]] Place place(const Receiver& receiver, const glm::vec2& at) const;
+  /// One of its places, spot < kLeafSpots; of a receiver that has them.
+  [[nodiscard]] Place spot(const Receiver& receiver, std::uint32_t spot) const;
+  [[nodiscard]] glm::vec3 point(const Receiver& receiver, const glm::vec2& at) const {
+    return place(receiver, at).point;
+  }
 
   /// Whether a part of the triangle lies in front of a receiver. What is wholly behind its horizon cannot hide a light
   /// from it, although a pixel on a convex edge may show it: the top of a block, seen instead of the topmost texels of

@@ -37,6 +37,7 @@ void visitScene(Scene& scene, Visit visit) {
   visit(scene.triangle_surface);
   visit(scene.surfaces);
   visit(scene.leaves);
+  visit(scene.spots);
   visit(scene.node_area);
   visit(scene.opacity);
 }
@@ -193,6 +194,8 @@ Result<std::shared_ptr<const scene::PatchScene>> unpackScene(std::span<const std
 void packLinks(std::vector<std::byte>& to, const solver::LinkSample& links) {
   appendValue(to, links.escaped);
   appendValue(to, links.absorbed);
+  appendValue(to, links.delivered);
+  appendValue(to, links.due);
   packVector(to, links.runs);
   packVector(to, links.irradiance);
 }
@@ -200,6 +203,8 @@ void packLinks(std::vector<std::byte>& to, const solver::LinkSample& links) {
 bool unpackLinks(BodyReader& from, std::size_t nodes, solver::LinkSample& links) {
   links.escaped = from.value<double>();
   links.absorbed = from.value<double>();
+  links.delivered = from.value<double>();
+  links.due = from.value<double>();
   unpackVector(from, links.runs);
   unpackVector(from, links.irradiance);
   std::size_t values = 0;

@@ -192,8 +192,9 @@ void Bvh::collectHits(const glm::dvec3& origin, const glm::dvec3& direction, dou
   }
 }
 
-bool Bvh::touches(const glm::vec3& box_min, const glm::vec3& box_max, std::span<const std::uint32_t> tags,
-                  std::uint32_t ignored_tag) const {
+/// Whether the test holds for any triangle of the tree's leaves that reach into the box.
+template <typename Test>
+bool Bvh::anyTriangle(const glm::vec3& box_min, const glm::vec3& box_max, Test test) const {
   if (triangles_.empty()) return false;
   std::array<std::uint32_t, kStackDepth> stack;
   std::size_t depth = 0;
@@ -210,9 +211,30 @@ bool Bvh::touches(const glm::vec3& box_min, const glm::vec3& box_max, std::span<
       continue;
     }
     for (std::uint32_t i = node.first; i < node.first + node.count; ++i)
-      if (tags[order_[i]] != ignored_tag && touchesBox(triangles_[order_[i]], box_min, box_max)) return true;
+      if (test(order_[i])) return true;
   }
   return false;
+}
+
+bool Bvh::touches(const glm::vec3& box_min, const glm::vec3& box_max, std::span<const std::uint32_t> tags,
+                  std::uint32_t ignored_tag) const {
+  return anyTriangle(box_min, box_max, [&](std::uint32_t triangle) {
+    return tags[triangle] != ignored_tag && touchesBox(triangles_[triangle], box_min, box_max);
+  });
+}
+
+bool Bvh::touches(const OrientedBox& box, std::span<const std::uint32_t> tags, std::uint32_t ignored_tag) const {
+  glm::vec3 reach(0.0F);
+  for (int axis = 0; axis < 3; ++axis) reach += box.half[axis] * glm::abs(box.axes[static_cast<std::size_t>(axis)]);
+  return anyTriangle(box.centre - reach, box.centre + reach, [&](std::uint32_t triangle) {
+    if (tags[triangle] == ignored_tag) return false;
+    Triangle local;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const glm::vec3 p = triangles_[triangle][k] - box.centre;
+      local[k] = {glm::dot(p, box.axes[0]), glm::dot(p, box.axes[1]), glm::dot(p, box.axes[2])};
+    }
+    return touchesBox(local, -box.half, box.half);
+  });
 }
 
 }  // namespace radiosity::scene

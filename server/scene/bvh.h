@@ -33,6 +33,15 @@ class Bvh {
   [[nodiscard]] bool touches(const glm::vec3& box_min, const glm::vec3& box_max, std::span<const std::uint32_t> tags,
                              std::uint32_t ignored_tag) const;
 
+  struct OrientedBox {
+    glm::vec3 centre{0.0F};
+    std::array<glm::vec3, 3> axes{};  ///< unit, at right angles
+    glm::vec3 half{0.0F};             ///< extent along each
+  };
+  /// The same for a box that is turned.
+  [[nodiscard]] bool touches(const OrientedBox& box, std::span<const std::uint32_t> tags,
+                             std::uint32_t ignored_tag) const;
+
   [[nodiscard]] bool empty() const { return triangles_.empty(); }
   [[nodiscard]] std::size_t size() const { return triangles_.size(); }
 
@@ -42,6 +51,8 @@ class Bvh {
     std::uint32_t first;  ///< leaf: into order_; inner: left child (the right one follows it)
     std::uint32_t count;  ///< 0: inner
   };
+  template <typename Test>
+  [[nodiscard]] bool anyTriangle(const glm::vec3& box_min, const glm::vec3& box_max, Test test) const;
   void build();
   [[nodiscard]] std::uint32_t split(std::uint32_t first, std::uint32_t count);
 

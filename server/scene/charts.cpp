@@ -54,6 +54,8 @@ class Builder {
       solid.push_back(!material.double_sided && !isSeeThrough(material));
     }
     removeBuried(patches_, pieces, solid);
+    placeSpots(patches_, pieces);
+    placeSpotsInGaps(patches_);
     measureOpacity(scene_, patches_);
     applyOpacity(patches_);
     sumAncestors(patches_);

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <glm/vec2.hpp>
+#include <span>
 #include <vector>
 
 #include "server/scene/patch_scene.h"
@@ -25,6 +26,21 @@ struct LeafPiece {
 /// Takes the part of each leaf that lies inside another solid out of node_area and moves leaf points to what is left.
 /// `solid`: by surface; opaque and single-sided, so that it can bound a solid. Adds warnings about coincident faces.
 void removeBuried(PatchScene& patches, const std::vector<LeafPiece>& pieces, const std::vector<bool>& solid);
+
+/// Places on a leaf that is not full: kLeafSpots of `places`, which lie evenly over what is left of it. Sorts them
+/// anew.
+void keepSpots(PatchScene& patches, LeafPoint& leaf, std::span<LeafSpot> places);
+
+/// Places on every leaf that is neither empty nor full and has none yet.
+void placeSpots(PatchScene& patches, const std::vector<LeafPiece>& pieces);
+
+/// The same for full leaves of planes right before which something else stands (a lamp close under a ceiling): there,
+/// light changes within a leaf. Both sides.
+void placeSpotsInGaps(PatchScene& patches);
+
+/// Point `i` of `count` (16 or 64; others lie less evenly) in [0, 1)^2. Rank-1 lattice: every point has its own u and
+/// its own v, so axis-parallel borders are placed within 1/count.
+[[nodiscard]] glm::dvec2 latticePoint(std::uint32_t i, std::uint32_t count);
 
 /// Sums level 0 of node_area up all pyramids.
 void sumAncestors(PatchScene& patches);

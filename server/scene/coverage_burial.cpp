@@ -21,12 +21,6 @@ constexpr double kLift = 2e-5;
 constexpr std::uint32_t kFewSamples = 16, kManySamples = 64;
 constexpr std::uint64_t kMaxSamples = 2'000'000;  ///< a scene; beyond it leaves get fewer
 
-/// Rank-1 lattice: every point has its own x and its own y, so axis-parallel borders are placed within 1/count.
-glm::dvec2 samplePoint(std::uint32_t i, std::uint32_t count) {
-  const std::uint32_t generator = count == kManySamples ? 19 : 5;
-  return {(i + 0.5) / count, ((std::uint64_t{i} * generator) % count + 0.5) / count};
-}
-
 struct Bounds {
   glm::vec3 min{std::numeric_limits<float>::infinity()}, max{-std::numeric_limits<float>::infinity()};
   void add(const glm::vec3& p) {
@@ -191,6 +185,7 @@ class Burial {
   struct Change {
     std::uint32_t leaf, side;
     LeafPoint point;
+    std::vector<LeafSpot> places;  ///< where it is visible
   };
 
   [[nodiscard]] std::uint32_t leafOf(const Contact& c) const {
@@ -251,7 +246,7 @@ class Burial {
         if (!known && !buried(point.triangle, glm::dvec2(point.texel), side)) return;
         known = true;
         patches_.node_area[nodeOf(leaf)] = 0.0F;
-        changes_.push_back({leafOf(leaf), side, {}});
+        changes_.push_back({leafOf(leaf), side, {}, {}});
       }
   }
 
@@ -263,9 +258,10 @@ class Burial {
     const glm::dvec2 corner(contact.x, contact.y);
     parts_.assign(std::max<std::size_t>(1, end - first), Part{});
     LeafPoint visible;
+    std::vector<LeafSpot> places;
     double nearest = std::numeric_limits<double>::infinity();
     for (std::uint32_t i = 0; i < count; ++i) {
-      const glm::dvec2 texel = corner + samplePoint(i, count);
+      const glm::dvec2 texel = corner + latticePoint(i, count);
       std::uint32_t triangle = point.triangle;
       std::size_t part = 0;
       if (first != end) {
@@ -281,6 +277,7 @@ class Burial {
         ++parts_[part].buried;
         continue;
       }
+      places.push_back({glm::vec2(texel), triangle});
       const double distance = glm::distance(texel, corner + 0.5);
       if (distance >= nearest) continue;
       nearest = distance;
@@ -295,7 +292,7 @@ class Burial {
     } else if (visible.triangle == kNone) {
       visible = {point.texel, point.triangle, false};
     }
-    changes_.push_back({leaf, contact.side, visible});
+    changes_.push_back({leaf, contact.side, visible, std::move(places)});
     touched_.push_back(contact);
   }
 
@@ -351,17 +348,17 @@ class Burial {
       return a.leaf != b.leaf ? a.leaf < b.leaf : a.side < b.side;
     });
     for (std::size_t i = 0; i < changes_.size(); ++i) {
-      const Change& change = changes_[i];
+      Change& change = changes_[i];
       const bool both = i + 1 < changes_.size() && changes_[i + 1].leaf == change.leaf;
       const bool two_sided = isTwoSided(change.leaf);
       LeafPoint& point = patches_.leaves[change.leaf];
       point.full = false;
-      if (both) {
-        point = change.point.triangle != kNone ? change.point : changes_[i + 1].point;
-        ++i;
-      } else if (change.point.triangle != kNone) {
-        point = change.point;
-      } else if (!two_sided) {
+      Change& open = both && change.point.triangle == kNone ? changes_[i + 1] : change;
+      if (both) ++i;
+      if (open.point.triangle != kNone) {
+        point = open.point;
+        keepSpots(patches_, point, open.places);
+      } else if (both || !two_sided) {
         point = {};
       }
     }

@@ -33,13 +33,23 @@ struct TriangleFrame {
   glm::vec3 origin, du, dv, normal;
 };
 
+/// A place on a leaf: texel coordinates, and the triangle whose frame they belong to.
+struct LeafSpot {
+  glm::vec2 texel{0.0F};
+  std::uint32_t triangle = kNone;
+};
+
+/// So many places are kept of each leaf within which light changes much: enough for the mean over what is left of it.
+inline constexpr std::uint32_t kLeafSpots = 16;
+
 /// Where a leaf is: a point (texel coordinates) on the part of the leaf that is covered and not buried inside another
-/// solid, and the triangle that holds it. kFull: wholly covered by coplanar triangles and wholly unburied, so any point
-/// of the texel may be used with the triangle's frame.
+/// solid, and the triangle that holds it. `full`: wholly covered by coplanar triangles and wholly unburied, so any
+/// point of the texel may be used with the triangle's frame.
 struct LeafPoint {
   glm::vec2 texel;
   std::uint32_t triangle = kNone;  ///< kNone: the leaf is empty
   bool full = false;
+  std::uint32_t first_spot = kNone;  ///< into PatchScene::spots; kNone: any point stands for all
 };
 
 struct Surface {
@@ -75,6 +85,9 @@ struct PatchScene {
   std::vector<std::uint32_t> triangle_source;  ///< by triangle: which one of its instance's primitive it was
   std::vector<Surface> surfaces;
   std::vector<LeafPoint> leaves;
+  /// kLeafSpots of each leaf that is neither empty nor full, and of full ones in narrow gaps: spread evenly over the
+  /// covered and unburied part. Every fourth of them lie in different quarters of it.
+  std::vector<LeafSpot> spots;
   /// Unit box squared: covered and unburied part, times its opacity; parent = sum of children; 0 = empty. What a leaf
   /// catches of the light is irradiance times this, so irradiance needs no opacity anywhere.
   std::vector<float> node_area;
@@ -102,6 +115,14 @@ struct PatchScene {
   std::uint64_t triangles_dropped = 0;
 
   [[nodiscard]] std::size_t nodeCount() const { return node_area.size(); }
+
+  /// A place on a leaf that is not empty, by two uniform numbers in [0, 1); leaf (x, y) of its surface.
+  [[nodiscard]] LeafSpot spotAt(const LeafPoint& leaf, std::uint32_t x, std::uint32_t y, const glm::vec2& at) const {
+    if (leaf.full) return {glm::vec2(x, y) + at, leaf.triangle};
+    if (leaf.first_spot == kNone) return {leaf.texel, leaf.triangle};
+    const auto spot = static_cast<std::uint32_t>(at.x * static_cast<float>(kLeafSpots));
+    return spots[leaf.first_spot + (spot < kLeafSpots ? spot : kLeafSpots - 1)];
+  }
 };
 
 /// Grid size and first node of one level, relative to a surface side's first node.

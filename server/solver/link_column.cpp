@@ -194,13 +194,20 @@ void LinkColumn::add(const LinkExpander& sample, const LinkSample& totals, doubl
   }
   escaped_ = (escaped_ * points_ + totals.escaped * points) / sum;
   absorbed_ = (absorbed_ * points_ + totals.absorbed * points) / sum;
+  delivered_ = (delivered_ * points_ + totals.delivered * points) / sum;
+  due_ = (due_ * points_ + totals.due * points) / sum;
   points_ = sum;
   ++samples_;
 }
 
+double LinkColumn::gain() const {
+  return due_ > 0.0 && delivered_ > 0.0 ? std::clamp(due_ / delivered_, 0.25, 4.0) : 1.0;
+}
+
 void LinkColumn::apply(const std::array<float, 3>& radiosity, const std::array<float*, 3>& irradiance) const {
+  const float scale = scale_ * static_cast<float>(gain());
   for (const auto& run : runs_) {
-    addScaled(&code_[run.offset], run.count, scale_ * radiosity[0], scale_ * radiosity[1], scale_ * radiosity[2],
+    addScaled(&code_[run.offset], run.count, scale * radiosity[0], scale * radiosity[1], scale * radiosity[2],
               irradiance[0] + run.first_value, irradiance[1] + run.first_value, irradiance[2] + run.first_value);
   }
 }
@@ -215,13 +222,13 @@ double LinkColumn::product(const LinkColumn& a, const LinkColumn& b, std::span<c
     sum += static_cast<double>(
         productOf(&a.code_[run.offset], &b.code_[other->offset], &leaf_area[run.first_value], run.count));
   }
-  return sum * static_cast<double>(a.scale_) * static_cast<double>(b.scale_);
+  return sum * a.gain() * static_cast<double>(a.scale_) * b.gain() * static_cast<double>(b.scale_);
 }
 
 bool LinkColumn::decode(std::uint32_t side, std::span<float> leaves) const {
   const auto run = std::lower_bound(runs_.begin(), runs_.end(), side, [](const Run& r, auto s) { return r.side < s; });
   if (run == runs_.end() || run->side != side) return false;
-  decodeAll(&code_[run->offset], run->count, scale_, leaves.data());
+  decodeAll(&code_[run->offset], run->count, scale_ * static_cast<float>(gain()), leaves.data());
   return true;
 }
 

@@ -74,7 +74,7 @@ void NodeShots::addGather(const NodePlace& node, std::size_t half, std::uint32_t
   const std::uint64_t node_key = mixKeys(key(node), half);
   // The halves look at opposite places of a texel: what is linear in it cancels in their mean and shows in their
   // difference.
-  const glm::dvec4 jitter = sobol4(index, mixKeys(key(node), 2));
+  const glm::dvec4 jitter = sobol4(index, mixKeys(mixKeys(seed_, side.first_node), 2));
   shot.receiver_jitter = glm::vec2(half == 0 ? glm::dvec2(jitter) : 1.0 - glm::dvec2(jitter));
   shot.first_point = static_cast<std::uint32_t>(batch.points.size());
   shot.point_count = points;
@@ -84,8 +84,7 @@ void NodeShots::addGather(const NodePlace& node, std::size_t half, std::uint32_t
     if (!whole) {
       const auto leaf = leafByArea(node, sample.x, sample.y);
       const auto& place = patches_.leaves[surface.first_leaf + leaf];
-      texel = place.full ? glm::dvec2(leaf % side.width, leaf / side.width) + glm::dvec2(sample.x, sample.y)
-                         : glm::dvec2(place.texel);
+      texel = patches_.spotAt(place, leaf % side.width, leaf / side.width, glm::vec2(sample)).texel;
     }
     batch.points.push_back(hemicubeAt(at(texel), shot.normal, sample.z, mixKeys(node_key, index * points + p)));
   }
@@ -99,10 +98,9 @@ void NodeShots::addScatter(const NodePlace& node, std::size_t half, std::uint32_
   glm::dvec4 sample = sobol4(index, node_key);
   const auto leaf = leafByArea(node, sample.x, sample.y);
   const auto& place = patches_.leaves[patches_.surfaces[side.surface].first_leaf + leaf];
-  const auto& triangle = patches_.triangles[place.triangle];
-  const glm::vec2 texel =
-      place.full ? glm::vec2(glm::dvec2(leaf % side.width, leaf / side.width) + glm::dvec2(sample.x, sample.y))
-                 : place.texel;
+  const auto [texel, index_of_triangle] =
+      patches_.spotAt(place, leaf % side.width, leaf / side.width, glm::vec2(sample));
+  const auto& triangle = patches_.triangles[index_of_triangle];
   ScatterShot shot;
   shot.frame = hemicubeAt(triangle.origin + texel.x * triangle.du + texel.y * triangle.dv,
                           side.side == 0 ? triangle.normal : -triangle.normal, sample.z, mixKeys(node_key, index));
@@ -119,6 +117,7 @@ void NodeShots::add(const LightPolygon& light, std::size_t half, std::uint32_t i
   std::copy(light.corners.begin(), light.corners.end(), shot.corners.begin());
   shot.corner_count = light.corner_count;
   shot.normal = light.normal;
+  shot.all_spots = true;  // light and shadow of a lamp differ more across a leaf than anything else
   shot.resolution = resolution;
   shot.receiver_jitter = glm::vec2(half == 0 ? glm::dvec2(jitter) : 1.0 - glm::dvec2(jitter));
   shot.first_point = static_cast<std::uint32_t>(batch.points.size());

@@ -50,9 +50,9 @@ void Planner::addShot(const RadiosityState& state, const Side& side, const Node&
   const glm::dvec3 unshot(state.unshot(side, leaf));
   const double sum = std::abs(unshot.x) + std::abs(unshot.y) + std::abs(unshot.z);
   if (place.triangle == scene::kNone || sum <= 0.0) return;
-  const auto& triangle = patches.triangles[place.triangle];
-  const glm::vec2 texel =
-      place.full ? glm::vec2(glm::dvec2(leaf % side.width, leaf / side.width) + glm::dvec2(u, v)) : place.texel;
+  const auto [texel, triangle_index] =
+      patches.spotAt(place, leaf % side.width, leaf / side.width, glm::vec2(glm::dvec2(u, v)));
+  const auto& triangle = patches.triangles[triangle_index];
   const auto grid = scene::levelGrid(side.width, side.height, node.level);
   const auto rough = static_cast<double>(state.nodeRough(side.first_node + grid.offset + node.y * grid.width + node.x));
   ScatterShot shot;
@@ -104,7 +104,7 @@ bool Planner::isSpent(const RadiosityState& state, const Side& side, const Node&
 glm::dvec2 Planner::openPoint(const RadiosityState& state, const Side& side, const Node& node, double u, double v) {
   const std::uint32_t leaf = leafByUnshot(state, side, node.level, node.x, node.y, u, v);
   const auto& place = state.patches().leaves[state.patches().surfaces[side.surface].first_leaf + leaf];
-  return place.full ? glm::dvec2(leaf % side.width, leaf / side.width) + glm::dvec2(u, v) : glm::dvec2(place.texel);
+  return state.patches().spotAt(place, leaf % side.width, leaf / side.width, glm::vec2(glm::dvec2(u, v))).texel;
 }
 
 void Planner::addNodeGather(const RadiosityState& state, const Side& side, const Node& node, double weight,

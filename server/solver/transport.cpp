@@ -19,6 +19,8 @@ void LinkSample::scale(double factor) {
   for (auto& value : irradiance) value *= static_cast<float>(factor);
   escaped *= factor;
   absorbed *= factor;
+  delivered *= factor;
+  due *= factor;
 }
 
 TransportCounters& TransportCounters::operator+=(const TransportCounters& other) {

@@ -59,7 +59,8 @@ struct GatherShot {
   /// do.
   float fill = 1.0F;
   std::uint32_t resolution = 128;
-  glm::vec2 receiver_jitter{0.5F};  ///< where in a full leaf's texel the receiving point lies
+  glm::vec2 receiver_jitter{0.5F};  ///< where in a leaf the receiving point lies (PatchScene::spotAt)
+  bool all_spots = false;           ///< the mean over all spots of a leaf that is not full
   std::uint32_t half = 0;
   std::uint32_t first_point = 0, point_count = 0;  ///< into ShotBatch::points
 };
@@ -165,6 +166,10 @@ struct LinkSample {
   std::vector<Run> runs;
   std::vector<float> irradiance;         ///< mean over each node of the runs, one run after the other
   double escaped = 0.0, absorbed = 0.0;  ///< flux that left the scene, and that fell on unlit sides
+  /// Flux that arrives by the links, and that should by what neither escapes nor is absorbed. One point of view may
+  /// find half or twice as much; the ratio of their means over many is near one (LinkColumn::gain). 0: nothing is
+  /// known.
+  double delivered = 0.0, due = 0.0;
 
   void add(std::uint32_t node, float value) {
     if (runs.empty() || runs.back().first_node + runs.back().count != node) runs.push_back({node, 0});

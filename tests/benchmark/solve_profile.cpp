@@ -19,6 +19,7 @@
 #include "server/gpu/gpu_transport.h"
 #include "server/scene/document.h"
 #include "server/scene/patch_scene.h"
+#include "server/solver/outlines.h"
 #include "server/solver/shooting_solver.h"
 #include "server/solver/solver.h"
 #include "tests/oracle/path_tracer.h"
@@ -43,83 +44,120 @@ struct Clock {
 struct Leaf {
   std::uint32_t node = 0;
   double area = 0.0;
+  bool full = true;
   oracle::Footprint footprint;
 };
 
-/// Leaves wholly covered by one plane and not buried: there a texel mean is a mean over a parallelogram.
-std::vector<Leaf> fullLeaves(const scene::PatchScene& patches) {
+/// Of all triangles of a surface, in texels.
+double texelArea(const scene::PatchScene& patches, const scene::Surface& surface) {
+  double sum = 0.0;
+  for (std::uint32_t t = surface.first_triangle; t < surface.first_triangle + surface.triangle_count; ++t) {
+    std::array<glm::dvec2, 3> c;
+    for (std::size_t k = 0; k < 3; ++k) c[k] = patches.vertices[patches.indices[std::size_t{3} * t + k]].texel;
+    sum += 0.5 * std::abs((c[1].x - c[0].x) * (c[2].y - c[0].y) - (c[1].y - c[0].y) * (c[2].x - c[0].x));
+  }
+  return sum;
+}
+
+/// Leaves of planes with their outlines; what is buried the path tracer leaves out of the mean by itself.
+std::vector<Leaf> planarLeaves(const scene::PatchScene& patches) {
   std::vector<Leaf> leaves;
-  for (const auto& surface : patches.surfaces) {
+  const solver::Outlines outlines(patches);
+  for (std::uint32_t s = 0; s < patches.surfaces.size(); ++s) {
+    const auto& surface = patches.surfaces[s];
+    if (!surface.planar) continue;
+    const bool known = std::abs(outlines.node(s, surface.level_count - 1, 0, 0).area() - texelArea(patches, surface)) <
+                       1e-3 * texelArea(patches, surface);
     for (std::uint32_t i = 0; i < surface.width * surface.height; ++i) {
       const auto& place = patches.leaves[surface.first_leaf + i];
-      if (place.triangle == scene::kNone || !place.full || surface.first_node[0] == scene::kNone) continue;
+      if (place.triangle == scene::kNone || surface.first_node[0] == scene::kNone) continue;
+      if (!place.full && !known) continue;  // its outline is not convex
       const auto& frame = patches.triangles[place.triangle];
-      const auto corner = [&](std::uint32_t x, std::uint32_t y) {
-        return glm::dvec3(frame.origin + static_cast<float>(i % surface.width + x) * frame.du +
-                          static_cast<float>(i / surface.width + y) * frame.dv) *
+      const auto polygon = outlines.node(s, 0, i % surface.width, i / surface.width);
+      const auto corner = [&](std::uint32_t k) {
+        const auto& texel = polygon.corner[k];
+        return (glm::dvec3(frame.origin) + texel.x * glm::dvec3(frame.du) + texel.y * glm::dvec3(frame.dv)) *
                    patches.scale +
                patches.centre;
       };
       Leaf leaf;
       leaf.node = surface.first_node[0] + i;
       leaf.area = static_cast<double>(patches.node_area[leaf.node]);
+      leaf.full = place.full;
+      if (leaf.area < 0.25 * static_cast<double>(surface.texel_area)) continue;
       const glm::dvec3 normal(frame.normal);
-      leaf.footprint.pieces = {{{corner(0, 0), corner(1, 0), corner(1, 1)}, normal},
-                               {{corner(0, 0), corner(1, 1), corner(0, 1)}, normal}};
+      for (std::uint32_t k = 2; k < polygon.count; ++k)
+        leaf.footprint.pieces.push_back({{corner(0), corner(k - 1), corner(k)}, normal});
       leaves.push_back(std::move(leaf));
     }
   }
   return leaves;
 }
 
-std::vector<glm::dvec3> reference(const std::string& scene, const std::vector<Leaf>& leaves, std::uint32_t samples,
-                                  const std::string& cache) {
-  std::vector<glm::dvec3> values(leaves.size());
-  if (std::ifstream in(cache, std::ios::binary);
-      in.read(reinterpret_cast<char*>(values.data()), static_cast<std::streamsize>(values.size() * sizeof(glm::dvec3))))
-    return values;
+struct Truth {
+  glm::dvec3 mean{0.0}, standard_error{0.0};
+  double visible = 1.0;
+};
+
+std::vector<Truth> reference(const std::string& scene, const std::vector<Leaf>& leaves, std::uint32_t samples,
+                             const std::string& cache) {
+  std::vector<Truth> values(leaves.size());
+  const auto bytes = static_cast<std::streamsize>(values.size() * sizeof(Truth));
+  if (std::ifstream in(cache, std::ios::binary); in.read(reinterpret_cast<char*>(values.data()), bytes)) return values;
   const oracle::PathTracer tracer(oracle::readGlb(scene));
   std::vector<oracle::Footprint> footprints;
   for (const auto& leaf : leaves) footprints.push_back(leaf.footprint);
   oracle::PathOptions options;
   options.samples = samples;
   const auto traced = tracer.irradiance(footprints, options);
-  double noise = 0.0, square = 0.0;
-  for (std::size_t i = 0; i < traced.size(); ++i) {
-    values[i] = traced[i].mean_lux;
-    noise += leaves[i].area * glm::dot(traced[i].standard_error, traced[i].standard_error);
-    square += leaves[i].area * glm::dot(values[i], values[i]);
+  for (std::size_t i = 0; i < traced.size(); ++i)
+    values[i] = {traced[i].mean_lux, traced[i].standard_error, traced[i].visible_fraction};
+  if (!cache.empty()) {
+    std::ofstream(cache, std::ios::binary).write(reinterpret_cast<const char*>(values.data()), bytes);
   }
-  std::printf("reference: %zu leaves, own error %.3f %%\n", leaves.size(), 100.0 * std::sqrt(noise / square));
-  if (!cache.empty())
-    std::ofstream(cache, std::ios::binary)
-        .write(reinterpret_cast<const char*>(values.data()),
-               static_cast<std::streamsize>(values.size() * sizeof(glm::dvec3)));
   return values;
 }
 
-void printTruth(const std::vector<Leaf>& leaves, const std::vector<glm::dvec3>& truth,
+void leaveOutBuried(std::vector<Leaf>& leaves, std::vector<Truth>& truth) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < leaves.size(); ++i) {
+    if (truth[i].visible < 0.25) continue;
+    leaves[kept] = leaves[i];
+    truth[kept++] = truth[i];
+  }
+  leaves.resize(kept);
+  truth.resize(kept);
+}
+
+/// The tracer's own noise is taken out of the squares.
+void printTruth(const std::vector<Leaf>& leaves, const std::vector<Truth>& truth,
                 const std::vector<glm::vec3>& solved) {
-  double difference = 0.0, square = 0.0, mine = 0.0, theirs = 0.0;
+  double square = 0.0, mine = 0.0, theirs = 0.0;
+  std::array<double, 2> difference{}, noise{};  // of parts, of full leaves
   std::vector<double> relative;
   for (std::size_t i = 0; i < leaves.size(); ++i) {
-    const glm::dvec3 value(solved[leaves[i].node]), d = value - truth[i];
-    difference += leaves[i].area * glm::dot(d, d);
-    square += leaves[i].area * glm::dot(truth[i], truth[i]);
-    const double l = value.x + value.y + value.z, t = truth[i].x + truth[i].y + truth[i].z;
-    mine += leaves[i].area * l;
-    theirs += leaves[i].area * t;
+    const glm::dvec3 value(solved[leaves[i].node]), mean = truth[i].mean, d = value - mean;
+    const double area = leaves[i].area;
+    difference[leaves[i].full ? 1 : 0] += area * glm::dot(d, d);
+    noise[leaves[i].full ? 1 : 0] += area * glm::dot(truth[i].standard_error, truth[i].standard_error);
+    square += area * glm::dot(mean, mean);
+    const double l = value.x + value.y + value.z, t = mean.x + mean.y + mean.z;
+    mine += area * l;
+    theirs += area * t;
     relative.push_back(std::abs(l - t) / std::max(t, 1e-12));
   }
   std::sort(relative.begin(), relative.end());
-  std::printf(" | truth: rms %6.3f %%  median %6.3f %%  p99 %6.2f %%  mean ratio %.4f",
-              100.0 * std::sqrt(difference / square), 100.0 * relative[relative.size() / 2],
-              100.0 * relative[relative.size() * 99 / 100], mine / theirs);
+  const auto percent = [&](double sum) { return 100.0 * std::sqrt(std::max(0.0, sum) / square); };
+  std::printf(
+      " | truth: rms %6.3f %% (parts %.3f full %.3f, noise %.3f) median %6.3f %%  p99 %6.2f %%  mean ratio %.4f",
+      percent(difference[0] + difference[1] - noise[0] - noise[1]), percent(difference[0] - noise[0]),
+      percent(difference[1] - noise[1]), percent(noise[0] + noise[1]), 100.0 * relative[relative.size() / 2],
+      100.0 * relative[relative.size() * 99 / 100], mine / theirs);
 }
 
 /// Which surfaces are wrong, and which way.
-void printSurfaces(const scene::PatchScene& patches, const std::vector<Leaf>& leaves,
-                   const std::vector<glm::dvec3>& truth, const std::vector<glm::vec3>& solved) {
+void printSurfaces(const scene::PatchScene& patches, const std::vector<Leaf>& leaves, const std::vector<Truth>& truth,
+                   const std::vector<glm::vec3>& solved) {
   for (std::size_t s = 0; s < patches.surfaces.size() && s < 40; ++s) {
     const auto first = patches.surfaces[s].first_node[0];
     const auto count = patches.surfaces[s].width * patches.surfaces[s].height;
@@ -127,11 +165,11 @@ void printSurfaces(const scene::PatchScene& patches, const std::vector<Leaf>& le
     std::uint32_t worst_leaf = 0;
     for (std::size_t i = 0; i < leaves.size(); ++i) {
       if (leaves[i].node < first || leaves[i].node >= first + count) continue;
-      const glm::dvec3 value(solved[leaves[i].node]), d = value - truth[i];
+      const glm::dvec3 value(solved[leaves[i].node]), d = value - truth[i].mean;
       mine += leaves[i].area * (value.x + value.y + value.z);
-      theirs += leaves[i].area * (truth[i].x + truth[i].y + truth[i].z);
+      theirs += leaves[i].area * (truth[i].mean.x + truth[i].mean.y + truth[i].mean.z);
       difference += leaves[i].area * glm::dot(d, d);
-      square += leaves[i].area * glm::dot(truth[i], truth[i]);
+      square += leaves[i].area * glm::dot(truth[i].mean, truth[i].mean);
       if (glm::dot(d, d) > worst) worst = glm::dot(d, d), worst_leaf = leaves[i].node - first;
     }
     std::printf("  surface %2zu %3ux%3u ratio %.4f rms %.2f %% mean %.4g worst off %.3g at (%u, %u)\n", s,
@@ -145,7 +183,7 @@ void printSurfaces(const scene::PatchScene& patches, const std::vector<Leaf>& le
                   /// too bright.
                   void
                   printMap(const scene::PatchScene& patches, std::uint32_t surface, const std::vector<Leaf>& leaves,
-                           const std::vector<glm::dvec3>& truth, const std::vector<glm::vec3>& solved) {
+                           const std::vector<Truth>& truth, const std::vector<glm::vec3>& solved) {
   const auto& s = patches.surfaces[surface];
   std::vector<std::string> rows(s.height, std::string(s.width, ' '));
   double mean = 0.0, count = 0.0;
@@ -155,14 +193,50 @@ void printSurfaces(const scene::PatchScene& patches, const std::vector<Leaf>& le
       if (leaves[i].node >= s.first_node[0] && local < s.width * s.height) visit(i, local);
     }
   };
-  each([&](std::size_t i, std::uint32_t) { mean += truth[i].y, count += 1.0; });
+  each([&](std::size_t i, std::uint32_t) { mean += truth[i].mean.y, count += 1.0; });
   mean /= count;
   each([&](std::size_t i, std::uint32_t local) {
-    const double off = (static_cast<double>(solved[leaves[i].node].y) - truth[i].y) / mean;
+    const double off = (static_cast<double>(solved[leaves[i].node].y) - truth[i].mean.y) / mean;
     const int step = std::min(25, static_cast<int>(std::abs(off) * 20.0));
     rows[local / s.width][local % s.width] = static_cast<char>(step == 0 ? '.' : (off > 0 ? 'A' : 'a') + step);
   });
   for (const auto& row : rows) std::printf("  %s\n", row.c_str());
+}
+
+/// The leaves that contribute most to the error.
+void printWorst(const scene::PatchScene& patches, const std::vector<Leaf>& leaves, const std::vector<Truth>& truth,
+                const std::vector<glm::vec3>& solved, std::size_t count) {
+  std::vector<std::pair<double, std::size_t>> order;
+  double square = 0.0, all = 0.0;
+  for (std::size_t i = 0; i < leaves.size(); ++i) {
+    const glm::dvec3 d = glm::dvec3(solved[leaves[i].node]) - truth[i].mean, noise = truth[i].standard_error;
+    square += leaves[i].area * glm::dot(truth[i].mean, truth[i].mean);
+    order.emplace_back(leaves[i].area * (glm::dot(d, d) - glm::dot(noise, noise)), i);
+    all += order.back().first;
+  }
+  std::sort(order.begin(), order.end(), std::greater<>());
+  double sum = 0.0;
+  for (std::size_t k = 0; k < std::min(count, order.size()); ++k) {
+    const auto& leaf = leaves[order[k].second];
+    sum += order[k].first;
+    std::size_t s = 0;
+    while (patches.surfaces[s].first_node[0] == scene::kNone || leaf.node < patches.surfaces[s].first_node[0] ||
+           leaf.node - patches.surfaces[s].first_node[0] >= patches.surfaces[s].width * patches.surfaces[s].height)
+      ++s;
+    const auto local = leaf.node - patches.surfaces[s].first_node[0];
+    const auto& mean = truth[order[k].second].mean;
+    const auto& corner = leaf.footprint.pieces[0].corners[0];
+    const auto& normal = leaf.footprint.pieces[0].normal;
+    std::printf("  at (%.3f, %.3f, %.3f) facing (%.1f, %.1f, %.1f)", corner.x, corner.y, corner.z, normal.x, normal.y,
+                normal.z);
+    std::printf(
+        "  surface %3zu (%ux%u) leaf (%u, %u) %s area %.2f (%.2f): %.4g, true %.4g +- %.2g; %.1f %% of the square\n", s,
+        patches.surfaces[s].width, patches.surfaces[s].height, local % patches.surfaces[s].width,
+        local / patches.surfaces[s].width, leaf.full ? "full" : "part",
+        leaf.area / static_cast<double>(patches.surfaces[s].texel_area), truth[order[k].second].visible,
+        solved[leaf.node].y, mean.y, truth[order[k].second].standard_error.y, 100.0 * order[k].first / all);
+  }
+  std::printf("  together %.1f %% of the square of %.3f %%\n", 100.0 * sum / all, 100.0 * std::sqrt(all / square));
 }
 
 int profile(const std::string& file, std::map<std::string, std::string> options) {
@@ -183,9 +257,10 @@ int profile(const std::string& file, std::map<std::string, std::string> options)
   std::printf("%s: %llu polygons, %zu surfaces, %zu nodes, %zu leaves, built in %.3f s\n", file.c_str(),
               static_cast<unsigned long long>(patches->polygons), patches->surfaces.size(), patches->nodeCount(),
               patches->leaves.size(), std::chrono::duration<double>(Clock::now() - begin).count());
-  const auto leaves = fullLeaves(*patches);
-  const auto truth =
-      reference(file, leaves, static_cast<std::uint32_t>(number("--samples", 4096)), options["--reference"]);
+  auto leaves = planarLeaves(*patches);
+  std::printf("%zu leaves with spots\n", patches->spots.size() / scene::kLeafSpots);
+  auto truth = reference(file, leaves, static_cast<std::uint32_t>(number("--samples", 4096)), options["--reference"]);
+  leaveOutBuried(leaves, truth);
   const int workers = static_cast<int>(number("--workers", 0));
   auto transport =
       workers == 0 ? gpu::makeInProcessTransport() : gpu::makeWorkerTransport({workers, options["--worker-program"]});
@@ -240,6 +315,8 @@ int profile(const std::string& file, std::map<std::string, std::string> options)
   if (options.count("--map") != 0) {
     printMap(*patches, static_cast<std::uint32_t>(number("--map", 0)), leaves, truth, solver.irradiance());
   }
+  if (options.count("--worst") != 0)
+    printWorst(*patches, leaves, truth, solver.irradiance(), static_cast<std::size_t>(number("--worst", 20)));
   const auto energy = solver.energy();
   const auto& counters = solver.plannerCounters();
   std::printf("shooters %llu, of which gathered %llu; roulette kills %llu\n",

@@ -60,6 +60,26 @@ TEST_F(LinkColumns, SamplesAreAveragedByTheirPointsAlsoWhereOneOfThemSawNothing)
   EXPECT_NEAR(column.escaped(), 0.0625, 1e-12);
 }
 
+TEST_F(LinkColumns, AreScaledToWhatShouldArriveInTheMeanOverAllSamples) {
+  // One point of view finds too much, the other too little: each by itself would be scaled by 1/2 and by 2, and the
+  // near leaf that both see alike would get 5/4 of its light.
+  LinkSample first, second;
+  first.add(sides_[1].first_node, 0.5F);
+  first.delivered = 2.0;
+  first.due = 1.0;
+  second.add(sides_[1].first_node, 0.5F);
+  second.delivered = 0.5;
+  second.due = 1.0;
+  LinkColumn column;
+  add(column, first, 1.0);
+  EXPECT_NEAR(column.gain(), 0.5, 1e-12);
+  EXPECT_NEAR(leaf(column, 1, 0), 0.25, 1e-4);
+  add(column, second, 1.0);
+  EXPECT_NEAR(column.gain(), 0.8, 1e-12);
+  EXPECT_NEAR(leaf(column, 1, 0), 0.4, 1e-4);
+  EXPECT_NEAR(LinkColumn::product(column, column, std::vector<float>(made_.patches->nodeCount(), 1.0F)), 0.16, 1e-3);
+}
+
 TEST_F(LinkColumns, TinyAndHugeLinksAreKeptAlike) {
   for (const float size : {1e-25F, 1e-10F, 1.0F, 3e4F}) {
     LinkSample sample;

@@ -1,0 +1,147 @@
+// Where on a leaf that is not full one may stand, several times over: its irradiance is the mean over what is left of
+// it.
+#include <algorithm>
+#include <array>
+#include <glm/geometric.hpp>
+#include <utility>
+
+#include "server/scene/bvh.h"
+#include "server/scene/coverage.h"
+
+namespace radiosity::scene {
+
+glm::dvec2 latticePoint(std::uint32_t i, std::uint32_t count) {
+  const std::uint32_t generator = count == 64 ? 19 : 5;
+  return {(i + 0.5) / count, static_cast<double>((std::uint64_t{i} * generator) % count + 0.5) / count};
+}
+
+namespace {
+
+/// The place nearest to the middle of all.
+LeafSpot middleOf(std::span<const LeafSpot> places) {
+  glm::vec2 middle(0.0F);
+  for (const auto& place : places) middle += place.texel / static_cast<float>(places.size());
+  return *std::min_element(places.begin(), places.end(), [&](const LeafSpot& a, const LeafSpot& b) {
+    return glm::dot(a.texel - middle, a.texel - middle) < glm::dot(b.texel - middle, b.texel - middle);
+  });
+}
+
+/// Halves the places, across and up in turn, until there are `count` cells of equal worth, and appends the middle of
+/// each.
+void spread(std::span<LeafSpot> places, std::uint32_t count, int axis, std::vector<LeafSpot>& spots) {
+  if (count == 1 || places.size() == 1) {
+    spots.insert(spots.end(), count, middleOf(places));
+    return;
+  }
+  std::sort(places.begin(), places.end(), [axis](const LeafSpot& a, const LeafSpot& b) {
+    return a.texel[axis] != b.texel[axis] ? a.texel[axis] < b.texel[axis] : a.texel[1 - axis] < b.texel[1 - axis];
+  });
+  const std::size_t half = places.size() / 2;
+  spread(places.first(half), count / 2, 1 - axis, spots);
+  spread(places.subspan(half), count - count / 2, 1 - axis, spots);
+}
+
+}  // namespace
+
+void keepSpots(PatchScene& patches, LeafPoint& leaf, std::span<LeafSpot> places) {
+  if (places.size() < 2) return;
+  leaf.first_spot = static_cast<std::uint32_t>(patches.spots.size());
+  spread(places, kLeafSpots, 0, patches.spots);
+}
+
+void placeSpots(PatchScene& patches, const std::vector<LeafPiece>& pieces) {
+  constexpr std::uint32_t kSamples = 16, kManySamples = 64, kEnough = 6;
+  std::vector<LeafSpot> places;
+  std::size_t surface = 0;
+  for (std::size_t first = 0, end = 0; first < pieces.size(); first = end) {
+    const std::uint32_t index = pieces[first].leaf;
+    while (end < pieces.size() && pieces[end].leaf == index) ++end;
+    auto& leaf = patches.leaves[index];
+    if (leaf.triangle == kNone || leaf.full || leaf.first_spot != kNone) continue;
+    while (surface + 1 < patches.surfaces.size() && patches.surfaces[surface + 1].first_leaf <= index) ++surface;
+    const std::uint32_t local = index - patches.surfaces[surface].first_leaf, width = patches.surfaces[surface].width;
+    const glm::dvec2 corner(local % width, local / width);
+    for (const std::uint32_t count : {kSamples, kManySamples}) {
+      if (count == kManySamples && places.size() >= kEnough) break;
+      places.clear();
+      for (std::uint32_t i = 0; i < count; ++i) {
+        const glm::dvec2 texel = corner + latticePoint(i, count);
+        for (std::size_t p = first; p < end; ++p) {
+          if (!triangleHolds(patches, pieces[p].triangle, texel, 0.0)) continue;
+          places.push_back({glm::vec2(texel), pieces[p].triangle});
+          break;
+        }
+      }
+    }
+    keepSpots(patches, leaf, places);
+  }
+}
+
+namespace {
+
+/// Leaves are looked at in so many leaf widths before them, ...
+constexpr float kGap = 0.5F;
+/// ... starting well above the rounding of positions, and without their rims: walls that meet a floor are no gap.
+constexpr float kLift = 2e-5F, kInterior = 0.9F;
+
+class Gaps {
+ public:
+  explicit Gaps(PatchScene& patches) : patches_(patches) {
+    std::vector<Bvh::Triangle> triangles(patches.triangles.size());
+    for (std::size_t i = 0; i < patches.indices.size(); ++i)
+      triangles[i / 3][i % 3] = patches.vertices[patches.indices[i]].position;
+    tree_ = Bvh(std::move(triangles));
+  }
+
+  void run() {
+    for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
+      const Surface& surface = patches_.surfaces[s];
+      for (std::size_t side = 0; side < 2 && surface.planar; ++side)
+        if (surface.first_node[side] != kNone) descend(s, side == 0 ? 1.0F : -1.0F, surface.level_count - 1, {0, 0});
+    }
+  }
+
+ private:
+  /// Space right before a node, on one side.
+  [[nodiscard]] Bvh::OrientedBox boxBefore(std::uint32_t s, float side, std::uint32_t level, glm::uvec2 at) const {
+    const Surface& surface = patches_.surfaces[s];
+    const TriangleFrame& frame = patches_.triangles[surface.first_triangle];
+    const glm::vec2 low(at << level);
+    const glm::vec2 high(glm::min((at + 1U) << level, glm::uvec2(surface.width, surface.height)));
+    const glm::vec2 middle = 0.5F * (low + high), extent = 0.5F * (high - low - (1.0F - kInterior));
+    const float across = glm::length(frame.du), up = glm::length(frame.dv), depth = kGap * std::min(across, up);
+    const glm::vec3 normal = side * frame.normal, u = frame.du / across;
+    Bvh::OrientedBox box;
+    box.centre = frame.origin + middle.x * frame.du + middle.y * frame.dv + (kLift + 0.5F * depth) * normal;
+    box.axes = {u, glm::normalize(glm::cross(normal, u)), normal};
+    box.half = {extent.x * across, extent.y * up, 0.5F * depth};
+    return box;
+  }
+
+  void descend(std::uint32_t s, float side, std::uint32_t level, glm::uvec2 at) {
+    const Surface& surface = patches_.surfaces[s];
+    if (!tree_.touches(boxBefore(s, side, level, at), patches_.triangle_surface, s)) return;
+    if (level > 0) {
+      const LevelGrid below = levelGrid(surface.width, surface.height, level - 1);
+      for (std::uint32_t y = 2 * at.y; y < std::min(2 * at.y + 2, below.height); ++y)
+        for (std::uint32_t x = 2 * at.x; x < std::min(2 * at.x + 2, below.width); ++x)
+          descend(s, side, level - 1, {x, y});
+      return;
+    }
+    auto& leaf = patches_.leaves[surface.first_leaf + at.y * surface.width + at.x];
+    if (!leaf.full || leaf.first_spot != kNone) return;
+    std::array<LeafSpot, kLeafSpots> places;
+    for (std::uint32_t i = 0; i < kLeafSpots; ++i)
+      places[i] = {glm::vec2(glm::dvec2(at) + latticePoint(i, kLeafSpots)), leaf.triangle};
+    keepSpots(patches_, leaf, places);
+  }
+
+  PatchScene& patches_;
+  Bvh tree_;
+};
+
+}  // namespace
+
+void placeSpotsInGaps(PatchScene& patches) { Gaps(patches).run(); }
+
+}  // namespace radiosity::scene
