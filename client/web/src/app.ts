@@ -121,7 +121,7 @@ export class App {
     });
     this.share = new Share(this, sharePanel);
     this.tiles = new TileFeed({
-      set: (kind) => (kind === 'irradiance' ? this.viewer.set : this.viewer.dataSet),
+      set: (kind) => this.viewer.setOf(kind),
       dropped: (bytes, reason) => {
         this.connection.used(bytes);
         if (reason) console.warn(`a tile was dropped: ${reason}`);

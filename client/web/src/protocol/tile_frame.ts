@@ -9,7 +9,7 @@ export const TILE_SIDE = 64;
 const MAGIC = 0x54444152; // "RADT", little-endian
 const MAX_MIP = 16;
 
-export const KINDS = ['irradiance', 'radiosity', 'error', 'patchId', 'mipLevel', 'unshot'] as const;
+export const KINDS = ['irradiance', 'radiosity', 'error', 'patchId', 'mipLevel', 'unshot', 'normal'] as const;
 export const FORMATS = ['rgba16f', 'rgb9e5', 'rgba32f', 'r32ui'] as const;
 export type PixelFormat = (typeof FORMATS)[number];
 const BYTES_PER_TEXEL: Record<PixelFormat, number> = { rgba16f: 8, rgb9e5: 4, rgba32f: 16, r32ui: 4 };

@@ -77,7 +77,7 @@ export class LightmapSet {
     if (values.length === 0) return undefined;
     const at = (q: number) => values[Math.min(values.length - 1, Math.floor(q * values.length))]!;
     const high = at(0.995);
-    return [Math.max(at(0.02), high / 1e4), high];
+    return [Math.max(at(0.005), high / 1e4), high];
   }
 
   restore(): void {

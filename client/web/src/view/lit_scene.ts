@@ -37,6 +37,7 @@ export class LitScene {
   private readonly made = new Map<string, LitMaterial>();
   private readonly geometries = new Set<BufferGeometry>();
   private readonly textures = new Set<Texture>();
+  private readonly nodeNumbers = new Map<Object3D, number>();
 
   /** Reads a GLB from /scene.glb. Rejects when it cannot be drawn. */
   static async load(glb: ArrayBuffer, set: LightmapSet, view: ViewUniforms, anisotropy: number): Promise<LitScene> {
@@ -61,6 +62,7 @@ export class LitScene {
       if (object instanceof Mesh) this.light(object, associations, view, anisotropy);
     });
     for (const light of lights) this.putOut(light);
+    for (const [node, object] of this.nodes) this.nodeNumbers.set(object, node);
     this.root.add(gltf.scene);
   }
 
@@ -99,7 +101,8 @@ export class LitScene {
   nodeOf(object: Object3D): number | undefined {
     for (let at: Object3D | null = object; at; at = at.parent) {
       if (at instanceof LampMarker) return at.node;
-      for (const [node, known] of this.nodes) if (known === at) return node;
+      const node = this.nodeNumbers.get(at);
+      if (node !== undefined) return node;
     }
     return undefined;
   }

@@ -30,7 +30,7 @@ export const VIEW_MODES: readonly ViewMode[] = [
     number: 2,
     hint: 'Light that leaves: emitted and reflected',
     quantity: 'irradiance',
-    unit: 'lm/m²',
+    unit: 'lx',
     falseColour: 'always',
   },
   {
@@ -39,7 +39,7 @@ export const VIEW_MODES: readonly ViewMode[] = [
     number: 3,
     hint: 'Light that has arrived and not been passed on',
     quantity: 'unshot',
-    unit: 'lm/m²',
+    unit: 'lx',
     falseColour: 'always',
   },
   {

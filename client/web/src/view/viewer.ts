@@ -93,6 +93,12 @@ export class Viewer {
     return this.staged?.set ?? this.shown?.set;
   }
 
+  /** The set that tiles of a quantity belong to; undefined: nobody looks at it. */
+  setOf(quantity: string): LightmapSet | undefined {
+    if (quantity === 'irradiance') return this.set;
+    return this.dataSet?.quantity === quantity ? this.dataSet : undefined;
+  }
+
   /** Pages have a new layout. Returns the set whose geometry is to be fetched; undefined: it is the one that is there. */
   expectLayout(note: LightmapsNote): LightmapSet | undefined {
     if (this.layoutKnown && this.set?.note.layout === note.layout && samePages(this.set.note, note)) return undefined;
@@ -217,10 +223,10 @@ export class Viewer {
   }
 
   private measure(now: number): void {
-    if (now - this.lastMeasure < MEASURE_EVERY_MS || !this.shown?.set.covered || this.mode?.flat) return;
+    if (now - this.lastMeasure < MEASURE_EVERY_MS || !this.shown?.set.covered) return;
     this.lastMeasure = now;
-    this.updateRange();
-    if (this.exposure.automatic) void this.measureNow().then(() => this.invalidate());
+    if (this.uniforms.all.falseColour.value) this.updateRange();
+    if (this.exposure.automatic && !this.mode?.flat) void this.measureNow().then(() => this.invalidate());
   }
 
   /** Signs and handles are no part of the scene's light. */
