@@ -144,7 +144,7 @@ export class SceneDocument {
         inverse: [],
         isStep,
         key,
-        requestId: crypto.randomUUID?.() ?? `${Date.now()}-${Math.random()}`,
+        requestId: newRequestId(),
         shown: [],
         confirmed: false,
         done: (error) => (error ? reject(error) : resolve()),
@@ -236,6 +236,11 @@ export class SceneDocument {
     this.events.refused(edit.label, reasonOf(error));
     edit.done(error);
   }
+}
+
+/** Pages without TLS have no crypto.randomUUID; nobody gains by guessing these. */
+function newRequestId(): string {
+  return `edit-${Date.now().toString(36)}-${Math.random().toString(36).slice(2)}`;
 }
 
 function reasonOf(error: Error): string {
