@@ -96,8 +96,6 @@ export class App {
         addLamp: () => void this.edit.addLamp(),
         undo: () => void this.edit.undo(),
         redo: () => void this.edit.redo(),
-        reconnect: () => this.connection.open(),
-        giveToken: (token) => this.giveToken(token),
       },
       {
         View: this.view.panel.element,

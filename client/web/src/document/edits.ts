@@ -1,7 +1,7 @@
 // Patches that the viewer makes, as pure functions of the document.
 
 import type { Json, Patch } from '../protocol/messages';
-import { holderOf, lightOf, nodeName, type Gltf, type GltfLight, type Vec3, type Vec4 } from './gltf';
+import { holderOf, nodeName, type Gltf, type GltfLight, type Vec3, type Vec4 } from './gltf';
 import { valueAt } from './json_patch';
 
 export function setColour(material: number, gltf: Gltf, rgb: Vec3): Patch {
@@ -169,8 +169,4 @@ function readable(member: string): string {
     '-': 'new light',
   };
   return words[member] ?? member;
-}
-
-export function isLamp(gltf: Gltf, node: number): boolean {
-  return lightOf(gltf, node) !== undefined;
 }

@@ -122,8 +122,5 @@ export interface Notifications {
 
 export const SUBPROTOCOL = 'radiosity.v1';
 
-/** Close codes and error codes that the viewer treats apart. */
+/** The close code that trying again does not mend. */
 export const CLOSE_UNAUTHENTICATED = 1008;
-export const ERROR_UNAUTHENTICATED = -32001;
-export const ERROR_STALE = -32009;
-export const ERROR_RATE = -32029;

@@ -13,8 +13,6 @@ export interface FrameActions {
   addLamp(): void;
   undo(): void;
   redo(): void;
-  reconnect(): void;
-  giveToken(token: string): void;
 }
 
 const THEMES = ['auto', 'dark', 'light'] as const;

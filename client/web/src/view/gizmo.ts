@@ -19,7 +19,7 @@ import {
 import { TransformControls } from 'three/addons/controls/TransformControls.js';
 import { LampMarker } from './lamp_marker';
 
-export type GizmoMode = 'translate' | 'rotate' | 'scale' | 'off';
+export type GizmoMode = 'translate' | 'rotate' | 'scale';
 
 /** Finding edges takes about a microsecond a triangle; larger objects show their box. */
 const MAX_EDGE_TRIANGLES = 30_000;
@@ -80,14 +80,14 @@ export class Gizmo {
     this.object = object;
     this.clearOutline();
     this.placePivot();
-    if (object && this.mode !== 'off') this.controls.attach(this.pivot);
+    if (object) this.controls.attach(this.pivot);
     else this.controls.detach();
     if (object) this.makeOutline(object);
   }
 
   setMode(mode: GizmoMode): void {
     this.mode = mode;
-    if (mode !== 'off') this.controls.setMode(mode);
+    this.controls.setMode(mode);
     this.attach(this.object);
   }
 

@@ -14,13 +14,10 @@ import {
 } from 'three';
 import { GLTFLoader, type GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import { isVisible } from '../document/edits';
-import { lightOf, materialName, type Gltf, type GltfNode } from '../document/gltf';
+import { lightOf, type Gltf, type GltfNode } from '../document/gltf';
 import { LampMarker } from './lamp_marker';
 import { LitMaterial, sharpen, type ViewUniforms } from './lit_material';
 import type { LightmapSet } from './lightmap_set';
-
-/** What an edit asks of the pictures. */
-export type EditEffect = 'none' | 'redraw';
 
 interface Association {
   nodes?: number;
@@ -221,8 +218,4 @@ function place(object: Object3D, node: GltfNode): void {
   object.quaternion.set(...(node.rotation ?? [0, 0, 0, 1]));
   object.scale.set(...(node.scale ?? [1, 1, 1]));
   object.updateMatrixWorld(true);
-}
-
-export function describeMaterial(gltf: Gltf, index: number | undefined): string {
-  return index === undefined ? 'no material' : materialName(gltf, index);
 }
