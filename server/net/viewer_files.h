@@ -20,7 +20,8 @@ struct ViewerFile {
 /// was not built.
 [[nodiscard]] std::span<const ViewerFile> viewerFiles();
 
-/// The file at the request's path ("/" is the page itself), packed where the client takes gzip; 304 where it has it; 404.
+/// The file at the request's path ("/" is the page itself), packed where the client takes gzip; 304 where it has it;
+/// 404.
 [[nodiscard]] HttpResponse viewerResponse(const HttpRequest& request);
 
 }  // namespace radiosity::net
