@@ -54,7 +54,7 @@ struct PageInfo {
   std::uint32_t width = 0, height = 0, mips = 0;
 };
 
-/// "empty", "loading", "solving", "paused", "converged", "timeLimit", "failed" in `state`.
+/// "empty", "loading", "solving", "paused", "converged", "timeLimit", "limited", "failed" in `state`.
 struct Progress {
   std::uint64_t revision = 0;
   std::string state = "empty";

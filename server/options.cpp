@@ -67,6 +67,12 @@ void addSolveOptions(CLI::App& app, Options& o, Raw& raw) {
                  "Radiance of everything outside the scene, nits: 1000, or R,G,B, or R,G,B/R,G,B (above / below the "
                  "horizon); for scenes without a sky of their own")
       ->type_name("NITS");
+  app.add_option(
+         "--link-memory", o.solve.link_memory_bytes,
+         "Memory for remembered links, bytes (suffixes KiB, MiB, GiB); a solve that has used it up ends above its "
+         "target error; 0: remember none")
+      ->transform(CLI::AsSizeValue(false))
+      ->capture_default_str();
   app.add_flag("--paper-mode", o.solve.paper_mode, "Lum, Ma and Max 2002 to the letter, for comparisons");
 }
 

@@ -9,7 +9,7 @@ void buildApp(CLI::App& app, Run& run) {
       "stderr.");
   app.footer(
       "Exit codes: 0 done, the asked error reached; 1 failed; 2 bad usage or bad input;\n"
-      "            3 time limit reached before the error, output written; 75 interrupted.\n"
+      "            3 ended above the asked error (time limit, memory for links), output written; 75 interrupted.\n"
       "`radiosity COMMAND --help` tells the options of a command, with units and defaults.");
   app.set_version_flag("--version", "radiosity 0.1.0");
   app.require_subcommand(1);

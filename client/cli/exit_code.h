@@ -10,7 +10,7 @@ enum class ExitCode : int {
   kOk = 0,            ///< done; for solve and watch: the asked error was reached
   kFailed = 1,        ///< no server, no driver, full disk
   kBadInput = 2,      ///< an option, file, scene or patch is wrong
-  kTimeLimit = 3,     ///< the time limit came before the asked error; output was written
+  kShort = 3,         ///< ended above the asked error (time limit, memory for links); output was written
   kInterrupted = 75,  ///< Ctrl-C or SIGTERM (EX_TEMPFAIL: running it again makes sense)
 };
 

@@ -52,6 +52,8 @@ std::string reportJson(const protocol::StatusReply& status, bool reached) {
               {"revision", progress.revision},
               {"gl_renderer", status.gl_renderer},
               {"reached", reached},
+              {"state", progress.state},
+              {"limit", progress.state == "limited" ? json(progress.failure) : json(nullptr)},
               {"settings", settingsJson(status.settings)},
               {"warnings", status.warnings},
               {"warning_count", status.warning_count},

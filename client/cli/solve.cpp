@@ -33,7 +33,8 @@ struct SolveOptions {
   std::uint64_t texels = 16'000;
   double texel_size_m = 0.0;  ///< 0: by number
   std::uint64_t seed = 1;
-  unsigned workers = 0;  ///< 0: the server's choice
+  unsigned workers = 0;     ///< 0: the server's choice
+  std::string link_memory;  ///< as radiosityd takes it; empty: the server's choice
   bool unlit = false, quiet = false;
 };
 
@@ -99,6 +100,8 @@ class Solve {
     if (!program) return tl::unexpected(program.error());
     ServerProcess::Options start{.program = *program, .arguments = {}, .keep_going = [] { return !interrupted(); }};
     if (options_.workers > 0) start.arguments = {"--workers", std::to_string(options_.workers)};
+    if (!options_.link_memory.empty())
+      start.arguments.insert(start.arguments.end(), {"--link-memory", options_.link_memory});
     if (by_path_) {
       const auto folder = std::filesystem::canonical(options_.scene).parent_path();
       start.arguments.insert(start.arguments.end(), {"--scene-root", folder.string()});
@@ -191,7 +194,8 @@ class Solve {
         return tl::unexpected(CallFailure{{ErrorCode::kUnavailable, "the server lost the scene", remote_.url.text()}});
       display_.show(viewOf(progress, options_.error));
       const bool is_ours = progress.revision >= revision_;
-      if (is_ours && (progress.state == "converged" || progress.state == "timeLimit")) return status;
+      if (is_ours && (progress.state == "converged" || progress.state == "timeLimit" || progress.state == "limited"))
+        return status;
       const auto next = std::chrono::steady_clock::now() + kStatusInterval;
       while (!ask_now_ && std::chrono::steady_clock::now() < next) {
         if (interrupted()) return tl::unexpected(CallFailure{{ErrorCode::kUnavailable, "interrupted", {}}});
@@ -218,8 +222,10 @@ class Solve {
     for (const auto& warning : status.warnings)
       if (passed_on_.find(warning) == std::string::npos) warn(warning);
     for (const auto& name : *written) std::printf("%s\n", name.c_str());
-    std::fprintf(stderr, "%s%s\n", reached ? "" : "time limit: ", outcomeText(status.progress).c_str());
-    return reached ? ExitCode::kOk : ExitCode::kTimeLimit;
+    const auto& failure = status.progress.failure;
+    const std::string why = status.progress.state == "limited" ? "limited (" + failure + "): " : "time limit: ";
+    std::fprintf(stderr, "%s%s\n", reached ? "" : why.c_str(), outcomeText(status.progress).c_str());
+    return reached ? ExitCode::kOk : ExitCode::kShort;
   }
 
   Result<void> writeReport(const protocol::StatusReply& status, bool reached) const {
@@ -308,9 +314,16 @@ void addSolve(CLI::App& app, Run& run) {
       command.add_option("--workers", options->workers, "render processes of the private server (default: one a core)")
           ->check(CLI::Range(1U, 256U).description(""))
           ->type_name("N");
+  auto* memory = command
+                     .add_option("--link-memory", options->link_memory,
+                                 "memory for links of the private server, such as 256MiB (default: 1GiB); when it is "
+                                 "used up the solve ends above its error")
+                     ->check(CLI::AsSizeValue(false).description(""))
+                     ->type_name("SIZE");
   command.add_option("--server", options->server.url, "solve there rather than on a private radiosityd")
       ->type_name("URL")
-      ->excludes(workers);
+      ->excludes(workers)
+      ->excludes(memory);
   addTokenOption(command, options->server);
   command.add_flag("-q,--quiet", options->quiet, "no progress on stderr");
   command.callback([options, &run] { run = [options] { return Solve(*options).run(); }; });

@@ -85,13 +85,15 @@ class Watch {
 
   std::optional<ExitCode> ending(const protocol::Progress& progress) {
     if (options_.follow) return std::nullopt;
-    const bool stopped = progress.state == "converged" || progress.state == "timeLimit" || progress.state == "failed";
+    const bool stopped = progress.state == "converged" || progress.state == "timeLimit" ||
+                         progress.state == "limited" || progress.state == "failed";
     if (!stopped) return std::nullopt;
     display_.clear();
     if (progress.state == "failed")
       return complain(Error{ErrorCode::kUnavailable, "the solve failed: " + progress.failure, remote_.url.text()});
-    std::printf("%s: %s\n", progress.state == "converged" ? "converged" : "time limit", outcomeText(progress).c_str());
-    return progress.state == "converged" ? ExitCode::kOk : ExitCode::kTimeLimit;
+    const std::string why = progress.state == "limited" ? "limited (" + progress.failure + ")" : "time limit";
+    std::printf("%s: %s\n", progress.state == "converged" ? "converged" : why.c_str(), outcomeText(progress).c_str());
+    return progress.state == "converged" ? ExitCode::kOk : ExitCode::kShort;
   }
 
   void show(const protocol::Progress& progress) {

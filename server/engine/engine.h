@@ -18,7 +18,9 @@
 
 namespace radiosity::engine {
 
-enum class SolveState { kEmpty, kLoading, kSolving, kPaused, kConverged, kTimeLimit, kFailed };
+/// kLimited: done what it could, above the target error (Status::failure says what was used up); it goes on after an
+/// edit.
+enum class SolveState { kEmpty, kLoading, kSolving, kPaused, kConverged, kTimeLimit, kLimited, kFailed };
 
 /// Relative RMS errors of irradiance over all texels, area-weighted; estimates. total^2 = sum of squares.
 struct ErrorEstimate {
@@ -47,6 +49,7 @@ struct SolveSettings {
   std::uint64_t seed = 1;
   std::optional<SkySetting> sky;  ///< for scenes that have none of their own
   bool paper_mode = false;        ///< Lum, Ma and Max 2002 to the letter (server option, comparisons)
+  std::uint64_t link_memory_bytes = std::uint64_t{1} << 30;  ///< that remembered links never exceed (server option)
 };
 
 struct Status {
@@ -64,7 +67,7 @@ struct Status {
   std::map<std::string, double> counters;  ///< skips, culls, times: whatever the solver counts
   std::string gl_renderer;
   std::vector<std::string> warnings;
-  std::string failure;  ///< why, when kFailed
+  std::string failure;  ///< why, when kFailed or kLimited
   SolveSettings settings;
 };
 

@@ -138,6 +138,7 @@ void LitScene::makeSolver() {
   settings.target_error = settings_.target_error;
   settings.seed = settings_.seed;
   settings.paper_mode = settings_.paper_mode;
+  settings.link_memory = settings_.link_memory_bytes;
   sources_ = lightSources();
   solver_ = solver::makeSolver(patches_, materials_, transport_, settings, sources_);
   solver_power_ = power_ = emittedPower();

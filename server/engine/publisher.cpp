@@ -90,6 +90,9 @@ std::shared_ptr<const Lightmaps> Publisher::publish(const std::vector<scene::Lig
   for (std::size_t p = 0; p < pages.size(); ++p) {
     const PageSnapshot* before = p < pages_.size() ? pages_[p].get() : nullptr;
     lightmaps->pages.push_back(snapshot(pages[p], before));
+    for (const auto& mip : lightmaps->pages.back()->tile_version) {
+      for (const auto version : mip) ++(version == version_ ? tiles_.changed : tiles_.unchanged);
+    }
   }
   pages_ = lightmaps->pages;
   lightmaps->layout = layout_;

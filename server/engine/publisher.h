@@ -24,11 +24,19 @@ class Publisher {
 
   [[nodiscard]] std::uint64_t version() const { return version_; }
 
+  /// Tiles of all publications, of all mips: those with a new version, and those that changed by less than a quantum
+  /// and need not be sent again.
+  struct TileCounters {
+    std::uint64_t changed = 0, unchanged = 0;
+  };
+  [[nodiscard]] const TileCounters& tileCounters() const { return tiles_; }
+
  private:
   [[nodiscard]] std::shared_ptr<const PageSnapshot> snapshot(const scene::LightmapPage& page,
                                                              const PageSnapshot* before) const;
 
   std::uint64_t layout_ = 0, version_ = 0;
+  TileCounters tiles_;
   std::vector<std::shared_ptr<const PageSnapshot>> pages_;
 };
 

@@ -1,5 +1,7 @@
 #include "server/engine/solve_loop.h"
 
+#include <fmt/format.h>
+
 #include "common/log.h"
 #include "server/engine/solve_loop_class.h"
 #include "server/engine/status_report.h"
@@ -10,6 +12,21 @@ namespace {
 constexpr std::size_t kMaxQueue = 1024;
 constexpr auto kPublishInterval = std::chrono::milliseconds(50);
 constexpr auto kProgressInterval = std::chrono::milliseconds(100);
+
+std::string limitText(solver::SolveLimit limit, std::uint64_t link_memory_bytes) {
+  constexpr double kMebi = 1048576.0;
+  switch (limit) {
+    case solver::SolveLimit::kLinkMemory:
+      return fmt::format("the memory for links, {:.3g} MiB, is used up; --link-memory gives it more",
+                         static_cast<double>(link_memory_bytes) / kMebi);
+    case solver::SolveLimit::kPatches:
+      return "every patch shoots for itself and no sample lowers the error any more; more texels would";
+    case solver::SolveLimit::kRounds:
+    case solver::SolveLimit::kNone:
+      break;
+  }
+  return "as many rounds are done as there is room for";
+}
 
 }  // namespace
 
@@ -81,8 +98,9 @@ void SolveLoop::solveSlice() {
   if (*outcome == solver::StepOutcome::kConverged) {
     endSolve(SolveState::kConverged);
   } else if (*outcome == solver::StepOutcome::kExhausted) {
-    failure_ = "the target error is smaller than can be reached here: the room for rounds, or for links, is used up";
-    endSolve(SolveState::kFailed);
+    failure_ = limitText(lit_->solver().limit(), settings_.link_memory_bytes);
+    log::warn("the solve ends above its target error: {}", failure_);
+    endSolve(SolveState::kLimited);
   } else if (settings_.time_limit_s && seconds_ >= *settings_.time_limit_s) {
     endSolve(SolveState::kTimeLimit);
   } else {
@@ -115,7 +133,11 @@ void SolveLoop::endSolve(SolveState state) {
 }
 
 void SolveLoop::publishLightmaps(bool final) {
-  if (!lit_ || !listeners_.any() || (!unpublished_ && !final)) return;
+  if (!lit_ || (!unpublished_ && !final)) return;
+  if (!listeners_.any()) {
+    ++unwatched_;
+    return;
+  }
   updateStatus(false);
   auto published = publisher_.publish(lit_->pages(), status(), final && state_ == SolveState::kConverged);
   {
@@ -136,6 +158,12 @@ void SolveLoop::updateStatus(bool announce) {
   status.seconds = seconds_;
   status.settings = settings_;
   status.failure = failure_;
+  if (lit_) {
+    const auto& tiles = publisher_.tileCounters();
+    status.counters["tiles.changed"] = static_cast<double>(tiles.changed);
+    status.counters["skip.tilesUnchanged"] = static_cast<double>(tiles.unchanged);
+    status.counters["skip.publicationsUnwatched"] = static_cast<double>(unwatched_);
+  }
   status.gl_renderer = transport_->description();
   {
     const std::scoped_lock lock(mutex_);

@@ -100,6 +100,7 @@ class SolveLoop final : public Engine {
   std::uint64_t revision_ = 0;
   double seconds_ = 0.0;
   bool unpublished_ = false;
+  std::uint64_t unwatched_ = 0;  // publications that nobody was there for
   Clock::time_point last_publish_{}, last_progress_{};
 
   mutable std::mutex mutex_;  // for the two that any thread may read, and transport_ coming and going

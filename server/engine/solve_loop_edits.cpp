@@ -121,7 +121,8 @@ Result<SolveSettings> SolveLoop::applySettings(const SolveSettings& settings) {
     beginSolve();
     listeners_.tell([this](Listener& listener) { listener.onSceneLoaded(revision_); });
     publishLightmaps(false);
-  } else if (before.seed != settings.seed || before.paper_mode != settings.paper_mode) {
+  } else if (before.seed != settings.seed || before.paper_mode != settings.paper_mode ||
+             before.link_memory_bytes != settings.link_memory_bytes) {
     lit_->restart(settings);
     beginSolve();
   } else {
@@ -137,8 +138,10 @@ Result<SolveSettings> SolveLoop::applySettings(const SolveSettings& settings) {
 }
 
 void SolveLoop::reconsiderStop() {
-  if (state_ != SolveState::kConverged && state_ != SolveState::kTimeLimit) return;
+  if (state_ != SolveState::kConverged && state_ != SolveState::kTimeLimit && state_ != SolveState::kLimited) return;
   const bool reached = lit_->solver().error().total <= settings_.target_error;
+  if (state_ == SolveState::kLimited && !reached) return;
+  failure_.clear();
   const bool out_of_time = settings_.time_limit_s && seconds_ >= *settings_.time_limit_s;
   const SolveState now = reached ? SolveState::kConverged : out_of_time ? SolveState::kTimeLimit : SolveState::kSolving;
   if (now == state_) return;

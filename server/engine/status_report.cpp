@@ -10,6 +10,21 @@ double lumens(const std::array<double, 3>& flux, double scale_m) {
   return (flux[0] + flux[1] + flux[2]) * scale_m * scale_m;
 }
 
+/// Sides of surfaces that neither reflect nor shine: they receive light and never shoot.
+std::uint64_t blackSides(const LitScene& lit) {
+  std::uint64_t black = 0;
+  for (const auto& surface : lit.patches().surfaces) {
+    const auto root = scene::levelGrid(surface.width, surface.height, surface.level_count - 1).offset;
+    for (const auto first : surface.first_node) {
+      if (first == scene::kNone) continue;
+      const auto& materials = lit.materials();
+      const glm::vec3 sum = materials.emission[first + root] + materials.reflectance[first + root];
+      black += sum == glm::vec3(0.0F) ? 1 : 0;
+    }
+  }
+  return black;
+}
+
 void addCounters(const LitScene& lit, Status& status) {
   const auto& transport = lit.solver().transportCounters();
   const auto& planner = lit.solver().plannerCounters();
@@ -25,13 +40,29 @@ void addCounters(const LitScene& lit, Status& status) {
   counters["pixels"] = static_cast<double>(transport.pixels);
   counters["triangles.drawn"] = static_cast<double>(transport.triangles_drawn);
   counters["triangles.culled"] = static_cast<double>(transport.triangles_culled);
+  counters["triangles.betweenSamples"] = static_cast<double>(transport.triangles_between);
+  counters["triangles.hidden"] = static_cast<double>(transport.triangles_hidden);
+  counters["faces"] = static_cast<double>(transport.faces);
+  counters["faces.empty"] = static_cast<double>(transport.faces_empty);
   counters["triangles.dropped"] = static_cast<double>(scene.triangles_dropped + patches.triangles_dropped);
   counters["seconds.render"] = transport.render_seconds;
   counters["seconds.accumulate"] = transport.accumulate_seconds;
   counters["seconds.gather"] = transport.gather_seconds;
   counters["skip.rouletteKills"] = static_cast<double>(planner.roulette_kills);
   counters["skip.wholeSubtrees"] = static_cast<double>(planner.whole_subtrees);
-  counters["pushPulls"] = static_cast<double>(planner.push_pulls);
+  counters["skip.blackSides"] = static_cast<double>(blackSides(lit));
+  if (const auto links = lit.solver().linkCounters(); links.solutions > 0) {
+    counters["links.bytes"] = static_cast<double>(links.bytes);
+    counters["links.shooters"] = static_cast<double>(links.shooters);
+    counters["links.samples"] = static_cast<double>(links.samples);
+    counters["links.solutions"] = static_cast<double>(links.solutions);
+    counters["links.sweeps"] = static_cast<double>(links.sweeps);
+    counters["links.rows"] = static_cast<double>(links.rows);
+    counters["skip.shotsReplayed"] = static_cast<double>(links.replayed);
+    counters["skip.rowsOfChannels"] = static_cast<double>(links.rows_saved);
+  } else {
+    counters["pushPulls"] = static_cast<double>(planner.push_pulls);
+  }
 }
 
 }  // namespace

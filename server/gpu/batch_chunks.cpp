@@ -13,17 +13,23 @@ namespace {
 constexpr double kMinChunkCost = 500'000.0;  // pixels
 /// So many chunks for each worker even out the differences between them.
 constexpr double kChunksPerWorker = 8.0;
-/// Links of so many shots fit into one report.
+/// Links of so many shots fit into one report, in scenes where those of one shot are few.
 constexpr std::size_t kMaxShots = 64;
+constexpr std::size_t kMaxLinkBytes = std::size_t{16} << 20;
+
+/// A link is a float; at most every node has one.
+std::size_t maxShots(std::size_t nodes) {
+  return std::clamp<std::size_t>(kMaxLinkBytes / (sizeof(float) * std::max<std::size_t>(nodes, 1)), 1, kMaxShots);
+}
 
 template <typename Shot>
-void cut(const std::vector<Shot>& shots, ShotKind kind, double target, const solver::ShotCost& cost,
+void cut(const std::vector<Shot>& shots, ShotKind kind, double target, std::size_t most, const solver::ShotCost& cost,
          std::vector<Chunk>& chunks) {
   double sum = 0.0;
   std::size_t first = 0;
   for (std::size_t i = 0; i < shots.size(); ++i) {
     sum += cost(shots[i]);
-    if (sum < target && i + 1 < shots.size() && i + 1 - first < kMaxShots) continue;
+    if (sum < target && i + 1 < shots.size() && i + 1 - first < most) continue;
     chunks.push_back({kind, first, i + 1 - first, sum});
     first = i + 1;
     sum = 0.0;
@@ -70,8 +76,9 @@ void packGather(const solver::ShotBatch& batch, const Chunk& chunk, Packed& pack
 
 }  // namespace
 
-std::vector<Chunk> cutBatch(const solver::ShotBatch& batch, std::size_t triangles, std::size_t workers) {
-  const solver::ShotCost cost{static_cast<double>(triangles)};
+std::vector<Chunk> cutBatch(const solver::ShotBatch& batch, const SceneSize& scene, std::size_t workers) {
+  const solver::ShotCost cost{static_cast<double>(scene.triangles)};
+  const std::size_t most = maxShots(scene.nodes);
   double total = 0.0;
   for (const auto& shot : batch.scatter) total += cost(shot);
   for (const auto& shot : batch.gather) total += cost(shot);
@@ -81,10 +88,10 @@ std::vector<Chunk> cutBatch(const solver::ShotBatch& batch, std::size_t triangle
   const double share = total / static_cast<double>(workers);
   const double target = std::min(std::max(kMinChunkCost, share / kChunksPerWorker), share);
   std::vector<Chunk> chunks;
-  cut(batch.gather, ShotKind::kGather, target, cost, chunks);
-  cut(batch.parallel, ShotKind::kParallel, target, cost, chunks);
-  cut(batch.point_lights, ShotKind::kPoint, target, cost, chunks);
-  cut(batch.scatter, ShotKind::kScatter, target, cost, chunks);
+  cut(batch.gather, ShotKind::kGather, target, most, cost, chunks);
+  cut(batch.parallel, ShotKind::kParallel, target, most, cost, chunks);
+  cut(batch.point_lights, ShotKind::kPoint, target, most, cost, chunks);
+  cut(batch.scatter, ShotKind::kScatter, target, most, cost, chunks);
   return chunks;
 }
 

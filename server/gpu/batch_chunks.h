@@ -17,8 +17,14 @@ struct Chunk {
   double cost = 0.0;  ///< pixels, and what takes as long as so many
 };
 
+/// Of the scene: what decides how many shots go into a chunk.
+struct SceneSize {
+  std::size_t triangles = 0, nodes = 0;
+};
+
 /// Gather shots first: they are the longest. Cost of a shot: its pixels and, for each hemicube, the scene's triangles.
-[[nodiscard]] std::vector<Chunk> cutBatch(const solver::ShotBatch& batch, std::size_t triangles, std::size_t workers);
+/// The links of a chunk, which travel and wait for their turn, take some 16 MiB at most, or are those of one shot.
+[[nodiscard]] std::vector<Chunk> cutBatch(const solver::ShotBatch& batch, const SceneSize& scene, std::size_t workers);
 
 /// The chunk as the body of a message; `measure`: links are wanted, shot by shot.
 [[nodiscard]] std::vector<std::byte> packChunk(const solver::ShotBatch& batch, const Chunk& chunk, std::uint64_t id,

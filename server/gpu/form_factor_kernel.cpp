@@ -72,41 +72,69 @@ ClippedPolygon clipToPlane(std::span<const glm::vec3> corners, const glm::vec3& 
   return clipped;
 }
 
+namespace {
+
+/// The number of corners is a constant in each loop, so that the loop over receivers vectorises.
+template <typename Loop>
+[[gnu::always_inline]] inline void withCorners(std::size_t count, const Loop& loop) {
+  switch (count) {
+    case 3:
+      return loop(std::integral_constant<std::size_t, 3>());
+    case 4:
+      return loop(std::integral_constant<std::size_t, 4>());
+    case 5:
+      return loop(std::integral_constant<std::size_t, 5>());
+    case 6:
+      return loop(std::integral_constant<std::size_t, 6>());
+    case 7:
+      return loop(std::integral_constant<std::size_t, 7>());
+    case 8:
+      return loop(std::integral_constant<std::size_t, 8>());
+    default:
+      return loop(std::integral_constant<std::size_t, 9>());
+  }
+}
+
+struct Corners {
+  float x[9] = {}, y[9] = {}, z[9] = {};
+
+  explicit Corners(std::span<const glm::vec3> corners) {
+    for (std::size_t k = 0; k < corners.size(); ++k) {
+      x[k] = corners[k].x;
+      y[k] = corners[k].y;
+      z[k] = corners[k].z;
+    }
+  }
+};
+
+}  // namespace
+
 // One clone for processors with 256-bit vectors. No fused multiply-add in either, so both give the same bits.
 __attribute__((target_clones("avx2", "default"))) void planarFormFactors(const ClippedPolygon& polygon,
                                                                          const glm::vec3& normal, const float* x,
                                                                          const float* y, const float* z,
                                                                          std::size_t count, float* form_factor) {
-  float cx[9] = {}, cy[9] = {}, cz[9] = {};
-  for (std::size_t k = 0; k < polygon.count; ++k) {
-    cx[k] = polygon.corner[k].x;
-    cy[k] = polygon.corner[k].y;
-    cz[k] = polygon.corner[k].z;
-  }
+  const Corners c(std::span(polygon.corner.data(), polygon.count));
   const float nx = normal.x, ny = normal.y, nz = normal.z;
-  // The number of corners is a constant in each loop, so that the loop over receivers vectorises.
-  const auto all = [&]<std::size_t kCorners>(std::integral_constant<std::size_t, kCorners>)
-      __attribute__((always_inline)) {
-    for (std::size_t i = 0; i < count; ++i) {
-      form_factor[i] = lambertSum<kCorners>(cx, cy, cz, nx, ny, nz, x[i], y[i], z[i]);
-    }
-  };
-  switch (polygon.count) {
-    case 3:
-      return all(std::integral_constant<std::size_t, 3>());
-    case 4:
-      return all(std::integral_constant<std::size_t, 4>());
-    case 5:
-      return all(std::integral_constant<std::size_t, 5>());
-    case 6:
-      return all(std::integral_constant<std::size_t, 6>());
-    case 7:
-      return all(std::integral_constant<std::size_t, 7>());
-    case 8:
-      return all(std::integral_constant<std::size_t, 8>());
-    default:
-      return all(std::integral_constant<std::size_t, 9>());
-  }
+  withCorners(
+      polygon.count, [&]<std::size_t kCorners>(std::integral_constant<std::size_t, kCorners>)
+                         __attribute__((always_inline)) {
+                           for (std::size_t i = 0; i < count; ++i)
+                             form_factor[i] = lambertSum<kCorners>(c.x, c.y, c.z, nx, ny, nz, x[i], y[i], z[i]);
+                         });
+}
+
+__attribute__((target_clones("avx2", "default"))) void wholeFormFactors(std::span<const glm::vec3> corners,
+                                                                        const FormFactorPoints& points,
+                                                                        std::size_t count, float* form_factor) {
+  const Corners c(corners);
+  const auto [x, y, z, nx, ny, nz] = points;
+  withCorners(
+      corners.size(), [&, x = x, y = y, z = z, nx = nx, ny = ny, nz = nz ]<std::size_t kCorners>(
+                          std::integral_constant<std::size_t, kCorners>) __attribute__((always_inline)) {
+        for (std::size_t i = 0; i < count; ++i)
+          form_factor[i] = lambertSum<kCorners>(c.x, c.y, c.z, nx[i], ny[i], nz[i], x[i], y[i], z[i]);
+      });
 }
 
 }  // namespace radiosity::gpu

@@ -24,4 +24,13 @@ struct ClippedPolygon {
 void planarFormFactors(const ClippedPolygon& polygon, const glm::vec3& normal, const float* x, const float* y,
                        const float* z, std::size_t count, float* form_factor);
 
+/// Points with normals, as arrays of equal length.
+struct FormFactorPoints {
+  const float *x, *y, *z, *nx, *ny, *nz;
+};
+
+/// The same for points of any normals, in front of whose planes all of the polygon lies (3 to 9 corners).
+void wholeFormFactors(std::span<const glm::vec3> corners, const FormFactorPoints& points, std::size_t count,
+                      float* form_factor);
+
 }  // namespace radiosity::gpu

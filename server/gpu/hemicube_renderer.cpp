@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <tuple>
 
 #include "common/check.h"
 
@@ -14,6 +15,8 @@ namespace {
 constexpr std::size_t kSoftwareAtlasPixels = std::size_t{1} << 16U;
 constexpr std::size_t kGpuAtlasPixels = std::size_t{1} << 24U;
 constexpr std::size_t kMaxLayers = 256;
+/// Reading the depth of a view takes about as long as drawing so many triangles.
+constexpr std::size_t kWorthASecondLook = 256;
 
 }  // namespace
 
@@ -44,13 +47,13 @@ Result<HemicubeRenderer> HemicubeRenderer::create(const EglContext& context) {
   return renderer;
 }
 
-Result<void> HemicubeRenderer::setScene(GpuScene scene) {
+Result<void> HemicubeRenderer::setScene(GpuScene scene, const Culling& culling) {
   if (scene.seeThrough() && !see_through_) {
     auto programs = buildPrograms(*context_, {kSeeThrough});
     if (!programs) return tl::unexpected(programs.error());
     see_through_ = std::move(*programs);
   }
-  culler_ = TriangleCuller(scene.patches());
+  culler_ = TriangleCuller(scene.patches(), culling);
   scene_ = std::move(scene);
   paper_ids_.reset();
   return {};
@@ -99,26 +102,67 @@ HemicubeRenderer::Target& HemicubeRenderer::target(std::uint32_t resolution) {
   return targets_.emplace(resolution, std::move(made)).first->second;
 }
 
-void HemicubeRenderer::collect(std::uint32_t resolution, std::span<const HemicubeView> views,
-                               solver::TransportCounters& counters) {
+std::size_t HemicubeRenderer::select(std::uint32_t resolution, std::span<const HemicubeView> views,
+                                     solver::TransportCounters& counters) {
   face_views_.clear();
-  indices_.clear();
-  commands_.clear();
+  selections_.resize(std::max(selections_.size(), views.size()));
+  std::size_t waiting = 0;
   for (std::size_t i = 0; i < views.size(); ++i) {
     const auto faces = faceViews(views[i].frame, resolution, views[i].level_bias, static_cast<std::uint32_t>(i));
     face_views_.insert(face_views_.end(), faces.begin(), faces.end());
-    auto first = static_cast<std::uint32_t>(indices_.size());
-    const auto counts = culler_.cull(hemicubeAxes(views[i].frame), indices_);
-    for (std::uint32_t face = 0; face < RAD_FACES; ++face) {
-      const auto view = static_cast<std::uint32_t>(i) * RAD_FACES + face;
-      for (const auto count : {counts[face].inside, counts[face].crossing}) {
-        if (count > 0) commands_.push_back({count, 1, first, 0, view});
-        first += count;
-        counters.triangles_drawn += count / 3;
-      }
-      counters.triangles_culled += culler_.triangleCount() - (counts[face].inside + counts[face].crossing) / 3;
+    culler_.select(views[i].frame, resolution, selections_[i]);
+    counters.triangles_between += selections_[i].between;
+    counters.triangles_culled += RAD_FACES * culler_.triangleCount();
+    for (const auto& list : selections_[i].second) waiting += list.count / 3;
+    counters.faces += RAD_FACES;
+    for (std::size_t l = 0; l < 2 * RAD_FACES; l += 2) {
+      const auto& [first, second] = std::tie(selections_[i].first, selections_[i].second);
+      const auto count = first[l].count + first[l + 1].count + second[l].count + second[l + 1].count;
+      counters.faces_empty += count == 0 ? 1 : 0;
     }
   }
+  return waiting;
+}
+
+/// Triangles that are drawn were counted as culled.
+void HemicubeRenderer::draw(TriangleCuller::Lists TriangleCuller::Selection::*lists, std::size_t views,
+                            solver::TransportCounters& counters) {
+  indices_.clear();
+  commands_.clear();
+  for (std::size_t i = 0; i < views; ++i) {
+    for (std::size_t l = 0; l < (selections_[i].*lists).size(); ++l) {
+      const auto indices = (selections_[i].*lists)[l].valid();
+      if (indices.empty()) continue;
+      commands_.push_back({static_cast<std::uint32_t>(indices.size()), 1, static_cast<std::uint32_t>(indices_.size()),
+                           0, static_cast<std::uint32_t>(i * RAD_FACES + l / 2)});
+      indices_.insert(indices_.end(), indices.begin(), indices.end());
+    }
+  }
+  if (commands_.empty()) return;
+  counters.triangles_drawn += indices_.size() / 3;
+  counters.triangles_culled -= indices_.size() / 3;
+  fill(indices_buffer_, std::span<const std::uint32_t>(indices_), GL_STREAM_DRAW);
+  fill(commands_buffer_, std::span<const DrawCommand>(commands_), GL_STREAM_DRAW);
+  glMultiDrawElementsIndirect(GL_TRIANGLES, GL_UNSIGNED_INT, nullptr, static_cast<GLsizei>(commands_.size()), 0);
+}
+
+void HemicubeRenderer::takeHidden(std::uint32_t resolution, std::span<const HemicubeView> views, const Target& target,
+                                  solver::TransportCounters& counters) {
+  read(target.depth, resolution, views.size(), GL_DEPTH_COMPONENT, GL_FLOAT, depth_);
+  const auto pixels = hemicubePixels(resolution);
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    counters.triangles_hidden += culler_.takeHidden(
+        views[i].frame, resolution, std::span<const float>(depth_).subspan(i * pixels, pixels), selections_[i]);
+  }
+}
+
+template <typename T>
+void HemicubeRenderer::read(const Texture& from, std::uint32_t resolution, std::size_t views, unsigned format,
+                            unsigned type, std::vector<T>& into) {
+  into.resize(views * hemicubePixels(resolution));
+  glGetTextureSubImage(from.name(), 0, 0, 0, 0, static_cast<GLsizei>(resolution), static_cast<GLsizei>(3 * resolution),
+                       static_cast<GLsizei>(views), format, type, static_cast<GLsizei>(into.size() * sizeof(T)),
+                       into.data());
 }
 
 void HemicubeRenderer::setState(HemicubePass pass, std::uint32_t resolution, const Target& target) {
@@ -171,24 +215,19 @@ std::span<const std::uint32_t> HemicubeRenderer::render(HemicubePass pass, std::
   const auto start = std::chrono::steady_clock::now();
   context_->makeCurrent();
   auto& into = target(resolution);
-  collect(resolution, views, counters);
+  const auto waiting = select(resolution, views, counters);
   fill(views_buffer_, std::span<const FaceView>(face_views_), GL_STREAM_DRAW);
-  fill(indices_buffer_, std::span<const std::uint32_t>(indices_), GL_STREAM_DRAW);
-  fill(commands_buffer_, std::span<const DrawCommand>(commands_), GL_STREAM_DRAW);
 
   setState(pass, resolution, into);
   const GLuint background = pass == HemicubePass::kNodes ? scene_->escapedId() : RAD_ITEM_NONE;
   const float far_depth = 0.0F;
   glClearNamedFramebufferuiv(into.framebuffer.name(), GL_COLOR, 0, &background);
   glClearNamedFramebufferfv(into.framebuffer.name(), GL_DEPTH, 0, &far_depth);
-  if (!commands_.empty()) {
-    glMultiDrawElementsIndirect(GL_TRIANGLES, GL_UNSIGNED_INT, nullptr, static_cast<GLsizei>(commands_.size()), 0);
-  }
+  draw(&TriangleCuller::Selection::first, views.size(), counters);
+  if (waiting >= kWorthASecondLook * views.size()) takeHidden(resolution, views, into, counters);
+  draw(&TriangleCuller::Selection::second, views.size(), counters);
 
-  pixels_.resize(views.size() * hemicubePixels(resolution));
-  glGetTextureSubImage(into.ids.name(), 0, 0, 0, 0, static_cast<GLsizei>(resolution),
-                       static_cast<GLsizei>(3 * resolution), static_cast<GLsizei>(views.size()), GL_RED_INTEGER,
-                       GL_UNSIGNED_INT, static_cast<GLsizei>(pixels_.size() * sizeof(std::uint32_t)), pixels_.data());
+  read(into.ids, resolution, views.size(), GL_RED_INTEGER, GL_UNSIGNED_INT, pixels_);
   if (pass == HemicubePass::kPaper) paper_ids_->decode(pixels_, scene_->escapedId());
   counters.pixels += pixels_.size();
   counters.render_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

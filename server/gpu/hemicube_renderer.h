@@ -2,7 +2,8 @@
 // context and its thread.
 //
 // Each shooter has its own layer, with its faces always in the same place, so that its pixels are the same whatever
-// else is rendered with it.
+// else is rendered with it. Large scenes are drawn in two steps, the second without what the first hides (see
+// triangle_culler.h).
 #pragma once
 
 #include <map>
@@ -35,7 +36,7 @@ class HemicubeRenderer {
   [[nodiscard]] static Result<HemicubeRenderer> create(const EglContext& context);
 
   /// Fails when the driver does not compile the variant for scenes that one can see through.
-  [[nodiscard]] Result<void> setScene(GpuScene scene);
+  [[nodiscard]] Result<void> setScene(GpuScene scene, const Culling& culling = {});
   /// Makes the ID texture, once a scene; must come before HemicubePass::kPaper.
   [[nodiscard]] Result<void> preparePaper();
   [[nodiscard]] const GpuScene& scene() const { return *scene_; }
@@ -60,9 +61,18 @@ class HemicubeRenderer {
 
   explicit HemicubeRenderer(const EglContext& context) : context_(&context) {}
   Target& target(std::uint32_t resolution);
-  void collect(std::uint32_t resolution, std::span<const HemicubeView> views, solver::TransportCounters& counters);
+  /// Returns the number of triangles that wait for a second step.
+  std::size_t select(std::uint32_t resolution, std::span<const HemicubeView> views,
+                     solver::TransportCounters& counters);
+  void takeHidden(std::uint32_t resolution, std::span<const HemicubeView> views, const Target& target,
+                  solver::TransportCounters& counters);
+  void draw(TriangleCuller::Lists TriangleCuller::Selection::*lists, std::size_t views,
+            solver::TransportCounters& counters);
   void useProgram(HemicubePass pass) const;
   void setState(HemicubePass pass, std::uint32_t resolution, const Target& target);
+  template <typename T>
+  void read(const Texture& from, std::uint32_t resolution, std::size_t views, unsigned format, unsigned type,
+            std::vector<T>& into);
 
   const EglContext* context_;
   std::optional<GpuScene> scene_;
@@ -78,9 +88,11 @@ class HemicubeRenderer {
   Buffer views_buffer_, indices_buffer_, commands_buffer_;
   std::map<std::uint32_t, Target> targets_;  ///< by resolution
   std::vector<FaceView> face_views_;
+  std::vector<TriangleCuller::Selection> selections_;  ///< by view
   std::vector<std::uint32_t> indices_;
   std::vector<DrawCommand> commands_;
   std::vector<std::uint32_t> pixels_;
+  std::vector<float> depth_;
 };
 
 }  // namespace radiosity::gpu

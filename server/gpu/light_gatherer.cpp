@@ -65,6 +65,17 @@ __attribute__((target_clones("avx2", "default"))) void projectReceivers(const Po
   }
 }
 
+/// Least and greatest height of a polygon above a plane.
+std::array<float, 2> heights(std::span<const glm::vec3> corners, const glm::vec3& point, const glm::vec3& normal) {
+  float low = 1e30F, high = -1e30F;
+  for (const auto& corner : corners) {
+    const float height = glm::dot(corner - point, normal);
+    low = std::min(low, height);
+    high = std::max(high, height);
+  }
+  return {low, high};
+}
+
 bool sameGeometry(const solver::GatherShot& a, const solver::GatherShot& b) {
   return a.corners == b.corners && a.corner_count == b.corner_count && a.normal == b.normal &&
          a.receiver_jitter == b.receiver_jitter && a.all_spots == b.all_spots && a.fill == b.fill;
@@ -103,12 +114,34 @@ bool LightGatherer::behind(const solver::GatherShot& shot, const scene::Surface&
 
 void LightGatherer::findLit(const solver::GatherShot& shot) {
   if (lit_valid_ && sameGeometry(shot, lit_for_)) return;
-  lit_count_ = 0;
+  lit_count_ = weighed_ = 0;
   for (const auto& group : receivers_->groups()) {
     if (!behind(shot, receivers_->patches().surfaces[group.surface])) findLitGroup(shot, group);
   }
+  weighWhole(shot);
   lit_for_ = shot;
   lit_valid_ = true;
+}
+
+/// Form factors of the receivers that wait for theirs: groups in a row that see all of the polygon are weighed at once,
+/// since many scenes have thousands of groups of one or two.
+void LightGatherer::weighWhole(const solver::GatherShot& shot) {
+  const std::size_t k = weighed_;
+  wholeFormFactors(std::span(shot.corners.data(), shot.corner_count),
+                   {lit_.x.data() + k, lit_.y.data() + k, lit_.z.data() + k, lit_.nx.data() + k, lit_.ny.data() + k,
+                    lit_.nz.data() + k},
+                   lit_count_ - k, lit_.form_factor.data() + k);
+  for (auto i = k; i < lit_count_ && shot.fill < 1.0F; ++i) lit_.form_factor[i] *= shot.fill;
+  shareAmongSpots(shot, k);
+  weighed_ = lit_count_;
+}
+
+/// A receiver of several places is the mean of them; of those lit from `begin` on.
+void LightGatherer::shareAmongSpots(const solver::GatherShot& shot, std::size_t begin) {
+  for (std::size_t k = begin; k < lit_count_; ++k) {
+    const auto spots = spotsOf(shot, receivers_->all()[lit_.receiver[k]]);
+    if (spots > 1) lit_.form_factor[k] /= static_cast<float>(spots);
+  }
 }
 
 void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers::Group& group) {
@@ -117,10 +150,15 @@ void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers
   const auto plane_normal = group.side * plane.normal;
   const std::span corners(shot.corners.data(), shot.corner_count);
   ClippedPolygon polygon;
+  bool whole = false;
   if (surface.planar) {
-    polygon = clipToPlane(corners, plane.origin, plane_normal);
-    if (polygon.count == 0) return;
+    const auto [low, high] = heights(corners, plane.origin, plane_normal);
+    if (high < -kInPlane) return;
+    whole = low > kInPlane;
+    if (!whole) polygon = clipToPlane(corners, plane.origin, plane_normal);
+    if (!whole && polygon.count == 0) return;
   }
+  if (!whole) weighWhole(shot);
   const std::size_t begin = lit_count_;
   for (std::size_t i = group.first; i < group.first + group.count; ++i) {
     const auto& receiver = receivers_->all()[i];
@@ -140,6 +178,8 @@ void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers
       addLit(i, place, normal);
     }
   }
+  if (whole) return;
+  weighed_ = lit_count_;
   if (surface.planar) {
     planarFormFactors(polygon, plane_normal, &lit_.x[begin], &lit_.y[begin], &lit_.z[begin], lit_count_ - begin,
                       &lit_.form_factor[begin]);
@@ -149,10 +189,7 @@ void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers
       for (std::size_t k = begin; k < lit_count_; ++k) lit_.form_factor[k] *= shining;
     }
   }
-  for (std::size_t k = begin; k < lit_count_; ++k) {
-    const auto spots = spotsOf(shot, receivers_->all()[lit_.receiver[k]]);
-    if (spots > 1) lit_.form_factor[k] /= static_cast<float>(spots);
-  }
+  shareAmongSpots(shot, begin);
 }
 
 void LightGatherer::addLit(std::size_t receiver, const Receivers::Place& place, const glm::vec3& normal) {

@@ -53,6 +53,8 @@ class LightGatherer {
 
   void findLit(const solver::GatherShot& shot);
   void findLitGroup(const solver::GatherShot& shot, const Receivers::Group& group);
+  void weighWhole(const solver::GatherShot& shot);
+  void shareAmongSpots(const solver::GatherShot& shot, std::size_t begin);
   [[nodiscard]] bool behind(const solver::GatherShot& shot, const scene::Surface& surface) const;
   void testPoint(const solver::GatherShot& shot, const solver::HemicubeFrame& point,
                  std::span<const std::uint32_t> items, std::size_t half);
@@ -70,7 +72,8 @@ class LightGatherer {
   bool lit_valid_ = false;
   Lit lit_;
   std::size_t lit_count_ = 0;
-  Lost look_lost_;  ///< of the looks since beginLinks
+  std::size_t weighed_ = 0;  ///< of those lit: the others wait for their form factors
+  Lost look_lost_;           ///< of the looks since beginLinks
   std::size_t look_count_ = 0;
   std::vector<std::uint32_t> starts_;
 };

@@ -5,7 +5,6 @@
 #include <glm/geometric.hpp>
 
 #include "common/check.h"
-#include "server/gpu/hemicube_views.h"
 
 namespace radiosity::gpu {
 namespace {
@@ -22,7 +21,8 @@ Result<ParallelRenderer> ParallelRenderer::create(const EglContext& context) {
   auto program = buildProgram(context, "hemicube.vert", "hemicube_items.frag", {"PARALLEL"});
   if (!program) return tl::unexpected(program.error());
   renderer.program_ = std::move(*program);
-  renderer.indices_buffer_ = Buffer(context, "all triangles");
+  renderer.indices_buffer_ = Buffer(context, "triangles of parallel views");
+  renderer.commands_buffer_ = Buffer(context, "draw commands of parallel views");
   renderer.views_buffer_ = Buffer(context, "parallel views");
   return renderer;
 }
@@ -33,10 +33,7 @@ Result<void> ParallelRenderer::setScene(const GpuScene& scene) {
     if (!program) return tl::unexpected(program.error());
     see_through_ = std::move(*program);
   }
-  context_->makeCurrent();
-  const auto& indices = scene.patches().indices;
-  fill(indices_buffer_, std::span<const std::uint32_t>(indices), GL_STATIC_DRAW);
-  index_count_ = indices.size();
+  culler_ = ParallelCuller(scene.patches());
   const auto box = solver::sceneBox(scene.patches());
   centre_ = 0.5F * (box[0] + box[1]);
   radius_ = std::max(0.5F * glm::length(box[1] - box[0]), 1.0e-6F);
@@ -73,6 +70,29 @@ ParallelRenderer::Target& ParallelRenderer::target(std::uint32_t resolution) {
   return targets_.emplace(resolution, std::move(made)).first->second;
 }
 
+/// What each view draws, and how it looks at the scene.
+void ParallelRenderer::select(std::uint32_t resolution, std::span<const solver::ParallelView> views,
+                              solver::TransportCounters& counters) {
+  faces_.clear();
+  indices_.clear();
+  commands_.clear();
+  for (std::uint32_t i = 0; i < views.size(); ++i) {
+    const auto a = axes(views[i], resolution);
+    const float to_clip = 2.0F / static_cast<float>(resolution);
+    const auto shift = to_clip * a.shift - 1.0F;
+    faces_.push_back({{to_clip * a.right, shift.x},
+                      {to_clip * a.up, shift.y},
+                      {views[i].direction / (2.1F * radius_), static_cast<float>(i)},
+                      {a.centre, 0.0F}});
+    const auto first = static_cast<std::uint32_t>(indices_.size());
+    culler_.select(a, views[i].direction, indices_);
+    const auto count = static_cast<std::uint32_t>(indices_.size()) - first;
+    if (count > 0) commands_.push_back({count, 1, first, 0, i});
+    counters.triangles_drawn += count / 3;
+    counters.triangles_culled += culler_.triangleCount() - count / 3;
+  }
+}
+
 std::span<const std::uint32_t> ParallelRenderer::render(const GpuScene& scene, std::uint32_t resolution,
                                                         std::span<const solver::ParallelView> views,
                                                         solver::TransportCounters& counters) {
@@ -80,17 +100,10 @@ std::span<const std::uint32_t> ParallelRenderer::render(const GpuScene& scene, s
   const auto start = std::chrono::steady_clock::now();
   context_->makeCurrent();
   auto& into = target(resolution);
-  std::vector<FaceView> faces;
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    const auto a = axes(views[i], resolution);
-    const float to_clip = 2.0F / static_cast<float>(resolution);
-    const auto shift = to_clip * a.shift - 1.0F;
-    faces.push_back({{to_clip * a.right, shift.x},
-                     {to_clip * a.up, shift.y},
-                     {views[i].direction / (2.1F * radius_), static_cast<float>(i)},
-                     {a.centre, 0.0F}});
-  }
-  fill(views_buffer_, std::span<const FaceView>(faces), GL_STREAM_DRAW);
+  select(resolution, views, counters);
+  fill(views_buffer_, std::span<const FaceView>(faces_), GL_STREAM_DRAW);
+  fill(indices_buffer_, std::span<const std::uint32_t>(indices_), GL_STREAM_DRAW);
+  fill(commands_buffer_, std::span<const DrawCommand>(commands_), GL_STREAM_DRAW);
   glViewport(0, 0, static_cast<GLsizei>(resolution), static_cast<GLsizei>(resolution));
   glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
   glEnable(GL_DEPTH_TEST);
@@ -109,16 +122,14 @@ std::span<const std::uint32_t> ParallelRenderer::render(const GpuScene& scene, s
   const float far_depth = 0.0F;
   glClearNamedFramebufferuiv(into.framebuffer.name(), GL_COLOR, 0, &background);
   glClearNamedFramebufferfv(into.framebuffer.name(), GL_DEPTH, 0, &far_depth);
-  if (index_count_ > 0) {
-    glDrawElementsInstanced(GL_TRIANGLES, static_cast<GLsizei>(index_count_), GL_UNSIGNED_INT, nullptr,
-                            static_cast<GLsizei>(views.size()));
-  }
+  glBindBuffer(GL_DRAW_INDIRECT_BUFFER, commands_buffer_.name());
+  if (!commands_.empty())
+    glMultiDrawElementsIndirect(GL_TRIANGLES, GL_UNSIGNED_INT, nullptr, static_cast<GLsizei>(commands_.size()), 0);
   pixels_.resize(views.size() * resolution * resolution);
   glGetTextureSubImage(into.ids.name(), 0, 0, 0, 0, static_cast<GLsizei>(resolution), static_cast<GLsizei>(resolution),
                        static_cast<GLsizei>(views.size()), GL_RED_INTEGER, GL_UNSIGNED_INT,
                        static_cast<GLsizei>(pixels_.size() * sizeof(std::uint32_t)), pixels_.data());
   counters.pixels += pixels_.size();
-  counters.triangles_drawn += index_count_ / 3 * views.size();
   counters.render_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return pixels_;
 }

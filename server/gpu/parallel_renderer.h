@@ -10,16 +10,11 @@
 
 #include "server/gpu/gl_objects.h"
 #include "server/gpu/gpu_scene.h"
+#include "server/gpu/hemicube_views.h"
+#include "server/gpu/parallel_culler.h"
 #include "server/solver/transport.h"
 
 namespace radiosity::gpu {
-
-/// Unit box to the image of one view: pixel = floor(across (p - centre) + shift), in columns and rows.
-struct ParallelAxes {
-  glm::vec3 centre, right, up;  ///< right and up: pixels for each unit
-  glm::vec2 shift;
-  double pixel_area;  ///< unit^2
-};
 
 class ParallelRenderer {
  public:
@@ -44,14 +39,25 @@ class ParallelRenderer {
     Framebuffer framebuffer;
   };
 
+  struct DrawCommand {  // as glMultiDrawElementsIndirect reads it
+    std::uint32_t count, instance_count, first_index;
+    std::int32_t base_vertex;
+    std::uint32_t base_instance;
+  };
+
   explicit ParallelRenderer(const EglContext& context) : context_(&context) {}
+  void select(std::uint32_t resolution, std::span<const solver::ParallelView> views,
+              solver::TransportCounters& counters);
   Target& target(std::uint32_t resolution);
 
   const EglContext* context_;
   Program program_;
   std::optional<Program> see_through_;  ///< made for the first scene that needs it
-  Buffer indices_buffer_, views_buffer_;
-  std::size_t index_count_ = 0;
+  Buffer indices_buffer_, views_buffer_, commands_buffer_;
+  ParallelCuller culler_;
+  std::vector<FaceView> faces_;
+  std::vector<std::uint32_t> indices_;
+  std::vector<DrawCommand> commands_;
   glm::vec3 centre_{0.0F};
   float radius_ = 1.0F;
   std::map<std::uint32_t, Target> targets_;  ///< by resolution

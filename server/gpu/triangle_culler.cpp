@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <bit>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
 
 namespace radiosity::gpu {
@@ -10,112 +12,253 @@ namespace {
 /// Heights above the shooter's plane that are taken for the plane itself: rounding puts neighbours in the same plane up
 /// to 1e-7 above it, where they would cover everything.
 constexpr float kCoplanar = 1.0e-6F;
-
 /// The shooter must be this far (unit box) outside a solid's bounds to count as outside.
 constexpr float kOutside = 1.0e-6F;
-constexpr int kBackBit = 7;
+/// Fewer make more boxes to look at, more make larger ones.
+constexpr std::uint32_t kClusterTriangles = 64;
+/// Below so many triangles of a scene nothing is gained by drawing in two steps.
+constexpr std::size_t kManyTriangles = 2048;
+/// Triangles of at least this solid angle, about, are drawn first: 12 pixels of a hemicube of N = 64. So are clusters
+/// nearer than their own size.
+constexpr float kLargeSteradian = 0.006F;
+/// Half a pixel's part by which rasterisers may move corners (OpenGL asks for 4 bits of subpixel precision), and more.
+constexpr float kSampleMargin = 0.0625F;
 
-struct Corners {
-  const float* x;
-  const float* y;
-  const float* z;
+constexpr std::uint32_t kFaces = 0x1FU;  // bit f: face f may see it
+constexpr int kBackBit = 7;              // it shows its back
+constexpr int kInsideBit = 8;            // bit 8 + f: it lies wholly inside face f's pyramid
+constexpr int kLargeBit = 16;
+constexpr int kBetweenBit = 17;  // lies inside and between the sample points
+
+/// What the kernel reads of a cluster's triangles.
+struct Triangles {
+  std::array<std::array<const float*, 3>, 3> corner;
+  std::array<const float*, 4> plane;
+  const float* area;
 };
 
-std::uint16_t bit(bool set, int place) { return static_cast<std::uint16_t>(static_cast<int>(set) << place); }
+struct View {
+  HemicubeAxes axes;
+  float half, shift_x, shift_y;  ///< N / 2; of the lattice, pixels
+};
 
-/// A face's pyramid is cut by planes through the origin; a triangle is out when all corners lie outside one of them.
-void classify(const HemicubeAxes& axes, const std::array<Corners, 3>& corners, const std::array<const float*, 4>& plane,
-              std::size_t count, std::uint16_t* __restrict faces) {
-  const auto [o, t, b, n] = axes;
-  for (std::size_t i = 0; i < count; ++i) {
+View viewOf(const solver::HemicubeFrame& frame, std::uint32_t resolution) {
+  const auto [across, up] = latticePhase(frame.lattice);
+  return {hemicubeAxes(frame), 0.5F * static_cast<float>(resolution), static_cast<float>(0.5 - across),
+          static_cast<float>(0.5 - up)};
+}
+
+// By value and without initializer lists, so that the loop below vectorises.
+inline float smaller(float a, float b) { return a < b ? a : b; }
+inline float larger(float a, float b) { return a > b ? a : b; }
+inline float smallest(float a, float b, float c) { return smaller(smaller(a, b), c); }
+inline float largest(float a, float b, float c) { return larger(larger(a, b), c); }
+
+inline std::uint32_t bit(bool set, int place) { return static_cast<std::uint32_t>(static_cast<int>(set) << place); }
+
+/// Smallest and largest of z -+ x, z -+ y, x -+ y over what is looked at, which place it among the planes between the
+/// faces, and the greatest and smallest height.
+struct Spans {
+  float zx_low, zx_high, zpx_low, zpx_high, zy_low, zy_high, zpy_low, zpy_high, xy_low, xy_high, xpy_low, xpy_high;
+  float z_low, z_high;
+};
+
+/// A face's pyramid is cut by planes through the origin; something is out when all of it lies outside one of them.
+inline std::uint32_t facesOf(const Spans& s) {
+  const bool above = s.z_high > kCoplanar;
+  const bool top = above & (s.zx_high > 0) & (s.zpx_high > 0) & (s.zy_high > 0) & (s.zpy_high > 0);
+  const bool px = above & (s.zx_low < 0) & (s.xy_high > 0) & (s.xpy_high > 0);
+  const bool mx = above & (s.zpx_low < 0) & (s.xpy_low < 0) & (s.xy_low < 0);
+  const bool py = above & (s.zy_low < 0) & (s.xy_low < 0) & (s.xpy_high > 0);
+  const bool my = above & (s.zpy_low < 0) & (s.xpy_low < 0) & (s.xy_high > 0);
+  return bit(top, 0) | bit(px, 1) | bit(mx, 2) | bit(py, 3) | bit(my, 4);
+}
+
+__attribute__((target_clones("avx2", "default"))) void classify(const View& view, const Triangles& from,
+                                                                std::size_t first, std::size_t end,
+                                                                std::uint32_t* __restrict seen) {
+  const auto [o, t, b, n] = view.axes;
+  for (std::size_t i = first; i < end; ++i) {
     float x[3], y[3], z[3];
-    for (int c = 0; c < 3; ++c) {
-      const float dx = corners[c].x[i] - o.x;
-      const float dy = corners[c].y[i] - o.y;
-      const float dz = corners[c].z[i] - o.z;
+    float nearest = 1e30F;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const float dx = from.corner[c][0][i] - o.x;
+      const float dy = from.corner[c][1][i] - o.y;
+      const float dz = from.corner[c][2][i] - o.z;
       x[c] = dx * t.x + dy * t.y + dz * t.z;
       y[c] = dx * b.x + dy * b.y + dz * b.z;
       z[c] = dx * n.x + dy * n.y + dz * n.z;
+      nearest = smaller(nearest, dx * dx + dy * dy + dz * dz);
     }
     const auto low = [](const float(&v)[3], const float(&w)[3], float s) {
-      return std::min({v[0] + s * w[0], v[1] + s * w[1], v[2] + s * w[2]});
+      return smallest(v[0] + s * w[0], v[1] + s * w[1], v[2] + s * w[2]);
     };
     const auto high = [](const float(&v)[3], const float(&w)[3], float s) {
-      return std::max({v[0] + s * w[0], v[1] + s * w[1], v[2] + s * w[2]});
+      return largest(v[0] + s * w[0], v[1] + s * w[1], v[2] + s * w[2]);
     };
-    const bool above = std::max({z[0], z[1], z[2]}) > kCoplanar;
-    // highest and lowest of z -+ x, z -+ y, x -+ y over the corners
-    const float zx_high = high(z, x, -1), zx_low = low(z, x, -1), zpx_high = high(z, x, 1), zpx_low = low(z, x, 1);
-    const float zy_high = high(z, y, -1), zy_low = low(z, y, -1), zpy_high = high(z, y, 1), zpy_low = low(z, y, 1);
-    const float xy_high = high(x, y, -1), xy_low = low(x, y, -1), xpy_high = high(x, y, 1), xpy_low = low(x, y, 1);
-    const bool top = above & (zx_high > 0) & (zpx_high > 0) & (zy_high > 0) & (zpy_high > 0);
-    const bool px = above & (zx_low < 0) & (xy_high > 0) & (xpy_high > 0);
-    const bool mx = above & (zpx_low < 0) & (xpy_low < 0) & (xy_low < 0);
-    const bool py = above & (zy_low < 0) & (xy_low < 0) & (xpy_high > 0);
-    const bool my = above & (zpy_low < 0) & (xpy_low < 0) & (xy_high > 0);
-    const bool risen = std::min({z[0], z[1], z[2]}) > 0;
-    const bool top_in = top & (zx_low > 0) & (zpx_low > 0) & (zy_low > 0) & (zpy_low > 0);
-    const bool px_in = px & risen & (zx_high < 0) & (xy_low > 0) & (xpy_low > 0);
-    const bool mx_in = mx & risen & (zpx_high < 0) & (xpy_high < 0) & (xy_high < 0);
-    const bool py_in = py & risen & (zy_high < 0) & (xy_high < 0) & (xpy_low > 0);
-    const bool my_in = my & risen & (zpy_high < 0) & (xpy_high < 0) & (xy_low > 0);
-    const bool back = plane[0][i] * o.x + plane[1][i] * o.y + plane[2][i] * o.z < plane[3][i];
-    faces[i] = static_cast<std::uint16_t>(bit(back, kBackBit) | bit(top, 0) | bit(px, 1) | bit(mx, 2) | bit(py, 3) |
-                                          bit(my, 4) | bit(top_in, 8) | bit(px_in, 9) | bit(mx_in, 10) |
-                                          bit(py_in, 11) | bit(my_in, 12));
+    const Spans s{low(z, x, -1),
+                  high(z, x, -1),
+                  low(z, x, 1),
+                  high(z, x, 1),
+                  low(z, y, -1),
+                  high(z, y, -1),
+                  low(z, y, 1),
+                  high(z, y, 1),
+                  low(x, y, -1),
+                  high(x, y, -1),
+                  low(x, y, 1),
+                  high(x, y, 1),
+                  smallest(z[0], z[1], z[2]),
+                  largest(z[0], z[1], z[2])};
+    const std::uint32_t faces = facesOf(s);
+    const bool risen = s.z_low > 0;
+    const bool top_in = risen & (s.zx_low > 0) & (s.zpx_low > 0) & (s.zy_low > 0) & (s.zpy_low > 0);
+    const bool px_in = risen & (s.zx_high < 0) & (s.xy_low > 0) & (s.xpy_low > 0);
+    const bool mx_in = risen & (s.zpx_high < 0) & (s.xpy_high < 0) & (s.xy_high < 0);
+    const bool py_in = risen & (s.zy_high < 0) & (s.xy_high < 0) & (s.xpy_low > 0);
+    const bool my_in = risen & (s.zpy_high < 0) & (s.xpy_high < 0) & (s.xy_low > 0);
+    const bool along_x = px_in | mx_in;
+    // Pixels of the corners on the one face that holds it (the cells of hemicube_weights.h).
+    float column_low = 1e30F, column_high = -1e30F, row_low = 1e30F, row_high = -1e30F;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const float depth = larger(largest(z[c], std::abs(x[c]), std::abs(y[c])), 1e-20F);
+      const float across = along_x ? y[c] : x[c];
+      const float up = top_in ? y[c] + depth : z[c];
+      const float scale = view.half / depth;
+      const float column = (across + depth) * scale, row = up * scale;
+      column_low = smaller(column_low, column);
+      column_high = larger(column_high, column);
+      row_low = smaller(row_low, row);
+      row_high = larger(row_high, row);
+    }
+    // Samples lie half-way between whole numbers; the sum keeps what is truncated positive.
+    const float shift_x = view.shift_x + 1.5F, shift_y = view.shift_y + 1.5F;
+    const bool no_column = static_cast<int>(column_low + shift_x - kSampleMargin) ==
+                           static_cast<int>(column_high + shift_x + kSampleMargin);
+    const bool no_row =
+        static_cast<int>(row_low + shift_y - kSampleMargin) == static_cast<int>(row_high + shift_y + kSampleMargin);
+    const bool inside = top_in | along_x | py_in | my_in;
+    const bool back = from.plane[0][i] * o.x + from.plane[1][i] * o.y + from.plane[2][i] * o.z < from.plane[3][i];
+    seen[i] = faces | bit(back, kBackBit) | bit(top_in, kInsideBit) | bit(px_in, kInsideBit + 1) |
+              bit(mx_in, kInsideBit + 2) | bit(py_in, kInsideBit + 3) | bit(my_in, kInsideBit + 4) |
+              bit(from.area[i] > kLargeSteradian * nearest, kLargeBit) |
+              bit(inside & (no_column | no_row), kBetweenBit);
   }
+}
+
+/// The same for a box.
+Spans spansOf(const HemicubeAxes& axes, const TriangleClusters::Cluster& cluster) {
+  const auto centre = cluster.centre - axes.origin;
+  const auto place = [&](const glm::vec3& along, float& low, float& high) {
+    const float middle = glm::dot(centre, along), reach = glm::dot(cluster.extent, glm::abs(along));
+    // Room for rounding, or a box could be out whose triangles are not.
+    const float slack = 1e-6F;
+    low = middle - reach - slack;
+    high = middle + reach + slack;
+  };
+  Spans s{};
+  place(axes.normal - axes.tangent, s.zx_low, s.zx_high);
+  place(axes.normal + axes.tangent, s.zpx_low, s.zpx_high);
+  place(axes.normal - axes.bitangent, s.zy_low, s.zy_high);
+  place(axes.normal + axes.bitangent, s.zpy_low, s.zpy_high);
+  place(axes.tangent - axes.bitangent, s.xy_low, s.xy_high);
+  place(axes.tangent + axes.bitangent, s.xpy_low, s.xpy_high);
+  place(axes.normal, s.z_low, s.z_high);
+  return s;
 }
 
 }  // namespace
 
-TriangleCuller::TriangleCuller(const scene::PatchScene& patches)
-    : triangle_count_(patches.indices.size() / 3),
+TriangleCuller::TriangleCuller(const scene::PatchScene& patches, const Culling& culling)
+    : culling_(culling),
+      clusters_(makeClusters(patches, kClusterTriangles)),
       solids_(findClosedSolids(patches)),
-      outside_(solids_.bounds.size()),
-      indices_(patches.indices),
-      faces_(triangle_count_) {
-  for (auto& part : plane_) part.resize(triangle_count_);
-  for (std::size_t i = 0; i < triangle_count_; ++i) {
-    const auto& corner = patches.vertices[indices_[3 * i]];
-    for (int axis = 0; axis < 3; ++axis) plane_[static_cast<std::size_t>(axis)][i] = corner.normal[axis];
-    plane_[3][i] = glm::dot(corner.normal, corner.position);
+      outside_(solids_.bounds.size()) {
+  const std::size_t count = clusters_.order.size();
+  culling_.hidden = culling.hidden && count >= kManyTriangles;
+  for (auto& part : plane_) part.resize(count);
+  for (auto& corner : corner_) {
+    for (auto& axis : corner) axis.resize(count);
   }
-  for (int c = 0; c < 3; ++c) {
-    for (auto& axis : corner_[c]) axis.resize(triangle_count_);
-    for (std::size_t i = 0; i < triangle_count_; ++i) {
-      const auto& position = patches.vertices[indices_[3 * i + c]].position;
-      for (int axis = 0; axis < 3; ++axis) corner_[c][axis][i] = position[axis];
+  area_.resize(count);
+  solid_.resize(count);
+  indices_.resize(3 * count);
+  seen_.resize(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t triangle = clusters_.order[i];
+    std::array<glm::vec3, 3> at;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const auto index = indices_[3 * i + c] = patches.indices[3 * triangle + c];
+      at[c] = patches.vertices[index].position;
+      for (int axis = 0; axis < 3; ++axis) corner_[c][static_cast<std::size_t>(axis)][i] = at[c][axis];
     }
+    const auto& first = patches.vertices[indices_[3 * i]];
+    for (int axis = 0; axis < 3; ++axis) plane_[static_cast<std::size_t>(axis)][i] = first.normal[axis];
+    plane_[3][i] = glm::dot(first.normal, first.position);
+    area_[i] = 0.5F * glm::length(glm::cross(at[1] - at[0], at[2] - at[0]));
+    solid_[i] = solids_.solid_of[triangle];
   }
-  for (auto& list : seen_) list.resize(3 * triangle_count_);
 }
 
-TriangleCuller::Counts TriangleCuller::cull(const HemicubeAxes& axes, std::vector<std::uint32_t>& indices) {
-  std::array<Corners, 3> corners{};
-  for (int c = 0; c < 3; ++c) corners[c] = {corner_[c][0].data(), corner_[c][1].data(), corner_[c][2].data()};
-  classify(axes, corners, {plane_[0].data(), plane_[1].data(), plane_[2].data(), plane_[3].data()}, triangle_count_,
-           faces_.data());
+void TriangleCuller::select(const solver::HemicubeFrame& frame, std::uint32_t resolution, Selection& selection) {
+  for (auto* lists : {&selection.first, &selection.second}) {
+    for (auto& list : *lists) list.count = 0, list.runs.clear();
+  }
+  selection.between = 0;
+  const auto view = viewOf(frame, resolution);
+  const auto& axes = view.axes;
   for (std::size_t i = 0; i < outside_.size(); ++i) {
     const auto& [low, high] = solids_.bounds[i];
-    outside_[i] = static_cast<std::uint8_t>(glm::any(glm::lessThan(axes.origin, low - kOutside)) ||
-                                            glm::any(glm::greaterThan(axes.origin, high + kOutside)));
+    outside_[i] =
+        static_cast<std::uint8_t>(culling_.backs && (glm::any(glm::lessThan(axes.origin, low - kOutside)) ||
+                                                     glm::any(glm::greaterThan(axes.origin, high + kOutside))));
   }
-  std::array<std::uint32_t, std::size_t{2} * RAD_FACES> count{};
-  for (std::size_t i = 0; i < triangle_count_; ++i) {
-    if ((faces_[i] >> kBackBit & 1) != 0 && backHidden(i)) continue;
-    for (auto faces = faces_[i] & 0x1FU; faces != 0; faces &= faces - 1) {
-      const auto face = static_cast<unsigned>(std::countr_zero(faces));
-      const auto list = 2 * face + 1 - (faces_[i] >> (8 + face) & 1U);
-      std::copy_n(&indices_[3 * i], 3, &seen_[list][count[list]]);
-      count[list] += 3;
+  Triangles from{};
+  for (std::size_t c = 0; c < 3; ++c) {
+    for (std::size_t axis = 0; axis < 3; ++axis) from.corner[c][axis] = corner_[c][axis].data();
+  }
+  for (std::size_t part = 0; part < 4; ++part) from.plane[part] = plane_[part].data();
+  from.area = area_.data();
+  for (std::uint32_t number = 0; number < clusters_.clusters.size(); ++number) {
+    const auto& cluster = clusters_.clusters[number];
+    const std::uint32_t faces = culling_.faces ? facesOf(spansOf(axes, cluster)) : kFaces;
+    if (faces == 0) continue;
+    classify(view, from, cluster.first, cluster.first + cluster.count, seen_.data());
+    const auto away = glm::max(glm::abs(axes.origin - cluster.centre) - cluster.extent, glm::vec3(0.0F));
+    const bool near = !culling_.hidden || glm::dot(away, away) < glm::dot(cluster.extent, cluster.extent);
+    emit(cluster, number, faces, near, selection);
+  }
+}
+
+/// Triangles of one cluster, face by face, to the lists.
+void TriangleCuller::emit(const TriangleClusters::Cluster& cluster, std::uint32_t number, std::uint32_t faces,
+                          bool near, Selection& selection) {
+  for (auto* lists : {&selection.first, &selection.second}) {  // room for all, so that the loop below need not look
+    for (auto& list : *lists) {
+      const std::size_t most = list.count + 3 * std::size_t{cluster.count};
+      if (list.indices.size() < most) list.indices.resize(2 * most);
     }
   }
-  Counts counts{};
-  for (std::size_t list = 0; list < seen_.size(); ++list) {
-    indices.insert(indices.end(), seen_[list].begin(), seen_[list].begin() + count[list]);
-    (list % 2 == 0 ? counts[list / 2].inside : counts[list / 2].crossing) = count[list];
+  for (std::size_t i = cluster.first; i < cluster.first + cluster.count; ++i) {
+    const auto seen = seen_[i];
+    if ((seen >> kBackBit & 1U) != 0 && solid_[i] != scene::kNone && outside_[solid_[i]] != 0) continue;
+    auto in = culling_.faces ? seen & faces : kFaces;
+    if (culling_.samples && (seen >> kBetweenBit & 1U) != 0) {
+      selection.between += static_cast<std::uint32_t>(std::popcount(in));
+      continue;
+    }
+    auto& lists = near || (seen >> kLargeBit & 1U) != 0 ? selection.first : selection.second;
+    for (; in != 0; in &= in - 1) {
+      const auto face = static_cast<unsigned>(std::countr_zero(in));
+      auto& list = lists[2 * face + 1 - (seen >> (kInsideBit + face) & 1U)];
+      for (std::size_t c = 0; c < 3; ++c) list.indices[list.count + c] = indices_[3 * i + c];
+      list.count += 3;
+    }
   }
-  return counts;
+  if (near) return;
+  for (auto& list : selection.second) {
+    if (list.count > (list.runs.empty() ? 0 : list.runs.back().end)) list.runs.push_back({number, list.count});
+  }
 }
 
 }  // namespace radiosity::gpu

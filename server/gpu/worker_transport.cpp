@@ -130,7 +130,7 @@ class WorkerTransport final : public solver::Transport {
     if (batch.mode == solver::LinkMode::kPaperMipmap && !paper_fits_) return tl::unexpected(paper_error_);
     deaths_ = 0;
     gather_shots_ = batch.gather.size();
-    chunks_ = cutBatch(batch, triangles_, slots_.size());
+    chunks_ = cutBatch(batch, {triangles_, nodes_}, slots_.size());
     queue_.clear();
     for (std::size_t i = 0; i < chunks_.size(); ++i) queue_.push_back(i);
     for (auto& slot : slots_) {

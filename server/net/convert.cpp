@@ -26,6 +26,8 @@ std::string_view stateName(engine::SolveState state) {
       return "converged";
     case engine::SolveState::kTimeLimit:
       return "timeLimit";
+    case engine::SolveState::kLimited:
+      return "limited";
     case engine::SolveState::kFailed:
       return "failed";
   }
@@ -34,7 +36,8 @@ std::string_view stateName(engine::SolveState state) {
 
 bool hasStopped(engine::SolveState state) {
   return state == engine::SolveState::kEmpty || state == engine::SolveState::kConverged ||
-         state == engine::SolveState::kTimeLimit || state == engine::SolveState::kFailed;
+         state == engine::SolveState::kTimeLimit || state == engine::SolveState::kLimited ||
+         state == engine::SolveState::kFailed;
 }
 
 protocol::Progress toProgress(const engine::Status& s) {

@@ -47,7 +47,7 @@ void solveMetrics(Text& text, const engine::Status& status) {
   using engine::SolveState;
   text.family("solve_state", "gauge", "1 for the state the solve is in.");
   for (const auto state : {SolveState::kEmpty, SolveState::kLoading, SolveState::kSolving, SolveState::kPaused,
-                           SolveState::kConverged, SolveState::kTimeLimit, SolveState::kFailed})
+                           SolveState::kConverged, SolveState::kTimeLimit, SolveState::kLimited, SolveState::kFailed})
     text.sample("solve_state", state == status.state ? 1 : 0, fmt::format("{{state=\"{}\"}}", stateName(state)));
   text.gauge("scene_revision", "Revision of the scene.", status.revision);
   text.gauge("tile_version", "Version of the published lightmaps.", status.tile_version);

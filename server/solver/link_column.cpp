@@ -134,27 +134,36 @@ void LinkExpander::pushDown(std::uint32_t s) {
 }
 
 void LinkColumn::makeRoom(std::span<const std::uint32_t> reached, const std::vector<Side>& sides) {
+  auto run = runs_.begin();
   const auto has = [&](std::uint32_t side) {
-    const auto run =
-        std::lower_bound(runs_.begin(), runs_.end(), side, [](const Run& r, auto s) { return r.side < s; });
-    return run != runs_.end() && run->side == side;
+    while (run != runs_.end() && run->side + run->side_count <= side) ++run;
+    return run != runs_.end() && run->side <= side;
   };
   if (std::all_of(reached.begin(), reached.end(), has)) return;
   std::vector<std::uint32_t> all(reached.begin(), reached.end());
-  for (const auto& run : runs_) all.push_back(run.side);
+  for (const auto& old : runs_) {
+    for (std::uint32_t i = 0; i < old.side_count; ++i) all.push_back(old.side + i);
+  }
   std::sort(all.begin(), all.end());
   all.erase(std::unique(all.begin(), all.end()), all.end());
   std::vector<Run> runs;
-  std::uint32_t offset = 0;
-  for (const auto side : all) {
-    runs.push_back({side, sides[side].first_value, sides[side].leaf_count, offset});
-    offset += sides[side].leaf_count;
+  std::uint32_t size = 0;
+  for (const auto s : all) {
+    const Side& side = sides[s];
+    const std::uint32_t end = side.first_value + side.leaf_count;
+    const bool joins =
+        !runs.empty() && (side.first_value - runs.back().first_value - runs.back().count) * kLeafBytes <= sizeof(Run);
+    if (!joins) runs.push_back({s, 0, side.first_value, 0, size});
+    runs.back().side_count = s + 1 - runs.back().side;
+    runs.back().count = end - runs.back().first_value;
+    size = runs.back().offset + runs.back().count;
   }
-  std::vector<std::uint16_t> code(offset, 0);
-  std::size_t to = 0;
-  for (const auto& run : runs_) {
-    while (runs[to].side != run.side) ++to;
-    std::copy_n(code_.begin() + run.offset, run.count, code.begin() + runs[to].offset);
+  runs.shrink_to_fit();
+  std::vector<std::uint16_t> code(size, 0);
+  auto to = runs.begin();
+  for (const auto& old : runs_) {
+    while (to->first_value + to->count <= old.first_value) ++to;
+    std::copy_n(code_.begin() + old.offset, old.count, code.begin() + to->offset + (old.first_value - to->first_value));
   }
   runs_ = std::move(runs);
   code_ = std::move(code);
@@ -178,18 +187,15 @@ void LinkColumn::add(const LinkExpander& sample, const LinkSample& totals, doubl
   const float old_scale = scale_;
   grow(sample, sides);
   const float kept = old_part * (old_scale / scale_), added = new_part / scale_;
-  // To the average of very many, one more adds less than half a last bit: then chance rounds, and the mean stays true.
-  const bool chance = samples_ >= kExactSamples;
-  std::size_t next = 0;
+  auto next = sample.sidesReached().begin();
+  const auto end = sample.sidesReached().end();
   for (const auto& run : runs_) {
-    const auto reached = sample.sidesReached();
-    const bool is_new = next < reached.size() && reached[next] == run.side;
-    if (is_new) ++next;
-    for (std::uint32_t i = 0; i < run.count; ++i) {
-      auto& code = code_[run.offset + i];
-      const float fresh = is_new ? sample.values()[run.first_value + i] : 0.0F;
-      const std::uint32_t dither = chance ? ditherOf(run.first_value + i, samples_) : 2048;
-      code = encodeLink(kept * decodeOne(code) + added * fresh, dither);
+    for (std::uint32_t s = run.side; s < run.side + run.side_count; ++s) {
+      const Side& side = sides[s];
+      const bool is_new = next != end && *next == s;
+      if (is_new) ++next;
+      addTo(run, side.first_value, side.leaf_count, kept, added,
+            is_new ? sample.values().subspan(side.first_value, side.leaf_count) : std::span<const float>());
     }
   }
   escaped_ = (escaped_ * points_ + totals.escaped * points) / sum;
@@ -198,6 +204,18 @@ void LinkColumn::add(const LinkExpander& sample, const LinkSample& totals, doubl
   due_ = (due_ * points_ + totals.due * points) / sum;
   points_ = sum;
   ++samples_;
+}
+
+/// `fresh`: what the sample brings to the `count` values from `first_value` on; empty: nothing.
+void LinkColumn::addTo(const Run& run, std::uint32_t first_value, std::uint32_t count, float kept, float added,
+                       std::span<const float> fresh) {
+  // To the average of very many, one more adds less than half a last bit: then chance rounds, and the mean stays true.
+  const bool chance = samples_ >= kExactSamples;
+  std::uint16_t* code = &code_[run.offset + (first_value - run.first_value)];
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const std::uint32_t dither = chance ? ditherOf(first_value + i, samples_) : 2048;
+    code[i] = encodeLink(kept * decodeOne(code[i]) + added * (fresh.empty() ? 0.0F : fresh[i]), dither);
+  }
 }
 
 double LinkColumn::gain() const {
@@ -216,19 +234,27 @@ double LinkColumn::product(const LinkColumn& a, const LinkColumn& b, std::span<c
   double sum = 0.0;
   auto other = b.runs_.begin();
   for (const auto& run : a.runs_) {
-    while (other != b.runs_.end() && other->side < run.side) ++other;
-    if (other == b.runs_.end()) break;
-    if (other->side != run.side) continue;
-    sum += static_cast<double>(
-        productOf(&a.code_[run.offset], &b.code_[other->offset], &leaf_area[run.first_value], run.count));
+    const std::uint32_t run_end = run.first_value + run.count;
+    while (other != b.runs_.end() && other->first_value + other->count <= run.first_value) ++other;
+    for (auto with = other; with != b.runs_.end() && with->first_value < run_end; ++with) {
+      const std::uint32_t first = std::max(run.first_value, with->first_value);
+      const std::uint32_t end = std::min(run_end, with->first_value + with->count);
+      sum += static_cast<double>(productOf(&a.code_[run.offset + (first - run.first_value)],
+                                           &b.code_[with->offset + (first - with->first_value)], &leaf_area[first],
+                                           end - first));
+    }
   }
   return sum * a.gain() * static_cast<double>(a.scale_) * b.gain() * static_cast<double>(b.scale_);
 }
 
-bool LinkColumn::decode(std::uint32_t side, std::span<float> leaves) const {
-  const auto run = std::lower_bound(runs_.begin(), runs_.end(), side, [](const Run& r, auto s) { return r.side < s; });
-  if (run == runs_.end() || run->side != side) return false;
-  decodeAll(&code_[run->offset], run->count, scale_ * static_cast<float>(gain()), leaves.data());
+bool LinkColumn::decode(std::uint32_t first_value, std::span<float> leaves) const {
+  const auto after = std::upper_bound(runs_.begin(), runs_.end(), first_value,
+                                      [](auto value, const Run& run) { return value < run.first_value; });
+  if (after == runs_.begin()) return false;
+  const Run& run = *(after - 1);
+  if (first_value >= run.first_value + run.count) return false;
+  decodeAll(&code_[run.offset + (first_value - run.first_value)], leaves.size(), scale_ * static_cast<float>(gain()),
+            leaves.data());
   return true;
 }
 

@@ -59,20 +59,26 @@ class LinkColumn {
 
   /// Adds radiosity[c] times the links to plane c of irradiance, by leaf value.
   void apply(const std::array<float, 3>& radiosity, const std::array<float*, 3>& irradiance) const;
-  /// The links to the leaves of one side; false when there are none.
-  [[nodiscard]] bool decode(std::uint32_t side, std::span<float> leaves) const;
+  /// The links to the leaves of one side, whose values begin at `first_value`; false when there are none.
+  [[nodiscard]] bool decode(std::uint32_t first_value, std::span<float> leaves) const;
 
   /// Sums over leaves of area times the product of two columns' links.
   [[nodiscard]] static double product(const LinkColumn& a, const LinkColumn& b, std::span<const float> leaf_area);
 
+  static constexpr std::size_t kLeafBytes = sizeof(std::uint16_t);
+  /// Consecutive sides, with all their leaves. Small sides between others are kept though nothing reaches them: their
+  /// zeros take less than a run of their own.
   struct Run {
-    std::uint32_t side, first_value, count, offset;
+    std::uint32_t side, side_count, first_value, count, offset;
   };
   [[nodiscard]] std::span<const Run> runs() const { return runs_; }
 
  private:
   void makeRoom(std::span<const std::uint32_t> reached, const std::vector<Side>& sides);
   void grow(const LinkExpander& sample, const std::vector<Side>& sides);
+
+  void addTo(const Run& run, std::uint32_t first_value, std::uint32_t count, float kept, float added,
+             std::span<const float> fresh);
 
   std::vector<Run> runs_;    // by ascending side
   float scale_ = 0x1p-100F;  // of the codes; a power of two that grows with the largest link

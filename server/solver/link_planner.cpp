@@ -107,7 +107,7 @@ bool LinkPlanner::isPartial(const Node& node) const {
 }
 
 void LinkPlanner::addShooter(const Node& node, LinkSystem& system, const UnshotPyramid& unshot,
-                             const scene::PatchScene& patches, std::vector<Measurement>& wanted) {
+                             const scene::PatchScene& patches, LinkMemory& memory, std::vector<Measurement>& wanted) {
   const auto id = nodeId(sides_[node.place.side], node.place);
   if (patches.node_area[id] <= 0.0F || node.net <= 0.0) return;
   // Right beside a buried edge one would see single leaves come and go: there nobody plays.
@@ -122,6 +122,12 @@ void LinkPlanner::addShooter(const Node& node, LinkSystem& system, const UnshotP
   shooter.area = static_cast<double>(patches.node_area[id]);
   shooter.sent.fill(unshot.flux(id) / patches.node_area[id]);
   shooter.certain = certain;
+  shooter.most_bytes = memory.mostBytes(node.place.side);
+  const std::size_t columns = static_cast<std::size_t>(in[0]) + static_cast<std::size_t>(in[1]);
+  if (memory.isFull() || !memory.takeShooters(std::span(&shooter, 1), columns, system)) {
+    left_out_ += node.net;
+    return;
+  }
   const auto index = system.add(shooter);
   ++counters_.shooters;
   if (shots_.gathers(node.place)) ++counters_.gathered_nodes;
@@ -132,7 +138,7 @@ void LinkPlanner::addShooter(const Node& node, LinkSystem& system, const UnshotP
 }
 
 std::vector<Measurement> LinkPlanner::grow(LinkSystem& system, const UnshotPyramid& unshot,
-                                           const scene::PatchScene& patches, std::size_t limit) {
+                                           const scene::PatchScene& patches, std::size_t limit, LinkMemory& memory) {
   const auto weaker = [](const Node& a, const Node& b) {
     if (a.power != b.power) return a.power < b.power;
     return std::tie(a.place.side, a.place.level, a.place.y, a.place.x) >
@@ -163,16 +169,28 @@ std::vector<Measurement> LinkPlanner::grow(LinkSystem& system, const UnshotPyram
     }
     const auto there = system.at(nodeId(sides_[place.side], place));
     if (there == scene::kNone) {
-      addShooter(node, system, unshot, patches, wanted);
+      addShooter(node, system, unshot, patches, memory, wanted);
       continue;
     }
     const auto& shooter = system.shooters()[there];  // one of its halves may join late
     for (std::size_t half = 0; half < 2; ++half) {
-      if (shooter.column[half].points() == 0.0 && (shooter.certain || plays(place, half, shooter.power())))
-        wanted.push_back({there, half, 1, 0});
+      const bool joins =
+          shooter.column[half].points() == 0.0 && (shooter.certain || plays(place, half, shooter.power()));
+      if (joins && memory.takeSample(shooter, half)) wanted.push_back({there, half, 1, 0});
     }
   }
   return wanted;
+}
+
+double LinkPlanner::unlinked(const LinkSystem& system) const {
+  double flux = 0.0;
+  for (const auto& shooter : system.shooters()) {
+    for (std::size_t half = 0; half < 2 && !shooter.isLight(); ++half) {
+      const bool plays_here = shooter.certain || plays(shooter.place, half, shooter.power());
+      if (shooter.column[half].points() == 0.0 && plays_here) flux += 0.5 * shooter.power();
+    }
+  }
+  return flux;
 }
 
 double LinkPlanner::rouletteShare(const LinkSystem& system) {
@@ -205,7 +223,8 @@ double LinkPlanner::variation(const LinkSystem& system, const UnshotPyramid& uns
 }
 
 void LinkPlanner::split(const NodePlace& place, LinkSystem& system, const UnshotPyramid& unshot,
-                        const scene::PatchScene& patches, std::vector<Measurement>& wanted) {
+                        const scene::PatchScene& patches, LinkMemory& memory, std::vector<Measurement>& wanted) {
+  std::vector<Shooter> children;
   const Side& side = sides_[place.side];
   const auto grid = scene::levelGrid(side.width, side.height, place.level - 1);
   for (std::uint32_t y = 2 * place.y; y < std::min(2 * place.y + 2, grid.height); ++y) {
@@ -218,17 +237,22 @@ void LinkPlanner::split(const NodePlace& place, LinkSystem& system, const Unshot
       shooter.area = static_cast<double>(patches.node_area[id]);
       shooter.sent.fill(unshot.flux(id) / patches.node_area[id]);
       shooter.certain = true;
-      const auto index = system.add(shooter);
-      ++counters_.shooters;
-      if (shots_.gathers(child)) ++counters_.gathered_nodes;
-      if (child.level > 0) ++counters_.whole_subtrees;
-      for (std::size_t half = 0; half < 2; ++half) wanted.push_back({index, half, 1, 0});
+      shooter.most_bytes = memory.mostBytes(place.side);
+      children.push_back(shooter);
     }
+  }
+  if (!memory.takeShooters(children, 2, system)) return;
+  for (const auto& shooter : children) {
+    const auto index = system.add(shooter);
+    ++counters_.shooters;
+    if (shots_.gathers(shooter.place)) ++counters_.gathered_nodes;
+    if (shooter.place.level > 0) ++counters_.whole_subtrees;
+    for (std::size_t half = 0; half < 2; ++half) wanted.push_back({index, half, 1, 0});
   }
 }
 
 std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPyramid& unshot,
-                                              const scene::PatchScene& patches, bool may_split) {
+                                              const scene::PatchScene& patches, bool may_split, LinkMemory& memory) {
   double spread = 0.0, squares = 0.0;
   for (const auto& shooter : system.shooters()) {
     spread += shooter.spread();
@@ -260,12 +284,14 @@ std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPy
   for (const auto& gain : gains) {
     if (wanted.size() >= limit || gain.gain <= 0.0) break;
     if (gain.points == 0) {
-      split(NodePlace(system.shooters()[gain.shooter].place), system, unshot, patches, wanted);
+      if (!memory.isFull())
+        split(NodePlace(system.shooters()[gain.shooter].place), system, unshot, patches, memory, wanted);
       continue;
     }
-    const auto& column = system.shooters()[gain.shooter].column;
+    const auto& shooter = system.shooters()[gain.shooter];
+    if (!memory.takeSample(shooter, 0) || !memory.takeSample(shooter, 1)) continue;
     for (std::size_t half = 0; half < 2; ++half)
-      wanted.push_back({gain.shooter, half, gain.points, column[half].samples()});
+      wanted.push_back({gain.shooter, half, gain.points, shooter.column[half].samples()});
   }
   return wanted;
 }

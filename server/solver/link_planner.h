@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "server/solver/link_memory.h"
 #include "server/solver/link_system.h"
 #include "server/solver/node_shots.h"
 #include "server/solver/planner.h"
@@ -33,15 +34,15 @@ class LinkPlanner {
   /// Samples of the lights that have none yet, shared out by power.
   [[nodiscard]] std::vector<Measurement> firstLight(const LinkSystem& system) const;
 
-  /// Makes the strongest unshot nodes shooters, up to `limit` of them, and says what to measure. Empty: what is left is
-  /// below a shooter's worth, or stood for by others.
+  /// Makes the strongest unshot nodes shooters, up to `limit` of them and as long as there is memory, and says what to
+  /// measure. Empty: what is left is below a shooter's worth, or stood for by others, or there is no room for more.
   [[nodiscard]] std::vector<Measurement> grow(LinkSystem& system, const UnshotPyramid& unshot,
-                                              const scene::PatchScene& patches, std::size_t limit);
+                                              const scene::PatchScene& patches, std::size_t limit, LinkMemory& memory);
 
   /// Whatever lowers the error most for its cost: further samples of shooters whose halves differ, or shooters for the
-  /// children of nodes inside which light varies (where `may_split`).
+  /// children of nodes inside which light varies (where `may_split`), as far as there is memory.
   [[nodiscard]] std::vector<Measurement> improve(LinkSystem& system, const UnshotPyramid& unshot,
-                                                 const scene::PatchScene& patches, bool may_split);
+                                                 const scene::PatchScene& patches, bool may_split, LinkMemory& memory);
 
   /// Square of the error of irradiance, summed over leaves by area and over channels, that light which varies inside
   /// the shooters causes.
@@ -55,8 +56,10 @@ class LinkPlanner {
   /// power whose weight that changed.
   double weigh(LinkSystem& system);
 
-  /// Flux of the nodes that the last walk found too weak even to play roulette, all channels.
+  /// Flux of the nodes that the last walk found too weak even to play roulette, or had no room for, all channels.
   [[nodiscard]] double leftOut() const { return left_out_; }
+  /// Flux of the shooters whose links are forgotten or not measured yet, all channels.
+  [[nodiscard]] double unlinked(const LinkSystem& system) const;
 
   [[nodiscard]] const PlannerCounters& counters() const { return counters_; }
 
@@ -74,9 +77,9 @@ class LinkPlanner {
   [[nodiscard]] double variation(const Shooter& shooter, const LinkSystem& system, const UnshotPyramid& unshot,
                                  const scene::PatchScene& patches) const;
   void split(const NodePlace& place, LinkSystem& system, const UnshotPyramid& unshot, const scene::PatchScene& patches,
-             std::vector<Measurement>& wanted);
+             LinkMemory& memory, std::vector<Measurement>& wanted);
   void addShooter(const Node& node, LinkSystem& system, const UnshotPyramid& unshot, const scene::PatchScene& patches,
-                  std::vector<Measurement>& wanted);
+                  LinkMemory& memory, std::vector<Measurement>& wanted);
 
   const std::vector<Side>& sides_;
   const NodeShots& shots_;

@@ -141,7 +141,7 @@ void LinkSystem::updateRows() {
     reflectance_mean_[m] = glm::vec3(reflectance / area);
   }
   const auto half = [&](std::size_t h) {
-    for (auto& row : matrix_[h]) row.resize(count, 0.0F);
+    for (auto& row : matrix_[h]) row.reserve(count), row.resize(count, 0.0F);  // no room to spare: memory is bounded
     for (std::uint32_t n = 0; n < count; ++n) updateRows(h, n, changed_[n] ? 0 : static_cast<std::uint32_t>(known_));
   };
   std::thread other(half, 1);
@@ -154,13 +154,16 @@ void LinkSystem::updateRows() {
 /// Entries of one column in the rows of all members from `first_member` on.
 void LinkSystem::updateRows(std::size_t half, std::uint32_t column, std::uint32_t first_member) {
   thread_local std::vector<float> links;
-  for (const auto& run : shooters_[column].column[half].runs()) {
-    const auto& members = members_[run.side];
-    const auto first = std::lower_bound(members.begin(), members.end(), first_member);
-    if (first == members.end()) continue;
-    links.resize(run.count);
-    (void)shooters_[column].column[half].decode(run.side, links);
-    for (auto m = first; m != members.end(); ++m) fillRow(half, *m, column, links.data());
+  const auto& from = shooters_[column].column[half];
+  for (const auto& run : from.runs()) {
+    for (std::uint32_t s = run.side; s < run.side + run.side_count; ++s) {
+      const auto& members = members_[s];
+      const auto first = std::lower_bound(members.begin(), members.end(), first_member);
+      if (first == members.end()) continue;
+      links.resize(sides_[s].leaf_count);
+      (void)from.decode(sides_[s].first_value, links);
+      for (auto m = first; m != members.end(); ++m) fillRow(half, *m, column, links.data());
+    }
   }
 }
 

@@ -32,6 +32,7 @@ struct Shooter {
   std::array<glm::vec3, 2> mean{};         ///< b: mean radiosity of the node
   std::array<glm::vec3, 2> sent{};         ///< s, before the weight
 
+  std::size_t most_bytes = 0;        ///< that a column can come to take
   std::array<double, 3> products{};  ///< sums over leaves of area T0 T0, T0 T1, T1 T1
 
   [[nodiscard]] bool isLight() const { return light != scene::kNone || source != scene::kNone; }
@@ -75,6 +76,9 @@ class LinkSystem {
   void irradiance(std::size_t half, std::vector<glm::vec3>& values) const;
   /// What all links take.
   [[nodiscard]] std::size_t bytes() const;
+  /// Rows of the equation in each half, and how many a node of the side has.
+  [[nodiscard]] std::size_t rowCount() const { return matrix_[0].size(); }
+  [[nodiscard]] std::size_t rowsOf(std::uint32_t side) const { return uniform_[side] ? 1 : 3; }
   /// Radiosity that stands for each leaf of a side: that of the deepest shooter above it, mean of the halves.
   void standIn(std::uint32_t side, std::vector<glm::vec3>& leaves) const;
 

@@ -16,8 +16,6 @@ namespace {
 constexpr double kRefinement = 2.0;
 /// More refinements than this find nothing: everything is split to its leaves.
 constexpr double kMinShare = 1e-9;
-/// So many lights that were moved away or switched off keep their links.
-constexpr std::ptrdiff_t kDarkSources = 8;
 constexpr std::uint32_t kMaxRounds = 100'000;
 /// Where nothing can be split any more, samples stop when their error is this part of the rest.
 constexpr double kIdleSampling = 0.1;
@@ -45,6 +43,7 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
       shots_(*patches_, sides_, settings.seed),
       system_(*patches_, sides_),
       expander_(*patches_, sides_),
+      memory_(*patches_, sides_, settings.link_memory),
       unshot_(*patches_),
       planner_(sides_, shots_, settings_.planner),
       irradiance_(patches_->nodeCount(), glm::vec3(0.0F)) {
@@ -66,88 +65,6 @@ void LinkedSolver::takeMaterials(const scene::PatchMaterials& materials) {
   }
   takeLights();
   system_.setMaterials(emission_, reflectance_);
-}
-
-/// Every light polygon that ever was is a shooter; its radiosity is what it emits now.
-void LinkedSolver::takeLights() {
-  for (auto& light : lights_) light.emission = glm::vec3(0.0F);
-  for (const auto& light : findLightPolygons(*patches_, sides_, emission_)) {
-    const auto known =
-        std::find_if(lights_.begin(), lights_.end(), [&](const LightPolygon& old) { return old.key == light.key; });
-    if (known != lights_.end()) {
-      known->emission = light.emission;
-      continue;
-    }
-    Shooter shooter;
-    shooter.light = static_cast<std::uint32_t>(lights_.size());
-    shooter.area = light.area;
-    lights_.push_back(light);
-    (void)system_.add(shooter);
-  }
-  for (auto& shooter : system_.shooters()) {
-    if (shooter.light != scene::kNone) shooter.sent.fill(lights_[shooter.light].emission);
-  }
-}
-
-/// So is every light without extent.
-void LinkedSolver::takeSources(const LightSources& sources) {
-  for (auto& source : sources_) source.intensity = glm::dvec3(0.0);
-  for (const auto& source : punctual_.makeSources(*patches_, sources)) {
-    const auto known =
-        std::find_if(sources_.begin(), sources_.end(), [&](const auto& old) { return old.sameShape(source); });
-    if (known != sources_.end()) {
-      known->intensity = source.intensity;
-      continue;
-    }
-    addSource(source);
-  }
-  for (auto& shooter : system_.shooters()) {
-    if (shooter.source != scene::kNone) shooter.sent.fill(glm::vec3(sources_[shooter.source].intensity));
-  }
-}
-
-/// In the place of one that is dark, once there are some: a lamp that is dragged about leaves no trail.
-void LinkedSolver::addSource(const PunctualLights::Source& source) {
-  const auto dark = [&](const PunctualLights::Source& s) { return s.intensity == glm::dvec3(0.0); };
-  if (std::count_if(sources_.begin(), sources_.end(), dark) >= kDarkSources) {
-    const auto old = std::find_if(sources_.begin(), sources_.end(), dark);
-    for (std::uint32_t n = 0; n < system_.shooters().size(); ++n) {
-      auto& shooter = system_.shooters()[n];
-      if (shooter.source != static_cast<std::uint32_t>(old - sources_.begin())) continue;
-      system_.forget(n);
-      shooter.area = source.flux_per_intensity;
-    }
-    *old = source;
-    return;
-  }
-  Shooter shooter;
-  shooter.source = static_cast<std::uint32_t>(sources_.size());
-  shooter.area = source.flux_per_intensity;
-  sources_.push_back(source);
-  (void)system_.add(shooter);
-}
-
-/// One sequence of shots of a light without extent.
-Result<void> LinkedSolver::measureSource(const Measurement& want) {
-  const auto& source = sources_[system_.shooters()[want.shooter].source];
-  ShotBatch batch;
-  batch.flux_scale = kMeasureScale * std::exp2(-std::ceil(std::log2(std::max(1.0, source.flux_per_intensity))));
-  punctual_.addSample(source, want.index, static_cast<std::uint32_t>(want.half), batch);
-  FluxAccumulators flux;
-  flux.reset(patches_->nodeCount());
-  const auto done = transport_.run(batch, flux);
-  if (!done) return tl::unexpected<Error>(done.error());
-  counters_ += *done;
-  LinkSample links;
-  for (std::uint32_t node = 0; node < patches_->nodeCount(); ++node)
-    links.addFlux(node, flux.node[want.half][node][0], *patches_);
-  links.escaped += static_cast<double>(flux.escaped[0]) / kMeasureScale;
-  links.absorbed += static_cast<double>(flux.backface[0]) / kMeasureScale;
-  // The shots of a half carry half of an intensity of one.
-  links.scale(2.0 * kMeasureScale / batch.flux_scale);
-  expander_.expand(links);
-  system_.addSample(want.shooter, want.half, expander_, links, want.points);
-  return {};
 }
 
 /// Measures the next part of the wave: short, so that an edit, a pause or the end of the server need not wait for all.
@@ -188,14 +105,38 @@ Result<void> LinkedSolver::measureSlice() {
   return {};
 }
 
+void LinkedSolver::solveEquation() {
+  const auto sweeps = static_cast<std::uint64_t>(system_.solve());
+  ++solutions_;
+  sweeps_ += sweeps;
+  replayed_ += sweeps * system_.shooters().size();
+}
+
+LinkCounters LinkedSolver::linkCounters() const {
+  LinkCounters counters;
+  counters.bytes = system_.bytes();
+  counters.solutions = solutions_;
+  counters.sweeps = sweeps_;
+  counters.replayed = replayed_;
+  counters.rows = system_.rowCount();
+  std::uint64_t nodes = 0;
+  for (const auto& shooter : system_.shooters()) {
+    nodes += shooter.isLight() ? 0 : 1;
+    counters.shooters += shooter.column[0].points() + shooter.column[1].points() > 0.0 ? 1 : 0;
+    counters.samples += shooter.column[0].samples() + shooter.column[1].samples();
+  }
+  counters.rows_saved = 3 * nodes > counters.rows ? 3 * nodes - counters.rows : 0;
+  return counters;
+}
+
 /// Solves all bounces over the links there are, and lights every leaf.
 void LinkedSolver::settle() {
   (void)planner_.weigh(system_);
-  system_.solve();
+  solveEquation();
   std::vector<std::array<double, 2>> weights;
   for (const auto& shooter : system_.shooters()) weights.push_back(shooter.weight);
   if (planner_.weigh(system_) > kSameWeights) {  // shooters that were dark before had no weight
-    system_.solve();
+    solveEquation();
   } else {
     for (std::size_t n = 0; n < weights.size(); ++n) system_.shooters()[n].weight = weights[n];
   }
@@ -229,6 +170,22 @@ void LinkedSolver::findUnshot() {
   }
 }
 
+/// Part of what the shooters of reflected light send that leaves the scene or falls on unlit sides: it never comes
+/// back.
+double LinkedSolver::lostPart() const {
+  double sent = 0.0, lost = 0.0;
+  for (const auto& shooter : system_.shooters()) {
+    for (std::size_t half = 0; half < 2 && !shooter.isLight(); ++half) {
+      const auto& column = shooter.column[half];
+      const glm::dvec3 radiosity = shooter.weight[half] * glm::dvec3(shooter.sent[half]);
+      if (column.points() == 0.0) continue;
+      sent += shooter.area * (radiosity.x + radiosity.y + radiosity.z);
+      lost += (column.escaped() + column.absorbed()) * (radiosity.x + radiosity.y + radiosity.z);
+    }
+  }
+  return sent > 0.0 ? std::clamp(lost / sent, 0.0, 1.0) : 0.0;
+}
+
 /// Light that there is to shoot, with all its bounces: what stands in for the shooters' leaves, and what is unshot.
 double LinkedSolver::powerToShoot() const {
   double shot = 0.0, received = 0.0, reflected = 0.0;
@@ -242,7 +199,7 @@ double LinkedSolver::powerToShoot() const {
       reflected += static_cast<double>(glm::dot(flux, reflectance_[side.first_value + leaf]));
     }
   }
-  const double kept = received > 0.0 ? std::min(0.95, reflected / received) : 0.5;
+  const double kept = received > 0.0 ? std::min(0.95, (1.0 - lostPart()) * reflected / received) : 0.5;
   return shot + net_unshot_ / (1.0 - kept);
 }
 
@@ -252,26 +209,27 @@ void LinkedSolver::startGrowth() {
 }
 
 /// No memory for more shooters, or nothing left to split.
-bool LinkedSolver::isFull() const { return system_.bytes() >= settings_.link_memory || share_part_ < kMinShare; }
+bool LinkedSolver::isFull() const { return memory_.isFull() || share_part_ < kMinShare; }
 
 std::vector<Measurement> LinkedSolver::plan() {
-  if (phase_ == Phase::kLights) return planner_.firstLight(system_);
-  if (phase_ == Phase::kImprove) return planner_.improve(system_, unshot_, *patches_, !isFull());
+  memory_.begin(system_);
+  if (phase_ == Phase::kLights) return planLights();
+  if (phase_ == Phase::kImprove) return planner_.improve(system_, unshot_, *patches_, !isFull(), memory_);
   if (planner_.share() <= 0.0 || isFull()) return {};
   const std::size_t limit = std::max<std::size_t>(settings_.planner.pairs_a_wave, system_.shooters().size() / 2);
-  return planner_.grow(system_, unshot_, *patches_, limit);
+  return planner_.grow(system_, unshot_, *patches_, limit, memory_);
 }
 
 Result<StepOutcome> LinkedSolver::step() {
-  if (phase_ == Phase::kDone) return StepOutcome::kConverged;
+  if (phase_ == Phase::kDone) {
+    return error_.total <= settings_.target_error ? StepOutcome::kConverged : StepOutcome::kExhausted;
+  }
   if (measured_ == wanted_.size()) {
     wanted_ = plan();
     measured_ = 0;
     const bool dark = phase_ == Phase::kLights && net_unshot_ + varying_ <= 0.0;
-    if (wanted_.empty() && phase_ == Phase::kImprove) {  // no sample can lower the error
-      phase_ = Phase::kDone;
-      return StepOutcome::kExhausted;
-    }
+    if (wanted_.empty() && phase_ == Phase::kImprove)  // no sample that there is room for can lower the error
+      return exhausted(memory_.lacksSamples() || memory_.isFull() ? SolveLimit::kLinkMemory : SolveLimit::kPatches);
     if (wanted_.empty() && (dark || phase_ == Phase::kGrow)) return finishRound();
   }
   if (!wanted_.empty()) {
@@ -291,7 +249,14 @@ StepOutcome LinkedSolver::finishRound() {
   return chooseNext();
 }
 
+StepOutcome LinkedSolver::exhausted(SolveLimit limit) {
+  limit_ = limit;
+  phase_ = Phase::kDone;
+  return StepOutcome::kExhausted;
+}
+
 StepOutcome LinkedSolver::chooseNext() {
+  limit_ = SolveLimit::kNone;
   if (error_.total <= settings_.target_error) {
     settleFromLinks();
     assess();
@@ -301,7 +266,8 @@ StepOutcome LinkedSolver::chooseNext() {
     return StepOutcome::kConverged;
   }
   const auto& shooters = system_.shooters();
-  if (std::any_of(shooters.begin(), shooters.end(), [](const Shooter& shooter) { return shooter.owes(); })) {
+  const auto owes = [](const Shooter& shooter) { return shooter.owes(); };
+  if (lights_fit_ && std::any_of(shooters.begin(), shooters.end(), owes)) {
     phase_ = Phase::kLights;
     return StepOutcome::kRoundDone;
   }
@@ -309,10 +275,9 @@ StepOutcome LinkedSolver::chooseNext() {
   const double roulette = error_.sampling * std::sqrt(LinkPlanner::rouletteShare(system_));
   const bool by_share = std::hypot(roulette, left_out_) > 0.7 * error_.total;
   const double by_samples = std::sqrt(std::max(0.0, error_.sampling * error_.sampling - roulette * roulette));
-  if (rounds_ >= kMaxRounds || (isFull() && (by_share || by_samples < kIdleSampling * error_.residual))) {
-    phase_ = Phase::kDone;
-    return StepOutcome::kExhausted;
-  }
+  if (rounds_ >= kMaxRounds) return exhausted(SolveLimit::kRounds);
+  if (isFull() && (by_share || by_samples < kIdleSampling * error_.residual))
+    return exhausted(memory_.isFull() ? SolveLimit::kLinkMemory : SolveLimit::kPatches);
   if (by_share) {
     share_part_ /= kRefinement;
     planner_.setShare(planner_.share() / kRefinement);
@@ -344,13 +309,13 @@ void LinkedSolver::assess() {
       if (shooter.isLight() && column.points() == 0.0) owed += 0.5 * shooter.power();
     }
   }
-  const double left_out = planner_.leftOut();
+  const double left_out = planner_.leftOut() + (growing_ ? 0.0 : planner_.unlinked(system_));
   owed += growing_ ? net_unshot_ : left_out;
   if (field.square() <= 0.0) {
     error_.residual = error_.total = owed + varying_ > 0.0 ? 1.0 : 0.0;  // all or nothing is missing
     return;
   }
-  const double kept = std::min(0.999, reflected / received);
+  const double kept = std::min(0.999, (1.0 - lostPart()) * reflected / received);
   error_.sampling = field.sampling();
   error_.discretization = field.discretization();
   const double varying = std::sqrt(planner_.variation(system_, unshot_, *patches_) / field.square());
@@ -379,6 +344,13 @@ void LinkedSolver::solveAnew() {
   wanted_.clear();
   measured_ = 0;
   settleFromLinks();
+  memory_.begin(system_);
+  if (memory_.isOverdrawn()) {
+    while (memory_.isOverdrawn() && forgetWeakest()) continue;
+    settleFromLinks();
+  }
+  memory_.forgive();
+  lights_fit_ = true;
   growing_ = true;
   phase_ = Phase::kLights;
   assess();
@@ -396,7 +368,7 @@ void LinkedSolver::settleFromLinks() {
       shooter.mean.fill(glm::vec3(0.0F));
       shooter.sent.fill(glm::vec3(0.0F));
     }
-    system_.solve();
+    solveEquation();
     if (pass == 1) continue;
     double power = 0.0;
     for (const auto& shooter : system_.shooters()) {

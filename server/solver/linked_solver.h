@@ -12,6 +12,7 @@
 
 #include "common/result.h"
 #include "server/solver/lights.h"
+#include "server/solver/link_memory.h"
 #include "server/solver/link_planner.h"
 #include "server/solver/link_system.h"
 #include "server/solver/node_shots.h"
@@ -38,8 +39,12 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] const TransportCounters& transportCounters() const override { return counters_; }
   [[nodiscard]] const PlannerCounters& plannerCounters() const override { return planner_.counters(); }
   [[nodiscard]] std::uint32_t rounds() const override { return rounds_; }
+  [[nodiscard]] SolveLimit limit() const override { return limit_; }
+  [[nodiscard]] LinkCounters linkCounters() const override;
   [[nodiscard]] bool hasFluxScale() const override { return false; }
 
+  /// What the links of all lights can come to take.
+  [[nodiscard]] std::size_t lightBytes() const;
   /// What is remembered.
   [[nodiscard]] const LinkSystem& system() const { return system_; }
 
@@ -48,13 +53,17 @@ class LinkedSolver final : public Solver {
 
   [[nodiscard]] bool isFull() const;
   [[nodiscard]] std::vector<Measurement> plan();
+  [[nodiscard]] std::vector<Measurement> planLights();
+  [[nodiscard]] bool forgetWeakest();
   [[nodiscard]] Result<void> measureSlice();
   [[nodiscard]] Result<void> measureSource(const Measurement& want);
   void takeSources(const LightSources& sources);
   void addSource(const PunctualLights::Source& source);
   [[nodiscard]] double powerToShoot() const;
+  [[nodiscard]] double lostPart() const;
   void solveAnew();
   void settleFromLinks();
+  void solveEquation();
   void lightLeaves();
   void takeMaterials(const scene::PatchMaterials& materials);
   void takeLights();
@@ -63,6 +72,7 @@ class LinkedSolver final : public Solver {
   void startGrowth();
   [[nodiscard]] StepOutcome finishRound();
   [[nodiscard]] StepOutcome chooseNext();
+  [[nodiscard]] StepOutcome exhausted(SolveLimit limit);
 
   std::shared_ptr<const scene::PatchScene> patches_;
   Transport& transport_;
@@ -75,9 +85,12 @@ class LinkedSolver final : public Solver {
   NodeShots shots_;
   LinkSystem system_;
   LinkExpander expander_;
+  LinkMemory memory_;
   UnshotPyramid unshot_;
   LinkPlanner planner_;
   Phase phase_ = Phase::kLights;
+  SolveLimit limit_ = SolveLimit::kNone;
+  bool lights_fit_ = true;           // no light goes without links for want of memory
   std::vector<Measurement> wanted_;  // the wave under way
   std::size_t measured_ = 0;         // of the wave
   std::size_t slice_ = 16;           // measurements that take some 50 ms
@@ -85,6 +98,7 @@ class LinkedSolver final : public Solver {
   double share_part_ = 0.0;          // of all power, that one shooter should have
   double left_out_ = 0.0;            // relative error by nodes too weak to play roulette
   std::uint32_t rounds_ = 0;
+  std::uint64_t solutions_ = 0, sweeps_ = 0, replayed_ = 0;
   double varying_ = 0.0, net_unshot_ = 0.0;     // flux, all channels
   std::array<std::vector<glm::vec3>, 2> half_;  // irradiance by leaf value
   std::vector<glm::vec3> irradiance_;           // by node

@@ -9,8 +9,6 @@ namespace {
 
 /// A round may leave this part of the target error unshot: it is carried over, and small beside the sampling error.
 constexpr double kResidualShare = 0.3;
-/// Flux sums have headroom for this many rounds (RadiosityState::chooseFluxScale).
-constexpr std::uint32_t kMaxRounds = 1024;
 
 PlannerSettings plannerSettings(const SolverSettings& settings) {
   PlannerSettings planner = settings.planner;
@@ -71,7 +69,10 @@ double ShootingSolver::roundPower() const {
 
 Result<StepOutcome> ShootingSolver::step() {
   if (wave_.underWay()) return advanceWave();
-  if (phase_ == Phase::kDone) return StepOutcome::kConverged;
+  if (phase_ == Phase::kDone) {
+    const bool exhausted = !settings_.paper_mode && error_.total > settings_.target_error;
+    return exhausted ? StepOutcome::kExhausted : StepOutcome::kConverged;
+  }
   if (phase_ == Phase::kDirect) {
     planDirect();
   } else if (!planIndirect()) {

@@ -39,10 +39,15 @@ class ShootingSolver final : public Solver {
   [[nodiscard]] const TransportCounters& transportCounters() const override { return transport_counters_; }
   [[nodiscard]] const PlannerCounters& plannerCounters() const override { return planner_.counters(); }
   [[nodiscard]] std::uint32_t rounds() const override { return state_.rounds(); }
+  [[nodiscard]] SolveLimit limit() const override {
+    return state_.rounds() >= kMaxRounds ? SolveLimit::kRounds : SolveLimit::kNone;
+  }
   [[nodiscard]] bool hasFluxScale() const override { return true; }
 
  private:
   enum class Phase { kDirect, kIndirect, kDone };
+  /// Flux sums have headroom for this many rounds (RadiosityState::chooseFluxScale).
+  static constexpr std::uint32_t kMaxRounds = 1024;
   void planDirect();
   [[nodiscard]] bool planIndirect();
   void beginWave(ShotBatch batch, const std::array<double, 3>& emitted_before);

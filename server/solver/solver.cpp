@@ -22,7 +22,9 @@ std::unique_ptr<Solver> makeSolver(std::shared_ptr<const scene::PatchScene> patc
   if (settings.paper_mode || see_through || patches->leaves.size() * kLeafBytes * kMinShooters > settings.link_memory) {
     return std::make_unique<ShootingSolver>(std::move(patches), materials, transport, settings, sources);
   }
-  return std::make_unique<LinkedSolver>(std::move(patches), materials, transport, settings, sources);
+  auto linked = std::make_unique<LinkedSolver>(patches, materials, transport, settings, sources);
+  if (linked->lightBytes() <= settings.link_memory / 2) return linked;
+  return std::make_unique<ShootingSolver>(std::move(patches), materials, transport, settings, sources);
 }
 
 }  // namespace radiosity::solver

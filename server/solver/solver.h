@@ -23,8 +23,8 @@ struct SolverSettings {
   /// Gaussian over the unpushed irradiance. It stops when the residual reaches the target; its sampling error is what
   /// it is.
   bool paper_mode = false;
-  /// Bytes for remembered links. When they are used up no more nodes become shooters; a scene that could not even have
-  /// a few hundred is solved without.
+  /// Bytes that remembered links never exceed. When they are used up no more nodes become shooters; a scene that could
+  /// not even have a few hundred, or whose lights alone would take half of it, is solved without.
   std::size_t link_memory = std::size_t{1} << 30;
   PlannerSettings planner;
 };
@@ -35,6 +35,26 @@ enum class StepOutcome {
   kRoundDone,  ///< irradiance() and error() are new
   kConverged,  ///< and the error is at most the target
   kExhausted,  ///< nothing more can be done here; the error stays above the target
+};
+
+/// What keeps a solve above its target when it is exhausted.
+enum class SolveLimit {
+  kNone,
+  kLinkMemory,  ///< SolverSettings::link_memory
+  kRounds,      ///< as many rounds as sums have room for
+  kPatches,     ///< every node is split to its leaves, or no sample can lower the error any more
+};
+
+/// What is remembered, and what for, for reports.
+struct LinkCounters {
+  std::uint64_t bytes = 0;       ///< that all links take
+  std::uint64_t shooters = 0;    ///< that have links
+  std::uint64_t samples = 0;     ///< hemicubes or gathered polygons, or sequences of images of a light, taken for them
+  std::uint64_t solutions = 0;   ///< of the equation over the links: all bounces without another hemicube
+  std::uint64_t sweeps = 0;      ///< of these solutions
+  std::uint64_t replayed = 0;    ///< links of shooters used once more in these sweeps: as many shots were not shot
+  std::uint64_t rows = 0;        ///< of the equation, in each half
+  std::uint64_t rows_saved = 0;  ///< where reflectance is uniform one row serves three channels
 };
 
 class Solver {
@@ -63,6 +83,10 @@ class Solver {
   [[nodiscard]] virtual const TransportCounters& transportCounters() const = 0;
   [[nodiscard]] virtual const PlannerCounters& plannerCounters() const = 0;
   [[nodiscard]] virtual std::uint32_t rounds() const = 0;
+  /// Why the last step() said kExhausted.
+  [[nodiscard]] virtual SolveLimit limit() const = 0;
+  /// All zero where links are forgotten.
+  [[nodiscard]] virtual LinkCounters linkCounters() const { return {}; }
   /// Flux is kept as integers whose scale was chosen for the light at the start: very different light needs a new
   /// solver.
   [[nodiscard]] virtual bool hasFluxScale() const = 0;

@@ -148,7 +148,11 @@ struct TransportCounters {
   std::uint64_t point_images = 0, parallel_images = 0;  ///< of lights without extent
   std::uint64_t pixels = 0;                             ///< visibility samples rendered and accumulated
   std::uint64_t links = 0;                              ///< (shot, node) pairs that received flux
+  /// Summed over the faces of hemicubes, and over parallel images. Of those culled some lay between the sample points
+  /// of pixels, some behind others.
   std::uint64_t triangles_drawn = 0, triangles_culled = 0;
+  std::uint64_t triangles_between = 0, triangles_hidden = 0;
+  std::uint64_t faces = 0, faces_empty = 0;  ///< of hemicubes; those in which nothing is drawn
   double render_seconds = 0.0, accumulate_seconds = 0.0, gather_seconds = 0.0;
 
   TransportCounters& operator+=(const TransportCounters& other);

@@ -10,6 +10,7 @@
 
 #include "server/gpu/gpu_transport.h"
 #include "server/scene/document.h"
+#include "tests/gl/scene_builder.h"
 
 namespace radiosity::benchmarks {
 namespace {
@@ -46,6 +47,13 @@ const Patches& patchesOf(std::int64_t which) {
       must(scene::buildPatchScene(importedScene(which), chartOptions(which))));
   made.materials = scene::shadePatches(importedScene(which), *made.patches);
   return all.emplace(which, std::move(made)).first->second;
+}
+
+std::shared_ptr<const scene::PatchScene> roomOf(std::int64_t polygons) {
+  static std::map<std::int64_t, std::shared_ptr<const scene::PatchScene>> rooms;
+  auto& found = rooms[polygons];
+  if (!found) found = test::randomRoom(static_cast<std::uint32_t>(polygons), polygons <= 402 ? 13742 : 27382, 5);
+  return found;
 }
 
 std::unique_ptr<solver::Transport> makeTransport(std::int64_t workers, benchmark::State& state) {

@@ -14,8 +14,8 @@
 namespace radiosity::benchmarks {
 
 /// First argument of the benchmarks that work on real scenes.
-enum BuiltScene : std::int64_t { kCornell, kSmallRoom, kSeminarRoom };
-inline constexpr const char* kSceneNames[] = {"cornell", "room_small", "room_seminar"};
+enum BuiltScene : std::int64_t { kCornell, kSmallRoom, kSeminarRoom, kFurnace };
+inline constexpr const char* kSceneNames[] = {"cornell", "room_small", "room_seminar", "furnace"};
 
 /// Imported; a benchmark of the import makes its own.
 [[nodiscard]] const scene::Scene& importedScene(std::int64_t which);
@@ -27,6 +27,10 @@ struct Patches {
 /// With the patch counts of the paper's rooms, about (default options for the others). Kept for the whole program.
 [[nodiscard]] const Patches& patchesOf(std::int64_t which);
 [[nodiscard]] scene::ChartOptions chartOptions(std::int64_t which);
+
+/// A room full of small boxes, of about so many rectangles and about as many patches as the paper has for that. Kept
+/// for the whole program.
+[[nodiscard]] std::shared_ptr<const scene::PatchScene> roomOf(std::int64_t polygons);
 
 /// 0 workers: in this process. Null after a failure, with which the state is skipped.
 [[nodiscard]] std::unique_ptr<solver::Transport> makeTransport(std::int64_t workers, benchmark::State& state);

@@ -1,6 +1,6 @@
 """Writes FOLDER/rates.md, one table for each Google Benchmark result FOLDER/*_benchmark.json.
 
-    rates_table.py FOLDER
+    rates_table.py FOLDER [NAME]        NAME: also prints the tables of results whose name contains it
 """
 
 import json
@@ -44,7 +44,7 @@ def table(result):
     return lines
 
 
-def main(folder):
+def main(folder, wanted=None):
     results = sorted(folder.glob("*_benchmark.json"))
     text = ["# Rates", ""]
     for path in results:
@@ -52,8 +52,11 @@ def main(folder):
             result = json.loads(path.read_text())
             context = result["context"]
             load = ", ".join(f"{value:.1f}" for value in context.get("load_avg", []))
-            text += [f"## {path.stem}", "", f"{context['num_cpus']} cores, load {load or 'unknown'} when it began.", "",
-                     *table(result), ""]
+            section = [f"## {path.stem}", "", f"{context['num_cpus']} cores, load {load or 'unknown'} when it began.", "",
+                       *table(result), ""]
+            text += section
+            if wanted and wanted in path.stem:
+                print("\n".join(section))
         except (ValueError, KeyError) as error:
             text += [f"## {path.stem}", "", f"Not readable: {error!r}.", ""]  # a run that was cut short
     if results:
@@ -61,4 +64,4 @@ def main(folder):
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), *sys.argv[2:3])

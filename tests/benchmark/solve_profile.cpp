@@ -279,6 +279,8 @@ int profile(const std::string& file, std::map<std::string, std::string> options)
   settings.planner.light_points = static_cast<std::uint32_t>(number("--light-points", settings.planner.light_points));
   settings.planner.light_resolution =
       static_cast<std::uint32_t>(number("--light-resolution", settings.planner.light_resolution));
+  settings.planner.node_resolution =
+      static_cast<std::uint32_t>(number("--node-resolution", settings.planner.node_resolution));
   settings.planner.pairs_a_wave = static_cast<std::uint32_t>(number("--pairs", settings.planner.pairs_a_wave));
   settings.planner.level_bias = static_cast<float>(number("--bias", 0.0));
   begin = Clock::now();

@@ -1,22 +1,13 @@
 // Speed of light transport: shots/s and samples/s of scatter, points/s of gather, in rooms of 402 and 3138 polygons
-// (the sizes of the two scenes in Lum, Ma and Max 2002), of fewer and of more.
+// (the sizes of the two scenes in Lum, Ma and Max 2002), of 102 and of 60000.
 //   transport_benchmark --benchmark_filter=scatter/402
 #include <benchmark/benchmark.h>
-
-#include <map>
 
 #include "tests/benchmark/built_scenes.h"
 #include "tests/gl/scene_builder.h"
 
 namespace radiosity {
 namespace {
-
-std::shared_ptr<const scene::PatchScene> room(std::int64_t polygons) {
-  static std::map<std::int64_t, std::shared_ptr<const scene::PatchScene>> rooms;
-  auto& found = rooms[polygons];
-  if (!found) found = test::randomRoom(static_cast<std::uint32_t>(polygons), polygons <= 402 ? 13742 : 27382, 5);
-  return found;
-}
 
 void report(benchmark::State& state, const solver::TransportCounters& sum) {
   using benchmark::Counter;
@@ -25,18 +16,9 @@ void report(benchmark::State& state, const solver::TransportCounters& sum) {
   state.counters["us_render"] = 1e6 * sum.render_seconds / shots;
   state.counters["us_sum"] = 1e6 * (sum.accumulate_seconds + sum.gather_seconds) / shots;
   state.counters["links"] = static_cast<double>(sum.links) / shots;
+  state.counters["Msamples/s/core"] =
+      1e-6 * static_cast<double>(sum.pixels) / (sum.render_seconds + sum.accumulate_seconds + sum.gather_seconds);
   state.counters["triangles"] = static_cast<double>(sum.triangles_drawn) / shots;
-}
-
-void add(solver::TransportCounters& into, const solver::TransportCounters& from) {
-  into.scatter_shots += from.scatter_shots;
-  into.gather_points += from.gather_points;
-  into.pixels += from.pixels;
-  into.links += from.links;
-  into.triangles_drawn += from.triangles_drawn;
-  into.render_seconds += from.render_seconds;
-  into.accumulate_seconds += from.accumulate_seconds;
-  into.gather_seconds += from.gather_seconds;
 }
 
 void runBatch(benchmark::State& state, solver::Transport& transport, const scene::PatchScene& scene,
@@ -47,7 +29,7 @@ void runBatch(benchmark::State& state, solver::Transport& transport, const scene
   for (auto _ : state) {
     const auto counters = transport.run(batch, flux);
     if (!counters) return state.SkipWithError(counters.error().text().c_str());
-    add(sum, *counters);
+    sum += *counters;
   }
   report(state, sum);
   state.SetItemsProcessed(static_cast<std::int64_t>(sum.scatter_shots + sum.gather_points));
@@ -55,7 +37,7 @@ void runBatch(benchmark::State& state, solver::Transport& transport, const scene
 
 /// Arguments: polygons, resolution, workers.
 void scatter(benchmark::State& state) {
-  const auto scene = room(state.range(0));
+  const auto scene = benchmarks::roomOf(state.range(0));
   const auto carrier = benchmarks::makeTransport(state.range(2), state);
   if (!carrier || !carrier->setScene(scene)) return;
   std::mt19937 random(1);
@@ -73,7 +55,7 @@ void scatter(benchmark::State& state) {
 
 /// Arguments: polygons, resolution, workers. A ceiling lamp seen by every leaf, 64 points in 4 shots.
 void gather(benchmark::State& state) {
-  const auto scene = room(state.range(0));
+  const auto scene = benchmarks::roomOf(state.range(0));
   const auto carrier = benchmarks::makeTransport(state.range(2), state);
   if (!carrier || !carrier->setScene(scene)) return;
   std::mt19937 random(1);
@@ -99,12 +81,12 @@ void gather(benchmark::State& state) {
 
 BENCHMARK(scatter)
     ->ArgNames({"polygons", "resolution", "workers"})
-    ->ArgsProduct({{102, 402, 3138, 12006}, {32, 64, 128, 256}, benchmarks::workerCounts()})
+    ->ArgsProduct({{102, 402, 3138, 60000}, {32, 64, 128, 256}, benchmarks::workerCounts()})
     ->UseRealTime()
     ->Unit(benchmark::kMillisecond);
 BENCHMARK(gather)
     ->ArgNames({"polygons", "resolution", "workers"})
-    ->ArgsProduct({{402, 3138}, {128, 256}, benchmarks::workerCounts()})
+    ->ArgsProduct({{402, 3138, 60000}, {64, 128, 256}, benchmarks::workerCounts()})
     ->UseRealTime()
     ->Unit(benchmark::kMillisecond);
 

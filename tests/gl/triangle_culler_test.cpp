@@ -5,9 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <set>
 
 #include "server/gpu/closed_solids.h"
+#include "server/gpu/hemicube_renderer.h"
 #include "tests/gl/scene_builder.h"
 
 namespace radiosity::test {
@@ -59,35 +62,103 @@ bool mayBeSeen(const scene::PatchScene& scene, std::size_t triangle, const gpu::
 
 TEST(TriangleCuller, DrawsAllThatAFaceCanSee) {
   const auto scene = randomRoom(200, 200, 3);
-  gpu::TriangleCuller culler(*scene);
+  gpu::TriangleCuller culler(*scene, {.samples = false});
   std::mt19937 random(3);
   std::size_t drawn = 0;
+  gpu::TriangleCuller::Selection selection;
   for (int shot = 0; shot < 12; ++shot) {
     const auto frame = shotFrom(*scene, random() % 200, 0.4F, 0.3F, 64, random).frame;
     const auto axes = gpu::hemicubeAxes(frame);
-    std::vector<std::uint32_t> indices;
-    const auto counts = culler.cull(axes, indices);
-    auto next = indices.begin();
+    culler.select(frame, 64, selection);
     for (int face = 0; face < RAD_FACES; ++face) {
-      const auto count =
-          counts[static_cast<std::size_t>(face)].inside + counts[static_cast<std::size_t>(face)].crossing;
-      const std::vector<std::uint32_t> seen(next, next + count);
-      next += count;
-      drawn += count / 3;
+      std::set<std::array<std::uint32_t, 3>> seen;
+      for (const auto* lists : {&selection.first, &selection.second}) {
+        for (int crossing = 0; crossing < 2; ++crossing) {
+          const auto indices = (*lists)[static_cast<std::size_t>(2 * face + crossing)].valid();
+          for (std::size_t k = 0; k < indices.size(); k += 3) seen.insert({indices[k], indices[k + 1], indices[k + 2]});
+          drawn += indices.size() / 3;
+        }
+      }
       for (std::size_t i = 0; i < scene->triangles.size(); ++i) {
         const auto& first = scene->vertices[scene->indices[3 * i]];
         const bool back = glm::dot(first.normal, axes.origin - first.position) < 0.0F;
         if (back && culler.backHidden(i)) continue;
-        bool found = false;
-        for (std::size_t k = 0; k < seen.size() && !found; k += 3) {
-          found = std::equal(&seen[k], &seen[k] + 3, &scene->indices[3 * i]);
-        }
+        const auto* corners = &scene->indices[3 * i];
+        const bool found = seen.count({corners[0], corners[1], corners[2]}) > 0;
         EXPECT_TRUE(found || !mayBeSeen(*scene, i, axes, face)) << "triangle " << i << " face " << face;
       }
     }
-    EXPECT_EQ(next, indices.end());
   }
   EXPECT_LT(drawn, 12 * scene->triangles.size());  // and it does leave something out
+}
+
+TEST(TriangleClusters, HoldEveryTriangleOnceInsideTheirBoxes) {
+  const auto scene = randomRoom(402, 402, 7);
+  const auto made = gpu::makeClusters(*scene, 50);
+  std::vector<int> count(scene->triangles.size(), 0);
+  for (const auto& cluster : made.clusters) {
+    EXPECT_LE(cluster.count, 50U);
+    for (auto i = cluster.first; i < cluster.first + cluster.count; ++i) {
+      ++count[made.order[i]];
+      for (std::size_t k = 0; k < 3; ++k) {
+        const auto& corner = scene->vertices[scene->indices[3 * std::size_t{made.order[i]} + k]].position;
+        const auto outside = glm::abs(corner - cluster.centre) - cluster.extent;
+        EXPECT_LT(std::max({outside.x, outside.y, outside.z}), 1e-6F);
+      }
+    }
+  }
+  EXPECT_EQ(std::count(count.begin(), count.end(), 1), static_cast<std::ptrdiff_t>(count.size()));
+  scene::PatchScene empty;
+  EXPECT_TRUE(gpu::makeClusters(empty, 50).clusters.empty());
+}
+
+class CulledImages : public testing::Test {
+ protected:
+  void SetUp() override {
+    auto made = gpu::EglContext::create();
+    if (!made) GTEST_SKIP() << made.error().text();
+    context_ = std::move(*made);
+  }
+
+  /// Images of the views, one after the other.
+  std::vector<std::uint32_t> images(const std::shared_ptr<const scene::PatchScene>& scene, gpu::HemicubePass pass,
+                                    std::uint32_t resolution, const std::vector<gpu::HemicubeView>& views,
+                                    const gpu::Culling& culling) {
+    std::vector<std::uint32_t> all;
+    auto renderer = gpu::HemicubeRenderer::create(*context_);
+    auto uploaded = gpu::GpuScene::upload(*context_, scene);
+    if (!renderer || !uploaded || !renderer->setScene(std::move(*uploaded), culling)) return all;
+    counters_ = {};
+    const auto step = renderer->capacity(resolution);
+    for (std::size_t i = 0; i < views.size(); i += step) {
+      const auto some =
+          renderer->render(pass, resolution, std::span(views).subspan(i, std::min(step, views.size() - i)), counters_);
+      all.insert(all.end(), some.begin(), some.end());
+    }
+    return all;
+  }
+
+  std::unique_ptr<gpu::EglContext> context_;
+  solver::TransportCounters counters_;
+};
+
+TEST_F(CulledImages, AreThoseOfAllTriangles) {
+  const auto scene = randomRoom(6006, 6006, 11);  // enough for two steps, small enough to fall between samples
+  std::mt19937 random(5);
+  std::vector<gpu::HemicubeView> views;
+  for (int i = 0; i < 11; ++i) views.push_back({shotFrom(*scene, random() % 6006, 0.4F, 0.3F, 32, random).frame, 0.5F});
+  for (const std::uint32_t resolution : {16U, 32U, 96U}) {
+    for (const auto pass : {gpu::HemicubePass::kItems, gpu::HemicubePass::kNodes}) {
+      const auto all = images(scene, pass, resolution, views, {.samples = false, .hidden = false});
+      ASSERT_EQ(all.size(), views.size() * gpu::hemicubePixels(resolution));
+      const auto drawn = counters_.triangles_drawn, faced = drawn + counters_.triangles_culled;
+      EXPECT_EQ(images(scene, pass, resolution, views, {}), all);
+      EXPECT_GT(counters_.triangles_between, 0U);
+      EXPECT_GT(counters_.triangles_hidden, 0U);
+      EXPECT_EQ(counters_.triangles_drawn + counters_.triangles_between + counters_.triangles_hidden, drawn);
+      EXPECT_EQ(counters_.triangles_drawn + counters_.triangles_culled, faced);
+    }
+  }
 }
 
 }  // namespace

@@ -101,7 +101,7 @@ TEST(BatchChunks, CoverEveryShotOnce) {
   for (const std::size_t workers : {1U, 2U, 7U}) {
     std::size_t scatter = 0;
     std::size_t gather = 0;
-    for (const auto& chunk : gpu::cutBatch(batch, 120, workers)) {
+    for (const auto& chunk : gpu::cutBatch(batch, {120, 1000}, workers)) {
       auto& next = chunk.kind == gpu::ShotKind::kGather ? gather : scatter;
       EXPECT_EQ(chunk.first, next);
       EXPECT_GT(chunk.count, 0U);
@@ -110,7 +110,20 @@ TEST(BatchChunks, CoverEveryShotOnce) {
     EXPECT_EQ(scatter, batch.scatter.size());
     EXPECT_EQ(gather, batch.gather.size());
   }
-  EXPECT_TRUE(gpu::cutBatch({}, 0, 2).empty());
+  EXPECT_TRUE(gpu::cutBatch({}, {}, 2).empty());
+}
+
+TEST(BatchChunks, OfScenesWithManyNodesHaveFewShotsSoThatTheirLinksStaySmall) {
+  const auto scene = randomRoom(60, 2000, 1);
+  const auto batch = mixedBatch(*scene, 400);
+  const auto longest = [&](std::size_t nodes) {
+    std::size_t most = 0;
+    for (const auto& chunk : gpu::cutBatch(batch, {120, nodes}, 1)) most = std::max(most, chunk.count);
+    return most;
+  };
+  EXPECT_GT(longest(1000), 4U);
+  EXPECT_EQ(longest(1U << 20U), 4U);  // 4 MiB of links a shot
+  EXPECT_EQ(longest(1U << 26U), 1U);
 }
 
 TEST_F(Workers, AnyNumberOfWorkersGivesTheBitsOfOneProcess) {

@@ -83,6 +83,10 @@ class SolveTest(ServiceCase):
         self.assertGreater(report["error"]["total"], 1e-6)
         self.assertFalse(report["reached"])
 
+    def test_memoryForLinksThatIsNoSizeIsRefused(self):
+        _, errors = self.client("solve", self.scene, "-o", "lit.glb", "--link-memory", "much", expect=2)
+        self.assertIn("--link-memory", errors)
+
     def test_interruptionExits75AtOnceAndLeavesNothing(self):
         for number in (signal.SIGINT, signal.SIGTERM):
             process = self.start("solve", self.scene, "-o", "lit.glb", *ENDLESS)

@@ -46,6 +46,24 @@ TEST_F(Settings, TheTimeLimitStopsTheSolveShortOfItsTarget) {
   EXPECT_FALSE(engine().lightmaps()->final);
 }
 
+TEST_F(Settings, MemoryForLinksThatIsUsedUpEndsTheSolveAboveItsTargetAndAnEditGoesOn) {
+  ASSERT_TRUE(configure([](SolveSettings& settings) {
+    settings.link_memory_bytes = 200'000;
+    settings.target_error = kNever;
+  }));
+  ASSERT_TRUE(load(lumpedCube(0.5)));
+  ASSERT_TRUE(reaches(SolveState::kLimited));
+  const auto stopped = status();
+  EXPECT_NE(stopped.failure.find("--link-memory"), std::string::npos) << stopped.failure;
+  EXPECT_GT(stopped.error.total, kNever);
+  EXPECT_LE(stopped.counters.at("links.bytes"), 200'000.0);
+  ASSERT_TRUE(engine().lightmaps());
+  ASSERT_TRUE(configure([](SolveSettings& s) { s.target_error = kEasy; }));
+  EXPECT_TRUE(reaches(SolveState::kConverged));
+  EXPECT_TRUE(status().failure.empty());
+  EXPECT_GE(status().shots, stopped.shots);  // it did not start over
+}
+
 TEST_F(Settings, ARaisedTimeLimitLetsAStoppedSolveGoOn) {
   runOutOfTime();
   const auto stopped = status();

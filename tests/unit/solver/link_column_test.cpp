@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+
 #include <cmath>
 
 #include "tests/unit/solver/quad_scene.h"
@@ -34,7 +36,7 @@ class LinkColumns : public testing::Test {
   }
   [[nodiscard]] float leaf(const LinkColumn& column, std::uint32_t side, std::uint32_t at) const {
     std::vector<float> leaves(sides_[side].leaf_count);
-    return column.decode(side, leaves) ? leaves[at] : -1.0F;
+    return column.decode(sides_[side].first_value, leaves) ? leaves[at] : -1.0F;
   }
 
   test::QuadScene made_;
@@ -104,6 +106,42 @@ TEST_F(LinkColumns, TheMeanOfThousandsOfSamplesIsStillTheirMean) {
   for (int i = 0; i < 9'990; ++i) add(column, low, 1.0);  // nothing was seen
   // 10 in 10,000. Rounded to nearest it would stay where a ten-thousandth of it is less than half a last bit.
   EXPECT_NEAR(leaf(column, 0, 0), 0.001, 0.0003);
+}
+
+TEST(LinkRuns, OfSmallSidesAreJoinedWhereZerosTakeLessThanARunOfTheirOwn) {
+  std::vector<test::Quad> quads;
+  for (int i = 0; i < 60; ++i)
+    quads.push_back({{0.01F * static_cast<float>(i), 0, 0}, {0.01F, 0, 0}, {0, 0, 0.01F}, 1, 1, {}, {}});
+  const auto made = test::makeQuadScene(quads);
+  const auto sides = makeSides(*made.patches);
+  LinkExpander expander(*made.patches, sides);
+  const auto add = [&](LinkColumn& column, std::initializer_list<std::uint32_t> reached) {
+    LinkSample sample;
+    for (const auto s : reached) sample.add(sides[s].first_node, 0.5F);
+    expander.expand(sample);
+    column.add(expander, sample, 1.0, sides);
+  };
+  const auto link = [&](const LinkColumn& column, std::uint32_t s) {
+    std::array<float, 1> value{};
+    return column.decode(sides[s].first_value, value) ? value[0] : -1.0F;
+  };
+  LinkColumn column, other;
+  add(column, {1, 3, 50});
+  ASSERT_EQ(column.runs().size(), 2U);
+  EXPECT_EQ(column.runs()[0].side_count, 3U);
+  EXPECT_NEAR(link(column, 1), 0.5F, 1e-3F);
+  EXPECT_EQ(link(column, 2), 0.0F);
+  EXPECT_EQ(link(column, 30), -1.0F);
+  add(column, {2, 5, 50});  // joins what was there
+  ASSERT_EQ(column.runs().size(), 2U);
+  EXPECT_EQ(column.runs()[0].side_count, 5U);
+  for (const std::uint32_t s : {1U, 2U, 3U, 5U}) EXPECT_NEAR(link(column, s), 0.25F, 1e-3F) << s;
+  EXPECT_EQ(link(column, 4), 0.0F);
+  EXPECT_NEAR(link(column, 50), 0.5F, 1e-3F);
+  add(other, {0, 5, 40, 50, 59});
+  const std::vector<float> area(60, 2.0F);
+  EXPECT_NEAR(LinkColumn::product(column, other, area), 2.0 * (0.25 * 0.5 + 0.5 * 0.5), 1e-3);
+  EXPECT_NEAR(LinkColumn::product(other, column, area), 2.0 * (0.25 * 0.5 + 0.5 * 0.5), 1e-3);
 }
 
 TEST_F(LinkColumns, WhatACoarseNodeReceivesReachesAllLeavesBelowIt) {

@@ -1,0 +1,141 @@
+// LinkedSolver: its lights. They come, change and go by edits; those switched off keep their links.
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "server/solver/linked_solver.h"
+
+namespace radiosity::solver {
+namespace {
+
+/// So many lights that were moved away or switched off keep their links.
+constexpr std::ptrdiff_t kDarkSources = 8;
+
+}  // namespace
+
+/// Every light polygon that ever was is a shooter; its radiosity is what it emits now.
+void LinkedSolver::takeLights() {
+  for (auto& light : lights_) light.emission = glm::vec3(0.0F);
+  for (const auto& light : findLightPolygons(*patches_, sides_, emission_)) {
+    const auto known =
+        std::find_if(lights_.begin(), lights_.end(), [&](const LightPolygon& old) { return old.key == light.key; });
+    if (known != lights_.end()) {
+      known->emission = light.emission;
+      continue;
+    }
+    Shooter shooter;
+    shooter.light = static_cast<std::uint32_t>(lights_.size());
+    shooter.area = light.area;
+    shooter.most_bytes = memory_.mostBytes(light);
+    lights_.push_back(light);
+    (void)system_.add(shooter);
+  }
+  for (auto& shooter : system_.shooters()) {
+    if (shooter.light != scene::kNone) shooter.sent.fill(lights_[shooter.light].emission);
+  }
+}
+
+std::size_t LinkedSolver::lightBytes() const {
+  std::size_t bytes = 0;
+  for (const auto& shooter : system_.shooters()) bytes += shooter.isLight() ? 2 * shooter.most_bytes : 0;
+  return bytes;
+}
+
+/// So is every light without extent.
+void LinkedSolver::takeSources(const LightSources& sources) {
+  for (auto& source : sources_) source.intensity = glm::dvec3(0.0);
+  for (const auto& source : punctual_.makeSources(*patches_, sources)) {
+    const auto known =
+        std::find_if(sources_.begin(), sources_.end(), [&](const auto& old) { return old.sameShape(source); });
+    if (known != sources_.end()) {
+      known->intensity = source.intensity;
+      continue;
+    }
+    addSource(source);
+  }
+  for (auto& shooter : system_.shooters()) {
+    if (shooter.source != scene::kNone) shooter.sent.fill(glm::vec3(sources_[shooter.source].intensity));
+  }
+}
+
+/// In the place of one that is dark, once there are some: a lamp that is dragged about leaves no trail.
+void LinkedSolver::addSource(const PunctualLights::Source& source) {
+  const auto dark = [&](const PunctualLights::Source& s) { return s.intensity == glm::dvec3(0.0); };
+  if (std::count_if(sources_.begin(), sources_.end(), dark) >= kDarkSources) {
+    const auto old = std::find_if(sources_.begin(), sources_.end(), dark);
+    for (std::uint32_t n = 0; n < system_.shooters().size(); ++n) {
+      auto& shooter = system_.shooters()[n];
+      if (shooter.source != static_cast<std::uint32_t>(old - sources_.begin())) continue;
+      system_.forget(n);
+      shooter.area = source.flux_per_intensity;
+    }
+    *old = source;
+    return;
+  }
+  Shooter shooter;
+  shooter.source = static_cast<std::uint32_t>(sources_.size());
+  shooter.area = source.flux_per_intensity;
+  shooter.most_bytes = memory_.mostBytes();
+  sources_.push_back(source);
+  (void)system_.add(shooter);
+}
+
+/// One sequence of shots of a light without extent.
+Result<void> LinkedSolver::measureSource(const Measurement& want) {
+  const auto& source = sources_[system_.shooters()[want.shooter].source];
+  ShotBatch batch;
+  batch.flux_scale = kMeasureScale * std::exp2(-std::ceil(std::log2(std::max(1.0, source.flux_per_intensity))));
+  punctual_.addSample(source, want.index, static_cast<std::uint32_t>(want.half), batch);
+  FluxAccumulators flux;
+  flux.reset(patches_->nodeCount());
+  const auto done = transport_.run(batch, flux);
+  if (!done) return tl::unexpected<Error>(done.error());
+  counters_ += *done;
+  LinkSample links;
+  for (std::uint32_t node = 0; node < patches_->nodeCount(); ++node)
+    links.addFlux(node, flux.node[want.half][node][0], *patches_);
+  links.escaped += static_cast<double>(flux.escaped[0]) / kMeasureScale;
+  links.absorbed += static_cast<double>(flux.backface[0]) / kMeasureScale;
+  // The shots of a half carry half of an intensity of one.
+  links.scale(2.0 * kMeasureScale / batch.flux_scale);
+  expander_.expand(links);
+  system_.addSample(want.shooter, want.half, expander_, links, want.points);
+  return {};
+}
+
+/// Nobody can do without light: where there is no room for its links, the weakest shooters lose theirs.
+std::vector<Measurement> LinkedSolver::planLights() {
+  auto wanted = planner_.firstLight(system_);
+  lights_fit_ = true;
+  std::array<std::uint32_t, 2> last{scene::kNone, scene::kNone};  // by half; all samples of a light come together
+  std::array<bool, 2> fits{};
+  std::erase_if(wanted, [&](const Measurement& want) {
+    if (last[want.half] != want.shooter) {
+      last[want.half] = want.shooter;
+      const auto take = [&] { return memory_.takeSample(system_.shooters()[want.shooter], want.half); };
+      while (!(fits[want.half] = take()) && forgetWeakest()) continue;
+    }
+    lights_fit_ = lights_fit_ && fits[want.half];
+    return !fits[want.half];
+  });
+  return wanted;
+}
+
+/// Those that only correct a shooter above them go first: it still stands for them. False: none has links.
+bool LinkedSolver::forgetWeakest() {
+  std::uint32_t weakest = scene::kNone;
+  const auto& shooters = system_.shooters();
+  const auto worth = [&](std::uint32_t n) {
+    return std::pair(shooters[n].parent == scene::kNone, shooters[n].power());
+  };
+  for (std::uint32_t n = 0; n < shooters.size(); ++n) {
+    if (shooters[n].isLight() || shooters[n].column[0].bytes() + shooters[n].column[1].bytes() == 0) continue;
+    if (weakest == scene::kNone || worth(n) < worth(weakest)) weakest = n;
+  }
+  if (weakest == scene::kNone) return false;
+  memory_.giveBack(shooters[weakest].column[0].bytes() + shooters[weakest].column[1].bytes());
+  system_.forget(weakest);
+  return true;
+}
+
+}  // namespace radiosity::solver
