@@ -18,6 +18,7 @@ struct HttpRequest {
   std::string path;                          ///< "/scene.glb", percent-decoded
   std::map<std::string, std::string> query;  ///< percent-decoded
   std::string content_type, name;            ///< name: header X-Name, or ?name=
+  std::string accept_encoding, if_none_match;
   Bytes body;
 };
 

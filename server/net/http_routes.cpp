@@ -11,6 +11,7 @@
 #include "server/net/convert.h"
 #include "server/net/metrics.h"
 #include "server/net/status_page.h"
+#include "server/net/viewer_files.h"
 
 namespace radiosity::net {
 namespace {
@@ -57,7 +58,11 @@ std::string queryText(const HttpRequest& request, const char* key, std::string o
 
 // ---- handlers ----
 
-void getPage(const std::shared_ptr<Hub>& hub, HttpRequest& /*request*/, const Respond& done) {
+void getViewer(const std::shared_ptr<Hub>& /*hub*/, HttpRequest& request, const Respond& done) {
+  done(viewerResponse(request));
+}
+
+void getStatus(const std::shared_ptr<Hub>& hub, HttpRequest& /*request*/, const Respond& done) {
   HttpResponse response;
   response.content_type = "text/html; charset=utf-8";
   response.text = statusPage(hub->engine().status(), hub->viewerCount(), hub->options().version);
@@ -163,7 +168,10 @@ struct Route {
 };
 
 constexpr std::array kRoutes = {
-    Route{"/", "GET", getPage},
+    Route{"/", "GET", getViewer, true},  // the viewer holds no secrets, and asks for the token itself
+    Route{"/assets/", "GET", getViewer, true},
+    Route{"/favicon.svg", "GET", getViewer, true},
+    Route{"/status", "GET", getStatus},
     Route{"/scene", "PUT", putScene},
     Route{"/uploads", "PUT", putUpload},
     Route{"/scene.gltf", "GET", getSceneGltf},

@@ -16,7 +16,7 @@ using Respond = std::function<void(HttpResponse)>;
 /// Looks at a request before its body is read: 404, 405 with Allow, or 415; nothing when it may go on.
 [[nodiscard]] std::optional<HttpResponse> refusal(const HttpRequest& request);
 
-/// Whether the token is needed: everywhere but for the probes.
+/// Whether the token is needed: everywhere but for the probes and the viewer's own files.
 [[nodiscard]] bool needsToken(const HttpRequest& request);
 
 /// Answers a request for which refusal() found nothing.

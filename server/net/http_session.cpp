@@ -134,6 +134,8 @@ void HttpSession::onHeader(BoostError error) {
   if (!request) return send(errorResponse(request.error()), true);
   request_ = std::move(*request);
   request_.content_type = field(http::field::content_type);
+  request_.accept_encoding = field(http::field::accept_encoding);
+  request_.if_none_match = field(http::field::if_none_match);
   const auto named = request_.query.find("name");
   request_.name = named != request_.query.end() ? named->second : std::string(view(message["X-Name"]));
   if (request_.name.empty()) request_.name = "upload";
@@ -244,7 +246,7 @@ void HttpSession::prepare(bool close) {
   m.result(static_cast<unsigned>(response_.status));
   m.keep_alive(!close);
   m.body() = beast::span<const char>(data, size);
-  if (response_.status != 204) m.content_length(size);
+  if (response_.status != 204 && response_.status != 304) m.content_length(size);
   m.set(http::field::date, httpDate());
   m.set(http::field::server, "radiosityd/" + hub_->options().version);
   if (size > 0) m.set(http::field::content_type, response_.content_type);

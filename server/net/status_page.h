@@ -1,4 +1,4 @@
-// GET /: what the server is doing, as a page that needs no script.
+// GET /status: what the server is doing, as a page that needs no script.
 #pragma once
 
 #include <string>

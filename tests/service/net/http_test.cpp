@@ -34,6 +34,7 @@ TEST(Http, EveryRouteAnswersWithItsType) {
     const char* type;
     const char* content;
   } routes[] = {{"/", "text/html", "radiosityd"},
+                {"/status", "text/html", "Scene revision"},
                 {"/scene.gltf", "model/gltf+json", "asset"},
                 {"/scene.glb", "model/gltf-binary", "glTF scene"},
                 {"/scene-unlit.glb?x=1", "model/gltf-binary", "glTF unlit"},
@@ -171,16 +172,46 @@ TEST(Http, AHeaderThatDripsInIsCutOff) {
   EXPECT_TRUE(http.closed(Seconds(20)));
 }
 
-TEST(Http, TheTokenGuardsAllButTheProbes) {
+TEST(Http, TheTokenGuardsAllButTheProbesAndTheViewer) {
   RunningServer server(withToken());
-  for (const auto* target : {"/", "/scene.glb", "/metrics", "/nothing"})
+  for (const auto* target : {"/status", "/scene.glb", "/metrics", "/nothing"})
     EXPECT_EQ(request(server.port(), "GET", target).status, 401) << target;
   EXPECT_EQ(request(server.port(), "PUT", "/scene", {}, "x").status, 401);
   EXPECT_EQ(request(server.port(), "GET", "/metrics", "Authorization: Bearer wrong\r\n").status, 401);
   EXPECT_EQ(request(server.port(), "GET", "/healthz").status, 200);
   EXPECT_EQ(request(server.port(), "GET", "/readyz").status, 200);
+  EXPECT_EQ(request(server.port(), "GET", "/").status, 200);  // the page asks for the token
+  EXPECT_EQ(request(server.port(), "GET", "/assets/none.js").status, 404);
   const auto good = std::string("Authorization: Bearer ") + kSecret + "\r\n";
   EXPECT_EQ(request(server.port(), "GET", "/metrics", good).status, 200);
+}
+
+TEST(Http, TheViewerIsSentOnceAndPackedToThoseWhoTakeIt) {
+  RunningServer server;
+  const auto plain = request(server.port(), "GET", "/");
+  EXPECT_THAT(plain.header("Content-Security-Policy"), HasSubstr("default-src 'none'"));
+  EXPECT_EQ(plain.header("X-Content-Type-Options"), "nosniff");
+  EXPECT_EQ(plain.header("Cache-Control"), "no-cache");
+  EXPECT_EQ(plain.header("Content-Encoding"), "");
+  const auto tag = plain.header("ETag");
+  ASSERT_FALSE(tag.empty());
+
+  for (const auto& matching : {tag, "\"other\", W/" + tag, std::string("*")}) {
+    const auto again = request(server.port(), "GET", "/", "If-None-Match: " + matching + "\r\n");
+    EXPECT_EQ(again.status, 304) << matching;
+    EXPECT_EQ(again.body, "");
+    EXPECT_EQ(again.header("ETag"), tag);
+  }
+  EXPECT_EQ(request(server.port(), "GET", "/", "If-None-Match: \"other\"\r\n").status, 200);
+
+  for (const auto* refusing : {"", "Accept-Encoding: br\r\n", "Accept-Encoding: gzip;q=0\r\n"})
+    EXPECT_EQ(request(server.port(), "GET", "/", refusing).body, plain.body) << refusing;
+  const auto packed = request(server.port(), "GET", "/", "Accept-Encoding: br, gzip\r\n");
+  if (packed.header("Content-Encoding") == "gzip") {  // not where the viewer was not built
+    EXPECT_EQ(packed.body.substr(0, 2), "\x1f\x8b");
+    EXPECT_EQ(packed.header("Vary"), "Accept-Encoding");
+  }
+  EXPECT_EQ(request(server.port(), "GET", "/assets/../index.html").status, 404);
 }
 
 TEST(Http, APageOfAnotherSiteMayNotSendScenes) {

@@ -1,0 +1,350 @@
+// The viewer as a whole: what comes from the server goes to the picture and the panels, and what the user does goes to
+// the server. One for a page.
+
+import { EditSession } from './app_edit';
+import { ViewSession } from './app_view';
+import type { Gltf } from './document/gltf';
+import { Connection, type LinkState } from './protocol/connection';
+import type {
+  HelloReply,
+  LightmapsNote,
+  Notifications,
+  Patch,
+  Progress,
+  Resume,
+  ScenePatchReply,
+  ServerInfo,
+  Settings,
+  Status,
+  SubscribeParams,
+} from './protocol/messages';
+import { ConnectionLost } from './protocol/rpc';
+import { TileFeed } from './tiles/tile_feed';
+import { Frame } from './ui/frame';
+import { percent, readable } from './ui/dom';
+import { SharePanel } from './ui/share_panel';
+import { SolvePanel, stateName } from './ui/solve_panel';
+import { Share } from './app_share';
+import type { LightmapSet } from './view/lightmap_set';
+import { MOST_MIPS } from './view/lightmap_page';
+import { Viewer } from './view/viewer';
+
+/** Below this the network is slow: fewer versions of the light are asked for. Bytes a second. */
+const SLOW_RATE = 400_000;
+const SLOW_HZ = 2;
+
+export class App {
+  readonly connection: Connection;
+  readonly frame: Frame;
+  readonly viewer: Viewer;
+  readonly view: ViewSession;
+  readonly edit: EditSession;
+  readonly share: Share;
+  readonly solve: SolvePanel;
+  progress: Progress | undefined;
+  /** For tests and for the console: what happened when, milliseconds since the page began. */
+  readonly marks: Record<string, number> = {};
+  private readonly tiles: TileFeed;
+  private resume: Resume | undefined;
+  private token = readToken();
+  private slow = false;
+  private everOpen = false;
+  private epoch = '';
+  private awaited: (() => void)[] = [];
+
+  constructor() {
+    // Nobody else has this name, so the page knows its own patches when it is told of them.
+    const me = `viewer ${Math.random().toString(36).slice(2, 6)}`;
+    // First of all: while the server answers, the page builds itself. Nothing comes in before this is done.
+    this.connection = new Connection(
+      {
+        url: `${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws`,
+        client: me,
+        token: () => this.token,
+        resume: () => this.resume,
+        subscription: () => this.subscription(),
+      },
+      {
+        state: (state, detail) => this.onLink(state, detail),
+        ready: (info, hello) => void this.onReady(info, hello),
+        notification: (method, params) => this.onNotification(method, params),
+        tile: (frame) => {
+          if (!('firstTile' in this.marks)) this.mark('firstTile');
+          this.tiles.push(frame);
+        },
+      },
+    );
+    this.connection.open();
+    this.solve = new SolvePanel({
+      pauseOrResume: () => this.pauseOrResume(),
+      restart: () => void this.ask('solve.restart'),
+      configure: (settings) => void this.configure(settings),
+    });
+    this.view = new ViewSession(this);
+    this.edit = new EditSession(this, me, (patch, id) => this.sendPatch(patch, id));
+    const sharePanel = new SharePanel({
+      copyLink: () => void this.share.copyLink(),
+      copyEdit: (form) => void this.share.copyEdit(form),
+      download: (what) => void this.share.download(what),
+    });
+    this.frame = new Frame(
+      {
+        toggleWalk: () => this.view.toggleWalk(),
+        frameAll: () => this.view.frameAll(),
+        gizmo: (mode) => this.edit.setGizmo(mode),
+        toggleMeter: () => this.view.toggleMeter(),
+        addLamp: () => void this.edit.addLamp(),
+        undo: () => void this.edit.undo(),
+        redo: () => void this.edit.redo(),
+      },
+      {
+        View: this.view.panel.element,
+        Solve: this.solve.element,
+        Scene: this.edit.panel.element,
+        Share: sharePanel.element,
+      },
+    );
+    this.viewer = new Viewer(this.frame.canvas, {
+      used: (bytes) => this.connection.used(bytes),
+      drawn: () => this.view.onDrawn(),
+      sceneShown: (scene) => {
+        this.view.onSceneShown(scene);
+        this.edit.onSceneShown();
+        this.mark('geometry');
+      },
+      gizmoDragging: (active) => this.edit.onGizmoDragging(active),
+      gizmoChanged: (object, mode) => this.edit.onGizmoChanged(object, mode),
+      contextLost: (lost) =>
+        this.frame.setBanner(lost ? 'The graphics card was taken away; waiting for it to come back.' : undefined),
+    });
+    this.share = new Share(this, sharePanel);
+    this.tiles = new TileFeed({
+      set: (kind) => this.viewer.setOf(kind),
+      dropped: (bytes, reason) => {
+        this.connection.used(bytes);
+        if (reason) console.warn(`a tile was dropped: ${reason}`);
+      },
+      queued: () => this.viewer.invalidate(),
+    });
+    this.view.start();
+    this.edit.start();
+    document.addEventListener('visibilitychange', () => this.onVisible());
+    window.addEventListener('online', () => this.connection.open());
+  }
+
+  mark(name: string): void {
+    this.marks[name] ??= performance.now();
+  }
+
+  /** A call whose refusal is shown. */
+  async ask<T>(method: string, params: object = {}): Promise<T | undefined> {
+    try {
+      return await this.connection.call<T>(method, params);
+    } catch (error) {
+      this.frame.toasts.show((error as Error).message, 'bad');
+      return undefined;
+    }
+  }
+
+  /** HTTP with the token, where there is one. Rejects with what the server says is wrong. */
+  async fetch(path: string, init: RequestInit = {}): Promise<Response> {
+    const headers = new Headers(init.headers);
+    if (this.token) headers.set('Authorization', `Bearer ${this.token}`);
+    const response = await fetch(path, { ...init, headers, cache: 'no-store' });
+    if (response.ok) return response;
+    const body = (await response.json().catch(() => undefined)) as
+      | { error?: { message: string; where?: string } }
+      | undefined;
+    const { message, where } = body?.error ?? { message: `HTTP ${response.status}` };
+    throw new Error(where ? `${where}: ${message}` : message);
+  }
+
+  /** Streams the quantity that the view needs. */
+  async resubscribe(): Promise<void> {
+    if (this.connection.isOpen) await this.connection.subscribe().catch(() => undefined);
+  }
+
+  private subscription(): SubscribeParams {
+    const base = this.viewer.set?.baseMip ?? 0;
+    return {
+      minMip: base,
+      maxMip: Math.min(16, base + MOST_MIPS - 1),
+      quantity: this.viewer.dataSet?.quantity ?? 'irradiance',
+      maxHz: document.hidden ? 0.5 : this.slow ? SLOW_HZ : 0,
+    };
+  }
+
+  private onLink(state: LinkState, detail: string): void {
+    if (state === 'open') {
+      this.frame.setBanner(undefined);
+      if (this.everOpen) this.frame.toasts.show('Connected again', 'good');
+      this.everOpen = true;
+    } else if (state === 'waiting') {
+      this.frame.setState('Not connected', 'bad');
+      this.frame.setBanner(`No connection: ${detail}.`, 'Try now', () => this.connection.open());
+    } else if (state === 'refused') {
+      this.frame.setState('Not connected', 'bad');
+      this.frame.askToken(detail, (token) => this.giveToken(token));
+    } else if (!this.everOpen) {
+      this.frame?.setState('Connecting', 'busy'); // the first time there is no page yet
+    }
+  }
+
+  private giveToken(token: string): void {
+    this.token = token;
+    sessionStorage.setItem('token', token);
+    this.connection.open();
+  }
+
+  private async onReady(info: ServerInfo, hello: HelloReply): Promise<void> {
+    this.mark('ready');
+    if (this.epoch !== '' && this.epoch !== hello.epoch) this.resume = undefined;
+    this.epoch = hello.epoch;
+    if (!hello.resumed) this.viewer.forgetLayout();
+    for (const resolve of this.awaited.splice(0)) resolve();
+    this.view.onCapabilities();
+    this.share.onServer(info);
+    this.frame.setWelcome(hello.revision === 0);
+    const status = await this.connection.call<Status>('status').catch(() => undefined);
+    if (status) this.onStatus(status);
+    if (!hello.resumed && hello.revision > 0) await this.fetchDocument();
+    const { count } = await this.connection.call<{ count: number }>('viewers').catch(() => ({ count: 1 }));
+    this.frame.setViewers(count);
+  }
+
+  private onStatus(status: Status): void {
+    this.solve.setSettings(status.settings);
+    this.solve.setWarnings(status.warnings, status.warningCount);
+    this.onProgress(status);
+  }
+
+  private onNotification<K extends keyof Notifications>(method: K, params: Notifications[K]): void {
+    const handlers: { [M in keyof Notifications]?: (note: Notifications[M]) => void } = {
+      progress: (note) => this.onProgress(note),
+      'scene.patched': (note) => this.edit.onPatched(note, () => void this.fetchDocument()),
+      'scene.loaded': () => void this.onLoaded(),
+      lightmaps: (note) => void this.onLightmaps(note),
+      bookmark: (note) => this.onBookmark(note.revision, note.tileVersion),
+      viewers: (note) => this.frame.setViewers(note.count),
+      draining: () => this.frame.toasts.show('The server is stopping'),
+    };
+    handlers[method]?.(params);
+  }
+
+  private onProgress(progress: Progress): void {
+    this.progress = progress;
+    this.solve.update(progress);
+    const done = progress.state === 'converged' || progress.state === 'timeLimit';
+    const bad = progress.state === 'failed';
+    const error = progress.state === 'empty' ? '' : `${percent(progress.error.total)} error`;
+    const rate = progress.state === 'solving' ? `${readable(progress.shotsPerSecond, 2)} shots/s` : '';
+    this.frame.setState(
+      stateName(progress.state),
+      bad ? 'bad' : done ? 'good' : progress.state === 'solving' ? 'busy' : 'idle',
+      error,
+      rate,
+    );
+    this.adaptToNetwork();
+  }
+
+  /** On a slow line intermediate versions are left out; moving about needs no network at all. */
+  private adaptToNetwork(): void {
+    const { rate } = this.connection.credit;
+    const slow = rate > 0 && rate < (this.slow ? 1.5 : 1) * SLOW_RATE;
+    if (slow === this.slow) return;
+    this.slow = slow;
+    void this.resubscribe();
+    if (slow) this.frame.toasts.show('Slow network: light is updated less often');
+  }
+
+  private async onLoaded(): Promise<void> {
+    this.frame.setWelcome(false);
+    this.resume = undefined;
+    await this.fetchDocument();
+    const status = await this.connection.call<Status>('status').catch(() => undefined);
+    if (status) this.onStatus(status);
+  }
+
+  async fetchDocument(): Promise<void> {
+    try {
+      const reply = await this.connection.call<{ revision: number; gltf?: Gltf; url?: string }>('scene.get');
+      const gltf = reply.gltf ?? ((await (await this.fetch(reply.url!)).json()) as Gltf);
+      this.edit.document.reset(gltf, reply.revision);
+    } catch (error) {
+      if (!(error instanceof ConnectionLost)) this.frame.toasts.show(`The scene: ${(error as Error).message}`, 'bad');
+    }
+  }
+
+  private async onLightmaps(note: LightmapsNote): Promise<void> {
+    const set = this.viewer.expectLayout(note);
+    if (!set) return;
+    if (set.baseMip > 0) await this.resubscribe();
+    await this.loadGeometry(note, set);
+  }
+
+  private async loadGeometry(note: LightmapsNote, set: LightmapSet): Promise<void> {
+    try {
+      const glb = await (await this.fetch(note.uvs)).arrayBuffer();
+      if (this.viewer.set === set) await this.viewer.load(glb, set);
+    } catch (error) {
+      if (this.viewer.set === set) this.frame.toasts.show(`The geometry: ${(error as Error).message}`, 'bad');
+    }
+  }
+
+  private onBookmark(revision: number, tileVersion: number): void {
+    // Tiles on their way through the decoder belong to this bookmark, too.
+    this.tiles.afterAll(() => {
+      const set = this.viewer.dataSet ?? this.viewer.set;
+      if (set) set.complete = true;
+      if (set?.quantity === 'irradiance') this.resume = { epoch: this.epoch, revision, tileVersion };
+    });
+  }
+
+  private onVisible(): void {
+    if (!document.hidden) {
+      this.connection.open();
+      void this.connection.check();
+      this.viewer.invalidate();
+    }
+    void this.resubscribe();
+  }
+
+  private pauseOrResume(): void {
+    void this.ask(this.progress?.state === 'paused' ? 'solve.resume' : 'solve.pause');
+  }
+
+  togglePause(): void {
+    if (this.progress?.state === 'paused' || this.progress?.state === 'solving') this.pauseOrResume();
+  }
+
+  private async configure(settings: Partial<Settings>): Promise<void> {
+    const all = await this.ask<Settings>('solve.configure', settings);
+    if (all) this.solve.setSettings(all);
+  }
+
+  /** A lost answer is asked for again with the same id, which the server does once. */
+  private async sendPatch(patch: Patch, requestId: string): Promise<ScenePatchReply> {
+    const epoch = this.epoch;
+    for (;;) {
+      if (!this.connection.isOpen) await new Promise<void>((resolve) => this.awaited.push(resolve));
+      if (this.epoch !== epoch) throw new Error('the server has started again and does not know this scene');
+      try {
+        return await this.connection.call<ScenePatchReply>('scene.patch', { patch, requestId });
+      } catch (error) {
+        if (!(error instanceof ConnectionLost) && this.connection.isOpen) throw error;
+      }
+    }
+  }
+}
+
+/** From the link (#token=...), where it does not stay to be seen, or from this tab's memory. */
+function readToken(): string | undefined {
+  const hash = new URLSearchParams(location.hash.slice(1));
+  const token = hash.get('token');
+  if (token) {
+    sessionStorage.setItem('token', token);
+    hash.delete('token');
+    history.replaceState(null, '', `#${hash}`);
+  }
+  return token ?? sessionStorage.getItem('token') ?? undefined;
+}

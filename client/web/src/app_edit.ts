@@ -1,0 +1,226 @@
+// Selecting and changing: the scene's document, the gizmo, undo, files dropped on the page. Part of the App.
+
+import { Vector3, type Object3D } from 'three';
+import type { App } from './app';
+import * as edits from './document/edits';
+import { hangingNodes, lightOf, nodeName, type Vec3, type Vec4 } from './document/gltf';
+import { SceneDocument, type SendPatch } from './document/scene_document';
+import type { Patch, ScenePatchedNote } from './protocol/messages';
+import { ScenePanel, type Selection } from './ui/scene_panel';
+import type { GizmoMode } from './view/gizmo';
+
+export class EditSession {
+  readonly panel: ScenePanel;
+  readonly document: SceneDocument;
+  selection: Selection | undefined;
+
+  constructor(
+    private readonly app: App,
+    private readonly me: string,
+    send: SendPatch,
+  ) {
+    this.document = new SceneDocument(me, send, {
+      changed: (pointers) => this.onChanged(pointers),
+      refused: (label, reason) => app.frame.toasts.show(`${label}: ${reason}`, 'bad'),
+      historyChanged: () => this.onHistory(),
+    });
+    this.panel = new ScenePanel({
+      select: (selection) => this.select(selection),
+      setColour: (material, rgb) =>
+        this.make('Colour', edits.setColour(material, this.document.gltf, rgb), `colour ${material}`),
+      setEmission: (material, rgb, strength) =>
+        this.make('Emission', edits.setEmission(material, rgb, strength), `emission ${material}`),
+      setLight: (light, change) =>
+        this.make('Light', edits.setLight(light, change), `light ${light} ${Object.keys(change).join()}`),
+      setPlacement: (node, placement) => this.make('Placement', edits.setPlacement(node, placement)),
+      setVisible: (node, visible) =>
+        this.make(visible ? 'Show' : 'Hide', edits.setVisible(this.document.gltf, node, visible)),
+      remove: (node) => this.remove(node),
+      addLamp: () => void this.addLamp(),
+      endGesture: () => this.document.endGesture(),
+      loadFile: (file) => void this.loadFile(file),
+    });
+  }
+
+  start(): void {
+    this.panel.setSelection(undefined);
+    window.addEventListener('dragover', (event) => {
+      event.preventDefault();
+      document.body.classList.add('dropping');
+    });
+    for (const type of ['dragleave', 'drop'] as const)
+      window.addEventListener(type, () => document.body.classList.remove('dropping'));
+    window.addEventListener('drop', (event) => {
+      event.preventDefault();
+      const file = event.dataTransfer?.files[0];
+      if (file) void this.loadFile(file);
+    });
+  }
+
+  onPatched(note: ScenePatchedNote, fetchAnew: () => void): void {
+    if (!this.document.patched(note.revision, note.patch, note.by)) fetchAnew();
+    if (note.by !== this.me)
+      this.app.frame.toasts.show(
+        `${note.by || 'Someone'} changed ${edits.describePatch(this.document.gltf, note.patch)}`,
+      );
+  }
+
+  /** The objects are new; what was selected may still be there. */
+  onSceneShown(): void {
+    this.app.viewer.applyDocument(this.document.gltf, []);
+    this.panel.setDocument(this.document.gltf, (node) => this.materialsOf(node));
+    this.app.viewer.select(this.selection?.node);
+  }
+
+  // ---- selection ----
+
+  select(selection: Selection | undefined): void {
+    this.selection = selection;
+    this.app.viewer.select(selection?.node);
+    this.panel.setSelection(selection);
+    if (selection && this.app.frame.panelOpen) this.app.frame.showTab('Scene');
+  }
+
+  selectHit(object: Object3D | undefined): void {
+    const scene = this.app.viewer.shown;
+    const node = object && scene?.nodeOf(object);
+    this.select(node === undefined ? undefined : { node, material: object && scene?.materialIndexOf(object) });
+  }
+
+  /** For those who have no pointer. */
+  selectNext(step: number): void {
+    const nodes = hangingNodes(this.document.gltf)
+      .map(({ node }) => node)
+      .filter((node) => this.document.gltf.nodes?.[node]?.mesh !== undefined || lightOf(this.document.gltf, node));
+    if (nodes.length === 0) return;
+    const at = this.selection ? nodes.indexOf(this.selection.node) : -1;
+    const node = nodes[at < 0 ? (step > 0 ? 0 : nodes.length - 1) : (at + step + nodes.length) % nodes.length]!;
+    this.select({ node, material: this.materialsOf(node)[0] });
+  }
+
+  private materialsOf(node: number): number[] {
+    const mesh = this.document.gltf.nodes?.[node]?.mesh;
+    const primitives = mesh === undefined ? [] : (this.document.gltf.meshes?.[mesh]?.primitives ?? []);
+    return [...new Set(primitives.flatMap((primitive) => primitive.material ?? []))];
+  }
+
+  // ---- changes ----
+
+  private make(label: string, patch: Patch, key?: string): void {
+    this.document.edit(label, patch, key).catch(() => undefined); // the refusal was shown
+  }
+
+  setGizmo(mode: GizmoMode): void {
+    this.app.viewer.gizmo.setMode(mode);
+    this.app.frame.setGizmo(mode);
+    this.app.viewer.invalidate();
+  }
+
+  onGizmoDragging(active: boolean): void {
+    if (!active) this.document.endGesture();
+  }
+
+  onGizmoChanged(object: Object3D, mode: GizmoMode): void {
+    const node = this.selection?.node;
+    if (node === undefined) return;
+    const rounded = (values: number[]) => values.map((v) => Number(v.toPrecision(7)));
+    // Turning and scaling go about the object's middle, so they move its origin.
+    const placement: edits.Placement = { translation: rounded(object.position.toArray()) as Vec3 };
+    if (mode === 'rotate') placement.rotation = unit(object.quaternion.toArray() as Vec4);
+    if (mode === 'scale') placement.scale = rounded(object.scale.toArray()) as Vec3;
+    const label = mode === 'translate' ? 'Move' : mode === 'rotate' ? 'Turn' : 'Scale';
+    this.make(`${label} ${nodeName(this.document.gltf, node)}`, edits.setPlacement(node, placement), `${mode} ${node}`);
+  }
+
+  /** In front of the camera, a third of the way to what it looks at, as bright as the scene is exposed for. */
+  async addLamp(): Promise<void> {
+    const { rig, exposure, shown } = this.app.viewer;
+    if (!shown) return;
+    const eye = rig.camera.position;
+    const ahead = rig.camera.getWorldDirection(new Vector3());
+    const distance = eye.distanceTo(rig.target);
+    const at = eye.clone().addScaledVector(ahead, 0.75 * distance);
+    shown.bounds.clampPoint(at, at);
+    // A grey wall at a quarter of the scene's size away would be a middle grey.
+    const reach = shown.bounds.getSize(new Vector3()).length() / 4;
+    const candela = Number(((0.5 * Math.PI * reach * reach) / exposure.value).toPrecision(2));
+    const place = at.toArray().map((v) => Number(v.toPrecision(4))) as Vec3;
+    const { patch, node } = edits.addLamp(this.document.gltf, place, candela);
+    try {
+      await this.document.edit('Add lamp', patch);
+      this.select({ node, material: undefined });
+    } catch {
+      // The refusal was shown.
+    }
+  }
+
+  removeSelected(): void {
+    if (this.selection) this.remove(this.selection.node);
+  }
+
+  private remove(node: number): void {
+    const patch = edits.detachNode(this.document.gltf, node);
+    if (!patch) return;
+    this.select(undefined);
+    this.make(`Remove ${nodeName(this.document.gltf, node)}`, patch);
+  }
+
+  async undo(): Promise<void> {
+    if (this.app.connection.has('scene.undo')) await this.app.ask('scene.undo');
+    else await this.document.undo();
+  }
+
+  async redo(): Promise<void> {
+    if (this.app.connection.has('scene.redo')) await this.app.ask('scene.redo');
+    else await this.document.redo();
+  }
+
+  async loadFile(file: File): Promise<void> {
+    const { toasts } = this.app.frame;
+    const limit = this.app.connection.info?.limits['uploadBytes'] ?? Infinity;
+    if (file.size > limit) return toasts.show(`${file.name} is larger than the server takes`, 'bad');
+    toasts.show(`Loading ${file.name}…`);
+    try {
+      this.app.view.forgetCamera();
+      const path = `/scene?name=${encodeURIComponent(file.name)}`;
+      const response = await this.app.fetch(path, {
+        method: 'PUT',
+        body: file,
+        headers: { 'Content-Type': 'application/octet-stream' },
+      });
+      const { warnings } = (await response.json()) as { warnings: string[] };
+      const count = warnings.length;
+      toasts.show(
+        count ? `${file.name} loaded; ${count} warning${count > 1 ? 's' : ''}, see Solve` : `${file.name} loaded`,
+        'good',
+      );
+    } catch (error) {
+      toasts.show(`${file.name}: ${(error as Error).message}`, 'bad');
+    }
+  }
+
+  private onChanged(pointers: string[]): void {
+    this.app.viewer.applyDocument(this.document.gltf, pointers);
+    if (pointers.length === 0) {
+      this.select(undefined);
+      this.panel.setDocument(this.document.gltf, (node) => this.materialsOf(node));
+    } else {
+      this.panel.refresh();
+    }
+  }
+
+  private onHistory(): void {
+    const server = this.app.connection?.has('scene.undo');
+    this.app.frame?.setHistory(
+      server || this.document.undoStack.length > 0,
+      server || this.document.redoStack.length > 0,
+    );
+    if (this.document.lastEdit) this.app.share?.onEdit(this.document.lastEdit);
+  }
+}
+
+/** Rounded, and still of unit length to the last digit that counts. */
+function unit(q: Vec4): Vec4 {
+  const length = Math.hypot(...q) || 1;
+  return q.map((v) => Number((v / length).toPrecision(9))) as Vec4;
+}

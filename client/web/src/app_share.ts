@@ -1,0 +1,75 @@
+// Links, commands and files to take away. Part of the App.
+
+import type { App } from './app';
+import type { Patch, ServerInfo } from './protocol/messages';
+import { copyText, download } from './ui/dom';
+import type { SharePanel } from './ui/share_panel';
+
+export type Download = 'glb' | 'unlit' | 'exr' | 'png' | 'snapshot';
+
+/** One operation a line: to be read, and to be edited. */
+export function formatPatch(patch: Patch): string {
+  return `[\n${patch.map((operation) => `  ${JSON.stringify(operation)}`).join(',\n')}\n]`;
+}
+
+/** What makes the same edit from a shell. */
+export function editCommand(patch: Patch, host: string): string {
+  const json = JSON.stringify(patch).replaceAll("'", `'\\''`);
+  return `echo '${json}' | radiosity edit ${host} -`;
+}
+
+export class Share {
+  private lastEdit: Patch | undefined;
+
+  constructor(
+    private readonly app: App,
+    private readonly panel: SharePanel,
+  ) {}
+
+  onEdit(patch: Patch): void {
+    this.lastEdit = patch;
+    this.panel.setEdit(formatPatch(patch));
+  }
+
+  onServer(info: ServerInfo): void {
+    this.panel.setAbout([
+      ['Program', info.server],
+      ['Renderer', info.glRenderer],
+      ['Address', location.host],
+    ]);
+  }
+
+  async copyLink(): Promise<void> {
+    const link = `${location.origin}/#${this.app.view.linkHash()}`;
+    history.replaceState(null, '', link);
+    await this.copy(link, 'Link copied');
+  }
+
+  async copyEdit(form: 'command' | 'json'): Promise<void> {
+    if (!this.lastEdit) return;
+    const text = form === 'json' ? formatPatch(this.lastEdit) : editCommand(this.lastEdit, location.host);
+    await this.copy(text, form === 'json' ? 'JSON copied' : 'Command copied');
+  }
+
+  async download(what: Download): Promise<void> {
+    try {
+      if (what === 'png') return download(await this.app.viewer.picture(), 'view.png');
+      if (what === 'glb') return await this.save('/scene.glb', 'scene-lit.glb');
+      if (what === 'unlit') return await this.save('/scene-unlit.glb', 'scene-unlit.glb');
+      if (what === 'snapshot') return await this.save('/snapshot.png?width=1920&height=1080', 'snapshot.png');
+      const pages = this.app.viewer.set?.pages.length ?? 0;
+      for (let page = 0; page < pages; ++page) await this.save(`/lightmaps/${page}.exr`, `lightmap.${page}.exr`);
+    } catch (error) {
+      this.app.frame.toasts.show(`Download: ${(error as Error).message}`, 'bad');
+    }
+  }
+
+  private async save(path: string, name: string): Promise<void> {
+    download(await (await this.app.fetch(path)).blob(), name);
+  }
+
+  private async copy(text: string, done: string): Promise<void> {
+    const copied = await copyText(text);
+    this.app.frame.toasts.show(copied ? done : 'The browser did not let the page copy', copied ? 'good' : 'bad');
+  }
+}

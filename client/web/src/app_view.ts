@@ -1,0 +1,314 @@
+// What is shown and from where: views, exposure, cameras, the light meter. Part of the App.
+
+import { Box3, Vector3 } from 'three';
+import type { App } from './app';
+import { nodeName } from './document/gltf';
+import { readable } from './ui/dom';
+import { listenToKeys } from './ui/keys';
+import { ViewPanel } from './ui/view_panel';
+import type { LitScene } from './view/lit_scene';
+import { luminance } from './view/picker';
+import { TONE_CURVES, VIEW_MODES, viewMode, type ViewMode } from './view/view_modes';
+
+/** A click that moves less is no drag, pixels. */
+const CLICK_SLACK = 5;
+
+export class ViewSession {
+  readonly panel: ViewPanel;
+  mode: ViewMode = viewMode('lit');
+  private falseColour = false;
+  private metering = false;
+  private pointer: { x: number; y: number } | undefined;
+  private meterWaits = false;
+  private camera = -1;
+  private placed = false;
+  private sharpMarked = false;
+
+  constructor(private readonly app: App) {
+    this.panel = new ViewPanel({
+      setMode: (id) => void this.setMode(id),
+      setFalseColour: (on) => this.setFalseColour(on),
+      setRange: (range) => this.setRange(range),
+      setAutoExposure: (on) => this.setAutoExposure(on),
+      setStops: (stops) => this.setStops(stops),
+      setToneCurve: (id) => this.setToneCurve(id),
+      setBackground: (id) => (document.documentElement.dataset['background'] = id),
+      useCamera: (index) => this.useCamera(index),
+    });
+  }
+
+  /** When the page is there. */
+  start(): void {
+    const { canvas } = this.app.frame;
+    const link = new URLSearchParams(location.hash.slice(1));
+    this.placed = this.app.viewer.rig.fromText(link.get('camera') ?? '');
+    void this.setMode(link.get('view') ?? 'lit');
+    if (link.get('ui') === '0') this.app.frame.toggleChrome();
+    this.listenToPointer(canvas);
+    listenToKeys(canvas, {
+      camera: (event, down) => this.app.viewer.rig.key(event, down),
+      turn: (right, up) => this.app.viewer.rig.turn(right, up),
+      zoom: (factor) => this.app.viewer.rig.zoom(factor),
+      press: (key, event) => this.press(key, event),
+    });
+  }
+
+  /** The hash of a link to this very view. */
+  linkHash(): string {
+    const hash = new URLSearchParams({ camera: this.app.viewer.rig.toText() });
+    if (this.mode.id !== 'lit') hash.set('view', this.mode.id);
+    return hash.toString();
+  }
+
+  onCapabilities(): void {
+    this.panel.setAvailable((mode) => this.available(mode));
+    if (!this.available(this.mode)) void this.setMode('lit');
+  }
+
+  onSceneShown(scene: LitScene): void {
+    this.panel.setCameras(scene.cameras.map((camera) => camera.name));
+    if (this.placed) return;
+    this.placed = true;
+    if (scene.cameras.length > 0) this.useCamera(0);
+    else this.app.viewer.rig.overview(scene.bounds);
+  }
+
+  /** Another scene wants another place to look from. */
+  forgetCamera(): void {
+    this.placed = false;
+    this.camera = -1;
+    this.app.viewer.exposure.fresh = true;
+  }
+
+  onDrawn(): void {
+    const set = this.app.viewer.shown?.set;
+    if (set && set.tilesTaken > 0) this.app.mark('light');
+    if (set?.complete && set.waiting === 0 && !this.sharpMarked) {
+      this.sharpMarked = true;
+      this.app.mark('sharp');
+    }
+    this.showLegend();
+    if (this.metering) this.readMeter();
+  }
+
+  async setMode(id: string): Promise<void> {
+    const mode = viewMode(id);
+    if (!this.available(mode)) return;
+    const before = this.app.viewer.dataSet?.quantity;
+    this.mode = mode;
+    const data = mode.quantity === 'irradiance' ? undefined : mode.quantity;
+    this.app.viewer.setDataQuantity(data);
+    this.app.viewer.setMode(mode);
+    this.applyFalseColour();
+    if (before !== data) await this.app.resubscribe();
+  }
+
+  toggleWalk(): void {
+    const { rig } = this.app.viewer;
+    rig.setMode(rig.mode === 'walk' ? 'orbit' : 'walk');
+    this.app.frame.setWalk(rig.mode === 'walk');
+  }
+
+  frameAll(): void {
+    const { viewer } = this.app;
+    if (this.mode.flat) viewer.pagesView.frame();
+    else if (viewer.shown) viewer.rig.frame(viewer.shown.bounds);
+    viewer.invalidate();
+  }
+
+  frameSelection(): void {
+    const node = this.app.edit.selection?.node;
+    const object = node === undefined ? undefined : this.app.viewer.shown?.nodes.get(node);
+    const box = object && new Box3().setFromObject(object);
+    if (!box || box.isEmpty()) return this.frameAll();
+    this.app.viewer.rig.frame(box);
+  }
+
+  toggleMeter(): void {
+    this.metering = !this.metering;
+    this.app.frame.setMeter(this.metering);
+    this.app.frame.canvas.classList.toggle('metering', this.metering);
+    if (this.metering) this.readMeter();
+    else this.app.frame.meter.hide();
+  }
+
+  private available(mode: ViewMode): boolean {
+    return mode.quantity === 'irradiance' || this.app.connection?.has(`quantity.${mode.quantity}`) === true;
+  }
+
+  private useCamera(index: number): void {
+    const { shown, rig } = this.app.viewer;
+    const chosen = shown?.cameras[index];
+    if (!chosen) return;
+    this.camera = index;
+    rig.take(chosen.camera, shown!.bounds);
+  }
+
+  private nextCamera(): void {
+    const count = this.app.viewer.shown?.cameras.length ?? 0;
+    if (count > 0) this.useCamera((this.camera + 1) % count);
+  }
+
+  private setFalseColour(on: boolean): void {
+    this.falseColour = on;
+    this.applyFalseColour();
+  }
+
+  private applyFalseColour(): void {
+    const { viewer } = this.app;
+    const on = this.mode.falseColour === 'always' || (this.mode.falseColour === 'choice' && this.falseColour);
+    viewer.uniforms.all.falseColour.value = on;
+    this.panel.setMode(this.mode, on);
+    viewer.invalidate();
+  }
+
+  private setRange(range: [number, number] | undefined): void {
+    const { viewer } = this.app;
+    viewer.autoRange = range === undefined;
+    if (range) viewer.uniforms.all.falseRange.value.set(...range);
+    viewer.setMode(this.mode);
+  }
+
+  private setAutoExposure(on: boolean): void {
+    const { exposure } = this.app.viewer;
+    if (!on) exposure.base = exposure.value / 2 ** exposure.stops;
+    exposure.automatic = on;
+    this.panel.setAuto(on);
+    this.app.viewer.invalidate();
+  }
+
+  private setStops(stops: number): void {
+    const clamped = Math.min(8, Math.max(-8, stops));
+    this.app.viewer.exposure.stops = clamped;
+    this.panel.setStops(clamped);
+    this.app.viewer.invalidate();
+  }
+
+  private setToneCurve(id: string): void {
+    const curve = TONE_CURVES.find((one) => one.id === id);
+    this.app.viewer.uniforms.all.toneCurve.value = curve?.number ?? 0;
+    this.app.viewer.invalidate();
+  }
+
+  private showLegend(): void {
+    const { frame, viewer } = this.app;
+    if (!viewer.uniforms.all.falseColour.value || !this.mode.unit || !viewer.shown) return frame.legend.hide();
+    const { x: low, y: high } = viewer.uniforms.all.falseRange.value;
+    frame.legend.show(this.mode.label, this.mode.unit, low, high);
+    this.panel.showRange(low, high);
+  }
+
+  // ---- pointer ----
+
+  private listenToPointer(canvas: HTMLCanvasElement): void {
+    let down: { x: number; y: number } | undefined;
+    canvas.addEventListener('pointerdown', (event) => {
+      canvas.focus({ preventScroll: true });
+      // Touch tells of its place only when it comes down, so the gizmo may not know yet that it is meant.
+      down = this.app.viewer.gizmo.busy ? undefined : { x: event.clientX, y: event.clientY };
+    });
+    canvas.addEventListener('pointerup', (event) => {
+      const moved = down && Math.hypot(event.clientX - down.x, event.clientY - down.y);
+      down = undefined;
+      if (moved !== undefined && moved <= CLICK_SLACK && event.button === 0) this.click(event);
+    });
+    canvas.addEventListener('pointermove', (event) => {
+      this.pointer = { x: event.clientX, y: event.clientY };
+      if (this.metering) this.readMeterSoon();
+    });
+    canvas.addEventListener('pointerleave', () => {
+      this.pointer = undefined;
+      this.app.frame.meter.hide();
+    });
+  }
+
+  private click(event: PointerEvent): void {
+    this.pointer = { x: event.clientX, y: event.clientY };
+    if (this.metering) return this.readMeter();
+    const hit = this.app.viewer.pickAt(...this.toDevice(event.clientX, event.clientY));
+    this.app.edit.selectHit(hit?.object);
+  }
+
+  private toDevice(x: number, y: number): [number, number] {
+    const box = this.app.frame.canvas.getBoundingClientRect();
+    return [((x - box.left) / box.width) * 2 - 1, 1 - ((y - box.top) / box.height) * 2];
+  }
+
+  /** At most once a frame, however often the pointer tells of itself. */
+  private readMeterSoon(): void {
+    if (this.meterWaits) return;
+    this.meterWaits = true;
+    requestAnimationFrame(() => {
+      this.meterWaits = false;
+      if (this.metering) this.readMeter();
+    });
+  }
+
+  /** Without a pointer (keyboard) the meter reads in the middle of the picture. */
+  private readMeter(): void {
+    const { viewer, frame, edit } = this.app;
+    const box = frame.canvas.getBoundingClientRect();
+    const { x, y } = this.pointer ?? { x: box.left + box.width / 2, y: box.top + box.height / 2 };
+    const reading = viewer.readAt(...this.toDevice(x, y));
+    if (!reading) return frame.meter.hide();
+    const lux = reading.irradiance && luminance(reading.irradiance);
+    // Where errors of single texels are not streamed, the scene's own stands for them.
+    const error = reading.error ?? (lux === undefined ? undefined : lux * (this.app.progress?.error.total ?? NaN));
+    const details = [
+      reading.irradiance
+        ? `R ${readable(reading.irradiance[0])}  G ${readable(reading.irradiance[1])}  B ${readable(reading.irradiance[2])}`
+        : '',
+      reading.node === undefined ? '' : nodeName(edit.document.gltf, reading.node),
+      reading.texel ? `page ${reading.page}, texel ${reading.texel.join(', ')}` : '',
+      position(reading.point),
+    ];
+    frame.meter.show(x, y, lux, error, details.filter((text) => text !== '').join('\n'));
+  }
+
+  // ---- keys ----
+
+  private press(key: string, event: KeyboardEvent): boolean {
+    const { app } = this;
+    const command = event.ctrlKey || event.metaKey;
+    if (command && key.toLowerCase() === 'z') return done(event.shiftKey ? app.edit.redo() : app.edit.undo());
+    if (command && key.toLowerCase() === 'y') return done(app.edit.redo());
+    if (command || event.altKey) return false;
+    if (/^\d$/.test(key)) return done(this.setMode(VIEW_MODES[(Number(key) + 9) % 10]?.id ?? 'lit'));
+    const actions: Record<string, () => unknown> = {
+      v: () => this.toggleWalk(),
+      f: () => this.frameAll(),
+      F: () => this.frameSelection(),
+      c: () => this.nextCamera(),
+      x: () => this.mode.falseColour === 'choice' && this.setFalseColour(!this.falseColour),
+      '[': () => this.setStops(app.viewer.exposure.stops - 0.25),
+      ']': () => this.setStops(app.viewer.exposure.stops + 0.25),
+      m: () => this.toggleMeter(),
+      n: () => app.edit.selectNext(1),
+      N: () => app.edit.selectNext(-1),
+      t: () => app.edit.setGizmo('translate'),
+      r: () => app.edit.setGizmo('rotate'),
+      y: () => app.edit.setGizmo('scale'),
+      l: () => app.edit.addLamp(),
+      Delete: () => app.edit.removeSelected(),
+      Backspace: () => app.edit.removeSelected(),
+      ' ': () => app.togglePause(),
+      p: () => app.frame.togglePanel(),
+      h: () => app.frame.toggleChrome(),
+      Escape: () => app.edit.select(undefined),
+      '?': () => app.frame.help.showModal(),
+    };
+    const action = actions[key];
+    return action ? done(action()) : false;
+  }
+}
+
+function done(_result: unknown): true {
+  return true;
+}
+
+function position(point: Vector3): string {
+  return `at ${point
+    .toArray()
+    .map((v) => readable(v))
+    .join(', ')} m`;
+}

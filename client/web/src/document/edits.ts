@@ -1,0 +1,172 @@
+// Patches that the viewer makes, as pure functions of the document.
+
+import type { Json, Patch } from '../protocol/messages';
+import { holderOf, nodeName, type Gltf, type GltfLight, type Vec3, type Vec4 } from './gltf';
+import { valueAt } from './json_patch';
+
+export function setColour(material: number, gltf: Gltf, rgb: Vec3): Patch {
+  const alpha = gltf.materials?.[material]?.pbrMetallicRoughness?.baseColorFactor?.[3] ?? 1;
+  const value: Vec4 = [...rgb, alpha];
+  return [{ op: 'replace', path: `/materials/${material}/pbrMetallicRoughness/baseColorFactor`, value }];
+}
+
+export function setEmission(material: number, rgb: Vec3, strength: number): Patch {
+  return [
+    { op: 'replace', path: `/materials/${material}/emissiveFactor`, value: rgb },
+    {
+      op: 'replace',
+      path: `/materials/${material}/extensions/KHR_materials_emissive_strength/emissiveStrength`,
+      value: strength,
+    },
+  ];
+}
+
+export interface Placement {
+  translation?: Vec3;
+  rotation?: Vec4;
+  scale?: Vec3;
+}
+
+export function setPlacement(node: number, placement: Placement): Patch {
+  return Object.entries(placement).map(([member, value]) => ({
+    op: 'replace',
+    path: `/nodes/${node}/${member}`,
+    value: value as Json,
+  }));
+}
+
+export function setLight(light: number, change: Partial<Pick<GltfLight, 'color' | 'intensity'>>): Patch {
+  return Object.entries(change).map(([member, value]) => ({
+    op: 'replace',
+    path: `/extensions/KHR_lights_punctual/lights/${light}/${member}`,
+    value: value as Json,
+  }));
+}
+
+/** `add` where a member may be missing: it replaces, too. */
+export function setVisible(gltf: Gltf, node: number, visible: boolean): Patch {
+  const patch = markUsed(gltf, 'KHR_node_visibility');
+  const path = `/nodes/${node}/extensions`;
+  if (!gltf.nodes?.[node]?.extensions) patch.push({ op: 'add', path, value: {} });
+  return [...patch, { op: 'add', path: `${path}/KHR_node_visibility`, value: { visible } }];
+}
+
+export function isVisible(gltf: Gltf, node: number): boolean {
+  return gltf.nodes?.[node]?.extensions?.KHR_node_visibility?.visible ?? true;
+}
+
+function markUsed(gltf: Gltf, extension: string): Patch {
+  if (!gltf.extensionsUsed) return [{ op: 'add', path: '/extensionsUsed', value: [extension] }];
+  if (gltf.extensionsUsed.includes(extension)) return [];
+  return [{ op: 'add', path: '/extensionsUsed/-', value: extension }];
+}
+
+/** A point light at `translation` (metres) in the scene that is shown. Lists grow at their ends, so indices are known. */
+export function addLamp(gltf: Gltf, translation: Vec3, candela: number): { patch: Patch; node: number } {
+  const node = gltf.nodes?.length ?? 0;
+  const lights = gltf.extensions?.KHR_lights_punctual?.lights ?? [];
+  const name = freeName(gltf, 'lamp');
+  const light = { name, type: 'point', color: [1, 1, 1], intensity: candela };
+  const patch = markUsed(gltf, 'KHR_lights_punctual');
+  if (!gltf.extensions) patch.push({ op: 'add', path: '/extensions', value: {} });
+  if (!gltf.extensions?.KHR_lights_punctual)
+    patch.push({ op: 'add', path: '/extensions/KHR_lights_punctual', value: { lights: [light] } });
+  else patch.push({ op: 'add', path: '/extensions/KHR_lights_punctual/lights/-', value: light });
+  if (!gltf.nodes) patch.push({ op: 'add', path: '/nodes', value: [] });
+  patch.push({
+    op: 'add',
+    path: '/nodes/-',
+    value: {
+      name,
+      translation,
+      rotation: [0, 0, 0, 1],
+      scale: [1, 1, 1],
+      extensions: { KHR_lights_punctual: { light: lights.length } },
+    },
+  });
+  patch.push(attach(gltf, `/scenes/${gltf.scene ?? 0}/nodes`, node));
+  return { patch, node };
+}
+
+function attach(gltf: Gltf, list: string, node: number): Patch[number] {
+  const there = valueAt(gltf as unknown as Json, list) !== undefined;
+  return there ? { op: 'add', path: `${list}/-`, value: node } : { op: 'add', path: list, value: [node] };
+}
+
+/** Takes a node out of the scene; it stays in the document, for lists do not shrink. Nothing when it hangs nowhere. */
+export function detachNode(gltf: Gltf, node: number): Patch | undefined {
+  const holder = holderOf(gltf, node);
+  if (!holder) return undefined;
+  const path = `${holder.list}/${holder.place}`;
+  return [
+    { op: 'test', path, value: node },
+    { op: 'remove', path },
+  ];
+}
+
+function freeName(gltf: Gltf, wanted: string): string {
+  const taken = new Set((gltf.nodes ?? []).map((node) => node.name));
+  for (let i = 1; ; ++i) {
+    const name = i === 1 ? wanted : `${wanted} ${i}`;
+    if (!taken.has(name)) return name;
+  }
+}
+
+const GROWING = /^\/(nodes|meshes|materials|cameras|extensions\/KHR_lights_punctual\/lights)\/-$/;
+const HANGING = /^\/(scenes\/\d+\/nodes|nodes\/\d+\/children)(\/|$)/;
+
+function grows(patch: Patch): boolean {
+  return patch.some((operation) => GROWING.test(operation.path));
+}
+
+/**
+ * What undoes `patch`, given the patch that would put the viewer's copy back: the server's lists do not shrink, so what
+ * was appended to them stays, and is only taken out of the scene.
+ */
+export function undoOnServer(patch: Patch, inverse: Patch): Patch {
+  if (!grows(patch)) return inverse;
+  const hung = patch.find((operation) => HANGING.test(operation.path) && operation.path.endsWith('/-'));
+  return inverse
+    .filter((operation) => HANGING.test(operation.path))
+    .flatMap((operation) =>
+      operation.op === 'remove' && hung?.value !== undefined && /\d$/.test(operation.path)
+        ? [{ op: 'test' as const, path: operation.path, value: hung.value }, operation]
+        : [operation],
+    );
+}
+
+/** An object that was taken out of the scene by undoing is still in the document: it only has to be hung up again. */
+export function redoOnServer(patch: Patch): Patch {
+  return grows(patch) ? patch.filter((operation) => HANGING.test(operation.path)) : patch;
+}
+
+/** A sentence for people: what a patch does. */
+export function describePatch(gltf: Gltf, patch: Patch): string {
+  const parts = new Set<string>();
+  for (const { path } of patch) {
+    const [, list, key, ...rest] = path.split('/');
+    const index = Number(key?.startsWith('@') ? NaN : key);
+    const named = key?.startsWith('@') ? key.slice(1) : undefined;
+    const member = (rest.at(-1) ?? '').replace('KHR_node_visibility', 'visibility');
+    if (list === 'materials' && rest.length > 0)
+      parts.add(`${named ?? gltf.materials?.[index]?.name ?? `material ${key}`}: ${readable(member)}`);
+    else if (list === 'nodes' && rest.length > 0)
+      parts.add(`${named ?? (gltf.nodes?.[index] ? nodeName(gltf, index) : `node ${key}`)}: ${readable(member)}`);
+    else if (list === 'nodes') parts.add('a new object');
+    else if (list === 'scenes') parts.add('objects of the scene');
+    else if (path.startsWith('/extensions/KHR_lights_punctual/lights/')) parts.add(`light: ${readable(member)}`);
+    else if (path.startsWith('/extras/radiositySky')) parts.add('sky');
+  }
+  return [...parts].slice(0, 3).join(', ') || 'the scene';
+}
+
+function readable(member: string): string {
+  const words: Record<string, string> = {
+    baseColorFactor: 'colour',
+    emissiveFactor: 'emission',
+    emissiveStrength: 'emission',
+    translation: 'position',
+    '-': 'new light',
+  };
+  return words[member] ?? member;
+}

@@ -1,0 +1,96 @@
+// The parts of glTF 2.0 that the viewer reads and edits, with the server's defaults written out.
+
+import type { Json } from '../protocol/messages';
+
+export type Vec3 = [number, number, number];
+export type Vec4 = [number, number, number, number];
+
+export interface GltfNode {
+  name?: string;
+  mesh?: number;
+  camera?: number;
+  children?: number[];
+  translation?: Vec3;
+  rotation?: Vec4;
+  scale?: Vec3;
+  matrix?: number[];
+  extensions?: {
+    KHR_lights_punctual?: { light: number };
+    KHR_node_visibility?: { visible?: boolean };
+    [name: string]: unknown;
+  };
+}
+
+export interface GltfMaterial {
+  name?: string;
+  emissiveFactor?: Vec3;
+  pbrMetallicRoughness?: { baseColorFactor?: Vec4; metallicFactor?: number; [member: string]: unknown };
+  doubleSided?: boolean;
+  extensions?: { KHR_materials_emissive_strength?: { emissiveStrength?: number }; [name: string]: unknown };
+}
+
+export interface GltfLight {
+  name?: string;
+  type: 'point' | 'spot' | 'directional';
+  color?: Vec3;
+  intensity?: number;
+  range?: number;
+  spot?: { innerConeAngle?: number; outerConeAngle?: number };
+}
+
+export interface Gltf {
+  asset: { version: string; generator?: string };
+  scene?: number;
+  scenes?: { name?: string; nodes?: number[] }[];
+  nodes?: GltfNode[];
+  meshes?: { name?: string; primitives: { material?: number; [member: string]: unknown }[] }[];
+  materials?: GltfMaterial[];
+  cameras?: { name?: string; type: string }[];
+  extensionsUsed?: string[];
+  extensions?: { KHR_lights_punctual?: { lights: GltfLight[] }; [name: string]: unknown };
+  extras?: Json;
+}
+
+export function nodeName(gltf: Gltf, index: number): string {
+  const node = gltf.nodes?.[index];
+  const mesh = node?.mesh !== undefined ? gltf.meshes?.[node.mesh]?.name : undefined;
+  return node?.name || mesh || `node ${index}`;
+}
+
+export function materialName(gltf: Gltf, index: number): string {
+  return gltf.materials?.[index]?.name || `material ${index}`;
+}
+
+/** Light that a node carries, if any. */
+export function lightOf(gltf: Gltf, node: number): { index: number; light: GltfLight } | undefined {
+  const index = gltf.nodes?.[node]?.extensions?.KHR_lights_punctual?.light;
+  const light = index === undefined ? undefined : gltf.extensions?.KHR_lights_punctual?.lights[index];
+  return index === undefined || !light ? undefined : { index, light };
+}
+
+/** Where a node hangs: pointer of the list that names it, and its place there. */
+export function holderOf(gltf: Gltf, node: number): { list: string; place: number } | undefined {
+  for (const [s, scene] of (gltf.scenes ?? []).entries()) {
+    const place = scene.nodes?.indexOf(node) ?? -1;
+    if (place >= 0) return { list: `/scenes/${s}/nodes`, place };
+  }
+  for (const [n, parent] of (gltf.nodes ?? []).entries()) {
+    const place = parent.children?.indexOf(node) ?? -1;
+    if (place >= 0) return { list: `/nodes/${n}/children`, place };
+  }
+  return undefined;
+}
+
+/** Nodes of the scene shown, depth first, each with how deep it lies. Cycles end. */
+export function hangingNodes(gltf: Gltf): { node: number; depth: number }[] {
+  const out: { node: number; depth: number }[] = [];
+  const seen = new Set<number>();
+  const visit = (node: number, depth: number) => {
+    if (seen.has(node)) return;
+    seen.add(node);
+    out.push({ node, depth });
+    for (const next of gltf.nodes?.[node]?.children ?? []) visit(next, depth + 1);
+  };
+  for (const root of gltf.scenes?.[gltf.scene ?? 0]?.nodes ?? []) visit(root, 0);
+  return out;
+}

@@ -1,0 +1,253 @@
+// The viewer's copy of the scene, and the edits on their way to the server. What the user does shows at once; what the
+// server refuses is taken back with its reason. One edit is on the way at a time: while somebody drags, later positions
+// replace the one that waits. Main thread; knows no pictures.
+
+import type { Json, Patch, ScenePatchReply } from '../protocol/messages';
+import { ConnectionLost, RpcError } from '../protocol/rpc';
+import { redoOnServer, undoOnServer } from './edits';
+import type { Gltf } from './gltf';
+import { applyPatch, PatchError, sameJson } from './json_patch';
+
+export interface EditEntry {
+  label: string;
+  forward: Patch;
+  inverse: Patch;
+}
+
+interface PendingEdit extends EditEntry {
+  /** Edits with the same key replace each other while they wait, and are one step of undo. */
+  key: string | undefined;
+  requestId: string;
+  /** Puts the copy back; empty while the edit is not shown. */
+  shown: Patch;
+  isStep: boolean;
+  confirmed: boolean;
+  done: (error?: Error) => void;
+}
+
+export interface DocumentEvents {
+  /** Members below these pointers have other values now; empty: everything. */
+  changed(pointers: string[]): void;
+  refused(label: string, reason: string): void;
+  historyChanged(): void;
+}
+
+export type SendPatch = (patch: Patch, requestId: string) => Promise<ScenePatchReply>;
+
+const MAX_HISTORY = 200;
+
+export class SceneDocument {
+  gltf: Gltf = { asset: { version: '2.0' } };
+  revision = 0;
+  readonly undoStack: EditEntry[] = [];
+  readonly redoStack: EditEntry[] = [];
+  lastEdit: Patch | undefined;
+  private pending: PendingEdit[] = [];
+  private sending = false;
+  private openKey: string | undefined;
+
+  private generation = 0;
+
+  /** `me`: the name under which the server tells others of our patches; nobody else has it. */
+  constructor(
+    private readonly me: string,
+    private readonly send: SendPatch,
+    private readonly events: DocumentEvents,
+  ) {}
+
+  /** Another scene: what was on its way belongs to the old one. */
+  reset(gltf: Gltf, revision: number): void {
+    this.gltf = gltf;
+    this.revision = revision;
+    this.pending = [];
+    this.undoStack.length = 0;
+    this.redoStack.length = 0;
+    this.openKey = undefined;
+    ++this.generation;
+    this.events.changed([]);
+    this.events.historyChanged();
+  }
+
+  /** A patch that the server has made, ours or someone else's. False: the copy does not fit; fetch the scene anew. */
+  patched(revision: number, patch: Patch, by: string): boolean {
+    if (revision <= this.revision) return true;
+    const first = this.pending[0];
+    if (by === this.me && first && sameJson(first.forward as unknown as Json, patch as unknown as Json)) {
+      this.confirm(first, revision);
+      return true;
+    }
+    this.takeBackPending();
+    try {
+      applyPatch(this.json, patch);
+    } catch (error) {
+      if (error instanceof PatchError) return false;
+      throw error;
+    }
+    this.revision = revision;
+    this.showPending();
+    this.events.changed(patch.map((operation) => operation.path));
+    return true;
+  }
+
+  /**
+   * Shows the edit and sends it. `key` marks the edits of one gesture. The promise ends with the server's answer, or
+   * when a later edit of the gesture took this one's place.
+   */
+  edit(label: string, patch: Patch, key?: string): Promise<void> {
+    return this.enqueue(label, patch, true, key);
+  }
+
+  /** The gesture is over: the next edit with its key is a new step. */
+  endGesture(): void {
+    this.openKey = undefined;
+  }
+
+  async undo(): Promise<void> {
+    const entry = this.undoStack.pop();
+    if (entry) await this.step(entry, entry.inverse, this.undoStack, this.redoStack, `Undo ${entry.label}`);
+  }
+
+  async redo(): Promise<void> {
+    const entry = this.redoStack.pop();
+    if (!entry) return;
+    await this.step(entry, redoOnServer(entry.forward), this.redoStack, this.undoStack, `Redo ${entry.label}`);
+  }
+
+  private async step(entry: EditEntry, patch: Patch, from: EditEntry[], to: EditEntry[], label: string): Promise<void> {
+    this.openKey = undefined;
+    const generation = this.generation;
+    try {
+      await this.enqueue(label, patch, false, undefined);
+      if (generation === this.generation) to.push(entry);
+    } catch {
+      if (generation === this.generation) from.push(entry); // the reason was shown
+    }
+    this.events.historyChanged();
+  }
+
+  private get json(): Json {
+    return this.gltf as unknown as Json;
+  }
+
+  private enqueue(label: string, forward: Patch, isStep: boolean, key: string | undefined): Promise<void> {
+    return new Promise((resolve, reject) => {
+      const waiting = this.pending.at(-1);
+      const onTheWay = this.sending ? this.pending[0] : undefined;
+      if (key !== undefined && waiting && waiting !== onTheWay && waiting.key === key) {
+        this.takeBack(waiting);
+        this.pending.pop();
+        waiting.done();
+      }
+      const edit: PendingEdit = {
+        label,
+        forward,
+        inverse: [],
+        isStep,
+        key,
+        requestId: newRequestId(),
+        shown: [],
+        confirmed: false,
+        done: (error) => (error ? reject(error) : resolve()),
+      };
+      this.pending.push(edit);
+      this.show(edit);
+      this.events.changed(forward.map((operation) => operation.path));
+      void this.pump();
+    });
+  }
+
+  /** An edit that does not fit the copy may fit the server's scene: it is sent all the same. */
+  private show(edit: PendingEdit): void {
+    if (edit.confirmed) return;
+    try {
+      edit.shown = applyPatch(this.json, edit.forward);
+    } catch {
+      edit.shown = [];
+    }
+  }
+
+  private takeBack(edit: PendingEdit): void {
+    if (edit.shown.length > 0) applyPatch(this.json, edit.shown);
+    edit.shown = [];
+  }
+
+  private takeBackPending(): void {
+    for (const edit of [...this.pending].reverse()) this.takeBack(edit);
+  }
+
+  private showPending(): void {
+    for (const edit of this.pending) this.show(edit);
+  }
+
+  private async pump(): Promise<void> {
+    if (this.sending) return;
+    this.sending = true;
+    while (this.pending.length > 0) {
+      const edit = this.pending[0]!;
+      try {
+        const reply = await this.send(edit.forward, edit.requestId);
+        this.confirm(edit, reply.revision);
+        edit.done();
+      } catch (error) {
+        this.refuse(edit, error as Error);
+      }
+      // A scene that came meanwhile has taken the list away, or the notification has taken the edit off it.
+      if (this.pending[0] === edit) this.pending.shift();
+    }
+    this.sending = false;
+  }
+
+  /**
+   * The server has made this edit. It is the oldest of those on their way, so it lies right on top of what the server
+   * had before: what was shown stays, and what puts it back is what undoes it. The notification comes first, as a rule;
+   * the edit stays in the list, as nothing but a reminder, until the answer is there.
+   */
+  private confirm(edit: PendingEdit, revision: number): void {
+    if (edit.confirmed || this.pending[0] !== edit) return;
+    edit.confirmed = true;
+    this.revision = Math.max(this.revision, revision);
+    const inverse = edit.shown;
+    edit.shown = [];
+    this.lastEdit = edit.forward;
+    if (edit.isStep) this.remember(edit, undoOnServer(edit.forward, inverse));
+    this.events.historyChanged();
+  }
+
+  private remember(edit: PendingEdit, inverse: Patch): void {
+    this.redoStack.length = 0;
+    const last = this.undoStack.at(-1);
+    if (last && edit.key !== undefined && edit.key === this.openKey) {
+      last.forward = edit.forward;
+    } else {
+      this.undoStack.push({ label: edit.label, forward: edit.forward, inverse });
+      if (this.undoStack.length > MAX_HISTORY) this.undoStack.shift();
+    }
+    this.openKey = edit.key;
+  }
+
+  private refuse(edit: PendingEdit, error: Error): void {
+    if (edit.confirmed) return edit.done(); // the answer was lost on its way, the notification was not
+    if (this.pending[0] === edit) {
+      this.takeBackPending();
+      this.pending.shift();
+      this.showPending();
+    }
+    this.events.changed(edit.forward.map((operation) => operation.path));
+    this.events.refused(edit.label, reasonOf(error));
+    edit.done(error);
+  }
+}
+
+/** Pages without TLS have no crypto.randomUUID; nobody gains by guessing these. */
+function newRequestId(): string {
+  return `edit-${Date.now().toString(36)}-${Math.random().toString(36).slice(2)}`;
+}
+
+function reasonOf(error: Error): string {
+  if (error instanceof RpcError) {
+    const pointer = error.data.pointer;
+    return pointer && !error.message.includes(pointer) ? `${error.message} (${pointer})` : error.message;
+  }
+  if (error instanceof ConnectionLost) return 'the connection was lost before the server answered';
+  return error.message;
+}

@@ -1,0 +1,33 @@
+// Starts the viewer, or says why it cannot.
+
+import { App } from './app';
+import { h } from './ui/dom';
+
+declare global {
+  interface Window {
+    /** For tests and for the console. */
+    viewer?: App;
+  }
+}
+
+try {
+  if (!('WebGL2RenderingContext' in window)) throw new Error('This browser has no WebGL 2.');
+  window.viewer = new App();
+} catch (error) {
+  console.error(error);
+  document.body.append(
+    h(
+      'div',
+      { class: 'fatal' },
+      h('h1', {}, 'The viewer could not start'),
+      h('p', {}, (error as Error).message),
+      h(
+        'p',
+        {},
+        'It needs WebGL 2. What the server is doing also stands on its ',
+        h('a', { href: '/status' }, 'status page'),
+        '.',
+      ),
+    ),
+  );
+}

@@ -1,0 +1,51 @@
+// How much the server may send ahead of what was shown: about half a second of what the network carries, so that a slow
+// line keeps its answers quick, and a quick one is never idle. Pure but for the clock that it is given.
+
+const MIN_WINDOW = 64 * 1024;
+const MAX_WINDOW = 8 * 1024 * 1024;
+const AHEAD_S = 0.5;
+const MEASURE_MS = 400;
+
+export const FIRST_WINDOW = 512 * 1024;
+
+export class CreditWindow {
+  private window = FIRST_WINDOW;
+  private outstanding = FIRST_WINDOW; // what the server may still send, and what was sent and not yet used
+  private measuredSince = -1;
+  private measuredBytes = 0;
+
+  /** Bytes a second while tiles came without a pause; 0 until measured. */
+  rate = 0;
+
+  /** A frame has come. */
+  received(bytes: number, nowMs: number): void {
+    if (this.measuredSince < 0) this.measuredSince = nowMs;
+    this.measuredBytes += bytes;
+    const took = nowMs - this.measuredSince;
+    if (took < MEASURE_MS) return;
+    // Only a time in which the window was used up says something about the network.
+    if (this.measuredBytes >= 0.5 * this.window) this.adapt((1000 * this.measuredBytes) / took);
+    this.measuredSince = nowMs;
+    this.measuredBytes = 0;
+  }
+
+  /** Everything asked for has come: the pause that follows says nothing about the network. */
+  idle(): void {
+    this.measuredSince = -1;
+    this.measuredBytes = 0;
+  }
+
+  /** A frame was shown. Returns the credit to give back now; 0: later. */
+  used(bytes: number): number {
+    this.outstanding -= bytes;
+    const missing = this.window - this.outstanding;
+    if (missing < this.window / 4) return 0;
+    this.outstanding = this.window;
+    return missing;
+  }
+
+  private adapt(rate: number): void {
+    this.rate = this.rate === 0 ? rate : 0.5 * (this.rate + rate);
+    this.window = Math.round(Math.min(MAX_WINDOW, Math.max(MIN_WINDOW, this.rate * AHEAD_S)));
+  }
+}

@@ -1,0 +1,126 @@
+// The messages of protocol/README.md that the viewer speaks, as types. Names and units are the specification's.
+
+export type Json = null | boolean | number | string | Json[] | { [member: string]: Json };
+
+export interface PatchOperation {
+  op: 'add' | 'remove' | 'replace' | 'move' | 'copy' | 'test';
+  path: string;
+  from?: string;
+  value?: Json;
+}
+export type Patch = PatchOperation[];
+
+export interface ServerInfo {
+  server: string;
+  epoch: string;
+  revision: number;
+  capabilities: string[];
+  limits: Record<string, number>;
+  lightmaps: number;
+  glRenderer: string;
+  authRequired: boolean;
+}
+
+export interface Resume {
+  epoch: string;
+  revision: number;
+  tileVersion: number;
+}
+
+export interface HelloReply {
+  epoch: string;
+  revision: number;
+  tileFormat: string;
+  codec: string;
+  creditBytes: number;
+  resumed: boolean;
+}
+
+export type SolveState = 'empty' | 'loading' | 'solving' | 'paused' | 'converged' | 'timeLimit' | 'failed';
+
+export interface Progress {
+  revision: number;
+  state: SolveState;
+  tileVersion: number;
+  shots: number;
+  shotsPerSecond: number;
+  seconds: number;
+  secondsLeft?: number;
+  error: { total: number; residual: number; sampling: number; discretization: number };
+  energy: Record<string, number>;
+  patches: number;
+  nodes: number;
+  surfaces: number;
+  polygons: number;
+  failure?: string;
+}
+
+export interface Settings {
+  targetError: number;
+  timeLimitMs: number | null;
+  texels: number;
+  texelSize: number;
+  seed: number;
+}
+
+export interface Status extends Progress {
+  settings: Settings;
+  warnings: string[];
+  warningCount: number;
+  counters: Record<string, number>;
+  glRenderer: string;
+}
+
+export interface PageSize {
+  width: number;
+  height: number;
+  mips: number;
+}
+
+export interface LightmapsNote {
+  layout: number;
+  revision: number;
+  pages: PageSize[];
+  uvs: string;
+}
+
+export interface ScenePatchedNote {
+  revision: number;
+  patch: Patch;
+  by: string;
+}
+
+export interface Bookmark {
+  revision: number;
+  tileVersion: number;
+}
+
+export interface SubscribeParams {
+  lightmaps?: number[];
+  minMip?: number;
+  maxMip?: number;
+  maxHz?: number;
+  quantity?: string;
+}
+
+export interface ScenePatchReply {
+  revision: number;
+  affected: { surfaces: number; shots: number };
+}
+
+/** Notifications by method; what is not here is ignored, as the specification asks. */
+export interface Notifications {
+  serverInfo: ServerInfo;
+  progress: Progress;
+  'scene.patched': ScenePatchedNote;
+  'scene.loaded': { revision: number };
+  lightmaps: LightmapsNote;
+  bookmark: Bookmark;
+  viewers: { count: number };
+  draining: { graceMs: number };
+}
+
+export const SUBPROTOCOL = 'radiosity.v1';
+
+/** The close code that trying again does not mend. */
+export const CLOSE_UNAUTHENTICATED = 1008;

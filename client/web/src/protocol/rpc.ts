@@ -1,0 +1,90 @@
+// JSON-RPC 2.0 over one open WebSocket: calls with answers by id, notifications by method.
+
+import type { Json } from './messages';
+
+/** What a call is refused with; `data` may hold pointer, op and revision. */
+export class RpcError extends Error {
+  constructor(
+    readonly code: number,
+    message: string,
+    readonly data: { pointer?: string; op?: number; revision?: number } = {},
+  ) {
+    super(message);
+  }
+}
+
+/** The call's connection went away before the answer came: it may or may not have been heard. */
+export class ConnectionLost extends Error {
+  constructor() {
+    super('the connection was lost before the answer came');
+  }
+}
+
+export interface TextSocket {
+  send(text: string): void;
+}
+
+interface Waiting {
+  resolve: (result: unknown) => void;
+  reject: (error: Error) => void;
+}
+
+export class Rpc {
+  private nextId = 1;
+  private readonly waiting = new Map<number, Waiting>();
+
+  constructor(
+    private readonly socket: TextSocket,
+    private readonly onNotification: (method: string, params: unknown) => void,
+  ) {}
+
+  call<T>(method: string, params: object = {}): Promise<T> {
+    const id = this.nextId++;
+    return new Promise<T>((resolve, reject) => {
+      this.waiting.set(id, { resolve: resolve as (result: unknown) => void, reject });
+      try {
+        this.socket.send(JSON.stringify({ jsonrpc: '2.0', id, method, params }));
+      } catch {
+        this.waiting.delete(id);
+        reject(new ConnectionLost());
+      }
+    });
+  }
+
+  notify(method: string, params: object): void {
+    this.socket.send(JSON.stringify({ jsonrpc: '2.0', method, params }));
+  }
+
+  /** Reads a text frame; what is not a message of JSON-RPC is dropped. */
+  receive(text: string): void {
+    let message: unknown;
+    try {
+      message = JSON.parse(text);
+    } catch {
+      return;
+    }
+    for (const one of Array.isArray(message) ? message : [message]) this.take(one);
+  }
+
+  /** No more answers will come. */
+  close(): void {
+    for (const { reject } of this.waiting.values()) reject(new ConnectionLost());
+    this.waiting.clear();
+  }
+
+  private take(message: unknown): void {
+    if (typeof message !== 'object' || message === null) return;
+    const { id, method, params, result, error } = message as Record<string, Json>;
+    if (typeof method === 'string') return this.onNotification(method, params ?? {});
+    const waiting = typeof id === 'number' ? this.waiting.get(id) : undefined;
+    if (!waiting) return;
+    this.waiting.delete(id as number);
+    if (error && typeof error === 'object' && !Array.isArray(error)) {
+      waiting.reject(
+        new RpcError(Number(error['code']), String(error['message']), (error['data'] ?? {}) as RpcError['data']),
+      );
+    } else {
+      waiting.resolve(result);
+    }
+  }
+}

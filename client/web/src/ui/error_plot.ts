@@ -1,0 +1,152 @@
+// Error against time, both logarithmic, as the solve goes on.
+
+import type { Progress } from '../protocol/messages';
+import { h } from './dom';
+
+interface Sample {
+  seconds: number;
+  total: number;
+  residual: number;
+  sampling: number;
+}
+
+const LINES = [
+  { key: 'sampling', colour: '--plot-b' },
+  { key: 'residual', colour: '--plot-c' },
+  { key: 'total', colour: '--accent' },
+] as const;
+const MARGIN = { left: 44, right: 8, top: 8, bottom: 22 };
+const MOST = 600;
+
+export class ErrorPlot {
+  readonly element = h('canvas', {
+    class: 'plot',
+    role: 'img',
+    'aria-label': 'Error against solve time, both logarithmic',
+  });
+  private samples: Sample[] = [];
+  private target = 0;
+
+  constructor() {
+    new ResizeObserver(() => this.draw()).observe(this.element);
+  }
+
+  add(progress: Progress): void {
+    const last = this.samples.at(-1);
+    // Solve time runs backwards when an edit or another scene begins a new solve.
+    if (last && progress.seconds < last.seconds) this.samples = [];
+    if (!(progress.seconds > 0) || progress.seconds === last?.seconds) return;
+    this.samples.push({ seconds: progress.seconds, ...progress.error });
+    // Samples lie evenly in time, the plot is logarithmic: every second one is enough where there are many.
+    if (this.samples.length > MOST) this.samples = this.samples.filter((_, i) => i % 2 === 0 || i > MOST - 50);
+    this.draw();
+  }
+
+  setTarget(target: number): void {
+    this.target = target;
+    this.draw();
+  }
+
+  draw(): void {
+    const { clientWidth: width, clientHeight: height } = this.element;
+    const context = this.element.getContext('2d');
+    if (!context || width === 0) return;
+    const ratio = devicePixelRatio;
+    if (this.element.width !== Math.round(width * ratio)) {
+      this.element.width = Math.round(width * ratio);
+      this.element.height = Math.round(height * ratio);
+    }
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.clearRect(0, 0, width, height);
+    const style = getComputedStyle(this.element);
+    const x = scale(
+      this.samples.map((s) => s.seconds),
+      [0.1, 1],
+      MARGIN.left,
+      width - MARGIN.right,
+    );
+    const errors = this.samples.flatMap((s) => [s.total, ...(s.sampling > 1e-4 ? [s.sampling] : [])]);
+    const y = scale([...errors, this.target || 0.02], [0.01, 1], height - MARGIN.bottom, MARGIN.top);
+    this.axes(context, style, x, y, width, height);
+    context.save();
+    context.beginPath();
+    context.rect(MARGIN.left, MARGIN.top, width - MARGIN.left - MARGIN.right, height - MARGIN.top - MARGIN.bottom);
+    context.clip();
+    for (const { key, colour } of LINES) this.line(context, style.getPropertyValue(colour), key, x, y);
+    context.restore();
+  }
+
+  private axes(
+    context: CanvasRenderingContext2D,
+    style: CSSStyleDeclaration,
+    x: LogScale,
+    y: LogScale,
+    width: number,
+    height: number,
+  ): void {
+    context.font = `11px ${style.fontFamily}`;
+    context.fillStyle = style.getPropertyValue('--dim');
+    context.strokeStyle = style.getPropertyValue('--line');
+    context.lineWidth = 1;
+    context.textAlign = 'center';
+    for (const tick of x.ticks) {
+      stroke(context, x.at(tick), MARGIN.top, x.at(tick), height - MARGIN.bottom);
+      context.fillText(`${short(tick)} s`, x.at(tick), height - 7);
+    }
+    context.textAlign = 'right';
+    for (const tick of y.ticks) {
+      stroke(context, MARGIN.left, y.at(tick), width - MARGIN.right, y.at(tick));
+      context.fillText(`${short(100 * tick)} %`, MARGIN.left - 5, y.at(tick) + 4);
+    }
+    if (!this.target) return;
+    context.strokeStyle = style.getPropertyValue('--good');
+    context.setLineDash([4, 4]);
+    stroke(context, MARGIN.left, y.at(this.target), width - MARGIN.right, y.at(this.target));
+    context.setLineDash([]);
+  }
+
+  private line(
+    context: CanvasRenderingContext2D,
+    colour: string,
+    key: (typeof LINES)[number]['key'],
+    x: LogScale,
+    y: LogScale,
+  ): void {
+    context.beginPath();
+    context.strokeStyle = colour;
+    context.lineWidth = key === 'total' ? 2 : 1.2;
+    for (const sample of this.samples) if (sample[key] > 0) context.lineTo(x.at(sample.seconds), y.at(sample[key]));
+    context.stroke();
+  }
+}
+
+interface LogScale {
+  at(value: number): number;
+  ticks: number[];
+}
+
+/** Decades that hold all values and at least `atLeast`; ticks at powers of ten, and at 2 and 5 where there is room. */
+function scale(values: number[], atLeast: [number, number], from: number, to: number): LogScale {
+  const good = values.filter((v) => v > 0 && Number.isFinite(v));
+  const low = Math.log10(Math.min(atLeast[1], ...good) * 0.9);
+  const high = Math.log10(Math.max(values.length ? 0 : atLeast[1], ...good, 10 ** low * 2) * 1.1);
+  const ticks: number[] = [];
+  const steps = high - low > 1.8 ? [1] : [1, 2, 5];
+  for (let decade = Math.floor(low); decade <= high; ++decade)
+    for (const step of steps) {
+      const tick = step * 10 ** decade;
+      if (Math.log10(tick) >= low && Math.log10(tick) <= high) ticks.push(tick);
+    }
+  return { at: (value) => from + ((Math.log10(value) - low) / (high - low)) * (to - from), ticks };
+}
+
+function short(value: number): string {
+  return String(Number(value.toPrecision(2)));
+}
+
+function stroke(context: CanvasRenderingContext2D, x0: number, y0: number, x1: number, y1: number): void {
+  context.beginPath();
+  context.moveTo(x0, y0);
+  context.lineTo(x1, y1);
+  context.stroke();
+}

@@ -1,0 +1,224 @@
+// The page: the picture, and around it a bar above, tools below and a panel beside (on narrow screens: below).
+
+import { button, h, icon, iconButton, pressed } from './dom';
+import { makeHelp } from './help';
+import { Legend, MeterCard } from './legend';
+import { Toasts } from './toast';
+
+export interface FrameActions {
+  toggleWalk(): void;
+  frameAll(): void;
+  gizmo(mode: 'translate' | 'rotate' | 'scale'): void;
+  toggleMeter(): void;
+  addLamp(): void;
+  undo(): void;
+  redo(): void;
+}
+
+const THEMES = ['auto', 'dark', 'light'] as const;
+
+export class Frame {
+  readonly canvas = h('canvas', {
+    class: 'view',
+    tabIndex: 0,
+    role: 'application',
+    'aria-label': 'The scene. Press ? for keys.',
+  });
+  readonly toasts = new Toasts();
+  readonly legend = new Legend();
+  readonly meter = new MeterCard();
+  readonly help = makeHelp();
+  private readonly state = h('span', { class: 'state', role: 'status' }, 'Connecting');
+  private readonly dot = h('span', { class: 'dot' });
+  private readonly error = h('span', { class: 'error-now' });
+  private readonly rate = h('span', { class: 'rate' });
+  private readonly people = h('span', { class: 'people', title: 'People who watch', hidden: true });
+  private readonly banner = h('div', { class: 'banner', role: 'alert', hidden: true });
+  private readonly welcome = h('div', { class: 'welcome', hidden: true });
+  private readonly panelButton: HTMLButtonElement;
+  private readonly panel: HTMLElement;
+  private readonly tools: Record<string, HTMLButtonElement>;
+  private readonly tabs = new Map<string, { tab: HTMLButtonElement; body: HTMLElement }>();
+
+  constructor(actions: FrameActions, panels: Record<string, HTMLElement>) {
+    this.tools = this.makeTools(actions);
+    this.panelButton = iconButton('panel', 'Panel', 'P', () => this.togglePanel());
+    this.panel = this.makePanel(panels);
+    const bar = h(
+      'header',
+      { class: 'bar' },
+      h('span', { class: 'brand' }, 'radiosityd'),
+      h('span', { class: 'chip' }, this.dot, this.state, this.error, this.rate),
+      h('span', { class: 'spacer' }),
+      this.people,
+      this.themeButton(),
+      iconButton('help', 'Keys', '?', () => this.help.showModal()),
+      this.panelButton,
+    );
+    this.people.append(icon('people'), h('span', {}));
+    const tools = h('div', { class: 'tools', role: 'toolbar', 'aria-label': 'Tools' }, ...Object.values(this.tools));
+    const readings = h('div', { class: 'readings' }, this.legend.element);
+    document.body.append(
+      h('main', {}, this.canvas, readings, tools, this.welcome, this.banner),
+      bar,
+      this.panel,
+      this.meter.element,
+      this.toasts.element,
+      this.help,
+    );
+    this.openPanel(innerWidth >= 900);
+    this.setGizmo('translate');
+    this.setHistory(false, false);
+  }
+
+  setState(text: string, tone: 'busy' | 'good' | 'bad' | 'idle', error = '', rate = ''): void {
+    this.state.textContent = text;
+    this.error.textContent = error;
+    this.rate.textContent = rate;
+    this.dot.className = `dot ${tone}`;
+  }
+
+  setViewers(count: number): void {
+    this.people.hidden = count < 2;
+    this.people.lastElementChild!.textContent = String(count);
+    this.people.title = `${count} viewers`;
+  }
+
+  setWalk(on: boolean): void {
+    pressed(this.tools['walk']!, on);
+  }
+
+  setMeter(on: boolean): void {
+    pressed(this.tools['meter']!, on);
+  }
+
+  setGizmo(mode: string): void {
+    for (const name of ['translate', 'rotate', 'scale']) pressed(this.tools[name]!, name === mode);
+  }
+
+  setHistory(undo: boolean, redo: boolean): void {
+    this.tools['undo']!.disabled = !undo;
+    this.tools['redo']!.disabled = !redo;
+  }
+
+  /** Something that stays until it is mended; undefined: nothing is wrong. */
+  setBanner(text: string | undefined, label = '', act?: () => void): void {
+    this.banner.hidden = text === undefined;
+    if (text === undefined) return;
+    this.banner.replaceChildren(h('span', {}, text), ...(act ? [button(label, act)] : []));
+  }
+
+  /** Shown where there is no scene. */
+  setWelcome(on: boolean): void {
+    this.welcome.hidden = !on;
+    if (!on || this.welcome.firstChild) return;
+    this.welcome.append(
+      h('h2', {}, 'No scene yet'),
+      h('p', {}, 'Drop a .glb here, or send one:'),
+      h('pre', { class: 'code' }, `curl -T room.glb ${location.origin}/scene`),
+    );
+  }
+
+  askToken(reason: string, give: (token: string) => void): void {
+    const input = h('input', { type: 'password', 'aria-label': 'Token', autocomplete: 'off' });
+    const form = h(
+      'form',
+      { class: 'token' },
+      h('span', {}, `This server wants a token: ${reason}.`),
+      input,
+      h('button', {}, 'Connect'),
+    );
+    form.onsubmit = (event) => {
+      event.preventDefault();
+      if (input.value) give(input.value.trim());
+    };
+    this.banner.hidden = false;
+    this.banner.replaceChildren(form);
+    input.focus();
+  }
+
+  togglePanel(): void {
+    this.openPanel(this.panel.hidden);
+  }
+
+  toggleChrome(): void {
+    document.body.classList.toggle('bare');
+  }
+
+  showTab(name: string): void {
+    for (const [other, { tab, body }] of this.tabs) {
+      const on = other === name;
+      tab.setAttribute('aria-selected', String(on));
+      tab.tabIndex = on ? 0 : -1;
+      body.hidden = !on;
+    }
+  }
+
+  get panelOpen(): boolean {
+    return !this.panel.hidden;
+  }
+
+  private openPanel(open: boolean): void {
+    this.panel.hidden = !open;
+    document.body.classList.toggle('with-panel', open);
+    pressed(this.panelButton, open);
+  }
+
+  private makeTools(actions: FrameActions): Record<string, HTMLButtonElement> {
+    const tool = (name: string, label: string, key: string, act: () => void) => iconButton(name, label, key, act);
+    return {
+      walk: tool('walk', 'First person', 'V', () => actions.toggleWalk()),
+      frame: tool('frame', 'Frame everything', 'F', () => actions.frameAll()),
+      meter: tool('meter', 'Light meter', 'M', () => actions.toggleMeter()),
+      translate: tool('move', 'Move', 'T', () => actions.gizmo('translate')),
+      rotate: tool('rotate', 'Turn', 'R', () => actions.gizmo('rotate')),
+      scale: tool('scale', 'Scale', 'Y', () => actions.gizmo('scale')),
+      lamp: tool('lamp', 'Add a lamp', 'L', () => actions.addLamp()),
+      undo: tool('undo', 'Undo', 'Ctrl+Z', () => actions.undo()),
+      redo: tool('redo', 'Redo', 'Ctrl+Shift+Z', () => actions.redo()),
+    };
+  }
+
+  private makePanel(panels: Record<string, HTMLElement>): HTMLElement {
+    const names = Object.keys(panels);
+    const bar = h('div', { class: 'tabs', role: 'tablist' });
+    const element = h('aside', { class: 'panel', 'aria-label': 'Panel' }, bar);
+    for (const name of names) {
+      const body = h('div', { class: 'tab-body', role: 'tabpanel', id: `tab-${name}` }, panels[name]);
+      const tab = button(name, () => this.showTab(name), { role: 'tab', 'aria-controls': body.id });
+      tab.onkeydown = ({ key }) => {
+        const step = key === 'ArrowRight' ? 1 : key === 'ArrowLeft' ? names.length - 1 : 0;
+        if (step === 0) return;
+        const next = names[(names.indexOf(name) + step) % names.length]!;
+        this.showTab(next);
+        this.tabs.get(next)?.tab.focus();
+      };
+      bar.append(tab);
+      element.append(body);
+      this.tabs.set(name, { tab, body });
+    }
+    this.showTab(names[0]!);
+    return element;
+  }
+
+  private themeButton(): HTMLButtonElement {
+    let theme = localStorage.getItem('theme') ?? 'auto';
+    const apply = () => {
+      document.documentElement.dataset['theme'] = theme;
+      element.textContent = theme === 'auto' ? '◐' : theme === 'dark' ? '☾' : '☀';
+      element.title = `Colours: ${theme}`;
+      element.setAttribute('aria-label', element.title);
+    };
+    const element: HTMLButtonElement = button(
+      '',
+      () => {
+        theme = THEMES[(THEMES.indexOf(theme as (typeof THEMES)[number]) + 1) % THEMES.length]!;
+        localStorage.setItem('theme', theme);
+        apply();
+      },
+      { class: 'icon' },
+    );
+    apply();
+    return element;
+  }
+}

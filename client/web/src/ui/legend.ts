@@ -1,0 +1,65 @@
+// The scale of a false-colour picture: what colour means how many lux.
+
+import { paletteCss } from '../view/palette';
+import { h, readable } from './dom';
+
+export class Legend {
+  private readonly bar = h('div', { class: 'bar' });
+  private readonly ticks = h('div', { class: 'ticks' });
+  private readonly title = h('div', { class: 'title' });
+  readonly element = h(
+    'figure',
+    { class: 'legend card', 'aria-label': 'Scale of colours', hidden: true },
+    this.title,
+    this.bar,
+    this.ticks,
+  );
+
+  constructor() {
+    this.bar.style.background = paletteCss('to right');
+  }
+
+  hide(): void {
+    this.element.hidden = true;
+  }
+
+  show(title: string, unit: string, low: number, high: number): void {
+    this.element.hidden = false;
+    this.title.textContent = `${title}, ${unit}`;
+    const count = 5;
+    const labels = Array.from({ length: count }, (_, i) => readable(low * (high / low) ** (i / (count - 1)), 2));
+    const text = labels.join(' ');
+    if (this.ticks.dataset['text'] === text) return;
+    this.ticks.dataset['text'] = text;
+    this.ticks.replaceChildren(...labels.map((label) => h('span', {}, label)));
+  }
+}
+
+/** The light meter's reading, beside the pointer. */
+export class MeterCard {
+  private readonly value = h('strong', {});
+  private readonly bar = h('span', { class: 'errorbar' });
+  private readonly more = h('div', { class: 'dim' });
+  readonly element = h(
+    'div',
+    { class: 'meter card', role: 'status', hidden: true },
+    h('div', {}, this.value, this.bar),
+    this.more,
+  );
+
+  hide(): void {
+    this.element.hidden = true;
+  }
+
+  /** `lux` undefined: no light known there. `error`: lux, either side. */
+  show(x: number, y: number, lux: number | undefined, error: number | undefined, details: string): void {
+    this.element.hidden = false;
+    this.value.textContent = lux === undefined ? 'no light known' : `${readable(lux)} lx`;
+    this.bar.textContent = lux === undefined || error === undefined ? '' : ` ± ${readable(error, 2)}`;
+    this.more.textContent = details;
+    const { offsetWidth: w, offsetHeight: hgt } = this.element;
+    const left = Math.min(Math.max(8, x + 18), Math.max(8, innerWidth - w - 8));
+    const top = y + 18 + hgt > innerHeight ? y - hgt - 14 : y + 18;
+    this.element.style.transform = `translate(${Math.round(left)}px, ${Math.round(top)}px)`;
+  }
+}

@@ -1,0 +1,248 @@
+// The panel "Scene": its objects, and what can be changed of the selected one.
+
+import { MathUtils, Euler, Quaternion } from 'three';
+import { isVisible } from '../document/edits';
+import { hangingNodes, lightOf, materialName, nodeName, type Gltf, type Vec3, type Vec4 } from '../document/gltf';
+import type { Placement } from '../document/edits';
+import { button, checkbox, field, fromHex, h, row, section, toHex } from './dom';
+
+export interface Selection {
+  node: number;
+  material: number | undefined;
+}
+
+export interface ScenePanelActions {
+  select(selection: Selection | undefined): void;
+  setColour(material: number, rgb: Vec3): void;
+  setEmission(material: number, rgb: Vec3, strength: number): void;
+  setLight(light: number, change: { color?: Vec3; intensity?: number }): void;
+  setPlacement(node: number, placement: Placement): void;
+  setVisible(node: number, visible: boolean): void;
+  remove(node: number): void;
+  addLamp(): void;
+  endGesture(): void;
+  loadFile(file: File): void;
+}
+
+const MOST_LISTED = 400;
+
+export class ScenePanel {
+  readonly element: HTMLElement;
+  private readonly list = h('ul', { class: 'tree', 'aria-label': 'Objects' });
+  private readonly editor = h('div', { class: 'editor' });
+  private gltf: Gltf = { asset: { version: '2.0' } };
+  private selection: Selection | undefined;
+  private revealed: number | undefined;
+  private materialsOf: (node: number) => number[] = () => [];
+
+  constructor(private readonly actions: ScenePanelActions) {
+    const file = h('input', { type: 'file', accept: '.glb,.gltf', class: 'offscreen', tabIndex: -1 });
+    file.onchange = () => {
+      const chosen = file.files?.[0];
+      if (chosen) actions.loadFile(chosen);
+      file.value = '';
+    };
+    this.element = h(
+      'div',
+      {},
+      section(
+        'Objects',
+        this.list,
+        h(
+          'div',
+          { class: 'buttons' },
+          button('Add lamp', () => actions.addLamp(), { title: 'Add a point light in front of the camera (L)' }),
+          button('Open scene…', () => file.click(), { title: 'Or drop a .glb on the page' }),
+          file,
+        ),
+      ),
+      this.editor,
+    );
+  }
+
+  setDocument(gltf: Gltf, materialsOf: (node: number) => number[]): void {
+    this.gltf = gltf;
+    this.materialsOf = materialsOf;
+    this.refresh();
+  }
+
+  setSelection(selection: Selection | undefined): void {
+    this.selection = selection;
+    this.refresh();
+  }
+
+  /** Shows other people's and our own edits; leaves what the user is typing alone. */
+  refresh(): void {
+    this.showList();
+    if (!this.editor.contains(document.activeElement) || document.activeElement instanceof HTMLButtonElement)
+      this.showEditor();
+  }
+
+  private showList(): void {
+    const all = hangingNodes(this.gltf);
+    const had = this.list.contains(document.activeElement);
+    const { scrollTop } = this.list;
+    const items = all.slice(0, MOST_LISTED).map(({ node, depth }) => {
+      const current = node === this.selection?.node;
+      const element = button(
+        nodeName(this.gltf, node),
+        () => this.actions.select({ node, material: this.materialsOf(node)[0] }),
+        {
+          'aria-current': current ? 'true' : undefined,
+          class: isVisible(this.gltf, node) ? '' : 'hidden-node',
+        },
+      );
+      element.style.paddingInlineStart = `${0.5 + 0.8 * Math.min(depth, 8)}rem`;
+      if (lightOf(this.gltf, node)) element.append(h('span', { class: 'tag' }, 'light'));
+      return h('li', {}, element);
+    });
+    if (all.length > MOST_LISTED) items.push(h('li', { class: 'dim' }, `and ${all.length - MOST_LISTED} more`));
+    this.list.replaceChildren(...items);
+    this.list.scrollTop = scrollTop;
+    this.revealSelection();
+    if (had) this.list.querySelector<HTMLElement>('[aria-current]')?.focus();
+  }
+
+  /** Scrolls the list, and nothing but the list, to an object that was just selected or just came. */
+  private revealSelection(): void {
+    const element = this.list.querySelector<HTMLElement>('[aria-current]')?.parentElement;
+    const node = element ? this.selection?.node : undefined;
+    if (node === this.revealed) return;
+    this.revealed = node;
+    if (!element) return;
+    const top = element.offsetTop - this.list.offsetTop;
+    if (top < this.list.scrollTop || top + element.offsetHeight > this.list.scrollTop + this.list.clientHeight)
+      this.list.scrollTop = top - this.list.clientHeight / 2;
+  }
+
+  private showEditor(): void {
+    const { selection, gltf } = this;
+    const node = selection && gltf.nodes?.[selection.node];
+    if (!selection || !node) {
+      this.editor.replaceChildren(h('p', { class: 'dim' }, 'Click an object to change it.'));
+      return;
+    }
+    const light = lightOf(gltf, selection.node);
+    const materials = this.materialsOf(selection.node);
+    const material = selection.material ?? materials[0];
+    this.editor.replaceChildren(
+      section(
+        nodeName(gltf, selection.node),
+        field(
+          'Visible',
+          checkbox(isVisible(gltf, selection.node), (on) => this.actions.setVisible(selection.node, on)),
+        ),
+        ...this.placement(selection.node),
+        h(
+          'div',
+          { class: 'buttons' },
+          button('Remove', () => this.actions.remove(selection.node), { title: 'Delete' }),
+        ),
+      ),
+      ...(light ? [this.lightEditor(light.index)] : []),
+      ...(material !== undefined && gltf.materials?.[material] ? [this.materialEditor(material, materials)] : []),
+    );
+  }
+
+  private placement(index: number): HTMLElement[] {
+    const node = this.gltf.nodes![index]!;
+    if (node.matrix) return [h('p', { class: 'dim' }, 'Placed by a skewed matrix, which cannot be edited here.')];
+    const turn = new Euler().setFromQuaternion(new Quaternion(...(node.rotation ?? [0, 0, 0, 1])), 'YXZ');
+    const degrees = [turn.x, turn.y, turn.z].map((a) => MathUtils.radToDeg(a)) as Vec3;
+    return [
+      this.vector('Position, m', node.translation ?? [0, 0, 0], (translation) =>
+        this.actions.setPlacement(index, { translation }),
+      ),
+      this.vector('Rotation, °', degrees, ([x, y, z]) => {
+        const euler = new Euler(...([x, y, z].map((a) => MathUtils.degToRad(a)) as Vec3), 'YXZ');
+        this.actions.setPlacement(index, { rotation: new Quaternion().setFromEuler(euler).toArray() as Vec4 });
+      }),
+      this.vector('Scale', node.scale ?? [1, 1, 1], (scale) => this.actions.setPlacement(index, { scale })),
+    ];
+  }
+
+  private vector(label: string, value: Vec3, changed: (value: Vec3) => void): HTMLElement {
+    const inputs = value.map((v, i) =>
+      h('input', {
+        type: 'text',
+        inputMode: 'decimal',
+        class: 'number',
+        value: String(Number(v.toPrecision(5))),
+        'aria-label': `${label}, ${'xyz'[i]}`,
+        onchange: () => {
+          const next = inputs.map((input) => Number(input.value)) as Vec3;
+          if (next.every(Number.isFinite)) changed(next);
+          else this.showEditor();
+        },
+      }),
+    );
+    return row(label, h('span', { class: 'vector' }, ...inputs));
+  }
+
+  private materialEditor(index: number, all: number[]): HTMLElement {
+    const material = this.gltf.materials![index]!;
+    const base = material.pbrMetallicRoughness?.baseColorFactor ?? [1, 1, 1, 1];
+    const emission = material.emissiveFactor ?? [0, 0, 0];
+    const top = Math.max(...emission);
+    const strength = material.extensions?.KHR_materials_emissive_strength?.emissiveStrength ?? 1;
+    const colour = this.colour(toHex(base), (hex) => this.actions.setColour(index, fromHex(hex)));
+    // Luminance at full colour: the factor's brightest channel belongs to the strength, so that both sliders are free.
+    const glow = this.colour(toHex(top > 0 ? emission.map((c) => c / top) : [1, 1, 1]), () => send());
+    const nits = this.number(String(Number((top * strength).toPrecision(5))), () => send());
+    const send = () => {
+      const value = Number(nits.value);
+      if (!(value >= 0)) return this.showEditor();
+      this.actions.setEmission(index, value > 0 ? fromHex(glow.value) : [0, 0, 0], value > 0 ? value : 1);
+    };
+    const chooser =
+      all.length > 1
+        ? row(
+            'Material',
+            h(
+              'span',
+              { class: 'list' },
+              ...all.map((m) =>
+                button(
+                  materialName(this.gltf, m),
+                  () => this.actions.select({ node: this.selection!.node, material: m }),
+                  { 'aria-pressed': String(m === index) },
+                ),
+              ),
+            ),
+          )
+        : undefined;
+    return section(
+      `Material: ${materialName(this.gltf, index)}`,
+      chooser,
+      field('Colour', colour),
+      field('Emission', glow),
+      field('Luminance, nit', nits),
+    );
+  }
+
+  private lightEditor(index: number): HTMLElement {
+    const light = this.gltf.extensions!.KHR_lights_punctual!.lights[index]!;
+    const unit = light.type === 'directional' ? 'lx' : 'cd';
+    const colour = this.colour(toHex(light.color ?? [1, 1, 1]), (hex) =>
+      this.actions.setLight(index, { color: fromHex(hex) }),
+    );
+    const strength = this.number(String(Number((light.intensity ?? 1).toPrecision(5))), () => {
+      const value = Number(strength.value);
+      if (value >= 0) this.actions.setLight(index, { intensity: value });
+      else this.showEditor();
+    });
+    return section(`Light: ${light.type}`, field('Colour', colour), field(`Intensity, ${unit}`, strength));
+  }
+
+  /** Sends while the colour is being chosen; the gesture ends when the chooser closes. */
+  private colour(value: string, changed: (hex: string) => void): HTMLInputElement {
+    const input = h('input', { type: 'color', value });
+    input.oninput = () => changed(input.value);
+    input.onchange = () => this.actions.endGesture();
+    return input;
+  }
+
+  private number(value: string, changed: () => void): HTMLInputElement {
+    return h('input', { type: 'text', inputMode: 'decimal', class: 'number', value, onchange: changed });
+  }
+}

@@ -1,0 +1,58 @@
+// The panel "Share": a link that carries the camera, the last edit as a command, and files to take away.
+
+import { button, h, section } from './dom';
+
+export interface SharePanelActions {
+  copyLink(): void;
+  copyEdit(form: 'command' | 'json'): void;
+  download(what: 'glb' | 'unlit' | 'exr' | 'png' | 'snapshot'): void;
+}
+
+export class SharePanel {
+  readonly element: HTMLElement;
+  private readonly edit = h('pre', { class: 'code', tabIndex: 0 }, 'Nothing was changed yet.');
+  private readonly about = h('dl', { class: 'facts' });
+  private readonly copies: HTMLButtonElement[];
+
+  constructor(actions: SharePanelActions) {
+    this.copies = [
+      button('Copy as command', () => actions.copyEdit('command'), { disabled: true }),
+      button('Copy JSON', () => actions.copyEdit('json'), { disabled: true }),
+    ];
+    this.element = h(
+      'div',
+      {},
+      section(
+        'This view',
+        h(
+          'div',
+          { class: 'buttons' },
+          button('Copy link', () => actions.copyLink()),
+          button('Save picture', () => actions.download('png')),
+        ),
+      ),
+      section('Last edit', this.edit, h('div', { class: 'buttons' }, ...this.copies)),
+      section(
+        'Download',
+        h(
+          'div',
+          { class: 'buttons' },
+          button('Lit scene (.glb)', () => actions.download('glb'), { title: 'With lightmap coordinates' }),
+          button('Baked scene (.glb)', () => actions.download('unlit'), { title: 'For any glTF viewer' }),
+          button('Lightmaps (.exr)', () => actions.download('exr'), { title: 'Irradiance in lux, 32-bit float' }),
+          button("Server's picture (.png)", () => actions.download('snapshot')),
+        ),
+      ),
+      section('Server', this.about),
+    );
+  }
+
+  setEdit(json: string): void {
+    this.edit.textContent = json;
+    for (const copy of this.copies) copy.disabled = false;
+  }
+
+  setAbout(facts: [string, string][]): void {
+    this.about.replaceChildren(...facts.flatMap(([name, value]) => [h('dt', {}, name), h('dd', {}, value)]));
+  }
+}

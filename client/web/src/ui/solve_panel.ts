@@ -1,0 +1,142 @@
+// The panel "Solve": how far the light is, and how far it shall go.
+
+import type { Progress, Settings } from '../protocol/messages';
+import { button, field, h, percent, readable, section } from './dom';
+import { ErrorPlot } from './error_plot';
+
+export interface SolvePanelActions {
+  pauseOrResume(): void;
+  restart(): void;
+  configure(settings: Partial<Settings>): void;
+}
+
+const STATES: Record<string, string> = {
+  empty: 'No scene',
+  loading: 'Loading',
+  solving: 'Solving',
+  paused: 'Paused',
+  converged: 'Done',
+  timeLimit: 'Time limit reached',
+  failed: 'Failed',
+};
+
+export function stateName(state: string): string {
+  return STATES[state] ?? state;
+}
+
+export function duration(seconds: number): string {
+  if (seconds < 10) return `${readable(seconds, 2)} s`;
+  if (seconds < 120) return `${Math.round(seconds)} s`;
+  if (seconds < 7200) return `${Math.round(seconds / 60)} min`;
+  return `${readable(seconds / 3600, 2)} h`;
+}
+
+export class SolvePanel {
+  readonly element: HTMLElement;
+  readonly plot = new ErrorPlot();
+  private readonly facts = h('dl', { class: 'facts' });
+  private readonly warnings = h('details', { hidden: true });
+  private readonly pause: HTMLButtonElement;
+  private readonly bar = h('progress', { max: 1, value: 0, 'aria-label': 'Way to the target error' });
+  private readonly target: HTMLInputElement;
+  private readonly texels: HTMLInputElement;
+  private settings: Settings | undefined;
+  private firstError = 1;
+
+  constructor(actions: SolvePanelActions) {
+    this.pause = button('Pause', () => actions.pauseOrResume());
+    this.target = h('input', { type: 'text', class: 'number', inputMode: 'decimal' });
+    this.target.onchange = () => {
+      const value = parseFloat(this.target.value) / 100;
+      if (value > 0 && value <= 1) actions.configure({ targetError: value });
+      else this.showSettings();
+    };
+    this.texels = h('input', { type: 'text', class: 'number', inputMode: 'numeric' });
+    this.texels.onchange = () => {
+      const value = Math.round(Number(this.texels.value.replaceAll(',', '')));
+      if (value >= 1) actions.configure({ texels: value });
+      else this.showSettings();
+    };
+    this.element = h(
+      'div',
+      {},
+      section(
+        'Progress',
+        this.bar,
+        this.facts,
+        h(
+          'div',
+          { class: 'buttons' },
+          this.pause,
+          button('Start again', () => actions.restart()),
+        ),
+      ),
+      section('Error against time', this.plot.element, legendLine()),
+      section('Goal', field('Error, %', this.target), field('Texels, about', this.texels)),
+      this.warnings,
+    );
+  }
+
+  update(progress: Progress): void {
+    const { error } = progress;
+    this.plot.add(progress);
+    if (progress.shots === 0 || error.total > this.firstError) this.firstError = Math.max(error.total, 1e-6);
+    const target = this.settings?.targetError ?? 0.02;
+    const way = Math.log(this.firstError / error.total) / Math.log(this.firstError / target);
+    this.bar.value = progress.state === 'converged' ? 1 : Math.min(1, Math.max(0, Number.isFinite(way) ? way : 0));
+    this.pause.textContent = progress.state === 'paused' ? 'Resume' : 'Pause';
+    this.pause.disabled = progress.state !== 'paused' && progress.state !== 'solving';
+    this.showFacts([
+      ['State', progress.failure ? `${stateName(progress.state)}: ${progress.failure}` : stateName(progress.state)],
+      ['Error', `${percent(error.total)} of ${percent(target)}`],
+      ['Residual', percent(error.residual)],
+      ['Sampling', percent(error.sampling)],
+      ['Too coarse texels', percent(error.discretization)],
+      ['Shots', `${readable(progress.shots, 4)} (${readable(progress.shotsPerSecond, 2)}/s)`],
+      ['Solve time', duration(progress.seconds)],
+      ['Time left, about', progress.secondsLeft === undefined ? '–' : duration(progress.secondsLeft)],
+      ['Unshot', `${readable(progress.energy['unshot'] ?? 0)} of ${readable(progress.energy['emitted'] ?? 0)} lm`],
+      ['Patches', `${readable(progress.patches, 4)} on ${readable(progress.surfaces, 4)} surfaces`],
+    ]);
+  }
+
+  setSettings(settings: Settings): void {
+    this.settings = settings;
+    this.plot.setTarget(settings.targetError);
+    this.showSettings();
+  }
+
+  setWarnings(warnings: string[], count: number): void {
+    this.warnings.hidden = count === 0;
+    this.warnings.replaceChildren(
+      h('summary', {}, `${count} warning${count === 1 ? '' : 's'} about the scene`),
+      h('ul', {}, ...warnings.slice(0, 50).map((warning) => h('li', {}, warning))),
+    );
+  }
+
+  private showSettings(): void {
+    if (!this.settings) return;
+    this.target.value = readable(100 * this.settings.targetError);
+    this.texels.value = String(this.settings.texels);
+  }
+
+  private showFacts(facts: [string, string][]): void {
+    facts.forEach(([name, value], i) => {
+      let [dt, dd] = [this.facts.children[2 * i], this.facts.children[2 * i + 1]];
+      if (!dt || !dd) this.facts.append((dt = h('dt', {}, name)), (dd = h('dd')));
+      if (dd.textContent !== value) dd.textContent = value;
+    });
+  }
+}
+
+function legendLine(): HTMLElement {
+  const swatch = (name: string, label: string) => h('span', { class: `swatch ${name}` }, label);
+  return h(
+    'p',
+    { class: 'swatches' },
+    swatch('a', 'total'),
+    swatch('b', 'sampling'),
+    swatch('c', 'residual'),
+    swatch('t', 'goal'),
+  );
+}

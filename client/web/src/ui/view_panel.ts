@@ -1,0 +1,132 @@
+// The panel "View": what is shown and how bright, from where.
+
+import { TONE_CURVES, VIEW_MODES, type ViewMode } from '../view/view_modes';
+import { button, checkbox, field, h, pressed, readable, section, select } from './dom';
+
+export const BACKGROUNDS = [
+  { id: 'theme', label: 'As the page' },
+  { id: 'black', label: 'Black' },
+  { id: 'grey', label: 'Grey' },
+  { id: 'white', label: 'White' },
+  { id: 'sky', label: 'Sky' },
+] as const;
+
+export interface ViewPanelActions {
+  setMode(id: string): void;
+  setFalseColour(on: boolean): void;
+  setRange(range: [number, number] | undefined): void;
+  setAutoExposure(on: boolean): void;
+  setStops(stops: number): void;
+  setToneCurve(id: string): void;
+  setBackground(id: string): void;
+  useCamera(index: number): void;
+}
+
+export class ViewPanel {
+  readonly element: HTMLElement;
+  private readonly modes = new Map<string, HTMLButtonElement>();
+  private readonly falseBox: HTMLInputElement;
+  private readonly stops: HTMLInputElement;
+  private readonly stopsValue = h('output', { class: 'value' });
+  private readonly auto: HTMLInputElement;
+  private readonly cameras = h('div', { class: 'list' });
+  private readonly low = this.rangeInput('Lowest');
+  private readonly high = this.rangeInput('Highest');
+  private readonly autoRange: HTMLInputElement;
+  private readonly rangeRow: HTMLElement;
+  private readonly falseRow: HTMLElement;
+
+  constructor(private readonly actions: ViewPanelActions) {
+    const grid = h('div', { class: 'modes', role: 'group', 'aria-label': 'What is shown' });
+    VIEW_MODES.forEach((mode, i) => {
+      const key = String((i + 1) % 10);
+      const element = button(mode.label, () => actions.setMode(mode.id), { title: `${mode.hint} (${key})` });
+      this.modes.set(mode.id, element);
+      grid.append(element);
+    });
+    this.falseBox = checkbox(false, (on) => actions.setFalseColour(on));
+    this.autoRange = checkbox(true, (on) => this.changeRange(on));
+    this.auto = checkbox(true, (on) => actions.setAutoExposure(on));
+    this.stops = h('input', { type: 'range', min: '-8', max: '8', step: '0.25', value: '0' });
+    this.stops.oninput = () => actions.setStops(Number(this.stops.value));
+    this.falseRow = field('False colour', this.falseBox);
+    this.rangeRow = h('div', {}, field('Automatic scale', this.autoRange), field('Scale', this.low, this.high));
+    this.element = h(
+      'div',
+      {},
+      section('Show', grid, this.falseRow, this.rangeRow),
+      section(
+        'Picture',
+        field('Automatic exposure', this.auto),
+        field('Exposure', this.stops, this.stopsValue),
+        field(
+          'Tone curve',
+          select(TONE_CURVES, 'neutral', (id) => actions.setToneCurve(id)),
+        ),
+        field(
+          'Background',
+          select(BACKGROUNDS, 'theme', (id) => actions.setBackground(id)),
+        ),
+      ),
+      section('Cameras of the scene', this.cameras),
+    );
+    this.setStops(0);
+  }
+
+  setMode(mode: ViewMode, falseColour: boolean): void {
+    for (const [id, element] of this.modes) pressed(element, id === mode.id);
+    this.falseRow.hidden = mode.falseColour === 'off';
+    this.falseBox.disabled = mode.falseColour === 'always';
+    this.falseBox.checked = falseColour;
+    this.rangeRow.hidden = !falseColour || mode.falseColour === 'off';
+  }
+
+  /** Views that the server streams nothing for say so. */
+  setAvailable(available: (mode: ViewMode) => boolean): void {
+    for (const mode of VIEW_MODES) {
+      const element = this.modes.get(mode.id)!;
+      element.disabled = !available(mode);
+      if (element.disabled) element.title = `${mode.hint}: this server does not stream it`;
+    }
+  }
+
+  setStops(stops: number): void {
+    this.stops.value = String(stops);
+    this.stopsValue.textContent = `${stops > 0 ? '+' : ''}${readable(stops, 3)} EV`;
+  }
+
+  setAuto(on: boolean): void {
+    this.auto.checked = on;
+  }
+
+  showRange(low: number, high: number): void {
+    if (!this.autoRange.checked) return;
+    this.low.value = readable(low, 3).replaceAll(',', '');
+    this.high.value = readable(high, 3).replaceAll(',', '');
+  }
+
+  setCameras(names: string[]): void {
+    this.cameras.replaceChildren(
+      ...names.map((name, i) => button(name, () => this.actions.useCamera(i))),
+      ...(names.length === 0 ? [h('p', { class: 'dim' }, 'The scene has none.')] : []),
+    );
+  }
+
+  private rangeInput(label: string): HTMLInputElement {
+    return h('input', {
+      type: 'text',
+      inputMode: 'decimal',
+      class: 'number',
+      'aria-label': `${label} value of the scale`,
+      disabled: true,
+      onchange: () => this.changeRange(false),
+    });
+  }
+
+  private changeRange(automatic: boolean): void {
+    this.low.disabled = this.high.disabled = automatic;
+    const [low, high] = [Number(this.low.value), Number(this.high.value)];
+    if (automatic) this.actions.setRange(undefined);
+    else if (low > 0 && high > low) this.actions.setRange([low, high]);
+  }
+}

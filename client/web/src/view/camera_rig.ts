@@ -1,0 +1,234 @@
+// Where one looks from: orbiting about a point, or walking in the first person, by mouse, touch and keyboard.
+
+import { Box3, Euler, MathUtils, PerspectiveCamera, Quaternion, Sphere, Vector3 } from 'three';
+import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
+
+export type Walk = 'orbit' | 'walk';
+
+const WALK_KEYS: Record<string, [number, number, number]> = {
+  KeyW: [0, 0, -1],
+  KeyS: [0, 0, 1],
+  KeyA: [-1, 0, 0],
+  KeyD: [1, 0, 0],
+  KeyE: [0, 1, 0],
+  KeyQ: [0, -1, 0],
+};
+
+export class CameraRig {
+  readonly camera = new PerspectiveCamera(45, 1, 0.01, 1000);
+  readonly orbit: OrbitControls;
+  mode: Walk = 'orbit';
+  private size = 1;
+  private readonly down = new Set<string>();
+  private readonly look = new Euler(0, 0, 0, 'YXZ');
+  private readonly drags = new Map<number, { x: number; y: number }>();
+  /** Vertical field of view that the camera was given, degrees; narrower screens see more above and below. */
+  private fov = 45;
+
+  constructor(
+    private readonly element: HTMLElement,
+    private readonly moved: () => void,
+  ) {
+    this.orbit = new OrbitControls(this.camera, element);
+    this.orbit.enableDamping = true;
+    this.orbit.dampingFactor = 0.18;
+    this.orbit.zoomToCursor = true;
+    this.orbit.addEventListener('change', moved);
+    element.addEventListener('pointerdown', (event) => this.startDrag(event));
+    element.addEventListener('pointermove', (event) => this.drag(event));
+    for (const type of ['pointerup', 'pointercancel'] as const)
+      element.addEventListener(type, (event) => this.drags.delete(event.pointerId));
+    element.addEventListener('wheel', (event) => this.wheel(event), { passive: true });
+    window.addEventListener('blur', () => this.down.clear());
+  }
+
+  get target(): Vector3 {
+    return this.orbit.target;
+  }
+
+  setMode(mode: Walk): void {
+    this.mode = mode;
+    this.orbit.enabled = mode === 'orbit';
+    if (mode === 'walk') this.look.setFromQuaternion(this.camera.quaternion);
+    else this.aimAhead();
+    this.moved();
+  }
+
+  /** Nothing is dragged while something else is (the gizmo). */
+  set enabled(enabled: boolean) {
+    this.orbit.enabled = enabled && this.mode === 'orbit';
+    if (!enabled) this.drags.clear();
+  }
+
+  /** True: the key moves the camera. */
+  key(event: KeyboardEvent, pressed: boolean): boolean {
+    if (!(event.code in WALK_KEYS) || event.ctrlKey || event.metaKey || event.altKey) return false;
+    if (pressed) this.down.add(event.code);
+    else this.down.delete(event.code);
+    this.moved();
+    return true;
+  }
+
+  /** Arrow keys: turns about the target, or looks about. Radians. */
+  turn(right: number, up: number): void {
+    if (this.mode === 'walk') {
+      this.lookBy(-right, up);
+      return;
+    }
+    const offset = this.camera.position.clone().sub(this.target);
+    const around = new Quaternion().setFromAxisAngle(new Vector3(0, 1, 0), right);
+    const sideways = new Vector3(1, 0, 0).applyQuaternion(this.camera.quaternion);
+    const raised = offset.clone().applyAxisAngle(sideways, -up);
+    const polar = raised.angleTo(new Vector3(0, 1, 0));
+    if (polar > 0.02 && polar < Math.PI - 0.02) offset.copy(raised);
+    this.camera.position.copy(this.target).add(offset.applyQuaternion(around));
+    this.orbit.update();
+    this.moved();
+  }
+
+  /** Nearer for factors below 1. */
+  zoom(factor: number): void {
+    if (this.mode === 'walk') {
+      this.camera.translateZ((factor - 1) * this.size * 0.3);
+    } else {
+      this.camera.position.sub(this.target).multiplyScalar(factor).add(this.target);
+      this.orbit.update();
+    }
+    this.moved();
+  }
+
+  /** Moves on. True: still moving. */
+  update(seconds: number): boolean {
+    const moving = this.down.size > 0;
+    if (moving) {
+      const step = new Vector3();
+      for (const code of this.down) step.add(new Vector3(...WALK_KEYS[code]!));
+      step.multiplyScalar(Math.min(seconds, 0.1) * this.size * 0.35).applyQuaternion(this.camera.quaternion);
+      this.camera.position.add(step);
+      this.target.add(step);
+    }
+    if (this.mode === 'orbit') this.orbit.update();
+    this.fitPlanes();
+    return moving;
+  }
+
+  /** How large the scene is: sets speeds and depth range. */
+  setBounds(box: Box3): void {
+    this.size = Math.max(box.getSize(new Vector3()).length(), 1e-6);
+    this.orbit.minDistance = this.size * 1e-3;
+    this.orbit.maxDistance = this.size * 20;
+  }
+
+  frame(box: Box3): void {
+    const sphere = box.getBoundingSphere(new Sphere());
+    const half = MathUtils.degToRad(Math.min(this.camera.fov, this.horizontalFov)) / 2;
+    const back = this.camera.getWorldDirection(new Vector3()).negate();
+    const distance = Math.max(sphere.radius, this.size * 1e-3) / Math.sin(half);
+    this.target.copy(sphere.center);
+    this.camera.position.copy(sphere.center).addScaledVector(back, distance);
+    if (this.mode === 'orbit') this.orbit.update();
+    this.moved();
+  }
+
+  /** Takes a camera of the scene; its target is put where the middle of the scene lies along its view. */
+  take(from: PerspectiveCamera, box: Box3): void {
+    from.updateWorldMatrix(true, false);
+    from.matrixWorld.decompose(this.camera.position, this.camera.quaternion, new Vector3());
+    this.fov = from.fov;
+    this.resize(this.camera.aspect);
+    const ahead = this.camera.getWorldDirection(new Vector3());
+    const distance = box.getCenter(new Vector3()).sub(this.camera.position).dot(ahead);
+    this.aimAt(Math.max(distance, this.size * 0.05));
+    this.look.setFromQuaternion(this.camera.quaternion);
+    this.moved();
+  }
+
+  /** Looks at the scene from in front, a little above. */
+  overview(box: Box3): void {
+    this.fov = 45;
+    this.resize(this.camera.aspect);
+    this.camera.position.copy(box.getCenter(new Vector3())).add(new Vector3(0.25, 0.2, 1));
+    this.camera.lookAt(box.getCenter(new Vector3()));
+    this.frame(box);
+  }
+
+  resize(aspect: number): void {
+    this.camera.aspect = aspect;
+    const wide = 2 * Math.atan(Math.tan(MathUtils.degToRad(this.fov) / 2) / Math.min(1, aspect));
+    this.camera.fov = aspect < 1 ? Math.min(100, MathUtils.radToDeg(wide)) : this.fov;
+    this.camera.updateProjectionMatrix();
+  }
+
+  /** Nine numbers for a link: eye, target, field of view and mode. */
+  toText(): string {
+    const numbers = [...this.camera.position.toArray(), ...this.target.toArray(), this.fov];
+    return [...numbers.map((v) => Number(v.toPrecision(5))), this.mode === 'walk' ? 1 : 0].join(',');
+  }
+
+  fromText(text: string): boolean {
+    const n = text.split(',').map(Number);
+    if (n.length !== 8 || !n.every(Number.isFinite) || !(n[6]! > 1 && n[6]! < 170)) return false;
+    this.camera.position.set(n[0]!, n[1]!, n[2]!);
+    this.target.set(n[3]!, n[4]!, n[5]!);
+    this.fov = n[6]!;
+    this.camera.lookAt(this.target);
+    this.resize(this.camera.aspect);
+    this.setMode(n[7] === 1 ? 'walk' : 'orbit');
+    return true;
+  }
+
+  private get horizontalFov(): number {
+    const half = MathUtils.degToRad(this.camera.fov) / 2;
+    return 2 * MathUtils.radToDeg(Math.atan(Math.tan(half) * this.camera.aspect));
+  }
+
+  private aimAhead(): void {
+    this.aimAt(Math.max(this.camera.position.distanceTo(this.target), this.size * 0.05));
+  }
+
+  private aimAt(distance: number): void {
+    const ahead = this.camera.getWorldDirection(new Vector3());
+    this.target.copy(this.camera.position).addScaledVector(ahead, distance);
+    if (this.mode === 'orbit') this.orbit.update();
+  }
+
+  private fitPlanes(): void {
+    const far = this.camera.position.distanceTo(this.target) + this.size * 2;
+    const near = Math.max(this.size * 2e-4, far * 1e-5);
+    if (Math.abs(this.camera.far / far - 1) < 0.2 && Math.abs(this.camera.near / near - 1) < 0.2) return;
+    this.camera.near = near;
+    this.camera.far = far;
+    this.camera.updateProjectionMatrix();
+  }
+
+  private startDrag(event: PointerEvent): void {
+    if (this.mode === 'walk') this.drags.set(event.pointerId, { x: event.clientX, y: event.clientY });
+  }
+
+  /** One finger or button looks about, two walk. */
+  private drag(event: PointerEvent): void {
+    const last = this.drags.get(event.pointerId);
+    if (!last || this.mode !== 'walk') return;
+    const [dx, dy] = [event.clientX - last.x, event.clientY - last.y];
+    this.drags.set(event.pointerId, { x: event.clientX, y: event.clientY });
+    const perPixel = MathUtils.degToRad(this.camera.fov) / this.element.clientHeight;
+    if (this.drags.size === 1) return this.lookBy(dx * perPixel, dy * perPixel);
+    const step = (this.size * 0.5) / this.element.clientHeight;
+    this.camera.translateX(-dx * step);
+    this.camera.translateZ(-dy * step);
+    this.moved();
+  }
+
+  private wheel(event: WheelEvent): void {
+    if (this.mode === 'walk') this.zoom(event.deltaY > 0 ? 1.15 : 0.87);
+  }
+
+  private lookBy(yaw: number, pitch: number): void {
+    this.look.setFromQuaternion(this.camera.quaternion);
+    this.look.y += yaw;
+    this.look.x = MathUtils.clamp(this.look.x + pitch, -1.55, 1.55);
+    this.look.z = 0;
+    this.camera.quaternion.setFromEuler(this.look);
+    this.moved();
+  }
+}

@@ -1,0 +1,107 @@
+// How bright the picture is shown. Automatic: the lit part's logarithmic mean becomes middle grey, as the server does it
+// for its own pictures, from a small picture read back without waiting.
+
+import { FloatType, HalfFloatType, WebGLRenderTarget, type Camera, type Scene, type WebGLRenderer } from 'three';
+import { decodeHalf } from '../protocol/rgb9e5';
+import type { ViewUniforms } from './lit_material';
+
+const WIDTH = 64;
+const HEIGHT = 48;
+const GREY = 0.18;
+/** Of what is typical, weighed by the square root: what is further off is a dark outside, or a lamp. */
+const RANGE = 24;
+
+/** The factor for a picture's luminances; undefined when nothing is lit. */
+export function exposureOf(luminances: readonly number[]): number | undefined {
+  const lit = luminances.filter((v) => v > 0 && Number.isFinite(v)).sort((a, b) => a - b);
+  const half = lit.reduce((sum, v) => sum + Math.sqrt(v), 0) / 2;
+  let below = 0;
+  const typical = lit.find((v) => (below += Math.sqrt(v)) >= half);
+  if (typical === undefined) return undefined;
+  const kept = lit.filter((v) => v >= typical / RANGE && v <= typical * RANGE);
+  return GREY / Math.exp(kept.reduce((sum, v) => sum + Math.log(v), 0) / kept.length);
+}
+
+export class ExposureMeter {
+  automatic = true;
+  /** Steps of two, added to what is measured, or to 1 where exposure is manual. */
+  stops = 0;
+  /** What a manual exposure starts from. */
+  base = 1;
+  /** Nothing was measured yet. */
+  fresh = true;
+  private measured = 1;
+  private shown = 1;
+  private running: Promise<void> | undefined;
+  private readonly target: WebGLRenderTarget;
+  private readonly half: boolean;
+
+  constructor(
+    private readonly renderer: WebGLRenderer,
+    private readonly view: ViewUniforms,
+  ) {
+    this.half = !renderer.extensions.has('EXT_color_buffer_float');
+    this.target = new WebGLRenderTarget(WIDTH, HEIGHT, { type: this.half ? HalfFloatType : FloatType });
+  }
+
+  /** Moves what is shown towards what was measured. True: not there yet. */
+  step(seconds: number): boolean {
+    const goal = (this.automatic ? this.measured : this.base) * 2 ** this.stops;
+    const ratio = goal / this.shown;
+    const close = Math.abs(Math.log2(ratio)) < 0.004;
+    this.shown = close ? goal : this.shown * ratio ** Math.min(1, seconds * 7);
+    this.view.all.toneMappingExposure.value = this.shown;
+    // Surfaces of which nothing is known yet show as a bright grey.
+    this.view.all.previewLight.value = (Math.PI * 0.6) / this.shown;
+    return !close;
+  }
+
+  /** The next step goes all the way. */
+  settle(): void {
+    this.shown = (this.automatic ? this.measured : this.base) * 2 ** this.stops;
+  }
+
+  get value(): number {
+    return this.shown;
+  }
+
+  /** Ends when there is a new value; the one that is on its way counts. */
+  measure(scene: Scene, camera: Camera): Promise<void> {
+    this.running ??= this.read(scene, camera).finally(() => (this.running = undefined));
+    return this.running;
+  }
+
+  private async read(scene: Scene, camera: Camera): Promise<void> {
+    const { renderer, target, view } = this;
+    const pixels = this.half ? new Uint16Array(4 * WIDTH * HEIGHT) : new Float32Array(4 * WIDTH * HEIGHT);
+    view.all.measuring.value = true;
+    renderer.setRenderTarget(target);
+    renderer.clear();
+    renderer.render(scene, camera);
+    renderer.setRenderTarget(null);
+    view.all.measuring.value = false;
+    try {
+      await renderer.readRenderTargetPixelsAsync(target, 0, 0, WIDTH, HEIGHT, pixels);
+      const value = exposureOf(this.luminances(pixels));
+      if (value !== undefined) this.take(value);
+    } catch {
+      // The context was lost on the way; it is measured again when it is back.
+    }
+  }
+
+  private take(value: number): void {
+    this.measured = value;
+    if (this.fresh) this.settle();
+    this.fresh = false;
+  }
+
+  private luminances(pixels: Uint16Array | Float32Array): number[] {
+    const read = this.half ? (i: number) => decodeHalf(pixels[i]!) : (i: number) => pixels[i]!;
+    const out: number[] = [];
+    for (let i = 0; i < pixels.length; i += 4) {
+      // Only what was drawn upon: the background is no light.
+      if (read(i + 3) > 0) out.push(0.2126 * read(i) + 0.7152 * read(i + 1) + 0.0722 * read(i + 2));
+    }
+    return out;
+  }
+}

@@ -1,0 +1,167 @@
+// Handles to move, turn and scale the selected object, and the lines that show which it is. The handles are in the middle
+// of the object, wherever its own origin may be: many scenes have all their origins in one corner.
+
+import {
+  Box3,
+  Box3Helper,
+  type BufferGeometry,
+  EdgesGeometry,
+  LineBasicMaterial,
+  LinearSRGBColorSpace,
+  LineSegments,
+  Matrix4,
+  Mesh,
+  Object3D,
+  type PerspectiveCamera,
+  Scene,
+  type Vector3,
+} from 'three';
+import { TransformControls } from 'three/addons/controls/TransformControls.js';
+import { LampMarker } from './lamp_marker';
+
+export type GizmoMode = 'translate' | 'rotate' | 'scale';
+
+/** Finding edges takes about a microsecond a triangle; larger objects show their box. */
+const MAX_EDGE_TRIANGLES = 30_000;
+
+export class Gizmo {
+  mode: GizmoMode = 'translate';
+  private object: Object3D | undefined;
+  private readonly pivot = new Object3D();
+  /** From the pivot to the object, when the handles were put there. */
+  private readonly fromPivot = new Matrix4();
+  private readonly controls: TransformControls;
+  private readonly lines = new LineBasicMaterial({
+    toneMapped: false,
+    depthTest: false,
+    transparent: true,
+    opacity: 0.9,
+  });
+  private outline: Object3D[] = [];
+
+  constructor(
+    private readonly scene: Scene,
+    camera: PerspectiveCamera,
+    element: HTMLElement,
+    events: { dragging(active: boolean): void; changed(object: Object3D, mode: GizmoMode): void; redraw(): void },
+  ) {
+    this.lines.color.setRGB(1, 0.66, 0.16, LinearSRGBColorSpace);
+    this.controls = new TransformControls(camera, element);
+    this.controls.size = 0.8;
+    scene.add(this.pivot, this.controls.getHelper());
+    this.controls.addEventListener('change', () => events.redraw());
+    this.controls.addEventListener('dragging-changed', ({ value }) => {
+      if (!value) this.placePivot();
+      events.dragging(value as boolean);
+    });
+    this.controls.addEventListener('objectChange', () => {
+      if (!this.object) return;
+      this.follow(this.object);
+      this.refresh();
+      events.changed(this.object, this.mode);
+    });
+  }
+
+  get dragging(): boolean {
+    return this.controls.dragging;
+  }
+
+  /** The pointer is over a handle, or holds one. */
+  get busy(): boolean {
+    return this.controls.dragging || this.controls.axis !== null;
+  }
+
+  /** Where the handles are, in metres. */
+  get middle(): Vector3 {
+    return this.pivot.position.clone();
+  }
+
+  attach(object: Object3D | undefined): void {
+    this.object = object;
+    this.clearOutline();
+    this.placePivot();
+    if (object) this.controls.attach(this.pivot);
+    else this.controls.detach();
+    if (object) this.makeOutline(object);
+  }
+
+  setMode(mode: GizmoMode): void {
+    this.mode = mode;
+    this.controls.setMode(mode);
+    this.attach(this.object);
+  }
+
+  /** The object was moved, by these handles or by someone else. */
+  refresh(): void {
+    if (!this.dragging) this.placePivot();
+    for (const line of this.outline) {
+      const of = line.userData['of'] as Object3D | undefined;
+      if (of) {
+        of.updateWorldMatrix(true, false);
+        line.matrix.copy(of.matrixWorld);
+        line.matrixWorld.copy(of.matrixWorld);
+      } else if (this.object) {
+        (line as Box3Helper).box.setFromObject(this.object);
+      }
+    }
+  }
+
+  setVisible(visible: boolean): void {
+    this.controls.getHelper().visible = visible && this.controls.object !== undefined;
+    for (const line of this.outline) line.visible = visible;
+  }
+
+  /** Into the middle of the object, turned as it is, so that scaling along the handles does not skew it. */
+  private placePivot(): void {
+    const { object, pivot } = this;
+    if (!object) return;
+    object.updateWorldMatrix(true, true);
+    const box = new Box3().setFromObject(object);
+    if (box.isEmpty()) object.getWorldPosition(pivot.position);
+    else box.getCenter(pivot.position);
+    object.getWorldQuaternion(pivot.quaternion);
+    pivot.scale.set(1, 1, 1);
+    pivot.updateMatrixWorld(true);
+    this.fromPivot.copy(pivot.matrixWorld).invert().multiply(object.matrixWorld);
+  }
+
+  private follow(object: Object3D): void {
+    this.pivot.updateMatrixWorld(true);
+    const local = object.parent ? object.parent.matrixWorld.clone().invert() : new Matrix4();
+    local.multiply(this.pivot.matrixWorld).multiply(this.fromPivot);
+    local.decompose(object.position, object.quaternion, object.scale);
+    object.updateMatrixWorld(true);
+  }
+
+  private makeOutline(object: Object3D): void {
+    let triangles = 0;
+    const meshes: Mesh[] = [];
+    object.traverse((child) => {
+      if (!(child instanceof Mesh) || child.parent instanceof LampMarker) return;
+      meshes.push(child);
+      const geometry = child.geometry as BufferGeometry;
+      triangles += (geometry.index?.count ?? geometry.getAttribute('position').count) / 3;
+    });
+    if (triangles > MAX_EDGE_TRIANGLES || meshes.length > 200) {
+      this.outline = [new Box3Helper(new Box3().setFromObject(object), this.lines.color)];
+    } else {
+      this.outline = meshes.map((mesh) => {
+        const line = new LineSegments(new EdgesGeometry(mesh.geometry as BufferGeometry, 20), this.lines);
+        line.matrixAutoUpdate = false;
+        line.userData['of'] = mesh;
+        line.renderOrder = 10;
+        return line;
+      });
+    }
+    for (const line of this.outline) this.scene.add(line);
+    this.refresh();
+  }
+
+  private clearOutline(): void {
+    for (const line of this.outline) {
+      line.removeFromParent();
+      (line as LineSegments).geometry.dispose();
+    }
+    this.outline = [];
+  }
+}

@@ -1,0 +1,92 @@
+// All pages of one layout, and the tiles that wait to be drawn. Tiles are taken up a few milliseconds a frame, so that
+// moving about stays smooth however many come.
+
+import type { WebGLRenderer } from 'three';
+import type { LightmapsNote } from '../protocol/messages';
+import type { Tile } from '../protocol/tile_frame';
+import { LightmapPage } from './lightmap_page';
+
+/** Texels of all pages in memory, and as many again on the card. */
+export const MEMORY_BUDGET_BYTES = 512 * 2 ** 20;
+
+/** The finest mip of all pages that fits into the budget. */
+export function baseMipFor(pages: LightmapsNote['pages'], budget = MEMORY_BUDGET_BYTES): number {
+  const bytes = pages.reduce((sum, page) => sum + (page.width * page.height * 16) / 3, 0);
+  let mip = 0;
+  while (bytes / 4 ** mip > budget && mip < 8) ++mip;
+  return mip;
+}
+
+export class LightmapSet {
+  readonly pages: LightmapPage[];
+  readonly baseMip: number;
+  /** Smallest error that a tile's header told of, as a fraction; Infinity: no tile yet. */
+  error = Infinity;
+  /** The server has said that everything it has was sent. */
+  complete = false;
+  tilesTaken = 0;
+  private queue: { tile: Tile; bytes: number }[] = [];
+
+  constructor(
+    renderer: WebGLRenderer,
+    readonly note: LightmapsNote,
+    readonly quantity: string,
+    private readonly used: (bytes: number) => void,
+  ) {
+    this.baseMip = baseMipFor(note.pages);
+    const nearest = quantity === 'patchId' || quantity === 'mipLevel';
+    this.pages = note.pages.map((page) => new LightmapPage(renderer, page, this.baseMip, nearest));
+  }
+
+  get bytes(): number {
+    return this.pages.reduce((sum, page) => sum + page.bytes, 0);
+  }
+
+  get waiting(): number {
+    return this.queue.length;
+  }
+
+  /** Light is known on all surfaces. */
+  get covered(): boolean {
+    return this.complete || this.pages.every((page) => page.covered);
+  }
+
+  /** `bytes` of the frame are given back to the server when the tile was taken up. */
+  enqueue(tile: Tile, bytes: number): void {
+    this.queue.push({ tile, bytes });
+  }
+
+  /** Takes up what waits for at most `budgetMs`. Returns how many tiles that were. */
+  takeUp(budgetMs: number): number {
+    const end = performance.now() + budgetMs;
+    let taken = 0;
+    while (taken < this.queue.length && (taken === 0 || performance.now() < end)) {
+      const { tile, bytes } = this.queue[taken++]!;
+      this.pages[tile.header.page]?.put(tile);
+      if (Number.isFinite(tile.header.error)) this.error = Math.min(this.error, tile.header.error);
+      this.used(bytes);
+    }
+    this.queue.splice(0, taken);
+    this.tilesTaken += taken;
+    return taken;
+  }
+
+  /** Values at the dark and bright end of what is there, lux; undefined: nothing yet. */
+  range(): [number, number] | undefined {
+    const values = this.pages.flatMap((page) => page.someValues(4096)).sort((a, b) => a - b);
+    if (values.length === 0) return undefined;
+    const at = (q: number) => values[Math.min(values.length - 1, Math.floor(q * values.length))]!;
+    const high = at(0.995);
+    return [Math.max(at(0.005), high / 1e4), high];
+  }
+
+  restore(): void {
+    for (const page of this.pages) page.restore();
+  }
+
+  dispose(): void {
+    for (const { bytes } of this.queue) this.used(bytes);
+    this.queue = [];
+    for (const page of this.pages) page.dispose();
+  }
+}

@@ -1,0 +1,159 @@
+// three.js materials lit by lightmap pages, and how an edit of a glTF material reaches them. Every surface is Lambertian
+// with reflectance base colour x (1 - metallic), at most 0.999, as the server has it.
+
+import {
+  DoubleSide,
+  FrontSide,
+  MeshLambertMaterial,
+  SRGBColorSpace,
+  type Material,
+  type MeshStandardMaterial,
+  type Texture,
+  Vector2,
+} from 'three';
+import type { GltfMaterial } from '../document/gltf';
+import type { LightmapPage } from './lightmap_page';
+import { FRAGMENT_PARS, LIGHT_FRAGMENT, OUTPUT_FRAGMENT } from './lit_shader';
+
+/** Uniforms of all materials together. */
+export class ViewUniforms {
+  readonly all = {
+    viewMode: { value: 0 },
+    toneCurve: { value: 0 },
+    measuring: { value: false },
+    falseColour: { value: false },
+    falseRange: { value: new Vector2(1, 1000) },
+    previewLight: { value: 1 },
+    toneMappingExposure: { value: 1 },
+  };
+}
+
+export class LitMaterial extends MeshLambertMaterial {
+  readonly own = {
+    diffuseScale: { value: 1 },
+    dataPage: { value: null as Texture | null },
+    dataScale: { value: 1 },
+  };
+  page: LightmapPage | undefined;
+  dataPage: LightmapPage | undefined;
+  private meanMetal = 1;
+
+  constructor(source: Material, view: ViewUniforms, page: LightmapPage | undefined) {
+    super();
+    const from = source as MeshStandardMaterial;
+    this.name = from.name;
+    this.color.copy(from.color);
+    this.map = from.map;
+    this.vertexColors = from.vertexColors;
+    this.flatShading = from.flatShading;
+    this.side = from.side === DoubleSide ? DoubleSide : FrontSide;
+    this.alphaTest = from.alphaTest;
+    this.transparent = from.transparent;
+    this.depthWrite = from.depthWrite;
+    this.opacity = from.opacity;
+    if (from.emissive) {
+      this.emissive.copy(from.emissive);
+      this.emissiveIntensity = from.emissiveIntensity;
+      this.emissiveMap = from.emissiveMap;
+    }
+    this.applyTransmission(from);
+    this.meanMetal = from.metalnessMap ? meanBlue(from.metalnessMap) : 1;
+    this.own.diffuseScale.value = 1 - (from.metalness ?? 0) * this.meanMetal;
+    this.setPage(page);
+    this.onBeforeCompile = (shader) => {
+      Object.assign(shader.uniforms, view.all, this.own, this.page?.uniforms ?? noPage());
+      shader.fragmentShader = shader.fragmentShader
+        .replace('#include <lights_lambert_pars_fragment>', (chunk) => chunk + FRAGMENT_PARS)
+        .replace('#include <lights_lambert_fragment>', (chunk) => REFLECTANCE + chunk)
+        .replace('#include <lights_fragment_maps>', LIGHT_FRAGMENT)
+        .replace('#include <opaque_fragment>', OUTPUT_FRAGMENT)
+        .replace('#include <tonemapping_fragment>', '')
+        .replace('#include <colorspace_fragment>', '');
+    };
+  }
+
+  /** One program for all of them: what differs is in defines that three.js knows of. */
+  override customProgramCacheKey(): string {
+    return 'radiosity';
+  }
+
+  /** The page's scale may have grown since the last frame. */
+  refresh(): void {
+    if (this.page) this.lightMapIntensity = this.page.scale;
+    if (this.dataPage) this.own.dataScale.value = this.dataPage.scale;
+  }
+
+  setDataPage(page: LightmapPage | undefined): void {
+    this.dataPage = page;
+    this.own.dataPage.value = page?.texture ?? this.page?.texture ?? null;
+  }
+
+  /** Takes on what an edit may change. */
+  edit(gltf: GltfMaterial): void {
+    const pbr = gltf.pbrMetallicRoughness ?? {};
+    const [r = 1, g = 1, b = 1, a = 1] = pbr.baseColorFactor ?? [];
+    this.color.setRGB(r, g, b);
+    if (this.transparent) this.opacity = a;
+    this.own.diffuseScale.value = 1 - (pbr.metallicFactor ?? 1) * this.meanMetal;
+    this.emissive.setRGB(...(gltf.emissiveFactor ?? [0, 0, 0]));
+    this.emissiveIntensity = gltf.extensions?.KHR_materials_emissive_strength?.emissiveStrength ?? 1;
+    const side = gltf.doubleSided ? DoubleSide : FrontSide;
+    if (side !== this.side) {
+      this.side = side;
+      this.needsUpdate = true;
+    }
+  }
+
+  private setPage(page: LightmapPage | undefined): void {
+    this.page = page;
+    this.lightMap = page?.texture ?? null;
+    this.own.dataPage.value = page?.texture ?? null;
+    this.refresh();
+  }
+
+  /** What the server lets through by chance is half seen through here. */
+  private applyTransmission(from: MeshStandardMaterial & { transmission?: number }): void {
+    if (!from.transmission) return;
+    this.transparent = true;
+    this.depthWrite = false;
+    this.opacity *= 1 - 0.9 * from.transmission;
+  }
+}
+
+const REFLECTANCE = `
+  diffuseColor.rgb = min(diffuseColor.rgb * diffuseScale, vec3(0.999));
+`;
+
+function noPage() {
+  return {
+    pageResident: { value: null },
+    pageSize: { value: [1, 1] },
+    pageUsed: { value: [1, 1] },
+    pageTiles: { value: 64 },
+  };
+}
+
+/** The server has one metallic value a material: factor x mean of the texture's blue channel. */
+function meanBlue(texture: Texture): number {
+  const image = texture.image as CanvasImageSource | undefined;
+  if (!image) return 1;
+  const side = 64;
+  const context = new OffscreenCanvas(side, side).getContext('2d', { colorSpace: 'srgb', willReadFrequently: true });
+  if (!context) return 1;
+  context.imageSmoothingQuality = 'high';
+  context.drawImage(image, 0, 0, side, side);
+  const { data } = context.getImageData(0, 0, side, side);
+  let sum = 0;
+  for (let i = 2; i < data.length; i += 4) sum += data[i]!;
+  return sum / (255 * side * side);
+}
+
+/** Albedo pictures stay sharp at a slant. */
+export function sharpen(material: Material, anisotropy: number): void {
+  const { map, emissiveMap } = material as MeshLambertMaterial;
+  for (const texture of [map, emissiveMap]) {
+    if (!texture) continue;
+    texture.anisotropy = anisotropy;
+    texture.colorSpace = SRGBColorSpace;
+  }
+}

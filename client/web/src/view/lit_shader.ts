@@ -1,0 +1,163 @@
+// GLSL that turns a three.js Lambert material into one lit by pages of irradiance, with all the views of the scene.
+// One program serves all views, tone curves and the exposure meter, so that switching never waits for a compiler.
+
+import { ShaderChunk } from 'three';
+import { paletteGlsl } from './palette';
+
+/** Pages: a tile's finest mip that has come is in `pageResident`, one texel for 64 x 64 of the page, 255 for none. */
+const PAGE_PARS = `
+uniform sampler2D pageResident;
+uniform vec2 pageSize;
+uniform float pageTiles;
+const float kNothing = 15.5;
+
+// The finest mip that all four texels of a bilinear lookup have.
+float residentMip(vec2 uv) {
+  vec2 size = vec2(textureSize(pageResident, 0));
+  vec2 texel = 0.75 / pageSize;
+  vec2 tiles = pageSize / (pageTiles * size);
+  float mip = 0.0;
+  for (int i = 0; i < 4; ++i) {
+    vec2 at = clamp(uv + texel * vec2((i & 1) != 0 ? 1.0 : -1.0, (i & 2) != 0 ? 1.0 : -1.0), vec2(0.0), vec2(0.9999));
+    mip = max(mip, texture(pageResident, at * tiles).r * 255.0);
+  }
+  return mip;
+}
+
+// Charts lie two texels apart: beyond mip 1 they run into each other, so that is how far minification may go.
+float lookupMip(vec2 uv, out float resident) {
+  resident = residentMip(uv);
+  vec2 dx = dFdx(uv) * pageSize, dy = dFdy(uv) * pageSize;
+  float wanted = clamp(0.5 * log2(max(dot(dx, dx), dot(dy, dy))), 0.0, 1.0);
+  return max(wanted, resident);
+}`;
+
+const VIEW_PARS = `
+uniform int viewMode;
+uniform int toneCurve;       // 0 neutral, 1 ACES, 2 AgX, 3 none
+uniform bool measuring;      // linear radiance for the exposure meter
+uniform bool falseColour;
+uniform vec2 falseRange;     // lowest and highest value of the legend, on a logarithmic scale
+uniform float previewLight;  // irradiance of surfaces that no light has been heard of yet
+${paletteGlsl()}
+
+float luminanceOf(vec3 c) { return dot(c, vec3(0.2126, 0.7152, 0.0722)); }
+
+vec3 encodeSrgb(vec3 c) {
+  c = clamp(c, 0.0, 1.0);
+  return mix(1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, c * 12.92, vec3(lessThanEqual(c, vec3(0.0031308))));
+}
+
+vec3 displayed(vec3 radiance) {
+  if (measuring) return radiance;
+  if (toneCurve == 1) return encodeSrgb(ACESFilmicToneMapping(radiance));
+  if (toneCurve == 2) return encodeSrgb(AgXToneMapping(radiance));
+  if (toneCurve == 3) return encodeSrgb(radiance * toneMappingExposure);
+  return encodeSrgb(NeutralToneMapping(radiance));
+}
+
+vec3 measured(float value) {
+  if (!(value > 0.0)) return kStops[0] * 0.5;
+  return paletteColour(log(value / falseRange.x) / log(falseRange.y / falseRange.x));
+}
+
+vec3 mipColour(float mip) {
+  const vec3 colours[6] = vec3[6](vec3(0.16, 0.55, 0.9), vec3(0.1, 0.68, 0.56), vec3(0.42, 0.74, 0.25),
+                                  vec3(0.93, 0.75, 0.2), vec3(0.93, 0.46, 0.16), vec3(0.8, 0.2, 0.3));
+  if (mip > kNothing) return vec3(0.25);
+  float at = clamp(mip, 0.0, 4.999);
+  return mix(colours[int(at)], colours[int(at) + 1], fract(at));
+}
+
+// Every texel its own shade, with a line around it where it is large enough on the screen.
+vec3 patchColour(vec2 uv, vec3 shade) {
+  vec2 at = uv * pageSize;
+  uvec2 id = uvec2(at);
+  uint hash = id.x * 1973u ^ id.y * 9277u;
+  hash = (hash ^ (hash >> 7u)) * 0x2c1b3c6du;
+  vec3 tint = 0.55 + 0.45 * vec3(float(hash & 255u), float((hash >> 8u) & 255u), float((hash >> 16u) & 255u)) / 255.0;
+  vec2 width = fwidth(at);
+  vec2 border = min(fract(at), 1.0 - fract(at)) / max(width, vec2(1e-6));
+  float line = (1.0 - smoothstep(0.4, 1.1, min(border.x, border.y))) * (1.0 - smoothstep(0.25, 0.5, max(width.x, width.y)));
+  return mix(shade * tint, vec3(0.02), 0.8 * line);
+}`;
+
+export const FRAGMENT_PARS = `
+#ifdef USE_LIGHTMAP
+  uniform sampler2D dataPage;
+  uniform float dataScale;
+#endif
+uniform float diffuseScale;  // 1 - metallic
+${ShaderChunk.tonemapping_pars_fragment}
+${PAGE_PARS}
+${VIEW_PARS}
+`;
+
+/** Instead of lights_fragment_maps: irradiance of the page, or light from the viewer as long as there is none. */
+export const LIGHT_FRAGMENT = `
+  vec3 pageIrradiance = vec3(0.0);
+  float pageMip = 99.0;
+  #ifdef USE_LIGHTMAP
+    float resident;
+    pageMip = lookupMip(vLightMapUv, resident);
+    pageIrradiance = resident > kNothing ? vec3(previewLight * (0.35 + 0.65 * abs(normal.z)))
+                                         : textureLod(lightMap, vLightMapUv, pageMip).rgb * lightMapIntensity;
+  #endif
+  irradiance += pageIrradiance;
+`;
+
+/** Instead of opaque, tone mapping and colour space chunks. */
+export const OUTPUT_FRAGMENT = `
+  #ifdef OPAQUE
+    diffuseColor.a = 1.0;
+  #endif
+  vec3 shade = vec3(0.0);
+  if (viewMode == 0 || measuring) {
+    shade = displayed(outgoingLight);
+  } else if (viewMode == 1) {
+    shade = falseColour ? measured(luminanceOf(pageIrradiance)) : displayed(pageIrradiance * RECIPROCAL_PI);
+  } else if (viewMode == 2) {
+    shade = measured(luminanceOf(outgoingLight * PI));
+  } else if (viewMode == 3 || viewMode == 4) {
+    #ifdef USE_LIGHTMAP
+      shade = measured(luminanceOf(textureLod(dataPage, vLightMapUv, 0.0).rgb * dataScale));
+    #endif
+  } else if (viewMode == 5) {
+    #ifdef USE_LIGHTMAP
+      shade = patchColour(vLightMapUv, displayed(pageIrradiance * RECIPROCAL_PI));
+    #endif
+  } else if (viewMode == 6) {
+    shade = mipColour(pageMip) * (0.7 + 0.3 * abs(normal.z));
+  } else if (viewMode == 7) {
+    shade = inverseTransformDirection(normal, viewMatrix) * 0.5 + 0.5;
+  } else {
+    shade = encodeSrgb(diffuseColor.rgb);
+  }
+  gl_FragColor = vec4(shade, diffuseColor.a);
+`;
+
+/** The flat view of one page. */
+export const FLAT_VERTEX = `
+varying vec2 vUv;
+uniform vec2 pageUsed;
+void main() {
+  vUv = uv * pageUsed;
+  gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
+}`;
+
+export const FLAT_FRAGMENT = `
+#include <common>
+varying vec2 vUv;
+uniform sampler2D lightMap;
+uniform float lightMapIntensity;
+${ShaderChunk.tonemapping_pars_fragment}
+${PAGE_PARS}
+${VIEW_PARS}
+void main() {
+  float resident = residentMip(vUv);
+  vec2 texel = (floor(vUv * pageSize) + 0.5) / pageSize;
+  bool magnified = max(fwidth(vUv.x) * pageSize.x, fwidth(vUv.y) * pageSize.y) < 0.5;
+  vec3 irradiance = textureLod(lightMap, magnified && resident < 0.5 ? texel : vUv, resident).rgb * lightMapIntensity;
+  vec3 shade = falseColour ? measured(luminanceOf(irradiance)) : displayed(irradiance * RECIPROCAL_PI);
+  gl_FragColor = vec4(resident > kNothing ? vec3(0.25) : shade, 1.0);
+}`;

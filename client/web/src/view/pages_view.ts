@@ -1,0 +1,97 @@
+// The lightmap pages side by side, flat, to be panned and zoomed.
+
+import { Box3, Mesh, OrthographicCamera, PlaneGeometry, Scene, ShaderMaterial, Vector3 } from 'three';
+import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
+import type { ViewUniforms } from './lit_material';
+import type { LightmapPage } from './lightmap_page';
+import type { LightmapSet } from './lightmap_set';
+import { FLAT_FRAGMENT, FLAT_VERTEX } from './lit_shader';
+
+const GAP = 0.04;
+
+export class PagesView {
+  readonly scene = new Scene();
+  readonly camera = new OrthographicCamera(-1, 1, 1, -1, 0.1, 10);
+  private readonly controls: OrbitControls;
+  private readonly box = new Box3();
+  private shownSet: LightmapSet | undefined;
+  private made: { mesh: Mesh; material: ShaderMaterial; page: LightmapPage }[] = [];
+
+  constructor(
+    element: HTMLElement,
+    private readonly view: ViewUniforms,
+    moved: () => void,
+  ) {
+    this.camera.position.z = 5;
+    this.controls = new OrbitControls(this.camera, element);
+    this.controls.enableRotate = false;
+    this.controls.screenSpacePanning = true;
+    this.controls.zoomToCursor = true;
+    this.controls.mouseButtons.LEFT = 2 as never; // pan
+    this.controls.touches.ONE = 1 as never; // pan
+    this.controls.enabled = false;
+    this.controls.addEventListener('change', moved);
+  }
+
+  set active(active: boolean) {
+    this.controls.enabled = active;
+  }
+
+  /** Lays the pages out in rows, as near to a square as whole numbers go. */
+  show(set: LightmapSet | undefined): void {
+    if (set === this.shownSet) return;
+    for (const { mesh, material } of this.made) {
+      mesh.removeFromParent();
+      mesh.geometry.dispose();
+      material.dispose();
+    }
+    this.made = [];
+    this.shownSet = set;
+    if (!set) return;
+    const largest = Math.max(...set.pages.map((page) => Math.max(page.width, page.height)), 1);
+    const columns = Math.ceil(Math.sqrt(set.pages.length));
+    this.made = set.pages.map((page, i) => {
+      const mesh = this.makeMesh(page, largest);
+      mesh.position.set((i % columns) * (1 + GAP), -Math.floor(i / columns) * (1 + GAP), 0);
+      this.scene.add(mesh);
+      return { mesh, material: mesh.material as ShaderMaterial, page };
+    });
+    this.box.setFromObject(this.scene);
+    this.frame();
+  }
+
+  frame(): void {
+    const centre = this.box.getCenter(new Vector3());
+    this.controls.target.set(centre.x, centre.y, 0);
+    this.camera.position.set(centre.x, centre.y, 5);
+    this.camera.zoom = 1;
+    this.resize(this.camera.right / this.camera.top);
+    this.controls.update();
+  }
+
+  resize(aspect: number): void {
+    const size = this.box.isEmpty() ? new Vector3(1, 1, 1) : this.box.getSize(new Vector3());
+    const half = 0.56 * Math.max(size.y, size.x / aspect);
+    Object.assign(this.camera, { left: -half * aspect, right: half * aspect, top: half, bottom: -half });
+    this.camera.updateProjectionMatrix();
+  }
+
+  refresh(): void {
+    this.controls.update();
+    for (const { material, page } of this.made) material.uniforms['lightMapIntensity']!.value = page.scale;
+  }
+
+  private makeMesh(page: LightmapPage, largest: number): Mesh {
+    const material = new ShaderMaterial({
+      vertexShader: FLAT_VERTEX,
+      fragmentShader: FLAT_FRAGMENT,
+      uniforms: {
+        ...this.view.all,
+        ...page.uniforms,
+        lightMap: { value: page.texture },
+        lightMapIntensity: { value: page.scale },
+      },
+    });
+    return new Mesh(new PlaneGeometry(page.width / largest, page.height / largest), material);
+  }
+}

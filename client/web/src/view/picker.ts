@@ -1,0 +1,54 @@
+// What lies under the pointer: the object to select, and the light that falls there.
+
+import { Mesh, Raycaster, Vector2, Vector3, type Intersection, type PerspectiveCamera } from 'three';
+import type { LightmapPage } from './lightmap_page';
+import type { LitScene } from './lit_scene';
+
+export interface Reading {
+  point: Vector3;
+  normal: Vector3;
+  /** Irradiance, lux: linear R, G, B; undefined: no light is known there. */
+  irradiance: [number, number, number] | undefined;
+  /** Its estimated error, lux, luminance; undefined where the server does not stream it. */
+  error: number | undefined;
+  node: number | undefined;
+  material: number | undefined;
+  page: number | undefined;
+  texel: [number, number] | undefined;
+}
+
+export function luminance([r, g, b]: readonly [number, number, number]): number {
+  return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+}
+
+const caster = new Raycaster();
+
+/** `x`, `y`: normalised device coordinates. */
+export function pick(scene: LitScene, camera: PerspectiveCamera, x: number, y: number): Intersection | undefined {
+  caster.setFromCamera(new Vector2(x, y), camera);
+  caster.params.Line = { threshold: 0 };
+  return caster.intersectObjects(scene.pickable(), true).find((hit) => hit.object instanceof Mesh && shown(hit.object));
+}
+
+function shown(object: Mesh): boolean {
+  for (let at: Mesh['parent'] = object; at; at = at.parent) if (!at.visible) return false;
+  return true;
+}
+
+export function readingAt(scene: LitScene, hit: Intersection, errors?: readonly LightmapPage[]): Reading {
+  const page = hit.object.userData['page'] as LightmapPage | undefined;
+  const uv = hit.uv1;
+  const normal = (hit.normal ?? new Vector3()).clone().transformDirection(hit.object.matrixWorld);
+  const index = page ? scene.set.pages.indexOf(page) : -1;
+  const error = uv ? errors?.[index]?.sample(uv.x, uv.y) : undefined;
+  return {
+    point: hit.point.clone(),
+    normal,
+    irradiance: page && uv ? page.sample(uv.x, uv.y) : undefined,
+    error: error && luminance(error),
+    node: scene.nodeOf(hit.object),
+    material: scene.materialIndexOf(hit.object),
+    page: page ? index : undefined,
+    texel: page && uv ? [Math.floor(uv.x * page.width), Math.floor(uv.y * page.height)] : undefined,
+  };
+}

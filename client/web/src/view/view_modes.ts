@@ -1,0 +1,100 @@
+// What the viewer can show of the scene. Numbers are those of the shader (lit_shader.ts).
+
+export interface ViewMode {
+  id: string;
+  label: string;
+  number: number;
+  hint: string;
+  /** Quantity of the tiles that are needed; what the server does not stream cannot be shown. */
+  quantity: 'irradiance' | 'radiosity' | 'error' | 'unshot' | 'patchId' | 'mipLevel';
+  /** Unit of the false-colour legend; undefined: there is nothing to measure. */
+  unit?: string;
+  falseColour: 'off' | 'choice' | 'always';
+  flat?: boolean;
+}
+
+export const VIEW_MODES: readonly ViewMode[] = [
+  { id: 'lit', label: 'Lit', number: 0, hint: 'As the eye sees it', quantity: 'irradiance', falseColour: 'off' },
+  {
+    id: 'irradiance',
+    label: 'Irradiance',
+    number: 1,
+    hint: 'Light that arrives, without the colour of surfaces',
+    quantity: 'irradiance',
+    unit: 'lx',
+    falseColour: 'choice',
+  },
+  {
+    id: 'radiosity',
+    label: 'Radiosity',
+    number: 2,
+    hint: 'Light that leaves: emitted and reflected',
+    quantity: 'irradiance',
+    unit: 'lx',
+    falseColour: 'always',
+  },
+  {
+    id: 'unshot',
+    label: 'Unshot',
+    number: 3,
+    hint: 'Light that has arrived and not been passed on',
+    quantity: 'unshot',
+    unit: 'lx',
+    falseColour: 'always',
+  },
+  {
+    id: 'error',
+    label: 'Error',
+    number: 4,
+    hint: 'Estimated error of each texel',
+    quantity: 'error',
+    unit: 'lx',
+    falseColour: 'always',
+  },
+  {
+    id: 'patches',
+    label: 'Patches',
+    number: 5,
+    hint: 'Texels of the lightmap',
+    quantity: 'irradiance',
+    falseColour: 'off',
+  },
+  {
+    id: 'mips',
+    label: 'Mip level',
+    number: 6,
+    hint: 'How fine the light is that has come so far',
+    quantity: 'irradiance',
+    falseColour: 'off',
+  },
+  {
+    id: 'normals',
+    label: 'Normals',
+    number: 7,
+    hint: 'Direction of surfaces',
+    quantity: 'irradiance',
+    falseColour: 'off',
+  },
+  { id: 'albedo', label: 'Albedo', number: 8, hint: 'Colour of surfaces', quantity: 'irradiance', falseColour: 'off' },
+  {
+    id: 'pages',
+    label: 'Pages',
+    number: 1,
+    hint: 'The lightmaps themselves',
+    quantity: 'irradiance',
+    unit: 'lx',
+    falseColour: 'choice',
+    flat: true,
+  },
+];
+
+export function viewMode(id: string): ViewMode {
+  return VIEW_MODES.find((mode) => mode.id === id) ?? VIEW_MODES[0]!;
+}
+
+export const TONE_CURVES = [
+  { id: 'neutral', label: 'Neutral', number: 0 },
+  { id: 'aces', label: 'ACES', number: 1 },
+  { id: 'agx', label: 'AgX', number: 2 },
+  { id: 'none', label: 'None', number: 3 },
+] as const;

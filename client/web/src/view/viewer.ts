@@ -1,0 +1,327 @@
+// The picture: owns the WebGL context, the scene on the screen and the light on it. Draws only when something changed.
+// Main thread. A new layout of lightmaps is prepared beside the one that is shown and takes its place when it is lit.
+
+import { type Intersection, LinearSRGBColorSpace, NoToneMapping, type Object3D, Scene, WebGLRenderer } from 'three';
+import type { Gltf } from '../document/gltf';
+import type { LightmapsNote } from '../protocol/messages';
+import { CameraRig } from './camera_rig';
+import { ExposureMeter } from './exposure';
+import { Gizmo, type GizmoMode } from './gizmo';
+import { ViewUniforms } from './lit_material';
+import { LightmapSet } from './lightmap_set';
+import { LitScene } from './lit_scene';
+import { PagesView } from './pages_view';
+import { pick, readingAt, type Reading } from './picker';
+import type { ViewMode } from './view_modes';
+
+/** For taking up tiles, of the 16 that a frame has. */
+const TILE_BUDGET_MS = 5;
+/** A new layout is shown when its light is this far, or after so long. */
+const READY_ERROR = 0.35;
+const READY_AFTER_MS = 900;
+const MEASURE_EVERY_MS = 250;
+
+export interface ViewerEvents {
+  used(bytes: number): void;
+  /** After each picture. */
+  drawn(): void;
+  sceneShown(scene: LitScene): void;
+  gizmoDragging(active: boolean): void;
+  gizmoChanged(object: Object3D, mode: GizmoMode): void;
+  contextLost(lost: boolean): void;
+}
+
+interface Staged {
+  set: LightmapSet;
+  scene?: LitScene;
+  since: number;
+}
+
+export class Viewer {
+  readonly renderer: WebGLRenderer;
+  readonly uniforms = new ViewUniforms();
+  readonly rig: CameraRig;
+  readonly exposure: ExposureMeter;
+  readonly gizmo: Gizmo;
+  readonly pagesView: PagesView;
+  shown: LitScene | undefined;
+  /** Pages of error or unshot light, where they are streamed. */
+  dataSet: LightmapSet | undefined;
+  mode: ViewMode | undefined;
+  autoRange = true;
+  private staged: Staged | undefined;
+  private readonly world = new Scene();
+  private wanted = true;
+  private lastFrame = 0;
+  private lastMeasure = 0;
+  private lost = false;
+  private layoutKnown = true;
+  private document: Gltf = { asset: { version: '2.0' } };
+
+  constructor(
+    readonly canvas: HTMLCanvasElement,
+    private readonly events: ViewerEvents,
+  ) {
+    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, powerPreference: 'high-performance' });
+    this.renderer.toneMapping = NoToneMapping; // our shaders do it, and the encoding, so that one program serves all
+    this.renderer.outputColorSpace = LinearSRGBColorSpace;
+    this.renderer.setClearColor(0, 0); // the page's own background shows behind the scene
+    this.rig = new CameraRig(canvas, () => this.invalidate());
+    this.exposure = new ExposureMeter(this.renderer, this.uniforms);
+    this.pagesView = new PagesView(canvas, this.uniforms, () => this.invalidate());
+    this.gizmo = new Gizmo(this.world, this.rig.camera, canvas, {
+      dragging: (active) => {
+        this.rig.enabled = !active;
+        events.gizmoDragging(active);
+      },
+      changed: (object, mode) => events.gizmoChanged(object, mode),
+      redraw: () => this.invalidate(),
+    });
+    new ResizeObserver(() => this.resize()).observe(canvas);
+    canvas.addEventListener('webglcontextlost', () => this.onContext(true));
+    canvas.addEventListener('webglcontextrestored', () => this.onContext(false));
+    this.resize();
+    requestAnimationFrame((now) => this.frame(now));
+  }
+
+  invalidate(): void {
+    this.wanted = true;
+  }
+
+  /** The set that tiles of irradiance belong to. */
+  get set(): LightmapSet | undefined {
+    return this.staged?.set ?? this.shown?.set;
+  }
+
+  /** The set that tiles of a quantity belong to; undefined: nobody looks at it. */
+  setOf(quantity: string): LightmapSet | undefined {
+    if (quantity === 'irradiance') return this.set;
+    return this.dataSet?.quantity === quantity ? this.dataSet : undefined;
+  }
+
+  /** Pages have a new layout. Returns the set whose geometry is to be fetched; undefined: it is the one that is there. */
+  expectLayout(note: LightmapsNote): LightmapSet | undefined {
+    if (this.layoutKnown && this.set?.note.layout === note.layout && samePages(this.set.note, note)) return undefined;
+    this.layoutKnown = true;
+    this.dropStaged();
+    const set = new LightmapSet(this.renderer, note, 'irradiance', this.events.used);
+    this.staged = { set, since: performance.now() };
+    this.setDataQuantity(undefined);
+    return set;
+  }
+
+  /** The server may have started again: its next layout is new, whatever its number. */
+  forgetLayout(): void {
+    this.layoutKnown = false;
+  }
+
+  /** Geometry of a layout. A set that was overtaken is dropped. */
+  async load(glb: ArrayBuffer, set: LightmapSet): Promise<void> {
+    const scene = await LitScene.load(
+      glb,
+      set,
+      this.uniforms,
+      Math.min(8, this.renderer.capabilities.getMaxAnisotropy()),
+    );
+    if (this.staged?.set !== set) return scene.dispose();
+    scene.applyDocument(this.document);
+    this.staged.scene = scene;
+    this.staged.since = performance.now();
+    this.invalidate();
+  }
+
+  /** Nothing to show any more (the server has no scene). */
+  clear(): void {
+    this.dropStaged();
+    this.replaceShown(undefined);
+  }
+
+  applyDocument(document: Gltf, pointers: string[]): void {
+    this.document = document;
+    this.shown?.applyPointers(document, pointers);
+    this.staged?.scene?.applyPointers(document, pointers);
+    this.gizmo.refresh();
+    this.invalidate();
+  }
+
+  /** Pages for a quantity beside irradiance, or none. */
+  setDataQuantity(quantity: string | undefined): LightmapSet | undefined {
+    if (this.dataSet?.quantity === quantity) return this.dataSet;
+    this.dataSet?.dispose();
+    const note = this.set?.note;
+    this.dataSet = quantity && note ? new LightmapSet(this.renderer, note, quantity, this.events.used) : undefined;
+    this.bindData();
+    return this.dataSet;
+  }
+
+  setMode(mode: ViewMode): void {
+    this.mode = mode;
+    this.uniforms.all.viewMode.value = mode.number;
+    this.pagesView.active = mode.flat === true;
+    this.rig.enabled = !mode.flat;
+    this.gizmo.setVisible(!mode.flat);
+    if (mode.flat) this.pagesView.show(this.shown?.set);
+    this.updateRange();
+    this.invalidate();
+  }
+
+  pickAt(x: number, y: number): Intersection | undefined {
+    return this.shown && !this.mode?.flat ? pick(this.shown, this.rig.camera, x, y) : undefined;
+  }
+
+  readAt(x: number, y: number): Reading | undefined {
+    const hit = this.pickAt(x, y);
+    const errors = this.dataSet?.quantity === 'error' ? this.dataSet.pages : undefined;
+    return hit && this.shown ? readingAt(this.shown, hit, errors) : undefined;
+  }
+
+  select(node: number | undefined): void {
+    const object = node === undefined ? undefined : (this.lampRoot(node) ?? this.shown?.nodes.get(node));
+    this.gizmo.attach(object);
+    this.invalidate();
+  }
+
+  /** PNG of what is on the screen. */
+  async picture(): Promise<Blob> {
+    await this.settle();
+    this.gizmo.setVisible(false);
+    this.draw();
+    this.gizmo.setVisible(!this.mode?.flat);
+    this.invalidate();
+    return new Promise((resolve, reject) =>
+      this.canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error('the picture could not be made')))),
+    );
+  }
+
+  /** A lamp that came with an edit has a marker before it has a node in the geometry. */
+  private lampRoot(node: number): Object3D | undefined {
+    return this.shown?.nodes.has(node) ? undefined : this.shown?.lamps.get(node);
+  }
+
+  private frame(now: number): void {
+    requestAnimationFrame((next) => this.frame(next));
+    const seconds = Math.min(0.25, (now - this.lastFrame) / 1000);
+    this.lastFrame = now;
+    if (this.lost) return;
+    const taken = (this.set?.takeUp(TILE_BUDGET_MS) ?? 0) + (this.dataSet?.takeUp(TILE_BUDGET_MS) ?? 0);
+    if (taken > 0) this.wanted = true;
+    this.promote(now);
+    if (this.rig.update(seconds)) this.wanted = true;
+    if (this.wanted) this.measure(now);
+    if (this.exposure.step(seconds)) this.wanted = true;
+    if (!this.wanted) return;
+    this.wanted = false;
+    this.draw();
+    this.events.drawn();
+  }
+
+  private draw(): void {
+    this.shown?.eachMaterial((material) => material.refresh());
+    this.pagesView.refresh();
+    const flat = this.mode?.flat;
+    this.renderer.render(flat ? this.pagesView.scene : this.world, flat ? this.pagesView.camera : this.rig.camera);
+  }
+
+  private measure(now: number): void {
+    if (now - this.lastMeasure < MEASURE_EVERY_MS || !this.shown?.set.covered) return;
+    this.lastMeasure = now;
+    if (this.uniforms.all.falseColour.value) this.updateRange();
+    if (this.exposure.automatic && !this.mode?.flat) void this.measureNow().then(() => this.invalidate());
+  }
+
+  /** Signs and handles are no part of the scene's light. */
+  private measureNow(): Promise<void> {
+    const lamps = [...(this.shown?.lamps.values() ?? [])];
+    this.gizmo.setVisible(false);
+    for (const lamp of lamps) lamp.visible = false;
+    const measured = this.exposure.measure(this.world, this.rig.camera);
+    this.gizmo.setVisible(!this.mode?.flat);
+    for (const lamp of lamps) lamp.visible = true;
+    return measured;
+  }
+
+  /** Ends when the picture has the exposure that the light there is now asks for. */
+  async settle(): Promise<void> {
+    while (this.shown && this.set?.waiting) await new Promise((resolve) => setTimeout(resolve, 20));
+    for (let again = 0; again < 2 && this.shown; ++again) await this.measureNow(); // the first may have been on its way
+    this.exposure.settle();
+    this.exposure.step(0);
+    this.invalidate();
+  }
+
+  private updateRange(): void {
+    const data = this.mode?.quantity === 'irradiance' ? this.shown?.set : this.dataSet;
+    const range = this.autoRange ? data?.range() : undefined;
+    if (range) this.uniforms.all.falseRange.value.set(...range);
+  }
+
+  /** The first scene shows at once; a later one when its light has come, so that nothing goes dark in between. */
+  private promote(now: number): void {
+    const staged = this.staged;
+    if (!staged?.scene || this.gizmo.dragging) return; // what is held is not taken out of the hand
+    const lit = staged.set.covered && staged.set.waiting === 0 && staged.set.error < READY_ERROR;
+    if (this.shown && !lit && now - staged.since < READY_AFTER_MS) return;
+    this.staged = undefined;
+    this.replaceShown(staged.scene);
+    this.bindData();
+    this.events.sceneShown(staged.scene);
+  }
+
+  private replaceShown(scene: LitScene | undefined): void {
+    const before = this.shown;
+    this.shown = scene;
+    if (before) {
+      this.gizmo.attach(undefined);
+      before.dispose();
+      before.set.dispose();
+    }
+    if (scene) {
+      this.world.add(scene.root);
+      this.rig.setBounds(scene.bounds);
+    }
+    if (this.mode?.flat) this.pagesView.show(scene?.set);
+    this.invalidate();
+  }
+
+  private dropStaged(): void {
+    this.staged?.scene?.dispose();
+    this.staged?.set.dispose();
+    this.staged = undefined;
+  }
+
+  private bindData(): void {
+    const set = this.shown?.set;
+    this.shown?.eachMaterial((material) => {
+      const index = material.page ? (set?.pages.indexOf(material.page) ?? -1) : -1;
+      material.setDataPage(this.dataSet?.pages[index]);
+    });
+    this.invalidate();
+  }
+
+  private resize(): void {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    if (width === 0 || height === 0) return;
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.setSize(width, height, false);
+    this.rig.resize(width / height);
+    this.pagesView.resize(width / height);
+    if (this.shown) this.draw(); // resizing clears the canvas: drawn at once, it does not blink
+    this.invalidate();
+  }
+
+  private onContext(lost: boolean): void {
+    this.lost = lost;
+    if (!lost) {
+      for (const set of [this.shown?.set, this.staged?.set, this.dataSet]) set?.restore();
+      this.invalidate();
+    }
+    this.events.contextLost(lost);
+  }
+}
+
+function samePages(a: LightmapsNote, b: LightmapsNote): boolean {
+  return (
+    a.pages.length === b.pages.length &&
+    a.pages.every((page, i) => page.width === b.pages[i]!.width && page.height === b.pages[i]!.height)
+  );
+}

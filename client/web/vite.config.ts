@@ -1,0 +1,45 @@
+import { gzipSync } from 'node:zlib';
+import { readdirSync, readFileSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { defineConfig, type Plugin } from 'vite';
+
+/** Leaves a packed copy beside every file: the server has both and sends what the browser takes. */
+function packed(): Plugin {
+  let folder = '';
+  const pack = (at: string) => {
+    for (const entry of readdirSync(at, { withFileTypes: true })) {
+      const path = join(at, entry.name);
+      if (entry.isDirectory()) pack(path);
+      else if (!path.endsWith('.gz')) writeFileSync(`${path}.gz`, gzipSync(readFileSync(path), { level: 9 }));
+    }
+  };
+  return {
+    name: 'packed',
+    apply: 'build',
+    configResolved: (config) => void (folder = config.build.outDir),
+    closeBundle: () => pack(folder),
+  };
+}
+
+const server = process.env['RADIOSITY_SERVER'] ?? 'http://127.0.0.1:8765';
+const routes = ['/scene', '/lightmaps', '/snapshot', '/status', '/uploads'];
+
+export default defineConfig({
+  plugins: [packed()],
+  worker: { format: 'es' },
+  build: {
+    outDir: process.env['RADIOSITY_WEB_OUT'] ?? 'dist',
+    emptyOutDir: true,
+    target: 'es2022',
+    // One page of one program: the code that every visit needs comes in one piece.
+    chunkSizeWarningLimit: 1500,
+    modulePreload: { polyfill: false },
+    assetsInlineLimit: 0, // data: addresses would need holes in the Content-Security-Policy
+  },
+  server: {
+    proxy: {
+      ...Object.fromEntries(routes.map((route) => [route, server])),
+      '/ws': { target: server, ws: true },
+    },
+  },
+});

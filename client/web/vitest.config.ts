@@ -1,0 +1,37 @@
+import { fileURLToPath } from 'node:url';
+import { defineConfig } from 'vitest/config';
+
+const here = (path: string) => fileURLToPath(new URL(path, import.meta.url));
+// Tests lie with all other tests of the project, where no node_modules is above them.
+const resolve = {
+  alias: { 'playwright-core': here('node_modules/playwright-core/index.mjs'), three: here('node_modules/three') },
+};
+
+const server = { fs: { allow: [here('../..')] } };
+
+export default defineConfig({
+  server,
+  test: {
+    projects: [
+      {
+        resolve,
+        server,
+        test: { name: 'unit', root: here('../../tests/web'), include: ['unit/**/*.test.ts'], globals: true },
+      },
+      {
+        resolve,
+        server,
+        test: {
+          name: 'browser',
+          root: here('../../tests/web'),
+          include: ['browser/**/*.test.ts'],
+          globals: true,
+          pool: 'forks',
+          poolOptions: { forks: { singleFork: true } }, // one browser and one server at a time: they share two cores
+          testTimeout: 120_000,
+          hookTimeout: 120_000,
+        },
+      },
+    ],
+  },
+});

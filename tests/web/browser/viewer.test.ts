@@ -1,0 +1,242 @@
+import type { Page } from 'playwright-core';
+import type {} from '../../../client/web/src/main';
+import { converged, difference, Pages, pixels, sceneOf, SCENES, Server, until } from './harness';
+
+const server = new Server(`${SCENES}/cornell.glb`);
+const pages = new Pages();
+
+beforeAll(async () => {
+  await server.start();
+  await pages.launch();
+});
+afterEach(async () => {
+  await pages.closeAll();
+  expect(pages.complaints.splice(0)).toEqual([]);
+});
+afterAll(async () => {
+  await pages.quit();
+  await server.stop('SIGTERM');
+});
+
+const bare = () => `${server.url}/#ui=0`;
+
+/** Selects by name in the list of objects. */
+async function choose(page: Page, name: string): Promise<void> {
+  await page.getByRole('tab', { name: 'Scene' }).click();
+  await page.getByRole('button', { name, exact: true }).click();
+}
+
+it('shows the Cornell box in the colours of the server', async () => {
+  const page = await pages.open(bare());
+  await converged(page);
+  const ours = await pixels(page, 60);
+  const theirs = await pixels(page, 60, '/snapshot.png?width=480&height=480');
+  const { mean, p99 } = difference(ours, theirs);
+  // Measured: 0.6 and 6. Both expose automatically, the page from 64 x 48 pixels: 1 % in brightness is 1 of 255. Edges are
+  // smoothed differently, of which at most 1 % of the pixels are.
+  expect(mean).toBeLessThan(1.5);
+  expect(p99).toBeLessThan(12);
+});
+
+it('gives a late joiner the same picture', async () => {
+  const first = await pages.open(bare());
+  await converged(first);
+  const second = await pages.open(bare());
+  await converged(second);
+  // The exposure comes to rest within 0.3 % of what was measured.
+  expect(difference(await pixels(first, 60), await pixels(second, 60)).p99).toBeLessThanOrEqual(2);
+  expect(await first.evaluate(() => document.querySelector('.people span')?.textContent)).toBe('2');
+});
+
+it('shows an edit made by hand to everyone, and undoes it', async () => {
+  const editor = await pages.open(server.url, 1200, 800);
+  const watcher = await pages.open(bare());
+  await converged(editor);
+  await converged(watcher);
+  const before = await sceneOf(server);
+  const white = before.materials.findIndex((material) => material.name === 'white');
+  const dark = await pixels(watcher, 60);
+
+  await editor.mouse.click(400, 260); // the back wall
+  const colour = editor.getByLabel('Colour', { exact: true });
+  const told = watcher
+    .getByText(/changed white: colour/)
+    .first()
+    .waitFor({ state: 'attached' });
+  await colour.fill('#2040ff');
+  await told;
+  const isBlue = (scene: typeof before) => {
+    const factor = (
+      scene.materials[white]!['pbrMetallicRoughness'] as {
+        baseColorFactor: number[];
+      }
+    ).baseColorFactor;
+    return factor[2]! > 0.99 && factor[0]! < 0.02;
+  };
+  expect(isBlue(await until(() => sceneOf(server), isBlue))).toBe(true);
+  await watcher.waitForFunction(
+    (m) => window.viewer!.edit.document.gltf.materials![m]!.pbrMetallicRoughness!.baseColorFactor![2]! > 0.99,
+    white,
+  );
+  await converged(watcher);
+  const blue = await pixels(watcher, 60);
+  expect(difference(dark, blue).mean).toBeGreaterThan(10);
+
+  await editor.getByRole('button', { name: 'Undo' }).click();
+  const back = await until(
+    () => sceneOf(server),
+    (scene) => !isBlue(scene),
+  );
+  expect(back.materials).toEqual(before.materials);
+  await converged(watcher);
+  expect(difference(dark, await pixels(watcher, 60)).mean).toBeLessThan(2);
+});
+
+it('moves an object with the handles, in one step of undo', async () => {
+  const page = await pages.open(server.url, 1200, 800);
+  await converged(page);
+  const before = await sceneOf(server);
+  await choose(page, 'tall_block');
+  const node = await page.evaluate(() => window.viewer!.edit.selection!.node);
+  // The middle of the handles, in pixels of the page.
+  const from = await page.evaluate(() => {
+    const { viewer } = window.viewer!;
+    viewer.rig.camera.updateMatrixWorld();
+    const at = viewer.gizmo.middle.project(viewer.rig.camera);
+    const box = viewer.canvas.getBoundingClientRect();
+    return { x: box.left + ((at.x + 1) / 2) * box.width, y: box.top + ((1 - at.y) / 2) * box.height };
+  });
+  await page.mouse.move(from.x, from.y);
+  await page.mouse.down();
+  for (let step = 1; step <= 8; ++step) await page.mouse.move(from.x - 8 * step, from.y - 3 * step);
+  await page.mouse.up();
+  const moved = await until(
+    () => sceneOf(server),
+    (scene) => scene.nodes[node]!.translation[0] !== before.nodes[node]!.translation[0],
+  );
+  expect(moved.nodes[node]!.translation).not.toEqual(before.nodes[node]!.translation);
+  // What the page shows is what the server has, when all is said.
+  await page.waitForFunction(() => window.viewer!.edit.document.undoStack.length === 1);
+  await until(
+    () => page.evaluate((n) => window.viewer!.edit.document.gltf.nodes![n]!.translation, node),
+    (shown) => JSON.stringify(shown) === JSON.stringify(moved.nodes[node]!.translation),
+    3000,
+  );
+  await page.keyboard.press('Control+z');
+  const undone = await until(
+    () => sceneOf(server),
+    (scene) => JSON.stringify(scene.nodes) === JSON.stringify(before.nodes),
+  );
+  expect(undone.nodes).toEqual(before.nodes);
+  await converged(page);
+});
+
+it('adds a lamp, and takes it out again', async () => {
+  const page = await pages.open(server.url, 1200, 800);
+  await converged(page);
+  const before = await sceneOf(server);
+  await page.keyboard.press('l');
+  const lit = await until(
+    () => sceneOf(server),
+    (scene) => scene.scenes[0]!.nodes.length === before.scenes[0]!.nodes.length + 1,
+  );
+  expect(lit.nodes.at(-1)!.name).toMatch(/^lamp/);
+  await page.getByLabel('Intensity, cd').waitFor();
+  await converged(page);
+  await page.keyboard.press('Delete');
+  const out = await until(
+    () => sceneOf(server),
+    (scene) => scene.scenes[0]!.nodes.length === before.scenes[0]!.nodes.length,
+  );
+  expect(out.scenes).toEqual(before.scenes);
+  await converged(page);
+});
+
+it('takes back what the server refuses, with its reason', async () => {
+  const page = await pages.open(server.url, 1200, 800);
+  await converged(page);
+  const before = await sceneOf(server);
+  await page.mouse.click(400, 260);
+  const field = page.getByLabel('Luminance, nit');
+  await field.fill('1e30');
+  await field.press('Enter');
+  await page.getByText(/too bright/).waitFor();
+  expect((await sceneOf(server)).materials).toEqual(before.materials);
+  const shown = await page.evaluate(() => window.viewer!.edit.document.gltf.materials);
+  expect(shown).toEqual(before.materials);
+});
+
+it('reads the light under the pointer', async () => {
+  const page = await pages.open(server.url, 1200, 800);
+  await converged(page);
+  await page.keyboard.press('m');
+  await page.mouse.move(400, 260);
+  const text = await until(
+    async () => (await page.locator('.meter').innerText()) || '',
+    (t) => / lx ± /.test(t),
+  );
+  expect(text).toMatch(/[\d.,]+ lx ± [\d.,]+/);
+  const reading = await page.evaluate(() => {
+    const box = window.viewer!.viewer.canvas.getBoundingClientRect();
+    return window.viewer!.viewer.readAt((400 / box.width) * 2 - 1, 1 - (260 / box.height) * 2)!.irradiance!;
+  });
+  // Against the lightmap file's own view of the page: the luminance shown is that of the texels sampled.
+  const lux = Number(/([\d.,]+) lx/.exec(text)![1]!.replaceAll(',', ''));
+  expect(lux).toBeCloseTo(0.2126 * reading[0] + 0.7152 * reading[1] + 0.0722 * reading[2], 1);
+  expect(lux).toBeGreaterThan(0);
+});
+
+it('comes back when the graphics context was lost', async () => {
+  const page = await pages.open(bare());
+  await converged(page);
+  const before = await pixels(page, 60);
+  await page.evaluate(async () => {
+    const extension = window.viewer!.viewer.renderer.getContext().getExtension('WEBGL_lose_context')!;
+    extension.loseContext();
+    await new Promise((resolve) => setTimeout(resolve, 300));
+    extension.restoreContext();
+    await new Promise((resolve) => setTimeout(resolve, 1000));
+  });
+  expect(difference(before, await pixels(page, 60)).p99).toBeLessThanOrEqual(2);
+});
+
+it.each([360, 768, 1280])('fits into %i pixels, and every view draws something', async (width) => {
+  const page = await pages.open(server.url, width, 640, {
+    touch: width < 700,
+  });
+  await converged(page);
+  const outside = await page.evaluate(() =>
+    [...document.querySelectorAll('button')]
+      .filter((button) => button.offsetParent !== null && !button.closest('.tab-body'))
+      .map((button) => ({
+        name: button.getAttribute('aria-label') ?? button.textContent,
+        box: button.getBoundingClientRect(),
+      }))
+      .filter(({ box }) => box.left < 0 || box.right > innerWidth || box.top < 0 || box.bottom > innerHeight)
+      .map(({ name }) => name),
+  );
+  expect(outside).toEqual([]);
+  if (width !== 1280) return;
+  const seen = new Set<string>();
+  for (const view of ['Lit', 'Irradiance', 'Radiosity', 'Patches', 'Mip level', 'Normals', 'Albedo', 'Pages']) {
+    await page.getByRole('button', { name: view, exact: true }).click();
+    const picture = await pixels(page, 16);
+    expect(Math.max(...picture), view).toBeGreaterThan(40);
+    seen.add(picture.join());
+  }
+  expect(seen.size).toBe(8);
+});
+
+it('carries the camera in a link', async () => {
+  const page = await pages.open(server.url, 900, 600);
+  await converged(page);
+  await page.locator('canvas.view').focus();
+  for (let i = 0; i < 5; ++i) await page.keyboard.press('ArrowRight');
+  const hash = await page.evaluate(() => window.viewer!.view.linkHash());
+  const other = await pages.open(`${server.url}/#${hash}`, 900, 600);
+  await converged(other);
+  const place = (p: Page) => p.evaluate(() => window.viewer!.viewer.rig.camera.matrixWorld.toArray());
+  const [a, b] = [await place(page), await place(other)];
+  // Five digits are in the link.
+  a.forEach((v, i) => expect(Math.abs(v - b[i]!)).toBeLessThan(1e-3));
+});

@@ -1,0 +1,257 @@
+import { existsSync, readFileSync } from 'node:fs';
+import * as edits from '../../../client/web/src/document/edits';
+import type { Gltf } from '../../../client/web/src/document/gltf';
+import { applyPatch, sameJson, withoutNames } from '../../../client/web/src/document/json_patch';
+import { SceneDocument } from '../../../client/web/src/document/scene_document';
+import type { Json, Patch, ScenePatchReply } from '../../../client/web/src/protocol/messages';
+import { RpcError } from '../../../client/web/src/protocol/rpc';
+
+function room(): Gltf {
+  return {
+    asset: { version: '2.0' },
+    scene: 0,
+    scenes: [{ nodes: [0, 1] }],
+    nodes: [
+      {
+        name: 'floor',
+        mesh: 0,
+        translation: [0, 0, 0],
+        rotation: [0, 0, 0, 1],
+        scale: [1, 1, 1],
+      },
+      {
+        name: 'box',
+        mesh: 0,
+        translation: [1, 0, 0],
+        rotation: [0, 0, 0, 1],
+        scale: [1, 1, 1],
+      },
+    ],
+    materials: [
+      {
+        name: 'white',
+        emissiveFactor: [0, 0, 0],
+        pbrMetallicRoughness: { baseColorFactor: [1, 1, 1, 1] },
+      },
+    ],
+    meshes: [{ primitives: [{ material: 0 }] }],
+  };
+}
+
+const json = (gltf: Gltf) => gltf as unknown as Json;
+
+describe('JSON Patch', () => {
+  const suite = new URL('../../../../shared/suites/json-patch-tests/', import.meta.url);
+  const files = ['tests.json', 'spec_tests.json'].map((name) => new URL(name, suite)).filter((url) => existsSync(url));
+
+  it.skipIf(files.length === 0)(
+    'does what the suite of others expects, and undoes it (skipped without ../shared)',
+    () => {
+      interface Case {
+        comment?: string;
+        doc: Json;
+        patch: Patch;
+        expected?: Json;
+        error?: string;
+        disabled?: boolean;
+      }
+      let run = 0;
+      for (const file of files)
+        for (const { comment, doc, patch, expected, error, disabled } of JSON.parse(
+          readFileSync(file, 'utf8'),
+        ) as Case[]) {
+          // The scene is an object that is never replaced as a whole; the rest of the suite is about just that.
+          if (disabled || patch.some((op) => op.path === '' && op.op !== 'test')) continue;
+          ++run;
+          const after = structuredClone(doc);
+          if (error !== undefined) {
+            expect(() => applyPatch(after, patch), comment ?? error).toThrow();
+            expect(after, comment).toEqual(doc);
+          } else {
+            const inverse = applyPatch(after, patch);
+            if (expected !== undefined) expect(sameJson(after, expected), comment ?? JSON.stringify(patch)).toBe(true);
+            applyPatch(after, inverse);
+            expect(sameJson(after, doc), `inverse of ${JSON.stringify(patch)}`).toBe(true);
+          }
+        }
+      expect(run).toBeGreaterThan(80);
+    },
+  );
+
+  it('finds elements by names that are unique', () => {
+    expect(withoutNames(json(room()), '/nodes/@box/translation')).toBe('/nodes/1/translation');
+    expect(() => withoutNames(json(room()), '/nodes/@chair/translation')).toThrow('0 elements');
+    const twice = room();
+    twice.nodes![0]!.name = 'box';
+    expect(() => withoutNames(json(twice), '/nodes/@box')).toThrow('2 elements');
+  });
+
+  it('is all or nothing', () => {
+    const gltf = room();
+    const patch: Patch = [
+      { op: 'replace', path: '/nodes/1/translation', value: [9, 9, 9] },
+      { op: 'remove', path: '/nodes/7' },
+    ];
+    expect(() => applyPatch(json(gltf), patch)).toThrow();
+    expect(gltf).toEqual(room());
+  });
+
+  it('does not reach prototypes', () => {
+    const document = { a: {} } as Json;
+    applyPatch(document, [{ op: 'add', path: '/a/__proto__', value: { polluted: true } }]);
+    expect(({} as Record<string, unknown>)['polluted']).toBeUndefined();
+    expect(() => applyPatch(document, [{ op: 'replace', path: '/constructor/name', value: 1 }])).toThrow();
+  });
+});
+
+describe('edits', () => {
+  it('add a lamp to a scene without lights, and take it out again', () => {
+    const gltf = room();
+    const { patch, node } = edits.addLamp(gltf, [0, 1, 0], 50);
+    const undo = edits.undoOnServer(patch, applyPatch(json(gltf), patch));
+    expect(node).toBe(2);
+    expect(gltf.scenes![0]!.nodes).toEqual([0, 1, 2]);
+    expect(gltf.extensionsUsed).toEqual(['KHR_lights_punctual']);
+    expect(gltf.extensions!.KHR_lights_punctual!.lights[0]).toMatchObject({
+      type: 'point',
+      intensity: 50,
+    });
+    applyPatch(json(gltf), undo);
+    expect(gltf.scenes![0]!.nodes).toEqual([0, 1]);
+    expect(gltf.nodes!.length).toBe(3); // lists do not shrink
+    applyPatch(json(gltf), edits.redoOnServer(patch));
+    expect(gltf.scenes![0]!.nodes).toEqual([0, 1, 2]);
+    expect(gltf.nodes!.length).toBe(3);
+  });
+
+  it('hide a node that has no extensions yet', () => {
+    const gltf = room();
+    applyPatch(json(gltf), edits.setVisible(gltf, 1, false));
+    expect(edits.isVisible(gltf, 1)).toBe(false);
+    applyPatch(json(gltf), edits.setVisible(gltf, 1, true));
+    expect(edits.isVisible(gltf, 1)).toBe(true);
+    expect(gltf.extensionsUsed).toEqual(['KHR_node_visibility']);
+  });
+
+  it('are told in words', () => {
+    expect(edits.describePatch(room(), edits.setColour(0, room(), [1, 0, 0]))).toBe('white: colour');
+    expect(edits.describePatch(room(), [{ op: 'replace', path: '/nodes/@box/translation', value: [0, 0, 0] }])).toBe(
+      'box: position',
+    );
+  });
+});
+
+/** A server whose answers the test gives. */
+function session() {
+  const calls: {
+    patch: Patch;
+    id: string;
+    answer: (reply: ScenePatchReply) => void;
+    refuse: (error: Error) => void;
+  }[] = [];
+  const refused: string[] = [];
+  const document = new SceneDocument(
+    'me',
+    (patch, id) =>
+      new Promise((answer, refuse) => {
+        calls.push({ patch, id, answer, refuse });
+      }),
+    {
+      changed: () => undefined,
+      refused: (label, reason) => refused.push(`${label}: ${reason}`),
+      historyChanged: () => undefined,
+    },
+  );
+  document.reset(room(), 1);
+  return { document, calls, refused };
+}
+
+const move = (x: number): Patch => edits.setPlacement(1, { translation: [x, 0, 0] });
+const reply = (revision: number): ScenePatchReply => ({
+  revision,
+  affected: { surfaces: 1, shots: 1 },
+});
+const settle = () => new Promise((resolve) => setImmediate(resolve));
+
+describe('scene document', () => {
+  it('shows an edit at once, and undoes it to what stood there before', async () => {
+    const { document, calls } = session();
+    const done = document.edit('Move', move(5));
+    expect(document.gltf.nodes![1]!.translation).toEqual([5, 0, 0]);
+    expect(document.patched(2, calls[0]!.patch, 'me')).toBe(true); // the notification comes first
+    calls[0]!.answer(reply(2));
+    await done;
+    expect(document.gltf.nodes![1]!.translation).toEqual([5, 0, 0]);
+    const undone = document.undo();
+    expect(calls[1]!.patch).toEqual([{ op: 'replace', path: '/nodes/1/translation', value: [1, 0, 0] }]);
+    calls[1]!.answer(reply(3));
+    await undone;
+    expect(document.gltf).toEqual(room());
+    const redone = document.redo();
+    calls[2]!.answer(reply(4));
+    await redone;
+    expect(document.gltf.nodes![1]!.translation).toEqual([5, 0, 0]);
+  });
+
+  it('sends one edit at a time, and of a drag only the newest place', async () => {
+    const { document, calls } = session();
+    void document.edit('Move', move(2), 'drag');
+    void document.edit('Move', move(3), 'drag');
+    void document.edit('Move', move(4), 'drag');
+    expect(calls.map((call) => call.patch)).toEqual([move(2)]);
+    calls[0]!.answer(reply(2));
+    await settle();
+    expect(calls.map((call) => call.patch)).toEqual([move(2), move(4)]);
+    calls[1]!.answer(reply(3));
+    await settle();
+    expect(document.undoStack.length).toBe(1);
+    expect(document.undoStack[0]!.inverse).toEqual(move(1));
+    expect(document.undoStack[0]!.forward).toEqual(move(4));
+  });
+
+  it('snaps back with the reason when the server refuses', async () => {
+    const { document, calls, refused } = session();
+    const done = document.edit('Move', move(7));
+    calls[0]!.refuse(new RpcError(-32022, 'would not be a scene', { pointer: '/nodes/1' }));
+    await expect(done).rejects.toThrow();
+    expect(document.gltf).toEqual(room());
+    expect(refused).toEqual(['Move: would not be a scene (/nodes/1)']);
+    expect(document.undoStack).toEqual([]);
+  });
+
+  it("lays its own edit upon other people's", async () => {
+    const { document, calls } = session();
+    const done = document.edit('Move', move(7));
+    const theirs: Patch = [{ op: 'replace', path: '/nodes/@box/scale', value: [2, 2, 2] }];
+    expect(document.patched(2, theirs, 'Ann')).toBe(true);
+    expect(document.gltf.nodes![1]).toMatchObject({
+      translation: [7, 0, 0],
+      scale: [2, 2, 2],
+    });
+    calls[0]!.refuse(new Error('no'));
+    await expect(done).rejects.toThrow();
+    expect(document.gltf.nodes![1]).toMatchObject({
+      translation: [1, 0, 0],
+      scale: [2, 2, 2],
+    });
+  });
+
+  it('adds a lamp once, whether the notification or the answer comes first', async () => {
+    for (const notificationFirst of [true, false]) {
+      const { document, calls } = session();
+      const { patch } = edits.addLamp(document.gltf, [0, 1, 0], 50);
+      const done = document.edit('Add lamp', patch);
+      if (notificationFirst) document.patched(2, patch, 'me');
+      calls[0]!.answer(reply(2));
+      await done;
+      if (!notificationFirst) document.patched(2, patch, 'me');
+      expect(document.gltf.nodes!.length).toBe(3);
+      expect(document.gltf.scenes![0]!.nodes).toEqual([0, 1, 2]);
+    }
+  });
+
+  it('asks for the scene anew when a patch does not fit', () => {
+    const { document } = session();
+    expect(document.patched(2, [{ op: 'remove', path: '/nodes/9' }], 'Ann')).toBe(false);
+  });
+});

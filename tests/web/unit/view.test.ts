@@ -1,0 +1,67 @@
+import { exposureOf } from '../../../client/web/src/view/exposure';
+import { editCommand } from '../../../client/web/src/app_share';
+import { baseMipFor } from '../../../client/web/src/view/lightmap_set';
+import { fromHex, percent, readable, toHex } from '../../../client/web/src/ui/dom';
+
+describe('automatic exposure', () => {
+  it('brings an even picture to middle grey', () => {
+    expect(exposureOf(new Array<number>(100).fill(2.5))).toBeCloseTo(0.18 / 2.5, 10);
+  });
+
+  it('does not look at lamps and dark outsides', () => {
+    const room = Array.from({ length: 900 }, (_, i) => 1 + (i % 3));
+    const mean = Math.exp(room.reduce((sum, v) => sum + Math.log(v), 0) / room.length);
+    const picture = [...room, ...new Array<number>(5).fill(5000), ...new Array<number>(80).fill(1e-5), 0, NaN];
+    expect(exposureOf(picture)).toBeCloseTo(0.18 / mean, 10);
+  });
+
+  it('is undefined where nothing is lit', () => {
+    expect(exposureOf([0, 0])).toBeUndefined();
+    expect(exposureOf([])).toBeUndefined();
+  });
+});
+
+describe('memory', () => {
+  const page = (side: number) => ({ width: side, height: side, mips: 13 });
+
+  it('keeps one page of 4096 and 40 of 1024 whole', () => {
+    expect(baseMipFor([page(4096)])).toBe(0);
+    expect(baseMipFor(new Array(40).fill(page(1024)))).toBe(0);
+  });
+
+  it('asks for coarser mips where pages would not fit', () => {
+    const base = baseMipFor(new Array(40).fill(page(4096)));
+    expect(base).toBe(2);
+    // 40 pages of 4096 x 4096 texels of 4 bytes, with mips, are 3.3 GiB; a sixteenth fits.
+    expect((40 * 4096 ** 2 * 16) / 3 / 4 ** base).toBeLessThan(512 * 2 ** 20);
+  });
+});
+
+it('colours keep their bytes through hexadecimal', () => {
+  for (const hex of ['#000000', '#ffffff', '#123456', '#0a0b0c', '#fe8001']) expect(toHex(fromHex(hex))).toBe(hex);
+});
+
+it('numbers are readable', () => {
+  expect([1234567, 1234.5, 0.01234, 0, 1e-7, NaN].map((v) => readable(v))).toEqual([
+    '1,234,567',
+    '1,235',
+    '0.0123',
+    '0',
+    '1.00e-7',
+    '–',
+  ]);
+  expect(percent(0.0183)).toBe('1.8 %');
+});
+
+it('the command survives a shell', () => {
+  const patch = [
+    {
+      op: 'replace' as const,
+      path: "/nodes/@Ann's lamp/translation",
+      value: [0, 1, 0],
+    },
+  ];
+  expect(editCommand(patch, 'host:1')).toBe(
+    `echo '[{"op":"replace","path":"/nodes/@Ann'\\''s lamp/translation","value":[0,1,0]}]' | radiosity edit host:1 -`,
+  );
+});
