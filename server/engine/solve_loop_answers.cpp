@@ -121,8 +121,8 @@ Result<SharedBytes> SolveLoop::renderSnapshot(const SnapshotRequest& request) {
   }
   // Nobody wants a picture of the dark after an edit; but what was waited for must not have a ghost of the old light.
   const bool dark = quantity.pages == Quantity::kIrradiance && lit_->solver().error().total > kPresentable;
-  const auto pages = dark ? pageImages({quantity.pages, lit_->shownPages(), {}, false})
-                          : pageImages(makePages(*lit_, quantity.pages));
+  const auto pages =
+      dark ? pageImages({quantity.pages, lit_->shownPages(), {}, false}) : pageImages(makePages(*lit_, quantity.pages));
   const auto image = view_->render(lit_->scene(), lit_->patches(), pages, view);
   if (!image) return tl::unexpected<Error>(image.error());
   auto png = encodePng(quantity.photometric ? toneMap(*image, autoExposure(*image)) : *image);

@@ -60,7 +60,7 @@ class LightGatherer {
                  std::span<const std::uint32_t> items, std::size_t half);
   [[nodiscard]] bool hiddenAtSilhouette(std::size_t i, const glm::vec3& light, std::span<const std::uint32_t> items,
                                         std::size_t size) const;
-  void weighLost(const solver::HemicubeFrame& point, std::span<const std::uint32_t> items,
+  void weighLost(const solver::HemicubeFrame& point, std::span<const std::uint32_t> items, std::uint32_t resolution,
                  const HemicubeWeights& weights, Lost& lost);
   [[nodiscard]] float visibility(std::size_t sums, std::size_t i, std::size_t points) const;
   [[nodiscard]] double delivered(std::size_t sums, std::size_t points) const;

@@ -295,8 +295,7 @@ bool LinkColumn::decode(std::uint32_t first_value, std::span<float> leaves) cons
   if (after == runs_.begin()) return false;
   const Run& run = *(after - 1);
   if (first_value >= run.first_value + run.count) return false;
-  decodeAll(&code_[run.offset + (first_value - run.first_value)], leaves.size(), scale_ * gain_,
-            leaves.data());
+  decodeAll(&code_[run.offset + (first_value - run.first_value)], leaves.size(), scale_ * gain_, leaves.data());
   return true;
 }
 

@@ -104,7 +104,7 @@ class LinkedSolver final : public Solver {
   LinkPlanner planner_;
   Phase phase_ = Phase::kLights;
   SolveLimit limit_ = SolveLimit::kNone;
-  bool lights_fit_ = true;           // no light goes without links for want of memory
+  bool lights_fit_ = true;  // no light goes without links for want of memory
   Pass pass_ = Pass::kNone;
   FromLinks from_links_ = FromLinks::kNo;
   bool settling_ = false;            // a wave is measured, its light is still to be solved for

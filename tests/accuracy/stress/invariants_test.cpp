@@ -23,10 +23,10 @@ const LinkedSolver& linked(const Solve& solve) {
 }
 
 /// Flux that a radiosity of one of a shooter brings to leaves [x0, x1) x [y0, y1) of a side, by half.
-double fluxTo(const Solve& solve, const Shooter& shooter, std::size_t half, std::uint32_t s, const solver::Side& side,
+double fluxTo(const Solve& solve, const Shooter& shooter, std::size_t half, const solver::Side& side,
               const solver::LeafRect& rect) {
   std::vector<float> links(side.leaf_count);
-  if (!shooter.column[half].decode(s, links)) return 0.0;
+  if (!shooter.column[half].decode(side.first_value, links)) return 0.0;
   double sum = 0.0;
   for (auto y = rect.y0; y < rect.y1; ++y) {
     for (auto x = rect.x0; x < rect.x1; ++x) {
@@ -47,7 +47,7 @@ TEST(Invariants, RowSumsOfFormFactorsAreOneWithinAMillionthInAClosedRoom) {
       if (shooter.column[half].points() == 0.0) continue;
       double sum = shooter.column[half].escaped() + shooter.column[half].absorbed();
       for (std::uint32_t s = 0; s < sides.size(); ++s)
-        sum += fluxTo(solve, shooter, half, s, sides[s], {0, 0, sides[s].width, sides[s].height});
+        sum += fluxTo(solve, shooter, half, sides[s], {0, 0, sides[s].width, sides[s].height});
       ++rows;
       EXPECT_NEAR(sum / shooter.area, 1.0, 1e-6);
     }
@@ -72,7 +72,7 @@ TEST(Invariants, LinksAreReciprocalWithinThreeSigma) {
         measured = measured && shooters[i].column[half].points() > 0.0 && shooters[j].column[half].points() > 0.0;
         const auto to = [&](const Shooter& from, const Shooter& at) {
           const auto& side = sides[at.place.side];
-          return fluxTo(solve, from, half, at.place.side, side, solver::leafRect(side, at.place));
+          return fluxTo(solve, from, half, side, solver::leafRect(side, at.place));
         };
         there[half] = to(shooters[i], shooters[j]);
         back[half] = to(shooters[j], shooters[i]);
