@@ -165,14 +165,15 @@ export class EditSession {
     this.make(`Remove ${nodeName(this.document.gltf, node)}`, patch);
   }
 
+  /** What was done in this page first, a whole drag at once; then what the server remembers, whoever did it. */
   async undo(): Promise<void> {
-    if (this.app.connection.has('scene.undo')) await this.app.ask('scene.undo');
-    else await this.document.undo();
+    if (this.document.undoStack.length > 0) await this.document.undo();
+    else if (this.app.connection.has('scene.undo')) await this.app.ask('scene.undo');
   }
 
   async redo(): Promise<void> {
-    if (this.app.connection.has('scene.redo')) await this.app.ask('scene.redo');
-    else await this.document.redo();
+    if (this.document.redoStack.length > 0) await this.document.redo();
+    else if (this.app.connection.has('scene.redo')) await this.app.ask('scene.redo');
   }
 
   async loadFile(file: File): Promise<void> {

@@ -174,6 +174,26 @@ const reply = (revision: number): ScenePatchReply => ({
 const settle = () => new Promise((resolve) => setImmediate(resolve));
 
 describe('scene document', () => {
+  it('keeps one step of a drag whose last edits are answered after it ended', async () => {
+    const { document, calls } = session();
+    const first = document.edit('Move', move(5), 'move 1');
+    const last = document.edit('Move', move(6), 'move 1');
+    document.endGesture();
+    calls[0]!.answer(reply(2));
+    await first;
+    calls[1]!.answer(reply(3));
+    await last;
+    expect(document.undoStack.length).toBe(1);
+    const again = document.edit('Move', move(7), 'move 1');
+    calls[2]!.answer(reply(4));
+    await again;
+    expect(document.undoStack.length, 'the next drag is a step of its own').toBe(2);
+    const undone = document.undo();
+    expect(calls[3]!.patch).toEqual([{ op: 'replace', path: '/nodes/1/translation', value: [6, 0, 0] }]);
+    calls[3]!.answer(reply(5));
+    await undone;
+  });
+
   it('shows an edit at once, and undoes it to what stood there before', async () => {
     const { document, calls } = session();
     const done = document.edit('Move', move(5));

@@ -43,6 +43,7 @@ export class SceneDocument {
   readonly redoStack: EditEntry[] = [];
   lastEdit: Patch | undefined;
   private pending: PendingEdit[] = [];
+  private gesture = 0;
   private sending = false;
   private openKey: string | undefined;
 
@@ -97,9 +98,9 @@ export class SceneDocument {
     return this.enqueue(label, patch, true, key);
   }
 
-  /** The gesture is over: the next edit with its key is a new step. */
+  /** The gesture is over: the next edit with its key is a new step. Those on their way still belong to this one. */
   endGesture(): void {
-    this.openKey = undefined;
+    ++this.gesture;
   }
 
   async undo(): Promise<void> {
@@ -129,7 +130,8 @@ export class SceneDocument {
     return this.gltf as unknown as Json;
   }
 
-  private enqueue(label: string, forward: Patch, isStep: boolean, key: string | undefined): Promise<void> {
+  private enqueue(label: string, forward: Patch, isStep: boolean, kind: string | undefined): Promise<void> {
+    const key = kind === undefined ? undefined : `${kind} #${this.gesture}`;
     return new Promise((resolve, reject) => {
       const waiting = this.pending.at(-1);
       const onTheWay = this.sending ? this.pending[0] : undefined;
