@@ -104,7 +104,7 @@ function isNoise(text: string): boolean {
 
 /** Until the solve has stopped at its target, and all light is on the screen. */
 export async function converged(page: Page): Promise<void> {
-  await page.waitForFunction(
+  const done = page.waitForFunction(
     () => {
       const app = window.viewer;
       const set = app?.viewer.shown?.set;
@@ -113,6 +113,20 @@ export async function converged(page: Page): Promise<void> {
     undefined,
     { timeout: 60_000 },
   );
+  await done.catch(async (error: Error) => {
+    const state = await page.evaluate(() => {
+      const app = window.viewer;
+      const set = app?.viewer.shown?.set;
+      return JSON.stringify({
+        open: app?.connection.isOpen,
+        progress: app?.progress,
+        complete: set?.complete,
+        waiting: set?.waiting,
+        isShown: set !== undefined && app?.viewer.set === set,
+      });
+    });
+    throw new Error(`${error.message}; the page stands at ${state}`);
+  });
 }
 
 /** What a page shows, or the picture at a URL, brought to `side` x `side` pixels: R, G, B of each, 0 to 255. */

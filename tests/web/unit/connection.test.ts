@@ -152,14 +152,26 @@ describe('connection', () => {
     expect(pauseMs(3, 0)).toBeLessThan(pauseMs(3, 1));
   });
 
-  it('does not knock again where the token is refused', () => {
+  it('does not knock again where the token is refused', async () => {
     const test = setup();
     test.connection.open();
     test.socket().greet();
+    test.socket().give({ id: test.socket().sent[0]!.id, error: { code: -32001, message: 'no or wrong token' } });
+    await vi.advanceTimersByTimeAsync(0);
     test.socket().drop(1008, 'no or wrong token');
     expect(test.states.at(-1)).toBe('refused');
     vi.advanceTimersByTime(600_000);
     expect(FakeSocket.all.length).toBe(1);
+  });
+
+  it('knocks again where a busy machine said hello too late', async () => {
+    const test = setup();
+    test.connection.open();
+    test.socket().greet();
+    test.socket().drop(1008, 'hello did not come in time');
+    expect(test.states.at(-1)).toBe('waiting');
+    await vi.advanceTimersByTimeAsync(1000);
+    expect(FakeSocket.all.length).toBe(2);
   });
 
   it('gives up a socket that no longer answers', async () => {

@@ -5,6 +5,7 @@ import { CreditWindow, FIRST_WINDOW } from './credit';
 import {
   CLOSE_UNAUTHENTICATED,
   SUBPROTOCOL,
+  UNAUTHENTICATED,
   type HelloReply,
   type Notifications,
   type Resume,
@@ -55,6 +56,7 @@ export class Connection {
   private timer: ReturnType<typeof setTimeout> | undefined;
   private probe: ReturnType<typeof setInterval> | undefined;
   private stopped = false;
+  private isRefused = false; // the token, by the answer to this socket's hello
 
   constructor(
     private readonly options: ConnectionOptions,
@@ -120,6 +122,7 @@ export class Connection {
     const resume = this.options.resume();
     const token = this.options.token();
     this.credit = new CreditWindow();
+    this.isRefused = false;
     try {
       const hello = await rpc.call<HelloReply>('hello', {
         client: this.options.client,
@@ -137,7 +140,8 @@ export class Connection {
       this.watch(rpc);
     } catch (error) {
       // What was refused is said by the close that follows; anything else is a connection to give up.
-      if (!(error instanceof RpcError)) this.socket?.close();
+      if (error instanceof RpcError) this.isRefused = error.code === UNAUTHENTICATED;
+      else this.socket?.close();
     }
   }
 
@@ -167,7 +171,9 @@ export class Connection {
     this.rpc?.close();
     this.rpc = undefined;
     if (this.stopped) return;
-    if (code === CLOSE_UNAUTHENTICATED) return this.events.state('refused', reason || 'the token is missing or wrong');
+    // Closed with the same code without an answer, hello only came too late: the machine was busy.
+    if (code === CLOSE_UNAUTHENTICATED && this.isRefused)
+      return this.events.state('refused', reason || 'the token is missing or wrong');
     const pause = pauseMs(this.attempt++, (this.options.random ?? Math.random)());
     this.events.state('waiting', describeClose(code, reason, pause));
     this.timer = setTimeout(() => this.open(), pause);

@@ -124,3 +124,5 @@ export const SUBPROTOCOL = 'radiosity.v1';
 
 /** The close code that trying again does not mend. */
 export const CLOSE_UNAUTHENTICATED = 1008;
+/** JSON-RPC error of a missing or wrong token. */
+export const UNAUTHENTICATED = -32001;
