@@ -1,5 +1,6 @@
 // radiosityd: options -> engine and network -> run until a signal.
 #include <chrono>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -11,6 +12,8 @@
 #include "server/gpu/gpu_transport.h"
 #include "server/net/server.h"
 #include "server/options.h"
+#include "server/state/store.h"
+#include "server/state/uploads.h"
 
 #ifndef RADIOSITY_VERSION
 #define RADIOSITY_VERSION "0.0.0"
@@ -25,7 +28,7 @@ int report(const Error& error) {
 }
 
 void loadFirstScene(engine::Engine& engine, const std::string& path) {
-  engine.loadFile(path, [path](const Result<engine::LoadOutcome>& outcome) {
+  engine.openFile(path, [path](const Result<engine::LoadOutcome>& outcome) {
     if (!outcome) return log::error("{}", outcome.error().text());
   });
 }
@@ -40,8 +43,21 @@ void leaveWithin(std::chrono::milliseconds patience) {
   }).detach();
 }
 
-int serve(const Options& options) {
+/// How long the end waits for the last checkpoint; then the one before it stays.
+constexpr auto kCheckpointPatience = std::chrono::milliseconds(3500);
+
+int serve(Options options) {
   engine::EngineOptions engine_options;
+  if (!options.state.empty()) {
+    auto store = state::Store::open(options.state);
+    if (!store) return report(store.error());
+    engine_options.store = std::move(*store);
+    engine_options.named_settings = options.named_settings;
+    engine_options.checkpoint_bytes = options.checkpoint_bytes;
+    options.server.uploads = std::make_shared<state::Uploads>(*engine_options.store);
+  }
+  const auto store = engine_options.store;  // outlives the uploads, which outlive the server
+  const auto uploads = options.server.uploads;
   engine_options.settings = options.solve;
   engine_options.make_transport = [workers = options.workers] {
     return gpu::makeWorkerTransport({workers, "/proc/self/exe"});
@@ -55,6 +71,9 @@ int serve(const Options& options) {
   std::printf("listening on %s\n", (*server)->url().c_str());
   std::fflush(stdout);
   (*server)->run();
+  for (const int number : {SIGINT, SIGTERM}) (void)std::signal(number, SIG_DFL);  // from here on it ends at once
+  if (!(*server)->inHurry()) (*engine)->keepSolve(kCheckpointPatience);
+  if (store) store->foldLog();
   leaveWithin(std::chrono::milliseconds(200));
   return 0;
 }

@@ -11,6 +11,8 @@ namespace {
 
 constexpr std::size_t kMaxQueue = 1024;
 constexpr auto kProgressInterval = std::chrono::milliseconds(100);
+/// A solve that took longer is worth a checkpoint at its end.
+constexpr double kLongSolveSeconds = 2.0;
 
 std::string limitText(solver::SolveLimit limit, std::uint64_t link_memory_bytes) {
   constexpr double kMebi = 1048576.0;
@@ -59,12 +61,22 @@ void SolveLoop::threadMain(std::promise<Result<void>> started) {
     const std::scoped_lock lock(mutex_);
     transport_ = std::move(*transport);
   }
+  if (auto restored = restoreState(); !restored) {
+    {
+      const std::scoped_lock lock(mutex_);
+      transport_.reset();
+    }
+    started.set_value(tl::unexpected<Error>(restored.error()));
+    return;
+  }
   updateStatus(false);
   started.set_value({});
   while (runCommands()) {
     welcomeWatchers();
     if (state_ == SolveState::kSolving) solveSlice();
+    checkpointIfDue();
   }
+  checkpoints_.reset();
   lit_.reset();
   view_.reset();
   const std::scoped_lock lock(mutex_);
@@ -133,6 +145,8 @@ void SolveLoop::endSolve(SolveState state) {
   updateStatus(false);
   publishLightmaps(true);
   updateStatus(true);
+  // Of the short solves of a drag the next periodic one will do: thirty a second would stand in the way of the edits.
+  if (seconds_ > kLongSolveSeconds) next_checkpoint_ = Clock::now();
 }
 
 void SolveLoop::updateStatus(bool announce) {
@@ -149,6 +163,14 @@ void SolveLoop::updateStatus(bool announce) {
     status.counters["tiles.changed"] = static_cast<double>(tiles.changed);
     status.counters["skip.tilesUnchanged"] = static_cast<double>(tiles.unchanged);
     status.counters["skip.publicationsUnwatched"] = static_cast<double>(unwatched_);
+    if (checkpoints_) {
+      const auto written = checkpoints_->counters();
+      status.counters["state.checkpoints"] = static_cast<double>(written.written);
+      status.counters["state.checkpointsFailed"] = static_cast<double>(written.failed);
+      status.counters["state.checkpointBytes"] = static_cast<double>(written.bytes);
+      status.counters["state.checkpointSeconds"] = written.seconds;
+      status.counters["state.resumedShots"] = static_cast<double>(resumed_shots_);
+    }
   }
   status.gl_renderer = transport_->description();
   {

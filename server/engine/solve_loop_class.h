@@ -1,11 +1,13 @@
-// The class behind makeEngine (solve_loop.h), private to this folder. Its methods lie in four files: solve_loop.cpp
+// The class behind makeEngine (solve_loop.h), private to this folder. Its methods lie in six files: solve_loop.cpp
 // runs the thread, solve_loop_edits.cpp changes scene and settings, solve_loop_answers.cpp makes what can be fetched,
-// solve_loop_publish.cpp shows lightmaps to those who watch.
+// solve_loop_publish.cpp shows lightmaps to those who watch, solve_loop_state.cpp keeps what outlives the process,
+// solve_loop_restore.cpp brings it back.
 #pragma once
 
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <future>
 #include <memory>
 #include <mutex>
@@ -24,6 +26,7 @@
 #include "server/gpu/view_renderer.h"
 #include "server/scene/document.h"
 #include "server/solver/transport.h"
+#include "server/state/checkpoint.h"
 
 namespace radiosity::engine {
 
@@ -39,6 +42,7 @@ class SolveLoop final : public Engine {
 
   void loadBytes(std::string name, SharedBytes bytes, Callback<LoadOutcome> done) override;
   void loadFile(std::string path, Callback<LoadOutcome> done) override;
+  void openFile(std::string path, Callback<LoadOutcome> done) override;
   void patch(PatchRequest request, Callback<PatchOutcome> done) override;
   void step(StepRequest request, Callback<PatchOutcome> done) override;
   void history(Callback<HistoryReport> done) override;
@@ -55,6 +59,8 @@ class SolveLoop final : public Engine {
   void lightmapExr(std::uint32_t page, Quantity quantity, Callback<SharedBytes> done) override;
   void snapshot(SnapshotRequest request, Callback<SharedBytes> done) override;
   void addListener(std::weak_ptr<Listener> listener) override;
+  [[nodiscard]] const Past& past() const override { return past_; }
+  void keepSolve(std::chrono::milliseconds patience) override;
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -83,20 +89,39 @@ class SolveLoop final : public Engine {
   void updateStatus(bool announce);
 
   [[nodiscard]] Result<LoadOutcome> install(Result<scene::Document> document);
+  /// Called when nothing but the disk can fail any more: what is about to come is brought there.
+  using Keep = std::function<Result<void>(const PatchOutcome&)>;
   /// Puts a lit scene in place of the present one, which goes on if `made` is an error or cannot be uploaded.
   /// `fade`: shows the present one's light until the new one's is as good.
-  [[nodiscard]] Result<void> relight(Result<std::unique_ptr<LitScene>> made, bool fade);
+  [[nodiscard]] Result<void> relight(Result<std::unique_ptr<LitScene>> made, bool fade,
+                                     const std::function<Result<void>(const LitScene&)>& keep = {});
   [[nodiscard]] Result<void> checkBase(const std::optional<std::uint64_t>& base_revision) const;
   [[nodiscard]] Result<PatchOutcome> applyRequest(const PatchRequest& request);
   [[nodiscard]] Result<PatchOutcome> applyStep(const StepRequest& request);
   /// Makes the edited scene the present one; raises no revision and tells nobody yet.
-  [[nodiscard]] Result<PatchOutcome> adopt(scene::EditedDocument edited);
-  [[nodiscard]] Result<PatchOutcome> rebuild(scene::EditedDocument edited);
+  [[nodiscard]] Result<PatchOutcome> adopt(scene::EditedDocument edited, const Keep& keep);
+  [[nodiscard]] Result<PatchOutcome> rebuild(scene::EditedDocument edited, const Keep& keep);
   /// Tells everyone of the new revision and solves on.
   void announceEdit(const PatchOutcome& outcome, const std::string& patch, const std::string& by);
   [[nodiscard]] Result<SolveSettings> applySettings(const SolveSettings& settings);
   /// A solve that has stopped goes on when the settings now ask for more, and is done when they ask for less.
   void reconsiderStop();
+
+  // What outlives the process; all of it nothing without a store.
+  [[nodiscard]] Result<void> restoreState();
+  [[nodiscard]] Result<void> restoreScene(state::Kept kept);
+  [[nodiscard]] Result<void> restoreSolve(const scene::Document& document);
+  [[nodiscard]] Result<std::unique_ptr<LitScene>> resumedScene(const scene::Document& document,
+                                                               const Bytes& checkpoint);
+  /// The scene that outlived the last process was loaded from the same bytes, and nothing else has been loaded since.
+  [[nodiscard]] bool goesOnWith(const scene::Document& document, bool with_edits) const;
+  [[nodiscard]] Result<void> keepLoad(const History::Next& next, const scene::Document& document);
+  /// How an edit is brought to the disk: `after` is the document that it leads to.
+  [[nodiscard]] Keep keepEdit(const History::Next& next, const Receipt& receipt, const scene::Document& after);
+  [[nodiscard]] Result<void> keepSettings(const SolveSettings& settings);
+  void checkpointIfDue();
+  /// True: taken, or not to be had at all.
+  [[nodiscard]] bool takeCheckpoint();
 
   [[nodiscard]] Result<SharedBytes> renderSnapshot(const SnapshotRequest& request);
   [[nodiscard]] Result<SharedBytes> makeUnlit();
@@ -121,6 +146,14 @@ class SolveLoop final : public Engine {
   bool unpublished_ = false;
   std::uint64_t unwatched_ = 0;  // publications that nobody was there for
   Clock::time_point next_publish_{}, last_progress_{};
+  std::unique_ptr<state::CheckpointWriter> checkpoints_;  // null: none are kept
+  Clock::time_point next_checkpoint_{};
+  std::uint64_t checkpoint_revision_ = 0, checkpoint_shots_ = 0;  // of the last that was taken
+  bool checkpoint_too_large_ = false;                             // the last one was
+  std::string loaded_digest_;                                     // of the scene that outlived the last process
+  bool as_restored_ = false;                                      // the scene is that one; no edit, no load since
+  std::uint64_t resumed_shots_ = 0;
+  Past past_;  // constant once start() has returned
 
   mutable std::mutex mutex_;  // for the two that any thread may read, and transport_ coming and going
   Status status_;

@@ -84,11 +84,14 @@ void putScene(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respo
 }
 
 void putUpload(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond& done) {
-  const auto id = hub->uploads().put(request.name, std::make_shared<const Bytes>(std::move(request.body)));
-  auto response = plain(201, protocol::encodeHttpUrl("/uploads/" + id));
-  response.content_type = "application/json";
-  response.headers.emplace_back("Location", "/uploads/" + id);
-  done(std::move(response));
+  hub->keepUpload(request.name, std::make_shared<const Bytes>(std::move(request.body)),
+                  [done](const Result<std::string>& id) {
+                    if (!id) return done(errorResponse(id.error()));
+                    auto response = plain(201, protocol::encodeHttpUrl("/uploads/" + *id));
+                    response.content_type = "application/json";
+                    response.headers.emplace_back("Location", "/uploads/" + *id);
+                    done(std::move(response));
+                  });
 }
 
 void getSceneGltf(const std::shared_ptr<Hub>& hub, HttpRequest& /*request*/, const Respond& done) {

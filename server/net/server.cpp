@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <pthread.h>
+#include <atomic>
 #include <boost/asio/post.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/steady_timer.hpp>
@@ -54,6 +55,7 @@ class Server::State {
   asio::basic_signal_set<Strand> signals_;
   asio::basic_waitable_timer<Clock, asio::wait_traits<Clock>, Strand> drain_timer_, retry_timer_;
   bool signalled_ = false;
+  std::atomic<bool> in_hurry_{false};
   Clock::time_point drain_until_;
   std::uint16_t port_ = 0;
 };
@@ -107,7 +109,10 @@ void Server::State::accept() {
 void Server::State::watchSignals() {
   signals_.async_wait([this](BoostError error, int number) {
     if (error) return;
-    if (std::exchange(signalled_, true)) return context_.stop();
+    if (std::exchange(signalled_, true)) {
+      in_hurry_ = true;
+      return context_.stop();
+    }
     log::info("signal {}: draining", number);
     drain();
     watchSignals();
@@ -173,6 +178,7 @@ void Server::drainOnSignals() {
 }
 
 void Server::run() { state_->run(); }
+bool Server::inHurry() const { return state_->in_hurry_; }
 void Server::drain() { state_->drain(); }
 
 }  // namespace radiosity::net

@@ -27,6 +27,8 @@ class Server {
   void drainOnSignals();
   /// Serves with options.threads threads, the caller's among them; returns when drained.
   void run();
+  /// A second signal came: whoever sent it does not want to wait for anything.
+  [[nodiscard]] bool inHurry() const;
   /// Tells clients, finishes what was begun, closes; cuts off what is left after options.drain_grace. Any thread.
   void drain();
 

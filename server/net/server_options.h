@@ -6,10 +6,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "protocol/limits.h"
+#include "server/state/uploads.h"
 
 namespace radiosity::net {
 
@@ -24,6 +26,7 @@ struct ServerOptions {
   std::size_t max_clients = protocol::kMaxClients;
   int threads = 2;
   std::string version = "0.0.0";
+  std::shared_ptr<state::Uploads> uploads;  ///< null: uploads do not outlive the server
 
   std::chrono::milliseconds hello_timeout{protocol::kHelloTimeoutMs};
   std::chrono::milliseconds write_deadline{protocol::kWriteDeadlineMs};
