@@ -330,7 +330,7 @@ void addSolve(CLI::App& app, Run& run) {
       ->type_name("URL")
       ->excludes(workers)
       ->excludes(memory);
-  addTokenOption(command, options->server);
+  addAccessOptions(command, options->server);
   command.add_flag("-q,--quiet", options->quiet, "no progress on stderr");
   command.callback([options, &run] { run = [options] { return Solve(*options).run(); }; });
 }

@@ -3,6 +3,7 @@
 // unless he asks a question, and the solver never waits for a client.
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <string>
@@ -17,6 +18,9 @@ struct EngineOptions {
   SolveSettings settings;
   /// Makes the transport, on the solve thread. kUnavailable (no EGL driver) ends start-up.
   std::function<Result<std::unique_ptr<solver::Transport>>()> make_transport;
+  /// After a transport failed, before the solve starts over on it; doubled for each failure of the same solve, of which
+  /// the fifth ends it. Drivers take seconds to reset a card.
+  std::chrono::milliseconds recovery_wait{500};
 };
 
 /// Starts the solve thread and the transport; returns when both are up, or why not.

@@ -1,9 +1,10 @@
-// The class behind makeEngine (solve_loop.h), private to this folder. Its methods lie in four files: solve_loop.cpp
+// The class behind makeEngine (solve_loop.h), private to this folder. Its methods lie in five files: solve_loop.cpp
 // runs the thread, solve_loop_edits.cpp changes scene and settings, solve_loop_answers.cpp makes what can be fetched,
-// solve_loop_publish.cpp shows lightmaps to those who watch.
+// solve_loop_publish.cpp shows lightmaps to those who watch, solve_loop_recovery.cpp goes on when renderers are lost.
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <future>
@@ -47,6 +48,7 @@ class SolveLoop final : public Engine {
   void resume(Callback<SolveState> done) override;
   void restart(Callback<SolveState> done) override;
   [[nodiscard]] Status status() const override;
+  [[nodiscard]] double busySeconds() const override;
   [[nodiscard]] std::shared_ptr<void> watch(Quantity quantity) override;
   [[nodiscard]] std::shared_ptr<const Lightmaps> lightmaps(Quantity quantity) const override;
   void sceneText(Callback<SceneText> done) override;
@@ -74,6 +76,13 @@ class SolveLoop final : public Engine {
   /// The clock starts over: another scene, another seed, an edit. A paused solve stays paused.
   void beginSolve();
   void endSolve(SolveState state);
+  /// The transport failed. True: it will be tried again after a while, from the solve's beginning.
+  [[nodiscard]] bool willRecover(const Error& error);
+  /// Whether there is a transport that works; tries to get one when it is time to.
+  [[nodiscard]] bool rendererIsBack();
+  void tellLosses();  ///< of renderers that were replaced
+  void beat();        ///< the thread is alive and has finished something
+
   /// What is watched and not published yet; `final`: as a new version in any case.
   void publishLightmaps(bool final);
   [[nodiscard]] QuantityPages pagesToShow(Quantity quantity);
@@ -121,6 +130,13 @@ class SolveLoop final : public Engine {
   bool unpublished_ = false;
   std::uint64_t unwatched_ = 0;  // publications that nobody was there for
   Clock::time_point next_publish_{}, last_progress_{};
+  bool renderer_lost_ = false;
+  unsigned recoveries_ = 0;  // of this solve
+  Clock::time_point retry_at_{};
+  std::uint64_t losses_told_ = 0, solve_restarts_ = 0;
+
+  std::atomic<Clock::rep> last_beat_{0};  // since the clock's epoch; any thread may read both
+  std::atomic<bool> waiting_{true};
 
   mutable std::mutex mutex_;  // for the two that any thread may read, and transport_ coming and going
   Status status_;

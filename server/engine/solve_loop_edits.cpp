@@ -28,6 +28,7 @@ Result<LoadOutcome> SolveLoop::install(Result<scene::Document> document) {
     return tl::unexpected<Error>(lit.error());
   }
   history_.loaded(++revision_, name);
+  const LogScope about({.revision = revision_});
   for (const auto& warning : lit_->warnings()) log::warn("{}", warning);
   beginSolve();
   listeners_.tell([this](Listener& listener) { listener.onSceneLoaded(revision_); });
@@ -48,6 +49,7 @@ Result<void> SolveLoop::relight(Result<std::unique_ptr<LitScene>> made, bool fad
   }
   if (fade && lit_) (*made)->fadeFrom(*lit_);
   lit_ = std::move(*made);
+  renderer_lost_ = false;  // it took the scene
   publisher_.reset();
   return {};
 }

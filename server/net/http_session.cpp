@@ -277,20 +277,25 @@ void HttpSession::onWritten() {
   message_.reset();
   response_ = {};
   if (keep) return readHeader();
-  BoostError ignored;
-  stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
-  linger();
+  stream_.expires_after(hub_->options().close_patience);
+  stream_.async_end(AnyHandler([self = shared_from_this()](BoostError) {
+    BoostError ignored;
+    self->stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
+    self->linger();
+  }));
 }
 
-/// Closing with unread bytes would reset the connection and take the response away from the client.
+/// Closing with unread bytes would reset the connection and take the response away from the client. What comes is
+/// dropped as it is, deciphered or not.
 void HttpSession::linger() {
   if (lingered_ == 0) stream_.expires_after(hub_->options().close_patience);
   buffer_.clear();
-  stream_.async_read_some(buffer_.prepare(kBufferLimit), [self = shared_from_this()](BoostError error, std::size_t n) {
-    self->lingered_ += n;
-    if (error || self->lingered_ > kLingerBytes) return self->stream_.close();
-    self->linger();
-  });
+  stream_.next_layer().async_read_some(buffer_.prepare(kBufferLimit),
+                                       [self = shared_from_this()](BoostError error, std::size_t n) {
+                                         self->lingered_ += n;
+                                         if (error || self->lingered_ > kLingerBytes) return self->stream_.close();
+                                         self->linger();
+                                       });
 }
 
 /// While the server drains: a peer that neither sends nor takes anything is not waited for.

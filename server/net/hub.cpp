@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/log.h"
 #include "server/net/convert.h"
 
 namespace radiosity::net {
@@ -187,7 +188,7 @@ std::optional<std::vector<SharedText>> Hub::missedSince(const protocol::Resume& 
   return missed;
 }
 
-void Hub::askOnce(const std::string& request_id, const std::string& request, EditAnswer done,
+void Hub::askOnce(const std::string& request_id, const std::string& request, const std::string& by, EditAnswer done,
                   const std::function<void(engine::Engine::Callback<engine::PatchOutcome>)>& ask) {
   if (!request_id.empty()) {
     const auto fingerprint = std::hash<std::string>()(request);
@@ -203,12 +204,17 @@ void Hub::askOnce(const std::string& request_id, const std::string& request, Edi
     if (!inserted) return;
     done = [this, request_id](const auto& answer) { remember(request_id, answer); };
   }
-  ask(fromEngine<engine::PatchOutcome>([this, done](const Result<engine::PatchOutcome>& outcome) {
+  ask(fromEngine<engine::PatchOutcome>([this, done, request_id, by](const Result<engine::PatchOutcome>& outcome) {
     if (outcome) {
       sawRevision(outcome->revision);
+      const LogScope about({.revision = outcome->revision, .request_id = request_id});
+      log::info("edit by {}: {} surfaces, {} shots to do again", by, outcome->affected_surfaces,
+                outcome->affected_shots);
       return done(protocol::SceneStepReply{outcome->revision, outcome->affected_surfaces, outcome->affected_shots,
                                            outcome->stepped});
     }
+    const LogScope about({.revision = revision(), .request_id = request_id});
+    log::info("edit by {} refused: {}", by, outcome.error().text());
     auto error = protocol::toRpcError(outcome.error());
     error.revision = revision();
     done(tl::unexpected(std::move(error)));
@@ -225,13 +231,13 @@ SharedBytes Hub::upload(const std::string& uri) const {
 void Hub::patch(const protocol::ScenePatchCall& call, const std::string& by, EditAnswer done) {
   engine::PatchRequest request{call.patch, call.base_revision, call.dry_run, by, {}};
   request.find_upload = [self = shared_from_this()](const std::string& uri) { return self->upload(uri); };
-  askOnce(call.request_id, fmt::format("{}|{}|{}", call.base_revision.value_or(0), call.dry_run, call.patch),
+  askOnce(call.request_id, fmt::format("{}|{}|{}", call.base_revision.value_or(0), call.dry_run, call.patch), by,
           std::move(done), [&](auto heard) { engine_.patch(std::move(request), std::move(heard)); });
 }
 
 void Hub::step(bool redo, std::optional<std::uint64_t> base_revision, const std::string& request_id,
                const std::string& by, EditAnswer done) {
-  askOnce(request_id, fmt::format("{}|{}", base_revision.value_or(0), redo ? "redo" : "undo"), std::move(done),
+  askOnce(request_id, fmt::format("{}|{}", base_revision.value_or(0), redo ? "redo" : "undo"), by, std::move(done),
           [&](auto heard) {
             engine_.step({redo, base_revision, by}, std::move(heard));
           });
@@ -369,6 +375,11 @@ void Hub::onSceneLoaded(std::uint64_t revision) {
     history_from_ = revision;
   }
   enter([&] { broadcast(protocol::SceneLoaded{revision}); });
+}
+
+void Hub::onNotice(const engine::Notice& notice) {
+  const bool replaced = notice.kind == engine::Notice::Kind::kRendererReplaced;
+  enter([&] { broadcast(protocol::ServerNote{replaced ? "rendererReplaced" : "solveRestarted", notice.text}); });
 }
 
 void Hub::onLightmaps(const std::shared_ptr<const engine::Lightmaps>& lightmaps) {
