@@ -67,18 +67,19 @@ class Stage:
         self.environment = {"PATH": "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin", "LANG": "C.UTF-8"}
         self.user, self.workdir, self.command = "0:0", "/", None
 
-    def create(self, suite):
-        self.folder.mkdir(parents=True)
-        subprocess.run(["debootstrap", "--variant=minbase", "--include=ca-certificates", suite, str(self.folder)],
-                       check=True, stdout=subprocess.DEVNULL)
+    def create(self, base, suite):
+        """`base`: a bare system, made where it is not there yet."""
+        if not base.exists():
+            subprocess.run(["debootstrap", "--variant=minbase", "--include=ca-certificates", suite, str(base)], check=True,
+                           stdout=subprocess.DEVNULL)
+        self.folder.parent.mkdir(parents=True, exist_ok=True)
+        subprocess.run(["cp", "-a", str(base), str(self.folder)], check=True)
         files = [(Path(name), self.folder / name[1:]) for name in NETWORK_FILES]
         files.append((Path.home() / ".npmrc", self.folder / "root" / ".npmrc"))
         for source, target in files:
-            if source.is_dir():
-                shutil.copytree(source, target, symlinks=True, dirs_exist_ok=True)
-            elif source.exists():
+            if source.exists():
                 target.parent.mkdir(parents=True, exist_ok=True)
-                shutil.copy(source, target)
+                subprocess.run(["cp", "-aT", str(source), str(target)], check=True)
 
     def run(self, command, network=True):
         """Runs a list of words in the stage; its devices and processes are there only meanwhile."""
@@ -123,7 +124,7 @@ def copy(stage, stages, words):
             shutil.copy(origin, goal)
 
 
-def build(steps, root):
+def build(steps, root, base):
     stages = []
     for step in steps:
         print(f"without_docker: {step}"[:200], file=sys.stderr, flush=True)
@@ -131,7 +132,7 @@ def build(steps, root):
         words = step.words() if step.name in ("FROM", "COPY", "CMD") else []
         if step.name == "FROM":
             stages.append(Stage(root / str(len(stages)), words[2] if words[1:2] == ["AS"] else str(len(stages))))
-            stages[-1].create(IMAGES[words[0]])
+            stages[-1].create(base or root / "base", IMAGES[words[0]])
         elif step.name == "ENV":
             key, _, value = step.text.partition("=")
             stage.environment[key] = value
@@ -155,6 +156,7 @@ def build(steps, root):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--root", type=Path, help="folder for the stages; must not exist yet")
+    parser.add_argument("--base", type=Path, help="folder with a bare Debian 12 to begin with, made if need be; default: in --root")
     parser.add_argument("--list", action="store_true")
     parser.add_argument("command", nargs="*")
     options = parser.parse_args()
@@ -164,7 +166,8 @@ def main():
         return 0
     if options.root is None or options.root.exists():
         parser.error("--root must name a folder that does not exist yet")
-    stages = build(steps, options.root.resolve())
+    options.root.mkdir(parents=True)
+    stages = build(steps, options.root.resolve(), options.base and options.base.resolve())
     return stages[-1].run(options.command, network=False) if options.command else 0
 
 

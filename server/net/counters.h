@@ -16,6 +16,7 @@ struct Counters {
   std::atomic<std::int64_t> certificate_expires_at_s{0};  ///< since 1970-01-01 UTC; 0: no TLS
   std::array<Count, 6> http_responses{};                  ///< by first digit of the status
   Count upload_bytes{0};
+  Count uploads_held_bytes{0};  ///< of bodies that are coming, or being worked on
   Count calls{0}, calls_failed{0};
   Count text_messages_sent{0}, text_bytes_sent{0};
   Count tiles_sent{0}, tile_bytes_sent{0};

@@ -9,6 +9,7 @@
 #include <cerrno>
 #include <chrono>
 #include <functional>
+#include <new>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -53,6 +54,7 @@ class Server::State {
 
   void waitForLast();
   void beat();
+  void serveEvents();
 
   std::shared_ptr<Hub> hub_;
   asio::io_context context_;
@@ -180,6 +182,18 @@ void Server::State::waitForLast() {
   });
 }
 
+/// Until the end. Memory that runs out in the middle of an upload or an answer takes that connection with it, which
+/// goes with its handler, and no other.
+void Server::State::serveEvents() {
+  while (!context_.stopped()) {
+    try {
+      context_.run();
+    } catch (const std::bad_alloc&) {
+      log::error("out of memory: a connection was dropped");
+    }
+  }
+}
+
 void Server::State::run() {
   hub_->start();
   asio::post(strand_, [this] {
@@ -189,10 +203,10 @@ void Server::State::run() {
   });
   std::vector<std::thread> helpers;
   for (int i = 1; i < hub_->options().threads; ++i) {
-    helpers.emplace_back([this] { context_.run(); });
+    helpers.emplace_back([this] { serveEvents(); });
     (void)pthread_setname_np(helpers.back().native_handle(), "net");  // for top -H, and what the benchmarks count
   }
-  context_.run();
+  serveEvents();
   for (auto& helper : helpers) helper.join();
 }
 
