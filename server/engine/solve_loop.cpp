@@ -174,7 +174,9 @@ void SolveLoop::updateStatus(bool announce) {
 
 Status SolveLoop::status() const {
   const std::scoped_lock lock(mutex_);
-  return status_;
+  auto status = status_;
+  if (loads_ > 0 && status.state == SolveState::kEmpty) status.state = SolveState::kLoading;
+  return status;
 }
 
 void SolveLoop::addListener(std::weak_ptr<Listener> listener) { listeners_.add(std::move(listener)); }

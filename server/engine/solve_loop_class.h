@@ -68,6 +68,9 @@ class SolveLoop final : public Engine {
   template <typename T, typename Work>
   void askLit(Callback<T> done, Work work);
 
+  /// A load counts as under way from here until it is answered: reading a large file takes its time. Any thread.
+  [[nodiscard]] Callback<LoadOutcome> countLoad(Callback<LoadOutcome> done);
+
   // All below: solve thread only.
   void threadMain(std::promise<Result<void>> started);
   [[nodiscard]] bool runCommands();
@@ -137,6 +140,7 @@ class SolveLoop final : public Engine {
 
   std::atomic<Clock::rep> last_beat_{0};  // since the clock's epoch; any thread may read both
   std::atomic<bool> waiting_{true};
+  std::atomic<int> loads_{0};
 
   mutable std::mutex mutex_;  // for the two that any thread may read, and transport_ coming and going
   Status status_;

@@ -7,14 +7,23 @@
 
 namespace radiosity::engine {
 
+Engine::Callback<LoadOutcome> SolveLoop::countLoad(Callback<LoadOutcome> done) {
+  ++loads_;
+  return [this, done = std::move(done)](Result<LoadOutcome> outcome) {
+    --loads_;
+    done(std::move(outcome));
+  };
+}
+
 void SolveLoop::loadBytes(std::string name, SharedBytes bytes, Callback<LoadOutcome> done) {
-  ask<LoadOutcome>(std::move(done), [this, name = std::move(name), bytes = std::move(bytes)] {
+  ask<LoadOutcome>(countLoad(std::move(done)), [this, name = std::move(name), bytes = std::move(bytes)] {
     return install(scene::parseDocument(name, *bytes));
   });
 }
 
 void SolveLoop::loadFile(std::string path, Callback<LoadOutcome> done) {
-  ask<LoadOutcome>(std::move(done), [this, path = std::move(path)] { return install(scene::loadDocument(path)); });
+  ask<LoadOutcome>(countLoad(std::move(done)),
+                   [this, path = std::move(path)] { return install(scene::loadDocument(path)); });
 }
 
 Result<LoadOutcome> SolveLoop::install(Result<scene::Document> document) {

@@ -113,6 +113,17 @@ class Observe(ServiceCase):
         self.assertEqual(self.get(server, "/healthz"), (200, "ok\n"))
         self.assertEqual(self.get(server, "/readyz"), (200, "ready\n"))
 
+    def test_a_server_that_was_given_a_scene_is_not_ready_before_it_is_there(self):
+        server = self.server(self.scene, "--error", "0.1", "--texels", "500")
+        revision = 0
+        while revision == 0:
+            # In this order: what is ready now has been loaded now.
+            status, said = self.get(server, "/readyz")
+            metrics = metrics_text.parse(self.get(server, "/metrics")[1])
+            revision = metrics["radiosityd_scene_revision"].samples[()]
+            if revision == 0:
+                self.assertEqual((status, said), (503, "loading\n"))
+
     # ---- logs ----
 
     def test_json_logs_are_one_object_a_line_with_revision_and_request(self):
