@@ -47,7 +47,7 @@ std::optional<std::chrono::microseconds> watchdogTime() {
 }  // namespace
 
 bool isAlive(const Vitals& vitals) {
-  return vitals.event_loop_silent_s() < kEventLoopPatience_s && vitals.solver_busy_s() < kSolverPatience_s;
+  return vitals.event_loop_silent_s() < kEventLoopPatienceS && vitals.solver_busy_s() < kSolverPatienceS;
 }
 
 Result<void> notifyService(const std::string& socket, const std::string& state) {
@@ -105,7 +105,7 @@ void ServiceNotifier::run() {
     if (watched_ && alive) tell("WATCHDOG=1");
     if (was_alive && !alive)
       log::error("the {} hangs; the watchdog is not told any more that all is well",
-                 vitals_.solver_busy_s() < kSolverPatience_s ? "event loop" : "solve thread");
+                 vitals_.solver_busy_s() < kSolverPatienceS ? "event loop" : "solve thread");
     was_alive = alive;
     auto status = "STATUS=" + vitals_.status();
     std::replace(status.begin(), status.end(), '\n', ' ');

@@ -24,9 +24,9 @@ struct Vitals {
 };
 
 /// The longest that one command may keep the solve thread: loading a scene of many millions of triangles.
-inline constexpr double kSolverPatience_s = 600.0;
+inline constexpr double kSolverPatienceS = 600.0;
 /// An event loop that is silent for so long hangs.
-inline constexpr double kEventLoopPatience_s = 10.0;
+inline constexpr double kEventLoopPatienceS = 10.0;
 
 /// Whether the service does its work; a watchdog that hears nothing restarts it.
 [[nodiscard]] bool isAlive(const Vitals& vitals);

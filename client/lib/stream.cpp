@@ -21,7 +21,7 @@ Stream::~Stream() = default;
 
 void* Stream::nativeTls() const { return tls_ ? tls_->stream.native_handle() : nullptr; }
 
-void Stream::async_secure(asio::ssl::context& context, const std::string& host, bool verify, Handler handler) {
+void Stream::secure(asio::ssl::context& context, const std::string& host, bool verify, Handler handler) {
   tls_ = std::make_unique<Tls>(tcp_, context);
   auto& tls = tls_->stream;
   auto* native = tls.native_handle();

@@ -30,15 +30,15 @@ class Stream {
   Stream(const Stream&) = delete;
   Stream& operator=(const Stream&) = delete;
 
-  Tcp& next_layer() { return tcp_; }
-  executor_type get_executor() { return tcp_.get_executor(); }
-
   /// The client's side of the TLS handshake; all that follows is enciphered. `host` is what the certificate must be
   /// made out to where `verify` is set.
-  void async_secure(boost::asio::ssl::context& context, const std::string& host, bool verify, Handler handler);
+  void secure(boost::asio::ssl::context& context, const std::string& host, bool verify, Handler handler);
   /// OpenSSL's SSL of a stream that was secured; for its verdict on the certificate.
   [[nodiscard]] void* nativeTls() const;
 
+  // NOLINTBEGIN(readability-identifier-naming): names that Beast asks for
+  Tcp& next_layer() { return tcp_; }
+  executor_type get_executor() { return tcp_.get_executor(); }
   template <typename Buffers, typename H>
   void async_read_some(const Buffers& buffers, H&& handler) {
     readSome(few<boost::asio::mutable_buffer>(buffers), shared(std::forward<H>(handler)));
@@ -53,6 +53,7 @@ class Stream {
     auto held = std::make_shared<std::decay_t<H>>(std::forward<H>(handler));
     stream.tearDown(role, [held](Error error, std::size_t) { (*held)(error); });
   }
+  // NOLINTEND(readability-identifier-naming)
 
  private:
   struct Tls;

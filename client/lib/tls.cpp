@@ -54,8 +54,7 @@ Result<void> openStream(Pump& pump, Stream& stream, const ServerUrl& url, const 
   if (auto trusted = trust.verify ? trustAuthorities(context, trust) : Result<void>(); !trusted) return trusted;
   if (auto connected = connectTo(pump, stream.next_layer(), url, timeout); !connected) return connected;
   const auto error = pump.await(stream, timeout, [&](auto handler) {
-    stream.async_secure(context, url.host, trust.verify,
-                        [handler](const BoostError& e, std::size_t) mutable { handler(e); });
+    stream.secure(context, url.host, trust.verify, [handler](const BoostError& e, std::size_t) mutable { handler(e); });
   });
   if (error) return tl::unexpected(handshakeError(error, static_cast<SSL*>(stream.nativeTls()), url));
   return {};

@@ -308,7 +308,7 @@ void HttpSession::onWritten() {
   response_ = {};
   if (keep) return readHeader();
   stream_.expires_after(hub_->options().close_patience);
-  stream_.async_end(AnyHandler([self = shared_from_this()](BoostError) {
+  stream_.endSending(AnyHandler([self = shared_from_this()](BoostError) {
     BoostError ignored;
     self->stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
     self->linger();

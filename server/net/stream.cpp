@@ -17,7 +17,7 @@ Stream::Stream(Stream&&) noexcept = default;
 Stream& Stream::operator=(Stream&&) noexcept = default;
 Stream::~Stream() = default;
 
-void Stream::async_secure(asio::ssl::context& context, asio::const_buffer read, AnyHandler handler) {
+void Stream::secure(asio::ssl::context& context, asio::const_buffer read, AnyHandler handler) {
   tls_ = std::make_unique<Tls>(*tcp_, context);
   tls_->stream.async_handshake(asio::ssl::stream_base::server, read, std::move(handler));
 }
@@ -32,7 +32,7 @@ void Stream::writeSome(const Few<asio::const_buffer>& buffers, AnyHandler handle
   tcp_->async_write_some(buffers, std::move(handler));
 }
 
-void Stream::async_end(AnyHandler handler) {
+void Stream::endSending(AnyHandler handler) {
   if (tls_) return tls_->stream.async_shutdown(std::move(handler));
   BoostError error;
   socket().shutdown(tcp::socket::shutdown_send, error);

@@ -69,17 +69,21 @@ class Stream {
   Stream(const Stream&) = delete;
   Stream& operator=(const Stream&) = delete;
 
-  TcpStream& next_layer() { return *tcp_; }
-  executor_type get_executor() { return tcp_->get_executor(); }
   TcpStream::socket_type& socket() { return tcp_->socket(); }
-  void expires_after(std::chrono::nanoseconds time) { tcp_->expires_after(time); }
-  void expires_never() { tcp_->expires_never(); }
   void close() { tcp_->close(); }
 
   /// The server's side of the TLS handshake; all that follows is enciphered. `read`: bytes that were read already; they
   /// must live until the handler (error, bytes of them used) is called, as must the context.
-  void async_secure(asio::ssl::context& context, asio::const_buffer read, AnyHandler handler);
+  void secure(asio::ssl::context& context, asio::const_buffer read, AnyHandler handler);
 
+  /// Says that nothing more will be sent: close_notify and the peer's, where there is TLS.
+  void endSending(AnyHandler handler);
+
+  // NOLINTBEGIN(readability-identifier-naming): names that Beast asks for, or uses itself
+  TcpStream& next_layer() { return *tcp_; }
+  executor_type get_executor() { return tcp_->get_executor(); }
+  void expires_after(std::chrono::nanoseconds time) { tcp_->expires_after(time); }
+  void expires_never() { tcp_->expires_never(); }
   template <typename Buffers, typename Handler>
   void async_read_some(const Buffers& buffers, Handler&& handler) {
     readSome(few<asio::mutable_buffer>(buffers), AnyHandler(std::forward<Handler>(handler)));
@@ -88,14 +92,12 @@ class Stream {
   void async_write_some(const Buffers& buffers, Handler&& handler) {
     writeSome(few<asio::const_buffer>(buffers), AnyHandler(std::forward<Handler>(handler)));
   }
-  /// Says that nothing more will be sent: close_notify and the peer's, where there is TLS.
-  void async_end(AnyHandler handler);
-
   /// How Beast's WebSocket ends a connection.
   template <typename Handler>
   friend void async_teardown(beast::role_type role, Stream& stream, Handler&& handler) {
     stream.tearDown(role, AnyHandler(std::forward<Handler>(handler)));
   }
+  // NOLINTEND(readability-identifier-naming)
 
  private:
   struct Tls;

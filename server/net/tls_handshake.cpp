@@ -55,7 +55,7 @@ class TlsHandshake : public Connection, public std::enable_shared_from_this<TlsH
   void onDetected(BoostError error, bool speaks_tls) {
     if (error) return failed();
     if (!speaks_tls) return refusePlain();
-    stream_.async_secure(
+    stream_.secure(
         tls_->context, buffer_.cdata(),
         AnyHandler([self = shared_from_this()](BoostError e, std::size_t used) { self->onHandshake(e, used); }));
   }
