@@ -11,16 +11,11 @@ import unittest
 
 import openjd_schema
 import yaml
+from client_options import keeps_state, options_of
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 DOCKER = ROOT / "docker"
 UID = "10001"
-
-
-def options_of(program, *command):
-    """Every option that --help tells of."""
-    done = subprocess.run([os.environ[program], *command, "--help"], capture_output=True, text=True, check=True)
-    return set(re.findall(r"(?<![\w-])--?[a-z][a-z-]*", done.stdout))
 
 
 def load(path):
@@ -124,6 +119,7 @@ class OpenJobDescription(unittest.TestCase):
             with self.assertRaises(openjd_schema.Invalid):
                 openjd_schema.check(spoil(change))
 
+    @keeps_state
     def test_its_options_are_those_of_the_client(self):
         arguments = self.template["steps"][0]["script"]["actions"]["onRun"]["args"]
         self.assertEqual(arguments[0], "solve")
@@ -182,6 +178,11 @@ class KubernetesJob(unittest.TestCase):
         code, arguments = self.run_script(75, terminate=True)
         self.assertEqual(code, 75)
         self.assertIn("/data/scene-4.glb", arguments)
+        self.assertIn("--state /data/state/scene-4", arguments)
+
+    @keeps_state
+    def test_its_options_are_those_of_the_client(self):
+        _, arguments = self.run_script(0)
         self.assertLessEqual({a for a in arguments.split() if a.startswith("-")}, options_of("RADIOSITY", "solve"))
 
 

@@ -9,6 +9,7 @@ import unittest
 
 import plates
 import slurm_cluster
+from client_options import keeps_state
 
 SCRIPT = pathlib.Path(__file__).resolve().parents[2] / "docker/farm/slurm_array.sh"
 #: Stands for the client where only the script is tested: waits for SIGTERM and saves, then, tried again, comes to its end.
@@ -46,6 +47,7 @@ class SlurmArray(unittest.TestCase):
         plates.write_glb(path, plates.document())
         return path
 
+    @keeps_state
     def test_each_task_lights_its_scene(self):
         job = self.submit([self.scene("first"), self.scene("second")], "--error", "0.1", "--texels", "500")
         for task, name in ((1, "first"), (2, "second")):
@@ -55,6 +57,7 @@ class SlurmArray(unittest.TestCase):
             report = json.loads((self.out / f"{name}.json").read_text())
             self.assertLessEqual(report["error"]["total"], 0.1)
 
+    @keeps_state
     def test_a_scene_that_is_none_fails_its_task_alone(self):
         bad = self.folder / "bad.glb"
         bad.write_text("no scene")
@@ -81,6 +84,7 @@ class SlurmArray(unittest.TestCase):
         self.assertIn(f"--state {self.out}/state/a", first)
         self.assertIn("--error 0.05", first)
 
+    @keeps_state
     def test_a_real_solve_that_is_interrupted_goes_on(self):
         room = os.environ.get("RADIOSITY_ROOM", "")
         if not pathlib.Path(room).exists():
