@@ -58,7 +58,8 @@ class Dockerfile(unittest.TestCase):
         installed = set(re.findall(r"[a-z0-9][a-z0-9+.-]+", self.of("RUN", self.build)[0].text))
         self.assertEqual(wanted - tests_only - installed, set())
         running = set(re.findall(r"[a-z0-9][a-z0-9+.-]+", self.of("RUN", self.image)[0].text))
-        self.assertLessEqual({"libegl1", "libegl-mesa0", "libgl1-mesa-dri"}, running)
+        # Loaded by name as the programs run, so that no linker tells of them.
+        self.assertLessEqual({"libegl1", "libegl-mesa0", "libgl1", "libgl1-mesa-dri"}, running)
 
     def test_the_image_holds_every_library_that_the_programs_need(self):
         if shutil.which("dpkg-query") is None:
