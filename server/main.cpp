@@ -12,6 +12,7 @@
 #include "server/gpu/gpu_transport.h"
 #include "server/net/server.h"
 #include "server/options.h"
+#include "server/service_notify.h"
 #include "server/state/store.h"
 #include "server/state/uploads.h"
 
@@ -21,6 +22,9 @@
 
 namespace radiosity {
 namespace {
+
+/// How a worker, which is started by the server, learns the form of its log.
+constexpr const char* kLogFormatVariable = "RADIOSITY_LOG_FORMAT";
 
 int report(const Error& error) {
   std::fprintf(stderr, "radiosityd: %s\n", error.text().c_str());
@@ -41,6 +45,11 @@ void leaveWithin(std::chrono::milliseconds patience) {
     log::info("leaving in the middle of a load");
     std::_Exit(0);
   }).detach();
+}
+
+Vitals vitalsOf(const engine::Engine& engine, const net::Server& server) {
+  return {[&server] { return server.silentSeconds(); }, [&engine] { return engine.busySeconds(); },
+          [&server] { return server.statusLine(); }};
 }
 
 /// How long the end waits for the last checkpoint; then the one before it stays.
@@ -70,6 +79,8 @@ int serve(Options options) {
   if (!options.scene.empty()) loadFirstScene(**engine, options.scene);
   std::printf("listening on %s\n", (*server)->url().c_str());
   std::fflush(stdout);
+  ServiceNotifier notifier(vitalsOf(**engine, **server));
+  (*server)->onDrain([&notifier] { notifier.stopping(); });
   (*server)->run();
   for (const int number : {SIGINT, SIGTERM}) (void)std::signal(number, SIG_DFL);  // from here on it ends at once
   if (!(*server)->inHurry()) (*engine)->keepSolve(kCheckpointPatience);
@@ -79,10 +90,16 @@ int serve(Options options) {
 }
 
 int run(int argc, char** argv) {
-  if (argc > 1 && std::string_view(argv[1]) == "--worker") return gpu::workerMain(argc - 2, argv + 2);
+  if (argc > 1 && std::string_view(argv[1]) == "--worker") {
+    const char* format = std::getenv(kLogFormatVariable);
+    const bool json = format != nullptr && std::string_view(format) == "json";
+    startLog("radiosityd worker", "info", json ? LogFormat::kJson : LogFormat::kText);
+    return gpu::workerMain(argc - 2, argv + 2);
+  }
   const auto parsed = parseOptions(argc, argv, RADIOSITY_VERSION);
   if (parsed.exit_code) return *parsed.exit_code;
-  startLog("radiosityd", parsed.options.log_level);
+  startLog("radiosityd", parsed.options.log_level, parsed.options.log_format);
+  if (parsed.options.log_format == LogFormat::kJson) setenv(kLogFormatVariable, "json", 1);
   return serve(parsed.options);
 }
 

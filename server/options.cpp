@@ -12,7 +12,7 @@ namespace radiosity {
 namespace {
 
 struct Raw {
-  std::string listen = "127.0.0.1:8765", token_file, sky;
+  std::string listen = "127.0.0.1:8765", token_file, sky, log_format = "text";
   double time_limit_s = 0.0;
 };
 
@@ -111,6 +111,13 @@ void addServerOptions(CLI::App& app, Options& o, Raw& raw) {
   app.add_option("--token-file", raw.token_file, "File whose first line every client must present as bearer token");
   addStateOptions(app, o);
   app.add_flag("--insecure", o.server.insecure, "Listen beyond this machine without a token");
+  auto* certificate =
+      app.add_option("--tls-cert", o.server.tls_certificate,
+                     "PEM file with the certificate (and those above it): speak TLS 1.2 and 1.3 only, https:// and "
+                     "wss://. SIGHUP reads it again");
+  auto* key = app.add_option("--tls-key", o.server.tls_key, "PEM file with the certificate's private key, unencrypted");
+  certificate->needs(key)->type_name("FILE");
+  key->needs(certificate)->type_name("FILE");
   app.add_option("--allow-origin", o.server.allow_origins,
                  "Let web pages of this origin in, beside the server's own (https://viewer.example.org); repeatable");
   app.add_option("--scene-root", o.server.scene_root, "Folder from which clients may load scenes as file:NAME")
@@ -124,6 +131,10 @@ void addServerOptions(CLI::App& app, Options& o, Raw& raw) {
   app.add_option("--log-level", o.log_level, "debug, info, warn, error or off; the log goes to stderr")
       ->check(CLI::IsMember({"debug", "info", "warn", "error", "off"}))
       ->capture_default_str();
+  app.add_option("--log-format", raw.log_format,
+                 "text, or json: one object a line, with time, level, message, revision and requestId")
+      ->check(CLI::IsMember({"text", "json"}))
+      ->capture_default_str();
 }
 
 Result<void> finish(Options& o, const Raw& raw) {
@@ -134,6 +145,7 @@ Result<void> finish(Options& o, const Raw& raw) {
     const auto color = [](const std::array<double, 3>& c) { return glm::vec3(c[0], c[1], c[2]); };
     o.solve.sky = {color(sky->upper), color(sky->lower)};
   }
+  o.log_format = raw.log_format == "json" ? LogFormat::kJson : LogFormat::kText;
   if (auto listen = readListen(raw.listen, o.server); !listen) return listen;
   if (raw.token_file.empty()) return {};
   auto token = readToken(raw.token_file);

@@ -6,6 +6,7 @@
 #include <set>
 #include <string>
 
+#include "common/log.h"
 #include "common/result.h"
 #include "server/engine/engine.h"
 #include "server/net/server_options.h"
@@ -21,6 +22,7 @@ struct Options {
   engine::SolveSettings solve;
   int workers = 0;  ///< 0: one for each core with a software renderer, one on a GPU
   std::string log_level = "info";
+  LogFormat log_format = LogFormat::kText;
 };
 
 /// `argc`, `argv` as main got them. With an exit code instead of options, everything was said already: 0 after --help

@@ -344,7 +344,7 @@ void addSolve(CLI::App& app, Run& run) {
       ->excludes(workers)
       ->excludes(memory)
       ->excludes(state);
-  addTokenOption(command, options->server);
+  addAccessOptions(command, options->server);
   command.add_flag("-q,--quiet", options->quiet, "no progress on stderr");
   command.callback([options, &run] { run = [options] { return Solve(*options).run(); }; });
 }

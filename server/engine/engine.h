@@ -87,6 +87,9 @@ struct Status {
   std::string gl_renderer;
   std::vector<std::string> warnings;
   std::string failure;  ///< why, when kFailed or kLimited
+  /// Nothing can be drawn at present (a driver is gone, all renderers died); the solve starts over when it can.
+  bool renderer_lost = false;
+  std::uint64_t renderers_replaced = 0, solve_restarts = 0;  ///< since the start of the program
   SolveSettings settings;
 };
 
@@ -203,6 +206,13 @@ struct SnapshotRequest {
   std::string quantity = "lit";  ///< lit, irradiance, radiosity, error, patchId, mipLevel, normal, unshot
 };
 
+/// Something mended itself that those who watch may wonder about.
+struct Notice {
+  enum class Kind { kRendererReplaced, kSolveRestarted };
+  Kind kind = Kind::kRendererReplaced;
+  std::string text;
+};
+
 class Listener {
  public:
   virtual ~Listener() = default;
@@ -210,6 +220,7 @@ class Listener {
   virtual void onScenePatched(std::uint64_t revision, const std::string& patch, const std::string& by) = 0;
   virtual void onSceneLoaded(std::uint64_t revision) = 0;
   virtual void onLightmaps(const std::shared_ptr<const Lightmaps>& lightmaps) = 0;
+  virtual void onNotice(const Notice& /*notice*/) {}
 };
 
 class Engine {
@@ -236,6 +247,9 @@ class Engine {
   virtual void restart(Callback<SolveState> done) = 0;
 
   [[nodiscard]] virtual Status status() const = 0;
+  /// How long the solve thread has been at its present slice or command; 0 while it waits for one. Slices take less
+  /// than a second, loads of large scenes minutes.
+  [[nodiscard]] virtual double busySeconds() const = 0;
 
   /// Until the last of what this returns is let go, the quantity is published: now, and whenever it has changed. What
   /// nobody watches costs nothing.

@@ -85,21 +85,28 @@ void SolveLoop::threadMain(std::promise<Result<void>> started) {
 
 /// Sleeps while there is nothing to solve, then does all commands that are due. False: the engine is being destroyed.
 bool SolveLoop::runCommands() {
-  const auto due = queue_.take(state_ != SolveState::kSolving);
+  waiting_ = state_ != SolveState::kSolving;
+  const auto due = queue_.take(waiting_);
+  beat();
+  waiting_ = false;
   if (!due) return false;
   for (const auto& command : *due) {
     if (queue_.closed()) return false;
     command();
+    beat();
   }
   return true;
 }
 
 void SolveLoop::solveSlice() {
+  if (renderer_lost_ && !rendererIsBack()) return;
   const auto begin = Clock::now();
   const auto outcome = lit_->solver().step();
   seconds_ += std::chrono::duration<double>(Clock::now() - begin).count();
   if (queue_.closed()) return;  // nobody is left to be told
+  tellLosses();
   if (!outcome) {
+    if (willRecover(outcome.error())) return;
     failure_ = outcome.error().text();
     log::error("solve stopped: {}", failure_);
     endSolve(SolveState::kFailed);
@@ -137,6 +144,8 @@ void SolveLoop::beginSolve() {
 
 void SolveLoop::endSolve(SolveState state) {
   state_ = state;
+  renderer_lost_ = state == SolveState::kFailed && renderer_lost_;
+  recoveries_ = 0;
   if (queue_.closed()) return;
   if (lit_) {
     lit_->solver().assess();
@@ -158,6 +167,9 @@ void SolveLoop::updateStatus(bool announce) {
   status.seconds = seconds_;
   status.settings = settings_;
   status.failure = failure_;
+  status.renderer_lost = renderer_lost_;
+  status.renderers_replaced = losses_told_;
+  status.solve_restarts = solve_restarts_;
   if (lit_) {
     const auto& tiles = publisher_.tileCounters();
     status.counters["tiles.changed"] = static_cast<double>(tiles.changed);
@@ -184,7 +196,9 @@ void SolveLoop::updateStatus(bool announce) {
 
 Status SolveLoop::status() const {
   const std::scoped_lock lock(mutex_);
-  return status_;
+  auto status = status_;
+  if (loads_ > 0 && status.state == SolveState::kEmpty) status.state = SolveState::kLoading;
+  return status;
 }
 
 void SolveLoop::addListener(std::weak_ptr<Listener> listener) { listeners_.add(std::move(listener)); }

@@ -20,6 +20,9 @@ struct EngineOptions {
   SolveSettings settings;
   /// Makes the transport, on the solve thread. kUnavailable (no EGL driver) ends start-up.
   std::function<Result<std::unique_ptr<solver::Transport>>()> make_transport;
+  /// After a transport failed, before the solve starts over on it; doubled for each failure of the same solve, of which
+  /// the fifth ends it. Drivers take seconds to reset a card.
+  std::chrono::milliseconds recovery_wait{500};
 
   /// What outlives this process; null: nothing does. An edit is answered only when it is in there.
   std::shared_ptr<state::Store> store;

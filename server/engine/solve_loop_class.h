@@ -1,10 +1,11 @@
-// The class behind makeEngine (solve_loop.h), private to this folder. Its methods lie in six files: solve_loop.cpp
+// The class behind makeEngine (solve_loop.h), private to this folder. Its methods lie in seven files: solve_loop.cpp
 // runs the thread, solve_loop_edits.cpp changes scene and settings, solve_loop_answers.cpp makes what can be fetched,
 // solve_loop_publish.cpp shows lightmaps to those who watch, solve_loop_state.cpp keeps what outlives the process,
-// solve_loop_restore.cpp brings it back.
+// solve_loop_restore.cpp brings it back, solve_loop_recovery.cpp goes on when renderers are lost.
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <functional>
@@ -51,6 +52,7 @@ class SolveLoop final : public Engine {
   void resume(Callback<SolveState> done) override;
   void restart(Callback<SolveState> done) override;
   [[nodiscard]] Status status() const override;
+  [[nodiscard]] double busySeconds() const override;
   [[nodiscard]] std::shared_ptr<void> watch(Quantity quantity) override;
   [[nodiscard]] std::shared_ptr<const Lightmaps> lightmaps(Quantity quantity) const override;
   void sceneText(Callback<SceneText> done) override;
@@ -72,6 +74,9 @@ class SolveLoop final : public Engine {
   template <typename T, typename Work>
   void askLit(Callback<T> done, Work work);
 
+  /// A load counts as under way from here until it is answered: reading a large file takes its time. Any thread.
+  [[nodiscard]] Callback<LoadOutcome> countLoad(Callback<LoadOutcome> done);
+
   // All below: solve thread only.
   void threadMain(std::promise<Result<void>> started);
   [[nodiscard]] bool runCommands();
@@ -80,6 +85,13 @@ class SolveLoop final : public Engine {
   /// The clock starts over: another scene, another seed, an edit. A paused solve stays paused.
   void beginSolve();
   void endSolve(SolveState state);
+  /// The transport failed. True: it will be tried again after a while, from the solve's beginning.
+  [[nodiscard]] bool willRecover(const Error& error);
+  /// Whether there is a transport that works; tries to get one when it is time to.
+  [[nodiscard]] bool rendererIsBack();
+  void tellLosses();  ///< of renderers that were replaced
+  void beat();        ///< the thread is alive and has finished something
+
   /// What is watched and not published yet; `final`: as a new version in any case.
   void publishLightmaps(bool final);
   [[nodiscard]] QuantityPages pagesToShow(Quantity quantity);
@@ -146,6 +158,14 @@ class SolveLoop final : public Engine {
   bool unpublished_ = false;
   std::uint64_t unwatched_ = 0;  // publications that nobody was there for
   Clock::time_point next_publish_{}, last_progress_{};
+  bool renderer_lost_ = false;
+  unsigned recoveries_ = 0;  // of this solve
+  Clock::time_point retry_at_{};
+  std::uint64_t losses_told_ = 0, solve_restarts_ = 0;
+
+  std::atomic<Clock::rep> last_beat_{0};  // since the clock's epoch; any thread may read both
+  std::atomic<bool> waiting_{true};
+  std::atomic<int> loads_{0};
   std::unique_ptr<state::CheckpointWriter> checkpoints_;  // null: none are kept
   Clock::time_point next_checkpoint_{};
   std::uint64_t checkpoint_revision_ = 0, checkpoint_shots_ = 0;  // of the last that was taken

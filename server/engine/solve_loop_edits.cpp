@@ -7,14 +7,23 @@
 
 namespace radiosity::engine {
 
+Engine::Callback<LoadOutcome> SolveLoop::countLoad(Callback<LoadOutcome> done) {
+  ++loads_;
+  return [this, done = std::move(done)](Result<LoadOutcome> outcome) {
+    --loads_;
+    done(std::move(outcome));
+  };
+}
+
 void SolveLoop::loadBytes(std::string name, SharedBytes bytes, Callback<LoadOutcome> done) {
-  ask<LoadOutcome>(std::move(done), [this, name = std::move(name), bytes = std::move(bytes)] {
+  ask<LoadOutcome>(countLoad(std::move(done)), [this, name = std::move(name), bytes = std::move(bytes)] {
     return install(scene::parseDocument(name, *bytes));
   });
 }
 
 void SolveLoop::loadFile(std::string path, Callback<LoadOutcome> done) {
-  ask<LoadOutcome>(std::move(done), [this, path = std::move(path)] { return install(scene::loadDocument(path)); });
+  ask<LoadOutcome>(countLoad(std::move(done)),
+                   [this, path = std::move(path)] { return install(scene::loadDocument(path)); });
 }
 
 Result<LoadOutcome> SolveLoop::install(Result<scene::Document> document) {
@@ -31,6 +40,7 @@ Result<LoadOutcome> SolveLoop::install(Result<scene::Document> document) {
   }
   ++revision_;
   history_.take(std::move(next));
+  const LogScope about({.revision = revision_});
   for (const auto& warning : lit_->warnings()) log::warn("{}", warning);
   beginSolve();
   listeners_.tell([this](Listener& listener) { listener.onSceneLoaded(revision_); });
@@ -54,6 +64,7 @@ Result<void> SolveLoop::relight(Result<std::unique_ptr<LitScene>> made, bool fad
   }
   if (fade && lit_) (*made)->fadeFrom(*lit_);
   lit_ = std::move(*made);
+  renderer_lost_ = false;  // it took the scene
   publisher_.reset();
   return {};
 }

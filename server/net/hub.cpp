@@ -218,7 +218,7 @@ std::optional<std::vector<SharedText>> Hub::missedSince(const protocol::Resume& 
   return missed;
 }
 
-void Hub::askOnce(const engine::Receipt& receipt, EditAnswer done,
+void Hub::askOnce(const engine::Receipt& receipt, const std::string& by, EditAnswer done,
                   const std::function<void(engine::Engine::Callback<engine::PatchOutcome>)>& ask) {
   const auto& [request_id, fingerprint] = receipt;
   if (!request_id.empty()) {
@@ -234,16 +234,22 @@ void Hub::askOnce(const engine::Receipt& receipt, EditAnswer done,
     if (!inserted) return;
     done = [this, request_id = receipt.request_id](const auto& answer) { remember(request_id, answer); };
   }
-  ask(fromEngine<engine::PatchOutcome>([this, done](const Result<engine::PatchOutcome>& outcome) {
-    if (outcome) {
-      sawRevision(outcome->revision);
-      return done(protocol::SceneStepReply{outcome->revision, outcome->affected_surfaces, outcome->affected_shots,
-                                           outcome->stepped});
-    }
-    auto error = protocol::toRpcError(outcome.error());
-    error.revision = revision();
-    done(tl::unexpected(std::move(error)));
-  }));
+  ask(fromEngine<engine::PatchOutcome>(
+      [this, done, request_id = receipt.request_id, by](const Result<engine::PatchOutcome>& outcome) {
+        if (outcome) {
+          sawRevision(outcome->revision);
+          const LogScope about({.revision = outcome->revision, .request_id = request_id});
+          log::info("edit by {}: {} surfaces, {} shots to do again", by, outcome->affected_surfaces,
+                    outcome->affected_shots);
+          return done(protocol::SceneStepReply{outcome->revision, outcome->affected_surfaces, outcome->affected_shots,
+                                               outcome->stepped});
+        }
+        const LogScope about({.revision = revision(), .request_id = request_id});
+        log::info("edit by {} refused: {}", by, outcome.error().text());
+        auto error = protocol::toRpcError(outcome.error());
+        error.revision = revision();
+        done(tl::unexpected(std::move(error)));
+      }));
 }
 
 void Hub::keepUpload(const std::string& name, const SharedBytes& bytes,
@@ -287,14 +293,14 @@ void Hub::patch(const protocol::ScenePatchCall& call, const std::string& by, Edi
   const engine::Receipt receipt{call.request_id, call.request_id.empty() ? 0 : fingerprintOf(text)};
   engine::PatchRequest request{call.patch, call.base_revision, call.dry_run, by, {}, receipt};
   request.find_upload = [self = shared_from_this()](const std::string& uri) { return self->upload(uri); };
-  askOnce(receipt, std::move(done), [&](auto heard) { engine_.patch(std::move(request), std::move(heard)); });
+  askOnce(receipt, by, std::move(done), [&](auto heard) { engine_.patch(std::move(request), std::move(heard)); });
 }
 
 void Hub::step(bool redo, std::optional<std::uint64_t> base_revision, const std::string& request_id,
                const std::string& by, EditAnswer done) {
   const auto text = fmt::format("{}|{}", base_revision.value_or(0), redo ? "redo" : "undo");
   const engine::Receipt receipt{request_id, request_id.empty() ? 0 : fingerprintOf(text)};
-  askOnce(receipt, std::move(done), [&](auto heard) {
+  askOnce(receipt, by, std::move(done), [&](auto heard) {
     engine_.step({redo, base_revision, by, receipt}, std::move(heard));
   });
 }
@@ -435,6 +441,11 @@ void Hub::onSceneLoaded(std::uint64_t revision) {
     history_from_ = revision;
   }
   enter([&] { broadcast(protocol::SceneLoaded{revision}); });
+}
+
+void Hub::onNotice(const engine::Notice& notice) {
+  const bool replaced = notice.kind == engine::Notice::Kind::kRendererReplaced;
+  enter([&] { broadcast(protocol::ServerNote{replaced ? "rendererReplaced" : "solveRestarted", notice.text}); });
 }
 
 void Hub::onLightmaps(const std::shared_ptr<const engine::Lightmaps>& lightmaps) {

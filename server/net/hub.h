@@ -114,6 +114,7 @@ class Hub : public engine::Listener, public std::enable_shared_from_this<Hub> {
   void onScenePatched(std::uint64_t revision, const std::string& patch, const std::string& by) override;
   void onSceneLoaded(std::uint64_t revision) override;
   void onLightmaps(const std::shared_ptr<const engine::Lightmaps>& lightmaps) override;
+  void onNotice(const engine::Notice& notice) override;
 
  private:
   struct Waiter {
@@ -136,7 +137,7 @@ class Hub : public engine::Listener, public std::enable_shared_from_this<Hub> {
   [[nodiscard]] std::vector<std::shared_ptr<Viewer>> viewers() const;
   void broadcast(const protocol::Notification& notification);
   /// Calls `ask` with what is to hear the engine's outcome, unless the request was made before.
-  void askOnce(const engine::Receipt& receipt, EditAnswer done,
+  void askOnce(const engine::Receipt& receipt, const std::string& by, EditAnswer done,
                const std::function<void(engine::Engine::Callback<engine::PatchOutcome>)>& ask);
   void remember(const std::string& request_id, const EditResult& answer);
   void bringBack(const engine::Past& past);

@@ -25,7 +25,7 @@ OWN_INCLUDES = [
     ("server/engine/", ["common/", "server/engine/", "server/scene/", "server/solver/", "server/gpu/", "server/state/"]),
     ("server/state/", ["common/", "server/state/"]),
     ("server/net/", ["common/", "protocol/", "server/net/", r"server/engine/engine\.h", r"server/state/uploads\.h"]),
-    (r"server/(main|options)[^/]*$", ["common/", "protocol/", "server/"]),
+    (r"server/(main|options|service_notify)[^/]*$", ["common/", "protocol/", "server/"]),
     ("client/lib/", ["common/", "protocol/", "client/lib/"]),
     ("client/cli/", ["common/", "protocol/", "client/lib/", "client/cli/"]),
 ]

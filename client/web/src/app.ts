@@ -227,6 +227,7 @@ export class App {
       bookmark: (note) => this.onBookmark(note.revision, note.tileVersion),
       viewers: (note) => this.frame.setViewers(note.count),
       draining: () => this.frame.toasts.show('The server is stopping'),
+      notice: (note) => this.frame.toasts.show(note.text),
     };
     handlers[method]?.(params);
   }

@@ -118,6 +118,7 @@ export interface Notifications {
   bookmark: Bookmark;
   viewers: { count: number };
   draining: { graceMs: number };
+  notice: { kind: string; text: string };
 }
 
 export const SUBPROTOCOL = 'radiosity.v1';
