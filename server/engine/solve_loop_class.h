@@ -84,8 +84,9 @@ class SolveLoop final : public Engine {
 
   [[nodiscard]] Result<LoadOutcome> install(Result<scene::Document> document);
   /// Puts a lit scene in place of the present one, which goes on if `made` is an error or cannot be uploaded.
-  /// `fade`: shows the present one's light until the new one's is as good.
-  [[nodiscard]] Result<void> relight(Result<std::unique_ptr<LitScene>> made, bool fade);
+  /// Of an edit, the present one's light is shown until the new one's is as good.
+  enum class Relation { kOther, kEdited };
+  [[nodiscard]] Result<LitScene::Affected> relight(Result<std::unique_ptr<LitScene>> made, Relation relation);
   [[nodiscard]] Result<void> checkBase(const std::optional<std::uint64_t>& base_revision) const;
   [[nodiscard]] Result<PatchOutcome> applyRequest(const PatchRequest& request);
   [[nodiscard]] Result<PatchOutcome> applyStep(const StepRequest& request);

@@ -22,7 +22,7 @@ Result<LoadOutcome> SolveLoop::install(Result<scene::Document> document) {
   const SolveState before = std::exchange(state_, SolveState::kLoading);
   updateStatus(true);
   const auto name = document->name;
-  if (const auto lit = relight(LitScene::make(std::move(*document), settings_, *transport_), false); !lit) {
+  if (const auto lit = relight(LitScene::make(std::move(*document), settings_, *transport_), Relation::kOther); !lit) {
     if (state_ == SolveState::kLoading) state_ = before;
     updateStatus(true);
     return tl::unexpected<Error>(lit.error());
@@ -35,7 +35,7 @@ Result<LoadOutcome> SolveLoop::install(Result<scene::Document> document) {
   return LoadOutcome{revision_, lit_->warnings()};
 }
 
-Result<void> SolveLoop::relight(Result<std::unique_ptr<LitScene>> made, bool fade) {
+Result<LitScene::Affected> SolveLoop::relight(Result<std::unique_ptr<LitScene>> made, Relation relation) {
   if (!made) return tl::unexpected<Error>(made.error());
   if (auto uploaded = (*made)->upload(); !uploaded) {
     if (lit_) {
@@ -44,12 +44,15 @@ Result<void> SolveLoop::relight(Result<std::unique_ptr<LitScene>> made, bool fad
         endSolve(SolveState::kFailed);
       }
     }
-    return uploaded;
+    return tl::unexpected<Error>(uploaded.error());
   }
-  if (fade && lit_) (*made)->fadeFrom(*lit_);
+  auto* former = relation == Relation::kEdited ? lit_.get() : nullptr;
+  if (former != nullptr) (*made)->fadeFrom(*former);
+  // What a solve that failed has measured may be a part of what it thinks it has.
+  const auto affected = (*made)->startSolve(state_ == SolveState::kFailed ? nullptr : former);
   lit_ = std::move(*made);
   publisher_.reset();
-  return {};
+  return affected;
 }
 
 void SolveLoop::patch(PatchRequest request, Callback<PatchOutcome> done) {
@@ -123,12 +126,11 @@ Result<PatchOutcome> SolveLoop::adopt(scene::EditedDocument edited) {
 
 Result<PatchOutcome> SolveLoop::rebuild(scene::EditedDocument edited) {
   PatchOutcome outcome;
-  outcome.affected_shots = lit_->solver().shots();
-  outcome.affected_surfaces = lit_->patches().surfaces.size();
-  if (const auto lit = relight(LitScene::make(std::move(edited), settings_, *transport_), true); !lit)
-    return tl::unexpected<Error>(lit.error());
-  outcome.affected_surfaces = std::max<std::uint64_t>(outcome.affected_surfaces, lit_->patches().surfaces.size());
-  outcome.affected_surfaces = std::max<std::uint64_t>(outcome.affected_surfaces, 1);  // pages are new even if empty
+  const auto affected =
+      relight(LitScene::make(std::move(edited), settings_, *transport_, lit_.get()), Relation::kEdited);
+  if (!affected) return tl::unexpected<Error>(affected.error());
+  outcome.affected_shots = affected->shots;
+  outcome.affected_surfaces = std::max<std::uint64_t>(affected->surfaces, 1);  // pages are new even if empty
   return outcome;
 }
 
@@ -153,7 +155,7 @@ Result<SolveSettings> SolveLoop::applySettings(const SolveSettings& settings) {
     return settings_;
   }
   if (before.texels != settings.texels || before.texel_size_m != settings.texel_size_m) {
-    if (const auto lit = relight(LitScene::make(lit_->document(), settings, *transport_), true); !lit) {
+    if (const auto lit = relight(LitScene::make(lit_->document(), settings, *transport_), Relation::kEdited); !lit) {
       settings_ = before;
       updateStatus(true);
       return tl::unexpected<Error>(lit.error());

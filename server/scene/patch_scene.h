@@ -110,6 +110,10 @@ struct PatchScene {
   };
   std::vector<Seam> seams;
 
+  /// Edge of a texel where nothing asks for another (unit box): as charts were laid out, and as a first guess decided
+  /// which facets are charts of their own.
+  double texel = 0.0, rough_texel = 0.0;
+
   std::vector<std::string> warnings;
   std::uint64_t polygons = 0;  ///< coplanar facets (what the paper calls polygons)
   std::uint64_t triangles_dropped = 0;
@@ -154,9 +158,21 @@ struct ChartOptions {
   double curve_angle_deg = 15.0;  ///< normal spread of a curved chart
 };
 
+/// A scene as it was before an edit. Refers to its parts.
+struct FormerScene {
+  const Scene& scene;
+  const PatchScene& patches;
+};
+
 /// Flattens instances, drops degenerate triangles (counted), makes charts or takes a valid TEXCOORD_1, packs pages,
 /// measures coverage and burial. kTooLarge when a limit of leaves (2^28) or pages (1024) is passed.
-[[nodiscard]] Result<PatchScene> buildPatchScene(const Scene& scene, const ChartOptions& options);
+///
+/// With a `former` self, unit box, texel size and the places of charts on pages stay as they were, so that whatever the
+/// edit left alone is the same, bit by bit. Other charts get what is free on the pages, or pages of their own. When the
+/// unit box or the texel size no longer suit the scene (half as large, or half as large again; a quarter too fine or too
+/// coarse), all is made anew; when less than half of the pages is in use, places are.
+[[nodiscard]] Result<PatchScene> buildPatchScene(const Scene& scene, const ChartOptions& options,
+                                                 const FormerScene* former = nullptr);
 
 /// Emission (exitance E = pi L_e, lux) and reflectance of every node: leaves integrated over textures and vertex
 /// colours (16 samples a leaf), parents area-weighted means. Index = node. Reflectance is clamped to 0.999.

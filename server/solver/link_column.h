@@ -51,7 +51,21 @@ class LinkColumn {
   void add(const LinkExpander& sample, const LinkSample& totals, double points, const std::vector<Side>& sides,
            double factor = 1.0);
 
+  /// Other links to some leaves: `values` by leaf value, of which those of `leaves` (runs of leaf values, ascending)
+  /// count. What all links together deliver stays, and so do the samples they are said to come from. For columns of
+  /// which nothing escapes and nothing is absorbed.
+  struct ValueRun {
+    std::uint32_t first, count;
+  };
+  void replace(std::span<const ValueRun> leaves, std::span<const float> values, std::span<const float> leaf_area,
+               const std::vector<Side>& sides);
+  /// The same links in a scene whose sides are numbered otherwise. `side_after`: by old side, kNone: its links are
+  /// dropped, what they delivered is not. Order is kept.
+  void renumber(const std::vector<std::uint32_t>& side_after, const std::vector<Side>& before,
+                const std::vector<Side>& after);
+
   [[nodiscard]] double points() const { return points_; }
+  [[nodiscard]] bool losesNothing() const { return escaped_ == 0.0 && absorbed_ == 0.0; }
   [[nodiscard]] std::uint32_t samples() const { return samples_; }
   /// What leaves a polygon arrives: all links are multiplied by this, the ratio of what should arrive, in the mean over
   /// all samples, to the sum of the links as they are kept. Otherwise small errors (one point for a whole leaf, pixels
@@ -83,6 +97,7 @@ class LinkColumn {
  private:
   void makeRoom(std::span<const std::uint32_t> reached, const std::vector<Side>& sides);
   void grow(const LinkExpander& sample, const std::vector<Side>& sides);
+  void growTo(float largest);
   void keepFlux(std::span<const float> leaf_area);
 
   void addTo(const Run& run, std::uint32_t first_value, std::uint32_t count, float kept, float added,

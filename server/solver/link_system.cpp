@@ -58,6 +58,17 @@ void LinkSystem::addSample(std::uint32_t index, std::size_t half, const LinkExpa
   const double all = (arriving + totals.escaped + totals.absorbed) / shooter.area;
   const double factor = std::abs(all - 1.0) < kOnlyRounding ? 1.0 / all : 1.0;
   shooter.column[half].add(links, totals, points, sides_, factor);
+  noteChange(index, half);
+}
+
+void LinkSystem::replaceLinks(std::uint32_t index, std::size_t half, std::span<const LinkColumn::ValueRun> leaves,
+                              std::span<const float> values) {
+  shooters_[index].column[half].replace(leaves, values, leaf_area_, sides_);
+  noteChange(index, half);
+}
+
+void LinkSystem::noteChange(std::uint32_t index, std::size_t half) {
+  auto& shooter = shooters_[index];
   const auto& own = shooter.column[half];
   shooter.products[half == 0 ? 0 : 2] = LinkColumn::product(own, own, leaf_area_);
   shooter.products[1] = LinkColumn::product(shooter.column[0], shooter.column[1], leaf_area_);
@@ -119,6 +130,14 @@ void LinkSystem::forget(std::uint32_t index) {
     for (auto& row : half.matrix) {
       if (index < row.size()) row[index] = 0.0F;
     }
+  }
+}
+
+void LinkSystem::forget(std::uint32_t index, std::size_t half) {
+  shooters_[index].column[half] = {};
+  noteChange(index, half);
+  for (auto& row : halves_[half].matrix) {
+    if (index < row.size()) row[index] = 0.0F;
   }
 }
 

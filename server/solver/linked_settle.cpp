@@ -90,11 +90,14 @@ void LinkedSolver::solveAnew() {
   settling_ = false;
   pass_ = Pass::kNone;
   from_links_ = FromLinks::kAfterEdit;
+  edit_lights_planned_ = false;
   error_ = {};  // unknown
 }
 
 /// False: there was no room for the links of a new lamp, others had to go, and the light is to be solved for again.
 bool LinkedSolver::finishEdit() {
+  wanted_.clear();
+  measured_ = 0;
   memory_.begin(system_);
   bool forgot = false;
   while (memory_.isOverdrawn() && forgetWeakest()) forgot = true;
@@ -105,6 +108,7 @@ bool LinkedSolver::finishEdit() {
   growing_ = true;
   phase_ = Phase::kLights;
   assess();
+  fprintf(stderr,"DBG edit settled: total %g residual %g sampling %g net %g\n", error_.total, error_.residual, error_.sampling, net_unshot_);
   if (error_.total <= settings_.target_error) phase_ = Phase::kDone;  // the links there are carry it all
   return true;
 }
