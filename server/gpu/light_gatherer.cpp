@@ -28,7 +28,7 @@ bool isCrack(std::span<const std::uint32_t> items, std::size_t first, std::size_
 
 /// So many pixels around the places of named receivers are drawn: their own pixel's middle, and its neighbours', lie
 /// within.
-constexpr float kPixelsAround = 2.2F;
+constexpr float kPixelsAround = 0.8F;
 
 /// So many of a receiver's spots count for one shot of a reflecting node; all of them for a light.
 constexpr std::uint32_t kNodeSpots = 4;

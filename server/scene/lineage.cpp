@@ -38,6 +38,20 @@ std::vector<SurfaceRange> surfacesOf(const Scene& scene, const PatchScene& patch
   return ranges;
 }
 
+/// More boxes cost more to look past than they leave out.
+constexpr std::size_t kMaxChangedBoxes = 16;
+/// What a box hides, or lets be seen, goes by its surface.
+constexpr float kJoin = 0.9F;
+
+ChangedBox unionOf(const ChangedBox& a, const ChangedBox& b) {
+  return {glm::min(a.low, b.low), glm::max(a.high, b.high)};
+}
+
+float surfaceOf(const ChangedBox& box) {
+  const glm::vec3 size = box.high - box.low;
+  return size.x * size.y + size.y * size.z + size.z * size.x;
+}
+
 bool sameGrid(const Surface& a, const Surface& b) {
   const auto hasSide = [](const Surface& s, std::size_t side) { return s.first_node[side] != kNone; };
   return a.width == b.width && a.height == b.height && hasSide(a, 0) == hasSide(b, 0) && hasSide(a, 1) == hasSide(b, 1);
@@ -115,13 +129,22 @@ std::vector<std::uint32_t> matchInstances(const Scene& before, const Scene& afte
   return source;
 }
 
-void limitBoxes(std::vector<ChangedBox>& boxes) {
-  if (boxes.size() <= kMaxChangedBoxes) return;
-  for (const auto& box : boxes) {
-    boxes[0].low = glm::min(boxes[0].low, box.low);
-    boxes[0].high = glm::max(boxes[0].high, box.high);
+void joinBoxes(std::vector<ChangedBox>& boxes) {
+  for (bool joined = true; joined;) {
+    joined = false;
+    for (std::size_t i = 0; i < boxes.size(); ++i) {
+      for (std::size_t k = i + 1; k < boxes.size();) {
+        const auto both = unionOf(boxes[i], boxes[k]);
+        if (boxes.size() <= kMaxChangedBoxes && surfaceOf(both) > kJoin * (surfaceOf(boxes[i]) + surfaceOf(boxes[k]))) {
+          ++k;
+          continue;
+        }
+        boxes[i] = both;
+        boxes.erase(boxes.begin() + static_cast<std::ptrdiff_t>(k));
+        joined = true;
+      }
+    }
   }
-  boxes.resize(1);
 }
 
 bool PatchMap::nothingKept() const { return std::ranges::all_of(moved, [](bool m) { return m; }); }
@@ -160,7 +183,7 @@ PatchMap matchPatches(const Scene& scene_before, const PatchScene& before, const
   }
   old_boxes.appendTo(map.boxes);
   new_boxes.appendTo(map.boxes);
-  limitBoxes(map.boxes);
+  joinBoxes(map.boxes);
   return map;
 }
 

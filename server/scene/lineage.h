@@ -32,9 +32,8 @@ struct PatchMap {
   [[nodiscard]] bool nothingKept() const;
 };
 
-/// More boxes than this become one.
-inline constexpr std::size_t kMaxChangedBoxes = 16;
-void limitBoxes(std::vector<ChangedBox>& boxes);
+/// Boxes that are hardly larger together than apart become one, and so do all when there are very many.
+void joinBoxes(std::vector<ChangedBox>& boxes);
 
 /// `after` was built with `before` as its former self (buildPatchScene), so that both have the same unit box;
 /// otherwise is a bug of the caller. O(triangles + leaves).

@@ -93,7 +93,7 @@ GeometryChange LinkedSolver::changeSince(const Renumbering& numbers) const {
   if (former.repaired_ == former.repairs_.size()) return change;
   const auto& earlier = former.shadows_->change();
   change.boxes.insert(change.boxes.end(), earlier.boxes.begin(), earlier.boxes.end());
-  scene::limitBoxes(change.boxes);
+  scene::joinBoxes(change.boxes);
   for (std::size_t s = 0; s < former.sides_.size(); ++s) {
     if (numbers.unmoved_after[s] == scene::kNone) continue;
     const auto from = former.sides_[s].first_value, to = sides_[numbers.unmoved_after[s]].first_value;

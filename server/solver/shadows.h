@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
 #include <span>
 #include <vector>
 
@@ -30,37 +31,42 @@ class Shadows {
   [[nodiscard]] bool sees(const glm::vec3& point, const glm::vec3& normal) const;
 
   struct Scratch {
-    std::vector<std::uint8_t> marks;  // by leaf value; all zero between calls
+    std::vector<std::uint8_t> chunks, leaves;
   };
   /// Runs of leaf values, ascending, none across sides, of all leaves whose links from within `radius` of one of the
   /// points, as an item buffer of `resolution` finds them, may differ: those altered, and those that the way to passes
   /// a box, half a pixel's diagonal beside it included. A superset; leaves behind the plane of the points, and without
-  /// area, may be missing unless they are altered. O(leaves found + sides).
+  /// area, may be missing unless they are altered. O(leaves / 64 + leaves near those found).
   void find(std::span<const glm::vec3> points, const glm::vec3& normal, float radius, std::uint32_t resolution,
             Scratch& scratch, std::vector<LinkColumn::ValueRun>& runs) const;
 
  private:
-  struct Ball {
-    glm::vec3 centre{0.0F};
-    float radius = -1.0F;  ///< negative: empty
+  /// Balls around leaves, or around some of them; a negative radius: nothing.
+  struct Balls {
+    std::vector<float> x, y, z, radius;
+    void add(const glm::vec3& centre, float r);
+    [[nodiscard]] glm::vec3 centre(std::size_t i) const { return {x[i], y[i], z[i]}; }
   };
+  /// All ways from a point to what lies behind, in, or beside a box.
   struct Way {
     glm::vec3 from, low, high;
   };
-  struct Ways {
-    std::vector<Way> each;
-    glm::vec3 point, normal;
-  };
-  void enclose(const Side& side);
-  void mark(std::uint32_t side, std::uint32_t level, std::uint32_t x, std::uint32_t y, const Ways& ways,
-            std::vector<std::uint8_t>& marks, bool& any) const;
+  static void markMet(const Way& way, const glm::vec4& plane, const Balls& balls, std::size_t first, std::size_t end,
+                      std::uint8_t* marks);
+  void addLeaves(const Side& side);
+  void addChunks(std::uint32_t side);
 
   const scene::PatchScene& patches_;
   const std::vector<Side>& sides_;
   GeometryChange change_;
   std::vector<scene::ChangedBox> all_;  ///< boxes, and one around all altered leaves
-  std::vector<bool> side_altered_;      ///< some leaf of it
-  std::vector<Ball> ball_;              ///< by node
+  Balls leaves_;                        ///< by leaf value
+  struct Chunk {
+    std::uint32_t first, count;  ///< leaf values, of one side
+    bool altered;                ///< some of them
+  };
+  std::vector<Chunk> chunks_;
+  Balls chunk_balls_;
 };
 
 }  // namespace radiosity::solver
