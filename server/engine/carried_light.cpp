@@ -55,7 +55,10 @@ std::optional<glm::dvec2> carryPoint(glm::dvec2 point, const std::array<glm::vec
 class Carrier {
  public:
   Carrier(const ShownScene& before, const Scene& scene, const PatchScene& patches)
-      : before_(before), patches_(patches), mean_(meanOf(before.pages)), source_(scene::matchInstances(before.scene, scene)) {}
+      : before_(before),
+        patches_(patches),
+        mean_(meanOf(before.pages)),
+        source_(scene::matchInstances(before.scene, scene)) {}
 
   [[nodiscard]] std::vector<LightmapPage> run() const {
     std::vector<glm::vec3> values(patches_.nodeCount(), mean_);

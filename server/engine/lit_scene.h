@@ -10,8 +10,8 @@
 #include "server/engine/engine.h"
 #include "server/engine/scene_change.h"
 #include "server/scene/document.h"
-#include "server/scene/lineage.h"
 #include "server/scene/lightmap.h"
+#include "server/scene/lineage.h"
 #include "server/scene/patch_scene.h"
 #include "server/solver/solver.h"
 

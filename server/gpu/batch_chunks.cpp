@@ -77,8 +77,7 @@ void packGather(const solver::ShotBatch& batch, const Chunk& chunk, Packed& pack
     shot.first_run = static_cast<std::uint32_t>(packed.receivers.size());
     packed.receivers.insert(packed.receivers.end(), runs, runs + shot.run_count);
     // Nearly always all shots of a batch name the same boxes.
-    const bool known = i > chunk.first && shot.box_count > 0 &&
-                       batch.gather[i - 1].first_box == shot.first_box &&
+    const bool known = i > chunk.first && shot.box_count > 0 && batch.gather[i - 1].first_box == shot.first_box &&
                        batch.gather[i - 1].box_count == shot.box_count;
     shot.first_box = known ? packed.gather.back().first_box : static_cast<std::uint32_t>(packed.boxes.size());
     if (!known) packed.boxes.insert(packed.boxes.end(), boxes, boxes + shot.box_count);

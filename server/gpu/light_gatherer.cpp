@@ -378,7 +378,8 @@ std::optional<ViewWindow> LightGatherer::windowOf(const solver::GatherShot& shot
       const auto& receiver = receivers_->all()[i];
       const auto spots = receiver.hasSpots() ? scene::kLeafSpots : 1;
       for (std::uint32_t k = 0; k < spots; ++k) {
-        const auto place = spots > 1 ? receivers_->spot(receiver, k) : receivers_->place(receiver, shot.receiver_jitter);
+        const auto place =
+            spots > 1 ? receivers_->spot(receiver, k) : receivers_->place(receiver, shot.receiver_jitter);
         if (glm::dot(shot.normal, place.point - shot.corners[0]) > kInPlane) places_.push_back(place.point);
       }
     }

@@ -45,7 +45,8 @@ struct Extent {
 
 std::optional<ViewWindow> windowAround(const solver::HemicubeFrame& eye, std::span<const glm::vec3> points,
                                        std::span<const scene::ChangedBox> boxes, float margin_rad) {
-  std::vector<glm::vec3> directions;
+  thread_local std::vector<glm::vec3> directions;
+  directions.clear();
   for (const auto& point : points) directions.push_back(point - eye.origin);
   for (const auto& box : boxes) addBox(box, eye, directions);
   glm::vec3 sum(0.0F);
@@ -57,7 +58,8 @@ std::optional<ViewWindow> windowAround(const solver::HemicubeFrame& eye, std::sp
   }
   if (!(glm::length(sum) > 0.0F)) return std::nullopt;
   const glm::vec3 axis = glm::normalize(sum);
-  const glm::vec3 helper = std::abs(axis.x) < 0.6F ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0);
+  // Most things stand upright, and so does a pyramid that fits them.
+  const glm::vec3 helper = std::abs(axis.y) < 0.9F ? glm::vec3(0, 1, 0) : glm::vec3(1, 0, 0);
   const glm::vec3 right = glm::normalize(glm::cross(helper, axis)), up = glm::cross(axis, right);
   Extent across, along;
   for (const auto& d : directions) {

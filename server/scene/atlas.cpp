@@ -140,9 +140,7 @@ class PageSpace {
   }
 
  private:
-  [[nodiscard]] std::size_t index(std::uint32_t x, std::uint32_t y) const {
-    return std::size_t{y} * page_.width + x;
-  }
+  [[nodiscard]] std::size_t index(std::uint32_t x, std::uint32_t y) const { return std::size_t{y} * page_.width + x; }
   /// rect.x if it is free; else the column after one that is taken.
   [[nodiscard]] std::uint32_t blockedUntil(const TexelRect& rect) const {
     for (std::uint32_t y = rect.y; y < rect.y + rect.height; ++y)

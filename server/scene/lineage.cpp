@@ -147,7 +147,9 @@ void joinBoxes(std::vector<ChangedBox>& boxes) {
   }
 }
 
-bool PatchMap::nothingKept() const { return std::ranges::all_of(moved, [](bool m) { return m; }); }
+bool PatchMap::nothingKept() const {
+  return std::ranges::all_of(moved, [](bool m) { return m; });
+}
 
 PatchMap matchPatches(const Scene& scene_before, const PatchScene& before, const Scene& scene_after,
                       const PatchScene& after) {

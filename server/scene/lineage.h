@@ -1,5 +1,6 @@
-// What two scenes have in common, one being an edit of the other: which instances, charts and leaves are still the same,
-// and where something changed. So that an edit of geometry leaves everything else as it is. Plain values, any thread.
+// What two scenes have in common, one being an edit of the other: which instances, charts and leaves are still the
+// same, and where something changed. So that an edit of geometry leaves everything else as it is. Plain values, any
+// thread.
 #pragma once
 
 #include <cstdint>

@@ -169,8 +169,8 @@ struct FormerScene {
 ///
 /// With a `former` self, unit box, texel size and the places of charts on pages stay as they were, so that whatever the
 /// edit left alone is the same, bit by bit. Other charts get what is free on the pages, or pages of their own. When the
-/// unit box or the texel size no longer suit the scene (half as large, or half as large again; a quarter too fine or too
-/// coarse), all is made anew; when less than half of the pages is in use, places are.
+/// unit box or the texel size no longer suit the scene (half as large, or half as large again; a quarter too fine or
+/// too coarse), all is made anew; when less than half of the pages is in use, places are.
 [[nodiscard]] Result<PatchScene> buildPatchScene(const Scene& scene, const ChartOptions& options,
                                                  const FormerScene* former = nullptr);
 

@@ -268,7 +268,7 @@ void LinkColumn::keepFlux(std::span<const float> leaf_area) {
   gain_ = due_ > 0.0 && coded > 0.0 ? static_cast<float>(std::clamp(due_ / coded, 0.25, 4.0)) : 1.0F;
 }
 
-void LinkColumn::replace(std::span<const ValueRun> leaves, std::span<const float> values,
+void LinkColumn::replace(std::span<const ValueRun> leaves, std::span<const float> values, const Totals& totals,
                          std::span<const float> leaf_area, const std::vector<Side>& sides) {
   std::vector<std::uint32_t> reached;
   float largest = 0.0F;
@@ -295,6 +295,9 @@ void LinkColumn::replace(std::span<const ValueRun> leaves, std::span<const float
     std::uint16_t* code = &code_[to->offset + (run.first - to->first_value)];
     for (std::uint32_t i = 0; i < run.count; ++i) code[i] = encodeLink(unit * values[run.first + i]);
   }
+  due_ = totals.due;
+  escaped_ = totals.escaped;
+  absorbed_ = totals.absorbed;
   keepFlux(leaf_area);
 }
 

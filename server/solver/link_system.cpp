@@ -54,17 +54,24 @@ LinkSystem::LinkSystem(const scene::PatchScene& patches, const std::vector<Side>
 void LinkSystem::addSample(std::uint32_t index, std::size_t half, const LinkExpander& links, const LinkSample& totals,
                            double points) {
   auto& shooter = shooters_[index];
-  const double arriving = totals.due > 0.0 ? totals.due : links.flux();
-  const double all = (arriving + totals.escaped + totals.absorbed) / shooter.area;
-  const double factor = std::abs(all - 1.0) < kOnlyRounding ? 1.0 / all : 1.0;
+  const double factor =
+      roundingOf(shooter, totals.due > 0.0 ? totals.due : links.flux(), totals.escaped, totals.absorbed);
   shooter.column[half].add(links, totals, points, sides_, factor);
   noteChange(index, half);
 }
 
 void LinkSystem::replaceLinks(std::uint32_t index, std::size_t half, std::span<const LinkColumn::ValueRun> leaves,
-                              std::span<const float> values) {
-  shooters_[index].column[half].replace(leaves, values, leaf_area_, sides_);
+                              std::span<const float> values, const LinkColumn::Totals& totals) {
+  auto& shooter = shooters_[index];
+  const double factor = roundingOf(shooter, totals.due, totals.escaped, totals.absorbed);
+  shooter.column[half].replace(leaves, values, {factor * totals.due, factor * totals.escaped, factor * totals.absorbed},
+                               leaf_area_, sides_);
   noteChange(index, half);
+}
+
+double LinkSystem::roundingOf(const Shooter& shooter, double due, double escaped, double absorbed) {
+  const double all = (due + escaped + absorbed) / shooter.area;
+  return std::abs(all - 1.0) < kOnlyRounding ? 1.0 / all : 1.0;
 }
 
 void LinkSystem::noteChange(std::uint32_t index, std::size_t half) {

@@ -72,7 +72,7 @@ class LinkSystem {
 
   /// Other links to some leaves, as LinkColumn::replace.
   void replaceLinks(std::uint32_t shooter, std::size_t half, std::span<const LinkColumn::ValueRun> leaves,
-                    std::span<const float> values);
+                    std::span<const float> values, const LinkColumn::Totals& totals);
 
   /// Forgets its links, so that its place can be taken by another light.
   void forget(std::uint32_t shooter);
@@ -118,6 +118,8 @@ class LinkSystem {
     bool done = true;
   };
   [[nodiscard]] double areaOf(const Shooter& shooter) const;
+  /// By which what a sample delivers, loses and lets escape is multiplied.
+  [[nodiscard]] static double roundingOf(const Shooter& shooter, double due, double escaped, double absorbed);
   void noteChange(std::uint32_t shooter, std::size_t half);
   void updateMeans();
   void makeRows();

@@ -1,9 +1,10 @@
 // LinkedSolver after an edit of geometry: measures again what the edit may have changed, with the same points as
 // before. Each column of links is the mean of its samples, so all of them are taken again, but only for the leaves that
-// need it; how much arrives in all is known to stay where nothing escapes and nothing is absorbed.
+// need it; how much should arrive in all is known without the others, unless much is lost.
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <glm/geometric.hpp>
 #include <span>
 #include <utility>
@@ -16,6 +17,9 @@ namespace {
 
 /// Points of one sample of a light that is taken again: as many as of a new one.
 constexpr std::uint32_t kLightPoints = 8;
+/// What arrives, escapes and is absorbed makes all that is sent; a polygon's area is known to 0.002 of it. A sum of
+/// some links in the place of what should arrive does not.
+constexpr double kNoSum = 0.005;
 /// Repairs of a slice before it is known how long they take.
 constexpr std::size_t kMostAtOnce = 1024;
 
@@ -43,13 +47,13 @@ struct LinkedSolver::RepairBatch {
   std::vector<Sample> gathered, scattered;
   std::vector<float> sum;  ///< by leaf value: of the repair on its way, links times points
   double points = 0.0;
-  bool lost = false;
-  std::vector<Repair> anew;  ///< something is lost now: all links must be measured
+  LinkColumn::Totals totals;  ///< times points
+  bool open = false;          ///< so much is lost that only the sum of all links tells what arrives
+  std::vector<Repair> anew;   ///< whole, since they are open now
 };
 
 /// Leaves in repairs_ what is needed, and makes room for what it may bring.
 void LinkedSolver::planRepairs() {
-  fprintf(stderr, "DBG plan cpu %g render %g gather %g repairs %zu whole %zu shooters %zu lights %zu\n", (double)clock()/CLOCKS_PER_SEC, counters_.render_seconds, counters_.gather_seconds, repairs_.size(), (size_t)std::ranges::count_if(repairs_, [](auto& r){return r.whole;}), system_.shooters().size(), lights_.size());
   system_.begin();
   memory_.begin(system_);
   affected_ = 0;
@@ -63,10 +67,8 @@ void LinkedSolver::planRepairs() {
     affected_ += shooter.isLight() ? 1 + (repair.samples - 1) / kLightPoints : repair.samples;
     return false;
   });
-  fprintf(stderr, "DBG planned %zu whole %zu\n", repairs_.size(), (size_t)std::ranges::count_if(repairs_, [](auto& r){return r.whole;}));
 }
 
-// END
 /// Whether some point of the samples sees the change. What cannot be repaired in parts becomes whole.
 bool LinkedSolver::isNeeded(Repair& repair) {
   const auto& shooter = system_.shooters()[repair.shooter];
@@ -87,7 +89,7 @@ bool LinkedSolver::isNeeded(Repair& repair) {
     edits_.kept += shooter.isLight() ? 1 : repair.samples;
     return false;
   }
-  repair.whole = !gathers || !shooter.column[repair.half].losesNothing();
+  repair.whole = !gathers || shooter.column[repair.half].isOpen(shooter.area);
   if (!repair.whole) return true;
   system_.forget(repair.shooter, repair.half);
   return true;
@@ -158,10 +160,13 @@ Result<void> LinkedSolver::repairSlice() {
       if (repair.whole) continue;
       shots.gather[i].first_run = first_run;
       shots.gather[i].run_count = static_cast<std::uint32_t>(shots.receivers.size()) - first_run;
-      shots.gather[i].box_count = static_cast<std::uint32_t>(shots.boxes.size());
+      // Where nothing was lost, whatever is lost now is lost where the change is seen.
+      const bool all = !system_.shooters()[repair.shooter].column[repair.half].losesNothing();
+      shots.gather[i].box_count = all ? 0 : static_cast<std::uint32_t>(shots.boxes.size());
     }
     for (auto i = scattered; i < shots.scatter.size(); ++i) batch.scattered.push_back({r, 1, false});
-    (repair.whole ? edits_.retaken : edits_.repaired) += shots.gather.size() - gathered + shots.scatter.size() - scattered;
+    (repair.whole ? edits_.retaken : edits_.repaired) +=
+        shots.gather.size() - gathered + shots.scatter.size() - scattered;
   }
   const auto take = [&](std::size_t i, LinkSample&& links) { takePart(batch, i, links); };
   const auto done = transport_.measure(shots, take);
@@ -169,12 +174,11 @@ Result<void> LinkedSolver::repairSlice() {
   counters_ += *done;
   repaired_ += batch.repairs.size();
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  slice_ = std::clamp(static_cast<std::size_t>(static_cast<double>(batch.repairs.size()) * kSliceSeconds /
-                                               std::max(seconds, 1e-6)),
-                      fewest_a_slice_, kMostAtOnce);
+  slice_ = std::clamp(
+      static_cast<std::size_t>(static_cast<double>(batch.repairs.size()) * kSliceSeconds / std::max(seconds, 1e-6)),
+      fewest_a_slice_, kMostAtOnce);
   repairs_.insert(repairs_.end(), batch.anew.begin(), batch.anew.end());
   if (repaired_ == repairs_.size()) {
-    fprintf(stderr, "DBG kept %lu repaired %lu links %lu retaken %lu; cpu %g render %g gather %g boxes %zu\n", edits_.kept, edits_.repaired, edits_.repaired_links, edits_.retaken, (double)clock()/CLOCKS_PER_SEC, counters_.render_seconds, counters_.gather_seconds, shots.boxes.size());
     repairs_.clear();
     repaired_ = 0;
     shadows_.reset();
@@ -194,7 +198,13 @@ void LinkedSolver::takePart(RepairBatch& repairs, std::size_t shot, LinkSample& 
     return;
   }
   repairs.points += sample.points;
-  repairs.lost = repairs.lost || links.escaped > 0.0 || links.absorbed > 0.0;
+  const auto area = system_.shooters()[repair.shooter].area;
+  const double all = links.due + links.escaped + links.absorbed;
+  repairs.open =
+      repairs.open || LinkColumn::isOpen(area, links.escaped + links.absorbed) || std::abs(all - area) > kNoSum * area;
+  repairs.totals.due += sample.points * links.due;
+  repairs.totals.escaped += sample.points * links.escaped;
+  repairs.totals.absorbed += sample.points * links.absorbed;
   auto reached = expander_.sidesReached().begin();
   const auto end = expander_.sidesReached().end();
   for (const auto& run : repairs.leaves[sample.repair]) {
@@ -205,16 +215,18 @@ void LinkedSolver::takePart(RepairBatch& repairs, std::size_t shot, LinkSample& 
       repairs.sum[v] += static_cast<float>(sample.points) * expander_.values()[v];
   }
   if (!sample.last) return;
-  const float share = 1.0F / static_cast<float>(std::exchange(repairs.points, 0.0));
+  const double part = 1.0 / std::exchange(repairs.points, 0.0);
+  const auto totals = std::exchange(repairs.totals, {});
   const auto& leaves = repairs.leaves[sample.repair];
   for (const auto& run : leaves) {
-    for (std::uint32_t v = run.first; v < run.first + run.count; ++v) repairs.sum[v] *= share;
+    for (std::uint32_t v = run.first; v < run.first + run.count; ++v) repairs.sum[v] *= static_cast<float>(part);
   }
-  if (std::exchange(repairs.lost, false)) {
+  if (std::exchange(repairs.open, false)) {
     system_.forget(repair.shooter, repair.half);
     repairs.anew.push_back({repair.shooter, repair.half, repair.samples, true});
   } else {
-    system_.replaceLinks(repair.shooter, repair.half, leaves, repairs.sum);
+    system_.replaceLinks(repair.shooter, repair.half, leaves, repairs.sum,
+                         {part * totals.due, part * totals.escaped, part * totals.absorbed});
   }
   for (const auto& run : leaves) std::fill_n(repairs.sum.begin() + run.first, run.count, 0.0F);
 }

@@ -298,7 +298,7 @@ StepOutcome LinkedSolver::chooseFurther() {
 }
 
 void LinkedSolver::assess() {
-  if (repaired_ < repairs_.size()) return;  // nothing is known before all links are true
+  if (repaired_ < repairs_.size()) return;     // nothing is known before all links are true
   if (from_links_ == FromLinks::kAfterEdit) {  // somebody wants to know before the next step
     try {
       do {

@@ -80,8 +80,8 @@ class LinkedSolver final : public Solver {
   struct Renumbering {
     const LinkedSolver& former;
     const scene::PatchMap& map;
-    std::vector<std::uint32_t> side_after;         ///< by old side; kNone: gone
-    std::vector<std::uint32_t> unmoved_after;      ///< the same; kNone also where it moved
+    std::vector<std::uint32_t> side_after;          ///< by old side; kNone: gone
+    std::vector<std::uint32_t> unmoved_after;       ///< the same; kNone also where it moved
     std::vector<std::array<Repair, 2>> unfinished;  ///< by old shooter and half: what was still to be taken again
   };
   struct RepairBatch;
@@ -142,9 +142,9 @@ class LinkedSolver final : public Solver {
   LinkMemory memory_;
   UnshotPyramid unshot_;
   LinkPlanner planner_;
-  std::vector<Repair> repairs_;                // after an edit of geometry; before anything else is done
-  std::size_t repaired_ = 0;                   // of these
-  std::unique_ptr<Shadows> shadows_;           // of the edit
+  std::vector<Repair> repairs_;                       // after an edit of geometry; before anything else is done
+  std::size_t repaired_ = 0;                          // of these
+  std::unique_ptr<Shadows> shadows_;                  // of the edit
   std::uint32_t key_end_ = 0, triangle_key_end_ = 0;  // keys of sides that never were
   std::uint64_t affected_ = 0;
   LinkCounters edits_;  // what repairs add to linkCounters()
@@ -154,14 +154,14 @@ class LinkedSolver final : public Solver {
   Pass pass_ = Pass::kNone;
   FromLinks from_links_ = FromLinks::kNo;
   bool edit_lights_planned_ = false;  // of the edit being taken in
-  bool settling_ = false;            // a wave is measured, its light is still to be solved for
-  std::vector<Measurement> wanted_;  // the wave under way
-  std::size_t measured_ = 0;         // of the wave
-  std::size_t slice_ = 16;           // measurements that take some 50 ms
-  std::size_t fewest_a_slice_ = 8;   // so many at least, for the workers
-  bool growing_ = true;              // light is still missing: until the first walk found nothing more to add
-  double share_part_ = 0.0;          // of all power, that one shooter should have
-  double left_out_ = 0.0;            // relative error by nodes too weak to play roulette
+  bool settling_ = false;             // a wave is measured, its light is still to be solved for
+  std::vector<Measurement> wanted_;   // the wave under way
+  std::size_t measured_ = 0;          // of the wave
+  std::size_t slice_ = 16;            // measurements that take some 50 ms
+  std::size_t fewest_a_slice_ = 8;    // so many at least, for the workers
+  bool growing_ = true;               // light is still missing: until the first walk found nothing more to add
+  double share_part_ = 0.0;           // of all power, that one shooter should have
+  double left_out_ = 0.0;             // relative error by nodes too weak to play roulette
   std::uint32_t rounds_ = 0;
   std::uint64_t solutions_ = 0, sweeps_ = 0, replayed_ = 0;
   double varying_ = 0.0, net_unshot_ = 0.0;     // flux, all channels

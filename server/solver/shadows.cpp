@@ -93,20 +93,28 @@ __attribute__((target_clones("avx2", "default"))) void Shadows::markMet(const Wa
   const float ox = way.from.x, oy = way.from.y, oz = way.from.z;
   const float lx = way.low.x, ly = way.low.y, lz = way.low.z, hx = way.high.x, hy = way.high.y, hz = way.high.z;
   const float nx = plane.x, ny = plane.y, nz = plane.z, nd = plane.w;
+  const float spread = way.spread;
   const float *x = balls.x.data(), *y = balls.y.data(), *z = balls.z.data(), *radius = balls.radius.data();
   const auto smaller = [](float a, float b) { return a < b ? a : b; };
   const auto larger = [](float a, float b) { return a > b ? a : b; };
   for (std::size_t i = begin; i < end; ++i) {
     const float r = radius[i];
     const float dx = x[i] - ox, dy = y[i] - oy, dz = z[i] - oz;
-    const float ix = 1.0F / (std::abs(dx) > 1e-20F ? dx : 1e-20F);
-    const float iy = 1.0F / (std::abs(dy) > 1e-20F ? dy : 1e-20F);
-    const float iz = 1.0F / (std::abs(dz) > 1e-20F ? dz : 1e-20F);
-    const float ax = (lx - r - ox) * ix, bx = (hx + r - ox) * ix;
-    const float ay = (ly - r - oy) * iy, by = (hy + r - oy) * iy;
-    const float az = (lz - r - oz) * iz, bz = (hz + r - oz) * iz;
-    const float first = larger(larger(smaller(ax, bx), smaller(ay, by)), larger(smaller(az, bz), 0.0F));
-    const float last = smaller(smaller(larger(ax, bx), larger(ay, by)), smaller(larger(az, bz), 1.0F));
+    const float s = spread * std::sqrt(dx * dx + dy * dy + dz * dz);
+    float first = 0.0F, last = 1.0F;
+    // At part t of the way one is past the low face where t (d + s) >= low - r - o, and so on.
+    const auto clip = [&](float slope, float least) {
+      const float safe = std::abs(slope) > 1e-20F ? slope : 1e-20F;
+      const float t = least / safe;
+      first = safe > 0.0F ? larger(first, t) : first;
+      last = safe > 0.0F ? last : smaller(last, t);
+    };
+    clip(dx + s, lx - r - ox);
+    clip(s - dx, ox - hx - r);
+    clip(dy + s, ly - r - oy);
+    clip(s - dy, oy - hy - r);
+    clip(dz + s, lz - r - oz);
+    clip(s - dz, oz - hz - r);
     const bool met = (first <= last) & (r >= 0.0F) & (nx * x[i] + ny * y[i] + nz * z[i] - nd >= -r);
     marks[i - begin] = static_cast<std::uint8_t>(marks[i - begin] | static_cast<std::uint8_t>(met));
   }
@@ -117,10 +125,9 @@ void Shadows::find(std::span<const glm::vec3> points, const glm::vec3& normal, f
   std::vector<Way> ways;
   for (const auto& point : points) {
     for (const auto& box : change_.boxes) {
-      const auto far = glm::max(glm::abs(box.low - point), glm::abs(box.high - point));
-      // A pixel is 2 / N wide at a depth of one.
-      const float beside = radius + 2.0F * kHalfDiagonal / static_cast<float>(resolution) * glm::length(far);
-      ways.push_back({point, box.low - beside, box.high + beside});
+      // A pixel is 2 / N wide at a depth of one; depths are at most distances.
+      ways.push_back(
+          {point, box.low - radius, box.high + radius, 2.0F * kHalfDiagonal / static_cast<float>(resolution)});
     }
   }
   const glm::vec4 plane(normal, glm::dot(normal, points.front()));

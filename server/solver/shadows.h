@@ -50,6 +50,7 @@ class Shadows {
   /// All ways from a point to what lies behind, in, or beside a box.
   struct Way {
     glm::vec3 from, low, high;
+    float spread;  ///< the box counts as larger by so much for each unit of the way to it
   };
   static void markMet(const Way& way, const glm::vec4& plane, const Balls& balls, std::size_t first, std::size_t end,
                       std::uint8_t* marks);
