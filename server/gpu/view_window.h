@@ -10,7 +10,7 @@
 #include <span>
 
 #include "server/gpu/hemicube_views.h"
-#include "server/scene/lineage.h"
+#include "server/scene/patch_scene.h"
 
 namespace radiosity::gpu {
 

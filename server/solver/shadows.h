@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "server/scene/lineage.h"
+#include "server/scene/patch_scene.h"
 #include "server/solver/link_column.h"
 #include "server/solver/side.h"
 

@@ -16,7 +16,6 @@
 #include <vector>
 
 #include "common/result.h"
-#include "server/scene/lineage.h"
 #include "server/scene/patch_scene.h"
 
 namespace radiosity::solver {

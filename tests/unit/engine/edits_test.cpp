@@ -123,8 +123,9 @@ TEST_F(Edits, AMovedReceiverIsChartedAndSolvedAnew) {
   const auto layout = engine().lightmaps()->layout;
   const auto outcome = patch(R"([{"op":"replace","path":"/nodes/1/translation","value":[0,2,0]}])");
   ASSERT_TRUE(outcome) << outcome.error().text();
-  EXPECT_EQ(outcome->affected_surfaces, 2U);
-  EXPECT_EQ(outcome->affected_shots, before.shots);
+  EXPECT_EQ(outcome->affected_surfaces, 1U) << "the other plate is where it was";
+  EXPECT_GT(outcome->affected_shots, 0U);
+  EXPECT_LE(outcome->affected_shots, before.shots);
   ASSERT_TRUE(reaches(SolveState::kConverged));
   (void)sceneText();
   EXPECT_GT(engine().lightmaps()->layout, layout);
