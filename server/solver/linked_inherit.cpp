@@ -40,7 +40,7 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
   sweeps_ = former.sweeps_;
   replayed_ = former.replayed_;
   share_part_ = former.share_part_;
-  planner_.setShare(former.planner_.share());
+  planner_.inherit(former.planner_, numbers.side_after);
   inheritLights(former, numbers);
   takeMaterials(materials);
   takeSources(sources);
