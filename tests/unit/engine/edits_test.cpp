@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 
 #include "tests/scenes/scenes.h"
@@ -154,9 +156,10 @@ TEST_F(Edits, AnEditOfAPausedSolveLeavesItPausedAndShowsTheNewLayout) {
   ASSERT_TRUE(load(test_scenes::parallelPlates(1.0, 1.0, 1.0, 1.0, 0.3)));
   ASSERT_EQ(pause().value(), SolveState::kPaused);
   const auto layout = engine().lightmaps()->layout;
+  const auto shots = status().shots;
   ASSERT_TRUE(patch(R"([{"op":"replace","path":"/nodes/1/translation","value":[0,2,0]}])"));
   EXPECT_EQ(status().state, SolveState::kPaused);
-  EXPECT_EQ(status().shots, 0U);
+  EXPECT_EQ(status().shots, shots);
   EXPECT_GT(engine().lightmaps()->layout, layout);
   EXPECT_EQ(engine().lightmaps()->revision, 2U);
 }
@@ -215,12 +218,21 @@ TEST_F(Edits, TheOldLightFadesIntoTheNewWithoutADarkMoment) {
   EXPECT_GT(darkest(published), 0.8 * before);
   EXPECT_NEAR(meanIrradiance(*published.front()), before, 0.02 * before);  // carried: the same light
   EXPECT_TRUE(published.back()->final);
-  // In the end it is the solver's own light, which a server that loads the edited scene finds too.
+  // In the end it is the solver's own light, which a solve from nothing finds too.
   const auto shown = published.back()->pages.front()->mips.front().pixels;
+  const double error = status().error.total;
   ASSERT_TRUE(restart());
   ASSERT_TRUE(reaches(SolveState::kConverged));
   (void)sceneText();
-  EXPECT_EQ(engine().lightmaps()->pages.front()->mips.front().pixels, shown);
+  const auto solved = engine().lightmaps()->pages.front()->mips.front().pixels;
+  ASSERT_EQ(solved.size(), shown.size());
+  double difference = 0.0, all = 0.0;
+  for (std::size_t i = 0; i < shown.size(); ++i) {
+    const glm::dvec3 d(solved[i] - shown[i]), v(solved[i]);
+    difference += glm::dot(d, d);
+    all += glm::dot(v, v);
+  }
+  EXPECT_LE(std::sqrt(difference / all), error + status().error.total);
 }
 
 TEST_F(Edits, WhatIsNewIsNotBlackEither) {
