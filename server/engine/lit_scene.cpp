@@ -40,8 +40,11 @@ LitScene::Affected LitScene::startSolve(LitScene* former) {
   }
   const auto map = scene::matchPatches(*former->scene_, *former->patches_, *scene_, *patches_);
   const solver::FormerSolver before{*former->solver_, map};
-  makeSolver(map.nothingKept() ? nullptr : &before);
-  return {touchedSurfaces(former->patches_->surfaces.size(), map), solver_->affectedSamples()};
+  const bool keeps = !map.nothingKept();
+  makeSolver(keeps ? &before : nullptr);
+  return {touchedSurfaces(former->patches_->surfaces.size(), map),
+          keeps && solver_->linkCounters().kept + solver_->affectedSamples() > 0 ? solver_->affectedSamples()
+                                                                                : shots_before};
 }
 
 /// Those that are new, or gone, or elsewhere, and those of which more or less is left.

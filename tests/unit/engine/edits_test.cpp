@@ -125,9 +125,9 @@ TEST_F(Edits, AMovedReceiverIsChartedAndSolvedAnew) {
   const auto layout = engine().lightmaps()->layout;
   const auto outcome = patch(R"([{"op":"replace","path":"/nodes/1/translation","value":[0,2,0]}])");
   ASSERT_TRUE(outcome) << outcome.error().text();
-  EXPECT_EQ(outcome->affected_surfaces, 1U) << "the other plate is where it was";
-  EXPECT_GT(outcome->affected_shots, 0U);
-  EXPECT_LE(outcome->affected_shots, before.shots);
+  // So far off that the scene's unit box is another: nothing stays.
+  EXPECT_EQ(outcome->affected_surfaces, 2U);
+  EXPECT_EQ(outcome->affected_shots, before.shots);
   ASSERT_TRUE(reaches(SolveState::kConverged));
   (void)sceneText();
   EXPECT_GT(engine().lightmaps()->layout, layout);
@@ -156,10 +156,9 @@ TEST_F(Edits, AnEditOfAPausedSolveLeavesItPausedAndShowsTheNewLayout) {
   ASSERT_TRUE(load(test_scenes::parallelPlates(1.0, 1.0, 1.0, 1.0, 0.3)));
   ASSERT_EQ(pause().value(), SolveState::kPaused);
   const auto layout = engine().lightmaps()->layout;
-  const auto shots = status().shots;
   ASSERT_TRUE(patch(R"([{"op":"replace","path":"/nodes/1/translation","value":[0,2,0]}])"));
   EXPECT_EQ(status().state, SolveState::kPaused);
-  EXPECT_EQ(status().shots, shots);
+  EXPECT_EQ(status().shots, 0U);
   EXPECT_GT(engine().lightmaps()->layout, layout);
   EXPECT_EQ(engine().lightmaps()->revision, 2U);
 }
