@@ -44,7 +44,7 @@ LitScene::Affected LitScene::startSolve(LitScene* former) {
   makeSolver(keeps ? &before : nullptr);
   return {touchedSurfaces(former->patches_->surfaces.size(), map),
           keeps && solver_->linkCounters().kept + solver_->affectedSamples() > 0 ? solver_->affectedSamples()
-                                                                                : shots_before};
+                                                                                 : shots_before};
 }
 
 /// Those that are new, or gone, or elsewhere, and those of which more or less is left.
