@@ -4,11 +4,10 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/vec2.hpp>
-#include <map>
 #include <optional>
-#include <tuple>
 
 #include "common/check.h"
+#include "server/scene/lineage.h"
 
 namespace radiosity::engine {
 namespace {
@@ -17,21 +16,6 @@ using scene::kNone;
 using scene::LightmapPage;
 using scene::PatchScene;
 using scene::Scene;
-
-/// By which an instance is known again: its node, mesh and primitive, and which of the node's instances it is.
-using InstanceKey = std::tuple<std::uint32_t, std::uint32_t, std::uint32_t, std::uint32_t>;
-
-std::vector<InstanceKey> keysOf(const Scene& scene) {
-  std::map<InstanceKey, std::uint32_t> seen;
-  std::vector<InstanceKey> keys;
-  for (const auto& instance : scene.instances) {
-    const auto& primitive = scene.primitives[instance.primitive];
-    InstanceKey key{instance.node, primitive.mesh, primitive.primitive, 0};
-    std::get<3>(key) = seen[key]++;
-    keys.push_back(key);
-  }
-  return keys;
-}
 
 /// Mean over what is covered.
 glm::vec3 meanOf(const std::vector<LightmapPage>& pages) {
@@ -71,15 +55,10 @@ std::optional<glm::dvec2> carryPoint(glm::dvec2 point, const std::array<glm::vec
 class Carrier {
  public:
   Carrier(const ShownScene& before, const Scene& scene, const PatchScene& patches)
-      : before_(before), patches_(patches), mean_(meanOf(before.pages)) {
-    std::map<InstanceKey, std::uint32_t> known;
-    const auto old_keys = keysOf(before.scene);
-    for (std::uint32_t i = 0; i < old_keys.size(); ++i) known[old_keys[i]] = i;
-    for (const auto& key : keysOf(scene)) {
-      const auto found = known.find(key);
-      source_.push_back(found == known.end() ? kNone : found->second);
-    }
-  }
+      : before_(before),
+        patches_(patches),
+        mean_(meanOf(before.pages)),
+        source_(scene::matchInstances(before.scene, scene)) {}
 
   [[nodiscard]] std::vector<LightmapPage> run() const {
     std::vector<glm::vec3> values(patches_.nodeCount(), mean_);

@@ -1,7 +1,7 @@
 #include "server/engine/lit_scene.h"
 
 #include <algorithm>
-#include <set>
+#include <optional>
 #include <utility>
 
 #include "server/engine/carried_light.h"
@@ -15,17 +15,52 @@ Result<std::unique_ptr<LitScene>> LitScene::make(scene::Document document, const
 }
 
 Result<std::unique_ptr<LitScene>> LitScene::make(scene::EditedDocument edited, const SolveSettings& settings,
-                                                 solver::Transport& transport) {
+                                                 solver::Transport& transport, const LitScene* former) {
   auto lit = std::unique_ptr<LitScene>(new LitScene(std::move(edited), settings, transport));
   scene::ChartOptions charts;
   charts.texel_budget = settings.texels;
   charts.texel_size_m = settings.texel_size_m;
-  auto patches = scene::buildPatchScene(*lit->scene_, charts);
+  std::optional<scene::FormerScene> before;
+  if (former != nullptr) before.emplace(scene::FormerScene{*former->scene_, *former->patches_});
+  lit->reproducible_ = former == nullptr;
+  auto patches = scene::buildPatchScene(*lit->scene_, charts, before ? &*before : nullptr);
   if (!patches) return tl::unexpected<Error>(patches.error());
   lit->patches_ = std::make_shared<const scene::PatchScene>(std::move(*patches));
   lit->materials_ = scene::shadePatches(*lit->scene_, *lit->patches_);
-  lit->makeSolver();
   return lit;
+}
+
+LitScene::Affected LitScene::startSolve(LitScene* former) {
+  const auto all = std::max<std::uint64_t>(patches_->surfaces.size(), former ? former->patches_->surfaces.size() : 0);
+  const auto shots_before = former != nullptr ? former->solver_->shots() : 0;
+  const bool related = former != nullptr && former->patches_->centre == patches_->centre &&
+                       former->patches_->scale == patches_->scale && former->patches_->texel == patches_->texel;
+  if (!related) {
+    makeSolver();
+    return {all, shots_before};
+  }
+  const auto map = scene::matchPatches(*former->scene_, *former->patches_, *scene_, *patches_);
+  const solver::FormerSolver before{*former->solver_, map};
+  const bool keeps = !map.nothingKept();
+  makeSolver(keeps ? &before : nullptr);
+  return {touchedSurfaces(former->patches_->surfaces.size(), map),
+          keeps && solver_->linkCounters().kept + solver_->affectedSamples() > 0 ? solver_->affectedSamples()
+                                                                                 : shots_before};
+}
+
+/// Those that are new, or gone, or elsewhere, and those of which more or less is left.
+std::uint64_t LitScene::touchedSurfaces(std::size_t before, const scene::PatchMap& map) const {
+  std::uint64_t touched = 0, found = 0;
+  for (std::size_t s = 0; s < patches_->surfaces.size(); ++s) {
+    const auto& surface = patches_->surfaces[s];
+    const auto first = map.leaf_altered.begin() + surface.first_leaf;
+    touched += std::find(first, first + std::int64_t{surface.width} * surface.height, true) !=
+                       first + std::int64_t{surface.width} * surface.height
+                   ? 1
+                   : 0;
+    found += map.surface_before[s] != scene::kNone ? 1 : 0;
+  }
+  return touched + before - found;
 }
 
 solver::LightSources LitScene::lightSources(const scene::Scene& scene) const {
@@ -47,14 +82,14 @@ double LitScene::emittedPower() const {
   return power;
 }
 
-void LitScene::makeSolver() {
+void LitScene::makeSolver(const solver::FormerSolver* former) {
   solver::SolverSettings settings;
   settings.target_error = settings_.target_error;
   settings.seed = settings_.seed;
   settings.paper_mode = settings_.paper_mode;
   settings.link_memory = settings_.link_memory_bytes;
   sources_ = lightSources(*scene_);
-  solver_ = solver::makeSolver(patches_, materials_, transport_, settings, sources_);
+  solver_ = solver::makeSolver(patches_, materials_, transport_, settings, sources_, former);
   solver_power_ = power_ = emittedPower();
 }
 

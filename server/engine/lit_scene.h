@@ -11,6 +11,7 @@
 #include "server/engine/scene_change.h"
 #include "server/scene/document.h"
 #include "server/scene/lightmap.h"
+#include "server/scene/lineage.h"
 #include "server/scene/patch_scene.h"
 #include "server/solver/solver.h"
 
@@ -18,18 +19,31 @@ namespace radiosity::engine {
 
 class LitScene {
  public:
-  /// Imports, charts and prepares a solve. The transport stays as it is until upload().
+  /// Imports and charts. The transport stays as it is until upload().
   [[nodiscard]] static Result<std::unique_ptr<LitScene>> make(scene::Document document, const SolveSettings& settings,
                                                               solver::Transport& transport);
-  /// The same for a document that has been imported already.
+  /// The same for a document that has been imported already. With a former scene that this one is an edit of, charts
+  /// that the edit left alone stay as they are.
   [[nodiscard]] static Result<std::unique_ptr<LitScene>> make(scene::EditedDocument edited,
                                                               const SolveSettings& settings,
-                                                              solver::Transport& transport);
+                                                              solver::Transport& transport,
+                                                              const LitScene* former = nullptr);
+
+  /// Whether a scene made of the same document by another process has the same charts, so that a saved solve fits it. One
+  /// whose charts stayed where a former scene had them is its own.
+  [[nodiscard]] bool isReproducible() const { return reproducible_; }
 
   /// Gives the geometry to the transport; must come before the solver's first step.
   [[nodiscard]] Result<void> upload() const { return transport_.setScene(patches_); }
 
   [[nodiscard]] SceneChange changeTo(const scene::Scene& next) const { return changeBetween(*scene_, next); }
+
+  /// Prepares the solve; must come after upload(). What can be kept of a former scene's links is taken from it: its
+  /// solver is of no use afterwards. Returns what an edit that made this scene of that one touched.
+  struct Affected {
+    std::uint64_t surfaces = 0, shots = 0;
+  };
+  Affected startSolve(LitScene* former = nullptr);
 
   /// Surfaces that a change to `next` would touch; all of them where it changes geometry or lights.
   [[nodiscard]] std::uint64_t affectedBy(const SceneChange& change, const scene::Scene& next) const;
@@ -78,8 +92,9 @@ class LitScene {
         settings_(settings),
         transport_(transport),
         scene_(std::make_shared<const scene::Scene>(std::move(edited.scene))) {}
-  void makeSolver();
+  void makeSolver(const solver::FormerSolver* former = nullptr);
   void updateSolver(bool materials, bool lights);
+  [[nodiscard]] std::uint64_t touchedSurfaces(std::size_t before, const scene::PatchMap& map) const;
   [[nodiscard]] double emittedPower() const;
   [[nodiscard]] solver::LightSources lightSources(const scene::Scene& scene) const;
 
@@ -89,6 +104,7 @@ class LitScene {
   std::shared_ptr<const scene::Scene> scene_;
   std::shared_ptr<const scene::PatchScene> patches_;
   scene::PatchMaterials materials_;
+  bool reproducible_ = true;
   std::unique_ptr<solver::Solver> solver_;
   solver::LightSources sources_;                // that the solver knows of
   double power_ = 0.0;                          // emitted, all channels

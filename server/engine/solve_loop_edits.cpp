@@ -32,8 +32,9 @@ Result<LoadOutcome> SolveLoop::install(Result<scene::Document> document) {
   const SolveState before = std::exchange(state_, SolveState::kLoading);
   updateStatus(true);
   auto next = History::nextLoad(revision_ + 1, document->name);
-  const auto keep = [&](const LitScene& made) { return keepLoad(next, made.document()); };
-  if (const auto lit = relight(LitScene::make(std::move(*document), settings_, *transport_), false, keep); !lit) {
+  const auto keep = [&](const LitScene& made, const LitScene::Affected&) { return keepLoad(next, made.document()); };
+  const auto lit = relight(LitScene::make(std::move(*document), settings_, *transport_), Relation::kOther, keep);
+  if (!lit) {
     if (state_ == SolveState::kLoading) state_ = before;
     updateStatus(true);
     return tl::unexpected<Error>(lit.error());
@@ -48,25 +49,37 @@ Result<LoadOutcome> SolveLoop::install(Result<scene::Document> document) {
   return LoadOutcome{revision_, lit_->warnings()};
 }
 
-Result<void> SolveLoop::relight(Result<std::unique_ptr<LitScene>> made, bool fade,
-                                const std::function<Result<void>(const LitScene&)>& keep) {
-  if (!made) return tl::unexpected<Error>(made.error());
-  auto uploaded = (*made)->upload();
-  if (uploaded && keep) uploaded = keep(**made);
-  if (!uploaded) {
-    if (lit_) {
-      if (const auto back = lit_->upload(); !back) {
-        failure_ = back.error().text();
-        endSolve(SolveState::kFailed);
-      }
-    }
-    return uploaded;
+/// What was lit before goes on, since what should replace it cannot.
+void SolveLoop::takeBack(bool links_are_gone) {
+  if (!lit_) return;
+  if (const auto back = lit_->upload(); !back) {
+    failure_ = back.error().text();
+    endSolve(SolveState::kFailed);
+  } else if (links_are_gone) {
+    lit_->restart(settings_);
+    beginSolve();
   }
-  if (fade && lit_) (*made)->fadeFrom(*lit_);
+}
+
+Result<LitScene::Affected> SolveLoop::relight(Result<std::unique_ptr<LitScene>> made, Relation relation,
+                                              const KeepMade& keep) {
+  if (!made) return tl::unexpected<Error>(made.error());
+  if (auto uploaded = (*made)->upload(); !uploaded) {
+    takeBack(false);
+    return tl::unexpected<Error>(uploaded.error());
+  }
+  auto* former = relation == Relation::kEdited ? lit_.get() : nullptr;
+  if (former != nullptr) (*made)->fadeFrom(*former);
+  // What a solve that failed has measured may be a part of what it thinks it has.
+  const auto affected = (*made)->startSolve(state_ == SolveState::kFailed ? nullptr : former);
+  if (auto kept = keep ? keep(**made, affected) : Result<void>(); !kept) {
+    takeBack(former != nullptr);
+    return tl::unexpected<Error>(kept.error());
+  }
   lit_ = std::move(*made);
   renderer_lost_ = false;  // it took the scene
   publisher_.reset();
-  return {};
+  return affected;
 }
 
 void SolveLoop::patch(PatchRequest request, Callback<PatchOutcome> done) {
@@ -147,14 +160,13 @@ Result<PatchOutcome> SolveLoop::adopt(scene::EditedDocument edited, const Keep& 
 Result<PatchOutcome> SolveLoop::rebuild(scene::EditedDocument edited, const Keep& keep) {
   PatchOutcome outcome;
   outcome.revision = revision_ + 1;
-  outcome.affected_shots = lit_->solver().shots();
-  outcome.affected_surfaces = lit_->patches().surfaces.size();
-  const auto keep_made = [&](const LitScene& made) {
-    outcome.affected_surfaces = std::max<std::uint64_t>(outcome.affected_surfaces, made.patches().surfaces.size());
-    outcome.affected_surfaces = std::max<std::uint64_t>(outcome.affected_surfaces, 1);  // pages are new even if empty
+  const auto keep_made = [&](const LitScene&, const LitScene::Affected& affected) {
+    outcome.affected_shots = affected.shots;
+    outcome.affected_surfaces = std::max<std::uint64_t>(affected.surfaces, 1);  // pages are new even if empty
     return keep(outcome);
   };
-  if (const auto lit = relight(LitScene::make(std::move(edited), settings_, *transport_), true, keep_made); !lit)
+  auto made = LitScene::make(std::move(edited), settings_, *transport_, lit_.get());
+  if (const auto lit = relight(std::move(made), Relation::kEdited, keep_made); !lit)
     return tl::unexpected<Error>(lit.error());
   return outcome;
 }
@@ -181,7 +193,7 @@ Result<SolveSettings> SolveLoop::applySettings(const SolveSettings& settings) {
     return settings_;
   }
   if (before.texels != settings.texels || before.texel_size_m != settings.texel_size_m) {
-    if (const auto lit = relight(LitScene::make(lit_->document(), settings, *transport_), true); !lit) {
+    if (const auto lit = relight(LitScene::make(lit_->document(), settings, *transport_), Relation::kEdited); !lit) {
       settings_ = before;
       (void)keepSettings(before);
       updateStatus(true);

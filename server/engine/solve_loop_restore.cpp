@@ -124,7 +124,8 @@ Result<void> SolveLoop::restoreSolve(const scene::Document& document) {
     }
   }
   if (!lit_) {
-    if (auto lit = relight(LitScene::make(document, settings_, *transport_), false); !lit) return lit;
+    if (auto lit = relight(LitScene::make(document, settings_, *transport_), Relation::kOther); !lit)
+      return tl::unexpected<Error>(lit.error());
   }
   beginSolve();
   seconds_ = seconds;
@@ -150,6 +151,7 @@ Result<std::unique_ptr<LitScene>> SolveLoop::resumedScene(const scene::Document&
   settings.target_error = head.target_error;
   auto lit = LitScene::make(std::move(then), settings, *transport_);
   if (!lit) return lit;
+  (void)(*lit)->startSolve();
   if (!(*lit)->restore(from)) return fail(ErrorCode::kBadInput, "it does not fit the scene");
   if (!is_newest) {  // the solve can take in whatever has changed of light and colour since
     auto scene = scene::importScene(document);

@@ -85,7 +85,13 @@ void SolveLoop::checkpointIfDue() {
                                               std::chrono::duration_cast<Clock::duration>(written)});
 }
 
+/// True: nothing is left to be done about it now, be it that none can be had.
 bool SolveLoop::takeCheckpoint() {
+  if (!lit_->isReproducible()) {  // after a restart the solve of a scene whose geometry was edited begins anew
+    checkpoint_revision_ = revision_;
+    checkpoint_shots_ = lit_->solver().shots();
+    return true;
+  }
   ArchiveWriter to(options_.checkpoint_bytes);
   auto head = headOf(settings_);
   head.epoch = past_.epoch;

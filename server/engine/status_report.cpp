@@ -58,6 +58,10 @@ void addCounters(const LitScene& lit, Status& status) {
     counters["links.solutions"] = static_cast<double>(links.solutions);
     counters["links.sweeps"] = static_cast<double>(links.sweeps);
     counters["links.rows"] = static_cast<double>(links.rows);
+    counters["skip.shotsKept"] = static_cast<double>(links.kept);
+    counters["edits.shotsRepaired"] = static_cast<double>(links.repaired);
+    counters["edits.linksRepaired"] = static_cast<double>(links.repaired_links);
+    counters["edits.shotsRetaken"] = static_cast<double>(links.retaken);
     counters["skip.shotsReplayed"] = static_cast<double>(links.replayed);
     counters["skip.rowsOfChannels"] = static_cast<double>(links.rows_saved);
   } else {

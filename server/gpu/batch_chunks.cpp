@@ -42,6 +42,8 @@ struct Packed {
   std::vector<solver::HemicubeFrame> points;
   std::vector<solver::ParallelShot> parallel;
   std::vector<solver::ParallelView> views;
+  std::vector<solver::NodeRun> receivers;
+  std::vector<scene::ChangedBox> boxes;
 };
 
 /// The directions of a sky come once, even where several shots of the chunk are parts of it.
@@ -70,6 +72,15 @@ void packGather(const solver::ShotBatch& batch, const Chunk& chunk, Packed& pack
     const auto first = batch.points.begin() + shot.first_point;
     shot.first_point = static_cast<std::uint32_t>(packed.points.size());
     packed.points.insert(packed.points.end(), first, first + shot.point_count);
+    const auto runs = batch.receivers.begin() + shot.first_run;
+    const auto boxes = batch.boxes.begin() + shot.first_box;
+    shot.first_run = static_cast<std::uint32_t>(packed.receivers.size());
+    packed.receivers.insert(packed.receivers.end(), runs, runs + shot.run_count);
+    // Nearly always all shots of a batch name the same boxes.
+    const bool known = i > chunk.first && shot.box_count > 0 && batch.gather[i - 1].first_box == shot.first_box &&
+                       batch.gather[i - 1].box_count == shot.box_count;
+    shot.first_box = known ? packed.gather.back().first_box : static_cast<std::uint32_t>(packed.boxes.size());
+    if (!known) packed.boxes.insert(packed.boxes.end(), boxes, boxes + shot.box_count);
     packed.gather.push_back(shot);
   }
 }
@@ -114,6 +125,8 @@ std::vector<std::byte> packChunk(const solver::ShotBatch& batch, const Chunk& ch
   head.point_lights = static_cast<std::uint32_t>(point_lights.size());
   head.parallel = static_cast<std::uint32_t>(packed.parallel.size());
   head.views = static_cast<std::uint32_t>(packed.views.size());
+  head.receivers = static_cast<std::uint32_t>(packed.receivers.size());
+  head.boxes = static_cast<std::uint32_t>(packed.boxes.size());
   std::vector<std::byte> body;
   appendValue(body, head);
   appendSpan(body, scatter);
@@ -122,6 +135,8 @@ std::vector<std::byte> packChunk(const solver::ShotBatch& batch, const Chunk& ch
   appendSpan(body, point_lights);
   appendSpan(body, std::span<const solver::ParallelShot>(packed.parallel));
   appendSpan(body, std::span<const solver::ParallelView>(packed.views));
+  appendSpan(body, std::span<const solver::NodeRun>(packed.receivers));
+  appendSpan(body, std::span<const scene::ChangedBox>(packed.boxes));
   return body;
 }
 

@@ -110,7 +110,7 @@ std::size_t HemicubeRenderer::select(std::uint32_t resolution, std::span<const H
   for (std::size_t i = 0; i < views.size(); ++i) {
     const auto faces = faceViews(views[i].frame, resolution, views[i].level_bias, static_cast<std::uint32_t>(i));
     face_views_.insert(face_views_.end(), faces.begin(), faces.end());
-    culler_.select(views[i].frame, resolution, selections_[i]);
+    culler_.select(views[i].frame, resolution, selections_[i], views[i].window ? &*views[i].window : nullptr);
     counters.triangles_between += selections_[i].between;
     counters.triangles_culled += RAD_FACES * culler_.triangleCount();
     for (const auto& list : selections_[i].second) waiting += list.count / 3;

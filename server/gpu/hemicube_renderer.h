@@ -22,6 +22,7 @@ namespace radiosity::gpu {
 struct HemicubeView {
   solver::HemicubeFrame frame;
   float level_bias = 0.0F;
+  std::optional<ViewWindow> window = std::nullopt;  ///< pixels outside need not be drawn
 };
 
 /// What the pixels hold.

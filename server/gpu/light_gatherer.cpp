@@ -26,6 +26,10 @@ bool isCrack(std::span<const std::uint32_t> items, std::size_t first, std::size_
   return true;
 }
 
+/// So many pixels around the places of named receivers are drawn: their own pixel's middle, and its neighbours', lie
+/// within.
+constexpr float kPixelsAround = 0.8F;
+
 /// So many of a receiver's spots count for one shot of a reflecting node; all of them for a light.
 constexpr std::uint32_t kNodeSpots = 4;
 
@@ -281,6 +285,24 @@ void LightGatherer::weighLost(const solver::HemicubeFrame& point, std::span<cons
   }
 }
 
+void LightGatherer::weighLostInside(const ViewWindow& window, const solver::HemicubeFrame& point,
+                                    std::span<const std::uint32_t> items, std::uint32_t resolution,
+                                    const HemicubeWeights& weights, Lost& lost) const {
+  for (std::uint32_t row = 0; row < 3 * resolution; ++row) {
+    const auto inside = pixelsInside(window, point, resolution, row);
+    for (std::size_t i = std::size_t{row} * resolution + inside.first; i < std::size_t{row} * resolution + inside.end;
+         ++i) {
+      const auto item = items[i];
+      if (item == RAD_ITEM_NONE) {
+        if (!isCrack(items, i, i + 1, resolution)) lost.escaped += weights.pixel(i);
+        continue;
+      }
+      const bool back = glm::dot(receivers_->plane(item).normal, point.origin) <= receivers_->plane(item).distance;
+      if (receivers_->absorbs(item, back)) lost.absorbed += weights.pixel(i);
+    }
+  }
+}
+
 float LightGatherer::visibility(std::size_t sums, std::size_t i, std::size_t points) const {
   const float weight = lit_.weight[sums][i];
   return weight > 0.0F ? lit_.visible_weight[sums][i] / weight : lit_.visible[sums][i] / static_cast<float>(points);
@@ -323,8 +345,59 @@ void LightGatherer::deliver(const solver::GatherShot& shot, std::size_t half, st
   }
 }
 
-void LightGatherer::beginLinks(const solver::GatherShot& shot) {
-  findLit(shot);
+/// The parts of groups that runs of leaves name.
+template <typename Take>
+void LightGatherer::forEachGroup(std::span<const solver::NodeRun> named, const Take& take) const {
+  const auto& all = receivers_->all();
+  auto group = receivers_->groups().begin();
+  const auto end = receivers_->groups().end();
+  for (const auto& run : named) {
+    const auto before = [](const Receivers::Receiver& receiver, std::uint32_t node) { return receiver.node < node; };
+    while (group != end && (group->count == 0 || all[group->first + group->count - 1].node < run.first_node)) ++group;
+    for (auto part = group; part != end; ++part) {
+      if (part->count == 0) continue;
+      const auto first = all.begin() + static_cast<std::ptrdiff_t>(part->first);
+      const auto last = first + static_cast<std::ptrdiff_t>(part->count);
+      if (first->node >= run.first_node + run.count) break;
+      const auto low = std::lower_bound(first, last, run.first_node, before);
+      const auto high = std::lower_bound(low, last, run.first_node + run.count, before);
+      if (low == high) continue;
+      take(Receivers::Group{part->surface, static_cast<std::size_t>(low - all.begin()),
+                            static_cast<std::size_t>(high - low), part->side});
+    }
+  }
+}
+
+std::optional<ViewWindow> LightGatherer::windowOf(const solver::GatherShot& shot, const solver::HemicubeFrame& point,
+                                                  std::span<const solver::NodeRun> named,
+                                                  std::span<const scene::ChangedBox> boxes) {
+  places_.clear();
+  forEachGroup(named, [&](const Receivers::Group& group) {
+    if (behind(shot, receivers_->patches().surfaces[group.surface])) return;
+    for (std::size_t i = group.first; i < group.first + group.count; ++i) {
+      const auto& receiver = receivers_->all()[i];
+      const auto spots = receiver.hasSpots() ? scene::kLeafSpots : 1;
+      for (std::uint32_t k = 0; k < spots; ++k) {
+        const auto place =
+            spots > 1 ? receivers_->spot(receiver, k) : receivers_->place(receiver, shot.receiver_jitter);
+        if (glm::dot(shot.normal, place.point - shot.corners[0]) > kInPlane) places_.push_back(place.point);
+      }
+    }
+  });
+  return windowAround(point, places_, boxes, kPixelsAround * 2.0F / static_cast<float>(shot.resolution));
+}
+
+void LightGatherer::beginLinks(const solver::GatherShot& shot, std::span<const solver::NodeRun> named) {
+  if (named.empty()) {
+    findLit(shot);
+  } else {
+    lit_count_ = weighed_ = 0;
+    lit_valid_ = false;
+    forEachGroup(named, [&](const Receivers::Group& group) {
+      if (!behind(shot, receivers_->patches().surfaces[group.surface])) findLitGroup(shot, group);
+    });
+    weighWhole(shot);
+  }
   for (auto* sum : {&lit_.weight[0], &lit_.visible_weight[0], &lit_.visible[0]}) {
     std::fill_n(sum->begin(), lit_count_, 0.0F);
   }
@@ -333,9 +406,14 @@ void LightGatherer::beginLinks(const solver::GatherShot& shot) {
 }
 
 void LightGatherer::look(const solver::GatherShot& shot, const solver::HemicubeFrame& point,
-                         std::span<const std::uint32_t> items, const HemicubeWeights& weights) {
+                         std::span<const std::uint32_t> items, const HemicubeWeights& weights,
+                         const ViewWindow* window) {
   testPoint(shot, point, items, 0);
-  weighLost(point, items, shot.resolution, weights, look_lost_);
+  if (window != nullptr) {
+    weighLostInside(*window, point, items, shot.resolution, weights, look_lost_);
+  } else {
+    weighLost(point, items, shot.resolution, weights, look_lost_);
+  }
   ++look_count_;
 }
 

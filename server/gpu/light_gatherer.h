@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "server/gpu/hemicube_renderer.h"
 #include "server/gpu/hemicube_weights.h"
 #include "server/gpu/receivers.h"
+#include "server/gpu/view_window.h"
 
 namespace radiosity::gpu {
 
@@ -29,9 +31,14 @@ class LightGatherer {
 
   /// Links of one shot, in steps, so that item buffers of several shots can be drawn at once: begin, one look for each
   /// point, finish.
-  void beginLinks(const solver::GatherShot& shot);
+  /// Of shots that want links to some receivers only, `named` are these, ascending.
+  void beginLinks(const solver::GatherShot& shot, std::span<const solver::NodeRun> named = {});
   void look(const solver::GatherShot& shot, const solver::HemicubeFrame& point, std::span<const std::uint32_t> items,
-            const HemicubeWeights& weights);
+            const HemicubeWeights& weights, const ViewWindow* window = nullptr);
+  /// What a look at some receivers, and at boxes, can show; nothing where that is nearly all.
+  [[nodiscard]] std::optional<ViewWindow> windowOf(const solver::GatherShot& shot, const solver::HemicubeFrame& point,
+                                                   std::span<const solver::NodeRun> named,
+                                                   std::span<const scene::ChangedBox> boxes);
   void finishLinks(const solver::GatherShot& shot, solver::LinkSample& sample, solver::TransportCounters& counters);
 
  private:
@@ -51,6 +58,11 @@ class LightGatherer {
     std::uint64_t escaped = 0, absorbed = 0;
   };
 
+  template <typename Take>
+  void forEachGroup(std::span<const solver::NodeRun> named, const Take& take) const;
+  void weighLostInside(const ViewWindow& window, const solver::HemicubeFrame& point,
+                       std::span<const std::uint32_t> items, std::uint32_t resolution, const HemicubeWeights& weights,
+                       Lost& lost) const;
   void findLit(const solver::GatherShot& shot);
   void findLitGroup(const solver::GatherShot& shot, const Receivers::Group& group);
   void weighWhole(const solver::GatherShot& shot);
@@ -78,6 +90,7 @@ class LightGatherer {
   Lost look_lost_;           ///< of the looks since beginLinks
   std::size_t look_count_ = 0;
   std::vector<std::uint32_t> starts_;
+  std::vector<glm::vec3> places_;  ///< of named receivers
 };
 
 }  // namespace radiosity::gpu

@@ -66,17 +66,24 @@ void ShotRunner::measureGather(const ShotSpan& shots, const solver::Transport::T
     for (; last < looks.size() && views.size() < renderer_.capacity(resolution) &&
            shots.gather[looks[last].shot].resolution == resolution;
          ++last) {
-      views.push_back({shots.points[looks[last].point]});
+      const auto& shot = shots.gather[looks[last].shot];
+      const auto& point = shots.points[looks[last].point];
+      views.push_back({point, 0.0F, std::nullopt});
+      if (shot.box_count > 0)
+        views.back().window = gatherer_.windowOf(shot, point, shots.receivers.subspan(shot.first_run, shot.run_count),
+                                                 shots.boxes.subspan(shot.first_box, shot.box_count));
     }
     const auto images = renderer_.render(HemicubePass::kItems, resolution, views, counters);
     const auto start = Clock::now();
     const auto pixels = hemicubePixels(resolution);
     for (auto i = first; i < last; ++i) {
       const auto& shot = shots.gather[looks[i].shot];
-      if (looks[i].point == shot.first_point) gatherer_.beginLinks(shot);
+      if (looks[i].point == shot.first_point)
+        gatherer_.beginLinks(shot, shots.receivers.subspan(shot.first_run, shot.run_count));
       const auto& frame = shots.points[looks[i].point];
-      gatherer_.look(shot, frame, images.subspan((i - first) * pixels, pixels),
-                     weights_.get(resolution, frame.lattice));
+      const auto& window = views[i - first].window;
+      gatherer_.look(shot, frame, images.subspan((i - first) * pixels, pixels), weights_.get(resolution, frame.lattice),
+                     window ? &*window : nullptr);
       if (looks[i].point + 1 == shot.first_point + shot.point_count) {
         solver::LinkSample links;
         gatherer_.finishLinks(shot, links, counters);

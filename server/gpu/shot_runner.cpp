@@ -46,8 +46,8 @@ Result<void> checkPunctual(const ShotSpan& shots) {
 }  // namespace
 
 ShotSpan spanOf(const solver::ShotBatch& batch) {
-  return {batch.mode,   batch.flux_scale,   batch.scatter,  batch.gather,
-          batch.points, batch.point_lights, batch.parallel, batch.views};
+  return {batch.mode,         batch.flux_scale, batch.scatter, batch.gather,    batch.points,
+          batch.point_lights, batch.parallel,   batch.views,   batch.receivers, batch.boxes};
 }
 
 Result<void> checkShots(const ShotSpan& shots) {
@@ -64,11 +64,14 @@ Result<void> checkShots(const ShotSpan& shots) {
   }
   for (std::size_t i = 0; i < shots.gather.size(); ++i) {
     const auto& shot = shots.gather[i];
-    const bool points_fit = inside(shot.first_point, shot.point_count, shots.points.size());
+    const bool points_fit = inside(shot.first_point, shot.point_count, shots.points.size()) &&
+                            inside(shot.first_run, shot.run_count, shots.receivers.size()) &&
+                            inside(shot.first_box, shot.box_count, shots.boxes.size());
     if (!goodResolution(shot.resolution) || shot.half > solver::kBothHalves || shot.corner_count < 3 ||
         shot.corner_count > solver::kMaxCorners || !points_fit) {
       return fail(ErrorCode::kInternal,
-                  "resolution must be even and 4..2048, half 0, 1 or both, 3 to 8 corners, points inside the batch",
+                  "resolution must be even and 4..2048, half 0, 1 or both, 3 to 8 corners, points, receivers and boxes "
+                  "inside the batch",
                   "gather shot " + std::to_string(i));
     }
     for (const auto& point : shots.points.subspan(shot.first_point, shot.point_count)) {

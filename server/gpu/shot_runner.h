@@ -27,6 +27,8 @@ struct ShotSpan {
   std::span<const solver::PointShot> point_lights;
   std::span<const solver::ParallelShot> parallel;
   std::span<const solver::ParallelView> views;
+  std::span<const solver::NodeRun> receivers;  ///< of gather shots that want not all
+  std::span<const scene::ChangedBox> boxes;
 };
 [[nodiscard]] ShotSpan spanOf(const solver::ShotBatch& batch);
 

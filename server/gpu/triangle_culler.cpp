@@ -24,6 +24,9 @@ constexpr float kLargeSteradian = 0.006F;
 /// Half a pixel's part by which rasterisers may move corners (OpenGL asks for 4 bits of subpixel precision), and more.
 constexpr float kSampleMargin = 0.0625F;
 
+/// Of heights above the planes of a window (unit box): rounding.
+constexpr float kWindowMargin = 1e-6F;
+
 constexpr std::uint32_t kFaces = 0x1FU;  // bit f: face f may see it
 constexpr int kBackBit = 7;              // it shows its back
 constexpr int kInsideBit = 8;            // bit 8 + f: it lies wholly inside face f's pyramid
@@ -171,6 +174,25 @@ __attribute__((target_clones("avx2", "default"))) void classify(const View& view
   }
 }
 
+/// Takes from all faces what lies wholly outside one plane of a window.
+__attribute__((target_clones("avx2", "default"))) void cutAway(const glm::vec3& o, const ViewWindow& window,
+                                                               const Triangles& from, std::size_t first,
+                                                               std::size_t end, std::uint32_t* __restrict seen) {
+  const auto planes = window.planes;
+  for (std::size_t i = first; i < end; ++i) {
+    bool out = false;
+    for (std::size_t k = 0; k < 4; ++k) {
+      float h[3];
+      for (std::size_t c = 0; c < 3; ++c) {
+        h[c] = (from.corner[c][0][i] - o.x) * planes[k].x + (from.corner[c][1][i] - o.y) * planes[k].y +
+               (from.corner[c][2][i] - o.z) * planes[k].z;
+      }
+      out |= largest(h[0], h[1], h[2]) < -kWindowMargin;
+    }
+    seen[i] &= ~(out ? kFaces : 0U);
+  }
+}
+
 /// The same for a box.
 Spans spansOf(const HemicubeAxes& axes, const TriangleClusters::Cluster& cluster) {
   const auto centre = cluster.centre - axes.origin;
@@ -225,7 +247,8 @@ TriangleCuller::TriangleCuller(const scene::PatchScene& patches, const Culling& 
   }
 }
 
-void TriangleCuller::select(const solver::HemicubeFrame& frame, std::uint32_t resolution, Selection& selection) {
+void TriangleCuller::select(const solver::HemicubeFrame& frame, std::uint32_t resolution, Selection& selection,
+                            const ViewWindow* window) {
   for (auto* lists : {&selection.first, &selection.second}) {
     for (auto& list : *lists) list.count = 0, list.runs.clear();
   }
@@ -248,7 +271,10 @@ void TriangleCuller::select(const solver::HemicubeFrame& frame, std::uint32_t re
     const auto& cluster = clusters_.clusters[number];
     const std::uint32_t faces = culling_.faces ? facesOf(spansOf(axes, cluster)) : kFaces;
     if (faces == 0) continue;
+    if (window != nullptr && window->excludes(cluster.centre - axes.origin, cluster.extent + kWindowMargin)) continue;
     classify(view, from, cluster.first, cluster.first + cluster.count, seen_.data());
+    if (window != nullptr)
+      cutAway(axes.origin, *window, from, cluster.first, cluster.first + cluster.count, seen_.data());
     const auto away = glm::max(glm::abs(axes.origin - cluster.centre) - cluster.extent, glm::vec3(0.0F));
     const bool near = !culling_.hidden || glm::dot(away, away) < glm::dot(cluster.extent, cluster.extent);
     emit(cluster, number, faces, near, selection);

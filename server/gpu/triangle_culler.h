@@ -15,6 +15,7 @@
 #include "server/gpu/closed_solids.h"
 #include "server/gpu/hemicube_views.h"
 #include "server/gpu/triangle_clusters.h"
+#include "server/gpu/view_window.h"
 #include "server/scene/patch_scene.h"
 
 namespace radiosity::gpu {
@@ -53,7 +54,9 @@ class TriangleCuller {
   };
 
   /// `selection` is overwritten.
-  void select(const solver::HemicubeFrame& frame, std::uint32_t resolution, Selection& selection);
+  /// With a window, only what may be seen through it.
+  void select(const solver::HemicubeFrame& frame, std::uint32_t resolution, Selection& selection,
+              const ViewWindow* window = nullptr);
 
   /// Takes from the second lists what the depth image of the first hides (layout of hemicube_weights.h, RAD_NEAR /
   /// distance along the face's axis). Returns the triangles taken out.

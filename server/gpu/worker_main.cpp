@@ -67,9 +67,12 @@ class Worker {
     const auto point_lights = from.values<solver::PointShot>(head.point_lights);
     const auto parallel = from.values<solver::ParallelShot>(head.parallel);
     const auto views = from.values<solver::ParallelView>(head.views);
+    const auto receivers = from.values<solver::NodeRun>(head.receivers);
+    const auto boxes = from.values<scene::ChangedBox>(head.boxes);
     if (!from.good() || !sink_) return fail(ErrorCode::kInternal, "a chunk is cut short or came before the scene");
     const auto mode = static_cast<solver::LinkMode>(head.mode);
-    const ShotSpan shots{mode, head.flux_scale, scatter, gather, points, point_lights, parallel, views};
+    const ShotSpan shots{mode,         head.flux_scale, scatter, gather,    points,
+                         point_lights, parallel,        views,   receivers, boxes};
     std::vector<std::byte> links;
     const auto pack = [&](std::size_t, const solver::LinkSample& sample) { packLinks(links, sample); };
     const auto counters = head.measure != 0 ? runner_->measure(shots, pack) : runner_->run(shots, *sink_);

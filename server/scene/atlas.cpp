@@ -5,7 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
+#include <numeric>
+#include <optional>
 #include <unordered_map>
 
 #include "common/check.h"
@@ -17,6 +20,11 @@ double triangleArea(const std::array<glm::dvec2, 3>& t) {
   const glm::dvec2 a = t[1] - t[0], b = t[2] - t[0];
   return 0.5 * std::abs(a.x * b.y - a.y * b.x);
 }
+
+/// Cells of pages that are looked at for free places, times blocks to be placed.
+constexpr std::uint64_t kMostLooks = std::uint64_t{1} << 27U;
+/// Waste of so many texels is none.
+constexpr double kSmallPage = 64.0 * 64.0;
 
 std::uint32_t texelsAlong(double length, double texel) {
   return static_cast<std::uint32_t>(std::clamp(std::round(length / texel), 1.0, 1e9));
@@ -104,10 +112,52 @@ struct Block {
   std::uint32_t page = 0, x = 0, y = 0;
 };
 
+struct TexelRect {
+  std::uint32_t x = 0, y = 0, width = 0, height = 0;
+};
+
+/// Which texels of a page are taken.
+class PageSpace {
+ public:
+  explicit PageSpace(const Page& page) : page_(page), taken_(cells(), false) {}
+
+  [[nodiscard]] std::uint64_t cells() const { return std::uint64_t{page_.width} * page_.height; }
+
+  void take(const TexelRect& rect) {
+    for (std::uint32_t y = rect.y; y < std::min(rect.y + rect.height, page_.height); ++y)
+      for (std::uint32_t x = rect.x; x < std::min(rect.x + rect.width, page_.width); ++x) taken_[index(x, y)] = true;
+  }
+
+  /// The first place from the top where a rectangle is free.
+  [[nodiscard]] std::optional<glm::uvec2> findFree(std::uint32_t width, std::uint32_t height) const {
+    for (std::uint32_t y = 0; y + height <= page_.height; ++y)
+      for (std::uint32_t x = 0; x + width <= page_.width;) {
+        const auto next = blockedUntil({x, y, width, height});
+        if (next == x) return glm::uvec2(x, y);
+        x = next;
+      }
+    return std::nullopt;
+  }
+
+ private:
+  [[nodiscard]] std::size_t index(std::uint32_t x, std::uint32_t y) const { return std::size_t{y} * page_.width + x; }
+  /// rect.x if it is free; else the column after one that is taken.
+  [[nodiscard]] std::uint32_t blockedUntil(const TexelRect& rect) const {
+    for (std::uint32_t y = rect.y; y < rect.y + rect.height; ++y)
+      for (std::uint32_t x = rect.x + rect.width; x-- > rect.x;)
+        if (taken_[index(x, y)]) return x + 1;
+    return rect.x;
+  }
+
+  Page page_;
+  std::vector<bool> taken_;
+};
+
 class LayoutMaker {
  public:
-  LayoutMaker(const Scene& scene, const std::vector<Chart>& charts, double texel, const ChartOptions& options)
-      : scene_(scene), charts_(charts), texel_(texel), gutter_(options.gutter) {
+  LayoutMaker(const Scene& scene, const std::vector<Chart>& charts, double texel, const ChartOptions& options,
+              const FormerPlaces& former)
+      : scene_(scene), charts_(charts), former_(former), texel_(texel), gutter_(options.gutter) {
     max_page_ = std::clamp(options.max_page_size, 16U, 32768U) & ~3U;
     max_chart_ = max_page_ - std::min(gutter_, max_page_ / 2);
   }
@@ -134,7 +184,7 @@ class LayoutMaker {
                       "the page size "
                       "or split the mesh",
                       clamped_, max_page_, first_clamped_));
-    if (auto packed = pack(); !packed) return tl::unexpected(packed.error());
+    if (auto packed = packAll(); !packed) return tl::unexpected(packed.error());
     for (const Block& block : blocks_)
       for (const std::uint32_t c : block.charts) {
         atlas_.grids[c].page = block.page;
@@ -223,10 +273,92 @@ class LayoutMaker {
     return stbrp_pack_rects(&context, rects.data(), static_cast<int>(rects.size())) != 0;
   }
 
+  Result<void> packAll() {
+    std::vector<std::size_t> all(blocks_.size());
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    if (former_.of_chart.empty()) return pack(all);
+    atlas_.pages = former_.pages;
+    const auto left = keepPlaces();
+    if (auto packed = pack(left); !packed) return packed;
+    dropEmptyPages();
+    if (!isWasteful()) return {};
+    atlas_.pages.clear();
+    return pack(all);
+  }
+
+  /// Returns the blocks that found no place on the pages there are.
+  std::vector<std::size_t> keepPlaces() {
+    std::vector<PageSpace> space;
+    for (const Page& page : atlas_.pages) space.emplace_back(page);
+    std::vector<std::size_t> fresh, left;
+    for (std::size_t i = 0; i < blocks_.size(); ++i) {
+      if (takeFormer(blocks_[i])) {
+        space[blocks_[i].page].take(outer(blocks_[i]));
+      } else {
+        fresh.push_back(i);
+      }
+    }
+    std::ranges::stable_sort(fresh, std::greater{}, [&](std::size_t i) { return blocks_[i].height; });
+    std::uint64_t looks = 0;  // what looking everywhere costs is bounded; a new page is always free
+    for (const std::size_t i : fresh) {
+      Block& block = blocks_[i];
+      bool found = false;
+      for (std::uint32_t p = 0; p < space.size() && !found; ++p) {
+        if ((looks += space[p].cells()) > kMostLooks) break;
+        const auto at = space[p].findFree(block.width + gutter_, block.height + gutter_);
+        if (!at) continue;
+        found = true;
+        block.page = p;
+        block.x = at->x + gutter_ / 2;
+        block.y = at->y + gutter_ / 2;
+        space[p].take(outer(block));
+      }
+      if (!found) left.push_back(i);
+    }
+    return left;
+  }
+
+  [[nodiscard]] TexelRect outer(const Block& block) const {
+    return {block.x - gutter_ / 2, block.y - gutter_ / 2, block.width + gutter_, block.height + gutter_};
+  }
+
+  /// All its charts have the size they had, and lie to each other as they lay.
+  bool takeFormer(Block& block) const {
+    for (const std::uint32_t c : block.charts) {
+      const auto& place = former_.of_chart[c];
+      const ChartGrid& grid = atlas_.grids[c];
+      if (place.width != grid.width || place.height != grid.height || place.x < grid.page_x + gutter_ / 2 ||
+          place.y < grid.page_y + gutter_ / 2)
+        return false;
+      const Block here{block.width, block.height, {}, place.page, place.x - grid.page_x, place.y - grid.page_y};
+      if (c != block.charts.front() && (here.page != block.page || here.x != block.x || here.y != block.y))
+        return false;
+      block.page = here.page;
+      block.x = here.x;
+      block.y = here.y;
+    }
+    const TexelRect rect = outer(block);
+    const Page& page = atlas_.pages[block.page];
+    return rect.x + rect.width <= page.width && rect.y + rect.height <= page.height;
+  }
+
+  void dropEmptyPages() {
+    std::size_t used = 0;
+    for (const Block& block : blocks_) used = std::max<std::size_t>(used, block.page + 1);
+    atlas_.pages.resize(used);
+  }
+
+  [[nodiscard]] bool isWasteful() const {
+    double used = 0.0, all = 0.0;
+    for (const Block& block : blocks_) used += static_cast<double>(block.width + gutter_) * (block.height + gutter_);
+    for (const Page& page : atlas_.pages) all += static_cast<double>(page.width) * page.height;
+    return all > 2.0 * used + kSmallPage;
+  }
+
   /// The smallest near-square page that holds everything, or a page of the largest size and what is left over.
-  Result<void> pack() {
+  Result<void> pack(const std::vector<std::size_t>& which) {
     std::vector<stbrp_rect> rects;
-    for (std::size_t i = 0; i < blocks_.size(); ++i)
+    for (const std::size_t i : which)
       rects.push_back({static_cast<int>(i), static_cast<int>(blocks_[i].width + gutter_),
                        static_cast<int>(blocks_[i].height + gutter_), 0, 0, 0});
     while (!rects.empty()) {
@@ -281,6 +413,7 @@ class LayoutMaker {
 
   const Scene& scene_;
   const std::vector<Chart>& charts_;
+  const FormerPlaces& former_;
   double texel_;
   std::uint32_t gutter_, max_page_, max_chart_;
   Atlas atlas_;
@@ -313,8 +446,8 @@ double texelSizeFor(const std::vector<Chart>& charts, std::uint64_t texel_budget
 }
 
 Result<Atlas> layOut(const Scene& scene, const std::vector<Chart>& charts, double texel_size,
-                     const ChartOptions& options) {
-  return LayoutMaker(scene, charts, texel_size, options).make();
+                     const ChartOptions& options, const FormerPlaces& former) {
+  return LayoutMaker(scene, charts, texel_size, options, former).make();
 }
 
 }  // namespace radiosity::scene

@@ -25,13 +25,23 @@ struct Atlas {
   std::vector<std::string> warnings;
 };
 
+/// Where charts were before an edit.
+struct FormerPlaces {
+  struct Place {
+    std::uint32_t page = 0, x = 0, y = 0, width = 0, height = 0;  ///< width 0: it was not there
+  };
+  std::vector<Place> of_chart;  ///< empty: there was no scene before
+  std::vector<Page> pages;
+};
+
 /// The texel edge (unit box) at which about `texel_budget` leaves are covered.
 [[nodiscard]] double texelSizeFor(const std::vector<Chart>& charts, std::uint64_t texel_budget);
 
-/// Grids for texels of about `texel_size`, packed with `options.gutter` empty texels between. Charts that would not fit
+/// Grids for texels of about `texel_size`, packed with `options.gutter` empty texels between. Charts whose
+/// grid is as it was keep their places, as long as half of the pages is in use. Charts that would not fit
 /// a page get coarser texels, with a warning. kTooLarge: more than kMaxPages pages or kMaxLeaves leaves.
 [[nodiscard]] Result<Atlas> layOut(const Scene& scene, const std::vector<Chart>& charts, double texel_size,
-                                   const ChartOptions& options);
+                                   const ChartOptions& options, const FormerPlaces& former = {});
 
 inline constexpr std::size_t kMaxPages = 1024;
 inline constexpr std::uint64_t kMaxLeaves = std::uint64_t{1} << 28;  ///< some 6 GiB of patches

@@ -6,10 +6,12 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <optional>
 #include <unordered_map>
 
 #include "server/scene/atlas.h"
 #include "server/scene/coverage.h"
+#include "server/scene/lineage.h"
 #include "server/scene/opacity.h"
 
 namespace radiosity::scene {
@@ -19,6 +21,8 @@ namespace {
 constexpr double kPlanarTexels = 8.0;
 /// Curved charts may bend up to 45 degrees until they are this many texels large.
 constexpr double kSmallTexels = 4.0;
+/// Texels of the former scene are kept unless they are so many times too coarse, or too fine, for the budget.
+constexpr double kCoarsest = 1.25;
 
 const Material& materialOf(const Scene& scene, std::uint32_t instance) {
   static const Material kDefault;
@@ -28,18 +32,31 @@ const Material& materialOf(const Scene& scene, std::uint32_t instance) {
 
 class Builder {
  public:
-  Builder(const Scene& scene, const ChartOptions& options) : scene_(scene), options_(options) {}
+  Builder(const Scene& scene, const ChartOptions& options, const FormerScene* former)
+      : scene_(scene), options_(options), former_(former) {}
 
-  Result<PatchScene> build() {
-    flat_ = flatten(scene_);
+  /// Nothing: the former scene's unit box or texels do not suit.
+  Result<std::optional<PatchScene>> build() {
+    if (former_ != nullptr) {
+      const UnitFrame frame{former_->patches.centre, former_->patches.scale};
+      if (frameFor(scene_, &frame) != frame) return std::nullopt;
+      flat_ = flatten(scene_, frame);
+    } else {
+      flat_ = flatten(scene_, frameFor(scene_));
+    }
     patches_.centre = flat_.centre;
     patches_.scale = flat_.scale;
     patches_.triangles_dropped = flat_.dropped;
     patches_.warnings = flat_.warnings;
     neighbours_ = edgeNeighbours(flat_);
     makeCharts();
-    const double texel = texelSize();
-    auto atlas = layOut(scene_, charts_, texel, options_);
+    patches_.texel = texelSize();
+    if (former_ != nullptr && options_.texel_size_m <= 0.0) {
+      const double ratio = former_->patches.texel / patches_.texel;
+      if (ratio > kCoarsest || ratio < 1.0 / kCoarsest) return std::nullopt;
+      patches_.texel = former_->patches.texel;
+    }
+    auto atlas = layOut(scene_, charts_, patches_.texel, options_, formerPlaces());
     if (!atlas) return tl::unexpected(atlas.error());
     atlas_ = std::move(*atlas);
     patches_.pages = atlas_.pages;
@@ -61,7 +78,7 @@ class Builder {
     sumAncestors(patches_);
     writeInstanceUvs();
     findSeams(flat_, neighbours_, sources_, 2.0 * options_.curve_angle_deg, patches_);
-    return std::move(patches_);
+    return std::optional<PatchScene>(std::move(patches_));
   }
 
  private:
@@ -81,7 +98,8 @@ class Builder {
     }
     const Facets facets = findFacets(flat_, neighbours_, own);
     patches_.polygons = facets.facets.size() + from_file.size();
-    const double texel = roughTexelSize();
+    const double texel = former_ != nullptr ? former_->patches.rough_texel : roughTexelSize();
+    patches_.rough_texel = texel;
     const auto groups = groupFacets(flat_, neighbours_, facets, kPlanarTexels * texel, kSmallTexels * texel * texel,
                                     options_.curve_angle_deg);
     charts_ = fitCharts(flat_, facets, groups);
@@ -100,6 +118,29 @@ class Builder {
   [[nodiscard]] double texelSize() const {
     if (options_.texel_size_m > 0.0) return options_.texel_size_m / flat_.scale;
     return texelSizeFor(charts_, options_.texel_budget);
+  }
+
+  /// Charts are known again by their instance, their order on it and the size of their grid.
+  [[nodiscard]] FormerPlaces formerPlaces() const {
+    FormerPlaces places;
+    if (former_ == nullptr) return places;
+    places.pages = former_->patches.pages;
+    std::vector<std::vector<std::uint32_t>> surfaces(former_->scene.instances.size());
+    const auto& old_ones = former_->patches.surfaces;
+    for (std::uint32_t s = 0; s < old_ones.size(); ++s) surfaces[old_ones[s].instance].push_back(s);
+    const auto source = matchInstances(former_->scene, scene_);
+    std::vector<std::uint32_t> count(scene_.instances.size(), 0);
+    for (const Chart& chart : charts_) ++count[chart.instance];
+    std::uint32_t order = 0;
+    for (std::size_t c = 0; c < charts_.size(); ++c) {
+      const std::uint32_t instance = charts_[c].instance;
+      order = c > 0 && charts_[c - 1].instance == instance ? order + 1 : 0;
+      places.of_chart.emplace_back();
+      if (source[instance] == kNone || surfaces[source[instance]].size() != count[instance]) continue;
+      const Surface& old_one = old_ones[surfaces[source[instance]][order]];
+      places.of_chart.back() = {old_one.page, old_one.page_x, old_one.page_y, old_one.width, old_one.height};
+    }
+    return places;
   }
 
   void addSurface(std::uint32_t c) {
@@ -235,6 +276,7 @@ class Builder {
 
   const Scene& scene_;
   const ChartOptions& options_;
+  const FormerScene* former_;
   PatchScene patches_;
   FlatScene flat_;
   std::vector<std::uint32_t> neighbours_;
@@ -245,8 +287,15 @@ class Builder {
 
 }  // namespace
 
-Result<PatchScene> buildPatchScene(const Scene& scene, const ChartOptions& options) {
-  return Builder(scene, options).build();
+Result<PatchScene> buildPatchScene(const Scene& scene, const ChartOptions& options, const FormerScene* former) {
+  if (former != nullptr) {
+    auto built = Builder(scene, options, former).build();
+    if (!built) return tl::unexpected(built.error());
+    if (*built) return std::move(**built);
+  }
+  auto built = Builder(scene, options, nullptr).build();
+  if (!built) return tl::unexpected(built.error());
+  return std::move(**built);
 }
 
 }  // namespace radiosity::scene

@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <glm/vec4.hpp>
+#include <glm/vector_relational.hpp>
 #include <unordered_map>
 
 namespace radiosity::scene {
@@ -14,6 +15,11 @@ namespace {
 
 /// Distances below this fraction of an instance's extent are rounding of 32-bit file coordinates.
 constexpr double kWeldFraction = 2e-7;
+
+/// A scene keeps the unit box of its former self as long as it reaches no farther from its middle, ...
+constexpr double kMostReach = 0.75;
+/// ... and fills this part of it: 32-bit positions keep their digits.
+constexpr double kLeastExtent = 0.5;
 
 bool isFinite(const glm::dvec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
@@ -232,11 +238,24 @@ void pairHalfEdges(const FlatScene& flat, const HalfEdge* edges, std::size_t cou
 
 }  // namespace
 
-FlatScene flatten(const Scene& scene) {
-  FlatScene flat;
+UnitFrame frameFor(const Scene& scene, const UnitFrame* former) {
+  UnitFrame frame;
   const Box box = worldBounds(scene);
-  if (!box.empty()) flat.centre = 0.5 * box.min + 0.5 * box.max;
-  if (box.extent() > 0.0) flat.scale = box.extent();
+  if (former != nullptr && !box.empty()) {
+    const auto low = (box.min - former->centre) / former->scale, high = (box.max - former->centre) / former->scale;
+    const bool holds = glm::all(glm::greaterThanEqual(low, glm::dvec3(-kMostReach))) &&
+                       glm::all(glm::lessThanEqual(high, glm::dvec3(kMostReach)));
+    if (holds && box.extent() >= kLeastExtent * former->scale) return *former;
+  }
+  if (!box.empty()) frame.centre = 0.5 * box.min + 0.5 * box.max;
+  if (box.extent() > 0.0) frame.scale = box.extent();
+  return frame;
+}
+
+FlatScene flatten(const Scene& scene, const UnitFrame& frame) {
+  FlatScene flat;
+  flat.centre = frame.centre;
+  flat.scale = frame.scale;
   flat.tolerance.assign(scene.instances.size(), 0.0);
   for (std::uint32_t i = 0; i < scene.instances.size(); ++i) {
     flat.first_triangle.push_back(static_cast<std::uint32_t>(flat.triangles.size()));

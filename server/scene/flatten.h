@@ -33,8 +33,18 @@ struct FlatScene {
   std::vector<std::string> warnings;
 };
 
+/// unit = (world - centre) / scale.
+struct UnitFrame {
+  glm::dvec3 centre{0.0};
+  double scale = 1.0;
+  bool operator==(const UnitFrame&) const = default;
+};
+
 /// The scale is the largest extent itself, so scaling a scene by a power of two gives the same bits in the unit box.
-[[nodiscard]] FlatScene flatten(const Scene& scene);
+/// With a former frame, that one as long as it suits.
+[[nodiscard]] UnitFrame frameFor(const Scene& scene, const UnitFrame* former = nullptr);
+
+[[nodiscard]] FlatScene flatten(const Scene& scene, const UnitFrame& frame);
 
 /// By 3 x triangle + edge (edge e joins corners e and e + 1): the triangle of the same instance on the other side,
 /// traversing the edge the opposite way; where several share an edge, the one that bends least. kNone: border.

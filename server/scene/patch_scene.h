@@ -110,6 +110,10 @@ struct PatchScene {
   };
   std::vector<Seam> seams;
 
+  /// Edge of a texel where nothing asks for another (unit box): as charts were laid out, and as a first guess decided
+  /// which facets are charts of their own.
+  double texel = 0.0, rough_texel = 0.0;
+
   std::vector<std::string> warnings;
   std::uint64_t polygons = 0;  ///< coplanar facets (what the paper calls polygons)
   std::uint64_t triangles_dropped = 0;
@@ -146,6 +150,26 @@ struct LevelGrid {
   return levels;
 }
 
+/// An axis-parallel box, unit box coordinates.
+struct ChangedBox {
+  glm::vec3 low, high;
+};
+
+/// Charts keep their identity where they have the same grid on the same instance.
+struct PatchMap {
+  std::vector<std::uint32_t> surface_before;  ///< by surface: its former number, or kNone: it is new
+  std::vector<bool> moved;                    ///< by surface: new, or elsewhere, or of another shape, than it was
+  /// By leaf: of a moved surface, or what is left of it, or where one stands on it, is not what it was.
+  std::vector<bool> leaf_altered;
+  /// Around all that was or is now where something else is or was, one for each instance or fewer.
+  std::vector<ChangedBox> boxes;
+
+  [[nodiscard]] bool nothingKept() const;
+};
+
+/// Boxes that are hardly larger together than apart become one, and so do all when there are very many.
+void joinBoxes(std::vector<ChangedBox>& boxes);
+
 struct ChartOptions {
   std::uint64_t texel_budget = 16'000;  ///< leaf patches in all, about; used when texel_size_m is 0
   double texel_size_m = 0.0;
@@ -154,9 +178,21 @@ struct ChartOptions {
   double curve_angle_deg = 15.0;  ///< normal spread of a curved chart
 };
 
+/// A scene as it was before an edit. Refers to its parts.
+struct FormerScene {
+  const Scene& scene;
+  const PatchScene& patches;
+};
+
 /// Flattens instances, drops degenerate triangles (counted), makes charts or takes a valid TEXCOORD_1, packs pages,
 /// measures coverage and burial. kTooLarge when a limit of leaves (2^28) or pages (1024) is passed.
-[[nodiscard]] Result<PatchScene> buildPatchScene(const Scene& scene, const ChartOptions& options);
+///
+/// With a `former` self, unit box, texel size and the places of charts on pages stay as they were, so that whatever the
+/// edit left alone is the same, bit by bit. Other charts get what is free on the pages, or pages of their own. When the
+/// unit box or the texel size no longer suit the scene (half as large, or half as large again; a quarter too fine or
+/// too coarse), all is made anew; when less than half of the pages is in use, places are.
+[[nodiscard]] Result<PatchScene> buildPatchScene(const Scene& scene, const ChartOptions& options,
+                                                 const FormerScene* former = nullptr);
 
 /// Emission (exitance E = pi L_e, lux) and reflectance of every node: leaves integrated over textures and vertex
 /// colours (16 samples a leaf), parents area-weighted means. Index = node. Reflectance is clamped to 0.999.

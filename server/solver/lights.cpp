@@ -67,7 +67,7 @@ void addPolygons(const scene::PatchScene& patches, const Side& side, const glm::
     const auto corners = triangleCorners(patches, triangle);
     LightPolygon light;
     std::copy(corners.begin(), corners.end(), light.corners.begin());
-    light.key = 2 * triangle + side.side;
+    light.key = 2 * (side.triangle_key + i) + side.side;
     for (std::uint32_t k = i + 1; k < surface.triangle_count && light.corner_count == 3; ++k) {
       if (used[k]) continue;
       if (const auto quad = joinTriangles(corners, triangleCorners(patches, surface.first_triangle + k), normal)) {

@@ -18,7 +18,7 @@ struct LightPolygon {
   glm::vec3 normal{0.0F};    ///< towards the lit side
   glm::vec3 emission{0.0F};  ///< exitance, lux
   double area = 0.0;         ///< unit box squared
-  std::uint32_t key = 0;     ///< stable across edits of emission: for sample sequences
+  std::uint32_t key = 0;     ///< 2 (Side::triangle_key + triangle) + side: stable across edits
 
   glm::dvec3 delivered{0.0};  ///< S of the emission: exitance gathered so far, summed over rounds
 

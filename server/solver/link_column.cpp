@@ -206,6 +206,10 @@ void LinkColumn::grow(const LinkExpander& sample, const std::vector<Side>& sides
     const auto values = sample.values().subspan(sides[side].first_value, sides[side].leaf_count);
     for (const float value : values) largest = std::max(largest, value);
   }
+  growTo(largest);
+}
+
+void LinkColumn::growTo(float largest) {
   while (scale_ < 0.5F * std::min(largest, 1e30F)) scale_ *= 2.0F;
 }
 
@@ -262,6 +266,63 @@ void LinkColumn::keepFlux(std::span<const float> leaf_area) {
   coded *= static_cast<double>(scale_);
   // Where nearly all links are too small for a code there is nothing to lay the rest on.
   gain_ = due_ > 0.0 && coded > 0.0 ? static_cast<float>(std::clamp(due_ / coded, 0.25, 4.0)) : 1.0F;
+}
+
+void LinkColumn::replace(std::span<const ValueRun> leaves, std::span<const float> values, const Totals& totals,
+                         std::span<const float> leaf_area, const std::vector<Side>& sides) {
+  std::vector<std::uint32_t> reached;
+  float largest = 0.0F;
+  std::uint32_t s = 0;
+  for (const auto& run : leaves) {
+    float here = 0.0F;
+    for (std::uint32_t v = run.first; v < run.first + run.count; ++v) here = std::max(here, values[v]);
+    largest = std::max(largest, here);
+    while (sides[s].first_value + sides[s].leaf_count <= run.first) ++s;
+    if (here > 0.0F && (reached.empty() || reached.back() != s)) reached.push_back(s);
+  }
+  makeRoom(reached, sides);
+  const float old_scale = scale_;
+  growTo(largest);
+  if (scale_ != old_scale) {
+    for (auto& code : code_) code = encodeLink(old_scale / scale_ * decodeOne(code));
+  }
+  const float unit = 1.0F / scale_;
+  auto to = runs_.begin();
+  for (const auto& run : leaves) {
+    while (to != runs_.end() && to->first_value + to->count <= run.first) ++to;
+    if (to == runs_.end()) break;
+    if (to->first_value > run.first) continue;  // no room was made: all of them are zero
+    std::uint16_t* code = &code_[to->offset + (run.first - to->first_value)];
+    for (std::uint32_t i = 0; i < run.count; ++i) code[i] = encodeLink(unit * values[run.first + i]);
+  }
+  due_ = totals.due;
+  escaped_ = totals.escaped;
+  absorbed_ = totals.absorbed;
+  keepFlux(leaf_area);
+}
+
+void LinkColumn::renumber(const std::vector<std::uint32_t>& side_after, const std::vector<Side>& before,
+                          const std::vector<Side>& after) {
+  std::vector<Run> runs;
+  std::vector<std::uint16_t> code;
+  code.reserve(code_.size());
+  for (const auto& old : runs_) {
+    for (std::uint32_t s = old.side; s < old.side + old.side_count; ++s) {
+      const auto next = side_after[s];
+      if (next == scene::kNone) continue;
+      const auto size = static_cast<std::uint32_t>(code.size());
+      const bool joins = !runs.empty() && runs.back().side + runs.back().side_count == next;
+      if (!joins) runs.push_back({next, 0, after[next].first_value, 0, size});
+      ++runs.back().side_count;
+      runs.back().count += after[next].leaf_count;
+      const auto from = code_.begin() + old.offset + (before[s].first_value - old.first_value);
+      code.insert(code.end(), from, from + before[s].leaf_count);
+    }
+  }
+  runs.shrink_to_fit();
+  code.shrink_to_fit();
+  runs_ = std::move(runs);
+  code_ = std::move(code);
 }
 
 void LinkColumn::apply(const std::array<float, 3>& radiosity, const std::array<float*, 3>& irradiance) const {

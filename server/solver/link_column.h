@@ -52,7 +52,27 @@ class LinkColumn {
   void add(const LinkExpander& sample, const LinkSample& totals, double points, const std::vector<Side>& sides,
            double factor = 1.0);
 
+  struct ValueRun {
+    std::uint32_t first, count;
+  };
+  struct Totals {
+    double due = 0.0, escaped = 0.0, absorbed = 0.0;  ///< as in LinkSample
+  };
+  /// Other links to some leaves, and what all together should deliver, from as many points as before: `values` by leaf
+  /// value, of which those of `leaves` (runs of leaf values, ascending, none across sides) count.
+  void replace(std::span<const ValueRun> leaves, std::span<const float> values, const Totals& totals,
+               std::span<const float> leaf_area, const std::vector<Side>& sides);
+  /// The same links in a scene whose sides are numbered otherwise. `side_after`: by old side, kNone: its links are
+  /// dropped, what they delivered is not. Order is kept.
+  void renumber(const std::vector<std::uint32_t>& side_after, const std::vector<Side>& before,
+                const std::vector<Side>& after);
+
   [[nodiscard]] double points() const { return points_; }
+  /// Whether so much of what a shooter of this area sends is lost that it is not known how much should arrive, but by
+  /// the sum of all links.
+  [[nodiscard]] static bool isOpen(double area, double lost) { return lost > 0.0099 * area; }
+  [[nodiscard]] bool isOpen(double area) const { return isOpen(area, escaped_ + absorbed_); }
+  [[nodiscard]] bool losesNothing() const { return escaped_ == 0.0 && absorbed_ == 0.0; }
   [[nodiscard]] std::uint32_t samples() const { return samples_; }
   /// What leaves a polygon arrives: all links are multiplied by this, the ratio of what should arrive, in the mean over
   /// all samples, to the sum of the links as they are kept. Otherwise small errors (one point for a whole leaf, pixels
@@ -95,6 +115,7 @@ class LinkColumn {
   }
   void makeRoom(std::span<const std::uint32_t> reached, const std::vector<Side>& sides);
   void grow(const LinkExpander& sample, const std::vector<Side>& sides);
+  void growTo(float largest);
   void keepFlux(std::span<const float> leaf_area);
 
   void addTo(const Run& run, std::uint32_t first_value, std::uint32_t count, float kept, float added,

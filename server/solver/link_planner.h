@@ -29,6 +29,12 @@ class LinkPlanner {
               const PlannerSettings& settings, std::uint64_t seed)
       : sides_(sides), shots_(shots), settings_(settings), draws_(patches, sides, seed) {}
 
+  /// After an edit of geometry: who plays roulette, and wins, is as it was where the side still is.
+  void inherit(const LinkPlanner& former, const std::vector<std::uint32_t>& side_after) {
+    draws_.inherit(former.draws_, side_after);
+    share_ = former.share_;
+  }
+
   /// The power of one shooter, all channels; nodes are split until they have less.
   void setShare(double share) { share_ = share; }
   [[nodiscard]] double share() const { return share_; }

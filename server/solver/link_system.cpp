@@ -54,10 +54,28 @@ LinkSystem::LinkSystem(const scene::PatchScene& patches, const std::vector<Side>
 void LinkSystem::addSample(std::uint32_t index, std::size_t half, const LinkExpander& links, const LinkSample& totals,
                            double points) {
   auto& shooter = shooters_[index];
-  const double arriving = totals.due > 0.0 ? totals.due : links.flux();
-  const double all = (arriving + totals.escaped + totals.absorbed) / shooter.area;
-  const double factor = std::abs(all - 1.0) < kOnlyRounding ? 1.0 / all : 1.0;
+  const double factor =
+      roundingOf(shooter, totals.due > 0.0 ? totals.due : links.flux(), totals.escaped, totals.absorbed);
   shooter.column[half].add(links, totals, points, sides_, factor);
+  noteChange(index, half);
+}
+
+void LinkSystem::replaceLinks(std::uint32_t index, std::size_t half, std::span<const LinkColumn::ValueRun> leaves,
+                              std::span<const float> values, const LinkColumn::Totals& totals) {
+  auto& shooter = shooters_[index];
+  const double factor = roundingOf(shooter, totals.due, totals.escaped, totals.absorbed);
+  shooter.column[half].replace(leaves, values, {factor * totals.due, factor * totals.escaped, factor * totals.absorbed},
+                               leaf_area_, sides_);
+  noteChange(index, half);
+}
+
+double LinkSystem::roundingOf(const Shooter& shooter, double due, double escaped, double absorbed) {
+  const double all = (due + escaped + absorbed) / shooter.area;
+  return std::abs(all - 1.0) < kOnlyRounding ? 1.0 / all : 1.0;
+}
+
+void LinkSystem::noteChange(std::uint32_t index, std::size_t half) {
+  auto& shooter = shooters_[index];
   const auto& own = shooter.column[half];
   shooter.products[half == 0 ? 0 : 2] = LinkColumn::product(own, own, leaf_area_);
   shooter.products[1] = LinkColumn::product(shooter.column[0], shooter.column[1], leaf_area_);
@@ -119,6 +137,14 @@ void LinkSystem::forget(std::uint32_t index) {
     for (auto& row : half.matrix) {
       if (index < row.size()) row[index] = 0.0F;
     }
+  }
+}
+
+void LinkSystem::forget(std::uint32_t index, std::size_t half) {
+  shooters_[index].column[half] = {};
+  noteChange(index, half);
+  for (auto& row : halves_[half].matrix) {
+    if (index < row.size()) row[index] = 0.0F;
   }
 }
 

@@ -14,6 +14,7 @@
 #include <array>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <span>
 #include <vector>
 
 #include "server/solver/gmres.h"
@@ -69,8 +70,14 @@ class LinkSystem {
   void addSample(std::uint32_t shooter, std::size_t half, const LinkExpander& links, const LinkSample& totals,
                  double points);
 
+  /// Other links to some leaves, as LinkColumn::replace.
+  void replaceLinks(std::uint32_t shooter, std::size_t half, std::span<const LinkColumn::ValueRun> leaves,
+                    std::span<const float> values, const LinkColumn::Totals& totals);
+
   /// Forgets its links, so that its place can be taken by another light.
   void forget(std::uint32_t shooter);
+  /// The links of one half.
+  void forget(std::uint32_t shooter, std::size_t half);
 
   /// Starts to bring rows up to date and to solve both halves, from what was sent before. Nothing else may change
   /// until it is done; begin() may come again at any time, and starts anew.
@@ -117,6 +124,9 @@ class LinkSystem {
   [[nodiscard]] bool isPlace(const NodePlace& place) const;
   void clear();
   [[nodiscard]] double areaOf(const Shooter& shooter) const;
+  /// By which what a sample delivers, loses and lets escape is multiplied.
+  [[nodiscard]] static double roundingOf(const Shooter& shooter, double due, double escaped, double absorbed);
+  void noteChange(std::uint32_t shooter, std::size_t half);
   void updateMeans();
   void makeRows();
   void updateColumn(std::size_t half, std::uint32_t column, std::uint32_t first_member);

@@ -1,4 +1,5 @@
 // How LinkedSolver brings light to the leaves over the links it has: slice by slice.
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -90,11 +91,14 @@ void LinkedSolver::solveAnew() {
   settling_ = false;
   pass_ = Pass::kNone;
   from_links_ = FromLinks::kAfterEdit;
+  edit_lights_planned_ = false;
   error_ = {};  // unknown
 }
 
 /// False: there was no room for the links of a new lamp, others had to go, and the light is to be solved for again.
 bool LinkedSolver::finishEdit() {
+  wanted_.clear();
+  measured_ = 0;
   memory_.begin(system_);
   bool forgot = false;
   while (memory_.isOverdrawn() && forgetWeakest()) forgot = true;
@@ -104,8 +108,21 @@ bool LinkedSolver::finishEdit() {
   lights_fit_ = true;
   growing_ = true;
   phase_ = Phase::kLights;
+  const auto& shooters = system_.shooters();
+  if (net_unshot_ > 0.0 && std::ranges::none_of(shooters, [](const Shooter& shooter) { return shooter.owes(); })) {
+    // Where nothing needs links that are not there, the solution over those that are is the end already.
+    startGrowth();
+    wanted_ = plan();
+    growing_ = !wanted_.empty();
+  }
   assess();
-  if (error_.total <= settings_.target_error) phase_ = Phase::kDone;  // the links there are carry it all
+  if (error_.total <= settings_.target_error) {
+    wanted_.clear();
+    phase_ = Phase::kDone;
+  } else if (!growing_) {
+    ++rounds_;
+    (void)chooseFurther();
+  }
   return true;
 }
 
@@ -137,7 +154,7 @@ bool LinkedSolver::settleFromLinks() {
     }
     if (power > 0.0) planner_.setShare(power * share_part_);  // weak beside the light that there is now
     (void)planner_.weigh(system_);
-    forgetLight();
+    system_.begin();  // from the first solution, which depends on nothing else either
     pass_ = Pass::kSecond;
   }
   if (!advanceSolution()) return false;

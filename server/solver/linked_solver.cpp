@@ -39,8 +39,8 @@ PunctualSettings punctualSettings(const SolverSettings& settings) {
 
 }  // namespace
 
-LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
-                           Transport& transport, const SolverSettings& settings, const LightSources& sources)
+LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, Transport& transport,
+                           const SolverSettings& settings)
     : patches_(std::move(patches)),
       transport_(transport),
       settings_(settings),
@@ -53,11 +53,18 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
       unshot_(*patches_),
       planner_(*patches_, sides_, shots_, settings_.planner, settings_.seed),
       irradiance_(patches_->nodeCount(), glm::vec3(0.0F)) {
+  slice_ = std::clamp<std::size_t>(kFirstTriangles / std::max<std::size_t>(1, patches_->triangles.size()), 2, 16);
+  fewest_a_slice_ = std::min(slice_, kFewestMeasurements);
+}
+
+LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
+                           Transport& transport, const SolverSettings& settings, const LightSources& sources)
+    : LinkedSolver(std::move(patches), transport, settings) {
+  key_end_ = static_cast<std::uint32_t>(patches_->nodeCount());
+  triangle_key_end_ = static_cast<std::uint32_t>(patches_->triangles.size());
   takeMaterials(materials);
   takeSources(sources);
   share_part_ = 1.0 / settings_.planner.first_shooters;
-  slice_ = std::clamp<std::size_t>(kFirstTriangles / std::max<std::size_t>(1, patches_->triangles.size()), 2, 16);
-  fewest_a_slice_ = std::min(slice_, kFewestMeasurements);
   for (auto& half : half_) half.assign(emission_.size(), glm::vec3(0.0F));
   findUnshot();
 }
@@ -131,6 +138,10 @@ LinkCounters LinkedSolver::linkCounters() const {
   counters.sweeps = sweeps_;
   counters.replayed = replayed_;
   counters.rows = system_.rowCount();
+  counters.kept = edits_.kept;
+  counters.repaired = edits_.repaired;
+  counters.repaired_links = edits_.repaired_links;
+  counters.retaken = edits_.retaken;
   std::uint64_t nodes = 0;
   for (const auto& shooter : system_.shooters()) {
     nodes += shooter.isLight() ? 0 : 1;
@@ -204,7 +215,20 @@ Result<StepOutcome> LinkedSolver::step() {
 }
 
 Result<StepOutcome> LinkedSolver::advance() {
+  if (repaired_ < repairs_.size()) {
+    if (const auto done = repairSlice(); !done) return tl::unexpected<Error>(done.error());
+    return StepOutcome::kSlice;
+  }
   if (from_links_ == FromLinks::kAfterEdit) {
+    if (!edit_lights_planned_) {  // what was switched on, or moved: all that follows depends on its light
+      memory_.begin(system_);
+      wanted_ = planLights();
+      edit_lights_planned_ = true;
+    }
+    if (measured_ < wanted_.size()) {
+      if (const auto done = measureSlice(); !done) return tl::unexpected<Error>(done.error());
+      return StepOutcome::kSlice;
+    }
     if (!settleFromLinks()) return StepOutcome::kSlice;
     if (!finishEdit()) return StepOutcome::kSlice;
     return phase_ == Phase::kDone ? StepOutcome::kConverged : StepOutcome::kShot;
@@ -287,6 +311,7 @@ StepOutcome LinkedSolver::chooseFurther() {
 }
 
 void LinkedSolver::assess() {
+  if (repaired_ < repairs_.size()) return;     // nothing is known before all links are true
   if (from_links_ == FromLinks::kAfterEdit) {  // somebody wants to know before the next step
     try {
       do {

@@ -16,6 +16,7 @@
 #include "server/solver/link_planner.h"
 #include "server/solver/link_system.h"
 #include "server/solver/node_shots.h"
+#include "server/solver/shadows.h"
 #include "server/solver/solver.h"
 #include "server/solver/unshot_pyramid.h"
 
@@ -25,6 +26,13 @@ class LinkedSolver final : public Solver {
  public:
   LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
                Transport& transport, const SolverSettings& settings, const LightSources& sources = {});
+  /// After an edit of geometry: takes over the links of `former`, the solver of the scene before, that the edit left
+  /// alone, and measures the others again with its first steps: same shooters, same points, so that links are those
+  /// that a fresh measurement of all would find. Of shooters that see the change, only links to leaves whose ways to
+  /// them pass it are measured (Shadows).
+  LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
+               Transport& transport, const SolverSettings& settings, const LightSources& sources, LinkedSolver& former,
+               const scene::PatchMap& map);
 
   [[nodiscard]] Result<StepOutcome> step() override;
   void setMaterials(const scene::PatchMaterials& materials) override;
@@ -44,6 +52,7 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] std::uint32_t rounds() const override { return rounds_; }
   [[nodiscard]] SolveLimit limit() const override { return limit_; }
   [[nodiscard]] LinkCounters linkCounters() const override;
+  [[nodiscard]] std::uint64_t affectedSamples() const override { return affected_; }
   [[nodiscard]] bool hasFluxScale() const override { return false; }
   [[nodiscard]] bool save(ArchiveWriter& to) const override;
   [[nodiscard]] bool restore(ArchiveReader& from) override;
@@ -65,6 +74,37 @@ class LinkedSolver final : public Solver {
 
   template <typename Archive, typename Self>
   static void visit(Archive& archive, Self& self);
+  /// Samples of a column that are to be taken again.
+  struct Repair {
+    std::uint32_t shooter = 0;
+    std::size_t half = 0;
+    std::uint32_t samples = 0;  ///< of a light polygon: points
+    bool whole = false;         ///< all their links; the column is empty
+  };
+  /// Where the sides of the scene before are now.
+  struct Renumbering {
+    const LinkedSolver& former;
+    const scene::PatchMap& map;
+    std::vector<std::uint32_t> side_after;          ///< by old side; kNone: gone
+    std::vector<std::uint32_t> unmoved_after;       ///< the same; kNone also where it moved
+    std::vector<std::array<Repair, 2>> unfinished;  ///< by old shooter and half: what was still to be taken again
+  };
+  struct RepairBatch;
+
+  /// All but its light.
+  LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, Transport& transport, const SolverSettings& settings);
+  [[nodiscard]] Renumbering renumber(LinkedSolver& former, const scene::PatchMap& map);
+  [[nodiscard]] GeometryChange changeSince(const Renumbering& numbers) const;
+  void inheritLights(LinkedSolver& former, const Renumbering& numbers);
+  void inheritNodes(LinkedSolver& former, const Renumbering& numbers);
+  void inheritColumns(Shooter& from, std::uint32_t old_index, std::uint32_t index, bool whole,
+                      const Renumbering& numbers);
+  void planRepairs();
+  [[nodiscard]] bool isNeeded(Repair& repair);
+  void addSamples(const Repair& repair, ShotBatch& batch) const;
+  void findCutLinks(RepairBatch& repairs) const;
+  void takePart(RepairBatch& repairs, std::size_t shot, LinkSample& links);
+  [[nodiscard]] Result<void> repairSlice();
   [[nodiscard]] bool isFull() const;
   [[nodiscard]] std::vector<Measurement> plan();
   [[nodiscard]] std::vector<Measurement> planLights();
@@ -107,19 +147,26 @@ class LinkedSolver final : public Solver {
   LinkMemory memory_;
   UnshotPyramid unshot_;
   LinkPlanner planner_;
+  std::vector<Repair> repairs_;                       // after an edit of geometry; before anything else is done
+  std::size_t repaired_ = 0;                          // of these
+  std::unique_ptr<Shadows> shadows_;                  // of the edit
+  std::uint32_t key_end_ = 0, triangle_key_end_ = 0;  // keys of sides that never were
+  std::uint64_t affected_ = 0;
+  LinkCounters edits_;  // what repairs add to linkCounters()
   Phase phase_ = Phase::kLights;
   SolveLimit limit_ = SolveLimit::kNone;
   bool lights_fit_ = true;  // no light goes without links for want of memory
   Pass pass_ = Pass::kNone;
   FromLinks from_links_ = FromLinks::kNo;
-  bool settling_ = false;            // a wave is measured, its light is still to be solved for
-  std::vector<Measurement> wanted_;  // the wave under way
-  std::size_t measured_ = 0;         // of the wave
-  std::size_t slice_ = 16;           // measurements that take some 50 ms
-  std::size_t fewest_a_slice_ = 8;   // so many at least, for the workers
-  bool growing_ = true;              // light is still missing: until the first walk found nothing more to add
-  double share_part_ = 0.0;          // of all power, that one shooter should have
-  double left_out_ = 0.0;            // relative error by nodes too weak to play roulette
+  bool edit_lights_planned_ = false;  // of the edit being taken in
+  bool settling_ = false;             // a wave is measured, its light is still to be solved for
+  std::vector<Measurement> wanted_;   // the wave under way
+  std::size_t measured_ = 0;          // of the wave
+  std::size_t slice_ = 16;            // measurements that take some 50 ms
+  std::size_t fewest_a_slice_ = 8;    // so many at least, for the workers
+  bool growing_ = true;               // light is still missing: until the first walk found nothing more to add
+  double share_part_ = 0.0;           // of all power, that one shooter should have
+  double left_out_ = 0.0;             // relative error by nodes too weak to play roulette
   std::uint32_t rounds_ = 0;
   std::uint64_t solutions_ = 0, sweeps_ = 0, replayed_ = 0;
   double varying_ = 0.0, net_unshot_ = 0.0;     // flux, all channels

@@ -32,7 +32,7 @@ bool NodeShots::isWhole(const NodePlace& node) const {
 
 std::uint64_t NodeShots::key(const NodePlace& node) const {
   const std::uint64_t place = (std::uint64_t{node.level} << 58) ^ (std::uint64_t{node.y} << 29) ^ std::uint64_t{node.x};
-  return mixKeys(mixKeys(seed_, sides_[node.side].first_node), place);
+  return mixKeys(mixKeys(seed_, sides_[node.side].key), place);
 }
 
 void NodeShots::add(const NodePlace& node, std::size_t half, std::uint32_t index, std::uint32_t points,
@@ -74,7 +74,7 @@ void NodeShots::addGather(const NodePlace& node, std::size_t half, std::uint32_t
   const std::uint64_t node_key = mixKeys(key(node), half);
   // The halves look at opposite places of a texel: what is linear in it cancels in their mean and shows in their
   // difference.
-  const glm::dvec4 jitter = sobol4(index, mixKeys(mixKeys(seed_, side.first_node), 2));
+  const glm::dvec4 jitter = sobol4(index, mixKeys(mixKeys(seed_, side.key), 2));
   shot.receiver_jitter = glm::vec2(half == 0 ? glm::dvec2(jitter) : 1.0 - glm::dvec2(jitter));
   shot.first_point = static_cast<std::uint32_t>(batch.points.size());
   shot.point_count = points;

@@ -49,6 +49,18 @@ RouletteDraws::RouletteDraws(const scene::PatchScene& patches, const std::vector
   }
   std::sort(order.begin(), order.end());
   for (std::uint32_t k = 0; k < order.size(); ++k) rank_[std::get<2>(order[k])] = k;
+  rank_end_ = static_cast<std::uint32_t>(order.size());
+}
+
+void RouletteDraws::inherit(const RouletteDraws& former, const std::vector<std::uint32_t>& side_after) {
+  std::vector<std::uint32_t> before(rank_.size(), scene::kNone);
+  for (std::size_t s = 0; s < side_after.size(); ++s) {
+    if (side_after[s] != scene::kNone) before[side_after[s]] = former.rank_[s];
+  }
+  const std::uint32_t first_new = former.rank_end_;
+  for (std::size_t s = 0; s < rank_.size(); ++s)
+    rank_[s] = before[s] != scene::kNone ? before[s] : first_new + rank_[s];
+  rank_end_ = first_new + rank_end_;
 }
 
 double RouletteDraws::draw(const NodePlace& node, std::size_t half) const {

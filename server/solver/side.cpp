@@ -14,7 +14,8 @@ std::vector<Side> makeSides(const scene::PatchScene& patches) {
       Side side;
       side.surface = s;
       side.side = face;
-      side.first_node = surface.first_node[face];
+      side.first_node = side.key = surface.first_node[face];
+      side.triangle_key = surface.first_triangle;
       side.width = surface.width;
       side.height = surface.height;
       side.level_count = surface.level_count;

@@ -15,6 +15,10 @@ struct Side {
   std::uint32_t surface = 0;
   std::uint32_t side = 0;        ///< 0 front, 1 back
   std::uint32_t first_node = 0;  ///< level 0 starts here
+  /// For sample sequences, and to know light polygons again: stay with the side whatever an edit does to the numbers of
+  /// nodes and triangles. A scene that is no edit of another has its own numbers here: first_node, and the surface's
+  /// first triangle.
+  std::uint32_t key = 0, triangle_key = 0;
   std::uint32_t node_count = 0;
   std::uint32_t first_value = 0;  ///< leaf values of this side start here
   std::uint32_t leaf_count = 0;

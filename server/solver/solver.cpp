@@ -15,14 +15,22 @@ constexpr std::size_t kLeafBytes = 2;
 
 std::unique_ptr<Solver> makeSolver(std::shared_ptr<const scene::PatchScene> patches,
                                    const scene::PatchMaterials& materials, Transport& transport,
-                                   const SolverSettings& settings, const LightSources& sources) {
+                                   const SolverSettings& settings, const LightSources& sources,
+                                   const FormerSolver* former) {
   // Coverage by chance, pixel by pixel, makes links to what one can see through too uncertain to solve over: light
   // between sheets that all but touch would grow from bounce to bounce.
   const bool see_through = !patches->opacity.empty();
   if (settings.paper_mode || see_through || patches->leaves.size() * kLeafBytes * kMinShooters > settings.link_memory) {
     return std::make_unique<ShootingSolver>(std::move(patches), materials, transport, settings, sources);
   }
-  auto linked = std::make_unique<LinkedSolver>(patches, materials, transport, settings, sources);
+  auto* linked_before = former != nullptr ? dynamic_cast<LinkedSolver*>(&former->solver) : nullptr;
+  std::unique_ptr<LinkedSolver> linked;
+  if (linked_before != nullptr) {
+    linked =
+        std::make_unique<LinkedSolver>(patches, materials, transport, settings, sources, *linked_before, former->map);
+  } else {
+    linked = std::make_unique<LinkedSolver>(patches, materials, transport, settings, sources);
+  }
   if (linked->lightBytes() <= settings.link_memory / 2) return linked;
   return std::make_unique<ShootingSolver>(std::move(patches), materials, transport, settings, sources);
 }

@@ -56,6 +56,9 @@ struct LinkCounters {
   std::uint64_t replayed = 0;    ///< links of shooters used once more in these sweeps: as many shots were not shot
   std::uint64_t rows = 0;        ///< of the equation, in each half
   std::uint64_t rows_saved = 0;  ///< where reflectance is uniform one row serves three channels
+  // Of edits of geometry, in all: samples that no change was seen from; that were taken again for the leaves whose
+  // links may have changed, and how many these were; that were taken again.
+  std::uint64_t kept = 0, repaired = 0, repaired_links = 0, retaken = 0;
 };
 
 class Solver {
@@ -94,6 +97,8 @@ class Solver {
   [[nodiscard]] virtual std::uint32_t rounds() const = 0;
   /// Why the last step() said kExhausted.
   [[nodiscard]] virtual SolveLimit limit() const = 0;
+  /// Samples that an edit of geometry made it take again, in part or as a whole; known as soon as it is made.
+  [[nodiscard]] virtual std::uint64_t affectedSamples() const { return shots(); }
   /// All zero where links are forgotten.
   [[nodiscard]] virtual LinkCounters linkCounters() const { return {}; }
   /// Flux is kept as integers whose scale was chosen for the light at the start: very different light needs a new
@@ -113,8 +118,18 @@ class Solver {
   }
 };
 
+/// The solver of a scene before an edit of its geometry, which gives up what it remembers and is of no use afterwards,
+/// and what the edited scene has in common with it.
+struct FormerSolver {
+  Solver& solver;
+  const scene::PatchMap& map;
+};
+
+/// With a former solver of the same settings: the links that the edit left alone stay, others are measured again with
+/// the next steps.
 [[nodiscard]] std::unique_ptr<Solver> makeSolver(std::shared_ptr<const scene::PatchScene> patches,
                                                  const scene::PatchMaterials& materials, Transport& transport,
-                                                 const SolverSettings& settings, const LightSources& sources = {});
+                                                 const SolverSettings& settings, const LightSources& sources = {},
+                                                 const FormerSolver* former = nullptr);
 
 }  // namespace radiosity::solver

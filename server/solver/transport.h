@@ -45,6 +45,11 @@ struct ScatterShot {
 /// points to the first and the rest to the second, each carrying half of the radiosity.
 inline constexpr std::uint32_t kBothHalves = 2;
 
+/// Consecutive nodes.
+struct NodeRun {
+  std::uint32_t first_node, count;
+};
+
 /// Gather: light of one convex planar polygon of uniform radiosity at every leaf. For each point on the polygon an item
 /// buffer gives visibility; irradiance = radiosity x exact polygon form factor (Lambert) x mean visibility weighted by
 /// cos cos / r^2.
@@ -63,6 +68,11 @@ struct GatherShot {
   bool all_spots = false;           ///< the mean over all spots of a leaf that is not full
   std::uint32_t half = 0;
   std::uint32_t first_point = 0, point_count = 0;  ///< into ShotBatch::points
+  /// Into ShotBatch::receivers, for measure(): only links to these leaves are wanted, others may be left out. 0: all.
+  std::uint32_t first_run = 0, run_count = 0;
+  /// Into ShotBatch::boxes, of a shot that names its receivers: what escapes and what is absorbed is wanted only where
+  /// the points see these boxes or the receivers, and may be left out elsewhere. 0: everywhere.
+  std::uint32_t first_box = 0, box_count = 0;
 };
 
 /// Receiving points inside a full leaf over which a shot of light without extent is averaged, as (u, v) in [0, 1)^2.
@@ -120,6 +130,8 @@ struct ShotBatch {
   std::vector<ScatterShot> scatter;
   std::vector<GatherShot> gather;
   std::vector<HemicubeFrame> points;  ///< light points of the gather shots
+  std::vector<NodeRun> receivers;     ///< of the gather shots that want not all; leaves
+  std::vector<scene::ChangedBox> boxes;
   std::vector<PointShot> point_lights;
   std::vector<ParallelShot> parallel;
   std::vector<ParallelView> views;  ///< of the parallel shots
@@ -164,9 +176,7 @@ inline constexpr double kMeasureScale = 1125899906842624.0;  // 2^50
 /// What one shot brings where, for a radiosity (gather) or flux (scatter) of one: its links. Nodes of any level may be
 /// named; a node that is named twice receives both.
 struct LinkSample {
-  struct Run {
-    std::uint32_t first_node, count;
-  };
+  using Run = NodeRun;
   std::vector<Run> runs;
   std::vector<float> irradiance;         ///< mean over each node of the runs, one run after the other
   double escaped = 0.0, absorbed = 0.0;  ///< flux that left the scene, and that fell on unlit sides

@@ -196,7 +196,7 @@ class Bench {
       if (!outcome) return tl::unexpected(outcome.error());
       const auto times = finish(edit.name);
       if (!times) return tl::unexpected(times.error());
-      add(edit.name, edit.target, *times, *full, outcome->affected_shots > 0 ? 0 : shots);
+      add(edit.name, edit.target, *times, *full, shots <= times->shots ? shots : 0);  // a new solver counts from 0
       shots = times->shots;
     }
     return {};

@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 
 #include "tests/scenes/scenes.h"
@@ -123,6 +125,7 @@ TEST_F(Edits, AMovedReceiverIsChartedAndSolvedAnew) {
   const auto layout = engine().lightmaps()->layout;
   const auto outcome = patch(R"([{"op":"replace","path":"/nodes/1/translation","value":[0,2,0]}])");
   ASSERT_TRUE(outcome) << outcome.error().text();
+  // So far off that the scene's unit box is another: nothing stays.
   EXPECT_EQ(outcome->affected_surfaces, 2U);
   EXPECT_EQ(outcome->affected_shots, before.shots);
   ASSERT_TRUE(reaches(SolveState::kConverged));
@@ -214,12 +217,21 @@ TEST_F(Edits, TheOldLightFadesIntoTheNewWithoutADarkMoment) {
   EXPECT_GT(darkest(published), 0.8 * before);
   EXPECT_NEAR(meanIrradiance(*published.front()), before, 0.02 * before);  // carried: the same light
   EXPECT_TRUE(published.back()->final);
-  // In the end it is the solver's own light, which a server that loads the edited scene finds too.
+  // In the end it is the solver's own light, which a solve from nothing finds too.
   const auto shown = published.back()->pages.front()->mips.front().pixels;
+  const double error = status().error.total;
   ASSERT_TRUE(restart());
   ASSERT_TRUE(reaches(SolveState::kConverged));
   (void)sceneText();
-  EXPECT_EQ(engine().lightmaps()->pages.front()->mips.front().pixels, shown);
+  const auto solved = engine().lightmaps()->pages.front()->mips.front().pixels;
+  ASSERT_EQ(solved.size(), shown.size());
+  double difference = 0.0, all = 0.0;
+  for (std::size_t i = 0; i < shown.size(); ++i) {
+    const glm::dvec3 d(solved[i] - shown[i]), v(solved[i]);
+    difference += glm::dot(d, d);
+    all += glm::dot(v, v);
+  }
+  EXPECT_LE(std::sqrt(difference / all), error + status().error.total);
 }
 
 TEST_F(Edits, WhatIsNewIsNotBlackEither) {

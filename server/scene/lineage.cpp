@@ -1,0 +1,192 @@
+#include "server/scene/lineage.h"
+
+#include <algorithm>
+#include <glm/common.hpp>
+#include <map>
+#include <tuple>
+
+#include "common/check.h"
+
+namespace radiosity::scene {
+namespace {
+
+/// By which an instance is known again: its node, mesh and primitive, and which of the node's instances it is.
+using InstanceKey = std::tuple<std::uint32_t, std::uint32_t, std::uint32_t, std::uint32_t>;
+
+std::vector<InstanceKey> keysOf(const Scene& scene) {
+  std::map<InstanceKey, std::uint32_t> seen;
+  std::vector<InstanceKey> keys;
+  for (const auto& instance : scene.instances) {
+    const auto& primitive = scene.primitives[instance.primitive];
+    InstanceKey key{instance.node, primitive.mesh, primitive.primitive, 0};
+    std::get<3>(key) = seen[key]++;
+    keys.push_back(key);
+  }
+  return keys;
+}
+
+/// By instance: its first surface and how many it has; they lie together.
+struct SurfaceRange {
+  std::uint32_t first = 0, count = 0;
+};
+std::vector<SurfaceRange> surfacesOf(const Scene& scene, const PatchScene& patches) {
+  std::vector<SurfaceRange> ranges(scene.instances.size());
+  for (std::uint32_t s = 0; s < patches.surfaces.size(); ++s) {
+    auto& range = ranges[patches.surfaces[s].instance];
+    if (range.count++ == 0) range.first = s;
+  }
+  return ranges;
+}
+
+/// More boxes cost more to look past than they leave out.
+constexpr std::size_t kMaxChangedBoxes = 16;
+/// What a box hides, or lets be seen, goes by its surface.
+constexpr float kJoin = 0.9F;
+
+ChangedBox unionOf(const ChangedBox& a, const ChangedBox& b) {
+  return {glm::min(a.low, b.low), glm::max(a.high, b.high)};
+}
+
+float surfaceOf(const ChangedBox& box) {
+  const glm::vec3 size = box.high - box.low;
+  return size.x * size.y + size.y * size.z + size.z * size.x;
+}
+
+bool sameGrid(const Surface& a, const Surface& b) {
+  const auto hasSide = [](const Surface& s, std::size_t side) { return s.first_node[side] != kNone; };
+  return a.width == b.width && a.height == b.height && hasSide(a, 0) == hasSide(b, 0) && hasSide(a, 1) == hasSide(b, 1);
+}
+
+class Matcher {
+ public:
+  Matcher(const PatchScene& before, const PatchScene& after) : before_(before), after_(after) {}
+
+  [[nodiscard]] bool samePlace(const Surface& a, const Surface& b) const {
+    if (a.triangle_count != b.triangle_count || a.planar != b.planar || a.see_through || b.see_through) return false;
+    for (std::uint32_t i = 0; i < 3 * a.triangle_count; ++i) {
+      const auto& v = before_.vertices[before_.indices[std::size_t{3} * a.first_triangle + i]];
+      const auto& w = after_.vertices[after_.indices[std::size_t{3} * b.first_triangle + i]];
+      if (v.position != w.position || v.texel != w.texel || v.normal != w.normal) return false;
+    }
+    return true;
+  }
+
+  /// A leaf of a surface that has not moved. Triangles are numbered from the surface's first.
+  [[nodiscard]] bool sameLeaf(const Surface& a, const Surface& b, std::uint32_t leaf) const {
+    const auto &old_one = before_.leaves[a.first_leaf + leaf], &new_one = after_.leaves[b.first_leaf + leaf];
+    const auto sameTriangle = [&](std::uint32_t t, std::uint32_t u) {
+      return t == kNone || u == kNone ? t == u : t - a.first_triangle == u - b.first_triangle;
+    };
+    if (!sameTriangle(old_one.triangle, new_one.triangle) || old_one.full != new_one.full) return false;
+    if (!old_one.full && old_one.texel != new_one.texel) return false;
+    if ((old_one.first_spot == kNone) != (new_one.first_spot == kNone)) return false;
+    for (std::uint32_t k = 0; old_one.first_spot != kNone && k < kLeafSpots; ++k) {
+      const auto &s = before_.spots[old_one.first_spot + k], &t = after_.spots[new_one.first_spot + k];
+      if (s.texel != t.texel || !sameTriangle(s.triangle, t.triangle)) return false;
+    }
+    for (std::size_t side = 0; side < 2; ++side) {
+      if (a.first_node[side] == kNone) continue;
+      if (before_.node_area[a.first_node[side] + leaf] != after_.node_area[b.first_node[side] + leaf]) return false;
+    }
+    return true;
+  }
+
+ private:
+  const PatchScene& before_;
+  const PatchScene& after_;
+};
+
+/// One box for each instance that has something in it.
+class Boxes {
+ public:
+  explicit Boxes(std::size_t instances) : boxes_(instances, {glm::vec3(1e30F), glm::vec3(-1e30F)}) {}
+  void add(const Surface& surface) {
+    auto& box = boxes_[surface.instance];
+    box.low = glm::min(box.low, surface.bounds_min);
+    box.high = glm::max(box.high, surface.bounds_max);
+  }
+  void appendTo(std::vector<ChangedBox>& all) const {
+    for (const auto& box : boxes_) {
+      if (box.low.x <= box.high.x) all.push_back(box);
+    }
+  }
+
+ private:
+  std::vector<ChangedBox> boxes_;
+};
+
+}  // namespace
+
+std::vector<std::uint32_t> matchInstances(const Scene& before, const Scene& after) {
+  std::map<InstanceKey, std::uint32_t> known;
+  const auto old_keys = keysOf(before);
+  for (std::uint32_t i = 0; i < old_keys.size(); ++i) known[old_keys[i]] = i;
+  std::vector<std::uint32_t> source;
+  for (const auto& key : keysOf(after)) {
+    const auto found = known.find(key);
+    source.push_back(found == known.end() ? kNone : found->second);
+  }
+  return source;
+}
+
+void joinBoxes(std::vector<ChangedBox>& boxes) {
+  for (bool joined = true; joined;) {
+    joined = false;
+    for (std::size_t i = 0; i < boxes.size(); ++i) {
+      for (std::size_t k = i + 1; k < boxes.size();) {
+        const auto both = unionOf(boxes[i], boxes[k]);
+        if (boxes.size() <= kMaxChangedBoxes && surfaceOf(both) > kJoin * (surfaceOf(boxes[i]) + surfaceOf(boxes[k]))) {
+          ++k;
+          continue;
+        }
+        boxes[i] = both;
+        boxes.erase(boxes.begin() + static_cast<std::ptrdiff_t>(k));
+        joined = true;
+      }
+    }
+  }
+}
+
+bool PatchMap::nothingKept() const {
+  return std::ranges::all_of(moved, [](bool m) { return m; });
+}
+
+PatchMap matchPatches(const Scene& scene_before, const PatchScene& before, const Scene& scene_after,
+                      const PatchScene& after) {
+  RAD_CHECK(before.centre == after.centre && before.scale == after.scale);
+  PatchMap map;
+  map.surface_before.assign(after.surfaces.size(), kNone);
+  map.moved.assign(after.surfaces.size(), true);
+  map.leaf_altered.assign(after.leaves.size(), true);
+  const auto old_ranges = surfacesOf(scene_before, before), new_ranges = surfacesOf(scene_after, after);
+  const auto source = matchInstances(scene_before, scene_after);
+  const Matcher matcher(before, after);
+  Boxes old_boxes(scene_before.instances.size()), new_boxes(scene_after.instances.size());
+  std::vector<bool> stayed(before.surfaces.size(), false);
+  for (std::uint32_t i = 0; i < new_ranges.size(); ++i) {
+    const auto range = new_ranges[i];
+    const bool same_charts = source[i] != kNone && old_ranges[source[i]].count == range.count;
+    for (std::uint32_t k = 0; k < range.count; ++k) {
+      const auto s = range.first + k, former = same_charts ? old_ranges[source[i]].first + k : kNone;
+      const auto& surface = after.surfaces[s];
+      if (former != kNone && sameGrid(before.surfaces[former], surface)) map.surface_before[s] = former;
+      if (map.surface_before[s] == kNone || !matcher.samePlace(before.surfaces[former], surface)) {
+        new_boxes.add(surface);
+        continue;
+      }
+      map.moved[s] = false;
+      stayed[former] = true;
+      for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf)
+        map.leaf_altered[surface.first_leaf + leaf] = !matcher.sameLeaf(before.surfaces[former], surface, leaf);
+    }
+  }
+  for (std::uint32_t s = 0; s < before.surfaces.size(); ++s) {
+    if (!stayed[s]) old_boxes.add(before.surfaces[s]);
+  }
+  old_boxes.appendTo(map.boxes);
+  new_boxes.appendTo(map.boxes);
+  joinBoxes(map.boxes);
+  return map;
+}
+
+}  // namespace radiosity::scene

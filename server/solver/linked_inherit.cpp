@@ -1,0 +1,168 @@
+// LinkedSolver after an edit of geometry: what it takes over from the solver of the scene before.
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "server/solver/linked_solver.h"
+
+namespace radiosity::solver {
+namespace {
+
+/// By surface: its first side, or kNone.
+std::vector<std::uint32_t> firstSides(const scene::PatchScene& patches, const std::vector<Side>& sides) {
+  std::vector<std::uint32_t> first(patches.surfaces.size(), scene::kNone);
+  for (auto s = static_cast<std::uint32_t>(sides.size()); s-- > 0;) first[sides[s].surface] = s;
+  return first;
+}
+
+/// The side that a light polygon is a part of, by its key.
+std::uint32_t sideOfLight(const LightPolygon& light, const scene::PatchScene& patches, const std::vector<Side>& sides) {
+  const std::uint32_t triangle = light.key / 2;
+  const auto found = std::ranges::find_if(sides, [&](const Side& side) {
+    return side.side == light.key % 2 && triangle >= side.triangle_key &&
+           triangle - side.triangle_key < patches.surfaces[side.surface].triangle_count;
+  });
+  return found == sides.end() ? scene::kNone : static_cast<std::uint32_t>(found - sides.begin());
+}
+
+}  // namespace
+
+LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
+                           Transport& transport, const SolverSettings& settings, const LightSources& sources,
+                           LinkedSolver& former, const scene::PatchMap& map)
+    : LinkedSolver(std::move(patches), transport, settings) {
+  const auto numbers = renumber(former, map);
+  shadows_ = std::make_unique<Shadows>(*patches_, sides_, changeSince(numbers));
+  edits_ = former.edits_;
+  counters_ = former.counters_;
+  rounds_ = former.rounds_;
+  solutions_ = former.solutions_;
+  sweeps_ = former.sweeps_;
+  replayed_ = former.replayed_;
+  share_part_ = former.share_part_;
+  planner_.inherit(former.planner_, numbers.side_after);
+  inheritLights(former, numbers);
+  takeMaterials(materials);
+  takeSources(sources);
+  inheritNodes(former, numbers);
+  planRepairs();
+  for (auto& half : half_) half.assign(emission_.size(), glm::vec3(0.0F));
+  findUnshot();
+  solveAnew();
+}
+
+/// Sides that are still there keep their keys; others get keys that no side ever had.
+LinkedSolver::Renumbering LinkedSolver::renumber(LinkedSolver& former, const scene::PatchMap& map) {
+  Renumbering numbers{former, map, {}, {}, {}};
+  numbers.side_after.assign(former.sides_.size(), scene::kNone);
+  numbers.unmoved_after = numbers.side_after;
+  const auto first_sides = firstSides(*former.patches_, former.sides_);
+  key_end_ = former.key_end_;
+  triangle_key_end_ = former.triangle_key_end_;
+  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
+    Side& side = sides_[s];
+    const auto before = map.surface_before[side.surface];
+    if (before == scene::kNone) {
+      side.key = std::exchange(key_end_, key_end_ + side.node_count);
+      side.triangle_key =
+          std::exchange(triangle_key_end_, triangle_key_end_ + patches_->surfaces[side.surface].triangle_count);
+      continue;
+    }
+    auto old_side = first_sides[before];
+    while (former.sides_[old_side].side != side.side) ++old_side;
+    side.key = former.sides_[old_side].key;
+    side.triangle_key = former.sides_[old_side].triangle_key;
+    numbers.side_after[old_side] = s;
+    if (!map.moved[side.surface]) numbers.unmoved_after[old_side] = s;
+  }
+  numbers.unfinished.resize(former.system_.shooters().size());
+  for (const auto& repair : std::span(former.repairs_).subspan(former.repaired_))
+    numbers.unfinished[repair.shooter][repair.half] = repair;
+  return numbers;
+}
+
+/// Since all links were true: where an edit came before those before it were taken in, theirs count too.
+GeometryChange LinkedSolver::changeSince(const Renumbering& numbers) const {
+  GeometryChange change;
+  change.boxes = numbers.map.boxes;
+  for (const auto& side : sides_) {
+    const auto first = numbers.map.leaf_altered.begin() + patches_->surfaces[side.surface].first_leaf;
+    change.altered.insert(change.altered.end(), first, first + side.leaf_count);
+  }
+  const auto& former = numbers.former;
+  if (former.repaired_ == former.repairs_.size()) return change;
+  const auto& earlier = former.shadows_->change();
+  change.boxes.insert(change.boxes.end(), earlier.boxes.begin(), earlier.boxes.end());
+  scene::joinBoxes(change.boxes);
+  for (std::size_t s = 0; s < former.sides_.size(); ++s) {
+    if (numbers.unmoved_after[s] == scene::kNone) continue;
+    const auto from = former.sides_[s].first_value, to = sides_[numbers.unmoved_after[s]].first_value;
+    for (std::uint32_t leaf = 0; leaf < former.sides_[s].leaf_count; ++leaf) {
+      if (earlier.altered[from + leaf]) change.altered[to + leaf] = true;
+    }
+  }
+  return change;
+}
+
+/// Light polygons that have not moved, dark ones too. takeMaterials() will say how bright they are.
+void LinkedSolver::inheritLights(LinkedSolver& former, const Renumbering& numbers) {
+  auto& shooters = former.system_.shooters();
+  for (std::uint32_t n = 0; n < shooters.size(); ++n) {
+    if (shooters[n].light == scene::kNone) continue;
+    const auto& light = former.lights_[shooters[n].light];
+    const auto old_side = sideOfLight(light, *former.patches_, former.sides_);
+    if (old_side == scene::kNone || numbers.unmoved_after[old_side] == scene::kNone) continue;
+    Shooter shooter;
+    shooter.light = static_cast<std::uint32_t>(lights_.size());
+    shooter.area = light.area;
+    shooter.most_bytes = memory_.mostBytes(light);
+    lights_.push_back(light);
+    inheritColumns(shooters[n], n, system_.add(shooter), false, numbers);
+  }
+}
+
+void LinkedSolver::inheritNodes(LinkedSolver& former, const Renumbering& numbers) {
+  auto& shooters = former.system_.shooters();
+  for (std::uint32_t n = 0; n < shooters.size(); ++n) {
+    if (shooters[n].isLight() || numbers.side_after[shooters[n].place.side] == scene::kNone) continue;
+    Shooter shooter;
+    shooter.place = shooters[n].place;
+    shooter.place.side = numbers.side_after[shooter.place.side];
+    const Side& side = sides_[shooter.place.side];
+    if (patches_->node_area[nodeId(side, shooter.place)] <= 0.0F) continue;  // buried
+    bool altered = false;
+    const auto rect = leafRect(side, shooter.place);
+    for (auto y = rect.y0; y < rect.y1; ++y) {
+      for (auto x = rect.x0; x < rect.x1; ++x)
+        altered = altered || shadows_->change().altered[side.first_value + y * side.width + x];
+    }
+    shooter.certain = shooters[n].certain;
+    shooter.mean = shooters[n].mean;
+    shooter.sent = shooters[n].sent;
+    shooter.most_bytes = memory_.mostBytes(shooter.place.side);
+    inheritColumns(shooters[n], n, system_.add(shooter), altered, numbers);
+  }
+}
+
+/// `whole`: the shooter itself is not what it was. The links of the others are taken over as they are, and their
+/// repair is noted.
+void LinkedSolver::inheritColumns(Shooter& from, std::uint32_t old_index, std::uint32_t index, bool whole,
+                                  const Renumbering& numbers) {
+  auto& shooter = system_.shooters()[index];
+  shooter.products = from.products;
+  for (std::size_t half = 0; half < 2; ++half) {
+    auto& column = from.column[half];
+    const auto& unfinished = numbers.unfinished[old_index][half];
+    const bool is_light = from.light != scene::kNone;
+    const auto samples = unfinished.whole ? unfinished.samples
+                         : is_light       ? static_cast<std::uint32_t>(column.points())
+                                          : column.samples();
+    if (samples == 0) continue;
+    repairs_.push_back({index, half, samples, whole || unfinished.whole});
+    if (repairs_.back().whole) continue;
+    column.renumber(numbers.unmoved_after, numbers.former.sides_, sides_);
+    shooter.column[half] = std::move(column);
+  }
+}
+
+}  // namespace radiosity::solver

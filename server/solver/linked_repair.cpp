@@ -1,0 +1,234 @@
+// LinkedSolver after an edit of geometry: measures again what the edit may have changed, with the same points as
+// before. Each column of links is the mean of its samples, so all of them are taken again, but only for the leaves that
+// need it; how much should arrive in all is known without the others, unless much is lost.
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <span>
+#include <utility>
+
+#include "server/solver/halves.h"
+#include "server/solver/linked_solver.h"
+
+namespace radiosity::solver {
+namespace {
+
+/// Points of one sample of a light that is taken again: as many as of a new one.
+constexpr std::uint32_t kLightPoints = 8;
+/// What arrives, escapes and is absorbed makes all that is sent; a polygon's area is known to 0.002 of it. A sum of
+/// some links in the place of what should arrive does not.
+constexpr double kNoSum = 0.005;
+/// Repairs of a slice before it is known how long they take.
+constexpr std::size_t kMostAtOnce = 1024;
+
+/// Of the corners of a polygon about their middle.
+std::pair<glm::vec3, float> circle(const LightPolygon& light) {
+  const std::span corners(light.corners.data(), light.corner_count);
+  glm::vec3 middle(0.0F);
+  for (const auto& corner : corners) middle += corner / static_cast<float>(corners.size());
+  float radius = 0.0F;
+  for (const auto& corner : corners) radius = std::max(radius, glm::distance(middle, corner));
+  return {middle, radius};
+}
+
+}  // namespace
+
+/// Some repairs on their way.
+struct LinkedSolver::RepairBatch {
+  std::span<const Repair> repairs;
+  std::vector<std::vector<LinkColumn::ValueRun>> leaves;  ///< by repair: those to be taken again; unused where whole
+  ShotBatch shots;
+  struct Sample {
+    std::uint32_t repair, points;
+    bool last;
+  };
+  std::vector<Sample> gathered, scattered;
+  std::vector<float> sum;  ///< by leaf value: of the repair on its way, links times points
+  double points = 0.0;
+  LinkColumn::Totals totals;  ///< times points
+  bool open = false;          ///< so much is lost that only the sum of all links tells what arrives
+  std::vector<Repair> anew;   ///< whole, since they are open now
+};
+
+/// Leaves in repairs_ what is needed, and makes room for what it may bring.
+void LinkedSolver::planRepairs() {
+  system_.begin();
+  memory_.begin(system_);
+  affected_ = 0;
+  std::erase_if(repairs_, [&](Repair& repair) {
+    const auto& shooter = system_.shooters()[repair.shooter];
+    if (!isNeeded(repair)) return true;
+    if (!memory_.takeSample(shooter, repair.half)) {
+      system_.forget(repair.shooter, repair.half);
+      return true;
+    }
+    affected_ += shooter.isLight() ? 1 + (repair.samples - 1) / kLightPoints : repair.samples;
+    return false;
+  });
+}
+
+/// Whether some point of the samples sees the change. What cannot be repaired in parts becomes whole.
+bool LinkedSolver::isNeeded(Repair& repair) {
+  const auto& shooter = system_.shooters()[repair.shooter];
+  if (repair.whole) return true;
+  bool sees = false, gathers = true;
+  if (shooter.isLight()) {
+    const auto& light = lights_[shooter.light];
+    sees = shadows_->sees(light.corners[0], light.normal);
+  } else {
+    ShotBatch batch;
+    addSamples(repair, batch);
+    gathers = batch.scatter.empty();
+    const auto looks = [&](const HemicubeFrame& frame) { return shadows_->sees(frame.origin, frame.normal); };
+    sees = std::ranges::any_of(batch.points, looks) ||
+           std::ranges::any_of(batch.scatter, [&](const ScatterShot& shot) { return looks(shot.frame); });
+  }
+  if (!sees) {
+    edits_.kept += shooter.isLight() ? 1 : repair.samples;
+    return false;
+  }
+  repair.whole = !gathers || shooter.column[repair.half].isOpen(shooter.area);
+  if (!repair.whole) return true;
+  system_.forget(repair.shooter, repair.half);
+  return true;
+}
+
+/// The shots that the column was made of; of a light, as many points.
+void LinkedSolver::addSamples(const Repair& repair, ShotBatch& batch) const {
+  const auto& shooter = system_.shooters()[repair.shooter];
+  if (!shooter.isLight()) {
+    for (std::uint32_t i = 0; i < repair.samples; ++i)
+      shots_.add(shooter.place, repair.half, i, 1, settings_.planner.node_resolution, batch);
+    return;
+  }
+  std::uint32_t points = 1 + (repair.samples - 1) % kLightPoints;
+  for (std::uint32_t i = 0; i * kLightPoints < repair.samples; ++i, points = kLightPoints)
+    shots_.add(lights_[shooter.light], repair.half, i, points, settings_.planner.light_resolution, batch);
+}
+
+void LinkedSolver::findCutLinks(RepairBatch& repairs) const {
+  repairs.leaves.resize(repairs.repairs.size());
+  inBothHalves([&](std::size_t worker) {
+    Shadows::Scratch scratch;
+    std::vector<glm::vec3> points;
+    for (std::size_t i = worker; i < repairs.repairs.size(); i += 2) {
+      const auto& repair = repairs.repairs[i];
+      const auto& shooter = system_.shooters()[repair.shooter];
+      if (repair.whole) continue;
+      if (shooter.isLight()) {
+        const auto& light = lights_[shooter.light];
+        const auto [middle, radius] = circle(light);
+        shadows_->find({&middle, 1}, light.normal, radius, settings_.planner.light_resolution, scratch,
+                       repairs.leaves[i]);
+        continue;
+      }
+      ShotBatch batch;
+      addSamples(repair, batch);
+      points.clear();
+      for (const auto& frame : batch.points) points.push_back(frame.origin);
+      shadows_->find(points, batch.gather.front().normal, 0.0F, settings_.planner.node_resolution, scratch,
+                     repairs.leaves[i]);
+    }
+  });
+}
+
+/// Short, as measureSlice().
+Result<void> LinkedSolver::repairSlice() {
+  const auto start = std::chrono::steady_clock::now();
+  RepairBatch batch;
+  batch.repairs = std::span(repairs_).subspan(repaired_, std::min(slice_, repairs_.size() - repaired_));
+  batch.sum.resize(emission_.size());
+  findCutLinks(batch);
+  auto& shots = batch.shots;
+  for (const auto& box : shadows_->change().boxes) shots.boxes.push_back(box);
+  for (std::uint32_t r = 0; r < batch.repairs.size(); ++r) {
+    const auto& repair = batch.repairs[r];
+    if (!repair.whole && batch.leaves[r].empty()) continue;
+    const auto first_run = static_cast<std::uint32_t>(shots.receivers.size());
+    std::uint32_t side = 0;
+    for (const auto& run : batch.leaves[r]) {
+      while (sides_[side].first_value + sides_[side].leaf_count <= run.first) ++side;
+      edits_.repaired_links += run.count;
+      shots.receivers.push_back({sides_[side].first_node + (run.first - sides_[side].first_value), run.count});
+    }
+    const std::size_t gathered = shots.gather.size(), scattered = shots.scatter.size();
+    addSamples(repair, shots);
+    for (auto i = gathered; i < shots.gather.size(); ++i) {
+      batch.gathered.push_back({r, shots.gather[i].point_count, i + 1 == shots.gather.size()});
+      if (repair.whole) continue;
+      shots.gather[i].first_run = first_run;
+      shots.gather[i].run_count = static_cast<std::uint32_t>(shots.receivers.size()) - first_run;
+      // Where nothing was lost, whatever is lost now is lost where the change is seen.
+      const bool all = !system_.shooters()[repair.shooter].column[repair.half].losesNothing();
+      shots.gather[i].box_count = all ? 0 : static_cast<std::uint32_t>(shots.boxes.size());
+    }
+    for (auto i = scattered; i < shots.scatter.size(); ++i) batch.scattered.push_back({r, 1, false});
+    (repair.whole ? edits_.retaken : edits_.repaired) +=
+        shots.gather.size() - gathered + shots.scatter.size() - scattered;
+  }
+  const auto take = [&](std::size_t i, LinkSample&& links) { takePart(batch, i, links); };
+  const auto done = transport_.measure(shots, take);
+  if (!done) return tl::unexpected<Error>(done.error());
+  counters_ += *done;
+  repaired_ += batch.repairs.size();
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  slice_ = std::clamp(
+      static_cast<std::size_t>(static_cast<double>(batch.repairs.size()) * kSliceSeconds / std::max(seconds, 1e-6)),
+      fewest_a_slice_, kMostAtOnce);
+  repairs_.insert(repairs_.end(), batch.anew.begin(), batch.anew.end());
+  if (repaired_ == repairs_.size()) {
+    repairs_.clear();
+    repaired_ = 0;
+    shadows_.reset();
+  }
+  return {};
+}
+
+/// One sample, whole or for some leaves; the last of a column puts them in the place of what was there.
+void LinkedSolver::takePart(RepairBatch& repairs, std::size_t shot, LinkSample& links) {
+  const bool scattered = shot >= repairs.gathered.size();
+  const auto& sample = scattered ? repairs.scattered[shot - repairs.gathered.size()] : repairs.gathered[shot];
+  const auto& repair = repairs.repairs[sample.repair];
+  if (scattered) links.scale(system_.shooters()[repair.shooter].area);  // it carried a flux of one
+  expander_.expand(links);
+  if (repair.whole) {
+    system_.addSample(repair.shooter, repair.half, expander_, links, sample.points);
+    return;
+  }
+  repairs.points += sample.points;
+  const auto area = system_.shooters()[repair.shooter].area;
+  const double all = links.due + links.escaped + links.absorbed;
+  repairs.open =
+      repairs.open || LinkColumn::isOpen(area, links.escaped + links.absorbed) || std::abs(all - area) > kNoSum * area;
+  repairs.totals.due += sample.points * links.due;
+  repairs.totals.escaped += sample.points * links.escaped;
+  repairs.totals.absorbed += sample.points * links.absorbed;
+  auto reached = expander_.sidesReached().begin();
+  const auto end = expander_.sidesReached().end();
+  for (const auto& run : repairs.leaves[sample.repair]) {
+    while (reached != end && sides_[*reached].first_value + sides_[*reached].leaf_count <= run.first) ++reached;
+    if (reached == end) break;
+    if (sides_[*reached].first_value > run.first) continue;
+    for (std::uint32_t v = run.first; v < run.first + run.count; ++v)
+      repairs.sum[v] += static_cast<float>(sample.points) * expander_.values()[v];
+  }
+  if (!sample.last) return;
+  const double part = 1.0 / std::exchange(repairs.points, 0.0);
+  const auto totals = std::exchange(repairs.totals, {});
+  const auto& leaves = repairs.leaves[sample.repair];
+  for (const auto& run : leaves) {
+    for (std::uint32_t v = run.first; v < run.first + run.count; ++v) repairs.sum[v] *= static_cast<float>(part);
+  }
+  if (std::exchange(repairs.open, false)) {
+    system_.forget(repair.shooter, repair.half);
+    repairs.anew.push_back({repair.shooter, repair.half, repair.samples, true});
+  } else {
+    system_.replaceLinks(repair.shooter, repair.half, leaves, repairs.sum,
+                         {part * totals.due, part * totals.escaped, part * totals.absorbed});
+  }
+  for (const auto& run : leaves) std::fill_n(repairs.sum.begin() + run.first, run.count, 0.0F);
+}
+
+}  // namespace radiosity::solver

@@ -1,0 +1,73 @@
+// Which links an edit of geometry may have cut or opened: those to leaves that were changed themselves, and those that
+// pass what was or is where something changed. Plain values; find() may be called by several threads, each with a
+// Scratch of its own.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+#include <span>
+#include <vector>
+
+#include "server/scene/patch_scene.h"
+#include "server/solver/link_column.h"
+#include "server/solver/side.h"
+
+namespace radiosity::solver {
+
+/// What changed, in the numbers of the edited scene.
+struct GeometryChange {
+  std::vector<scene::ChangedBox> boxes;
+  std::vector<bool> altered;  ///< by leaf value
+};
+
+class Shadows {
+ public:
+  Shadows(const scene::PatchScene& patches, const std::vector<Side>& sides, GeometryChange change);
+
+  [[nodiscard]] const GeometryChange& change() const { return change_; }
+
+  /// Whether a half space can see any of it.
+  [[nodiscard]] bool sees(const glm::vec3& point, const glm::vec3& normal) const;
+
+  struct Scratch {
+    std::vector<std::uint8_t> chunks, leaves;
+  };
+  /// Runs of leaf values, ascending, none across sides, of all leaves whose links from within `radius` of one of the
+  /// points, as an item buffer of `resolution` finds them, may differ: those altered, and those that the way to passes
+  /// a box, half a pixel's diagonal beside it included. A superset; leaves behind the plane of the points, and without
+  /// area, may be missing unless they are altered. O(leaves / 64 + leaves near those found).
+  void find(std::span<const glm::vec3> points, const glm::vec3& normal, float radius, std::uint32_t resolution,
+            Scratch& scratch, std::vector<LinkColumn::ValueRun>& runs) const;
+
+ private:
+  /// Balls around leaves, or around some of them; a negative radius: nothing.
+  struct Balls {
+    std::vector<float> x, y, z, radius;
+    void add(const glm::vec3& centre, float r);
+    [[nodiscard]] glm::vec3 centre(std::size_t i) const { return {x[i], y[i], z[i]}; }
+  };
+  /// All ways from a point to what lies behind, in, or beside a box.
+  struct Way {
+    glm::vec3 from, low, high;
+    float spread;  ///< the box counts as larger by so much for each unit of the way to it
+  };
+  static void markMet(const Way& way, const glm::vec4& plane, const Balls& balls, std::size_t first, std::size_t end,
+                      std::uint8_t* marks);
+  void addLeaves(const Side& side);
+  void addChunks(std::uint32_t side);
+
+  const scene::PatchScene& patches_;
+  const std::vector<Side>& sides_;
+  GeometryChange change_;
+  std::vector<scene::ChangedBox> all_;  ///< boxes, and one around all altered leaves
+  Balls leaves_;                        ///< by leaf value
+  struct Chunk {
+    std::uint32_t first, count;  ///< leaf values, of one side
+    bool altered;                ///< some of them
+  };
+  std::vector<Chunk> chunks_;
+  Balls chunk_balls_;
+};
+
+}  // namespace radiosity::solver
