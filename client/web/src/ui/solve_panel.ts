@@ -17,6 +17,7 @@ const STATES: Record<string, string> = {
   paused: 'Paused',
   converged: 'Done',
   timeLimit: 'Time limit reached',
+  limited: 'Memory limit reached',
   failed: 'Failed',
 };
 
