@@ -21,6 +21,10 @@ const TILE_BUDGET_MS = 5;
 const READY_ERROR = 0.35;
 const READY_AFTER_MS = 900;
 const MEASURE_EVERY_MS = 250;
+/** Reading back waits for all that the card has still to draw, which a slow one makes long: rest so many times that. */
+const MEASURE_SHARE = 8;
+/** A driver that never says it is done (a lost context) holds nothing up for longer. */
+const MOST_COMPILING_MS = 2000;
 /** Length of the pyramid that stands for another viewer, of the scene's diagonal. */
 const PERSON_SIZE = 0.04;
 
@@ -54,6 +58,7 @@ export class Viewer {
   autoRange = true;
   private staged: Staged | undefined;
   private people: People | undefined;
+  private readonly anisotropy: number;
   private readonly world = new Scene();
   private wanted = true;
   private lastFrame = 0;
@@ -69,6 +74,8 @@ export class Viewer {
     this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, powerPreference: 'high-performance' });
     this.renderer.toneMapping = NoToneMapping; // our shaders do it, and the encoding, so that one program serves all
     this.renderer.outputColorSpace = LinearSRGBColorSpace;
+    // Asked for here, where nothing is being drawn that the answer would have to wait for.
+    this.anisotropy = Math.min(8, this.renderer.capabilities.getMaxAnisotropy());
     this.renderer.setClearColor(0, 0); // the page's own background shows behind the scene
     this.rig = new CameraRig(canvas, () => this.invalidate());
     this.exposure = new ExposureMeter(this.renderer, this.uniforms);
@@ -121,17 +128,22 @@ export class Viewer {
 
   /** Geometry of a layout. A set that was overtaken is dropped. */
   async load(glb: ArrayBuffer, set: LightmapSet): Promise<void> {
-    const scene = await LitScene.load(
-      glb,
-      set,
-      this.uniforms,
-      Math.min(8, this.renderer.capabilities.getMaxAnisotropy()),
-    );
+    const scene = await LitScene.load(glb, set, this.uniforms, this.anisotropy);
     if (this.staged?.set !== set) return scene.dispose();
     scene.applyDocument(this.document);
+    await this.compile(scene);
+    if (this.staged?.set !== set) return scene.dispose();
+    scene.applyDocument(this.document); // it may have been edited meanwhile
     this.staged.scene = scene;
     this.staged.since = performance.now();
     this.invalidate();
+  }
+
+  /** Has the driver make the scene's programs while the page goes on, where it can: drawing waits for them. */
+  private async compile(scene: LitScene): Promise<void> {
+    if (!this.renderer.extensions.has('KHR_parallel_shader_compile')) return;
+    const timeUp = new Promise((resolve) => setTimeout(resolve, MOST_COMPILING_MS));
+    await Promise.race([this.renderer.compileAsync(scene.root, this.rig.camera, this.world), timeUp]);
   }
 
   /** Nothing to show any more (the server has no scene). */
@@ -239,7 +251,8 @@ export class Viewer {
   }
 
   private measure(now: number): void {
-    if (now - this.lastMeasure < MEASURE_EVERY_MS || !this.shown?.set.covered) return;
+    const pause = Math.max(MEASURE_EVERY_MS, MEASURE_SHARE * this.exposure.tookMs);
+    if (now - this.lastMeasure < pause || !this.shown?.set.covered) return;
     this.lastMeasure = now;
     if (this.uniforms.all.falseColour.value) this.updateRange();
     if (this.exposure.automatic && !this.mode?.flat) void this.measureNow().then(() => this.invalidate());
