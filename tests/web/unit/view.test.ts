@@ -44,7 +44,7 @@ it('a page grows its exponent in steps that hold what comes', () => {
     const page = pageExponent(exponent);
     expect(page).toBeGreaterThanOrEqual(exponent);
     expect(page - exponent).toBeLessThan(8);
-    // Nothing is lost of a texel that is 2^-20 of the brightest that a tile of this exponent may hold.
+    // Nothing is lost of a texel that is 2^-21 of the brightest that a tile of this exponent may hold.
     const dim = encodeRgb9e5(2 ** -6, 2 ** -7, 0.75 * 2 ** -6);
     expect(scaleRgb9e5(scaleRgb9e5(dim, exponent - page), page - exponent)).toBe(dim);
   }
