@@ -74,6 +74,32 @@ inline std::uint32_t facesOf(const Spans& s) {
   return bit(top, 0) | bit(px, 1) | bit(mx, 2) | bit(py, 3) | bit(my, 4);
 }
 
+/// Whether a triangle of these corners, in pixels, covers none of the samples at whole numbers: it lies between two
+/// columns or rows of them, or has four at most in its bounds and is beside each. Without branches, as the loop that
+/// calls it.
+inline bool showsNoSample(const float (&column)[3], const float (&row)[3]) {
+  const int left = static_cast<int>(smallest(column[0], column[1], column[2]) - kSampleMargin);
+  const int right = static_cast<int>(largest(column[0], column[1], column[2]) + kSampleMargin);
+  const int below = static_cast<int>(smallest(row[0], row[1], row[2]) - kSampleMargin);
+  const int above = static_cast<int>(largest(row[0], row[1], row[2]) + kSampleMargin);
+  const int columns = right - left, rows = above - below;
+  float du[3], dv[3], slack[3];
+  for (std::size_t c = 0; c < 3; ++c) {
+    du[c] = column[(c + 1) % 3] - column[c];
+    dv[c] = row[(c + 1) % 3] - row[c];
+    slack[c] = -kSampleMargin * (std::abs(du[c]) + std::abs(dv[c]));
+  }
+  const float turn = du[0] * dv[1] - dv[0] * du[1] < 0.0F ? -1.0F : 1.0F;
+  bool hit = (columns > 2) | (rows > 2);
+  for (int k = 0; k < 4; ++k) {
+    const float u = static_cast<float>(right - (k & 1)), v = static_cast<float>(above - (k >> 1));
+    bool in = (columns > (k & 1)) & (rows > (k >> 1));
+    for (std::size_t c = 0; c < 3; ++c) in = in & (turn * (du[c] * (v - row[c]) - dv[c] * (u - column[c])) >= slack[c]);
+    hit = hit | in;
+  }
+  return (columns == 0) | (rows == 0) | !hit;
+}
+
 __attribute__((target_clones("avx2", "default"))) void classify(const View& view, const Triangles& from,
                                                                 std::size_t first, std::size_t end,
                                                                 std::uint32_t* __restrict seen) {
@@ -117,32 +143,31 @@ __attribute__((target_clones("avx2", "default"))) void classify(const View& view
     const bool mx_in = risen & (s.zpx_high < 0) & (s.xpy_high < 0) & (s.xy_high < 0);
     const bool py_in = risen & (s.zy_high < 0) & (s.xy_high < 0) & (s.xpy_low > 0);
     const bool my_in = risen & (s.zpy_high < 0) & (s.xpy_high < 0) & (s.xy_low > 0);
-    const bool along_x = px_in | mx_in;
-    // Pixels of the corners on the one face that holds it (the cells of hemicube_weights.h).
-    float column_low = 1e30F, column_high = -1e30F, row_low = 1e30F, row_high = -1e30F;
+    // What stands on the shooter's plane is as good as above it, except to the rasteriser, which must clip it.
+    const bool stands = s.z_low > -kCoplanar;
+    const bool along_x = stands & (((s.zx_high < 0) & (s.xy_low > 0) & (s.xpy_low > 0)) |
+                                   ((s.zpx_high < 0) & (s.xpy_high < 0) & (s.xy_high < 0)));
+    const bool along_y = stands & (((s.zy_high < 0) & (s.xy_high < 0) & (s.xpy_low > 0)) |
+                                   ((s.zpy_high < 0) & (s.xpy_high < 0) & (s.xy_low > 0)));
+    // Corners on the one face that holds it, in pixels such that samples are whole numbers and what is truncated
+    // positive (the cells of hemicube_weights.h).
+    float column[3], row[3];
+    float rounding = 0.0F;
     for (std::size_t c = 0; c < 3; ++c) {
       const float depth = larger(largest(z[c], std::abs(x[c]), std::abs(y[c])), 1e-20F);
       const float across = along_x ? y[c] : x[c];
       const float up = top_in ? y[c] + depth : z[c];
       const float scale = view.half / depth;
-      const float column = (across + depth) * scale, row = up * scale;
-      column_low = smaller(column_low, column);
-      column_high = larger(column_high, column);
-      row_low = smaller(row_low, row);
-      row_high = larger(row_high, row);
+      column[c] = (across + depth) * scale + (view.shift_x + 1.5F);
+      row[c] = larger(up, 0.0F) * scale + (view.shift_y + 1.5F);
+      rounding = larger(rounding, kCoplanar * scale);
     }
-    // Samples lie half-way between whole numbers; the sum keeps what is truncated positive.
-    const float shift_x = view.shift_x + 1.5F, shift_y = view.shift_y + 1.5F;
-    const bool no_column = static_cast<int>(column_low + shift_x - kSampleMargin) ==
-                           static_cast<int>(column_high + shift_x + kSampleMargin);
-    const bool no_row =
-        static_cast<int>(row_low + shift_y - kSampleMargin) == static_cast<int>(row_high + shift_y + kSampleMargin);
-    const bool inside = top_in | along_x | py_in | my_in;
+    const bool on_one_face = (top_in | along_x | along_y) & (rounding < 0.25F * kSampleMargin);
+    const bool no_sample = on_one_face & showsNoSample(column, row);
     const bool back = from.plane[0][i] * o.x + from.plane[1][i] * o.y + from.plane[2][i] * o.z < from.plane[3][i];
     seen[i] = faces | bit(back, kBackBit) | bit(top_in, kInsideBit) | bit(px_in, kInsideBit + 1) |
               bit(mx_in, kInsideBit + 2) | bit(py_in, kInsideBit + 3) | bit(my_in, kInsideBit + 4) |
-              bit(from.area[i] > kLargeSteradian * nearest, kLargeBit) |
-              bit(inside & (no_column | no_row), kBetweenBit);
+              bit(from.area[i] > kLargeSteradian * nearest, kLargeBit) | bit(no_sample, kBetweenBit);
   }
 }
 

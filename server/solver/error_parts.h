@@ -13,10 +13,11 @@ struct ErrorParts {
   double discretization = 0.0;  ///< leaf against the bilinear interpolation of its parents, a third (second order)
 };
 
-/// Flux per channel, lux unit^2. emitted = absorbed + escaped + backface + unshot + imbalance.
+/// Flux per channel, lux unit^2. emitted = absorbed + escaped + backface + unshot + imbalance. `unshot` can be below
+/// zero by chance: winners at roulette stand for more, or less, than there is.
 struct EnergyParts {
   std::array<double, 3> emitted{}, absorbed{}, escaped{}, backface{}, unshot{};
-  /// What unbiased sampling created or destroyed by chance (gathered light, roulette): zero in the mean.
+  /// What unbiased sampling created or destroyed by chance (gathered light): zero in the mean.
   std::array<double, 3> imbalance{};
 };
 

@@ -272,6 +272,16 @@ void LinkColumn::apply(const std::array<float, 3>& radiosity, const std::array<f
   }
 }
 
+void LinkColumn::addSquares(float factor, std::span<float> sums) const {
+  const float scale = scale_ * gain_;
+  for (const auto& run : runs_) {
+    for (std::uint32_t i = 0; i < run.count; ++i) {
+      const float link = scale * decodeOne(code_[run.offset + i]);
+      sums[run.first_value + i] += factor * link * link;
+    }
+  }
+}
+
 double LinkColumn::product(const LinkColumn& a, const LinkColumn& b, std::span<const float> leaf_area) {
   double sum = 0.0;
   auto other = b.runs_.begin();

@@ -66,6 +66,8 @@ class LinkColumn {
 
   /// Adds radiosity[c] times the links to plane c of irradiance, by leaf value.
   void apply(const std::array<float, 3>& radiosity, const std::array<float*, 3>& irradiance) const;
+  /// Adds `factor` times the squares of the links, by leaf value.
+  void addSquares(float factor, std::span<float> sums) const;
   /// The links to the leaves of one side, whose values begin at `first_value`; false when there are none.
   [[nodiscard]] bool decode(std::uint32_t first_value, std::span<float> leaves) const;
 

@@ -11,22 +11,29 @@ namespace radiosity::solver {
 namespace {
 
 /// Nodes weaker than this part of a share play Russian roulette.
-constexpr double kRouletteShare = 0.05;
+constexpr double kRouletteShare = 0.2;
 /// A node that plays counts at most this often. Below, its light is left out (see leftOut()): in a dark corner larger
 /// weights would feed on themselves.
-constexpr double kMaxWeight = 20.0;
+constexpr double kMaxWeight = 80.0;
 /// Nodes of less than this part of a share may shoot as a polygon though a part of it is empty or buried.
-constexpr double kPartialShare = 1.2 * kRouletteShare;
+constexpr double kPartialShare = 0.06;
 /// Their parts that have more than this do not play.
-constexpr double kCertainShare = 0.1 * kRouletteShare;
+constexpr double kCertainShare = 0.005;
 /// Light that only differs between the leaves of a node cancels at a distance and counts near by.
 constexpr double kVariationWorth = 0.1;
 /// Square of the part of a node's links to its near receivers that feels what varies inside it.
 constexpr double kVariation = 0.5;
 /// Points of one sample of a light: enough for the ratio of weighted visibilities to have little bias.
 constexpr std::uint32_t kLightPoints = 8;
-/// A light's item buffers cost about so many times those of a node, for their resolution.
-constexpr double kLightCost = 3.0;
+/// Points on all lights together in the first wave and half, where some have fewer than kLightPoints.
+constexpr std::uint32_t kMostFirstPoints = 128;
+/// A point on a light costs this part of a node's sample: its image has more pixels, but the receivers are found and
+/// weighed once for all points, and expanded and averaged once.
+constexpr double kLightCost = 0.7;
+/// So many samples' worth of what is usual is mixed into what is found of a shooter.
+constexpr double kPrior = 1.0;
+/// A wave brings a shooter at most so many samples.
+constexpr std::uint32_t kMostSamplesAWave = 8;
 /// So many times that of a node are the images of a light without extent (a sky has most).
 constexpr double kSourceCost = 60.0;
 
@@ -47,7 +54,7 @@ double LinkPlanner::chance(double power) const { return std::min(1.0, power / (k
 bool LinkPlanner::plays(const NodePlace& place, std::size_t half, double power) const {
   const double p = chance(power);
   if (p < 1.0 / kMaxWeight) return false;
-  return p >= 1.0 || uniformFromKey(mixKeys(mixKeys(shots_.key(place), half), 77)) < p;
+  return p >= 1.0 || draws_.draw(place, half) < p;
 }
 
 double LinkPlanner::weigh(LinkSystem& system) {
@@ -68,9 +75,13 @@ double LinkPlanner::weigh(LinkSystem& system) {
 
 std::vector<Measurement> LinkPlanner::firstLight(const LinkSystem& system) const {
   double total = 0.0;
+  std::uint32_t lights = 0;
   for (const auto& shooter : system.shooters()) {
-    if (shooter.isLight()) total += shooter.power();
+    if (!shooter.isLight() || shooter.power() <= 0.0) continue;
+    total += shooter.power();
+    ++lights;
   }
+  const std::uint32_t all = std::max(settings_.light_points, std::min(kLightPoints * lights, kMostFirstPoints));
   std::vector<Measurement> wanted;
   for (std::uint32_t n = 0; n < system.shooters().size(); ++n) {
     const auto& shooter = system.shooters()[n];
@@ -81,7 +92,7 @@ std::vector<Measurement> LinkPlanner::firstLight(const LinkSystem& system) const
       }
       continue;
     }
-    const auto share = static_cast<std::uint32_t>(std::lround(settings_.light_points * shooter.power() / total));
+    const auto share = static_cast<std::uint32_t>(std::lround(all * shooter.power() / total));
     const std::uint32_t points = std::clamp(share, 2U, kLightPoints);
     for (std::uint32_t k = 0; k < std::max(1U, (share + kLightPoints - 1) / kLightPoints); ++k) {
       for (std::size_t half = 0; half < 2; ++half) {
@@ -204,15 +215,32 @@ double LinkPlanner::rouletteShare(const LinkSystem& system) {
 }
 
 /// What differs from the mean inside a node reaches a receiver with as much of its links as is near: far away it
-/// cancels, close by it does not. The sum of squared links weighs the near ones most.
-double LinkPlanner::variation(const Shooter& shooter, const LinkSystem& system, const UnshotPyramid& unshot,
-                              const scene::PatchScene& patches) const {
+/// cancels, close by it does not. The sum of squared links weighs the near ones most. Per square of a link.
+double LinkPlanner::squaredVariation(const Shooter& shooter, const LinkSystem& system, const UnshotPyramid& unshot,
+                                     const scene::PatchScene& patches) const {
   if (shooter.isLight() || shooter.place.level == 0) return 0.0;
   const auto id = nodeId(sides_[shooter.place.side], shooter.place);
   if (system.hasBelow(id)) return 0.0;
   const double rough = static_cast<double>(unshot.rough(id)) / static_cast<double>(patches.node_area[id]);
-  const double reach = std::max(shooter.products[0], shooter.products[2]);
-  return kVariation * rough * rough * reach;
+  return kVariation * rough * rough;
+}
+
+double LinkPlanner::variation(const Shooter& shooter, const LinkSystem& system, const UnshotPyramid& unshot,
+                              const scene::PatchScene& patches) const {
+  return squaredVariation(shooter, system, unshot, patches) * std::max(shooter.products[0], shooter.products[2]);
+}
+
+std::vector<float> LinkPlanner::variationOfLeaves(const LinkSystem& system, const UnshotPyramid& unshot,
+                                                  const scene::PatchScene& patches) const {
+  std::size_t values = 0;
+  for (const auto& side : sides_) values += side.leaf_count;
+  std::vector<float> leaves(values, 0.0F);
+  for (const auto& shooter : system.shooters()) {
+    const double squared = squaredVariation(shooter, system, unshot, patches);
+    if (squared <= 0.0) continue;
+    shooter.column[shooter.products[0] >= shooter.products[2] ? 0 : 1].addSquares(static_cast<float>(squared), leaves);
+  }
+  return leaves;
 }
 
 double LinkPlanner::variation(const LinkSystem& system, const UnshotPyramid& unshot,
@@ -269,10 +297,13 @@ std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPy
     const std::uint32_t points = shooter.light != scene::kNone ? kLightPoints : 1;
     const double cost = shooter.source != scene::kNone ? kSourceCost : shooter.isLight() ? kLightCost : 1.0;
     const double taken = shooter.column[0].points();
-    // The spread of few samples is itself uncertain: half a sample's worth of what is usual for such power is mixed in.
+    // The spread of few samples is itself uncertain: a sample's worth of what is usual for such power is mixed in.
     const double usual = squares > 0.0 ? spread / squares * shooter.power() * shooter.power() : 0.0;
-    const double variance = 0.25 * (shooter.spread() * taken + 0.5 * usual) / (taken + 0.5);
-    gains.push_back({variance / (2.0 * (taken + points) * cost), n, points});
+    const double variance = 0.25 * (shooter.spread() * taken + kPrior * usual) / (taken + kPrior);
+    // Of each further sample, were those before it taken. At most as many as there are: their worth is only guessed.
+    const auto most = std::min(kMostSamplesAWave, std::max(1U, shooter.column[0].samples()));
+    for (std::uint32_t k = 0; k < most; ++k)
+      gains.push_back({variance * taken / (2.0 * (taken + k * points) * (taken + (k + 1) * points) * cost), n, points});
     const double varying = may_split ? variation(shooter, system, unshot, patches) : 0.0;
     if (varying > 0.0) gains.push_back({varying / 8.0, n, 0});
   }
@@ -281,6 +312,7 @@ std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPy
   });
   const std::size_t limit = 2 * std::max<std::size_t>(settings_.pairs_a_wave, system.shooters().size() / 8);
   std::vector<Measurement> wanted;
+  std::vector<std::uint32_t> further(system.shooters().size(), 0);
   for (const auto& gain : gains) {
     if (wanted.size() >= limit || gain.gain <= 0.0) break;
     if (gain.points == 0) {
@@ -291,7 +323,8 @@ std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPy
     const auto& shooter = system.shooters()[gain.shooter];
     if (!memory.takeSample(shooter, 0) || !memory.takeSample(shooter, 1)) continue;
     for (std::size_t half = 0; half < 2; ++half)
-      wanted.push_back({gain.shooter, half, gain.points, shooter.column[half].samples()});
+      wanted.push_back({gain.shooter, half, gain.points, shooter.column[half].samples() + further[gain.shooter]});
+    ++further[gain.shooter];
   }
   return wanted;
 }

@@ -10,6 +10,7 @@
 #include "server/solver/link_system.h"
 #include "server/solver/node_shots.h"
 #include "server/solver/planner.h"
+#include "server/solver/roulette.h"
 #include "server/solver/unshot_pyramid.h"
 
 namespace radiosity::solver {
@@ -24,8 +25,9 @@ struct Measurement {
 
 class LinkPlanner {
  public:
-  LinkPlanner(const std::vector<Side>& sides, const NodeShots& shots, const PlannerSettings& settings)
-      : sides_(sides), shots_(shots), settings_(settings) {}
+  LinkPlanner(const scene::PatchScene& patches, const std::vector<Side>& sides, const NodeShots& shots,
+              const PlannerSettings& settings, std::uint64_t seed)
+      : sides_(sides), shots_(shots), settings_(settings), draws_(patches, sides, seed) {}
 
   /// The power of one shooter, all channels; nodes are split until they have less.
   void setShare(double share) { share_ = share; }
@@ -48,6 +50,10 @@ class LinkPlanner {
   /// the shooters causes.
   [[nodiscard]] double variation(const LinkSystem& system, const UnshotPyramid& unshot,
                                  const scene::PatchScene& patches) const;
+
+  /// The same for each leaf value. Cost: one look at every link.
+  [[nodiscard]] std::vector<float> variationOfLeaves(const LinkSystem& system, const UnshotPyramid& unshot,
+                                                     const scene::PatchScene& patches) const;
 
   /// The part of the sampling error's square that is due to roulette: only smaller shares lower it.
   [[nodiscard]] static double rouletteShare(const LinkSystem& system);
@@ -74,6 +80,8 @@ class LinkPlanner {
   [[nodiscard]] bool isPartial(const Node& node) const;
   [[nodiscard]] double chance(double power) const;
   [[nodiscard]] bool plays(const NodePlace& place, std::size_t half, double power) const;
+  [[nodiscard]] double squaredVariation(const Shooter& shooter, const LinkSystem& system, const UnshotPyramid& unshot,
+                                        const scene::PatchScene& patches) const;
   [[nodiscard]] double variation(const Shooter& shooter, const LinkSystem& system, const UnshotPyramid& unshot,
                                  const scene::PatchScene& patches) const;
   void split(const NodePlace& place, LinkSystem& system, const UnshotPyramid& unshot, const scene::PatchScene& patches,
@@ -84,6 +92,7 @@ class LinkPlanner {
   const std::vector<Side>& sides_;
   const NodeShots& shots_;
   const PlannerSettings& settings_;
+  RouletteDraws draws_;
   PlannerCounters counters_;
   double share_ = 0.0;
   double left_out_ = 0.0;

@@ -19,6 +19,9 @@ constexpr double kRefinement = 2.0;
 /// More refinements than this find nothing: everything is split to its leaves.
 constexpr double kMinShare = 1e-9;
 constexpr std::uint32_t kMaxRounds = 100'000;
+/// Shares are refined when what roulette and weakness cause is this part of the error: a wave of growth lowers it by
+/// more than a wave of samples, long before it is the larger part.
+constexpr double kByShare = 0.35;
 /// Where nothing can be split any more, samples stop when their error is this part of the rest.
 constexpr double kIdleSampling = 0.1;
 /// Before the first was timed: as many measurements, of some images each, as draw so many triangles.
@@ -48,11 +51,11 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
       expander_(*patches_, sides_),
       memory_(*patches_, sides_, settings.link_memory),
       unshot_(*patches_),
-      planner_(sides_, shots_, settings_.planner),
+      planner_(*patches_, sides_, shots_, settings_.planner, settings_.seed),
       irradiance_(patches_->nodeCount(), glm::vec3(0.0F)) {
   takeMaterials(materials);
   takeSources(sources);
-  share_part_ = 1.0 / settings_.planner.shooters_a_round;
+  share_part_ = 1.0 / settings_.planner.first_shooters;
   slice_ = std::clamp<std::size_t>(kFirstTriangles / std::max<std::size_t>(1, patches_->triangles.size()), 2, 16);
   fewest_a_slice_ = std::min(slice_, kFewestMeasurements);
   for (auto& half : half_) half.assign(emission_.size(), glm::vec3(0.0F));
@@ -258,7 +261,7 @@ StepOutcome LinkedSolver::chooseFurther() {
   }
   // Roulette's part of the sampling error, and what was too weak to play, fall with the share alone.
   const double roulette = error_.sampling * std::sqrt(LinkPlanner::rouletteShare(system_));
-  const bool by_share = std::hypot(roulette, left_out_) > 0.7 * error_.total;
+  const bool by_share = std::hypot(roulette, left_out_) > kByShare * error_.total;
   const double by_samples = std::sqrt(std::max(0.0, error_.sampling * error_.sampling - roulette * roulette));
   if (rounds_ >= kMaxRounds) return exhausted(SolveLimit::kRounds);
   if (isFull() && (by_share || by_samples < kIdleSampling * error_.residual))
@@ -315,6 +318,7 @@ void LinkedSolver::assess() {
   error_.discretization = field.discretization();
   const double varying = std::sqrt(planner_.variation(system_, unshot_, *patches_) / field.square());
   error_.residual = owed / (1.0 - kept) / received + varying + system_.unsolved();
+  varying_share_ = error_.residual > 0.0 ? varying / error_.residual : 0.0;
   left_out_ = left_out / (1.0 - kept) / received;
   error_.total = std::hypot(error_.residual, error_.sampling);
 }
@@ -340,42 +344,9 @@ void LinkedSolver::setLights(const LightSources& sources) {
   solveAnew();
 }
 
-std::vector<glm::vec3> LinkedSolver::halfIrradiance(std::uint32_t half) const {
-  std::vector<glm::vec3> values(patches_->nodeCount(), glm::vec3(0.0F));
-  for (const auto& side : sides_)
-    std::copy_n(half_[half].begin() + side.first_value, side.leaf_count, values.begin() + side.first_node);
-  return values;
-}
-
-std::vector<glm::vec3> LinkedSolver::unshot() const {
-  std::vector<glm::vec3> values(patches_->nodeCount(), glm::vec3(0.0F)), leaves;
-  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
-    leafUnshot(s, leaves);
-    std::copy(leaves.begin(), leaves.end(), values.begin() + sides_[s].first_node);
-  }
-  return values;
-}
-
-std::vector<std::uint8_t> LinkedSolver::shotLevels() const {
-  std::vector<std::uint8_t> levels(patches_->nodeCount(), kNeverShot);
-  for (const auto& shooter : system_.shooters()) {
-    if (shooter.isLight()) continue;
-    const Side& side = sides_[shooter.place.side];
-    const auto level = static_cast<std::uint8_t>(shooter.place.level);
-    const auto rect = leafRect(side, shooter.place);
-    for (auto y = rect.y0; y < rect.y1; ++y) {
-      for (auto x = rect.x0; x < rect.x1; ++x) {
-        auto& known = levels[side.first_node + y * side.width + x];
-        known = std::min(known, level);
-      }
-    }
-  }
-  return levels;
-}
-
 EnergyParts LinkedSolver::energy() const {
   EnergyParts parts;
-  std::array<double, 3> lit{};  // sent by lights that have links
+  std::array<double, 3> sent_for{};  // by lights that have links, and by shooters for others
   for (const auto& shooter : system_.shooters()) {
     for (std::size_t c = 0; c < 3 && shooter.source != scene::kNone; ++c) {
       const double flux = shooter.area * static_cast<double>(shooter.sent[0][static_cast<int>(c)]);
@@ -391,8 +362,14 @@ EnergyParts LinkedSolver::energy() const {
         const double sent = 0.5 * shooter.weight[half] * static_cast<double>(shooter.sent[half][static_cast<int>(c)]);
         parts.escaped[c] += sent * column.escaped();
         parts.backface[c] += sent * column.absorbed();
-        if (shooter.light != scene::kNone) lit[c] += sent * shooter.area;
+        if (shooter.light != scene::kNone) sent_for[c] += sent * shooter.area;
       }
+    }
+    // Shooters that won at roulette sent more than their own leaves have, those that lost nothing.
+    for (std::size_t half = 0; half < 2 && !shooter.isLight(); ++half) {
+      for (int c = 0; c < 3; ++c)
+        sent_for[static_cast<std::size_t>(c)] +=
+            0.5 * (shooter.weight[half] - 1.0) * static_cast<double>(shooter.sent[half][c]) * shooter.area;
     }
   }
   for (const auto& side : sides_) {
@@ -412,7 +389,7 @@ EnergyParts LinkedSolver::energy() const {
     }
   }
   for (std::size_t c = 0; c < 3; ++c) {
-    parts.unshot[c] -= lit[c];
+    parts.unshot[c] -= sent_for[c];
     parts.imbalance[c] = parts.emitted[c] - parts.absorbed[c] - parts.escaped[c] - parts.backface[c] - parts.unshot[c];
   }
   return parts;

@@ -36,6 +36,7 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] std::vector<glm::vec3> halfIrradiance(std::uint32_t half) const override;
   [[nodiscard]] std::vector<glm::vec3> unshot() const override;
   [[nodiscard]] std::vector<std::uint8_t> shotLevels() const override;
+  [[nodiscard]] std::vector<float> residualShape() const override;
   [[nodiscard]] const ErrorParts& error() const override { return error_; }
   [[nodiscard]] EnergyParts energy() const override;
   [[nodiscard]] const TransportCounters& transportCounters() const override { return counters_; }
@@ -118,6 +119,7 @@ class LinkedSolver final : public Solver {
   std::uint32_t rounds_ = 0;
   std::uint64_t solutions_ = 0, sweeps_ = 0, replayed_ = 0;
   double varying_ = 0.0, net_unshot_ = 0.0;     // flux, all channels
+  double varying_share_ = 0.0;                  // of the residual, what light that varies inside shooters causes
   std::array<std::vector<glm::vec3>, 2> half_;  // irradiance by leaf value
   std::vector<glm::vec3> irradiance_;           // by node
   ErrorParts error_;

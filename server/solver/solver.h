@@ -84,6 +84,8 @@ class Solver {
   /// By node, level 0: the level of the node that last shot for this leaf; kNeverShot where none has.
   [[nodiscard]] virtual std::vector<std::uint8_t> shotLevels() const = 0;
   static constexpr std::uint8_t kNeverShot = 255;
+  /// By node, level 0: how the square of the residual is spread over the leaves; area-weighted mean one. Empty: evenly.
+  [[nodiscard]] virtual std::vector<float> residualShape() const { return {}; }
   [[nodiscard]] virtual const ErrorParts& error() const = 0;
   [[nodiscard]] virtual EnergyParts energy() const = 0;
   [[nodiscard]] virtual const TransportCounters& transportCounters() const = 0;

@@ -46,25 +46,27 @@ glm::dvec3 meanSquare(const scene::PatchScene& patches, const std::vector<Side>&
 
 std::vector<glm::vec3> texelErrorSquared(const scene::PatchScene& patches, std::span<const glm::vec3> first,
                                          std::span<const glm::vec3> second, std::span<const glm::vec3> mean,
-                                         const ErrorParts& stated) {
+                                         const ErrorParts& stated, std::span<const float> residual_shape) {
   std::vector<glm::vec3> squares(patches.nodeCount(), glm::vec3(0.0F));
   const auto sides = makeSides(patches);
   const glm::dvec3 residual = stated.residual * stated.residual * meanSquare(patches, sides, mean);
   for (const auto& side : sides) {
     std::vector<double> area(side.leaf_count);
-    std::vector<glm::dvec3> share(side.leaf_count, glm::dvec3(0.0));
+    std::vector<glm::dvec3> sampling(side.leaf_count, glm::dvec3(0.0));
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
       area[leaf] = static_cast<double>(patches.node_area[side.first_node + leaf]);
     const auto around = boxSums(area, side.width, side.height);
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
       if (area[leaf] <= 0.0) continue;
       const glm::dvec3 half(0.5F * (first[side.first_node + leaf] - second[side.first_node + leaf]));
-      share[leaf] = half * half * (area[leaf] / around[leaf]);
+      sampling[leaf] = half * half * (area[leaf] / around[leaf]);
     }
-    const auto shared = boxSums(share, side.width, side.height);
+    const auto shared = boxSums(sampling, side.width, side.height);
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
       if (area[leaf] <= 0.0) continue;
-      squares[side.first_node + leaf] = glm::vec3(shared[leaf] + residual);
+      const auto node = side.first_node + leaf;
+      const double share = residual_shape.empty() ? 1.0 : static_cast<double>(residual_shape[node]);
+      squares[node] = glm::vec3(shared[leaf] + share * residual);
     }
   }
   return squares;

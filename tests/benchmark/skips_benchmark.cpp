@@ -75,7 +75,7 @@ const std::vector<Variant>& variants() {
       {"default", [](auto&) {}},
       {"small item buffers (N 32)", [](auto& s) { s.planner.node_resolution = 32; }},
       {"large item buffers (N 128)", [](auto& s) { s.planner.node_resolution = 128; }},
-      {"four times the first shooters", [](auto& s) { s.planner.shooters_a_round *= 4; }},
+      {"four times the first shooters", [](auto& s) { s.planner.first_shooters *= 4; }},
       {"links forgotten", [](auto& s) { s.link_memory = 0; }},
       {"links forgotten, reflected light scattered",
        [](auto& s) { s.link_memory = 0, s.planner.gather_nodes = false; }},

@@ -19,6 +19,7 @@
 #include "server/gpu/gpu_transport.h"
 #include "server/scene/document.h"
 #include "server/scene/patch_scene.h"
+#include "server/solver/linked_solver.h"
 #include "server/solver/outlines.h"
 #include "server/solver/shooting_solver.h"
 #include "server/solver/solver.h"
@@ -239,6 +240,26 @@ void printWorst(const scene::PatchScene& patches, const std::vector<Leaf>& leave
   std::printf("  together %.1f %% of the square of %.3f %%\n", 100.0 * sum / all, 100.0 * std::sqrt(all / square));
 }
 
+/// Whose samples the sampling error comes from: parts of its square.
+void printSpread(const solver::Solver& any) {
+  const auto* solver = dynamic_cast<const solver::LinkedSolver*>(&any);
+  if (solver == nullptr) return;
+  double lights = 0.0, roulette = 0.0, nodes = 0.0, light_samples = 0.0, node_samples = 0.0, half_played = 0.0;
+  for (const auto& shooter : solver->system().shooters()) {
+    const double spread = shooter.spread();
+    const double samples = shooter.column[0].samples() + shooter.column[1].samples();
+    if (shooter.column[0].samples() == 0 || shooter.column[1].samples() == 0) half_played += 1.0;
+    (shooter.isLight() ? light_samples : node_samples) += samples;
+    (shooter.isLight() ? lights : shooter.weight[0] != 1.0 || shooter.weight[1] != 1.0 ? roulette : nodes) += spread;
+  }
+  const double all = std::max(1e-300, lights + roulette + nodes) / 100.0;
+  std::printf(
+      "          spread: lights %.1f %% (%.0f samples) roulette %.1f %% nodes %.1f %% (%.0f samples); %.0f of %zu "
+      "shooters in one half only\n",
+      lights / all, light_samples, roulette / all, nodes / all, node_samples, half_played,
+      solver->system().shooters().size());
+}
+
 int profile(const std::string& file, std::map<std::string, std::string> options) {
   const auto number = [&](const char* name, double fallback) {
     return options.count(name) != 0 ? std::atof(options[name].c_str()) : fallback;
@@ -273,8 +294,7 @@ int profile(const std::string& file, std::map<std::string, std::string> options)
   settings.seed = static_cast<std::uint64_t>(number("--seed", 1));
   settings.paper_mode = options.count("--paper") != 0;
   settings.planner.gather_nodes = number("--gather", 1) != 0.0;  // 0: reflected light is scattered instead
-  settings.planner.shooters_a_round =
-      static_cast<std::uint32_t>(number("--shooters", settings.planner.shooters_a_round));
+  settings.planner.first_shooters = static_cast<std::uint32_t>(number("--shooters", settings.planner.first_shooters));
   settings.planner.resolution = static_cast<std::uint32_t>(number("--resolution", settings.planner.resolution));
   settings.planner.light_points = static_cast<std::uint32_t>(number("--light-points", settings.planner.light_points));
   settings.planner.light_resolution =
@@ -311,6 +331,7 @@ int profile(const std::string& file, std::map<std::string, std::string> options)
                 100 * e.total, 100 * e.residual, 100 * e.sampling, 100 * e.discretization);
     printTruth(leaves, truth, solver.irradiance());
     std::printf(" | render %.2f acc %.2f gather %.2f\n", c.render_seconds, c.accumulate_seconds, c.gather_seconds);
+    if (options.count("--spread") != 0) printSpread(solver);
     if (last) break;
   }
   if (options.count("--surfaces") != 0) printSurfaces(*patches, leaves, truth, solver.irradiance());

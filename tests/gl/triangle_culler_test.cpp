@@ -161,5 +161,32 @@ TEST_F(CulledImages, AreThoseOfAllTriangles) {
   }
 }
 
+// What stands on the floor touches the horizon of a shooter in the floor: to within rounding, above or below it.
+TEST_F(CulledImages, AreThoseOfAllTrianglesThatStandOnTheShootersPlane) {
+  SceneBuilder builder;
+  builder.addBox(glm::vec3(-0.5F, -0.37F, -0.5F), glm::vec3(0.5F, 0.4F, 0.5F), 2, true);
+  std::mt19937 random(8);
+  std::uniform_real_distribution<float> place(-0.45F, 0.45F), size(0.002F, 0.05F);
+  for (int i = 0; i < 600; ++i) {
+    const glm::vec3 low(place(random), -0.37F, place(random));
+    builder.addBox(low, low + glm::vec3(size(random), 4.0F * size(random), size(random)), 1, false);
+  }
+  const auto scene = builder.build();
+  std::vector<gpu::HemicubeView> views;
+  for (std::uint32_t i = 0; i < 12; ++i) {
+    auto frame = shotFrom(*scene, i % 6, place(random) + 0.5F, place(random) + 0.5F, 32, random).frame;
+    if (frame.normal.y > 0.5F) frame.origin.y = -0.37F + 1e-7F * static_cast<float>(static_cast<int>(i) - 6);
+    views.push_back({frame, 0.0F});
+  }
+  for (const std::uint32_t resolution : {16U, 32U, 128U}) {
+    const auto all = images(scene, gpu::HemicubePass::kItems, resolution, views, {.samples = false, .hidden = false});
+    const auto drawn = counters_.triangles_drawn;
+    EXPECT_EQ(images(scene, gpu::HemicubePass::kItems, resolution, views, {.hidden = false}), all);
+    if (resolution <= 32) {
+      EXPECT_LT(3 * counters_.triangles_drawn, 2 * drawn);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace radiosity::test

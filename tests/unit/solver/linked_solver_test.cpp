@@ -47,26 +47,41 @@ TEST_F(LinkedEdits, OfTheLampAndBackGiveTheSameBits) {
   EXPECT_EQ(solver_->irradiance(), before);
 }
 
-TEST_F(LinkedEdits, OfReflectanceAgreeWithAFreshSolveWithinTheTwoStatedErrors) {
+/// Sum of the squares of the differences, by node of level 0.
+double distance(const std::vector<glm::vec3>& a, const std::vector<glm::vec3>& b) {
+  double sum = 0.0;
+  for (std::size_t node = 0; node < a.size(); ++node) {
+    const glm::dvec3 difference(a[node] - b[node]);
+    sum += glm::dot(difference, difference);
+  }
+  return sum;
+}
+
+// Not measured in stated errors: single points of nodes light what is beside them by 1 / r^2 here, whose rare large
+// values few samples do not show. Those are for the tests that draw.
+TEST_F(LinkedEdits, OfReflectanceAgreeWithFreshSolvesAsTheseAgreeWithEachOther) {
   quads_[3].reflectance = glm::vec3(0.8F, 0.2F, 0.1F);
   const auto painted = makeQuadScene(quads_);
+  const auto before = solver_->irradiance();
   solver_->setMaterials(painted.materials);
   solve(*solver_);
-  SolverSettings other;
-  other.seed = 2;
-  LinkedSolver fresh(painted.patches, painted.materials, rays_, other);
-  solve(fresh);
-  // A stated error is itself an estimate: the product promises the truth within a factor of 1.5.
-  constexpr double kCalibration = 1.5;
-  double square = 0.0, difference = 0.0;
-  for (std::size_t node = 0; node < fresh.irradiance().size(); ++node) {
-    const glm::vec3 a = solver_->irradiance()[node], b = fresh.irradiance()[node];
-    for (int c = 0; c < 3; ++c) {
-      square += static_cast<double>(b[c] * b[c]);
-      difference += static_cast<double>((a[c] - b[c]) * (a[c] - b[c]));
-    }
+  std::vector<std::vector<glm::vec3>> fresh;
+  for (std::uint64_t seed = 2; seed < 10; ++seed) {
+    SolverSettings other;
+    other.seed = seed;
+    LinkedSolver again(painted.patches, painted.materials, rays_, other);
+    solve(again);
+    fresh.push_back(again.irradiance());
   }
-  EXPECT_LT(std::sqrt(difference / square), kCalibration * std::hypot(solver_->error().total, fresh.error().total));
+  double edited = 0.0, among = 0.0, untouched = 0.0;
+  for (std::size_t k = 0; k < fresh.size(); ++k) {
+    edited += distance(solver_->irradiance(), fresh[k]);
+    untouched += distance(before, fresh[k]);
+    among += distance(fresh[k], fresh[(k + 1) % fresh.size()]);
+  }
+  // Squares: one solve against eight, all of one distribution, is off by chance by less than half of what it should be.
+  EXPECT_LT(edited, 1.5 * 1.5 * among);
+  EXPECT_GT(untouched, 4.0 * edited) << "the edit shows";
 }
 
 TEST_F(LinkedEdits, AThousandRandomOnesLeaveNoDriftAndNoMemory) {
