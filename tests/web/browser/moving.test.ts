@@ -137,6 +137,10 @@ it('selects with a tap', async () => {
     (node) => node !== undefined,
   );
   expect(selected).toBeTypeOf('number');
+  // Where there is no keyboard a button frames it.
+  const before = await place(page);
+  await page.getByRole('button', { name: 'Look at it' }).tap();
+  expect((await place(page)).target).not.toEqual(before.target);
 });
 
 it('walks and looks about in the first person', async () => {
