@@ -3,8 +3,10 @@
 
 import {
   BufferGeometry,
+  Color,
   Float32BufferAttribute,
   Group,
+  LinearSRGBColorSpace,
   LineBasicMaterial,
   LineSegments,
   Mesh,
@@ -54,7 +56,8 @@ class Person extends Object3D {
   constructor(camera: SharedCamera, visit: (eye: Vector3, target: Vector3) => void) {
     super();
     const hue = Math.round((camera.viewer * HUE_STEP) % 360);
-    const color = `hsl(${hue}, 85%, 60%)`;
+    // Nothing is encoded after the shader: the numbers are those of the screen, as the label's are.
+    const color = new Color().setHSL(hue / 360, 0.85, 0.6, LinearSRGBColorSpace);
     this.side = new MeshBasicMaterial({ color, transparent: true, opacity: 0.35, side: 2, depthWrite: false });
     this.edge = new LineBasicMaterial({ color });
     this.add(new Mesh(SIDES, this.side), new LineSegments(EDGES, this.edge));
