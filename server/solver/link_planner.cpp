@@ -10,11 +10,11 @@
 namespace radiosity::solver {
 namespace {
 
-/// Nodes weaker than this part of a share play Russian roulette.
+/// Nodes weaker than this part of a share play Russian roulette, where half of all light is reflected or less.
 constexpr double kRouletteShare = 0.2;
 /// A node that plays counts at most this often. Below, its light is left out (see leftOut()): in a dark corner larger
 /// weights would feed on themselves.
-constexpr double kMaxWeight = 80.0;
+constexpr double kMaxWeight = 40.0;
 /// Nodes of less than this part of a share may shoot as a polygon though a part of it is empty or buried.
 constexpr double kPartialShare = 0.06;
 /// Their parts that have more than this do not play.
@@ -48,7 +48,11 @@ LinkPlanner::Node LinkPlanner::nodeAt(const NodePlace& place, const UnshotPyrami
   return node;
 }
 
-double LinkPlanner::chance(double power) const { return std::min(1.0, power / (kRouletteShare * share_)); }
+void LinkPlanner::setReflectance(double mean) {
+  roulette_share_ = kRouletteShare * std::clamp(2.0 * (1.0 - mean), 1e-4, 1.0);
+}
+
+double LinkPlanner::chance(double power) const { return std::min(1.0, power / (roulette_share_ * share_)); }
 
 /// A node keeps its draw: as its power grows, or the share shrinks, it joins sooner or later.
 bool LinkPlanner::plays(const NodePlace& place, std::size_t half, double power) const {

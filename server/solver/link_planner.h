@@ -33,6 +33,10 @@ class LinkPlanner {
   void setShare(double share) { share_ = share; }
   [[nodiscard]] double share() const { return share_; }
 
+  /// Mean reflectance of the scene: what roulette creates or loses by chance is reflected so often, so that in bright
+  /// rooms fewer nodes play.
+  void setReflectance(double mean);
+
   /// Samples of the lights that have none yet, shared out by power.
   [[nodiscard]] std::vector<Measurement> firstLight(const LinkSystem& system) const;
 
@@ -95,6 +99,7 @@ class LinkPlanner {
   RouletteDraws draws_;
   PlannerCounters counters_;
   double share_ = 0.0;
+  double roulette_share_ = 0.0;  ///< nodes weaker than this part of a share play
   double left_out_ = 0.0;
 };
 

@@ -73,6 +73,16 @@ void LinkedSolver::takeMaterials(const scene::PatchMaterials& materials) {
   }
   takeLights();
   system_.setMaterials(emission_, reflectance_);
+  double area = 0.0;
+  glm::dvec3 reflectance(0.0);
+  for (const auto& side : sides_) {
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+      const auto a = static_cast<double>(patches_->node_area[side.first_node + leaf]);
+      reflectance += a * glm::dvec3(reflectance_[side.first_value + leaf]);
+      area += a;
+    }
+  }
+  planner_.setReflectance(area > 0.0 ? std::max({reflectance.x, reflectance.y, reflectance.z}) / area : 0.0);
 }
 
 /// Measures the next part of the wave: short, so that an edit, a pause or the end of the server need not wait for all.
