@@ -138,6 +138,8 @@ it('selects with a tap', async () => {
   );
   expect(selected).toBeTypeOf('number');
   // Where there is no keyboard a button frames it.
+  await page.getByRole('button', { name: 'Panel', exact: true }).tap();
+  await page.getByRole('tab', { name: 'Scene' }).tap();
   const before = await place(page);
   await page.getByRole('button', { name: 'Look at it' }).tap();
   expect((await place(page)).target).not.toEqual(before.target);
