@@ -58,7 +58,11 @@ it('shows where the other looks from, follows, and forgets who leaves', async ()
   );
   expect(distance(await eye(first), await eye(second))).toBeLessThan(1e-3);
   // In one place with it, the sign would fill the picture.
-  expect(await name.isVisible()).toBe(false);
+  const visible = await until(
+    () => name.isVisible(),
+    (is) => !is,
+  );
+  expect(visible).toBe(false);
 
   await second.context().close();
   const left = await until(
