@@ -51,7 +51,8 @@ inline constexpr std::uint32_t kMaxWaitMs = 24U * 3600U * 1000U;  ///< longest s
 // Server-wide defaults; flags of radiosityd change them.
 inline constexpr std::size_t kMaxClients = 256;
 inline constexpr std::size_t kMaxUploadBytes = std::size_t{1} << 30;
-inline constexpr int kMaxSnapshotSide = 4096;  ///< pixels
+inline constexpr std::size_t kMaxTlsHandshakes = 64;  ///< under way at a time; each costs the server more than its peer
+inline constexpr int kMaxSnapshotSide = 4096;         ///< pixels
 
 /// WebSocket close codes that this protocol uses.
 enum class CloseCode : std::uint16_t {

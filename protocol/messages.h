@@ -340,7 +340,14 @@ struct Draining {
   std::uint64_t grace_ms = 0;
 };
 
+/// Something happened to the server that those who watch may wonder about; nothing need be done.
+struct ServerNote {
+  static constexpr std::string_view kMethod = "notice";
+  std::string kind;  ///< "rendererReplaced", "solveRestarted"; others may come
+  std::string text;  ///< for people
+};
+
 using Notification = std::variant<ServerInfo, ProgressNote, ScenePatched, SceneLoaded, LightmapsNote, Bookmark,
-                                  ViewersNote, CamerasNote, Draining>;
+                                  ViewersNote, CamerasNote, Draining, ServerNote>;
 
 }  // namespace radiosity::protocol

@@ -51,6 +51,7 @@ std::string params(const CamerasNote& n) {
   return dumpJson({{"cameras", std::move(cameras)}});
 }
 std::string params(const Draining& n) { return dumpJson({{"graceMs", n.grace_ms}}); }
+std::string params(const ServerNote& n) { return dumpJson({{"kind", n.kind}, {"text", n.text}}); }
 
 void read(Reader& r, ServerInfo& n) {
   r.text("server", n.server, Need::kRequired, kAnyText);
@@ -107,6 +108,10 @@ void read(Reader& r, CamerasNote& n) {
   });
 }
 void read(Reader& r, Draining& n) { r.integer("graceMs", n.grace_ms, Need::kRequired, 0, kAnyInteger); }
+void read(Reader& r, ServerNote& n) {
+  r.text("kind", n.kind, Need::kRequired, kMaxTextBytes);
+  r.text("text", n.text, Need::kOptional, kAnyText);
+}
 
 using Decoded = tl::expected<Notification, RpcError>;
 

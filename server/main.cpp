@@ -1,5 +1,6 @@
 // radiosityd: options -> engine and network -> run until a signal.
 #include <chrono>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -11,6 +12,9 @@
 #include "server/gpu/gpu_transport.h"
 #include "server/net/server.h"
 #include "server/options.h"
+#include "server/service_notify.h"
+#include "server/state/store.h"
+#include "server/state/uploads.h"
 
 #ifndef RADIOSITY_VERSION
 #define RADIOSITY_VERSION "0.0.0"
@@ -19,13 +23,16 @@
 namespace radiosity {
 namespace {
 
+/// How a worker, which is started by the server, learns the form of its log.
+constexpr const char* kLogFormatVariable = "RADIOSITY_LOG_FORMAT";
+
 int report(const Error& error) {
   std::fprintf(stderr, "radiosityd: %s\n", error.text().c_str());
   return exitCodeOf(error);
 }
 
 void loadFirstScene(engine::Engine& engine, const std::string& path) {
-  engine.loadFile(path, [path](const Result<engine::LoadOutcome>& outcome) {
+  engine.openFile(path, [path](const Result<engine::LoadOutcome>& outcome) {
     if (!outcome) return log::error("{}", outcome.error().text());
   });
 }
@@ -40,8 +47,26 @@ void leaveWithin(std::chrono::milliseconds patience) {
   }).detach();
 }
 
-int serve(const Options& options) {
+Vitals vitalsOf(const engine::Engine& engine, const net::Server& server) {
+  return {[&server] { return server.silentSeconds(); }, [&engine] { return engine.busySeconds(); },
+          [&server] { return server.statusLine(); }};
+}
+
+/// How long the end waits for the last checkpoint; then the one before it stays.
+constexpr auto kCheckpointPatience = std::chrono::milliseconds(3500);
+
+int serve(Options options) {
   engine::EngineOptions engine_options;
+  if (!options.state.empty()) {
+    auto store = state::Store::open(options.state);
+    if (!store) return report(store.error());
+    engine_options.store = std::move(*store);
+    engine_options.named_settings = options.named_settings;
+    engine_options.checkpoint_bytes = options.checkpoint_bytes;
+    options.server.uploads = std::make_shared<state::Uploads>(*engine_options.store);
+  }
+  const auto store = engine_options.store;  // outlives the uploads, which outlive the server
+  const auto uploads = options.server.uploads;
   engine_options.settings = options.solve;
   engine_options.make_transport = [workers = options.workers] {
     return gpu::makeWorkerTransport({workers, "/proc/self/exe"});
@@ -54,16 +79,27 @@ int serve(const Options& options) {
   if (!options.scene.empty()) loadFirstScene(**engine, options.scene);
   std::printf("listening on %s\n", (*server)->url().c_str());
   std::fflush(stdout);
+  ServiceNotifier notifier(vitalsOf(**engine, **server));
+  (*server)->onDrain([&notifier] { notifier.stopping(); });
   (*server)->run();
+  for (const int number : {SIGINT, SIGTERM}) (void)std::signal(number, SIG_DFL);  // from here on it ends at once
+  if (!(*server)->inHurry()) (*engine)->keepSolve(kCheckpointPatience);
+  if (store) store->foldLog();
   leaveWithin(std::chrono::milliseconds(200));
   return 0;
 }
 
 int run(int argc, char** argv) {
-  if (argc > 1 && std::string_view(argv[1]) == "--worker") return gpu::workerMain(argc - 2, argv + 2);
+  if (argc > 1 && std::string_view(argv[1]) == "--worker") {
+    const char* format = std::getenv(kLogFormatVariable);
+    const bool json = format != nullptr && std::string_view(format) == "json";
+    startLog("radiosityd worker", "info", json ? LogFormat::kJson : LogFormat::kText);
+    return gpu::workerMain(argc - 2, argv + 2);
+  }
   const auto parsed = parseOptions(argc, argv, RADIOSITY_VERSION);
   if (parsed.exit_code) return *parsed.exit_code;
-  startLog("radiosityd", parsed.options.log_level);
+  startLog("radiosityd", parsed.options.log_level, parsed.options.log_format);
+  if (parsed.options.log_format == LogFormat::kJson) setenv(kLogFormatVariable, "json", 1);
   return serve(parsed.options);
 }
 

@@ -12,7 +12,7 @@ namespace radiosity {
 namespace {
 
 struct Raw {
-  std::string listen = "127.0.0.1:8765", token_file, sky;
+  std::string listen = "127.0.0.1:8765", token_file, sky, log_format = "text";
   double time_limit_s = 0.0;
 };
 
@@ -76,11 +76,48 @@ void addSolveOptions(CLI::App& app, Options& o, Raw& raw) {
   app.add_flag("--paper-mode", o.solve.paper_mode, "Lum, Ma and Max 2002 to the letter, for comparisons");
 }
 
+void addStateOptions(CLI::App& app, Options& o) {
+  app.add_option(
+         "--state", o.state,
+         "Folder of what outlives the server: scene, edits, settings, uploads, checkpoints of the solve. An edit "
+         "is answered once it is on the disk. Made if it is missing; one server at a time. It goes before SCENE "
+         "as long as that is the file its scene came from")
+      ->type_name("DIR");
+  app.add_option("--checkpoint-size", o.checkpoint_bytes,
+                 "Largest checkpoint of a solve in --state, bytes (suffixes KiB, MiB, GiB); a solve that needs more "
+                 "begins anew after a restart; 0: none")
+      ->transform(CLI::AsSizeValue(false))
+      ->capture_default_str();
+}
+
+/// Settings of the command line go before those that a client made earlier.
+std::set<std::string> namedSettings(const CLI::App& app) {
+  std::set<std::string> named;
+  const auto note = [&](const char* option, const char* setting) {
+    if (app.count(option) > 0) named.insert(setting);
+  };
+  note("--error", "targetError");
+  note("--time-limit", "timeLimit");
+  note("--texels", "texels");
+  note("--texel-size", "texels");
+  note("--seed", "seed");
+  note("--sky", "sky");
+  return named;
+}
+
 void addServerOptions(CLI::App& app, Options& o, Raw& raw) {
   app.add_option("--listen", raw.listen, "ADDRESS:PORT of HTTP and WebSocket; port 0: any free one, printed on stdout")
       ->capture_default_str();
   app.add_option("--token-file", raw.token_file, "File whose first line every client must present as bearer token");
+  addStateOptions(app, o);
   app.add_flag("--insecure", o.server.insecure, "Listen beyond this machine without a token");
+  auto* certificate =
+      app.add_option("--tls-cert", o.server.tls_certificate,
+                     "PEM file with the certificate (and those above it): speak TLS 1.2 and 1.3 only, https:// and "
+                     "wss://. SIGHUP reads it again");
+  auto* key = app.add_option("--tls-key", o.server.tls_key, "PEM file with the certificate's private key, unencrypted");
+  certificate->needs(key)->type_name("FILE");
+  key->needs(certificate)->type_name("FILE");
   app.add_option("--allow-origin", o.server.allow_origins,
                  "Let web pages of this origin in, beside the server's own (https://viewer.example.org); repeatable");
   app.add_option("--scene-root", o.server.scene_root, "Folder from which clients may load scenes as file:NAME")
@@ -94,6 +131,10 @@ void addServerOptions(CLI::App& app, Options& o, Raw& raw) {
   app.add_option("--log-level", o.log_level, "debug, info, warn, error or off; the log goes to stderr")
       ->check(CLI::IsMember({"debug", "info", "warn", "error", "off"}))
       ->capture_default_str();
+  app.add_option("--log-format", raw.log_format,
+                 "text, or json: one object a line, with time, level, message, revision and requestId")
+      ->check(CLI::IsMember({"text", "json"}))
+      ->capture_default_str();
 }
 
 Result<void> finish(Options& o, const Raw& raw) {
@@ -104,6 +145,7 @@ Result<void> finish(Options& o, const Raw& raw) {
     const auto color = [](const std::array<double, 3>& c) { return glm::vec3(c[0], c[1], c[2]); };
     o.solve.sky = {color(sky->upper), color(sky->lower)};
   }
+  o.log_format = raw.log_format == "json" ? LogFormat::kJson : LogFormat::kText;
   if (auto listen = readListen(raw.listen, o.server); !listen) return listen;
   if (raw.token_file.empty()) return {};
   auto token = readToken(raw.token_file);
@@ -131,6 +173,7 @@ ParsedOptions parseOptions(int argc, const char* const* argv, const std::string&
     parsed.exit_code = app.exit(error) == 0 ? 0 : kExitBadUsage;
     return parsed;
   }
+  options.named_settings = namedSettings(app);
   if (const auto finished = finish(options, raw); !finished) {
     std::fprintf(stderr, "radiosityd: %s\n", finished.error().text().c_str());
     parsed.exit_code = kExitBadUsage;

@@ -1,9 +1,12 @@
 // The command line of radiosityd. Used by main only.
 #pragma once
 
+#include <filesystem>
 #include <optional>
+#include <set>
 #include <string>
 
+#include "common/log.h"
 #include "common/result.h"
 #include "server/engine/engine.h"
 #include "server/net/server_options.h"
@@ -11,11 +14,15 @@
 namespace radiosity {
 
 struct Options {
-  std::string scene;  ///< path; empty: start without one
+  std::string scene;                     ///< path; empty: start without one
+  std::filesystem::path state;           ///< folder of what outlives the server; empty: nothing does
+  std::set<std::string> named_settings;  ///< of `solve`, those on the command line (EngineOptions::named_settings)
+  std::size_t checkpoint_bytes = std::size_t{256} << 20;
   net::ServerOptions server;
   engine::SolveSettings solve;
   int workers = 0;  ///< 0: one for each core with a software renderer, one on a GPU
   std::string log_level = "info";
+  LogFormat log_format = LogFormat::kText;
 };
 
 /// `argc`, `argv` as main got them. With an exit code instead of options, everything was said already: 0 after --help

@@ -104,19 +104,27 @@ Result<std::uint64_t> currentRevision(const Remote& remote) {
 
 }  // namespace
 
-void addTokenOption(CLI::App& command, RemoteOptions& options) {
+void addAccessOptions(CLI::App& command, RemoteOptions& options) {
   command.add_option("--token-file", options.token_file, "file that holds the server's token")->type_name("FILE");
+  command
+      .add_option("--ca", options.trust.ca_file,
+                  "PEM file of the authorities, or of the self-signed certificate, to trust with https://; default: "
+                  "those of this machine")
+      ->type_name("FILE");
+  command.add_flag("--insecure{false}", options.trust.verify,
+                   "with https://: take any certificate (whoever is in between can read and change all)");
 }
 
 void addRemoteOptions(CLI::App& command, RemoteOptions& options) {
-  command.add_option("URL", options.url, "the server: HOST:PORT, http://HOST:PORT or ws://HOST:PORT/ws")
+  command.add_option("URL", options.url, "the server: HOST:PORT, http://HOST:PORT or https://HOST:PORT")
       ->required()
       ->type_name("");
-  addTokenOption(command, options);
+  addAccessOptions(command, options);
 }
 
 client::CallResult<client::Connection> Remote::connect() const {
-  return client::Connection::open({.url = url, .client = "radiosity/0.1.0", .token = token, .keep_going = keep_going});
+  return client::Connection::open(
+      {.url = url, .trust = trust, .client = "radiosity/0.1.0", .token = token, .keep_going = keep_going});
 }
 
 Result<Remote> remoteFrom(const RemoteOptions& options) {
@@ -124,7 +132,7 @@ Result<Remote> remoteFrom(const RemoteOptions& options) {
   if (!url) return tl::unexpected(url.error());
   auto token = readToken(options.token_file);
   if (!token) return tl::unexpected(token.error());
-  return Remote{*url, *token, [] { return !interrupted(); }};
+  return Remote{*url, options.trust, *token, [] { return !interrupted(); }};
 }
 
 Error httpError(const client::HttpReply& reply, const std::string& where) {

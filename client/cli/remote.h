@@ -17,19 +17,24 @@ namespace radiosity::cli {
 struct RemoteOptions {
   std::string url;
   std::string token_file;
+  client::TlsTrust trust;
 };
 
-/// Adds the positional URL and --token-file.
+/// Adds the positional URL and the options of access.
 void addRemoteOptions(CLI::App& command, RemoteOptions& options);
-void addTokenOption(CLI::App& command, RemoteOptions& options);
+/// --token-file, --ca, --insecure.
+void addAccessOptions(CLI::App& command, RemoteOptions& options);
 
 /// A server that can be spoken to.
 struct Remote {
   client::ServerUrl url;
-  std::string token;
-  client::KeepGoing keep_going;  ///< stops at an interruption
+  client::TlsTrust trust = {};
+  std::string token = {};
+  client::KeepGoing keep_going = {};  ///< stops at an interruption
 
-  [[nodiscard]] client::HttpOptions http() const { return {.url = url, .token = token, .keep_going = keep_going}; }
+  [[nodiscard]] client::HttpOptions http() const {
+    return {.url = url, .trust = trust, .token = token, .keep_going = keep_going};
+  }
   [[nodiscard]] client::CallResult<client::Connection> connect() const;
 };
 [[nodiscard]] Result<Remote> remoteFrom(const RemoteOptions& options);

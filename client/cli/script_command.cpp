@@ -143,6 +143,8 @@ class ScriptRun {
     std::vector<std::string> words(step.words.rbegin(), step.words.rend() - 1);
     words.push_back(options_.server.url);
     if (!options_.server.token_file.empty()) words.push_back("--token-file=" + options_.server.token_file);
+    if (!options_.server.trust.ca_file.empty()) words.push_back("--ca=" + options_.server.trust.ca_file);
+    if (!options_.server.trust.verify) words.emplace_back("--insecure");
     words.push_back(command);
     // The program that parsed the line must live as long as what it prepared.
     const auto app = std::make_shared<CLI::App>("", "radiosity");

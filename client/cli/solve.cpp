@@ -23,10 +23,12 @@ using client::CallResult;
 constexpr auto kStatusInterval = 250ms;
 constexpr auto kStopGrace = 5000ms;
 constexpr auto kInterruptGrace = 500ms;
-constexpr auto kEndGrace = 300ms;  // a dying process closes its sockets before it can be waited for
+constexpr auto kCheckpointGrace = 4500ms;  // an interrupted solve that keeps state ends within five seconds
+constexpr auto kEndGrace = 300ms;          // a dying process closes its sockets before it can be waited for
 
 struct SolveOptions {
   std::string scene, output, report, png, sky;
+  std::string state;  ///< folder; empty: an interrupted solve is lost
   RemoteOptions server;
   double error = 0.02;
   double time_limit_s = 0.0;  ///< 0: none
@@ -47,18 +49,21 @@ class Solve {
     const ExitCode code = solve();
     display_.clear();
     if (server_) {
-      server_->stop(interrupted() ? kInterruptGrace : kStopGrace);
+      server_->stop(!interrupted() ? kStopGrace : options_.state.empty() ? kInterruptGrace : kCheckpointGrace);
       passOnLog();
     }
-    if (code != ExitCode::kInterrupted) return code;
-    std::fprintf(stderr, "%s\n",
-                 server_
-                     ? "radiosity: nothing was written; a private solve keeps no state, so it starts anew next time"
-                     : "radiosity: nothing was written; the server goes on solving (radiosity save gets the result)");
+    if (code == ExitCode::kInterrupted)
+      std::fprintf(stderr, "radiosity: nothing was written; %s\n", whatNext().c_str());
     return code;
   }
 
  private:
+  [[nodiscard]] std::string whatNext() const {
+    if (!options_.server.url.empty()) return "the server goes on solving (radiosity save gets the result)";
+    if (options_.state.empty()) return "without --state a solve starts anew next time";
+    return "what was solved is kept in " + options_.state + ": the same command goes on from there";
+  }
+
   ExitCode solve() {
     if (auto ready = checkInputs(); !ready) return complain(ready.error());
     if (auto ready = findServer(); !ready) return complain(ready.error());
@@ -102,6 +107,8 @@ class Solve {
     if (options_.workers > 0) start.arguments = {"--workers", std::to_string(options_.workers)};
     if (!options_.link_memory.empty())
       start.arguments.insert(start.arguments.end(), {"--link-memory", options_.link_memory});
+    if (!options_.state.empty())
+      start.arguments.insert(start.arguments.end(), {"--state", std::filesystem::absolute(options_.state).string()});
     if (by_path_) {
       const auto folder = std::filesystem::canonical(options_.scene).parent_path();
       start.arguments.insert(start.arguments.end(), {"--scene-root", folder.string()});
@@ -326,11 +333,18 @@ void addSolve(CLI::App& app, Run& run) {
                                  "used up the solve ends above its error")
                      ->check(CLI::AsSizeValue(false).description(""))
                      ->type_name("SIZE");
+  auto* state = command
+                    .add_option("--state", options->state,
+                                "folder (made if missing) that an interrupted solve is kept in: Ctrl-C, SIGTERM or "
+                                "SIGHUP ends it within 5 s with status 75, and the same command goes on from there, "
+                                "to the same output")
+                    ->type_name("DIR");
   command.add_option("--server", options->server.url, "solve there rather than on a private radiosityd")
       ->type_name("URL")
       ->excludes(workers)
-      ->excludes(memory);
-  addTokenOption(command, options->server);
+      ->excludes(memory)
+      ->excludes(state);
+  addAccessOptions(command, options->server);
   command.add_flag("-q,--quiet", options->quiet, "no progress on stderr");
   command.callback([options, &run] { run = [options] { return Solve(*options).run(); }; });
 }

@@ -118,6 +118,13 @@ Result<void> AtomicFile::commit() {
   if (close(std::exchange(descriptor_, -1)) != 0) return failErrno("writing failed", path_, errno);
   if (rename(temporary_.c_str(), path_.c_str()) != 0) return failErrno("cannot be put in place", path_, errno);
   temporary_.clear();
+  // So that the new name outlives a power failure too; some file systems cannot, and then it is as good as it gets.
+  const auto folder = std::filesystem::path(path_).parent_path();
+  const int opened = open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (opened >= 0) {
+    (void)fsync(opened);
+    close(opened);
+  }
   return {};
 }
 

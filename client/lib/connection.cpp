@@ -10,6 +10,7 @@
 #include <random>
 
 #include "client/lib/pump.h"
+#include "client/lib/stream.h"
 
 namespace radiosity::client {
 namespace {
@@ -36,7 +37,7 @@ struct Connection::Impl {
   // -- opening --
 
   Result<void> connect() {
-    auto connected = detail::connectTo(pump, beast::get_lowest_layer(stream), options.url, options.timeout);
+    auto connected = detail::openStream(pump, stream.next_layer(), options.url, options.trust, options.timeout);
     if (!connected) return connected;
     stream.read_message_max(protocol::kMaxMessageBytes);
     // A server that is gone without a word is noticed by its silence.
@@ -178,7 +179,7 @@ struct Connection::Impl {
 
   ConnectionOptions options;
   detail::Pump pump;
-  websocket::stream<beast::tcp_stream> stream;
+  websocket::stream<detail::Stream> stream;
   beast::flat_buffer buffer;
   std::deque<std::string> outgoing;
   std::deque<Arrival> arrivals;

@@ -15,6 +15,7 @@
 #include <string>
 
 #include "client/lib/server_url.h"
+#include "client/lib/tls.h"
 #include "common/result.h"
 #include "protocol/codec.h"
 #include "protocol/messages.h"
@@ -24,6 +25,7 @@ namespace radiosity::client {
 
 struct ConnectionOptions {
   ServerUrl url;
+  TlsTrust trust = {};
   std::string client = "radiosity";  ///< who we are, shown to others beside our edits
   std::string token = {};            ///< empty: none
   /// Asked at least every 50 ms of any wait; false abandons it with kUnavailable "interrupted".

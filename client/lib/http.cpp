@@ -10,6 +10,7 @@
 #include <boost/beast/http/write.hpp>
 
 #include "client/lib/pump.h"
+#include "client/lib/stream.h"
 
 namespace radiosity::client {
 namespace {
@@ -28,7 +29,9 @@ class Exchange {
   explicit Exchange(const HttpOptions& options)
       : options_(options), pump_(options.keep_going), stream_(pump_.context()) {}
 
-  Result<void> connect() { return detail::connectTo(pump_, stream_, options_.url, options_.connect_timeout); }
+  Result<void> connect() {
+    return detail::openStream(pump_, stream_, options_.url, options_.trust, options_.connect_timeout);
+  }
 
   template <typename Body>
   http::request<Body> request(http::verb verb, std::string_view path) const {
@@ -110,7 +113,7 @@ class Exchange {
 
   const HttpOptions& options_;
   Pump pump_;
-  beast::tcp_stream stream_;
+  detail::Stream stream_;
   beast::flat_buffer buffer_;
 };
 

@@ -10,6 +10,7 @@
 
 #include "client/lib/atomic_file.h"
 #include "client/lib/server_url.h"
+#include "client/lib/tls.h"
 #include "common/result.h"
 
 namespace radiosity::client {
@@ -22,6 +23,7 @@ using TransferProgress = std::function<void(std::uint64_t done_bytes, std::uint6
 
 struct HttpOptions {
   ServerUrl url;
+  TlsTrust trust = {};
   std::string token;  ///< sent as "Authorization: Bearer"; empty: none
   KeepGoing keep_going = {};
   TransferProgress progress = {};

@@ -9,10 +9,12 @@ namespace radiosity::client {
 namespace {
 
 constexpr std::size_t kMaxUrlBytes = 2048;
-constexpr std::uint16_t kSchemePort = 80;
+constexpr std::uint16_t kHttpPort = 80;
+constexpr std::uint16_t kHttpsPort = 443;
 
 tl::unexpected<Error> bad(std::string_view url, const std::string& why) {
-  return fail(ErrorCode::kBadUsage, why + "; expected HOST:PORT or http://HOST:PORT", "\"" + std::string(url) + "\"");
+  return fail(ErrorCode::kBadUsage, why + "; expected HOST:PORT, http://HOST:PORT or https://HOST:PORT",
+              "\"" + std::string(url) + "\"");
 }
 
 std::string lower(std::string_view text) {
@@ -57,11 +59,10 @@ Result<ServerUrl> parseServerUrl(std::string_view text) {
   std::string_view rest = text;
   if (const auto scheme_end = text.find("://"); scheme_end != std::string_view::npos) {
     const std::string scheme = lower(text.substr(0, scheme_end));
-    if (scheme == "https" || scheme == "wss")
-      return bad(text, "this client does not speak TLS: connect through an SSH tunnel or a local proxy");
-    if (scheme != "http" && scheme != "ws") return bad(text, "unknown scheme \"" + scheme + "\"");
+    url.tls = scheme == "https" || scheme == "wss";
+    if (!url.tls && scheme != "http" && scheme != "ws") return bad(text, "unknown scheme \"" + scheme + "\"");
     rest.remove_prefix(scheme_end + 3);
-    url.port = kSchemePort;
+    url.port = url.tls ? kHttpsPort : kHttpPort;
   }
   const auto authority_end = std::min(rest.find_first_of("/?#"), rest.size());
   std::string_view authority = rest.substr(0, authority_end);

@@ -2,6 +2,7 @@
 // come from the solve thread and must not block; a session posts them to its own strand.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <glm/vec2.hpp>
@@ -86,6 +87,9 @@ struct Status {
   std::string gl_renderer;
   std::vector<std::string> warnings;
   std::string failure;  ///< why, when kFailed or kLimited
+  /// Nothing can be drawn at present (a driver is gone, all renderers died); the solve starts over when it can.
+  bool renderer_lost = false;
+  std::uint64_t renderers_replaced = 0, solve_restarts = 0;  ///< since the start of the program
   SolveSettings settings;
 };
 
@@ -130,6 +134,12 @@ struct LoadOutcome {
   std::vector<std::string> warnings;
 };
 
+/// What makes the retry of an edit harmless, also after a restart.
+struct Receipt {
+  std::string request_id;         ///< empty: the edit came without
+  std::uint64_t fingerprint = 0;  ///< of the whole request
+};
+
 struct PatchRequest {
   std::string patch;  ///< JSON text of the RFC 6902 array, depth and size already bounded
   std::optional<std::uint64_t> base_revision;
@@ -137,6 +147,7 @@ struct PatchRequest {
   std::string by;  ///< who, for scene.patched
   /// The bytes of an upload that the patch refers to; null: there is no such upload. Called on the solve thread.
   std::function<SharedBytes(const std::string& uri)> find_upload = {};
+  Receipt receipt = {};
 };
 
 /// One edit back, or forth again.
@@ -144,6 +155,7 @@ struct StepRequest {
   bool redo = false;
   std::optional<std::uint64_t> base_revision;
   std::string by;
+  Receipt receipt = {};
 };
 
 /// Errors of a patch: Error::where = JSON pointer; `operation` in PatchError is the index of the failing operation.
@@ -151,6 +163,24 @@ struct PatchOutcome {
   std::uint64_t revision = 0;
   std::uint64_t affected_surfaces = 0, affected_shots = 0;
   std::uint64_t stepped = 0;  ///< of undo and redo: the revision that the edit had made when it was new
+};
+
+/// What outlived earlier processes; all empty for an engine that keeps nothing.
+struct Past {
+  std::string epoch;                     ///< the same as long as revisions and tile versions go on
+  std::uint64_t first_tile_version = 0;  ///< all of this process are larger
+  /// Patches since the last load, oldest first: whoever is at `patches_from` or later can follow.
+  struct Patch {
+    std::uint64_t revision = 0;
+    std::string patch, by;
+  };
+  std::uint64_t patches_from = 0;
+  std::vector<Patch> patches;
+  struct Answer {
+    Receipt receipt;
+    PatchOutcome outcome;
+  };
+  std::vector<Answer> answers;  ///< oldest first
 };
 
 /// How a revision came about.
@@ -176,6 +206,13 @@ struct SnapshotRequest {
   std::string quantity = "lit";  ///< lit, irradiance, radiosity, error, patchId, mipLevel, normal, unshot
 };
 
+/// Something mended itself that those who watch may wonder about.
+struct Notice {
+  enum class Kind { kRendererReplaced, kSolveRestarted };
+  Kind kind = Kind::kRendererReplaced;
+  std::string text;
+};
+
 class Listener {
  public:
   virtual ~Listener() = default;
@@ -183,6 +220,7 @@ class Listener {
   virtual void onScenePatched(std::uint64_t revision, const std::string& patch, const std::string& by) = 0;
   virtual void onSceneLoaded(std::uint64_t revision) = 0;
   virtual void onLightmaps(const std::shared_ptr<const Lightmaps>& lightmaps) = 0;
+  virtual void onNotice(const Notice& /*notice*/) {}
 };
 
 class Engine {
@@ -195,6 +233,9 @@ class Engine {
   /// `name` is for messages and file names ("room.glb"). `file` (a path) or `bytes`, not both.
   virtual void loadBytes(std::string name, SharedBytes bytes, Callback<LoadOutcome> done) = 0;
   virtual void loadFile(std::string path, Callback<LoadOutcome> done) = 0;
+  /// The scene to start with: goes on with one that outlived the last process, edits included, where that was loaded
+  /// from the very same file.
+  virtual void openFile(std::string path, Callback<LoadOutcome> done) { loadFile(std::move(path), std::move(done)); }
   virtual void patch(PatchRequest request, Callback<PatchOutcome> done) = 0;
   /// Takes the latest edit back that is not taken back, whoever made it, or makes it again. A new revision; kNotFound
   /// where there is none.
@@ -206,6 +247,9 @@ class Engine {
   virtual void restart(Callback<SolveState> done) = 0;
 
   [[nodiscard]] virtual Status status() const = 0;
+  /// How long the solve thread has been at its present slice or command; 0 while it waits for one. Slices take less
+  /// than a second, loads of large scenes minutes.
+  [[nodiscard]] virtual double busySeconds() const = 0;
 
   /// Until the last of what this returns is let go, the quantity is published: now, and whenever it has changed. What
   /// nobody watches costs nothing.
@@ -228,6 +272,15 @@ class Engine {
   virtual void lightmapExr(std::uint32_t page, Quantity quantity, Callback<SharedBytes> done) = 0;
   /// PNG.
   virtual void snapshot(SnapshotRequest request, Callback<SharedBytes> done) = 0;
+
+  /// The same from the engine's start to its end.
+  [[nodiscard]] virtual const Past& past() const {
+    static const Past kNothing;
+    return kNothing;
+  }
+  /// The end is near: brings what was solved so far to the disk, where state is kept. Blocks, at most so long; then the
+  /// last checkpoint stays.
+  virtual void keepSolve(std::chrono::milliseconds /*patience*/) {}
 
   /// Kept by weak pointer; a listener that is gone is forgotten. Lightmaps come only while someone watches.
   virtual void addListener(std::weak_ptr<Listener> listener) = 0;

@@ -38,6 +38,8 @@ std::string summaryOf(const json& patch) {
 
 std::string textOf(const json& patch) { return patch.dump(-1, ' ', false, json::error_handler_t::replace); }
 
+std::size_t bytesOf(const state::Edit& edit) { return edit.forth.size() + edit.back.size(); }
+
 std::vector<SharedBytes> appended(const std::vector<SharedBytes>& before, const std::vector<SharedBytes>& after) {
   return {after.begin() + static_cast<std::ptrdiff_t>(std::min(before.size(), after.size())), after.end()};
 }
@@ -45,39 +47,47 @@ std::vector<SharedBytes> appended(const std::vector<SharedBytes>& before, const 
 }  // namespace
 
 void History::log(PastRevision entry) {
-  entry.time_s = now();
+  noteStep(entry);
   log_.push_back(std::move(entry));
   if (log_.size() > bounds_.revisions) log_.pop_front();
 }
 
-std::size_t History::patchBytes() const {
-  std::size_t bytes = 0;
-  for (const auto& edit : edits_) bytes += edit.bytes();
-  return bytes;
+/// What an undo or a redo says of an earlier entry.
+void History::noteStep(const PastRevision& entry) {
+  if (entry.kind != PastRevision::Kind::kUndo && entry.kind != PastRevision::Kind::kRedo) return;
+  for (auto& past : log_) {
+    if (past.kind == PastRevision::Kind::kPatch && past.revision == entry.stepped)
+      past.undone = entry.kind == PastRevision::Kind::kUndo;
+  }
 }
 
-void History::loaded(std::uint64_t revision, const std::string& name) {
-  log_.clear();
-  edits_.clear();
-  done_ = 0;
-  log({revision, PastRevision::Kind::kLoad, {}, shortened(name)});
+History::Next History::nextLoad(std::uint64_t revision, const std::string& name) {
+  Next next;
+  next.entry = {revision, PastRevision::Kind::kLoad, {}, shortened(name), now()};
+  return next;
 }
 
-void History::edited(std::uint64_t revision, const std::string& by, const json& patch, const scene::Document& before,
-                     const scene::Document& after) {
-  edits_.erase(edits_.begin() + static_cast<std::ptrdiff_t>(done_), edits_.end());
-  Edit edit;
-  edit.revision = revision;
-  edit.forth = textOf(scene::diffJson(before.gltf, after.gltf));
-  edit.back = textOf(scene::diffJson(after.gltf, before.gltf));
-  edit.buffers = appended(before.buffers, after.buffers);
-  edit.images = appended(before.images, after.images);
-  edit.buffers_before = before.buffers.size();
-  edit.images_before = before.images.size();
-  edits_.push_back(std::move(edit));
-  while (!edits_.empty() && (edits_.size() > bounds_.edits || patchBytes() > bounds_.patch_bytes)) edits_.pop_front();
-  done_ = edits_.size();
-  log({revision, PastRevision::Kind::kPatch, by, summaryOf(patch)});
+History::Next History::nextEdit(std::uint64_t revision, const std::string& by, const json& patch,
+                                const scene::Document& before, const scene::Document& after) const {
+  Next next;
+  next.entry = {revision, PastRevision::Kind::kPatch, by, summaryOf(patch), now()};
+  next.patch = textOf(scene::diffJson(before.gltf, after.gltf));
+  next.appended = {before.buffers.size(), before.images.size(), appended(before.buffers, after.buffers),
+                   appended(before.images, after.images)};
+  next.edit = state::Edit{revision, next.patch, textOf(scene::diffJson(after.gltf, before.gltf)), next.appended};
+  for (auto n = done_; n < edits_.size(); ++n) next.forgotten.push_back(edits_[n].revision);
+  std::size_t count = done_ + 1, bytes = bytesOf(*next.edit);
+  for (std::size_t n = 0; n < done_; ++n) bytes += bytesOf(edits_[n]);
+  for (std::size_t n = 0; n < done_ && (count > bounds_.edits || bytes > bounds_.patch_bytes); ++n, --count) {
+    next.forgotten.push_back(edits_[n].revision);
+    bytes -= bytesOf(edits_[n]);
+  }
+  if (count > bounds_.edits || bytes > bounds_.patch_bytes) {  // too large to be taken back
+    next.edit.reset();
+    --count;
+  }
+  next.done = count;
+  return next;
 }
 
 Result<History::Step> History::step(bool redo, const scene::Document& now) const {
@@ -87,25 +97,44 @@ Result<History::Step> History::step(bool redo, const scene::Document& now) const
   Step step{now, redo ? edit.forth : edit.back, edit.revision};
   step.document.gltf.patch_inplace(json::parse(step.patch));  // our own, of just this document
   auto& [name, gltf, buffers, images] = step.document;
-  buffers.resize(edit.buffers_before);
-  images.resize(edit.images_before);
+  buffers.resize(edit.appended.buffers_before);
+  images.resize(edit.appended.images_before);
   if (redo) {
-    buffers.insert(buffers.end(), edit.buffers.begin(), edit.buffers.end());
-    images.insert(images.end(), edit.images.begin(), edit.images.end());
+    buffers.insert(buffers.end(), edit.appended.buffers.begin(), edit.appended.buffers.end());
+    images.insert(images.end(), edit.appended.images.begin(), edit.appended.images.end());
   }
   return step;
 }
 
-void History::stepped(std::uint64_t revision, const std::string& by, bool redo) {
+History::Next History::nextStep(std::uint64_t revision, const std::string& by, bool redo) const {
   RAD_CHECK(redo ? done_ < edits_.size() : done_ > 0);
-  const auto edit = edits_[redo ? done_++ : --done_].revision;
-  for (auto& entry : log_) {
-    if (entry.kind == PastRevision::Kind::kPatch && entry.revision == edit) entry.undone = !redo;
+  const auto& edit = edits_[redo ? done_ : done_ - 1];
+  Next next;
+  next.entry = {revision, redo ? PastRevision::Kind::kRedo : PastRevision::Kind::kUndo, by, {}, now(), edit.revision};
+  next.entry.summary = (redo ? "makes again revision " : "takes back revision ") + std::to_string(edit.revision);
+  next.patch = redo ? edit.forth : edit.back;
+  next.appended = {edit.appended.buffers_before, edit.appended.images_before, {}, {}};
+  if (redo) next.appended = edit.appended;
+  next.done = redo ? done_ + 1 : done_ - 1;
+  return next;
+}
+
+void History::take(Next next) {
+  if (next.entry.kind == PastRevision::Kind::kLoad) {
+    log_.clear();
+    edits_.clear();
   }
-  PastRevision entry{revision, redo ? PastRevision::Kind::kRedo : PastRevision::Kind::kUndo, by, {}};
-  entry.summary = (redo ? "makes again revision " : "takes back revision ") + std::to_string(edit);
-  entry.stepped = edit;
-  log(std::move(entry));
+  std::erase_if(edits_, [&](const auto& edit) { return std::ranges::count(next.forgotten, edit.revision) > 0; });
+  if (next.edit) edits_.push_back(std::move(*next.edit));
+  done_ = next.done;
+  log(std::move(next.entry));
+}
+
+void History::restore(std::vector<PastRevision> log_entries, std::vector<state::Edit> edits, std::size_t done) {
+  log_.clear();
+  for (auto& entry : log_entries) log(std::move(entry));
+  edits_.assign(std::make_move_iterator(edits.begin()), std::make_move_iterator(edits.end()));
+  done_ = done;
 }
 
 HistoryReport History::report(std::uint64_t revision) const {

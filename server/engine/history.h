@@ -4,12 +4,14 @@
 
 #include <cstdint>
 #include <deque>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "common/bytes.h"
 #include "server/engine/engine.h"
 #include "server/scene/document.h"
+#include "server/state/store.h"
 
 namespace radiosity::engine {
 
@@ -21,12 +23,31 @@ class History {
   History() = default;
   explicit History(const Bounds& bounds) : bounds_(bounds) {}
 
+  /// A revision that is about to come: written to the disk first, then taken over.
+  struct Next {
+    PastRevision entry;
+    std::string patch;                     ///< plain RFC 6902 that leads there, as JSON text
+    state::Appended appended;              ///< buffers and images that come with it, and how many stay
+    std::optional<state::Edit> edit;       ///< a new edit that can be taken back
+    std::vector<std::uint64_t> forgotten;  ///< edits that no longer can be taken back or made again
+    std::size_t done = 0;                  ///< of the edits; those behind are taken back
+  };
   /// Another scene: nothing before it can come back.
-  void loaded(std::uint64_t revision, const std::string& name);
+  [[nodiscard]] static Next nextLoad(std::uint64_t revision, const std::string& name);
+  /// An edit; what had been taken back can then no longer be made again.
+  [[nodiscard]] Next nextEdit(std::uint64_t revision, const std::string& by, const nlohmann::json& patch,
+                              const scene::Document& before, const scene::Document& after) const;
+  /// One edit back, or forth again; there must be one.
+  [[nodiscard]] Next nextStep(std::uint64_t revision, const std::string& by, bool redo) const;
+  void take(Next next);
 
-  /// An edit was made; what had been taken back can no longer be made again.
+  /// nextLoad() and take() in one.
+  void loaded(std::uint64_t revision, const std::string& name) { take(nextLoad(revision, name)); }
+  /// nextEdit() and take() in one.
   void edited(std::uint64_t revision, const std::string& by, const nlohmann::json& patch, const scene::Document& before,
-              const scene::Document& after);
+              const scene::Document& after) {
+    take(nextEdit(revision, by, patch, before, after));
+  }
 
   /// The document one edit back or forth, and the patch that leads there (plain RFC 6902, as JSON text).
   struct Step {
@@ -36,25 +57,21 @@ class History {
   };
   /// kNotFound where there is nothing to take back or to make again. Changes nothing: the step may yet fail.
   [[nodiscard]] Result<Step> step(bool redo, const scene::Document& now) const;
-  /// The step was taken.
-  void stepped(std::uint64_t revision, const std::string& by, bool redo);
+  /// nextStep() and take() in one.
+  void stepped(std::uint64_t revision, const std::string& by, bool redo) { take(nextStep(revision, by, redo)); }
+
+  /// What outlived the last process: a log whose `undone` is not set yet, and edits of which so many are done.
+  void restore(std::vector<PastRevision> log, std::vector<state::Edit> edits, std::size_t done);
 
   [[nodiscard]] HistoryReport report(std::uint64_t revision) const;
 
  private:
-  struct Edit {
-    std::uint64_t revision = 0;
-    std::string forth, back;                   // JSON Patches
-    std::vector<SharedBytes> buffers, images;  // that it appended
-    std::size_t buffers_before = 0, images_before = 0;
-    [[nodiscard]] std::size_t bytes() const { return forth.size() + back.size(); }
-  };
   void log(PastRevision entry);
-  [[nodiscard]] std::size_t patchBytes() const;
+  void noteStep(const PastRevision& entry);
 
   Bounds bounds_;
   std::deque<PastRevision> log_;
-  std::deque<Edit> edits_;
+  std::deque<state::Edit> edits_;
   std::size_t done_ = 0;  // of edits_; those behind are taken back
 };
 

@@ -63,6 +63,16 @@ void LitScene::restart(const SolveSettings& settings) {
   makeSolver();
 }
 
+bool LitScene::save(ArchiveWriter& to) const {
+  to(solver_power_);
+  return solver_->save(to);
+}
+
+bool LitScene::restore(ArchiveReader& from) {
+  from(solver_power_);
+  return from.ok() && solver_->restore(from);
+}
+
 std::uint64_t LitScene::affectedBy(const SceneChange& change, const scene::Scene& next) const {
   const auto& surfaces = patches_->surfaces;
   if (change.geometry || sources_ != lightSources(next)) return surfaces.size();

@@ -49,6 +49,10 @@ class LitScene {
   [[nodiscard]] const SolveSettings& settings() const { return settings_; }
   [[nodiscard]] std::vector<std::string> warnings() const;
 
+  /// The solve so far, as Solver::save() and restore().
+  [[nodiscard]] bool save(ArchiveWriter& to) const;
+  [[nodiscard]] bool restore(ArchiveReader& from);
+
   /// Starts the solve over, with other settings that leave the charts as they are.
   void restart(const SolveSettings& settings);
 

@@ -13,6 +13,9 @@ namespace radiosity::engine {
 
 class Publisher {
  public:
+  /// Versions and layouts go on above `version`; before anything is published.
+  void startAbove(std::uint64_t version) { layout_ = version_ = layout_since_ = version; }
+
   /// Forgets all tiles: the layout of the pages is new.
   void reset();
 

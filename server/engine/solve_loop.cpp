@@ -11,6 +11,8 @@ namespace {
 
 constexpr std::size_t kMaxQueue = 1024;
 constexpr auto kProgressInterval = std::chrono::milliseconds(100);
+/// A solve that took longer is worth a checkpoint at its end.
+constexpr double kLongSolveSeconds = 2.0;
 
 std::string limitText(solver::SolveLimit limit, std::uint64_t link_memory_bytes) {
   constexpr double kMebi = 1048576.0;
@@ -59,12 +61,22 @@ void SolveLoop::threadMain(std::promise<Result<void>> started) {
     const std::scoped_lock lock(mutex_);
     transport_ = std::move(*transport);
   }
+  if (auto restored = restoreState(); !restored) {
+    {
+      const std::scoped_lock lock(mutex_);
+      transport_.reset();
+    }
+    started.set_value(tl::unexpected<Error>(restored.error()));
+    return;
+  }
   updateStatus(false);
   started.set_value({});
   while (runCommands()) {
     welcomeWatchers();
     if (state_ == SolveState::kSolving) solveSlice();
+    checkpointIfDue();
   }
+  checkpoints_.reset();
   lit_.reset();
   view_.reset();
   const std::scoped_lock lock(mutex_);
@@ -73,21 +85,28 @@ void SolveLoop::threadMain(std::promise<Result<void>> started) {
 
 /// Sleeps while there is nothing to solve, then does all commands that are due. False: the engine is being destroyed.
 bool SolveLoop::runCommands() {
-  const auto due = queue_.take(state_ != SolveState::kSolving);
+  waiting_ = state_ != SolveState::kSolving;
+  const auto due = queue_.take(waiting_);
+  beat();
+  waiting_ = false;
   if (!due) return false;
   for (const auto& command : *due) {
     if (queue_.closed()) return false;
     command();
+    beat();
   }
   return true;
 }
 
 void SolveLoop::solveSlice() {
+  if (renderer_lost_ && !rendererIsBack()) return;
   const auto begin = Clock::now();
   const auto outcome = lit_->solver().step();
   seconds_ += std::chrono::duration<double>(Clock::now() - begin).count();
   if (queue_.closed()) return;  // nobody is left to be told
+  tellLosses();
   if (!outcome) {
+    if (willRecover(outcome.error())) return;
     failure_ = outcome.error().text();
     log::error("solve stopped: {}", failure_);
     endSolve(SolveState::kFailed);
@@ -125,6 +144,8 @@ void SolveLoop::beginSolve() {
 
 void SolveLoop::endSolve(SolveState state) {
   state_ = state;
+  renderer_lost_ = state == SolveState::kFailed && renderer_lost_;
+  recoveries_ = 0;
   if (queue_.closed()) return;
   if (lit_) {
     lit_->solver().assess();
@@ -133,6 +154,8 @@ void SolveLoop::endSolve(SolveState state) {
   updateStatus(false);
   publishLightmaps(true);
   updateStatus(true);
+  // Of the short solves of a drag the next periodic one will do: thirty a second would stand in the way of the edits.
+  if (seconds_ > kLongSolveSeconds) next_checkpoint_ = Clock::now();
 }
 
 void SolveLoop::updateStatus(bool announce) {
@@ -144,11 +167,22 @@ void SolveLoop::updateStatus(bool announce) {
   status.seconds = seconds_;
   status.settings = settings_;
   status.failure = failure_;
+  status.renderer_lost = renderer_lost_;
+  status.renderers_replaced = losses_told_;
+  status.solve_restarts = solve_restarts_;
   if (lit_) {
     const auto& tiles = publisher_.tileCounters();
     status.counters["tiles.changed"] = static_cast<double>(tiles.changed);
     status.counters["skip.tilesUnchanged"] = static_cast<double>(tiles.unchanged);
     status.counters["skip.publicationsUnwatched"] = static_cast<double>(unwatched_);
+    if (checkpoints_) {
+      const auto written = checkpoints_->counters();
+      status.counters["state.checkpoints"] = static_cast<double>(written.written);
+      status.counters["state.checkpointsFailed"] = static_cast<double>(written.failed);
+      status.counters["state.checkpointBytes"] = static_cast<double>(written.bytes);
+      status.counters["state.checkpointSeconds"] = written.seconds;
+      status.counters["state.resumedShots"] = static_cast<double>(resumed_shots_);
+    }
   }
   status.gl_renderer = transport_->description();
   {
@@ -162,7 +196,9 @@ void SolveLoop::updateStatus(bool announce) {
 
 Status SolveLoop::status() const {
   const std::scoped_lock lock(mutex_);
-  return status_;
+  auto status = status_;
+  if (loads_ > 0 && status.state == SolveState::kEmpty) status.state = SolveState::kLoading;
+  return status;
 }
 
 void SolveLoop::addListener(std::weak_ptr<Listener> listener) { listeners_.add(std::move(listener)); }

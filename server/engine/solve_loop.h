@@ -3,13 +3,16 @@
 // unless he asks a question, and the solver never waits for a client.
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <memory>
+#include <set>
 #include <string>
 
 #include "common/result.h"
 #include "server/engine/engine.h"
 #include "server/solver/transport.h"
+#include "server/state/store.h"
 
 namespace radiosity::engine {
 
@@ -17,9 +20,19 @@ struct EngineOptions {
   SolveSettings settings;
   /// Makes the transport, on the solve thread. kUnavailable (no EGL driver) ends start-up.
   std::function<Result<std::unique_ptr<solver::Transport>>()> make_transport;
+  /// After a transport failed, before the solve starts over on it; doubled for each failure of the same solve, of which
+  /// the fifth ends it. Drivers take seconds to reset a card.
+  std::chrono::milliseconds recovery_wait{500};
+
+  /// What outlives this process; null: nothing does. An edit is answered only when it is in there.
+  std::shared_ptr<state::Store> store;
+  std::set<std::string> named_settings;  ///< of `settings`, by their names in the store: these go before kept ones
+  std::size_t checkpoint_bytes = std::size_t{256} << 20;  ///< of one checkpoint; a solve that needs more has none
+  std::chrono::milliseconds checkpoint_interval{5'000};   ///< at least; and at its end
 };
 
-/// Starts the solve thread and the transport; returns when both are up, or why not.
+/// Starts the solve thread and the transport, and brings back what the store holds; returns when all are up, or why
+/// not.
 [[nodiscard]] Result<std::unique_ptr<Engine>> makeEngine(EngineOptions options);
 
 }  // namespace radiosity::engine

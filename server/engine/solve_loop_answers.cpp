@@ -124,7 +124,10 @@ Result<SharedBytes> SolveLoop::renderSnapshot(const SnapshotRequest& request) {
   const auto pages =
       dark ? pageImages({quantity.pages, lit_->shownPages(), {}, false}) : pageImages(makePages(*lit_, quantity.pages));
   const auto image = view_->render(lit_->scene(), lit_->patches(), pages, view);
-  if (!image) return tl::unexpected<Error>(image.error());
+  if (!image) {
+    view_.reset();  // its context may be lost; the next picture gets a new one
+    return tl::unexpected<Error>(image.error());
+  }
   auto png = encodePng(quantity.photometric ? toneMap(*image, autoExposure(*image)) : *image);
   if (!png) return tl::unexpected<Error>(png.error());
   return std::make_shared<const Bytes>(std::move(*png));

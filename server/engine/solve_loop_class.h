@@ -1,11 +1,14 @@
-// The class behind makeEngine (solve_loop.h), private to this folder. Its methods lie in four files: solve_loop.cpp
+// The class behind makeEngine (solve_loop.h), private to this folder. Its methods lie in seven files: solve_loop.cpp
 // runs the thread, solve_loop_edits.cpp changes scene and settings, solve_loop_answers.cpp makes what can be fetched,
-// solve_loop_publish.cpp shows lightmaps to those who watch.
+// solve_loop_publish.cpp shows lightmaps to those who watch, solve_loop_state.cpp keeps what outlives the process,
+// solve_loop_restore.cpp brings it back, solve_loop_recovery.cpp goes on when renderers are lost.
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <future>
 #include <memory>
 #include <mutex>
@@ -24,6 +27,7 @@
 #include "server/gpu/view_renderer.h"
 #include "server/scene/document.h"
 #include "server/solver/transport.h"
+#include "server/state/checkpoint.h"
 
 namespace radiosity::engine {
 
@@ -39,6 +43,7 @@ class SolveLoop final : public Engine {
 
   void loadBytes(std::string name, SharedBytes bytes, Callback<LoadOutcome> done) override;
   void loadFile(std::string path, Callback<LoadOutcome> done) override;
+  void openFile(std::string path, Callback<LoadOutcome> done) override;
   void patch(PatchRequest request, Callback<PatchOutcome> done) override;
   void step(StepRequest request, Callback<PatchOutcome> done) override;
   void history(Callback<HistoryReport> done) override;
@@ -47,6 +52,7 @@ class SolveLoop final : public Engine {
   void resume(Callback<SolveState> done) override;
   void restart(Callback<SolveState> done) override;
   [[nodiscard]] Status status() const override;
+  [[nodiscard]] double busySeconds() const override;
   [[nodiscard]] std::shared_ptr<void> watch(Quantity quantity) override;
   [[nodiscard]] std::shared_ptr<const Lightmaps> lightmaps(Quantity quantity) const override;
   void sceneText(Callback<SceneText> done) override;
@@ -55,6 +61,8 @@ class SolveLoop final : public Engine {
   void lightmapExr(std::uint32_t page, Quantity quantity, Callback<SharedBytes> done) override;
   void snapshot(SnapshotRequest request, Callback<SharedBytes> done) override;
   void addListener(std::weak_ptr<Listener> listener) override;
+  [[nodiscard]] const Past& past() const override { return past_; }
+  void keepSolve(std::chrono::milliseconds patience) override;
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -66,6 +74,9 @@ class SolveLoop final : public Engine {
   template <typename T, typename Work>
   void askLit(Callback<T> done, Work work);
 
+  /// A load counts as under way from here until it is answered: reading a large file takes its time. Any thread.
+  [[nodiscard]] Callback<LoadOutcome> countLoad(Callback<LoadOutcome> done);
+
   // All below: solve thread only.
   void threadMain(std::promise<Result<void>> started);
   [[nodiscard]] bool runCommands();
@@ -74,6 +85,13 @@ class SolveLoop final : public Engine {
   /// The clock starts over: another scene, another seed, an edit. A paused solve stays paused.
   void beginSolve();
   void endSolve(SolveState state);
+  /// The transport failed. True: it will be tried again after a while, from the solve's beginning.
+  [[nodiscard]] bool willRecover(const Error& error);
+  /// Whether there is a transport that works; tries to get one when it is time to.
+  [[nodiscard]] bool rendererIsBack();
+  void tellLosses();  ///< of renderers that were replaced
+  void beat();        ///< the thread is alive and has finished something
+
   /// What is watched and not published yet; `final`: as a new version in any case.
   void publishLightmaps(bool final);
   [[nodiscard]] QuantityPages pagesToShow(Quantity quantity);
@@ -83,20 +101,39 @@ class SolveLoop final : public Engine {
   void updateStatus(bool announce);
 
   [[nodiscard]] Result<LoadOutcome> install(Result<scene::Document> document);
+  /// Called when nothing but the disk can fail any more: what is about to come is brought there.
+  using Keep = std::function<Result<void>(const PatchOutcome&)>;
   /// Puts a lit scene in place of the present one, which goes on if `made` is an error or cannot be uploaded.
   /// `fade`: shows the present one's light until the new one's is as good.
-  [[nodiscard]] Result<void> relight(Result<std::unique_ptr<LitScene>> made, bool fade);
+  [[nodiscard]] Result<void> relight(Result<std::unique_ptr<LitScene>> made, bool fade,
+                                     const std::function<Result<void>(const LitScene&)>& keep = {});
   [[nodiscard]] Result<void> checkBase(const std::optional<std::uint64_t>& base_revision) const;
   [[nodiscard]] Result<PatchOutcome> applyRequest(const PatchRequest& request);
   [[nodiscard]] Result<PatchOutcome> applyStep(const StepRequest& request);
   /// Makes the edited scene the present one; raises no revision and tells nobody yet.
-  [[nodiscard]] Result<PatchOutcome> adopt(scene::EditedDocument edited);
-  [[nodiscard]] Result<PatchOutcome> rebuild(scene::EditedDocument edited);
+  [[nodiscard]] Result<PatchOutcome> adopt(scene::EditedDocument edited, const Keep& keep);
+  [[nodiscard]] Result<PatchOutcome> rebuild(scene::EditedDocument edited, const Keep& keep);
   /// Tells everyone of the new revision and solves on.
   void announceEdit(const PatchOutcome& outcome, const std::string& patch, const std::string& by);
   [[nodiscard]] Result<SolveSettings> applySettings(const SolveSettings& settings);
   /// A solve that has stopped goes on when the settings now ask for more, and is done when they ask for less.
   void reconsiderStop();
+
+  // What outlives the process; all of it nothing without a store.
+  [[nodiscard]] Result<void> restoreState();
+  [[nodiscard]] Result<void> restoreScene(state::Kept kept);
+  [[nodiscard]] Result<void> restoreSolve(const scene::Document& document);
+  [[nodiscard]] Result<std::unique_ptr<LitScene>> resumedScene(const scene::Document& document,
+                                                               const Bytes& checkpoint);
+  /// The scene that outlived the last process was loaded from the same bytes, and nothing else has been loaded since.
+  [[nodiscard]] bool goesOnWith(const scene::Document& document, bool with_edits) const;
+  [[nodiscard]] Result<void> keepLoad(const History::Next& next, const scene::Document& document);
+  /// How an edit is brought to the disk: `after` is the document that it leads to.
+  [[nodiscard]] Keep keepEdit(const History::Next& next, const Receipt& receipt, const scene::Document& after);
+  [[nodiscard]] Result<void> keepSettings(const SolveSettings& settings);
+  void checkpointIfDue();
+  /// True: taken, or not to be had at all.
+  [[nodiscard]] bool takeCheckpoint();
 
   [[nodiscard]] Result<SharedBytes> renderSnapshot(const SnapshotRequest& request);
   [[nodiscard]] Result<SharedBytes> makeUnlit();
@@ -121,6 +158,22 @@ class SolveLoop final : public Engine {
   bool unpublished_ = false;
   std::uint64_t unwatched_ = 0;  // publications that nobody was there for
   Clock::time_point next_publish_{}, last_progress_{};
+  bool renderer_lost_ = false;
+  unsigned recoveries_ = 0;  // of this solve
+  Clock::time_point retry_at_{};
+  std::uint64_t losses_told_ = 0, solve_restarts_ = 0;
+
+  std::atomic<Clock::rep> last_beat_{0};  // since the clock's epoch; any thread may read both
+  std::atomic<bool> waiting_{true};
+  std::atomic<int> loads_{0};
+  std::unique_ptr<state::CheckpointWriter> checkpoints_;  // null: none are kept
+  Clock::time_point next_checkpoint_{};
+  std::uint64_t checkpoint_revision_ = 0, checkpoint_shots_ = 0;  // of the last that was taken
+  bool checkpoint_too_large_ = false;                             // the last one was
+  std::string loaded_digest_;                                     // of the scene that outlived the last process
+  bool as_restored_ = false;                                      // the scene is that one; no edit, no load since
+  std::uint64_t resumed_shots_ = 0;
+  Past past_;  // constant once start() has returned
 
   mutable std::mutex mutex_;  // for the two that any thread may read, and transport_ coming and going
   Status status_;

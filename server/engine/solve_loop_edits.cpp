@@ -7,27 +7,40 @@
 
 namespace radiosity::engine {
 
+Engine::Callback<LoadOutcome> SolveLoop::countLoad(Callback<LoadOutcome> done) {
+  ++loads_;
+  return [this, done = std::move(done)](Result<LoadOutcome> outcome) {
+    --loads_;
+    done(std::move(outcome));
+  };
+}
+
 void SolveLoop::loadBytes(std::string name, SharedBytes bytes, Callback<LoadOutcome> done) {
-  ask<LoadOutcome>(std::move(done), [this, name = std::move(name), bytes = std::move(bytes)] {
+  ask<LoadOutcome>(countLoad(std::move(done)), [this, name = std::move(name), bytes = std::move(bytes)] {
     return install(scene::parseDocument(name, *bytes));
   });
 }
 
 void SolveLoop::loadFile(std::string path, Callback<LoadOutcome> done) {
-  ask<LoadOutcome>(std::move(done), [this, path = std::move(path)] { return install(scene::loadDocument(path)); });
+  ask<LoadOutcome>(countLoad(std::move(done)),
+                   [this, path = std::move(path)] { return install(scene::loadDocument(path)); });
 }
 
 Result<LoadOutcome> SolveLoop::install(Result<scene::Document> document) {
   if (!document) return tl::unexpected<Error>(document.error());
+  if (goesOnWith(*document, false)) return LoadOutcome{revision_, lit_->warnings()};
   const SolveState before = std::exchange(state_, SolveState::kLoading);
   updateStatus(true);
-  const auto name = document->name;
-  if (const auto lit = relight(LitScene::make(std::move(*document), settings_, *transport_), false); !lit) {
+  auto next = History::nextLoad(revision_ + 1, document->name);
+  const auto keep = [&](const LitScene& made) { return keepLoad(next, made.document()); };
+  if (const auto lit = relight(LitScene::make(std::move(*document), settings_, *transport_), false, keep); !lit) {
     if (state_ == SolveState::kLoading) state_ = before;
     updateStatus(true);
     return tl::unexpected<Error>(lit.error());
   }
-  history_.loaded(++revision_, name);
+  ++revision_;
+  history_.take(std::move(next));
+  const LogScope about({.revision = revision_});
   for (const auto& warning : lit_->warnings()) log::warn("{}", warning);
   beginSolve();
   listeners_.tell([this](Listener& listener) { listener.onSceneLoaded(revision_); });
@@ -35,9 +48,12 @@ Result<LoadOutcome> SolveLoop::install(Result<scene::Document> document) {
   return LoadOutcome{revision_, lit_->warnings()};
 }
 
-Result<void> SolveLoop::relight(Result<std::unique_ptr<LitScene>> made, bool fade) {
+Result<void> SolveLoop::relight(Result<std::unique_ptr<LitScene>> made, bool fade,
+                                const std::function<Result<void>(const LitScene&)>& keep) {
   if (!made) return tl::unexpected<Error>(made.error());
-  if (auto uploaded = (*made)->upload(); !uploaded) {
+  auto uploaded = (*made)->upload();
+  if (uploaded && keep) uploaded = keep(**made);
+  if (!uploaded) {
     if (lit_) {
       if (const auto back = lit_->upload(); !back) {
         failure_ = back.error().text();
@@ -48,6 +64,7 @@ Result<void> SolveLoop::relight(Result<std::unique_ptr<LitScene>> made, bool fad
   }
   if (fade && lit_) (*made)->fadeFrom(*lit_);
   lit_ = std::move(*made);
+  renderer_lost_ = false;  // it took the scene
   publisher_.reset();
   return {};
 }
@@ -81,10 +98,11 @@ Result<PatchOutcome> SolveLoop::applyRequest(const PatchRequest& request) {
     return PatchOutcome{revision_, lit_->affectedBy(change, edited->scene),
                         change.geometry ? lit_->solver().shots() : 0};
   }
-  const auto before = lit_->document();
-  const auto outcome = adopt(std::move(*edited));
+  auto next = history_.nextEdit(revision_ + 1, request.by, patch, lit_->document(), edited->document);
+  const auto keep = keepEdit(next, request.receipt, edited->document);
+  const auto outcome = adopt(std::move(*edited), keep);
   if (!outcome) return outcome;
-  history_.edited(outcome->revision, request.by, patch, before, lit_->document());
+  history_.take(std::move(next));
   announceEdit(*outcome, request.patch, request.by);
   return outcome;
 }
@@ -95,22 +113,27 @@ Result<PatchOutcome> SolveLoop::applyStep(const StepRequest& request) {
   if (!step) return tl::unexpected<Error>(step.error());
   auto scene = scene::importScene(step->document);
   if (!scene) return tl::unexpected<Error>(scene.error());
-  auto outcome = adopt({std::move(step->document), std::move(*scene)});
+  auto next = history_.nextStep(revision_ + 1, request.by, request.redo);
+  const auto keep = keepEdit(next, request.receipt, step->document);
+  auto outcome = adopt({std::move(step->document), std::move(*scene)}, keep);
   if (!outcome) return outcome;
   outcome->stepped = step->edit;
-  history_.stepped(outcome->revision, request.by, request.redo);
+  history_.take(std::move(next));
   announceEdit(*outcome, step->patch, request.by);
   return outcome;
 }
 
-Result<PatchOutcome> SolveLoop::adopt(scene::EditedDocument edited) {
+Result<PatchOutcome> SolveLoop::adopt(scene::EditedDocument edited, const Keep& keep) {
   const auto change = lit_->changeTo(edited.scene);
   PatchOutcome outcome;
+  outcome.revision = revision_ + 1;
   if (change.geometry) {
-    auto rebuilt = rebuild(std::move(edited));
+    auto rebuilt = rebuild(std::move(edited), keep);
     if (!rebuilt) return rebuilt;
     outcome = *rebuilt;
   } else {
+    outcome.affected_surfaces = lit_->affectedBy(change, edited.scene);
+    if (auto kept = keep(outcome); !kept) return tl::unexpected<Error>(kept.error());
     outcome.affected_surfaces = lit_->reshade(std::move(edited), change);
     // The light of the wave that failed is counted as shot but arrived nowhere.
     if (outcome.affected_surfaces > 0 && state_ == SolveState::kFailed) lit_->restart(settings_);
@@ -121,14 +144,18 @@ Result<PatchOutcome> SolveLoop::adopt(scene::EditedDocument edited) {
   return outcome;
 }
 
-Result<PatchOutcome> SolveLoop::rebuild(scene::EditedDocument edited) {
+Result<PatchOutcome> SolveLoop::rebuild(scene::EditedDocument edited, const Keep& keep) {
   PatchOutcome outcome;
+  outcome.revision = revision_ + 1;
   outcome.affected_shots = lit_->solver().shots();
   outcome.affected_surfaces = lit_->patches().surfaces.size();
-  if (const auto lit = relight(LitScene::make(std::move(edited), settings_, *transport_), true); !lit)
+  const auto keep_made = [&](const LitScene& made) {
+    outcome.affected_surfaces = std::max<std::uint64_t>(outcome.affected_surfaces, made.patches().surfaces.size());
+    outcome.affected_surfaces = std::max<std::uint64_t>(outcome.affected_surfaces, 1);  // pages are new even if empty
+    return keep(outcome);
+  };
+  if (const auto lit = relight(LitScene::make(std::move(edited), settings_, *transport_), true, keep_made); !lit)
     return tl::unexpected<Error>(lit.error());
-  outcome.affected_surfaces = std::max<std::uint64_t>(outcome.affected_surfaces, lit_->patches().surfaces.size());
-  outcome.affected_surfaces = std::max<std::uint64_t>(outcome.affected_surfaces, 1);  // pages are new even if empty
   return outcome;
 }
 
@@ -147,6 +174,7 @@ void SolveLoop::configure(SolveSettings settings, Callback<SolveSettings> done) 
 }
 
 Result<SolveSettings> SolveLoop::applySettings(const SolveSettings& settings) {
+  if (auto kept = keepSettings(settings); !kept) return tl::unexpected<Error>(kept.error());
   const SolveSettings before = std::exchange(settings_, settings);
   if (!lit_) {  // they wait for a scene
     updateStatus(true);
@@ -155,6 +183,7 @@ Result<SolveSettings> SolveLoop::applySettings(const SolveSettings& settings) {
   if (before.texels != settings.texels || before.texel_size_m != settings.texel_size_m) {
     if (const auto lit = relight(LitScene::make(lit_->document(), settings, *transport_), true); !lit) {
       settings_ = before;
+      (void)keepSettings(before);
       updateStatus(true);
       return tl::unexpected<Error>(lit.error());
     }

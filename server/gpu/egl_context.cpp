@@ -4,6 +4,7 @@
 #include <epoxy/egl.h>
 #include <epoxy/gl.h>
 
+#include <array>
 #include <cstdlib>
 #include <string_view>
 #include <vector>
@@ -104,6 +105,22 @@ std::vector<Candidate> candidates(std::vector<std::string>& failures) {
 
 bool debugWanted() { return std::getenv("RADIOSITY_GL_DEBUG") != nullptr; }
 
+/// `robust`: a driver that resets the card says so afterwards; not every driver can.
+EGLContext createContext(EGLDisplay display, EGLConfig config, bool robust) {
+  const std::array<EGLint, 11> attributes = {EGL_CONTEXT_MAJOR_VERSION_KHR,
+                                             4,
+                                             EGL_CONTEXT_MINOR_VERSION_KHR,
+                                             5,
+                                             EGL_CONTEXT_OPENGL_PROFILE_MASK_KHR,
+                                             EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT_KHR,
+                                             EGL_CONTEXT_FLAGS_KHR,
+                                             debugWanted() ? EGL_CONTEXT_OPENGL_DEBUG_BIT_KHR : 0,
+                                             robust ? EGL_CONTEXT_OPENGL_RESET_NOTIFICATION_STRATEGY_KHR : EGL_NONE,
+                                             EGL_LOSE_CONTEXT_ON_RESET_KHR,
+                                             EGL_NONE};
+  return eglCreateContext(display, config, EGL_NO_CONTEXT, attributes.data());
+}
+
 /// The display and context of one candidate, or why not. A display is never terminated: eglTerminate ends it for every
 /// other context of the process too (EGL does not count uses), and the process's end frees it.
 tl::expected<std::pair<EGLDisplay, EGLContext>, std::string> open(const Candidate& candidate) {
@@ -126,16 +143,8 @@ tl::expected<std::pair<EGLDisplay, EGLContext>, std::string> open(const Candidat
   if (eglChooseConfig(display, config_attributes, &config, 1, &count) == EGL_FALSE || count == 0) {
     return tl::unexpected("no OpenGL configuration: " + eglErrorText());
   }
-  const EGLint attributes[] = {EGL_CONTEXT_MAJOR_VERSION_KHR,
-                               4,
-                               EGL_CONTEXT_MINOR_VERSION_KHR,
-                               5,
-                               EGL_CONTEXT_OPENGL_PROFILE_MASK_KHR,
-                               EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT_KHR,
-                               EGL_CONTEXT_FLAGS_KHR,
-                               debugWanted() ? EGL_CONTEXT_OPENGL_DEBUG_BIT_KHR : 0,
-                               EGL_NONE};
-  const EGLContext context = eglCreateContext(display, config, EGL_NO_CONTEXT, attributes);
+  auto context = createContext(display, config, true);
+  if (context == EGL_NO_CONTEXT) context = createContext(display, config, false);
   if (context == EGL_NO_CONTEXT) return tl::unexpected("no OpenGL 4.5 core context: " + eglErrorText());
   if (eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context) == EGL_FALSE) {
     const auto reason = eglErrorText();
@@ -143,6 +152,17 @@ tl::expected<std::pair<EGLDisplay, EGLContext>, std::string> open(const Candidat
     return tl::unexpected("eglMakeCurrent failed: " + reason);
   }
   return std::pair{display, context};
+}
+
+const char* resetText(GLenum reset) {
+  switch (reset) {
+    case GL_GUILTY_CONTEXT_RESET:
+      return "our own work made the driver reset the card";
+    case GL_INNOCENT_CONTEXT_RESET:
+      return "another program made the driver reset the card";
+    default:
+      return "the driver reset the card";
+  }
 }
 
 void GLAPIENTRY onDebugMessage(GLenum /*source*/, GLenum type, GLuint id, GLenum severity, GLsizei length,
@@ -201,6 +221,22 @@ EglContext::~EglContext() {
     eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
   }
   eglDestroyContext(display_, context_);
+}
+
+Result<void> EglContext::check() const {
+  makeCurrent();
+  if (const auto reset = glGetGraphicsResetStatus(); reset != GL_NO_ERROR)
+    return fail(ErrorCode::kUnavailable, fmt::format("the graphics context was lost: {}", resetText(reset)), renderer_);
+  const auto error = glGetError();
+  if (error == GL_NO_ERROR) return {};
+  constexpr int kMostFlags = 16;  // one for each kind of error; a lost context may report for ever
+  for (int i = 0; i < kMostFlags && glGetError() != GL_NO_ERROR; ++i) {
+  }
+  if (error == GL_CONTEXT_LOST) return fail(ErrorCode::kUnavailable, "the graphics context was lost", renderer_);
+  if (error == GL_OUT_OF_MEMORY)
+    return fail(ErrorCode::kUnavailable,
+                "the graphics driver is out of memory; fewer --workers, or fewer texels, need less", renderer_);
+  return fail(ErrorCode::kInternal, fmt::format("OpenGL refused a call with error {:#x}", error), renderer_);
 }
 
 void EglContext::makeCurrent() const {

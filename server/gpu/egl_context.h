@@ -23,6 +23,11 @@ class EglContext {
   /// Cheap when it is current already.
   void makeCurrent() const;
 
+  /// What went wrong on the context since the last check, if anything: kUnavailable when it was lost (a driver reset
+  /// the card) or memory ran out, kInternal for a call that OpenGL refused. What was drawn since then is void. Costs a
+  /// few calls of the driver; to be asked once for each piece of work that was read back.
+  [[nodiscard]] Result<void> check() const;
+
   /// GL_RENDERER: "llvmpipe (LLVM 15.0.6, 256 bits)"
   [[nodiscard]] const std::string& renderer() const { return renderer_; }
   /// True when a CPU does the drawing.

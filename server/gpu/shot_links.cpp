@@ -13,6 +13,7 @@ Result<solver::TransportCounters> ShotRunner::measure(const ShotSpan& shots, con
   solver::TransportCounters counters;
   measureGather(shots, take, counters);
   measureScatter(shots, take, counters);
+  if (const auto good = context_->check(); !good) return tl::unexpected(good.error());
   return counters;
 }
 

@@ -102,7 +102,7 @@ Result<void> ShotRunner::setScene(std::shared_ptr<const scene::PatchScene> patch
   patches_ = std::move(patches);
   link_store_.reset();
   has_scene_ = true;
-  return {};
+  return context_->check();
 }
 
 Result<solver::TransportCounters> ShotRunner::run(const ShotSpan& shots, const FluxSink& sink) {
@@ -121,6 +121,7 @@ Result<solver::TransportCounters> ShotRunner::run(const ShotSpan& shots, const F
   for (const auto& shot : shots.parallel) {
     punctual_.gather(shot, shots.views, shots.flux_scale, renderer_.scene(), parallel_, sink, counters);
   }
+  if (const auto good = context_->check(); !good) return tl::unexpected(good.error());
   return counters;
 }
 

@@ -54,7 +54,9 @@ class GlViewRenderer final : public ViewRenderer {
     const auto geometry = makeViewGeometry(scene, patches, glm::dvec3(request.camera.world[3]));
     setState(request, target);
     draw(scene, pages, request, geometry);
-    return read(request, target);
+    auto picture = read(request, target);
+    if (const auto good = context_->check(); !good) return tl::unexpected(good.error());
+    return picture;
   }
 
  private:

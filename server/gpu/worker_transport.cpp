@@ -115,6 +115,8 @@ class WorkerTransport final : public solver::Transport {
     (void)eventfd_write(wake_.get(), 1);  // never read: whoever waits now or later is woken
   }
 
+  [[nodiscard]] Losses losses() const override { return {losses_, last_death_}; }
+
   [[nodiscard]] std::string description() const override {
     return fmt::format("{}, {} worker{}", renderer_, slots_.size(), slots_.size() == 1 ? "" : "s");
   }
@@ -262,6 +264,7 @@ class WorkerTransport final : public solver::Transport {
     log::warn("{}; replacing it, {} chunks to be done again", why.text(), slot.held.size() + slot.done.size());
     last_death_ = why.text();
     ++deaths_;
+    ++losses_;
     queue_.insert(queue_.end(), slot.held.begin(), slot.held.end());
     queue_.insert(queue_.end(), slot.done.begin(), slot.done.end());
     slot = Slot{};
@@ -313,7 +316,8 @@ class WorkerTransport final : public solver::Transport {
   std::vector<std::optional<solver::LinkSample>> links_;  ///< by shot, of those that others must go before
   std::size_t next_taken_ = 0;
   std::deque<std::size_t> queue_;
-  int deaths_ = 0;
+  int deaths_ = 0;            ///< in the present call
+  std::uint64_t losses_ = 0;  ///< in all
   std::string last_death_;
 };
 

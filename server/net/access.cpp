@@ -76,8 +76,8 @@ Result<void> checkExposure(const ServerOptions& options) {
                 "--listen " + options.address);
   if (address.is_loopback() || !options.token.empty() || options.insecure) return {};
   return fail(ErrorCode::kBadUsage,
-              "anyone who reaches this address could use the server; give --token-file FILE (and put a TLS proxy in "
-              "front), or --insecure if the network is trusted",
+              "anyone who reaches this address could use the server; give --token-file FILE (and --tls-cert, "
+              "--tls-key, or a TLS proxy in front), or --insecure if the network is trusted",
               "--listen " + options.address);
 }
 

@@ -1,5 +1,5 @@
-// Names of Boost.Beast and Asio for the three .cpp files that speak to sockets. Nothing else includes this: it is slow
-// to compile.
+// Names of Boost.Beast and Asio for the few .cpp files that speak to sockets. Nothing else includes this: it is slow to
+// compile.
 #pragma once
 
 #include <boost/asio/io_context.hpp>
@@ -21,7 +21,7 @@ using BoostError = boost::system::error_code;
 
 /// Every socket has its own strand, so a session's handlers never run side by side.
 using Strand = asio::strand<asio::io_context::executor_type>;
-using Stream = beast::basic_stream<tcp, Strand>;
+using TcpStream = beast::basic_stream<tcp, Strand>;
 using Upgrade = http::request<http::vector_body<std::uint8_t>>;
 
 }  // namespace radiosity::net

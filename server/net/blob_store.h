@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "common/bytes.h"
 
@@ -25,22 +26,25 @@ class BlobStore {
     SharedBytes bytes;
   };
 
-  /// Returns the id. What lay there already counts as new.
-  std::string put(std::string name, SharedBytes bytes);
+  /// What lay there already counts as new.
+  struct Put {
+    std::string id;
+    std::vector<std::string> dropped;  ///< ids of those that had to go
+  };
+  Put put(std::string name, SharedBytes bytes);
+  /// One that is kept elsewhere: find() gives it without bytes.
+  void expect(std::string id, std::string name);
+  void drop(std::string_view id);
   [[nodiscard]] std::optional<Blob> find(std::string_view id) const;
 
  private:
+  void forget(std::string_view id);
+
   std::size_t max_count_, max_bytes_;
   Naming naming_;
   mutable std::mutex mutex_;
   std::deque<Blob> blobs_;
   std::size_t bytes_ = 0;
 };
-
-/// SHA-256 as 64 hexadecimal digits. About 1 s a GiB.
-[[nodiscard]] std::string sha256Hex(const Bytes& bytes);
-
-/// `bytes` random bytes from the system, as hexadecimal.
-[[nodiscard]] std::string randomHex(std::size_t bytes);
 
 }  // namespace radiosity::net

@@ -173,7 +173,7 @@ void Calls::run(const protocol::SceneLoadCall& call, const Slot& slot) {
   constexpr std::string_view kUpload = "/uploads/";
   constexpr std::string_view kFile = "file:";
   if (call.url.starts_with(kUpload)) {
-    const auto blob = hub_.uploads().find(std::string_view(call.url).substr(kUpload.size()));
+    const auto blob = hub_.findUpload(std::string_view(call.url).substr(kUpload.size()));
     if (!blob)
       return slot.error({RpcCode::kNotFound, "there is no such upload (any more); PUT it to /uploads", "/params/url"});
     return hub_.engine().loadBytes(blob->name, blob->bytes, std::move(done));
@@ -280,11 +280,12 @@ void Calls::run(const protocol::CreditCall& call, const Slot& slot) {
 
 void Calls::run(const protocol::SnapshotCall& call, const Slot& slot) {
   engine::SnapshotRequest request{call.camera, call.width, call.height, call.quantity};
-  hub_.engine().snapshot(std::move(request), hub_.fromEngine<SharedBytes>([slot, hub = &hub_](
-                                                                              const Result<SharedBytes>& png) {
-    if (!png) return slot.fail(png);
-    slot.reply(protocol::SnapshotReply{fmt::format("/snapshots/{}.png", hub->snapshots().put("snapshot.png", *png))});
-  }));
+  hub_.engine().snapshot(
+      std::move(request), hub_.fromEngine<SharedBytes>([slot, hub = &hub_](const Result<SharedBytes>& png) {
+        if (!png) return slot.fail(png);
+        slot.reply(
+            protocol::SnapshotReply{fmt::format("/snapshots/{}.png", hub->snapshots().put("snapshot.png", *png).id)});
+      }));
 }
 
 void Calls::run(const protocol::ViewersCall& /*call*/, const Slot& slot) {

@@ -6,6 +6,7 @@
 #include <charconv>
 #include <utility>
 
+#include "common/log.h"
 #include "protocol/http_bodies.h"
 #include "protocol/messages.h"
 #include "server/net/convert.h"
@@ -73,9 +74,11 @@ void getStatus(const std::shared_ptr<Hub>& hub, HttpRequest& /*request*/, const 
 void putScene(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond& done) {
   if (hub->draining()) return done(errorResponse({ErrorCode::kBusy, "the server is shutting down", {}}));
   auto bytes = std::make_shared<const Bytes>(std::move(request.body));
-  auto answer = [hub = hub.get(), done](const Result<engine::LoadOutcome>& outcome) {
+  auto answer = [hub = hub.get(), name = request.name, done](const Result<engine::LoadOutcome>& outcome) {
     if (!outcome) return done(errorResponse(outcome.error()));
     hub->sawRevision(outcome->revision);
+    const LogScope about({.revision = outcome->revision});
+    log::info("scene {} uploaded", name);
     auto response = plain(200, protocol::encodeHttpLoad({outcome->revision, outcome->warnings}));
     response.content_type = "application/json";
     done(std::move(response));
@@ -84,11 +87,14 @@ void putScene(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respo
 }
 
 void putUpload(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond& done) {
-  const auto id = hub->uploads().put(request.name, std::make_shared<const Bytes>(std::move(request.body)));
-  auto response = plain(201, protocol::encodeHttpUrl("/uploads/" + id));
-  response.content_type = "application/json";
-  response.headers.emplace_back("Location", "/uploads/" + id);
-  done(std::move(response));
+  hub->keepUpload(request.name, std::make_shared<const Bytes>(std::move(request.body)),
+                  [done](const Result<std::string>& id) {
+                    if (!id) return done(errorResponse(id.error()));
+                    auto response = plain(201, protocol::encodeHttpUrl("/uploads/" + *id));
+                    response.content_type = "application/json";
+                    response.headers.emplace_back("Location", "/uploads/" + *id);
+                    done(std::move(response));
+                  });
 }
 
 void getSceneGltf(const std::shared_ptr<Hub>& hub, HttpRequest& /*request*/, const Respond& done) {
@@ -148,6 +154,7 @@ void getReady(const std::shared_ptr<Hub>& hub, HttpRequest& /*request*/, const R
   const auto status = hub->engine().status();
   if (hub->draining()) return done(plain(503, "draining\n"));
   if (status.state == engine::SolveState::kLoading) return done(plain(503, "loading\n"));
+  if (status.renderer_lost) return done(plain(503, "no renderer: " + status.failure + "\n"));
   if (status.state == engine::SolveState::kFailed) return done(plain(503, "failed: " + status.failure + "\n"));
   done(plain(200, "ready\n"));
 }

@@ -44,6 +44,31 @@ std::string httpDate() {
   return {text.data(), length};
 }
 
+/// The part of the memory for uploads that a session holds. All sessions share kUploadsAtATime times the largest
+/// upload: each may send one that large, and together they must not fill the machine.
+class UploadRoom {
+ public:
+  explicit UploadRoom(Hub& hub) : hub_(hub) {}
+  ~UploadRoom() { hub_.counters().uploads_held_bytes -= held_bytes_; }
+  UploadRoom(const UploadRoom&) = delete;
+  UploadRoom& operator=(const UploadRoom&) = delete;
+
+  /// False: there is no room for so much; what was held is held still.
+  [[nodiscard]] bool hold(std::size_t bytes) {
+    auto& all = hub_.counters().uploads_held_bytes;
+    const auto now = all += bytes - held_bytes_;
+    const bool fits = now <= kUploadsAtATime * hub_.options().max_upload_bytes || bytes <= held_bytes_;
+    if (!fits) all -= bytes - held_bytes_;
+    if (fits) held_bytes_ = bytes;
+    return fits;
+  }
+
+ private:
+  static constexpr std::uint64_t kUploadsAtATime = 2;
+  Hub& hub_;
+  std::uint64_t held_bytes_ = 0;
+};
+
 class HttpSession : public Connection, public std::enable_shared_from_this<HttpSession> {
  public:
   HttpSession(Stream stream, std::shared_ptr<Hub> hub, ConnectionSlot slot)
@@ -51,6 +76,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
         hub_(std::move(hub)),
         slot_(std::move(slot)),
         buffer_(kBufferLimit),
+        room_(*hub_),
         stall_(stream_.get_executor()) {}
 
   void start() {
@@ -88,6 +114,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   beast::flat_buffer buffer_;
   std::optional<Parser> parser_;
   HttpRequest request_;
+  UploadRoom room_;
   bool head_ = false, keep_alive_ = false, idle_ = false;
   bool asked_ = false;  ///< the engine, which takes its time
   asio::steady_timer stall_;
@@ -207,6 +234,8 @@ void HttpSession::onBody(BoostError error) {
   if (error == http::error::body_limit)
     return send(errorResponse(413, "tooLarge", "the body is larger than this path accepts (--max-upload)"), true);
   if (error) return stream_.close();
+  if (!room_.hold(parser_->get().body().size()))
+    return send(errorResponse({ErrorCode::kBusy, "other uploads take all the room there is; try again", {}}), true);
   if (parser_->is_done()) return onWhole();
   stream_.expires_after(hub_->options().idle_timeout);
   http::async_read_some(stream_, buffer_, *parser_, [self = shared_from_this()](BoostError e, std::size_t n) {
@@ -228,6 +257,7 @@ void HttpSession::onWhole() {
 
 void HttpSession::send(HttpResponse response, bool close) {
   asked_ = false;
+  (void)room_.hold(0);
   response_ = std::move(response);
   const auto kind = static_cast<std::size_t>(response_.status / 100);
   ++hub_->counters().http_responses.at(std::min<std::size_t>(kind, 5));
@@ -277,20 +307,25 @@ void HttpSession::onWritten() {
   message_.reset();
   response_ = {};
   if (keep) return readHeader();
-  BoostError ignored;
-  stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
-  linger();
+  stream_.expires_after(hub_->options().close_patience);
+  stream_.endSending(AnyHandler([self = shared_from_this()](BoostError) {
+    BoostError ignored;
+    self->stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
+    self->linger();
+  }));
 }
 
-/// Closing with unread bytes would reset the connection and take the response away from the client.
+/// Closing with unread bytes would reset the connection and take the response away from the client. What comes is
+/// dropped as it is, deciphered or not.
 void HttpSession::linger() {
   if (lingered_ == 0) stream_.expires_after(hub_->options().close_patience);
   buffer_.clear();
-  stream_.async_read_some(buffer_.prepare(kBufferLimit), [self = shared_from_this()](BoostError error, std::size_t n) {
-    self->lingered_ += n;
-    if (error || self->lingered_ > kLingerBytes) return self->stream_.close();
-    self->linger();
-  });
+  stream_.next_layer().async_read_some(buffer_.prepare(kBufferLimit),
+                                       [self = shared_from_this()](BoostError error, std::size_t n) {
+                                         self->lingered_ += n;
+                                         if (error || self->lingered_ > kLingerBytes) return self->stream_.close();
+                                         self->linger();
+                                       });
 }
 
 /// While the server drains: a peer that neither sends nor takes anything is not waited for.

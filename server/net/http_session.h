@@ -1,11 +1,11 @@
-// One TCP connection speaking HTTP/1.1: limits and timeouts, then the routes; hands over to a WebSocketSession on an
+// One connection speaking HTTP/1.1: limits and timeouts, then the routes; hands over to a WebSocketSession on an
 // upgrade. Owns itself (shared_ptr in its handlers); runs on its own strand.
 #pragma once
 
 #include <memory>
 
-#include "server/net/beast.h"
 #include "server/net/hub.h"
+#include "server/net/stream.h"
 
 namespace radiosity::net {
 

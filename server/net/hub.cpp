@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/log.h"
+#include "common/sha256.h"
 #include "server/net/convert.h"
 
 namespace radiosity::net {
@@ -23,7 +25,7 @@ SharedText shared(std::string text) { return std::make_shared<const std::string>
 Hub::Hub(const ServerOptions& options, engine::Engine& engine)
     : options_(options),
       engine_(engine),
-      epoch_(randomHex(8)),
+      epoch_(engine.past().epoch.empty() ? randomHex(8) : engine.past().epoch),
       uploads_(kUploadsKept, options.max_upload_bytes, BlobStore::Naming::kByContent),
       snapshots_(kSnapshotsKept, kSnapshotBytes, BlobStore::Naming::kAtRandom) {}
 
@@ -33,8 +35,35 @@ void Hub::start() {
     const std::lock_guard lock(mutex_);
     revision_ = history_from_ = status.revision;
     last_state_ = status.state;
+    bringBack(engine_.past());
+  }
+  if (options_.uploads) {
+    for (auto& upload : options_.uploads->list()) uploads_.expect(std::move(upload.id), std::move(upload.name));
   }
   engine_.addListener(weak_from_this());
+}
+
+/// What an earlier process was told and has answered.
+void Hub::bringBack(const engine::Past& past) {
+  if (past.epoch.empty()) return;
+  first_tile_version_ = past.first_tile_version;
+  if (revision_ > 0) history_from_ = past.patches_from;
+  for (const auto& [revision, patch, by] : past.patches) {
+    if (patch.size() > protocol::kMaxMessageBytes - kNoteRoomBytes) {  // no message could tell it: fetch the scene
+      history_.clear();
+      history_bytes_ = 0;
+      history_from_ = revision;
+      continue;
+    }
+    addToHistory(revision, shared(protocol::encodeNotification(protocol::ScenePatched{revision, patch, by})));
+  }
+  for (const auto& [receipt, outcome] : past.answers) {
+    remembered_[receipt.request_id] = {
+        receipt.fingerprint,
+        protocol::SceneStepReply{outcome.revision, outcome.affected_surfaces, outcome.affected_shots, outcome.stepped},
+        {}};
+    remembered_order_.push_back(receipt.request_id);
+  }
 }
 
 std::uint64_t Hub::revision() const {
@@ -192,8 +221,10 @@ void Hub::drain() {
 // ---- patches ----
 
 std::optional<std::vector<SharedText>> Hub::missedSince(const protocol::Resume& resume) const {
-  const bool old_layout = resume.tile_version < engine_.status().layout_since;
+  const auto layout_since = engine_.status().layout_since;
   const std::lock_guard lock(mutex_);
+  // Tiles of an earlier process are all sent anew, in a layout of another number.
+  const bool old_layout = resume.tile_version > first_tile_version_ && resume.tile_version < layout_since;
   if (resume.epoch != epoch_ || resume.revision > revision_ || resume.revision < history_from_) return std::nullopt;
   if (old_layout) return std::nullopt;
   std::vector<SharedText> missed;
@@ -202,10 +233,10 @@ std::optional<std::vector<SharedText>> Hub::missedSince(const protocol::Resume& 
   return missed;
 }
 
-void Hub::askOnce(const std::string& request_id, const std::string& request, EditAnswer done,
+void Hub::askOnce(const engine::Receipt& receipt, const std::string& by, EditAnswer done,
                   const std::function<void(engine::Engine::Callback<engine::PatchOutcome>)>& ask) {
+  const auto& [request_id, fingerprint] = receipt;
   if (!request_id.empty()) {
-    const auto fingerprint = std::hash<std::string>()(request);
     const std::lock_guard lock(mutex_);
     const auto [found, inserted] = remembered_.try_emplace(request_id);
     auto& known = found->second;
@@ -216,40 +247,77 @@ void Hub::askOnce(const std::string& request_id, const std::string& request, Edi
     if (known.answer) return done(*known.answer);
     known.waiting.push_back(std::move(done));
     if (!inserted) return;
-    done = [this, request_id](const auto& answer) { remember(request_id, answer); };
+    done = [this, request_id = receipt.request_id](const auto& answer) { remember(request_id, answer); };
   }
-  ask(fromEngine<engine::PatchOutcome>([this, done](const Result<engine::PatchOutcome>& outcome) {
-    if (outcome) {
-      sawRevision(outcome->revision);
-      return done(protocol::SceneStepReply{outcome->revision, outcome->affected_surfaces, outcome->affected_shots,
-                                           outcome->stepped});
-    }
-    auto error = protocol::toRpcError(outcome.error());
-    error.revision = revision();
-    done(tl::unexpected(std::move(error)));
-  }));
+  ask(fromEngine<engine::PatchOutcome>(
+      [this, done, request_id = receipt.request_id, by](const Result<engine::PatchOutcome>& outcome) {
+        if (outcome) {
+          sawRevision(outcome->revision);
+          const LogScope about({.revision = outcome->revision, .request_id = request_id});
+          log::info("edit by {}: {} surfaces, {} shots to do again", by, outcome->affected_surfaces,
+                    outcome->affected_shots);
+          return done(protocol::SceneStepReply{outcome->revision, outcome->affected_surfaces, outcome->affected_shots,
+                                               outcome->stepped});
+        }
+        const LogScope about({.revision = revision(), .request_id = request_id});
+        log::info("edit by {} refused: {}", by, outcome.error().text());
+        auto error = protocol::toRpcError(outcome.error());
+        error.revision = revision();
+        done(tl::unexpected(std::move(error)));
+      }));
 }
 
-SharedBytes Hub::upload(const std::string& uri) const {
+void Hub::keepUpload(const std::string& name, const SharedBytes& bytes,
+                     std::function<void(const Result<std::string>&)> done) {
+  auto put = uploads_.put(name, bytes);
+  if (!options_.uploads) return done(std::move(put.id));
+  const auto heard = [self = shared_from_this(), id = put.id, done = std::move(done)](const Result<void>& kept) {
+    self->enter([&] {
+      if (kept) return done(id);
+      log::error("an upload is refused, it cannot be kept: {}", kept.error().text());
+      self->uploads_.drop(id);
+      done(tl::unexpected(kept.error()));
+    });
+  };
+  options_.uploads->keep({put.id, name}, bytes, std::move(put.dropped), heard);
+}
+
+std::optional<BlobStore::Blob> Hub::findUpload(std::string_view id) {
+  auto blob = uploads_.find(id);
+  if (!blob || blob->bytes || !options_.uploads) return blob;
+  auto bytes = options_.uploads->read(blob->id);
+  if (!bytes) {
+    log::error("{}", bytes.error().text());
+    uploads_.drop(id);
+    return std::nullopt;
+  }
+  blob->bytes = std::move(*bytes);
+  (void)uploads_.put(blob->name, blob->bytes);
+  return blob;
+}
+
+SharedBytes Hub::upload(const std::string& uri) {
   constexpr std::string_view kUpload = "/uploads/";
   if (!uri.starts_with(kUpload)) return nullptr;
-  const auto blob = uploads_.find(std::string_view(uri).substr(kUpload.size()));
+  const auto blob = findUpload(std::string_view(uri).substr(kUpload.size()));
   return blob ? blob->bytes : nullptr;
 }
 
 void Hub::patch(const protocol::ScenePatchCall& call, const std::string& by, EditAnswer done) {
-  engine::PatchRequest request{call.patch, call.base_revision, call.dry_run, by, {}};
+  const auto text = fmt::format("{}|{}|{}", call.base_revision.value_or(0), call.dry_run, call.patch);
+  const engine::Receipt receipt{call.request_id, call.request_id.empty() ? 0 : fingerprintOf(text)};
+  engine::PatchRequest request{call.patch, call.base_revision, call.dry_run, by, {}, receipt};
   request.find_upload = [self = shared_from_this()](const std::string& uri) { return self->upload(uri); };
-  askOnce(call.request_id, fmt::format("{}|{}|{}", call.base_revision.value_or(0), call.dry_run, call.patch),
-          std::move(done), [&](auto heard) { engine_.patch(std::move(request), std::move(heard)); });
+  askOnce(receipt, by, std::move(done), [&](auto heard) { engine_.patch(std::move(request), std::move(heard)); });
 }
 
 void Hub::step(bool redo, std::optional<std::uint64_t> base_revision, const std::string& request_id,
                const std::string& by, EditAnswer done) {
-  askOnce(request_id, fmt::format("{}|{}", base_revision.value_or(0), redo ? "redo" : "undo"), std::move(done),
-          [&](auto heard) {
-            engine_.step({redo, base_revision, by}, std::move(heard));
-          });
+  const auto text = fmt::format("{}|{}", base_revision.value_or(0), redo ? "redo" : "undo");
+  const engine::Receipt receipt{request_id, request_id.empty() ? 0 : fingerprintOf(text)};
+  askOnce(receipt, by, std::move(done), [&](auto heard) {
+    engine_.step({redo, base_revision, by, receipt}, std::move(heard));
+  });
 }
 
 void Hub::remember(const std::string& request_id, const EditResult& answer) {
@@ -362,17 +430,21 @@ void Hub::onScenePatched(std::uint64_t revision, const std::string& patch, const
   {
     const std::lock_guard lock(mutex_);
     revision_ = std::max(revision_, revision);
-    history_.push_back({revision, text});
-    history_bytes_ += text->size();
-    while (history_.size() > kHistoryPatches || history_bytes_ > kHistoryBytes) {
-      history_from_ = history_.front().revision;
-      history_bytes_ -= history_.front().text->size();
-      history_.pop_front();
-    }
+    addToHistory(revision, text);
   }
   enter([&] {
     for (const auto& viewer : viewers()) viewer->sendText(text);
   });
+}
+
+void Hub::addToHistory(std::uint64_t revision, const SharedText& text) {
+  history_.push_back({revision, text});
+  history_bytes_ += text->size();
+  while (history_.size() > kHistoryPatches || history_bytes_ > kHistoryBytes) {
+    history_from_ = history_.front().revision;
+    history_bytes_ -= history_.front().text->size();
+    history_.pop_front();
+  }
 }
 
 void Hub::onSceneLoaded(std::uint64_t revision) {
@@ -384,6 +456,11 @@ void Hub::onSceneLoaded(std::uint64_t revision) {
     history_from_ = revision;
   }
   enter([&] { broadcast(protocol::SceneLoaded{revision}); });
+}
+
+void Hub::onNotice(const engine::Notice& notice) {
+  const bool replaced = notice.kind == engine::Notice::Kind::kRendererReplaced;
+  enter([&] { broadcast(protocol::ServerNote{replaced ? "rendererReplaced" : "solveRestarted", notice.text}); });
 }
 
 void Hub::onLightmaps(const std::shared_ptr<const engine::Lightmaps>& lightmaps) {

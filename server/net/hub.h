@@ -92,7 +92,11 @@ class Hub : public engine::Listener, public std::enable_shared_from_this<Hub> {
   /// The waiter's time is up: answers it as not reached.
   void giveUp(std::uint64_t waiter);
 
-  BlobStore& uploads() { return uploads_; }
+  /// `done` is called once the upload is kept (on the disk, where the server has state) with its id, or why not.
+  void keepUpload(const std::string& name, const SharedBytes& bytes,
+                  std::function<void(const Result<std::string>&)> done);
+  /// With its bytes; blocks while they come from the disk, the first time after a restart.
+  [[nodiscard]] std::optional<BlobStore::Blob> findUpload(std::string_view id);
   BlobStore& snapshots() { return snapshots_; }
   TileCache& tiles() { return tiles_; }
   CameraBoard& cameras() { return cameras_; }
@@ -118,6 +122,7 @@ class Hub : public engine::Listener, public std::enable_shared_from_this<Hub> {
   void onScenePatched(std::uint64_t revision, const std::string& patch, const std::string& by) override;
   void onSceneLoaded(std::uint64_t revision) override;
   void onLightmaps(const std::shared_ptr<const engine::Lightmaps>& lightmaps) override;
+  void onNotice(const engine::Notice& notice) override;
 
  private:
   struct Waiter {
@@ -127,7 +132,7 @@ class Hub : public engine::Listener, public std::enable_shared_from_this<Hub> {
     WaitAnswer done;
   };
   struct Remembered {
-    std::size_t fingerprint = 0;
+    std::uint64_t fingerprint = 0;
     std::optional<EditResult> answer;
     std::vector<EditAnswer> waiting;
   };
@@ -140,10 +145,12 @@ class Hub : public engine::Listener, public std::enable_shared_from_this<Hub> {
   [[nodiscard]] std::vector<std::shared_ptr<Viewer>> viewers() const;
   void broadcast(const protocol::Notification& notification);
   /// Calls `ask` with what is to hear the engine's outcome, unless the request was made before.
-  void askOnce(const std::string& request_id, const std::string& request, EditAnswer done,
+  void askOnce(const engine::Receipt& receipt, const std::string& by, EditAnswer done,
                const std::function<void(engine::Engine::Callback<engine::PatchOutcome>)>& ask);
   void remember(const std::string& request_id, const EditResult& answer);
-  [[nodiscard]] SharedBytes upload(const std::string& uri) const;
+  void bringBack(const engine::Past& past);
+  void addToHistory(std::uint64_t revision, const SharedText& text);
+  [[nodiscard]] SharedBytes upload(const std::string& uri);
   [[nodiscard]] static std::optional<bool> reached(const Waiter& waiter, const engine::Status& status);
 
   ServerOptions options_;
@@ -165,7 +172,8 @@ class Hub : public engine::Listener, public std::enable_shared_from_this<Hub> {
   std::uint64_t revision_ = 0;
   std::deque<PastPatch> history_;
   std::size_t history_bytes_ = 0;
-  std::uint64_t history_from_ = 0;  ///< a client at this revision or later can resume
+  std::uint64_t history_from_ = 0;        ///< a client at this revision or later can resume
+  std::uint64_t first_tile_version_ = 0;  ///< older ones are an earlier process's
   std::map<std::string, Remembered> remembered_;
   std::deque<std::string> remembered_order_;
   std::vector<Waiter> waiters_;

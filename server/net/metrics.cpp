@@ -36,10 +36,14 @@ class Text {
   std::string out_;
 };
 
-/// A counter's name as a metric's: what is not allowed becomes '_'.
+/// A counter's name as a metric's: "skip.tilesUnchanged" becomes "solver_skip_tiles_unchanged".
 std::string metricName(std::string_view key) {
   std::string name = "solver_";
-  for (const char c : key) name += std::isalnum(static_cast<unsigned char>(c)) != 0 ? c : '_';
+  for (const char c : key) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (std::isupper(byte) != 0 && name.back() != '_') name += '_';
+    name += std::isalnum(byte) != 0 ? static_cast<char>(std::tolower(byte)) : '_';
+  }
   return name;
 }
 
@@ -65,6 +69,10 @@ void solveMetrics(Text& text, const engine::Status& status) {
   text.sample("energy_lumens", status.energy.backface, "{part=\"backface\"}");
   text.sample("energy_lumens", status.energy.unshot, "{part=\"unshot\"}");
   text.sample("energy_lumens", status.energy.imbalance, "{part=\"imbalance\"}");
+  text.counter("renderers_replaced_total", "Renderer processes that died or hung and were replaced.",
+               status.renderers_replaced);
+  text.counter("solve_restarts_total", "Solves that started over since no renderer was left.", status.solve_restarts);
+  text.gauge("renderer_lost", "1 while nothing can be drawn.", status.renderer_lost ? 1 : 0);
   text.gauge("patches", "Leaf patches with area.", status.patches);
   text.gauge("surfaces", "Charts.", status.surfaces);
   text.gauge("polygons", "Coplanar facets.", status.polygons);
@@ -76,10 +84,17 @@ void networkMetrics(Text& text, Hub& hub) {
   text.gauge("connections", "Open TCP connections.", c.connections.load());
   text.gauge("viewers", "WebSocket sessions that said hello.", hub.viewerCount());
   text.gauge("draining", "1 while shutting down.", hub.draining() ? 1 : 0);
-  text.counter("connections_refused_total", "Connections over the limit.", c.connections_refused.load());
+  text.counter("connections_refused_total", "Connections over a limit.", c.connections_refused.load());
+  if (const auto end = c.certificate_expires_at_s.load(); end != 0) {
+    text.gauge("tls_certificate_expiry_timestamp_seconds", "When the certificate expires, Unix time.", end);
+    text.gauge("tls_handshakes", "TLS handshakes under way.", c.tls_handshakes.load());
+    text.counter("tls_handshakes_failed_total", "TLS handshakes that failed, were cut off, or were plain HTTP.",
+                 c.tls_handshakes_failed.load());
+  }
   text.family("http_responses_total", "counter", "HTTP responses by class of status.");
   for (std::size_t i = 1; i < c.http_responses.size(); ++i)
     text.sample("http_responses_total", c.http_responses[i].load(), fmt::format("{{code=\"{}xx\"}}", i));
+  text.gauge("uploads_held_bytes", "Bodies that are coming or being worked on.", c.uploads_held_bytes.load());
   text.counter("upload_bytes_total", "Bytes of uploaded bodies.", c.upload_bytes.load());
   text.counter("calls_total", "JSON-RPC calls.", c.calls.load());
   text.counter("calls_failed_total", "JSON-RPC calls answered with an error.", c.calls_failed.load());
@@ -101,6 +116,8 @@ std::string metricsText(Hub& hub) {
   text.family("build_info", "gauge", "Always 1.");
   text.sample("build_info", 1, fmt::format("{{version=\"{}\"}}", hub.options().version));
   solveMetrics(text, hub.engine().status());
+  text.gauge("solve_thread_busy_seconds", "How long the solve thread has been at its present slice or command.",
+             hub.engine().busySeconds());
   networkMetrics(text, hub);
   return text.take();
 }

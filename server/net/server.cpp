@@ -2,11 +2,14 @@
 
 #include <fmt/format.h>
 #include <pthread.h>
+#include <atomic>
 #include <boost/asio/post.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <cerrno>
 #include <chrono>
+#include <functional>
+#include <new>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -14,8 +17,10 @@
 #include "common/log.h"
 #include "server/net/access.h"
 #include "server/net/beast.h"
+#include "server/net/convert.h"
 #include "server/net/http_session.h"
 #include "server/net/hub.h"
+#include "server/net/tls_handshake.h"
 
 namespace radiosity::net {
 
@@ -37,7 +42,9 @@ class Server::State {
   State& operator=(const State&) = delete;
 
   Result<void> open();
+  Result<void> loadCertificate();
   void accept();
+  void serve(TcpStream stream, ConnectionSlot slot);
   void watchSignals();
   void drain();
   void run();
@@ -46,6 +53,8 @@ class Server::State {
   friend class Server;
 
   void waitForLast();
+  void beat();
+  void serveEvents();
 
   std::shared_ptr<Hub> hub_;
   asio::io_context context_;
@@ -53,7 +62,12 @@ class Server::State {
   asio::basic_socket_acceptor<tcp, Strand> acceptor_;
   asio::basic_signal_set<Strand> signals_;
   asio::basic_waitable_timer<Clock, asio::wait_traits<Clock>, Strand> drain_timer_, retry_timer_;
+  std::shared_ptr<TlsContext> tls_;  ///< null: plain; on the strand
+  asio::basic_waitable_timer<Clock, asio::wait_traits<Clock>, Strand> beat_timer_{strand_};
+  std::atomic<Clock::rep> last_beat_{Clock::now().time_since_epoch().count()};
+  std::function<void()> drain_hook_;
   bool signalled_ = false;
+  std::atomic<bool> in_hurry_{false};
   Clock::time_point drain_until_;
   std::uint16_t port_ = 0;
 };
@@ -61,6 +75,7 @@ class Server::State {
 Result<void> Server::State::open() {
   const auto& options = hub_->options();
   if (auto safe = checkExposure(options); !safe) return safe;
+  if (auto loaded = loadCertificate(); !loaded) return loaded;
   const tcp::endpoint endpoint(asio::ip::make_address(options.address), options.port);
   BoostError error;
   acceptor_.open(endpoint.protocol(), error);
@@ -75,6 +90,24 @@ Result<void> Server::State::open() {
               fmt::format("cannot listen on {}:{}", options.address, options.port));
 }
 
+/// Both or neither of the options; connections that stand keep the certificate they began with.
+Result<void> Server::State::loadCertificate() {
+  const auto& options = hub_->options();
+  if (options.tls_certificate.empty() && options.tls_key.empty()) return {};
+  if (options.tls_certificate.empty() || options.tls_key.empty())
+    return fail(ErrorCode::kBadUsage, "--tls-cert and --tls-key belong together");
+  auto tls = loadTls(options.tls_certificate, options.tls_key);
+  if (!tls) return tl::unexpected(std::move(tls.error()));
+  tls_ = std::move(*tls);
+  hub_->counters().certificate_expires_at_s = tls_->expires_at_s;
+  return {};
+}
+
+void Server::State::serve(TcpStream stream, ConnectionSlot slot) {
+  if (tls_) return serveTls(std::move(stream), tls_, hub_, std::move(slot));
+  serveHttp(Stream(std::move(stream)), hub_, std::move(slot));
+}
+
 void Server::State::accept() {
   acceptor_.async_accept(asio::make_strand(context_), [this](BoostError error, auto socket) {
     if (error == asio::error::operation_aborted) return;
@@ -84,7 +117,7 @@ void Server::State::accept() {
       BoostError ignored;
       socket.set_option(tcp::no_delay(true), ignored);
       if (hub_->counters().connections.load() <= hub_->options().max_clients) {
-        serveHttp(Stream(std::move(socket)), hub_, slot);
+        serve(TcpStream(std::move(socket)), slot);
       } else {
         // A short answer that fits the socket's buffer: no session is spent on it.
         static constexpr std::string_view kFull =
@@ -107,7 +140,15 @@ void Server::State::accept() {
 void Server::State::watchSignals() {
   signals_.async_wait([this](BoostError error, int number) {
     if (error) return;
-    if (std::exchange(signalled_, true)) return context_.stop();
+    if (number == SIGHUP) {
+      const auto loaded = loadCertificate();
+      loaded ? log::info("certificate read again") : log::error("the old certificate stays: {}", loaded.error().text());
+      return watchSignals();
+    }
+    if (std::exchange(signalled_, true)) {
+      in_hurry_ = true;
+      return context_.stop();
+    }
     log::info("signal {}: draining", number);
     drain();
     watchSignals();
@@ -120,9 +161,20 @@ void Server::State::drain() {
     BoostError ignored;
     acceptor_.close(ignored);
     retry_timer_.cancel();
+    beat_timer_.cancel();
+    if (drain_hook_) drain_hook_();
     drain_until_ = Clock::now() + hub_->options().drain_grace;
     hub_->drain();
     waitForLast();
+  });
+}
+
+/// Every thread of ours takes its turn at what is due, so that this comes late only where all of them hang.
+void Server::State::beat() {
+  last_beat_ = Clock::now().time_since_epoch().count();
+  beat_timer_.expires_after(std::chrono::seconds(1));
+  beat_timer_.async_wait([this](BoostError error) {
+    if (!error) beat();
   });
 }
 
@@ -134,17 +186,31 @@ void Server::State::waitForLast() {
   });
 }
 
+/// Until the end. Memory that runs out in the middle of an upload or an answer takes that connection with it, which
+/// goes with its handler, and no other.
+void Server::State::serveEvents() {
+  while (!context_.stopped()) {
+    try {
+      context_.run();
+    } catch (const std::bad_alloc&) {
+      log::error("out of memory: a connection was dropped");
+    }
+  }
+}
+
 void Server::State::run() {
   hub_->start();
   asio::post(strand_, [this] {
-    if (acceptor_.is_open()) accept();
+    if (!acceptor_.is_open()) return;
+    accept();
+    beat();
   });
   std::vector<std::thread> helpers;
   for (int i = 1; i < hub_->options().threads; ++i) {
-    helpers.emplace_back([this] { context_.run(); });
+    helpers.emplace_back([this] { serveEvents(); });
     (void)pthread_setname_np(helpers.back().native_handle(), "net");  // for top -H, and what the benchmarks count
   }
-  context_.run();
+  serveEvents();
   for (auto& helper : helpers) helper.join();
 }
 
@@ -161,18 +227,34 @@ std::uint16_t Server::port() const { return state_->port_; }
 
 std::string Server::url() const {
   const auto& address = state_->hub_->options().address;
+  const auto* scheme = state_->hub_->options().tls_certificate.empty() ? "http" : "https";
   const bool six = address.find(':') != std::string::npos;
-  return six ? fmt::format("http://[{}]:{}", address, state_->port_)
-             : fmt::format("http://{}:{}", address, state_->port_);
+  return six ? fmt::format("{}://[{}]:{}", scheme, address, state_->port_)
+             : fmt::format("{}://{}:{}", scheme, address, state_->port_);
 }
 
 void Server::drainOnSignals() {
   state_->signals_.add(SIGINT);
   state_->signals_.add(SIGTERM);
+  if (!state_->hub_->options().tls_certificate.empty()) state_->signals_.add(SIGHUP);
   state_->watchSignals();
 }
 
+void Server::onDrain(std::function<void()> hook) { state_->drain_hook_ = std::move(hook); }
+
+double Server::silentSeconds() const {
+  const Clock::duration since(Clock::now().time_since_epoch().count() - state_->last_beat_);
+  return std::chrono::duration<double>(since).count();
+}
+
+std::string Server::statusLine() const {
+  const auto status = state_->hub_->engine().status();
+  return fmt::format("{}, revision {}, error {:.2g} %, {} viewers", stateName(status.state), status.revision,
+                     100.0 * status.error.total, state_->hub_->viewerCount());
+}
+
 void Server::run() { state_->run(); }
+bool Server::inHurry() const { return state_->in_hurry_; }
 void Server::drain() { state_->drain(); }
 
 }  // namespace radiosity::net

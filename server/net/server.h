@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -21,12 +22,20 @@ class Server {
   Server& operator=(const Server&) = delete;
 
   [[nodiscard]] std::uint16_t port() const;  ///< the real one, also where 0 was asked for
-  [[nodiscard]] std::string url() const;     ///< "http://127.0.0.1:8765"
+  [[nodiscard]] std::string url() const;     ///< "http://127.0.0.1:8765", with TLS "https://..."
 
-  /// SIGINT and SIGTERM drain; a second one stops at once. Before run().
+  /// SIGINT and SIGTERM drain; a second one stops at once. SIGHUP reads the certificate again. Before run().
   void drainOnSignals();
+  /// Called once when the server begins to drain, on one of its threads. Before run().
+  void onDrain(std::function<void()> hook);
+  /// How long ago the event loop last came round; it does so every second. Any thread.
+  [[nodiscard]] double silentSeconds() const;
+  /// "solving, revision 3, error 4.1 %, 2 viewers". Any thread.
+  [[nodiscard]] std::string statusLine() const;
   /// Serves with options.threads threads, the caller's among them; returns when drained.
   void run();
+  /// A second signal came: whoever sent it does not want to wait for anything.
+  [[nodiscard]] bool inHurry() const;
   /// Tells clients, finishes what was begun, closes; cuts off what is left after options.drain_grace. Any thread.
   void drain();
 

@@ -6,10 +6,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "protocol/limits.h"
+#include "server/state/uploads.h"
 
 namespace radiosity::net {
 
@@ -18,13 +20,17 @@ struct ServerOptions {
   std::uint16_t port = 8765;               ///< 0: any free one
   std::string token;                       ///< empty: none needed
   bool insecure = false;                   ///< allow another than a loopback address without a token
+  std::filesystem::path tls_certificate;   ///< PEM; with it and the key only TLS is spoken
+  std::filesystem::path tls_key;           ///< PEM, not encrypted
   std::vector<std::string> allow_origins;  ///< "https://viewer.example.org", beside the server's own
   std::filesystem::path scene_root;        ///< empty: no server-side files
   std::size_t max_upload_bytes = protocol::kMaxUploadBytes;
   std::size_t max_clients = protocol::kMaxClients;
   int threads = 2;
   std::string version = "0.0.0";
+  std::shared_ptr<state::Uploads> uploads;  ///< null: uploads do not outlive the server
 
+  std::chrono::milliseconds handshake_timeout{10'000};  ///< of TLS, from the first byte to the last
   std::chrono::milliseconds hello_timeout{protocol::kHelloTimeoutMs};
   std::chrono::milliseconds write_deadline{protocol::kWriteDeadlineMs};
   std::chrono::milliseconds close_patience{2'000};   ///< for the closing handshake, then the socket is cut

@@ -4,7 +4,6 @@
 
 #include <memory>
 
-#include "server/net/beast.h"
 #include "server/net/http_session.h"
 #include "server/net/hub.h"
 

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "common/archive.h"
 #include "server/solver/side.h"
 #include "server/solver/transport.h"
 
@@ -74,6 +75,10 @@ class LinkColumn {
   /// Sums over leaves of area times the product of two columns' links.
   [[nodiscard]] static double product(const LinkColumn& a, const LinkColumn& b, std::span<const float> leaf_area);
 
+  void save(ArchiveWriter& to) const { visit(to, *this); }
+  /// False: it is not of a scene with so many sides and leaf values.
+  [[nodiscard]] bool restore(ArchiveReader& from, std::size_t sides, std::size_t values);
+
   static constexpr std::size_t kLeafBytes = sizeof(std::uint16_t);
   /// Consecutive sides, with all their leaves. Small sides between others are kept though nothing reaches them: their
   /// zeros take less than a run of their own.
@@ -83,6 +88,11 @@ class LinkColumn {
   [[nodiscard]] std::span<const Run> runs() const { return runs_; }
 
  private:
+  template <typename Archive, typename Self>
+  static void visit(Archive& archive, Self& self) {
+    archive(self.runs_, self.scale_, self.gain_, self.code_, self.samples_, self.points_, self.due_, self.escaped_,
+            self.absorbed_);
+  }
   void makeRoom(std::span<const std::uint32_t> reached, const std::vector<Side>& sides);
   void grow(const LinkExpander& sample, const std::vector<Side>& sides);
   void keepFlux(std::span<const float> leaf_area);

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "common/archive.h"
 #include "server/solver/lights.h"
 #include "server/solver/link_system.h"
 #include "server/solver/side.h"
@@ -45,6 +46,12 @@ class LinkMemory {
   void forgive() { full_ = false; }
   /// A sample was refused since begin().
   [[nodiscard]] bool lacksSamples() const { return lacks_samples_; }
+
+  /// Between two plans.
+  template <typename Archive, typename Self>
+  static void visit(Archive& archive, Self& self) {
+    archive(self.full_, self.lacks_samples_);
+  }
 
  private:
   template <typename Sees>

@@ -73,6 +73,12 @@ class LinkPlanner {
 
   [[nodiscard]] const PlannerCounters& counters() const { return counters_; }
 
+  /// What its choices depend on, beside the system and the settings.
+  template <typename Archive, typename Self>
+  static void visit(Archive& archive, Self& self) {
+    archive(self.counters_, self.share_, self.left_out_);
+  }
+
  private:
   struct Node {
     double power = 0.0, net = 0.0;

@@ -93,6 +93,10 @@ class LinkSystem {
   /// Rows of the equation in each half, and how many a node of the side has.
   [[nodiscard]] std::size_t rowCount() const { return halves_[0].matrix.size(); }
   [[nodiscard]] std::size_t rowsOf(std::uint32_t side) const { return uniform_[side] ? 1 : 3; }
+  /// Between two solutions. The matrix is not saved: begin() makes it again from the links, with the same bits.
+  void save(ArchiveWriter& to) const;
+  /// Takes the place of all that is there. False: it is of another scene.
+  [[nodiscard]] bool restore(ArchiveReader& from);
   /// Radiosity that stands for each leaf of a side: that of the deepest shooter above it, mean of the halves.
   void standIn(std::uint32_t side, std::vector<glm::vec3>& leaves) const;
 
@@ -110,6 +114,8 @@ class LinkSystem {
     double unsolved = 0.0;
     bool done = true;
   };
+  [[nodiscard]] bool isPlace(const NodePlace& place) const;
+  void clear();
   [[nodiscard]] double areaOf(const Shooter& shooter) const;
   void updateMeans();
   void makeRows();

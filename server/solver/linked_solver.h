@@ -45,6 +45,8 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] SolveLimit limit() const override { return limit_; }
   [[nodiscard]] LinkCounters linkCounters() const override;
   [[nodiscard]] bool hasFluxScale() const override { return false; }
+  [[nodiscard]] bool save(ArchiveWriter& to) const override;
+  [[nodiscard]] bool restore(ArchiveReader& from) override;
 
   /// What the links of all lights can come to take.
   [[nodiscard]] std::size_t lightBytes() const;
@@ -61,6 +63,8 @@ class LinkedSolver final : public Solver {
   /// What a solution over nothing but the links is for.
   enum class FromLinks { kNo, kAfterEdit, kToConfirm };
 
+  template <typename Archive, typename Self>
+  static void visit(Archive& archive, Self& self);
   [[nodiscard]] bool isFull() const;
   [[nodiscard]] std::vector<Measurement> plan();
   [[nodiscard]] std::vector<Measurement> planLights();

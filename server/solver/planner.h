@@ -70,6 +70,13 @@ class Planner {
   [[nodiscard]] const PlannerCounters& counters() const { return counters_; }
   [[nodiscard]] PlannerSettings& settings() { return settings_; }
 
+  /// What its choices depend on, beside the state.
+  template <typename Archive, typename Self>
+  static void visit(Archive& archive, Self& self) {
+    archive(self.settings_, self.counters_, self.intended_, self.exhausted_, self.share_, self.wave_,
+            self.shots_planned_, self.gather_rounds_);
+  }
+
  private:
   struct Node {
     double power;

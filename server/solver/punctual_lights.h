@@ -77,6 +77,12 @@ class PunctualLights {
   /// Flux not yet carried, all channels and rounds, in absolute value.
   [[nodiscard]] double owed(std::uint32_t rounds) const;
 
+  /// What was played, and what is still to be.
+  template <typename Archive, typename Self>
+  static void visit(Archive& archive, Self& self) {
+    archive(self.sources_, self.pending_, self.next_);
+  }
+
  private:
   [[nodiscard]] Source makeLight(const scene::PatchScene& patches, const scene::PunctualLight& light) const;
   [[nodiscard]] Source makeDirectional(const glm::dvec3& irradiance, const glm::dvec3& towards) const;

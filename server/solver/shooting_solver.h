@@ -45,11 +45,15 @@ class ShootingSolver final : public Solver {
     return state_.rounds() >= kMaxRounds ? SolveLimit::kRounds : SolveLimit::kNone;
   }
   [[nodiscard]] bool hasFluxScale() const override { return true; }
+  [[nodiscard]] bool save(ArchiveWriter& to) const override;
+  [[nodiscard]] bool restore(ArchiveReader& from) override;
 
  private:
   enum class Phase { kDirect, kIndirect, kDone };
   /// Flux sums have headroom for this many rounds (RadiosityState::chooseFluxScale).
   static constexpr std::uint32_t kMaxRounds = 1024;
+  template <typename Archive, typename Self>
+  static void visit(Archive& archive, Self& self);
   void planDirect();
   [[nodiscard]] bool planIndirect();
   void beginWave(ShotBatch batch, const std::array<double, 3>& emitted_before);

@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "common/archive.h"
 #include "common/result.h"
 #include "server/scene/patch_scene.h"
 #include "server/solver/error_parts.h"
@@ -98,6 +99,13 @@ class Solver {
   /// Flux is kept as integers whose scale was chosen for the light at the start: very different light needs a new
   /// solver.
   [[nodiscard]] virtual bool hasFluxScale() const = 0;
+
+  /// Appends all that it takes to go on later, in the same program, with the same bits. False, and nothing of use
+  /// appended, in the middle of something: after one of the next steps it can. Cost: a copy of all links.
+  [[nodiscard]] virtual bool save(ArchiveWriter& to) const = 0;
+  /// Goes on from what save() wrote. For a new solver, made for the same patches, materials, lights and settings.
+  /// False: it was written for something else, and this solver is good for nothing any more.
+  [[nodiscard]] virtual bool restore(ArchiveReader& from) = 0;
 
   [[nodiscard]] std::uint64_t shots() const {
     const auto& done = transportCounters();

@@ -19,6 +19,7 @@
 #include <span>
 #include <vector>
 
+#include "common/archive.h"
 #include "server/scene/patch_scene.h"
 #include "server/solver/side.h"
 #include "server/solver/transport.h"
@@ -103,6 +104,16 @@ class RadiosityState {
   /// Flux of the gather shots that reached leaves, summed over all rounds.
   [[nodiscard]] const Flux3& gathered() const { return gathered_; }
   [[nodiscard]] const Flux3& scattered() const { return scattered_; }
+
+  /// All but patches and materials.
+  template <typename Archive, typename Self>
+  static void visit(Archive& archive, Self& self) {
+    archive(self.sides_, self.received_, self.shot_, self.shot_level_, self.irradiance_, self.unshot_, self.node_rough_,
+            self.node_flux_, self.escaped_, self.backface_, self.gathered_, self.scattered_, self.flux_scale_,
+            self.rounds_);
+  }
+  /// Whether what visit() read has the sizes that it must.
+  [[nodiscard]] bool isWhole() const;
 
  private:
   void chooseFluxScale(double other_flux);

@@ -215,6 +215,14 @@ class Transport {
   /// wanted for its end. From any thread. A transport whose calls are short need not do anything.
   virtual void interrupt() {}
 
+  /// Renderers that died, hung or lost their context, and were replaced, since the transport was made. For the thread
+  /// that uses it.
+  struct Losses {
+    std::uint64_t count = 0;
+    std::string last;  ///< why
+  };
+  [[nodiscard]] virtual Losses losses() const { return {}; }
+
   /// "llvmpipe (LLVM 15.0.6, 256 bits), 2 workers"
   [[nodiscard]] virtual std::string description() const = 0;
 

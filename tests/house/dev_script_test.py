@@ -1,6 +1,7 @@
 """What ./dev does with what is typed, as far as it needs neither a build nor an installation: those are played by
 stand-ins."""
 
+import json
 import os
 import shutil
 import subprocess
@@ -122,7 +123,7 @@ class DevRun(Checkout):
 
 
 class DevLint(Checkout):
-    """`./dev lint` where ninja tells how it was called and has nothing to do, or finds something."""
+    """`./dev lint` where ninja and clang-tidy tell how they were called and have nothing to do, or find something."""
 
     def setUp(self):
         super().setUp()
@@ -133,11 +134,11 @@ class DevLint(Checkout):
             (self.root / rules).write_text("Checks: a")
         self.stand_in("bin/ninja", f'echo "$*" >>{self.root}/calls; echo "$FINDING"; [ -z "$FINDING" ]')
 
-    def lint(self, finding=""):
-        """How it ended, and the calls of ninja."""
+    def lint(self, finding="", options=("--all",)):
+        """How it ended, and the calls of ninja or clang-tidy."""
         (self.root / "calls").write_text("")
         environment = dict(os.environ, PATH=f"{self.root}/bin:{os.environ['PATH']}", FINDING=finding)
-        done = subprocess.run([self.root / "dev", "lint"], capture_output=True, text=True, timeout=60,
+        done = subprocess.run([self.root / "dev", "lint", *options], capture_output=True, text=True, timeout=60,
                               stdin=subprocess.DEVNULL, env=environment)
         return done, (self.root / "calls").read_text().splitlines()
 
@@ -158,6 +159,35 @@ class DevLint(Checkout):
         done, _ = self.lint(finding="room.cpp:3:1: error: unused [check]")
         self.assertEqual(done.returncode, 1)
         self.assertIn("room.cpp:3:1: error: unused [check]", done.stderr)
+
+    def git(self, *arguments):
+        subprocess.run(["git", "-c", "user.name=t", "-c", "user.email=t@t", *arguments], cwd=self.root, check=True,
+                       capture_output=True)
+
+    def test_without_all_only_what_differs_from_main_is_read(self):
+        sources = {"common/a.h": "", "common/a.cpp": '#include "common/a.h"\n', "common/b.cpp": "", "common/c.cpp": ""}
+        (self.root / "common").mkdir()
+        for name, text in sources.items():
+            (self.root / name).write_text(text)
+        commands = [{"file": f"{self.root}/{name}"} for name in sources if name.endswith(".cpp")]
+        (self.root / "build-lint/compile_commands.json").write_text(json.dumps(commands))
+        self.git("init", "-q", "-b", "main")
+        self.git("add", ".")
+        self.git("commit", "-qm", "first")
+        self.stand_in("bin/clang-tidy-14", f'echo "${{@: -1}}" >>{self.root}/calls; echo "$FINDING"; [ -z "$FINDING" ]')
+        done, calls = self.lint(options=())
+        self.assertEqual((done.returncode, calls), (0, []))
+        (self.root / "common/a.h").write_text("// changed")
+        (self.root / "common/b.cpp").write_text("// changed")
+        (self.root / "common/no_target.cpp").write_text("")
+        done, calls = self.lint(options=())
+        self.assertEqual((done.returncode, sorted(calls)), (0, [f"{self.root}/common/a.cpp", f"{self.root}/common/b.cpp"]))
+        done, _ = self.lint(finding="b.cpp:1:1: error: wrong [check]", options=())
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("b.cpp:1:1: error: wrong [check]", done.stdout)
+
+    def test_other_options_are_refused(self):
+        self.assertEqual(self.lint(options=("--al",))[0].returncode, 2)
 
 
 if __name__ == "__main__":

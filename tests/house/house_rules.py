@@ -22,10 +22,10 @@ OWN_INCLUDES = [
     ("server/scene/", ["common/", "server/scene/"]),
     ("server/solver/", ["common/", "server/solver/", r"server/scene/(scene|patch_scene)\.h"]),
     ("server/gpu/", ["common/", "server/gpu/", "server/solver/", r"server/scene/(scene|patch_scene)\.h"]),
-    ("server/engine/", ["common/", "server/engine/", "server/scene/", "server/solver/", "server/gpu/", "server/store/"]),
-    ("server/store/", ["common/", "server/store/"]),
-    ("server/net/", ["common/", "protocol/", "server/net/", r"server/engine/engine\.h"]),
-    (r"server/(main|options)[^/]*$", ["common/", "protocol/", "server/"]),
+    ("server/engine/", ["common/", "server/engine/", "server/scene/", "server/solver/", "server/gpu/", "server/state/"]),
+    ("server/state/", ["common/", "server/state/"]),
+    ("server/net/", ["common/", "protocol/", "server/net/", r"server/engine/engine\.h", r"server/state/uploads\.h"]),
+    (r"server/(main|options|service_notify)[^/]*$", ["common/", "protocol/", "server/"]),
     ("client/lib/", ["common/", "protocol/", "client/lib/"]),
     ("client/cli/", ["common/", "protocol/", "client/lib/", "client/cli/"]),
 ]
@@ -34,6 +34,8 @@ OWN_INCLUDES = [
 LIBRARY_HOMES = [
     (r"(GL|EGL|GLES\d?|KHR|epoxy)/", "OpenGL and EGL headers", ["server/gpu/", "tests/"]),
     (r"boost/", "Boost", ["server/net/", r"server/(main|options)[^/]*$", "client/lib/", "tests/"]),
+    (r"sqlite3", "SQLite", ["server/state/", "tests/"]),
+    (r"openssl/(evp|sha)", "OpenSSL's digests", ["common/"]),
     (r"nlohmann/", "the JSON library", ["protocol/", "server/scene/", "client/cli/", "client/lib/", "tests/"]),
     (r"tiny_gltf", "the glTF reader", ["server/scene/", "tests/"]),
     (r"(gtest|gmock|benchmark|embree\d)/", "test libraries", ["tests/"]),

@@ -53,11 +53,13 @@ class EachRule(unittest.TestCase):
             ("server/net/a.cpp", "server/scene/scene.h"), ("client/lib/a.cpp", "server/scene/scene.h"),
             ("client/lib/a.cpp", "client/cli/solve.h"), ("server/engine/a.cpp", "tests/oracle/oracle.h"),
             ("server/main.cpp", "tests/oracle/oracle.h"), ("server/unruly/a.cpp", "common/result.h"),
-            ("server/solver/a.cpp", "../scene/scene.h"),
+            ("server/solver/a.cpp", "../scene/scene.h"), ("server/state/a.cpp", "server/scene/document.h"),
+            ("server/state/a.cpp", "server/engine/engine.h"), ("server/net/a.cpp", "server/state/store.h"),
         ]:
             self.assertEqual(count(file, header), 1, f"{file} -> {header} must be refused")
         for file, header in [
-            ("common/a.h", "common/result.h"), ("server/solver/a.cpp", "server/scene/patch_scene.h"),
+            ("common/a.h", "common/result.h"), ("server/engine/a.cpp", "server/state/store.h"),
+            ("server/net/a.cpp", "server/state/uploads.h"), ("server/solver/a.cpp", "server/scene/patch_scene.h"),
             ("server/net/a.cpp", "server/engine/engine.h"), ("server/main.cpp", "server/net/listener.h"),
             ("server/options.cpp", "server/engine/engine.h"), ("client/cli/a.cpp", "client/lib/connection.h"),
             ("tests/unit/solver/a_test.cpp", "server/solver/state.h"), ("tests/oracle/a.cpp", "tests/scenes/room.h"),

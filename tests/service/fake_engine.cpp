@@ -156,6 +156,16 @@ void FakeEngine::progress(double error, engine::SolveState state) {
   for (const auto& listener : listeners()) listener->onProgress(now);
 }
 
+void FakeEngine::notice(const engine::Notice& notice) {
+  for (const auto& listener : listeners()) listener->onNotice(notice);
+}
+
+void FakeEngine::loseRenderer(bool lost) {
+  const std::lock_guard lock(mutex_);
+  status_.renderer_lost = lost;
+  status_.failure = lost ? "the driver is gone" : "";
+}
+
 void FakeEngine::holdAnswers() {
   const std::lock_guard lock(mutex_);
   holding_ = true;

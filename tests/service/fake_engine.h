@@ -34,6 +34,9 @@ class FakeEngine : public engine::Engine {
   void release();
   void setSceneText(std::string gltf);
   [[nodiscard]] std::uint64_t patchesSeen() const;
+  void notice(const engine::Notice& notice);
+  void loseRenderer(bool lost);
+  std::atomic<double> busy_seconds{0.0};
   [[nodiscard]] std::string lastLoad() const;  ///< "name: 123 bytes" or "file PATH"
 
   // ---- engine::Engine ----
@@ -47,6 +50,7 @@ class FakeEngine : public engine::Engine {
   void resume(Callback<engine::SolveState> done) override;
   void restart(Callback<engine::SolveState> done) override;
   [[nodiscard]] engine::Status status() const override;
+  [[nodiscard]] double busySeconds() const override { return busy_seconds; }
   using engine::Engine::lightmaps;
   [[nodiscard]] std::shared_ptr<void> watch(engine::Quantity quantity) override;
   [[nodiscard]] std::shared_ptr<const engine::Lightmaps> lightmaps(engine::Quantity quantity) const override;

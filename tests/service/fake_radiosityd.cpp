@@ -19,7 +19,7 @@ void shorten(radiosity::net::ServerOptions& options) {
   if (text == nullptr) return;
   const std::chrono::milliseconds patience(std::strtol(text, nullptr, 10));
   options.hello_timeout = options.write_deadline = options.close_patience = options.header_timeout =
-      options.drain_patience = patience;
+      options.handshake_timeout = options.drain_patience = patience;
   options.drain_grace = std::chrono::minutes(10);
 }
 
@@ -30,7 +30,7 @@ int main(int argc, char** argv) {
   auto parsed = parseOptions(argc, argv, "0.0.0-fake");
   if (parsed.exit_code) return *parsed.exit_code;
   shorten(parsed.options.server);
-  startLog("fake_radiosityd", parsed.options.log_level);
+  startLog("fake_radiosityd", parsed.options.log_level, parsed.options.log_format);
   testing::FakeEngine fake({2, 512, 256, 4});
   fake.configure(parsed.options.solve, [](const auto&) {});
   auto server = net::Server::open(parsed.options.server, fake);

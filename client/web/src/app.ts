@@ -244,6 +244,7 @@ export class App {
       viewers: (note) => this.onViewers(note.count),
       cameras: (note) => this.people.onCameras(note.cameras),
       draining: () => this.frame.toasts.show('The server is stopping'),
+      notice: (note) => this.frame.toasts.show(note.text),
     };
     handlers[method]?.(params);
   }

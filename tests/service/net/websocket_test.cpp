@@ -238,6 +238,9 @@ TEST(Scene, AFileIsLoadedOnlyFromBelowTheSceneRoot) {
   std::ofstream(folder / "outside.glb") << "x";
   std::ofstream(folder / "root" / "sub" / "a.glb") << "x";
   std::filesystem::create_symlink(folder / "outside.glb", folder / "root" / "link.glb");
+  std::filesystem::create_symlink(folder, folder / "root" / "up");
+  std::filesystem::create_directories(folder / "root-beside");
+  std::ofstream(folder / "root-beside" / "b.glb") << "x";
   net::ServerOptions options;
   options.scene_root = folder / "root";
   {
@@ -246,7 +249,9 @@ TEST(Scene, AFileIsLoadedOnlyFromBelowTheSceneRoot) {
     socket.hello();
     EXPECT_EQ(codeOf(socket.call(SceneLoadCall{"file:sub/a.glb"})), 0);
     EXPECT_THAT(server.engine.lastLoad(), HasSubstr("root/sub/a.glb"));
-    for (const auto* name : {"../outside.glb", "link.glb", "sub", "none.glb", "sub/../../outside.glb"})
+    for (const auto* name : {"../outside.glb", "link.glb", "sub", "none.glb", "sub/../../outside.glb", "up/outside.glb",
+                             "../root-beside/b.glb", "%2e%2e/outside.glb", "..%2foutside.glb",
+                             "sub/%2e%2e/%2e%2e/outside.glb", "/etc/passwd", "//etc/passwd", "", ".", "sub/a.glb/"})
       EXPECT_EQ(codeOf(socket.call(SceneLoadCall{std::string("file:") + name})), -32004) << name;
     EXPECT_EQ(codeOf(socket.call(SceneLoadCall{"file:" + (folder / "outside.glb").string()})), -32004);
   }

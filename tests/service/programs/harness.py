@@ -43,7 +43,7 @@ class Server:
                 if not chunk:
                     break
                 text += chunk
-                found = re.search(rb"listening on (http://\S+)", text)
+                found = re.search(rb"listening on (https?://\S+)", text)
                 if found:
                     return found.group(1).decode()
         code = self.kill()

@@ -3,6 +3,7 @@ seconds: what must come is waited for, and a hang is a failure."""
 import json
 import pathlib
 import re
+import resource
 import socket
 import time
 import unittest
@@ -203,6 +204,41 @@ class Abuse(ServiceCase):
         time.sleep(0.3)  # so that a write is stuck
         self.assertEqual(server.terminate(), 0, server.log())
         stalled.reset()
+
+    def test_uploads_share_a_room_that_is_bounded(self):
+        server = self.server(*self.scene, "--max-upload", "1MiB")
+        size = 1 << 20
+
+        def upload(bytes_sent):
+            raw = RawSocket(server.port)
+            self.addCleanup(raw.socket.close)
+            raw.send(b"PUT /uploads HTTP/1.1\r\nHost: localhost\r\nContent-Length: %d\r\n\r\n" % size + bytes(bytes_sent))
+            return raw
+
+        patient = [upload(size - 1) for _ in range(2)]
+        self.eventually(lambda: self.metric(server, "uploads_held_bytes") == 2 * (size - 1))
+        self.assertIn(b"503 Service Unavailable", upload(1000).socket.recv(4096))
+        for raw in patient:  # those who were there first are served
+            raw.send(b"x")
+            self.assertIn(b"201 Created", raw.socket.recv(4096))
+        self.eventually(lambda: self.metric(server, "uploads_held_bytes") == 0)
+        self.assertIn(b"201 Created", upload(size).socket.recv(4096))
+
+    def test_memory_that_runs_out_takes_one_connection_and_no_other(self):
+        server = self.server(*self.scene)
+        status = pathlib.Path(f"/proc/{server.process.pid}/status").read_text()
+        used = int(re.search(r"VmSize:\s+(\d+) kB", status).group(1)) * 1024
+        if used > 1 << 40:
+            self.skipTest("a sanitizer takes all addresses there are, and ends the program instead")
+        viewer = self.viewer(server)
+        limit = used + (256 << 20)
+        resource.prlimit(server.process.pid, resource.RLIMIT_AS, (limit, limit))
+        greedy = RawSocket(server.port)
+        self.addCleanup(greedy.socket.close)
+        greedy.send(b"PUT /uploads HTTP/1.1\r\nHost: localhost\r\nContent-Length: %d\r\n\r\n0123" % (1 << 30))
+        self.assertEqual(greedy.socket.recv(4096), b"")
+        self.versionsSeen(viewer, 3)
+        self.assertIn("out of memory", server.log())
 
     def test_an_upload_that_stalls_does_not_hold_up_the_end(self):
         server = self.server(*self.scene, env=PATIENCE)

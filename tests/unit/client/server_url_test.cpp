@@ -35,12 +35,27 @@ TEST(ServerUrl, refusesWithTheReason) {
        {Case{"", "empty"}, Case{":80", "host is missing"}, Case{"http://", "host is missing"},
         Case{"h:0", "1 to 65535"}, Case{"h:65536", "1 to 65535"}, Case{"h:", "1 to 65535"}, Case{"h:8x", "1 to 65535"},
         Case{"h:-1", "1 to 65535"}, Case{"::1", "brackets"}, Case{"[::1", "missing"}, Case{"[::1]x", "unexpected"},
-        Case{"https://h", "TLS"}, Case{"wss://h/ws", "TLS"}, Case{"ftp://h", "unknown scheme"},
-        Case{"me:pw@h:1", "user name"}, Case{"h:1/?a=b", "query"}, Case{"h 1", "blank"}, Case{"h\r\nX: y", "blank"}}) {
+        Case{"ftp://h", "unknown scheme"}, Case{"me:pw@h:1", "user name"}, Case{"h:1/?a=b", "query"},
+        Case{"h 1", "blank"}, Case{"h\r\nX: y", "blank"}}) {
     const auto url = parseServerUrl(c.text);
     ASSERT_FALSE(url) << c.text;
     EXPECT_EQ(url.error().code, ErrorCode::kBadUsage) << c.text;
     EXPECT_NE(url.error().text().find(c.reason), std::string::npos) << c.text << " -> " << url.error().text();
+  }
+}
+
+TEST(ServerUrl, knowsTlsByTheScheme) {
+  struct Case {
+    const char* text;
+    bool tls;
+    const char* written;
+  };
+  for (const Case& c : {Case{"https://h", true, "https://h:443"}, Case{"WSS://h:8765/ws", true, "https://h:8765"},
+                        Case{"http://h", false, "http://h:80"}, Case{"h", false, "http://h:8765"}}) {
+    const auto url = parseServerUrl(c.text);
+    ASSERT_TRUE(url) << c.text << ": " << url.error().text();
+    EXPECT_EQ(url->tls, c.tls) << c.text;
+    EXPECT_EQ(url->text(), c.written) << c.text;
   }
 }
 

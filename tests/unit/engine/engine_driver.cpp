@@ -19,7 +19,12 @@ class ScriptedTransport final : public solver::Transport {
   }
   Result<solver::TransportCounters> run(const solver::ShotBatch& batch, solver::FluxAccumulators& into) override {
     if (script_->run_fails) return fail(ErrorCode::kUnavailable, "the device was lost");
+    if (script_->runs_until_failure > 0 && --script_->runs_until_failure == 0)
+      return fail(ErrorCode::kUnavailable, "the driver reset the card");
     return rays_.run(batch, into);
+  }
+  [[nodiscard]] Losses losses() const override {
+    return {static_cast<std::uint64_t>(script_->losses.load()), "worker 7 hangs"};
   }
   [[nodiscard]] std::string description() const override { return "rays"; }
 
@@ -74,8 +79,19 @@ std::vector<std::shared_ptr<const engine::Lightmaps>> Recorder::lightmaps() cons
   return lightmaps_;
 }
 
+void Recorder::onNotice(const engine::Notice& notice) {
+  const std::scoped_lock lock(mutex_);
+  notices_.push_back(notice);
+}
+
+std::vector<engine::Notice> Recorder::notices() const {
+  const std::scoped_lock lock(mutex_);
+  return notices_;
+}
+
 void Recorder::forget() {
   const std::scoped_lock lock(mutex_);
+  notices_.clear();
   progress_.clear();
   patched_.clear();
   loaded_.clear();
@@ -86,6 +102,7 @@ engine::EngineOptions rayOptions(std::shared_ptr<TransportScript> script) {
   engine::EngineOptions options;
   options.settings.target_error = kEasy;
   options.settings.texels = 150;
+  options.recovery_wait = std::chrono::milliseconds(2);
   options.make_transport = [script = std::move(script)]() -> Result<std::unique_ptr<solver::Transport>> {
     return std::make_unique<ScriptedTransport>(script);
   };

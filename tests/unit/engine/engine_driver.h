@@ -22,6 +22,8 @@ namespace radiosity::test {
 /// What a test decides about the transport while the solve thread uses it.
 struct TransportScript {
   std::atomic<bool> run_fails{false};
+  std::atomic<int> runs_until_failure{0};  ///< the run that brings it from 1 to 0 fails
+  std::atomic<int> losses{0};
   std::atomic<int> uploads_to_fail{0};
   std::atomic<int> uploads{0};
 };
@@ -34,6 +36,8 @@ class Recorder final : public engine::Listener {
   void onSceneLoaded(std::uint64_t revision) override;
   void onLightmaps(const std::shared_ptr<const engine::Lightmaps>& lightmaps) override;
 
+  void onNotice(const engine::Notice& notice) override;
+
   struct Patched {
     std::uint64_t revision = 0;
     std::string patch, by;
@@ -42,6 +46,7 @@ class Recorder final : public engine::Listener {
   [[nodiscard]] std::vector<Patched> patched() const;
   [[nodiscard]] std::vector<std::uint64_t> loaded() const;
   [[nodiscard]] std::vector<std::shared_ptr<const engine::Lightmaps>> lightmaps() const;
+  [[nodiscard]] std::vector<engine::Notice> notices() const;
   void forget();
 
  private:
@@ -50,6 +55,7 @@ class Recorder final : public engine::Listener {
   std::vector<Patched> patched_;
   std::vector<std::uint64_t> loaded_;
   std::vector<std::shared_ptr<const engine::Lightmaps>> lightmaps_;
+  std::vector<engine::Notice> notices_;
 };
 
 /// A target that these small scenes reach in well under a second; and one that they never reach.

@@ -127,6 +127,7 @@ export interface Notifications {
   viewers: { count: number };
   cameras: { cameras: SharedCamera[] };
   draining: { graceMs: number };
+  notice: { kind: string; text: string };
 }
 
 export const SUBPROTOCOL = 'radiosity.v1';

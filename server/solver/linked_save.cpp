@@ -1,0 +1,118 @@
+// LinkedSolver as bytes and back: links as they are kept, and what its choices depend on. All else is made again from
+// these: the matrix, unshot light, who lies below whom.
+#include <algorithm>
+
+#include "server/solver/linked_solver.h"
+
+namespace radiosity::solver {
+namespace {
+
+constexpr std::uint32_t kKind = 0x4b4e494cU;  // "LINK"
+
+/// All of a shooter but its links.
+template <typename Archive, typename Self>
+void visitShooter(Archive& archive, Self& shooter) {
+  archive(shooter.place, shooter.light, shooter.source, shooter.certain, shooter.area, shooter.weight, shooter.mean,
+          shooter.sent, shooter.most_bytes, shooter.products);
+}
+
+}  // namespace
+
+bool LinkColumn::restore(ArchiveReader& from, std::size_t sides, std::size_t values) {
+  visit(from, *this);
+  const auto fits = [&](const Run& run) {
+    return std::uint64_t{run.side} + run.side_count <= sides && std::uint64_t{run.first_value} + run.count <= values &&
+           std::uint64_t{run.offset} + run.count <= code_.size();
+  };
+  return from.ok() && std::all_of(runs_.begin(), runs_.end(), fits);
+}
+
+void LinkSystem::save(ArchiveWriter& to) const {
+  to(static_cast<std::uint64_t>(shooters_.size()));
+  for (const auto& shooter : shooters_) {
+    visitShooter(to, shooter);
+    for (const auto& column : shooter.column) column.save(to);
+  }
+  for (const auto& half : halves_) to(half.sweeps, half.unsolved, half.shining, half.area);
+}
+
+bool LinkSystem::isPlace(const NodePlace& place) const {
+  if (place.side >= sides_.size() || place.level >= sides_[place.side].level_count) return false;
+  const auto grid = scene::levelGrid(sides_[place.side].width, sides_[place.side].height, place.level);
+  if (place.x >= grid.width || place.y >= grid.height) return false;
+  const auto node = nodeId(sides_[place.side], place);
+  return shooter_of_node_[node] == scene::kNone && !below_[node];
+}
+
+void LinkSystem::clear() {
+  shooters_.clear();
+  rows_.clear();
+  emission_mean_.clear();
+  reflectance_mean_.clear();
+  std::fill(shooter_of_node_.begin(), shooter_of_node_.end(), scene::kNone);
+  std::fill(below_.begin(), below_.end(), false);
+  for (auto& members : members_) members.clear();
+  changed_.clear();
+  known_ = 0;
+  next_column_ = 0;
+  halves_ = {};
+}
+
+bool LinkSystem::restore(ArchiveReader& from) {
+  clear();
+  std::uint64_t count = 0;
+  from(count);
+  for (std::uint64_t n = 0; n < count && from.ok(); ++n) {
+    Shooter shooter;
+    visitShooter(from, shooter);
+    for (auto& column : shooter.column) {
+      if (!column.restore(from, sides_.size(), leaf_area_.size())) return false;
+    }
+    if (!shooter.isLight() && !isPlace(shooter.place)) return false;
+    (void)add(shooter);
+  }
+  for (auto& half : halves_) from(half.sweeps, half.unsolved, half.shining, half.area);
+  // So that the equation has its rows, which count as memory, before the next plan.
+  updateMeans();
+  makeRows();
+  return from.ok();
+}
+
+template <typename Archive, typename Self>
+void LinkedSolver::visit(Archive& archive, Self& self) {
+  archive(self.lights_, self.sources_, self.phase_, self.limit_, self.lights_fit_, self.from_links_, self.settling_,
+          self.wanted_, self.measured_, self.growing_, self.share_part_, self.left_out_, self.rounds_, self.solutions_,
+          self.sweeps_, self.replayed_, self.varying_share_, self.half_, self.error_, self.counters_);
+  LinkPlanner::visit(archive, self.planner_);
+  LinkMemory::visit(archive, self.memory_);
+}
+
+bool LinkedSolver::save(ArchiveWriter& to) const {
+  if (pass_ != Pass::kNone) return false;
+  to(kKind, static_cast<std::uint64_t>(emission_.size()));
+  visit(to, *this);
+  system_.save(to);
+  return true;
+}
+
+bool LinkedSolver::restore(ArchiveReader& from) {
+  std::uint32_t kind = 0;
+  std::uint64_t values = 0;
+  from(kind, values);
+  if (!from.ok() || kind != kKind || values != emission_.size()) return false;
+  visit(from, *this);
+  if (!system_.restore(from)) return false;
+  const auto& shooters = system_.shooters();
+  const auto known = [&](const Shooter& shooter) {
+    return (shooter.light == scene::kNone || shooter.light < lights_.size()) &&
+           (shooter.source == scene::kNone || shooter.source < sources_.size());
+  };
+  const auto exists = [&](const Measurement& want) { return want.shooter < shooters.size() && want.half < 2; };
+  if (half_[0].size() != values || half_[1].size() != values || measured_ > wanted_.size() ||
+      !std::all_of(shooters.begin(), shooters.end(), known) || !std::all_of(wanted_.begin(), wanted_.end(), exists))
+    return false;
+  findUnshot();
+  return true;
+}
+
+}  // namespace radiosity::solver

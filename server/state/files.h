@@ -1,0 +1,44 @@
+// Files that are there whole or not at all, also after the power has failed. Errors name the file. Any thread.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+
+#include "common/bytes.h"
+#include "common/result.h"
+
+namespace radiosity::state {
+
+/// kNotFound where there is none, kTooLarge above `most` bytes, else kUnavailable.
+[[nodiscard]] Result<Bytes> readWhole(const std::filesystem::path& file, std::uint64_t most);
+
+/// Written beside, on the disk, then renamed; the folder's entry is on the disk too. What was there stays on an error.
+[[nodiscard]] Result<void> writeWhole(const std::filesystem::path& file, std::span<const std::uint8_t> bytes);
+/// The same, one part after the other.
+[[nodiscard]] Result<void> writeWhole(const std::filesystem::path& file,
+                                      std::span<const std::span<const std::uint8_t>> parts);
+
+/// A folder that exists and is ours alone until this is destroyed: a lock on its file `lock`. The file also holds the
+/// last revision that was acknowledged, so that a log cut short is noticed.
+class FolderLock {
+ public:
+  /// Waits a second for a server that is about to end. kUnavailable: another one lives there.
+  [[nodiscard]] static Result<FolderLock> take(const std::filesystem::path& folder);
+  FolderLock(FolderLock&& other) noexcept;
+  FolderLock& operator=(FolderLock&&) = delete;
+  FolderLock(const FolderLock&) = delete;
+  FolderLock& operator=(const FolderLock&) = delete;
+  ~FolderLock();
+
+  /// 0 where none was noted.
+  [[nodiscard]] std::uint64_t notedRevision() const;
+  /// Outlives this process, not a power failure: it is not waited for.
+  void noteRevision(std::uint64_t revision) const;
+
+ private:
+  explicit FolderLock(int descriptor) : descriptor_(descriptor) {}
+  int descriptor_ = -1;
+};
+
+}  // namespace radiosity::state

@@ -1,0 +1,92 @@
+// A transport that fails in the middle of a solve.
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cstring>
+
+#include "tests/scenes/scenes.h"
+#include "tests/unit/engine/engine_driver.h"
+
+namespace radiosity::test {
+namespace {
+
+using engine::Notice;
+using engine::SolveState;
+using test_scenes::lumpedCube;
+
+class Recovery : public EngineTest {
+ protected:
+  /// Every texel that was published last.
+  std::vector<float> texels() {
+    (void)sceneText();  // the state is told before the last lightmaps are out
+    std::vector<float> all;
+    const auto lightmaps = engine().lightmaps();
+    for (const auto& page : lightmaps->pages)
+      for (const auto& pixel : page->mips.front().pixels) all.insert(all.end(), {pixel.x, pixel.y, pixel.z});
+    return all;
+  }
+};
+
+TEST_F(Recovery, ALostRendererRestartsTheSolveAndTheResultHasTheSameBits) {
+  solve(lumpedCube(0.5));
+  const auto undisturbed = texels();
+  const auto shots = status().shots;
+  recorder_->forget();
+
+  script_->runs_until_failure = 3;
+  solve(lumpedCube(0.5));
+  EXPECT_EQ(script_->runs_until_failure, 0) << "the solve was too short to be disturbed";
+  const auto disturbed = texels();
+  ASSERT_EQ(disturbed.size(), undisturbed.size());
+  EXPECT_EQ(std::memcmp(disturbed.data(), undisturbed.data(), undisturbed.size() * sizeof(float)), 0);
+  EXPECT_EQ(status().shots, shots);
+
+  const auto notices = recorder_->notices();
+  ASSERT_EQ(notices.size(), 1U);
+  EXPECT_EQ(notices[0].kind, Notice::Kind::kSolveRestarted);
+  EXPECT_THAT(notices[0].text, testing::HasSubstr("the driver reset the card"));
+  EXPECT_EQ(status().solve_restarts, 1U);
+  EXPECT_FALSE(status().renderer_lost);
+  EXPECT_EQ(status().failure, "");
+  EXPECT_TRUE(std::ranges::any_of(recorder_->progress(), [](const auto& told) {
+    return told.renderer_lost && told.state == SolveState::kSolving;
+  }));
+}
+
+TEST_F(Recovery, AnUploadThatFailsWhileRecoveringIsTriedAgain) {
+  script_->runs_until_failure = 2;
+  ASSERT_TRUE(load(lumpedCube(0.5)));
+  script_->uploads_to_fail = 2;
+  ASSERT_TRUE(reaches(SolveState::kConverged));
+  EXPECT_EQ(script_->uploads_to_fail, 0);
+  EXPECT_EQ(status().solve_restarts, 1U);
+}
+
+TEST_F(Recovery, ARendererThatNeverComesBackEndsTheSolveAfterFourTries) {
+  script_->run_fails = true;
+  ASSERT_TRUE(load(lumpedCube(0.5)));
+  ASSERT_TRUE(reaches(SolveState::kFailed));
+  EXPECT_EQ(status().solve_restarts, 4U);
+  script_->run_fails = false;
+  ASSERT_TRUE(restart());
+  EXPECT_TRUE(reaches(SolveState::kConverged));
+}
+
+TEST_F(Recovery, ReplacedRenderersAreTold) {
+  script_->losses = 2;
+  solve(lumpedCube(0.5));
+  const auto notices = recorder_->notices();
+  ASSERT_EQ(notices.size(), 1U);
+  EXPECT_EQ(notices[0].kind, Notice::Kind::kRendererReplaced);
+  EXPECT_THAT(notices[0].text, testing::HasSubstr("worker 7 hangs"));
+  EXPECT_EQ(status().renderers_replaced, 2U);
+}
+
+TEST_F(Recovery, AnIdleEngineIsNotBusy) {
+  solve(lumpedCube(0.5));
+  (void)sceneText();
+  EXPECT_TRUE(eventually([&] { return engine().busySeconds() == 0.0; }));
+}
+
+}  // namespace
+}  // namespace radiosity::test

@@ -1,0 +1,275 @@
+// An engine that ends, and another that begins where it was.
+#include <gmock/gmock.h>
+
+#include <filesystem>
+
+#include "tests/scenes/glb_writer.h"
+#include "tests/scenes/scenes.h"
+#include "tests/unit/client/temporary_folder.h"
+#include "tests/unit/engine/engine_driver.h"
+#include "tests/unit/state/file_limit.h"
+
+namespace radiosity::test {
+namespace {
+
+using test_scenes::lumpedCube;
+using namespace std::chrono_literals;
+
+constexpr auto kPatienceForCheckpoint = 20s;
+
+std::string translationPatch(double x) {
+  return R"([{"op":"replace","path":"/nodes/0/translation","value":[)" + std::to_string(x) + ",0,0]}]";
+}
+
+class Kept : public EngineTest {
+ protected:
+  void SetUp() override { start(); }
+
+  void start() {
+    auto store = state::Store::open(folder_.file("state"));
+    ASSERT_TRUE(store) << store.error().text();
+    auto options = rayOptions(script_);
+    options.settings.target_error = target_;
+    options.named_settings = named_;
+    options.store = std::move(*store);
+    auto made = engine::makeEngine(std::move(options));
+    ASSERT_TRUE(made) << made.error().text();
+    engine_ = std::move(*made);
+    engine_->addListener(recorder_);
+    watching_ = engine_->watch(engine::Quantity::kIrradiance);
+  }
+  void restart() {
+    watching_.reset();
+    engine_.reset();
+    start();
+  }
+  /// The first page as a file: published tiles keep what changed by less than a quantum.
+  [[nodiscard]] Bytes light() {
+    const auto exr =
+        call<SharedBytes>([&](auto done) { engine_->lightmapExr(0, engine::Quantity::kIrradiance, std::move(done)); });
+    EXPECT_TRUE(exr);
+    return exr ? **exr : Bytes();
+  }
+  [[nodiscard]] double counter(const std::string& name) { return status().counters[name]; }
+
+  TemporaryFolder folder_;
+  double target_ = kEasy;
+  std::set<std::string> named_ = {"targetError"};
+};
+
+TEST_F(Kept, TheSceneIsBackAtItsLastRevisionWithItsPast) {
+  solve(lumpedCube(0.5));
+  ASSERT_TRUE(patch({emissionPatch(0, 2.0), {}, false, "ann", {}, {"id-1", 77}}));
+  ASSERT_TRUE(patch(translationPatch(0.25)));
+  ASSERT_TRUE(undo());
+  const auto text = sceneText();
+  const auto before = history();
+  restart();
+  EXPECT_EQ(status().revision, 4U);
+  EXPECT_EQ(sceneText(), text);
+  const auto after = history();
+  EXPECT_EQ(after.undoable, 1U);
+  EXPECT_EQ(after.redoable, 1U);
+  ASSERT_EQ(after.revisions.size(), 4U);
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(after.revisions[i].summary, before.revisions[i].summary);
+    EXPECT_EQ(after.revisions[i].by, before.revisions[i].by);
+    EXPECT_EQ(after.revisions[i].time_s, before.revisions[i].time_s);
+    EXPECT_EQ(after.revisions[i].undone, before.revisions[i].undone);
+  }
+  const auto& past = engine().past();
+  EXPECT_EQ(past.patches_from, 1U);
+  ASSERT_EQ(past.patches.size(), 3U);
+  EXPECT_EQ(past.patches[0].by, "ann");
+  ASSERT_EQ(past.answers.size(), 1U);
+  EXPECT_EQ(past.answers[0].receipt.fingerprint, 77U);
+  EXPECT_EQ(past.answers[0].outcome.revision, 2U);
+  EXPECT_EQ(redo()->stepped, 3U);
+  EXPECT_EQ(undo()->revision, 6U);
+  EXPECT_EQ(undo()->stepped, 2U);
+}
+
+TEST_F(Kept, ManyRestartsAndManyEditsLoseNothing) {
+  ASSERT_TRUE(load(lumpedCube(0.5)));
+  std::uint64_t revision = 1;
+  for (int run = 0; run < 5; ++run) {
+    for (int i = 0; i < 70; ++i) {
+      const auto done = i % 10 == 9 ? undo() : patch(emissionPatch(0, 1.0 + run + 0.01 * i));
+      ASSERT_TRUE(done) << done.error().text();
+      EXPECT_EQ(done->revision, ++revision);
+    }
+    const auto text = sceneText();
+    const auto past = history();
+    restart();
+    EXPECT_EQ(status().revision, revision);
+    EXPECT_EQ(sceneText(), text);
+    EXPECT_EQ(history().undoable, past.undoable);
+    EXPECT_EQ(history().revisions.size(), past.revisions.size());
+  }
+}
+
+TEST_F(Kept, ADoneSolveIsDoneAtOnceAfterTheRestartWithTheSameLight) {
+  solve(lumpedCube(0.5));
+  const auto before = light();
+  const auto shots = status().shots;
+  const auto version = status().tile_version;
+  engine().keepSolve(kPatienceForCheckpoint);
+  restart();
+  ASSERT_TRUE(reaches(State::kConverged));
+  EXPECT_EQ(status().shots, shots);
+  EXPECT_EQ(counter("state.resumedShots"), static_cast<double>(shots));
+  EXPECT_TRUE(light() == before);
+  EXPECT_GT(status().tile_version, version);
+  EXPECT_GT(engine().past().first_tile_version, version);
+}
+
+TEST_F(Kept, AnInterruptedSolveEndsWithTheSameLightAsOneThatWasNot) {
+  target_ = 0.005;
+  restart();
+  solve(lumpedCube(0.7));
+  const auto before = light();
+  const auto samples = counter("links.samples");
+  ASSERT_TRUE(load(lumpedCube(0.7)));  // once more, from nothing
+  int interrupted = 0;
+  for (int i = 0; i < 50 && status().state == State::kSolving; ++i) {
+    std::this_thread::sleep_for(2ms);
+    const bool solving = status().state == State::kSolving;
+    engine().keepSolve(kPatienceForCheckpoint);
+    restart();
+    if (solving && counter("state.resumedShots") > 0) ++interrupted;
+  }
+  ASSERT_TRUE(reaches(State::kConverged));
+  EXPECT_GT(interrupted, 0);
+  EXPECT_EQ(counter("links.samples"), samples);
+  EXPECT_TRUE(light() == before);
+}
+
+TEST_F(Kept, ACheckpointFromBeforeAnEditOfLightServesAfterIt) {
+  solve(lumpedCube(0.5));
+  engine().keepSolve(kPatienceForCheckpoint);
+  const auto saved = folder_.read("state/checkpoint");
+  ASSERT_TRUE(patch(emissionPatch(0, 5.0)));
+  ASSERT_TRUE(reaches(State::kPaused));  // by keepSolve()
+  watching_.reset();
+  engine_.reset();
+  folder_.write("state/checkpoint", saved);
+  start();
+  EXPECT_GT(counter("state.resumedShots"), 0.0);
+  ASSERT_TRUE(reaches(State::kConverged));
+  EXPECT_EQ(status().revision, 2U);
+}
+
+TEST_F(Kept, ACheckpointOfAnotherGeometryOrOtherSettingsIsOfNoUse) {
+  solve(lumpedCube(0.5));
+  engine().keepSolve(kPatienceForCheckpoint);
+  const auto saved = folder_.read("state/checkpoint");
+  const auto restartWith = [&](const std::string& checkpoint) {
+    watching_.reset();
+    engine_.reset();
+    folder_.write("state/checkpoint", checkpoint);
+    start();
+    return counter("state.resumedShots");
+  };
+  ASSERT_GT(restartWith(saved), 0.0);
+  ASSERT_TRUE(configure([](auto& settings) { settings.seed = 9; }));
+  EXPECT_EQ(restartWith(saved), 0.0);
+  ASSERT_TRUE(configure([](auto& settings) { settings.seed = 1; }));
+  ASSERT_GT(restartWith(saved), 0.0);
+  EXPECT_EQ(restartWith(saved.substr(0, saved.size() / 2)), 0.0);
+  ASSERT_TRUE(reaches(State::kConverged));  // anew
+  ASSERT_TRUE(patch(translationPatch(0.5)));
+  EXPECT_EQ(restartWith(saved), 0.0);
+}
+
+TEST_F(Kept, SettingsComeBackUnlessTheCommandLineNamesThem) {
+  ASSERT_TRUE(configure([](auto& settings) {
+    settings.target_error = 0.125;
+    settings.texels = 123;
+    settings.seed = 7;
+    settings.time_limit_s = 3.5;
+    settings.sky = engine::SkySetting{{1.1F, 2.0F, 3.0F}, {0.1F, 0.0F, 0.0F}};
+  }));
+  named_ = {};
+  restart();
+  const auto settings = status().settings;
+  EXPECT_EQ(settings.target_error, 0.125);
+  EXPECT_EQ(settings.texels, 123U);
+  EXPECT_EQ(settings.seed, 7U);
+  EXPECT_EQ(settings.time_limit_s, 3.5);
+  EXPECT_EQ(settings.sky, (engine::SkySetting{{1.1F, 2.0F, 3.0F}, {0.1F, 0.0F, 0.0F}}));
+  named_ = {"targetError", "seed"};
+  restart();
+  EXPECT_EQ(status().settings.target_error, kEasy);
+  EXPECT_EQ(status().settings.seed, 1U);
+  EXPECT_EQ(status().settings.texels, 123U);
+}
+
+TEST_F(Kept, TheSceneItWasStartedWithGoesOnWithItsEdits) {
+  const auto file = folder_.write("room.glb", "");
+  const auto write = [&](double reflectance) {
+    const auto bytes = test_scenes::encodeGlb(lumpedCube(reflectance));
+    folder_.write("room.glb", std::string(bytes.begin(), bytes.end()));
+  };
+  const auto open = [&] {
+    return call<engine::LoadOutcome>([&](auto done) { engine_->openFile(file, std::move(done)); }).value().revision;
+  };
+  write(0.5);
+  EXPECT_EQ(open(), 1U);
+  restart();
+  EXPECT_EQ(load(lumpedCube(0.5))->revision, 1U);  // the very scene, as it was loaded
+  ASSERT_TRUE(patch(emissionPatch(0, 2.0)));
+  restart();
+  EXPECT_EQ(open(), 2U);
+  EXPECT_EQ(load(lumpedCube(0.5))->revision, 3U);  // a client asks for the scene without the edit
+  restart();
+  write(0.25);
+  EXPECT_EQ(open(), 4U);
+}
+
+TEST_F(Kept, WhatCannotBeKeptIsRefusedAndAllStaysAsItWas) {
+  solve(lumpedCube(0.5));
+  const auto before = light();
+  const auto text = sceneText();
+  recorder_->forget();
+  {
+    const FileLimit full(std::filesystem::file_size(folder_.file("state/state.sqlite-wal")));
+    for (const auto& edit : {emissionPatch(0, 3.0), translationPatch(0.5)}) {
+      const auto refused = patch(edit);
+      ASSERT_FALSE(refused);
+      EXPECT_EQ(refused.error().code, ErrorCode::kUnavailable);
+      EXPECT_NE(refused.error().message.find(folder_.file("state/state.sqlite")), std::string::npos);
+    }
+    EXPECT_FALSE(load(lumpedCube(0.25)));
+    EXPECT_FALSE(configure([](auto& settings) { settings.seed = 5; }));
+  }
+  EXPECT_EQ(status().revision, 1U);
+  EXPECT_EQ(status().state, State::kConverged);
+  EXPECT_EQ(status().settings.seed, 1U);
+  EXPECT_EQ(sceneText(), text);
+  EXPECT_TRUE(light() == before);
+  EXPECT_TRUE(recorder_->patched().empty());
+  EXPECT_TRUE(recorder_->loaded().empty());
+  EXPECT_EQ(history().undoable, 0U);
+  EXPECT_EQ(patch(emissionPatch(0, 3.0))->revision, 2U);  // there is room again
+  EXPECT_EQ(patch(translationPatch(0.5))->revision, 3U);
+  ASSERT_TRUE(reaches(State::kConverged));
+  restart();
+  EXPECT_EQ(status().revision, 3U);
+}
+
+TEST_F(Kept, ASolveTooLargeForACheckpointGoesOnWithout) {
+  watching_.reset();
+  engine_.reset();
+  auto store = state::Store::open(folder_.file("state"));
+  ASSERT_TRUE(store);
+  auto options = rayOptions(script_);
+  options.store = std::move(*store);
+  options.checkpoint_bytes = 1000;
+  engine_ = std::move(*engine::makeEngine(std::move(options)));
+  solve(lumpedCube(0.5));
+  engine().keepSolve(kPatienceForCheckpoint);
+  EXPECT_FALSE(std::filesystem::exists(folder_.file("state/checkpoint")));
+}
+
+}  // namespace
+}  // namespace radiosity::test

@@ -1,0 +1,125 @@
+// A solve that is saved and goes on elsewhere is the solve that was never interrupted, to the last bit.
+#include <gtest/gtest.h>
+
+#include "server/solver/linked_solver.h"
+#include "server/solver/shooting_solver.h"
+#include "tests/unit/solver/quad_scene.h"
+#include "tests/unit/solver/solve.h"
+
+namespace radiosity::solver {
+namespace {
+
+using test::cubeQuads;
+using test::makeQuadScene;
+using test::RayTransport;
+using test::solve;
+
+constexpr std::size_t kRoom = std::size_t{64} << 20;
+
+LightSources lamp(float candela) { return {{{.position = {0.1, 0.2, 0.0}, .intensity = glm::vec3(candela)}}, {}}; }
+
+template <typename Kind>
+class Saved : public testing::Test {
+ protected:
+  void SetUp() override {
+    settings_.target_error = 0.01;
+    ASSERT_TRUE(rays_.setScene(made_.patches));
+  }
+  std::unique_ptr<Kind> make(const LightSources& sources = lamp(5.0F)) {
+    return std::make_unique<Kind>(made_.patches, made_.materials, rays_, settings_, sources);
+  }
+  /// As a new process would: from bytes alone.
+  std::unique_ptr<Kind> goOn(const Kind& from) {
+    ArchiveWriter to(kRoom);
+    if (!from.save(to) || !to.fits()) return nullptr;
+    auto next = make();
+    ArchiveReader reader(to.bytes());
+    return next->restore(reader) ? std::move(next) : nullptr;
+  }
+  void expectSame(const Kind& a, const Kind& b) {
+    EXPECT_EQ(a.irradiance(), b.irradiance());
+    EXPECT_EQ(a.unshot(), b.unshot());
+    EXPECT_EQ(a.shotLevels(), b.shotLevels());
+    EXPECT_EQ(a.linkCounters().samples, b.linkCounters().samples);
+    EXPECT_EQ(a.rounds(), b.rounds());
+    EXPECT_EQ(a.error().total, b.error().total);
+    EXPECT_EQ(a.energy().absorbed, b.energy().absorbed);
+  }
+
+  test::QuadScene made_ = makeQuadScene(cubeQuads(6, {0, 4, 0, 0, 0, 0}, {0.5F, 0.5F, 0.6F, 0.5F, 0.5F, 0.5F}));
+  SolverSettings settings_;
+  RayTransport rays_{64};
+};
+
+using Kinds = testing::Types<LinkedSolver, ShootingSolver>;
+TYPED_TEST_SUITE(Saved, Kinds);
+
+TYPED_TEST(Saved, WhereverItWasInterruptedTheEndIsTheSame) {
+  auto whole = this->make();
+  solve(*whole);
+  auto interrupted = this->make();
+  int times = 0;
+  for (int i = 0; i < 100000; ++i) {
+    const auto outcome = interrupted->step();
+    ASSERT_TRUE(outcome);
+    if (*outcome == StepOutcome::kConverged) break;
+    if (i % 3 != 0) continue;
+    if (auto next = this->goOn(*interrupted)) {
+      interrupted = std::move(next);
+      ++times;
+    }
+  }
+  EXPECT_GT(times, 3);
+  this->expectSame(*interrupted, *whole);
+}
+
+TYPED_TEST(Saved, ADoneSolveIsStillDoneAndTakesEditsAsBefore) {
+  auto solved = this->make();
+  solve(*solved);
+  auto next = this->goOn(*solved);
+  ASSERT_TRUE(next);
+  this->expectSame(*next, *solved);
+  EXPECT_EQ(next->step().value(), StepOutcome::kConverged);
+  for (auto* solver : {solved.get(), next.get()}) {
+    solver->setLights(lamp(9.0F));
+    solve(*solver);
+  }
+  this->expectSame(*next, *solved);
+}
+
+TYPED_TEST(Saved, EditsBeforeItAreInIt) {
+  auto solved = this->make(lamp(2.0F));
+  for (int i = 0; i < 20; ++i) ASSERT_TRUE(solved->step());
+  solved->setLights(lamp(5.0F));
+  solve(*solved);
+  auto next = this->goOn(*solved);
+  ASSERT_TRUE(next);
+  this->expectSame(*next, *solved);
+}
+
+TYPED_TEST(Saved, WhatIsCutShortOrOfAnotherSceneIsRefused) {
+  auto solved = this->make();
+  solve(*solved);
+  ArchiveWriter to(kRoom);
+  ASSERT_TRUE(solved->save(to));
+  for (const std::size_t part : {0UL, 3UL, to.bytes().size() / 2, to.bytes().size() - 1}) {
+    ArchiveReader reader(std::span(to.bytes()).first(part));
+    EXPECT_FALSE(this->make()->restore(reader)) << part;
+  }
+  const auto other = makeQuadScene(cubeQuads(5, {0, 4, 0, 0, 0, 0}, {0.5F, 0.5F, 0.5F, 0.5F, 0.5F, 0.5F}));
+  TypeParam elsewhere(other.patches, other.materials, this->rays_, this->settings_);
+  ArchiveReader reader(to.bytes());
+  EXPECT_FALSE(elsewhere.restore(reader));
+}
+
+TYPED_TEST(Saved, NeverTakesMoreThanItMay) {
+  auto solved = this->make();
+  solve(*solved);
+  ArchiveWriter to(1000);
+  (void)solved->save(to);
+  EXPECT_FALSE(to.fits());
+  EXPECT_LE(to.bytes().size(), 1000U);
+}
+
+}  // namespace
+}  // namespace radiosity::solver
