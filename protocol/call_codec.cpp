@@ -76,6 +76,7 @@ json params(const SnapshotCall& c) {
   if (!c.camera.empty()) out["camera"] = c.camera;
   return out;
 }
+json params(const CameraCall& c) { return c.pose ? toJson(*c.pose) : json::object(); }
 template <typename C>
 json params(const C& /*no parameters*/) {
   return json::object();
@@ -168,6 +169,9 @@ void read(Reader& r, SnapshotCall& c) {
   r.narrow("width", c.width, Need::kOptional, 1, kMaxSnapshotSide);
   r.narrow("height", c.height, Need::kOptional, 1, kMaxSnapshotSide);
   r.text("quantity", c.quantity, Need::kOptional, 64);
+}
+void read(Reader& r, CameraCall& c) {
+  if (r.find("position") != nullptr || r.find("target") != nullptr) read(r, c.pose.emplace());
 }
 template <typename C>
 void read(Reader& /*reader*/, C& /*no parameters*/) {}

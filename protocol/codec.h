@@ -29,6 +29,7 @@ namespace radiosity::protocol {
 [[nodiscard]] std::string encodeReply(const RequestId& id, const CreditReply& reply);
 [[nodiscard]] std::string encodeReply(const RequestId& id, const SnapshotReply& reply);
 [[nodiscard]] std::string encodeReply(const RequestId& id, const ViewersReply& reply);
+[[nodiscard]] std::string encodeReply(const RequestId& id, const CameraReply& reply);
 
 [[nodiscard]] std::string encodeNotification(const Notification& notification);
 

@@ -24,6 +24,12 @@ inline constexpr std::size_t kMaxInlineSceneBytes = std::size_t{1} << 19;  ///< 
 inline constexpr std::size_t kMaxStatusWarnings = 200;
 inline constexpr std::size_t kMaxCallsInFlight = 64;  ///< of one connection, waiting for their answer
 
+// Cameras of other viewers.
+inline constexpr std::size_t kMaxCameras = 64;            ///< shared at a time
+inline constexpr double kMaxCoordinateM = 1e12;           ///< of eye and target
+inline constexpr std::size_t kCameraCallsPerSecond = 20;  ///< of one connection, and as many at once
+inline constexpr std::uint32_t kCamerasIntervalMs = 100;  ///< between two `cameras` to one connection
+
 // Tiles.
 inline constexpr std::uint32_t kTileSide = 64;  ///< texels; tiles at a page's right and bottom edge are smaller
 inline constexpr std::size_t kTileHeaderBytes = 64;

@@ -1,5 +1,8 @@
 #include "protocol/message_parts.h"
 
+#include <fmt/format.h>
+#include <cmath>
+
 namespace radiosity::protocol {
 
 using nlohmann::json;
@@ -16,21 +19,29 @@ json toJson(const Settings& s) {
 json toJson(const Sky& sky) { return {{"upper", sky.upper}, {"lower", sky.lower}}; }
 
 void read(Reader& r, Sky& sky) {
-  const auto color = [&](const char* key, Need need, std::array<double, 3>& out) {
-    std::size_t count = 0;
-    r.array(key, need, 3, [&](const json& value, const std::string& pointer) {
-      const double number = value.is_number() ? value.get<double>() : -1.0;
-      if (number >= 0.0 && number <= kMaxSkyNits) {
-        out[count++] = number;
-      } else {
-        r.refuse(pointer, "must be a number in [0, 1e12]");
-      }
-    });
-    if (r.find(key) != nullptr && count != 3) r.refuse(r.pointerOf(key), "must have 3 elements");
-  };
-  color("upper", Need::kRequired, sky.upper);
+  readTriple(r, "upper", Need::kRequired, 0.0, kMaxSkyNits, sky.upper);
   sky.lower = sky.upper;
-  color("lower", Need::kOptional, sky.lower);
+  readTriple(r, "lower", Need::kOptional, 0.0, kMaxSkyNits, sky.lower);
+}
+
+void readTriple(Reader& r, const char* key, Need need, double low, double high, std::array<double, 3>& out) {
+  std::size_t count = 0;
+  r.array(key, need, 3, [&](const json& value, const std::string& pointer) {
+    const double number = value.is_number() ? value.get<double>() : std::nan("");
+    if (number >= low && number <= high) {
+      out[count++] = number;
+    } else {
+      r.refuse(pointer, fmt::format("must be a number in [{:g}, {:g}]", low, high));
+    }
+  });
+  if (r.find(key) != nullptr && count != 3) r.refuse(r.pointerOf(key), "must have 3 elements");
+}
+
+json toJson(const CameraPose& pose) { return {{"position", pose.position}, {"target", pose.target}}; }
+
+void read(Reader& r, CameraPose& pose) {
+  readTriple(r, "position", Need::kRequired, -kMaxCoordinateM, kMaxCoordinateM, pose.position);
+  readTriple(r, "target", Need::kRequired, -kMaxCoordinateM, kMaxCoordinateM, pose.target);
 }
 
 void readSky(Reader& r, std::optional<Sky>& sky) {

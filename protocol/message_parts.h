@@ -1,6 +1,7 @@
 // Parts that several messages share, to JSON and back. For this folder's .cpp files only.
 #pragma once
 
+#include <array>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -18,12 +19,17 @@ inline constexpr const char* kQuantityNames = "irradiance, radiosity, error, pat
 [[nodiscard]] nlohmann::json toJson(const Settings& settings);
 [[nodiscard]] nlohmann::json toJson(const Progress& progress);
 [[nodiscard]] nlohmann::json toJson(const Sky& sky);
+[[nodiscard]] nlohmann::json toJson(const CameraPose& pose);
 void read(Reader& reader, Settings& settings);
 /// Member "sky"; none where it is missing or null.
 void readSky(Reader& reader, std::optional<Sky>& sky);
 void read(Reader& reader, Progress& progress);
 
 void readStrings(Reader& reader, const char* key, Need need, std::size_t max, std::vector<std::string>& out);
+/// An array of three numbers, each at least `low` and at most `high`.
+void readTriple(Reader& reader, const char* key, Need need, double low, double high, std::array<double, 3>& out);
+/// Members "position" and "target".
+void read(Reader& reader, CameraPose& pose);
 void readIndices(Reader& reader, const char* key, std::vector<std::uint32_t>& out);
 
 /// Bounds of solve.configure and of the reply that echoes it.

@@ -4,6 +4,7 @@
 // (0.02 = 2 %), luminous flux in lumens.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -81,6 +82,17 @@ struct Progress {
   std::string failure;  ///< why, when state is "failed"
 };
 
+/// Where somebody looks from: eye and the point looked at, metres, in the scene's space.
+struct CameraPose {
+  std::array<double, 3> position{}, target{};
+  bool operator==(const CameraPose&) const = default;
+};
+struct SharedCamera {
+  std::uint64_t viewer = 0;  ///< as in that viewer's own CameraReply
+  std::string name;          ///< `client` of its hello
+  CameraPose pose;
+};
+
 // ---- replies ----
 
 struct HelloReply {
@@ -150,6 +162,9 @@ struct SnapshotReply {
 };
 struct ViewersReply {
   std::uint64_t count = 0;
+};
+struct CameraReply {
+  std::optional<std::uint64_t> viewer;  ///< the caller's number in `cameras`; none: its camera is not shared
 };
 
 // ---- calls ----
@@ -262,10 +277,16 @@ struct ViewersCall {
   static constexpr std::string_view kMethod = "viewers";
   using Reply = ViewersReply;
 };
+/// Shares where the caller looks from, and makes it hear of the others; without a pose neither any longer.
+struct CameraCall {
+  static constexpr std::string_view kMethod = "camera";
+  using Reply = CameraReply;
+  std::optional<CameraPose> pose = {};
+};
 
 using Call = std::variant<HelloCall, SceneGetCall, SceneLoadCall, ScenePatchCall, SceneUndoCall, SceneRedoCall,
                           SceneHistoryCall, SolveConfigureCall, SolvePauseCall, SolveResumeCall, SolveRestartCall,
-                          SolveWaitCall, StatusCall, SubscribeCall, CreditCall, SnapshotCall, ViewersCall>;
+                          SolveWaitCall, StatusCall, SubscribeCall, CreditCall, SnapshotCall, ViewersCall, CameraCall>;
 
 // ---- notifications from the server ----
 
@@ -310,6 +331,10 @@ struct ViewersNote {
   static constexpr std::string_view kMethod = "viewers";
   std::uint64_t count = 0;
 };
+struct CamerasNote {
+  static constexpr std::string_view kMethod = "cameras";
+  std::vector<SharedCamera> cameras;  ///< all that are shared, the receiver's among them
+};
 struct Draining {
   static constexpr std::string_view kMethod = "draining";
   std::uint64_t grace_ms = 0;
@@ -323,6 +348,6 @@ struct ServerNote {
 };
 
 using Notification = std::variant<ServerInfo, ProgressNote, ScenePatched, SceneLoaded, LightmapsNote, Bookmark,
-                                  ViewersNote, Draining, ServerNote>;
+                                  ViewersNote, CamerasNote, Draining, ServerNote>;
 
 }  // namespace radiosity::protocol

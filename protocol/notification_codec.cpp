@@ -41,6 +41,15 @@ std::string params(const Bookmark& n) {
   return dumpJson({{"revision", n.revision}, {"tileVersion", n.tile_version}, {"quantity", name(n.quantity)}});
 }
 std::string params(const ViewersNote& n) { return dumpJson({{"count", n.count}}); }
+std::string params(const CamerasNote& n) {
+  json cameras = json::array();
+  for (const auto& camera : n.cameras) {
+    cameras.push_back(toJson(camera.pose));
+    cameras.back()["viewer"] = camera.viewer;
+    cameras.back()["name"] = camera.name;
+  }
+  return dumpJson({{"cameras", std::move(cameras)}});
+}
 std::string params(const Draining& n) { return dumpJson({{"graceMs", n.grace_ms}}); }
 std::string params(const ServerNote& n) { return dumpJson({{"kind", n.kind}, {"text", n.text}}); }
 
@@ -87,6 +96,17 @@ void read(Reader& r, Bookmark& n) {
   r.choice("quantity", n.quantity, Need::kOptional, quantityFrom, kQuantityNames);
 }
 void read(Reader& r, ViewersNote& n) { r.integer("count", n.count, Need::kRequired, 0, kAnyInteger); }
+void read(Reader& r, CamerasNote& n) {
+  r.array("cameras", Need::kRequired, kMaxListEntries, [&](const json& element, const std::string& pointer) {
+    Reader inner(&element, pointer);
+    SharedCamera camera;
+    inner.integer("viewer", camera.viewer, Need::kRequired, 0, kAnyInteger);
+    inner.text("name", camera.name, Need::kRequired, kMaxTextBytes);
+    read(inner, camera.pose);
+    if (inner.failed()) r.refuse(inner.pointer(), inner.message().substr(inner.pointer().size() + 1));
+    n.cameras.push_back(std::move(camera));
+  });
+}
 void read(Reader& r, Draining& n) { r.integer("graceMs", n.grace_ms, Need::kRequired, 0, kAnyInteger); }
 void read(Reader& r, ServerNote& n) {
   r.text("kind", n.kind, Need::kRequired, kMaxTextBytes);

@@ -96,6 +96,7 @@ void read(Reader& r, CreditReply& reply) {
   reply.credit_bytes = value->get<std::int64_t>();
 }
 void read(Reader& r, SnapshotReply& reply) { r.text("url", reply.url, Need::kRequired, kAnyText); }
+void read(Reader& r, CameraReply& reply) { r.optionalInteger("viewer", reply.viewer, 0, kAnyInteger); }
 void read(Reader& r, ViewersReply& reply) { r.integer("count", reply.count, Need::kRequired, 0, kAnyInteger); }
 
 }  // namespace
@@ -173,6 +174,10 @@ std::string encodeReply(const RequestId& id, const SnapshotReply& r) { return an
 
 std::string encodeReply(const RequestId& id, const ViewersReply& r) { return answer(id, json{{"count", r.count}}); }
 
+std::string encodeReply(const RequestId& id, const CameraReply& r) {
+  return answer(id, r.viewer ? json{{"viewer", *r.viewer}} : json::object());
+}
+
 template <typename Reply>
 Result<Reply> decodeReply(const json& result) {
   Reader reader(&result, "");
@@ -195,5 +200,6 @@ template Result<SubscribeReply> decodeReply<SubscribeReply>(const json&);
 template Result<CreditReply> decodeReply<CreditReply>(const json&);
 template Result<SnapshotReply> decodeReply<SnapshotReply>(const json&);
 template Result<ViewersReply> decodeReply<ViewersReply>(const json&);
+template Result<CameraReply> decodeReply<CameraReply>(const json&);
 
 }  // namespace radiosity::protocol

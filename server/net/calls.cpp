@@ -292,6 +292,33 @@ void Calls::run(const protocol::ViewersCall& /*call*/, const Slot& slot) {
   slot.reply(protocol::ViewersReply{hub_.viewerCount()});
 }
 
+bool Calls::takeCameraCall() {
+  constexpr double kMost = protocol::kCameraCallsPerSecond;
+  const auto now = std::chrono::steady_clock::now();
+  const double seconds = std::chrono::duration<double>(now - std::exchange(camera_calls_at_, now)).count();
+  camera_calls_ = std::min(kMost, camera_calls_ + kMost * seconds);
+  if (camera_calls_ < 1.0) return false;
+  camera_calls_ -= 1.0;
+  return true;
+}
+
+/// Everyone may hide at any rate: that costs others nothing.
+void Calls::run(const protocol::CameraCall& call, const Slot& slot) {
+  const auto peer = peer_.lock();
+  if (peer == nullptr) return slot.drop();
+  if (!call.pose) {
+    hub_.hideCamera(*peer);
+    return slot.reply(protocol::CameraReply{});
+  }
+  if (!takeCameraCall())
+    return slot.error({RpcCode::kRateLimited,
+                       fmt::format("a camera may be told {} times a second", protocol::kCameraCallsPerSecond)});
+  const auto number = hub_.shareCamera(*peer, client_, *call.pose);
+  if (!number)
+    return slot.error({RpcCode::kTooLarge, fmt::format("{} cameras are shared already", protocol::kMaxCameras)});
+  slot.reply(protocol::CameraReply{number});
+}
+
 Result<std::string> fileBelow(const std::filesystem::path& root, std::string_view relative) {
   std::error_code error;
   const auto base = std::filesystem::canonical(root, error);

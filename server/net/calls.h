@@ -60,6 +60,8 @@ class Calls {
   void run(const protocol::CreditCall& call, const Slot& slot);
   void run(const protocol::SnapshotCall& call, const Slot& slot);
   void run(const protocol::ViewersCall& call, const Slot& slot);
+  void run(const protocol::CameraCall& call, const Slot& slot);
+  bool takeCameraCall();
 
   Hub& hub_;
   std::weak_ptr<Peer> peer_;
@@ -67,6 +69,8 @@ class Calls {
   bool authenticated_;
   bool greeted_ = false;
   std::string client_;
+  double camera_calls_ = protocol::kCameraCallsPerSecond;  ///< that may be made now; they come back with time
+  std::chrono::steady_clock::time_point camera_calls_at_ = std::chrono::steady_clock::now();
   std::shared_ptr<std::atomic<std::size_t>> in_flight_ = std::make_shared<std::atomic<std::size_t>>(0);
 };
 

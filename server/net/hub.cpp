@@ -110,6 +110,7 @@ protocol::ServerInfo Hub::serverInfo() {
                        "credit",
                        "snapshot",
                        "viewers",
+                       "cameras",
                        "resume",
                        "batch",
                        "tiles.rgba16f",
@@ -171,6 +172,20 @@ void Hub::leave(const Viewer& viewer) {
     after = viewers_.size();
   }
   if (before != after) broadcast(protocol::ViewersNote{after});
+  hideCamera(viewer);
+}
+
+std::optional<std::uint64_t> Hub::shareCamera(const Viewer& viewer, const std::string& name,
+                                              const protocol::CameraPose& pose) {
+  const auto number = cameras_.put(viewer, name, pose);
+  if (number)
+    for (const auto& other : viewers()) other->camerasChanged();
+  return number;
+}
+
+void Hub::hideCamera(const Viewer& viewer) {
+  if (!cameras_.remove(viewer)) return;
+  for (const auto& other : viewers()) other->camerasChanged();
 }
 
 std::size_t Hub::viewerCount() const { return viewers().size(); }

@@ -17,6 +17,7 @@
 #include "protocol/codec.h"
 #include "server/engine/engine.h"
 #include "server/net/blob_store.h"
+#include "server/net/camera_board.h"
 #include "server/net/counters.h"
 #include "server/net/server_options.h"
 #include "server/net/tile_cache.h"
@@ -40,6 +41,7 @@ class Viewer {
   virtual void sendText(SharedText text) = 0;      ///< in order, none lost
   virtual void sendProgress(SharedText text) = 0;  ///< only the newest counts
   virtual void lightmapsChanged() = 0;
+  virtual void camerasChanged() = 0;
 };
 
 class Hub : public engine::Listener, public std::enable_shared_from_this<Hub> {
@@ -62,6 +64,11 @@ class Hub : public engine::Listener, public std::enable_shared_from_this<Hub> {
   void join(const std::weak_ptr<Viewer>& viewer);  ///< tells everyone the new count
   void leave(const Viewer& viewer);
   [[nodiscard]] std::size_t viewerCount() const;
+
+  /// Tells those who share theirs. Returns the camera's number; nothing when kMaxCameras are shared.
+  [[nodiscard]] std::optional<std::uint64_t> shareCamera(const Viewer& viewer, const std::string& name,
+                                                         const protocol::CameraPose& pose);
+  void hideCamera(const Viewer& viewer);
 
   /// From now on calls are refused; tells viewers and connections.
   void drain();
@@ -92,6 +99,7 @@ class Hub : public engine::Listener, public std::enable_shared_from_this<Hub> {
   [[nodiscard]] std::optional<BlobStore::Blob> findUpload(std::string_view id);
   BlobStore& snapshots() { return snapshots_; }
   TileCache& tiles() { return tiles_; }
+  CameraBoard& cameras() { return cameras_; }
   Counters& counters() { return counters_; }
 
   /// Everything that comes from the engine passes here, so that nothing reaches for a socket once shut() has returned
@@ -151,6 +159,7 @@ class Hub : public engine::Listener, public std::enable_shared_from_this<Hub> {
   std::atomic<bool> draining_{false};
   BlobStore uploads_, snapshots_;
   TileCache tiles_;
+  CameraBoard cameras_;
   Counters counters_;
   std::recursive_mutex gate_;  ///< recursive: an engine may call back before its method returns
   bool shut_ = false;

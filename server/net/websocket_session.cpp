@@ -42,6 +42,7 @@ class WebSocketSession final : public Peer, public Connection, public std::enabl
   void sendText(SharedText text) override;
   void sendProgress(SharedText text) override;
   void lightmapsChanged() override;
+  void camerasChanged() override;
   void drain() override;
 
   // On the strand.
@@ -60,6 +61,7 @@ class WebSocketSession final : public Peer, public Connection, public std::enabl
   void enqueue(SharedText text);
   void cutAfter(std::chrono::milliseconds patience);
   void adoptLightmaps();
+  void tellCameras();
   void pump();
   void writeText(SharedText text);
   void writeTile(OutgoingTile tile);
@@ -79,7 +81,7 @@ class WebSocketSession final : public Peer, public Connection, public std::enabl
 
   std::deque<SharedText> control_;  ///< not yet given to the socket
   std::size_t control_bytes_ = 0;
-  SharedText progress_;
+  SharedText progress_, cameras_;  ///< the newest; older ones were not worth sending
   SharedText writing_text_;
   std::optional<OutgoingTile> writing_tile_;
   bool writing_ = false, closing_ = false, draining_ = false;
@@ -89,9 +91,9 @@ class WebSocketSession final : public Peer, public Connection, public std::enabl
   std::list<asio::steady_timer> timers_;
 
   std::shared_ptr<void> watching_;  ///< keeps the quantity subscribed to coming
-  std::atomic<bool> lightmaps_posted_{false};
+  std::atomic<bool> lightmaps_posted_{false}, cameras_posted_{false};
   bool adoption_timed_ = false;
-  Clock::time_point next_adoption_;
+  Clock::time_point next_adoption_, next_cameras_;
 };
 
 // ---- coming ----
@@ -185,6 +187,15 @@ void WebSocketSession::lightmapsChanged() {
   onStrand([](WebSocketSession& s) { s.adoptLightmaps(); });
 }
 
+void WebSocketSession::camerasChanged() {
+  if (cameras_posted_.exchange(true)) return;
+  onStrand([](WebSocketSession& s) {
+    const auto wait = std::chrono::ceil<std::chrono::milliseconds>(s.next_cameras_ - Clock::now());
+    if (wait.count() <= 0) return s.tellCameras();
+    s.later(wait, [&s] { s.tellCameras(); });
+  });
+}
+
 /// A peer that does not read would hold the server up for as long as a write may take; what the system has taken of our
 /// bytes still reaches it after the socket is closed.
 void WebSocketSession::drain() {
@@ -248,6 +259,13 @@ void WebSocketSession::adoptLightmaps() {
   pump();
 }
 
+void WebSocketSession::tellCameras() {
+  cameras_posted_ = false;  // what changes from here on asks for another visit
+  next_cameras_ = Clock::now() + std::chrono::milliseconds(protocol::kCamerasIntervalMs);
+  cameras_ = hub_->cameras().noteFor(*this);
+  pump();
+}
+
 void WebSocketSession::pump() {
   if (writing_ || closing_) return;
   if (!control_.empty()) {
@@ -259,6 +277,7 @@ void WebSocketSession::pump() {
   if (close_when_written_) return close(close_when_written_->first, close_when_written_->second);
   if (!greeted_) return;
   if (progress_) return writeText(std::exchange(progress_, nullptr));
+  if (cameras_) return writeText(std::exchange(cameras_, nullptr));
   if (auto tile = tiles_.next(hub_->tiles())) return writeTile(std::move(*tile));
   if (const auto bookmark = tiles_.takeBookmark())
     writeText(std::make_shared<const std::string>(protocol::encodeNotification(*bookmark)));

@@ -2,6 +2,7 @@
 // the server. One for a page.
 
 import { EditSession } from './app_edit';
+import { PeopleSession } from './app_people';
 import { ViewSession } from './app_view';
 import type { Gltf } from './document/gltf';
 import { Connection, type LinkState } from './protocol/connection';
@@ -40,6 +41,7 @@ export class App {
   readonly view: ViewSession;
   readonly edit: EditSession;
   readonly share: Share;
+  readonly people: PeopleSession;
   readonly solve: SolvePanel;
   progress: Progress | undefined;
   /** For tests and for the console: what happened when, milliseconds since the page began. */
@@ -82,7 +84,10 @@ export class App {
     });
     this.view = new ViewSession(this);
     this.edit = new EditSession(this, me, (patch, id) => this.sendPatch(patch, id));
+    this.people = new PeopleSession(this);
     const sharePanel = new SharePanel({
+      sharing: this.people.sharing,
+      setSharing: (on) => this.people.setSharing(on),
       copyLink: () => void this.share.copyLink(),
       copyEdit: (form) => void this.share.copyEdit(form),
       download: (what) => void this.share.download(what),
@@ -106,7 +111,10 @@ export class App {
     );
     this.viewer = new Viewer(this.frame.canvas, {
       used: (bytes) => this.connection.used(bytes),
-      drawn: () => this.view.onDrawn(),
+      drawn: () => {
+        this.view.onDrawn();
+        this.people.tellSoon();
+      },
       sceneShown: (scene) => {
         this.view.onSceneShown(scene);
         this.edit.onSceneShown();
@@ -117,6 +125,8 @@ export class App {
       contextLost: (lost) =>
         this.frame.setBanner(lost ? 'The graphics card was taken away; waiting for it to come back.' : undefined),
     });
+    this.viewer.showPeople(this.people.people);
+    this.frame.overPicture(this.people.people.labels);
     this.share = new Share(this, sharePanel);
     this.tiles = new TileFeed({
       set: (kind) => this.viewer.setOf(kind),
@@ -204,12 +214,18 @@ export class App {
     for (const resolve of this.awaited.splice(0)) resolve();
     this.view.onCapabilities();
     this.share.onServer(info);
+    this.people.onReady();
     this.frame.setWelcome(hello.revision === 0);
     const status = await this.connection.call<Status>('status').catch(() => undefined);
     if (status) this.onStatus(status);
     if (!hello.resumed && hello.revision > 0) await this.fetchDocument();
     const { count } = await this.connection.call<{ count: number }>('viewers').catch(() => ({ count: 1 }));
+    this.onViewers(count);
+  }
+
+  private onViewers(count: number): void {
     this.frame.setViewers(count);
+    this.people.onViewers(count);
   }
 
   private onStatus(status: Status): void {
@@ -225,7 +241,8 @@ export class App {
       'scene.loaded': () => void this.onLoaded(),
       lightmaps: (note) => void this.onLightmaps(note),
       bookmark: (note) => this.onBookmark(note.revision, note.tileVersion),
-      viewers: (note) => this.frame.setViewers(note.count),
+      viewers: (note) => this.onViewers(note.count),
+      cameras: (note) => this.people.onCameras(note.cameras),
       draining: () => this.frame.toasts.show('The server is stopping'),
       notice: (note) => this.frame.toasts.show(note.text),
     };
@@ -235,7 +252,7 @@ export class App {
   private onProgress(progress: Progress): void {
     this.progress = progress;
     this.solve.update(progress);
-    const done = progress.state === 'converged' || progress.state === 'timeLimit';
+    const done = ['converged', 'timeLimit', 'limited'].includes(progress.state);
     const bad = progress.state === 'failed';
     const error = progress.state === 'empty' ? '' : `${percent(progress.error.total)} error`;
     const rate = progress.state === 'solving' ? `${readable(progress.shotsPerSecond, 2)} shots/s` : '';

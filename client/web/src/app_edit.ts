@@ -37,6 +37,7 @@ export class EditSession {
         this.make(visible ? 'Show' : 'Hide', edits.setVisible(this.document.gltf, node, visible)),
       remove: (node) => this.remove(node),
       addLamp: () => void this.addLamp(),
+      frameSelection: () => app.view.frameSelection(),
       endGesture: () => this.document.endGesture(),
       loadFile: (file) => void this.loadFile(file),
     });

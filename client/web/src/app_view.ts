@@ -42,6 +42,7 @@ export class ViewSession {
     const { canvas } = this.app.frame;
     const link = new URLSearchParams(location.hash.slice(1));
     this.placed = this.app.viewer.rig.fromText(link.get('camera') ?? '');
+    this.app.frame.setWalk(this.app.viewer.rig.mode === 'walk');
     void this.setMode(link.get('view') ?? 'lit');
     if (link.get('ui') === '0') this.app.frame.toggleChrome();
     this.listenToPointer(canvas);

@@ -1,5 +1,7 @@
 import { exposureOf } from '../../../client/web/src/view/exposure';
 import { editCommand } from '../../../client/web/src/app_share';
+import { encodeRgb9e5, scaleRgb9e5 } from '../../../client/web/src/protocol/rgb9e5';
+import { pageExponent } from '../../../client/web/src/view/lightmap_page';
 import { baseMipFor } from '../../../client/web/src/view/lightmap_set';
 import { fromHex, percent, readable, toHex } from '../../../client/web/src/ui/dom';
 
@@ -35,6 +37,18 @@ describe('memory', () => {
     // 40 pages of 4096 x 4096 texels of 4 bytes, with mips, are 3.3 GiB; a sixteenth fits.
     expect((40 * 4096 ** 2 * 16) / 3 / 4 ** base).toBeLessThan(512 * 2 ** 20);
   });
+});
+
+it('a page grows its exponent in steps that hold what comes', () => {
+  for (let exponent = -40; exponent <= 40; ++exponent) {
+    const page = pageExponent(exponent);
+    expect(page).toBeGreaterThanOrEqual(exponent);
+    expect(page - exponent).toBeLessThan(8);
+    // Nothing is lost of a texel that is 2^-21 of the brightest that a tile of this exponent may hold.
+    const dim = encodeRgb9e5(2 ** -6, 2 ** -7, 0.75 * 2 ** -6);
+    expect(scaleRgb9e5(scaleRgb9e5(dim, exponent - page), page - exponent)).toBe(dim);
+  }
+  expect(pageExponent(0)).toBe(0);
 });
 
 it('colours keep their bytes through hexadecimal', () => {

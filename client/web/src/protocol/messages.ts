@@ -36,7 +36,7 @@ export interface HelloReply {
   resumed: boolean;
 }
 
-export type SolveState = 'empty' | 'loading' | 'solving' | 'paused' | 'converged' | 'timeLimit' | 'failed';
+export type SolveState = 'empty' | 'loading' | 'solving' | 'paused' | 'converged' | 'timeLimit' | 'limited' | 'failed';
 
 export interface Progress {
   revision: number;
@@ -95,6 +95,14 @@ export interface Bookmark {
   tileVersion: number;
 }
 
+/** Where a viewer looks from: eye and the point looked at, metres. */
+export interface SharedCamera {
+  viewer: number;
+  name: string;
+  position: [number, number, number];
+  target: [number, number, number];
+}
+
 export interface SubscribeParams {
   lightmaps?: number[];
   minMip?: number;
@@ -117,6 +125,7 @@ export interface Notifications {
   lightmaps: LightmapsNote;
   bookmark: Bookmark;
   viewers: { count: number };
+  cameras: { cameras: SharedCamera[] };
   draining: { graceMs: number };
   notice: { kind: string; text: string };
 }

@@ -29,6 +29,9 @@ export class ErrorPlot {
 
   constructor() {
     new ResizeObserver(() => this.draw()).observe(this.element);
+    // A canvas does not take up the page's new colours by itself.
+    new MutationObserver(() => this.draw()).observe(document.documentElement, { attributeFilter: ['data-theme'] });
+    matchMedia('(prefers-color-scheme: light)').addEventListener('change', () => this.draw());
   }
 
   add(progress: Progress): void {
@@ -48,15 +51,19 @@ export class ErrorPlot {
   }
 
   draw(): void {
-    const { clientWidth: width, clientHeight: height } = this.element;
+    const { clientWidth, clientHeight } = this.element;
+    // Letters and margins are those of a page of 14 pixels, and grow with it.
+    const unit = parseFloat(getComputedStyle(document.documentElement).fontSize) / 14;
+    const [width, height] = [clientWidth / unit, clientHeight / unit];
     const context = this.element.getContext('2d');
     if (!context || width === 0) return;
     const ratio = devicePixelRatio;
-    if (this.element.width !== Math.round(width * ratio)) {
-      this.element.width = Math.round(width * ratio);
-      this.element.height = Math.round(height * ratio);
+    const [columns, rows] = [Math.round(clientWidth * ratio), Math.round(clientHeight * ratio)];
+    if (this.element.width !== columns || this.element.height !== rows) {
+      this.element.width = columns;
+      this.element.height = rows;
     }
-    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.setTransform(ratio * unit, 0, 0, ratio * unit, 0, 0);
     context.clearRect(0, 0, width, height);
     const style = getComputedStyle(this.element);
     const x = scale(
@@ -117,6 +124,13 @@ export class ErrorPlot {
     context.lineWidth = key === 'total' ? 2 : 1.2;
     for (const sample of this.samples) if (sample[key] > 0) context.lineTo(x.at(sample.seconds), y.at(sample[key]));
     context.stroke();
+    // Who comes when all is done has one sample, which makes no line.
+    const last = this.samples.at(-1);
+    if (!last || !(last[key] > 0)) return;
+    context.beginPath();
+    context.fillStyle = colour;
+    context.arc(x.at(last.seconds), y.at(last[key]), key === 'total' ? 3 : 2, 0, 2 * Math.PI);
+    context.fill();
   }
 }
 

@@ -137,6 +137,11 @@ export class Frame {
     input.focus();
   }
 
+  /** Lies over the picture, below the tools. */
+  overPicture(element: HTMLElement): void {
+    this.canvas.after(element);
+  }
+
   togglePanel(): void {
     this.openPanel(this.panel.hidden);
   }

@@ -14,6 +14,7 @@ const KEYS: [string, string][] = [
   ['[ ]', 'darker, brighter'],
   ['M', 'light meter'],
   ['Click, N, Shift+N', 'select, next, previous object'],
+  ['Click a name', 'look from where that viewer looks'],
   ['T, R, Y', 'move, turn, scale the selection'],
   ['L', 'add a lamp'],
   ['Delete', 'remove the selection'],

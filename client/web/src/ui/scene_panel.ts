@@ -20,6 +20,7 @@ export interface ScenePanelActions {
   setVisible(node: number, visible: boolean): void;
   remove(node: number): void;
   addLamp(): void;
+  frameSelection(): void;
   endGesture(): void;
   loadFile(file: File): void;
 }
@@ -136,6 +137,7 @@ export class ScenePanel {
         h(
           'div',
           { class: 'buttons' },
+          button('Look at it', () => this.actions.frameSelection(), { title: 'Shift+F' }),
           button('Remove', () => this.actions.remove(selection.node), { title: 'Delete' }),
         ),
       ),

@@ -1,8 +1,11 @@
 // The panel "Share": a link that carries the camera, the last edit as a command, and files to take away.
 
-import { button, h, section } from './dom';
+import { button, checkbox, field, h, section } from './dom';
 
 export interface SharePanelActions {
+  /** What the box says at first. */
+  sharing: boolean;
+  setSharing(on: boolean): void;
   copyLink(): void;
   copyEdit(form: 'command' | 'json'): void;
   download(what: 'glb' | 'unlit' | 'exr' | 'png' | 'snapshot'): void;
@@ -30,6 +33,14 @@ export class SharePanel {
           button('Copy link', () => actions.copyLink()),
           button('Save picture', () => actions.download('png')),
         ),
+      ),
+      section(
+        'People',
+        field(
+          'Show cameras',
+          checkbox(actions.sharing, (on) => actions.setSharing(on)),
+        ),
+        h('p', { class: 'dim' }, 'Who shows where they look from sees where the others do.'),
       ),
       section('Last edit', this.edit, h('div', { class: 'buttons' }, ...this.copies)),
       section(

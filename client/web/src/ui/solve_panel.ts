@@ -17,6 +17,7 @@ const STATES: Record<string, string> = {
   paused: 'Paused',
   converged: 'Done',
   timeLimit: 'Time limit reached',
+  limited: 'Memory limit reached',
   failed: 'Failed',
 };
 
@@ -96,7 +97,8 @@ export class SolvePanel {
       ['Solve time', duration(progress.seconds)],
       ['Time left, about', progress.secondsLeft === undefined ? '–' : duration(progress.secondsLeft)],
       ['Unshot', `${readable(progress.energy['unshot'] ?? 0)} of ${readable(progress.energy['emitted'] ?? 0)} lm`],
-      ['Patches', `${readable(progress.patches, 4)} on ${readable(progress.surfaces, 4)} surfaces`],
+      ['Patches', readable(progress.patches, 4)],
+      ['Surfaces', readable(progress.surfaces, 4)],
     ]);
   }
 

@@ -50,14 +50,14 @@ export class ViewPanel {
     this.stops = h('input', { type: 'range', min: '-8', max: '8', step: '0.25', value: '0' });
     this.stops.oninput = () => actions.setStops(Number(this.stops.value));
     this.falseRow = field('False colour', this.falseBox);
-    this.rangeRow = h('div', {}, field('Automatic scale', this.autoRange), field('Scale', this.low, this.high));
+    this.rangeRow = h('div', {}, field('Auto scale', this.autoRange), field('Scale', this.low, this.high));
     this.element = h(
       'div',
       {},
       section('Show', grid, this.falseRow, this.rangeRow),
       section(
         'Picture',
-        field('Automatic exposure', this.auto),
+        field('Auto exposure', this.auto),
         field('Exposure', this.stops, this.stopsValue),
         field(
           'Tone curve',

@@ -143,6 +143,15 @@ export class CameraRig {
     this.moved();
   }
 
+  /** Looks from one point to another. */
+  lookFrom(eye: Vector3, target: Vector3): void {
+    this.camera.position.copy(eye);
+    this.target.copy(target);
+    this.camera.lookAt(target);
+    if (this.mode === 'orbit') this.orbit.update();
+    this.moved();
+  }
+
   /** Looks at the scene from in front, a little above. */
   overview(box: Box3): void {
     this.fov = 45;
@@ -175,6 +184,11 @@ export class CameraRig {
     this.resize(this.camera.aspect);
     this.setMode(n[7] === 1 ? 'walk' : 'orbit');
     return true;
+  }
+
+  /** Diagonal of the scene, metres. */
+  get sceneSize(): number {
+    return this.size;
   }
 
   private get horizontalFov(): number {

@@ -30,6 +30,8 @@ export class ExposureMeter {
   base = 1;
   /** Nothing was measured yet. */
   fresh = true;
+  /** How long the last measurement was on its way. */
+  tookMs = 0;
   private measured = 1;
   private shown = 1;
   private running: Promise<void> | undefined;
@@ -80,8 +82,10 @@ export class ExposureMeter {
     renderer.render(scene, camera);
     renderer.setRenderTarget(null);
     view.all.measuring.value = false;
+    const begin = performance.now();
     try {
       await renderer.readRenderTargetPixelsAsync(target, 0, 0, WIDTH, HEIGHT, pixels);
+      this.tookMs = performance.now() - begin;
       const value = exposureOf(this.luminances(pixels));
       if (value !== undefined) this.take(value);
     } catch {

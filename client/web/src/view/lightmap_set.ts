@@ -9,6 +9,9 @@ import { LightmapPage } from './lightmap_page';
 /** Texels of all pages in memory, and as many again on the card. */
 export const MEMORY_BUDGET_BYTES = 512 * 2 ** 20;
 
+/** Texels that the legend's range is made of, of all pages together. */
+const RANGE_SAMPLES = 16_384;
+
 /** The finest mip of all pages that fits into the budget. */
 export function baseMipFor(pages: LightmapsNote['pages'], budget = MEMORY_BUDGET_BYTES): number {
   const bytes = pages.reduce((sum, page) => sum + (page.width * page.height * 16) / 3, 0);
@@ -73,7 +76,8 @@ export class LightmapSet {
 
   /** Values at the dark and bright end of what is there, lux; undefined: nothing yet. */
   range(): [number, number] | undefined {
-    const values = this.pages.flatMap((page) => page.someValues(4096)).sort((a, b) => a - b);
+    const each = Math.max(64, Math.floor(RANGE_SAMPLES / this.pages.length));
+    const values = Float64Array.from(this.pages.flatMap((page) => page.someValues(each))).sort();
     if (values.length === 0) return undefined;
     const at = (q: number) => values[Math.min(values.length - 1, Math.floor(q * values.length))]!;
     const high = at(0.995);

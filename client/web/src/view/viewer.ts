@@ -10,6 +10,7 @@ import { Gizmo, type GizmoMode } from './gizmo';
 import { ViewUniforms } from './lit_material';
 import { LightmapSet } from './lightmap_set';
 import { LitScene } from './lit_scene';
+import type { People } from './people';
 import { PagesView } from './pages_view';
 import { pick, readingAt, type Reading } from './picker';
 import type { ViewMode } from './view_modes';
@@ -20,6 +21,12 @@ const TILE_BUDGET_MS = 5;
 const READY_ERROR = 0.35;
 const READY_AFTER_MS = 900;
 const MEASURE_EVERY_MS = 250;
+/** Reading back waits for all that the card has still to draw, which a slow one makes long: rest so many times that. */
+const MEASURE_SHARE = 8;
+/** A driver that never says it is done (a lost context) holds nothing up for longer. */
+const MOST_COMPILING_MS = 2000;
+/** Length of the pyramid that stands for another viewer, of the scene's diagonal. */
+const PERSON_SIZE = 0.04;
 
 export interface ViewerEvents {
   used(bytes: number): void;
@@ -50,6 +57,8 @@ export class Viewer {
   mode: ViewMode | undefined;
   autoRange = true;
   private staged: Staged | undefined;
+  private people: People | undefined;
+  private readonly anisotropy: number;
   private readonly world = new Scene();
   private wanted = true;
   private lastFrame = 0;
@@ -65,6 +74,8 @@ export class Viewer {
     this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, powerPreference: 'high-performance' });
     this.renderer.toneMapping = NoToneMapping; // our shaders do it, and the encoding, so that one program serves all
     this.renderer.outputColorSpace = LinearSRGBColorSpace;
+    // Asked for here, where nothing is being drawn that the answer would have to wait for.
+    this.anisotropy = Math.min(8, this.renderer.capabilities.getMaxAnisotropy());
     this.renderer.setClearColor(0, 0); // the page's own background shows behind the scene
     this.rig = new CameraRig(canvas, () => this.invalidate());
     this.exposure = new ExposureMeter(this.renderer, this.uniforms);
@@ -117,17 +128,22 @@ export class Viewer {
 
   /** Geometry of a layout. A set that was overtaken is dropped. */
   async load(glb: ArrayBuffer, set: LightmapSet): Promise<void> {
-    const scene = await LitScene.load(
-      glb,
-      set,
-      this.uniforms,
-      Math.min(8, this.renderer.capabilities.getMaxAnisotropy()),
-    );
+    const scene = await LitScene.load(glb, set, this.uniforms, this.anisotropy);
     if (this.staged?.set !== set) return scene.dispose();
     scene.applyDocument(this.document);
+    await this.compile(scene);
+    if (this.staged?.set !== set) return scene.dispose();
+    scene.applyDocument(this.document); // it may have been edited meanwhile
     this.staged.scene = scene;
     this.staged.since = performance.now();
     this.invalidate();
+  }
+
+  /** Has the driver make the scene's programs while the page goes on, where it can: drawing waits for them. */
+  private async compile(scene: LitScene): Promise<void> {
+    if (!this.renderer.extensions.has('KHR_parallel_shader_compile')) return;
+    const timeUp = new Promise((resolve) => setTimeout(resolve, MOST_COMPILING_MS));
+    await Promise.race([this.renderer.compileAsync(scene.root, this.rig.camera, this.world), timeUp]);
   }
 
   /** Nothing to show any more (the server has no scene). */
@@ -175,6 +191,12 @@ export class Viewer {
     return hit && this.shown ? readingAt(this.shown, hit, errors) : undefined;
   }
 
+  /** Where others look from is drawn into the picture. */
+  showPeople(people: People): void {
+    this.people = people;
+    this.world.add(people.root);
+  }
+
   select(node: number | undefined): void {
     const object = node === undefined ? undefined : (this.lampRoot(node) ?? this.shown?.nodes.get(node));
     this.gizmo.attach(object);
@@ -184,9 +206,9 @@ export class Viewer {
   /** PNG of what is on the screen. */
   async picture(): Promise<Blob> {
     await this.settle();
-    this.gizmo.setVisible(false);
+    this.setSigns(false);
     this.draw();
-    this.gizmo.setVisible(!this.mode?.flat);
+    this.setSigns(true);
     this.invalidate();
     return new Promise((resolve, reject) =>
       this.canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error('the picture could not be made')))),
@@ -207,6 +229,7 @@ export class Viewer {
     if (taken > 0) this.wanted = true;
     this.promote(now);
     if (this.rig.update(seconds)) this.wanted = true;
+    if (this.people?.step(seconds, this.rig.sceneSize * PERSON_SIZE)) this.wanted = true;
     if (this.wanted) this.measure(now);
     if (this.exposure.step(seconds)) this.wanted = true;
     if (!this.wanted) return;
@@ -218,12 +241,18 @@ export class Viewer {
   private draw(): void {
     this.shown?.eachMaterial((material) => material.refresh());
     this.pagesView.refresh();
+    this.people?.leaveOut(this.rig.camera);
     const flat = this.mode?.flat;
     this.renderer.render(flat ? this.pagesView.scene : this.world, flat ? this.pagesView.camera : this.rig.camera);
+    if (this.people) {
+      this.people.labels.hidden = flat === true;
+      this.people.placeLabels(this.rig.camera, this.canvas.clientWidth, this.canvas.clientHeight);
+    }
   }
 
   private measure(now: number): void {
-    if (now - this.lastMeasure < MEASURE_EVERY_MS || !this.shown?.set.covered) return;
+    const pause = Math.max(MEASURE_EVERY_MS, MEASURE_SHARE * this.exposure.tookMs);
+    if (now - this.lastMeasure < pause || !this.shown?.set.covered) return;
     this.lastMeasure = now;
     if (this.uniforms.all.falseColour.value) this.updateRange();
     if (this.exposure.automatic && !this.mode?.flat) void this.measureNow().then(() => this.invalidate());
@@ -231,13 +260,17 @@ export class Viewer {
 
   /** Signs and handles are no part of the scene's light. */
   private measureNow(): Promise<void> {
-    const lamps = [...(this.shown?.lamps.values() ?? [])];
-    this.gizmo.setVisible(false);
-    for (const lamp of lamps) lamp.visible = false;
+    this.setSigns(false);
     const measured = this.exposure.measure(this.world, this.rig.camera);
-    this.gizmo.setVisible(!this.mode?.flat);
-    for (const lamp of lamps) lamp.visible = true;
+    this.setSigns(true);
     return measured;
+  }
+
+  /** Handles, lamps' signs and other viewers. */
+  private setSigns(visible: boolean): void {
+    this.gizmo.setVisible(visible && !this.mode?.flat);
+    for (const lamp of this.shown?.lamps.values() ?? []) lamp.visible = visible;
+    if (this.people) this.people.root.visible = visible;
   }
 
   /** Ends when the picture has the exposure that the light there is now asks for. */

@@ -1,0 +1,98 @@
+import type { Page } from 'playwright-core';
+import type {} from '../../../client/web/src/main';
+import { converged, Pages, SCENES, Server, until } from './harness';
+
+const server = new Server(`${SCENES}/cornell.glb`);
+const pages = new Pages();
+
+beforeAll(async () => {
+  await server.start();
+  await pages.launch();
+});
+afterEach(async () => {
+  await pages.closeAll();
+  expect(pages.complaints.splice(0)).toEqual([]);
+});
+afterAll(async () => {
+  await pages.quit();
+  await server.stop('SIGTERM');
+});
+
+const eye = (page: Page) => page.evaluate(() => window.viewer!.viewer.rig.camera.position.toArray());
+/** Where a page draws the others' eyes. */
+const others = (page: Page) =>
+  page.evaluate(() => window.viewer!.people.people.root.children.map((person) => person.position.toArray()));
+const distance = (a: readonly number[], b: readonly number[]) => Math.hypot(...a.map((v, i) => v - b[i]!));
+
+/** Until a page shows one other, there. */
+async function shows(page: Page, other: Page): Promise<void> {
+  const goal = await eye(other);
+  const seen = await until(
+    () => others(page),
+    (all) => all.length === 1 && distance(all[0]!, goal) < 1e-3,
+  );
+  expect(seen.length).toBe(1);
+  expect(distance(seen[0]!, goal)).toBeLessThan(1e-3); // five digits are told
+}
+
+it('shows where the other looks from, follows, and forgets who leaves', async () => {
+  const first = await pages.open(server.url, 1200, 800);
+  await converged(first);
+  const second = await pages.open(server.url, 1200, 800);
+  await converged(second);
+  await shows(first, second);
+  await shows(second, first);
+
+  await second.locator('canvas.view').focus();
+  for (let i = 0; i < 12; ++i) await second.keyboard.press('ArrowRight');
+  await shows(first, second);
+
+  // A name in the picture leads there.
+  for (let i = 0; i < 20; ++i) await first.keyboard.press('-');
+  const name = first.locator('.person');
+  await name.waitFor();
+  await name.click();
+  await until(
+    async () => distance(await eye(first), await eye(second)),
+    (d) => d < 1e-3,
+  );
+  expect(distance(await eye(first), await eye(second))).toBeLessThan(1e-3);
+  // In one place with it, the sign would fill the picture.
+  const visible = await until(
+    () => name.isVisible(),
+    (is) => !is,
+  );
+  expect(visible).toBe(false);
+
+  await second.context().close();
+  const left = await until(
+    () => others(first),
+    (all) => all.length === 0,
+  );
+  expect(left).toEqual([]);
+});
+
+it('shows nothing of who does not want it, and nothing to them', async () => {
+  const first = await pages.open(server.url, 1200, 800);
+  await converged(first);
+  const second = await pages.open(server.url, 1200, 800);
+  await converged(second);
+  await shows(first, second);
+  await second.getByRole('tab', { name: 'Share' }).click();
+  await second.getByLabel('Show cameras').uncheck();
+  const left = await until(
+    () => others(first),
+    (all) => all.length === 0,
+  );
+  expect(left).toEqual([]);
+  expect(await others(second)).toEqual([]);
+  // The choice outlives the visit.
+  await second.reload();
+  await converged(second);
+  expect(await others(first)).toEqual([]);
+  await second.getByRole('tab', { name: 'Share' }).click();
+  expect(await second.getByLabel('Show cameras').isChecked()).toBe(false);
+  await second.getByLabel('Show cameras').check();
+  await shows(first, second);
+  await shows(second, first);
+});
