@@ -29,8 +29,8 @@ class LitScene {
                                                               solver::Transport& transport,
                                                               const LitScene* former = nullptr);
 
-  /// Whether a scene made of the same document by another process has the same charts, so that a saved solve fits it. One
-  /// whose charts stayed where a former scene had them is its own.
+  /// Whether a scene made of the same document by another process has the same charts, so that a saved solve fits it.
+  /// One whose charts stayed where a former scene had them is its own.
   [[nodiscard]] bool isReproducible() const { return reproducible_; }
 
   /// Gives the geometry to the transport; must come before the solver's first step.

@@ -106,7 +106,7 @@ class SolveLoop final : public Engine {
   /// Puts a lit scene in place of the present one, which goes on if `made` is an error or cannot be uploaded.
   /// Of an edit, the present one's light is shown until the new one's is as good, and its links go over to it: where
   /// `keep` fails then, the present one is solved anew.
-  enum class Relation { kOther, kEdited };
+  enum class Relation { kOther, kEdited, kResumed };  ///< the last has its solve already
   using KeepMade = std::function<Result<void>(const LitScene& made, const LitScene::Affected& affected)>;
   [[nodiscard]] Result<LitScene::Affected> relight(Result<std::unique_ptr<LitScene>> made, Relation relation,
                                                    const KeepMade& keep = {});

@@ -71,7 +71,8 @@ Result<LitScene::Affected> SolveLoop::relight(Result<std::unique_ptr<LitScene>> 
   auto* former = relation == Relation::kEdited ? lit_.get() : nullptr;
   if (former != nullptr) (*made)->fadeFrom(*former);
   // What a solve that failed has measured may be a part of what it thinks it has.
-  const auto affected = (*made)->startSolve(state_ == SolveState::kFailed ? nullptr : former);
+  LitScene::Affected affected;
+  if (relation != Relation::kResumed) affected = (*made)->startSolve(state_ == SolveState::kFailed ? nullptr : former);
   if (auto kept = keep ? keep(**made, affected) : Result<void>(); !kept) {
     takeBack(former != nullptr);
     return tl::unexpected<Error>(kept.error());

@@ -117,7 +117,7 @@ Result<void> SolveLoop::restoreSolve(const scene::Document& document) {
     auto resumed = resumedScene(document, **checkpoint);
     if (resumed) {
       seconds = seconds_;
-      if (auto lit = relight(std::move(resumed), false); !lit) return lit;
+      if (auto lit = relight(std::move(resumed), Relation::kResumed); !lit) return tl::unexpected<Error>(lit.error());
       resumed_shots_ = lit_->solver().shots();
     } else {
       log::warn("the solve begins anew: {}: {}", file.string(), resumed.error().message);
