@@ -173,7 +173,7 @@ bool SolveLoop::goesOnWith(const scene::Document& document, bool with_edits) con
 }
 
 void SolveLoop::openFile(std::string path, Callback<LoadOutcome> done) {
-  ask<LoadOutcome>(std::move(done), [this, path = std::move(path)]() -> Result<LoadOutcome> {
+  ask<LoadOutcome>(countLoad(std::move(done)), [this, path = std::move(path)]() -> Result<LoadOutcome> {
     auto document = scene::loadDocument(path);
     if (document && goesOnWith(*document, true)) return LoadOutcome{revision_, lit_->warnings()};
     if (document && as_restored_)
