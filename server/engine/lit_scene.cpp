@@ -30,15 +30,24 @@ Result<std::unique_ptr<LitScene>> LitScene::make(scene::EditedDocument edited, c
   return lit;
 }
 
+bool LitScene::relatedTo(const LitScene& former) const {
+  return former.patches_->centre == patches_->centre && former.patches_->scale == patches_->scale &&
+         former.patches_->texel == patches_->texel;
+}
+
+LitScene::Affected LitScene::mostAffected(const LitScene& former) const {
+  const auto surfaces = former.patches_->surfaces.size();
+  if (!relatedTo(former)) return {std::max(patches_->surfaces.size(), surfaces), former.solver_->shots()};
+  const auto map = scene::matchPatches(*former.scene_, *former.patches_, *scene_, *patches_);
+  return {touchedSurfaces(surfaces, map), former.solver_->shots()};
+}
+
 LitScene::Affected LitScene::startSolve(LitScene* former) {
-  const auto all = std::max<std::uint64_t>(patches_->surfaces.size(), former ? former->patches_->surfaces.size() : 0);
-  const auto shots_before = former != nullptr ? former->solver_->shots() : 0;
-  const bool related = former != nullptr && former->patches_->centre == patches_->centre &&
-                       former->patches_->scale == patches_->scale && former->patches_->texel == patches_->texel;
-  if (!related) {
+  if (former == nullptr || !relatedTo(*former)) {
     makeSolver();
-    return {all, shots_before};
+    return former == nullptr ? Affected{patches_->surfaces.size(), 0} : mostAffected(*former);
   }
+  const auto shots_before = former->solver_->shots();
   const auto map = scene::matchPatches(*former->scene_, *former->patches_, *scene_, *patches_);
   const solver::FormerSolver before{*former->solver_, map};
   const bool keeps = !map.nothingKept();

@@ -44,6 +44,8 @@ class LitScene {
     std::uint64_t surfaces = 0, shots = 0;
   };
   Affected startSolve(LitScene* former = nullptr);
+  /// What that will say of an edit that makes this scene of `former`, or more.
+  [[nodiscard]] Affected mostAffected(const LitScene& former) const;
 
   /// Surfaces that a change to `next` would touch; all of them where it changes geometry or lights.
   [[nodiscard]] std::uint64_t affectedBy(const SceneChange& change, const scene::Scene& next) const;
@@ -92,6 +94,7 @@ class LitScene {
         settings_(settings),
         transport_(transport),
         scene_(std::make_shared<const scene::Scene>(std::move(edited.scene))) {}
+  [[nodiscard]] bool relatedTo(const LitScene& former) const;
   void makeSolver(const solver::FormerSolver* former = nullptr);
   void updateSolver(bool materials, bool lights);
   [[nodiscard]] std::uint64_t touchedSurfaces(std::size_t before, const scene::PatchMap& map) const;

@@ -104,13 +104,12 @@ class SolveLoop final : public Engine {
   /// Called when nothing but the disk can fail any more: what is about to come is brought there.
   using Keep = std::function<Result<void>(const PatchOutcome&)>;
   /// Puts a lit scene in place of the present one, which goes on if `made` is an error or cannot be uploaded.
-  /// Of an edit, the present one's light is shown until the new one's is as good, and its links go over to it: where
-  /// `keep` fails then, the present one is solved anew.
-  enum class Relation { kOther, kEdited, kResumed };  ///< the last has its solve already
-  using KeepMade = std::function<Result<void>(const LitScene& made, const LitScene::Affected& affected)>;
+  /// Of an edit, the present one's light is shown until the new one's is as good, and its links go over to it, once
+  /// `keep` has succeeded. A resumed one has its solve already.
+  enum class Relation { kOther, kEdited, kResumed };
+  using KeepMade = std::function<Result<void>(const LitScene&)>;
   [[nodiscard]] Result<LitScene::Affected> relight(Result<std::unique_ptr<LitScene>> made, Relation relation,
                                                    const KeepMade& keep = {});
-  void takeBack(bool links_are_gone);
   [[nodiscard]] Result<void> checkBase(const std::optional<std::uint64_t>& base_revision) const;
   [[nodiscard]] Result<PatchOutcome> applyRequest(const PatchRequest& request);
   [[nodiscard]] Result<PatchOutcome> applyStep(const StepRequest& request);

@@ -32,7 +32,7 @@ Result<LoadOutcome> SolveLoop::install(Result<scene::Document> document) {
   const SolveState before = std::exchange(state_, SolveState::kLoading);
   updateStatus(true);
   auto next = History::nextLoad(revision_ + 1, document->name);
-  const auto keep = [&](const LitScene& made, const LitScene::Affected&) { return keepLoad(next, made.document()); };
+  const auto keep = [&](const LitScene& made) { return keepLoad(next, made.document()); };
   const auto lit = relight(LitScene::make(std::move(*document), settings_, *transport_), Relation::kOther, keep);
   if (!lit) {
     if (state_ == SolveState::kLoading) state_ = before;
@@ -49,23 +49,18 @@ Result<LoadOutcome> SolveLoop::install(Result<scene::Document> document) {
   return LoadOutcome{revision_, lit_->warnings()};
 }
 
-/// What was lit before goes on, since what should replace it cannot.
-void SolveLoop::takeBack(bool links_are_gone) {
-  if (!lit_) return;
-  if (const auto back = lit_->upload(); !back) {
-    failure_ = back.error().text();
-    endSolve(SolveState::kFailed);
-  } else if (links_are_gone) {
-    lit_->restart(settings_);
-    beginSolve();
-  }
-}
-
 Result<LitScene::Affected> SolveLoop::relight(Result<std::unique_ptr<LitScene>> made, Relation relation,
                                               const KeepMade& keep) {
   if (!made) return tl::unexpected<Error>(made.error());
-  if (auto uploaded = (*made)->upload(); !uploaded) {
-    takeBack(false);
+  auto uploaded = (*made)->upload();
+  if (uploaded && keep) uploaded = keep(**made);
+  if (!uploaded) {
+    if (lit_) {
+      if (const auto back = lit_->upload(); !back) {
+        failure_ = back.error().text();
+        endSolve(SolveState::kFailed);
+      }
+    }
     return tl::unexpected<Error>(uploaded.error());
   }
   auto* former = relation == Relation::kEdited ? lit_.get() : nullptr;
@@ -73,10 +68,6 @@ Result<LitScene::Affected> SolveLoop::relight(Result<std::unique_ptr<LitScene>> 
   // What a solve that failed has measured may be a part of what it thinks it has.
   LitScene::Affected affected;
   if (relation != Relation::kResumed) affected = (*made)->startSolve(state_ == SolveState::kFailed ? nullptr : former);
-  if (auto kept = keep ? keep(**made, affected) : Result<void>(); !kept) {
-    takeBack(former != nullptr);
-    return tl::unexpected<Error>(kept.error());
-  }
   lit_ = std::move(*made);
   renderer_lost_ = false;  // it took the scene
   publisher_.reset();
@@ -161,14 +152,19 @@ Result<PatchOutcome> SolveLoop::adopt(scene::EditedDocument edited, const Keep& 
 Result<PatchOutcome> SolveLoop::rebuild(scene::EditedDocument edited, const Keep& keep) {
   PatchOutcome outcome;
   outcome.revision = revision_ + 1;
-  const auto keep_made = [&](const LitScene&, const LitScene::Affected& affected) {
+  const auto set = [&](const LitScene::Affected& affected) {
     outcome.affected_shots = affected.shots;
     outcome.affected_surfaces = std::max<std::uint64_t>(affected.surfaces, 1);  // pages are new even if empty
+  };
+  // How many shots it touches is known when their links have gone over, after which there is no way back.
+  const auto keep_made = [&](const LitScene& made) {
+    set(made.mostAffected(*lit_));
     return keep(outcome);
   };
   auto made = LitScene::make(std::move(edited), settings_, *transport_, lit_.get());
-  if (const auto lit = relight(std::move(made), Relation::kEdited, keep_made); !lit)
-    return tl::unexpected<Error>(lit.error());
+  const auto affected = relight(std::move(made), Relation::kEdited, keep_made);
+  if (!affected) return tl::unexpected<Error>(affected.error());
+  set(*affected);
   return outcome;
 }
 
