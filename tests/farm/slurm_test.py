@@ -90,7 +90,7 @@ class SlurmArray(unittest.TestCase):
         if not pathlib.Path(room).exists():
             self.skipTest("the room was not built")
         # An error that is never reached: the solve lasts until it is interrupted, and then until its time is up.
-        task = f"{self.submit([room], '--error', '1e-9', '--time-limit', '20')}_1"
+        task = f"{self.submit([room], '--error', '1e-6', '--time-limit', '20')}_1"
         state = self.out / "state" / pathlib.Path(room).stem
         self.cluster.until(lambda: state.exists() and any(state.iterdir()), "the solve keeps a state")
         self.cluster.call("scancel", "--signal=TERM", "--batch", task)
