@@ -11,10 +11,10 @@ namespace radiosity::solver {
 namespace {
 
 /// Nodes weaker than this part of a share play Russian roulette, where half of all light is reflected or less.
-constexpr double kRouletteShare = 0.2;
+constexpr double kRouletteShare = 0.05;
 /// A node that plays counts at most this often. Below, its light is left out (see leftOut()): in a dark corner larger
 /// weights would feed on themselves.
-constexpr double kMaxWeight = 40.0;
+constexpr double kMaxWeight = 20.0;
 /// Nodes of less than this part of a share may shoot as a polygon though a part of it is empty or buried.
 constexpr double kPartialShare = 0.06;
 /// Their parts that have more than this do not play.
@@ -23,6 +23,8 @@ constexpr double kCertainShare = 0.005;
 constexpr double kVariationWorth = 0.1;
 /// Square of the part of a node's links to its near receivers that feels what varies inside it.
 constexpr double kVariation = 0.5;
+/// First samples of a scattered node.
+constexpr std::uint32_t kScatteredPoints = 4;
 /// Points of one sample of a light: enough for the ratio of weighted visibilities to have little bias.
 constexpr std::uint32_t kLightPoints = 8;
 /// Points on all lights together in the first wave and half, where some have fewer than kLightPoints.
@@ -148,8 +150,16 @@ void LinkPlanner::addShooter(const Node& node, LinkSystem& system, const UnshotP
   if (shots_.gathers(node.place)) ++counters_.gathered_nodes;
   if (node.place.level > 0) ++counters_.whole_subtrees;
   for (std::size_t half = 0; half < 2; ++half) {
-    if (in[half]) wanted.push_back({index, half, 1, 0});
+    if (in[half]) wantFirst(index, half, system, wanted);
   }
+}
+
+/// A node that is scattered shines from single points: what is beside one of few would stand out as a blot.
+void LinkPlanner::wantFirst(std::uint32_t index, std::size_t half, const LinkSystem& system,
+                            std::vector<Measurement>& wanted) const {
+  const auto& shooter = system.shooters()[index];
+  const auto samples = shots_.gathers(shooter.place) ? 1U : kScatteredPoints;
+  for (std::uint32_t k = 0; k < samples; ++k) wanted.push_back({index, half, 1, k});
 }
 
 std::vector<Measurement> LinkPlanner::grow(LinkSystem& system, const UnshotPyramid& unshot,
@@ -279,7 +289,7 @@ void LinkPlanner::split(const NodePlace& place, LinkSystem& system, const Unshot
     ++counters_.shooters;
     if (shots_.gathers(shooter.place)) ++counters_.gathered_nodes;
     if (shooter.place.level > 0) ++counters_.whole_subtrees;
-    for (std::size_t half = 0; half < 2; ++half) wanted.push_back({index, half, 1, 0});
+    for (std::size_t half = 0; half < 2; ++half) wantFirst(index, half, system, wanted);
   }
 }
 

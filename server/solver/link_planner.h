@@ -100,6 +100,8 @@ class LinkPlanner {
                                         const scene::PatchScene& patches) const;
   [[nodiscard]] double variation(const Shooter& shooter, const LinkSystem& system, const UnshotPyramid& unshot,
                                  const scene::PatchScene& patches) const;
+  void wantFirst(std::uint32_t index, std::size_t half, const LinkSystem& system,
+                 std::vector<Measurement>& wanted) const;
   void split(const NodePlace& place, LinkSystem& system, const UnshotPyramid& unshot, const scene::PatchScene& patches,
              LinkMemory& memory, std::vector<Measurement>& wanted);
   void addShooter(const Node& node, LinkSystem& system, const UnshotPyramid& unshot, const scene::PatchScene& patches,
