@@ -197,7 +197,8 @@ std::vector<Measurement> LinkedSolver::plan() {
   memory_.begin(system_);
   if (phase_ == Phase::kLights) return planLights();
   if (phase_ == Phase::kImprove) return planner_.improve(system_, unshot_, *patches_, !isFull(), memory_);
-  if (planner_.share() <= 0.0 || isFull()) return {};
+  if (planner_.share() <= 0.0) return {};
+  // Also where there is no room: the walk finds out how much light goes without.
   const std::size_t limit = std::max<std::size_t>(settings_.planner.pairs_a_wave, system_.shooters().size() / 2);
   return planner_.grow(system_, unshot_, *patches_, limit, memory_);
 }
