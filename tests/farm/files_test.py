@@ -197,7 +197,8 @@ class ServiceUnit(unittest.TestCase):
             place = pathlib.Path(folder) / "radiosityd.service"
             # The program lies elsewhere while it is tested; a unit's program must exist.
             place.write_text(unit.replace("/usr/local/bin/radiosityd", str(pathlib.Path(os.environ["RADIOSITYD"]).resolve())))
-            done = subprocess.run([analyze, "verify", place], capture_output=True, text=True, check=False)
+            # Whether its manual pages are installed here is not the unit's affair.
+            done = subprocess.run([analyze, "--man=no", "verify", place], capture_output=True, text=True, check=False)
             self.assertEqual((done.returncode, done.stdout + done.stderr), (0, ""))
             rated = subprocess.run([analyze, "security", "--offline=true", "--threshold=20", place], capture_output=True,
                                    text=True, check=False)
