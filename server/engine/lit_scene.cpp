@@ -30,31 +30,26 @@ Result<std::unique_ptr<LitScene>> LitScene::make(scene::EditedDocument edited, c
   return lit;
 }
 
-bool LitScene::relatedTo(const LitScene& former) const {
-  return former.patches_->centre == patches_->centre && former.patches_->scale == patches_->scale &&
-         former.patches_->texel == patches_->texel;
+LitScene::Affected LitScene::succeed(const LitScene& former) {
+  const auto before = former.patches_->surfaces.size();
+  const bool related = former.patches_->centre == patches_->centre && former.patches_->scale == patches_->scale &&
+                       former.patches_->texel == patches_->texel;
+  if (!related) return {std::max(patches_->surfaces.size(), before), former.solver_->shots()};
+  former_map_ = scene::matchPatches(*former.scene_, *former.patches_, *scene_, *patches_);
+  return {touchedSurfaces(before, *former_map_), former.solver_->shots()};
 }
 
-LitScene::Affected LitScene::mostAffected(const LitScene& former) const {
-  const auto surfaces = former.patches_->surfaces.size();
-  if (!relatedTo(former)) return {std::max(patches_->surfaces.size(), surfaces), former.solver_->shots()};
-  const auto map = scene::matchPatches(*former.scene_, *former.patches_, *scene_, *patches_);
-  return {touchedSurfaces(surfaces, map), former.solver_->shots()};
-}
-
-LitScene::Affected LitScene::startSolve(LitScene* former) {
-  if (former == nullptr || !relatedTo(*former)) {
+std::uint64_t LitScene::startSolve(LitScene* former) {
+  const auto map = std::exchange(former_map_, std::nullopt);
+  if (former == nullptr || !map || map->nothingKept()) {
     makeSolver();
-    return former == nullptr ? Affected{patches_->surfaces.size(), 0} : mostAffected(*former);
+    return former == nullptr ? 0 : former->solver_->shots();
   }
   const auto shots_before = former->solver_->shots();
-  const auto map = scene::matchPatches(*former->scene_, *former->patches_, *scene_, *patches_);
-  const solver::FormerSolver before{*former->solver_, map};
-  const bool keeps = !map.nothingKept();
-  makeSolver(keeps ? &before : nullptr);
-  return {touchedSurfaces(former->patches_->surfaces.size(), map),
-          keeps && solver_->linkCounters().kept + solver_->affectedSamples() > 0 ? solver_->affectedSamples()
-                                                                                 : shots_before};
+  const solver::FormerSolver before{*former->solver_, *map};
+  makeSolver(&before);
+  const bool keeps = solver_->linkCounters().kept + solver_->affectedSamples() > 0;
+  return keeps ? solver_->affectedSamples() : shots_before;
 }
 
 /// Those that are new, or gone, or elsewhere, and those of which more or less is left.

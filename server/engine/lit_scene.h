@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -38,14 +39,15 @@ class LitScene {
 
   [[nodiscard]] SceneChange changeTo(const scene::Scene& next) const { return changeBetween(*scene_, next); }
 
-  /// Prepares the solve; must come after upload(). What can be kept of a former scene's links is taken from it: its
-  /// solver is of no use afterwards. Returns what an edit that made this scene of that one touched.
+  /// Finds what stays of `former`, of which this scene is an edit, and says what the edit touches: these surfaces, and
+  /// at most so many shots.
   struct Affected {
     std::uint64_t surfaces = 0, shots = 0;
   };
-  Affected startSolve(LitScene* former = nullptr);
-  /// What that will say of an edit that makes this scene of `former`, or more.
-  [[nodiscard]] Affected mostAffected(const LitScene& former) const;
+  [[nodiscard]] Affected succeed(const LitScene& former);
+  /// Prepares the solve; must come after upload(). What stays of the links of `former`, after succeed(), is taken from
+  /// it: its solver is of no use afterwards. Returns the shots that are to be taken again.
+  std::uint64_t startSolve(LitScene* former = nullptr);
 
   /// Surfaces that a change to `next` would touch; all of them where it changes geometry or lights.
   [[nodiscard]] std::uint64_t affectedBy(const SceneChange& change, const scene::Scene& next) const;
@@ -94,7 +96,6 @@ class LitScene {
         settings_(settings),
         transport_(transport),
         scene_(std::make_shared<const scene::Scene>(std::move(edited.scene))) {}
-  [[nodiscard]] bool relatedTo(const LitScene& former) const;
   void makeSolver(const solver::FormerSolver* former = nullptr);
   void updateSolver(bool materials, bool lights);
   [[nodiscard]] std::uint64_t touchedSurfaces(std::size_t before, const scene::PatchMap& map) const;
@@ -108,6 +109,7 @@ class LitScene {
   std::shared_ptr<const scene::PatchScene> patches_;
   scene::PatchMaterials materials_;
   bool reproducible_ = true;
+  std::optional<scene::PatchMap> former_map_;  // from succeed() to startSolve()
   std::unique_ptr<solver::Solver> solver_;
   solver::LightSources sources_;                // that the solver knows of
   double power_ = 0.0;                          // emitted, all channels

@@ -105,9 +105,9 @@ class SolveLoop final : public Engine {
   using Keep = std::function<Result<void>(const PatchOutcome&)>;
   /// Puts a lit scene in place of the present one, which goes on if `made` is an error or cannot be uploaded.
   /// Of an edit, the present one's light is shown until the new one's is as good, and its links go over to it, once
-  /// `keep` has succeeded. A resumed one has its solve already.
+  /// `keep` has succeeded. A resumed one has its solve already. Returns what an edit touched.
   enum class Relation { kOther, kEdited, kResumed };
-  using KeepMade = std::function<Result<void>(const LitScene&)>;
+  using KeepMade = std::function<Result<void>(const LitScene& made, const LitScene::Affected& at_most)>;
   [[nodiscard]] Result<LitScene::Affected> relight(Result<std::unique_ptr<LitScene>> made, Relation relation,
                                                    const KeepMade& keep = {});
   [[nodiscard]] Result<void> checkBase(const std::optional<std::uint64_t>& base_revision) const;

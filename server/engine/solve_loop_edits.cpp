@@ -32,7 +32,7 @@ Result<LoadOutcome> SolveLoop::install(Result<scene::Document> document) {
   const SolveState before = std::exchange(state_, SolveState::kLoading);
   updateStatus(true);
   auto next = History::nextLoad(revision_ + 1, document->name);
-  const auto keep = [&](const LitScene& made) { return keepLoad(next, made.document()); };
+  const auto keep = [&](const LitScene& made, const LitScene::Affected&) { return keepLoad(next, made.document()); };
   const auto lit = relight(LitScene::make(std::move(*document), settings_, *transport_), Relation::kOther, keep);
   if (!lit) {
     if (state_ == SolveState::kLoading) state_ = before;
@@ -52,8 +52,11 @@ Result<LoadOutcome> SolveLoop::install(Result<scene::Document> document) {
 Result<LitScene::Affected> SolveLoop::relight(Result<std::unique_ptr<LitScene>> made, Relation relation,
                                               const KeepMade& keep) {
   if (!made) return tl::unexpected<Error>(made.error());
+  auto* former = relation == Relation::kEdited ? lit_.get() : nullptr;
   auto uploaded = (*made)->upload();
-  if (uploaded && keep) uploaded = keep(**made);
+  LitScene::Affected affected;
+  if (uploaded && former != nullptr) affected = (*made)->succeed(*former);
+  if (uploaded && keep) uploaded = keep(**made, affected);
   if (!uploaded) {
     if (lit_) {
       if (const auto back = lit_->upload(); !back) {
@@ -63,11 +66,10 @@ Result<LitScene::Affected> SolveLoop::relight(Result<std::unique_ptr<LitScene>> 
     }
     return tl::unexpected<Error>(uploaded.error());
   }
-  auto* former = relation == Relation::kEdited ? lit_.get() : nullptr;
   if (former != nullptr) (*made)->fadeFrom(*former);
   // What a solve that failed has measured may be a part of what it thinks it has.
-  LitScene::Affected affected;
-  if (relation != Relation::kResumed) affected = (*made)->startSolve(state_ == SolveState::kFailed ? nullptr : former);
+  if (relation != Relation::kResumed)
+    affected.shots = (*made)->startSolve(state_ == SolveState::kFailed ? nullptr : former);
   lit_ = std::move(*made);
   renderer_lost_ = false;  // it took the scene
   publisher_.reset();
@@ -157,8 +159,8 @@ Result<PatchOutcome> SolveLoop::rebuild(scene::EditedDocument edited, const Keep
     outcome.affected_surfaces = std::max<std::uint64_t>(affected.surfaces, 1);  // pages are new even if empty
   };
   // How many shots it touches is known when their links have gone over, after which there is no way back.
-  const auto keep_made = [&](const LitScene& made) {
-    set(made.mostAffected(*lit_));
+  const auto keep_made = [&](const LitScene&, const LitScene::Affected& at_most) {
+    set(at_most);
     return keep(outcome);
   };
   auto made = LitScene::make(std::move(edited), settings_, *transport_, lit_.get());

@@ -25,8 +25,6 @@ constexpr double kVariationWorth = 0.1;
 constexpr double kVariation = 0.5;
 /// First samples of a scattered node.
 constexpr std::uint32_t kScatteredPoints = 4;
-/// Points of one sample of a light: enough for the ratio of weighted visibilities to have little bias.
-constexpr std::uint32_t kLightPoints = 8;
 /// Points on all lights together in the first wave and half, where some have fewer than kLightPoints.
 constexpr std::uint32_t kMostFirstPoints = 128;
 /// A point on a light costs this part of a node's sample: its image has more pixels, but the receivers are found and
@@ -201,7 +199,7 @@ std::vector<Measurement> LinkPlanner::grow(LinkSystem& system, const UnshotPyram
     for (std::size_t half = 0; half < 2; ++half) {
       const bool joins =
           shooter.column[half].points() == 0.0 && (shooter.certain || plays(place, half, shooter.power()));
-      if (joins && memory.takeSample(shooter, half)) wanted.push_back({there, half, 1, 0});
+      if (joins && memory.takeSample(shooter, half)) wantFirst(there, half, system, wanted);
     }
   }
   return wanted;

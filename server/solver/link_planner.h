@@ -15,6 +15,10 @@
 
 namespace radiosity::solver {
 
+/// Points of one sample of a light, but for a first one of fewer: enough for the ratio of weighted visibilities to have
+/// little bias. What takes samples again counts on it.
+inline constexpr std::uint32_t kLightPoints = 8;
+
 /// One sample of the links of a shooter in one half.
 struct Measurement {
   std::uint32_t shooter = 0;

@@ -15,8 +15,6 @@
 namespace radiosity::solver {
 namespace {
 
-/// Points of one sample of a light that is taken again: as many as of a new one.
-constexpr std::uint32_t kLightPoints = 8;
 /// What arrives, escapes and is absorbed makes all that is sent; a polygon's area is known to 0.002 of it. A sum of
 /// some links in the place of what should arrive does not.
 constexpr double kNoSum = 0.005;

@@ -22,8 +22,9 @@ struct PlannerSettings {
   LinkMode mode = LinkMode::kFormula;
   std::uint32_t pairs_a_wave = 64;       ///< shooters; each shoots once into either half
   std::uint32_t shooters_a_round = 256;  ///< a round's power is divided into about this many shots
-  std::uint32_t first_shooters = 128;  ///< where links are kept: at first a shooter has this part of the power at most
-  std::uint32_t resolution = 64;       ///< N of a hemicube that carries a full share of power
+  std::uint32_t first_shooters =
+      128;  ///< where links are kept: at first no shooter has more than one in so many parts of the power
+  std::uint32_t resolution = 64;         ///< N of a hemicube that carries a full share of power
   std::uint32_t light_resolution = 128;  ///< N of the item buffers of gathered light
   std::uint32_t node_resolution =
       32;                    ///< N of the item buffers of gathered nodes: a fifth cheaper than 64 for the same error

@@ -257,6 +257,22 @@ TEST_F(Kept, WhatCannotBeKeptIsRefusedAndAllStaysAsItWas) {
   EXPECT_EQ(status().revision, 3U);
 }
 
+// Its charts lie where the edit found them; a scene that is built anew from the same document has others.
+TEST_F(Kept, ASolveOfEditedGeometryBeginsAnewAfterARestart) {
+  solve(lumpedCube(0.5));
+  engine().keepSolve(kPatienceForCheckpoint);
+  restart();  // it had paused
+  const auto loaded = folder_.read("state/checkpoint");
+  ASSERT_TRUE(patch(translationPatch(0.5)));
+  ASSERT_TRUE(reaches(State::kConverged));
+  engine().keepSolve(kPatienceForCheckpoint);
+  EXPECT_TRUE(folder_.read("state/checkpoint") == loaded) << "one was taken of it";
+  restart();
+  EXPECT_EQ(status().revision, 2U);
+  EXPECT_EQ(counter("state.resumedShots"), 0.0);
+  EXPECT_TRUE(reaches(State::kConverged));
+}
+
 TEST_F(Kept, ASolveTooLargeForACheckpointGoesOnWithout) {
   watching_.reset();
   engine_.reset();

@@ -97,6 +97,25 @@ export class Pages {
   }
 }
 
+/** For all tests of a file: one server that shows the scene, and pages that complain of nothing. */
+export function serveAll(scene: string): { server: Server; pages: Pages } {
+  const server = new Server(`${SCENES}/${scene}`);
+  const pages = new Pages();
+  beforeAll(async () => {
+    await server.start();
+    await pages.launch();
+  });
+  afterEach(async () => {
+    await pages.closeAll();
+    expect(pages.complaints.splice(0)).toEqual([]);
+  });
+  afterAll(async () => {
+    await pages.quit();
+    await server.stop('SIGTERM');
+  });
+  return { server, pages };
+}
+
 /** What Chromium says of its own software renderer, and of networks that are gone, which no page can keep it from. */
 function isNoise(text: string): boolean {
   return /GPU stall due to ReadPixels|WebSocket connection to|ERR_CONNECTION_REFUSED|CONTEXT_LOST_WEBGL/.test(text);

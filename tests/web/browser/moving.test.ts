@@ -1,23 +1,9 @@
 // Moving about by touch and in the first person, through the browser's own input.
 import type { CDPSession, Page } from 'playwright-core';
 import type {} from '../../../client/web/src/main';
-import { converged, Pages, SCENES, Server, until } from './harness';
+import { converged, serveAll, until } from './harness';
 
-const server = new Server(`${SCENES}/cornell.glb`);
-const pages = new Pages();
-
-beforeAll(async () => {
-  await server.start();
-  await pages.launch();
-});
-afterEach(async () => {
-  await pages.closeAll();
-  expect(pages.complaints.splice(0)).toEqual([]);
-});
-afterAll(async () => {
-  await pages.quit();
-  await server.stop('SIGTERM');
-});
+const { server, pages } = serveAll('cornell.glb');
 
 type Point = [number, number];
 

@@ -1,22 +1,8 @@
 import type { Page } from 'playwright-core';
 import type {} from '../../../client/web/src/main';
-import { converged, Pages, SCENES, Server, until } from './harness';
+import { converged, serveAll, until } from './harness';
 
-const server = new Server(`${SCENES}/cornell.glb`);
-const pages = new Pages();
-
-beforeAll(async () => {
-  await server.start();
-  await pages.launch();
-});
-afterEach(async () => {
-  await pages.closeAll();
-  expect(pages.complaints.splice(0)).toEqual([]);
-});
-afterAll(async () => {
-  await pages.quit();
-  await server.stop('SIGTERM');
-});
+const { server, pages } = serveAll('cornell.glb');
 
 const eye = (page: Page) => page.evaluate(() => window.viewer!.viewer.rig.camera.position.toArray());
 /** Where a page draws the others' eyes. */

@@ -208,8 +208,9 @@ export class Frame {
 
   private themeButton(): HTMLButtonElement {
     let theme = localStorage.getItem('theme') ?? 'auto';
+    const system = matchMedia('(prefers-color-scheme: light)');
     const apply = () => {
-      document.documentElement.dataset['theme'] = theme;
+      document.documentElement.dataset['theme'] = theme !== 'auto' ? theme : system.matches ? 'light' : 'dark';
       element.textContent = theme === 'auto' ? '◐' : theme === 'dark' ? '☾' : '☀';
       element.title = `Colours: ${theme}`;
       element.setAttribute('aria-label', element.title);
@@ -223,6 +224,7 @@ export class Frame {
       },
       { class: 'icon' },
     );
+    system.addEventListener('change', apply);
     apply();
     return element;
   }
