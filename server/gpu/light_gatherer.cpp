@@ -30,17 +30,11 @@ bool isCrack(std::span<const std::uint32_t> items, std::size_t first, std::size_
 /// within.
 constexpr float kPixelsAround = 0.8F;
 
-/// So many of a receiver's spots count for one shot of a reflecting node; all of them for a light.
-constexpr std::uint32_t kNodeSpots = 4;
+/// So many of a receiver's spots count for one shot of a reflecting node, and of a light: others for every shot.
+constexpr std::uint32_t kNodeSpots = 4, kLightSpots = 16;
 
-double polygonArea(std::span<const glm::vec3> corners) {
-  glm::dvec3 sum(0.0);
-  for (std::size_t i = 2; i < corners.size(); ++i) {
-    sum += glm::cross(glm::dvec3(corners[i - 1]) - glm::dvec3(corners[0]),
-                      glm::dvec3(corners[i]) - glm::dvec3(corners[0]));
-  }
-  return 0.5 * glm::length(sum);
-}
+/// What few points in front of a receiver's plane stand for is multiplied by this at most.
+constexpr double kMostForOthers = 4.0;
 
 /// What the kernel below needs of a hemicube and of the receivers.
 struct PointView {
@@ -97,25 +91,36 @@ bool sameGeometry(const solver::GatherShot& a, const solver::GatherShot& b) {
          a.receiver_jitter == b.receiver_jitter && a.all_spots == b.all_spots && a.fill == b.fill;
 }
 
+/// How much of the part of a polygon in front of a receiver shines where of the whole polygon `fill` does: not more
+/// than all. `front`: that part, of the polygon's area.
+double shining(float fill, double front) {
+  return front > 0.0 ? std::min(1.0, static_cast<double>(fill) / front) : 1.0;
+}
+
+/// How much of what shines lies in front, then.
+float frontOfShining(float fill, double front) {
+  return static_cast<float>(std::min(1.0, front / static_cast<double>(fill)));
+}
+
 /// How many points of a receiver count.
 std::uint32_t spotsOf(const solver::GatherShot& shot, const Receivers::Receiver& receiver) {
-  return !receiver.hasSpots() ? 1 : shot.all_spots ? scene::kLeafSpots : kNodeSpots;
+  return !receiver.hasSpots() ? 1 : shot.all_spots ? kLightSpots : kNodeSpots;
 }
 
 }  // namespace
 
 void LightGatherer::Lit::resize(std::size_t count) {
-  for (auto* values : {&x, &y, &z, &nx, &ny, &nz, &form_factor, &point_weight}) values->resize(count);
+  for (auto* values : {&x, &y, &z, &nx, &ny, &nz, &form_factor, &front, &point_weight}) values->resize(count);
   receiver.resize(count);
   pixel.resize(count);
   for (std::size_t half = 0; half < 2; ++half) {
-    for (auto* sums : {&weight[half], &visible_weight[half], &visible[half]}) sums->resize(count);
+    for (auto* sums : {&weight[half], &visible_weight[half]}) sums->resize(count);
   }
 }
 
 LightGatherer::LightGatherer(std::shared_ptr<const Receivers> receivers) : receivers_(std::move(receivers)) {
   std::size_t points = receivers_->all().size();
-  for (const auto& receiver : receivers_->all()) points += receiver.hasSpots() ? scene::kLeafSpots - 1 : 0;
+  for (const auto& receiver : receivers_->all()) points += receiver.hasSpots() ? kLightSpots - 1 : 0;
   lit_.resize(points);
 }
 
@@ -148,6 +153,8 @@ void LightGatherer::weighWhole(const solver::GatherShot& shot) {
                     lit_.nz.data() + k},
                    lit_count_ - k, lit_.form_factor.data() + k);
   for (auto i = k; i < lit_count_ && shot.fill < 1.0F; ++i) lit_.form_factor[i] *= shot.fill;
+  std::fill(lit_.front.begin() + static_cast<std::ptrdiff_t>(k),
+            lit_.front.begin() + static_cast<std::ptrdiff_t>(lit_count_), 1.0F);
   shareAmongSpots(shot, k);
   weighed_ = lit_count_;
 }
@@ -187,9 +194,10 @@ void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers
       if (glm::dot(shot.normal, place.point - shot.corners[0]) <= kInPlane) continue;
       const auto normal = surface.planar ? plane_normal : group.side * place.frame->normal;
       if (!surface.planar) {
-        const auto form_factor = static_cast<float>(polygonFormFactor(place.point, normal, corners));
-        if (form_factor <= 0.0F) continue;
-        lit_.form_factor[lit_count_] = shot.fill * form_factor;
+        const auto form_factor = formFactorInFront(place.point, normal, corners);
+        if (form_factor.value <= 0.0) continue;
+        lit_.form_factor[lit_count_] = static_cast<float>(form_factor.value * shining(shot.fill, form_factor.front));
+        lit_.front[lit_count_] = frontOfShining(shot.fill, form_factor.front);
       }
       addLit(i, place, normal);
     }
@@ -199,10 +207,10 @@ void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers
   if (surface.planar) {
     planarFormFactors(polygon, plane_normal, &lit_.x[begin], &lit_.y[begin], &lit_.z[begin], lit_count_ - begin,
                       &lit_.form_factor[begin]);
-    if (shot.fill < 1.0F) {
-      const double kept = polygonArea(std::span(polygon.corner.data(), polygon.count)) / polygonArea(corners);
-      const auto shining = static_cast<float>(std::min(1.0, static_cast<double>(shot.fill) / kept));
-      for (std::size_t k = begin; k < lit_count_; ++k) lit_.form_factor[k] *= shining;
+    const double kept = polygonArea(std::span(polygon.corner.data(), polygon.count)) / polygonArea(corners);
+    for (std::size_t k = begin; k < lit_count_; ++k) {
+      lit_.form_factor[k] *= static_cast<float>(shining(shot.fill, kept));
+      lit_.front[k] = frontOfShining(shot.fill, kept);
     }
   }
   shareAmongSpots(shot, begin);
@@ -230,7 +238,6 @@ void LightGatherer::testPoint(const solver::GatherShot& shot, const solver::Hemi
   const auto size = static_cast<std::size_t>(shot.resolution);
   float* weight = lit_.weight[half].data();
   float* visible_weight = lit_.visible_weight[half].data();
-  float* visible_count = lit_.visible[half].data();
   for (std::size_t i = 0; i < lit_count_; ++i) {
     const auto item = items[lit_.pixel[i]];
     bool visible = true;
@@ -247,7 +254,6 @@ void LightGatherer::testPoint(const solver::GatherShot& shot, const solver::Hemi
     }
     weight[i] += lit_.point_weight[i];
     visible_weight[i] += visible ? lit_.point_weight[i] : 0.0F;
-    visible_count[i] += visible ? 1.0F : 0.0F;
   }
 }
 
@@ -303,9 +309,16 @@ void LightGatherer::weighLostInside(const ViewWindow& window, const solver::Hemi
   }
 }
 
+/// By the points before the receiver's plane, which decide alone: those behind it see nothing of what the form factor
+/// stands for. Where there happen to be none, others stand for them, so that the mean over all samples is right. Where
+/// so little lies in front that they would have to stand for very many, the receiver is taken to see the rest.
 float LightGatherer::visibility(std::size_t sums, std::size_t i, std::size_t points) const {
   const float weight = lit_.weight[sums][i];
-  return weight > 0.0F ? lit_.visible_weight[sums][i] / weight : lit_.visible[sums][i] / static_cast<float>(points);
+  if (lit_.front[i] >= 1.0F) return weight > 0.0F ? lit_.visible_weight[sums][i] / weight : 0.0F;
+  const double none = std::pow(1.0 - static_cast<double>(lit_.front[i]), static_cast<double>(points));
+  const double factor = std::min(1.0 / (1.0 - none), kMostForOthers);
+  if (weight > 0.0F) return static_cast<float>(factor) * lit_.visible_weight[sums][i] / weight;
+  return static_cast<float>(std::max(0.0, 1.0 - factor * (1.0 - none)) / none);
 }
 
 /// Flux that arrives by form factors and visibility, for a radiosity of one.
@@ -398,7 +411,7 @@ void LightGatherer::beginLinks(const solver::GatherShot& shot, std::span<const s
     });
     weighWhole(shot);
   }
-  for (auto* sum : {&lit_.weight[0], &lit_.visible_weight[0], &lit_.visible[0]}) {
+  for (auto* sum : {&lit_.weight[0], &lit_.visible_weight[0]}) {
     std::fill_n(sum->begin(), lit_count_, 0.0F);
   }
   look_lost_ = {};
@@ -455,7 +468,7 @@ void LightGatherer::gather(const solver::GatherShot& shot, std::span<const solve
   findLit(shot);
   const bool both = shot.half == solver::kBothHalves && points.size() > 1;
   for (std::size_t half = 0; half < 2; ++half) {
-    for (auto* sum : {&lit_.weight[half], &lit_.visible_weight[half], &lit_.visible[half]}) {
+    for (auto* sum : {&lit_.weight[half], &lit_.visible_weight[half]}) {
       std::fill_n(sum->begin(), lit_count_, 0.0F);
     }
   }

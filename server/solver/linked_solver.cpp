@@ -232,12 +232,10 @@ Result<StepOutcome> LinkedSolver::advance() {
     }
     if (!settleFromLinks()) return StepOutcome::kSlice;
     if (!finishEdit()) return StepOutcome::kSlice;
-    return phase_ == Phase::kDone ? StepOutcome::kConverged : StepOutcome::kShot;
+    return phase_ == Phase::kDone ? ended() : StepOutcome::kShot;
   }
   if (from_links_ == FromLinks::kToConfirm) return confirm();
-  if (phase_ == Phase::kDone) {
-    return error_.total <= settings_.target_error ? StepOutcome::kConverged : StepOutcome::kExhausted;
-  }
+  if (phase_ == Phase::kDone) return ended();
   if (!settling_ && measured_ == wanted_.size()) {
     wanted_ = plan();
     measured_ = 0;
@@ -257,6 +255,13 @@ Result<StepOutcome> LinkedSolver::advance() {
   return StepOutcome::kShot;
 }
 
+/// An edit is taken in whole: its links would not be true otherwise.
+void LinkedSolver::endWave() {
+  if (repaired_ < repairs_.size() || from_links_ != FromLinks::kNo || settling_ || measured_ == 0) return;
+  wanted_.resize(measured_);
+  settling_ = true;
+}
+
 StepOutcome LinkedSolver::finishRound() {
   growing_ = false;
   ++rounds_;
@@ -268,6 +273,11 @@ StepOutcome LinkedSolver::exhausted(SolveLimit limit) {
   limit_ = limit;
   phase_ = Phase::kDone;
   return StepOutcome::kExhausted;
+}
+
+/// What a solver in kDone says: it may have got there because nothing more can be done.
+StepOutcome LinkedSolver::ended() const {
+  return error_.total <= settings_.target_error ? StepOutcome::kConverged : StepOutcome::kExhausted;
 }
 
 StepOutcome LinkedSolver::chooseNext() {
@@ -311,16 +321,26 @@ StepOutcome LinkedSolver::chooseFurther() {
   return StepOutcome::kRoundDone;
 }
 
+/// Without memory or threads the next step will try again, and can say so.
+template <typename Work>
+void LinkedSolver::tryNow(const Work& work) {
+  try {
+    work();
+  } catch (const std::bad_alloc&) {
+    pass_ = Pass::kNone;
+  } catch (const std::system_error&) {
+    pass_ = Pass::kNone;
+  }
+}
+
 void LinkedSolver::assess() {
   if (repaired_ < repairs_.size()) return;     // nothing is known before all links are true
   if (from_links_ == FromLinks::kAfterEdit) {  // somebody wants to know before the next step
-    try {
+    tryNow([this] {
       do {
         while (!settleFromLinks()) continue;
       } while (!finishEdit());
-    } catch (const std::bad_alloc&) {  // the next step will try again, and can say so
-      pass_ = Pass::kNone;
-    }
+    });
     return;
   }
   FieldError field(*patches_);
@@ -362,12 +382,10 @@ void LinkedSolver::assess() {
 void LinkedSolver::setTargetError(double target) {
   settings_.target_error = target;
   if (phase_ != Phase::kDone || from_links_ != FromLinks::kNo) return;
-  try {
+  tryNow([this] {
     (void)chooseNext();
     while (from_links_ == FromLinks::kToConfirm) (void)confirm();
-  } catch (const std::bad_alloc&) {  // the next step will try again, and can say so
-    pass_ = Pass::kNone;
-  }
+  });
 }
 
 void LinkedSolver::setMaterials(const scene::PatchMaterials& materials) {
