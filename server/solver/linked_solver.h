@@ -7,6 +7,7 @@
 // varies.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -135,8 +136,7 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] StepOutcome ended() const;
   [[nodiscard]] StepOutcome confirm();
   [[nodiscard]] StepOutcome chooseFurther();
-  template <typename Work>
-  void tryNow(const Work& work);
+  void tryNow(const std::function<void()>& work);
 
   std::shared_ptr<const scene::PatchScene> patches_;
   Transport& transport_;
