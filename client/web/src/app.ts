@@ -216,9 +216,7 @@ export class App {
     this.share.onServer(info);
     this.people.onReady();
     this.frame.setWelcome(hello.revision === 0);
-    const status = await this.connection.call<Status>('status').catch(() => undefined);
-    if (status) this.onStatus(status);
-    if (!hello.resumed && hello.revision > 0) await this.fetchDocument();
+    await Promise.all([this.fetchStatus(), !hello.resumed && hello.revision > 0 && this.fetchDocument()]);
     const { count } = await this.connection.call<{ count: number }>('viewers').catch(() => ({ count: 1 }));
     this.onViewers(count);
   }
@@ -278,7 +276,11 @@ export class App {
   private async onLoaded(): Promise<void> {
     this.frame.setWelcome(false);
     this.resume = undefined;
-    await this.fetchDocument();
+    this.edit.select(undefined); // numbers of nodes mean others now
+    await Promise.all([this.fetchStatus(), this.fetchDocument()]);
+  }
+
+  private async fetchStatus(): Promise<void> {
     const status = await this.connection.call<Status>('status').catch(() => undefined);
     if (status) this.onStatus(status);
   }

@@ -138,6 +138,34 @@ it('adds a lamp, and takes it out again', async () => {
   await converged(page);
 });
 
+it('keeps what was clicked before the document came', async () => {
+  const page = await pages.open('about:blank', 1200, 800);
+  let letGo = () => undefined as void;
+  const allowed = new Promise<void>((resolve) => (letGo = resolve));
+  await page.routeWebSocket(/\/ws$/, (socket) => {
+    const upstream = socket.connectToServer();
+    const asked = new Set<unknown>();
+    socket.onMessage((message) => {
+      const call = typeof message === 'string' ? (JSON.parse(message) as { id?: unknown; method?: string }) : {};
+      if (call.method === 'scene.get') asked.add(call.id);
+      upstream.send(message);
+    });
+    upstream.onMessage(async (message) => {
+      if (typeof message === 'string' && asked.has((JSON.parse(message) as { id?: unknown }).id ?? 'none'))
+        await allowed;
+      socket.send(message);
+    });
+  });
+  await page.goto(server.url);
+  await converged(page);
+  expect(await page.evaluate(() => window.viewer!.edit.document.gltf.nodes)).toBeUndefined();
+  await page.mouse.click(400, 260);
+  const selected = await page.evaluate(() => window.viewer!.edit.selection!.node);
+  letGo();
+  await page.getByLabel('Luminance, nit').waitFor();
+  expect(await page.evaluate(() => window.viewer!.edit.selection!.node)).toBe(selected);
+});
+
 it('takes back what the server refuses, with its reason', async () => {
   const page = await pages.open(server.url, 1200, 800);
   await converged(page);

@@ -64,8 +64,11 @@ export class LightmapSet {
     const end = performance.now() + budgetMs;
     let taken = 0;
     while (taken < this.queue.length && (taken === 0 || performance.now() < end)) {
-      const { tile, bytes } = this.queue[taken++]!;
-      this.pages[tile.header.page]?.put(tile);
+      const { tile, bytes } = this.queue[taken]!;
+      const page = this.pages[tile.header.page];
+      if (page && !page.makeRoom(tile, end)) break; // goes on in the next frame
+      page?.put(tile);
+      ++taken;
       if (Number.isFinite(tile.header.error)) this.error = Math.min(this.error, tile.header.error);
       this.used(bytes);
     }
