@@ -83,7 +83,8 @@ export class ViewSession {
 
   onDrawn(): void {
     const set = this.app.viewer.shown?.set;
-    if (set && set.tilesTaken > 0) this.app.mark('light');
+    if (set) this.app.mark('geometry');
+    if (set?.lit && set.tilesTaken > 0) this.app.mark('light');
     if (set?.complete && set.waiting === 0 && !this.sharpMarked) {
       this.sharpMarked = true;
       this.app.mark('sharp');

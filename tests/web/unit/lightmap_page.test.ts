@@ -1,6 +1,7 @@
 import { decodeRgb9e5, encodeRgb9e5, scaleRgb9e5 } from '../../../client/web/src/protocol/rgb9e5';
 import type { Tile } from '../../../client/web/src/protocol/tile_frame';
 import { LightmapPage } from '../../../client/web/src/view/lightmap_page';
+import { LightmapSet } from '../../../client/web/src/view/lightmap_set';
 import { PageRescale } from '../../../client/web/src/view/page_rescale';
 
 type Renderer = ConstructorParameters<typeof LightmapPage>[0];
@@ -123,4 +124,47 @@ it('finishes what it had begun when the context comes back', () => {
   expect(card.textures.size).toBe(1);
   page.dispose();
   expect(card.textures.size).toBe(0);
+});
+
+describe('a set of pages', () => {
+  const note = { layout: 1, revision: 1, quantity: 'irradiance', pages: [{ width: 64, height: 64, mips: 7 }], uvs: '' };
+  const dark = tile(0, 0, 0, 0);
+  const lit = tile(0, 0, 5, 0);
+
+  it('takes black for no light yet, until some has come', () => {
+    const set = new LightmapSet(new Card().renderer, note, 'irradiance', () => undefined);
+    set.enqueue({ ...dark, header: { ...dark.header, page: 0, revision: 3 } }, 1);
+    set.complete = true;
+    expect(set.takeUp(ALWAYS)).toBe(1);
+    expect([set.lit, set.covered, set.revision]).toEqual([false, false, 3]);
+    set.enqueue({ ...lit, header: { ...lit.header, page: 0, revision: 2 } }, 1);
+    set.takeUp(ALWAYS);
+    expect([set.lit, set.covered, set.revision]).toEqual([true, true, 3]);
+    expect(set.pages[0]!.uniforms.pageLightKnown.value).toBe(true);
+  });
+
+  it('takes black for black when the solve is over', () => {
+    const set = new LightmapSet(new Card().renderer, note, 'irradiance', () => undefined);
+    set.settle();
+    set.complete = true;
+    expect(set.covered).toBe(true);
+  });
+
+  it('keeps tiles back while their page makes room', () => {
+    const large = { ...note, pages: [{ width: 1024, height: 1024, mips: 11 }] };
+    let used = 0;
+    const set = new LightmapSet(new Card().renderer, large, 'irradiance', (bytes) => (used += bytes));
+    for (const [i, each] of [lit, tile(0, 0, 59_904, 3), tile(64, 0, 7, 0)].entries())
+      set.enqueue({ ...each, header: { ...each.header, page: 0 } }, 10 ** i);
+    set.takeUp(-1);
+    let frames = 1;
+    for (; set.waiting > 0; ++frames) {
+      expect(used % 10 ** (3 - set.waiting)).toBe(used); // in their order
+      set.takeUp(-1);
+    }
+    expect(frames).toBeGreaterThan(4);
+    expect(used).toBe(111);
+    expect(set.pages[0]!.sample(100 / 1024, 32 / 1024)![0]).toBe(7);
+    expect(set.pages[0]!.sample(32 / 1024, 32 / 1024)![0]).toBe(59_904 * 8);
+  });
 });

@@ -9,10 +9,12 @@ const PAGE_PARS = `
 uniform sampler2D pageResident;
 uniform vec2 pageSize;
 uniform float pageTiles;
+uniform bool pageLightKnown;  // false: nothing has shone yet, and what is there is black
 const float kNothing = 15.5;
 
 // The finest mip that all four texels of a bilinear lookup have.
 float residentMip(vec2 uv) {
+  if (!pageLightKnown) return 255.0;
   vec2 size = vec2(textureSize(pageResident, 0));
   vec2 texel = 0.75 / pageSize;
   vec2 tiles = pageSize / (pageTiles * size);

@@ -146,6 +146,13 @@ export class Viewer {
     await Promise.race([this.renderer.compileAsync(scene.root, this.rig.camera, this.world), timeUp]);
   }
 
+  /** The solve does not go on: where nothing has shone there is no light. */
+  settleLight(): void {
+    if (this.set?.lit !== false) return;
+    this.set.settle();
+    this.invalidate();
+  }
+
   /** Nothing to show any more (the server has no scene). */
   clear(): void {
     this.dropStaged();
