@@ -194,6 +194,7 @@ export class ViewSession {
 
   private showLegend(): void {
     const { frame, viewer } = this.app;
+    if (this.mode.id === 'mips') return frame.legend.showMips();
     if (!viewer.uniforms.all.falseColour.value || !this.mode.unit || !viewer.shown) return frame.legend.hide();
     const { x: low, y: high } = viewer.uniforms.all.falseRange.value;
     frame.legend.show(this.mode.label, this.mode.unit, low, high);

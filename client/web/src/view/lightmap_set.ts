@@ -105,7 +105,8 @@ export class LightmapSet {
     if (values.length === 0) return undefined;
     const at = (q: number) => values[Math.min(values.length - 1, Math.floor(q * values.length))]!;
     const high = at(0.995);
-    return [Math.max(at(0.005), high / 1e4), high];
+    // Errors and remainders are nothing in many places, and differ little where they are something.
+    return [Math.max(at(0.005), high / (this.quantity === 'irradiance' ? 1e4 : 1e3)), high];
   }
 
   restore(): void {

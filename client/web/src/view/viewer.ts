@@ -28,6 +28,9 @@ const MOST_COMPILING_MS = 2000;
 /** Length of the pyramid that stands for another viewer, of the scene's diagonal. */
 const PERSON_SIZE = 0.04;
 
+/** What leaves a surface is this much less than what arrives, at the dark end of the scale. */
+const DARKEST = 0.1;
+
 export interface ViewerEvents {
   used(bytes: number): void;
   /** After each picture. */
@@ -292,7 +295,9 @@ export class Viewer {
   private updateRange(): void {
     const data = this.mode?.quantity === 'irradiance' ? this.shown?.set : this.dataSet;
     const range = this.autoRange ? data?.range() : undefined;
-    if (range) this.uniforms.all.falseRange.value.set(...range);
+    if (!range) return;
+    const [low, high] = range;
+    this.uniforms.all.falseRange.value.set(this.mode?.id === 'radiosity' ? DARKEST * low : low, high);
   }
 
   /** The first scene shows at once; a later one when its light has come, so that nothing goes dark in between. */
