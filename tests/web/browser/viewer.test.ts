@@ -200,6 +200,31 @@ it('reads the light under the pointer', async () => {
   expect(lux).toBeGreaterThan(0);
 });
 
+it('scales every view by its own values, to the last tile', async () => {
+  const page = await pages.open(server.url, 600, 500);
+  await converged(page);
+  const ranges = new Set<string>();
+  for (const mode of ['irradiance', 'unshot', 'error']) {
+    const ends = await until(
+      () =>
+        page.evaluate((mode) => {
+          const { view, viewer } = window.viewer!;
+          if (view.mode.id !== mode) {
+            void view.setMode(mode);
+            viewer.uniforms.all.falseColour.value = true;
+          }
+          const set = mode === 'irradiance' ? viewer.shown!.set : viewer.dataSet;
+          const all = set?.quantity === mode && set.complete && set.waiting === 0 ? set.range() : undefined;
+          return { shown: viewer.uniforms.all.falseRange.value.toArray(), all };
+        }, mode),
+      ({ shown, all }) => all !== undefined && shown.join() === all.join(),
+    );
+    expect(ends.shown, mode).toEqual(ends.all);
+    ranges.add(ends.shown.join());
+  }
+  expect(ranges.size).toBe(3);
+});
+
 it('comes back when the graphics context was lost', async () => {
   const page = await pages.open(bare());
   await converged(page);
