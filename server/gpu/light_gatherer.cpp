@@ -13,8 +13,8 @@
 namespace radiosity::gpu {
 namespace {
 
-/// A polygon of whose light less than this stays in the scene is not held to deliver it all. A crack that is
-/// more than one pixel (isCrack) takes up to 0.0012 for each.
+/// A single shot of whose light less than this stays in the scene is not held to deliver it all: what one image says of
+/// that is too coarse. A crack that is more than one pixel (isCrack) takes up to 0.0012 for each.
 constexpr double kClosed = 0.99;
 /// So many pixels around the places of named receivers are drawn: their own pixel's middle, and its neighbours', lie
 /// within.
@@ -292,7 +292,7 @@ void LightGatherer::finishLinks(const solver::GatherShot& shot, solver::LinkSamp
   const double absorbed = static_cast<double>(look_lost_.absorbed) / one;
   const double kept = 1.0 - escaped - absorbed;
   sample.delivered = delivered(0, look_count_);
-  sample.due = kept < kClosed ? sample.delivered : kept * area;
+  sample.due = kept * area;
   sample.runs.clear();
   sample.irradiance.clear();
   sample.irradiance.reserve(lit_count_);

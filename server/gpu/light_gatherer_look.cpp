@@ -152,10 +152,11 @@ void LightGatherer::weighLostInside(const ViewWindow& window, const solver::Hemi
 float LightGatherer::visibility(std::size_t sums, std::size_t i, std::size_t points) const {
   const float weight = lit_.weight[sums][i];
   if (lit_.front[i] >= 1.0F) return weight > 0.0F ? lit_.visible_weight[sums][i] / weight : 0.0F;
-  const double none = std::pow(1.0 - static_cast<double>(lit_.front[i]), static_cast<double>(points));
-  const double factor = std::min(1.0 / (1.0 - none), kMostForOthers);
+  // The points are spread evenly: of `points`, one at least lies in front of all planes that cut off a larger part.
+  const double some = std::min(1.0, static_cast<double>(points) * static_cast<double>(lit_.front[i]));
+  const double factor = std::min(1.0 / some, kMostForOthers);
   if (weight > 0.0F) return static_cast<float>(factor) * lit_.visible_weight[sums][i] / weight;
-  return static_cast<float>(std::max(0.0, 1.0 - factor * (1.0 - none)) / none);
+  return some < 1.0 ? static_cast<float>(std::max(0.0, 1.0 - factor * some) / (1.0 - some)) : 0.0F;
 }
 
 }  // namespace radiosity::gpu
