@@ -83,7 +83,8 @@ export class ViewSession {
 
   onDrawn(): void {
     const set = this.app.viewer.shown?.set;
-    if (set && set.tilesTaken > 0) this.app.mark('light');
+    if (set) this.app.mark('geometry');
+    if (set?.lit && set.tilesTaken > 0) this.app.mark('light');
     if (set?.complete && set.waiting === 0 && !this.sharpMarked) {
       this.sharpMarked = true;
       this.app.mark('sharp');
@@ -193,6 +194,7 @@ export class ViewSession {
 
   private showLegend(): void {
     const { frame, viewer } = this.app;
+    if (this.mode.id === 'mips') return frame.legend.showMips();
     if (!viewer.uniforms.all.falseColour.value || !this.mode.unit || !viewer.shown) return frame.legend.hide();
     const { x: low, y: high } = viewer.uniforms.all.falseRange.value;
     frame.legend.show(this.mode.label, this.mode.unit, low, high);
