@@ -76,6 +76,36 @@ TEST_F(Recovery, ARendererThatNeverComesBackEndsTheSolveAfterFourTries) {
   EXPECT_TRUE(reaches(SolveState::kConverged));
 }
 
+TEST_F(Recovery, WhatMemoryDoesNotSufficeForIsRefusedAndTheSceneStays) {
+  solve(lumpedCube(0.5));
+  const auto before = status();
+  script_->uploads_to_run_out = 1;
+  const auto loaded = load(lumpedCube(0.25));
+  ASSERT_FALSE(loaded);
+  EXPECT_EQ(loaded.error().code, ErrorCode::kTooLarge);
+  script_->uploads_to_run_out = 1;
+  const auto sized = configure([](auto& settings) { settings.texels = 600; });
+  ASSERT_FALSE(sized);
+  EXPECT_EQ(sized.error().code, ErrorCode::kTooLarge);
+  EXPECT_EQ(status().state, SolveState::kConverged);
+  EXPECT_EQ(status().revision, before.revision);
+  EXPECT_EQ(status().settings.texels, before.settings.texels);
+  EXPECT_EQ(status().shots, before.shots);
+  ASSERT_TRUE(patch(emissionPatch(0, 2.0)));
+  EXPECT_TRUE(reaches(SolveState::kConverged));
+}
+
+TEST_F(Recovery, ASolveThatRunsOutOfMemoryFailsAndCanBeStartedAgain) {
+  script_->runs_out_of_memory = true;
+  ASSERT_TRUE(configure([](auto& settings) { settings.paper_mode = true; }));
+  ASSERT_TRUE(load(lumpedCube(0.5)));
+  ASSERT_TRUE(reaches(SolveState::kFailed));
+  EXPECT_THAT(status().failure, testing::HasSubstr("memory"));
+  script_->runs_out_of_memory = false;
+  ASSERT_TRUE(restart());
+  EXPECT_TRUE(eventually([&] { return status().shots > 0; }));
+}
+
 TEST_F(Recovery, ReplacedRenderersAreTold) {
   script_->losses = 2;
   solve(lumpedCube(0.5));

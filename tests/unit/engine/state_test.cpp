@@ -206,6 +206,40 @@ TEST_F(Kept, SettingsComeBackUnlessTheCommandLineNamesThem) {
   EXPECT_EQ(status().settings.texels, 123U);
 }
 
+TEST_F(Kept, SettingsThatCannotBeLitAreNotKept) {
+  solve(lumpedCube(0.5));
+  const auto texels = status().settings.texels;
+  const auto refused = configure([](auto& settings) { settings.texels = std::uint64_t{1} << 32U; });
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kTooLarge);
+  EXPECT_EQ(status().settings.texels, texels);
+  script_->uploads_to_fail = 1;
+  EXPECT_FALSE(configure([](auto& settings) { settings.texels = 600; }));
+  EXPECT_EQ(status().settings.texels, texels);
+  restart();
+  EXPECT_EQ(status().settings.texels, texels);
+  EXPECT_TRUE(reaches(State::kConverged));
+}
+
+// As after a move to a machine with less memory.
+TEST_F(Kept, TexelsThatThereIsNoMemoryForAnyMoreGiveWayToThoseOfTheCommandLine) {
+  solve(lumpedCube(0.5));
+  const auto patches = status().patches;
+  watching_.reset();
+  engine_.reset();
+  {
+    auto store = state::Store::open(folder_.file("state"));
+    ASSERT_TRUE(store);
+    auto settings = (*store)->takeKept().settings;
+    settings["texels"] = "4294967296";
+    ASSERT_TRUE((*store)->setSettings(settings));
+  }
+  start();
+  EXPECT_EQ(status().settings.texels, 150U);
+  ASSERT_TRUE(reaches(State::kConverged));
+  EXPECT_EQ(status().patches, patches);
+}
+
 TEST_F(Kept, TheSceneItWasStartedWithGoesOnWithItsEdits) {
   const auto file = folder_.write("room.glb", "");
   const auto write = [&](double reflectance) {
