@@ -112,7 +112,13 @@ void SolveLoop::solveSlice() {
     endSolve(SolveState::kFailed);
     return;
   }
-  if (*outcome == solver::StepOutcome::kSlice) return tellProgress(false);
+  if (*outcome == solver::StepOutcome::kSlice) {
+    if (Clock::now() >= next_publish_ && lit_->showDirectLight()) {
+      unpublished_ = true;
+      publishLightmaps(false);
+    }
+    return tellProgress(false);
+  }
   unpublished_ = true;
   if (*outcome == solver::StepOutcome::kConverged) {
     endSolve(SolveState::kConverged);
