@@ -303,21 +303,29 @@ void LinkColumn::replace(std::span<const ValueRun> leaves, std::span<const float
 
 void LinkColumn::renumber(const std::vector<std::uint32_t>& side_after, const std::vector<Side>& before,
                           const std::vector<Side>& after) {
+  struct Piece {
+    std::uint32_t side, from;  // new number; where its codes are
+  };
+  std::vector<Piece> pieces;
+  for (const auto& old : runs_) {
+    for (std::uint32_t s = old.side; s < old.side + old.side_count; ++s) {
+      if (side_after[s] != scene::kNone)
+        pieces.push_back({side_after[s], old.offset + (before[s].first_value - old.first_value)});
+    }
+  }
+  // An edit that changes the order of nodes changes that of sides.
+  std::sort(pieces.begin(), pieces.end(), [](const Piece& a, const Piece& b) { return a.side < b.side; });
   std::vector<Run> runs;
   std::vector<std::uint16_t> code;
   code.reserve(code_.size());
-  for (const auto& old : runs_) {
-    for (std::uint32_t s = old.side; s < old.side + old.side_count; ++s) {
-      const auto next = side_after[s];
-      if (next == scene::kNone) continue;
-      const auto size = static_cast<std::uint32_t>(code.size());
-      const bool joins = !runs.empty() && runs.back().side + runs.back().side_count == next;
-      if (!joins) runs.push_back({next, 0, after[next].first_value, 0, size});
-      ++runs.back().side_count;
-      runs.back().count += after[next].leaf_count;
-      const auto from = code_.begin() + old.offset + (before[s].first_value - old.first_value);
-      code.insert(code.end(), from, from + before[s].leaf_count);
-    }
+  for (const auto& [side, offset] : pieces) {
+    const auto size = static_cast<std::uint32_t>(code.size());
+    const bool joins = !runs.empty() && runs.back().side + runs.back().side_count == side;
+    if (!joins) runs.push_back({side, 0, after[side].first_value, 0, size});
+    ++runs.back().side_count;
+    runs.back().count += after[side].leaf_count;
+    const auto from = code_.begin() + offset;
+    code.insert(code.end(), from, from + after[side].leaf_count);
   }
   runs.shrink_to_fit();
   code.shrink_to_fit();

@@ -62,8 +62,8 @@ class LinkColumn {
   /// value, of which those of `leaves` (runs of leaf values, ascending, none across sides) count.
   void replace(std::span<const ValueRun> leaves, std::span<const float> values, const Totals& totals,
                std::span<const float> leaf_area, const std::vector<Side>& sides);
-  /// The same links in a scene whose sides are numbered otherwise. `side_after`: by old side, kNone: its links are
-  /// dropped, what they delivered is not. Order is kept.
+  /// The same links in a scene whose sides are numbered otherwise, in any order. `side_after`: by old side, kNone: its
+  /// links are dropped, what they delivered is not.
   void renumber(const std::vector<std::uint32_t>& side_after, const std::vector<Side>& before,
                 const std::vector<Side>& after);
 
