@@ -66,13 +66,14 @@ Result<LitScene::Affected> SolveLoop::relight(Result<std::unique_ptr<LitScene>> 
     }
     return tl::unexpected<Error>(uploaded.error());
   }
-  if (former != nullptr) (*made)->fadeFrom(*former);
+  const bool same_layout = former != nullptr && (*made)->keepsLayoutOf(*former);
+  if (former != nullptr) (*made)->fadeFrom(*former, same_layout);
   // What a solve that failed has measured may be a part of what it thinks it has.
   if (relation != Relation::kResumed)
     affected.shots = (*made)->startSolve(state_ == SolveState::kFailed ? nullptr : former);
+  if (!same_layout) publisher_.reset();
   lit_ = std::move(*made);
   renderer_lost_ = false;  // it took the scene
-  publisher_.reset();
   return affected;
 }
 
