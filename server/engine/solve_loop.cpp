@@ -133,6 +133,10 @@ void SolveLoop::solveSlice() {
   const bool out_of_time = settings_.time_limit_s && seconds_ >= *settings_.time_limit_s;
   if (*outcome == solver::StepOutcome::kSlice) {
     if (out_of_time) lit_->solver().endWave();
+    if (Clock::now() >= next_publish_ && lit_->showDirectLight()) {
+      unpublished_ = true;
+      publishLightmaps(false);
+    }
     return tellProgress(false);
   }
   unpublished_ = true;

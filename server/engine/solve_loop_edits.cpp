@@ -64,9 +64,10 @@ Result<LitScene::Affected> SolveLoop::relight(Result<std::unique_ptr<LitScene>> 
     putBack(starts);  // it may have had the links already
     return affected;
   }
+  // The links are taken, the patches are still there to be compared.
+  if (former == nullptr || !(*made)->keepsLayoutOf(*former)) publisher_.reset();
   lit_ = std::move(*made);
   renderer_lost_ = false;  // it took the scene
-  publisher_.reset();
   return affected;
 }
 
@@ -75,7 +76,7 @@ Result<LitScene::Affected> SolveLoop::tryOut(LitScene& made, LitScene* former, c
   LitScene::Affected affected;
   if (former != nullptr) {
     affected = made.succeed(*former);
-    made.fadeFrom(*former);
+    made.fadeFrom(*former, made.keepsLayoutOf(*former));
   }
   if (auto kept = keep ? keep(made, affected) : Result<void>(); !kept) return tl::unexpected<Error>(kept.error());
   return affected;

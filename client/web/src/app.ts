@@ -295,8 +295,10 @@ export class App {
   async fetchDocument(): Promise<void> {
     try {
       const reply = await this.connection.call<{ revision: number; gltf?: Gltf; url?: string }>('scene.get');
-      const gltf = reply.gltf ?? ((await (await this.fetch(reply.url!)).json()) as Gltf);
-      this.edit.document.reset(gltf, reply.revision);
+      if (reply.gltf) return this.edit.document.reset(reply.gltf, reply.revision);
+      const file = await this.fetch(reply.url!);
+      const revision = Number(file.headers.get('X-Revision') ?? reply.revision); // it may be newer than the answer
+      this.edit.document.reset((await file.json()) as Gltf, revision);
     } catch (error) {
       if (!(error instanceof ConnectionLost)) this.frame.toasts.show(`The scene: ${(error as Error).message}`, 'bad');
     }
@@ -306,7 +308,7 @@ export class App {
     const set = this.viewer.expectLayout(note);
     if (!set) return;
     this.settleLight();
-    if (set.baseMip > 0) await this.resubscribe();
+    if (this.view.renewData() || set.baseMip > 0) await this.resubscribe();
     await this.loadGeometry(note, set);
   }
 

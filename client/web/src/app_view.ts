@@ -93,6 +93,13 @@ export class ViewSession {
     if (this.metering) this.readMeter();
   }
 
+  /** Pages have a new layout: what is looked at besides light has new ones too. False: nothing is. */
+  renewData(): boolean {
+    if (this.mode.quantity === 'irradiance') return false;
+    this.app.viewer.setDataQuantity(this.mode.quantity);
+    return true;
+  }
+
   async setMode(id: string): Promise<void> {
     const mode = viewMode(id);
     if (!this.available(mode)) return;

@@ -267,6 +267,22 @@ it.each([360, 768, 1280])('fits into %i pixels, and every view draws something',
   expect(seen.size).toBe(8);
 });
 
+it('goes on showing the error, and light after it, when the pages have a new layout', async () => {
+  const page = await pages.open(server.url, 900, 600);
+  await converged(page);
+  await page.evaluate(() => window.viewer!.view.setMode('error'));
+  const taken = () => page.evaluate(() => window.viewer!.viewer.dataSet?.tilesTaken ?? 0);
+  await until(taken, (tiles) => tiles > 0);
+  const layout = () => page.evaluate(() => window.viewer!.viewer.set!.note.layout);
+  const before = await layout();
+  await page.evaluate(() => window.viewer!.connection.call('solve.configure', { texels: 9000 }));
+  await until(layout, (now) => now !== before);
+  await until(taken, (tiles) => tiles > 0);
+  await page.evaluate(() => window.viewer!.view.setMode('lit'));
+  await converged(page);
+  await page.evaluate(() => window.viewer!.connection.call('solve.configure', { texels: 16000 }));
+});
+
 it('carries the camera in a link', async () => {
   const page = await pages.open(server.url, 900, 600);
   await converged(page);
