@@ -151,7 +151,7 @@ void LitScene::fadeFrom(LitScene& before, bool same_layout) {
     return same_layout ? std::move(pages) : carryLight({*before.scene_, *before.patches_, pages}, *scene_, *patches_);
   };
   old_light_ = carried(before.shownPages());
-  auto direct = before.old_direct_.empty() ? before.directPages() : std::exchange(before.old_direct_, {});
+  auto direct = before.old_direct_.empty() ? before.directPages() : before.old_direct_;
   old_direct_.clear();
   if (!direct.empty()) old_direct_ = carried(std::move(direct));
   new_share_ = 0.0;
