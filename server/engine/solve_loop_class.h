@@ -107,8 +107,9 @@ class SolveLoop final : public Engine {
   using Keep = std::function<Result<void>(const PatchOutcome&)>;
   /// Puts a lit scene in place of the present one, which goes on if `made` is an error or cannot be uploaded.
   /// Of an edit, the present one's light is shown until the new one's is as good, and its links go over to it, once
-  /// `keep` has succeeded. A resumed one has its solve already. Returns what an edit touched.
-  enum class Relation { kOther, kEdited, kResumed };
+  /// `keep` has succeeded; but for one that is to be solved anew, with another seed say. A resumed one has its solve
+  /// already. Returns what an edit touched.
+  enum class Relation { kOther, kEdited, kSolvedAnew, kResumed };
   using KeepMade = std::function<Result<void>(const LitScene& made, const LitScene::Affected& at_most)>;
   [[nodiscard]] Result<LitScene::Affected> relight(Result<std::unique_ptr<LitScene>> made, Relation relation,
                                                    const KeepMade& keep = {});
@@ -124,6 +125,7 @@ class SolveLoop final : public Engine {
   [[nodiscard]] Result<PatchOutcome> applyStep(const StepRequest& request);
   /// Makes the edited scene the present one; raises no revision and tells nobody yet.
   [[nodiscard]] Result<PatchOutcome> adopt(scene::EditedDocument edited, const Keep& keep);
+  void takeInLight();
   [[nodiscard]] Result<PatchOutcome> rebuild(scene::EditedDocument edited, const Keep& keep);
   /// Tells everyone of the new revision and solves on.
   void announceEdit(const PatchOutcome& outcome, const std::string& patch, const std::string& by);

@@ -53,10 +53,10 @@ Result<LoadOutcome> SolveLoop::install(Result<scene::Document> document) {
 Result<LitScene::Affected> SolveLoop::relight(Result<std::unique_ptr<LitScene>> made, Relation relation,
                                               const KeepMade& keep) {
   if (!made) return tl::unexpected<Error>(made.error());
-  auto* former = relation == Relation::kEdited ? lit_.get() : nullptr;
+  auto* former = relation == Relation::kEdited || relation == Relation::kSolvedAnew ? lit_.get() : nullptr;
   auto affected = withinMemory([&] { return tryOut(**made, former, keep); });
   // What a solve that failed has measured may be a part of what it thinks it has.
-  auto* measured = state_ == SolveState::kFailed ? nullptr : former;
+  auto* measured = state_ == SolveState::kFailed || relation == Relation::kSolvedAnew ? nullptr : former;
   const bool starts = affected && relation != Relation::kResumed;
   if (starts) affected = startSolveOf(**made, *affected, measured);
   if (!affected) {
@@ -173,13 +173,18 @@ Result<PatchOutcome> SolveLoop::adopt(scene::EditedDocument edited, const Keep& 
     outcome.affected_surfaces = lit_->affectedBy(change, edited.scene);
     if (auto kept = keep(outcome); !kept) return tl::unexpected<Error>(kept.error());
     outcome.affected_surfaces = lit_->reshade(std::move(edited), change);
-    // The light of the wave that failed is counted as shot but arrived nowhere.
-    if (outcome.affected_surfaces > 0 && state_ == SolveState::kFailed) lit_->restart(settings_);
-    // The solver takes an edit in with its next step, which does not come: show what can be shown.
-    if (outcome.affected_surfaces > 0 && state_ == SolveState::kPaused) lit_->solver().assess();
+    if (outcome.affected_surfaces > 0) takeInLight();
   }
   outcome.revision = ++revision_;
   return outcome;
+}
+
+/// The solver was told of other light or materials.
+void SolveLoop::takeInLight() {
+  // The light of the wave that failed is counted as shot but arrived nowhere.
+  if (state_ == SolveState::kFailed) lit_->restart(settings_);
+  // It takes an edit in with its next step, which does not come: show what can be shown.
+  if (state_ == SolveState::kPaused) lit_->solver().assess();
 }
 
 Result<PatchOutcome> SolveLoop::rebuild(scene::EditedDocument edited, const Keep& keep) {
@@ -218,10 +223,13 @@ void SolveLoop::configure(ChangeSettings change, Callback<SolveSettings> done) {
 Result<SolveSettings> SolveLoop::applySettings(const SolveSettings& settings) {
   const SolveSettings before = settings_;
   const bool resized = before.texels != settings.texels || before.texel_size_m != settings.texel_size_m;
+  const bool anew = before.seed != settings.seed || before.paper_mode != settings.paper_mode ||
+                    before.link_memory_bytes != settings.link_memory_bytes;
   if (lit_ && resized) {  // which may fail: only what can be lit is kept
     const auto keep = [&](const LitScene&, const LitScene::Affected&) { return keepSettings(settings); };
     auto made = withinMemory([&] { return LitScene::make(lit_->document(), settings, *transport_); });
-    if (const auto lit = relight(std::move(made), Relation::kEdited, keep); !lit) {
+    const auto relation = anew ? Relation::kSolvedAnew : Relation::kEdited;
+    if (const auto lit = relight(std::move(made), relation, keep); !lit) {
       updateStatus(true);
       return tl::unexpected<Error>(lit.error());
     }
@@ -237,14 +245,15 @@ Result<SolveSettings> SolveLoop::applySettings(const SolveSettings& settings) {
     beginSolve();
     listeners_.tell([this](Listener& listener) { listener.onSceneLoaded(revision_); });
     publishLightmaps(false);
-  } else if (before.seed != settings.seed || before.paper_mode != settings.paper_mode ||
-             before.link_memory_bytes != settings.link_memory_bytes) {
+  } else if (anew) {
     lit_->restart(settings);
     beginSolve();
   } else {
     lit_->retarget(settings);
     if (before.sky != settings.sky && lit_->setSky(settings)) {
+      takeInLight();
       beginSolve();
+      publishLightmaps(false);
     } else {
       reconsiderStop();
       updateStatus(true);

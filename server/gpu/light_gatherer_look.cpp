@@ -11,7 +11,7 @@ namespace radiosity::gpu {
 namespace {
 
 /// What few points in front of a receiver's plane stand for is multiplied by this at most.
-constexpr double kMostForOthers = 4.0;
+constexpr float kMostForOthers = 8.0F;
 
 /// A single pixel through which one looks out of the scene, between four that show something: where a corner of one
 /// wall meets the middle of another's edge, rounding leaves such holes, and no light must leave by them.
@@ -147,16 +147,16 @@ void LightGatherer::weighLostInside(const ViewWindow& window, const solver::Hemi
 }
 
 /// By the points before the receiver's plane, which decide alone: those behind it see nothing of what the form factor
-/// stands for. Where there happen to be none, others stand for them, so that the mean over all samples is right. Where
-/// so little lies in front that they would have to stand for very many, the receiver is taken to see the rest.
+/// stands for. Where there happen to be none, others stand for them, so that the mean over all samples is right; but
+/// for the light of a last sliver, which would need too many.
 float LightGatherer::visibility(std::size_t sums, std::size_t i, std::size_t points) const {
   const float weight = lit_.weight[sums][i];
-  if (lit_.front[i] >= 1.0F) return weight > 0.0F ? lit_.visible_weight[sums][i] / weight : 0.0F;
+  if (weight <= 0.0F) return 0.0F;
+  const float seen = lit_.visible_weight[sums][i] / weight;
+  if (lit_.front[i] >= 1.0F) return seen;
   // The points are spread evenly: of `points`, one at least lies in front of all planes that cut off a larger part.
-  const double some = std::min(1.0, static_cast<double>(points) * static_cast<double>(lit_.front[i]));
-  const double factor = std::min(1.0 / some, kMostForOthers);
-  if (weight > 0.0F) return static_cast<float>(factor) * lit_.visible_weight[sums][i] / weight;
-  return some < 1.0 ? static_cast<float>(std::max(0.0, 1.0 - factor * some) / (1.0 - some)) : 0.0F;
+  const float some = std::min(1.0F, static_cast<float>(points) * lit_.front[i]);
+  return seen * std::min(1.0F / some, kMostForOthers);
 }
 
 }  // namespace radiosity::gpu

@@ -159,6 +159,24 @@ TEST_F(Settings, ARestartWithTheSameSeedGivesTheSameBits) {
   EXPECT_NE(**pixels, **others);
 }
 
+// The texel size decides, so that the layout, and with it every link, would stay.
+TEST_F(Settings, AnotherSeedIsTakenAlsoWhereTexelsAreNamedWithIt) {
+  ASSERT_TRUE(configure([](auto& settings) { settings.texel_size_m = 0.1; }));
+  solve(lumpedCube(0.5));
+  const auto light = [&] { return (void)sceneText(), meanIrradiance(*engine().lightmaps()); };
+  const double first = light();
+  ASSERT_TRUE(configure([](auto& settings) {
+    settings.seed = 2;
+    settings.texels = 20'000;
+  }));
+  ASSERT_TRUE(reaches(State::kConverged));
+  const double second = light();
+  ASSERT_TRUE(restart());
+  ASSERT_TRUE(reaches(State::kConverged));
+  EXPECT_EQ(second, light());
+  EXPECT_NE(second, first);
+}
+
 TEST_F(Settings, MoreTexelsMakeANewLayoutOfTheSameRevision) {
   solve(lumpedCube(0.5));
   const auto before = status();
