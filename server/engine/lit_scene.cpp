@@ -130,7 +130,8 @@ std::uint64_t LitScene::reshade(scene::EditedDocument next, const SceneChange& c
   document_ = std::move(next.document);
   scene_ = std::make_shared<const scene::Scene>(std::move(next.scene));
   const bool other_lights = sources_ != lightSources(*scene_);
-  if (!change.materials.empty() || other_lights) updateSolver(!change.materials.empty(), other_lights);
+  // A material that no lit surface has leaves the light, and what is known of its error, as they are.
+  if (affected > 0) updateSolver(!change.materials.empty(), other_lights);
   return affected;
 }
 

@@ -112,7 +112,11 @@ void SolveLoop::solveSlice() {
     endSolve(SolveState::kFailed);
     return;
   }
-  if (*outcome == solver::StepOutcome::kSlice) return tellProgress(false);
+  const bool out_of_time = settings_.time_limit_s && seconds_ >= *settings_.time_limit_s;
+  if (*outcome == solver::StepOutcome::kSlice) {
+    if (out_of_time) lit_->solver().endWave();
+    return tellProgress(false);
+  }
   unpublished_ = true;
   if (*outcome == solver::StepOutcome::kConverged) {
     endSolve(SolveState::kConverged);
@@ -120,7 +124,7 @@ void SolveLoop::solveSlice() {
     failure_ = limitText(lit_->solver().limit(), settings_.link_memory_bytes);
     log::warn("the solve ends above its target error: {}", failure_);
     endSolve(SolveState::kLimited);
-  } else if (settings_.time_limit_s && seconds_ >= *settings_.time_limit_s) {
+  } else if (out_of_time) {
     endSolve(SolveState::kTimeLimit);
   } else {
     if (Clock::now() >= next_publish_) publishLightmaps(false);

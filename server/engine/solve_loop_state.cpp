@@ -74,6 +74,7 @@ Result<void> SolveLoop::keepSettings(const SolveSettings& settings) {
 
 void SolveLoop::checkpointIfDue() {
   if (!checkpoints_ || !lit_ || Clock::now() < next_checkpoint_) return;
+  if (renderer_lost_ || state_ == SolveState::kFailed) return;
   if (checkpoint_revision_ == revision_ && checkpoint_shots_ == lit_->solver().shots()) return;
   // At its end the solve sleeps: that checkpoint takes the place of one that still waits.
   if (state_ == SolveState::kSolving && checkpoints_->isBusy()) return;
@@ -87,6 +88,8 @@ void SolveLoop::checkpointIfDue() {
 
 /// True: nothing is left to be done about it now, be it that none can be had.
 bool SolveLoop::takeCheckpoint() {
+  // What a failed solver has measured may be a part of what it thinks it has: the checkpoint before stays.
+  if (renderer_lost_ || state_ == SolveState::kFailed) return true;
   if (!lit_->isReproducible()) {  // after a restart the solve of a scene whose geometry was edited begins anew
     checkpoint_revision_ = revision_;
     checkpoint_shots_ = lit_->solver().shots();

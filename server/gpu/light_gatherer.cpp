@@ -13,73 +13,15 @@
 namespace radiosity::gpu {
 namespace {
 
-/// A polygon of whose light less than this stays in the scene is not held to deliver it all. A crack that is
-/// more than one pixel (isCrack) takes up to 0.0012 for each.
+/// A single shot of whose light less than this stays in the scene is not held to deliver it all: what one image says of
+/// that is too coarse. A crack that is more than one pixel (isCrack) takes up to 0.0012 for each.
 constexpr double kClosed = 0.99;
-/// A single pixel through which one looks out of the scene, between four that show something: where a corner of one
-/// wall meets the middle of another's edge, rounding leaves such holes, and no light must leave by them.
-bool isCrack(std::span<const std::uint32_t> items, std::size_t first, std::size_t end, std::size_t width) {
-  if (end - first != 1 || first < width || first + width >= items.size()) return false;
-  for (const auto neighbour : {first - 1, first + 1, first - width, first + width}) {
-    if (items[neighbour] == RAD_ITEM_NONE) return false;
-  }
-  return true;
-}
-
 /// So many pixels around the places of named receivers are drawn: their own pixel's middle, and its neighbours', lie
 /// within.
 constexpr float kPixelsAround = 0.8F;
 
-/// So many of a receiver's spots count for one shot of a reflecting node; all of them for a light.
-constexpr std::uint32_t kNodeSpots = 4;
-
-double polygonArea(std::span<const glm::vec3> corners) {
-  glm::dvec3 sum(0.0);
-  for (std::size_t i = 2; i < corners.size(); ++i) {
-    sum += glm::cross(glm::dvec3(corners[i - 1]) - glm::dvec3(corners[0]),
-                      glm::dvec3(corners[i]) - glm::dvec3(corners[0]));
-  }
-  return 0.5 * glm::length(sum);
-}
-
-/// What the kernel below needs of a hemicube and of the receivers.
-struct PointView {
-  glm::vec3 o, t, b, n;
-  int resolution;
-  float shift_x, shift_y;
-};
-
-/// For every receiver: the pixel of the hemicube's image in which it lies (the cells of hemicube_weights.h), and cos
-/// cos / r^2. Branch-free, so that it vectorises; one clone for processors with 256-bit vectors, same bits in both.
-__attribute__((target_clones("avx2", "default"))) void projectReceivers(const PointView& view, std::size_t count,
-                                                                        const float* x, const float* y, const float* z,
-                                                                        const float* nx, const float* ny,
-                                                                        const float* nz, std::uint32_t* pixel,
-                                                                        float* weight) {
-  const int size = view.resolution, half_size = size / 2;
-  const float half = static_cast<float>(size) / 2.0F;
-  for (std::size_t i = 0; i < count; ++i) {
-    const float dx = x[i] - view.o.x, dy = y[i] - view.o.y, dz = z[i] - view.o.z;
-    const float lx = dx * view.t.x + dy * view.t.y + dz * view.t.z;
-    const float ly = dx * view.b.x + dy * view.b.y + dz * view.b.z;
-    const float lz = std::max(dx * view.n.x + dy * view.n.y + dz * view.n.z, 1.0e-9F);
-    const float ax = std::abs(lx), ay = std::abs(ly), side = std::max(ax, ay);
-    const bool top = lz >= side;
-    const bool along_x = ax >= ay;
-    const float depth = std::max(lz, side);
-    const float across = top || !along_x ? lx : ly;
-    const float up = top ? ly + depth : lz;  // top rows start at -1, side rows at the horizon
-    const float scale = half / depth;
-    const int column = std::clamp(static_cast<int>((across + depth) * scale + view.shift_x), 0, size - 1);
-    const int row = std::clamp(static_cast<int>(up * scale + view.shift_y), 0, (top ? size : half_size) - 1);
-    const int face = along_x ? (lx > 0.0F ? 0 : 1) : (ly > 0.0F ? 2 : 3);
-    const int first_row = top ? 0 : size + face * half_size;
-    pixel[i] = static_cast<std::uint32_t>((first_row + row) * size + column);
-    const float square = dx * dx + dy * dy + dz * dz;
-    const float cosine = std::max(0.0F, -(dx * nx[i] + dy * ny[i] + dz * nz[i]));
-    weight[i] = lz * cosine / (square * square);
-  }
-}
+/// So many of a receiver's spots count for one shot of a reflecting node, and of a light: others for every shot.
+constexpr std::uint32_t kNodeSpots = 4, kLightSpots = 16;
 
 /// Least and greatest height of a polygon above a plane.
 std::array<float, 2> heights(std::span<const glm::vec3> corners, const glm::vec3& point, const glm::vec3& normal) {
@@ -97,25 +39,36 @@ bool sameGeometry(const solver::GatherShot& a, const solver::GatherShot& b) {
          a.receiver_jitter == b.receiver_jitter && a.all_spots == b.all_spots && a.fill == b.fill;
 }
 
+/// How much of the part of a polygon in front of a receiver shines where of the whole polygon `fill` does: not more
+/// than all. `front`: that part, of the polygon's area.
+double shining(float fill, double front) {
+  return front > 0.0 ? std::min(1.0, static_cast<double>(fill) / front) : 1.0;
+}
+
+/// How much of what shines lies in front, then.
+float frontOfShining(float fill, double front) {
+  return static_cast<float>(std::min(1.0, front / static_cast<double>(fill)));
+}
+
 /// How many points of a receiver count.
 std::uint32_t spotsOf(const solver::GatherShot& shot, const Receivers::Receiver& receiver) {
-  return !receiver.hasSpots() ? 1 : shot.all_spots ? scene::kLeafSpots : kNodeSpots;
+  return !receiver.hasSpots() ? 1 : shot.all_spots ? kLightSpots : kNodeSpots;
 }
 
 }  // namespace
 
 void LightGatherer::Lit::resize(std::size_t count) {
-  for (auto* values : {&x, &y, &z, &nx, &ny, &nz, &form_factor, &point_weight}) values->resize(count);
+  for (auto* values : {&x, &y, &z, &nx, &ny, &nz, &form_factor, &front, &point_weight}) values->resize(count);
   receiver.resize(count);
   pixel.resize(count);
   for (std::size_t half = 0; half < 2; ++half) {
-    for (auto* sums : {&weight[half], &visible_weight[half], &visible[half]}) sums->resize(count);
+    for (auto* sums : {&weight[half], &visible_weight[half]}) sums->resize(count);
   }
 }
 
 LightGatherer::LightGatherer(std::shared_ptr<const Receivers> receivers) : receivers_(std::move(receivers)) {
   std::size_t points = receivers_->all().size();
-  for (const auto& receiver : receivers_->all()) points += receiver.hasSpots() ? scene::kLeafSpots - 1 : 0;
+  for (const auto& receiver : receivers_->all()) points += receiver.hasSpots() ? kLightSpots - 1 : 0;
   lit_.resize(points);
 }
 
@@ -148,6 +101,8 @@ void LightGatherer::weighWhole(const solver::GatherShot& shot) {
                     lit_.nz.data() + k},
                    lit_count_ - k, lit_.form_factor.data() + k);
   for (auto i = k; i < lit_count_ && shot.fill < 1.0F; ++i) lit_.form_factor[i] *= shot.fill;
+  std::fill(lit_.front.begin() + static_cast<std::ptrdiff_t>(k),
+            lit_.front.begin() + static_cast<std::ptrdiff_t>(lit_count_), 1.0F);
   shareAmongSpots(shot, k);
   weighed_ = lit_count_;
 }
@@ -187,9 +142,10 @@ void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers
       if (glm::dot(shot.normal, place.point - shot.corners[0]) <= kInPlane) continue;
       const auto normal = surface.planar ? plane_normal : group.side * place.frame->normal;
       if (!surface.planar) {
-        const auto form_factor = static_cast<float>(polygonFormFactor(place.point, normal, corners));
-        if (form_factor <= 0.0F) continue;
-        lit_.form_factor[lit_count_] = shot.fill * form_factor;
+        const auto form_factor = formFactorInFront(place.point, normal, corners);
+        if (form_factor.value <= 0.0) continue;
+        lit_.form_factor[lit_count_] = static_cast<float>(form_factor.value * shining(shot.fill, form_factor.front));
+        lit_.front[lit_count_] = frontOfShining(shot.fill, form_factor.front);
       }
       addLit(i, place, normal);
     }
@@ -199,10 +155,10 @@ void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers
   if (surface.planar) {
     planarFormFactors(polygon, plane_normal, &lit_.x[begin], &lit_.y[begin], &lit_.z[begin], lit_count_ - begin,
                       &lit_.form_factor[begin]);
-    if (shot.fill < 1.0F) {
-      const double kept = polygonArea(std::span(polygon.corner.data(), polygon.count)) / polygonArea(corners);
-      const auto shining = static_cast<float>(std::min(1.0, static_cast<double>(shot.fill) / kept));
-      for (std::size_t k = begin; k < lit_count_; ++k) lit_.form_factor[k] *= shining;
+    const double kept = polygonArea(std::span(polygon.corner.data(), polygon.count)) / polygonArea(corners);
+    for (std::size_t k = begin; k < lit_count_; ++k) {
+      lit_.form_factor[k] *= static_cast<float>(shining(shot.fill, kept));
+      lit_.front[k] = frontOfShining(shot.fill, kept);
     }
   }
   shareAmongSpots(shot, begin);
@@ -217,95 +173,6 @@ void LightGatherer::addLit(std::size_t receiver, const Receivers::Place& place, 
   lit_.ny[k] = normal.y;
   lit_.nz[k] = normal.z;
   lit_.receiver[k] = static_cast<std::uint32_t>(receiver);
-}
-
-void LightGatherer::testPoint(const solver::GatherShot& shot, const solver::HemicubeFrame& point,
-                              std::span<const std::uint32_t> items, std::size_t half) {
-  const auto [o, t, b, n] = hemicubeAxes(point);
-  const auto [across, up] = latticePhase(point.lattice);
-  const PointView view{
-      o, t, b, n, static_cast<int>(shot.resolution), static_cast<float>(0.5 - across), static_cast<float>(0.5 - up)};
-  projectReceivers(view, lit_count_, lit_.x.data(), lit_.y.data(), lit_.z.data(), lit_.nx.data(), lit_.ny.data(),
-                   lit_.nz.data(), lit_.pixel.data(), lit_.point_weight.data());
-  const auto size = static_cast<std::size_t>(shot.resolution);
-  float* weight = lit_.weight[half].data();
-  float* visible_weight = lit_.visible_weight[half].data();
-  float* visible_count = lit_.visible[half].data();
-  for (std::size_t i = 0; i < lit_count_; ++i) {
-    const auto item = items[lit_.pixel[i]];
-    bool visible = true;
-    if (item == RAD_ITEM_NONE) {
-      visible = !hiddenAtSilhouette(i, o, items, size);
-    } else {
-      const auto& plane = receivers_->plane(item);
-      const glm::vec3 at(lit_.x[i], lit_.y[i], lit_.z[i]);
-      const float light = glm::dot(plane.normal, o) - plane.distance;
-      const float receiver = glm::dot(plane.normal, at) - plane.distance;
-      const float before = light > 0.0F ? receiver : -receiver;
-      visible =
-          before >= -kInPlane || !receivers_->risesBefore(item, at, glm::vec3(lit_.nx[i], lit_.ny[i], lit_.nz[i]));
-    }
-    weight[i] += lit_.point_weight[i];
-    visible_weight[i] += visible ? lit_.point_weight[i] : 0.0F;
-    visible_count[i] += visible ? 1.0F : 0.0F;
-  }
-}
-
-/// The middle of a receiver's pixel misses everything, the receiver too. Where the ray to it meets a wide facet that a
-/// neighbouring pixel shows, that hides it: along the edges of a closed room, what lies behind its walls.
-bool LightGatherer::hiddenAtSilhouette(std::size_t i, const glm::vec3& light, std::span<const std::uint32_t> items,
-                                       std::size_t size) const {
-  const std::size_t pixel = lit_.pixel[i], column = pixel % size, row = pixel / size;
-  const std::size_t first_row = row < size ? 0 : size + (row - size) / (size / 2) * (size / 2);
-  const std::size_t rows = row < size ? size : size / 2;
-  std::array<std::uint32_t, 9> around{};
-  for (std::size_t k = 0; k < around.size(); ++k) {
-    const auto x = std::clamp<std::size_t>(column + k % 3, 1, size) - 1;
-    const auto y = std::clamp<std::size_t>(row - first_row + k / 3, 1, rows) - 1;
-    around[k] = items[(first_row + y) * size + x];
-  }
-  const glm::vec3 at(lit_.x[i], lit_.y[i], lit_.z[i]), normal(lit_.nx[i], lit_.ny[i], lit_.nz[i]);
-  const float pixel_size = 2.0F * glm::distance(light, at) / static_cast<float>(size);
-  return receivers_->anyMeets(around, {at, normal, light - at, 1.0F, pixel_size});
-}
-
-void LightGatherer::weighLost(const solver::HemicubeFrame& point, std::span<const std::uint32_t> items,
-                              std::uint32_t resolution, const HemicubeWeights& weights, Lost& lost) {
-  starts_.resize(items.size() + 1);
-  const auto runs = findRuns(items, starts_);
-  for (std::size_t run = 0; run < runs; ++run) {
-    const auto item = items[starts_[run]];
-    const std::uint64_t weight = weights.before[starts_[run + 1]] - weights.before[starts_[run]];
-    if (item == RAD_ITEM_NONE) {
-      if (!isCrack(items, starts_[run], starts_[run + 1], resolution)) lost.escaped += weight;
-      continue;
-    }
-    const bool back = glm::dot(receivers_->plane(item).normal, point.origin) <= receivers_->plane(item).distance;
-    if (receivers_->absorbs(item, back)) lost.absorbed += weight;
-  }
-}
-
-void LightGatherer::weighLostInside(const ViewWindow& window, const solver::HemicubeFrame& point,
-                                    std::span<const std::uint32_t> items, std::uint32_t resolution,
-                                    const HemicubeWeights& weights, Lost& lost) const {
-  for (std::uint32_t row = 0; row < 3 * resolution; ++row) {
-    const auto inside = pixelsInside(window, point, resolution, row);
-    for (std::size_t i = std::size_t{row} * resolution + inside.first; i < std::size_t{row} * resolution + inside.end;
-         ++i) {
-      const auto item = items[i];
-      if (item == RAD_ITEM_NONE) {
-        if (!isCrack(items, i, i + 1, resolution)) lost.escaped += weights.pixel(i);
-        continue;
-      }
-      const bool back = glm::dot(receivers_->plane(item).normal, point.origin) <= receivers_->plane(item).distance;
-      if (receivers_->absorbs(item, back)) lost.absorbed += weights.pixel(i);
-    }
-  }
-}
-
-float LightGatherer::visibility(std::size_t sums, std::size_t i, std::size_t points) const {
-  const float weight = lit_.weight[sums][i];
-  return weight > 0.0F ? lit_.visible_weight[sums][i] / weight : lit_.visible[sums][i] / static_cast<float>(points);
 }
 
 /// Flux that arrives by form factors and visibility, for a radiosity of one.
@@ -398,7 +265,7 @@ void LightGatherer::beginLinks(const solver::GatherShot& shot, std::span<const s
     });
     weighWhole(shot);
   }
-  for (auto* sum : {&lit_.weight[0], &lit_.visible_weight[0], &lit_.visible[0]}) {
+  for (auto* sum : {&lit_.weight[0], &lit_.visible_weight[0]}) {
     std::fill_n(sum->begin(), lit_count_, 0.0F);
   }
   look_lost_ = {};
@@ -425,7 +292,7 @@ void LightGatherer::finishLinks(const solver::GatherShot& shot, solver::LinkSamp
   const double absorbed = static_cast<double>(look_lost_.absorbed) / one;
   const double kept = 1.0 - escaped - absorbed;
   sample.delivered = delivered(0, look_count_);
-  sample.due = kept < kClosed ? sample.delivered : kept * area;
+  sample.due = kept * area;
   sample.runs.clear();
   sample.irradiance.clear();
   sample.irradiance.reserve(lit_count_);
@@ -455,7 +322,7 @@ void LightGatherer::gather(const solver::GatherShot& shot, std::span<const solve
   findLit(shot);
   const bool both = shot.half == solver::kBothHalves && points.size() > 1;
   for (std::size_t half = 0; half < 2; ++half) {
-    for (auto* sum : {&lit_.weight[half], &lit_.visible_weight[half], &lit_.visible[half]}) {
+    for (auto* sum : {&lit_.weight[half], &lit_.visible_weight[half]}) {
       std::fill_n(sum->begin(), lit_count_, 0.0F);
     }
   }

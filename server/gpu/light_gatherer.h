@@ -47,7 +47,8 @@ class LightGatherer {
     std::vector<float> x, y, z, nx, ny, nz;
     std::vector<float> form_factor;  ///< times the receiving point's share of its leaf
     std::vector<std::uint32_t> receiver;
-    std::array<std::vector<float>, 2> weight, visible_weight, visible;
+    std::vector<float> front;  ///< part of what shines that lies before the receiver's plane
+    std::array<std::vector<float>, 2> weight, visible_weight;
     std::vector<float> point_weight;   ///< of the point being tested
     std::vector<std::uint32_t> pixel;  ///< in which it sees the receiver
 

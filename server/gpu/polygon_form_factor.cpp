@@ -1,5 +1,6 @@
 #include "server/gpu/polygon_form_factor.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -31,12 +32,25 @@ Polygon clipToHorizon(const glm::dvec3& point, const glm::dvec3& normal, std::sp
   return clipped;
 }
 
+/// Fan of triangles from the first corner: exact for convex ones.
+template <typename Corners>
+double areaOf(const Corners& corner, std::size_t count) {
+  glm::dvec3 sum(0.0);
+  for (std::size_t i = 2; i < count; ++i) {
+    const auto first = glm::dvec3(corner[0]);
+    sum += glm::cross(glm::dvec3(corner[i - 1]) - first, glm::dvec3(corner[i]) - first);
+  }
+  return 0.5 * glm::length(sum);
+}
+
 }  // namespace
 
-double polygonFormFactor(const glm::dvec3& point, const glm::dvec3& normal, std::span<const glm::vec3> corners) {
+double polygonArea(std::span<const glm::vec3> corners) { return areaOf(corners, corners.size()); }
+
+FormFactor formFactorInFront(const glm::dvec3& point, const glm::dvec3& normal, std::span<const glm::vec3> corners) {
   RAD_CHECK_LE(corners.size(), std::size_t{8});
   const auto polygon = clipToHorizon(point, normal, corners);
-  if (polygon.count < 3) return 0.0;
+  if (polygon.count < 3) return {};
   double sum = 0.0;
   for (std::size_t i = 0; i < polygon.count; ++i) {
     const auto& a = polygon.corner[i];
@@ -46,7 +60,13 @@ double polygonFormFactor(const glm::dvec3& point, const glm::dvec3& normal, std:
     if (sine == 0.0) continue;  // the edge points at the receiver: no angle, or the receiver lies on it
     sum += std::atan2(sine, glm::dot(a, b)) * (glm::dot(normal_of_edge, normal) / sine);
   }
-  return std::abs(sum) / (2.0 * std::numbers::pi);
+  const double all = polygonArea(corners);
+  const double front = all > 0.0 ? std::min(1.0, areaOf(polygon.corner, polygon.count) / all) : 1.0;
+  return {std::abs(sum) / (2.0 * std::numbers::pi), front};
+}
+
+double polygonFormFactor(const glm::dvec3& point, const glm::dvec3& normal, std::span<const glm::vec3> corners) {
+  return formFactorInFront(point, normal, corners).value;
 }
 
 }  // namespace radiosity::gpu

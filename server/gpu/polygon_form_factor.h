@@ -7,10 +7,19 @@
 
 namespace radiosity::gpu {
 
+struct FormFactor {
+  double value = 0.0;
+  double front = 0.0;  ///< part of the polygon's area above the receiver's plane
+};
+
 /// Irradiance at `point` (unit `normal`) from a polygon of radiosity 1 with nothing in between: 1/(2 pi) |sum of
 /// theta_k (gamma_k . n)| over the edges of the polygon's part above the receiver's plane (Lambert 1760; Baum,
-/// Rushmeier and Winget 1989). At most 4 corners. The polygon must face the point; 0 when it is below the horizon.
+/// Rushmeier and Winget 1989). At most 8 corners. The polygon must face the point; 0 when it is below the horizon.
+[[nodiscard]] FormFactor formFactorInFront(const glm::dvec3& point, const glm::dvec3& normal,
+                                           std::span<const glm::vec3> corners);
 [[nodiscard]] double polygonFormFactor(const glm::dvec3& point, const glm::dvec3& normal,
                                        std::span<const glm::vec3> corners);
+
+[[nodiscard]] double polygonArea(std::span<const glm::vec3> corners);
 
 }  // namespace radiosity::gpu

@@ -7,8 +7,10 @@
 
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <csignal>
 #include <cstring>
+#include <thread>
 
 #include "common/check.h"
 
@@ -114,13 +116,18 @@ void WorkerProcess::stop() {
 }
 
 std::string WorkerProcess::epitaph() const {
-  int status = 0;
   siginfo_t info{};
-  // WNOWAIT: stop() still reaps it. A closed socket means it is ending, so this does not wait long.
-  if (waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOWAIT) != 0) return "a worker process is gone";
-  status = info.si_status;
-  return "worker process " + std::to_string(pid_) +
-         (info.si_code == CLD_EXITED ? " ended with status " : " was killed by signal ") + std::to_string(status);
+  // WNOWAIT: stop() still reaps it. A closed socket means that it is ending; one that could not be used does not.
+  constexpr int kTries = 50;
+  for (int i = 0; i < kTries && info.si_pid == 0; ++i) {
+    if (i > 0) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    if (waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOWAIT | WNOHANG) != 0)
+      return "a worker process is gone";
+  }
+  const std::string name = "worker process " + std::to_string(pid_);
+  if (info.si_pid == 0) return name + " cannot be spoken to";
+  return name + (info.si_code == CLD_EXITED ? " ended with status " : " was killed by signal ") +
+         std::to_string(info.si_status);
 }
 
 Error WorkerProcess::errorOf(Lapse lapse) const {

@@ -18,7 +18,7 @@ namespace radiosity::gpu {
 
 enum class MessageKind : std::uint32_t {
   kReady,      ///< worker: has a context; body: ReadyBody, renderer's name
-  kFailed,     ///< worker: body: text. It goes on only after a failed chunk
+  kFailed,     ///< worker: body: text. The worker ends
   kScene,      ///< transport: two descriptors follow (scene, flux); body: SceneBody
   kSceneDone,  ///< worker
   kChunk,      ///< transport: body: ChunkBody, then the arrays it counts

@@ -17,28 +17,15 @@ glm::dvec2 latticePoint(std::uint32_t i, std::uint32_t count) {
 
 namespace {
 
-/// The place nearest to the middle of all.
-LeafSpot middleOf(std::span<const LeafSpot> places) {
-  glm::vec2 middle(0.0F);
-  for (const auto& place : places) middle += place.texel / static_cast<float>(places.size());
-  return *std::min_element(places.begin(), places.end(), [&](const LeafSpot& a, const LeafSpot& b) {
-    return glm::dot(a.texel - middle, a.texel - middle) < glm::dot(b.texel - middle, b.texel - middle);
-  });
-}
-
-/// Halves the places, across and up in turn, until there are `count` cells of equal worth, and appends the middle of
-/// each.
-void spread(std::span<LeafSpot> places, std::uint32_t count, int axis, std::vector<LeafSpot>& spots) {
-  if (count == 1 || places.size() == 1) {
-    spots.insert(spots.end(), count, middleOf(places));
-    return;
-  }
+/// Halves them, across and up in turn, so that each part of the order is a part of the leaf.
+void orderByPlace(std::span<LeafSpot> places, int axis) {
+  if (places.size() < 2) return;
   std::sort(places.begin(), places.end(), [axis](const LeafSpot& a, const LeafSpot& b) {
     return a.texel[axis] != b.texel[axis] ? a.texel[axis] < b.texel[axis] : a.texel[1 - axis] < b.texel[1 - axis];
   });
   const std::size_t half = places.size() / 2;
-  spread(places.first(half), count / 2, 1 - axis, spots);
-  spread(places.subspan(half), count - count / 2, 1 - axis, spots);
+  orderByPlace(places.first(half), 1 - axis);
+  orderByPlace(places.subspan(half), 1 - axis);
 }
 
 }  // namespace
@@ -46,7 +33,10 @@ void spread(std::span<LeafSpot> places, std::uint32_t count, int axis, std::vect
 void keepSpots(PatchScene& patches, LeafPoint& leaf, std::span<LeafSpot> places) {
   if (places.size() < 2) return;
   leaf.first_spot = static_cast<std::uint32_t>(patches.spots.size());
-  spread(places, kLeafSpots, 0, patches.spots);
+  orderByPlace(places, 0);
+  // At even steps, so that what is a tenth of the leaf has a tenth of the spots, to one of them.
+  for (std::size_t k = 0; k < kLeafSpots; ++k)
+    patches.spots.push_back(places[(2 * k + 1) * places.size() / (2 * std::size_t{kLeafSpots})]);
 }
 
 void placeSpots(PatchScene& patches, const std::vector<LeafPiece>& pieces) {

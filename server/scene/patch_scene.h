@@ -39,8 +39,9 @@ struct LeafSpot {
   std::uint32_t triangle = kNone;
 };
 
-/// So many places are kept of each leaf within which light changes much: enough for the mean over what is left of it.
-inline constexpr std::uint32_t kLeafSpots = 16;
+/// So many places are kept of each leaf within which light changes much: enough for the mean over what is left of it,
+/// also where a thin strip behind something is lit and all before it is not. A power of two.
+inline constexpr std::uint32_t kLeafSpots = 64;
 
 /// Where a leaf is: a point (texel coordinates) on the part of the leaf that is covered and not buried inside another
 /// solid, and the triangle that holds it. `full`: wholly covered by coplanar triangles and wholly unburied, so any

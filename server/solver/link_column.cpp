@@ -6,6 +6,9 @@
 namespace radiosity::solver {
 namespace {
 
+/// Of what a shooter sends.
+constexpr double kMostlyLost = 0.5;
+
 /// Up to so many samples the average is rounded to nearest.
 constexpr std::uint32_t kExactSamples = 64;
 
@@ -236,6 +239,7 @@ void LinkColumn::add(const LinkExpander& sample, const LinkSample& totals, doubl
   const double due = totals.due > 0.0 ? totals.due : sample.flux();
   const auto average = [&](double& old, double fresh) { old = (old * points_ + factor * fresh * points) / sum; };
   average(due_, due);
+  average(delivered_, sample.flux());
   average(escaped_, totals.escaped);
   average(absorbed_, totals.absorbed);
   points_ = sum;
@@ -264,8 +268,10 @@ void LinkColumn::keepFlux(std::span<const float> leaf_area) {
     coded += fluxOf(links.data(), &leaf_area[run.first_value], run.count);
   }
   coded *= static_cast<double>(scale_);
+  // What little stays where most is lost, form factors know better than the pixels through which the rest is lost.
+  const double arrives = due_ < kMostlyLost * (due_ + escaped_ + absorbed_) ? delivered_ : due_;
   // Where nearly all links are too small for a code there is nothing to lay the rest on.
-  gain_ = due_ > 0.0 && coded > 0.0 ? static_cast<float>(std::clamp(due_ / coded, 0.25, 4.0)) : 1.0F;
+  gain_ = arrives > 0.0 && coded > 0.0 ? static_cast<float>(std::clamp(arrives / coded, 0.25, 4.0)) : 1.0F;
 }
 
 void LinkColumn::replace(std::span<const ValueRun> leaves, std::span<const float> values, const Totals& totals,
@@ -295,7 +301,7 @@ void LinkColumn::replace(std::span<const ValueRun> leaves, std::span<const float
     std::uint16_t* code = &code_[to->offset + (run.first - to->first_value)];
     for (std::uint32_t i = 0; i < run.count; ++i) code[i] = encodeLink(unit * values[run.first + i]);
   }
-  due_ = totals.due;
+  due_ = delivered_ = totals.due;  // of a shooter that loses next to nothing
   escaped_ = totals.escaped;
   absorbed_ = totals.absorbed;
   keepFlux(leaf_area);
@@ -303,21 +309,29 @@ void LinkColumn::replace(std::span<const ValueRun> leaves, std::span<const float
 
 void LinkColumn::renumber(const std::vector<std::uint32_t>& side_after, const std::vector<Side>& before,
                           const std::vector<Side>& after) {
+  struct Piece {
+    std::uint32_t side, from;  // new number; where its codes are
+  };
+  std::vector<Piece> pieces;
+  for (const auto& old : runs_) {
+    for (std::uint32_t s = old.side; s < old.side + old.side_count; ++s) {
+      if (side_after[s] != scene::kNone)
+        pieces.push_back({side_after[s], old.offset + (before[s].first_value - old.first_value)});
+    }
+  }
+  // An edit that changes the order of nodes changes that of sides.
+  std::sort(pieces.begin(), pieces.end(), [](const Piece& a, const Piece& b) { return a.side < b.side; });
   std::vector<Run> runs;
   std::vector<std::uint16_t> code;
   code.reserve(code_.size());
-  for (const auto& old : runs_) {
-    for (std::uint32_t s = old.side; s < old.side + old.side_count; ++s) {
-      const auto next = side_after[s];
-      if (next == scene::kNone) continue;
-      const auto size = static_cast<std::uint32_t>(code.size());
-      const bool joins = !runs.empty() && runs.back().side + runs.back().side_count == next;
-      if (!joins) runs.push_back({next, 0, after[next].first_value, 0, size});
-      ++runs.back().side_count;
-      runs.back().count += after[next].leaf_count;
-      const auto from = code_.begin() + old.offset + (before[s].first_value - old.first_value);
-      code.insert(code.end(), from, from + before[s].leaf_count);
-    }
+  for (const auto& [side, offset] : pieces) {
+    const auto size = static_cast<std::uint32_t>(code.size());
+    const bool joins = !runs.empty() && runs.back().side + runs.back().side_count == side;
+    if (!joins) runs.push_back({side, 0, after[side].first_value, 0, size});
+    ++runs.back().side_count;
+    runs.back().count += after[side].leaf_count;
+    const auto from = code_.begin() + offset;
+    code.insert(code.end(), from, from + after[side].leaf_count);
   }
   runs.shrink_to_fit();
   code.shrink_to_fit();

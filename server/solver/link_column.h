@@ -62,14 +62,14 @@ class LinkColumn {
   /// value, of which those of `leaves` (runs of leaf values, ascending, none across sides) count.
   void replace(std::span<const ValueRun> leaves, std::span<const float> values, const Totals& totals,
                std::span<const float> leaf_area, const std::vector<Side>& sides);
-  /// The same links in a scene whose sides are numbered otherwise. `side_after`: by old side, kNone: its links are
-  /// dropped, what they delivered is not. Order is kept.
+  /// The same links in a scene whose sides are numbered otherwise, in any order. `side_after`: by old side, kNone: its
+  /// links are dropped, what they delivered is not.
   void renumber(const std::vector<std::uint32_t>& side_after, const std::vector<Side>& before,
                 const std::vector<Side>& after);
 
   [[nodiscard]] double points() const { return points_; }
-  /// Whether so much of what a shooter of this area sends is lost that it is not known how much should arrive, but by
-  /// the sum of all links.
+  /// Whether so much of what a shooter of this area sends is lost that a look at some leaves, which does not see all of
+  /// what is lost, cannot tell how much should arrive.
   [[nodiscard]] static bool isOpen(double area, double lost) { return lost > 0.0099 * area; }
   [[nodiscard]] bool isOpen(double area) const { return isOpen(area, escaped_ + absorbed_); }
   [[nodiscard]] bool losesNothing() const { return escaped_ == 0.0 && absorbed_ == 0.0; }
@@ -110,8 +110,8 @@ class LinkColumn {
  private:
   template <typename Archive, typename Self>
   static void visit(Archive& archive, Self& self) {
-    archive(self.runs_, self.scale_, self.gain_, self.code_, self.samples_, self.points_, self.due_, self.escaped_,
-            self.absorbed_);
+    archive(self.runs_, self.scale_, self.gain_, self.code_, self.samples_, self.points_, self.due_, self.delivered_,
+            self.escaped_, self.absorbed_);
   }
   void makeRoom(std::span<const std::uint32_t> reached, const std::vector<Side>& sides);
   void grow(const LinkExpander& sample, const std::vector<Side>& sides);
@@ -126,7 +126,7 @@ class LinkColumn {
   float gain_ = 1.0F;
   std::vector<std::uint16_t> code_;
   std::uint32_t samples_ = 0;
-  double points_ = 0.0, due_ = 0.0, escaped_ = 0.0, absorbed_ = 0.0;
+  double points_ = 0.0, due_ = 0.0, delivered_ = 0.0, escaped_ = 0.0, absorbed_ = 0.0;
 };
 
 }  // namespace radiosity::solver

@@ -18,6 +18,9 @@ float highest(const glm::vec3& point, const glm::vec3& normal, const glm::vec3& 
   return glm::dot(normal, corner - point);
 }
 
+/// Of both halves.
+std::size_t matrixBytes(std::size_t rows, std::size_t shooters) { return 2 * sizeof(float) * rows * shooters; }
+
 }  // namespace
 
 LinkMemory::LinkMemory(const scene::PatchScene& patches, const std::vector<Side>& sides, std::size_t bytes)
@@ -74,6 +77,12 @@ void LinkMemory::begin(const LinkSystem& system) {
   lacks_samples_ = false;
 }
 
+bool LinkMemory::isMostlyRows(const LinkSystem& system) const {
+  std::size_t rows = 0;
+  for (const auto& shooter : system.shooters()) rows += shooter.isLight() ? 0 : system.rowsOf(shooter.place.side);
+  return matrixBytes(rows, system.shooters().size()) > bytes_ / 2;
+}
+
 bool LinkMemory::takeShooters(std::span<const Shooter> shooters, std::size_t columns, const LinkSystem& system) {
   std::size_t links = 0, rows = rows_;
   for (const auto& shooter : shooters) {
@@ -81,7 +90,7 @@ bool LinkMemory::takeShooters(std::span<const Shooter> shooters, std::size_t col
     rows += system.rowsOf(shooter.place.side);
   }
   const std::size_t count = shooters_ + shooters.size();
-  const std::size_t matrix = 2 * sizeof(float) * (rows * count - rows_ * shooters_);
+  const std::size_t matrix = matrixBytes(rows, count) - matrixBytes(rows_, shooters_);
   if (taken_ + links + matrix > bytes_ - bytes_ / kGrowthPart) {
     full_ = true;
     return false;

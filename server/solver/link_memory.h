@@ -40,6 +40,9 @@ class LinkMemory {
   /// More is taken than there is: an edit made the equation larger.
   [[nodiscard]] bool isOverdrawn() const { return taken_ > bytes_; }
 
+  /// Whether the equation, for the materials that there are now, takes more than half of the memory.
+  [[nodiscard]] bool isMostlyRows(const LinkSystem& system) const;
+
   /// A shooter was refused since forgive().
   [[nodiscard]] bool isFull() const { return full_; }
   /// Shooters may be asked for again: light, or what there is, has changed.

@@ -37,6 +37,7 @@ class LinkPlanner {
   void inherit(const LinkPlanner& former, const std::vector<std::uint32_t>& side_after) {
     draws_.inherit(former.draws_, side_after);
     share_ = former.share_;
+    counters_ = former.counters_;
   }
 
   /// The power of one shooter, all channels; nodes are split until they have less.

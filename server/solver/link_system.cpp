@@ -208,7 +208,7 @@ void LinkSystem::updateColumn(std::size_t half, std::uint32_t column, std::uint3
       const auto first = std::lower_bound(members.begin(), members.end(), first_member);
       if (first == members.end()) continue;
       links.resize(sides_[s].leaf_count);
-      (void)from.decode(sides_[s].first_value, links);
+      RAD_CHECK(from.decode(sides_[s].first_value, links));
       for (auto m = first; m != members.end(); ++m) fillRow(half, *m, column, links.data());
     }
   }

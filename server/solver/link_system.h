@@ -93,6 +93,8 @@ class LinkSystem {
   /// flux that shines. At most 1e-6 unless the sweeps were used up.
   [[nodiscard]] double unsolved() const;
 
+  /// No shooters are left.
+  void clear();
   /// Irradiance of every leaf value from the solution of `half`.
   void irradiance(std::size_t half, std::vector<glm::vec3>& values) const;
   /// What all links take.
@@ -122,7 +124,6 @@ class LinkSystem {
     bool done = true;
   };
   [[nodiscard]] bool isPlace(const NodePlace& place) const;
-  void clear();
   [[nodiscard]] double areaOf(const Shooter& shooter) const;
   /// By which what a sample delivers, loses and lets escape is multiplied.
   [[nodiscard]] static double roundingOf(const Shooter& shooter, double due, double escaped, double absorbed);

@@ -80,9 +80,10 @@ bool LinkSystem::restore(ArchiveReader& from) {
 
 template <typename Archive, typename Self>
 void LinkedSolver::visit(Archive& archive, Self& self) {
-  archive(self.lights_, self.sources_, self.phase_, self.limit_, self.lights_fit_, self.from_links_, self.settling_,
-          self.wanted_, self.measured_, self.growing_, self.share_part_, self.left_out_, self.rounds_, self.solutions_,
-          self.sweeps_, self.replayed_, self.varying_share_, self.half_, self.error_, self.counters_);
+  archive(self.lights_, self.sources_, self.phase_, self.limit_, self.lights_fit_, self.from_links_,
+          self.edit_lights_planned_, self.settling_, self.wanted_, self.measured_, self.growing_, self.share_part_,
+          self.left_out_, self.rounds_, self.solutions_, self.sweeps_, self.replayed_, self.varying_share_, self.half_,
+          self.error_, self.counters_);
   LinkPlanner::visit(archive, self.planner_);
   LinkMemory::visit(archive, self.memory_);
 }

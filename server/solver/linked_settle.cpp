@@ -86,6 +86,7 @@ void LinkedSolver::leafUnshot(std::uint32_t s, std::vector<glm::vec3>& leaves) c
 
 /// After an edit: the next steps solve over the links there are. What was still to be measured will be asked for again.
 void LinkedSolver::solveAnew() {
+  if (memory_.isMostlyRows(system_)) dropNodes();
   wanted_.clear();
   measured_ = 0;
   settling_ = false;
@@ -93,6 +94,29 @@ void LinkedSolver::solveAnew() {
   from_links_ = FromLinks::kAfterEdit;
   edit_lights_planned_ = false;
   error_ = {};  // unknown
+}
+
+/// All shooters but lights, because the equation alone would take the memory of their links: surfaces that had one
+/// reflectance have textures now, and a row for each channel. As many as there is room for will be found again.
+void LinkedSolver::dropNodes() {
+  std::vector<Shooter> lights;
+  std::vector<std::uint32_t> number(system_.shooters().size(), scene::kNone);
+  for (std::uint32_t n = 0; n < number.size(); ++n) {
+    if (!system_.shooters()[n].isLight()) continue;
+    number[n] = static_cast<std::uint32_t>(lights.size());
+    lights.push_back(std::move(system_.shooters()[n]));
+  }
+  system_.clear();
+  for (const auto& light : lights) (void)system_.add(light);
+  std::vector<Repair> repairs;
+  for (auto repair : std::span(repairs_).subspan(repaired_)) {
+    if (number[repair.shooter] == scene::kNone) continue;
+    repair.shooter = number[repair.shooter];
+    repairs.push_back(repair);
+  }
+  repairs_ = std::move(repairs);
+  repaired_ = 0;
+  share_part_ = 1.0 / settings_.planner.first_shooters;
 }
 
 /// False: there was no room for the links of a new lamp, others had to go, and the light is to be solved for again.

@@ -7,6 +7,7 @@
 // varies.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -38,6 +39,7 @@ class LinkedSolver final : public Solver {
   void setMaterials(const scene::PatchMaterials& materials) override;
   void setLights(const LightSources& sources) override;
   void setTargetError(double target) override;
+  void endWave() override;
   void assess() override;
 
   [[nodiscard]] const std::vector<glm::vec3>& irradiance() const override { return irradiance_; }
@@ -116,6 +118,7 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] double powerToShoot() const;
   [[nodiscard]] double lostPart() const;
   void solveAnew();
+  void dropNodes();
   [[nodiscard]] bool advanceSolution();
   [[nodiscard]] bool settleFromLinks();
   [[nodiscard]] bool finishEdit();
@@ -130,8 +133,10 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] StepOutcome finishRound();
   [[nodiscard]] StepOutcome chooseNext();
   [[nodiscard]] StepOutcome exhausted(SolveLimit limit);
+  [[nodiscard]] StepOutcome ended() const;
   [[nodiscard]] StepOutcome confirm();
   [[nodiscard]] StepOutcome chooseFurther();
+  void tryNow(const std::function<void()>& work);
 
   std::shared_ptr<const scene::PatchScene> patches_;
   Transport& transport_;

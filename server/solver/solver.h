@@ -75,6 +75,9 @@ class Solver {
   virtual void setLights(const LightSources& sources) = 0;
   /// Goes on when the solve had stopped at a larger error.
   virtual void setTargetError(double target) = 0;
+  /// Time is short: what is still to be measured of the wave is left out where that can be done, and the next steps
+  /// bring to an end what there is.
+  virtual void endWave() {}
   /// Brings irradiance() and error() up to date when the solve is stopped before its first round ended.
   virtual void assess() = 0;
 

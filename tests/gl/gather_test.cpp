@@ -103,6 +103,38 @@ TEST_F(Gather, UnoccludedIrradianceIsLambertsFormula) {
   }
 }
 
+// Half of the lamp lies behind the wall's plane. Single points on it, which lie in front or behind by chance, must give
+// the form factor of the half in front in the mean.
+TEST_F(Gather, OfALampThatAWallsPlaneCutsThePartInFrontIsReceived) {
+  SceneBuilder builder;
+  const auto wall = builder.add({{0.0F, -0.3F, -0.5F}, {0, 0, 0.6F}, {0, 0.6F, 0}, 6, 6});  // faces -x
+  const auto lamp = builder.add({{-0.3F, -0.4F, 0.45F}, {0, 0.8F, 0}, {0.5F, 0, 0}, 1, 1});
+  const auto scene = builder.build();
+  const auto normal = glm::dvec3(scene->triangles[scene->surfaces[wall].first_triangle].normal);
+  constexpr int kShots = 400;
+  std::mt19937 random(7);
+  std::vector<double> sum(36, 0.0);
+  solver::ShotBatch batch;
+  for (int i = 0; i < kShots; ++i) {
+    batch = gatherFrom(*scene, lamp, 1, random);
+    const auto flux = run(scene, batch);
+    for (std::uint32_t k = 0; k < 36; ++k) sum[k] += irradiance(*scene, flux, wall, k % 6, k / 6) / kShots;
+  }
+  const auto& chart = scene->surfaces[wall];
+  const auto& frame = scene->triangles[chart.first_triangle];
+  double all = 0.0, exact = 0.0;
+  for (std::uint32_t k = 0; k < 36; ++k) {
+    const auto at =
+        frame.origin + (static_cast<float>(k % 6) + 0.5F) * frame.du + (static_cast<float>(k / 6) + 0.5F) * frame.dv;
+    all += sum[k];
+    exact += gpu::polygonFormFactor(glm::dvec3(at), normal,
+                                    std::span(batch.gather[0].corners).first(batch.gather[0].corner_count));
+  }
+  EXPECT_GT(exact, 0.5);
+  // The point lies in front in three of five shots, binomially: standard error sqrt(0.4 / 0.6 / 400) = 4 %.
+  EXPECT_NEAR(all / exact, 1.0, 0.12);
+}
+
 TEST_F(Gather, TheReceiverJitterMovesTheReceivingPoint) {
   SceneBuilder builder;
   const auto floor = builder.add({{-0.5F, -0.5F, -0.5F}, {1, 0, 0}, {0, 1, 0}, 4, 4});

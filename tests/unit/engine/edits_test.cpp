@@ -247,6 +247,36 @@ TEST_F(Edits, WhatIsNewIsNotBlackEither) {
   ASSERT_TRUE(reaches(SolveState::kConverged));
 }
 
+// The order of nodes is that in which surfaces are numbered.
+TEST_F(Edits, OtherOrderOfTheSameNodesKeepsTheLight) {
+  solve(blockRoom());
+  const auto before = meanIrradiance(*engine().lightmaps());
+  ASSERT_TRUE(patch(R"([{"op":"replace","path":"/scenes/0/nodes","value":[2,1,0]}])"));
+  ASSERT_TRUE(reaches(State::kConverged));
+  EXPECT_NEAR(meanIrradiance(*engine().lightmaps()), before, 1e-3 * before);
+  ASSERT_TRUE(patch(emissionPatch(1, 20.0)));
+  ASSERT_TRUE(reaches(State::kConverged));
+  EXPECT_NEAR(meanIrradiance(*engine().lightmaps()), 2.0 * before, 2e-3 * before);
+}
+
+TEST_F(Edits, AMaterialThatNoLitSurfaceHasLeavesTheErrorKnown) {
+  auto scene = blockRoom();
+  const auto unseen = scene.add({"unseen", glm::dvec3(0.5), glm::dvec3(0.0)});
+  test_scenes::Object point{"point", {}, {}};
+  appendBox(point, {1.5, 0.5, 1.5}, {1.7, 0.7, 1.7}, test_scenes::allFaces(unseen));
+  scene.objects.push_back(point);
+  solve(scene);
+  ASSERT_TRUE(patch(R"([{"op":"replace","path":"/nodes/3/scale","value":[0,0,0]}])"));
+  ASSERT_TRUE(reaches(State::kConverged));
+  const auto error = status().error.total;
+  const auto outcome =
+      patch(R"([{"op":"replace","path":"/materials/3/pbrMetallicRoughness/baseColorFactor","value":[0.2,0.3,0.4,1]}])");
+  ASSERT_TRUE(outcome) << outcome.error().text();
+  EXPECT_EQ(outcome->affected_surfaces, 0U);
+  EXPECT_EQ(status().state, State::kConverged);
+  EXPECT_EQ(status().error.total, error);
+}
+
 TEST_F(Edits, AppendingWhatNobodyPlacesYetCostsNothing) {
   solve(lumpedCube(0.5));
   const auto before = status();

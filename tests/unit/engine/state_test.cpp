@@ -273,6 +273,21 @@ TEST_F(Kept, ASolveOfEditedGeometryBeginsAnewAfterARestart) {
   EXPECT_TRUE(reaches(State::kConverged));
 }
 
+// Of the wave that failed the light counts as shot, but arrived nowhere.
+TEST_F(Kept, AFailedSolveLeavesTheCheckpointBeforeIt) {
+  solve(lumpedCube(0.5));
+  engine().keepSolve(kPatienceForCheckpoint);
+  restart();
+  const auto good = folder_.read("state/checkpoint");
+  ASSERT_FALSE(good.empty());
+  script_->run_fails = true;
+  ASSERT_TRUE(test::EngineTest::restart());
+  ASSERT_TRUE(reaches(State::kFailed));
+  engine().keepSolve(kPatienceForCheckpoint);
+  EXPECT_TRUE(folder_.read("state/checkpoint") == good);
+  script_->run_fails = false;
+}
+
 TEST_F(Kept, ASolveTooLargeForACheckpointGoesOnWithout) {
   watching_.reset();
   engine_.reset();

@@ -49,7 +49,7 @@ TEST(LeafSpots, LieEvenlyOverWhatABlockLeavesOfALeaf) {
   EXPECT_EQ(seen, 8U);
 }
 
-TEST(LeafSpots, EveryFourthLiesInAnotherQuarter) {
+TEST(LeafSpots, EveryEighthLiesInAnotherQuarter) {
   Scene scene;
   place(scene, floorQuad(4.0));
   place(scene, floorQuad(2.0, 1.0, 1.0), glm::dmat4(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0.01, 0, 1));
@@ -57,9 +57,9 @@ TEST(LeafSpots, EveryFourthLiesInAnotherQuarter) {
   for (const auto& leaf : patches.leaves) {
     if (leaf.first_spot == kNone) continue;
     const glm::vec2 low = glm::floor(leaf.texel);
-    for (std::uint32_t first = 0; first < 4; ++first) {
+    for (std::uint32_t first = 0; first < 8; ++first) {
       std::uint32_t quarters = 0;
-      for (std::uint32_t k = first; k < kLeafSpots; k += 4) {
+      for (std::uint32_t k = first; k < kLeafSpots; k += 8) {
         const glm::vec2 in = patches.spots[leaf.first_spot + k].texel - low;
         quarters |= 1U << (2U * (in.y > 0.5F ? 1U : 0U) + (in.x > 0.5F ? 1U : 0U));
       }

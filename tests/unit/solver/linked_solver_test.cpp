@@ -263,6 +263,58 @@ TEST_F(LinkMemoryBound, HoldsWhenTexturesMakeThreeRowsOfOne) {
   EXPECT_EQ(run(), StepOutcome::kExhausted);
 }
 
+TEST_F(LinkMemoryBound, ThatTheThreeRowsAloneWouldPassIsUsedForFewerShooters) {
+  make(300'000, 1e-6);
+  ASSERT_EQ(run(), StepOutcome::kExhausted);
+  const double before = solver_->error().total;
+  auto textured = made_.materials;
+  for (std::size_t i = 0; i < textured.reflectance.size(); i += 2) textured.reflectance[i] *= 0.98F;
+  solver_->setMaterials(textured);
+  ASSERT_EQ(run(), StepOutcome::kExhausted);
+  // Some two thirds of the shooters: their error is larger, but not that of light without bounces, which is above 1.
+  EXPECT_LT(solver_->error().total, 10.0 * before + 0.05) << "nearly all links were thrown away";
+}
+
+TEST_F(LinkMemoryBound, AnEditOfALimitedSolveIsNotConvergedAboveItsTarget) {
+  make(45'000, 0.01);
+  ASSERT_EQ(run(), StepOutcome::kExhausted);
+  for (int i = 0; i < 4; ++i) {
+    quads_[1].emission *= 0.25F;
+    solver_->setMaterials(makeQuadScene(quads_).materials);
+    const auto outcome = run();
+    EXPECT_EQ(outcome == StepOutcome::kConverged, solver_->error().total <= settings_.target_error) << i;
+  }
+}
+
+TEST_F(LinkMemoryBound, AWaveThatIsCutShortIsSolvedForAtOnceAndItsErrorStated) {
+  make(std::size_t{1} << 30, 1e-6);
+  rays_->pause = std::chrono::milliseconds(1);  // so that a wave takes several slices
+  const auto step = [&] {
+    const auto outcome = solver_->step();
+    EXPECT_TRUE(outcome);
+    return outcome ? *outcome : StepOutcome::kExhausted;
+  };
+  bool measuring = false;
+  for (int waves = 0; waves < 4 || !measuring;) {
+    const auto before = solver_->shots();
+    const bool slice = step() == StepOutcome::kSlice;
+    waves += slice ? 0 : 1;
+    measuring = slice && solver_->shots() > before;
+  }
+  const auto shots = solver_->shots();
+  solver_->endWave();
+  int slices = 0;
+  while (step() == StepOutcome::kSlice && slices < 100) ++slices;
+  EXPECT_LT(slices, 100);
+  EXPECT_EQ(solver_->shots(), shots);
+  solver_->assess();
+  rays_->pause = std::chrono::milliseconds(0);
+  const double stated = solver_->error().total;
+  const auto limited = solver_->irradiance();
+  EXPECT_LT(stated, 1.0);
+  EXPECT_LT(awayFromTruth(limited, {}), 1.5 * std::hypot(stated, 0.01));
+}
+
 TEST_F(LinkMemoryBound, ThatIsUsedUpStillHasRoomForNewLamps) {
   make(45'000, 1e-6);
   ASSERT_EQ(run(), StepOutcome::kExhausted);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
+#include <thread>
 
 #include "server/solver/sampling.h"
 
@@ -244,6 +245,7 @@ void RayTransport::parallel(const solver::ParallelShot& shot, const solver::Shot
 }
 
 Result<solver::TransportCounters> RayTransport::run(const solver::ShotBatch& batch, solver::FluxAccumulators& into) {
+  std::this_thread::sleep_for(pause);
   for (const auto& shot : batch.scatter) scatter(shot, batch.flux_scale, into);
   for (const auto& shot : batch.gather) gather(shot, batch, into);
   for (const auto& shot : batch.point_lights) point(shot, batch.flux_scale, into);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <memory>
 #include <vector>
 
@@ -37,6 +38,8 @@ class RayTransport final : public solver::Transport {
   Result<void> setScene(std::shared_ptr<const scene::PatchScene> patches) override;
   Result<solver::TransportCounters> run(const solver::ShotBatch& batch, solver::FluxAccumulators& into) override;
   [[nodiscard]] std::string description() const override { return "rays"; }
+
+  std::chrono::milliseconds pause{0};  ///< with each run, as a slow renderer would
 
  protected:
   [[nodiscard]] std::shared_ptr<const scene::PatchScene> scene() const override { return patches_; }

@@ -97,6 +97,32 @@ TYPED_TEST(Saved, EditsBeforeItAreInIt) {
   this->expectSame(*next, *solved);
 }
 
+TYPED_TEST(Saved, InTheMiddleOfNewLampsItGoesOnWithTheNext) {
+  LightSources many = lamp(5.0F);
+  for (int i = 0; i < 5; ++i)
+    many.lights.push_back({.position = {0.1 * i - 0.2, 0.1, 0.05 * i}, .intensity = glm::vec3(3.0F)});
+  auto whole = this->make(), interrupted = this->make();
+  for (auto* solver : {whole.get(), interrupted.get()}) {
+    solve(*solver);
+    solver->setLights(many);
+  }
+  solve(*whole);
+  int times = 0;
+  for (int i = 0; i < 8; ++i) {
+    ASSERT_TRUE(interrupted->step());
+    ArchiveWriter to(kRoom);
+    if (!interrupted->save(to)) continue;
+    auto next = this->make(many);
+    ArchiveReader reader(to.bytes());
+    ASSERT_TRUE(next->restore(reader));
+    interrupted = std::move(next);
+    ++times;
+  }
+  EXPECT_GT(times, 0);
+  solve(*interrupted);
+  this->expectSame(*interrupted, *whole);
+}
+
 TYPED_TEST(Saved, WhatIsCutShortOrOfAnotherSceneIsRefused) {
   auto solved = this->make();
   solve(*solved);

@@ -1,0 +1,183 @@
+// What LinkedSolver says of itself: its error, the balance of energy, how much there is still to shoot, counters.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <new>
+#include <system_error>
+
+#include "server/solver/field_error.h"
+#include "server/solver/linked_solver.h"
+
+namespace radiosity::solver {
+namespace {
+
+/// Largest mean reflectance that is told from one.
+constexpr double kMostKept = 0.99999;
+
+}  // namespace
+
+void LinkedSolver::assess() {
+  if (repaired_ < repairs_.size()) return;     // nothing is known before all links are true
+  if (from_links_ == FromLinks::kAfterEdit) {  // somebody wants to know before the next step
+    tryNow([this] {
+      do {
+        while (!settleFromLinks()) continue;
+      } while (!finishEdit());
+    });
+    return;
+  }
+  FieldError field(*patches_);
+  double received = 0.0, reflected = 0.0;
+  for (const auto& side : sides_) {
+    const auto leaves = [&](std::size_t half) {
+      return std::span<const glm::vec3>(&half_[half][side.first_value], side.leaf_count);
+    };
+    field.addSide(side, leaves(0), leaves(1));
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+      const glm::vec3 flux = irradiance_[side.first_node + leaf] * patches_->node_area[side.first_node + leaf];
+      received += static_cast<double>(channelSum(flux));
+      reflected += static_cast<double>(glm::dot(flux, reflectance_[side.first_value + leaf]));
+    }
+  }
+  error_ = {};
+  double owed = 0.0;  // by lights that are still to be measured
+  for (const auto& shooter : system_.shooters()) {
+    for (const auto& column : shooter.column) {
+      if (shooter.isLight() && column.points() == 0.0) owed += 0.5 * shooter.power();
+    }
+  }
+  const double left_out = planner_.leftOut() + (growing_ ? 0.0 : planner_.unlinked(system_));
+  owed += growing_ ? net_unshot_ : left_out;
+  if (field.square() <= 0.0) {
+    error_.residual = error_.total = owed + varying_ > 0.0 ? 1.0 : 0.0;  // all or nothing is missing
+    return;
+  }
+  const double kept = std::min(kMostKept, (1.0 - lostPart()) * reflected / received);
+  error_.sampling = field.sampling();
+  error_.discretization = field.discretization();
+  const double varying = std::sqrt(planner_.variation(system_, unshot_, *patches_) / field.square());
+  error_.residual = owed / (1.0 - kept) / received + varying + system_.unsolved();
+  varying_share_ = error_.residual > 0.0 ? varying / error_.residual : 0.0;
+  left_out_ = left_out / (1.0 - kept) / received;
+  error_.total = std::hypot(error_.residual, error_.sampling);
+}
+
+/// Without memory or threads the next step will try again, and can say so.
+void LinkedSolver::tryNow(const std::function<void()>& work) {
+  try {
+    work();
+  } catch (const std::bad_alloc&) {
+    pass_ = Pass::kNone;
+  } catch (const std::system_error&) {
+    pass_ = Pass::kNone;
+  }
+}
+
+LinkCounters LinkedSolver::linkCounters() const {
+  LinkCounters counters;
+  counters.bytes = system_.bytes();
+  counters.solutions = solutions_;
+  counters.sweeps = sweeps_;
+  counters.replayed = replayed_;
+  counters.rows = system_.rowCount();
+  counters.kept = edits_.kept;
+  counters.repaired = edits_.repaired;
+  counters.repaired_links = edits_.repaired_links;
+  counters.retaken = edits_.retaken;
+  std::uint64_t nodes = 0;
+  for (const auto& shooter : system_.shooters()) {
+    nodes += shooter.isLight() ? 0 : 1;
+    counters.shooters += shooter.column[0].points() + shooter.column[1].points() > 0.0 ? 1 : 0;
+    counters.samples += shooter.column[0].samples() + shooter.column[1].samples();
+  }
+  counters.rows_saved = 3 * nodes > counters.rows ? 3 * nodes - counters.rows : 0;
+  return counters;
+}
+
+/// Part of what the shooters of reflected light send that leaves the scene or falls on unlit sides: it never comes
+/// back.
+double LinkedSolver::lostPart() const {
+  double sent = 0.0, lost = 0.0;
+  for (const auto& shooter : system_.shooters()) {
+    for (std::size_t half = 0; half < 2 && !shooter.isLight(); ++half) {
+      const auto& column = shooter.column[half];
+      const glm::dvec3 radiosity = shooter.weight[half] * glm::dvec3(shooter.sent[half]);
+      if (column.points() == 0.0) continue;
+      sent += shooter.area * (radiosity.x + radiosity.y + radiosity.z);
+      lost += (column.escaped() + column.absorbed()) * (radiosity.x + radiosity.y + radiosity.z);
+    }
+  }
+  return sent > 0.0 ? std::clamp(lost / sent, 0.0, 1.0) : 0.0;
+}
+
+/// Light that there is to shoot, with all its bounces: what stands in for the shooters' leaves, and what is unshot.
+double LinkedSolver::powerToShoot() const {
+  double shot = 0.0, received = 0.0, reflected = 0.0;
+  for (const auto& shooter : system_.shooters()) {
+    if (!shooter.isLight() && shooter.parent == scene::kNone) shot += shooter.power();
+  }
+  for (const auto& side : sides_) {
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+      const glm::vec3 flux = irradiance_[side.first_node + leaf] * patches_->node_area[side.first_node + leaf];
+      received += static_cast<double>(channelSum(flux));
+      reflected += static_cast<double>(glm::dot(flux, reflectance_[side.first_value + leaf]));
+    }
+  }
+  const double kept = received > 0.0 ? std::min(0.95, (1.0 - lostPart()) * reflected / received) : 0.5;
+  return shot + net_unshot_ / (1.0 - kept);
+}
+
+EnergyParts LinkedSolver::energy() const {
+  EnergyParts parts;
+  std::array<double, 3> sent_for{};  // by lights that have links, and by shooters for others
+  for (const auto& shooter : system_.shooters()) {
+    for (std::size_t c = 0; c < 3 && shooter.source != scene::kNone; ++c) {
+      const double flux = shooter.area * static_cast<double>(shooter.sent[0][static_cast<int>(c)]);
+      parts.emitted[c] += flux;
+      for (const auto& column : shooter.column) {
+        if (column.points() == 0.0) parts.unshot[c] += 0.5 * flux;
+      }
+    }
+    for (std::size_t half = 0; half < 2; ++half) {
+      const auto& column = shooter.column[half];
+      if (column.points() == 0.0) continue;
+      for (std::size_t c = 0; c < 3; ++c) {
+        const double sent = 0.5 * shooter.weight[half] * static_cast<double>(shooter.sent[half][static_cast<int>(c)]);
+        parts.escaped[c] += sent * column.escaped();
+        parts.backface[c] += sent * column.absorbed();
+        if (shooter.light != scene::kNone) sent_for[c] += sent * shooter.area;
+      }
+    }
+    // Shooters that won at roulette sent more than their own leaves have, those that lost nothing.
+    for (std::size_t half = 0; half < 2 && !shooter.isLight(); ++half) {
+      for (int c = 0; c < 3; ++c)
+        sent_for[static_cast<std::size_t>(c)] +=
+            0.5 * (shooter.weight[half] - 1.0) * static_cast<double>(shooter.sent[half][c]) * shooter.area;
+    }
+  }
+  for (const auto& side : sides_) {
+    const glm::dvec3 net(unshot_.flux(side.first_node + side.node_count - 1));
+    for (int c = 0; c < 3; ++c) {
+      const auto i = static_cast<std::size_t>(c);
+      parts.unshot[i] += net[c];
+      for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+        const auto v = side.first_value + leaf;
+        const auto area = static_cast<double>(patches_->node_area[side.first_node + leaf]);
+        const double emitted = area * static_cast<double>(emission_[v][c]);
+        parts.emitted[i] += emitted;
+        if (side.gathered) parts.unshot[i] += emitted;
+        parts.absorbed[i] += area * (1.0 - static_cast<double>(reflectance_[v][c])) *
+                             static_cast<double>(irradiance_[side.first_node + leaf][c]);
+      }
+    }
+  }
+  for (std::size_t c = 0; c < 3; ++c) {
+    parts.unshot[c] -= sent_for[c];
+    parts.imbalance[c] = parts.emitted[c] - parts.absorbed[c] - parts.escaped[c] - parts.backface[c] - parts.unshot[c];
+  }
+  return parts;
+}
+
+}  // namespace radiosity::solver
