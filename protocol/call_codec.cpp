@@ -142,7 +142,7 @@ void read(Reader& r, SolveConfigureCall& c) {
   if (const auto* limit = r.find("timeLimitMs"); limit != nullptr && limit->is_null())
     c.no_time_limit = true;
   else
-    r.optionalInteger("timeLimitMs", c.time_limit_ms, 1, kAnyInteger);
+    r.optionalInteger("timeLimitMs", c.time_limit_ms, 1, kMaxTimeLimitMs);
   r.optionalInteger("texels", c.texels, 1, kMaxTexels);
   r.optionalNumber("texelSize", c.texel_size_m, kTexelSizeRange);
   r.optionalInteger("seed", c.seed, 0, std::numeric_limits<std::uint64_t>::max());
@@ -217,6 +217,12 @@ tl::expected<Call, RpcError> decodeCall(const RpcRequest& request) {
     if (method.name == request.method) return method.decode(request.params.get());
   return tl::unexpected(RpcError{RpcCode::kMethodNotFound,
                                  fmt::format("there is no method \"{}\"", request.method.substr(0, 64)), "/method"});
+}
+
+std::vector<std::string> methodNames() {
+  std::vector<std::string> names;
+  for (const auto& method : kMethods) names.emplace_back(method.name);
+  return names;
 }
 
 std::string encodeCall(const RequestId& id, const Call& call) {

@@ -4,6 +4,7 @@
 
 #include <string>
 #include <tl/expected.hpp>
+#include <vector>
 
 #include "protocol/json_rpc.h"
 #include "protocol/messages.h"
@@ -15,6 +16,9 @@ namespace radiosity::protocol {
 /// The call with its parameters, or the error to answer: kMethodNotFound, or kInvalidParams with pointer and reason
 /// ("/params/targetError must be a number in (0, 1]").
 [[nodiscard]] tl::expected<Call, RpcError> decodeCall(const RpcRequest& request);
+
+/// Of every method there is, in no particular order.
+[[nodiscard]] std::vector<std::string> methodNames();
 
 [[nodiscard]] std::string encodeReply(const RequestId& id, const HelloReply& reply);
 [[nodiscard]] std::string encodeReply(const RequestId& id, const SceneGetReply& reply);

@@ -46,7 +46,8 @@ inline constexpr std::size_t kControlLaneMessages = 256;
 inline constexpr std::size_t kControlLaneBytes = std::size_t{1} << 20;
 inline constexpr std::uint32_t kHelloTimeoutMs = 5'000;
 inline constexpr std::uint32_t kWriteDeadlineMs = 10'000;
-inline constexpr std::uint32_t kMaxWaitMs = 24U * 3600U * 1000U;  ///< longest solve.wait
+inline constexpr std::uint64_t kMaxTimeLimitMs = 1'000'000'000'000;  ///< 31 years
+inline constexpr std::uint32_t kMaxWaitMs = 24U * 3600U * 1000U;     ///< longest solve.wait
 
 // Server-wide defaults; flags of radiosityd change them.
 inline constexpr std::size_t kMaxClients = 256;

@@ -86,6 +86,7 @@ int serve(Options options) {
   if (!(*server)->inHurry()) (*engine)->keepSolve(kCheckpointPatience);
   if (store) store->foldLog();
   leaveWithin(std::chrono::milliseconds(200));
+  if (uploads) uploads->finish();
   return 0;
 }
 

@@ -50,7 +50,7 @@ void addSolveOptions(CLI::App& app, Options& o, Raw& raw) {
       ->check(CLI::Range(1e-9, 1.0))
       ->capture_default_str();
   app.add_option("--time-limit", raw.time_limit_s, "Stop after this many seconds of solving; 0: no limit")
-      ->check(CLI::NonNegativeNumber)
+      ->check(CLI::Range(0.0, 1e9))
       ->capture_default_str();
   app.add_option("--texels", o.solve.texels, "Lightmap texels (leaf patches) in all, about")
       ->check(CLI::PositiveNumber)

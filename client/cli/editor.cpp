@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <random>
 #include <thread>
@@ -11,8 +13,12 @@
 namespace radiosity::cli {
 namespace {
 
-constexpr int kAttempts = 3;
+constexpr int kAttempts = 3;  ///< to send an edit over connections that are lost
+/// For a server that is started again.
+constexpr std::chrono::seconds kPatience{15}, kLongestWait{2};
 constexpr int kRaces = 20;
+
+using Clock = std::chrono::steady_clock;
 
 std::string newRequestId() {
   std::random_device random;
@@ -20,6 +26,27 @@ std::string newRequestId() {
 }
 
 client::CallFailure failureOf(Error error) { return {std::move(error), {}}; }
+
+void pause(std::chrono::milliseconds wait) {
+  const auto until = Clock::now() + wait;
+  while (!interrupted() && Clock::now() < until) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+}
+
+/// Who may be there again in a while: nobody answers, or a server that is stopping.
+bool mayComeBack(const client::CallFailure& failure) {
+  if (failure.rpc) return failure.rpc->code == protocol::RpcCode::kDraining;
+  return failure.error.code == ErrorCode::kUnavailable || failure.error.code == ErrorCode::kBusy;
+}
+
+/// Once a connection was lost: tries until `deadline`.
+client::CallResult<client::Connection> connectAgain(const Remote& remote, Clock::time_point deadline) {
+  client::BackOff back_off;
+  for (;;) {
+    pause(std::min<std::chrono::milliseconds>(back_off.next(), kLongestWait));
+    auto connection = remote.connect();
+    if (connection || interrupted() || Clock::now() > deadline || !mayComeBack(connection.error())) return connection;
+  }
+}
 
 }  // namespace
 
@@ -44,14 +71,13 @@ client::CallResult<FetchedScene> fetchScene(const Remote& remote) {
 template <typename CallType>
 client::CallResult<typename CallType::Reply> sendEdit(const Remote& remote, CallType call) {
   call.request_id = newRequestId();
-  client::BackOff back_off;
+  auto connection = remote.connect();
   for (int attempt = 1;; ++attempt) {
-    auto connection = remote.connect();
     if (!connection) return tl::unexpected(connection.error());
     auto reply = connection->call(call);
     if (reply || reply.error().rpc || interrupted() || attempt == kAttempts) return reply;
     warn(reply.error().error.text() + "; sending the edit again");
-    std::this_thread::sleep_for(back_off.next());
+    connection = connectAgain(remote, Clock::now() + kPatience);
   }
 }
 

@@ -22,8 +22,8 @@ struct FetchedScene {
 /// The scene's document; by URL where it is too long for a message.
 [[nodiscard]] client::CallResult<FetchedScene> fetchScene(const Remote& remote);
 
-/// Sends an edit; after a lost connection again under the same request id, which the server applies once. `CallType`
-/// has a request_id.
+/// Sends an edit; after a lost connection again under the same request id, which the server applies once. A server that
+/// is gone then is waited for, 15 s. `CallType` has a request_id.
 template <typename CallType>
 [[nodiscard]] client::CallResult<typename CallType::Reply> sendEdit(const Remote& remote, CallType call);
 

@@ -1,21 +1,14 @@
 #include "client/cli/exit_code.h"
 
-#include <algorithm>
 #include <cstdio>
 
 #include "client/cli/interrupt.h"
+#include "common/one_line.h"
 
 namespace radiosity::cli {
 namespace {
 
 std::string complaint_place;
-
-/// Texts come from files and peers: control characters must not reach the terminal.
-std::string oneLine(std::string text) {
-  std::replace_if(
-      text.begin(), text.end(), [](unsigned char c) { return c < ' ' || c == 0x7f; }, ' ');
-  return text;
-}
 
 }  // namespace
 

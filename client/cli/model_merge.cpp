@@ -181,7 +181,7 @@ class Merger {
     const auto index = renumber_.first("nodes") + model_["nodes"].size();
     add("/nodes/-", std::move(node));
     if (auto done = attach(placement, index); !done) return tl::unexpected(done.error());
-    return Merge{std::move(patch_), "/nodes/@" + name};
+    return Merge{std::move(patch_), "@" + name};
   }
 
   Result<void> attach(const Placement& placement, std::size_t index) {

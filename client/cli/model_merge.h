@@ -30,7 +30,7 @@ struct Placement {
 
 struct Merge {
   Json patch;
-  std::string node;  ///< pointer to the new node, "/nodes/@table"
+  std::string node;  ///< the new node as the commands take it, "@table"
 };
 
 /// A patch that appends everything of the model but animations and skins, with its indices moved along, below one new

@@ -8,6 +8,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "common/one_line.h"
+
 namespace radiosity::cli {
 namespace {
 
@@ -89,12 +91,13 @@ void ProgressDisplay::showText(const std::string& text) {
   draw(limit > 0 ? text.substr(0, static_cast<std::size_t>(limit)) : text);
 }
 
-void ProgressDisplay::draw(const std::string& line) {
+void ProgressDisplay::draw(const std::string& text) {
   using namespace std::chrono_literals;
   const auto now = std::chrono::steady_clock::now();
   const auto interval = terminal_ ? std::chrono::milliseconds(50) : std::chrono::milliseconds(2000);
   if (last_ != std::chrono::steady_clock::time_point{} && now - last_ < interval) return;
   last_ = now;
+  const auto line = oneLine(text);
   if (terminal_) {
     std::fprintf(stderr, "\r\033[K%s", line.c_str());
     drawn_ = true;
@@ -106,7 +109,7 @@ void ProgressDisplay::draw(const std::string& line) {
 
 void ProgressDisplay::message(const std::string& text) {
   clear();
-  std::fprintf(stderr, "%s\n", text.c_str());
+  std::fprintf(stderr, "%s\n", oneLine(text).c_str());
 }
 
 void ProgressDisplay::clear() {

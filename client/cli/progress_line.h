@@ -52,7 +52,7 @@ class ProgressDisplay {
 
  private:
   [[nodiscard]] int columns() const;
-  void draw(const std::string& line);
+  void draw(const std::string& text);
 
   bool quiet_;
   bool terminal_;

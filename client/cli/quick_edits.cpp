@@ -12,6 +12,7 @@
 #include "client/cli/model_merge.h"
 #include "client/cli/scene_edits.h"
 #include "client/cli/scene_file.h"
+#include "common/one_line.h"
 #include "protocol/http_bodies.h"
 
 namespace radiosity::cli {
@@ -268,8 +269,8 @@ void addHistory(CLI::App& app, Run& run) {
       if (!reply) return complain(reply.error());
       for (const auto& past : reply->revisions) {
         fmt::print("{:6}  {:%F %T}  {:5}  {}{}{}\n", past.revision,
-                   fmt::localtime(static_cast<std::time_t>(past.time_s)), past.kind, past.summary,
-                   past.by.empty() ? "" : "  by " + past.by, past.undone ? "  (taken back)" : "");
+                   fmt::localtime(static_cast<std::time_t>(past.time_s)), oneLine(past.kind), oneLine(past.summary),
+                   past.by.empty() ? "" : "  by " + oneLine(past.by), past.undone ? "  (taken back)" : "");
       }
       fmt::print("{} edits can be taken back, {} made again\n", reply->undoable, reply->redoable);
       return ExitCode::kOk;

@@ -96,10 +96,19 @@ Result<std::vector<client::AtomicFile>> downloadAll(const Remote& remote, const 
   return files;
 }
 
-Result<std::uint64_t> currentRevision(const Remote& remote) {
+/// What UVs and pages that belong together have in common: other texels make another layout of the same revision.
+struct Layout {
+  std::uint64_t revision = 0, texels = 0;
+  double texel_size_m = 0.0;
+  bool operator==(const Layout&) const = default;
+};
+
+Result<Layout> currentLayout(const Remote& remote) {
   auto connection = remote.connect();
   if (!connection) return tl::unexpected(connection.error().error);
-  return connection->serverInfo().revision;
+  const auto status = connection->call(protocol::StatusCall{});
+  if (!status) return tl::unexpected(status.error().error);
+  return Layout{status->progress.revision, status->settings.texels, status->settings.texel_size_m};
 }
 
 }  // namespace
@@ -194,13 +203,13 @@ Result<std::vector<std::string>> saveScene(const Remote& remote, const SaveReque
   const auto stem = glbStem(request.glb_path);
   if (!stem) return tl::unexpected(stem.error());
   for (int attempt = 0; attempt < kSaveAttempts; ++attempt) {
-    const auto before = currentRevision(remote);
+    const auto before = currentLayout(remote);
     if (!before) return tl::unexpected(before.error());
     auto files = downloadAll(remote, request, *stem, display);
     if (!files) return tl::unexpected(files.error());
-    const auto after = currentRevision(remote);
+    const auto after = currentLayout(remote);
     if (!after) return tl::unexpected(after.error());
-    if (*before != *after) continue;  // somebody edited the scene in between: UVs and pages might not belong together
+    if (*before != *after) continue;  // somebody changed it in between: UVs and pages might not belong together
     std::vector<std::string> names;
     for (auto& file : *files) {
       if (auto done = file.commit(); !done) return tl::unexpected(done.error());
@@ -208,7 +217,7 @@ Result<std::vector<std::string>> saveScene(const Remote& remote, const SaveReque
     }
     return names;
   }
-  return fail(ErrorCode::kBusy, "the scene is being edited faster than it can be downloaded; try again",
+  return fail(ErrorCode::kBusy, "the scene is being changed faster than it can be downloaded; try again",
               remote.url.text());
 }
 

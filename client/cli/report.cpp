@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/check.h"
+#include "common/one_line.h"
 #include "protocol/codec.h"
 
 namespace radiosity::cli {
@@ -71,7 +72,7 @@ std::string statusText(const protocol::StatusReply& status) {
   const auto& s = status.settings;
   std::string out;
   const auto row = [&out](std::string_view name, const std::string& value) {
-    out += fmt::format("{:<10} {}\n", name, value);
+    out += fmt::format("{:<10} {}\n", name, oneLine(value));
   };
   row("state", stateWord(p.state) + (p.failure.empty() ? "" : ": " + p.failure));
   row("revision", std::to_string(p.revision));
@@ -91,7 +92,7 @@ std::string statusText(const protocol::StatusReply& status) {
   row("seed", std::to_string(s.seed));
   row("OpenGL", status.gl_renderer);
   row("warnings", countText(status.warning_count));
-  for (const auto& warning : status.warnings) out += "  " + warning + "\n";
+  for (const auto& warning : status.warnings) out += "  " + oneLine(warning) + "\n";
   return out;
 }
 

@@ -12,6 +12,7 @@
 #include "client/cli/report.h"
 #include "client/cli/scene_file.h"
 #include "client/cli/server_process.h"
+#include "common/one_line.h"
 
 namespace radiosity::cli {
 namespace {
@@ -234,7 +235,8 @@ class Solve {
       if (passed_on_.find(warning) == std::string::npos) warn(warning);
     for (const auto& name : *written) std::printf("%s\n", name.c_str());
     const auto& failure = status.progress.failure;
-    const std::string why = status.progress.state == "limited" ? "limited (" + failure + "): " : "time limit: ";
+    const std::string why =
+        status.progress.state == "limited" ? "limited (" + oneLine(failure) + "): " : "time limit: ";
     std::fprintf(stderr, "%s%s\n", reached ? "" : why.c_str(), outcomeText(status.progress).c_str());
     return reached ? ExitCode::kOk : ExitCode::kShort;
   }

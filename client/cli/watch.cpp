@@ -9,6 +9,7 @@
 #include "client/cli/interrupt.h"
 #include "client/cli/remote.h"
 #include "client/cli/report.h"
+#include "common/one_line.h"
 
 namespace radiosity::cli {
 namespace {
@@ -91,7 +92,7 @@ class Watch {
     display_.clear();
     if (progress.state == "failed")
       return complain(Error{ErrorCode::kUnavailable, "the solve failed: " + progress.failure, remote_.url.text()});
-    const std::string why = progress.state == "limited" ? "limited (" + progress.failure + ")" : "time limit";
+    const std::string why = progress.state == "limited" ? "limited (" + oneLine(progress.failure) + ")" : "time limit";
     std::printf("%s: %s\n", progress.state == "converged" ? "converged" : why.c_str(), outcomeText(progress).c_str());
     return progress.state == "converged" ? ExitCode::kOk : ExitCode::kShort;
   }

@@ -10,6 +10,7 @@ const resolve = {
 const server = { fs: { allow: [here('../..')] } };
 
 export default defineConfig({
+  resolve, // for vite-node, which runs the benchmark
   server,
   test: {
     projects: [

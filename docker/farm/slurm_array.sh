@@ -36,7 +36,7 @@ mkdir -p "$out/state" || exit 1
 
 # The shell gets the signal and passes it on; `wait` returns at once then, so it is asked until the solve has ended.
 "${RADIOSITY:-radiosity}" solve "$scene" -o "$out/$name-lit.glb" --report "$out/$name.json" \
-  --workers "${SLURM_CPUS_PER_TASK:-0}" --state "$out/state/$name" "$@" &
+  ${SLURM_CPUS_PER_TASK:+--workers "$SLURM_CPUS_PER_TASK"} --state "$out/state/$name" "$@" &
 solve=$!
 trap 'kill -TERM "$solve" 2>/dev/null' TERM
 code=0

@@ -112,6 +112,20 @@ double newLightShare(double error, double target_error) {
   return t * t * (3.0 - 2.0 * t);
 }
 
+std::vector<LightmapPage> replacePart(std::vector<LightmapPage> shown, const std::vector<LightmapPage>& part,
+                                      const std::vector<LightmapPage>& fresh) {
+  RAD_CHECK_EQ(part.size(), shown.size());
+  RAD_CHECK_EQ(fresh.size(), shown.size());
+  for (std::size_t p = 0; p < shown.size(); ++p) {
+    auto& pixels = shown[p].irradiance.pixels;
+    RAD_CHECK_EQ(part[p].irradiance.pixels.size(), pixels.size());
+    RAD_CHECK_EQ(fresh[p].irradiance.pixels.size(), pixels.size());
+    for (std::size_t i = 0; i < pixels.size(); ++i)
+      pixels[i] = glm::max(pixels[i] - part[p].irradiance.pixels[i] + fresh[p].irradiance.pixels[i], 0.0F);
+  }
+  return shown;
+}
+
 std::vector<LightmapPage> blendPages(const std::vector<LightmapPage>& carried, std::vector<LightmapPage> fresh,
                                      double share) {
   RAD_CHECK_EQ(carried.size(), fresh.size());

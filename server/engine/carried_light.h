@@ -26,6 +26,12 @@ struct ShownScene {
 /// fraction) is so large that light is missing, 1 from the target error or 5 % on, smooth in between.
 [[nodiscard]] double newLightShare(double error, double target_error);
 
+/// shown - part + fresh, nowhere below 0; all of one layout. `part` is a part of what is shown, `fresh` what takes its
+/// place.
+[[nodiscard]] std::vector<scene::LightmapPage> replacePart(std::vector<scene::LightmapPage> shown,
+                                                           const std::vector<scene::LightmapPage>& part,
+                                                           const std::vector<scene::LightmapPage>& fresh);
+
 /// share x fresh + (1 - share) x carried; both of one layout.
 [[nodiscard]] std::vector<scene::LightmapPage> blendPages(const std::vector<scene::LightmapPage>& carried,
                                                           std::vector<scene::LightmapPage> fresh, double share);

@@ -241,7 +241,9 @@ class Engine {
   /// where there is none.
   virtual void step(StepRequest request, Callback<PatchOutcome> done) = 0;
   virtual void history(Callback<HistoryReport> done) = 0;
-  virtual void configure(SolveSettings settings, Callback<SolveSettings> done) = 0;
+  /// Makes the settings that are to hold of those that hold when its turn comes. Called once, on the solve thread.
+  using ChangeSettings = std::function<SolveSettings(SolveSettings)>;
+  virtual void configure(ChangeSettings change, Callback<SolveSettings> done) = 0;
   virtual void pause(Callback<SolveState> done) = 0;
   virtual void resume(Callback<SolveState> done) = 0;
   virtual void restart(Callback<SolveState> done) = 0;

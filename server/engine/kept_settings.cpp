@@ -11,6 +11,8 @@
 namespace radiosity::engine {
 namespace {
 
+constexpr double kLongestTimeLimitSeconds = 1e9;  ///< as the protocol has it
+
 template <typename T>
 std::optional<T> numberIn(const std::map<std::string, std::string>& kept, const std::string& name) {
   const auto found = kept.find(name);
@@ -53,7 +55,7 @@ SolveSettings withKept(SolveSettings settings, const std::map<std::string, std::
     if (const auto error = real("targetError"); error && *error > 0.0 && *error <= 1.0) settings.target_error = *error;
   }
   if (!named.contains("timeLimit")) {
-    if (const auto limit = real("timeLimit"); limit && *limit >= 0.0)
+    if (const auto limit = real("timeLimit"); limit && *limit >= 0.0 && *limit <= kLongestTimeLimitSeconds)
       settings.time_limit_s = *limit > 0.0 ? limit : std::nullopt;
   }
   if (!named.contains("texels")) {

@@ -39,6 +39,17 @@ LitScene::Affected LitScene::succeed(const LitScene& former) {
   return {touchedSurfaces(before, *former_map_), former.solver_->shots()};
 }
 
+bool LitScene::keepsLayoutOf(const LitScene& former) const {
+  const auto samePage = [](const scene::Page& a, const scene::Page& b) {
+    return a.width == b.width && a.height == b.height;
+  };
+  const auto sameUv = [](const auto& a, const auto& b) { return a.page == b.page && a.corners == b.corners; };
+  return former.patches_->centre == patches_->centre && former.patches_->scale == patches_->scale &&
+         std::ranges::equal(former.patches_->pages, patches_->pages, samePage) &&
+         std::ranges::equal(former.patches_->instance_uvs, patches_->instance_uvs, sameUv) &&
+         onlyNodesMoved(*former.scene_, *scene_);
+}
+
 std::uint64_t LitScene::startSolve(LitScene* former) {
   const auto map = std::exchange(former_map_, std::nullopt);
   if (former == nullptr || !map || map->nothingKept()) {
@@ -135,10 +146,31 @@ std::uint64_t LitScene::reshade(scene::EditedDocument next, const SceneChange& c
   return affected;
 }
 
-void LitScene::fadeFrom(LitScene& before) {
-  const auto shown = before.shownPages();
-  old_light_ = carryLight({*before.scene_, *before.patches_, shown}, *scene_, *patches_);
+void LitScene::fadeFrom(LitScene& before, bool same_layout) {
+  const auto carried = [&](std::vector<scene::LightmapPage> pages) {
+    return same_layout ? std::move(pages) : carryLight({*before.scene_, *before.patches_, pages}, *scene_, *patches_);
+  };
+  old_light_ = carried(before.shownPages());
+  auto direct = before.old_direct_.empty() ? before.directPages() : before.old_direct_;
+  old_direct_.clear();
+  if (!direct.empty()) old_direct_ = carried(std::move(direct));
   new_share_ = 0.0;
+}
+
+/// Empty: not known.
+std::vector<scene::LightmapPage> LitScene::directPages() const {
+  const auto direct = solver_->directIrradiance();
+  if (direct.empty()) return {};
+  return scene::assemblePages(*patches_, direct);
+}
+
+bool LitScene::showDirectLight() {
+  if (old_light_.empty() || old_direct_.empty() || !solver_->isRepairing()) return false;
+  const auto fresh = directPages();
+  if (fresh.empty()) return false;
+  old_light_ = replacePart(std::move(old_light_), old_direct_, fresh);
+  old_direct_.clear();
+  return true;
 }
 
 /// Goes on with what changed: materials_, or the sources of light that are no surfaces.
@@ -149,6 +181,7 @@ void LitScene::updateSolver(bool materials, bool lights) {
   // small lights.
   if (solver_->hasFluxScale() && (power_ > 4.0 * solver_power_ || power_ < solver_power_ / 64.0)) {
     old_light_ = shownPages();
+    old_direct_.clear();
     new_share_ = 0.0;
     makeSolver();
     return;

@@ -39,6 +39,9 @@ class LitScene {
 
   [[nodiscard]] SceneChange changeTo(const scene::Scene& next) const { return changeBetween(*scene_, next); }
 
+  /// Whether pages and UVs are those of `former`, and who has its GLB needs no other: tiles stay valid.
+  [[nodiscard]] bool keepsLayoutOf(const LitScene& former) const;
+
   /// Finds what stays of `former`, of which this scene is an edit, and says what the edit touches: these surfaces, and
   /// at most so many shots.
   struct Affected {
@@ -55,8 +58,9 @@ class LitScene {
   /// Takes over what leaves the geometry as it is. Returns the number of surfaces affected.
   std::uint64_t reshade(scene::EditedDocument next, const SceneChange& change);
 
-  /// Shows `before`'s light, on the charts that are still there, until this scene's own is as good.
-  void fadeFrom(LitScene& before);
+  /// Shows `before`'s light, on the charts that are still there, until this scene's own is as good. `same_layout`: of
+  /// keepsLayoutOf(before); then all of it stays as it is.
+  void fadeFrom(LitScene& before, bool same_layout);
 
   [[nodiscard]] const scene::Document& document() const { return document_; }
   [[nodiscard]] const scene::Scene& scene() const { return *scene_; }
@@ -88,7 +92,14 @@ class LitScene {
   /// What viewers see: after an edit the light that was there before fades into pages() as these become as good.
   [[nodiscard]] std::vector<scene::LightmapPage> shownPages();
   /// From here on the solver's own light is shown, as good as it is.
-  void endFade() { old_light_.clear(); }
+  void endFade() {
+    old_light_.clear();
+    old_direct_.clear();
+  }
+  /// While an edit of geometry is being solved, as soon as the lights' own part of the new light is known: shows it in
+  /// the place of their old one, so that shadows move long before reflected light follows. True: what viewers see has
+  /// changed. Once for each edit; costs two passes over the pages.
+  [[nodiscard]] bool showDirectLight();
 
  private:
   LitScene(scene::EditedDocument edited, const SolveSettings& settings, solver::Transport& transport)
@@ -98,6 +109,7 @@ class LitScene {
         scene_(std::make_shared<const scene::Scene>(std::move(edited.scene))) {}
   void makeSolver(const solver::FormerSolver* former = nullptr);
   void updateSolver(bool materials, bool lights);
+  [[nodiscard]] std::vector<scene::LightmapPage> directPages() const;
   [[nodiscard]] std::uint64_t touchedSurfaces(std::size_t before, const scene::PatchMap& map) const;
   [[nodiscard]] double emittedPower() const;
   [[nodiscard]] solver::LightSources lightSources(const scene::Scene& scene) const;
@@ -111,11 +123,12 @@ class LitScene {
   bool reproducible_ = true;
   std::optional<scene::PatchMap> former_map_;  // from succeed() to startSolve()
   std::unique_ptr<solver::Solver> solver_;
-  solver::LightSources sources_;                // that the solver knows of
-  double power_ = 0.0;                          // emitted, all channels
-  double solver_power_ = 0.0;                   // emitted power the solver's flux scale was chosen for
-  std::vector<scene::LightmapPage> old_light_;  // what was shown before an edit; empty: no fade
-  double new_share_ = 0.0;                      // of the solver's own light in what is shown; never falls
+  solver::LightSources sources_;                 // that the solver knows of
+  double power_ = 0.0;                           // emitted, all channels
+  double solver_power_ = 0.0;                    // emitted power the solver's flux scale was chosen for
+  std::vector<scene::LightmapPage> old_light_;   // what was shown before an edit; empty: no fade
+  std::vector<scene::LightmapPage> old_direct_;  // of it, what came straight from lights; empty: not known, or replaced
+  double new_share_ = 0.0;                       // of the solver's own light in what is shown; never falls
 };
 
 }  // namespace radiosity::engine

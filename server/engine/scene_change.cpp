@@ -1,6 +1,8 @@
 #include "server/engine/scene_change.h"
 
 #include <algorithm>
+#include <map>
+#include <utility>
 
 namespace radiosity::engine {
 namespace {
@@ -69,6 +71,25 @@ SceneChange changeBetween(const Scene& before, const Scene& after) {
     if (!sameShading(before, old_one, after, new_one)) change.materials.push_back(m);
   }
   return change;
+}
+
+bool onlyNodesMoved(const Scene& before, const Scene& after) {
+  if (before.primitives != after.primitives || before.instances.size() != after.instances.size()) return false;
+  std::map<std::pair<std::uint32_t, std::uint32_t>, int> placed;
+  for (const auto& instance : before.instances) ++placed[{instance.node, instance.primitive}];
+  for (std::size_t i = 0; i < before.instances.size(); ++i) {
+    auto instance = before.instances[i];
+    const bool moved = instance.world != after.instances[i].world;
+    instance.world = after.instances[i].world;
+    // Of several instances of one node, each has a place of its own beside the node's.
+    if (instance != after.instances[i] || (moved && placed[{instance.node, instance.primitive}] > 1)) return false;
+  }
+  const auto used = usedMaterials(before);
+  const auto both = std::min(before.materials.size(), after.materials.size());
+  for (std::size_t m = 0; m < both; ++m) {
+    if (used[m] && !sameShape(before, before.materials[m], after, after.materials[m])) return false;
+  }
+  return true;
 }
 
 }  // namespace radiosity::engine

@@ -22,4 +22,8 @@ struct SceneChange {
 /// comparison of all vertices and decoded textures.
 [[nodiscard]] SceneChange changeBetween(const scene::Scene& before, const scene::Scene& after);
 
+/// Whether nothing but places of nodes, and what materials emit and reflect, differs, so that one who has the file of
+/// `before` can bring it up to date by the nodes' transforms alone. Cost: as changeBetween().
+[[nodiscard]] bool onlyNodesMoved(const scene::Scene& before, const scene::Scene& after);
+
 }  // namespace radiosity::engine

@@ -72,9 +72,7 @@ void SolveLoop::threadMain(std::promise<Result<void>> started) {
   updateStatus(false);
   started.set_value({});
   while (runCommands()) {
-    welcomeWatchers();
-    if (state_ == SolveState::kSolving) solveSlice();
-    checkpointIfDue();
+    takeTurn();
   }
   checkpoints_.reset();
   lit_.reset();
@@ -92,10 +90,30 @@ bool SolveLoop::runCommands() {
   if (!due) return false;
   for (const auto& command : *due) {
     if (queue_.closed()) return false;
-    command();
+    try {
+      command();
+    } catch (const std::bad_alloc&) {  // of the answer: what was asked is done
+      log::error("out of memory: an answer was dropped");
+    }
     beat();
   }
   return true;
+}
+
+/// Where memory runs out in it the solve has failed: whatever frees some, an edit or a smaller scene, starts another.
+void SolveLoop::takeTurn() {
+  try {
+    welcomeWatchers();
+    if (state_ == SolveState::kSolving) solveSlice();
+    checkpointIfDue();
+  } catch (const std::bad_alloc&) {
+    failure_ = outOfMemory().value().message;
+    log::error("solve stopped: {}", failure_);
+    state_ = SolveState::kFailed;
+    unpublished_ = false;
+    next_checkpoint_ = Clock::now() + options_.checkpoint_interval;
+    updateStatus(true);
+  }
 }
 
 void SolveLoop::solveSlice() {
@@ -115,6 +133,10 @@ void SolveLoop::solveSlice() {
   const bool out_of_time = settings_.time_limit_s && seconds_ >= *settings_.time_limit_s;
   if (*outcome == solver::StepOutcome::kSlice) {
     if (out_of_time) lit_->solver().endWave();
+    if (Clock::now() >= next_publish_ && lit_->showDirectLight()) {
+      unpublished_ = true;
+      publishLightmaps(false);
+    }
     return tellProgress(false);
   }
   unpublished_ = true;

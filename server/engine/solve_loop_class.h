@@ -21,6 +21,7 @@
 #include "server/engine/history.h"
 #include "server/engine/listeners.h"
 #include "server/engine/lit_scene.h"
+#include "server/engine/memory.h"
 #include "server/engine/publisher.h"
 #include "server/engine/solve_loop.h"
 #include "server/engine/watches.h"
@@ -47,7 +48,7 @@ class SolveLoop final : public Engine {
   void patch(PatchRequest request, Callback<PatchOutcome> done) override;
   void step(StepRequest request, Callback<PatchOutcome> done) override;
   void history(Callback<HistoryReport> done) override;
-  void configure(SolveSettings settings, Callback<SolveSettings> done) override;
+  void configure(ChangeSettings change, Callback<SolveSettings> done) override;
   void pause(Callback<SolveState> done) override;
   void resume(Callback<SolveState> done) override;
   void restart(Callback<SolveState> done) override;
@@ -80,6 +81,7 @@ class SolveLoop final : public Engine {
   // All below: solve thread only.
   void threadMain(std::promise<Result<void>> started);
   [[nodiscard]] bool runCommands();
+  void takeTurn();  ///< what is done between commands
   void solveSlice();
   void tellProgress(bool assess);  ///< not oftener than anyone can see; `assess`: with a new error
   /// The clock starts over: another scene, another seed, an edit. A paused solve stays paused.
@@ -110,6 +112,13 @@ class SolveLoop final : public Engine {
   using KeepMade = std::function<Result<void>(const LitScene& made, const LitScene::Affected& at_most)>;
   [[nodiscard]] Result<LitScene::Affected> relight(Result<std::unique_ptr<LitScene>> made, Relation relation,
                                                    const KeepMade& keep = {});
+  /// What of it can be undone; what an edit touches, at most.
+  [[nodiscard]] Result<LitScene::Affected> tryOut(LitScene& made, LitScene* former, const KeepMade& keep);
+  /// The links of `measured` go over, where there is memory for both.
+  [[nodiscard]] static Result<LitScene::Affected> startSolveOf(LitScene& made, LitScene::Affected affected,
+                                                               LitScene* measured);
+  /// The present scene, after another was tried. `anew`: its solve starts over.
+  void putBack(bool anew);
   [[nodiscard]] Result<void> checkBase(const std::optional<std::uint64_t>& base_revision) const;
   [[nodiscard]] Result<PatchOutcome> applyRequest(const PatchRequest& request);
   [[nodiscard]] Result<PatchOutcome> applyStep(const StepRequest& request);
@@ -126,6 +135,7 @@ class SolveLoop final : public Engine {
   [[nodiscard]] Result<void> restoreState();
   [[nodiscard]] Result<void> restoreScene(state::Kept kept);
   [[nodiscard]] Result<void> restoreSolve(const scene::Document& document);
+  [[nodiscard]] Result<void> lightKept(const scene::Document& document);
   [[nodiscard]] Result<std::unique_ptr<LitScene>> resumedScene(const scene::Document& document,
                                                                const Bytes& checkpoint);
   /// The scene that outlived the last process was loaded from the same bytes, and nothing else has been loaded since.
@@ -187,7 +197,7 @@ class SolveLoop final : public Engine {
 template <typename T, typename Work>
 void SolveLoop::ask(Callback<T> done, Work work) {
   const auto answer = std::make_shared<Callback<T>>(std::move(done));
-  if (queue_.push([answer, work = std::move(work)]() mutable { (*answer)(work()); })) return;
+  if (queue_.push([answer, work = std::move(work)]() mutable { (*answer)(withinMemory(work)); })) return;
   (*answer)(fail(ErrorCode::kBusy, "too many requests are waiting for the solver, try again"));
 }
 

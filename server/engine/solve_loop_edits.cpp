@@ -33,7 +33,8 @@ Result<LoadOutcome> SolveLoop::install(Result<scene::Document> document) {
   updateStatus(true);
   auto next = History::nextLoad(revision_ + 1, document->name);
   const auto keep = [&](const LitScene& made, const LitScene::Affected&) { return keepLoad(next, made.document()); };
-  const auto lit = relight(LitScene::make(std::move(*document), settings_, *transport_), Relation::kOther, keep);
+  auto made = withinMemory([&] { return LitScene::make(std::move(*document), settings_, *transport_); });
+  const auto lit = relight(std::move(made), Relation::kOther, keep);
   if (!lit) {
     if (state_ == SolveState::kLoading) state_ = before;
     updateStatus(true);
@@ -53,27 +54,57 @@ Result<LitScene::Affected> SolveLoop::relight(Result<std::unique_ptr<LitScene>> 
                                               const KeepMade& keep) {
   if (!made) return tl::unexpected<Error>(made.error());
   auto* former = relation == Relation::kEdited ? lit_.get() : nullptr;
-  auto uploaded = (*made)->upload();
-  LitScene::Affected affected;
-  if (uploaded && former != nullptr) affected = (*made)->succeed(*former);
-  if (uploaded && keep) uploaded = keep(**made, affected);
-  if (!uploaded) {
-    if (lit_) {
-      if (const auto back = lit_->upload(); !back) {
-        failure_ = back.error().text();
-        endSolve(SolveState::kFailed);
-      }
-    }
-    return tl::unexpected<Error>(uploaded.error());
-  }
-  if (former != nullptr) (*made)->fadeFrom(*former);
+  auto affected = withinMemory([&] { return tryOut(**made, former, keep); });
   // What a solve that failed has measured may be a part of what it thinks it has.
-  if (relation != Relation::kResumed)
-    affected.shots = (*made)->startSolve(state_ == SolveState::kFailed ? nullptr : former);
+  auto* measured = state_ == SolveState::kFailed ? nullptr : former;
+  const bool starts = affected && relation != Relation::kResumed;
+  if (starts) affected = startSolveOf(**made, *affected, measured);
+  if (!affected) {
+    made->reset();    // before the other takes its place again
+    putBack(starts);  // it may have had the links already
+    return affected;
+  }
+  // The links are taken, the patches are still there to be compared.
+  if (former == nullptr || !(*made)->keepsLayoutOf(*former)) publisher_.reset();
   lit_ = std::move(*made);
   renderer_lost_ = false;  // it took the scene
-  publisher_.reset();
   return affected;
+}
+
+Result<LitScene::Affected> SolveLoop::tryOut(LitScene& made, LitScene* former, const KeepMade& keep) {
+  if (auto uploaded = made.upload(); !uploaded) return tl::unexpected<Error>(uploaded.error());
+  LitScene::Affected affected;
+  if (former != nullptr) {
+    affected = made.succeed(*former);
+    made.fadeFrom(*former, made.keepsLayoutOf(*former));
+  }
+  if (auto kept = keep ? keep(made, affected) : Result<void>(); !kept) return tl::unexpected<Error>(kept.error());
+  return affected;
+}
+
+Result<LitScene::Affected> SolveLoop::startSolveOf(LitScene& made, LitScene::Affected affected, LitScene* measured) {
+  try {
+    affected.shots = made.startSolve(measured);
+    return affected;
+  } catch (const std::bad_alloc&) {
+    log::warn("no memory for the links of the solve before: all is measured anew");
+  }
+  return withinMemory([&]() -> Result<LitScene::Affected> {
+    affected.shots = made.startSolve();
+    return affected;
+  });
+}
+
+void SolveLoop::putBack(bool anew) {
+  if (!lit_) return;
+  const auto back = withinMemory([&] {
+    if (anew) lit_->restart(settings_);
+    return lit_->upload();
+  });
+  if (back && !anew) return;
+  if (back) return beginSolve();
+  failure_ = back.error().text();
+  endSolve(SolveState::kFailed);
 }
 
 void SolveLoop::patch(PatchRequest request, Callback<PatchOutcome> done) {
@@ -180,24 +211,29 @@ void SolveLoop::announceEdit(const PatchOutcome& outcome, const std::string& pat
   publishLightmaps(false);
 }
 
-void SolveLoop::configure(SolveSettings settings, Callback<SolveSettings> done) {
-  ask<SolveSettings>(std::move(done), [this, settings] { return applySettings(settings); });
+void SolveLoop::configure(ChangeSettings change, Callback<SolveSettings> done) {
+  ask<SolveSettings>(std::move(done), [this, change = std::move(change)] { return applySettings(change(settings_)); });
 }
 
 Result<SolveSettings> SolveLoop::applySettings(const SolveSettings& settings) {
-  if (auto kept = keepSettings(settings); !kept) return tl::unexpected<Error>(kept.error());
-  const SolveSettings before = std::exchange(settings_, settings);
+  const SolveSettings before = settings_;
+  const bool resized = before.texels != settings.texels || before.texel_size_m != settings.texel_size_m;
+  if (lit_ && resized) {  // which may fail: only what can be lit is kept
+    const auto keep = [&](const LitScene&, const LitScene::Affected&) { return keepSettings(settings); };
+    auto made = withinMemory([&] { return LitScene::make(lit_->document(), settings, *transport_); });
+    if (const auto lit = relight(std::move(made), Relation::kEdited, keep); !lit) {
+      updateStatus(true);
+      return tl::unexpected<Error>(lit.error());
+    }
+  } else if (auto kept = keepSettings(settings); !kept) {
+    return tl::unexpected<Error>(kept.error());
+  }
+  settings_ = settings;
   if (!lit_) {  // they wait for a scene
     updateStatus(true);
     return settings_;
   }
-  if (before.texels != settings.texels || before.texel_size_m != settings.texel_size_m) {
-    if (const auto lit = relight(LitScene::make(lit_->document(), settings, *transport_), Relation::kEdited); !lit) {
-      settings_ = before;
-      (void)keepSettings(before);
-      updateStatus(true);
-      return tl::unexpected<Error>(lit.error());
-    }
+  if (resized) {
     beginSolve();
     listeners_.tell([this](Listener& listener) { listener.onSceneLoaded(revision_); });
     publishLightmaps(false);

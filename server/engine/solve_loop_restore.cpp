@@ -27,7 +27,7 @@ PastRevision pastRevision(const state::Revision& kept) {
 
 Error damaged(const std::string& what, const std::filesystem::path& folder) {
   return {ErrorCode::kBadInput,
-          "damaged: " + what + "; put a backup in its place, or move the folder away to start anew",
+          "damaged: " + what + "; put a backup of the whole folder in its place, or move the folder away to start anew",
           (folder / "state.sqlite").string()};
 }
 
@@ -114,7 +114,7 @@ Result<void> SolveLoop::restoreSolve(const scene::Document& document) {
   if (!checkpoint) {
     log::warn("the solve begins anew: {}", checkpoint.error().text());
   } else if (*checkpoint) {
-    auto resumed = resumedScene(document, **checkpoint);
+    auto resumed = withinMemory([&] { return resumedScene(document, **checkpoint); });
     if (resumed) {
       seconds = seconds_;
       if (auto lit = relight(std::move(resumed), Relation::kResumed); !lit) return tl::unexpected<Error>(lit.error());
@@ -124,13 +124,32 @@ Result<void> SolveLoop::restoreSolve(const scene::Document& document) {
     }
   }
   if (!lit_) {
-    if (auto lit = relight(LitScene::make(document, settings_, *transport_), Relation::kOther); !lit)
-      return tl::unexpected<Error>(lit.error());
+    if (auto lit = lightKept(document); !lit) return lit;
   }
   beginSolve();
   seconds_ = seconds;
   checkpoint_revision_ = resumed_shots_ > 0 ? revision_ : 0;
   checkpoint_shots_ = resumed_shots_;
+  return {};
+}
+
+/// Texels that were asked for when there was more memory do not keep the server from starting: then those of the
+/// command line hold.
+Result<void> SolveLoop::lightKept(const scene::Document& document) {
+  const auto light = [&](const SolveSettings& settings) {
+    auto made = withinMemory([&] { return LitScene::make(document, settings, *transport_); });
+    return relight(std::move(made), Relation::kOther);
+  };
+  auto lit = light(settings_);
+  auto other = settings_;
+  other.texels = options_.settings.texels;
+  other.texel_size_m = options_.settings.texel_size_m;
+  if (!lit && lit.error().code == ErrorCode::kTooLarge && keptSettings(other) != keptSettings(settings_)) {
+    log::warn("the kept number of texels cannot be lit, that of the command line holds: {}", lit.error().text());
+    lit = light(other);
+    if (lit) settings_ = other;
+  }
+  if (!lit) return tl::unexpected<Error>(lit.error());
   return {};
 }
 

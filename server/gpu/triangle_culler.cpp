@@ -193,7 +193,26 @@ __attribute__((target_clones("avx2", "default"))) void cutAway(const glm::vec3& 
   }
 }
 
-/// The same for a box.
+/// Faces of which some pixel may lie in a window. Of what crosses a window, the rest of the hemicube is not looked at.
+std::uint32_t facesInside(const HemicubeAxes& axes, const ViewWindow& window) {
+  const auto [o, t, b, n] = axes;
+  const std::array<std::array<glm::vec3, 4>, RAD_FACES> corners = {{{n + t + b, n + t - b, n - t + b, n - t - b},
+                                                                    {t + b, t - b, t + b + n, t - b + n},
+                                                                    {-t + b, -t - b, -t + b + n, -t - b + n},
+                                                                    {b + t, b - t, b + t + n, b - t + n},
+                                                                    {-b + t, -b - t, -b + t + n, -b - t + n}}};
+  std::uint32_t faces = 0;
+  for (int face = 0; face < RAD_FACES; ++face) {
+    const auto& corner = corners[static_cast<std::size_t>(face)];
+    const bool out = std::ranges::any_of(window.planes, [&](const glm::vec3& plane) {
+      return std::ranges::all_of(corner, [&](const glm::vec3& c) { return glm::dot(plane, c) < -kWindowMargin; });
+    });
+    faces |= bit(!out, face);
+  }
+  return faces;
+}
+
+/// As classify() finds them of triangles, of a box.
 Spans spansOf(const HemicubeAxes& axes, const TriangleClusters::Cluster& cluster) {
   const auto centre = cluster.centre - axes.origin;
   const auto place = [&](const glm::vec3& along, float& low, float& high) {
@@ -267,9 +286,10 @@ void TriangleCuller::select(const solver::HemicubeFrame& frame, std::uint32_t re
   }
   for (std::size_t part = 0; part < 4; ++part) from.plane[part] = plane_[part].data();
   from.area = area_.data();
+  const std::uint32_t of_interest = window != nullptr ? facesInside(axes, *window) : kFaces;
   for (std::uint32_t number = 0; number < clusters_.clusters.size(); ++number) {
     const auto& cluster = clusters_.clusters[number];
-    const std::uint32_t faces = culling_.faces ? facesOf(spansOf(axes, cluster)) : kFaces;
+    const std::uint32_t faces = of_interest & (culling_.faces ? facesOf(spansOf(axes, cluster)) : kFaces);
     if (faces == 0) continue;
     if (window != nullptr && window->excludes(cluster.centre - axes.origin, cluster.extent + kWindowMargin)) continue;
     classify(view, from, cluster.first, cluster.first + cluster.count, seen_.data());
@@ -293,7 +313,7 @@ void TriangleCuller::emit(const TriangleClusters::Cluster& cluster, std::uint32_
   for (std::size_t i = cluster.first; i < cluster.first + cluster.count; ++i) {
     const auto seen = seen_[i];
     if ((seen >> kBackBit & 1U) != 0 && solid_[i] != scene::kNone && outside_[solid_[i]] != 0) continue;
-    auto in = culling_.faces ? seen & faces : kFaces;
+    auto in = culling_.faces ? seen & faces : faces;
     if (culling_.samples && (seen >> kBetweenBit & 1U) != 0) {
       selection.between += static_cast<std::uint32_t>(std::popcount(in));
       continue;

@@ -29,16 +29,19 @@ class BlobStore {
   /// What lay there already counts as new.
   struct Put {
     std::string id;
-    std::vector<std::string> dropped;  ///< ids of those that had to go
+    bool was_there = false;
+    std::vector<Blob> dropped = {};  ///< those that had to go, oldest first
   };
   Put put(std::string name, SharedBytes bytes);
+  /// As if put() had not been called: what lay there before lies there again.
+  void takeBack(const Put& put);
   /// One that is kept elsewhere: find() gives it without bytes.
   void expect(std::string id, std::string name);
   void drop(std::string_view id);
   [[nodiscard]] std::optional<Blob> find(std::string_view id) const;
 
  private:
-  void forget(std::string_view id);
+  bool forget(std::string_view id);  ///< false: it was not there
 
   std::size_t max_count_, max_bytes_;
   Naming naming_;

@@ -104,13 +104,15 @@ void Calls::handleItem(const protocol::RpcItem& item, Slot slot) {
 /// Hello first, once; not while draining; not too many at a time.
 bool Calls::admit(const protocol::Call& call, Slot& slot) {
   const bool hello = std::holds_alternative<protocol::HelloCall>(call);
+  // Answered on the spot, whatever else waits, and without it a stream of tiles would stop for ever.
+  const bool credit = std::holds_alternative<protocol::CreditCall>(call);
   if (!greeted_ && !hello)
     turnAway(slot, {RpcCode::kUnauthenticated, "the first request must be hello", "/method"});
   else if (greeted_ && hello)
     slot.error({RpcCode::kInvalidRequest, "hello was said before", "/method"});
   else if (hub_.draining())
     slot.error({RpcCode::kDraining, "the server is shutting down; connect again later"});
-  else if (in_flight_->load() > protocol::kMaxCallsInFlight)
+  else if (!credit && in_flight_->load() > protocol::kMaxCallsInFlight)
     slot.error(
         {RpcCode::kRateLimited, fmt::format("more than {} calls wait for their answer", protocol::kMaxCallsInFlight)});
   else
@@ -130,7 +132,6 @@ void Calls::run(const protocol::HelloCall& call, const Slot& slot) {
     return turnAway(slot, {RpcCode::kUnauthenticated, "token is missing or wrong", "/params/token"});
   protocol::HelloReply reply;
   reply.epoch = hub_.epoch();
-  reply.revision = hub_.revision();
   const auto streamed = [](protocol::PixelFormat f) { return f != protocol::PixelFormat::kR32ui; };
   const auto format = std::find_if(call.tile_formats.begin(), call.tile_formats.end(), streamed);
   if (format != call.tile_formats.end()) reply.tile_format = *format;
@@ -142,13 +143,13 @@ void Calls::run(const protocol::HelloCall& call, const Slot& slot) {
   tiles_.setCredit(reply.credit_bytes);
   greeted_ = true;
   client_ = call.client;
-  std::optional<std::vector<SharedText>> missed;
-  if (call.resume) missed = hub_.missedSince(*call.resume);
-  reply.resumed = missed.has_value();
-  if (missed) tiles_.resumeFrom(*call.resume);
-  slot.reply(reply);
-  if (missed)
-    for (const auto& text : *missed) peer->sendText(text);
+  hub_.join(peer, call.resume, [&](std::uint64_t revision, std::optional<std::vector<SharedText>> missed) {
+    reply.revision = revision;
+    reply.resumed = missed.has_value();
+    if (missed) tiles_.resumeFrom(*call.resume);
+    slot.reply(reply);
+    if (missed) peer->sendMissed(std::move(*missed));
+  });
   peer->greeted();
 }
 
@@ -223,7 +224,7 @@ void Calls::run(const protocol::SceneHistoryCall& call, const Slot& slot) {
 }
 
 void Calls::run(const protocol::SolveConfigureCall& call, const Slot& slot) {
-  hub_.engine().configure(merged(hub_.engine().status().settings, call),
+  hub_.engine().configure([call](const engine::SolveSettings& now) { return merged(now, call); },
                           hub_.fromEngine<engine::SolveSettings>([slot](const Result<engine::SolveSettings>& settings) {
                             settings ? slot.reply(toSettings(*settings)) : slot.fail(settings);
                           }));
@@ -252,14 +253,21 @@ void Calls::run(const protocol::SolveRestartCall& /*call*/, const Slot& slot) {
 }
 
 void Calls::run(const protocol::SolveWaitCall& call, const Slot& slot) {
-  const auto waiter = hub_.wait(call, peer_, [slot](const std::optional<protocol::StatusReply>& status) {
+  const auto peer = peer_.lock();
+  if (peer == nullptr) return;
+  // The timer comes first, so that an answer at once finds what it makes useless; it learns below whom to give up,
+  // before this strand can come to its task.
+  const auto waiter = std::make_shared<std::uint64_t>(0);
+  std::optional<Peer::Timer> timer;
+  if (call.timeout_ms)
+    timer = peer->later(std::chrono::milliseconds(*call.timeout_ms),
+                        [hub = hub_.shared_from_this(), waiter] { hub->giveUp(*waiter); });
+  const auto answer = [slot, timer, weak = peer_](const std::optional<protocol::StatusReply>& status) {
+    if (const auto waiting = timer ? weak.lock() : nullptr) waiting->forget(*timer);
     if (status) return slot.reply(*status);
     slot.error({RpcCode::kDraining, "the server is shutting down; connect again later"});
-  });
-  const auto peer = peer_.lock();
-  if (peer == nullptr || !call.timeout_ms) return;
-  peer->later(std::chrono::milliseconds(*call.timeout_ms),
-              [hub = hub_.shared_from_this(), waiter] { hub->giveUp(waiter); });
+  };
+  *waiter = hub_.wait(call, peer_, answer);
 }
 
 void Calls::run(const protocol::StatusCall& /*call*/, const Slot& slot) {

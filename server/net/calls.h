@@ -4,11 +4,13 @@
 
 #include <atomic>
 #include <chrono>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "protocol/codec.h"
 #include "server/net/hub.h"
@@ -19,8 +21,13 @@ namespace radiosity::net {
 /// The session as its calls see it.
 class Peer : public Viewer {
  public:
-  /// Runs `task` on the session's strand after a while, if the session still lives.
-  virtual void later(std::chrono::milliseconds delay, std::function<void()> task) = 0;
+  /// Runs `task` on the session's strand after a while, if the session still lives and the timer is not forgotten.
+  using Timer = std::uint64_t;
+  [[nodiscard]] virtual Timer later(std::chrono::milliseconds delay, std::function<void()> task) = 0;
+  /// From any thread: the timer is of no use any more.
+  virtual void forget(Timer timer) = 0;
+  /// From any thread, in order with sendText(): what the client missed while it was away.
+  virtual void sendMissed(std::vector<SharedText> texts) = 0;
   virtual void greeted() = 0;      ///< hello was accepted
   virtual void tilesWanted() = 0;  ///< there is more credit
   virtual void subscribed() = 0;   ///< TileLane::subscribe was called

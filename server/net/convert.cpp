@@ -68,7 +68,9 @@ engine::SkySetting toSetting(const protocol::Sky& sky) {
 protocol::Settings toSettings(const engine::SolveSettings& s) {
   protocol::Settings out;
   out.target_error = s.target_error;
-  if (s.time_limit_s) out.time_limit_ms = static_cast<std::uint64_t>(std::llround(*s.time_limit_s * 1000.0));
+  constexpr auto kLongest = static_cast<double>(protocol::kMaxTimeLimitMs);
+  if (s.time_limit_s)
+    out.time_limit_ms = static_cast<std::uint64_t>(std::llround(std::min(*s.time_limit_s * 1000.0, kLongest)));
   out.texels = s.texels;
   out.texel_size_m = s.texel_size_m;
   out.seed = s.seed;

@@ -73,19 +73,20 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
  public:
   HttpSession(Stream stream, std::shared_ptr<Hub> hub, ConnectionSlot slot)
       : stream_(std::move(stream)),
+        executor_(stream_.get_executor()),
         hub_(std::move(hub)),
         slot_(std::move(slot)),
         buffer_(kBufferLimit),
         room_(*hub_),
-        stall_(stream_.get_executor()) {}
+        stall_(executor_) {}
 
   void start() {
     hub_->add(weak_from_this());
-    asio::dispatch(stream_.get_executor(), [self = shared_from_this()] { self->readHeader(); });
+    asio::dispatch(executor_, [self = shared_from_this()] { self->readHeader(); });
   }
 
   void drain() override {
-    asio::post(stream_.get_executor(), [self = shared_from_this()] {
+    asio::post(executor_, [self = shared_from_this()] {
       if (self->idle_) return self->stream_.close();
       self->cutWhenStalled();
     });
@@ -109,6 +110,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   [[nodiscard]] std::string_view field(http::field name) const { return view(parser_->get()[name]); }
 
   Stream stream_;
+  const Stream::executor_type executor_;  ///< for other threads: the stream goes elsewhere with an upgrade
   std::shared_ptr<Hub> hub_;
   ConnectionSlot slot_;
   beast::flat_buffer buffer_;
@@ -222,7 +224,12 @@ void HttpSession::upgrade() {
 
 void HttpSession::readBody() {
   if (parser_->is_done()) return onWhole();
-  if (request_.method != "PUT") parser_->body_limit(kBodyOfGet);
+  if (request_.method != "PUT") {
+    // The parser holds a length against the limit with the header; a limit set now is for chunks alone.
+    if (parser_->content_length().value_or(0) > kBodyOfGet)
+      return send(errorResponse(413, "tooLarge", "a request of this method has no use for so large a body"), true);
+    parser_->body_limit(kBodyOfGet);
+  }
   if (!beast::iequals(parser_->get()[http::field::expect], "100-continue")) return onBody({});
   static constexpr std::string_view kContinue = "HTTP/1.1 100 Continue\r\n\r\n";
   stream_.expires_after(hub_->options().idle_timeout);
@@ -249,9 +256,14 @@ void HttpSession::onWhole() {
   hub_->counters().upload_bytes += request_.body.size();
   stream_.expires_never();
   asked_ = true;
-  respond(hub_, std::move(request_), [self = shared_from_this()](HttpResponse response) {
-    asio::post(self->stream_.get_executor(),
-               [self, response = std::move(response)]() mutable { self->send(std::move(response), false); });
+  hub_->hold(shared_from_this());
+  respond(hub_, std::move(request_), [weak = weak_from_this()](HttpResponse response) {
+    const auto self = weak.lock();
+    if (self == nullptr) return;
+    asio::post(self->executor_, [self, response = std::move(response)]() mutable {
+      self->hub_->letGo(self);
+      self->send(std::move(response), false);
+    });
   });
 }
 

@@ -99,33 +99,12 @@ protocol::ServerInfo Hub::serverInfo() {
   info.server = "radiosityd/" + options_.version;
   info.epoch = epoch_;
   info.revision = revision();
-  info.capabilities = {"scene.get",
-                       "scene.load",
-                       "scene.patch",
-                       "scene.undo",
-                       "scene.history",
-                       "solve",
-                       "status",
-                       "subscribe",
-                       "credit",
-                       "snapshot",
-                       "viewers",
-                       "cameras",
-                       "resume",
-                       "batch",
-                       "tiles.rgba16f",
-                       "tiles.rgb9e5",
-                       "tiles.rgba32f",
-                       "tiles.r32ui",
-                       "codec.none",
-                       "codec.deflate",
-                       "quantity.irradiance",
-                       "quantity.radiosity",
-                       "quantity.error",
-                       "quantity.patchId",
-                       "quantity.mipLevel",
-                       "quantity.unshot",
-                       "quantity.normal"};
+  info.capabilities = protocol::methodNames();
+  for (const auto* more : {"cameras", "resume", "batch", "tiles.rgba16f", "tiles.rgb9e5", "tiles.rgba32f",
+                           "tiles.r32ui", "codec.none", "codec.deflate"})
+    info.capabilities.emplace_back(more);
+  for (std::size_t i = 0; i < engine::kQuantityCount; ++i)
+    info.capabilities.push_back("quantity." + std::string(name(static_cast<protocol::Quantity>(i))));
   if (!options_.scene_root.empty()) info.capabilities.emplace_back("scene.load.file");
   info.limits = {{"messageBytes", protocol::kMaxMessageBytes},
                  {"jsonDepth", protocol::kMaxJsonDepth},
@@ -151,10 +130,12 @@ void Hub::add(const std::weak_ptr<Connection>& connection) {
   connections_.push_back(connection);
 }
 
-void Hub::join(const std::weak_ptr<Viewer>& viewer) {
+void Hub::join(const std::weak_ptr<Viewer>& viewer, const std::optional<protocol::Resume>& resume,
+               const Welcome& welcome) {
   {
     const std::lock_guard lock(mutex_);
     viewers_.push_back(viewer);
+    welcome(revision_, resume ? missedSince(*resume) : std::nullopt);
   }
   broadcast(protocol::ViewersNote{viewerCount()});
 }
@@ -191,8 +172,12 @@ void Hub::hideCamera(const Viewer& viewer) {
 std::size_t Hub::viewerCount() const { return viewers().size(); }
 
 std::vector<std::shared_ptr<Viewer>> Hub::viewers() const {
-  std::vector<std::shared_ptr<Viewer>> alive;
   const std::lock_guard lock(mutex_);
+  return presentViewers();
+}
+
+std::vector<std::shared_ptr<Viewer>> Hub::presentViewers() const {
+  std::vector<std::shared_ptr<Viewer>> alive;
   for (const auto& weak : viewers_)
     if (auto viewer = weak.lock()) alive.push_back(std::move(viewer));
   return alive;
@@ -222,7 +207,6 @@ void Hub::drain() {
 
 std::optional<std::vector<SharedText>> Hub::missedSince(const protocol::Resume& resume) const {
   const auto layout_since = engine_.status().layout_since;
-  const std::lock_guard lock(mutex_);
   // Tiles of an earlier process are all sent anew, in a layout of another number.
   const bool old_layout = resume.tile_version > first_tile_version_ && resume.tile_version < layout_since;
   if (resume.epoch != epoch_ || resume.revision > revision_ || resume.revision < history_from_) return std::nullopt;
@@ -271,15 +255,19 @@ void Hub::keepUpload(const std::string& name, const SharedBytes& bytes,
                      std::function<void(const Result<std::string>&)> done) {
   auto put = uploads_.put(name, bytes);
   if (!options_.uploads) return done(std::move(put.id));
-  const auto heard = [self = shared_from_this(), id = put.id, done = std::move(done)](const Result<void>& kept) {
+  std::vector<std::string> dropped;
+  for (const auto& blob : put.dropped) dropped.push_back(blob.id);
+  state::Uploads::Entry entry{put.id, name};
+  const auto heard = [self = shared_from_this(), put = std::move(put),
+                      done = std::move(done)](const Result<void>& kept) {
     self->enter([&] {
-      if (kept) return done(id);
+      if (kept) return done(put.id);
       log::error("an upload is refused, it cannot be kept: {}", kept.error().text());
-      self->uploads_.drop(id);
+      self->uploads_.takeBack(put);
       done(tl::unexpected(kept.error()));
     });
   };
-  options_.uploads->keep({put.id, name}, bytes, std::move(put.dropped), heard);
+  options_.uploads->keep(std::move(entry), bytes, std::move(dropped), heard);
 }
 
 std::optional<BlobStore::Blob> Hub::findUpload(std::string_view id) {
@@ -385,8 +373,23 @@ void Hub::giveUp(std::uint64_t waiter) {
 // ---- from the engine ----
 
 void Hub::shut() {
-  const std::lock_guard lock(gate_);
-  shut_ = true;
+  {
+    const std::lock_guard lock(gate_);
+    shut_ = true;
+  }
+  std::set<std::shared_ptr<Connection>> ending;
+  const std::lock_guard lock(mutex_);
+  ending.swap(held_);
+}
+
+void Hub::hold(std::shared_ptr<Connection> connection) {
+  const std::lock_guard lock(mutex_);
+  held_.insert(std::move(connection));
+}
+
+void Hub::letGo(const std::shared_ptr<Connection>& connection) {
+  const std::lock_guard lock(mutex_);
+  held_.erase(connection);
 }
 
 void Hub::onProgress(const engine::Status& status) {
@@ -427,13 +430,15 @@ void Hub::onScenePatched(std::uint64_t revision, const std::string& patch, const
   // An undo may bring back more than a message can hold.
   if (patch.size() > protocol::kMaxMessageBytes - kNoteRoomBytes) return onSceneLoaded(revision);
   const auto text = shared(protocol::encodeNotification(protocol::ScenePatched{revision, patch, by}));
-  {
-    const std::lock_guard lock(mutex_);
-    revision_ = std::max(revision_, revision);
-    addToHistory(revision, text);
-  }
   enter([&] {
-    for (const auto& viewer : viewers()) viewer->sendText(text);
+    std::vector<std::shared_ptr<Viewer>> present;
+    {  // who joins later finds it in the history
+      const std::lock_guard lock(mutex_);
+      revision_ = std::max(revision_, revision);
+      addToHistory(revision, text);
+      present = presentViewers();
+    }
+    for (const auto& viewer : present) viewer->sendText(text);
   });
 }
 

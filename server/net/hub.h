@@ -11,6 +11,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -61,7 +62,11 @@ class Hub : public engine::Listener, public std::enable_shared_from_this<Hub> {
   [[nodiscard]] protocol::ServerInfo serverInfo();
 
   void add(const std::weak_ptr<Connection>& connection);
-  void join(const std::weak_ptr<Viewer>& viewer);  ///< tells everyone the new count
+  /// Tells everyone the new count. `welcome` is called first, with the present revision and what a viewer who has seen
+  /// `resume` has missed: notifications in order; nothing when it must start afresh. It is called under the lock: all
+  /// that is told to viewers from then on comes behind what it sends, and nothing falls between.
+  using Welcome = std::function<void(std::uint64_t revision, std::optional<std::vector<SharedText>> missed)>;
+  void join(const std::weak_ptr<Viewer>& viewer, const std::optional<protocol::Resume>& resume, const Welcome& welcome);
   void leave(const Viewer& viewer);
   [[nodiscard]] std::size_t viewerCount() const;
 
@@ -72,10 +77,11 @@ class Hub : public engine::Listener, public std::enable_shared_from_this<Hub> {
 
   /// From now on calls are refused; tells viewers and connections.
   void drain();
+  /// A connection that waits for the engine lives here, so that no engine callback owns it: those may outlive the
+  /// server, sockets must not. Until it is let go, or shut().
+  void hold(std::shared_ptr<Connection> connection);
+  void letGo(const std::shared_ptr<Connection>& connection);
   [[nodiscard]] bool draining() const { return draining_.load(); }
-
-  /// What a viewer who has seen `resume` has missed: notifications in order; nothing when it must start afresh.
-  [[nodiscard]] std::optional<std::vector<SharedText>> missedSince(const protocol::Resume& resume) const;
 
   using EditResult = tl::expected<protocol::SceneStepReply, protocol::RpcError>;  ///< of a patch: `edit` is 0
   using EditAnswer = std::function<void(const EditResult&)>;
@@ -143,6 +149,9 @@ class Hub : public engine::Listener, public std::enable_shared_from_this<Hub> {
 
   void announceProgress(const engine::Status& status);
   [[nodiscard]] std::vector<std::shared_ptr<Viewer>> viewers() const;
+  // Both under the lock.
+  [[nodiscard]] std::vector<std::shared_ptr<Viewer>> presentViewers() const;
+  [[nodiscard]] std::optional<std::vector<SharedText>> missedSince(const protocol::Resume& resume) const;
   void broadcast(const protocol::Notification& notification);
   /// Calls `ask` with what is to hear the engine's outcome, unless the request was made before.
   void askOnce(const engine::Receipt& receipt, const std::string& by, EditAnswer done,
@@ -166,6 +175,7 @@ class Hub : public engine::Listener, public std::enable_shared_from_this<Hub> {
 
   mutable std::mutex mutex_;  ///< everything below
   std::vector<std::weak_ptr<Connection>> connections_;
+  std::set<std::shared_ptr<Connection>> held_;
   std::vector<std::weak_ptr<Viewer>> viewers_;
   std::array<std::shared_ptr<const engine::Lightmaps>, engine::kQuantityCount> lightmaps_;
   std::array<std::weak_ptr<void>, engine::kQuantityCount> watches_;  ///< one of the engine's serves all viewers

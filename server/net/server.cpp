@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <pthread.h>
+#include <unistd.h>
 #include <atomic>
 #include <boost/asio/post.hpp>
 #include <boost/asio/signal_set.hpp>
@@ -46,6 +47,7 @@ class Server::State {
   void accept();
   void serve(TcpStream stream, ConnectionSlot slot);
   void watchSignals();
+  void readAgain();
   void drain();
   void run();
 
@@ -66,7 +68,7 @@ class Server::State {
   asio::basic_waitable_timer<Clock, asio::wait_traits<Clock>, Strand> beat_timer_{strand_};
   std::atomic<Clock::rep> last_beat_{Clock::now().time_since_epoch().count()};
   std::function<void()> drain_hook_;
-  bool signalled_ = false;
+  bool signalled_ = false, on_terminal_ = false;
   std::atomic<bool> in_hurry_{false};
   Clock::time_point drain_until_;
   std::uint16_t port_ = 0;
@@ -140,9 +142,9 @@ void Server::State::accept() {
 void Server::State::watchSignals() {
   signals_.async_wait([this](BoostError error, int number) {
     if (error) return;
-    if (number == SIGHUP) {
-      const auto loaded = loadCertificate();
-      loaded ? log::info("certificate read again") : log::error("the old certificate stays: {}", loaded.error().text());
+    const bool terminal_closed = on_terminal_ && !tls_;
+    if (number == SIGHUP && !terminal_closed) {
+      readAgain();
       return watchSignals();
     }
     if (std::exchange(signalled_, true)) {
@@ -153,6 +155,14 @@ void Server::State::watchSignals() {
     drain();
     watchSignals();
   });
+}
+
+/// Also where there is nothing to read: a service that is told to reload must not end. (Who runs the server by hand and
+/// closes the terminal means just that.)
+void Server::State::readAgain() {
+  if (!tls_) return log::info("SIGHUP: there is no certificate to read again");
+  const auto loaded = loadCertificate();
+  loaded ? log::info("certificate read again") : log::error("the old certificate stays: {}", loaded.error().text());
 }
 
 void Server::State::drain() {
@@ -236,7 +246,8 @@ std::string Server::url() const {
 void Server::drainOnSignals() {
   state_->signals_.add(SIGINT);
   state_->signals_.add(SIGTERM);
-  if (!state_->hub_->options().tls_certificate.empty()) state_->signals_.add(SIGHUP);
+  state_->signals_.add(SIGHUP);
+  state_->on_terminal_ = isatty(STDIN_FILENO) == 1;
   state_->watchSignals();
 }
 

@@ -24,7 +24,8 @@ class Server {
   [[nodiscard]] std::uint16_t port() const;  ///< the real one, also where 0 was asked for
   [[nodiscard]] std::string url() const;     ///< "http://127.0.0.1:8765", with TLS "https://..."
 
-  /// SIGINT and SIGTERM drain; a second one stops at once. SIGHUP reads the certificate again. Before run().
+  /// SIGINT and SIGTERM drain; a second one stops at once. SIGHUP reads the certificate again, where there
+  /// is one; without one it drains where stdin is a terminal, which was closed. Before run().
   void drainOnSignals();
   /// Called once when the server begins to drain, on one of its threads. Before run().
   void onDrain(std::function<void()> hook);

@@ -15,6 +15,7 @@ constexpr std::string_view kHead = R"(<!doctype html>
 <meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">
 {}<title>radiosityd: {}</title>
+<link rel="icon" href="/favicon.svg" type="image/svg+xml">
 <style>
 body {{ font: 16px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 62rem; padding: 0 1rem; color: #222; }}
 table {{ border-collapse: collapse; }}

@@ -27,7 +27,11 @@ const std::string& plainRefusal() {
 class TlsHandshake : public Connection, public std::enable_shared_from_this<TlsHandshake> {
  public:
   TlsHandshake(TcpStream stream, std::shared_ptr<TlsContext> tls, std::shared_ptr<Hub> hub, ConnectionSlot slot)
-      : stream_(std::move(stream)), tls_(std::move(tls)), hub_(std::move(hub)), slot_(std::move(slot)) {
+      : stream_(std::move(stream)),
+        executor_(stream_.get_executor()),
+        tls_(std::move(tls)),
+        hub_(std::move(hub)),
+        slot_(std::move(slot)) {
     ++hub_->counters().tls_handshakes;
   }
   ~TlsHandshake() override { leaveCount(); }
@@ -36,7 +40,7 @@ class TlsHandshake : public Connection, public std::enable_shared_from_this<TlsH
 
   void start() {
     hub_->add(weak_from_this());
-    asio::dispatch(stream_.get_executor(), [self = shared_from_this()] {
+    asio::dispatch(executor_, [self = shared_from_this()] {
       self->stream_.expires_after(self->hub_->options().handshake_timeout);  // for all of it
       beast::async_detect_ssl(self->stream_, self->buffer_,
                               [self](BoostError error, bool speaks_tls) { self->onDetected(error, speaks_tls); });
@@ -44,7 +48,7 @@ class TlsHandshake : public Connection, public std::enable_shared_from_this<TlsH
   }
 
   void drain() override {
-    asio::post(stream_.get_executor(), [self = shared_from_this()] {
+    asio::post(executor_, [self = shared_from_this()] {
       if (self->hub_) self->stream_.close();
     });
   }
@@ -98,6 +102,7 @@ class TlsHandshake : public Connection, public std::enable_shared_from_this<TlsH
   }
 
   Stream stream_;
+  const Stream::executor_type executor_;  ///< for other threads: the stream goes elsewhere after the handshake
   std::shared_ptr<TlsContext> tls_;
   std::shared_ptr<Hub> hub_;  ///< null: handed over
   ConnectionSlot slot_;

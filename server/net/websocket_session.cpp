@@ -3,19 +3,19 @@
 #include <array>
 #include <atomic>
 #include <boost/asio/post.hpp>
-#include <boost/asio/steady_timer.hpp>
 #include <boost/beast/websocket.hpp>
 #include <chrono>
 #include <deque>
 #include <functional>
-#include <list>
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "common/log.h"
 #include "server/net/calls.h"
 #include "server/net/convert.h"
+#include "server/net/session_timers.h"
 #include "server/net/tile_lane.h"
 
 namespace radiosity::net {
@@ -34,20 +34,26 @@ class WebSocketSession final : public Peer, public Connection, public std::enabl
         hub_(std::move(hub)),
         slot_(std::move(slot)),
         deadline_(ws_.get_executor()),
-        cut_(ws_.get_executor()) {}
+        cut_(ws_.get_executor()),
+        timers_(ws_.get_executor()) {}
 
   void start(Upgrade upgrade, bool authenticated);
 
   // Any thread.
   void sendText(SharedText text) override;
+  void sendMissed(std::vector<SharedText> texts) override;
   void sendProgress(SharedText text) override;
   void lightmapsChanged() override;
   void camerasChanged() override;
   void drain() override;
 
+  void forget(Timer timer) override;
+
   // On the strand.
-  void later(std::chrono::milliseconds delay, std::function<void()> task) override;
-  void greeted() override;
+  Timer later(std::chrono::milliseconds delay, std::function<void()> task) override {
+    return timers_.start(weak_from_this(), delay, std::move(task));
+  }
+  void greeted() override { greeted_ = true; }
   void tilesWanted() override { pump(); }
   void subscribed() override;
   void closeAfterWrites(CloseCode code, std::string reason) override;
@@ -58,7 +64,7 @@ class WebSocketSession final : public Peer, public Connection, public std::enabl
   void read();
   void onRead(BoostError error);
   void onStrand(std::function<void(WebSocketSession&)> task);
-  void enqueue(SharedText text);
+  void enqueue(SharedText text, bool counts = true);
   void cutAfter(std::chrono::milliseconds patience);
   void adoptLightmaps();
   void tellCameras();
@@ -79,8 +85,12 @@ class WebSocketSession final : public Peer, public Connection, public std::enabl
   std::optional<Calls> calls_;
   bool greeted_ = false;
 
-  std::deque<SharedText> control_;  ///< not yet given to the socket
-  std::size_t control_bytes_ = 0;
+  struct Waiting {
+    SharedText text;
+    bool counts;  ///< against the limits of the control lane
+  };
+  std::deque<Waiting> control_;  ///< not yet given to the socket
+  std::size_t control_messages_ = 0, control_bytes_ = 0;
   SharedText progress_, cameras_;  ///< the newest; older ones were not worth sending
   SharedText writing_text_;
   std::optional<OutgoingTile> writing_tile_;
@@ -88,7 +98,7 @@ class WebSocketSession final : public Peer, public Connection, public std::enabl
   std::uint64_t write_number_ = 0;
   std::optional<std::pair<CloseCode, std::string>> close_when_written_;
   asio::steady_timer deadline_, cut_;
-  std::list<asio::steady_timer> timers_;
+  SessionTimers timers_;
 
   std::shared_ptr<void> watching_;  ///< keeps the quantity subscribed to coming
   std::atomic<bool> lightmaps_posted_{false}, cameras_posted_{false};
@@ -131,15 +141,10 @@ void WebSocketSession::onAccepted(BoostError error) {
   if (error) return cut();
   upgrade_ = {};
   enqueue(std::make_shared<const std::string>(protocol::encodeNotification(hub_->serverInfo())));
-  later(hub_->options().hello_timeout, [this] {
+  (void)later(hub_->options().hello_timeout, [this] {
     if (!greeted_) closeAfterWrites(CloseCode::kPolicy, "hello did not come in time");
   });
   read();
-}
-
-void WebSocketSession::greeted() {
-  greeted_ = true;
-  hub_->join(weak_from_this());
 }
 
 void WebSocketSession::read() {
@@ -175,6 +180,12 @@ void WebSocketSession::sendText(SharedText text) {
   onStrand([text = std::move(text)](WebSocketSession& s) { s.enqueue(text); });
 }
 
+void WebSocketSession::sendMissed(std::vector<SharedText> texts) {
+  onStrand([texts = std::move(texts)](WebSocketSession& s) {
+    for (const auto& text : texts) s.enqueue(text, false);
+  });
+}
+
 void WebSocketSession::sendProgress(SharedText text) {
   onStrand([text = std::move(text)](WebSocketSession& s) {
     s.progress_ = text;
@@ -192,7 +203,7 @@ void WebSocketSession::camerasChanged() {
   onStrand([](WebSocketSession& s) {
     const auto wait = std::chrono::ceil<std::chrono::milliseconds>(s.next_cameras_ - Clock::now());
     if (wait.count() <= 0) return s.tellCameras();
-    s.later(wait, [&s] { s.tellCameras(); });
+    (void)s.later(wait, [&s] { s.tellCameras(); });
   });
 }
 
@@ -205,29 +216,27 @@ void WebSocketSession::drain() {
   });
 }
 
-void WebSocketSession::later(std::chrono::milliseconds delay, std::function<void()> task) {
-  const auto timer = timers_.emplace(timers_.end(), ws_.get_executor());
-  timer->expires_after(delay);
-  timer->async_wait([weak = weak_from_this(), timer, task = std::move(task)](BoostError error) {
-    const auto self = weak.lock();
-    if (error || self == nullptr) return;
-    self->timers_.erase(timer);
-    task();
-  });
+void WebSocketSession::forget(Timer timer) {
+  onStrand([timer](WebSocketSession& s) { s.timers_.cancel(timer); });
 }
 
 // ---- lanes ----
 
-void WebSocketSession::enqueue(SharedText text) {
+/// `counts`: against what may wait. What a client has missed does not: it is bounded by itself, shared by all, and
+/// comes in one piece, so that nobody could have read any of it yet.
+void WebSocketSession::enqueue(SharedText text, bool counts) {
   if (closing_) return;
-  const bool full = control_.size() >= protocol::kControlLaneMessages ||
-                    (!control_.empty() && control_bytes_ + text->size() > protocol::kControlLaneBytes);
-  if (full) {
+  const bool full = control_messages_ >= protocol::kControlLaneMessages ||
+                    (control_messages_ > 0 && control_bytes_ + text->size() > protocol::kControlLaneBytes);
+  if (counts && full) {
     ++hub_->counters().closed_overload;
     return close(CloseCode::kOverload, "messages are not read");
   }
-  control_bytes_ += text->size();
-  control_.push_back(std::move(text));
+  if (counts) {
+    ++control_messages_;
+    control_bytes_ += text->size();
+  }
+  control_.push_back({std::move(text), counts});
   pump();
 }
 
@@ -245,10 +254,11 @@ void WebSocketSession::adoptLightmaps() {
   if (tiles_.maxHz() > 0.0 && now < next_adoption_) {
     if (std::exchange(adoption_timed_, true)) return;
     const auto wait = std::chrono::ceil<std::chrono::milliseconds>(next_adoption_ - now);
-    return later(wait, [this] {
+    (void)later(wait, [this] {
       adoption_timed_ = false;
       adoptLightmaps();
     });
+    return;
   }
   if (tiles_.maxHz() > 0.0)
     next_adoption_ =
@@ -269,9 +279,12 @@ void WebSocketSession::tellCameras() {
 void WebSocketSession::pump() {
   if (writing_ || closing_) return;
   if (!control_.empty()) {
-    auto text = std::move(control_.front());
+    auto [text, counts] = std::move(control_.front());
     control_.pop_front();
-    control_bytes_ -= text->size();
+    if (counts) {
+      --control_messages_;
+      control_bytes_ -= text->size();
+    }
     return writeText(std::move(text));
   }
   if (close_when_written_) return close(close_when_written_->first, close_when_written_->second);
@@ -372,7 +385,7 @@ void WebSocketSession::cut() {
   hub_->leave(*this);
   deadline_.cancel();
   cut_.cancel();
-  timers_.clear();
+  timers_.cancelAll();
   beast::get_lowest_layer(ws_).close();
 }
 

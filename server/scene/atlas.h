@@ -39,11 +39,14 @@ struct FormerPlaces {
 
 /// Grids for texels of about `texel_size`, packed with `options.gutter` empty texels between. Charts whose
 /// grid is as it was keep their places, as long as half of the pages is in use. Charts that would not fit
-/// a page get coarser texels, with a warning. kTooLarge: more than kMaxPages pages or kMaxLeaves leaves.
+/// a page get coarser texels, with a warning. kTooLarge: more than kMaxPages pages or mostLeaves()
+/// leaves.
 [[nodiscard]] Result<Atlas> layOut(const Scene& scene, const std::vector<Chart>& charts, double texel_size,
                                    const ChartOptions& options, const FormerPlaces& former = {});
 
 inline constexpr std::size_t kMaxPages = 1024;
 inline constexpr std::uint64_t kMaxLeaves = std::uint64_t{1} << 28;  ///< some 6 GiB of patches
+/// Those that three quarters of the memory hold with all that a solve needs; at most kMaxLeaves.
+[[nodiscard]] std::uint64_t mostLeaves();
 
 }  // namespace radiosity::scene

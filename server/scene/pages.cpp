@@ -76,9 +76,9 @@ glm::vec3 extrapolate(const glm::vec3& near, const glm::vec3& far) {
   return near + glm::clamp(near - far, -bound, bound);
 }
 
-/// What the neighbours of earlier rings say about an unknown texel; false: nothing yet. Continued slopes count, plain
-/// copies only where there is no slope to continue.
-bool fromNeighbours(const Patchwork& p, std::int64_t x, std::int64_t y, std::uint8_t ring, glm::vec3& value) {
+/// What the neighbours of earlier rings say about an unknown texel that has such. Continued slopes count, plain copies
+/// only where there is no slope to continue.
+glm::vec3 fromNeighbours(const Patchwork& p, std::int64_t x, std::int64_t y, std::uint8_t ring) {
   glm::vec3 sloped(0.0F), plain(0.0F);
   float sloped_weight = 0.0F, plain_weight = 0.0F;
   for (std::int64_t dy = -1; dy <= 1; ++dy)
@@ -95,28 +95,42 @@ bool fromNeighbours(const Patchwork& p, std::int64_t x, std::int64_t y, std::uin
       sloped += extrapolate(p.value[near], p.value[far]) * w;
       sloped_weight += w;
     }
-  if (plain_weight <= 0.0F) return false;
-  value = sloped_weight > 0.0F ? sloped / sloped_weight : plain / plain_weight;
-  return true;
+  RAD_CHECK_LT(0.0F, plain_weight);
+  return sloped_weight > 0.0F ? sloped / sloped_weight : plain / plain_weight;
 }
 
-/// Ring by ring outward from texels with a value of their own; the first ring continues slopes, later ones copy.
+/// Gives the unknown neighbours of `texels` their ring, and returns them.
+std::vector<std::size_t> nextRing(Patchwork& p, const std::vector<std::size_t>& texels, std::uint8_t ring) {
+  std::vector<std::size_t> next;
+  for (const std::size_t i : texels) {
+    const auto x = static_cast<std::int64_t>(i) % p.width, y = static_cast<std::int64_t>(i) / p.width;
+    for (std::int64_t ny = std::max<std::int64_t>(0, y - 1); ny <= std::min(p.height - 1, y + 1); ++ny)
+      for (std::int64_t nx = std::max<std::int64_t>(0, x - 1); nx <= std::min(p.width - 1, x + 1); ++nx) {
+        const std::size_t n = p.at(nx, ny);
+        if (p.ring[n] != kMaxRing) continue;
+        p.ring[n] = ring;
+        next.push_back(n);
+      }
+  }
+  return next;
+}
+
+/// Ring by ring outward from texels with a value of their own; the first ring continues slopes, later ones copy. Each
+/// texel is looked at once, however wide the gaps are.
 void fillUnknown(Patchwork& p) {
-  std::vector<std::size_t> unknown;
+  std::vector<std::size_t> texels;
   for (std::size_t i = 0; i < p.ring.size(); ++i)
-    if (p.ring[i] != 0) unknown.push_back(i);
-  if (unknown.size() == p.ring.size()) {  // wholly buried or empty: black, but somebody's
+    if (p.ring[i] == 0) texels.push_back(i);
+  if (texels.empty()) {  // wholly buried or empty: black, but somebody's
     std::ranges::fill(p.value, glm::vec3(0.0F));
     return;
   }
-  for (std::uint8_t ring = 1; ring < kMaxRing && !unknown.empty(); ++ring) {
-    std::vector<std::size_t> later, now;
-    for (const std::size_t i : unknown) {
+  for (std::uint8_t ring = 1; ring < kMaxRing && !texels.empty(); ++ring) {
+    texels = nextRing(p, texels, ring);
+    for (const std::size_t i : texels) {
       const auto x = static_cast<std::int64_t>(i) % p.width, y = static_cast<std::int64_t>(i) / p.width;
-      (fromNeighbours(p, x, y, ring, p.value[i]) ? now : later).push_back(i);
+      p.value[i] = fromNeighbours(p, x, y, ring);
     }
-    for (const std::size_t i : now) p.ring[i] = ring;
-    unknown = std::move(later);
   }
 }
 

@@ -241,10 +241,11 @@ void LinkSystem::fillRow(std::size_t half, std::uint32_t member, std::uint32_t c
     halves_[half].matrix[row.first + static_cast<std::uint32_t>(c)][column] = static_cast<float>(sum[c] / whole);
 }
 
-void LinkSystem::irradiance(std::size_t half, std::vector<glm::vec3>& values) const {
+void LinkSystem::irradiance(std::size_t half, std::vector<glm::vec3>& values, From from) const {
   std::array<std::vector<float>, 3> planes;
   for (auto& plane : planes) plane.assign(reflectance_.size(), 0.0F);
   for (const auto& shooter : shooters_) {
+    if (from == From::kLights && !shooter.isLight()) continue;
     const glm::vec3 sent = static_cast<float>(shooter.weight[half]) * shooter.sent[half];
     if (sent == glm::vec3(0.0F)) continue;
     shooter.column[half].apply({sent.x, sent.y, sent.z}, {planes[0].data(), planes[1].data(), planes[2].data()});

@@ -95,8 +95,9 @@ class LinkSystem {
 
   /// No shooters are left.
   void clear();
-  /// Irradiance of every leaf value from the solution of `half`.
-  void irradiance(std::size_t half, std::vector<glm::vec3>& values) const;
+  /// Irradiance of every leaf value from the solution of `half`, or what of it comes straight from lights.
+  enum class From { kAll, kLights };
+  void irradiance(std::size_t half, std::vector<glm::vec3>& values, From from = From::kAll) const;
   /// What all links take.
   [[nodiscard]] std::size_t bytes() const;
   /// Rows of the equation in each half, and how many a node of the side has.

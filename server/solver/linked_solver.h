@@ -44,6 +44,8 @@ class LinkedSolver final : public Solver {
 
   [[nodiscard]] const std::vector<glm::vec3>& irradiance() const override { return irradiance_; }
   [[nodiscard]] std::vector<glm::vec3> halfIrradiance(std::uint32_t half) const override;
+  [[nodiscard]] std::vector<glm::vec3> directIrradiance() const override;
+  [[nodiscard]] bool isRepairing() const override { return repaired_ < repairs_.size(); }
   [[nodiscard]] std::vector<glm::vec3> unshot() const override;
   [[nodiscard]] std::vector<std::uint8_t> shotLevels() const override;
   [[nodiscard]] std::vector<float> residualShape() const override;

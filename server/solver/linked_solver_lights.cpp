@@ -1,8 +1,11 @@
 // LinkedSolver: its lights. They come, change and go by edits; those switched off keep their links.
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <span>
 #include <utility>
 
+#include "server/solver/halves.h"
 #include "server/solver/linked_solver.h"
 
 namespace radiosity::solver {
@@ -78,6 +81,24 @@ void LinkedSolver::addSource(const PunctualLights::Source& source) {
   shooter.most_bytes = memory_.mostBytes();
   sources_.push_back(source);
   (void)system_.add(shooter);
+}
+
+/// Unknown while links of a light are still to be measured, or measured again.
+std::vector<glm::vec3> LinkedSolver::directIrradiance() const {
+  const auto& shooters = system_.shooters();
+  const auto isLight = [&](const Repair& repair) { return shooters[repair.shooter].isLight(); };
+  if (std::ranges::any_of(std::span(repairs_).subspan(repaired_), isLight)) return {};
+  if (std::ranges::any_of(shooters, [](const Shooter& shooter) { return shooter.owes(); })) return {};
+  std::array<std::vector<glm::vec3>, 2> halves;
+  inBothHalves([&](std::size_t half) { system_.irradiance(half, halves[half], LinkSystem::From::kLights); });
+  std::vector<glm::vec3> irradiance(patches_->nodeCount(), glm::vec3(0.0F));
+  for (const auto& side : sides_) {
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+      const auto v = side.first_value + leaf;
+      irradiance[side.first_node + leaf] = 0.5F * (halves[0][v] + halves[1][v]);
+    }
+  }
+  return irradiance;
 }
 
 /// One sequence of shots of a light without extent.

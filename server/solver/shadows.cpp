@@ -17,11 +17,28 @@ constexpr std::uint32_t kChunkLeaves = 64;
 /// Half a pixel's diagonal, in widths of a pixel, and room for rounding.
 constexpr float kHalfDiagonal = 0.7072F;
 
+constexpr float kMissed = -1.0F;
+/// Slopes this small do not leave where they are.
+constexpr float kLevel = 1e-20F;
+
 scene::ChangedBox nothing() { return {glm::vec3(1e30F), glm::vec3(-1e30F)}; }
 
 void include(scene::ChangedBox& box, const glm::vec3& centre, float radius) {
   box.low = glm::min(box.low, centre - radius);
   box.high = glm::max(box.high, centre + radius);
+}
+
+inline float smaller(float a, float b) { return a < b ? a : b; }
+inline float larger(float a, float b) { return a > b ? a : b; }
+
+/// The part of [0, 1] where slope t >= least.
+struct Clip {
+  float first, last;
+};
+inline Clip clip(float slope, float least) {
+  const bool rises = slope > -kLevel;
+  const float t = least / (rises ? larger(slope, kLevel) : slope);
+  return {rises ? larger(t, 0.0F) : 0.0F, rises ? 1.0F : smaller(t, 1.0F)};
 }
 
 }  // namespace
@@ -85,38 +102,31 @@ bool Shadows::sees(const glm::vec3& point, const glm::vec3& normal) const {
   });
 }
 
-/// Marks the balls that the way meets and that reach before the plane: segments and boxes (Kay and Kajiya 1986).
-/// Branch-free, so that it vectorises; both clones give the same marks.
+/// Raises the marks of balls that the way meets and that reach before the plane to 0 or more: segments and boxes (Kay
+/// and Kajiya 1986). Marks are numbers, and nothing is decided but by smaller and larger, since GCC 12 vectorises
+/// neither branches nor flags here. Both clones give the same marks.
 __attribute__((target_clones("avx2", "default"))) void Shadows::markMet(const Way& way, const glm::vec4& plane,
                                                                         const Balls& balls, std::size_t begin,
-                                                                        std::size_t end, std::uint8_t* marks) {
+                                                                        std::size_t end, float* marks) {
   const float ox = way.from.x, oy = way.from.y, oz = way.from.z;
   const float lx = way.low.x, ly = way.low.y, lz = way.low.z, hx = way.high.x, hy = way.high.y, hz = way.high.z;
   const float nx = plane.x, ny = plane.y, nz = plane.z, nd = plane.w;
   const float spread = way.spread;
-  const float *x = balls.x.data(), *y = balls.y.data(), *z = balls.z.data(), *radius = balls.radius.data();
-  const auto smaller = [](float a, float b) { return a < b ? a : b; };
-  const auto larger = [](float a, float b) { return a > b ? a : b; };
-  for (std::size_t i = begin; i < end; ++i) {
+  const float *x = balls.x.data() + begin, *y = balls.y.data() + begin, *z = balls.z.data() + begin;
+  const float* radius = balls.radius.data() + begin;
+  float* __restrict mark = marks;
+  const std::size_t count = end - begin;
+  for (std::size_t i = 0; i < count; ++i) {
     const float r = radius[i];
     const float dx = x[i] - ox, dy = y[i] - oy, dz = z[i] - oz;
     const float s = spread * std::sqrt(dx * dx + dy * dy + dz * dz);
-    float first = 0.0F, last = 1.0F;
     // At part t of the way one is past the low face where t (d + s) >= low - r - o, and so on.
-    const auto clip = [&](float slope, float least) {
-      const float safe = std::abs(slope) > 1e-20F ? slope : 1e-20F;
-      const float t = least / safe;
-      first = safe > 0.0F ? larger(first, t) : first;
-      last = safe > 0.0F ? last : smaller(last, t);
-    };
-    clip(dx + s, lx - r - ox);
-    clip(s - dx, ox - hx - r);
-    clip(dy + s, ly - r - oy);
-    clip(s - dy, oy - hy - r);
-    clip(dz + s, lz - r - oz);
-    clip(s - dz, oz - hz - r);
-    const bool met = (first <= last) & (r >= 0.0F) & (nx * x[i] + ny * y[i] + nz * z[i] - nd >= -r);
-    marks[i - begin] = static_cast<std::uint8_t>(marks[i - begin] | static_cast<std::uint8_t>(met));
+    const Clip a = clip(dx + s, lx - r - ox), b = clip(s - dx, ox - hx - r), c = clip(dy + s, ly - r - oy);
+    const Clip d = clip(s - dy, oy - hy - r), e = clip(dz + s, lz - r - oz), f = clip(s - dz, oz - hz - r);
+    const float first = larger(larger(larger(a.first, b.first), larger(c.first, d.first)), larger(e.first, f.first));
+    const float last = smaller(smaller(smaller(a.last, b.last), smaller(c.last, d.last)), smaller(e.last, f.last));
+    const float height = nx * x[i] + ny * y[i] + nz * z[i] - nd;
+    mark[i] = larger(mark[i], smaller(smaller(last - first, r), height + r));
   }
 }
 
@@ -131,17 +141,17 @@ void Shadows::find(std::span<const glm::vec3> points, const glm::vec3& normal, f
     }
   }
   const glm::vec4 plane(normal, glm::dot(normal, points.front()));
-  scratch.chunks.assign(chunks_.size(), 0);
+  scratch.chunks.assign(chunks_.size(), kMissed);
   for (const auto& way : ways) markMet(way, plane, chunk_balls_, 0, chunks_.size(), scratch.chunks.data());
   runs.clear();
   for (std::size_t c = 0; c < chunks_.size(); ++c) {
     const auto& chunk = chunks_[c];
-    if (scratch.chunks[c] == 0 && !chunk.altered) continue;
-    scratch.leaves.assign(chunk.count, 0);
+    if (scratch.chunks[c] < 0.0F && !chunk.altered) continue;
+    scratch.leaves.assign(chunk.count, kMissed);
     for (const auto& way : ways)
       markMet(way, plane, leaves_, chunk.first, chunk.first + chunk.count, scratch.leaves.data());
     for (std::uint32_t i = 0; i < chunk.count; ++i) {
-      if (scratch.leaves[i] == 0 && !(chunk.altered && change_.altered[chunk.first + i])) continue;
+      if (scratch.leaves[i] < 0.0F && !(chunk.altered && change_.altered[chunk.first + i])) continue;
       const bool joins = i > 0 && !runs.empty() && runs.back().first + runs.back().count == chunk.first + i;
       if (!joins) runs.push_back({chunk.first + i, 0});
       ++runs.back().count;

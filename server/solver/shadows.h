@@ -31,7 +31,7 @@ class Shadows {
   [[nodiscard]] bool sees(const glm::vec3& point, const glm::vec3& normal) const;
 
   struct Scratch {
-    std::vector<std::uint8_t> chunks, leaves;
+    std::vector<float> chunks, leaves;  ///< marks: negative where missed
   };
   /// Runs of leaf values, ascending, none across sides, of all leaves whose links from within `radius` of one of the
   /// points, as an item buffer of `resolution` finds them, may differ: those altered, and those that the way to passes
@@ -53,7 +53,7 @@ class Shadows {
     float spread;  ///< the box counts as larger by so much for each unit of the way to it
   };
   static void markMet(const Way& way, const glm::vec4& plane, const Balls& balls, std::size_t first, std::size_t end,
-                      std::uint8_t* marks);
+                      float* marks);
   void addLeaves(const Side& side);
   void addChunks(std::uint32_t side);
 

@@ -85,6 +85,11 @@ class Solver {
   [[nodiscard]] virtual const std::vector<glm::vec3>& irradiance() const = 0;
   /// The same from one of the two independent halves of the samples.
   [[nodiscard]] virtual std::vector<glm::vec3> halfIrradiance(std::uint32_t half) const = 0;
+  /// The part of irradiance that comes straight from lights, by node, level 0; empty: not known, or not by itself.
+  /// Costs a pass over the lights' links.
+  [[nodiscard]] virtual std::vector<glm::vec3> directIrradiance() const { return {}; }
+  /// After an edit of geometry: irradiance() is not there yet, since links are being measured again.
+  [[nodiscard]] virtual bool isRepairing() const { return false; }
   /// Radiosity (lux, signed) by node, level 0, that is still to be shot. What light polygons emit is not in it: they
   /// are owed by the light, not by its leaves.
   [[nodiscard]] virtual std::vector<glm::vec3> unshot() const = 0;

@@ -56,7 +56,8 @@ void Database::Close::operator()(sqlite3* handle) const { sqlite3_close_v2(handl
 tl::unexpected<Error> Database::failure(int code) const {
   const std::string why = handle_ ? sqlite3_errmsg(handle_.get()) : sqlite3_errstr(code);
   if (isDamage(code))
-    return fail(ErrorCode::kBadInput, why + "; put a backup in its place, or move the folder away to start anew",
+    return fail(ErrorCode::kBadInput,
+                why + "; put a backup of the whole folder in its place, or move the folder away to start anew",
                 file_.string());
   const bool busy = (code & 0xff) == SQLITE_BUSY || (code & 0xff) == SQLITE_LOCKED;
   return fail(ErrorCode::kUnavailable, busy ? "another program has it open (" + why + ")" : why, file_.string());
@@ -118,7 +119,7 @@ Result<void> Database::checkPages() {
   if (text != nullptr && *text == "ok") return {};
   return fail(ErrorCode::kBadInput,
               "damaged (" + (text != nullptr ? *text : std::string("cannot be checked")) +
-                  "); put a backup in its place, or move the folder away to start anew",
+                  "); put a backup of the whole folder in its place, or move the folder away to start anew",
               file_.string());
 }
 
@@ -137,7 +138,8 @@ Result<std::vector<Row>> checkedRows(Database& database, const std::string& tabl
     if (digest == nullptr || *digest != digestOf(table, std::span(row).first(row.size() - 1)))
       return fail(ErrorCode::kBadInput,
                   "damaged: a row of " + table +
-                      " is not what was written; put a backup in its place, or move the folder away to start anew",
+                      " is not what was written; put a backup of the whole folder in its place, or move the folder "
+                      "away to start anew",
                   database.file().string());
     row.pop_back();
   }

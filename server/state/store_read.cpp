@@ -124,9 +124,10 @@ Result<void> Store::checkNewest() const {
     broken =
         fmt::format("revision {} was acknowledged, and {} is the last that is there", lock_.notedRevision(), newest);
   if (broken.empty()) return {};
-  return fail(ErrorCode::kBadInput,
-              "damaged: " + broken + "; put a backup in its place, or move the folder away to start anew",
-              database_.file().string());
+  return fail(
+      ErrorCode::kBadInput,
+      "damaged: " + broken + "; put a backup of the whole folder in its place, or move the folder away to start anew",
+      database_.file().string());
 }
 
 }  // namespace radiosity::state

@@ -8,13 +8,15 @@ namespace radiosity::state {
 
 Uploads::Uploads(Store& store) : store_(store), thread_([this] { work(); }) {}
 
-Uploads::~Uploads() {
+Uploads::~Uploads() { finish(); }
+
+void Uploads::finish() {
   {
     const std::scoped_lock lock(mutex_);
     ends_ = true;
   }
   wake_.notify_all();
-  thread_.join();
+  if (thread_.joinable()) thread_.join();
 }
 
 std::vector<Uploads::Entry> Uploads::list() const {

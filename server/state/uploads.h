@@ -21,13 +21,17 @@ class Uploads {
  public:
   /// The store must outlive this.
   explicit Uploads(Store& store);
-  ~Uploads();  ///< once what was asked for is done
+  ~Uploads();
   Uploads(const Uploads&) = delete;
   Uploads& operator=(const Uploads&) = delete;
 
   struct Entry {
     std::string id, name;
   };
+  /// Does what was asked for, and takes nothing more. Whoever hears of an upload may own this in turn, so it must not
+  /// be left to the last of them, which would end it in its own thread. Once; before the store goes.
+  void finish();
+
   /// What was there at the start, oldest first.
   [[nodiscard]] std::vector<Entry> list() const;
 

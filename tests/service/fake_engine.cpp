@@ -268,12 +268,15 @@ void FakeEngine::history(Callback<engine::HistoryReport> done) {
   answer([done = std::move(done), report = std::move(report)] { done(report); });
 }
 
-void FakeEngine::configure(engine::SolveSettings settings, Callback<engine::SolveSettings> done) {
-  {
-    const std::lock_guard lock(mutex_);
-    status_.settings = settings;
-  }
-  answer([done, settings] { done(settings); });
+void FakeEngine::configure(ChangeSettings change, Callback<engine::SolveSettings> done) {
+  answer([this, change = std::move(change), done = std::move(done)] {
+    engine::SolveSettings settings;
+    {
+      const std::lock_guard lock(mutex_);
+      settings = status_.settings = change(status_.settings);
+    }
+    done(settings);
+  });
 }
 
 void FakeEngine::setState(engine::SolveState state, Callback<engine::SolveState> done) {

@@ -45,7 +45,7 @@ class FakeEngine : public engine::Engine {
   void patch(engine::PatchRequest request, Callback<engine::PatchOutcome> done) override;
   void step(engine::StepRequest request, Callback<engine::PatchOutcome> done) override;
   void history(Callback<engine::HistoryReport> done) override;
-  void configure(engine::SolveSettings settings, Callback<engine::SolveSettings> done) override;
+  void configure(ChangeSettings change, Callback<engine::SolveSettings> done) override;
   void pause(Callback<engine::SolveState> done) override;
   void resume(Callback<engine::SolveState> done) override;
   void restart(Callback<engine::SolveState> done) override;

@@ -32,7 +32,7 @@ int main(int argc, char** argv) {
   shorten(parsed.options.server);
   startLog("fake_radiosityd", parsed.options.log_level, parsed.options.log_format);
   testing::FakeEngine fake({2, 512, 256, 4});
-  fake.configure(parsed.options.solve, [](const auto&) {});
+  fake.configure([&](const auto&) { return parsed.options.solve; }, [](const auto&) {});
   auto server = net::Server::open(parsed.options.server, fake);
   if (!server) {
     std::fprintf(stderr, "radiosityd: %s\n", server.error().text().c_str());

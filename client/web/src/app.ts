@@ -118,7 +118,7 @@ export class App {
       sceneShown: (scene) => {
         this.view.onSceneShown(scene);
         this.edit.onSceneShown();
-        this.mark('geometry');
+        this.frame.sceneShown = true;
       },
       gizmoDragging: (active) => this.edit.onGizmoDragging(active),
       gizmoChanged: (object, mode) => this.edit.onGizmoChanged(object, mode),
@@ -215,10 +215,7 @@ export class App {
     this.view.onCapabilities();
     this.share.onServer(info);
     this.people.onReady();
-    this.frame.setWelcome(hello.revision === 0);
-    const status = await this.connection.call<Status>('status').catch(() => undefined);
-    if (status) this.onStatus(status);
-    if (!hello.resumed && hello.revision > 0) await this.fetchDocument();
+    await Promise.all([this.fetchStatus(), !hello.resumed && hello.revision > 0 && this.fetchDocument()]);
     const { count } = await this.connection.call<{ count: number }>('viewers').catch(() => ({ count: 1 }));
     this.onViewers(count);
   }
@@ -262,7 +259,16 @@ export class App {
       error,
       rate,
     );
+    this.settleLight();
+    this.frame.setWelcome(progress.state);
     this.adaptToNetwork();
+  }
+
+  /** Black is no light yet as long as the solve goes on. */
+  private settleLight(): void {
+    const { progress, viewer } = this;
+    const goesOn = !progress || ['empty', 'loading', 'solving'].includes(progress.state);
+    if (!goesOn && viewer.set && viewer.set.note.revision <= progress.revision) viewer.settleLight();
   }
 
   /** On a slow line intermediate versions are left out; moving about needs no network at all. */
@@ -276,9 +282,12 @@ export class App {
   }
 
   private async onLoaded(): Promise<void> {
-    this.frame.setWelcome(false);
     this.resume = undefined;
-    await this.fetchDocument();
+    this.edit.select(undefined); // numbers of nodes mean others now
+    await Promise.all([this.fetchStatus(), this.fetchDocument()]);
+  }
+
+  private async fetchStatus(): Promise<void> {
     const status = await this.connection.call<Status>('status').catch(() => undefined);
     if (status) this.onStatus(status);
   }
@@ -286,8 +295,10 @@ export class App {
   async fetchDocument(): Promise<void> {
     try {
       const reply = await this.connection.call<{ revision: number; gltf?: Gltf; url?: string }>('scene.get');
-      const gltf = reply.gltf ?? ((await (await this.fetch(reply.url!)).json()) as Gltf);
-      this.edit.document.reset(gltf, reply.revision);
+      if (reply.gltf) return this.edit.document.reset(reply.gltf, reply.revision);
+      const file = await this.fetch(reply.url!);
+      const revision = Number(file.headers.get('X-Revision') ?? reply.revision); // it may be newer than the answer
+      this.edit.document.reset((await file.json()) as Gltf, revision);
     } catch (error) {
       if (!(error instanceof ConnectionLost)) this.frame.toasts.show(`The scene: ${(error as Error).message}`, 'bad');
     }
@@ -296,7 +307,8 @@ export class App {
   private async onLightmaps(note: LightmapsNote): Promise<void> {
     const set = this.viewer.expectLayout(note);
     if (!set) return;
-    if (set.baseMip > 0) await this.resubscribe();
+    this.settleLight();
+    if (this.view.renewData() || set.baseMip > 0) await this.resubscribe();
     await this.loadGeometry(note, set);
   }
 

@@ -204,7 +204,9 @@ export class EditSession {
   private onChanged(pointers: string[]): void {
     this.app.viewer.applyDocument(this.document.gltf, pointers);
     if (pointers.length === 0) {
-      this.select(undefined);
+      // The document may come after the picture: what was clicked meanwhile stays selected.
+      const node = this.selection && this.document.gltf.nodes?.[this.selection.node];
+      this.select(node && this.selection);
       this.panel.setDocument(this.document.gltf, (node) => this.materialsOf(node));
     } else {
       this.panel.refresh();

@@ -83,13 +83,21 @@ export class ViewSession {
 
   onDrawn(): void {
     const set = this.app.viewer.shown?.set;
-    if (set && set.tilesTaken > 0) this.app.mark('light');
+    if (set) this.app.mark('geometry');
+    if (set?.lit && set.tilesTaken > 0) this.app.mark('light');
     if (set?.complete && set.waiting === 0 && !this.sharpMarked) {
       this.sharpMarked = true;
       this.app.mark('sharp');
     }
     this.showLegend();
     if (this.metering) this.readMeter();
+  }
+
+  /** Pages have a new layout: what is looked at besides light has new ones too. False: nothing is. */
+  renewData(): boolean {
+    if (this.mode.quantity === 'irradiance') return false;
+    this.app.viewer.setDataQuantity(this.mode.quantity);
+    return true;
   }
 
   async setMode(id: string): Promise<void> {
@@ -193,6 +201,7 @@ export class ViewSession {
 
   private showLegend(): void {
     const { frame, viewer } = this.app;
+    if (this.mode.id === 'mips') return frame.legend.showMips();
     if (!viewer.uniforms.all.falseColour.value || !this.mode.unit || !viewer.shown) return frame.legend.hide();
     const { x: low, y: high } = viewer.uniforms.all.falseRange.value;
     frame.legend.show(this.mode.label, this.mode.unit, low, high);

@@ -1,10 +1,13 @@
 // HTTP over real sockets against the fake engine.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <malloc.h>
 
 #include <array>
 #include <cstdio>
+#include <memory>
 #include <string>
+#include <vector>
 
 #include "protocol/http_bodies.h"
 #include "server/net/access.h"
@@ -186,6 +189,21 @@ TEST(Http, TheTokenGuardsAllButTheProbesAndTheViewer) {
   EXPECT_EQ(request(server.port(), "GET", "/metrics", good).status, 200);
 }
 
+TEST(Http, ABodyThatIsOfNoUseIsNotTaken) {
+  RunningServer server(withToken());
+  for (const auto* target : {"/healthz", "/", "/readyz"}) {
+    RawHttp http(server.port());
+    http.send(std::string("GET ") + target + " HTTP/1.1\r\nHost: localhost\r\nContent-Length: 1000000000\r\n\r\n");
+    EXPECT_EQ(http.receive().status, 413) << target;
+    EXPECT_TRUE(http.closed(Seconds(10)));
+  }
+  RawHttp chunked(server.port());
+  chunked.send("GET /healthz HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\n");
+  for (int i = 0; i < 5; ++i) chunked.send("4000\r\n" + std::string(0x4000, 'x') + "\r\n");
+  EXPECT_EQ(chunked.receive().status, 413);
+  EXPECT_EQ(request(server.port(), "GET", "/healthz", {}, "a body, though a small one").status, 200);
+}
+
 TEST(Http, TheViewerIsSentOnceAndPackedToThoseWhoTakeIt) {
   RunningServer server;
   const auto plain = request(server.port(), "GET", "/");
@@ -265,8 +283,10 @@ TEST(Http, MetricsAreWellFormed) {
 }
 
 TEST(Http, AnEngineThatAnswersAfterTheServerIsGoneHarmsNobody) {
+  mallopt(M_PERTURB, 0xa5);  // what is freed is written over, so that its use shows
   FakeEngine engine;
   engine.holdAnswers();
+  std::vector<std::unique_ptr<RawHttp>> asking;
   {
     net::ServerOptions options;
     options.port = 0;
@@ -274,8 +294,10 @@ TEST(Http, AnEngineThatAnswersAfterTheServerIsGoneHarmsNobody) {
     auto server = net::Server::open(options, engine);
     ASSERT_TRUE(server.has_value());
     std::thread thread([&] { (*server)->run(); });
-    RawHttp http((*server)->port());
-    http.send("GET /scene.glb HTTP/1.1\r\nHost: localhost\r\n\r\nGET /healthz HTTP/1.1\r\n");
+    for (int i = 0; i < 100; ++i) {
+      asking.push_back(std::make_unique<RawHttp>((*server)->port()));
+      asking.back()->send("GET /scene.glb HTTP/1.1\r\nHost: localhost\r\n\r\nGET /healthz HTTP/1.1\r\n");
+    }
     RawHttp probe((*server)->port());
     probe.send("GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n");
     EXPECT_EQ(probe.receive().status, 200);
@@ -285,6 +307,7 @@ TEST(Http, AnEngineThatAnswersAfterTheServerIsGoneHarmsNobody) {
   engine.release();
   engine.progress(0.5);
   engine.publish();
+  mallopt(M_PERTURB, 0);
 }
 
 // ---- opening ----

@@ -6,6 +6,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -35,7 +36,8 @@ TEST(Handshake, TheServerIntroducesItselfFirst) {
   const auto note = decodeNotification(*info);
   ASSERT_TRUE(note.has_value());
   const auto& read = std::get<ServerInfo>(*note);
-  EXPECT_THAT(read.capabilities, ::testing::Contains("tiles.rgb9e5"));
+  for (const auto* what : {"tiles.rgb9e5", "quantity.mipLevel", "scene.redo", "solve.configure", "camera", "resume"})
+    EXPECT_THAT(read.capabilities, ::testing::Contains(what));
   const auto hello = replyOf<HelloReply>(socket.hello({}, {PixelFormat::kR32ui, PixelFormat::kRgb9e5}));
   EXPECT_EQ(hello.epoch, read.epoch);
   EXPECT_EQ(hello.tile_format, PixelFormat::kRgb9e5) << "the first that can be streamed";
@@ -209,6 +211,30 @@ TEST(Messages, TooManyCallsAtATimeAreRefused) {
   EXPECT_EQ(codeOf(socket.call(StatusCall{})), 0);
 }
 
+/// Reads until the answer to this id has come; other messages are passed over.
+RpcResponse answerTo(TestSocket& socket, const std::string& id) {
+  while (const auto message = socket.read()) {
+    if (message->binary) continue;
+    const auto parsed = parseRpc(message->text(), kMaxMessageBytes);
+    if (const auto* response = std::get_if<RpcResponse>(&parsed.items.at(0)); response && response->id == id)
+      return *response;
+  }
+  return {};
+}
+
+TEST(Messages, CreditIsTakenHoweverManyCallsWait) {
+  RunningServer server;
+  TestSocket socket(server.port());
+  socket.hello({}, {}, 0);
+  (void)socket.call(SubscribeCall{});
+  server.engine.publish();
+  server.engine.holdAnswers();
+  for (std::size_t i = 0; i < kMaxCallsInFlight; ++i)
+    socket.sendText(R"({"jsonrpc":"2.0","id":"held","method":"scene.get"})");
+  socket.sendText(R"({"jsonrpc":"2.0","method":"credit","params":{"bytes":100000}})");
+  EXPECT_TRUE(socket.nextTile(Seconds(10)).has_value());
+}
+
 TEST(Scene, GetGivesTheDocument) {
   RunningServer server;
   TestSocket socket(server.port());
@@ -287,6 +313,33 @@ TEST(Scene, TheSameRequestIdGetsTheSameAnswerOnce) {
   EXPECT_EQ(codeOf(socket.call(other)), -32602);
 }
 
+/// Makes edits of so many bytes each while nobody is there, then comes back.
+void expectMissedPatchesToCome(std::size_t count, std::size_t bytes) {
+  RunningServer server;
+  HelloCall back;
+  back.client = "test";
+  back.resume.emplace();
+  {
+    TestSocket before(server.port());
+    back.resume->epoch = replyOf<HelloReply>(before.hello()).epoch;
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto patch = R"([{"op":"add","path":"/extras","value":")" + std::string(bytes, 'x') + "\"}]";
+    server.engine.patch({patch, {}, false, "other", {}, {}}, [](const auto&) {});
+  }
+  TestSocket socket(server.port());
+  ASSERT_TRUE(replyOf<HelloReply>(socket.call(back)).resumed);
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto note = socket.waitFor("scene.patched");
+    ASSERT_TRUE(note.has_value()) << "after " << i << ", closed with " << socket.closeCode();
+    EXPECT_EQ(note->params->at("revision"), i + 1);
+  }
+  EXPECT_EQ(codeOf(socket.call(StatusCall{})), 0);
+}
+
+TEST(Resume, BringsAsManyPatchesAsAreRemembered) { expectMissedPatchesToCome(256, 10); }
+TEST(Resume, BringsLongPatchesToo) { expectMissedPatchesToCome(6, 600'000); }
+
 TEST(Solve, ConfigureKeepsWhatIsNotNamed) {
   RunningServer server;
   TestSocket socket(server.port());
@@ -304,6 +357,36 @@ TEST(Solve, ConfigureKeepsWhatIsNotNamed) {
   EXPECT_EQ(settings.target_error, 0.1);
   EXPECT_EQ(replyOf<StateReply>(socket.call(SolvePauseCall{})).state, "paused");
   EXPECT_EQ(replyOf<StateReply>(socket.call(SolveResumeCall{})).state, "solving");
+}
+
+TEST(Solve, ChangesOfSettingsThatFollowEachOtherAtOnceAllHold) {
+  RunningServer server;
+  TestSocket socket(server.port());
+  socket.hello();
+  server.engine.holdAnswers();
+  SolveConfigureCall first, second;
+  first.time_limit_ms = 100'001;
+  second.target_error = 0.1;
+  socket.sendText(encodeCall("\"first\"", first));
+  socket.sendText(encodeCall("\"second\"", second));
+  EXPECT_EQ(codeOf(socket.call(StatusCall{})), 0) << "both have been read";
+  server.engine.release();
+  EXPECT_EQ(replyOf<Settings>(answerTo(socket, "\"first\"")).target_error, 0.02);
+  const auto settings = replyOf<Settings>(answerTo(socket, "\"second\""));
+  EXPECT_EQ(settings.time_limit_ms, 100'001U);
+  EXPECT_EQ(settings.target_error, 0.1);
+}
+
+TEST(Solve, ATimeLimitThatNoClientCouldReadBackIsRefused) {
+  RunningServer server;
+  TestSocket socket(server.port());
+  socket.hello();
+  SolveConfigureCall call;
+  call.time_limit_ms = std::numeric_limits<std::int64_t>::max();
+  EXPECT_EQ(codeOf(socket.call(call)), -32602);
+  call.time_limit_ms = kMaxTimeLimitMs;
+  EXPECT_EQ(replyOf<Settings>(socket.call(call)).time_limit_ms, kMaxTimeLimitMs);
+  EXPECT_EQ(replyOf<StatusReply>(socket.call(StatusCall{})).settings.time_limit_ms, kMaxTimeLimitMs);
 }
 
 TEST(Solve, WaitAnswersWhenTheErrorIsReached) {

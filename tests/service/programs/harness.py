@@ -31,8 +31,8 @@ class Server:
         self.log_path = pathlib.Path(folder) / f"radiosityd-{uuid.uuid4().hex}.log"
         with open(self.log_path, "wb") as log:
             self.process = subprocess.Popen(
-                [program("RADIOSITYD"), "--listen", f"127.0.0.1:{port}", *map(str, arguments)], stdout=subprocess.PIPE,
-                stderr=log, env={**os.environ, **(env or {}), MARK: mark})
+                [program("RADIOSITYD"), "--listen", f"127.0.0.1:{port}", *map(str, arguments)],
+                stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=log, env={**os.environ, **(env or {}), MARK: mark})
         self.url = self._listening_url(60)
 
     def _listening_url(self, seconds):

@@ -1,12 +1,19 @@
 """The client's other commands against a server that runs already."""
+import asyncio
+import concurrent.futures
 import json
+import pathlib
 import signal
 import struct
+import threading
 import unittest
+
+import websockets
 
 import plates
 from harness import ServiceCase, waitForLine
 
+EXAMPLES = pathlib.Path(__file__).parents[3] / "protocol" / "examples"
 EDIT = json.dumps([{"op": "replace", "path": f"/materials/{plates.LAMP_MATERIAL}/emissiveFactor", "value": [1, 1, 1]}])
 QUICK = ("--error", 0.05, "--texels", 2000)
 
@@ -52,6 +59,52 @@ class RemoteTest(ServiceCase):
         out, _ = self.client("edit", server.url, "patch.json", "--base-revision", before)
         self.assertRegex(out, rf"^revision {before + 1}, affected: \d+ surfaces, \d+ shots\n$")
         self.assertIn("revision", self.complaint("edit", server.url, "patch.json", "--base-revision", before))
+
+    def test_anEditIsSentAgainToAServerThatIsAwayForSeconds(self):
+        """A stand-in takes the edit and goes without an answer; it is back three seconds later, at the same address."""
+        requests = []
+        greeting = (EXAMPLES / "note-serverInfo.json").read_text()
+        replies = {method: json.loads((EXAMPLES / f"reply-{method}.json").read_text())["result"]
+                   for method in ("hello", "scene.undo")}
+
+        async def stand_in(told):
+            gone = asyncio.Event()
+
+            async def serve(socket, *_):
+                await socket.send(greeting)
+                async for text in socket:
+                    call = json.loads(text)
+                    if call["method"] == "scene.undo":
+                        requests.append(call["params"]["requestId"])
+                        if len(requests) == 1:
+                            return gone.set()
+                    await socket.send(json.dumps({"jsonrpc": "2.0", "id": call["id"], "result": replies[call["method"]]}))
+                return None
+
+            protocols = {"subprotocols": ["radiosity.v1"]}
+            async with websockets.serve(serve, "127.0.0.1", 0, **protocols) as server:
+                port = server.sockets[0].getsockname()[1]
+                told.set_result(port)
+                await gone.wait()
+            await asyncio.sleep(3)
+            async with websockets.serve(serve, "127.0.0.1", port, **protocols):
+                await asyncio.sleep(60)
+
+        told = concurrent.futures.Future()
+        loop = asyncio.new_event_loop()
+        task = loop.create_task(stand_in(told))
+        thread = threading.Thread(target=lambda: loop.run_until_complete(asyncio.wait([task])))
+        thread.start()
+        try:
+            out, err = self.client("undo", f"127.0.0.1:{told.result(20)}")
+        finally:
+            loop.call_soon_threadsafe(task.cancel)
+            thread.join()
+            loop.close()
+        self.assertIn("took back revision", out)
+        self.assertIn("sending the edit again", err)
+        self.assertEqual(len(requests), 2)
+        self.assertEqual(requests[0], requests[1])
 
     def test_badEditsExit2WithOperationPointerAndReason(self):
         server = self.solved()

@@ -69,8 +69,8 @@ class Session:
         session = Session(socket)
         assert socket.subprotocol == "radiosity.v1", socket.subprotocol
         session.info = (await session.note("serverInfo"))["params"]
-        session.hello = await session.call("hello", client="service test", tileFormats=["rgba16f"],
-                                           codecs=["deflate", "none"], creditBytes=1 << 20, **hello)
+        offer = {"client": "service test", "tileFormats": ["rgba16f"], "codecs": ["deflate", "none"], "creditBytes": 1 << 20}
+        session.hello = await session.call("hello", **{**offer, **hello})
         return session
 
     async def close(self):

@@ -210,6 +210,14 @@ class Tls(ServiceCase):
         self.assertEqual(self.served(server), ssl.PEM_cert_to_DER_cert(self.certificate.read_text()))
         self.assertNotEqual(self.served(server), before)
 
+    def test_without_a_certificate_sighup_ends_nothing(self):
+        server = self.server(self.scene)
+        server.process.send_signal(signal.SIGHUP)
+        self.waitForLog(server, "there is no certificate to read again")
+        with socket.create_connection(("127.0.0.1", server.port), SECONDS) as plain:
+            plain.sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
+            self.assertIn(b"200 OK", plain.recv(4096))
+
     def waitForLog(self, server, words):
         deadline = time.monotonic() + SECONDS
         while words not in server.log():

@@ -4,6 +4,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "common/one_line.h"
+
 namespace radiosity::cli {
 namespace {
 
@@ -45,6 +47,19 @@ TEST(StatusText, tellsStateErrorAndWarnings) {
   EXPECT_THAT(text, testing::HasSubstr("state      converged\n"));
   EXPECT_THAT(text, testing::HasSubstr("1.8 % of 2 % (residual 0.1 %, sampling 1.7 %, discretization 0.2 %)"));
   EXPECT_THAT(text, testing::HasSubstr("  3 triangles dropped\n"));
+}
+
+TEST(StatusText, lettersOfPeersDoNotMoveTheCursor) {
+  auto status = someStatus();
+  status.warnings = {"red \x1b[31m",
+                     "window \xc2\x9b"
+                     "2J",
+                     "bell \a, back\r\n"};
+  status.gl_renderer = "\x1b]0;title\x7f";
+  const auto text = statusText(status);
+  for (const auto* bad : {"\x1b", "\xc2\x9b", "\a", "\r", "\x7f"}) EXPECT_EQ(text.find(bad), std::string::npos);
+  EXPECT_THAT(text, testing::HasSubstr("red  [31m\n"));
+  EXPECT_EQ(oneLine("\xc3\xa9t\xc3\xa9 \xc2\xa9"), "\xc3\xa9t\xc3\xa9 \xc2\xa9");
 }
 
 }  // namespace

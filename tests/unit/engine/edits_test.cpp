@@ -234,6 +234,48 @@ TEST_F(Edits, TheOldLightFadesIntoTheNewWithoutADarkMoment) {
   EXPECT_LE(std::sqrt(difference / all), error + status().error.total);
 }
 
+std::size_t tilesNewerThan(const engine::Lightmaps& lightmaps, std::uint64_t version) {
+  std::size_t newer = 0;
+  for (const auto& page : lightmaps.pages) {
+    for (const auto& mip : page->tile_version)
+      newer += static_cast<std::size_t>(std::ranges::count_if(mip, [&](auto v) { return v > version; }));
+  }
+  return newer;
+}
+
+TEST_F(Edits, AMovedNodeKeepsTheLayoutAndIsSentNoTileBeforeItsLightChanges) {
+  solve(blockRoom());
+  const auto before = engine().lightmaps();
+  recorder_->forget();
+  const auto uploads = script_->uploads.load();
+  ASSERT_TRUE(patch(R"([{"op":"replace","path":"/nodes/@block/translation","value":[0.7,0,0.7]}])"));
+  EXPECT_GT(script_->uploads, uploads) << "its geometry changed";
+  const auto first = recorder_->lightmaps();
+  ASSERT_FALSE(first.empty());
+  EXPECT_EQ(first.front()->revision, 2U);
+  EXPECT_EQ(first.front()->layout, before->layout);
+  EXPECT_EQ(tilesNewerThan(*first.front(), before->tile_version), 0U);
+  ASSERT_TRUE(reaches(SolveState::kConverged));
+  (void)sceneText();
+  EXPECT_GT(tilesNewerThan(*engine().lightmaps(), before->tile_version), 0U) << "a shadow has moved";
+  EXPECT_EQ(engine().lightmaps()->layout, before->layout);
+}
+
+TEST_F(Edits, WhatIsHiddenScaledOrAddedHasALayoutOfItsOwn) {
+  solve(blockRoom());
+  auto layout = engine().lightmaps()->layout;
+  for (const char* edit :
+       {R"({"op":"replace","path":"/nodes/@block/extensions/KHR_node_visibility/visible","value":false})",
+        R"({"op":"replace","path":"/nodes/@block/extensions/KHR_node_visibility/visible","value":true})",
+        R"({"op":"replace","path":"/nodes/@block/scale","value":[0.5,0.5,0.5]})",
+        R"({"op":"replace","path":"/materials/@red/doubleSided","value":true})"}) {
+    ASSERT_TRUE(patch("[" + std::string(edit) + "]")) << edit;
+    (void)sceneText();
+    EXPECT_GT(engine().lightmaps()->layout, layout) << edit;
+    layout = engine().lightmaps()->layout;
+  }
+}
+
 TEST_F(Edits, WhatIsNewIsNotBlackEither) {
   solve(lumpedCube(0.5));
   recorder_->forget();

@@ -13,6 +13,7 @@ class ScriptedTransport final : public solver::Transport {
   Result<void> setScene(std::shared_ptr<const scene::PatchScene> patches) override {
     if (script_->uploads_to_fail > 0 && script_->uploads_to_fail-- > 0)
       return fail(ErrorCode::kUnavailable, "out of memory on the device");
+    if (script_->uploads_to_run_out > 0 && script_->uploads_to_run_out-- > 0) throw std::bad_alloc();
     ++script_->uploads;
     patches_ = patches;
     return rays_.setScene(std::move(patches));
@@ -21,6 +22,7 @@ class ScriptedTransport final : public solver::Transport {
     if (script_->run_fails) return fail(ErrorCode::kUnavailable, "the device was lost");
     if (script_->runs_until_failure > 0 && --script_->runs_until_failure == 0)
       return fail(ErrorCode::kUnavailable, "the driver reset the card");
+    if (script_->runs_out_of_memory) throw std::bad_alloc();
     return rays_.run(batch, into);
   }
   [[nodiscard]] Losses losses() const override {
@@ -135,9 +137,11 @@ engine::HistoryReport EngineTest::history() {
 }
 
 Result<engine::SolveSettings> EngineTest::configure(const std::function<void(engine::SolveSettings&)>& change) {
-  auto settings = status().settings;
-  change(settings);
-  return call<engine::SolveSettings>([&](auto done) { engine_->configure(settings, std::move(done)); });
+  const auto changed = [&](engine::SolveSettings settings) {
+    change(settings);
+    return settings;
+  };
+  return call<engine::SolveSettings>([&](auto done) { engine_->configure(changed, std::move(done)); });
 }
 
 Result<engine::SolveState> EngineTest::pause() {

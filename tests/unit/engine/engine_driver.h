@@ -24,7 +24,8 @@ struct TransportScript {
   std::atomic<bool> run_fails{false};
   std::atomic<int> runs_until_failure{0};  ///< the run that brings it from 1 to 0 fails
   std::atomic<int> losses{0};
-  std::atomic<int> uploads_to_fail{0};
+  std::atomic<int> uploads_to_fail{0}, uploads_to_run_out{0};
+  std::atomic<bool> runs_out_of_memory{false};
   std::atomic<int> uploads{0};
 };
 

@@ -54,12 +54,16 @@ TEST_F(Recovery, ALostRendererRestartsTheSolveAndTheResultHasTheSameBits) {
 }
 
 TEST_F(Recovery, AnUploadThatFailsWhileRecoveringIsTriedAgain) {
-  script_->runs_until_failure = 2;
+  ASSERT_TRUE(configure([](auto& settings) { settings.target_error = kNever; }));
   ASSERT_TRUE(load(lumpedCube(0.5)));
+  ASSERT_TRUE(pause());
   script_->uploads_to_fail = 2;
-  ASSERT_TRUE(reaches(SolveState::kConverged));
+  script_->runs_until_failure = 1;
+  ASSERT_TRUE(resume());
+  EXPECT_TRUE(eventually([&] { return status().solve_restarts == 1; }));
   EXPECT_EQ(script_->uploads_to_fail, 0);
-  EXPECT_EQ(status().solve_restarts, 1U);
+  ASSERT_TRUE(configure([](auto& settings) { settings.target_error = kEasy; }));
+  EXPECT_TRUE(reaches(SolveState::kConverged));
 }
 
 TEST_F(Recovery, ARendererThatNeverComesBackEndsTheSolveAfterFourTries) {
@@ -70,6 +74,36 @@ TEST_F(Recovery, ARendererThatNeverComesBackEndsTheSolveAfterFourTries) {
   script_->run_fails = false;
   ASSERT_TRUE(restart());
   EXPECT_TRUE(reaches(SolveState::kConverged));
+}
+
+TEST_F(Recovery, WhatMemoryDoesNotSufficeForIsRefusedAndTheSceneStays) {
+  solve(lumpedCube(0.5));
+  const auto before = status();
+  script_->uploads_to_run_out = 1;
+  const auto loaded = load(lumpedCube(0.25));
+  ASSERT_FALSE(loaded);
+  EXPECT_EQ(loaded.error().code, ErrorCode::kTooLarge);
+  script_->uploads_to_run_out = 1;
+  const auto sized = configure([](auto& settings) { settings.texels = 600; });
+  ASSERT_FALSE(sized);
+  EXPECT_EQ(sized.error().code, ErrorCode::kTooLarge);
+  EXPECT_EQ(status().state, SolveState::kConverged);
+  EXPECT_EQ(status().revision, before.revision);
+  EXPECT_EQ(status().settings.texels, before.settings.texels);
+  EXPECT_EQ(status().shots, before.shots);
+  ASSERT_TRUE(patch(emissionPatch(0, 2.0)));
+  EXPECT_TRUE(reaches(SolveState::kConverged));
+}
+
+TEST_F(Recovery, ASolveThatRunsOutOfMemoryFailsAndCanBeStartedAgain) {
+  script_->runs_out_of_memory = true;
+  ASSERT_TRUE(configure([](auto& settings) { settings.paper_mode = true; }));
+  ASSERT_TRUE(load(lumpedCube(0.5)));
+  ASSERT_TRUE(reaches(SolveState::kFailed));
+  EXPECT_THAT(status().failure, testing::HasSubstr("memory"));
+  script_->runs_out_of_memory = false;
+  ASSERT_TRUE(restart());
+  EXPECT_TRUE(eventually([&] { return status().shots > 0; }));
 }
 
 TEST_F(Recovery, ReplacedRenderersAreTold) {

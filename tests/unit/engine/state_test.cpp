@@ -31,6 +31,7 @@ class Kept : public EngineTest {
     auto options = rayOptions(script_);
     options.settings.target_error = target_;
     options.named_settings = named_;
+    if (recovers_late_) options.recovery_wait = std::chrono::hours(1);
     options.store = std::move(*store);
     auto made = engine::makeEngine(std::move(options));
     ASSERT_TRUE(made) << made.error().text();
@@ -54,6 +55,7 @@ class Kept : public EngineTest {
 
   TemporaryFolder folder_;
   double target_ = kEasy;
+  bool recovers_late_ = false;
   std::set<std::string> named_ = {"targetError"};
 };
 
@@ -204,6 +206,40 @@ TEST_F(Kept, SettingsComeBackUnlessTheCommandLineNamesThem) {
   EXPECT_EQ(status().settings.texels, 123U);
 }
 
+TEST_F(Kept, SettingsThatCannotBeLitAreNotKept) {
+  solve(lumpedCube(0.5));
+  const auto texels = status().settings.texels;
+  const auto refused = configure([](auto& settings) { settings.texels = std::uint64_t{1} << 32U; });
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kTooLarge);
+  EXPECT_EQ(status().settings.texels, texels);
+  script_->uploads_to_fail = 1;
+  EXPECT_FALSE(configure([](auto& settings) { settings.texels = 600; }));
+  EXPECT_EQ(status().settings.texels, texels);
+  restart();
+  EXPECT_EQ(status().settings.texels, texels);
+  EXPECT_TRUE(reaches(State::kConverged));
+}
+
+// As after a move to a machine with less memory.
+TEST_F(Kept, TexelsThatThereIsNoMemoryForAnyMoreGiveWayToThoseOfTheCommandLine) {
+  solve(lumpedCube(0.5));
+  const auto patches = status().patches;
+  watching_.reset();
+  engine_.reset();
+  {
+    auto store = state::Store::open(folder_.file("state"));
+    ASSERT_TRUE(store);
+    auto settings = (*store)->takeKept().settings;
+    settings["texels"] = "4294967296";
+    ASSERT_TRUE((*store)->setSettings(settings));
+  }
+  start();
+  EXPECT_EQ(status().settings.texels, 150U);
+  ASSERT_TRUE(reaches(State::kConverged));
+  EXPECT_EQ(status().patches, patches);
+}
+
 TEST_F(Kept, TheSceneItWasStartedWithGoesOnWithItsEdits) {
   const auto file = folder_.write("room.glb", "");
   const auto write = [&](double reflectance) {
@@ -273,19 +309,21 @@ TEST_F(Kept, ASolveOfEditedGeometryBeginsAnewAfterARestart) {
   EXPECT_TRUE(reaches(State::kConverged));
 }
 
-// Of the wave that failed the light counts as shot, but arrived nowhere.
-TEST_F(Kept, AFailedSolveLeavesTheCheckpointBeforeIt) {
-  solve(lumpedCube(0.5));
-  engine().keepSolve(kPatienceForCheckpoint);
+// What was measured of the wave that failed would count twice.
+TEST_F(Kept, ASolveWithoutARendererLeavesTheCheckpointBeforeIt) {
+  recovers_late_ = true;
   restart();
-  const auto good = folder_.read("state/checkpoint");
-  ASSERT_FALSE(good.empty());
-  script_->run_fails = true;
-  ASSERT_TRUE(test::EngineTest::restart());
-  ASSERT_TRUE(reaches(State::kFailed));
-  engine().keepSolve(kPatienceForCheckpoint);
-  EXPECT_TRUE(folder_.read("state/checkpoint") == good);
-  script_->run_fails = false;
+  solve(lumpedCube(0.5));
+  const auto undisturbed = light();
+  for (const int run : {2, 3, 5, 8}) {
+    script_->runs_until_failure = run;
+    ASSERT_TRUE(test::EngineTest::restart());
+    ASSERT_TRUE(eventually([&] { return status().renderer_lost; })) << run;
+    engine().keepSolve(kPatienceForCheckpoint);
+    restart();
+    ASSERT_TRUE(reaches(State::kConverged));
+    EXPECT_TRUE(light() == undisturbed) << run;
+  }
 }
 
 TEST_F(Kept, ASolveTooLargeForACheckpointGoesOnWithout) {

@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
-
 #include <cmath>
+#include <span>
+#include <vector>
 
 #include "tests/unit/solver/quad_scene.h"
 
@@ -186,6 +188,122 @@ TEST_F(LinkColumns, ProductsAreWeightedByArea) {
   EXPECT_NEAR(LinkColumn::product(a, a, area), 2.0 * (0.25 + 0.25), 1e-4);
   EXPECT_NEAR(LinkColumn::product(a, b, area), 2.0 * 0.125, 1e-4);
   EXPECT_NEAR(LinkColumn::product(b, a, area), 2.0 * 0.125, 1e-4);
+}
+
+/// Flux of all links for a radiosity of one.
+double fluxOf(const LinkColumn& column, const std::vector<Side>& sides, std::span<const float> leaf_area) {
+  double flux = 0.0;
+  for (const auto& side : sides) {
+    std::vector<float> leaves(side.leaf_count);
+    if (!column.decode(side.first_value, leaves)) continue;
+    for (std::uint32_t i = 0; i < side.leaf_count; ++i)
+      flux += static_cast<double>(leaves[i]) * static_cast<double>(leaf_area[side.first_value + i]);
+  }
+  return flux;
+}
+
+TEST_F(LinkColumns, OneInWhichLinksWereReplacedIsTheOneMadeOfThemAfresh) {
+  const auto set = [&](LinkSample& sample, std::uint32_t side, std::uint32_t leaf, float value) {
+    sample.add(sides_[side].first_node + leaf, value);
+  };
+  LinkSample before, after;
+  for (std::uint32_t leaf = 0; leaf < 16; ++leaf) {
+    const float value = 0.01F + 0.003F * static_cast<float>(leaf);
+    set(before, 1, leaf, value);
+    set(after, 1, leaf, leaf < 4 ? 0.5F * value : value);  // darker
+  }
+  set(before, 2, 3, 0.02F);  // will be hidden
+  set(after, 4, 7, 0.9F);    // was hidden; by far the largest, so that the scale must grow
+  before.due = 0.04, before.escaped = 0.01;
+  after.due = 0.05, after.absorbed = 0.002;
+  LinkColumn replaced, afresh;
+  add(replaced, before, 3.0);
+  add(afresh, after, 3.0);
+  expander_.expand(after);
+  std::vector<float> values(expander_.leafAreas().size(), 0.0F);
+  for (const auto s : expander_.sidesReached()) {
+    for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v)
+      values[v] = expander_.values()[v];
+  }
+  const std::vector<LinkColumn::ValueRun> leaves = {
+      {sides_[1].first_value, 4}, {sides_[2].first_value + 2, 3}, {sides_[4].first_value, 16}};
+  replaced.replace(leaves, values, {after.due, after.escaped, after.absorbed}, expander_.leafAreas(), sides_);
+  for (std::uint32_t side = 0; side < 6; ++side) {
+    for (std::uint32_t i = 0; i < 16; ++i) {
+      const float was = std::max(0.0F, leaf(replaced, side, i)), is = std::max(0.0F, leaf(afresh, side, i));
+      EXPECT_NEAR(was, is, 0x1p-10F * is) << side << ", " << i;  // two roundings of 2^-12, and that of the gain
+    }
+  }
+  EXPECT_EQ(leaf(replaced, 2, 3), 0.0F);
+  EXPECT_EQ(replaced.points(), afresh.points());
+  EXPECT_EQ(replaced.escaped(), 0.0);
+  EXPECT_EQ(replaced.absorbed(), afresh.absorbed());
+  EXPECT_NEAR(fluxOf(replaced, sides_, expander_.leafAreas()), after.due, 1e-6);
+}
+
+TEST_F(LinkColumns, WhereNothingReachesALeafReplacingItTakesNoMemory) {
+  LinkSample sample;
+  sample.add(sides_[1].first_node, 0.5F);
+  LinkColumn column;
+  add(column, sample, 1.0);
+  const auto bytes = column.bytes();
+  const std::vector<float> values(96, 0.0F);
+  const std::vector<LinkColumn::ValueRun> leaves = {{sides_[3].first_value, 16}, {sides_[5].first_value + 4, 2}};
+  column.replace(leaves, values, {1.0 / 32.0, 0.0, 0.0}, expander_.leafAreas(), sides_);
+  EXPECT_EQ(column.bytes(), bytes);
+  EXPECT_EQ(leaf(column, 3, 0), -1.0F);
+  EXPECT_NEAR(leaf(column, 1, 0), 0.5, 1e-6);
+}
+
+TEST_F(LinkColumns, OneThatWasRenumberedIsTheOneMadeInTheNewNumbers) {
+  // Of six sides the third is gone, and a smaller one has come before the second.
+  auto quads = test::cubeQuads(4, {}, {});
+  auto extra = quads[0];
+  extra.width = extra.height = 2;
+  quads.erase(quads.begin() + 2);
+  quads.insert(quads.begin() + 1, extra);
+  const auto made = test::makeQuadScene(quads);
+  const auto sides = makeSides(*made.patches);
+  const std::vector<std::uint32_t> side_after = {0, 2, scene::kNone, 3, 4, 5};
+  LinkSample before, after;
+  for (std::uint32_t side = 0; side < 5; ++side) {  // nothing reaches the last
+    for (std::uint32_t i = 0; i < 16; ++i) {
+      const float value = 0.02F + 0.001F * static_cast<float>(16 * side + i);
+      before.add(sides_[side].first_node + i, value);
+      if (side_after[side] != scene::kNone) after.add(sides[side_after[side]].first_node + i, value);
+    }
+  }
+  before.due = 0.25, before.escaped = 0.03;
+  after.due = 0.2, after.escaped = 0.03;
+  LinkColumn column, afresh;
+  add(column, before, 2.0);
+  const auto original = column;
+  column.renumber(side_after, sides_, sides);
+  for (std::uint32_t side = 0; side < 6; ++side) {
+    std::vector<float> was(16), is(16);
+    const bool had = original.decode(sides_[side].first_value, was);
+    if (side_after[side] == scene::kNone) continue;
+    EXPECT_EQ(column.decode(sides[side_after[side]].first_value, is), had) << side;
+    EXPECT_EQ(is, was) << side;  // to the bit, with the gain that all links together had
+  }
+  std::vector<float> small(4);
+  EXPECT_FALSE(column.decode(sides[1].first_value, small)) << "nothing is known of what is new";
+  EXPECT_EQ(column.points(), 2.0);
+  EXPECT_EQ(column.escaped(), 0.03);
+  EXPECT_LT(column.bytes(), original.bytes());
+  // With nothing to replace but what should arrive it is the column of the new scene, and keeps its flux.
+  LinkExpander expander(*made.patches, sides);
+  expander.expand(after);
+  afresh.add(expander, after, 2.0, sides);
+  column.replace({}, {}, {after.due, after.escaped, 0.0}, expander.leafAreas(), sides);
+  EXPECT_NEAR(fluxOf(column, sides, expander.leafAreas()), after.due, 1e-6);
+  for (const auto& side : sides) {
+    std::vector<float> one(side.leaf_count, 0.0F), other(side.leaf_count, 0.0F);
+    // Where there is none, one of them may keep zeros between runs.
+    (void)column.decode(side.first_value, one);
+    (void)afresh.decode(side.first_value, other);
+    for (std::uint32_t i = 0; i < side.leaf_count; ++i) EXPECT_NEAR(one[i], other[i], 0x1p-10F * other[i]);
+  }
 }
 
 }  // namespace

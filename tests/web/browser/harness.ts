@@ -57,18 +57,31 @@ export class Pages {
   private browser: Browser | undefined;
   private contexts: BrowserContext[] = [];
 
-  async launch(): Promise<void> {
+  /** Without `card` Chromium renders in software, so that tests need no graphics card. */
+  async launch(card = false): Promise<void> {
+    const software = ['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader'];
     this.browser = await chromium.launch({
       executablePath: program('CHROMIUM', '/usr/bin/chromium'),
-      // Software rendering, so that the test needs no graphics card; containers have no room for Chromium's sandbox.
-      args: [
-        '--no-sandbox',
-        '--use-gl=angle',
-        '--use-angle=swiftshader',
-        '--enable-unsafe-swiftshader',
-        '--ignore-gpu-blocklist',
-      ],
+      // Containers have no room for Chromium's sandbox.
+      args: ['--no-sandbox', '--ignore-gpu-blocklist', ...(card ? [] : software)],
     });
+  }
+
+  get started(): Browser {
+    if (!this.browser) throw new Error('launch() comes first');
+    return this.browser;
+  }
+
+  /** What draws WebGL, in Chromium's words. */
+  async renderer(): Promise<string> {
+    const page = await this.open('about:blank');
+    const name = await page.evaluate(() => {
+      const gl = document.createElement('canvas').getContext('webgl2');
+      const extension = gl?.getExtension('WEBGL_debug_renderer_info');
+      return gl && extension ? String(gl.getParameter(extension.UNMASKED_RENDERER_WEBGL)) : 'no WebGL 2';
+    });
+    await this.closeAll();
+    return name;
   }
 
   async open(url: string, width = 480, height = 480, options: { touch?: boolean } = {}): Promise<Page> {

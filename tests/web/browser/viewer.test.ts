@@ -138,6 +138,34 @@ it('adds a lamp, and takes it out again', async () => {
   await converged(page);
 });
 
+it('keeps what was clicked before the document came', async () => {
+  const page = await pages.open('about:blank', 1200, 800);
+  let letGo = () => undefined as void;
+  const allowed = new Promise<void>((resolve) => (letGo = resolve));
+  await page.routeWebSocket(/\/ws$/, (socket) => {
+    const upstream = socket.connectToServer();
+    const asked = new Set<unknown>();
+    socket.onMessage((message) => {
+      const call = typeof message === 'string' ? (JSON.parse(message) as { id?: unknown; method?: string }) : {};
+      if (call.method === 'scene.get') asked.add(call.id);
+      upstream.send(message);
+    });
+    upstream.onMessage(async (message) => {
+      if (typeof message === 'string' && asked.has((JSON.parse(message) as { id?: unknown }).id ?? 'none'))
+        await allowed;
+      socket.send(message);
+    });
+  });
+  await page.goto(server.url);
+  await converged(page);
+  expect(await page.evaluate(() => window.viewer!.edit.document.gltf.nodes)).toBeUndefined();
+  await page.mouse.click(400, 260);
+  const selected = await page.evaluate(() => window.viewer!.edit.selection!.node);
+  letGo();
+  await page.getByLabel('Luminance, nit').waitFor();
+  expect(await page.evaluate(() => window.viewer!.edit.selection!.node)).toBe(selected);
+});
+
 it('takes back what the server refuses, with its reason', async () => {
   const page = await pages.open(server.url, 1200, 800);
   await converged(page);
@@ -155,8 +183,9 @@ it('takes back what the server refuses, with its reason', async () => {
 it('reads the light under the pointer', async () => {
   const page = await pages.open(server.url, 1200, 800);
   await converged(page);
-  await page.keyboard.press('m');
+  // First the pointer: a meter that has none reads the middle of the picture until the next frame.
   await page.mouse.move(400, 260);
+  await page.keyboard.press('m');
   const text = await until(
     async () => (await page.locator('.meter').innerText()) || '',
     (t) => / lx ± /.test(t),
@@ -170,6 +199,31 @@ it('reads the light under the pointer', async () => {
   const lux = Number(/([\d.,]+) lx/.exec(text)![1]!.replaceAll(',', ''));
   expect(lux).toBeCloseTo(0.2126 * reading[0] + 0.7152 * reading[1] + 0.0722 * reading[2], 1);
   expect(lux).toBeGreaterThan(0);
+});
+
+it('scales every view by its own values, to the last tile', async () => {
+  const page = await pages.open(server.url, 600, 500);
+  await converged(page);
+  const ranges = new Set<string>();
+  for (const mode of ['irradiance', 'unshot', 'error']) {
+    const ends = await until(
+      () =>
+        page.evaluate((mode) => {
+          const { view, viewer } = window.viewer!;
+          if (view.mode.id !== mode) {
+            void view.setMode(mode);
+            viewer.uniforms.all.falseColour.value = true;
+          }
+          const set = mode === 'irradiance' ? viewer.shown!.set : viewer.dataSet;
+          const all = set?.quantity === mode && set.complete && set.waiting === 0 ? set.range() : undefined;
+          return { shown: viewer.uniforms.all.falseRange.value.toArray(), all };
+        }, mode),
+      ({ shown, all }) => all !== undefined && shown.join() === all.join(),
+    );
+    expect(ends.shown, mode).toEqual(ends.all);
+    ranges.add(ends.shown.join());
+  }
+  expect(ranges.size).toBe(3);
 });
 
 it('comes back when the graphics context was lost', async () => {
@@ -211,6 +265,22 @@ it.each([360, 768, 1280])('fits into %i pixels, and every view draws something',
     seen.add(picture.join());
   }
   expect(seen.size).toBe(8);
+});
+
+it('goes on showing the error, and light after it, when the pages have a new layout', async () => {
+  const page = await pages.open(server.url, 900, 600);
+  await converged(page);
+  await page.evaluate(() => window.viewer!.view.setMode('error'));
+  const taken = () => page.evaluate(() => window.viewer!.viewer.dataSet?.tilesTaken ?? 0);
+  await until(taken, (tiles) => tiles > 0);
+  const layout = () => page.evaluate(() => window.viewer!.viewer.set!.note.layout);
+  const before = await layout();
+  await page.evaluate(() => window.viewer!.connection.call('solve.configure', { texels: 9000 }));
+  await until(layout, (now) => now !== before);
+  await until(taken, (tiles) => tiles > 0);
+  await page.evaluate(() => window.viewer!.view.setMode('lit'));
+  await converged(page);
+  await page.evaluate(() => window.viewer!.connection.call('solve.configure', { texels: 16000 }));
 });
 
 it('carries the camera in a link', async () => {

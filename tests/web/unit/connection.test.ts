@@ -144,6 +144,28 @@ describe('connection', () => {
     expect(test.socket().sent[0]!.params['resume']).toBeUndefined();
   });
 
+  it('starts afresh, and ever more slowly, where it was closed for what it did not read', async () => {
+    const test = setup(() => ({ epoch: 'e1', revision: 4, tileVersion: 9 }));
+    const offered = () => test.socket().sent[0]!.params['resume'];
+    await opened(test);
+    expect(offered()).toBeDefined();
+    for (let attempt = 0; attempt < 3; ++attempt) {
+      test.socket().drop(1013, 'messages are not read');
+      const sockets = FakeSocket.all.length;
+      await vi.advanceTimersByTimeAsync(pauseMs(attempt, 0.5) - 1);
+      expect(FakeSocket.all.length).toBe(sockets);
+      await vi.advanceTimersByTimeAsync(1);
+      expect(FakeSocket.all.length).toBe(sockets + 1);
+      await opened(test);
+      expect(offered()).toBeUndefined();
+    }
+    test.socket().give({ method: 'bookmark', params: { revision: 4, tileVersion: 9 } });
+    test.socket().drop(1006, '');
+    await vi.advanceTimersByTimeAsync(60_000);
+    await opened(test);
+    expect(offered()).toBeDefined();
+  });
+
   it('waits longer each time, never much longer than ten seconds', () => {
     const pauses = Array.from({ length: 12 }, (_, attempt) => pauseMs(attempt, 0.5));
     expect(pauses).toEqual([...pauses].sort((a, b) => a - b));

@@ -274,4 +274,22 @@ describe('scene document', () => {
     const { document } = session();
     expect(document.patched(2, [{ op: 'remove', path: '/nodes/9' }], 'Ann')).toBe(false);
   });
+
+  it('asks for the scene anew when a patch was lost on the way', () => {
+    const { document } = session();
+    expect(document.patched(3, [{ op: 'replace', path: '/nodes/1/name', value: 'b' }], 'Ann')).toBe(false);
+    expect(document.revision).toBe(1);
+    expect(document.gltf).toEqual(room());
+  });
+
+  it('asks for the scene anew when its own edit comes back in other words', () => {
+    const { document } = session();
+    const { patch } = edits.addLamp(document.gltf, [0, 1, 0], 50);
+    void document.edit('Add lamp', patch);
+    const told = patch.map((operation) =>
+      operation.path === '/nodes/-' ? { ...operation, path: '/nodes/2' } : operation,
+    );
+    expect(told).not.toEqual(patch);
+    expect(document.patched(2, told, 'me')).toBe(false);
+  });
 });

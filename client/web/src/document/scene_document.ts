@@ -72,11 +72,14 @@ export class SceneDocument {
   /** A patch that the server has made, ours or someone else's. False: the copy does not fit; fetch the scene anew. */
   patched(revision: number, patch: Patch, by: string): boolean {
     if (revision <= this.revision) return true;
+    if (revision !== this.revision + 1) return false; // one was lost on the way
     const first = this.pending[0];
     if (by === this.me && first && sameJson(first.forward as unknown as Json, patch as unknown as Json)) {
       this.confirm(first, revision);
       return true;
     }
+    // A server that was started again tells what it had made of ours in its own words.
+    if (by === this.me && first) return false;
     this.takeBackPending();
     try {
       applyPatch(this.json, patch);

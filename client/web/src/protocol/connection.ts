@@ -3,6 +3,7 @@
 
 import { CreditWindow, FIRST_WINDOW } from './credit';
 import {
+  CLOSE_OVERLOAD,
   CLOSE_UNAUTHENTICATED,
   SUBPROTOCOL,
   UNAUTHENTICATED,
@@ -56,6 +57,7 @@ export class Connection {
   private timer: ReturnType<typeof setTimeout> | undefined;
   private probe: ReturnType<typeof setInterval> | undefined;
   private stopped = false;
+  private isBehind = false; // what was missed was too much for one go: start afresh
   private isRefused = false; // the token, by the answer to this socket's hello
 
   constructor(
@@ -114,12 +116,15 @@ export class Connection {
 
   private onNotification(rpc: Rpc, method: string, params: unknown): void {
     if (method === 'serverInfo') void this.handshake(rpc, params as ServerInfo);
-    if (method === 'bookmark') this.credit.idle();
+    if (method === 'bookmark') {
+      this.credit.idle();
+      this.isBehind = false;
+    }
     this.events.notification(method as keyof Notifications, params as never);
   }
 
   private async handshake(rpc: Rpc, info: ServerInfo): Promise<void> {
-    const resume = this.options.resume();
+    const resume = this.isBehind ? undefined : this.options.resume();
     const token = this.options.token();
     this.credit = new CreditWindow();
     this.isRefused = false;
@@ -133,7 +138,7 @@ export class Connection {
         ...(resume && resume.epoch === info.epoch ? { resume } : {}),
       });
       this.info = info;
-      this.attempt = 0;
+      if (!this.isBehind) this.attempt = 0;
       this.events.state('open', '');
       this.events.ready(info, hello);
       await this.subscribe();
@@ -174,6 +179,7 @@ export class Connection {
     // Closed with the same code without an answer, hello only came too late: the machine was busy.
     if (code === CLOSE_UNAUTHENTICATED && this.isRefused)
       return this.events.state('refused', reason || 'the token is missing or wrong');
+    this.isBehind ||= code === CLOSE_OVERLOAD;
     const pause = pauseMs(this.attempt++, (this.options.random ?? Math.random)());
     this.events.state('waiting', describeClose(code, reason, pause));
     this.timer = setTimeout(() => this.open(), pause);
@@ -184,7 +190,7 @@ function describeClose(code: number, reason: string, pause: number): string {
   const why =
     code === 1001
       ? 'the server has stopped'
-      : code === 1013
+      : code === CLOSE_OVERLOAD
         ? 'the server is overloaded'
         : code === 4408
           ? 'the network was too slow'

@@ -134,5 +134,6 @@ export const SUBPROTOCOL = 'radiosity.v1';
 
 /** The close code that trying again does not mend. */
 export const CLOSE_UNAUTHENTICATED = 1008;
+export const CLOSE_OVERLOAD = 1013;
 /** JSON-RPC error of a missing or wrong token. */
 export const UNAUTHENTICATED = -32001;

@@ -35,6 +35,8 @@ export class Frame {
   private readonly people = h('span', { class: 'people', title: 'People who watch', hidden: true });
   private readonly banner = h('div', { class: 'banner', role: 'alert', hidden: true });
   private readonly welcome = h('div', { class: 'welcome', hidden: true });
+  /** There is a picture, which no message shall cover. */
+  sceneShown = false;
   private readonly panelButton: HTMLButtonElement;
   private readonly panel: HTMLElement;
   private readonly tools: Record<string, HTMLButtonElement>;
@@ -108,11 +110,17 @@ export class Frame {
     this.banner.replaceChildren(h('span', {}, text), ...(act ? [button(label, act)] : []));
   }
 
-  /** Shown where there is no scene. */
-  setWelcome(on: boolean): void {
-    this.welcome.hidden = !on;
-    if (!on || this.welcome.firstChild) return;
-    this.welcome.append(
+  /** Says what there is to do where there is no scene, and that one is coming. */
+  setWelcome(state: string): void {
+    this.welcome.hidden = state !== 'empty' && (state !== 'loading' || this.sceneShown);
+    if (this.welcome.hidden || this.welcome.dataset['state'] === state) return;
+    this.welcome.dataset['state'] = state;
+    if (state === 'loading')
+      return this.welcome.replaceChildren(
+        h('h2', {}, 'Loading the scene'),
+        h('p', {}, 'Its surfaces are laid out for light; a large one takes a while.'),
+      );
+    this.welcome.replaceChildren(
       h('h2', {}, 'No scene yet'),
       h('p', {}, 'Drop a .glb here, or send one:'),
       h('pre', { class: 'code' }, `curl -T room.glb ${location.origin}/scene`),

@@ -1,6 +1,6 @@
-// The scale of a false-colour picture: what colour means how many lux.
+// The scale of a false-colour picture: what colour means how many lux, or which mip.
 
-import { paletteCss } from '../view/palette';
+import { MIP_STOPS, paletteCss } from '../view/palette';
 import { h, readable } from './dom';
 
 export class Legend {
@@ -15,22 +15,30 @@ export class Legend {
     this.ticks,
   );
 
-  constructor() {
-    this.bar.style.background = paletteCss('to right');
-  }
-
   hide(): void {
     this.element.hidden = true;
   }
 
   show(title: string, unit: string, low: number, high: number): void {
-    this.element.hidden = false;
-    this.title.textContent = `${title}, ${unit}`;
     const count = 5;
     const labels = Array.from({ length: count }, (_, i) => readable(low * (high / low) ** (i / (count - 1)), 2));
-    const text = labels.join(' ');
+    this.fill(`${title}, ${unit}`, paletteCss('to right'), labels);
+  }
+
+  showMips(): void {
+    const labels = MIP_STOPS.map((_, mip) =>
+      mip === 0 ? '0, sharp' : mip < MIP_STOPS.length - 1 ? `${mip}` : `${mip} +`,
+    );
+    this.fill('Mip level of the light', paletteCss('to right', MIP_STOPS), labels);
+  }
+
+  private fill(title: string, background: string, labels: string[]): void {
+    this.element.hidden = false;
+    const text = [title, ...labels].join(' ');
     if (this.ticks.dataset['text'] === text) return;
     this.ticks.dataset['text'] = text;
+    this.title.textContent = title;
+    this.bar.style.background = background;
     this.ticks.replaceChildren(...labels.map((label) => h('span', {}, label)));
   }
 }

@@ -28,6 +28,13 @@ export class LightmapSet {
   /** The server has said that everything it has was sent. */
   complete = false;
   tilesTaken = 0;
+  /** Scene revision of the newest tile that was taken up; 0: none. */
+  revision = 0;
+  /**
+   * Uniform of all pages. The server's first version of a scene is black, as nothing has shone yet: until there is
+   * light, or it is known that there is none, surfaces show as those that nothing has come for.
+   */
+  private readonly lightKnown = { value: false };
   private queue: { tile: Tile; bytes: number }[] = [];
 
   constructor(
@@ -39,6 +46,8 @@ export class LightmapSet {
     this.baseMip = baseMipFor(note.pages);
     const nearest = quantity === 'patchId' || quantity === 'mipLevel';
     this.pages = note.pages.map((page) => new LightmapPage(renderer, page, this.baseMip, nearest));
+    for (const page of this.pages) page.uniforms.pageLightKnown = this.lightKnown;
+    if (quantity !== 'irradiance') this.lightKnown.value = true;
   }
 
   get bytes(): number {
@@ -51,7 +60,17 @@ export class LightmapSet {
 
   /** Light is known on all surfaces. */
   get covered(): boolean {
-    return this.complete || this.pages.every((page) => page.covered);
+    return this.lit && (this.complete || this.pages.every((page) => page.covered));
+  }
+
+  /** Some light has come, or the solve is over without any. */
+  get lit(): boolean {
+    return this.lightKnown.value;
+  }
+
+  /** The solve does not go on: what there is is the light. */
+  settle(): void {
+    this.lightKnown.value = true;
   }
 
   /** `bytes` of the frame are given back to the server when the tile was taken up. */
@@ -64,8 +83,13 @@ export class LightmapSet {
     const end = performance.now() + budgetMs;
     let taken = 0;
     while (taken < this.queue.length && (taken === 0 || performance.now() < end)) {
-      const { tile, bytes } = this.queue[taken++]!;
-      this.pages[tile.header.page]?.put(tile);
+      const { tile, bytes } = this.queue[taken]!;
+      const page = this.pages[tile.header.page];
+      if (page && !page.makeRoom(tile, end)) break; // goes on in the next frame
+      page?.put(tile);
+      ++taken;
+      this.lightKnown.value ||= tile.texels.some((texel) => (texel & 0x7ffffff) !== 0);
+      this.revision = Math.max(this.revision, tile.header.revision);
       if (Number.isFinite(tile.header.error)) this.error = Math.min(this.error, tile.header.error);
       this.used(bytes);
     }
@@ -81,7 +105,8 @@ export class LightmapSet {
     if (values.length === 0) return undefined;
     const at = (q: number) => values[Math.min(values.length - 1, Math.floor(q * values.length))]!;
     const high = at(0.995);
-    return [Math.max(at(0.005), high / 1e4), high];
+    // Errors and remainders are nothing in many places, and differ little where they are something.
+    return [Math.max(at(0.005), high / (this.quantity === 'irradiance' ? 1e4 : 1e3)), high];
   }
 
   restore(): void {

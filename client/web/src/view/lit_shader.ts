@@ -2,17 +2,19 @@
 // One program serves all views, tone curves and the exposure meter, so that switching never waits for a compiler.
 
 import { ShaderChunk } from 'three';
-import { paletteGlsl } from './palette';
+import { glslList, MIP_STOPS, paletteGlsl } from './palette';
 
 /** Pages: a tile's finest mip that has come is in `pageResident`, one texel for 64 x 64 of the page, 255 for none. */
 const PAGE_PARS = `
 uniform sampler2D pageResident;
 uniform vec2 pageSize;
 uniform float pageTiles;
+uniform bool pageLightKnown;  // false: nothing has shone yet, and what is there is black
 const float kNothing = 15.5;
 
 // The finest mip that all four texels of a bilinear lookup have.
 float residentMip(vec2 uv) {
+  if (!pageLightKnown) return 255.0;
   vec2 size = vec2(textureSize(pageResident, 0));
   vec2 texel = 0.75 / pageSize;
   vec2 tiles = pageSize / (pageTiles * size);
@@ -62,10 +64,9 @@ vec3 measured(float value) {
 }
 
 vec3 mipColour(float mip) {
-  const vec3 colours[6] = vec3[6](vec3(0.16, 0.55, 0.9), vec3(0.1, 0.68, 0.56), vec3(0.42, 0.74, 0.25),
-                                  vec3(0.93, 0.75, 0.2), vec3(0.93, 0.46, 0.16), vec3(0.8, 0.2, 0.3));
+  const vec3 colours[${MIP_STOPS.length}] = ${glslList(MIP_STOPS)};
   if (mip > kNothing) return vec3(0.25);
-  float at = clamp(mip, 0.0, 4.999);
+  float at = clamp(mip, 0.0, ${(MIP_STOPS.length - 1.001).toFixed(3)});
   return mix(colours[int(at)], colours[int(at) + 1], fract(at));
 }
 

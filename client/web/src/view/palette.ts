@@ -13,10 +13,25 @@ export const STOPS: readonly (readonly [number, number, number])[] = [
   [1.0, 0.9, 0.86],
 ];
 
+/** sRGB, of mip 0, 1, ...; between them where a lookup lies between two mips. */
+export const MIP_STOPS: readonly (readonly [number, number, number])[] = [
+  [0.16, 0.55, 0.9],
+  [0.1, 0.68, 0.56],
+  [0.42, 0.74, 0.25],
+  [0.93, 0.75, 0.2],
+  [0.93, 0.46, 0.16],
+  [0.8, 0.2, 0.3],
+];
+
+/** As a GLSL array of vec3. */
+export function glslList(stops: typeof STOPS): string {
+  const list = stops.map((stop) => `vec3(${stop.map((c) => c.toFixed(3)).join(', ')})`).join(', ');
+  return `vec3[${stops.length}](${list})`;
+}
+
 export function paletteGlsl(): string {
-  const list = STOPS.map((stop) => `vec3(${stop.map((c) => c.toFixed(3)).join(', ')})`).join(', ');
   return `
-const vec3 kStops[${STOPS.length}] = vec3[${STOPS.length}](${list});
+const vec3 kStops[${STOPS.length}] = ${glslList(STOPS)};
 vec3 paletteColour(float t) {
   float at = clamp(t, 0.0, 1.0) * ${(STOPS.length - 1).toFixed(1)};
   int low = int(min(floor(at), ${(STOPS.length - 2).toFixed(1)}));
@@ -24,7 +39,7 @@ vec3 paletteColour(float t) {
 }`;
 }
 
-export function paletteCss(direction: string): string {
-  const colours = STOPS.map((stop) => `rgb(${stop.map((c) => Math.round(255 * c)).join(' ')})`);
+export function paletteCss(direction: string, stops = STOPS): string {
+  const colours = stops.map((stop) => `rgb(${stop.map((c) => Math.round(255 * c)).join(' ')})`);
   return `linear-gradient(${direction}, ${colours.join(', ')})`;
 }

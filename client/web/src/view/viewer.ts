@@ -28,6 +28,9 @@ const MOST_COMPILING_MS = 2000;
 /** Length of the pyramid that stands for another viewer, of the scene's diagonal. */
 const PERSON_SIZE = 0.04;
 
+/** What leaves a surface is this much less than what arrives, at the dark end of the scale. */
+const DARKEST = 0.1;
+
 export interface ViewerEvents {
   used(bytes: number): void;
   /** After each picture. */
@@ -61,8 +64,12 @@ export class Viewer {
   private readonly anisotropy: number;
   private readonly world = new Scene();
   private wanted = true;
+  /** Something has changed that the scale of false colours, and the exposure, may depend on. */
+  private scaleDue = true;
+  private exposureDue = true;
   private lastFrame = 0;
   private lastMeasure = 0;
+  private lastScale = 0;
   private lost = false;
   private layoutKnown = true;
   private document: Gltf = { asset: { version: '2.0' } };
@@ -97,6 +104,8 @@ export class Viewer {
 
   invalidate(): void {
     this.wanted = true;
+    this.scaleDue = true;
+    this.exposureDue = true;
   }
 
   /** The set that tiles of irradiance belong to. */
@@ -144,6 +153,13 @@ export class Viewer {
     if (!this.renderer.extensions.has('KHR_parallel_shader_compile')) return;
     const timeUp = new Promise((resolve) => setTimeout(resolve, MOST_COMPILING_MS));
     await Promise.race([this.renderer.compileAsync(scene.root, this.rig.camera, this.world), timeUp]);
+  }
+
+  /** The solve does not go on: where nothing has shone there is no light. */
+  settleLight(): void {
+    if (this.set?.lit !== false) return;
+    this.set.settle();
+    this.invalidate();
   }
 
   /** Nothing to show any more (the server has no scene). */
@@ -226,11 +242,11 @@ export class Viewer {
     this.lastFrame = now;
     if (this.lost) return;
     const taken = (this.set?.takeUp(TILE_BUDGET_MS) ?? 0) + (this.dataSet?.takeUp(TILE_BUDGET_MS) ?? 0);
-    if (taken > 0) this.wanted = true;
+    if (taken > 0) this.invalidate();
     this.promote(now);
-    if (this.rig.update(seconds)) this.wanted = true;
+    if (this.rig.update(seconds)) this.invalidate();
     if (this.people?.step(seconds, this.rig.sceneSize * PERSON_SIZE)) this.wanted = true;
-    if (this.wanted) this.measure(now);
+    this.measure(now);
     if (this.exposure.step(seconds)) this.wanted = true;
     if (!this.wanted) return;
     this.wanted = false;
@@ -250,12 +266,21 @@ export class Viewer {
     }
   }
 
+  /** What changes during a pause is measured after it: the last tiles of a solve, too. */
   private measure(now: number): void {
+    if (this.scaleDue && now - this.lastScale >= MEASURE_EVERY_MS) {
+      this.lastScale = now;
+      this.scaleDue = false;
+      if (this.uniforms.all.falseColour.value) {
+        this.updateRange();
+        this.wanted = true;
+      }
+    }
     const pause = Math.max(MEASURE_EVERY_MS, MEASURE_SHARE * this.exposure.tookMs);
-    if (now - this.lastMeasure < pause || !this.shown?.set.covered) return;
+    if (!this.exposureDue || now - this.lastMeasure < pause || !this.shown?.set.covered) return;
     this.lastMeasure = now;
-    if (this.uniforms.all.falseColour.value) this.updateRange();
-    if (this.exposure.automatic && !this.mode?.flat) void this.measureNow().then(() => this.invalidate());
+    this.exposureDue = false;
+    if (this.exposure.automatic && !this.mode?.flat) void this.measureNow().then(() => (this.wanted = true));
   }
 
   /** Signs and handles are no part of the scene's light. */
@@ -285,7 +310,9 @@ export class Viewer {
   private updateRange(): void {
     const data = this.mode?.quantity === 'irradiance' ? this.shown?.set : this.dataSet;
     const range = this.autoRange ? data?.range() : undefined;
-    if (range) this.uniforms.all.falseRange.value.set(...range);
+    if (!range) return;
+    const [low, high] = range;
+    this.uniforms.all.falseRange.value.set(this.mode?.id === 'radiosity' ? DARKEST * low : low, high);
   }
 
   /** The first scene shows at once; a later one when its light has come, so that nothing goes dark in between. */

@@ -1,0 +1,137 @@
+// The methods without a socket: what a session is asked to do, and in which order.
+#include "server/net/calls.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <condition_variable>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "tests/service/fake_engine.h"
+
+namespace radiosity::testing {
+namespace {
+
+using net::SharedText;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+/// Keeps what it is told.
+class FakePeer : public net::Peer {
+ public:
+  void sendText(SharedText text) override {
+    if (on_text) on_text(*text);
+    const std::lock_guard lock(mutex_);
+    sent_.push_back(std::move(text));
+  }
+  void sendMissed(std::vector<SharedText> texts) override {
+    const std::lock_guard lock(mutex_);
+    sent_.insert(sent_.end(), texts.begin(), texts.end());
+  }
+  void sendProgress(SharedText /*text*/) override {}
+  void lightmapsChanged() override {}
+  void camerasChanged() override {}
+  Timer later(std::chrono::milliseconds /*delay*/, std::function<void()> task) override {
+    timers[++last_timer_] = std::move(task);
+    return last_timer_;
+  }
+  void forget(Timer timer) override { timers.erase(timer); }
+  void greeted() override {}
+  void tilesWanted() override {}
+  void subscribed() override {}
+  void closeAfterWrites(protocol::CloseCode /*code*/, std::string /*reason*/) override {}
+
+  [[nodiscard]] std::vector<std::string> sent() const {
+    const std::lock_guard lock(mutex_);
+    std::vector<std::string> texts;
+    for (const auto& text : sent_) texts.push_back(*text);
+    return texts;
+  }
+
+  std::function<void(const std::string&)> on_text;
+  std::map<Timer, std::function<void()>> timers;
+
+ private:
+  mutable std::mutex mutex_;
+  std::vector<SharedText> sent_;
+  Timer last_timer_ = 0;
+};
+
+class CallsTest : public ::testing::Test {
+ protected:
+  CallsTest() { hub->start(); }
+
+  void hello(const std::string& more = "") {
+    calls.handle(R"({"jsonrpc":"2.0","id":1,"method":"hello","params":{"client":"test")" + more + "}}");
+  }
+  void wait() { calls.handle(R"({"jsonrpc":"2.0","id":"w","method":"solve.wait","params":{"timeoutMs":86400000}})"); }
+  void edit() {
+    engine.patch({R"([{"op":"replace","path":"/asset/generator","value":"x"}])", {}, false, "other", {}, {}},
+                 [](const auto&) {});
+  }
+
+  FakeEngine engine;
+  std::shared_ptr<net::Hub> hub = std::make_shared<net::Hub>(net::ServerOptions{}, engine);
+  std::shared_ptr<FakePeer> peer = std::make_shared<FakePeer>();
+  net::TileLane tiles;
+  net::Calls calls{*hub, peer, tiles, true};
+};
+
+TEST_F(CallsTest, AWaitThatIsOverLeavesNoTimerBehind) {
+  hello();
+  engine.progress(0.01, engine::SolveState::kConverged);
+  wait();
+  EXPECT_THAT(peer->sent().back(), HasSubstr(R"("reached":true)"));
+  EXPECT_TRUE(peer->timers.empty()) << "answered at once";
+
+  engine.progress(0.5);
+  wait();
+  EXPECT_EQ(peer->timers.size(), 1U);
+  engine.progress(0.01);
+  EXPECT_THAT(peer->sent().back(), HasSubstr(R"("reached":true)"));
+  EXPECT_TRUE(peer->timers.empty()) << "answered later";
+
+  engine.progress(0.5);
+  wait();
+  const auto told = peer->sent().size();
+  ASSERT_EQ(peer->timers.size(), 1U);
+  std::exchange(peer->timers, {}).begin()->second();
+  ASSERT_EQ(peer->sent().size(), told + 1);
+  EXPECT_THAT(peer->sent().back(), HasSubstr(R"("reached":false)"));
+  EXPECT_TRUE(peer->timers.empty()) << "given up";
+}
+
+// The answer to hello is followed by another client's edit as closely as can be: from another thread, which is given
+// time to get through.
+TEST_F(CallsTest, AnEditThatComesBetweenTheAnswerToHelloAndTheFirstBroadcastReachesTheClientOnceAndInOrder) {
+  edit();
+  std::thread editor;
+  peer->on_text = [&](const std::string& text) {
+    if (text.find("creditBytes") == std::string::npos || editor.joinable()) return;
+    auto through = std::make_shared<std::pair<std::mutex, std::condition_variable>>();
+    std::unique_lock lock(through->first);
+    editor = std::thread([this, through] {
+      edit();
+      through->second.notify_all();
+    });
+    (void)through->second.wait_for(lock, std::chrono::milliseconds(300));
+  };
+  hello(R"(,"resume":{"epoch":")" + hub->epoch() + R"(","revision":0,"tileVersion":0})");
+  editor.join();
+  std::vector<std::string> patched;
+  for (const auto& text : peer->sent())
+    if (text.find("scene.patched") != std::string::npos) patched.push_back(text);
+  ASSERT_EQ(patched.size(), 2U);
+  EXPECT_THAT(patched[0], HasSubstr(R"("revision":1)"));
+  EXPECT_THAT(patched[1], HasSubstr(R"("revision":2)"));
+  EXPECT_THAT(peer->sent().front(), HasSubstr(R"("resumed":true)"));
+}
+
+}  // namespace
+}  // namespace radiosity::testing

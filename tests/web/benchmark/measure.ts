@@ -1,0 +1,175 @@
+// One opening of the viewer, and edits seen in it, in a real browser with a real server.
+
+import type { Page } from 'playwright-core';
+import { converged, Pages, SCENES, Server } from '../browser/harness';
+import { intervals } from './figures';
+import { installProbe, type Probe } from './probe';
+import { endTrace, startTrace, type MainThread } from './trace';
+
+export interface Opening {
+  /** Milliseconds from navigation to the frame that showed it. */
+  geometry: number;
+  light: number;
+  converged: number;
+  /** Tasks of the main thread from the first tile on that took 50 ms or more, as the page sees it. */
+  longTasks: number[];
+  /** All of its tasks, in processor time. */
+  thread: MainThread;
+  /** Between frames, from the first with geometry on; milliseconds. */
+  frames: number[];
+}
+
+export interface Edit {
+  /** Milliseconds from one to the next. */
+  ackToTile: number;
+  tileToFrame: number;
+  askToFrame: number;
+}
+
+const SIZE = [1280, 800] as const;
+
+async function openProbed(pages: Pages, url: string): Promise<Page> {
+  const page = await pages.open('about:blank', ...SIZE);
+  await page.addInitScript(installProbe);
+  await page.goto(url);
+  return page;
+}
+
+async function takeOpening(pages: Pages, url: string): Promise<Opening> {
+  const page = await pages.open('about:blank', ...SIZE);
+  await page.addInitScript(installProbe);
+  await startTrace(pages.started, page);
+  await page.goto(url);
+  await page.waitForFunction(() => window.probe?.converged !== undefined, undefined, { timeout: 120_000 });
+  await page.waitForTimeout(300); // a task that has just begun is told of when it is over
+  const thread = await endTrace(pages.started);
+  const marks = await page.evaluate(() => window.viewer!.marks);
+  const probe: Probe = await page.evaluate(() => window.probe!);
+  const after = (mark: number) => probe.frames.find((time) => time >= mark) ?? NaN;
+  const geometry = after(marks['geometry']!);
+  const firstTile = marks['firstTile']!;
+  const until = probe.converged!;
+  const isLate = ({ start, ms }: { start: number; ms: number }) => start + ms >= firstTile && start <= until;
+  return {
+    geometry,
+    light: after(marks['light']!),
+    converged: until,
+    longTasks: probe.longTasks.filter(isLate).map(({ ms }) => ms),
+    thread,
+    frames: intervals(probe.frames.filter((time) => time >= geometry && time <= until)),
+  };
+}
+
+/** A page that opens a scene that is solved already, each time in a browser profile of its own (no cache). */
+export async function openSolved(pages: Pages, scene: string, runs: number): Promise<Opening[]> {
+  const server = new Server(`${SCENES}/${scene}`);
+  await server.start();
+  const openings: Opening[] = [];
+  try {
+    await converged(await pages.open(server.url, ...SIZE));
+    await pages.closeAll();
+    for (let run = 0; run < runs; ++run) {
+      openings.push(await takeOpening(pages, server.url));
+      await pages.closeAll();
+    }
+  } finally {
+    await server.stop('SIGTERM');
+  }
+  return openings;
+}
+
+/** A page that is opened as soon as the server listens, while it still loads the scene. */
+export async function openLoading(pages: Pages, scene: string, runs: number): Promise<Opening[]> {
+  const openings: Opening[] = [];
+  for (let run = 0; run < runs; ++run) {
+    const server = new Server(`${SCENES}/${scene}`);
+    await server.start();
+    try {
+      openings.push(await takeOpening(pages, server.url));
+    } finally {
+      await pages.closeAll();
+      await server.stop('SIGTERM');
+    }
+  }
+  return openings;
+}
+
+/** Answers of a connection that the viewer knows nothing of. Times are milliseconds since 1970, as all pages have them. */
+async function recolour(editor: Page, rgb: number[]): Promise<{ revision: number; asked: number; answered: number }> {
+  return editor.evaluate(async (rgb) => {
+    const now = () => performance.timeOrigin + performance.now();
+    const socket = new WebSocket(`ws://${location.host}/ws`, 'radiosity.v1');
+    const answers = new Map<number, (result: { revision: number }) => void>();
+    socket.onmessage = ({ data }) => {
+      const { id, result } = JSON.parse(data as string) as { id?: number; result: { revision: number } };
+      if (id !== undefined) answers.get(id)?.(result);
+    };
+    await new Promise((resolve) => (socket.onopen = resolve));
+    const call = (id: number, method: string, params: object) =>
+      new Promise<{ revision: number }>((resolve) => {
+        answers.set(id, resolve);
+        socket.send(JSON.stringify({ jsonrpc: '2.0', id, method, params }));
+      });
+    await call(1, 'hello', { client: 'benchmark' });
+    const asked = now();
+    const patch = [{ op: 'replace', path: '/materials/@light/emissiveFactor', value: rgb }];
+    const { revision } = await call(2, 'scene.patch', { patch });
+    const answered = now();
+    socket.close();
+    return { revision, asked, answered };
+  }, rgb);
+}
+
+/** A lamp that somebody else recolours, seen in an open page; the solve comes to rest before the next. */
+export async function watchEdits(pages: Pages, scene: string, edits: number): Promise<Edit[]> {
+  const server = new Server(`${SCENES}/${scene}`);
+  await server.start();
+  try {
+    const page = await openProbed(pages, server.url);
+    await converged(page);
+    const editor = await pages.open(`${server.url}/status`, 100, 100);
+    const out: Edit[] = [];
+    for (let i = 0; i < edits; ++i) {
+      const { revision, asked, answered } = await recolour(editor, i % 2 ? [1, 0.7, 0.4] : [0.4, 0.7, 1]);
+      const seen = await page.waitForFunction((revision) => {
+        const { tiles, shown } = window.probe!;
+        const first = (times: Record<number, number>) =>
+          Math.min(...Object.keys(times).filter((key) => Number(key) >= revision).map((key) => times[Number(key)]!)); // prettier-ignore
+        const [tile, frame] = [first(tiles), first(shown)];
+        return Number.isFinite(frame) ? { tile, frame, origin: performance.timeOrigin } : undefined;
+      }, revision);
+      const { tile, frame, origin } = (await seen.jsonValue())!;
+      out.push({
+        ackToTile: origin + tile - answered,
+        tileToFrame: frame - tile,
+        askToFrame: origin + frame - asked,
+      });
+      await converged(page);
+    }
+    return out;
+  } finally {
+    await pages.closeAll();
+    await server.stop('SIGTERM');
+  }
+}
+
+/** Bytes of JavaScript that a visit fetches, as packed and unpacked. */
+export async function scriptSize(pages: Pages, scene: string): Promise<{ packed: number; unpacked: number }> {
+  const server = new Server(`${SCENES}/${scene}`);
+  await server.start();
+  try {
+    const page = await pages.open(server.url, ...SIZE);
+    await converged(page);
+    return await page.evaluate(() => {
+      const entries = performance.getEntriesByType('resource') as PerformanceResourceTiming[];
+      const scripts = entries.filter(({ name }) => name.endsWith('.js'));
+      return {
+        packed: scripts.reduce((sum, entry) => sum + entry.encodedBodySize, 0),
+        unpacked: scripts.reduce((sum, entry) => sum + entry.decodedBodySize, 0),
+      };
+    });
+  } finally {
+    await pages.closeAll();
+    await server.stop('SIGTERM');
+  }
+}

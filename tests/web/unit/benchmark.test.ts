@@ -1,0 +1,37 @@
+import { intervals, median, quantile, spread, table } from '../benchmark/figures';
+import { CONVERGED, FIRST_TILE, mainThread } from '../benchmark/trace';
+
+it('takes medians of even and odd counts, and quantiles', () => {
+  expect(median([3, 1, 2])).toBe(2);
+  expect(median([4, 1, 2, 3])).toBe(2.5);
+  expect(median([])).toBeNaN();
+  expect(quantile([5, 1, 4, 2, 3], 0.95)).toBe(5);
+  expect(spread([12.34, 1, 100])).toBe('12 (100)');
+  expect(intervals([1, 3, 10])).toEqual([2, 7]);
+  expect(table(['a', 'b'], [['x', '1']])).toBe('| a | b |\n| --- | ---: |\n| x | 1 |');
+});
+
+it('finds the tasks of the thread that set the marks', () => {
+  const mark = (name: string, ts: number) => ({ name, cat: 'blink.user_timing', ph: 'R', pid: 7, tid: 1, ts });
+  const task = (tid: number, ts: number, dur: number, tdur: number) => ({
+    name: 'ThreadControllerImpl::RunTask',
+    cat: 'toplevel',
+    ph: 'X',
+    pid: 7,
+    tid,
+    ts,
+    dur,
+    tdur,
+  });
+  const events = [
+    task(1, 0, 9000, 4000),
+    task(2, 0, 99000, 99000), // another thread's
+    task(1, 10_000, 5000, 3000), // the first tile comes in the middle of it
+    mark(FIRST_TILE, 12_000),
+    task(1, 20_000, 70_000, 2000),
+    mark(CONVERGED, 95_000),
+    task(1, 96_000, 5000, 5000),
+  ];
+  expect(mainThread(events)).toEqual({ before: [4], withTiles: [3, 2] });
+  expect(() => mainThread(events.slice(0, 3))).toThrow('no marks');
+});
