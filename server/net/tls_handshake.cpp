@@ -34,9 +34,7 @@ class TlsHandshake : public Connection, public std::enable_shared_from_this<TlsH
         slot_(std::move(slot)) {
     ++hub_->counters().tls_handshakes;
   }
-  ~TlsHandshake() override {
-    if (hub_) --hub_->counters().tls_handshakes;
-  }
+  ~TlsHandshake() override { leaveCount(); }
   TlsHandshake(const TlsHandshake&) = delete;
   TlsHandshake& operator=(const TlsHandshake&) = delete;
 
@@ -67,14 +65,21 @@ class TlsHandshake : public Connection, public std::enable_shared_from_this<TlsH
   void onHandshake(BoostError error, std::size_t used) {
     // What detection read is part of the first message: all of it belongs to the handshake.
     if (error || used != buffer_.size() || hub_->draining()) return failed();
-    --hub_->counters().tls_handshakes;
+    leaveCount();
     stream_.expires_never();
     serveHttp(std::move(stream_), std::move(hub_), std::move(slot_));
   }
 
+  /// The peer sees the end before the handler that holds this object is gone, and may come again at once: it must not
+  /// still be counted then.
   void failed() {
     ++hub_->counters().tls_handshakes_failed;
+    leaveCount();
     stream_.close();
+  }
+
+  void leaveCount() {
+    if (std::exchange(counted_, false)) --hub_->counters().tls_handshakes;
   }
 
   void refusePlain() {
@@ -102,6 +107,7 @@ class TlsHandshake : public Connection, public std::enable_shared_from_this<TlsH
   std::shared_ptr<Hub> hub_;  ///< null: handed over
   ConnectionSlot slot_;
   beast::flat_buffer buffer_{kMostRead};
+  bool counted_ = true;  ///< among the handshakes under way
 };
 
 }  // namespace

@@ -1,21 +1,14 @@
 // A text frame, as the server and as a client takes it: calls, notifications and answers of every kind.
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-
 #include "protocol/codec.h"
 #include "protocol/limits.h"
+#include "tests/fuzz/examples.h"
 #include "tests/fuzz/target.h"
 
 namespace radiosity::fuzz {
 
 std::vector<Seed> seeds() {
   std::vector<Seed> all{seedOf("[]"), seedOf(R"([{"jsonrpc":"2.0","id":1,"method":"viewers"},5])")};
-  for (const auto& entry : std::filesystem::directory_iterator(RADIOSITY_SOURCE_DIR "/protocol/examples")) {
-    if (entry.path().extension() != ".json") continue;
-    std::ifstream in(entry.path(), std::ios::binary);
-    all.emplace_back(std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>());
-  }
+  for (const auto& text : exampleTexts("")) all.push_back(seedOf(text));
   return all;
 }
 

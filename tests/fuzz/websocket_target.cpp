@@ -11,6 +11,7 @@
 
 #include "common/log.h"
 #include "server/net/server.h"
+#include "tests/fuzz/examples.h"
 #include "tests/fuzz/target.h"
 #include "tests/service/fake_engine.h"
 
@@ -92,7 +93,7 @@ bool talk(std::uint16_t port, const std::string& bytes) {
 
 std::vector<Seed> seeds() {
   const auto of = [](Start start, const std::string& bytes) { return seedOf(std::string(1, start) + bytes); };
-  return {
+  std::vector<Seed> all{
       of(kHttp, "GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n"),
       of(kHttp, "PUT /uploads?name=a.glb HTTP/1.1\r\nHost: localhost\r\nContent-Length: 4\r\n\r\nglTF"),
       of(kHttp, "GET /lightmaps/0.exr?quantity=error HTTP/1.1\r\nHost: localhost\r\n\r\n"),
@@ -104,6 +105,8 @@ std::vector<Seed> seeds() {
          textFrame(
              R"([{"jsonrpc":"2.0","id":3,"method":"status"},{"jsonrpc":"2.0","method":"credit","params":{"bytes":9}}])")),
       of(kViewer, std::string("\x89\x80\0\0\0\0\x88\x82\0\0\0\0\x03\xe8", 14))};
+  for (const auto& text : exampleTexts("call-")) all.push_back(of(kViewer, textFrame(text)));
+  return all;
 }
 
 }  // namespace radiosity::fuzz

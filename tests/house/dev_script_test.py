@@ -190,5 +190,58 @@ class DevLint(Checkout):
         self.assertEqual(self.lint(options=("--al",))[0].returncode, 2)
 
 
+class DevFuzz(Checkout):
+    """`./dev fuzz` where ninja has nothing to do and two targets tell how they were called."""
+
+    def setUp(self):
+        super().setUp()
+        self.stand_in("bin/ninja", 'echo "ninja: no work to do."')
+        (self.root / "build-fuzz").mkdir()
+        (self.root / "build-fuzz/build.ninja").touch()
+        for name in ("apple", "pear"):
+            self.stand_in(f"build-fuzz/tests/fuzz/{name}_replay", 'echo seed >"$2/seed-0"')
+            self.stand_in(f"build-fuzz/tests/fuzz/{name}_fuzz",
+                          f'echo "{name} $*" >>{self.root}/calls; echo "stat::number_of_executed_units: 7"; '
+                          f'echo "wrong in {name}"; [ "$FINDS" != {name} ]')
+
+    def fuzz(self, *options, finds=""):
+        """How it ended, and how the targets were called."""
+        (self.root / "calls").write_text("")
+        environment = dict(os.environ, PATH=f"{self.root}/bin:{os.environ['PATH']}", FINDS=finds)
+        done = subprocess.run([self.root / "dev", "fuzz", *options], capture_output=True, text=True, timeout=60,
+                              stdin=subprocess.DEVNULL, env=environment)
+        return done, sorted((self.root / "calls").read_text().splitlines())
+
+    def test_every_target_searches_from_its_own_seeds_for_so_long(self):
+        done, calls = self.fuzz("5")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual([call.split()[0] for call in calls], ["apple", "pear"])
+        for name, call in zip(("apple", "pear"), calls):
+            self.assertIn("-max_total_time=5 ", call)
+            self.assertTrue(call.endswith(f"{self.root}/out/fuzz/{name}"), call)
+            self.assertTrue((self.root / f"out/fuzz/{name}/seed-0").exists())
+            self.assertIn(f"{name}: 7 inputs, nothing found", done.stderr)
+
+    def test_what_one_finds_is_shown_and_fails_and_the_others_go_on(self):
+        for finds, other in (("apple", "pear"), ("pear", "apple")):
+            done, calls = self.fuzz(finds=finds)
+            self.assertEqual((done.returncode, len(calls)), (1, 2))
+            self.assertIn(f"wrong in {finds}", done.stderr)
+            self.assertIn(f"{finds}: found something", done.stderr)
+            self.assertIn(f"{other}: 7 inputs, nothing found", done.stderr)
+
+    def test_a_name_chooses_and_one_that_fits_none_is_refused(self):
+        self.assertEqual([call.split()[0] for call in self.fuzz("1", "pea")[1]], ["pear"])
+        self.assertEqual(self.fuzz("1", "plum")[0].returncode, 2)
+
+    def test_the_viewers_packages_are_not_fetched(self):
+        (self.root / "client/web").mkdir(parents=True)
+        (self.root / "client/web/package-lock.json").touch()
+        for name in ("npm", "node"):
+            self.stand_in(f"bin/{name}", f"touch {self.root}/fetched")
+        self.assertEqual(self.fuzz()[0].returncode, 0)
+        self.assertFalse((self.root / "fetched").exists())
+
+
 if __name__ == "__main__":
     unittest.main()

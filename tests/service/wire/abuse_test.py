@@ -1,6 +1,7 @@
 """Clients that take and give nothing, or too much, or vanish: each is cut off, and nobody else notices. No claims about
 seconds: what must come is waited for, and a hang is a failure."""
 import json
+import os
 import pathlib
 import re
 import resource
@@ -52,8 +53,13 @@ class Abuse(ServiceCase):
             if opcode == BINARY:
                 note = {"jsonrpc": "2.0", "method": "credit", "params": {"bytes": len(payload)}}
                 raw.send(frame(TEXT, json.dumps(note).encode()))
-            elif json.loads(payload).get("method") == "bookmark":
+            elif opcode == TEXT and json.loads(payload).get("method") == "bookmark":
                 seen += 1
+
+    def assertGrewLess(self, server, before, limit_bytes, about=None):
+        # A sanitizer keeps freed memory back, to see who still uses it.
+        if os.environ.get("RADIOSITY_SANITIZED") != "1":
+            self.assertLess(self.residentBytes(server) - before, limit_bytes, about)
 
     def residentBytes(self, server):
         status = pathlib.Path(f"/proc/{server.process.pid}/status").read_text()
@@ -110,7 +116,7 @@ class Abuse(ServiceCase):
                 sent += pinger.socket.send(pings)
         except (TimeoutError, ConnectionError):
             pass
-        self.assertLess(self.residentBytes(server) - before, 4 << 20, f"{sent} bytes of pings")
+        self.assertGrewLess(server, before, 4 << 20, f"{sent} bytes of pings")
 
     def test_headers_that_drip_do_not_keep_others_out(self):
         server = self.server("--max-clients", 12, env=PATIENCE)
@@ -180,7 +186,7 @@ class Abuse(ServiceCase):
         before = self.residentBytes(server)
         storm(240)
         # Tiles in the shared cache grow to their bound whoever asks; sessions would be megabytes each.
-        self.assertLess(self.residentBytes(server) - before, (64 << 20) + (16 << 20))
+        self.assertGrewLess(server, before, (64 << 20) + (16 << 20))
         self.versionsSeen(self.viewer(server), 2)
 
     def test_a_flood_of_calls_is_answered_or_refused_and_ends(self):

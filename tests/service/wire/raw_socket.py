@@ -82,10 +82,11 @@ class RawSocket:
         return self.answer(method)["result"]
 
     def answer(self, request):
-        """The response to the request of that id; others and everything else are dropped."""
+        """The response to the request of that id; others and everything else are dropped, pings too: the server may send
+        one at any time, and will on a machine that is busy."""
         while True:
             _, opcode, payload = self.frame()
-            assert opcode in (TEXT, BINARY), (opcode, payload)
+            assert opcode in (TEXT, BINARY, PING), (opcode, payload)
             if opcode == TEXT and "method" not in (message := json.loads(payload)) and message["id"] == request:
                 return message
 
@@ -114,10 +115,10 @@ class RawSocket:
         return bool(first & 0x80), first & 15, self._take(size)
 
     def reply(self):
-        """The next frame that is no notification and no tile."""
+        """The next frame that is no notification, no tile and no ping."""
         while True:
             got = self.frame()
-            if got[1] == BINARY or (got[1] == TEXT and b'"method"' in got[2]):
+            if got[1] in (BINARY, PING) or (got[1] == TEXT and b'"method"' in got[2]):
                 continue
             return got
 
