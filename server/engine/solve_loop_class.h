@@ -144,6 +144,7 @@ class SolveLoop final : public Engine {
   [[nodiscard]] bool goesOnWith(const scene::Document& document, bool with_edits) const;
   [[nodiscard]] Result<void> keepLoad(const History::Next& next, const scene::Document& document);
   /// How an edit is brought to the disk: `after` is the document that it leads to.
+  void correctAnswer(PatchOutcome& outcome);
   [[nodiscard]] Keep keepEdit(const History::Next& next, const Receipt& receipt, const scene::Document& after);
   [[nodiscard]] Result<void> keepSettings(const SolveSettings& settings);
   void checkpointIfDue();
@@ -186,6 +187,7 @@ class SolveLoop final : public Engine {
   std::uint64_t checkpoint_revision_ = 0, checkpoint_shots_ = 0;  // of the last that was taken
   bool checkpoint_too_large_ = false;                             // the last one was
   std::string loaded_digest_;                                     // of the scene that outlived the last process
+  std::optional<state::Answer> kept_answer_;                      // of the edit under way
   bool as_restored_ = false;                                      // the scene is that one; no edit, no load since
   std::uint64_t resumed_shots_ = 0;
   Past past_;  // constant once start() has returned

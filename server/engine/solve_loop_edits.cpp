@@ -203,6 +203,7 @@ Result<PatchOutcome> SolveLoop::rebuild(scene::EditedDocument edited, const Keep
   const auto affected = relight(std::move(made), Relation::kEdited, keep_made);
   if (!affected) return tl::unexpected<Error>(affected.error());
   set(*affected);
+  correctAnswer(outcome);
   return outcome;
 }
 

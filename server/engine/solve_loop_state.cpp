@@ -45,6 +45,7 @@ Result<void> SolveLoop::keepLoad(const History::Next& next, const scene::Documen
 }
 
 SolveLoop::Keep SolveLoop::keepEdit(const History::Next& next, const Receipt& receipt, const scene::Document& after) {
+  kept_answer_.reset();
   if (!options_.store) return [](const PatchOutcome&) -> Result<void> { return {}; };
   state::Store::Change change{plainRevision(next), next.edit, next.forgotten, next.done, {}, {}};
   if (options_.store->wantsDocument()) change.document = plainDocument(after);
@@ -55,12 +56,28 @@ SolveLoop::Keep SolveLoop::keepEdit(const History::Next& next, const Receipt& re
                                     outcome.affected_surfaces, outcome.affected_shots, stepped};
     const auto kept = options_.store->edit(change);
     if (!kept) return refused(kept.error());
+    kept_answer_ = change.answer;
     as_restored_ = false;
     // Not in the middle of a drag where checkpoints are work.
     if (checkpoints_ && checkpoints_->counters().seconds < kSmallCheckpointSeconds)
       next_checkpoint_ = std::min(next_checkpoint_, Clock::now() + kAfterEdit);
     return {};
   };
+}
+
+/// Who asks again after a restart hears what was said before.
+void SolveLoop::correctAnswer(PatchOutcome& outcome) {
+  if (!kept_answer_) return;
+  auto answer = *std::exchange(kept_answer_, std::nullopt);
+  if (answer.surfaces == outcome.affected_surfaces && answer.shots == outcome.affected_shots) return;
+  const auto kept = answer;
+  answer.surfaces = outcome.affected_surfaces;
+  answer.shots = outcome.affected_shots;
+  const auto corrected = options_.store->correct(answer);
+  if (corrected) return;
+  log::warn("an edit's answer stays as it was first kept: {}", corrected.error().text());
+  outcome.affected_surfaces = kept.surfaces;
+  outcome.affected_shots = kept.shots;
 }
 
 Result<void> SolveLoop::keepSettings(const SolveSettings& settings) {

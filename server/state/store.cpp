@@ -196,6 +196,11 @@ Result<void> Store::edit(const Change& change) {
   return {};
 }
 
+Result<void> Store::correct(const Answer& answer) {
+  const std::scoped_lock lock(mutex_);
+  return database_.atomically([&] { return putAnswer(answer); });
+}
+
 Result<void> Store::setSettings(const std::map<std::string, std::string>& settings) {
   const std::scoped_lock lock(mutex_);
   return database_.atomically([&]() -> Result<void> {

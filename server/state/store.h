@@ -104,6 +104,8 @@ class Store {
   };
   /// One edit, undo or redo.
   [[nodiscard]] Result<void> edit(const Change& change);
+  /// What is said of the last edit, known better once it was made.
+  [[nodiscard]] Result<void> correct(const Answer& answer);
   /// Enough revisions have come since the document was last written whole.
   [[nodiscard]] bool wantsDocument() const { return since_document_ >= kRevisionsKept || patch_bytes_ >= kPatchBytes; }
 

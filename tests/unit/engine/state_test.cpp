@@ -6,6 +6,7 @@
 #include "tests/scenes/glb_writer.h"
 #include "tests/scenes/scenes.h"
 #include "tests/unit/client/temporary_folder.h"
+#include "tests/unit/engine/block_room.h"
 #include "tests/unit/engine/engine_driver.h"
 #include "tests/unit/state/file_limit.h"
 
@@ -89,6 +90,19 @@ TEST_F(Kept, TheSceneIsBackAtItsLastRevisionWithItsPast) {
   EXPECT_EQ(redo()->stepped, 3U);
   EXPECT_EQ(undo()->revision, 6U);
   EXPECT_EQ(undo()->stepped, 2U);
+}
+
+// How many shots an edit of geometry touches is known only after it was kept.
+TEST_F(Kept, AnEditIsAnsweredAfterTheRestartAsItWasBefore) {
+  solve(blockRoom());
+  const auto moved = patch(
+      {R"([{"op":"replace","path":"/nodes/2/translation","value":[0.7,0,0.6]}])", {}, false, "test", {}, {"move", 7}});
+  ASSERT_TRUE(moved) << moved.error().text();
+  restart();
+  const auto& answers = engine().past().answers;
+  ASSERT_EQ(answers.size(), 1U);
+  EXPECT_EQ(answers[0].outcome.affected_shots, moved->affected_shots);
+  EXPECT_EQ(answers[0].outcome.affected_surfaces, moved->affected_surfaces);
 }
 
 TEST_F(Kept, ManyRestartsAndManyEditsLoseNothing) {
