@@ -91,7 +91,6 @@ Result<void> SolveLoop::keepSettings(const SolveSettings& settings) {
 
 void SolveLoop::checkpointIfDue() {
   if (!checkpoints_ || !lit_ || Clock::now() < next_checkpoint_) return;
-  if (renderer_lost_ || state_ == SolveState::kFailed) return;
   if (checkpoint_revision_ == revision_ && checkpoint_shots_ == lit_->solver().shots()) return;
   // At its end the solve sleeps: that checkpoint takes the place of one that still waits.
   if (state_ == SolveState::kSolving && checkpoints_->isBusy()) return;

@@ -60,7 +60,8 @@ FormFactor formFactorInFront(const glm::dvec3& point, const glm::dvec3& normal, 
     if (sine == 0.0) continue;  // the edge points at the receiver: no angle, or the receiver lies on it
     sum += std::atan2(sine, glm::dot(a, b)) * (glm::dot(normal_of_edge, normal) / sine);
   }
-  const double all = polygonArea(corners);
+  const auto above = [&](const glm::vec3& corner) { return glm::dot(glm::dvec3(corner) - point, normal) >= 0.0; };
+  const double all = std::all_of(corners.begin(), corners.end(), above) ? 0.0 : polygonArea(corners);
   const double front = all > 0.0 ? std::min(1.0, areaOf(polygon.corner, polygon.count) / all) : 1.0;
   return {std::abs(sum) / (2.0 * std::numbers::pi), front};
 }

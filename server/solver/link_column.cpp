@@ -6,7 +6,7 @@
 namespace radiosity::solver {
 namespace {
 
-/// Of what a shooter sends.
+/// Of a shooter that keeps less than this part of what it sends, the form factors say what arrives.
 constexpr double kMostlyLost = 0.5;
 
 /// Up to so many samples the average is rounded to nearest.
@@ -236,10 +236,11 @@ void LinkColumn::add(const LinkExpander& sample, const LinkSample& totals, doubl
     }
   }
   // Of which nothing is known, that should arrive which does.
-  const double due = totals.due > 0.0 ? totals.due : sample.flux();
+  const double delivered = totals.delivered > 0.0 ? totals.delivered : sample.flux();
+  const double due = totals.due > 0.0 ? totals.due : delivered;
   const auto average = [&](double& old, double fresh) { old = (old * points_ + factor * fresh * points) / sum; };
   average(due_, due);
-  average(delivered_, sample.flux());
+  average(delivered_, delivered);
   average(escaped_, totals.escaped);
   average(absorbed_, totals.absorbed);
   points_ = sum;

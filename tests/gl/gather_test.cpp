@@ -103,8 +103,8 @@ TEST_F(Gather, UnoccludedIrradianceIsLambertsFormula) {
   }
 }
 
-// Half of the lamp lies behind the wall's plane. Single points on it, which lie in front or behind by chance, must give
-// the form factor of the half in front in the mean.
+// Two fifths of the lamp lie behind the wall's plane. Single points on it, which lie in front or behind by chance, must
+// give the form factor of the part in front in the mean.
 TEST_F(Gather, OfALampThatAWallsPlaneCutsThePartInFrontIsReceived) {
   SceneBuilder builder;
   const auto wall = builder.add({{0.0F, -0.3F, -0.5F}, {0, 0, 0.6F}, {0, 0.6F, 0}, 6, 6});  // faces -x
