@@ -17,7 +17,13 @@ export default defineConfig({
       {
         resolve,
         server,
-        test: { name: 'unit', root: here('../../tests/web'), include: ['unit/**/*.test.ts'], globals: true },
+        test: {
+          name: 'unit',
+          root: here('../../tests/web'),
+          include: ['unit/**/*.test.ts'],
+          globals: true,
+          testTimeout: 60_000,
+        },
       },
       {
         resolve,
@@ -29,8 +35,8 @@ export default defineConfig({
           globals: true,
           pool: 'forks',
           poolOptions: { forks: { singleFork: true } }, // one browser and one server at a time: they share two cores
-          testTimeout: 120_000,
-          hookTimeout: 120_000,
+          testTimeout: 300_000, // more than the harness waits for anything
+          hookTimeout: 300_000,
         },
       },
     ],

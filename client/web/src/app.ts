@@ -7,6 +7,7 @@ import { ViewSession } from './app_view';
 import type { Gltf } from './document/gltf';
 import { Connection, type LinkState } from './protocol/connection';
 import type {
+  Bookmark,
   HelloReply,
   LightmapsNote,
   Notifications,
@@ -25,6 +26,7 @@ import { Frame } from './ui/frame';
 import { percent, readable } from './ui/dom';
 import { SharePanel } from './ui/share_panel';
 import { SolvePanel, stateName } from './ui/solve_panel';
+import { store, stored } from './ui/stored';
 import { Share } from './app_share';
 import type { LightmapSet } from './view/lightmap_set';
 import { MOST_MIPS } from './view/lightmap_page';
@@ -43,7 +45,10 @@ export class App {
   readonly share: Share;
   readonly people: PeopleSession;
   readonly solve: SolvePanel;
+  /** What the server has told of its solve over this connection. */
   progress: Progress | undefined;
+  /** Up to where all light has come over this connection, and was decoded. */
+  bookmark: Bookmark | undefined;
   /** For tests and for the console: what happened when, milliseconds since the page began. */
   readonly marks: Record<string, number> = {};
   private readonly tiles: TileFeed;
@@ -73,6 +78,7 @@ export class App {
         tile: (frame) => {
           if (!('firstTile' in this.marks)) this.mark('firstTile');
           this.tiles.push(frame);
+          this.adaptToNetwork(); // the last tiles come when the solve has nothing to tell any more
         },
       },
     );
@@ -81,6 +87,7 @@ export class App {
       pauseOrResume: () => this.pauseOrResume(),
       restart: () => void this.ask('solve.restart'),
       configure: (settings) => void this.configure(settings),
+      notUnderstood: (text) => this.notUnderstood(text),
     });
     this.view = new ViewSession(this);
     this.edit = new EditSession(this, me, (patch, id) => this.sendPatch(patch, id));
@@ -119,6 +126,7 @@ export class App {
         this.view.onSceneShown(scene);
         this.edit.onSceneShown();
         this.frame.sceneShown = true;
+        if (this.progress) this.showState(this.progress); // no message covers the picture
       },
       gizmoDragging: (active) => this.edit.onGizmoDragging(active),
       gizmoChanged: (object, mode) => this.edit.onGizmoChanged(object, mode),
@@ -144,6 +152,11 @@ export class App {
 
   mark(name: string): void {
     this.marks[name] ??= performance.now();
+  }
+
+  /** Of a field in which something else was expected. */
+  notUnderstood(text: string): void {
+    this.frame.toasts.show(`“${text}” cannot stand there`, 'bad');
   }
 
   /** A call whose refusal is shown. */
@@ -185,7 +198,9 @@ export class App {
   }
 
   private onLink(state: LinkState, detail: string): void {
+    this.bookmark = undefined;
     if (state === 'open') {
+      this.progress = undefined; // that of a server which has started again is not that of its scene
       this.frame.setBanner(undefined);
       if (this.everOpen) this.frame.toasts.show('Connected again', 'good');
       this.everOpen = true;
@@ -202,7 +217,7 @@ export class App {
 
   private giveToken(token: string): void {
     this.token = token;
-    sessionStorage.setItem('token', token);
+    store('token', token, 'session');
     this.connection.open();
   }
 
@@ -237,7 +252,7 @@ export class App {
       'scene.patched': (note) => this.edit.onPatched(note, () => void this.fetchDocument()),
       'scene.loaded': () => void this.onLoaded(),
       lightmaps: (note) => void this.onLightmaps(note),
-      bookmark: (note) => this.onBookmark(note.revision, note.tileVersion),
+      bookmark: (note) => this.onBookmark(note),
       viewers: (note) => this.onViewers(note.count),
       cameras: (note) => this.people.onCameras(note.cameras),
       draining: () => this.frame.toasts.show('The server is stopping'),
@@ -249,19 +264,33 @@ export class App {
   private onProgress(progress: Progress): void {
     this.progress = progress;
     this.solve.update(progress);
+    if (progress.state === 'empty') this.forgetScene();
+    this.showState(progress);
+    this.settleLight();
+  }
+
+  private showState(progress: Progress): void {
     const done = ['converged', 'timeLimit', 'limited'].includes(progress.state);
     const bad = progress.state === 'failed';
-    const error = progress.state === 'empty' ? '' : `${percent(progress.error.total)} error`;
+    const stated = progress.state !== 'empty' && progress.state !== 'loading';
+    const error = stated ? `${percent(progress.error.total)} error` : '';
     const rate = progress.state === 'solving' ? `${readable(progress.shotsPerSecond, 2)} shots/s` : '';
     this.frame.setState(
-      stateName(progress.state),
+      progress.state === 'loading' && this.viewer.shown ? 'First light' : stateName(progress.state),
       bad ? 'bad' : done ? 'good' : progress.state === 'solving' ? 'busy' : 'idle',
       error,
       rate,
     );
-    this.settleLight();
     this.frame.setWelcome(progress.state);
-    this.adaptToNetwork();
+  }
+
+  /** The server has none: it was started again without, or could not have the one whose first light it showed. */
+  private forgetScene(): void {
+    if (!this.viewer.set) return;
+    this.resume = undefined;
+    this.viewer.clear();
+    this.edit.document.reset({ asset: { version: '2.0' } }, this.progress!.revision);
+    this.frame.sceneShown = false;
   }
 
   /** Black is no light yet as long as the solve goes on. */
@@ -284,6 +313,7 @@ export class App {
   private async onLoaded(): Promise<void> {
     this.resume = undefined;
     this.edit.select(undefined); // numbers of nodes mean others now
+    this.view.sceneComes();
     await Promise.all([this.fetchStatus(), this.fetchDocument()]);
   }
 
@@ -321,12 +351,16 @@ export class App {
     }
   }
 
-  private onBookmark(revision: number, tileVersion: number): void {
+  private onBookmark(bookmark: Bookmark): void {
+    const { info } = this.connection;
     // Tiles on their way through the decoder belong to this bookmark, too.
     this.tiles.afterAll(() => {
-      const set = this.viewer.dataSet ?? this.viewer.set;
-      if (set) set.complete = true;
-      if (set?.quantity === 'irradiance') this.resume = { epoch: this.epoch, revision, tileVersion };
+      const set = this.viewer.setOf(bookmark.quantity); // another is looked at by now: nothing was said of that one
+      if (!set || info !== this.connection.info) return;
+      set.complete = true;
+      this.bookmark = bookmark;
+      const { quantity, revision, tileVersion } = bookmark;
+      if (quantity === 'irradiance') this.resume = { epoch: this.epoch, revision, tileVersion };
     });
   }
 
@@ -350,6 +384,7 @@ export class App {
   private async configure(settings: Partial<Settings>): Promise<void> {
     const all = await this.ask<Settings>('solve.configure', settings);
     if (all) this.solve.setSettings(all);
+    else this.solve.showSettings();
   }
 
   /** A lost answer is asked for again with the same id, which the server does once. */
@@ -372,9 +407,9 @@ function readToken(): string | undefined {
   const hash = new URLSearchParams(location.hash.slice(1));
   const token = hash.get('token');
   if (token) {
-    sessionStorage.setItem('token', token);
+    store('token', token, 'session');
     hash.delete('token');
     history.replaceState(null, '', `#${hash}`);
   }
-  return token ?? sessionStorage.getItem('token') ?? undefined;
+  return token ?? stored('token', 'session');
 }

@@ -40,6 +40,7 @@ export class EditSession {
       frameSelection: () => app.view.frameSelection(),
       endGesture: () => this.document.endGesture(),
       loadFile: (file) => void this.loadFile(file),
+      notUnderstood: (text) => app.notUnderstood(text),
     });
   }
 
@@ -182,8 +183,8 @@ export class EditSession {
     const limit = this.app.connection.info?.limits['uploadBytes'] ?? Infinity;
     if (file.size > limit) return toasts.show(`${file.name} is larger than the server takes`, 'bad');
     toasts.show(`Loading ${file.name}…`);
+    const placed = this.app.view.forgetCamera();
     try {
-      this.app.view.forgetCamera();
       const path = `/scene?name=${encodeURIComponent(file.name)}`;
       const response = await this.app.fetch(path, {
         method: 'PUT',
@@ -197,6 +198,7 @@ export class EditSession {
         'good',
       );
     } catch (error) {
+      if (this.app.viewer.shown) this.app.view.keepCamera(placed);
       toasts.show(`${file.name}: ${(error as Error).message}`, 'bad');
     }
   }

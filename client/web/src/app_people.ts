@@ -4,6 +4,7 @@ import type { Vector3 } from 'three';
 import type { App } from './app';
 import type { SharedCamera } from './protocol/messages';
 import { RpcError } from './protocol/rpc';
+import { store, stored } from './ui/stored';
 import { People } from './view/people';
 
 /** Between two places told to the server. */
@@ -13,7 +14,7 @@ const STORED = 'share-camera';
 export class PeopleSession {
   readonly people: People;
   /** The user's choice; kept for the next visit. */
-  sharing = localStorage.getItem(STORED) !== 'off';
+  sharing = stored(STORED) !== 'off';
   private me: number | undefined;
   private cameras: readonly SharedCamera[] = [];
   private others = 0;
@@ -28,7 +29,7 @@ export class PeopleSession {
 
   setSharing(on: boolean): void {
     this.sharing = on;
-    localStorage.setItem(STORED, on ? 'on' : 'off');
+    store(STORED, on ? 'on' : 'off');
     if (on) return this.tellSoon();
     this.forget();
     if (this.app.connection.has('cameras')) this.app.connection.call('camera').catch(() => undefined);

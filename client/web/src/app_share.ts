@@ -12,10 +12,10 @@ export function formatPatch(patch: Patch): string {
   return `[\n${patch.map((operation) => `  ${JSON.stringify(operation)}`).join(',\n')}\n]`;
 }
 
-/** What makes the same edit from a shell. */
-export function editCommand(patch: Patch, host: string): string {
+/** What makes the same edit from a shell. `token`: the server wants one, which stays out of what is copied. */
+export function editCommand(patch: Patch, server: string, token = false): string {
   const json = JSON.stringify(patch).replaceAll("'", `'\\''`);
-  return `echo '${json}' | radiosity edit ${host} -`;
+  return `echo '${json}' | radiosity edit ${server} -${token ? ' --token-file token' : ''}`;
 }
 
 export class Share {
@@ -47,7 +47,9 @@ export class Share {
 
   async copyEdit(form: 'command' | 'json'): Promise<void> {
     if (!this.lastEdit) return;
-    const text = form === 'json' ? formatPatch(this.lastEdit) : editCommand(this.lastEdit, location.host);
+    const server = location.protocol === 'https:' ? location.origin : location.host;
+    const command = editCommand(this.lastEdit, server, this.app.connection.info?.authRequired);
+    const text = form === 'json' ? formatPatch(this.lastEdit) : command;
     await this.copy(text, form === 'json' ? 'JSON copied' : 'Command copied');
   }
 

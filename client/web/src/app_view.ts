@@ -23,6 +23,8 @@ export class ViewSession {
   private camera = -1;
   private placed = false;
   private sharpMarked = false;
+  private bounds: Box3 | undefined;
+  private sceneIsNew = false;
 
   constructor(private readonly app: App) {
     this.panel = new ViewPanel({
@@ -34,6 +36,7 @@ export class ViewSession {
       setToneCurve: (id) => this.setToneCurve(id),
       setBackground: (id) => (document.documentElement.dataset['background'] = id),
       useCamera: (index) => this.useCamera(index),
+      notUnderstood: (text) => app.notUnderstood(text),
     });
   }
 
@@ -68,17 +71,34 @@ export class ViewSession {
 
   onSceneShown(scene: LitScene): void {
     this.panel.setCameras(scene.cameras.map((camera) => camera.name));
+    const elsewhere = this.bounds !== undefined && !alike(this.bounds, scene.bounds);
+    this.bounds = scene.bounds;
+    if (this.sceneIsNew && elsewhere) this.forgetCamera();
+    this.sceneIsNew = false;
     if (this.placed) return;
     this.placed = true;
     if (scene.cameras.length > 0) this.useCamera(0);
     else this.app.viewer.rig.overview(scene.bounds);
   }
 
-  /** Another scene wants another place to look from. */
-  forgetCamera(): void {
+  /** Somebody has loaded one; its geometry follows. The same scene, laid out anew, is looked at from where one was. */
+  sceneComes(): void {
+    this.sceneIsNew = true;
+  }
+
+  /** Another scene wants another place to look from. Returns what keepCamera() takes it back with. */
+  forgetCamera(): { placed: boolean; camera: number } {
+    const before = { placed: this.placed, camera: this.camera };
     this.placed = false;
     this.camera = -1;
     this.app.viewer.exposure.fresh = true;
+    return before;
+  }
+
+  /** The other scene did not come. */
+  keepCamera(before: { placed: boolean; camera: number }): void {
+    this.placed = before.placed;
+    this.camera = before.camera;
   }
 
   onDrawn(): void {
@@ -190,7 +210,7 @@ export class ViewSession {
     const clamped = Math.min(8, Math.max(-8, stops));
     this.app.viewer.exposure.stops = clamped;
     this.panel.setStops(clamped);
-    this.app.viewer.invalidate();
+    this.app.viewer.moved();
   }
 
   private setToneCurve(id: string): void {
@@ -226,7 +246,8 @@ export class ViewSession {
       this.pointer = { x: event.clientX, y: event.clientY };
       if (this.metering) this.readMeterSoon();
     });
-    canvas.addEventListener('pointerleave', () => {
+    canvas.addEventListener('pointerleave', ({ pointerType }) => {
+      if (pointerType === 'touch') return; // a finger that is lifted has left: what it pointed at is still meant
       this.pointer = undefined;
       this.app.frame.meter.hide();
     });
@@ -283,6 +304,7 @@ export class ViewSession {
     if (command && key.toLowerCase() === 'z') return done(event.shiftKey ? app.edit.redo() : app.edit.undo());
     if (command && key.toLowerCase() === 'y') return done(app.edit.redo());
     if (command || event.altKey) return false;
+    if (key === 'Delete' || key === 'Backspace') return isAmongObjects(event.target) && done(app.edit.removeSelected());
     if (/^\d$/.test(key)) return done(this.setMode(VIEW_MODES[(Number(key) + 9) % 10]?.id ?? 'lit'));
     const actions: Record<string, () => unknown> = {
       v: () => this.toggleWalk(),
@@ -299,8 +321,6 @@ export class ViewSession {
       r: () => app.edit.setGizmo('rotate'),
       y: () => app.edit.setGizmo('scale'),
       l: () => app.edit.addLamp(),
-      Delete: () => app.edit.removeSelected(),
-      Backspace: () => app.edit.removeSelected(),
       ' ': () => app.togglePause(),
       p: () => app.frame.togglePanel(),
       h: () => app.frame.toggleChrome(),
@@ -312,8 +332,19 @@ export class ViewSession {
   }
 }
 
+/** Two boxes that one looks at from the same place. */
+function alike(a: Box3, b: Box3): boolean {
+  const size = a.getSize(new Vector3()).length();
+  return a.min.distanceTo(b.min) + a.max.distanceTo(b.max) < 0.25 * size;
+}
+
 function done(_result: unknown): true {
   return true;
+}
+
+/** Keys that take something away do so in the picture and in the list of objects: elsewhere they were meant for a control. */
+function isAmongObjects(target: EventTarget | null): boolean {
+  return target === document.body || (target instanceof Element && target.closest('canvas.view, .tree') !== null);
 }
 
 function position(point: Vector3): string {

@@ -3,25 +3,9 @@ import { mkdtempSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import type {} from '../../../client/web/src/main';
-import { converged, difference, Pages, pixels, SCENES, Server, until } from './harness';
+import { converged, difference, pixels, said, SCENES, serveEach } from './harness';
 
-const pages = new Pages();
-const servers: Server[] = [];
-
-async function serve(scene?: string, ...options: string[]): Promise<Server> {
-  const server = new Server(scene, options);
-  await server.start();
-  servers.push(server);
-  return server;
-}
-
-beforeAll(() => pages.launch());
-afterEach(async () => {
-  await pages.closeAll();
-  for (const server of servers.splice(0)) await server.stop();
-  expect(pages.complaints.splice(0)).toEqual([]);
-});
-afterAll(() => pages.quit());
+const { pages, serve } = serveEach();
 
 it('outlives a server that is killed and started again', async () => {
   const server = await serve(`${SCENES}/cornell.glb`);
@@ -33,7 +17,7 @@ it('outlives a server that is killed and started again', async () => {
   // The picture stays, and can be turned about.
   expect(difference(before, await pixels(page, 60)).p99).toBeLessThanOrEqual(1);
   await server.start();
-  await page.getByText('Connected again').waitFor();
+  await said(page, /^Connected again$/);
   await converged(page);
   expect(await page.locator('.banner').isVisible()).toBe(false);
   expect(difference(before, await pixels(page, 60)).mean).toBeLessThan(2);
@@ -50,7 +34,7 @@ it('waits for a scene, and loads one that is dropped', async () => {
     transfer.items.add(new File([data], 'box.glb'));
     window.dispatchEvent(new DragEvent('drop', { dataTransfer: transfer, cancelable: true }));
   }, bytes);
-  await page.getByText(/box\.glb loaded/).waitFor();
+  await said(page, /box\.glb loaded/);
   await converged(page);
   expect(await page.locator('.welcome').isVisible()).toBe(false);
   expect(Math.max(...(await pixels(page, 16)))).toBeGreaterThan(60);
@@ -61,14 +45,8 @@ it('says what is wrong with a file that is no scene', async () => {
   const page = await pages.open(server.url, 900, 600);
   await converged(page);
   await page.evaluate(() => void window.viewer!.edit.loadFile(new File(['not a scene'], 'notes.glb')));
-  await page
-    .getByText(/^notes\.glb: /)
-    .first()
-    .waitFor();
-  await until(
-    () => page.evaluate(() => window.viewer!.viewer.shown !== undefined),
-    (shown) => shown,
-  );
+  await said(page, /^notes\.glb: /);
+  await converged(page); // the scene that was there is there
   // The refusal is an answer of 400, which the browser's console tells of; nothing else may.
   expect(pages.complaints.splice(0).filter((text) => !text.includes('status of 400'))).toEqual([]);
 });

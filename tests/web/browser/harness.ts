@@ -2,6 +2,7 @@
 
 import { spawn, type ChildProcess } from 'node:child_process';
 import { accessSync, constants } from 'node:fs';
+import { connect, createServer, type AddressInfo, type Socket } from 'node:net';
 import { chromium, type Browser, type BrowserContext, type Page } from 'playwright-core';
 
 function program(variable: string, otherwise?: string): string {
@@ -12,6 +13,13 @@ function program(variable: string, otherwise?: string): string {
 }
 
 export const SCENES = process.env['RADIOSITY_SCENES'] ?? '';
+
+/**
+ * How long a test waits for what must come. Solves, other tests and Chromium's software renderer share two cores, and
+ * nothing here is a statement about speed: only what never comes ends a wait. Less than a test may take, which then says
+ * what it waited for.
+ */
+const PATIENCE_MS = 200_000;
 
 export class Server {
   private process: ChildProcess | undefined;
@@ -51,6 +59,51 @@ export class Server {
   }
 }
 
+/** A line between pages and a server that carries so many bytes a second to them, all connections together. */
+export class SlowLine {
+  private readonly sockets = new Set<Socket>();
+  private free = 0; // when what was sent has gone through
+  private readonly server = createServer((page) => this.join(page));
+
+  constructor(
+    private readonly target: string,
+    private readonly bytesPerSecond: number,
+  ) {}
+
+  /** The URL of its far end. */
+  async start(): Promise<string> {
+    await new Promise<void>((resolve) => this.server.listen(0, '127.0.0.1', resolve));
+    return `http://127.0.0.1:${(this.server.address() as AddressInfo).port}`;
+  }
+
+  stop(): void {
+    this.server.close();
+    for (const socket of this.sockets) socket.destroy();
+  }
+
+  private join(page: Socket): void {
+    const { hostname, port } = new URL(this.target);
+    const server = connect(Number(port), hostname);
+    for (const socket of [page, server]) {
+      this.sockets.add(socket);
+      socket.on('error', () => undefined);
+      socket.on('close', () => {
+        page.destroy();
+        server.destroy();
+      });
+    }
+    page.pipe(server);
+    server.on('data', (bytes: Buffer) => {
+      server.pause();
+      this.free = Math.max(this.free, performance.now()) + (1000 * bytes.length) / this.bytesPerSecond;
+      setTimeout(() => {
+        page.write(bytes);
+        server.resume();
+      }, this.free - performance.now());
+    });
+  }
+}
+
 export class Pages {
   /** Errors and warnings of all pages: there shall be none. */
   readonly complaints: string[] = [];
@@ -62,8 +115,9 @@ export class Pages {
     const software = ['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader'];
     this.browser = await chromium.launch({
       executablePath: program('CHROMIUM', '/usr/bin/chromium'),
-      // Containers have no room for Chromium's sandbox.
-      args: ['--no-sandbox', '--ignore-gpu-blocklist', ...(card ? [] : software)],
+      // Containers have no room for Chromium's sandbox. A renderer in software that gets no processor does not hang.
+      args: ['--no-sandbox', '--ignore-gpu-blocklist', '--disable-gpu-watchdog', ...(card ? [] : software)],
+      timeout: PATIENCE_MS,
     });
   }
 
@@ -90,6 +144,8 @@ export class Pages {
       hasTouch: options.touch ?? false,
     });
     this.contexts.push(context);
+    context.setDefaultTimeout(PATIENCE_MS);
+    await context.addInitScript(keepNotes);
     const page = await context.newPage();
     page.on('console', (message) => {
       if (['error', 'warning'].includes(message.type()) && !isNoise(message.text()))
@@ -129,36 +185,113 @@ export function serveAll(scene: string): { server: Server; pages: Pages } {
   return { server, pages };
 }
 
+/** For each test of a file: servers of its own, which end with it, and pages that complain of nothing. */
+export function serveEach(): { serve: (scene?: string, ...options: string[]) => Promise<Server>; pages: Pages } {
+  const pages = new Pages();
+  const servers: Server[] = [];
+  beforeAll(() => pages.launch());
+  afterEach(async () => {
+    await pages.closeAll();
+    for (const server of servers.splice(0)) await server.stop();
+    expect(pages.complaints.splice(0)).toEqual([]);
+  });
+  afterAll(() => pages.quit());
+  const serve = async (scene?: string, ...options: string[]) => {
+    const server = new Server(scene, options);
+    await server.start();
+    servers.push(server);
+    return server;
+  };
+  return { serve, pages };
+}
+
 /** What Chromium says of its own software renderer, and of networks that are gone, which no page can keep it from. */
 function isNoise(text: string): boolean {
   return /GPU stall due to ReadPixels|WebSocket connection to|ERR_CONNECTION_REFUSED|CONTEXT_LOST_WEBGL/.test(text);
 }
 
-/** Until the solve has stopped at its target, and all light is on the screen. */
-export async function converged(page: Page): Promise<void> {
-  const done = page.waitForFunction(
-    () => {
+/** In the page: notes go by themselves, some before a test that gets no processor has looked. */
+function keepNotes(): void {
+  const notes: string[] = [];
+  (window as unknown as { notes: string[] }).notes = notes;
+  new MutationObserver((changes) => {
+    for (const node of changes.flatMap(({ addedNodes }) => [...addedNodes]))
+      if (node instanceof HTMLElement && node.matches('.toast')) notes.push(node.firstChild?.textContent ?? '');
+  }).observe(document, { childList: true, subtree: true });
+}
+
+/** Until a note of the page says so, or has said so. */
+export async function said(page: Page, what: RegExp): Promise<void> {
+  const notes = () => page.evaluate(() => (window as unknown as { notes: string[] }).notes);
+  await until(notes, (all) => all.some((text) => what.test(text)));
+}
+
+/**
+ * Until the solve has stopped at its target, all of its light is on the screen, and the page's document is the server's.
+ * `documentWaits`: the test holds the document back.
+ */
+export async function converged(page: Page, documentWaits = false): Promise<void> {
+  const state = () =>
+    page.evaluate(async () => {
       const app = window.viewer;
       const set = app?.viewer.shown?.set;
-      return app?.progress?.state === 'converged' && set?.complete && set.waiting === 0 && app.viewer.set === set;
-    },
-    undefined,
-    { timeout: 60_000 },
-  );
-  await done.catch(async (error: Error) => {
-    const state = await page.evaluate(() => {
-      const app = window.viewer;
-      const set = app?.viewer.shown?.set;
-      return JSON.stringify({
+      const here = {
         open: app?.connection.isOpen,
-        progress: app?.progress,
-        complete: set?.complete,
+        state: app?.progress?.state,
+        tileVersion: app?.bookmark?.quantity === 'irradiance' ? app.bookmark.tileVersion : -1,
+        revision: app?.edit.document.revision,
         waiting: set?.waiting,
-        isShown: set !== undefined && app?.viewer.set === set,
-      });
+        shown: set?.complete === true && app?.viewer.set === set && app.viewer.dataSet === undefined,
+        banner: document.querySelector<HTMLElement>('.banner:not([hidden])')?.innerText,
+        contextLost: app?.viewer.renderer.getContext().isContextLost(),
+        sinceFrameMs: app && performance.now() - (app.viewer as unknown as { lastFrame: number }).lastFrame,
+      };
+      if (!app || !here.open || here.state !== 'converged' || !here.shown || here.waiting !== 0) return { here };
+      // What the page was told last may be of a solve that is over: the server is asked.
+      const there = await app.connection
+        .call<{ state: string; tileVersion: number; revision: number }>('status')
+        .then(({ state, tileVersion, revision }) => ({ state, tileVersion, revision }))
+        .catch(() => undefined);
+      return { here, there };
     });
-    throw new Error(`${error.message}; the page stands at ${state}`);
-  });
+  await until(
+    state,
+    ({ here, there }) =>
+      there?.state === 'converged' &&
+      here.tileVersion >= there.tileVersion &&
+      (documentWaits || here.revision === there.revision),
+  );
+}
+
+/** Until the server has answered all that was done by hand: a drag, say, is told in parts. */
+export async function answered(page: Page): Promise<void> {
+  const pending = () =>
+    page.evaluate(() => (window.viewer!.edit.document as unknown as { pending: unknown[] }).pending.length);
+  await until(pending, (count) => count === 0);
+}
+
+/** Until a frame was drawn that shows what there is now. */
+export async function drawn(page: Page): Promise<void> {
+  await page.evaluate(
+    () =>
+      new Promise<void>((resolve) => {
+        const { view, viewer } = window.viewer!;
+        const others = view.onDrawn;
+        view.onDrawn = () => {
+          view.onDrawn = others;
+          view.onDrawn();
+          resolve();
+        };
+        viewer.invalidate();
+      }),
+  );
+}
+
+/** Until so many turns of the page have come and gone, in which something that moves goes on. */
+export async function turns(page: Page, count: number): Promise<void> {
+  await page.evaluate(async (count) => {
+    for (let i = 0; i < count; ++i) await new Promise((resolve) => requestAnimationFrame(resolve));
+  }, count);
 }
 
 /** What a page shows, or the picture at a URL, brought to `side` x `side` pixels: R, G, B of each, 0 to 255. */
@@ -200,11 +333,14 @@ export async function sceneOf(server: Server): Promise<{
   return (await (await fetch(`${server.url}/scene.gltf`)).json()) as never;
 }
 
-export async function until<T>(what: () => Promise<T>, good: (value: T) => boolean, ms = 20_000): Promise<T> {
-  const end = Date.now() + ms;
+/** Until it is good; what never is fails, with what it was last. */
+export async function until<T>(what: () => Promise<T>, good: (value: T) => boolean): Promise<T> {
+  const end = Date.now() + PATIENCE_MS;
   for (;;) {
     const value = await what();
-    if (good(value) || Date.now() > end) return value;
-    await new Promise((resolve) => setTimeout(resolve, 100));
+    if (good(value)) return value;
+    if (Date.now() > end)
+      throw new Error(`never came, but stayed ${JSON.stringify(value)}; wanted: ${good.toString()}`);
+    await new Promise((resolve) => setTimeout(resolve, 50));
   }
 }

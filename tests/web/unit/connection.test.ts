@@ -124,6 +124,18 @@ describe('connection', () => {
     expect(test.connection.has('x')).toBe(true);
   });
 
+  it('sends nothing into a socket that is closing, and ends what was asked there when it is closed', async () => {
+    const test = setup();
+    await opened(test);
+    const before = test.socket().sent.length;
+    test.socket().readyState = 2;
+    const lost = expect(test.connection.call('status')).rejects.toBeInstanceOf(ConnectionLost);
+    test.connection.used(FIRST_WINDOW);
+    expect(test.socket().sent.length).toBe(before);
+    test.socket().drop(1006, '');
+    await lost;
+  });
+
   it('comes back after a loss and offers what it holds to the same epoch only', async () => {
     const test = setup(() => ({ epoch: 'e1', revision: 4, tileVersion: 9 }));
     await opened(test);
@@ -218,7 +230,9 @@ describe('rpc', () => {
   it('matches answers by id, not by order, also in batches', async () => {
     const sent: { id: number }[] = [];
     const notes: string[] = [];
-    const rpc = new Rpc({ send: (text) => void sent.push(JSON.parse(text)) }, (method) => notes.push(method));
+    const rpc = new Rpc({ readyState: 1, send: (text) => void sent.push(JSON.parse(text)) }, (method) =>
+      notes.push(method),
+    );
     const [a, b] = [rpc.call<number>('a'), rpc.call<number>('b')];
     rpc.receive(
       JSON.stringify([
@@ -239,7 +253,7 @@ describe('rpc', () => {
   });
 
   it('drops what is no message', () => {
-    const rpc = new Rpc({ send: () => undefined }, () => expect.unreachable());
+    const rpc = new Rpc({ readyState: 1, send: () => undefined }, () => expect.unreachable());
     for (const text of ['', '{', '7', 'null', '[]', '[null]', '{"id":99,"result":1}']) rpc.receive(text);
   });
 });
@@ -257,16 +271,62 @@ describe('credit', () => {
     }
   });
 
+  /** Frames of so many bytes, all of which the page uses at once. */
+  const run = (bytes: number, everyMs: number) => {
+    const credit = new CreditWindow();
+    for (let t = 0; t < 10_000; t += everyMs) {
+      credit.received(bytes, t);
+      credit.used(bytes);
+    }
+    return credit;
+  };
+
   it('shrinks on a slow network and grows on a quick one', () => {
-    const run = (bytes: number, everyMs: number) => {
-      const credit = new CreditWindow();
-      for (let t = 0; t < 10_000; t += everyMs) credit.received(bytes, t);
-      return credit;
-    };
-    expect(run(2_000, 10).rate).toBe(0); // never filled the window, so nothing is known
-    const slow = run(16_000, 20);
-    expect(slow.rate).toBeGreaterThan(0.7e6);
-    expect(slow.rate).toBeLessThan(0.9e6);
-    expect(run(64_000, 2).rate).toBeGreaterThan(25e6);
+    for (const [bytes, everyMs] of [
+      [16_000, 400], // 40 kB/s: less than the window in any time that is measured
+      [16_000, 100],
+      [16_000, 20],
+      [64_000, 2],
+    ] as const) {
+      const { rate } = run(bytes, everyMs);
+      expect(rate / ((1000 * bytes) / everyMs)).toBeGreaterThan(0.95);
+      expect(rate / ((1000 * bytes) / everyMs)).toBeLessThan(1.05);
+    }
+  });
+
+  it('does not take a page that is slow to draw for a slow network', () => {
+    const credit = new CreditWindow();
+    let free = FIRST_WINDOW; // what the server may send, which it does at once
+    for (let t = 0; t < 20_000; t += 100) {
+      while (free >= 16_000) {
+        credit.received(16_000, t);
+        free -= 16_000;
+      }
+      free += credit.used(16_000); // 160 kB/s
+    }
+    expect(credit.rate).toBe(0);
+  });
+
+  it('grows where the server waits for the page, and all comes at once', () => {
+    const credit = new CreditWindow();
+    let free = FIRST_WINDOW;
+    let most = 0;
+    for (let t = 0; t < 5000; t += 50) {
+      let came = 0;
+      for (; free >= 16_000; free -= 16_000, came += 16_000) credit.received(16_000, t);
+      free += credit.used(came);
+      most = Math.max(most, free);
+    }
+    expect(most).toBeGreaterThan(4 * FIRST_WINDOW);
+  });
+
+  it('learns nothing from the pauses between one version of the light and the next', () => {
+    const credit = new CreditWindow();
+    for (let t = 0; t < 20_000; t += 300) {
+      credit.received(16_000, t);
+      credit.used(16_000);
+      credit.idle();
+    }
+    expect(credit.rate).toBe(0);
   });
 });

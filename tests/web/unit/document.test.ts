@@ -1,6 +1,6 @@
 import { existsSync, readFileSync } from 'node:fs';
 import * as edits from '../../../client/web/src/document/edits';
-import type { Gltf } from '../../../client/web/src/document/gltf';
+import { hangingNodes, type Gltf } from '../../../client/web/src/document/gltf';
 import { applyPatch, sameJson, withoutNames } from '../../../client/web/src/document/json_patch';
 import { SceneDocument } from '../../../client/web/src/document/scene_document';
 import type { Json, Patch, ScenePatchReply } from '../../../client/web/src/protocol/messages';
@@ -172,6 +172,33 @@ const reply = (revision: number): ScenePatchReply => ({
   affected: { surfaces: 1, shots: 1 },
 });
 const settle = () => new Promise((resolve) => setImmediate(resolve));
+
+describe('nodes of the scene', () => {
+  const scene = (nodes: Gltf['nodes'], roots: number[]): Gltf => ({
+    asset: { version: '2.0' },
+    scenes: [{ nodes: roots }],
+    nodes,
+  });
+
+  it('come depth first, each with its depth, once', () => {
+    const gltf = scene([{ children: [2, 1] }, {}, { children: [3] }, { children: [0] }, {}], [0, 4]);
+    expect(hangingNodes(gltf)).toEqual([
+      { node: 0, depth: 0 },
+      { node: 2, depth: 1 },
+      { node: 3, depth: 2 },
+      { node: 1, depth: 1 },
+      { node: 4, depth: 0 },
+    ]);
+  });
+
+  it('may hang in a chain of any length', () => {
+    const count = 200_000;
+    const chain = Array.from({ length: count }, (_, i) => (i + 1 < count ? { children: [i + 1] } : {}));
+    const all = hangingNodes(scene(chain, [0]));
+    expect(all.length).toBe(count);
+    expect(all.at(-1)).toEqual({ node: count - 1, depth: count - 1 });
+  });
+});
 
 describe('scene document', () => {
   it('keeps one step of a drag whose last edits are answered after it ended', async () => {

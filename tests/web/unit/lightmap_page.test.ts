@@ -150,6 +150,14 @@ describe('a set of pages', () => {
     expect(set.covered).toBe(true);
   });
 
+  it('takes up some tiles a frame though its time is over, so that slow frames need not be many', () => {
+    const set = new LightmapSet(new Card().renderer, note, 'irradiance', () => undefined);
+    for (let i = 0; i < 20; ++i) set.enqueue({ ...lit, header: { ...lit.header, page: 0 } }, 1);
+    expect(set.takeUp(-1)).toBe(8);
+    expect(set.waiting).toBe(12);
+    expect(set.takeUp(ALWAYS)).toBe(12);
+  });
+
   it('keeps tiles back while their page makes room', () => {
     const large = { ...note, pages: [{ width: 1024, height: 1024, mips: 11 }] };
     let used = 0;

@@ -3,7 +3,7 @@ import { editCommand } from '../../../client/web/src/app_share';
 import { encodeRgb9e5, scaleRgb9e5 } from '../../../client/web/src/protocol/rgb9e5';
 import { pageExponent } from '../../../client/web/src/view/lightmap_page';
 import { baseMipFor } from '../../../client/web/src/view/lightmap_set';
-import { fromHex, percent, readable, toHex } from '../../../client/web/src/ui/dom';
+import { fromHex, parseNumber, percent, readable, toHex } from '../../../client/web/src/ui/dom';
 
 describe('automatic exposure', () => {
   it('brings an even picture to middle grey', () => {
@@ -78,4 +78,32 @@ it('the command survives a shell', () => {
   expect(editCommand(patch, 'host:1')).toBe(
     `echo '[{"op":"replace","path":"/nodes/@Ann'\\''s lamp/translation","value":[0,1,0]}]' | radiosity edit host:1 -`,
   );
+  expect(editCommand([], 'https://host', true)).toBe(`echo '[]' | radiosity edit https://host - --token-file token`);
+});
+
+describe('a number that somebody wrote', () => {
+  it('has a point or a comma before its fraction', () => {
+    for (const [text, value] of [
+      ['1.5', 1.5],
+      ['1,5', 1.5],
+      [' -0,125 ', -0.125],
+      ['.5', 0.5],
+      [',5', 0.5],
+      ['2e-3', 0.002],
+      ['12,3456', 12.3456],
+    ] as const)
+      expect(parseNumber(text), text).toBe(value);
+  });
+
+  it('may set thousands apart, as what is shown does', () => {
+    for (const value of [1500, 12_345, 1_234_567, 0.002, 33.25])
+      expect(parseNumber(readable(value, 7)), readable(value, 7)).toBe(value);
+    expect(parseNumber('1,234.5')).toBe(1234.5);
+    expect(parseNumber('15 000 000')).toBe(15_000_000);
+  });
+
+  it('is none where there is anything else', () => {
+    for (const text of ['', ' ', 'abc', '1.5.2', '1,5,2', '2 m', '1,234,5', 'NaN', 'Infinity', '1e999', '0x10', '--1'])
+      expect(parseNumber(text), text).toBeNaN();
+  });
 });

@@ -81,16 +81,18 @@ export function holderOf(gltf: Gltf, node: number): { list: string; place: numbe
   return undefined;
 }
 
-/** Nodes of the scene shown, depth first, each with how deep it lies. Cycles end. */
+/** Nodes of the scene shown, depth first, each with how deep it lies. Cycles end, and no chain is too long. */
 export function hangingNodes(gltf: Gltf): { node: number; depth: number }[] {
   const out: { node: number; depth: number }[] = [];
   const seen = new Set<number>();
-  const visit = (node: number, depth: number) => {
-    if (seen.has(node)) return;
+  const waiting = [...(gltf.scenes?.[gltf.scene ?? 0]?.nodes ?? [])].reverse().map((node) => ({ node, depth: 0 }));
+  for (let next = waiting.pop(); next; next = waiting.pop()) {
+    const { node, depth } = next;
+    if (seen.has(node)) continue;
     seen.add(node);
-    out.push({ node, depth });
-    for (const next of gltf.nodes?.[node]?.children ?? []) visit(next, depth + 1);
-  };
-  for (const root of gltf.scenes?.[gltf.scene ?? 0]?.nodes ?? []) visit(root, 0);
+    out.push(next);
+    for (const child of [...(gltf.nodes?.[node]?.children ?? [])].reverse())
+      waiting.push({ node: child, depth: depth + 1 });
+  }
   return out;
 }

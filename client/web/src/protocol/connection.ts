@@ -111,7 +111,7 @@ export class Connection {
   /** Tells that a frame was used, so that the server may send more. */
   used(bytes: number): void {
     const credit = this.credit.used(bytes);
-    if (credit > 0 && this.isOpen && this.socket?.readyState === 1) this.rpc?.notify('credit', { bytes: credit });
+    if (credit > 0 && this.isOpen) this.rpc?.notify('credit', { bytes: credit });
   }
 
   private onNotification(rpc: Rpc, method: string, params: unknown): void {

@@ -5,12 +5,16 @@ const MIN_WINDOW = 64 * 1024;
 const MAX_WINDOW = 8 * 1024 * 1024;
 const AHEAD_S = 0.5;
 const MEASURE_MS = 400;
+/** A tile of 64 x 64 texels in the format that is asked for first, with its header. */
+const FRAME = 64 * 64 * 4 + 64;
 
 export const FIRST_WINDOW = 512 * 1024;
 
 export class CreditWindow {
   private window = FIRST_WINDOW;
   private outstanding = FIRST_WINDOW; // what the server may still send, and what was sent and not yet used
+  private ahead = FIRST_WINDOW; // what the server may still send
+  private starved = false; // it may have waited for credit
   private measuredSince = -1;
   private measuredBytes = 0;
 
@@ -19,14 +23,22 @@ export class CreditWindow {
 
   /** A frame has come. */
   received(bytes: number, nowMs: number): void {
-    if (this.measuredSince < 0) this.measuredSince = nowMs;
+    this.ahead -= bytes;
+    this.starved ||= this.ahead < FRAME;
+    if (this.measuredSince < 0) {
+      this.measuredSince = nowMs; // how long the first was on its way is not known
+      this.starved = this.ahead < FRAME;
+      return;
+    }
     this.measuredBytes += bytes;
     const took = nowMs - this.measuredSince;
     if (took < MEASURE_MS) return;
-    // Only a time in which the window was used up says something about the network.
-    if (this.measuredBytes >= 0.5 * this.window) this.adapt((1000 * this.measuredBytes) / took);
+    const rate = (1000 * this.measuredBytes) / took;
+    if (this.starved) this.adaptToAtLeast(rate);
+    else this.adapt(rate);
     this.measuredSince = nowMs;
     this.measuredBytes = 0;
+    this.starved = this.ahead < FRAME;
   }
 
   /** Everything asked for has come: the pause that follows says nothing about the network. */
@@ -41,11 +53,22 @@ export class CreditWindow {
     const missing = this.window - this.outstanding;
     if (missing < this.window / 4) return 0;
     this.outstanding = this.window;
+    this.ahead += missing;
     return missing;
   }
 
   private adapt(rate: number): void {
     this.rate = this.rate === 0 ? rate : 0.5 * (this.rate + rate);
-    this.window = Math.round(Math.min(MAX_WINDOW, Math.max(MIN_WINDOW, this.rate * AHEAD_S)));
+    this.window = windowFor(this.rate);
   }
+
+  /** The server waited for the page: what came says only what the network carries at least. */
+  private adaptToAtLeast(rate: number): void {
+    if (this.rate > 0) this.rate = Math.max(this.rate, rate);
+    this.window = Math.max(this.window, windowFor(rate));
+  }
+}
+
+function windowFor(rate: number): number {
+  return Math.round(Math.min(MAX_WINDOW, Math.max(MIN_WINDOW, rate * AHEAD_S)));
 }

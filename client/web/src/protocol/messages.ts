@@ -93,6 +93,7 @@ export interface ScenePatchedNote {
 export interface Bookmark {
   revision: number;
   tileVersion: number;
+  quantity: string;
 }
 
 /** Where a viewer looks from: eye and the point looked at, metres. */

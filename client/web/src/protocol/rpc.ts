@@ -21,8 +21,11 @@ export class ConnectionLost extends Error {
 }
 
 export interface TextSocket {
+  readonly readyState: number;
   send(text: string): void;
 }
+
+const OPEN = 1; // of a WebSocket
 
 interface Waiting {
   resolve: (result: unknown) => void;
@@ -43,7 +46,7 @@ export class Rpc {
     return new Promise<T>((resolve, reject) => {
       this.waiting.set(id, { resolve: resolve as (result: unknown) => void, reject });
       try {
-        this.socket.send(JSON.stringify({ jsonrpc: '2.0', id, method, params }));
+        this.send({ jsonrpc: '2.0', id, method, params });
       } catch {
         this.waiting.delete(id);
         reject(new ConnectionLost());
@@ -52,7 +55,12 @@ export class Rpc {
   }
 
   notify(method: string, params: object): void {
-    this.socket.send(JSON.stringify({ jsonrpc: '2.0', method, params }));
+    this.send({ jsonrpc: '2.0', method, params });
+  }
+
+  /** Into a socket that is closing goes nothing, of which the browser would complain: what waits ends with close(). */
+  private send(message: object): void {
+    if (this.socket.readyState === OPEN) this.socket.send(JSON.stringify(message));
   }
 
   /** Reads a text frame; what is not a message of JSON-RPC is dropped. */

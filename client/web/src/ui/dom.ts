@@ -116,6 +116,18 @@ export function readable(value: number, digits = 3): string {
   });
 }
 
+/**
+ * The number that somebody wrote, with a point or a comma before its fraction; NaN: none. Commas between groups of three
+ * digits, as readable() writes them, set thousands apart: "1,500" is 1500, "1,5" and "0,125" are fractions.
+ */
+export function parseNumber(text: string): number {
+  const plain = text.trim().replace(/\s+/g, '');
+  if (/^[-+]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?$/.test(plain)) return Number(plain.replaceAll(',', ''));
+  if (!/^[-+]?(\d+[.,]?\d*|[.,]\d+)(e[-+]?\d+)?$/i.test(plain)) return NaN;
+  const value = Number(plain.replace(',', '.'));
+  return Number.isFinite(value) ? value : NaN; // "1e999" is none that a message could carry
+}
+
 export function percent(fraction: number): string {
   return Number.isFinite(fraction) ? `${readable(100 * fraction, 2)} %` : '–';
 }

@@ -3,6 +3,7 @@
 import { button, h, icon, iconButton, pressed } from './dom';
 import { makeHelp } from './help';
 import { Legend, MeterCard } from './legend';
+import { store, stored } from './stored';
 import { Toasts } from './toast';
 
 export interface FrameActions {
@@ -34,7 +35,7 @@ export class Frame {
   private readonly rate = h('span', { class: 'rate' });
   private readonly people = h('span', { class: 'people', title: 'People who watch', hidden: true });
   private readonly banner = h('div', { class: 'banner', role: 'alert', hidden: true });
-  private readonly welcome = h('div', { class: 'welcome', hidden: true });
+  private readonly welcome = h('div', { class: 'welcome card', hidden: true });
   /** There is a picture, which no message shall cover. */
   sceneShown = false;
   private readonly panelButton: HTMLButtonElement;
@@ -215,7 +216,7 @@ export class Frame {
   }
 
   private themeButton(): HTMLButtonElement {
-    let theme = localStorage.getItem('theme') ?? 'auto';
+    let theme = stored('theme') ?? 'auto';
     const system = matchMedia('(prefers-color-scheme: light)');
     const apply = () => {
       document.documentElement.dataset['theme'] = theme !== 'auto' ? theme : system.matches ? 'light' : 'dark';
@@ -227,7 +228,7 @@ export class Frame {
       '',
       () => {
         theme = THEMES[(THEMES.indexOf(theme as (typeof THEMES)[number]) + 1) % THEMES.length]!;
-        localStorage.setItem('theme', theme);
+        store('theme', theme);
         apply();
       },
       { class: 'icon' },

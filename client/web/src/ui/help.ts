@@ -28,9 +28,14 @@ const KEYS: [string, string][] = [
 export function makeHelp(): HTMLDialogElement {
   const dialog = h('dialog', { class: 'card help', 'aria-label': 'Keys' });
   dialog.append(
-    h('h2', {}, 'Keys'),
+    // The button comes first: it takes the focus, and what has the focus is scrolled to.
+    h(
+      'header',
+      {},
+      h('h2', {}, 'Keys'),
+      button('Close', () => dialog.close()),
+    ),
     h('dl', {}, ...KEYS.flatMap(([keys, what]) => [h('dt', {}, keys), h('dd', {}, what)])),
-    button('Close', () => dialog.close()),
   );
   dialog.addEventListener('click', (event) => {
     if (event.target === dialog) dialog.close();

@@ -4,7 +4,7 @@ import { MathUtils, Euler, Quaternion } from 'three';
 import { isVisible } from '../document/edits';
 import { hangingNodes, lightOf, materialName, nodeName, type Gltf, type Vec3, type Vec4 } from '../document/gltf';
 import type { Placement } from '../document/edits';
-import { button, checkbox, field, fromHex, h, row, section, toHex } from './dom';
+import { button, checkbox, field, fromHex, h, parseNumber, row, section, toHex } from './dom';
 
 export interface Selection {
   node: number;
@@ -23,17 +23,36 @@ export interface ScenePanelActions {
   frameSelection(): void;
   endGesture(): void;
   loadFile(file: File): void;
+  notUnderstood(text: string): void;
 }
 
 const MOST_LISTED = 400;
+/** So many are seen at a glance. */
+const FEW = 12;
+const MOST_LETTERS = 200;
+
+interface ListEntry {
+  node: number;
+  depth: number;
+  name: string;
+  visible: boolean;
+  light: boolean;
+}
 
 export class ScenePanel {
   readonly element: HTMLElement;
   private readonly list = h('ul', { class: 'tree', 'aria-label': 'Objects' });
+  private readonly find = h('input', { type: 'search', 'aria-label': 'Find an object by name' });
+  private readonly findRow = field('Find', this.find);
+  private readonly entries = new Map<number, HTMLElement>();
+  private listText = '';
   private readonly editor = h('div', { class: 'editor' });
   private gltf: Gltf = { asset: { version: '2.0' } };
   private selection: Selection | undefined;
   private revealed: number | undefined;
+  private edited: number | undefined;
+  /** Something is being written that was not sent yet. */
+  private typing = false;
   private materialsOf: (node: number) => number[] = () => [];
 
   constructor(private readonly actions: ScenePanelActions) {
@@ -48,6 +67,7 @@ export class ScenePanel {
       {},
       section(
         'Objects',
+        this.findRow,
         this.list,
         h(
           'div',
@@ -59,6 +79,11 @@ export class ScenePanel {
       ),
       this.editor,
     );
+    this.find.addEventListener('input', () => this.showList());
+    this.editor.addEventListener('input', () => (this.typing = true));
+    this.editor.addEventListener('change', () => (this.typing = false));
+    // What was selected while another tab was open is scrolled to when this one is.
+    new ResizeObserver(() => this.revealSelection()).observe(this.list);
   }
 
   setDocument(gltf: Gltf, materialsOf: (node: number) => number[]): void {
@@ -72,43 +97,64 @@ export class ScenePanel {
     this.refresh();
   }
 
-  /** Shows other people's and our own edits; leaves what the user is typing alone. */
+  /**
+   * Shows other people's and our own edits, and what a refused one snaps back to; leaves alone what the user is typing
+   * and a colour that is being chosen.
+   */
   refresh(): void {
     this.showList();
-    if (!this.editor.contains(document.activeElement) || document.activeElement instanceof HTMLButtonElement)
-      this.showEditor();
+    const at = this.editor.contains(document.activeElement) ? (document.activeElement as HTMLInputElement) : undefined;
+    if (!at || (at.type !== 'color' && !this.typing)) this.showEditor();
   }
 
   private showList(): void {
     const all = hangingNodes(this.gltf);
+    this.findRow.hidden = all.length <= FEW;
+    const wanted = this.findRow.hidden ? '' : this.find.value.trim().toLowerCase();
+    const found = wanted ? all.filter(({ node }) => nodeName(this.gltf, node).toLowerCase().includes(wanted)) : all;
+    const listed = found.slice(0, MOST_LISTED).map(({ node, depth }) => ({
+      node,
+      depth: Math.min(depth, 8),
+      name: nodeName(this.gltf, node).slice(0, MOST_LETTERS),
+      visible: isVisible(this.gltf, node),
+      light: lightOf(this.gltf, node) !== undefined,
+    }));
+    // A drag changes the document many times a second, and the list not at all.
+    const text = JSON.stringify([listed, found.length]);
+    if (text !== this.listText) this.fillList(listed, found.length);
+    this.listText = text;
+    for (const [node, element] of this.entries)
+      if (node === this.selection?.node) element.setAttribute('aria-current', 'true');
+      else element.removeAttribute('aria-current');
+    this.revealSelection();
+  }
+
+  private fillList(listed: ListEntry[], found: number): void {
     const had = this.list.contains(document.activeElement);
     const { scrollTop } = this.list;
-    const items = all.slice(0, MOST_LISTED).map(({ node, depth }) => {
-      const current = node === this.selection?.node;
-      const element = button(
-        nodeName(this.gltf, node),
-        () => this.actions.select({ node, material: this.materialsOf(node)[0] }),
-        {
-          'aria-current': current ? 'true' : undefined,
-          class: isVisible(this.gltf, node) ? '' : 'hidden-node',
-        },
-      );
-      element.style.paddingInlineStart = `${0.5 + 0.8 * Math.min(depth, 8)}rem`;
-      if (lightOf(this.gltf, node)) element.append(h('span', { class: 'tag' }, 'light'));
+    this.entries.clear();
+    const items = listed.map(({ node, depth, name, visible, light }) => {
+      const element = button(name, () => this.actions.select({ node, material: this.materialsOf(node)[0] }), {
+        class: visible ? '' : 'hidden-node',
+      });
+      element.style.paddingInlineStart = `${0.5 + 0.8 * depth}rem`;
+      if (light) element.append(h('span', { class: 'tag' }, 'light'));
+      this.entries.set(node, element);
       return h('li', {}, element);
     });
-    if (all.length > MOST_LISTED) items.push(h('li', { class: 'dim' }, `and ${all.length - MOST_LISTED} more`));
+    if (found > listed.length)
+      items.push(h('li', { class: 'dim' }, `and ${found - listed.length} more: find them by name`));
+    if (found === 0) items.push(h('li', { class: 'dim' }, 'None.'));
     this.list.replaceChildren(...items);
     this.list.scrollTop = scrollTop;
-    this.revealSelection();
-    if (had) this.list.querySelector<HTMLElement>('[aria-current]')?.focus();
+    if (had) this.entries.get(this.selection?.node ?? -1)?.focus();
   }
 
   /** Scrolls the list, and nothing but the list, to an object that was just selected or just came. */
   private revealSelection(): void {
     const element = this.list.querySelector<HTMLElement>('[aria-current]')?.parentElement;
     const node = element ? this.selection?.node : undefined;
-    if (node === this.revealed) return;
+    if (node === this.revealed || this.list.clientHeight === 0) return;
     this.revealed = node;
     if (!element) return;
     const top = element.offsetTop - this.list.offsetTop;
@@ -116,7 +162,18 @@ export class ScenePanel {
       this.list.scrollTop = top - this.list.clientHeight / 2;
   }
 
+  /** Who was at one of its controls is at the same one afterwards. */
   private showEditor(): void {
+    const controls = () => [...this.editor.querySelectorAll<HTMLElement>('input, button')];
+    const at = controls().indexOf(document.activeElement as HTMLElement);
+    const [before, node] = [this.edited, this.selection?.node];
+    this.typing = false;
+    this.fillEditor();
+    this.edited = node;
+    if (at >= 0 && before === node) controls()[at]?.focus({ preventScroll: true });
+  }
+
+  private fillEditor(): void {
     const { selection, gltf } = this;
     const node = selection && gltf.nodes?.[selection.node];
     if (!selection || !node) {
@@ -172,9 +229,9 @@ export class ScenePanel {
         value: String(Number(v.toPrecision(5))),
         'aria-label': `${label}, ${'xyz'[i]}`,
         onchange: () => {
-          const next = inputs.map((input) => Number(input.value)) as Vec3;
+          const next = inputs.map((input) => parseNumber(input.value)) as Vec3;
           if (next.every(Number.isFinite)) changed(next);
-          else this.showEditor();
+          else this.refuse(inputs.find((input) => !Number.isFinite(parseNumber(input.value)))!);
         },
       }),
     );
@@ -192,8 +249,8 @@ export class ScenePanel {
     const glow = this.colour(toHex(top > 0 ? emission.map((c) => c / top) : [1, 1, 1]), () => send());
     const nits = this.number(String(Number((top * strength).toPrecision(5))), () => send());
     const send = () => {
-      const value = Number(nits.value);
-      if (!(value >= 0)) return this.showEditor();
+      const value = parseNumber(nits.value);
+      if (!(value >= 0)) return this.refuse(nits);
       this.actions.setEmission(index, value > 0 ? fromHex(glow.value) : [0, 0, 0], value > 0 ? value : 1);
     };
     const chooser =
@@ -229,11 +286,17 @@ export class ScenePanel {
       this.actions.setLight(index, { color: fromHex(hex) }),
     );
     const strength = this.number(String(Number((light.intensity ?? 1).toPrecision(5))), () => {
-      const value = Number(strength.value);
+      const value = parseNumber(strength.value);
       if (value >= 0) this.actions.setLight(index, { intensity: value });
-      else this.showEditor();
+      else this.refuse(strength);
     });
     return section(`Light: ${light.type}`, field('Colour', colour), field(`Intensity, ${unit}`, strength));
+  }
+
+  /** What it was before stands there again. */
+  private refuse(input: HTMLInputElement): void {
+    this.actions.notUnderstood(input.value);
+    this.showEditor();
   }
 
   /** Sends while the colour is being chosen; the gesture ends when the chooser closes. */

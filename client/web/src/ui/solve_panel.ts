@@ -1,13 +1,14 @@
 // The panel "Solve": how far the light is, and how far it shall go.
 
 import type { Progress, Settings } from '../protocol/messages';
-import { button, field, h, percent, readable, section } from './dom';
+import { button, field, h, parseNumber, percent, readable, section } from './dom';
 import { ErrorPlot } from './error_plot';
 
 export interface SolvePanelActions {
   pauseOrResume(): void;
   restart(): void;
   configure(settings: Partial<Settings>): void;
+  notUnderstood(text: string): void;
 }
 
 const STATES: Record<string, string> = {
@@ -48,15 +49,17 @@ export class SolvePanel {
     this.pause = button('Pause', () => actions.pauseOrResume());
     this.target = h('input', { type: 'text', class: 'number', inputMode: 'decimal' });
     this.target.onchange = () => {
-      const value = parseFloat(this.target.value) / 100;
-      if (value > 0 && value <= 1) actions.configure({ targetError: value });
-      else this.showSettings();
+      const value = parseNumber(this.target.value.replace('%', '')) / 100;
+      if (value > 0 && value <= 1) return actions.configure({ targetError: value });
+      actions.notUnderstood(this.target.value);
+      this.showSettings();
     };
     this.texels = h('input', { type: 'text', class: 'number', inputMode: 'numeric' });
     this.texels.onchange = () => {
-      const value = Math.round(Number(this.texels.value.replaceAll(',', '')));
-      if (value >= 1) actions.configure({ texels: value });
-      else this.showSettings();
+      const value = Math.round(parseNumber(this.texels.value));
+      if (value >= 1) return actions.configure({ texels: value });
+      actions.notUnderstood(this.texels.value);
+      this.showSettings();
     };
     this.element = h(
       'div',
@@ -116,7 +119,8 @@ export class SolvePanel {
     );
   }
 
-  private showSettings(): void {
+  /** What stands in the fields: the server's, also after it has refused others. */
+  showSettings(): void {
     if (!this.settings) return;
     this.target.value = readable(100 * this.settings.targetError);
     this.texels.value = String(this.settings.texels);

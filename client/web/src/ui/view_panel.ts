@@ -1,7 +1,7 @@
 // The panel "View": what is shown and how bright, from where.
 
 import { TONE_CURVES, VIEW_MODES, type ViewMode } from '../view/view_modes';
-import { button, checkbox, field, h, pressed, readable, section, select } from './dom';
+import { button, checkbox, field, h, parseNumber, pressed, readable, section, select } from './dom';
 
 export const BACKGROUNDS = [
   { id: 'theme', label: 'As the page' },
@@ -20,6 +20,7 @@ export interface ViewPanelActions {
   setToneCurve(id: string): void;
   setBackground(id: string): void;
   useCamera(index: number): void;
+  notUnderstood(text: string): void;
 }
 
 export class ViewPanel {
@@ -125,8 +126,9 @@ export class ViewPanel {
 
   private changeRange(automatic: boolean): void {
     this.low.disabled = this.high.disabled = automatic;
-    const [low, high] = [Number(this.low.value), Number(this.high.value)];
+    const [low, high] = [parseNumber(this.low.value), parseNumber(this.high.value)];
     if (automatic) this.actions.setRange(undefined);
     else if (low > 0 && high > low) this.actions.setRange([low, high]);
+    else this.actions.notUnderstood(`${this.low.value} to ${this.high.value}`);
   }
 }

@@ -14,6 +14,7 @@ import {
   Object3D,
   type PerspectiveCamera,
   Scene,
+  Vector2,
   type Vector3,
 } from 'three';
 import { TransformControls } from 'three/addons/controls/TransformControls.js';
@@ -23,6 +24,10 @@ export type GizmoMode = 'translate' | 'rotate' | 'scale';
 
 /** Finding edges takes about a microsecond a triangle; larger objects show their box. */
 const MAX_EDGE_TRIANGLES = 30_000;
+/** One drag makes an object at most so many times larger or smaller, and never turns it inside out. */
+const MOST_SCALE = 100;
+/** The middle handle doubles the size in so many pixels to the right or upwards. */
+const DOUBLING_PX = 100;
 
 export class Gizmo {
   mode: GizmoMode = 'translate';
@@ -38,6 +43,9 @@ export class Gizmo {
     opacity: 0.9,
   });
   private outline: Object3D[] = [];
+  /** In pixels of the page; where it took hold, and where it is now. */
+  private readonly grabbed = new Vector2();
+  private readonly pointer = new Vector2();
 
   constructor(
     private readonly scene: Scene,
@@ -48,6 +56,16 @@ export class Gizmo {
     this.lines.color.setRGB(1, 0.66, 0.16, LinearSRGBColorSpace);
     this.controls = new TransformControls(camera, element);
     this.controls.size = 0.8;
+    // Handles lie where they were last drawn, which is some time ago where frames are slow: what is under the pointer
+    // is decided by where they are now.
+    const place = () => this.object && this.controls.getHelper().updateMatrixWorld(true);
+    const locate = ({ clientX, clientY }: PointerEvent) => {
+      place();
+      this.pointer.set(clientX, clientY);
+      if (!this.dragging) this.grabbed.copy(this.pointer);
+    };
+    for (const type of ['pointermove', 'pointerdown'] as const)
+      element.addEventListener(type, locate, { capture: true });
     scene.add(this.pivot, this.controls.getHelper());
     this.controls.addEventListener('change', () => events.redraw());
     this.controls.addEventListener('dragging-changed', ({ value }) => {
@@ -56,6 +74,7 @@ export class Gizmo {
     });
     this.controls.addEventListener('objectChange', () => {
       if (!this.object) return;
+      if (this.mode === 'scale') this.limitScale();
       this.follow(this.object);
       this.refresh();
       events.changed(this.object, this.mode);
@@ -123,6 +142,19 @@ export class Gizmo {
     pivot.scale.set(1, 1, 1);
     pivot.updateMatrixWorld(true);
     this.fromPivot.copy(pivot.matrixWorld).invert().multiply(object.matrixWorld);
+  }
+
+  /**
+   * The controls divide by how far from the middle the pointer took hold, which for the handle in the middle is next to
+   * nothing: there the way that it has gone decides.
+   */
+  private limitScale(): void {
+    const { scale } = this.pivot;
+    if (this.controls.axis === 'XYZ') {
+      const { x, y } = this.pointer.clone().sub(this.grabbed);
+      scale.setScalar(2 ** ((x - y) / DOUBLING_PX));
+    }
+    scale.clampScalar(1 / MOST_SCALE, MOST_SCALE);
   }
 
   private follow(object: Object3D): void {

@@ -9,6 +9,12 @@ import { LightmapPage } from './lightmap_page';
 /** Texels of all pages in memory, and as many again on the card. */
 export const MEMORY_BUDGET_BYTES = 512 * 2 ** 20;
 
+/**
+ * A frame takes up so many, whatever the clock says: where the page gets little of its processor, a frame of one tile
+ * would be spent before it began, and a page of a hundred tiles would take a hundred slow frames.
+ */
+const LEAST_TILES = 8;
+
 /** Texels that the legend's range is made of, of all pages together. */
 const RANGE_SAMPLES = 16_384;
 
@@ -78,11 +84,11 @@ export class LightmapSet {
     this.queue.push({ tile, bytes });
   }
 
-  /** Takes up what waits for at most `budgetMs`. Returns how many tiles that were. */
+  /** Takes up what waits for `budgetMs`, but some at least. Returns how many tiles that were. */
   takeUp(budgetMs: number): number {
     const end = performance.now() + budgetMs;
     let taken = 0;
-    while (taken < this.queue.length && (taken === 0 || performance.now() < end)) {
+    while (taken < this.queue.length && (taken < LEAST_TILES || performance.now() < end)) {
       const { tile, bytes } = this.queue[taken]!;
       const page = this.pages[tile.header.page];
       if (page && !page.makeRoom(tile, end)) break; // goes on in the next frame

@@ -6,6 +6,8 @@ import type { Gltf } from '../document/gltf';
 import type { LightmapsNote } from '../protocol/messages';
 import { CameraRig } from './camera_rig';
 import { ExposureMeter } from './exposure';
+import { FrameFences } from './frame_fences';
+import { FramePace } from './frame_pace';
 import { Gizmo, type GizmoMode } from './gizmo';
 import { ViewUniforms } from './lit_material';
 import { LightmapSet } from './lightmap_set';
@@ -15,8 +17,10 @@ import { PagesView } from './pages_view';
 import { pick, readingAt, type Reading } from './picker';
 import type { ViewMode } from './view_modes';
 
-/** For taking up tiles, of the 16 that a frame has. */
+/** For taking up tiles, of the 16 that a frame has; of longer ones the same share, but no task of 50. */
 const TILE_BUDGET_MS = 5;
+const TILE_SHARE = 0.3;
+const MOST_TILE_MS = 20;
 /** A new layout is shown when its light is this far, or after so long. */
 const READY_ERROR = 0.35;
 const READY_AFTER_MS = 900;
@@ -25,6 +29,8 @@ const MEASURE_EVERY_MS = 250;
 const MEASURE_SHARE = 8;
 /** A driver that never says it is done (a lost context) holds nothing up for longer. */
 const MOST_COMPILING_MS = 2000;
+/** What an edit changes shall be seen soon; how sharp comes after it. */
+const EDIT_HURRY_MS = 700;
 /** Length of the pyramid that stands for another viewer, of the scene's diagonal. */
 const PERSON_SIZE = 0.04;
 
@@ -62,6 +68,9 @@ export class Viewer {
   private staged: Staged | undefined;
   private people: People | undefined;
   private readonly anisotropy: number;
+  private readonly pace: FramePace;
+  private readonly fences: FrameFences;
+  private scale = 1;
   private readonly world = new Scene();
   private wanted = true;
   /** Something has changed that the scale of false colours, and the exposure, may depend on. */
@@ -84,16 +93,19 @@ export class Viewer {
     // Asked for here, where nothing is being drawn that the answer would have to wait for.
     this.anisotropy = Math.min(8, this.renderer.capabilities.getMaxAnisotropy());
     this.renderer.setClearColor(0, 0); // the page's own background shows behind the scene
-    this.rig = new CameraRig(canvas, () => this.invalidate());
+    const gl = this.renderer.getContext() as WebGL2RenderingContext;
+    this.pace = new FramePace(drawsWithoutCard(gl));
+    this.fences = new FrameFences(gl);
+    this.rig = new CameraRig(canvas, () => this.moved());
     this.exposure = new ExposureMeter(this.renderer, this.uniforms);
-    this.pagesView = new PagesView(canvas, this.uniforms, () => this.invalidate());
+    this.pagesView = new PagesView(canvas, this.uniforms, () => this.moved());
     this.gizmo = new Gizmo(this.world, this.rig.camera, canvas, {
       dragging: (active) => {
         this.rig.enabled = !active;
         events.gizmoDragging(active);
       },
       changed: (object, mode) => events.gizmoChanged(object, mode),
-      redraw: () => this.invalidate(),
+      redraw: () => (this.gizmo.dragging ? this.moved() : this.invalidate()),
     });
     new ResizeObserver(() => this.resize()).observe(canvas);
     canvas.addEventListener('webglcontextlost', () => this.onContext(true));
@@ -106,6 +118,12 @@ export class Viewer {
     this.wanted = true;
     this.scaleDue = true;
     this.exposureDue = true;
+  }
+
+  /** What is looked at moves, or was changed by hand: it shall be seen soon. */
+  moved(): void {
+    this.pace.hurry(performance.now());
+    this.invalidate();
   }
 
   /** The set that tiles of irradiance belong to. */
@@ -173,6 +191,7 @@ export class Viewer {
     this.shown?.applyPointers(document, pointers);
     this.staged?.scene?.applyPointers(document, pointers);
     this.gizmo.refresh();
+    this.pace.hurry(performance.now(), EDIT_HURRY_MS);
     this.invalidate();
   }
 
@@ -194,7 +213,7 @@ export class Viewer {
     this.gizmo.setVisible(!mode.flat);
     if (mode.flat) this.pagesView.show(this.shown?.set);
     this.updateRange();
-    this.invalidate();
+    this.moved();
   }
 
   pickAt(x: number, y: number): Intersection | undefined {
@@ -216,14 +235,14 @@ export class Viewer {
   select(node: number | undefined): void {
     const object = node === undefined ? undefined : (this.lampRoot(node) ?? this.shown?.nodes.get(node));
     this.gizmo.attach(object);
-    this.invalidate();
+    this.moved();
   }
 
   /** PNG of what is on the screen. */
   async picture(): Promise<Blob> {
     await this.settle();
     this.setSigns(false);
-    this.draw();
+    this.draw(1);
     this.setSigns(true);
     this.invalidate();
     return new Promise((resolve, reject) =>
@@ -238,23 +257,37 @@ export class Viewer {
 
   private frame(now: number): void {
     requestAnimationFrame((next) => this.frame(next));
-    const seconds = Math.min(0.25, (now - this.lastFrame) / 1000);
+    const sinceMs = now - this.lastFrame;
+    const seconds = Math.min(0.25, sinceMs / 1000);
+    const tileMs = Math.min(MOST_TILE_MS, Math.max(TILE_BUDGET_MS, TILE_SHARE * sinceMs));
     this.lastFrame = now;
     if (this.lost) return;
-    const taken = (this.set?.takeUp(TILE_BUDGET_MS) ?? 0) + (this.dataSet?.takeUp(TILE_BUDGET_MS) ?? 0);
+    this.pace.turn(now);
+    for (let done = this.fences.poll(now); done > 0; --done) this.pace.ended(now);
+    const taken = (this.set?.takeUp(tileMs) ?? 0) + (this.dataSet?.takeUp(tileMs) ?? 0);
     if (taken > 0) this.invalidate();
     this.promote(now);
     if (this.rig.update(seconds)) this.invalidate();
     if (this.people?.step(seconds, this.rig.sceneSize * PERSON_SIZE)) this.wanted = true;
     this.measure(now);
     if (this.exposure.step(seconds)) this.wanted = true;
-    if (!this.wanted) return;
+    if (this.shown?.set.complete === false) this.pace.hurry(now, 0); // the first light is soon first, and then sharp
+    if (!this.wanted && !this.pace.isSharpDue(now)) return;
+    const scale = this.pace.ask(now);
+    if (scale === undefined) return;
     this.wanted = false;
-    this.draw();
+    this.draw(scale);
+    this.pace.began(now, scale);
+    this.fences.put(now);
     this.events.drawn();
   }
 
-  private draw(): void {
+  /** `scale`: of each side, to draw fewer pixels than the screen has. */
+  private draw(scale: number): void {
+    if (scale !== this.scale) {
+      this.scale = scale;
+      this.renderer.setPixelRatio(scale * Math.min(devicePixelRatio, 2));
+    }
     this.shown?.eachMaterial((material) => material.refresh());
     this.pagesView.refresh();
     this.people?.leaveOut(this.rig.camera);
@@ -361,22 +394,33 @@ export class Viewer {
   private resize(): void {
     const { clientWidth: width, clientHeight: height } = this.canvas;
     if (width === 0 || height === 0) return;
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.setPixelRatio(this.scale * Math.min(devicePixelRatio, 2));
     this.renderer.setSize(width, height, false);
     this.rig.resize(width / height);
     this.pagesView.resize(width / height);
-    if (this.shown) this.draw(); // resizing clears the canvas: drawn at once, it does not blink
+    if (this.shown) this.draw(this.scale); // resizing clears the canvas: drawn at once, it does not blink
     this.invalidate();
   }
 
   private onContext(lost: boolean): void {
     this.lost = lost;
+    this.pace.forget();
+    this.fences.forget();
     if (!lost) {
       for (const set of [this.shown?.set, this.staged?.set, this.dataSet]) set?.restore();
       this.invalidate();
     }
     this.events.contextLost(lost);
   }
+}
+
+/** What the browser says of the card, where it says anything. */
+function drawsWithoutCard(gl: WebGL2RenderingContext): boolean {
+  let name = String(gl.getParameter(gl.RENDERER));
+  // Only browsers that hide the name there are asked for it in the old way, which others warn of.
+  const extension = name === 'WebKit WebGL' ? gl.getExtension('WEBGL_debug_renderer_info') : null;
+  if (extension) name = String(gl.getParameter(extension.UNMASKED_RENDERER_WEBGL));
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
 }
 
 function samePages(a: LightmapsNote, b: LightmapsNote): boolean {

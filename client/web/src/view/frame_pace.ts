@@ -1,0 +1,95 @@
+// How finely to draw, and when, so that moving about stays smooth where frames take long (a weak card, or none). While
+// something moves, fewer pixels are drawn; as soon as all is at rest, all of them. Pure: is told what frames cost.
+
+/** Of each side of the picture: every step has half the pixels of the one before. */
+export const SCALES = [1, Math.SQRT1_2, 0.5, 0.5 * Math.SQRT1_2, 0.25] as const;
+
+/** What moves is drawn so finely that a frame takes no longer, where the coarsest scale can do that. */
+export const MOVING_FRAME_MS = 40;
+/** Nothing has moved for so long, and for so many turns of a page that may be slow: all is at rest. */
+const REST_MS = 200;
+const REST_TURNS = 3;
+/** Frames at rest leave a slow card as much time as they take, so that what moves next need not wait; but no more. */
+const MOST_PAUSE_MS = 500;
+/** One is drawn while the next is made: more would only show what is asked for later. */
+const MOST_UNDER_WAY = 2;
+/** Of a whole frame, where the browser says that it draws without a card: 1280 x 720 on two cores, about. */
+const SOFTWARE_FRAME_MS = 300;
+/** A page that nobody looked at has not been told when its frames were done. */
+const LONGEST_FRAME_MS = 5000;
+const LONGEST_TURN_MS = 1000;
+
+interface Frame {
+  scale: number;
+  begunMs: number;
+}
+
+export class FramePace {
+  private readonly underWay: Frame[] = [];
+  /** What frames with all pixels would take, by the newest two that were measured. */
+  private wholeFrameMs: [number, number];
+  private lastEndMs = -Infinity;
+  private lastTookMs = 0;
+  private hurryUntilMs = -Infinity;
+  private lastTurnMs = -Infinity;
+  private turnMs = 0;
+  private lastScale = 1;
+
+  /** `software`: no card draws, as far as is known. */
+  constructor(software: boolean) {
+    const guess = software ? SOFTWARE_FRAME_MS : 0;
+    this.wholeFrameMs = [guess, guess];
+  }
+
+  /** Once for every turn of the page, before anything else. */
+  turn(nowMs: number): void {
+    this.turnMs = Math.min(LONGEST_TURN_MS, nowMs - this.lastTurnMs);
+    this.lastTurnMs = nowMs;
+  }
+
+  /** Something moves, and for so long a soon picture is worth more than a sharp one. */
+  hurry(nowMs: number, forMs = REST_MS): void {
+    const rest = Math.max(forMs, REST_TURNS * this.turnMs);
+    this.hurryUntilMs = Math.max(this.hurryUntilMs, nowMs + rest);
+  }
+
+  /** What is on the screen was drawn in a hurry that is over: it is to be drawn anew. */
+  isSharpDue(nowMs: number): boolean {
+    return this.lastScale < 1 && nowMs >= this.hurryUntilMs;
+  }
+
+  /** The scale of a frame that is drawn now; undefined: later, as the card has enough to do. */
+  ask(nowMs: number): number | undefined {
+    if (nowMs < this.hurryUntilMs) return this.underWay.length < MOST_UNDER_WAY ? this.movingScale : undefined;
+    const pause = this.lastTookMs > MOVING_FRAME_MS ? Math.min(MOST_PAUSE_MS, this.lastTookMs) : 0;
+    return this.underWay.length > 0 || nowMs - this.lastEndMs < pause ? undefined : 1;
+  }
+
+  /** A frame was handed to the card. */
+  began(nowMs: number, scale: number): void {
+    this.underWay.push({ scale, begunMs: nowMs });
+    this.lastScale = scale;
+  }
+
+  /** The card is done with the oldest frame. */
+  ended(nowMs: number): void {
+    const frame = this.underWay.shift();
+    if (!frame) return;
+    const tookMs = nowMs - Math.max(frame.begunMs, this.lastEndMs);
+    this.lastEndMs = nowMs;
+    if (tookMs > LONGEST_FRAME_MS) return;
+    this.lastTookMs = tookMs;
+    this.wholeFrameMs = [this.wholeFrameMs[1], tookMs / frame.scale ** 2];
+  }
+
+  /** The card was taken away, and all it had to draw. */
+  forget(): void {
+    this.underWay.length = 0;
+  }
+
+  /** The finest that is quick enough. One slow frame may be a hiccup (a program being compiled): two are not. */
+  private get movingScale(): number {
+    const wholeMs = Math.min(...this.wholeFrameMs);
+    return SCALES.find((scale) => wholeMs * scale ** 2 <= MOVING_FRAME_MS) ?? SCALES.at(-1)!;
+  }
+}

@@ -1,0 +1,223 @@
+// For those who see little, have no pointer, or a small screen.
+import type { Page } from 'playwright-core';
+import type {} from '../../../client/web/src/main';
+import { converged, serveAll, turns, until } from './harness';
+
+const { server, pages } = serveAll('cornell.glb');
+
+const TABS = ['View', 'Solve', 'Scene', 'Share'];
+
+/**
+ * Texts that are less readable than WCAG 2.2 asks for (1.4.3, level AA: 4.5, or 3 where letters are large), with the
+ * ratio. What shines through a card is taken as white, and as black. Disabled controls are exempt.
+ */
+async function unreadable(page: Page): Promise<string[]> {
+  return page.evaluate(() => {
+    type Colour = [number, number, number, number];
+    const context = new OffscreenCanvas(1, 1).getContext('2d', { willReadFrequently: true })!;
+    const parse = (css: string): Colour => {
+      context.clearRect(0, 0, 1, 1);
+      context.fillStyle = css;
+      context.fillRect(0, 0, 1, 1);
+      const [r, g, b, a] = context.getImageData(0, 0, 1, 1).data;
+      return [r!, g!, b!, a! / 255];
+    };
+    const over = (top: Colour, below: Colour): Colour => {
+      const mix = (i: 0 | 1 | 2) => top[3] * top[i] + (1 - top[3]) * below[i];
+      return [mix(0), mix(1), mix(2), 1];
+    };
+    const luminance = ([r, g, b]: Colour) => {
+      const [x, y, z] = [r, g, b].map((v) => {
+        const s = v / 255;
+        return s <= 0.04045 ? s / 12.92 : ((s + 0.055) / 1.055) ** 2.4;
+      });
+      return 0.2126 * x! + 0.7152 * y! + 0.0722 * z!;
+    };
+    const ratio = (a: Colour, b: Colour) => {
+      const [low, high] = [luminance(a), luminance(b)].sort((p, q) => p - q);
+      return (high! + 0.05) / (low! + 0.05);
+    };
+    const behind = (element: Element, picture: Colour): Colour => {
+      const layers: Colour[] = [];
+      for (let at: Element | null = element; at; at = at.parentElement) {
+        if (at.tagName === 'MAIN') break; // the picture
+        const colour = parse(getComputedStyle(at).backgroundColor);
+        layers.push(colour);
+        if (colour[3] === 1) break;
+        if (getComputedStyle(at).position === 'fixed' && at.closest('.panel, dialog') === null) break;
+      }
+      return layers.reverse().reduce((below, top) => over(top, below), picture);
+    };
+    const out: string[] = [];
+    const visit = (element: Element, text: string) => {
+      const style = getComputedStyle(element);
+      if (element.closest(':disabled') || !(element as HTMLElement).checkVisibility()) return;
+      if (element.closest('canvas, option, noscript, .offscreen')) return;
+      const size = parseFloat(style.fontSize);
+      const needed = size >= 24 || (size >= 18.66 && Number(style.fontWeight) >= 700) ? 3 : 4.5;
+      const worst = Math.min(
+        ...([0, 255] as const).map((v) => {
+          const back = behind(element, [v, v, v, 1]);
+          return ratio(over(parse(style.color), back), back);
+        }),
+      );
+      if (worst < needed) out.push(`${text.trim().slice(0, 40)} (${element.className}): ${worst.toFixed(2)}`);
+    };
+    const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+    for (let node = texts.nextNode(); node; node = texts.nextNode())
+      if (node.textContent?.trim() && node.parentElement) visit(node.parentElement, node.textContent);
+    for (const field of document.querySelectorAll<HTMLInputElement>('input.number, select')) visit(field, field.value);
+    return out;
+  });
+}
+
+it.each(['dark', 'light'] as const)('can be read in %s colours', async (scheme) => {
+  const page = await pages.open('about:blank', 1200, 800);
+  await page.emulateMedia({ colorScheme: scheme });
+  await page.goto(server.url);
+  await converged(page);
+  await page.waitForFunction((theme) => document.documentElement.dataset['theme'] === theme, scheme);
+  await page.evaluate(() => {
+    const { frame, edit, view } = window.viewer!;
+    edit.selectNext(1);
+    void view.setMode('irradiance');
+    view.toggleMeter();
+    frame.toasts.show('A note', 'good');
+    frame.toasts.show('A refusal', 'bad');
+    frame.setBanner('No connection.', 'Try now', () => undefined);
+    frame.setWelcome('empty');
+    frame.legend.show('Irradiance', 'lx', 1, 1000);
+  });
+  for (const tab of TABS) {
+    await page.getByRole('tab', { name: tab }).click();
+    expect(await unreadable(page), tab).toEqual([]);
+  }
+  await page.evaluate(() => window.viewer!.frame.help.showModal());
+  expect(await unreadable(page), 'keys').toEqual([]);
+  // What the test sees by: letters in the colour of what is behind them are found.
+  await page.evaluate(() => (document.querySelector<HTMLElement>('.chip .state')!.style.color = 'var(--card)'));
+  expect((await unreadable(page)).length).toBe(1);
+});
+
+it('reaches every control with Tab, and shows where one is', async () => {
+  const page = await pages.open(server.url, 1200, 800);
+  await converged(page);
+  await page.evaluate(() => window.viewer!.edit.selectNext(1));
+  await until(() => page.locator('.toast').count(), (notes) => notes === 0); // prettier-ignore
+  for (const tab of TABS) {
+    await page.getByRole('tab', { name: tab }).focus();
+    await page.keyboard.press('Enter');
+    // Who is to be reached: tabs that are not open are reached with the arrows from the one that is.
+    const all = await page.evaluate(() => {
+      const list = [...document.querySelectorAll<HTMLElement>('canvas.view, button, input, select, a, summary, pre')]; // prettier-ignore
+      const wanted = list.filter(
+        (element) =>
+          element.checkVisibility() && !element.matches(':disabled, .offscreen, [role=tab][aria-selected=false]'),
+      );
+      wanted.forEach((element, i) => (element.dataset['stop'] = String(i)));
+      (document.activeElement as HTMLElement).blur();
+      return wanted.length;
+    });
+    expect(all).toBeGreaterThan(12);
+    const reached = new Set<string>();
+    const unseen: string[] = [];
+    for (let i = 0; i < 2 * all && reached.size < all; ++i) {
+      await page.keyboard.press('Tab');
+      const { stop, seen, name } = await page.evaluate(() => {
+        const at = document.activeElement as HTMLElement;
+        const { outlineStyle, outlineWidth } = getComputedStyle(at);
+        const seen = at === document.body || (outlineStyle !== 'none' && parseFloat(outlineWidth) >= 2);
+        return { stop: at.dataset['stop'], seen, name: at.getAttribute('aria-label') ?? at.textContent ?? '' };
+      });
+      if (stop) reached.add(stop);
+      if (!seen) unseen.push(name);
+    }
+    expect(unseen, tab).toEqual([]);
+    expect(reached.size, tab).toBe(all);
+    await page.evaluate(() => document.querySelectorAll('[data-stop]').forEach((e) => e.removeAttribute('data-stop')));
+  }
+});
+
+it('moves between tabs with the arrows', async () => {
+  const page = await pages.open(server.url, 1200, 800);
+  await page.getByRole('tab', { name: 'View' }).focus();
+  for (const tab of ['Solve', 'Scene', 'Share', 'View']) {
+    await page.keyboard.press('ArrowRight');
+    expect(await page.evaluate(() => document.activeElement?.textContent)).toBe(tab);
+    expect(await page.getByRole('tab', { name: tab }).getAttribute('aria-selected')).toBe('true');
+  }
+});
+
+it('does by keys alone what a designer does: choose, move, look at, undo', async () => {
+  const page = await pages.open(server.url, 1200, 800);
+  await converged(page);
+  await page.keyboard.press('Tab'); // the picture
+  expect(await page.evaluate(() => document.activeElement?.tagName)).toBe('CANVAS');
+  const name = () =>
+    page.evaluate(() => {
+      const { edit } = window.viewer!;
+      return edit.selection && edit.document.gltf.nodes![edit.selection.node]!.name;
+    });
+  await until(
+    async () => {
+      await page.keyboard.press('n');
+      return name();
+    },
+    (chosen) => chosen === 'tall_block',
+  );
+  const field = page.getByLabel('Position, m, y');
+  const before = await field.inputValue();
+  while (!(await field.evaluate((element) => element === document.activeElement))) await page.keyboard.press('Tab');
+  await page.keyboard.press('Control+a');
+  await page.keyboard.type('0.05');
+  await page.keyboard.press('Enter');
+  const height = () =>
+    page.evaluate(() => {
+      const { edit } = window.viewer!;
+      return edit.document.gltf.nodes![edit.selection!.node]!.translation![1];
+    });
+  expect(await until(height, (y) => y === 0.05)).toBe(0.05);
+  // A key that takes an object away does not do so from another control.
+  const look = page.getByRole('button', { name: 'Look at it' });
+  await look.focus();
+  const eye = () => page.evaluate(() => window.viewer!.viewer.rig.target.toArray());
+  const from = await eye();
+  await page.keyboard.press('Enter');
+  expect(await eye()).not.toEqual(from);
+  await page.keyboard.press('Backspace');
+  expect(await name()).toBe('tall_block');
+  await page.locator('canvas.view').focus();
+  await page.keyboard.press('Control+z');
+  expect(await until(height, (y) => y !== 0.05)).toBe(Number(before));
+  // The list of keys opens, is read from its top, and closes.
+  await page.keyboard.press('?');
+  expect(await page.locator('dialog.help').evaluate((dialog) => dialog.scrollTop)).toBe(0);
+  await page.keyboard.press('Escape');
+  expect(await page.locator('dialog.help').isVisible()).toBe(false);
+});
+
+it('reads the light by touch, and shows what was tapped in the list', async () => {
+  const page = await pages.open(server.url, 360, 640, { touch: true });
+  await converged(page);
+  await page.getByRole('button', { name: 'Light meter' }).tap();
+  await page.evaluate(() => {
+    const { canvas } = window.viewer!.viewer;
+    canvas.addEventListener('pointerleave', () => (canvas.dataset['left'] = 'yes'));
+  });
+  await page.touchscreen.tap(180, 250);
+  await page.locator('canvas.view[data-left]').waitFor(); // a finger that is lifted leaves the picture
+  await turns(page, 2); // what else would follow has followed
+  expect(await page.locator('.meter').innerText()).toMatch(/ lx ± /);
+  await page.getByRole('button', { name: 'Light meter' }).tap();
+  // The last of the list, chosen while the list is not to be seen.
+  await page.evaluate(() => window.viewer!.edit.selectNext(-1));
+  await page.getByRole('button', { name: 'Panel', exact: true }).tap();
+  await page.getByRole('tab', { name: 'Scene' }).tap();
+  const seen = () =>
+    page.evaluate(() => {
+      const list = document.querySelector('.tree')!.getBoundingClientRect();
+      const at = document.querySelector('.tree [aria-current]')!.getBoundingClientRect();
+      return at.top >= list.top && at.bottom <= list.bottom;
+    });
+  expect(await until(seen, (is) => is)).toBe(true);
+});

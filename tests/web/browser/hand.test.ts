@@ -1,0 +1,165 @@
+// What hands do beside moving things: turning and scaling by the handles, taking files away.
+
+import { readFileSync } from 'node:fs';
+import type { Download, Page } from 'playwright-core';
+import type {} from '../../../client/web/src/main';
+import { answered, converged, said, sceneOf, serveAll, until } from './harness';
+
+const { server, pages } = serveAll('cornell.glb');
+
+const SIDE = { width: 1200, height: 800 };
+
+type Placement = { translation: number[]; rotation: number[]; scale: number[] };
+
+async function placementOf(node: number): Promise<Placement> {
+  return (await sceneOf(server)).nodes[node] as unknown as Placement;
+}
+
+/** Chooses the object, and drags the handles of a mode from so far beside their middle, in pixels. Returns its node. */
+async function drag(page: Page, key: string, from: [number, number], by: [number, number]): Promise<number> {
+  const node = await page.evaluate(() => {
+    const { edit } = window.viewer!;
+    const index = edit.document.gltf.nodes!.findIndex(({ name }) => name === 'tall_block');
+    edit.select({ node: index, material: undefined });
+    return index;
+  });
+  await page.locator('canvas.view').focus();
+  await page.keyboard.press(key);
+  const middle = await page.evaluate(() => {
+    const { viewer } = window.viewer!;
+    viewer.rig.camera.updateMatrixWorld();
+    const at = viewer.gizmo.middle.project(viewer.rig.camera);
+    const box = viewer.canvas.getBoundingClientRect();
+    return { x: box.left + ((at.x + 1) / 2) * box.width, y: box.top + ((1 - at.y) / 2) * box.height };
+  });
+  const [x, y] = [middle.x + from[0], middle.y + from[1]];
+  await page.mouse.move(x, y);
+  await page.mouse.down();
+  for (let step = 1; step <= 8; ++step) await page.mouse.move(x + (by[0] * step) / 8, y + (by[1] * step) / 8);
+  await page.mouse.up();
+  return node;
+}
+
+/** Where the middle of an object is, in metres. */
+const middleOf = (page: Page, node: number) =>
+  page.evaluate((n) => {
+    window.viewer!.edit.select({ node: n, material: undefined });
+    return window.viewer!.viewer.gizmo.middle.toArray();
+  }, node);
+
+const distance = (a: readonly number[], b: readonly number[]) => Math.hypot(...a.map((v, i) => v - b[i]!));
+
+it.each([
+  { name: 'turns', key: 'r', from: [55, 55], by: [-60, 40], member: 'rotation' },
+  { name: 'scales', key: 'y', from: [0, 0], by: [50, -30], member: 'scale' },
+] as const)('$name an object about its middle, in one step of undo', async ({ key, from, by, member }) => {
+  const page = await pages.open(server.url, SIDE.width, SIDE.height);
+  await converged(page);
+  const index = (await sceneOf(server)).nodes.findIndex(({ name }) => name === 'tall_block');
+  const before = await placementOf(index);
+  const middle = await middleOf(page, index);
+  const node = await drag(page, key, [...from], [...by]);
+  expect(node).toBe(index);
+  await answered(page);
+  const after = await placementOf(node);
+  expect(distance(after[member], before[member])).toBeGreaterThan(0.01);
+  if (member === 'rotation') expect(Math.hypot(...after.rotation)).toBeCloseTo(1, 8);
+  // The middle handle, which is taken hold of where a ratio of distances says nothing: 80 pixels, less what few moves miss.
+  if (member === 'scale')
+    for (const factor of after.scale.map((s, i) => s / before.scale[i]!)) {
+      expect(factor).toBeGreaterThan(1.2);
+      expect(factor).toBeLessThan(2.5);
+    }
+  expect(await page.evaluate(() => window.viewer!.edit.document.undoStack.length)).toBe(1);
+  // Its middle stays where it was, though its origin lies elsewhere (the file's blocks stand in a corner of the box).
+  expect(distance(await middleOf(page, node), middle)).toBeLessThan(0.05);
+  // The last edit can be taken to a shell: it says the turn, and where that brings the origin.
+  const patch = await page.evaluate(() => window.viewer!.edit.document.lastEdit!.map(({ path }) => path));
+  expect(patch).toEqual([`/nodes/${node}/translation`, `/nodes/${node}/${member}`]);
+  await page.keyboard.press('Control+z');
+  const undone = await until(
+    () => placementOf(node),
+    (now) => JSON.stringify(now) === JSON.stringify(before),
+  );
+  expect(undone).toEqual(before);
+  await converged(page);
+});
+
+async function bytesOf(download: Download): Promise<Buffer> {
+  return readFileSync(await download.path());
+}
+
+const PNG = Buffer.from([0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a]);
+
+/** Width and height from a PNG's header. */
+const sizeOf = (png: Buffer) => [png.readUInt32BE(16), png.readUInt32BE(20)];
+
+it('saves files that are what their names say', async () => {
+  const page = await pages.open(server.url, SIDE.width, SIDE.height);
+  await converged(page);
+  await page.getByRole('tab', { name: 'Share' }).click();
+  const save = async (button: string): Promise<[string, Buffer]> => {
+    const download = page.waitForEvent('download');
+    await page.getByRole('button', { name: button }).click();
+    const file = await download;
+    return [file.suggestedFilename(), await bytesOf(file)];
+  };
+  const [viewName, view] = await save('Save picture');
+  expect(viewName).toBe('view.png');
+  expect(view.subarray(0, 8)).toEqual(PNG);
+  const canvas = await page.evaluate(() => {
+    const { canvas } = window.viewer!.viewer;
+    return [canvas.clientWidth, canvas.clientHeight];
+  });
+  expect(sizeOf(view)).toEqual(canvas); // all pixels of the screen, however few are drawn while frames are slow
+
+  for (const button of ['Lit scene (.glb)', 'Baked scene (.glb)']) {
+    const [name, glb] = await save(button);
+    expect(name, button).toMatch(/\.glb$/);
+    expect(glb.toString('latin1', 0, 4)).toBe('glTF');
+    expect(glb.readUInt32LE(8)).toBe(glb.length);
+    const gltf = JSON.parse(glb.toString('utf8', 20, 20 + glb.readUInt32LE(12))) as {
+      meshes: { primitives: { attributes: object }[] }[];
+    };
+    expect(gltf.meshes[0]!.primitives[0]!.attributes).toHaveProperty('TEXCOORD_1');
+  }
+
+  const [exrName, exr] = await save('Lightmaps (.exr)');
+  expect(exrName).toBe('lightmap.0.exr');
+  expect(exr.readUInt32LE(0)).toBe(20000630); // OpenEXR's magic number
+  const served = Buffer.from(await (await fetch(`${server.url}/lightmaps/0.exr`)).arrayBuffer());
+  expect(exr.equals(served)).toBe(true);
+
+  const [, snapshot] = await save("Server's picture (.png)");
+  expect(snapshot.subarray(0, 8)).toEqual(PNG);
+  expect(sizeOf(snapshot)).toEqual([1920, 1080]);
+});
+
+it('takes a number with a comma, and says so where there is none', async () => {
+  const page = await pages.open(server.url, SIDE.width, SIDE.height);
+  await converged(page);
+  await page.getByRole('tab', { name: 'Solve' }).click();
+  const goal = page.getByLabel('Error, %');
+  await goal.fill('1,9');
+  await goal.press('Enter');
+  const settings = () =>
+    page.evaluate(
+      async () => (await window.viewer!.connection.call<{ settings: { targetError: number } }>('status')).settings,
+    );
+  const changed = await until(settings, ({ targetError }) => targetError !== 0.02);
+  expect(changed.targetError).toBeCloseTo(0.019, 12);
+  await goal.fill('half');
+  await goal.press('Enter');
+  await said(page, /^“half” cannot stand there$/);
+  expect(await goal.inputValue()).toBe('1.9');
+  // What the server refuses does not stay in the field either.
+  const texels = page.getByLabel('Texels, about');
+  const before = await texels.inputValue();
+  await texels.fill('1e15');
+  await texels.press('Enter');
+  await until(
+    () => texels.inputValue(),
+    (value) => value === before,
+  );
+  await page.evaluate(() => window.viewer!.connection.call('solve.configure', { targetError: 0.02 }));
+});

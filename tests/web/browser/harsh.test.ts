@@ -1,0 +1,292 @@
+// Scenes that are large, odd or mean, and whether the page gives back what it takes.
+
+import type { Page } from 'playwright-core';
+import type {} from '../../../client/web/src/main';
+import { converged, drawn, pixels, said, SCENES, type Server, serveEach, until } from './harness';
+
+const { pages, serve } = serveEach();
+
+interface Node {
+  name?: string;
+  mesh?: number;
+  translation?: number[];
+  children?: number[];
+}
+
+/** A glTF of squares, one metre wide, that face upwards and shine; `nodes` use mesh 0. */
+function squares(nodes: Node[], names: { material?: string; mesh?: string } = {}): string {
+  const corners = [-0.5, 0, -0.5, -0.5, 0, 0.5, 0.5, 0, 0.5, 0.5, 0, -0.5];
+  const bytes = Buffer.alloc(60);
+  corners.forEach((v, i) => bytes.writeFloatLE(v, 4 * i));
+  [0, 1, 2, 0, 2, 3].forEach((v, i) => bytes.writeUInt16LE(v, 48 + 2 * i));
+  const hung = new Set(nodes.flatMap(({ children }) => children ?? []));
+  return JSON.stringify({
+    asset: { version: '2.0' },
+    scene: 0,
+    scenes: [{ nodes: nodes.map((_, i) => i).filter((i) => !hung.has(i)) }],
+    nodes,
+    meshes: [{ name: names.mesh ?? 'square', primitives: [{ attributes: { POSITION: 0 }, indices: 1, material: 0 }] }],
+    materials: [
+      {
+        name: names.material ?? 'paper',
+        emissiveFactor: [1, 1, 1],
+        pbrMetallicRoughness: { baseColorFactor: [0.5, 0.5, 0.5, 1] },
+      },
+    ],
+    accessors: [
+      {
+        bufferView: 0,
+        componentType: 5126,
+        count: 4,
+        type: 'VEC3',
+        min: [-0.5, 0, -0.5],
+        max: [0.5, 0, 0.5],
+      },
+      { bufferView: 1, componentType: 5123, count: 6, type: 'SCALAR' },
+    ],
+    bufferViews: [
+      { buffer: 0, byteOffset: 0, byteLength: 48 },
+      { buffer: 0, byteOffset: 48, byteLength: 12 },
+    ],
+    buffers: [{ byteLength: 60, uri: `data:application/octet-stream;base64,${bytes.toString('base64')}` }],
+  });
+}
+
+async function put(server: Server, gltf: string): Promise<void> {
+  const answer = await fetch(`${server.url}/scene?name=harsh.gltf`, {
+    method: 'PUT',
+    body: gltf,
+    headers: { 'Content-Type': 'model/gltf+json' },
+  });
+  if (!answer.ok) throw new Error(await answer.text());
+}
+
+/** Until the page shows the scene that the server has, lit. */
+async function shown(page: Page, node: string): Promise<void> {
+  await page.waitForFunction((name) => window.viewer?.edit.document.gltf.nodes?.some((n) => n.name === name), node);
+  await converged(page);
+}
+
+it('takes names for text, however they are written and however long they are', async () => {
+  const server = await serve();
+  const evil = '<img src=x onerror="window.hacked=1"><script>window.hacked=1</script>';
+  const long = 'W'.repeat(10_000);
+  await put(
+    server,
+    squares(
+      [
+        { name: evil, mesh: 0 },
+        { name: long, mesh: 0, translation: [0, 1, 0] },
+        { name: 'last', mesh: 0, translation: [2, 0, 0] },
+      ],
+      { material: evil, mesh: long },
+    ),
+  );
+  const page = await pages.open(server.url, 1200, 800);
+  await shown(page, 'last');
+  await page.getByRole('tab', { name: 'Scene' }).click();
+  for (const index of [0, 1]) {
+    await page.locator('.tree button').nth(index).click();
+    await page.getByText(/^Material: /).waitFor();
+  }
+  // Another page, of such a name, changes such an object: that is told, too.
+  await page.evaluate(
+    async ({ name, address }) => {
+      const socket = new WebSocket(`ws://${address}/ws`, 'radiosity.v1');
+      await new Promise((resolve) => (socket.onopen = resolve));
+      const send = (id: number, method: string, params: object) =>
+        socket.send(JSON.stringify({ jsonrpc: '2.0', id, method, params }));
+      send(1, 'hello', { client: name });
+      for (const [i, node] of [0, 1].entries())
+        send(2 + i, 'scene.patch', {
+          patch: [{ op: 'replace', path: `/nodes/${node}/translation`, value: [0, 0.5 + node, 0] }],
+        });
+    },
+    { name: evil.slice(0, 40), address: new URL(server.url).host },
+  );
+  await said(page, /changed .*position/);
+  expect(await page.evaluate(() => 'hacked' in window)).toBe(false);
+  expect(await page.locator('img').count()).toBe(0);
+  // Nothing grows out of its place.
+  const wide = await page.evaluate(() =>
+    [...document.querySelectorAll('.panel *, .toasts *')]
+      .filter((e) => e.getBoundingClientRect().right > innerWidth + 1)
+      .map((e) => e.className || e.tagName),
+  );
+  expect(wide).toEqual([]);
+  const tall = await page.evaluate(() =>
+    Math.max(...[...document.querySelectorAll('.toast, .panel h3')].map((e) => e.clientHeight)),
+  );
+  expect(tall).toBeLessThan(400);
+});
+
+it('lists ten thousand objects, and finds one of them by its name', async () => {
+  const server = await serve();
+  const nodes: Node[] = Array.from({ length: 10_000 }, (_, i) => ({
+    name: `object ${i}`,
+    ...(i % 100 === 0 ? { mesh: 0, translation: [(i / 100) % 10, 0, Math.floor(i / 1000)] } : {}),
+  }));
+  nodes.push({ name: 'the last', mesh: 0, translation: [0, 1, 0] });
+  await put(server, squares(nodes));
+  const page = await pages.open(server.url, 1200, 800);
+  await shown(page, 'the last');
+  await page.getByRole('tab', { name: 'Scene' }).click();
+  await page.getByText(/and 9601 more/).waitFor();
+  await page.getByLabel('Find an object by name').fill('THE LAST');
+  await page.getByRole('button', { name: 'the last', exact: true }).click();
+  await page.getByText('Position, m').waitFor();
+  expect(await page.locator('.tree button').count()).toBe(1);
+  await page.getByLabel('Find an object by name').fill('nothing of that name');
+  await page.locator('.tree').getByText('None.').waitFor();
+});
+
+it('shows scenes without anything, and forgets one that its server has no more', async () => {
+  const server = await serve();
+  await put(
+    server,
+    JSON.stringify({ asset: { version: '2.0' }, scenes: [{}], scene: 0, nodes: [{ name: 'nothing' }] }),
+  );
+  const page = await pages.open(server.url, 900, 600);
+  await page.waitForFunction(() => window.viewer?.viewer.shown !== undefined);
+  await page.keyboard.press('f');
+  await page.keyboard.press('m');
+  await put(server, squares([{ name: 'one', mesh: 0 }]));
+  await shown(page, 'one');
+  await server.stop();
+  await page.getByText(/No connection/).waitFor();
+  await server.start(); // without a scene
+  await page.getByText('No scene yet').waitFor();
+  await page.waitForFunction(() => window.viewer!.viewer.shown === undefined);
+  await put(server, squares([{ name: 'two', mesh: 0 }]));
+  await shown(page, 'two');
+});
+
+it('looks at a scene that somebody else has loaded, and stays where one was for the same one', async () => {
+  const server = await serve(`${SCENES}/cornell.glb`);
+  const page = await pages.open(server.url, 900, 600);
+  await converged(page);
+  await page.locator('canvas.view').focus();
+  for (let i = 0; i < 3; ++i) await page.keyboard.press('ArrowRight');
+  const eye = () => page.evaluate(() => window.viewer!.viewer.rig.camera.position.toArray());
+  const before = await eye();
+  await page.evaluate(() => window.viewer!.connection.call('solve.configure', { texels: 9000 }));
+  await converged(page);
+  expect(await eye()).toEqual(before);
+  await put(server, squares([{ name: 'far away', mesh: 0, translation: [500, 0, 0] }]));
+  await shown(page, 'far away');
+  const after = await until(eye, ([x]) => Math.abs(x! - 500) < 50);
+  expect(Math.abs(after[0]! - 500)).toBeLessThan(50);
+});
+
+it('keeps a page of many texels, and forty pages, within the memory that it states', async () => {
+  // As the server would tell of them; tiles of all would take minutes here.
+  const server = await serve(`${SCENES}/cornell.glb`);
+  const page = await pages.open(server.url, 900, 600);
+  await converged(page);
+  const bytes = await page.evaluate(async () => {
+    const { viewer } = window.viewer!;
+    const taken: number[] = [];
+    const layouts = [
+      [{ width: 4096, height: 4096, mips: 13 }],
+      Array.from({ length: 40 }, () => ({ width: 1024, height: 1024, mips: 11 })),
+      Array.from({ length: 40 }, () => ({ width: 4096, height: 4096, mips: 13 })),
+    ];
+    for (const [i, pages] of layouts.entries()) {
+      const note = { ...viewer.set!.note, layout: 1000 + i, pages };
+      taken.push(viewer.expectLayout(note)!.bytes);
+      await new Promise((resolve) => setTimeout(resolve, 100));
+    }
+    return taken;
+  });
+  expect(bytes[0]).toBeLessThanOrEqual(86 * 2 ** 20);
+  expect(bytes[1]).toBeLessThanOrEqual(214 * 2 ** 20);
+  expect(bytes[2]).toBeLessThanOrEqual(512 * 2 ** 20);
+});
+
+it('gives back what edits, loads and views have taken on the card', async () => {
+  const server = await serve(`${SCENES}/cornell.glb`);
+  const page = await pages.open('about:blank', 900, 600);
+  await page.addInitScript(() => {
+    const counts: Record<string, number> = {};
+    (window as unknown as { alive: object }).alive = counts;
+    const type = WebGL2RenderingContext.prototype as unknown as Record<string, (...of: unknown[]) => unknown>;
+    for (const kind of ['Texture', 'Buffer', 'VertexArray', 'Program', 'Framebuffer', 'Sync']) {
+      const [make, end] = kind === 'Sync' ? ['fenceSync', 'deleteSync'] : [`create${kind}`, `delete${kind}`];
+      const [making, ending] = [type[make]!, type[end]!];
+      type[make] = function (...of) {
+        counts[kind] = (counts[kind] ?? 0) + 1;
+        return making.apply(this, of);
+      };
+      type[end] = function (...of) {
+        if (of[0]) counts[kind] = (counts[kind] ?? 0) - 1;
+        return ending.apply(this, of);
+      };
+    }
+  });
+  await page.goto(server.url);
+  await converged(page);
+  const alive = () => page.evaluate(() => ({ ...(window as unknown as { alive: Record<string, number> }).alive }));
+  const round = async (i: number) => {
+    await page.evaluate(async (step) => {
+      const app = window.viewer!;
+      const node = app.edit.document.gltf.nodes!.findIndex(({ name }) => name === 'tall_block');
+      app.edit.select({ node, material: undefined });
+      for (const mode of ['error', 'patches', 'pages', 'lit']) await app.view.setMode(mode);
+      app.edit.select(undefined);
+      const value = [0.001 * (1 + (step % 2)), 0, 0];
+      await app.connection.call('scene.patch', {
+        patch: [{ op: 'replace', path: `/nodes/${node}/translation`, value }],
+      });
+      await app.connection.call('solve.configure', { texels: 9000 + 1000 * (step % 2) });
+    }, i);
+    await converged(page);
+    await pixels(page, 8);
+  };
+  // What is made once is there, the handles too: rounds are so quick that frames may miss them.
+  const select = (name?: string) =>
+    page.evaluate((wanted) => {
+      const app = window.viewer!;
+      const node = app.edit.document.gltf.nodes!.findIndex((one) => one.name === wanted);
+      app.edit.select(wanted === undefined ? undefined : { node, material: undefined });
+    }, name);
+  await select('tall_block');
+  await drawn(page);
+  await select();
+  for (let i = 0; i < 2; ++i) await round(i);
+  // While a layout takes the place of another both are there.
+  const counts: string[] = [];
+  const settled = () => counts.length > 4 && new Set(counts.slice(-4)).size === 1;
+  await until(async () => counts.push(JSON.stringify(await alive())), settled);
+  const before = await alive();
+  for (let i = 2; i < 8; ++i) await round(i);
+  expect(before['Texture']).toBeGreaterThan(0);
+  // A frame or two may be on their way, and three.js keeps as many vertex arrays as it has seen pairs of geometry and program.
+  const grown = async () => Object.entries(await alive()).filter(([kind, count]) => count - (before[kind] ?? 0) > 3);
+  expect(await until(grown, (kinds) => kinds.length === 0)).toEqual([]);
+});
+
+it('shows the first light of a scene of many texels while they are being made', async () => {
+  const server = await serve(`${SCENES}/cornell.glb`, '--texels', '1200000');
+  const page = await pages.open('about:blank', 900, 600);
+  await page.addInitScript(() => {
+    const seen: { texels: number; lit: boolean; covered: boolean }[] = [];
+    (window as unknown as { seen: object[] }).seen = seen;
+    const look = () => {
+      const set = window.viewer?.viewer.shown?.set;
+      const texels = set?.note.pages.reduce((sum, { width, height }) => sum + width * height, 0) ?? 0;
+      const card = document.querySelector<HTMLElement>('.welcome');
+      if (set?.lit && seen.at(-1)?.texels !== texels) seen.push({ texels, lit: true, covered: card?.hidden === false });
+      requestAnimationFrame(look);
+    };
+    look();
+  });
+  await page.goto(server.url);
+  const seen = await until(
+    () => page.evaluate(() => (window as unknown as { seen: { texels: number; covered: boolean }[] }).seen),
+    (all) => all.length > 0 && all.at(-1)!.texels > 1_000_000,
+  );
+  // A page that opens later than the load takes finds all texels there.
+  expect(seen.at(-1)!.texels).toBeGreaterThan(1_000_000);
+  for (const { covered } of seen) expect(covered).toBe(false);
+  for (const { texels } of seen.slice(0, -1)) expect(texels).toBeLessThan(300_000);
+});

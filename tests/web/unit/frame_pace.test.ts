@@ -1,0 +1,110 @@
+import { FramePace, MOVING_FRAME_MS, SCALES } from '../../../client/web/src/view/frame_pace';
+
+/** A card for which a frame with all pixels takes so long, one after the other; asked every 16 ms, as browsers do. */
+class Card {
+  readonly scales: number[] = [];
+  /** From the moment a frame was handed over to its end. */
+  readonly latencies: number[] = [];
+  private nowMs = 0;
+  private queue: { begun: number; end: number }[] = [];
+
+  constructor(
+    private readonly pace: FramePace,
+    private readonly wholeMs: number,
+  ) {}
+
+  /** `moving`: something moves before every frame. `tiles`: something has come that is to be drawn. */
+  run(forMs: number, { moving = false, tiles = false }): void {
+    for (const until = this.nowMs + forMs; this.nowMs < until; this.nowMs += 16) {
+      while (this.queue[0] && this.queue[0].end <= this.nowMs) {
+        this.latencies.push(this.nowMs - this.queue.shift()!.begun);
+        this.pace.ended(this.nowMs);
+      }
+      this.pace.turn(this.nowMs);
+      if (moving) this.pace.hurry(this.nowMs);
+      if (!moving && !tiles && !this.pace.isSharpDue(this.nowMs)) continue;
+      const scale = this.pace.ask(this.nowMs);
+      if (scale === undefined) continue;
+      this.scales.push(scale);
+      this.pace.began(this.nowMs, scale);
+      const end = Math.max(this.nowMs, this.queue.at(-1)?.end ?? 0) + this.wholeMs * scale ** 2;
+      this.queue.push({ begun: this.nowMs, end });
+    }
+  }
+}
+
+describe('the pace of frames', () => {
+  it('draws all pixels of every frame on a card that can', () => {
+    const card = new Card(new FramePace(false), 10);
+    card.run(1000, { moving: true });
+    expect(card.scales.length).toBeGreaterThan(60);
+    expect(new Set(card.scales)).toEqual(new Set([1]));
+  });
+
+  it('draws fewer while something moves on one that cannot, so that frames are quick, and all once it rests', () => {
+    const card = new Card(new FramePace(false), 300);
+    card.run(3000, { moving: true });
+    const settled = card.scales.slice(5);
+    expect(settled.length).toBeGreaterThan(40);
+    for (const scale of settled) expect(300 * scale ** 2).toBeLessThanOrEqual(MOVING_FRAME_MS);
+    // Two are under way at most, and the clock ticks every 16 ms.
+    for (const latency of card.latencies.slice(5)) expect(latency).toBeLessThan(2 * (MOVING_FRAME_MS + 16));
+    const before = card.scales.length;
+    card.run(2000, {});
+    expect(card.scales.slice(before)).toEqual([1]);
+  });
+
+  it('begins coarsely where no card draws', () => {
+    const pace = new FramePace(true);
+    pace.hurry(0);
+    expect(pace.ask(0)).toBeLessThan(0.5);
+  });
+
+  it('takes one slow frame for a hiccup', () => {
+    const pace = new FramePace(false);
+    const card = new Card(pace, 10);
+    card.run(200, { moving: true });
+    pace.hurry(10_000);
+    pace.began(10_000, 1);
+    pace.ended(10_900);
+    pace.hurry(11_000);
+    expect(pace.ask(11_000)).toBe(1);
+  });
+
+  it('is as sharp as before when the card is quick again', () => {
+    const pace = new FramePace(false);
+    new Card(pace, 4000).run(20_000, { moving: true });
+    pace.forget();
+    pace.hurry(30_000);
+    expect(pace.ask(30_000)).toBe(SCALES.at(-1));
+    let now = 30_000;
+    for (let i = 0; i < 20; ++i, now += 20) {
+      pace.hurry(now);
+      pace.began(now, pace.ask(now)!);
+      pace.ended(now + 16); // however few pixels: it is told at the next tick of the clock
+    }
+    pace.hurry(now);
+    expect(pace.ask(now)).toBe(1);
+  });
+
+  it('does not take a page that turns slowly for one that rests', () => {
+    const pace = new FramePace(true);
+    for (let now = 0; now < 5000; now += 600) {
+      pace.turn(now);
+      expect(pace.isSharpDue(now)).toBe(false);
+      pace.hurry(now); // by an event between two turns
+      const scale = pace.ask(now);
+      expect(scale).toBeLessThan(1);
+      pace.began(now, scale!);
+      pace.ended(now + 100);
+    }
+  });
+
+  it('leaves a slow card half of its time when only light changes', () => {
+    const card = new Card(new FramePace(false), 320);
+    card.run(10_000, { tiles: true });
+    expect(new Set(card.scales)).toEqual(new Set([1]));
+    expect(card.scales.length).toBeLessThan(18);
+    expect(card.scales.length).toBeGreaterThan(12);
+  });
+});
