@@ -6,6 +6,7 @@
 // on the other side, the next pixels are asked too.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -46,11 +47,16 @@ class LightGatherer {
   struct Lit {
     std::vector<float> x, y, z, nx, ny, nz;
     std::vector<float> form_factor;  ///< times the receiving point's share of its leaf
-    std::vector<std::uint32_t> receiver;
-    std::vector<float> front;  ///< part of what shines that lies before the receiver's plane
+    std::vector<float> share;        ///< that one
+    std::vector<std::uint32_t> node;
+    std::vector<std::uint32_t> care;      ///< Receivers::careOf
+    std::vector<std::uint32_t> doubt;     ///< what questions the pixel of the point being tested leaves
+    std::vector<std::uint32_t> doubtful;  ///< those with some
+    std::vector<float> front;             ///< part of what shines that lies before the receiver's plane
     std::array<std::vector<float>, 2> weight, visible_weight;
     std::vector<float> point_weight;   ///< of the point being tested
     std::vector<std::uint32_t> pixel;  ///< in which it sees the receiver
+    std::vector<float> visibility;     ///< as findVisibility last found it
 
     void resize(std::size_t count);
   };
@@ -64,22 +70,31 @@ class LightGatherer {
   void weighLostInside(const ViewWindow& window, const solver::HemicubeFrame& point,
                        std::span<const std::uint32_t> items, std::uint32_t resolution, const HemicubeWeights& weights,
                        Lost& lost) const;
+  void makeRoom(std::size_t more);
   void findLit(const solver::GatherShot& shot);
   void findLitGroup(const solver::GatherShot& shot, const Receivers::Group& group);
+  void addPlain(const solver::GatherShot& shot, std::size_t first, std::size_t count, const glm::vec3& normal);
   void weighWhole(const solver::GatherShot& shot);
-  void shareAmongSpots(const solver::GatherShot& shot, std::size_t begin);
+  void shareAmongPlaces(std::size_t begin);
   [[nodiscard]] bool behind(const solver::GatherShot& shot, const scene::Surface& surface) const;
   void testPoint(const solver::GatherShot& shot, const solver::HemicubeFrame& point,
                  std::span<const std::uint32_t> items, std::size_t half);
+  [[nodiscard]] std::array<std::uint32_t, 9> itemsAround(std::size_t i, std::span<const std::uint32_t> items,
+                                                         std::size_t size) const;
+  [[nodiscard]] Receivers::Ray rayTo(std::size_t i, const glm::vec3& light, std::size_t size) const;
+  [[nodiscard]] bool hidden(std::size_t i, const glm::vec3& light, std::span<const std::uint32_t> items,
+                            std::size_t size) const;
+  [[nodiscard]] bool hiddenFromGap(std::size_t i, const glm::vec3& light, std::span<const std::uint32_t> items,
+                                   std::size_t size) const;
   [[nodiscard]] bool hiddenAtSilhouette(std::size_t i, const glm::vec3& light, std::span<const std::uint32_t> items,
                                         std::size_t size) const;
   void weighLost(const solver::HemicubeFrame& point, std::span<const std::uint32_t> items, std::uint32_t resolution,
                  const HemicubeWeights& weights, Lost& lost);
-  [[nodiscard]] float visibility(std::size_t sums, std::size_t i, std::size_t points) const;
-  [[nodiscard]] double delivered(std::size_t sums, std::size_t points) const;
-  [[nodiscard]] double conserve(std::size_t sums, std::size_t points, double area, double kept) const;
-  void addLit(std::size_t receiver, const Receivers::Place& place, const glm::vec3& normal);
-  void deliver(const solver::GatherShot& shot, std::size_t half, std::size_t points, double share, const FluxSink& sink,
+  void findVisibility(std::size_t sums, std::size_t points);
+  [[nodiscard]] double delivered() const;
+  [[nodiscard]] double conserve(double area, double kept) const;
+  void addLit(const Receivers::Receiver& receiver, const Receivers::Place& place, const glm::vec3& normal);
+  void deliver(const solver::GatherShot& shot, std::size_t half, double share, const FluxSink& sink,
                solver::TransportCounters& counters) const;
 
   std::shared_ptr<const Receivers> receivers_;

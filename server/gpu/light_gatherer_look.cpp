@@ -62,6 +62,52 @@ __attribute__((target_clones("avx2", "default"))) void projectReceivers(const Po
   }
 }
 
+/// What of a doubt is not of the receiver (Receivers::Care): what its pixel shows may hide the light from it.
+constexpr std::uint32_t kHides = 4;
+/// A receiver this far (unit box) before an item is none of its places: its pixel's middle misses what it lies on.
+constexpr float kApart = 1.0e-5F;
+
+/// Planes of triangles, by triangle: normal and distance. Items of a hemicube, by pixel.
+struct Seen {
+  const float* planes;
+  const std::int32_t* items;
+};
+
+/// What questions a receiver's pixel leaves: a receiver in a gap has one in any case, one of a surface with two sides
+/// where the pixel shows what lies behind it, all where the pixel shows nothing, or an item behind whose plane they
+/// lie, on the side that the light at `o` does not see. Most have none, and see the light. Indices have signs so that
+/// it vectorises.
+__attribute__((target_clones("avx2", "default"))) void findDoubts(const glm::vec3& o, const Seen& seen,
+                                                                  std::size_t count, const std::uint32_t* pixel,
+                                                                  const float* x, const float* y, const float* z,
+                                                                  const std::uint32_t* care, std::uint32_t* doubt) {
+  static_assert(sizeof(Receivers::Plane) == 4 * sizeof(float) && static_cast<std::int32_t>(RAD_ITEM_NONE) < 0);
+  const float ox = o.x, oy = o.y, oz = o.z;
+  const auto [planes, items] = seen;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto item = items[static_cast<std::int32_t>(pixel[i])];
+    const std::int32_t k = 4 * (item < 0 ? 0 : item);
+    const float nx = planes[k], ny = planes[k + 1], nz = planes[k + 2], distance = planes[k + 3];
+    const float light = nx * ox + ny * oy + nz * oz - distance;
+    const float receiver = nx * x[i] + ny * y[i] + nz * z[i] - distance;
+    const float before = light > 0.0F ? receiver : -receiver;
+    const std::uint32_t asks = before > kApart ? care[i] : care[i] & Receivers::kInGap;
+    doubt[i] = before < -kInPlane || item < 0 ? kHides | asks : asks;
+  }
+}
+
+/// The part of what was weighed that was visible; see LightGatherer::findVisibility.
+__attribute__((target_clones("avx2", "default"))) void weighVisible(std::size_t count, float points,
+                                                                    const float* weight, const float* visible_weight,
+                                                                    const float* front, float* visibility) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const float seen = weight[i] > 0.0F ? visible_weight[i] / weight[i] : 0.0F;
+    // The points are spread evenly: of `points`, one at least lies in front of all planes that cut off a larger part.
+    const float some = std::min(1.0F, points * front[i]);
+    visibility[i] = seen * (front[i] >= 1.0F ? 1.0F : std::min(1.0F / some, kMostForOthers));
+  }
+}
+
 }  // namespace
 
 void LightGatherer::testPoint(const solver::GatherShot& shot, const solver::HemicubeFrame& point,
@@ -75,41 +121,80 @@ void LightGatherer::testPoint(const solver::GatherShot& shot, const solver::Hemi
   const auto size = static_cast<std::size_t>(shot.resolution);
   float* weight = lit_.weight[half].data();
   float* visible_weight = lit_.visible_weight[half].data();
+  const Seen seen{&receivers_->planes()->normal.x, reinterpret_cast<const std::int32_t*>(items.data())};
+  findDoubts(o, seen, lit_count_, lit_.pixel.data(), lit_.x.data(), lit_.y.data(), lit_.z.data(), lit_.care.data(),
+             lit_.doubt.data());
   for (std::size_t i = 0; i < lit_count_; ++i) {
-    const auto item = items[lit_.pixel[i]];
-    bool visible = true;
-    if (item == RAD_ITEM_NONE) {
-      visible = !hiddenAtSilhouette(i, o, items, size);
-    } else {
-      const auto& plane = receivers_->plane(item);
-      const glm::vec3 at(lit_.x[i], lit_.y[i], lit_.z[i]);
-      const float light = glm::dot(plane.normal, o) - plane.distance;
-      const float receiver = glm::dot(plane.normal, at) - plane.distance;
-      const float before = light > 0.0F ? receiver : -receiver;
-      visible =
-          before >= -kInPlane || !receivers_->risesBefore(item, at, glm::vec3(lit_.nx[i], lit_.ny[i], lit_.nz[i]));
-    }
     weight[i] += lit_.point_weight[i];
-    visible_weight[i] += visible ? lit_.point_weight[i] : 0.0F;
+    visible_weight[i] += lit_.doubt[i] == 0 ? lit_.point_weight[i] : 0.0F;
+  }
+  std::size_t doubts = 0;
+  for (std::size_t i = 0; i < lit_count_; ++i) {
+    lit_.doubtful[doubts] = static_cast<std::uint32_t>(i);
+    doubts += lit_.doubt[i] == 0 ? 0 : 1;
+  }
+  for (const auto i : std::span(lit_.doubtful.data(), doubts)) {
+    if (!hidden(i, o, items, size)) visible_weight[i] += lit_.point_weight[i];
   }
 }
 
-/// The middle of a receiver's pixel misses everything, the receiver too. Where the ray to it meets a wide facet that a
-/// neighbouring pixel shows, that hides it: along the edges of a closed room, what lies behind its walls.
-bool LightGatherer::hiddenAtSilhouette(std::size_t i, const glm::vec3& light, std::span<const std::uint32_t> items,
-                                       std::size_t size) const {
+/// Of a receiver whose pixel leaves doubts.
+bool LightGatherer::hidden(std::size_t i, const glm::vec3& light, std::span<const std::uint32_t> items,
+                           std::size_t size) const {
+  const auto item = items[lit_.pixel[i]];
+  if (item == RAD_ITEM_NONE) return hiddenAtSilhouette(i, light, items, size);
+  if ((lit_.doubt[i] & Receivers::kInGap) != 0) return hiddenFromGap(i, light, items, size);
+  // Beside a silhouette one looks past what closes a hollow whose inside is a surface as well.
+  if ((lit_.doubt[i] & kHides) == 0) return hiddenAtSilhouette(i, light, items, size);
+  return receivers_->risesBefore(item, {lit_.x[i], lit_.y[i], lit_.z[i]}, {lit_.nx[i], lit_.ny[i], lit_.nz[i]});
+}
+
+/// The receiver's pixel and those around it, on the same face.
+std::array<std::uint32_t, 9> LightGatherer::itemsAround(std::size_t i, std::span<const std::uint32_t> items,
+                                                        std::size_t size) const {
   const std::size_t pixel = lit_.pixel[i], column = pixel % size, row = pixel / size;
   const std::size_t first_row = row < size ? 0 : size + (row - size) / (size / 2) * (size / 2);
   const std::size_t rows = row < size ? size : size / 2;
   std::array<std::uint32_t, 9> around{};
-  for (std::size_t k = 0; k < around.size(); ++k) {
-    const auto x = std::clamp<std::size_t>(column + k % 3, 1, size) - 1;
-    const auto y = std::clamp<std::size_t>(row - first_row + k / 3, 1, rows) - 1;
-    around[k] = items[(first_row + y) * size + x];
+  const bool inside = column > 0 && column + 1 < size && row > first_row && row + 1 < first_row + rows;
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (inside) {
+      const auto* three = &items[pixel + k * size - size - 1];
+      std::copy(three, three + 3, &around[3 * k]);
+      continue;
+    }
+    const auto y = std::clamp<std::size_t>(row - first_row + k, 1, rows) - 1;
+    for (std::size_t x = 0; x < 3; ++x)
+      around[3 * k + x] = items[(first_row + y) * size + std::clamp<std::size_t>(column + x, 1, size) - 1];
   }
+  return around;
+}
+
+Receivers::Ray LightGatherer::rayTo(std::size_t i, const glm::vec3& light, std::size_t size) const {
   const glm::vec3 at(lit_.x[i], lit_.y[i], lit_.z[i]), normal(lit_.nx[i], lit_.ny[i], lit_.nz[i]);
   const float pixel_size = 2.0F * glm::distance(light, at) / static_cast<float>(size);
-  return receivers_->anyMeets(around, {at, normal, light - at, 1.0F, pixel_size});
+  return {at, normal, light - at, 1.0F, pixel_size};
+}
+
+/// The middle of a receiver's pixel misses the receiver, and perhaps everything. Where the ray to it meets a wide facet
+/// that a neighbouring pixel shows, that hides it: along the edges of a closed room, what lies behind its walls.
+bool LightGatherer::hiddenAtSilhouette(std::size_t i, const glm::vec3& light, std::span<const std::uint32_t> items,
+                                       std::size_t size) const {
+  return receivers_->anyMeets(itemsAround(i, items, size), rayTo(i, light, size));
+}
+
+/// Pixels blur the edges of shadows, which is right in the mean: what one leaf loses its neighbour gains. Not beside
+/// what hovers right before a surface: the neighbour is dark.
+bool LightGatherer::hiddenFromGap(std::size_t i, const glm::vec3& light, std::span<const std::uint32_t> items,
+                                  std::size_t size) const {
+  const auto own = items[lit_.pixel[i]];
+  const auto around = itemsAround(i, items, size);
+  if (std::any_of(around.begin(), around.end(), [own](std::uint32_t item) { return item != own; })) {
+    const auto hidden = receivers_->hiddenAmong(around, rayTo(i, light, size));
+    if (hidden) return *hidden;
+  }
+  return (lit_.doubt[i] & kHides) != 0 &&
+         receivers_->risesBefore(own, {lit_.x[i], lit_.y[i], lit_.z[i]}, {lit_.nx[i], lit_.ny[i], lit_.nz[i]});
 }
 
 void LightGatherer::weighLost(const solver::HemicubeFrame& point, std::span<const std::uint32_t> items,
@@ -149,14 +234,9 @@ void LightGatherer::weighLostInside(const ViewWindow& window, const solver::Hemi
 /// By the points before the receiver's plane, which decide alone: those behind it see nothing of what the form factor
 /// stands for. Where there happen to be none, others stand for them, so that the mean over all samples is right; but
 /// for the light of a last sliver, which would need too many.
-float LightGatherer::visibility(std::size_t sums, std::size_t i, std::size_t points) const {
-  const float weight = lit_.weight[sums][i];
-  if (weight <= 0.0F) return 0.0F;
-  const float seen = lit_.visible_weight[sums][i] / weight;
-  if (lit_.front[i] >= 1.0F) return seen;
-  // The points are spread evenly: of `points`, one at least lies in front of all planes that cut off a larger part.
-  const float some = std::min(1.0F, static_cast<float>(points) * lit_.front[i]);
-  return seen * std::min(1.0F / some, kMostForOthers);
+void LightGatherer::findVisibility(std::size_t sums, std::size_t points) {
+  weighVisible(lit_count_, static_cast<float>(points), lit_.weight[sums].data(), lit_.visible_weight[sums].data(),
+               lit_.front.data(), lit_.visibility.data());
 }
 
 }  // namespace radiosity::gpu

@@ -9,7 +9,7 @@ namespace radiosity::gpu {
 namespace {
 
 /// A facet narrower than this many pixels may slip between them.
-constexpr float kWidePixels = 3.0F;
+constexpr float kWidePixels = 1.5F;
 /// Facets of more triangles than this are not intersected.
 constexpr std::uint32_t kMaxFacetTriangles = 512;
 /// Triangles are widened by this part of their size, so that a ray cannot pass between two that share an edge.
@@ -20,9 +20,26 @@ std::uint32_t rootOf(std::vector<std::uint32_t>& parent, std::uint32_t i) {
   return i;
 }
 
+bool receives(const scene::LeafPoint& leaf, float area) { return leaf.triangle != scene::kNone && area > 0.0F; }
+
+std::size_t countReceivers(const scene::PatchScene& patches) {
+  std::size_t count = 0;
+  for (const auto& surface : patches.surfaces) {
+    for (const auto first : surface.first_node) {
+      for (std::uint32_t i = 0; first != scene::kNone && i < surface.width * surface.height; ++i)
+        count += receives(patches.leaves[surface.first_leaf + i], patches.node_area[first + i]) ? 1 : 0;
+    }
+  }
+  return count;
+}
+
 }  // namespace
 
 Receivers::Receivers(std::shared_ptr<const scene::PatchScene> patches) : patches_(std::move(patches)) {
+  const auto count = countReceivers(*patches_);
+  receivers_.reserve(count);
+  for (auto* texels : {&texel_x_, &texel_y_}) texels->reserve(count);
+  nodes_.reserve(count);
   for (std::uint32_t s = 0; s < patches_->surfaces.size(); ++s) {
     const auto& surface = patches_->surfaces[s];
     for (std::size_t side = 0; side < 2; ++side) {
@@ -31,20 +48,52 @@ Receivers::Receivers(std::shared_ptr<const scene::PatchScene> patches) : patches
       const std::size_t begin = receivers_.size();
       for (std::uint32_t i = 0; i < surface.width * surface.height; ++i) {
         const auto& leaf = patches_->leaves[surface.first_leaf + i];
-        if (leaf.triangle == scene::kNone || patches_->node_area[first + i] <= 0.0F) continue;
+        if (!receives(leaf, patches_->node_area[first + i])) continue;
         const auto texel = leaf.full ? glm::vec2(i % surface.width, i / surface.width) : leaf.texel;
         receivers_.push_back({first + i, leaf.triangle, texel, leaf.first_spot, leaf.full});
       }
-      groups_.push_back({s, begin, receivers_.size() - begin, side == 0 ? 1.0F : -1.0F});
+      groups_.push_back({s, begin, receivers_.size() - begin, side == 0 ? 1.0F : -1.0F, blocks_.size()});
+      findBlocks(groups_.back());
     }
   }
+  planes_.reserve(patches_->triangles.size());
+  corners_.reserve(patches_->triangles.size());
   for (std::size_t i = 0; i < patches_->triangles.size(); ++i) {
+    auto& corners = corners_.emplace_back();
+    for (std::size_t k = 0; k < 3; ++k) corners[k] = patches_->vertices[patches_->indices[3 * i + k]].position;
     const auto& normal = patches_->triangles[i].normal;
-    planes_.push_back({normal, glm::dot(normal, patches_->vertices[patches_->indices[3 * i]].position)});
+    planes_.push_back({normal, glm::dot(normal, corners[0])});
     const auto& surface = patches_->surfaces[patches_->triangle_surface[i]];
     absorbs_.push_back({surface.first_node[0] == scene::kNone, surface.first_node[1] == scene::kNone});
   }
   findFacets();
+}
+
+void Receivers::findBlocks(Group& group) {
+  const bool planar = patches_->surfaces[group.surface].planar;
+  const auto isPlain = [&](const Receiver& receiver) { return planar && receiver.full && !receiver.hasSpots(); };
+  const auto sameFrame = [&](const Receiver& a, const Receiver& b) {
+    const auto &one = patches_->triangles[a.triangle], &other = patches_->triangles[b.triangle];
+    return one.origin == other.origin && one.du == other.du && one.dv == other.dv;
+  };
+  for (auto i = group.first; i < group.first + group.count; ++i) {
+    const auto& receiver = receivers_[i];
+    const bool plain = isPlain(receiver);
+    const bool goes_on = i > group.first && blocks_.back().count < kBlock && blocks_.back().plain == plain &&
+                         (!plain || sameFrame(receiver, receivers_[i - 1]));
+    if (!goes_on) blocks_.push_back({i, 0, glm::vec3(1e30F), glm::vec3(-1e30F), plain});
+    auto& block = blocks_.back();
+    ++block.count;
+    const auto hold = [&block](const glm::vec3& point) {
+      block.low = glm::min(block.low, point);
+      block.high = glm::max(block.high, point);
+    };
+    for (std::uint32_t k = 0; receiver.hasSpots() && k < scene::kLeafSpots; ++k) hold(spot(receiver, k).point);
+    for (int corner = 0; corner < 4; ++corner) hold(place(receiver, {corner % 2, corner / 2}).point);
+    texel_x_.push_back(receiver.texel.x);
+    texel_y_.push_back(receiver.texel.y);
+    nodes_.push_back(receiver.node);
+  }
 }
 
 void Receivers::findFacets() {
@@ -78,24 +127,15 @@ void Receivers::findFacets() {
     float area = 0.0F;
     glm::vec3 low(1e30F), high(-1e30F);
     for (std::uint32_t i = facet.first; i < facet.first + facet.count; ++i) {
-      std::array<glm::vec3, 3> c;
-      for (std::size_t k = 0; k < 3; ++k) {
-        c[k] = patches_->vertices[patches_->indices[3 * std::size_t{facet_triangles_[i]} + k]].position;
-        low = glm::min(low, c[k]);
-        high = glm::max(high, c[k]);
+      const auto& c = corners_[facet_triangles_[i]];
+      for (const auto& corner : c) {
+        low = glm::min(low, corner);
+        high = glm::max(high, corner);
       }
       area += 0.5F * glm::length(glm::cross(c[1] - c[0], c[2] - c[0]));
     }
     facet.width = area / std::max(glm::length(high - low), 1e-12F);
   }
-}
-
-bool Receivers::behind(std::uint32_t item, const Ray& ray) const {
-  const auto& plane = planes_[item];
-  const float height = plane.height(ray.at);
-  const float rise = glm::dot(plane.normal, ray.way) * ray.reach;  // from the receiver to the light
-  const bool light_above = height + rise > 0.0F;
-  return (light_above ? height : -height) < -kInPlane && risesBefore(item, ray.at, ray.normal);
 }
 
 bool Receivers::wide(std::uint32_t item, const Ray& ray) const {
@@ -107,13 +147,8 @@ bool Receivers::wide(std::uint32_t item, const Ray& ray) const {
 Receivers::Meeting Receivers::meet(std::uint32_t item, const Ray& ray) const {
   const auto& facet = facets_[facet_of_[item]];
   for (std::uint32_t i = facet.first; i < facet.first + facet.count; ++i) {
-    std::array<glm::vec3, 3> c;
-    std::array<glm::vec2, 3> texel;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const auto& vertex = patches_->vertices[patches_->indices[3 * std::size_t{facet_triangles_[i]} + k]];
-      c[k] = vertex.position;
-      texel[k] = vertex.texel;
-    }
+    const auto triangle = facet_triangles_[i];
+    const auto& c = corners_[triangle];
     const auto e1 = c[1] - c[0], e2 = c[2] - c[0], p = glm::cross(ray.way, e2);
     const float determinant = glm::dot(e1, p);
     if (determinant == 0.0F) continue;
@@ -122,7 +157,10 @@ Receivers::Meeting Receivers::meet(std::uint32_t item, const Ray& ray) const {
     const auto q = glm::cross(s, e1);
     const float v = glm::dot(ray.way, q) / determinant;
     if (u < -kSeal || v < -kSeal || u + v > 1.0F + kSeal) continue;
-    return opacityAt(facet_triangles_[i], texel[0] + u * (texel[1] - texel[0]) + v * (texel[2] - texel[0]));
+    const auto texelOf = [&](std::size_t k) {
+      return patches_->vertices[patches_->indices[3 * std::size_t{triangle} + k]].texel;
+    };
+    return opacityAt(triangle, texelOf(0) + u * (texelOf(1) - texelOf(0)) + v * (texelOf(2) - texelOf(0)));
   }
   return Meeting::kNothing;
 }
@@ -143,28 +181,31 @@ bool Receivers::hidesAtEdge(std::uint32_t item, const Ray& ray) const {
   return hides(item, ray) && (!wide(item, ray) || meet(item, ray) != Meeting::kNothing);
 }
 
-bool Receivers::anyMeets(std::span<const std::uint32_t> items, const Ray& ray) const {
-  std::uint32_t last = scene::kNone;
+std::optional<bool> Receivers::hiddenAmong(std::span<const std::uint32_t> items, const Ray& ray) const {
+  bool met = false;
+  std::array<std::uint32_t, 9> behind_all{};
+  std::size_t count = 0;
   for (const auto item : items) {
-    if (item == last || item == scene::kNone) continue;
+    if (item == scene::kNone || !behind(item, ray)) continue;
+    const auto end = behind_all.begin() + static_cast<std::ptrdiff_t>(count);
+    if (std::find(behind_all.begin(), end, item) != end) continue;
+    if (count < behind_all.size()) behind_all[count++] = item;
+    if (!wide(item, ray)) return std::nullopt;
+    const auto meeting = met ? Meeting::kSolid : meet(item, ray);
+    if (meeting == Meeting::kChance) return std::nullopt;
+    met = meeting == Meeting::kSolid;
+  }
+  return met;
+}
+
+bool Receivers::anyMeets(std::span<const std::uint32_t> items, const Ray& ray) const {
+  auto last = scene::kNone;
+  for (const auto item : items) {
+    if (item == scene::kNone || item == last) continue;
     last = item;
     if (behind(item, ray) && wide(item, ray) && meet(item, ray) == Meeting::kSolid) return true;
   }
   return false;
-}
-
-Receivers::Place Receivers::place(const Receiver& receiver, const glm::vec2& at) const {
-  const auto [texel, triangle] =
-      receiver.full ? scene::LeafSpot{receiver.texel + at, receiver.triangle}
-                    : patches_->spotAt({receiver.texel, receiver.triangle, false, receiver.first_spot}, 0, 0, at);
-  const auto& frame = patches_->triangles[triangle];
-  return {frame.origin + texel.x * frame.du + texel.y * frame.dv, &frame};
-}
-
-Receivers::Place Receivers::spot(const Receiver& receiver, std::uint32_t spot) const {
-  const auto& [texel, triangle] = patches_->spots[receiver.first_spot + spot];
-  const auto& frame = patches_->triangles[triangle];
-  return {frame.origin + texel.x * frame.du + texel.y * frame.dv, &frame};
 }
 
 }  // namespace radiosity::gpu

@@ -8,6 +8,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -28,13 +29,23 @@ class Receivers {
     bool full;
 
     [[nodiscard]] bool hasSpots() const { return first_spot != scene::kNone; }
+    /// Something hovers right before it, or beside that.
+    [[nodiscard]] bool liesInGap() const { return full && hasSpots(); }
   };
   /// Receivers of one side of a surface; they lie together.
   struct Group {
     std::uint32_t surface;
     std::size_t first, count;
     float side;  ///< +1 front, -1 back
+    std::size_t first_block;
   };
+  /// Receivers of a group in a row.
+  struct Block {
+    std::size_t first, count;
+    glm::vec3 low{0.0F}, high{0.0F};  ///< around all their places
+    bool plain = false;               ///< all full, out of gaps and in one frame
+  };
+  static constexpr std::size_t kBlock = 64;  ///< receivers of a block at most
   struct Plane {
     glm::vec3 normal{0.0F};
     float distance = 0.0F;
@@ -50,19 +61,42 @@ class Receivers {
   [[nodiscard]] const scene::PatchScene& patches() const { return *patches_; }
   [[nodiscard]] const std::vector<Group>& groups() const { return groups_; }
   [[nodiscard]] const std::vector<Receiver>& all() const { return receivers_; }
+  /// By group.
+  [[nodiscard]] const std::vector<Block>& blocks() const { return blocks_; }
+  /// As in Receiver, by receiver.
+  [[nodiscard]] const float* texelX() const { return texel_x_.data(); }
+  [[nodiscard]] const float* texelY() const { return texel_y_.data(); }
+  [[nodiscard]] const std::uint32_t* nodes() const { return nodes_.data(); }
+  [[nodiscard]] const Plane* planes() const { return planes_.data(); }
   [[nodiscard]] const Plane& plane(std::uint32_t triangle) const { return planes_[triangle]; }
   /// Whether the side of the triangle that faces (or turns away from) a light only absorbs.
   [[nodiscard]] bool absorbs(std::uint32_t triangle, bool back) const {
     return absorbs_[triangle][static_cast<std::size_t>(back)];
+  }
+  /// Where a receiver's own pixel does not decide alone: in a gap; on a surface with two sides, of which one may be the
+  /// inside of something.
+  enum Care : std::uint32_t { kInGap = 1, kTwoSided = 2 };
+  [[nodiscard]] std::uint32_t careOf(const Receiver& receiver) const {
+    const bool two_sided = !absorbs_[receiver.triangle][0] && !absorbs_[receiver.triangle][1];
+    return (receiver.liesInGap() ? kInGap : 0U) | (two_sided ? kTwoSided : 0U);
   }
   struct Place {
     glm::vec3 point;
     const scene::TriangleFrame* frame;
   };
   /// A place on a receiver, by `at` in [0, 1)^2.
-  [[nodiscard]] Place place(const Receiver& receiver, const glm::vec2& at) const;
+  [[nodiscard]] Place place(const Receiver& receiver, const glm::vec2& at) const {
+    if (receiver.full) return placeOf({receiver.texel + at, receiver.triangle});
+    return placeOf(patches_->spotAt({receiver.texel, receiver.triangle, false, receiver.first_spot}, 0, 0, at));
+  }
   /// One of its places, spot < kLeafSpots; of a receiver that has them.
-  [[nodiscard]] Place spot(const Receiver& receiver, std::uint32_t spot) const;
+  [[nodiscard]] Place spot(const Receiver& receiver, std::uint32_t spot) const {
+    return placeOf(patches_->spots[receiver.first_spot + spot]);
+  }
+  /// Has a row of its spots, if there are any, brought nearer.
+  void fetchSpots(const Receiver& receiver, std::uint32_t row) const {
+    if (receiver.hasSpots()) __builtin_prefetch(&patches_->spots[receiver.first_spot + row * scene::kSpotQuarters]);
+  }
   [[nodiscard]] glm::vec3 point(const Receiver& receiver, const glm::vec2& at) const {
     return place(receiver, at).point;
   }
@@ -71,8 +105,7 @@ class Receivers {
   /// from it, although a pixel on a convex edge may show it: the top of a block, seen instead of the topmost texels of
   /// its side.
   [[nodiscard]] bool risesBefore(std::uint32_t triangle, const glm::vec3& point, const glm::vec3& normal) const {
-    for (std::size_t k = 0; k < 3; ++k) {
-      const auto& corner = patches_->vertices[patches_->indices[3 * std::size_t{triangle} + k]].position;
+    for (const auto& corner : corners_[triangle]) {
       if (glm::dot(normal, corner - point) > kInPlane) return true;
     }
     return false;
@@ -98,6 +131,10 @@ class Receivers {
   /// mean.
   [[nodiscard]] bool hidesAtEdge(std::uint32_t item, const Ray& ray) const;
 
+  /// Whether one of the facets that the pixels around a receiver show hides the light from it, by intersection. None:
+  /// one of them is narrow, or lets light through in part, and the receiver's own pixel is right in the mean.
+  [[nodiscard]] std::optional<bool> hiddenAmong(std::span<const std::uint32_t> items, const Ray& ray) const;
+
   /// Whether the ray meets a wide facet that some neighbouring pixel shows, where that lets nothing through.
   [[nodiscard]] bool anyMeets(std::span<const std::uint32_t> items, const Ray& ray) const;
 
@@ -107,8 +144,19 @@ class Receivers {
     std::uint32_t first = 0, count = 0;  ///< into facet_triangles_
     float width = 0.0F;                  ///< area / longest side, unit
   };
+  [[nodiscard]] Place placeOf(const scene::LeafSpot& spot) const {
+    const auto& frame = patches_->triangles[spot.triangle];
+    return {frame.origin + spot.texel.x * frame.du + spot.texel.y * frame.dv, &frame};
+  }
+  void findBlocks(Group& group);
   void findFacets();
-  [[nodiscard]] bool behind(std::uint32_t item, const Ray& ray) const;
+  [[nodiscard]] bool behind(std::uint32_t item, const Ray& ray) const {
+    const auto& plane = planes_[item];
+    const float height = plane.height(ray.at);
+    const float rise = glm::dot(plane.normal, ray.way) * ray.reach;  // from the receiver to the light
+    const bool light_above = height + rise > 0.0F;
+    return (light_above ? height : -height) < -kInPlane && risesBefore(item, ray.at, ray.normal);
+  }
   [[nodiscard]] bool wide(std::uint32_t item, const Ray& ray) const;
   /// What the ray finds of the item's facet; kChance: a place of partial opacity.
   enum class Meeting { kNothing, kChance, kSolid };
@@ -118,8 +166,12 @@ class Receivers {
   std::shared_ptr<const scene::PatchScene> patches_;
   std::vector<Receiver> receivers_;
   std::vector<Group> groups_;
-  std::vector<Plane> planes_;                 ///< by triangle
-  std::vector<std::array<bool, 2>> absorbs_;  ///< by triangle: front, back
+  std::vector<Block> blocks_;
+  std::vector<float> texel_x_, texel_y_;
+  std::vector<std::uint32_t> nodes_;
+  std::vector<Plane> planes_;                      ///< by triangle
+  std::vector<std::array<glm::vec3, 3>> corners_;  ///< by triangle: together, since they are looked at in any order
+  std::vector<std::array<bool, 2>> absorbs_;       ///< by triangle: front, back
   std::vector<Facet> facets_;
   std::vector<std::uint32_t> facet_of_;  ///< by triangle
   std::vector<std::uint32_t> facet_triangles_;

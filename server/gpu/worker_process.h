@@ -3,6 +3,7 @@
 
 #include <sys/types.h>
 
+#include <chrono>
 #include <cstdint>
 #include <string>
 
@@ -41,6 +42,8 @@ class WorkerProcess {
   [[nodiscard]] pid_t pid() const { return pid_; }
   [[nodiscard]] const std::string& renderer() const { return renderer_; }
   [[nodiscard]] bool software() const { return software_; }
+  /// That it has used so far, of all its threads; zero where the system does not tell.
+  [[nodiscard]] std::chrono::nanoseconds processorTime() const;
   [[nodiscard]] FluxSink sink() { return fluxRegionSink(flux_.bytes(), nodes_); }
 
  private:

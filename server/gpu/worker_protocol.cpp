@@ -176,10 +176,21 @@ tl::expected<Message, Lapse> receiveMessage(int socket, const Patience& patience
 }
 
 Result<SharedMemory> packScene(const scene::PatchScene& patches) {
-  std::vector<std::byte> packed;
-  visitScene(patches, [&](const auto& values) { packVector(packed, values); });
-  auto memory = SharedMemory::create("radiosity scene", packed.size());
-  if (memory) std::memcpy(memory->bytes().data(), packed.data(), packed.size());
+  // Straight to where it is needed: of many texels a copy is as large as all else that is made of them.
+  std::size_t bytes = 0;
+  visitScene(patches, [&](const auto& values) { bytes += sizeof(std::uint64_t) + std::span(values).size_bytes(); });
+  auto memory = SharedMemory::create("radiosity scene", bytes);
+  if (!memory) return memory;
+  auto* to = memory->bytes().data();
+  const auto put = [&to](const void* from, std::size_t count) {
+    if (count > 0) std::memcpy(to, from, count);
+    to += count;
+  };
+  visitScene(patches, [&](const auto& values) {
+    const std::uint64_t count = values.size();
+    put(&count, sizeof(count));
+    put(values.data(), std::span(values).size_bytes());
+  });
   return memory;
 }
 

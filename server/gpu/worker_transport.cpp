@@ -31,6 +31,9 @@ constexpr int kMaxDeaths = 5;
 constexpr auto kStartPatience = std::chrono::seconds(60);
 /// WorkerOptions::patience, for each pixel.
 constexpr double kSlowPixelSeconds = 2e-6;
+/// Of the time that a late worker is given again it must have used this part: one that is stopped, or waits for ever,
+/// uses nothing.
+constexpr int kLeastUse = 5000;
 /// A worker takes in a scene at ten times this rate at least.
 constexpr double kSlowSceneBytesPerSecond = 5e6;
 
@@ -46,6 +49,9 @@ struct Slot {
   std::deque<std::size_t> held;          ///< chunks sent, not yet reported
   std::vector<std::size_t> done;         ///< chunks reported, still only in its accumulators
   Clock::time_point deadline;            ///< of the chunk it has held longest
+  Clock::duration patience{};            ///< that the chunk may take
+  Clock::duration used_before{};         ///< processor time of the worker when it started on that chunk, ...
+  Clock::duration used_lately{};         ///< ... and when it was last given time
   solver::TransportCounters counters;
 };
 
@@ -191,7 +197,21 @@ class WorkerTransport final : public solver::Transport {
 
   /// The worker starts on the chunk it has held longest.
   void startClock(Slot& slot) const {
-    slot.deadline = Clock::now() + options_.patience + seconds(kSlowPixelSeconds * chunks_[slot.held.front()].cost);
+    slot.patience = options_.patience + seconds(kSlowPixelSeconds * chunks_[slot.held.front()].cost);
+    slot.deadline = Clock::now() + slot.patience;
+    slot.used_before = slot.used_lately = slot.process->processorTime();
+  }
+
+  /// On a busy machine a worker that draws on the processor may be late because it was hardly let run. It is given as
+  /// long again, as long as it uses what it gets, and until it has had in processor time what a chunk may take.
+  [[nodiscard]] static bool givenMoreTime(Slot& slot) {
+    if (!slot.process->software()) return false;
+    const Clock::duration used = slot.process->processorTime();
+    const bool runs = used - slot.used_lately >= slot.patience / kLeastUse;
+    if (!runs || used - slot.used_before >= slot.patience) return false;
+    slot.used_lately = used;
+    slot.deadline = Clock::now() + slot.patience;
+    return true;
   }
 
   /// Waits until some worker has something to say and hears it, or until one is late and buries it, or for a wake-up.
@@ -214,7 +234,7 @@ class WorkerTransport final : public solver::Transport {
       if (polls[i].fd < 0) continue;
       if (polls[i].revents != 0) {
         hear(slots_[i]);
-      } else if (now >= slots_[i].deadline) {
+      } else if (now >= slots_[i].deadline && !givenMoreTime(slots_[i])) {
         bury(slots_[i],
              Error{ErrorCode::kUnavailable, fmt::format("worker process {} hangs", slots_[i].process->pid())});
       }

@@ -45,7 +45,6 @@ struct FormerPlaces {
                                    const ChartOptions& options, const FormerPlaces& former = {});
 
 inline constexpr std::size_t kMaxPages = 1024;
-inline constexpr std::uint64_t kMaxLeaves = std::uint64_t{1} << 28;  ///< some 6 GiB of patches
 /// Those that three quarters of the memory hold with all that a solve needs; at most kMaxLeaves.
 [[nodiscard]] std::uint64_t mostLeaves();
 

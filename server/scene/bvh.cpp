@@ -7,6 +7,8 @@
 #include <limits>
 #include <numeric>
 
+#include "server/scene/bounds.h"
+
 namespace radiosity::scene {
 namespace {
 
@@ -14,35 +16,41 @@ constexpr std::uint32_t kLeafSize = 4;
 constexpr int kBins = 16;
 constexpr std::size_t kStackDepth = 128;
 
-struct Box {
-  glm::vec3 min{std::numeric_limits<float>::infinity()}, max{-std::numeric_limits<float>::infinity()};
-  void add(const glm::vec3& p) {
-    min = glm::min(min, p);
-    max = glm::max(max, p);
+float halfArea(const Bounds& box) {
+  if (box.empty()) return 0.0F;
+  const glm::vec3 d = box.max - box.min;
+  return d.x * d.y + d.y * d.z + d.z * d.x;
+}
+
+/// A ray for the slab test, in single precision. `origin` is grown both ways by more than what rounding moves a
+/// box's sides and where the ray meets them, for coordinates and ways within a few unit boxes: no box that the exact
+/// ray meets is missed, and of the others triangles decide.
+struct SlabRay {
+  static constexpr float kGrowth = 2e-6F;
+  glm::vec3 before, behind, inverse;
+  float t_min, t_max;
+
+  SlabRay(const glm::dvec3& origin, const glm::dvec3& direction, double from, double to)
+      : before(glm::vec3(origin) + kGrowth),
+        behind(glm::vec3(origin) - kGrowth),
+        t_min(static_cast<float>(from) - kGrowth),
+        t_max(static_cast<float>(to) + kGrowth) {
+    for (int axis = 0; axis < 3; ++axis) {  // a zero component would make 0 x infinity
+      const double component = std::abs(direction[axis]) > 1e-30 ? direction[axis] : 1e-30;
+      inverse[axis] = static_cast<float>(1.0 / component);
+    }
   }
-  void add(const Box& other) {
-    min = glm::min(min, other.min);
-    max = glm::max(max, other.max);
-  }
-  [[nodiscard]] float halfArea() const {
-    if (min.x > max.x) return 0.0F;
-    const glm::vec3 d = max - min;
-    return d.x * d.y + d.y * d.z + d.z * d.x;
+
+  [[nodiscard]] bool meets(const glm::vec3& low, const glm::vec3& high) const {
+    float near = t_min, far = t_max;
+    for (int axis = 0; axis < 3; ++axis) {
+      const float one = (low[axis] - before[axis]) * inverse[axis], other = (high[axis] - behind[axis]) * inverse[axis];
+      near = std::max(near, std::min(one, other));
+      far = std::min(far, std::max(one, other));
+    }
+    return near <= far;
   }
 };
-
-/// Slab test, boxes grown by an ulp or two so that flat ones are not missed.
-bool meetsBox(const glm::vec3& low, const glm::vec3& high, const glm::dvec3& origin, const glm::dvec3& inverse,
-              double t_min, double t_max) {
-  for (int axis = 0; axis < 3; ++axis) {
-    double near = (low[axis] - origin[axis]) * inverse[axis];
-    double far = (high[axis] - origin[axis]) * inverse[axis];
-    if (near > far) std::swap(near, far);
-    t_min = std::max(t_min, near - std::abs(near) * 1e-12);
-    t_max = std::min(t_max, far + std::abs(far) * 1e-12);
-  }
-  return t_min <= t_max;
-}
 
 /// Moller and Trumbore 1997, in double so that edges leak less than a part in 1e12.
 bool meetsTriangle(const Bvh::Triangle& triangle, const glm::dvec3& origin, const glm::dvec3& direction, RayHit& hit) {
@@ -105,7 +113,7 @@ void Bvh::build() {
     const Task task = pending.back();
     pending.pop_back();
     const std::uint32_t first = nodes_[task.node].first, count = nodes_[task.node].count;
-    Box box;
+    Bounds box;
     for (std::uint32_t i = first; i < first + count; ++i)
       for (const auto& p : triangles_[order_[i]]) box.add(p);
     nodes_[task.node].min = box.min;
@@ -124,7 +132,7 @@ void Bvh::build() {
 
 /// Reorders order_[first, first + count) and returns how many go left; never all or none.
 std::uint32_t Bvh::split(std::uint32_t first, std::uint32_t count) {
-  Box spread;
+  Bounds spread;
   for (std::uint32_t i = first; i < first + count; ++i) spread.add(centres_[order_[i]]);
   const glm::vec3 extent = spread.max - spread.min;
   const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0 : (extent.y >= extent.z ? 1 : 2);
@@ -133,7 +141,7 @@ std::uint32_t Bvh::split(std::uint32_t first, std::uint32_t count) {
     const float where = (centres_[t][axis] - spread.min[axis]) / extent[axis];
     return std::min(kBins - 1, static_cast<int>(where * static_cast<float>(kBins)));
   };
-  std::array<Box, kBins> boxes;
+  std::array<Bounds, kBins> boxes;
   std::array<std::uint32_t, kBins> counts{};
   for (std::uint32_t i = first; i < first + count; ++i) {
     const auto bin = static_cast<std::size_t>(binOf(order_[i]));
@@ -141,21 +149,21 @@ std::uint32_t Bvh::split(std::uint32_t first, std::uint32_t count) {
     for (const auto& p : triangles_[order_[i]]) boxes[bin].add(p);
   }
   std::array<float, kBins> right_cost{};
-  Box right;
+  Bounds right;
   std::uint32_t right_count = 0;
   for (std::size_t bin = kBins - 1; bin > 0; --bin) {
     right.add(boxes[bin]);
     right_count += counts[bin];
-    right_cost[bin] = right.halfArea() * static_cast<float>(right_count);
+    right_cost[bin] = halfArea(right) * static_cast<float>(right_count);
   }
-  Box left;
+  Bounds left;
   std::uint32_t left_count = 0;
   int best = 0;
   float best_cost = std::numeric_limits<float>::infinity();
   for (std::size_t bin = 0; bin + 1 < kBins; ++bin) {
     left.add(boxes[bin]);
     left_count += counts[bin];
-    const float cost = left.halfArea() * static_cast<float>(left_count) + right_cost[bin + 1];
+    const float cost = halfArea(left) * static_cast<float>(left_count) + right_cost[bin + 1];
     if (left_count > 0 && left_count < count && cost < best_cost) {
       best_cost = cost;
       best = static_cast<int>(bin);
@@ -170,15 +178,13 @@ std::uint32_t Bvh::split(std::uint32_t first, std::uint32_t count) {
 void Bvh::collectHits(const glm::dvec3& origin, const glm::dvec3& direction, double t_min, double t_max,
                       std::vector<RayHit>& hits) const {
   if (triangles_.empty()) return;
-  glm::dvec3 inverse;
-  for (int axis = 0; axis < 3; ++axis)  // a zero component would make 0 x infinity in the slab test
-    inverse[axis] = 1.0 / (std::abs(direction[axis]) > 1e-30 ? direction[axis] : std::copysign(1e-30, direction[axis]));
+  const SlabRay ray(origin, direction, t_min, t_max);
   std::array<std::uint32_t, kStackDepth> stack;
   std::size_t depth = 0;
   stack[depth++] = 0;
   while (depth > 0) {
     const Node& node = nodes_[stack[--depth]];
-    if (!meetsBox(node.min, node.max, origin, inverse, t_min, t_max)) continue;
+    if (!ray.meets(node.min, node.max)) continue;
     if (node.count == 0) {
       stack[depth++] = node.first;
       stack[depth++] = node.first + 1;
@@ -223,17 +229,28 @@ bool Bvh::touches(const glm::vec3& box_min, const glm::vec3& box_max, std::span<
   });
 }
 
-bool Bvh::touches(const OrientedBox& box, std::span<const std::uint32_t> tags, std::uint32_t ignored_tag) const {
+/// Whether the test holds for any triangle that touches the box; it gets the triangle in the axes of the box.
+template <typename Test>
+bool Bvh::anyTouching(const OrientedBox& box, Test test) const {
   glm::vec3 reach(0.0F);
   for (int axis = 0; axis < 3; ++axis) reach += box.half[axis] * glm::abs(box.axes[static_cast<std::size_t>(axis)]);
   return anyTriangle(box.centre - reach, box.centre + reach, [&](std::uint32_t triangle) {
-    if (tags[triangle] == ignored_tag) return false;
     Triangle local;
     for (std::size_t k = 0; k < 3; ++k) {
       const glm::vec3 p = triangles_[triangle][k] - box.centre;
       local[k] = {glm::dot(p, box.axes[0]), glm::dot(p, box.axes[1]), glm::dot(p, box.axes[2])};
     }
-    return touchesBox(local, -box.half, box.half);
+    return test(triangle, local) && touchesBox(local, -box.half, box.half);
+  });
+}
+
+bool Bvh::touches(const OrientedBox& box, std::span<const std::uint32_t> tags, std::uint32_t ignored_tag) const {
+  return anyTouching(box, [&](std::uint32_t triangle, const Triangle&) { return tags[triangle] != ignored_tag; });
+}
+
+bool Bvh::hoversIn(const OrientedBox& box, std::span<const std::uint32_t> tags, std::uint32_t ignored_tag) const {
+  return anyTouching(box, [&](std::uint32_t triangle, const Triangle& local) {
+    return tags[triangle] != ignored_tag && std::min({local[0].z, local[1].z, local[2].z}) > -box.half.z;
   });
 }
 

@@ -41,6 +41,9 @@ class Bvh {
   /// The same for a box that is turned.
   [[nodiscard]] bool touches(const OrientedBox& box, std::span<const std::uint32_t> tags,
                              std::uint32_t ignored_tag) const;
+  /// The same, of triangles alone that lie wholly above the lower face of the box along its third axis.
+  [[nodiscard]] bool hoversIn(const OrientedBox& box, std::span<const std::uint32_t> tags,
+                              std::uint32_t ignored_tag) const;
 
   [[nodiscard]] bool empty() const { return triangles_.empty(); }
   [[nodiscard]] std::size_t size() const { return triangles_.size(); }
@@ -53,6 +56,8 @@ class Bvh {
   };
   template <typename Test>
   [[nodiscard]] bool anyTriangle(const glm::vec3& box_min, const glm::vec3& box_max, Test test) const;
+  template <typename Test>
+  [[nodiscard]] bool anyTouching(const OrientedBox& box, Test test) const;
   void build();
   [[nodiscard]] std::uint32_t split(std::uint32_t first, std::uint32_t count);
 

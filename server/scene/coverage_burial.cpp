@@ -1,108 +1,24 @@
 // The part of a surface that lies inside another solid (the floor under a block, a wall behind a cupboard) receives no
 // light and must not count as area. A solid is what single-sided surfaces bound: from inside, one meets backs first.
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <optional>
 #include <utility>
 
-#include "server/scene/bvh.h"
+#include "common/parallel.h"
 #include "server/scene/coverage.h"
+#include "server/scene/solids.h"
 
 namespace radiosity::scene {
 namespace {
 
-/// Rays start this far from the surface (unit box): well above the rounding of 32-bit positions (6e-8), well below
-/// anything modelled.
-constexpr double kLift = 2e-5;
 constexpr std::uint32_t kFewSamples = 16, kManySamples = 64;
 constexpr std::uint64_t kMaxSamples = 2'000'000;  ///< a scene; beyond it leaves get fewer
-
-struct Bounds {
-  glm::vec3 min{std::numeric_limits<float>::infinity()}, max{-std::numeric_limits<float>::infinity()};
-  void add(const glm::vec3& p) {
-    min = glm::min(min, p);
-    max = glm::max(max, p);
-  }
-  void add(const Bounds& b) {
-    min = glm::min(min, b.min);
-    max = glm::max(max, b.max);
-  }
-  [[nodiscard]] bool empty() const { return min.x > max.x; }
-};
-
-glm::vec3 positionAt(const TriangleFrame& frame, const glm::dvec2& texel) {
-  return glm::vec3(glm::dvec3(frame.origin) + texel.x * glm::dvec3(frame.du) + texel.y * glm::dvec3(frame.dv));
-}
-
-/// The triangles that bound solids, and the question whether a point lies inside one.
-class Solids {
- public:
-  Solids(const PatchScene& patches, const std::vector<bool>& solid) {
-    std::vector<Bvh::Triangle> triangles;
-    for (std::uint32_t t = 0; t < patches.triangles.size(); ++t) {
-      if (!solid[patches.triangle_surface[t]]) continue;
-      Bvh::Triangle triangle;
-      for (std::size_t c = 0; c < 3; ++c)
-        triangle[c] = patches.vertices[patches.indices[std::size_t{3} * t + c]].position;
-      triangles.push_back(triangle);
-      surface_.push_back(patches.triangle_surface[t]);
-    }
-    tree_ = Bvh(std::move(triangles));
-  }
-
-  [[nodiscard]] bool empty() const { return tree_.empty(); }
-
-  /// True when a solid's surface, other than `surface` itself, passes through or touches the box.
-  [[nodiscard]] bool near(const Bounds& box, std::uint32_t surface) const {
-    const glm::vec3 margin(static_cast<float>(2.0 * kLift));
-    return tree_.touches(box.min - margin, box.max + margin, surface_, surface);
-  }
-
-  /// Buried when rays into the whole hemisphere leave more solids than they enter. One odd face that is turned the
-  /// wrong way, or a room whose roof was modelled from outside, does not bury what can be seen from elsewhere.
-  [[nodiscard]] bool buries(const glm::vec3& position, const glm::vec3& normal) {
-    const glm::dvec3 n(normal);
-    const glm::dvec3 reference = std::abs(n.x) < 0.8 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
-    const glm::dvec3 u = glm::normalize(glm::cross(reference, n));
-    const glm::dvec3 v = glm::cross(n, u);
-    const glm::dvec3 origin = glm::dvec3(position) + n * kLift;
-    // irrational-looking angles, so that no ray runs along modelled edges
-    if (!leavesSolid(origin, n + 0.0713 * u + 0.0427 * v)) return false;
-    for (int i = 0; i < 5; ++i) {
-      const double angle = 0.3217 + 2.0 * M_PI * i / 5.0;
-      if (!leavesSolid(origin, 0.6 * n + 0.8 * (std::cos(angle) * u + std::sin(angle) * v))) return false;
-    }
-    return true;
-  }
-
- private:
-  /// Walks a ray to the end: +1 for every solid entered (front), -1 for every one left (back); below zero, the origin
-  /// was inside.
-  bool leavesSolid(const glm::dvec3& origin, const glm::dvec3& direction) {
-    hits_.clear();
-    tree_.collectHits(origin, direction, 0.0, 8.0, hits_);
-    std::ranges::sort(hits_, [](const RayHit& a, const RayHit& b) { return a.t < b.t; });
-    int depth = 0;
-    double last = -1.0;
-    bool last_front = false;
-    for (const RayHit& hit : hits_) {
-      if (last_front == hit.front && hit.t - last < 1e-9) continue;  // the edge between two triangles
-      last = hit.t;
-      last_front = hit.front;
-      depth += hit.front ? 1 : -1;
-      if (depth < 0) return true;
-    }
-    return false;
-  }
-
-  Bvh tree_;
-  std::vector<std::uint32_t> surface_;  ///< by triangle of the tree
-  std::vector<RayHit> hits_;
-};
+/// Leaves: what is found of so many is held at once; fewer are not worth a thread.
+constexpr std::size_t kMeasuredAtOnce = 65536, kFewestAShare = 64;
 
 /// Boxes around the nodes of one surface, for the question where other solids come near.
 class NodeBoxes {
@@ -157,77 +73,10 @@ class NodeBoxes {
   std::vector<Bounds> boxes_;
 };
 
-/// Pairs of surfaces that lie on each other and face the same way: the earlier is seen, the later gets no light.
-class Coincidence {
- public:
-  explicit Coincidence(PatchScene& patches) : patches_(patches) {
-    std::vector<Bvh::Triangle> triangles;
-    for (std::size_t t = 0; t < patches.triangles.size(); ++t)
-      triangles.push_back({patches.vertices[patches.indices[3 * t]].position,
-                           patches.vertices[patches.indices[3 * t + 1]].position,
-                           patches.vertices[patches.indices[3 * t + 2]].position});
-    tree_ = Bvh(std::move(triangles));
-  }
-
-  void run() {
-    std::uint64_t count = 0;
-    std::pair<std::uint32_t, std::uint32_t> first{kNone, kNone};
-    for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
-      const std::uint32_t other = coveredBy(s);
-      covered_.push_back(other != kNone);
-      if (other == kNone) continue;
-      if (count++ == 0) first = {other, s};
-    }
-    if (count == 0) return;
-    patches_.warnings.push_back(
-        fmt::format("{} surfaces lie exactly on an earlier one that faces the same way and is seen instead (the first: "
-                    "surface {} of instance {} on surface {} of instance {})",
-                    count, first.second, patches_.surfaces[first.second].instance, first.first,
-                    patches_.surfaces[first.first].instance));
-  }
-
-  /// Whether the front of `s` is covered there. Only asked of surfaces that are covered somewhere.
-  [[nodiscard]] bool covers(std::uint32_t s, const glm::vec3& position, const glm::vec3& normal) {
-    return covered_[s] && coveredAt(s, position, normal) != kNone;
-  }
-
- private:
-  std::uint32_t coveredAt(std::uint32_t s, const glm::vec3& position, const glm::vec3& normal) {
-    const glm::dvec3 n(normal);
-    hits_.clear();
-    tree_.collectHits(glm::dvec3(position) + n * 1e-6, -n, 0.0, 2e-6, hits_);
-    for (const RayHit& hit : hits_) {
-      const std::uint32_t other = patches_.triangle_surface[hit.triangle];
-      if (other < s && glm::dot(patches_.triangles[hit.triangle].normal, normal) > 0.9999F) return other;
-    }
-    return kNone;
-  }
-
-  /// An earlier surface found right at some of this surface's leaf points.
-  std::uint32_t coveredBy(std::uint32_t s) {
-    const Surface& surface = patches_.surfaces[s];
-    const std::uint32_t leaves = surface.width * surface.height;
-    const std::uint32_t step = std::max(1U, leaves / 16);
-    for (std::uint32_t i = step / 2; i < leaves; i += step) {
-      const LeafPoint& point = patches_.leaves[surface.first_leaf + i];
-      if (point.triangle == kNone) continue;
-      const TriangleFrame& frame = patches_.triangles[point.triangle];
-      const std::uint32_t other = coveredAt(s, positionAt(frame, glm::dvec2(point.texel)), frame.normal);
-      if (other != kNone) return other;
-    }
-    return kNone;
-  }
-
-  PatchScene& patches_;
-  Bvh tree_;
-  std::vector<RayHit> hits_;
-  std::vector<bool> covered_;  ///< by surface: somewhere
-};
-
 class Burial {
  public:
   Burial(PatchScene& patches, const std::vector<LeafPiece>& pieces, const std::vector<bool>& solid,
-         Coincidence& coincidence)
+         const Coincidence& coincidence)
       : patches_(patches), pieces_(pieces), solids_(patches, solid), coincidence_(coincidence) {}
 
   void run() {
@@ -240,7 +89,7 @@ class Burial {
     few_ = wanted <= kMaxSamples ? kFewSamples
                                  : static_cast<std::uint32_t>(std::max<std::uint64_t>(
                                        1, kMaxSamples / std::max<std::size_t>(1, contacts_.size())));
-    for (const Contact& contact : contacts_) measure(contact, few_);
+    measureAll(contacts_, few_);
     refineBorders();
     settleSides();
   }
@@ -254,6 +103,13 @@ class Burial {
     std::uint32_t leaf, side;
     LeafPoint point;
     std::vector<LeafSpot> places;  ///< where it is visible
+  };
+  struct Measured {
+    float visible_area;
+    Change change;
+  };
+  struct Part {
+    std::uint32_t samples = 0, buried = 0;
   };
 
   [[nodiscard]] std::uint32_t leafOf(const Contact& c) const {
@@ -269,11 +125,11 @@ class Burial {
     return side == 0 ? n : -n;
   }
   /// Inside a solid, or under a face that lies on this one.
-  [[nodiscard]] bool buried(std::uint32_t triangle, const glm::dvec2& texel, std::uint32_t side) {
+  [[nodiscard]] bool buried(std::uint32_t triangle, const glm::dvec2& texel, std::uint32_t side, Hits& hits) const {
     const auto position = positionAt(patches_.triangles[triangle], texel);
     const auto normal = facing(triangle, side);
-    if (side == 0 && coincidence_.covers(patches_.triangle_surface[triangle], position, normal)) return true;
-    return solids_.buries(position, normal);
+    if (side == 0 && coincidence_.covers(patches_.triangle_surface[triangle], position, normal, hits)) return true;
+    return solids_.buries(position, normal, hits);
   }
 
   /// Splits a surface into nodes that no other solid comes near (all visible or all buried: one test) and single leaves
@@ -315,20 +171,47 @@ class Burial {
         const Contact leaf{s, side, lx, ly};
         const LeafPoint& point = patches_.leaves[leafOf(leaf)];
         if (point.triangle == kNone) continue;
-        if (!known && !buried(point.triangle, glm::dvec2(point.texel), side)) return;
+        if (!known && !buried(point.triangle, glm::dvec2(point.texel), side, hits_)) return;
         known = true;
         patches_.node_area[nodeOf(leaf)] = 0.0F;
         changes_.push_back({leafOf(leaf), side, {}, {}});
       }
   }
 
-  /// Visible area of one leaf and side from `count` samples.
-  void measure(const Contact& contact, std::uint32_t count) {
+  /// What a thread of its own needs to measure leaves.
+  struct Scratch {
+    Hits hits;
+    std::vector<Part> parts;
+  };
+
+  /// Visible areas of leaves: measured side by side, taken in their order.
+  void measureAll(const std::vector<Contact>& contacts, std::uint32_t count) {
+    std::vector<std::optional<Measured>> measured;
+    for (std::size_t first = 0; first < contacts.size(); first += kMeasuredAtOnce) {
+      const auto end = std::min(contacts.size(), first + kMeasuredAtOnce);
+      measured.assign(end - first, std::nullopt);
+      inShares((end - first) / kFewestAShare, [&](std::size_t share, std::size_t shares) {
+        Scratch scratch;
+        for (auto i = first + share; i < end; i += shares) measured[i - first] = measure(contacts[i], count, scratch);
+      });
+      for (auto i = first; i < end; ++i) {
+        auto& found = measured[i - first];
+        if (!found) continue;
+        patches_.node_area[nodeOf(contacts[i])] = found->visible_area;
+        changes_.push_back(std::move(found->change));
+        touched_.push_back(contacts[i]);
+      }
+    }
+  }
+
+  /// Visible area of one leaf and side from `count` samples; none where all of it is visible.
+  [[nodiscard]] std::optional<Measured> measure(const Contact& contact, std::uint32_t count, Scratch& scratch) const {
     const std::uint32_t leaf = leafOf(contact);
     const LeafPoint point = patches_.leaves[leaf];
     const std::size_t first = first_piece_[leaf], end = first_piece_[leaf + 1];
     const glm::dvec2 corner(contact.x, contact.y);
-    parts_.assign(std::max<std::size_t>(1, end - first), Part{});
+    auto& parts = scratch.parts;
+    parts.assign(std::max<std::size_t>(1, end - first), Part{});
     LeafPoint visible;
     std::vector<LeafSpot> places;
     double nearest = std::numeric_limits<double>::infinity();
@@ -344,9 +227,9 @@ class Burial {
         if (part == end - first) continue;  // not covered here
         triangle = found->triangle;
       }
-      ++parts_[part].samples;
-      if (buried(triangle, texel, contact.side)) {
-        ++parts_[part].buried;
+      ++parts[part].samples;
+      if (buried(triangle, texel, contact.side, scratch.hits)) {
+        ++parts[part].buried;
         continue;
       }
       places.push_back({glm::vec2(texel), triangle});
@@ -355,35 +238,31 @@ class Burial {
       nearest = distance;
       visible = {glm::vec2(texel), triangle, false};
     }
-    const Outcome outcome = sumParts(point, contact, first, end);
-    if (outcome.buried == 0) return;
-    if (count != kManySamples && outcome.buried < outcome.samples) return measure(contact, kManySamples);
-    patches_.node_area[nodeOf(contact)] = static_cast<float>(outcome.visible_area);
+    const Outcome outcome = sumParts(point, contact, first, end, scratch);
+    if (outcome.buried == 0) return std::nullopt;
+    if (count != kManySamples && outcome.buried < outcome.samples) return measure(contact, kManySamples, scratch);
     if (outcome.visible_area <= 0.0) {
       visible = {};
     } else if (visible.triangle == kNone) {
       visible = {point.texel, point.triangle, false};
     }
-    changes_.push_back({leaf, contact.side, visible, std::move(places)});
-    touched_.push_back(contact);
+    return Measured{static_cast<float>(outcome.visible_area), {leaf, contact.side, visible, std::move(places)}};
   }
 
-  struct Part {
-    std::uint32_t samples = 0, buried = 0;
-  };
   struct Outcome {
     std::uint32_t samples = 0, buried = 0;
     double visible_area = 0.0;
   };
 
   /// Pieces too small to hold a sample go the way of the leaf's own point.
-  Outcome sumParts(const LeafPoint& point, const Contact& contact, std::size_t first, std::size_t end) {
+  Outcome sumParts(const LeafPoint& point, const Contact& contact, std::size_t first, std::size_t end,
+                   Scratch& scratch) const {
     Outcome outcome;
-    for (std::size_t part = 0; part < parts_.size(); ++part) {
-      Part& p = parts_[part];
+    for (std::size_t part = 0; part < scratch.parts.size(); ++part) {
+      Part& p = scratch.parts[part];
       if (p.samples == 0) {
         p.samples = 1;
-        p.buried = buried(point.triangle, glm::dvec2(point.texel), contact.side) ? 1 : 0;
+        p.buried = buried(point.triangle, glm::dvec2(point.texel), contact.side, scratch.hits) ? 1 : 0;
       }
       const double area = first == end ? patches_.node_area[nodeOf(contact)] : pieces_[first + part].area;
       outcome.samples += p.samples;
@@ -402,6 +281,7 @@ class Burial {
     const std::vector<Contact> buried = std::exchange(touched_, {});
     std::vector<bool> in_contact(patches_.leaves.size() * 2, false);
     for (const Contact& c : contacts_) in_contact[slot(c)] = true;
+    std::vector<Contact> beside;
     for (const Contact& c : buried) {
       const Surface& surface = patches_.surfaces[c.surface];
       for (std::uint32_t y = c.y == 0 ? 0 : c.y - 1; y < std::min(c.y + 2, surface.height); ++y)
@@ -409,9 +289,10 @@ class Burial {
           const Contact neighbour{c.surface, c.side, x, y};
           if (done[slot(neighbour)] || !in_contact[slot(neighbour)]) continue;
           done[slot(neighbour)] = true;
-          measure(neighbour, kManySamples);
+          beside.push_back(neighbour);
         }
     }
+    measureAll(beside, kManySamples);
   }
 
   /// Both sides share a leaf's point: the front's visible point, or the back's where the front is buried.
@@ -444,11 +325,11 @@ class Burial {
   PatchScene& patches_;
   const std::vector<LeafPiece>& pieces_;
   Solids solids_;
-  Coincidence& coincidence_;
+  const Coincidence& coincidence_;
   std::vector<std::size_t> first_piece_;
   std::vector<Contact> contacts_, touched_;
   std::vector<Change> changes_;
-  std::vector<Part> parts_;
+  Hits hits_;
   std::uint32_t few_ = kFewSamples;
 };
 
@@ -458,6 +339,7 @@ void removeBuried(PatchScene& patches, const std::vector<LeafPiece>& pieces, con
   Coincidence coincidence(patches);
   coincidence.run();
   Burial(patches, pieces, solid, coincidence).run();
+  coincidence.keepCovered();
 }
 
 }  // namespace radiosity::scene

@@ -111,15 +111,15 @@ constexpr Member kBufferView[] = {string("name"),
                                   req(uint("byteLength", 1)),
                                   uint("byteStride", 4, 252),
                                   uint("target")};
-constexpr Member kSparseIndices[] = {req(index("bufferView", Ref::kBufferViews)), uint("byteOffset"),
-                                     req(uint("componentType"))};
+constexpr Member componentType() { return req(uint("componentType", 5120, 5126)); }
+constexpr Member kSparseIndices[] = {req(index("bufferView", Ref::kBufferViews)), uint("byteOffset"), componentType()};
 constexpr Member kSparseValues[] = {req(index("bufferView", Ref::kBufferViews)), uint("byteOffset")};
 constexpr Member kSparse[] = {req(uint("count", 1)), req(object("indices", kSparseIndices)),
                               req(object("values", kSparseValues))};
 constexpr Member kAccessor[] = {string("name"),
                                 index("bufferView", Ref::kBufferViews),
                                 uint("byteOffset"),
-                                req(uint("componentType")),
+                                componentType(),
                                 boolean("normalized"),
                                 req(uint("count", 1)),
                                 req(oneOf("type", kAccessorTypes)),

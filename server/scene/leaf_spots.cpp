@@ -35,8 +35,10 @@ void keepSpots(PatchScene& patches, LeafPoint& leaf, std::span<LeafSpot> places)
   leaf.first_spot = static_cast<std::uint32_t>(patches.spots.size());
   orderByPlace(places, 0);
   // At even steps, so that what is a tenth of the leaf has a tenth of the spots, to one of them.
-  for (std::size_t k = 0; k < kLeafSpots; ++k)
-    patches.spots.push_back(places[(2 * k + 1) * places.size() / (2 * std::size_t{kLeafSpots})]);
+  for (std::size_t k = 0; k < kLeafSpots; ++k) {
+    const std::size_t place = k % kSpotQuarters * std::size_t{kSpotRows} + k / kSpotQuarters;
+    patches.spots.push_back(places[(2 * place + 1) * places.size() / (2 * std::size_t{kLeafSpots})]);
+  }
 }
 
 void placeSpots(PatchScene& patches, const std::vector<LeafPiece>& pieces) {
@@ -73,6 +75,9 @@ namespace {
 constexpr float kGap = 0.5F;
 /// ... starting well above the rounding of positions, and without their rims: walls that meet a floor are no gap.
 constexpr float kLift = 2e-5F, kInterior = 0.9F;
+/// What hovers beside a leaf counts so many leaf widths away, a pixel or two of an item buffer: a lamp in front of a
+/// hole in the ceiling, whose shadow there falls on nothing that could make up for what pixels give it of the rim.
+constexpr float kBeside = 2.0F;
 
 class Gaps {
  public:
@@ -92,13 +97,14 @@ class Gaps {
   }
 
  private:
-  /// Space right before a node, on one side.
-  [[nodiscard]] Bvh::OrientedBox boxBefore(std::uint32_t s, float side, std::uint32_t level, glm::uvec2 at) const {
+  /// Space right before a node, on one side, wider than the node by so many leaf widths.
+  [[nodiscard]] Bvh::OrientedBox boxBefore(std::uint32_t s, float side, std::uint32_t level, glm::uvec2 at,
+                                           float wider) const {
     const Surface& surface = patches_.surfaces[s];
     const TriangleFrame& frame = patches_.triangles[surface.first_triangle];
     const glm::vec2 low(at << level);
     const glm::vec2 high(glm::min((at + 1U) << level, glm::uvec2(surface.width, surface.height)));
-    const glm::vec2 middle = 0.5F * (low + high), extent = 0.5F * (high - low - (1.0F - kInterior));
+    const glm::vec2 middle = 0.5F * (low + high), extent = 0.5F * (high - low + wider);
     const float across = glm::length(frame.du), up = glm::length(frame.dv), depth = kGap * std::min(across, up);
     const glm::vec3 normal = side * frame.normal, u = frame.du / across;
     Bvh::OrientedBox box;
@@ -110,7 +116,9 @@ class Gaps {
 
   void descend(std::uint32_t s, float side, std::uint32_t level, glm::uvec2 at) {
     const Surface& surface = patches_.surfaces[s];
-    if (!tree_.touches(boxBefore(s, side, level, at), patches_.triangle_surface, s)) return;
+    if (!tree_.touches(boxBefore(s, side, level, at, kInterior - 1.0F), patches_.triangle_surface, s) &&
+        !tree_.hoversIn(boxBefore(s, side, level, at, 2.0F * kBeside), patches_.triangle_surface, s))
+      return;
     if (level > 0) {
       const LevelGrid below = levelGrid(surface.width, surface.height, level - 1);
       for (std::uint32_t y = 2 * at.y; y < std::min(2 * at.y + 2, below.height); ++y)

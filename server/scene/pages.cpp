@@ -148,6 +148,7 @@ class PageMaker {
   std::vector<LightmapPage> make(Seams seams) {
     for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
       Patchwork p = gather(patches_, patches_.surfaces[s], values_);
+      takeFromCovers(s, p);
       fillUnknown(p);
       place(s, p);
     }
@@ -157,6 +158,34 @@ class PageMaker {
   }
 
  private:
+  /// The light of leaves that earlier surfaces cover, whose charts have their places already.
+  void takeFromCovers(std::uint32_t s, Patchwork& p) {
+    const Surface& surface = patches_.surfaces[s];
+    const auto end_leaf = surface.first_leaf + surface.width * surface.height;
+    for (; next_covered_ < patches_.covered.size() && patches_.covered[next_covered_].leaf < end_leaf;
+         ++next_covered_) {
+      const auto& covered = patches_.covered[next_covered_];
+      const auto i = covered.leaf - surface.first_leaf;
+      const auto to = p.at(surface.page_x + i % surface.width - p.x0, surface.page_y + i / surface.width - p.y0);
+      p.value[to] = lookUp(patches_.surfaces[covered.surface], covered.texel);
+      p.ring[to] = 0;
+    }
+  }
+
+  /// Bilinear, within the chart.
+  [[nodiscard]] glm::vec3 lookUp(const Surface& surface, const glm::vec2& texel) const {
+    const Image& page = pages_[surface.page].irradiance;
+    const glm::vec2 most(surface.width - 1, surface.height - 1);
+    const glm::vec2 at = glm::clamp(texel - 0.5F, glm::vec2(0.0F), most);
+    const glm::vec2 low = glm::floor(at), high = glm::min(low + 1.0F, most), part = at - low;
+    const auto pixel = [&](float x, float y) {
+      return page.pixels[page.index(static_cast<int>(surface.page_x) + static_cast<int>(x),
+                                    static_cast<int>(surface.page_y) + static_cast<int>(y))];
+    };
+    return glm::mix(glm::mix(pixel(low.x, low.y), pixel(high.x, low.y), part.x),
+                    glm::mix(pixel(low.x, high.y), pixel(high.x, high.y), part.x), part.y);
+  }
+
   /// Where charts of a file's own layout share texels: the one that sees more of it wins, then the nearer.
   void place(std::uint32_t s, const Patchwork& p) {
     const std::uint32_t page_id = patches_.surfaces[s].page;
@@ -209,6 +238,7 @@ class PageMaker {
   std::span<const glm::vec3> values_;
   std::vector<LightmapPage> pages_;
   std::vector<PageOwners> owners_;
+  std::size_t next_covered_ = 0;
 };
 
 }  // namespace

@@ -42,6 +42,10 @@ struct LeafSpot {
 /// So many places are kept of each leaf within which light changes much: enough for the mean over what is left of it,
 /// also where a thin strip behind something is lit and all before it is not. A power of two.
 inline constexpr std::uint32_t kLeafSpots = 64;
+/// Spots are kept by so many in a row, which lie in different quarters of the leaf: what few of them are looked at lies
+/// together.
+inline constexpr std::uint32_t kSpotQuarters = 4;
+inline constexpr std::uint32_t kSpotRows = kLeafSpots / kSpotQuarters;
 
 /// Where a leaf is: a point (texel coordinates) on the part of the leaf that is covered and not buried inside another
 /// solid, and the triangle that holds it. `full`: wholly covered by coplanar triangles and wholly unburied, so any
@@ -86,8 +90,8 @@ struct PatchScene {
   std::vector<std::uint32_t> triangle_source;  ///< by triangle: which one of its instance's primitive it was
   std::vector<Surface> surfaces;
   std::vector<LeafPoint> leaves;
-  /// kLeafSpots of each leaf that is neither empty nor full, and of full ones in narrow gaps: spread evenly over the
-  /// covered and unburied part. Every fourth of them lie in different quarters of it.
+  /// kLeafSpots of each leaf that is neither empty nor full, and of full ones in narrow gaps or right beside what
+  /// hovers before them: spread evenly over the covered and unburied part, by rows of kSpotQuarters.
   std::vector<LeafSpot> spots;
   /// Unit box squared: covered and unburied part, times its opacity; parent = sum of children; 0 = empty. What a leaf
   /// catches of the light is irradiance times this, so irradiance needs no opacity anywhere.
@@ -111,6 +115,14 @@ struct PatchScene {
   };
   std::vector<Seam> seams;
 
+  /// A leaf right behind another surface that faces the same way and is lit in its place, and where on that. Lightmaps
+  /// show that light in both: who draws them sees now one, now the other.
+  struct Covered {
+    std::uint32_t leaf, surface;  ///< the surface is an earlier one
+    glm::vec2 texel;
+  };
+  std::vector<Covered> covered;  ///< leaves ascending
+
   /// Edge of a texel where nothing asks for another (unit box): as charts were laid out, and as a first guess decided
   /// which facets are charts of their own.
   double texel = 0.0, rough_texel = 0.0;
@@ -125,8 +137,9 @@ struct PatchScene {
   [[nodiscard]] LeafSpot spotAt(const LeafPoint& leaf, std::uint32_t x, std::uint32_t y, const glm::vec2& at) const {
     if (leaf.full) return {glm::vec2(x, y) + at, leaf.triangle};
     if (leaf.first_spot == kNone) return {leaf.texel, leaf.triangle};
-    const auto spot = static_cast<std::uint32_t>(at.x * static_cast<float>(kLeafSpots));
-    return spots[leaf.first_spot + (spot < kLeafSpots ? spot : kLeafSpots - 1)];
+    const auto wanted = static_cast<std::uint32_t>(at.x * static_cast<float>(kLeafSpots));
+    const auto place = wanted < kLeafSpots ? wanted : kLeafSpots - 1;  // by place: a quarter after the other
+    return spots[leaf.first_spot + place % kSpotRows * kSpotQuarters + place / kSpotRows];
   }
 };
 
@@ -184,6 +197,11 @@ struct FormerScene {
   const Scene& scene;
   const PatchScene& patches;
 };
+
+inline constexpr std::uint64_t kMaxLeaves = std::uint64_t{1} << 28;  ///< some 6 GiB of patches
+
+/// How many leaves a scene will have, about. O(triangles).
+[[nodiscard]] std::uint64_t expectedLeaves(const Scene& scene, const ChartOptions& options);
 
 /// Flattens instances, drops degenerate triangles (counted), makes charts or takes a valid TEXCOORD_1, packs pages,
 /// measures coverage and burial. kTooLarge when a limit of leaves (2^28) or pages (1024) is passed.

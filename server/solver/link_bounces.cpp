@@ -20,6 +20,10 @@ constexpr double kMostInterreflection = 1e5;
 constexpr double kMostDarkness = 0.05;
 /// Leaves whose links are looked at between two looks at the clock.
 constexpr std::size_t kLeavesAtOnce = std::size_t{1} << 21U;
+/// Columns whose entries are found together: as many as lie in a line of the cache or two.
+constexpr std::uint32_t kColumnsAtOnce = 32;
+/// Children that have this part of a node's area are all of them.
+constexpr double kWhole = 1.0 - 1e-9;
 constexpr std::size_t kLanes = 8;
 
 /// Sum of products in kLanes partial sums, so that it vectorises with the same bits everywhere. In double precision:
@@ -63,8 +67,8 @@ bool LinkSystem::advance(double seconds) {
     const auto chunk = static_cast<std::uint32_t>(kLeavesAtOnce / std::max<std::size_t>(1, leaf_area_.size()) + 1);
     const auto last = std::min(count, next_column_ + chunk);
     inBothHalves([&](std::size_t h) {
-      for (auto n = next_column_; n < last; ++n)
-        updateColumn(h, n, changed_[n] ? 0 : static_cast<std::uint32_t>(known_));
+      for (auto n = next_column_; n < last; n += kColumnsAtOnce)
+        updateColumns(h, n, std::min(last, n + kColumnsAtOnce));
     });
     next_column_ = last;
     if (next_column_ == count) {
@@ -83,10 +87,33 @@ bool LinkSystem::advance(double seconds) {
   return halves_[0].done && halves_[1].done;
 }
 
+/// By the points that each has: `own` of all shooters.
+void LinkSystem::shareAmongChildren(std::size_t h) {
+  struct Below {
+    double area = 0.0, variance = 0.0;  ///< of the children, that of one point from all of the parent being area^2
+  };
+  std::vector<Below> below(shooters_.size());
+  for (std::size_t n = shooters_.size(); n-- > 0;) {
+    auto& shooter = shooters_[n];
+    shooter.own[h] = 1.0;
+    if (shooter.isLight()) continue;
+    double points = shooter.weight[h] == 1.0 ? shooter.column[h].points() : 0.0;
+    if (below[n].area > kWhole * shooter.area) {
+      const double further = shooter.area * shooter.area / below[n].variance;
+      shooter.own[h] = points / (points + further);
+      points += further;
+    }
+    if (points <= 0.0 || shooter.parent == scene::kNone) continue;
+    below[shooter.parent].area += shooter.area;
+    below[shooter.parent].variance += shooter.area * shooter.area / points;
+  }
+}
+
 /// From what was sent before.
 void LinkSystem::beginHalf(std::size_t h) {
   Half& half = halves_[h];
   const std::size_t count = shooters_.size();
+  shareAmongChildren(h);
   half.shining = {};
   half.area = 0.0;
   std::vector<double> area(count, 0.0);
@@ -186,7 +213,7 @@ void LinkSystem::sweep(std::size_t h, Gmres::Vectors& x, bool affine) {
   Half& half = halves_[h];
   const std::size_t count = shooters_.size();
   for (std::size_t c = 0; c < 3; ++c) {
-    for (std::size_t n = 0; n < count; ++n) half.sent[c][n] = shooters_[n].weight[h] * x[c][n];
+    for (std::size_t n = 0; n < count; ++n) half.sent[c][n] = shooters_[n].carried(h) * x[c][n];
   }
   for (std::size_t m = 0; m < count; ++m) {
     const auto& shooter = shooters_[m];
@@ -199,8 +226,10 @@ void LinkSystem::sweep(std::size_t h, Gmres::Vectors& x, bool affine) {
       if (row.count == 1) mean *= static_cast<double>(reflectance_mean_[m][i]);
       if (affine) mean += static_cast<double>(emission_mean_[m][i]);
       half.mean[c][m] = mean;
-      x[c][m] = shooter.parent == scene::kNone ? mean : mean - half.mean[c][shooter.parent];
-      half.sent[c][m] = shooter.weight[h] * x[c][m];
+      x[c][m] = mean;
+      if (shooter.parent != scene::kNone)
+        x[c][m] -= half.mean[c][shooter.parent] - (1.0 - shooters_[shooter.parent].own[h]) * x[c][shooter.parent];
+      half.sent[c][m] = shooter.carried(h) * x[c][m];
     }
   }
 }

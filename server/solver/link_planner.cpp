@@ -37,6 +37,9 @@ constexpr std::uint32_t kMostSamplesAWave = 8;
 /// So many times that of a node are the images of a light without extent (a sky has most).
 constexpr double kSourceCost = 60.0;
 
+/// Flux that its own links carry, all channels, mean of the halves.
+double carriedPower(const Shooter& shooter) { return 0.5 * (shooter.own[0] + shooter.own[1]) * shooter.power(); }
+
 }  // namespace
 
 LinkPlanner::Node LinkPlanner::nodeAt(const NodePlace& place, const UnshotPyramid& unshot) const {
@@ -116,9 +119,10 @@ bool LinkPlanner::mustSplit(const Node& node, const LinkSystem& system) const {
   return isPartial(node);
 }
 
-/// A node that is partly empty or buried is no polygon, until it is too weak for that to be seen.
+/// A node that is partly empty or buried, or folded, is no polygon, until it is too weak for that to be seen.
 bool LinkPlanner::isPartial(const Node& node) const {
-  return node.power > kPartialShare * share_ && shots_.gathers(node.place) && !shots_.isWhole(node.place);
+  if (node.power <= kPartialShare * share_) return false;
+  return shots_.gathers(node.place) ? !shots_.isWhole(node.place) : shots_.isFolded(node.place);
 }
 
 void LinkPlanner::addShooter(const Node& node, LinkSystem& system, const UnshotPyramid& unshot,
@@ -296,7 +300,7 @@ std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPy
   double spread = 0.0, squares = 0.0;
   for (const auto& shooter : system.shooters()) {
     spread += shooter.spread();
-    squares += shooter.power() * shooter.power();
+    squares += carriedPower(shooter) * carriedPower(shooter);
   }
   struct Gain {
     double gain;
@@ -310,7 +314,7 @@ std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPy
     const double cost = shooter.source != scene::kNone ? kSourceCost : shooter.isLight() ? kLightCost : 1.0;
     const double taken = shooter.column[0].points();
     // The spread of few samples is itself uncertain: a sample's worth of what is usual for such power is mixed in.
-    const double usual = squares > 0.0 ? spread / squares * shooter.power() * shooter.power() : 0.0;
+    const double usual = squares > 0.0 ? spread / squares * carriedPower(shooter) * carriedPower(shooter) : 0.0;
     const double variance = 0.25 * (shooter.spread() * taken + kPrior * usual) / (taken + kPrior);
     // Of each further sample, were those before it taken. At most as many as there are: their worth is only guessed.
     const auto most = std::min(kMostSamplesAWave, std::max(1U, shooter.column[0].samples()));

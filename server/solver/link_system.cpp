@@ -33,7 +33,7 @@ __attribute__((target_clones("avx2", "default"))) float dot(const float* a, cons
 double Shooter::power() const { return 0.5 * static_cast<double>(channelSum(sent[0] + sent[1])) * area; }
 
 double Shooter::spread() const {
-  const glm::dvec3 first = weight[0] * glm::dvec3(sent[0]), second = weight[1] * glm::dvec3(sent[1]);
+  const glm::dvec3 first = carried(0) * glm::dvec3(sent[0]), second = carried(1) * glm::dvec3(sent[1]);
   return std::max(0.0, products[0] * glm::dot(first, first) - 2.0 * products[1] * glm::dot(first, second) +
                            products[2] * glm::dot(second, second));
 }
@@ -82,7 +82,7 @@ void LinkSystem::noteChange(std::uint32_t index, std::size_t half) {
   changed_[index] = true;
 }
 
-void LinkSystem::setMaterials(const std::vector<glm::vec3>& emission, const std::vector<glm::vec3>& reflectance) {
+void LinkSystem::setMaterials(std::vector<glm::vec3> emission, std::vector<glm::vec3> reflectance) {
   bool same_rows = reflectance_.size() == reflectance.size();
   for (std::size_t s = 0; s < sides_.size(); ++s) {
     const Side& side = sides_[s];
@@ -99,8 +99,8 @@ void LinkSystem::setMaterials(const std::vector<glm::vec3>& emission, const std:
     same_rows = same_rows && uniform == uniform_[s] && (uniform || same);
     uniform_[s] = uniform;
   }
-  emission_ = emission;
-  reflectance_ = reflectance;
+  emission_ = std::move(emission);
+  reflectance_ = std::move(reflectance);
   emission_mean_.clear();
   if (same_rows) return;
   known_ = 0;
@@ -198,18 +198,23 @@ void LinkSystem::makeRows() {
   }
 }
 
-/// Entries of one column in the rows of all members from `first_member` on.
-void LinkSystem::updateColumn(std::size_t half, std::uint32_t column, std::uint32_t first_member) {
+/// Entries of some columns in a row, of those that changed in all rows, of others in the new ones. Side by side: the
+/// entries of a row lie together, those of a column far apart in memory.
+void LinkSystem::updateColumns(std::size_t half, std::uint32_t first, std::uint32_t end) {
   thread_local std::vector<float> links;
-  const auto& from = shooters_[column].column[half];
-  for (const auto& run : from.runs()) {
-    for (std::uint32_t s = run.side; s < run.side + run.side_count; ++s) {
-      const auto& members = members_[s];
-      const auto first = std::lower_bound(members.begin(), members.end(), first_member);
-      if (first == members.end()) continue;
-      links.resize(sides_[s].leaf_count);
-      RAD_CHECK(from.decode(sides_[s].first_value, links));
-      for (auto m = first; m != members.end(); ++m) fillRow(half, *m, column, links.data());
+  const auto firstMember = [&](std::uint32_t column) {
+    return changed_[column] ? 0 : static_cast<std::uint32_t>(known_);
+  };
+  std::uint32_t least = scene::kNone;
+  for (auto column = first; column < end; ++column) least = std::min(least, firstMember(column));
+  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
+    const auto& members = members_[s];
+    if (members.empty() || members.back() < least) continue;
+    links.resize(sides_[s].leaf_count);
+    for (auto column = first; column < end; ++column) {
+      const auto from = std::lower_bound(members.begin(), members.end(), firstMember(column));
+      if (from == members.end() || !shooters_[column].column[half].decode(sides_[s].first_value, links)) continue;
+      for (auto m = from; m != members.end(); ++m) fillRow(half, *m, column, links.data());
     }
   }
 }
@@ -246,7 +251,7 @@ void LinkSystem::irradiance(std::size_t half, std::vector<glm::vec3>& values, Fr
   for (auto& plane : planes) plane.assign(reflectance_.size(), 0.0F);
   for (const auto& shooter : shooters_) {
     if (from == From::kLights && !shooter.isLight()) continue;
-    const glm::vec3 sent = static_cast<float>(shooter.weight[half]) * shooter.sent[half];
+    const glm::vec3 sent = static_cast<float>(shooter.carried(half)) * shooter.sent[half];
     if (sent == glm::vec3(0.0F)) continue;
     shooter.column[half].apply({sent.x, sent.y, sent.z}, {planes[0].data(), planes[1].data(), planes[2].data()});
   }

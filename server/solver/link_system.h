@@ -4,10 +4,21 @@
 //   b_m = e_m + mean over node m of rho sum_n T_n w_n s_n,     s_m = b_m - b_parent(m),
 //
 // where T_n are the links of shooter n to leaves, w_n its roulette weight, and parent(m) the nearest shooter above m in
-// its quadtree: a node shoots its mean, its children how they differ from it, signed. Solved by GMRES around sweeps of
-// Gauss and Seidel, which are progressive shooting on few unknowns (Cohen and others 1988). Two independent halves of
-// all links give two independent solutions, whose difference is the sampling error. Owned by LinkedSolver; one thread
-// outside of the calls.
+// its quadtree: a node shoots its mean, its children how they differ from it, signed.
+//
+// Links say what arrives for a radiosity of one, so where all children c of p have links, sum T_c measures what T_p
+// does, from other points. The best mean of both weighs them by their points: a of T_p and 1 - a of the sum, a = k_p /
+// (k_p + k), k = A_p^2 / sum (A_c^2 / k_c), since the variance of T_c falls with its area and its points. Shot as such,
+//
+//   s_p (a T_p + (1 - a) sum T_c) + sum (b_c - b_p) T_c = a s_p T_p + sum (b_c - b_p + (1 - a) s_p) T_c,
+//
+// it is the children that shoot more: s_m = b_m - b_parent + (1 - a_parent) s_parent, over own links a_m s_m. The same
+// holds for their children; k_c counts these, too. No link changes, halves stay apart, weights do not depend on what
+// was measured, so all stays unbiased. Who plays roulette leaves everything to its children (a = 0).
+//
+// Solved by GMRES around sweeps of Gauss and Seidel, which are progressive shooting on few unknowns (Cohen and others
+// 1988). Two independent halves of all links give two independent solutions, whose difference is the sampling error.
+// Owned by LinkedSolver; one thread outside of the calls.
 #pragma once
 
 #include <algorithm>
@@ -32,6 +43,7 @@ struct Shooter {
   double area = 0.0;                       ///< that shines, unit box squared
   std::array<LinkColumn, 2> column;        ///< by half
   std::array<double, 2> weight{1.0, 1.0};  ///< 0: does not play in that half
+  std::array<double, 2> own{1.0, 1.0};     ///< part of s that its own links carry, the rest goes to its children
   std::array<glm::vec3, 2> mean{};         ///< b: mean radiosity of the node
   std::array<glm::vec3, 2> sent{};         ///< s, before the weight
 
@@ -43,6 +55,8 @@ struct Shooter {
   [[nodiscard]] bool owes() const {
     return isLight() && power() > 0.0 && (column[0].points() == 0.0 || column[1].points() == 0.0);
   }
+  /// Radiosity that its own links carry.
+  [[nodiscard]] double carried(std::size_t half) const { return weight[half] * own[half]; }
   /// Flux it shoots, all channels, mean of the halves and before roulette.
   [[nodiscard]] double power() const;
   /// Variance that it brings to irradiance: area-weighted square of the difference between what its halves deliver.
@@ -54,7 +68,9 @@ class LinkSystem {
   LinkSystem(const scene::PatchScene& patches, const std::vector<Side>& sides);
 
   /// By leaf value. Entries of the matrix stay unless they hold a reflectance that changed.
-  void setMaterials(const std::vector<glm::vec3>& emission, const std::vector<glm::vec3>& reflectance);
+  void setMaterials(std::vector<glm::vec3> emission, std::vector<glm::vec3> reflectance);
+  [[nodiscard]] const std::vector<glm::vec3>& emission() const { return emission_; }
+  [[nodiscard]] const std::vector<glm::vec3>& reflectance() const { return reflectance_; }
 
   /// Index of the new shooter. Ancestors must come before their descendants.
   std::uint32_t add(const Shooter& shooter);
@@ -131,8 +147,9 @@ class LinkSystem {
   void noteChange(std::uint32_t shooter, std::size_t half);
   void updateMeans();
   void makeRows();
-  void updateColumn(std::size_t half, std::uint32_t column, std::uint32_t first_member);
+  void updateColumns(std::size_t half, std::uint32_t first, std::uint32_t end);
   void fillRow(std::size_t half, std::uint32_t member, std::uint32_t column, const float* links);
+  void shareAmongChildren(std::size_t half);
   void beginHalf(std::size_t half);
   void advanceHalf(std::size_t half);
   void sweep(std::size_t half, Gmres::Vectors& sent, bool affine);

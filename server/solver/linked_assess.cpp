@@ -38,7 +38,7 @@ void LinkedSolver::assess() {
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
       const glm::vec3 flux = irradiance_[side.first_node + leaf] * patches_->node_area[side.first_node + leaf];
       received += static_cast<double>(channelSum(flux));
-      reflected += static_cast<double>(glm::dot(flux, reflectance_[side.first_value + leaf]));
+      reflected += static_cast<double>(glm::dot(flux, system_.reflectance()[side.first_value + leaf]));
     }
   }
   error_ = {};
@@ -48,8 +48,11 @@ void LinkedSolver::assess() {
       if (shooter.isLight() && column.points() == 0.0) owed += 0.5 * shooter.power();
     }
   }
-  const double left_out = planner_.leftOut() + (growing_ ? 0.0 : planner_.unlinked(system_));
-  owed += growing_ ? net_unshot_ : left_out;
+  // What a wave that ended early did not measure stands for its leaves, so that it is not unshot, and sends nothing.
+  // Parts of a node are signed: what of them would have taken light away is no light that is missing.
+  const double unlinked = std::max(0.0, planner_.unlinked(system_));
+  const double left_out = planner_.leftOut() + (growing_ ? 0.0 : unlinked);
+  owed += growing_ ? net_unshot_ + unlinked : left_out;
   if (field.square() <= 0.0) {
     error_.residual = error_.total = owed + varying_ > 0.0 ? 1.0 : 0.0;  // all or nothing is missing
     return;
@@ -103,7 +106,7 @@ double LinkedSolver::lostPart() const {
   for (const auto& shooter : system_.shooters()) {
     for (std::size_t half = 0; half < 2 && !shooter.isLight(); ++half) {
       const auto& column = shooter.column[half];
-      const glm::dvec3 radiosity = shooter.weight[half] * glm::dvec3(shooter.sent[half]);
+      const glm::dvec3 radiosity = shooter.carried(half) * glm::dvec3(shooter.sent[half]);
       if (column.points() == 0.0) continue;
       sent += shooter.area * (radiosity.x + radiosity.y + radiosity.z);
       lost += (column.escaped() + column.absorbed()) * (radiosity.x + radiosity.y + radiosity.z);
@@ -122,7 +125,7 @@ double LinkedSolver::powerToShoot() const {
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
       const glm::vec3 flux = irradiance_[side.first_node + leaf] * patches_->node_area[side.first_node + leaf];
       received += static_cast<double>(channelSum(flux));
-      reflected += static_cast<double>(glm::dot(flux, reflectance_[side.first_value + leaf]));
+      reflected += static_cast<double>(glm::dot(flux, system_.reflectance()[side.first_value + leaf]));
     }
   }
   const double kept = received > 0.0 ? std::min(0.95, (1.0 - lostPart()) * reflected / received) : 0.5;
@@ -144,7 +147,7 @@ EnergyParts LinkedSolver::energy() const {
       const auto& column = shooter.column[half];
       if (column.points() == 0.0) continue;
       for (std::size_t c = 0; c < 3; ++c) {
-        const double sent = 0.5 * shooter.weight[half] * static_cast<double>(shooter.sent[half][static_cast<int>(c)]);
+        const double sent = 0.5 * shooter.carried(half) * static_cast<double>(shooter.sent[half][static_cast<int>(c)]);
         parts.escaped[c] += sent * column.escaped();
         parts.backface[c] += sent * column.absorbed();
         if (shooter.light != scene::kNone) sent_for[c] += sent * shooter.area;
@@ -153,8 +156,8 @@ EnergyParts LinkedSolver::energy() const {
     // Shooters that won at roulette sent more than their own leaves have, those that lost nothing.
     for (std::size_t half = 0; half < 2 && !shooter.isLight(); ++half) {
       for (int c = 0; c < 3; ++c)
-        sent_for[static_cast<std::size_t>(c)] +=
-            0.5 * (shooter.weight[half] - 1.0) * static_cast<double>(shooter.sent[half][c]) * shooter.area;
+        sent_for[static_cast<std::size_t>(c)] += 0.5 * (shooter.weight[half] - 1.0) * shooter.own[half] *
+                                                 static_cast<double>(shooter.sent[half][c]) * shooter.area;
     }
   }
   for (const auto& side : sides_) {
@@ -165,10 +168,10 @@ EnergyParts LinkedSolver::energy() const {
       for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
         const auto v = side.first_value + leaf;
         const auto area = static_cast<double>(patches_->node_area[side.first_node + leaf]);
-        const double emitted = area * static_cast<double>(emission_[v][c]);
+        const double emitted = area * static_cast<double>(system_.emission()[v][c]);
         parts.emitted[i] += emitted;
         if (side.gathered) parts.unshot[i] += emitted;
-        parts.absorbed[i] += area * (1.0 - static_cast<double>(reflectance_[v][c])) *
+        parts.absorbed[i] += area * (1.0 - static_cast<double>(system_.reflectance()[v][c])) *
                              static_cast<double>(irradiance_[side.first_node + leaf][c]);
       }
     }

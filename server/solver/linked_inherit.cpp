@@ -46,7 +46,7 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
   takeSources(sources);
   inheritNodes(former, numbers);
   planRepairs();
-  for (auto& half : half_) half.assign(emission_.size(), glm::vec3(0.0F));
+  for (auto& half : half_) half.assign(system_.emission().size(), glm::vec3(0.0F));
   findUnshot();
   solveAnew();
 }

@@ -137,7 +137,7 @@ Result<void> LinkedSolver::repairSlice() {
   const auto start = std::chrono::steady_clock::now();
   RepairBatch batch;
   batch.repairs = std::span(repairs_).subspan(repaired_, std::min(slice_, repairs_.size() - repaired_));
-  batch.sum.resize(emission_.size());
+  batch.sum.resize(system_.emission().size());
   findCutLinks(batch);
   auto& shots = batch.shots;
   for (const auto& box : shadows_->change().boxes) shots.boxes.push_back(box);

@@ -12,8 +12,8 @@ constexpr std::uint32_t kKind = 0x4b4e494cU;  // "LINK"
 /// All of a shooter but its links.
 template <typename Archive, typename Self>
 void visitShooter(Archive& archive, Self& shooter) {
-  archive(shooter.place, shooter.light, shooter.source, shooter.certain, shooter.area, shooter.weight, shooter.mean,
-          shooter.sent, shooter.most_bytes, shooter.products);
+  archive(shooter.place, shooter.light, shooter.source, shooter.certain, shooter.area, shooter.weight, shooter.own,
+          shooter.mean, shooter.sent, shooter.most_bytes, shooter.products);
 }
 
 }  // namespace
@@ -90,7 +90,7 @@ void LinkedSolver::visit(Archive& archive, Self& self) {
 
 bool LinkedSolver::save(ArchiveWriter& to) const {
   if (pass_ != Pass::kNone) return false;
-  to(kKind, static_cast<std::uint64_t>(emission_.size()));
+  to(kKind, static_cast<std::uint64_t>(system_.emission().size()));
   visit(to, *this);
   system_.save(to);
   return true;
@@ -100,7 +100,7 @@ bool LinkedSolver::restore(ArchiveReader& from) {
   std::uint32_t kind = 0;
   std::uint64_t values = 0;
   from(kind, values);
-  if (!from.ok() || kind != kKind || values != emission_.size()) return false;
+  if (!from.ok() || kind != kKind || values != system_.emission().size()) return false;
   visit(from, *this);
   if (!system_.restore(from)) return false;
   const auto& shooters = system_.shooters();

@@ -79,8 +79,8 @@ void LinkedSolver::leafUnshot(std::uint32_t s, std::vector<glm::vec3>& leaves) c
   system_.standIn(s, leaves);
   for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
     const auto v = side.first_value + leaf;
-    const glm::vec3 emission = side.gathered ? glm::vec3(0.0F) : emission_[v];
-    leaves[leaf] = reflectance_[v] * irradiance_[side.first_node + leaf] + emission - leaves[leaf];
+    const glm::vec3 emission = side.gathered ? glm::vec3(0.0F) : system_.emission()[v];
+    leaves[leaf] = system_.reflectance()[v] * irradiance_[side.first_node + leaf] + emission - leaves[leaf];
   }
 }
 

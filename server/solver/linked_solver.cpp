@@ -62,27 +62,27 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
   takeMaterials(materials);
   takeSources(sources);
   share_part_ = 1.0 / settings_.planner.first_shooters;
-  for (auto& half : half_) half.assign(emission_.size(), glm::vec3(0.0F));
+  for (auto& half : half_) half.assign(system_.emission().size(), glm::vec3(0.0F));
   findUnshot();
 }
 
 void LinkedSolver::takeMaterials(const scene::PatchMaterials& materials) {
-  emission_.clear();
-  reflectance_.clear();
+  std::vector<glm::vec3> emissions, reflectances;  // by leaf value
+  for (auto* values : {&emissions, &reflectances}) values->reserve(expander_.values().size());
   for (const auto& side : sides_) {
     const auto emission = materials.emission.begin() + side.first_node;
     const auto reflectance = materials.reflectance.begin() + side.first_node;
-    emission_.insert(emission_.end(), emission, emission + side.leaf_count);
-    reflectance_.insert(reflectance_.end(), reflectance, reflectance + side.leaf_count);
+    emissions.insert(emissions.end(), emission, emission + side.leaf_count);
+    reflectances.insert(reflectances.end(), reflectance, reflectance + side.leaf_count);
   }
+  system_.setMaterials(std::move(emissions), std::move(reflectances));
   takeLights();
-  system_.setMaterials(emission_, reflectance_);
   double area = 0.0;
   glm::dvec3 reflectance(0.0);
   for (const auto& side : sides_) {
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
       const auto a = static_cast<double>(patches_->node_area[side.first_node + leaf]);
-      reflectance += a * glm::dvec3(reflectance_[side.first_value + leaf]);
+      reflectance += a * glm::dvec3(system_.reflectance()[side.first_value + leaf]);
       area += a;
     }
   }

@@ -144,8 +144,7 @@ class LinkedSolver final : public Solver {
   Transport& transport_;
   SolverSettings settings_;
   std::vector<Side> sides_;
-  std::vector<glm::vec3> emission_, reflectance_;  // by leaf value
-  std::vector<LightPolygon> lights_;               // those switched off stay, dark: their links are still good
+  std::vector<LightPolygon> lights_;  // those switched off stay, dark: their links are still good
   PunctualLights punctual_;
   std::vector<PunctualLights::Source> sources_;  // those switched off stay, dark
   NodeShots shots_;

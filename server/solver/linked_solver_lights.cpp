@@ -19,7 +19,7 @@ constexpr std::ptrdiff_t kDarkSources = 8;
 /// Every light polygon that ever was is a shooter; its radiosity is what it emits now.
 void LinkedSolver::takeLights() {
   for (auto& light : lights_) light.emission = glm::vec3(0.0F);
-  for (const auto& light : findLightPolygons(*patches_, sides_, emission_)) {
+  for (const auto& light : findLightPolygons(*patches_, sides_, system_.emission())) {
     const auto known =
         std::find_if(lights_.begin(), lights_.end(), [&](const LightPolygon& old) { return old.key == light.key; });
     if (known != lights_.end()) {

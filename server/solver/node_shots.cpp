@@ -8,6 +8,13 @@
 #include "server/solver/sampling.h"
 
 namespace radiosity::solver {
+namespace {
+
+/// Nodes of a block of so many by so many look at the same place of a receiver, those of the next block at the
+/// opposite place.
+constexpr std::uint32_t kJitterBlock = 4;
+
+}  // namespace
 
 HemicubeFrame hemicubeAt(const glm::vec3& origin, const glm::vec3& normal, double rotation, std::uint64_t key) {
   const glm::vec3 helper = std::abs(normal.x) < 0.6F ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0);
@@ -22,11 +29,19 @@ HemicubeFrame hemicubeAt(const glm::vec3& origin, const glm::vec3& normal, doubl
   return frame;
 }
 
+/// Unit box squared. Where a file's own coordinates unfold a surface texels differ in size.
+double NodeShots::areaOf(const NodePlace& node, const TexelPolygon& polygon) const {
+  const auto& surface = patches_.surfaces[sides_[node.side].surface];
+  if (surface.planar) return polygon.area() * static_cast<double>(surface.texel_area);
+  const auto& frame = patches_.triangles[flatTriangle(node)];
+  return polygon.area() * static_cast<double>(glm::length(glm::cross(frame.du, frame.dv)));
+}
+
 bool NodeShots::isWhole(const NodePlace& node) const {
   const Side& side = sides_[node.side];
   const auto polygon = outlines_.node(side.surface, node.level, node.x, node.y);
   const auto area = static_cast<double>(patches_.node_area[nodeId(side, node)]);
-  const double whole = polygon.area() * static_cast<double>(patches_.surfaces[side.surface].texel_area);
+  const double whole = areaOf(node, polygon);
   return std::abs(area - whole) <= 2e-3 * whole;
 }
 
@@ -54,7 +69,7 @@ void NodeShots::addGather(const NodePlace& node, std::size_t half, std::uint32_t
                           std::uint32_t resolution, ShotBatch& batch) const {
   const Side& side = sides_[node.side];
   const auto& surface = patches_.surfaces[side.surface];
-  const auto& frame = patches_.triangles[surface.first_triangle];
+  const auto& frame = patches_.triangles[flatTriangle(node)];
   const auto polygon = outlines_.node(side.surface, node.level, node.x, node.y);
   if (polygon.count < 3) return addScatter(node, half, index, resolution, batch);  // a sliver
   const bool whole = isWhole(node);
@@ -67,15 +82,17 @@ void NodeShots::addGather(const NodePlace& node, std::size_t half, std::uint32_t
   const bool turned = glm::dot(glm::cross(frame.du, frame.dv), shot.normal) < 0.0F;
   for (std::uint32_t k = 0; k < polygon.count; ++k)
     shot.corners[turned ? polygon.count - 1 - k : k] = at(polygon.corner[k]);
-  const double area = polygon.area() * static_cast<double>(surface.texel_area);
+  const double area = areaOf(node, polygon);
   const auto shining = static_cast<double>(patches_.node_area[nodeId(side, node)]);
   shot.fill = whole ? 1.0F : static_cast<float>(std::min(1.0, shining / area));
   shot.resolution = resolution;
   const std::uint64_t node_key = mixKeys(key(node), half);
   // The halves look at opposite places of a texel: what is linear in it cancels in their mean and shows in their
-  // difference.
+  // difference. So do blocks of nodes, or it would show for the whole surface at once; inside a block all look at one
+  // place, since what single nodes bring to it changes steeply close by, and the sum of neighbours does not.
   const glm::dvec4 jitter = sobol4(index, mixKeys(mixKeys(seed_, side.key), 2));
-  shot.receiver_jitter = glm::vec2(half == 0 ? glm::dvec2(jitter) : 1.0 - glm::dvec2(jitter));
+  shot.receiver_jitter = glm::vec2(
+      (half + node.x / kJitterBlock + node.y / kJitterBlock) % 2 == 0 ? glm::dvec2(jitter) : 1.0 - glm::dvec2(jitter));
   shot.first_point = static_cast<std::uint32_t>(batch.points.size());
   shot.point_count = points;
   for (std::uint32_t p = 0; p < points; ++p) {

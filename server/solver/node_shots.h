@@ -4,6 +4,7 @@
 
 #include <cstdint>
 
+#include "server/solver/flat_nodes.h"
 #include "server/solver/lights.h"
 #include "server/solver/outlines.h"
 #include "server/solver/side.h"
@@ -18,12 +19,15 @@ namespace radiosity::solver {
 class NodeShots {
  public:
   NodeShots(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed)
-      : patches_(patches), sides_(sides), outlines_(patches), seed_(seed) {}
+      : patches_(patches), sides_(sides), outlines_(patches), flat_(patches), seed_(seed) {}
 
-  /// Nodes of planar surfaces shoot as polygons, gathered; others from one point, scattered.
+  /// Nodes that lie in one plane shoot as polygons, gathered; others from one point, scattered.
   [[nodiscard]] bool gathers(const NodePlace& node) const {
-    const auto& surface = patches_.surfaces[sides_[node.side].surface];
-    return surface.planar && !surface.see_through;
+    return !patches_.surfaces[sides_[node.side].surface].see_through && flatTriangle(node) != scene::kNone;
+  }
+  /// Wide parts of the node lie in one plane each, but not all of it.
+  [[nodiscard]] bool isFolded(const NodePlace& node) const {
+    return flat_.isFolded(sides_[node.side].surface, node.level, node.x, node.y);
   }
   /// All of the node's polygon is covered and not buried.
   [[nodiscard]] bool isWhole(const NodePlace& node) const;
@@ -40,11 +44,16 @@ class NodeShots {
                  std::uint32_t resolution, ShotBatch& batch) const;
   void addScatter(const NodePlace& node, std::size_t half, std::uint32_t index, std::uint32_t resolution,
                   ShotBatch& batch) const;
+  [[nodiscard]] std::uint32_t flatTriangle(const NodePlace& node) const {
+    return flat_.triangle(sides_[node.side].surface, node.level, node.x, node.y);
+  }
+  [[nodiscard]] double areaOf(const NodePlace& node, const TexelPolygon& polygon) const;
   [[nodiscard]] std::uint32_t leafByArea(const NodePlace& node, double& u, double& v) const;
 
   const scene::PatchScene& patches_;
   const std::vector<Side>& sides_;
   Outlines outlines_;
+  FlatNodes flat_;
   std::uint64_t seed_;
 };
 

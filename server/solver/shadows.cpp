@@ -1,9 +1,11 @@
 #include "server/solver/shadows.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <utility>
 
 namespace radiosity::solver {
 namespace {
@@ -12,8 +14,8 @@ namespace {
 constexpr float kInFront = -5e-7F;
 /// A leaf of a curved surface may reach so much farther than the frame of one of its triangles tells.
 constexpr float kCurved = 2.0F;
-/// So many leaves in a row are looked at as one first.
-constexpr std::uint32_t kChunkLeaves = 64;
+/// Squares of so many leaves along a side are looked at as one first.
+constexpr std::uint32_t kTileSide = 8;
 /// Half a pixel's diagonal, in widths of a pixel, and room for rounding.
 constexpr float kHalfDiagonal = 0.7072F;
 
@@ -43,55 +45,76 @@ inline Clip clip(float slope, float least) {
 
 }  // namespace
 
-void Shadows::Balls::add(const glm::vec3& centre, float r) {
+void Shadows::Balls::add(const glm::vec3& centre, float r, float pixels) {
   x.push_back(centre.x);
   y.push_back(centre.y);
   z.push_back(centre.z);
   radius.push_back(r);
+  reach.push_back(pixels);
+}
+
+/// Leaves in gaps, and those of surfaces with two sides, ask the pixels around their own as well.
+float Shadows::reachOf(const scene::Surface& surface, const scene::LeafPoint& leaf) const {
+  const bool in_gap = leaf.full && leaf.first_spot != scene::kNone;
+  const bool two_sided = surface.first_node[0] != scene::kNone && surface.first_node[1] != scene::kNone;
+  return in_gap || two_sided ? 3.0F : 1.0F;
 }
 
 Shadows::Shadows(const scene::PatchScene& patches, const std::vector<Side>& sides, GeometryChange change)
-    : patches_(patches), sides_(sides), change_(std::move(change)), all_(change_.boxes) {
-  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
-    addLeaves(sides_[s]);
-    addChunks(s);
+    : patches_(patches), change_(std::move(change)), all_(change_.boxes) {
+  starts_.resize(change_.altered.size());
+  for (const auto& side : sides) {
+    if (side.leaf_count > 0) starts_[side.first_value] = true;
+    addTiles(side);
   }
-  auto altered = nothing();
-  for (std::size_t v = 0; v < change_.altered.size(); ++v) {
-    if (change_.altered[v] && leaves_.radius[v] >= 0.0F) include(altered, leaves_.centre(v), leaves_.radius[v]);
-  }
+  const auto altered = aroundAltered();
   if (altered.low.x <= altered.high.x) all_.push_back(altered);
 }
 
-void Shadows::addLeaves(const Side& side) {
-  const auto& surface = patches_.surfaces[side.surface];
-  for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
-    const auto triangle = patches_.leaves[surface.first_leaf + leaf].triangle;
-    if (triangle == scene::kNone) {
-      leaves_.add(glm::vec3(0.0F), -1.0F);
-      continue;
-    }
-    const auto& frame = patches_.triangles[triangle];
-    const float x = static_cast<float>(leaf % side.width) + 0.5F, y = static_cast<float>(leaf / side.width) + 0.5F;
-    leaves_.add(frame.origin + x * frame.du + y * frame.dv,
-                (surface.planar ? 0.5F : 0.5F * kCurved) * (glm::length(frame.du) + glm::length(frame.dv)));
+scene::ChangedBox Shadows::aroundAltered() const {
+  auto box = nothing();
+  for (std::size_t i = 0; i < value_.size(); ++i) {
+    if (change_.altered[value_[i]] && leaves_.radius[i] >= 0.0F) include(box, leaves_.centre(i), leaves_.radius[i]);
+  }
+  return box;
+}
+
+void Shadows::addTiles(const Side& side) {
+  for (std::uint32_t y = 0; y < side.height; y += kTileSide) {
+    for (std::uint32_t x = 0; x < side.width; x += kTileSide) addTile(side, x, y);
   }
 }
 
-void Shadows::addChunks(std::uint32_t s) {
-  const Side& side = sides_[s];
-  for (std::uint32_t begin = 0; begin < side.leaf_count; begin += kChunkLeaves) {
-    Chunk chunk{side.first_value + begin, std::min(kChunkLeaves, side.leaf_count - begin), false};
-    auto box = nothing();
-    for (auto v = chunk.first; v < chunk.first + chunk.count; ++v) {
-      chunk.altered = chunk.altered || change_.altered[v];
-      if (leaves_.radius[v] >= 0.0F) include(box, leaves_.centre(v), leaves_.radius[v]);
-    }
-    chunks_.push_back(chunk);
-    const bool empty = box.low.x > box.high.x;
-    chunk_balls_.add(empty ? glm::vec3(0.0F) : 0.5F * (box.low + box.high),
-                     empty ? -1.0F : 0.5F * glm::distance(box.low, box.high));
+void Shadows::addTile(const Side& side, std::uint32_t x0, std::uint32_t y0) {
+  Tile tile{value_.size(), 0, false};
+  for (auto y = y0; y < std::min(y0 + kTileSide, side.height); ++y) {
+    for (auto x = x0; x < std::min(x0 + kTileSide, side.width); ++x) addLeaf(side, y * side.width + x);
   }
+  tile.count = value_.size() - tile.first;
+  auto box = nothing();
+  float reach = 1.0F;
+  for (auto i = tile.first; i < value_.size(); ++i) {
+    reach = std::max(reach, leaves_.reach[i]);
+    tile.altered = tile.altered || change_.altered[value_[i]];
+    if (leaves_.radius[i] >= 0.0F) include(box, leaves_.centre(i), leaves_.radius[i]);
+  }
+  tiles_.push_back(tile);
+  const bool empty = box.low.x > box.high.x;
+  tile_balls_.add(empty ? glm::vec3(0.0F) : 0.5F * (box.low + box.high),
+                  empty ? -1.0F : 0.5F * glm::distance(box.low, box.high), reach);
+}
+
+void Shadows::addLeaf(const Side& side, std::uint32_t leaf) {
+  value_.push_back(side.first_value + leaf);
+  const auto& surface = patches_.surfaces[side.surface];
+  const auto& point = patches_.leaves[surface.first_leaf + leaf];
+  const auto triangle = point.triangle;
+  if (triangle == scene::kNone) return leaves_.add(glm::vec3(0.0F), -1.0F);
+  const auto& frame = patches_.triangles[triangle];
+  const float x = static_cast<float>(leaf % side.width) + 0.5F, y = static_cast<float>(leaf / side.width) + 0.5F;
+  leaves_.add(frame.origin + x * frame.du + y * frame.dv,
+              (surface.planar ? 0.5F : 0.5F * kCurved) * (glm::length(frame.du) + glm::length(frame.dv)),
+              reachOf(surface, point));
 }
 
 bool Shadows::sees(const glm::vec3& point, const glm::vec3& normal) const {
@@ -113,13 +136,13 @@ __attribute__((target_clones("avx2", "default"))) void Shadows::markMet(const Wa
   const float nx = plane.x, ny = plane.y, nz = plane.z, nd = plane.w;
   const float spread = way.spread;
   const float *x = balls.x.data() + begin, *y = balls.y.data() + begin, *z = balls.z.data() + begin;
-  const float* radius = balls.radius.data() + begin;
+  const float *radius = balls.radius.data() + begin, *reach = balls.reach.data() + begin;
   float* __restrict mark = marks;
   const std::size_t count = end - begin;
   for (std::size_t i = 0; i < count; ++i) {
     const float r = radius[i];
     const float dx = x[i] - ox, dy = y[i] - oy, dz = z[i] - oz;
-    const float s = spread * std::sqrt(dx * dx + dy * dy + dz * dz);
+    const float s = spread * reach[i] * std::sqrt(dx * dx + dy * dy + dz * dz);
     // At part t of the way one is past the low face where t (d + s) >= low - r - o, and so on.
     const Clip a = clip(dx + s, lx - r - ox), b = clip(s - dx, ox - hx - r), c = clip(dy + s, ly - r - oy);
     const Clip d = clip(s - dy, oy - hy - r), e = clip(dz + s, lz - r - oz), f = clip(s - dz, oz - hz - r);
@@ -141,19 +164,32 @@ void Shadows::find(std::span<const glm::vec3> points, const glm::vec3& normal, f
     }
   }
   const glm::vec4 plane(normal, glm::dot(normal, points.front()));
-  scratch.chunks.assign(chunks_.size(), kMissed);
-  for (const auto& way : ways) markMet(way, plane, chunk_balls_, 0, chunks_.size(), scratch.chunks.data());
-  runs.clear();
-  for (std::size_t c = 0; c < chunks_.size(); ++c) {
-    const auto& chunk = chunks_[c];
-    if (scratch.chunks[c] < 0.0F && !chunk.altered) continue;
-    scratch.leaves.assign(chunk.count, kMissed);
+  scratch.tiles.assign(tiles_.size(), kMissed);
+  for (const auto& way : ways) markMet(way, plane, tile_balls_, 0, tiles_.size(), scratch.tiles.data());
+  scratch.found.resize((change_.altered.size() + 63) / 64);
+  for (std::size_t t = 0; t < tiles_.size(); ++t) {
+    const auto& tile = tiles_[t];
+    if (scratch.tiles[t] < 0.0F && !tile.altered) continue;
+    scratch.leaves.assign(tile.count, kMissed);
     for (const auto& way : ways)
-      markMet(way, plane, leaves_, chunk.first, chunk.first + chunk.count, scratch.leaves.data());
-    for (std::uint32_t i = 0; i < chunk.count; ++i) {
-      if (scratch.leaves[i] < 0.0F && !(chunk.altered && change_.altered[chunk.first + i])) continue;
-      const bool joins = i > 0 && !runs.empty() && runs.back().first + runs.back().count == chunk.first + i;
-      if (!joins) runs.push_back({chunk.first + i, 0});
+      markMet(way, plane, leaves_, tile.first, tile.first + tile.count, scratch.leaves.data());
+    for (std::size_t i = 0; i < tile.count; ++i) {
+      const auto value = value_[tile.first + i];
+      const bool found = scratch.leaves[i] >= 0.0F || (tile.altered && change_.altered[value]);
+      scratch.found[value / 64] |= std::uint64_t{found} << (value % 64);
+    }
+  }
+  takeRuns(scratch, runs);
+}
+
+/// Of the bits that are set, which it clears.
+void Shadows::takeRuns(Scratch& scratch, std::vector<LinkColumn::ValueRun>& runs) const {
+  runs.clear();
+  for (std::size_t word = 0; word < scratch.found.size(); ++word) {
+    for (auto bits = std::exchange(scratch.found[word], 0); bits != 0; bits &= bits - 1) {
+      const auto value = static_cast<std::uint32_t>(64 * word + static_cast<std::size_t>(std::countr_zero(bits)));
+      const bool joins = !runs.empty() && runs.back().first + runs.back().count == value && !starts_[value];
+      if (!joins) runs.push_back({value, 0});
       ++runs.back().count;
     }
   }

@@ -31,12 +31,13 @@ class Shadows {
   [[nodiscard]] bool sees(const glm::vec3& point, const glm::vec3& normal) const;
 
   struct Scratch {
-    std::vector<float> chunks, leaves;  ///< marks: negative where missed
+    std::vector<float> tiles, leaves;  ///< marks: negative where missed
+    std::vector<std::uint64_t> found;  ///< one bit a leaf value; none between calls
   };
   /// Runs of leaf values, ascending, none across sides, of all leaves whose links from within `radius` of one of the
   /// points, as an item buffer of `resolution` finds them, may differ: those altered, and those that the way to passes
-  /// a box, half a pixel's diagonal beside it included. A superset; leaves behind the plane of the points, and without
-  /// area, may be missing unless they are altered. O(leaves / 64 + leaves near those found).
+  /// a box, what the pixels show that decide on the leaf included. A superset; leaves behind the plane of the points,
+  /// and without area, may be missing unless they are altered. O(tiles + leaves near those found).
   void find(std::span<const glm::vec3> points, const glm::vec3& normal, float radius, std::uint32_t resolution,
             Scratch& scratch, std::vector<LinkColumn::ValueRun>& runs) const;
 
@@ -44,7 +45,8 @@ class Shadows {
   /// Balls around leaves, or around some of them; a negative radius: nothing.
   struct Balls {
     std::vector<float> x, y, z, radius;
-    void add(const glm::vec3& centre, float r);
+    std::vector<float> reach;  ///< of the pixels that decide, in half diagonals of one
+    void add(const glm::vec3& centre, float r, float pixels = 1.0F);
     [[nodiscard]] glm::vec3 centre(std::size_t i) const { return {x[i], y[i], z[i]}; }
   };
   /// All ways from a point to what lies behind, in, or beside a box.
@@ -54,20 +56,26 @@ class Shadows {
   };
   static void markMet(const Way& way, const glm::vec4& plane, const Balls& balls, std::size_t first, std::size_t end,
                       float* marks);
-  void addLeaves(const Side& side);
-  void addChunks(std::uint32_t side);
+  void addTiles(const Side& side);
+  void addTile(const Side& side, std::uint32_t x0, std::uint32_t y0);
+  void addLeaf(const Side& side, std::uint32_t leaf);
+  [[nodiscard]] float reachOf(const scene::Surface& surface, const scene::LeafPoint& leaf) const;
+  [[nodiscard]] scene::ChangedBox aroundAltered() const;
+  void takeRuns(Scratch& scratch, std::vector<LinkColumn::ValueRun>& runs) const;
 
   const scene::PatchScene& patches_;
-  const std::vector<Side>& sides_;
   GeometryChange change_;
   std::vector<scene::ChangedBox> all_;  ///< boxes, and one around all altered leaves
-  Balls leaves_;                        ///< by leaf value
-  struct Chunk {
-    std::uint32_t first, count;  ///< leaf values, of one side
-    bool altered;                ///< some of them
+  Balls leaves_;                        ///< tile after tile
+  std::vector<std::uint32_t> value_;    ///< of these leaves
+  /// Leaves of a square of a side.
+  struct Tile {
+    std::size_t first, count;  ///< into leaves_
+    bool altered;              ///< some of them
   };
-  std::vector<Chunk> chunks_;
-  Balls chunk_balls_;
+  std::vector<Tile> tiles_;
+  Balls tile_balls_;
+  std::vector<bool> starts_;  ///< by leaf value: the first of a side
 };
 
 }  // namespace radiosity::solver

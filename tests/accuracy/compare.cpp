@@ -50,7 +50,8 @@ std::vector<SurfacePoint> choosePoints(const LitScene& lit, const ReferenceOptio
   for (std::size_t i = 0; i < options.points && sum > 0.0; ++i) {
     const double target = (static_cast<double>(i) + random.uniform()) / static_cast<double>(options.points) * sum;
     const auto found = std::upper_bound(cumulative.begin(), cumulative.end() - 1, target);
-    const auto& triangle = lit.scene.triangles[static_cast<std::size_t>(found - cumulative.begin())];
+    const auto index = static_cast<std::uint32_t>(found - cumulative.begin());
+    const auto& triangle = lit.scene.triangles[index];
     const double root = std::sqrt(random.uniform());
     const double v = random.uniform();
     const auto mix = [&](const auto& c) { return c[0] * (1.0 - root) + c[1] * (root * (1.0 - v)) + c[2] * (root * v); };
@@ -61,6 +62,7 @@ std::vector<SurfacePoint> choosePoints(const LitScene& lit, const ReferenceOptio
       back.normal = -back.normal;
       point.footprint.pieces.push_back(back);
     }
+    point.footprint.pieces[0].triangle = index;
     points.push_back(std::move(point));
   }
   return points;

@@ -73,6 +73,7 @@ int main(int argc, char** argv) {
   app.add_option("--texels", options.texels, "texels to compare, drawn at random; 0: all")->capture_default_str();
   app.add_option("--points", options.points, "surface points for the total error")->capture_default_str();
   app.add_option("--seed", options.seed)->capture_default_str();
+  app.add_flag("--closed-form", options.closed_form, "take the exact value, without noise, where the scene has one");
   app.add_flag("--json", json, "print JSON");
   app.add_option("--worst", worst, "show the texels with most of the squared error");
   app.add_option("--references", folder, "folder where references are kept between runs; empty: not kept");

@@ -54,7 +54,7 @@ double texelArea(const Polygon& polygon) {
   return 0.5 * std::abs(twice);
 }
 
-void addPieces(Texel& texel, const Polygon& polygon, const oracle::Triangle& triangle) {
+void addPieces(Texel& texel, const Polygon& polygon, const oracle::Triangle& triangle, std::uint32_t index) {
   texel.coverage += texelArea(polygon);
   const auto& rho = triangle.reflectance;
   texel.least_reflectance = std::min({texel.least_reflectance, rho.x, rho.y, rho.z});
@@ -62,14 +62,14 @@ void addPieces(Texel& texel, const Polygon& polygon, const oracle::Triangle& tri
   texel.two_sided = texel.two_sided || triangle.double_sided;
   for (std::size_t i = 1; i + 1 < polygon.size(); ++i) {
     const std::array<glm::dvec3, 3> corners{polygon[0].world, polygon[i].world, polygon[i + 1].world};
-    texel.footprint.pieces.push_back({corners, triangle.normal});
-    if (triangle.double_sided) texel.footprint.pieces.push_back({corners, -triangle.normal});
+    texel.footprint.pieces.push_back({corners, triangle.normal, index});
+    if (triangle.double_sided) texel.footprint.pieces.push_back({corners, -triangle.normal, oracle::kNoTriangle});
   }
 }
 
 using TexelMap = std::map<std::tuple<int, int, int>, Texel>;  // page, y, x
 
-void rasterize(const oracle::Triangle& triangle, const Page& page, TexelMap& texels) {
+void rasterize(const oracle::Triangle& triangle, std::uint32_t index, const Page& page, TexelMap& texels) {
   Polygon whole;
   glm::dvec2 low(1e300);
   glm::dvec2 high(-1e300);
@@ -87,7 +87,7 @@ void rasterize(const oracle::Triangle& triangle, const Page& page, TexelMap& tex
       texel.page = triangle.lightmap_page;
       texel.x = x;
       texel.y = y;
-      addPieces(texel, cell, triangle);
+      addPieces(texel, cell, triangle, index);
     }
   }
 }
@@ -182,9 +182,10 @@ LitScene readLitScene(const std::filesystem::path& glb) {
 
 std::vector<Texel> findTexels(const LitScene& lit) {
   TexelMap texels;
-  for (const auto& triangle : lit.scene.triangles) {
+  for (std::uint32_t i = 0; i < lit.scene.triangles.size(); ++i) {
+    const auto& triangle = lit.scene.triangles[i];
     if (triangle.lightmap_page < 0) continue;
-    rasterize(triangle, lit.pages.at(static_cast<std::size_t>(triangle.lightmap_page)), texels);
+    rasterize(triangle, i, lit.pages.at(static_cast<std::size_t>(triangle.lightmap_page)), texels);
   }
   std::vector<Texel> result;
   result.reserve(texels.size());

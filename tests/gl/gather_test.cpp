@@ -10,6 +10,7 @@
 
 #include "server/gpu/gpu_transport.h"
 #include "server/gpu/polygon_form_factor.h"
+#include "server/scene/coverage.h"
 #include "tests/gl/scene_builder.h"
 
 namespace radiosity::test {
@@ -135,23 +136,61 @@ TEST_F(Gather, OfALampThatAWallsPlaneCutsThePartInFrontIsReceived) {
   EXPECT_NEAR(all / exact, 1.0, 0.12);
 }
 
+// Many texels away: what is near looks from two places.
 TEST_F(Gather, TheReceiverJitterMovesTheReceivingPoint) {
   SceneBuilder builder;
-  const auto floor = builder.add({{-0.5F, -0.5F, -0.5F}, {1, 0, 0}, {0, 1, 0}, 4, 4});
+  const auto floor = builder.add({{-0.5F, -0.5F, -0.5F}, {1, 0, 0}, {0, 1, 0}, 32, 32});
   const auto lamp = builder.add({{-0.1F, -0.2F, 0.4F}, {0, 0.3F, 0}, {0.2F, 0, 0}, 1, 1});
   const auto scene = builder.build();
   std::mt19937 random(1);
   auto batch = gatherFrom(*scene, lamp, 2, random);
   batch.gather[0].receiver_jitter = {0.125F, 0.75F};
   const auto flux = run(scene, batch);
-  const auto exact = gpu::polygonFormFactor({-0.5 + 1.125 / 4, -0.5 + 2.75 / 4, -0.5}, {0, 0, 1},
+  const auto exact = gpu::polygonFormFactor({-0.5 + 9.125 / 32, -0.5 + 22.75 / 32, -0.5}, {0, 0, 1},
                                             std::span(batch.gather[0].corners).first(batch.gather[0].corner_count));
-  EXPECT_NEAR(irradiance(*scene, flux, floor, 1, 2), exact, 1e-5 * exact);
+  EXPECT_NEAR(irradiance(*scene, flux, floor, 9, 22), exact, 1e-5 * exact);
 }
 
 /// Share of the lamp's interval [-0.1, 0.1] that a point at distance x from the blocker's edge line sees past a
 /// half-plane: similar triangles, blocker half-way between lamp and floor.
 double visibleShare(double x) { return std::clamp((x + 0.1) / 0.2, 0.0, 1.0); }
+
+// A lamp as large as a texel, and the texel at its foot: across it the form factor falls from 0.5 to 0.07.
+TEST_F(Gather, AReceiverCloseByLooksFromOppositePlacesAndTheHalvesFromFour) {
+  constexpr float kTexel = 1.0F / 16.0F;
+  SceneBuilder builder;
+  const auto floor = builder.add({{-0.5F, -0.5F, -0.5F}, {1, 0, 0}, {0, 1, 0}, 16, 16});
+  const auto lamp = builder.add({{-0.5F, 0, -0.5F}, {0, kTexel, 0}, {0, 0, kTexel}, 1, 1});
+  const auto scene = builder.build();
+  std::mt19937 random(3);
+  auto batch = gatherFrom(*scene, lamp, 1, random);
+  auto& shot = batch.gather[0];
+  const auto at = [&](const glm::dvec2& place) {
+    const glm::dvec3 point(-0.5 + kTexel * place.x, kTexel * place.y, -0.5);
+    return gpu::polygonFormFactor(point, {0, 0, 1}, std::span(shot.corners).first(shot.corner_count));
+  };
+  double mean = 0.0, one_place = 0.0, halves = 0.0, all = 0.0;
+  for (std::uint32_t k = 0; k < 64 * 64; ++k) mean += at({(k % 64 + 0.5) / 64, (k / 64 + 0.5) / 64}) / (64 * 64);
+  std::uniform_real_distribution<float> unit(0.0F, 1.0F);
+  for (std::uint32_t trial = 0; trial < 16; ++trial) {
+    const glm::vec2 jitter(unit(random), unit(random));
+    std::array<double, 2> half{};
+    for (std::size_t h = 0; h < 2; ++h) {
+      shot.receiver_jitter = h == 0 ? jitter : 1.0F - jitter;
+      half[h] = irradiance(*scene, run(scene, batch), floor, 0, 8);
+    }
+    const glm::dvec2 across = jitter.x <= 0.5F ? jitter : 1.0F - jitter;
+    const auto inverted = [](double offset) { return std::copysign(0.5 - std::abs(offset), offset); };
+    const glm::dvec2 other(0.5 + inverted(0.5 - across.x), 0.5 - inverted(0.5 - across.y));
+    const double sum = at(across) + at(1.0 - across) + at(other) + at(1.0 - other);
+    EXPECT_NEAR(half[0] + half[1], 0.5 * sum, 1e-3 * sum);
+    one_place += std::pow(at(across) - at(1.0 - across), 2.0);
+    halves += std::pow(half[0] - half[1], 2.0);
+    all += std::pow(0.5 * (half[0] + half[1]) - mean, 2.0);
+  }
+  EXPECT_LT(halves, 0.25 * one_place) << "what is linear in the place cancels in each half";
+  EXPECT_LT(all, 0.1 * halves) << "and what is quadratic in the mean of the two";
+}
 
 TEST_F(Gather, AHalfPlaneCastsAnExactUmbraAndPenumbra) {
   SceneBuilder builder;
@@ -175,6 +214,56 @@ TEST_F(Gather, AHalfPlaneCastsAnExactUmbraAndPenumbra) {
     } else {
       EXPECT_NEAR(share, visibleShare(at), 0.05) << at;
     }
+  }
+}
+
+// A panel hangs half a thousandth before a ceiling. Pixels are wider than the leaves along its rim, and those under it
+// are dark: what pixels took from the leaves beside it, none would gain.
+TEST_F(Gather, LeavesBesideAPanelThatHangsBeforeThemLoseNothingToIt) {
+  SceneBuilder builder;
+  const auto ceiling = builder.add({{-0.5F, 0.5F, 0.5F}, {1, 0, 0}, {0, -1, 0}, 40, 40});
+  builder.add({{0.0F, 0.25F, 0.4995F}, {0.3F, 0, 0}, {0, -0.5F, 0}, 1, 1});
+  const auto lamp = builder.add({{-0.1F, -0.1F, -0.5F}, {0.2F, 0, 0}, {0, 0.2F, 0}, 1, 1});
+  auto made = std::make_shared<scene::PatchScene>(*builder.build());
+  scene::placeSpotsInGaps(*made);
+  const std::shared_ptr<const scene::PatchScene> scene = made;
+  std::mt19937 random(3);
+  const auto batch = gatherFrom(*scene, lamp, 8, random);
+  const auto flux = run(scene, batch);
+  const auto corners = std::span(batch.gather[0].corners).first(batch.gather[0].corner_count);
+  double beside = 0.0, under = 0.0, open = 0.0;
+  for (std::uint32_t y = 12; y < 28; ++y) {
+    beside += irradiance(*scene, flux, ceiling, 19, y);
+    under += irradiance(*scene, flux, ceiling, 20, y);
+    open += gpu::polygonFormFactor({-0.0125, 0.5 - (y + 0.5) / 40, 0.5}, {0, 0, -1}, corners);
+  }
+  // In the gap one sees at most what lies to the side of the panel: 0.0005 of a leaf's 0.025.
+  EXPECT_NEAR(beside / open, 1.0, 0.02);
+  EXPECT_NEAR(under / open, 0.0, 0.02);
+}
+
+// Seen from the lamp, pixels along the silhouette of a box show the floor beyond it, and what lies inside, where both
+// sides of a wall are surfaces, lies before that.
+TEST_F(Gather, TheInsideOfAClosedBoxOfTwoSidedWallsStaysDark) {
+  SceneBuilder builder;
+  builder.add({{-1.0F, -1.0F, -0.5F}, {2, 0, 0}, {0, 2, 0}, 20, 20});
+  const std::uint32_t first = builder.add({{-0.2F, -0.2F, -0.3F}, {0.4F, 0, 0}, {0, 0.4F, 0}, 16, 16, true});
+  builder.add({{-0.2F, -0.2F, -0.1F}, {0.4F, 0, 0}, {0, 0.4F, 0}, 16, 16, true});
+  builder.add({{-0.2F, -0.2F, -0.3F}, {0, 0.4F, 0}, {0, 0, 0.2F}, 16, 8, true});
+  builder.add({{0.2F, -0.2F, -0.3F}, {0, 0.4F, 0}, {0, 0, 0.2F}, 16, 8, true});
+  builder.add({{-0.2F, -0.2F, -0.3F}, {0.4F, 0, 0}, {0, 0, 0.2F}, 16, 8, true});
+  const std::uint32_t last = builder.add({{-0.2F, 0.2F, -0.3F}, {0.4F, 0, 0}, {0, 0, 0.2F}, 16, 8, true});
+  const auto lamp = builder.add({{-0.1F, -0.1F, 0.4F}, {0, 0.2F, 0}, {0.2F, 0, 0}, 1, 1});
+  const auto scene = builder.build();
+  std::mt19937 random(11);
+  const auto flux = run(scene, gatherFrom(*scene, lamp, 8, random));
+  for (auto s = first; s <= last; ++s) {
+    const auto& wall = scene->surfaces[s];
+    const auto inward = glm::dot(scene->triangles[wall.first_triangle].normal,
+                                 glm::vec3(0.0F, 0.0F, -0.2F) - 0.5F * (wall.bounds_min + wall.bounds_max)) > 0.0F;
+    ASSERT_NE(wall.first_node[1], scene::kNone);
+    for (std::uint32_t i = 0; i < wall.width * wall.height; ++i)
+      EXPECT_EQ(flux.node[0][wall.first_node[inward ? 0 : 1] + i][0], 0) << s << " " << i;
   }
 }
 

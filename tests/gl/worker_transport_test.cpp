@@ -7,6 +7,7 @@
 #include <atomic>
 #include <chrono>
 #include <csignal>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <thread>
@@ -66,6 +67,17 @@ std::vector<pid_t> childWorkers() {
     if (parent == getpid()) found.push_back(std::stoi(name));
   }
   return found;
+}
+
+double processorSeconds(const std::vector<pid_t>& workers) {
+  double sum = 0.0;
+  for (const auto worker : workers) {
+    clockid_t clock{};
+    timespec used{};
+    if (clock_getcpuclockid(worker, &clock) != 0 || clock_gettime(clock, &used) != 0) continue;
+    sum += static_cast<double>(used.tv_sec) + 1e-9 * static_cast<double>(used.tv_nsec);
+  }
+  return sum;
 }
 
 class Workers : public ::testing::Test {
@@ -213,6 +225,36 @@ TEST_F(Workers, HungWorkersAreReplacedAndChangeNoBit) {
     EXPECT_EQ(after.size(), 2U);
     EXPECT_EQ(std::count(after.begin(), after.end(), living.front()), 0) << "the stopped one is still there";
   }
+}
+
+TEST_F(Workers, ThatAreHardlyLetRunAreLateAndNotHung) {
+  const auto scene = randomRoom(402, 13742, 2);
+  const auto batch = mixedBatch(*scene, 60);
+  ASSERT_TRUE(in_process_->setScene(scene).has_value());
+  const auto expected = run(*in_process_, *scene, batch);
+  const auto transport = make(2, std::chrono::milliseconds(1));  // and 2 us for each of half a million pixels
+  ASSERT_TRUE(transport);
+  ASSERT_TRUE(transport->setScene(scene).has_value());
+  const auto workers = childWorkers();
+  ASSERT_EQ(workers.size(), 2U);
+  // As on a machine with much else to do: half a millisecond of processor time, then a tenth of a second of nothing.
+  std::atomic<bool> over{false};
+  std::thread brake([&] {
+    while (!over) {
+      for (const auto worker : workers) kill(worker, SIGSTOP);
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));
+      const double before = processorSeconds(workers);
+      for (const auto worker : workers) kill(worker, SIGCONT);
+      for (int i = 0; i < 100 && processorSeconds(workers) < before + 5e-4; ++i)
+        std::this_thread::sleep_for(std::chrono::microseconds(200));
+    }
+    for (const auto worker : workers) kill(worker, SIGCONT);
+  });
+  expectSame(run(*transport, *scene, batch), expected);
+  over = true;
+  brake.join();
+  EXPECT_EQ(transport->losses().count, 0U);
+  EXPECT_EQ(childWorkers(), workers);
 }
 
 TEST_F(Workers, AnInterruptionEndsARunWithAHungWorkerAndEveryRunAfterIt) {

@@ -12,6 +12,9 @@
 #include <stdexcept>
 #include <thread>
 
+#include "tests/oracle/burial.h"
+#include "tests/oracle/directions.h"
+#include "tests/oracle/embree_ray.h"
 #include "tests/oracle/lamps.h"
 #include "tests/oracle/random.h"
 
@@ -20,23 +23,11 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 constexpr std::uint32_t kBatches = 8;  // independent shifts: their spread is the standard error
-constexpr int kBurialRays = 16;
 
 struct Point {
   glm::dvec3 position, normal;
+  std::uint32_t triangle = kNoTriangle;  ///< that it was chosen on
 };
-
-/// Cosine-distributed direction about a unit normal; the basis is Duff et al., JCGT 2017.
-glm::dvec3 cosineDirection(const glm::dvec3& n, double u, double v) {
-  const double sign = std::copysign(1.0, n.z);
-  const double a = -1.0 / (sign + n.z);
-  const double b = n.x * n.y * a;
-  const glm::dvec3 s(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x);
-  const glm::dvec3 t(b, sign + n.y * n.y * a, -n.y);
-  const double r = std::sqrt(u);
-  const double phi = 2.0 * kPi * v;
-  return s * (r * std::cos(phi)) + t * (r * std::sin(phi)) + n * std::sqrt(std::max(0.0, 1.0 - u));
-}
 
 glm::dvec3 uniformInTriangle(const std::array<glm::dvec3, 3>& c, double u, double v) {
   const double root = std::sqrt(u);
@@ -61,12 +52,13 @@ std::size_t pick(const std::vector<double>& cumulative, double& u) {
 struct Tally {
   glm::dvec3 sum{0.0};
   double visible = 0.0, tried = 0.0;
+  double front = 0.0, covered = 0.0;  ///< of those tried, on fronts, and of these under an earlier face
 };
 
 }  // namespace
 
 Footprint Footprint::at(const glm::dvec3& point, const glm::dvec3& normal) {
-  return {{Piece{{point, point, point}, normal}}};
+  return {{Piece{{point, point, point}, normal, kNoTriangle}}};
 }
 
 double Footprint::area() const {
@@ -97,14 +89,13 @@ class PathTracer::Scene {
   Scene(const Scene&) = delete;
   Scene& operator=(const Scene&) = delete;
 
-  [[nodiscard]] bool buried(const Point& point) const {
-    int backs = 0;
-    for (int i = 0; i < kBurialRays; ++i) {
-      const double u = (i + 0.5) / kBurialRays;
-      const double v = i * std::numbers::phi;
-      if (meetsBack(point, cosineDirection(point.normal, u, v))) ++backs;
-    }
-    return 2 * backs > kBurialRays;
+  [[nodiscard]] bool inside(const Point& point) const {
+    return burial_->insideSolid(toUnit(point.position), point.normal);
+  }
+
+  /// Under an earlier triangle in the same plane.
+  [[nodiscard]] bool covered(const Point& point) const {
+    return point.triangle != kNoTriangle && burial_->underEarlier(toUnit(point.position), point.normal, point.triangle);
   }
 
   [[nodiscard]] Irradiance estimate(const Footprint& footprint, std::size_t index, const PathOptions& options) const {
@@ -119,13 +110,21 @@ class PathTracer::Scene {
         const auto u = lattice.point(i);
         const auto point = pointOn(footprint, cumulative, u[0], u[1]);
         tallies[b].tried += 1.0;
-        if (check_burial && buried(point)) continue;
+        if (check_burial && (leaveOut(point, tallies[b]) || inside(point))) continue;
         if (see_through_ && onHole(point)) continue;
         tallies[b].visible += 1.0;
         tallies[b].sum += path(point, {u[2], u[3], u[4], u[5], u[6]}, random);
       }
     }
     return summarize(tallies);
+  }
+
+  /// Whether the point is under an earlier face; counts it.
+  [[nodiscard]] bool leaveOut(const Point& point, Tally& tally) const {
+    const bool out = covered(point);
+    tally.front += point.triangle != kNoTriangle ? 1.0 : 0.0;
+    tally.covered += out ? 1.0 : 0.0;
+    return out;
   }
 
  private:
@@ -157,7 +156,8 @@ class PathTracer::Scene {
 
   void build() {
     scene_ = rtcNewScene(device_);
-    rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_ROBUST);
+    rtcSetSceneFlags(scene_,
+                     static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION));
     rtcSetSceneBuildQuality(scene_, RTC_BUILD_QUALITY_HIGH);
     if (!triangles_.empty()) {
       const RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
@@ -177,6 +177,7 @@ class PathTracer::Scene {
       rtcReleaseGeometry(geometry);
     }
     rtcCommitScene(scene_);
+    burial_.emplace(scene_, triangles_);
   }
 
   void gatherLights() {
@@ -199,18 +200,7 @@ class PathTracer::Scene {
   [[nodiscard]] glm::dvec3 lifted(const Point& point) const { return toUnit(point.position) + point.normal * kLift; }
 
   [[nodiscard]] std::optional<Hit> trace(const Point& from, const glm::dvec3& direction) const {
-    const auto origin = lifted(from);
-    RTCRayHit query{};
-    query.ray.org_x = static_cast<float>(origin.x);
-    query.ray.org_y = static_cast<float>(origin.y);
-    query.ray.org_z = static_cast<float>(origin.z);
-    query.ray.dir_x = static_cast<float>(direction.x);
-    query.ray.dir_y = static_cast<float>(direction.y);
-    query.ray.dir_z = static_cast<float>(direction.z);
-    query.ray.tfar = std::numeric_limits<float>::infinity();
-    query.ray.mask = ~0U;
-    query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    auto query = embreeRay(lifted(from), direction, std::numeric_limits<double>::infinity());
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     rtcIntersect1(scene_, &context, &query);
@@ -267,11 +257,6 @@ class PathTracer::Scene {
     const Point above{point.position + point.normal * (4.0 * kLift / scale_), -point.normal};
     const auto hit = trace(above, -point.normal);
     return hit && triangles_[hit->triangle].see_through && opacityAt(*hit) <= 0.0;
-  }
-
-  [[nodiscard]] bool meetsBack(const Point& from, const glm::dvec3& direction) const {
-    const auto hit = trace(from, direction);
-    return hit && hit->back && !triangles_[hit->triangle].double_sided && !triangles_[hit->triangle].see_through;
   }
 
   [[nodiscard]] bool sees(const Point& a, const Point& b, Random& random) const {
@@ -388,10 +373,10 @@ class PathTracer::Scene {
   [[nodiscard]] static Point pointOn(const Footprint& footprint, const std::vector<double>& cumulative, double u,
                                      double v) {
     const auto& piece = footprint.pieces[pick(cumulative, u)];
-    return {uniformInTriangle(piece.corners, u, v), piece.normal};
+    return {uniformInTriangle(piece.corners, u, v), piece.normal, piece.triangle};
   }
 
-  /// Cheap first look: no footprint from which no ray meets a back needs the test at every sample.
+  /// Cheap first look: no footprint from which no ray leaves a solid needs the test at every sample.
   [[nodiscard]] bool mayBeBuried(const Footprint& footprint, const std::vector<double>& cumulative, std::size_t index,
                                  std::uint64_t seed) const {
     Random random(Random::seedFrom(seed, index, kBatches));
@@ -399,7 +384,9 @@ class PathTracer::Scene {
     for (std::uint32_t i = 0; i < 128; ++i) {
       const auto u = lattice.point(i);
       const auto point = pointOn(footprint, cumulative, u[0], u[1]);
-      if (meetsBack(point, cosineDirection(point.normal, u[2], u[3]))) return true;
+      const auto place = toUnit(point.position);
+      if (point.triangle != kNoTriangle && burial_->underEarlier(place, point.normal, point.triangle)) return true;
+      if (burial_->leavesSolid(place + point.normal * kLift, cosineDirection(point.normal, u[2], u[3]))) return true;
     }
     return false;
   }
@@ -410,7 +397,11 @@ class PathTracer::Scene {
       all.sum += tally.sum;
       all.visible += tally.visible;
       all.tried += tally.tried;
+      all.front += tally.front;
+      all.covered += tally.covered;
     }
+    // A lightmap shows there what the earlier face receives, also where the back of this one is seen.
+    if (all.covered > 0.0 && all.covered == all.front) all.visible = 0.0;
     Irradiance result;
     result.visible_fraction = all.tried > 0.0 ? all.visible / all.tried : 0.0;
     if (all.visible <= 0.0) return result;
@@ -434,6 +425,7 @@ class PathTracer::Scene {
   bool see_through_ = false;  // anything
   RTCDevice device_ = nullptr;
   RTCScene scene_ = nullptr;
+  std::optional<Burial> burial_;
   glm::dvec3 centre_{0.0};
   double scale_ = 1.0;
   std::vector<std::size_t> lights_;
@@ -462,7 +454,7 @@ std::vector<Irradiance> PathTracer::irradiance(std::span<const Footprint> footpr
 }
 
 bool PathTracer::buried(const glm::dvec3& point, const glm::dvec3& normal) const {
-  return scene_->buried({point, normal});
+  return scene_->inside({point, normal, kNoTriangle});
 }
 
 }  // namespace radiosity::oracle

@@ -14,12 +14,16 @@
 
 namespace radiosity::oracle {
 
+inline constexpr std::uint32_t kNoTriangle = ~std::uint32_t{0};
+
 /// Where irradiance is wanted: the mean over the area of some triangles (a texel), or at a point (one triangle with
 /// three equal corners).
 struct Footprint {
   struct Piece {
     std::array<glm::dvec3, 3> corners{};
     glm::dvec3 normal{0.0};  ///< unit; light arrives on this side
+    /// Of the scene, whose front this is a part of: what lies under an earlier one in its plane is left out.
+    std::uint32_t triangle = kNoTriangle;
   };
   std::vector<Piece> pieces;
 
@@ -30,7 +34,8 @@ struct Footprint {
 struct Irradiance {
   glm::dvec3 mean_lux{0.0};
   glm::dvec3 standard_error{0.0};
-  double visible_fraction = 1.0;  ///< of the footprint's area: the rest lies inside another solid and is left out
+  /// Of the footprint's area: the rest is buried and left out. 0 where all of its front lies under an earlier face.
+  double visible_fraction = 1.0;
 };
 
 struct PathOptions {
@@ -51,7 +56,7 @@ class PathTracer {
   [[nodiscard]] std::vector<Irradiance> irradiance(std::span<const Footprint> footprints,
                                                    const PathOptions& options) const;
 
-  /// Whether the point lies inside another solid: most rays from it meet the back of a surface.
+  /// Whether the point lies inside another solid (burial.h).
   [[nodiscard]] bool buried(const glm::dvec3& point, const glm::dvec3& normal) const;
 
  private:

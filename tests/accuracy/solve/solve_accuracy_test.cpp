@@ -78,6 +78,24 @@ TEST(SolvedScene, CornellBoxIsWithinFivePercentOfThePathTracer) {
   EXPECT_LT(accuracy.solver.solverRms(), 2.0 * report["error"]["total"].get<double>() + 0.005);
 }
 
+// Shooters whose light is signed leave noise below black where hardly any light comes.
+TEST(SolvedScene, NoTexelIsDarkerThanBlack) {
+  const auto file = std::filesystem::path(RADIOSITY_SHARED_DIR) / "scenes/godot_living_room_panels.glb";
+  if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is not here";
+  const auto folder = std::filesystem::path(RADIOSITY_BINARY_DIR) / "accuracy/SolvedScene.NoTexelIsDarkerThanBlack";
+  std::filesystem::create_directories(folder);
+  const auto run = runSolve(RADIOSITY_CLIENT, file, folder, {"--error", "0.05", "--time-limit", "20"});
+  ASSERT_TRUE(run.exit_code == 0 || run.exit_code == 3) << "exit code " << run.exit_code;
+  const auto lit = readLitScene(run.output);
+  std::size_t texels = 0;
+  for (const auto& texel : findTexels(lit)) {
+    const auto value = lit.pages.at(static_cast<std::size_t>(texel.page)).at(texel.x, texel.y);
+    ++texels;
+    for (int c = 0; c < 3; ++c) EXPECT_GE(value[c], 0.0) << texel.x << ", " << texel.y;
+  }
+  EXPECT_GT(texels, 10000U);
+}
+
 TEST(SolvedScene, EnergyOfTheReportBalances) {
   nlohmann::json report;
   solve(test_scenes::cornell(), {"--error", "0.1", "--time-limit", "10", "--texels", "2000"}, &report);

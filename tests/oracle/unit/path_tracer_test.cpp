@@ -121,6 +121,83 @@ TEST(PathTracer, LegsHideTheFloorUnderThem) {
   EXPECT_FALSE(tracer.buried({2.0, 0.0, 0.0}, {0, 1, 0}));         // under the table
 }
 
+/// A room of one metre with a box under its ceiling, of which some faces are left out.
+TriangleScene roomWithBoxAbove(glm::dvec3 low, glm::dvec3 high, unsigned left_out) {
+  auto made = test_scenes::furnace(glm::dvec3(0.5), glm::dvec3(1.0));
+  test_scenes::Object box{"box", {}, {}};
+  test_scenes::appendBox(box, low, high, test_scenes::allFaces(0), left_out);
+  made.objects.push_back(box);
+  return triangulate(made);
+}
+
+// As light fittings are modelled, half a millimetre below the ceiling: what is above the panel is dark, but no less a
+// part of the ceiling.
+TEST(PathTracer, BehindALonePanelIsNotInsideASolid) {
+  constexpr unsigned kPanel =
+      test_scenes::kXMin | test_scenes::kXMax | test_scenes::kYMax | test_scenes::kZMin | test_scenes::kZMax;
+  const auto scene = roomWithBoxAbove({0.3, 0.9995, 0.3}, {0.7, 0.9999, 0.7}, kPanel);
+  const PathTracer tracer(scene);
+  for (const double x : {0.31, 0.5, 0.69}) EXPECT_FALSE(tracer.buried({x, 1.0, 0.52}, {0, -1, 0})) << x;
+  const auto result = tracer.irradiance(std::vector{Footprint::at({0.5, 1.0, 0.52}, {0, -1, 0})}, {.samples = 256})[0];
+  EXPECT_EQ(result.visible_fraction, 1.0);
+  EXPECT_EQ(result.mean_lux, glm::dvec3(0.0));
+}
+
+TEST(PathTracer, UnderABoxIsInsideASolidWithOrWithoutItsLid) {
+  for (const unsigned left_out : {unsigned{test_scenes::kNoFace}, unsigned{test_scenes::kYMax}}) {
+    const PathTracer tracer(roomWithBoxAbove({0.3, 0.99, 0.3}, {0.7, 1.0, 0.7}, left_out));
+    EXPECT_FALSE(tracer.buried({0.29, 1.0, 0.52}, {0, -1, 0}));
+    for (const double x : {0.301, 0.5, 0.699}) EXPECT_TRUE(tracer.buried({x, 1.0, 0.52}, {0, -1, 0})) << x;
+    EXPECT_TRUE(tracer.buried({0.5, 0.995, 0.5}, {0, -1, 0}));  // some surface within
+  }
+}
+
+// The gap between a ceiling and a closed box is no part of the box.
+TEST(PathTracer, BetweenACeilingAndABoxIsNotInsideIt) {
+  const PathTracer tracer(roomWithBoxAbove({0.3, 0.9, 0.3}, {0.7, 0.9995, 0.7}, test_scenes::kNoFace));
+  EXPECT_FALSE(tracer.buried({0.5, 1.0, 0.52}, {0, -1, 0}));
+}
+
+// What lies in a hollow of itself looks at itself along its surface: a bowl inside a block.
+TEST(PathTracer, AHollowSurfaceInsideABlockIsInsideIt) {
+  auto made = test_scenes::furnace(glm::dvec3(0.5), glm::dvec3(1.0));
+  test_scenes::Object things{"things", {}, {}};
+  test_scenes::appendBox(things, {0.2, 0.0, 0.2}, {0.8, 0.6, 0.8}, test_scenes::allFaces(0), test_scenes::kYMin);
+  made.objects.push_back(things);
+  test_scenes::Object bowl{"bowl", {}, {}};
+  bowl.polygons = {{{{0.4, 0.3, 0.4}, {0.4, 0.2, 0.6}, {0.6, 0.2, 0.6}, {0.6, 0.3, 0.4}}, 0},
+                   {{{0.4, 0.2, 0.6}, {0.4, 0.3, 0.7}, {0.6, 0.3, 0.7}, {0.6, 0.2, 0.6}}, 0}};
+  made.objects.push_back(bowl);
+  const auto scene = triangulate(made);
+  const auto& facet = scene.triangles[scene.triangles.size() - 4];
+  const auto middle = (facet.corners[0] + facet.corners[1] + facet.corners[2]) / 3.0;
+  EXPECT_TRUE(PathTracer(scene).buried(middle, facet.normal));
+}
+
+TEST(PathTracer, OfTwoFacesInOnePlaneTheLaterIsLeftOut) {
+  auto made = test_scenes::furnace(glm::dvec3(0.5), glm::dvec3(1.0));
+  test_scenes::Object mat{"mat", {}, {}};  // on a quarter of the floor, once upwards and once downwards
+  mat.polygons = {{{{0.5, 0.0, 0.5}, {0.5, 0.0, 1.0}, {1.0, 0.0, 1.0}, {1.0, 0.0, 0.5}}, 0},
+                  {{{0.0, 0.0, 0.0}, {0.5, 0.0, 0.0}, {0.5, 0.0, 0.5}, {0.0, 0.0, 0.5}}, 0}};
+  made.objects.push_back(mat);
+  const auto scene = triangulate(made);
+  std::vector<Footprint> footprints;
+  for (std::uint32_t t = 0; t < scene.triangles.size(); ++t)
+    footprints.push_back({{{scene.triangles[t].corners, scene.triangles[t].normal, t}}});
+  const auto results = PathTracer(scene).irradiance(footprints, {.samples = 64});
+  const auto mats = results.size() - 4;
+  for (std::size_t t = 0; t < mats; ++t) EXPECT_EQ(results[t].visible_fraction, 1.0) << t;
+  for (std::size_t t = mats; t < mats + 2; ++t) EXPECT_EQ(results[t].visible_fraction, 0.0) << t;
+
+  // The back of such a face does not count for it, that of another does.
+  for (const auto t : {mats, mats + 2}) {
+    auto both = footprints[t];
+    both.pieces.push_back({scene.triangles[t].corners, -scene.triangles[t].normal});
+    const auto result = PathTracer(scene).irradiance(std::vector{both}, {.samples = 64})[0];
+    EXPECT_EQ(result.visible_fraction > 0.0, t != mats) << t;
+  }
+}
+
 TEST(PathTracer, FootprintHalfUnderABlockReportsHalf) {
   auto made = test_scenes::furnace(glm::dvec3(0.5), glm::dvec3(1.0), 4.0);
   test_scenes::Object block{"block", {}, {}};

@@ -245,6 +245,24 @@ TEST(Charts, AFloorUnderARoofSeenFromOutsideOnlyStaysVisible) {
   EXPECT_NEAR(leafArea(build(scene, 2000)), 32.0, 1e-3);
 }
 
+// As light fittings are modelled: half a millimetre below the ceiling, nothing but the side that shines. In that gap it
+// is dark, but a panel is no solid; with sides up to the ceiling it is one.
+TEST(Charts, APanelBeforeACeilingBuriesNothing) {
+  const double room = 2.0 * (4 * 3 + 3 * 5 + 4 * 5), panel = 3.0 * 2.0;
+  Primitive light;
+  addQuad(light, {0.1, 2.9995, 0.1}, {3.1, 2.9995, 0.1}, {3.1, 2.9995, 2.1}, {0.1, 2.9995, 2.1});
+  Scene scene;
+  place(scene, box({0, 0, 0}, {4, 3, 5}, true));
+  place(scene, light);
+  EXPECT_NEAR(leafArea(build(scene, 6000)), room + panel, 0.01);
+  Scene fitting;
+  place(fitting, box({0, 0, 0}, {4, 3, 5}, true));
+  place(fitting, box({0.1, 2.9, 0.1}, {3.1, 3.0, 2.1}));
+  const double sides = 2.0 * 0.1 * (3.0 + 2.0);
+  EXPECT_NEAR(leafArea(build(fitting, 6000)), room - panel + 2.0 * panel + sides,
+              0.02);  // its lid faces out of the room
+}
+
 TEST(Charts, DoubleSidedSurfacesHaveTwoSides) {
   Scene scene;
   Material material;

@@ -310,6 +310,7 @@ TEST(Import, everyFaultIsRefusedAtItsPlace) {
   EXPECT_EQ(faulty("/accessors/0/count", 2.5), "test.glb: /accessors/0/count");
   EXPECT_EQ(faulty("/accessors/0/byteOffset", 4), "test.glb: /accessors/0/count");
   EXPECT_EQ(faulty("/accessors/0/componentType", 5130), "test.glb: /accessors/0/componentType");
+  EXPECT_EQ(faulty("/accessors/0/componentType", 1), "test.glb: /accessors/0/componentType");
   EXPECT_EQ(faulty("/accessors/0/type", "VEC2"), "test.glb: /meshes/0/primitives/0/attributes/POSITION");
   EXPECT_EQ(faulty("/accessors/0/type", "VEC9"), "test.glb: /accessors/0/type");
   EXPECT_EQ(faulty("/accessors/1/componentType", 5126), "test.glb: /accessors/1/count");

@@ -1,6 +1,8 @@
 // Places on leaves within which light changes: partly covered or buried ones, and full ones in narrow gaps.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include <glm/geometric.hpp>
 
 #include "server/scene/patch_scene.h"
@@ -49,7 +51,7 @@ TEST(LeafSpots, LieEvenlyOverWhatABlockLeavesOfALeaf) {
   EXPECT_EQ(seen, 8U);
 }
 
-TEST(LeafSpots, EveryEighthLiesInAnotherQuarter) {
+TEST(LeafSpots, EveryEighthRowHasSomeInEveryQuarter) {
   Scene scene;
   place(scene, floorQuad(4.0));
   place(scene, floorQuad(2.0, 1.0, 1.0), glm::dmat4(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0.01, 0, 1));
@@ -59,8 +61,9 @@ TEST(LeafSpots, EveryEighthLiesInAnotherQuarter) {
     const glm::vec2 low = glm::floor(leaf.texel);
     for (std::uint32_t first = 0; first < 8; ++first) {
       std::uint32_t quarters = 0;
-      for (std::uint32_t k = first; k < kLeafSpots; k += 8) {
-        const glm::vec2 in = patches.spots[leaf.first_spot + k].texel - low;
+      for (std::uint32_t k = 0; k < 2 * kSpotQuarters; ++k) {
+        const std::uint32_t row = first + 8 * (k / kSpotQuarters);
+        const glm::vec2 in = patches.spots[leaf.first_spot + row * kSpotQuarters + k % kSpotQuarters].texel - low;
         quarters |= 1U << (2U * (in.y > 0.5F ? 1U : 0U) + (in.x > 0.5F ? 1U : 0U));
       }
       EXPECT_EQ(quarters, 15U);
@@ -68,25 +71,29 @@ TEST(LeafSpots, EveryEighthLiesInAnotherQuarter) {
   }
 }
 
-TEST(LeafSpots, FullLeavesHaveThemOnlyInNarrowGaps) {
+TEST(LeafSpots, FullLeavesHaveThemOnlyInNarrowGapsAndBesideThem) {
   Scene scene;
   place(scene, box({0, 0, 0}, {4, 3, 4}, true));
   Material sheet;  // seen from both sides it bounds no solid
   sheet.double_sided = true;
   place(scene, floorQuad(1.0, 1.5, 1.5), glm::dmat4(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 2.95, 0, 1), sheet);
   const PatchScene patches = build(scene, 0.25);
-  std::size_t above = 0;
+  std::size_t above = 0, by_its_rim = 0;
   for (const auto& surface : patches.surfaces) {
     for (std::uint32_t i = 0; i < surface.width * surface.height; ++i) {
       const auto& leaf = patches.leaves[surface.first_leaf + i];
       if (!leaf.full || leaf.first_spot == kNone) continue;
       const auto at = worldOf(patches, {leaf.texel, leaf.triangle});
       EXPECT_GT(at.y, 2.9) << "walls that meet are no gap";
-      EXPECT_TRUE(at.x > 1.25 && at.x < 2.75 && at.z > 1.25 && at.z < 2.75) << at.x << " " << at.z;
-      ++above;
+      const double beside = std::max({1.5 - at.x, at.x - 2.5, 1.5 - at.z, at.z - 2.5});
+      // Two leaves from the sheet, the leaf's middle half a one farther, but for rounding: the next is a whole one
+      // away.
+      EXPECT_LT(beside, 0.5 + 0.125 + 1e-3);
+      ++(beside < 0.0 ? above : by_its_rim);
     }
   }
   EXPECT_GE(above, 32U) << "of ceiling and sheet";
+  EXPECT_GE(by_its_rim, 48U) << "of the ceiling, around sixteen";
 }
 
 }  // namespace

@@ -211,5 +211,32 @@ TEST(Pages, CoarserMipsDoNotBleedGutters) {
 
 TEST(Pages, EmptySceneHasNoPages) { EXPECT_TRUE(assemblePages(PatchScene{}, {}).empty()); }
 
+// Whoever draws both sees now one, now the other: a black one would show as a pattern of dots.
+TEST(Pages, LightmapsOfCoveredFacesShowTheLightOfWhatCoversThem) {
+  Scene scene;
+  place(scene, floorQuad(1.0));
+  place(scene, floorQuad(0.5));  // lies in the first, with texels of other places
+  const PatchScene patches = build(scene, 300);
+  ASSERT_EQ(patches.surfaces.size(), 2U);
+  std::vector<glm::vec3> values(patches.nodeCount(), glm::vec3(0.0F));
+  const auto light = [](const glm::vec3& position) { return glm::vec3(1.0F + position.x, 2.0F + position.z, 3.0F); };
+  const auto middle = [&](const Surface& surface, std::uint32_t i) {
+    const auto& frame = patches.triangles[surface.first_triangle];
+    return frame.origin + (static_cast<float>(i % surface.width) + 0.5F) * frame.du +
+           (static_cast<float>(i / surface.width) + 0.5F) * frame.dv;
+  };
+  const auto& lit = patches.surfaces[0];
+  for (std::uint32_t i = 0; i < lit.width * lit.height; ++i) values[lit.first_node[0] + i] = light(middle(lit, i));
+  const auto pages = assemblePages(patches, values);
+  const auto& covered = patches.surfaces[1];
+  for (std::uint32_t i = 0; i < covered.width * covered.height; ++i) {
+    const auto& image = pages[covered.page].irradiance;
+    const auto pixel = image.pixels[image.index(static_cast<int>(covered.page_x + i % covered.width),
+                                                static_cast<int>(covered.page_y + i / covered.width))];
+    const auto expected = light(middle(covered, i));
+    for (int channel = 0; channel < 3; ++channel) EXPECT_NEAR(pixel[channel], expected[channel], 0.02) << i;
+  }
+}
+
 }  // namespace
 }  // namespace radiosity::scene::test

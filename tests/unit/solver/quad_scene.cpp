@@ -255,7 +255,7 @@ Result<solver::TransportCounters> RayTransport::run(const solver::ShotBatch& bat
   counters.parallel_images = batch.views.size();
   counters.scatter_shots = batch.scatter.size();
   counters.gather_shots = batch.gather.size();
-  counters.gather_points = batch.points.size();
+  for (const auto& shot : batch.gather) counters.gather_points += shot.point_count;  // a batch may hold others' points
   return counters;
 }
 

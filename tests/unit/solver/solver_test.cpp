@@ -40,16 +40,18 @@ TYPED_TEST(AnySolver, FurnaceReachesEmissionOverOneMinusReflectance) {
     RayTransport rays(64);
     ASSERT_TRUE(rays.setScene(made.patches));
     SolverSettings settings;
-    settings.target_error = 0.05;
+    // Rounds of shots that are forgotten take twenty-five times as many for a fifth of the error.
+    const double target = std::is_same_v<TypeParam, LinkedSolver> ? 0.01 : 0.05;
+    settings.target_error = target;
     TypeParam solver(made.patches, made.materials, rays, settings);
     solve(solver);
-    // B = E / (1 - rho) = E + rho H, hence H = E / (1 - rho). The stated error is relative RMS; the mean over 384
-    // leaves is better, but light points are only sampled at leaf centres (no exact form factor here), which costs up
-    // to a percent.
+    // B = E / (1 - rho) = E + rho H, hence H = E / (1 - rho). What few points on walls that shine say (no exact form
+    // factor here) is wrong for many leaves at once, so the mean is not much better than a leaf: of eight seeds the
+    // worst was off by 1.8 %.
     double mean = 0.0;
     for (std::uint32_t s = 0; s < 6; ++s) mean += meanIrradiance(made, solver, s) / 6.0;
     EXPECT_NEAR(mean * (1.0 - static_cast<double>(rho)), 1.0, 0.03) << "rho " << rho;
-    EXPECT_LE(solver.error().total, 0.05);
+    EXPECT_LE(solver.error().total, target);
   }
 }
 

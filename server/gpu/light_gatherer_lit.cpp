@@ -1,0 +1,358 @@
+// Which receivers a polygon shines at, from where on them they look at it, and the form factors there.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "server/gpu/form_factor_kernel.h"
+#include "server/gpu/light_gatherer.h"
+#include "server/gpu/polygon_form_factor.h"
+
+namespace radiosity::gpu {
+namespace {
+
+/// So many pixels around the places of named receivers are drawn: their own pixel's middle lies within, and those of
+/// its neighbours, which receivers that want care ask too.
+constexpr float kPixelsAround = 0.8F, kPixelsAroundMore = 2.2F;
+
+/// So many rows of a receiver's spots count for one shot of a reflecting node, and of a light: others for every shot.
+constexpr std::uint32_t kNodeRows = 1, kLightRows = 4, kLightSpots = kLightRows * scene::kSpotQuarters;
+constexpr std::size_t kFewestLit = 4096;
+/// Spots are asked for before they are looked at, by so many receivers: each lies on a line of the cache of its own.
+constexpr std::size_t kSpotsAhead = 8;
+/// A receiver nearer than this to what shines, in texels, looks from two opposite places: what it receives changes
+/// steeply across it, and would be most of what samples differ by.
+constexpr float kNearTexels = 6.0F;
+
+/// Least and greatest height of a polygon above a plane.
+std::array<float, 2> heights(std::span<const glm::vec3> corners, const glm::vec3& point, const glm::vec3& normal) {
+  float low = 1e30F, high = -1e30F;
+  for (const auto& corner : corners) {
+    const float height = glm::dot(corner - point, normal);
+    low = std::min(low, height);
+    high = std::max(high, height);
+  }
+  return {low, high};
+}
+
+bool sameGeometry(const solver::GatherShot& a, const solver::GatherShot& b) {
+  return a.corners == b.corners && a.corner_count == b.corner_count && a.normal == b.normal &&
+         a.receiver_jitter == b.receiver_jitter && a.all_spots == b.all_spots && a.fill == b.fill;
+}
+
+/// How much of the part of a polygon in front of a receiver shines where of the whole polygon `fill` does: not more
+/// than all. `front`: that part, of the polygon's area.
+double shining(float fill, double front) {
+  return front > 0.0 ? std::min(1.0, static_cast<double>(fill) / front) : 1.0;
+}
+
+/// How much of what shines lies in front, then.
+float frontOfShining(float fill, double front) {
+  return static_cast<float>(std::min(1.0, front / static_cast<double>(fill)));
+}
+
+struct Ball {
+  glm::vec3 middle{0.0F};
+  float radius = 0.0F;
+};
+
+/// Around the places of a surface that are near to a polygon; of radius 0 where there are none.
+Ball nearBall(std::span<const glm::vec3> corners, const scene::Surface& surface, const glm::vec3& texel) {
+  Ball ball;
+  for (const auto& corner : corners) ball.middle += corner / static_cast<float>(corners.size());
+  for (const auto& corner : corners) ball.radius = std::max(ball.radius, glm::distance(ball.middle, corner));
+  ball.radius += kNearTexels * glm::length(texel);
+  const auto closest = glm::clamp(ball.middle, surface.bounds_min, surface.bounds_max);
+  if (glm::distance(ball.middle, closest) > ball.radius) ball.radius = 0.0F;
+  return ball;
+}
+
+bool isNear(const Ball& ball, const Receivers::Block& block) {
+  return ball.radius > 0.0F &&
+         glm::distance(ball.middle, glm::clamp(ball.middle, block.low, block.high)) <= ball.radius;
+}
+
+/// Least and greatest height of a box above the polygon's plane.
+std::array<float, 2> heights(const solver::GatherShot& shot, const glm::vec3& low, const glm::vec3& high) {
+  const auto rises = glm::greaterThan(shot.normal, glm::vec3(0.0F));
+  return {glm::dot(shot.normal, glm::mix(high, low, rises) - shot.corners[0]),
+          glm::dot(shot.normal, glm::mix(low, high, rises) - shot.corners[0])};
+}
+
+/// The places of receivers in one frame, as Receivers::place has them. Branch-free, so that it vectorises.
+__attribute__((target_clones("avx2", "default"))) void findPlaces(const scene::TriangleFrame& frame,
+                                                                  const glm::vec2& at, std::size_t count,
+                                                                  const float* texel_x, const float* texel_y, float* x,
+                                                                  float* y, float* z) {
+  const auto o = frame.origin, u = frame.du, v = frame.dv;
+  for (std::size_t i = 0; i < count; ++i) {
+    const float across = texel_x[i] + at.x, up = texel_y[i] + at.y;
+    x[i] = o.x + across * u.x + up * v.x;
+    y[i] = o.y + across * u.y + up * v.y;
+    z[i] = o.z + across * u.z + up * v.z;
+  }
+}
+
+/// The first of two opposite places. For the opposite jitter, that of the other half, they lie in the other two
+/// quarters of the receiver, as far from its edges as these are from its middle: what is linear across it cancels in
+/// each half, what is quadratic nearly so in their mean, and shows in their difference.
+glm::vec2 nearPlace(const glm::vec2& jitter) {
+  if (jitter.x <= 0.5F) return jitter;
+  const auto inverted = [](float offset) { return std::copysign(0.5F - std::abs(offset), offset); };
+  return {0.5F + inverted(jitter.x - 0.5F), 0.5F - inverted(jitter.y - 0.5F)};
+}
+
+/// The rows of spots that count for a shot.
+struct SpotRows {
+  std::uint32_t first, apart;
+};
+
+SpotRows spotRows(const solver::GatherShot& shot) {
+  const std::uint32_t apart = scene::kSpotRows / (shot.all_spots ? kLightRows : kNodeRows);
+  return {std::min(apart - 1, static_cast<std::uint32_t>(shot.receiver_jitter.x * static_cast<float>(apart))), apart};
+}
+
+/// Where a receiver looks at a polygon, which is near inside a ball: takes each place before the polygon's plane, and
+/// its share of the receiver. Places stay in registers: through memory they cost more than all else that is done here.
+template <typename Take>
+[[gnu::always_inline]] inline void forEachPlace(const solver::GatherShot& shot, const Ball& ball,
+                                                const Receivers& receivers, const Receivers::Receiver& receiver,
+                                                const Take& take) {
+  const auto offer = [&](const Receivers::Place& place, float share) {
+    if (glm::dot(shot.normal, place.point - shot.corners[0]) > kInPlane) take(place, share);
+  };
+  if (receiver.hasSpots()) {
+    const auto [first, apart] = spotRows(shot);
+    const float share = static_cast<float>(apart) / static_cast<float>(scene::kLeafSpots);
+    for (std::uint32_t row = first; row < scene::kSpotRows; row += apart) {
+      for (std::uint32_t k = 0; k < scene::kSpotQuarters; ++k)
+        offer(receivers.spot(receiver, row * scene::kSpotQuarters + k), share);
+    }
+    return;
+  }
+  const auto place = receivers.place(receiver, shot.receiver_jitter);
+  const auto way = place.point - ball.middle;
+  if (glm::dot(way, way) >= ball.radius * ball.radius) {
+    offer(place, 1.0F);
+    return;
+  }
+  const auto at = nearPlace(shot.receiver_jitter);
+  offer(receivers.place(receiver, at), 0.5F);
+  offer(receivers.place(receiver, 1.0F - at), 0.5F);
+}
+
+}  // namespace
+
+void LightGatherer::Lit::resize(std::size_t count) {
+  for (auto* values : {&x, &y, &z, &nx, &ny, &nz, &form_factor, &share, &front, &point_weight, &visibility})
+    values->resize(count);
+  node.resize(count);
+  care.resize(count);
+  doubt.resize(count);
+  doubtful.resize(count);
+  pixel.resize(count);
+  for (std::size_t half = 0; half < 2; ++half) {
+    for (auto* sums : {&weight[half], &visible_weight[half]}) sums->resize(count);
+  }
+}
+
+LightGatherer::LightGatherer(std::shared_ptr<const Receivers> receivers) : receivers_(std::move(receivers)) {}
+
+/// Room for so many more: not for all receivers there are, of which half face a shooter.
+void LightGatherer::makeRoom(std::size_t more) {
+  const auto size = lit_.x.size();
+  if (lit_count_ + more > size) lit_.resize(std::max({lit_count_ + more, size + size / 2, kFewestLit}));
+}
+
+/// Whether all of the surface lies behind the polygon's plane.
+bool LightGatherer::behind(const solver::GatherShot& shot, const scene::Surface& surface) const {
+  return heights(shot, surface.bounds_min, surface.bounds_max)[1] <= kInPlane;
+}
+
+void LightGatherer::findLit(const solver::GatherShot& shot) {
+  if (lit_valid_ && sameGeometry(shot, lit_for_)) return;
+  lit_count_ = weighed_ = 0;
+  for (const auto& group : receivers_->groups()) {
+    if (!behind(shot, receivers_->patches().surfaces[group.surface])) findLitGroup(shot, group);
+  }
+  weighWhole(shot);
+  lit_for_ = shot;
+  lit_valid_ = true;
+}
+
+/// Form factors of the receivers that wait for theirs: groups in a row that see all of the polygon are weighed at once,
+/// since many scenes have thousands of groups of one or two.
+void LightGatherer::weighWhole(const solver::GatherShot& shot) {
+  const std::size_t k = weighed_;
+  wholeFormFactors(std::span(shot.corners.data(), shot.corner_count),
+                   {lit_.x.data() + k, lit_.y.data() + k, lit_.z.data() + k, lit_.nx.data() + k, lit_.ny.data() + k,
+                    lit_.nz.data() + k},
+                   lit_count_ - k, lit_.form_factor.data() + k);
+  for (auto i = k; i < lit_count_ && shot.fill < 1.0F; ++i) lit_.form_factor[i] *= shot.fill;
+  std::fill(lit_.front.begin() + static_cast<std::ptrdiff_t>(k),
+            lit_.front.begin() + static_cast<std::ptrdiff_t>(lit_count_), 1.0F);
+  shareAmongPlaces(k);
+  weighed_ = lit_count_;
+}
+
+/// A receiver of several places is the mean of them; of those lit from `begin` on.
+void LightGatherer::shareAmongPlaces(std::size_t begin) {
+  for (std::size_t k = begin; k < lit_count_; ++k) lit_.form_factor[k] *= lit_.share[k];
+}
+
+void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers::Group& group) {
+  const auto& surface = receivers_->patches().surfaces[group.surface];
+  const auto& plane = receivers_->patches().triangles[surface.first_triangle];
+  const auto plane_normal = group.side * plane.normal;
+  const std::span corners(shot.corners.data(), shot.corner_count);
+  ClippedPolygon polygon;
+  bool whole = false;
+  if (surface.planar) {
+    const auto [low, high] = heights(corners, plane.origin, plane_normal);
+    if (high < -kInPlane) return;
+    whole = low > kInPlane;
+    if (!whole) polygon = clipToPlane(corners, plane.origin, plane_normal);
+    if (!whole && polygon.count == 0) return;
+  }
+  if (!whole) weighWhole(shot);
+  const std::size_t begin = lit_count_;
+  const auto ball = nearBall(corners, surface, plane.du);
+  const auto add = [&](const Receivers::Receiver& receiver) {
+    forEachPlace(shot, ball, *receivers_, receiver, [&](const Receivers::Place& place, float share) {
+      const auto normal = surface.planar ? plane_normal : group.side * place.frame->normal;
+      if (!surface.planar) {
+        const auto form_factor = formFactorInFront(place.point, normal, corners);
+        if (form_factor.value <= 0.0) return;
+        lit_.form_factor[lit_count_] = static_cast<float>(form_factor.value * shining(shot.fill, form_factor.front));
+        lit_.front[lit_count_] = frontOfShining(shot.fill, form_factor.front);
+      }
+      lit_.share[lit_count_] = share;
+      addLit(receiver, place, normal);
+    });
+  };
+  const auto end = group.first + group.count;
+  const auto first_row = spotRows(shot).first;
+  auto block = receivers_->blocks().begin() + static_cast<std::ptrdiff_t>(group.first_block);
+  for (auto i = group.first; i < end; ++block) {
+    const auto stop = std::min(end, block->first + block->count);
+    if (stop <= i) continue;
+    // By the whole block, also where only some of it are named: they get the same bits.
+    makeRoom((stop - i) * (block->plain ? 2 : kLightSpots));
+    const auto [low, high] = heights(shot, block->low, block->high);
+    if (high <= 0.0F) i = stop;
+    if (block->plain && low > kInPlane && !isNear(ball, *block)) {
+      addPlain(shot, i, stop - i, plane_normal);
+      i = stop;
+    }
+    for (; i < stop; ++i) {
+      if (i + kSpotsAhead < receivers_->all().size())
+        receivers_->fetchSpots(receivers_->all()[i + kSpotsAhead], first_row);
+      add(receivers_->all()[i]);
+    }
+  }
+  if (whole) return;
+  weighed_ = lit_count_;
+  if (surface.planar) {
+    planarFormFactors(polygon, plane_normal, lit_.x.data() + begin, lit_.y.data() + begin, lit_.z.data() + begin,
+                      lit_count_ - begin, lit_.form_factor.data() + begin);
+    const double kept = polygonArea(std::span(polygon.corner.data(), polygon.count)) / polygonArea(corners);
+    for (std::size_t k = begin; k < lit_count_; ++k) {
+      lit_.form_factor[k] *= static_cast<float>(shining(shot.fill, kept));
+      lit_.front[k] = frontOfShining(shot.fill, kept);
+    }
+  }
+  shareAmongPlaces(begin);
+}
+
+/// Receivers of a plain block.
+void LightGatherer::addPlain(const solver::GatherShot& shot, std::size_t first, std::size_t count,
+                             const glm::vec3& normal) {
+  const std::size_t k = lit_count_;
+  const auto& frame = receivers_->patches().triangles[receivers_->all()[first].triangle];
+  findPlaces(frame, shot.receiver_jitter, count, receivers_->texelX() + first, receivers_->texelY() + first, &lit_.x[k],
+             &lit_.y[k], &lit_.z[k]);
+  std::fill_n(&lit_.nx[k], count, normal.x);
+  std::fill_n(&lit_.ny[k], count, normal.y);
+  std::fill_n(&lit_.nz[k], count, normal.z);
+  std::fill_n(&lit_.share[k], count, 1.0F);
+  std::fill_n(&lit_.care[k], count, receivers_->careOf(receivers_->all()[first]));
+  std::copy_n(receivers_->nodes() + first, count, &lit_.node[k]);
+  lit_count_ += count;
+}
+
+void LightGatherer::addLit(const Receivers::Receiver& receiver, const Receivers::Place& place,
+                           const glm::vec3& normal) {
+  const std::size_t k = lit_count_++;
+  lit_.x[k] = place.point.x;
+  lit_.y[k] = place.point.y;
+  lit_.z[k] = place.point.z;
+  lit_.nx[k] = normal.x;
+  lit_.ny[k] = normal.y;
+  lit_.nz[k] = normal.z;
+  lit_.node[k] = receiver.node;
+  lit_.care[k] = receivers_->careOf(receiver);
+}
+
+/// The parts of groups that runs of leaves name.
+template <typename Take>
+void LightGatherer::forEachGroup(std::span<const solver::NodeRun> named, const Take& take) const {
+  const auto& all = receivers_->all();
+  auto group = receivers_->groups().begin();
+  const auto end = receivers_->groups().end();
+  for (const auto& run : named) {
+    const auto before = [](const Receivers::Receiver& receiver, std::uint32_t node) { return receiver.node < node; };
+    while (group != end && (group->count == 0 || all[group->first + group->count - 1].node < run.first_node)) ++group;
+    for (auto part = group; part != end; ++part) {
+      if (part->count == 0) continue;
+      const auto first = all.begin() + static_cast<std::ptrdiff_t>(part->first);
+      const auto last = first + static_cast<std::ptrdiff_t>(part->count);
+      if (first->node >= run.first_node + run.count) break;
+      const auto low = std::lower_bound(first, last, run.first_node, before);
+      const auto high = std::lower_bound(low, last, run.first_node + run.count, before);
+      if (low == high) continue;
+      take(Receivers::Group{part->surface, static_cast<std::size_t>(low - all.begin()),
+                            static_cast<std::size_t>(high - low), part->side, part->first_block});
+    }
+  }
+}
+
+std::optional<ViewWindow> LightGatherer::windowOf(const solver::GatherShot& shot, const solver::HemicubeFrame& point,
+                                                  std::span<const solver::NodeRun> named,
+                                                  std::span<const scene::ChangedBox> boxes) {
+  places_.clear();
+  float around = kPixelsAround;
+  forEachGroup(named, [&](const Receivers::Group& group) {
+    const auto& surface = receivers_->patches().surfaces[group.surface];
+    if (behind(shot, surface)) return;
+    const auto ball = nearBall(std::span(shot.corners.data(), shot.corner_count), surface,
+                               receivers_->patches().triangles[surface.first_triangle].du);
+    for (std::size_t i = group.first; i < group.first + group.count; ++i) {
+      const auto& receiver = receivers_->all()[i];
+      if (receivers_->careOf(receiver) != 0) around = kPixelsAroundMore;
+      forEachPlace(shot, ball, *receivers_, receiver,
+                   [&](const Receivers::Place& place, float /*share*/) { places_.push_back(place.point); });
+    }
+  });
+  return windowAround(point, places_, boxes, around * 2.0F / static_cast<float>(shot.resolution));
+}
+
+void LightGatherer::beginLinks(const solver::GatherShot& shot, std::span<const solver::NodeRun> named) {
+  if (named.empty()) {
+    findLit(shot);
+  } else {
+    lit_count_ = weighed_ = 0;
+    lit_valid_ = false;
+    forEachGroup(named, [&](const Receivers::Group& group) {
+      if (!behind(shot, receivers_->patches().surfaces[group.surface])) findLitGroup(shot, group);
+    });
+    weighWhole(shot);
+  }
+  for (auto* sum : {&lit_.weight[0], &lit_.visible_weight[0]}) {
+    std::fill_n(sum->begin(), lit_count_, 0.0F);
+  }
+  look_lost_ = {};
+  look_count_ = 0;
+}
+
+}  // namespace radiosity::gpu

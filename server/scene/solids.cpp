@@ -1,0 +1,196 @@
+#include "server/scene/solids.h"
+
+#include <fmt/format.h>
+
+#include <glm/geometric.hpp>
+#include <utility>
+
+#include "server/scene/coverage.h"
+
+namespace radiosity::scene {
+namespace {
+
+/// Rays start this far from the surface (unit box): well above the rounding of 32-bit positions (6e-8), well below
+/// anything modelled.
+constexpr double kLift = 2e-5;
+/// Rays along a surface rise by this part of their length: through any gap that is wider than a thousandth of its
+/// depth.
+constexpr double kGrazing = 2e-4;
+/// So many places of a leaf are looked at for what covers it.
+constexpr std::uint32_t kPlaces = 16;
+
+struct Frame {
+  glm::dvec3 n, u, v;
+};
+Frame frameAbout(const glm::vec3& normal) {
+  const glm::dvec3 n(normal);
+  const glm::dvec3 reference = std::abs(n.x) < 0.8 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
+  const glm::dvec3 u = glm::normalize(glm::cross(reference, n));
+  return {n, u, glm::cross(n, u)};
+}
+
+/// Of a position in the triangle's plane.
+glm::vec2 texelAt(const TriangleFrame& frame, const glm::vec3& position) {
+  const glm::dvec3 u(frame.du), v(frame.dv), way = glm::dvec3(position) - glm::dvec3(frame.origin);
+  const double uu = glm::dot(u, u), uv = glm::dot(u, v), vv = glm::dot(v, v);
+  const double along_u = glm::dot(way, u), along_v = glm::dot(way, v), determinant = uu * vv - uv * uv;
+  return {(along_u * vv - along_v * uv) / determinant, (along_v * uu - along_u * uv) / determinant};
+}
+
+}  // namespace
+
+Solids::Solids(const PatchScene& patches, const std::vector<bool>& solid) {
+  std::vector<Bvh::Triangle> triangles;
+  for (std::uint32_t t = 0; t < patches.triangles.size(); ++t) {
+    if (!solid[patches.triangle_surface[t]]) continue;
+    Bvh::Triangle triangle;
+    for (std::size_t c = 0; c < 3; ++c)
+      triangle[c] = patches.vertices[patches.indices[std::size_t{3} * t + c]].position;
+    triangles.push_back(triangle);
+    surface_.push_back(patches.triangle_surface[t]);
+    normal_.push_back(patches.triangles[t].normal);
+  }
+  tree_ = Bvh(std::move(triangles));
+}
+
+bool Solids::near(const Bounds& box, std::uint32_t surface) const {
+  const glm::vec3 margin(static_cast<float>(2.0 * kLift));
+  return tree_.touches(box.min - margin, box.max + margin, surface_, surface);
+}
+
+bool Solids::buries(const glm::vec3& position, const glm::vec3& normal, Hits& hits) const {
+  const glm::dvec3 origin = glm::dvec3(position) + kLift * glm::dvec3(normal);
+  return raysLeave(origin, normal, hits) && !seesOutAlong(origin, normal, hits);
+}
+
+bool Solids::raysLeave(const glm::dvec3& origin, const glm::vec3& normal, Hits& hits) const {
+  const auto [n, u, v] = frameAbout(normal);
+  // irrational-looking angles, so that no ray runs along modelled edges
+  if (!leavesSolid(origin, n + 0.0713 * u + 0.0427 * v, hits)) return false;
+  for (int i = 0; i < 5; ++i) {
+    const double angle = 0.3217 + 2.0 * M_PI * i / 5.0;
+    if (!leavesSolid(origin, 0.6 * n + 0.8 * (std::cos(angle) * u + std::sin(angle) * v), hits)) return false;
+  }
+  return true;
+}
+
+/// Whether a ray along the surface gets, before it leaves a solid, to where rays do not all leave one, or out of the
+/// scene. What it meets first may be a part of the surface, in a hollow, or of another that is buried as well.
+bool Solids::seesOutAlong(const glm::dvec3& origin, const glm::vec3& normal, Hits& hits) const {
+  const auto [n, u, v] = frameAbout(normal);
+  for (int i = 0; i < 8; ++i) {
+    const double angle = 0.2871 + 2.0 * M_PI * i / 8.0;
+    const glm::dvec3 direction = kGrazing * n + std::cos(angle) * u + std::sin(angle) * v;
+    if (leavesSolid(origin, direction, hits)) continue;
+    if (hits.empty()) return true;
+    const RayHit first = hits.front();
+    const glm::vec3 facing = normal_[first.triangle];
+    if (!raysLeave(origin + first.t * direction + kLift * glm::dvec3(facing), facing, hits)) return true;
+  }
+  return false;
+}
+
+/// Walks a ray to the end: +1 for every solid entered (front), -1 for every one left (back); below zero, the origin
+/// was inside. Leaves what it met in `hits`, in order.
+bool Solids::leavesSolid(const glm::dvec3& origin, const glm::dvec3& direction, Hits& hits) const {
+  hits.clear();
+  tree_.collectHits(origin, direction, 0.0, 8.0, hits);
+  std::ranges::sort(hits, [](const RayHit& a, const RayHit& b) { return a.t < b.t; });
+  int depth = 0;
+  double last = -1.0;
+  bool last_front = false;
+  for (const RayHit& hit : hits) {
+    if (last_front == hit.front && hit.t - last < 1e-9) continue;  // the edge between two triangles
+    last = hit.t;
+    last_front = hit.front;
+    depth += hit.front ? 1 : -1;
+    if (depth < 0) return true;
+  }
+  return false;
+}
+
+Coincidence::Coincidence(PatchScene& patches) : patches_(patches) {
+  std::vector<Bvh::Triangle> triangles;
+  for (std::size_t t = 0; t < patches.triangles.size(); ++t)
+    triangles.push_back({patches.vertices[patches.indices[3 * t]].position,
+                         patches.vertices[patches.indices[3 * t + 1]].position,
+                         patches.vertices[patches.indices[3 * t + 2]].position});
+  tree_ = Bvh(std::move(triangles));
+}
+
+void Coincidence::run() {
+  std::uint64_t count = 0;
+  std::pair<std::uint32_t, std::uint32_t> first{kNone, kNone};
+  for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
+    const std::uint32_t other = coveredBy(s);
+    covered_.push_back(other != kNone);
+    if (other == kNone) continue;
+    if (count++ == 0) first = {other, s};
+  }
+  if (count == 0) return;
+  patches_.warnings.push_back(
+      fmt::format("{} surfaces lie exactly on an earlier one that faces the same way and is seen instead (the first: "
+                  "surface {} of instance {} on surface {} of instance {})",
+                  count, first.second, patches_.surfaces[first.second].instance, first.first,
+                  patches_.surfaces[first.first].instance));
+}
+
+std::uint32_t Coincidence::coveredAt(std::uint32_t s, const glm::vec3& position, const glm::vec3& normal,
+                                     Hits& hits) const {
+  const auto triangle = triangleOver(s, position, normal, hits);
+  return triangle == kNone ? kNone : patches_.triangle_surface[triangle];
+}
+
+/// Of the earliest surface that covers `s` there.
+std::uint32_t Coincidence::triangleOver(std::uint32_t s, const glm::vec3& position, const glm::vec3& normal,
+                                        Hits& hits) const {
+  const glm::dvec3 n(normal);
+  hits.clear();
+  tree_.collectHits(glm::dvec3(position) + n * 1e-6, -n, 0.0, 2e-6, hits);
+  std::uint32_t earliest = s, over = kNone;
+  for (const RayHit& hit : hits) {
+    const std::uint32_t other = patches_.triangle_surface[hit.triangle];
+    if (other >= earliest || glm::dot(patches_.triangles[hit.triangle].normal, normal) <= 0.9999F) continue;
+    earliest = other;
+    over = hit.triangle;
+  }
+  return over;
+}
+
+void Coincidence::keepCovered() {
+  Hits hits;
+  for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
+    const Surface& surface = patches_.surfaces[s];
+    if (!covered_[s] || !surface.planar || surface.first_node[0] == kNone) continue;
+    const TriangleFrame& frame = patches_.triangles[surface.first_triangle];
+    for (std::uint32_t i = 0; i < surface.width * surface.height; ++i) {
+      if (patches_.node_area[surface.first_node[0] + i] > 0.0F) continue;
+      // The middle of a texel that is wider than the surface may lie beside both.
+      const glm::dvec2 corner(i % surface.width, i / surface.width);
+      auto over = kNone;
+      for (std::uint32_t k = 0; k < kPlaces && over == kNone; ++k)
+        over = triangleOver(s, positionAt(frame, corner + latticePoint(k, kPlaces)), frame.normal, hits);
+      if (over == kNone) continue;
+      const auto texel = texelAt(patches_.triangles[over], positionAt(frame, corner + 0.5));
+      patches_.covered.push_back({surface.first_leaf + i, patches_.triangle_surface[over], texel});
+    }
+  }
+}
+
+/// An earlier surface found right at some of this surface's leaf points.
+std::uint32_t Coincidence::coveredBy(std::uint32_t s) const {
+  const Surface& surface = patches_.surfaces[s];
+  const std::uint32_t leaves = surface.width * surface.height;
+  const std::uint32_t step = std::max(1U, leaves / 16);
+  Hits hits;
+  for (std::uint32_t i = step / 2; i < leaves; i += step) {
+    const LeafPoint& point = patches_.leaves[surface.first_leaf + i];
+    if (point.triangle == kNone) continue;
+    const TriangleFrame& frame = patches_.triangles[point.triangle];
+    const std::uint32_t other = coveredAt(s, positionAt(frame, glm::dvec2(point.texel)), frame.normal, hits);
+    if (other != kNone) return other;
+  }
+  return kNone;
+}
+
+}  // namespace radiosity::scene

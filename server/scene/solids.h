@@ -1,0 +1,79 @@
+// What can hide a place of a surface from everything: solids that it lies in, and surfaces that lie on it. Plain values
+// made from a scene; questions may be asked by several threads, each with Hits of its own.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <glm/common.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <vector>
+
+#include "server/scene/bounds.h"
+#include "server/scene/bvh.h"
+#include "server/scene/patch_scene.h"
+
+namespace radiosity::scene {
+
+[[nodiscard]] inline glm::vec3 positionAt(const TriangleFrame& frame, const glm::dvec2& texel) {
+  return glm::vec3(glm::dvec3(frame.origin) + texel.x * glm::dvec3(frame.du) + texel.y * glm::dvec3(frame.dv));
+}
+
+using Hits = std::vector<RayHit>;
+
+/// The triangles that bound solids, and the question whether a point lies inside one.
+class Solids {
+ public:
+  /// `solid`: by surface.
+  Solids(const PatchScene& patches, const std::vector<bool>& solid);
+
+  [[nodiscard]] bool empty() const { return tree_.empty(); }
+
+  /// True when a solid's surface, other than `surface` itself, passes through or touches the box.
+  [[nodiscard]] bool near(const Bounds& box, std::uint32_t surface) const;
+
+  /// Buried when rays into the whole hemisphere leave more solids than they enter. One odd face that is turned the
+  /// wrong way, or a room whose roof was modelled from outside, does not bury what can be seen from elsewhere. Nor does
+  /// a panel that hangs before a wall, whose back hides the wall from nearly everywhere: one sees out along the wall.
+  [[nodiscard]] bool buries(const glm::vec3& position, const glm::vec3& normal, Hits& hits) const;
+
+ private:
+  [[nodiscard]] bool raysLeave(const glm::dvec3& origin, const glm::vec3& normal, Hits& hits) const;
+  [[nodiscard]] bool seesOutAlong(const glm::dvec3& origin, const glm::vec3& normal, Hits& hits) const;
+  [[nodiscard]] bool leavesSolid(const glm::dvec3& origin, const glm::dvec3& direction, Hits& hits) const;
+
+  Bvh tree_;
+  std::vector<std::uint32_t> surface_;  ///< by triangle of the tree
+  std::vector<glm::vec3> normal_;       ///< likewise
+};
+
+/// Pairs of surfaces that lie on each other and face the same way: the earlier is seen, the later gets no light.
+class Coincidence {
+ public:
+  explicit Coincidence(PatchScene& patches);
+
+  /// Finds the pairs; adds a warning to the scene where there are some.
+  void run();
+
+  /// Fills PatchScene::covered, when areas are known.
+  void keepCovered();
+
+  /// Whether the front of `s` is covered there. Only asked of surfaces that are covered somewhere.
+  [[nodiscard]] bool covers(std::uint32_t s, const glm::vec3& position, const glm::vec3& normal, Hits& hits) const {
+    return covered_[s] && coveredAt(s, position, normal, hits) != kNone;
+  }
+
+ private:
+  [[nodiscard]] std::uint32_t coveredAt(std::uint32_t s, const glm::vec3& position, const glm::vec3& normal,
+                                        Hits& hits) const;
+  [[nodiscard]] std::uint32_t triangleOver(std::uint32_t s, const glm::vec3& position, const glm::vec3& normal,
+                                           Hits& hits) const;
+  [[nodiscard]] std::uint32_t coveredBy(std::uint32_t s) const;
+
+  PatchScene& patches_;
+  Bvh tree_;
+  std::vector<bool> covered_;  ///< by surface: somewhere
+};
+
+}  // namespace radiosity::scene

@@ -1,0 +1,136 @@
+#include "tests/oracle/burial.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <numbers>
+
+#include "tests/oracle/directions.h"
+#include "tests/oracle/embree_ray.h"
+
+namespace radiosity::oracle {
+namespace {
+
+// Lengths in the box of size 2, in which 32-bit positions are rounded to 1.2e-7.
+constexpr double kLift = 2e-6;
+constexpr double kOnSurface = 4e-5;
+constexpr double kSamePlane = 1e-6;
+/// Two triangles met at one distance, both from the front or both from the back, are one crossing: of their edge.
+constexpr double kSameCrossing = 1e-6;
+constexpr double kSameFacing = 0.9999;
+constexpr int kRays = 16;
+/// Rays along a surface rise by this part of their length: through any gap that is wider than a thousandth of its
+/// depth.
+constexpr double kGrazing = 2e-4;
+
+}  // namespace
+
+/// Embree hands the context to the filter; what was met goes behind it.
+struct Burial::Query {
+  RTCIntersectContext context;
+  std::vector<Crossing> crossings;
+};
+
+Burial::Burial(RTCScene scene, std::span<const Triangle> triangles) : scene_(scene), triangles_(triangles) {}
+
+void Burial::keep(const RTCFilterFunctionNArguments* arguments) {
+  auto& query = *reinterpret_cast<Query*>(arguments->context);
+  for (unsigned i = 0; i < arguments->N; ++i) {
+    if (arguments->valid[i] != -1) continue;
+    arguments->valid[i] = 0;  // goes on to the next
+    query.crossings.push_back({static_cast<double>(RTCRayN_tfar(arguments->ray, arguments->N, i)),
+                               RTCHitN_primID(arguments->hit, arguments->N, i)});
+  }
+}
+
+/// In order, each triangle once: Embree may split one and meet both parts.
+std::vector<Burial::Crossing> Burial::crossings(const glm::dvec3& from, const glm::dvec3& way, double far) const {
+  Query query{};
+  rtcInitIntersectContext(&query.context);
+  query.context.filter = &Burial::keep;
+  auto ray = embreeRay(from, way, far);
+  rtcIntersect1(scene_, &query.context, &ray);
+  auto& met = query.crossings;
+  std::sort(met.begin(), met.end(), [](const auto& a, const auto& b) {
+    return a.triangle != b.triangle ? a.triangle < b.triangle : a.distance < b.distance;
+  });
+  met.erase(std::unique(met.begin(), met.end(), [](const auto& a, const auto& b) { return a.triangle == b.triangle; }),
+            met.end());
+  std::sort(met.begin(), met.end(), [](const auto& a, const auto& b) { return a.distance < b.distance; });
+  return std::move(met);
+}
+
+std::vector<Burial::Crossing> Burial::solidCrossings(const glm::dvec3& from, const glm::dvec3& direction) const {
+  auto met = crossings(from, direction, std::numeric_limits<double>::infinity());
+  std::erase_if(met, [&](const Crossing& crossing) {
+    const auto& triangle = triangles_[crossing.triangle];
+    return triangle.double_sided || triangle.see_through;
+  });
+  return met;
+}
+
+bool Burial::isFront(std::uint32_t triangle, const glm::dvec3& direction) const {
+  return glm::dot(direction, triangles_[triangle].normal) < 0.0;
+}
+
+/// From the start to some place on the ray: then the start is inside what is left there.
+bool Burial::leavesMore(std::span<const Crossing> crossings, const glm::dvec3& direction) const {
+  int entered = 0;
+  for (std::size_t i = 0; i < crossings.size(); ++i) {
+    const bool front = isFront(crossings[i].triangle, direction);
+    const bool same = i > 0 && crossings[i].distance - crossings[i - 1].distance < kSameCrossing &&
+                      front == isFront(crossings[i - 1].triangle, direction);
+    if (same) continue;
+    entered += front ? 1 : -1;
+    if (entered < 0) return true;
+  }
+  return false;
+}
+
+bool Burial::leavesSolid(const glm::dvec3& point, const glm::dvec3& direction) const {
+  return leavesMore(solidCrossings(point, direction), direction);
+}
+
+bool Burial::mostRaysLeave(const glm::dvec3& point, const glm::dvec3& normal) const {
+  const auto lifted = point + normal * kLift;
+  int leave = 0;
+  for (int i = 0; i < kRays; ++i) {
+    if (leavesSolid(lifted, cosineDirection(normal, (i + 0.5) / kRays, i * std::numbers::phi))) ++leave;
+    if (2 * leave > kRays || 2 * (i + 1 - leave) >= kRays) break;
+  }
+  return 2 * leave > kRays;
+}
+
+/// Whether a ray along the surface gets to where one is not inside, or out of the scene, before it leaves a solid.
+bool Burial::seesOutAlong(const glm::dvec3& point, const glm::dvec3& normal) const {
+  const auto [s, t] = tangents(normal);
+  const auto from = point + normal * kOnSurface;
+  for (int i = 0; i < kRays; ++i) {
+    const double phi = 2.0 * std::numbers::pi * (i + 0.3) / kRays;
+    const auto direction = glm::normalize(s * std::cos(phi) + t * std::sin(phi) + normal * kGrazing);
+    const auto met = solidCrossings(from, direction);
+    if (leavesMore(met, direction)) continue;
+    // What it meets first may be a part of the surface, in a hollow, or of another that is inside as well.
+    if (met.empty() || !mostRaysLeave(from + direction * met.front().distance, triangles_[met.front().triangle].normal))
+      return true;
+  }
+  return false;
+}
+
+bool Burial::insideSolid(const glm::dvec3& point, const glm::dvec3& normal) const {
+  if (!mostRaysLeave(point, normal)) return false;
+  const auto above = solidCrossings(point + normal * kLift, normal);
+  const bool lies_on =
+      !above.empty() && above.front().distance < kOnSurface && !isFront(above.front().triangle, normal);
+  return lies_on || !seesOutAlong(point, normal);
+}
+
+bool Burial::underEarlier(const glm::dvec3& point, const glm::dvec3& normal, std::uint32_t triangle) const {
+  const auto met = crossings(point + normal * kSamePlane, -normal, 2.0 * kSamePlane);
+  return std::any_of(met.begin(), met.end(), [&](const Crossing& crossing) {
+    return crossing.triangle < triangle && glm::dot(triangles_[crossing.triangle].normal, normal) > kSameFacing;
+  });
+}
+
+}  // namespace radiosity::oracle

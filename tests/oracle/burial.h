@@ -1,0 +1,53 @@
+// Which points of a surface are no surface that light can reach: those inside another solid, and those under a face
+// that lies in the same plane. Asks Embree for all that a ray meets, not only the first. Immutable; any thread.
+#pragma once
+
+#include <embree3/rtcore.h>
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <span>
+#include <vector>
+
+#include "tests/oracle/triangle_scene.h"
+
+namespace radiosity::oracle {
+
+class Burial {
+ public:
+  /// Keeps both. `scene`: one geometry that holds `triangles` in their order, in a box of size 2 about the origin, made
+  /// with RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION.
+  Burial(RTCScene scene, std::span<const Triangle> triangles);
+
+  /// Whether the point (of the box) on a surface with that unit normal lies inside a solid. Solids are what opaque
+  /// single-sided triangles bound: most rays from inside leave more of them than they enter. That does not suffice for
+  /// a panel that hangs before a wall, whose back hides the wall from nearly everywhere: behind it one sees out along
+  /// the wall, and inside a solid one does not. What lies on the surface, nearer than kOnSurface, leaves no gap.
+  [[nodiscard]] bool insideSolid(const glm::dvec3& point, const glm::dvec3& normal) const;
+
+  /// One ray of the question: false where the point cannot be inside, at much less cost when asked at many points.
+  [[nodiscard]] bool leavesSolid(const glm::dvec3& point, const glm::dvec3& direction) const;
+
+  /// Whether a triangle that comes before `triangle` in the file lies in its plane, faces the same way and holds the
+  /// point (of the box): that one is lit.
+  [[nodiscard]] bool underEarlier(const glm::dvec3& point, const glm::dvec3& normal, std::uint32_t triangle) const;
+
+ private:
+  struct Crossing {
+    double distance = 0.0;
+    std::uint32_t triangle = 0;
+  };
+  struct Query;
+  static void keep(const RTCFilterFunctionNArguments* arguments);
+  [[nodiscard]] std::vector<Crossing> crossings(const glm::dvec3& from, const glm::dvec3& way, double far) const;
+  [[nodiscard]] std::vector<Crossing> solidCrossings(const glm::dvec3& from, const glm::dvec3& direction) const;
+  [[nodiscard]] bool isFront(std::uint32_t triangle, const glm::dvec3& direction) const;
+  [[nodiscard]] bool leavesMore(std::span<const Crossing> crossings, const glm::dvec3& direction) const;
+  [[nodiscard]] bool mostRaysLeave(const glm::dvec3& point, const glm::dvec3& normal) const;
+  [[nodiscard]] bool seesOutAlong(const glm::dvec3& point, const glm::dvec3& normal) const;
+
+  RTCScene scene_;
+  std::span<const Triangle> triangles_;
+};
+
+}  // namespace radiosity::oracle
