@@ -74,6 +74,7 @@ json params(const CreditCall& c) { return {{"bytes", c.bytes}}; }
 json params(const SnapshotCall& c) {
   json out = {{"width", c.width}, {"height", c.height}, {"quantity", c.quantity}};
   if (!c.camera.empty()) out["camera"] = c.camera;
+  if (c.exposure) out["exposure"] = *c.exposure;
   return out;
 }
 json params(const CameraCall& c) { return c.pose ? toJson(*c.pose) : json::object(); }
@@ -169,6 +170,7 @@ void read(Reader& r, SnapshotCall& c) {
   r.narrow("width", c.width, Need::kOptional, 1, kMaxSnapshotSide);
   r.narrow("height", c.height, Need::kOptional, 1, kMaxSnapshotSide);
   r.text("quantity", c.quantity, Need::kOptional, 64);
+  r.optionalNumber("exposure", c.exposure, {0.0, kMaxExposure, true});
 }
 void read(Reader& r, CameraCall& c) {
   if (r.find("position") != nullptr || r.find("target") != nullptr) read(r, c.pose.emplace());

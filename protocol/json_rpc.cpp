@@ -110,6 +110,14 @@ RpcMessage whole(RpcMalformed item) {
   return message;
 }
 
+/// What is wrong, without what nlohmann says of itself, nor all that it had read of a token: that may be a whole
+/// message.
+std::string reasonOf(std::string_view what) {
+  constexpr std::size_t kEnough = 300;
+  if (const auto start = what.find("] "); start != std::string_view::npos) what.remove_prefix(start + 2);
+  return what.size() > kEnough ? std::string(what.substr(0, kEnough)) + " ..." : std::string(what);
+}
+
 /// Parses after the depth check; the message of nlohmann's exception says where.
 Result<json> parseChecked(std::string_view text) {
   if (isDeeperThan(text, kMaxJsonDepth))
@@ -120,10 +128,7 @@ Result<json> parseChecked(std::string_view text) {
   try {
     return json::parse(text);
   } catch (const json::exception& e) {
-    const std::string_view what = e.what();
-    const auto start = what.find("] ");
-    return fail(ErrorCode::kBadInput,
-                "not JSON: " + std::string(start == std::string_view::npos ? what : what.substr(start + 2)));
+    return fail(ErrorCode::kBadInput, "not JSON: " + reasonOf(e.what()));
   }
 }
 

@@ -54,6 +54,7 @@ inline constexpr std::size_t kMaxClients = 256;
 inline constexpr std::size_t kMaxUploadBytes = std::size_t{1} << 30;
 inline constexpr std::size_t kMaxTlsHandshakes = 64;  ///< under way at a time; each costs the server more than its peer
 inline constexpr int kMaxSnapshotSide = 4096;         ///< pixels
+inline constexpr double kMaxExposure = 1e30;          ///< of a snapshot, 1/nit
 
 /// WebSocket close codes that this protocol uses.
 enum class CloseCode : std::uint16_t {

@@ -159,6 +159,7 @@ struct CreditReply {
 };
 struct SnapshotReply {
   std::string url;
+  std::optional<double> exposure;  ///< 1/nit, as given or as measured; none: false colours
 };
 struct ViewersReply {
   std::uint64_t count = 0;
@@ -272,6 +273,7 @@ struct SnapshotCall {
   std::string camera = {};
   int width = 960, height = 720;
   std::string quantity = "lit";
+  std::optional<double> exposure = {};  ///< 1/nit; none: measured
 };
 struct ViewersCall {
   static constexpr std::string_view kMethod = "viewers";

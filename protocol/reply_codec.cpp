@@ -95,7 +95,10 @@ void read(Reader& r, CreditReply& reply) {
     return r.refuse(r.pointerOf("creditBytes"), "must be an integer");
   reply.credit_bytes = value->get<std::int64_t>();
 }
-void read(Reader& r, SnapshotReply& reply) { r.text("url", reply.url, Need::kRequired, kAnyText); }
+void read(Reader& r, SnapshotReply& reply) {
+  r.text("url", reply.url, Need::kRequired, kAnyText);
+  r.optionalNumber("exposure", reply.exposure, {0.0, std::numeric_limits<double>::max(), true});
+}
 void read(Reader& r, CameraReply& reply) { r.optionalInteger("viewer", reply.viewer, 0, kAnyInteger); }
 void read(Reader& r, ViewersReply& reply) { r.integer("count", reply.count, Need::kRequired, 0, kAnyInteger); }
 
@@ -170,7 +173,11 @@ std::string encodeReply(const RequestId& id, const CreditReply& r) {
   return answer(id, json{{"creditBytes", r.credit_bytes}});
 }
 
-std::string encodeReply(const RequestId& id, const SnapshotReply& r) { return answer(id, json{{"url", r.url}}); }
+std::string encodeReply(const RequestId& id, const SnapshotReply& r) {
+  json out = {{"url", r.url}};
+  if (r.exposure) out["exposure"] = *r.exposure;
+  return answer(id, std::move(out));
+}
 
 std::string encodeReply(const RequestId& id, const ViewersReply& r) { return answer(id, json{{"count", r.count}}); }
 

@@ -68,6 +68,7 @@ int serve(Options options) {
   const auto store = engine_options.store;  // outlives the uploads, which outlive the server
   const auto uploads = options.server.uploads;
   engine_options.settings = options.solve;
+  engine_options.first_texels = options.first_texels;
   engine_options.make_transport = [workers = options.workers] {
     return gpu::makeWorkerTransport({workers, "/proc/self/exe"});
   };

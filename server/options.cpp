@@ -58,6 +58,10 @@ void addSolveOptions(CLI::App& app, Options& o, Raw& raw) {
   app.add_option("--texel-size", o.solve.texel_size_m, "Side of a texel in metres; 0: from --texels")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
+  app.add_option("--first-texels", o.first_texels,
+                 "Of a scene of more than a million texels, light so many first, for those who watch, while the others "
+                 "are being made; 0: none")
+      ->capture_default_str();
   app.add_option("--seed", o.solve.seed, "Seed of the sampling; the same seed gives the same bits")
       ->capture_default_str();
   app.add_option("--workers", o.workers, "Renderer processes; 0: one for each core in software, one on a GPU")

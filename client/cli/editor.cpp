@@ -95,7 +95,8 @@ client::CallResult<protocol::ScenePatchReply> editScene(const Remote& remote, co
     if (text.size() + 1024 > protocol::kMaxMessageBytes || patch->size() > protocol::kMaxPatchOperations)
       return tl::unexpected(failureOf(
           {ErrorCode::kTooLarge,
-           fmt::format("the edit is too long for one message: {} operations, {} bytes", patch->size(), text.size()),
+           fmt::format("the edit is too long for one message: {} operations of {}, {} bytes of {}", patch->size(),
+                       protocol::kMaxPatchOperations, text.size() + 1024, protocol::kMaxMessageBytes),
            {}}));
     auto reply = sendEdit(remote, protocol::ScenePatchCall{.patch = std::move(text), .base_revision = scene->revision});
     const bool stale = !reply && reply.error().rpc && reply.error().rpc->code == protocol::RpcCode::kStaleRevision;

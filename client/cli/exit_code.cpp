@@ -43,10 +43,12 @@ ExitCode complain(const Error& error) {
 
 ExitCode complain(const client::CallFailure& failure) {
   Error error = failure.error;
-  if (failure.rpc && failure.rpc->op)
-    error.where = "operation " + std::to_string(*failure.rpc->op) + (error.where.empty() ? "" : ": " + error.where);
-  if (failure.rpc && failure.rpc->revision)
-    error.message += " (the scene is at revision " + std::to_string(*failure.rpc->revision) + ")";
+  if (failure.rpc && failure.rpc->op) {
+    const auto operation = "operation " + std::to_string(*failure.rpc->op);
+    if (error.message.starts_with(operation + ": "))
+      error.message.erase(0, operation.size() + 2);  // said once is enough
+    error.where = operation + (error.where.empty() ? "" : ": " + error.where);
+  }
   return complain(error);
 }
 

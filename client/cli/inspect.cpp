@@ -1,7 +1,10 @@
 // radiosity load, status, snapshot and save: one exchange with a server each.
 #include <fmt/format.h>
 
+#include <charconv>
+#include <chrono>
 #include <memory>
+#include <optional>
 
 #include "client/cli/commands.h"
 #include "client/cli/remote.h"
@@ -44,25 +47,53 @@ ExitCode status(const StatusOptions& options) {
   return ExitCode::kOk;
 }
 
+/// A server that makes a large scene answers when it has made it.
+constexpr auto kPatience = std::chrono::minutes(10);
+
 struct SnapshotOptions {
   RemoteOptions server;
-  std::string output, camera, quantity = "lit";
+  std::string output, camera, quantity = "lit", exposure = "auto";
   int width = 960, height = 720;
 };
+
+/// What the pictures of this process, one after the other, hand on to `--exposure same`.
+std::optional<double>& exposureBefore() {
+  static std::optional<double> exposure;
+  return exposure;
+}
+
+std::optional<double> numberIn(const std::string& text) {
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc() && end == text.data() + text.size() ? std::optional(value) : std::nullopt;
+}
+
+std::optional<double> exposureOf(const std::string& text) { return text == "same" ? exposureBefore() : numberIn(text); }
+
+std::string checkExposure(const std::string& text) {
+  const auto value = numberIn(text);
+  const bool good = text == "auto" || text == "same" || (value && *value > 0.0 && *value <= protocol::kMaxExposure);
+  return good ? std::string{} : "must be auto, same, or a number above 0: " + text;
+}
 
 ExitCode snapshot(const SnapshotOptions& options) {
   const auto remote = remoteFrom(options.server);
   if (!remote) return complain(remote.error());
   auto file = client::AtomicFile::create(options.output);
   if (!file) return complain(file.error());
-  std::string target = fmt::format("/snapshot.png?width={}&height={}&quantity={}", options.width, options.height,
-                                   client::percentEncode(options.quantity));
-  if (!options.camera.empty()) target += "&camera=" + client::percentEncode(options.camera);
-  const auto reply = client::httpGetToFile(remote->http(), target, *file);
+  auto connection = remote->connect();
+  if (!connection) return complain(connection.error());
+  const auto made = connection->call(protocol::SnapshotCall{options.camera, options.width, options.height,
+                                                            options.quantity, exposureOf(options.exposure)},
+                                     kPatience);
+  if (!made) return complain(made.error());
+  const auto reply = client::httpGetToFile(remote->http(), made->url, *file);
   if (!reply) return complain(reply.error());
   if (!reply->ok()) return complain(httpError(*reply, remote->url.text()));
   if (auto done = file->commit(); !done) return complain(done.error());
+  if (made->exposure) exposureBefore() = made->exposure;
   std::printf("%s\n", options.output.c_str());
+  if (made->exposure) std::fprintf(stderr, "%s\n", fmt::format("exposure {:.6g} per nit", *made->exposure).c_str());
   return ExitCode::kOk;
 }
 
@@ -124,6 +155,13 @@ void addSnapshot(CLI::App& app, Run& run) {
           "lit, irradiance, radiosity, unshot, error, patchId, mipLevel or normal; all but light in false colours")
       ->check(CLI::IsMember({"lit", "irradiance", "radiosity", "unshot", "error", "patchId", "mipLevel", "normal"}))
       ->type_name("WHAT")
+      ->capture_default_str();
+  command
+      .add_option("--exposure", options->exposure,
+                  "what radiance in nits is multiplied by; auto: measured (and told on stderr); same: that of the "
+                  "picture before it in a script")
+      ->check(CLI::Validator(checkExposure, ""))
+      ->type_name("X")
       ->capture_default_str();
   command.callback([options, &run] { run = [options] { return snapshot(*options); }; });
 }

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "client/cli/scene_edits.h"
+#include "protocol/json_rpc.h"
 
 namespace radiosity::cli {
 namespace {
@@ -212,6 +213,22 @@ class Merger {
   Json patch_ = Json::array();
 };
 
+/// A GLB for `add` goes whole: what lies in other files would be asked of the server, which has no such upload.
+Result<void> expectAllInside(const Json& gltf, const std::string& name) {
+  for (const char* list : {"buffers", "images"}) {
+    const auto entries = gltf.find(list);
+    if (entries == gltf.end() || !entries->is_array()) continue;
+    for (std::size_t i = 0; i < entries->size(); ++i) {
+      const auto& entry = (*entries)[i];
+      const auto uri = entry.is_object() ? entry.value("uri", Json()) : Json();
+      if (!uri.is_string() || uri.get_ref<const std::string&>().starts_with("data:")) continue;
+      return fail(ErrorCode::kBadInput, uri.dump() + " is another file; pack it into the .glb, or add a .gltf",
+                  fmt::format("{}: /{}/{}/uri", name, list, i));
+    }
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<Model> splitModel(std::string_view glb, const std::string& name) {
@@ -225,11 +242,17 @@ Result<Model> splitModel(std::string_view glb, const std::string& name) {
     const auto type = wordAt(glb, at + 4);
     at += kChunkHeader;
     if (length > glb.size() - at) return fail(ErrorCode::kBadInput, "the GLB is cut off", name);
-    if (type == kJson) model.gltf = Json::parse(glb.substr(at, length), nullptr, false);
+    if (type == kJson) {
+      const auto padded = glb.substr(at, length);  // by some exporters with zeros
+      const auto json = protocol::parseJson(padded.substr(0, padded.find_last_not_of('\0') + 1));
+      if (!json) return fail(json.error().code, "the GLB's JSON: " + json.error().text(), name);
+      model.gltf = **json;
+    }
     if (type == kBin) model.bin = glb.substr(at, length);
     at += length;
   }
   if (!model.gltf.is_object()) return fail(ErrorCode::kBadInput, "the GLB has no JSON that can be read", name);
+  if (const auto inside = expectAllInside(model.gltf, name); !inside) return tl::unexpected(inside.error());
   return model;
 }
 

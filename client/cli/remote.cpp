@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <optional>
@@ -103,12 +104,18 @@ struct Layout {
   bool operator==(const Layout&) const = default;
 };
 
+/// Waits while a scene is loaded: what a server shows of it until then are fewer texels, with pages of their own.
 Result<Layout> currentLayout(const Remote& remote) {
   auto connection = remote.connect();
   if (!connection) return tl::unexpected(connection.error().error);
-  const auto status = connection->call(protocol::StatusCall{});
-  if (!status) return tl::unexpected(status.error().error);
-  return Layout{status->progress.revision, status->settings.texels, status->settings.texel_size_m};
+  while (!interrupted()) {
+    const auto status = connection->call(protocol::StatusCall{});
+    if (!status) return tl::unexpected(status.error().error);
+    if (status->progress.state != "loading")
+      return Layout{status->progress.revision, status->settings.texels, status->settings.texel_size_m};
+    if (auto polled = connection->poll(std::chrono::milliseconds(200)); !polled) return tl::unexpected(polled.error());
+  }
+  return fail(ErrorCode::kUnavailable, "interrupted");
 }
 
 }  // namespace

@@ -116,4 +116,9 @@ std::string outcomeText(const protocol::Progress& progress) {
                      progress.revision);
 }
 
+std::string finerTexelsText(const protocol::ErrorParts& error) {
+  if (!(error.discretization > error.total)) return {};
+  return fmt::format("; finer texels would change {}", percentText(error.discretization));
+}
+
 }  // namespace radiosity::cli

@@ -9,6 +9,7 @@
 #include <optional>
 #include <set>
 #include <sstream>
+#include <string_view>
 
 namespace radiosity::cli {
 namespace {
@@ -153,6 +154,12 @@ Json setOperation(const Json& thing, const std::string& pointer, const std::stri
   return {{"op", "add"}, {"path", pointer + at}, {"value", std::move(value)}};
 }
 
+std::string propertyNames() {
+  std::set<std::string_view> names;  // `color` is a material's and a light's
+  for (const auto& property : kProperties) names.insert(property.name);
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
 Result<Json> setProperty(const Json& gltf, const std::string& name, const std::string& property,
                          const std::string& value) {
   bool known = false;
@@ -173,7 +180,7 @@ Result<Json> setProperty(const Json& gltf, const std::string& name, const std::s
     }
     return patch;
   }
-  if (!known) return bad("no such property; there are:\n" + propertyHelp(), property);
+  if (!known) return bad(fmt::format("no such property; there are {}", propertyNames()), property);
   for (const auto& candidate : kProperties) {
     if (candidate.name != property) continue;
     return bad(fmt::format("no {} or node that has one is called that; {}", nounOf(candidate.kind),
@@ -267,7 +274,8 @@ Result<Json> rotatePatch(const Json& gltf, const std::string& node, double degre
   if (!index) return tl::unexpected(index.error());
   const double length = std::hypot(axis[0], axis[1], axis[2]);
   if (!(length > 0.0)) return bad("the axis has no length", node);
-  const double half = degrees * std::numbers::pi / 360.0, s = std::sin(half) / length;
+  if (!std::isfinite(degrees)) return bad("DEGREES must be a finite number", node);
+  const double half = std::remainder(degrees, 720.0) * std::numbers::pi / 360.0, s = std::sin(half) / length;
   Quaternion turn{axis[0] * s, axis[1] * s, axis[2] * s, std::cos(half)};
   if (!absolute) turn = product(turn, numbersOf<4>(gltf["nodes"][*index], "rotation", {0.0, 0.0, 0.0, 1.0}));
   const double norm = std::hypot(std::hypot(turn[0], turn[1]), std::hypot(turn[2], turn[3]));

@@ -205,7 +205,7 @@ void addScript(CLI::App& app, Run& run) {
       "  for s from 5 to 100 count 20 index i     # $s = 5, 10, ... 100; $i = 00, 01, ... 19\n"
       "    set @lamp.emissiveStrength $s\n"
       "    wait --error 0.02\n"
-      "    snapshot -o lamp-$i.png\n"
+      "    snapshot -o lamp-$i.png --exposure same  # as bright as the light is, not as each looks best\n"
       "  end\n"
       "  for color in 1,0,0 0,1,0                 # the values one after the other\n"
       "    ...\n"

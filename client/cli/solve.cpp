@@ -104,8 +104,11 @@ class Solve {
     }
     auto program = findServerProgram();
     if (!program) return tl::unexpected(program.error());
-    ServerProcess::Options start{.program = *program, .arguments = {}, .keep_going = [] { return !interrupted(); }};
-    if (options_.workers > 0) start.arguments = {"--workers", std::to_string(options_.workers)};
+    // Nobody watches.
+    ServerProcess::Options start{
+        .program = *program, .arguments = {"--first-texels", "0"}, .keep_going = [] { return !interrupted(); }};
+    if (options_.workers > 0)
+      start.arguments.insert(start.arguments.end(), {"--workers", std::to_string(options_.workers)});
     if (!options_.link_memory.empty())
       start.arguments.insert(start.arguments.end(), {"--link-memory", options_.link_memory});
     if (!options_.state.empty())
@@ -237,7 +240,8 @@ class Solve {
     const auto& failure = status.progress.failure;
     const std::string why =
         status.progress.state == "limited" ? "limited (" + oneLine(failure) + "): " : "time limit: ";
-    std::fprintf(stderr, "%s%s\n", reached ? "" : why.c_str(), outcomeText(status.progress).c_str());
+    std::fprintf(stderr, "%s%s%s\n", reached ? "" : why.c_str(), outcomeText(status.progress).c_str(),
+                 finerTexelsText(status.progress.error).c_str());
     return reached ? ExitCode::kOk : ExitCode::kShort;
   }
 

@@ -203,7 +203,13 @@ struct HistoryReport {
 struct SnapshotRequest {
   std::string camera;  ///< name or index of a scene camera; empty: the first, or one that frames the scene
   int width = 960, height = 720;
-  std::string quantity = "lit";  ///< lit, irradiance, radiosity, error, patchId, mipLevel, normal, unshot
+  std::string quantity = "lit";    ///< lit, irradiance, radiosity, error, patchId, mipLevel, normal, unshot
+  std::optional<double> exposure;  ///< 1/nit; none: measured
+};
+
+struct Snapshot {
+  SharedBytes png;
+  std::optional<double> exposure;  ///< 1/nit, what radiance was multiplied by; none: false colours
 };
 
 /// Something mended itself that those who watch may wonder about.
@@ -272,8 +278,7 @@ class Engine {
   virtual void unlitGlb(Callback<SharedBytes> done) = 0;
   /// OpenEXR, row 0 = v 0: 32-bit float RGB, or one channel "Y" of 32-bit whole numbers.
   virtual void lightmapExr(std::uint32_t page, Quantity quantity, Callback<SharedBytes> done) = 0;
-  /// PNG.
-  virtual void snapshot(SnapshotRequest request, Callback<SharedBytes> done) = 0;
+  virtual void snapshot(SnapshotRequest request, Callback<Snapshot> done) = 0;
 
   /// The same from the engine's start to its end.
   [[nodiscard]] virtual const Past& past() const {

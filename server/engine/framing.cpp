@@ -371,7 +371,8 @@ float autoExposure(const Image& radiance) {
     sum += std::log(value);
     ++count;
   }
-  return count == 0 ? 1.0F : static_cast<float>(0.18 / std::exp(sum / static_cast<double>(count)));
+  constexpr double kMost = 9.9e29;  // a picture of next to nothing: what may be asked for
+  return count == 0 ? 1.0F : static_cast<float>(std::min(kMost, 0.18 / std::exp(sum / static_cast<double>(count))));
 }
 
 }  // namespace radiosity::engine

@@ -49,7 +49,7 @@ std::vector<SharedBytes> appended(const std::vector<SharedBytes>& before, const 
 void History::log(PastRevision entry) {
   noteStep(entry);
   log_.push_back(std::move(entry));
-  if (log_.size() > bounds_.revisions) log_.pop_front();
+  if (log_.size() > bounds_.revisions) log_.erase(log_.begin());
 }
 
 /// What an undo or a redo says of an earlier entry.
@@ -117,6 +117,11 @@ History::Next History::nextStep(std::uint64_t revision, const std::string& by, b
   if (redo) next.appended = edit.appended;
   next.done = redo ? done_ + 1 : done_ - 1;
   return next;
+}
+
+void History::makeRoom() {
+  log_.reserve(log_.size() + 1);
+  edits_.reserve(edits_.size() + 1);
 }
 
 void History::take(Next next) {

@@ -39,6 +39,8 @@ class History {
                               const scene::Document& before, const scene::Document& after) const;
   /// One edit back, or forth again; there must be one.
   [[nodiscard]] Next nextStep(std::uint64_t revision, const std::string& by, bool redo) const;
+  /// Before the revision is written: take() then fails for nothing, not for want of memory either.
+  void makeRoom();
   void take(Next next);
 
   /// nextLoad() and take() in one.
@@ -70,8 +72,8 @@ class History {
   void noteStep(const PastRevision& entry);
 
   Bounds bounds_;
-  std::deque<PastRevision> log_;
-  std::deque<state::Edit> edits_;
+  std::vector<PastRevision> log_;
+  std::vector<state::Edit> edits_;
   std::size_t done_ = 0;  // of edits_; those behind are taken back
 };
 

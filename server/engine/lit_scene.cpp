@@ -1,6 +1,7 @@
 #include "server/engine/lit_scene.h"
 
 #include <algorithm>
+#include <glm/common.hpp>
 #include <optional>
 #include <utility>
 
@@ -110,7 +111,9 @@ void LitScene::makeSolver(const solver::FormerSolver* former) {
 
 void LitScene::restart(const SolveSettings& settings) {
   settings_ = settings;
+  if (stale_) materials_ = scene::shadePatches(*scene_, *patches_);
   makeSolver();
+  stale_ = false;
 }
 
 bool LitScene::save(ArchiveWriter& to) const {
@@ -131,19 +134,20 @@ std::uint64_t LitScene::affectedBy(const SceneChange& change, const scene::Scene
   }));
 }
 
-std::uint64_t LitScene::reshade(scene::EditedDocument next, const SceneChange& change) {
-  const auto affected = affectedBy(change, next.scene);
+void LitScene::reshade(scene::Document document, std::shared_ptr<const scene::Scene> next, const SceneChange& change) {
+  document_ = std::move(document);
+  scene_ = std::move(next);
+  const bool was_stale = std::exchange(stale_, true);
   for (const auto material : change.materials) {
     const std::string place = "/materials/" + std::to_string(material) + " ";  // what was said of its former self
     std::erase_if(materials_.warnings, [&](const auto& warning) { return warning.starts_with(place); });
-    (void)scene::reshadeMaterial(next.scene, *patches_, material, materials_);
+    (void)scene::reshadeMaterial(*scene_, *patches_, material, materials_);
   }
-  document_ = std::move(next.document);
-  scene_ = std::make_shared<const scene::Scene>(std::move(next.scene));
   const bool other_lights = sources_ != lightSources(*scene_);
   // A material that no lit surface has leaves the light, and what is known of its error, as they are.
-  if (affected > 0) updateSolver(!change.materials.empty(), other_lights);
-  return affected;
+  // A solver of which only a part knows of an edit is told of no other: it will be made anew.
+  if (!was_stale && affectedBy(change, *scene_) > 0) updateSolver(!change.materials.empty(), other_lights);
+  stale_ = was_stale;
 }
 
 void LitScene::fadeFrom(LitScene& before, bool same_layout) {
@@ -151,8 +155,11 @@ void LitScene::fadeFrom(LitScene& before, bool same_layout) {
     return same_layout ? std::move(pages) : carryLight({*before.scene_, *before.patches_, pages}, *scene_, *patches_);
   };
   old_light_ = carried(before.shownPages());
-  auto direct = before.old_direct_.empty() ? before.directPages() : before.old_direct_;
   old_direct_.clear();
+  // Only of links that are taken over is the lights' part known before all else.
+  const bool known = former_map_ && !former_map_->nothingKept();
+  std::vector<scene::LightmapPage> direct;
+  if (known) direct = before.old_direct_.empty() ? before.directPages() : before.old_direct_;
   if (!direct.empty()) old_direct_ = carried(std::move(direct));
   new_share_ = 0.0;
 }
@@ -193,7 +200,9 @@ void LitScene::updateSolver(bool materials, bool lights) {
 bool LitScene::setSky(const SolveSettings& settings) {
   settings_ = settings;
   if (sources_ == lightSources(*scene_)) return false;
-  updateSolver(false, true);
+  const bool was_stale = std::exchange(stale_, true);
+  if (!was_stale) updateSolver(false, true);
+  stale_ = was_stale;
   return true;
 }
 
@@ -207,8 +216,12 @@ std::vector<std::string> LitScene::warnings() const {
   return all;
 }
 
+/// Children shoot how they differ from their parents, so noise leaves single leaves a little darker than black. Nothing
+/// is: cutting it off only takes error away.
 std::vector<scene::LightmapPage> LitScene::pages() const {
-  return scene::assemblePages(*patches_, solver_->irradiance());
+  std::vector<glm::vec3> irradiance = solver_->irradiance();
+  for (auto& value : irradiance) value = glm::max(value, 0.0F);
+  return scene::assemblePages(*patches_, irradiance);
 }
 
 std::vector<scene::LightmapPage> LitScene::shownPages() {

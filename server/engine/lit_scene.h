@@ -55,8 +55,9 @@ class LitScene {
   /// Surfaces that a change to `next` would touch; all of them where it changes geometry or lights.
   [[nodiscard]] std::uint64_t affectedBy(const SceneChange& change, const scene::Scene& next) const;
 
-  /// Takes over what leaves the geometry as it is. Returns the number of surfaces affected.
-  std::uint64_t reshade(scene::EditedDocument next, const SceneChange& change);
+  /// Takes over what leaves the geometry as it is. Where memory runs out in it the scene is the edited one, and
+  /// stale.
+  void reshade(scene::Document document, std::shared_ptr<const scene::Scene> next, const SceneChange& change);
 
   /// Shows `before`'s light, on the charts that are still there, until this scene's own is as good. `same_layout`: of
   /// keepsLayoutOf(before); then all of it stays as it is.
@@ -77,6 +78,9 @@ class LitScene {
 
   /// Starts the solve over, with other settings that leave the charts as they are.
   void restart(const SolveSettings& settings);
+  /// The solve is none of this scene, or of these settings: it must not go on before restart().
+  void invalidate() { stale_ = true; }
+  [[nodiscard]] bool isStale() const { return stale_; }
 
   /// Another target or time limit: the solve goes on from where it is.
   void retarget(const SolveSettings& settings) {
@@ -120,6 +124,7 @@ class LitScene {
   std::shared_ptr<const scene::Scene> scene_;
   std::shared_ptr<const scene::PatchScene> patches_;
   scene::PatchMaterials materials_;
+  bool stale_ = false;
   bool reproducible_ = true;
   std::optional<scene::PatchMap> former_map_;  // from succeed() to startSolve()
   std::unique_ptr<solver::Solver> solver_;

@@ -21,4 +21,16 @@ auto withinMemory(Work&& work) -> decltype(work()) {
   }
 }
 
+/// Whether memory sufficed for `work`, which returns nothing. For what comes after an edit is on the disk: that is made
+/// then, come what may, and must not be told as refused.
+template <typename Work>
+bool fitsMemory(Work&& work) {
+  try {
+    work();
+    return true;
+  } catch (const std::bad_alloc&) {
+    return false;
+  }
+}
+
 }  // namespace radiosity::engine

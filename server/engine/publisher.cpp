@@ -71,13 +71,16 @@ void copyTile(const Image& from, const TileRect& tile, Image& to) {
 }
 void copyTile(const IdImage& /*those that did not change at all*/, const TileRect& /*tile*/, IdImage& /*to*/) {}
 
-std::vector<Image> valueMips(const QuantityPages& pages, std::size_t page) {
+/// Leaves the page empty: of many texels a copy is worth leaving out.
+std::vector<Image> valueMips(QuantityPages& pages, std::size_t page) {
   std::vector<Image> mips;
-  scene::LightmapPage mip = pages.values[page];
+  scene::LightmapPage mip = std::move(pages.values[page]);
   while (true) {
-    mips.push_back(shown(pages, mip.irradiance));
-    if (mip.irradiance.width == 1 && mip.irradiance.height == 1) return mips;
-    mip = scene::coarserMip(mip);
+    const bool last = mip.irradiance.width == 1 && mip.irradiance.height == 1;
+    auto coarser = last ? scene::LightmapPage{} : scene::coarserMip(mip);
+    mips.push_back(shown(pages, std::move(mip.irradiance)));
+    if (last) return mips;
+    mip = std::move(coarser);
   }
 }
 
@@ -136,7 +139,7 @@ void Publisher::reset() {
   for (auto& lightmaps : latest_) lightmaps.reset();
 }
 
-std::shared_ptr<const PageSnapshot> Publisher::snapshot(const QuantityPages& pages, std::size_t page,
+std::shared_ptr<const PageSnapshot> Publisher::snapshot(QuantityPages& pages, std::size_t page,
                                                         const PageSnapshot* before) const {
   auto made = std::make_shared<PageSnapshot>();
   if (holdsIds(pages.quantity)) {
@@ -154,7 +157,7 @@ std::shared_ptr<const PageSnapshot> Publisher::snapshot(const QuantityPages& pag
   return made;
 }
 
-std::shared_ptr<const Lightmaps> Publisher::publish(const QuantityPages& pages, const Status& status, bool final) {
+std::shared_ptr<const Lightmaps> Publisher::publish(QuantityPages pages, const Status& status, bool final) {
   auto& latest = latest_[static_cast<std::size_t>(pages.quantity)];
   auto lightmaps = std::make_shared<Lightmaps>();
   for (std::size_t p = 0; p < pages.size(); ++p) {

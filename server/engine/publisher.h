@@ -25,7 +25,7 @@ class Publisher {
 
   /// The present version of these pages; tiles that changed by less than a half-float quantum since the quantity was
   /// last published keep their version.
-  [[nodiscard]] std::shared_ptr<const Lightmaps> publish(const QuantityPages& pages, const Status& status, bool final);
+  [[nodiscard]] std::shared_ptr<const Lightmaps> publish(QuantityPages pages, const Status& status, bool final);
 
   /// What was published of the quantity last; nothing after reset() or forget().
   [[nodiscard]] const std::shared_ptr<const Lightmaps>& latest(Quantity quantity) const {
@@ -44,7 +44,7 @@ class Publisher {
   [[nodiscard]] const TileCounters& tileCounters() const { return tiles_; }
 
  private:
-  [[nodiscard]] std::shared_ptr<const PageSnapshot> snapshot(const QuantityPages& pages, std::size_t page,
+  [[nodiscard]] std::shared_ptr<const PageSnapshot> snapshot(QuantityPages& pages, std::size_t page,
                                                              const PageSnapshot* before) const;
 
   std::uint64_t layout_ = 0, version_ = 0, layout_since_ = 0;

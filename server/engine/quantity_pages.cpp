@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 #include <utility>
 
 #include "server/solver/texel_error.h"
@@ -15,7 +16,7 @@ std::vector<glm::vec3> radiosity(const LitScene& lit) {
   const auto& irradiance = lit.solver().irradiance();
   std::vector<glm::vec3> values(irradiance.size());
   for (std::size_t n = 0; n < values.size(); ++n)
-    values[n] = lit.materials().emission[n] + lit.materials().reflectance[n] * irradiance[n];
+    values[n] = lit.materials().emission[n] + lit.materials().reflectance[n] * glm::max(irradiance[n], 0.0F);
   return values;
 }
 

@@ -2,15 +2,21 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "common/log.h"
 #include "server/engine/solve_loop_class.h"
 #include "server/engine/status_report.h"
+#include "server/engine/thread_time.h"
 
 namespace radiosity::engine {
 namespace {
 
 constexpr std::size_t kMaxQueue = 1024;
 constexpr auto kProgressInterval = std::chrono::milliseconds(100);
+/// Estimating the error and weighing all light go over every texel: they take no more than one part in so many of the
+/// solve thread's time.
+constexpr int kProgressShare = 10;
 /// A solve that took longer is worth a checkpoint at its end.
 constexpr double kLongSolveSeconds = 2.0;
 
@@ -75,6 +81,7 @@ void SolveLoop::threadMain(std::promise<Result<void>> started) {
     takeTurn();
   }
   checkpoints_.reset();
+  first_light_.reset();
   lit_.reset();
   view_.reset();
   const std::scoped_lock lock(mutex_);
@@ -83,7 +90,7 @@ void SolveLoop::threadMain(std::promise<Result<void>> started) {
 
 /// Sleeps while there is nothing to solve, then does all commands that are due. False: the engine is being destroyed.
 bool SolveLoop::runCommands() {
-  waiting_ = state_ != SolveState::kSolving;
+  waiting_ = first_light_ ? !first_light_->goes_on : state_ != SolveState::kSolving;
   const auto due = queue_.take(waiting_);
   beat();
   waiting_ = false;
@@ -104,9 +111,17 @@ bool SolveLoop::runCommands() {
 void SolveLoop::takeTurn() {
   try {
     welcomeWatchers();
-    if (state_ == SolveState::kSolving) solveSlice();
+    if (first_light_)
+      firstLightSlice();
+    else if (state_ == SolveState::kSolving)
+      solveSlice();
     checkpointIfDue();
   } catch (const std::bad_alloc&) {
+    if (first_light_) {  // the whole may still be had
+      first_light_->goes_on = unpublished_ = false;
+      log::warn("out of memory: the first light stays as it is");
+      return;
+    }
     failure_ = outOfMemory().value().message;
     log::error("solve stopped: {}", failure_);
     state_ = SolveState::kFailed;
@@ -118,6 +133,7 @@ void SolveLoop::takeTurn() {
 
 void SolveLoop::solveSlice() {
   if (renderer_lost_ && !rendererIsBack()) return;
+  if (lit_->isStale()) lit_->restart(settings_);
   const auto begin = Clock::now();
   const auto outcome = lit_->solver().step();
   seconds_ += std::chrono::duration<double>(Clock::now() - begin).count();
@@ -155,9 +171,11 @@ void SolveLoop::solveSlice() {
 }
 
 void SolveLoop::tellProgress(bool assess) {
-  if (Clock::now() - last_progress_ < kProgressInterval) return;
+  if (Clock::now() < next_progress_) return;
+  const auto begin = threadTime();
   if (assess) lit_->solver().assess();
   updateStatus(true);
+  next_progress_ = Clock::now() + std::max<Clock::duration>(kProgressInterval, kProgressShare * (threadTime() - begin));
 }
 
 void SolveLoop::beginSolve() {
@@ -185,7 +203,7 @@ void SolveLoop::endSolve(SolveState state) {
 }
 
 void SolveLoop::updateStatus(bool announce) {
-  Status status = lit_ ? reportStatus(*lit_, seconds_) : Status{};
+  Status status = lit_ && !first_light_ ? reportStatus(*lit_, seconds_) : Status{};
   status.state = state_;
   status.revision = revision_;
   status.tile_version = publisher_.version();
@@ -216,7 +234,7 @@ void SolveLoop::updateStatus(bool announce) {
     status_ = status;
   }
   if (!announce) return;
-  last_progress_ = Clock::now();
+  next_progress_ = Clock::now() + kProgressInterval;
   listeners_.tell([&](Listener& listener) { listener.onProgress(status); });
 }
 

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <set>
@@ -23,6 +24,10 @@ struct EngineOptions {
   /// After a transport failed, before the solve starts over on it; doubled for each failure of the same solve, of which
   /// the fifth ends it. Drivers take seconds to reset a card.
   std::chrono::milliseconds recovery_wait{500};
+
+  /// Scenes of more texels than this are lit at `first_texels` first, while the others are being made; 0: none are.
+  std::uint64_t first_light_above = 1'000'000;
+  std::uint64_t first_texels = 100'000;
 
   /// What outlives this process; null: nothing does. An edit is answered only when it is in there.
   std::shared_ptr<state::Store> store;

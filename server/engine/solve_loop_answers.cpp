@@ -100,9 +100,25 @@ std::vector<Image> pageImages(QuantityPages pages) {
   return images;
 }
 
+/// A driver that resets the card takes the context away at any time: then once more, on a new one.
+Result<Image> draw(std::unique_ptr<gpu::ViewRenderer>& renderer, const LitScene& lit, const std::vector<Image>& pages,
+                   const gpu::ViewRequest& view) {
+  const bool fresh = renderer == nullptr;
+  if (fresh) {
+    auto made = gpu::makeViewRenderer();
+    if (!made) return tl::unexpected<Error>(made.error());
+    renderer = std::move(*made);
+  }
+  auto image = renderer->render(lit.scene(), lit.patches(), pages, view);
+  if (image) return image;
+  renderer.reset();
+  const bool lost = image.error().code == ErrorCode::kUnavailable;
+  return lost && !fresh ? draw(renderer, lit, pages, view) : image;
+}
+
 }  // namespace
 
-Result<SharedBytes> SolveLoop::renderSnapshot(const SnapshotRequest& request) {
+Result<Snapshot> SolveLoop::renderSnapshot(const SnapshotRequest& request) {
   const auto found = snapshotQuantities().find(request.quantity);
   if (found == snapshotQuantities().end())
     return fail(ErrorCode::kBadUsage, "no quantity \"" + request.quantity + "\"", "quantity");
@@ -114,27 +130,21 @@ Result<SharedBytes> SolveLoop::renderSnapshot(const SnapshotRequest& request) {
   view.width = request.width;
   view.height = request.height;
   view.quantity = quantity.view;
-  if (!view_) {
-    auto made = gpu::makeViewRenderer();
-    if (!made) return tl::unexpected<Error>(made.error());
-    view_ = std::move(*made);
-  }
   // Nobody wants a picture of the dark after an edit; but what was waited for must not have a ghost of the old light.
   const bool dark = quantity.pages == Quantity::kIrradiance && lit_->solver().error().total > kPresentable;
   const auto pages =
       dark ? pageImages({quantity.pages, lit_->shownPages(), {}, false}) : pageImages(makePages(*lit_, quantity.pages));
-  const auto image = view_->render(lit_->scene(), lit_->patches(), pages, view);
-  if (!image) {
-    view_.reset();  // its context may be lost; the next picture gets a new one
-    return tl::unexpected<Error>(image.error());
-  }
-  auto png = encodePng(quantity.photometric ? toneMap(*image, autoExposure(*image)) : *image);
+  const auto image = draw(view_, *lit_, pages, view);
+  if (!image) return tl::unexpected<Error>(image.error());
+  std::optional<double> exposure;
+  if (quantity.photometric) exposure = request.exposure ? *request.exposure : autoExposure(*image);
+  auto png = encodePng(exposure ? toneMap(*image, static_cast<float>(*exposure)) : *image);
   if (!png) return tl::unexpected<Error>(png.error());
-  return std::make_shared<const Bytes>(std::move(*png));
+  return Snapshot{std::make_shared<const Bytes>(std::move(*png)), exposure};
 }
 
-void SolveLoop::snapshot(SnapshotRequest request, Callback<SharedBytes> done) {
-  askLit<SharedBytes>(std::move(done), [this, request = std::move(request)] { return renderSnapshot(request); });
+void SolveLoop::snapshot(SnapshotRequest request, Callback<Snapshot> done) {
+  askLit<Snapshot>(std::move(done), [this, request = std::move(request)] { return renderSnapshot(request); });
 }
 
 }  // namespace radiosity::engine

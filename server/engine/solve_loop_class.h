@@ -1,7 +1,8 @@
-// The class behind makeEngine (solve_loop.h), private to this folder. Its methods lie in seven files: solve_loop.cpp
-// runs the thread, solve_loop_edits.cpp changes scene and settings, solve_loop_answers.cpp makes what can be fetched,
-// solve_loop_publish.cpp shows lightmaps to those who watch, solve_loop_state.cpp keeps what outlives the process,
-// solve_loop_restore.cpp brings it back, solve_loop_recovery.cpp goes on when renderers are lost.
+// The class behind makeEngine (solve_loop.h), private to this folder. Its methods lie in eight files: solve_loop.cpp
+// runs the thread, solve_loop_load.cpp takes in scenes, solve_loop_edits.cpp changes scene and settings,
+// solve_loop_answers.cpp makes what can be fetched, solve_loop_publish.cpp shows lightmaps to those who watch,
+// solve_loop_state.cpp keeps what outlives the process, solve_loop_restore.cpp brings it back, solve_loop_recovery.cpp
+// goes on when renderers are lost.
 #pragma once
 
 #include <array>
@@ -12,6 +13,7 @@
 #include <future>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <utility>
@@ -31,6 +33,8 @@
 #include "server/state/checkpoint.h"
 
 namespace radiosity::engine {
+
+[[nodiscard]] inline tl::unexpected<Error> noScene() { return fail(ErrorCode::kNotFound, "no scene is loaded"); }
 
 class SolveLoop final : public Engine {
  public:
@@ -60,7 +64,7 @@ class SolveLoop final : public Engine {
   void sceneGlb(Callback<SharedBytes> done) override;
   void unlitGlb(Callback<SharedBytes> done) override;
   void lightmapExr(std::uint32_t page, Quantity quantity, Callback<SharedBytes> done) override;
-  void snapshot(SnapshotRequest request, Callback<SharedBytes> done) override;
+  void snapshot(SnapshotRequest request, Callback<Snapshot> done) override;
   void addListener(std::weak_ptr<Listener> listener) override;
   [[nodiscard]] const Past& past() const override { return past_; }
   void keepSolve(std::chrono::milliseconds patience) override;
@@ -74,9 +78,16 @@ class SolveLoop final : public Engine {
   /// The same; answers kNotFound while no scene is loaded.
   template <typename T, typename Work>
   void askLit(Callback<T> done, Work work);
+  /// For what changes the scene or the solve: of a scene that is still being loaded the whole must be there.
+  template <typename T, typename Work>
+  void askToChange(Callback<T> done, Work work);
 
   /// A load counts as under way from here until it is answered: reading a large file takes its time. Any thread.
   [[nodiscard]] Callback<LoadOutcome> countLoad(Callback<LoadOutcome> done);
+  /// Nothing: the scene's first light is being shown, and the answer comes when all of it is there.
+  using LoadBegun = Result<std::optional<LoadOutcome>>;
+  /// Runs `begin` on the solve thread. Any thread.
+  void load(Callback<LoadOutcome> done, std::function<LoadBegun()> begin);
 
   // All below: solve thread only.
   void threadMain(std::promise<Result<void>> started);
@@ -98,11 +109,27 @@ class SolveLoop final : public Engine {
   void publishLightmaps(bool final);
   [[nodiscard]] QuantityPages pagesToShow(Quantity quantity);
   void publishQuantity(Quantity quantity);
+  [[nodiscard]] Clock::duration publishPause(Clock::duration took) const;
   /// Those who came while nothing changes are told what there is.
   void welcomeWatchers();
   void updateStatus(bool announce);
 
-  [[nodiscard]] Result<LoadOutcome> install(Result<scene::Document> document);
+  [[nodiscard]] LoadBegun install(Result<scene::Document> document);
+  /// A load of many texels: what is shown while they are being made, and who waits for them.
+  struct FirstLight {
+    std::future<Result<std::unique_ptr<LitScene>>> whole;
+    Callback<LoadOutcome> done;
+    std::shared_ptr<std::atomic<bool>> made;  ///< `whole` is there, but for the moment that its thread takes to end
+    bool goes_on = true;                      ///< its solve
+  };
+  [[nodiscard]] bool wantsFirstLight(const scene::Scene& scene) const;
+  [[nodiscard]] Result<void> showFirstLight(const scene::EditedDocument& edited);
+  [[nodiscard]] Result<void> makeWhole(const scene::EditedDocument& edited);
+  void firstLightSlice();
+  /// Puts the whole scene in place of its first light; waits for it. Nothing to do where no first light is shown.
+  void endFirstLight();
+  [[nodiscard]] Result<LoadOutcome> settleIn(Result<std::unique_ptr<LitScene>> made);
+  void unload(SolveState state);
   /// Called when nothing but the disk can fail any more: what is about to come is brought there.
   using Keep = std::function<Result<void>(const PatchOutcome&)>;
   /// Puts a lit scene in place of the present one, which goes on if `made` is an error or cannot be uploaded.
@@ -113,23 +140,27 @@ class SolveLoop final : public Engine {
   using KeepMade = std::function<Result<void>(const LitScene& made, const LitScene::Affected& at_most)>;
   [[nodiscard]] Result<LitScene::Affected> relight(Result<std::unique_ptr<LitScene>> made, Relation relation,
                                                    const KeepMade& keep = {});
-  /// What of it can be undone; what an edit touches, at most.
-  [[nodiscard]] Result<LitScene::Affected> tryOut(LitScene& made, LitScene* former, const KeepMade& keep);
-  /// The links of `measured` go over, where there is memory for both.
-  [[nodiscard]] static Result<LitScene::Affected> startSolveOf(LitScene& made, LitScene::Affected affected,
-                                                               LitScene* measured);
-  /// The present scene, after another was tried. `anew`: its solve starts over.
-  void putBack(bool anew);
+  /// What of it can be undone; what an edit touches, at most. `solve_anew`: the solver, too, which takes nothing over.
+  /// `keeps_layout`: whether pages are where those of `former` are.
+  [[nodiscard]] Result<LitScene::Affected> tryOut(LitScene& made, LitScene* former, bool solve_anew,
+                                                  const KeepMade& keep, bool& keeps_layout);
+  /// The edited scene, which is on the disk, takes the place of the present one and its links, where there is memory
+  /// for both; else it is solved anew; where there is no memory for that either, no scene is there and the solve has
+  /// failed. Returns the shots that are to be taken again.
+  [[nodiscard]] std::uint64_t takeLinks(std::unique_ptr<LitScene> made);
+  void putBack();  ///< the present scene, after another was tried
   [[nodiscard]] Result<void> checkBase(const std::optional<std::uint64_t>& base_revision) const;
   [[nodiscard]] Result<PatchOutcome> applyRequest(const PatchRequest& request);
   [[nodiscard]] Result<PatchOutcome> applyStep(const StepRequest& request);
   /// Makes the edited scene the present one; raises no revision and tells nobody yet.
   [[nodiscard]] Result<PatchOutcome> adopt(scene::EditedDocument edited, const Keep& keep);
-  void takeInLight();
+  template <typename Tell>
+  bool takeInLight(const Tell& tell);
   [[nodiscard]] Result<PatchOutcome> rebuild(scene::EditedDocument edited, const Keep& keep);
   /// Tells everyone of the new revision and solves on.
   void announceEdit(const PatchOutcome& outcome, const std::string& patch, const std::string& by);
   [[nodiscard]] Result<SolveSettings> applySettings(const SolveSettings& settings);
+  void takeSettings(const SolveSettings& before, bool resized, bool anew);
   /// A solve that has stopped goes on when the settings now ask for more, and is done when they ask for less.
   void reconsiderStop();
 
@@ -151,7 +182,7 @@ class SolveLoop final : public Engine {
   /// True: taken, or not to be had at all.
   [[nodiscard]] bool takeCheckpoint();
 
-  [[nodiscard]] Result<SharedBytes> renderSnapshot(const SnapshotRequest& request);
+  [[nodiscard]] Result<Snapshot> renderSnapshot(const SnapshotRequest& request);
   [[nodiscard]] Result<SharedBytes> makeUnlit();
   [[nodiscard]] Result<SharedBytes> makeExr(std::uint32_t page, Quantity quantity);
 
@@ -165,6 +196,7 @@ class SolveLoop final : public Engine {
   std::unique_ptr<solver::Transport> transport_;  // made and ended under mutex_: the destructor interrupts it
   std::unique_ptr<gpu::ViewRenderer> view_;
   std::unique_ptr<LitScene> lit_;
+  std::optional<FirstLight> first_light_;  // then lit_ is made of a few texels, in no history and on no disk
   Publisher publisher_;
   History history_;
   SolveState state_ = SolveState::kEmpty;
@@ -173,7 +205,7 @@ class SolveLoop final : public Engine {
   double seconds_ = 0.0;
   bool unpublished_ = false;
   std::uint64_t unwatched_ = 0;  // publications that nobody was there for
-  Clock::time_point next_publish_{}, last_progress_{};
+  Clock::time_point next_publish_{}, next_progress_{};
   bool renderer_lost_ = false;
   unsigned recoveries_ = 0;  // of this solve
   Clock::time_point retry_at_{};
@@ -206,9 +238,17 @@ void SolveLoop::ask(Callback<T> done, Work work) {
 }
 
 template <typename T, typename Work>
+void SolveLoop::askToChange(Callback<T> done, Work work) {
+  ask<T>(std::move(done), [this, work = std::move(work)]() mutable -> Result<T> {
+    endFirstLight();
+    return work();
+  });
+}
+
+template <typename T, typename Work>
 void SolveLoop::askLit(Callback<T> done, Work work) {
   ask<T>(std::move(done), [this, work = std::move(work)]() mutable -> Result<T> {
-    if (!lit_) return fail(ErrorCode::kNotFound, "no scene is loaded");
+    if (!lit_) return noScene();
     return work();
   });
 }

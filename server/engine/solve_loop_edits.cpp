@@ -1,4 +1,4 @@
-// What changes the scene or the solve: loading, patching, settings, pause.
+// What changes the scene or the solve: patching, settings, pause.
 #include <algorithm>
 #include <utility>
 
@@ -7,112 +7,86 @@
 
 namespace radiosity::engine {
 
-Engine::Callback<LoadOutcome> SolveLoop::countLoad(Callback<LoadOutcome> done) {
-  ++loads_;
-  return [this, done = std::move(done)](Result<LoadOutcome> outcome) {
-    --loads_;
-    done(std::move(outcome));
-  };
-}
-
-void SolveLoop::loadBytes(std::string name, SharedBytes bytes, Callback<LoadOutcome> done) {
-  ask<LoadOutcome>(countLoad(std::move(done)), [this, name = std::move(name), bytes = std::move(bytes)] {
-    return install(scene::parseDocument(name, *bytes));
-  });
-}
-
-void SolveLoop::loadFile(std::string path, Callback<LoadOutcome> done) {
-  ask<LoadOutcome>(countLoad(std::move(done)),
-                   [this, path = std::move(path)] { return install(scene::loadDocument(path)); });
-}
-
-Result<LoadOutcome> SolveLoop::install(Result<scene::Document> document) {
-  if (!document) return tl::unexpected<Error>(document.error());
-  if (goesOnWith(*document, false)) return LoadOutcome{revision_, lit_->warnings()};
-  const SolveState before = std::exchange(state_, SolveState::kLoading);
-  updateStatus(true);
-  auto next = History::nextLoad(revision_ + 1, document->name);
-  const auto keep = [&](const LitScene& made, const LitScene::Affected&) { return keepLoad(next, made.document()); };
-  auto made = withinMemory([&] { return LitScene::make(std::move(*document), settings_, *transport_); });
-  const auto lit = relight(std::move(made), Relation::kOther, keep);
-  if (!lit) {
-    if (state_ == SolveState::kLoading) state_ = before;
-    updateStatus(true);
-    return tl::unexpected<Error>(lit.error());
-  }
-  ++revision_;
-  history_.take(std::move(next));
-  const LogScope about({.revision = revision_});
-  for (const auto& warning : lit_->warnings()) log::warn("{}", warning);
-  beginSolve();
-  listeners_.tell([this](Listener& listener) { listener.onSceneLoaded(revision_); });
-  publishLightmaps(false);
-  return LoadOutcome{revision_, lit_->warnings()};
-}
-
 Result<LitScene::Affected> SolveLoop::relight(Result<std::unique_ptr<LitScene>> made, Relation relation,
                                               const KeepMade& keep) {
   if (!made) return tl::unexpected<Error>(made.error());
   auto* former = relation == Relation::kEdited || relation == Relation::kSolvedAnew ? lit_.get() : nullptr;
-  auto affected = withinMemory([&] { return tryOut(**made, former, keep); });
   // What a solve that failed has measured may be a part of what it thinks it has.
-  auto* measured = state_ == SolveState::kFailed || relation == Relation::kSolvedAnew ? nullptr : former;
-  const bool starts = affected && relation != Relation::kResumed;
-  if (starts) affected = startSolveOf(**made, *affected, measured);
+  const bool is_whole = state_ != SolveState::kFailed && !(lit_ && lit_->isStale());
+  auto* measured = is_whole && relation != Relation::kSolvedAnew ? former : nullptr;
+  const bool starts = relation != Relation::kResumed;
+  bool keeps_layout = false;
+  auto affected =
+      withinMemory([&] { return tryOut(**made, former, starts && measured == nullptr, keep, keeps_layout); });
   if (!affected) {
-    made->reset();    // before the other takes its place again
-    putBack(starts);  // it may have had the links already
+    made->reset();  // before the other takes its place again
+    putBack();
     return affected;
   }
-  // The links are taken, the patches are still there to be compared.
-  if (former == nullptr || !(*made)->keepsLayoutOf(*former)) publisher_.reset();
-  lit_ = std::move(*made);
+  if (!keeps_layout) publisher_.reset();
   renderer_lost_ = false;  // it took the scene
+  if (starts && measured != nullptr) return LitScene::Affected{affected->surfaces, takeLinks(std::move(*made))};
+  lit_ = std::move(*made);
   return affected;
 }
 
-Result<LitScene::Affected> SolveLoop::tryOut(LitScene& made, LitScene* former, const KeepMade& keep) {
+Result<LitScene::Affected> SolveLoop::tryOut(LitScene& made, LitScene* former, bool solve_anew, const KeepMade& keep,
+                                             bool& keeps_layout) {
   if (auto uploaded = made.upload(); !uploaded) return tl::unexpected<Error>(uploaded.error());
   LitScene::Affected affected;
   if (former != nullptr) {
     affected = made.succeed(*former);
-    made.fadeFrom(*former, made.keepsLayoutOf(*former));
+    keeps_layout = made.keepsLayoutOf(*former);
+    made.fadeFrom(*former, keeps_layout);
   }
+  if (solve_anew) (void)made.startSolve();
   if (auto kept = keep ? keep(made, affected) : Result<void>(); !kept) return tl::unexpected<Error>(kept.error());
   return affected;
 }
 
-Result<LitScene::Affected> SolveLoop::startSolveOf(LitScene& made, LitScene::Affected affected, LitScene* measured) {
-  try {
-    affected.shots = made.startSolve(measured);
-    return affected;
-  } catch (const std::bad_alloc&) {
-    log::warn("no memory for the links of the solve before: all is measured anew");
+std::uint64_t SolveLoop::takeLinks(std::unique_ptr<LitScene> made) {
+  std::uint64_t shots = 0;
+  if (fitsMemory([&] { shots = made->startSolve(lit_.get()); })) {
+    lit_ = std::move(made);
+    return shots;
   }
-  return withinMemory([&]() -> Result<LitScene::Affected> {
-    affected.shots = made.startSolve();
-    return affected;
+  log::warn("no memory for the links of the solve before: all is measured anew");
+  shots = lit_->solver().shots();
+  lit_.reset();  // what it held is needed
+  if (fitsMemory([&] { (void)made->startSolve(); })) {
+    lit_ = std::move(made);
+    return shots;
+  }
+  made.reset();
+  const bool told = fitsMemory([&] {
+    failure_ = "what was asked is made, but " + outOfMemory().value().message;
+    log::error("solve stopped: {}", failure_);
+    unload(SolveState::kFailed);
   });
+  if (!told) state_ = SolveState::kFailed;
+  return shots;
 }
 
-void SolveLoop::putBack(bool anew) {
-  if (!lit_) return;
-  const auto back = withinMemory([&] {
-    if (anew) lit_->restart(settings_);
-    return lit_->upload();
-  });
-  if (back && !anew) return;
-  if (back) return beginSolve();
+void SolveLoop::putBack() {
+  if (!lit_ || first_light_) return;
+  const auto back = withinMemory([&] { return lit_->upload(); });
+  if (back) return;
   failure_ = back.error().text();
   endSolve(SolveState::kFailed);
 }
 
 void SolveLoop::patch(PatchRequest request, Callback<PatchOutcome> done) {
-  askLit<PatchOutcome>(std::move(done), [this, request = std::move(request)] { return applyRequest(request); });
+  askToChange<PatchOutcome>(std::move(done), [this, request = std::move(request)]() -> Result<PatchOutcome> {
+    if (!lit_) return noScene();
+    return applyRequest(request);
+  });
 }
 
 void SolveLoop::step(StepRequest request, Callback<PatchOutcome> done) {
-  askLit<PatchOutcome>(std::move(done), [this, request = std::move(request)] { return applyStep(request); });
+  askToChange<PatchOutcome>(std::move(done), [this, request = std::move(request)]() -> Result<PatchOutcome> {
+    if (!lit_) return noScene();
+    return applyStep(request);
+  });
 }
 
 void SolveLoop::history(Callback<HistoryReport> done) {
@@ -161,30 +135,46 @@ Result<PatchOutcome> SolveLoop::applyStep(const StepRequest& request) {
   return outcome;
 }
 
+/// `tell` tells the solver of other light or materials; it returns whether that changes the light. What is told is on
+/// the disk: where memory runs out the solve starts over, now or with its next slice, and false is returned.
+template <typename Tell>
+bool SolveLoop::takeInLight(const Tell& tell) {
+  const bool told = fitsMemory([&] {
+    if (!tell()) return;
+    // The light of the wave that failed is counted as shot but arrived nowhere.
+    if (state_ == SolveState::kFailed) lit_->invalidate();
+    if (lit_->isStale()) return lit_->restart(settings_);
+    // It takes an edit in with its next step, which does not come: show what can be shown.
+    if (state_ == SolveState::kPaused) lit_->solver().assess();
+  });
+  if (told) return true;
+  log::warn("out of memory: the solve starts over");
+  lit_->invalidate();
+  (void)fitsMemory([&] { lit_->restart(settings_); });
+  return false;
+}
+
 Result<PatchOutcome> SolveLoop::adopt(scene::EditedDocument edited, const Keep& keep) {
   const auto change = lit_->changeTo(edited.scene);
   PatchOutcome outcome;
   outcome.revision = revision_ + 1;
+  history_.makeRoom();
   if (change.geometry) {
     auto rebuilt = rebuild(std::move(edited), keep);
     if (!rebuilt) return rebuilt;
     outcome = *rebuilt;
   } else {
     outcome.affected_surfaces = lit_->affectedBy(change, edited.scene);
+    auto scene = std::make_shared<const scene::Scene>(std::move(edited.scene));
     if (auto kept = keep(outcome); !kept) return tl::unexpected<Error>(kept.error());
-    outcome.affected_surfaces = lit_->reshade(std::move(edited), change);
-    if (outcome.affected_surfaces > 0) takeInLight();
+    const bool taken = takeInLight([&] {
+      lit_->reshade(std::move(edited.document), std::move(scene), change);
+      return outcome.affected_surfaces > 0;
+    });
+    if (!taken) outcome.affected_surfaces = std::max<std::uint64_t>(outcome.affected_surfaces, 1);  // all, in truth
   }
   outcome.revision = ++revision_;
   return outcome;
-}
-
-/// The solver was told of other light or materials.
-void SolveLoop::takeInLight() {
-  // The light of the wave that failed is counted as shot but arrived nowhere.
-  if (state_ == SolveState::kFailed) lit_->restart(settings_);
-  // It takes an edit in with its next step, which does not come: show what can be shown.
-  if (state_ == SolveState::kPaused) lit_->solver().assess();
 }
 
 Result<PatchOutcome> SolveLoop::rebuild(scene::EditedDocument edited, const Keep& keep) {
@@ -203,22 +193,35 @@ Result<PatchOutcome> SolveLoop::rebuild(scene::EditedDocument edited, const Keep
   const auto affected = relight(std::move(made), Relation::kEdited, keep_made);
   if (!affected) return tl::unexpected<Error>(affected.error());
   set(*affected);
-  correctAnswer(outcome);
+  if (!fitsMemory([&] { correctAnswer(outcome); }))
+    log::warn("out of memory: an edit's answer stays as it was first kept");
   return outcome;
 }
 
 void SolveLoop::announceEdit(const PatchOutcome& outcome, const std::string& patch, const std::string& by) {
-  listeners_.tell([&](Listener& listener) { listener.onScenePatched(outcome.revision, patch, by); });
-  if (outcome.affected_surfaces > 0) {
-    beginSolve();
-  } else {
-    updateStatus(true);
-  }
-  publishLightmaps(false);
+  const auto tell = [&] {
+    listeners_.tell([&](Listener& listener) { listener.onScenePatched(outcome.revision, patch, by); });
+  };
+  const auto tell_to_fetch = [&] {
+    listeners_.tell([&](Listener& listener) { listener.onSceneLoaded(outcome.revision); });
+  };
+  if (!fitsMemory(tell) && !fitsMemory(tell_to_fetch)) log::error("out of memory: viewers are not told of an edit");
+  const bool shown = fitsMemory([&] {
+    if (lit_ && outcome.affected_surfaces > 0) {
+      beginSolve();
+    } else {
+      updateStatus(true);
+    }
+    publishLightmaps(false);
+  });
+  if (shown) return;
+  unpublished_ = true;
+  log::warn("out of memory: an edit will be shown later");
 }
 
 void SolveLoop::configure(ChangeSettings change, Callback<SolveSettings> done) {
-  ask<SolveSettings>(std::move(done), [this, change = std::move(change)] { return applySettings(change(settings_)); });
+  askToChange<SolveSettings>(std::move(done),
+                             [this, change = std::move(change)] { return applySettings(change(settings_)); });
 }
 
 Result<SolveSettings> SolveLoop::applySettings(const SolveSettings& settings) {
@@ -238,29 +241,35 @@ Result<SolveSettings> SolveLoop::applySettings(const SolveSettings& settings) {
     return tl::unexpected<Error>(kept.error());
   }
   settings_ = settings;
-  if (!lit_) {  // they wait for a scene
-    updateStatus(true);
-    return settings_;
+  if (!fitsMemory([&] { takeSettings(before, resized, anew); })) {
+    unpublished_ = true;
+    log::warn("out of memory: settings are told of later");
   }
+  return settings_;
+}
+
+/// They are kept: nothing can be refused any more.
+void SolveLoop::takeSettings(const SolveSettings& before, bool resized, bool anew) {
+  if (!lit_) return updateStatus(true);  // they wait for a scene
   if (resized) {
     beginSolve();
     listeners_.tell([this](Listener& listener) { listener.onSceneLoaded(revision_); });
-    publishLightmaps(false);
-  } else if (anew) {
-    lit_->restart(settings);
-    beginSolve();
-  } else {
-    lit_->retarget(settings);
-    if (before.sky != settings.sky && lit_->setSky(settings)) {
-      takeInLight();
-      beginSolve();
-      publishLightmaps(false);
-    } else {
-      reconsiderStop();
-      updateStatus(true);
-    }
+    return publishLightmaps(false);
   }
-  return settings_;
+  if (anew) {
+    lit_->invalidate();
+    (void)fitsMemory([&] { lit_->restart(settings_); });
+    return beginSolve();
+  }
+  lit_->retarget(settings_);
+  bool other_light = before.sky != settings_.sky;
+  if (other_light && !takeInLight([&] { return other_light = lit_->setSky(settings_); })) other_light = true;
+  if (other_light) {
+    beginSolve();
+    return publishLightmaps(false);
+  }
+  reconsiderStop();
+  updateStatus(true);
 }
 
 void SolveLoop::reconsiderStop() {
@@ -279,7 +288,7 @@ void SolveLoop::reconsiderStop() {
 }
 
 void SolveLoop::pause(Callback<SolveState> done) {
-  ask<SolveState>(std::move(done), [this]() -> Result<SolveState> {
+  askToChange<SolveState>(std::move(done), [this]() -> Result<SolveState> {
     if (state_ == SolveState::kSolving) state_ = SolveState::kPaused;
     updateStatus(true);
     return state_;
@@ -287,7 +296,7 @@ void SolveLoop::pause(Callback<SolveState> done) {
 }
 
 void SolveLoop::resume(Callback<SolveState> done) {
-  ask<SolveState>(std::move(done), [this]() -> Result<SolveState> {
+  askToChange<SolveState>(std::move(done), [this]() -> Result<SolveState> {
     if (state_ == SolveState::kPaused) state_ = SolveState::kSolving;
     updateStatus(true);
     return state_;
@@ -295,7 +304,8 @@ void SolveLoop::resume(Callback<SolveState> done) {
 }
 
 void SolveLoop::restart(Callback<SolveState> done) {
-  askLit<SolveState>(std::move(done), [this]() -> Result<SolveState> {
+  askToChange<SolveState>(std::move(done), [this]() -> Result<SolveState> {
+    if (!lit_) return noScene();
     lit_->restart(settings_);
     state_ = SolveState::kSolving;
     beginSolve();

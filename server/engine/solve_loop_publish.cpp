@@ -2,26 +2,21 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <ctime>
 #include <utility>
 
 #include "server/engine/quantity_pages.h"
 #include "server/engine/solve_loop_class.h"
+#include "server/engine/thread_time.h"
 
 namespace radiosity::engine {
 namespace {
 
 /// Oftener than anyone can see a difference.
 constexpr auto kPublishInterval = std::chrono::milliseconds(50);
-/// Making pages takes no more than one part in so many of the solve thread's time, however large they are.
+/// Making pages takes no more than one part in so many of the solve thread's time, however large they are; ...
 constexpr int kPublishShare = 20;
-
-/// Processor time of this thread: on a busy machine pages are no more work than on a quiet one.
-std::chrono::nanoseconds threadTime() {
-  timespec now{};
-  (void)clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return std::chrono::seconds(now.tv_sec) + std::chrono::nanoseconds(now.tv_nsec);
-}
+/// ... but while a solve is young, and every version shows much that is new, up to one part in so many.
+constexpr int kEarlyShare = 4;
 
 constexpr std::array kQuantities = {Quantity::kIrradiance, Quantity::kRadiosity, Quantity::kError, Quantity::kPatchId,
                                     Quantity::kMipLevel,   Quantity::kUnshot,    Quantity::kNormal};
@@ -41,7 +36,14 @@ void SolveLoop::publishLightmaps(bool final) {
   unpublished_ = false;
   updateStatus(false);
   for (const auto quantity : kQuantities) publishQuantity(quantity);
-  next_publish_ = Clock::now() + std::max<Clock::duration>(kPublishInterval, kPublishShare * (threadTime() - begin));
+  next_publish_ = Clock::now() + publishPause(threadTime() - begin);
+}
+
+/// After pages that took so long: never longer than the solve is old, where that leaves it most of its time.
+auto SolveLoop::publishPause(Clock::duration took) const -> Clock::duration {
+  const auto age = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds_));
+  const Clock::duration pause = std::min(kPublishShare * took, std::max(kEarlyShare * took, age));
+  return std::max<Clock::duration>(kPublishInterval, pause);
 }
 
 QuantityPages SolveLoop::pagesToShow(Quantity quantity) {

@@ -179,7 +179,7 @@ Result<std::unique_ptr<LitScene>> SolveLoop::resumedScene(const scene::Document&
     if (change.geometry)
       return fail(ErrorCode::kBadInput, fmt::format("it is of revision {}, whose geometry is not that of revision {}",
                                                     head.revision, revision_));
-    (void)(*lit)->reshade({document, std::move(*scene)}, change);
+    (*lit)->reshade(document, std::make_shared<const scene::Scene>(std::move(*scene)), change);
   }
   if (settings_.target_error != head.target_error) (*lit)->retarget(settings_);
   seconds_ = is_newest ? head.seconds : 0.0;
@@ -192,7 +192,7 @@ bool SolveLoop::goesOnWith(const scene::Document& document, bool with_edits) con
 }
 
 void SolveLoop::openFile(std::string path, Callback<LoadOutcome> done) {
-  ask<LoadOutcome>(countLoad(std::move(done)), [this, path = std::move(path)]() -> Result<LoadOutcome> {
+  load(std::move(done), [this, path = std::move(path)]() -> LoadBegun {
     auto document = scene::loadDocument(path);
     if (document && goesOnWith(*document, true)) return LoadOutcome{revision_, lit_->warnings()};
     if (document && as_restored_)

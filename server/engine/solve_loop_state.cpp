@@ -56,7 +56,7 @@ SolveLoop::Keep SolveLoop::keepEdit(const History::Next& next, const Receipt& re
                                     outcome.affected_surfaces, outcome.affected_shots, stepped};
     const auto kept = options_.store->edit(change);
     if (!kept) return refused(kept.error());
-    kept_answer_ = change.answer;
+    kept_answer_ = std::move(change.answer);  // no copy: nothing may fail any more
     as_restored_ = false;
     // Not in the middle of a drag where checkpoints are work.
     if (checkpoints_ && checkpoints_->counters().seconds < kSmallCheckpointSeconds)
@@ -90,7 +90,7 @@ Result<void> SolveLoop::keepSettings(const SolveSettings& settings) {
 // ---- checkpoints ----
 
 void SolveLoop::checkpointIfDue() {
-  if (!checkpoints_ || !lit_ || Clock::now() < next_checkpoint_) return;
+  if (!checkpoints_ || !lit_ || first_light_ || Clock::now() < next_checkpoint_) return;
   if (checkpoint_revision_ == revision_ && checkpoint_shots_ == lit_->solver().shots()) return;
   // At its end the solve sleeps: that checkpoint takes the place of one that still waits.
   if (state_ == SolveState::kSolving && checkpoints_->isBusy()) return;
@@ -105,7 +105,7 @@ void SolveLoop::checkpointIfDue() {
 /// True: nothing is left to be done about it now, be it that none can be had.
 bool SolveLoop::takeCheckpoint() {
   // What a failed solver has measured may be a part of what it thinks it has: the checkpoint before stays.
-  if (renderer_lost_ || state_ == SolveState::kFailed) return true;
+  if (renderer_lost_ || state_ == SolveState::kFailed || lit_->isStale()) return true;
   if (!lit_->isReproducible()) {  // after a restart the solve of a scene whose geometry was edited begins anew
     checkpoint_revision_ = revision_;
     checkpoint_shots_ = lit_->solver().shots();

@@ -17,8 +17,11 @@ using protocol::RpcError;
 /// Together they are no longer than a message may be: what does not fit is answered by an error in its place.
 class Calls::Answers {
  public:
-  Answers(std::weak_ptr<Peer> peer, bool batch, std::size_t expected)
-      : peer_(std::move(peer)), batch_(batch), open_(expected) {}
+  Answers(std::weak_ptr<Peer> peer, std::shared_ptr<const int> awaited, bool batch, std::size_t expected)
+      : peer_(std::move(peer)), awaited_(std::move(awaited)), batch_(batch), open_(expected) {}
+  ~Answers() = default;
+  Answers(const Answers&) = delete;
+  Answers& operator=(const Answers&) = delete;
 
   void add(const protocol::RequestId& id, std::string text) {
     std::string whole;
@@ -29,10 +32,14 @@ class Calls::Answers {
             id, {RpcCode::kTooLarge, "the answers of this batch are over 1 MiB together; ask one by one"});
       bytes_ += text.size();
       if (!text.empty()) texts_.push_back(std::move(text));
-      if (--open_ > 0 || texts_.empty()) return;
-      whole = batch_ ? protocol::encodeBatch(texts_) : std::move(texts_.front());
+      if (--open_ > 0) return;
+      awaited_.reset();
+      if (!texts_.empty()) whole = batch_ ? protocol::encodeBatch(texts_) : std::move(texts_.front());
     }
-    if (const auto peer = peer_.lock()) peer->sendText(std::make_shared<const std::string>(std::move(whole)));
+    const auto peer = peer_.lock();
+    if (!peer) return;
+    if (!whole.empty()) peer->sendText(std::make_shared<const std::string>(std::move(whole)));
+    peer->answered();
   }
 
  private:
@@ -40,6 +47,7 @@ class Calls::Answers {
   static constexpr std::size_t kRoom = protocol::kMaxMessageBytes - protocol::kMaxBatch * 512;
 
   std::weak_ptr<Peer> peer_;
+  std::shared_ptr<const int> awaited_;  ///< Calls counts those who have it
   bool batch_;
   std::mutex mutex_;
   std::size_t open_, bytes_ = 0;
@@ -79,7 +87,7 @@ Calls::Calls(Hub& hub, std::weak_ptr<Peer> peer, TileLane& tiles, bool authentic
 
 void Calls::handle(std::string_view text) {
   const auto message = protocol::parseRpc(text, protocol::kMaxMessageBytes);
-  const auto answers = std::make_shared<Answers>(peer_, message.batch, message.items.size());
+  const auto answers = std::make_shared<Answers>(peer_, awaited_, message.batch, message.items.size());
   for (const auto& item : message.items) {
     ++hub_.counters().calls;
     in_flight_->fetch_add(1);
@@ -287,13 +295,17 @@ void Calls::run(const protocol::CreditCall& call, const Slot& slot) {
 }
 
 void Calls::run(const protocol::SnapshotCall& call, const Slot& slot) {
-  engine::SnapshotRequest request{call.camera, call.width, call.height, call.quantity};
-  hub_.engine().snapshot(
-      std::move(request), hub_.fromEngine<SharedBytes>([slot, hub = &hub_](const Result<SharedBytes>& png) {
-        if (!png) return slot.fail(png);
-        slot.reply(
-            protocol::SnapshotReply{fmt::format("/snapshots/{}.png", hub->snapshots().put("snapshot.png", *png).id)});
-      }));
+  engine::SnapshotRequest request{call.camera, call.width, call.height, call.quantity, call.exposure};
+  hub_.engine().snapshot(std::move(request),
+                         hub_.fromEngine<engine::Snapshot>([slot, hub = &hub_](const Result<engine::Snapshot>& made) {
+                           if (!made) {
+                             auto error = protocol::toRpcError(made.error());
+                             if (made.error().code == ErrorCode::kBadUsage) error.pointer = "/params/" + error.pointer;
+                             return slot.error(error);
+                           }
+                           const auto id = hub->snapshots().put("snapshot.png", made->png).id;
+                           slot.reply(protocol::SnapshotReply{fmt::format("/snapshots/{}.png", id), made->exposure});
+                         }));
 }
 
 void Calls::run(const protocol::ViewersCall& /*call*/, const Slot& slot) {

@@ -29,6 +29,7 @@ class Peer : public Viewer {
   /// From any thread, in order with sendText(): what the client missed while it was away.
   virtual void sendMissed(std::vector<SharedText> texts) = 0;
   virtual void greeted() = 0;      ///< hello was accepted
+  virtual void answered() = 0;     ///< from any thread: all that came in one frame is answered
   virtual void tilesWanted() = 0;  ///< there is more credit
   virtual void subscribed() = 0;   ///< TileLane::subscribe was called
   virtual void closeAfterWrites(protocol::CloseCode code, std::string reason) = 0;
@@ -41,6 +42,8 @@ class Calls {
 
   /// One text frame.
   void handle(std::string_view text);
+  /// Whether an answer is still to come; Peer::answered() says when to ask again.
+  [[nodiscard]] bool answersAwaited() const { return awaited_.use_count() > 1; }
 
  private:
   class Answers;
@@ -78,6 +81,7 @@ class Calls {
   std::string client_;
   double camera_calls_ = protocol::kCameraCallsPerSecond;  ///< that may be made now; they come back with time
   std::chrono::steady_clock::time_point camera_calls_at_ = std::chrono::steady_clock::now();
+  std::shared_ptr<const int> awaited_ = std::make_shared<const int>(0);  ///< shared by what collects answers
   std::shared_ptr<std::atomic<std::size_t>> in_flight_ = std::make_shared<std::atomic<std::size_t>>(0);
 };
 

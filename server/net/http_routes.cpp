@@ -52,6 +52,17 @@ Result<int> queryInt(const HttpRequest& request, const char* key, int otherwise,
   return value;
 }
 
+Result<std::optional<double>> queryExposure(const HttpRequest& request) {
+  const auto found = request.query.find("exposure");
+  if (found == request.query.end()) return std::nullopt;
+  double value = 0.0;
+  const auto& text = found->second;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !(value > 0.0 && value <= protocol::kMaxExposure))
+    return fail(ErrorCode::kBadInput, fmt::format("must be a number in (0, {}]", protocol::kMaxExposure), "?exposure=");
+  return value;
+}
+
 std::string queryText(const HttpRequest& request, const char* key, std::string otherwise) {
   const auto found = request.query.find(key);
   return found == request.query.end() ? std::move(otherwise) : found->second.substr(0, protocol::kMaxTextBytes);
@@ -134,8 +145,16 @@ void getSnapshot(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Re
   const auto width = queryInt(request, "width", 960, 1, protocol::kMaxSnapshotSide);
   const auto height = queryInt(request, "height", 720, 1, protocol::kMaxSnapshotSide);
   if (!width || !height) return done(errorResponse(width ? height.error() : width.error()));
-  hub->engine().snapshot({queryText(request, "camera", ""), *width, *height, queryText(request, "quantity", "lit")},
-                         fileAnswer(*hub, done, "image/png"));
+  const auto exposure = queryExposure(request);
+  if (!exposure) return done(errorResponse(exposure.error()));
+  hub->engine().snapshot(
+      {queryText(request, "camera", ""), *width, *height, queryText(request, "quantity", "lit"), *exposure},
+      hub->fromEngine<engine::Snapshot>([done](Result<engine::Snapshot> made) {
+        if (made) return done(file(std::move(made->png), "image/png"));
+        auto error = made.error();
+        if (error.code == ErrorCode::kBadUsage) error.where = fmt::format("?{}=", error.where);
+        done(errorResponse(error));
+      }));
 }
 
 void getStoredSnapshot(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond& done) {

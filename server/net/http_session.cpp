@@ -180,6 +180,9 @@ bool HttpSession::refuseEarly() {
     send(std::move(response), !no_body);
     return true;
   };
+  const auto hosts = parser_->get().count(http::field::host);
+  if (hosts > 1 || (hosts == 0 && parser_->get().version() >= 11))  // RFC 9112 section 3.2: whom it is for is not clear
+    return refuse(errorResponse(400, "badInput", "a request of HTTP/1.1 needs one Host"));
   if (!hostAllowed(field(http::field::host), options))
     return refuse(errorResponse(403, "forbidden",
                                 "this name is not served (Host); use localhost or an IP address, or --allow-origin"));
@@ -299,6 +302,7 @@ void HttpSession::prepare(bool close) {
     m.set(http::field::vary, "Origin");
     m.set(http::field::access_control_allow_methods, "GET, HEAD, PUT, OPTIONS");
     m.set(http::field::access_control_allow_headers, "Authorization, Content-Type, X-Name");
+    m.set(http::field::access_control_expose_headers, "Location, Retry-After, X-Revision");
   }
   for (const auto& [name, value] : response_.headers) m.set(name, value);
 }

@@ -101,6 +101,7 @@ void networkMetrics(Text& text, Hub& hub) {
   text.counter("text_messages_sent_total", "WebSocket text messages.", c.text_messages_sent.load());
   text.counter("text_sent_bytes_total", "Bytes of WebSocket text messages.", c.text_bytes_sent.load());
   text.counter("tiles_encoded_total", "Tiles encoded; a tile is encoded once for all sessions.", hub.tiles().encoded());
+  text.gauge("tile_cache_bytes", "Encoded tiles kept for whoever wants the same.", hub.tiles().bytes());
   text.counter("tiles_sent_total", "Tiles sent.", c.tiles_sent.load());
   text.counter("tiles_sent_bytes_total", "Bytes of tile frames.", c.tile_bytes_sent.load());
   text.family("sessions_closed_total", "counter", "WebSocket sessions closed by the server.");

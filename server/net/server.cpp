@@ -112,7 +112,8 @@ void Server::State::serve(TcpStream stream, ConnectionSlot slot) {
 
 void Server::State::accept() {
   acceptor_.async_accept(asio::make_strand(context_), [this](BoostError error, auto socket) {
-    if (error == asio::error::operation_aborted) return;
+    // Closed by the drain, perhaps while this waited its turn with a connection.
+    if (error == asio::error::operation_aborted || !acceptor_.is_open()) return;
     if (!error) {
       ++hub_->counters().connections;
       const ConnectionSlot slot(nullptr, [hub = hub_](void*) { --hub->counters().connections; });

@@ -7,6 +7,11 @@
 namespace radiosity::net {
 namespace {
 
+/// What an entry takes beside its pixels, in the map and in the queue. Tiles of one colour are a few dozen bytes.
+constexpr std::size_t kEntryBytes = 256;
+
+std::size_t costOf(const TileCache::Pixels& pixels) { return pixels->payload.size() + kEntryBytes; }
+
 protocol::Region regionOf(glm::ivec2 size, std::uint32_t tile) {
   const int side = static_cast<int>(protocol::kTileSide);
   const int across = (size.x + side - 1) / side;
@@ -43,10 +48,10 @@ Result<TileCache::Pixels> TileCache::get(const Key& key, const engine::PageSnaps
   const auto [place, inserted] = tiles_.emplace(key, pixels);
   if (!inserted) return place->second;
   order_.push_back(key);
-  bytes_ += pixels->payload.size();
+  bytes_ += costOf(pixels);
   while (bytes_ > max_bytes_ && order_.size() > 1) {
     const auto oldest = tiles_.find(order_.front());
-    bytes_ -= oldest->second->payload.size();
+    bytes_ -= costOf(oldest->second);
     tiles_.erase(oldest);
     order_.pop_front();
   }

@@ -34,13 +34,15 @@ class TileCache {
   [[nodiscard]] Result<Pixels> get(const Key& key, const engine::PageSnapshot& page);
 
   [[nodiscard]] std::uint64_t encoded() const { return encoded_.load(); }
+  /// What is kept, and what keeping it takes.
+  [[nodiscard]] std::size_t bytes() const { return bytes_.load(); }
 
  private:
   std::size_t max_bytes_;
   std::mutex mutex_;
   std::map<Key, Pixels> tiles_;
   std::deque<Key> order_;
-  std::size_t bytes_ = 0;
+  std::atomic<std::size_t> bytes_{0};
   std::atomic<std::uint64_t> encoded_{0};
 };
 

@@ -78,6 +78,8 @@ Result<std::shared_ptr<TlsContext>> loadTls(const std::filesystem::path& certifi
   SSL_CTX_set_min_proto_version(native, TLS1_2_VERSION);
   // Renegotiation is of no use here and lets a peer make the server work for nothing; neither is compression.
   SSL_CTX_set_options(native, SSL_OP_NO_RENEGOTIATION | SSL_OP_NO_COMPRESSION | SSL_OP_CIPHER_SERVER_PREFERENCE);
+  // Who comes again brings a ticket. What is kept of those who do not (20,480 of them) would only take memory.
+  SSL_CTX_set_session_cache_mode(native, SSL_SESS_CACHE_OFF);
   if (auto used = useCertificate(context, certificate); !used) return tl::unexpected(std::move(used.error()));
   if (auto used = useKey(context, key); !used) return tl::unexpected(std::move(used.error()));
   if (SSL_CTX_check_private_key(native) != 1)

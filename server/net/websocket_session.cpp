@@ -1,5 +1,6 @@
 #include "server/net/websocket_session.h"
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <boost/asio/post.hpp>
@@ -25,6 +26,8 @@ namespace websocket = boost::beast::websocket;
 using Clock = std::chrono::steady_clock;
 using protocol::CloseCode;
 
+constexpr double kLongestPauseSeconds = 1e9;  ///< between two versions, at the lowest rate; a clock counts further
+constexpr const char* kDrainReason = "the server is shutting down";
 constexpr int kSendBufferBytes = 512 * 1024;  ///< more would only make tiles older before they arrive
 
 class WebSocketSession final : public Peer, public Connection, public std::enable_shared_from_this<WebSocketSession> {
@@ -48,6 +51,7 @@ class WebSocketSession final : public Peer, public Connection, public std::enabl
   void drain() override;
 
   void forget(Timer timer) override;
+  void answered() override;
 
   // On the strand.
   Timer later(std::chrono::milliseconds delay, std::function<void()> task) override {
@@ -83,6 +87,7 @@ class WebSocketSession final : public Peer, public Connection, public std::enabl
   beast::flat_buffer buffer_;
   TileLane tiles_;
   std::optional<Calls> calls_;
+  bool accepted_ = false;  ///< the upgrade is answered: frames may be written
   bool greeted_ = false;
 
   struct Waiting {
@@ -102,7 +107,7 @@ class WebSocketSession final : public Peer, public Connection, public std::enabl
 
   std::shared_ptr<void> watching_;  ///< keeps the quantity subscribed to coming
   std::atomic<bool> lightmaps_posted_{false}, cameras_posted_{false};
-  bool adoption_timed_ = false;
+  std::optional<Timer> adoption_;  ///< of newer lightmaps, once the rate asked for allows it
   Clock::time_point next_adoption_, next_cameras_;
 };
 
@@ -135,10 +140,12 @@ void WebSocketSession::start(Upgrade upgrade, bool authenticated) {
   hub_->add(weak_from_this());
   configure();
   ws_.async_accept(upgrade_, [self = shared_from_this()](BoostError error) { self->onAccepted(error); });
+  if (hub_->draining()) drain();  // it may have begun after the request was read, and before this was added
 }
 
 void WebSocketSession::onAccepted(BoostError error) {
   if (error) return cut();
+  accepted_ = true;
   upgrade_ = {};
   enqueue(std::make_shared<const std::string>(protocol::encodeNotification(hub_->serverInfo())));
   (void)later(hub_->options().hello_timeout, [this] {
@@ -207,13 +214,21 @@ void WebSocketSession::camerasChanged() {
   });
 }
 
-/// A peer that does not read would hold the server up for as long as a write may take; what the system has taken of our
+/// Answers that are under way, of edits say, go before the end: for half of the time, since the rest is for closing. A
+/// peer that does not read would hold the server up for as long as a write may take; what the system has taken of our
 /// bytes still reaches it after the socket is closed.
 void WebSocketSession::drain() {
   onStrand([](WebSocketSession& s) {
-    if (!std::exchange(s.draining_, true)) s.cutAfter(s.hub_->options().drain_patience);
-    s.closeAfterWrites(CloseCode::kGoingAway, "the server is shutting down");
+    if (std::exchange(s.draining_, true)) return;
+    const auto patience = s.hub_->options().drain_patience;
+    s.cutAfter(patience);
+    (void)s.later(patience / 2, [&s] { s.closeAfterWrites(CloseCode::kGoingAway, kDrainReason); });
+    s.pump();
   });
+}
+
+void WebSocketSession::answered() {
+  if (hub_->draining()) onStrand([](WebSocketSession& s) { s.pump(); });
 }
 
 void WebSocketSession::forget(Timer timer) {
@@ -244,6 +259,7 @@ void WebSocketSession::enqueue(SharedText text, bool counts) {
 void WebSocketSession::subscribed() {
   watching_ = hub_->watch(toQuantity(tiles_.quantity()));
   next_adoption_ = {};
+  if (adoption_) timers_.cancel(*std::exchange(adoption_, std::nullopt));  // its time is that of the rate before
   lightmapsChanged();
 }
 
@@ -251,18 +267,19 @@ void WebSocketSession::adoptLightmaps() {
   lightmaps_posted_ = false;
   if (!tiles_.subscribed() || closing_) return;
   const auto now = Clock::now();
-  if (tiles_.maxHz() > 0.0 && now < next_adoption_) {
-    if (std::exchange(adoption_timed_, true)) return;
+  if (now < next_adoption_) {
+    if (adoption_) return;
     const auto wait = std::chrono::ceil<std::chrono::milliseconds>(next_adoption_ - now);
-    (void)later(wait, [this] {
-      adoption_timed_ = false;
+    adoption_ = later(wait, [this] {
+      adoption_.reset();
       adoptLightmaps();
     });
     return;
   }
-  if (tiles_.maxHz() > 0.0)
-    next_adoption_ =
-        now + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / tiles_.maxHz()));
+  if (tiles_.maxHz() > 0.0) {
+    const std::chrono::duration<double> pause(std::min(1.0 / tiles_.maxHz(), kLongestPauseSeconds));
+    next_adoption_ = now + std::chrono::duration_cast<Clock::duration>(pause);
+  }
   const auto lightmaps = hub_->lightmaps(toQuantity(tiles_.quantity()));
   if (tiles_.setLightmaps(lightmaps))
     enqueue(std::make_shared<const std::string>(protocol::encodeNotification(toLightmapsNote(*lightmaps))));
@@ -277,7 +294,7 @@ void WebSocketSession::tellCameras() {
 }
 
 void WebSocketSession::pump() {
-  if (writing_ || closing_) return;
+  if (!accepted_ || writing_ || closing_) return;
   if (!control_.empty()) {
     auto [text, counts] = std::move(control_.front());
     control_.pop_front();
@@ -288,6 +305,7 @@ void WebSocketSession::pump() {
     return writeText(std::move(text));
   }
   if (close_when_written_) return close(close_when_written_->first, close_when_written_->second);
+  if (draining_ && !calls_->answersAwaited()) return close(CloseCode::kGoingAway, kDrainReason);
   if (!greeted_) return;
   if (progress_) return writeText(std::exchange(progress_, nullptr));
   if (cameras_) return writeText(std::exchange(cameras_, nullptr));

@@ -1,6 +1,9 @@
 #include "server/state/blobs.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <span>
 
 #include "common/log.h"
 #include "common/sha256.h"
@@ -59,9 +62,9 @@ Result<void> Blobs::putAs(const std::string& id, const SharedBytes& bytes) {
     const std::scoped_lock lock(mutex_);
     held_.insert(id);
   }
-  std::error_code error;
-  if (fs::file_size(folder_ / id, error) != bytes->size() || error) {
-    if (auto written = writeWhole(folder_ / id, *bytes); !written) {
+  if (!isKept(folder_ / id, *bytes)) {  // also where the disk has damaged what was there
+    const std::span<const std::uint8_t> whole(*bytes);
+    if (auto written = writeWhole(folder_ / id, std::span(&whole, 1), fmt::format(".{}", ++writes_)); !written) {
       release(id);
       return written;
     }
@@ -102,7 +105,7 @@ void Blobs::sweep(const std::set<std::string>& wanted) {
   for (const auto& entry : fs::directory_iterator(folder_, error)) {
     const auto name = entry.path().filename().string();
     const bool ours = isBlobId(name) || (name.starts_with('.') && name.ends_with(".new"));
-    const auto id = name.starts_with('.') ? name.substr(1, name.size() - 5) : name;
+    const auto id = name.starts_with('.') ? name.substr(1, name.find('.', 1) - 1) : name;
     if (!ours || wanted.contains(name) || held_.contains(id)) continue;
     std::erase_if(known_, [&](const auto& known) { return known.second.id == name; });
     std::error_code ignored;

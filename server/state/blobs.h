@@ -2,6 +2,8 @@
 // damage is noticed when they are read. Thread-safe.
 #pragma once
 
+#include <atomic>
+#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -41,7 +43,8 @@ class Blobs {
   void remember(const SharedBytes& bytes, const std::string& id, bool written);
 
   std::filesystem::path folder_;
-  std::mutex mutex_;  ///< everything below
+  std::atomic<std::uint64_t> writes_{0};  ///< an upload and a scene may bring the same bytes at a time
+  std::mutex mutex_;                      ///< everything below
   struct Known {
     std::weak_ptr<const Bytes> bytes;
     std::string id;

@@ -105,11 +105,20 @@ Result<void> Database::run(const std::string& sql, std::span<const Value> values
 
 Result<void> Database::atomically(const std::function<Result<void>()>& work) {
   if (auto begun = run("BEGIN IMMEDIATE"); !begun) return begun;
-  auto done = work();
-  if (done) done = run("COMMIT");
-  // A failed COMMIT may have rolled back by itself already; then this says so, and is right.
-  if (!done && sqlite3_get_autocommit(handle_.get()) == 0) (void)run("ROLLBACK");
-  return done;
+  // A failed COMMIT may have rolled back by itself already. Needs no memory of ours: there may be none.
+  const auto rollBack = [this] {
+    if (sqlite3_get_autocommit(handle_.get()) == 0)
+      (void)sqlite3_exec(handle_.get(), "ROLLBACK", nullptr, nullptr, nullptr);
+  };
+  try {
+    auto done = work();
+    if (done) done = run("COMMIT");
+    if (!done) rollBack();
+    return done;
+  } catch (...) {
+    rollBack();
+    throw;
+  }
 }
 
 Result<void> Database::checkPages() {

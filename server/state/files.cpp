@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <charconv>
@@ -24,6 +25,7 @@ using namespace std::chrono_literals;
 
 constexpr auto kLockPatience = 1s;
 constexpr std::size_t kNoteBytes = 24;
+constexpr std::size_t kCompareBytes = std::size_t{256} << 10;
 
 class Descriptor {
  public:
@@ -84,9 +86,10 @@ Result<void> writeWhole(const fs::path& file, std::span<const std::uint8_t> byte
   return writeWhole(file, std::span(&bytes, 1));
 }
 
-Result<void> writeWhole(const fs::path& file, std::span<const std::span<const std::uint8_t>> parts) {
-  const fs::path beside = file.parent_path() / ("." + file.filename().string() + ".new");
-  const auto written = [&]() -> Result<void> {
+Result<void> writeWhole(const fs::path& file, std::span<const std::span<const std::uint8_t>> parts,
+                        const std::string& mark) {
+  const fs::path beside = file.parent_path() / ("." + file.filename().string() + mark + ".new");
+  auto written = [&]() -> Result<void> {
     const Descriptor opened(open(beside.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
     if (opened.get() < 0) return failErrno("cannot be made", beside, errno);
     for (const auto part : parts) {
@@ -101,6 +104,22 @@ Result<void> writeWhole(const fs::path& file, std::span<const std::span<const st
     return written;
   }
   return syncFolder(file.parent_path());
+}
+
+bool isKept(const fs::path& file, std::span<const std::uint8_t> bytes) {
+  const Descriptor opened(open(file.c_str(), O_RDONLY | O_CLOEXEC));
+  struct stat about {};
+  if (opened.get() < 0 || fstat(opened.get(), &about) != 0 || static_cast<std::uint64_t>(about.st_size) != bytes.size())
+    return false;
+  Bytes part(std::min(bytes.size(), kCompareBytes));
+  while (!bytes.empty()) {
+    const ssize_t count = read(opened.get(), part.data(), std::min(part.size(), bytes.size()));
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0 || std::memcmp(part.data(), bytes.data(), static_cast<std::size_t>(count)) != 0) return false;
+    bytes = bytes.subspan(static_cast<std::size_t>(count));
+  }
+  // Whoever wrote it may have been killed just before it did this.
+  return fsync(opened.get()) == 0 && syncFolder(file.parent_path()).has_value();
 }
 
 Result<FolderLock> FolderLock::take(const fs::path& folder) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <span>
+#include <string>
 
 #include "common/bytes.h"
 #include "common/result.h"
@@ -15,9 +16,13 @@ namespace radiosity::state {
 
 /// Written beside, on the disk, then renamed; the folder's entry is on the disk too. What was there stays on an error.
 [[nodiscard]] Result<void> writeWhole(const std::filesystem::path& file, std::span<const std::uint8_t> bytes);
-/// The same, one part after the other.
+/// The same, one part after the other. What is written beside it bears `mark`: threads that may write the same file at
+/// a time have one each.
 [[nodiscard]] Result<void> writeWhole(const std::filesystem::path& file,
-                                      std::span<const std::span<const std::uint8_t>> parts);
+                                      std::span<const std::span<const std::uint8_t>> parts,
+                                      const std::string& mark = {});
+/// Whether the file is there, holds just these bytes, and will after the power has failed. Cost: reading it.
+[[nodiscard]] bool isKept(const std::filesystem::path& file, std::span<const std::uint8_t> bytes);
 
 /// A folder that exists and is ours alone until this is destroyed: a lock on its file `lock`. The file also holds the
 /// last revision that was acknowledged, so that a log cut short is noticed.

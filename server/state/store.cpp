@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <new>
 #include <set>
 #include <string_view>
 #include <utility>
@@ -147,6 +148,7 @@ Result<void> Store::forgetOld(std::uint64_t newest) {
 
 Result<void> Store::load(const Revision& revision, const Document& document, const std::string& digest) {
   const std::scoped_lock lock(mutex_);
+  auto new_digest = digest;  // after it is kept nothing may fail
   auto kept = database_.atomically([&]() -> Result<void> {
     for (const auto* table : {"revisions", "edits"}) {
       if (auto gone = database_.run(fmt::format("DELETE FROM {}", table)); !gone) return gone;
@@ -157,7 +159,7 @@ Result<void> Store::load(const Revision& revision, const Document& document, con
   });
   if (!kept) return kept;
   lock_.noteRevision(revision.revision);
-  digest_ = digest;
+  digest_ = std::move(new_digest);
   document_revision_ = revision.revision;
   since_document_ = patch_bytes_ = 0;
   sweepBlobs();
@@ -192,6 +194,7 @@ Result<void> Store::edit(const Change& change) {
   if (change.document) {
     document_revision_ = newest;
     since_document_ = patch_bytes_ = 0;
+    sweepBlobs();  // now and then, so that what forgotten edits had appended does not add up until the next start
   }
   return {};
 }
@@ -235,7 +238,16 @@ void Store::foldLog() {
 }
 
 /// Best effort: what is left over takes room and nothing else.
+/// What memory does not suffice for is swept some other time.
 void Store::sweepBlobs() {
+  try {
+    sweepUnwanted();
+  } catch (const std::bad_alloc&) {
+    return;
+  }
+}
+
+void Store::sweepUnwanted() {
   std::set<std::string> wanted;
   constexpr std::array kNames = {"SELECT buffers || ',' || images FROM scene",
                                  "SELECT buffers || ',' || images FROM revisions",

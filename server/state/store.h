@@ -144,6 +144,7 @@ class Store {
   [[nodiscard]] Result<std::string> putBlobs(const std::vector<SharedBytes>& blobs);
   [[nodiscard]] Result<std::vector<SharedBytes>> getBlobs(const std::string& ids);
   void sweepBlobs();
+  void sweepUnwanted();
 
   std::filesystem::path folder_;
   FolderLock lock_;

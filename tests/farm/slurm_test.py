@@ -101,10 +101,28 @@ class SlurmArray(unittest.TestCase):
         self.assertEqual(self.cluster.field(task, "ExitCode"), "3:0", self.log(1))
         self.assertTrue(list(self.out.glob("*-lit.glb")), self.log(1))
 
+
+class Script(unittest.TestCase):
+    """What needs no Slurm."""
+
+    def run_task(self, *arguments, **environment):
+        clean = {name: value for name, value in os.environ.items() if not name.startswith("SLURM_")}
+        return subprocess.run([SCRIPT, *arguments], capture_output=True, text=True, check=False, env={**clean, **environment})
+
     def test_usage_is_said(self):
-        done = subprocess.run([SCRIPT], capture_output=True, text=True, check=False)
+        done = self.run_task()
         self.assertEqual(done.returncode, 2)
         self.assertIn("usage: sbatch", done.stderr)
+
+    def test_the_number_of_workers_is_named_only_where_slurm_names_one(self):
+        with tempfile.TemporaryDirectory(prefix="radiosity-slurm-") as folder:
+            scenes = pathlib.Path(folder) / "scenes.txt"
+            scenes.write_text("a.glb\n")
+            for cpus, workers in (({"SLURM_CPUS_PER_TASK": "3"}, "--workers 3"), ({}, None)):
+                done = self.run_task(str(scenes), folder, "--error", "0.05", RADIOSITY="echo", SLURM_ARRAY_TASK_ID="1", **cpus)
+                self.assertEqual(done.returncode, 0, done.stderr)
+                self.assertIn(f"--state {folder}/state/a --error 0.05", done.stdout)
+                self.assertEqual(workers in done.stdout if workers else "--workers" not in done.stdout, True, done.stdout)
 
 
 if __name__ == "__main__":

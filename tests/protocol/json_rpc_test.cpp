@@ -7,6 +7,7 @@
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "protocol/codec.h"
 #include "protocol/limits.h"
@@ -95,6 +96,13 @@ TEST(JsonRpc, AMessageOverTheLimitIsNotParsed) {
   EXPECT_EQ(errorOf("\"" + std::string(kMaxMessageBytes, 'a') + "\"").code, RpcCode::kTooLarge);
 }
 
+TEST(JsonRpc, WhatIsWrongIsSaidInFewWordsHoweverLongTheToken) {
+  const auto error = errorOf("\"" + std::string(kMaxMessageBytes - 1, 'a'));
+  EXPECT_EQ(error.code, RpcCode::kParseError);
+  EXPECT_LT(error.message.size(), 400U);
+  EXPECT_NE(error.message.find("missing closing quote"), std::string::npos) << error.message;
+}
+
 TEST(JsonRpc, ErrorsKeepTheirPlaceAcrossTheWire) {
   const RpcError error{RpcCode::kInvalidScene, "no such \"texture\"", "/materials/3", 2, 17};
   const auto message = parse(encodeError("5", error));
@@ -107,6 +115,21 @@ TEST(JsonRpc, ErrorsKeepTheirPlaceAcrossTheWire) {
   EXPECT_EQ(response.error->revision, 17U);
   EXPECT_EQ(fromRpcError(error).code, ErrorCode::kInvalidScene);
   EXPECT_EQ(toRpcError({ErrorCode::kStaleRevision, "m", "w"}).code, RpcCode::kStaleRevision);
+}
+
+TEST(JsonRpc, EveryErrorOfTheServerHasItsCode) {
+  const std::pair<ErrorCode, RpcCode> codes[] = {{ErrorCode::kBadUsage, RpcCode::kInvalidParams},
+                                                 {ErrorCode::kBadInput, RpcCode::kInvalidScene},
+                                                 {ErrorCode::kInvalidScene, RpcCode::kInvalidScene},
+                                                 {ErrorCode::kUnsupported, RpcCode::kInvalidScene},
+                                                 {ErrorCode::kNotFound, RpcCode::kNotFound},
+                                                 {ErrorCode::kTooLarge, RpcCode::kTooLarge},
+                                                 {ErrorCode::kStaleRevision, RpcCode::kStaleRevision},
+                                                 {ErrorCode::kTestFailed, RpcCode::kTestFailed},
+                                                 {ErrorCode::kBusy, RpcCode::kRateLimited},
+                                                 {ErrorCode::kUnavailable, RpcCode::kUnavailable},
+                                                 {ErrorCode::kInternal, RpcCode::kInternalError}};
+  for (const auto& [ours, wire] : codes) EXPECT_EQ(toRpcError({ours, "what was wrong", {}}).code, wire);
 }
 
 TEST(Params, AnErrorNamesThePointerAndTheRange) {
@@ -122,6 +145,7 @@ TEST(Params, AnErrorNamesThePointerAndTheRange) {
   EXPECT_EQ(paramsError("subscribe", R"({"quantity":"beauty"})").pointer, "/params/quantity");
   EXPECT_EQ(paramsError("credit", R"({"bytes":-1})").pointer, "/params/bytes");
   EXPECT_EQ(paramsError("snapshot", R"({"width":100000})").pointer, "/params/width");
+  EXPECT_EQ(paramsError("snapshot", R"({"exposure":0})").message, "/params/exposure must be a number in (0, 1e+30]");
 }
 
 TEST(Params, APatchErrorNamesTheOperation) {

@@ -322,10 +322,14 @@ void FakeEngine::lightmapExr(std::uint32_t page, engine::Quantity quantity, Call
         bytesOf(quantity == engine::Quantity::kIrradiance ? "exr" : fmt::format("exr {}", static_cast<int>(quantity))));
   });
 }
-void FakeEngine::snapshot(engine::SnapshotRequest request, Callback<SharedBytes> done) {
+void FakeEngine::snapshot(engine::SnapshotRequest request, Callback<engine::Snapshot> done) {
   answer([done, request] {
+    if (request.quantity == "colour") return done(fail(ErrorCode::kBadUsage, "no quantity \"colour\"", "quantity"));
     if (request.camera == "nobody") return done(fail(ErrorCode::kNotFound, "there is no camera \"nobody\""));
-    done(bytesOf(fmt::format("png {}x{} {} {}", request.width, request.height, request.quantity, request.camera)));
+    const auto exposure = request.exposure.value_or(0.25);
+    done(engine::Snapshot{bytesOf(fmt::format("png {}x{} {} {} {}", request.width, request.height, request.quantity,
+                                              request.camera, exposure)),
+                          exposure});
   });
 }
 

@@ -43,6 +43,7 @@ class FakePeer : public net::Peer {
   }
   void forget(Timer timer) override { timers.erase(timer); }
   void greeted() override {}
+  void answered() override {}
   void tilesWanted() override {}
   void subscribed() override {}
   void closeAfterWrites(protocol::CloseCode /*code*/, std::string /*reason*/) override {}

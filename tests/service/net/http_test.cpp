@@ -42,8 +42,8 @@ TEST(Http, EveryRouteAnswersWithItsType) {
                 {"/scene.glb", "model/gltf-binary", "glTF scene"},
                 {"/scene-unlit.glb?x=1", "model/gltf-binary", "glTF unlit"},
                 {"/lightmaps/0.exr", "image/x-exr", "exr"},
-                {"/snapshot.png?camera=my%20desk&width=320&height=200&quantity=normal", "image/png",
-                 "png 320x200 normal my desk"},
+                {"/snapshot.png?camera=my%20desk&width=320&height=200&quantity=normal&exposure=4e3", "image/png",
+                 "png 320x200 normal my desk 4000"},
                 {"/healthz", "text/plain", "ok"},
                 {"/readyz", "text/plain", "ready"},
                 {"/metrics", "text/plain; version=0.0.4", "radiosityd_scene_revision"}};
@@ -59,6 +59,13 @@ TEST(Http, EveryRouteAnswersWithItsType) {
   }
 }
 
+TEST(Http, TheDocumentSaysItsRevision) {
+  RunningServer server;
+  EXPECT_EQ(request(server.port(), "GET", "/scene.gltf").header("X-Revision"), "0");
+  EXPECT_EQ(request(server.port(), "PUT", "/scene", {}, "scene").status, 200);
+  EXPECT_EQ(request(server.port(), "GET", "/scene.gltf").header("X-Revision"), "1");
+}
+
 TEST(Http, WhatIsNotThereIsSaidSoInJson) {
   RunningServer server;
   const auto missing = request(server.port(), "GET", "/nothing");
@@ -71,6 +78,33 @@ TEST(Http, WhatIsNotThereIsSaidSoInJson) {
   const auto bad = request(server.port(), "GET", "/snapshot.png?width=0");
   EXPECT_EQ(bad.status, 400);
   EXPECT_EQ(protocol::decodeHttpError(400, bad.body).where, "?width=");
+  for (const auto* exposure : {"0", "-1", "nan", "1e31", "1x", ""}) {
+    const auto wrong = request(server.port(), "GET", std::string("/snapshot.png?exposure=") + exposure);
+    EXPECT_EQ(wrong.status, 400) << exposure;
+    EXPECT_EQ(protocol::decodeHttpError(400, wrong.body).where, "?exposure=") << exposure;
+  }
+}
+
+TEST(Http, EveryErrorHasItsStatus) {
+  const std::pair<ErrorCode, int> statuses[] = {
+      {ErrorCode::kBadUsage, 400},      {ErrorCode::kBadInput, 400},   {ErrorCode::kInvalidScene, 400},
+      {ErrorCode::kUnsupported, 400},   {ErrorCode::kNotFound, 404},   {ErrorCode::kTooLarge, 413},
+      {ErrorCode::kStaleRevision, 409}, {ErrorCode::kTestFailed, 409}, {ErrorCode::kBusy, 503},
+      {ErrorCode::kUnavailable, 503},   {ErrorCode::kInternal, 500}};
+  for (const auto& [code, status] : statuses) {
+    const auto response = net::errorResponse({code, "what was wrong", "where"});
+    EXPECT_EQ(response.status, status);
+    const auto read = protocol::decodeHttpError(status, response.text);
+    EXPECT_EQ(read.code, code);
+    EXPECT_EQ(read.where, "where");
+    EXPECT_EQ(response.headers.empty(), status != 503) << "Retry-After";
+  }
+}
+
+TEST(Http, AnUploadSaysWhereItIs) {
+  RunningServer server;
+  const auto got = request(server.port(), "PUT", "/uploads", {}, "12345");
+  EXPECT_EQ(got.header("Location"), *protocol::decodeHttpUrl(got.body));
 }
 
 TEST(Http, AMethodThatIsNotAllowedNamesThoseThatAre) {
@@ -155,6 +189,9 @@ TEST(Http, AConnectionServesManyRequestsAlsoPipelined) {
 TEST(Http, WhatIsNotHttpIsAnsweredAndClosed) {
   RunningServer server;
   for (const std::string& text : {std::string("\x16\x03\x01\x02\x00\x01\r\n\r\n", 10), std::string("GET\r\n\r\n"),
+                                  std::string("GET /healthz HTTP/1.1\r\nConnection: close\r\n\r\n"),
+                                  std::string("GET /healthz HTTP/1.1\r\nHost: localhost\r\nHost: rebound.example\r\n"
+                                              "Connection: close\r\n\r\n"),
                                   std::string("GET /%zz HTTP/1.1\r\nHost: localhost\r\n\r\n"),
                                   "GET /" + std::string(20'000, 'a') + " HTTP/1.1\r\nHost: localhost\r\n\r\n"}) {
     RawHttp http(server.port());
@@ -180,6 +217,7 @@ TEST(Http, TheTokenGuardsAllButTheProbesAndTheViewer) {
   for (const auto* target : {"/status", "/scene.glb", "/metrics", "/nothing"})
     EXPECT_EQ(request(server.port(), "GET", target).status, 401) << target;
   EXPECT_EQ(request(server.port(), "PUT", "/scene", {}, "x").status, 401);
+  EXPECT_THAT(request(server.port(), "GET", "/status").header("WWW-Authenticate"), HasSubstr("Bearer"));
   EXPECT_EQ(request(server.port(), "GET", "/metrics", "Authorization: Bearer wrong\r\n").status, 401);
   EXPECT_EQ(request(server.port(), "GET", "/healthz").status, 200);
   EXPECT_EQ(request(server.port(), "GET", "/readyz").status, 200);
@@ -240,6 +278,12 @@ TEST(Http, APageOfAnotherSiteMayNotSendScenes) {
   const auto allowed = request(server.port(), "PUT", "/scene", "Origin: https://viewer.example.org\r\n", "x");
   EXPECT_EQ(allowed.status, 200);
   EXPECT_EQ(allowed.header("Access-Control-Allow-Origin"), "https://viewer.example.org");
+  const auto asked = request(server.port(), "OPTIONS", "/scene", "Origin: https://viewer.example.org\r\n");
+  EXPECT_EQ(asked.status, 204);
+  EXPECT_THAT(asked.header("Access-Control-Allow-Methods"), HasSubstr("PUT"));
+  EXPECT_THAT(asked.header("Access-Control-Allow-Headers"), HasSubstr("Authorization"));
+  EXPECT_THAT(asked.header("Access-Control-Expose-Headers"), HasSubstr("X-Revision"));
+  EXPECT_EQ(request(server.port(), "GET", "/healthz").header("Access-Control-Allow-Origin"), "");
 }
 
 TEST(Http, ANameThatWasMadeToPointHereIsNotServed) {
@@ -270,7 +314,9 @@ TEST(Http, TooManyConnectionsAreTurnedAway) {
   EXPECT_EQ(one.receive().status, 200);
   EXPECT_EQ(two.receive().status, 200);
   RawHttp three(server.port());
-  EXPECT_EQ(three.receive().status, 503);
+  const auto refused = three.receive();
+  EXPECT_EQ(refused.status, 503);
+  EXPECT_FALSE(refused.header("Retry-After").empty());
 }
 
 TEST(Http, MetricsAreWellFormed) {

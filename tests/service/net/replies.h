@@ -31,4 +31,15 @@ inline int closeCodeOf(TestSocket& socket) {
   return socket.closeCode();
 }
 
+/// Reads until the answer to this id has come; other messages are passed over.
+inline protocol::RpcResponse awaitAnswer(TestSocket& socket, const std::string& id) {
+  while (const auto message = socket.read()) {
+    if (message->binary) continue;
+    const auto parsed = protocol::parseRpc(message->text(), protocol::kMaxMessageBytes);
+    if (const auto* response = std::get_if<protocol::RpcResponse>(&parsed.items.at(0)); response && response->id == id)
+      return *response;
+  }
+  return {};
+}
+
 }  // namespace radiosity::testing

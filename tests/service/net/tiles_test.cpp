@@ -131,6 +131,41 @@ TEST(Tiles, NoMoreIsSentThanTheClientGaveCreditFor) {
   EXPECT_FALSE(socket.nextTile(Seconds(0.3)).has_value());
 }
 
+TEST(Tiles, ALowRateIsARateHoweverLow) {
+  RunningServer server;
+  server.engine.publish();
+  TestSocket socket(server.port());
+  socket.hello();
+  SubscribeCall call;
+  call.max_hz = 1e-300;
+  socket.call(call);
+  ASSERT_TRUE(socket.waitFor("bookmark").has_value());
+  socket.tiles.clear();
+  server.engine.publish();
+  EXPECT_FALSE(socket.nextTile(Seconds(0.3)).has_value());
+}
+
+TEST(Tiles, AHigherRateDoesNotWaitForTheTimeOfTheLowerOne) {
+  RunningServer server;
+  server.engine.publish();
+  TestSocket socket(server.port());
+  socket.hello();
+  SubscribeCall call;
+  call.max_hz = 0.001;
+  socket.call(call);
+  ASSERT_TRUE(socket.waitFor("bookmark").has_value());
+  const auto waits = server.engine.publish();  // a thousand seconds, at that rate
+  socket.tiles.clear();
+  EXPECT_FALSE(socket.nextTile(Seconds(0.2)).has_value());
+  call.max_hz = 1.0;
+  socket.call(call);
+  EXPECT_EQ(socket.waitFor("bookmark")->params->at("tileVersion"), waits);
+  const auto last = server.engine.publish();
+  const auto note = socket.waitFor("bookmark");
+  ASSERT_TRUE(note.has_value());
+  EXPECT_EQ(note->params->at("tileVersion"), last);
+}
+
 TEST(Tiles, TheSameTileIsEncodedOnceForEveryone) {
   RunningServer server;
   server.engine.publish();
@@ -146,8 +181,14 @@ TEST(Tiles, TheSameTileIsEncodedOnceForEveryone) {
 }
 
 TEST(Tiles, AReaderThatStallsIsClosedAndHoldsNobodyUp) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  constexpr milliseconds kDeadline(
+      5000);  // the reader does not read while it makes the next pages, which takes seconds
+#else
+  constexpr milliseconds kDeadline(500);
+#endif
   net::ServerOptions options;
-  options.write_deadline = milliseconds(500);
+  options.write_deadline = kDeadline;
   options.close_patience = milliseconds(200);
   RunningServer server(options, {4, 512, 512, 1});
   server.engine.publish();

@@ -38,6 +38,16 @@ TEST(Handshake, TheServerIntroducesItselfFirst) {
   const auto& read = std::get<ServerInfo>(*note);
   for (const auto* what : {"tiles.rgb9e5", "quantity.mipLevel", "scene.redo", "solve.configure", "camera", "resume"})
     EXPECT_THAT(read.capabilities, ::testing::Contains(what));
+  EXPECT_EQ(read.limits, (std::map<std::string, std::uint64_t>{{"messageBytes", 1048576},
+                                                               {"jsonDepth", 64},
+                                                               {"patchOperations", 1000},
+                                                               {"batchCalls", 64},
+                                                               {"callsInFlight", 64},
+                                                               {"uploadBytes", 1073741824},
+                                                               {"clients", 256},
+                                                               {"snapshotSide", 4096},
+                                                               {"creditBytes", 67108864}}));
+  EXPECT_FALSE(read.auth_required);
   const auto hello = replyOf<HelloReply>(socket.hello({}, {PixelFormat::kR32ui, PixelFormat::kRgb9e5}));
   EXPECT_EQ(hello.epoch, read.epoch);
   EXPECT_EQ(hello.tile_format, PixelFormat::kRgb9e5) << "the first that can be streamed";
@@ -211,17 +221,6 @@ TEST(Messages, TooManyCallsAtATimeAreRefused) {
   EXPECT_EQ(codeOf(socket.call(StatusCall{})), 0);
 }
 
-/// Reads until the answer to this id has come; other messages are passed over.
-RpcResponse answerTo(TestSocket& socket, const std::string& id) {
-  while (const auto message = socket.read()) {
-    if (message->binary) continue;
-    const auto parsed = parseRpc(message->text(), kMaxMessageBytes);
-    if (const auto* response = std::get_if<RpcResponse>(&parsed.items.at(0)); response && response->id == id)
-      return *response;
-  }
-  return {};
-}
-
 TEST(Messages, CreditIsTakenHoweverManyCallsWait) {
   RunningServer server;
   TestSocket socket(server.port());
@@ -371,8 +370,8 @@ TEST(Solve, ChangesOfSettingsThatFollowEachOtherAtOnceAllHold) {
   socket.sendText(encodeCall("\"second\"", second));
   EXPECT_EQ(codeOf(socket.call(StatusCall{})), 0) << "both have been read";
   server.engine.release();
-  EXPECT_EQ(replyOf<Settings>(answerTo(socket, "\"first\"")).target_error, 0.02);
-  const auto settings = replyOf<Settings>(answerTo(socket, "\"second\""));
+  EXPECT_EQ(replyOf<Settings>(awaitAnswer(socket, "\"first\"")).target_error, 0.02);
+  const auto settings = replyOf<Settings>(awaitAnswer(socket, "\"second\""));
   EXPECT_EQ(settings.time_limit_ms, 100'001U);
   EXPECT_EQ(settings.target_error, 0.1);
 }
@@ -432,8 +431,17 @@ TEST(Snapshot, IsTakenAtOnceAndFetchedByUrl) {
   TestSocket socket(server.port());
   socket.hello();
   const auto reply = replyOf<SnapshotReply>(socket.call(SnapshotCall{"desk", 64, 48, "lit"}));
-  EXPECT_EQ(request(server.port(), "GET", reply.url).body, "png 64x48 lit desk");
+  EXPECT_EQ(request(server.port(), "GET", reply.url).body, "png 64x48 lit desk 0.25");
+  EXPECT_EQ(reply.exposure, 0.25);
+  const auto exposed = replyOf<SnapshotReply>(socket.call(SnapshotCall{"desk", 64, 48, "lit", 2.5}));
+  EXPECT_EQ(request(server.port(), "GET", exposed.url).body, "png 64x48 lit desk 2.5");
+  EXPECT_EQ(exposed.exposure, 2.5);
   EXPECT_EQ(codeOf(socket.call(SnapshotCall{"nobody", 64, 48, "lit"})), -32004);
+  const auto refused = socket.call(SnapshotCall{"desk", 64, 48, "colour"});
+  EXPECT_EQ(codeOf(refused), -32602);
+  EXPECT_EQ(refused.error->pointer, "/params/quantity");
+  EXPECT_THAT(request(server.port(), "GET", "/snapshot.png?quantity=colour").body,
+              HasSubstr(R"("where":"?quantity=")"));
 }
 
 TEST(Viewers, AreCountedForEveryone) {
@@ -447,23 +455,6 @@ TEST(Viewers, AreCountedForEveryone) {
     EXPECT_EQ(first.waitFor("viewers")->params->at("count"), 2);
   }
   EXPECT_EQ(first.waitFor("viewers")->params->at("count"), 1);
-}
-
-TEST(Drain, TellsClientsFinishesAndCloses) {
-  RunningServer server;
-  TestSocket socket(server.port());
-  socket.hello();
-  server.engine.progress(0.5);
-  socket.sendText(encodeCall("7", SolveWaitCall{}));
-  EXPECT_EQ(codeOf(socket.call(StatusCall{})), 0);
-  RawHttp idle(server.port());
-  idle.send("GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n");
-  EXPECT_EQ(idle.receive().status, 200);
-  server.drain();
-  EXPECT_TRUE(socket.waitFor("draining").has_value());
-  EXPECT_EQ(closeCodeOf(socket), 1001);
-  EXPECT_TRUE(idle.closed(Seconds(10)));
-  server.stop();
 }
 
 }  // namespace

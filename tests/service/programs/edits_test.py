@@ -104,6 +104,38 @@ class PatchTest(EditsCase):
 
         self.run_async(body())
 
+    def test_aMoveKeepsTheLayoutAndSendsNoTileBeforeItsLightChanges(self):
+        async def body():
+            session = await self.session()
+            await session.call("solve.configure", targetError=1e-6)  # so that it can be paused
+            await session.call("solve.wait", error=0.05, timeoutMs=60000)
+            await session.call("solve.pause")
+            await session.call("subscribe")
+            layout = (await session.note("lightmaps"))["params"]["layout"]
+            await session.tiles_until((await session.call("status"))["tileVersion"])
+            held = len(session.tiles)
+            edit = await self.patch(session, replace("/nodes/@lamp/translation", [0.1, 0.2, 0]))
+            while (await session.note("bookmark"))["params"]["revision"] < edit["revision"]:
+                pass
+            self.assertEqual(len(session.tiles), held, "nothing has changed yet")
+            await session.call("solve.resume")
+            status = await session.call("solve.wait", error=0.05, revision=edit["revision"], timeoutMs=60000)
+            self.assertTrue(status["reached"], status)
+            await session.call("solve.pause")
+            await session.tiles_until((await session.call("status"))["tileVersion"])
+            self.assertGreater(len(session.tiles), held)
+            self.assertFalse([tile for tile in session.tiles[held:] if tile.flags & 2], "a reset")
+            self.assertFalse([note for note in session.notes if note["method"] == "lightmaps"])
+            late = await Session.open(self.url)
+            await late.call("subscribe")
+            self.assertEqual((await late.note("lightmaps"))["params"]["layout"], layout)
+            await late.close()
+            await self.patch(session, replace("/nodes/@lamp/scale", [0.5, 1, 0.5]))
+            self.assertGreater((await session.note("lightmaps"))["params"]["layout"], layout, "another size, other texels")
+            await session.close()
+
+        self.run_async(body())
+
     def test_theSameUploadLiesThereOnce(self):
         first, second = (self.put("/uploads", b"some bytes")["url"] for _ in range(2))
         self.assertEqual(first, second)
@@ -295,6 +327,10 @@ class ShortFormsTest(EditsCase):
         self.assertIn("floor, lamp", self.complaint("set", self.url, "@x.emissiveStrength", 1))
         self.assertIn("/materials/1/emissiveFactor", self.complaint("set", self.url, "@lamp.emissiveFactor", "red"))
         self.assertIn("no edit to take back", self.complaint("undo", self.url))
+        (self.folder / "nothing.json").write_text('[{"op":"test","path":"/asset/nothing","value":1}]')
+        text = self.complaint("edit", self.url, "nothing.json")
+        self.assertIn("error: operation 0: /asset/nothing: ", text)
+        self.assertEqual(text.count("operation 0"), 1, text)
 
     def test_aScriptSweepsAndRecords(self):
         (self.folder / "sweep.txt").write_text(

@@ -1,19 +1,19 @@
 """The client's other commands against a server that runs already."""
 import asyncio
-import concurrent.futures
 import json
-import pathlib
+import re
 import signal
 import struct
-import threading
 import unittest
+from http import HTTPStatus
 
 import websockets
 
 import plates
 from harness import ServiceCase, waitForLine
+from pictures import brightness
+from stand_in import example, messages, running
 
-EXAMPLES = pathlib.Path(__file__).parents[3] / "protocol" / "examples"
 EDIT = json.dumps([{"op": "replace", "path": f"/materials/{plates.LAMP_MATERIAL}/emissiveFactor", "value": [1, 1, 1]}])
 QUICK = ("--error", 0.05, "--texels", 2000)
 
@@ -63,16 +63,14 @@ class RemoteTest(ServiceCase):
     def test_anEditIsSentAgainToAServerThatIsAwayForSeconds(self):
         """A stand-in takes the edit and goes without an answer; it is back three seconds later, at the same address."""
         requests = []
-        greeting = (EXAMPLES / "note-serverInfo.json").read_text()
-        replies = {method: json.loads((EXAMPLES / f"reply-{method}.json").read_text())["result"]
-                   for method in ("hello", "scene.undo")}
+        replies = {method: example(f"reply-{method}")["result"] for method in ("hello", "scene.undo")}
 
         async def stand_in(told):
             gone = asyncio.Event()
 
             async def serve(socket, *_):
-                await socket.send(greeting)
-                async for text in socket:
+                await socket.send(json.dumps(example("note-serverInfo")))
+                async for text in messages(socket):
                     call = json.loads(text)
                     if call["method"] == "scene.undo":
                         requests.append(call["params"]["requestId"])
@@ -90,17 +88,8 @@ class RemoteTest(ServiceCase):
             async with websockets.serve(serve, "127.0.0.1", port, **protocols):
                 await asyncio.sleep(60)
 
-        told = concurrent.futures.Future()
-        loop = asyncio.new_event_loop()
-        task = loop.create_task(stand_in(told))
-        thread = threading.Thread(target=lambda: loop.run_until_complete(asyncio.wait([task])))
-        thread.start()
-        try:
-            out, err = self.client("undo", f"127.0.0.1:{told.result(20)}")
-        finally:
-            loop.call_soon_threadsafe(task.cancel)
-            thread.join()
-            loop.close()
+        with running(stand_in) as port:
+            out, err = self.client("undo", f"127.0.0.1:{port}")
         self.assertIn("took back revision", out)
         self.assertIn("sending the edit again", err)
         self.assertEqual(len(requests), 2)
@@ -121,6 +110,17 @@ class RemoteTest(ServiceCase):
             png = (self.folder / "a.png").read_bytes()
             self.assertEqual(png[:8], b"\x89PNG\r\n\x1a\n")
             self.assertEqual(struct.unpack(">2I", png[16:24]), (64, 48))
+        _, told = self.client("snapshot", server.url, "-o", "a.png")
+        exposure = float(re.search(r"^exposure (\S+) per nit$", told, re.MULTILINE).group(1))
+        for name, factor in (("same.png", 1), ("dark.png", 1e-6), ("bright.png", 1e6)):
+            _, told = self.client("snapshot", server.url, "-o", name, "--exposure", exposure * factor)
+            self.assertIn(f"exposure {exposure * factor:.6g} per nit", told)
+        dark, same, bright = (brightness((self.folder / name).read_bytes()) for name in ("dark.png", "same.png", "bright.png"))
+        self.assertAlmostEqual(brightness((self.folder / "a.png").read_bytes()), same, delta=0.01)  # told in 6 digits
+        self.assertEqual(dark, 0)
+        self.assertGreater(bright, 1.5 * same)
+        for wrong in ("0", "-1", "nan", "1e31", "bright"):
+            self.assertIn("--exposure", self.complaint("snapshot", server.url, "-o", "b.png", "--exposure", wrong))
         self.assertIn("nosuch", self.complaint("snapshot", server.url, "-o", "b.png", "--camera", "nosuch"))
         self.assertNotIn("b.png", self.files())
 
@@ -130,6 +130,61 @@ class RemoteTest(ServiceCase):
         self.assertEqual(out.splitlines(), ["again.glb", "again.lightmap.0.exr", "again.error.0.exr"])
         for ending in (".glb", ".lightmap.0.exr"):
             self.assertEqual((self.folder / f"again{ending}").read_bytes(), (self.folder / f"lit{ending}").read_bytes())
+
+    def savedFrom(self, status, fetched):
+        """What `radiosity save` writes of a stand-in; `status` fills in its answers, and its files tell its texels."""
+        async def serve(socket, *_):
+            await socket.send(json.dumps(example("note-serverInfo")))
+            async for text in messages(socket):
+                call = json.loads(text)
+                result = example(f"reply-{call['method']}")["result"]
+                if call["method"] == "status":
+                    status(result)
+                await socket.send(json.dumps({"jsonrpc": "2.0", "id": call["id"], "result": result}))
+
+        async def answer(path, _):
+            if path == "/ws":
+                return None
+            if "/lightmaps/1" in path:
+                return HTTPStatus.NOT_FOUND, [], b""
+            body = f"{path} of {fetched(path)} texels".encode()
+            return HTTPStatus.OK, [], body
+
+        async def stand_in(told):
+            async with websockets.serve(serve, "127.0.0.1", 0, subprotocols=["radiosity.v1"], process_request=answer) as server:
+                told.set_result(server.sockets[0].getsockname()[1])
+                await asyncio.sleep(60)
+
+        with running(stand_in) as port:
+            self.client("save", f"127.0.0.1:{port}", "-o", "torn.glb")
+        return [(self.folder / file).read_bytes() for file in ("torn.glb", "torn.lightmap.0.exr")]
+
+    def test_saveTakesUVsAndPagesOfOneLayoutOnly(self):
+        """Texels are changed by somebody just after the scene was fetched, at the same revision."""
+        scenes = []
+
+        def texels():
+            return 4000 if scenes else 2000
+
+        def fetched(path):
+            now = texels()
+            scenes.extend([path] if path == "/scene.glb" else [])
+            return now
+
+        for file in self.savedFrom(lambda result: result["settings"].update(texels=texels()), fetched):
+            self.assertIn(b"of 4000 texels", file)
+        self.assertEqual(len(scenes), 2)
+
+    def test_saveWaitsUntilAllTexelsAreThere(self):
+        """While a scene is loaded fewer texels are shown, at the revision and with the settings of the whole."""
+        asked = []
+
+        def status(result):
+            asked.append(None)
+            result["state"] = "loading" if len(asked) < 3 else "converged"
+
+        for file in self.savedFrom(status, lambda _: 15000000 if len(asked) >= 3 else 100000):
+            self.assertIn(b"of 15000000 texels", file)
 
     def test_watchEndsWhenTheSolveHasConverged(self):
         server = self.solved()

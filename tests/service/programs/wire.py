@@ -110,13 +110,13 @@ class Session:
             if answer is not None:
                 return answer
 
-    async def note(self, method):
-        """The next notification of that kind, past or future."""
+    async def note(self, method, seconds=60):
+        """The next notification of that kind, past or future; so long at most without any message."""
         while True:
             for i, note in enumerate(self.notes):
                 if note["method"] == method:
                     return self.notes.pop(i)
-            answer = await self.receive()
+            answer = await self.receive(seconds)
             assert answer is None, answer
 
     async def tiles_until(self, version):

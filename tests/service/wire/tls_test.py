@@ -1,5 +1,6 @@
 """TLS: the server's --tls-cert and --tls-key, by clients that are not ours (Python's ssl and websockets) and by ours."""
 import asyncio
+import contextlib
 import json
 import os
 import re
@@ -7,6 +8,7 @@ import signal
 import socket
 import ssl
 import subprocess
+import threading
 import time
 import unittest
 import urllib.error
@@ -116,6 +118,21 @@ class Tls(ServiceCase):
         self.assertEqual(refused.exception.code, 413)
         refused.exception.close()
 
+    def test_who_comes_again_brings_a_ticket_and_the_server_keeps_nothing(self):
+        server = self.tlsServer()
+        for tickets in (True, False):
+            client = ssl.create_default_context(cafile=str(self.certificate))
+            client.maximum_version = ssl.TLSVersion.TLSv1_2
+            client.options |= 0 if tickets else ssl.OP_NO_TICKET
+            session = None
+            for again in (False, True):
+                with socket.create_connection(("127.0.0.1", server.port), SECONDS) as plain:
+                    with client.wrap_socket(plain, server_hostname="localhost", session=session) as secure:
+                        secure.sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n")
+                        self.assertIn(b" 200 ", secure.recv(4096))
+                        self.assertEqual(secure.session_reused, again and tickets)
+                        session = secure.session
+
     def test_old_versions_are_refused(self):
         server = self.tlsServer()
         trust = ssl.create_default_context(cafile=str(self.certificate))
@@ -187,6 +204,31 @@ class Tls(ServiceCase):
         self.addCleanup(idle.close)
         self.addCleanup(unfinished.close)
         self.assertEqual(server.terminate(), 0)
+
+    def test_a_drain_amid_handshakes_harms_nobody(self):
+        """Connections are told of it while they become sessions: what that touches is seen by a thread sanitizer."""
+        context = ssl.create_default_context(cafile=str(self.certificate))
+
+        def visit(port, ready):
+            with contextlib.suppress(OSError):
+                plain = socket.create_connection(("127.0.0.1", port), SECONDS)
+                ready.wait(SECONDS)
+                with context.wrap_socket(plain, server_hostname="localhost") as session:
+                    session.sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n")
+                    while session.recv(4096):
+                        pass
+
+        for _ in range(5):
+            server = self.tlsServer()
+            ready = threading.Barrier(25)
+            visitors = [threading.Thread(target=visit, args=(server.port, ready)) for _ in range(24)]
+            for visitor in visitors:
+                visitor.start()
+            ready.wait(SECONDS)
+            self.assertEqual(server.terminate(), 0)
+            for visitor in visitors:
+                visitor.join(SECONDS)
+                self.assertFalse(visitor.is_alive(), "its connection was not ended")
 
     # ---- another certificate ----
 

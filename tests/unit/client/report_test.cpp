@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "common/one_line.h"
@@ -40,6 +41,12 @@ TEST(ReportJson, hasEveryMemberThatIsPromised) {
   EXPECT_EQ(report["counters"]["skippedBlack"], 7.0);
   EXPECT_EQ(report["reached"], true);
   EXPECT_TRUE(report["settings"]["time_limit_s"].is_null());
+}
+
+TEST(OutcomeText, saysThatTexelsAreTooLargeOnlyWhereTheyAreWhatLimits) {
+  EXPECT_EQ(finerTexelsText({0.0142, 0.004, 0.0137, 0.0381}), "; finer texels would change 3.81 %");
+  EXPECT_EQ(finerTexelsText({0.018, 0.001, 0.017, 0.002}), "");
+  EXPECT_EQ(finerTexelsText({0.018, 0.001, 0.017, std::nan("")}), "");
 }
 
 TEST(StatusText, tellsStateErrorAndWarnings) {

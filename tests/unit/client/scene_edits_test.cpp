@@ -1,6 +1,10 @@
 // Short forms of edits, as patches on a document.
 #include <gmock/gmock.h>
 
+#include <cstddef>
+#include <limits>
+#include <string>
+
 #include "client/cli/model_merge.h"
 #include "client/cli/scene_edits.h"
 
@@ -93,6 +97,8 @@ TEST(SceneEdits, nodesMoveTurnAndGrowFromWhereTheyAre) {
   }
   EXPECT_NEAR(std::abs(gltf["nodes"][0]["rotation"][3].get<double>()), 1.0, 1e-12);
   EXPECT_FALSE(rotatePatch(document(), "@lamp", 90.0, {0, 0, 0}, false));
+  EXPECT_FALSE(rotatePatch(document(), "@lamp", std::numeric_limits<double>::infinity(), {0, 1, 0}, false));
+  EXPECT_TRUE((*rotatePatch(document(), "@lamp", 1e308, {0, 1, 0}, false))[0]["value"][1].is_number());
   EXPECT_THAT(movePatch(document(), "/nodes/3", {0, 0, 0}, false).error().message, HasSubstr("shears"));
   for (const auto* node : {"@twin", "@nobody", "/nodes/4", "/nodes/", "/nodes/1x", "lamp", "", "@"})
     EXPECT_FALSE(movePatch(document(), node, {0, 0, 0}, false)) << node;
@@ -151,6 +157,23 @@ TEST(ModelMerge, aFileThatIsNotWhatItSeemsIsRefused) {
   }
   EXPECT_FALSE(splitModel("glTF", "x.glb"));
   EXPECT_FALSE(splitModel(std::string("glTF\2\0\0\0\x20\0\0\0\xff\0\0\0JSON{}", 22), "x.glb"));
+}
+
+std::string glbOf(const std::string& json) {
+  const auto word = [](std::size_t n) {
+    return std::string{static_cast<char>(n & 0xFF), static_cast<char>(n >> 8U), 0, 0};
+  };
+  return "glTF" + word(2) + word(20 + json.size()) + word(json.size()) + "JSON" + json;
+}
+
+TEST(ModelMerge, aGlbThatNeedsOtherFilesOrNestsTooDeepIsRefusedHere) {
+  EXPECT_TRUE(splitModel(glbOf(R"({"buffers":[{"byteLength":1},{"uri":"data:;base64,AA=="}]})"), "x.glb"));
+  EXPECT_TRUE(splitModel(glbOf(R"({"asset":{}})" + std::string(3, '\0')), "x.glb")) << "so some exporters pad";
+  const auto refused = splitModel(glbOf(R"({"images":[{"bufferView":0},{"uri":"wood.png"}]})"), "x.glb");
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().where, "x.glb: /images/1/uri");
+  EXPECT_THAT(refused.error().message, HasSubstr("wood.png"));
+  EXPECT_FALSE(splitModel(glbOf(R"({"extras":)" + std::string(5000, '[') + std::string(5000, ']') + "}"), "x.glb"));
 }
 
 }  // namespace

@@ -11,6 +11,8 @@ class ScriptedTransport final : public solver::Transport {
   explicit ScriptedTransport(std::shared_ptr<TransportScript> script) : script_(std::move(script)) {}
 
   Result<void> setScene(std::shared_ptr<const scene::PatchScene> patches) override {
+    if (script_->uploads_until_failure > 0 && --script_->uploads_until_failure == 0)
+      return fail(ErrorCode::kUnavailable, "out of memory on the device");
     if (script_->uploads_to_fail > 0 && script_->uploads_to_fail-- > 0)
       return fail(ErrorCode::kUnavailable, "out of memory on the device");
     if (script_->uploads_to_run_out > 0 && script_->uploads_to_run_out-- > 0) throw std::bad_alloc();
@@ -111,6 +113,15 @@ engine::EngineOptions rayOptions(std::shared_ptr<TransportScript> script) {
   return options;
 }
 
+void EngineTest::startOn(const std::string& folder, engine::EngineOptions options) {
+  auto store = state::Store::open(folder);
+  ASSERT_TRUE(store) << store.error().text();
+  options.store = std::move(*store);
+  auto made = engine::makeEngine(std::move(options));
+  ASSERT_TRUE(made) << made.error().text();
+  engine_ = std::move(*made);
+}
+
 void EngineTest::SetUp() {
   auto made = engine::makeEngine(rayOptions(script_));
   ASSERT_TRUE(made) << made.error().text();
@@ -161,11 +172,26 @@ std::string EngineTest::sceneText() {
   return text ? text->gltf : text.error().text();
 }
 
+Bytes EngineTest::light() {
+  Bytes all;
+  for (std::uint32_t page = 0;; ++page) {
+    const auto exr = call<SharedBytes>(
+        [&](auto done) { engine_->lightmapExr(page, engine::Quantity::kIrradiance, std::move(done)); });
+    if (!exr) break;  // no such page
+    all.insert(all.end(), (*exr)->begin(), (*exr)->end());
+  }
+  EXPECT_FALSE(all.empty());
+  return all;
+}
+
 testing::AssertionResult EngineTest::reaches(State state) {
   const auto deadline = std::chrono::steady_clock::now() + kPatience;
   while (std::chrono::steady_clock::now() < deadline) {
     const auto now = status();
-    if (now.state == state) return testing::AssertionSuccess();
+    if (now.state == state) {
+      (void)sceneText();  // the final lightmaps are published after the state
+      return testing::AssertionSuccess();
+    }
     if (now.state != State::kSolving && now.state != State::kLoading && now.state != State::kEmpty) {
       return testing::AssertionFailure() << "state " << static_cast<int>(now.state) << ", error " << now.error.total
                                          << " " << now.failure;
@@ -179,7 +205,6 @@ void EngineTest::solve(const test_scenes::TestScene& scene) {
   const auto loaded = load(scene);
   ASSERT_TRUE(loaded) << loaded.error().text();
   ASSERT_TRUE(reaches(State::kConverged));
-  (void)sceneText();  // the final lightmaps are published after the state
 }
 
 std::string emissionPatch(int index, double nits) {

@@ -24,6 +24,7 @@ struct TransportScript {
   std::atomic<bool> run_fails{false};
   std::atomic<int> runs_until_failure{0};  ///< the run that brings it from 1 to 0 fails
   std::atomic<int> losses{0};
+  std::atomic<int> uploads_until_failure{0};  ///< likewise
   std::atomic<int> uploads_to_fail{0}, uploads_to_run_out{0};
   std::atomic<bool> runs_out_of_memory{false};
   std::atomic<int> uploads{0};
@@ -68,6 +69,8 @@ class EngineTest : public testing::Test {
 
   void SetUp() override;
   void TearDown() override { engine_.reset(); }
+  /// An engine that keeps all in this folder, or goes on from there.
+  void startOn(const std::string& folder, engine::EngineOptions options);
 
   /// Asks and waits for the answer: call<LoadOutcome>([&](auto done) { engine().loadBytes("a.glb", bytes, done); }).
   template <typename T, typename Ask>
@@ -93,6 +96,9 @@ class EngineTest : public testing::Test {
   Result<State> restart();
   /// Returns when everything asked before has been done.
   std::string sceneText();
+  /// The light of all pages as files: published tiles keep what has changed by less than a quantum since they were
+  /// last sent, and that depends on time.
+  Bytes light();
 
   /// Waits until `holds()`; false: it never did.
   template <typename Condition>

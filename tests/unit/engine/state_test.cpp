@@ -27,16 +27,11 @@ class Kept : public EngineTest {
   void SetUp() override { start(); }
 
   void start() {
-    auto store = state::Store::open(folder_.file("state"));
-    ASSERT_TRUE(store) << store.error().text();
     auto options = rayOptions(script_);
     options.settings.target_error = target_;
     options.named_settings = named_;
     if (recovers_late_) options.recovery_wait = std::chrono::hours(1);
-    options.store = std::move(*store);
-    auto made = engine::makeEngine(std::move(options));
-    ASSERT_TRUE(made) << made.error().text();
-    engine_ = std::move(*made);
+    ASSERT_NO_FATAL_FAILURE(startOn(folder_.file("state"), std::move(options)));
     engine_->addListener(recorder_);
     watching_ = engine_->watch(engine::Quantity::kIrradiance);
   }
@@ -44,13 +39,6 @@ class Kept : public EngineTest {
     watching_.reset();
     engine_.reset();
     start();
-  }
-  /// The first page as a file: published tiles keep what changed by less than a quantum.
-  [[nodiscard]] Bytes light() {
-    const auto exr =
-        call<SharedBytes>([&](auto done) { engine_->lightmapExr(0, engine::Quantity::kIrradiance, std::move(done)); });
-    EXPECT_TRUE(exr);
-    return exr ? **exr : Bytes();
   }
   [[nodiscard]] double counter(const std::string& name) { return status().counters[name]; }
 
@@ -343,12 +331,9 @@ TEST_F(Kept, ASolveWithoutARendererLeavesTheCheckpointBeforeIt) {
 TEST_F(Kept, ASolveTooLargeForACheckpointGoesOnWithout) {
   watching_.reset();
   engine_.reset();
-  auto store = state::Store::open(folder_.file("state"));
-  ASSERT_TRUE(store);
   auto options = rayOptions(script_);
-  options.store = std::move(*store);
   options.checkpoint_bytes = 1000;
-  engine_ = std::move(*engine::makeEngine(std::move(options)));
+  ASSERT_NO_FATAL_FAILURE(startOn(folder_.file("state"), std::move(options)));
   solve(lumpedCube(0.5));
   engine().keepSolve(kPatienceForCheckpoint);
   EXPECT_FALSE(std::filesystem::exists(folder_.file("state/checkpoint")));

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 #include <fstream>
+#include <iterator>
+#include <thread>
 
 #include "common/sha256.h"
 #include "server/state/checkpoint.h"
@@ -130,6 +132,22 @@ TEST_F(StoreTest, ForgottenEditsAndDroppedUploadsAreGoneAndSoAreTheirBytes) {
   std::size_t blobs = 0;
   for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(folder_.file("state/blobs"))) ++blobs;
   EXPECT_EQ(blobs, 3U);  // vertices, picture, the second upload
+}
+
+TEST_F(StoreTest, WhatForgottenEditsHadAppendedDoesNotAddUp) {
+  constexpr std::uint64_t kEdits = 1000;
+  auto store = open();
+  ASSERT_TRUE(store->load(loadEntry(1), room(), "digest"));
+  for (std::uint64_t r = 2; r <= kEdits; ++r) {
+    auto edit = change(r);
+    edit.revision.appended = edit.edit->appended = {1, 1, {bytesOf("appended by " + std::to_string(r))}, {}};
+    edit.forgotten = {r - 1};
+    if (store->wantsDocument()) edit.document = room();
+    ASSERT_TRUE(store->edit(edit));
+  }
+  const std::filesystem::directory_iterator blobs(folder_.file("state/blobs"));
+  // Those of the revisions that are kept: 256, and as many until the document is written whole.
+  EXPECT_LT(std::distance(begin(blobs), end(blobs)), 600);
 }
 
 TEST_F(StoreTest, LongHistoriesAreBoundedOnceTheDocumentIsWrittenWhole) {
@@ -265,6 +283,36 @@ TEST_F(StoreTest, ADamagedOrMissingBlobIsNamed) {
   std::filesystem::remove(folder_.file(name));
   error = openError();
   EXPECT_EQ(error.where, folder_.file(name));
+}
+
+TEST_F(StoreTest, WhatTheDiskHasDamagedIsMendedByWhoBringsItAgain) {
+  const auto id = sha256Hex(std::string_view("upload"));
+  ASSERT_TRUE(open()->keepUpload({id, "u"}, bytesOf("upload"), {}));
+  flip("state/blobs/" + id, 3);
+  auto store = open();
+  ASSERT_FALSE(store->readUpload(id));
+  ASSERT_TRUE(store->keepUpload({id, "u"}, bytesOf("upload"), {}));
+  store.reset();
+  const auto upload = open()->readUpload(id);
+  ASSERT_TRUE(upload) << upload.error().text();
+  EXPECT_EQ(**upload, *bytesOf("upload"));
+}
+
+TEST_F(StoreTest, TheSameBytesMayComeAsUploadAndSceneAtATime) {
+  auto store = open();
+  for (std::uint64_t round = 1; round <= 20; ++round) {
+    const std::string text(4000000, static_cast<char>('a' + round));
+    const auto id = sha256Hex(text);
+    auto document = room("{}");
+    document.buffers = {bytesOf(text)};
+    Result<void> kept;
+    std::thread uploading([&] { kept = store->keepUpload({id, "u"}, bytesOf(text), {}); });
+    const auto loaded = store->load(loadEntry(round), document, "digest");
+    uploading.join();
+    ASSERT_TRUE(kept) << kept.error().text();
+    ASSERT_TRUE(loaded) << loaded.error().text();
+    ASSERT_EQ(sha256Hex(folder_.read("state/blobs/" + id)), id);
+  }
 }
 
 TEST_F(StoreTest, WhatDoesNotFitOnTheDiskIsRefusedAndTheRestStays) {

@@ -1,0 +1,110 @@
+// What viewers see of an edit while it is being solved.
+#include "server/engine/lit_scene.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "server/scene/document.h"
+#include "tests/scenes/glb_writer.h"
+#include "tests/unit/engine/block_room.h"
+#include "tests/unit/solver/quad_scene.h"
+
+namespace radiosity::test {
+namespace {
+
+using engine::LitScene;
+
+scene::EditedDocument roomDocument() {
+  const auto bytes = test_scenes::encodeGlb(blockRoom());
+  auto document = scene::parseDocument("room.glb", bytes);
+  EXPECT_TRUE(document) << document.error().text();
+  auto imported = scene::importScene(*document);
+  EXPECT_TRUE(imported) << imported.error().text();
+  return {std::move(*document), std::move(*imported)};
+}
+
+template <typename T>
+T valueOf(Result<T> result) {
+  EXPECT_TRUE(result) << result.error().text();
+  return std::move(*result);
+}
+
+void solveToEnd(LitScene& lit) {
+  for (;;) {
+    const auto outcome = lit.solver().step();
+    ASSERT_TRUE(outcome) << outcome.error().text();
+    if (*outcome == solver::StepOutcome::kConverged) return;
+    ASSERT_NE(*outcome, solver::StepOutcome::kExhausted);
+  }
+}
+
+/// Green light of all texels.
+std::vector<float> lightOf(const std::vector<scene::LightmapPage>& pages) {
+  std::vector<float> light;
+  for (const auto& page : pages) {
+    for (const auto& pixel : page.irradiance.pixels) light.push_back(pixel.y);
+  }
+  return light;
+}
+
+TEST(LitScene, ShadowsMoveBeforeReflectedLightIsKnown) {
+  engine::SolveSettings settings;
+  settings.target_error = 0.03;
+  settings.texels = 600;
+  RayTransport transport(400);
+  const auto former = valueOf(LitScene::make(roomDocument(), settings, transport));
+  auto& before = *former;
+  ASSERT_TRUE(before.upload());
+  before.startSolve();
+  solveToEnd(before);
+  const auto old_light = lightOf(before.pages());
+
+  const auto patch =
+      nlohmann::json::parse(R"([{"op":"replace","path":"/nodes/@block/translation","value":[1.3,0,1.3]}])");
+  auto edited = valueOf(scene::editDocument(before.document(), patch, {}));
+  const auto next = valueOf(LitScene::make(std::move(edited), settings, transport, &before));
+  auto& after = *next;
+  ASSERT_TRUE(after.upload());
+  (void)after.succeed(before);
+  ASSERT_TRUE(after.keepsLayoutOf(before));
+  after.fadeFrom(before, true);
+  after.startSolve(&before);
+  EXPECT_FALSE(after.showDirectLight()) << "nothing of the new light is known";
+  EXPECT_EQ(lightOf(after.shownPages()), old_light);
+
+  while (!after.showDirectLight()) {
+    const auto outcome = after.solver().step();
+    ASSERT_TRUE(outcome) << outcome.error().text();
+    ASSERT_EQ(*outcome, solver::StepOutcome::kSlice) << "reflected light was there as soon";
+    ASSERT_TRUE(after.solver().isRepairing());
+  }
+  const auto shown = lightOf(after.shownPages());
+  EXPECT_FALSE(after.showDirectLight()) << "once for each edit";
+  solveToEnd(after);
+  const auto fresh = lightOf(after.pages());
+  ASSERT_EQ(shown.size(), old_light.size());
+  ASSERT_EQ(shown.size(), fresh.size());
+
+  // Where a shadow came or went, what is shown at once lies nearer to the light to come than to what was.
+  std::size_t darker = 0, brighter = 0, nearer = 0;
+  for (std::size_t i = 0; i < shown.size(); ++i) {
+    if (shown[i] < 0.6F * old_light[i]) {
+      ++darker;
+    } else if (shown[i] > old_light[i] / 0.6F) {
+      ++brighter;
+    } else {
+      continue;
+    }
+    nearer += std::abs(shown[i] - fresh[i]) < std::abs(old_light[i] - fresh[i]) ? 1 : 0;
+  }
+  EXPECT_GT(darker, 10U);
+  EXPECT_GT(brighter, 10U);
+  EXPECT_GE(nearer, 9 * (darker + brighter) / 10);
+}
+
+}  // namespace
+}  // namespace radiosity::test
