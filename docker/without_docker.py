@@ -82,23 +82,17 @@ class Stage:
                 subprocess.run(["cp", "-aT", str(source), str(target)], check=True)
 
     def run(self, command, network=True):
-        """Runs a list of words in the stage; its devices and processes are there only meanwhile."""
+        """Runs a list of words in the stage. Its devices and processes are mounted where nobody else sees them, and are
+        gone with it, however it ends: whoever removes the folder then removes no device of the machine."""
         environment = {"HOME": "/root" if self.user == "0:0" else "/tmp", **self.environment}
         if network:
             environment.update({key: os.environ[key] for key in NETWORK if key in os.environ})
-        mounts = [("proc", "/proc", ["-t", "proc"]), ("/dev", "/dev", ["--rbind"])]
-        made = []
-        try:
-            for source, target, how in mounts:
-                (self.folder / target[1:]).mkdir(exist_ok=True)
-                subprocess.run(["mount", *how, source, str(self.folder / target[1:])], check=True)
-                made.append(str(self.folder / target[1:]))
-            inner = f"cd {shlex.quote(self.workdir)} && exec {shlex.join(command)}"
-            return subprocess.run(["chroot", f"--userspec={self.user}", str(self.folder), "/bin/sh", "-c", inner],
-                                  env=environment, check=False).returncode
-        finally:
-            for target in reversed(made):
-                subprocess.run(["umount", "-l", target], check=False)
+        for mounted in ("proc", "dev"):
+            (self.folder / mounted).mkdir(exist_ok=True)
+        inner = f"cd {shlex.quote(self.workdir)} && exec {shlex.join(command)}"
+        mounts = 'mount -t proc proc "$0/proc" && mount --rbind /dev "$0/dev" && exec chroot --userspec="$1" "$0" /bin/sh -c "$2"'
+        return subprocess.run(["unshare", "--mount", "--propagation", "private", "/bin/sh", "-c", mounts, str(self.folder),
+                               self.user, inner], env=environment, check=False).returncode
 
 
 def ignored(path):
@@ -109,7 +103,8 @@ def ignored(path):
 def copy(stage, stages, words):
     source_root = CHECKOUT
     if words[0].startswith("--from="):
-        source_root = next(s.folder for s in stages if s.name == words.pop(0)[len("--from="):])
+        name = words.pop(0)[len("--from="):]
+        source_root = next(s.folder for s in stages if s.name == name)
     *sources, target = words
     place = stage.folder / os.path.join(stage.workdir, target).lstrip("/")
     into = target.endswith("/") or len(sources) > 1

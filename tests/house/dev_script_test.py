@@ -122,6 +122,45 @@ class DevRun(Checkout):
         self.assertEqual(called[2:5], ["../my room.glb", "-o", f"{self.root}/out/my room-lit.glb"])
 
 
+class DevTest(Checkout):
+    """`./dev test` in a checkout that is built already; ctest prints what it is given and fails."""
+
+    OUTPUT = "\n".join((
+        "        Start   1: Room.Works", "  1/3 Test   #1: Room.Works " + "." * 300 + "   Passed    0.01 sec",
+        "        Start   2: Room.Leaks", "        Start   3: Room.Waits", "  2/3 Test   #2: Room.Leaks " + "." * 300 +
+        "***Failed    0.01 sec", "first line", *(f"line {n}" for n in range(100)), "the reason",
+        "  3/3 Test   #3: Room.Waits " + "." * 300 + "***Skipped   0.01 sec", "no Slurm here",
+        "", "67% tests passed, 1 tests failed out of 3", "The following tests FAILED:"))
+
+    def setUp(self):
+        super().setUp()
+        self.stand_in("bin/ninja", 'echo "ninja: no work to do."')
+        self.stand_in("bin/npm", "")
+        (self.root / "build").mkdir()
+        (self.root / "build/build.ninja").touch()
+        (self.root / "printed").write_text(self.OUTPUT)
+        self.stand_in("bin/ctest", f'cat {self.root}/printed; exit "$STATUS"')
+
+    def run_tests(self, status):
+        environment = dict(os.environ, PATH=f"{self.root}/bin:{os.environ['PATH']}", STATUS=str(status))
+        return subprocess.run([self.root / "dev", "test"], capture_output=True, text=True, timeout=60, cwd=self.root,
+                              stdin=subprocess.DEVNULL, env=environment)
+
+    def test_what_failed_is_shown_last_and_no_line_is_wide(self):
+        done = self.run_tests(8)
+        self.assertEqual(done.returncode, 8)
+        again = done.stdout.split("The following tests FAILED:")[1].splitlines()
+        self.assertEqual(again[1], "  2/3 Test   #2: Room.Leaks ...***Failed    0.01 sec")
+        self.assertEqual((again[-2], again[-1]), ("the reason", "67% tests passed, 1 tests failed out of 3"))
+        self.assertNotIn("first line", again)
+        self.assertNotIn("no Slurm here", again)
+        self.assertLess(max(map(len, done.stdout.splitlines())), 100)
+
+    def test_what_passes_is_shown_once(self):
+        done = self.run_tests(0)
+        self.assertEqual((done.returncode, done.stdout.count("Room.Leaks")), (0, 1))
+
+
 class DevLint(Checkout):
     """`./dev lint` where ninja and clang-tidy tell how they were called and have nothing to do, or find something."""
 
