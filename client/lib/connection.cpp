@@ -257,6 +257,7 @@ CallResult<protocol::JsonPtr> Connection::exchange(const protocol::Call& call, s
 Result<void> Connection::poll(std::chrono::milliseconds duration) {
   auto& impl = *impl_;
   if (!impl.dispatch() && !impl.broken) {
+    impl.pump.context().poll();  // runs what can be run at once, where runUntil() has no time for anything
     (void)impl.pump.runUntil([&] { return impl.broken || !impl.arrivals.empty(); }, Clock::now() + duration);
     impl.dispatch();
   }

@@ -1,5 +1,8 @@
 """The client's other commands against a server that runs already."""
 import asyncio
+import base64
+import contextlib
+import hashlib
 import json
 import re
 import signal
@@ -12,7 +15,7 @@ import websockets
 import plates
 from harness import ServiceCase, waitForLine
 from pictures import brightness
-from stand_in import example, messages, running
+from stand_in import Frames, example, messages, running
 
 EDIT = json.dumps([{"op": "replace", "path": f"/materials/{plates.LAMP_MATERIAL}/emissiveFactor", "value": [1, 1, 1]}])
 QUICK = ("--error", 0.05, "--texels", 2000)
@@ -94,6 +97,54 @@ class RemoteTest(ServiceCase):
         self.assertIn("sending the edit again", err)
         self.assertEqual(len(requests), 2)
         self.assertEqual(requests[0], requests[1])
+
+    def test_aSceneThatTakesLongToLoadDoesNotCostTheConnection(self):
+        """A server lets go who does not answer its pings, and while a scene is uploaded and read nothing else is said."""
+        ponged = []
+
+        async def stand_in(told):
+            answered = asyncio.Event()
+
+            async def websocket(frames):
+                frames.send(1, json.dumps(example("note-serverInfo")).encode())
+                while True:
+                    opcode, payload = await frames.receive()
+                    if opcode == 1:
+                        call = json.loads(payload)
+                        result = example(f"reply-{call['method']}")["result"]
+                        frames.send(1, json.dumps({"jsonrpc": "2.0", "id": call["id"], "result": result}).encode())
+                    elif opcode == 10:
+                        ponged.append(payload)
+                        answered.set()
+
+            async def serve(reader, writer):
+                with contextlib.suppress(asyncio.IncompleteReadError):
+                    head = (await reader.readuntil(b"\r\n\r\n")).decode()
+                    key = re.search(r"Sec-WebSocket-Key: (\S+)", head, re.IGNORECASE)
+                    if key:
+                        accept = hashlib.sha1((key.group(1) + "258EAFA5-E914-47DA-95CA-C5AB0DC85B11").encode()).digest()
+                        writer.write(b"HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+                                     b"Sec-WebSocket-Protocol: radiosity.v1\r\nSec-WebSocket-Accept: "
+                                     + base64.b64encode(accept) + b"\r\n\r\n")
+                        connected.append(Frames(reader, writer))
+                        return await websocket(connected[0])
+                    await reader.readexactly(int(re.search(r"Content-Length: (\d+)", head, re.IGNORECASE).group(1)))
+                    connected[0].send(9, b"still there?")
+                    with contextlib.suppress(asyncio.TimeoutError):
+                        await asyncio.wait_for(answered.wait(), 20)
+                    body = json.dumps({"error": {"code": "busy", "message": "that was all"}}).encode()
+                    writer.write(b"HTTP/1.1 503 Busy\r\nConnection: close\r\nContent-Length: %d\r\n\r\n" % len(body) + body)
+                writer.close()
+
+            connected = []
+            async with await asyncio.start_server(serve, "127.0.0.1", 0) as server:
+                told.set_result(server.sockets[0].getsockname()[1])
+                await asyncio.sleep(60)
+
+        with running(stand_in) as port:
+            self.assertIn("that was all", self.complaint("solve", self.scene, "-o", "lit.glb", "--server",
+                                                         f"127.0.0.1:{port}", expect=1))
+        self.assertEqual(ponged, [b"still there?"])
 
     def test_badEditsExit2WithOperationPointerAndReason(self):
         server = self.solved()

@@ -4,6 +4,7 @@ import concurrent.futures
 import contextlib
 import json
 import pathlib
+import struct
 import threading
 
 import websockets
@@ -37,3 +38,23 @@ def running(serve):
         loop.call_soon_threadsafe(task.cancel)
         thread.join()
         loop.close()
+
+
+class Frames:
+    """The server's end of a WebSocket on a pair of streams: for one that answers HTTP on the same port."""
+
+    def __init__(self, reader, writer):
+        self.reader, self.writer = reader, writer
+
+    def send(self, opcode, payload):
+        size = len(payload)
+        self.writer.write(bytes([0x80 | opcode]) + (bytes([size]) if size < 126 else b"\x7e" + struct.pack(">H", size)) + payload)
+
+    async def receive(self):
+        """(opcode, payload) of the next frame; asyncio.IncompleteReadError at the end."""
+        first, second = await self.reader.readexactly(2)
+        size = second & 127
+        if size > 125:
+            size = int.from_bytes(await self.reader.readexactly(2 if size == 126 else 8), "big")
+        mask, payload = await self.reader.readexactly(4), await self.reader.readexactly(size)
+        return first & 15, bytes(byte ^ mask[i % 4] for i, byte in enumerate(payload))
