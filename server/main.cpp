@@ -37,12 +37,12 @@ void loadFirstScene(engine::Engine& engine, const std::string& path) {
   });
 }
 
-/// The engine ends between two steps of a load, and a step of a big scene takes seconds. Whoever asked for the end does
-/// not wait for that: nothing a load has made so far is worth keeping. The workers die with this process.
-void leaveWithin(std::chrono::milliseconds patience) {
-  std::thread([patience] {
+/// Whoever asked for the end does not wait longer. What was acknowledged is on the disk at any time, and the workers
+/// die with this process.
+void leaveWithin(std::chrono::milliseconds patience, const char* why) {
+  std::thread([patience, why] {
     std::this_thread::sleep_for(patience);
-    log::info("leaving in the middle of a load");
+    log::info("leaving {}", why);
     std::_Exit(0);
   }).detach();
 }
@@ -54,6 +54,11 @@ Vitals vitalsOf(const engine::Engine& engine, const net::Server& server) {
 
 /// How long the end waits for the last checkpoint; then the one before it stays.
 constexpr auto kCheckpointPatience = std::chrono::milliseconds(3500);
+/// For what lies between the end's waits, which have bounds of their own: a disk that does not answer, say.
+constexpr auto kEndSlack = std::chrono::milliseconds(500);
+/// The engine ends between two steps of what it does, and a step of a load of a big scene takes seconds; nothing it has
+/// made since the checkpoint is worth keeping.
+constexpr auto kEnginePatience = std::chrono::milliseconds(200);
 
 int serve(Options options) {
   engine::EngineOptions engine_options;
@@ -81,12 +86,15 @@ int serve(Options options) {
   std::printf("listening on %s\n", (*server)->url().c_str());
   std::fflush(stdout);
   ServiceNotifier notifier(vitalsOf(**engine, **server));
-  (*server)->onDrain([&notifier] { notifier.stopping(); });
+  (*server)->onDrain([&notifier, grace = options.server.drain_grace] {
+    leaveWithin(grace + kCheckpointPatience + kEndSlack, "before all was done: the end took too long");
+    notifier.stopping();
+  });
   (*server)->run();
   for (const int number : {SIGINT, SIGTERM}) (void)std::signal(number, SIG_DFL);  // from here on it ends at once
   if (!(*server)->inHurry()) (*engine)->keepSolve(kCheckpointPatience);
   if (store) store->foldLog();
-  leaveWithin(std::chrono::milliseconds(200));
+  leaveWithin(kEnginePatience, "in the middle of the engine's work");
   if (uploads) uploads->finish();
   return 0;
 }

@@ -1,6 +1,7 @@
 #include "server/service_notify.h"
 
 #include <sys/socket.h>
+#include <sys/time.h>
 #include <sys/un.h>
 #include <unistd.h>
 
@@ -22,6 +23,8 @@ namespace radiosity {
 namespace {
 
 constexpr std::chrono::milliseconds kStatusInterval{2000};
+/// For a manager that is busy. The event loop, which tells of the end, has less time.
+constexpr std::chrono::milliseconds kPatience{5000}, kPatienceAtEnd{500};
 
 std::string environment(const char* name) {
   const char* value = std::getenv(name);
@@ -50,7 +53,7 @@ bool isAlive(const Vitals& vitals) {
   return vitals.event_loop_silent_s() < kEventLoopPatienceS && vitals.solver_busy_s() < kSolverPatienceS;
 }
 
-Result<void> notifyService(const std::string& socket, const std::string& state) {
+Result<void> notifyService(const std::string& socket, const std::string& state, std::chrono::milliseconds patience) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   const bool form_is_good = socket.size() > 1 && (socket[0] == '/' || socket[0] == '@');
@@ -60,13 +63,17 @@ Result<void> notifyService(const std::string& socket, const std::string& state) 
   if (socket[0] == '@') address.sun_path[0] = '\0';
   const int descriptor = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   if (descriptor < 0) return fail(ErrorCode::kUnavailable, std::strerror(errno), "NOTIFY_SOCKET");
+  const auto whole_s = std::chrono::duration_cast<std::chrono::seconds>(patience);
+  const timeval most{whole_s.count(), std::chrono::microseconds(patience - whole_s).count()};
+  (void)setsockopt(descriptor, SOL_SOCKET, SO_SNDTIMEO, &most, sizeof(most));
   const auto length = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + socket.size());
   const auto sent =
       sendto(descriptor, state.data(), state.size(), MSG_NOSIGNAL, reinterpret_cast<const sockaddr*>(&address), length);
   const int error = errno;
   close(descriptor);
   if (sent == static_cast<ssize_t>(state.size())) return {};
-  return fail(ErrorCode::kUnavailable, std::strerror(error), "NOTIFY_SOCKET " + socket);
+  return fail(ErrorCode::kUnavailable, error == EAGAIN ? "nobody reads it" : std::strerror(error),
+              "NOTIFY_SOCKET " + socket);
 }
 
 ServiceNotifier::ServiceNotifier(Vitals vitals)
@@ -78,7 +85,7 @@ ServiceNotifier::ServiceNotifier(Vitals vitals)
     interval_ = std::min(interval_, std::chrono::duration_cast<std::chrono::milliseconds>(*time / kTimesInEach));
     interval_ = std::max(interval_, std::chrono::milliseconds(1));
   }
-  tell("READY=1");
+  tell("READY=1", kPatience);
   thread_ = std::thread([this] { run(); });
 }
 
@@ -93,7 +100,7 @@ ServiceNotifier::~ServiceNotifier() {
 }
 
 void ServiceNotifier::stopping() {
-  if (!socket_.empty()) tell("STOPPING=1\nSTATUS=draining");
+  if (!socket_.empty()) tell("STOPPING=1\nSTATUS=draining", kPatienceAtEnd);
 }
 
 void ServiceNotifier::run() {
@@ -102,22 +109,22 @@ void ServiceNotifier::run() {
   for (std::unique_lock lock(mutex_); !ended_; wake_.wait_for(lock, interval_)) {
     lock.unlock();
     const bool alive = isAlive(vitals_);
-    if (watched_ && alive) tell("WATCHDOG=1");
+    if (watched_ && alive) tell("WATCHDOG=1", kPatience);
     if (was_alive && !alive)
       log::error("the {} hangs; the watchdog is not told any more that all is well",
                  vitals_.solver_busy_s() < kSolverPatienceS ? "event loop" : "solve thread");
     was_alive = alive;
     auto status = "STATUS=" + vitals_.status();
     std::replace(status.begin(), status.end(), '\n', ' ');
-    if (status != told) tell(status);
+    if (status != told) tell(status, kPatience);
     told = std::move(status);
     lock.lock();
   }
 }
 
 /// A manager that is not there is named once.
-void ServiceNotifier::tell(const std::string& state) {
-  const auto told = notifyService(socket_, state);
+void ServiceNotifier::tell(const std::string& state, std::chrono::milliseconds patience) {
+  const auto told = notifyService(socket_, state, patience);
   const std::lock_guard lock(mutex_);
   if (!told && !std::exchange(failed_, true)) log::warn("{}", told.error().text());
 }

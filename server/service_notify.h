@@ -31,8 +31,10 @@ inline constexpr double kEventLoopPatienceS = 10.0;
 /// Whether the service does its work; a watchdog that hears nothing restarts it.
 [[nodiscard]] bool isAlive(const Vitals& vitals);
 
-/// The state a service tells; see sd_notify(3). kUnavailable: the socket cannot be reached.
-[[nodiscard]] Result<void> notifyService(const std::string& socket, const std::string& state);
+/// The state a service tells; see sd_notify(3). kUnavailable: the socket cannot be reached, or nobody has read it for
+/// as long as `patience`. Any thread; blocks for that time at most.
+[[nodiscard]] Result<void> notifyService(const std::string& socket, const std::string& state,
+                                         std::chrono::milliseconds patience);
 
 class ServiceNotifier {
  public:
@@ -48,7 +50,7 @@ class ServiceNotifier {
 
  private:
   void run();
-  void tell(const std::string& state);
+  void tell(const std::string& state, std::chrono::milliseconds patience);
 
   std::string socket_;
   Vitals vitals_;

@@ -199,6 +199,12 @@ class Observe(ServiceCase):
         self.assertEqual(server.terminate(), 0)
         self.assertEqual(server.log().count("NOTIFY_SOCKET"), 1)
 
+    def test_a_manager_that_does_not_read_does_not_hold_up_the_end(self):
+        _, environment = self.manager()
+        server = self.server(env={**environment, "WATCHDOG_USEC": "3000"})  # its queue is full at once
+        self.until(lambda: "nobody reads it" in server.log())
+        self.assertEqual(server.terminate(), 0)
+
 
 if __name__ == "__main__":
     unittest.main()

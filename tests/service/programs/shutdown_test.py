@@ -10,7 +10,7 @@ import unittest
 import websockets
 
 import plates
-from harness import ServiceCase, marked_processes
+from harness import ServiceCase, marked_processes, program
 from wire import Session
 
 ENDLESS = ("--error", 1e-6, "--texels", 20000, "--workers", 2)
@@ -115,6 +115,41 @@ class ShutdownTest(ServiceCase):
         self.run_async(body())
         self.assertEqual(server.terminate(), 0, server.log())
         self.assertNothingLeft()
+
+    def test_aDiskThatDoesNotAnswerDoesNotKeepTheServer(self):
+        """An edit, and after it the end, wait for it. What was acknowledged before is there again."""
+        stuck, state = self.folder / "stuck", self.folder / "state"
+        server = self.server(self.scene, "--state", state, "--error", 0.1, "--texels", 500,
+                             env={"LD_PRELOAD": program("STUCK_DISK"), "RADIOSITY_TEST_STUCK_DISK": str(stuck)})
+        lamp = f"/materials/{plates.LAMP_MATERIAL}/emissiveFactor"
+
+        async def body():
+            session = await Session.open(server.url)
+            await self.state_reached(session, "converged")
+            await session.call("scene.patch", patch=[{"op": "replace", "path": lamp, "value": [1, 0, 0]}])
+            stuck.touch()
+            edit = asyncio.ensure_future(
+                session.call("scene.patch", patch=[{"op": "replace", "path": lamp, "value": [0, 1, 0]}]))
+            done, _ = await asyncio.wait({edit}, timeout=1)
+            self.assertEqual(done, set(), "it was acknowledged before it was on the disk")
+            server.process.send_signal(signal.SIGTERM)
+            await asyncio.wait({edit})
+            self.assertIsNotNone(edit.exception())
+
+        self.run_async(body())
+        self.assertEqual(server.wait(20), 0, server.log())
+        self.assertIn("the end took too long", server.log())
+        stuck.unlink()
+        again = self.server("--state", state)
+
+        async def acknowledged():
+            session = await Session.open(again.url)
+            scene = await session.call("scene.get")
+            await session.close()
+            return scene["gltf"]["materials"][plates.LAMP_MATERIAL]["emissiveFactor"]
+
+        # The other one was not answered: it may be there or not.
+        self.assertIn(self.run_async(acknowledged()), ([1, 0, 0], [0, 1, 0]))
 
 
 if __name__ == "__main__":
