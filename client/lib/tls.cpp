@@ -4,6 +4,7 @@
 #include <openssl/ssl.h>
 #include <openssl/x509_vfy.h>
 #include <boost/asio/ssl/context.hpp>
+#include <boost/asio/ssl/error.hpp>
 
 #include "client/lib/pump.h"
 #include "client/lib/stream.h"
@@ -29,6 +30,7 @@ Result<void> trustAuthorities(ssl::context& context, const TlsTrust& trust) {
 }
 
 Error handshakeError(const BoostError& error, SSL* native, const ServerUrl& url) {
+  if (error == ssl::error::stream_truncated) return transferError(asio::error::eof, url, "TLS handshake");
   if (error.category() != asio::error::get_ssl_category()) return transferError(error, url, "TLS handshake");
   const auto verdict = SSL_get_verify_result(native);
   if (verdict == X509_V_ERR_HOSTNAME_MISMATCH || verdict == X509_V_ERR_IP_ADDRESS_MISMATCH)

@@ -122,12 +122,13 @@ void Server::State::accept() {
       if (hub_->counters().connections.load() <= hub_->options().max_clients) {
         serve(TcpStream(std::move(socket)), slot);
       } else {
-        // A short answer that fits the socket's buffer: no session is spent on it.
+        // A short answer that fits the socket's buffer: no session is spent on it. Who waits for TLS gets none: what is
+        // sent in the clear would pass for a server without TLS.
         static constexpr std::string_view kFull =
             "HTTP/1.1 503 Service Unavailable\r\nRetry-After: 5\r\nContent-Length: 0\r\nConnection: close\r\n\r\n";
         ++hub_->counters().connections_refused;
         socket.non_blocking(true, ignored);
-        socket.send(asio::buffer(kFull), 0, ignored);
+        if (!tls_) socket.send(asio::buffer(kFull), 0, ignored);
       }
       return accept();
     }

@@ -196,6 +196,17 @@ class Tls(ServiceCase):
             except OSError:  # the server has not seen yet that they are gone
                 self.assertLess(time.monotonic(), deadline)
 
+    def test_who_finds_the_server_full_is_not_told_in_the_clear(self):
+        """It would pass for a server without TLS, and a client might come again without."""
+        server = self.tlsServer("--max-clients", 1)
+        first = socket.create_connection(("127.0.0.1", server.port))
+        self.addCleanup(first.close)
+        one_more = socket.create_connection(("127.0.0.1", server.port))
+        self.addCleanup(one_more.close)
+        self.assertEqual(self.end(one_more), b"")
+        said = self.complaint("status", server.url, "--ca", self.certificate, expect=1)
+        self.assertRegex(said, "TLS handshake: .*closed the connection")
+
     def test_a_drain_ends_tls_connections(self):
         server = self.tlsServer()
         context = ssl.create_default_context(cafile=str(self.certificate))
