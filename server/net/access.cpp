@@ -19,6 +19,12 @@ std::string_view authorityOf(std::string_view origin) {
   return scheme == std::string_view::npos ? std::string_view() : origin.substr(scheme + 3);
 }
 
+/// As browsers send it: scheme and authority, no path; or "null", of pages from files. "*" is our own word for all.
+bool isOrigin(std::string_view text) {
+  const auto authority = authorityOf(text);
+  return text == "*" || text == "null" || (!authority.empty() && authority.find_first_of("/?#@ ") == authority.npos);
+}
+
 /// "host:port" or "[::1]:port" -> host without brackets.
 std::string_view nameOf(std::string_view authority) {
   if (authority.starts_with('[')) return authority.substr(1, authority.find(']') - 1);
@@ -74,6 +80,10 @@ Result<void> checkExposure(const ServerOptions& options) {
   if (error)
     return fail(ErrorCode::kBadUsage, "not an IP address; use for example 127.0.0.1:8765 or [::]:8765",
                 "--listen " + options.address);
+  for (const auto& allowed : options.allow_origins)
+    if (!isOrigin(allowed))
+      return fail(ErrorCode::kBadUsage, "not an origin, and would match none; write it as https://viewer.example.org",
+                  "--allow-origin " + allowed);
   if (address.is_loopback() || !options.token.empty() || options.insecure) return {};
   return fail(ErrorCode::kBadUsage,
               "anyone who reaches this address could use the server; give --token-file FILE (and --tls-cert, "

@@ -23,7 +23,7 @@ namespace radiosity::net {
 /// without a token, only IP addresses, "localhost" and the hosts of --allow-origin are served.
 [[nodiscard]] bool hostAllowed(std::string_view host, const ServerOptions& options);
 
-/// kBadUsage when the address is not an IP address, or is reachable from outside without token or --insecure.
+/// kBadUsage: no IP address, or one reachable from outside without token or --insecure; an --allow-origin that is none.
 [[nodiscard]] Result<void> checkExposure(const ServerOptions& options);
 
 }  // namespace radiosity::net

@@ -1,13 +1,15 @@
 """The server over its socket, by an off-the-shelf WebSocket client that knows only the specification."""
 import asyncio
 import json
+import os
 import signal
+import subprocess
 import unittest
 import urllib.error
 import urllib.request
 
 import plates
-from harness import ServiceCase, marked_processes
+from harness import MARK, ServiceCase, marked_processes, program
 from wire import RpcError, Session
 
 TARGET = 0.05
@@ -52,6 +54,16 @@ class ServerTest(ServiceCase):
             status = await session.call("status")
         self.assertEqual(status["state"], "converged")
         return status
+
+    def test_anOriginThatIsNoneIsRefusedByName(self):
+        """It would match no page's, without a word."""
+        for origin in ("viewer.example.org", "https://viewer.example.org/", "https://", "https://a.example https://b.example"):
+            done = subprocess.run([program("RADIOSITYD"), "--listen", "127.0.0.1:0", "--allow-origin", origin], timeout=60,
+                                  capture_output=True, text=True, check=False, env={**os.environ, MARK: self.mark})
+            self.assertEqual(done.returncode, 2, done.stderr)
+            self.assertIn(f"--allow-origin {origin}: not an origin", done.stderr)
+        for origin in ("https://viewer.example.org", "http://localhost:5173", "http://[::1]:5173", "null", "*"):
+            self.server("--allow-origin", origin)
 
     def test_serverIntroducesItselfAndAnswersHello(self):
         async def body():
