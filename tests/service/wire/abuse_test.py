@@ -1,11 +1,14 @@
 """Clients that take and give nothing, or too much, or vanish: each is cut off, and nobody else notices. No claims about
 seconds: what must come is waited for, and a hang is a failure."""
+import concurrent.futures
+import itertools
 import json
 import os
 import pathlib
 import re
 import resource
 import socket
+import threading
 import time
 import unittest
 import urllib.request
@@ -45,6 +48,13 @@ class Abuse(ServiceCase):
             call = {"jsonrpc": "2.0", "id": 1, "method": "subscribe", "params": {"minMip": finest}}
             raw.send(frame(TEXT, json.dumps(call).encode()))
         return raw
+
+    def isThere(self, raw):
+        try:
+            raw.call("viewers")
+        except (EOFError, OSError):
+            return False
+        return True
 
     def reader(self, server):
         """A viewer that keeps up: a bookmark comes only to those who do, and under a sanitizer whole pages take longer to
@@ -160,9 +170,18 @@ class Abuse(ServiceCase):
 
     def test_more_clients_than_the_limit_are_told_so(self):
         server = self.server("--max-clients", 4)
-        kept = [self.viewer(server, subscribe=False) for _ in range(4)]
-        with RawSocket(server.port) as late:
-            self.assertIn(b" 503 ", late.socket.recv(4096))
+        kept = []
+        for _ in range(5):
+            kept += [self.viewer(server, subscribe=False) for _ in range(4 - len(kept))]
+            with RawSocket(server.port) as late:
+                told = late.socket.recv(4096)
+            # On a machine that stalls, one that has answered no ping for half a minute was let go: it proves nothing.
+            present = [raw for raw in kept if self.isThere(raw)]
+            if len(present) == 4:
+                break
+            kept = present
+        self.assertEqual(len(present), 4)
+        self.assertIn(b" 503 ", told)
         kept[0].reset()
 
         def admitted():
@@ -171,6 +190,43 @@ class Abuse(ServiceCase):
                 return b" 200 " in again.socket.recv(4096)
 
         self.eventually(admitted)
+
+    def test_never_are_more_in_than_the_limit_whoever_comes_and_goes(self):
+        """Counted by the clients themselves: in once they are answered, out before they close."""
+        server = self.server("--max-clients", 4)
+        tally, lock, end = {"in": 0, "most": 0, "refused": 0}, threading.Lock(), time.monotonic() + 3
+
+        def visit(number):
+            for turn in itertools.count(number):
+                if time.monotonic() > end and tally["refused"]:
+                    return
+                with RawSocket(server.port) as raw:
+                    if turn % 4 == 0:  # half a handshake takes a place too
+                        raw.send(b"GET /ws HT")
+                        continue
+                    if not self.isIn(raw, upgrade=turn % 2 == 0):
+                        tally["refused"] += 1
+                        continue
+                    with lock:
+                        tally["in"] += 1
+                        tally["most"] = max(tally["most"], tally["in"])
+                    time.sleep(0.002)
+                    with lock:
+                        tally["in"] -= 1
+
+        with concurrent.futures.ThreadPoolExecutor(16) as visitors:
+            list(visitors.map(visit, range(16)))
+        self.assertIn(tally["most"], range(1, 5))
+        self.eventually(lambda: self.metric(server, "connections") == 1)  # the one that asks
+
+    def isIn(self, raw, upgrade):
+        try:
+            if upgrade:
+                return " 101 " in raw.upgrade()
+            raw.send(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n")
+            return b" 200 " in raw.socket.recv(4096)
+        except (EOFError, ConnectionError):
+            return False
 
     def test_a_storm_of_reconnections_leaves_nothing_behind(self):
         server = self.server(*self.scene, env=PATIENCE)
