@@ -74,6 +74,7 @@ export class ViewSession {
     const elsewhere = this.bounds !== undefined && !alike(this.bounds, scene.bounds);
     this.bounds = scene.bounds;
     if (this.sceneIsNew && elsewhere) this.forgetCamera();
+    if (this.sceneIsNew || !this.placed) this.app.viewer.exposure.forget();
     this.sceneIsNew = false;
     if (this.placed) return;
     this.placed = true;
@@ -91,7 +92,6 @@ export class ViewSession {
     const before = { placed: this.placed, camera: this.camera };
     this.placed = false;
     this.camera = -1;
-    this.app.viewer.exposure.fresh = true;
     return before;
   }
 
@@ -104,7 +104,7 @@ export class ViewSession {
   onDrawn(): void {
     const set = this.app.viewer.shown?.set;
     if (set) this.app.mark('geometry');
-    if (set?.lit && set.tilesTaken > 0) this.app.mark('light');
+    if (set?.showsLight && set.tilesTaken > 0) this.app.mark('light');
     if (set?.complete && set.waiting === 0 && !this.sharpMarked) {
       this.sharpMarked = true;
       this.app.mark('sharp');

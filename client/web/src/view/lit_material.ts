@@ -130,7 +130,7 @@ function noPage() {
     pageSize: { value: [1, 1] },
     pageUsed: { value: [1, 1] },
     pageTiles: { value: 64 },
-    pageLightKnown: { value: false },
+    pageLightShown: { value: false },
   };
 }
 
