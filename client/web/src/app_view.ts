@@ -301,8 +301,9 @@ export class ViewSession {
   private press(key: string, event: KeyboardEvent): boolean {
     const { app } = this;
     const command = event.ctrlKey || event.metaKey;
-    if (command && key.toLowerCase() === 'z') return done(event.shiftKey ? app.edit.redo() : app.edit.undo());
-    if (command && key.toLowerCase() === 'y') return done(app.edit.redo());
+    if (command && key.toLowerCase() === 'z')
+      return done(event.shiftKey ? app.edit.history.redo() : app.edit.history.undo());
+    if (command && key.toLowerCase() === 'y') return done(app.edit.history.redo());
     if (command || event.altKey) return false;
     if (key === 'Delete' || key === 'Backspace') return isAmongObjects(event.target) && done(app.edit.removeSelected());
     if (/^\d$/.test(key)) return done(this.setMode(VIEW_MODES[(Number(key) + 9) % 10]?.id ?? 'lit'));
