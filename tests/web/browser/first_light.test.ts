@@ -87,7 +87,7 @@ it.each(['', 'view=irradiance', 'view=pages'])(
   },
 );
 
-/** A lit square, 500 m away. */
+/** A wall that shines upon a floor, 500 m away. */
 function bright(luminance: number): string {
   const corners = [-0.5, 0, -0.5, -0.5, 0, 0.5, 0.5, 0, 0.5, 0.5, 0, -0.5];
   const bytes = Buffer.alloc(60);
@@ -98,8 +98,8 @@ function bright(luminance: number): string {
     scene: 0,
     scenes: [{ nodes: [0, 1] }],
     nodes: [
-      { name: 'lamp', mesh: 0, translation: [500, 1, 0], rotation: [1, 0, 0, 0] },
-      { name: 'floor', mesh: 1, translation: [500, 0, 0], scale: [2, 1, 2] },
+      { name: 'wall', mesh: 0, translation: [500, 0, 0], rotation: [Math.SQRT1_2, 0, 0, Math.SQRT1_2] },
+      { name: 'floor', mesh: 1, translation: [500, -0.5, 0.5] },
     ],
     meshes: [0, 1].map((material) => ({ primitives: [{ attributes: { POSITION: 0 }, indices: 1, material }] })),
     extensionsUsed: ['KHR_materials_emissive_strength'],
@@ -136,7 +136,9 @@ it('shows a scene that takes the place of a darker one in its own brightness at 
   const frames = (await framesOf(page)).filter(({ layout, light }) => layout !== before.layout && light);
   const last = frames.at(-1)!;
   expect(before.exposure / last.exposure).toBeGreaterThan(20);
-  // Its light comes to rest while it is solved: some of it is reflected later than the rest.
-  expect(frames[0]!.exposure / last.exposure).toBeLessThan(2);
-  expect(frames[0]!.exposure / last.exposure).toBeGreaterThan(0.5);
+  // Its first light may be a part of what there will be: it is as bright on the screen all the same, where the exposure
+  // of the scene before would make it white.
+  const mean = ({ picture }: Frame) => picture.reduce((sum, v) => sum + v, 0) / picture.length;
+  expect(mean(frames[0]!) / mean(last), `${frames[0]!.exposure}, ${last.exposure}`).toBeLessThan(1.5);
+  expect(mean(frames[0]!) / mean(last)).toBeGreaterThan(0.5);
 });

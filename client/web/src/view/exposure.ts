@@ -57,6 +57,12 @@ export class ExposureMeter {
     ++this.scene;
   }
 
+  /** Shown at once, until there is a measurement to go over to. */
+  guess(value: number): void {
+    this.take(value);
+    this.waits = false;
+  }
+
   /** How brightly to show light is still to be found out. */
   get unknown(): boolean {
     return this.automatic && this.waits;

@@ -16,6 +16,7 @@ import { LitScene } from './lit_scene';
 import type { People } from './people';
 import { PagesView } from './pages_view';
 import { pick, readingAt, type Reading } from './picker';
+import { exposureByRays } from './ray_exposure';
 import type { ViewMode } from './view_modes';
 
 /** For taking up tiles, of the 16 that a frame has; of longer ones the same share, but no task of 50. */
@@ -323,8 +324,17 @@ export class Viewer {
     const { covered, complete, waiting } = this.shown?.set ?? {};
     if (!this.gate.mayMeasure(now, covered === true, complete === true && waiting === 0)) return;
     this.lastMeasure = now;
+    if (unknown && this.guessExposure(now)) return; // and the card has the first light itself to draw
     this.exposureDue = false;
     if (automatic && (unknown || !this.mode?.flat)) void this.measureNow().then(() => (this.wanted = true));
+  }
+
+  private guessExposure(now: number): boolean {
+    const guess = this.shown && exposureByRays(this.shown, this.rig.camera);
+    if (guess === undefined) return false;
+    this.exposure.guess(guess);
+    this.gate.turn(now, false);
+    return (this.wanted = true);
   }
 
   /** Signs and handles are no part of the scene's light. */
