@@ -125,6 +125,17 @@ TEST(BatchChunks, CoverEveryShotOnce) {
   EXPECT_TRUE(gpu::cutBatch({}, {}, 2).empty());
 }
 
+// So that no worker waits long for another at the end.
+TEST(BatchChunks, GetSmallTowardsTheEndOfABatch) {
+  const auto scene = randomRoom(60, 2000, 1);
+  auto batch = mixedBatch(*scene, 700);
+  batch.gather.clear();
+  const auto chunks = gpu::cutBatch(batch, {200'000, 1000}, 2);  // of many triangles: each shot costs something
+  ASSERT_GT(chunks.size(), 8U);
+  EXPECT_LT(chunks.back().cost, 0.25 * chunks.front().cost);
+  for (std::size_t i = 1; i < chunks.size(); ++i) EXPECT_LT(chunks[i].cost, 1.3 * chunks[i - 1].cost) << i;
+}
+
 TEST(BatchChunks, OfScenesWithManyNodesHaveFewShotsSoThatTheirLinksStaySmall) {
   const auto scene = randomRoom(60, 2000, 1);
   const auto batch = mixedBatch(*scene, 400);
