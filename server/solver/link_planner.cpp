@@ -39,7 +39,7 @@ constexpr double kSourceCost = 60.0;
 
 /// A wave ends where it is likely to bring the error to this part of the target: the spreads that it goes by are
 /// uncertain themselves, and the largest are rather too large.
-constexpr double kSurelyBelow = 0.95;
+constexpr double kSurelyBelow = 0.9;
 /// So much of a wave is worth solving all bounces for.
 constexpr std::size_t kLeastPartOfWave = 8;
 
