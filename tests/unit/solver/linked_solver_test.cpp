@@ -161,10 +161,10 @@ TEST_F(LinkedEdits, ALampDraggedAboutLeavesNoTrail) {
 TEST_F(LinkedEdits, AskedForALittleLessErrorTakeALittleMore) {
   const double stated = solver_->error().total;
   const auto before = solver_->linkCounters().samples;
-  solver_->setTargetError(0.9 * stated);
+  solver_->setTargetError(0.99 * stated);
   solve(*solver_);
   const auto more = static_cast<double>(solver_->linkCounters().samples - before);
-  EXPECT_LE(solver_->error().total, 0.9 * stated);
+  EXPECT_LE(solver_->error().total, 0.99 * stated);
   EXPECT_GT(more, 0.0);
   EXPECT_LT(more, 100.0) << "of " << before << ", stated " << stated << " then " << solver_->error().total;
 }
