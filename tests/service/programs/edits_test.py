@@ -33,7 +33,7 @@ class EditsCase(ServiceCase):
         self.url = self.running.url
 
     def run_async(self, coroutine):
-        return asyncio.run(asyncio.wait_for(coroutine, 300))
+        return asyncio.run(asyncio.wait_for(coroutine, 600))
 
     def put(self, path, body):
         request = urllib.request.Request(self.url + path, data=body, method="PUT",
