@@ -131,7 +131,7 @@ class RemoteTest(ServiceCase):
                     await reader.readexactly(int(re.search(r"Content-Length: (\d+)", head, re.IGNORECASE).group(1)))
                     connected[0].send(9, b"still there?")
                     with contextlib.suppress(asyncio.TimeoutError):
-                        await asyncio.wait_for(answered.wait(), 20)
+                        await asyncio.wait_for(answered.wait(), 60)
                     body = json.dumps({"error": {"code": "busy", "message": "that was all"}}).encode()
                     writer.write(b"HTTP/1.1 503 Busy\r\nConnection: close\r\nContent-Length: %d\r\n\r\n" % len(body) + body)
                 writer.close()
@@ -139,7 +139,7 @@ class RemoteTest(ServiceCase):
             connected = []
             async with await asyncio.start_server(serve, "127.0.0.1", 0) as server:
                 told.set_result(server.sockets[0].getsockname()[1])
-                await asyncio.sleep(60)
+                await asyncio.sleep(300)
 
         with running(stand_in) as port:
             self.assertIn("that was all", self.complaint("solve", self.scene, "-o", "lit.glb", "--server",

@@ -137,7 +137,7 @@ class ShutdownTest(ServiceCase):
             self.assertIsNotNone(edit.exception())
 
         self.run_async(body())
-        self.assertEqual(server.wait(20), 0, server.log())
+        self.assertEqual(server.wait(60), 0, server.log())
         self.assertIn("the end took too long", server.log())
         stuck.unlink()
         again = self.server("--state", state)
