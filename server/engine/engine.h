@@ -70,6 +70,9 @@ struct SolveSettings {
   std::uint64_t link_memory_bytes = std::uint64_t{1} << 30;  ///< that remembered links never exceed (server option)
 };
 
+/// Warnings that a Status holds at most: it is made ten times a second, and scenes have as many as they have materials.
+inline constexpr std::size_t kStatusWarnings = 200;
+
 struct Status {
   SolveState state = SolveState::kEmpty;
   std::uint64_t revision = 0;      ///< of the scene; raised by load and patch
@@ -85,8 +88,9 @@ struct Status {
   std::uint64_t nodes = 0, surfaces = 0, polygons = 0, pages = 0;
   std::map<std::string, double> counters;  ///< skips, culls, times: whatever the solver counts
   std::string gl_renderer;
-  std::vector<std::string> warnings;
-  std::string failure;  ///< why, when kFailed or kLimited
+  std::vector<std::string> warnings;  ///< the first kStatusWarnings
+  std::uint64_t warning_count = 0;    ///< of all
+  std::string failure;                ///< why, when kFailed or kLimited
   /// Nothing can be drawn at present (a driver is gone, all renderers died); the solve starts over when it can.
   bool renderer_lost = false;
   std::uint64_t renderers_replaced = 0, solve_restarts = 0;  ///< since the start of the program

@@ -8,6 +8,23 @@
 #include "server/engine/carried_light.h"
 
 namespace radiosity::engine {
+namespace {
+
+std::uint64_t leavesWithArea(const scene::PatchScene& patches) {
+  std::uint64_t count = 0;
+  for (const auto& surface : patches.surfaces) {
+    for (const auto first : surface.first_node) {
+      if (first == scene::kNone) continue;
+      const auto leaves = patches.node_area.begin() + first;
+      count += static_cast<std::uint64_t>(std::count_if(leaves, leaves + std::int64_t{surface.width} * surface.height,
+                                                        [](const float area) { return area > 0.0F; }));
+    }
+  }
+  return count;
+}
+
+}  // namespace
+
 Result<std::unique_ptr<LitScene>> LitScene::make(scene::Document document, const SolveSettings& settings,
                                                  solver::Transport& transport) {
   auto imported = scene::importScene(document);
@@ -27,6 +44,7 @@ Result<std::unique_ptr<LitScene>> LitScene::make(scene::EditedDocument edited, c
   auto patches = scene::buildPatchScene(*lit->scene_, charts, before ? &*before : nullptr);
   if (!patches) return tl::unexpected<Error>(patches.error());
   lit->patches_ = std::make_shared<const scene::PatchScene>(std::move(*patches));
+  lit->patch_count_ = leavesWithArea(*lit->patches_);
   lit->materials_ = scene::shadePatches(*lit->scene_, *lit->patches_);
   return lit;
 }
@@ -206,14 +224,20 @@ bool LitScene::setSky(const SolveSettings& settings) {
   return true;
 }
 
-std::vector<std::string> LitScene::warnings() const {
-  std::vector<std::string> all = scene_->warnings;
-  all.insert(all.end(), patches_->warnings.begin(), patches_->warnings.end());
-  all.insert(all.end(), materials_.warnings.begin(), materials_.warnings.end());
-  if (power_ <= 0.0 && !patches_->surfaces.empty()) {
-    all.emplace_back("nothing shines: the scene has no emissive surface, no light and no sky; --sky 1000 adds one");
+std::vector<std::string> LitScene::warnings(std::size_t most) const {
+  std::vector<std::string> first;
+  for (const auto* some : {&scene_->warnings, &patches_->warnings, &materials_.warnings}) {
+    const auto count = static_cast<std::ptrdiff_t>(std::min(some->size(), most - first.size()));
+    first.insert(first.end(), some->begin(), some->begin() + count);
   }
-  return all;
+  if (nothingShines() && first.size() < most) {
+    first.emplace_back("nothing shines: the scene has no emissive surface, no light and no sky; --sky 1000 adds one");
+  }
+  return first;
+}
+
+std::size_t LitScene::warningCount() const {
+  return scene_->warnings.size() + patches_->warnings.size() + materials_.warnings.size() + (nothingShines() ? 1 : 0);
 }
 
 /// Children shoot how they differ from their parents, so noise leaves single leaves a little darker than black. Nothing

@@ -1,7 +1,9 @@
 // One scene and everything derived from it: document, values, patches, materials, solver. Belongs to the solve thread.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -70,7 +72,11 @@ class LitScene {
   [[nodiscard]] solver::Solver& solver() { return *solver_; }
   [[nodiscard]] const solver::Solver& solver() const { return *solver_; }
   [[nodiscard]] const SolveSettings& settings() const { return settings_; }
-  [[nodiscard]] std::vector<std::string> warnings() const;
+  /// What is odd about the scene; the first so many.
+  [[nodiscard]] std::vector<std::string> warnings(std::size_t most = std::numeric_limits<std::size_t>::max()) const;
+  [[nodiscard]] std::size_t warningCount() const;
+  /// Leaf patches with area.
+  [[nodiscard]] std::uint64_t patchCount() const { return patch_count_; }
 
   /// The solve so far, as Solver::save() and restore().
   [[nodiscard]] bool save(ArchiveWriter& to) const;
@@ -111,6 +117,7 @@ class LitScene {
         settings_(settings),
         transport_(transport),
         scene_(std::make_shared<const scene::Scene>(std::move(edited.scene))) {}
+  [[nodiscard]] bool nothingShines() const { return power_ <= 0.0 && !patches_->surfaces.empty(); }
   void makeSolver(const solver::FormerSolver* former = nullptr);
   void updateSolver(bool materials, bool lights);
   [[nodiscard]] std::vector<scene::LightmapPage> directPages() const;
@@ -123,6 +130,7 @@ class LitScene {
   solver::Transport& transport_;
   std::shared_ptr<const scene::Scene> scene_;
   std::shared_ptr<const scene::PatchScene> patches_;
+  std::uint64_t patch_count_ = 0;
   scene::PatchMaterials materials_;
   bool stale_ = false;
   bool reproducible_ = true;

@@ -1,6 +1,5 @@
 #include "server/engine/status_report.h"
 
-#include <algorithm>
 #include <array>
 
 namespace radiosity::engine {
@@ -91,15 +90,9 @@ Status reportStatus(const LitScene& lit, double seconds) {
   status.surfaces = patches.surfaces.size();
   status.polygons = patches.polygons;
   status.pages = patches.pages.size();
-  for (const auto& surface : patches.surfaces) {
-    for (const auto first : surface.first_node) {
-      if (first == scene::kNone) continue;
-      const auto leaves = patches.node_area.begin() + first;
-      status.patches += static_cast<std::uint64_t>(std::count_if(
-          leaves, leaves + std::int64_t{surface.width} * surface.height, [](const float area) { return area > 0.0F; }));
-    }
-  }
-  status.warnings = lit.warnings();
+  status.patches = lit.patchCount();
+  status.warnings = lit.warnings(kStatusWarnings);
+  status.warning_count = lit.warningCount();
   addCounters(lit, status);
   return status;
 }

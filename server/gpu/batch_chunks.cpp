@@ -10,9 +10,11 @@ namespace radiosity::gpu {
 namespace {
 
 /// A chunk costs a message there and back (about 50 us with the wake-up): it should take well over a millisecond.
-constexpr double kMinChunkCost = 500'000.0;  // pixels
-/// So many chunks for each worker even out the differences between them.
-constexpr double kChunksPerWorker = 8.0;
+constexpr double kMinChunkCost = 150'000.0;  // pixels
+/// A chunk is at most this part of a worker's share of the batch, and of its share of what is left: the last ones are
+/// small, so that all workers come to their end together.
+constexpr double kLargestPart = 1.0 / 8.0;
+constexpr double kPartOfRest = 1.0 / 3.0;
 /// Links of so many shots fit into one report, in scenes where those of one shot are few.
 constexpr std::size_t kMaxShots = 64;
 constexpr std::size_t kMaxLinkBytes = std::size_t{16} << 20;
@@ -22,19 +24,34 @@ std::size_t maxShots(std::size_t nodes) {
   return std::clamp<std::size_t>(kMaxLinkBytes / (sizeof(float) * std::max<std::size_t>(nodes, 1)), 1, kMaxShots);
 }
 
-template <typename Shot>
-void cut(const std::vector<Shot>& shots, ShotKind kind, double target, std::size_t most, const solver::ShotCost& cost,
-         std::vector<Chunk>& chunks) {
-  double sum = 0.0;
-  std::size_t first = 0;
-  for (std::size_t i = 0; i < shots.size(); ++i) {
-    sum += cost(shots[i]);
-    if (sum < target && i + 1 < shots.size() && i + 1 - first < most) continue;
-    chunks.push_back({kind, first, i + 1 - first, sum});
-    first = i + 1;
-    sum = 0.0;
+/// What a batch is cut by.
+struct Cutter {
+  solver::ShotCost cost;
+  std::size_t most;  ///< shots of a chunk
+  double share;      ///< cost of a worker's share of the batch
+  double left;       ///< what it costs to do what is not cut yet, a worker's share
+  std::size_t workers;
+  std::vector<Chunk> chunks;
+
+  /// Small batches still give every worker something to do.
+  [[nodiscard]] double target() const {
+    return std::min(std::max(kMinChunkCost, std::min(kLargestPart * share, kPartOfRest * left)), share);
   }
-}
+
+  template <typename Shot>
+  void cut(const std::vector<Shot>& shots, ShotKind kind) {
+    double sum = 0.0;
+    std::size_t first = 0;
+    for (std::size_t i = 0; i < shots.size(); ++i) {
+      sum += cost(shots[i]);
+      if (sum < target() && i + 1 < shots.size() && i + 1 - first < most) continue;
+      chunks.push_back({kind, first, i + 1 - first, sum});
+      left -= sum / static_cast<double>(workers);
+      first = i + 1;
+      sum = 0.0;
+    }
+  }
+};
 
 /// What a chunk refers to, gathered into arrays of its own.
 struct Packed {
@@ -88,22 +105,20 @@ void packGather(const solver::ShotBatch& batch, const Chunk& chunk, Packed& pack
 }  // namespace
 
 std::vector<Chunk> cutBatch(const solver::ShotBatch& batch, const SceneSize& scene, std::size_t workers) {
-  const solver::ShotCost cost{static_cast<double>(scene.triangles)};
+  const solver::ShotCost cost{static_cast<double>(scene.triangles), static_cast<double>(scene.nodes)};
   const std::size_t most = maxShots(scene.nodes);
   double total = 0.0;
   for (const auto& shot : batch.scatter) total += cost(shot);
   for (const auto& shot : batch.gather) total += cost(shot);
   for (const auto& shot : batch.point_lights) total += cost(shot);
   for (const auto& shot : batch.parallel) total += cost(shot);
-  // Small batches still give every worker something to do.
   const double share = total / static_cast<double>(workers);
-  const double target = std::min(std::max(kMinChunkCost, share / kChunksPerWorker), share);
-  std::vector<Chunk> chunks;
-  cut(batch.gather, ShotKind::kGather, target, most, cost, chunks);
-  cut(batch.parallel, ShotKind::kParallel, target, most, cost, chunks);
-  cut(batch.point_lights, ShotKind::kPoint, target, most, cost, chunks);
-  cut(batch.scatter, ShotKind::kScatter, target, most, cost, chunks);
-  return chunks;
+  Cutter cutter{cost, most, share, share, workers, {}};
+  cutter.cut(batch.gather, ShotKind::kGather);
+  cutter.cut(batch.parallel, ShotKind::kParallel);
+  cutter.cut(batch.point_lights, ShotKind::kPoint);
+  cutter.cut(batch.scatter, ShotKind::kScatter);
+  return std::move(cutter.chunks);
 }
 
 std::vector<std::byte> packChunk(const solver::ShotBatch& batch, const Chunk& chunk, std::uint64_t id, bool measure) {

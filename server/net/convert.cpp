@@ -134,13 +134,15 @@ protocol::StatusReply toStatusReply(const engine::Status& s) {
   protocol::StatusReply out;
   out.progress = toProgress(s);
   out.settings = toSettings(s.settings);
-  out.warning_count = s.warnings.size();
+  out.warning_count = s.warning_count;
   out.warnings = firstWarnings(s.warnings);
   for (const auto& [key, value] : s.counters)
     if (std::isfinite(value)) out.counters[key] = value;
   out.gl_renderer = s.gl_renderer;
   return out;
 }
+
+static_assert(engine::kStatusWarnings == protocol::kMaxStatusWarnings);
 
 // Both list the same quantities in the same order.
 static_assert(static_cast<int>(engine::Quantity::kIrradiance) == static_cast<int>(protocol::Quantity::kIrradiance));

@@ -87,8 +87,7 @@ std::string statusPage(const engine::Status& s, std::size_t viewers, std::string
   if (!s.warnings.empty()) page += "<h2>Warnings</h2>\n<ul>\n";
   for (std::size_t i = 0; i < s.warnings.size() && i < kWarningsShown; ++i)
     page += fmt::format("<li>{}</li>\n", htmlEscaped(s.warnings[i]));
-  if (s.warnings.size() > kWarningsShown)
-    page += fmt::format("<li>and {} more</li>\n", s.warnings.size() - kWarningsShown);
+  if (s.warning_count > kWarningsShown) page += fmt::format("<li>and {} more</li>\n", s.warning_count - kWarningsShown);
   if (!s.warnings.empty()) page += "</ul>\n";
   return page + "</body>\n</html>\n";
 }

@@ -7,7 +7,7 @@
 namespace radiosity::scene {
 namespace {
 
-constexpr std::size_t kMaxOperations = 1000;
+constexpr std::size_t kMaxOperations = 5000;
 constexpr std::size_t kMaxDepth = 64;
 // `copy` can double a document with each operation; what is added is bounded, not the count of operations alone.
 constexpr std::size_t kMaxAddedBytes = std::size_t{64} << 20;

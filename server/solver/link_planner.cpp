@@ -37,6 +37,34 @@ constexpr std::uint32_t kMostSamplesAWave = 8;
 /// So many times that of a node are the images of a light without extent (a sky has most).
 constexpr double kSourceCost = 60.0;
 
+/// A wave ends where it is likely to bring the error to this part of the target: the spreads that it goes by are
+/// uncertain themselves, and the largest are rather too large.
+constexpr double kSurelyBelow = 0.9;
+/// So much of a wave is worth solving all bounces for.
+constexpr std::size_t kLeastPartOfWave = 8;
+
+/// What a wave of improvement is likely to do to the error.
+class Forecast {
+ public:
+  /// Variance of all samples, and squared error by what varies inside shooters, as the gains of a wave count them.
+  Forecast(const ErrorGoal& goal, double variance, double variation)
+      : goal_(goal), variance_(variance), variation_(variation) {}
+  void sample(double less) { sampled_ += less; }
+  void split(double less) { split_ += less; }
+  [[nodiscard]] bool isReached() const {
+    const double sampling = goal_.sampling * left(sampled_, variance_);
+    const double residual = goal_.rest + goal_.varying * left(split_, variation_);
+    return std::hypot(residual, sampling) <= kSurelyBelow * goal_.target;
+  }
+
+ private:
+  static double left(double less, double all) { return all > 0.0 ? std::sqrt(std::max(0.0, 1.0 - less / all)) : 1.0; }
+
+  ErrorGoal goal_;
+  double variance_, variation_;
+  double sampled_ = 0.0, split_ = 0.0;
+};
+
 /// Flux that its own links carry, all channels, mean of the halves.
 double carriedPower(const Shooter& shooter) { return 0.5 * (shooter.own[0] + shooter.own[1]) * shooter.power(); }
 
@@ -296,7 +324,8 @@ void LinkPlanner::split(const NodePlace& place, LinkSystem& system, const Unshot
 }
 
 std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPyramid& unshot,
-                                              const scene::PatchScene& patches, bool may_split, LinkMemory& memory) {
+                                              const scene::PatchScene& patches, bool may_split, LinkMemory& memory,
+                                              const ErrorGoal& goal) {
   double spread = 0.0, squares = 0.0;
   for (const auto& shooter : system.shooters()) {
     spread += shooter.spread();
@@ -305,8 +334,10 @@ std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPy
   struct Gain {
     double gain;
     std::uint32_t shooter, points;  // 0 points: split
+    double less;                    // of the square of the error
   };
   std::vector<Gain> gains;
+  double variances = 0.0, variations = 0.0;
   for (std::uint32_t n = 0; n < system.shooters().size(); ++n) {
     const auto& shooter = system.shooters()[n];
     if (shooter.column[0].points() == 0.0 || shooter.column[1].points() == 0.0) continue;
@@ -318,10 +349,15 @@ std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPy
     const double variance = 0.25 * (shooter.spread() * taken + kPrior * usual) / (taken + kPrior);
     // Of each further sample, were those before it taken. At most as many as there are: their worth is only guessed.
     const auto most = std::min(kMostSamplesAWave, std::max(1U, shooter.column[0].samples()));
-    for (std::uint32_t k = 0; k < most; ++k)
-      gains.push_back({variance * taken / (2.0 * (taken + k * points) * (taken + (k + 1) * points) * cost), n, points});
-    const double varying = may_split ? variation(shooter, system, unshot, patches) : 0.0;
-    if (varying > 0.0) gains.push_back({varying / 8.0, n, 0});
+    variances += variance;
+    for (std::uint32_t k = 0; k < most; ++k) {
+      const double before = taken + k * points, after = before + points;
+      gains.push_back({variance * taken / (2.0 * before * after * cost), n, points,
+                       variance * taken * (1.0 / before - 1.0 / after)});
+    }
+    const double varying = variation(shooter, system, unshot, patches);
+    variations += varying;
+    if (may_split && varying > 0.0) gains.push_back({varying / 8.0, n, 0, varying});
   }
   std::sort(gains.begin(), gains.end(), [](const Gain& a, const Gain& b) {
     return std::tie(b.gain, a.shooter, a.points) < std::tie(a.gain, b.shooter, b.points);
@@ -329,8 +365,11 @@ std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPy
   const std::size_t limit = 2 * std::max<std::size_t>(settings_.pairs_a_wave, system.shooters().size() / 8);
   std::vector<Measurement> wanted;
   std::vector<std::uint32_t> further(system.shooters().size(), 0);
+  Forecast forecast(goal, variances, variations);
   for (const auto& gain : gains) {
     if (wanted.size() >= limit || gain.gain <= 0.0) break;
+    if (wanted.size() >= limit / kLeastPartOfWave && forecast.isReached()) break;
+    gain.points == 0 ? forecast.split(gain.less) : forecast.sample(gain.less);
     if (gain.points == 0) {
       if (!memory.isFull())
         split(NodePlace(system.shooters()[gain.shooter].place), system, unshot, patches, memory, wanted);

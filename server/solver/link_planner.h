@@ -27,6 +27,14 @@ struct Measurement {
   std::uint32_t index = 0;  ///< which sample of that column: fixes its points
 };
 
+/// What the stated error is made of, relative, and what it should become.
+struct ErrorGoal {
+  double sampling = 0.0;  ///< root of the samples' variance
+  double varying = 0.0;   ///< of the residual, what light causes that varies inside shooters
+  double rest = 0.0;      ///< of the residual: what a wave of improvement leaves as it is
+  double target = 0.0;
+};
+
 class LinkPlanner {
  public:
   LinkPlanner(const scene::PatchScene& patches, const std::vector<Side>& sides, const NodeShots& shots,
@@ -57,9 +65,11 @@ class LinkPlanner {
                                               const scene::PatchScene& patches, std::size_t limit, LinkMemory& memory);
 
   /// Whatever lowers the error most for its cost: further samples of shooters whose halves differ, or shooters for the
-  /// children of nodes inside which light varies (where `may_split`), as far as there is memory.
+  /// children of nodes inside which light varies (where `may_split`), as far as there is memory, and until the error is
+  /// likely to be what it should.
   [[nodiscard]] std::vector<Measurement> improve(LinkSystem& system, const UnshotPyramid& unshot,
-                                                 const scene::PatchScene& patches, bool may_split, LinkMemory& memory);
+                                                 const scene::PatchScene& patches, bool may_split, LinkMemory& memory,
+                                                 const ErrorGoal& goal);
 
   /// Square of the error of irradiance, summed over leaves by area and over channels, that light which varies inside
   /// the shooters causes.

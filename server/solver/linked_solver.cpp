@@ -139,7 +139,11 @@ bool LinkedSolver::isFull() const { return memory_.isFull() || share_part_ < kMi
 std::vector<Measurement> LinkedSolver::plan() {
   memory_.begin(system_);
   if (phase_ == Phase::kLights) return planLights();
-  if (phase_ == Phase::kImprove) return planner_.improve(system_, unshot_, *patches_, !isFull(), memory_);
+  if (phase_ == Phase::kImprove) {
+    const double varying = varying_share_ * error_.residual;
+    const ErrorGoal goal{error_.sampling, varying, error_.residual - varying, settings_.target_error};
+    return planner_.improve(system_, unshot_, *patches_, !isFull(), memory_, goal);
+  }
   if (planner_.share() <= 0.0) return {};
   // Also where there is no room: the walk finds out how much light goes without.
   const std::size_t limit = std::max<std::size_t>(settings_.planner.pairs_a_wave, system_.shooters().size() / 2);

@@ -7,11 +7,16 @@ namespace radiosity::solver {
 
 /// In pixels of visibility, and what takes as long as so many.
 struct ShotCost {
-  double triangles;  ///< of the scene: culling and drawing one costs about as much as kTrianglePixels
+  double triangles;        ///< of the scene: culling and drawing one costs about as much as kTrianglePixels
+  double receivers = 0.0;  ///< that a gathered shot weighs and each of its points looks at, where it names none
 
   static constexpr double kTrianglePixels = 4.0;
+  static constexpr double kReceiverPixels = 0.5;
   [[nodiscard]] double operator()(const ScatterShot& shot) const { return hemicube(shot.resolution); }
-  [[nodiscard]] double operator()(const GatherShot& shot) const { return shot.point_count * hemicube(shot.resolution); }
+  [[nodiscard]] double operator()(const GatherShot& shot) const {
+    const double looks = shot.run_count > 0 ? 0.0 : kReceiverPixels * receivers;
+    return looks + shot.point_count * (looks + hemicube(shot.resolution));
+  }
   [[nodiscard]] double operator()(const PointShot& shot) const { return hemicube(shot.resolution); }
   [[nodiscard]] double operator()(const ParallelShot& shot) const {
     return shot.view_count * (double{1.0} * shot.resolution * shot.resolution + kTrianglePixels * triangles);

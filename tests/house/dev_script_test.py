@@ -141,9 +141,9 @@ class DevTest(Checkout):
         (self.root / "printed").write_text(self.OUTPUT)
         self.stand_in("bin/ctest", f'cat {self.root}/printed; exit "$STATUS"')
 
-    def run_tests(self, status):
+    def run_tests(self, status, *options):
         environment = dict(os.environ, PATH=f"{self.root}/bin:{os.environ['PATH']}", STATUS=str(status))
-        return subprocess.run([self.root / "dev", "test"], capture_output=True, text=True, timeout=60, cwd=self.root,
+        return subprocess.run([self.root / "dev", "test", *options], capture_output=True, text=True, timeout=60, cwd=self.root,
                               stdin=subprocess.DEVNULL, env=environment)
 
     def test_what_failed_is_shown_last_and_no_line_is_wide(self):
@@ -155,6 +155,26 @@ class DevTest(Checkout):
         self.assertNotIn("first line", again)
         self.assertNotIn("no Slurm here", again)
         self.assertLess(max(map(len, done.stdout.splitlines())), 100)
+
+    def test_what_failed_is_run_again_only_if_asked_and_named_if_it_passes(self):
+        (self.root / "build/Testing/Temporary").mkdir(parents=True)
+        passing = "100% tests passed, 0 tests failed out of 2"
+        self.stand_in("bin/ctest", f'echo "$*" >>{self.root}/calls\n[[ "$*" != *--rerun-failed* ]] || '
+                      f'{{ echo "{passing}"; exit "$AGAIN"; }}\ncat {self.root}/printed\n'
+                      f'printf "2:Room.Leaks\\n7:Room.Burns\\n" >{self.root}/build/Testing/Temporary/LastTestsFailed.log; '
+                      'exit "$STATUS"')
+        for again, options, status, calls in (("0", (), 8, 1), ("0", ("--again",), 0, 2), ("8", ("--again",), 8, 2)):
+            with self.subTest(again=again, options=options):
+                (self.root / "calls").write_text("")
+                os.environ["AGAIN"] = again
+                self.addCleanup(os.environ.pop, "AGAIN", None)
+                done = self.run_tests(8, *options)
+                self.assertEqual(done.returncode, status)
+                called = (self.root / "calls").read_text().splitlines()
+                self.assertEqual(len(called), calls)
+                self.assertFalse(any("--again" in call for call in called))
+                self.assertEqual("passed only when run again, alone: Room.Leaks Room.Burns" in done.stderr, status == 0)
+                self.assertTrue(done.stdout.rstrip().endswith(passing if calls == 2 else "out of 3"), done.stdout[-200:])
 
     def test_what_passes_is_shown_once(self):
         done = self.run_tests(0)

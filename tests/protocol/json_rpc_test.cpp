@@ -154,7 +154,7 @@ TEST(Params, APatchErrorNamesTheOperation) {
   EXPECT_EQ(error.op, 1U);
   EXPECT_EQ(paramsError("scene.patch", R"({"patch":{}})").pointer, "/params/patch");
   std::string many = R"({"patch":[)";
-  for (int i = 0; i < 1001; ++i) many += std::string(i > 0 ? "," : "") + R"({"op":"add","path":"/a"})";
+  for (int i = 0; i < 5001; ++i) many += std::string(i > 0 ? "," : "") + R"({"op":"add","path":"/a"})";
   EXPECT_EQ(paramsError("scene.patch", many + "]}").pointer, "/params/patch");
 }
 

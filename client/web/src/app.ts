@@ -6,21 +6,22 @@ import { PeopleSession } from './app_people';
 import { ViewSession } from './app_view';
 import type { Gltf } from './document/gltf';
 import { Connection, type LinkState } from './protocol/connection';
-import type {
-  Bookmark,
-  HelloReply,
-  LightmapsNote,
-  Notifications,
-  Patch,
-  Progress,
-  Resume,
-  ScenePatchReply,
-  ServerInfo,
-  Settings,
-  Status,
-  SubscribeParams,
+import {
+  NOT_FOUND,
+  type Bookmark,
+  type HelloReply,
+  type LightmapsNote,
+  type Notifications,
+  type Patch,
+  type Progress,
+  type Resume,
+  type ScenePatchReply,
+  type ServerInfo,
+  type Settings,
+  type Status,
+  type SubscribeParams,
 } from './protocol/messages';
-import { ConnectionLost } from './protocol/rpc';
+import { ConnectionLost, RpcError } from './protocol/rpc';
 import { TileFeed } from './tiles/tile_feed';
 import { Frame } from './ui/frame';
 import { percent, readable } from './ui/dom';
@@ -58,6 +59,8 @@ export class App {
   private everOpen = false;
   private epoch = '';
   private awaited: (() => void)[] = [];
+  /** Why the solve of the scene that is there has failed, as the page says it. */
+  private failure: string | undefined;
 
   constructor() {
     // Nobody else has this name, so the page knows its own patches when it is told of them.
@@ -106,8 +109,8 @@ export class App {
         gizmo: (mode) => this.edit.setGizmo(mode),
         toggleMeter: () => this.view.toggleMeter(),
         addLamp: () => void this.edit.addLamp(),
-        undo: () => void this.edit.undo(),
-        redo: () => void this.edit.redo(),
+        undo: () => void this.edit.history.undo(),
+        redo: () => void this.edit.history.redo(),
       },
       {
         View: this.view.panel.element,
@@ -130,8 +133,11 @@ export class App {
       },
       gizmoDragging: (active) => this.edit.onGizmoDragging(active),
       gizmoChanged: (object, mode) => this.edit.onGizmoChanged(object, mode),
-      contextLost: (lost) =>
-        this.frame.setBanner(lost ? 'The graphics card was taken away; waiting for it to come back.' : undefined),
+      contextLost: (lost) => {
+        this.frame.setBanner(lost ? 'The graphics card was taken away; waiting for it to come back.' : undefined);
+        this.failure = undefined;
+        if (!lost && this.progress) this.showState(this.progress);
+      },
     });
     this.viewer.showPeople(this.people.people);
     this.frame.overPicture(this.people.people.labels);
@@ -199,7 +205,9 @@ export class App {
 
   private onLink(state: LinkState, detail: string): void {
     this.bookmark = undefined;
+    this.edit?.history.forget(); // the first time there is no page yet
     if (state === 'open') {
+      this.failure = undefined;
       this.progress = undefined; // that of a server which has started again is not that of its scene
       this.frame.setBanner(undefined);
       if (this.everOpen) this.frame.toasts.show('Connected again', 'good');
@@ -211,7 +219,7 @@ export class App {
       this.frame.setState('Not connected', 'bad');
       this.frame.askToken(detail, (token) => this.giveToken(token));
     } else if (!this.everOpen) {
-      this.frame?.setState('Connecting', 'busy'); // the first time there is no page yet
+      this.frame?.setState('Connecting', 'busy');
     }
   }
 
@@ -230,6 +238,7 @@ export class App {
     this.view.onCapabilities();
     this.share.onServer(info);
     this.people.onReady();
+    this.edit.history.askSoon();
     await Promise.all([this.fetchStatus(), !hello.resumed && hello.revision > 0 && this.fetchDocument()]);
     const { count } = await this.connection.call<{ count: number }>('viewers').catch(() => ({ count: 1 }));
     this.onViewers(count);
@@ -249,7 +258,10 @@ export class App {
   private onNotification<K extends keyof Notifications>(method: K, params: Notifications[K]): void {
     const handlers: { [M in keyof Notifications]?: (note: Notifications[M]) => void } = {
       progress: (note) => this.onProgress(note),
-      'scene.patched': (note) => this.edit.onPatched(note, () => void this.fetchDocument()),
+      'scene.patched': (note) => {
+        this.edit.onPatched(note, () => void this.fetchDocument());
+        this.edit.history.askSoon();
+      },
       'scene.loaded': () => void this.onLoaded(),
       lightmaps: (note) => void this.onLightmaps(note),
       bookmark: (note) => this.onBookmark(note),
@@ -264,7 +276,7 @@ export class App {
   private onProgress(progress: Progress): void {
     this.progress = progress;
     this.solve.update(progress);
-    if (progress.state === 'empty') this.forgetScene();
+    if (!hasScene(progress)) this.forgetScene();
     this.showState(progress);
     this.settleLight();
   }
@@ -272,7 +284,7 @@ export class App {
   private showState(progress: Progress): void {
     const done = ['converged', 'timeLimit', 'limited'].includes(progress.state);
     const bad = progress.state === 'failed';
-    const stated = progress.state !== 'empty' && progress.state !== 'loading';
+    const stated = hasScene(progress) && progress.state !== 'loading';
     const error = stated ? `${percent(progress.error.total)} error` : '';
     const rate = progress.state === 'solving' ? `${readable(progress.shotsPerSecond, 2)} shots/s` : '';
     this.frame.setState(
@@ -281,10 +293,19 @@ export class App {
       error,
       rate,
     );
-    this.frame.setWelcome(progress.state);
+    this.frame.setWelcome(hasScene(progress) && bad ? '' : progress.state, progress.failure);
+    this.showFailure(hasScene(progress) && bad ? (progress.failure ?? 'the server does not say why') : undefined);
   }
 
-  /** The server has none: it was started again without, or could not have the one whose first light it showed. */
+  /** The light that there is stays to be looked at; that nothing comes after it is said for as long as it holds. */
+  private showFailure(why: string | undefined): void {
+    if (why === this.failure) return;
+    this.failure = why;
+    if (why === undefined) return this.frame.setBanner(undefined);
+    this.frame.setBanner(`The solve has failed: ${why}.`, 'Start again', () => void this.ask('solve.restart'));
+  }
+
+  /** The server has none: it was started again without, could not have the one whose first light it showed, or lost it. */
   private forgetScene(): void {
     if (!this.viewer.set) return;
     this.resume = undefined;
@@ -314,6 +335,7 @@ export class App {
     this.resume = undefined;
     this.edit.select(undefined); // numbers of nodes mean others now
     this.view.sceneComes();
+    this.edit.history.askSoon();
     await Promise.all([this.fetchStatus(), this.fetchDocument()]);
   }
 
@@ -330,6 +352,7 @@ export class App {
       const revision = Number(file.headers.get('X-Revision') ?? reply.revision); // it may be newer than the answer
       this.edit.document.reset((await file.json()) as Gltf, revision);
     } catch (error) {
+      if (error instanceof RpcError && error.code === NOT_FOUND) return; // there is none: the server's state says so
       if (!(error instanceof ConnectionLost)) this.frame.toasts.show(`The scene: ${(error as Error).message}`, 'bad');
     }
   }
@@ -400,6 +423,11 @@ export class App {
       }
     }
   }
+}
+
+/** `failed` may mean both: that a scene is not solved further, and that there is none. */
+function hasScene({ state, surfaces }: Progress): boolean {
+  return state !== 'empty' && (state !== 'failed' || surfaces > 0);
 }
 
 /** From the link (#token=...), where it does not stay to be seen, or from this tab's memory. */

@@ -2,6 +2,7 @@
 
 import { Vector3, type Object3D } from 'three';
 import type { App } from './app';
+import { EditHistory } from './app_history';
 import * as edits from './document/edits';
 import { hangingNodes, lightOf, nodeName, type Vec3, type Vec4 } from './document/gltf';
 import { SceneDocument, type SendPatch } from './document/scene_document';
@@ -12,6 +13,7 @@ import type { GizmoMode } from './view/gizmo';
 export class EditSession {
   readonly panel: ScenePanel;
   readonly document: SceneDocument;
+  readonly history: EditHistory;
   selection: Selection | undefined;
 
   constructor(
@@ -24,6 +26,7 @@ export class EditSession {
       refused: (label, reason) => app.frame.toasts.show(`${label}: ${reason}`, 'bad'),
       historyChanged: () => this.onHistory(),
     });
+    this.history = new EditHistory(app, this.document);
     this.panel = new ScenePanel({
       select: (selection) => this.select(selection),
       setColour: (material, rgb) =>
@@ -167,17 +170,6 @@ export class EditSession {
     this.make(`Remove ${nodeName(this.document.gltf, node)}`, patch);
   }
 
-  /** What was done in this page first, a whole drag at once; then what the server remembers, whoever did it. */
-  async undo(): Promise<void> {
-    if (this.document.undoStack.length > 0) await this.document.undo();
-    else if (this.app.connection.has('scene.undo')) await this.app.ask('scene.undo');
-  }
-
-  async redo(): Promise<void> {
-    if (this.document.redoStack.length > 0) await this.document.redo();
-    else if (this.app.connection.has('scene.redo')) await this.app.ask('scene.redo');
-  }
-
   async loadFile(file: File): Promise<void> {
     const { toasts } = this.app.frame;
     const limit = this.app.connection.info?.limits['uploadBytes'] ?? Infinity;
@@ -216,11 +208,7 @@ export class EditSession {
   }
 
   private onHistory(): void {
-    const server = this.app.connection?.has('scene.undo');
-    this.app.frame?.setHistory(
-      server || this.document.undoStack.length > 0,
-      server || this.document.redoStack.length > 0,
-    );
+    this.history?.show();
     if (this.document.lastEdit) this.app.share?.onEdit(this.document.lastEdit);
   }
 }

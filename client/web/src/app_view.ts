@@ -74,6 +74,7 @@ export class ViewSession {
     const elsewhere = this.bounds !== undefined && !alike(this.bounds, scene.bounds);
     this.bounds = scene.bounds;
     if (this.sceneIsNew && elsewhere) this.forgetCamera();
+    if (this.sceneIsNew || !this.placed) this.app.viewer.exposure.forget();
     this.sceneIsNew = false;
     if (this.placed) return;
     this.placed = true;
@@ -91,7 +92,6 @@ export class ViewSession {
     const before = { placed: this.placed, camera: this.camera };
     this.placed = false;
     this.camera = -1;
-    this.app.viewer.exposure.fresh = true;
     return before;
   }
 
@@ -104,7 +104,7 @@ export class ViewSession {
   onDrawn(): void {
     const set = this.app.viewer.shown?.set;
     if (set) this.app.mark('geometry');
-    if (set?.lit && set.tilesTaken > 0) this.app.mark('light');
+    if (set?.showsLight && set.tilesTaken > 0) this.app.mark('light');
     if (set?.complete && set.waiting === 0 && !this.sharpMarked) {
       this.sharpMarked = true;
       this.app.mark('sharp');
@@ -301,8 +301,9 @@ export class ViewSession {
   private press(key: string, event: KeyboardEvent): boolean {
     const { app } = this;
     const command = event.ctrlKey || event.metaKey;
-    if (command && key.toLowerCase() === 'z') return done(event.shiftKey ? app.edit.redo() : app.edit.undo());
-    if (command && key.toLowerCase() === 'y') return done(app.edit.redo());
+    if (command && key.toLowerCase() === 'z')
+      return done(event.shiftKey ? app.edit.history.redo() : app.edit.history.undo());
+    if (command && key.toLowerCase() === 'y') return done(app.edit.history.redo());
     if (command || event.altKey) return false;
     if (key === 'Delete' || key === 'Backspace') return isAmongObjects(event.target) && done(app.edit.removeSelected());
     if (/^\d$/.test(key)) return done(this.setMode(VIEW_MODES[(Number(key) + 9) % 10]?.id ?? 'lit'));

@@ -40,7 +40,7 @@ TEST(Handshake, TheServerIntroducesItselfFirst) {
     EXPECT_THAT(read.capabilities, ::testing::Contains(what));
   EXPECT_EQ(read.limits, (std::map<std::string, std::uint64_t>{{"messageBytes", 1048576},
                                                                {"jsonDepth", 64},
-                                                               {"patchOperations", 1000},
+                                                               {"patchOperations", 5000},
                                                                {"batchCalls", 64},
                                                                {"callsInFlight", 64},
                                                                {"uploadBytes", 1073741824},

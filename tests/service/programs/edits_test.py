@@ -33,7 +33,7 @@ class EditsCase(ServiceCase):
         self.url = self.running.url
 
     def run_async(self, coroutine):
-        return asyncio.run(asyncio.wait_for(coroutine, 300))
+        return asyncio.run(asyncio.wait_for(coroutine, 600))
 
     def put(self, path, body):
         request = urllib.request.Request(self.url + path, data=body, method="PUT",
@@ -196,7 +196,7 @@ class PatchTest(EditsCase):
             self.assertIn("cycle", str(caught.exception))
             self.assertIn(caught.exception.data["op"], (0, 1))
             with self.assertRaises(RpcError) as caught:
-                await self.patch(session, *[name] * 1001)
+                await self.patch(session, *[name] * 5001)
             self.assertEqual(caught.exception.code, BAD_CALL)
             answer = await session.raw('{"jsonrpc":"2.0","id":1,"method":"scene.patch","params":{"patch":[{"op":"add",'
                                        '"path":"/nodes/0/scale","value":[NaN,1,1]}]}}')

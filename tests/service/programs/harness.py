@@ -34,7 +34,7 @@ class Server:
             self.process = subprocess.Popen(
                 [program("RADIOSITYD"), "--listen", f"127.0.0.1:{port}", *map(str, arguments)],
                 stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=log, env={**os.environ, **(env or {}), MARK: mark})
-        self.url = self._listening_url(60)
+        self.url = self._listening_url(180)
 
     def _listening_url(self, seconds):
         text, deadline = b"", time.monotonic() + seconds
@@ -57,7 +57,7 @@ class Server:
     def log(self):
         return self.log_path.read_text(errors="replace")
 
-    def terminate(self, seconds=20):
+    def terminate(self, seconds=60):
         """SIGTERM; returns the exit status."""
         self.process.send_signal(signal.SIGTERM)
         return self.wait(seconds)
@@ -128,7 +128,7 @@ class ServiceCase(unittest.TestCase):
         self.addCleanup(server.kill)
         return server
 
-    def assertNothingLeft(self, seconds=10.0):
+    def assertNothingLeft(self, seconds=60.0):
         deadline = time.monotonic() + seconds
         while marked_processes(self.mark) and time.monotonic() < deadline:
             time.sleep(0.05)
@@ -150,7 +150,7 @@ class ServiceCase(unittest.TestCase):
         self.addCleanup(end)
         return process
 
-    def client(self, *arguments, expect=0, env=None, stdin=None, seconds=120):
+    def client(self, *arguments, expect=0, env=None, stdin=None, seconds=300):
         """Runs the client to its end; returns (stdout, stderr)."""
         done = subprocess.run([program("RADIOSITY"), *map(str, arguments)], capture_output=True, text=True,
                               input=stdin or "", env={**os.environ, **(env or {}), MARK: self.mark}, cwd=self.folder,
@@ -169,7 +169,7 @@ class ServiceCase(unittest.TestCase):
         return sorted(p.name for p in self.folder.iterdir() if p.suffix != ".log")
 
 
-def waitForLine(stream, wanted, seconds=60):
+def waitForLine(stream, wanted, seconds=120):
     """Reads lines of a child's pipe until one contains `wanted`; returns everything read."""
     text, deadline = "", time.monotonic() + seconds
     while time.monotonic() < deadline:

@@ -19,7 +19,7 @@ from harness import ServiceCase
 from wire import Session
 
 DASHBOARD = pathlib.Path(__file__).resolve().parents[3] / "docker/grafana/radiosityd.json"
-SECONDS = 60  # until a test fails that waits for what does not come
+SECONDS = 120  # until a test fails that waits for what does not come
 
 
 class Observe(ServiceCase):

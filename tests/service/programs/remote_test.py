@@ -200,7 +200,7 @@ class RemoteTest(ServiceCase):
         self.server(port=server.port)
         waitForLine(watching.stderr, "empty")
         watching.send_signal(signal.SIGINT)
-        self.assertEqual(watching.wait(10), 75)
+        self.assertEqual(watching.wait(60), 75)
 
     def test_tokenIsNeededAndSuffices(self):
         (self.folder / "token").write_text("a-long-enough-token-for-a-test\n")

@@ -29,7 +29,7 @@ class ServerTest(ServiceCase):
         self.url = self.running.url
 
     def run_async(self, coroutine):
-        return asyncio.run(asyncio.wait_for(coroutine, 300))
+        return asyncio.run(asyncio.wait_for(coroutine, 600))
 
     def get(self, path):
         with urllib.request.urlopen(self.url + path, timeout=60) as answer:
@@ -226,7 +226,7 @@ class ServerTest(ServiceCase):
             self.assertIn("graceMs", (await session.note("draining"))["params"])
 
         self.run_async(body())
-        self.assertEqual(self.running.wait(20), 0, self.running.log())
+        self.assertEqual(self.running.wait(60), 0, self.running.log())
         self.assertEqual(marked_processes(self.mark), [])
 
     def test_killedServerLeavesNoWorker(self):

@@ -43,7 +43,7 @@ class ShutdownTest(ServiceCase):
         plates.write_glb(self.scene, plates.lit_document())
 
     def run_async(self, coroutine):
-        return asyncio.run(asyncio.wait_for(coroutine, 120))
+        return asyncio.run(asyncio.wait_for(coroutine, 400))
 
     async def state_reached(self, session, wanted):
         while (await session.call("status"))["state"] != wanted:
@@ -71,7 +71,7 @@ class ShutdownTest(ServiceCase):
                 self.assertEqual(session.socket.close_code, 1001)
 
             self.run_async(body())
-            self.assertEqual(server.wait(20), 0, server.log())
+            self.assertEqual(server.wait(60), 0, server.log())
             self.assertEqual(marked_processes(self.mark), [])
 
     def test_solvingServerNeedsNoClientToEnd(self):

@@ -76,7 +76,7 @@ class Session:
     async def close(self):
         await self.socket.close()
 
-    async def receive(self, seconds=60):
+    async def receive(self, seconds=120):
         """One message, put where it belongs; responses and errors are returned."""
         frame = await asyncio.wait_for(self.socket.recv(), seconds)
         if isinstance(frame, bytes):
@@ -110,7 +110,7 @@ class Session:
             if answer is not None:
                 return answer
 
-    async def note(self, method, seconds=60):
+    async def note(self, method, seconds=120):
         """The next notification of that kind, past or future; so long at most without any message."""
         while True:
             for i, note in enumerate(self.notes):

@@ -157,6 +157,18 @@ TEST_F(LinkedEdits, ALampDraggedAboutLeavesNoTrail) {
   EXPECT_NEAR(solver_->irradiance()[node].x / fresh.irradiance()[node].x, 1.0F, 0.06F);
 }
 
+// A whole wave would be 128 measurements.
+TEST_F(LinkedEdits, AskedForALittleLessErrorTakeALittleMore) {
+  const double stated = solver_->error().total;
+  const auto before = solver_->linkCounters().samples;
+  solver_->setTargetError(0.99 * stated);
+  solve(*solver_);
+  const auto more = static_cast<double>(solver_->linkCounters().samples - before);
+  EXPECT_LE(solver_->error().total, 0.99 * stated);
+  EXPECT_GT(more, 0.0);
+  EXPECT_LT(more, 100.0) << "of " << before << ", stated " << stated << " then " << solver_->error().total;
+}
+
 TEST(LinkedSolver, ATinyLightIsNotBlack) {
   auto quads = cubeQuads(4, {}, {0.5F, 0.5F, 0.5F, 0.5F, 0.5F, 0.5F});
   quads.push_back({{0, 0.4F, 0}, {1e-6F, 0, 0}, {0, 0, 1e-6F}, 1, 1, glm::vec3(1e12F), glm::vec3(0.0F)});

@@ -42,11 +42,21 @@ export function installProbe(): void {
   };
 
   // This runs before the page's own callback of the same frame, and so sees what the frame before has drawn.
+  let marked = false;
+  const markDrawn = ({ view }: NonNullable<Window['viewer']>) => {
+    marked = true;
+    const others = view.onDrawn.bind(view);
+    view.onDrawn = () => {
+      others();
+      performance.mark('probe: drawn');
+    };
+  };
   const frame = () => {
     requestAnimationFrame(frame);
     const now = performance.now();
     probe.frames.push(now);
     const app = window.viewer;
+    if (app && !marked) markDrawn(app);
     const set = app?.viewer.shown?.set;
     if (!app || !set || app.viewer.set !== set) return;
     if (set.revision > 0) probe.shown[set.revision] ??= now;

@@ -53,6 +53,21 @@ function openingsTable(rows: readonly Row[]): string {
   );
 }
 
+/** What 60 frames a second leave 16.7 ms for, where a card draws them. */
+function framesTable(rows: readonly Row[]): string {
+  const head = ["a frame's own scripts: median, p95, max", 'while tiles arrive', 'while the picture turns'];
+  return table(
+    head,
+    rows.map(({ label, openings }) => {
+      const of = (figure: (opening: Opening) => number[]) => {
+        const all = openings.flatMap(figure);
+        return [median(all), quantile(all, 0.95), Math.max(...all)].map(ms).join(', ');
+      };
+      return [label, of(({ thread }) => thread.framesWithTiles), of(({ thread }) => thread.framesOfTurning)];
+    }),
+  );
+}
+
 function editsTable(edits: readonly Edit[]): string {
   return table(
     ['a lamp recoloured over another connection', 'ms'],
@@ -103,6 +118,8 @@ async function main(): Promise<void> {
       "The main thread and its longest tasks: processor time. Tasks > 50 ms: by the page's clock, other programs included.",
       '',
       openingsTable(rows),
+      '',
+      framesTable(rows),
       '',
       editsTable(seen),
       '',

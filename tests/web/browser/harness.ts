@@ -210,10 +210,17 @@ function isNoise(text: string): boolean {
   return /GPU stall due to ReadPixels|WebSocket connection to|ERR_CONNECTION_REFUSED|CONTEXT_LOST_WEBGL/.test(text);
 }
 
+declare global {
+  interface Window {
+    /** All notes that the page has shown. */
+    notes?: string[];
+  }
+}
+
 /** In the page: notes go by themselves, some before a test that gets no processor has looked. */
 function keepNotes(): void {
   const notes: string[] = [];
-  (window as unknown as { notes: string[] }).notes = notes;
+  window.notes = notes;
   new MutationObserver((changes) => {
     for (const node of changes.flatMap(({ addedNodes }) => [...addedNodes]))
       if (node instanceof HTMLElement && node.matches('.toast')) notes.push(node.firstChild?.textContent ?? '');
@@ -222,7 +229,7 @@ function keepNotes(): void {
 
 /** Until a note of the page says so, or has said so. */
 export async function said(page: Page, what: RegExp): Promise<void> {
-  const notes = () => page.evaluate(() => (window as unknown as { notes: string[] }).notes);
+  const notes = () => page.evaluate(() => window.notes!);
   await until(notes, (all) => all.some((text) => what.test(text)));
 }
 

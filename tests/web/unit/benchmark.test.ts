@@ -1,5 +1,5 @@
 import { intervals, median, quantile, spread, table } from '../benchmark/figures';
-import { CONVERGED, FIRST_TILE, mainThread } from '../benchmark/trace';
+import { CONVERGED, DRAWN, FIRST_TILE, mainThread, TURNED, TURNING } from '../benchmark/trace';
 
 it('takes medians of even and odd counts, and quantiles', () => {
   expect(median([3, 1, 2])).toBe(2);
@@ -32,6 +32,33 @@ it('finds the tasks of the thread that set the marks', () => {
     mark(CONVERGED, 95_000),
     task(1, 96_000, 5000, 5000),
   ];
-  expect(mainThread(events)).toEqual({ before: [4], withTiles: [3, 2] });
+  expect(mainThread(events)).toMatchObject({ before: [4], withTiles: [3, 2] });
   expect(() => mainThread(events.slice(0, 3))).toThrow('no marks');
+});
+
+it('finds the scripts of frames that drew, by what was going on', () => {
+  const at = (name: string, ts: number) => ({ name, cat: 'blink.user_timing', ph: 'R', pid: 7, tid: 1, ts });
+  const frame = (ts: number, tdur: number, tid = 1) => ({
+    ...at('FireAnimationFrame', ts),
+    cat: 'devtools.timeline',
+    ph: 'X',
+    tid,
+    dur: 900,
+    tdur,
+  });
+  const events = [
+    frame(0, 100), // before all tiles
+    at(DRAWN, 50),
+    at(FIRST_TILE, 1000),
+    frame(2000, 500),
+    at(DRAWN, 2100),
+    frame(3000, 5), // draws nothing
+    frame(2000, 700, 2), // another thread's
+    at(CONVERGED, 5000),
+    at(TURNING, 6000),
+    frame(6100, 800),
+    at(DRAWN, 6900),
+    at(TURNED, 8000),
+  ];
+  expect(mainThread(events)).toMatchObject({ framesWithTiles: [0.5], framesOfTurning: [0.8] });
 });

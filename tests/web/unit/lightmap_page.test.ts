@@ -137,10 +137,14 @@ describe('a set of pages', () => {
     set.complete = true;
     expect(set.takeUp(ALWAYS)).toBe(1);
     expect([set.lit, set.covered, set.revision]).toEqual([false, false, 3]);
+    set.showLight();
+    expect(set.showsLight).toBe(false);
     set.enqueue({ ...lit, header: { ...lit.header, page: 0, revision: 2 } }, 1);
     set.takeUp(ALWAYS);
     expect([set.lit, set.covered, set.revision]).toEqual([true, true, 3]);
-    expect(set.pages[0]!.uniforms.pageLightKnown.value).toBe(true);
+    expect(set.showsLight).toBe(false); // not before it is known how brightly
+    set.showLight();
+    expect(set.pages[0]!.uniforms.pageLightShown.value).toBe(true);
   });
 
   it('takes black for black when the solve is over', () => {

@@ -14,13 +14,16 @@ export interface EditEntry {
   inverse: Patch;
 }
 
+/** What an edit is to the history: a step of it, or one of them taken back or made again. */
+type Role = 'step' | 'undo' | 'redo';
+
 interface PendingEdit extends EditEntry {
   /** Edits with the same key replace each other while they wait, and are one step of undo. */
   key: string | undefined;
   requestId: string;
   /** Puts the copy back; empty while the edit is not shown. */
   shown: Patch;
-  isStep: boolean;
+  role: Role;
   confirmed: boolean;
   done: (error?: Error) => void;
 }
@@ -41,6 +44,8 @@ export class SceneDocument {
   revision = 0;
   readonly undoStack: EditEntry[] = [];
   readonly redoStack: EditEntry[] = [];
+  /** Revisions that took back what this page had done; to the server they are edits like others. */
+  readonly takenBack = new Set<number>();
   lastEdit: Patch | undefined;
   private pending: PendingEdit[] = [];
   private gesture = 0;
@@ -63,6 +68,7 @@ export class SceneDocument {
     this.pending = [];
     this.undoStack.length = 0;
     this.redoStack.length = 0;
+    this.takenBack.clear();
     this.openKey = undefined;
     ++this.generation;
     this.events.changed([]);
@@ -98,7 +104,7 @@ export class SceneDocument {
    * when a later edit of the gesture took this one's place.
    */
   edit(label: string, patch: Patch, key?: string): Promise<void> {
-    return this.enqueue(label, patch, true, key);
+    return this.enqueue(label, patch, 'step', key);
   }
 
   /** The gesture is over: the next edit with its key is a new step. Those on their way still belong to this one. */
@@ -108,20 +114,21 @@ export class SceneDocument {
 
   async undo(): Promise<void> {
     const entry = this.undoStack.pop();
-    if (entry) await this.step(entry, entry.inverse, this.undoStack, this.redoStack, `Undo ${entry.label}`);
+    if (entry) await this.step('undo', entry, entry.inverse, this.undoStack, this.redoStack);
   }
 
   async redo(): Promise<void> {
     const entry = this.redoStack.pop();
     if (!entry) return;
-    await this.step(entry, redoOnServer(entry.forward), this.redoStack, this.undoStack, `Redo ${entry.label}`);
+    await this.step('redo', entry, redoOnServer(entry.forward), this.redoStack, this.undoStack);
   }
 
-  private async step(entry: EditEntry, patch: Patch, from: EditEntry[], to: EditEntry[], label: string): Promise<void> {
+  private async step(role: Role, entry: EditEntry, patch: Patch, from: EditEntry[], to: EditEntry[]): Promise<void> {
+    const label = `${role === 'undo' ? 'Undo' : 'Redo'} ${entry.label}`;
     this.openKey = undefined;
     const generation = this.generation;
     try {
-      await this.enqueue(label, patch, false, undefined);
+      await this.enqueue(label, patch, role, undefined);
       if (generation === this.generation) to.push(entry);
     } catch {
       if (generation === this.generation) from.push(entry); // the reason was shown
@@ -133,7 +140,7 @@ export class SceneDocument {
     return this.gltf as unknown as Json;
   }
 
-  private enqueue(label: string, forward: Patch, isStep: boolean, kind: string | undefined): Promise<void> {
+  private enqueue(label: string, forward: Patch, role: Role, kind: string | undefined): Promise<void> {
     const key = kind === undefined ? undefined : `${kind} #${this.gesture}`;
     return new Promise((resolve, reject) => {
       const waiting = this.pending.at(-1);
@@ -147,7 +154,7 @@ export class SceneDocument {
         label,
         forward,
         inverse: [],
-        isStep,
+        role,
         key,
         requestId: newRequestId(),
         shown: [],
@@ -214,7 +221,8 @@ export class SceneDocument {
     const inverse = edit.shown;
     edit.shown = [];
     this.lastEdit = edit.forward;
-    if (edit.isStep) this.remember(edit, undoOnServer(edit.forward, inverse));
+    if (edit.role === 'step') this.remember(edit, undoOnServer(edit.forward, inverse));
+    if (edit.role === 'undo') this.takenBack.add(revision);
     this.events.historyChanged();
   }
 

@@ -131,6 +131,22 @@ export interface Notifications {
   notice: { kind: string; text: string };
 }
 
+/** One of the revisions since the scene was loaded. */
+export interface PastRevision {
+  revision: number;
+  kind: 'load' | 'patch' | 'undo' | 'redo';
+  /** Of a patch: it is taken back at present. */
+  undone?: boolean;
+}
+
+export interface SceneHistory {
+  revision: number;
+  undoable: number;
+  redoable: number;
+  /** Oldest first. */
+  revisions: PastRevision[];
+}
+
 export const SUBPROTOCOL = 'radiosity.v1';
 
 /** The close code that trying again does not mend. */
@@ -138,3 +154,5 @@ export const CLOSE_UNAUTHENTICATED = 1008;
 export const CLOSE_OVERLOAD = 1013;
 /** JSON-RPC error of a missing or wrong token. */
 export const UNAUTHENTICATED = -32001;
+/** There is nothing of that name, or no scene. */
+export const NOT_FOUND = -32004;

@@ -112,17 +112,19 @@ export class Frame {
   }
 
   /** Says what there is to do where there is no scene, and that one is coming. */
-  setWelcome(state: string): void {
-    this.welcome.hidden = state !== 'empty' && (state !== 'loading' || this.sceneShown);
-    if (this.welcome.hidden || this.welcome.dataset['state'] === state) return;
-    this.welcome.dataset['state'] = state;
+  setWelcome(state: string, failure = ''): void {
+    this.welcome.hidden = !['empty', 'failed'].includes(state) && (state !== 'loading' || this.sceneShown);
+    const shown = `${state} ${failure}`;
+    if (this.welcome.hidden || this.welcome.dataset['state'] === shown) return;
+    this.welcome.dataset['state'] = shown;
     if (state === 'loading')
       return this.welcome.replaceChildren(
         h('h2', {}, 'Loading the scene'),
         h('p', {}, 'Its surfaces are laid out for light; a large one takes a while.'),
       );
     this.welcome.replaceChildren(
-      h('h2', {}, 'No scene yet'),
+      h('h2', {}, state === 'failed' ? 'The server has lost the scene' : 'No scene yet'),
+      failure && h('p', {}, `It says: ${failure}.`),
       h('p', {}, 'Drop a .glb here, or send one:'),
       h('pre', { class: 'code' }, `curl -T room.glb ${location.origin}/scene`),
     );

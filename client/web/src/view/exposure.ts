@@ -28,12 +28,16 @@ export class ExposureMeter {
   stops = 0;
   /** What a manual exposure starts from. */
   base = 1;
-  /** Nothing was measured yet. */
-  fresh = true;
   /** How long the last measurement was on its way. */
   tookMs = 0;
   private measured = 1;
   private shown = 1;
+  /** The next value is taken at once: the eye need not get used to it. */
+  private fresh = true;
+  /** Nothing has come back yet, be it that nothing is lit. */
+  private waits = true;
+  /** Raised when what is measured at the moment is of no interest any more. */
+  private scene = 0;
   private running: Promise<void> | undefined;
   private readonly target: WebGLRenderTarget;
   private readonly half: boolean;
@@ -44,6 +48,24 @@ export class ExposureMeter {
   ) {
     this.half = !renderer.extensions.has('EXT_color_buffer_float');
     this.target = new WebGLRenderTarget(WIDTH, HEIGHT, { type: this.half ? HalfFloatType : FloatType });
+  }
+
+  /** Another scene, or another part of it: what was measured says nothing about it. */
+  forget(): void {
+    this.fresh = this.waits = true;
+    this.running = undefined;
+    ++this.scene;
+  }
+
+  /** Shown at once, until there is a measurement to go over to. */
+  guess(value: number): void {
+    this.take(value);
+    this.waits = false;
+  }
+
+  /** How brightly to show light is still to be found out. */
+  get unknown(): boolean {
+    return this.automatic && this.waits;
   }
 
   /** Moves what is shown towards what was measured. True: not there yet. */
@@ -69,12 +91,16 @@ export class ExposureMeter {
 
   /** Ends when there is a new value; the one that is on its way counts. */
   measure(scene: Scene, camera: Camera): Promise<void> {
-    this.running ??= this.read(scene, camera).finally(() => (this.running = undefined));
-    return this.running;
+    if (this.running) return this.running;
+    const running = this.read(scene, camera).finally(() => {
+      if (this.running === running) this.running = undefined;
+    });
+    return (this.running = running);
   }
 
   private async read(scene: Scene, camera: Camera): Promise<void> {
     const { renderer, target, view } = this;
+    const of = this.scene;
     const pixels = this.half ? new Uint16Array(4 * WIDTH * HEIGHT) : new Float32Array(4 * WIDTH * HEIGHT);
     view.all.measuring.value = true;
     renderer.setRenderTarget(target);
@@ -86,11 +112,13 @@ export class ExposureMeter {
     try {
       await renderer.readRenderTargetPixelsAsync(target, 0, 0, WIDTH, HEIGHT, pixels);
       this.tookMs = performance.now() - begin;
+      if (of !== this.scene) return;
       const value = exposureOf(this.luminances(pixels));
       if (value !== undefined) this.take(value);
     } catch {
       // The context was lost on the way; it is measured again when it is back.
     }
+    if (of === this.scene) this.waits = false;
   }
 
   private take(value: number): void {

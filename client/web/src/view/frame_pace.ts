@@ -25,6 +25,8 @@ interface Frame {
 }
 
 export class FramePace {
+  /** What the first frame is likely to be drawn with. */
+  readonly firstScale: number;
   private readonly underWay: Frame[] = [];
   /** What frames with all pixels would take, by the newest two that were measured. */
   private wholeFrameMs: [number, number];
@@ -39,6 +41,7 @@ export class FramePace {
   constructor(software: boolean) {
     const guess = software ? SOFTWARE_FRAME_MS : 0;
     this.wholeFrameMs = [guess, guess];
+    this.firstScale = this.movingScale;
   }
 
   /** Once for every turn of the page, before anything else. */

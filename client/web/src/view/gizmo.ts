@@ -29,13 +29,20 @@ const MOST_SCALE = 100;
 /** The middle handle doubles the size in so many pixels to the right or upwards. */
 const DOUBLING_PX = 100;
 
+interface GizmoEvents {
+  dragging(active: boolean): void;
+  changed(object: Object3D, mode: GizmoMode): void;
+  redraw(): void;
+}
+
 export class Gizmo {
   mode: GizmoMode = 'translate';
   private object: Object3D | undefined;
   private readonly pivot = new Object3D();
   /** From the pivot to the object, when the handles were put there. */
   private readonly fromPivot = new Matrix4();
-  private readonly controls: TransformControls;
+  /** Made when something is selected for the first time: a visitor does not wait for what few will use. */
+  private made: TransformControls | undefined;
   private readonly lines = new LineBasicMaterial({
     toneMapped: false,
     depthTest: false,
@@ -49,16 +56,14 @@ export class Gizmo {
 
   constructor(
     private readonly scene: Scene,
-    camera: PerspectiveCamera,
-    element: HTMLElement,
-    events: { dragging(active: boolean): void; changed(object: Object3D, mode: GizmoMode): void; redraw(): void },
+    private readonly camera: PerspectiveCamera,
+    private readonly element: HTMLElement,
+    private readonly events: GizmoEvents,
   ) {
     this.lines.color.setRGB(1, 0.66, 0.16, LinearSRGBColorSpace);
-    this.controls = new TransformControls(camera, element);
-    this.controls.size = 0.8;
     // Handles lie where they were last drawn, which is some time ago where frames are slow: what is under the pointer
     // is decided by where they are now.
-    const place = () => this.object && this.controls.getHelper().updateMatrixWorld(true);
+    const place = () => this.object && this.made?.getHelper().updateMatrixWorld(true);
     const locate = ({ clientX, clientY }: PointerEvent) => {
       place();
       this.pointer.set(clientX, clientY);
@@ -66,28 +71,16 @@ export class Gizmo {
     };
     for (const type of ['pointermove', 'pointerdown'] as const)
       element.addEventListener(type, locate, { capture: true });
-    scene.add(this.pivot, this.controls.getHelper());
-    this.controls.addEventListener('change', () => events.redraw());
-    this.controls.addEventListener('dragging-changed', ({ value }) => {
-      if (!value) this.placePivot();
-      events.dragging(value as boolean);
-    });
-    this.controls.addEventListener('objectChange', () => {
-      if (!this.object) return;
-      if (this.mode === 'scale') this.limitScale();
-      this.follow(this.object);
-      this.refresh();
-      events.changed(this.object, this.mode);
-    });
+    scene.add(this.pivot);
   }
 
   get dragging(): boolean {
-    return this.controls.dragging;
+    return this.made?.dragging ?? false;
   }
 
   /** The pointer is over a handle, or holds one. */
   get busy(): boolean {
-    return this.controls.dragging || this.controls.axis !== null;
+    return this.made !== undefined && (this.made.dragging || this.made.axis !== null);
   }
 
   /** Where the handles are, in metres. */
@@ -100,13 +93,13 @@ export class Gizmo {
     this.clearOutline();
     this.placePivot();
     if (object) this.controls.attach(this.pivot);
-    else this.controls.detach();
+    else this.made?.detach();
     if (object) this.makeOutline(object);
   }
 
   setMode(mode: GizmoMode): void {
     this.mode = mode;
-    this.controls.setMode(mode);
+    this.made?.setMode(mode);
     this.attach(this.object);
   }
 
@@ -126,8 +119,32 @@ export class Gizmo {
   }
 
   setVisible(visible: boolean): void {
-    this.controls.getHelper().visible = visible && this.controls.object !== undefined;
+    if (this.made) this.made.getHelper().visible = visible && this.made.object !== undefined;
     for (const line of this.outline) line.visible = visible;
+  }
+
+  private get controls(): TransformControls {
+    return (this.made ??= this.makeControls());
+  }
+
+  private makeControls(): TransformControls {
+    const controls = new TransformControls(this.camera, this.element);
+    controls.size = 0.8;
+    controls.setMode(this.mode);
+    this.scene.add(controls.getHelper());
+    controls.addEventListener('change', () => this.events.redraw());
+    controls.addEventListener('dragging-changed', ({ value }) => {
+      if (!value) this.placePivot();
+      this.events.dragging(value as boolean);
+    });
+    controls.addEventListener('objectChange', () => {
+      if (!this.object) return;
+      if (this.mode === 'scale') this.limitScale();
+      this.follow(this.object);
+      this.refresh();
+      this.events.changed(this.object, this.mode);
+    });
+    return controls;
   }
 
   /** Into the middle of the object, turned as it is, so that scaling along the handles does not skew it. */
@@ -150,7 +167,7 @@ export class Gizmo {
    */
   private limitScale(): void {
     const { scale } = this.pivot;
-    if (this.controls.axis === 'XYZ') {
+    if (this.made?.axis === 'XYZ') {
       const { x, y } = this.pointer.clone().sub(this.grabbed);
       scale.setScalar(2 ** ((x - y) / DOUBLING_PX));
     }

@@ -82,7 +82,7 @@ export class LightmapPage {
       pageSize: { value: [width, height] },
       pageTiles: { value: TILE_SIDE },
       pageUsed: { value: this.used },
-      pageLightKnown: { value: true },
+      pageLightShown: { value: true },
     };
     this.restore();
   }

@@ -37,10 +37,12 @@ export class LightmapSet {
   /** Scene revision of the newest tile that was taken up; 0: none. */
   revision = 0;
   /**
-   * Uniform of all pages. The server's first version of a scene is black, as nothing has shone yet: until there is
-   * light, or it is known that there is none, surfaces show as those that nothing has come for.
+   * Some light has come, or the solve is over without any. The server's first version of a scene is black, as nothing
+   * has shone yet.
    */
-  private readonly lightKnown = { value: false };
+  lit = false;
+  /** Uniform of all pages: until light is shown, surfaces show as those that nothing has come for. */
+  private readonly lightShown = { value: false };
   private queue: { tile: Tile; bytes: number }[] = [];
 
   constructor(
@@ -52,8 +54,9 @@ export class LightmapSet {
     this.baseMip = baseMipFor(note.pages);
     const nearest = quantity === 'patchId' || quantity === 'mipLevel';
     this.pages = note.pages.map((page) => new LightmapPage(renderer, page, this.baseMip, nearest));
-    for (const page of this.pages) page.uniforms.pageLightKnown = this.lightKnown;
-    if (quantity !== 'irradiance') this.lightKnown.value = true;
+    for (const page of this.pages) page.uniforms.pageLightShown = this.lightShown;
+    if (quantity === 'irradiance') return;
+    this.lit = this.lightShown.value = true;
   }
 
   get bytes(): number {
@@ -69,14 +72,18 @@ export class LightmapSet {
     return this.lit && (this.complete || this.pages.every((page) => page.covered));
   }
 
-  /** Some light has come, or the solve is over without any. */
-  get lit(): boolean {
-    return this.lightKnown.value;
+  get showsLight(): boolean {
+    return this.lightShown.value;
+  }
+
+  /** From the next frame on surfaces show the light that has come, where some has. */
+  showLight(): void {
+    this.lightShown.value ||= this.lit;
   }
 
   /** The solve does not go on: what there is is the light. */
   settle(): void {
-    this.lightKnown.value = true;
+    this.lit = true;
   }
 
   /** `bytes` of the frame are given back to the server when the tile was taken up. */
@@ -94,7 +101,7 @@ export class LightmapSet {
       if (page && !page.makeRoom(tile, end)) break; // goes on in the next frame
       page?.put(tile);
       ++taken;
-      this.lightKnown.value ||= tile.texels.some((texel) => (texel & 0x7ffffff) !== 0);
+      this.lit ||= tile.texels.some((texel) => (texel & 0x7ffffff) !== 0);
       this.revision = Math.max(this.revision, tile.header.revision);
       if (Number.isFinite(tile.header.error)) this.error = Math.min(this.error, tile.header.error);
       this.used(bytes);

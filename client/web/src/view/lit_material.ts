@@ -88,6 +88,22 @@ export class LitMaterial extends MeshLambertMaterial {
     this.own.dataPage.value = page?.texture ?? this.page?.texture ?? null;
   }
 
+  /** All of a surface looks the same but for its light. */
+  get isPlain(): boolean {
+    return !this.map && !this.emissiveMap && !this.vertexColors && !this.transparent && this.alphaTest === 0;
+  }
+
+  /** Of a plain surface, in nits, as the program has it; irradiance in lux. */
+  radianceOf(irradiance: readonly [number, number, number]): [number, number, number] {
+    const rho = (c: number) => Math.min(0.999, c * this.own.diffuseScale.value) / Math.PI;
+    const { color, emissive, emissiveIntensity: strength } = this;
+    return [
+      emissive.r * strength + rho(color.r) * irradiance[0],
+      emissive.g * strength + rho(color.g) * irradiance[1],
+      emissive.b * strength + rho(color.b) * irradiance[2],
+    ];
+  }
+
   /** Takes on what an edit may change. */
   edit(gltf: GltfMaterial): void {
     const pbr = gltf.pbrMetallicRoughness ?? {};
@@ -130,7 +146,7 @@ function noPage() {
     pageSize: { value: [1, 1] },
     pageUsed: { value: [1, 1] },
     pageTiles: { value: 64 },
-    pageLightKnown: { value: false },
+    pageLightShown: { value: false },
   };
 }
 

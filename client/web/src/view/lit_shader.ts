@@ -9,12 +9,13 @@ const PAGE_PARS = `
 uniform sampler2D pageResident;
 uniform vec2 pageSize;
 uniform float pageTiles;
-uniform bool pageLightKnown;  // false: nothing has shone yet, and what is there is black
+uniform bool pageLightShown;  // false: nothing has shone yet, or it is not known how brightly to show it
+uniform bool measuring;       // linear radiance for the exposure meter
 const float kNothing = 15.5;
 
 // The finest mip that all four texels of a bilinear lookup have.
 float residentMip(vec2 uv) {
-  if (!pageLightKnown) return 255.0;
+  if (!pageLightShown && !measuring) return 255.0;
   vec2 size = vec2(textureSize(pageResident, 0));
   vec2 texel = 0.75 / pageSize;
   vec2 tiles = pageSize / (pageTiles * size);
@@ -37,7 +38,6 @@ float lookupMip(vec2 uv, out float resident) {
 const VIEW_PARS = `
 uniform int viewMode;
 uniform int toneCurve;       // 0 neutral, 1 ACES, 2 AgX, 3 none
-uniform bool measuring;      // linear radiance for the exposure meter
 uniform bool falseColour;
 uniform vec2 falseRange;     // lowest and highest value of the legend, on a logarithmic scale
 uniform float previewLight;  // irradiance of surfaces that no light has been heard of yet
@@ -135,6 +135,9 @@ export const OUTPUT_FRAGMENT = `
     shade = encodeSrgb(diffuseColor.rgb);
   }
   gl_FragColor = vec4(shade, diffuseColor.a);
+  #ifdef USE_LIGHTMAP
+    if (measuring && resident > kNothing) gl_FragColor.a = 0.0; // what nothing is known of is no part of the picture
+  #endif
 `;
 
 /** The flat view of one page. */

@@ -10,11 +10,13 @@ import { FrameFences } from './frame_fences';
 import { FramePace } from './frame_pace';
 import { Gizmo, type GizmoMode } from './gizmo';
 import { ViewUniforms } from './lit_material';
+import { LightGate } from './light_gate';
 import { LightmapSet } from './lightmap_set';
 import { LitScene } from './lit_scene';
 import type { People } from './people';
 import { PagesView } from './pages_view';
 import { pick, readingAt, type Reading } from './picker';
+import { exposureByRays } from './ray_exposure';
 import type { ViewMode } from './view_modes';
 
 /** For taking up tiles, of the 16 that a frame has; of longer ones the same share, but no task of 50. */
@@ -70,7 +72,8 @@ export class Viewer {
   private readonly anisotropy: number;
   private readonly pace: FramePace;
   private readonly fences: FrameFences;
-  private scale = 1;
+  private scale: number;
+  private bufferKey = '';
   private readonly world = new Scene();
   private wanted = true;
   /** Something has changed that the scale of false colours, and the exposure, may depend on. */
@@ -81,6 +84,7 @@ export class Viewer {
   private lastScale = 0;
   private lost = false;
   private layoutKnown = true;
+  private readonly gate = new LightGate();
   private document: Gltf = { asset: { version: '2.0' } };
 
   constructor(
@@ -90,11 +94,14 @@ export class Viewer {
     this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, powerPreference: 'high-performance' });
     this.renderer.toneMapping = NoToneMapping; // our shaders do it, and the encoding, so that one program serves all
     this.renderer.outputColorSpace = LinearSRGBColorSpace;
+    // Each answer about a program's text waits for all that the card has to do; a program that fails is heard of anyway.
+    this.renderer.debug.checkShaderErrors = import.meta.env.DEV;
     // Asked for here, where nothing is being drawn that the answer would have to wait for.
     this.anisotropy = Math.min(8, this.renderer.capabilities.getMaxAnisotropy());
     this.renderer.setClearColor(0, 0); // the page's own background shows behind the scene
     const gl = this.renderer.getContext() as WebGL2RenderingContext;
     this.pace = new FramePace(drawsWithoutCard(gl));
+    this.scale = this.pace.firstScale;
     this.fences = new FrameFences(gl);
     this.rig = new CameraRig(canvas, () => this.moved());
     this.exposure = new ExposureMeter(this.renderer, this.uniforms);
@@ -269,10 +276,11 @@ export class Viewer {
     this.promote(now);
     if (this.rig.update(seconds)) this.invalidate();
     if (this.people?.step(seconds, this.rig.sceneSize * PERSON_SIZE)) this.wanted = true;
+    this.gate.turn(now, this.shown?.set.lit === true && this.exposure.unknown);
     this.measure(now);
     if (this.exposure.step(seconds)) this.wanted = true;
     if (this.shown?.set.complete === false) this.pace.hurry(now, 0); // the first light is soon first, and then sharp
-    if (!this.wanted && !this.pace.isSharpDue(now)) return;
+    if ((!this.wanted && !this.pace.isSharpDue(now)) || this.gate.standsStill(now)) return;
     const scale = this.pace.ask(now);
     if (scale === undefined) return;
     this.wanted = false;
@@ -286,8 +294,9 @@ export class Viewer {
   private draw(scale: number): void {
     if (scale !== this.scale) {
       this.scale = scale;
-      this.renderer.setPixelRatio(scale * Math.min(devicePixelRatio, 2));
+      this.sizeBuffer();
     }
+    if (!this.gate.isClosed(performance.now())) this.shown?.set.showLight();
     this.shown?.eachMaterial((material) => material.refresh());
     this.pagesView.refresh();
     this.people?.leaveOut(this.rig.camera);
@@ -309,11 +318,23 @@ export class Viewer {
         this.wanted = true;
       }
     }
-    const pause = Math.max(MEASURE_EVERY_MS, MEASURE_SHARE * this.exposure.tookMs);
-    if (!this.exposureDue || now - this.lastMeasure < pause || !this.shown?.set.covered) return;
+    const { unknown, automatic } = this.exposure;
+    const pause = unknown ? 0 : Math.max(MEASURE_EVERY_MS, MEASURE_SHARE * this.exposure.tookMs);
+    if (!this.exposureDue || now - this.lastMeasure < pause) return;
+    const { covered, complete, waiting } = this.shown?.set ?? {};
+    if (!this.gate.mayMeasure(now, covered === true, complete === true && waiting === 0)) return;
     this.lastMeasure = now;
+    if (unknown && this.guessExposure(now)) return; // and the card has the first light itself to draw
     this.exposureDue = false;
-    if (this.exposure.automatic && !this.mode?.flat) void this.measureNow().then(() => (this.wanted = true));
+    if (automatic && (unknown || !this.mode?.flat)) void this.measureNow().then(() => (this.wanted = true));
+  }
+
+  private guessExposure(now: number): boolean {
+    const guess = this.shown && exposureByRays(this.shown, this.rig.camera);
+    if (guess === undefined) return false;
+    this.exposure.guess(guess);
+    this.gate.turn(now, false);
+    return (this.wanted = true);
   }
 
   /** Signs and handles are no part of the scene's light. */
@@ -337,6 +358,7 @@ export class Viewer {
     for (let again = 0; again < 2 && this.shown; ++again) await this.measureNow(); // the first may have been on its way
     this.exposure.settle();
     this.exposure.step(0);
+    this.shown?.set.showLight();
     this.invalidate();
   }
 
@@ -394,12 +416,21 @@ export class Viewer {
   private resize(): void {
     const { clientWidth: width, clientHeight: height } = this.canvas;
     if (width === 0 || height === 0) return;
-    this.renderer.setPixelRatio(this.scale * Math.min(devicePixelRatio, 2));
-    this.renderer.setSize(width, height, false);
+    this.sizeBuffer();
     this.rig.resize(width / height);
     this.pagesView.resize(width / height);
     if (this.shown) this.draw(this.scale); // resizing clears the canvas: drawn at once, it does not blink
     this.invalidate();
+  }
+
+  /** A new buffer waits for all that the card has to do, and clears the canvas: none is made for nothing. */
+  private sizeBuffer(): void {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    const ratio = this.scale * Math.min(devicePixelRatio, 2);
+    const key = [width, height, ratio].join();
+    if (width === 0 || height === 0 || key === this.bufferKey) return;
+    this.bufferKey = key;
+    this.renderer.setDrawingBufferSize(width, height, ratio);
   }
 
   private onContext(lost: boolean): void {

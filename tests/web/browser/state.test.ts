@@ -1,0 +1,143 @@
+// What the page says of its server's state: what can be undone, and what has failed.
+
+import type { Page } from 'playwright-core';
+import type {} from '../../../client/web/src/main';
+import type { Progress } from '../../../client/web/src/protocol/messages';
+import { answered, converged, drawn, said, sceneOf, SCENES, type Server, serveEach, until } from './harness';
+
+const { pages, serve } = serveEach();
+
+const step = (page: Page, name: 'Undo' | 'Redo') => page.getByRole('button', { name, exact: true });
+
+/** Until Undo and Redo can be pressed, or cannot, as given. */
+async function offers(page: Page, undo: boolean, redo: boolean): Promise<void> {
+  const offered = async () => [await step(page, 'Undo').isEnabled(), await step(page, 'Redo').isEnabled()];
+  await until(offered, ([canUndo, canRedo]) => canUndo === undo && canRedo === redo);
+}
+
+const emissionOf = async (server: Server) =>
+  (await sceneOf(server)).materials.find(({ name }) => name === 'light')!['emissiveFactor'] as number[];
+
+it('offers to undo and to redo what there is, and says so where there is nothing', async () => {
+  const server = await serve(`${SCENES}/cornell.glb`);
+  const page = await pages.open(server.url, 1200, 800);
+  await converged(page);
+  const before = await emissionOf(server);
+  await page.locator('canvas.view').focus();
+  await page.keyboard.press('Control+z');
+  await said(page, /^Nothing to undo$/);
+  await page.keyboard.press('Control+Shift+z');
+  await said(page, /^Nothing to redo$/);
+  await offers(page, false, false);
+
+  // What a script has done can be taken back here, and made again.
+  const value = [0.2, 0.4, 1];
+  const patch = [{ op: 'replace', path: '/materials/@light/emissiveFactor', value }];
+  const other = await pages.open(server.url);
+  await other.waitForFunction(() => window.viewer?.connection.isOpen);
+  await other.evaluate((p) => window.viewer!.connection.call('scene.patch', { patch: p }), patch);
+  await offers(page, true, false);
+  await page.keyboard.press('Control+z');
+  await offers(page, false, true);
+  expect(await emissionOf(server)).toEqual(before);
+  await step(page, 'Redo').click();
+  await offers(page, true, false);
+  expect(await emissionOf(server)).toEqual(value);
+
+  // What was done here is taken back once: to take that back, too, would be to do it again.
+  await page.mouse.click(400, 260); // the back wall
+  await page.getByLabel('Colour', { exact: true }).fill('#2040ff');
+  await answered(page);
+  await offers(page, true, false);
+  const blue = (await sceneOf(server)).materials;
+  await step(page, 'Undo').click();
+  await answered(page);
+  await offers(page, false, true);
+  const back = (await sceneOf(server)).materials;
+  expect(back).not.toEqual(blue);
+  await page.locator('canvas.view').focus();
+  await page.keyboard.press('Control+z');
+  const twice = () => page.evaluate(() => window.notes!.filter((text) => text === 'Nothing to undo').length);
+  expect(await until(twice, (count) => count === 2)).toBe(2);
+  expect((await sceneOf(server)).materials).toEqual(back);
+
+  // Another process knows nothing of it.
+  await server.stop();
+  await page.getByText(/No connection/).waitFor();
+  await server.start();
+  await converged(page);
+  await offers(page, false, false);
+});
+
+/** A page on whose connection a test has a word to say: it changes what comes, and tells more. */
+async function openTold(
+  url: string,
+  change: (text: string) => string = (text) => text,
+): Promise<{ page: Page; tell: (message: object) => void }> {
+  const page = await pages.open('about:blank', 900, 600);
+  let send = (_text: string) => undefined as void;
+  await page.routeWebSocket(/\/ws$/, (socket) => {
+    const upstream = socket.connectToServer();
+    socket.onMessage((message) => upstream.send(message));
+    upstream.onMessage((message) => socket.send(typeof message === 'string' ? change(message) : message));
+    send = (text) => socket.send(text);
+  });
+  await page.goto(url);
+  return { page, tell: (message) => send(JSON.stringify({ jsonrpc: '2.0', ...message })) };
+}
+
+/** As a server tells it when it has no memory left, which a test cannot take from it. */
+const failed = (progress: Progress, surfaces: number) => ({
+  method: 'progress',
+  params: { ...progress, state: 'failed', failure: 'out of memory (bad_alloc)', surfaces, patches: 100 * surfaces },
+});
+
+const told = (page: Page) => page.evaluate(() => window.viewer!.progress!);
+
+it('does not go on showing a scene that its server has lost, and says why', async () => {
+  const server = await serve(`${SCENES}/cornell.glb`);
+  const { page, tell } = await openTold(server.url);
+  await converged(page);
+  tell(failed(await told(page), 0));
+  const card = page.locator('.welcome');
+  await card.getByText('The server has lost the scene').waitFor();
+  await card.getByText('It says: out of memory (bad_alloc).').waitFor();
+  expect(await page.locator('.chip').innerText()).toBe('Failed');
+  await drawn(page);
+  expect(await page.evaluate(() => window.viewer!.viewer.shown)).toBeUndefined();
+  expect(await page.evaluate(() => window.viewer!.edit.document.gltf.nodes)).toBeUndefined();
+  // Until there is one again.
+  const glb = await (await fetch(`${server.url}/scene.glb`)).arrayBuffer();
+  await fetch(`${server.url}/scene?name=again.glb`, { method: 'PUT', body: glb });
+  await converged(page);
+  expect(await card.isVisible()).toBe(false);
+});
+
+it('says what failed to who comes after it', async () => {
+  const server = await serve();
+  const { page } = await openTold(server.url, (text) =>
+    text.replaceAll('"state":"empty"', '"state":"failed","failure":"out of memory (bad_alloc)"'),
+  );
+  await page.locator('.welcome').getByText('It says: out of memory (bad_alloc).').waitFor();
+  expect(await page.locator('.chip').innerText()).toBe('Failed');
+  const other = await serve(`${SCENES}/cornell.glb`);
+  const glb = await (await fetch(`${other.url}/scene.glb`)).arrayBuffer();
+  await fetch(`${server.url}/scene?name=room.glb`, { method: 'PUT', body: glb });
+  await converged(page);
+  expect(await page.locator('.welcome').isVisible()).toBe(false);
+});
+
+it('keeps the light of a solve that has failed, says why, and starts it again', async () => {
+  const server = await serve(`${SCENES}/cornell.glb`);
+  const { page, tell } = await openTold(server.url);
+  await converged(page);
+  const { surfaces } = await told(page);
+  tell(failed(await told(page), surfaces));
+  const banner = page.locator('.banner');
+  await banner.getByText('The solve has failed: out of memory (bad_alloc).').waitFor();
+  expect(await page.evaluate(() => window.viewer!.viewer.shown !== undefined)).toBe(true);
+  expect(await page.locator('.welcome').isVisible()).toBe(false);
+  await banner.getByRole('button', { name: 'Start again' }).click();
+  await converged(page);
+  expect(await banner.isVisible()).toBe(false);
+});

@@ -1,0 +1,43 @@
+import { offerOf } from '../../../client/web/src/app_history';
+import type { PastRevision, SceneHistory } from '../../../client/web/src/protocol/messages';
+
+const history = (undoable: number, redoable: number, revisions: PastRevision[]): SceneHistory => ({
+  revision: revisions.at(-1)?.revision ?? 0,
+  undoable,
+  redoable,
+  revisions,
+});
+
+const load: PastRevision = { revision: 1, kind: 'load' };
+
+describe('what is offered to be undone and redone', () => {
+  it('is nothing where the server has nothing', () => {
+    expect(offerOf(history(0, 0, [load]), new Set())).toEqual({ undo: false, redo: false });
+    expect(offerOf(history(0, 0, []), new Set())).toEqual({ undo: false, redo: false });
+  });
+
+  it('is what others have done, and have taken back', () => {
+    const edit: PastRevision = { revision: 2, kind: 'patch' };
+    expect(offerOf(history(1, 0, [load, edit]), new Set())).toEqual({ undo: true, redo: false });
+    const back: PastRevision[] = [load, { ...edit, undone: true }, { revision: 3, kind: 'undo' }];
+    expect(offerOf(history(0, 1, back), new Set())).toEqual({ undo: false, redo: true });
+  });
+
+  it('is not what this page has taken back: undoing that would do it again', () => {
+    const edits: PastRevision[] = [load, { revision: 2, kind: 'patch' }, { revision: 3, kind: 'patch' }];
+    expect(offerOf(history(2, 0, edits), new Set([3]))).toEqual({ undo: false, redo: false });
+    // Somebody's edit on top of it is.
+    const more: PastRevision[] = [...edits, { revision: 4, kind: 'patch' }];
+    expect(offerOf(history(3, 0, more), new Set([3])).undo).toBe(true);
+    const less: PastRevision[] = [
+      ...edits,
+      { revision: 4, kind: 'patch', undone: true },
+      { revision: 5, kind: 'undo' },
+    ];
+    expect(offerOf(history(2, 1, less), new Set([3]))).toEqual({ undo: false, redo: true });
+  });
+
+  it('is undone without knowing it where there is more than was asked for', () => {
+    expect(offerOf(history(40, 0, [{ revision: 90, kind: 'redo' }]), new Set([3])).undo).toBe(true);
+  });
+});
