@@ -9,6 +9,7 @@ import subprocess
 import tempfile
 import time
 import unittest
+import unittest.mock
 import uuid
 
 MARK = "RADIOSITY_TEST_MARK"
@@ -88,8 +89,14 @@ def marked_processes(mark):
     return found
 
 
+def sanitizer_options(folder):
+    """The options of those sanitizers that the environment speaks of, with reports that go to files in `folder`."""
+    return {name: f"{os.environ[name]}:log_path={folder}/report" for name in ("ASAN_OPTIONS", "TSAN_OPTIONS")
+            if name in os.environ}
+
+
 class ServiceCase(unittest.TestCase):
-    """A folder, a mark on every process, and the claim that all are gone in the end."""
+    """A folder, a mark on every process, and the claim that all are gone in the end, and no sanitizer had a word to say."""
 
     maxDiff = None
 
@@ -97,7 +104,24 @@ class ServiceCase(unittest.TestCase):
         self.mark = uuid.uuid4().hex
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="radiosity-service-"))
         self.addCleanup(shutil.rmtree, self.folder, ignore_errors=True)
+        self._watchSanitizers()
         self.addCleanup(self.assertNothingLeft)
+
+    def _watchSanitizers(self):
+        # Not every status is looked at: a renderer that ends is replaced, and many a server is killed in the end.
+        reports = pathlib.Path(tempfile.mkdtemp(prefix="radiosity-sanitizers-"))
+        self.addCleanup(shutil.rmtree, reports, ignore_errors=True)
+        self.addCleanup(self.assertNoReports, reports)
+        options = unittest.mock.patch.dict(os.environ, sanitizer_options(reports))
+        options.start()
+        self.addCleanup(options.stop)
+
+    def assertNoReports(self, reports):
+        found = [file.read_text(errors="replace") for file in reports.iterdir()]
+        # Those of GCC's undefined-behaviour sanitizer go to standard error, whatever its options say.
+        found += [log for file in self.folder.glob("*.log") if "runtime error: " in (log := file.read_text(errors="replace"))]
+        if found:
+            self.fail("\n".join(found))
 
     def server(self, *arguments, **options):
         server = Server(self.folder, *arguments, mark=self.mark, **options)
