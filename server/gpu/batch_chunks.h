@@ -22,8 +22,9 @@ struct SceneSize {
   std::size_t triangles = 0, nodes = 0;
 };
 
-/// Gather shots first: they are the longest. Cost of a shot: its pixels and, for each hemicube, the scene's triangles.
-/// The links of a chunk, which travel and wait for their turn, take some 16 MiB at most, or are those of one shot.
+/// Gather shots first: they are the longest. Cost of a shot: its pixels and, for each hemicube, the scene's triangles
+/// and the receivers that look. The links of a chunk, which travel and wait for their turn, take some 16 MiB at most,
+/// or are those of one shot.
 [[nodiscard]] std::vector<Chunk> cutBatch(const solver::ShotBatch& batch, const SceneSize& scene, std::size_t workers);
 
 /// The chunk as the body of a message; `measure`: links are wanted, shot by shot.

@@ -7,10 +7,11 @@
 namespace radiosity::scene {
 namespace {
 
-constexpr std::size_t kMaxOperations = 5000;
 constexpr std::size_t kMaxDepth = 64;
 // `copy` can double a document with each operation; what is added is bounded, not the count of operations alone.
 constexpr std::size_t kMaxAddedBytes = std::size_t{64} << 20;
+// Looking for a name reads the elements of an array: a patch may read so many in all, a second's worth or so.
+constexpr std::size_t kMaxRead = 20'000'000;
 
 /// About what a value costs in memory.
 std::size_t weightOf(const Json& value) {
@@ -113,7 +114,7 @@ class Patcher {
   }
 
   /// "@lamp": the one element whose `name` is lamp. Digits without leading zeros: that element. "-": past the end.
-  [[nodiscard]] Result<std::size_t> arrayIndex(const Json& array, const std::string& token) const {
+  [[nodiscard]] Result<std::size_t> arrayIndex(const Json& array, const std::string& token) {
     if (token == "-") return array.size();
     if (!token.empty() && token[0] == '@') return namedIndex(array, token.substr(1));
     const bool digits =
@@ -124,10 +125,18 @@ class Patcher {
     return static_cast<std::size_t>(std::stoul(token));
   }
 
-  [[nodiscard]] Result<std::size_t> namedIndex(const Json& array, const std::string& name) const {
+  [[nodiscard]] static bool isNamed(const Json& element, const std::string& name) {
+    if (!element.is_object()) return false;
+    const auto found = element.find("name");
+    return found != element.end() && found->is_string() && found->get_ref<const std::string&>() == name;
+  }
+
+  [[nodiscard]] Result<std::size_t> namedIndex(const Json& array, const std::string& name) {
+    read_ += array.size();
+    if (read_ > kMaxRead) return fault("the patch looks for too many names; use indices", ErrorCode::kTooLarge);
     std::optional<std::size_t> found;
     for (std::size_t i = 0; i < array.size(); ++i) {
-      if (!array[i].is_object() || stringOf(array[i], "name") != name) continue;
+      if (!isNamed(array[i], name)) continue;
       if (found) return fault("'" + name + "' names more than one element; use its index");
       found = i;
     }
@@ -221,21 +230,25 @@ class Patcher {
     if (target->value == nullptr) return fault("there is no such value");
     touched_ = target->path;
     if (auto ok = permit("remove", target->path); !ok) return ok;
-    if (target->parent == nullptr) {
-      document_ = nullptr;
-    } else if (target->parent->is_array()) {
-      target->parent->erase(target->index);
-    } else {
-      target->parent->erase(target->key);
-    }
+    erase(*target);
     return {};
+  }
+
+  void erase(const Target& target) {
+    if (target.parent == nullptr) {
+      document_ = nullptr;
+    } else if (target.parent->is_array()) {
+      target.parent->erase(target.index);
+    } else {
+      target.parent->erase(target.key);
+    }
   }
 
   Result<void> transfer(const std::string& op, const std::string& from, const std::string& path) {
     const auto source = resolve(from);
     if (!source) return tl::unexpected(source.error());
     if (source->value == nullptr) return fault("there is no value at 'from' (" + from + ")");
-    Json value = *source->value;
+    Json value;
     if (op == "move") {
       // Compared as resolved: a name and an index may mean the same element.
       const auto to = resolve(path);
@@ -244,7 +257,11 @@ class Patcher {
       const bool below = to->path.size() >= inner.size() && std::equal(inner.begin(), inner.end(), to->path.begin());
       if (below && to->path.size() > inner.size()) return fault("cannot move a value into itself");
       if (below) return {};
-      if (auto ok = remove(from); !ok) return ok;
+      if (auto ok = permit("remove", inner); !ok) return ok;
+      value = std::move(*source->value);
+      erase(*source);
+    } else {
+      value = *source->value;
     }
     auto target = resolve(path);
     if (!target) return tl::unexpected(target.error());
@@ -256,6 +273,7 @@ class Patcher {
   const PatchGuard& guard_;
   std::size_t number_ = 0;
   std::size_t added_ = 0;
+  std::size_t read_ = 0;  ///< elements, on the way
   std::string where_;
   Tokens touched_;
 };
@@ -298,8 +316,9 @@ void addDifference(const Json& before, const Json& after, const std::string& poi
 Result<Json> applyJsonPatch(const Json& document, const Json& patch, const PatchGuard& guard,
                             std::vector<Tokens>* touched) {
   if (!patch.is_array()) return fail(ErrorCode::kBadInput, "a JSON Patch is an array of operations", "patch");
-  if (patch.size() > kMaxOperations) {
-    return fail(ErrorCode::kTooLarge, "a patch may have " + std::to_string(kMaxOperations) + " operations", "patch");
+  if (patch.size() > kMaxPatchOperations) {
+    return fail(ErrorCode::kTooLarge, "a patch may have " + std::to_string(kMaxPatchOperations) + " operations",
+                "patch");
   }
   if (jsonDepth(patch) > kMaxDepth) return fail(ErrorCode::kTooLarge, "patch is nested deeper than 64 levels", "patch");
   Patcher patcher(document, guard);

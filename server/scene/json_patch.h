@@ -16,9 +16,12 @@ using Tokens = std::vector<std::string>;
 /// Asked before each change, with names resolved to indices: a reason to refuse, or "".
 using PatchGuard = std::function<std::string(const Json& document, const std::string& op, const Tokens& path)>;
 
-/// At most 5000 operations, 64 levels, 64 MiB of added values. An array element may be named: /nodes/@lamp. The error's
-/// message starts with "operation N: " (from 0), its `where` is the pointer; kTestFailed for a failed `test`, kTooLarge
-/// over a limit, else kBadInput. `touched`, where given, gets the resolved `path` of every operation.
+inline constexpr std::size_t kMaxPatchOperations = 5000;
+
+/// At most so many operations, 64 levels, 64 MiB of added values, 20 million elements looked at for names. An array
+/// element may be named: /nodes/@lamp. The error's message starts with "operation N: " (from 0), its `where` is the
+/// pointer; kTestFailed for a failed `test`, kTooLarge over a limit, else kBadInput. `touched`, where given, gets the
+/// resolved `path` of every operation.
 [[nodiscard]] Result<Json> applyJsonPatch(const Json& document, const Json& patch, const PatchGuard& guard = {},
                                           std::vector<Tokens>* touched = nullptr);
 

@@ -39,7 +39,9 @@ constexpr double kSourceCost = 60.0;
 
 /// A wave ends where it is likely to bring the error to this part of the target: the spreads that it goes by are
 /// uncertain themselves, and the largest are rather too large.
-constexpr double kSurelyBelow = 0.9;
+constexpr double kSurelyBelow = 0.85;
+/// Of what varies inside a node its children, half as wide, resolve this part (of the square), where it is smooth.
+constexpr double kResolved = 0.75;
 /// So much of a wave is worth solving all bounces for.
 constexpr std::size_t kLeastPartOfWave = 8;
 
@@ -340,7 +342,10 @@ std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPy
   double variances = 0.0, variations = 0.0;
   for (std::uint32_t n = 0; n < system.shooters().size(); ++n) {
     const auto& shooter = system.shooters()[n];
-    if (shooter.column[0].points() == 0.0 || shooter.column[1].points() == 0.0) continue;
+    if (shooter.column[0].points() == 0.0 || shooter.column[1].points() == 0.0) {
+      variances += 0.25 * shooter.spread();  // of roulette: no sample lowers it
+      continue;
+    }
     const std::uint32_t points = shooter.light != scene::kNone ? kLightPoints : 1;
     const double cost = shooter.source != scene::kNone ? kSourceCost : shooter.isLight() ? kLightCost : 1.0;
     const double taken = shooter.column[0].points();
@@ -357,7 +362,7 @@ std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPy
     }
     const double varying = variation(shooter, system, unshot, patches);
     variations += varying;
-    if (may_split && varying > 0.0) gains.push_back({varying / 8.0, n, 0, varying});
+    if (may_split && varying > 0.0) gains.push_back({varying / 8.0, n, 0, kResolved * varying});
   }
   std::sort(gains.begin(), gains.end(), [](const Gain& a, const Gain& b) {
     return std::tie(b.gain, a.shooter, a.points) < std::tie(a.gain, b.shooter, b.points);
@@ -369,14 +374,16 @@ std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPy
   for (const auto& gain : gains) {
     if (wanted.size() >= limit || gain.gain <= 0.0) break;
     if (wanted.size() >= limit / kLeastPartOfWave && forecast.isReached()) break;
-    gain.points == 0 ? forecast.split(gain.less) : forecast.sample(gain.less);
     if (gain.points == 0) {
+      const auto before = wanted.size();
       if (!memory.isFull())
         split(NodePlace(system.shooters()[gain.shooter].place), system, unshot, patches, memory, wanted);
+      if (wanted.size() > before) forecast.split(gain.less);
       continue;
     }
     const auto& shooter = system.shooters()[gain.shooter];
     if (!memory.takeSample(shooter, 0) || !memory.takeSample(shooter, 1)) continue;
+    forecast.sample(gain.less);
     for (std::size_t half = 0; half < 2; ++half)
       wanted.push_back({gain.shooter, half, gain.points, shooter.column[half].samples() + further[gain.shooter]});
     ++further[gain.shooter];

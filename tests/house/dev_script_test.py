@@ -156,25 +156,40 @@ class DevTest(Checkout):
         self.assertNotIn("no Slurm here", again)
         self.assertLess(max(map(len, done.stdout.splitlines())), 100)
 
-    def test_what_failed_is_run_again_only_if_asked_and_named_if_it_passes(self):
-        (self.root / "build/Testing/Temporary").mkdir(parents=True)
-        passing = "100% tests passed, 0 tests failed out of 2"
+    def again(self, names, again=0, options=("--again",), preset="default"):
+        """A run in which these failed at first; its end, and how often ctest was called."""
+        log = self.root / ("build" if preset == "default" else f"build-{preset}") / "Testing/Temporary/LastTestsFailed.log"
+        log.parent.mkdir(parents=True, exist_ok=True)
+        lines = "".join(f"{number}:{name}\\n" for number, name in enumerate(names))
         self.stand_in("bin/ctest", f'echo "$*" >>{self.root}/calls\n[[ "$*" != *--rerun-failed* ]] || '
-                      f'{{ echo "{passing}"; exit "$AGAIN"; }}\ncat {self.root}/printed\n'
-                      f'printf "2:Room.Leaks\\n7:Room.Burns\\n" >{self.root}/build/Testing/Temporary/LastTestsFailed.log; '
-                      'exit "$STATUS"')
-        for again, options, status, calls in (("0", (), 8, 1), ("0", ("--again",), 0, 2), ("8", ("--again",), 8, 2)):
-            with self.subTest(again=again, options=options):
-                (self.root / "calls").write_text("")
-                os.environ["AGAIN"] = again
-                self.addCleanup(os.environ.pop, "AGAIN", None)
-                done = self.run_tests(8, *options)
-                self.assertEqual(done.returncode, status)
-                called = (self.root / "calls").read_text().splitlines()
-                self.assertEqual(len(called), calls)
-                self.assertFalse(any("--again" in call for call in called))
-                self.assertEqual("passed only when run again, alone: Room.Leaks Room.Burns" in done.stderr, status == 0)
-                self.assertTrue(done.stdout.rstrip().endswith(passing if calls == 2 else "out of 3"), done.stdout[-200:])
+                      f'{{ echo "100% tests passed, again"; exit {again}; }}\ncat {self.root}/printed\n'
+                      f'printf "{lines}" >{log}; exit "$STATUS"')
+        (self.root / "calls").write_text("")
+        os.environ["RADIOSITY_PRESET"] = preset
+        self.addCleanup(os.environ.pop, "RADIOSITY_PRESET", None)
+        done = self.run_tests(8, *options)
+        calls = (self.root / "calls").read_text().splitlines()
+        self.assertFalse(any("--again" in call for call in calls))
+        return done, len(calls)
+
+    def test_what_waits_for_programs_is_run_again_if_asked_and_named_if_it_passes(self):
+        for names, again, options, status, calls in (
+                (["service_state"], 0, (), 8, 1), (["service_state", "web_browser"], 0, ("--again",), 0, 2),
+                (["wire_tls"], 8, ("--again",), 8, 2), (["wire_tls", "Room.Leaks"], 0, ("--again",), 8, 1),
+                ([f"service_{n}" for n in range(6)], 0, ("--again",), 8, 1)):
+            with self.subTest(names=names, again=again, options=options):
+                done, called = self.again(names, again, options)
+                self.assertEqual((done.returncode, called), (status, calls), done.stderr)
+                self.assertEqual("passed only when run again, alone: " + " ".join(names) in done.stderr, status == 0)
+
+    def test_what_a_sanitizer_finds_gets_no_second_try(self):
+        (self.root / "build-tsan").mkdir()
+        (self.root / "build-tsan/build.ninja").touch()
+        done, called = self.again(["service_state"], preset="tsan")
+        self.assertEqual((done.returncode, called), (8, 1), done.stderr)
+
+    def test_again_comes_first(self):
+        self.assertEqual(self.run_tests(0, "Room", "--again").returncode, 2)
 
     def test_what_passes_is_shown_once(self):
         done = self.run_tests(0)

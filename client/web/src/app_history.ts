@@ -63,22 +63,33 @@ export class EditHistory {
     await this.onServer('redo');
   }
 
+  /**
+   * Asks anew once all that this page has sent is answered: what is known is of before, and its newest edit may be one
+   * that has just been taken back here.
+   */
   private async onServer(step: keyof Offer): Promise<void> {
-    if (!this.server[step]) await this.ask(); // somebody may have done something since
-    if (this.server[step]) await this.app.ask(`scene.${step}`);
+    await this.document.settled();
+    const offer = await this.ask();
+    if (offer[step]) await this.app.ask(`scene.${step}`);
     else if (this.app.connection.isOpen) this.app.frame.toasts.show(`Nothing to ${step}`);
   }
 
-  private async ask(): Promise<void> {
+  private async ask(): Promise<Offer> {
     clearTimeout(this.timer);
     this.timer = undefined;
     const { connection } = this.app;
-    if (!connection.has('scene.history')) return this.forget();
+    if (!connection.has('scene.history')) {
+      this.forget();
+      return NOTHING;
+    }
     const question = ++this.questions;
     this.lastAsked = performance.now();
     const answer = await connection.call<SceneHistory>('scene.history', { limit: REVISIONS }).catch(() => undefined);
-    if (question !== this.questions) return; // a later answer counts
-    this.server = answer ? offerOf(answer, this.document.takenBack) : NOTHING;
-    this.show();
+    const offer = answer ? offerOf(answer, this.document.takenBack) : NOTHING;
+    if (question === this.questions) {
+      this.server = offer;
+      this.show();
+    }
+    return offer;
   }
 }

@@ -100,18 +100,19 @@ class SolveTest(ServiceCase):
         self.assertIn("--link-memory", errors)
 
     def test_interruptionExits75AtOnceAndLeavesNothing(self):
-        seconds = []
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGTERM):
+        seconds = {signal.SIGINT: [], signal.SIGTERM: []}
+        for number in 2 * (signal.SIGINT, signal.SIGTERM):
             process = self.start("solve", self.scene, "-o", "lit.glb", *ENDLESS)
             waitForLine(process.stderr, "shots")
             asked = time.monotonic()
             process.send_signal(number)
             self.assertEqual(process.wait(60), 75)
-            seconds.append(time.monotonic() - asked)
+            seconds[number].append(time.monotonic() - asked)
             self.assertIn("interrupted", process.stderr.read())
             self.assertNothingLeft()
             self.assertEqual(self.files(), ["plates.glb"])
-        self.assertLess(min(seconds), 5)  # what farms are promised; of three, since a machine may stall
+        for number, took in seconds.items():
+            self.assertLess(min(took), 5, number)  # what farms are promised; of two, since a machine may stall
 
     def test_killedClientTakesItsServerAlong(self):
         process = self.start("solve", self.scene, "-o", "lit.glb", *ENDLESS)

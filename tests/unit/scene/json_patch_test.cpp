@@ -89,6 +89,11 @@ TEST(JsonPatch, aMoveIntoItselfIsSeenThroughNames) {
   EXPECT_FALSE(applyJsonPatch(doc, R"([{"op":"move","from":"/l/@a","path":"/l/0/in"}])"_json));
   EXPECT_FALSE(applyJsonPatch(doc, R"([{"op":"move","from":"/l/0","path":"/l/@a/in"}])"_json));
   EXPECT_EQ(applyJsonPatch(doc, R"([{"op":"move","from":"/l/@a","path":"/l/0"}])"_json).value(), doc);
+  EXPECT_EQ(applyJsonPatch(doc, R"([{"op":"move","from":"","path":""}])"_json).value(), doc);
+  const auto moved = applyJsonPatch(doc, R"([{"op":"move","from":"/l/@a","path":"/m"}])"_json);
+  ASSERT_TRUE(moved) << moved.error().text();
+  EXPECT_EQ((*moved)["m"], doc["l"][0]);
+  EXPECT_EQ((*moved)["l"].size(), doc["l"].size() - 1);
   // A name that only begins like another is another.
   EXPECT_EQ(applyJsonPatch(R"({"a":1})"_json, R"([{"op":"move","from":"/a","path":"/ab"}])"_json).value(),
             (Json{{"ab", 1}}));
@@ -133,6 +138,16 @@ TEST(JsonPatch, operationsDepthAndGrowthAreBounded) {
   Json many = Json::array();
   for (int i = 0; i < 5001; ++i) many.push_back({{"op", "add"}, {"path", "/a"}, {"value", 1}});
   EXPECT_EQ(applyJsonPatch(Json::object(), many).error().code, ErrorCode::kTooLarge);
+  many.erase(many.size() - 1);
+  EXPECT_TRUE(applyJsonPatch(Json::object(), many));
+  // Names are looked for among all elements.
+  Json named = {{"nodes", Json::array()}};
+  for (int i = 0; i < 20'000; ++i) named["nodes"].push_back({{"name", std::to_string(i)}});
+  for (auto& operation : many) operation = {{"op", "replace"}, {"path", "/nodes/@7/name"}, {"value", "7"}};
+  const auto searched = applyJsonPatch(named, many);
+  ASSERT_FALSE(searched);
+  EXPECT_EQ(searched.error().code, ErrorCode::kTooLarge);
+  EXPECT_NE(searched.error().text().find("names"), std::string::npos) << searched.error().text();
   // Each copy doubles the document: 2^1000 without a bound.
   Json doubling = Json::array();
   for (int i = 0; i < 60; ++i) doubling.push_back({{"op", "copy"}, {"from", "/a"}, {"path", "/a/-"}});

@@ -61,6 +61,17 @@ it('offers to undo and to redo what there is, and says so where there is nothing
   expect(await until(twice, (count) => count === 2)).toBe(2);
   expect((await sceneOf(server)).materials).toEqual(back);
 
+  // Nor by pressing twice, faster than the server answers.
+  await page.getByLabel('Colour', { exact: true }).fill('#ff4020');
+  await answered(page);
+  const red = (await sceneOf(server)).materials;
+  expect(red).not.toEqual(back);
+  await page.locator('canvas.view').focus();
+  await page.keyboard.press('Control+z');
+  await page.keyboard.press('Control+z');
+  expect(await until(twice, (count) => count === 3)).toBe(3);
+  expect((await sceneOf(server)).materials).toEqual(back);
+
   // Another process knows nothing of it.
   await server.stop();
   await page.getByText(/No connection/).waitFor();

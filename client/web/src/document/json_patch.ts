@@ -163,12 +163,13 @@ function applyOperation(document: Json, operation: PatchOperation): Patch {
 
 /** Applies all or nothing; returns the patch that undoes it. Throws PatchError. */
 export function applyPatch(document: Json, patch: Patch): Patch {
-  let inverse: Patch = [];
+  const steps: Patch[] = [];
+  const inverse = () => steps.reverse().flat();
   try {
-    for (const operation of patch) inverse = [...applyOperation(document, operation), ...inverse];
+    for (const operation of patch) steps.push(applyOperation(document, operation));
   } catch (error) {
-    for (const operation of inverse) applyOperation(document, operation);
+    for (const operation of inverse()) applyOperation(document, operation);
     throw error;
   }
-  return inverse;
+  return inverse();
 }

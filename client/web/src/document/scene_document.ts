@@ -46,6 +46,7 @@ export class SceneDocument {
   readonly redoStack: EditEntry[] = [];
   /** Revisions that took back what this page had done; to the server they are edits like others. */
   readonly takenBack = new Set<number>();
+  private readonly waiting: (() => void)[] = [];
   lastEdit: Patch | undefined;
   private pending: PendingEdit[] = [];
   private gesture = 0;
@@ -66,6 +67,7 @@ export class SceneDocument {
     this.gltf = gltf;
     this.revision = revision;
     this.pending = [];
+    for (const done of this.waiting.splice(0)) done();
     this.undoStack.length = 0;
     this.redoStack.length = 0;
     this.takenBack.clear();
@@ -105,6 +107,11 @@ export class SceneDocument {
    */
   edit(label: string, patch: Patch, key?: string): Promise<void> {
     return this.enqueue(label, patch, 'step', key);
+  }
+
+  /** Until every edit that was made here so far is answered. */
+  async settled(): Promise<void> {
+    while (this.pending.length > 0) await new Promise<void>((done) => this.waiting.push(done));
   }
 
   /** The gesture is over: the next edit with its key is a new step. Those on their way still belong to this one. */
@@ -207,6 +214,7 @@ export class SceneDocument {
       if (this.pending[0] === edit) this.pending.shift();
     }
     this.sending = false;
+    for (const done of this.waiting.splice(0)) done();
   }
 
   /**
