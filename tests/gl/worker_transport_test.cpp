@@ -14,6 +14,7 @@
 
 #include "server/gpu/batch_chunks.h"
 #include "server/gpu/gpu_transport.h"
+#include "server/solver/shot_cost.h"
 #include "tests/gl/scene_builder.h"
 
 namespace radiosity::test {
@@ -134,6 +135,22 @@ TEST(BatchChunks, GetSmallTowardsTheEndOfABatch) {
   ASSERT_GT(chunks.size(), 8U);
   EXPECT_LT(chunks.back().cost, 0.25 * chunks.front().cost);
   for (std::size_t i = 1; i < chunks.size(); ++i) EXPECT_LT(chunks[i].cost, 1.3 * chunks[i - 1].cost) << i;
+}
+
+TEST(BatchChunks, OfGatheredShotsCountTheReceiversThatLook) {
+  const auto scene = randomRoom(60, 2000, 1);
+  auto batch = mixedBatch(*scene, 8);
+  batch.scatter.clear();
+  const auto cost = [&](std::size_t nodes) {
+    double sum = 0.0;
+    for (const auto& chunk : gpu::cutBatch(batch, {120, nodes}, 2)) sum += chunk.cost;
+    return sum;
+  };
+  ASSERT_EQ(batch.gather.size(), 3U);  // of five points each, all receivers weighed once and looked at from each point
+  EXPECT_DOUBLE_EQ(cost(101'000) - cost(1000), 3 * (1 + 5) * 100'000 * solver::ShotCost::kReceiverPixels);
+  batch.receivers.push_back({0, 1});
+  for (auto& shot : batch.gather) shot.run_count = 1;
+  EXPECT_DOUBLE_EQ(cost(101'000), cost(1000)) << "those that are named are few";
 }
 
 TEST(BatchChunks, OfScenesWithManyNodesHaveFewShotsSoThatTheirLinksStaySmall) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <string>
 #include <vector>
 
 #include "server/scene/document.h"
@@ -49,6 +50,22 @@ std::vector<float> lightOf(const std::vector<scene::LightmapPage>& pages) {
     for (const auto& pixel : page.irradiance.pixels) light.push_back(pixel.y);
   }
   return light;
+}
+
+// Ten times a second somebody asks; scenes have as many warnings as materials.
+TEST(LitScene, TellsSoManyWarningsAndHowManyThereAre) {
+  auto edited = roomDocument();
+  edited.scene.warnings = {"one", "two", "three"};
+  engine::SolveSettings settings;
+  settings.texels = 600;
+  RayTransport transport(64);
+  const auto lit = valueOf(LitScene::make(std::move(edited), settings, transport));
+  (void)lit->startSolve();
+  EXPECT_EQ(lit->warnings(2), (std::vector<std::string>{"one", "two"}));
+  EXPECT_EQ(lit->warnings().size(), lit->warningCount());
+  EXPECT_GE(lit->warningCount(), 3U);
+  EXPECT_GT(lit->patchCount(), 500U);
+  EXPECT_TRUE(lit->warnings(0).empty());
 }
 
 TEST(LitScene, ShadowsMoveBeforeReflectedLightIsKnown) {
