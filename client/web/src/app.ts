@@ -299,7 +299,7 @@ export class App {
 
   /** The light that there is stays to be looked at; that nothing comes after it is said for as long as it holds. */
   private showFailure(why: string | undefined): void {
-    if (why === this.failure) return;
+    if (why === this.failure || this.viewer.isLost) return; // the card comes first; it is said when that is back
     this.failure = why;
     if (why === undefined) return this.frame.setBanner(undefined);
     this.frame.setBanner(`The solve has failed: ${why}.`, 'Start again', () => void this.ask('solve.restart'));

@@ -23,6 +23,14 @@ describe('the first light', () => {
     expect(gate.mayMeasure(250, false, false)).toBe(true);
   });
 
+  it('leaves the picture of the light whose place it takes until it can be shown', () => {
+    const gate = new LightGate();
+    gate.turn(0, true, true);
+    expect([gate.standsStill(2999), gate.standsStill(3000)]).toEqual([true, false]);
+    gate.turn(500, false, true);
+    expect(gate.standsStill(500)).toBe(false);
+  });
+
   it('is measured when it is whole, and does not wait for that for long', () => {
     const gate = new LightGate();
     gate.turn(0, true);

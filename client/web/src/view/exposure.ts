@@ -116,7 +116,7 @@ export class ExposureMeter {
       const value = exposureOf(this.luminances(pixels));
       if (value !== undefined) this.take(value);
     } catch {
-      // The context was lost on the way; it is measured again when it is back.
+      return; // The context was lost on the way; it is measured again when it is back.
     }
     if (of === this.scene) this.waits = false;
   }

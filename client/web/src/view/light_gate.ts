@@ -12,10 +12,15 @@ const STILL_MS = 400;
 
 export class LightGate {
   private sinceMs: number | undefined;
+  private replaces = false;
 
-  /** Once for every turn of the page. `waits`: there is light whose exposure is not known. */
-  turn(nowMs: number, waits: boolean): void {
+  /**
+   * Once for every turn of the page. `waits`: there is light whose exposure is not known. `replaces`: it takes the place
+   * of other light, whose picture stays until it can be shown: surfaces without light in between would flash.
+   */
+  turn(nowMs: number, waits: boolean, replaces = false): void {
     this.sinceMs = waits ? (this.sinceMs ?? nowMs) : undefined;
+    this.replaces = replaces;
   }
 
   /** Light is not to be shown yet. */
@@ -34,7 +39,7 @@ export class LightGate {
   }
 
   standsStill(nowMs: number): boolean {
-    return this.waitedMs(nowMs) < STILL_MS;
+    return this.waitedMs(nowMs) < (this.replaces ? MOST_CLOSED_MS : STILL_MS);
   }
 
   private waitedMs(nowMs: number): number {

@@ -83,6 +83,8 @@ export class Viewer {
   private lastMeasure = 0;
   private lastScale = 0;
   private lost = false;
+  /** What is shown took the place of another scene's light. */
+  private replaced = false;
   private layoutKnown = true;
   private readonly gate = new LightGate();
   private document: Gltf = { asset: { version: '2.0' } };
@@ -233,6 +235,11 @@ export class Viewer {
     return hit && this.shown ? readingAt(this.shown, hit, errors) : undefined;
   }
 
+  /** The graphics card was taken away. */
+  get isLost(): boolean {
+    return this.lost;
+  }
+
   /** Where others look from is drawn into the picture. */
   showPeople(people: People): void {
     this.people = people;
@@ -276,7 +283,7 @@ export class Viewer {
     this.promote(now);
     if (this.rig.update(seconds)) this.invalidate();
     if (this.people?.step(seconds, this.rig.sceneSize * PERSON_SIZE)) this.wanted = true;
-    this.gate.turn(now, this.shown?.set.lit === true && this.exposure.unknown);
+    this.gate.turn(now, this.shown?.set.lit === true && this.exposure.unknown, this.replaced);
     this.measure(now);
     if (this.exposure.step(seconds)) this.wanted = true;
     if (this.shown?.set.complete === false) this.pace.hurry(now, 0); // the first light is soon first, and then sharp
@@ -384,6 +391,7 @@ export class Viewer {
 
   private replaceShown(scene: LitScene | undefined): void {
     const before = this.shown;
+    this.replaced = before?.set.lit === true;
     this.shown = scene;
     if (before) {
       this.gizmo.attach(undefined);
