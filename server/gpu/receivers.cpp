@@ -186,7 +186,7 @@ std::optional<bool> Receivers::hiddenAmong(std::span<const std::uint32_t> items,
   std::array<std::uint32_t, 9> behind_all{};
   std::size_t count = 0;
   for (const auto item : items) {
-    if (item == scene::kNone || !behind(item, ray)) continue;
+    if (item == scene::kNone || !behind(item, ray) || !liesBefore(item, ray)) continue;
     const auto end = behind_all.begin() + static_cast<std::ptrdiff_t>(count);
     if (std::find(behind_all.begin(), end, item) != end) continue;
     if (count < behind_all.size()) behind_all[count++] = item;

@@ -256,7 +256,7 @@ StepOutcome LinkedSolver::chooseFurther() {
   if (refineVariation()) return StepOutcome::kRoundDone;
   // Roulette's part of the sampling error, and what was too weak to play, fall with the share alone.
   const double total = std::hypot(by_links_, error_.residual);
-  if (total <= targetOfLinks()) return exhausted(SolveLimit::kPatches);  // the rest varies within leaves
+  if (total <= targetOfLinks()) return exhausted(SolveLimit::kWithin);
   const double roulette = by_links_ * std::sqrt(LinkPlanner::rouletteShare(system_));
   const bool by_share = std::hypot(roulette, left_out_) > kByShare * total;
   const double by_samples = std::sqrt(std::max(0.0, by_links_ * by_links_ - roulette * roulette));

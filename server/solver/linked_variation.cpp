@@ -22,7 +22,9 @@ constexpr double kLeastByLinks = 0.5;
 }  // namespace
 
 bool LinkedSolver::wantsVariation() const {
-  if (variation_ || growing_ || error_.total > std::max(kSoon * settings_.target_error, kLittle)) return false;
+  if (variation_ || growing_ || !settings_.within_leaves ||
+      error_.total > std::max(kSoon * settings_.target_error, kLittle))
+    return false;
   return std::ranges::none_of(patches_->surfaces, [](const scene::Surface& surface) { return surface.see_through; });
 }
 

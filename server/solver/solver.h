@@ -24,6 +24,9 @@ struct SolverSettings {
   /// Gaussian over the unpushed irradiance. It stops when the residual reaches the target; its sampling error is what
   /// it is.
   bool paper_mode = false;
+  /// Whether light that varies within leaves is looked for, stated, and corrected. Without, leaves are lumped: each
+  /// shoots its mean, and that alone is what the error is about.
+  bool within_leaves = true;
   /// Bytes that remembered links never exceed. When they are used up no more nodes become shooters; a scene that could
   /// not even have a few hundred, or whose lights alone would take half of it, is solved without.
   std::size_t link_memory = std::size_t{1} << 30;
@@ -44,6 +47,7 @@ enum class SolveLimit {
   kLinkMemory,  ///< SolverSettings::link_memory
   kRounds,      ///< as many rounds as sums have room for
   kPatches,     ///< every node is split to its leaves, or no sample can lower the error any more
+  kWithin,      ///< light that varies within leaves
 };
 
 /// What is remembered, and what for, for reports.

@@ -49,7 +49,9 @@ std::vector<glm::vec3> texelErrorSquared(const scene::PatchScene& patches, std::
                                          const ErrorParts& stated, std::span<const float> residual_shape) {
   std::vector<glm::vec3> squares(patches.nodeCount(), glm::vec3(0.0F));
   const auto sides = makeSides(patches);
-  const glm::dvec3 residual = stated.residual * stated.residual * meanSquare(patches, sides, mean);
+  const auto mean_square = meanSquare(patches, sides, mean);
+  const glm::dvec3 residual = stated.residual * stated.residual * mean_square;
+  const glm::dvec3 variation = stated.variation * stated.variation * mean_square;
   for (const auto& side : sides) {
     std::vector<double> area(side.leaf_count);
     std::vector<glm::dvec3> sampling(side.leaf_count, glm::dvec3(0.0));
@@ -66,7 +68,7 @@ std::vector<glm::vec3> texelErrorSquared(const scene::PatchScene& patches, std::
       if (area[leaf] <= 0.0) continue;
       const auto node = side.first_node + leaf;
       const double share = residual_shape.empty() ? 1.0 : static_cast<double>(residual_shape[node]);
-      squares[node] = glm::vec3(shared[leaf] + share * residual);
+      squares[node] = glm::vec3(shared[leaf] + share * residual + variation);
     }
   }
   return squares;

@@ -79,9 +79,11 @@ RealSolve solveReally(const test_scenes::TestScene& scene, const SolveOptions& o
   settings.target_error = options.target_error;
   settings.seed = options.seed;
   settings.paper_mode = options.paper_mode;
+  settings.within_leaves = false;  // the dense solution is one of lumped patches
   const auto solver = solver::makeSolver(patches, materials, *transport, settings);
-  while (valueOf(solver->step()) != solver::StepOutcome::kConverged) {
-  }
+  auto outcome = solver::StepOutcome::kSlice;
+  while (outcome != solver::StepOutcome::kConverged && outcome != solver::StepOutcome::kExhausted)
+    outcome = valueOf(solver->step());
   return {texelsOf(*patches, materials, solver->irradiance()), solver->error(), solver->energy(), solver->rounds()};
 }
 
