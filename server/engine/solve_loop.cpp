@@ -82,6 +82,7 @@ void SolveLoop::threadMain(std::promise<Result<void>> started) {
   }
   checkpoints_.reset();
   first_light_.reset();
+  former_.reset();
   lit_.reset();
   view_.reset();
   const std::scoped_lock lock(mutex_);
@@ -117,6 +118,7 @@ void SolveLoop::takeTurn() {
       solveSlice();
     checkpointIfDue();
   } catch (const std::bad_alloc&) {
+    if (std::exchange(former_, nullptr)) return log::warn("out of memory: the scene before the last edit is forgotten");
     if (first_light_) {  // the whole may still be had
       first_light_->goes_on = unpublished_ = false;
       log::warn("out of memory: the first light stays as it is");
@@ -139,7 +141,9 @@ void SolveLoop::solveSlice() {
   seconds_ += std::chrono::duration<double>(Clock::now() - begin).count();
   if (queue_.closed()) return;  // nobody is left to be told
   tellLosses();
+  if (former_ && !holdsBoth()) former_.reset();
   if (!outcome) {
+    if (outcome.error().code == ErrorCode::kTooLarge && std::exchange(former_, nullptr)) return lit_->invalidate();
     if (willRecover(outcome.error())) return;
     failure_ = outcome.error().text();
     log::error("solve stopped: {}", failure_);
@@ -218,6 +222,7 @@ void SolveLoop::updateStatus(bool announce) {
     const auto& tiles = publisher_.tileCounters();
     status.counters["tiles.changed"] = static_cast<double>(tiles.changed);
     status.counters["skip.tilesUnchanged"] = static_cast<double>(tiles.unchanged);
+    status.counters["skip.solvesReturned"] = static_cast<double>(went_back_);
     status.counters["skip.publicationsUnwatched"] = static_cast<double>(unwatched_);
     if (checkpoints_) {
       const auto written = checkpoints_->counters();

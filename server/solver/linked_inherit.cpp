@@ -29,9 +29,9 @@ std::uint32_t sideOfLight(const LightPolygon& light, const scene::PatchScene& pa
 
 LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
                            Transport& transport, const SolverSettings& settings, const LightSources& sources,
-                           LinkedSolver& former, const scene::PatchMap& map)
+                           LinkedSolver& former, const scene::PatchMap& map, bool keep_former)
     : LinkedSolver(std::move(patches), transport, settings) {
-  const auto numbers = renumber(former, map);
+  const auto numbers = renumber(former, map, keep_former);
   shadows_ = std::make_unique<Shadows>(*patches_, sides_, changeSince(numbers));
   edits_ = former.edits_;
   counters_ = former.counters_;
@@ -52,8 +52,9 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
 }
 
 /// Sides that are still there keep their keys; others get keys that no side ever had.
-LinkedSolver::Renumbering LinkedSolver::renumber(LinkedSolver& former, const scene::PatchMap& map) {
-  Renumbering numbers{former, map, {}, {}, {}};
+LinkedSolver::Renumbering LinkedSolver::renumber(const LinkedSolver& former, const scene::PatchMap& map,
+                                                 bool keep_former) {
+  Renumbering numbers{former, map, keep_former, {}, {}, {}};
   numbers.side_after.assign(former.sides_.size(), scene::kNone);
   numbers.unmoved_after = numbers.side_after;
   const auto first_sides = firstSides(*former.patches_, former.sides_);
@@ -160,8 +161,8 @@ void LinkedSolver::inheritColumns(Shooter& from, std::uint32_t old_index, std::u
     if (samples == 0) continue;
     repairs_.push_back({index, half, samples, whole || unfinished.whole});
     if (repairs_.back().whole) continue;
-    column.renumber(numbers.unmoved_after, numbers.former.sides_, sides_);
-    shooter.column[half] = std::move(column);
+    shooter.column[half] = column.renumbered(numbers.unmoved_after, numbers.former.sides_, sides_);
+    if (!numbers.keep_former) column = {};
   }
 }
 

@@ -30,10 +30,11 @@ class LinkedSolver final : public Solver {
   /// After an edit of geometry: takes over the links of `former`, the solver of the scene before, that the edit left
   /// alone, and measures the others again with its first steps: same shooters, same points, so that links are those
   /// that a fresh measurement of all would find. Of shooters that see the change, only links to leaves whose ways to
-  /// them pass it are measured (Shadows).
+  /// them pass it are measured (Shadows). `keep_former`: it stays what it was; else its links go as they are taken
+  /// over, so that memory never holds them twice, and it is of no use afterwards.
   LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
                Transport& transport, const SolverSettings& settings, const LightSources& sources, LinkedSolver& former,
-               const scene::PatchMap& map);
+               const scene::PatchMap& map, bool keep_former = false);
 
   [[nodiscard]] Result<StepOutcome> step() override;
   void setMaterials(const scene::PatchMaterials& materials) override;
@@ -89,6 +90,7 @@ class LinkedSolver final : public Solver {
   struct Renumbering {
     const LinkedSolver& former;
     const scene::PatchMap& map;
+    bool keep_former;
     std::vector<std::uint32_t> side_after;          ///< by old side; kNone: gone
     std::vector<std::uint32_t> unmoved_after;       ///< the same; kNone also where it moved
     std::vector<std::array<Repair, 2>> unfinished;  ///< by old shooter and half: what was still to be taken again
@@ -97,7 +99,7 @@ class LinkedSolver final : public Solver {
 
   /// All but its light.
   LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, Transport& transport, const SolverSettings& settings);
-  [[nodiscard]] Renumbering renumber(LinkedSolver& former, const scene::PatchMap& map);
+  [[nodiscard]] Renumbering renumber(const LinkedSolver& former, const scene::PatchMap& map, bool keep_former);
   [[nodiscard]] GeometryChange changeSince(const Renumbering& numbers) const;
   void inheritLights(LinkedSolver& former, const Renumbering& numbers);
   void inheritNodes(LinkedSolver& former, const Renumbering& numbers);

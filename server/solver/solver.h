@@ -126,11 +126,11 @@ class Solver {
   }
 };
 
-/// The solver of a scene before an edit of its geometry, which gives up what it remembers and is of no use afterwards,
-/// and what the edited scene has in common with it.
+/// The solver of a scene before an edit of its geometry, and what the edited scene has in common with it.
 struct FormerSolver {
   Solver& solver;
   const scene::PatchMap& map;
+  bool keep = false;  ///< it stays what it is; else it gives up what it remembers and is of no use afterwards
 };
 
 /// With a former solver of the same settings: the links that the edit left alone stay, others are measured again with
