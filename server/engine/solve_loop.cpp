@@ -91,7 +91,7 @@ void SolveLoop::threadMain(std::promise<Result<void>> started) {
 
 /// Sleeps while there is nothing to solve, then does all commands that are due. False: the engine is being destroyed.
 bool SolveLoop::runCommands() {
-  waiting_ = first_light_ ? !first_light_->goes_on : state_ != SolveState::kSolving;
+  waiting_ = first_light_ ? !first_light_->goes_on : state_ != SolveState::kSolving && !isBehind();
   const auto due = queue_.take(waiting_);
   beat();
   waiting_ = false;
@@ -116,6 +116,8 @@ void SolveLoop::takeTurn() {
       firstLightSlice();
     else if (state_ == SolveState::kSolving)
       solveSlice();
+    else if (isBehind())
+      catchUp();
     checkpointIfDue();
   } catch (const std::bad_alloc&) {
     if (std::exchange(former_, nullptr)) return log::warn("out of memory: the scene before the last edit is forgotten");
@@ -172,6 +174,24 @@ void SolveLoop::solveSlice() {
     if (Clock::now() >= next_publish_) publishLightmaps(false);
     tellProgress(true);
   }
+}
+
+bool SolveLoop::isBehind() const {
+  return state_ == SolveState::kConverged && lit_ && !lit_->isStale() && lit_->solver().isBehind();
+}
+
+/// Takes no solve time, and says nothing before it is done: what is shown is solved.
+void SolveLoop::catchUp() {
+  const auto outcome = lit_->solver().step();
+  if (queue_.closed()) return;
+  tellLosses();
+  if (outcome && *outcome == solver::StepOutcome::kSlice) return;
+  unpublished_ = true;
+  if (outcome && *outcome == solver::StepOutcome::kConverged) return endSolve(SolveState::kConverged);
+  // With all links it is not solved after all, or no renderer is left: the next slice goes on, or finds out.
+  if (!outcome) lit_->invalidate();
+  state_ = SolveState::kSolving;
+  updateStatus(true);
 }
 
 void SolveLoop::tellProgress(bool assess) {

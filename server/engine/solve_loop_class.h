@@ -94,6 +94,9 @@ class SolveLoop final : public Engine {
   [[nodiscard]] bool runCommands();
   void takeTurn();  ///< what is done between commands
   void solveSlice();
+  /// Solved and told; what was left for later since it matters little is done between commands.
+  [[nodiscard]] bool isBehind() const;
+  void catchUp();
   void tellProgress(bool assess);  ///< not oftener than anyone can see; `assess`: with a new error
   /// The clock starts over: another scene, another seed, an edit. A paused solve stays paused.
   void beginSolve();

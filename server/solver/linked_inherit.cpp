@@ -32,7 +32,13 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
                            LinkedSolver& former, const scene::PatchMap& map, bool keep_former)
     : LinkedSolver(std::move(patches), transport, settings) {
   const auto numbers = renumber(former, map, keep_former);
-  shadows_ = std::make_unique<Shadows>(*patches_, sides_, changeSince(numbers));
+  auto change = changeOf(numbers);
+  if (former.isBehind()) {
+    auto all = change;
+    addEarlier(numbers, all);
+    earlier_shadows_ = std::make_unique<Shadows>(*patches_, sides_, std::move(all));
+  }
+  shadows_ = std::make_unique<Shadows>(*patches_, sides_, std::move(change));
   edits_ = former.edits_;
   counters_ = former.counters_;
   rounds_ = former.rounds_;
@@ -45,7 +51,7 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
   takeMaterials(materials);
   takeSources(sources);
   inheritNodes(former, numbers);
-  planRepairs();
+  planRepairs(former.isRepairing() ? 0.0 : former.fieldNorm());
   for (auto& half : half_) half.assign(system_.emission().size(), glm::vec3(0.0F));
   findUnshot();
   solveAnew();
@@ -82,17 +88,20 @@ LinkedSolver::Renumbering LinkedSolver::renumber(const LinkedSolver& former, con
   return numbers;
 }
 
-/// Since all links were true: where an edit came before those before it were taken in, theirs count too.
-GeometryChange LinkedSolver::changeSince(const Renumbering& numbers) const {
+GeometryChange LinkedSolver::changeOf(const Renumbering& numbers) const {
   GeometryChange change;
   change.boxes = numbers.map.boxes;
   for (const auto& side : sides_) {
     const auto first = numbers.map.leaf_altered.begin() + patches_->surfaces[side.surface].first_leaf;
     change.altered.insert(change.altered.end(), first, first + side.leaf_count);
   }
+  return change;
+}
+
+/// Where an edit comes before those before it were taken in, theirs count too.
+void LinkedSolver::addEarlier(const Renumbering& numbers, GeometryChange& change) const {
   const auto& former = numbers.former;
-  if (former.repaired_ == former.repairs_.size()) return change;
-  const auto& earlier = former.shadows_->change();
+  const auto& earlier = (former.earlier_shadows_ ? former.earlier_shadows_ : former.shadows_)->change();
   change.boxes.insert(change.boxes.end(), earlier.boxes.begin(), earlier.boxes.end());
   scene::joinBoxes(change.boxes);
   for (std::size_t s = 0; s < former.sides_.size(); ++s) {
@@ -102,7 +111,6 @@ GeometryChange LinkedSolver::changeSince(const Renumbering& numbers) const {
       if (earlier.altered[from + leaf]) change.altered[to + leaf] = true;
     }
   }
-  return change;
 }
 
 /// Light polygons that have not moved, dark ones too. takeMaterials() will say how bright they are.
@@ -131,18 +139,23 @@ void LinkedSolver::inheritNodes(LinkedSolver& former, const Renumbering& numbers
     shooter.place.side = numbers.side_after[shooter.place.side];
     const Side& side = sides_[shooter.place.side];
     if (patches_->node_area[nodeId(side, shooter.place)] <= 0.0F) continue;  // buried
-    bool altered = false;
-    const auto rect = leafRect(side, shooter.place);
-    for (auto y = rect.y0; y < rect.y1; ++y) {
-      for (auto x = rect.x0; x < rect.x1; ++x)
-        altered = altered || shadows_->change().altered[side.first_value + y * side.width + x];
-    }
     shooter.certain = shooters[n].certain;
     shooter.mean = shooters[n].mean;
     shooter.sent = shooters[n].sent;
     shooter.most_bytes = memory_.mostBytes(shooter.place.side);
-    inheritColumns(shooters[n], n, system_.add(shooter), altered, numbers);
+    inheritColumns(shooters[n], n, system_.add(shooter), isAltered(shooter.place, shadows_->change()), numbers);
   }
+}
+
+bool LinkedSolver::isAltered(const NodePlace& place, const GeometryChange& change) const {
+  const Side& side = sides_[place.side];
+  const auto rect = leafRect(side, place);
+  for (auto y = rect.y0; y < rect.y1; ++y) {
+    for (auto x = rect.x0; x < rect.x1; ++x) {
+      if (change.altered[side.first_value + y * side.width + x]) return true;
+    }
+  }
+  return false;
 }
 
 /// `whole`: the shooter itself is not what it was. The links of the others are taken over as they are, and their
@@ -159,7 +172,9 @@ void LinkedSolver::inheritColumns(Shooter& from, std::uint32_t old_index, std::u
                          : is_light       ? static_cast<std::uint32_t>(column.points())
                                           : column.samples();
     if (samples == 0) continue;
-    repairs_.push_back({index, half, samples, whole || unfinished.whole});
+    const bool overtaken = unfinished.samples > 0;
+    const bool was_altered = overtaken && !is_light && isAltered(shooter.place, earlier_shadows_->change());
+    repairs_.push_back({index, half, samples, whole || was_altered || unfinished.whole, overtaken});
     if (repairs_.back().whole) continue;
     shooter.column[half] = column.renumbered(numbers.unmoved_after, numbers.former.sides_, sides_);
     if (!numbers.keep_former) column = {};

@@ -163,7 +163,7 @@ Result<StepOutcome> LinkedSolver::step() {
 }
 
 Result<StepOutcome> LinkedSolver::advance() {
-  if (repaired_ < repairs_.size()) {
+  if (isRepairing()) {
     if (const auto done = repairSlice(); !done) return tl::unexpected<Error>(done.error());
     return StepOutcome::kSlice;
   }
@@ -177,13 +177,14 @@ Result<StepOutcome> LinkedSolver::advance() {
       if (const auto done = measureSlice(); !done) return tl::unexpected<Error>(done.error());
       return StepOutcome::kSlice;
     }
-    if (!settleFromLinks()) return StepOutcome::kSlice;
+    if (!settleFromLinks() || findsMoreDue()) return StepOutcome::kSlice;
     if (!finishEdit()) return StepOutcome::kSlice;
     return phase_ == Phase::kDone ? ended() : StepOutcome::kShot;
   }
   if (from_links_ == FromLinks::kToConfirm) return confirm();
-  if (phase_ == Phase::kDone) return ended();
+  if (phase_ == Phase::kDone) return isBehind() ? catchUp() : ended();
   if (!settling_ && measured_ == wanted_.size()) {
+    if (findsMoreDue()) return StepOutcome::kSlice;
     wanted_ = plan();
     measured_ = 0;
     const bool dark = phase_ == Phase::kLights && net_unshot_ + varying_ <= 0.0;
@@ -204,7 +205,7 @@ Result<StepOutcome> LinkedSolver::advance() {
 
 /// An edit is taken in whole: its links would not be true otherwise.
 void LinkedSolver::endWave() {
-  if (repaired_ < repairs_.size() || from_links_ != FromLinks::kNo || settling_ || measured_ == 0) return;
+  if (isRepairing() || from_links_ != FromLinks::kNo || settling_ || measured_ == 0) return;
   wanted_.resize(measured_);
   settling_ = true;
 }
@@ -216,7 +217,13 @@ StepOutcome LinkedSolver::finishRound() {
   return chooseNext();
 }
 
+/// What waits may be what is missing.
 StepOutcome LinkedSolver::exhausted(SolveLimit limit) {
+  if (isBehind() && !isRepairing()) {
+    due_ = repairs_.size();
+    from_links_ = FromLinks::kToConfirm;
+    return StepOutcome::kSlice;
+  }
   limit_ = limit;
   phase_ = Phase::kDone;
   return StepOutcome::kExhausted;

@@ -7,6 +7,7 @@
 // varies.
 #pragma once
 
+#include <cmath>
 #include <functional>
 #include <memory>
 #include <vector>
@@ -46,7 +47,8 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] const std::vector<glm::vec3>& irradiance() const override { return irradiance_; }
   [[nodiscard]] std::vector<glm::vec3> halfIrradiance(std::uint32_t half) const override;
   [[nodiscard]] std::vector<glm::vec3> directIrradiance() const override;
-  [[nodiscard]] bool isRepairing() const override { return repaired_ < repairs_.size(); }
+  [[nodiscard]] bool isRepairing() const override { return repaired_ < due_; }
+  [[nodiscard]] bool isBehind() const override { return repaired_ < repairs_.size(); }
   [[nodiscard]] std::vector<glm::vec3> unshot() const override;
   [[nodiscard]] std::vector<std::uint8_t> shotLevels() const override;
   [[nodiscard]] std::vector<float> residualShape() const override;
@@ -62,6 +64,8 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] bool save(ArchiveWriter& to) const override;
   [[nodiscard]] bool restore(ArchiveReader& from) override;
 
+  /// After an edit of geometry: no light before all links are true.
+  void beExact();
   /// What the links of all lights can come to take.
   [[nodiscard]] std::size_t lightBytes() const;
   /// What is remembered.
@@ -85,6 +89,8 @@ class LinkedSolver final : public Solver {
     std::size_t half = 0;
     std::uint32_t samples = 0;  ///< of a light polygon: points
     bool whole = false;         ///< all their links; the column is empty
+    bool overtaken = false;     ///< nor were they taken again after the edit before
+    double reach = HUGE_VAL;    ///< bound of what the old links are wrong by (changeReach); infinite: cannot wait
   };
   /// Where the sides of the scene before are now.
   struct Renumbering {
@@ -100,12 +106,24 @@ class LinkedSolver final : public Solver {
   /// All but its light.
   LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, Transport& transport, const SolverSettings& settings);
   [[nodiscard]] Renumbering renumber(const LinkedSolver& former, const scene::PatchMap& map, bool keep_former);
-  [[nodiscard]] GeometryChange changeSince(const Renumbering& numbers) const;
+  [[nodiscard]] GeometryChange changeOf(const Renumbering& numbers) const;
+  void addEarlier(const Renumbering& numbers, GeometryChange& change) const;
+  [[nodiscard]] bool isAltered(const NodePlace& place, const GeometryChange& change) const;
   void inheritLights(LinkedSolver& former, const Renumbering& numbers);
   void inheritNodes(LinkedSolver& former, const Renumbering& numbers);
   void inheritColumns(Shooter& from, std::uint32_t old_index, std::uint32_t index, bool whole,
                       const Renumbering& numbers);
-  void planRepairs();
+  void planRepairs(double norm);
+  [[nodiscard]] const Shadows& shadowsOf(const Repair& repair) const {
+    return repair.overtaken ? *earlier_shadows_ : *shadows_;
+  }
+  [[nodiscard]] double reachOf(const Repair& repair) const;
+  [[nodiscard]] double missing(const Repair& repair) const;
+  [[nodiscard]] double missing() const;
+  [[nodiscard]] double fieldNorm() const;
+  void planDue(double norm);
+  [[nodiscard]] bool findsMoreDue();
+  [[nodiscard]] Result<StepOutcome> catchUp();
   [[nodiscard]] bool isNeeded(Repair& repair);
   void addSamples(const Repair& repair, ShotBatch& batch) const;
   void findCutLinks(RepairBatch& repairs) const;
@@ -155,9 +173,11 @@ class LinkedSolver final : public Solver {
   LinkMemory memory_;
   UnshotPyramid unshot_;
   LinkPlanner planner_;
-  std::vector<Repair> repairs_;                       // after an edit of geometry; before anything else is done
+  std::vector<Repair> repairs_;                       // after an edit of geometry
   std::size_t repaired_ = 0;                          // of these
+  std::size_t due_ = 0;                               // of these, before anything else is done
   std::unique_ptr<Shadows> shadows_;                  // of the edit
+  std::unique_ptr<Shadows> earlier_shadows_;          // and of those before it, for links that no edit saw taken again
   std::uint32_t key_end_ = 0, triangle_key_end_ = 0;  // keys of sides that never were
   std::uint64_t affected_ = 0;
   LinkCounters edits_;  // what repairs add to linkCounters()

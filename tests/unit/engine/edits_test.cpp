@@ -380,6 +380,7 @@ TEST_F(Edits, UndoAndRedoOfAMoveShowTheSolvesThatWereThere) {
   const auto before = light();
   ASSERT_TRUE(patch(kMove));
   ASSERT_TRUE(reaches(SolveState::kConverged));
+  ASSERT_TRUE(eventually([&] { return status().counters["edits.samplesWaiting"] == 0.0; }));
   const auto moved_scene = sceneText();
   const auto moved = light();
   EXPECT_FALSE(moved == before);
