@@ -29,6 +29,11 @@ class Bvh {
   void collectHits(const glm::dvec3& origin, const glm::dvec3& direction, double t_min, double t_max,
                    std::vector<RayHit>& hits) const;
 
+  /// False: no ray in this direction from anywhere in the box meets the back of a triangle (RayHit::front) with t in
+  /// (0, t_max). True: one might.
+  [[nodiscard]] bool mayMeetBack(const glm::vec3& box_min, const glm::vec3& box_max, const glm::dvec3& direction,
+                                 double t_max) const;
+
   /// True when a triangle other than those marked with `ignored_tag` touches the box. `tags`: one for each triangle.
   [[nodiscard]] bool touches(const glm::vec3& box_min, const glm::vec3& box_max, std::span<const std::uint32_t> tags,
                              std::uint32_t ignored_tag) const;
