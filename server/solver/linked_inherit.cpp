@@ -1,8 +1,10 @@
 // LinkedSolver after an edit of geometry: what it takes over from the solver of the scene before.
 #include <algorithm>
 #include <array>
+#include <span>
 #include <utility>
 
+#include "server/solver/halves.h"
 #include "server/solver/linked_solver.h"
 
 namespace radiosity::solver {
@@ -126,12 +128,14 @@ void LinkedSolver::inheritLights(LinkedSolver& former, const Renumbering& number
     shooter.area = light.area;
     shooter.most_bytes = memory_.mostBytes(light);
     lights_.push_back(light);
-    inheritColumns(shooters[n], n, system_.add(shooter), false, numbers);
+    planRepairsOf(shooters[n], n, system_.add(shooter), false, numbers);
   }
+  inheritColumns(former, 0, numbers);
 }
 
 void LinkedSolver::inheritNodes(LinkedSolver& former, const Renumbering& numbers) {
   auto& shooters = former.system_.shooters();
+  const auto first_repair = repairs_.size();
   for (std::uint32_t n = 0; n < shooters.size(); ++n) {
     if (shooters[n].isLight() || numbers.side_after[shooters[n].place.side] == scene::kNone) continue;
     Shooter shooter;
@@ -143,8 +147,9 @@ void LinkedSolver::inheritNodes(LinkedSolver& former, const Renumbering& numbers
     shooter.mean = shooters[n].mean;
     shooter.sent = shooters[n].sent;
     shooter.most_bytes = memory_.mostBytes(shooter.place.side);
-    inheritColumns(shooters[n], n, system_.add(shooter), isAltered(shooter.place, shadows_->change()), numbers);
+    planRepairsOf(shooters[n], n, system_.add(shooter), isAltered(shooter.place, shadows_->change()), numbers);
   }
+  inheritColumns(former, first_repair, numbers);
 }
 
 bool LinkedSolver::isAltered(const NodePlace& place, const GeometryChange& change) const {
@@ -158,14 +163,13 @@ bool LinkedSolver::isAltered(const NodePlace& place, const GeometryChange& chang
   return false;
 }
 
-/// `whole`: the shooter itself is not what it was. The links of the others are taken over as they are, and their
-/// repair is noted.
-void LinkedSolver::inheritColumns(Shooter& from, std::uint32_t old_index, std::uint32_t index, bool whole,
-                                  const Renumbering& numbers) {
+/// `whole`: the shooter itself is not what it was.
+void LinkedSolver::planRepairsOf(const Shooter& from, std::uint32_t old_index, std::uint32_t index, bool whole,
+                                 const Renumbering& numbers) {
   auto& shooter = system_.shooters()[index];
   shooter.products = from.products;
   for (std::size_t half = 0; half < 2; ++half) {
-    auto& column = from.column[half];
+    const auto& column = from.column[half];
     const auto& unfinished = numbers.unfinished[old_index][half];
     const bool is_light = from.light != scene::kNone;
     const auto samples = unfinished.whole ? unfinished.samples
@@ -174,11 +178,20 @@ void LinkedSolver::inheritColumns(Shooter& from, std::uint32_t old_index, std::u
     if (samples == 0) continue;
     const bool overtaken = unfinished.samples > 0;
     const bool was_altered = overtaken && !is_light && isAltered(shooter.place, earlier_shadows_->change());
-    repairs_.push_back({index, half, samples, whole || was_altered || unfinished.whole, overtaken});
-    if (repairs_.back().whole) continue;
-    shooter.column[half] = column.renumbered(numbers.unmoved_after, numbers.former.sides_, sides_);
-    if (!numbers.keep_former) column = {};
+    repairs_.push_back({index, old_index, half, samples, whole || was_altered || unfinished.whole, overtaken});
   }
+}
+
+/// Links of what is not taken again as a whole go over as they are. Both halves at once: most of it is fresh memory.
+void LinkedSolver::inheritColumns(LinkedSolver& former, std::size_t first_repair, const Renumbering& numbers) {
+  inBothHalves([&](std::size_t half) {
+    for (const auto& repair : std::span(repairs_).subspan(first_repair)) {
+      if (repair.whole || repair.half != half) continue;
+      auto& column = former.system_.shooters()[repair.old_shooter].column[half];
+      system_.shooters()[repair.shooter].column[half] = column.renumbered(numbers.unmoved_after, former.sides_, sides_);
+      if (!numbers.keep_former) column = {};
+    }
+  });
 }
 
 }  // namespace radiosity::solver

@@ -242,7 +242,7 @@ void LinkedSolver::takePart(RepairBatch& repairs, std::size_t shot, LinkSample& 
   }
   if (std::exchange(repairs.open, false)) {
     system_.forget(repair.shooter, repair.half);
-    repairs.anew.push_back({repair.shooter, repair.half, repair.samples, true, repair.overtaken});
+    repairs.anew.push_back({repair.shooter, repair.old_shooter, repair.half, repair.samples, true, repair.overtaken});
   } else {
     system_.replaceLinks(repair.shooter, repair.half, leaves, repairs.sum,
                          {part * totals.due, part * totals.escaped, part * totals.absorbed});

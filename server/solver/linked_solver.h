@@ -85,7 +85,7 @@ class LinkedSolver final : public Solver {
   static void visit(Archive& archive, Self& self);
   /// Samples of a column that are to be taken again.
   struct Repair {
-    std::uint32_t shooter = 0;
+    std::uint32_t shooter = 0, old_shooter = 0;
     std::size_t half = 0;
     std::uint32_t samples = 0;  ///< of a light polygon: points
     bool whole = false;         ///< all their links; the column is empty
@@ -111,8 +111,9 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] bool isAltered(const NodePlace& place, const GeometryChange& change) const;
   void inheritLights(LinkedSolver& former, const Renumbering& numbers);
   void inheritNodes(LinkedSolver& former, const Renumbering& numbers);
-  void inheritColumns(Shooter& from, std::uint32_t old_index, std::uint32_t index, bool whole,
-                      const Renumbering& numbers);
+  void planRepairsOf(const Shooter& from, std::uint32_t old_index, std::uint32_t index, bool whole,
+                     const Renumbering& numbers);
+  void inheritColumns(LinkedSolver& former, std::size_t first_repair, const Renumbering& numbers);
   void planRepairs(double norm);
   [[nodiscard]] const Shadows& shadowsOf(const Repair& repair) const {
     return repair.overtaken ? *earlier_shadows_ : *shadows_;
