@@ -71,6 +71,7 @@ json toJson(const Progress& p) {
                {{"total", p.error.total},
                 {"residual", p.error.residual},
                 {"sampling", p.error.sampling},
+                {"variation", p.error.variation},
                 {"discretization", p.error.discretization}}},
               {"energy",
                {{"emitted", p.energy.emitted},
@@ -101,6 +102,7 @@ void read(Reader& r, Progress& p) {
     e.number("total", p.error.total, Need::kRequired, {});
     e.number("residual", p.error.residual, Need::kRequired, {});
     e.number("sampling", p.error.sampling, Need::kRequired, {});
+    e.number("variation", p.error.variation, Need::kOptional, {});
     e.number("discretization", p.error.discretization, Need::kRequired, {});
   });
   r.object("energy", Need::kOptional, [&](Reader& e) {

@@ -46,7 +46,7 @@ enum class Quantity : std::uint8_t {
 // ---- parts ----
 
 struct ErrorParts {
-  double total = 1.0, residual = 1.0, sampling = 0.0, discretization = 0.0;
+  double total = 1.0, residual = 1.0, sampling = 0.0, variation = 0.0, discretization = 0.0;
 };
 
 struct EnergyParts {

@@ -58,8 +58,8 @@ std::string progressLine(const ProgressView& view, int columns) {
   if (columns >= kMinColumnsForBar) line += bar(progressFraction(view.error, view.target_error));
   line += fmt::format("error {} of {}", percentText(view.error), percentText(view.target_error));
   if (view.show_parts)
-    line += fmt::format(" (residual {}, sampling {}, discretization {})", percentText(view.residual),
-                        percentText(view.sampling), percentText(view.discretization));
+    line += fmt::format(" (residual {}, sampling {}, variation {}, discretization {})", percentText(view.residual),
+                        percentText(view.sampling), percentText(view.variation), percentText(view.discretization));
   line += fmt::format("  {} shots, {}/s", countText(view.shots),
                       countText(static_cast<std::uint64_t>(std::max(0.0, view.shots_per_second))));
   line += "  " + durationText(view.seconds);

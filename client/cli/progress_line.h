@@ -11,7 +11,7 @@ namespace radiosity::cli {
 struct ProgressView {
   std::string state;   ///< "solving", "loading", ... as the server says
   double error = 1.0;  ///< relative, total
-  double residual = 0.0, sampling = 0.0, discretization = 0.0;
+  double residual = 0.0, sampling = 0.0, variation = 0.0, discretization = 0.0;
   double target_error = 0.02;
   std::uint64_t shots = 0;
   double shots_per_second = 0.0;

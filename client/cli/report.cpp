@@ -42,6 +42,7 @@ std::string reportJson(const protocol::StatusReply& status, bool reached) {
                {{"total", progress.error.total},
                 {"residual", progress.error.residual},
                 {"sampling", progress.error.sampling},
+                {"variation", progress.error.variation},
                 {"discretization", progress.error.discretization}}},
               {"energy",
                {{"emitted", progress.energy.emitted},
@@ -76,9 +77,10 @@ std::string statusText(const protocol::StatusReply& status) {
   };
   row("state", stateWord(p.state) + (p.failure.empty() ? "" : ": " + p.failure));
   row("revision", std::to_string(p.revision));
-  row("error", fmt::format("{} of {} (residual {}, sampling {}, discretization {})", percentText(p.error.total),
-                           percentText(s.target_error), percentText(p.error.residual), percentText(p.error.sampling),
-                           percentText(p.error.discretization)));
+  row("error",
+      fmt::format("{} of {} (residual {}, sampling {}, variation {}, discretization {})", percentText(p.error.total),
+                  percentText(s.target_error), percentText(p.error.residual), percentText(p.error.sampling),
+                  percentText(p.error.variation), percentText(p.error.discretization)));
   row("shots", fmt::format("{}, {:.0f}/s", countText(p.shots), p.shots_per_second));
   row("time", durationText(p.seconds) + (p.seconds_left ? ", " + durationText(*p.seconds_left) + " left" : "") +
                   (s.time_limit_ms ? ", limit " + durationText(static_cast<double>(*s.time_limit_ms) / 1000.0) : ""));
@@ -101,6 +103,7 @@ ProgressView viewOf(const protocol::Progress& progress, double target_error) {
           .error = progress.error.total,
           .residual = progress.error.residual,
           .sampling = progress.error.sampling,
+          .variation = progress.error.variation,
           .discretization = progress.error.discretization,
           .target_error = target_error,
           .shots = progress.shots,

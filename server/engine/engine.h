@@ -25,7 +25,7 @@ enum class SolveState { kEmpty, kLoading, kSolving, kPaused, kConverged, kTimeLi
 
 /// Relative RMS errors of irradiance over all texels, area-weighted; estimates. total^2 = sum of squares.
 struct ErrorEstimate {
-  double total = 1.0, residual = 1.0, sampling = 0.0, discretization = 0.0;
+  double total = 1.0, residual = 1.0, sampling = 0.0, variation = 0.0, discretization = 0.0;
 };
 
 /// Luminous flux, lumens (sum of the three channels).

@@ -78,7 +78,7 @@ Status reportStatus(const LitScene& lit, double seconds) {
   status.shots = solver.shots();
   status.shots_per_second = seconds > 0.0 ? static_cast<double>(status.shots) / seconds : 0.0;
   const auto& error = solver.error();
-  status.error = {error.total, error.residual, error.sampling, error.discretization};
+  status.error = {error.total, error.residual, error.sampling, error.variation, error.discretization};
   const double target = lit.settings().target_error;
   // Sampling error falls with the square root of time.
   if (error.total > target && error.total < 1.0)

@@ -1,5 +1,5 @@
 // Point-to-polygon form factors of many receivers in one plane, in single precision and vectorised.
-// polygon_form_factor.h is the plain version, which the tests hold this one against.
+// server/solver/polygon_form_factor.h is the plain version, which the tests hold this one against.
 #pragma once
 
 #include <array>

@@ -5,7 +5,7 @@
 #include <chrono>
 #include <cmath>
 
-#include "server/gpu/polygon_form_factor.h"
+#include "server/solver/polygon_form_factor.h"
 
 namespace radiosity::gpu {
 namespace {
@@ -64,7 +64,8 @@ void LightGatherer::look(const solver::GatherShot& shot, const solver::HemicubeF
 
 void LightGatherer::finishLinks(const solver::GatherShot& shot, solver::LinkSample& sample,
                                 solver::TransportCounters& counters) {
-  const double area = static_cast<double>(shot.fill) * polygonArea(std::span(shot.corners.data(), shot.corner_count));
+  const double area =
+      static_cast<double>(shot.fill) * solver::polygonArea(std::span(shot.corners.data(), shot.corner_count));
   const double one = static_cast<double>(look_count_) * solver::kWeightOne;
   const double escaped = static_cast<double>(look_lost_.escaped) / one;
   const double absorbed = static_cast<double>(look_lost_.absorbed) / one;
@@ -130,7 +131,8 @@ void LightGatherer::gather(const solver::GatherShot& shot, std::span<const solve
                 lost[half]);
     }
   }
-  const double area = static_cast<double>(shot.fill) * polygonArea(std::span(shot.corners.data(), shot.corner_count));
+  const double area =
+      static_cast<double>(shot.fill) * solver::polygonArea(std::span(shot.corners.data(), shot.corner_count));
   const std::size_t first_half = both ? (points.size() + 1) / 2 : points.size();
   for (std::size_t sums = 0; sums < (both ? 2U : 1U); ++sums) {
     const std::size_t count = sums == 0 ? first_half : points.size() - first_half;

@@ -7,7 +7,7 @@
 
 #include "server/gpu/form_factor_kernel.h"
 #include "server/gpu/light_gatherer.h"
-#include "server/gpu/polygon_form_factor.h"
+#include "server/solver/polygon_form_factor.h"
 
 namespace radiosity::gpu {
 namespace {
@@ -38,7 +38,8 @@ std::array<float, 2> heights(std::span<const glm::vec3> corners, const glm::vec3
 
 bool sameGeometry(const solver::GatherShot& a, const solver::GatherShot& b) {
   return a.corners == b.corners && a.corner_count == b.corner_count && a.normal == b.normal &&
-         a.receiver_jitter == b.receiver_jitter && a.all_spots == b.all_spots && a.fill == b.fill;
+         a.receiver_jitter == b.receiver_jitter && a.spot_row == b.spot_row && a.all_spots == b.all_spots &&
+         a.fill == b.fill;
 }
 
 /// How much of the part of a polygon in front of a receiver shines where of the whole polygon `fill` does: not more
@@ -110,7 +111,17 @@ struct SpotRows {
 
 SpotRows spotRows(const solver::GatherShot& shot) {
   const std::uint32_t apart = scene::kSpotRows / (shot.all_spots ? kLightRows : kNodeRows);
-  return {std::min(apart - 1, static_cast<std::uint32_t>(shot.receiver_jitter.x * static_cast<float>(apart))), apart};
+  return {shot.spot_row * apart / scene::kSpotRows, apart};
+}
+
+/// Which of the rows of its spots is a receiver's first. Neighbours differ: in a narrow gap what the edges of shooters
+/// do to one row they would do to the same row of all, and so few draws neither average out nor tell how large their
+/// error is. By where it lies on its surface, which edits elsewhere do not change.
+std::uint32_t firstRow(const Receivers::Receiver& receiver, const SpotRows& rows) {
+  std::uint32_t mixed = static_cast<std::uint32_t>(receiver.texel.x) * 0x9e3779b1U +
+                        static_cast<std::uint32_t>(receiver.texel.y) * 0x85ebca77U;
+  mixed = (mixed ^ (mixed >> 15)) * 0x2c1b3c6dU;
+  return (rows.first + (mixed >> 16)) % rows.apart;
 }
 
 /// Where a receiver looks at a polygon, which is near inside a ball: takes each place before the polygon's plane, and
@@ -123,9 +134,9 @@ template <typename Take>
     if (glm::dot(shot.normal, place.point - shot.corners[0]) > kInPlane) take(place, share);
   };
   if (receiver.hasSpots()) {
-    const auto [first, apart] = spotRows(shot);
-    const float share = static_cast<float>(apart) / static_cast<float>(scene::kLeafSpots);
-    for (std::uint32_t row = first; row < scene::kSpotRows; row += apart) {
+    const auto rows = spotRows(shot);
+    const float share = static_cast<float>(rows.apart) / static_cast<float>(scene::kLeafSpots);
+    for (std::uint32_t row = firstRow(receiver, rows); row < scene::kSpotRows; row += rows.apart) {
       for (std::uint32_t k = 0; k < scene::kSpotQuarters; ++k)
         offer(receivers.spot(receiver, row * scene::kSpotQuarters + k), share);
     }
@@ -222,7 +233,7 @@ void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers
     forEachPlace(shot, ball, *receivers_, receiver, [&](const Receivers::Place& place, float share) {
       const auto normal = surface.planar ? plane_normal : group.side * place.frame->normal;
       if (!surface.planar) {
-        const auto form_factor = formFactorInFront(place.point, normal, corners);
+        const auto form_factor = solver::formFactorInFront(place.point, normal, corners);
         if (form_factor.value <= 0.0) return;
         lit_.form_factor[lit_count_] = static_cast<float>(form_factor.value * shining(shot.fill, form_factor.front));
         lit_.front[lit_count_] = frontOfShining(shot.fill, form_factor.front);
@@ -232,7 +243,7 @@ void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers
     });
   };
   const auto end = group.first + group.count;
-  const auto first_row = spotRows(shot).first;
+  const auto rows = spotRows(shot);
   auto block = receivers_->blocks().begin() + static_cast<std::ptrdiff_t>(group.first_block);
   for (auto i = group.first; i < end; ++block) {
     const auto stop = std::min(end, block->first + block->count);
@@ -246,8 +257,10 @@ void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers
       i = stop;
     }
     for (; i < stop; ++i) {
-      if (i + kSpotsAhead < receivers_->all().size())
-        receivers_->fetchSpots(receivers_->all()[i + kSpotsAhead], first_row);
+      if (i + kSpotsAhead < receivers_->all().size()) {
+        const auto& ahead = receivers_->all()[i + kSpotsAhead];
+        if (ahead.hasSpots()) receivers_->fetchSpots(ahead, firstRow(ahead, rows));
+      }
       add(receivers_->all()[i]);
     }
   }
@@ -256,7 +269,8 @@ void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers
   if (surface.planar) {
     planarFormFactors(polygon, plane_normal, lit_.x.data() + begin, lit_.y.data() + begin, lit_.z.data() + begin,
                       lit_count_ - begin, lit_.form_factor.data() + begin);
-    const double kept = polygonArea(std::span(polygon.corner.data(), polygon.count)) / polygonArea(corners);
+    const double kept =
+        solver::polygonArea(std::span(polygon.corner.data(), polygon.count)) / solver::polygonArea(corners);
     for (std::size_t k = begin; k < lit_count_; ++k) {
       lit_.form_factor[k] *= static_cast<float>(shining(shot.fill, kept));
       lit_.front[k] = frontOfShining(shot.fill, kept);

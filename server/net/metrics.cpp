@@ -61,6 +61,7 @@ void solveMetrics(Text& text, const engine::Status& status) {
   text.sample("error_ratio", status.error.total, "{part=\"total\"}");
   text.sample("error_ratio", status.error.residual, "{part=\"residual\"}");
   text.sample("error_ratio", status.error.sampling, "{part=\"sampling\"}");
+  text.sample("error_ratio", status.error.variation, "{part=\"variation\"}");
   text.sample("error_ratio", status.error.discretization, "{part=\"discretization\"}");
   text.family("energy_lumens", "gauge", "Where the light went.");
   text.sample("energy_lumens", status.energy.emitted, "{part=\"emitted\"}");

@@ -42,13 +42,17 @@ struct SlabRay {
   }
 
   [[nodiscard]] bool meets(const glm::vec3& low, const glm::vec3& high) const {
+    return entry(low, high) < std::numeric_limits<float>::infinity();
+  }
+  /// Where the ray comes in; infinity: it does not.
+  [[nodiscard]] float entry(const glm::vec3& low, const glm::vec3& high) const {
     float near = t_min, far = t_max;
     for (int axis = 0; axis < 3; ++axis) {
       const float one = (low[axis] - before[axis]) * inverse[axis], other = (high[axis] - behind[axis]) * inverse[axis];
       near = std::max(near, std::min(one, other));
       far = std::min(far, std::max(one, other));
     }
-    return near <= far;
+    return near <= far ? near : std::numeric_limits<float>::infinity();
   }
 };
 
@@ -226,6 +230,41 @@ bool Bvh::mayMeetBack(const glm::vec3& box_min, const glm::vec3& box_max, const 
     }
   }
   return false;
+}
+
+std::optional<RayHit> Bvh::nearestHit(const glm::dvec3& origin, const glm::dvec3& direction, double t_min,
+                                      double t_max) const {
+  if (triangles_.empty()) return std::nullopt;
+  SlabRay ray(origin, direction, t_min, t_max);
+  struct Task {
+    std::uint32_t node;
+    float entry;
+  };
+  std::array<Task, kStackDepth> stack;
+  std::size_t depth = 0;
+  stack[depth++] = {0, ray.entry(nodes_[0].min, nodes_[0].max)};
+  std::optional<RayHit> nearest;
+  while (depth > 0) {
+    const Task task = stack[--depth];
+    if (task.entry > ray.t_max) continue;
+    const Node& node = nodes_[task.node];
+    if (node.count == 0) {
+      const Task left{node.first, ray.entry(nodes_[node.first].min, nodes_[node.first].max)};
+      const Task right{node.first + 1, ray.entry(nodes_[node.first + 1].min, nodes_[node.first + 1].max)};
+      const bool left_first = left.entry <= right.entry;
+      stack[depth++] = left_first ? right : left;
+      stack[depth++] = left_first ? left : right;
+      continue;
+    }
+    for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
+      RayHit hit{0.0, order_[i], false};
+      if (!meetsTriangle(triangles_[order_[i]], origin, direction, hit) || !(hit.t > t_min && hit.t < t_max)) continue;
+      t_max = hit.t;
+      ray.t_max = static_cast<float>(t_max) + SlabRay::kGrowth;
+      nearest = hit;
+    }
+  }
+  return nearest;
 }
 
 /// Whether the test holds for any triangle of the tree's leaves that reach into the box.

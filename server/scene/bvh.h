@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -33,6 +34,10 @@ class Bvh {
   /// (0, t_max). True: one might.
   [[nodiscard]] bool mayMeetBack(const glm::vec3& box_min, const glm::vec3& box_max, const glm::dvec3& direction,
                                  double t_max) const;
+
+  /// The hit with the least t in (t_min, t_max), or none.
+  [[nodiscard]] std::optional<RayHit> nearestHit(const glm::dvec3& origin, const glm::dvec3& direction, double t_min,
+                                                 double t_max) const;
 
   /// True when a triangle other than those marked with `ignored_tag` touches the box. `tags`: one for each triangle.
   [[nodiscard]] bool touches(const glm::vec3& box_min, const glm::vec3& box_max, std::span<const std::uint32_t> tags,

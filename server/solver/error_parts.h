@@ -7,9 +7,10 @@ namespace radiosity::solver {
 
 /// Relative RMS errors of irradiance: sqrt(sum a |dH|^2 / sum a |H|^2) over leaves and channels, a = visible area.
 struct ErrorParts {
-  double total = 1.0;           ///< residual and sampling together: what further shots will remove
+  double total = 1.0;           ///< residual, sampling and variation together
   double residual = 1.0;        ///< light not yet shot, spread evenly, and light that varies inside shooters
   double sampling = 0.0;        ///< half the difference of the two independent halves
+  double variation = 0.0;       ///< light that varies within leaves, of which others see a part: finer ones lower it
   double discretization = 0.0;  ///< leaf against the bilinear interpolation of its parents, a third (second order)
 };
 

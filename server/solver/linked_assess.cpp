@@ -58,7 +58,7 @@ void LinkedSolver::assess() {
     return;
   }
   const double kept = std::min(kMostKept, (1.0 - lostPart()) * reflected / received);
-  error_.sampling = field.sampling();
+  by_links_ = error_.sampling = field.sampling();
   error_.discretization = field.discretization();
   const double varying = std::sqrt(planner_.variation(system_, unshot_, *patches_) / field.square());
   error_.residual = owed / (1.0 - kept) / received + varying + system_.unsolved();
@@ -66,6 +66,14 @@ void LinkedSolver::assess() {
   varying_share_ = error_.residual > 0.0 ? varying / error_.residual : 0.0;
   left_out_ = left_out / (1.0 - kept) / received;
   error_.total = std::hypot(error_.residual, error_.sampling);
+  if (wantsVariation()) {
+    variation_ = std::make_unique<LeafVariation>(*patches_, sides_, settings_.seed);
+    updateVariation();
+  }
+  if (!variation_) return;
+  error_.sampling = std::hypot(by_links_, std::sqrt(variation_->noise() / field.square()));
+  error_.variation = std::sqrt(variation_->left() / field.square());
+  error_.total = std::hypot(error_.residual, error_.sampling, error_.variation);
 }
 
 /// Without memory or threads the next step will try again, and can say so.

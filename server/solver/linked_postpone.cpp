@@ -100,9 +100,7 @@ bool LinkedSolver::findsMoreDue() {
 /// comes in between need not wait for the others.
 Result<StepOutcome> LinkedSolver::catchUp() {
   due_ = std::min(repairs_.size(), repaired_ + slice_);
-  if (const auto done = repairSlice(); !done) return tl::unexpected<Error>(done.error());
-  if (!isBehind()) from_links_ = FromLinks::kToConfirm;
-  return StepOutcome::kSlice;
+  return advance();
 }
 
 void LinkedSolver::beExact() { due_ = repairs_.size(); }

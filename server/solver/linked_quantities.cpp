@@ -17,6 +17,11 @@ std::vector<glm::vec3> LinkedSolver::halfIrradiance(std::uint32_t half) const {
   std::vector<glm::vec3> values(patches_->nodeCount(), glm::vec3(0.0F));
   for (const auto& side : sides_)
     std::copy_n(half_[half].begin() + side.first_value, side.leaf_count, values.begin() + side.first_node);
+  if (!variation_ || !variation_->corrects()) return values;
+  for (const auto& side : sides_) {
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
+      values[side.first_node + leaf] += variation_->correction(half)[side.first_value + leaf];
+  }
   return values;
 }
 

@@ -53,6 +53,7 @@ bool LinkedSolver::settle() {
 void LinkedSolver::lightLeaves() {
   inBothHalves([&](std::size_t half) { system_.irradiance(half, half_[half]); });
   findUnshot();
+  if (variation_) updateVariation();
 }
 
 void LinkedSolver::findUnshot() {

@@ -8,6 +8,7 @@
 #include <new>
 #include <string>
 #include <system_error>
+#include <utility>
 
 #include "server/solver/field_error.h"
 
@@ -141,7 +142,7 @@ std::vector<Measurement> LinkedSolver::plan() {
   if (phase_ == Phase::kLights) return planLights();
   if (phase_ == Phase::kImprove) {
     const double varying = varying_share_ * error_.residual;
-    const ErrorGoal goal{error_.sampling, varying, error_.residual - varying, settings_.target_error};
+    const ErrorGoal goal{by_links_, varying, error_.residual - varying, targetOfLinks()};
     return planner_.improve(system_, unshot_, *patches_, !isFull(), memory_, goal);
   }
   if (planner_.share() <= 0.0) return {};
@@ -165,6 +166,8 @@ Result<StepOutcome> LinkedSolver::step() {
 Result<StepOutcome> LinkedSolver::advance() {
   if (isRepairing()) {
     if (const auto done = repairSlice(); !done) return tl::unexpected<Error>(done.error());
+    // Nothing else asks for the light over links that were the last to be measured.
+    if (!isBehind() && phase_ == Phase::kDone && from_links_ == FromLinks::kNo) from_links_ = FromLinks::kToConfirm;
     return StepOutcome::kSlice;
   }
   if (from_links_ == FromLinks::kAfterEdit) {
@@ -183,6 +186,7 @@ Result<StepOutcome> LinkedSolver::advance() {
   }
   if (from_links_ == FromLinks::kToConfirm) return confirm();
   if (phase_ == Phase::kDone) return isBehind() ? catchUp() : ended();
+  if (std::exchange(refined_, false)) return chooseNext();
   if (!settling_ && measured_ == wanted_.size()) {
     if (findsMoreDue()) return StepOutcome::kSlice;
     wanted_ = plan();
@@ -258,10 +262,13 @@ StepOutcome LinkedSolver::chooseFurther() {
     phase_ = Phase::kLights;
     return StepOutcome::kRoundDone;
   }
+  if (refineVariation()) return StepOutcome::kRoundDone;
   // Roulette's part of the sampling error, and what was too weak to play, fall with the share alone.
-  const double roulette = error_.sampling * std::sqrt(LinkPlanner::rouletteShare(system_));
-  const bool by_share = std::hypot(roulette, left_out_) > kByShare * error_.total;
-  const double by_samples = std::sqrt(std::max(0.0, error_.sampling * error_.sampling - roulette * roulette));
+  const double total = std::hypot(by_links_, error_.residual);
+  if (total <= targetOfLinks()) return exhausted(SolveLimit::kPatches);  // the rest varies within leaves
+  const double roulette = by_links_ * std::sqrt(LinkPlanner::rouletteShare(system_));
+  const bool by_share = std::hypot(roulette, left_out_) > kByShare * total;
+  const double by_samples = std::sqrt(std::max(0.0, by_links_ * by_links_ - roulette * roulette));
   if (rounds_ >= kMaxRounds) return exhausted(SolveLimit::kRounds);
   if (isFull() && (by_share || by_samples < kIdleSampling * error_.residual))
     return exhausted(memory_.isFull() ? SolveLimit::kLinkMemory : SolveLimit::kPatches);
@@ -277,6 +284,7 @@ StepOutcome LinkedSolver::chooseFurther() {
 
 void LinkedSolver::setTargetError(double target) {
   settings_.target_error = target;
+  if (variation_) tryNow([this] { updateVariation(); });
   if (phase_ != Phase::kDone || from_links_ != FromLinks::kNo) return;
   tryNow([this] {
     (void)chooseNext();

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "common/result.h"
+#include "server/solver/leaf_variation.h"
 #include "server/solver/lights.h"
 #include "server/solver/link_memory.h"
 #include "server/solver/link_planner.h"
@@ -44,7 +45,9 @@ class LinkedSolver final : public Solver {
   void endWave() override;
   void assess() override;
 
-  [[nodiscard]] const std::vector<glm::vec3>& irradiance() const override { return irradiance_; }
+  [[nodiscard]] const std::vector<glm::vec3>& irradiance() const override {
+    return corrected_.empty() ? irradiance_ : corrected_;
+  }
   [[nodiscard]] std::vector<glm::vec3> halfIrradiance(std::uint32_t half) const override;
   [[nodiscard]] std::vector<glm::vec3> directIrradiance() const override;
   [[nodiscard]] bool isRepairing() const override { return repaired_ < due_; }
@@ -150,6 +153,10 @@ class LinkedSolver final : public Solver {
   void takeLights();
   [[nodiscard]] bool settle();
   void findUnshot();
+  void updateVariation();
+  [[nodiscard]] bool wantsVariation() const;
+  [[nodiscard]] bool refineVariation();
+  [[nodiscard]] double targetOfLinks() const;
   void leafUnshot(std::uint32_t side, std::vector<glm::vec3>& leaves) const;
   void startGrowth();
   [[nodiscard]] Result<StepOutcome> advance();
@@ -202,6 +209,11 @@ class LinkedSolver final : public Solver {
   double varying_share_ = 0.0;                  // of the residual, what light that varies inside shooters causes
   std::array<std::vector<glm::vec3>, 2> half_;  // irradiance by leaf value
   std::vector<glm::vec3> irradiance_;           // by node
+  std::unique_ptr<LeafVariation> variation_;    // once little else is in error
+  std::vector<glm::vec3> corrected_;            // irradiance by node, with what leaves lack; empty: nothing
+  bool refined_ = false;                        // more paths were traced: what is next is to be chosen anew
+  double square_ = 0.0;                         // of the light that it was brought up to date with, times area
+  double by_links_ = 0.0;                       // sampling error without the noise of that
   ErrorParts error_;
   TransportCounters counters_;
 };

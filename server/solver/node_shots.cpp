@@ -14,6 +14,17 @@ namespace {
 /// opposite place.
 constexpr std::uint32_t kJitterBlock = 4;
 
+/// The halves draw rows of spots each for itself, and never from the same quarter at once. The opposite row would not
+/// do: of so few rows two that are opposite are soon drawn by both halves, and what they do not show would not show in
+/// the halves' difference either.
+std::uint32_t rowOf(std::uint32_t index, std::uint64_t key, bool second) {
+  const std::uint32_t first = spotRow(sobol4(index, mixKeys(key, 3)).x);
+  if (!second) return first;
+  const std::uint32_t row = spotRow(sobol4(index, mixKeys(key, 4)).x);
+  constexpr std::uint32_t kQuarter = scene::kSpotRows / 4;
+  return row / kQuarter != first / kQuarter ? row : (row + 2 * kQuarter) % scene::kSpotRows;
+}
+
 }  // namespace
 
 HemicubeFrame hemicubeAt(const glm::vec3& origin, const glm::vec3& normal, double rotation, std::uint64_t key) {
@@ -91,8 +102,9 @@ void NodeShots::addGather(const NodePlace& node, std::size_t half, std::uint32_t
   // difference. So do blocks of nodes, or it would show for the whole surface at once; inside a block all look at one
   // place, since what single nodes bring to it changes steeply close by, and the sum of neighbours does not.
   const glm::dvec4 jitter = sobol4(index, mixKeys(mixKeys(seed_, side.key), 2));
-  shot.receiver_jitter = glm::vec2(
-      (half + node.x / kJitterBlock + node.y / kJitterBlock) % 2 == 0 ? glm::dvec2(jitter) : 1.0 - glm::dvec2(jitter));
+  const bool opposite = (half + node.x / kJitterBlock + node.y / kJitterBlock) % 2 != 0;
+  shot.receiver_jitter = glm::vec2(opposite ? 1.0 - glm::dvec2(jitter) : glm::dvec2(jitter));
+  shot.spot_row = rowOf(index, mixKeys(seed_, side.key), opposite);
   shot.first_point = static_cast<std::uint32_t>(batch.points.size());
   shot.point_count = points;
   for (std::uint32_t p = 0; p < points; ++p) {
@@ -137,6 +149,7 @@ void NodeShots::add(const LightPolygon& light, std::size_t half, std::uint32_t i
   shot.all_spots = true;  // light and shadow of a lamp differ more across a leaf than anything else
   shot.resolution = resolution;
   shot.receiver_jitter = glm::vec2(half == 0 ? glm::dvec2(jitter) : 1.0 - glm::dvec2(jitter));
+  shot.spot_row = rowOf(index, light_key, half != 0);
   shot.first_point = static_cast<std::uint32_t>(batch.points.size());
   shot.point_count = points;
   for (std::uint32_t p = 0; p < points; ++p) {

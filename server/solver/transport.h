@@ -6,6 +6,7 @@
 // number of workers, cannot change a bit of the result, and a shot replayed with the opposite sign cancels exactly.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <functional>
@@ -65,6 +66,7 @@ struct GatherShot {
   float fill = 1.0F;
   std::uint32_t resolution = 128;
   glm::vec2 receiver_jitter{0.5F};  ///< where in a leaf the receiving point lies (PatchScene::spotAt)
+  std::uint32_t spot_row = 0;       ///< which rows of spots, where a leaf has spots: out of scene::kSpotRows
   bool all_spots = false;           ///< the mean over all spots of a leaf that is not full
   std::uint32_t half = 0;
   std::uint32_t first_point = 0, point_count = 0;  ///< into ShotBatch::points
@@ -74,6 +76,11 @@ struct GatherShot {
   /// the points see these boxes or the receivers, and may be left out elsewhere. 0: everywhere.
   std::uint32_t first_box = 0, box_count = 0;
 };
+
+/// For GatherShot::spot_row, from a number in [0, 1).
+[[nodiscard]] inline std::uint32_t spotRow(double at) {
+  return std::min(scene::kSpotRows - 1, static_cast<std::uint32_t>(at * scene::kSpotRows));
+}
 
 /// Receiving points inside a full leaf over which a shot of light without extent is averaged, as (u, v) in [0, 1)^2.
 inline constexpr std::size_t kMaxReceiverPoints = 8;

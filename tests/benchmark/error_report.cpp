@@ -84,6 +84,7 @@ json toJson(const SolveRow& row) {
   out["stated"] = {{"total", row.stated.total},
                    {"residual", row.stated.residual},
                    {"sampling", row.stated.sampling},
+                   {"variation", row.stated.variation},
                    {"discretization", row.stated.discretization}};
   out["solver"] = accuracy::toJson(row.solver);
   out["total"] = accuracy::toJson(row.total);

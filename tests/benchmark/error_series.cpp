@@ -40,7 +40,7 @@ struct Judge {
 StatedError statedOf(const json& report) {
   const auto error = report.value("error", json::object());
   return {error.value("total", 0.0), error.value("residual", 0.0), error.value("sampling", 0.0),
-          error.value("discretization", 0.0)};
+          error.value("variation", 0.0), error.value("discretization", 0.0)};
 }
 
 /// What makes the truth unknown: no light, or something that the reference does not model.

@@ -28,7 +28,7 @@ struct SeriesOptions {
 };
 
 struct StatedError {
-  double total = 0.0, residual = 0.0, sampling = 0.0, discretization = 0.0;
+  double total = 0.0, residual = 0.0, sampling = 0.0, variation = 0.0, discretization = 0.0;
 };
 
 struct SolveRow {

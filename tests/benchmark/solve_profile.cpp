@@ -325,10 +325,11 @@ int profile(const std::string& file, std::map<std::string, std::string> options)
     shown = seconds;
     const auto& e = solver.error();
     const auto& c = solver.transportCounters();
-    std::printf("%7.3f s round %3u shots %6llu+%llu | stated %6.3f %% (residual %.3f sampling %.3f disc %.3f)", seconds,
-                solver.rounds() - (*outcome == solver::StepOutcome::kConverged ? 0 : 1),
-                static_cast<unsigned long long>(c.scatter_shots), static_cast<unsigned long long>(c.gather_points),
-                100 * e.total, 100 * e.residual, 100 * e.sampling, 100 * e.discretization);
+    std::printf(
+        "%7.3f s round %3u shots %6llu+%llu | stated %6.3f %% (residual %.3f sampling %.3f variation %.3f disc %.3f)",
+        seconds, solver.rounds() - (*outcome == solver::StepOutcome::kConverged ? 0 : 1),
+        static_cast<unsigned long long>(c.scatter_shots), static_cast<unsigned long long>(c.gather_points),
+        100 * e.total, 100 * e.residual, 100 * e.sampling, 100 * e.variation, 100 * e.discretization);
     printTruth(leaves, truth, solver.irradiance());
     std::printf(" | render %.2f acc %.2f gather %.2f\n", c.render_seconds, c.accumulate_seconds, c.gather_seconds);
     if (options.count("--spread") != 0) printSpread(solver);

@@ -9,8 +9,8 @@
 #include <numbers>
 
 #include "server/gpu/gpu_transport.h"
-#include "server/gpu/polygon_form_factor.h"
 #include "server/scene/coverage.h"
+#include "server/solver/polygon_form_factor.h"
 #include "tests/gl/scene_builder.h"
 
 namespace radiosity::test {
@@ -73,17 +73,17 @@ TEST(PolygonFormFactor, MatchesTheClosedFormOfAPointFacingARectangle) {
                         y / std::sqrt(1 + y * y) * std::atan(x / std::sqrt(1 + y * y))) /
                        (2 * std::numbers::pi);
   const std::array<glm::vec3, 4> corners{glm::vec3(0, 0, 0.9F), {0, 0.4F, 0.9F}, {0.7F, 0.4F, 0.9F}, {0.7F, 0, 0.9F}};
-  EXPECT_NEAR(gpu::polygonFormFactor({0, 0, 0}, {0, 0, 1}, corners), exact, 1e-7);
+  EXPECT_NEAR(solver::polygonFormFactor({0, 0, 0}, {0, 0, 1}, corners), exact, 1e-7);
 }
 
 TEST(PolygonFormFactor, ClipsAtTheHorizon) {
   // an upright rectangle of height 2h centred on the horizon gives the same as its upper half
   const std::array<glm::vec3, 4> whole{glm::vec3(-1, 1, -0.5F), {1, 1, -0.5F}, {1, 1, 0.5F}, {-1, 1, 0.5F}};
   const std::array<glm::vec3, 4> half{glm::vec3(-1, 1, 0), {1, 1, 0}, {1, 1, 0.5F}, {-1, 1, 0.5F}};
-  const auto expected = gpu::polygonFormFactor({0, 0, 0}, {0, 0, 1}, half);
+  const auto expected = solver::polygonFormFactor({0, 0, 0}, {0, 0, 1}, half);
   EXPECT_GT(expected, 0.01);
-  EXPECT_NEAR(gpu::polygonFormFactor({0, 0, 0}, {0, 0, 1}, whole), expected, 1e-12);
-  EXPECT_EQ(gpu::polygonFormFactor({0, 0, 1}, {0, 0, 1}, half), 0.0);
+  EXPECT_NEAR(solver::polygonFormFactor({0, 0, 0}, {0, 0, 1}, whole), expected, 1e-12);
+  EXPECT_EQ(solver::polygonFormFactor({0, 0, 1}, {0, 0, 1}, half), 0.0);
 }
 
 TEST_F(Gather, UnoccludedIrradianceIsLambertsFormula) {
@@ -97,8 +97,8 @@ TEST_F(Gather, UnoccludedIrradianceIsLambertsFormula) {
   for (std::uint32_t y = 0; y < 16; ++y) {
     for (std::uint32_t x = 0; x < 16; ++x) {
       const glm::dvec3 point(-0.5 + (x + 0.5) / 16, -0.5 + (y + 0.5) / 16, -0.5);
-      const auto exact = gpu::polygonFormFactor(point, {0, 0, 1},
-                                                std::span(batch.gather[0].corners).first(batch.gather[0].corner_count));
+      const auto exact = solver::polygonFormFactor(
+          point, {0, 0, 1}, std::span(batch.gather[0].corners).first(batch.gather[0].corner_count));
       EXPECT_NEAR(irradiance(*scene, flux, floor, x, y), exact, 1e-5 * exact) << x << ", " << y;
     }
   }
@@ -128,8 +128,8 @@ TEST_F(Gather, OfALampThatAWallsPlaneCutsThePartInFrontIsReceived) {
     const auto at =
         frame.origin + (static_cast<float>(k % 6) + 0.5F) * frame.du + (static_cast<float>(k / 6) + 0.5F) * frame.dv;
     all += sum[k];
-    exact += gpu::polygonFormFactor(glm::dvec3(at), normal,
-                                    std::span(batch.gather[0].corners).first(batch.gather[0].corner_count));
+    exact += solver::polygonFormFactor(glm::dvec3(at), normal,
+                                       std::span(batch.gather[0].corners).first(batch.gather[0].corner_count));
   }
   EXPECT_GT(exact, 0.5);
   // The point lies in front in three of five shots, binomially: standard error sqrt(0.4 / 0.6 / 400) = 4 %.
@@ -146,8 +146,8 @@ TEST_F(Gather, TheReceiverJitterMovesTheReceivingPoint) {
   auto batch = gatherFrom(*scene, lamp, 2, random);
   batch.gather[0].receiver_jitter = {0.125F, 0.75F};
   const auto flux = run(scene, batch);
-  const auto exact = gpu::polygonFormFactor({-0.5 + 9.125 / 32, -0.5 + 22.75 / 32, -0.5}, {0, 0, 1},
-                                            std::span(batch.gather[0].corners).first(batch.gather[0].corner_count));
+  const auto exact = solver::polygonFormFactor({-0.5 + 9.125 / 32, -0.5 + 22.75 / 32, -0.5}, {0, 0, 1},
+                                               std::span(batch.gather[0].corners).first(batch.gather[0].corner_count));
   EXPECT_NEAR(irradiance(*scene, flux, floor, 9, 22), exact, 1e-5 * exact);
 }
 
@@ -167,7 +167,7 @@ TEST_F(Gather, AReceiverCloseByLooksFromOppositePlacesAndTheHalvesFromFour) {
   auto& shot = batch.gather[0];
   const auto at = [&](const glm::dvec2& place) {
     const glm::dvec3 point(-0.5 + kTexel * place.x, kTexel * place.y, -0.5);
-    return gpu::polygonFormFactor(point, {0, 0, 1}, std::span(shot.corners).first(shot.corner_count));
+    return solver::polygonFormFactor(point, {0, 0, 1}, std::span(shot.corners).first(shot.corner_count));
   };
   double mean = 0.0, one_place = 0.0, halves = 0.0, all = 0.0;
   for (std::uint32_t k = 0; k < 64 * 64; ++k) mean += at({(k % 64 + 0.5) / 64, (k / 64 + 0.5) / 64}) / (64 * 64);
@@ -204,8 +204,8 @@ TEST_F(Gather, AHalfPlaneCastsAnExactUmbraAndPenumbra) {
   const auto flux = run(scene, batch);
   for (std::uint32_t x = 0; x < 64; ++x) {
     const double at = -0.5 + (x + 0.5) / 64;
-    const auto open = gpu::polygonFormFactor({at, -0.25, -0.5}, {0, 0, 1},
-                                             std::span(batch.gather[0].corners).first(batch.gather[0].corner_count));
+    const auto open = solver::polygonFormFactor({at, -0.25, -0.5}, {0, 0, 1},
+                                                std::span(batch.gather[0].corners).first(batch.gather[0].corner_count));
     const double share = irradiance(*scene, flux, floor, x, 0) / open;
     if (at < -0.11) {
       EXPECT_EQ(share, 0.0) << at;
@@ -235,7 +235,7 @@ TEST_F(Gather, LeavesBesideAPanelThatHangsBeforeThemLoseNothingToIt) {
   for (std::uint32_t y = 12; y < 28; ++y) {
     beside += irradiance(*scene, flux, ceiling, 19, y);
     under += irradiance(*scene, flux, ceiling, 20, y);
-    open += gpu::polygonFormFactor({-0.0125, 0.5 - (y + 0.5) / 40, 0.5}, {0, 0, -1}, corners);
+    open += solver::polygonFormFactor({-0.0125, 0.5 - (y + 0.5) / 40, 0.5}, {0, 0, -1}, corners);
   }
   // In the gap one sees at most what lies to the side of the panel: 0.0005 of a leaf's 0.025.
   EXPECT_NEAR(beside / open, 1.0, 0.02);

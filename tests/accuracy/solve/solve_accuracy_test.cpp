@@ -10,6 +10,7 @@
 #include "tests/accuracy/solve_run.h"
 #include "tests/scenes/glb_writer.h"
 #include "tests/scenes/scenes.h"
+#include "tests/scenes/shapes.h"
 
 namespace radiosity::accuracy {
 namespace {
@@ -76,6 +77,34 @@ TEST(SolvedScene, CornellBoxIsWithinFivePercentOfThePathTracer) {
   ASSERT_TRUE(report.contains("error"));
   // the stated error is a promise: the truth is not much worse
   EXPECT_LT(accuracy.solver.solverRms(), 2.0 * report["error"]["total"].get<double>() + 0.005);
+}
+
+/// A room with a flat lamp right under its ceiling, all of which shines, its rim of one centimetre too: on the ceiling
+/// that light ends within a tenth of a texel, and the rim sees nothing else.
+test_scenes::TestScene roomWithARim() {
+  test_scenes::TestScene scene;
+  scene.name = "rim";
+  const auto white = scene.add({"white", glm::dvec3(0.8), {}});
+  const auto shining = scene.add({"shining", glm::dvec3(0.5), glm::dvec3(1.0)});
+  test_scenes::Object room{"room", {}, {}}, lamp{"lamp", {}, {}};
+  test_scenes::appendBox(room, {-2, 0, -2}, {2, 3, 2}, test_scenes::allFaces(white), test_scenes::kNoFace, true);
+  test_scenes::appendBox(lamp, {-0.375, 2.99, -0.375}, {0.375, 3, 0.375}, test_scenes::allFaces(shining),
+                         test_scenes::kYMax);
+  scene.objects = {room, lamp};
+  return scene;
+}
+
+TEST(SolvedScene, LightThatVariesWithinTexelsIsCorrectedAndStated) {
+  nlohmann::json report;
+  const auto lit = solve(roomWithARim(), {"--error", "0.02", "--time-limit", "60", "--texels", "12000"}, &report);
+  const auto reference = makeReference(lit, {.texel_samples = 4096, .point_samples = 16, .texels = 1500, .points = 10});
+  const auto accuracy = measure(lit, reference);
+  const double stated = report["error"]["total"];
+  RecordProperty("solver_error", std::to_string(accuracy.solver.solverRms()));
+  RecordProperty("stated", std::to_string(stated));
+  EXPECT_LE(stated, 0.02);
+  EXPECT_LT(accuracy.solver.solverRms(),
+            1.5 * stated);  // the promise; without the correction it is three times as large
 }
 
 // Shooters whose light is signed leave noise below black where hardly any light comes.

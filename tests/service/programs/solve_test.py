@@ -45,7 +45,7 @@ class SolveTest(ServiceCase):
     def check_report(self, report):
         for name in ("seconds", "shots", "patches", "surfaces", "polygons", "revision"):
             self.assertIsInstance(report[name], (int, float), name)
-        self.assertEqual(set(report["error"]), {"total", "residual", "sampling", "discretization"})
+        self.assertEqual(set(report["error"]), {"total", "residual", "sampling", "variation", "discretization"})
         self.assertEqual(set(report["energy"]), {"emitted", "absorbed", "escaped", "backface", "unshot", "imbalance"})
         self.assertLessEqual(report["error"]["total"], 0.05)
         self.assertGreater(report["patches"], 500)

@@ -50,6 +50,30 @@ TEST(Bvh, FindsTheHitsThatASearchOfAllTrianglesFinds) {
   EXPECT_GT(total, 100U);
 }
 
+TEST(Bvh, TheNearestHitIsTheFirstOfAll) {
+  const Bvh tree(soup(500));
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> uniform(-0.5, 0.5);
+  std::size_t met = 0, missed = 0;
+  for (int ray = 0; ray < 1000; ++ray) {
+    const glm::dvec3 origin(uniform(random), uniform(random), uniform(random));
+    const glm::dvec3 direction(uniform(random), uniform(random), uniform(random));
+    const double reach = ray % 2 == 0 ? 1.0 : 0.1;
+    std::vector<RayHit> hits;
+    tree.collectHits(origin, direction, 0.0, reach, hits);
+    const auto nearest = tree.nearestHit(origin, direction, 0.0, reach);
+    ASSERT_EQ(nearest.has_value(), !hits.empty());
+    (nearest ? met : missed) += 1;
+    if (!nearest) continue;
+    const auto first = std::ranges::min_element(hits, {}, &RayHit::t);
+    EXPECT_EQ(nearest->t, first->t);
+    EXPECT_EQ(nearest->triangle, first->triangle);
+    EXPECT_EQ(nearest->front, first->front);
+  }
+  EXPECT_GT(met, 100U);
+  EXPECT_GT(missed, 100U);
+}
+
 TEST(Bvh, KnowsFrontFromBack) {
   const Bvh tree({{glm::vec3(0, 0, 0), glm::vec3(1, 0, 0), glm::vec3(0, 1, 0)}});
   std::vector<RayHit> hits;

@@ -46,7 +46,7 @@ export interface Progress {
   shotsPerSecond: number;
   seconds: number;
   secondsLeft?: number;
-  error: { total: number; residual: number; sampling: number; discretization: number };
+  error: { total: number; residual: number; sampling: number; variation?: number; discretization: number };
   energy: Record<string, number>;
   patches: number;
   nodes: number;

@@ -95,6 +95,7 @@ export class SolvePanel {
       ['Error', `${percent(error.total)} of ${percent(target)}`],
       ['Residual', percent(error.residual)],
       ['Sampling', percent(error.sampling)],
+      ['Within texels', percent(error.variation ?? 0)],
       ['Too coarse texels', percent(error.discretization)],
       ['Shots', `${readable(progress.shots, 4)} (${readable(progress.shotsPerSecond, 2)}/s)`],
       ['Solve time', duration(progress.seconds)],

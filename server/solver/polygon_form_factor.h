@@ -5,7 +5,7 @@
 #include <glm/vec3.hpp>
 #include <span>
 
-namespace radiosity::gpu {
+namespace radiosity::solver {
 
 struct FormFactor {
   double value = 0.0;
@@ -22,4 +22,4 @@ struct FormFactor {
 
 [[nodiscard]] double polygonArea(std::span<const glm::vec3> corners);
 
-}  // namespace radiosity::gpu
+}  // namespace radiosity::solver

@@ -1,4 +1,4 @@
-#include "server/gpu/polygon_form_factor.h"
+#include "server/solver/polygon_form_factor.h"
 
 #include <algorithm>
 #include <array>
@@ -8,7 +8,7 @@
 
 #include "common/check.h"
 
-namespace radiosity::gpu {
+namespace radiosity::solver {
 namespace {
 
 /// A convex polygon clipped by one plane has at most one corner more.
@@ -70,4 +70,4 @@ double polygonFormFactor(const glm::dvec3& point, const glm::dvec3& normal, std:
   return formFactorInFront(point, normal, corners).value;
 }
 
-}  // namespace radiosity::gpu
+}  // namespace radiosity::solver

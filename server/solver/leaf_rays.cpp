@@ -1,0 +1,103 @@
+#include "server/solver/leaf_rays.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
+
+namespace radiosity::solver {
+namespace {
+
+/// Rays start so far from a surface (unit box), well above the rounding of positions.
+constexpr double kLift = 2e-6;
+/// Farther than the unit box is wide.
+constexpr double kFar = 4.0;
+
+/// Where in a frame a point of its plane lies.
+glm::dvec2 texelAt(const scene::TriangleFrame& frame, const glm::dvec3& point) {
+  const glm::dvec3 way = point - glm::dvec3(frame.origin), u(frame.du), v(frame.dv);
+  const double uu = glm::dot(u, u), uv = glm::dot(u, v), vv = glm::dot(v, v);
+  const double along_u = glm::dot(way, u), along_v = glm::dot(way, v), determinant = uu * vv - uv * uv;
+  return {(along_u * vv - along_v * uv) / determinant, (along_v * uu - along_u * uv) / determinant};
+}
+
+glm::dvec3 lifted(const LeafRays::Place& place) { return place.position + kLift * place.normal; }
+
+}  // namespace
+
+glm::dvec3 cosineDirection(const glm::dvec3& normal, double u, double v) {
+  const glm::dvec3 helper = std::abs(normal.x) < 0.6 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
+  const glm::dvec3 a = glm::normalize(glm::cross(helper, normal)), b = glm::cross(normal, a);
+  const double radius = std::sqrt(u), angle = 2.0 * std::numbers::pi * v;
+  return radius * std::cos(angle) * a + radius * std::sin(angle) * b + std::sqrt(std::max(0.0, 1.0 - u)) * normal;
+}
+
+LeafRays::LeafRays(const scene::PatchScene& patches, const std::vector<Side>& sides)
+    : patches_(patches), sides_(sides), side_of_(patches.surfaces.size(), {scene::kNone, scene::kNone}) {
+  std::vector<scene::Bvh::Triangle> triangles(patches.triangles.size());
+  for (std::size_t i = 0; i < patches.indices.size(); ++i)
+    triangles[i / 3][i % 3] = patches.vertices[patches.indices[i]].position;
+  tree_ = scene::Bvh(std::move(triangles));
+  for (std::uint32_t s = 0; s < sides.size(); ++s) {
+    side_of_[sides[s].surface][sides[s].side] = s;
+    greatest_width_ = std::max(greatest_width_, widthOf(sides[s].first_value));
+  }
+}
+
+const Side& LeafRays::sideOf(std::uint32_t value) const {
+  return *std::prev(std::ranges::upper_bound(sides_, value, {}, &Side::first_value));
+}
+
+double LeafRays::areaOf(std::uint32_t value) const {
+  const Side& side = sideOf(value);
+  return static_cast<double>(patches_.node_area[side.first_node + value - side.first_value]);
+}
+
+double LeafRays::widthOf(std::uint32_t value) const {
+  return std::sqrt(static_cast<double>(patches_.surfaces[sideOf(value).surface].texel_area));
+}
+
+LeafRays::Place LeafRays::placeOn(std::uint32_t value, const glm::dvec2& at) const {
+  const Side& side = sideOf(value);
+  const auto leaf = value - side.first_value;
+  const auto& point = patches_.leaves[patches_.surfaces[side.surface].first_leaf + leaf];
+  const auto [texel, triangle] = patches_.spotAt(point, leaf % side.width, leaf / side.width, glm::vec2(at));
+  const auto& frame = patches_.triangles[triangle];
+  const glm::dvec3 position = glm::dvec3(frame.origin) + static_cast<double>(texel.x) * glm::dvec3(frame.du) +
+                              static_cast<double>(texel.y) * glm::dvec3(frame.dv);
+  return {position, glm::dvec3(side.side == 0 ? frame.normal : -frame.normal), value};
+}
+
+LeafRays::Sight LeafRays::look(const Place& from, const glm::dvec3& direction, double reach) const {
+  Sight sight;
+  const auto origin = lifted(from);
+  const auto hit = tree_.nearestHit(origin, direction, 0.0, reach);
+  sight.distance = hit ? hit->t : reach;
+  if (!hit) return sight;
+  const auto s = side_of_[patches_.triangle_surface[hit->triangle]][hit->front ? 0 : 1];
+  if (s == scene::kNone) return sight;
+  const auto& frame = patches_.triangles[hit->triangle];
+  const Side& side = sides_[s];
+  sight.end.position = origin + hit->t * direction;
+  sight.end.normal = glm::dvec3(hit->front ? frame.normal : -frame.normal);
+  const auto texel = texelAt(frame, sight.end.position);
+  const auto x = static_cast<std::uint32_t>(std::clamp(texel.x, 0.0, static_cast<double>(side.width - 1)));
+  const auto y = static_cast<std::uint32_t>(std::clamp(texel.y, 0.0, static_cast<double>(side.height - 1)));
+  const auto leaf = y * side.width + x;
+  if (patches_.node_area[side.first_node + leaf] > 0.0F) sight.end.value = side.first_value + leaf;
+  return sight;
+}
+
+LeafRays::Sight LeafRays::look(const Place& from, const glm::dvec3& direction) const {
+  auto sight = look(from, direction, kFar);
+  if (sight.distance >= kFar) sight.end.value = direction.y >= 0.0 ? kSkyAbove : kSkyBelow;
+  return sight;
+}
+
+bool LeafRays::isOpen(const Place& from, const glm::dvec3& to) const {
+  const glm::dvec3 origin = lifted(from), way = to - origin;
+  const double length = glm::length(way);
+  return length > 0.0 && !tree_.nearestHit(origin, way / length, 0.0, length - kLift);
+}
+
+}  // namespace radiosity::solver

@@ -1,0 +1,61 @@
+// What single places of leaves see, by rays: for light that varies within a leaf, of which links know nothing. Plain
+// values; any thread.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <vector>
+
+#include "server/scene/bvh.h"
+#include "server/scene/patch_scene.h"
+#include "server/solver/side.h"
+
+namespace radiosity::solver {
+
+class LeafRays {
+ public:
+  /// Instead of leaf values: nothing that sends light, or the sky.
+  static constexpr std::uint32_t kNothing = scene::kNone, kSkyAbove = scene::kNone - 1, kSkyBelow = scene::kNone - 2;
+
+  /// A place on the lit side of a leaf; unit box.
+  struct Place {
+    glm::dvec3 position{0.0};
+    glm::dvec3 normal{0.0};
+    std::uint32_t value = kNothing;  ///< leaf value
+  };
+
+  /// O(n log n) in triangles. Both are to outlive it.
+  LeafRays(const scene::PatchScene& patches, const std::vector<Side>& sides);
+
+  [[nodiscard]] const Side& sideOf(std::uint32_t value) const;
+  /// Unit box squared: what is covered and not buried.
+  [[nodiscard]] double areaOf(std::uint32_t value) const;
+  /// Edge of a leaf, unit box: of the whole texel.
+  [[nodiscard]] double widthOf(std::uint32_t value) const;
+  [[nodiscard]] double greatestWidth() const { return greatest_width_; }
+
+  /// The place at (u, v) in [0, 1)^2, uniform over what is left of a leaf that has area.
+  [[nodiscard]] Place placeOn(std::uint32_t value, const glm::dvec2& at) const;
+  /// What lies that way within `reach` (unit box); `value` is kNothing where nothing does, and where it is no leaf.
+  struct Sight {
+    Place end;
+    double distance = 0.0;
+  };
+  [[nodiscard]] Sight look(const Place& from, const glm::dvec3& direction, double reach) const;
+  /// The same without bounds; `value` may be one of the sky's.
+  [[nodiscard]] Sight look(const Place& from, const glm::dvec3& direction) const;
+  [[nodiscard]] bool isOpen(const Place& from, const glm::dvec3& to) const;
+
+ private:
+  const scene::PatchScene& patches_;
+  const std::vector<Side>& sides_;
+  scene::Bvh tree_;
+  std::vector<std::array<std::uint32_t, 2>> side_of_;  ///< by surface
+  double greatest_width_ = 0.0;
+};
+
+/// Directions before a surface with probability proportional to the cosine, from (u, v) in [0, 1)^2.
+[[nodiscard]] glm::dvec3 cosineDirection(const glm::dvec3& normal, double u, double v);
+
+}  // namespace radiosity::solver

@@ -1,0 +1,198 @@
+#include "server/solver/leaf_variation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numeric>
+
+#include "server/solver/halves.h"
+#include "server/solver/sampling.h"
+
+namespace radiosity::solver {
+namespace {
+
+/// More receivers than these are sampled: then what varies is stated, and not corrected.
+constexpr std::size_t kMostReceivers = 262'144;
+/// So many paths of each half all receivers have before it must show whether something varies.
+constexpr std::uint32_t kEvenPaths = 8;
+/// Fewer of them that meet a leaf near by may miss what varies.
+constexpr std::size_t kFewestPaths = 512;
+/// So many times its standard deviation what was found is not by chance.
+constexpr double kSurely = 2.0;
+/// Where what is doubtful is more than this part of all that is lacking, squared, nothing is corrected.
+constexpr double kDoubtful = 0.1;
+/// A receiver never has more paths than these; a round of refinement adds no more than those in all.
+constexpr std::uint32_t kMostPaths = 4096, kMostAdded = 16'384;
+/// A round of refinement is for the receivers with so much of what it could lower.
+constexpr double kRefinedPart = 0.8;
+
+template <typename Lack>
+glm::dvec3 all(const Lack& lack) {
+  return glm::dvec3(lack.sure) + glm::dvec3(lack.doubtful);
+}
+
+}  // namespace
+
+LeafVariation::LeafVariation(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed)
+    : sides_(sides), rays_(patches, sides), seed_(mixKeys(seed, 0x4c454146ULL)) {
+  for (const auto& side : sides) {
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
+      if (patches.node_area[side.first_node + leaf] > 0.0F) receivers_.push_back(side.first_value + leaf);
+  }
+  const std::size_t all = receivers_.size();
+  if (all <= kMostReceivers) return;
+  for (std::size_t i = 0; i < kMostReceivers; ++i)  // one of each stretch
+    receivers_[i] = receivers_[static_cast<std::size_t>((static_cast<double>(i) + uniformFromKey(mixKeys(seed_, i))) *
+                                                        static_cast<double>(all) / kMostReceivers)];
+  receivers_.resize(kMostReceivers);
+  stands_for_ = static_cast<double>(all) / kMostReceivers;
+}
+
+bool LeafVariation::isWhole() const {
+  const auto fits = [](std::uint16_t count) { return count >= 1 && count <= kMostPaths; };
+  return (count_.empty() || count_.size() == receivers_.size()) && std::ranges::all_of(count_, fits);
+}
+
+/// All paths again, because other lights shine than did.
+void LeafVariation::traceAnew(const LeafLight& light) {
+  for (auto& paths : paths_) paths.clear();
+  wanted_.clear();
+  if (count_.empty()) count_.assign(receivers_.size(), 1);
+  std::vector<Task> tasks(receivers_.size());
+  for (std::size_t r = 0; r < receivers_.size(); ++r) tasks[r] = {receivers_[r], 0, count_[r]};
+  trace(tasks, light);
+}
+
+std::vector<LeafVariation::Task> LeafVariation::twiceAsMany() const {
+  std::vector<Task> tasks(receivers_.size());
+  for (std::size_t r = 0; r < receivers_.size(); ++r) tasks[r] = {receivers_[r], count_[r], 2U * count_[r]};
+  return tasks;
+}
+
+void LeafVariation::update(const LeafLight& light, double bound) {
+  std::uint64_t shining = 1;
+  for (std::size_t i = 0; i < light.lights.size(); ++i)
+    if (light.lights[i].emission != glm::vec3(0.0F)) shining = mixKeys(shining, mixKeys(i, light.lights[i].key));
+  for (std::size_t i = 0; i < light.sources.size(); ++i)
+    if (light.sources[i].intensity != glm::dvec3(0.0))
+      shining = mixKeys(shining, mixKeys(~i, light.sources[i].shapeKey()));
+  if (shining != traced_for_) traceAnew(light);
+  traced_for_ = shining;
+  trace(wanted_, light);
+  wanted_.clear();
+  for (auto& half : correction_) half = {};
+  sumUp(light);
+  // Until it is known: all receivers get more of them.
+  const auto fewest = [&] { return count_.empty() ? kEvenPaths : std::uint32_t{*std::ranges::min_element(count_)}; };
+  const auto isUnsure = [&] { return found_ + deviation_ > bound && found_ < kSurely * deviation_; };
+  while ((isUnsure() || paths_[0].size() < kFewestPaths) && fewest() < kEvenPaths) {
+    trace(twiceAsMany(), light);
+    for (auto& count : count_) count = static_cast<std::uint16_t>(2 * count);
+    sumUp(light);
+  }
+  left_ = std::max(0.0, found_);
+  noise_ = 0.0;
+  gain_ = {};
+  if (stands_for_ == 1.0 && found_ + deviation_ > bound) correct();
+  for (auto& half : lacking_) half = {};
+}
+
+void LeafVariation::sumUp(const LeafLight& light) {
+  inBothHalves([&](std::size_t half) {
+    auto& lacking = lacking_[half];
+    lacking.assign(light.reflectance.size(), {});
+    for (const auto& path : paths_[half]) {
+      const auto lack = this->lacking(path, light, half);
+      lacking[path.receiver].sure += lack.sure;
+      lacking[path.receiver].doubtful += lack.doubtful;
+    }
+    for (std::size_t r = 0; r < receivers_.size(); ++r) {
+      lacking[receivers_[r]].sure /= static_cast<float>(count_[r]);
+      lacking[receivers_[r]].doubtful /= static_cast<float>(count_[r]);
+    }
+  });
+  double sum = 0.0, squares = 0.0;
+  for (const auto value : receivers_) {
+    // The halves are independent, so that their noise cancels in the product.
+    const double product = glm::dot(all(lacking_[0][value]), all(lacking_[1][value]));
+    if (product == 0.0) continue;
+    const double here = rays_.areaOf(value) * product;
+    sum += here;
+    squares += here * here;
+  }
+  found_ = sum * stands_for_;
+  deviation_ = std::sqrt(squares) * stands_for_;
+}
+
+/// Receivers get what they lack, as far as it is more than noise and sure.
+void LeafVariation::correct() {
+  for (auto& half : correction_) half.assign(lacking_[0].size(), glm::vec3(0.0F));
+  gain_.assign(lacking_[0].size(), 0.0F);
+  left_ = noise_ = unknown_ = doubtful_ = 0.0;
+  for (const auto& side : sides_) weigh(side);
+  left_ = std::max(0.0, left_);
+}
+
+/// What is found by chance at one leaf is not found at its neighbours too: a leaf gets as much of what it lacks as
+/// there is of signal in signal and noise around it (Wiener), and nothing where noise is the larger part.
+void LeafVariation::weigh(const Side& side) {
+  std::vector<double> signal(side.leaf_count, 0.0), noise(side.leaf_count, 0.0), doubt(side.leaf_count, 0.0);
+  for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+    const auto &first = lacking_[0][side.first_value + leaf], &second = lacking_[1][side.first_value + leaf];
+    const glm::dvec3 one = all(first), other = all(second), doubtful(0.5F * (first.doubtful + second.doubtful));
+    if (one == glm::dvec3(0.0) && other == glm::dvec3(0.0)) continue;
+    const double area = rays_.areaOf(side.first_value + leaf);
+    signal[leaf] = area * glm::dot(one, other);
+    noise[leaf] = 0.25 * area * glm::dot(one - other, one - other);
+    doubt[leaf] = area * glm::dot(doubtful, doubtful);
+  }
+  // Without the leaf itself, whose share of the signal would be the larger the more of it is chance: what is left
+  // would come out too small. A leaf without neighbours has to do.
+  const auto around = [&](const std::vector<double>& values, std::uint32_t leaf) {
+    const auto x = leaf % side.width, y = leaf / side.width;
+    double sum = 0.0;
+    for (auto ny = y - std::min(y, 1U); ny < std::min(y + 2, side.height); ++ny)
+      for (auto nx = x - std::min(x, 1U); nx < std::min(x + 2, side.width); ++nx) sum += values[ny * side.width + nx];
+    return side.leaf_count > 1 ? sum - values[leaf] : sum;
+  };
+  for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+    const auto value = side.first_value + leaf;
+    const double s = around(signal, leaf), n = around(noise, leaf);
+    const bool found = s > n && s > 0.0, known = found && around(doubt, leaf) < kDoubtful * s;
+    if (!found) unknown_ += noise[leaf];
+    if (found && !known) doubtful_ += signal[leaf];
+    const double weight = known ? s / (s + n) : 0.0;
+    for (std::size_t h = 0; h < 2 && known; ++h)
+      correction_[h][value] = static_cast<float>(weight) * glm::vec3(all(lacking_[h][value]));
+    left_ += (1.0 - weight) * (1.0 - weight) * signal[leaf];
+    noise_ += weight * weight * noise[leaf];
+    gain_[value] = static_cast<float>(n + noise[leaf]);
+  }
+}
+
+bool LeafVariation::refine() {
+  if (gain_.empty()) return false;
+  std::vector<std::uint32_t> order;
+  double sum = 0.0;
+  for (std::uint32_t r = 0; r < receivers_.size(); ++r) {
+    if (count_[r] >= kMostPaths || gain_[receivers_[r]] <= 0.0F) continue;
+    order.push_back(r);
+    sum += static_cast<double>(gain_[receivers_[r]]);
+  }
+  std::ranges::sort(order, [&](std::uint32_t a, std::uint32_t b) {
+    const float first = gain_[receivers_[a]] / count_[a], second = gain_[receivers_[b]] / count_[b];
+    return first != second ? first > second : a < b;
+  });
+  double taken = 0.0;
+  std::uint32_t added = 0;
+  for (const auto r : order) {
+    if (taken >= kRefinedPart * sum || added >= kMostAdded) break;
+    taken += static_cast<double>(gain_[receivers_[r]]);
+    added += count_[r];
+    wanted_.push_back({receivers_[r], count_[r], 2U * count_[r]});
+    count_[r] = static_cast<std::uint16_t>(2 * count_[r]);
+  }
+  return !wanted_.empty();
+}
+
+}  // namespace radiosity::solver

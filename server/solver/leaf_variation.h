@@ -1,0 +1,129 @@
+// Light that varies within a leaf. A leaf shoots its mean, so what sees only a part of it, or that part from near by,
+// gets too much or too little where its light changes within it: at the foot of something, along a gap, beside the rim
+// of a lamp. No sample of links can tell. Rays can: from points of receivers to points y of leaves near by, and from
+// there and from another point of the same leaf the same way on. What y has more than that other point varies inside
+// the leaf, and is what the receiver lacks; where light is even nothing is left, and no noise.
+//
+// What it comes to is stated (ErrorParts::variation), and where it matters and is known well enough it is added to what
+// receivers have over links: a gather over texels, for those that need it. Paths depend on geometry
+// and on which lights shine; light and reflectance are put in with each update. Owned by LinkedSolver; one thread
+// outside of the calls.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <span>
+#include <vector>
+
+#include "server/solver/leaf_rays.h"
+#include "server/solver/lights.h"
+#include "server/solver/punctual_lights.h"
+
+namespace radiosity::solver {
+
+/// Light as the paths see it. By leaf value, lux.
+struct LeafLight {
+  std::span<const glm::vec3> emission;  ///< of what is no light polygon
+  std::span<const glm::vec3> reflectance;
+  std::array<std::span<const glm::vec3>, 2> irradiance;  ///< by half
+  std::span<const LightPolygon> lights;                  ///< dark ones too; more may come, none goes
+  std::span<const PunctualLights::Source> sources;
+};
+
+class LeafVariation {
+ public:
+  LeafVariation(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed);
+
+  /// Brings all that is below up to date with the light. Paths are traced when there are none, or when other lights
+  /// shine; more of them until what varies is known to be little beside `bound`, an irradiance squared times area as
+  /// below, or is found to be more. Below the bound nothing is corrected.
+  void update(const LeafLight& light, double bound);
+
+  /// More paths for those receivers where they help most; update() is to follow. False: there are as many as there may
+  /// be.
+  [[nodiscard]] bool refine();
+
+  // Sums over leaves and channels of area (unit box squared) times irradiance (lux) squared.
+  /// Of what varies and is not corrected; an estimate without bias, but not below zero.
+  [[nodiscard]] double left() const { return left_; }
+  /// Of the noise of the corrections in the mean of the halves.
+  [[nodiscard]] double noise() const { return noise_; }
+  /// Of what more paths would lower: that noise, the noise that hides what varies, and what is left where it is not
+  /// because it is doubtful.
+  [[nodiscard]] double unsettled() const { return noise_ + unknown_ + std::max(0.0, left_ - doubtful_); }
+
+  [[nodiscard]] bool corrects() const { return !correction_[0].empty(); }
+  /// To be added to irradiance, lux, by leaf value; the halves are independent. Empty: nothing.
+  [[nodiscard]] std::span<const glm::vec3> correction(std::size_t half) const { return correction_[half]; }
+
+  /// How many paths each receiver has; the paths are traced anew from it.
+  template <typename Archive, typename Self>
+  static void visit(Archive& archive, Self& self) {
+    archive(self.count_);
+  }
+  /// Whether what visit() read fits.
+  [[nodiscard]] bool isWhole() const;
+
+ private:
+  using Place = LeafRays::Place;
+  /// A way from a receiver over a leaf near by, and from another place of that.
+  struct Path {
+    std::uint32_t receiver = 0;                       ///< leaf value
+    std::uint32_t by = 0;                             ///< leaf value of the leaf near by
+    std::array<std::uint32_t, 2> seen{};              ///< leaf values that its two places see
+    std::uint32_t light = 0, source = 0;              ///< one of each
+    float light_factor = 0.0F, source_factor = 0.0F;  ///< what the first place has of them more than the second
+    bool sees_near = false;                           ///< one of `seen` is near, and may vary within itself
+  };
+  /// Irradiance that a receiver lacks: what is sure, and what comes over a second leaf near by, of whose light the mean
+  /// is known. In a gap between bright surfaces that may be as wrong as what it is to correct.
+  struct Lack {
+    glm::vec3 sure{0.0F}, doubtful{0.0F};
+  };
+  /// What light comes to one of two places, and which of all is followed: drawn in proportion to what it would bring
+  /// without shadows.
+  struct Drawn {
+    std::uint32_t index = scene::kNone;
+    std::array<double, 2> unhidden{};
+    double chance = 0.0;
+  };
+  /// A receiver is to have paths first .. end - 1.
+  struct Task {
+    std::uint32_t receiver, first, end;
+  };
+
+  [[nodiscard]] bool isNear(const LeafRays::Sight& sight) const;
+  void traceAnew(const LeafLight& light);
+  void trace(std::span<const Task> tasks, const LeafLight& light);
+  void follow(const Task& task, std::size_t half, const LeafLight& light, std::vector<Path>& paths) const;
+  [[nodiscard]] bool follow(const Place& from, std::uint64_t key, const LeafLight& light, Path& path) const;
+  template <typename Unhidden>
+  [[nodiscard]] static Drawn draw(std::size_t count, std::uint64_t key, const Unhidden& unhidden);
+  void followLight(const std::array<Place, 2>& places, std::uint64_t key, const LeafLight& light, Path& path) const;
+  void followSource(const std::array<Place, 2>& places, std::uint64_t key, const LeafLight& light, Path& path) const;
+  [[nodiscard]] Lack lacking(const Path& path, const LeafLight& light, std::size_t half) const;
+  void sumUp(const LeafLight& light);
+  void correct();
+  void weigh(const Side& side);
+  [[nodiscard]] std::vector<Task> twiceAsMany() const;
+
+  const std::vector<Side>& sides_;
+  LeafRays rays_;
+  std::uint64_t seed_;
+  std::vector<std::uint32_t> receivers_;      ///< leaf values, ascending
+  double stands_for_ = 1.0;                   ///< leaves, for each receiver
+  std::vector<std::uint16_t> count_;          ///< paths of each half, by receiver; empty: none were traced yet
+  std::uint64_t traced_for_ = 0;              ///< which lights
+  bool is_traced_ = false;                    ///< as many as count_ says
+  std::vector<Task> wanted_;                  ///< by refine()
+  std::array<std::vector<Path>, 2> paths_;    ///< by half
+  std::array<std::vector<Lack>, 2> lacking_;  ///< by half and leaf value: mean of the paths; while updating
+  std::array<std::vector<glm::vec3>, 2> correction_;
+  std::vector<float> gain_;               ///< by leaf value: what more paths would lower; while correcting
+  double found_ = 0.0, deviation_ = 0.0;  ///< sum of what varies, and its standard deviation
+  double left_ = 0.0, noise_ = 0.0, unknown_ = 0.0, doubtful_ = 0.0;
+};
+
+}  // namespace radiosity::solver

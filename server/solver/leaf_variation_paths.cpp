@@ -1,0 +1,186 @@
+// The paths of LeafVariation: where they go, and what is lacking by them.
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
+
+#include "common/parallel.h"
+#include "server/solver/leaf_variation.h"
+#include "server/solver/polygon_form_factor.h"
+#include "server/solver/sampling.h"
+#include "server/solver/unshot_pyramid.h"
+
+namespace radiosity::solver {
+namespace {
+
+/// From farther away than so many widths of a leaf its light might as well be even: what sees all of it sees all parts
+/// alike.
+constexpr double kNear = 4.0;
+/// Nearer to a lamp's plane than this (unit box) is on it.
+constexpr double kOnLamp = 1e-6;
+/// Light from directions without an end comes from there.
+constexpr double kFar = 4.0;
+/// Fewer tasks than these are not worth a thread.
+constexpr std::size_t kTasksAShare = 256;
+
+using Kind = PunctualLights::Source::Kind;
+
+/// Form factor of the whole lamp.
+double unhiddenLight(const LightPolygon& lamp, const LeafRays::Place& place) {
+  if (glm::dot(place.position - glm::dvec3(lamp.corners[0]), glm::dvec3(lamp.normal)) <= kOnLamp) return 0.0;
+  return polygonFormFactor(place.position, place.normal, std::span(lamp.corners.data(), lamp.corner_count));
+}
+
+/// The way to a source.
+glm::dvec3 wayTo(const PunctualLights::Source& source, const LeafRays::Place& place) {
+  if (source.kind == Kind::kDirectional) return kFar * glm::dvec3(source.direction);
+  return glm::dvec3(source.position) - place.position;
+}
+
+/// Irradiance for an intensity of one; of the sky none, since paths see that where they end.
+double unhiddenSource(const PunctualLights::Source& source, const LeafRays::Place& place) {
+  if (source.kind == Kind::kSky) return 0.0;
+  const glm::dvec3 way = wayTo(source, place), axis(source.direction);
+  const double distance = glm::length(way), cosine = distance > 0.0 ? glm::dot(place.normal, way) / distance : 0.0;
+  if (cosine <= 0.0 || source.kind == Kind::kDirectional) return std::max(0.0, cosine);
+  double strength = 1.0;
+  if (source.kind == Kind::kSpot) {
+    const double fade = std::clamp(-glm::dot(axis, way) / distance * static_cast<double>(source.cone_scale) +
+                                       static_cast<double>(source.cone_offset),
+                                   0.0, 1.0);
+    strength = fade * fade;
+  }
+  if (source.range > 0.0F)
+    strength *= std::clamp(1.0 - std::pow(distance / static_cast<double>(source.range), 4.0), 0.0, 1.0);
+  return strength * cosine / (distance * distance);
+}
+
+glm::vec3 skyRadiosity(bool above, std::span<const PunctualLights::Source> sources) {
+  glm::dvec3 sum(0.0);
+  for (const auto& source : sources) {
+    if (source.kind == Kind::kSky && (source.direction.y > 0.0F) == above) sum += std::numbers::pi * source.intensity;
+  }
+  return glm::vec3(sum);
+}
+
+}  // namespace
+
+/// By how strong lights are nothing is chosen: their light may change, and the paths stay.
+template <typename Unhidden>
+LeafVariation::Drawn LeafVariation::draw(std::size_t count, std::uint64_t key, const Unhidden& unhidden) {
+  Drawn drawn;
+  double all = 0.0;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const std::array<double, 2> here = unhidden(i);
+    const double worth = here[0] + here[1];
+    if (worth <= 0.0) continue;
+    all += worth;
+    if (uniformFromKey(mixKeys(key, i)) * all < worth) drawn = {i, here, worth};  // a reservoir of one
+  }
+  drawn.chance = all > 0.0 ? drawn.chance / all : 0.0;
+  return drawn;
+}
+
+void LeafVariation::followLight(const std::array<Place, 2>& places, std::uint64_t key, const LeafLight& light,
+                                Path& path) const {
+  const auto drawn = draw(light.lights.size(), key, [&](std::uint32_t i) -> std::array<double, 2> {
+    const auto& lamp = light.lights[i];
+    if (lamp.emission == glm::vec3(0.0F)) return {0.0, 0.0};
+    return {unhiddenLight(lamp, places[0]), unhiddenLight(lamp, places[1])};
+  });
+  if (drawn.chance <= 0.0) return;
+  const glm::dvec4 at = sobol4(0, key);
+  const glm::dvec3 point(light.lights[drawn.index].point(at.x, at.y));
+  double factor = 0.0;
+  for (std::size_t p = 0; p < 2; ++p) {
+    if (drawn.unhidden[p] > 0.0 && rays_.isOpen(places[p], point)) factor += (p == 0 ? 1.0 : -1.0) * drawn.unhidden[p];
+  }
+  path.light = drawn.index;
+  path.light_factor = static_cast<float>(factor / drawn.chance);
+}
+
+void LeafVariation::followSource(const std::array<Place, 2>& places, std::uint64_t key, const LeafLight& light,
+                                 Path& path) const {
+  const auto drawn = draw(light.sources.size(), key, [&](std::uint32_t i) -> std::array<double, 2> {
+    const auto& source = light.sources[i];
+    if (source.intensity == glm::dvec3(0.0)) return {0.0, 0.0};
+    return {unhiddenSource(source, places[0]), unhiddenSource(source, places[1])};
+  });
+  if (drawn.chance <= 0.0) return;
+  double factor = 0.0;
+  for (std::size_t p = 0; p < 2; ++p) {
+    const auto to = places[p].position + wayTo(light.sources[drawn.index], places[p]);
+    if (drawn.unhidden[p] > 0.0 && rays_.isOpen(places[p], to)) factor += (p == 0 ? 1.0 : -1.0) * drawn.unhidden[p];
+  }
+  path.source = drawn.index;
+  path.source_factor = static_cast<float>(factor / drawn.chance);
+}
+
+bool LeafVariation::isNear(const LeafRays::Sight& sight) const {
+  return sight.end.value < LeafRays::kSkyBelow && sight.distance <= kNear * rays_.widthOf(sight.end.value);
+}
+
+/// False: no leaf is near that way, or it makes no difference.
+bool LeafVariation::follow(const Place& from, std::uint64_t key, const LeafLight& light, Path& path) const {
+  const glm::dvec4 first = sobol4(0, mixKeys(key, 1)), second = sobol4(0, mixKeys(key, 2));
+  const auto sight = rays_.look(from, cosineDirection(from.normal, first.x, first.y), kNear * rays_.greatestWidth());
+  path.by = sight.end.value;
+  if (!isNear(sight)) return false;
+  const std::array<Place, 2> places{sight.end, rays_.placeOn(path.by, {first.z, first.w})};
+  for (std::size_t p = 0; p < 2; ++p) {
+    const auto seen = rays_.look(places[p], cosineDirection(places[p].normal, second.x, second.y));
+    path.seen[p] = seen.end.value;
+    path.sees_near = path.sees_near || isNear(seen);
+  }
+  followLight(places, mixKeys(key, 3), light, path);
+  followSource(places, mixKeys(key, 4), light, path);
+  return path.seen[0] != path.seen[1] || path.light_factor != 0.0F || path.source_factor != 0.0F;
+}
+
+void LeafVariation::follow(const Task& task, std::size_t half, const LeafLight& light, std::vector<Path>& paths) const {
+  const Side& side = rays_.sideOf(task.receiver);
+  const auto leaf_key = mixKeys(mixKeys(seed_, side.key), task.receiver - side.first_value);
+  for (auto k = task.first; k < task.end; ++k) {
+    const auto key = mixKeys(leaf_key, 2 * std::uint64_t{k} + half);
+    const glm::dvec4 at = sobol4(0, key);
+    Path path;
+    path.receiver = task.receiver;
+    if (follow(rays_.placeOn(task.receiver, {at.x, at.y}), key, light, path)) paths.push_back(path);
+  }
+}
+
+/// The order of paths, and so the bits of their sums, does not depend on how many threads share them.
+void LeafVariation::trace(std::span<const Task> tasks, const LeafLight& light) {
+  std::vector<std::array<std::vector<Path>, 2>> found;
+  const std::size_t shares = std::max<std::size_t>(1, tasks.size() / kTasksAShare);
+  found.resize(shares);
+  inShares(shares, [&](std::size_t first, std::size_t apart) {
+    for (auto share = first; share < shares; share += apart) {
+      for (auto i = share * tasks.size() / shares; i < (share + 1) * tasks.size() / shares; ++i) {
+        for (std::size_t half = 0; half < 2; ++half) follow(tasks[i], half, light, found[share][half]);
+      }
+    }
+  });
+  for (const auto& share : found) {
+    for (std::size_t half = 0; half < 2; ++half)
+      paths_[half].insert(paths_[half].end(), share[half].begin(), share[half].end());
+  }
+}
+
+/// By one path, times the paths of the receiver.
+LeafVariation::Lack LeafVariation::lacking(const Path& path, const LeafLight& light, std::size_t half) const {
+  const auto radiosity = [&](std::uint32_t value) {
+    if (value == LeafRays::kNothing) return glm::vec3(0.0F);
+    if (value >= LeafRays::kSkyBelow) return skyRadiosity(value == LeafRays::kSkyAbove, light.sources);
+    return light.reflectance[value] * light.irradiance[half][value] + light.emission[value];
+  };
+  glm::vec3 direct(0.0F);
+  if (path.light_factor != 0.0F) direct += path.light_factor * light.lights[path.light].emission;
+  if (path.source_factor != 0.0F) direct += path.source_factor * glm::vec3(light.sources[path.source].intensity);
+  const glm::vec3 reflected = radiosity(path.seen[0]) - radiosity(path.seen[1]);
+  const glm::vec3 by = light.reflectance[path.by];
+  if (path.sees_near) return {by * direct, by * reflected};
+  return {by * (direct + reflected), glm::vec3(0.0F)};
+}
+
+}  // namespace radiosity::solver

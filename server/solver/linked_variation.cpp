@@ -1,0 +1,74 @@
+// LinkedSolver and the light that varies within leaves, of which its links know nothing.
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "server/solver/linked_solver.h"
+
+namespace radiosity::solver {
+namespace {
+
+/// It is asked for when all else is at most so many times the target, or this.
+constexpr double kSoon = 3.0, kLittle = 0.1;
+/// What is less than this part of the target is not looked into further: it adds a twentieth to the total.
+constexpr double kNegligible = 0.3;
+/// More paths are traced, and not more links measured, where what they would tell is so much of the square of the
+/// error.
+constexpr double kByPaths = 0.35;
+/// What varies within leaves may take this much of the target and still leave links something to reach.
+constexpr double kLeastByLinks = 0.5;
+
+}  // namespace
+
+bool LinkedSolver::wantsVariation() const {
+  if (variation_ || growing_ || error_.total > std::max(kSoon * settings_.target_error, kLittle)) return false;
+  return std::ranges::none_of(patches_->surfaces, [](const scene::Surface& surface) { return surface.see_through; });
+}
+
+/// For the light that leaves have now.
+void LinkedSolver::updateVariation() {
+  std::vector<glm::vec3> emission = system_.emission();
+  double square = 0.0;
+  for (const auto& side : sides_) {
+    if (side.gathered) std::fill_n(emission.begin() + side.first_value, side.leaf_count, glm::vec3(0.0F));
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+      const glm::dvec3 irradiance(irradiance_[side.first_node + leaf]);
+      square += static_cast<double>(patches_->node_area[side.first_node + leaf]) * glm::dot(irradiance, irradiance);
+    }
+  }
+  square_ = square;
+  const double bound = kNegligible * settings_.target_error;
+  variation_->update({emission, system_.reflectance(), {half_[0], half_[1]}, lights_, sources_},
+                     bound * bound * square);
+  corrected_.clear();
+  if (!variation_->corrects()) return;
+  corrected_ = irradiance_;
+  for (const auto& side : sides_) {
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+      const auto v = side.first_value + leaf;
+      auto& corrected = corrected_[side.first_node + leaf];
+      const auto lacking = 0.5F * (variation_->correction(0)[v] + variation_->correction(1)[v]);
+      corrected = glm::max(corrected + lacking, glm::vec3(0.0F));  // by noise it might be less
+    }
+  }
+}
+
+/// What is to be reached by links, beside what varies within leaves.
+double LinkedSolver::targetOfLinks() const {
+  const double noise = error_.sampling * error_.sampling - by_links_ * by_links_;
+  const double rest = settings_.target_error * settings_.target_error - noise - error_.variation * error_.variation;
+  return std::max(std::sqrt(std::max(0.0, rest)), kLeastByLinks * settings_.target_error);
+}
+
+/// False: it is links that are wanted more, or more paths help no more.
+bool LinkedSolver::refineVariation() {
+  if (!variation_ || !variation_->corrects()) return false;
+  if (variation_->unsettled() < kByPaths * error_.total * error_.total * square_ || !variation_->refine()) return false;
+  updateVariation();
+  assess();
+  refined_ = true;
+  return true;
+}
+
+}  // namespace radiosity::solver
