@@ -146,7 +146,13 @@ bool LightGatherer::hidden(std::size_t i, const glm::vec3& light, std::span<cons
   if ((lit_.doubt[i] & Receivers::kInGap) != 0) return hiddenFromGap(i, light, items, size);
   // Beside a silhouette one looks past what closes a hollow whose inside is a surface as well.
   if ((lit_.doubt[i] & kHides) == 0) return hiddenAtSilhouette(i, light, items, size);
-  return receivers_->risesBefore(item, {lit_.x[i], lit_.y[i], lit_.z[i]}, {lit_.nx[i], lit_.ny[i], lit_.nz[i]});
+  return couldHide(item, i, light);
+}
+
+/// An item behind whose plane, seen from the light, a receiver lies.
+bool LightGatherer::couldHide(std::uint32_t item, std::size_t i, const glm::vec3& light) const {
+  const glm::vec3 at(lit_.x[i], lit_.y[i], lit_.z[i]), normal(lit_.nx[i], lit_.ny[i], lit_.nz[i]);
+  return receivers_->risesBefore(item, at, normal) && receivers_->liesBefore(item, at, light - at);
 }
 
 /// The receiver's pixel and those around it, on the same face.
@@ -193,8 +199,7 @@ bool LightGatherer::hiddenFromGap(std::size_t i, const glm::vec3& light, std::sp
     const auto hidden = receivers_->hiddenAmong(around, rayTo(i, light, size));
     if (hidden) return *hidden;
   }
-  return (lit_.doubt[i] & kHides) != 0 &&
-         receivers_->risesBefore(own, {lit_.x[i], lit_.y[i], lit_.z[i]}, {lit_.nx[i], lit_.ny[i], lit_.nz[i]});
+  return (lit_.doubt[i] & kHides) != 0 && couldHide(own, i, light);
 }
 
 void LightGatherer::weighLost(const solver::HemicubeFrame& point, std::span<const std::uint32_t> items,

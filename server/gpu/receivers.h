@@ -111,6 +111,13 @@ class Receivers {
     return false;
   }
 
+  /// Whether a part of the triangle is nearer to the light than a receiver is. What is wholly farther away cannot hide
+  /// the light from it, although a pixel beside a silhouette may show it, and its plane lie between the two: the chair
+  /// behind a thin leg.
+  [[nodiscard]] bool liesBefore(std::uint32_t triangle, const glm::vec3& point, const glm::vec3& way) const {
+    return risesBefore(triangle, point, glm::normalize(way));
+  }
+
   /// A receiving point, and the way from it to the light.
   struct Ray {
     glm::vec3 at, normal;
@@ -155,7 +162,8 @@ class Receivers {
     const float height = plane.height(ray.at);
     const float rise = glm::dot(plane.normal, ray.way) * ray.reach;  // from the receiver to the light
     const bool light_above = height + rise > 0.0F;
-    return (light_above ? height : -height) < -kInPlane && risesBefore(item, ray.at, ray.normal);
+    return (light_above ? height : -height) < -kInPlane && risesBefore(item, ray.at, ray.normal) &&
+           liesBefore(item, ray.at, ray.way);
   }
   [[nodiscard]] bool wide(std::uint32_t item, const Ray& ray) const;
   /// What the ray finds of the item's facet; kChance: a place of partial opacity.
