@@ -49,13 +49,21 @@ Result<std::unique_ptr<LitScene>> LitScene::make(scene::EditedDocument edited, c
   return lit;
 }
 
-LitScene::Affected LitScene::succeed(const LitScene& former) {
-  const auto before = former.patches_->surfaces.size();
+/// Nothing where all was laid out anew.
+std::optional<scene::PatchMap> LitScene::mapFrom(const LitScene& former) const {
   const bool related = former.patches_->centre == patches_->centre && former.patches_->scale == patches_->scale &&
                        former.patches_->texel == patches_->texel;
-  if (!related) return {std::max(patches_->surfaces.size(), before), former.solver_->shots()};
-  former_map_ = scene::matchPatches(*former.scene_, *former.patches_, *scene_, *patches_);
-  return {touchedSurfaces(before, *former_map_), former.solver_->shots()};
+  if (!related) return std::nullopt;
+  return scene::matchPatches(*former.scene_, *former.patches_, *scene_, *patches_);
+}
+
+LitScene::Affected LitScene::succeed(const LitScene& former) {
+  former_map_ = mapFrom(former);
+  return {touchedSurfaces(former.patches_->surfaces.size(), former_map_), former.solver_->shots()};
+}
+
+std::uint64_t LitScene::surfacesTouchedSince(const LitScene& former) const {
+  return touchedSurfaces(former.patches_->surfaces.size(), mapFrom(former));
 }
 
 bool LitScene::keepsLayoutOf(const LitScene& former) const {
@@ -69,21 +77,24 @@ bool LitScene::keepsLayoutOf(const LitScene& former) const {
          onlyNodesMoved(*former.scene_, *scene_);
 }
 
-std::uint64_t LitScene::startSolve(LitScene* former) {
-  const auto map = std::exchange(former_map_, std::nullopt);
-  if (former == nullptr || !map || map->nothingKept()) {
+std::uint64_t LitScene::startSolve(LitScene* former, bool keep_former) {
+  if (former == nullptr || !former_map_ || former_map_->nothingKept()) {
     makeSolver();
+    former_map_.reset();
     return former == nullptr ? 0 : former->solver_->shots();
   }
   const auto shots_before = former->solver_->shots();
-  const solver::FormerSolver before{*former->solver_, *map};
+  const solver::FormerSolver before{*former->solver_, *former_map_, keep_former};
   makeSolver(&before);
+  former_map_.reset();
   const bool keeps = solver_->linkCounters().kept + solver_->affectedSamples() > 0;
   return keeps ? solver_->affectedSamples() : shots_before;
 }
 
 /// Those that are new, or gone, or elsewhere, and those of which more or less is left.
-std::uint64_t LitScene::touchedSurfaces(std::size_t before, const scene::PatchMap& map) const {
+std::uint64_t LitScene::touchedSurfaces(std::size_t before, const std::optional<scene::PatchMap>& matched) const {
+  if (!matched) return std::max(patches_->surfaces.size(), before);
+  const auto& map = *matched;
   std::uint64_t touched = 0, found = 0;
   for (std::size_t s = 0; s < patches_->surfaces.size(); ++s) {
     const auto& surface = patches_->surfaces[s];

@@ -50,9 +50,12 @@ class LitScene {
     std::uint64_t surfaces = 0, shots = 0;
   };
   [[nodiscard]] Affected succeed(const LitScene& former);
+  /// Surfaces that differ between `former` and this scene, one of which is an edit of the other.
+  [[nodiscard]] std::uint64_t surfacesTouchedSince(const LitScene& former) const;
   /// Prepares the solve; must come after upload(). What stays of the links of `former`, after succeed(), is taken from
-  /// it: its solver is of no use afterwards. Returns the shots that are to be taken again.
-  std::uint64_t startSolve(LitScene* former = nullptr);
+  /// it: its solver is of no use afterwards, unless it is to be kept, which takes the memory of both. Returns the shots
+  /// that are to be taken again. May be called again where it threw and the former is whole.
+  std::uint64_t startSolve(LitScene* former = nullptr, bool keep_former = false);
 
   /// Surfaces that a change to `next` would touch; all of them where it changes geometry or lights.
   [[nodiscard]] std::uint64_t affectedBy(const SceneChange& change, const scene::Scene& next) const;
@@ -121,7 +124,8 @@ class LitScene {
   void makeSolver(const solver::FormerSolver* former = nullptr);
   void updateSolver(bool materials, bool lights);
   [[nodiscard]] std::vector<scene::LightmapPage> directPages() const;
-  [[nodiscard]] std::uint64_t touchedSurfaces(std::size_t before, const scene::PatchMap& map) const;
+  [[nodiscard]] std::optional<scene::PatchMap> mapFrom(const LitScene& former) const;
+  [[nodiscard]] std::uint64_t touchedSurfaces(std::size_t before, const std::optional<scene::PatchMap>& matched) const;
   [[nodiscard]] double emittedPower() const;
   [[nodiscard]] solver::LightSources lightSources(const scene::Scene& scene) const;
 

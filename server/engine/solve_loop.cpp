@@ -84,6 +84,7 @@ void SolveLoop::threadMain(std::promise<Result<void>> started) {
   }
   checkpoints_.reset();
   first_light_.reset();
+  former_.reset();
   lit_.reset();
   view_.reset();
   const std::scoped_lock lock(mutex_);
@@ -92,7 +93,7 @@ void SolveLoop::threadMain(std::promise<Result<void>> started) {
 
 /// Sleeps while there is nothing to solve, then does all commands that are due. False: the engine is being destroyed.
 bool SolveLoop::runCommands() {
-  waiting_ = first_light_ ? !first_light_->goes_on : state_ != SolveState::kSolving;
+  waiting_ = first_light_ ? !first_light_->goes_on : state_ != SolveState::kSolving && !isBehind();
   const auto due = queue_.take(waiting_);
   beat();
   waiting_ = false;
@@ -117,8 +118,11 @@ void SolveLoop::takeTurn() {
       firstLightSlice();
     else if (state_ == SolveState::kSolving)
       solveSlice();
+    else if (isBehind())
+      catchUp();
     checkpointIfDue();
   } catch (const std::bad_alloc&) {
+    if (std::exchange(former_, nullptr)) return log::warn("out of memory: the scene before the last edit is forgotten");
     if (first_light_) {  // the whole may still be had
       first_light_->goes_on = unpublished_ = false;
       log::warn("out of memory: the first light stays as it is");
@@ -141,7 +145,9 @@ void SolveLoop::solveSlice() {
   seconds_ += std::chrono::duration<double>(Clock::now() - begin).count();
   if (queue_.closed()) return;  // nobody is left to be told
   tellLosses();
+  if (former_ && !holdsBoth()) former_.reset();
   if (!outcome) {
+    if (outcome.error().code == ErrorCode::kTooLarge && std::exchange(former_, nullptr)) return lit_->invalidate();
     if (willRecover(outcome.error())) return;
     failure_ = outcome.error().text();
     log::error("solve stopped: {}", failure_);
@@ -170,6 +176,24 @@ void SolveLoop::solveSlice() {
     if (Clock::now() >= next_publish_) publishLightmaps(false);
     tellProgress(true);
   }
+}
+
+bool SolveLoop::isBehind() const {
+  return state_ == SolveState::kConverged && lit_ && !lit_->isStale() && lit_->solver().isBehind();
+}
+
+/// Takes no solve time, and says nothing before it is done: what is shown is solved.
+void SolveLoop::catchUp() {
+  const auto outcome = lit_->solver().step();
+  if (queue_.closed()) return;
+  tellLosses();
+  if (outcome && *outcome == solver::StepOutcome::kSlice) return;
+  unpublished_ = true;
+  if (outcome && *outcome == solver::StepOutcome::kConverged) return endSolve(SolveState::kConverged);
+  // With all links it is not solved after all, or no renderer is left: the next slice goes on, or finds out.
+  if (!outcome) lit_->invalidate();
+  state_ = SolveState::kSolving;
+  updateStatus(true);
 }
 
 void SolveLoop::tellProgress(bool assess) {
@@ -220,6 +244,7 @@ void SolveLoop::updateStatus(bool announce) {
     const auto& tiles = publisher_.tileCounters();
     status.counters["tiles.changed"] = static_cast<double>(tiles.changed);
     status.counters["skip.tilesUnchanged"] = static_cast<double>(tiles.unchanged);
+    status.counters["skip.solvesReturned"] = static_cast<double>(went_back_);
     status.counters["skip.publicationsUnwatched"] = static_cast<double>(unwatched_);
     if (checkpoints_) {
       const auto written = checkpoints_->counters();

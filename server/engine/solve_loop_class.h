@@ -94,6 +94,9 @@ class SolveLoop final : public Engine {
   [[nodiscard]] bool runCommands();
   void takeTurn();  ///< what is done between commands
   void solveSlice();
+  /// Solved and told; what was left for later since it matters little is done between commands.
+  [[nodiscard]] bool isBehind() const;
+  void catchUp();
   void tellProgress(bool assess);  ///< not oftener than anyone can see; `assess`: with a new error
   /// The clock starts over: another scene, another seed, an edit. A paused solve stays paused.
   void beginSolve();
@@ -148,14 +151,19 @@ class SolveLoop final : public Engine {
   /// for both; else it is solved anew; where there is no memory for that either, no scene is there and the solve has
   /// failed. Returns the shots that are to be taken again.
   [[nodiscard]] std::uint64_t takeLinks(std::unique_ptr<LitScene> made);
-  void putBack();  ///< the present scene, after another was tried
+  /// The same for an edit that leads back to the geometry of `former_`: that one and its solve are the present ones
+  /// again, with what `change` says of light and colour, and nothing is measured.
+  [[nodiscard]] Result<PatchOutcome> goBack(scene::EditedDocument edited, const SceneChange& change, const Keep& keep);
+  /// Solved, small beside the machine, and with room for as much again in the memory for links.
+  [[nodiscard]] bool isWorthKeeping(const LitScene& lit) const;
+  [[nodiscard]] bool holdsBoth() const;  ///< the memory for links those of `lit_` and of `former_`
+  void putBack();                        ///< the present scene, after another was tried
   [[nodiscard]] Result<void> checkBase(const std::optional<std::uint64_t>& base_revision) const;
   [[nodiscard]] Result<PatchOutcome> applyRequest(const PatchRequest& request);
   [[nodiscard]] Result<PatchOutcome> applyStep(const StepRequest& request);
   /// Makes the edited scene the present one; raises no revision and tells nobody yet.
   [[nodiscard]] Result<PatchOutcome> adopt(scene::EditedDocument edited, const Keep& keep);
-  template <typename Tell>
-  bool takeInLight(const Tell& tell);
+  [[nodiscard]] bool takeInLight(const std::function<bool()>& tell);
   [[nodiscard]] Result<PatchOutcome> rebuild(scene::EditedDocument edited, const Keep& keep);
   /// Tells everyone of the new revision and solves on.
   void announceEdit(const PatchOutcome& outcome, const std::string& patch, const std::string& by);
@@ -196,6 +204,7 @@ class SolveLoop final : public Engine {
   std::unique_ptr<solver::Transport> transport_;  // made and ended under mutex_: the destructor interrupts it
   std::unique_ptr<gpu::ViewRenderer> view_;
   std::unique_ptr<LitScene> lit_;
+  std::unique_ptr<LitScene> former_;       // before the last edit of geometry, solved, for the way back; null: not kept
   std::optional<FirstLight> first_light_;  // then lit_ is made of a few texels, in no history and on no disk
   Publisher publisher_;
   History history_;
@@ -222,7 +231,8 @@ class SolveLoop final : public Engine {
   std::optional<state::Answer> kept_answer_;                      // of the edit under way
   bool as_restored_ = false;                                      // the scene is that one; no edit, no load since
   std::uint64_t resumed_shots_ = 0;
-  Past past_;  // constant once start() has returned
+  std::uint64_t went_back_ = 0;  // edits that led back to a solve that was kept
+  Past past_;                    // constant once start() has returned
 
   mutable std::mutex mutex_;  // for the two that any thread may read, and transport_ coming and going
   Status status_;

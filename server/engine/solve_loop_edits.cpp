@@ -26,6 +26,7 @@ Result<LitScene::Affected> SolveLoop::relight(Result<std::unique_ptr<LitScene>> 
   if (!keeps_layout) publisher_.reset();
   renderer_lost_ = false;  // it took the scene
   if (starts && measured != nullptr) return LitScene::Affected{affected->surfaces, takeLinks(std::move(*made))};
+  former_.reset();
   lit_ = std::move(*made);
   return affected;
 }
@@ -46,6 +47,11 @@ Result<LitScene::Affected> SolveLoop::tryOut(LitScene& made, LitScene* former, b
 
 std::uint64_t SolveLoop::takeLinks(std::unique_ptr<LitScene> made) {
   std::uint64_t shots = 0;
+  former_.reset();
+  if (isWorthKeeping(*lit_) && fitsMemory([&] { shots = made->startSolve(lit_.get(), true); })) {
+    former_ = std::exchange(lit_, std::move(made));
+    return shots;
+  }
   if (fitsMemory([&] { shots = made->startSolve(lit_.get()); })) {
     lit_ = std::move(made);
     return shots;
@@ -137,8 +143,7 @@ Result<PatchOutcome> SolveLoop::applyStep(const StepRequest& request) {
 
 /// `tell` tells the solver of other light or materials; it returns whether that changes the light. What is told is on
 /// the disk: where memory runs out the solve starts over, now or with its next slice, and false is returned.
-template <typename Tell>
-bool SolveLoop::takeInLight(const Tell& tell) {
+bool SolveLoop::takeInLight(const std::function<bool()>& tell) {
   const bool told = fitsMemory([&] {
     if (!tell()) return;
     // The light of the wave that failed is counted as shot but arrived nowhere.
@@ -178,6 +183,10 @@ Result<PatchOutcome> SolveLoop::adopt(scene::EditedDocument edited, const Keep& 
 }
 
 Result<PatchOutcome> SolveLoop::rebuild(scene::EditedDocument edited, const Keep& keep) {
+  if (former_) {
+    const auto change = former_->changeTo(edited.scene);
+    if (!change.geometry) return goBack(std::move(edited), change, keep);
+  }
   PatchOutcome outcome;
   outcome.revision = revision_ + 1;
   const auto set = [&](const LitScene::Affected& affected) {
@@ -250,6 +259,7 @@ Result<SolveSettings> SolveLoop::applySettings(const SolveSettings& settings) {
 
 /// They are kept: nothing can be refused any more.
 void SolveLoop::takeSettings(const SolveSettings& before, bool resized, bool anew) {
+  former_.reset();                       // its solve is one by other settings
   if (!lit_) return updateStatus(true);  // they wait for a scene
   if (resized) {
     beginSolve();

@@ -189,6 +189,7 @@ void SolveLoop::endFirstLight() {
 /// The whole of a scene cannot be had whose first light was shown: nothing is there, as before.
 void SolveLoop::unload(SolveState state) {
   first_light_.reset();
+  former_.reset();
   lit_.reset();
   as_restored_ = false;
   state_ = state;

@@ -60,6 +60,7 @@ void addCounters(const LitScene& lit, Status& status) {
     counters["skip.shotsKept"] = static_cast<double>(links.kept);
     counters["edits.shotsRepaired"] = static_cast<double>(links.repaired);
     counters["edits.linksRepaired"] = static_cast<double>(links.repaired_links);
+    counters["edits.samplesWaiting"] = static_cast<double>(links.waiting);
     counters["edits.shotsRetaken"] = static_cast<double>(links.retaken);
     counters["skip.shotsReplayed"] = static_cast<double>(links.replayed);
     counters["skip.rowsOfChannels"] = static_cast<double>(links.rows_saved);

@@ -202,6 +202,36 @@ void Bvh::collectHits(const glm::dvec3& origin, const glm::dvec3& direction, dou
   }
 }
 
+/// A ray from the middle of the box, past what is larger by half the box on all sides. Triangles seen edge-on count as
+/// turned either way.
+bool Bvh::mayMeetBack(const glm::vec3& box_min, const glm::vec3& box_max, const glm::dvec3& direction,
+                      double t_max) const {
+  if (triangles_.empty()) return false;
+  constexpr double kEdgeOn = 1e-6;
+  const SlabRay ray(0.5 * (glm::dvec3(box_min) + glm::dvec3(box_max)), direction, 0.0, t_max);
+  const glm::vec3 half = 0.5F * (box_max - box_min) + SlabRay::kGrowth;
+  const double length = glm::length(direction);
+  std::array<std::uint32_t, kStackDepth> stack;
+  std::size_t depth = 0;
+  stack[depth++] = 0;
+  while (depth > 0) {
+    const Node& node = nodes_[stack[--depth]];
+    if (!ray.meets(node.min - half, node.max + half)) continue;
+    if (node.count == 0) {
+      stack[depth++] = node.first;
+      stack[depth++] = node.first + 1;
+      continue;
+    }
+    for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
+      const auto& [a, b, c] = triangles_[order_[i]];
+      const glm::dvec3 normal = glm::cross(glm::dvec3(b) - glm::dvec3(a), glm::dvec3(c) - glm::dvec3(a));
+      if (glm::dot(direction, normal) < -kEdgeOn * length * glm::length(normal)) continue;
+      if (ray.meets(glm::min(glm::min(a, b), c) - half, glm::max(glm::max(a, b), c) + half)) return true;
+    }
+  }
+  return false;
+}
+
 std::optional<RayHit> Bvh::nearestHit(const glm::dvec3& origin, const glm::dvec3& direction, double t_min,
                                       double t_max) const {
   if (triangles_.empty()) return std::nullopt;

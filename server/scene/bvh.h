@@ -30,6 +30,11 @@ class Bvh {
   void collectHits(const glm::dvec3& origin, const glm::dvec3& direction, double t_min, double t_max,
                    std::vector<RayHit>& hits) const;
 
+  /// False: no ray in this direction from anywhere in the box meets the back of a triangle (RayHit::front) with t in
+  /// (0, t_max). True: one might.
+  [[nodiscard]] bool mayMeetBack(const glm::vec3& box_min, const glm::vec3& box_max, const glm::dvec3& direction,
+                                 double t_max) const;
+
   /// The hit with the least t in (t_min, t_max), or none.
   [[nodiscard]] std::optional<RayHit> nearestHit(const glm::dvec3& origin, const glm::dvec3& direction, double t_min,
                                                  double t_max) const;

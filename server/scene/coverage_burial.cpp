@@ -204,12 +204,33 @@ class Burial {
     }
   }
 
+  /// All of the leaf is visible, as one look from all of it at once shows: most are, beside the few that a solid
+  /// covers.
+  [[nodiscard]] bool isOpen(const Contact& contact, std::size_t first_piece, std::size_t end_piece) const {
+    if (contact.side == 0 && coincidence_.isCovered(contact.surface)) return false;
+    const auto triangle = patches_.leaves[leafOf(contact)].triangle;
+    const auto normal = facing(triangle, contact.side);
+    const glm::dvec2 corner(contact.x, contact.y);
+    Bounds box;
+    const auto add = [&](std::uint32_t of) {
+      for (const auto& at : {corner, corner + glm::dvec2(1, 0), corner + glm::dvec2(0, 1), corner + 1.0})
+        box.add(positionAt(patches_.triangles[of], at));
+      return facing(of, contact.side) == normal;
+    };
+    if (!add(triangle)) return false;
+    for (auto piece = first_piece; piece < end_piece; ++piece) {
+      if (!add(pieces_[piece].triangle)) return false;
+    }
+    return !solids_.mayBury(box, normal);
+  }
+
   /// Visible area of one leaf and side from `count` samples; none where all of it is visible.
   [[nodiscard]] std::optional<Measured> measure(const Contact& contact, std::uint32_t count, Scratch& scratch) const {
     const std::uint32_t leaf = leafOf(contact);
     const LeafPoint point = patches_.leaves[leaf];
     const std::size_t first = first_piece_[leaf], end = first_piece_[leaf + 1];
     const glm::dvec2 corner(contact.x, contact.y);
+    if (isOpen(contact, first, end)) return std::nullopt;
     auto& parts = scratch.parts;
     parts.assign(std::max<std::size_t>(1, end - first), Part{});
     LeafPoint visible;

@@ -16,6 +16,8 @@ constexpr double kLift = 2e-5;
 /// Rays along a surface rise by this part of their length: through any gap that is wider than a thousandth of its
 /// depth.
 constexpr double kGrazing = 2e-4;
+/// Rays end well outside of the unit box.
+constexpr double kLongest = 8.0;
 /// So many places of a leaf are looked at for what covers it.
 constexpr std::uint32_t kPlaces = 16;
 
@@ -27,6 +29,13 @@ Frame frameAbout(const glm::vec3& normal) {
   const glm::dvec3 reference = std::abs(n.x) < 0.8 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
   const glm::dvec3 u = glm::normalize(glm::cross(reference, n));
   return {n, u, glm::cross(n, u)};
+}
+
+/// Of rays; one that does not leave a solid decides. An irrational-looking angle, so that none runs along modelled
+/// edges.
+glm::dvec3 firstWay(const glm::vec3& normal) {
+  const auto [n, u, v] = frameAbout(normal);
+  return n + 0.0713 * u + 0.0427 * v;
 }
 
 /// Of a position in the triangle's plane.
@@ -63,10 +72,14 @@ bool Solids::buries(const glm::vec3& position, const glm::vec3& normal, Hits& hi
   return raysLeave(origin, normal, hits) && !seesOutAlong(origin, normal, hits);
 }
 
+bool Solids::mayBury(const Bounds& positions, const glm::vec3& normal) const {
+  const glm::vec3 lift = static_cast<float>(kLift) * normal;
+  return tree_.mayMeetBack(positions.min + lift, positions.max + lift, firstWay(normal), kLongest);
+}
+
 bool Solids::raysLeave(const glm::dvec3& origin, const glm::vec3& normal, Hits& hits) const {
   const auto [n, u, v] = frameAbout(normal);
-  // irrational-looking angles, so that no ray runs along modelled edges
-  if (!leavesSolid(origin, n + 0.0713 * u + 0.0427 * v, hits)) return false;
+  if (!leavesSolid(origin, firstWay(normal), hits)) return false;
   for (int i = 0; i < 5; ++i) {
     const double angle = 0.3217 + 2.0 * M_PI * i / 5.0;
     if (!leavesSolid(origin, 0.6 * n + 0.8 * (std::cos(angle) * u + std::sin(angle) * v), hits)) return false;
@@ -94,7 +107,7 @@ bool Solids::seesOutAlong(const glm::dvec3& origin, const glm::vec3& normal, Hit
 /// was inside. Leaves what it met in `hits`, in order.
 bool Solids::leavesSolid(const glm::dvec3& origin, const glm::dvec3& direction, Hits& hits) const {
   hits.clear();
-  tree_.collectHits(origin, direction, 0.0, 8.0, hits);
+  tree_.collectHits(origin, direction, 0.0, kLongest, hits);
   std::ranges::sort(hits, [](const RayHit& a, const RayHit& b) { return a.t < b.t; });
   int depth = 0;
   double last = -1.0;

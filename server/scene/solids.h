@@ -38,6 +38,9 @@ class Solids {
   /// a panel that hangs before a wall, whose back hides the wall from nearly everywhere: one sees out along the wall.
   [[nodiscard]] bool buries(const glm::vec3& position, const glm::vec3& normal, Hits& hits) const;
 
+  /// False: it buries no position in the box, of this normal. True: it may. Costs as much as one that is not buried.
+  [[nodiscard]] bool mayBury(const Bounds& positions, const glm::vec3& normal) const;
+
  private:
   [[nodiscard]] bool raysLeave(const glm::dvec3& origin, const glm::vec3& normal, Hits& hits) const;
   [[nodiscard]] bool seesOutAlong(const glm::dvec3& origin, const glm::vec3& normal, Hits& hits) const;
@@ -58,6 +61,9 @@ class Coincidence {
 
   /// Fills PatchScene::covered, when areas are known.
   void keepCovered();
+
+  /// Whether its front is covered somewhere.
+  [[nodiscard]] bool isCovered(std::uint32_t s) const { return covered_[s]; }
 
   /// Whether the front of `s` is covered there. Only asked of surfaces that are covered somewhere.
   [[nodiscard]] bool covers(std::uint32_t s, const glm::vec3& position, const glm::vec3& normal, Hits& hits) const {

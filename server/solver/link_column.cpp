@@ -308,8 +308,8 @@ void LinkColumn::replace(std::span<const ValueRun> leaves, std::span<const float
   keepFlux(leaf_area);
 }
 
-void LinkColumn::renumber(const std::vector<std::uint32_t>& side_after, const std::vector<Side>& before,
-                          const std::vector<Side>& after) {
+LinkColumn LinkColumn::renumbered(const std::vector<std::uint32_t>& side_after, const std::vector<Side>& before,
+                                  const std::vector<Side>& after) const {
   struct Piece {
     std::uint32_t side, from;  // new number; where its codes are
   };
@@ -336,8 +336,18 @@ void LinkColumn::renumber(const std::vector<std::uint32_t>& side_after, const st
   }
   runs.shrink_to_fit();
   code.shrink_to_fit();
-  runs_ = std::move(runs);
-  code_ = std::move(code);
+  LinkColumn column;
+  column.runs_ = std::move(runs);
+  column.code_ = std::move(code);
+  column.scale_ = scale_;
+  column.gain_ = gain_;
+  column.samples_ = samples_;
+  column.points_ = points_;
+  column.due_ = due_;
+  column.delivered_ = delivered_;
+  column.escaped_ = escaped_;
+  column.absorbed_ = absorbed_;
+  return column;
 }
 
 void LinkColumn::apply(const std::array<float, 3>& radiosity, const std::array<float*, 3>& irradiance) const {

@@ -63,9 +63,9 @@ class LinkColumn {
   void replace(std::span<const ValueRun> leaves, std::span<const float> values, const Totals& totals,
                std::span<const float> leaf_area, const std::vector<Side>& sides);
   /// The same links in a scene whose sides are numbered otherwise, in any order. `side_after`: by old side, kNone: its
-  /// links are dropped, what they delivered is not.
-  void renumber(const std::vector<std::uint32_t>& side_after, const std::vector<Side>& before,
-                const std::vector<Side>& after);
+  /// links are left out, what they delivered is not.
+  [[nodiscard]] LinkColumn renumbered(const std::vector<std::uint32_t>& side_after, const std::vector<Side>& before,
+                                      const std::vector<Side>& after) const;
 
   [[nodiscard]] double points() const { return points_; }
   /// Whether so much of what a shooter of this area sends is lost that a look at some leaves, which does not see all of

@@ -19,7 +19,7 @@ constexpr double kMostKept = 0.99999;
 }  // namespace
 
 void LinkedSolver::assess() {
-  if (repaired_ < repairs_.size()) return;     // nothing is known before all links are true
+  if (isRepairing()) return;                   // nothing is known before all links are true
   if (from_links_ == FromLinks::kAfterEdit) {  // somebody wants to know before the next step
     tryNow([this] {
       do {
@@ -62,6 +62,7 @@ void LinkedSolver::assess() {
   error_.discretization = field.discretization();
   const double varying = std::sqrt(planner_.variation(system_, unshot_, *patches_) / field.square());
   error_.residual = owed / (1.0 - kept) / received + varying + system_.unsolved();
+  error_.residual = std::hypot(error_.residual, missing() / std::sqrt(field.square()));  // of links that wait
   varying_share_ = error_.residual > 0.0 ? varying / error_.residual : 0.0;
   left_out_ = left_out / (1.0 - kept) / received;
   error_.total = std::hypot(error_.residual, error_.sampling);
@@ -97,6 +98,7 @@ LinkCounters LinkedSolver::linkCounters() const {
   counters.repaired = edits_.repaired;
   counters.repaired_links = edits_.repaired_links;
   counters.retaken = edits_.retaken;
+  for (const auto& repair : std::span(repairs_).subspan(repaired_)) counters.waiting += repair.samples;
   std::uint64_t nodes = 0;
   for (const auto& shooter : system_.shooters()) {
     nodes += shooter.isLight() ? 0 : 1;

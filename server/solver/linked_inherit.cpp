@@ -1,8 +1,10 @@
 // LinkedSolver after an edit of geometry: what it takes over from the solver of the scene before.
 #include <algorithm>
 #include <array>
+#include <span>
 #include <utility>
 
+#include "server/solver/halves.h"
 #include "server/solver/linked_solver.h"
 
 namespace radiosity::solver {
@@ -29,10 +31,16 @@ std::uint32_t sideOfLight(const LightPolygon& light, const scene::PatchScene& pa
 
 LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
                            Transport& transport, const SolverSettings& settings, const LightSources& sources,
-                           LinkedSolver& former, const scene::PatchMap& map)
+                           LinkedSolver& former, const scene::PatchMap& map, bool keep_former)
     : LinkedSolver(std::move(patches), transport, settings) {
-  const auto numbers = renumber(former, map);
-  shadows_ = std::make_unique<Shadows>(*patches_, sides_, changeSince(numbers));
+  const auto numbers = renumber(former, map, keep_former);
+  auto change = changeOf(numbers);
+  if (former.isBehind()) {
+    auto all = change;
+    addEarlier(numbers, all);
+    earlier_shadows_ = std::make_unique<Shadows>(*patches_, sides_, std::move(all));
+  }
+  shadows_ = std::make_unique<Shadows>(*patches_, sides_, std::move(change));
   edits_ = former.edits_;
   counters_ = former.counters_;
   rounds_ = former.rounds_;
@@ -45,15 +53,16 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
   takeMaterials(materials);
   takeSources(sources);
   inheritNodes(former, numbers);
-  planRepairs();
+  planRepairs(former.isRepairing() ? 0.0 : former.fieldNorm());
   for (auto& half : half_) half.assign(system_.emission().size(), glm::vec3(0.0F));
   findUnshot();
   solveAnew();
 }
 
 /// Sides that are still there keep their keys; others get keys that no side ever had.
-LinkedSolver::Renumbering LinkedSolver::renumber(LinkedSolver& former, const scene::PatchMap& map) {
-  Renumbering numbers{former, map, {}, {}, {}};
+LinkedSolver::Renumbering LinkedSolver::renumber(const LinkedSolver& former, const scene::PatchMap& map,
+                                                 bool keep_former) {
+  Renumbering numbers{former, map, keep_former, {}, {}, {}};
   numbers.side_after.assign(former.sides_.size(), scene::kNone);
   numbers.unmoved_after = numbers.side_after;
   const auto first_sides = firstSides(*former.patches_, former.sides_);
@@ -81,17 +90,20 @@ LinkedSolver::Renumbering LinkedSolver::renumber(LinkedSolver& former, const sce
   return numbers;
 }
 
-/// Since all links were true: where an edit came before those before it were taken in, theirs count too.
-GeometryChange LinkedSolver::changeSince(const Renumbering& numbers) const {
+GeometryChange LinkedSolver::changeOf(const Renumbering& numbers) const {
   GeometryChange change;
   change.boxes = numbers.map.boxes;
   for (const auto& side : sides_) {
     const auto first = numbers.map.leaf_altered.begin() + patches_->surfaces[side.surface].first_leaf;
     change.altered.insert(change.altered.end(), first, first + side.leaf_count);
   }
+  return change;
+}
+
+/// Where an edit comes before those before it were taken in, theirs count too.
+void LinkedSolver::addEarlier(const Renumbering& numbers, GeometryChange& change) const {
   const auto& former = numbers.former;
-  if (former.repaired_ == former.repairs_.size()) return change;
-  const auto& earlier = former.shadows_->change();
+  const auto& earlier = (former.earlier_shadows_ ? former.earlier_shadows_ : former.shadows_)->change();
   change.boxes.insert(change.boxes.end(), earlier.boxes.begin(), earlier.boxes.end());
   scene::joinBoxes(change.boxes);
   for (std::size_t s = 0; s < former.sides_.size(); ++s) {
@@ -101,7 +113,6 @@ GeometryChange LinkedSolver::changeSince(const Renumbering& numbers) const {
       if (earlier.altered[from + leaf]) change.altered[to + leaf] = true;
     }
   }
-  return change;
 }
 
 /// Light polygons that have not moved, dark ones too. takeMaterials() will say how bright they are.
@@ -117,12 +128,14 @@ void LinkedSolver::inheritLights(LinkedSolver& former, const Renumbering& number
     shooter.area = light.area;
     shooter.most_bytes = memory_.mostBytes(light);
     lights_.push_back(light);
-    inheritColumns(shooters[n], n, system_.add(shooter), false, numbers);
+    planRepairsOf(shooters[n], n, system_.add(shooter), false, numbers);
   }
+  inheritColumns(former, 0, numbers);
 }
 
 void LinkedSolver::inheritNodes(LinkedSolver& former, const Renumbering& numbers) {
   auto& shooters = former.system_.shooters();
+  const auto first_repair = repairs_.size();
   for (std::uint32_t n = 0; n < shooters.size(); ++n) {
     if (shooters[n].isLight() || numbers.side_after[shooters[n].place.side] == scene::kNone) continue;
     Shooter shooter;
@@ -130,39 +143,55 @@ void LinkedSolver::inheritNodes(LinkedSolver& former, const Renumbering& numbers
     shooter.place.side = numbers.side_after[shooter.place.side];
     const Side& side = sides_[shooter.place.side];
     if (patches_->node_area[nodeId(side, shooter.place)] <= 0.0F) continue;  // buried
-    bool altered = false;
-    const auto rect = leafRect(side, shooter.place);
-    for (auto y = rect.y0; y < rect.y1; ++y) {
-      for (auto x = rect.x0; x < rect.x1; ++x)
-        altered = altered || shadows_->change().altered[side.first_value + y * side.width + x];
-    }
     shooter.certain = shooters[n].certain;
     shooter.mean = shooters[n].mean;
     shooter.sent = shooters[n].sent;
     shooter.most_bytes = memory_.mostBytes(shooter.place.side);
-    inheritColumns(shooters[n], n, system_.add(shooter), altered, numbers);
+    planRepairsOf(shooters[n], n, system_.add(shooter), isAltered(shooter.place, shadows_->change()), numbers);
   }
+  inheritColumns(former, first_repair, numbers);
 }
 
-/// `whole`: the shooter itself is not what it was. The links of the others are taken over as they are, and their
-/// repair is noted.
-void LinkedSolver::inheritColumns(Shooter& from, std::uint32_t old_index, std::uint32_t index, bool whole,
-                                  const Renumbering& numbers) {
+bool LinkedSolver::isAltered(const NodePlace& place, const GeometryChange& change) const {
+  const Side& side = sides_[place.side];
+  const auto rect = leafRect(side, place);
+  for (auto y = rect.y0; y < rect.y1; ++y) {
+    for (auto x = rect.x0; x < rect.x1; ++x) {
+      if (change.altered[side.first_value + y * side.width + x]) return true;
+    }
+  }
+  return false;
+}
+
+/// `whole`: the shooter itself is not what it was.
+void LinkedSolver::planRepairsOf(const Shooter& from, std::uint32_t old_index, std::uint32_t index, bool whole,
+                                 const Renumbering& numbers) {
   auto& shooter = system_.shooters()[index];
   shooter.products = from.products;
   for (std::size_t half = 0; half < 2; ++half) {
-    auto& column = from.column[half];
+    const auto& column = from.column[half];
     const auto& unfinished = numbers.unfinished[old_index][half];
     const bool is_light = from.light != scene::kNone;
     const auto samples = unfinished.whole ? unfinished.samples
                          : is_light       ? static_cast<std::uint32_t>(column.points())
                                           : column.samples();
     if (samples == 0) continue;
-    repairs_.push_back({index, half, samples, whole || unfinished.whole});
-    if (repairs_.back().whole) continue;
-    column.renumber(numbers.unmoved_after, numbers.former.sides_, sides_);
-    shooter.column[half] = std::move(column);
+    const bool overtaken = unfinished.samples > 0;
+    const bool was_altered = overtaken && !is_light && isAltered(shooter.place, earlier_shadows_->change());
+    repairs_.push_back({index, old_index, half, samples, whole || was_altered || unfinished.whole, overtaken});
   }
+}
+
+/// Links of what is not taken again as a whole go over as they are. Both halves at once: most of it is fresh memory.
+void LinkedSolver::inheritColumns(LinkedSolver& former, std::size_t first_repair, const Renumbering& numbers) {
+  inBothHalves([&](std::size_t half) {
+    for (const auto& repair : std::span(repairs_).subspan(first_repair)) {
+      if (repair.whole || repair.half != half) continue;
+      auto& column = former.system_.shooters()[repair.old_shooter].column[half];
+      system_.shooters()[repair.shooter].column[half] = column.renumbered(numbers.unmoved_after, former.sides_, sides_);
+      if (!numbers.keep_former) column = {};
+    }
+  });
 }
 
 }  // namespace radiosity::solver

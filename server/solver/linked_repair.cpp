@@ -51,7 +51,8 @@ struct LinkedSolver::RepairBatch {
 };
 
 /// Leaves in repairs_ what is needed, and makes room for what it may bring.
-void LinkedSolver::planRepairs() {
+/// `norm`: of the irradiance that there was, or 0 where it was not known.
+void LinkedSolver::planRepairs(double norm) {
   system_.begin();
   memory_.begin(system_);
   affected_ = 0;
@@ -63,23 +64,26 @@ void LinkedSolver::planRepairs() {
       return true;
     }
     affected_ += shooter.isLight() ? 1 + (repair.samples - 1) / kLightPoints : repair.samples;
+    repair.reach = reachOf(repair);
     return false;
   });
+  planDue(norm);
 }
 
 /// Whether some point of the samples sees the change. What cannot be repaired in parts becomes whole.
 bool LinkedSolver::isNeeded(Repair& repair) {
   const auto& shooter = system_.shooters()[repair.shooter];
   if (repair.whole) return true;
+  const auto& shadows = shadowsOf(repair);
   bool sees = false, gathers = true;
   if (shooter.isLight()) {
     const auto& light = lights_[shooter.light];
-    sees = shadows_->sees(light.corners[0], light.normal);
+    sees = shadows.sees(light.corners[0], light.normal);
   } else {
     ShotBatch batch;
     addSamples(repair, batch);
     gathers = batch.scatter.empty();
-    const auto looks = [&](const HemicubeFrame& frame) { return shadows_->sees(frame.origin, frame.normal); };
+    const auto looks = [&](const HemicubeFrame& frame) { return shadows.sees(frame.origin, frame.normal); };
     sees = std::ranges::any_of(batch.points, looks) ||
            std::ranges::any_of(batch.scatter, [&](const ScatterShot& shot) { return looks(shot.frame); });
   }
@@ -114,20 +118,21 @@ void LinkedSolver::findCutLinks(RepairBatch& repairs) const {
     for (std::size_t i = worker; i < repairs.repairs.size(); i += 2) {
       const auto& repair = repairs.repairs[i];
       const auto& shooter = system_.shooters()[repair.shooter];
-      if (repair.whole) continue;
+      if (repair.whole || repair.samples == 0) continue;
+      const auto& shadows = shadowsOf(repair);
       if (shooter.isLight()) {
         const auto& light = lights_[shooter.light];
         const auto [middle, radius] = circle(light);
-        shadows_->find({&middle, 1}, light.normal, radius, settings_.planner.light_resolution, scratch,
-                       repairs.leaves[i]);
+        shadows.find({&middle, 1}, light.normal, radius, settings_.planner.light_resolution, scratch,
+                     repairs.leaves[i]);
         continue;
       }
       ShotBatch batch;
       addSamples(repair, batch);
       points.clear();
       for (const auto& frame : batch.points) points.push_back(frame.origin);
-      shadows_->find(points, batch.gather.front().normal, 0.0F, settings_.planner.node_resolution, scratch,
-                     repairs.leaves[i]);
+      shadows.find(points, batch.gather.front().normal, 0.0F, settings_.planner.node_resolution, scratch,
+                   repairs.leaves[i]);
     }
   });
 }
@@ -136,11 +141,22 @@ void LinkedSolver::findCutLinks(RepairBatch& repairs) const {
 Result<void> LinkedSolver::repairSlice() {
   const auto start = std::chrono::steady_clock::now();
   RepairBatch batch;
-  batch.repairs = std::span(repairs_).subspan(repaired_, std::min(slice_, repairs_.size() - repaired_));
+  const auto count = std::min(slice_, due_ - repaired_);
+  for (auto& repair : std::span(repairs_).subspan(repaired_, count)) {
+    // Of one that waited there may be more by now.
+    const auto& shooter = system_.shooters()[repair.shooter];
+    if (!repair.whole && !shooter.isLight()) repair.samples = shooter.column[repair.half].samples();
+  }
+  batch.repairs = std::span(repairs_).subspan(repaired_, count);
   batch.sum.resize(system_.emission().size());
   findCutLinks(batch);
   auto& shots = batch.shots;
-  for (const auto& box : shadows_->change().boxes) shots.boxes.push_back(box);
+  const auto& boxes = shadows_->change().boxes;
+  shots.boxes = boxes;
+  if (earlier_shadows_) {
+    const auto& earlier = earlier_shadows_->change().boxes;
+    shots.boxes.insert(shots.boxes.end(), earlier.begin(), earlier.end());
+  }
   for (std::uint32_t r = 0; r < batch.repairs.size(); ++r) {
     const auto& repair = batch.repairs[r];
     if (!repair.whole && batch.leaves[r].empty()) continue;
@@ -160,7 +176,10 @@ Result<void> LinkedSolver::repairSlice() {
       shots.gather[i].run_count = static_cast<std::uint32_t>(shots.receivers.size()) - first_run;
       // Where nothing was lost, whatever is lost now is lost where the change is seen.
       const bool all = !system_.shooters()[repair.shooter].column[repair.half].losesNothing();
-      shots.gather[i].box_count = all ? 0 : static_cast<std::uint32_t>(shots.boxes.size());
+      if (all) continue;
+      shots.gather[i].first_box = repair.overtaken ? static_cast<std::uint32_t>(boxes.size()) : 0;
+      shots.gather[i].box_count =
+          static_cast<std::uint32_t>(repair.overtaken ? shots.boxes.size() - boxes.size() : boxes.size());
     }
     for (auto i = scattered; i < shots.scatter.size(); ++i) batch.scattered.push_back({r, 1, false});
     (repair.whole ? edits_.retaken : edits_.repaired) +=
@@ -175,11 +194,13 @@ Result<void> LinkedSolver::repairSlice() {
   slice_ = std::clamp(
       static_cast<std::size_t>(static_cast<double>(batch.repairs.size()) * kSliceSeconds / std::max(seconds, 1e-6)),
       fewest_a_slice_, kMostAtOnce);
-  repairs_.insert(repairs_.end(), batch.anew.begin(), batch.anew.end());
+  repairs_.insert(repairs_.begin() + static_cast<std::ptrdiff_t>(due_), batch.anew.begin(), batch.anew.end());
+  due_ += batch.anew.size();
   if (repaired_ == repairs_.size()) {
     repairs_.clear();
-    repaired_ = 0;
+    repaired_ = due_ = 0;
     shadows_.reset();
+    earlier_shadows_.reset();
   }
   return {};
 }
@@ -221,7 +242,7 @@ void LinkedSolver::takePart(RepairBatch& repairs, std::size_t shot, LinkSample& 
   }
   if (std::exchange(repairs.open, false)) {
     system_.forget(repair.shooter, repair.half);
-    repairs.anew.push_back({repair.shooter, repair.half, repair.samples, true});
+    repairs.anew.push_back({repair.shooter, repair.old_shooter, repair.half, repair.samples, true, repair.overtaken});
   } else {
     system_.replaceLinks(repair.shooter, repair.half, leaves, repairs.sum,
                          {part * totals.due, part * totals.escaped, part * totals.absorbed});

@@ -89,7 +89,7 @@ void LinkedSolver::visit(Archive& archive, Self& self) {
 }
 
 bool LinkedSolver::save(ArchiveWriter& to) const {
-  if (pass_ != Pass::kNone) return false;
+  if (pass_ != Pass::kNone || isBehind()) return false;
   to(kKind, static_cast<std::uint64_t>(system_.emission().size()));
   visit(to, *this);
   system_.save(to);

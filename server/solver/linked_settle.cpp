@@ -117,6 +117,7 @@ void LinkedSolver::dropNodes() {
   }
   repairs_ = std::move(repairs);
   repaired_ = 0;
+  due_ = repairs_.size();
   share_part_ = 1.0 / settings_.planner.first_shooters;
 }
 

@@ -164,8 +164,10 @@ Result<StepOutcome> LinkedSolver::step() {
 }
 
 Result<StepOutcome> LinkedSolver::advance() {
-  if (repaired_ < repairs_.size()) {
+  if (isRepairing()) {
     if (const auto done = repairSlice(); !done) return tl::unexpected<Error>(done.error());
+    // Nothing else asks for the light over links that were the last to be measured.
+    if (!isBehind() && phase_ == Phase::kDone && from_links_ == FromLinks::kNo) from_links_ = FromLinks::kToConfirm;
     return StepOutcome::kSlice;
   }
   if (from_links_ == FromLinks::kAfterEdit) {
@@ -178,14 +180,15 @@ Result<StepOutcome> LinkedSolver::advance() {
       if (const auto done = measureSlice(); !done) return tl::unexpected<Error>(done.error());
       return StepOutcome::kSlice;
     }
-    if (!settleFromLinks()) return StepOutcome::kSlice;
+    if (!settleFromLinks() || findsMoreDue()) return StepOutcome::kSlice;
     if (!finishEdit()) return StepOutcome::kSlice;
     return phase_ == Phase::kDone ? ended() : StepOutcome::kShot;
   }
   if (from_links_ == FromLinks::kToConfirm) return confirm();
-  if (phase_ == Phase::kDone) return ended();
+  if (phase_ == Phase::kDone) return isBehind() ? catchUp() : ended();
   if (std::exchange(refined_, false)) return chooseNext();
   if (!settling_ && measured_ == wanted_.size()) {
+    if (findsMoreDue()) return StepOutcome::kSlice;
     wanted_ = plan();
     measured_ = 0;
     const bool dark = phase_ == Phase::kLights && net_unshot_ + varying_ <= 0.0;
@@ -206,7 +209,7 @@ Result<StepOutcome> LinkedSolver::advance() {
 
 /// An edit is taken in whole: its links would not be true otherwise.
 void LinkedSolver::endWave() {
-  if (repaired_ < repairs_.size() || from_links_ != FromLinks::kNo || settling_ || measured_ == 0) return;
+  if (isRepairing() || from_links_ != FromLinks::kNo || settling_ || measured_ == 0) return;
   wanted_.resize(measured_);
   settling_ = true;
 }
@@ -218,7 +221,13 @@ StepOutcome LinkedSolver::finishRound() {
   return chooseNext();
 }
 
+/// What waits may be what is missing.
 StepOutcome LinkedSolver::exhausted(SolveLimit limit) {
+  if (isBehind() && !isRepairing()) {
+    due_ = repairs_.size();
+    from_links_ = FromLinks::kToConfirm;
+    return StepOutcome::kSlice;
+  }
   limit_ = limit;
   phase_ = Phase::kDone;
   return StepOutcome::kExhausted;

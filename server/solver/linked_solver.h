@@ -7,6 +7,7 @@
 // varies.
 #pragma once
 
+#include <cmath>
 #include <functional>
 #include <memory>
 #include <vector>
@@ -31,10 +32,11 @@ class LinkedSolver final : public Solver {
   /// After an edit of geometry: takes over the links of `former`, the solver of the scene before, that the edit left
   /// alone, and measures the others again with its first steps: same shooters, same points, so that links are those
   /// that a fresh measurement of all would find. Of shooters that see the change, only links to leaves whose ways to
-  /// them pass it are measured (Shadows).
+  /// them pass it are measured (Shadows). `keep_former`: it stays what it was; else its links go as they are taken
+  /// over, so that memory never holds them twice, and it is of no use afterwards.
   LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
                Transport& transport, const SolverSettings& settings, const LightSources& sources, LinkedSolver& former,
-               const scene::PatchMap& map);
+               const scene::PatchMap& map, bool keep_former = false);
 
   [[nodiscard]] Result<StepOutcome> step() override;
   void setMaterials(const scene::PatchMaterials& materials) override;
@@ -48,7 +50,8 @@ class LinkedSolver final : public Solver {
   }
   [[nodiscard]] std::vector<glm::vec3> halfIrradiance(std::uint32_t half) const override;
   [[nodiscard]] std::vector<glm::vec3> directIrradiance() const override;
-  [[nodiscard]] bool isRepairing() const override { return repaired_ < repairs_.size(); }
+  [[nodiscard]] bool isRepairing() const override { return repaired_ < due_; }
+  [[nodiscard]] bool isBehind() const override { return repaired_ < repairs_.size(); }
   [[nodiscard]] std::vector<glm::vec3> unshot() const override;
   [[nodiscard]] std::vector<std::uint8_t> shotLevels() const override;
   [[nodiscard]] std::vector<float> residualShape() const override;
@@ -64,6 +67,8 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] bool save(ArchiveWriter& to) const override;
   [[nodiscard]] bool restore(ArchiveReader& from) override;
 
+  /// After an edit of geometry: no light before all links are true.
+  void beExact();
   /// What the links of all lights can come to take.
   [[nodiscard]] std::size_t lightBytes() const;
   /// What is remembered.
@@ -83,15 +88,18 @@ class LinkedSolver final : public Solver {
   static void visit(Archive& archive, Self& self);
   /// Samples of a column that are to be taken again.
   struct Repair {
-    std::uint32_t shooter = 0;
+    std::uint32_t shooter = 0, old_shooter = 0;
     std::size_t half = 0;
     std::uint32_t samples = 0;  ///< of a light polygon: points
     bool whole = false;         ///< all their links; the column is empty
+    bool overtaken = false;     ///< nor were they taken again after the edit before
+    double reach = HUGE_VAL;    ///< bound of what the old links are wrong by (changeReach); infinite: cannot wait
   };
   /// Where the sides of the scene before are now.
   struct Renumbering {
     const LinkedSolver& former;
     const scene::PatchMap& map;
+    bool keep_former;
     std::vector<std::uint32_t> side_after;          ///< by old side; kNone: gone
     std::vector<std::uint32_t> unmoved_after;       ///< the same; kNone also where it moved
     std::vector<std::array<Repair, 2>> unfinished;  ///< by old shooter and half: what was still to be taken again
@@ -100,13 +108,26 @@ class LinkedSolver final : public Solver {
 
   /// All but its light.
   LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, Transport& transport, const SolverSettings& settings);
-  [[nodiscard]] Renumbering renumber(LinkedSolver& former, const scene::PatchMap& map);
-  [[nodiscard]] GeometryChange changeSince(const Renumbering& numbers) const;
+  [[nodiscard]] Renumbering renumber(const LinkedSolver& former, const scene::PatchMap& map, bool keep_former);
+  [[nodiscard]] GeometryChange changeOf(const Renumbering& numbers) const;
+  void addEarlier(const Renumbering& numbers, GeometryChange& change) const;
+  [[nodiscard]] bool isAltered(const NodePlace& place, const GeometryChange& change) const;
   void inheritLights(LinkedSolver& former, const Renumbering& numbers);
   void inheritNodes(LinkedSolver& former, const Renumbering& numbers);
-  void inheritColumns(Shooter& from, std::uint32_t old_index, std::uint32_t index, bool whole,
-                      const Renumbering& numbers);
-  void planRepairs();
+  void planRepairsOf(const Shooter& from, std::uint32_t old_index, std::uint32_t index, bool whole,
+                     const Renumbering& numbers);
+  void inheritColumns(LinkedSolver& former, std::size_t first_repair, const Renumbering& numbers);
+  void planRepairs(double norm);
+  [[nodiscard]] const Shadows& shadowsOf(const Repair& repair) const {
+    return repair.overtaken ? *earlier_shadows_ : *shadows_;
+  }
+  [[nodiscard]] double reachOf(const Repair& repair) const;
+  [[nodiscard]] double missing(const Repair& repair) const;
+  [[nodiscard]] double missing() const;
+  [[nodiscard]] double fieldNorm() const;
+  void planDue(double norm);
+  [[nodiscard]] bool findsMoreDue();
+  [[nodiscard]] Result<StepOutcome> catchUp();
   [[nodiscard]] bool isNeeded(Repair& repair);
   void addSamples(const Repair& repair, ShotBatch& batch) const;
   void findCutLinks(RepairBatch& repairs) const;
@@ -160,9 +181,11 @@ class LinkedSolver final : public Solver {
   LinkMemory memory_;
   UnshotPyramid unshot_;
   LinkPlanner planner_;
-  std::vector<Repair> repairs_;                       // after an edit of geometry; before anything else is done
+  std::vector<Repair> repairs_;                       // after an edit of geometry
   std::size_t repaired_ = 0;                          // of these
+  std::size_t due_ = 0;                               // of these, before anything else is done
   std::unique_ptr<Shadows> shadows_;                  // of the edit
+  std::unique_ptr<Shadows> earlier_shadows_;          // and of those before it, for links that no edit saw taken again
   std::uint32_t key_end_ = 0, triangle_key_end_ = 0;  // keys of sides that never were
   std::uint64_t affected_ = 0;
   LinkCounters edits_;  // what repairs add to linkCounters()

@@ -26,6 +26,8 @@ class Shadows {
   Shadows(const scene::PatchScene& patches, const std::vector<Side>& sides, GeometryChange change);
 
   [[nodiscard]] const GeometryChange& change() const { return change_; }
+  /// Around all that changed, altered leaves too.
+  [[nodiscard]] const std::vector<scene::ChangedBox>& all() const { return all_; }
 
   /// Whether a half space can see any of it.
   [[nodiscard]] bool sees(const glm::vec3& point, const glm::vec3& normal) const;

@@ -26,8 +26,8 @@ std::unique_ptr<Solver> makeSolver(std::shared_ptr<const scene::PatchScene> patc
   auto* linked_before = former != nullptr ? dynamic_cast<LinkedSolver*>(&former->solver) : nullptr;
   std::unique_ptr<LinkedSolver> linked;
   if (linked_before != nullptr) {
-    linked =
-        std::make_unique<LinkedSolver>(patches, materials, transport, settings, sources, *linked_before, former->map);
+    linked = std::make_unique<LinkedSolver>(patches, materials, transport, settings, sources, *linked_before,
+                                            former->map, former->keep);
   } else {
     linked = std::make_unique<LinkedSolver>(patches, materials, transport, settings, sources);
   }

@@ -61,8 +61,8 @@ struct LinkCounters {
   std::uint64_t rows = 0;        ///< of the equation, in each half
   std::uint64_t rows_saved = 0;  ///< where reflectance is uniform one row serves three channels
   // Of edits of geometry, in all: samples that no change was seen from; that were taken again for the leaves whose
-  // links may have changed, and how many these were; that were taken again.
-  std::uint64_t kept = 0, repaired = 0, repaired_links = 0, retaken = 0;
+  // links may have changed, and how many these were; that were taken again. And those that still wait for that.
+  std::uint64_t kept = 0, repaired = 0, repaired_links = 0, retaken = 0, waiting = 0;
 };
 
 class Solver {
@@ -94,6 +94,9 @@ class Solver {
   [[nodiscard]] virtual std::vector<glm::vec3> directIrradiance() const { return {}; }
   /// After an edit of geometry: irradiance() is not there yet, since links are being measured again.
   [[nodiscard]] virtual bool isRepairing() const { return false; }
+  /// After an edit of geometry: links that matter little beside the target error are still those of before, which
+  /// error() counts. Further steps after kConverged measure them, and end with kConverged once more.
+  [[nodiscard]] virtual bool isBehind() const { return false; }
   /// Radiosity (lux, signed) by node, level 0, that is still to be shot. What light polygons emit is not in it: they
   /// are owed by the light, not by its leaves.
   [[nodiscard]] virtual std::vector<glm::vec3> unshot() const = 0;
@@ -130,11 +133,11 @@ class Solver {
   }
 };
 
-/// The solver of a scene before an edit of its geometry, which gives up what it remembers and is of no use afterwards,
-/// and what the edited scene has in common with it.
+/// The solver of a scene before an edit of its geometry, and what the edited scene has in common with it.
 struct FormerSolver {
   Solver& solver;
   const scene::PatchMap& map;
+  bool keep = false;  ///< it stays what it is; else it gives up what it remembers and is of no use afterwards
 };
 
 /// With a former solver of the same settings: the links that the edit left alone stay, others are measured again with

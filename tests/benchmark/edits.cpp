@@ -40,6 +40,7 @@ struct Options {
   double error = 0.02;
   int repetitions = 3, workers = 0;
   bool in_process = false;
+  std::string only;
   std::filesystem::path output = "edits";
 };
 
@@ -196,6 +197,8 @@ class Bench {
     if (names_.empty()) findNames();
     auto shots = full->shots;
     for (const auto& edit : kEdits) {
+      if (edit.patch[0] != '\0') chosen_ = std::string(edit.name).find(options_.only) != std::string::npos;
+      if (!chosen_) continue;  // nor what takes it back
       watcher_->begin(++revision_);
       const auto outcome = edit.patch[0] == '\0' ? undo() : patch(filled(edit.patch));
       if (!outcome) return tl::unexpected(outcome.error());
@@ -285,6 +288,7 @@ class Bench {
   std::unique_ptr<engine::Engine> engine_;
   std::shared_ptr<void> watching_;
   std::uint64_t revision_ = 0;
+  bool chosen_ = true;
   std::map<std::string, std::string> names_;
   std::vector<std::string> order_;
   std::map<std::string, Row> rows_;
@@ -344,6 +348,7 @@ int main(int argc, char** argv) {
   app.add_option("--error", options.error, "stated error to solve to, as a fraction")->capture_default_str();
   app.add_option("--repetitions", options.repetitions, "runs of each scene")->capture_default_str();
   app.add_option("--workers", options.workers, "render processes; 0: one a core")->capture_default_str();
+  app.add_option("--only", options.only, "edits whose name contains this, and what takes them back");
   app.add_flag("--in-process", options.in_process, "render in this process, for its processor time");
   app.add_option("--output", options.output, "folder for edits.json and edits.md")->capture_default_str();
   CLI11_PARSE(app, argc, argv);

@@ -372,6 +372,69 @@ TEST_F(Edits, UndoOfAColourNeedsNoGeometryAndNoShot) {
   EXPECT_EQ(redo().error().code, ErrorCode::kNotFound);
 }
 
+constexpr const char* kMove = R"([{"op":"add","path":"/nodes/0/translation","value":[0.1,0.2,0]}])";
+
+TEST_F(Edits, UndoAndRedoOfAMoveShowTheSolvesThatWereThere) {
+  solve(lumpedCube(0.5));
+  const auto scene = sceneText();
+  const auto before = light();
+  ASSERT_TRUE(patch(kMove));
+  ASSERT_TRUE(reaches(SolveState::kConverged));
+  ASSERT_TRUE(eventually([&] { return status().counters["edits.samplesWaiting"] == 0.0; }));
+  const auto moved_scene = sceneText();
+  const auto moved = light();
+  EXPECT_FALSE(moved == before);
+  script_->run_fails = true;  // nothing is measured
+  for (int i = 0; i < 3; ++i) {
+    const auto back = undo();
+    ASSERT_TRUE(back) << back.error().text();
+    EXPECT_GT(back->affected_surfaces, 0U);
+    EXPECT_EQ(back->affected_shots, 0U);
+    ASSERT_TRUE(reaches(SolveState::kConverged));
+    EXPECT_EQ(sceneText(), scene);
+    EXPECT_TRUE(light() == before) << "the same bits";
+    ASSERT_TRUE(redo());
+    ASSERT_TRUE(reaches(SolveState::kConverged));
+    EXPECT_EQ(sceneText(), moved_scene);
+    EXPECT_TRUE(light() == moved) << "the same bits";
+  }
+}
+
+TEST_F(Edits, BackToAPlaceInAnotherLightIsSolvedOverTheLinksThatWereThere) {
+  solve(lumpedCube(0.5));
+  ASSERT_TRUE(patch(emissionPatch(1, 1.0)));
+  ASSERT_TRUE(reaches(SolveState::kConverged));
+  const auto before = light();
+  ASSERT_TRUE(patch(kMove));
+  ASSERT_TRUE(reaches(SolveState::kConverged));
+  ASSERT_TRUE(patch(emissionPatch(1, 2.0)));
+  ASSERT_TRUE(reaches(SolveState::kConverged));
+  script_->run_fails = true;  // nothing is measured
+  ASSERT_TRUE(patch(R"([{"op":"replace","path":"/nodes/0/translation","value":[0,0,0]}])"));
+  ASSERT_TRUE(reaches(SolveState::kConverged));
+  EXPECT_FALSE(light() == before) << "the lamp is another";
+  ASSERT_TRUE(patch(emissionPatch(1, 1.0)));
+  ASSERT_TRUE(reaches(SolveState::kConverged));
+  EXPECT_TRUE(light() == before) << "the same bits";
+}
+
+/// What is kept of the scene before an edit never makes links take more than they may.
+TEST_F(Edits, ASceneWhoseLinksFillTheirMemoryIsSolvedAgainOnItsWayBack) {
+  solve(lumpedCube(0.5));
+  const auto bytes = static_cast<std::uint64_t>(status().counters["links.bytes"]);
+  ASSERT_GT(bytes, 0U);
+  for (const bool fits : {false, true}) {
+    ASSERT_TRUE(configure([&](auto& settings) { settings.link_memory_bytes = fits ? 8 * bytes : bytes + bytes / 2; }));
+    ASSERT_TRUE(reaches(SolveState::kConverged) || reaches(SolveState::kLimited));
+    const auto returned = status().counters["skip.solvesReturned"];
+    ASSERT_TRUE(patch(kMove));
+    ASSERT_TRUE(reaches(SolveState::kConverged) || reaches(SolveState::kLimited));
+    ASSERT_TRUE(undo());
+    (void)sceneText();
+    EXPECT_EQ(status().counters["skip.solvesReturned"] > returned, fits);
+  }
+}
+
 TEST_F(Edits, UndoAndItsPatchLeadBackThroughEveryKindOfEdit) {
   ASSERT_TRUE(configure([](auto& settings) { settings.target_error = kNever; }));
   ASSERT_TRUE(load(test_scenes::parallelPlates(1.0, 1.0, 1.0, 1.0, 0.3)));

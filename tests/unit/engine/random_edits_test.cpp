@@ -11,6 +11,7 @@
 #include <optional>
 #include <random>
 
+#include "server/engine/scene_change.h"
 #include "server/scene/document.h"
 #include "server/scene/lightmap.h"
 #include "server/scene/patch_scene.h"
@@ -228,6 +229,7 @@ class RandomEdits : public EngineTest {
 
   void start(const test_scenes::TestScene& scene, unsigned seed) {
     draw_ = Draw(seed);
+    returned_ = status().counters["skip.solvesReturned"];
     const auto glb = test_scenes::encodeGlb(scene);
     documents_ = {scene::parseDocument(scene.name + ".glb", glb).value()};
     now_ = 0;
@@ -244,7 +246,7 @@ class RandomEdits : public EngineTest {
       const bool can = redo_it ? now_ + 1 < documents_.size() : now_ > 0;
       EXPECT_EQ((redo_it ? redo() : undo()).has_value(), can);
       if (can) now_ = redo_it ? now_ + 1 : now_ - 1;
-      if (can) charted_ = std::make_unique<Charted>(chart(documents_[now_], charted_.get()));
+      if (can) followCharts();
       return;
     }
     const auto patch_json = draw_.edit(documents_[now_].gltf);
@@ -255,7 +257,22 @@ class RandomEdits : public EngineTest {
     documents_.resize(now_ + 1);
     documents_.push_back(std::move(edited->document));
     ++now_;
-    charted_ = std::make_unique<Charted>(chart(documents_[now_], charted_.get()));
+    followCharts();
+  }
+
+  /// The charts of the document there is now: of what the engine kept of the scene before, or made from the last.
+  void followCharts() {
+    (void)sceneText();  // its status is that of the edit
+    const auto returned = status().counters["skip.solvesReturned"];
+    if (returned > std::exchange(returned_, returned)) {
+      std::swap(charted_, former_charted_);
+      charted_->scene = scene::importScene(documents_[now_]).value();
+      return;
+    }
+    auto made = std::make_unique<Charted>(chart(documents_[now_], charted_.get()));
+    // An edit that changes no geometry leaves the scene before the last that did where it is.
+    if (engine::changeBetween(charted_->scene, made->scene).geometry) former_charted_ = std::move(charted_);
+    charted_ = std::move(made);
   }
 
   /// Solved, or as well as can be done here: some scenes that chance makes have hardly any light to work with.
@@ -319,7 +336,9 @@ class RandomEdits : public EngineTest {
   int compared_ = 0;
   std::vector<Document> documents_;  ///< that undo and redo walk along
   std::size_t now_ = 0;
-  std::unique_ptr<Charted> charted_;  ///< of the document there is now
+  std::unique_ptr<Charted> charted_;         ///< of the document there is now
+  std::unique_ptr<Charted> former_charted_;  ///< before the last edit of geometry
+  double returned_ = 0.0;
 };
 
 TEST_F(RandomEdits, EndWhereAFreshSolveEnds) {

@@ -85,6 +85,35 @@ TEST(Bvh, KnowsFrontFromBack) {
   EXPECT_DOUBLE_EQ(hits[0].t, 1.0);
 }
 
+TEST(Bvh, WhereNoBackMayBeMetNoRayMeetsOne) {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<float> number(-1.0F, 1.0F);
+  const auto point = [&] { return glm::vec3(number(random), number(random), number(random)); };
+  std::vector<Bvh::Triangle> triangles;
+  for (int i = 0; i < 60; ++i) {
+    const auto at = point();
+    triangles.push_back({at, at + 0.2F * point(), at + 0.2F * point()});
+  }
+  const Bvh tree(triangles);
+  int open = 0, met = 0;
+  for (int i = 0; i < 400; ++i) {
+    const auto low = point(), high = low + 0.1F * glm::abs(point());
+    const glm::dvec3 direction(point());
+    const bool may = tree.mayMeetBack(low, high, direction, 8.0);
+    open += may ? 0 : 1;
+    for (int k = 0; k < 50; ++k) {
+      const auto origin = glm::mix(low, high, 0.5F * (point() + 1.0F));
+      std::vector<RayHit> hits;
+      tree.collectHits(glm::dvec3(origin), direction, 0.0, 8.0, hits);
+      const bool back = std::ranges::any_of(hits, [](const RayHit& hit) { return !hit.front; });
+      met += back ? 1 : 0;
+      EXPECT_TRUE(may || !back) << i;
+    }
+  }
+  EXPECT_GT(open, 50);
+  EXPECT_GT(met, 100);
+}
+
 TEST(Bvh, TouchesIgnoresTheTagAndMissesBoxesBesideADiagonal) {
   const Bvh tree({{glm::vec3(0, 0, 0), glm::vec3(1, 1, 0), glm::vec3(1, 1, 1)}});
   const std::vector<std::uint32_t> tags{7};

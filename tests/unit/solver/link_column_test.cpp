@@ -278,7 +278,7 @@ TEST_F(LinkColumns, OneThatWasRenumberedIsTheOneMadeInTheNewNumbers) {
   LinkColumn column, afresh;
   add(column, before, 2.0);
   const auto original = column;
-  column.renumber(side_after, sides_, sides);
+  column = column.renumbered(side_after, sides_, sides);
   for (std::uint32_t side = 0; side < 6; ++side) {
     std::vector<float> was(16), is(16);
     const bool had = original.decode(sides_[side].first_value, was);
