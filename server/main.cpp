@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <mutex>
 #include <string_view>
 #include <thread>
 
@@ -37,14 +38,25 @@ void loadFirstScene(engine::Engine& engine, const std::string& path) {
   });
 }
 
+/// The log ends with main(), before the threads of leaveWithin() do. Neither is ever destroyed.
+std::mutex leaving;
+bool log_ended = false;
+
 /// Whoever asked for the end does not wait longer. What was acknowledged is on the disk at any time, and the workers
 /// die with this process.
 void leaveWithin(std::chrono::milliseconds patience, const char* why) {
   std::thread([patience, why] {
     std::this_thread::sleep_for(patience);
-    log::info("leaving {}", why);
+    const std::lock_guard lock(leaving);
+    if (!log_ended) log::info("leaving {}", why);
     std::_Exit(0);
   }).detach();
+}
+
+/// All is done but for what libraries do at the end of a program, which leaveWithin() bounds as well.
+void endLog() {
+  const std::lock_guard lock(leaving);
+  log_ended = true;
 }
 
 Vitals vitalsOf(const engine::Engine& engine, const net::Server& server) {
@@ -110,7 +122,9 @@ int run(int argc, char** argv) {
   if (parsed.exit_code) return *parsed.exit_code;
   startLog("radiosityd", parsed.options.log_level, parsed.options.log_format);
   if (parsed.options.log_format == LogFormat::kJson) setenv(kLogFormatVariable, "json", 1);
-  return serve(parsed.options);
+  const int status = serve(parsed.options);
+  endLog();
+  return status;
 }
 
 }  // namespace

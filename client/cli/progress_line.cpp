@@ -60,8 +60,9 @@ std::string progressLine(const ProgressView& view, int columns) {
   if (view.show_parts)
     line += fmt::format(" (residual {}, sampling {}, variation {}, discretization {})", percentText(view.residual),
                         percentText(view.sampling), percentText(view.variation), percentText(view.discretization));
+  constexpr double kFastest = 1e18;  // a server may say anything
   line += fmt::format("  {} shots, {}/s", countText(view.shots),
-                      countText(static_cast<std::uint64_t>(std::max(0.0, view.shots_per_second))));
+                      countText(static_cast<std::uint64_t>(std::min(std::max(0.0, view.shots_per_second), kFastest))));
   line += "  " + durationText(view.seconds);
   if (view.seconds_left && view.error > view.target_error) line += ", " + durationText(*view.seconds_left) + " left";
   if (columns > 0 && line.size() > static_cast<std::size_t>(columns)) line.resize(static_cast<std::size_t>(columns));

@@ -22,6 +22,11 @@ const Material& materialOf(const Scene& scene, const Surface& surface) {
   return surface.material < scene.materials.size() ? scene.materials[surface.material] : kDefault;
 }
 
+/// In steps of 1/255; what is no number is 0.
+std::uint8_t byteOf(float opacity) {
+  return static_cast<std::uint8_t>(std::lround(255.0F * (opacity > 0.0F ? std::min(opacity, 1.0F) : 0.0F)));
+}
+
 /// Opacity over one surface.
 class SurfaceOpacity {
  public:
@@ -114,7 +119,7 @@ class SurfaceOpacity {
       for (auto x = static_cast<std::uint32_t>(std::max(low.x, 0.0)); x < end_x; ++x) {
         const glm::vec3 w = c.weightsAt((glm::dvec2(x, y) + 0.5) / scale);
         if (std::min({w.x, w.y, w.z}) < -1e-6F) continue;
-        cell(x, y) = static_cast<std::uint8_t>(std::lround(255.0F * opacityOf(c, glm::dvec2(x, y))));
+        cell(x, y) = byteOf(opacityOf(c, glm::dvec2(x, y)));
         known_[std::size_t{y} * width_ + x] = true;
       }
     }
@@ -138,7 +143,7 @@ class SurfaceOpacity {
     }
     // Slivers that hold no cell's middle: as the surface would be without a texture.
     const float alpha = material_.alpha_mode == AlphaMode::kBlend ? material_.alpha : 1.0F;
-    return static_cast<std::uint8_t>(std::lround(255.0F * alpha * (1.0F - material_.transmission)));
+    return byteOf(alpha * (1.0F - material_.transmission));
   }
 
   PatchScene& patches_;

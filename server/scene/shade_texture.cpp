@@ -29,6 +29,23 @@ int wrap(int i, int size, bool repeat, bool mirror) {
   return mirror && m >= size ? 2 * size - 1 - m : m;
 }
 
+/// The same place of the texture as `uv`, within its first two repeats (two, for mirrors) or, where it does not repeat,
+/// within one texture's width of it: so that a wild UV overflows no integer, and pixels are told apart around it.
+/// Exact.
+float fold(float uv, bool repeat) { return repeat ? std::fmod(uv, 2.0F) : std::clamp(uv, -1.0F, 2.0F); }
+
+/// What a bilinear lookup mixes: the first pixel, and the weights of the next ones.
+struct Lookup {
+  int x, y;
+  glm::vec2 next;
+};
+Lookup lookupAt(const TextureUse& use, const glm::vec2& uv, int width, int height) {
+  const glm::vec2 place =
+      glm::vec2(fold(uv.x, use.repeat_u), fold(uv.y, use.repeat_v)) * glm::vec2(width, height) - 0.5F;
+  const glm::vec2 base = glm::floor(place);
+  return {static_cast<int>(base.x), static_cast<int>(base.y), place - base};
+}
+
 /// Source pixels and weights of target pixel `i` when `from` pixels become `to`: exact overlap, so the mean is kept for
 /// odd sizes too.
 struct Taps {
@@ -60,18 +77,16 @@ float sampleAlpha(const Texture& texture, const TextureUse& use, const glm::vec2
   if (pixels == 0 || texture.rgba.size() < 4 * pixels || !std::isfinite(turned.x) || !std::isfinite(turned.y)) {
     return 1.0F;
   }
-  const glm::vec2 place =
-      glm::clamp(turned, glm::vec2(-1e5F), glm::vec2(1e5F)) * glm::vec2(texture.width, texture.height) - 0.5F;
-  const glm::vec2 base = glm::clamp(glm::floor(place), glm::vec2(-1e9F), glm::vec2(1e9F));
-  const glm::vec2 f = place - base;
+  const Lookup lookup = lookupAt(use, turned, texture.width, texture.height);
   const auto at = [&](int dx, int dy) {
-    const int x = wrap(static_cast<int>(base.x) + dx, texture.width, use.repeat_u, use.mirror_u);
-    const int y = wrap(static_cast<int>(base.y) + dy, texture.height, use.repeat_v, use.mirror_v);
+    const int x = wrap(lookup.x + dx, texture.width, use.repeat_u, use.mirror_u);
+    const int y = wrap(lookup.y + dy, texture.height, use.repeat_v, use.mirror_v);
     const auto index =
         static_cast<std::size_t>(y) * static_cast<std::size_t>(texture.width) + static_cast<std::size_t>(x);
     return static_cast<float>(texture.rgba[4 * index + 3]) / 255.0F;
   };
-  return glm::mix(glm::mix(at(0, 0), at(1, 0), f.x), glm::mix(at(0, 1), at(1, 1), f.x), f.y);
+  return glm::mix(glm::mix(at(0, 0), at(1, 0), lookup.next.x), glm::mix(at(0, 1), at(1, 1), lookup.next.x),
+                  lookup.next.y);
 }
 
 TexturePyramid::TexturePyramid(const Texture& texture) : texture_(&texture) {
@@ -109,11 +124,7 @@ glm::vec3 TexturePyramid::pixel(std::size_t level, int x, int y) const {
 
 glm::vec3 TexturePyramid::bilinear(std::size_t level, const TextureUse& use, const glm::vec2& uv) const {
   const int width = widthOf(level), height = heightOf(level);
-  // Bounded first: a wild UV must not overflow the integer below.
-  const glm::vec2 place = glm::clamp(uv, glm::vec2(-1e5F), glm::vec2(1e5F)) * glm::vec2(width, height) - 0.5F;
-  const glm::vec2 base = glm::clamp(glm::floor(place), glm::vec2(-1e9F), glm::vec2(1e9F));
-  const glm::vec2 f = place - base;
-  const int x0 = static_cast<int>(base.x), y0 = static_cast<int>(base.y);
+  const auto [x0, y0, f] = lookupAt(use, uv, width, height);
   const auto at = [&](int x, int y) {
     return pixel(level, wrap(x, width, use.repeat_u, use.mirror_u), wrap(y, height, use.repeat_v, use.mirror_v));
   };
@@ -125,7 +136,7 @@ glm::vec3 TexturePyramid::sample(const TextureUse& use, const glm::vec2& uv, con
   const glm::vec2 place = transformUv(use, uv);
   if (!std::isfinite(place.x) || !std::isfinite(place.y)) return glm::vec3(1.0F);
   const glm::vec2 extent = glm::abs(footprint * use.scale) * glm::vec2(texture_->width, texture_->height);
-  const float pixels = std::max({extent.x, extent.y, 1.0F});
+  const float pixels = std::max({1.0F, extent.x, extent.y});  // 1 comes first: what is no number is then passed over
   const auto level = std::min(levels_.size(), static_cast<std::size_t>(std::lround(std::log2(std::min(pixels, 1e6F)))));
   return bilinear(level, use, place);
 }

@@ -116,8 +116,9 @@ TEST(Liveness, APeerThatDoesNotAnswerPingsIsGone) {
   silent.hello();  // answers pings only while it reads, and from here on it does not
   TestSocket lively(server.port());
   lively.hello();
-  EXPECT_EQ(lively.waitFor("viewers")->params->at("count"), 2);
-  EXPECT_EQ(lively.waitFor("viewers")->params->at("count"), 1);
+  auto viewers = lively.waitFor("viewers");  // 1: on a slow machine the silent one was gone by then
+  if (viewers->params->at("count") == 2) viewers = lively.waitFor("viewers");
+  EXPECT_EQ(viewers->params->at("count"), 1);
 }
 
 }  // namespace

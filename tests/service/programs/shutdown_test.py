@@ -151,6 +151,20 @@ class ShutdownTest(ServiceCase):
         # The other one was not answered: it may be there or not.
         self.assertIn(self.run_async(acknowledged()), ([1, 0, 0], [0, 1, 0]))
 
+    def test_aSlowEndOfTheProgramIsCutShortWithoutAWord(self):
+        """The engine has ended by then, and so has the log: a line about it would be wrong, and written by what is gone."""
+        server = self.server(self.scene, "--error", 0.5, "--texels", 500,
+                             env={"LD_PRELOAD": program("STUCK_DISK"), "RADIOSITY_TEST_SLOW_EXIT": "1"})
+
+        async def body():
+            session = await Session.open(server.url)
+            await self.state_reached(session, "converged")
+            await session.close()
+
+        self.run_async(body())
+        self.assertEqual(server.terminate(), 0, server.log())
+        self.assertNotIn("leaving", server.log())
+
 
 if __name__ == "__main__":
     unittest.main()

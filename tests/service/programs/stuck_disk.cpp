@@ -1,5 +1,6 @@
 // Loaded into radiosityd before all else (LD_PRELOAD): a disk that takes what is written and never says that it is
-// safe, as a file server that went away does, while the file that RADIOSITY_TEST_STUCK_DISK names is there.
+// safe, as a file server that went away does, while the file that RADIOSITY_TEST_STUCK_DISK names is there. Where
+// RADIOSITY_TEST_SLOW_EXIT is set, a library that takes a second at the end of the program, after all of C++'s own.
 #include <dlfcn.h>
 #include <unistd.h>
 
@@ -15,6 +16,10 @@ int wait(const char* name, int descriptor) {
   const char* file = std::getenv("RADIOSITY_TEST_STUCK_DISK");
   while (file != nullptr && access(file, F_OK) == 0) std::this_thread::sleep_for(std::chrono::milliseconds(20));
   return reinterpret_cast<Sync>(dlsym(RTLD_NEXT, name))(descriptor);
+}
+
+[[gnu::destructor]] void linger() {
+  if (std::getenv("RADIOSITY_TEST_SLOW_EXIT") != nullptr) std::this_thread::sleep_for(std::chrono::seconds(1));
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <limits>
+#include <utility>
 
 namespace radiosity::cli {
 namespace {
@@ -47,6 +48,13 @@ TEST(ProgressLine, hasPartsOfTheErrorWhereAsked) {
 TEST(ProgressLine, saysNoTimeLeftOnceThere) {
   const ProgressView view{.state = "converged", .error = 0.01, .target_error = 0.02, .seconds_left = 4.0};
   EXPECT_THAT(progressLine(view, 200), Not(HasSubstr("left")));
+}
+
+TEST(ProgressLine, takesAnyRateThatAServerMayState) {
+  for (const auto& [rate, text] :
+       {std::pair(1e300, " 1,000,000,000,000,000,000/s"), std::pair(-1.0, " 0/s"), std::pair(kNan, " 0/s")}) {
+    EXPECT_THAT(progressLine({.state = "solving", .shots_per_second = rate}, 300), HasSubstr(text));
+  }
 }
 
 TEST(ProgressLine, neverExceedsTheTerminal) {

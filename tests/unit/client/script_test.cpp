@@ -57,7 +57,8 @@ TEST(Script, faultsNameFileAndLine) {
     EXPECT_THAT(fault(std::string(loop) + "\nend"), HasSubstr("s:1: a loop is written")) << loop;
   }
   for (const auto* loop : {"for x from a to 2 count 3", "for x from 1 to 2 count 0", "for x from 1 to 2 count 1.5",
-                           "for x from 1 to 2 count 1e9", "for x from 1 to 2 count -1"}) {
+                           "for x from 1 to 2 count 1e9", "for x from 1 to 2 count -1", "for x from 1 to 2 count nan",
+                           "for x from nan to 2 count 3", "for x from 1 to inf count 3"}) {
     EXPECT_THAT(fault(std::string(loop) + "\nend"), HasSubstr("s:1: from, to and count")) << loop;
   }
   std::string deep;
