@@ -18,7 +18,7 @@ const STATES: Record<string, string> = {
   paused: 'Paused',
   converged: 'Done',
   timeLimit: 'Time limit reached',
-  limited: 'Memory limit reached',
+  limited: 'Limit reached',
   failed: 'Failed',
 };
 
