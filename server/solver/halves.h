@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <future>
+#include <system_error>
 
 namespace radiosity::solver {
 
@@ -10,9 +11,17 @@ namespace radiosity::solver {
 /// out of a plain thread it would end the process.
 template <typename Work>
 void inBothHalves(const Work& work) {
-  auto other = std::async(std::launch::async, [&work] { work(std::size_t{1}); });
+  std::future<void> other;
+  try {
+    other = std::async(std::launch::async, [&work] { work(std::size_t{1}); });
+  } catch (const std::system_error&) {  // no more threads to be had: this one does both
+  }
   work(std::size_t{0});  // throws: the destructor of `other` waits
-  other.get();
+  if (other.valid()) {
+    other.get();
+  } else {
+    work(std::size_t{1});
+  }
 }
 
 }  // namespace radiosity::solver

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <numeric>
+#include <utility>
 
 #include "server/solver/halves.h"
 #include "server/solver/sampling.h"
@@ -12,7 +12,7 @@ namespace radiosity::solver {
 namespace {
 
 /// More receivers than these are sampled: then what varies is stated, and not corrected.
-constexpr std::size_t kMostReceivers = 262'144;
+constexpr std::size_t kMostReceivers = 131'072;
 /// So many paths of each half all receivers have before it must show whether something varies.
 constexpr std::uint32_t kEvenPaths = 8;
 /// Fewer of them that meet a leaf near by may miss what varies.
@@ -23,6 +23,8 @@ constexpr double kSurely = 2.0;
 constexpr double kDoubtful = 0.1;
 /// A receiver never has more paths than these; a round of refinement adds no more than those in all.
 constexpr std::uint32_t kMostPaths = 4096, kMostAdded = 16'384;
+/// And all together never more than these, 50 MB.
+constexpr std::size_t kMostInAll = 1'000'000;
 /// A round of refinement is for the receivers with so much of what it could lower.
 constexpr double kRefinedPart = 0.8;
 
@@ -53,10 +55,8 @@ bool LeafVariation::isWhole() const {
   return (count_.empty() || count_.size() == receivers_.size()) && std::ranges::all_of(count_, fits);
 }
 
-/// All paths again, because other lights shine than did.
-void LeafVariation::traceAnew(const LeafLight& light) {
-  for (auto& paths : paths_) paths.clear();
-  wanted_.clear();
+/// As many paths as count_ says.
+void LeafVariation::traceAll(const LeafLight& light) {
   if (count_.empty()) count_.assign(receivers_.size(), 1);
   std::vector<Task> tasks(receivers_.size());
   for (std::size_t r = 0; r < receivers_.size(); ++r) tasks[r] = {receivers_[r], 0, count_[r]};
@@ -64,8 +64,9 @@ void LeafVariation::traceAnew(const LeafLight& light) {
 }
 
 std::vector<LeafVariation::Task> LeafVariation::twiceAsMany() const {
-  std::vector<Task> tasks(receivers_.size());
-  for (std::size_t r = 0; r < receivers_.size(); ++r) tasks[r] = {receivers_[r], count_[r], 2U * count_[r]};
+  std::vector<Task> tasks;
+  for (std::size_t r = 0; r < receivers_.size(); ++r)
+    if (count_[r] < kEvenPaths) tasks.push_back({receivers_[r], count_[r], 2U * count_[r]});
   return tasks;
 }
 
@@ -76,18 +77,23 @@ void LeafVariation::update(const LeafLight& light, double bound) {
   for (std::size_t i = 0; i < light.sources.size(); ++i)
     if (light.sources[i].intensity != glm::dvec3(0.0))
       shining = mixKeys(shining, mixKeys(~i, light.sources[i].shapeKey()));
-  if (shining != traced_for_) traceAnew(light);
+  if (is_traced_ && shining != traced_for_) followOtherLights(light);
   traced_for_ = shining;
+  if (!std::exchange(is_traced_, true)) {
+    wanted_.clear();
+    traceAll(light);
+  }
   trace(wanted_, light);
   wanted_.clear();
   for (auto& half : correction_) half = {};
   sumUp(light);
   // Until it is known: all receivers get more of them.
   const auto fewest = [&] { return count_.empty() ? kEvenPaths : std::uint32_t{*std::ranges::min_element(count_)}; };
-  const auto isUnsure = [&] { return found_ + deviation_ > bound && found_ < kSurely * deviation_; };
+  const auto isUnsure = [&] { return std::abs(found_) + deviation_ > bound && found_ < kSurely * deviation_; };
   while ((isUnsure() || paths_[0].size() < kFewestPaths) && fewest() < kEvenPaths) {
     trace(twiceAsMany(), light);
-    for (auto& count : count_) count = static_cast<std::uint16_t>(2 * count);
+    for (auto& count : count_)
+      if (count < kEvenPaths) count = static_cast<std::uint16_t>(2 * count);
     sumUp(light);
   }
   left_ = std::max(0.0, found_);
@@ -171,7 +177,7 @@ void LeafVariation::weigh(const Side& side) {
 }
 
 bool LeafVariation::refine() {
-  if (gain_.empty()) return false;
+  if (gain_.empty() || paths_[0].size() + paths_[1].size() >= kMostInAll) return false;
   std::vector<std::uint32_t> order;
   double sum = 0.0;
   for (std::uint32_t r = 0; r < receivers_.size(); ++r) {

@@ -70,6 +70,7 @@ class LeafVariation {
   using Place = LeafRays::Place;
   /// A way from a receiver over a leaf near by, and from another place of that.
   struct Path {
+    std::uint64_t key = 0;                            ///< of its draws
     std::uint32_t receiver = 0;                       ///< leaf value
     std::uint32_t by = 0;                             ///< leaf value of the leaf near by
     std::array<std::uint32_t, 2> seen{};              ///< leaf values that its two places see
@@ -95,10 +96,12 @@ class LeafVariation {
   };
 
   [[nodiscard]] bool isNear(const LeafRays::Sight& sight) const;
-  void traceAnew(const LeafLight& light);
+  void traceAll(const LeafLight& light);
   void trace(std::span<const Task> tasks, const LeafLight& light);
   void follow(const Task& task, std::size_t half, const LeafLight& light, std::vector<Path>& paths) const;
-  [[nodiscard]] bool follow(const Place& from, std::uint64_t key, const LeafLight& light, Path& path) const;
+  void followLights(const std::array<Place, 2>& places, const LeafLight& light, Path& path) const;
+  void followOtherLights(const LeafLight& light);
+  [[nodiscard]] bool findPlaces(std::uint32_t receiver, std::uint64_t key, std::array<Place, 2>& places) const;
   template <typename Unhidden>
   [[nodiscard]] static Drawn draw(std::size_t count, std::uint64_t key, const Unhidden& unhidden);
   void followLight(const std::array<Place, 2>& places, std::uint64_t key, const LeafLight& light, Path& path) const;

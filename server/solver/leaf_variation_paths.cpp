@@ -92,8 +92,14 @@ void LeafVariation::followLight(const std::array<Place, 2>& places, std::uint64_
   const glm::dvec4 at = sobol4(0, key);
   const glm::dvec3 point(light.lights[drawn.index].point(at.x, at.y));
   double factor = 0.0;
+  const auto& lamp = light.lights[drawn.index];
   for (std::size_t p = 0; p < 2; ++p) {
-    if (drawn.unhidden[p] > 0.0 && rays_.isOpen(places[p], point)) factor += (p == 0 ? 1.0 : -1.0) * drawn.unhidden[p];
+    // Of a lamp that the place's plane cuts only what lies before it is seen: points behind it stand for nothing.
+    const bool before = glm::dot(point - places[p].position, places[p].normal) > 0.0;
+    if (drawn.unhidden[p] <= 0.0 || !before || !rays_.isOpen(places[p], point)) continue;
+    const auto seen =
+        formFactorInFront(places[p].position, places[p].normal, std::span(lamp.corners.data(), lamp.corner_count));
+    if (seen.front > 0.0) factor += (p == 0 ? 1.0 : -1.0) * seen.value / seen.front;
   }
   path.light = drawn.index;
   path.light_factor = static_cast<float>(factor / drawn.chance);
@@ -120,32 +126,52 @@ bool LeafVariation::isNear(const LeafRays::Sight& sight) const {
   return sight.end.value < LeafRays::kSkyBelow && sight.distance <= kNear * rays_.widthOf(sight.end.value);
 }
 
-/// False: no leaf is near that way, or it makes no difference.
-bool LeafVariation::follow(const Place& from, std::uint64_t key, const LeafLight& light, Path& path) const {
-  const glm::dvec4 first = sobol4(0, mixKeys(key, 1)), second = sobol4(0, mixKeys(key, 2));
+/// Where a path passes the leaf near by, and the other place of that. False: no leaf is near that way.
+bool LeafVariation::findPlaces(std::uint32_t receiver, std::uint64_t key, std::array<Place, 2>& places) const {
+  const glm::dvec4 at = sobol4(0, key), first = sobol4(0, mixKeys(key, 1));
+  const auto from = rays_.placeOn(receiver, {at.x, at.y});
   const auto sight = rays_.look(from, cosineDirection(from.normal, first.x, first.y), kNear * rays_.greatestWidth());
-  path.by = sight.end.value;
   if (!isNear(sight)) return false;
-  const std::array<Place, 2> places{sight.end, rays_.placeOn(path.by, {first.z, first.w})};
-  for (std::size_t p = 0; p < 2; ++p) {
-    const auto seen = rays_.look(places[p], cosineDirection(places[p].normal, second.x, second.y));
-    path.seen[p] = seen.end.value;
-    path.sees_near = path.sees_near || isNear(seen);
-  }
-  followLight(places, mixKeys(key, 3), light, path);
-  followSource(places, mixKeys(key, 4), light, path);
-  return path.seen[0] != path.seen[1] || path.light_factor != 0.0F || path.source_factor != 0.0F;
+  places = {sight.end, rays_.placeOn(sight.end.value, {first.z, first.w})};
+  return true;
 }
 
 void LeafVariation::follow(const Task& task, std::size_t half, const LeafLight& light, std::vector<Path>& paths) const {
   const Side& side = rays_.sideOf(task.receiver);
   const auto leaf_key = mixKeys(mixKeys(seed_, side.key), task.receiver - side.first_value);
+  std::array<Place, 2> places;
   for (auto k = task.first; k < task.end; ++k) {
-    const auto key = mixKeys(leaf_key, 2 * std::uint64_t{k} + half);
-    const glm::dvec4 at = sobol4(0, key);
     Path path;
+    path.key = mixKeys(leaf_key, 2 * std::uint64_t{k} + half);
     path.receiver = task.receiver;
-    if (follow(rays_.placeOn(task.receiver, {at.x, at.y}), key, light, path)) paths.push_back(path);
+    if (!findPlaces(path.receiver, path.key, places)) continue;
+    path.by = places[0].value;
+    const glm::dvec4 second = sobol4(0, mixKeys(path.key, 2));
+    for (std::size_t p = 0; p < 2; ++p) {
+      const auto seen = rays_.look(places[p], cosineDirection(places[p].normal, second.x, second.y));
+      path.seen[p] = seen.end.value;
+      path.sees_near = path.sees_near || isNear(seen);
+    }
+    followLights(places, light, path);
+    paths.push_back(path);
+  }
+}
+
+void LeafVariation::followLights(const std::array<Place, 2>& places, const LeafLight& light, Path& path) const {
+  path.light_factor = path.source_factor = 0.0F;
+  followLight(places, mixKeys(path.key, 3), light, path);
+  followSource(places, mixKeys(path.key, 4), light, path);
+}
+
+/// Other lights shine than did: where paths go stays as it is.
+void LeafVariation::followOtherLights(const LeafLight& light) {
+  for (auto& paths : paths_) {
+    inShares(paths.size() / kTasksAShare, [&](std::size_t share, std::size_t shares) {
+      std::array<Place, 2> places;
+      for (auto i = share; i < paths.size(); i += shares) {
+        if (findPlaces(paths[i].receiver, paths[i].key, places)) followLights(places, light, paths[i]);
+      }
+    });
   }
 }
 
@@ -161,6 +187,11 @@ void LeafVariation::trace(std::span<const Task> tasks, const LeafLight& light) {
       }
     }
   });
+  for (std::size_t half = 0; half < 2; ++half) {  // all room first: without memory nothing is to be there twice
+    std::size_t more = 0;
+    for (const auto& share : found) more += share[half].size();
+    paths_[half].reserve(paths_[half].size() + more);
+  }
   for (const auto& share : found) {
     for (std::size_t half = 0; half < 2; ++half)
       paths_[half].insert(paths_[half].end(), share[half].begin(), share[half].end());

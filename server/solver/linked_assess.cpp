@@ -66,10 +66,6 @@ void LinkedSolver::assess() {
   varying_share_ = error_.residual > 0.0 ? varying / error_.residual : 0.0;
   left_out_ = left_out / (1.0 - kept) / received;
   error_.total = std::hypot(error_.residual, error_.sampling);
-  if (wantsVariation()) {
-    variation_ = std::make_unique<LeafVariation>(*patches_, sides_, settings_.seed);
-    updateVariation();
-  }
   if (!variation_) return;
   error_.sampling = std::hypot(by_links_, std::sqrt(variation_->noise() / field.square()));
   error_.variation = std::sqrt(variation_->left() / field.square());

@@ -93,6 +93,7 @@ void LinkedSolver::solveAnew() {
   settling_ = false;
   pass_ = Pass::kNone;
   from_links_ = FromLinks::kAfterEdit;
+  refined_ = false;
   edit_lights_planned_ = false;
   error_ = {};  // unknown
 }
@@ -141,7 +142,7 @@ bool LinkedSolver::finishEdit() {
     wanted_ = plan();
     growing_ = !wanted_.empty();
   }
-  assess();
+  assessStep();
   if (error_.total <= settings_.target_error) {
     wanted_.clear();
     phase_ = Phase::kDone;
@@ -153,7 +154,7 @@ bool LinkedSolver::finishEdit() {
 }
 
 /// From nothing but the links: the result depends on them and on light and materials alone, so that an edit and its
-/// inverse give the same bits as long as no link was added in between. False: not yet.
+/// inverse give the same bits as long as no link and no path was added in between. False: not yet.
 bool LinkedSolver::settleFromLinks() {
   const auto forgetLight = [&] {
     for (auto& shooter : system_.shooters()) {

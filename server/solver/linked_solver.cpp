@@ -185,8 +185,8 @@ Result<StepOutcome> LinkedSolver::advance() {
     return phase_ == Phase::kDone ? ended() : StepOutcome::kShot;
   }
   if (from_links_ == FromLinks::kToConfirm) return confirm();
-  if (phase_ == Phase::kDone) return isBehind() ? catchUp() : ended();
   if (std::exchange(refined_, false)) return chooseNext();
+  if (phase_ == Phase::kDone) return isBehind() ? catchUp() : ended();
   if (!settling_ && measured_ == wanted_.size()) {
     if (findsMoreDue()) return StepOutcome::kSlice;
     wanted_ = plan();
@@ -217,7 +217,7 @@ void LinkedSolver::endWave() {
 StepOutcome LinkedSolver::finishRound() {
   growing_ = false;
   ++rounds_;
-  assess();
+  assessStep();
   return chooseNext();
 }
 
@@ -249,7 +249,7 @@ StepOutcome LinkedSolver::chooseNext() {
 StepOutcome LinkedSolver::confirm() {
   if (!settleFromLinks()) return StepOutcome::kSlice;
   from_links_ = FromLinks::kNo;
-  assess();
+  assessStep();
   if (error_.total > settings_.target_error) return chooseFurther();
   phase_ = Phase::kDone;
   return StepOutcome::kConverged;

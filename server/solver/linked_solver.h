@@ -153,6 +153,7 @@ class LinkedSolver final : public Solver {
   void takeLights();
   [[nodiscard]] bool settle();
   void findUnshot();
+  void assessStep();
   void updateVariation();
   [[nodiscard]] bool wantsVariation() const;
   [[nodiscard]] bool refineVariation();

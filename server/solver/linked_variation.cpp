@@ -11,6 +11,8 @@ namespace {
 
 /// It is asked for when all else is at most so many times the target, or this.
 constexpr double kSoon = 3.0, kLittle = 0.1;
+/// Each path asks all lights: with more than these it would take longer than the links.
+constexpr std::size_t kMostLights = 512;
 /// What is less than this part of the target is not looked into further: it adds a twentieth to the total.
 constexpr double kNegligible = 0.3;
 /// More paths are traced, and not more links measured, where what they would tell is so much of the square of the
@@ -25,7 +27,18 @@ bool LinkedSolver::wantsVariation() const {
   if (variation_ || growing_ || !settings_.within_leaves ||
       error_.total > std::max(kSoon * settings_.target_error, kLittle))
     return false;
+  if (lights_.size() + sources_.size() > kMostLights) return false;
   return std::ranges::none_of(patches_->surfaces, [](const scene::Surface& surface) { return surface.see_through; });
+}
+
+/// assess() at an end of what the solver does, and not when somebody looks: then alone paths are traced first, so that
+/// what they are does not depend on the clock.
+void LinkedSolver::assessStep() {
+  assess();
+  if (!wantsVariation()) return;
+  variation_ = std::make_unique<LeafVariation>(*patches_, sides_, settings_.seed);
+  updateVariation();
+  assess();
 }
 
 /// For the light that leaves have now.
