@@ -89,7 +89,7 @@ void LeafVariation::update(const LeafLight& light, double bound) {
   sumUp(light);
   // Until it is known: all receivers get more of them.
   const auto fewest = [&] { return count_.empty() ? kEvenPaths : std::uint32_t{*std::ranges::min_element(count_)}; };
-  const auto isUnsure = [&] { return std::abs(found_) + deviation_ > bound && found_ < kSurely * deviation_; };
+  const auto isUnsure = [&] { return found_ + deviation_ > bound && found_ < kSurely * deviation_; };
   while ((isUnsure() || paths_[0].size() < kFewestPaths) && fewest() < kEvenPaths) {
     trace(twiceAsMany(), light);
     for (auto& count : count_)
