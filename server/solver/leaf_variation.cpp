@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <utility>
 
 #include "server/solver/halves.h"
 #include "server/solver/sampling.h"
@@ -79,9 +78,10 @@ void LeafVariation::update(const LeafLight& light, double bound) {
       shining = mixKeys(shining, mixKeys(~i, light.sources[i].shapeKey()));
   if (is_traced_ && shining != traced_for_) followOtherLights(light);
   traced_for_ = shining;
-  if (!std::exchange(is_traced_, true)) {
+  if (!is_traced_) {
     wanted_.clear();
     traceAll(light);
+    is_traced_ = true;  // not where memory ran out: no paths would say that nothing varies
   }
   trace(wanted_, light);
   wanted_.clear();

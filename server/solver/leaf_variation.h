@@ -5,9 +5,8 @@
 // the leaf, and is what the receiver lacks; where light is even nothing is left, and no noise.
 //
 // What it comes to is stated (ErrorParts::variation), and where it matters and is known well enough it is added to what
-// receivers have over links: a gather over texels, for those that need it. Paths depend on geometry
-// and on which lights shine; light and reflectance are put in with each update. Owned by LinkedSolver; one thread
-// outside of the calls.
+// receivers have over links: a gather over texels, for those that need it. Paths depend on geometry and on which lights
+// shine; light and reflectance are put in with each update. Owned by LinkedSolver; one thread outside of the calls.
 #pragma once
 
 #include <algorithm>
@@ -36,9 +35,9 @@ class LeafVariation {
  public:
   LeafVariation(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed);
 
-  /// Brings all that is below up to date with the light. Paths are traced when there are none, or when other lights
-  /// shine; more of them until what varies is known to be little beside `bound`, an irradiance squared times area as
-  /// below, or is found to be more. Below the bound nothing is corrected.
+  /// Brings all that is below up to date with the light. Paths are traced when there are none, and followed to the
+  /// lights again when others shine; more are traced until what varies is known to be little beside `bound`, an
+  /// irradiance squared times area as below, or is found to be more. Below the bound nothing is corrected.
   void update(const LeafLight& light, double bound);
 
   /// More paths for those receivers where they help most; update() is to follow. False: there are as many as there may
@@ -46,7 +45,7 @@ class LeafVariation {
   [[nodiscard]] bool refine();
 
   // Sums over leaves and channels of area (unit box squared) times irradiance (lux) squared.
-  /// Of what varies and is not corrected; an estimate without bias, but not below zero.
+  /// Of what varies and is not corrected; an estimate without bias but that it is not below zero.
   [[nodiscard]] double left() const { return left_; }
   /// Of the noise of the corrections in the mean of the halves.
   [[nodiscard]] double noise() const { return noise_; }
@@ -119,7 +118,7 @@ class LeafVariation {
   double stands_for_ = 1.0;                   ///< leaves, for each receiver
   std::vector<std::uint16_t> count_;          ///< paths of each half, by receiver; empty: none were traced yet
   std::uint64_t traced_for_ = 0;              ///< which lights
-  bool is_traced_ = false;                    ///< as many as count_ says
+  bool is_traced_ = false;                    ///< as many paths as count_ says
   std::vector<Task> wanted_;                  ///< by refine()
   std::array<std::vector<Path>, 2> paths_;    ///< by half
   std::array<std::vector<Lack>, 2> lacking_;  ///< by half and leaf value: mean of the paths; while updating

@@ -112,6 +112,23 @@ TEST_F(LeafVariationTest, LightBesideALampsRimIsFoundAndCorrected) {
   EXPECT_LT(variation.left(), 0.1 * 3.0 * kWidth * kHeight * expected * expected);
 }
 
+// The lamp reaches as far below the floor as above it: what lies below adds nothing, and takes nothing away.
+TEST_F(LeafVariationTest, OfALampThatTheFloorsPlaneCutsTheUpperPartCounts) {
+  lamps_[0].corners[0].z = lamps_[0].corners[1].z = -static_cast<float>(kHeight);
+  lamps_[0].area *= 2.0;
+  LeafVariation variation(*scene_.patches, sides_, 1);
+  variation.update(light(), 0.0);
+  for (int round = 0; round < 12 && variation.refine(); ++round) variation.update(light(), 0.0);
+  ASSERT_TRUE(variation.corrects());
+  double found = 0.0;
+  for (std::size_t half = 0; half < 2; ++half)
+    for (std::uint32_t leaf = 0; leaf < kLooks; ++leaf)
+      found += 0.5 * static_cast<double>(variation.correction(half)[sides_[1].first_value + leaf].x) / kLooks;
+  const double expected = lacking(), sigma = std::sqrt(variation.noise() / (3.0 * kWidth * kHeight) / kLooks);
+  EXPECT_LT(sigma, 0.08 * expected);
+  EXPECT_NEAR(found, expected, 3.0 * sigma + 0.01 * expected);  // half of it where the cut counted twice
+}
+
 TEST_F(LeafVariationTest, WhatIsBelowTheBoundIsStatedAndNotCorrected) {
   LeafVariation variation(*scene_.patches, sides_, 1);
   variation.update(light(), 1.0);
