@@ -6,6 +6,8 @@
 #include <numbers>
 #include <type_traits>
 
+#include "common/clones.h"
+
 namespace radiosity::gpu {
 namespace {
 
@@ -118,10 +120,8 @@ template <typename Loop>
 }  // namespace
 
 // One clone for processors with 256-bit vectors. No fused multiply-add in either, so both give the same bits.
-__attribute__((target_clones("avx2", "default"))) void planarFormFactors(const ClippedPolygon& polygon,
-                                                                         const glm::vec3& normal, const float* x,
-                                                                         const float* y, const float* z,
-                                                                         std::size_t count, float* form_factor) {
+RADIOSITY_CLONES void planarFormFactors(const ClippedPolygon& polygon, const glm::vec3& normal, const float* x,
+                                        const float* y, const float* z, std::size_t count, float* form_factor) {
   const Edges edges(std::span(polygon.corner.data(), polygon.count));
   const float nx = normal.x, ny = normal.y, nz = normal.z;
   withCorners(
@@ -132,9 +132,8 @@ __attribute__((target_clones("avx2", "default"))) void planarFormFactors(const C
                          });
 }
 
-__attribute__((target_clones("avx2", "default"))) void wholeFormFactors(std::span<const glm::vec3> corners,
-                                                                        const FormFactorPoints& points,
-                                                                        std::size_t count, float* form_factor) {
+RADIOSITY_CLONES void wholeFormFactors(std::span<const glm::vec3> corners, const FormFactorPoints& points,
+                                       std::size_t count, float* form_factor) {
   const Edges edges(corners);
   const auto [x, y, z, nx, ny, nz] = points;
   withCorners(

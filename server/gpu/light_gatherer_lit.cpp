@@ -5,6 +5,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "common/clones.h"
 #include "server/gpu/form_factor_kernel.h"
 #include "server/gpu/light_gatherer.h"
 #include "server/solver/polygon_form_factor.h"
@@ -82,10 +83,8 @@ std::array<float, 2> heights(const solver::GatherShot& shot, const glm::vec3& lo
 }
 
 /// The places of receivers in one frame, as Receivers::place has them. Branch-free, so that it vectorises.
-__attribute__((target_clones("avx2", "default"))) void findPlaces(const scene::TriangleFrame& frame,
-                                                                  const glm::vec2& at, std::size_t count,
-                                                                  const float* texel_x, const float* texel_y, float* x,
-                                                                  float* y, float* z) {
+RADIOSITY_CLONES void findPlaces(const scene::TriangleFrame& frame, const glm::vec2& at, std::size_t count,
+                                 const float* texel_x, const float* texel_y, float* x, float* y, float* z) {
   const auto o = frame.origin, u = frame.du, v = frame.dv;
   for (std::size_t i = 0; i < count; ++i) {
     const float across = texel_x[i] + at.x, up = texel_y[i] + at.y;

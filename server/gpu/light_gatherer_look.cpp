@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "common/clones.h"
 #include "server/gpu/light_gatherer.h"
 #include "server/gpu/scatter_accumulator.h"
 
@@ -32,11 +33,9 @@ struct PointView {
 
 /// For every receiver: the pixel of the hemicube's image in which it lies (the cells of hemicube_weights.h), and cos
 /// cos / r^2. Branch-free, so that it vectorises; one clone for processors with 256-bit vectors, same bits in both.
-__attribute__((target_clones("avx2", "default"))) void projectReceivers(const PointView& view, std::size_t count,
-                                                                        const float* x, const float* y, const float* z,
-                                                                        const float* nx, const float* ny,
-                                                                        const float* nz, std::uint32_t* pixel,
-                                                                        float* weight) {
+RADIOSITY_CLONES void projectReceivers(const PointView& view, std::size_t count, const float* x, const float* y,
+                                       const float* z, const float* nx, const float* ny, const float* nz,
+                                       std::uint32_t* pixel, float* weight) {
   const int size = view.resolution, half_size = size / 2;
   const float half = static_cast<float>(size) / 2.0F;
   for (std::size_t i = 0; i < count; ++i) {
@@ -77,10 +76,9 @@ struct Seen {
 /// where the pixel shows what lies behind it, all where the pixel shows nothing, or an item behind whose plane they
 /// lie, on the side that the light at `o` does not see. Most have none, and see the light. Indices have signs so that
 /// it vectorises.
-__attribute__((target_clones("avx2", "default"))) void findDoubts(const glm::vec3& o, const Seen& seen,
-                                                                  std::size_t count, const std::uint32_t* pixel,
-                                                                  const float* x, const float* y, const float* z,
-                                                                  const std::uint32_t* care, std::uint32_t* doubt) {
+RADIOSITY_CLONES void findDoubts(const glm::vec3& o, const Seen& seen, std::size_t count, const std::uint32_t* pixel,
+                                 const float* x, const float* y, const float* z, const std::uint32_t* care,
+                                 std::uint32_t* doubt) {
   static_assert(sizeof(Receivers::Plane) == 4 * sizeof(float) && static_cast<std::int32_t>(RAD_ITEM_NONE) < 0);
   const float ox = o.x, oy = o.y, oz = o.z;
   const auto [planes, items] = seen;
@@ -97,9 +95,8 @@ __attribute__((target_clones("avx2", "default"))) void findDoubts(const glm::vec
 }
 
 /// The part of what was weighed that was visible; see LightGatherer::findVisibility.
-__attribute__((target_clones("avx2", "default"))) void weighVisible(std::size_t count, float points,
-                                                                    const float* weight, const float* visible_weight,
-                                                                    const float* front, float* visibility) {
+RADIOSITY_CLONES void weighVisible(std::size_t count, float points, const float* weight, const float* visible_weight,
+                                   const float* front, float* visibility) {
   for (std::size_t i = 0; i < count; ++i) {
     const float seen = weight[i] > 0.0F ? visible_weight[i] / weight[i] : 0.0F;
     // The points are spread evenly: of `points`, one at least lies in front of all planes that cut off a larger part.

@@ -1,5 +1,6 @@
 #include "server/gpu/parallel_culler.h"
 
+#include "common/clones.h"
 #include "server/gpu/closed_solids.h"
 
 namespace radiosity::gpu {
@@ -25,9 +26,8 @@ struct Triangles {
   std::array<const float*, 3> solid_normal;
 };
 
-__attribute__((target_clones("avx2", "default"))) void classify(const ParallelAxes& axes, const glm::vec3& direction,
-                                                                const Triangles& from, std::size_t count,
-                                                                std::uint32_t* __restrict skipped) {
+RADIOSITY_CLONES void classify(const ParallelAxes& axes, const glm::vec3& direction, const Triangles& from,
+                               std::size_t count, std::uint32_t* __restrict skipped) {
   const auto [centre, right, up, shift, area] = axes;
   // Samples lie half-way between whole numbers; the sum keeps what is truncated positive.
   const float first_column = shift.x + 1.5F, first_row = shift.y + 1.5F;

@@ -6,6 +6,8 @@
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
 
+#include "common/clones.h"
+
 namespace radiosity::gpu {
 namespace {
 
@@ -103,9 +105,8 @@ inline bool showsNoSample(const float (&column)[3], const float (&row)[3]) {
   return (columns == 0) | (rows == 0) | !hit;
 }
 
-__attribute__((target_clones("avx2", "default"))) void classify(const View& view, const Triangles& from,
-                                                                std::size_t first, std::size_t end,
-                                                                std::uint32_t* __restrict seen) {
+RADIOSITY_CLONES void classify(const View& view, const Triangles& from, std::size_t first, std::size_t end,
+                               std::uint32_t* __restrict seen) {
   const auto [o, t, b, n] = view.axes;
   for (std::size_t i = first; i < end; ++i) {
     float x[3], y[3], z[3];
@@ -175,9 +176,8 @@ __attribute__((target_clones("avx2", "default"))) void classify(const View& view
 }
 
 /// Takes from all faces what lies wholly outside one plane of a window.
-__attribute__((target_clones("avx2", "default"))) void cutAway(const glm::vec3& o, const ViewWindow& window,
-                                                               const Triangles& from, std::size_t first,
-                                                               std::size_t end, std::uint32_t* __restrict seen) {
+RADIOSITY_CLONES void cutAway(const glm::vec3& o, const ViewWindow& window, const Triangles& from, std::size_t first,
+                              std::size_t end, std::uint32_t* __restrict seen) {
   const auto planes = window.planes;
   for (std::size_t i = first; i < end; ++i) {
     bool out = false;

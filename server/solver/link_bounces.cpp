@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "common/clones.h"
 #include "server/solver/halves.h"
 #include "server/solver/link_system.h"
 
@@ -28,8 +29,7 @@ constexpr std::size_t kLanes = 8;
 
 /// Sum of products in kLanes partial sums, so that it vectorises with the same bits everywhere. In double precision:
 /// where reflectance is near one, what matters is the small difference of large sums.
-__attribute__((target_clones("avx2", "default"))) double dotDouble(const float* row, const double* x,
-                                                                   std::size_t count) {
+RADIOSITY_CLONES double dotDouble(const float* row, const double* x, std::size_t count) {
   double sum[kLanes] = {};
   std::size_t i = 0;
   for (; i + kLanes <= count; i += kLanes) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <bit>
 
+#include "common/clones.h"
+
 namespace radiosity::solver {
 namespace {
 
@@ -29,14 +31,12 @@ inline float decodeOne(std::uint16_t code) {
 }
 
 // Both vectorise; clones with and without 256-bit vectors give the same bits (no fused multiply-add in either).
-__attribute__((target_clones("avx2", "default"))) void decodeAll(const std::uint16_t* code, std::size_t count,
-                                                                 float scale, float* value) {
+RADIOSITY_CLONES void decodeAll(const std::uint16_t* code, std::size_t count, float scale, float* value) {
   for (std::size_t i = 0; i < count; ++i) value[i] = scale * decodeOne(code[i]);
 }
 
-__attribute__((target_clones("avx2", "default"))) void addScaled(const std::uint16_t* code, std::size_t count, float r,
-                                                                 float g, float b, float* __restrict red,
-                                                                 float* __restrict green, float* __restrict blue) {
+RADIOSITY_CLONES void addScaled(const std::uint16_t* code, std::size_t count, float r, float g, float b,
+                                float* __restrict red, float* __restrict green, float* __restrict blue) {
   for (std::size_t i = 0; i < count; ++i) {
     const float value = decodeOne(code[i]);
     red[i] += r * value;
@@ -45,8 +45,7 @@ __attribute__((target_clones("avx2", "default"))) void addScaled(const std::uint
   }
 }
 
-__attribute__((target_clones("avx2", "default"))) float productOf(const std::uint16_t* a, const std::uint16_t* b,
-                                                                  const float* area, std::size_t count) {
+RADIOSITY_CLONES float productOf(const std::uint16_t* a, const std::uint16_t* b, const float* area, std::size_t count) {
   constexpr std::size_t kLanes = 8;
   float sum[kLanes] = {};
   std::size_t i = 0;
@@ -60,8 +59,7 @@ __attribute__((target_clones("avx2", "default"))) float productOf(const std::uin
 }
 
 /// In double precision, so that sums over all leaves keep their digits.
-__attribute__((target_clones("avx2", "default"))) double fluxOf(const float* value, const float* area,
-                                                                std::size_t count) {
+RADIOSITY_CLONES double fluxOf(const float* value, const float* area, std::size_t count) {
   constexpr std::size_t kLanes = 8;
   double sum[kLanes] = {};
   std::size_t i = 0;

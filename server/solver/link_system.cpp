@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/check.h"
+#include "common/clones.h"
 #include "server/solver/unshot_pyramid.h"
 
 namespace radiosity::solver {
@@ -16,7 +17,7 @@ constexpr double kOnlyRounding = 1e-4;
 constexpr std::size_t kLanes = 8;
 
 /// Sum of products in kLanes partial sums, so that it vectorises with the same bits everywhere.
-__attribute__((target_clones("avx2", "default"))) float dot(const float* a, const float* b, std::size_t count) {
+RADIOSITY_CLONES float dot(const float* a, const float* b, std::size_t count) {
   float sum[kLanes] = {};
   std::size_t i = 0;
   for (; i + kLanes <= count; i += kLanes) {

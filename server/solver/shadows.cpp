@@ -7,6 +7,8 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "common/clones.h"
+
 namespace radiosity::solver {
 namespace {
 
@@ -128,9 +130,8 @@ bool Shadows::sees(const glm::vec3& point, const glm::vec3& normal) const {
 /// Raises the marks of balls that the way meets and that reach before the plane to 0 or more: segments and boxes (Kay
 /// and Kajiya 1986). Marks are numbers, and nothing is decided but by smaller and larger, since GCC 12 vectorises
 /// neither branches nor flags here. Both clones give the same marks.
-__attribute__((target_clones("avx2", "default"))) void Shadows::markMet(const Way& way, const glm::vec4& plane,
-                                                                        const Balls& balls, std::size_t begin,
-                                                                        std::size_t end, float* marks) {
+RADIOSITY_CLONES void Shadows::markMet(const Way& way, const glm::vec4& plane, const Balls& balls, std::size_t begin,
+                                       std::size_t end, float* marks) {
   const float ox = way.from.x, oy = way.from.y, oz = way.from.z;
   const float lx = way.low.x, ly = way.low.y, lz = way.low.z, hx = way.high.x, hy = way.high.y, hz = way.high.z;
   const float nx = plane.x, ny = plane.y, nz = plane.z, nd = plane.w;

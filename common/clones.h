@@ -1,0 +1,13 @@
+// Functions that the compiler makes twice, for processors with and without 256-bit vectors.
+#pragma once
+
+/// Before the definition of a function whose loops vectorise: one clone is for processors with AVX2, and which one is
+/// called is decided as the program is loaded. No fused multiply-add in either, so both give the same bits.
+///
+/// The thread sanitizer has one alone: GCC instruments what decides as well, which runs before the sanitizer does, and
+/// the program ends with a segmentation fault before main().
+#if defined(__SANITIZE_THREAD__)
+#define RADIOSITY_CLONES
+#else
+#define RADIOSITY_CLONES __attribute__((target_clones("avx2", "default")))
+#endif
