@@ -140,6 +140,16 @@ def nothing_is_left_over(tree):
                 yield f"{file}:{number}: left over: {line.strip()}"
 
 
+def clones_are_made_in_one_way(tree):
+    """What chooses between clones of a function does not survive the thread sanitizer; common/clones.h knows of it."""
+    for file in tree.files:
+        if Path(file).suffix not in {".cpp", ".h"} or file == "common/clones.h":
+            continue
+        for number, line in tree.lines(file):
+            if "target_clones" in line:
+                yield f"{file}:{number}: clones of its own; say RADIOSITY_CLONES (common/clones.h)"
+
+
 def no_machine_is_named(tree):
     for file in tree.text():
         for number, line in tree.lines(file):
@@ -165,5 +175,5 @@ def readme_explains_every_package(tree):
 
 RULES = [
     own_includes_follow_the_arrows, libraries_stay_at_home, top_level_is_fixed, files_are_short,
-    nothing_is_left_over, no_machine_is_named, readme_explains_every_package,
+    nothing_is_left_over, clones_are_made_in_one_way, no_machine_is_named, readme_explains_every_package,
 ]

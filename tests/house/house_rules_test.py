@@ -114,6 +114,14 @@ class EachRule(unittest.TestCase):
         self.write("common/a.h", "// TO" + "DO: finish\nint a;  // FIX" + "ME\n")
         self.assertEqual(len(self.complaints(house_rules.nothing_is_left_over)), 2)
 
+    def test_clones(self):
+        clones = '__attribute__((target_clones("avx2", "default")))'
+        self.write("common/clones.h", f"#define RADIOSITY_CLONES {clones}\n")
+        self.write("server/solver/a.cpp", "RADIOSITY_CLONES float a();\n")
+        self.assertEqual(self.complaints(house_rules.clones_are_made_in_one_way), [])
+        self.write("server/solver/a.cpp", f"{clones} float a();\n")
+        self.assertEqual(len(self.complaints(house_rules.clones_are_made_in_one_way)), 1)
+
     def test_machine_paths(self):
         self.write("README.md", "at/home/a, ~/home/a, ../home/b, $HOME/home/c, https://example.org/home/\n")
         self.assertEqual(self.complaints(house_rules.no_machine_is_named), [])
