@@ -1,10 +1,18 @@
 #include "tests/unit/engine/engine_driver.h"
 
+#include <algorithm>
+#include <cstdlib>
+
 #include "tests/scenes/glb_writer.h"
 #include "tests/unit/solver/quad_scene.h"
 
 namespace radiosity::test {
 namespace {
+
+std::chrono::seconds patience() {
+  const char* factor = std::getenv("RADIOSITY_TEST_PATIENCE");
+  return std::chrono::seconds(60) * std::max(1, factor != nullptr ? std::atoi(factor) : 1);
+}
 
 class ScriptedTransport final : public solver::Transport {
  public:
@@ -42,6 +50,8 @@ class ScriptedTransport final : public solver::Transport {
 };
 
 }  // namespace
+
+const std::chrono::seconds EngineTest::kPatience = patience();
 
 void Recorder::onProgress(const engine::Status& status) {
   const std::scoped_lock lock(mutex_);
