@@ -163,7 +163,9 @@ class ShutdownTest(ServiceCase):
 
         self.run_async(body())
         self.assertEqual(server.terminate(), 0, server.log())
-        self.assertNotIn("leaving", server.log())
+        # Where the machine is slow the engine itself may take longer than it is given: a line before that is true.
+        _, _, since_exit = server.log().partition(f"exit of {server.process.pid}\n")
+        self.assertNotIn("leaving", since_exit)
 
 
 if __name__ == "__main__":
