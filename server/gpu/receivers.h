@@ -12,6 +12,7 @@
 #include <span>
 #include <vector>
 
+#include "server/scene/bvh.h"
 #include "server/scene/patch_scene.h"
 
 namespace radiosity::gpu {
@@ -142,6 +143,10 @@ class Receivers {
   /// one of them is narrow, or lets light through in part, and the receiver's own pixel is right in the mean.
   [[nodiscard]] std::optional<bool> hiddenAmong(std::span<const std::uint32_t> items, const Ray& ray) const;
 
+  /// Whether anything opaque stands between, by intersection with all there is: to be asked of places on surfaces with
+  /// two sides alone.
+  [[nodiscard]] bool isBlocked(const Ray& ray) const;
+
   /// Whether the ray meets a wide facet that some neighbouring pixel shows, where that lets nothing through.
   [[nodiscard]] bool anyMeets(std::span<const std::uint32_t> items, const Ray& ray) const;
 
@@ -157,6 +162,7 @@ class Receivers {
   }
   void findBlocks(Group& group);
   void findFacets();
+  void buildTree();
   [[nodiscard]] bool behind(std::uint32_t item, const Ray& ray) const {
     const auto& plane = planes_[item];
     const float height = plane.height(ray.at);
@@ -179,6 +185,7 @@ class Receivers {
   std::vector<Plane> planes_;                      ///< by triangle
   std::vector<std::array<glm::vec3, 3>> corners_;  ///< by triangle: together, since they are looked at in any order
   std::vector<std::array<bool, 2>> absorbs_;       ///< by triangle: front, back
+  scene::Bvh opaque_;                              ///< triangles; empty where no surface has two sides
   std::vector<Facet> facets_;
   std::vector<std::uint32_t> facet_of_;  ///< by triangle
   std::vector<std::uint32_t> facet_triangles_;
