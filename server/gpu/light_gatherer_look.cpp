@@ -63,8 +63,6 @@ RADIOSITY_CLONES void projectReceivers(const PointView& view, std::size_t count,
 
 /// What of a doubt is not of the receiver (Receivers::Care): what its pixel shows may hide the light from it.
 constexpr std::uint32_t kHides = 4;
-/// A receiver this far (unit box) before an item is none of its places: its pixel's middle misses what it lies on.
-constexpr float kApart = 1.0e-5F;
 
 /// Planes of triangles, by triangle: normal and distance. Items of a hemicube, by pixel.
 struct Seen {
@@ -143,7 +141,8 @@ bool LightGatherer::hidden(std::size_t i, const glm::vec3& light, std::span<cons
   if ((lit_.doubt[i] & Receivers::kInGap) != 0) return hiddenFromGap(i, light, items, size);
   // Beside a silhouette one looks past what closes a hollow whose inside is a surface as well.
   if ((lit_.doubt[i] & kHides) == 0) return hiddenAtSilhouette(i, light, items, size);
-  return couldHide(item, rayTo(i, light, size));
+  const auto ray = rayTo(i, light, size);
+  return couldHide(item, ray) || ((lit_.care[i] & Receivers::kTwoSided) != 0 && receivers_->isBlocked(ray));
 }
 
 /// An item behind whose plane, seen from the light, a receiver lies.
@@ -179,10 +178,13 @@ Receivers::Ray LightGatherer::rayTo(std::size_t i, const glm::vec3& light, std::
 }
 
 /// The middle of a receiver's pixel misses the receiver, and perhaps everything. Where the ray to it meets a wide facet
-/// that a neighbouring pixel shows, that hides it: along the edges of a closed room, what lies behind its walls.
+/// that a neighbouring pixel shows, that hides it: along the edges of a closed room, what lies behind its walls. Of a
+/// surface with two sides one may be the inside of a thin shell, whose bevels no pixel need show: there all is asked.
 bool LightGatherer::hiddenAtSilhouette(std::size_t i, const glm::vec3& light, std::span<const std::uint32_t> items,
                                        std::size_t size) const {
-  return receivers_->anyMeets(itemsAround(i, items, size), rayTo(i, light, size));
+  const auto ray = rayTo(i, light, size);
+  if ((lit_.care[i] & Receivers::kTwoSided) != 0 && receivers_->isBlocked(ray)) return true;
+  return receivers_->anyMeets(itemsAround(i, items, size), ray);
 }
 
 /// Pixels blur the edges of shadows, which is right in the mean: what one leaf loses its neighbour gains. Not beside

@@ -12,12 +12,15 @@
 #include <span>
 #include <vector>
 
+#include "server/scene/bvh.h"
 #include "server/scene/patch_scene.h"
 
 namespace radiosity::gpu {
 
 /// A receiver this far (unit box) behind a plane still counts as lying in it.
 inline constexpr float kInPlane = 2.0e-6F;
+/// One this far (unit box) before an item is none of its places: its pixel's middle misses what it lies on.
+inline constexpr float kApart = 1.0e-5F;
 
 class Receivers {
  public:
@@ -132,15 +135,22 @@ class Receivers {
     return item != scene::kNone && behind(item, ray);
   }
 
-  /// The same near an edge, for the receiver's own pixel. Facets wide enough for pixels to show them are intersected
-  /// with the ray, so that shadows end where the geometry does, and nothing leaks along the edges of a room; narrow
-  /// ones (slivers, dense meshes), and places of partial opacity, count by what the pixel shows, which is right in the
-  /// mean.
+  /// Whether a receiver lies before the plane of what its pixel shows: the pixel looks past what it lies on.
+  [[nodiscard]] bool liesApart(std::uint32_t item, const Ray& ray) const { return before(item, ray) > kApart; }
+
+  /// The same as hides() near an edge, for the receiver's own pixel. Facets wide enough for pixels to show them are
+  /// intersected with the ray, so that shadows end where the geometry does, and nothing leaks along the edges of a
+  /// room; narrow ones (slivers, dense meshes), and places of partial opacity, count by what the pixel shows, which is
+  /// right in the mean.
   [[nodiscard]] bool hidesAtEdge(std::uint32_t item, const Ray& ray) const;
 
   /// Whether one of the facets that the pixels around a receiver show hides the light from it, by intersection. None:
   /// one of them is narrow, or lets light through in part, and the receiver's own pixel is right in the mean.
   [[nodiscard]] std::optional<bool> hiddenAmong(std::span<const std::uint32_t> items, const Ray& ray) const;
+
+  /// Whether anything opaque stands between, by intersection with all there is: to be asked of places on surfaces with
+  /// two sides alone.
+  [[nodiscard]] bool isBlocked(const Ray& ray) const;
 
   /// Whether the ray meets a wide facet that some neighbouring pixel shows, where that lets nothing through.
   [[nodiscard]] bool anyMeets(std::span<const std::uint32_t> items, const Ray& ray) const;
@@ -157,12 +167,16 @@ class Receivers {
   }
   void findBlocks(Group& group);
   void findFacets();
-  [[nodiscard]] bool behind(std::uint32_t item, const Ray& ray) const {
+  void buildTree();
+  /// Height above the plane, on the light's side of it.
+  [[nodiscard]] float before(std::uint32_t item, const Ray& ray) const {
     const auto& plane = planes_[item];
     const float height = plane.height(ray.at);
     const float rise = glm::dot(plane.normal, ray.way) * ray.reach;  // from the receiver to the light
-    const bool light_above = height + rise > 0.0F;
-    return (light_above ? height : -height) < -kInPlane && risesBefore(item, ray.at, ray.normal);
+    return height + rise > 0.0F ? height : -height;
+  }
+  [[nodiscard]] bool behind(std::uint32_t item, const Ray& ray) const {
+    return before(item, ray) < -kInPlane && risesBefore(item, ray.at, ray.normal);
   }
   [[nodiscard]] bool wide(std::uint32_t item, const Ray& ray) const;
   /// What the ray finds of the item's facet; kChance: a place of partial opacity.
@@ -179,6 +193,7 @@ class Receivers {
   std::vector<Plane> planes_;                      ///< by triangle
   std::vector<std::array<glm::vec3, 3>> corners_;  ///< by triangle: together, since they are looked at in any order
   std::vector<std::array<bool, 2>> absorbs_;       ///< by triangle: front, back
+  scene::Bvh opaque_;                              ///< triangles; empty where no surface has two sides
   std::vector<Facet> facets_;
   std::vector<std::uint32_t> facet_of_;  ///< by triangle
   std::vector<std::uint32_t> facet_triangles_;

@@ -80,7 +80,7 @@ class Burial {
       : patches_(patches), pieces_(pieces), solids_(patches, solid), coincidence_(coincidence) {}
 
   void run() {
-    if (solids_.empty()) return;
+    if (solids_.empty() && !coincidence_.found()) return;
     first_piece_.assign(patches_.leaves.size() + 1, 0);
     for (const LeafPiece& piece : pieces_) ++first_piece_[piece.leaf + 1];
     for (std::size_t i = 1; i < first_piece_.size(); ++i) first_piece_[i] += first_piece_[i - 1];
@@ -133,7 +133,7 @@ class Burial {
   }
 
   /// Splits a surface into nodes that no other solid comes near (all visible or all buried: one test) and single leaves
-  /// in contact with one.
+  /// in contact with one, or with an earlier surface that covers some of them.
   void classify(std::uint32_t s) {
     const NodeBoxes boxes(patches_, s, pieces_, first_piece_);
     const Surface& surface = patches_.surfaces[s];
@@ -146,7 +146,8 @@ class Burial {
     const Surface& surface = patches_.surfaces[s];
     const Bounds box = boxes.box(level, x, y);
     if (box.empty()) return;
-    if (!solids_.near(box, s)) {
+    const bool covered = side == 0 && coincidence_.isCovered(s);
+    if (!covered && !solids_.near(box, s)) {
       settleUniform(s, side, level, x, y);
       return;
     }

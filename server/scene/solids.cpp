@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
 #include <utility>
 
 #include "server/scene/coverage.h"
@@ -18,6 +20,9 @@ constexpr double kLift = 2e-5;
 constexpr double kGrazing = 2e-4;
 /// Rays end well outside of the unit box.
 constexpr double kLongest = 8.0;
+/// What lies on each other faces the same way: cosine of the angle between. Planes of such are no farther apart where
+/// the scene is (unit box) unless they meet at an angle.
+constexpr float kSameWay = 0.9999F, kSamePlane = 1e-5F;
 /// So many places of a leaf are looked at for what covers it.
 constexpr std::uint32_t kPlaces = 16;
 
@@ -134,8 +139,9 @@ Coincidence::Coincidence(PatchScene& patches) : patches_(patches) {
 void Coincidence::run() {
   std::uint64_t count = 0;
   std::pair<std::uint32_t, std::uint32_t> first{kNone, kNone};
+  const auto coplanar = coplanarWithEarlier();
   for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
-    const std::uint32_t other = coveredBy(s);
+    const std::uint32_t other = coveredBy(s, coplanar[s]);
     covered_.push_back(other != kNone);
     if (other == kNone) continue;
     if (count++ == 0) first = {other, s};
@@ -163,7 +169,7 @@ std::uint32_t Coincidence::triangleOver(std::uint32_t s, const glm::vec3& positi
   std::uint32_t earliest = s, over = kNone;
   for (const RayHit& hit : hits) {
     const std::uint32_t other = patches_.triangle_surface[hit.triangle];
-    if (other >= earliest || glm::dot(patches_.triangles[hit.triangle].normal, normal) <= 0.9999F) continue;
+    if (other >= earliest || glm::dot(patches_.triangles[hit.triangle].normal, normal) <= kSameWay) continue;
     earliest = other;
     over = hit.triangle;
   }
@@ -190,11 +196,41 @@ void Coincidence::keepCovered() {
   }
 }
 
-/// An earlier surface found right at some of this surface's leaf points.
-std::uint32_t Coincidence::coveredBy(std::uint32_t s) const {
+/// By surface: planar, in one plane with an earlier one that reaches into its bounds, and facing the same way.
+std::vector<bool> Coincidence::coplanarWithEarlier() const {
+  struct Plane {
+    float distance;
+    std::uint32_t surface;
+    glm::vec3 normal;
+  };
+  std::vector<Plane> planes;
+  for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
+    const Surface& surface = patches_.surfaces[s];
+    if (!surface.planar) continue;
+    const TriangleFrame& frame = patches_.triangles[surface.first_triangle];
+    planes.push_back({glm::dot(frame.normal, frame.origin), s, frame.normal});
+  }
+  std::ranges::sort(planes, {}, [](const Plane& plane) { return std::pair(plane.distance, plane.surface); });
+  std::vector<bool> found(patches_.surfaces.size(), false);
+  for (std::size_t i = 0; i < planes.size(); ++i) {
+    const Surface& a = patches_.surfaces[planes[i].surface];
+    for (auto k = i + 1; k < planes.size() && planes[k].distance - planes[i].distance < kSamePlane; ++k) {
+      const Surface& b = patches_.surfaces[planes[k].surface];
+      if (glm::dot(planes[i].normal, planes[k].normal) <= kSameWay) continue;
+      if (glm::any(glm::greaterThan(a.bounds_min, b.bounds_max + kSamePlane)) ||
+          glm::any(glm::greaterThan(b.bounds_min, a.bounds_max + kSamePlane)))
+        continue;
+      found[std::max(planes[i].surface, planes[k].surface)] = true;
+    }
+  }
+  return found;
+}
+
+/// An earlier surface found right at some of this surface's leaf points, or `closely`, at one of them at least.
+std::uint32_t Coincidence::coveredBy(std::uint32_t s, bool closely) const {
   const Surface& surface = patches_.surfaces[s];
   const std::uint32_t leaves = surface.width * surface.height;
-  const std::uint32_t step = std::max(1U, leaves / 16);
+  const std::uint32_t step = closely ? 1U : std::max(1U, leaves / 16);
   Hits hits;
   for (std::uint32_t i = step / 2; i < leaves; i += step) {
     const LeafPoint& point = patches_.leaves[surface.first_leaf + i];

@@ -62,6 +62,9 @@ class Coincidence {
   /// Fills PatchScene::covered, when areas are known.
   void keepCovered();
 
+  /// Whether there are any.
+  [[nodiscard]] bool found() const { return std::ranges::find(covered_, true) != covered_.end(); }
+
   /// Whether its front is covered somewhere.
   [[nodiscard]] bool isCovered(std::uint32_t s) const { return covered_[s]; }
 
@@ -75,7 +78,8 @@ class Coincidence {
                                         Hits& hits) const;
   [[nodiscard]] std::uint32_t triangleOver(std::uint32_t s, const glm::vec3& position, const glm::vec3& normal,
                                            Hits& hits) const;
-  [[nodiscard]] std::uint32_t coveredBy(std::uint32_t s) const;
+  [[nodiscard]] std::vector<bool> coplanarWithEarlier() const;
+  [[nodiscard]] std::uint32_t coveredBy(std::uint32_t s, bool closely) const;
 
   PatchScene& patches_;
   Bvh tree_;

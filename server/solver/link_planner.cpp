@@ -171,6 +171,7 @@ void LinkPlanner::addShooter(const Node& node, LinkSystem& system, const UnshotP
   shooter.area = static_cast<double>(patches.node_area[id]);
   shooter.sent.fill(unshot.flux(id) / patches.node_area[id]);
   shooter.certain = certain;
+  shooter.resolution = resolution_;
   shooter.most_bytes = memory.mostBytes(node.place.side);
   const std::size_t columns = static_cast<std::size_t>(in[0]) + static_cast<std::size_t>(in[1]);
   if (memory.isFull() || !memory.takeShooters(std::span(&shooter, 1), columns, system)) {
@@ -311,6 +312,7 @@ void LinkPlanner::split(const NodePlace& place, LinkSystem& system, const Unshot
       shooter.area = static_cast<double>(patches.node_area[id]);
       shooter.sent.fill(unshot.flux(id) / patches.node_area[id]);
       shooter.certain = true;
+      shooter.resolution = resolution_;
       shooter.most_bytes = memory.mostBytes(place.side);
       children.push_back(shooter);
     }

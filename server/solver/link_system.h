@@ -40,6 +40,7 @@ struct Shooter {
   std::uint32_t source = scene::kNone;     ///< index of the light without extent, or kNone; `area` is its flux for one
   std::uint32_t parent = scene::kNone;     ///< nearest shooter above
   bool certain = false;                    ///< never plays roulette
+  std::uint32_t resolution = 0;            ///< N of a node's item buffers
   double area = 0.0;                       ///< that shines, unit box squared
   std::array<LinkColumn, 2> column;        ///< by half
   std::array<double, 2> weight{1.0, 1.0};  ///< 0: does not play in that half

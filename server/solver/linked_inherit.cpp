@@ -144,6 +144,7 @@ void LinkedSolver::inheritNodes(LinkedSolver& former, const Renumbering& numbers
     const Side& side = sides_[shooter.place.side];
     if (patches_->node_area[nodeId(side, shooter.place)] <= 0.0F) continue;  // buried
     shooter.certain = shooters[n].certain;
+    shooter.resolution = shooters[n].resolution;
     shooter.mean = shooters[n].mean;
     shooter.sent = shooters[n].sent;
     shooter.most_bytes = memory_.mostBytes(shooter.place.side);

@@ -102,7 +102,7 @@ void LinkedSolver::addSamples(const Repair& repair, ShotBatch& batch) const {
   const auto& shooter = system_.shooters()[repair.shooter];
   if (!shooter.isLight()) {
     for (std::uint32_t i = 0; i < repair.samples; ++i)
-      shots_.add(shooter.place, repair.half, i, 1, settings_.planner.node_resolution, batch);
+      shots_.add(shooter.place, repair.half, i, 1, shooter.resolution, batch);
     return;
   }
   std::uint32_t points = 1 + (repair.samples - 1) % kLightPoints;
@@ -131,8 +131,7 @@ void LinkedSolver::findCutLinks(RepairBatch& repairs) const {
       addSamples(repair, batch);
       points.clear();
       for (const auto& frame : batch.points) points.push_back(frame.origin);
-      shadows.find(points, batch.gather.front().normal, 0.0F, settings_.planner.node_resolution, scratch,
-                   repairs.leaves[i]);
+      shadows.find(points, batch.gather.front().normal, 0.0F, shooter.resolution, scratch, repairs.leaves[i]);
     }
   });
 }

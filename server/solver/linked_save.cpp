@@ -12,8 +12,8 @@ constexpr std::uint32_t kKind = 0x4b4e494cU;  // "LINK"
 /// All of a shooter but its links.
 template <typename Archive, typename Self>
 void visitShooter(Archive& archive, Self& shooter) {
-  archive(shooter.place, shooter.light, shooter.source, shooter.certain, shooter.area, shooter.weight, shooter.own,
-          shooter.mean, shooter.sent, shooter.most_bytes, shooter.products);
+  archive(shooter.place, shooter.light, shooter.source, shooter.certain, shooter.resolution, shooter.area,
+          shooter.weight, shooter.own, shooter.mean, shooter.sent, shooter.most_bytes, shooter.products);
 }
 
 }  // namespace

@@ -53,6 +53,7 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, Tra
       irradiance_(patches_->nodeCount(), glm::vec3(0.0F)) {
   slice_ = std::clamp<std::size_t>(kFirstTriangles / std::max<std::size_t>(1, patches_->triangles.size()), 2, 16);
   fewest_a_slice_ = std::min(slice_, kFewestMeasurements);
+  planner_.setTarget(settings_.target_error);
 }
 
 LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
@@ -107,7 +108,7 @@ Result<void> LinkedSolver::measureSlice() {
     if (shooter.isLight()) {
       shots_.add(lights_[shooter.light], want.half, want.index, want.points, settings_.planner.light_resolution, batch);
     } else {
-      shots_.add(shooter.place, want.half, want.index, want.points, settings_.planner.node_resolution, batch);
+      shots_.add(shooter.place, want.half, want.index, want.points, shooter.resolution, batch);
     }
     (batch.gather.size() > gathered.size() ? gathered : scattered).push_back(&want);
   }
@@ -284,6 +285,7 @@ StepOutcome LinkedSolver::chooseFurther() {
 
 void LinkedSolver::setTargetError(double target) {
   settings_.target_error = target;
+  planner_.setTarget(target);
   if (variation_) tryNow([this] { updateVariation(); });
   if (phase_ != Phase::kDone || from_links_ != FromLinks::kNo) return;
   tryNow([this] {

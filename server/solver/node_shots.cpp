@@ -11,7 +11,7 @@ namespace radiosity::solver {
 namespace {
 
 /// Nodes of a block of so many by so many look at the same place of a receiver, those of the next block at the
-/// opposite place.
+/// opposite place, or at other spots.
 constexpr std::uint32_t kJitterBlock = 4;
 
 /// The halves draw rows of spots each for itself, and never from the same quarter at once. The opposite row would not
@@ -23,6 +23,11 @@ std::uint32_t rowOf(std::uint32_t index, std::uint64_t key, bool second) {
   const std::uint32_t row = spotRow(sobol4(index, mixKeys(key, 4)).x);
   constexpr std::uint32_t kQuarter = scene::kSpotRows / 4;
   return row / kQuarter != first / kQuarter ? row : (row + 2 * kQuarter) % scene::kSpotRows;
+}
+
+std::uint64_t blockOf(const NodePlace& node) {
+  return (std::uint64_t{node.level} << 58) ^ (std::uint64_t{node.y / kJitterBlock} << 29) ^
+         std::uint64_t{node.x / kJitterBlock};
 }
 
 }  // namespace
@@ -100,11 +105,12 @@ void NodeShots::addGather(const NodePlace& node, std::size_t half, std::uint32_t
   const std::uint64_t node_key = mixKeys(key(node), half);
   // The halves look at opposite places of a texel: what is linear in it cancels in their mean and shows in their
   // difference. So do blocks of nodes, or it would show for the whole surface at once; inside a block all look at one
-  // place, since what single nodes bring to it changes steeply close by, and the sum of neighbours does not.
+  // place, since what single nodes bring to it changes steeply close by, and the sum of neighbours does not. Of spots
+  // each block has its own rows: few rows are a poor mean over a texel that something covers in part.
   const glm::dvec4 jitter = sobol4(index, mixKeys(mixKeys(seed_, side.key), 2));
   const bool opposite = (half + node.x / kJitterBlock + node.y / kJitterBlock) % 2 != 0;
   shot.receiver_jitter = glm::vec2(opposite ? 1.0 - glm::dvec2(jitter) : glm::dvec2(jitter));
-  shot.spot_row = rowOf(index, mixKeys(seed_, side.key), opposite);
+  shot.spot_row = rowOf(index, mixKeys(mixKeys(seed_, side.key), blockOf(node)), half != 0);
   shot.first_point = static_cast<std::uint32_t>(batch.points.size());
   shot.point_count = points;
   for (std::uint32_t p = 0; p < points; ++p) {

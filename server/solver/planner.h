@@ -26,12 +26,11 @@ struct PlannerSettings {
       128;  ///< where links are kept: at first no shooter has more than one in so many parts of the power
   std::uint32_t resolution = 64;         ///< N of a hemicube that carries a full share of power
   std::uint32_t light_resolution = 128;  ///< N of the item buffers of gathered light
-  std::uint32_t node_resolution =
-      32;                    ///< N of the item buffers of gathered nodes: a fifth cheaper than 64 for the same error
-  bool gather_nodes = true;  ///< nodes of planar surfaces are gathered as polygons; false: all is scattered
-  std::uint32_t light_points = 16;  ///< points on lights in a round and half, shared by power
-  double variation_share = 0.25;    ///< split a node whose inner variation weighs this part of a share
-  float level_bias = 0.0F;          ///< positive: coarser links
+  std::uint32_t node_resolution = 32;    ///< N of the item buffers of gathered nodes, at least (LinkPlanner::setTarget)
+  bool gather_nodes = true;              ///< nodes of planar surfaces are gathered as polygons; false: all is scattered
+  std::uint32_t light_points = 16;       ///< points on lights in a round and half, shared by power
+  double variation_share = 0.25;         ///< split a node whose inner variation weighs this part of a share
+  float level_bias = 0.0F;               ///< positive: coarser links
 };
 
 /// What a wave skipped, for reports.

@@ -267,6 +267,20 @@ TEST_F(Gather, TheInsideOfAClosedBoxOfTwoSidedWallsStaysDark) {
   }
 }
 
+// A table top: pixels are wider than its rim and its bevel together, so that most show what lies beyond.
+TEST_F(Gather, TheInsideOfAThinBevelledPlateOfTwoSidedFacesStaysDark) {
+  SceneBuilder builder;
+  builder.add({{-1.0F, -1.0F, -0.5F}, {2, 0, 0}, {0, 2, 0}, 20, 20});
+  const auto plate = builder.addBevelledPlate();
+  const auto lamp = builder.add({{-0.1F, -0.1F, 0.4F}, {0, 0.2F, 0}, {0.2F, 0, 0}, 1, 1});
+  const auto scene = builder.build();
+  std::mt19937 random(11);
+  const auto flux = run(scene, gatherFrom(*scene, lamp, 8, random));
+  // What is no farther from a bevel's plane than kInPlane counts as lying in it: a thousandth of the rim's height, and
+  // of the light that falls on the rim, which is a hundredth of all.
+  EXPECT_LT(shareInside(*scene, flux, plate), 1e-5);
+}
+
 TEST_F(Gather, AClosedBoxReceivesWhatTheLampEmits) {
   SceneBuilder builder;
   builder.addBox(glm::vec3(-0.5F), glm::vec3(0.5F), 48, true);
