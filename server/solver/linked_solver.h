@@ -148,6 +148,7 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] bool advanceSolution();
   [[nodiscard]] bool settleFromLinks();
   [[nodiscard]] bool finishEdit();
+  [[nodiscard]] bool mayGoWithout();
   void lightLeaves();
   void takeMaterials(const scene::PatchMaterials& materials);
   void takeLights();
