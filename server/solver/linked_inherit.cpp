@@ -53,7 +53,7 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
   takeMaterials(materials);
   takeSources(sources);
   inheritNodes(former, numbers);
-  planRepairs(former.isRepairing() ? 0.0 : former.fieldNorm());
+  planRepairs(former.isRepairing() ? 0.0 : former.fieldNorm(), ChangeReach(*former.patches_, *patches_, map));
   for (auto& half : half_) half.assign(system_.emission().size(), glm::vec3(0.0F));
   findUnshot();
   solveAnew();
@@ -179,7 +179,8 @@ void LinkedSolver::planRepairsOf(const Shooter& from, std::uint32_t old_index, s
     if (samples == 0) continue;
     const bool overtaken = unfinished.samples > 0;
     const bool was_altered = overtaken && !is_light && isAltered(shooter.place, earlier_shadows_->change());
-    repairs_.push_back({index, old_index, half, samples, whole || was_altered || unfinished.whole, overtaken});
+    repairs_.push_back({index, old_index, half, samples, whole || was_altered || unfinished.whole, overtaken,
+                        overtaken ? unfinished.reach : 0.0});
   }
 }
 

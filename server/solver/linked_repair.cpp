@@ -52,7 +52,7 @@ struct LinkedSolver::RepairBatch {
 
 /// Leaves in repairs_ what is needed, and makes room for what it may bring.
 /// `norm`: of the irradiance that there was, or 0 where it was not known.
-void LinkedSolver::planRepairs(double norm) {
+void LinkedSolver::planRepairs(double norm, const ChangeReach& change) {
   system_.begin();
   memory_.begin(system_);
   affected_ = 0;
@@ -64,8 +64,10 @@ void LinkedSolver::planRepairs(double norm) {
       return true;
     }
     affected_ += shooter.isLight() ? 1 + (repair.samples - 1) / kLightPoints : repair.samples;
-    repair.reach = reachOf(repair);
     return false;
+  });
+  inBothHalves([&](std::size_t worker) {
+    for (auto r = worker; r < repairs_.size(); r += 2) repairs_[r].reach += reachOf(repairs_[r], change);
   });
   planDue(norm);
 }
