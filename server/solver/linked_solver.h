@@ -115,6 +115,7 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] bool isAltered(const NodePlace& place, const GeometryChange& change) const;
   void inheritLights(LinkedSolver& former, const Renumbering& numbers);
   void inheritNodes(LinkedSolver& former, const Renumbering& numbers);
+  void inheritVariation(const LinkedSolver& former, const Renumbering& numbers);
   void planRepairsOf(const Shooter& from, std::uint32_t old_index, std::uint32_t index, bool whole,
                      const Renumbering& numbers);
   void inheritColumns(LinkedSolver& former, std::size_t first_repair, const Renumbering& numbers);
@@ -213,6 +214,7 @@ class LinkedSolver final : public Solver {
   std::array<std::vector<glm::vec3>, 2> half_;     // irradiance by leaf value
   std::vector<glm::vec3> irradiance_;              // by node
   std::unique_ptr<LeafVariation> variation_;       // once little else is in error
+  std::unique_ptr<LeafVariation> next_variation_;  // after an edit of geometry, until then
   std::vector<glm::vec3> corrected_;               // irradiance by node, with what leaves lack; empty: nothing
   bool refined_ = false;                           // more paths were traced: what is next is to be chosen anew
   double square_ = 0.0;                            // of the light that it was brought up to date with, times area
