@@ -64,8 +64,6 @@ __attribute__((target_clones("avx2", "default"))) void projectReceivers(const Po
 
 /// What of a doubt is not of the receiver (Receivers::Care): what its pixel shows may hide the light from it.
 constexpr std::uint32_t kHides = 4;
-/// A receiver this far (unit box) before an item is none of its places: its pixel's middle misses what it lies on.
-constexpr float kApart = 1.0e-5F;
 
 /// Planes of triangles, by triangle: normal and distance. Items of a hemicube, by pixel.
 struct Seen {

@@ -53,8 +53,9 @@ struct PixelPlace {
 };
 
 /// By the receiver's own pixel and the four whose samples lie around it. Near an edge, all sixteen: where three edges
-/// meet, the one that matters may not be among the four.
-bool isHidden(const Receivers& receivers, const PixelPlace& place, const Receivers::Ray& ray) {
+/// meet, the one that matters may not be among the four. Of a surface with two sides one may be the inside of a wall
+/// thinner than a pixel: where the pixels do not show it, or show an edge, all is asked.
+bool isHidden(const Receivers& receivers, const PixelPlace& place, const Receivers::Ray& ray, bool two_sided) {
   const float left = std::floor(place.x - 0.5F), below = std::floor(place.y - 0.5F);
   const auto own = place.item(place.x, place.y);
   std::array<std::uint32_t, 4> around{};
@@ -63,13 +64,14 @@ bool isHidden(const Receivers& receivers, const PixelPlace& place, const Receive
     around[i] = place.item(left + static_cast<float>(i % 2), below + static_cast<float>(i / 2));
     edge = edge || around[i] != own;
   }
-  if (!edge && own != RAD_ITEM_NONE) return receivers.hides(own, ray);
+  if (!edge && own != RAD_ITEM_NONE)
+    return receivers.hides(own, ray) || (two_sided && receivers.liesApart(own, ray) && receivers.isBlocked(ray));
   if (receivers.hidesAtEdge(own, ray) || receivers.anyMeets(around, ray)) return true;
   std::array<std::uint32_t, 16> wider{};
   for (std::size_t i = 0; i < 16; ++i) {
     wider[i] = place.item(left - 1.0F + static_cast<float>(i % 4), below - 1.0F + static_cast<float>(i / 4));
   }
-  return receivers.anyMeets(wider, ray);
+  return receivers.anyMeets(wider, ray) || (two_sided && receivers.isBlocked(ray));
 }
 
 /// A hemicube's image, looked up by direction in the axes of the hemicube (the cells of hemicube_weights.h).
@@ -121,6 +123,7 @@ void PunctualGatherer::lightGroup(const solver::PointShot& shot, const Receivers
   const HemicubeItems image(items, shot.resolution, shot.frame.lattice);
   for (std::size_t i = group.first; i < group.first + group.count; ++i) {
     const auto& receiver = receivers_->all()[i];
+    const bool two_sided = (receivers_->careOf(receiver) & Receivers::kTwoSided) != 0;
     const auto& frame = patches.triangles[receiver.triangle];
     if (surface.planar && group.side * glm::dot(frame.normal, o - frame.origin) <= 0.0F) return;  // all turns away
     const auto middle = receivers_->point(receiver, glm::vec2(0.5F)) - o;
@@ -144,7 +147,7 @@ void PunctualGatherer::lightGroup(const solver::PointShot& shot, const Receivers
       const float strength = coneFalloff(shot, local.z / distance) * rangeFade(shot, distance);
       if (strength <= 0.0F) continue;
       const float pixel_size = 2.0F * distance / static_cast<float>(shot.resolution);
-      if (isHidden(*receivers_, image.at(local), {at, normal, -d, 1.0F, pixel_size})) continue;
+      if (isHidden(*receivers_, image.at(local), {at, normal, -d, 1.0F, pixel_size}, two_sided)) continue;
       sum += strength * (near_mean >= 0.0F ? near_mean : cosine / square);
     }
     sum_[i] += sum / static_cast<float>(count);
@@ -224,6 +227,7 @@ void PunctualGatherer::lightGroup(const solver::ParallelShot& shot, const Parall
   const auto sky_point = static_cast<std::uint32_t>(view_index) % shot.receivers.count;
   for (std::size_t i = group.first; i < group.first + group.count; ++i) {
     const auto& receiver = receivers_->all()[i];
+    const bool two_sided = (receivers_->careOf(receiver) & Receivers::kTwoSided) != 0;
     if (surface.planar && group.side * glm::dot(patches.triangles[receiver.triangle].normal, view.direction) <= 0.0F)
       return;
     const std::uint32_t first = sky ? sky_point : 0;
@@ -238,7 +242,7 @@ void PunctualGatherer::lightGroup(const solver::ParallelShot& shot, const Parall
       const PixelPlace place{items.data(), size, size, glm::dot(axes.right, d) + axes.shift.x,
                              glm::dot(axes.up, d) + axes.shift.y};
       // Far enough to be beyond everything: the scene fits a box of side 1 or so.
-      const bool hidden = isHidden(*receivers_, place, {at, normal, view.direction, 4.0F, pixel_size});
+      const bool hidden = isHidden(*receivers_, place, {at, normal, view.direction, 4.0F, pixel_size}, two_sided);
       visible += hidden ? 0.0F : cosine;
     }
     sum_[i] += visible / static_cast<float>(count);

@@ -19,6 +19,8 @@ namespace radiosity::gpu {
 
 /// A receiver this far (unit box) behind a plane still counts as lying in it.
 inline constexpr float kInPlane = 2.0e-6F;
+/// One this far (unit box) before an item is none of its places: its pixel's middle misses what it lies on.
+inline constexpr float kApart = 1.0e-5F;
 
 class Receivers {
  public:
@@ -133,10 +135,13 @@ class Receivers {
     return item != scene::kNone && behind(item, ray);
   }
 
-  /// The same near an edge, for the receiver's own pixel. Facets wide enough for pixels to show them are intersected
-  /// with the ray, so that shadows end where the geometry does, and nothing leaks along the edges of a room; narrow
-  /// ones (slivers, dense meshes), and places of partial opacity, count by what the pixel shows, which is right in the
-  /// mean.
+  /// Whether a receiver lies before the plane of what its pixel shows: the pixel looks past what it lies on.
+  [[nodiscard]] bool liesApart(std::uint32_t item, const Ray& ray) const { return before(item, ray) > kApart; }
+
+  /// The same as hides() near an edge, for the receiver's own pixel. Facets wide enough for pixels to show them are
+  /// intersected with the ray, so that shadows end where the geometry does, and nothing leaks along the edges of a
+  /// room; narrow ones (slivers, dense meshes), and places of partial opacity, count by what the pixel shows, which is
+  /// right in the mean.
   [[nodiscard]] bool hidesAtEdge(std::uint32_t item, const Ray& ray) const;
 
   /// Whether one of the facets that the pixels around a receiver show hides the light from it, by intersection. None:
@@ -163,12 +168,15 @@ class Receivers {
   void findBlocks(Group& group);
   void findFacets();
   void buildTree();
-  [[nodiscard]] bool behind(std::uint32_t item, const Ray& ray) const {
+  /// Height above the plane, on the light's side of it.
+  [[nodiscard]] float before(std::uint32_t item, const Ray& ray) const {
     const auto& plane = planes_[item];
     const float height = plane.height(ray.at);
     const float rise = glm::dot(plane.normal, ray.way) * ray.reach;  // from the receiver to the light
-    const bool light_above = height + rise > 0.0F;
-    return (light_above ? height : -height) < -kInPlane && risesBefore(item, ray.at, ray.normal);
+    return height + rise > 0.0F ? height : -height;
+  }
+  [[nodiscard]] bool behind(std::uint32_t item, const Ray& ray) const {
+    return before(item, ray) < -kInPlane && risesBefore(item, ray.at, ray.normal);
   }
   [[nodiscard]] bool wide(std::uint32_t item, const Ray& ray) const;
   /// What the ray finds of the item's facet; kChance: a place of partial opacity.

@@ -252,6 +252,19 @@ TEST_F(Punctual, NothingLeaksIntoAClosedRoomAlongItsEdges) {
   }
 }
 
+TEST_F(Punctual, TheInsideOfAThinPlateOfTwoSidedFacesStaysDark) {
+  SceneBuilder builder;
+  const auto plate = builder.addBevelledPlate();
+  builder.add({{-1.0F, -1.0F, -0.5F}, {2, 0, 0}, {0, 2, 0}, 20, 20});
+  const auto scene = builder.build();
+  solver::LightSources sky, lamp, sun;
+  sky.sky = {glm::vec3(1.0F), glm::vec3(1.0F)};
+  lamp.lights = {{.position = {0.1, 0.05, 0.4}, .intensity = glm::vec3(1e5F)}};
+  sun.lights = {{.kind = scene::LightKind::kDirectional, .direction = {0.2, 0.3, -0.9}, .intensity = glm::vec3(1e5F)}};
+  for (const auto& sources : {sky, lamp, sun})
+    EXPECT_LT(shareInside(*scene, runRound(scene, sources), plate), 3e-5);  // of the sky's light the rim has more
+}
+
 TEST_F(Punctual, AHalfPlaneHidesAPointLightBehindAStraightEdge) {
   SceneBuilder builder;
   const auto floor = builder.add({{-0.5F, -0.5F, -0.5F}, {1, 0, 0}, {0, 1, 0}, 64, 16});

@@ -82,6 +82,36 @@ std::shared_ptr<const scene::PatchScene> SceneBuilder::build() const {
   return scene;
 }
 
+std::uint32_t SceneBuilder::addBevelledPlate() {
+  const float wide = 0.2F, narrow = 0.198F, bottom = -0.2F, rim = -0.197F, top = -0.195F;
+  const auto at = [](const glm::vec2& out, float across, float along, float z) {
+    return glm::vec3(out * across + glm::vec2(-out.y, out.x) * along, z);
+  };
+  const std::uint32_t first = add({{-wide, wide, bottom}, {2 * wide, 0, 0}, {0, -2 * wide, 0}, 16, 16, true});
+  add({{-narrow, -narrow, top}, {2 * narrow, 0, 0}, {0, 2 * narrow, 0}, 16, 16, true});
+  for (const auto& out : {glm::vec2(1, 0), glm::vec2(0, 1), glm::vec2(-1, 0), glm::vec2(0, -1)}) {
+    const auto low = at(out, wide, -wide, bottom), ridge = at(out, wide, -wide, rim);
+    const auto along = at(out, 0.0F, 2 * wide, 0.0F);
+    add({low, along, ridge - low, 16, 1, true});
+    // As wide as the plate: it reaches beyond the bevel of the next side, and closes the corner.
+    add({ridge, along, at(out, narrow, -wide, top) - ridge, 16, 1, true});
+  }
+  return first;
+}
+
+double shareInside(const scene::PatchScene& scene, const solver::FluxAccumulators& flux, std::uint32_t plate) {
+  const glm::vec3 middle(0.0F, 0.0F, -0.1985F);
+  double inside = 0.0, outside = 0.0;
+  for (auto s = plate; s < plate + 10; ++s) {
+    const auto& face = scene.surfaces[s];
+    const auto way = middle - 0.5F * (face.bounds_min + face.bounds_max);
+    const int inner = glm::dot(scene.triangles[face.first_triangle].normal, way) > 0.0F ? 0 : 1;
+    inside += fluxAt(scene, flux, s, kFluxScale, inner);
+    outside += fluxAt(scene, flux, s, kFluxScale, 1 - inner);
+  }
+  return inside / outside;
+}
+
 std::shared_ptr<const scene::PatchScene> randomRoom(std::uint32_t quads, std::uint32_t texels, std::uint32_t seed) {
   SceneBuilder builder;
   const auto side = [&](double share) {

@@ -23,6 +23,9 @@ class SceneBuilder {
   std::uint32_t add(const Quad& quad);
   /// The six faces of an axis-parallel box, seen from inside (or from outside); first surface's index.
   std::uint32_t addBox(glm::vec3 low, glm::vec3 high, std::uint32_t texels, bool inside);
+  /// A square plate of ten faces with two sides, 0.4 wide and 0.005 thick, bevelled above, lying at z = -0.2: thinner
+  /// than the pixels of most item buffers. Its first surface.
+  std::uint32_t addBevelledPlate();
   [[nodiscard]] std::shared_ptr<const scene::PatchScene> build() const;
 
  private:
@@ -43,6 +46,10 @@ class SceneBuilder {
 /// Flux that reached one side of a surface, all levels, channel 0, both halves.
 [[nodiscard]] double fluxAt(const scene::PatchScene& scene, const solver::FluxAccumulators& flux, std::uint32_t surface,
                             double flux_scale, int side = 0);
+
+/// Of the light on such a plate, channel 0: what fell into it, as a part of what fell on it.
+[[nodiscard]] double shareInside(const scene::PatchScene& scene, const solver::FluxAccumulators& flux,
+                                 std::uint32_t plate);
 
 inline constexpr double kFluxScale = 1099511627776.0;  // 2^40
 
