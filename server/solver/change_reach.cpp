@@ -4,8 +4,8 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
+#include <utility>
 
-#include "server/scene/patch_tree.h"
 #include "server/solver/sampling.h"
 
 namespace radiosity::solver {
@@ -21,6 +21,14 @@ constexpr double kLift = 1e-5, kHides = 1e-4;
 /// Farther than the unit box is wide.
 constexpr double kFar = 4.0;
 
+/// Of all triangles, numbered as the scene's.
+std::shared_ptr<const scene::Bvh> treeOf(const scene::PatchScene& patches) {
+  std::vector<scene::Bvh::Triangle> triangles(patches.triangles.size());
+  for (std::size_t i = 0; i < patches.indices.size(); ++i)
+    triangles[i / 3][i % 3] = patches.vertices[patches.indices[i]].position;
+  return std::make_shared<const scene::Bvh>(std::move(triangles));
+}
+
 /// Of a place that a small shooter of radiosity one sees at this distance, both cosines included.
 double irradiance(double area, double cosines, double distance) {
   return std::min(1.0, area * cosines / (std::numbers::pi * distance * distance));
@@ -29,7 +37,7 @@ double irradiance(double area, double cosines, double distance) {
 }  // namespace
 
 ChangeReach::ChangeReach(const scene::PatchScene& before, const scene::PatchScene& after, const scene::PatchMap& map)
-    : before_(before), after_(after), tree_before_(scene::treeOf(before)), tree_after_(scene::treeOf(after)) {
+    : before_(before), after_(after), tree_before_(treeOf(before)), tree_after_(treeOf(after)) {
   std::vector<bool> gone(before.surfaces.size(), true);
   for (std::size_t s = 0; s < after.surfaces.size(); ++s) {
     if (!map.moved[s]) gone[map.surface_before[s]] = false;

@@ -9,7 +9,6 @@
 #include <numbers>
 #include <random>
 
-#include "server/scene/patch_tree.h"
 #include "tests/unit/solver/quad_scene.h"
 
 namespace radiosity::solver {
@@ -41,6 +40,13 @@ class ChangeReachTest : public testing::Test {
     map_.leaf_altered.assign(after_->leaves.size(), false);
   }
 
+  static scene::Bvh treeOf(const scene::PatchScene& patches) {
+    std::vector<scene::Bvh::Triangle> triangles(patches.triangles.size());
+    for (std::size_t i = 0; i < patches.indices.size(); ++i)
+      triangles[i / 3][i % 3] = patches.vertices[patches.indices[i]].position;
+    return scene::Bvh(std::move(triangles));
+  }
+
   /// What a small shooter sends to a place, 0 where it is hidden.
   static double arriving(const glm::vec3& origin, const glm::vec3& normal, const glm::dvec3& place,
                          const glm::dvec3& facing, const scene::Bvh& tree) {
@@ -54,7 +60,7 @@ class ChangeReachTest : public testing::Test {
   /// Norm of the change over all surfaces; on what is moved, of what it had and of what it has.
   [[nodiscard]] double exact(const glm::vec3& origin, const glm::vec3& normal) const {
     constexpr int kFine = 160;
-    const auto tree_before = scene::treeOf(*before_), tree_after = scene::treeOf(*after_);
+    const auto tree_before = treeOf(*before_), tree_after = treeOf(*after_);
     double square = 0.0;
     for (std::size_t s = 0; s < after_->surfaces.size(); ++s) {
       for (const auto* patches : {before_.get(), after_.get()}) {
@@ -66,8 +72,8 @@ class ChangeReachTest : public testing::Test {
         for (int i = 0; i < kFine * kFine; ++i) {
           const glm::dvec3 place =
               glm::dvec3(frame.origin) + (i % kFine + 0.5) / kFine * u + (i / kFine + 0.5) / kFine * v;
-          const double then = arriving(origin, normal, place, facing, *tree_before);
-          const double now = arriving(origin, normal, place, facing, *tree_after);
+          const double then = arriving(origin, normal, place, facing, tree_before);
+          const double now = arriving(origin, normal, place, facing, tree_after);
           const double change = map_.moved[s] ? (patches == before_.get() ? then : now) : now - then;
           square += change * change * glm::length(glm::cross(u, v)) / (kFine * kFine);
         }
