@@ -12,6 +12,8 @@ namespace {
 constexpr float kWidePixels = 1.5F;
 /// Facets of more triangles than this are not intersected.
 constexpr std::uint32_t kMaxFacetTriangles = 512;
+/// Of a facet with more corners a box around it stands for them.
+constexpr std::size_t kMostCorners = 8;
 /// Triangles are widened by this part of their size, so that a ray cannot pass between two that share an edge.
 constexpr float kSeal = 1.0e-5F;
 
@@ -141,24 +143,38 @@ void Receivers::findFacets() {
     auto& facet = number[facet_of_[triangle]];
     if (facet == scene::kNone) {
       facet = static_cast<std::uint32_t>(facets_.size());
-      facets_.push_back({i, 0, 0.0F});
+      facets_.push_back({.first = i});
     }
     ++facets_[facet].count;
     facet_of_[triangle] = facet;
   }
-  for (auto& facet : facets_) {
-    float area = 0.0F;
-    glm::vec3 low(1e30F), high(-1e30F);
-    for (std::uint32_t i = facet.first; i < facet.first + facet.count; ++i) {
-      const auto& c = corners_[facet_triangles_[i]];
-      for (const auto& corner : c) {
-        low = glm::min(low, corner);
-        high = glm::max(high, corner);
-      }
-      area += 0.5F * glm::length(glm::cross(c[1] - c[0], c[2] - c[0]));
+  for (auto& facet : facets_) measure(facet);
+}
+
+void Receivers::measure(Facet& facet) {
+  float area = 0.0F;
+  glm::vec3 low(1e30F), high(-1e30F);
+  facet.first_corner = static_cast<std::uint32_t>(outlines_.size());
+  for (std::uint32_t i = facet.first; i < facet.first + facet.count; ++i) {
+    const auto& c = corners_[facet_triangles_[i]];
+    for (const auto& corner : c) {
+      low = glm::min(low, corner);
+      high = glm::max(high, corner);
+      const auto from = outlines_.begin() + static_cast<std::ptrdiff_t>(facet.first_corner);
+      if (outlines_.size() - facet.first_corner <= kMostCorners &&
+          std::find(from, outlines_.end(), corner) == outlines_.end())
+        outlines_.push_back(corner);
     }
-    facet.width = area / std::max(glm::length(high - low), 1e-12F);
+    area += 0.5F * glm::length(glm::cross(c[1] - c[0], c[2] - c[0]));
   }
+  if (outlines_.size() - facet.first_corner > kMostCorners) {
+    outlines_.resize(facet.first_corner);
+    for (unsigned k = 0; k < 8; ++k)
+      outlines_.emplace_back((k & 1U) != 0 ? high.x : low.x, (k & 2U) != 0 ? high.y : low.y,
+                             (k & 4U) != 0 ? high.z : low.z);
+  }
+  facet.corner_count = static_cast<std::uint32_t>(outlines_.size()) - facet.first_corner;
+  facet.width = area / std::max(glm::length(high - low), 1e-12F);
 }
 
 bool Receivers::wide(std::uint32_t item, const Ray& ray) const {

@@ -104,12 +104,13 @@ class Receivers {
     return place(receiver, at).point;
   }
 
-  /// Whether a part of the triangle lies in front of a receiver. What is wholly behind its horizon cannot hide a light
-  /// from it, although a pixel on a convex edge may show it: the top of a block, seen instead of the topmost texels of
-  /// its side.
-  [[nodiscard]] bool risesBefore(std::uint32_t triangle, const glm::vec3& point, const glm::vec3& normal) const {
-    for (const auto& corner : corners_[triangle]) {
-      if (glm::dot(normal, corner - point) > kInPlane) return true;
+  /// Whether a part of the item's facet lies in front of a receiver. What is wholly behind its horizon cannot hide a
+  /// light from it, although a pixel on a convex edge may show it: the top of a block, seen instead of the topmost
+  /// texels of its side. The facet's: an item names any triangle of the facet that the pixel shows.
+  [[nodiscard]] bool risesBefore(std::uint32_t item, const glm::vec3& point, const glm::vec3& normal) const {
+    const auto& facet = facets_[facet_of_[item]];
+    for (std::uint32_t i = facet.first_corner; i < facet.first_corner + facet.corner_count; ++i) {
+      if (glm::dot(normal, outlines_[i] - point) > kInPlane) return true;
     }
     return false;
   }
@@ -122,11 +123,11 @@ class Receivers {
     float pixel_size;  ///< at most this, unit, anywhere along the way
   };
 
-  /// Whether a part of the triangle is nearer to the light than a receiver is. What is wholly farther away cannot hide
-  /// the light, although a pixel beside a silhouette may show it, and its plane lie between the two: the chair behind a
-  /// thin leg. Not asked for lights at infinity, whose wide pixels are right in the mean alone.
-  [[nodiscard]] bool liesBefore(std::uint32_t triangle, const Ray& ray) const {
-    return risesBefore(triangle, ray.at, glm::normalize(ray.way));
+  /// Whether a part of the item's facet is nearer to the light than a receiver is. What is wholly farther away cannot
+  /// hide the light, although a pixel beside a silhouette may show it, and its plane lie between the two: the chair
+  /// behind a thin leg. Not asked for lights at infinity, whose wide pixels are right in the mean alone.
+  [[nodiscard]] bool liesBefore(std::uint32_t item, const Ray& ray) const {
+    return risesBefore(item, ray.at, glm::normalize(ray.way));
   }
 
   /// Whether what a pixel shows hides the light from a receiver in it: it lies behind the item's plane, on the side
@@ -158,8 +159,9 @@ class Receivers {
  private:
   /// Coplanar triangles of one chart that share corners.
   struct Facet {
-    std::uint32_t first = 0, count = 0;  ///< into facet_triangles_
-    float width = 0.0F;                  ///< area / longest side, unit
+    std::uint32_t first = 0, count = 0;                ///< into facet_triangles_
+    std::uint32_t first_corner = 0, corner_count = 0;  ///< into outlines_
+    float width = 0.0F;                                ///< area / longest side, unit
   };
   [[nodiscard]] Place placeOf(const scene::LeafSpot& spot) const {
     const auto& frame = patches_->triangles[spot.triangle];
@@ -167,6 +169,7 @@ class Receivers {
   }
   void findBlocks(Group& group);
   void findFacets();
+  void measure(Facet& facet);
   void buildTree();
   /// Height above the plane, on the light's side of it.
   [[nodiscard]] float before(std::uint32_t item, const Ray& ray) const {
@@ -191,12 +194,13 @@ class Receivers {
   std::vector<float> texel_x_, texel_y_;
   std::vector<std::uint32_t> nodes_;
   std::vector<Plane> planes_;                      ///< by triangle
-  std::vector<std::array<glm::vec3, 3>> corners_;  ///< by triangle: together, since they are looked at in any order
+  std::vector<std::array<glm::vec3, 3>> corners_;  ///< by triangle
   std::vector<std::array<bool, 2>> absorbs_;       ///< by triangle: front, back
   scene::Bvh opaque_;                              ///< triangles; empty where no surface has two sides
   std::vector<Facet> facets_;
   std::vector<std::uint32_t> facet_of_;  ///< by triangle
   std::vector<std::uint32_t> facet_triangles_;
+  std::vector<glm::vec3> outlines_;  ///< each facet's corners, or those of a box around many
 };
 
 }  // namespace radiosity::gpu

@@ -242,6 +242,29 @@ TEST_F(Gather, LeavesBesideAPanelThatHangsBeforeThemLoseNothingToIt) {
   EXPECT_NEAR(under / open, 0.0, 0.02);
 }
 
+// An item names one triangle of the panel, of which all may lie farther from the lamp than the leaf that the other one
+// hides.
+TEST_F(Gather, LeavesUnderAPanelAreDarkForLampsOnAllSides) {
+  for (const auto& way : {glm::vec2(1, 0), glm::vec2(0, 1), glm::vec2(-1, 0), glm::vec2(0, -1), glm::vec2(1, 1)}) {
+    SceneBuilder builder;
+    const auto ceiling = builder.add({{-0.5F, 0.5F, 0.5F}, {1, 0, 0}, {0, -1, 0}, 40, 40});
+    builder.add({{-0.2F, 0.2F, 0.4995F}, {0.4F, 0, 0}, {0, -0.4F, 0}, 1, 1});
+    const auto at = 0.3F * way;
+    const auto lamp = builder.add({{at.x - 0.05F, at.y - 0.05F, 0.2F}, {0.1F, 0, 0}, {0, 0.1F, 0}, 1, 1});
+    auto made = std::make_shared<scene::PatchScene>(*builder.build());
+    scene::placeSpotsInGaps(*made);
+    const std::shared_ptr<const scene::PatchScene> scene = made;
+    std::mt19937 random(3);
+    const auto flux = run(scene, gatherFrom(*scene, lamp, 8, random));
+    double under = 0.0;
+    for (std::uint32_t y = 14; y < 26; ++y) {
+      for (std::uint32_t x = 14; x < 26; ++x) under += irradiance(*scene, flux, ceiling, x, y);
+    }
+    EXPECT_GT(irradiance(*scene, flux, ceiling, 20, way.y > 0.0F ? 5 : 35), 0.0);
+    EXPECT_EQ(under, 0.0) << way.x << " " << way.y;
+  }
+}
+
 // Seen from the lamp, pixels along the silhouette of a box show the floor beyond it, and what lies inside, where both
 // sides of a wall are surfaces, lies before that.
 TEST_F(Gather, TheInsideOfAClosedBoxOfTwoSidedWallsStaysDark) {
