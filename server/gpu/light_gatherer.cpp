@@ -54,11 +54,13 @@ void LightGatherer::look(const solver::GatherShot& shot, const solver::HemicubeF
                          std::span<const std::uint32_t> items, const HemicubeWeights& weights,
                          const ViewWindow* window) {
   testPoint(shot, point, items, 0);
+  const auto before = look_lost_;
   if (window != nullptr) {
     weighLostInside(*window, point, items, shot.resolution, weights, look_lost_);
   } else {
     weighLost(point, items, shot.resolution, weights, look_lost_);
   }
+  if (look_lost_ != before) open_looks_.add(look_count_);
   ++look_count_;
 }
 
@@ -96,6 +98,7 @@ void LightGatherer::finishLinks(const solver::GatherShot& shot, solver::LinkSamp
   sample.irradiance.resize(count);
   sample.escaped = escaped * area;
   sample.absorbed = absorbed * area;
+  sample.open_looks = open_looks_;
   counters.links += sample.irradiance.size();
   counters.gather_points += look_count_;
   ++counters.gather_shots;

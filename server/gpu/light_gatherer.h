@@ -63,6 +63,7 @@ class LightGatherer {
   /// Weight of what left the scene, and of what fell on unlit sides, summed over points.
   struct Lost {
     std::uint64_t escaped = 0, absorbed = 0;
+    bool operator==(const Lost&) const = default;
   };
 
   template <typename Take>
@@ -105,7 +106,8 @@ class LightGatherer {
   std::size_t lit_count_ = 0;
   std::size_t weighed_ = 0;  ///< of those lit: the others wait for their form factors
   Lost look_lost_;           ///< of the looks since beginLinks
-  std::size_t look_count_ = 0;
+  std::uint32_t look_count_ = 0;
+  solver::Looks open_looks_;  ///< likewise: of them those that lost something
   std::vector<std::uint32_t> starts_;
   std::vector<glm::vec3> places_;  ///< of named receivers
 };

@@ -365,6 +365,7 @@ void LightGatherer::beginLinks(const solver::GatherShot& shot, std::span<const s
     std::fill_n(sum->begin(), lit_count_, 0.0F);
   }
   look_lost_ = {};
+  open_looks_ = {};
   look_count_ = 0;
 }
 

@@ -207,6 +207,7 @@ void packLinks(std::vector<std::byte>& to, const solver::LinkSample& links) {
   appendValue(to, links.absorbed);
   appendValue(to, links.delivered);
   appendValue(to, links.due);
+  appendValue(to, links.open_looks);
   packVector(to, links.runs);
   packVector(to, links.irradiance);
 }
@@ -216,6 +217,7 @@ bool unpackLinks(BodyReader& from, std::size_t nodes, solver::LinkSample& links)
   links.absorbed = from.value<double>();
   links.delivered = from.value<double>();
   links.due = from.value<double>();
+  links.open_looks = from.value<solver::Looks>();
   unpackVector(from, links.runs);
   unpackVector(from, links.irradiance);
   std::size_t values = 0;

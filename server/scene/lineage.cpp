@@ -2,8 +2,12 @@
 
 #include <algorithm>
 #include <glm/common.hpp>
+#include <limits>
 #include <map>
+#include <numeric>
+#include <span>
 #include <tuple>
+#include <utility>
 
 #include "common/check.h"
 
@@ -40,6 +44,8 @@ std::vector<SurfaceRange> surfacesOf(const Scene& scene, const PatchScene& patch
 
 /// More boxes cost more to look past than they leave out.
 constexpr std::size_t kMaxChangedBoxes = 16;
+/// Of more than these it is not asked which go together best.
+constexpr std::size_t kMostCompared = 64;
 /// What a box hides, or lets be seen, goes by its surface.
 constexpr float kJoin = 0.9F;
 
@@ -96,24 +102,84 @@ class Matcher {
   const PatchScene& after_;
 };
 
-/// One box for each instance that has something in it.
+/// Boxes around some surfaces: one for each part of an instance that hangs together, which is much less than one around
+/// all of a chair.
 class Boxes {
  public:
-  explicit Boxes(std::size_t instances) : boxes_(instances, {glm::vec3(1e30F), glm::vec3(-1e30F)}) {}
-  void add(const Surface& surface) {
-    auto& box = boxes_[surface.instance];
-    box.low = glm::min(box.low, surface.bounds_min);
-    box.high = glm::max(box.high, surface.bounds_max);
-  }
+  explicit Boxes(const PatchScene& patches) : patches_(patches) {}
+  /// In ascending order.
+  void add(std::uint32_t surface) { surfaces_.push_back(surface); }
   void appendTo(std::vector<ChangedBox>& all) const {
-    for (const auto& box : boxes_) {
-      if (box.low.x <= box.high.x) all.push_back(box);
+    for (std::size_t first = 0; first < surfaces_.size();) {
+      auto end = first + 1;
+      while (end < surfaces_.size() && instanceOf(end) == instanceOf(first)) ++end;
+      const auto parts = partsOf(std::span(surfaces_).subspan(first, end - first));
+      all.insert(all.end(), parts.begin(), parts.end());
+      first = end;
     }
   }
 
  private:
-  std::vector<ChangedBox> boxes_;
+  using Corner = std::tuple<float, float, float>;
+
+  [[nodiscard]] std::uint32_t instanceOf(std::size_t i) const { return patches_.surfaces[surfaces_[i]].instance; }
+
+  /// Surfaces that share a corner hang together. One for all of them where they are too many to tell apart.
+  [[nodiscard]] std::vector<ChangedBox> partsOf(std::span<const std::uint32_t> surfaces) const {
+    std::vector<std::uint32_t> part(surfaces.size());
+    std::iota(part.begin(), part.end(), 0U);
+    const auto rootOf = [&](std::uint32_t i) {
+      while (part[i] != i) i = part[i] = part[part[i]];
+      return i;
+    };
+    std::vector<std::pair<Corner, std::uint32_t>> corners;
+    for (std::uint32_t i = 0; i < surfaces.size(); ++i) {
+      const auto& surface = patches_.surfaces[surfaces[i]];
+      for (std::uint32_t k = 0; k < 3 * surface.triangle_count; ++k) {
+        const auto& at = patches_.vertices[patches_.indices[std::size_t{3} * surface.first_triangle + k]].position;
+        corners.push_back({{at.x, at.y, at.z}, i});
+      }
+    }
+    std::ranges::sort(corners);
+    for (std::size_t k = 1; k < corners.size(); ++k) {
+      if (corners[k].first == corners[k - 1].first) part[rootOf(corners[k].second)] = rootOf(corners[k - 1].second);
+    }
+    std::map<std::uint32_t, ChangedBox> boxes;
+    for (std::uint32_t i = 0; i < surfaces.size(); ++i) {
+      const auto& surface = patches_.surfaces[surfaces[i]];
+      const ChangedBox own{surface.bounds_min, surface.bounds_max};
+      const auto [box, is_new] = boxes.try_emplace(rootOf(i), own);
+      if (!is_new) box->second = unionOf(box->second, own);
+    }
+    std::vector<ChangedBox> all;
+    for (const auto& [root, box] : boxes) {
+      if (all.empty() || boxes.size() <= kMaxChangedBoxes) {
+        all.push_back(box);
+      } else {
+        all[0] = unionOf(all[0], box);
+      }
+    }
+    return all;
+  }
+
+  const PatchScene& patches_;
+  std::vector<std::uint32_t> surfaces_;
 };
+
+/// The two boxes whose union has the least surface more than they.
+std::pair<std::size_t, std::size_t> bestPair(const std::vector<ChangedBox>& boxes) {
+  std::pair<std::size_t, std::size_t> best{0, 1};
+  float least = std::numeric_limits<float>::infinity();
+  for (std::size_t i = 0; i < boxes.size(); ++i) {
+    for (auto k = i + 1; k < boxes.size(); ++k) {
+      const float more = surfaceOf(unionOf(boxes[i], boxes[k])) - surfaceOf(boxes[i]) - surfaceOf(boxes[k]);
+      if (more >= least) continue;
+      least = more;
+      best = {i, k};
+    }
+  }
+  return best;
+}
 
 }  // namespace
 
@@ -130,20 +196,34 @@ std::vector<std::uint32_t> matchInstances(const Scene& before, const Scene& afte
 }
 
 void joinBoxes(std::vector<ChangedBox>& boxes) {
+  const auto join = [&](std::size_t i, std::size_t k) {
+    boxes[i] = unionOf(boxes[i], boxes[k]);
+    boxes.erase(boxes.begin() + static_cast<std::ptrdiff_t>(k));
+  };
+  if (boxes.size() > kMostCompared) {  // those that come one after the other, since they often belong together
+    const auto all = std::exchange(boxes, {});
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      const auto to = i * kMostCompared / all.size();
+      if (to == boxes.size()) boxes.push_back(all[i]);
+      boxes[to] = unionOf(boxes[to], all[i]);
+    }
+  }
   for (bool joined = true; joined;) {
     joined = false;
     for (std::size_t i = 0; i < boxes.size(); ++i) {
       for (std::size_t k = i + 1; k < boxes.size();) {
-        const auto both = unionOf(boxes[i], boxes[k]);
-        if (boxes.size() <= kMaxChangedBoxes && surfaceOf(both) > kJoin * (surfaceOf(boxes[i]) + surfaceOf(boxes[k]))) {
+        if (surfaceOf(unionOf(boxes[i], boxes[k])) > kJoin * (surfaceOf(boxes[i]) + surfaceOf(boxes[k]))) {
           ++k;
           continue;
         }
-        boxes[i] = both;
-        boxes.erase(boxes.begin() + static_cast<std::ptrdiff_t>(k));
+        join(i, k);
         joined = true;
       }
     }
+  }
+  while (boxes.size() > kMaxChangedBoxes) {
+    const auto [i, k] = bestPair(boxes);
+    join(i, k);
   }
 }
 
@@ -161,7 +241,7 @@ PatchMap matchPatches(const Scene& scene_before, const PatchScene& before, const
   const auto old_ranges = surfacesOf(scene_before, before), new_ranges = surfacesOf(scene_after, after);
   const auto source = matchInstances(scene_before, scene_after);
   const Matcher matcher(before, after);
-  Boxes old_boxes(scene_before.instances.size()), new_boxes(scene_after.instances.size());
+  Boxes old_boxes(before), new_boxes(after);
   std::vector<bool> stayed(before.surfaces.size(), false);
   for (std::uint32_t i = 0; i < new_ranges.size(); ++i) {
     const auto range = new_ranges[i];
@@ -171,7 +251,7 @@ PatchMap matchPatches(const Scene& scene_before, const PatchScene& before, const
       const auto& surface = after.surfaces[s];
       if (former != kNone && sameGrid(before.surfaces[former], surface)) map.surface_before[s] = former;
       if (map.surface_before[s] == kNone || !matcher.samePlace(before.surfaces[former], surface)) {
-        new_boxes.add(surface);
+        new_boxes.add(s);
         continue;
       }
       map.moved[s] = false;
@@ -181,7 +261,7 @@ PatchMap matchPatches(const Scene& scene_before, const PatchScene& before, const
     }
   }
   for (std::uint32_t s = 0; s < before.surfaces.size(); ++s) {
-    if (!stayed[s]) old_boxes.add(before.surfaces[s]);
+    if (!stayed[s]) old_boxes.add(s);
   }
   old_boxes.appendTo(map.boxes);
   new_boxes.appendTo(map.boxes);

@@ -175,13 +175,13 @@ struct PatchMap {
   std::vector<bool> moved;                    ///< by surface: new, or elsewhere, or of another shape, than it was
   /// By leaf: of a moved surface, or what is left of it, or where one stands on it, is not what it was.
   std::vector<bool> leaf_altered;
-  /// Around all that was or is now where something else is or was, one for each instance or fewer.
+  /// Around all that was or is now where something else is or was, one for each part of an instance or fewer.
   std::vector<ChangedBox> boxes;
 
   [[nodiscard]] bool nothingKept() const;
 };
 
-/// Boxes that are hardly larger together than apart become one, and so do all when there are very many.
+/// Boxes that are hardly larger together than apart become one, and others until there are 16 at most.
 void joinBoxes(std::vector<ChangedBox>& boxes);
 
 struct ChartOptions {

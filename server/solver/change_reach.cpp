@@ -1,78 +1,139 @@
 #include "server/solver/change_reach.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <numbers>
+#include <utility>
+
+#include "server/solver/sampling.h"
 
 namespace radiosity::solver {
 namespace {
 
-/// A quad that one plane has cut has at most five corners.
-struct Cut {
-  std::array<glm::vec3, 5> corner{};
-  std::size_t count = 0;
-};
+/// Places on what is gone, on what came, and on what was altered; so many turns share them.
+constexpr std::size_t kPlaces = 96;
+constexpr std::uint32_t kTurns = 6;
+/// Of a leaf that stays, but of which more or less is left, the link changes by about this part.
+constexpr double kAltered = 0.5;
+/// Rays begin so far from where they start (unit box), and what is nearer than a place by so much of the way hides it.
+constexpr double kLift = 1e-5, kHides = 1e-4;
+/// Farther than the unit box is wide.
+constexpr double kFar = 4.0;
 
-/// What of a quad about the origin lies above the plane through it.
-Cut cutAtHorizon(const std::array<glm::vec3, 4>& quad, const glm::vec3& normal) {
-  Cut cut;
-  for (std::size_t k = 0; k < 4; ++k) {
-    const auto &a = quad[k], &b = quad[(k + 1) % 4];
-    const float above_a = glm::dot(normal, a), above_b = glm::dot(normal, b);
-    if (above_a >= 0.0F) cut.corner[cut.count++] = a;
-    if ((above_a > 0.0F && above_b < 0.0F) || (above_a < 0.0F && above_b > 0.0F))
-      cut.corner[cut.count++] = a + above_a / (above_a - above_b) * (b - a);
-  }
-  return cut;
+/// Of all triangles, numbered as the scene's.
+std::shared_ptr<const scene::Bvh> treeOf(const scene::PatchScene& patches) {
+  std::vector<scene::Bvh::Triangle> triangles(patches.triangles.size());
+  for (std::size_t i = 0; i < patches.indices.size(); ++i)
+    triangles[i / 3][i % 3] = patches.vertices[patches.indices[i]].position;
+  return std::make_shared<const scene::Bvh>(std::move(triangles));
 }
 
-double lambert(const Cut& polygon, const glm::vec3& normal) {
-  double sum = 0.0;
-  for (std::size_t k = 0; k < polygon.count; ++k) {
-    const auto &a = polygon.corner[k], &b = polygon.corner[(k + 1) % polygon.count];
-    const auto across = glm::cross(a, b);
-    const float length = glm::length(across);
-    if (!(length > 0.0F)) continue;
-    sum += static_cast<double>(std::atan2(length, glm::dot(a, b)) * glm::dot(across, normal) / length);
-  }
-  return 0.5 * std::numbers::inv_pi * std::abs(sum);
+/// Of a place that a small shooter of radiosity one sees at this distance, both cosines included.
+double irradiance(double area, double cosines, double distance) {
+  return std::min(1.0, area * cosines / (std::numbers::pi * distance * distance));
 }
 
 }  // namespace
 
-double throughBox(const glm::vec3& origin, const glm::vec3& normal, const scene::ChangedBox& box) {
-  bool inside = true;
-  double sum = 0.0;
-  for (int axis = 0; axis < 3; ++axis) {
-    const bool before = origin[axis] < box.low[axis];
-    if (!before && origin[axis] <= box.high[axis]) continue;
-    inside = false;
-    const int u = (axis + 1) % 3, v = (axis + 2) % 3;
-    std::array<glm::vec3, 4> face{};
-    for (std::size_t k = 0; k < 4; ++k) {
-      face[k][axis] = before ? box.low[axis] : box.high[axis];
-      face[k][u] = k == 1 || k == 2 ? box.high[u] : box.low[u];
-      face[k][v] = k >= 2 ? box.high[v] : box.low[v];
-      face[k] -= origin;
-    }
-    sum += lambert(cutAtHorizon(face, normal), normal);
+ChangeReach::ChangeReach(const scene::PatchScene& before, const scene::PatchScene& after, const scene::PatchMap& map)
+    : before_(before), after_(after), tree_before_(treeOf(before)), tree_after_(treeOf(after)) {
+  std::vector<bool> gone(before.surfaces.size(), true);
+  for (std::size_t s = 0; s < after.surfaces.size(); ++s) {
+    if (!map.moved[s]) gone[map.surface_before[s]] = false;
   }
-  return inside ? 1.0 : std::min(1.0, sum);
+  addTriangles(before, gone, gone_);
+  addTriangles(after, map.moved, come_);
+  addAltered(after, map);
 }
 
-double changeReach(const glm::vec3& origin, const glm::vec3& normal, const scene::ChangedBox& shooter, double area,
-                   std::span<const scene::ChangedBox> boxes) {
-  double squares = 0.0;
-  for (const auto& box : boxes) {
-    const auto gap = glm::max(glm::max(box.low - shooter.high, shooter.low - box.high), glm::vec3(0.0F));
-    const auto apart = static_cast<double>(glm::dot(gap, gap));
-    const double largest = area < std::numbers::pi * apart ? area / (std::numbers::pi * apart) : 1.0;
-    squares += 2.0 * largest * area * throughBox(origin, normal, box);
+/// Places evenly over the area of the surfaces that are marked.
+void ChangeReach::addTriangles(const scene::PatchScene& patches, const std::vector<bool>& marked,
+                               Places& places) const {
+  const auto corners = [&](std::uint32_t t) {
+    std::array<glm::dvec3, 3> corner;
+    for (std::size_t c = 0; c < 3; ++c)
+      corner[c] = glm::dvec3(patches.vertices[patches.indices[std::size_t{3} * t + c]].position);
+    return corner;
+  };
+  std::vector<std::pair<std::uint32_t, double>> area_until;
+  double all = 0.0;
+  for (std::uint32_t t = 0; t < patches.triangles.size(); ++t) {
+    if (!marked[patches.triangle_surface[t]]) continue;
+    const auto [a, b, c] = corners(t);
+    all += 0.5 * glm::length(glm::cross(b - a, c - a));
+    area_until.push_back({t, all});
   }
-  return std::sqrt(squares);
+  for (std::size_t i = 0, next = 0; all > 0.0 && i < kPlaces; ++i) {
+    const double at = (static_cast<double>(i) + 0.5) / kPlaces * all;
+    while (next + 1 < area_until.size() && area_until[next].second <= at) ++next;
+    const auto triangle = area_until[next].first;
+    const auto [a, b, c] = corners(triangle);
+    const glm::dvec4 random = sobol4(static_cast<std::uint32_t>(i), 0);
+    const double u = std::sqrt(random.x);
+    places.push_back({a + u * (1.0 - random.y) * (b - a) + u * random.y * (c - a),
+                      glm::dvec3(patches.triangles[triangle].normal), all / kPlaces});
+  }
+}
+
+/// Leaves of what has not moved of which more or less is left than was.
+void ChangeReach::addAltered(const scene::PatchScene& patches, const scene::PatchMap& map) {
+  Places all;
+  for (std::uint32_t s = 0; s < patches.surfaces.size(); ++s) {
+    const auto& surface = patches.surfaces[s];
+    if (map.moved[s]) continue;
+    for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf) {
+      const auto& point = patches.leaves[surface.first_leaf + leaf];
+      if (!map.leaf_altered[surface.first_leaf + leaf] || point.triangle == scene::kNone) continue;
+      const auto& frame = patches.triangles[point.triangle];
+      const float x = static_cast<float>(leaf % surface.width) + 0.5F,
+                  y = static_cast<float>(leaf / surface.width) + 0.5F;
+      all.push_back({glm::dvec3(frame.origin + x * frame.du + y * frame.dv), glm::dvec3(frame.normal),
+                     kAltered * kAltered * static_cast<double>(surface.texel_area)});
+    }
+  }
+  const std::size_t count = std::min(all.size(), kPlaces);
+  for (std::size_t i = 0; i < count; ++i) {
+    altered_.push_back(all[i * all.size() / count]);
+    altered_.back().area *= static_cast<double>(all.size()) / static_cast<double>(count);
+  }
+}
+
+double ChangeReach::squareAt(const Place& place, const Eye& eye, const scene::Bvh& own, const scene::PatchScene* other,
+                             const scene::Bvh* tree_of_other) {
+  const glm::dvec3 way = place.point - eye.origin;
+  const double distance = glm::length(way), rise = glm::dot(way, eye.normal);
+  if (!(rise > 0.0)) return 0.0;
+  const glm::dvec3 towards = way / distance;
+  const double sent = rise / distance;
+  const double here = irradiance(eye.area, sent * std::abs(glm::dot(towards, place.normal)), distance);
+  if (here <= 0.0 || own.nearestHit(eye.origin, towards, kLift, distance * (1.0 - kHides))) return 0.0;
+  double there = 0.0;
+  if (other != nullptr) {
+    if (const auto hit = tree_of_other->nearestHit(eye.origin, towards, kLift, kFar)) {
+      const auto facing = std::abs(glm::dot(towards, glm::dvec3(other->triangles[hit->triangle].normal)));
+      there = irradiance(eye.area, sent * facing, hit->t);
+    }
+  }
+  // What arrives here, or no longer does, arrives no longer there, or does: the same flux in the mean over a wider
+  // area.
+  return std::min(here * place.area, eye.area) * (here + there);
+}
+
+double ChangeReach::of(const glm::vec3& origin, const glm::vec3& normal, double area, std::uint32_t turn) const {
+  const Eye eye{glm::dvec3(origin), glm::dvec3(normal), area};
+  double square = 0.0;
+  const auto sum = [&](const Places& places, const scene::Bvh& own, const scene::PatchScene* other,
+                       const scene::Bvh* tree_of_other) {
+    // Fewer turns where there are few places, so that each has some.
+    const auto turns = std::clamp<std::size_t>(places.size() / (kPlaces / kTurns), 1, kTurns);
+    for (auto i = turn % turns; i < places.size(); i += turns)
+      square += static_cast<double>(turns) * squareAt(places[i], eye, own, other, tree_of_other);
+  };
+  sum(gone_, *tree_before_, &after_, tree_after_.get());
+  sum(come_, *tree_after_, &before_, tree_before_.get());
+  sum(altered_, *tree_after_, nullptr, nullptr);
+  return std::sqrt(square);
 }
 
 }  // namespace radiosity::solver

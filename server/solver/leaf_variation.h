@@ -35,6 +35,15 @@ class LeafVariation {
  public:
   LeafVariation(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed);
 
+  /// After an edit of geometry, before the first update(): what the paths of the scene before have found.
+  /// `value_before`: by leaf value, what it was there, or kNone. `clear`: by leaf value, whether it is one of them, and
+  /// nothing within nearest() of it changed: where no leaf was near, none is. All else is traced anew, so that paths
+  /// are the same as without it but for how many there are.
+  void inherit(const LeafVariation& former, std::span<const std::uint32_t> value_before,
+               const std::vector<bool>& clear);
+  /// Farther from a leaf than this (unit box) nothing is near to it.
+  [[nodiscard]] double nearest() const;
+
   /// Brings all that is below up to date with the light. Paths are traced when there are none, and followed to the
   /// lights again when others shine; more are traced until what varies is known to be little beside `bound`, an
   /// irradiance squared times area as below, or is found to be more. Below the bound nothing is corrected.
@@ -75,6 +84,7 @@ class LeafVariation {
     std::array<std::uint32_t, 2> seen{};              ///< leaf values that its two places see
     std::uint32_t light = 0, source = 0;              ///< one of each
     float light_factor = 0.0F, source_factor = 0.0F;  ///< what the first place has of them more than the second
+    std::uint16_t index = 0;                          ///< which one of the receiver's, in its half
     bool sees_near = false;                           ///< one of `seen` is near, and may vary within itself
   };
   /// Irradiance that a receiver lacks: what is sure, and what comes over a second leaf near by, of whose light the mean
@@ -94,12 +104,16 @@ class LeafVariation {
     std::uint32_t receiver, first, end;
   };
 
+  [[nodiscard]] static std::uint64_t numberOf(std::uint32_t receiver, std::uint32_t index) {
+    return std::uint64_t{receiver} << 16U | index;
+  }
   [[nodiscard]] bool isNear(const LeafRays::Sight& sight) const;
   void traceAll(const LeafLight& light);
   void trace(std::span<const Task> tasks, const LeafLight& light);
   void follow(const Task& task, std::size_t half, const LeafLight& light, std::vector<Path>& paths) const;
   void followLights(const std::array<Place, 2>& places, const LeafLight& light, Path& path) const;
   void followOtherLights(const LeafLight& light);
+  [[nodiscard]] bool isKnownToEnd(std::uint32_t receiver, std::uint32_t index, std::size_t half) const;
   [[nodiscard]] bool findPlaces(std::uint32_t receiver, std::uint64_t key, std::array<Place, 2>& places) const;
   template <typename Unhidden>
   [[nodiscard]] static Drawn draw(std::size_t count, std::uint64_t key, const Unhidden& unhidden);
@@ -114,14 +128,16 @@ class LeafVariation {
   const std::vector<Side>& sides_;
   LeafRays rays_;
   std::uint64_t seed_;
-  std::vector<std::uint32_t> receivers_;      ///< leaf values, ascending
-  double stands_for_ = 1.0;                   ///< leaves, for each receiver
-  std::vector<std::uint16_t> count_;          ///< paths of each half, by receiver; empty: none were traced yet
-  std::uint64_t traced_for_ = 0;              ///< which lights
-  bool is_traced_ = false;                    ///< as many paths as count_ says
-  std::vector<Task> wanted_;                  ///< by refine()
-  std::array<std::vector<Path>, 2> paths_;    ///< by half
-  std::array<std::vector<Lack>, 2> lacking_;  ///< by half and leaf value: mean of the paths; while updating
+  std::vector<std::uint32_t> receivers_;    ///< leaf values, ascending
+  double stands_for_ = 1.0;                 ///< leaves, for each receiver
+  std::vector<std::uint16_t> count_;        ///< paths of each half, by receiver; empty: none were traced yet
+  std::uint64_t traced_for_ = 0;            ///< which lights
+  bool is_traced_ = false;                  ///< as many paths as count_ says
+  std::vector<Task> wanted_;                ///< by refine()
+  std::array<std::vector<Path>, 2> paths_;  ///< by half
+  std::vector<std::uint16_t> known_;        ///< by leaf value: of so many paths it is known which there are; or empty
+  std::array<std::vector<std::uint64_t>, 2> there_;  ///< by half: these, as numberOf() has them, ascending
+  std::array<std::vector<Lack>, 2> lacking_;         ///< by half and leaf value: mean of the paths; while updating
   std::array<std::vector<glm::vec3>, 2> correction_;
   std::vector<float> gain_;               ///< by leaf value: what more paths would lower; while correcting
   double found_ = 0.0, deviation_ = 0.0;  ///< sum of what varies, and its standard deviation

@@ -122,6 +122,8 @@ void LeafVariation::followSource(const std::array<Place, 2>& places, std::uint64
   path.source_factor = static_cast<float>(factor / drawn.chance);
 }
 
+double LeafVariation::nearest() const { return kNear * rays_.greatestWidth(); }
+
 bool LeafVariation::isNear(const LeafRays::Sight& sight) const {
   return sight.end.value < LeafRays::kSkyBelow && sight.distance <= kNear * rays_.widthOf(sight.end.value);
 }
@@ -141,7 +143,9 @@ void LeafVariation::follow(const Task& task, std::size_t half, const LeafLight& 
   const auto leaf_key = mixKeys(mixKeys(seed_, side.key), task.receiver - side.first_value);
   std::array<Place, 2> places;
   for (auto k = task.first; k < task.end; ++k) {
+    if (isKnownToEnd(task.receiver, k, half)) continue;
     Path path;
+    path.index = static_cast<std::uint16_t>(k);
     path.key = mixKeys(leaf_key, 2 * std::uint64_t{k} + half);
     path.receiver = task.receiver;
     if (!findPlaces(path.receiver, path.key, places)) continue;

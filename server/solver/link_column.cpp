@@ -241,6 +241,9 @@ void LinkColumn::add(const LinkExpander& sample, const LinkSample& totals, doubl
   average(delivered_, delivered);
   average(escaped_, totals.escaped);
   average(absorbed_, totals.absorbed);
+  const bool unsaid = totals.open_looks.bits == 0 && totals.escaped + totals.absorbed > 0.0;
+  const Looks open = unsaid ? Looks{~std::uint64_t{0}} : totals.open_looks;
+  open_looks_.add(open, static_cast<std::uint32_t>(points_), static_cast<std::uint32_t>(points));
   points_ = sum;
   ++samples_;
   keepFlux(sample.leafAreas());
@@ -303,6 +306,7 @@ void LinkColumn::replace(std::span<const ValueRun> leaves, std::span<const float
   due_ = delivered_ = totals.due;  // of a shooter that loses next to nothing
   escaped_ = totals.escaped;
   absorbed_ = totals.absorbed;
+  open_looks_ = totals.open_looks;
   keepFlux(leaf_area);
 }
 
@@ -345,6 +349,7 @@ LinkColumn LinkColumn::renumbered(const std::vector<std::uint32_t>& side_after, 
   column.delivered_ = delivered_;
   column.escaped_ = escaped_;
   column.absorbed_ = absorbed_;
+  column.open_looks_ = open_looks_;
   return column;
 }
 

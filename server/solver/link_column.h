@@ -57,6 +57,7 @@ class LinkColumn {
   };
   struct Totals {
     double due = 0.0, escaped = 0.0, absorbed = 0.0;  ///< as in LinkSample
+    Looks open_looks;                                 ///< of all points
   };
   /// Other links to some leaves, and what all together should deliver, from as many points as before: `values` by leaf
   /// value, of which those of `leaves` (runs of leaf values, ascending, none across sides) count.
@@ -72,7 +73,9 @@ class LinkColumn {
   /// what is lost, cannot tell how much should arrive.
   [[nodiscard]] static bool isOpen(double area, double lost) { return lost > 0.0099 * area; }
   [[nodiscard]] bool isOpen(double area) const { return isOpen(area, escaped_ + absorbed_); }
-  [[nodiscard]] bool losesNothing() const { return escaped_ == 0.0 && absorbed_ == 0.0; }
+  /// Of the points, in the order of the samples, those from where something escapes or is absorbed; of samples that do
+  /// not say, all.
+  [[nodiscard]] const Looks& openLooks() const { return open_looks_; }
   [[nodiscard]] std::uint32_t samples() const { return samples_; }
   /// What leaves a polygon arrives: all links are multiplied by this, the ratio of what should arrive, in the mean over
   /// all samples, to the sum of the links as they are kept. Otherwise small errors (one point for a whole leaf, pixels
@@ -111,7 +114,7 @@ class LinkColumn {
   template <typename Archive, typename Self>
   static void visit(Archive& archive, Self& self) {
     archive(self.runs_, self.scale_, self.gain_, self.code_, self.samples_, self.points_, self.due_, self.delivered_,
-            self.escaped_, self.absorbed_);
+            self.escaped_, self.absorbed_, self.open_looks_.bits);
   }
   void makeRoom(std::span<const std::uint32_t> reached, const std::vector<Side>& sides);
   void grow(const LinkExpander& sample, const std::vector<Side>& sides);
@@ -127,6 +130,7 @@ class LinkColumn {
   std::vector<std::uint16_t> code_;
   std::uint32_t samples_ = 0;
   double points_ = 0.0, due_ = 0.0, delivered_ = 0.0, escaped_ = 0.0, absorbed_ = 0.0;
+  Looks open_looks_;
 };
 
 }  // namespace radiosity::solver

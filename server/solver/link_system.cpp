@@ -65,8 +65,9 @@ void LinkSystem::replaceLinks(std::uint32_t index, std::size_t half, std::span<c
                               std::span<const float> values, const LinkColumn::Totals& totals) {
   auto& shooter = shooters_[index];
   const double factor = roundingOf(shooter, totals.due, totals.escaped, totals.absorbed);
-  shooter.column[half].replace(leaves, values, {factor * totals.due, factor * totals.escaped, factor * totals.absorbed},
-                               leaf_area_, sides_);
+  shooter.column[half].replace(
+      leaves, values, {factor * totals.due, factor * totals.escaped, factor * totals.absorbed, totals.open_looks},
+      leaf_area_, sides_);
   noteChange(index, half);
 }
 

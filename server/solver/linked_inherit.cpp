@@ -53,7 +53,8 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
   takeMaterials(materials);
   takeSources(sources);
   inheritNodes(former, numbers);
-  planRepairs(former.isRepairing() ? 0.0 : former.fieldNorm());
+  planRepairs(former.isRepairing() ? 0.0 : former.fieldNorm(), ChangeReach(*former.patches_, *patches_, map));
+  if (former.variation_) inheritVariation(former, numbers);
   for (auto& half : half_) half.assign(system_.emission().size(), glm::vec3(0.0F));
   findUnshot();
   solveAnew();
@@ -179,8 +180,29 @@ void LinkedSolver::planRepairsOf(const Shooter& from, std::uint32_t old_index, s
     if (samples == 0) continue;
     const bool overtaken = unfinished.samples > 0;
     const bool was_altered = overtaken && !is_light && isAltered(shooter.place, earlier_shadows_->change());
-    repairs_.push_back({index, old_index, half, samples, whole || was_altered || unfinished.whole, overtaken});
+    repairs_.push_back({index, old_index, half, samples, whole || was_altered || unfinished.whole, overtaken,
+                        overtaken ? unfinished.reach : 0.0});
   }
+}
+
+/// Where nothing changed near a leaf, what its paths meet there is what they met.
+void LinkedSolver::inheritVariation(const LinkedSolver& former, const Renumbering& numbers) {
+  next_variation_ = std::make_unique<LeafVariation>(*patches_, sides_, settings_.seed);
+  const auto reach = static_cast<float>(std::max(next_variation_->nearest(), former.variation_->nearest()));
+  const auto& change = shadows_->change();
+  std::vector<std::uint32_t> value_before(change.altered.size(), scene::kNone);
+  std::vector<bool> clear(change.altered.size(), false);
+  for (std::uint32_t s = 0; s < former.sides_.size(); ++s) {
+    if (numbers.unmoved_after[s] == scene::kNone) continue;
+    const Side &side = sides_[numbers.unmoved_after[s]], &before = former.sides_[s];
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+      const auto value = side.first_value + leaf;
+      if (change.altered[value]) continue;
+      value_before[value] = before.first_value + leaf;
+      clear[value] = !shadows_->changesWithin(value, reach);
+    }
+  }
+  next_variation_->inherit(*former.variation_, value_before, clear);
 }
 
 /// Links of what is not taken again as a whole go over as they are. Both halves at once: most of it is fresh memory.

@@ -44,7 +44,7 @@ struct LinkedSolver::RepairBatch {
   };
   std::vector<Sample> gathered, scattered;
   std::vector<float> sum;  ///< by leaf value: of the repair on its way, links times points
-  double points = 0.0;
+  std::uint32_t points = 0;
   LinkColumn::Totals totals;  ///< times points
   bool open = false;          ///< so much is lost that only the sum of all links tells what arrives
   std::vector<Repair> anew;   ///< whole, since they are open now
@@ -52,7 +52,7 @@ struct LinkedSolver::RepairBatch {
 
 /// Leaves in repairs_ what is needed, and makes room for what it may bring.
 /// `norm`: of the irradiance that there was, or 0 where it was not known.
-void LinkedSolver::planRepairs(double norm) {
+void LinkedSolver::planRepairs(double norm, const ChangeReach& change) {
   system_.begin();
   memory_.begin(system_);
   affected_ = 0;
@@ -64,8 +64,10 @@ void LinkedSolver::planRepairs(double norm) {
       return true;
     }
     affected_ += shooter.isLight() ? 1 + (repair.samples - 1) / kLightPoints : repair.samples;
-    repair.reach = reachOf(repair);
     return false;
+  });
+  inBothHalves([&](std::size_t worker) {
+    for (auto r = worker; r < repairs_.size(); r += 2) repairs_[r].reach += reachOf(repairs_[r], change);
   });
   planDue(norm);
 }
@@ -168,17 +170,18 @@ Result<void> LinkedSolver::repairSlice() {
     }
     const std::size_t gathered = shots.gather.size(), scattered = shots.scatter.size();
     addSamples(repair, shots);
+    std::uint32_t looks = 0;
     for (auto i = gathered; i < shots.gather.size(); ++i) {
-      batch.gathered.push_back({r, shots.gather[i].point_count, i + 1 == shots.gather.size()});
+      auto& shot = shots.gather[i];
+      batch.gathered.push_back({r, shot.point_count, i + 1 == shots.gather.size()});
       if (repair.whole) continue;
-      shots.gather[i].first_run = first_run;
-      shots.gather[i].run_count = static_cast<std::uint32_t>(shots.receivers.size()) - first_run;
+      shot.first_run = first_run;
+      shot.run_count = static_cast<std::uint32_t>(shots.receivers.size()) - first_run;
+      shot.first_box = repair.overtaken ? static_cast<std::uint32_t>(boxes.size()) : 0;
+      shot.box_count = static_cast<std::uint32_t>(repair.overtaken ? shots.boxes.size() - boxes.size() : boxes.size());
       // Where nothing was lost, whatever is lost now is lost where the change is seen.
-      const bool all = !system_.shooters()[repair.shooter].column[repair.half].losesNothing();
-      if (all) continue;
-      shots.gather[i].first_box = repair.overtaken ? static_cast<std::uint32_t>(boxes.size()) : 0;
-      shots.gather[i].box_count =
-          static_cast<std::uint32_t>(repair.overtaken ? shots.boxes.size() - boxes.size() : boxes.size());
+      const auto& column = system_.shooters()[repair.shooter].column[repair.half];
+      shot.open_looks = column.openLooks().from(std::exchange(looks, looks + shot.point_count), shot.point_count);
     }
     for (auto i = scattered; i < shots.scatter.size(); ++i) batch.scattered.push_back({r, 1, false});
     (repair.whole ? edits_.retaken : edits_.repaired) +=
@@ -215,7 +218,8 @@ void LinkedSolver::takePart(RepairBatch& repairs, std::size_t shot, LinkSample& 
     system_.addSample(repair.shooter, repair.half, expander_, links, sample.points);
     return;
   }
-  repairs.points += sample.points;
+  repairs.totals.open_looks.add(links.open_looks, std::exchange(repairs.points, repairs.points + sample.points),
+                                sample.points);
   const auto area = system_.shooters()[repair.shooter].area;
   const double all = links.due + links.escaped + links.absorbed;
   repairs.open =
@@ -233,7 +237,7 @@ void LinkedSolver::takePart(RepairBatch& repairs, std::size_t shot, LinkSample& 
       repairs.sum[v] += static_cast<float>(sample.points) * expander_.values()[v];
   }
   if (!sample.last) return;
-  const double part = 1.0 / std::exchange(repairs.points, 0.0);
+  const double part = 1.0 / std::exchange(repairs.points, 0);
   const auto totals = std::exchange(repairs.totals, {});
   const auto& leaves = repairs.leaves[sample.repair];
   for (const auto& run : leaves) {
@@ -244,7 +248,7 @@ void LinkedSolver::takePart(RepairBatch& repairs, std::size_t shot, LinkSample& 
     repairs.anew.push_back({repair.shooter, repair.old_shooter, repair.half, repair.samples, true, repair.overtaken});
   } else {
     system_.replaceLinks(repair.shooter, repair.half, leaves, repairs.sum,
-                         {part * totals.due, part * totals.escaped, part * totals.absorbed});
+                         {part * totals.due, part * totals.escaped, part * totals.absorbed, totals.open_looks});
   }
   for (const auto& run : leaves) std::fill_n(repairs.sum.begin() + run.first, run.count, 0.0F);
 }

@@ -140,7 +140,7 @@ bool LinkedSolver::finishEdit() {
     // Where nothing needs links that are not there, the solution over those that are is the end already.
     startGrowth();
     wanted_ = plan();
-    growing_ = !wanted_.empty();
+    growing_ = !wanted_.empty() && !mayGoWithout();
   }
   assessStep();
   if (error_.total <= settings_.target_error) {
@@ -151,6 +151,15 @@ bool LinkedSolver::finishEdit() {
     (void)chooseFurther();
   }
   return true;
+}
+
+/// After an edit some node or other is just strong enough to be a shooter now. Where the target is reached while the
+/// few that are wanted send nothing, which counts as light that is missing, they are not worth another wave.
+bool LinkedSolver::mayGoWithout() {
+  if (wanted_.size() >= settings_.planner.pairs_a_wave) return false;  // the walk may have ended before it was through
+  growing_ = false;
+  assess();
+  return error_.total <= settings_.target_error;
 }
 
 /// From nothing but the links: the result depends on them and on light and materials alone, so that an edit and its

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "common/result.h"
+#include "server/solver/change_reach.h"
 #include "server/solver/leaf_variation.h"
 #include "server/solver/lights.h"
 #include "server/solver/link_memory.h"
@@ -93,7 +94,7 @@ class LinkedSolver final : public Solver {
     std::uint32_t samples = 0;  ///< of a light polygon: points
     bool whole = false;         ///< all their links; the column is empty
     bool overtaken = false;     ///< nor were they taken again after the edit before
-    double reach = HUGE_VAL;    ///< bound of what the old links are wrong by (changeReach); infinite: cannot wait
+    double reach = HUGE_VAL;    ///< what the old links are wrong by (ChangeReach); infinite: cannot wait
   };
   /// Where the sides of the scene before are now.
   struct Renumbering {
@@ -114,14 +115,15 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] bool isAltered(const NodePlace& place, const GeometryChange& change) const;
   void inheritLights(LinkedSolver& former, const Renumbering& numbers);
   void inheritNodes(LinkedSolver& former, const Renumbering& numbers);
+  void inheritVariation(const LinkedSolver& former, const Renumbering& numbers);
   void planRepairsOf(const Shooter& from, std::uint32_t old_index, std::uint32_t index, bool whole,
                      const Renumbering& numbers);
   void inheritColumns(LinkedSolver& former, std::size_t first_repair, const Renumbering& numbers);
-  void planRepairs(double norm);
+  void planRepairs(double norm, const ChangeReach& change);
   [[nodiscard]] const Shadows& shadowsOf(const Repair& repair) const {
     return repair.overtaken ? *earlier_shadows_ : *shadows_;
   }
-  [[nodiscard]] double reachOf(const Repair& repair) const;
+  [[nodiscard]] double reachOf(const Repair& repair, const ChangeReach& change) const;
   [[nodiscard]] double missing(const Repair& repair) const;
   [[nodiscard]] double missing() const;
   [[nodiscard]] double fieldNorm() const;
@@ -148,6 +150,7 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] bool advanceSolution();
   [[nodiscard]] bool settleFromLinks();
   [[nodiscard]] bool finishEdit();
+  [[nodiscard]] bool mayGoWithout();
   void lightLeaves();
   void takeMaterials(const scene::PatchMaterials& materials);
   void takeLights();
@@ -206,15 +209,16 @@ class LinkedSolver final : public Solver {
   double left_out_ = 0.0;             // relative error by nodes too weak to play roulette
   std::uint32_t rounds_ = 0;
   std::uint64_t solutions_ = 0, sweeps_ = 0, replayed_ = 0;
-  double varying_ = 0.0, net_unshot_ = 0.0;     // flux, all channels
-  double varying_share_ = 0.0;                  // of the residual, what light that varies inside shooters causes
-  std::array<std::vector<glm::vec3>, 2> half_;  // irradiance by leaf value
-  std::vector<glm::vec3> irradiance_;           // by node
-  std::unique_ptr<LeafVariation> variation_;    // once little else is in error
-  std::vector<glm::vec3> corrected_;            // irradiance by node, with what leaves lack; empty: nothing
-  bool refined_ = false;                        // more paths were traced: what is next is to be chosen anew
-  double square_ = 0.0;                         // of the light that it was brought up to date with, times area
-  double by_links_ = 0.0;                       // sampling error without the noise of that
+  double varying_ = 0.0, net_unshot_ = 0.0;        // flux, all channels
+  double varying_share_ = 0.0;                     // of the residual, what light that varies inside shooters causes
+  std::array<std::vector<glm::vec3>, 2> half_;     // irradiance by leaf value
+  std::vector<glm::vec3> irradiance_;              // by node
+  std::unique_ptr<LeafVariation> variation_;       // once little else is in error
+  std::unique_ptr<LeafVariation> next_variation_;  // after an edit of geometry, until then
+  std::vector<glm::vec3> corrected_;               // irradiance by node, with what leaves lack; empty: nothing
+  bool refined_ = false;                           // more paths were traced: what is next is to be chosen anew
+  double square_ = 0.0;                            // of the light that it was brought up to date with, times area
+  double by_links_ = 0.0;                          // sampling error without the noise of that
   ErrorParts error_;
   TransportCounters counters_;
 };

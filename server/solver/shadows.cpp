@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <functional>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <utility>
@@ -47,6 +48,10 @@ inline Clip clip(float slope, float least) {
 
 }  // namespace
 
+void Shadows::Balls::clear() {
+  for (auto* values : {&x, &y, &z, &radius, &reach}) values->clear();
+}
+
 void Shadows::Balls::add(const glm::vec3& centre, float r, float pixels) {
   x.push_back(centre.x);
   y.push_back(centre.y);
@@ -69,6 +74,18 @@ Shadows::Shadows(const scene::PatchScene& patches, const std::vector<Side>& side
     if (side.leaf_count > 0) starts_[side.first_value] = true;
     addTiles(side);
   }
+  // The first ways often meet all of a tile then.
+  std::ranges::sort(change_.boxes, std::ranges::greater(), [](const scene::ChangedBox& box) {
+    const auto size = box.high - box.low;
+    return size.x * size.y + size.y * size.z + size.z * size.x;
+  });
+  around_ = nothing();
+  for (const auto& box : change_.boxes) {
+    around_.low = glm::min(around_.low, box.low);
+    around_.high = glm::max(around_.high, box.high);
+  }
+  place_.resize(value_.size());
+  for (std::uint32_t i = 0; i < value_.size(); ++i) place_[value_[i]] = i;
   const auto altered = aroundAltered();
   if (altered.low.x <= altered.high.x) all_.push_back(altered);
 }
@@ -119,6 +136,15 @@ void Shadows::addLeaf(const Side& side, std::uint32_t leaf) {
               reachOf(surface, point));
 }
 
+bool Shadows::changesWithin(std::uint32_t value, float distance) const {
+  const auto i = place_[value];
+  if (leaves_.radius[i] < 0.0F) return true;
+  const auto reach = distance + leaves_.radius[i];
+  return std::ranges::any_of(all_, [&](const scene::ChangedBox& box) {
+    return glm::distance(leaves_.centre(i), glm::clamp(leaves_.centre(i), box.low, box.high)) <= reach;
+  });
+}
+
 bool Shadows::sees(const glm::vec3& point, const glm::vec3& normal) const {
   return std::ranges::any_of(all_, [&](const scene::ChangedBox& box) {
     const glm::vec3 farthest(normal.x > 0.0F ? box.high.x : box.low.x, normal.y > 0.0F ? box.high.y : box.low.y,
@@ -154,33 +180,64 @@ RADIOSITY_CLONES void Shadows::markMet(const Way& way, const glm::vec4& plane, c
   }
 }
 
+/// Tiles that a way around all boxes meets, then those of them that the way to a single box meets, then their leaves.
 void Shadows::find(std::span<const glm::vec3> points, const glm::vec3& normal, float radius, std::uint32_t resolution,
                    Scratch& scratch, std::vector<LinkColumn::ValueRun>& runs) const {
-  std::vector<Way> ways;
-  for (const auto& point : points) {
-    for (const auto& box : change_.boxes) {
-      // A pixel is 2 / N wide at a depth of one; depths are at most distances.
-      ways.push_back(
-          {point, box.low - radius, box.high + radius, 2.0F * kHalfDiagonal / static_cast<float>(resolution)});
-    }
-  }
+  // A pixel is 2 / N wide at a depth of one; depths are at most distances.
+  const float spread = 2.0F * kHalfDiagonal / static_cast<float>(resolution);
+  const auto wayTo = [&](const glm::vec3& point, const scene::ChangedBox& box) {
+    return Way{point, box.low - radius, box.high + radius, spread};
+  };
   const glm::vec4 plane(normal, glm::dot(normal, points.front()));
   scratch.tiles.assign(tiles_.size(), kMissed);
-  for (const auto& way : ways) markMet(way, plane, tile_balls_, 0, tiles_.size(), scratch.tiles.data());
-  scratch.found.resize((change_.altered.size() + 63) / 64);
-  for (std::size_t t = 0; t < tiles_.size(); ++t) {
-    const auto& tile = tiles_[t];
-    if (scratch.tiles[t] < 0.0F && !tile.altered) continue;
-    scratch.leaves.assign(tile.count, kMissed);
-    for (const auto& way : ways)
-      markMet(way, plane, leaves_, tile.first, tile.first + tile.count, scratch.leaves.data());
-    for (std::size_t i = 0; i < tile.count; ++i) {
-      const auto value = value_[tile.first + i];
-      const bool found = scratch.leaves[i] >= 0.0F || (tile.altered && change_.altered[value]);
-      scratch.found[value / 64] |= std::uint64_t{found} << (value % 64);
+  if (!change_.boxes.empty()) {
+    for (const auto& point : points)
+      markMet(wayTo(point, around_), plane, tile_balls_, 0, tiles_.size(), scratch.tiles.data());
+  }
+  takeTiles(scratch);
+  const auto near = scratch.near.size();
+  scratch.ways.clear();
+  scratch.by_way.clear();
+  for (const auto& point : points) {
+    for (const auto& box : change_.boxes) {
+      scratch.ways.push_back(wayTo(point, box));
+      scratch.by_way.resize(scratch.by_way.size() + near, kMissed);
+      markMet(scratch.ways.back(), plane, scratch.near_balls, 0, near,
+              scratch.by_way.data() + scratch.by_way.size() - near);
     }
   }
+  scratch.found.resize((change_.altered.size() + 63) / 64);
+  for (std::size_t i = 0; i < near; ++i) markLeaves(i, plane, scratch);
   takeRuns(scratch, runs);
+}
+
+/// Those that are marked, and those of which leaves are altered.
+void Shadows::takeTiles(Scratch& scratch) const {
+  scratch.near.clear();
+  scratch.near_balls.clear();
+  for (std::uint32_t t = 0; t < tiles_.size(); ++t) {
+    if (scratch.tiles[t] < 0.0F && !tiles_[t].altered) continue;
+    scratch.near.push_back(t);
+    scratch.near_balls.add(tile_balls_.centre(t), tile_balls_.radius[t], tile_balls_.reach[t]);
+  }
+}
+
+/// Leaves of the i-th of the tiles that were taken.
+void Shadows::markLeaves(std::size_t i, const glm::vec4& plane, Scratch& scratch) const {
+  const auto& tile = tiles_[scratch.near[i]];
+  scratch.leaves.assign(tile.count, kMissed);
+  bool met = tile.altered;
+  for (std::size_t w = 0; w < scratch.ways.size(); ++w) {
+    if (scratch.by_way[w * scratch.near.size() + i] < 0.0F) continue;
+    met = true;
+    markMet(scratch.ways[w], plane, leaves_, tile.first, tile.first + tile.count, scratch.leaves.data());
+    if (std::ranges::all_of(scratch.leaves, [](float mark) { return mark >= 0.0F; })) break;
+  }
+  for (std::size_t k = 0; met && k < tile.count; ++k) {
+    const auto value = value_[tile.first + k];
+    const bool found = scratch.leaves[k] >= 0.0F || (tile.altered && change_.altered[value]);
+    scratch.found[value / 64] |= std::uint64_t{found} << (value % 64);
+  }
 }
 
 /// Of the bits that are set, which it clears.

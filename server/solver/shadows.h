@@ -29,13 +29,12 @@ class Shadows {
   /// Around all that changed, altered leaves too.
   [[nodiscard]] const std::vector<scene::ChangedBox>& all() const { return all_; }
 
+  /// Whether something of it may be so near to a leaf, or to a place on it.
+  [[nodiscard]] bool changesWithin(std::uint32_t value, float distance) const;
   /// Whether a half space can see any of it.
   [[nodiscard]] bool sees(const glm::vec3& point, const glm::vec3& normal) const;
 
-  struct Scratch {
-    std::vector<float> tiles, leaves;  ///< marks: negative where missed
-    std::vector<std::uint64_t> found;  ///< one bit a leaf value; none between calls
-  };
+  class Scratch;
   /// Runs of leaf values, ascending, none across sides, of all leaves whose links from within `radius` of one of the
   /// points, as an item buffer of `resolution` finds them, may differ: those altered, and those that the way to passes
   /// a box, what the pixels show that decide on the leaf included. A superset; leaves behind the plane of the points,
@@ -48,6 +47,7 @@ class Shadows {
   struct Balls {
     std::vector<float> x, y, z, radius;
     std::vector<float> reach;  ///< of the pixels that decide, in half diagonals of one
+    void clear();
     void add(const glm::vec3& centre, float r, float pixels = 1.0F);
     [[nodiscard]] glm::vec3 centre(std::size_t i) const { return {x[i], y[i], z[i]}; }
   };
@@ -58,6 +58,8 @@ class Shadows {
   };
   static void markMet(const Way& way, const glm::vec4& plane, const Balls& balls, std::size_t first, std::size_t end,
                       float* marks);
+  void takeTiles(Scratch& scratch) const;
+  void markLeaves(std::size_t i, const glm::vec4& plane, Scratch& scratch) const;
   void addTiles(const Side& side);
   void addTile(const Side& side, std::uint32_t x0, std::uint32_t y0);
   void addLeaf(const Side& side, std::uint32_t leaf);
@@ -68,8 +70,10 @@ class Shadows {
   const scene::PatchScene& patches_;
   GeometryChange change_;
   std::vector<scene::ChangedBox> all_;  ///< boxes, and one around all altered leaves
+  scene::ChangedBox around_{};          ///< all boxes
   Balls leaves_;                        ///< tile after tile
   std::vector<std::uint32_t> value_;    ///< of these leaves
+  std::vector<std::uint32_t> place_;    ///< by leaf value: where it is in leaves_
   /// Leaves of a square of a side.
   struct Tile {
     std::size_t first, count;  ///< into leaves_
@@ -78,6 +82,17 @@ class Shadows {
   std::vector<Tile> tiles_;
   Balls tile_balls_;
   std::vector<bool> starts_;  ///< by leaf value: the first of a side
+};
+
+/// What find() works with.
+class Shadows::Scratch {
+  friend class Shadows;
+  std::vector<float> tiles, leaves;  ///< marks: negative where missed
+  std::vector<std::uint32_t> near;   ///< tiles that may be met
+  Balls near_balls;                  ///< around these
+  std::vector<Way> ways;
+  std::vector<float> by_way;         ///< marks of these tiles, way after way
+  std::vector<std::uint64_t> found;  ///< one bit a leaf value; none between calls
 };
 
 }  // namespace radiosity::solver

@@ -51,6 +51,29 @@ struct NodeRun {
   std::uint32_t first_node, count;
 };
 
+/// A set of looks, each from one point, by number; of those that are too many all or none are in it.
+struct Looks {
+  std::uint64_t bits = 0;
+
+  static constexpr std::uint32_t kMany = 63;  ///< this one and all that follow share a bit
+  [[nodiscard]] bool has(std::uint32_t look) const { return (bits >> std::min(look, kMany) & 1U) != 0; }
+  void add(std::uint32_t look) { bits |= std::uint64_t{1} << std::min(look, kMany); }
+  /// The looks of another set, counted from `first`.
+  void add(const Looks& others, std::uint32_t first, std::uint32_t count) {
+    for (std::uint32_t look = 0; look < count && others.bits != 0; ++look) {
+      if (others.has(look)) add(first + look);
+    }
+  }
+  /// `count` of them, from `first` on.
+  [[nodiscard]] Looks from(std::uint32_t first, std::uint32_t count) const {
+    Looks looks;
+    for (std::uint32_t look = 0; look < count && bits != 0; ++look) {
+      if (has(first + look)) looks.add(look);
+    }
+    return looks;
+  }
+};
+
 /// Gather: light of one convex planar polygon of uniform radiosity at every leaf. For each point on the polygon an item
 /// buffer gives visibility; irradiance = radiosity x exact polygon form factor (Lambert) x mean visibility weighted by
 /// cos cos / r^2.
@@ -75,6 +98,7 @@ struct GatherShot {
   /// Into ShotBatch::boxes, of a shot that names its receivers: what escapes and what is absorbed is wanted only where
   /// the points see these boxes or the receivers, and may be left out elsewhere. 0: everywhere.
   std::uint32_t first_box = 0, box_count = 0;
+  Looks open_looks;  ///< points of which all that escapes and is absorbed is wanted nevertheless
 };
 
 /// For GatherShot::spot_row, from a number in [0, 1).
@@ -191,6 +215,7 @@ struct LinkSample {
   /// find half or twice as much; the ratio of their means over many is near one (LinkColumn::gain). 0: nothing is
   /// known.
   double delivered = 0.0, due = 0.0;
+  Looks open_looks;  ///< of a gather shot: its points from where something of that escapes or is absorbed
 
   void add(std::uint32_t node, float value) {
     if (runs.empty() || runs.back().first_node + runs.back().count != node) runs.push_back({node, 0});

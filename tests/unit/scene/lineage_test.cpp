@@ -107,6 +107,40 @@ TEST(Lineage, WhatComesTakesWhatIsFreeAndWhatWentLeavesItsPlace) {
   EXPECT_FALSE(map.moved[0]);
 }
 
+TEST(Lineage, BoxesLieAroundPartsAndNotAroundWhatIsBetweenThem) {
+  auto before = squares();
+  auto& pair = before.primitives.emplace_back(square());  // two of them, far apart, in one
+  pair.mesh = 1;
+  for (std::size_t i = 0; i < 4; ++i) pair.positions.push_back(pair.positions[i] + glm::dvec3(3, 0, 0));
+  pair.indices.insert(pair.indices.end(), {4, 5, 6, 4, 6, 7});
+  auto instance = placed(4, {0, 2, 0}, 0.5);
+  instance.primitive = 1;
+  before.instances.push_back(instance);
+  const auto patches = buildPatchScene(before, options()).value();
+  auto after = before;
+  after.instances.back().world = placed(4, {0, 2, 3}, 0.5).world;
+  const auto map = matchPatches(before, patches, after, successor(before, patches, after));
+  EXPECT_EQ(map.boxes.size(), 4U) << "both parts, there and here";
+  const auto part = static_cast<float>(0.5 / patches.scale);
+  for (const auto& box : map.boxes) EXPECT_NEAR(box.high.x - box.low.x, part, 1e-3F * part);
+}
+
+TEST(Lineage, VeryManyPartsHaveFewBoxesThatHoldThemAll) {
+  std::vector<ChangedBox> boxes;
+  for (int i = 0; i < 500; ++i) {
+    const glm::vec3 low(static_cast<float>(i % 25), 0.0F, static_cast<float>(i / 25));
+    boxes.push_back({low, low + 0.1F});
+  }
+  auto joined = boxes;
+  joinBoxes(joined);
+  EXPECT_LE(joined.size(), 16U);
+  for (const auto& box : boxes) {
+    EXPECT_TRUE(std::ranges::any_of(joined, [&](const ChangedBox& j) {
+      return glm::all(glm::lessThanEqual(j.low, box.low)) && glm::all(glm::greaterThanEqual(j.high, box.high));
+    }));
+  }
+}
+
 TEST(Lineage, ThereAndBackGivesTheSamePlaces) {
   const auto before = squares();
   const auto patches = buildPatchScene(before, options()).value();

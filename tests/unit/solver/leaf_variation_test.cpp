@@ -159,6 +159,41 @@ TEST_F(LeafVariationTest, TheSamePathsFollowOtherLight) {
 }
 
 // The furnace: every place sees the same radiosity whichever way it looks.
+TEST_F(LeafVariationTest, AfterAnEditWhatIsClearOfItKeepsWhatItsPathsFound) {
+  LeafVariation former(*scene_.patches, sides_, 1);
+  former.update(light(), 0.0);
+  for (int round = 0; round < 3 && former.refine(); ++round) former.update(light(), 0.0);
+  ASSERT_TRUE(former.corrects());
+  std::vector<std::uint32_t> same(1 + kLooks);
+  for (std::uint32_t value = 0; value < same.size(); ++value) same[value] = value;
+  for (const bool clear : {true, false}) {
+    LeafVariation next(*scene_.patches, sides_, 1);
+    next.inherit(former, same, std::vector<bool>(same.size(), clear));
+    next.update(light(), 0.0);
+    EXPECT_EQ(next.left(), former.left());
+    EXPECT_EQ(next.noise(), former.noise());
+    for (std::size_t half = 0; half < 2; ++half) {
+      ASSERT_EQ(next.correction(half).size(), same.size());
+      for (const auto value : same) EXPECT_EQ(next.correction(half)[value], former.correction(half)[value]);
+    }
+  }
+  // The same strip far above the floor: nothing is near. Only where it is said to be clear is that not asked again.
+  test::Quad floor{{0.0F, 0.0F, 0.0F}, {0.2F, 0.0F, 0.0F}, {0.0F, 0.2F, 0.0F}};
+  test::Quad looks{{0.0F, 0.0F, 0.9F}, {0.0F, 0.2F, 0.0F}, {0.0F, 0.0F, 0.02F}};
+  floor.width = floor.height = looks.height = 1;
+  looks.width = kLooks;
+  const auto far = test::makeQuadScene({floor, looks});
+  LeafVariation alone(*far.patches, sides_, 1);
+  alone.update(light(), 0.0);
+  ASSERT_FALSE(alone.corrects());
+  for (const bool clear : {true, false}) {
+    LeafVariation next(*scene_.patches, sides_, 1);
+    next.inherit(alone, same, std::vector<bool>(same.size(), clear));
+    next.update(light(), 0.0);
+    EXPECT_EQ(next.corrects(), !clear);
+  }
+}
+
 TEST(LeafVariation, EvenLightLeavesNothing) {
   const auto scene = test::makeQuadScene(test::cubeQuads(4, {1, 1, 1, 1, 1, 1}, {0.5F, 0.5F, 0.5F, 0.5F, 0.5F, 0.5F}));
   const auto sides = makeSides(*scene.patches);

@@ -227,7 +227,7 @@ TEST_F(LinkColumns, OneInWhichLinksWereReplacedIsTheOneMadeOfThemAfresh) {
   }
   const std::vector<LinkColumn::ValueRun> leaves = {
       {sides_[1].first_value, 4}, {sides_[2].first_value + 2, 3}, {sides_[4].first_value, 16}};
-  replaced.replace(leaves, values, {after.due, after.escaped, after.absorbed}, expander_.leafAreas(), sides_);
+  replaced.replace(leaves, values, {after.due, after.escaped, after.absorbed, {}}, expander_.leafAreas(), sides_);
   for (std::uint32_t side = 0; side < 6; ++side) {
     for (std::uint32_t i = 0; i < 16; ++i) {
       const float was = std::max(0.0F, leaf(replaced, side, i)), is = std::max(0.0F, leaf(afresh, side, i));
@@ -249,10 +249,29 @@ TEST_F(LinkColumns, WhereNothingReachesALeafReplacingItTakesNoMemory) {
   const auto bytes = column.bytes();
   const std::vector<float> values(96, 0.0F);
   const std::vector<LinkColumn::ValueRun> leaves = {{sides_[3].first_value, 16}, {sides_[5].first_value + 4, 2}};
-  column.replace(leaves, values, {1.0 / 32.0, 0.0, 0.0}, expander_.leafAreas(), sides_);
+  column.replace(leaves, values, {1.0 / 32.0, 0.0, 0.0, {}}, expander_.leafAreas(), sides_);
   EXPECT_EQ(column.bytes(), bytes);
   EXPECT_EQ(leaf(column, 3, 0), -1.0F);
   EXPECT_NEAR(leaf(column, 1, 0), 0.5, 1e-6);
+}
+
+TEST_F(LinkColumns, KnowsFromWhichPointsSomethingWasLost) {
+  LinkSample sample;
+  sample.add(sides_[1].first_node, 0.5F);
+  LinkColumn column;
+  add(column, sample, 3.0);
+  EXPECT_EQ(column.openLooks().bits, 0U);
+  sample.escaped = 0.25;
+  sample.open_looks.add(1);
+  add(column, sample, 2.0);
+  EXPECT_EQ(column.openLooks().bits, 1U << 4U) << "the second of two, after three";
+  EXPECT_EQ(column.openLooks().from(3, 2).bits, 2U);
+  sample.open_looks = {};
+  add(column, sample, 1.0);
+  EXPECT_TRUE(column.openLooks().has(5)) << "it does not say which: all";
+  add(column, sample, 100.0);
+  for (const std::uint32_t look : {6U, 62U, 63U, 105U, 1000U}) EXPECT_TRUE(column.openLooks().has(look)) << look;
+  EXPECT_FALSE(column.openLooks().has(0));
 }
 
 TEST_F(LinkColumns, OneThatWasRenumberedIsTheOneMadeInTheNewNumbers) {
@@ -295,7 +314,7 @@ TEST_F(LinkColumns, OneThatWasRenumberedIsTheOneMadeInTheNewNumbers) {
   LinkExpander expander(*made.patches, sides);
   expander.expand(after);
   afresh.add(expander, after, 2.0, sides);
-  column.replace({}, {}, {after.due, after.escaped, 0.0}, expander.leafAreas(), sides);
+  column.replace({}, {}, {after.due, after.escaped, 0.0, {}}, expander.leafAreas(), sides);
   EXPECT_NEAR(fluxOf(column, sides, expander.leafAreas()), after.due, 1e-6);
   for (const auto& side : sides) {
     std::vector<float> one(side.leaf_count, 0.0F), other(side.leaf_count, 0.0F);
