@@ -21,7 +21,7 @@ OWN_INCLUDES = [
     ("protocol/", ["common/", "protocol/"]),
     ("server/scene/", ["common/", "server/scene/"]),
     ("server/solver/", ["common/", "server/solver/", r"server/scene/(scene|patch_scene|bvh)\.h"]),
-    ("server/gpu/", ["common/", "server/gpu/", "server/solver/", r"server/scene/(scene|patch_scene)\.h"]),
+    ("server/gpu/", ["common/", "server/gpu/", "server/solver/", r"server/scene/(scene|patch_scene|bvh)\.h"]),
     ("server/engine/", ["common/", "server/engine/", "server/scene/", "server/solver/", "server/gpu/", "server/state/"]),
     ("server/state/", ["common/", "server/state/"]),
     ("server/net/", ["common/", "protocol/", "server/net/", r"server/engine/engine\.h", r"server/state/uploads\.h"]),

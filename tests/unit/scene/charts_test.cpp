@@ -410,32 +410,6 @@ TEST(Charts, AbsurdTexelSizeIsRefused) {
   EXPECT_EQ(patches.error().code, ErrorCode::kTooLarge);
 }
 
-TEST(Charts, CoincidentFacesAreReported) {
-  Scene scene;
-  place(scene, floorQuad(1.0));
-  place(scene, floorQuad(1.0));
-  const PatchScene patches = build(scene, 100);
-  EXPECT_THAT(patches.warnings, testing::Contains(testing::HasSubstr("exactly on an earlier one")));
-  EXPECT_THAT(build(sceneOf(box({0, 0, 0}, {1, 1, 1}))).warnings, testing::IsEmpty());
-}
-
-// Also where nothing bounds a solid, and where the leaf that is looked at first lies in the covered part.
-TEST(Charts, OnlyWhatAnEarlierFaceCoversIsLeftOut) {
-  Material both;
-  both.double_sided = true;
-  for (const bool box_elsewhere : {false, true}) {
-    Scene scene;
-    place(scene, floorQuad(1.0), glm::translate(glm::dmat4(1.0), glm::dvec3(0.01, 0, 0)), both);
-    place(scene, floorQuad(4.0), glm::dmat4(1.0), both);
-    if (box_elsewhere) place(scene, box({9, 0, 9}, {10, 1, 10}));
-    const PatchScene patches = build(scene, 400);
-    EXPECT_THAT(patches.warnings, testing::Contains(testing::HasSubstr("exactly on an earlier one")));
-    const double boxes = box_elsewhere ? 6.0 : 0.0;
-    EXPECT_NEAR(leafArea(patches, 0), 16.0 + boxes, 0.05) << "1 + 16 - 1";
-    EXPECT_NEAR(leafArea(patches, 1), 17.0, 1e-4) << "nothing covers their backs";
-  }
-}
-
 Primitive quadWithLightmapUv(double u0, double u1) {
   Primitive p = floorQuad(1.0);
   p.texcoord1 = {{u0, 0.0}, {u0, 0.5}, {u1, 0.5}, {u1, 0.0}};
