@@ -83,7 +83,6 @@ class LightGatherer {
   [[nodiscard]] std::array<std::uint32_t, 9> itemsAround(std::size_t i, std::span<const std::uint32_t> items,
                                                          std::size_t size) const;
   [[nodiscard]] Receivers::Ray rayTo(std::size_t i, const glm::vec3& light, std::size_t size) const;
-  [[nodiscard]] bool couldHide(std::uint32_t item, const Receivers::Ray& ray) const;
   [[nodiscard]] bool hidden(std::size_t i, const glm::vec3& light, std::span<const std::uint32_t> items,
                             std::size_t size) const;
   [[nodiscard]] bool hiddenFromGap(std::size_t i, const glm::vec3& light, std::span<const std::uint32_t> items,

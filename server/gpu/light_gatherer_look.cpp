@@ -142,12 +142,8 @@ bool LightGatherer::hidden(std::size_t i, const glm::vec3& light, std::span<cons
   // Beside a silhouette one looks past what closes a hollow whose inside is a surface as well.
   if ((lit_.doubt[i] & kHides) == 0) return hiddenAtSilhouette(i, light, items, size);
   const auto ray = rayTo(i, light, size);
-  return couldHide(item, ray) || ((lit_.care[i] & Receivers::kTwoSided) != 0 && receivers_->isBlocked(ray));
-}
-
-/// An item behind whose plane, seen from the light, a receiver lies.
-bool LightGatherer::couldHide(std::uint32_t item, const Receivers::Ray& ray) const {
-  return receivers_->risesBefore(item, ray.at, ray.normal) && receivers_->liesBefore(item, ray);
+  return receivers_->hidesBefore(item, ray) ||
+         ((lit_.care[i] & Receivers::kTwoSided) != 0 && receivers_->isBlocked(ray));
 }
 
 /// The receiver's pixel and those around it, on the same face.
@@ -197,7 +193,7 @@ bool LightGatherer::hiddenFromGap(std::size_t i, const glm::vec3& light, std::sp
     const auto hidden = receivers_->hiddenAmong(around, rayTo(i, light, size));
     if (hidden) return *hidden;
   }
-  return (lit_.doubt[i] & kHides) != 0 && couldHide(own, rayTo(i, light, size));
+  return (lit_.doubt[i] & kHides) != 0 && receivers_->hidesBefore(own, rayTo(i, light, size));
 }
 
 void LightGatherer::weighLost(const solver::HemicubeFrame& point, std::span<const std::uint32_t> items,

@@ -204,6 +204,10 @@ Receivers::Meeting Receivers::meet(std::uint32_t item, const Ray& ray) const {
   return Meeting::kNothing;
 }
 
+bool Receivers::isMet(std::uint32_t item, const Ray& ray) const {
+  return facets_[facet_of_[item]].count > kMaxFacetTriangles || meet(item, ray) != Meeting::kNothing;
+}
+
 Receivers::Meeting Receivers::opacityAt(std::uint32_t triangle, const glm::vec2& texel) const {
   const auto& surface = patches_->surfaces[patches_->triangle_surface[triangle]];
   if (!surface.see_through) return Meeting::kSolid;

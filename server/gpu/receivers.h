@@ -104,15 +104,13 @@ class Receivers {
     return place(receiver, at).point;
   }
 
-  /// Whether a part of the item's facet lies in front of a receiver. What is wholly behind its horizon cannot hide a
+  /// Whether a part of the item's facet may lie in front of a receiver. What is wholly behind its horizon cannot hide a
   /// light from it, although a pixel on a convex edge may show it: the top of a block, seen instead of the topmost
-  /// texels of its side. The facet's: an item names any triangle of the facet that the pixel shows.
+  /// texels of its side. The facet's: an item names any triangle of the facet that the pixel shows. True decides
+  /// nothing: a box stands for facets of many corners, and facets have holes.
   [[nodiscard]] bool risesBefore(std::uint32_t item, const glm::vec3& point, const glm::vec3& normal) const {
     const auto& facet = facets_[facet_of_[item]];
-    for (std::uint32_t i = facet.first_corner; i < facet.first_corner + facet.corner_count; ++i) {
-      if (glm::dot(normal, outlines_[i] - point) > kInPlane) return true;
-    }
-    return false;
+    return anyRises(std::span(&outlines_[facet.first_corner], facet.corner_count), point, normal);
   }
 
   /// A receiving point, and the way from it to the light.
@@ -123,9 +121,9 @@ class Receivers {
     float pixel_size;  ///< at most this, unit, anywhere along the way
   };
 
-  /// Whether a part of the item's facet is nearer to the light than a receiver is. What is wholly farther away cannot
-  /// hide the light, although a pixel beside a silhouette may show it, and its plane lie between the two: the chair
-  /// behind a thin leg. Not asked for lights at infinity, whose wide pixels are right in the mean alone.
+  /// Whether a part of the item's facet may be nearer to the light than a receiver is. What is wholly farther away
+  /// cannot hide the light, although a pixel beside a silhouette may show it, and its plane lie between the two: the
+  /// chair behind a thin leg. Not asked for lights at infinity, whose wide pixels are right in the mean alone.
   [[nodiscard]] bool liesBefore(std::uint32_t item, const Ray& ray) const {
     return risesBefore(item, ray.at, glm::normalize(ray.way));
   }
@@ -133,7 +131,16 @@ class Receivers {
   /// Whether what a pixel shows hides the light from a receiver in it: it lies behind the item's plane, on the side
   /// that the light does not see. No depth bias, hence no acne. For pixels away from edges.
   [[nodiscard]] bool hides(std::uint32_t item, const Ray& ray) const {
-    return item != scene::kNone && behind(item, ray);
+    return item != scene::kNone && behind(item, ray) &&
+           (anyRises(corners_[item], ray.at, ray.normal) || isMet(item, ray));
+  }
+  /// The same of a light that is not at infinity, and of an item behind whose plane the receiver lies. Where the
+  /// triangle named lies before the receiver the pixel decides, which is right in the mean; where only others of the
+  /// facet do, the ray: the far side of a wall around a window lies before the window's reveal, and hides nothing.
+  [[nodiscard]] bool hidesBefore(std::uint32_t item, const Ray& ray) const {
+    const auto way = glm::normalize(ray.way);
+    if (anyRises(corners_[item], ray.at, ray.normal) && anyRises(corners_[item], ray.at, way)) return true;
+    return risesBefore(item, ray.at, ray.normal) && risesBefore(item, ray.at, way) && isMet(item, ray);
   }
 
   /// Whether a receiver lies before the plane of what its pixel shows: the pixel looks past what it lies on.
@@ -171,6 +178,15 @@ class Receivers {
   void findFacets();
   void measure(Facet& facet);
   void buildTree();
+  [[nodiscard]] static bool anyRises(std::span<const glm::vec3> corners, const glm::vec3& point,
+                                     const glm::vec3& normal) {
+    for (const auto& corner : corners) {
+      if (glm::dot(normal, corner - point) > kInPlane) return true;
+    }
+    return false;
+  }
+  /// The ray passes through the item's facet, or it has too many triangles to ask.
+  [[nodiscard]] bool isMet(std::uint32_t item, const Ray& ray) const;
   /// Height above the plane, on the light's side of it.
   [[nodiscard]] float before(std::uint32_t item, const Ray& ray) const {
     const auto& plane = planes_[item];

@@ -1,5 +1,6 @@
-// A small bounding volume hierarchy over triangles: which triangles does a ray meet, which touch a box. Used while a
-// scene is built (burial, coverage.h); immutable once built, so any number of threads may ask.
+// A small bounding volume hierarchy over triangles: which triangles does a ray meet, which touch a box. For burial
+// while a scene is built (coverage.h), for light within leaves, and where an item buffer cannot tell what hides a place
+// (gpu/receivers.h); immutable once built, so any number of threads may ask.
 #pragma once
 
 #include <array>

@@ -146,8 +146,7 @@ class Burial {
     const Surface& surface = patches_.surfaces[s];
     const Bounds box = boxes.box(level, x, y);
     if (box.empty()) return;
-    const bool covered = side == 0 && coincidence_.isCovered(s);
-    if (!covered && !solids_.near(box, s)) {
+    if (!solids_.near(box, s) && (side != 0 || !coincidence_.mayCover(s, box))) {
       settleUniform(s, side, level, x, y);
       return;
     }
@@ -208,7 +207,6 @@ class Burial {
   /// All of the leaf is visible, as one look from all of it at once shows: most are, beside the few that a solid
   /// covers.
   [[nodiscard]] bool isOpen(const Contact& contact, std::size_t first_piece, std::size_t end_piece) const {
-    if (contact.side == 0 && coincidence_.isCovered(contact.surface)) return false;
     const auto triangle = patches_.leaves[leafOf(contact)].triangle;
     const auto normal = facing(triangle, contact.side);
     const glm::dvec2 corner(contact.x, contact.y);
@@ -222,6 +220,7 @@ class Burial {
     for (auto piece = first_piece; piece < end_piece; ++piece) {
       if (!add(pieces_[piece].triangle)) return false;
     }
+    if (contact.side == 0 && coincidence_.mayCover(contact.surface, box)) return false;
     return !solids_.mayBury(box, normal);
   }
 

@@ -121,6 +121,7 @@ class Boxes {
 
  private:
   using Corner = std::tuple<float, float, float>;
+  static constexpr std::size_t kMostToTellApart = 200'000;  ///< triangles: a tenth of a second
 
   [[nodiscard]] std::uint32_t instanceOf(std::size_t i) const { return patches_.surfaces[surfaces_[i]].instance; }
 
@@ -132,8 +133,12 @@ class Boxes {
       while (part[i] != i) i = part[i] = part[part[i]];
       return i;
     };
+    std::size_t triangles = 0;
+    for (const auto surface : surfaces) triangles += patches_.surfaces[surface].triangle_count;
+    const bool tells_apart = triangles <= kMostToTellApart;
+    if (!tells_apart) std::ranges::fill(part, 0U);
     std::vector<std::pair<Corner, std::uint32_t>> corners;
-    for (std::uint32_t i = 0; i < surfaces.size(); ++i) {
+    for (std::uint32_t i = 0; i < surfaces.size() && tells_apart; ++i) {
       const auto& surface = patches_.surfaces[surfaces[i]];
       for (std::uint32_t k = 0; k < 3 * surface.triangle_count; ++k) {
         const auto& at = patches_.vertices[patches_.indices[std::size_t{3} * surface.first_triangle + k]].position;

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
+#include <tuple>
 #include <utility>
 
 #include "server/scene/coverage.h"
@@ -22,7 +24,8 @@ constexpr double kGrazing = 2e-4;
 constexpr double kLongest = 8.0;
 /// What lies on each other faces the same way: cosine of the angle between. Planes of such are no farther apart where
 /// the scene is (unit box) unless they meet at an angle.
-constexpr float kSameWay = 0.9999F, kSamePlane = 1e-5F;
+constexpr float kSameWay = 0.9999F;
+constexpr double kSamePlane = 2e-5;
 /// So many places of a leaf are looked at for what covers it.
 constexpr std::uint32_t kPlaces = 16;
 
@@ -196,34 +199,51 @@ void Coincidence::keepCovered() {
   }
 }
 
-/// By surface: planar, in one plane with an earlier one that reaches into its bounds, and facing the same way.
+/// By surface: planar, in one plane with an earlier one that reaches into its bounds, and facing the same way. Planes
+/// are sorted into cells of distance, and then swept along x; twice, so that no pair lies on both sides of a cell's
+/// end.
 std::vector<bool> Coincidence::coplanarWithEarlier() const {
   struct Plane {
-    float distance;
+    std::int64_t cell;
+    float low;  ///< along x
     std::uint32_t surface;
-    glm::vec3 normal;
   };
-  std::vector<Plane> planes;
-  for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
-    const Surface& surface = patches_.surfaces[s];
-    if (!surface.planar) continue;
-    const TriangleFrame& frame = patches_.triangles[surface.first_triangle];
-    planes.push_back({glm::dot(frame.normal, frame.origin), s, frame.normal});
-  }
-  std::ranges::sort(planes, {}, [](const Plane& plane) { return std::pair(plane.distance, plane.surface); });
   std::vector<bool> found(patches_.surfaces.size(), false);
-  for (std::size_t i = 0; i < planes.size(); ++i) {
-    const Surface& a = patches_.surfaces[planes[i].surface];
-    for (auto k = i + 1; k < planes.size() && planes[k].distance - planes[i].distance < kSamePlane; ++k) {
-      const Surface& b = patches_.surfaces[planes[k].surface];
-      if (glm::dot(planes[i].normal, planes[k].normal) <= kSameWay) continue;
-      if (glm::any(glm::greaterThan(a.bounds_min, b.bounds_max + kSamePlane)) ||
-          glm::any(glm::greaterThan(b.bounds_min, a.bounds_max + kSamePlane)))
-        continue;
-      found[std::max(planes[i].surface, planes[k].surface)] = true;
+  for (const double shift : {0.0, 0.5}) {
+    std::vector<Plane> planes;
+    for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
+      const Surface& surface = patches_.surfaces[s];
+      if (!surface.planar) continue;
+      const TriangleFrame& frame = patches_.triangles[surface.first_triangle];
+      const auto distance = static_cast<double>(glm::dot(frame.normal, frame.origin));
+      planes.push_back({static_cast<std::int64_t>(std::floor(distance / kSamePlane + shift)), surface.bounds_min.x, s});
+    }
+    std::ranges::sort(planes, {}, [](const Plane& plane) { return std::tuple(plane.cell, plane.low, plane.surface); });
+    for (std::size_t i = 0; i < planes.size(); ++i) {
+      const Surface& a = patches_.surfaces[planes[i].surface];
+      for (auto k = i + 1; k < planes.size() && planes[k].cell == planes[i].cell &&
+                           planes[k].low <= a.bounds_max.x + static_cast<float>(kSamePlane);
+           ++k) {
+        if (lieTogether(a, patches_.surfaces[planes[k].surface]))
+          found[std::max(planes[i].surface, planes[k].surface)] = true;
+      }
     }
   }
   return found;
+}
+
+/// Of two surfaces in one plane: they face the same way, and their bounds meet.
+bool Coincidence::lieTogether(const Surface& a, const Surface& b) const {
+  const auto margin = static_cast<float>(kSamePlane);
+  return glm::dot(patches_.triangles[a.first_triangle].normal, patches_.triangles[b.first_triangle].normal) >
+             kSameWay &&
+         !glm::any(glm::greaterThan(a.bounds_min, b.bounds_max + margin)) &&
+         !glm::any(glm::greaterThan(b.bounds_min, a.bounds_max + margin));
+}
+
+bool Coincidence::mayCover(std::uint32_t s, const Bounds& box) const {
+  const glm::vec3 margin(2.0e-6F);
+  return covered_[s] && tree_.touches(box.min - margin, box.max + margin, patches_.triangle_surface, s);
 }
 
 /// An earlier surface found right at some of this surface's leaf points, or `closely`, at one of them at least.

@@ -65,8 +65,8 @@ class Coincidence {
   /// Whether there are any.
   [[nodiscard]] bool found() const { return std::ranges::find(covered_, true) != covered_.end(); }
 
-  /// Whether its front is covered somewhere.
-  [[nodiscard]] bool isCovered(std::uint32_t s) const { return covered_[s]; }
+  /// Whether the front of `s` may be covered in the box.
+  [[nodiscard]] bool mayCover(std::uint32_t s, const Bounds& box) const;
 
   /// Whether the front of `s` is covered there. Only asked of surfaces that are covered somewhere.
   [[nodiscard]] bool covers(std::uint32_t s, const glm::vec3& position, const glm::vec3& normal, Hits& hits) const {
@@ -79,6 +79,7 @@ class Coincidence {
   [[nodiscard]] std::uint32_t triangleOver(std::uint32_t s, const glm::vec3& position, const glm::vec3& normal,
                                            Hits& hits) const;
   [[nodiscard]] std::vector<bool> coplanarWithEarlier() const;
+  [[nodiscard]] bool lieTogether(const Surface& a, const Surface& b) const;
   [[nodiscard]] std::uint32_t coveredBy(std::uint32_t s, bool closely) const;
 
   PatchScene& patches_;

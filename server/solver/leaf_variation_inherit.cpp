@@ -9,6 +9,7 @@ namespace radiosity::solver {
 void LeafVariation::inherit(const LeafVariation& former, std::span<const std::uint32_t> value_before,
                             const std::vector<bool>& clear) {
   if (!former.is_traced_ || stands_for_ != 1.0 || former.stands_for_ != 1.0) return;
+  if (former.count_.empty() || !former.wanted_.empty()) return;  // what is still to be traced is not known
   const auto fewest = *std::ranges::min_element(former.count_);
   std::vector<std::uint16_t> count_before;  // by former leaf value
   for (std::size_t r = 0; r < former.receivers_.size(); ++r) {

@@ -163,7 +163,8 @@ bool LinkedSolver::mayGoWithout() {
 }
 
 /// From nothing but the links: the result depends on them and on light and materials alone, so that an edit and its
-/// inverse give the same bits as long as no link and no path was added in between. False: not yet.
+/// inverse give the same bits as long as no link, no shooter without links (mayGoWithout) and no path was added in
+/// between. False: not yet.
 bool LinkedSolver::settleFromLinks() {
   const auto forgetLight = [&] {
     for (auto& shooter : system_.shooters()) {

@@ -77,7 +77,8 @@ class Solver {
   virtual void setMaterials(const scene::PatchMaterials& materials) = 0;
   /// Lights without extent, or the sky, changed.
   virtual void setLights(const LightSources& sources) = 0;
-  /// Goes on when the solve had stopped at a larger error.
+  /// Goes on when the solve had stopped at a larger error. What is measured keeps the pixels that sufficed for that
+  /// one.
   virtual void setTargetError(double target) = 0;
   /// Time is short: what is still to be measured of the wave is left out where that can be done, and the next steps
   /// bring to an end what there is.

@@ -12,6 +12,7 @@
 #include "server/scene/coverage.h"
 #include "server/solver/polygon_form_factor.h"
 #include "tests/gl/scene_builder.h"
+#include "tests/unit/scene/shapes.h"
 
 namespace radiosity::test {
 namespace {
@@ -263,6 +264,73 @@ TEST_F(Gather, LeavesUnderAPanelAreDarkForLampsOnAllSides) {
     EXPECT_GT(irradiance(*scene, flux, ceiling, 20, way.y > 0.0F ? 5 : 35), 0.0);
     EXPECT_EQ(under, 0.0) << way.x << " " << way.y;
   }
+}
+
+// Pixels along its rim show the cap, behind whose plane the topmost leaves of the side lie. It cannot hide a light from
+// them: none of it lies before their horizon, though a box around it does.
+TEST_F(Gather, TheCapOfAColumnHidesNothingFromItsSide) {
+  constexpr int kSides = 24;
+  constexpr double kRadius = 0.5, kHeight = 1.0;
+  scene::Primitive cap, side;
+  cap.positions.push_back({0, kHeight, 0});
+  for (int i = 0; i < kSides; ++i) {
+    const double angle = 2.0 * std::numbers::pi * i / kSides, next = 2.0 * std::numbers::pi * (i + 1) / kSides;
+    const glm::dvec3 a(kRadius * std::cos(angle), 0, -kRadius * std::sin(angle));
+    const glm::dvec3 b(kRadius * std::cos(next), 0, -kRadius * std::sin(next)), up(0, kHeight, 0);
+    cap.positions.push_back(a + up);
+    const auto k = static_cast<std::uint32_t>(i);
+    cap.indices.insert(cap.indices.end(), {0, k + 1, (k + 1) % kSides + 1});
+    scene::test::addQuad(side, a, b, b + up, a + up);
+  }
+  const std::array<glm::dvec3, 4> lamp{{{1.0, 1.6, -0.3}, {1.4, 1.6, -0.3}, {1.4, 1.6, 0.3}, {1.0, 1.6, 0.3}}};
+  scene::Primitive light;
+  scene::test::addQuad(light, lamp[0], lamp[1], lamp[2], lamp[3]);
+  scene::Scene made;
+  for (const auto& primitive : {cap, side, light}) scene::test::place(made, primitive);
+  scene::ChartOptions options;
+  options.texel_budget = 4000;
+  const auto built = scene::buildPatchScene(made, options);
+  ASSERT_TRUE(built.has_value());
+  const auto scene = std::make_shared<const scene::PatchScene>(*built);
+  solver::ShotBatch batch;
+  batch.flux_scale = kFluxScale;
+  solver::GatherShot shot;
+  shot.corner_count = 4;
+  shot.normal = {0, -1, 0};
+  for (std::size_t i = 0; i < 4; ++i) shot.corners[i] = glm::vec3((lamp[i] - scene->centre) / scene->scale);
+  shot.radiosity = {1.0, 1.0, 1.0};
+  shot.resolution = 64;
+  shot.point_count = 64;
+  for (std::uint32_t i = 0; i < 64; ++i) {
+    solver::HemicubeFrame frame;
+    const float u = (static_cast<float>(i % 8) + 0.5F) / 8.0F, v = (static_cast<float>(i / 8) + 0.5F) / 8.0F;
+    frame.origin = shot.corners[0] + u * (shot.corners[1] - shot.corners[0]) + v * (shot.corners[3] - shot.corners[0]);
+    frame.normal = shot.normal;
+    frame.tangent = {std::cos(static_cast<float>(i)), 0, std::sin(static_cast<float>(i))};
+    frame.lattice = i % 16;
+    batch.points.push_back(frame);
+  }
+  batch.gather = {shot};
+  const auto flux = run(scene, batch);
+  const auto corners = std::span(batch.gather[0].corners).first(4);
+  std::size_t lit = 0;
+  for (const auto& surface : scene->surfaces) {
+    for (std::uint32_t i = 0; i < surface.width * surface.height; ++i) {
+      const auto& leaf = scene->leaves[surface.first_leaf + i];
+      if (leaf.triangle == scene::kNone || !leaf.full) continue;
+      const auto& frame = scene->triangles[leaf.triangle];
+      if (std::abs(frame.normal.y) > 0.5F) continue;
+      const auto place = frame.origin + leaf.texel.x * frame.du + leaf.texel.y * frame.dv;
+      const double open = solver::polygonFormFactor(glm::dvec3(place), glm::dvec3(frame.normal), corners);
+      if (open < 0.002) continue;
+      const auto node = surface.first_node[0] + i;
+      const double found = static_cast<double>(flux.node[0][node][0] + flux.node[1][node][0]) / kFluxScale /
+                           static_cast<double>(scene->node_area[node]);
+      EXPECT_GT(found / open, 0.9) << place.x << " " << place.y << " " << place.z;
+      ++lit;
+    }
+  }
+  EXPECT_GT(lit, 200U);
 }
 
 // Seen from the lamp, pixels along the silhouette of a box show the floor beyond it, and what lies inside, where both

@@ -158,7 +158,6 @@ TEST_F(LeafVariationTest, TheSamePathsFollowOtherLight) {
   for (std::size_t half = 0; half < 2; ++half) EXPECT_EQ(variation.correction(half)[looks], before[half]);
 }
 
-// The furnace: every place sees the same radiosity whichever way it looks.
 TEST_F(LeafVariationTest, AfterAnEditWhatIsClearOfItKeepsWhatItsPathsFound) {
   LeafVariation former(*scene_.patches, sides_, 1);
   former.update(light(), 0.0);
@@ -194,6 +193,7 @@ TEST_F(LeafVariationTest, AfterAnEditWhatIsClearOfItKeepsWhatItsPathsFound) {
   }
 }
 
+// The furnace: every place sees the same radiosity whichever way it looks.
 TEST(LeafVariation, EvenLightLeavesNothing) {
   const auto scene = test::makeQuadScene(test::cubeQuads(4, {1, 1, 1, 1, 1, 1}, {0.5F, 0.5F, 0.5F, 0.5F, 0.5F, 0.5F}));
   const auto sides = makeSides(*scene.patches);
