@@ -73,7 +73,8 @@ bool LinkSystem::advance(double seconds) {
     next_column_ = last;
     if (next_column_ == count) {
       known_ = count;
-      std::fill(changed_.begin(), changed_.end(), false);
+      for (auto& changed : changed_) std::fill(changed.begin(), changed.end(), false);
+      no_row_.clear();
       for (std::size_t h = 0; h < 2; ++h) beginHalf(h);
     }
     if (!inTime()) return false;

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "common/check.h"
-#include "common/clones.h"
 #include "server/solver/unshot_pyramid.h"
 
 namespace radiosity::solver {
@@ -14,20 +13,6 @@ namespace {
 
 /// A sample of links is off by its rounding alone when its sum is as near as this to what was sent.
 constexpr double kOnlyRounding = 1e-4;
-constexpr std::size_t kLanes = 8;
-
-/// Sum of products in kLanes partial sums, so that it vectorises with the same bits everywhere.
-RADIOSITY_CLONES float dot(const float* a, const float* b, std::size_t count) {
-  float sum[kLanes] = {};
-  std::size_t i = 0;
-  for (; i + kLanes <= count; i += kLanes) {
-    for (std::size_t k = 0; k < kLanes; ++k) sum[k] += a[i + k] * b[i + k];
-  }
-  float rest = 0.0F;
-  for (; i < count; ++i) rest += a[i] * b[i];
-  for (std::size_t k = 0; k < kLanes; ++k) rest += sum[k];
-  return rest;
-}
 
 }  // namespace
 
@@ -81,7 +66,7 @@ void LinkSystem::noteChange(std::uint32_t index, std::size_t half) {
   const auto& own = shooter.column[half];
   shooter.products[half == 0 ? 0 : 2] = LinkColumn::product(own, own, leaf_area_);
   shooter.products[1] = LinkColumn::product(shooter.column[0], shooter.column[1], leaf_area_);
-  changed_[index] = true;
+  changed_[half][index] = true;
 }
 
 void LinkSystem::setMaterials(std::vector<glm::vec3> emission, std::vector<glm::vec3> reflectance) {
@@ -113,7 +98,7 @@ void LinkSystem::setMaterials(std::vector<glm::vec3> emission, std::vector<glm::
 std::uint32_t LinkSystem::add(const Shooter& shooter) {
   const auto index = static_cast<std::uint32_t>(shooters_.size());
   shooters_.push_back(shooter);
-  changed_.push_back(true);
+  for (auto& changed : changed_) changed.push_back(true);
   if (shooter.isLight()) return index;
   const NodePlace& place = shooter.place;
   const Side& side = sides_[place.side];
@@ -184,68 +169,6 @@ void LinkSystem::updateMeans() {
     emission_mean_[m] = side.gathered ? glm::vec3(0.0F) : glm::vec3(emission / shooter.area);
     reflectance_mean_[m] = glm::vec3(reflectance / shooter.area);
   }
-}
-
-void LinkSystem::makeRows() {
-  const std::size_t count = shooters_.size();
-  while (rows_.size() < count) {
-    const Shooter& shooter = shooters_[rows_.size()];
-    Rows row{static_cast<std::uint32_t>(halves_[0].matrix.size()), 0};
-    if (!shooter.isLight()) row.count = uniform_[shooter.place.side] ? 1 : 3;
-    for (auto& half : halves_) half.matrix.resize(row.first + row.count);
-    rows_.push_back(row);
-  }
-  for (auto& half : halves_) {
-    for (auto& row : half.matrix) row.reserve(count), row.resize(count, 0.0F);  // no room to spare: memory is bounded
-  }
-}
-
-/// Entries of some columns in a row, of those that changed in all rows, of others in the new ones. Side by side: the
-/// entries of a row lie together, those of a column far apart in memory.
-void LinkSystem::updateColumns(std::size_t half, std::uint32_t first, std::uint32_t end) {
-  thread_local std::vector<float> links;
-  const auto firstMember = [&](std::uint32_t column) {
-    return changed_[column] ? 0 : static_cast<std::uint32_t>(known_);
-  };
-  std::uint32_t least = scene::kNone;
-  for (auto column = first; column < end; ++column) least = std::min(least, firstMember(column));
-  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
-    const auto& members = members_[s];
-    if (members.empty() || members.back() < least) continue;
-    links.resize(sides_[s].leaf_count);
-    for (auto column = first; column < end; ++column) {
-      const auto from = std::lower_bound(members.begin(), members.end(), firstMember(column));
-      if (from == members.end() || !shooters_[column].column[half].decode(sides_[s].first_value, links)) continue;
-      for (auto m = from; m != members.end(); ++m) fillRow(half, *m, column, links.data());
-    }
-  }
-}
-
-void LinkSystem::fillRow(std::size_t half, std::uint32_t member, std::uint32_t column, const float* links) {
-  const NodePlace& place = shooters_[member].place;
-  const Side& side = sides_[place.side];
-  const auto rect = leafRect(side, place);
-  const double whole = shooters_[member].area;
-  const float* area = &patches_.node_area[side.first_node];
-  const auto& row = rows_[member];
-  if (row.count == 1) {
-    double sum = 0.0;
-    for (auto y = rect.y0; y < rect.y1; ++y) {
-      const auto first = y * side.width + rect.x0;
-      sum += static_cast<double>(dot(area + first, links + first, rect.x1 - rect.x0));
-    }
-    halves_[half].matrix[row.first][column] = static_cast<float>(sum / whole);
-    return;
-  }
-  glm::dvec3 sum(0.0);
-  for (auto y = rect.y0; y < rect.y1; ++y) {
-    for (auto x = rect.x0; x < rect.x1; ++x) {
-      const auto leaf = y * side.width + x;
-      sum += glm::dvec3(area[leaf] * links[leaf] * reflectance_[side.first_value + leaf]);
-    }
-  }
-  for (int c = 0; c < 3; ++c)
-    halves_[half].matrix[row.first + static_cast<std::uint32_t>(c)][column] = static_cast<float>(sum[c] / whole);
 }
 
 void LinkSystem::irradiance(std::size_t half, std::vector<glm::vec3>& values, From from) const {

@@ -96,6 +96,15 @@ class LinkSystem {
   /// The links of one half.
   void forget(std::uint32_t shooter, std::size_t half);
 
+  /// After an edit of geometry: what of the matrix is as it was. By shooter: its number in the former system, where the
+  /// leaves of its node are what they were, and by half, where the links of its column are; else kNone.
+  struct FormerEntries {
+    std::vector<std::uint32_t> row;
+    std::array<std::vector<std::uint32_t>, 2> column;
+  };
+  /// Takes over entries, with the bits that they would be made with. Comes after all shooters, before begin().
+  void inheritEntries(const LinkSystem& former, const FormerEntries& same);
+
   /// Starts to bring rows up to date and to solve both halves, from what was sent before. Nothing else may change
   /// until it is done; begin() may come again at any time, and starts anew.
   void begin();
@@ -148,6 +157,10 @@ class LinkSystem {
   void noteChange(std::uint32_t shooter, std::size_t half);
   void updateMeans();
   void makeRows();
+  [[nodiscard]] bool hasRow(std::uint32_t shooter) const {
+    return shooter < known_ && (no_row_.empty() || !no_row_[shooter]);
+  }
+  [[nodiscard]] bool hasSameReflectance(std::uint32_t member, const LinkSystem& former, std::uint32_t old_member) const;
   void updateColumns(std::size_t half, std::uint32_t first, std::uint32_t end);
   void fillRow(std::size_t half, std::uint32_t member, std::uint32_t column, const float* links);
   void shareAmongChildren(std::size_t half);
@@ -166,7 +179,8 @@ class LinkSystem {
   std::vector<std::uint32_t> shooter_of_node_;
   std::vector<bool> below_;
   std::vector<std::vector<std::uint32_t>> members_;  // nodes by side
-  std::vector<bool> changed_;                        // by shooter: its column's entries are stale
+  std::array<std::vector<bool>, 2> changed_;         // by half, by shooter: its column's entries are stale
+  std::vector<bool> no_row_;                         // by shooter: of those below known_; empty: none
   std::size_t known_ = 0;                            // shooters whose rows are there
   std::uint32_t next_column_ = 0;                    // to be brought up to date
   std::array<Half, 2> halves_;

@@ -33,7 +33,7 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
                            Transport& transport, const SolverSettings& settings, const LightSources& sources,
                            LinkedSolver& former, const scene::PatchMap& map, bool keep_former)
     : LinkedSolver(std::move(patches), transport, settings) {
-  const auto numbers = renumber(former, map, keep_former);
+  auto numbers = renumber(former, map, keep_former);
   auto change = changeOf(numbers);
   if (former.isBehind()) {
     auto all = change;
@@ -53,6 +53,7 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
   takeMaterials(materials);
   takeSources(sources);
   inheritNodes(former, numbers);
+  inheritEntries(former, numbers);
   planRepairs(former.isRepairing() ? 0.0 : former.fieldNorm(), ChangeReach(*former.patches_, *patches_, map));
   if (former.variation_) inheritVariation(former, numbers);
   for (auto& half : half_) half.assign(system_.emission().size(), glm::vec3(0.0F));
@@ -63,7 +64,7 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
 /// Sides that are still there keep their keys; others get keys that no side ever had.
 LinkedSolver::Renumbering LinkedSolver::renumber(const LinkedSolver& former, const scene::PatchMap& map,
                                                  bool keep_former) {
-  Renumbering numbers{former, map, keep_former, {}, {}, {}};
+  Renumbering numbers{former, map, keep_former, {}, {}, {}, {}};
   numbers.side_after.assign(former.sides_.size(), scene::kNone);
   numbers.unmoved_after = numbers.side_after;
   const auto first_sides = firstSides(*former.patches_, former.sides_);
@@ -117,7 +118,7 @@ void LinkedSolver::addEarlier(const Renumbering& numbers, GeometryChange& change
 }
 
 /// Light polygons that have not moved, dark ones too. takeMaterials() will say how bright they are.
-void LinkedSolver::inheritLights(LinkedSolver& former, const Renumbering& numbers) {
+void LinkedSolver::inheritLights(LinkedSolver& former, Renumbering& numbers) {
   auto& shooters = former.system_.shooters();
   for (std::uint32_t n = 0; n < shooters.size(); ++n) {
     if (shooters[n].light == scene::kNone) continue;
@@ -134,7 +135,7 @@ void LinkedSolver::inheritLights(LinkedSolver& former, const Renumbering& number
   inheritColumns(former, 0, numbers);
 }
 
-void LinkedSolver::inheritNodes(LinkedSolver& former, const Renumbering& numbers) {
+void LinkedSolver::inheritNodes(LinkedSolver& former, Renumbering& numbers) {
   auto& shooters = former.system_.shooters();
   const auto first_repair = repairs_.size();
   for (std::uint32_t n = 0; n < shooters.size(); ++n) {
@@ -167,7 +168,9 @@ bool LinkedSolver::isAltered(const NodePlace& place, const GeometryChange& chang
 
 /// `whole`: the shooter itself is not what it was.
 void LinkedSolver::planRepairsOf(const Shooter& from, std::uint32_t old_index, std::uint32_t index, bool whole,
-                                 const Renumbering& numbers) {
+                                 Renumbering& numbers) {
+  numbers.shooter_before.resize(index + 1, scene::kNone);
+  numbers.shooter_before[index] = old_index;
   auto& shooter = system_.shooters()[index];
   shooter.products = from.products;
   for (std::size_t half = 0; half < 2; ++half) {
@@ -203,6 +206,26 @@ void LinkedSolver::inheritVariation(const LinkedSolver& former, const Renumberin
     }
   }
   next_variation_->inherit(*former.variation_, value_before, clear);
+}
+
+/// Of the matrix: rows of nodes that are what they were, and columns whose links went over as they are.
+void LinkedSolver::inheritEntries(const LinkedSolver& former, const Renumbering& numbers) {
+  const auto& shooters = system_.shooters();
+  LinkSystem::FormerEntries same;
+  same.row = numbers.shooter_before;
+  same.row.resize(shooters.size(), scene::kNone);
+  same.column.fill(same.row);
+  for (const auto& repair : repairs_) {
+    if (repair.whole) same.column[repair.half][repair.shooter] = scene::kNone;
+  }
+  for (std::uint32_t n = 0; n < shooters.size(); ++n) {
+    if (same.row[n] == scene::kNone || shooters[n].isLight()) continue;
+    const auto& place = shooters[n].place;
+    const auto old_side = former.system_.shooters()[same.row[n]].place.side;
+    if (numbers.unmoved_after[old_side] != place.side || isAltered(place, shadows_->change()))
+      same.row[n] = scene::kNone;
+  }
+  system_.inheritEntries(former.system_, same);
 }
 
 /// Links of what is not taken again as a whole go over as they are. Both halves at once: most of it is fresh memory.

@@ -52,7 +52,8 @@ void LinkSystem::clear() {
   std::fill(shooter_of_node_.begin(), shooter_of_node_.end(), scene::kNone);
   std::fill(below_.begin(), below_.end(), false);
   for (auto& members : members_) members.clear();
-  changed_.clear();
+  changed_ = {};
+  no_row_.clear();
   known_ = 0;
   next_column_ = 0;
   halves_ = {};

@@ -104,6 +104,7 @@ class LinkedSolver final : public Solver {
     std::vector<std::uint32_t> side_after;          ///< by old side; kNone: gone
     std::vector<std::uint32_t> unmoved_after;       ///< the same; kNone also where it moved
     std::vector<std::array<Repair, 2>> unfinished;  ///< by old shooter and half: what was still to be taken again
+    std::vector<std::uint32_t> shooter_before;      ///< by shooter; it may be shorter
   };
   struct RepairBatch;
 
@@ -113,11 +114,12 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] GeometryChange changeOf(const Renumbering& numbers) const;
   void addEarlier(const Renumbering& numbers, GeometryChange& change) const;
   [[nodiscard]] bool isAltered(const NodePlace& place, const GeometryChange& change) const;
-  void inheritLights(LinkedSolver& former, const Renumbering& numbers);
-  void inheritNodes(LinkedSolver& former, const Renumbering& numbers);
+  void inheritLights(LinkedSolver& former, Renumbering& numbers);
+  void inheritNodes(LinkedSolver& former, Renumbering& numbers);
+  void inheritEntries(const LinkedSolver& former, const Renumbering& numbers);
   void inheritVariation(const LinkedSolver& former, const Renumbering& numbers);
   void planRepairsOf(const Shooter& from, std::uint32_t old_index, std::uint32_t index, bool whole,
-                     const Renumbering& numbers);
+                     Renumbering& numbers);
   void inheritColumns(LinkedSolver& former, std::size_t first_repair, const Renumbering& numbers);
   void planRepairs(double norm, const ChangeReach& change);
   [[nodiscard]] const Shadows& shadowsOf(const Repair& repair) const {

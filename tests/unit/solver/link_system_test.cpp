@@ -263,6 +263,39 @@ TEST_F(LinkSystems, AfterEditsHaveTheBitsOfFreshOnes) {
   expectFresh();
 }
 
+TEST_F(LinkSystems, TakeOverEntriesOfAFormerOneWithTheBitsOfFreshOnes) {
+  paintAtRandom();
+  std::fill_n(reflectance_.begin() + sides_[2].first_value, sides_[2].leaf_count, glm::vec3(0.4F));
+  lightWall(0, glm::vec3(1.0F));
+  auto former = makeSystem();
+  former.solve();
+  reflectance_[sides_[4].first_value + 5] = glm::vec3(0.01F);  // entries of wall 4 hold it
+  auto fresh = makeSystem();
+  fresh.solve();
+  const auto count = static_cast<std::uint32_t>(fresh.shooters().size());
+  const auto solved = [&](const LinkSystem::FormerEntries& same) {
+    auto heir = makeSystem();
+    heir.inheritEntries(former, same);
+    heir.solve();
+    return heir;
+  };
+  const auto isFresh = [&](const LinkSystem& heir) {
+    for (std::size_t m = 0; m < count; ++m) {
+      if (heir.shooters()[m].mean != fresh.shooters()[m].mean) return false;
+    }
+    return true;
+  };
+  LinkSystem::FormerEntries same;
+  for (std::uint32_t n = 0; n < count; ++n) same.row.push_back(n);
+  same.column.fill(same.row);
+  EXPECT_TRUE(isFresh(solved(same)));
+  auto some = same;
+  some.row[1] = some.row[7] = some.column[0][3] = some.column[1][8] = scene::kNone;
+  EXPECT_TRUE(isFresh(solved(some)));
+  std::swap(some.column[1][2], some.column[1][5]);
+  EXPECT_FALSE(isFresh(solved(some))) << "entries are taken from where it is told";
+}
+
 TEST_F(LinkSystems, WithoutLightAreDarkAfterOneSweep) {
   auto system = makeSystem();
   EXPECT_EQ(system.solve(), 1);
