@@ -24,7 +24,7 @@ void LinkedSolver::assess() {
     tryNow([this] {
       do {
         while (!settleFromLinks()) continue;
-      } while (!finishEdit());
+      } while (!finishEdit() && !isRepairing());
     });
     return;
   }

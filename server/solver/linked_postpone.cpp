@@ -14,10 +14,11 @@ namespace {
 /// Of the sum of what columns are wrong by, as ChangeReach has it, the light that they bring is wrong by less, since
 /// not all are wrong at the same places: by 0.34 to 0.63 of it where chairs and tables of a room were moved and added.
 constexpr double kInAll = 0.75;
-/// What waits may cause this part of the target error: in the sum of squares, 4 % of it.
-constexpr double kPostponed = 0.2;
-/// When light is solved for it is other light than that by which they were chosen.
-constexpr double kStillPostponed = 0.3;
+/// What waits may cause this part of the target error at least: in the sum of squares, 4 % of it. More where the solve
+/// before left room under the target, of which it takes a part, so that the edit may make the rest somewhat worse.
+constexpr double kPostponed = 0.2, kMostPostponed = 0.5, kOfRoom = 0.7;
+/// When light is solved for it is other light than that by which they were chosen: so many times that.
+constexpr double kStillPostponed = 1.5;
 
 }  // namespace
 
@@ -60,6 +61,12 @@ double LinkedSolver::fieldNorm() const {
   return std::sqrt(square);
 }
 
+/// `error`: all but what waits, as far as is known.
+void LinkedSolver::setPostponed(double error) {
+  const double part = error / settings_.target_error;
+  postponed_ = std::clamp(kOfRoom * std::sqrt(std::max(0.0, 1.0 - part * part)), kPostponed, kMostPostponed);
+}
+
 /// The strongest first, and only as many as must be. `norm`: of irradiance, about.
 void LinkedSolver::planDue(double norm) {
   struct Entry {
@@ -72,7 +79,7 @@ void LinkedSolver::planDue(double norm) {
   repairs_.clear();
   repaired_ = 0;
   for (const auto& entry : entries) repairs_.push_back(entry.repair);
-  const double most = kPostponed * settings_.target_error * norm;
+  const double most = postponed_ * settings_.target_error * norm;
   double sum = 0.0;
   for (due_ = repairs_.size(); due_ > 0; --due_) {
     sum += entries[due_ - 1].missing;
@@ -84,7 +91,19 @@ void LinkedSolver::planDue(double norm) {
 bool LinkedSolver::findsMoreDue() {
   if (repaired_ == repairs_.size()) return false;
   const double norm = fieldNorm();
-  if (missing() <= kStillPostponed * settings_.target_error * norm) return false;
+  if (missing() <= kStillPostponed * postponed_ * settings_.target_error * norm) return false;
+  planDue(norm);
+  return repaired_ < due_;
+}
+
+/// Where the target would be reached but for what waits, that is the least work: some of it waits no longer.
+bool LinkedSolver::isDueForTarget() {
+  if (error_.total <= settings_.target_error || repaired_ == repairs_.size()) return false;
+  const double norm = fieldNorm(), waits = missing() / norm;
+  const double rest = std::sqrt(std::max(0.0, error_.total * error_.total - waits * waits));
+  if (!(rest < settings_.target_error)) return false;
+  setPostponed(rest);
+  postponed_ = std::min(postponed_, kOfRoom * waits / settings_.target_error);
   planDue(norm);
   return repaired_ < due_;
 }

@@ -122,7 +122,8 @@ void LinkedSolver::dropNodes() {
   share_part_ = 1.0 / settings_.planner.first_shooters;
 }
 
-/// False: there was no room for the links of a new lamp, others had to go, and the light is to be solved for again.
+/// False: the light is to be solved for again, since there was no room for the links of a new lamp and others had to
+/// go, or after more repairs (isRepairing).
 bool LinkedSolver::finishEdit() {
   wanted_.clear();
   measured_ = 0;
@@ -143,6 +144,11 @@ bool LinkedSolver::finishEdit() {
     growing_ = !wanted_.empty() && !mayGoWithout();
   }
   assessStep();
+  if (isDueForTarget()) {
+    wanted_.clear();
+    from_links_ = FromLinks::kAfterEdit;
+    return false;
+  }
   if (error_.total <= settings_.target_error) {
     wanted_.clear();
     phase_ = Phase::kDone;

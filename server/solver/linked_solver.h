@@ -130,7 +130,9 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] double missing() const;
   [[nodiscard]] double fieldNorm() const;
   void planDue(double norm);
+  void setPostponed(double error);
   [[nodiscard]] bool findsMoreDue();
+  [[nodiscard]] bool isDueForTarget();
   [[nodiscard]] Result<StepOutcome> catchUp();
   [[nodiscard]] bool isNeeded(Repair& repair);
   void addSamples(const Repair& repair, ShotBatch& batch) const;
@@ -190,6 +192,7 @@ class LinkedSolver final : public Solver {
   std::vector<Repair> repairs_;                       // after an edit of geometry
   std::size_t repaired_ = 0;                          // of these
   std::size_t due_ = 0;                               // of these, before anything else is done
+  double postponed_ = 0.0;                            // part of the target error that the others may cause
   std::unique_ptr<Shadows> shadows_;                  // of the edit
   std::unique_ptr<Shadows> earlier_shadows_;          // and of those before it, for links that no edit saw taken again
   std::uint32_t key_end_ = 0, triangle_key_end_ = 0;  // keys of sides that never were
