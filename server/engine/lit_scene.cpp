@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "server/engine/carried_light.h"
+#include "server/scene/burial_record.h"
 
 namespace radiosity::engine {
 namespace {
@@ -41,9 +42,11 @@ Result<std::unique_ptr<LitScene>> LitScene::make(scene::EditedDocument edited, c
   std::optional<scene::FormerScene> before;
   if (former != nullptr) before.emplace(scene::FormerScene{*former->scene_, *former->patches_});
   lit->reproducible_ = former == nullptr;
-  auto patches = scene::buildPatchScene(*lit->scene_, charts, before ? &*before : nullptr);
-  if (!patches) return tl::unexpected<Error>(patches.error());
-  lit->patches_ = std::make_shared<const scene::PatchScene>(std::move(*patches));
+  auto built = scene::buildWithRecord(*lit->scene_, charts, before ? &*before : nullptr,
+                                      former != nullptr ? former->burial_.get() : nullptr);
+  if (!built) return tl::unexpected<Error>(built.error());
+  lit->patches_ = std::make_shared<const scene::PatchScene>(std::move(built->patches));
+  lit->burial_ = std::move(built->burial);
   lit->patch_count_ = leavesWithArea(*lit->patches_);
   lit->materials_ = scene::shadePatches(*lit->scene_, *lit->patches_);
   return lit;

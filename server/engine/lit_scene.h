@@ -18,6 +18,10 @@
 #include "server/scene/patch_scene.h"
 #include "server/solver/solver.h"
 
+namespace radiosity::scene {
+class BurialRecord;
+}
+
 namespace radiosity::engine {
 
 class LitScene {
@@ -134,6 +138,7 @@ class LitScene {
   solver::Transport& transport_;
   std::shared_ptr<const scene::Scene> scene_;
   std::shared_ptr<const scene::PatchScene> patches_;
+  std::shared_ptr<const scene::BurialRecord> burial_;  // of these, for edits; null: not kept
   std::uint64_t patch_count_ = 0;
   scene::PatchMaterials materials_;
   bool stale_ = false;

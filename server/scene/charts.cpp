@@ -10,6 +10,7 @@
 #include <unordered_map>
 
 #include "server/scene/atlas.h"
+#include "server/scene/burial_record.h"
 #include "server/scene/coverage.h"
 #include "server/scene/lineage.h"
 #include "server/scene/opacity.h"
@@ -32,11 +33,11 @@ const Material& materialOf(const Scene& scene, std::uint32_t instance) {
 
 class Builder {
  public:
-  Builder(const Scene& scene, const ChartOptions& options, const FormerScene* former)
-      : scene_(scene), options_(options), former_(former) {}
+  Builder(const Scene& scene, const ChartOptions& options, const FormerScene* former, const BurialRecord* record)
+      : scene_(scene), options_(options), former_(former), record_(record) {}
 
   /// Nothing: the former scene's unit box or texels do not suit.
-  Result<std::optional<PatchScene>> build() {
+  Result<std::optional<BuiltScene>> build() {
     if (former_ != nullptr) {
       const UnitFrame frame{former_->patches.centre, former_->patches.scale};
       if (frameFor(scene_, &frame) != frame) return std::nullopt;
@@ -70,7 +71,12 @@ class Builder {
       const Material& material = materialOf(scene_, surface.instance);
       solid.push_back(!material.double_sided && !isSeeThrough(material));
     }
-    removeBuried(patches_, pieces, solid);
+    std::optional<FormerBurial> former;
+    if (former_ != nullptr && record_ != nullptr) {
+      former.emplace(former_->patches, *record_, patches_,
+                     matchSurfaces(former_->scene, former_->patches, scene_, patches_), solid);
+    }
+    burial_ = removeBuried(patches_, pieces, solid, former ? &*former : nullptr);
     placeSpots(patches_, pieces);
     placeSpotsInGaps(patches_);
     measureOpacity(scene_, patches_);
@@ -78,7 +84,7 @@ class Builder {
     sumAncestors(patches_);
     writeInstanceUvs();
     findSeams(flat_, neighbours_, sources_, 2.0 * options_.curve_angle_deg, patches_);
-    return std::optional<PatchScene>(std::move(patches_));
+    return BuiltScene{std::move(patches_), std::move(burial_)};
   }
 
  private:
@@ -277,7 +283,9 @@ class Builder {
   const Scene& scene_;
   const ChartOptions& options_;
   const FormerScene* former_;
+  const BurialRecord* record_;
   PatchScene patches_;
+  std::shared_ptr<const BurialRecord> burial_;
   FlatScene flat_;
   std::vector<std::uint32_t> neighbours_;
   std::vector<Chart> charts_;
@@ -287,15 +295,22 @@ class Builder {
 
 }  // namespace
 
-Result<PatchScene> buildPatchScene(const Scene& scene, const ChartOptions& options, const FormerScene* former) {
+Result<BuiltScene> buildWithRecord(const Scene& scene, const ChartOptions& options, const FormerScene* former,
+                                   const BurialRecord* record) {
   if (former != nullptr) {
-    auto built = Builder(scene, options, former).build();
+    auto built = Builder(scene, options, former, record).build();
     if (!built) return tl::unexpected(built.error());
     if (*built) return std::move(**built);
   }
-  auto built = Builder(scene, options, nullptr).build();
+  auto built = Builder(scene, options, nullptr, nullptr).build();
   if (!built) return tl::unexpected(built.error());
   return std::move(**built);
+}
+
+Result<PatchScene> buildPatchScene(const Scene& scene, const ChartOptions& options, const FormerScene* former) {
+  auto built = buildWithRecord(scene, options, former);
+  if (!built) return tl::unexpected(built.error());
+  return std::move(built->patches);
 }
 
 }  // namespace radiosity::scene

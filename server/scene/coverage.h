@@ -4,12 +4,16 @@
 
 #include <cstdint>
 #include <glm/vec2.hpp>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "server/scene/patch_scene.h"
 
 namespace radiosity::scene {
+
+class BurialRecord;
+class FormerBurial;
 
 /// The part of a leaf that one triangle covers; kept only for leaves that no single triangle covers wholly.
 struct LeafPiece {
@@ -25,7 +29,10 @@ struct LeafPiece {
 
 /// Takes the part of each leaf that lies inside another solid out of node_area and moves leaf points to what is left.
 /// `solid`: by surface; opaque and single-sided, so that it can bound a solid. Adds warnings about coincident faces.
-void removeBuried(PatchScene& patches, const std::vector<LeafPiece>& pieces, const std::vector<bool>& solid);
+/// Returns how it was found, or null where that is too much to keep. `former`: what is known of the scene before an
+/// edit; leaves that it answers for are not looked at again, and get the same bits.
+std::shared_ptr<const BurialRecord> removeBuried(PatchScene& patches, const std::vector<LeafPiece>& pieces,
+                                                 const std::vector<bool>& solid, const FormerBurial* former = nullptr);
 
 /// Places on a leaf that is not full: kLeafSpots of `places`, which lie evenly over what is left of it. Sorts them
 /// anew.

@@ -19,6 +19,8 @@ constexpr std::uint32_t kFewSamples = 16, kManySamples = 64;
 constexpr std::uint64_t kMaxSamples = 2'000'000;  ///< a scene; beyond it leaves get fewer
 /// Leaves: what is found of so many is held at once; fewer are not worth a thread.
 constexpr std::size_t kMeasuredAtOnce = 65536, kFewestAShare = 64;
+/// Of more leaves it is not kept how they were found, and from more places than these rays were cast for hardly any.
+constexpr std::size_t kMostRecorded = 50'000, kMostFans = 64;
 
 /// Boxes around the nodes of one surface, for the question where other solids come near.
 class NodeBoxes {
@@ -76,11 +78,14 @@ class NodeBoxes {
 class Burial {
  public:
   Burial(PatchScene& patches, const std::vector<LeafPiece>& pieces, const std::vector<bool>& solid,
-         const Coincidence& coincidence)
-      : patches_(patches), pieces_(pieces), solids_(patches, solid), coincidence_(coincidence) {}
+         const Coincidence& coincidence, const FormerBurial* former)
+      : patches_(patches), pieces_(pieces), solids_(patches, solid), coincidence_(coincidence), former_(former) {
+    record_.solid = solid;
+    record_.covered = coincidence.covered();
+  }
 
-  void run() {
-    if (solids_.empty() && !coincidence_.found()) return;
+  std::shared_ptr<const BurialRecord> run() {
+    if (solids_.empty() && !coincidence_.found()) return nullptr;
     first_piece_.assign(patches_.leaves.size() + 1, 0);
     for (const LeafPiece& piece : pieces_) ++first_piece_[piece.leaf + 1];
     for (std::size_t i = 1; i < first_piece_.size(); ++i) first_piece_[i] += first_piece_[i - 1];
@@ -89,24 +94,19 @@ class Burial {
     few_ = wanted <= kMaxSamples ? kFewSamples
                                  : static_cast<std::uint32_t>(std::max<std::uint64_t>(
                                        1, kMaxSamples / std::max<std::size_t>(1, contacts_.size())));
-    measureAll(contacts_, few_);
+    measureAll(contacts_, few_, BurialRecord::Pass::kFew);
     refineBorders();
     settleSides();
+    return keptRecord();
   }
 
  private:
   struct Contact {
     std::uint32_t surface, side, x, y;
   };
-  /// A leaf that lost area, and the visible point found on it.
-  struct Change {
-    std::uint32_t leaf, side;
-    LeafPoint point;
-    std::vector<LeafSpot> places;  ///< where it is visible
-  };
   struct Measured {
-    float visible_area;
-    Change change;
+    std::optional<BuriedPart> buried;  ///< none: all of it is visible
+    std::optional<std::vector<RayFan>> fans;
   };
   struct Part {
     std::uint32_t samples = 0, buried = 0;
@@ -125,11 +125,12 @@ class Burial {
     return side == 0 ? n : -n;
   }
   /// Inside a solid, or under a face that lies on this one.
-  [[nodiscard]] bool buried(std::uint32_t triangle, const glm::dvec2& texel, std::uint32_t side, Hits& hits) const {
+  [[nodiscard]] bool buried(std::uint32_t triangle, const glm::dvec2& texel, std::uint32_t side, Hits& hits,
+                            RayNotes* notes = nullptr) const {
     const auto position = positionAt(patches_.triangles[triangle], texel);
     const auto normal = facing(triangle, side);
     if (side == 0 && coincidence_.covers(patches_.triangle_surface[triangle], position, normal, hits)) return true;
-    return solids_.buries(position, normal, hits);
+    return solids_.buries(position, normal, hits, notes);
   }
 
   /// Splits a surface into nodes that no other solid comes near (all visible or all buried: one test) and single leaves
@@ -174,34 +175,65 @@ class Burial {
         if (!known && !buried(point.triangle, glm::dvec2(point.texel), side, hits_)) return;
         known = true;
         patches_.node_area[nodeOf(leaf)] = 0.0F;
-        changes_.push_back({leafOf(leaf), side, {}, {}});
+        changes_.push_back({leafOf(leaf), side, {}, {}, 0.0F});
       }
   }
 
   /// What a thread of its own needs to measure leaves.
   struct Scratch {
     Hits hits;
+    RayNotes notes;
     std::vector<Part> parts;
   };
 
   /// Visible areas of leaves: measured side by side, taken in their order.
-  void measureAll(const std::vector<Contact>& contacts, std::uint32_t count) {
-    std::vector<std::optional<Measured>> measured;
+  void measureAll(const std::vector<Contact>& contacts, std::uint32_t count, BurialRecord::Pass pass) {
+    std::vector<Measured> measured;
     for (std::size_t first = 0; first < contacts.size(); first += kMeasuredAtOnce) {
       const auto end = std::min(contacts.size(), first + kMeasuredAtOnce);
-      measured.assign(end - first, std::nullopt);
+      measured.assign(end - first, {});
       inShares((end - first) / kFewestAShare, [&](std::size_t share, std::size_t shares) {
         Scratch scratch;
-        for (auto i = first + share; i < end; i += shares) measured[i - first] = measure(contacts[i], count, scratch);
+        for (auto i = first + share; i < end; i += shares)
+          measured[i - first] = remember(contacts[i], count, pass, scratch);
       });
       for (auto i = first; i < end; ++i) {
         auto& found = measured[i - first];
-        if (!found) continue;
-        patches_.node_area[nodeOf(contacts[i])] = found->visible_area;
-        changes_.push_back(std::move(found->change));
-        touched_.push_back(contacts[i]);
+        const auto& contact = contacts[i];
+        if (found.fans && record_.leaves.size() <= kMostRecorded)
+          record_.leaves.push_back({leafOf(contact), contact.side, pass, std::move(*found.fans), found.buried});
+        if (!found.buried) continue;
+        patches_.node_area[nodeOf(contact)] = found.buried->visible_area;
+        changes_.push_back(std::move(*found.buried));
+        touched_.push_back(contact);
       }
     }
+  }
+
+  /// As measure(), or from what was found before an edit.
+  [[nodiscard]] Measured remember(const Contact& contact, std::uint32_t count, BurialRecord::Pass pass,
+                                  Scratch& scratch) const {
+    const bool by_rays = !record_.covered[contact.surface];
+    if (by_rays && former_ != nullptr) {
+      const auto leaf = leafOf(contact) - patches_.surfaces[contact.surface].first_leaf;
+      if (const auto* known = former_->find(contact.surface, leaf, contact.side, pass, few_)) {
+        Measured same{{}, known->fans};
+        if (known->buried) same.buried = former_->renumbered(*known->buried, contact.surface);
+        return same;
+      }
+    }
+    scratch.notes.clear();
+    Measured found{measure(contact, count, scratch), {}};
+    const auto& fans = scratch.notes.fans();
+    if (by_rays && !fans.empty() && fans.size() <= kMostFans) found.fans = fans;
+    return found;
+  }
+
+  std::shared_ptr<const BurialRecord> keptRecord() {
+    if (record_.leaves.size() > kMostRecorded) return nullptr;
+    record_.few = few_;
+    record_.sort();
+    return std::make_shared<const BurialRecord>(std::move(record_));
   }
 
   /// All of the leaf is visible, as one look from all of it at once shows: most are, beside the few that a solid
@@ -225,7 +257,7 @@ class Burial {
   }
 
   /// Visible area of one leaf and side from `count` samples; none where all of it is visible.
-  [[nodiscard]] std::optional<Measured> measure(const Contact& contact, std::uint32_t count, Scratch& scratch) const {
+  [[nodiscard]] std::optional<BuriedPart> measure(const Contact& contact, std::uint32_t count, Scratch& scratch) const {
     const std::uint32_t leaf = leafOf(contact);
     const LeafPoint point = patches_.leaves[leaf];
     const std::size_t first = first_piece_[leaf], end = first_piece_[leaf + 1];
@@ -249,7 +281,7 @@ class Burial {
         triangle = found->triangle;
       }
       ++parts[part].samples;
-      if (buried(triangle, texel, contact.side, scratch.hits)) {
+      if (buried(triangle, texel, contact.side, scratch.hits, &scratch.notes)) {
         ++parts[part].buried;
         continue;
       }
@@ -267,7 +299,7 @@ class Burial {
     } else if (visible.triangle == kNone) {
       visible = {point.texel, point.triangle, false};
     }
-    return Measured{static_cast<float>(outcome.visible_area), {leaf, contact.side, visible, std::move(places)}};
+    return BuriedPart{leaf, contact.side, visible, std::move(places), static_cast<float>(outcome.visible_area)};
   }
 
   struct Outcome {
@@ -283,7 +315,7 @@ class Burial {
       Part& p = scratch.parts[part];
       if (p.samples == 0) {
         p.samples = 1;
-        p.buried = buried(point.triangle, glm::dvec2(point.texel), contact.side, scratch.hits) ? 1 : 0;
+        p.buried = buried(point.triangle, glm::dvec2(point.texel), contact.side, scratch.hits, &scratch.notes) ? 1 : 0;
       }
       const double area = first == end ? patches_.node_area[nodeOf(contact)] : pieces_[first + part].area;
       outcome.samples += p.samples;
@@ -298,7 +330,7 @@ class Burial {
     if (few_ != kFewSamples) return;
     std::vector<bool> done(patches_.leaves.size() * 2, false);
     const auto slot = [&](const Contact& c) { return std::size_t{2} * leafOf(c) + c.side; };
-    for (const Change& change : changes_) done[std::size_t{2} * change.leaf + change.side] = true;
+    for (const BuriedPart& change : changes_) done[std::size_t{2} * change.leaf + change.side] = true;
     const std::vector<Contact> buried = std::exchange(touched_, {});
     std::vector<bool> in_contact(patches_.leaves.size() * 2, false);
     for (const Contact& c : contacts_) in_contact[slot(c)] = true;
@@ -313,21 +345,21 @@ class Burial {
           beside.push_back(neighbour);
         }
     }
-    measureAll(beside, kManySamples);
+    measureAll(beside, kManySamples, BurialRecord::Pass::kMany);
   }
 
   /// Both sides share a leaf's point: the front's visible point, or the back's where the front is buried.
   void settleSides() {
-    std::ranges::stable_sort(changes_, [](const Change& a, const Change& b) {
+    std::ranges::stable_sort(changes_, [](const BuriedPart& a, const BuriedPart& b) {
       return a.leaf != b.leaf ? a.leaf < b.leaf : a.side < b.side;
     });
     for (std::size_t i = 0; i < changes_.size(); ++i) {
-      Change& change = changes_[i];
+      BuriedPart& change = changes_[i];
       const bool both = i + 1 < changes_.size() && changes_[i + 1].leaf == change.leaf;
       const bool two_sided = isTwoSided(change.leaf);
       LeafPoint& point = patches_.leaves[change.leaf];
       point.full = false;
-      Change& open = both && change.point.triangle == kNone ? changes_[i + 1] : change;
+      BuriedPart& open = both && change.point.triangle == kNone ? changes_[i + 1] : change;
       if (both) ++i;
       if (open.point.triangle != kNone) {
         point = open.point;
@@ -347,20 +379,24 @@ class Burial {
   const std::vector<LeafPiece>& pieces_;
   Solids solids_;
   const Coincidence& coincidence_;
+  const FormerBurial* former_;
+  BurialRecord record_;
   std::vector<std::size_t> first_piece_;
   std::vector<Contact> contacts_, touched_;
-  std::vector<Change> changes_;
+  std::vector<BuriedPart> changes_;
   Hits hits_;
   std::uint32_t few_ = kFewSamples;
 };
 
 }  // namespace
 
-void removeBuried(PatchScene& patches, const std::vector<LeafPiece>& pieces, const std::vector<bool>& solid) {
+std::shared_ptr<const BurialRecord> removeBuried(PatchScene& patches, const std::vector<LeafPiece>& pieces,
+                                                 const std::vector<bool>& solid, const FormerBurial* former) {
   Coincidence coincidence(patches);
   coincidence.run();
-  Burial(patches, pieces, solid, coincidence).run();
+  auto record = Burial(patches, pieces, solid, coincidence, former).run();
   coincidence.keepCovered();
+  return record;
 }
 
 }  // namespace radiosity::scene

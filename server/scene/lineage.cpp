@@ -63,6 +63,23 @@ bool sameGrid(const Surface& a, const Surface& b) {
   return a.width == b.width && a.height == b.height && hasSide(a, 0) == hasSide(b, 0) && hasSide(a, 1) == hasSide(b, 1);
 }
 
+/// By surface: the former one of the same instance, order and grid, or kNone.
+std::vector<std::uint32_t> formerSurfaces(const Scene& scene_before, const PatchScene& before, const Scene& scene_after,
+                                          const PatchScene& after) {
+  std::vector<std::uint32_t> former(after.surfaces.size(), kNone);
+  const auto old_ranges = surfacesOf(scene_before, before), new_ranges = surfacesOf(scene_after, after);
+  const auto source = matchInstances(scene_before, scene_after);
+  for (std::uint32_t i = 0; i < new_ranges.size(); ++i) {
+    const auto range = new_ranges[i];
+    if (source[i] == kNone || old_ranges[source[i]].count != range.count) continue;
+    for (std::uint32_t k = 0; k < range.count; ++k) {
+      const auto of = old_ranges[source[i]].first + k;
+      if (sameGrid(before.surfaces[of], after.surfaces[range.first + k])) former[range.first + k] = of;
+    }
+  }
+  return former;
+}
+
 class Matcher {
  public:
   Matcher(const PatchScene& before, const PatchScene& after) : before_(before), after_(after) {}
@@ -73,6 +90,15 @@ class Matcher {
       const auto& v = before_.vertices[before_.indices[std::size_t{3} * a.first_triangle + i]];
       const auto& w = after_.vertices[after_.indices[std::size_t{3} * b.first_triangle + i]];
       if (v.position != w.position || v.texel != w.texel || v.normal != w.normal) return false;
+    }
+    return true;
+  }
+
+  /// Of surfaces in the same place.
+  [[nodiscard]] bool sameFrames(const Surface& a, const Surface& b) const {
+    for (std::uint32_t i = 0; i < a.triangle_count; ++i) {
+      const auto &f = before_.triangles[a.first_triangle + i], &g = after_.triangles[b.first_triangle + i];
+      if (f.origin != g.origin || f.du != g.du || f.dv != g.dv || f.normal != g.normal) return false;
     }
     return true;
   }
@@ -236,34 +262,39 @@ bool PatchMap::nothingKept() const {
   return std::ranges::all_of(moved, [](bool m) { return m; });
 }
 
+std::vector<std::uint32_t> matchSurfaces(const Scene& scene_before, const PatchScene& before, const Scene& scene_after,
+                                         const PatchScene& after) {
+  auto source = formerSurfaces(scene_before, before, scene_after, after);
+  const Matcher matcher(before, after);
+  for (std::uint32_t s = 0; s < source.size(); ++s) {
+    if (source[s] == kNone) continue;
+    const Surface &a = before.surfaces[source[s]], &b = after.surfaces[s];
+    if (!matcher.samePlace(a, b) || !matcher.sameFrames(a, b)) source[s] = kNone;
+  }
+  return source;
+}
+
 PatchMap matchPatches(const Scene& scene_before, const PatchScene& before, const Scene& scene_after,
                       const PatchScene& after) {
   RAD_CHECK(before.centre == after.centre && before.scale == after.scale);
   PatchMap map;
-  map.surface_before.assign(after.surfaces.size(), kNone);
   map.moved.assign(after.surfaces.size(), true);
   map.leaf_altered.assign(after.leaves.size(), true);
-  const auto old_ranges = surfacesOf(scene_before, before), new_ranges = surfacesOf(scene_after, after);
-  const auto source = matchInstances(scene_before, scene_after);
+  map.surface_before = formerSurfaces(scene_before, before, scene_after, after);
   const Matcher matcher(before, after);
   Boxes old_boxes(before), new_boxes(after);
   std::vector<bool> stayed(before.surfaces.size(), false);
-  for (std::uint32_t i = 0; i < new_ranges.size(); ++i) {
-    const auto range = new_ranges[i];
-    const bool same_charts = source[i] != kNone && old_ranges[source[i]].count == range.count;
-    for (std::uint32_t k = 0; k < range.count; ++k) {
-      const auto s = range.first + k, former = same_charts ? old_ranges[source[i]].first + k : kNone;
-      const auto& surface = after.surfaces[s];
-      if (former != kNone && sameGrid(before.surfaces[former], surface)) map.surface_before[s] = former;
-      if (map.surface_before[s] == kNone || !matcher.samePlace(before.surfaces[former], surface)) {
-        new_boxes.add(s);
-        continue;
-      }
-      map.moved[s] = false;
-      stayed[former] = true;
-      for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf)
-        map.leaf_altered[surface.first_leaf + leaf] = !matcher.sameLeaf(before.surfaces[former], surface, leaf);
+  for (std::uint32_t s = 0; s < after.surfaces.size(); ++s) {
+    const auto former = map.surface_before[s];
+    const auto& surface = after.surfaces[s];
+    if (former == kNone || !matcher.samePlace(before.surfaces[former], surface)) {
+      new_boxes.add(s);
+      continue;
     }
+    map.moved[s] = false;
+    stayed[former] = true;
+    for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf)
+      map.leaf_altered[surface.first_leaf + leaf] = !matcher.sameLeaf(before.surfaces[former], surface, leaf);
   }
   for (std::uint32_t s = 0; s < before.surfaces.size(); ++s) {
     if (!stayed[s]) old_boxes.add(s);

@@ -16,6 +16,11 @@ namespace radiosity::scene {
 /// several, in their order), or kNone. O(n log n).
 [[nodiscard]] std::vector<std::uint32_t> matchInstances(const Scene& before, const Scene& after);
 
+/// By surface of `after`: the one of `before` that has the same triangles in the same places, texels and all, or kNone.
+/// Asks for no leaves. O(triangles).
+[[nodiscard]] std::vector<std::uint32_t> matchSurfaces(const Scene& scene_before, const PatchScene& before,
+                                                       const Scene& scene_after, const PatchScene& after);
+
 /// `after` was built with `before` as its former self (buildPatchScene), so that both have the same unit box;
 /// otherwise is a bug of the caller. O(triangles + leaves).
 [[nodiscard]] PatchMap matchPatches(const Scene& scene_before, const PatchScene& before, const Scene& scene_after,

@@ -14,37 +14,12 @@
 namespace radiosity::scene {
 namespace {
 
-/// Rays start this far from the surface (unit box): well above the rounding of 32-bit positions (6e-8), well below
-/// anything modelled.
-constexpr double kLift = 2e-5;
-/// Rays along a surface rise by this part of their length: through any gap that is wider than a thousandth of its
-/// depth.
-constexpr double kGrazing = 2e-4;
-/// Rays end well outside of the unit box.
-constexpr double kLongest = 8.0;
 /// What lies on each other faces the same way: cosine of the angle between. Planes of such are no farther apart where
 /// the scene is (unit box) unless they meet at an angle.
 constexpr float kSameWay = 0.9999F;
 constexpr double kSamePlane = 2e-5;
 /// So many places of a leaf are looked at for what covers it.
 constexpr std::uint32_t kPlaces = 16;
-
-struct Frame {
-  glm::dvec3 n, u, v;
-};
-Frame frameAbout(const glm::vec3& normal) {
-  const glm::dvec3 n(normal);
-  const glm::dvec3 reference = std::abs(n.x) < 0.8 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
-  const glm::dvec3 u = glm::normalize(glm::cross(reference, n));
-  return {n, u, glm::cross(n, u)};
-}
-
-/// Of rays; one that does not leave a solid decides. An irrational-looking angle, so that none runs along modelled
-/// edges.
-glm::dvec3 firstWay(const glm::vec3& normal) {
-  const auto [n, u, v] = frameAbout(normal);
-  return n + 0.0713 * u + 0.0427 * v;
-}
 
 /// Of a position in the triangle's plane.
 glm::vec2 texelAt(const TriangleFrame& frame, const glm::vec3& position) {
@@ -71,52 +46,53 @@ Solids::Solids(const PatchScene& patches, const std::vector<bool>& solid) {
 }
 
 bool Solids::near(const Bounds& box, std::uint32_t surface) const {
-  const glm::vec3 margin(static_cast<float>(2.0 * kLift));
+  const glm::vec3 margin(static_cast<float>(2.0 * kBurialLift));
   return tree_.touches(box.min - margin, box.max + margin, surface_, surface);
 }
 
-bool Solids::buries(const glm::vec3& position, const glm::vec3& normal, Hits& hits) const {
-  const glm::dvec3 origin = glm::dvec3(position) + kLift * glm::dvec3(normal);
-  return raysLeave(origin, normal, hits) && !seesOutAlong(origin, normal, hits);
+bool Solids::buries(const glm::vec3& position, const glm::vec3& normal, Hits& hits, RayNotes* notes) const {
+  const glm::dvec3 origin = glm::dvec3(position) + kBurialLift * glm::dvec3(normal);
+  return raysLeave({origin, normal, kNone}, hits, notes) && !seesOutAlong({origin, normal, kNone}, hits, notes);
 }
 
 bool Solids::mayBury(const Bounds& positions, const glm::vec3& normal) const {
-  const glm::vec3 lift = static_cast<float>(kLift) * normal;
-  return tree_.mayMeetBack(positions.min + lift, positions.max + lift, firstWay(normal), kLongest);
+  const glm::vec3 lift = static_cast<float>(kBurialLift) * normal;
+  return tree_.mayMeetBack(positions.min + lift, positions.max + lift, BurialWays(normal).of(0), kBurialRayLength);
 }
 
-bool Solids::raysLeave(const glm::dvec3& origin, const glm::vec3& normal, Hits& hits) const {
-  const auto [n, u, v] = frameAbout(normal);
-  if (!leavesSolid(origin, firstWay(normal), hits)) return false;
-  for (int i = 0; i < 5; ++i) {
-    const double angle = 0.3217 + 2.0 * M_PI * i / 5.0;
-    if (!leavesSolid(origin, 0.6 * n + 0.8 * (std::cos(angle) * u + std::sin(angle) * v), hits)) return false;
+/// One ray that does not leave a solid decides.
+bool Solids::raysLeave(const Start& start, Hits& hits, RayNotes* notes) const {
+  const BurialWays ways(start.normal);
+  for (std::uint32_t way = 0; way < kFirstWayAlong; ++way) {
+    if (notes != nullptr) notes->add(start.origin, start.normal, start.triangle, way);
+    if (!leavesSolid(start.origin, ways.of(way), hits)) return false;
   }
   return true;
 }
 
 /// Whether a ray along the surface gets, before it leaves a solid, to where rays do not all leave one, or out of the
 /// scene. What it meets first may be a part of the surface, in a hollow, or of another that is buried as well.
-bool Solids::seesOutAlong(const glm::dvec3& origin, const glm::vec3& normal, Hits& hits) const {
-  const auto [n, u, v] = frameAbout(normal);
-  for (int i = 0; i < 8; ++i) {
-    const double angle = 0.2871 + 2.0 * M_PI * i / 8.0;
-    const glm::dvec3 direction = kGrazing * n + std::cos(angle) * u + std::sin(angle) * v;
-    if (leavesSolid(origin, direction, hits)) continue;
+bool Solids::seesOutAlong(const Start& start, Hits& hits, RayNotes* notes) const {
+  const BurialWays ways(start.normal);
+  for (auto way = kFirstWayAlong; way < kBurialWays; ++way) {
+    if (notes != nullptr) notes->add(start.origin, start.normal, start.triangle, way);
+    const auto direction = ways.of(way);
+    if (leavesSolid(start.origin, direction, hits)) continue;
     if (hits.empty()) return true;
     const RayHit first = hits.front();
     const glm::vec3 facing = normal_[first.triangle];
-    if (!raysLeave(origin + first.t * direction + kLift * glm::dvec3(facing), facing, hits)) return true;
+    const auto there = start.origin + first.t * direction + kBurialLift * glm::dvec3(facing);
+    if (!raysLeave({there, facing, first.triangle}, hits, notes)) return true;
   }
   return false;
 }
 
 /// Walks a ray to the end: +1 for every solid entered (front), -1 for every one left (back); below zero, the origin
-/// was inside. Leaves what it met in `hits`, in order.
+/// was inside. Leaves what it met in `hits`, in order, which no other part of the scene changes.
 bool Solids::leavesSolid(const glm::dvec3& origin, const glm::dvec3& direction, Hits& hits) const {
   hits.clear();
-  tree_.collectHits(origin, direction, 0.0, kLongest, hits);
-  std::ranges::sort(hits, [](const RayHit& a, const RayHit& b) { return a.t < b.t; });
+  tree_.collectHits(origin, direction, 0.0, kBurialRayLength, hits);
+  std::ranges::sort(hits, {}, [](const RayHit& hit) { return std::tuple(hit.t, hit.front, hit.triangle); });
   int depth = 0;
   double last = -1.0;
   bool last_front = false;

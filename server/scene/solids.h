@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "server/scene/bounds.h"
+#include "server/scene/burial_record.h"
 #include "server/scene/bvh.h"
 #include "server/scene/patch_scene.h"
 
@@ -36,14 +37,22 @@ class Solids {
   /// Buried when rays into the whole hemisphere leave more solids than they enter. One odd face that is turned the
   /// wrong way, or a room whose roof was modelled from outside, does not bury what can be seen from elsewhere. Nor does
   /// a panel that hangs before a wall, whose back hides the wall from nearly everywhere: one sees out along the wall.
-  [[nodiscard]] bool buries(const glm::vec3& position, const glm::vec3& normal, Hits& hits) const;
+  /// `notes`: where they are not null, of the rays that decided.
+  [[nodiscard]] bool buries(const glm::vec3& position, const glm::vec3& normal, Hits& hits,
+                            RayNotes* notes = nullptr) const;
 
   /// False: it buries no position in the box, of this normal. True: it may. Costs as much as one that is not buried.
   [[nodiscard]] bool mayBury(const Bounds& positions, const glm::vec3& normal) const;
 
  private:
-  [[nodiscard]] bool raysLeave(const glm::dvec3& origin, const glm::vec3& normal, Hits& hits) const;
-  [[nodiscard]] bool seesOutAlong(const glm::dvec3& origin, const glm::vec3& normal, Hits& hits) const;
+  /// Of rays: a place and what faces it.
+  struct Start {
+    glm::dvec3 origin;
+    glm::vec3 normal;
+    std::uint32_t triangle;  ///< of the tree; kNone: the place that is asked for
+  };
+  [[nodiscard]] bool raysLeave(const Start& start, Hits& hits, RayNotes* notes) const;
+  [[nodiscard]] bool seesOutAlong(const Start& start, Hits& hits, RayNotes* notes) const;
   [[nodiscard]] bool leavesSolid(const glm::dvec3& origin, const glm::dvec3& direction, Hits& hits) const;
 
   Bvh tree_;
@@ -64,6 +73,9 @@ class Coincidence {
 
   /// Whether there are any.
   [[nodiscard]] bool found() const { return std::ranges::find(covered_, true) != covered_.end(); }
+
+  /// By surface: somewhere.
+  [[nodiscard]] const std::vector<bool>& covered() const { return covered_; }
 
   /// Whether the front of `s` may be covered in the box.
   [[nodiscard]] bool mayCover(std::uint32_t s, const Bounds& box) const;

@@ -1,0 +1,146 @@
+#include "server/scene/burial_record.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <tuple>
+
+#include "server/scene/lineage.h"
+
+namespace radiosity::scene {
+namespace {
+
+/// Rays along a surface rise by this part of their length: through any gap that is wider than a thousandth of its
+/// depth.
+constexpr double kGrazing = 2e-4;
+/// Boxes are larger by this (unit box) than what is in them: well above what rounding moves rays and positions.
+constexpr float kMargin = 1e-5F;
+constexpr std::uint32_t kHemisphere = 5, kAlong = kBurialWays - kFirstWayAlong;
+
+struct Turn {
+  double cosine, sine;
+};
+/// About the normal, by way. Odd angles, so that no ray runs along modelled edges.
+const std::array<Turn, kBurialWays>& turns() {
+  static const auto all = [] {
+    std::array<Turn, kBurialWays> made{};
+    const auto set = [&](std::uint32_t way, double angle) { made[way] = {std::cos(angle), std::sin(angle)}; };
+    for (std::uint32_t i = 0; i < kHemisphere; ++i) set(1 + i, 0.3217 + 2.0 * M_PI * i / 5.0);
+    for (std::uint32_t i = 0; i < kAlong; ++i) set(kFirstWayAlong + i, 0.2871 + 2.0 * M_PI * i / 8.0);
+    return made;
+  }();
+  return all;
+}
+
+/// Whether a ray from somewhere in a box of this half size about `from` meets the other box.
+bool sweeps(const glm::dvec3& from, const glm::dvec3& half, const glm::dvec3& way, const ChangedBox& box) {
+  double near = 0.0, far = kBurialRayLength;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double low = static_cast<double>(box.low[axis]) - half[axis] - from[axis];
+    const double high = static_cast<double>(box.high[axis]) + half[axis] - from[axis];
+    if (std::abs(way[axis]) < 1e-12) {
+      if (low > 0.0 || high < 0.0) return false;
+      continue;
+    }
+    const double one = low / way[axis], other = high / way[axis];
+    near = std::max(near, std::min(one, other));
+    far = std::min(far, std::max(one, other));
+  }
+  return near <= far;
+}
+
+}  // namespace
+
+BurialWays::BurialWays(const glm::vec3& normal) : n_(normal) {
+  const glm::dvec3 reference = std::abs(n_.x) < 0.8 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
+  u_ = glm::normalize(glm::cross(reference, n_));
+  v_ = glm::cross(n_, u_);
+}
+
+glm::dvec3 BurialWays::of(std::uint32_t way) const {
+  if (way == 0) return n_ + 0.0713 * u_ + 0.0427 * v_;
+  const auto [cosine, sine] = turns()[way];
+  if (way < kFirstWayAlong) return 0.6 * n_ + 0.8 * (cosine * u_ + sine * v_);
+  return kGrazing * n_ + cosine * u_ + sine * v_;
+}
+
+bool RayFan::mayMeet(std::span<const ChangedBox> boxes) const {
+  const glm::dvec3 low(origins.min), high(origins.max);
+  const glm::dvec3 middle = 0.5 * (low + high), half = 0.5 * (high - low) + static_cast<double>(kMargin);
+  const BurialWays all(normal);
+  for (std::uint32_t way = 0; way < kBurialWays; ++way) {
+    if ((ways >> way & 1U) == 0) continue;
+    const auto direction = all.of(way);
+    for (const auto& box : boxes) {
+      if (sweeps(middle, half, direction, box)) return true;
+    }
+  }
+  return false;
+}
+
+void RayNotes::add(const glm::dvec3& origin, const glm::vec3& normal, std::uint32_t from, std::uint32_t way) {
+  const auto same = [&](const RayFan& fan) { return fan.from == from && fan.normal == normal; };
+  auto fan = std::ranges::find_if(fans_, same);
+  if (fan == fans_.end()) {
+    fans_.push_back({{}, normal, from, 0});
+    fan = std::prev(fans_.end());
+  }
+  fan->origins.add(glm::vec3(origin));
+  fan->ways |= 1U << way;
+}
+
+void BurialRecord::sort() {
+  std::ranges::sort(leaves, {}, [](const Leaf& leaf) { return std::tuple(leaf.leaf, leaf.side, leaf.pass); });
+}
+
+const BurialRecord::Leaf* BurialRecord::find(std::uint32_t leaf, std::uint32_t side, Pass pass) const {
+  const auto key = [](const Leaf& entry) { return std::tuple(entry.leaf, entry.side, entry.pass); };
+  const auto found = std::ranges::lower_bound(leaves, std::tuple(leaf, side, pass), {}, key);
+  return found == leaves.end() || key(*found) != std::tuple(leaf, side, pass) ? nullptr : &*found;
+}
+
+FormerBurial::FormerBurial(const PatchScene& before, const BurialRecord& record, const PatchScene& after,
+                           std::vector<std::uint32_t> surface_before, const std::vector<bool>& solid)
+    : before_(before), record_(record), after_(after), surface_before_(std::move(surface_before)) {
+  std::vector<bool> stayed(before.surfaces.size(), false);
+  const auto add = [&](const Surface& surface) {
+    boxes_.push_back({surface.bounds_min - kMargin, surface.bounds_max + kMargin});
+  };
+  for (std::uint32_t s = 0; s < after.surfaces.size(); ++s) {
+    auto& former = surface_before_[s];
+    if (former != kNone && record.solid[former] != solid[s]) former = kNone;
+    if (former != kNone) {
+      stayed[former] = true;
+    } else if (solid[s]) {
+      add(after.surfaces[s]);
+    }
+  }
+  for (std::uint32_t s = 0; s < before.surfaces.size(); ++s) {
+    if (!stayed[s] && record.solid[s]) add(before.surfaces[s]);
+  }
+  joinBoxes(boxes_);
+}
+
+const BurialRecord::Leaf* FormerBurial::find(std::uint32_t surface, std::uint32_t leaf, std::uint32_t side,
+                                             BurialRecord::Pass pass, std::uint32_t few) const {
+  const auto former = surface_before_[surface];
+  if (former == kNone || record_.covered[former] || record_.few != few) return nullptr;
+  const auto* found = record_.find(before_.surfaces[former].first_leaf + leaf, side, pass);
+  const auto meets = [&](const RayFan& fan) { return fan.mayMeet(boxes_); };
+  return found == nullptr || std::ranges::any_of(found->fans, meets) ? nullptr : found;
+}
+
+BuriedPart FormerBurial::renumbered(const BuriedPart& part, std::uint32_t surface) const {
+  const Surface &from = before_.surfaces[surface_before_[surface]], &to = after_.surfaces[surface];
+  const auto number = [&](std::uint32_t& triangle) {
+    if (triangle != kNone) triangle = triangle - from.first_triangle + to.first_triangle;
+  };
+  BuriedPart after = part;
+  after.leaf = part.leaf - from.first_leaf + to.first_leaf;
+  number(after.point.triangle);
+  for (auto& place : after.places) number(place.triangle);
+  return after;
+}
+
+}  // namespace radiosity::scene

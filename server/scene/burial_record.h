@@ -1,0 +1,121 @@
+// What was found out about buried leaves, and by which rays, so that after an edit only leaves are looked at again of
+// which some ray passes where something was or is. Plain values; questions may be asked by several threads.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "server/scene/bounds.h"
+#include "server/scene/patch_scene.h"
+
+namespace radiosity::scene {
+
+/// Rays start this far from the surface (unit box): well above the rounding of 32-bit positions (6e-8), well below
+/// anything modelled.
+inline constexpr double kBurialLift = 2e-5;
+/// They end well outside of the unit box, in units of their directions' lengths, which are about one.
+inline constexpr double kBurialRayLength = 8.0;
+/// Ways that rays go from a place of some normal: one that decides most, those into the hemisphere, and those along
+/// the surface.
+inline constexpr std::uint32_t kBurialWays = 14, kFirstWayAlong = 6;
+
+/// Directions about a normal, by way. A few sines.
+class BurialWays {
+ public:
+  explicit BurialWays(const glm::vec3& normal);
+  [[nodiscard]] glm::dvec3 of(std::uint32_t way) const;
+
+ private:
+  glm::dvec3 n_, u_, v_;
+};
+
+/// Rays that were cast from places near each other, of one normal.
+struct RayFan {
+  Bounds origins;
+  glm::vec3 normal{0.0F};
+  std::uint32_t from = kNone;  ///< the triangle that they start from, of some list; kNone: the leaf's own
+  std::uint32_t ways = 0;      ///< bits
+
+  /// False: none of the rays comes near any of the boxes.
+  [[nodiscard]] bool mayMeet(std::span<const ChangedBox> boxes) const;
+};
+
+/// Notes rays. Those that start from other triangles become fans of their own.
+class RayNotes {
+ public:
+  void clear() { fans_.clear(); }
+  void add(const glm::dvec3& origin, const glm::vec3& normal, std::uint32_t from, std::uint32_t way);
+  [[nodiscard]] const std::vector<RayFan>& fans() const { return fans_; }
+
+ private:
+  std::vector<RayFan> fans_;
+};
+
+/// A leaf that lost area on one side, and the visible point found on it.
+struct BuriedPart {
+  std::uint32_t leaf = kNone, side = 0;
+  LeafPoint point;
+  std::vector<LeafSpot> places;  ///< where it is visible
+  float visible_area = 0.0F;
+};
+
+/// By leaf and side: what was measured.
+class BurialRecord {
+ public:
+  /// As some of the places on a leaf tell, or all that are ever looked at.
+  enum class Pass : std::uint8_t { kFew, kMany };
+  struct Leaf {
+    std::uint32_t leaf, side;
+    Pass pass;
+    std::vector<RayFan> fans;
+    std::optional<BuriedPart> buried;  ///< none: all of it is visible
+  };
+
+  std::uint32_t few = 0;      ///< places that were looked at in the first pass
+  std::vector<bool> solid;    ///< by surface
+  std::vector<bool> covered;  ///< by surface: an earlier one lies on it somewhere, which no ray tells
+  std::vector<Leaf> leaves;   ///< by leaf, side and pass once sort() was called
+
+  void sort();
+  /// Null: it was not measured by rays.
+  [[nodiscard]] const Leaf* find(std::uint32_t leaf, std::uint32_t side, Pass pass) const;
+};
+
+/// The scene before an edit, for burial: which of its surfaces are where they were.
+class FormerBurial {
+ public:
+  /// `surface_before`: by surface of `after`, the one of `before` that is the same in all triangles, or kNone.
+  /// `record`: of `before`. `solid`: by surface of `after`. Refers to the first three.
+  FormerBurial(const PatchScene& before, const BurialRecord& record, const PatchScene& after,
+               std::vector<std::uint32_t> surface_before, const std::vector<bool>& solid);
+
+  /// What was found of the leaf of `after`; null: it must be looked at again. `leaf` counts from the first of the
+  /// surface. A few ray and box tests.
+  [[nodiscard]] const BurialRecord::Leaf* find(std::uint32_t surface, std::uint32_t leaf, std::uint32_t side,
+                                               BurialRecord::Pass pass, std::uint32_t few) const;
+  /// In the numbers of `after`.
+  [[nodiscard]] BuriedPart renumbered(const BuriedPart& part, std::uint32_t surface) const;
+
+ private:
+  const PatchScene& before_;
+  const BurialRecord& record_;
+  const PatchScene& after_;
+  std::vector<std::uint32_t> surface_before_;
+  std::vector<ChangedBox> boxes_;  ///< where a solid was or is that is not the same
+};
+
+/// As buildPatchScene(), and how burial was found, for edits. `record`: that of the former scene, if it was kept: what
+/// is built is the same without it, later.
+struct BuiltScene {
+  PatchScene patches;
+  std::shared_ptr<const BurialRecord> burial;  ///< null: not kept
+};
+[[nodiscard]] Result<BuiltScene> buildWithRecord(const Scene& scene, const ChartOptions& options,
+                                                 const FormerScene* former = nullptr,
+                                                 const BurialRecord* record = nullptr);
+
+}  // namespace radiosity::scene

@@ -1,0 +1,168 @@
+// Burial after an edit: leaves that are not looked at again have the bits that they would get, whatever is moved, comes
+// or goes.
+#include "server/scene/burial_record.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <glm/gtc/matrix_transform.hpp>
+#include <random>
+
+#include "server/scene/lineage.h"
+
+namespace radiosity::scene {
+namespace {
+
+constexpr std::uint32_t kBox = 0, kLidless = 1, kRoom = 2;
+
+/// The unit cube about the origin, facing out, or without its lid, or facing in.
+Primitive cube(std::uint32_t kind) {
+  Primitive primitive;
+  primitive.mesh = kind;
+  primitive.primitive = 0;
+  primitive.material = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const float side : {-0.5F, 0.5F}) {
+      if (kind == kLidless && axis == 1 && side > 0.0F) continue;
+      const auto first = static_cast<std::uint32_t>(primitive.positions.size());
+      const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+      for (const auto& [a, b] : {std::pair(-0.5F, -0.5F), {0.5F, -0.5F}, {0.5F, 0.5F}, {-0.5F, 0.5F}}) {
+        glm::vec3 corner(0.0F);
+        corner[axis] = side;
+        corner[u] = a;
+        corner[v] = b;
+        primitive.positions.push_back(corner);
+      }
+      const bool turned = (side < 0.0F) != (kind == kRoom);
+      for (const std::uint32_t i : {0U, 1U, 2U, 0U, 2U, 3U}) primitive.indices.push_back(first + (turned ? 3 - i : i));
+    }
+  }
+  return primitive;
+}
+
+class BurialRecords : public testing::Test {
+ protected:
+  BurialRecords() {
+    scene_.materials.resize(2);
+    scene_.materials[1].double_sided = true;
+    scene_.primitives = {cube(kBox), cube(kLidless), cube(kRoom), cube(kBox)};
+    scene_.primitives[3].mesh = 3;
+    scene_.primitives[3].material = 1;
+    scene_.instances.push_back({.node = 0, .primitive = kRoom, .world = glm::scale(glm::dmat4(1.0), glm::dvec3(4.0))});
+    for (std::uint32_t i = 1; i < 12; ++i) scene_.instances.push_back(placedAtRandom(i));
+  }
+
+  [[nodiscard]] double chance(double low, double high) {
+    return low + (high - low) * static_cast<double>(random_() % 65536U) / 65536.0;
+  }
+
+  /// On the floor, against a wall, half in it, or in the air; turned or not.
+  Instance placedAtRandom(std::uint32_t node) {
+    const glm::dvec3 size(chance(0.2, 1.2), chance(0.2, 1.2), chance(0.2, 1.2));
+    glm::dvec3 at(chance(-1.8, 1.8), chance(-1.8, 1.8), chance(-1.8, 1.8));
+    if (random_() % 2 == 0) at.y = -2.0 + 0.5 * size.y;
+    if (random_() % 4 == 0) at.x = 2.0 - 0.3 * size.x;
+    auto world = glm::translate(glm::dmat4(1.0), at);
+    if (random_() % 2 == 0) world = glm::rotate(world, chance(0.0, 3.0), glm::dvec3(0, 1, 0));
+    constexpr std::array<std::uint32_t, 4> kKinds = {kBox, kBox, kLidless, 3};
+    return {.node = node, .primitive = kKinds[random_() % 4], .world = glm::scale(world, size)};
+  }
+
+  void editAtRandom() {
+    const auto which = 1 + random_() % (scene_.instances.size() - 1);
+    if (random_() % 4 == 0) {
+      scene_.instances.push_back(placedAtRandom(next_node_++));
+    } else if (random_() % 4 == 0 && scene_.instances.size() > 4) {
+      scene_.instances.erase(scene_.instances.begin() + static_cast<std::ptrdiff_t>(which));
+    } else if (random_() % 4 == 0) {  // what bounds solids, in the same place
+      scene_.materials[random_() % 2].double_sided = random_() % 2 == 0;
+    } else {
+      auto kind = scene_.instances[which].primitive;
+      scene_.instances[which] = placedAtRandom(scene_.instances[which].node);
+      scene_.instances[which].primitive = kind;
+    }
+  }
+
+  [[nodiscard]] BuiltScene build(const Scene& before, const BuiltScene& built, bool remembers = true) const {
+    const FormerScene former{before, built.patches};
+    return buildWithRecord(scene_, options_, &former, remembers ? built.burial.get() : nullptr).value();
+  }
+
+  static void expectSame(const PatchScene& a, const PatchScene& b) {
+    EXPECT_EQ(a.node_area, b.node_area);
+    ASSERT_EQ(a.spots.size(), b.spots.size());
+    for (std::size_t i = 0; i < a.spots.size(); ++i) {
+      ASSERT_EQ(a.spots[i].texel, b.spots[i].texel);
+      ASSERT_EQ(a.spots[i].triangle, b.spots[i].triangle);
+    }
+    ASSERT_EQ(a.leaves.size(), b.leaves.size());
+    for (std::size_t i = 0; i < a.leaves.size(); ++i) {
+      const auto &leaf = a.leaves[i], &other = b.leaves[i];
+      ASSERT_TRUE(leaf.texel == other.texel && leaf.triangle == other.triangle && leaf.full == other.full &&
+                  leaf.first_spot == other.first_spot);
+    }
+  }
+
+  Scene scene_;
+  ChartOptions options_{.texel_budget = 6000};
+  std::mt19937 random_{7};
+  std::uint32_t next_node_ = 100;
+};
+
+TEST_F(BurialRecords, RandomEditsGiveTheBitsOfLookingAtAllLeavesAgain) {
+  auto before = scene_;
+  auto built = buildWithRecord(scene_, options_).value();
+  std::size_t buried = 0;
+  for (int i = 0; i < 40; ++i) {
+    editAtRandom();
+    auto next = build(before, built);
+    const auto anew = build(before, built, false);
+    ASSERT_NO_FATAL_FAILURE(expectSame(next.patches, anew.patches)) << "edit " << i;
+    ASSERT_TRUE(next.burial && anew.burial);
+    EXPECT_EQ(next.burial->leaves.size(), anew.burial->leaves.size());
+    for (const auto& leaf : next.burial->leaves) buried += leaf.buried ? 1 : 0;
+    before = scene_;
+    built = std::move(next);
+  }
+  EXPECT_GT(buried, 4000U);
+}
+
+/// What is remembered is what counts: other numbers in the record come out again, of most leaves.
+TEST_F(BurialRecords, MostLeavesAreNotLookedAtAgain) {
+  const auto before = scene_;
+  auto built = buildWithRecord(scene_, options_).value();
+  auto record = *built.burial;
+  for (auto& leaf : record.leaves) {
+    if (leaf.buried) leaf.buried->visible_area = 0.125F;
+  }
+  built.burial = std::make_shared<const BurialRecord>(std::move(record));
+  scene_.instances[5].world = glm::translate(scene_.instances[5].world, glm::dvec3(0.1, 0, 0));
+  const auto after = build(before, built);
+  std::size_t remembered = 0, all = 0;
+  for (const auto& leaf : after.burial->leaves) {
+    if (!leaf.buried) continue;
+    ++all;
+    remembered += leaf.buried->visible_area == 0.125F ? 1 : 0;
+  }
+  EXPECT_GT(all, 100U);
+  EXPECT_GT(remembered, all / 2);
+  EXPECT_LT(remembered, all);
+}
+
+TEST(BurialWays, AreTheWaysThatFansSweep) {
+  const glm::vec3 normal = glm::normalize(glm::vec3(0.2F, 0.9F, -0.3F));
+  const BurialWays ways(normal);
+  for (std::uint32_t way = 0; way < kBurialWays; ++way) {
+    const glm::vec3 from(0.1F, 0.2F, 0.3F), there = from + 0.4F * glm::vec3(ways.of(way));
+    RayNotes notes;
+    notes.add(glm::dvec3(from), normal, kNone, way);
+    const std::array met{ChangedBox{there - 0.001F, there + 0.001F}};
+    EXPECT_TRUE(notes.fans().front().mayMeet(met));
+    const std::array behind{ChangedBox{2.0F * from - there - 0.001F, 2.0F * from - there + 0.001F}};
+    EXPECT_FALSE(notes.fans().front().mayMeet(behind));
+  }
+}
+
+}  // namespace
+}  // namespace radiosity::scene
