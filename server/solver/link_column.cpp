@@ -326,7 +326,9 @@ LinkColumn LinkColumn::renumbered(const std::vector<std::uint32_t>& side_after, 
   std::sort(pieces.begin(), pieces.end(), [](const Piece& a, const Piece& b) { return a.side < b.side; });
   std::vector<Run> runs;
   std::vector<std::uint16_t> code;
-  code.reserve(code_.size());
+  std::size_t codes = 0;
+  for (const auto& piece : pieces) codes += after[piece.side].leaf_count;
+  code.reserve(codes);  // not more, or they would be copied once more to give the rest back
   for (const auto& [side, offset] : pieces) {
     const auto size = static_cast<std::uint32_t>(code.size());
     const bool joins = !runs.empty() && runs.back().side + runs.back().side_count == side;
@@ -337,7 +339,6 @@ LinkColumn LinkColumn::renumbered(const std::vector<std::uint32_t>& side_after, 
     code.insert(code.end(), from, from + after[side].leaf_count);
   }
   runs.shrink_to_fit();
-  code.shrink_to_fit();
   LinkColumn column;
   column.runs_ = std::move(runs);
   column.code_ = std::move(code);
