@@ -18,7 +18,7 @@ constexpr float kInFront = -5e-7F;
 /// A leaf of a curved surface may reach so much farther than the frame of one of its triangles tells.
 constexpr float kCurved = 2.0F;
 /// Squares of so many leaves along a side are looked at as one first.
-constexpr std::uint32_t kTileSide = 8;
+constexpr std::uint32_t kTileSide = 4;
 /// Half a pixel's diagonal, in widths of a pixel, and room for rounding.
 constexpr float kHalfDiagonal = 0.7072F;
 
