@@ -13,7 +13,7 @@ namespace {
 
 /// Places on what is gone, on what came, and on what was altered; so many turns share them.
 constexpr std::size_t kPlaces = 96;
-constexpr std::uint32_t kTurns = 6;
+constexpr std::uint32_t kTurns = 12;
 /// Of a leaf that stays, but of which more or less is left, the link changes by about this part.
 constexpr double kAltered = 0.5;
 /// Rays begin so far from where they start (unit box), and what is nearer than a place by so much of the way hides it.

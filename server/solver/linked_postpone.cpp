@@ -22,18 +22,22 @@ constexpr double kStillPostponed = 1.5;
 
 }  // namespace
 
-/// How far the links of a column that was measured before the edit are from true, for a radiosity of one.
+/// How far the links of a column that was measured before the edit are from true, for a radiosity of one. Both halves
+/// look at other places on what changed, and what they find counts for both (planRepairs).
 double LinkedSolver::reachOf(const Repair& repair, const ChangeReach& change) const {
   const auto& shooter = system_.shooters()[repair.shooter];
   if (repair.whole || shooter.isLight()) return HUGE_VAL;
   ShotBatch batch;
   addSamples(repair, batch);
-  double sum = 0.0;
+  constexpr std::uint32_t kApart = 6;  // turns
+  double squares = 0.0;
   for (std::uint32_t i = 0; i < batch.gather.size(); ++i) {
     const auto& point = batch.points[batch.gather[i].first_point];
-    sum += change.of(point.origin, point.normal, shooter.area, repair.shooter + repair.half + i);
+    const auto turn = repair.shooter + kApart * static_cast<std::uint32_t>(repair.half) + i;
+    const double reach = change.of(point.origin, point.normal, shooter.area, turn);
+    squares += reach * reach;
   }
-  return sum / static_cast<double>(batch.gather.size());
+  return std::sqrt(squares / static_cast<double>(batch.gather.size()));
 }
 
 /// Area-weighted norm of the error of irradiance, mean of the halves, that a column's old links may cause.
@@ -108,10 +112,11 @@ bool LinkedSolver::isDueForTarget() {
   return repaired_ < due_;
 }
 
-/// Solved and told: the next of the links that waited, and in the end the light over all of them. An edit of light that
-/// comes in between need not wait for the others.
+/// Solved and told: the next of the links that waited, and in the end the light over all of them. An edit that comes in
+/// between need not wait for the others, nor long for those under way: an undo takes less time than a whole slice.
 Result<StepOutcome> LinkedSolver::catchUp() {
-  due_ = std::min(repairs_.size(), repaired_ + slice_);
+  constexpr std::size_t kPart = 4;
+  due_ = std::min(repairs_.size(), repaired_ + std::max(fewest_a_slice_, slice_ / kPart));
   return advance();
 }
 

@@ -66,9 +66,15 @@ void LinkedSolver::planRepairs(double norm, const ChangeReach& change) {
     affected_ += shooter.isLight() ? 1 + (repair.samples - 1) / kLightPoints : repair.samples;
     return false;
   });
+  std::vector<double> reach(repairs_.size());
   inBothHalves([&](std::size_t worker) {
-    for (auto r = worker; r < repairs_.size(); r += 2) repairs_[r].reach += reachOf(repairs_[r], change);
+    for (auto r = worker; r < repairs_.size(); r += 2) reach[r] = reachOf(repairs_[r], change);
   });
+  for (std::size_t r = 0; r + 1 < repairs_.size(); ++r) {  // both halves of a shooter lie together
+    if (repairs_[r].shooter != repairs_[r + 1].shooter || !std::isfinite(reach[r] + reach[r + 1])) continue;
+    reach[r] = reach[r + 1] = std::sqrt(0.5 * (reach[r] * reach[r] + reach[r + 1] * reach[r + 1]));
+  }
+  for (std::size_t r = 0; r < repairs_.size(); ++r) repairs_[r].reach += reach[r];
   planDue(norm);
 }
 
