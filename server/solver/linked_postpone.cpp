@@ -20,6 +20,9 @@ constexpr double kPostponed = 0.2, kMostPostponed = 0.5, kOfRoom = 0.7;
 /// When light is solved for it is other light than that by which they were chosen: so many times that.
 constexpr double kStillPostponed = 1.5;
 
+/// Part of the target that what waits may take, beside what takes this part of it; squares add up.
+double roomBeside(double part) { return kOfRoom * std::sqrt(std::max(0.0, 1.0 - part * part)); }
+
 }  // namespace
 
 /// How far the links of a column that was measured before the edit are from true, for a radiosity of one. Both halves
@@ -67,8 +70,7 @@ double LinkedSolver::fieldNorm() const {
 
 /// `error`: all but what waits, as far as is known.
 void LinkedSolver::setPostponed(double error) {
-  const double part = error / settings_.target_error;
-  postponed_ = std::clamp(kOfRoom * std::sqrt(std::max(0.0, 1.0 - part * part)), kPostponed, kMostPostponed);
+  postponed_ = std::clamp(roomBeside(error / settings_.target_error), kPostponed, kMostPostponed);
 }
 
 /// The strongest first, and only as many as must be. `norm`: of irradiance, about.
@@ -106,8 +108,7 @@ bool LinkedSolver::isDueForTarget() {
   const double norm = fieldNorm(), waits = missing() / norm;
   const double rest = std::sqrt(std::max(0.0, error_.total * error_.total - waits * waits));
   if (!(rest < settings_.target_error)) return false;
-  setPostponed(rest);
-  postponed_ = std::min(postponed_, kOfRoom * waits / settings_.target_error);
+  postponed_ = std::min(roomBeside(rest / settings_.target_error), kOfRoom * waits / settings_.target_error);
   planDue(norm);
   return repaired_ < due_;
 }

@@ -14,7 +14,7 @@
 namespace radiosity::solver {
 namespace {
 
-constexpr std::uint32_t kTurns = 6;
+constexpr std::uint32_t kTurns = 12;
 constexpr double kArea = 1e-3;
 
 class ChangeReachTest : public testing::Test {
