@@ -224,20 +224,40 @@ TEST_F(ChairEdit, ShowsLightBeforeItHasWhatMattersLittleAndHasAllInTheEnd) {
   ASSERT_TRUE(early.isBehind());
   const auto waiting = early.linkCounters().waiting;
   EXPECT_GT(waiting, early.linkCounters().repaired / 4);
-  EXPECT_LT(difference(early, *exact, *after.patches), 0.2 * settings_.target_error) << "what may wait";
-  EXPECT_GE(early.error().total, exact->error().total) << "it is stated";
+  // What is stated more than where all is measured; the solve before left most of the target.
+  const auto stated = [&] {
+    return std::sqrt(std::max(0.0, std::pow(early.error().total, 2.0) - std::pow(exact->error().total, 2.0)));
+  };
+  EXPECT_LT(difference(early, *exact, *after.patches), stated());
+  EXPECT_LT(stated(), 0.5 * settings_.target_error) << "what may wait";
   // In other light too, the old links of what is stronger now included.
   auto brighter = after.materials;
   for (auto& emission : brighter.emission) emission *= 5.0F;
   early.setMaterials(brighter);
   exact->setMaterials(brighter);
   finish(early), finish(*exact);
-  EXPECT_LT(difference(early, *exact, *after.patches), 0.3 * settings_.target_error);
+  EXPECT_LT(difference(early, *exact, *after.patches), stated());
+  EXPECT_LT(stated(), 0.75 * settings_.target_error);
   for (int i = 0; i < 1000 && early.isBehind(); ++i) ASSERT_TRUE(early.step());
   finish(early);
   EXPECT_FALSE(early.isBehind());
   expectSameLinks(early, *exact, *after.patches);
   EXPECT_LT(difference(early, *exact, *after.patches), 1e-4);
+}
+
+TEST_F(ChairEdit, WithLittleRoomUnderTheTargetWaitsForLess) {
+  const auto after = edited(before_, move_);
+  const auto loose = solved(before_), tight = solved(before_);
+  const auto map = mapOf(before_, after);
+  const auto waiting = [&](LinkedSolver& former, double target) {
+    settings_.target_error = target;
+    LinkedSolver early(after.patches, after.materials, *transport_, settings_, {}, former, map);
+    finish(early);
+    EXPECT_LE(early.error().total, target);
+    return early.linkCounters().waiting;
+  };
+  const double error = tight->error().total;
+  EXPECT_LT(waiting(*tight, 1.05 * error), waiting(*loose, 2.0 * error));
 }
 
 TEST_F(ChairEdit, OfASceneThatIsBehindCountsWhatWaitedForEarlierEdits) {
