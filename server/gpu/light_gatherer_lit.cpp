@@ -17,8 +17,6 @@ namespace {
 /// its neighbours, which receivers that want care ask too.
 constexpr float kPixelsAround = 0.8F, kPixelsAroundMore = 2.2F;
 
-/// So many rows of a receiver's spots count for one shot of a reflecting node, and of a light: others for every shot.
-constexpr std::uint32_t kNodeRows = 1, kLightRows = 4, kLightSpots = kLightRows * scene::kSpotQuarters;
 constexpr std::size_t kFewestLit = 4096;
 /// Spots are asked for before they are looked at, by so many receivers: each lies on a line of the cache of its own.
 constexpr std::size_t kSpotsAhead = 8;
@@ -39,7 +37,7 @@ std::array<float, 2> heights(std::span<const glm::vec3> corners, const glm::vec3
 
 bool sameGeometry(const solver::GatherShot& a, const solver::GatherShot& b) {
   return a.corners == b.corners && a.corner_count == b.corner_count && a.normal == b.normal &&
-         a.receiver_jitter == b.receiver_jitter && a.spot_row == b.spot_row && a.all_spots == b.all_spots &&
+         a.receiver_jitter == b.receiver_jitter && a.spot_row == b.spot_row && a.spot_rows == b.spot_rows &&
          a.fill == b.fill;
 }
 
@@ -109,7 +107,7 @@ struct SpotRows {
 };
 
 SpotRows spotRows(const solver::GatherShot& shot) {
-  const std::uint32_t apart = scene::kSpotRows / (shot.all_spots ? kLightRows : kNodeRows);
+  const std::uint32_t apart = scene::kSpotRows / shot.spot_rows;
   return {shot.spot_row * apart / scene::kSpotRows, apart};
 }
 
@@ -248,7 +246,7 @@ void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers
     const auto stop = std::min(end, block->first + block->count);
     if (stop <= i) continue;
     // By the whole block, also where only some of it are named: they get the same bits.
-    makeRoom((stop - i) * (block->plain ? 2 : kLightSpots));
+    makeRoom((stop - i) * std::max(2U, block->plain ? 0 : shot.spot_rows * scene::kSpotQuarters));
     const auto [low, high] = heights(shot, block->low, block->high);
     if (high <= 0.0F) i = stop;
     if (block->plain && low > kInPlane && !isNear(ball, *block)) {

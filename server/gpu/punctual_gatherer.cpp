@@ -52,26 +52,29 @@ struct PixelPlace {
   }
 };
 
-/// By the receiver's own pixel and the four whose samples lie around it. Near an edge, all sixteen: where three edges
-/// meet, the one that matters may not be among the four. Of a surface with two sides one may be the inside of a wall
-/// thinner than a pixel: where the pixels do not show it, or show an edge, all is asked.
+/// The receiver's own pixel decides where the four whose samples lie around it show the same. Elsewhere, if all sixteen
+/// around those hide the light, or none does, so does the receiver's, or it does not; where they differ the ray tells:
+/// pixels blur the edge of a shadow alike to both sides, but to ask only facets wide enough for them to show takes back
+/// what they lose beside these, not what they darken, and shadows of dense meshes on what is wide grow. Partial opacity
+/// is by the pixel, right in the mean. Of a surface with two sides one may be the inside of a wall thinner than a
+/// pixel: there all is asked, too, where pixels do not show it.
 bool isHidden(const Receivers& receivers, const PixelPlace& place, const Receivers::Ray& ray, bool two_sided) {
   const float left = std::floor(place.x - 0.5F), below = std::floor(place.y - 0.5F);
   const auto own = place.item(place.x, place.y);
-  std::array<std::uint32_t, 4> around{};
-  bool edge = false;
-  for (std::size_t i = 0; i < 4; ++i) {
-    around[i] = place.item(left + static_cast<float>(i % 2), below + static_cast<float>(i / 2));
-    edge = edge || around[i] != own;
-  }
-  if (!edge && own != RAD_ITEM_NONE)
-    return receivers.hides(own, ray) || (two_sided && receivers.liesApart(own, ray) && receivers.isBlocked(ray));
-  if (receivers.hidesAtEdge(own, ray) || receivers.anyMeets(around, ray)) return true;
+  const auto around = [&](int x, int y) {
+    return place.item(left + static_cast<float>(x), below + static_cast<float>(y));
+  };
+  bool edge = own == RAD_ITEM_NONE;
+  for (int i = 0; i < 4; ++i) edge = edge || around(i % 2, i / 2) != own;
+  const bool hidden = receivers.hides(own, ray);
+  if (!edge) return hidden || (two_sided && receivers.liesApart(own, ray) && receivers.isBlocked(ray));
   std::array<std::uint32_t, 16> wider{};
-  for (std::size_t i = 0; i < 16; ++i) {
-    wider[i] = place.item(left - 1.0F + static_cast<float>(i % 4), below - 1.0F + static_cast<float>(i / 4));
-  }
-  return receivers.anyMeets(wider, ray) || (two_sided && receivers.isBlocked(ray));
+  for (int i = 0; i < 16; ++i) wider[static_cast<std::size_t>(i)] = around(i % 4 - 1, i / 4 - 1);
+  const auto alike = [&](std::uint32_t item) { return item == own || receivers.hides(item, ray) == hidden; };
+  const bool see_through = std::ranges::any_of(wider, [&](auto item) { return receivers.isSeeThrough(item); });
+  if (!see_through && (hidden || !two_sided) && std::ranges::all_of(wider, alike)) return hidden;
+  if (receivers.isBlocked(ray) || receivers.anyMeets(wider, ray)) return true;
+  return receivers.isSeeThrough(own) && receivers.hidesAtEdge(own, ray);
 }
 
 /// A hemicube's image, looked up by direction in the axes of the hemicube (the cells of hemicube_weights.h).

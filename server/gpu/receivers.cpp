@@ -20,10 +20,6 @@ constexpr float kSeal = 1.0e-5F;
 /// Rays start so far from a surface, and end so far before another (unit box): well above the rounding of positions.
 constexpr double kLift = 2.0e-6;
 
-bool isTwoSided(const scene::Surface& surface) {
-  return surface.first_node[0] != scene::kNone && surface.first_node[1] != scene::kNone;
-}
-
 std::uint32_t rootOf(std::vector<std::uint32_t>& parent, std::uint32_t i) {
   while (parent[i] != i) i = parent[i] = parent[parent[i]];
   return i;
@@ -44,7 +40,8 @@ std::size_t countReceivers(const scene::PatchScene& patches) {
 
 }  // namespace
 
-Receivers::Receivers(std::shared_ptr<const scene::PatchScene> patches) : patches_(std::move(patches)) {
+Receivers::Receivers(std::shared_ptr<const scene::PatchScene> patches)
+    : patches_(std::move(patches)), opaque_(std::make_unique<Opaque>()) {
   const auto count = countReceivers(*patches_);
   receivers_.reserve(count);
   for (auto* texels : {&texel_x_, &texel_y_}) texels->reserve(count);
@@ -76,22 +73,21 @@ Receivers::Receivers(std::shared_ptr<const scene::PatchScene> patches) : patches
     absorbs_.push_back({surface.first_node[0] == scene::kNone, surface.first_node[1] == scene::kNone});
   }
   findFacets();
-  buildTree();
 }
 
-void Receivers::buildTree() {
-  if (std::ranges::none_of(patches_->surfaces, &isTwoSided)) return;
+scene::Bvh Receivers::treeOfOpaque() const {
   std::vector<scene::Bvh::Triangle> opaque;
   for (std::size_t i = 0; i < corners_.size(); ++i) {
     if (!patches_->surfaces[patches_->triangle_surface[i]].see_through) opaque.push_back(corners_[i]);
   }
-  opaque_ = scene::Bvh(std::move(opaque));
+  return scene::Bvh(std::move(opaque));
 }
 
 bool Receivers::isBlocked(const Ray& ray) const {
+  std::call_once(opaque_->made, [this] { opaque_->tree = treeOfOpaque(); });
   const auto from = glm::dvec3(ray.at) + kLift * glm::dvec3(ray.normal);
   const auto way = glm::dvec3(ray.at) + static_cast<double>(ray.reach) * glm::dvec3(ray.way) - from;
-  return opaque_.nearestHit(from, way, 0.0, 1.0 - 2.0 * kLift / glm::length(way)).has_value();
+  return opaque_->tree.nearestHit(from, way, 0.0, 1.0 - 2.0 * kLift / glm::length(way)).has_value();
 }
 
 void Receivers::findBlocks(Group& group) {

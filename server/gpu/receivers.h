@@ -8,6 +8,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <vector>
@@ -156,14 +157,24 @@ class Receivers {
   /// one of them is narrow, or lets light through in part, and the receiver's own pixel is right in the mean.
   [[nodiscard]] std::optional<bool> hiddenAmong(std::span<const std::uint32_t> items, const Ray& ray) const;
 
-  /// Whether anything opaque stands between, by intersection with all there is: to be asked of places on surfaces with
-  /// two sides alone.
+  /// Whether anything opaque stands between, by intersection with all there is: dear, and asked where pixels cannot
+  /// tell.
   [[nodiscard]] bool isBlocked(const Ray& ray) const;
+
+  /// Whether the item is of a surface that lets light through somewhere.
+  [[nodiscard]] bool isSeeThrough(std::uint32_t item) const {
+    return item != scene::kNone && patches_->surfaces[patches_->triangle_surface[item]].see_through;
+  }
 
   /// Whether the ray meets a wide facet that some neighbouring pixel shows, where that lets nothing through.
   [[nodiscard]] bool anyMeets(std::span<const std::uint32_t> items, const Ray& ray) const;
 
  private:
+  /// The opaque triangles, from when they are first asked for: many scenes never do.
+  struct Opaque {
+    std::once_flag made;
+    scene::Bvh tree;
+  };
   /// Coplanar triangles of one chart that share corners.
   struct Facet {
     std::uint32_t first = 0, count = 0;                ///< into facet_triangles_
@@ -177,7 +188,7 @@ class Receivers {
   void findBlocks(Group& group);
   void findFacets();
   void measure(Facet& facet);
-  void buildTree();
+  [[nodiscard]] scene::Bvh treeOfOpaque() const;
   [[nodiscard]] static bool anyRises(std::span<const glm::vec3> corners, const glm::vec3& point,
                                      const glm::vec3& normal) {
     for (const auto& corner : corners) {
@@ -212,7 +223,7 @@ class Receivers {
   std::vector<Plane> planes_;                      ///< by triangle
   std::vector<std::array<glm::vec3, 3>> corners_;  ///< by triangle
   std::vector<std::array<bool, 2>> absorbs_;       ///< by triangle: front, back
-  scene::Bvh opaque_;                              ///< triangles; empty where no surface has two sides
+  std::unique_ptr<Opaque> opaque_;
   std::vector<Facet> facets_;
   std::vector<std::uint32_t> facet_of_;  ///< by triangle
   std::vector<std::uint32_t> facet_triangles_;

@@ -42,7 +42,6 @@ void keepSpots(PatchScene& patches, LeafPoint& leaf, std::span<LeafSpot> places)
 }
 
 void placeSpots(PatchScene& patches, const std::vector<LeafPiece>& pieces) {
-  constexpr std::uint32_t kSamples = 16, kManySamples = 64, kEnough = 6;
   std::vector<LeafSpot> places;
   std::size_t surface = 0;
   for (std::size_t first = 0, end = 0; first < pieces.size(); first = end) {
@@ -53,16 +52,13 @@ void placeSpots(PatchScene& patches, const std::vector<LeafPiece>& pieces) {
     while (surface + 1 < patches.surfaces.size() && patches.surfaces[surface + 1].first_leaf <= index) ++surface;
     const std::uint32_t local = index - patches.surfaces[surface].first_leaf, width = patches.surfaces[surface].width;
     const glm::dvec2 corner(local % width, local / width);
-    for (const std::uint32_t count : {kSamples, kManySamples}) {
-      if (count == kManySamples && places.size() >= kEnough) break;
-      places.clear();
-      for (std::uint32_t i = 0; i < count; ++i) {
-        const glm::dvec2 texel = corner + latticePoint(i, count);
-        for (std::size_t p = first; p < end; ++p) {
-          if (!triangleHolds(patches, pieces[p].triangle, texel, 0.0)) continue;
-          places.push_back({glm::vec2(texel), pieces[p].triangle});
-          break;
-        }
+    places.clear();
+    for (std::uint32_t i = 0; i < kLeafSpots; ++i) {
+      const glm::dvec2 texel = corner + latticePoint(i, kLeafSpots);
+      for (std::size_t p = first; p < end; ++p) {
+        if (!triangleHolds(patches, pieces[p].triangle, texel, 0.0)) continue;
+        places.push_back({glm::vec2(texel), pieces[p].triangle});
+        break;
       }
     }
     keepSpots(patches, leaf, places);

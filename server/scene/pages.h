@@ -18,7 +18,8 @@ struct PageOwners {
 
 /// Changes texels as little as possible so that bilinear lookups on both sides of each seam agree. Least-norm
 /// projections (Kaczmarz 1937) over points along the seams, as in Iwanicki, "Lighting technology of The Last of Us"
-/// (2013), which solves the same least-squares problem. Gutter texels give way more easily than visible ones.
+/// (2013), which solves the same least-squares problem. Gutter texels give way more easily than visible ones, and
+/// small ones than those beside them.
 void stitchSeams(const PatchScene& patches, const std::vector<PageOwners>& owners, std::vector<LightmapPage>& pages);
 
 }  // namespace radiosity::scene

@@ -11,13 +11,17 @@ namespace {
 
 constexpr int kSweeps = 12;
 constexpr float kPointsATexel = 2.0F;
-constexpr float kMobileVisible = 0.25F;  // how much a texel gives way: visible ones little, gutter ones fully
+/// How much a texel gives way: gutter ones fully, visible ones little, and all the more the smaller they are beside
+/// those on the other side. What is left of a face between others is a thousandth of a texel, and as uncertain: one
+/// must not see its value beyond it.
+constexpr float kMobile = 1.0F, kMobileVisible = 0.25F, kMostMobile = 1000.0F;
 
 /// One bilinear lookup: four texels of a page.
 struct Lookup {
   std::uint32_t page = 0;
   std::array<std::uint32_t, 4> texel{};
   std::array<float, 4> weight{};
+  std::array<float, 4> reach{};  ///< weight times mobility
 };
 
 /// Two lookups that should agree.
@@ -38,8 +42,12 @@ class Stitcher {
   }
 
  private:
-  [[nodiscard]] float mobility(std::uint32_t page, std::uint32_t texel) const {
-    return owners_[page].ring[texel] == 0 ? kMobileVisible : 1.0F;
+  /// Of a texel on one side of a seam; `larger`: the texel's area on the side where they are larger.
+  [[nodiscard]] float mobility(const Surface& surface, std::uint32_t texel, float larger) const {
+    const bool visible = owners_[surface.page].ring[texel] == 0;
+    const float coverage = visible ? pages_[surface.page].coverage[texel] : 1.0F, area = surface.texel_area * coverage;
+    const float smaller = area > 0.0F ? std::clamp(larger / area, 1.0F, kMostMobile) : 1.0F;
+    return smaller * (visible ? kMobileVisible : kMobile);
   }
 
   /// False when the lookup would touch texels of another chart: those must not be pulled.
@@ -65,6 +73,8 @@ class Stitcher {
     const float length =
         std::max(glm::distance(seam.texel[0][0], seam.texel[0][1]), glm::distance(seam.texel[1][0], seam.texel[1][1]));
     const int count = std::max(1, static_cast<int>(std::ceil(length * kPointsATexel)));
+    const float larger =
+        std::max(patches_.surfaces[seam.surface[0]].texel_area, patches_.surfaces[seam.surface[1]].texel_area);
     for (int i = 0; i < count; ++i) {
       const float where = (static_cast<float>(i) + 0.5F) / static_cast<float>(count);
       Tie tie;
@@ -72,8 +82,11 @@ class Stitcher {
       bool usable = true;
       for (std::size_t s = 0; s < 2 && usable; ++s) {
         usable = lookUp(seam.surface[s], glm::mix(seam.texel[s][0], seam.texel[s][1], where), tie.side[s]);
-        for (std::size_t k = 0; k < 4; ++k)
-          norm += tie.side[s].weight[k] * tie.side[s].weight[k] * mobility(tie.side[s].page, tie.side[s].texel[k]);
+        for (std::size_t k = 0; k < 4; ++k) {
+          auto& lookup = tie.side[s];
+          lookup.reach[k] = lookup.weight[k] * mobility(patches_.surfaces[seam.surface[s]], lookup.texel[k], larger);
+          norm += lookup.weight[k] * lookup.reach[k];
+        }
       }
       if (!usable || !(norm > 0.0F)) continue;
       tie.inverse_norm = 1.0F / norm;
@@ -94,8 +107,7 @@ class Stitcher {
       for (std::size_t k = 0; k < 4; ++k) {
         const Lookup& lookup = tie.side[s];
         glm::vec3& value = pages_[lookup.page].irradiance.pixels[lookup.texel[k]];
-        const float reach = lookup.weight[k] * mobility(lookup.page, lookup.texel[k]) * (s == 0 ? 1.0F : -1.0F);
-        value = glm::max(value + step * reach, glm::vec3(0.0F));
+        value = glm::max(value + step * (s == 0 ? lookup.reach[k] : -lookup.reach[k]), glm::vec3(0.0F));
       }
   }
 

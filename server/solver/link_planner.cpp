@@ -27,12 +27,12 @@ constexpr double kVariation = 0.5;
 constexpr std::uint32_t kScatteredPoints = 4;
 /// Points on all lights together in the first wave and half, where some have fewer than kLightPoints.
 constexpr std::uint32_t kMostFirstPoints = 128;
-/// A point on a light costs this part of a node's sample: its image has more pixels, but the receivers are found and
-/// weighed once for all points, and expanded and averaged once.
-constexpr double kLightCost = 0.7;
+/// A point on a light costs this part of a node's sample from one: its image has more pixels, but the receivers are
+/// found and weighed once for all points, and expanded and averaged once. A further point of a node.
+constexpr double kLightCost = 0.7, kPointCost = 0.65;
 /// So many samples' worth of what is usual is mixed into what is found of a shooter.
 constexpr double kPrior = 1.0;
-/// A wave brings a shooter at most so many samples.
+/// A wave brings a light at most so many samples, and a node so many points.
 constexpr std::uint32_t kMostSamplesAWave = 8;
 /// So many times that of a node are the images of a light without extent (a sky has most).
 constexpr double kSourceCost = 60.0;
@@ -327,6 +327,22 @@ void LinkPlanner::split(const NodePlace& place, LinkSystem& system, const Unshot
   }
 }
 
+/// Those that a wave may bring a shooter, in order: about as many points as it has, and no more than a wave brings.
+std::vector<LinkPlanner::FurtherSample> LinkPlanner::furtherSamples(const Shooter& shooter) const {
+  const auto taken = shooter.column[0].samples();
+  const auto most = std::min(kMostSamplesAWave, std::max(1U, taken));
+  if (shooter.source != scene::kNone) return std::vector<FurtherSample>(most, {1, kSourceCost});
+  if (shooter.isLight()) return std::vector<FurtherSample>(most, {kLightPoints, kLightCost * kLightPoints});
+  std::vector<FurtherSample> samples;
+  const auto most_points = std::min(kMostSamplesAWave, static_cast<std::uint32_t>(shooter.column[0].points()));
+  for (std::uint32_t k = 0, all = 0; k == 0 || all < most_points; ++k) {
+    const auto points = shots_.pointsOf(shooter.place, taken + k);
+    samples.push_back({points, 1.0 + kPointCost * (points - 1)});
+    all += points;
+  }
+  return samples;
+}
+
 std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPyramid& unshot,
                                               const scene::PatchScene& patches, bool may_split, LinkMemory& memory,
                                               const ErrorGoal& goal) {
@@ -348,19 +364,17 @@ std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPy
       variances += 0.25 * shooter.spread();  // of roulette: no sample lowers it
       continue;
     }
-    const std::uint32_t points = shooter.light != scene::kNone ? kLightPoints : 1;
-    const double cost = shooter.source != scene::kNone ? kSourceCost : shooter.isLight() ? kLightCost : 1.0;
     const double taken = shooter.column[0].points();
     // The spread of few samples is itself uncertain: a sample's worth of what is usual for such power is mixed in.
     const double usual = squares > 0.0 ? spread / squares * carriedPower(shooter) * carriedPower(shooter) : 0.0;
     const double variance = 0.25 * (shooter.spread() * taken + kPrior * usual) / (taken + kPrior);
     // Of each further sample, were those before it taken. At most as many as there are: their worth is only guessed.
-    const auto most = std::min(kMostSamplesAWave, std::max(1U, shooter.column[0].samples()));
     variances += variance;
-    for (std::uint32_t k = 0; k < most; ++k) {
-      const double before = taken + k * points, after = before + points;
-      gains.push_back({variance * taken / (2.0 * before * after * cost), n, points,
-                       variance * taken * (1.0 / before - 1.0 / after)});
+    double before = taken;
+    for (const auto& sample : furtherSamples(shooter)) {
+      const double after = before + sample.points, less = variance * taken * (1.0 / before - 1.0 / after);
+      gains.push_back({less / (2.0 * sample.cost), n, sample.points, less});
+      before = after;
     }
     const double varying = variation(shooter, system, unshot, patches);
     variations += varying;
@@ -373,22 +387,28 @@ std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPy
   std::vector<Measurement> wanted;
   std::vector<std::uint32_t> further(system.shooters().size(), 0);
   Forecast forecast(goal, variances, variations);
+  std::size_t planned = 0;  // samples of lights, points of nodes
   for (const auto& gain : gains) {
-    if (wanted.size() >= limit || gain.gain <= 0.0) break;
-    if (wanted.size() >= limit / kLeastPartOfWave && forecast.isReached()) break;
+    if (planned >= limit || gain.gain <= 0.0) break;
+    if (planned >= limit / kLeastPartOfWave && forecast.isReached()) break;
     if (gain.points == 0) {
       const auto before = wanted.size();
       if (!memory.isFull())
         split(NodePlace(system.shooters()[gain.shooter].place), system, unshot, patches, memory, wanted);
       if (wanted.size() > before) forecast.split(gain.less);
+      planned += wanted.size() - before;
       continue;
     }
     const auto& shooter = system.shooters()[gain.shooter];
     if (!memory.takeSample(shooter, 0) || !memory.takeSample(shooter, 1)) continue;
     forecast.sample(gain.less);
-    for (std::size_t half = 0; half < 2; ++half)
-      wanted.push_back({gain.shooter, half, gain.points, shooter.column[half].samples() + further[gain.shooter]});
+    for (std::size_t half = 0; half < 2; ++half) {
+      const auto index = shooter.column[half].samples() + further[gain.shooter];
+      wanted.push_back(
+          {gain.shooter, half, shooter.isLight() ? gain.points : shots_.pointsOf(shooter.place, index), index});
+    }
     ++further[gain.shooter];
+    planned += 2 * (shooter.isLight() ? 1 : gain.points);
   }
   return wanted;
 }

@@ -118,6 +118,11 @@ class LinkPlanner {
   [[nodiscard]] Node nodeAt(const NodePlace& place, const UnshotPyramid& unshot) const;
   [[nodiscard]] bool mustSplit(const Node& node, const LinkSystem& system) const;
   [[nodiscard]] bool isPartial(const Node& node) const;
+  struct FurtherSample {
+    std::uint32_t points;
+    double cost;  ///< in a node's samples from one point
+  };
+  [[nodiscard]] std::vector<FurtherSample> furtherSamples(const Shooter& shooter) const;
   [[nodiscard]] double chance(double power) const;
   [[nodiscard]] bool plays(const NodePlace& place, std::size_t half, double power) const;
   [[nodiscard]] double squaredVariation(const Shooter& shooter, const LinkSystem& system, const UnshotPyramid& unshot,

@@ -110,7 +110,7 @@ void LinkedSolver::addSamples(const Repair& repair, ShotBatch& batch) const {
   const auto& shooter = system_.shooters()[repair.shooter];
   if (!shooter.isLight()) {
     for (std::uint32_t i = 0; i < repair.samples; ++i)
-      shots_.add(shooter.place, repair.half, i, 1, shooter.resolution, batch);
+      shots_.add(shooter.place, repair.half, i, shooter.resolution, batch);
     return;
   }
   std::uint32_t points = 1 + (repair.samples - 1) % kLightPoints;

@@ -108,7 +108,7 @@ Result<void> LinkedSolver::measureSlice() {
     if (shooter.isLight()) {
       shots_.add(lights_[shooter.light], want.half, want.index, want.points, settings_.planner.light_resolution, batch);
     } else {
-      shots_.add(shooter.place, want.half, want.index, want.points, shooter.resolution, batch);
+      shots_.add(shooter.place, want.half, want.index, shooter.resolution, batch);
     }
     (batch.gather.size() > gathered.size() ? gathered : scattered).push_back(&want);
   }

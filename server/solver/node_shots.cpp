@@ -1,6 +1,7 @@
 #include "server/solver/node_shots.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
@@ -13,6 +14,22 @@ namespace {
 /// Nodes of a block of so many by so many look at the same place of a receiver, those of the next block at the
 /// opposite place, or at other spots.
 constexpr std::uint32_t kJitterBlock = 4;
+
+/// Rows of a leaf's spots that count for a sample of a light: light and shadow of a lamp differ more across a leaf than
+/// anything else.
+constexpr std::uint32_t kLightRows = 4;
+
+/// Points of a polygon's sample, by its number, and of all before it.
+std::uint32_t pointsOfSample(std::uint32_t index) {
+  constexpr std::uint32_t kDoublings = std::bit_width(kMostNodePoints);
+  return index == 0 ? 1 : index < kDoublings ? 1U << (index - 1) : kMostNodePoints;
+}
+
+std::uint32_t firstPointOf(std::uint32_t index) {
+  constexpr std::uint32_t kDoublings = std::bit_width(kMostNodePoints);
+  if (index <= kDoublings) return index == 0 ? 0 : 1U << (index - 1);
+  return kMostNodePoints * (index - kDoublings + 1);
+}
 
 /// The halves draw rows of spots each for itself, and never from the same quarter at once. The opposite row would not
 /// do: of so few rows two that are opposite are soon drawn by both halves, and what they do not show would not show in
@@ -66,10 +83,14 @@ std::uint64_t NodeShots::key(const NodePlace& node) const {
   return mixKeys(mixKeys(seed_, sides_[node.side].key), place);
 }
 
-void NodeShots::add(const NodePlace& node, std::size_t half, std::uint32_t index, std::uint32_t points,
-                    std::uint32_t resolution, ShotBatch& batch) const {
+std::uint32_t NodeShots::pointsOf(const NodePlace& node, std::uint32_t index) const {
+  return gathers(node) ? pointsOfSample(index) : 1;
+}
+
+void NodeShots::add(const NodePlace& node, std::size_t half, std::uint32_t index, std::uint32_t resolution,
+                    ShotBatch& batch) const {
   if (gathers(node)) {
-    addGather(node, half, index, points, resolution, batch);
+    addGather(node, half, index, resolution, batch);
   } else {
     addScatter(node, half, index, resolution, batch);
   }
@@ -81,8 +102,8 @@ std::uint32_t NodeShots::leafByArea(const NodePlace& node, double& u, double& v)
       sides_[node.side], node, [&](std::uint32_t id) { return patches_.node_area[id]; }, u, v);
 }
 
-void NodeShots::addGather(const NodePlace& node, std::size_t half, std::uint32_t index, std::uint32_t points,
-                          std::uint32_t resolution, ShotBatch& batch) const {
+void NodeShots::addGather(const NodePlace& node, std::size_t half, std::uint32_t index, std::uint32_t resolution,
+                          ShotBatch& batch) const {
   const Side& side = sides_[node.side];
   const auto& surface = patches_.surfaces[side.surface];
   const auto& frame = patches_.triangles[flatTriangle(node)];
@@ -112,16 +133,18 @@ void NodeShots::addGather(const NodePlace& node, std::size_t half, std::uint32_t
   shot.receiver_jitter = glm::vec2(opposite ? 1.0 - glm::dvec2(jitter) : glm::dvec2(jitter));
   shot.spot_row = rowOf(index, mixKeys(mixKeys(seed_, side.key), blockOf(node)), half != 0);
   shot.first_point = static_cast<std::uint32_t>(batch.points.size());
-  shot.point_count = points;
-  for (std::uint32_t p = 0; p < points; ++p) {
-    glm::dvec4 sample = sobol4(index * points + p, node_key);
+  shot.point_count = pointsOfSample(index);
+  shot.spot_rows = shot.point_count;  // as many places of a receiver as before, looked at from each point
+  const auto first = firstPointOf(index);
+  for (auto p = first; p < first + shot.point_count; ++p) {
+    glm::dvec4 sample = sobol4(p, node_key);
     glm::dvec2 texel = polygon.point(sample.x, sample.y);
     if (!whole) {
       const auto leaf = leafByArea(node, sample.x, sample.y);
       const auto& place = patches_.leaves[surface.first_leaf + leaf];
       texel = patches_.spotAt(place, leaf % side.width, leaf / side.width, glm::vec2(sample)).texel;
     }
-    batch.points.push_back(hemicubeAt(at(texel), shot.normal, sample.z, mixKeys(node_key, index * points + p)));
+    batch.points.push_back(hemicubeAt(at(texel), shot.normal, sample.z, mixKeys(node_key, p)));
   }
   batch.gather.push_back(shot);
 }
@@ -152,7 +175,7 @@ void NodeShots::add(const LightPolygon& light, std::size_t half, std::uint32_t i
   std::copy(light.corners.begin(), light.corners.end(), shot.corners.begin());
   shot.corner_count = light.corner_count;
   shot.normal = light.normal;
-  shot.all_spots = true;  // light and shadow of a lamp differ more across a leaf than anything else
+  shot.spot_rows = kLightRows;
   shot.resolution = resolution;
   shot.receiver_jitter = glm::vec2(half == 0 ? glm::dvec2(jitter) : 1.0 - glm::dvec2(jitter));
   shot.spot_row = rowOf(index, light_key, half != 0);

@@ -12,6 +12,9 @@
 
 namespace radiosity::solver {
 
+/// Points of one sample of a node at most.
+inline constexpr std::uint32_t kMostNodePoints = 4;
+
 /// A place on a surface as the standing point of a hemicube; `rotation` in [0, 1).
 [[nodiscard]] HemicubeFrame hemicubeAt(const glm::vec3& origin, const glm::vec3& normal, double rotation,
                                        std::uint64_t key);
@@ -33,15 +36,21 @@ class NodeShots {
   [[nodiscard]] bool isWhole(const NodePlace& node) const;
   [[nodiscard]] std::uint64_t key(const NodePlace& node) const;
 
-  /// Appends sample `index` of `half`, from `points` points; a gather or a scatter shot.
-  void add(const NodePlace& node, std::size_t half, std::uint32_t index, std::uint32_t points, std::uint32_t resolution,
+  /// Points of a node's sample: one where it is scattered or is the first, then as many as all before it, up to
+  /// kMostNodePoints. From one point of a node that is near and wide, and partly hidden, visibility is the part of its
+  /// area that is seen, in the mean, and not that of its form factor: only the ratio of sums over several points tells.
+  [[nodiscard]] std::uint32_t pointsOf(const NodePlace& node, std::uint32_t index) const;
+
+  /// Appends sample `index` of `half`; a gather or a scatter shot.
+  void add(const NodePlace& node, std::size_t half, std::uint32_t index, std::uint32_t resolution,
            ShotBatch& batch) const;
+  /// The same of a light, from `points` points.
   void add(const LightPolygon& light, std::size_t half, std::uint32_t index, std::uint32_t points,
            std::uint32_t resolution, ShotBatch& batch) const;
 
  private:
-  void addGather(const NodePlace& node, std::size_t half, std::uint32_t index, std::uint32_t points,
-                 std::uint32_t resolution, ShotBatch& batch) const;
+  void addGather(const NodePlace& node, std::size_t half, std::uint32_t index, std::uint32_t resolution,
+                 ShotBatch& batch) const;
   void addScatter(const NodePlace& node, std::size_t half, std::uint32_t index, std::uint32_t resolution,
                   ShotBatch& batch) const;
   [[nodiscard]] std::uint32_t flatTriangle(const NodePlace& node) const {

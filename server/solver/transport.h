@@ -89,8 +89,9 @@ struct GatherShot {
   float fill = 1.0F;
   std::uint32_t resolution = 128;
   glm::vec2 receiver_jitter{0.5F};  ///< where in a leaf the receiving point lies (PatchScene::spotAt)
-  std::uint32_t spot_row = 0;       ///< which rows of spots, where a leaf has spots: out of scene::kSpotRows
-  bool all_spots = false;           ///< the mean over all spots of a leaf that is not full
+  std::uint32_t spot_row =
+      0;  ///< which row of a leaf's spots is the first, where it has spots: out of scene::kSpotRows
+  std::uint32_t spot_rows = 1;  ///< how many of them count: a power of two, at most kSpotRows
   std::uint32_t half = 0;
   std::uint32_t first_point = 0, point_count = 0;  ///< into ShotBatch::points
   /// Into ShotBatch::receivers, for measure(): only links to these leaves are wanted, others may be left out. 0: all.

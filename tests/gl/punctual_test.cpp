@@ -5,8 +5,10 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
+#include <random>
 
 #include "server/gpu/gpu_transport.h"
+#include "server/scene/coverage.h"
 #include "server/solver/punctual_lights.h"
 #include "tests/gl/scene_builder.h"
 
@@ -250,6 +252,45 @@ TEST_F(Punctual, NothingLeaksIntoAClosedRoomAlongItsEdges) {
       EXPECT_EQ(irradiance(*scene, flux, surface, leaf % 8, leaf / 8), 0.0) << surface << ": " << leaf;
     }
   }
+}
+
+// A plate with a rim of facets narrower than pixels. Pixels blur the rim's shadow alike to both sides, but what falls
+// inside is dark as it is, and the shadow was too small.
+TEST_F(Punctual, TheShadowOfAPlateWithANarrowRimIsAsLargeAsBoth) {
+  constexpr std::uint32_t kTexels = 64, kViews = 16;
+  SceneBuilder builder;
+  const auto floor = addFloor(builder, kTexels);
+  builder.add({{-0.19F, -0.19F, 0.0F}, {0.38F, 0, 0}, {0, 0.38F, 0}, 1, 1});
+  for (const float at : {-0.2F, 0.19F}) {
+    builder.add({{at, -0.2F, 0.0F}, {0.01F, 0, 0}, {0, 0.4F, 0}, 1, 1});
+    builder.add({{-0.19F, at, 0.0F}, {0.38F, 0, 0}, {0, 0.01F, 0}, 1, 1});
+  }
+  solver::ShotBatch batch;
+  solver::ParallelShot shot;
+  shot.irradiance = {1.0 / kViews, 0.0, 0.0};
+  shot.emitted = shot.irradiance;
+  shot.view_count = kViews;
+  shot.resolution = 64;
+  shot.receivers.count = 8;
+  for (std::uint32_t p = 0; p < 8; ++p) {
+    const auto at = scene::latticePoint(p, 8);
+    shot.receivers.at[p] = glm::vec2(at);
+  }
+  batch.parallel = {shot};
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> unit(0.0F, 1.0F);
+  for (std::uint32_t v = 0; v < kViews; ++v) {
+    const float angle = 6.2831853F * unit(random);
+    batch.views.push_back({{0, 0, 1}, {std::cos(angle), std::sin(angle), 0}, {unit(random), unit(random)}});
+  }
+  const auto scene = builder.build();
+  const auto flux = run(scene, batch);
+  double dark = 0.0;
+  for (std::uint32_t y = 0; y < kTexels; ++y) {
+    for (std::uint32_t x = 0; x < kTexels; ++x)
+      dark += (1.0 - irradiance(*scene, flux, floor, x, y)) / (kTexels * kTexels);
+  }
+  EXPECT_NEAR(dark / 0.16, 1.0, 0.01);  // 512 receiving points along each edge
 }
 
 TEST_F(Punctual, TheInsideOfAThinPlateOfTwoSidedFacesStaysDark) {

@@ -2,8 +2,10 @@
 // the server. One for a page.
 
 import { EditSession } from './app_edit';
+import { GeometrySession } from './app_geometry';
 import { PeopleSession } from './app_people';
 import { ViewSession } from './app_view';
+import { DocumentFetch } from './document/document_fetch';
 import type { Gltf } from './document/gltf';
 import { Connection, type LinkState } from './protocol/connection';
 import {
@@ -29,7 +31,6 @@ import { SharePanel } from './ui/share_panel';
 import { SolvePanel, stateName } from './ui/solve_panel';
 import { store, stored } from './ui/stored';
 import { Share } from './app_share';
-import type { LightmapSet } from './view/lightmap_set';
 import { MOST_MIPS } from './view/lightmap_page';
 import { Viewer } from './view/viewer';
 
@@ -53,6 +54,11 @@ export class App {
   /** For tests and for the console: what happened when, milliseconds since the page began. */
   readonly marks: Record<string, number> = {};
   private readonly tiles: TileFeed;
+  private readonly geometry = new GeometrySession(this);
+  private readonly document = new DocumentFetch({
+    ask: (signal) => this.askDocument(signal),
+    failed: (error) => this.onNoDocument(error),
+  });
   private resume: Resume | undefined;
   private token = readToken();
   private slow = false;
@@ -205,6 +211,7 @@ export class App {
 
   private onLink(state: LinkState, detail: string): void {
     this.bookmark = undefined;
+    this.document.forget();
     this.edit?.history.forget(); // the first time there is no page yet
     if (state === 'open') {
       this.failure = undefined;
@@ -239,7 +246,8 @@ export class App {
     this.share.onServer(info);
     this.people.onReady();
     this.edit.history.askSoon();
-    await Promise.all([this.fetchStatus(), !hello.resumed && hello.revision > 0 && this.fetchDocument()]);
+    if (hello.revision > 0 && (!hello.resumed || this.document.isOwed)) this.document.want();
+    await this.fetchStatus();
     const { count } = await this.connection.call<{ count: number }>('viewers').catch(() => ({ count: 1 }));
     this.onViewers(count);
   }
@@ -259,10 +267,10 @@ export class App {
     const handlers: { [M in keyof Notifications]?: (note: Notifications[M]) => void } = {
       progress: (note) => this.onProgress(note),
       'scene.patched': (note) => {
-        this.edit.onPatched(note, () => void this.fetchDocument());
+        this.edit.onPatched(note, () => this.document.want(note.revision));
         this.edit.history.askSoon();
       },
-      'scene.loaded': () => void this.onLoaded(),
+      'scene.loaded': () => this.onLoaded(),
       lightmaps: (note) => void this.onLightmaps(note),
       bookmark: (note) => this.onBookmark(note),
       viewers: (note) => this.onViewers(note.count),
@@ -331,12 +339,13 @@ export class App {
     if (slow) this.frame.toasts.show('Slow network: light is updated less often');
   }
 
-  private async onLoaded(): Promise<void> {
+  private onLoaded(): void {
     this.resume = undefined;
     this.edit.select(undefined); // numbers of nodes mean others now
     this.view.sceneComes();
     this.edit.history.askSoon();
-    await Promise.all([this.fetchStatus(), this.fetchDocument()]);
+    this.document.want();
+    void this.fetchStatus();
   }
 
   private async fetchStatus(): Promise<void> {
@@ -344,17 +353,21 @@ export class App {
     if (status) this.onStatus(status);
   }
 
-  async fetchDocument(): Promise<void> {
-    try {
-      const reply = await this.connection.call<{ revision: number; gltf?: Gltf; url?: string }>('scene.get');
-      if (reply.gltf) return this.edit.document.reset(reply.gltf, reply.revision);
-      const file = await this.fetch(reply.url!);
-      const revision = Number(file.headers.get('X-Revision') ?? reply.revision); // it may be newer than the answer
-      this.edit.document.reset((await file.json()) as Gltf, revision);
-    } catch (error) {
-      if (error instanceof RpcError && error.code === NOT_FOUND) return; // there is none: the server's state says so
-      if (!(error instanceof ConnectionLost)) this.frame.toasts.show(`The scene: ${(error as Error).message}`, 'bad');
+  private async askDocument(signal: AbortSignal): Promise<{ revision: number; take: () => void }> {
+    const reply = await this.connection.call<{ revision: number; gltf?: Gltf; url?: string }>('scene.get');
+    let { gltf, revision } = reply;
+    if (!gltf) {
+      const file = await this.fetch(reply.url!, { signal });
+      revision = Number(file.headers.get('X-Revision') ?? revision); // it may be newer than the answer
+      gltf = (await file.json()) as Gltf;
     }
+    const whole = gltf;
+    return { revision, take: () => this.edit.document.reset(whole, revision) };
+  }
+
+  private onNoDocument(error: Error): void {
+    if (error instanceof RpcError && error.code === NOT_FOUND) return; // there is none: the server's state says so
+    if (!(error instanceof ConnectionLost)) this.frame.toasts.show(`The scene: ${error.message}`, 'bad');
   }
 
   private async onLightmaps(note: LightmapsNote): Promise<void> {
@@ -362,24 +375,16 @@ export class App {
     if (!set) return;
     this.settleLight();
     if (this.view.renewData() || set.baseMip > 0) await this.resubscribe();
-    await this.loadGeometry(note, set);
-  }
-
-  private async loadGeometry(note: LightmapsNote, set: LightmapSet): Promise<void> {
-    try {
-      const glb = await (await this.fetch(note.uvs)).arrayBuffer();
-      if (this.viewer.set === set) await this.viewer.load(glb, set);
-    } catch (error) {
-      if (this.viewer.set === set) this.frame.toasts.show(`The geometry: ${(error as Error).message}`, 'bad');
-    }
+    await this.geometry.load(note, set);
   }
 
   private onBookmark(bookmark: Bookmark): void {
     const { info } = this.connection;
+    const set = this.viewer.setOf(bookmark.quantity);
     // Tiles on their way through the decoder belong to this bookmark, too.
     this.tiles.afterAll(() => {
-      const set = this.viewer.setOf(bookmark.quantity); // another is looked at by now: nothing was said of that one
-      if (!set || info !== this.connection.info) return;
+      // Another is looked at by now, or pages have another layout: nothing was said of that one.
+      if (!set || set !== this.viewer.setOf(bookmark.quantity) || info !== this.connection.info) return;
       set.complete = true;
       this.bookmark = bookmark;
       const { quantity, revision, tileVersion } = bookmark;

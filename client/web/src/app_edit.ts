@@ -3,6 +3,7 @@
 import { Vector3, type Object3D } from 'three';
 import type { App } from './app';
 import { EditHistory } from './app_history';
+import type { Placed } from './app_view';
 import * as edits from './document/edits';
 import { hangingNodes, lightOf, nodeName, type Vec3, type Vec4 } from './document/gltf';
 import { SceneDocument, type SendPatch } from './document/scene_document';
@@ -15,6 +16,8 @@ export class EditSession {
   readonly document: SceneDocument;
   readonly history: EditHistory;
   selection: Selection | undefined;
+  /** A file that is on its way, and where one looked from before it. */
+  private upload: { abort: AbortController; placed: Placed } | undefined;
 
   constructor(
     private readonly app: App,
@@ -175,13 +178,16 @@ export class EditSession {
     const limit = this.app.connection.info?.limits['uploadBytes'] ?? Infinity;
     if (file.size > limit) return toasts.show(`${file.name} is larger than the server takes`, 'bad');
     toasts.show(`Loading ${file.name}…`);
-    const placed = this.app.view.forgetCamera();
+    this.upload?.abort.abort(); // the last one is meant, however long an earlier one takes
+    const placed = this.upload?.placed ?? this.app.view.forgetCamera();
+    const upload = (this.upload = { abort: new AbortController(), placed });
     try {
       const path = `/scene?name=${encodeURIComponent(file.name)}`;
       const response = await this.app.fetch(path, {
         method: 'PUT',
         body: file,
         headers: { 'Content-Type': 'application/octet-stream' },
+        signal: upload.abort.signal,
       });
       const { warnings } = (await response.json()) as { warnings: string[] };
       const count = warnings.length;
@@ -190,8 +196,11 @@ export class EditSession {
         'good',
       );
     } catch (error) {
+      if (upload !== this.upload) return;
       if (this.app.viewer.shown) this.app.view.keepCamera(placed);
       toasts.show(`${file.name}: ${(error as Error).message}`, 'bad');
+    } finally {
+      if (upload === this.upload) this.upload = undefined;
     }
   }
 

@@ -13,6 +13,12 @@ import { TONE_CURVES, VIEW_MODES, viewMode, type ViewMode } from './view/view_mo
 /** A click that moves less is no drag, pixels. */
 const CLICK_SLACK = 5;
 
+/** Whether one has found a place in the scene to look from, and the number of its camera. */
+export interface Placed {
+  placed: boolean;
+  camera: number;
+}
+
 export class ViewSession {
   readonly panel: ViewPanel;
   mode: ViewMode = viewMode('lit');
@@ -88,7 +94,7 @@ export class ViewSession {
   }
 
   /** Another scene wants another place to look from. Returns what keepCamera() takes it back with. */
-  forgetCamera(): { placed: boolean; camera: number } {
+  forgetCamera(): Placed {
     const before = { placed: this.placed, camera: this.camera };
     this.placed = false;
     this.camera = -1;
@@ -96,7 +102,7 @@ export class ViewSession {
   }
 
   /** The other scene did not come. */
-  keepCamera(before: { placed: boolean; camera: number }): void {
+  keepCamera(before: Placed): void {
     this.placed = before.placed;
     this.camera = before.camera;
   }

@@ -195,11 +195,16 @@ export class LightmapPage {
     this.resident.needsUpdate = true;
   }
 
+  /** The context is lost: three.js is to forget the textures that it knew. */
+  release(): void {
+    this.texture.dispose();
+    this.resident.dispose();
+  }
+
   dispose(): void {
     this.gl.deleteTexture(this.drawn);
     if (this.growth) this.gl.deleteTexture(this.growth.texture);
-    this.texture.dispose();
-    this.resident.dispose();
+    this.release();
   }
 
   private get gl(): WebGL2RenderingContext {

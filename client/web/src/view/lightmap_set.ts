@@ -122,6 +122,12 @@ export class LightmapSet {
     return [Math.max(at(0.005), high / (this.quantity === 'irradiance' ? 1e4 : 1e3)), high];
   }
 
+  /** The context is lost. */
+  release(): void {
+    for (const page of this.pages) page.release();
+  }
+
+  /** A lost context is back. */
   restore(): void {
     for (const page of this.pages) page.restore();
   }

@@ -17,6 +17,7 @@ import type { People } from './people';
 import { PagesView } from './pages_view';
 import { pick, readingAt, type Reading } from './picker';
 import { exposureByRays } from './ray_exposure';
+import { release } from './release';
 import type { ViewMode } from './view_modes';
 
 /** For taking up tiles, of the 16 that a frame has; of longer ones the same share, but no task of 50. */
@@ -165,14 +166,20 @@ export class Viewer {
   /** Geometry of a layout. A set that was overtaken is dropped. */
   async load(glb: ArrayBuffer, set: LightmapSet): Promise<void> {
     const scene = await LitScene.load(glb, set, this.uniforms, this.anisotropy);
-    if (this.staged?.set !== set) return scene.dispose();
-    scene.applyDocument(this.document);
-    await this.compile(scene);
-    if (this.staged?.set !== set) return scene.dispose();
-    scene.applyDocument(this.document); // it may have been edited meanwhile
-    this.staged.scene = scene;
-    this.staged.since = performance.now();
-    this.invalidate();
+    let taken = false;
+    try {
+      if (this.staged?.set !== set) return;
+      scene.applyDocument(this.document);
+      await this.compile(scene);
+      if (this.staged?.set !== set) return;
+      scene.applyDocument(this.document); // it may have been edited meanwhile
+      this.staged.scene = scene;
+      this.staged.since = performance.now();
+      taken = true;
+      this.invalidate();
+    } finally {
+      if (!taken) scene.dispose();
+    }
   }
 
   /** Has the driver make the scene's programs while the page goes on, where it can: drawing waits for them. */
@@ -193,6 +200,7 @@ export class Viewer {
   clear(): void {
     this.dropStaged();
     this.replaceShown(undefined);
+    this.setDataQuantity(undefined);
   }
 
   applyDocument(document: Gltf, pointers: string[]): void {
@@ -402,7 +410,7 @@ export class Viewer {
       this.world.add(scene.root);
       this.rig.setBounds(scene.bounds);
     }
-    if (this.mode?.flat) this.pagesView.show(scene?.set);
+    this.pagesView.show(this.mode?.flat ? scene?.set : undefined); // it keeps no pages that are gone
     this.invalidate();
   }
 
@@ -445,8 +453,12 @@ export class Viewer {
     this.lost = lost;
     this.pace.forget();
     this.fences.forget();
-    if (!lost) {
-      for (const set of [this.shown?.set, this.staged?.set, this.dataSet]) set?.restore();
+    const sets = [this.shown?.set, this.staged?.set, this.dataSet];
+    if (lost) {
+      for (const root of [this.world, this.pagesView.scene, this.staged?.scene?.root]) if (root) release(root);
+      for (const set of sets) set?.release();
+    } else {
+      for (const set of sets) set?.restore();
       this.invalidate();
     }
     this.events.contextLost(lost);

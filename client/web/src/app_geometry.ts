@@ -1,0 +1,42 @@
+// Fetches the geometry of layouts. Part of the App.
+
+import type { App } from './app';
+import { pauseMs } from './protocol/connection';
+import type { LightmapsNote } from './protocol/messages';
+import type { LightmapSet } from './view/lightmap_set';
+
+export class GeometrySession {
+  private running: AbortController | undefined;
+
+  constructor(private readonly app: App) {}
+
+  /**
+   * Of a layout that has just come; what is on its way for another is given up. The light of a layout may be here before
+   * its geometry, and is not sent twice: so a line that breaks in between is tried again, for as long as it is the layout.
+   */
+  async load(note: LightmapsNote, set: LightmapSet): Promise<void> {
+    this.running?.abort();
+    const { signal } = (this.running = new AbortController());
+    const { viewer, frame } = this.app;
+    try {
+      const glb = await this.fetch(note.uvs, signal);
+      if (glb && viewer.set === set) await viewer.load(glb, set);
+    } catch (error) {
+      if (viewer.set === set && !signal.aborted) frame.toasts.show(`The geometry: ${(error as Error).message}`, 'bad');
+    }
+  }
+
+  /** Undefined: another layout has come. Rejects with what the server says against it. */
+  private async fetch(path: string, signal: AbortSignal): Promise<ArrayBuffer | undefined> {
+    for (let attempt = 0; !signal.aborted; ++attempt) {
+      try {
+        return await (await this.app.fetch(path, { signal })).arrayBuffer();
+      } catch (error) {
+        if (signal.aborted) return undefined;
+        if (!(error instanceof TypeError)) throw error; // fetch() has no other sign of a line that broke
+        await new Promise((resolve) => setTimeout(resolve, pauseMs(attempt, Math.random())));
+      }
+    }
+    return undefined;
+  }
+}
