@@ -18,6 +18,10 @@ set -uo pipefail
 
 readonly RESUMABLE=75 # EX_TEMPFAIL of sysexits.h, as `radiosity solve` uses it
 
+# The shell gets the signal and passes it on, also one that comes before there is a solve.
+stopped='' solve=''
+trap 'stopped=yes; [ -z "$solve" ] || kill -TERM "$solve" 2>/dev/null' TERM
+
 if [ $# -lt 2 ] || [ -z "${SLURM_ARRAY_TASK_ID:-}" ]; then
   echo "usage: sbatch --array=1-\$(wc -l < SCENES) slurm_array.sh SCENES OUT [OPTION...]" >&2
   exit 2
@@ -34,17 +38,15 @@ name=$(basename "$scene")
 name=${name%.*}
 mkdir -p "$out/state" || exit 1
 
-# The shell gets the signal and passes it on; `wait` returns at once then, so it is asked until the solve has ended.
 "${RADIOSITY:-radiosity}" solve "$scene" -o "$out/$name-lit.glb" --report "$out/$name.json" \
   ${SLURM_CPUS_PER_TASK:+--workers "$SLURM_CPUS_PER_TASK"} --state "$out/state/$name" "$@" &
 solve=$!
-trap 'kill -TERM "$solve" 2>/dev/null' TERM
-code=0
-while true; do
-  wait "$solve"
-  code=$?
-  kill -0 "$solve" 2>/dev/null || break
-done
+[ -z "$stopped" ] || kill -TERM "$solve"
+while kill -0 "$solve" 2>/dev/null; do wait "$solve"; done # the signal ends a wait, too
+wait "$solve"
+code=$?
+# A solve that was not listening yet dies of the signal: another try is right.
+[ "$stopped$code" != yes143 ] || code=$RESUMABLE
 
 if [ "$code" = "$RESUMABLE" ]; then
   echo "task $SLURM_ARRAY_TASK_ID: state saved, back into the queue"

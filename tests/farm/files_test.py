@@ -127,6 +127,11 @@ class OpenJobDescription(unittest.TestCase):
         self.assertLessEqual({a for a in arguments if a.startswith("-")}, options_of("RADIOSITY", "solve"))
 
 
+#: What a `radiosity` of the tests does: waits for SIGTERM, and ends with the number that is put in; or waits and dies of it.
+LISTEN = "trap 'exit %d' TERM; touch started; while [ -e \"$0\" ]; do sleep 0.05; done"
+UNAWARE = "touch started; while [ -e \"$0\" ]; do sleep 0.05; done"
+
+
 class KubernetesJob(unittest.TestCase):
     def setUp(self):
         self.job = yaml.safe_load((DOCKER / "farm/kubernetes_job.yaml").read_text(encoding="utf-8"))
@@ -157,29 +162,43 @@ class KubernetesJob(unittest.TestCase):
         volumes = {volume["name"] for volume in self.pod["volumes"]}
         self.assertEqual({mount["name"] for mount in self.container["volumeMounts"]}, volumes)
 
-    def run_script(self, exit_code, terminate=False):
-        """The container's command with a `radiosity` that ends so, or waits for SIGTERM first; its status."""
+    def run_script(self, exit_code, wait="", terminate=False, before=""):
+        """The container's command with a `radiosity` that does `wait` and ends so, SIGTERM being sent to the command once there
+        is a file `started`; `before`: what the command's shell does just before it. Status, and arguments of `radiosity`."""
         with tempfile.TemporaryDirectory() as folder:
             fake = pathlib.Path(folder) / "radiosity"
-            wait = "trap 'exit %d' TERM; touch started; while :; do sleep 0.05; done" % exit_code if terminate else ""
             fake.write_text(f"#!/bin/sh\necho \"$@\" > arguments\n{wait}\nexit {exit_code}\n")
             fake.chmod(0o755)
-            process = subprocess.Popen([*self.container["command"], *self.container["args"]], cwd=folder,
+            script = [arg.replace("radiosity solve", f"{before}\nradiosity solve", 1) for arg in self.container["args"]]
+            process = subprocess.Popen([*self.container["command"], *script], cwd=folder, stderr=subprocess.DEVNULL,
                                        env={"PATH": f"{folder}:{os.environ['PATH']}", "JOB_COMPLETION_INDEX": "4"})
-            if terminate:
-                while not (pathlib.Path(folder) / "started").exists():
-                    self.assertIsNone(process.poll())
-                process.terminate()
-            code = process.wait(60)
-            return code, (pathlib.Path(folder) / "arguments").read_text()
+            try:
+                if terminate:
+                    while not (pathlib.Path(folder) / "started").exists():
+                        self.assertIsNone(process.poll())
+                    process.terminate()
+                code = process.wait(60)
+            finally:
+                process.kill()
+                process.wait()
+            arguments = pathlib.Path(folder) / "arguments"
+            return code, arguments.read_text() if arguments.exists() else ""
 
     def test_its_command_passes_codes_and_signals_on(self):
         for given, wanted in ((0, 0), (1, 1), (2, 2), (3, 0), (75, 75)):
             self.assertEqual(self.run_script(given)[0], wanted)
-        code, arguments = self.run_script(75, terminate=True)
+        code, arguments = self.run_script(75, LISTEN % 75, terminate=True)
         self.assertEqual(code, 75)
         self.assertIn("/data/scene-4.glb", arguments)
         self.assertIn("--state /data/state/scene-4", arguments)
+
+    def test_stopped_before_the_solve_listens_it_is_tried_again(self):
+        self.assertEqual(self.run_script(0, UNAWARE, terminate=True)[0], 75)
+        # Not even started, it is, or is not, told: more than once, for it is a matter of luck where it could be either.
+        for _ in range(10):
+            self.assertEqual(self.run_script(0, LISTEN % 75, before="kill -TERM $$")[0], 75)
+        # Killed by somebody else it is no other than before: Kubernetes counts it.
+        self.assertEqual(self.run_script(0, "kill -TERM $$")[0], 143)
 
     @keeps_state
     def test_its_options_are_those_of_the_client(self):

@@ -107,7 +107,8 @@ class Script(unittest.TestCase):
 
     def run_task(self, *arguments, **environment):
         clean = {name: value for name, value in os.environ.items() if not name.startswith("SLURM_")}
-        return subprocess.run([SCRIPT, *arguments], capture_output=True, text=True, check=False, env={**clean, **environment})
+        return subprocess.run([SCRIPT, *arguments], capture_output=True, text=True, check=False,
+                              env={**clean, **environment}, timeout=60)
 
     def test_usage_is_said(self):
         done = self.run_task()
@@ -123,6 +124,23 @@ class Script(unittest.TestCase):
                 self.assertEqual(done.returncode, 0, done.stderr)
                 self.assertIn(f"--state {folder}/state/a --error 0.05", done.stdout)
                 self.assertEqual(workers in done.stdout if workers else "--workers" not in done.stdout, True, done.stdout)
+
+    def test_stopped_before_the_solve_listens_it_goes_back_into_the_queue(self):
+        listens = "#!/bin/sh\ntrap 'exit 75' TERM\n"
+        stops, waits = "kill -TERM $PPID\n", "while [ -e \"$0\" ]; do sleep 0.05; done\n"
+        # Before there is a solve; when it is there and takes no notice yet; and when it listens.
+        for mkdir, solve in ((stops, listens + waits), ("", "#!/bin/sh\n" + stops + waits), ("", listens + stops + waits)):
+            with tempfile.TemporaryDirectory(prefix="radiosity-slurm-") as folder:
+                for name, text in (("mkdir", f"#!/bin/sh\n{mkdir}exec /bin/mkdir \"$@\"\n"), ("radiosity", solve),
+                                   ("scontrol", "#!/bin/sh\necho \"$@\" >> \"$CALLS\"\nexit 1\n")):
+                    program = pathlib.Path(folder) / name
+                    program.write_text(text)
+                    program.chmod(0o755)
+                (pathlib.Path(folder) / "scenes.txt").write_text("a.glb\n")
+                done = self.run_task(f"{folder}/scenes.txt", folder, RADIOSITY=f"{folder}/radiosity", SLURM_ARRAY_TASK_ID="1",
+                                     SLURM_ARRAY_JOB_ID="7", CALLS=f"{folder}/calls", PATH=f"{folder}:{os.environ['PATH']}")
+                self.assertEqual(done.returncode, 75, done)
+                self.assertEqual((pathlib.Path(folder) / "calls").read_text(), "requeue 7_1\n")
 
 
 if __name__ == "__main__":
