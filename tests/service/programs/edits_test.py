@@ -9,6 +9,7 @@ import urllib.request
 
 import plates
 from harness import ServiceCase
+from patience import PATIENCE
 from wire import RpcError, Session
 
 SETTINGS = {"targetError": 0.05, "texels": 2000, "seed": 1}
@@ -33,7 +34,7 @@ class EditsCase(ServiceCase):
         self.url = self.running.url
 
     def run_async(self, coroutine):
-        return asyncio.run(asyncio.wait_for(coroutine, 600))
+        return asyncio.run(asyncio.wait_for(coroutine, 600 * PATIENCE))
 
     def put(self, path, body):
         request = urllib.request.Request(self.url + path, data=body, method="PUT",

@@ -7,6 +7,7 @@ import sys
 import unittest
 
 from harness import MARK, ServiceCase
+from patience import PATIENCE
 from pictures import brightness
 
 EXAMPLES = pathlib.Path(__file__).resolve().parents[3] / "client" / "examples"
@@ -30,7 +31,7 @@ class ExamplesTest(ServiceCase):
         program = [sys.executable] if name.endswith(".py") else [shutil.which("node")]
         if program[0] is None:
             self.skipTest("no node here (package nodejs)")
-        done = subprocess.run([*program, EXAMPLES / name, self.address, *arguments], cwd=self.folder, timeout=400,
+        done = subprocess.run([*program, EXAMPLES / name, self.address, *arguments], cwd=self.folder, timeout=400 * PATIENCE,
                               env={**os.environ, MARK: self.mark, "NODE_PATH": NODE_MODULES}, capture_output=True,
                               text=True, check=False)
         if "Cannot find module 'ws'" in done.stderr:

@@ -12,6 +12,8 @@ import unittest
 import unittest.mock
 import uuid
 
+from patience import PATIENCE
+
 MARK = "RADIOSITY_TEST_MARK"
 
 
@@ -34,7 +36,7 @@ class Server:
             self.process = subprocess.Popen(
                 [program("RADIOSITYD"), "--listen", f"127.0.0.1:{port}", *map(str, arguments)],
                 stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=log, env={**os.environ, **(env or {}), MARK: mark})
-        self.url = self._listening_url(180)
+        self.url = self._listening_url(180 * PATIENCE)
 
     def _listening_url(self, seconds):
         text, deadline = b"", time.monotonic() + seconds
@@ -128,7 +130,7 @@ class ServiceCase(unittest.TestCase):
         self.addCleanup(server.kill)
         return server
 
-    def assertNothingLeft(self, seconds=60.0):
+    def assertNothingLeft(self, seconds=60.0 * PATIENCE):
         deadline = time.monotonic() + seconds
         while marked_processes(self.mark) and time.monotonic() < deadline:
             time.sleep(0.05)
@@ -150,7 +152,7 @@ class ServiceCase(unittest.TestCase):
         self.addCleanup(end)
         return process
 
-    def client(self, *arguments, expect=0, env=None, stdin=None, seconds=300):
+    def client(self, *arguments, expect=0, env=None, stdin=None, seconds=300 * PATIENCE):
         """Runs the client to its end; returns (stdout, stderr)."""
         done = subprocess.run([program("RADIOSITY"), *map(str, arguments)], capture_output=True, text=True,
                               input=stdin or "", env={**os.environ, **(env or {}), MARK: self.mark}, cwd=self.folder,
@@ -169,7 +171,7 @@ class ServiceCase(unittest.TestCase):
         return sorted(p.name for p in self.folder.iterdir() if p.suffix != ".log")
 
 
-def waitForLine(stream, wanted, seconds=120):
+def waitForLine(stream, wanted, seconds=120 * PATIENCE):
     """Reads lines of a child's pipe until one contains `wanted`; returns everything read."""
     text, deadline = "", time.monotonic() + seconds
     while time.monotonic() < deadline:

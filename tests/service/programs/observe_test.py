@@ -16,10 +16,11 @@ import urllib.request
 import metrics_text
 import plates
 from harness import ServiceCase
+from patience import PATIENCE
 from wire import Session
 
 DASHBOARD = pathlib.Path(__file__).resolve().parents[3] / "docker/grafana/radiosityd.json"
-SECONDS = 120  # until a test fails that waits for what does not come
+SECONDS = 120 * PATIENCE  # until a test fails that waits for what does not come
 
 
 class Observe(ServiceCase):

@@ -10,13 +10,14 @@ import urllib.error
 import urllib.request
 
 from harness import ServiceCase, program
+from patience import PATIENCE
 from wire import Session
 
 # Long enough that nobody is too late to disturb it: seconds where nothing else runs.
 SETTINGS = ("--error", "0.005", "--texels", "6000", "--workers", "2")
 # On a machine that others use too. A renderer that stops while it draws is given up after half a minute, or a whole one:
 # it is given as long again if it had used the processor.
-SECONDS = 400
+SECONDS = 400 * PATIENCE
 
 
 class Renderers(ServiceCase):
@@ -54,7 +55,7 @@ class Renderers(ServiceCase):
         return sorted(found)
 
     def light(self, server):
-        with urllib.request.urlopen(server.url + "/lightmaps/0.exr", timeout=60) as reply:
+        with urllib.request.urlopen(server.url + "/lightmaps/0.exr", timeout=60 * PATIENCE) as reply:
             return reply.read()
 
     async def solving(self, session):
@@ -100,14 +101,14 @@ class Renderers(ServiceCase):
 
     def readiness(self, server):
         try:
-            with urllib.request.urlopen(server.url + "/readyz", timeout=60) as reply:
+            with urllib.request.urlopen(server.url + "/readyz", timeout=60 * PATIENCE) as reply:
                 return reply.read().decode()
         except urllib.error.HTTPError as refused:
             with refused:
                 return refused.read().decode()
 
     def metric(self, server, name):
-        with urllib.request.urlopen(server.url + "/metrics", timeout=60) as reply:
+        with urllib.request.urlopen(server.url + "/metrics", timeout=60 * PATIENCE) as reply:
             lines = reply.read().decode().splitlines()
         return next(float(line.split()[1]) for line in lines if line.startswith(f"radiosityd_{name} "))
 
@@ -191,7 +192,7 @@ class Renderers(ServiceCase):
 
     def test_a_picture_whose_graphics_context_is_lost_is_drawn_on_a_new_one(self):
         def picture():
-            with urllib.request.urlopen(server.url + "/snapshot.png?width=160&height=120", timeout=60) as reply:
+            with urllib.request.urlopen(server.url + "/snapshot.png?width=160&height=120", timeout=60 * PATIENCE) as reply:
                 return reply.read()
 
         server = self.server(self.room, "--error", "0.5", "--texels", "500", "--workers", "1", env=self.faulty())

@@ -10,6 +10,7 @@ import urllib.request
 
 import plates
 from harness import MARK, ServiceCase, marked_processes, program
+from patience import PATIENCE
 from wire import RpcError, Session
 
 TARGET = 0.05
@@ -31,7 +32,7 @@ class ServerTest(ServiceCase):
         self.url = self.running.url
 
     def run_async(self, coroutine):
-        return asyncio.run(asyncio.wait_for(coroutine, 600))
+        return asyncio.run(asyncio.wait_for(coroutine, 600 * PATIENCE))
 
     def get(self, path):
         with urllib.request.urlopen(self.url + path, timeout=60) as answer:

@@ -11,6 +11,7 @@ import websockets
 
 import plates
 from harness import ServiceCase, marked_processes, program
+from patience import PATIENCE
 from wire import Session
 
 ENDLESS = ("--error", 1e-6, "--texels", 20000, "--workers", 2)
@@ -43,7 +44,7 @@ class ShutdownTest(ServiceCase):
         plates.write_glb(self.scene, plates.lit_document())
 
     def run_async(self, coroutine):
-        return asyncio.run(asyncio.wait_for(coroutine, 400))
+        return asyncio.run(asyncio.wait_for(coroutine, 400 * PATIENCE))
 
     async def state_reached(self, session, wanted):
         while (await session.call("status"))["state"] != wanted:

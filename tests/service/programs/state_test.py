@@ -14,6 +14,7 @@ import urllib.request
 import plates
 from edit_load import Ledger, load_for, scene_with_counters
 from harness import MARK, ServiceCase, marked_processes, program
+from patience import PATIENCE
 from wire import RpcError, Session
 
 KILLS = 20
@@ -33,7 +34,7 @@ class StateCase(ServiceCase):
         self.scene = self.folder / "plates.glb"
         plates.write_glb(self.scene, scene_with_counters())
 
-    def run_async(self, coroutine, seconds=300):
+    def run_async(self, coroutine, seconds=300 * PATIENCE):
         return asyncio.run(asyncio.wait_for(coroutine, seconds))
 
     def keeper(self, *arguments, **options):
@@ -42,7 +43,7 @@ class StateCase(ServiceCase):
     def refused(self, *arguments, expect):
         """A server that must not start; returns its one line."""
         done = subprocess.run([program("RADIOSITYD"), "--listen", "127.0.0.1:0", *map(str, arguments)],
-                              capture_output=True, text=True, timeout=60, check=False,
+                              capture_output=True, text=True, timeout=60 * PATIENCE, check=False,
                               env={**os.environ, MARK: self.mark})
         self.assertEqual(done.returncode, expect, done.stderr)
         return done.stderr.strip().splitlines()[-1]
@@ -50,7 +51,7 @@ class StateCase(ServiceCase):
     def put(self, url, path, body):
         request = urllib.request.Request(url + path, data=body, method="PUT",
                                          headers={"Content-Type": "application/octet-stream"})
-        with urllib.request.urlopen(request, timeout=60) as answer:
+        with urllib.request.urlopen(request, timeout=60 * PATIENCE) as answer:
             return json.load(answer)
 
 

@@ -6,6 +6,8 @@ import zlib
 
 import websockets
 
+from patience import PATIENCE
+
 HEADER = struct.Struct("<4sBBBBIHHIIHHiQQIfII")
 RGBA16F, RGBA32F, R32UI = 0, 2, 3
 
@@ -76,7 +78,7 @@ class Session:
     async def close(self):
         await self.socket.close()
 
-    async def receive(self, seconds=120):
+    async def receive(self, seconds=120 * PATIENCE):
         """One message, put where it belongs; responses and errors are returned."""
         frame = await asyncio.wait_for(self.socket.recv(), seconds)
         if isinstance(frame, bytes):
@@ -94,7 +96,7 @@ class Session:
         request = self.next_id
         await self.socket.send(json.dumps({"jsonrpc": "2.0", "id": request, "method": method, "params": params}))
         while True:
-            answer = await self.receive(120)
+            answer = await self.receive()
             if answer is None:
                 continue
             assert answer.get("id") == request, answer
@@ -110,7 +112,7 @@ class Session:
             if answer is not None:
                 return answer
 
-    async def note(self, method, seconds=120):
+    async def note(self, method, seconds=120 * PATIENCE):
         """The next notification of that kind, past or future; so long at most without any message."""
         while True:
             for i, note in enumerate(self.notes):
