@@ -25,6 +25,9 @@ std::uint32_t pointsOfSample(std::uint32_t index) {
   return index == 0 ? 1 : index < kDoublings ? 1U << (index - 1) : kMostNodePoints;
 }
 
+/// Too thin to have an outline: it is scattered.
+bool isSliver(const TexelPolygon& polygon) { return polygon.count < 3; }
+
 std::uint32_t firstPointOf(std::uint32_t index) {
   constexpr std::uint32_t kDoublings = std::bit_width(kMostNodePoints);
   if (index <= kDoublings) return index == 0 ? 0 : 1U << (index - 1);
@@ -84,7 +87,9 @@ std::uint64_t NodeShots::key(const NodePlace& node) const {
 }
 
 std::uint32_t NodeShots::pointsOf(const NodePlace& node, std::uint32_t index) const {
-  return gathers(node) ? pointsOfSample(index) : 1;
+  if (!gathers(node)) return 1;
+  const auto polygon = outlines_.node(sides_[node.side].surface, node.level, node.x, node.y);
+  return isSliver(polygon) ? 1 : pointsOfSample(index);
 }
 
 void NodeShots::add(const NodePlace& node, std::size_t half, std::uint32_t index, std::uint32_t resolution,
@@ -108,7 +113,7 @@ void NodeShots::addGather(const NodePlace& node, std::size_t half, std::uint32_t
   const auto& surface = patches_.surfaces[side.surface];
   const auto& frame = patches_.triangles[flatTriangle(node)];
   const auto polygon = outlines_.node(side.surface, node.level, node.x, node.y);
-  if (polygon.count < 3) return addScatter(node, half, index, resolution, batch);  // a sliver
+  if (isSliver(polygon)) return addScatter(node, half, index, resolution, batch);
   const bool whole = isWhole(node);
   const auto at = [&](const glm::dvec2& texel) {
     return frame.origin + static_cast<float>(texel.x) * frame.du + static_cast<float>(texel.y) * frame.dv;
