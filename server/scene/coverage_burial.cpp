@@ -19,8 +19,9 @@ constexpr std::uint32_t kFewSamples = 16, kManySamples = 64;
 constexpr std::uint64_t kMaxSamples = 2'000'000;  ///< a scene; beyond it leaves get fewer
 /// Leaves: what is found of so many is held at once; fewer are not worth a thread.
 constexpr std::size_t kMeasuredAtOnce = 65536, kFewestAShare = 64;
-/// Of more leaves it is not kept how they were found, and from more places than these rays were cast for hardly any.
-constexpr std::size_t kMostRecorded = 50'000, kMostFans = 64;
+/// Of more leaves it is not kept how they were found, nor where that takes more, and from more places than these rays
+/// were cast for hardly any.
+constexpr std::size_t kMostRecorded = 50'000, kMostRecordedBytes = std::size_t{16} << 20, kMostFans = 64;
 
 /// Boxes around the nodes of one surface, for the question where other solids come near.
 class NodeBoxes {
@@ -200,8 +201,7 @@ class Burial {
       for (auto i = first; i < end; ++i) {
         auto& found = measured[i - first];
         const auto& contact = contacts[i];
-        if (found.fans && record_.leaves.size() <= kMostRecorded)
-          record_.leaves.push_back({leafOf(contact), contact.side, pass, std::move(*found.fans), found.buried});
+        if (found.fans) record(contact, pass, found);
         if (!found.buried) continue;
         patches_.node_area[nodeOf(contact)] = found.buried->visible_area;
         changes_.push_back(std::move(*found.buried));
@@ -229,8 +229,20 @@ class Burial {
     return found;
   }
 
+  void record(const Contact& contact, BurialRecord::Pass pass, Measured& found) {
+    if (is_too_much_) return;
+    recorded_bytes_ += sizeof(BurialRecord::Leaf) + found.fans->size() * sizeof(RayFan) +
+                       (found.buried ? found.buried->places.size() * sizeof(LeafSpot) : 0);
+    is_too_much_ = recorded_bytes_ > kMostRecordedBytes || record_.leaves.size() >= kMostRecorded;
+    if (is_too_much_) {
+      record_.leaves = {};
+    } else {
+      record_.leaves.push_back({leafOf(contact), contact.side, pass, std::move(*found.fans), found.buried});
+    }
+  }
+
   std::shared_ptr<const BurialRecord> keptRecord() {
-    if (record_.leaves.size() > kMostRecorded) return nullptr;
+    if (is_too_much_) return nullptr;
     record_.few = few_;
     record_.sort();
     return std::make_shared<const BurialRecord>(std::move(record_));
@@ -381,6 +393,8 @@ class Burial {
   const Coincidence& coincidence_;
   const FormerBurial* former_;
   BurialRecord record_;
+  std::size_t recorded_bytes_ = 0;
+  bool is_too_much_ = false;
   std::vector<std::size_t> first_piece_;
   std::vector<Contact> contacts_, touched_;
   std::vector<BuriedPart> changes_;
