@@ -54,7 +54,7 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
   takeSources(sources);
   inheritNodes(former, numbers);
   inheritEntries(former, numbers);
-  setPostponed(former.phase_ == Phase::kDone ? former.error_.total : settings_.target_error);
+  setPostponed(former.phase_ == Phase::kDone ? former.errorBesideMissing() : settings_.target_error);
   planRepairs(former.isRepairing() ? 0.0 : former.fieldNorm(), ChangeReach(*former.patches_, *patches_, map));
   if (former.variation_) inheritVariation(former, numbers);
   for (auto& half : half_) half.assign(system_.emission().size(), glm::vec3(0.0F));

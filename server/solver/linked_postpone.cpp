@@ -38,9 +38,9 @@ double LinkedSolver::reachOf(const Repair& repair, const ChangeReach& change) co
     const auto& point = batch.points[batch.gather[i].first_point];
     const auto turn = repair.shooter + kApart * static_cast<std::uint32_t>(repair.half) + i;
     const double reach = change.of(point.origin, point.normal, shooter.area, turn);
-    squares += reach * reach;
+    squares += batch.gather[i].point_count * reach * reach;
   }
-  return std::sqrt(squares / static_cast<double>(batch.gather.size()));
+  return std::sqrt(squares / static_cast<double>(batch.points.size()));
 }
 
 /// Area-weighted norm of the error of irradiance, mean of the halves, that a column's old links may cause.
@@ -66,6 +66,12 @@ double LinkedSolver::fieldNorm() const {
     }
   }
   return std::sqrt(square);
+}
+
+/// The stated error without what waits, of which an edit decides anew.
+double LinkedSolver::errorBesideMissing() const {
+  const double norm = fieldNorm(), waits = norm > 0.0 ? missing() / norm : 0.0;
+  return std::sqrt(std::max(0.0, error_.total * error_.total - waits * waits));
 }
 
 /// `error`: all but what waits, as far as is known.

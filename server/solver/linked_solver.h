@@ -128,6 +128,7 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] double reachOf(const Repair& repair, const ChangeReach& change) const;
   [[nodiscard]] double missing(const Repair& repair) const;
   [[nodiscard]] double missing() const;
+  [[nodiscard]] double errorBesideMissing() const;
   [[nodiscard]] double fieldNorm() const;
   void planDue(double norm);
   void setPostponed(double error);
