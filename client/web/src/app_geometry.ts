@@ -19,16 +19,16 @@ export class GeometrySession {
     const { signal } = (this.running = new AbortController());
     const { viewer, frame } = this.app;
     try {
-      const glb = await this.fetch(note.uvs, signal);
+      const glb = await this.fetch(note.uvs, () => viewer.set === set, signal);
       if (glb && viewer.set === set) await viewer.load(glb, set);
     } catch (error) {
       if (viewer.set === set && !signal.aborted) frame.toasts.show(`The geometry: ${(error as Error).message}`, 'bad');
     }
   }
 
-  /** Undefined: another layout has come. Rejects with what the server says against it. */
-  private async fetch(path: string, signal: AbortSignal): Promise<ArrayBuffer | undefined> {
-    for (let attempt = 0; !signal.aborted; ++attempt) {
+  /** Undefined: another layout has come, or none is shown any more. Rejects with what the server says against it. */
+  private async fetch(path: string, wanted: () => boolean, signal: AbortSignal): Promise<ArrayBuffer | undefined> {
+    for (let attempt = 0; !signal.aborted && wanted(); ++attempt) {
       try {
         return await (await this.app.fetch(path, { signal })).arrayBuffer();
       } catch (error) {

@@ -35,9 +35,9 @@ export class DocumentFetch {
     try {
       const { revision, take } = await this.source.ask(running.signal);
       if (running !== this.running) return;
+      take();
       has = revision;
       this.isOwed = false;
-      take();
     } catch (error) {
       if (running !== this.running) return;
       this.source.failed(error as Error);
