@@ -58,21 +58,6 @@ RADIOSITY_CLONES float productOf(const std::uint16_t* a, const std::uint16_t* b,
   return rest;
 }
 
-/// In double precision, so that sums over all leaves keep their digits.
-RADIOSITY_CLONES double fluxOf(const float* value, const float* area, std::size_t count) {
-  constexpr std::size_t kLanes = 8;
-  double sum[kLanes] = {};
-  std::size_t i = 0;
-  for (; i + kLanes <= count; i += kLanes) {
-    for (std::size_t k = 0; k < kLanes; ++k)
-      sum[k] += static_cast<double>(value[i + k]) * static_cast<double>(area[i + k]);
-  }
-  double rest = 0.0;
-  for (; i < count; ++i) rest += static_cast<double>(value[i]) * static_cast<double>(area[i]);
-  for (std::size_t k = 0; k < kLanes; ++k) rest += sum[k];
-  return rest;
-}
-
 }  // namespace
 
 std::uint16_t encodeLink(float value, std::uint32_t dither) {
@@ -83,86 +68,6 @@ std::uint16_t encodeLink(float value, std::uint32_t dither) {
 }
 
 float decodeLink(std::uint16_t code) { return decodeOne(code); }
-
-LinkExpander::LinkExpander(const scene::PatchScene& patches, const std::vector<Side>& sides)
-    : patches_(patches),
-      sides_(sides),
-      side_of_node_(patches.nodeCount(), 0),
-      coarse_(patches.nodeCount(), 0.0F),
-      is_reached_(sides.size(), false),
-      has_coarse_(sides.size(), false) {
-  std::size_t values = 0;
-  for (std::uint32_t s = 0; s < sides.size(); ++s) {
-    std::fill_n(side_of_node_.begin() + sides[s].first_node, sides[s].node_count, s);
-    values += sides[s].leaf_count;
-  }
-  values_.resize(values);
-  leaf_area_.reserve(values);
-  for (const auto& side : sides) {
-    const auto leaves = patches.node_area.begin() + side.first_node;
-    leaf_area_.insert(leaf_area_.end(), leaves, leaves + side.leaf_count);
-  }
-}
-
-double LinkExpander::flux() const {
-  double sum = 0.0;
-  for (const auto s : reached_) {
-    const auto first = sides_[s].first_value;
-    sum += fluxOf(&values_[first], &leaf_area_[first], sides_[s].leaf_count);
-  }
-  return sum;
-}
-
-void LinkExpander::reach(std::uint32_t side) {
-  if (is_reached_[side]) return;
-  is_reached_[side] = true;
-  reached_.push_back(side);
-  std::fill_n(values_.begin() + sides_[side].first_value, sides_[side].leaf_count, 0.0F);
-}
-
-void LinkExpander::expand(const LinkSample& sample) {
-  for (const auto side : reached_) is_reached_[side] = false;
-  reached_.clear();
-  const float* value = sample.irradiance.data();
-  for (const auto& run : sample.runs) {
-    for (std::uint32_t node = run.first_node; node < run.first_node + run.count; ++node, ++value) {
-      const std::uint32_t s = side_of_node_[node];
-      const Side& side = sides_[s];
-      reach(s);
-      const std::uint32_t local = node - side.first_node;
-      if (local < side.leaf_count) {
-        values_[side.first_value + local] += *value;
-      } else {
-        coarse_[node] += *value;
-        has_coarse_[s] = true;
-      }
-    }
-  }
-  std::sort(reached_.begin(), reached_.end());
-  for (const auto side : reached_) {
-    if (has_coarse_[side]) pushDown(side);
-  }
-}
-
-void LinkExpander::pushDown(std::uint32_t s) {
-  const Side& side = sides_[s];
-  has_coarse_[s] = false;
-  for (std::uint32_t level = side.level_count; level-- > 1;) {
-    const auto grid = scene::levelGrid(side.width, side.height, level);
-    const auto child = scene::levelGrid(side.width, side.height, level - 1);
-    for (std::uint32_t y = 0; y < child.height; ++y) {
-      for (std::uint32_t x = 0; x < child.width; ++x) {
-        const float value = coarse_[side.first_node + grid.offset + (y >> 1U) * grid.width + (x >> 1U)];
-        if (level > 1) {
-          coarse_[side.first_node + child.offset + y * child.width + x] += value;
-        } else if (patches_.node_area[side.first_node + y * child.width + x] > 0.0F) {
-          values_[side.first_value + y * child.width + x] += value;
-        }
-      }
-    }
-    std::fill_n(coarse_.begin() + side.first_node + grid.offset, grid.width * grid.height, 0.0F);
-  }
-}
 
 void LinkColumn::makeRoom(std::span<const std::uint32_t> reached, const std::vector<Side>& sides) {
   auto run = runs_.begin();
@@ -267,7 +172,7 @@ void LinkColumn::keepFlux(std::span<const float> leaf_area) {
   for (const auto& run : runs_) {
     links.resize(run.count);
     decodeAll(&code_[run.offset], run.count, 1.0F, links.data());
-    coded += fluxOf(links.data(), &leaf_area[run.first_value], run.count);
+    coded += fluxOf(links, &leaf_area[run.first_value]);
   }
   coded *= static_cast<double>(scale_);
   // What little stays where most is lost, form factors know better than the pixels through which the rest is lost.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/archive.h"
+#include "server/solver/link_expander.h"
 #include "server/solver/side.h"
 #include "server/solver/transport.h"
 
@@ -17,33 +18,6 @@ namespace radiosity::solver {
 /// cut off is rounded up when it is more than `dither` / 4096 of the last bit: 2048 is to nearest.
 [[nodiscard]] std::uint16_t encodeLink(float value, std::uint32_t dither = 2048);
 [[nodiscard]] float decodeLink(std::uint16_t code);
-
-/// Turns what a shot delivered to nodes of any level into values of leaves.
-class LinkExpander {
- public:
-  LinkExpander(const scene::PatchScene& patches, const std::vector<Side>& sides);
-
-  void expand(const LinkSample& sample);
-  /// Irradiance by leaf value; only that of the sides reached is valid.
-  [[nodiscard]] std::span<const float> values() const { return values_; }
-  [[nodiscard]] std::span<const std::uint32_t> sidesReached() const { return reached_; }
-  /// Sum of irradiance times area over all leaves.
-  [[nodiscard]] double flux() const;
-  /// Unit box squared, by leaf value.
-  [[nodiscard]] std::span<const float> leafAreas() const { return leaf_area_; }
-
- private:
-  void reach(std::uint32_t side);
-  void pushDown(std::uint32_t side);
-
-  const scene::PatchScene& patches_;
-  const std::vector<Side>& sides_;
-  std::vector<std::uint32_t> side_of_node_;
-  std::vector<float> values_, leaf_area_;
-  std::vector<float> coarse_;  // by node: what was linked above level 0
-  std::vector<std::uint32_t> reached_;
-  std::vector<bool> is_reached_, has_coarse_;
-};
 
 class LinkColumn {
  public:

@@ -219,7 +219,7 @@ void LinkedSolver::takePart(RepairBatch& repairs, std::size_t shot, LinkSample& 
   const auto& sample = scattered ? repairs.scattered[shot - repairs.gathered.size()] : repairs.gathered[shot];
   const auto& repair = repairs.repairs[sample.repair];
   if (scattered) links.scale(system_.shooters()[repair.shooter].area);  // it carried a flux of one
-  expander_.expand(links);
+  expander_.expand(links, scattered);
   if (repair.whole) {
     system_.addSample(repair.shooter, repair.half, expander_, links, sample.points);
     return;

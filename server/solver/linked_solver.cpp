@@ -115,8 +115,9 @@ Result<void> LinkedSolver::measureSlice() {
   gathered.insert(gathered.end(), scattered.begin(), scattered.end());
   const auto take = [&](std::size_t i, LinkSample&& links) {
     const auto& want = *gathered[i];
-    if (i >= batch.gather.size()) links.scale(system_.shooters()[want.shooter].area);  // it carried a flux of one
-    expander_.expand(links);
+    const bool scattered = i >= batch.gather.size();
+    if (scattered) links.scale(system_.shooters()[want.shooter].area);  // it carried a flux of one
+    expander_.expand(links, scattered);
     system_.addSample(want.shooter, want.half, expander_, links, want.points);
   };
   const auto done = transport_.measure(batch, take);

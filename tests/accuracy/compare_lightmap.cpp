@@ -1,6 +1,7 @@
 // compare_lightmap LIT.glb: how far a solved lightmap is from a path-traced reference.
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <exception>
 #include <glm/geometric.hpp>
@@ -51,11 +52,13 @@ void printWorst(const radiosity::accuracy::LitScene& lit, const radiosity::accur
     const auto& [texel, value, square] = entries[i];
     const auto& place = places.at({texel->page, texel->x, texel->y});
     const auto at = place.footprint.pieces.front().corners[0];
+    const auto error = glm::abs(value - texel->irradiance.mean_lux);
+    const int c = error.x > error.y && error.x > error.z ? 0 : error.y > error.z ? 1 : 2;
     std::printf(
-        "%4.1f %% page %d (%d, %d), \"%s\" at (%.3g, %.3g, %.3g): %.5g lux for %.5g +-%.2g (green), %.0f %% visible\n",
+        "%4.1f %% page %d (%d, %d), \"%s\" at (%.3g, %.3g, %.3g): %.5g lux for %.5g +-%.2g (%s), %.0f %% visible\n",
         100 * square / sum, texel->page, texel->x, texel->y, lit.scene.node_names.at(place.node).c_str(), at.x, at.y,
-        at.z, value.y, texel->irradiance.mean_lux.y, texel->irradiance.standard_error.y,
-        100 * texel->irradiance.visible_fraction);
+        at.z, value[c], texel->irradiance.mean_lux[c], texel->irradiance.standard_error[c],
+        std::array{"red", "green", "blue"}[static_cast<std::size_t>(c)], 100 * texel->irradiance.visible_fraction);
   }
 }
 
