@@ -285,8 +285,9 @@ void PunctualGatherer::scaleToSky(const solver::ParallelShot& shot, std::span<co
           found += static_cast<double>(std::max(0.0F, glm::dot(normal, view.direction)));
         }
         const double exact = 0.5 * std::numbers::pi * (1.0 + static_cast<double>(glm::dot(normal, shot.axis)));
-        // Bounded: a surface that all but turns away from the hemisphere sees too few of its directions.
-        scale = static_cast<float>(std::clamp(exact / (found * direction_share), 0.5, 2.0));
+        // Bounded: a surface that all but turns away from the hemisphere sees too few of its directions. Where it turns
+        // away altogether (0 / 0), what lights the leaf is another of its triangles, of which nothing is known here.
+        scale = found > 0.0 ? static_cast<float>(std::clamp(exact / (found * direction_share), 0.5, 2.0)) : 1.0F;
       }
       sum_[i] *= scale;
     }

@@ -56,15 +56,15 @@ ErrorParts estimateError(const RadiosityState& state, double owed) {
     varying += std::max(0.0, side.unshot_power - static_cast<double>(net.x + net.y + net.z));
   }
   ErrorParts parts;
-  if (field.square() <= 0.0) {
+  const double received = receivedFlux(state);
+  if (field.square() <= 0.0 || received <= 0.0) {
     parts.residual = unshot + varying > 0.0 ? 1.0 : 0.0;  // nothing received: all or nothing is missing
     parts.total = parts.residual;
     return parts;
   }
   parts.sampling = field.sampling();
   // Net unshot light is multiplied by its further bounces; what only varies inside nodes cancels after the first.
-  parts.residual =
-      (unshot / (1.0 - meanReflectance(state)) + kVariationError * varying) / std::max(receivedFlux(state), 1e-300);
+  parts.residual = (unshot / (1.0 - meanReflectance(state)) + kVariationError * varying) / received;
   parts.discretization = field.discretization();
   parts.total = std::hypot(parts.residual, parts.sampling);
   return parts;

@@ -236,6 +236,30 @@ TEST_F(Punctual, AConvexSolidUnderATwoColouredSkyReceivesTheHemisphereFormulaExa
   EXPECT_NEAR(total(flux), entered, 0.01 * entered);
 }
 
+// Its own triangle sees nothing of the upper sky, and none of the directions that stand for it: 0 / 0, the light of one
+// leaf was no number, and that of the whole scene neither.
+TEST_F(Punctual, ALeafThatTurnsAwayFromTheSkyTakesWhatAnotherOfItsTrianglesSees) {
+  SceneBuilder builder;
+  const auto below = builder.add({{-0.1F, 0.0F, -0.1F}, {0.2F, 0, 0}, {0, 0, 0.2F}, 1, 1});
+  const auto beside = builder.add({{0.1F, 0.0F, -0.1F}, {0, 0.2F, 0}, {0, 0, 0.2F}, 1, 1});
+  const auto scene = std::make_shared<scene::PatchScene>(*builder.build());
+  auto& surface = scene->surfaces[below];
+  const auto own = surface.first_triangle, other = scene->surfaces[beside].first_triangle;
+  ASSERT_EQ(scene->triangles[own].normal.y, -1.0F);
+  ASSERT_EQ(scene->triangles[other].normal.y, 0.0F);
+  surface.planar = false;
+  auto& leaf = scene->leaves[surface.first_leaf];
+  leaf.full = false;
+  leaf.first_spot = static_cast<std::uint32_t>(scene->spots.size());
+  for (std::uint32_t i = 0; i < scene::kLeafSpots; ++i)
+    scene->spots.push_back({glm::vec2(0.5F), i % 2 == 0 ? own : other});
+  solver::LightSources sources;
+  sources.sky = {glm::vec3(1.0F), glm::vec3(0.0F)};
+  const auto flux = runRound(scene, sources);
+  // The wall's half of the places gets half of the upper sky. Each direction looks at one place of the leaf.
+  EXPECT_NEAR(irradiance(*scene, flux, below, 0, 0), 0.5 * kPi / 2.0, 0.25 * kPi / 2.0);
+}
+
 TEST_F(Punctual, NothingLeaksIntoAClosedRoomAlongItsEdges) {
   SceneBuilder builder;
   builder.addBox(glm::vec3(-0.4F), glm::vec3(0.4F), 8, true);
