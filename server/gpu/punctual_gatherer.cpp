@@ -267,27 +267,35 @@ PunctualGatherer::Lost PunctualGatherer::weighLost(const solver::ParallelView& v
   return lost;
 }
 
+/// Of one receiver: what the whole hemisphere gives where it is looked at, to what the directions give that stand for
+/// it. Bounded: what all but turns away from the hemisphere sees too few of its directions.
+float PunctualGatherer::skyScale(std::span<const glm::vec3> normals, const glm::vec3& axis,
+                                 std::span<const solver::ParallelView> sky) {
+  double found = 0.0, exact = 0.0;
+  for (const auto& normal : normals) {
+    for (const auto& view : sky) found += static_cast<double>(std::max(0.0F, glm::dot(normal, view.direction)));
+    exact += 0.5 * std::numbers::pi * (1.0 + static_cast<double>(glm::dot(normal, axis)));
+  }
+  found *= 2.0 * std::numbers::pi / static_cast<double>(sky.size());
+  return found > 0.0 ? static_cast<float>(std::clamp(exact / found, 0.5, 2.0)) : 1.0F;
+}
+
 void PunctualGatherer::scaleToSky(const solver::ParallelShot& shot, std::span<const solver::ParallelView> sky) {
-  const auto& patches = receivers_->patches();
-  const double direction_share = 2.0 * std::numbers::pi / static_cast<double>(sky.size());
-  std::uint32_t last_triangle = scene::kNone;
+  std::vector<glm::vec3> normals, scaled;  // `scaled`: those that `scale` is of
   float scale = 1.0F;
   for (const auto& group : receivers_->groups()) {
-    last_triangle = scene::kNone;
     for (std::size_t i = group.first; i < group.first + group.count; ++i) {
       if (sum_[i] <= 0.0F) continue;
-      const auto triangle = receivers_->all()[i].triangle;
-      if (triangle != last_triangle) {
-        last_triangle = triangle;
-        const auto normal = group.side * patches.triangles[triangle].normal;
-        double found = 0.0;
-        for (const auto& view : sky) {
-          found += static_cast<double>(std::max(0.0F, glm::dot(normal, view.direction)));
-        }
-        const double exact = 0.5 * std::numbers::pi * (1.0 + static_cast<double>(glm::dot(normal, shot.axis)));
-        // Bounded: a surface that all but turns away from the hemisphere sees too few of its directions. Where it turns
-        // away altogether (0 / 0), what lights the leaf is another of its triangles, of which nothing is known here.
-        scale = found > 0.0 ? static_cast<float>(std::clamp(exact / (found * direction_share), 0.5, 2.0)) : 1.0F;
+      const auto& receiver = receivers_->all()[i];
+      // A leaf may have places on several triangles, each with a sky of its own.
+      normals.clear();
+      for (std::uint32_t p = 0; p < (receiver.hasSpots() ? shot.receivers.count : 1); ++p) {
+        normals.push_back(group.side * receivers_->place(receiver, shot.receivers.at[p]).frame->normal);
+      }
+      if (std::equal(normals.begin() + 1, normals.end(), normals.begin())) normals.resize(1);
+      if (normals != scaled) {
+        scaled = normals;
+        scale = skyScale(normals, shot.axis, sky);
       }
       sum_[i] *= scale;
     }

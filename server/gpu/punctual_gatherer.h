@@ -38,6 +38,8 @@ class PunctualGatherer {
   [[nodiscard]] Lost weighLost(const solver::PointShot& shot, std::span<const std::uint32_t> items) const;
   [[nodiscard]] Lost weighLost(const solver::ParallelView& view, double pixel_area,
                                std::span<const std::uint32_t> items) const;
+  [[nodiscard]] static float skyScale(std::span<const glm::vec3> normals, const glm::vec3& axis,
+                                      std::span<const solver::ParallelView> sky);
   void scaleToSky(const solver::ParallelShot& shot, std::span<const solver::ParallelView> sky);
   void deliver(const std::array<double, 3>& unit, const std::array<double, 3>& emitted, const Lost& lost,
                std::uint32_t half, double flux_scale, const FluxSink& sink, solver::TransportCounters& counters) const;
