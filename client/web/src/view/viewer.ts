@@ -18,6 +18,7 @@ import { PagesView } from './pages_view';
 import { pick, readingAt, type Reading } from './picker';
 import { exposureByRays } from './ray_exposure';
 import { release } from './release';
+import { Screen } from './screen';
 import type { ViewMode } from './view_modes';
 
 /** For taking up tiles, of the 16 that a frame has; of longer ones the same share, but no task of 50. */
@@ -63,6 +64,7 @@ export class Viewer {
   readonly exposure: ExposureMeter;
   readonly gizmo: Gizmo;
   readonly pagesView: PagesView;
+  readonly screen: Screen;
   shown: LitScene | undefined;
   /** Pages of error or unshot light, where they are streamed. */
   dataSet: LightmapSet | undefined;
@@ -74,7 +76,6 @@ export class Viewer {
   private readonly pace: FramePace;
   private readonly fences: FrameFences;
   private scale: number;
-  private bufferKey = '';
   private readonly world = new Scene();
   private wanted = true;
   /** Something has changed that the scale of false colours, and the exposure, may depend on. */
@@ -94,7 +95,7 @@ export class Viewer {
     readonly canvas: HTMLCanvasElement,
     private readonly events: ViewerEvents,
   ) {
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, powerPreference: 'high-performance' });
+    this.renderer = new WebGLRenderer({ canvas, antialias: false, alpha: true, powerPreference: 'high-performance' });
     this.renderer.toneMapping = NoToneMapping; // our shaders do it, and the encoding, so that one program serves all
     this.renderer.outputColorSpace = LinearSRGBColorSpace;
     // Each answer about a program's text waits for all that the card has to do; a program that fails is heard of anyway.
@@ -106,8 +107,9 @@ export class Viewer {
     this.pace = new FramePace(drawsWithoutCard(gl));
     this.scale = this.pace.firstScale;
     this.fences = new FrameFences(gl);
+    this.screen = new Screen(this.renderer, gl); // which smooths edges
     this.rig = new CameraRig(canvas, () => this.moved());
-    this.exposure = new ExposureMeter(this.renderer, this.uniforms);
+    this.exposure = new ExposureMeter(this.renderer, this.uniforms, () => this.pace.isIdle);
     this.pagesView = new PagesView(canvas, this.uniforms, () => this.moved());
     this.gizmo = new Gizmo(this.world, this.rig.camera, canvas, {
       dragging: (active) => {
@@ -296,6 +298,7 @@ export class Viewer {
     if (this.exposure.step(seconds)) this.wanted = true;
     if (this.shown?.set.complete === false) this.pace.hurry(now, 0); // the first light is soon first, and then sharp
     if ((!this.wanted && !this.pace.isSharpDue(now)) || this.gate.standsStill(now)) return;
+    if (this.exposure.wantsQuiet) return;
     const scale = this.pace.ask(now);
     if (scale === undefined) return;
     this.wanted = false;
@@ -307,16 +310,14 @@ export class Viewer {
 
   /** `scale`: of each side, to draw fewer pixels than the screen has. */
   private draw(scale: number): void {
-    if (scale !== this.scale) {
-      this.scale = scale;
-      this.sizeBuffer();
-    }
+    this.scale = scale;
     if (!this.gate.isClosed(performance.now())) this.shown?.set.showLight();
     this.shown?.eachMaterial((material) => material.refresh());
     this.pagesView.refresh();
     this.people?.leaveOut(this.rig.camera);
     const flat = this.mode?.flat;
-    this.renderer.render(flat ? this.pagesView.scene : this.world, flat ? this.pagesView.camera : this.rig.camera);
+    const [scene, camera] = flat ? [this.pagesView.scene, this.pagesView.camera] : [this.world, this.rig.camera];
+    this.screen.draw(scale, () => this.renderer.render(scene, camera));
     if (this.people) {
       this.people.labels.hidden = flat === true;
       this.people.placeLabels(this.rig.camera, this.canvas.clientWidth, this.canvas.clientHeight);
@@ -432,27 +433,19 @@ export class Viewer {
   private resize(): void {
     const { clientWidth: width, clientHeight: height } = this.canvas;
     if (width === 0 || height === 0) return;
-    this.sizeBuffer();
+    this.screen.resize(width, height, Math.min(devicePixelRatio, 2));
     this.rig.resize(width / height);
     this.pagesView.resize(width / height);
     if (this.shown) this.draw(this.scale); // resizing clears the canvas: drawn at once, it does not blink
     this.invalidate();
   }
 
-  /** A new buffer waits for all that the card has to do, and clears the canvas: none is made for nothing. */
-  private sizeBuffer(): void {
-    const { clientWidth: width, clientHeight: height } = this.canvas;
-    const ratio = this.scale * Math.min(devicePixelRatio, 2);
-    const key = [width, height, ratio].join();
-    if (width === 0 || height === 0 || key === this.bufferKey) return;
-    this.bufferKey = key;
-    this.renderer.setDrawingBufferSize(width, height, ratio);
-  }
-
   private onContext(lost: boolean): void {
     this.lost = lost;
     this.pace.forget();
     this.fences.forget();
+    this.screen.forget();
+    this.exposure.forgetCard();
     const sets = [this.shown?.set, this.staged?.set, this.dataSet];
     if (lost) {
       for (const root of [this.world, this.pagesView.scene, this.staged?.scene?.root]) if (root) release(root);
