@@ -66,8 +66,10 @@ export class Viewer {
   readonly pagesView: PagesView;
   readonly screen: Screen;
   shown: LitScene | undefined;
-  /** Pages of error or unshot light, where they are streamed. */
+  /** Pages of error or unshot light, where they are streamed, of the newest layout. */
   dataSet: LightmapSet | undefined;
+  /** Those on the screen, of the layout that is shown: others would lie elsewhere on its surfaces. */
+  shownData: LightmapSet | undefined;
   mode: ViewMode | undefined;
   autoRange = true;
   private staged: Staged | undefined;
@@ -156,7 +158,8 @@ export class Viewer {
     this.dropStaged();
     const set = new LightmapSet(this.renderer, note, 'irradiance', this.events.used);
     this.staged = { set, since: performance.now() };
-    this.setDataQuantity(undefined);
+    if (this.dataSet !== this.shownData) this.dataSet?.dispose();
+    this.dataSet = undefined; // its tiles are not those of the new layout; what is on the screen stays there
     return set;
   }
 
@@ -217,7 +220,7 @@ export class Viewer {
   /** Pages for a quantity beside irradiance, or none. */
   setDataQuantity(quantity: string | undefined): LightmapSet | undefined {
     if (this.dataSet?.quantity === quantity) return this.dataSet;
-    this.dataSet?.dispose();
+    if (this.dataSet !== this.shownData) this.dataSet?.dispose();
     const note = this.set?.note;
     this.dataSet = quantity && note ? new LightmapSet(this.renderer, note, quantity, this.events.used) : undefined;
     this.bindData();
@@ -241,7 +244,7 @@ export class Viewer {
 
   readAt(x: number, y: number): Reading | undefined {
     const hit = this.pickAt(x, y);
-    const errors = this.dataSet?.quantity === 'error' ? this.dataSet.pages : undefined;
+    const errors = this.shownData?.quantity === 'error' ? this.shownData.pages : undefined;
     return hit && this.shown ? readingAt(this.shown, hit, errors) : undefined;
   }
 
@@ -296,7 +299,8 @@ export class Viewer {
     this.gate.turn(now, this.shown?.set.lit === true && this.exposure.unknown, this.replaced);
     this.measure(now);
     if (this.exposure.step(seconds)) this.wanted = true;
-    if (this.shown?.set.complete === false) this.pace.hurry(now, 0); // the first light is soon first, and then sharp
+    const streamed = this.dataSet ?? this.shown?.set;
+    if (streamed?.complete === false) this.pace.hurry(now, 0); // the first light is soon first, and then sharp
     if ((!this.wanted && !this.pace.isSharpDue(now)) || this.gate.standsStill(now)) return;
     if (this.exposure.wantsQuiet) return;
     const scale = this.pace.ask(now);
@@ -379,7 +383,7 @@ export class Viewer {
   }
 
   private updateRange(): void {
-    const data = this.mode?.quantity === 'irradiance' ? this.shown?.set : this.dataSet;
+    const data = this.mode?.quantity === 'irradiance' ? this.shown?.set : this.shownData;
     const range = this.autoRange ? data?.range() : undefined;
     if (!range) return;
     const [low, high] = range;
@@ -390,7 +394,8 @@ export class Viewer {
   private promote(now: number): void {
     const staged = this.staged;
     if (!staged?.scene || this.gizmo.dragging) return; // what is held is not taken out of the hand
-    const lit = staged.set.covered && staged.set.waiting === 0 && staged.set.error < READY_ERROR;
+    const streamed = this.dataSet ?? staged.set;
+    const lit = streamed.covered && streamed.waiting === 0 && streamed.error < READY_ERROR;
     if (this.shown && !lit && now - staged.since < READY_AFTER_MS) return;
     this.staged = undefined;
     this.replaceShown(staged.scene);
@@ -421,11 +426,15 @@ export class Viewer {
     this.staged = undefined;
   }
 
+  /** Data of the layout that is shown; as long as they are only of the next, those there are of the quantity. */
   private bindData(): void {
-    const set = this.shown?.set;
-    this.shown?.eachMaterial((material) => {
-      const index = material.page ? (set?.pages.indexOf(material.page) ?? -1) : -1;
-      material.setDataPage(this.dataSet?.pages[index]);
+    const { shown, dataSet, shownData: before } = this;
+    if (dataSet?.note === shown?.set.note) this.shownData = dataSet;
+    else if (before?.note !== shown?.set.note || before?.quantity !== dataSet?.quantity) this.shownData = undefined;
+    if (before !== this.shownData) before?.dispose();
+    shown?.eachMaterial((material) => {
+      const index = material.page ? shown.set.pages.indexOf(material.page) : -1;
+      material.setDataPage(this.shownData?.pages[index]);
     });
     this.invalidate();
   }
@@ -446,7 +455,7 @@ export class Viewer {
     this.fences.forget();
     this.screen.forget();
     this.exposure.forgetCard();
-    const sets = [this.shown?.set, this.staged?.set, this.dataSet];
+    const sets = new Set([this.shown?.set, this.staged?.set, this.dataSet, this.shownData]);
     if (lost) {
       for (const root of [this.world, this.pagesView.scene, this.staged?.scene?.root]) if (root) release(root);
       for (const set of sets) set?.release();
