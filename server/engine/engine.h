@@ -276,8 +276,10 @@ class Engine {
     std::string gltf;
   };
   virtual void sceneText(Callback<SceneText> done) = 0;
-  /// GLB with TEXCOORD_1 and extras.lightmap on every lit primitive.
-  virtual void sceneGlb(Callback<SharedBytes> done) = 0;
+  /// GLB with TEXCOORD_1 and extras.lightmap on every lit primitive. `layout`: of that Lightmaps::layout, or
+  /// kStaleRevision where pages are laid out otherwise by now (or not yet so, for a number of another process); none:
+  /// as it is.
+  virtual void sceneGlb(std::optional<std::uint64_t> layout, Callback<SharedBytes> done) = 0;
   /// GLB with KHR_materials_unlit textures, tone-mapped.
   virtual void unlitGlb(Callback<SharedBytes> done) = 0;
   /// OpenEXR, row 0 = v 0: 32-bit float RGB, or one channel "Y" of 32-bit whole numbers.

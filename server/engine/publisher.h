@@ -34,6 +34,7 @@ class Publisher {
   void forget(Quantity quantity) { latest_[static_cast<std::size_t>(quantity)].reset(); }
 
   [[nodiscard]] std::uint64_t version() const { return version_; }
+  [[nodiscard]] std::uint64_t layout() const { return layout_; }
   [[nodiscard]] std::uint64_t layoutSince() const { return layout_since_; }
 
   /// Tiles of all publications, of all mips: those with a new version, and those that changed by less than a quantum

@@ -1,5 +1,7 @@
 // What can be fetched from the solve thread: the document, files in memory, pictures.
+#include <fmt/format.h>
 #include <map>
+#include <optional>
 #include <utility>
 
 #include "server/engine/exports.h"
@@ -22,8 +24,14 @@ void SolveLoop::sceneText(Callback<SceneText> done) {
   });
 }
 
-void SolveLoop::sceneGlb(Callback<SharedBytes> done) {
-  askLit<SharedBytes>(std::move(done), [this]() -> Result<SharedBytes> {
+void SolveLoop::sceneGlb(std::optional<std::uint64_t> layout, Callback<SharedBytes> done) {
+  askLit<SharedBytes>(std::move(done), [this, layout]() -> Result<SharedBytes> {
+    if (layout && *layout != publisher_.layout())
+      return fail(
+          ErrorCode::kStaleRevision,
+          fmt::format("the lightmaps have another layout, {}: what the newest `lightmaps` names is to be fetched",
+                      publisher_.layout()),
+          fmt::format("?layout={}", *layout));
     const auto lit = scene::withLightmapUvs(lit_->document(), lit_->scene(), lit_->patches());
     if (!lit) return tl::unexpected<Error>(lit.error());
     return std::make_shared<const Bytes>(scene::writeGlb(*lit));

@@ -61,7 +61,7 @@ class SolveLoop final : public Engine {
   [[nodiscard]] std::shared_ptr<void> watch(Quantity quantity) override;
   [[nodiscard]] std::shared_ptr<const Lightmaps> lightmaps(Quantity quantity) const override;
   void sceneText(Callback<SceneText> done) override;
-  void sceneGlb(Callback<SharedBytes> done) override;
+  void sceneGlb(std::optional<std::uint64_t> layout, Callback<SharedBytes> done) override;
   void unlitGlb(Callback<SharedBytes> done) override;
   void lightmapExr(std::uint32_t page, Quantity quantity, Callback<SharedBytes> done) override;
   void snapshot(SnapshotRequest request, Callback<Snapshot> done) override;

@@ -63,6 +63,17 @@ Result<std::optional<double>> queryExposure(const HttpRequest& request) {
   return value;
 }
 
+Result<std::optional<std::uint64_t>> queryLayout(const HttpRequest& request) {
+  const auto found = request.query.find("layout");
+  if (found == request.query.end()) return std::nullopt;
+  std::uint64_t value = 0;
+  const auto& text = found->second;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size())
+    return fail(ErrorCode::kBadInput, "must be the number of a layout", "?layout=");
+  return value;
+}
+
 std::string queryText(const HttpRequest& request, const char* key, std::string otherwise) {
   const auto found = request.query.find(key);
   return found == request.query.end() ? std::move(otherwise) : found->second.substr(0, protocol::kMaxTextBytes);
@@ -118,8 +129,10 @@ void getSceneGltf(const std::shared_ptr<Hub>& hub, HttpRequest& /*request*/, con
   }));
 }
 
-void getSceneGlb(const std::shared_ptr<Hub>& hub, HttpRequest& /*request*/, const Respond& done) {
-  hub->engine().sceneGlb(fileAnswer(*hub, done, "model/gltf-binary"));
+void getSceneGlb(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond& done) {
+  const auto layout = queryLayout(request);
+  if (!layout) return done(errorResponse(layout.error()));
+  hub->engine().sceneGlb(*layout, fileAnswer(*hub, done, "model/gltf-binary"));
 }
 
 void getUnlitGlb(const std::shared_ptr<Hub>& hub, HttpRequest& /*request*/, const Respond& done) {

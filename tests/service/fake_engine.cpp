@@ -309,8 +309,16 @@ void FakeEngine::sceneText(Callback<SceneText> done) {
   }
   answer([done = std::move(done), text = std::move(text)] { done(text); });
 }
-void FakeEngine::sceneGlb(Callback<SharedBytes> done) {
-  answer([done] { done(bytesOf("glTF scene")); });
+void FakeEngine::sceneGlb(std::optional<std::uint64_t> layout, Callback<SharedBytes> done) {
+  std::uint64_t here = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    here = layout_number_;
+  }
+  answer([done, layout, here] {
+    if (layout && *layout != here) return done(fail(ErrorCode::kStaleRevision, "the layout is another"));
+    done(bytesOf("glTF scene"));
+  });
 }
 void FakeEngine::unlitGlb(Callback<SharedBytes> done) {
   answer([done] { done(bytesOf("glTF unlit")); });

@@ -55,7 +55,7 @@ class FakeEngine : public engine::Engine {
   [[nodiscard]] std::shared_ptr<void> watch(engine::Quantity quantity) override;
   [[nodiscard]] std::shared_ptr<const engine::Lightmaps> lightmaps(engine::Quantity quantity) const override;
   void sceneText(Callback<SceneText> done) override;
-  void sceneGlb(Callback<SharedBytes> done) override;
+  void sceneGlb(std::optional<std::uint64_t> layout, Callback<SharedBytes> done) override;
   void unlitGlb(Callback<SharedBytes> done) override;
   void lightmapExr(std::uint32_t page, engine::Quantity quantity, Callback<SharedBytes> done) override;
   void snapshot(engine::SnapshotRequest request, Callback<engine::Snapshot> done) override;

@@ -182,14 +182,11 @@ export class EditSession {
     const placed = this.upload?.placed ?? this.app.view.forgetCamera();
     const upload = (this.upload = { abort: new AbortController(), placed });
     try {
-      const path = `/scene?name=${encodeURIComponent(file.name)}`;
-      const response = await this.app.fetch(path, {
-        method: 'PUT',
-        body: file,
-        headers: { 'Content-Type': 'application/octet-stream' },
-        signal: upload.abort.signal,
-      });
-      const { warnings } = (await response.json()) as { warnings: string[] };
+      const url = await this.send(file, upload.abort.signal);
+      // On the one connection: what is asked for later is loaded later, even if an upload that was given up arrives.
+      if (upload !== this.upload) return;
+      const { warnings } = await this.app.connection.call<{ warnings: string[] }>('scene.load', { url });
+      if (upload !== this.upload) return;
       const count = warnings.length;
       toasts.show(
         count ? `${file.name} loaded; ${count} warning${count > 1 ? 's' : ''}, see Solve` : `${file.name} loaded`,
@@ -202,6 +199,17 @@ export class EditSession {
     } finally {
       if (upload === this.upload) this.upload = undefined;
     }
+  }
+
+  /** Keeps the file on the server. Returns its URL there; rejects with what the server says against it. */
+  private async send(file: File, signal: AbortSignal): Promise<string> {
+    const response = await this.app.fetch(`/uploads?name=${encodeURIComponent(file.name)}`, {
+      method: 'PUT',
+      body: file,
+      headers: { 'Content-Type': 'application/octet-stream' },
+      signal,
+    });
+    return ((await response.json()) as { url: string }).url;
   }
 
   private onChanged(pointers: string[]): void {

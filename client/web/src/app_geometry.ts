@@ -2,6 +2,7 @@
 
 import type { App } from './app';
 import { pauseMs } from './protocol/connection';
+import { CONFLICT, HttpError } from './protocol/http_error';
 import type { LightmapsNote } from './protocol/messages';
 import type { LightmapSet } from './view/lightmap_set';
 
@@ -22,6 +23,8 @@ export class GeometrySession {
       const glb = await this.fetch(note.uvs, () => viewer.set === set, signal);
       if (glb && viewer.set === set) await viewer.load(glb, set);
     } catch (error) {
+      // Pages have another layout by now: the server tells of it, and this one is not waited for.
+      if (error instanceof HttpError && error.status === CONFLICT) return;
       if (viewer.set === set && !signal.aborted) frame.toasts.show(`The geometry: ${(error as Error).message}`, 'bad');
     }
   }

@@ -66,6 +66,29 @@ TEST(Http, TheDocumentSaysItsRevision) {
   EXPECT_EQ(request(server.port(), "GET", "/scene.gltf").header("X-Revision"), "1");
 }
 
+TEST(Http, TheGeometryOfAnotherLayoutIsRefused) {
+  RunningServer server;
+  server.engine.publish();
+  const auto layout = server.engine.lightmaps()->layout;
+  const auto ask = [&](const std::string& which) {
+    return request(server.port(), "GET", "/scene.glb?layout=" + which);
+  };
+  EXPECT_EQ(ask(std::to_string(layout)).body, "glTF scene");
+  for (const auto other : {layout - 1, layout + 1}) {
+    const auto refused = ask(std::to_string(other));
+    EXPECT_EQ(refused.status, 409);
+    EXPECT_EQ(protocol::decodeHttpError(409, refused.body).code, ErrorCode::kStaleRevision);
+  }
+  for (const auto* wrong : {"", "x", "1x", "-1", "18446744073709551616"}) {
+    const auto bad = ask(wrong);
+    EXPECT_EQ(bad.status, 400) << wrong;
+    EXPECT_EQ(protocol::decodeHttpError(400, bad.body).where, "?layout=") << wrong;
+  }
+  server.engine.changeLayout({});
+  EXPECT_EQ(ask(std::to_string(layout)).status, 409);
+  EXPECT_EQ(ask(std::to_string(layout + 1)).status, 200);
+}
+
 TEST(Http, WhatIsNotThereIsSaidSoInJson) {
   RunningServer server;
   const auto missing = request(server.port(), "GET", "/nothing");

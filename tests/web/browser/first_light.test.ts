@@ -2,7 +2,7 @@
 
 import type { Page } from 'playwright-core';
 import type {} from '../../../client/web/src/main';
-import { converged, difference, drawn, SCENES, serveEach } from './harness';
+import { converged, difference, drawn, putScene, SCENES, serveEach, squares } from './harness';
 
 const { pages, serve } = serveEach();
 
@@ -88,50 +88,22 @@ it.each(['', 'view=irradiance', 'view=pages'])(
 );
 
 /** A wall that shines upon a floor, 500 m away. */
-function bright(luminance: number): string {
-  const corners = [-0.5, 0, -0.5, -0.5, 0, 0.5, 0.5, 0, 0.5, 0.5, 0, -0.5];
-  const bytes = Buffer.alloc(60);
-  corners.forEach((v, i) => bytes.writeFloatLE(v, 4 * i));
-  [0, 1, 2, 0, 2, 3].forEach((v, i) => bytes.writeUInt16LE(v, 48 + 2 * i));
-  return JSON.stringify({
-    asset: { version: '2.0' },
-    scene: 0,
-    scenes: [{ nodes: [0, 1] }],
-    nodes: [
+function bright(emissiveStrength: number): string {
+  const extensions = { KHR_materials_emissive_strength: { emissiveStrength } };
+  return squares(
+    [
       { name: 'wall', mesh: 0, translation: [500, 0, 0], rotation: [Math.SQRT1_2, 0, 0, Math.SQRT1_2] },
       { name: 'floor', mesh: 1, translation: [500, -0.5, 0.5] },
     ],
-    meshes: [0, 1].map((material) => ({ primitives: [{ attributes: { POSITION: 0 }, indices: 1, material }] })),
-    extensionsUsed: ['KHR_materials_emissive_strength'],
-    materials: [
-      {
-        emissiveFactor: [1, 1, 1],
-        extensions: { KHR_materials_emissive_strength: { emissiveStrength: luminance } },
-      },
-      { pbrMetallicRoughness: { baseColorFactor: [0.5, 0.5, 0.5, 1] } },
-    ],
-    accessors: [
-      { bufferView: 0, componentType: 5126, count: 4, type: 'VEC3', min: [-0.5, 0, -0.5], max: [0.5, 0, 0.5] },
-      { bufferView: 1, componentType: 5123, count: 6, type: 'SCALAR' },
-    ],
-    bufferViews: [
-      { buffer: 0, byteOffset: 0, byteLength: 48 },
-      { buffer: 0, byteOffset: 48, byteLength: 12 },
-    ],
-    buffers: [{ byteLength: 60, uri: `data:application/octet-stream;base64,${bytes.toString('base64')}` }],
-  });
+    [{ emissiveFactor: [1, 1, 1], extensions }, { pbrMetallicRoughness: { baseColorFactor: [0.5, 0.5, 0.5, 1] } }],
+  );
 }
 
 it('shows a scene that takes the place of a darker one in its own brightness at once', async () => {
   const server = await serve(`${SCENES}/cornell.glb`);
   const page = await openWatched(`${server.url}/#ui=0`);
   const before = (await framesOf(page)).at(-1)!;
-  const answer = await fetch(`${server.url}/scene?name=bright.gltf`, {
-    method: 'PUT',
-    body: bright(1e5),
-    headers: { 'Content-Type': 'model/gltf+json' },
-  });
-  expect(answer.ok).toBe(true);
+  await putScene(server, bright(1e5));
   await page.waitForFunction((layout) => window.drawnFrames!.at(-1)!.layout !== layout, before.layout);
   const frames = (await framesOf(page)).filter(({ layout, light }) => layout !== before.layout && light);
   const last = frames.at(-1)!;

@@ -351,3 +351,58 @@ export async function until<T>(what: () => Promise<T>, good: (value: T) => boole
     await new Promise((resolve) => setTimeout(resolve, 50));
   }
 }
+
+export interface GltfNode {
+  name?: string;
+  mesh?: number;
+  translation?: number[];
+  rotation?: number[];
+  children?: number[];
+}
+
+const PAPER = {
+  name: 'paper',
+  emissiveFactor: [1, 1, 1],
+  pbrMetallicRoughness: { baseColorFactor: [0.5, 0.5, 0.5, 1] },
+};
+
+/** A glTF of squares, one metre wide, that face upwards: mesh i of `nodes` is one of the i-th material. */
+export function squares(nodes: GltfNode[], materials: object[] = [PAPER], meshName = 'square'): string {
+  const corners = [-0.5, 0, -0.5, -0.5, 0, 0.5, 0.5, 0, 0.5, 0.5, 0, -0.5];
+  const bytes = Buffer.alloc(60);
+  corners.forEach((v, i) => bytes.writeFloatLE(v, 4 * i));
+  [0, 1, 2, 0, 2, 3].forEach((v, i) => bytes.writeUInt16LE(v, 48 + 2 * i));
+  const hung = new Set(nodes.flatMap(({ children }) => children ?? []));
+  const uses = JSON.stringify(materials).includes('KHR_materials_emissive_strength');
+  return JSON.stringify({
+    asset: { version: '2.0' },
+    scene: 0,
+    scenes: [{ nodes: nodes.map((_, i) => i).filter((i) => !hung.has(i)) }],
+    nodes,
+    meshes: materials.map((_, material) => ({
+      name: meshName,
+      primitives: [{ attributes: { POSITION: 0 }, indices: 1, material }],
+    })),
+    ...(uses ? { extensionsUsed: ['KHR_materials_emissive_strength'] } : {}),
+    materials,
+    accessors: [
+      { bufferView: 0, componentType: 5126, count: 4, type: 'VEC3', min: [-0.5, 0, -0.5], max: [0.5, 0, 0.5] },
+      { bufferView: 1, componentType: 5123, count: 6, type: 'SCALAR' },
+    ],
+    bufferViews: [
+      { buffer: 0, byteOffset: 0, byteLength: 48 },
+      { buffer: 0, byteOffset: 48, byteLength: 12 },
+    ],
+    buffers: [{ byteLength: 60, uri: `data:application/octet-stream;base64,${bytes.toString('base64')}` }],
+  });
+}
+
+/** Loads a glTF as another program would. */
+export async function putScene(server: Server, gltf: string): Promise<void> {
+  const answer = await fetch(`${server.url}/scene?name=squares.gltf`, {
+    method: 'PUT',
+    body: gltf,
+    headers: { 'Content-Type': 'model/gltf+json' },
+  });
+  if (!answer.ok) throw new Error(await answer.text());
+}

@@ -3,64 +3,9 @@
 import type { Page } from 'playwright-core';
 import type {} from '../../../client/web/src/main';
 import { alive, countAlive, grown } from './card';
-import { converged, drawn, pixels, said, SCENES, type Server, serveEach, until } from './harness';
+import { converged, drawn, type GltfNode, pixels, putScene, said, SCENES, serveEach, squares, until } from './harness';
 
 const { pages, serve } = serveEach();
-
-interface Node {
-  name?: string;
-  mesh?: number;
-  translation?: number[];
-  children?: number[];
-}
-
-/** A glTF of squares, one metre wide, that face upwards and shine; `nodes` use mesh 0. */
-function squares(nodes: Node[], names: { material?: string; mesh?: string } = {}): string {
-  const corners = [-0.5, 0, -0.5, -0.5, 0, 0.5, 0.5, 0, 0.5, 0.5, 0, -0.5];
-  const bytes = Buffer.alloc(60);
-  corners.forEach((v, i) => bytes.writeFloatLE(v, 4 * i));
-  [0, 1, 2, 0, 2, 3].forEach((v, i) => bytes.writeUInt16LE(v, 48 + 2 * i));
-  const hung = new Set(nodes.flatMap(({ children }) => children ?? []));
-  return JSON.stringify({
-    asset: { version: '2.0' },
-    scene: 0,
-    scenes: [{ nodes: nodes.map((_, i) => i).filter((i) => !hung.has(i)) }],
-    nodes,
-    meshes: [{ name: names.mesh ?? 'square', primitives: [{ attributes: { POSITION: 0 }, indices: 1, material: 0 }] }],
-    materials: [
-      {
-        name: names.material ?? 'paper',
-        emissiveFactor: [1, 1, 1],
-        pbrMetallicRoughness: { baseColorFactor: [0.5, 0.5, 0.5, 1] },
-      },
-    ],
-    accessors: [
-      {
-        bufferView: 0,
-        componentType: 5126,
-        count: 4,
-        type: 'VEC3',
-        min: [-0.5, 0, -0.5],
-        max: [0.5, 0, 0.5],
-      },
-      { bufferView: 1, componentType: 5123, count: 6, type: 'SCALAR' },
-    ],
-    bufferViews: [
-      { buffer: 0, byteOffset: 0, byteLength: 48 },
-      { buffer: 0, byteOffset: 48, byteLength: 12 },
-    ],
-    buffers: [{ byteLength: 60, uri: `data:application/octet-stream;base64,${bytes.toString('base64')}` }],
-  });
-}
-
-async function put(server: Server, gltf: string): Promise<void> {
-  const answer = await fetch(`${server.url}/scene?name=harsh.gltf`, {
-    method: 'PUT',
-    body: gltf,
-    headers: { 'Content-Type': 'model/gltf+json' },
-  });
-  if (!answer.ok) throw new Error(await answer.text());
-}
 
 /** Until the page shows the scene that the server has, lit. */
 async function shown(page: Page, node: string): Promise<void> {
@@ -72,7 +17,7 @@ it('takes names for text, however they are written and however long they are', a
   const server = await serve();
   const evil = '<img src=x onerror="window.hacked=1"><script>window.hacked=1</script>';
   const long = 'W'.repeat(10_000);
-  await put(
+  await putScene(
     server,
     squares(
       [
@@ -80,7 +25,8 @@ it('takes names for text, however they are written and however long they are', a
         { name: long, mesh: 0, translation: [0, 1, 0] },
         { name: 'last', mesh: 0, translation: [2, 0, 0] },
       ],
-      { material: evil, mesh: long },
+      [{ name: evil, emissiveFactor: [1, 1, 1] }],
+      long,
     ),
   );
   const page = await pages.open(server.url, 1200, 800);
@@ -123,12 +69,12 @@ it('takes names for text, however they are written and however long they are', a
 
 it('lists ten thousand objects, and finds one of them by its name', async () => {
   const server = await serve();
-  const nodes: Node[] = Array.from({ length: 10_000 }, (_, i) => ({
+  const nodes: GltfNode[] = Array.from({ length: 10_000 }, (_, i) => ({
     name: `object ${i}`,
     ...(i % 100 === 0 ? { mesh: 0, translation: [(i / 100) % 10, 0, Math.floor(i / 1000)] } : {}),
   }));
   nodes.push({ name: 'the last', mesh: 0, translation: [0, 1, 0] });
-  await put(server, squares(nodes));
+  await putScene(server, squares(nodes));
   const page = await pages.open(server.url, 1200, 800);
   await shown(page, 'the last');
   await page.getByRole('tab', { name: 'Scene' }).click();
@@ -143,7 +89,7 @@ it('lists ten thousand objects, and finds one of them by its name', async () => 
 
 it('shows scenes without anything, and forgets one that its server has no more', async () => {
   const server = await serve();
-  await put(
+  await putScene(
     server,
     JSON.stringify({ asset: { version: '2.0' }, scenes: [{}], scene: 0, nodes: [{ name: 'nothing' }] }),
   );
@@ -151,14 +97,14 @@ it('shows scenes without anything, and forgets one that its server has no more',
   await page.waitForFunction(() => window.viewer?.viewer.shown !== undefined);
   await page.keyboard.press('f');
   await page.keyboard.press('m');
-  await put(server, squares([{ name: 'one', mesh: 0 }]));
+  await putScene(server, squares([{ name: 'one', mesh: 0 }]));
   await shown(page, 'one');
   await server.stop();
   await page.getByText(/No connection/).waitFor();
   await server.start(); // without a scene
   await page.getByText('No scene yet').waitFor();
   await page.waitForFunction(() => window.viewer!.viewer.shown === undefined);
-  await put(server, squares([{ name: 'two', mesh: 0 }]));
+  await putScene(server, squares([{ name: 'two', mesh: 0 }]));
   await shown(page, 'two');
 });
 
@@ -173,7 +119,7 @@ it('looks at a scene that somebody else has loaded, and stays where one was for 
   await page.evaluate(() => window.viewer!.connection.call('solve.configure', { texels: 9000 }));
   await converged(page);
   expect(await eye()).toEqual(before);
-  await put(server, squares([{ name: 'far away', mesh: 0, translation: [500, 0, 0] }]));
+  await putScene(server, squares([{ name: 'far away', mesh: 0, translation: [500, 0, 0] }]));
   await shown(page, 'far away');
   const after = await until(eye, ([x]) => Math.abs(x! - 500) < 50);
   expect(Math.abs(after[0]! - 500)).toBeLessThan(50);

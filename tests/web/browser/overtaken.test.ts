@@ -4,7 +4,7 @@
 import type { Page, Route } from 'playwright-core';
 import type {} from '../../../client/web/src/main';
 import { alive, countAlive, grown } from './card';
-import { converged, difference, drawn, pixels, said, SCENES, serveEach, until } from './harness';
+import { converged, difference, drawn, pixels, said, sceneOf, SCENES, serveEach, squares, until } from './harness';
 
 const { pages, serve } = serveEach();
 
@@ -219,29 +219,7 @@ it('keeps no pages of a layout or a scene that is gone, whatever was looked at',
 });
 
 /** A square that shines, somewhere. */
-function square(name: string, x: number): string {
-  const corners = [-0.5, 0, -0.5, -0.5, 0, 0.5, 0.5, 0, 0.5, 0.5, 0, -0.5];
-  const bytes = Buffer.alloc(60);
-  corners.forEach((v, i) => bytes.writeFloatLE(v, 4 * i));
-  [0, 1, 2, 0, 2, 3].forEach((v, i) => bytes.writeUInt16LE(v, 48 + 2 * i));
-  return JSON.stringify({
-    asset: { version: '2.0' },
-    scene: 0,
-    scenes: [{ nodes: [0] }],
-    nodes: [{ name, mesh: 0, translation: [x, 0, 0] }],
-    meshes: [{ primitives: [{ attributes: { POSITION: 0 }, indices: 1, material: 0 }] }],
-    materials: [{ emissiveFactor: [1, 1, 1] }],
-    accessors: [
-      { bufferView: 0, componentType: 5126, count: 4, type: 'VEC3', min: [-0.5, 0, -0.5], max: [0.5, 0, 0.5] },
-      { bufferView: 1, componentType: 5123, count: 6, type: 'SCALAR' },
-    ],
-    bufferViews: [
-      { buffer: 0, byteOffset: 0, byteLength: 48 },
-      { buffer: 0, byteOffset: 48, byteLength: 12 },
-    ],
-    buffers: [{ byteLength: 60, uri: `data:application/octet-stream;base64,${bytes.toString('base64')}` }],
-  });
-}
+const square = (name: string, x: number) => squares([{ name, mesh: 0, translation: [x, 0, 0] }]);
 
 it('shows the last of the files that are dropped, and one from where one was when that is no scene', async () => {
   const server = await serve(`${SCENES}/cornell.glb`);
@@ -252,7 +230,7 @@ it('shows the last of the files that are dropped, and one from where one was whe
   const eye = () => page.evaluate(() => window.viewer!.viewer.rig.camera.position.toArray());
   const drop = (name: string, text: string) =>
     page.evaluate(([n, t]) => void window.viewer!.edit.loadFile(new File([t!], n!)), [name, text]);
-  const gate = await holdBack(page, '/scene');
+  const gate = await holdBack(page, '/uploads');
   const given: string[] = [];
   page.on('requestfailed', (request) => given.push(new URL(request.url()).search));
 
@@ -281,5 +259,116 @@ it('shows the last of the files that are dropped, and one from where one was whe
   const [x] = await until(eye, ([now]) => Math.abs(now! - 500) < 50);
   expect(Math.abs(x! - 500)).toBeLessThan(50);
   expect(await page.evaluate(() => window.notes!.filter((text) => text.startsWith('slow.gltf:')))).toEqual([]);
+
+  // What was given up had left the page whole, and reaches the server only now: it is not loaded any more.
+  const request = gate.held[2]!.request();
+  const late = await fetch(request.url(), {
+    method: request.method(),
+    body: square('slow', 200),
+    headers: { 'Content-Type': 'application/octet-stream' },
+  });
+  expect(late.ok).toBe(true);
+  expect((await sceneOf(server)).nodes[0]!.name).toBe('quick');
+  forgiveRequests();
+});
+
+it('asks for the last of the files that are dropped after those before it, however soon it is there', async () => {
+  const server = await serve(`${SCENES}/cornell.glb`);
+  const page = await pages.open(server.url, 480, 480);
+  await converged(page);
+  // Both are on the server before the first is asked for.
+  const asked = await page.evaluate(
+    async ([first, second]) => {
+      const { connection, edit } = window.viewer!;
+      const call = connection.call.bind(connection);
+      const urls: string[] = [];
+      let dropped: Promise<void> | undefined;
+      connection.call = <T>(method: string, params: { url?: string } = {}) => {
+        if (method === 'scene.load') urls.push(params.url!);
+        // The second is dropped when the first has just been asked for.
+        if (method === 'scene.load') dropped ??= edit.loadFile(new File([second!], 'second.gltf'));
+        return call<T>(method, params);
+      };
+      await edit.loadFile(new File([first!], 'first.gltf'));
+      await dropped;
+      return urls.length;
+    },
+    [square('first', 300), square('second', 600)],
+  );
+  expect(asked).toBe(2);
+  expect((await sceneOf(server)).nodes[0]!.name).toBe('second');
+  expect(await page.evaluate(() => window.notes!.filter((text) => /^first\.gltf loaded/.test(text)))).toEqual([]);
+});
+
+it('shows errors of the layout that is on the screen, until the next one takes its place', async () => {
+  const server = await serve(`${SCENES}/cornell.glb`);
+  const page = await pages.open(server.url, 480, 480);
+  await converged(page);
+  await page.evaluate(() => window.viewer!.view.setMode('error'));
+  await page.waitForFunction(() => window.viewer!.viewer.shownData?.complete === true);
+  await drawn(page);
+  await page.evaluate(() => {
+    const seen: { layout: number; data: (number | undefined)[]; scale: number }[] = [];
+    (window as unknown as { seen: object[] }).seen = seen;
+    const { view, viewer } = window.viewer!;
+    const others = view.onDrawn.bind(view);
+    view.onDrawn = () => {
+      others();
+      const data = new Set<number | undefined>();
+      let scale = Infinity;
+      viewer.shown!.eachMaterial(({ page, own }) => {
+        if (!page) return;
+        const isData = viewer.shownData?.pages.some(({ texture }) => texture === own.dataPage.value);
+        data.add(isData ? viewer.shownData!.note.layout : undefined);
+        scale = Math.min(scale, own.dataScale.value);
+      });
+      seen.push({ layout: viewer.shown!.set.note.layout, data: [...data], scale });
+    };
+  });
+  const before = await layout(page);
+  const gate = await holdBack(page, '/scene.glb');
+  await configure(page, 9000);
+  await heldBack(gate, 1);
+  for (let i = 0; i < 3; ++i) await drawn(page); // tiles of the new layout are coming
+  gate.open = true;
+  await gate.held[0]!.continue();
+  await until(
+    () => page.evaluate(() => window.viewer!.viewer.shown!.set.note.layout),
+    (now) => now !== before,
+  );
+  await drawn(page);
+  const seen = await page.evaluate(
+    () => (window as unknown as { seen: { layout: number; data: (number | undefined)[]; scale: number }[] }).seen,
+  );
+  expect(new Set(seen.map((frame) => frame.layout)).size).toBe(2);
+  for (const frame of seen) expect(frame.data).toEqual([frame.layout]);
+  for (const frame of seen) expect(frame.scale).toBeGreaterThan(0);
+});
+
+it('does not take the geometry of another layout than it has asked for', async () => {
+  const server = await serve(`${SCENES}/cornell.glb`);
+  const page = await pages.open(server.url, 480, 480);
+  await converged(page);
+  // A request that is on its way for long: the pages have another layout when it arrives.
+  const gate = await holdBack(page, '/scene.glb');
+  await configure(page, 9000);
+  await heldBack(gate, 1);
+  const old = gate.held[0]!.request().url();
+  await configure(page, 10_000);
+  await heldBack(gate, 2);
+  const refused = await fetch(old);
+  expect(refused.status).toBe(409);
+  expect(((await refused.json()) as { error: { code: string } }).error.code).toBe('staleRevision');
+  expect((await fetch(gate.held[1]!.request().url())).status).toBe(200);
+  // One that is refused says nothing to the reader: the next is on its way.
+  gate.open = true;
+  await page.evaluate(async () => {
+    const { viewer } = window.viewer!;
+    const { geometry } = window.viewer! as unknown as { geometry: { load(note: object, set: object): Promise<void> } };
+    await geometry.load({ ...viewer.set!.note, uvs: '/scene.glb?layout=0' }, viewer.set!);
+  });
+  await configure(page, 11_000);
+  await converged(page);
+  expect(await page.evaluate(() => window.notes!.filter((text) => text.startsWith('The geometry')))).toEqual([]);
   forgiveRequests();
 });

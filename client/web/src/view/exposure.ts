@@ -4,6 +4,7 @@
 import { FloatType, HalfFloatType, WebGLRenderTarget, type Camera, type Scene, type WebGLRenderer } from 'three';
 import { decodeHalf } from '../protocol/rgb9e5';
 import type { ViewUniforms } from './lit_material';
+import { Readback } from './readback';
 
 const WIDTH = 64;
 const HEIGHT = 48;
@@ -41,13 +42,17 @@ export class ExposureMeter {
   private running: Promise<void> | undefined;
   private readonly target: WebGLRenderTarget;
   private readonly half: boolean;
+  private readonly readback: Readback;
 
   constructor(
     private readonly renderer: WebGLRenderer,
     private readonly view: ViewUniforms,
+    isCardQuiet: () => boolean,
   ) {
     this.half = !renderer.extensions.has('EXT_color_buffer_float');
     this.target = new WebGLRenderTarget(WIDTH, HEIGHT, { type: this.half ? HalfFloatType : FloatType });
+    const gl = renderer.getContext() as WebGL2RenderingContext;
+    this.readback = new Readback(gl, this.half ? gl.HALF_FLOAT : gl.FLOAT, WIDTH, HEIGHT, isCardQuiet);
   }
 
   /** Another scene, or another part of it: what was measured says nothing about it. */
@@ -66,6 +71,16 @@ export class ExposureMeter {
   /** How brightly to show light is still to be found out. */
   get unknown(): boolean {
     return this.automatic && this.waits;
+  }
+
+  /** A measurement is to be fetched as soon as the card has nothing to draw. */
+  get wantsQuiet(): boolean {
+    return this.readback.arrived;
+  }
+
+  /** The context is lost: what was on its way never comes. */
+  forgetCard(): void {
+    this.readback.forget();
   }
 
   /** Moves what is shown towards what was measured. True: not there yet. */
@@ -106,11 +121,12 @@ export class ExposureMeter {
     renderer.setRenderTarget(target);
     renderer.clear();
     renderer.render(scene, camera);
+    const begin = performance.now();
+    const reading = this.readback.read(pixels);
     renderer.setRenderTarget(null);
     view.all.measuring.value = false;
-    const begin = performance.now();
     try {
-      await renderer.readRenderTargetPixelsAsync(target, 0, 0, WIDTH, HEIGHT, pixels);
+      await reading;
       this.tookMs = performance.now() - begin;
       if (of !== this.scene) return;
       const value = exposureOf(this.luminances(pixels));

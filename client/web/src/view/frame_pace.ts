@@ -68,6 +68,11 @@ export class FramePace {
     return this.underWay.length > 0 || nowMs - this.lastEndMs < pause ? undefined : 1;
   }
 
+  /** The card has drawn all that it was given. */
+  get isIdle(): boolean {
+    return this.underWay.length === 0;
+  }
+
   /** A frame was handed to the card. */
   began(nowMs: number, scale: number): void {
     this.underWay.push({ scale, begunMs: nowMs });

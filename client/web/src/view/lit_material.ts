@@ -80,12 +80,12 @@ export class LitMaterial extends MeshLambertMaterial {
   /** The page's scale may have grown since the last frame. */
   refresh(): void {
     if (this.page) this.lightMapIntensity = this.page.scale;
-    if (this.dataPage) this.own.dataScale.value = this.dataPage.scale;
+    this.own.dataScale.value = this.dataPage?.scale ?? 0;
   }
 
   setDataPage(page: LightmapPage | undefined): void {
     this.dataPage = page;
-    this.own.dataPage.value = page?.texture ?? this.page?.texture ?? null;
+    this.own.dataPage.value = page?.texture ?? null; // light is no data: without any there is nothing to see
   }
 
   /** All of a surface looks the same but for its light. */
@@ -123,7 +123,6 @@ export class LitMaterial extends MeshLambertMaterial {
   private setPage(page: LightmapPage | undefined): void {
     this.page = page;
     this.lightMap = page?.texture ?? null;
-    this.own.dataPage.value = page?.texture ?? null;
     this.refresh();
   }
 

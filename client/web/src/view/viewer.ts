@@ -18,6 +18,7 @@ import { PagesView } from './pages_view';
 import { pick, readingAt, type Reading } from './picker';
 import { exposureByRays } from './ray_exposure';
 import { release } from './release';
+import { Screen } from './screen';
 import type { ViewMode } from './view_modes';
 
 /** For taking up tiles, of the 16 that a frame has; of longer ones the same share, but no task of 50. */
@@ -63,9 +64,12 @@ export class Viewer {
   readonly exposure: ExposureMeter;
   readonly gizmo: Gizmo;
   readonly pagesView: PagesView;
+  readonly screen: Screen;
   shown: LitScene | undefined;
-  /** Pages of error or unshot light, where they are streamed. */
+  /** Pages of error or unshot light, where they are streamed, of the newest layout. */
   dataSet: LightmapSet | undefined;
+  /** Those on the screen, of the layout that is shown: others would lie elsewhere on its surfaces. */
+  shownData: LightmapSet | undefined;
   mode: ViewMode | undefined;
   autoRange = true;
   private staged: Staged | undefined;
@@ -74,7 +78,6 @@ export class Viewer {
   private readonly pace: FramePace;
   private readonly fences: FrameFences;
   private scale: number;
-  private bufferKey = '';
   private readonly world = new Scene();
   private wanted = true;
   /** Something has changed that the scale of false colours, and the exposure, may depend on. */
@@ -94,7 +97,7 @@ export class Viewer {
     readonly canvas: HTMLCanvasElement,
     private readonly events: ViewerEvents,
   ) {
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, powerPreference: 'high-performance' });
+    this.renderer = new WebGLRenderer({ canvas, antialias: false, alpha: true, powerPreference: 'high-performance' });
     this.renderer.toneMapping = NoToneMapping; // our shaders do it, and the encoding, so that one program serves all
     this.renderer.outputColorSpace = LinearSRGBColorSpace;
     // Each answer about a program's text waits for all that the card has to do; a program that fails is heard of anyway.
@@ -106,8 +109,9 @@ export class Viewer {
     this.pace = new FramePace(drawsWithoutCard(gl));
     this.scale = this.pace.firstScale;
     this.fences = new FrameFences(gl);
+    this.screen = new Screen(this.renderer, gl); // which smooths edges
     this.rig = new CameraRig(canvas, () => this.moved());
-    this.exposure = new ExposureMeter(this.renderer, this.uniforms);
+    this.exposure = new ExposureMeter(this.renderer, this.uniforms, () => this.pace.isIdle);
     this.pagesView = new PagesView(canvas, this.uniforms, () => this.moved());
     this.gizmo = new Gizmo(this.world, this.rig.camera, canvas, {
       dragging: (active) => {
@@ -154,7 +158,8 @@ export class Viewer {
     this.dropStaged();
     const set = new LightmapSet(this.renderer, note, 'irradiance', this.events.used);
     this.staged = { set, since: performance.now() };
-    this.setDataQuantity(undefined);
+    if (this.dataSet !== this.shownData) this.dataSet?.dispose();
+    this.dataSet = undefined; // its tiles are not those of the new layout; what is on the screen stays there
     return set;
   }
 
@@ -215,7 +220,7 @@ export class Viewer {
   /** Pages for a quantity beside irradiance, or none. */
   setDataQuantity(quantity: string | undefined): LightmapSet | undefined {
     if (this.dataSet?.quantity === quantity) return this.dataSet;
-    this.dataSet?.dispose();
+    if (this.dataSet !== this.shownData) this.dataSet?.dispose();
     const note = this.set?.note;
     this.dataSet = quantity && note ? new LightmapSet(this.renderer, note, quantity, this.events.used) : undefined;
     this.bindData();
@@ -239,7 +244,7 @@ export class Viewer {
 
   readAt(x: number, y: number): Reading | undefined {
     const hit = this.pickAt(x, y);
-    const errors = this.dataSet?.quantity === 'error' ? this.dataSet.pages : undefined;
+    const errors = this.shownData?.quantity === 'error' ? this.shownData.pages : undefined;
     return hit && this.shown ? readingAt(this.shown, hit, errors) : undefined;
   }
 
@@ -294,8 +299,10 @@ export class Viewer {
     this.gate.turn(now, this.shown?.set.lit === true && this.exposure.unknown, this.replaced);
     this.measure(now);
     if (this.exposure.step(seconds)) this.wanted = true;
-    if (this.shown?.set.complete === false) this.pace.hurry(now, 0); // the first light is soon first, and then sharp
+    const streamed = this.dataSet ?? this.shown?.set;
+    if (streamed?.complete === false) this.pace.hurry(now, 0); // the first light is soon first, and then sharp
     if ((!this.wanted && !this.pace.isSharpDue(now)) || this.gate.standsStill(now)) return;
+    if (this.exposure.wantsQuiet) return;
     const scale = this.pace.ask(now);
     if (scale === undefined) return;
     this.wanted = false;
@@ -307,16 +314,14 @@ export class Viewer {
 
   /** `scale`: of each side, to draw fewer pixels than the screen has. */
   private draw(scale: number): void {
-    if (scale !== this.scale) {
-      this.scale = scale;
-      this.sizeBuffer();
-    }
+    this.scale = scale;
     if (!this.gate.isClosed(performance.now())) this.shown?.set.showLight();
     this.shown?.eachMaterial((material) => material.refresh());
     this.pagesView.refresh();
     this.people?.leaveOut(this.rig.camera);
     const flat = this.mode?.flat;
-    this.renderer.render(flat ? this.pagesView.scene : this.world, flat ? this.pagesView.camera : this.rig.camera);
+    const [scene, camera] = flat ? [this.pagesView.scene, this.pagesView.camera] : [this.world, this.rig.camera];
+    this.screen.draw(scale, () => this.renderer.render(scene, camera));
     if (this.people) {
       this.people.labels.hidden = flat === true;
       this.people.placeLabels(this.rig.camera, this.canvas.clientWidth, this.canvas.clientHeight);
@@ -378,7 +383,7 @@ export class Viewer {
   }
 
   private updateRange(): void {
-    const data = this.mode?.quantity === 'irradiance' ? this.shown?.set : this.dataSet;
+    const data = this.mode?.quantity === 'irradiance' ? this.shown?.set : this.shownData;
     const range = this.autoRange ? data?.range() : undefined;
     if (!range) return;
     const [low, high] = range;
@@ -389,7 +394,8 @@ export class Viewer {
   private promote(now: number): void {
     const staged = this.staged;
     if (!staged?.scene || this.gizmo.dragging) return; // what is held is not taken out of the hand
-    const lit = staged.set.covered && staged.set.waiting === 0 && staged.set.error < READY_ERROR;
+    const streamed = this.dataSet ?? staged.set;
+    const lit = streamed.covered && streamed.waiting === 0 && streamed.error < READY_ERROR;
     if (this.shown && !lit && now - staged.since < READY_AFTER_MS) return;
     this.staged = undefined;
     this.replaceShown(staged.scene);
@@ -420,11 +426,15 @@ export class Viewer {
     this.staged = undefined;
   }
 
+  /** Data of the layout that is shown; as long as they are only of the next, those there are of the quantity. */
   private bindData(): void {
-    const set = this.shown?.set;
-    this.shown?.eachMaterial((material) => {
-      const index = material.page ? (set?.pages.indexOf(material.page) ?? -1) : -1;
-      material.setDataPage(this.dataSet?.pages[index]);
+    const { shown, dataSet, shownData: before } = this;
+    if (dataSet?.note === shown?.set.note) this.shownData = dataSet;
+    else if (before?.note !== shown?.set.note || before?.quantity !== dataSet?.quantity) this.shownData = undefined;
+    if (before !== this.shownData) before?.dispose();
+    shown?.eachMaterial((material) => {
+      const index = material.page ? shown.set.pages.indexOf(material.page) : -1;
+      material.setDataPage(this.shownData?.pages[index]);
     });
     this.invalidate();
   }
@@ -432,28 +442,20 @@ export class Viewer {
   private resize(): void {
     const { clientWidth: width, clientHeight: height } = this.canvas;
     if (width === 0 || height === 0) return;
-    this.sizeBuffer();
+    this.screen.resize(width, height, Math.min(devicePixelRatio, 2));
     this.rig.resize(width / height);
     this.pagesView.resize(width / height);
     if (this.shown) this.draw(this.scale); // resizing clears the canvas: drawn at once, it does not blink
     this.invalidate();
   }
 
-  /** A new buffer waits for all that the card has to do, and clears the canvas: none is made for nothing. */
-  private sizeBuffer(): void {
-    const { clientWidth: width, clientHeight: height } = this.canvas;
-    const ratio = this.scale * Math.min(devicePixelRatio, 2);
-    const key = [width, height, ratio].join();
-    if (width === 0 || height === 0 || key === this.bufferKey) return;
-    this.bufferKey = key;
-    this.renderer.setDrawingBufferSize(width, height, ratio);
-  }
-
   private onContext(lost: boolean): void {
     this.lost = lost;
     this.pace.forget();
     this.fences.forget();
-    const sets = [this.shown?.set, this.staged?.set, this.dataSet];
+    this.screen.forget();
+    this.exposure.forgetCard();
+    const sets = new Set([this.shown?.set, this.staged?.set, this.dataSet, this.shownData]);
     if (lost) {
       for (const root of [this.world, this.pagesView.scene, this.staged?.scene?.root]) if (root) release(root);
       for (const set of sets) set?.release();

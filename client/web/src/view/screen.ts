@@ -1,0 +1,119 @@
+// What frames are drawn into: a buffer beside the canvas, of as many pixels as there is time for, and then brought onto the
+// canvas, which keeps its size. To change that makes a browser wait for all that the card has to draw: seconds, where
+// software draws. What is needed is asked of OpenGL itself, as no answer of it is to be waited for.
+
+import { WebGLRenderTarget, type WebGLRenderer } from 'three';
+
+/** What browsers give a canvas that asks for smooth edges. */
+const SAMPLES = 4;
+
+/** three.js has it for headsets. Draws into a framebuffer that it did not make, and leaves that to us. */
+interface TakesFramebuffers {
+  setRenderTargetFramebuffer(target: WebGLRenderTarget, framebuffer: WebGLFramebuffer): void;
+}
+
+/** Pixels of one size: the samples that are drawn, and what they come to. 36 bytes a pixel on the card. */
+class Layer {
+  readonly target: WebGLRenderTarget;
+  private readonly buffers: WebGLRenderbuffer[] = [];
+  private readonly drawn: WebGLFramebuffer;
+  private readonly smooth: WebGLFramebuffer;
+
+  constructor(
+    renderer: WebGLRenderer,
+    private readonly gl: WebGL2RenderingContext,
+    readonly width: number,
+    readonly height: number,
+  ) {
+    const samples = Math.min(SAMPLES, renderer.capabilities.maxSamples);
+    renderer.setRenderTarget(null); // as it is left
+    this.drawn = gl.createFramebuffer();
+    this.attach(this.drawn, gl.COLOR_ATTACHMENT0, gl.RGBA8, samples);
+    this.attach(this.drawn, gl.DEPTH_ATTACHMENT, gl.DEPTH_COMPONENT24, samples);
+    this.smooth = gl.createFramebuffer();
+    this.attach(this.smooth, gl.COLOR_ATTACHMENT0, gl.RGBA8, 0);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    this.target = new WebGLRenderTarget(width, height);
+    (renderer as unknown as TakesFramebuffers).setRenderTargetFramebuffer(this.target, this.drawn);
+  }
+
+  /** The canvas's framebuffer is bound before and after, as three.js believes. */
+  bringTo(width: number, height: number): void {
+    const { gl } = this;
+    const size = [0, 0, this.width, this.height] as const;
+    gl.bindFramebuffer(gl.READ_FRAMEBUFFER, this.drawn);
+    gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, this.smooth);
+    gl.blitFramebuffer(...size, ...size, gl.COLOR_BUFFER_BIT, gl.NEAREST);
+    gl.invalidateFramebuffer(gl.READ_FRAMEBUFFER, [gl.COLOR_ATTACHMENT0, gl.DEPTH_ATTACHMENT]);
+    gl.bindFramebuffer(gl.READ_FRAMEBUFFER, this.smooth);
+    gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, null);
+    const filter = width === this.width && height === this.height ? gl.NEAREST : gl.LINEAR;
+    gl.blitFramebuffer(...size, 0, 0, width, height, gl.COLOR_BUFFER_BIT, filter);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+  }
+
+  dispose(): void {
+    for (const buffer of this.buffers) this.gl.deleteRenderbuffer(buffer);
+    for (const framebuffer of [this.drawn, this.smooth]) this.gl.deleteFramebuffer(framebuffer);
+  }
+
+  private attach(framebuffer: WebGLFramebuffer, point: number, format: number, samples: number): void {
+    const { gl } = this;
+    const buffer = gl.createRenderbuffer();
+    gl.bindRenderbuffer(gl.RENDERBUFFER, buffer);
+    gl.renderbufferStorageMultisample(gl.RENDERBUFFER, samples, format, this.width, this.height);
+    gl.bindRenderbuffer(gl.RENDERBUFFER, null);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
+    gl.framebufferRenderbuffer(gl.FRAMEBUFFER, point, gl.RENDERBUFFER, buffer);
+    this.buffers.push(buffer);
+  }
+}
+
+export class Screen {
+  /** Pixels that the last frame was drawn with. */
+  drawn: readonly [number, number] = [0, 0];
+  private size: readonly [number, number] = [1, 1];
+  private whole: Layer | undefined;
+  /** Of what moves: of the last scale alone, as that seldom changes. */
+  private coarse: Layer | undefined;
+
+  constructor(
+    private readonly renderer: WebGLRenderer,
+    private readonly gl: WebGL2RenderingContext,
+  ) {}
+
+  /** Of the canvas, CSS pixels. Clears it, and waits for the card; does nothing where it has that size. */
+  resize(width: number, height: number, ratio: number): void {
+    const size = [width, height].map((side) => Math.floor(side * ratio)) as [number, number];
+    if (size.join() === this.size.join()) return;
+    this.size = size;
+    this.renderer.setDrawingBufferSize(width, height, ratio);
+    for (const layer of [this.whole, this.coarse]) layer?.dispose();
+    this.whole = this.coarse = undefined;
+  }
+
+  /** Draws with so many of the canvas's pixels, by each side, and brings that onto all of it. */
+  draw(scale: number, render: () => void): void {
+    const layer = this.layerOf(scale);
+    this.renderer.setRenderTarget(layer.target);
+    render();
+    this.renderer.setRenderTarget(null);
+    layer.bringTo(...this.size);
+    this.drawn = [layer.width, layer.height];
+  }
+
+  /** The context is lost, and all layers with it. */
+  forget(): void {
+    this.whole = this.coarse = undefined;
+  }
+
+  private layerOf(scale: number): Layer {
+    const [width, height] = this.size.map((side) => Math.max(1, Math.round(side * scale))) as [number, number];
+    if (scale === 1) return (this.whole ??= new Layer(this.renderer, this.gl, width, height));
+    if (this.coarse?.width !== width || this.coarse.height !== height) {
+      this.coarse?.dispose();
+      this.coarse = new Layer(this.renderer, this.gl, width, height);
+    }
+    return this.coarse;
+  }
+}
