@@ -124,26 +124,40 @@ std::size_t HemicubeRenderer::select(std::uint32_t resolution, std::span<const H
   return waiting;
 }
 
-/// Triangles that are drawn were counted as culled.
-void HemicubeRenderer::draw(TriangleCuller::Lists TriangleCuller::Selection::*lists, std::size_t views,
-                            solver::TransportCounters& counters) {
+/// Triangles that are drawn were counted as culled. Each face of all views has its own call and viewport: where a
+/// shader chooses the viewport llvmpipe takes triangles apart, with an allocation and three vertices for each, which
+/// took as long as drawing them.
+void HemicubeRenderer::draw(TriangleCuller::Lists TriangleCuller::Selection::*lists, std::uint32_t resolution,
+                            std::size_t views, solver::TransportCounters& counters) {
   indices_.clear();
   commands_.clear();
-  for (std::size_t i = 0; i < views; ++i) {
-    for (std::size_t l = 0; l < (selections_[i].*lists).size(); ++l) {
-      const auto indices = (selections_[i].*lists)[l].valid();
-      if (indices.empty()) continue;
-      commands_.push_back({static_cast<std::uint32_t>(indices.size()), 1, static_cast<std::uint32_t>(indices_.size()),
-                           0, static_cast<std::uint32_t>(i * RAD_FACES + l / 2)});
-      indices_.insert(indices_.end(), indices.begin(), indices.end());
+  std::array<std::size_t, RAD_FACES + 1> first{};
+  for (std::size_t face = 0; face < RAD_FACES; ++face) {
+    for (std::size_t i = 0; i < views; ++i) {
+      for (std::size_t l = 2 * face; l < 2 * face + 2; ++l) {
+        const auto indices = (selections_[i].*lists)[l].valid();
+        if (indices.empty()) continue;
+        commands_.push_back({static_cast<std::uint32_t>(indices.size()), 1, static_cast<std::uint32_t>(indices_.size()),
+                             0, static_cast<std::uint32_t>(i * RAD_FACES + face)});
+        indices_.insert(indices_.end(), indices.begin(), indices.end());
+      }
     }
+    first[face + 1] = commands_.size();
   }
   if (commands_.empty()) return;
   counters.triangles_drawn += indices_.size() / 3;
   counters.triangles_culled -= indices_.size() / 3;
   fill(indices_buffer_, std::span<const std::uint32_t>(indices_), GL_STREAM_DRAW);
   fill(commands_buffer_, std::span<const DrawCommand>(commands_), GL_STREAM_DRAW);
-  glMultiDrawElementsIndirect(GL_TRIANGLES, GL_UNSIGNED_INT, nullptr, static_cast<GLsizei>(commands_.size()), 0);
+  const auto n = static_cast<GLsizei>(resolution);
+  for (std::size_t face = 0; face < RAD_FACES; ++face) {
+    const auto count = first[face + 1] - first[face];
+    if (count == 0) continue;
+    const auto row = face == 0 ? 0 : n + (static_cast<GLsizei>(face) - 1) * n / 2;
+    glViewport(0, row, n, face == 0 ? n : n / 2);
+    const auto* from = reinterpret_cast<const void*>(first[face] * sizeof(DrawCommand));
+    glMultiDrawElementsIndirect(GL_TRIANGLES, GL_UNSIGNED_INT, from, static_cast<GLsizei>(count), 0);
+  }
 }
 
 void HemicubeRenderer::takeHidden(std::uint32_t resolution, std::span<const HemicubeView> views, const Target& target,
@@ -165,14 +179,7 @@ void HemicubeRenderer::read(const Texture& from, std::uint32_t resolution, std::
                        into.data());
 }
 
-void HemicubeRenderer::setState(HemicubePass pass, std::uint32_t resolution, const Target& target) {
-  const auto n = static_cast<float>(resolution);
-  std::array<std::array<float, 4>, RAD_FACES> viewports{};
-  viewports[0] = {0.0F, 0.0F, n, n};
-  for (int face = 1; face < RAD_FACES; ++face) {
-    viewports[static_cast<std::size_t>(face)] = {0.0F, n + static_cast<float>(face - 1) * n / 2.0F, n, n / 2.0F};
-  }
-  glViewportArrayv(0, RAD_FACES, viewports[0].data());
+void HemicubeRenderer::setState(HemicubePass pass, const Target& target) {
   glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
   glEnable(GL_DEPTH_TEST);
   glDisable(GL_CULL_FACE);
@@ -218,14 +225,14 @@ std::span<const std::uint32_t> HemicubeRenderer::render(HemicubePass pass, std::
   const auto waiting = select(resolution, views, counters);
   fill(views_buffer_, std::span<const FaceView>(face_views_), GL_STREAM_DRAW);
 
-  setState(pass, resolution, into);
+  setState(pass, into);
   const GLuint background = pass == HemicubePass::kNodes ? scene_->escapedId() : RAD_ITEM_NONE;
   const float far_depth = 0.0F;
   glClearNamedFramebufferuiv(into.framebuffer.name(), GL_COLOR, 0, &background);
   glClearNamedFramebufferfv(into.framebuffer.name(), GL_DEPTH, 0, &far_depth);
-  draw(&TriangleCuller::Selection::first, views.size(), counters);
+  draw(&TriangleCuller::Selection::first, resolution, views.size(), counters);
   if (waiting >= kWorthASecondLook * views.size()) takeHidden(resolution, views, into, counters);
-  draw(&TriangleCuller::Selection::second, views.size(), counters);
+  draw(&TriangleCuller::Selection::second, resolution, views.size(), counters);
 
   read(into.ids, resolution, views.size(), GL_RED_INTEGER, GL_UNSIGNED_INT, pixels_);
   if (pass == HemicubePass::kPaper) paper_ids_->decode(pixels_, scene_->escapedId());

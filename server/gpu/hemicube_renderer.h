@@ -67,10 +67,10 @@ class HemicubeRenderer {
                      solver::TransportCounters& counters);
   void takeHidden(std::uint32_t resolution, std::span<const HemicubeView> views, const Target& target,
                   solver::TransportCounters& counters);
-  void draw(TriangleCuller::Lists TriangleCuller::Selection::*lists, std::size_t views,
+  void draw(TriangleCuller::Lists TriangleCuller::Selection::*lists, std::uint32_t resolution, std::size_t views,
             solver::TransportCounters& counters);
   void useProgram(HemicubePass pass) const;
-  void setState(HemicubePass pass, std::uint32_t resolution, const Target& target);
+  void setState(HemicubePass pass, const Target& target);
   template <typename T>
   void read(const Texture& from, std::uint32_t resolution, std::size_t views, unsigned format, unsigned type,
             std::vector<T>& into);

@@ -41,15 +41,15 @@ struct FaceView {
   const auto shift_side = static_cast<float>((1.0 - 2.0 * up) / (columns / 2.0) - 1.0);
   const float footprint = 4.0F / static_cast<float>(resolution * resolution) * std::exp2(2.0F * level_bias);
   const auto origin = axes.origin, t = axes.tangent, b = axes.bitangent, n = axes.normal;
-  const auto side = [&](int face, glm::vec3 right, glm::vec3 depth) {
+  const auto side = [&](glm::vec3 right, glm::vec3 depth) {
     return FaceView{{right + shift_x * depth, footprint},
-                    {2.0F * n + shift_side * depth, static_cast<float>(face)},
+                    {2.0F * n + shift_side * depth, 0.0F},
                     {depth, static_cast<float>(layer)},
                     {origin, level_bias}};
   };
   const FaceView top{
       {t + shift_x * n, footprint}, {b + shift_top * n, 0.0F}, {n, static_cast<float>(layer)}, {origin, level_bias}};
-  return {top, side(1, b, t), side(2, b, -t), side(3, t, b), side(4, t, -b)};
+  return {top, side(b, t), side(b, -t), side(t, b), side(t, -b)};
 }
 
 }  // namespace radiosity::gpu

@@ -8,7 +8,7 @@ layout(location = RAD_ATTRIBUTE_NODES) in uvec4 nodes;  // first node of front a
 
 // The view, one for each draw (instance divisor 1). Attributes, since llvmpipe reads storage buffers lane by lane.
 layout(location = RAD_ATTRIBUTE_VIEW) in vec4 view_right;       // clip.x; w: pixel's footprint at distance 1, times 4^bias
-layout(location = RAD_ATTRIBUTE_VIEW + 1) in vec4 view_up;      // clip.y axis; w: face
+layout(location = RAD_ATTRIBUTE_VIEW + 1) in vec4 view_up;      // clip.y axis
 layout(location = RAD_ATTRIBUTE_VIEW + 2) in vec4 view_depth;   // clip.w axis; w: layer
 layout(location = RAD_ATTRIBUTE_VIEW + 3) in vec4 view_origin;  // shooter; w: level bias
 
@@ -44,7 +44,6 @@ void main() {
                      0.5 + dot(view_depth.xyz, d), 1.0);
 #else
   gl_Position = vec4(dot(view_right.xyz, d), dot(view_up.xyz, d), RAD_NEAR, dot(view_depth.xyz, d));
-  gl_ViewportIndex = int(view_up.w);
 #endif
   gl_Layer = int(view_depth.w);
 #ifdef SEE_THROUGH
