@@ -13,8 +13,9 @@ from harness import ServiceCase, program
 from patience import PATIENCE
 from wire import Session
 
-# Long enough that nobody is too late to disturb it: seconds where nothing else runs.
-SETTINGS = ("--error", "0.005", "--texels", "6000", "--workers", "2")
+# Long enough that nobody is too late to disturb it: seconds where nothing else runs. Under a sanitizer, where all is slower,
+# a third of the shots is long enough.
+SETTINGS = ("--error", "0.005" if PATIENCE == 1 else "0.01", "--texels", "6000", "--workers", "2")
 # On a machine that others use too. A renderer that stops while it draws is given up after half a minute, or a whole one:
 # it is given as long again if it had used the processor.
 SECONDS = 400 * PATIENCE
