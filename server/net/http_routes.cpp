@@ -132,7 +132,11 @@ void getSceneGltf(const std::shared_ptr<Hub>& hub, HttpRequest& /*request*/, con
 void getSceneGlb(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond& done) {
   const auto layout = queryLayout(request);
   if (!layout) return done(errorResponse(layout.error()));
-  hub->engine().sceneGlb(*layout, fileAnswer(*hub, done, "model/gltf-binary"));
+  // Nobody's fault: the layout changed while the request was on its way.
+  hub->engine().sceneGlb(*layout, hub->fromEngine<SharedBytes>([done](Result<SharedBytes> glb) {
+    const bool overtaken = !glb && glb.error().code == ErrorCode::kStaleRevision;
+    done(glb ? file(std::move(*glb), "model/gltf-binary") : overtaken ? plain(204, "") : errorResponse(glb.error()));
+  }));
 }
 
 void getUnlitGlb(const std::shared_ptr<Hub>& hub, HttpRequest& /*request*/, const Respond& done) {

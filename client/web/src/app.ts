@@ -8,7 +8,6 @@ import { ViewSession } from './app_view';
 import { DocumentFetch } from './document/document_fetch';
 import type { Gltf } from './document/gltf';
 import { Connection, type LinkState } from './protocol/connection';
-import { HttpError } from './protocol/http_error';
 import {
   NOT_FOUND,
   type Bookmark,
@@ -182,7 +181,7 @@ export class App {
     }
   }
 
-  /** HTTP with the token, where there is one. Rejects with HttpError where the server refuses. */
+  /** HTTP with the token, where there is one. Rejects with what the server says is wrong. */
   async fetch(path: string, init: RequestInit = {}): Promise<Response> {
     const headers = new Headers(init.headers);
     if (this.token) headers.set('Authorization', `Bearer ${this.token}`);
@@ -192,7 +191,7 @@ export class App {
       | { error?: { message: string; where?: string } }
       | undefined;
     const { message, where } = body?.error ?? { message: `HTTP ${response.status}` };
-    throw new HttpError(where ? `${where}: ${message}` : message, response.status);
+    throw new Error(where ? `${where}: ${message}` : message);
   }
 
   /** Streams the quantity that the view needs. */

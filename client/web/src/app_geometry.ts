@@ -2,9 +2,10 @@
 
 import type { App } from './app';
 import { pauseMs } from './protocol/connection';
-import { CONFLICT, HttpError } from './protocol/http_error';
 import type { LightmapsNote } from './protocol/messages';
 import type { LightmapSet } from './view/lightmap_set';
+
+const NO_CONTENT = 204;
 
 export class GeometrySession {
   private running: AbortController | undefined;
@@ -23,8 +24,6 @@ export class GeometrySession {
       const glb = await this.fetch(note.uvs, () => viewer.set === set, signal);
       if (glb && viewer.set === set) await viewer.load(glb, set);
     } catch (error) {
-      // Pages have another layout by now: the server tells of it, and this one is not waited for.
-      if (error instanceof HttpError && error.status === CONFLICT) return;
       if (viewer.set === set && !signal.aborted) frame.toasts.show(`The geometry: ${(error as Error).message}`, 'bad');
     }
   }
@@ -33,7 +32,9 @@ export class GeometrySession {
   private async fetch(path: string, wanted: () => boolean, signal: AbortSignal): Promise<ArrayBuffer | undefined> {
     for (let attempt = 0; !signal.aborted && wanted(); ++attempt) {
       try {
-        return await (await this.app.fetch(path, { signal })).arrayBuffer();
+        const response = await this.app.fetch(path, { signal });
+        // Pages have another layout by now: the server tells of it, and this one is not waited for.
+        return response.status === NO_CONTENT ? undefined : await response.arrayBuffer();
       } catch (error) {
         if (signal.aborted) return undefined;
         if (!(error instanceof TypeError)) throw error; // fetch() has no other sign of a line that broke
