@@ -13,8 +13,10 @@ namespace radiosity::solver {
 namespace {
 
 constexpr double kSliverPart = 0.25;
-constexpr double kReach = 1.5;   // edges of a leaf
-constexpr float kFacing = 0.5F;  // cosine between their normals
+constexpr double kReach = 1.5;        // edges of a leaf
+constexpr float kLeastReach = 1e-6F;  // unit box: nearer than this floats do not tell places apart
+constexpr float kFacing = 0.5F;       // cosine between their normals
+constexpr float kAside = 0.3F;        // out of the larger one's plane, of the reach
 
 struct Leaf {
   std::tuple<int, int, int> cell;
@@ -32,6 +34,9 @@ class Instance {
  private:
   template <typename Visit>
   void visitLeaves(const Visit& visit) const;
+  [[nodiscard]] double areaOf(const Side& side) const {
+    return static_cast<double>(patches_.node_area[side.first_node + side.node_count - 1]);
+  }
   [[nodiscard]] std::tuple<int, int, int> cellOf(const glm::vec3& at) const;
   [[nodiscard]] const Leaf* neighbourOf(const Leaf& sliver) const;
 
@@ -53,17 +58,24 @@ Instance::Instance(const scene::PatchScene& patches, const std::vector<Side>& si
     least = std::min(least, area);
   });
   if (!(sum > 0.0)) return;
-  thin_ = kSliverPart * squares / sum;
-  if (least >= thin_) return;
-  reach_ = static_cast<float>(kReach * std::sqrt(squares / sum));
+  const double mean = squares / sum;
+  thin_ = kSliverPart * mean;
+  reach_ = static_cast<float>(kReach * std::sqrt(mean));
+  if (least >= thin_ || reach_ < kLeastReach) return;
   visitLeaves([&](std::uint32_t s, std::uint32_t leaf, double area) {
-    const auto& place = patches_.leaves[patches_.surfaces[sides_[s].surface].first_leaf + leaf];
+    const auto& surface = patches_.surfaces[sides_[s].surface];
+    const auto texel = static_cast<double>(surface.texel_area);
+    const auto& place = patches_.leaves[surface.first_leaf + leaf];
     if (place.triangle == scene::kNone) return;
     const auto& frame = patches_.triangles[place.triangle];
     const glm::vec3 at = frame.origin + place.texel.x * frame.du + place.texel.y * frame.dv;
     const Leaf found{cellOf(at), at, sides_[s].side == 0 ? frame.normal : -frame.normal, sides_[s].first_value + leaf,
                      s};
-    (area < thin_ ? slivers_ : others_).push_back(found);
+    if (area >= thin_) {
+      others_.push_back(found);
+    } else if (area < kSliverPart * texel || areaOf(sides_[s]) < mean) {
+      slivers_.push_back(found);  // and not of a finer chart beside a coarse one, which shows what it shows
+    }
   });
   std::sort(others_.begin(), others_.end(),
             [](const Leaf& a, const Leaf& b) { return std::tie(a.cell, a.value) < std::tie(b.cell, b.value); });
@@ -97,6 +109,7 @@ const Leaf* Instance::neighbourOf(const Leaf& sliver) const {
         const glm::vec3 apart = leaf->at - sliver.at;
         const float distance = glm::dot(apart, apart);
         if (distance >= best || glm::dot(leaf->normal, sliver.normal) < kFacing) continue;
+        if (std::abs(glm::dot(leaf->normal, apart)) > kAside * reach_) continue;  // the other face of a shelf, say
         best = distance;
         nearest = &*leaf;
       }

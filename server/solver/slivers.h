@@ -17,9 +17,10 @@ struct Sliver {
 };
 
 /// Ascending by leaf: every leaf of less than a quarter of the area that leaves of its instance have (the mean over the
-/// instance's area), with the nearest one that is larger, belongs to the same instance, faces about the same way and
-/// lies within one and a half of their edges. What has no such neighbour is left out. Cost: a few times that of looking
-/// at every leaf.
+/// instance's area), if it is as small beside a full one of its chart, too, or all of its chart is smaller than that
+/// mean; with the nearest leaf that is larger, belongs to the same instance, faces about the same way, about in the
+/// same plane, and lies within one and a half of their edges. What has no such neighbour is left out. Cost: of looking
+/// at every leaf, and for each sliver at all that are larger within about one and a half edges.
 [[nodiscard]] std::vector<Sliver> findSlivers(const scene::PatchScene& patches, const std::vector<Side>& sides);
 
 }  // namespace radiosity::solver

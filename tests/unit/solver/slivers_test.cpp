@@ -58,6 +58,24 @@ TEST_F(Slivers, ThatFaceTheOtherWayOrLieFarOffOrBelongToSomethingElseShareWithNo
   EXPECT_TRUE(findSlivers(*made_.patches, sides_).empty()) << "by themselves they are no slivers";
 }
 
+TEST_F(Slivers, ThatAreAFinerChartBesideACoarseOneKeepWhatTheyShow) {
+  // 8 x 8 leaves of a hundredth each: more than the one leaf of a sixteenth that all of them are nearest to.
+  make({{{0.9F, 0, 0.75F}, {0, 0, 0.3F}, {0.3F, 0, 0}, 8, 8, {}, {}}});
+  for (const auto& sliver : findSlivers(*made_.patches, sides_)) EXPECT_NE(sliver.leaf, sides_[0].first_value + 15);
+  make({{{0.9F, 0, 0.85F}, {0, 0, 0.06F}, {0.06F, 0, 0}, 2, 2, {}, {}}});
+  EXPECT_EQ(findSlivers(*made_.patches, sides_).size(), 4U);
+}
+
+TEST_F(Slivers, OnTheOtherFaceOfAShelfShareWithNone) {
+  auto under = tiny(-0.05F);
+  under.origin.y = -0.2F;
+  make({under});
+  EXPECT_TRUE(findSlivers(*made_.patches, sides_).empty());
+  under.origin.y = -0.05F;
+  make({under});
+  EXPECT_EQ(findSlivers(*made_.patches, sides_).size(), 1U);
+}
+
 TEST_F(Slivers, OfAScatteredSampleGetWhatTheLeafBesideThemGetsAndAllOfItStays) {
   make({tiny(0.0F)});
   LinkSample hit;  // one pixel, on so small a place

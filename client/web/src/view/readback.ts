@@ -24,8 +24,8 @@ export class Readback {
   ) {}
 
   /**
-   * Of the framebuffer that is bound, RGBA, into `pixels`; one at a time. Ends when they are there. Rejects where the context
-   * is lost on the way, or nothing comes.
+   * Of the framebuffer that is bound, RGBA, into `pixels`; one at a time. Ends when they are there; where the card has not
+   * said so after five seconds, it is waited for. Rejects where the context is lost on the way.
    */
   async read(pixels: Uint16Array | Float32Array): Promise<void> {
     const { gl } = this;
