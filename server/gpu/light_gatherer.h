@@ -36,10 +36,11 @@ class LightGatherer {
   void beginLinks(const solver::GatherShot& shot, std::span<const solver::NodeRun> named = {});
   void look(const solver::GatherShot& shot, const solver::HemicubeFrame& point, std::span<const std::uint32_t> items,
             const HemicubeWeights& weights, const ViewWindow* window = nullptr);
-  /// What a look at some receivers, and at boxes, can show; nothing where that is nearly all.
+  /// Finds the places of some receivers, for windowOf() at all points of the shot.
+  void findWanted(const solver::GatherShot& shot, std::span<const solver::NodeRun> named);
+  /// What a look at these, and at boxes, can show; nothing where that is nearly all.
   [[nodiscard]] std::optional<ViewWindow> windowOf(const solver::GatherShot& shot, const solver::HemicubeFrame& point,
-                                                   std::span<const solver::NodeRun> named,
-                                                   std::span<const scene::ChangedBox> boxes);
+                                                   std::span<const scene::ChangedBox> boxes) const;
   void finishLinks(const solver::GatherShot& shot, solver::LinkSample& sample, solver::TransportCounters& counters);
 
  private:
@@ -108,7 +109,8 @@ class LightGatherer {
   std::uint32_t look_count_ = 0;
   solver::Looks open_looks_;  ///< likewise: of them those that lost something
   std::vector<std::uint32_t> starts_;
-  std::vector<glm::vec3> places_;  ///< of named receivers
+  std::vector<glm::vec3> places_;  ///< of wanted receivers
+  float pixels_around_ = 0.0F;     ///< that they want drawn around these
 };
 
 }  // namespace radiosity::gpu

@@ -328,11 +328,9 @@ void LightGatherer::forEachGroup(std::span<const solver::NodeRun> named, const T
   }
 }
 
-std::optional<ViewWindow> LightGatherer::windowOf(const solver::GatherShot& shot, const solver::HemicubeFrame& point,
-                                                  std::span<const solver::NodeRun> named,
-                                                  std::span<const scene::ChangedBox> boxes) {
+void LightGatherer::findWanted(const solver::GatherShot& shot, std::span<const solver::NodeRun> named) {
   places_.clear();
-  float around = kPixelsAround;
+  pixels_around_ = kPixelsAround;
   forEachGroup(named, [&](const Receivers::Group& group) {
     const auto& surface = receivers_->patches().surfaces[group.surface];
     if (behind(shot, surface)) return;
@@ -340,12 +338,16 @@ std::optional<ViewWindow> LightGatherer::windowOf(const solver::GatherShot& shot
                                receivers_->patches().triangles[surface.first_triangle].du);
     for (std::size_t i = group.first; i < group.first + group.count; ++i) {
       const auto& receiver = receivers_->all()[i];
-      if (receivers_->careOf(receiver) != 0) around = kPixelsAroundMore;
+      if (receivers_->careOf(receiver) != 0) pixels_around_ = kPixelsAroundMore;
       forEachPlace(shot, ball, *receivers_, receiver,
                    [&](const Receivers::Place& place, float /*share*/) { places_.push_back(place.point); });
     }
   });
-  return windowAround(point, places_, boxes, around * 2.0F / static_cast<float>(shot.resolution));
+}
+
+std::optional<ViewWindow> LightGatherer::windowOf(const solver::GatherShot& shot, const solver::HemicubeFrame& point,
+                                                  std::span<const scene::ChangedBox> boxes) const {
+  return windowAround(point, places_, boxes, pixels_around_ * 2.0F / static_cast<float>(shot.resolution));
 }
 
 void LightGatherer::beginLinks(const solver::GatherShot& shot, std::span<const solver::NodeRun> named) {

@@ -69,9 +69,11 @@ void ShotRunner::measureGather(const ShotSpan& shots, const solver::Transport::T
       const auto& shot = shots.gather[looks[last].shot];
       const auto& point = shots.points[looks[last].point];
       views.push_back({point, 0.0F, std::nullopt});
-      if (shot.box_count > 0 && !shot.open_looks.has(static_cast<std::uint32_t>(looks[last].point - shot.first_point)))
-        views.back().window = gatherer_.windowOf(shot, point, shots.receivers.subspan(shot.first_run, shot.run_count),
-                                                 shots.boxes.subspan(shot.first_box, shot.box_count));
+      if (shot.box_count == 0) continue;
+      if (looks[last].point == shot.first_point)
+        gatherer_.findWanted(shot, shots.receivers.subspan(shot.first_run, shot.run_count));
+      if (!shot.open_looks.has(static_cast<std::uint32_t>(looks[last].point - shot.first_point)))
+        views.back().window = gatherer_.windowOf(shot, point, shots.boxes.subspan(shot.first_box, shot.box_count));
     }
     const auto images = renderer_.render(HemicubePass::kItems, resolution, views, counters);
     const auto start = Clock::now();

@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/vec4.hpp>
 #include <vector>
+
+#include "common/clones.h"
 
 namespace radiosity::gpu {
 namespace {
@@ -12,8 +15,83 @@ constexpr float kWidest = 0.35F;
 /// Planes steeper than this leave out next to nothing; rad from the middle.
 constexpr float kSteepest = 1.4F;
 
+constexpr std::size_t kLanes = 8;
+
+/// Directions from the eye, as many as fill all lanes.
+struct Directions {
+  std::vector<float> x, y, z;
+  void clear() {
+    for (auto* values : {&x, &y, &z}) values->clear();
+  }
+  void push_back(const glm::vec3& d) {
+    x.push_back(d.x);
+    y.push_back(d.y);
+    z.push_back(d.z);
+  }
+  void fillLanes() {
+    while (x.size() % kLanes != 0) push_back({x.back(), y.back(), z.back()});
+  }
+};
+
+/// To length one. Returns their sum, and the square of the shortest length that was there.
+RADIOSITY_CLONES glm::vec4 normalizeAll(float* x, float* y, float* z, std::size_t count) {
+  float sum[3][kLanes] = {}, shortest[kLanes];
+  for (float& square : shortest) square = 1e30F;
+  for (std::size_t i = 0; i < count; i += kLanes) {
+    for (std::size_t k = 0; k < kLanes; ++k) {
+      const float square = x[i + k] * x[i + k] + y[i + k] * y[i + k] + z[i + k] * z[i + k];
+      const float part = 1.0F / std::sqrt(square);
+      shortest[k] = square < shortest[k] ? square : shortest[k];
+      sum[0][k] += x[i + k] *= part;
+      sum[1][k] += y[i + k] *= part;
+      sum[2][k] += z[i + k] *= part;
+    }
+  }
+  glm::vec4 all(0.0F, 0.0F, 0.0F, 1e30F);
+  for (std::size_t k = 0; k < kLanes; ++k) {
+    all += glm::vec4(sum[0][k], sum[1][k], sum[2][k], 0.0F);
+    all.w = std::min(all.w, shortest[k]);
+  }
+  return all;
+}
+
+struct PyramidAxes {
+  glm::vec3 axis, right, up;
+};
+
+/// Least depth along the axis, and least and greatest tangents to the right and upwards, of directions of length one.
+struct Spread {
+  float depth = 1e30F, left = 1e30F, right = -1e30F, below = 1e30F, above = -1e30F;
+};
+
+RADIOSITY_CLONES void spreadOf(const PyramidAxes& axes, const float* x, const float* y, const float* z,
+                               std::size_t count, Spread& spread) {
+  const auto [a, r, u] = axes;
+  float depth[kLanes], left[kLanes], right[kLanes], below[kLanes], above[kLanes];
+  for (std::size_t k = 0; k < kLanes; ++k) {
+    depth[k] = left[k] = below[k] = 1e30F;
+    right[k] = above[k] = -1e30F;
+  }
+  for (std::size_t i = 0; i < count; i += kLanes) {
+    for (std::size_t k = 0; k < kLanes; ++k) {
+      const float dx = x[i + k], dy = y[i + k], dz = z[i + k];
+      const float d = dx * a.x + dy * a.y + dz * a.z;
+      const float across = (dx * r.x + dy * r.y + dz * r.z) / d, along = (dx * u.x + dy * u.y + dz * u.z) / d;
+      depth[k] = d < depth[k] ? d : depth[k];
+      left[k] = across < left[k] ? across : left[k];
+      right[k] = across > right[k] ? across : right[k];
+      below[k] = along < below[k] ? along : below[k];
+      above[k] = along > above[k] ? along : above[k];
+    }
+  }
+  for (std::size_t k = 0; k < kLanes; ++k) {
+    spread = {std::min(spread.depth, depth[k]), std::min(spread.left, left[k]), std::max(spread.right, right[k]),
+              std::min(spread.below, below[k]), std::max(spread.above, above[k])};
+  }
+}
+
 /// What of a box is before a plane, as points whose hull holds it.
-void addBox(const scene::ChangedBox& box, const solver::HemicubeFrame& eye, std::vector<glm::vec3>& directions) {
+void addBox(const scene::ChangedBox& box, const solver::HemicubeFrame& eye, Directions& directions) {
   std::array<glm::vec3, 8> corner{};
   float low = 1e30F, high = -1e30F;
   for (std::size_t c = 0; c < 8; ++c) {
@@ -33,11 +111,7 @@ void addBox(const scene::ChangedBox& box, const solver::HemicubeFrame& eye, std:
 
 /// Low and high tangent of the angle from the axis towards `across`.
 struct Extent {
-  float low = 1e30F, high = -1e30F;
-  void add(float tangent) {
-    low = std::min(low, tangent);
-    high = std::max(high, tangent);
-  }
+  float low, high;
   [[nodiscard]] float largest() const { return std::max(std::abs(low), std::abs(high)); }
 };
 
@@ -45,29 +119,23 @@ struct Extent {
 
 std::optional<ViewWindow> windowAround(const solver::HemicubeFrame& eye, std::span<const glm::vec3> points,
                                        std::span<const scene::ChangedBox> boxes, float margin_rad) {
-  thread_local std::vector<glm::vec3> directions;
+  thread_local Directions directions;
   directions.clear();
   for (const auto& point : points) directions.push_back(point - eye.origin);
   for (const auto& box : boxes) addBox(box, eye, directions);
-  glm::vec3 sum(0.0F);
-  for (auto& d : directions) {
-    const float length = glm::length(d);
-    if (!(length > 0.0F)) return std::nullopt;
-    d /= length;
-    sum += d;
-  }
-  if (!(glm::length(sum) > 0.0F)) return std::nullopt;
-  const glm::vec3 axis = glm::normalize(sum);
+  if (directions.x.empty()) return std::nullopt;
+  directions.fillLanes();
+  auto &x = directions.x, &y = directions.y, &z = directions.z;
+  const auto sum = normalizeAll(x.data(), y.data(), z.data(), x.size());
+  if (!(sum.w > 0.0F) || !(glm::length(glm::vec3(sum)) > 0.0F)) return std::nullopt;
+  const glm::vec3 axis = glm::normalize(glm::vec3(sum));
   // Most things stand upright, and so does a pyramid that fits them.
   const glm::vec3 helper = std::abs(axis.y) < 0.9F ? glm::vec3(0, 1, 0) : glm::vec3(1, 0, 0);
   const glm::vec3 right = glm::normalize(glm::cross(helper, axis)), up = glm::cross(axis, right);
-  Extent across, along;
-  for (const auto& d : directions) {
-    const float depth = glm::dot(d, axis);
-    if (depth < kWidest) return std::nullopt;
-    across.add(glm::dot(d, right) / depth);
-    along.add(glm::dot(d, up) / depth);
-  }
+  Spread spread;
+  spreadOf({axis, right, up}, x.data(), y.data(), z.data(), x.size(), spread);
+  if (!(spread.depth >= kWidest)) return std::nullopt;
+  const Extent across{spread.left, spread.right}, along{spread.below, spread.above};
   ViewWindow window;
   // Far along the other way, the same angle from a plane through it is more angle about it.
   const auto planes = [&](const Extent& extent, const Extent& other, const glm::vec3& towards, std::size_t first) {

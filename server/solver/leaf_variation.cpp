@@ -56,10 +56,17 @@ bool LeafVariation::isWhole() const {
 
 /// As many paths as count_ says.
 void LeafVariation::traceAll(const LeafLight& light) {
+  const auto shines = [](const PunctualLights::Source& source) { return source.intensity != glm::dvec3(0.0); };
+  if (traced_for_ != kept_for_ || std::ranges::any_of(light.sources, shines)) {
+    for (auto& half : there_) {
+      for (auto& known : half) known.kept = scene::kNone;
+    }
+  }
   if (count_.empty()) count_.assign(receivers_.size(), 1);
   std::vector<Task> tasks(receivers_.size());
   for (std::size_t r = 0; r < receivers_.size(); ++r) tasks[r] = {receivers_[r], 0, count_[r]};
   trace(tasks, light);
+  forgetFormer();
 }
 
 std::vector<LeafVariation::Task> LeafVariation::twiceAsMany() const {

@@ -19,6 +19,7 @@
 #include "server/solver/leaf_rays.h"
 #include "server/solver/lights.h"
 #include "server/solver/punctual_lights.h"
+#include "server/solver/shadows.h"
 
 namespace radiosity::solver {
 
@@ -38,9 +39,10 @@ class LeafVariation {
   /// After an edit of geometry, before the first update(): what the paths of the scene before have found.
   /// `value_before`: by leaf value, what it was there, or kNone. `clear`: by leaf value, whether it is one of them, and
   /// nothing within nearest() of it changed: where no leaf was near, none is. All else is traced anew, so that paths
-  /// are the same as without it but for how many there are.
-  void inherit(const LeafVariation& former, std::span<const std::uint32_t> value_before,
-               const std::vector<bool>& clear);
+  /// are the same as without it but for how many there are. `change`, where the same `lights` were there before, in the
+  /// same places: paths of which no way passes it are taken over, unless other lights shine by then.
+  void inherit(const LeafVariation& former, std::span<const std::uint32_t> value_before, const std::vector<bool>& clear,
+               const Shadows* change = nullptr, std::span<const LightPolygon> lights = {});
   /// Farther from a leaf than this (unit box) nothing is near to it.
   [[nodiscard]] double nearest() const;
 
@@ -113,7 +115,19 @@ class LeafVariation {
   void follow(const Task& task, std::size_t half, const LeafLight& light, std::vector<Path>& paths) const;
   void followLights(const std::array<Place, 2>& places, const LeafLight& light, Path& path) const;
   void followOtherLights(const LeafLight& light);
-  [[nodiscard]] bool isKnownToEnd(std::uint32_t receiver, std::uint32_t index, std::size_t half) const;
+  /// Of the scene before: a path that there was.
+  struct Known {
+    std::uint64_t number = 0;           ///< numberOf()
+    std::uint32_t kept = scene::kNone;  ///< into kept_, where it is what it was
+  };
+  /// Whether the scene before tells whether there is such a path.
+  [[nodiscard]] bool isKnown(std::uint32_t receiver, std::uint32_t index) const {
+    return !known_.empty() && index < known_[receiver];
+  }
+  [[nodiscard]] const Known* findKnown(std::uint32_t receiver, std::uint32_t index, std::size_t half) const;
+  void keepPaths(const LeafVariation& former, std::size_t half, std::span<const std::uint32_t> value_after,
+                 const std::vector<bool>& clear, const Shadows* change, std::span<const LightPolygon> lights);
+  void forgetFormer();
   [[nodiscard]] bool findPlaces(std::uint32_t receiver, std::uint64_t key, std::array<Place, 2>& places) const;
   template <typename Unhidden>
   [[nodiscard]] static Drawn draw(std::size_t count, std::uint64_t key, const Unhidden& unhidden);
@@ -135,9 +149,12 @@ class LeafVariation {
   bool is_traced_ = false;                  ///< as many paths as count_ says
   std::vector<Task> wanted_;                ///< by refine()
   std::array<std::vector<Path>, 2> paths_;  ///< by half
-  std::vector<std::uint16_t> known_;        ///< by leaf value: of so many paths it is known which there are; or empty
-  std::array<std::vector<std::uint64_t>, 2> there_;  ///< by half: these, as numberOf() has them, ascending
-  std::array<std::vector<Lack>, 2> lacking_;         ///< by half and leaf value: mean of the paths; while updating
+  // After an edit of geometry, until paths are traced:
+  std::vector<std::uint16_t> known_;          ///< by leaf value: of so many paths it is known which there are; or empty
+  std::array<std::vector<Known>, 2> there_;   ///< by half: these, ascending
+  std::array<std::vector<Path>, 2> kept_;     ///< and those that are what they were, ...
+  std::uint64_t kept_for_ = 0;                ///< ... by these lights
+  std::array<std::vector<Lack>, 2> lacking_;  ///< by half and leaf value: mean of the paths; while updating
   std::array<std::vector<glm::vec3>, 2> correction_;
   std::vector<float> gain_;               ///< by leaf value: what more paths would lower; while correcting
   double found_ = 0.0, deviation_ = 0.0;  ///< sum of what varies, and its standard deviation

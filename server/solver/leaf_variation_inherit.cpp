@@ -1,13 +1,17 @@
 // LeafVariation after an edit of geometry. Nine of ten ways from a receiver meet no leaf near by; to find that out was
-// most of what paths took, and an edit changes it only where something was or is that moved.
+// most of what paths took, and an edit changes it only where something was or is that moved. Nor does it change where
+// the others lead, unless it lies in their way.
 #include <algorithm>
+#include <glm/geometric.hpp>
 
+#include "server/solver/halves.h"
 #include "server/solver/leaf_variation.h"
 
 namespace radiosity::solver {
 
 void LeafVariation::inherit(const LeafVariation& former, std::span<const std::uint32_t> value_before,
-                            const std::vector<bool>& clear) {
+                            const std::vector<bool>& clear, const Shadows* change,
+                            std::span<const LightPolygon> lights) {
   if (!former.is_traced_ || stands_for_ != 1.0 || former.stands_for_ != 1.0) return;
   if (former.count_.empty() || !former.wanted_.empty()) return;  // what is still to be traced is not known
   const auto fewest = *std::ranges::min_element(former.count_);
@@ -16,30 +20,74 @@ void LeafVariation::inherit(const LeafVariation& former, std::span<const std::ui
     count_before.resize(former.receivers_[r] + 1, 0);
     count_before.back() = former.count_[r];
   }
-  std::vector<std::uint32_t> value_after(count_before.size(), scene::kNone);
+  std::vector<std::uint32_t> value_after;  // by former leaf value, also of those that receive nothing
+  for (std::uint32_t value = 0; value < value_before.size(); ++value) {
+    const auto before = value_before[value];
+    if (before == scene::kNone) continue;
+    if (before >= value_after.size()) value_after.resize(before + 1, scene::kNone);
+    value_after[before] = value;
+  }
   known_.assign(value_before.size(), 0);
   count_.assign(receivers_.size(), fewest);
   for (std::size_t r = 0; r < receivers_.size(); ++r) {
     const auto value = receivers_[r], before = value_before[value];
     if (before >= count_before.size() || count_before[before] == 0) continue;
     count_[r] = count_before[before];
-    if (!clear[value]) continue;
-    known_[value] = count_before[before];
-    value_after[before] = value;
+    if (clear[value]) known_[value] = count_before[before];
   }
-  for (std::size_t half = 0; half < 2; ++half) {
-    for (const auto& path : former.paths_[half]) {
-      const auto receiver = value_after[path.receiver];
-      if (receiver != scene::kNone) there_[half].push_back(numberOf(receiver, path.index));
-    }
-    std::ranges::sort(there_[half]);
-  }
+  kept_for_ = former.traced_for_;
+  inBothHalves([&](std::size_t half) { keepPaths(former, half, value_after, clear, change, lights); });
 }
 
-/// No leaf is near that way.
-bool LeafVariation::isKnownToEnd(std::uint32_t receiver, std::uint32_t index, std::size_t half) const {
-  if (known_.empty() || index >= known_[receiver]) return false;
-  return !std::ranges::binary_search(there_[half], numberOf(receiver, index));
+/// Those of receivers that are clear, in the order of their numbers.
+void LeafVariation::keepPaths(const LeafVariation& former, std::size_t half, std::span<const std::uint32_t> value_after,
+                              const std::vector<bool>& clear, const Shadows* change,
+                              std::span<const LightPolygon> lights) {
+  const auto after = [&](std::uint32_t value) {
+    return value < value_after.size() ? value_after[value] : scene::kNone;
+  };
+  std::vector<float> reach;  // of the corners of a light about the first
+  for (const auto& light : lights) {
+    reach.push_back(0.0F);
+    for (std::size_t c = 1; c < light.corner_count; ++c)
+      reach.back() = std::max(reach.back(), glm::distance(light.corners[0], light.corners[c]));
+  }
+  // What it sees of what it meets, and of the light that was drawn for it, none of which moved.
+  const auto isWhatItWas = [&](Path& path) {
+    path.by = after(path.by);
+    if (path.by == scene::kNone) return false;
+    for (auto& seen : path.seen) {
+      seen = after(seen);  // nothing of the sky, and of what receives no light
+      if (seen == scene::kNone || change->isPassed(path.by, seen)) return false;
+    }
+    return lights.empty() || !change->isPassed(path.by, lights[path.light].corners[0], reach[path.light]);
+  };
+  for (auto path : former.paths_[half]) {
+    const auto receiver = after(path.receiver);
+    if (receiver == scene::kNone || !clear[receiver]) continue;
+    Known known{numberOf(receiver, path.index), scene::kNone};
+    path.receiver = receiver;
+    if (change != nullptr && isWhatItWas(path)) {
+      known.kept = static_cast<std::uint32_t>(kept_[half].size());
+      kept_[half].push_back(path);
+    }
+    there_[half].push_back(known);
+  }
+  std::ranges::sort(there_[half], {}, &Known::number);
+}
+
+/// Nothing: no leaf is near that way.
+const LeafVariation::Known* LeafVariation::findKnown(std::uint32_t receiver, std::uint32_t index,
+                                                     std::size_t half) const {
+  const auto number = numberOf(receiver, index);
+  const auto found = std::ranges::lower_bound(there_[half], number, {}, &Known::number);
+  return found != there_[half].end() && found->number == number ? &*found : nullptr;
+}
+
+void LeafVariation::forgetFormer() {
+  known_ = {};
+  there_ = {};
+  kept_ = {};
 }
 
 }  // namespace radiosity::solver

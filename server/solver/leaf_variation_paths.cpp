@@ -143,7 +143,14 @@ void LeafVariation::follow(const Task& task, std::size_t half, const LeafLight& 
   const auto leaf_key = mixKeys(mixKeys(seed_, side.key), task.receiver - side.first_value);
   std::array<Place, 2> places;
   for (auto k = task.first; k < task.end; ++k) {
-    if (isKnownToEnd(task.receiver, k, half)) continue;
+    if (isKnown(task.receiver, k)) {
+      const auto* known = findKnown(task.receiver, k, half);
+      if (known == nullptr) continue;
+      if (known->kept != scene::kNone) {
+        paths.push_back(kept_[half][known->kept]);
+        continue;
+      }
+    }
     Path path;
     path.index = static_cast<std::uint16_t>(k);
     path.key = mixKeys(leaf_key, 2 * std::uint64_t{k} + half);

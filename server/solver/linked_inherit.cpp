@@ -206,7 +206,11 @@ void LinkedSolver::inheritVariation(const LinkedSolver& former, const Renumberin
       clear[value] = !shadows_->changesWithin(value, reach);
     }
   }
-  next_variation_->inherit(*former.variation_, value_before, clear);
+  // Lamps that moved come after those that did not.
+  const bool same_lights = std::ranges::equal(former.lights_, lights_, [](const auto& a, const auto& b) {
+    return a.key == b.key && a.corners == b.corners && a.corner_count == b.corner_count;
+  });
+  next_variation_->inherit(*former.variation_, value_before, clear, same_lights ? shadows_.get() : nullptr, lights_);
 }
 
 /// Of the matrix: rows of nodes that are what they were, and columns whose links went over as they are.

@@ -145,6 +145,33 @@ bool Shadows::changesWithin(std::uint32_t value, float distance) const {
   });
 }
 
+bool Shadows::isPassed(std::uint32_t value, const glm::vec3& to, float radius) const {
+  const auto i = place_[value];
+  if (leaves_.radius[i] < 0.0F) return true;
+  const auto from = leaves_.centre(i), way = to - from;
+  const float around = leaves_.radius[i] + radius;
+  const auto passes = [&](const scene::ChangedBox& box) {
+    float first = 0.0F, last = 1.0F;
+    for (int axis = 0; axis < 3; ++axis) {
+      const float low = box.low[axis] - around - from[axis], high = box.high[axis] + around - from[axis];
+      if (std::abs(way[axis]) < kLevel) {
+        if (low > 0.0F || high < 0.0F) return false;
+        continue;
+      }
+      const float a = low / way[axis], b = high / way[axis];
+      first = larger(first, smaller(a, b));
+      last = smaller(last, larger(a, b));
+    }
+    return first <= last;
+  };
+  return !change_.boxes.empty() && passes(around_) && std::ranges::any_of(change_.boxes, passes);
+}
+
+bool Shadows::isPassed(std::uint32_t value, std::uint32_t to) const {
+  const auto i = place_[to];
+  return leaves_.radius[i] < 0.0F || isPassed(value, leaves_.centre(i), leaves_.radius[i]);
+}
+
 bool Shadows::sees(const glm::vec3& point, const glm::vec3& normal) const {
   return std::ranges::any_of(all_, [&](const scene::ChangedBox& box) {
     const glm::vec3 farthest(normal.x > 0.0F ? box.high.x : box.low.x, normal.y > 0.0F ? box.high.y : box.low.y,

@@ -31,6 +31,10 @@ class Shadows {
 
   /// Whether something of it may be so near to a leaf, or to a place on it.
   [[nodiscard]] bool changesWithin(std::uint32_t value, float distance) const;
+  /// Whether some way from a place on a leaf to one within `radius` of a point may pass a box. The second: to one on
+  /// another leaf.
+  [[nodiscard]] bool isPassed(std::uint32_t value, const glm::vec3& to, float radius) const;
+  [[nodiscard]] bool isPassed(std::uint32_t value, std::uint32_t to) const;
   /// Whether a half space can see any of it.
   [[nodiscard]] bool sees(const glm::vec3& point, const glm::vec3& normal) const;
 

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <glm/common.hpp>
@@ -140,8 +141,43 @@ TEST_F(ShadowsTest, EveryWayThatPassesWhatChangedIsFound) {
       }
     }
   }
-  EXPECT_GT(cut, 2'000U);
+  EXPECT_GT(cut, 1'000U) << "enough to tell";
   EXPECT_LT(found_in_all, looked_at / 2) << "a superset, but not all there is";
+}
+
+TEST_F(ShadowsTest, OfLeavesAndLampsEveryWayThatIsPassedIsToldFromMostThatAreNot) {
+  std::size_t cut = 0, told = 0, asked = 0;
+  for (int round = 0; round < 40; ++round) {
+    makeScene();
+    const Shadows shadows(*scene_.patches, sides_, makeChange());
+    const auto placeOn = [&](const Side& side, std::uint32_t leaf) {
+      const auto& frame = scene_.patches->triangles[scene_.patches->surfaces[side.surface].first_triangle];
+      const double x = leaf % side.width + uniform(0.0, 1.0), y = leaf / side.width + uniform(0.0, 1.0);
+      return glm::dvec3(frame.origin) + x * glm::dvec3(frame.du) + y * glm::dvec3(frame.dv);
+    };
+    const auto isCutBetween = [&](const glm::dvec3& from, const glm::dvec3& to) {
+      return std::ranges::any_of(triangles_, [&](const Triangle& triangle) { return passes(from, to, triangle); });
+    };
+    for (int i = 0; i < 2'000; ++i) {
+      const auto &side = sides_[random_() % sides_.size()], &other = sides_[random_() % sides_.size()];
+      const auto leaf = static_cast<std::uint32_t>(random_() % side.leaf_count);
+      const auto seen = static_cast<std::uint32_t>(random_() % other.leaf_count);
+      const double radius = uniform(0.0, 0.05);
+      const auto lamp = pointIn(glm::dvec3(-0.49), glm::dvec3(0.49));
+      const bool to_leaf = shadows.isPassed(side.first_value + leaf, other.first_value + seen);
+      const bool to_lamp = shadows.isPassed(side.first_value + leaf, glm::vec3(lamp), static_cast<float>(radius));
+      const auto from = placeOn(side, leaf);
+      const bool cut_to_leaf = isCutBetween(from, placeOn(other, seen));
+      const bool cut_to_lamp = isCutBetween(from, lamp + uniform(0.0, radius) * direction());
+      ASSERT_TRUE(to_leaf || !cut_to_leaf) << "round " << round << ", " << i;
+      ASSERT_TRUE(to_lamp || !cut_to_lamp) << "round " << round << ", " << i;
+      asked += 2;
+      told += (to_leaf ? 1U : 0U) + (to_lamp ? 1U : 0U);
+      cut += (cut_to_leaf ? 1U : 0U) + (cut_to_lamp ? 1U : 0U);
+    }
+  }
+  EXPECT_GT(cut, 1'000U) << "enough to tell";
+  EXPECT_LT(told, asked / 2);
 }
 
 }  // namespace
