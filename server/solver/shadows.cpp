@@ -16,9 +16,11 @@ namespace {
 /// What lies this little (unit box) before a plane may be rounding: it is seen from there.
 constexpr float kInFront = -5e-7F;
 /// A leaf of a curved surface may reach so much farther than the frame of one of its triangles tells.
-constexpr float kCurved = 2.0F;
+constexpr float kCurved = 2.8F;
 /// Squares of so many leaves along a side are looked at as one first.
 constexpr std::uint32_t kTileSide = 4;
+/// Balls ask for no more than the pixels so far around theirs.
+constexpr float kMostReach = 3.0F;
 /// Half a pixel's diagonal, in widths of a pixel, and room for rounding.
 constexpr float kHalfDiagonal = 0.7072F;
 
@@ -35,6 +37,17 @@ void include(scene::ChangedBox& box, const glm::vec3& centre, float radius) {
 
 inline float smaller(float a, float b) { return a < b ? a : b; }
 inline float larger(float a, float b) { return a > b ? a : b; }
+
+struct Ball {
+  glm::vec3 middle;
+  float radius;
+};
+Ball ballAround(std::span<const glm::vec3> points) {
+  Ball ball{glm::vec3(0.0F), 0.0F};
+  for (const auto& point : points) ball.middle += point / static_cast<float>(points.size());
+  for (const auto& point : points) ball.radius = std::max(ball.radius, glm::distance(ball.middle, point));
+  return ball;
+}
 
 /// The part of [0, 1] where slope t >= least.
 struct Clip {
@@ -64,7 +77,7 @@ void Shadows::Balls::add(const glm::vec3& centre, float r, float pixels) {
 float Shadows::reachOf(const scene::Surface& surface, const scene::LeafPoint& leaf) const {
   const bool in_gap = leaf.full && leaf.first_spot != scene::kNone;
   const bool two_sided = surface.first_node[0] != scene::kNone && surface.first_node[1] != scene::kNone;
-  return in_gap || two_sided ? 3.0F : 1.0F;
+  return in_gap || two_sided ? kMostReach : 1.0F;
 }
 
 Shadows::Shadows(const scene::PatchScene& patches, const std::vector<Side>& sides, GeometryChange change)
@@ -131,8 +144,8 @@ void Shadows::addLeaf(const Side& side, std::uint32_t leaf) {
   if (triangle == scene::kNone) return leaves_.add(glm::vec3(0.0F), -1.0F);
   const auto& frame = patches_.triangles[triangle];
   const float x = static_cast<float>(leaf % side.width) + 0.5F, y = static_cast<float>(leaf / side.width) + 0.5F;
-  leaves_.add(frame.origin + x * frame.du + y * frame.dv,
-              (surface.planar ? 0.5F : 0.5F * kCurved) * (glm::length(frame.du) + glm::length(frame.dv)),
+  const float half_diagonal = 0.5F * larger(glm::length(frame.du + frame.dv), glm::length(frame.du - frame.dv));
+  leaves_.add(frame.origin + x * frame.du + y * frame.dv, (surface.planar ? 1.0F : kCurved) * half_diagonal,
               reachOf(surface, point));
 }
 
@@ -208,30 +221,29 @@ RADIOSITY_CLONES void Shadows::markMet(const Way& way, const glm::vec4& plane, c
 }
 
 /// Tiles that a way around all boxes meets, then those of them that the way to a single box meets, then their leaves.
+/// All from the middle of the points: a way from one of these is nowhere farther from that from the middle than they
+/// are apart, and what it meets of boxes grown by so much is hardly more than what they meet one by one.
 void Shadows::find(std::span<const glm::vec3> points, const glm::vec3& normal, float radius, std::uint32_t resolution,
                    Scratch& scratch, std::vector<LinkColumn::ValueRun>& runs) const {
   // A pixel is 2 / N wide at a depth of one; depths are at most distances.
   const float spread = 2.0F * kHalfDiagonal / static_cast<float>(resolution);
-  const auto wayTo = [&](const glm::vec3& point, const scene::ChangedBox& box) {
-    return Way{point, box.low - radius, box.high + radius, spread};
+  const auto [middle, apart] = ballAround(points);
+  // Pixels are widest where seen from the point that is farthest away.
+  const float reach = radius + apart * (1.0F + spread * kMostReach);
+  const auto wayTo = [&](const scene::ChangedBox& box) {
+    return Way{middle, box.low - reach, box.high + reach, spread};
   };
   const glm::vec4 plane(normal, glm::dot(normal, points.front()));
   scratch.tiles.assign(tiles_.size(), kMissed);
-  if (!change_.boxes.empty()) {
-    for (const auto& point : points)
-      markMet(wayTo(point, around_), plane, tile_balls_, 0, tiles_.size(), scratch.tiles.data());
-  }
+  if (!change_.boxes.empty()) markMet(wayTo(around_), plane, tile_balls_, 0, tiles_.size(), scratch.tiles.data());
   takeTiles(scratch);
   const auto near = scratch.near.size();
   scratch.ways.clear();
-  scratch.by_way.clear();
-  for (const auto& point : points) {
-    for (const auto& box : change_.boxes) {
-      scratch.ways.push_back(wayTo(point, box));
-      scratch.by_way.resize(scratch.by_way.size() + near, kMissed);
-      markMet(scratch.ways.back(), plane, scratch.near_balls, 0, near,
-              scratch.by_way.data() + scratch.by_way.size() - near);
-    }
+  scratch.by_way.assign(change_.boxes.size() * near, kMissed);
+  for (const auto& box : change_.boxes) {
+    auto* marks = scratch.by_way.data() + scratch.ways.size() * near;
+    scratch.ways.push_back(wayTo(box));
+    markMet(scratch.ways.back(), plane, scratch.near_balls, 0, near, marks);
   }
   scratch.found.resize((change_.altered.size() + 63) / 64);
   for (std::size_t i = 0; i < near; ++i) markLeaves(i, plane, scratch);
