@@ -87,7 +87,7 @@ bool Receivers::isBlocked(const Ray& ray) const {
   std::call_once(opaque_->made, [this] { opaque_->tree = treeOfOpaque(); });
   const auto from = glm::dvec3(ray.at) + kLift * glm::dvec3(ray.normal);
   const auto way = glm::dvec3(ray.at) + static_cast<double>(ray.reach) * glm::dvec3(ray.way) - from;
-  return opaque_->tree.nearestHit(from, way, 0.0, 1.0 - 2.0 * kLift / glm::length(way)).has_value();
+  return opaque_->tree.meets(from, way, 0.0, 1.0 - 2.0 * kLift / glm::length(way));
 }
 
 void Receivers::findBlocks(Group& group) {

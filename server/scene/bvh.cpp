@@ -56,6 +56,9 @@ struct SlabRay {
   }
 };
 
+/// One and more than rounding.
+constexpr double kJustAbove = 1.0 + 1e-12;
+
 /// Moller and Trumbore 1997, in double so that edges leak less than a part in 1e12.
 bool meetsTriangle(const Bvh::Triangle& triangle, const glm::dvec3& origin, const glm::dvec3& direction, RayHit& hit) {
   const glm::dvec3 a(triangle[0]);
@@ -65,7 +68,10 @@ bool meetsTriangle(const Bvh::Triangle& triangle, const glm::dvec3& origin, cons
   const double determinant = glm::dot(e1, p);
   if (determinant == 0.0) return false;
   const glm::dvec3 s = origin - a;
-  const double u = glm::dot(s, p) / determinant;
+  // Most rays pass by: that is known before anything is divided.
+  const double scaled = glm::dot(s, p), sign = determinant > 0.0 ? 1.0 : -1.0;
+  if (scaled * sign < 0.0 || scaled * sign > kJustAbove * determinant * sign) return false;
+  const double u = scaled / determinant;
   if (!(u >= 0.0 && u <= 1.0)) return false;
   const glm::dvec3 q = glm::cross(s, e1);
   const double v = glm::dot(direction, q) / determinant;
@@ -105,6 +111,10 @@ Bvh::Bvh(std::vector<Triangle> triangles) : triangles_(std::move(triangles)), or
   for (const auto& t : triangles_) centres_.push_back((t[0] + t[1] + t[2]) / 3.0F);
   build();
   centres_ = {};
+  std::vector<Triangle> ordered;  // leaf after leaf, as rays ask for them
+  ordered.reserve(triangles_.size());
+  for (const auto index : order_) ordered.push_back(triangles_[index]);
+  triangles_ = std::move(ordered);
 }
 
 void Bvh::build() {
@@ -196,8 +206,7 @@ void Bvh::collectHits(const glm::dvec3& origin, const glm::dvec3& direction, dou
     }
     for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
       RayHit hit{0.0, order_[i], false};
-      if (meetsTriangle(triangles_[order_[i]], origin, direction, hit) && hit.t > t_min && hit.t < t_max)
-        hits.push_back(hit);
+      if (meetsTriangle(triangles_[i], origin, direction, hit) && hit.t > t_min && hit.t < t_max) hits.push_back(hit);
     }
   }
 }
@@ -223,7 +232,7 @@ bool Bvh::mayMeetBack(const glm::vec3& box_min, const glm::vec3& box_max, const 
       continue;
     }
     for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
-      const auto& [a, b, c] = triangles_[order_[i]];
+      const auto& [a, b, c] = triangles_[i];
       const glm::dvec3 normal = glm::cross(glm::dvec3(b) - glm::dvec3(a), glm::dvec3(c) - glm::dvec3(a));
       if (glm::dot(direction, normal) < -kEdgeOn * length * glm::length(normal)) continue;
       if (ray.meets(glm::min(glm::min(a, b), c) - half, glm::max(glm::max(a, b), c) + half)) return true;
@@ -232,8 +241,10 @@ bool Bvh::mayMeetBack(const glm::vec3& box_min, const glm::vec3& box_max, const 
   return false;
 }
 
-std::optional<RayHit> Bvh::nearestHit(const glm::dvec3& origin, const glm::dvec3& direction, double t_min,
-                                      double t_max) const {
+/// The hit with the least t, or any where `kAny`. Nearer children first.
+template <bool kAny>
+std::optional<RayHit> Bvh::findHit(const glm::dvec3& origin, const glm::dvec3& direction, double t_min,
+                                   double t_max) const {
   if (triangles_.empty()) return std::nullopt;
   SlabRay ray(origin, direction, t_min, t_max);
   struct Task {
@@ -243,7 +254,7 @@ std::optional<RayHit> Bvh::nearestHit(const glm::dvec3& origin, const glm::dvec3
   std::array<Task, kStackDepth> stack;
   std::size_t depth = 0;
   stack[depth++] = {0, ray.entry(nodes_[0].min, nodes_[0].max)};
-  std::optional<RayHit> nearest;
+  std::optional<RayHit> found;
   while (depth > 0) {
     const Task task = stack[--depth];
     if (task.entry > ray.t_max) continue;
@@ -252,22 +263,33 @@ std::optional<RayHit> Bvh::nearestHit(const glm::dvec3& origin, const glm::dvec3
       const Task left{node.first, ray.entry(nodes_[node.first].min, nodes_[node.first].max)};
       const Task right{node.first + 1, ray.entry(nodes_[node.first + 1].min, nodes_[node.first + 1].max)};
       const bool left_first = left.entry <= right.entry;
-      stack[depth++] = left_first ? right : left;
-      stack[depth++] = left_first ? left : right;
+      const Task &near = left_first ? left : right, &far = left_first ? right : left;
+      if (far.entry <= ray.t_max) stack[depth++] = far;
+      if (near.entry <= ray.t_max) stack[depth++] = near;
       continue;
     }
     for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
       RayHit hit{0.0, order_[i], false};
-      if (!meetsTriangle(triangles_[order_[i]], origin, direction, hit) || !(hit.t > t_min && hit.t < t_max)) continue;
+      if (!meetsTriangle(triangles_[i], origin, direction, hit) || !(hit.t > t_min && hit.t < t_max)) continue;
+      if constexpr (kAny) return hit;
       t_max = hit.t;
       ray.t_max = static_cast<float>(t_max) + SlabRay::kGrowth;
-      nearest = hit;
+      found = hit;
     }
   }
-  return nearest;
+  return found;
 }
 
-/// Whether the test holds for any triangle of the tree's leaves that reach into the box.
+std::optional<RayHit> Bvh::nearestHit(const glm::dvec3& origin, const glm::dvec3& direction, double t_min,
+                                      double t_max) const {
+  return findHit<false>(origin, direction, t_min, t_max);
+}
+
+bool Bvh::meets(const glm::dvec3& origin, const glm::dvec3& direction, double t_min, double t_max) const {
+  return findHit<true>(origin, direction, t_min, t_max).has_value();
+}
+
+/// Whether the test holds for any triangle, as triangles_ has them, of the tree's leaves that reach into the box.
 template <typename Test>
 bool Bvh::anyTriangle(const glm::vec3& box_min, const glm::vec3& box_max, Test test) const {
   if (triangles_.empty()) return false;
@@ -286,15 +308,15 @@ bool Bvh::anyTriangle(const glm::vec3& box_min, const glm::vec3& box_max, Test t
       continue;
     }
     for (std::uint32_t i = node.first; i < node.first + node.count; ++i)
-      if (test(order_[i])) return true;
+      if (test(i)) return true;
   }
   return false;
 }
 
 bool Bvh::touches(const glm::vec3& box_min, const glm::vec3& box_max, std::span<const std::uint32_t> tags,
                   std::uint32_t ignored_tag) const {
-  return anyTriangle(box_min, box_max, [&](std::uint32_t triangle) {
-    return tags[triangle] != ignored_tag && touchesBox(triangles_[triangle], box_min, box_max);
+  return anyTriangle(box_min, box_max, [&](std::uint32_t i) {
+    return tags[order_[i]] != ignored_tag && touchesBox(triangles_[i], box_min, box_max);
   });
 }
 
@@ -303,13 +325,13 @@ template <typename Test>
 bool Bvh::anyTouching(const OrientedBox& box, Test test) const {
   glm::vec3 reach(0.0F);
   for (int axis = 0; axis < 3; ++axis) reach += box.half[axis] * glm::abs(box.axes[static_cast<std::size_t>(axis)]);
-  return anyTriangle(box.centre - reach, box.centre + reach, [&](std::uint32_t triangle) {
+  return anyTriangle(box.centre - reach, box.centre + reach, [&](std::uint32_t i) {
     Triangle local;
     for (std::size_t k = 0; k < 3; ++k) {
-      const glm::vec3 p = triangles_[triangle][k] - box.centre;
+      const glm::vec3 p = triangles_[i][k] - box.centre;
       local[k] = {glm::dot(p, box.axes[0]), glm::dot(p, box.axes[1]), glm::dot(p, box.axes[2])};
     }
-    return test(triangle, local) && touchesBox(local, -box.half, box.half);
+    return test(order_[i], local) && touchesBox(local, -box.half, box.half);
   });
 }
 

@@ -40,6 +40,9 @@ class Bvh {
   [[nodiscard]] std::optional<RayHit> nearestHit(const glm::dvec3& origin, const glm::dvec3& direction, double t_min,
                                                  double t_max) const;
 
+  /// Whether there is one; costs less.
+  [[nodiscard]] bool meets(const glm::dvec3& origin, const glm::dvec3& direction, double t_min, double t_max) const;
+
   /// True when a triangle other than those marked with `ignored_tag` touches the box. `tags`: one for each triangle.
   [[nodiscard]] bool touches(const glm::vec3& box_min, const glm::vec3& box_max, std::span<const std::uint32_t> tags,
                              std::uint32_t ignored_tag) const;
@@ -65,6 +68,9 @@ class Bvh {
     std::uint32_t first;  ///< leaf: into order_; inner: left child (the right one follows it)
     std::uint32_t count;  ///< 0: inner
   };
+  template <bool kAny>
+  [[nodiscard]] std::optional<RayHit> findHit(const glm::dvec3& origin, const glm::dvec3& direction, double t_min,
+                                              double t_max) const;
   template <typename Test>
   [[nodiscard]] bool anyTriangle(const glm::vec3& box_min, const glm::vec3& box_max, Test test) const;
   template <typename Test>
@@ -72,9 +78,9 @@ class Bvh {
   void build();
   [[nodiscard]] std::uint32_t split(std::uint32_t first, std::uint32_t count);
 
-  std::vector<Triangle> triangles_;
-  std::vector<glm::vec3> centres_;  ///< while building
-  std::vector<std::uint32_t> order_;
+  std::vector<Triangle> triangles_;   ///< leaf after leaf
+  std::vector<glm::vec3> centres_;    ///< while building, when triangles_ is as it was given
+  std::vector<std::uint32_t> order_;  ///< of each of triangles_: its index in the list that was given
   std::vector<Node> nodes_;
 };
 

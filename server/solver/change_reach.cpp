@@ -107,7 +107,7 @@ double ChangeReach::squareAt(const Place& place, const Eye& eye, const scene::Bv
   const glm::dvec3 towards = way / distance;
   const double sent = rise / distance;
   const double here = irradiance(eye.area, sent * std::abs(glm::dot(towards, place.normal)), distance);
-  if (here <= 0.0 || own.nearestHit(eye.origin, towards, kLift, distance * (1.0 - kHides))) return 0.0;
+  if (here <= 0.0 || own.meets(eye.origin, towards, kLift, distance * (1.0 - kHides))) return 0.0;
   double there = 0.0;
   if (other != nullptr) {
     if (const auto hit = tree_of_other->nearestHit(eye.origin, towards, kLift, kFar)) {

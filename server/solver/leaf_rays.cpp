@@ -97,7 +97,7 @@ LeafRays::Sight LeafRays::look(const Place& from, const glm::dvec3& direction) c
 bool LeafRays::isOpen(const Place& from, const glm::dvec3& to) const {
   const glm::dvec3 origin = lifted(from), way = to - origin;
   const double length = glm::length(way);
-  return length > 0.0 && !tree_.nearestHit(origin, way / length, 0.0, length - kLift);
+  return length > 0.0 && !tree_.meets(origin, way / length, 0.0, length - kLift);
 }
 
 }  // namespace radiosity::solver

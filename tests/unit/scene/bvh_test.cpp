@@ -63,6 +63,7 @@ TEST(Bvh, TheNearestHitIsTheFirstOfAll) {
     tree.collectHits(origin, direction, 0.0, reach, hits);
     const auto nearest = tree.nearestHit(origin, direction, 0.0, reach);
     ASSERT_EQ(nearest.has_value(), !hits.empty());
+    ASSERT_EQ(tree.meets(origin, direction, 0.0, reach), !hits.empty());
     (nearest ? met : missed) += 1;
     if (!nearest) continue;
     const auto first = std::ranges::min_element(hits, {}, &RayHit::t);
