@@ -72,6 +72,8 @@ class Layer {
 export class Screen {
   /** Pixels that the last frame was drawn with. */
   drawn: readonly [number, number] = [0, 0];
+  /** What was asked for, and what the browser gave: where memory is scarce that is less. */
+  private asked = '';
   private size: readonly [number, number] = [1, 1];
   private whole: Layer | undefined;
   /** Of what moves: of the last scale alone, as that seldom changes. */
@@ -84,10 +86,11 @@ export class Screen {
 
   /** Of the canvas, CSS pixels. Clears it, and waits for the card; does nothing where it has that size. */
   resize(width: number, height: number, ratio: number): void {
-    const size = [width, height].map((side) => Math.floor(side * ratio)) as [number, number];
-    if (size.join() === this.size.join()) return;
-    this.size = size;
+    const asked = [width, height].map((side) => Math.floor(side * ratio)).join();
+    if (asked === this.asked) return;
+    this.asked = asked;
     this.renderer.setDrawingBufferSize(width, height, ratio);
+    this.size = [this.gl.drawingBufferWidth, this.gl.drawingBufferHeight];
     for (const layer of [this.whole, this.coarse]) layer?.dispose();
     this.whole = this.coarse = undefined;
   }
