@@ -17,8 +17,6 @@ constexpr double kRouletteShare = 0.05;
 constexpr double kMaxWeight = 20.0;
 /// Nodes of less than this part of a share may shoot as a polygon though a part of it is empty or buried.
 constexpr double kPartialShare = 0.06;
-/// Their parts that have more than this do not play.
-constexpr double kCertainShare = 0.005;
 /// Light that only differs between the leaves of a node cancels at a distance and counts near by.
 constexpr double kVariationWorth = 0.1;
 /// Square of the part of a node's links to its near receivers that feels what varies inside it.
@@ -159,8 +157,9 @@ void LinkPlanner::addShooter(const Node& node, LinkSystem& system, const UnshotP
                              const scene::PatchScene& patches, LinkMemory& memory, std::vector<Measurement>& wanted) {
   const auto id = nodeId(sides_[node.place.side], node.place);
   if (patches.node_area[id] <= 0.0F || node.net <= 0.0) return;
-  // Right beside a buried edge one would see single leaves come and go: there nobody plays.
-  const bool certain = node.beside_edge && node.power > kCertainShare * share_;
+  // Right beside a buried edge one would see single leaves come and go, and each of them is most of the light of one
+  // texel: there nobody plays.
+  const bool certain = node.beside_edge && chance(node.power) >= 1.0 / kMaxWeight;
   const std::array<bool, 2> in{certain || plays(node.place, 0, node.power),
                                certain || plays(node.place, 1, node.power)};
   counters_.roulette_kills += static_cast<std::uint64_t>(!in[0]) + static_cast<std::uint64_t>(!in[1]);

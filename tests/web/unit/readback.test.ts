@@ -1,6 +1,6 @@
 // A picture comes back from the card without anyone waiting for it; the card is one of our own.
-import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
-import { Readback } from "../../../client/web/src/view/readback";
+import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
+import { Readback } from '../../../client/web/src/view/readback';
 
 /** Signals fences when told to, and counts what it was asked for. */
 class Card {
@@ -21,20 +21,14 @@ class Card {
 }
 
 function readback(card: Card, isQuiet: () => boolean): Readback {
-  return new Readback(
-    card as unknown as WebGL2RenderingContext,
-    0,
-    1,
-    1,
-    isQuiet,
-  );
+  return new Readback(card as unknown as WebGL2RenderingContext, 0, 1, 1, isQuiet);
 }
 
-describe("Readback", () => {
+describe('Readback', () => {
   beforeEach(() => void vi.useFakeTimers());
   afterEach(() => void vi.useRealTimers());
 
-  it("fetches a picture once it is drawn and the card is quiet, and asks for that quiet until then", async () => {
+  it('fetches a picture once it is drawn and the card is quiet, and asks for that quiet until then', async () => {
     const card = new Card();
     let quiet = false;
     const back = readback(card, () => quiet);
@@ -50,7 +44,7 @@ describe("Readback", () => {
     expect([back.arrived, card.fetched, card.buffers]).toEqual([false, 1, 0]);
   });
 
-  it("asks for quiet until the last of two has been fetched", async () => {
+  it('asks for quiet until the last of two has been fetched', async () => {
     const card = new Card();
     card.drawn = true;
     const back = readback(card, () => false);
@@ -65,23 +59,19 @@ describe("Readback", () => {
     expect([back.arrived, card.fetched]).toEqual([false, 2]);
   });
 
-  it("never fetches what a card has not drawn after a minute", async () => {
+  it('never fetches what a card has not drawn after a minute', async () => {
     const card = new Card();
     const back = readback(card, () => true);
-    const failed = expect(back.read(new Float32Array(4))).rejects.toThrow(
-      "does not draw",
-    );
+    const failed = expect(back.read(new Float32Array(4))).rejects.toThrow('does not draw');
     await vi.advanceTimersByTimeAsync(61_000);
     await failed;
     expect([back.arrived, card.fetched, card.buffers]).toEqual([false, 0, 0]);
   });
 
-  it("gives up where the context is lost on the way", async () => {
+  it('gives up where the context is lost on the way', async () => {
     const card = new Card();
     const back = readback(card, () => true);
-    const failed = expect(back.read(new Float32Array(4))).rejects.toThrow(
-      "lost",
-    );
+    const failed = expect(back.read(new Float32Array(4))).rejects.toThrow('lost');
     back.forget();
     card.drawn = true;
     await vi.advanceTimersByTimeAsync(100);
