@@ -1,5 +1,4 @@
 // A picture comes back from the card without anyone waiting for it; the card is one of our own.
-import { afterEach, beforeEach, describe, expect, it, vi } from 'vitest';
 import { Readback } from '../../../client/web/src/view/readback';
 
 /** Signals fences when told to, and counts what it was asked for. */

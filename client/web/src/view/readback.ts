@@ -63,8 +63,11 @@ export class Readback {
 
   private async quiet(): Promise<void> {
     ++this.waiting;
-    for (const end = performance.now() + MOST_QUIET_MS; !this.isQuiet() && performance.now() < end; ) await look();
-    --this.waiting;
+    try {
+      for (const end = performance.now() + MOST_QUIET_MS; !this.isQuiet() && performance.now() < end; ) await look();
+    } finally {
+      --this.waiting;
+    }
   }
 
   /** False: it is not drawn yet. */
