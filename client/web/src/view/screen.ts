@@ -86,11 +86,12 @@ export class Screen {
 
   /** Of the canvas, CSS pixels. Clears it, and waits for the card; does nothing where it has that size. */
   resize(width: number, height: number, ratio: number): void {
-    const asked = [width, height].map((side) => Math.floor(side * ratio)).join();
-    if (asked === this.asked) return;
-    this.asked = asked;
+    const [wide, high] = [width, height].map((side) => Math.floor(side * ratio)) as [number, number];
+    if (this.asked === `${wide},${high}`) return;
+    this.asked = `${wide},${high}`;
     this.renderer.setDrawingBufferSize(width, height, ratio);
-    this.size = [this.gl.drawingBufferWidth, this.gl.drawingBufferHeight];
+    // Of a context that is lost it is nothing: what was asked for comes back with it.
+    this.size = [this.gl.drawingBufferWidth || wide, this.gl.drawingBufferHeight || high];
     for (const layer of [this.whole, this.coarse]) layer?.dispose();
     this.whole = this.coarse = undefined;
   }
