@@ -11,7 +11,7 @@
 namespace radiosity::scene {
 
 glm::dvec2 latticePoint(std::uint32_t i, std::uint32_t count) {
-  const std::uint32_t generator = count == 64 ? 19 : 5;
+  const std::uint32_t generator = count == 1024 ? 275 : count == 256 ? 75 : count == 64 ? 19 : 5;
   return {(i + 0.5) / count, static_cast<double>((std::uint64_t{i} * generator) % count + 0.5) / count};
 }
 
@@ -41,6 +41,47 @@ void keepSpots(PatchScene& patches, LeafPoint& leaf, std::span<LeafSpot> places)
   }
 }
 
+namespace {
+
+/// Places on a leaf are drawn from so many, and where fewer than there are spots lie on it, from more of them.
+constexpr std::array<std::uint32_t, 3> kPlacesTried{kLeafSpots, 256, 1024};
+
+/// Of a leaf, what pieces cover of it, in texels.
+struct CoveredBox {
+  glm::dvec2 low, size;
+};
+
+CoveredBox boxAround(const PatchScene& patches, std::span<const LeafPiece> pieces, const glm::dvec2& corner) {
+  glm::dvec2 low = corner + 1.0, high = corner;
+  for (const auto& piece : pieces) {
+    const std::size_t first = 3 * std::size_t{piece.triangle};
+    const auto texel = [&](std::size_t k) { return glm::dvec2(patches.vertices[patches.indices[first + k]].texel); };
+    low = glm::min(low, glm::min(texel(0), glm::min(texel(1), texel(2))));
+    high = glm::max(high, glm::max(texel(0), glm::max(texel(1), texel(2))));
+  }
+  low = glm::clamp(low, corner, corner + 1.0);
+  return {low, glm::clamp(high, low, corner + 1.0) - low};
+}
+
+/// Evenly over what is covered: a sliver of a leaf of which all places were drawn would have one or two of them, and
+/// these would stand for all of it in every sample.
+void findPlaces(const PatchScene& patches, std::span<const LeafPiece> pieces, const glm::dvec2& corner,
+                std::vector<LeafSpot>& places) {
+  const auto box = boxAround(patches, pieces, corner);
+  for (const auto count : kPlacesTried) {
+    places.clear();
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const glm::dvec2 texel = box.low + latticePoint(i, count) * box.size;
+      const auto holds = [&](const LeafPiece& piece) { return triangleHolds(patches, piece.triangle, texel, 0.0); };
+      const auto found = std::ranges::find_if(pieces, holds);
+      if (found != pieces.end()) places.push_back({glm::vec2(texel), found->triangle});
+    }
+    if (places.size() >= kLeafSpots) return;
+  }
+}
+
+}  // namespace
+
 void placeSpots(PatchScene& patches, const std::vector<LeafPiece>& pieces) {
   std::vector<LeafSpot> places;
   std::size_t surface = 0;
@@ -51,16 +92,7 @@ void placeSpots(PatchScene& patches, const std::vector<LeafPiece>& pieces) {
     if (leaf.triangle == kNone || leaf.full || leaf.first_spot != kNone) continue;
     while (surface + 1 < patches.surfaces.size() && patches.surfaces[surface + 1].first_leaf <= index) ++surface;
     const std::uint32_t local = index - patches.surfaces[surface].first_leaf, width = patches.surfaces[surface].width;
-    const glm::dvec2 corner(local % width, local / width);
-    places.clear();
-    for (std::uint32_t i = 0; i < kLeafSpots; ++i) {
-      const glm::dvec2 texel = corner + latticePoint(i, kLeafSpots);
-      for (std::size_t p = first; p < end; ++p) {
-        if (!triangleHolds(patches, pieces[p].triangle, texel, 0.0)) continue;
-        places.push_back({glm::vec2(texel), pieces[p].triangle});
-        break;
-      }
-    }
+    findPlaces(patches, std::span(pieces).subspan(first, end - first), glm::dvec2(local % width, local / width), places);
     keepSpots(patches, leaf, places);
   }
 }
