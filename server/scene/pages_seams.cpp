@@ -14,7 +14,7 @@ constexpr float kPointsATexel = 2.0F;
 /// How much a texel gives way: gutter ones fully, visible ones little, and all the more the smaller they are beside
 /// those on the other side. What is left of a face between others is a thousandth of a texel, and as uncertain: one
 /// must not see its value beyond it.
-constexpr float kMobile = 1.0F, kMobileVisible = 0.25F, kMostMobile = 1000.0F;
+constexpr float kMobile = 1.0F, kMobileVisible = 0.05F, kMostMobile = 1000.0F;
 
 /// One bilinear lookup: four texels of a page.
 struct Lookup {
