@@ -19,9 +19,13 @@ constexpr double kPresentable = 0.5;
 }  // namespace
 
 void SolveLoop::sceneText(Callback<SceneText> done) {
-  askLit<SceneText>(std::move(done), [this]() -> Result<SceneText> {
-    return SceneText{revision_, lit_->document().gltf.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)};
-  });
+  askLit<SceneText>(
+      std::move(done),
+      [this]() -> Result<SceneText> {
+        return SceneText{revision_,
+                         lit_->document().gltf.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)};
+      },
+      CommandQueue::Kind::kPrompt);
 }
 
 void SolveLoop::sceneGlb(std::optional<std::uint64_t> layout, Callback<SharedBytes> done) {
@@ -34,7 +38,9 @@ void SolveLoop::sceneGlb(std::optional<std::uint64_t> layout, Callback<SharedByt
           fmt::format("?layout={}", *layout));
     const auto lit = scene::withLightmapUvs(lit_->document(), lit_->scene(), lit_->patches());
     if (!lit) return tl::unexpected<Error>(lit.error());
-    return std::make_shared<const Bytes>(scene::writeGlb(*lit));
+    auto glb = scene::writeGlb(*lit);
+    if (!glb) return tl::unexpected<Error>(glb.error());
+    return std::make_shared<const Bytes>(std::move(*glb));
   });
 }
 

@@ -65,7 +65,8 @@ struct EditedDocument {
 [[nodiscard]] Result<EditedDocument> editDocument(const Document& document, const nlohmann::json& patch,
                                                   const FindUpload& uploads = {}, const ImportLimits& limits = {});
 
-/// The document as one GLB file (JSON chunk + one BIN chunk; buffers and images embedded).
-[[nodiscard]] Bytes writeGlb(const Document& document);
+/// The document as one GLB file (JSON chunk + one BIN chunk; buffers and images embedded). kTooLarge: more than 4 GiB,
+/// of which a GLB cannot tell the length.
+[[nodiscard]] Result<Bytes> writeGlb(const Document& document);
 
 }  // namespace radiosity::scene

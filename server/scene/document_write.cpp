@@ -10,6 +10,14 @@ namespace {
 
 void padTo4(Bytes& bytes) { bytes.resize((bytes.size() + 3) / 4 * 4, 0); }
 
+std::size_t dataBytes(const Document& document) {
+  std::size_t sum = 0;
+  for (const auto* files : {&document.buffers, &document.images}) {
+    for (const auto& file : *files) sum += file->size();
+  }
+  return sum;
+}
+
 /// All buffers behind each other; views are moved along.
 Bytes joinBuffers(const Document& document, Json& gltf) {
   Bytes bin;
@@ -48,13 +56,17 @@ void embedImages(const Document& document, Json& gltf, Bytes& bin) {
 
 }  // namespace
 
-Bytes writeGlb(const Document& document) {
+Result<Bytes> writeGlb(const Document& document) {
+  const auto tooLarge = [&] { return fail(ErrorCode::kTooLarge, "a GLB holds no more than 4 GiB", document.name); };
+  if (!fitsGlb(0, dataBytes(document))) return tooLarge();
   auto gltf = document.gltf;
   auto bin = joinBuffers(document, gltf);
   embedImages(document, gltf, bin);
   gltf.erase("buffers");
   if (!bin.empty()) gltf["buffers"] = Json::array({{{"byteLength", bin.size()}}});
-  return joinGlb(gltf.dump(-1, ' ', false, Json::error_handler_t::replace), bin);
+  const auto json = gltf.dump(-1, ' ', false, Json::error_handler_t::replace);
+  if (!fitsGlb(json.size(), bin.size())) return tooLarge();
+  return joinGlb(json, bin);
 }
 
 }  // namespace radiosity::scene

@@ -12,6 +12,8 @@ constexpr std::uint32_t kJsonChunk = 0x4E4F534A;
 constexpr std::uint32_t kBinChunk = 0x004E4942;
 constexpr std::size_t kHeaderBytes = 12;
 constexpr std::size_t kChunkHeaderBytes = 8;
+/// The header has 32 bits for the length.
+constexpr std::size_t kMaxGlbBytes = 0xFFFFFFFF;
 
 std::uint32_t u32(std::span<const std::uint8_t> bytes, std::size_t offset) {
   return static_cast<std::uint32_t>(bytes[offset]) | static_cast<std::uint32_t>(bytes[offset + 1]) << 8 |
@@ -20,6 +22,12 @@ std::uint32_t u32(std::span<const std::uint8_t> bytes, std::size_t offset) {
 
 void put(Bytes& out, std::uint32_t value) {
   for (int shift = 0; shift < 32; shift += 8) out.push_back(static_cast<std::uint8_t>(value >> shift));
+}
+
+std::size_t padded(std::size_t size) { return (size + 3) / 4 * 4; }
+
+std::size_t glbBytes(std::size_t json, std::size_t bin) {
+  return kHeaderBytes + kChunkHeaderBytes + padded(json) + (bin == 0 ? 0 : kChunkHeaderBytes + padded(bin));
 }
 
 tl::unexpected<Error> bad(const std::string& name, std::size_t offset, std::string what) {
@@ -68,11 +76,11 @@ Result<GlbChunks> splitGlb(const std::string& name, std::span<const std::uint8_t
   return chunks;
 }
 
+bool fitsGlb(std::size_t json, std::size_t bin) { return glbBytes(json, bin) <= kMaxGlbBytes; }
+
 Bytes joinGlb(std::string_view json, std::span<const std::uint8_t> bin) {
-  const auto padded = [](std::size_t size) { return (size + 3) / 4 * 4; };
-  const auto bin_size = bin.empty() ? 0 : kChunkHeaderBytes + padded(bin.size());
-  const auto total = kHeaderBytes + kChunkHeaderBytes + padded(json.size()) + bin_size;
-  RAD_CHECK_LE(total, std::size_t{0xFFFFFFFF});
+  const auto total = glbBytes(json.size(), bin.size());
+  RAD_CHECK_LE(total, kMaxGlbBytes);  // the caller asked fitsGlb()
   Bytes out;
   out.reserve(total);
   put(out, kMagic);

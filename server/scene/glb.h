@@ -22,7 +22,10 @@ struct GlbChunks {
 /// Views into `bytes`. Unknown chunks after the first are skipped, as the specification asks.
 [[nodiscard]] Result<GlbChunks> splitGlb(const std::string& name, std::span<const std::uint8_t> bytes);
 
-/// Pads JSON with spaces and BIN with zeros to 4 bytes. An empty `bin` gives no BIN chunk.
+/// Whether so many bytes of either chunk are no more than a GLB can say that it has, 4 GiB.
+[[nodiscard]] bool fitsGlb(std::size_t json, std::size_t bin);
+
+/// Of what fitsGlb(). Pads JSON with spaces and BIN with zeros to 4 bytes. An empty `bin` gives no BIN chunk.
 [[nodiscard]] Bytes joinGlb(std::string_view json, std::span<const std::uint8_t> bin);
 
 }  // namespace radiosity::scene

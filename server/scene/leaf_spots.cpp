@@ -92,7 +92,8 @@ void placeSpots(PatchScene& patches, const std::vector<LeafPiece>& pieces) {
     if (leaf.triangle == kNone || leaf.full || leaf.first_spot != kNone) continue;
     while (surface + 1 < patches.surfaces.size() && patches.surfaces[surface + 1].first_leaf <= index) ++surface;
     const std::uint32_t local = index - patches.surfaces[surface].first_leaf, width = patches.surfaces[surface].width;
-    findPlaces(patches, std::span(pieces).subspan(first, end - first), glm::dvec2(local % width, local / width), places);
+    findPlaces(patches, std::span(pieces).subspan(first, end - first), glm::dvec2(local % width, local / width),
+               places);
     keepSpots(patches, leaf, places);
   }
 }

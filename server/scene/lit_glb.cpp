@@ -141,6 +141,7 @@ class Exporter {
     for (std::size_t i = 0; i < placed.size(); ++i) {
       const auto index = litMesh(mesh, placed[i]);
       if (!index) return tl::unexpected(index.error());
+      if (!builder_.takeJson(name.size())) return builder_.tooMuchJson();
       const auto& [t, q, s] = (*locals)[i];
       Json child = {{"name", name + " #" + std::to_string(i)}, {"mesh", *index}};
       child["translation"] = {t.x, t.y, t.z};
@@ -159,9 +160,10 @@ class Exporter {
 
   /// The first placement takes the mesh's own index, so that a scene without instancing keeps its numbering.
   Result<std::size_t> litMesh(std::size_t mesh, const Placement& placement) {
-    auto built = builder_.build(source_meshes_[mesh], placement.lit);
+    const bool first = taken_.insert(mesh).second;
+    auto built = builder_.build(source_meshes_[mesh], placement.lit, !first);
     if (!built) return tl::unexpected(built.error());
-    if (taken_.insert(mesh).second) {
+    if (first) {
       out_.gltf["meshes"][mesh] = std::move(*built);
       return mesh;
     }

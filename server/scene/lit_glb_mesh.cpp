@@ -29,6 +29,8 @@ struct CornerHash {
   }
 };
 
+std::size_t textBytes(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace).size(); }
+
 }  // namespace
 
 void LitMeshBuilder::append(const void* data, std::size_t size) {
@@ -68,6 +70,17 @@ std::size_t LitMeshBuilder::addUvs(const std::vector<glm::vec2>& uvs) {
                       {"type", "VEC2"}});
 }
 
+Result<void> LitMeshBuilder::checkRoom(std::size_t more) const {
+  if (bytes_.size() + more <= kMaxNewBytes) return {};
+  return fail(ErrorCode::kTooLarge, "the lit scene would have more than 1 GiB of new vertex data", document_.name);
+}
+
+tl::unexpected<Error> LitMeshBuilder::tooMuchJson() const {
+  return fail(ErrorCode::kTooLarge,
+              "the lit scene would have more than 64 MiB of JSON again, for meshes that are there many times",
+              document_.name);
+}
+
 Result<std::size_t> LitMeshBuilder::copyAccessor(std::size_t accessor, const std::vector<std::uint32_t>& elements,
                                                  bool with_bounds) {
   const auto reader = AccessorReader::open(document_, model_, accessor);
@@ -75,9 +88,7 @@ Result<std::size_t> LitMeshBuilder::copyAccessor(std::size_t accessor, const std
   const auto size = elementBytes(model_.accessors[accessor]);
   const auto stride = (size + 3) / 4 * 4;  // vertex data must be aligned to 4 bytes
   const auto first = bytes_.size();
-  if (first + stride * elements.size() > kMaxNewBytes) {
-    return fail(ErrorCode::kTooLarge, "the lit scene would have more than 1 GiB of new vertex data", document_.name);
-  }
+  if (const auto room = checkRoom(stride * elements.size()); !room) return tl::unexpected(room.error());
   bytes_.reserve(first + stride * elements.size());
   for (const auto element : elements) {
     const auto next = bytes_.size() + stride;
@@ -85,7 +96,7 @@ Result<std::size_t> LitMeshBuilder::copyAccessor(std::size_t accessor, const std
     bytes_.resize(next, 0);
   }
   auto json = document_.gltf["accessors"][accessor];
-  for (const auto* member : {"sparse", "byteOffset", "min", "max"}) json.erase(member);
+  for (const auto* member : {"sparse", "byteOffset", "min", "max", "name", "extras", "extensions"}) json.erase(member);
   json["bufferView"] = addView(first, stride);
   json["count"] = elements.size();
   if (with_bounds) {
@@ -134,6 +145,8 @@ LitMeshBuilder::Vertices LitMeshBuilder::collect(const LitPrimitive& lit, std::u
 
 Result<Json> LitMeshBuilder::pagePrimitive(const Json& source, const LitPrimitive& lit, std::uint32_t page) {
   const auto vertices = collect(lit, page);
+  const auto more = vertices.uv.size() * sizeof(glm::vec2) + vertices.indices.size() * sizeof(std::uint32_t);
+  if (const auto room = checkRoom(more); !room) return tl::unexpected(room.error());
   auto primitive = source;
   auto attributes = source["attributes"];
   attributes.erase("TEXCOORD_1");
@@ -159,11 +172,19 @@ Result<Json> LitMeshBuilder::pagePrimitive(const Json& source, const LitPrimitiv
   return primitive;
 }
 
-Result<Json> LitMeshBuilder::build(const Json& mesh, const std::map<std::uint32_t, LitPrimitive>& lit) {
-  auto out = mesh;
+Result<Json> LitMeshBuilder::build(const Json& mesh, const std::map<std::uint32_t, LitPrimitive>& lit, bool again) {
+  Json out = Json::object(), primitives = Json::array();
+  for (const auto& [member, value] : mesh.items()) {
+    if (member == "primitives") primitives = value;
+    if (member != "primitives" && !(again && member == "extras")) out[member] = value;
+  }
+  if (again) {
+    for (auto& primitive : primitives) primitive.erase("extras");
+    if (!takeJson(textBytes(out) + textBytes(primitives))) return tooMuchJson();
+  }
   out["primitives"] = Json::array();
-  for (std::size_t p = 0; p < mesh["primitives"].size(); ++p) {
-    const auto& source = mesh["primitives"][p];
+  for (std::size_t p = 0; p < primitives.size(); ++p) {
+    const auto& source = primitives[p];
     const auto found = lit.find(static_cast<std::uint32_t>(p));
     if (found == lit.end()) {
       out["primitives"].push_back(source);
@@ -175,6 +196,7 @@ Result<Json> LitMeshBuilder::build(const Json& mesh, const std::map<std::uint32_
     std::set<std::uint32_t> pages(use.uv->page.begin(), use.uv->page.end());
     pages.erase(kNone);
     if (pages.empty()) out["primitives"].push_back(source);
+    if (pages.size() > 1 && !takeJson((pages.size() - 1) * textBytes(source))) return tooMuchJson();
     for (const auto page : pages) {
       auto primitive = pagePrimitive(source, use, page);
       if (!primitive) return primitive;

@@ -24,12 +24,19 @@ class LitMeshBuilder {
       : document_(document), model_(model), gltf_(gltf), buffer_(buffer) {}
 
   /// `mesh` with each primitive in `lit` (by index in the file's mesh) turned into one triangle list a page, vertices
-  /// split where lightmap UVs differ, all other attributes copied byte by byte. kTooLarge past 1 GiB of new data.
-  [[nodiscard]] Result<Json> build(const Json& mesh, const std::map<std::uint32_t, LitPrimitive>& lit);
+  /// split where lightmap UVs differ, all other attributes copied byte by byte. kTooLarge past 1 GiB of new data, or
+  /// 64 MiB of JSON that is there again. `again`: the mesh was built before; what is the file's own alone (`extras`,
+  /// which may be as large as the file) stays with the first.
+  [[nodiscard]] Result<Json> build(const Json& mesh, const std::map<std::uint32_t, LitPrimitive>& lit, bool again);
+  /// Counts JSON that is there again. False: it is too much.
+  [[nodiscard]] bool takeJson(std::size_t bytes) { return (json_bytes_ += bytes) <= kMaxJsonAgain; }
+  [[nodiscard]] tl::unexpected<Error> tooMuchJson() const;
 
   [[nodiscard]] Bytes takeBytes() { return std::move(bytes_); }
 
  private:
+  /// One mesh may stand in a scene a million times.
+  static constexpr std::size_t kMaxJsonAgain = std::size_t{64} << 20;
   struct Vertices {
     std::vector<std::uint32_t> source;   ///< vertex of the file's primitive
     std::vector<glm::vec2> uv;           ///< lightmap
@@ -40,6 +47,7 @@ class LitMeshBuilder {
   [[nodiscard]] Result<Json> pagePrimitive(const Json& source, const LitPrimitive& lit, std::uint32_t page);
   [[nodiscard]] Result<std::size_t> copyAccessor(std::size_t accessor, const std::vector<std::uint32_t>& elements,
                                                  bool with_bounds);
+  [[nodiscard]] Result<void> checkRoom(std::size_t more) const;
   [[nodiscard]] Result<Json> copyAttributes(const Json& attributes, const std::vector<std::uint32_t>& elements);
   [[nodiscard]] std::size_t addView(std::size_t first_byte, std::size_t stride);
   [[nodiscard]] std::size_t addAccessor(Json accessor);
@@ -51,6 +59,7 @@ class LitMeshBuilder {
   const tinygltf::Model& model_;
   Json& gltf_;
   std::size_t buffer_;
+  std::size_t json_bytes_ = 0;
   Bytes bytes_;
 };
 

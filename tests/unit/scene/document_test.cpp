@@ -177,7 +177,7 @@ TEST(Document, writeGlbRoundTrips) {
   GltfBuilder builder;
   builder.node({{"mesh", builder.square()}, {"name", "wall"}});
   const auto document = builder.document();
-  const auto again = parseDocument("again.glb", writeGlb(*document));
+  const auto again = parseDocument("again.glb", writeGlb(*document).value());
   ASSERT_TRUE(again) << again.error().text();
   const auto scene = importScene(*again);
   ASSERT_TRUE(scene) << scene.error().text();

@@ -86,7 +86,7 @@ Document roundTrip(const Document& document, std::uint32_t page_count) {
   const auto patches = patchesFor(scene, page_count);
   const auto lit = withLightmapUvs(document, scene, patches);
   EXPECT_TRUE(lit) << lit.error().text();
-  const auto again = parseDocument("lit.glb", writeGlb(*lit));
+  const auto again = parseDocument("lit.glb", writeGlb(*lit).value());
   EXPECT_TRUE(again) << again.error().text();
   const auto read = importScene(*again);
   EXPECT_TRUE(read) << read.error().text();
@@ -113,6 +113,30 @@ TEST(LitGlb, instancesGetAMeshEach) {
   const auto lit = roundTrip(*builder.document(), 1);
   EXPECT_EQ(lit.gltf["meshes"].size(), 2U);
   EXPECT_NE(lit.gltf["nodes"][0]["mesh"], lit.gltf["nodes"][1]["mesh"]);
+}
+
+TEST(LitGlb, whatIsTheFilesOwnAloneStaysWithTheFirstInstance) {
+  GltfBuilder builder;
+  const auto mesh = builder.square();
+  builder.gltf["meshes"][mesh]["extras"]["note"] = std::string(1U << 20U, 'x');
+  builder.gltf["meshes"][mesh]["primitives"][0]["extras"]["note"] = std::string(1U << 20U, 'y');
+  for (int i = 0; i < 100; ++i) builder.node({{"mesh", mesh}, {"translation", {0, 0, i}}});
+  const auto lit = roundTrip(*builder.document(), 1);
+  ASSERT_EQ(lit.gltf["meshes"].size(), 100U);
+  EXPECT_EQ(lit.gltf["meshes"][mesh]["extras"]["note"].get<std::string>().size(), 1U << 20U);
+  EXPECT_LT(lit.gltf.dump().size(), 3U << 20U);
+}
+
+TEST(LitGlb, tooMuchJsonForManyInstancesIsRefused) {
+  GltfBuilder builder;
+  const auto mesh = builder.square();
+  builder.gltf["meshes"][mesh]["name"] = std::string(1U << 20U, 'x');
+  for (int i = 0; i < 100; ++i) builder.node({{"mesh", mesh}, {"translation", {0, 0, i}}});
+  const auto document = builder.document().value();
+  const auto scene = importScene(document).value();
+  const auto lit = withLightmapUvs(document, scene, patchesFor(scene, 1));
+  ASSERT_FALSE(lit);
+  EXPECT_EQ(lit.error().code, ErrorCode::kTooLarge);
 }
 
 TEST(LitGlb, gpuInstancesBecomeChildNodes) {
