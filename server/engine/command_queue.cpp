@@ -4,11 +4,15 @@
 
 namespace radiosity::engine {
 
-bool CommandQueue::push(Command command) {
+bool CommandQueue::push(Command command, Kind kind) {
   {
     const std::scoped_lock lock(mutex_);
-    if (closed_ || commands_.size() >= capacity_) return false;
-    commands_.push_back(std::move(command));
+    if (closed_ || prompt_.size() + long_.size() >= capacity_) return false;
+    if (kind == Kind::kPrompt) {
+      prompt_.push_back(std::move(command));
+    } else {
+      long_.push_back(std::move(command));
+    }
   }
   wake_.notify_one();
   return true;
@@ -16,9 +20,13 @@ bool CommandQueue::push(Command command) {
 
 std::optional<std::vector<CommandQueue::Command>> CommandQueue::take(bool wait) {
   std::unique_lock lock(mutex_);
-  if (wait) wake_.wait(lock, [this] { return closed_ || !commands_.empty(); });
+  if (wait) wake_.wait(lock, [this] { return closed_ || !prompt_.empty() || !long_.empty(); });
   if (closed_) return std::nullopt;
-  return std::exchange(commands_, {});
+  if (!prompt_.empty() || long_.empty()) return std::exchange(prompt_, {});
+  std::vector<Command> one;
+  one.push_back(std::move(long_.front()));
+  long_.pop_front();
+  return one;
 }
 
 bool CommandQueue::closed() const {

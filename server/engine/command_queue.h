@@ -1,9 +1,11 @@
-// What other threads ask of the solve thread: commands in the order they came, never more than a fixed number. push()
+// What other threads ask of the solve thread: commands in the order they came, never more than a fixed number. What may
+// take seconds (pictures, files) waits for all else, and comes out by itself: an edit is not to wait for them. push()
 // and close() from any thread, take() from the solve thread alone.
 #pragma once
 
 #include <condition_variable>
 #include <cstddef>
+#include <deque>
 #include <functional>
 #include <mutex>
 #include <optional>
@@ -18,9 +20,11 @@ class CommandQueue {
   explicit CommandQueue(std::size_t capacity) : capacity_(capacity) {}
 
   /// False: the queue is full or closed, and the command will never run.
-  [[nodiscard]] bool push(Command command);
+  enum class Kind { kPrompt, kLong };
+  [[nodiscard]] bool push(Command command, Kind kind = Kind::kPrompt);
 
-  /// All that is due, oldest first. `wait`: sleeps until there is something. Nothing: the queue was closed.
+  /// All prompt ones that are due, oldest first; where there are none, the oldest long one. `wait`: sleeps until there
+  /// is something. Nothing: the queue was closed.
   [[nodiscard]] std::optional<std::vector<Command>> take(bool wait);
 
   [[nodiscard]] bool closed() const;
@@ -32,7 +36,8 @@ class CommandQueue {
   const std::size_t capacity_;
   mutable std::mutex mutex_;
   std::condition_variable wake_;
-  std::vector<Command> commands_;
+  std::vector<Command> prompt_;
+  std::deque<Command> long_;
   bool closed_ = false;
 };
 

@@ -74,10 +74,10 @@ class SolveLoop final : public Engine {
 
   /// Runs `work` on the solve thread and hands its Result to `done`; answers kBusy at once when the queue is full.
   template <typename T, typename Work>
-  void ask(Callback<T> done, Work work);
+  void ask(Callback<T> done, Work work, CommandQueue::Kind kind = CommandQueue::Kind::kPrompt);
   /// The same; answers kNotFound while no scene is loaded.
   template <typename T, typename Work>
-  void askLit(Callback<T> done, Work work);
+  void askLit(Callback<T> done, Work work, CommandQueue::Kind kind = CommandQueue::Kind::kLong);
   /// For what changes the scene or the solve: of a scene that is still being loaded the whole must be there.
   template <typename T, typename Work>
   void askToChange(Callback<T> done, Work work);
@@ -241,9 +241,9 @@ class SolveLoop final : public Engine {
 };
 
 template <typename T, typename Work>
-void SolveLoop::ask(Callback<T> done, Work work) {
+void SolveLoop::ask(Callback<T> done, Work work, CommandQueue::Kind kind) {
   const auto answer = std::make_shared<Callback<T>>(std::move(done));
-  if (queue_.push([answer, work = std::move(work)]() mutable { (*answer)(withinMemory(work)); })) return;
+  if (queue_.push([answer, work = std::move(work)]() mutable { (*answer)(withinMemory(work)); }, kind)) return;
   (*answer)(fail(ErrorCode::kBusy, "too many requests are waiting for the solver, try again"));
 }
 
@@ -256,11 +256,14 @@ void SolveLoop::askToChange(Callback<T> done, Work work) {
 }
 
 template <typename T, typename Work>
-void SolveLoop::askLit(Callback<T> done, Work work) {
-  ask<T>(std::move(done), [this, work = std::move(work)]() mutable -> Result<T> {
-    if (!lit_) return noScene();
-    return work();
-  });
+void SolveLoop::askLit(Callback<T> done, Work work, CommandQueue::Kind kind) {
+  ask<T>(
+      std::move(done),
+      [this, work = std::move(work)]() mutable -> Result<T> {
+        if (!lit_) return noScene();
+        return work();
+      },
+      kind);
 }
 
 }  // namespace radiosity::engine

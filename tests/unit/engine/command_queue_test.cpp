@@ -19,6 +19,26 @@ TEST(CommandQueue, CommandsComeOutInTheOrderTheyWentIn) {
   EXPECT_TRUE(queue.take(false)->empty());
 }
 
+TEST(CommandQueue, LongCommandsWaitForAllElseAndComeOutOneByOne) {
+  CommandQueue queue(8);
+  std::vector<int> done;
+  const auto note = [&done](int i) { return [&done, i] { done.push_back(i); }; };
+  for (int i = 0; i < 2; ++i) ASSERT_TRUE(queue.push(note(10 + i), CommandQueue::Kind::kLong));
+  const auto runSome = [&] {
+    const auto due = queue.take(true);
+    ASSERT_TRUE(due);
+    for (const auto& command : *due) command();
+  };
+  for (int i = 0; i < 2; ++i) ASSERT_TRUE(queue.push(note(i)));
+  runSome();
+  EXPECT_EQ(done, (std::vector<int>{0, 1}));
+  runSome();
+  ASSERT_TRUE(queue.push(note(2)));
+  runSome();
+  runSome();
+  EXPECT_EQ(done, (std::vector<int>{0, 1, 10, 2, 11}));
+}
+
 TEST(CommandQueue, FullQueueRefusesUntilItIsEmptied) {
   CommandQueue queue(2);
   EXPECT_TRUE(queue.push([] {}));
