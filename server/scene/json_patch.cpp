@@ -10,7 +10,8 @@ namespace {
 constexpr std::size_t kMaxDepth = 64;
 // `copy` can double a document with each operation; what is added is bounded, not the count of operations alone.
 constexpr std::size_t kMaxAddedBytes = std::size_t{64} << 20;
-// Looking for a name reads the elements of an array: a patch may read so many in all, a second's worth or so.
+// Looking for a name reads the elements of an array, and what is added or removed moves all behind it: a patch may do
+// so with so many in all, a second's worth or so.
 constexpr std::size_t kMaxRead = 20'000'000;
 
 /// About what a value costs in memory.
@@ -217,6 +218,7 @@ class Patcher {
     if (target.parent == nullptr) {
       document_ = std::move(value);
     } else if (target.parent->is_array()) {
+      if (auto ok = shift(target.parent->size() - target.index); !ok) return ok;
       target.parent->insert(target.parent->begin() + static_cast<std::ptrdiff_t>(target.index), std::move(value));
     } else {
       (*target.parent)[target.key] = std::move(value);
@@ -230,18 +232,28 @@ class Patcher {
     if (target->value == nullptr) return fault("there is no such value");
     touched_ = target->path;
     if (auto ok = permit("remove", target->path); !ok) return ok;
-    erase(*target);
-    return {};
+    return erase(*target);
   }
 
-  void erase(const Target& target) {
+  Result<void> erase(const Target& target) {
     if (target.parent == nullptr) {
       document_ = nullptr;
     } else if (target.parent->is_array()) {
+      if (auto ok = shift(target.parent->size() - target.index); !ok) return ok;
       target.parent->erase(target.index);
     } else {
       target.parent->erase(target.key);
     }
+    return {};
+  }
+
+  /// Elements behind the place where an array grows or shrinks move up: a long one is not to be moved by every
+  /// operation of a patch.
+  Result<void> shift(std::size_t elements) {
+    read_ += elements;
+    if (read_ <= kMaxRead) return {};
+    return fault("the patch moves too many elements of long arrays; add and remove at their ends",
+                 ErrorCode::kTooLarge);
   }
 
   Result<void> transfer(const std::string& op, const std::string& from, const std::string& path) {
@@ -259,7 +271,7 @@ class Patcher {
       if (below) return {};
       if (auto ok = permit("remove", inner); !ok) return ok;
       value = std::move(*source->value);
-      erase(*source);
+      if (auto ok = erase(*source); !ok) return ok;
     } else {
       value = *source->value;
     }

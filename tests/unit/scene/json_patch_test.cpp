@@ -148,6 +148,16 @@ TEST(JsonPatch, operationsDepthAndGrowthAreBounded) {
   ASSERT_FALSE(searched);
   EXPECT_EQ(searched.error().code, ErrorCode::kTooLarge);
   EXPECT_NE(searched.error().text().find("names"), std::string::npos) << searched.error().text();
+  // What is added before a long array moves all of it.
+  Json numbers = {{"a", std::vector<int>(100'000)}};
+  for (auto& operation : many) operation = {{"op", "add"}, {"path", "/a/0"}, {"value", 1}};
+  const auto moved = applyJsonPatch(numbers, many);
+  ASSERT_FALSE(moved);
+  EXPECT_EQ(moved.error().code, ErrorCode::kTooLarge);
+  for (auto& operation : many) operation = {{"op", "remove"}, {"path", "/a/0"}};
+  EXPECT_FALSE(applyJsonPatch(numbers, many));
+  for (auto& operation : many) operation = {{"op", "add"}, {"path", "/a/-"}, {"value", 1}};
+  EXPECT_TRUE(applyJsonPatch(numbers, many));
   // Each copy doubles the document: 2^1000 without a bound.
   Json doubling = Json::array();
   for (int i = 0; i < 60; ++i) doubling.push_back({{"op", "copy"}, {"from", "/a"}, {"path", "/a/-"}});
@@ -290,7 +300,7 @@ TEST_F(ScenePatch, anUploadBecomesAMesh) {
   EXPECT_EQ(edited->scene.primitives.at(0).positions.at(2), glm::dvec3(0, 2, 0));
   EXPECT_EQ(edited->document.buffers.at(1), upload);  // shared, not copied
   EXPECT_EQ(edited->document.gltf["buffers"][1], (Json{{"byteLength", 36}}));
-  const auto again = parseDocument("again.glb", writeGlb(edited->document));
+  const auto again = parseDocument("again.glb", writeGlb(edited->document).value());
   ASSERT_TRUE(again) << again.error().text();
   EXPECT_EQ(importScene(*again)->primitives, edited->scene.primitives);
 
