@@ -3,8 +3,11 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <sys/prctl.h>
+#include <sys/random.h>
 #include <sys/wait.h>
 #include <unistd.h>
+
+#include <fmt/format.h>
 
 #include <array>
 #include <cerrno>
@@ -41,16 +44,36 @@ Result<Pipe> makePipe() {
   return Pipe{ends[0], ends[1]};
 }
 
+/// A secret of 256 bits, as hexadecimal digits.
+Result<std::string> makeToken() {
+  std::array<std::uint8_t, 32> bytes{};
+  if (getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size()))
+    return fail(ErrorCode::kUnavailable, std::string("getrandom: ") + strerror(errno));
+  std::string token;
+  for (const auto byte : bytes) token += fmt::format("{:02x}", byte);
+  return token;
+}
+
+/// A pipe from which the token can be read, once: its reading end, which blocks.
+Result<int> tokenPipe(const std::string& token) {
+  std::array<int, 2> ends{};
+  if (pipe2(ends.data(), O_CLOEXEC) != 0) return fail(ErrorCode::kUnavailable, std::string("pipe: ") + strerror(errno));
+  const bool written = write(ends[1], token.data(), token.size()) == static_cast<ssize_t>(token.size());
+  close(ends[1]);
+  if (written) return ends[0];
+  close(ends[0]);
+  return fail(ErrorCode::kUnavailable, std::string("pipe: ") + strerror(errno));
+}
+
 /// Runs in the child, between fork and exec: only async-signal-safe calls.
-[[noreturn]] void becomeServer(const std::vector<char*>& arguments, int out, int err, pid_t parent) {
+[[noreturn]] void becomeServer(const std::vector<char*>& arguments, int secret, int out, int err, pid_t parent) {
   // A group of its own: Ctrl-C in the terminal reaches only us, and we decide how it ends.
   setpgid(0, 0);
   // It must not outlive us, however we end.
   prctl(PR_SET_PDEATHSIG, SIGTERM);
   if (getppid() != parent) _exit(kExecFailed);
   for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGPIPE}) signal(number, SIG_DFL);
-  const int nothing = open("/dev/null", O_RDONLY | O_CLOEXEC);
-  dup2(nothing, STDIN_FILENO);
+  dup2(secret, STDIN_FILENO);
   dup2(out, STDOUT_FILENO);
   dup2(err, STDERR_FILENO);
   execv(arguments[0], arguments.data());
@@ -126,6 +149,7 @@ Result<std::string> findServerProgram() {
 
 Result<ServerProcess> ServerProcess::start(const Options& options) {
   std::vector<std::string> words = {options.program, "--listen", "127.0.0.1:0"};
+  if (options.secret) words.insert(words.end(), {"--token-file", "/dev/stdin"});
   words.insert(words.end(), options.arguments.begin(), options.arguments.end());
   std::vector<char*> arguments;
   for (auto& word : words) arguments.push_back(word.data());
@@ -135,13 +159,17 @@ Result<ServerProcess> ServerProcess::start(const Options& options) {
   auto err = out ? makePipe() : out;
   if (!err) return tl::unexpected(err.error());
   ServerProcess server;
+  auto token = makeToken();
+  if (!token) return tl::unexpected(token.error());
+  if (options.secret) server.token_ = std::move(*token);
+  const auto secret = tokenPipe(server.token_ + "\n");
+  if (!secret) return tl::unexpected(secret.error());
   const pid_t parent = getpid();
   server.pid_ = fork();
   if (server.pid_ < 0) return fail(ErrorCode::kUnavailable, std::string("fork: ") + strerror(errno), options.program);
-  if (server.pid_ == 0) becomeServer(arguments, out->write_end, err->write_end, parent);
+  if (server.pid_ == 0) becomeServer(arguments, *secret, out->write_end, err->write_end, parent);
   setpgid(server.pid_, server.pid_);  // also here, so that stop() never comes before the child's own call
-  close(out->write_end);
-  close(err->write_end);
+  for (const int end : {*secret, out->write_end, err->write_end}) close(end);
   server.stdout_ = out->read_end;
   server.stderr_ = err->read_end;
   if (auto listening = server.waitUntilListening(options.keep_going); !listening)
@@ -159,7 +187,8 @@ ServerProcess::ServerProcess(ServerProcess&& other) noexcept
       log_(std::move(other.log_)),
       last_error_(std::move(other.last_error_)),
       last_text_(std::move(other.last_text_)),
-      url_(std::move(other.url_)) {}
+      url_(std::move(other.url_)),
+      token_(std::move(other.token_)) {}
 
 Result<void> ServerProcess::waitUntilListening(const std::function<bool()>& keep_going) {
   const auto deadline = Clock::now() + kStartTimeout;

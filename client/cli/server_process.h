@@ -33,8 +33,9 @@ class ServerProcess {
  public:
   struct Options {
     std::string program;
-    std::vector<std::string> arguments;  ///< after "--listen 127.0.0.1:0"
+    std::vector<std::string> arguments;  ///< after our own
     std::function<bool()> keep_going;    ///< false abandons the start
+    bool secret = true;                  ///< asks for a token; false: for others to join
   };
 
   /// Returns once the server listens. A server that exits first hands over its reason: kBadInput where it exited with
@@ -48,6 +49,8 @@ class ServerProcess {
   ~ServerProcess() { stop(std::chrono::milliseconds(1000)); }
 
   [[nodiscard]] const client::ServerUrl& url() const { return url_; }
+  /// What it asks of those who speak to it: it listens where every user of the machine could.
+  [[nodiscard]] const std::string& token() const { return token_; }
   [[nodiscard]] pid_t pid() const { return pid_; }
 
   /// Lines of the server's log since the last call, oldest first. Never waits.
@@ -76,6 +79,7 @@ class ServerProcess {
   std::vector<LogLine> log_;
   std::string last_error_, last_text_;
   client::ServerUrl url_;
+  std::string token_;
 };
 
 }  // namespace radiosity::cli

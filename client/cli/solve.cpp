@@ -122,6 +122,7 @@ class Solve {
     if (!server) return tl::unexpected(server.error());
     server_.emplace(std::move(*server));
     remote_.url = server_->url();
+    remote_.token = server_->token();
     remote_.keep_going = [this] {
       passOnLog();
       return !interrupted();

@@ -50,7 +50,7 @@ class RunningServer {
     if (!program) throw std::runtime_error(program.error().text());
     std::vector<std::string> arguments = {"--error", fmt::format("{}", options.error), "--max-clients", "1000"};
     arguments.insert(arguments.end(), more.begin(), more.end());
-    auto started = cli::ServerProcess::start({*program, arguments, [] { return true; }});
+    auto started = cli::ServerProcess::start({*program, arguments, [] { return true; }, false});
     if (!started) throw std::runtime_error(started.error().text());
     process_.emplace(std::move(*started));
   }

@@ -53,7 +53,30 @@ TEST(ServerProcess, asksForAFreeLoopbackPort) {
   auto options = script(folder, "echo \"$@\" > " + folder.file("args") + "; exit 3");
   options.arguments = {"--workers", "2"};
   EXPECT_FALSE(ServerProcess::start(options));
-  EXPECT_EQ(folder.read("args"), "--listen 127.0.0.1:0 --workers 2\n");
+  EXPECT_EQ(folder.read("args"), "--listen 127.0.0.1:0 --token-file /dev/stdin --workers 2\n");
+}
+
+TEST(ServerProcess, hasASecretOfItsOwn) {
+  const TemporaryFolder folder;
+  const auto words =
+      "read t; echo $t >> " + folder.file("token") + "; echo listening on http://127.0.0.1:4321; exec sleep 60";
+  std::string said;
+  for (int i = 0; i < 2; ++i) {
+    auto server = ServerProcess::start(script(folder, words));
+    ASSERT_TRUE(server) << server.error().text();
+    EXPECT_EQ(server->token().size(), 64U);
+    EXPECT_EQ(said.find(server->token()), std::string::npos);
+    said += server->token() + "\n";
+  }
+  EXPECT_EQ(folder.read("token"), said);
+}
+
+TEST(ServerProcess, asksForNoSecretWhereOthersAreToJoin) {
+  const TemporaryFolder folder;
+  auto options = script(folder, "echo \"$@\" > " + folder.file("args") + "; exit 3");
+  options.secret = false;
+  EXPECT_FALSE(ServerProcess::start(options));
+  EXPECT_EQ(folder.read("args"), "--listen 127.0.0.1:0\n");
 }
 
 TEST(ServerProcess, handsOverWhyItDidNotStart) {
