@@ -72,8 +72,17 @@ template <typename CallType>
 client::CallResult<typename CallType::Reply> sendEdit(const Remote& remote, CallType call) {
   call.request_id = newRequestId();
   auto connection = remote.connect();
+  std::string epoch;
   for (int attempt = 1;; ++attempt) {
     if (!connection) return tl::unexpected(connection.error());
+    // Request ids and revisions hold within an epoch: in another one the edit would be made again, and perhaps to
+    // another scene.
+    if (attempt > 1 && connection->hello().epoch != epoch)
+      return tl::unexpected(failureOf({ErrorCode::kUnavailable,
+                                       "the server began anew while the edit was under way; it may have been made or "
+                                       "not, and is not sent again",
+                                       remote.url.text()}));
+    epoch = connection->hello().epoch;
     auto reply = connection->call(call);
     if (reply || reply.error().rpc || interrupted() || attempt == kAttempts) return reply;
     warn(reply.error().error.text() + "; sending the edit again");

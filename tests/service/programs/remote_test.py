@@ -8,6 +8,7 @@ import re
 import signal
 import struct
 import unittest
+import uuid
 from http import HTTPStatus
 
 import websockets
@@ -63,9 +64,10 @@ class RemoteTest(ServiceCase):
         self.assertRegex(out, rf"^revision {before + 1}, affected: \d+ surfaces, \d+ shots\n$")
         self.assertIn("revision", self.complaint("edit", server.url, "patch.json", "--base-revision", before))
 
-    def test_anEditIsSentAgainToAServerThatIsAwayForSeconds(self):
-        """A stand-in takes the edit and goes without an answer; it is back three seconds later, at the same address."""
-        requests = []
+    @staticmethod
+    def goneForSeconds(requests, comes_back_anew):
+        """A stand-in that takes an undo, appends its id to `requests`, and goes without an answer; it is back three
+        seconds later, at the same address."""
         replies = {method: example(f"reply-{method}")["result"] for method in ("hello", "scene.undo")}
 
         async def stand_in(told):
@@ -88,15 +90,29 @@ class RemoteTest(ServiceCase):
                 told.set_result(port)
                 await gone.wait()
             await asyncio.sleep(3)
+            if comes_back_anew:
+                replies["hello"] = {**replies["hello"], "epoch": str(uuid.uuid4())}
             async with websockets.serve(serve, "127.0.0.1", port, **protocols):
                 await asyncio.sleep(60)
 
-        with running(stand_in) as port:
+        return stand_in
+
+    def test_anEditIsSentAgainToAServerThatIsAwayForSeconds(self):
+        requests = []
+        with running(self.goneForSeconds(requests, False)) as port:
             out, err = self.client("undo", f"127.0.0.1:{port}")
         self.assertIn("took back revision", out)
         self.assertIn("sending the edit again", err)
         self.assertEqual(len(requests), 2)
         self.assertEqual(requests[0], requests[1])
+
+    def test_anEditIsNotSentAgainToAServerThatBeganAnew(self):
+        """Another process without a state, perhaps with another scene: what it is asked would be done again, or there."""
+        requests = []
+        with running(self.goneForSeconds(requests, True)) as port:
+            err = self.complaint("undo", f"127.0.0.1:{port}", expect=1)
+        self.assertIn("began anew", err)
+        self.assertEqual(len(requests), 1)
 
     def test_aSceneThatTakesLongToLoadDoesNotCostTheConnection(self):
         """A server lets go who does not answer its pings, and while a scene is uploaded and read nothing else is said."""
