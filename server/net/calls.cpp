@@ -104,7 +104,8 @@ void Calls::handleItem(const protocol::RpcItem& item, Slot slot) {
   const auto& request = std::get<protocol::RpcRequest>(item);
   slot.id = request.id;
   const auto call = protocol::decodeCall(request);
-  if (!call) return greeted_ ? slot.error(call.error()) : turnAway(slot, call.error());
+  if (!call && greeted_) return slot.error(call.error());
+  if (!call) return turnAway(slot, request.method == "hello" ? call.error() : helloFirst());
   if (!admit(*call, slot)) return;
   std::visit([&](const auto& typed) { run(typed, slot); }, *call);
 }
@@ -115,7 +116,7 @@ bool Calls::admit(const protocol::Call& call, Slot& slot) {
   // Answered on the spot, whatever else waits, and without it a stream of tiles would stop for ever.
   const bool credit = std::holds_alternative<protocol::CreditCall>(call);
   if (!greeted_ && !hello)
-    turnAway(slot, {RpcCode::kUnauthenticated, "the first request must be hello", "/method"});
+    turnAway(slot, helloFirst());
   else if (greeted_ && hello)
     slot.error({RpcCode::kInvalidRequest, "hello was said before", "/method"});
   else if (hub_.draining())
@@ -128,11 +129,14 @@ bool Calls::admit(const protocol::Call& call, Slot& slot) {
   return false;
 }
 
+RpcError Calls::helloFirst() { return {RpcCode::kUnauthenticated, "the first request must be hello", "/method"}; }
+
 /// Answers, and closes: who cannot say hello has no business here.
 void Calls::turnAway(const Slot& slot, const RpcError& error) {
   slot.error(error);
   if (const auto peer = peer_.lock())
-    peer->closeAfterWrites(protocol::CloseCode::kPolicy, error.message.substr(0, 100));
+    peer->closeAfterWrites(protocol::CloseCode::kPolicy,
+                           error.code == RpcCode::kUnauthenticated ? error.message : "the first request was no hello");
 }
 
 void Calls::run(const protocol::HelloCall& call, const Slot& slot) {

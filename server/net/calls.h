@@ -51,6 +51,7 @@ class Calls {
 
   void handleItem(const protocol::RpcItem& item, Slot slot);
   bool admit(const protocol::Call& call, Slot& slot);
+  [[nodiscard]] static protocol::RpcError helloFirst();
   void turnAway(const Slot& slot, const protocol::RpcError& error);
 
   void run(const protocol::HelloCall& call, const Slot& slot);

@@ -1,5 +1,7 @@
 #include "server/net/convert.h"
 
+#include <nlohmann/json.hpp>
+
 #include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
@@ -102,7 +104,8 @@ std::vector<std::string> firstWarnings(const std::vector<std::string>& all) {
   std::vector<std::string> first;
   std::size_t bytes = 0;
   for (const auto& warning : all) {
-    bytes += warning.size();
+    // As an answer has it: what is no plain text takes up to six times the room.
+    bytes += nlohmann::json(warning).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace).size();
     if (first.size() == protocol::kMaxStatusWarnings || bytes > protocol::kMaxMessageBytes / 4) break;
     first.push_back(warning);
   }

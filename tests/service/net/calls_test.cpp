@@ -1,5 +1,6 @@
 // The methods without a socket: what a session is asked to do, and in which order.
 #include "server/net/calls.h"
+#include "server/net/convert.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -46,7 +47,7 @@ class FakePeer : public net::Peer {
   void answered() override {}
   void tilesWanted() override {}
   void subscribed() override {}
-  void closeAfterWrites(protocol::CloseCode /*code*/, std::string /*reason*/) override {}
+  void closeAfterWrites(protocol::CloseCode /*code*/, std::string reason) override { closed_with = std::move(reason); }
 
   [[nodiscard]] std::vector<std::string> sent() const {
     const std::lock_guard lock(mutex_);
@@ -57,6 +58,7 @@ class FakePeer : public net::Peer {
 
   std::function<void(const std::string&)> on_text;
   std::map<Timer, std::function<void()>> timers;
+  std::string closed_with;
 
  private:
   mutable std::mutex mutex_;
@@ -83,6 +85,26 @@ class CallsTest : public ::testing::Test {
   net::TileLane tiles;
   net::Calls calls{*hub, peer, tiles, true};
 };
+
+TEST_F(CallsTest, WhateverComesBeforeHelloIsTurnedAwayAsThat) {
+  for (const auto* request : {R"({"jsonrpc":"2.0","id":1,"method":"no.such"})",
+                              R"({"jsonrpc":"2.0","id":1,"method":"solve.wait","params":{"error":"x"}})",
+                              R"({"jsonrpc":"2.0","id":1,"method":"status"})"}) {
+    calls.handle(request);
+    EXPECT_THAT(peer->sent().back(), HasSubstr(R"("code":-32001)")) << request;
+    EXPECT_EQ(peer->closed_with, "the first request must be hello");
+  }
+  // A method's name may be anything, and a reason for closing must be UTF-8, which a cut name is not.
+  calls.handle(R"({"jsonrpc":"2.0","id":1,"method":"hello","params":{"aé":1}})");
+  EXPECT_EQ(peer->closed_with, "the first request was no hello");
+}
+
+TEST(FirstWarnings, AreCountedAsAnAnswerHasThem) {
+  const std::vector<std::string> plain(100, std::string(2000, 'x')), control(100, std::string(2000, '\x01'));
+  EXPECT_EQ(net::firstWarnings(plain).size(), 100U);
+  EXPECT_LE(net::firstWarnings(control).size() * 12'000, protocol::kMaxMessageBytes / 4);
+  EXPECT_GE(net::firstWarnings(control).size(), 10U);
+}
 
 TEST_F(CallsTest, AWaitThatIsOverLeavesNoTimerBehind) {
   hello();
