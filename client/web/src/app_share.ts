@@ -1,6 +1,7 @@
 // Links, commands and files to take away. Part of the App.
 
 import type { App } from './app';
+import { fetchLightmaps, fetchLitScene, type Layouts } from './document/one_layout';
 import type { Patch, ServerInfo } from './protocol/messages';
 import { copyText, download } from './ui/dom';
 import type { SharePanel } from './ui/share_panel';
@@ -20,6 +21,11 @@ export function editCommand(patch: Patch, server: string, token = false): string
 
 export class Share {
   private lastEdit: Patch | undefined;
+  private readonly layouts: Layouts = {
+    now: () => this.app.viewer.set?.note,
+    fetch: (path, init) => this.app.fetch(path, init),
+    pause: () => new Promise((resolve) => setTimeout(resolve, 100)),
+  };
 
   constructor(
     private readonly app: App,
@@ -56,11 +62,11 @@ export class Share {
   async download(what: Download): Promise<void> {
     try {
       if (what === 'png') return download(await this.app.viewer.picture(), 'view.png');
-      if (what === 'glb') return await this.save('/scene.glb', 'scene-lit.glb');
+      if (what === 'glb') return download(await fetchLitScene(this.layouts), 'scene-lit.glb');
       if (what === 'unlit') return await this.save('/scene-unlit.glb', 'scene-unlit.glb');
       if (what === 'snapshot') return await this.save('/snapshot.png?width=1920&height=1080', 'snapshot.png');
-      const pages = this.app.viewer.set?.pages.length ?? 0;
-      for (let page = 0; page < pages; ++page) await this.save(`/lightmaps/${page}.exr`, `lightmap.${page}.exr`);
+      const pages = await fetchLightmaps(this.layouts);
+      pages.forEach((blob, page) => download(blob, `lightmap.${page}.exr`));
     } catch (error) {
       this.app.frame.toasts.show(`Download: ${(error as Error).message}`, 'bad');
     }

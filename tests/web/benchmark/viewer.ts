@@ -30,6 +30,15 @@ interface Row {
 
 const say = (text: string) => process.stderr.write(`${text}\n`);
 
+/** Says what is measured, then what came of it, so that whoever waits sees at once which part takes how long. */
+async function stage<T>(name: string, measure: () => Promise<T>, told: (result: T) => string): Promise<T> {
+  say(`${name} ...`);
+  const begin = performance.now();
+  const result = await measure();
+  say(`${name}, ${((performance.now() - begin) / 1000).toFixed(0)} s:\n${told(result)}\n`);
+  return result;
+}
+
 function openingsTable(rows: readonly Row[]): string {
   const head = ['opened', 'geometry', 'light', 'converged', 'main thread in all', 'its longest task before tiles', 'with tiles', 'tasks > 50 ms with tiles, a visit', 'frame interval: median, p95, max']; // prettier-ignore
   return table(
@@ -98,14 +107,16 @@ async function main(): Promise<void> {
   await pages.launch(values.gpu);
   try {
     const rows: Row[] = [];
-    for (const { file, label } of SCENES) {
-      say(`${label}, solved`);
-      rows.push({ label: `${label}, solved`, openings: await openSolved(pages, file, runs) });
-      say(`${label}, being loaded`);
-      rows.push({ label: `${label}, being loaded`, openings: await openLoading(pages, file, runs) });
-    }
-    say('edits');
-    const seen = await watchEdits(pages, SCENES[0]!.file, edits);
+    for (const { file, label } of SCENES)
+      for (const [how, open] of [
+        ['solved', openSolved],
+        ['being loaded', openLoading],
+      ] as const) {
+        const row = (openings: Opening[]): Row => ({ label: `${label}, ${how}`, openings });
+        const told = (openings: Opening[]) => [openingsTable, framesTable].map((of) => of([row(openings)])).join('\n');
+        rows.push(row(await stage(`${label}, ${how}`, () => open(pages, file, runs), told)));
+      }
+    const seen = await stage('edits', () => watchEdits(pages, SCENES[0]!.file, edits), editsTable);
     const size = await scriptSize(pages, SCENES[0]!.file);
     const renderer = await pages.renderer();
     const text = [

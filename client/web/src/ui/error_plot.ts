@@ -3,7 +3,7 @@
 import type { Progress } from '../protocol/messages';
 import { h } from './dom';
 
-interface Sample {
+export interface Sample {
   seconds: number;
   total: number;
   residual: number;
@@ -72,8 +72,7 @@ export class ErrorPlot {
       MARGIN.left,
       width - MARGIN.right,
     );
-    const errors = this.samples.flatMap((s) => [s.total, ...(s.sampling > 1e-4 ? [s.sampling] : [])]);
-    const y = scale([...errors, this.target || 0.02], [0.01, 1], height - MARGIN.bottom, MARGIN.top);
+    const y = scale([...errorsShown(this.samples), this.target || 0.02], [0.01, 1], height - MARGIN.bottom, MARGIN.top);
     this.axes(context, style, x, y, width, height);
     context.save();
     context.beginPath();
@@ -98,7 +97,8 @@ export class ErrorPlot {
     context.textAlign = 'center';
     for (const tick of x.ticks) {
       stroke(context, x.at(tick), MARGIN.top, x.at(tick), height - MARGIN.bottom);
-      context.fillText(`${short(tick)} s`, x.at(tick), height - 7);
+      const text = `${short(tick)} s`;
+      context.fillText(text, within(x.at(tick), context.measureText(text).width, width), height - 7);
     }
     context.textAlign = 'right';
     for (const tick of y.ticks) {
@@ -132,6 +132,17 @@ export class ErrorPlot {
     context.arc(x.at(last.seconds), y.at(last[key]), key === 'total' ? 3 : 2, 0, 2 * Math.PI);
     context.fill();
   }
+}
+
+/** What the scale has to hold: all that the legend names, down to where a part is nothing beside the total. */
+export function errorsShown(samples: readonly Sample[]): number[] {
+  const parts = samples.flatMap(({ sampling, residual }) => [sampling, residual]);
+  return [...samples.map(({ total }) => total), ...parts.filter((part) => part > 1e-4)];
+}
+
+/** The middle of a text, so moved that the canvas does not cut it off at its left or right. */
+export function within(middle: number, textWidth: number, width: number): number {
+  return Math.max(textWidth / 2, Math.min(middle, width - textWidth / 2));
 }
 
 interface LogScale {

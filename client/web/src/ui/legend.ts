@@ -3,6 +3,16 @@
 import { MIP_STOPS, paletteCss } from '../view/palette';
 import { h, readable } from './dom';
 
+const LABELS = 5;
+
+/** Of colours on a logarithmic scale. The first and the last colour are those of all that lies beyond it, too, as lamps do. */
+export function scaleLabels(low: number, high: number): string[] {
+  return Array.from({ length: LABELS }, (_, i) => {
+    const sign = i === 0 ? '≤ ' : i === LABELS - 1 ? '≥ ' : '';
+    return sign + readable(low * (high / low) ** (i / (LABELS - 1)), 2);
+  });
+}
+
 export class Legend {
   private readonly bar = h('div', { class: 'bar' });
   private readonly ticks = h('div', { class: 'ticks' });
@@ -20,9 +30,7 @@ export class Legend {
   }
 
   show(title: string, unit: string, low: number, high: number): void {
-    const count = 5;
-    const labels = Array.from({ length: count }, (_, i) => readable(low * (high / low) ** (i / (count - 1)), 2));
-    this.fill(`${title}, ${unit}`, paletteCss('to right'), labels);
+    this.fill(`${title}, ${unit}`, paletteCss('to right'), scaleLabels(low, high));
   }
 
   showMips(): void {
