@@ -350,13 +350,30 @@ std::uint64_t Hub::wait(const protocol::SolveWaitCall& call, std::weak_ptr<void>
     std::erase_if(waiters_, [](const Waiter& waiter) { return waiter.owner.expired(); });
     waiters_.push_back({id, call.revision.value_or(revision_), call.error, std::move(owner), std::move(done)});
   }
-  // The state may be right already, and then nothing more need happen. Asked after the waiter is in the list, so that
-  // no change falls between.
-  announceProgress(engine_.status());
+  judge(id);
   return id;
 }
 
 void Hub::giveUp(std::uint64_t waiter) {
+/// The state may be right already, and then nothing more need happen. Asked after the waiter is in the list, so that no
+/// change falls between. Only this waiter hears of it: the solve thread may be telling a newer one at this moment, and
+/// what viewers are told must not run backwards.
+void Hub::judge(std::uint64_t waiter) {
+  const auto status = engine_.status();
+  std::optional<Waiter> found;
+  auto reply = toStatusReply(status);
+  {
+    const std::lock_guard lock(mutex_);
+    const auto place = std::find_if(waiters_.begin(), waiters_.end(), [&](const auto& w) { return w.id == waiter; });
+    if (place == waiters_.end()) return;
+    reply.reached = reached(*place, status);
+    if (!reply.reached) return;
+    found = std::move(*place);
+    waiters_.erase(place);
+  }
+  found->done(std::move(reply));
+}
+
   std::optional<Waiter> found;
   {
     const std::lock_guard lock(mutex_);

@@ -151,6 +151,7 @@ class Hub : public engine::Listener, public std::enable_shared_from_this<Hub> {
   [[nodiscard]] std::vector<std::shared_ptr<Viewer>> viewers() const;
   // Both under the lock.
   [[nodiscard]] std::vector<std::shared_ptr<Viewer>> presentViewers() const;
+  void judge(std::uint64_t waiter);
   [[nodiscard]] std::optional<std::vector<SharedText>> missedSince(const protocol::Resume& resume) const;
   void broadcast(const protocol::Notification& notification);
   /// Calls `ask` with what is to hear the engine's outcome, unless the request was made before.

@@ -293,10 +293,19 @@ void FakeEngine::restart(Callback<engine::SolveState> done) { setState(engine::S
 
 engine::Status FakeEngine::status() const {
   const std::lock_guard lock(mutex_);
-  return status_;
+  meanwhile_ = std::move(meanwhile);
 }
 
 std::shared_ptr<const engine::Lightmaps> FakeEngine::lightmaps(engine::Quantity quantity) const {
+  std::unique_lock lock(mutex_);
+  auto status = status_;
+  const auto meanwhile = std::exchange(meanwhile_, nullptr);
+  lock.unlock();
+  if (meanwhile) meanwhile();
+  return status;
+}
+
+void FakeEngine::overtakeStatus(std::function<void()> meanwhile) {
   const std::lock_guard lock(mutex_);
   return lightmaps_[static_cast<std::size_t>(quantity)];
 }

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <atomic>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -39,6 +40,8 @@ class FakeEngine : public engine::Engine {
   std::atomic<double> busy_seconds{0.0};
   [[nodiscard]] std::string lastLoad() const;  ///< "name: 123 bytes" or "file PATH"
 
+  /// Once: `meanwhile` happens after status() was taken, and before whoever asked for it has it.
+  void overtakeStatus(std::function<void()> meanwhile);
   // ---- engine::Engine ----
   void loadBytes(std::string name, SharedBytes bytes, Callback<engine::LoadOutcome> done) override;
   void loadFile(std::string path, Callback<engine::LoadOutcome> done) override;
@@ -90,4 +93,5 @@ class FakeEngine : public engine::Engine {
   std::vector<std::function<void()>> held_;
 };
 
+  mutable std::function<void()> meanwhile_;
 }  // namespace radiosity::testing
