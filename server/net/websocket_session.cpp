@@ -269,7 +269,7 @@ void WebSocketSession::adoptLightmaps() {
   const auto lightmaps = hub_->lightmaps(toQuantity(tiles_.quantity()));
   if (lightmaps == nullptr) return pump();  // the first are still to come, and do not wait for the rate
   const auto now = Clock::now();
-  if (now < next_adoption_) {
+  if (now < next_adoption_ && tiles_.sendFrom(lightmaps)) {
     if (adoption_) return;
     const auto wait = std::chrono::ceil<std::chrono::milliseconds>(next_adoption_ - now);
     adoption_ = later(wait, [this] {
