@@ -109,7 +109,7 @@ void putScene(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respo
 }
 
 void putUpload(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond& done) {
-  hub->keepUpload(request.name, std::make_shared<const Bytes>(std::move(request.body)),
+  hub->keepUpload(request.body_sha256, request.name, std::make_shared<const Bytes>(std::move(request.body)),
                   [done](const Result<std::string>& id) {
                     if (!id) return done(errorResponse(id.error()));
                     auto response = plain(201, protocol::encodeHttpUrl("/uploads/" + *id));
@@ -253,6 +253,11 @@ bool needsToken(const HttpRequest& request) {
   const auto* route = routeOf(request);
   return route == nullptr || !route->open;
 }
+bool namedByContent(const HttpRequest& request) {
+  const auto* route = routeOf(request);
+  return route != nullptr && route->handle == putUpload && request.method == route->method;
+}
+
 
 std::optional<HttpResponse> refusal(const HttpRequest& request) {
   const auto* route = routeOf(request);

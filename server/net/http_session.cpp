@@ -14,8 +14,10 @@
 #include <boost/beast/websocket/rfc6455.hpp>
 #include <ctime>
 #include <optional>
+#include <span>
 #include <utility>
 
+#include "common/sha256.h"
 #include "server/net/access.h"
 #include "server/net/http_routes.h"
 #include "server/net/websocket_session.h"
@@ -120,7 +122,9 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   bool head_ = false, keep_alive_ = false, idle_ = false;
   bool asked_ = false;  ///< the engine, which takes its time
   asio::steady_timer stall_;
-  std::uint64_t moved_bytes_ = 0;  ///< either way
+  std::uint64_t moved_bytes_ = 0;      ///< either way
+  std::optional<Sha256> body_sha256_;  ///< of what has come of a body that is named by it
+  std::size_t body_seen_ = 0;          ///< bytes of the body that have come
   std::string origin_;
   HttpResponse response_;  ///< holds the bytes that message_ points to
   std::optional<Response> message_;
@@ -226,6 +230,9 @@ void HttpSession::upgrade() {
 }
 
 void HttpSession::readBody() {
+  body_seen_ = 0;
+  body_sha256_.reset();
+  if (namedByContent(request_)) body_sha256_.emplace();
   if (parser_->is_done()) return onWhole();
   if (request_.method != "PUT") {
     // The parser holds a length against the limit with the header; a limit set now is for chunks alone.
@@ -244,7 +251,12 @@ void HttpSession::onBody(BoostError error) {
   if (error == http::error::body_limit)
     return send(errorResponse(413, "tooLarge", "the body is larger than this path accepts (--max-upload)"), true);
   if (error) return stream_.close();
-  if (!room_.hold(parser_->get().body().size()))
+  // The hash is taken part by part: of a GiB it takes a second, in which nobody else would be served.
+  const auto& body = parser_->get().body();
+  const auto came = std::span(body).subspan(body_seen_);
+  if (body_sha256_) body_sha256_->add(came);
+  body_seen_ = body.size();
+  if (!room_.hold(body.size()))
     return send(errorResponse({ErrorCode::kBusy, "other uploads take all the room there is; try again", {}}), true);
   if (parser_->is_done()) return onWhole();
   stream_.expires_after(hub_->options().idle_timeout);
@@ -256,6 +268,7 @@ void HttpSession::onBody(BoostError error) {
 
 void HttpSession::onWhole() {
   request_.body = std::move(parser_->get().body());
+  if (body_sha256_) request_.body_sha256 = body_sha256_->finish();
   hub_->counters().upload_bytes += request_.body.size();
   stream_.expires_never();
   asked_ = true;

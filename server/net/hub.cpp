@@ -26,8 +26,8 @@ Hub::Hub(const ServerOptions& options, engine::Engine& engine)
     : options_(options),
       engine_(engine),
       epoch_(engine.past().epoch.empty() ? randomHex(8) : engine.past().epoch),
-      uploads_(kUploadsKept, options.max_upload_bytes, BlobStore::Naming::kByContent),
-      snapshots_(kSnapshotsKept, kSnapshotBytes, BlobStore::Naming::kAtRandom) {}
+      uploads_(kUploadsKept, options.max_upload_bytes),
+      snapshots_(kSnapshotsKept, kSnapshotBytes) {}
 
 void Hub::start() {
   const auto status = engine_.status();
@@ -251,9 +251,9 @@ void Hub::askOnce(const engine::Receipt& receipt, const std::string& by, EditAns
       }));
 }
 
-void Hub::keepUpload(const std::string& name, const SharedBytes& bytes,
+void Hub::keepUpload(const std::string& id, const std::string& name, const SharedBytes& bytes,
                      std::function<void(const Result<std::string>&)> done) {
-  auto put = uploads_.put(name, bytes);
+  auto put = uploads_.put(id, name, bytes);
   if (!options_.uploads) return done(std::move(put.id));
   std::vector<std::string> dropped;
   for (const auto& blob : put.dropped) dropped.push_back(blob.id);
@@ -280,7 +280,7 @@ std::optional<BlobStore::Blob> Hub::findUpload(std::string_view id) {
     return std::nullopt;
   }
   blob->bytes = std::move(*bytes);
-  (void)uploads_.put(blob->name, blob->bytes);
+  (void)uploads_.put(blob->id, blob->name, blob->bytes);
   return blob;
 }
 
@@ -354,7 +354,6 @@ std::uint64_t Hub::wait(const protocol::SolveWaitCall& call, std::weak_ptr<void>
   return id;
 }
 
-void Hub::giveUp(std::uint64_t waiter) {
 /// The state may be right already, and then nothing more need happen. Asked after the waiter is in the list, so that no
 /// change falls between. Only this waiter hears of it: the solve thread may be telling a newer one at this moment, and
 /// what viewers are told must not run backwards.
@@ -374,6 +373,7 @@ void Hub::judge(std::uint64_t waiter) {
   found->done(std::move(reply));
 }
 
+void Hub::giveUp(std::uint64_t waiter) {
   std::optional<Waiter> found;
   {
     const std::lock_guard lock(mutex_);

@@ -99,7 +99,8 @@ class Hub : public engine::Listener, public std::enable_shared_from_this<Hub> {
   void giveUp(std::uint64_t waiter);
 
   /// `done` is called once the upload is kept (on the disk, where the server has state) with its id, or why not.
-  void keepUpload(const std::string& name, const SharedBytes& bytes,
+  /// `id`: the SHA-256 of the bytes, so that the same lie there once and a client can tell the id beforehand.
+  void keepUpload(const std::string& id, const std::string& name, const SharedBytes& bytes,
                   std::function<void(const Result<std::string>&)> done);
   /// With its bytes; blocks while they come from the disk, the first time after a restart.
   [[nodiscard]] std::optional<BlobStore::Blob> findUpload(std::string_view id);
