@@ -20,6 +20,7 @@
 #include "common/sha256.h"
 #include "server/net/access.h"
 #include "server/net/http_routes.h"
+#include "server/net/pace.h"
 #include "server/net/websocket_session.h"
 
 namespace radiosity::net {
@@ -80,7 +81,8 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
         slot_(std::move(slot)),
         buffer_(kBufferLimit),
         room_(*hub_),
-        stall_(executor_) {}
+        stall_(executor_),
+        pace_(hub_->options().least_bytes_per_second) {}
 
   void start() {
     hub_->add(weak_from_this());
@@ -104,7 +106,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   void onWhole();
   void send(HttpResponse response, bool close);
   void prepare(bool close);
-  void writeSome();
+  void writeSome(std::size_t moved);
   void onWritten();
   void linger();
   void cutWhenStalled();
@@ -123,6 +125,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   bool asked_ = false;  ///< the engine, which takes its time
   asio::steady_timer stall_;
   std::uint64_t moved_bytes_ = 0;      ///< either way
+  Pace pace_;                          ///< of the body that comes or goes
   std::optional<Sha256> body_sha256_;  ///< of what has come of a body that is named by it
   std::size_t body_seen_ = 0;          ///< bytes of the body that have come
   std::string origin_;
@@ -234,6 +237,7 @@ void HttpSession::readBody() {
   body_sha256_.reset();
   if (namedByContent(request_)) body_sha256_.emplace();
   if (parser_->is_done()) return onWhole();
+  pace_.start(hub_->options().idle_timeout);
   if (request_.method != "PUT") {
     // The parser holds a length against the limit with the header; a limit set now is for chunks alone.
     if (parser_->content_length().value_or(0) > kBodyOfGet)
@@ -259,7 +263,7 @@ void HttpSession::onBody(BoostError error) {
   if (!room_.hold(body.size()))
     return send(errorResponse({ErrorCode::kBusy, "other uploads take all the room there is; try again", {}}), true);
   if (parser_->is_done()) return onWhole();
-  stream_.expires_after(hub_->options().idle_timeout);
+  stream_.expires_after(pace_.moved(came.size()));
   http::async_read_some(stream_, buffer_, *parser_, [self = shared_from_this()](BoostError e, std::size_t n) {
     self->moved_bytes_ += n;
     self->onBody(e);
@@ -290,9 +294,10 @@ void HttpSession::send(HttpResponse response, bool close) {
   const auto kind = static_cast<std::size_t>(response_.status / 100);
   ++hub_->counters().http_responses.at(std::min<std::size_t>(kind, 5));
   prepare(close || !keep_alive_ || hub_->draining());
+  pace_.start(hub_->options().idle_timeout);
   serializer_.emplace(*message_);
   if (head_) serializer_->split(true);
-  writeSome();
+  writeSome(0);
 }
 
 void HttpSession::prepare(bool close) {
@@ -320,13 +325,14 @@ void HttpSession::prepare(bool close) {
   for (const auto& [name, value] : response_.headers) m.set(name, value);
 }
 
-void HttpSession::writeSome() {
+/// `moved`: bytes that were taken since the last time.
+void HttpSession::writeSome(std::size_t moved) {
   if (serializer_->is_done() || (head_ && serializer_->is_header_done())) return onWritten();
-  stream_.expires_after(hub_->options().idle_timeout);  // each time some of it was taken
+  stream_.expires_after(pace_.moved(moved));
   http::async_write_some(stream_, *serializer_, [self = shared_from_this()](BoostError error, std::size_t n) {
     if (error) return self->stream_.close();
     self->moved_bytes_ += n;
-    self->writeSome();
+    self->writeSome(n);
   });
 }
 

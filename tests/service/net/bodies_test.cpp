@@ -1,14 +1,32 @@
-// Bodies over real sockets.
+// Bodies over real sockets: what they hold of the server's memory, and for how long.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <string>
+#include <thread>
 
 #include "common/sha256.h"
+#include "server/net/pace.h"
 #include "tests/service/net/running_server.h"
 #include "tests/service/net/test_client.h"
 
 namespace radiosity::testing {
 namespace {
+
+using std::chrono::milliseconds;
+
+TEST(Pace, WhatMovesEarnsTimeButNoMoreThanTheSlack) {
+  using std::chrono::seconds;
+  net::Pace pace(1000);
+  const net::Pace::Clock::time_point start;
+  pace.start(seconds(30), start);
+  EXPECT_EQ(pace.moved(0, start), seconds(30));
+  EXPECT_EQ(pace.moved(5000, start), seconds(30));
+  EXPECT_EQ(pace.moved(1, start + seconds(29)), seconds(1) + milliseconds(1));
+  EXPECT_EQ(pace.moved(10'000, start + seconds(30)), seconds(10) + milliseconds(1));
+  EXPECT_EQ(pace.moved(1'000'000, start + seconds(31)), seconds(30));
+  EXPECT_EQ(pace.moved(0, start + seconds(100)), seconds(0));
+}
 
 TEST(Bodies, AnUploadIsNamedByAllOfItsBytesHoweverTheyCome) {
   RunningServer server;
@@ -23,6 +41,44 @@ TEST(Bodies, AnUploadIsNamedByAllOfItsBytesHoweverTheyCome) {
   EXPECT_EQ(chunked.receive().header("Location"), expected);
   chunked.send("PUT /uploads HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n");
   EXPECT_EQ(chunked.receive().header("Location"), "/uploads/" + sha256Hex(std::string_view()));
+}
+
+TEST(Bodies, ABodyThatDripsInIsCutOffAndItsRoomGivenBack) {
+  net::ServerOptions options;
+  options.idle_timeout = milliseconds(1000);
+  options.max_upload_bytes = 1000;
+  RunningServer server(options);
+  const std::string header = "PUT /uploads HTTP/1.1\r\nHost: localhost\r\nContent-Length: 1000\r\n\r\n";
+  std::array<RawHttp, 2> drips{RawHttp(server.port()), RawHttp(server.port())};
+  for (auto& drip : drips) drip.send(header + std::string(900, 'x'));
+  const auto held = [&] { return request(server.port(), "GET", "/metrics").body; };
+  for (int i = 0; i < 1000 && held().find("radiosityd_uploads_held_bytes 1800\n") == std::string::npos; ++i) {
+  }
+  EXPECT_EQ(request(server.port(), "PUT", "/uploads", {}, std::string(300, 'x')).status, 503);
+  const auto start = std::chrono::steady_clock::now();
+  bool ended = false;
+  while (!ended && std::chrono::steady_clock::now() - start < std::chrono::seconds(9)) {  // before 100 bytes have come
+    for (auto& drip : drips) drip.send("x");
+    ended = drips[0].closed(Seconds(0.1)) && drips[1].closed(Seconds(0.1));
+  }
+  EXPECT_TRUE(ended);
+  EXPECT_EQ(request(server.port(), "PUT", "/uploads", {}, std::string(300, 'x')).status, 201);
+}
+
+TEST(Bodies, ABodyThatComesAtALowRateComesAllTheSame) {
+  net::ServerOptions options;
+  options.idle_timeout = milliseconds(2000);
+  RunningServer server(options);
+  RawHttp http(server.port());
+  constexpr int kParts = 60;
+  const std::string part(std::size_t{40'000}, 'x');
+  http.send("PUT /uploads HTTP/1.1\r\nHost: localhost\r\nContent-Length: " + std::to_string(kParts * part.size()) +
+            "\r\n\r\n");
+  for (int i = 0; i < kParts; ++i) {  // 3 s in all, which the time for pauses alone would not cover
+    std::this_thread::sleep_for(milliseconds(50));
+    http.send(part);
+  }
+  EXPECT_EQ(http.receive().status, 201);
 }
 
 }  // namespace
