@@ -122,8 +122,7 @@ void putUpload(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Resp
 void getSceneGltf(const std::shared_ptr<Hub>& hub, HttpRequest& /*request*/, const Respond& done) {
   hub->engine().sceneText(hub->fromEngine<engine::Engine::SceneText>([done](Result<engine::Engine::SceneText> text) {
     if (!text) return done(errorResponse(text.error()));
-    auto response = plain(200, std::move(text->gltf));
-    response.content_type = "model/gltf+json";
+    auto response = file(std::make_shared<const Bytes>(text->gltf.begin(), text->gltf.end()), "model/gltf+json");
     response.headers.emplace_back("X-Revision", std::to_string(text->revision));
     done(std::move(response));
   }));
@@ -253,11 +252,11 @@ bool needsToken(const HttpRequest& request) {
   const auto* route = routeOf(request);
   return route == nullptr || !route->open;
 }
+
 bool namedByContent(const HttpRequest& request) {
   const auto* route = routeOf(request);
   return route != nullptr && route->handle == putUpload && request.method == route->method;
 }
-
 
 std::optional<HttpResponse> refusal(const HttpRequest& request) {
   const auto* route = routeOf(request);

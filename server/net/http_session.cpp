@@ -29,6 +29,7 @@ namespace {
 constexpr std::uint32_t kHeaderLimit = 16 * 1024;
 constexpr std::size_t kBufferLimit = std::size_t{64} * 1024;
 constexpr std::uint64_t kBodyOfGet = std::uint64_t{64} * 1024;
+constexpr std::size_t kSmallBody = std::size_t{64} * 1024;   ///< of a response: is sent whatever else waits
 constexpr std::size_t kLingerBytes = std::size_t{64} << 20;  ///< read and dropped so that a refusal can be read
 
 using Parser = http::request_parser<http::vector_body<std::uint8_t>>;
@@ -47,7 +48,7 @@ std::string httpDate() {
   return {text.data(), length};
 }
 
-/// The part of the memory for uploads that a session holds. All sessions share kUploadsAtATime times the largest
+/// The part of the memory for uploads that a session holds. All sessions share kBodiesAtATime times the largest
 /// upload: each may send one that large, and together they must not fill the machine.
 class UploadRoom {
  public:
@@ -60,14 +61,13 @@ class UploadRoom {
   [[nodiscard]] bool hold(std::size_t bytes) {
     auto& all = hub_.counters().uploads_held_bytes;
     const auto now = all += bytes - held_bytes_;
-    const bool fits = now <= kUploadsAtATime * hub_.options().max_upload_bytes || bytes <= held_bytes_;
+    const bool fits = now <= kBodiesAtATime * hub_.options().max_upload_bytes || bytes <= held_bytes_;
     if (!fits) all -= bytes - held_bytes_;
     if (fits) held_bytes_ = bytes;
     return fits;
   }
 
  private:
-  static constexpr std::uint64_t kUploadsAtATime = 2;
   Hub& hub_;
   std::uint64_t held_bytes_ = 0;
 };
@@ -82,7 +82,8 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
         buffer_(kBufferLimit),
         room_(*hub_),
         stall_(executor_),
-        pace_(hub_->options().least_bytes_per_second) {}
+        pace_(hub_->options().least_bytes_per_second),
+        going_(hub_->sendRoom()) {}
 
   void start() {
     hub_->add(weak_from_this());
@@ -130,6 +131,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   std::size_t body_seen_ = 0;          ///< bytes of the body that have come
   std::string origin_;
   HttpResponse response_;  ///< holds the bytes that message_ points to
+  SendRoom::Part going_;   ///< of those bytes; to be given back before they go, since it knows them by their place
   std::optional<Response> message_;
   std::optional<Serializer> serializer_;
   std::size_t lingered_ = 0;
@@ -291,6 +293,9 @@ void HttpSession::send(HttpResponse response, bool close) {
   asked_ = false;
   (void)room_.hold(0);
   response_ = std::move(response);
+  const auto size = response_.bytes ? response_.bytes->size() : 0;
+  if (size > kSmallBody && !head_ && !going_.hold(response_.bytes.get(), size))
+    response_ = errorResponse({ErrorCode::kBusy, "other downloads take all the room there is; try again", {}});
   const auto kind = static_cast<std::size_t>(response_.status / 100);
   ++hub_->counters().http_responses.at(std::min<std::size_t>(kind, 5));
   prepare(close || !keep_alive_ || hub_->draining());
@@ -340,6 +345,7 @@ void HttpSession::onWritten() {
   const bool keep = message_->keep_alive();
   serializer_.reset();
   message_.reset();
+  going_.release();
   response_ = {};
   if (keep) return readHeader();
   stream_.expires_after(hub_->options().close_patience);

@@ -27,7 +27,8 @@ Hub::Hub(const ServerOptions& options, engine::Engine& engine)
       engine_(engine),
       epoch_(engine.past().epoch.empty() ? randomHex(8) : engine.past().epoch),
       uploads_(kUploadsKept, options.max_upload_bytes),
-      snapshots_(kSnapshotsKept, kSnapshotBytes) {}
+      snapshots_(kSnapshotsKept, kSnapshotBytes),
+      send_room_(kBodiesAtATime * options.max_upload_bytes) {}
 
 void Hub::start() {
   const auto status = engine_.status();

@@ -15,6 +15,9 @@
 
 namespace radiosity::net {
 
+/// Bodies of the largest size (max_upload_bytes) that there is room for, coming, and as many going.
+inline constexpr std::uint64_t kBodiesAtATime = 2;
+
 struct ServerOptions {
   std::string address = "127.0.0.1";       ///< IP address, no name
   std::uint16_t port = 8765;               ///< 0: any free one

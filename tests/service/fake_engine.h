@@ -34,14 +34,16 @@ class FakeEngine : public engine::Engine {
   void holdAnswers();
   void release();
   void setSceneText(std::string gltf);
+  /// What scene.glb is from now on.
+  void setGlb(SharedBytes glb);
   [[nodiscard]] std::uint64_t patchesSeen() const;
   void notice(const engine::Notice& notice);
   void loseRenderer(bool lost);
   std::atomic<double> busy_seconds{0.0};
-  [[nodiscard]] std::string lastLoad() const;  ///< "name: 123 bytes" or "file PATH"
-
   /// Once: `meanwhile` happens after status() was taken, and before whoever asked for it has it.
   void overtakeStatus(std::function<void()> meanwhile);
+  [[nodiscard]] std::string lastLoad() const;  ///< "name: 123 bytes" or "file PATH"
+
   // ---- engine::Engine ----
   void loadBytes(std::string name, SharedBytes bytes, Callback<engine::LoadOutcome> done) override;
   void loadFile(std::string path, Callback<engine::LoadOutcome> done) override;
@@ -89,9 +91,10 @@ class FakeEngine : public engine::Engine {
   std::uint64_t layout_number_ = 1, patches_ = 0;
   std::string last_load_, scene_text_ = R"({"asset":{"version":"2.0"}})";
   std::vector<std::weak_ptr<engine::Listener>> listeners_;
+  SharedBytes glb_ = std::make_shared<const Bytes>(Bytes{'g', 'l', 'T', 'F', ' ', 's', 'c', 'e', 'n', 'e'});
   bool holding_ = false;
+  mutable std::function<void()> meanwhile_;
   std::vector<std::function<void()>> held_;
 };
 
-  mutable std::function<void()> meanwhile_;
 }  // namespace radiosity::testing

@@ -1,7 +1,10 @@
 // Bodies over real sockets: what they hold of the server's memory, and for how long.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <array>
+#include <memory>
 #include <string>
 #include <thread>
 
@@ -14,6 +17,7 @@ namespace radiosity::testing {
 namespace {
 
 using std::chrono::milliseconds;
+using ::testing::HasSubstr;
 
 TEST(Pace, WhatMovesEarnsTimeButNoMoreThanTheSlack) {
   using std::chrono::seconds;
@@ -79,6 +83,64 @@ TEST(Bodies, ABodyThatComesAtALowRateComesAllTheSame) {
     http.send(part);
   }
   EXPECT_EQ(http.receive().status, 201);
+}
+
+/// Asks for /scene.glb and takes nothing of it, until the server holds so much.
+void leaveWaiting(RawHttp& http, std::uint16_t port, std::size_t held) {
+  http.send("GET /scene.glb HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  const auto wanted = fmt::format("radiosityd_downloads_held_bytes {}\n", held);
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  std::string metrics;
+  do {
+    metrics = request(port, "GET", "/metrics").body;
+  } while (metrics.find(wanted) == std::string::npos && std::chrono::steady_clock::now() < end);
+  EXPECT_THAT(metrics, HasSubstr(wanted));
+}
+
+TEST(Bodies, WhatWaitsToBeTakenHasItsRoom) {
+  constexpr std::size_t kBytes = std::size_t{24} << 20;  // more than the system takes of it
+  net::ServerOptions options;
+  options.max_upload_bytes = kBytes;
+  RunningServer server(options);
+  const auto first = std::make_shared<const Bytes>(kBytes);
+  server.engine.setGlb(first);
+  {
+    std::array<RawHttp, 4> waiting{RawHttp(server.port()), RawHttp(server.port()), RawHttp(server.port()),
+                                   RawHttp(server.port())};
+    leaveWaiting(waiting[0], server.port(), kBytes);
+    leaveWaiting(waiting[1], server.port(), kBytes);  // the same: it is in memory once
+    server.engine.setGlb(std::make_shared<const Bytes>(kBytes));
+    leaveWaiting(waiting[2], server.port(), 2 * kBytes);
+    server.engine.setGlb(std::make_shared<const Bytes>(kBytes));
+    waiting[3].send("GET /scene.glb HTTP/1.1\r\nHost: localhost\r\n\r\n");
+    const auto refused = waiting[3].receive();
+    EXPECT_EQ(refused.status, 503);
+    EXPECT_FALSE(refused.header("Retry-After").empty());
+    server.engine.setGlb(first);
+    leaveWaiting(waiting[3], server.port(), 2 * kBytes);
+    EXPECT_EQ(request(server.port(), "GET", "/healthz").status, 200);
+    EXPECT_EQ(request(server.port(), "HEAD", "/scene.glb").status, 200);
+  }
+  RawHttp after(server.port());
+  leaveWaiting(after, server.port(), kBytes);
+  EXPECT_EQ(after.receive().body.size(), kBytes);
+}
+
+TEST(Bodies, AResponseThatDripsOutIsCutOff) {
+  constexpr std::size_t kBytes = std::size_t{24} << 20;
+  net::ServerOptions options;
+  options.idle_timeout = milliseconds(1000);
+  options.least_bytes_per_second = std::size_t{1} << 30;
+  RunningServer server(options);
+  server.engine.setGlb(std::make_shared<const Bytes>(kBytes));
+  RawHttp http(server.port());
+  leaveWaiting(http, server.port(), kBytes);
+  std::size_t taken = 0;
+  while (const auto some = http.readSome(Seconds(3))) {
+    taken += some;
+    std::this_thread::sleep_for(milliseconds(20));  // 3 MiB/s at most
+  }
+  EXPECT_LT(taken, kBytes);
 }
 
 }  // namespace
