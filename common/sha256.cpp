@@ -37,6 +37,30 @@ std::string hexOf(const std::array<unsigned char, kDigestBytes>& digest) {
 std::string sha256Hex(std::span<const std::uint8_t> bytes) { return hexOf(digestOf(bytes.data(), bytes.size())); }
 std::string sha256Hex(std::string_view text) { return hexOf(digestOf(text.data(), text.size())); }
 
+struct Sha256::State {
+  std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context{EVP_MD_CTX_new(), &EVP_MD_CTX_free};
+};
+
+Sha256::Sha256() : state_(std::make_unique<State>()) {
+  RAD_CHECK(state_->context != nullptr);
+  RAD_CHECK(EVP_DigestInit_ex(state_->context.get(), EVP_sha256(), nullptr) == 1);
+}
+Sha256::~Sha256() = default;
+Sha256::Sha256(Sha256&&) noexcept = default;
+Sha256& Sha256::operator=(Sha256&&) noexcept = default;
+
+void Sha256::add(std::span<const std::uint8_t> bytes) {
+  RAD_CHECK(EVP_DigestUpdate(state_->context.get(), bytes.data(), bytes.size()) == 1);
+}
+
+std::string Sha256::finish() {
+  std::array<unsigned char, kDigestBytes> digest{};
+  unsigned length = 0;
+  RAD_CHECK(EVP_DigestFinal_ex(state_->context.get(), digest.data(), &length) == 1);
+  RAD_CHECK_EQ(length, kDigestBytes);
+  return hexOf(digest);
+}
+
 std::uint64_t fingerprintOf(std::string_view text) {
   std::uint64_t value = 0;
   const auto digest = digestOf(text.data(), text.size());

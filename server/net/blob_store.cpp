@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "common/sha256.h"
-
 namespace radiosity::net {
 
 bool BlobStore::forget(std::string_view id) {
@@ -15,8 +13,8 @@ bool BlobStore::forget(std::string_view id) {
   return true;
 }
 
-BlobStore::Put BlobStore::put(std::string name, SharedBytes bytes) {
-  Put put{naming_ == Naming::kByContent ? sha256Hex(*bytes) : randomHex(16)};
+BlobStore::Put BlobStore::put(std::string id, std::string name, SharedBytes bytes) {
+  Put put{std::move(id)};
   const std::lock_guard lock(mutex_);
   put.was_there = forget(put.id);
   bytes_ += bytes->size();

@@ -14,12 +14,7 @@ namespace radiosity::net {
 
 class BlobStore {
  public:
-  /// kByContent: the id is the SHA-256 of the bytes, so the same bytes lie there once and a client can tell the id
-  /// beforehand. kAtRandom: it cannot be guessed.
-  enum class Naming { kByContent, kAtRandom };
-
-  BlobStore(std::size_t max_count, std::size_t max_bytes, Naming naming)
-      : max_count_(max_count), max_bytes_(max_bytes), naming_(naming) {}
+  BlobStore(std::size_t max_count, std::size_t max_bytes) : max_count_(max_count), max_bytes_(max_bytes) {}
 
   struct Blob {
     std::string id, name;
@@ -32,7 +27,8 @@ class BlobStore {
     bool was_there = false;
     std::vector<Blob> dropped = {};  ///< those that had to go, oldest first
   };
-  Put put(std::string name, SharedBytes bytes);
+  /// What lies there with this id makes way.
+  Put put(std::string id, std::string name, SharedBytes bytes);
   /// As if put() had not been called: what lay there before lies there again.
   void takeBack(const Put& put);
   /// One that is kept elsewhere: find() gives it without bytes.
@@ -44,7 +40,6 @@ class BlobStore {
   bool forget(std::string_view id);  ///< false: it was not there
 
   std::size_t max_count_, max_bytes_;
-  Naming naming_;
   mutable std::mutex mutex_;
   std::deque<Blob> blobs_;
   std::size_t bytes_ = 0;

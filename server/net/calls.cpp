@@ -5,6 +5,7 @@
 #include <mutex>
 #include <utility>
 
+#include "common/sha256.h"
 #include "server/net/access.h"
 #include "server/net/convert.h"
 
@@ -307,7 +308,7 @@ void Calls::run(const protocol::SnapshotCall& call, const Slot& slot) {
                              if (made.error().code == ErrorCode::kBadUsage) error.pointer = "/params/" + error.pointer;
                              return slot.error(error);
                            }
-                           const auto id = hub->snapshots().put("snapshot.png", made->png).id;
+                           const auto id = hub->snapshots().put(randomHex(16), "snapshot.png", made->png).id;
                            slot.reply(protocol::SnapshotReply{fmt::format("/snapshots/{}.png", id), made->exposure});
                          }));
 }

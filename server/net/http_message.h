@@ -20,6 +20,7 @@ struct HttpRequest {
   std::string content_type, name;            ///< name: header X-Name, or ?name=
   std::string accept_encoding, if_none_match;
   Bytes body;
+  std::string body_sha256;  ///< of one that is named by it (PUT /uploads): taken while it came
 };
 
 struct HttpResponse {

@@ -109,7 +109,7 @@ void putScene(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respo
 }
 
 void putUpload(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond& done) {
-  hub->keepUpload(request.name, std::make_shared<const Bytes>(std::move(request.body)),
+  hub->keepUpload(request.body_sha256, request.name, std::make_shared<const Bytes>(std::move(request.body)),
                   [done](const Result<std::string>& id) {
                     if (!id) return done(errorResponse(id.error()));
                     auto response = plain(201, protocol::encodeHttpUrl("/uploads/" + *id));
@@ -122,8 +122,7 @@ void putUpload(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Resp
 void getSceneGltf(const std::shared_ptr<Hub>& hub, HttpRequest& /*request*/, const Respond& done) {
   hub->engine().sceneText(hub->fromEngine<engine::Engine::SceneText>([done](Result<engine::Engine::SceneText> text) {
     if (!text) return done(errorResponse(text.error()));
-    auto response = plain(200, std::move(text->gltf));
-    response.content_type = "model/gltf+json";
+    auto response = file(std::make_shared<const Bytes>(text->gltf.begin(), text->gltf.end()), "model/gltf+json");
     response.headers.emplace_back("X-Revision", std::to_string(text->revision));
     done(std::move(response));
   }));
@@ -252,6 +251,11 @@ bool sceneType(std::string_view type) {
 bool needsToken(const HttpRequest& request) {
   const auto* route = routeOf(request);
   return route == nullptr || !route->open;
+}
+
+bool namedByContent(const HttpRequest& request) {
+  const auto* route = routeOf(request);
+  return route != nullptr && route->handle == putUpload && request.method == route->method;
 }
 
 std::optional<HttpResponse> refusal(const HttpRequest& request) {

@@ -19,6 +19,9 @@ using Respond = std::function<void(HttpResponse)>;
 /// Whether the token is needed: everywhere but for the probes and the viewer's own files.
 [[nodiscard]] bool needsToken(const HttpRequest& request);
 
+/// Whether request.body_sha256 is to be filled in: the answer names the body by it.
+[[nodiscard]] bool namedByContent(const HttpRequest& request);
+
 /// Answers a request for which refusal() found nothing.
 void respond(const std::shared_ptr<Hub>& hub, HttpRequest request, const Respond& done);
 

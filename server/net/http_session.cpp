@@ -14,10 +14,13 @@
 #include <boost/beast/websocket/rfc6455.hpp>
 #include <ctime>
 #include <optional>
+#include <span>
 #include <utility>
 
+#include "common/sha256.h"
 #include "server/net/access.h"
 #include "server/net/http_routes.h"
+#include "server/net/pace.h"
 #include "server/net/websocket_session.h"
 
 namespace radiosity::net {
@@ -26,6 +29,7 @@ namespace {
 constexpr std::uint32_t kHeaderLimit = 16 * 1024;
 constexpr std::size_t kBufferLimit = std::size_t{64} * 1024;
 constexpr std::uint64_t kBodyOfGet = std::uint64_t{64} * 1024;
+constexpr std::size_t kSmallBody = std::size_t{64} * 1024;   ///< of a response: is sent whatever else waits
 constexpr std::size_t kLingerBytes = std::size_t{64} << 20;  ///< read and dropped so that a refusal can be read
 
 using Parser = http::request_parser<http::vector_body<std::uint8_t>>;
@@ -44,7 +48,7 @@ std::string httpDate() {
   return {text.data(), length};
 }
 
-/// The part of the memory for uploads that a session holds. All sessions share kUploadsAtATime times the largest
+/// The part of the memory for uploads that a session holds. All sessions share kBodiesAtATime times the largest
 /// upload: each may send one that large, and together they must not fill the machine.
 class UploadRoom {
  public:
@@ -57,14 +61,13 @@ class UploadRoom {
   [[nodiscard]] bool hold(std::size_t bytes) {
     auto& all = hub_.counters().uploads_held_bytes;
     const auto now = all += bytes - held_bytes_;
-    const bool fits = now <= kUploadsAtATime * hub_.options().max_upload_bytes || bytes <= held_bytes_;
+    const bool fits = now <= kBodiesAtATime * hub_.options().max_upload_bytes || bytes <= held_bytes_;
     if (!fits) all -= bytes - held_bytes_;
     if (fits) held_bytes_ = bytes;
     return fits;
   }
 
  private:
-  static constexpr std::uint64_t kUploadsAtATime = 2;
   Hub& hub_;
   std::uint64_t held_bytes_ = 0;
 };
@@ -78,7 +81,9 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
         slot_(std::move(slot)),
         buffer_(kBufferLimit),
         room_(*hub_),
-        stall_(executor_) {}
+        stall_(executor_),
+        pace_(hub_->options().least_bytes_per_second),
+        going_(hub_->sendRoom()) {}
 
   void start() {
     hub_->add(weak_from_this());
@@ -102,7 +107,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   void onWhole();
   void send(HttpResponse response, bool close);
   void prepare(bool close);
-  void writeSome();
+  void writeSome(std::size_t moved);
   void onWritten();
   void linger();
   void cutWhenStalled();
@@ -120,9 +125,13 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   bool head_ = false, keep_alive_ = false, idle_ = false;
   bool asked_ = false;  ///< the engine, which takes its time
   asio::steady_timer stall_;
-  std::uint64_t moved_bytes_ = 0;  ///< either way
+  std::uint64_t moved_bytes_ = 0;      ///< either way
+  Pace pace_;                          ///< of the body that comes or goes
+  std::optional<Sha256> body_sha256_;  ///< of what has come of a body that is named by it
+  std::size_t body_seen_ = 0;          ///< bytes of the body that have come
   std::string origin_;
   HttpResponse response_;  ///< holds the bytes that message_ points to
+  SendRoom::Part going_;   ///< of those bytes; to be given back before they go, since it knows them by their place
   std::optional<Response> message_;
   std::optional<Serializer> serializer_;
   std::size_t lingered_ = 0;
@@ -226,7 +235,11 @@ void HttpSession::upgrade() {
 }
 
 void HttpSession::readBody() {
+  body_seen_ = 0;
+  body_sha256_.reset();
+  if (namedByContent(request_)) body_sha256_.emplace();
   if (parser_->is_done()) return onWhole();
+  pace_.start(hub_->options().idle_timeout);
   if (request_.method != "PUT") {
     // The parser holds a length against the limit with the header; a limit set now is for chunks alone.
     if (parser_->content_length().value_or(0) > kBodyOfGet)
@@ -244,10 +257,15 @@ void HttpSession::onBody(BoostError error) {
   if (error == http::error::body_limit)
     return send(errorResponse(413, "tooLarge", "the body is larger than this path accepts (--max-upload)"), true);
   if (error) return stream_.close();
-  if (!room_.hold(parser_->get().body().size()))
+  // The hash is taken part by part: of a GiB it takes a second, in which nobody else would be served.
+  const auto& body = parser_->get().body();
+  const auto came = std::span(body).subspan(body_seen_);
+  if (body_sha256_) body_sha256_->add(came);
+  body_seen_ = body.size();
+  if (!room_.hold(body.size()))
     return send(errorResponse({ErrorCode::kBusy, "other uploads take all the room there is; try again", {}}), true);
   if (parser_->is_done()) return onWhole();
-  stream_.expires_after(hub_->options().idle_timeout);
+  stream_.expires_after(pace_.moved(came.size()));
   http::async_read_some(stream_, buffer_, *parser_, [self = shared_from_this()](BoostError e, std::size_t n) {
     self->moved_bytes_ += n;
     self->onBody(e);
@@ -256,6 +274,7 @@ void HttpSession::onBody(BoostError error) {
 
 void HttpSession::onWhole() {
   request_.body = std::move(parser_->get().body());
+  if (body_sha256_) request_.body_sha256 = body_sha256_->finish();
   hub_->counters().upload_bytes += request_.body.size();
   stream_.expires_never();
   asked_ = true;
@@ -274,12 +293,16 @@ void HttpSession::send(HttpResponse response, bool close) {
   asked_ = false;
   (void)room_.hold(0);
   response_ = std::move(response);
+  const auto size = response_.bytes ? response_.bytes->size() : 0;
+  if (size > kSmallBody && !head_ && !going_.hold(response_.bytes.get(), size))
+    response_ = errorResponse({ErrorCode::kBusy, "other downloads take all the room there is; try again", {}});
   const auto kind = static_cast<std::size_t>(response_.status / 100);
   ++hub_->counters().http_responses.at(std::min<std::size_t>(kind, 5));
   prepare(close || !keep_alive_ || hub_->draining());
+  pace_.start(hub_->options().idle_timeout);
   serializer_.emplace(*message_);
   if (head_) serializer_->split(true);
-  writeSome();
+  writeSome(0);
 }
 
 void HttpSession::prepare(bool close) {
@@ -307,13 +330,14 @@ void HttpSession::prepare(bool close) {
   for (const auto& [name, value] : response_.headers) m.set(name, value);
 }
 
-void HttpSession::writeSome() {
+/// `moved`: bytes that were taken since the last time.
+void HttpSession::writeSome(std::size_t moved) {
   if (serializer_->is_done() || (head_ && serializer_->is_header_done())) return onWritten();
-  stream_.expires_after(hub_->options().idle_timeout);  // each time some of it was taken
+  stream_.expires_after(pace_.moved(moved));
   http::async_write_some(stream_, *serializer_, [self = shared_from_this()](BoostError error, std::size_t n) {
     if (error) return self->stream_.close();
     self->moved_bytes_ += n;
-    self->writeSome();
+    self->writeSome(n);
   });
 }
 
@@ -321,6 +345,7 @@ void HttpSession::onWritten() {
   const bool keep = message_->keep_alive();
   serializer_.reset();
   message_.reset();
+  going_.release();
   response_ = {};
   if (keep) return readHeader();
   stream_.expires_after(hub_->options().close_patience);

@@ -26,8 +26,9 @@ Hub::Hub(const ServerOptions& options, engine::Engine& engine)
     : options_(options),
       engine_(engine),
       epoch_(engine.past().epoch.empty() ? randomHex(8) : engine.past().epoch),
-      uploads_(kUploadsKept, options.max_upload_bytes, BlobStore::Naming::kByContent),
-      snapshots_(kSnapshotsKept, kSnapshotBytes, BlobStore::Naming::kAtRandom) {}
+      uploads_(kUploadsKept, options.max_upload_bytes),
+      snapshots_(kSnapshotsKept, kSnapshotBytes),
+      send_room_(kBodiesAtATime * options.max_upload_bytes) {}
 
 void Hub::start() {
   const auto status = engine_.status();
@@ -251,9 +252,9 @@ void Hub::askOnce(const engine::Receipt& receipt, const std::string& by, EditAns
       }));
 }
 
-void Hub::keepUpload(const std::string& name, const SharedBytes& bytes,
+void Hub::keepUpload(const std::string& id, const std::string& name, const SharedBytes& bytes,
                      std::function<void(const Result<std::string>&)> done) {
-  auto put = uploads_.put(name, bytes);
+  auto put = uploads_.put(id, name, bytes);
   if (!options_.uploads) return done(std::move(put.id));
   std::vector<std::string> dropped;
   for (const auto& blob : put.dropped) dropped.push_back(blob.id);
@@ -280,7 +281,7 @@ std::optional<BlobStore::Blob> Hub::findUpload(std::string_view id) {
     return std::nullopt;
   }
   blob->bytes = std::move(*bytes);
-  (void)uploads_.put(blob->name, blob->bytes);
+  (void)uploads_.put(blob->id, blob->name, blob->bytes);
   return blob;
 }
 
@@ -350,10 +351,27 @@ std::uint64_t Hub::wait(const protocol::SolveWaitCall& call, std::weak_ptr<void>
     std::erase_if(waiters_, [](const Waiter& waiter) { return waiter.owner.expired(); });
     waiters_.push_back({id, call.revision.value_or(revision_), call.error, std::move(owner), std::move(done)});
   }
-  // The state may be right already, and then nothing more need happen. Asked after the waiter is in the list, so that
-  // no change falls between.
-  announceProgress(engine_.status());
+  judge(id);
   return id;
+}
+
+/// The state may be right already, and then nothing more need happen. Asked after the waiter is in the list, so that no
+/// change falls between. Only this waiter hears of it: the solve thread may be telling a newer one at this moment, and
+/// what viewers are told must not run backwards.
+void Hub::judge(std::uint64_t waiter) {
+  const auto status = engine_.status();
+  std::optional<Waiter> found;
+  auto reply = toStatusReply(status);
+  {
+    const std::lock_guard lock(mutex_);
+    const auto place = std::find_if(waiters_.begin(), waiters_.end(), [&](const auto& w) { return w.id == waiter; });
+    if (place == waiters_.end()) return;
+    reply.reached = reached(*place, status);
+    if (!reply.reached) return;
+    found = std::move(*place);
+    waiters_.erase(place);
+  }
+  found->done(std::move(reply));
 }
 
 void Hub::giveUp(std::uint64_t waiter) {

@@ -20,6 +20,7 @@
 #include "server/net/blob_store.h"
 #include "server/net/camera_board.h"
 #include "server/net/counters.h"
+#include "server/net/send_room.h"
 #include "server/net/server_options.h"
 #include "server/net/tile_cache.h"
 
@@ -99,11 +100,13 @@ class Hub : public engine::Listener, public std::enable_shared_from_this<Hub> {
   void giveUp(std::uint64_t waiter);
 
   /// `done` is called once the upload is kept (on the disk, where the server has state) with its id, or why not.
-  void keepUpload(const std::string& name, const SharedBytes& bytes,
+  /// `id`: the SHA-256 of the bytes, so that the same lie there once and a client can tell the id beforehand.
+  void keepUpload(const std::string& id, const std::string& name, const SharedBytes& bytes,
                   std::function<void(const Result<std::string>&)> done);
   /// With its bytes; blocks while they come from the disk, the first time after a restart.
   [[nodiscard]] std::optional<BlobStore::Blob> findUpload(std::string_view id);
   BlobStore& snapshots() { return snapshots_; }
+  SendRoom& sendRoom() { return send_room_; }
   TileCache& tiles() { return tiles_; }
   CameraBoard& cameras() { return cameras_; }
   Counters& counters() { return counters_; }
@@ -148,6 +151,7 @@ class Hub : public engine::Listener, public std::enable_shared_from_this<Hub> {
   };
 
   void announceProgress(const engine::Status& status);
+  void judge(std::uint64_t waiter);
   [[nodiscard]] std::vector<std::shared_ptr<Viewer>> viewers() const;
   // Both under the lock.
   [[nodiscard]] std::vector<std::shared_ptr<Viewer>> presentViewers() const;
@@ -167,6 +171,7 @@ class Hub : public engine::Listener, public std::enable_shared_from_this<Hub> {
   std::string epoch_;
   std::atomic<bool> draining_{false};
   BlobStore uploads_, snapshots_;
+  SendRoom send_room_;
   TileCache tiles_;
   CameraBoard cameras_;
   Counters counters_;

@@ -96,6 +96,8 @@ void networkMetrics(Text& text, Hub& hub) {
   for (std::size_t i = 1; i < c.http_responses.size(); ++i)
     text.sample("http_responses_total", c.http_responses[i].load(), fmt::format("{{code=\"{}xx\"}}", i));
   text.gauge("uploads_held_bytes", "Bodies that are coming or being worked on.", c.uploads_held_bytes.load());
+  text.gauge("downloads_held_bytes", "Large bodies that wait for their peers to take them, each counted once.",
+             hub.sendRoom().heldBytes());
   text.counter("upload_bytes_total", "Bytes of uploaded bodies.", c.upload_bytes.load());
   text.counter("calls_total", "JSON-RPC calls.", c.calls.load());
   text.counter("calls_failed_total", "JSON-RPC calls answered with an error.", c.calls_failed.load());

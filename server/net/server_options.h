@@ -15,6 +15,9 @@
 
 namespace radiosity::net {
 
+/// Bodies of the largest size (max_upload_bytes) that there is room for, coming, and as many going.
+inline constexpr std::uint64_t kBodiesAtATime = 2;
+
 struct ServerOptions {
   std::string address = "127.0.0.1";       ///< IP address, no name
   std::uint16_t port = 8765;               ///< 0: any free one
@@ -35,7 +38,8 @@ struct ServerOptions {
   std::chrono::milliseconds write_deadline{protocol::kWriteDeadlineMs};
   std::chrono::milliseconds close_patience{2'000};   ///< for the closing handshake, then the socket is cut
   std::chrono::milliseconds header_timeout{10'000};  ///< for a whole HTTP header
-  std::chrono::milliseconds idle_timeout{30'000};    ///< of a kept-alive connection, between bytes of a body, pings
+  std::chrono::milliseconds idle_timeout{30'000};    ///< of a kept-alive connection, in a body, pings
+  std::size_t least_bytes_per_second = 64 * 1024;    ///< of a body, either way; idle_timeout is for all of its pauses
   std::chrono::milliseconds progress_interval{100};  ///< at least this between two progress notifications
   std::chrono::milliseconds drain_grace{5'000};      ///< for what is under way when the server stops
   std::chrono::milliseconds drain_patience{1'000};   ///< then: for a peer that takes nothing, or does not close

@@ -28,6 +28,7 @@ void TileLane::subscribe(const protocol::SubscribeCall& call) {
   const bool another = subscription_ && subscription_->quantity != call.quantity;
   subscription_ = call;
   if (another) {
+    taken_.reset();
     lightmaps_.reset();
     dirty_.clear();
   }
@@ -60,11 +61,22 @@ void TileLane::startLayout() {
   bookmarked_ = 0;
 }
 
+bool TileLane::laidOutAlike(const engine::Lightmaps& lightmaps) const {
+  return taken_ && taken_->layout == lightmaps.layout && taken_->pages == lightmaps.pages.size();
+}
+
+bool TileLane::sendFrom(const std::shared_ptr<const engine::Lightmaps>& newer) {
+  if (lightmaps_ == nullptr) return true;
+  if (!laidOutAlike(*newer)) return false;
+  lightmaps_ = newer;
+  return true;
+}
+
 bool TileLane::setLightmaps(std::shared_ptr<const engine::Lightmaps> lightmaps) {
-  if (!subscription_ || lightmaps == nullptr || lightmaps == lightmaps_) return false;
+  if (!subscription_ || lightmaps == nullptr) return false;
   if (toQuantity(lightmaps->quantity) != subscription_->quantity) return false;
-  const bool new_layout = lightmaps_ == nullptr || lightmaps_->layout != lightmaps->layout ||
-                          lightmaps_->pages.size() != lightmaps->pages.size();
+  const bool new_layout = !laidOutAlike(*lightmaps);
+  taken_ = {lightmaps->layout, lightmaps->revision, lightmaps->tile_version, lightmaps->pages.size()};
   lightmaps_ = std::move(lightmaps);
   if (new_layout) startLayout();
   findDirty();
@@ -140,10 +152,11 @@ std::optional<OutgoingTile> TileLane::next(TileCache& cache) {
 void TileLane::addCredit(std::int64_t bytes) { credit_ = std::min(credit_ + bytes, protocol::kMaxCreditBytes); }
 
 std::optional<protocol::Bookmark> TileLane::takeBookmark() {
-  if (!subscription_ || lightmaps_ == nullptr || !dirty_.empty() || bookmarked_ == lightmaps_->tile_version)
-    return std::nullopt;
-  bookmarked_ = lightmaps_->tile_version;
-  return protocol::Bookmark{lightmaps_->revision, lightmaps_->tile_version, subscription_->quantity};
+  if (!subscription_ || lightmaps_ == nullptr || !dirty_.empty()) return std::nullopt;
+  lightmaps_.reset();  // at a low rate the next ones may be long in coming
+  if (bookmarked_ == taken_->tile_version) return std::nullopt;
+  bookmarked_ = taken_->tile_version;
+  return protocol::Bookmark{taken_->revision, taken_->tile_version, subscription_->quantity};
 }
 
 }  // namespace radiosity::net

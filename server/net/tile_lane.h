@@ -42,6 +42,12 @@ class TileLane {
   /// Takes the newest lightmaps of the quantity subscribed to; others are passed over. True: their layout is new, or
   /// they are the first, so `lightmaps` must be sent before the next tile.
   bool setLightmaps(std::shared_ptr<const engine::Lightmaps> lightmaps);
+  /// For lightmaps that are newer than those taken, at a time when the rate does not allow to take them: what is still
+  /// to be sent is sent from them, so that a session whose client is slow does not keep old ones in memory. False:
+  /// their layout is another and something is still to be sent; they must be taken instead.
+  [[nodiscard]] bool sendFrom(const std::shared_ptr<const engine::Lightmaps>& newer);
+  /// Whether lightmaps are kept in memory: something of them is still to be sent.
+  [[nodiscard]] bool holdsLightmaps() const { return lightmaps_ != nullptr; }
 
   /// Credit is capped; see kMaxCreditBytes.
   void addCredit(std::int64_t bytes);
@@ -65,6 +71,13 @@ class TileLane {
     bool reset = true;                                ///< the next tile carries kTileReset
   };
 
+  /// Of the lightmaps taken last: this much outlives them.
+  struct Taken {
+    std::uint64_t layout, revision, tile_version;
+    std::size_t pages;
+  };
+
+  [[nodiscard]] bool laidOutAlike(const engine::Lightmaps& lightmaps) const;
   void startLayout();
   void findDirty();
   [[nodiscard]] bool wanted(std::uint32_t page) const;
@@ -73,7 +86,8 @@ class TileLane {
   std::optional<protocol::SubscribeCall> subscription_;
   protocol::PixelFormat format_ = protocol::PixelFormat::kRgba16f;
   protocol::Codec codec_ = protocol::Codec::kNone;
-  std::shared_ptr<const engine::Lightmaps> lightmaps_;
+  std::optional<Taken> taken_;
+  std::shared_ptr<const engine::Lightmaps> lightmaps_;  ///< those, or newer ones; null once everything was handed out
   std::vector<SentPage> sent_;
   std::vector<Entry> dirty_;  ///< best last
   std::optional<protocol::Resume> resume_;

@@ -266,8 +266,10 @@ void WebSocketSession::subscribed() {
 void WebSocketSession::adoptLightmaps() {
   lightmaps_posted_ = false;
   if (!tiles_.subscribed() || closing_) return;
+  const auto lightmaps = hub_->lightmaps(toQuantity(tiles_.quantity()));
+  if (lightmaps == nullptr) return pump();  // the first are still to come, and do not wait for the rate
   const auto now = Clock::now();
-  if (now < next_adoption_) {
+  if (now < next_adoption_ && tiles_.sendFrom(lightmaps)) {
     if (adoption_) return;
     const auto wait = std::chrono::ceil<std::chrono::milliseconds>(next_adoption_ - now);
     adoption_ = later(wait, [this] {
@@ -280,7 +282,6 @@ void WebSocketSession::adoptLightmaps() {
     const std::chrono::duration<double> pause(std::min(1.0 / tiles_.maxHz(), kLongestPauseSeconds));
     next_adoption_ = now + std::chrono::duration_cast<Clock::duration>(pause);
   }
-  const auto lightmaps = hub_->lightmaps(toQuantity(tiles_.quantity()));
   if (tiles_.setLightmaps(lightmaps))
     enqueue(std::make_shared<const std::string>(protocol::encodeNotification(toLightmapsNote(*lightmaps))));
   pump();

@@ -194,6 +194,11 @@ void FakeEngine::setSceneText(std::string gltf) {
   scene_text_ = std::move(gltf);
 }
 
+void FakeEngine::setGlb(SharedBytes glb) {
+  const std::lock_guard lock(mutex_);
+  glb_ = std::move(glb);
+}
+
 std::uint64_t FakeEngine::patchesSeen() const {
   const std::lock_guard lock(mutex_);
   return patches_;
@@ -292,8 +297,17 @@ void FakeEngine::resume(Callback<engine::SolveState> done) { setState(engine::So
 void FakeEngine::restart(Callback<engine::SolveState> done) { setState(engine::SolveState::kSolving, std::move(done)); }
 
 engine::Status FakeEngine::status() const {
+  std::unique_lock lock(mutex_);
+  auto status = status_;
+  const auto meanwhile = std::exchange(meanwhile_, nullptr);
+  lock.unlock();
+  if (meanwhile) meanwhile();
+  return status;
+}
+
+void FakeEngine::overtakeStatus(std::function<void()> meanwhile) {
   const std::lock_guard lock(mutex_);
-  return status_;
+  meanwhile_ = std::move(meanwhile);
 }
 
 std::shared_ptr<const engine::Lightmaps> FakeEngine::lightmaps(engine::Quantity quantity) const {
@@ -311,13 +325,15 @@ void FakeEngine::sceneText(Callback<SceneText> done) {
 }
 void FakeEngine::sceneGlb(std::optional<std::uint64_t> layout, Callback<SharedBytes> done) {
   std::uint64_t here = 0;
+  SharedBytes glb;
   {
     const std::lock_guard lock(mutex_);
     here = layout_number_;
+    glb = glb_;
   }
-  answer([done, layout, here] {
+  answer([done, layout, here, glb] {
     if (layout && *layout != here) return done(fail(ErrorCode::kStaleRevision, "the layout is another"));
-    done(bytesOf("glTF scene"));
+    done(glb);
   });
 }
 void FakeEngine::unlitGlb(Callback<SharedBytes> done) {

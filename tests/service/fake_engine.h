@@ -4,6 +4,7 @@
 
 #include <array>
 #include <atomic>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -33,10 +34,14 @@ class FakeEngine : public engine::Engine {
   void holdAnswers();
   void release();
   void setSceneText(std::string gltf);
+  /// What scene.glb is from now on.
+  void setGlb(SharedBytes glb);
   [[nodiscard]] std::uint64_t patchesSeen() const;
   void notice(const engine::Notice& notice);
   void loseRenderer(bool lost);
   std::atomic<double> busy_seconds{0.0};
+  /// Once: `meanwhile` happens after status() was taken, and before whoever asked for it has it.
+  void overtakeStatus(std::function<void()> meanwhile);
   [[nodiscard]] std::string lastLoad() const;  ///< "name: 123 bytes" or "file PATH"
 
   // ---- engine::Engine ----
@@ -86,7 +91,9 @@ class FakeEngine : public engine::Engine {
   std::uint64_t layout_number_ = 1, patches_ = 0;
   std::string last_load_, scene_text_ = R"({"asset":{"version":"2.0"}})";
   std::vector<std::weak_ptr<engine::Listener>> listeners_;
+  SharedBytes glb_ = std::make_shared<const Bytes>(Bytes{'g', 'l', 'T', 'F', ' ', 's', 'c', 'e', 'n', 'e'});
   bool holding_ = false;
+  mutable std::function<void()> meanwhile_;
   std::vector<std::function<void()>> held_;
 };
 

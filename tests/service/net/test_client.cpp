@@ -233,6 +233,12 @@ RawResponse RawHttp::receive(bool head_only, Seconds limit) {
   return response;
 }
 
+std::size_t RawHttp::readSome(Seconds limit) {
+  state_->received.clear();
+  (void)state_->more(limit);
+  return std::exchange(state_->received, {}).size();
+}
+
 bool RawHttp::closed(Seconds limit) {
   const auto before = std::chrono::steady_clock::now();
   while (state_->more(limit)) {

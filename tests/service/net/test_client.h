@@ -80,6 +80,8 @@ class RawHttp {
   void send(std::string_view bytes);
   /// One response, body by Content-Length. `head_only`: the answer of a HEAD. Status 0: the connection ended.
   RawResponse receive(bool head_only = false, Seconds limit = Seconds(20));
+  /// Takes what has come, or comes first, but no more than 64 KiB; returns how much, 0 at the end or the limit.
+  std::size_t readSome(Seconds limit);
   /// True when the other side closes within the limit.
   bool closed(Seconds limit);
 

@@ -20,8 +20,10 @@ class TileLaneTest : public ::testing::Test {
   using Changes = std::vector<std::vector<float>>;
   using Sent = std::vector<std::pair<int, std::uint32_t>>;  ///< mip, and tile from the left
 
+  using Lightmaps = std::shared_ptr<const engine::Lightmaps>;
+
   /// The next version, in which every tile has changed, by so much.
-  void publish(Changes changes) {
+  Lightmaps made(Changes changes, std::uint64_t layout = 1) {
     auto page = std::make_shared<engine::PageSnapshot>();
     ++version_;
     for (std::size_t mip = 0; mip < changes.size(); ++mip) {
@@ -30,10 +32,15 @@ class TileLaneTest : public ::testing::Test {
     }
     page->tile_change = std::move(changes);
     auto lightmaps = std::make_shared<engine::Lightmaps>();
-    lightmaps->layout = 1;
+    lightmaps->layout = layout;
     lightmaps->tile_version = version_;
     lightmaps->pages = {std::move(page)};
-    (void)lane_.setLightmaps(std::move(lightmaps));
+    return lightmaps;
+  }
+  Lightmaps publish(Changes changes) {
+    auto lightmaps = made(std::move(changes));
+    (void)lane_.setLightmaps(lightmaps);
+    return lightmaps;
   }
   /// All that the credit lets through.
   Sent take(std::int64_t credit = protocol::kMaxCreditBytes) {
@@ -72,6 +79,45 @@ TEST_F(TileLaneTest, WhatChangesLittleIsNotPassedOverForEver) {
     for (const auto& [mip, tile] : take(1)) order.push_back(tile);
   }
   EXPECT_THAT(order, ElementsAre(0U, 0U, 0U, 1U)) << "four versions behind it is worth more";
+}
+
+TEST_F(TileLaneTest, LightmapsThatAreAllSentAreNotKept) {
+  lane_.subscribe({});
+  publish({{1, 1}});
+  EXPECT_EQ(take().size(), 2U);
+  EXPECT_TRUE(lane_.holdsLightmaps());
+  ASSERT_TRUE(lane_.takeBookmark().has_value());
+  EXPECT_FALSE(lane_.holdsLightmaps());
+  publish({{1, 1}});
+  EXPECT_EQ(take().size(), 2U) << "what was sent is known without them";
+  EXPECT_EQ(lane_.takeBookmark()->tile_version, version_);
+}
+
+TEST_F(TileLaneTest, WhatIsStillToBeSentIsSentFromNewerOnesWithoutTakingThem) {
+  lane_.subscribe({});
+  const auto first = publish({{1, 1, 1}});
+  EXPECT_EQ(take(1).size(), 1U);
+  const auto second = made({{1, 1, 1}});
+  EXPECT_TRUE(lane_.sendFrom(second));
+  EXPECT_EQ(take().size(), 2U) << "the one that was sent waits for its time";
+  const auto bookmark = lane_.takeBookmark();
+  ASSERT_TRUE(bookmark.has_value());
+  EXPECT_EQ(bookmark->tile_version, first->tile_version) << "not everything is newer than that";
+  (void)lane_.setLightmaps(second);
+  EXPECT_EQ(take().size(), 1U);
+  EXPECT_EQ(lane_.takeBookmark()->tile_version, second->tile_version);
+}
+
+TEST_F(TileLaneTest, WhatIsLaidOutOtherwiseIsTakenAtOnceOnlyWhereSomethingIsStillToBeSent) {
+  lane_.subscribe({});
+  publish({{1, 1}});
+  const auto other = made({{1, 1, 1}}, 2);
+  EXPECT_EQ(take(1).size(), 1U);
+  EXPECT_FALSE(lane_.sendFrom(other));
+  EXPECT_EQ(take().size(), 1U);
+  (void)lane_.takeBookmark();
+  EXPECT_TRUE(lane_.sendFrom(other));
+  EXPECT_FALSE(lane_.holdsLightmaps());
 }
 
 }  // namespace

@@ -145,6 +145,23 @@ TEST(Tiles, ALowRateIsARateHoweverLow) {
   EXPECT_FALSE(socket.nextTile(Seconds(0.3)).has_value());
 }
 
+TEST(Tiles, TheFirstPictureDoesNotWaitForTheRate) {
+  RunningServer server;
+  TestSocket socket(server.port());
+  socket.hello();
+  SubscribeCall call;
+  call.max_hz = 0.001;
+  socket.call(call);  // nobody has watched so far: there is nothing yet
+  EXPECT_FALSE(socket.nextTile(Seconds(0.2)).has_value());
+  const auto first = server.engine.publish();
+  const auto note = socket.waitFor("bookmark", Seconds(10));
+  ASSERT_TRUE(note.has_value());
+  EXPECT_EQ(note->params->at("tileVersion"), first);
+  socket.tiles.clear();
+  server.engine.publish();
+  EXPECT_FALSE(socket.nextTile(Seconds(0.3)).has_value()) << "the second does";
+}
+
 TEST(Tiles, AHigherRateDoesNotWaitForTheTimeOfTheLowerOne) {
   RunningServer server;
   server.engine.publish();

@@ -426,6 +426,25 @@ TEST(Solve, WaitGivesUpWhenTimeIsUpOrTheSolveHasStopped) {
   EXPECT_EQ(replyOf<StatusReply>(socket.call(wait)).reached, true);
 }
 
+TEST(Solve, WhoBeginsToWaitDoesNotTellViewersOldProgress) {
+  net::ServerOptions options;
+  options.progress_interval = std::chrono::milliseconds(0);
+  RunningServer server(options);
+  TestSocket socket(server.port());
+  socket.hello();
+  server.engine.progress(0.5);
+  ASSERT_TRUE(socket.waitFor("progress").has_value());
+  server.engine.overtakeStatus([&] { server.engine.progress(0.2, engine::SolveState::kConverged); });
+  SolveWaitCall wait;
+  wait.error = 0.3;
+  EXPECT_EQ(replyOf<StatusReply>(socket.call(wait)).reached, true);
+  EXPECT_EQ(codeOf(socket.call(StatusCall{})), 0);
+  auto note = socket.waitFor("progress");
+  ASSERT_TRUE(note.has_value());
+  while (auto later = socket.waitFor("progress", Seconds(0.3))) note = std::move(later);
+  EXPECT_EQ(note->params->at("state"), "converged");
+}
+
 TEST(Snapshot, IsTakenAtOnceAndFetchedByUrl) {
   RunningServer server;
   TestSocket socket(server.port());
