@@ -32,8 +32,8 @@ int report(const Error& error) {
   return exitCodeOf(error);
 }
 
-void loadFirstScene(engine::Engine& engine, const std::string& path) {
-  engine.openFile(path, [path](const Result<engine::LoadOutcome>& outcome) {
+void loadFirstScene(engine::Engine& engine, const std::string& path, bool reload) {
+  engine.openFile(path, reload, [path](const Result<engine::LoadOutcome>& outcome) {
     if (!outcome) return log::error("{}", outcome.error().text());
   });
 }
@@ -94,7 +94,7 @@ int serve(Options options) {
   auto server = net::Server::open(options.server, **engine);
   if (!server) return report(server.error());
   (*server)->drainOnSignals();
-  if (!options.scene.empty()) loadFirstScene(**engine, options.scene);
+  if (!options.scene.empty()) loadFirstScene(**engine, options.scene, options.reload);
   std::printf("listening on %s\n", (*server)->url().c_str());
   std::fflush(stdout);
   ServiceNotifier notifier(vitalsOf(**engine, **server));

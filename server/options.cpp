@@ -84,9 +84,10 @@ void addStateOptions(CLI::App& app, Options& o) {
   app.add_option(
          "--state", o.state,
          "Folder of what outlives the server: scene, edits, settings, uploads, checkpoints of the solve. An edit "
-         "is answered once it is on the disk. Made if it is missing; one server at a time. It goes before SCENE "
-         "as long as that is the file its scene came from")
+         "is answered once it is on the disk. Made if it is missing; one server at a time. The scene in it goes "
+         "before SCENE, unless --reload")
       ->type_name("DIR");
+  app.add_flag("--reload", o.reload, "Take SCENE though --state holds a scene; that one and its edits are forgotten");
   app.add_option("--checkpoint-size", o.checkpoint_bytes,
                  "Largest checkpoint of a solve in --state, bytes (suffixes KiB, MiB, GiB); a solve that needs more "
                  "begins anew after a restart; 0: none")

@@ -16,6 +16,7 @@ namespace radiosity {
 struct Options {
   std::string scene;                     ///< path; empty: start without one
   std::filesystem::path state;           ///< folder of what outlives the server; empty: nothing does
+  bool reload = false;                   ///< `scene` is taken though there is one in `state`
   std::set<std::string> named_settings;  ///< of `solve`, those on the command line (EngineOptions::named_settings)
   std::size_t checkpoint_bytes = std::size_t{256} << 20;
   net::ServerOptions server;

@@ -243,9 +243,11 @@ class Engine {
   /// `name` is for messages and file names ("room.glb"). `file` (a path) or `bytes`, not both.
   virtual void loadBytes(std::string name, SharedBytes bytes, Callback<LoadOutcome> done) = 0;
   virtual void loadFile(std::string path, Callback<LoadOutcome> done) = 0;
-  /// The scene to start with: goes on with one that outlived the last process, edits included, where that was loaded
-  /// from the very same file.
-  virtual void openFile(std::string path, Callback<LoadOutcome> done) { loadFile(std::move(path), std::move(done)); }
+  /// The scene to start with: goes on with the one that outlived the last process, edits included, if there is one,
+  /// with a warning where that was not loaded from the very same file; unless it is to be taken anew.
+  virtual void openFile(std::string path, bool /*anew*/, Callback<LoadOutcome> done) {
+    loadFile(std::move(path), std::move(done));
+  }
   virtual void patch(PatchRequest request, Callback<PatchOutcome> done) = 0;
   /// Takes the latest edit back that is not taken back, whoever made it, or makes it again. A new revision; kNotFound
   /// where there is none.

@@ -48,7 +48,7 @@ class SolveLoop final : public Engine {
 
   void loadBytes(std::string name, SharedBytes bytes, Callback<LoadOutcome> done) override;
   void loadFile(std::string path, Callback<LoadOutcome> done) override;
-  void openFile(std::string path, Callback<LoadOutcome> done) override;
+  void openFile(std::string path, bool anew, Callback<LoadOutcome> done) override;
   void patch(PatchRequest request, Callback<PatchOutcome> done) override;
   void step(StepRequest request, Callback<PatchOutcome> done) override;
   void history(Callback<HistoryReport> done) override;

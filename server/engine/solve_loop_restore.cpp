@@ -191,14 +191,17 @@ bool SolveLoop::goesOnWith(const scene::Document& document, bool with_edits) con
   return options_.store->digestOf(plainDocument(document)) == loaded_digest_;
 }
 
-void SolveLoop::openFile(std::string path, Callback<LoadOutcome> done) {
-  load(std::move(done), [this, path = std::move(path)]() -> LoadBegun {
+/// What was kept was promised to those who made it: a restart with the same command must not take it from them.
+void SolveLoop::openFile(std::string path, bool anew, Callback<LoadOutcome> done) {
+  load(std::move(done), [this, path = std::move(path), anew]() -> LoadBegun {
     auto document = scene::loadDocument(path);
-    if (document && goesOnWith(*document, true)) return LoadOutcome{revision_, lit_->warnings()};
-    if (document && as_restored_)
-      log::warn("{} is not the file that the kept scene came from: it is loaded, the edits of the other are forgotten",
-                path);
-    return install(std::move(document));
+    if (!document || !as_restored_ || anew) return install(std::move(document));
+    if (!goesOnWith(*document, true))
+      log::warn(
+          "{} is not what the kept scene came from: it has changed, or a client loaded another. The kept scene goes on "
+          "at revision {}; --reload takes {} in its place",
+          path, revision_, path);
+    return LoadOutcome{revision_, lit_->warnings()};
   });
 }
 

@@ -28,7 +28,9 @@ state::Revision plainRevision(const History::Next& next) {
 /// What a client is told: the file is no place in its message.
 tl::unexpected<Error> refused(const Error& error) {
   log::error("a change is refused, it cannot be kept: {}", error.text());
-  return fail(error.code, "nothing is changed, since it could not be kept: " + error.text());
+  // A file that is damaged is bad input to this program, and no fault of the client's, who may try again.
+  const auto code = error.code == ErrorCode::kBadInput ? ErrorCode::kUnavailable : error.code;
+  return fail(code, "nothing is changed, since it could not be kept: " + error.text());
 }
 
 }  // namespace

@@ -248,8 +248,9 @@ TEST_F(Kept, TheSceneItWasStartedWithGoesOnWithItsEdits) {
     const auto bytes = test_scenes::encodeGlb(lumpedCube(reflectance));
     folder_.write("room.glb", std::string(bytes.begin(), bytes.end()));
   };
-  const auto open = [&] {
-    return call<engine::LoadOutcome>([&](auto done) { engine_->openFile(file, std::move(done)); }).value().revision;
+  const auto open = [&](bool anew = false) {
+    const auto opened = call<engine::LoadOutcome>([&](auto done) { engine_->openFile(file, anew, std::move(done)); });
+    return opened.value().revision;
   };
   write(0.5);
   EXPECT_EQ(open(), 1U);
@@ -261,7 +262,15 @@ TEST_F(Kept, TheSceneItWasStartedWithGoesOnWithItsEdits) {
   EXPECT_EQ(load(lumpedCube(0.5))->revision, 3U);  // a client asks for the scene without the edit
   restart();
   write(0.25);
-  EXPECT_EQ(open(), 4U);
+  EXPECT_EQ(open(), 3U);  // what was acknowledged is not thrown away for a file that has changed,
+  ASSERT_TRUE(patch(emissionPatch(0, 2.0)));
+  restart();
+  EXPECT_EQ(open(), 4U);  // nor what was edited,
+  EXPECT_EQ(history().undoable, 1U);
+  EXPECT_EQ(open(true), 5U);  // but where that is asked for
+  EXPECT_EQ(load(lumpedCube(0.75))->revision, 6U);
+  restart();
+  EXPECT_EQ(open(), 6U);  // nor what a client loaded in its place
 }
 
 TEST_F(Kept, WhatCannotBeKeptIsRefusedAndAllStaysAsItWas) {
