@@ -24,6 +24,18 @@ void SolveLoop::sceneText(Callback<SceneText> done) {
   });
 }
 
+/// Who asks while others are still being sent the same shares it with them: a copy for everyone could fill the machine.
+Result<SharedBytes> SolveLoop::makeGlb() {
+  const std::pair here(publisher_.layout(), revision_);
+  if (auto known = glb_.lock(); known != nullptr && glb_of_ == here) return known;
+  const auto lit = scene::withLightmapUvs(lit_->document(), lit_->scene(), lit_->patches());
+  if (!lit) return tl::unexpected<Error>(lit.error());
+  auto made = std::make_shared<const Bytes>(scene::writeGlb(*lit));
+  glb_ = made;
+  glb_of_ = here;
+  return made;
+}
+
 void SolveLoop::sceneGlb(std::optional<std::uint64_t> layout, Callback<SharedBytes> done) {
   askLit<SharedBytes>(std::move(done), [this, layout]() -> Result<SharedBytes> {
     if (layout && *layout != publisher_.layout())
@@ -32,9 +44,7 @@ void SolveLoop::sceneGlb(std::optional<std::uint64_t> layout, Callback<SharedByt
           fmt::format("the lightmaps have another layout, {}: what the newest `lightmaps` names is to be fetched",
                       publisher_.layout()),
           fmt::format("?layout={}", *layout));
-    const auto lit = scene::withLightmapUvs(lit_->document(), lit_->scene(), lit_->patches());
-    if (!lit) return tl::unexpected<Error>(lit.error());
-    return std::make_shared<const Bytes>(scene::writeGlb(*lit));
+    return makeGlb();
   });
 }
 
