@@ -28,6 +28,20 @@ void SolveLoop::sceneText(Callback<SceneText> done) {
       CommandQueue::Kind::kPrompt);
 }
 
+/// Who asks while others are still being sent the same shares it with them: a copy for everyone could fill the machine.
+Result<SharedBytes> SolveLoop::makeGlb() {
+  const std::pair here(publisher_.layout(), revision_);
+  if (auto known = glb_.lock(); known != nullptr && glb_of_ == here) return known;
+  const auto lit = scene::withLightmapUvs(lit_->document(), lit_->scene(), lit_->patches());
+  if (!lit) return tl::unexpected<Error>(lit.error());
+  auto glb = scene::writeGlb(*lit);
+  if (!glb) return tl::unexpected<Error>(glb.error());
+  auto made = std::make_shared<const Bytes>(std::move(*glb));
+  glb_ = made;
+  glb_of_ = here;
+  return made;
+}
+
 void SolveLoop::sceneGlb(std::optional<std::uint64_t> layout, Callback<SharedBytes> done) {
   askLit<SharedBytes>(std::move(done), [this, layout]() -> Result<SharedBytes> {
     if (layout && *layout != publisher_.layout())
@@ -36,11 +50,7 @@ void SolveLoop::sceneGlb(std::optional<std::uint64_t> layout, Callback<SharedByt
           fmt::format("the lightmaps have another layout, {}: what the newest `lightmaps` names is to be fetched",
                       publisher_.layout()),
           fmt::format("?layout={}", *layout));
-    const auto lit = scene::withLightmapUvs(lit_->document(), lit_->scene(), lit_->patches());
-    if (!lit) return tl::unexpected<Error>(lit.error());
-    auto glb = scene::writeGlb(*lit);
-    if (!glb) return tl::unexpected<Error>(glb.error());
-    return std::make_shared<const Bytes>(std::move(*glb));
+    return makeGlb();
   });
 }
 

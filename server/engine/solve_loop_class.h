@@ -191,6 +191,7 @@ class SolveLoop final : public Engine {
   [[nodiscard]] bool takeCheckpoint();
 
   [[nodiscard]] Result<Snapshot> renderSnapshot(const SnapshotRequest& request);
+  [[nodiscard]] Result<SharedBytes> makeGlb();
   [[nodiscard]] Result<SharedBytes> makeUnlit();
   [[nodiscard]] Result<SharedBytes> makeExr(std::uint32_t page, Quantity quantity);
 
@@ -203,6 +204,8 @@ class SolveLoop final : public Engine {
   SolveSettings settings_;
   std::unique_ptr<solver::Transport> transport_;  // made and ended under mutex_: the destructor interrupts it
   std::unique_ptr<gpu::ViewRenderer> view_;
+  std::weak_ptr<const Bytes> glb_;                    ///< the last that was made, while it is being sent
+  std::pair<std::uint64_t, std::uint64_t> glb_of_{};  ///< its layout and revision
   std::unique_ptr<LitScene> lit_;
   std::unique_ptr<LitScene> former_;       // before the last edit of geometry, solved, for the way back; null: not kept
   std::optional<FirstLight> first_light_;  // then lit_ is made of a few texels, in no history and on no disk

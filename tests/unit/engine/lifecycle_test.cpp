@@ -48,6 +48,19 @@ TEST_F(Lifecycle, ALoadedSceneIsSolvedToItsTarget) {
   EXPECT_NEAR(meanIrradiance(*lightmaps), 2.0 / 6.0, 0.03);
 }
 
+TEST_F(Lifecycle, WhoFetchesTheSceneAtTheSameTimeSharesIt) {
+  solve(lumpedCube(0.5));
+  const auto fetch = [&] {
+    return call<SharedBytes>([&](auto done) { engine().sceneGlb({}, std::move(done)); }).value();
+  };
+  const auto first = fetch();
+  EXPECT_EQ(fetch(), first);
+  ASSERT_TRUE(patch(emissionPatch(1, 2.0)));
+  const auto second = fetch();
+  EXPECT_NE(*second, *first);
+  EXPECT_EQ(fetch(), second);
+}
+
 TEST_F(Lifecycle, EnergyIsAccountedForToTheLastLumen) {
   solve(lumpedCube(0.5));
   const auto energy = status().energy;
