@@ -67,11 +67,12 @@ Result<void> Store::prepareTables() {
   });
 }
 
-/// The epoch is made once; every opening has a number.
+/// Every opening has a number. Without a scene revisions start again, at those that were told of one whose first light
+/// was being shown, and which was never kept: that is another epoch.
 Result<void> Store::beginRun() {
   ++runs_;
   return database_.atomically([&]() -> Result<void> {
-    if (epoch_.empty()) {
+    if (epoch_.empty() || !kept_.document) {
       epoch_ = randomHex(8);
       if (auto put = putMeta("epoch", epoch_); !put) return put;
     }
