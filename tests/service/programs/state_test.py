@@ -157,7 +157,7 @@ class KilledTest(StateCase):
 
         self.run_async(second())
 
-    def test_theSceneOnTheCommandLineIsLoadedOnceAndAnewWhenItIsAnother(self):
+    def test_theSceneOnTheCommandLineIsLoadedOnceAndAnewWhereThatIsAskedFor(self):
         def revision(server):
             async def ask():
                 session = await Session.open(server.url)
@@ -176,7 +176,15 @@ class KilledTest(StateCase):
         server.kill()
         plates.write_glb(self.scene, plates.document())
         server = self.keeper()
+        self.assertEqual(revision(server), 1)
+        self.assertIn("--reload", server.log())
+        server.kill()
+        server = self.keeper("--reload")
         self.assertEqual(revision(server), 2)
+        server.kill()
+        server = self.keeper()
+        self.assertEqual(revision(server), 2)
+        self.assertNotIn("--reload", server.log())
 
 
 class SolveTest(StateCase):
