@@ -1,7 +1,5 @@
 #include "server/net/convert.h"
 
-#include <nlohmann/json.hpp>
-
 #include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
@@ -100,12 +98,25 @@ engine::SolveSettings merged(engine::SolveSettings s, const protocol::SolveConfi
   return s;
 }
 
+namespace {
+
+/// No fewer than the text takes as JSON: control characters are written as six, what is no UTF-8 becomes three.
+std::size_t bytesInJson(const std::string& text) {
+  std::size_t bytes = 2;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    bytes += byte < 0x20 ? 6 : byte >= 0x80 ? 3 : c == '"' || c == '\\' ? 2 : 1;
+  }
+  return bytes;
+}
+
+}  // namespace
+
 std::vector<std::string> firstWarnings(const std::vector<std::string>& all) {
   std::vector<std::string> first;
   std::size_t bytes = 0;
   for (const auto& warning : all) {
-    // As an answer has it: what is no plain text takes up to six times the room.
-    bytes += nlohmann::json(warning).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace).size();
+    bytes += bytesInJson(warning);
     if (first.size() == protocol::kMaxStatusWarnings || bytes > protocol::kMaxMessageBytes / 4) break;
     first.push_back(warning);
   }
