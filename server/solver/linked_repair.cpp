@@ -11,6 +11,7 @@
 
 #include "server/solver/halves.h"
 #include "server/solver/linked_solver.h"
+#include "server/solver/near_edge.h"
 
 namespace radiosity::solver {
 namespace {
@@ -138,8 +139,15 @@ void LinkedSolver::findCutLinks(RepairBatch& repairs) const {
       ShotBatch batch;
       addSamples(repair, batch);
       points.clear();
-      for (const auto& frame : batch.points) points.push_back(frame.origin);
-      shadows.find(points, batch.gather.front().normal, 0.0F, shooter.resolution, scratch, repairs.leaves[i]);
+      const auto& shot = batch.gather.front();
+      const std::span corners(shot.corners.data(), shot.corner_count);
+      const EdgeBall around(corners);
+      if (shadows.passesWithin(around.middle, around.radius)) {
+        points.assign(corners.begin(), corners.end());  // as some receivers look at all that lies between these
+      } else {
+        for (const auto& frame : batch.points) points.push_back(frame.origin);
+      }
+      shadows.find(points, shot.normal, 0.0F, shooter.resolution, scratch, repairs.leaves[i]);
     }
   });
 }

@@ -158,6 +158,12 @@ bool Shadows::changesWithin(std::uint32_t value, float distance) const {
   });
 }
 
+bool Shadows::passesWithin(const glm::vec3& middle, float radius) const {
+  return std::ranges::any_of(change_.boxes, [&](const scene::ChangedBox& box) {
+    return glm::distance(middle, glm::clamp(middle, box.low, box.high)) <= radius;
+  });
+}
+
 bool Shadows::isPassed(std::uint32_t value, const glm::vec3& to, float radius) const {
   const auto i = place_[value];
   if (leaves_.radius[i] < 0.0F) return true;

@@ -31,6 +31,8 @@ class Shadows {
 
   /// Whether something of it may be so near to a leaf, or to a place on it.
   [[nodiscard]] bool changesWithin(std::uint32_t value, float distance) const;
+  /// Whether ways within a ball may pass a box.
+  [[nodiscard]] bool passesWithin(const glm::vec3& middle, float radius) const;
   /// Whether some way from a place on a leaf to one within `radius` of a point may pass a box. The second: to one on
   /// another leaf.
   [[nodiscard]] bool isPassed(std::uint32_t value, const glm::vec3& to, float radius) const;
