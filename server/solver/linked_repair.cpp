@@ -140,13 +140,10 @@ void LinkedSolver::findCutLinks(RepairBatch& repairs) const {
       addSamples(repair, batch);
       points.clear();
       const auto& shot = batch.gather.front();
-      const std::span corners(shot.corners.data(), shot.corner_count);
-      const EdgeBall around(corners);
-      if (shadows.passesWithin(around.middle, around.radius)) {
-        points.assign(corners.begin(), corners.end());  // as some receivers look at all that lies between these
-      } else {
-        for (const auto& frame : batch.points) points.push_back(frame.origin);
-      }
+      for (const auto& frame : batch.points) points.push_back(frame.origin);
+      // Some receivers look at other places of the shooter than its points.
+      const EdgeBall edge(std::span(shot.corners.data(), shot.corner_count));
+      if (shadows.passesWithin(edge.middle, edge.reach)) shadows.markNear(edge, scratch);
       shadows.find(points, shot.normal, 0.0F, shooter.resolution, scratch, repairs.leaves[i]);
     }
   });

@@ -16,16 +16,18 @@ namespace radiosity::solver {
 /// of the shooter, seen by chance, adds no more than this times its radiosity.
 inline constexpr float kNearEdge = 0.1F;
 
-/// All ways from such receivers to a shooter lie in this ball. From a distance of d on, the form
-/// factor of a share s of an area A is at most s A / (pi d^2).
+/// Where such receivers are, and what they look at. From a distance of d on, the form factor of a share s of an area A
+/// is at most s A / (pi d^2).
 struct EdgeBall {
   glm::vec3 middle{0.0F};
-  float radius = 0.0F;
+  float radius = 0.0F;  ///< around the shooter
+  float reach = 0.0F;   ///< around the receivers and the shooter
 
   explicit EdgeBall(std::span<const glm::vec3> corners) {
     for (const auto& corner : corners) middle += corner / static_cast<float>(corners.size());
     for (const auto& corner : corners) radius = std::max(radius, glm::distance(middle, corner));
-    radius += static_cast<float>(std::sqrt(polygonArea(corners) / (std::numbers::pi * static_cast<double>(kNearEdge))));
+    const double near = std::numbers::pi * static_cast<double>(kNearEdge);
+    reach = radius + static_cast<float>(std::sqrt(polygonArea(corners) / near));
   }
 };
 

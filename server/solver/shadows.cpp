@@ -226,6 +226,21 @@ RADIOSITY_CLONES void Shadows::markMet(const Way& way, const glm::vec4& plane, c
   }
 }
 
+void Shadows::markNear(const EdgeBall& edge, Scratch& scratch) const {
+  scratch.found.resize((change_.altered.size() + 63) / 64);
+  const auto isNear = [&](const Balls& balls, std::size_t i) {
+    return balls.radius[i] >= 0.0F && glm::distance(balls.centre(i), edge.middle) <= edge.reach + balls.radius[i];
+  };
+  for (std::size_t t = 0; t < tiles_.size(); ++t) {
+    if (!isNear(tile_balls_, t)) continue;
+    for (auto i = tiles_[t].first; i < tiles_[t].first + tiles_[t].count; ++i) {
+      const auto value = value_[i];
+      if (!isNear(leaves_, i) || !isPassed(value, edge.middle, edge.radius)) continue;
+      scratch.found[value / 64] |= std::uint64_t{1} << (value % 64);
+    }
+  }
+}
+
 /// Tiles that a way around all boxes meets, then those of them that the way to a single box meets, then their leaves.
 /// All from the middle of the points: a way from one of these is nowhere farther from that from the middle than they
 /// are apart, and what it meets of boxes grown by so much is hardly more than what they meet one by one.
