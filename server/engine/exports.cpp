@@ -128,6 +128,23 @@ Result<Bytes> encodeExr(const IdImage& ids, Quantity quantity) {
                   {{"Y", Imf::UINT, reinterpret_cast<const char*>(ids.ids.data()), sizeof(std::uint32_t)}});
 }
 
+Image dithered(Image display) {
+  // Bayer's order: the bits of x ^ y and y in turn, the lowest first.
+  const auto orderAt = [](std::uint32_t x, std::uint32_t y) {
+    std::uint32_t order = 0;
+    for (std::uint32_t bit = 0; bit < 3; ++bit) order = order << 2U | (((x ^ y) >> bit & 1U) << 1U) | (y >> bit & 1U);
+    return order;
+  };
+  for (int row = 0; row < display.height; ++row) {
+    for (int column = 0; column < display.width; ++column) {
+      const auto order = orderAt(static_cast<std::uint32_t>(column) % 8, static_cast<std::uint32_t>(row) % 8);
+      const float move = ((static_cast<float>(order) + 0.5F) / 64.0F - 0.5F) / 255.0F;
+      display.at(column, row) += move;
+    }
+  }
+  return display;
+}
+
 Result<Bytes> encodePng(const Image& display) {
   std::vector<std::uint8_t> rgb(display.pixels.size() * 3);
   for (std::size_t i = 0; i < display.pixels.size(); ++i) {

@@ -162,7 +162,7 @@ Result<Snapshot> SolveLoop::renderSnapshot(const SnapshotRequest& request) {
   if (!image) return tl::unexpected<Error>(image.error());
   std::optional<double> exposure;
   if (quantity.photometric) exposure = request.exposure ? *request.exposure : autoExposure(*image);
-  auto png = encodePng(exposure ? toneMap(*image, static_cast<float>(*exposure)) : *image);
+  auto png = encodePng(exposure ? dithered(toneMap(*image, static_cast<float>(*exposure))) : *image);
   if (!png) return tl::unexpected<Error>(png.error());
   return Snapshot{std::make_shared<const Bytes>(std::move(*png)), exposure};
 }

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <glm/gtc/matrix_inverse.hpp>
 
+#include "server/engine/exports.h"
+
 namespace radiosity::engine {
 namespace {
 
@@ -133,6 +135,20 @@ TEST(AutoExposure, IsTheLogarithmicMeanWhereContrastIsModest) {
 }
 
 TEST(AutoExposure, ABlackPictureStaysAsItIs) { EXPECT_EQ(autoExposure(Image(4, 4)), 1.0F); }
+
+TEST(Dithered, LightBetweenTwoStepsIsThatInTheMeanAndOnAStepStaysThere) {
+  constexpr float kStep = 1.0F / 255.0F;
+  for (const float parts : {0.0F, 0.125F, 0.5F, 0.75F}) {  // of a step, above the hundredth
+    const auto shown = dithered(Image(24, 16, glm::vec3((100.0F + parts) * kStep)));
+    for (int y = 0; y < 16; y += 8) {
+      for (int x = 0; x < 24; x += 8) {
+        double sum = 0.0;
+        for (int i = 0; i < 64; ++i) sum += std::round(255.0 * static_cast<double>(shown.at(x + i % 8, y + i / 8).g));
+        EXPECT_NEAR(sum / 64.0, 100.0 + static_cast<double>(parts), 1.0 / 64.0) << "a pixel in 64 is the finest";
+      }
+    }
+  }
+}
 
 }  // namespace
 }  // namespace radiosity::engine
