@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -62,6 +63,27 @@ void printWorst(const radiosity::accuracy::LitScene& lit, const radiosity::accur
   }
 }
 
+/// As `radiosity solve --sky` had it: grey, one colour, or one above and one below the horizon; nits.
+void setSky(const std::vector<double>& nits, radiosity::accuracy::LitScene& lit) {
+  if (nits.empty()) return;
+  if (nits.size() != 1 && nits.size() != 3 && nits.size() != 6)
+    throw std::invalid_argument("--sky takes 1, 3 or 6 numbers");
+  const auto colour = [&](std::size_t first) {
+    return nits.size() == 1 ? glm::dvec3(nits[0]) : glm::dvec3(nits[first], nits[first + 1], nits[first + 2]);
+  };
+  lit.scene.sky_upper = colour(0);
+  lit.scene.sky_lower = colour(nits.size() == 6 ? 3 : 0);
+}
+
+/// Without light nothing can be wrong, and every lightmap would pass.
+void requireLight(const radiosity::accuracy::Reference& reference) {
+  const auto isLit = [](const radiosity::accuracy::Reference::TexelMean& texel) {
+    return glm::length(texel.irradiance.mean_lux) > 0.0;
+  };
+  if (!std::any_of(reference.texels.begin(), reference.texels.end(), isLit))
+    throw std::runtime_error("no light reaches the texels of the reference; was there a --sky?");
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -69,6 +91,7 @@ int main(int argc, char** argv) {
   std::string file;
   radiosity::accuracy::ReferenceOptions options;
   bool json = false;
+  std::vector<double> sky;
   std::size_t worst = 0;
   std::string folder;
   app.add_option("LIT.glb", file, "output of `radiosity solve`")->required()->check(CLI::ExistingFile);
@@ -77,15 +100,19 @@ int main(int argc, char** argv) {
   app.add_option("--points", options.points, "surface points for the total error")->capture_default_str();
   app.add_option("--seed", options.seed)->capture_default_str();
   app.add_flag("--closed-form", options.closed_form, "take the exact value, without noise, where the scene has one");
+  app.add_option("--sky", sky, "the sky it was solved under: 1, 3 or 6 numbers with commas between, nits")
+      ->delimiter(',');
   app.add_flag("--json", json, "print JSON");
   app.add_option("--worst", worst, "show the texels with most of the squared error");
   app.add_option("--references", folder, "folder where references are kept between runs; empty: not kept");
   CLI11_PARSE(app, argc, argv);
   options.point_samples = options.texel_samples;
   try {
-    const auto lit = radiosity::accuracy::readLitScene(file);
+    auto lit = radiosity::accuracy::readLitScene(file);
+    setSky(sky, lit);
     const auto reference = folder.empty() ? radiosity::accuracy::makeReference(lit, options)
                                           : radiosity::accuracy::findReference(lit, options, folder).reference;
+    requireLight(reference);
     const auto accuracy = radiosity::accuracy::measure(lit, reference);
     if (json) {
       const nlohmann::json out{{"solver", radiosity::accuracy::toJson(accuracy.solver)},
