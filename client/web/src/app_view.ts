@@ -230,7 +230,7 @@ export class ViewSession {
     if (this.mode.id === 'mips') return frame.legend.showMips();
     if (!viewer.uniforms.all.falseColour.value || !this.mode.unit || !viewer.shown) return frame.legend.hide();
     const { x: low, y: high } = viewer.uniforms.all.falseRange.value;
-    frame.legend.show(this.mode.label, this.mode.unit, low, high);
+    frame.legend.show(this.mode.legend ?? this.mode.label, this.mode.unit, low, high);
     this.panel.showRange(low, high);
   }
 
@@ -295,6 +295,7 @@ export class ViewSession {
       reading.irradiance
         ? `R ${readable(reading.irradiance[0])}  G ${readable(reading.irradiance[1])}  B ${readable(reading.irradiance[2])}`
         : '',
+      this.mode.id === 'radiosity' && reading.radiosity !== undefined ? `leaves ${readable(reading.radiosity)} lm/m²` : '',
       reading.node === undefined ? '' : nodeName(edit.document.gltf, reading.node),
       reading.texel ? `page ${reading.page}, texel ${reading.texel.join(', ')}` : '',
       position(reading.point),
