@@ -118,6 +118,7 @@ void LightGatherer::gather(const solver::GatherShot& shot, std::span<const solve
       std::fill_n(sum->begin(), lit_count_, 0.0F);
     }
   }
+  beginEdges();
   std::array<Lost, 2> lost{};
   const auto capacity = renderer.capacity(shot.resolution);
   std::vector<HemicubeView> views;

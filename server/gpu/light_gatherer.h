@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "server/gpu/flux_sink.h"
+#include "server/gpu/form_factor_kernel.h"
 #include "server/gpu/hemicube_renderer.h"
 #include "server/gpu/hemicube_weights.h"
 #include "server/gpu/receivers.h"
@@ -95,17 +96,33 @@ class LightGatherer {
   void findVisibility(std::size_t sums, std::size_t points);
   [[nodiscard]] double delivered() const;
   [[nodiscard]] double conserve(double area, double kept) const;
+  /// Whether this one of those lit looks for itself at the part of the polygon before its plane.
+  [[nodiscard]] bool isEdge(std::size_t lit) const;
+  /// It does, at the last of parts_.
+  void addEdge(std::size_t lit);
+  void clearEdges();
+  void beginEdges();
+  void lookFromEdges(const solver::GatherShot& shot, const solver::HemicubeFrame& point, std::size_t half);
+  void takeEdges(std::size_t half, std::size_t points);
   void addLit(const Receivers::Receiver& receiver, const Receivers::Place& place, const glm::vec3& normal);
   void deliver(const solver::GatherShot& shot, std::size_t half, double share, const FluxSink& sink,
                solver::TransportCounters& counters) const;
 
   std::shared_ptr<const Receivers> receivers_;
+  /// A receiver that looks for itself, and how often it saw the light, in either half.
+  struct Edge {
+    std::uint32_t lit, part;
+    std::array<float, 2> seen;
+  };
+
   solver::GatherShot lit_for_;  ///< what lit_ was made for
   bool lit_valid_ = false;
   Lit lit_;
   std::size_t lit_count_ = 0;
-  std::size_t weighed_ = 0;  ///< of those lit: the others wait for their form factors
-  Lost look_lost_;           ///< of the looks since beginLinks
+  std::vector<Edge> edges_;            ///< of what is lit
+  std::vector<ClippedPolygon> parts_;  ///< of the polygon, before their planes
+  std::size_t weighed_ = 0;            ///< of those lit: the others wait for their form factors
+  Lost look_lost_;                     ///< of the looks since beginLinks
   std::uint32_t look_count_ = 0;
   solver::Looks open_looks_;  ///< likewise: of them those that lost something
   std::vector<std::uint32_t> starts_;

@@ -181,6 +181,7 @@ bool LightGatherer::behind(const solver::GatherShot& shot, const scene::Surface&
 void LightGatherer::findLit(const solver::GatherShot& shot) {
   if (lit_valid_ && sameGeometry(shot, lit_for_)) return;
   lit_count_ = weighed_ = 0;
+  clearEdges();
   for (const auto& group : receivers_->groups()) {
     if (!behind(shot, receivers_->patches().surfaces[group.surface])) findLitGroup(shot, group);
   }
@@ -234,6 +235,10 @@ void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers
         if (form_factor.value <= 0.0) return;
         lit_.form_factor[lit_count_] = static_cast<float>(form_factor.value * shining(shot.fill, form_factor.front));
         lit_.front[lit_count_] = frontOfShining(shot.fill, form_factor.front);
+        if (isEdge(lit_count_)) {
+          parts_.push_back(clipToPlane(corners, place.point, normal));
+          addEdge(lit_count_);
+        }
       }
       lit_.share[lit_count_] = share;
       addLit(receiver, place, normal);
@@ -268,10 +273,13 @@ void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers
                       lit_count_ - begin, lit_.form_factor.data() + begin);
     const double kept =
         solver::polygonArea(std::span(polygon.corner.data(), polygon.count)) / solver::polygonArea(corners);
+    parts_.push_back(polygon);
     for (std::size_t k = begin; k < lit_count_; ++k) {
       lit_.form_factor[k] *= static_cast<float>(shining(shot.fill, kept));
       lit_.front[k] = frontOfShining(shot.fill, kept);
+      if (isEdge(k)) addEdge(k);
     }
+    if (edges_.empty() || edges_.back().part + 1 < parts_.size()) parts_.pop_back();
   }
   shareAmongPlaces(begin);
 }
@@ -355,6 +363,7 @@ void LightGatherer::beginLinks(const solver::GatherShot& shot, std::span<const s
     findLit(shot);
   } else {
     lit_count_ = weighed_ = 0;
+    clearEdges();
     lit_valid_ = false;
     forEachGroup(named, [&](const Receivers::Group& group) {
       if (!behind(shot, receivers_->patches().surfaces[group.surface])) findLitGroup(shot, group);
@@ -364,6 +373,7 @@ void LightGatherer::beginLinks(const solver::GatherShot& shot, std::span<const s
   for (auto* sum : {&lit_.weight[0], &lit_.visible_weight[0]}) {
     std::fill_n(sum->begin(), lit_count_, 0.0F);
   }
+  beginEdges();
   look_lost_ = {};
   open_looks_ = {};
   look_count_ = 0;

@@ -131,6 +131,7 @@ void LightGatherer::testPoint(const solver::GatherShot& shot, const solver::Hemi
   for (const auto i : std::span(lit_.doubtful.data(), doubts)) {
     if (!hidden(i, o, items, size)) visible_weight[i] += lit_.point_weight[i];
   }
+  lookFromEdges(shot, point, half);
 }
 
 /// Of a receiver whose pixel leaves doubts.
@@ -236,6 +237,7 @@ void LightGatherer::weighLostInside(const ViewWindow& window, const solver::Hemi
 void LightGatherer::findVisibility(std::size_t sums, std::size_t points) {
   weighVisible(lit_count_, static_cast<float>(points), lit_.weight[sums].data(), lit_.visible_weight[sums].data(),
                lit_.front.data(), lit_.visibility.data());
+  takeEdges(sums, points);
 }
 
 }  // namespace radiosity::gpu

@@ -35,7 +35,7 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
     : LinkedSolver(std::move(patches), transport, settings) {
   auto numbers = renumber(former, map, keep_former);
   auto change = changeOf(numbers);
-  if (former.isBehind()) {
+  if (former.lacksLinks()) {
     auto all = change;
     addEarlier(numbers, all);
     earlier_shadows_ = std::make_unique<Shadows>(*patches_, sides_, std::move(all));

@@ -11,6 +11,7 @@
 
 #include "server/solver/halves.h"
 #include "server/solver/linked_solver.h"
+#include "server/solver/near_edge.h"
 
 namespace radiosity::solver {
 namespace {
@@ -138,8 +139,12 @@ void LinkedSolver::findCutLinks(RepairBatch& repairs) const {
       ShotBatch batch;
       addSamples(repair, batch);
       points.clear();
+      const auto& shot = batch.gather.front();
       for (const auto& frame : batch.points) points.push_back(frame.origin);
-      shadows.find(points, batch.gather.front().normal, 0.0F, shooter.resolution, scratch, repairs.leaves[i]);
+      // Some receivers look at other places of the shooter than its points.
+      const EdgeBall edge(std::span(shot.corners.data(), shot.corner_count));
+      if (shadows.passesWithin(edge.middle, edge.reach)) shadows.markNear(edge, scratch);
+      shadows.find(points, shot.normal, 0.0F, shooter.resolution, scratch, repairs.leaves[i]);
     }
   });
 }

@@ -169,7 +169,7 @@ Result<StepOutcome> LinkedSolver::advance() {
   if (isRepairing()) {
     if (const auto done = repairSlice(); !done) return tl::unexpected<Error>(done.error());
     // Nothing else asks for the light over links that were the last to be measured.
-    if (!isBehind() && phase_ == Phase::kDone && from_links_ == FromLinks::kNo) from_links_ = FromLinks::kToConfirm;
+    if (!lacksLinks() && phase_ == Phase::kDone && from_links_ == FromLinks::kNo) from_links_ = FromLinks::kToConfirm;
     return StepOutcome::kSlice;
   }
   if (from_links_ == FromLinks::kAfterEdit) {
@@ -188,7 +188,7 @@ Result<StepOutcome> LinkedSolver::advance() {
   }
   if (from_links_ == FromLinks::kToConfirm) return confirm();
   if (std::exchange(refined_, false)) return chooseNext();
-  if (phase_ == Phase::kDone) return isBehind() ? catchUp() : ended();
+  if (phase_ == Phase::kDone) return lacksLinks() ? catchUp() : ended();
   if (!settling_ && measured_ == wanted_.size()) {
     if (findsMoreDue()) return StepOutcome::kSlice;
     wanted_ = plan();
@@ -225,7 +225,7 @@ StepOutcome LinkedSolver::finishRound() {
 
 /// What waits may be what is missing.
 StepOutcome LinkedSolver::exhausted(SolveLimit limit) {
-  if (isBehind() && !isRepairing()) {
+  if (lacksLinks() && !isRepairing()) {
     due_ = repairs_.size();
     from_links_ = FromLinks::kToConfirm;
     return StepOutcome::kSlice;

@@ -52,7 +52,10 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] std::vector<glm::vec3> halfIrradiance(std::uint32_t half) const override;
   [[nodiscard]] std::vector<glm::vec3> directIrradiance() const override;
   [[nodiscard]] bool isRepairing() const override { return repaired_ < due_; }
-  [[nodiscard]] bool isBehind() const override { return repaired_ < repairs_.size(); }
+  /// When all links are there, the light over them is still to be solved for.
+  [[nodiscard]] bool isBehind() const override {
+    return lacksLinks() || (phase_ == Phase::kDone && from_links_ == FromLinks::kToConfirm);
+  }
   [[nodiscard]] std::vector<glm::vec3> unshot() const override;
   [[nodiscard]] std::vector<std::uint8_t> shotLevels() const override;
   [[nodiscard]] std::vector<float> residualShape() const override;
@@ -128,6 +131,8 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] double reachOf(const Repair& repair, const ChangeReach& change) const;
   [[nodiscard]] double missing(const Repair& repair) const;
   [[nodiscard]] double missing() const;
+  /// After an edit of geometry, some are still those of before.
+  [[nodiscard]] bool lacksLinks() const { return repaired_ < repairs_.size(); }
   [[nodiscard]] double errorBesideMissing() const;
   [[nodiscard]] double fieldNorm() const;
   void planDue(double norm);

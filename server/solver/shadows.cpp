@@ -158,6 +158,12 @@ bool Shadows::changesWithin(std::uint32_t value, float distance) const {
   });
 }
 
+bool Shadows::passesWithin(const glm::vec3& middle, float radius) const {
+  return std::ranges::any_of(change_.boxes, [&](const scene::ChangedBox& box) {
+    return glm::distance(middle, glm::clamp(middle, box.low, box.high)) <= radius;
+  });
+}
+
 bool Shadows::isPassed(std::uint32_t value, const glm::vec3& to, float radius) const {
   const auto i = place_[value];
   if (leaves_.radius[i] < 0.0F) return true;
@@ -217,6 +223,21 @@ RADIOSITY_CLONES void Shadows::markMet(const Way& way, const glm::vec4& plane, c
     const float last = smaller(smaller(smaller(a.last, b.last), smaller(c.last, d.last)), smaller(e.last, f.last));
     const float height = nx * x[i] + ny * y[i] + nz * z[i] - nd;
     mark[i] = larger(mark[i], smaller(smaller(last - first, r), height + r));
+  }
+}
+
+void Shadows::markNear(const EdgeBall& edge, Scratch& scratch) const {
+  scratch.found.resize((change_.altered.size() + 63) / 64);
+  const auto isNear = [&](const Balls& balls, std::size_t i) {
+    return balls.radius[i] >= 0.0F && glm::distance(balls.centre(i), edge.middle) <= edge.reach + balls.radius[i];
+  };
+  for (std::size_t t = 0; t < tiles_.size(); ++t) {
+    if (!isNear(tile_balls_, t)) continue;
+    for (auto i = tiles_[t].first; i < tiles_[t].first + tiles_[t].count; ++i) {
+      const auto value = value_[i];
+      if (!isNear(leaves_, i) || !isPassed(value, edge.middle, edge.radius)) continue;
+      scratch.found[value / 64] |= std::uint64_t{1} << (value % 64);
+    }
   }
 }
 

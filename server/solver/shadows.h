@@ -11,6 +11,7 @@
 
 #include "server/scene/patch_scene.h"
 #include "server/solver/link_column.h"
+#include "server/solver/near_edge.h"
 #include "server/solver/side.h"
 
 namespace radiosity::solver {
@@ -31,6 +32,8 @@ class Shadows {
 
   /// Whether something of it may be so near to a leaf, or to a place on it.
   [[nodiscard]] bool changesWithin(std::uint32_t value, float distance) const;
+  /// Whether ways within a ball may pass a box.
+  [[nodiscard]] bool passesWithin(const glm::vec3& middle, float radius) const;
   /// Whether some way from a place on a leaf to one within `radius` of a point may pass a box. The second: to one on
   /// another leaf.
   [[nodiscard]] bool isPassed(std::uint32_t value, const glm::vec3& to, float radius) const;
@@ -39,6 +42,8 @@ class Shadows {
   [[nodiscard]] bool sees(const glm::vec3& point, const glm::vec3& normal) const;
 
   class Scratch;
+  /// Leaves that may look at some place of a shooter near to them, past a box: the next find() gives them, too.
+  void markNear(const EdgeBall& edge, Scratch& scratch) const;
   /// Runs of leaf values, ascending, none across sides, of all leaves whose links from within `radius` of one of the
   /// points, as an item buffer of `resolution` finds them, may differ: those altered, and those that the way to passes
   /// a box, what the pixels show that decide on the leaf included. A superset; leaves behind the plane of the points,

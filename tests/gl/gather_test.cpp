@@ -137,6 +137,44 @@ TEST_F(Gather, OfALampThatAWallsPlaneCutsThePartInFrontIsReceived) {
   EXPECT_NEAR(all / exact, 1.0, 0.12);
 }
 
+// A floor that reaches out from under a wall: a twentieth of it lies before the wall's plane, at its foot, where the
+// wall sees all of it, and a seventieth past a skirting board. One point on the floor tells, wherever it lies.
+TEST_F(Gather, AWallLooksItselfAtTheFewOfALightThatLieAtItsFoot) {
+  for (const bool covered : {false, true}) {
+    SceneBuilder builder;
+    const auto wall = builder.add({{0.0F, -0.3F, 0.001F}, {0, 0, 0.1F}, {0, 0.6F, 0}, 2, 12});  // faces -x
+    const auto floor = builder.add({{-0.02F, -0.3F, 0.0F}, {0.4F, 0, 0}, {0, 0.6F, 0}, 1, 1});
+    if (covered) builder.add({{-0.002F, -0.5F, 0.0F}, {0, 1, 0}, {0, 0, 0.5F}, 1, 1});
+    const auto scene = builder.build();
+    const auto& chart = scene->surfaces[wall];
+    const auto& frame = scene->triangles[chart.first_triangle];
+    ASSERT_LT(frame.normal.x, -0.99F);
+    std::mt19937 random(5);
+    double sum = 0.0, exact = 0.0;
+    for (int i = 0; i < 20; ++i) {
+      auto batch = gatherFrom(*scene, floor, 1, random);
+      batch.gather[0].receiver_jitter = {0.5F, 0.5F};
+      const auto flux = run(scene, batch);
+      for (std::uint32_t k = 0; k < 12; ++k) {
+        const auto received = irradiance(*scene, flux, wall, 0, k);
+        const auto at = frame.origin + 0.5F * frame.du + (static_cast<float>(k) + 0.5F) * frame.dv;
+        const auto expected =
+            solver::polygonFormFactor(glm::dvec3(at), glm::dvec3(frame.normal),
+                                      std::span(batch.gather[0].corners).first(batch.gather[0].corner_count));
+        sum += received;
+        exact += expected;
+        if (covered) continue;
+        EXPECT_NEAR(received, expected, 1e-3 * expected) << i << ", " << k;
+      }
+    }
+    EXPECT_GT(exact, 1.0);
+    // 240 rays of which one in seventy arrives: standard error 0.008.
+    if (covered) {
+      EXPECT_NEAR(sum / exact, 0.0145, 0.04);
+    }
+  }
+}
+
 // Many texels away: what is near looks from two places.
 TEST_F(Gather, TheReceiverJitterMovesTheReceivingPoint) {
   SceneBuilder builder;

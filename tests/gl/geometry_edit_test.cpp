@@ -239,8 +239,7 @@ TEST_F(ChairEdit, ShowsLightBeforeItHasWhatMattersLittleAndHasAllInTheEnd) {
   EXPECT_LT(difference(early, *exact, *after.patches), stated());
   EXPECT_LT(stated(), 0.75 * settings_.target_error);
   for (int i = 0; i < 1000 && early.isBehind(); ++i) ASSERT_TRUE(early.step());
-  finish(early);
-  EXPECT_FALSE(early.isBehind());
+  EXPECT_FALSE(early.isBehind());  // nobody steps any further then: the light is that of the links
   expectSameLinks(early, *exact, *after.patches);
   EXPECT_LT(difference(early, *exact, *after.patches), 1e-4);
 }

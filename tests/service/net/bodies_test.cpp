@@ -35,7 +35,7 @@ TEST(Pace, WhatMovesEarnsTimeButNoMoreThanTheSlack) {
 TEST(Bodies, AnUploadIsNamedByAllOfItsBytesHoweverTheyCome) {
   RunningServer server;
   std::string body;
-  for (int i = 0; i < 200'000; ++i) body += static_cast<char>(i * i % 251);
+  for (int i = 0; i < 200'000; ++i) body += static_cast<char>(i % 1009 * (i % 1009) % 251);
   const auto expected = "/uploads/" + sha256Hex(body);
   EXPECT_EQ(request(server.port(), "PUT", "/uploads", {}, body).header("Location"), expected);
   RawHttp chunked(server.port());
