@@ -295,7 +295,9 @@ export class ViewSession {
       reading.irradiance
         ? `R ${readable(reading.irradiance[0])}  G ${readable(reading.irradiance[1])}  B ${readable(reading.irradiance[2])}`
         : '',
-      this.mode.id === 'radiosity' && reading.radiosity !== undefined ? `leaves ${readable(reading.radiosity)} lm/m²` : '',
+      this.mode.id === 'radiosity' && reading.radiosity !== undefined
+        ? `leaves ${readable(reading.radiosity)} lm/m²`
+        : '',
       reading.node === undefined ? '' : nodeName(edit.document.gltf, reading.node),
       reading.texel ? `page ${reading.page}, texel ${reading.texel.join(', ')}` : '',
       position(reading.point),

@@ -124,7 +124,7 @@ const MOST_DIGITS = 5;
  * either would be long, as multiples of the same power of ten. Between them belongs " ± ", after them the unit.
  */
 export function withError(value: number, error: number): [string, string] {
-  const roundedError = Number(error.toPrecision(2));
+  const roundedError = Number(Math.abs(error).toPrecision(2));
   const top = (v: number) => Math.floor(Math.log10(v));
   const largest = Math.max(Math.abs(value), roundedError);
   if (!(largest > 0 && Number.isFinite(largest))) return [readable(value), readable(error)];
@@ -133,8 +133,9 @@ export function withError(value: number, error: number): [string, string] {
   const decimals = Math.max(0, power - last);
   const format = { minimumFractionDigits: decimals, maximumFractionDigits: decimals };
   const write = (units: number) => (units * 10 ** (last - power)).toLocaleString('en', format);
+  const v = Math.round(value / 10 ** last) + 0; // -0 would be written with its sign
   // An error that is less than the last digit is no more than one of it.
-  const [v, e] = [Math.round(value / 10 ** last), Math.max(error > 0 ? 1 : 0, Math.round(roundedError / 10 ** last))];
+  const e = Math.max(roundedError > 0 ? 1 : 0, Math.round(roundedError / 10 ** last));
   return power === 0 ? [write(v), write(e)] : [`(${write(v)}`, `${write(e)}) × 10${superscript(power)}`];
 }
 

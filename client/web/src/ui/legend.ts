@@ -71,7 +71,8 @@ export class MeterCard {
   show(x: number, y: number, lux: number | undefined, error: number | undefined, details: string): void {
     this.element.hidden = false;
     const sure = error === undefined || !Number.isFinite(error);
-    const [value, either] = lux === undefined ? ['no light known', ''] : sure ? [readable(lux), ''] : withError(lux, error);
+    const [value, either] =
+      lux === undefined ? ['no light known', ''] : sure ? [readable(lux), ''] : withError(lux, error);
     this.value.textContent = value;
     this.bar.textContent = lux === undefined ? '' : either ? ` ± ${either} lx` : ' lx';
     this.more.textContent = details;
