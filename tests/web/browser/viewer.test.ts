@@ -158,7 +158,7 @@ it('keeps what was clicked before the document came', async () => {
   await page.mouse.click(400, 260);
   const selected = await page.evaluate(() => window.viewer!.edit.selection!.node);
   letGo();
-  await page.getByLabel('Luminance, nit').waitFor();
+  await page.getByLabel('Strength, nit').waitFor();
   expect(await page.evaluate(() => window.viewer!.edit.selection!.node)).toBe(selected);
 });
 
@@ -167,7 +167,7 @@ it('takes back what the server refuses, with its reason', async () => {
   await converged(page);
   const before = await sceneOf(server);
   await page.mouse.click(400, 260);
-  const field = page.getByLabel('Luminance, nit');
+  const field = page.getByLabel('Strength, nit');
   await field.fill('1e30');
   await field.press('Enter');
   await said(page, /too bright/);

@@ -3,7 +3,7 @@ import { editCommand } from '../../../client/web/src/app_share';
 import { encodeRgb9e5, scaleRgb9e5 } from '../../../client/web/src/protocol/rgb9e5';
 import { pageExponent } from '../../../client/web/src/view/lightmap_page';
 import { baseMipFor } from '../../../client/web/src/view/lightmap_set';
-import { fromHex, parseNumber, percent, readable, toHex, withError } from '../../../client/web/src/ui/dom';
+import { fromHex, measured, parseNumber, percent, readable, toHex, withError } from '../../../client/web/src/ui/dom';
 
 describe('automatic exposure', () => {
   it('brings an even picture to middle grey', () => {
@@ -65,6 +65,21 @@ it('numbers are readable', () => {
     '–',
   ]);
   expect(percent(0.0183)).toBe('1.8 %');
+});
+
+it('what was measured keeps the zeros at its end', () => {
+  expect([0.8, 0.191, 12, 0.37, -5, 100, 1234.5, 2e-7, 0, NaN].map(measured)).toEqual([
+    '0.800',
+    '0.191',
+    '12.0',
+    '0.370',
+    '-5.00',
+    '100',
+    '1,235',
+    '2.00e-7',
+    '0.00',
+    '–',
+  ]);
 });
 
 describe('a value and its error', () => {

@@ -116,6 +116,13 @@ export function readable(value: number, digits = 3): string {
   });
 }
 
+/** The same for what was measured: a zero at its end was measured, too. */
+export function measured(value: number): string {
+  const text = readable(value);
+  if (!/^-?[\d.]+$/.test(text)) return text; // without a fraction, or as a power of ten: nothing was left out
+  return value.toLocaleString('en', { minimumSignificantDigits: 3, maximumSignificantDigits: 3 });
+}
+
 /** Digits of a measured value at most, however small its error. */
 const MOST_DIGITS = 5;
 

@@ -1,7 +1,7 @@
 // The scale of a false-colour picture: what colour means how many lux, or which mip.
 
 import { MIP_STOPS, paletteCss } from '../view/palette';
-import { h, readable, withError } from './dom';
+import { h, measured, readable, withError } from './dom';
 
 const LABELS = 5;
 
@@ -72,7 +72,7 @@ export class MeterCard {
     this.element.hidden = false;
     const sure = error === undefined || !Number.isFinite(error);
     const [value, either] =
-      lux === undefined ? ['no light known', ''] : sure ? [readable(lux), ''] : withError(lux, error);
+      lux === undefined ? ['no light known', ''] : sure ? [measured(lux), ''] : withError(lux, error);
     this.value.textContent = value;
     this.bar.textContent = lux === undefined ? '' : either ? ` ± ${either} lx` : ' lx';
     this.more.textContent = details;

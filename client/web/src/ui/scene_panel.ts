@@ -245,7 +245,8 @@ export class ScenePanel {
     const top = Math.max(...emission);
     const strength = material.extensions?.KHR_materials_emissive_strength?.emissiveStrength ?? 1;
     const colour = this.colour(toHex(base), (hex) => this.actions.setColour(index, fromHex(hex)));
-    // Luminance at full colour: the factor's brightest channel belongs to the strength, so that both sliders are free.
+    // The factor's brightest channel belongs to the strength, so that both can be changed by themselves. The luminance of a
+    // colour is less than that.
     const glow = this.colour(toHex(top > 0 ? emission.map((c) => c / top) : [1, 1, 1]), () => send());
     const nits = this.number(String(Number((top * strength).toPrecision(5))), () => send());
     const send = () => {
@@ -275,7 +276,7 @@ export class ScenePanel {
       chooser,
       field('Colour', colour),
       field('Emission', glow),
-      field('Luminance, nit', nits),
+      field('Strength, nit', nits),
     );
   }
 
