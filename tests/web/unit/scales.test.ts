@@ -1,4 +1,4 @@
-import { errorsShown, within } from '../../../client/web/src/ui/error_plot';
+import { errorsShown, ticksBetween, within } from '../../../client/web/src/ui/error_plot';
 import { scaleLabels } from '../../../client/web/src/ui/legend';
 
 describe('the legend of false colours', () => {
@@ -16,6 +16,22 @@ describe('the plot of error against time', () => {
 
   it('is not stretched by a part that is nothing beside the total', () => {
     expect(errorsShown([{ seconds: 1, total: 0.02, residual: 1e-9, sampling: 0 }])).toEqual([0.02]);
+  });
+
+  it('has ticks enough to be read by, however little it spans, and no more than there is room for', () => {
+    const near = (low: number, high: number) => ticksBetween(low, high).map((tick) => Number(tick.toPrecision(3)));
+    expect(near(0.0009, 1.1)).toEqual([0.001, 0.01, 0.1, 1]);
+    expect(near(0.018, 1.1)).toEqual([0.02, 0.05, 0.1, 0.2, 0.5, 1]);
+    expect(near(0.0108, 0.034)).toEqual([0.015, 0.02, 0.03]);
+    expect(near(0.0095, 0.034)).toEqual([0.01, 0.02, 0.03]);
+    expect(near(0.9, 1.98)).toEqual([1, 1.5]);
+    for (let low = 1e-3; low < 10; low *= 1.07)
+      for (let span = 2.2; span < 1e5; span *= 1.1) {
+        const ticks = ticksBetween(low, low * span);
+        expect(ticks.length, `${low} to ${low * span}`).toBeGreaterThan(1);
+        const gaps = ticks.slice(1).map((tick, i) => Math.log(tick / ticks[i]!) / Math.log(span));
+        expect(Math.min(...gaps), `${low} to ${low * span}`).toBeGreaterThan(0.149);
+      }
   });
 
   it('keeps the texts of its ticks whole', () => {
