@@ -31,6 +31,11 @@ const MOST_LISTED = 400;
 const FEW = 12;
 const MOST_LETTERS = 200;
 
+/** What a narrow field has room for: four digits, and hundredths of what is large. */
+function briefly(value: number): string {
+  return String(Number(Math.abs(value) < 100 ? value.toPrecision(4) : value.toFixed(2)));
+}
+
 interface ListEntry {
   node: number;
   depth: number;
@@ -221,17 +226,21 @@ export class ScenePanel {
   }
 
   private vector(label: string, value: Vec3, changed: (value: Vec3) => void): HTMLElement {
+    // What nobody wrote anew stays as exact as it was, whatever there is room for.
+    const read = (input: HTMLInputElement, i: number) =>
+      input.value === briefly(value[i]!) ? value[i]! : parseNumber(input.value);
     const inputs = value.map((v, i) =>
       h('input', {
         type: 'text',
         inputMode: 'decimal',
         class: 'number',
-        value: String(Number(v.toPrecision(5))),
+        value: briefly(v),
+        title: String(v),
         'aria-label': `${label}, ${'xyz'[i]}`,
         onchange: () => {
-          const next = inputs.map((input) => parseNumber(input.value)) as Vec3;
+          const next = inputs.map(read) as Vec3;
           if (next.every(Number.isFinite)) changed(next);
-          else this.refuse(inputs.find((input) => !Number.isFinite(parseNumber(input.value)))!);
+          else this.refuse(inputs.find((input, i) => !Number.isFinite(read(input, i)))!);
         },
       }),
     );
