@@ -1,4 +1,5 @@
 import { errorsShown, ticksBetween, within } from '../../../client/web/src/ui/error_plot';
+import { briefly } from '../../../client/web/src/ui/scene_panel';
 import { scaleLabels } from '../../../client/web/src/ui/legend';
 
 describe('the legend of false colours', () => {
@@ -39,4 +40,11 @@ describe('the plot of error against time', () => {
     expect(within(4, 30, 274)).toBe(15);
     expect(within(100, 30, 274)).toBe(100);
   });
+});
+
+it('numbers of a place are brief, and none of them nothing but what rounding leaves', () => {
+  const given = [0.36833, -0.000662, 0.0596, -50.8237, 38.3579, 1, 0, 1e-15, 123.456, -1234.567, 9.99999, 2e-8];
+  expect(given.map(briefly)).toEqual(
+    ['0.3683', '-6.6e-4', '0.0596', '-50.82', '38.36', '1', '0', '0', '123.46', '-1234.57', '10', '2.0e-8'], // prettier-ignore
+  );
 });

@@ -31,9 +31,12 @@ const MOST_LISTED = 400;
 const FEW = 12;
 const MOST_LETTERS = 200;
 
-/** What a narrow field has room for: four digits, and hundredths of what is large. */
-function briefly(value: number): string {
-  return String(Number(Math.abs(value) < 100 ? value.toPrecision(4) : value.toFixed(2)));
+/** What a narrow field has room for: four digits, hundredths of what is large, and nothing where there is but rounding. */
+export function briefly(value: number): string {
+  const size = Math.abs(value);
+  if (size < 1e-9) return '0';
+  if (size < 1e-3) return value.toExponential(1);
+  return String(Number(size < 100 ? value.toFixed(Math.min(4, 3 - Math.floor(Math.log10(size)))) : value.toFixed(2)));
 }
 
 interface ListEntry {
