@@ -39,11 +39,11 @@ struct EnergyBalance {
 /// What a lightmap can hold.
 enum class Quantity {
   kIrradiance,  ///< H, lux
-  kRadiosity,   ///< B = E + rho H, lux
+  kRadiosity,   ///< B = E + rho H, lm/m^2
   kError,       ///< standard error of H, lux: what the stated sampling and residual error amount to at this texel
   kPatchId,     ///< whole numbers: the leaf patch's node; kNoId in gutters
   kMipLevel,    ///< whole numbers: level of the node that last shot for the texel; kNoId where none has
-  kUnshot,      ///< radiosity still to be shot, lux, signed
+  kUnshot,      ///< radiosity still to be shot, lm/m^2, signed
   kNormal,      ///< geometric normal of the front, (n + 1) / 2
 };
 inline constexpr std::size_t kQuantityCount = 7;

@@ -62,7 +62,7 @@ const char* unitOf(Quantity quantity) {
     case Quantity::kIrradiance:
       return "irradiance, lux";
     case Quantity::kRadiosity:
-      return "radiosity, lux";
+      return "radiosity, lm/m^2";
     case Quantity::kError:
       return "standard error of irradiance, lux";
     case Quantity::kPatchId:
@@ -70,7 +70,7 @@ const char* unitOf(Quantity quantity) {
     case Quantity::kMipLevel:
       return "mip level that shot, 4294967295 is none";
     case Quantity::kUnshot:
-      return "unshot radiosity, lux";
+      return "unshot radiosity, lm/m^2";
     case Quantity::kNormal:
       return "normal, (n + 1) / 2";
   }

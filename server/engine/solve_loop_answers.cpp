@@ -98,7 +98,7 @@ struct SnapshotQuantity {
   bool photometric;  ///< exposed and tone-mapped
 };
 
-/// Unshot radiosity is looked at as irradiance is: both are lux on the page.
+/// Unshot radiosity is looked at as irradiance is: both are lumens per square metre on the page.
 const std::map<std::string, SnapshotQuantity>& snapshotQuantities() {
   static const std::map<std::string, SnapshotQuantity> kAll = {
       {"lit", {gpu::ViewQuantity::kLit, Quantity::kIrradiance, true}},

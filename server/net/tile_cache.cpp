@@ -20,9 +20,16 @@ protocol::Region regionOf(glm::ivec2 size, std::uint32_t tile) {
   return {x, y, std::min(side, size.x - x), std::min(side, size.y - y)};
 }
 
+/// rgb9e5 has no sign: of what was passed on in advance nothing would be left.
+protocol::PixelFormat formatOf(const TileCache::Key& key) {
+  const bool lacks_sign = key.quantity == engine::Quantity::kUnshot && key.format == protocol::PixelFormat::kRgb9e5;
+  return lacks_sign ? protocol::PixelFormat::kRgba16f : key.format;
+}
+
 Result<protocol::EncodedPixels> encode(const TileCache::Key& key, const engine::PageSnapshot& page) {
   const auto region = regionOf(page.size(key.mip), key.tile);
-  if (!engine::holdsIds(key.quantity)) return protocol::encodePixels(page.mips[key.mip], region, key.format, key.codec);
+  if (!engine::holdsIds(key.quantity))
+    return protocol::encodePixels(page.mips[key.mip], region, formatOf(key), key.codec);
   const auto& image = page.id_mips[key.mip];
   std::vector<std::uint32_t> ids;
   for (int y = region.y; y < region.y + region.height; ++y) {

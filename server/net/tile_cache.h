@@ -30,7 +30,8 @@ class TileCache {
   };
   using Pixels = std::shared_ptr<const protocol::EncodedPixels>;
 
-  /// Whole numbers are encoded as r32ui, so Key::format says nothing of them. kInternal when a value is not finite.
+  /// Whole numbers are encoded as r32ui, whatever Key::format, and unshot light, which has a sign, as rgba16f where
+  /// that is rgb9e5. kInternal when a value is not finite.
   [[nodiscard]] Result<Pixels> get(const Key& key, const engine::PageSnapshot& page);
 
   [[nodiscard]] std::uint64_t encoded() const { return encoded_.load(); }

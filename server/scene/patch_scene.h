@@ -213,7 +213,7 @@ inline constexpr std::uint64_t kMaxLeaves = std::uint64_t{1} << 28;  ///< some 6
 [[nodiscard]] Result<PatchScene> buildPatchScene(const Scene& scene, const ChartOptions& options,
                                                  const FormerScene* former = nullptr);
 
-/// Emission (exitance E = pi L_e, lux) and reflectance of every node: leaves integrated over textures and vertex
+/// Emission (exitance E = pi L_e, lm/m^2) and reflectance of every node: leaves integrated over textures and vertex
 /// colours (16 samples a leaf), parents area-weighted means. Index = node. Reflectance is clamped to 0.999.
 struct PatchMaterials {
   std::vector<glm::vec3> emission;

@@ -16,7 +16,7 @@ struct LightPolygon {
   std::array<glm::vec3, 4> corners{};
   std::uint32_t corner_count = 3;
   glm::vec3 normal{0.0F};    ///< towards the lit side
-  glm::vec3 emission{0.0F};  ///< exitance, lux
+  glm::vec3 emission{0.0F};  ///< exitance, lm/m^2
   double area = 0.0;         ///< unit box squared
   std::uint32_t key = 0;     ///< 2 (Side::triangle_key + triangle) + side: stable across edits
 

@@ -98,7 +98,7 @@ class Solver {
   /// After an edit of geometry: links that matter little beside the target error are still those of before, which
   /// error() counts. Further steps after kConverged measure them, and end with kConverged once more.
   [[nodiscard]] virtual bool isBehind() const { return false; }
-  /// Radiosity (lux, signed) by node, level 0, that is still to be shot. What light polygons emit is not in it: they
+  /// Radiosity (lm/m^2, signed) by node, level 0, that is still to be shot. What light polygons emit is not in it: they
   /// are owed by the light, not by its leaves.
   [[nodiscard]] virtual std::vector<glm::vec3> unshot() const = 0;
   /// By node, level 0: the level of the node that last shot for this leaf; kNeverShot where none has.

@@ -82,7 +82,7 @@ struct GatherShot {
   std::array<glm::vec3, kMaxCorners> corners{};
   std::uint32_t corner_count = 3;  ///< 3 to kMaxCorners, counter-clockwise seen from the lit side
   glm::vec3 normal{0.0F};
-  std::array<double, 3> radiosity{};  ///< signed, lux, times the shot's weight in the average
+  std::array<double, 3> radiosity{};  ///< signed, lm/m^2, times the shot's weight in the average
   /// The part of the polygon that shines, when something covers the rest (a floor under a block). Nobody knows which
   /// part; a receiver whose horizon cuts the polygon is taken to see the shining part first, as the block's own sides
   /// do.

@@ -3,7 +3,7 @@
 import { Box3, Vector3 } from 'three';
 import type { App } from './app';
 import { nodeName } from './document/gltf';
-import { readable } from './ui/dom';
+import { measured } from './ui/dom';
 import { listenToKeys } from './ui/keys';
 import { ViewPanel } from './ui/view_panel';
 import type { LitScene } from './view/lit_scene';
@@ -230,7 +230,7 @@ export class ViewSession {
     if (this.mode.id === 'mips') return frame.legend.showMips();
     if (!viewer.uniforms.all.falseColour.value || !this.mode.unit || !viewer.shown) return frame.legend.hide();
     const { x: low, y: high } = viewer.uniforms.all.falseRange.value;
-    frame.legend.show(this.mode.label, this.mode.unit, low, high);
+    frame.legend.show(this.mode.legend ?? this.mode.label, this.mode.unit, low, high);
     this.panel.showRange(low, high);
   }
 
@@ -292,8 +292,9 @@ export class ViewSession {
     // Where errors of single texels are not streamed, the scene's own stands for them.
     const error = reading.error ?? (lux === undefined ? undefined : lux * (this.app.progress?.error.total ?? NaN));
     const details = [
-      reading.irradiance
-        ? `R ${readable(reading.irradiance[0])}  G ${readable(reading.irradiance[1])}  B ${readable(reading.irradiance[2])}`
+      reading.irradiance ? reading.irradiance.map((c, i) => `${'RGB'[i]} ${measured(c)}`).join('  ') : '',
+      this.mode.id === 'radiosity' && reading.radiosity !== undefined
+        ? `leaves ${measured(reading.radiosity)} lm/m²`
         : '',
       reading.node === undefined ? '' : nodeName(edit.document.gltf, reading.node),
       reading.texel ? `page ${reading.page}, texel ${reading.texel.join(', ')}` : '',
@@ -357,6 +358,6 @@ function isAmongObjects(target: EventTarget | null): boolean {
 function position(point: Vector3): string {
   return `at ${point
     .toArray()
-    .map((v) => readable(v))
+    .map((v) => measured(v))
     .join(', ')} m`;
 }

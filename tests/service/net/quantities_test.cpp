@@ -76,6 +76,26 @@ TEST(Quantities, WholeNumbersComeAsTheyAreInEveryCodec) {
   }
 }
 
+TEST(Quantities, WhatHasASignKeepsItInEveryFormat) {
+  RunningServer server;
+  server.engine.publish(-2.0F, Of::kUnshot);
+  for (const auto format : {PixelFormat::kRgb9e5, PixelFormat::kRgba16f, PixelFormat::kRgba32f}) {
+    TestSocket socket(server.port());
+    HelloCall hello;
+    hello.client = "test";
+    hello.tile_formats = {format};
+    EXPECT_EQ(replyOf<HelloReply>(socket.call(hello)).tile_format, format);
+    socket.call(to(Quantity::kUnshot));
+    ASSERT_TRUE(socket.waitFor("bookmark").has_value());
+    ASSERT_EQ(socket.tiles.size(), kTilesInAll);
+    for (const auto& frame : socket.tiles) {
+      const auto tile = decodeTile(frame);
+      EXPECT_EQ(tile->header.format, format == PixelFormat::kRgb9e5 ? PixelFormat::kRgba16f : format);
+      EXPECT_NEAR(tileImage(*tile)->at(0, 0).x, -2.0F, 2.0F * 0x1p-11F);
+    }
+  }
+}
+
 TEST(Quantities, ChangingItStartsAfreshAndTheOldOneIsNoLongerWatched) {
   RunningServer server;
   server.engine.publish();

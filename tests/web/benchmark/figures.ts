@@ -25,8 +25,3 @@ export function table(head: readonly string[], rows: readonly (readonly string[]
   const rule = head.map((_, i) => (i === 0 ? '---' : '---:'));
   return [line(head), line(rule), ...rows.map(line)].join('\n');
 }
-
-/** Between frames that begin at these times. */
-export function intervals(times: readonly number[]): number[] {
-  return times.slice(1).map((time, i) => time - times[i]!);
-}

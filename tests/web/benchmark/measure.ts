@@ -2,12 +2,11 @@
 
 import type { Page } from 'playwright-core';
 import { converged, Pages, SCENES, Server } from '../browser/harness';
-import { intervals } from './figures';
 import { installProbe, type Probe } from './probe';
 import { endTrace, startTrace, type MainThread } from './trace';
 
 export interface Opening {
-  /** Milliseconds from navigation to the frame that showed it. */
+  /** Milliseconds from navigation to the picture that showed it. */
   geometry: number;
   light: number;
   converged: number;
@@ -15,21 +14,25 @@ export interface Opening {
   longTasks: number[];
   /** All of its tasks, in processor time. */
   thread: MainThread;
-  /** Between frames, from the first with geometry on; milliseconds. */
-  frames: number[];
+  /** From the arrival of each tile, once there is light, to the picture with it; milliseconds. */
+  tileToPicture: number[];
+  /** Pictures a second while it turns. */
+  rate: number;
 }
 
 export interface Edit {
   /** Milliseconds from one to the next. */
   ackToTile: number;
-  tileToFrame: number;
-  askToFrame: number;
+  tileToPicture: number;
+  askToPicture: number;
 }
 
 const SIZE = [1280, 800] as const;
 /** Of pages of which nothing is timed: in software every pixel of theirs would cost time of the machine. */
 const SMALL = [160, 100] as const;
-const TURNING_FRAMES = 40;
+const TURNING_PICTURES = 40;
+/** Where pictures take long there are fewer. */
+const MOST_TURNING_MS = 3000;
 
 async function openProbed(pages: Pages, url: string): Promise<Page> {
   const page = await pages.open('about:blank', ...SIZE);
@@ -38,23 +41,24 @@ async function openProbed(pages: Pages, url: string): Promise<Page> {
   return page;
 }
 
-/** Turns the picture in every frame, and for so many that are drawn: software leaves some out. */
-async function turn(page: Page): Promise<void> {
-  await page.evaluate(async (count) => {
-    const { view, viewer } = window.viewer!;
-    const others = view.onDrawn.bind(view);
-    let drawn = 0;
-    view.onDrawn = () => {
-      others();
-      ++drawn;
-    };
-    performance.mark('probe: turning');
-    while (drawn < count) {
-      viewer.rig.turn(0.01, 0);
-      await new Promise((resolve) => requestAnimationFrame(resolve));
-    }
-    performance.mark('probe: turned');
-  }, TURNING_FRAMES);
+/** Turns the picture with every turn of the page. Returns how many pictures a second that gives. */
+async function turn(page: Page): Promise<number> {
+  return page.evaluate(
+    async ([count, mostMs]) => {
+      const { viewer } = window.viewer!;
+      const { pictures } = window.probe!;
+      const nextTurn = () => new Promise((resolve) => requestAnimationFrame(resolve));
+      performance.mark('probe: turning');
+      const [before, begin] = [pictures.length, performance.now()];
+      while (pictures.length - before < count! && performance.now() - begin < mostMs!) {
+        viewer.rig.turn(0.01, 0);
+        await nextTurn();
+      }
+      performance.mark('probe: turned');
+      return (1000 * (pictures.length - before)) / (performance.now() - begin);
+    },
+    [TURNING_PICTURES, MOST_TURNING_MS],
+  );
 }
 
 async function takeOpening(pages: Pages, url: string): Promise<Opening> {
@@ -63,23 +67,21 @@ async function takeOpening(pages: Pages, url: string): Promise<Opening> {
   await startTrace(pages.started, page);
   await page.goto(url);
   await page.waitForFunction(() => window.probe?.converged !== undefined, undefined, { timeout: 120_000 });
-  await turn(page);
+  const rate = await turn(page);
   await page.waitForTimeout(300); // a task that has just begun is told of when it is over
   const thread = await endTrace(pages.started);
-  const marks = await page.evaluate(() => window.viewer!.marks);
+  const firstTile = await page.evaluate(() => window.viewer!.marks['firstTile']!);
   const probe: Probe = await page.evaluate(() => window.probe!);
-  const after = (mark: number) => probe.frames.find((time) => time >= mark) ?? NaN;
-  const geometry = after(marks['geometry']!);
-  const firstTile = marks['firstTile']!;
   const until = probe.converged!;
   const isLate = ({ start, ms }: { start: number; ms: number }) => start + ms >= firstTile && start <= until;
   return {
-    geometry,
-    light: after(marks['light']!),
+    geometry: probe.pictures[0]?.done ?? NaN,
+    light: probe.pictures.find(({ light }) => light)?.done ?? NaN,
     converged: until,
     longTasks: probe.longTasks.filter(isLate).map(({ ms }) => ms),
     thread,
-    frames: intervals(probe.frames.filter((time) => time >= geometry && time <= until)),
+    tileToPicture: probe.tileToPicture,
+    rate,
   };
 }
 
@@ -158,14 +160,14 @@ export async function watchEdits(pages: Pages, scene: string, edits: number): Pr
         const { tiles, shown } = window.probe!;
         const first = (times: Record<number, number>) =>
           Math.min(...Object.keys(times).filter((key) => Number(key) >= revision).map((key) => times[Number(key)]!)); // prettier-ignore
-        const [tile, frame] = [first(tiles), first(shown)];
-        return Number.isFinite(frame) ? { tile, frame, origin: performance.timeOrigin } : undefined;
+        const [tile, picture] = [first(tiles), first(shown)];
+        return Number.isFinite(picture) ? { tile, picture, origin: performance.timeOrigin } : undefined;
       }, revision);
-      const { tile, frame, origin } = (await seen.jsonValue())!;
+      const { tile, picture, origin } = (await seen.jsonValue())!;
       out.push({
         ackToTile: origin + tile - answered,
-        tileToFrame: frame - tile,
-        askToFrame: origin + frame - asked,
+        tileToPicture: picture - tile,
+        askToPicture: origin + picture - asked,
       });
       await converged(page);
     }

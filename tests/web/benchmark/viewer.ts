@@ -5,15 +5,16 @@ import { cpus, loadavg } from 'node:os';
 import { join } from 'node:path';
 import { parseArgs } from 'node:util';
 import { Pages } from '../browser/harness';
-import { median, ms, quantile, spread, table } from './figures';
-import { openLoading, openSolved, scriptSize, watchEdits, type Edit, type Opening } from './measure';
+import { ms } from './figures';
+import { openLoading, openSolved, scriptSize, watchEdits, type Opening } from './measure';
+import { editsTable, framesTable, openingsTable, targetsTable, type Figures, type Row } from './report';
 
 const USAGE = `Usage: ./dev bench viewer [OPTION...]
 
 Opens radiosityd in Chromium and measures what a visitor waits for. Figures are medians, with the largest in brackets.
 
-  --runs N    openings of each scene (7)
-  --edits N   edits of the lamp (20)
+  --runs N    openings of each scene (3)
+  --edits N   edits of the lamp (10)
   --gpu       let Chromium use the graphics card; otherwise it renders in software, on the same cores as the server
   --help
 `;
@@ -22,11 +23,6 @@ const SCENES = [
   { file: 'cornell.glb', label: 'Cornell box' },
   { file: 'room_small.glb', label: 'room of 402 polygons' },
 ];
-
-interface Row {
-  label: string;
-  openings: Opening[];
-}
 
 const say = (text: string) => process.stderr.write(`${text}\n`);
 
@@ -39,61 +35,27 @@ async function stage<T>(name: string, measure: () => Promise<T>, told: (result: 
   return result;
 }
 
-function openingsTable(rows: readonly Row[]): string {
-  const head = ['opened', 'geometry', 'light', 'converged', 'main thread in all', 'its longest task before tiles', 'with tiles', 'tasks > 50 ms with tiles, a visit', 'frame interval: median, p95, max']; // prettier-ignore
-  return table(
-    head,
-    rows.map(({ label, openings }) => {
-      const of = (figure: (opening: Opening) => number) => spread(openings.map(figure));
-      const frames = openings.flatMap((opening) => opening.frames);
-      const sum = ({ before, withTiles }: Opening['thread']) => [...before, ...withTiles].reduce((a, b) => a + b, 0);
-      return [
-        label,
-        of((opening) => opening.geometry),
-        of((opening) => opening.light),
-        of((opening) => opening.converged),
-        of(({ thread }) => sum(thread)),
-        of(({ thread }) => Math.max(0, ...thread.before)),
-        of(({ thread }) => Math.max(0, ...thread.withTiles)),
-        of(({ longTasks }) => longTasks.length),
-        [median(frames), quantile(frames, 0.95), Math.max(...frames)].map(ms).join(', '),
-      ];
-    }),
-  );
-}
-
-/** What 60 frames a second leave 16.7 ms for, where a card draws them. */
-function framesTable(rows: readonly Row[]): string {
-  const head = ["a frame's own scripts: median, p95, max", 'while tiles arrive', 'while the picture turns'];
-  return table(
-    head,
-    rows.map(({ label, openings }) => {
-      const of = (figure: (opening: Opening) => number[]) => {
-        const all = openings.flatMap(figure);
-        return [median(all), quantile(all, 0.95), Math.max(...all)].map(ms).join(', ');
-      };
-      return [label, of(({ thread }) => thread.framesWithTiles), of(({ thread }) => thread.framesOfTurning)];
-    }),
-  );
-}
-
-function editsTable(edits: readonly Edit[]): string {
-  return table(
-    ['a lamp recoloured over another connection', 'ms'],
-    [
-      ['from the acknowledgement to its first tile in the page', spread(edits.map((edit) => edit.ackToTile))],
-      ['from that tile to the frame that shows it', spread(edits.map((edit) => edit.tileToFrame))],
-      ['from asking to the frame that shows it', spread(edits.map((edit) => edit.askToFrame))],
-    ],
-  );
+async function measureAll(pages: Pages, runs: number, edits: number): Promise<Figures> {
+  const rows: Row[] = [];
+  for (const { file, label } of SCENES)
+    for (const [how, open] of [
+      ['solved', openSolved],
+      ['being loaded', openLoading],
+    ] as const) {
+      const row = (openings: Opening[]): Row => ({ label: `${label}, ${how}`, openings });
+      const told = (openings: Opening[]) => [openingsTable, framesTable].map((of) => of([row(openings)])).join('\n');
+      rows.push(row(await stage(`${label}, ${how}`, () => open(pages, file, runs), told)));
+    }
+  const seen = await stage('edits', () => watchEdits(pages, SCENES[0]!.file, edits), editsTable);
+  return { rows, edits: seen, size: await scriptSize(pages, SCENES[0]!.file) };
 }
 
 async function main(): Promise<void> {
   const { values } = parseArgs({
     args: process.argv.slice(2),
     options: {
-      runs: { type: 'string', default: '7' },
-      edits: { type: 'string', default: '20' },
+      runs: { type: 'string', default: '3' },
+      edits: { type: 'string', default: '10' },
       gpu: { type: 'boolean', default: false },
       help: { type: 'boolean', default: false },
     },
@@ -106,39 +68,31 @@ async function main(): Promise<void> {
   const pages = new Pages();
   await pages.launch(values.gpu);
   try {
-    const rows: Row[] = [];
-    for (const { file, label } of SCENES)
-      for (const [how, open] of [
-        ['solved', openSolved],
-        ['being loaded', openLoading],
-      ] as const) {
-        const row = (openings: Opening[]): Row => ({ label: `${label}, ${how}`, openings });
-        const told = (openings: Opening[]) => [openingsTable, framesTable].map((of) => of([row(openings)])).join('\n');
-        rows.push(row(await stage(`${label}, ${how}`, () => open(pages, file, runs), told)));
-      }
-    const seen = await stage('edits', () => watchEdits(pages, SCENES[0]!.file, edits), editsTable);
-    const size = await scriptSize(pages, SCENES[0]!.file);
+    const figures = await measureAll(pages, runs, edits);
     const renderer = await pages.renderer();
+    const { rows, size } = figures;
     const text = [
       '# The live viewer',
       '',
       `${cpus().length} cores, load ${load.toFixed(1)} when it began; Chromium draws with ${renderer}. ${runs} openings of each, ${edits} edits; median (largest).`,
       `JavaScript: ${ms(size.packed / 1000)} kB packed, ${ms(size.unpacked / 1000)} kB unpacked.`,
       '',
-      'All in milliseconds. Geometry, light and converged: from navigation to the frame after the one that was drawn with it.',
+      targetsTable(figures),
+      '',
+      'All in milliseconds. Geometry, light and converged: from navigation to the picture with it, when the card has drawn it.',
       "The main thread and its longest tasks: processor time. Tasks > 50 ms: by the page's clock, other programs included.",
       '',
       openingsTable(rows),
       '',
       framesTable(rows),
       '',
-      editsTable(seen),
+      editsTable(figures.edits),
       '',
     ].join('\n');
     const folder = process.env['RADIOSITY_BENCH_OUTPUT'] ?? '.';
     mkdirSync(folder, { recursive: true });
     writeFileSync(join(folder, 'viewer.md'), text);
-    writeFileSync(join(folder, 'viewer.json'), JSON.stringify({ renderer, load, size, rows, edits: seen }, null, 1));
+    writeFileSync(join(folder, 'viewer.json'), JSON.stringify({ renderer, load, ...figures }, null, 1));
     process.stdout.write(text);
     if (pages.complaints.length > 0) throw new Error(`the pages complained: ${pages.complaints.join('; ')}`);
   } finally {

@@ -1,4 +1,4 @@
-import { intervals, median, quantile, spread, table } from '../benchmark/figures';
+import { median, quantile, spread, table } from '../benchmark/figures';
 import { CONVERGED, DRAWN, FIRST_TILE, mainThread, TURNED, TURNING } from '../benchmark/trace';
 
 it('takes medians of even and odd counts, and quantiles', () => {
@@ -7,7 +7,6 @@ it('takes medians of even and odd counts, and quantiles', () => {
   expect(median([])).toBeNaN();
   expect(quantile([5, 1, 4, 2, 3], 0.95)).toBe(5);
   expect(spread([12.34, 1, 100])).toBe('12 (100)');
-  expect(intervals([1, 3, 10])).toEqual([2, 7]);
   expect(table(['a', 'b'], [['x', '1']])).toBe('| a | b |\n| --- | ---: |\n| x | 1 |');
 });
 

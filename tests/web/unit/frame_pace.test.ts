@@ -16,10 +16,10 @@ class Card {
   /** `moving`: something moves before every frame. `tiles`: something has come that is to be drawn. */
   run(forMs: number, { moving = false, tiles = false }): void {
     for (const until = this.nowMs + forMs; this.nowMs < until; this.nowMs += 16) {
-      while (this.queue[0] && this.queue[0].end <= this.nowMs) {
-        this.latencies.push(this.nowMs - this.queue.shift()!.begun);
-        this.pace.ended(this.nowMs);
-      }
+      const open = this.queue.findIndex(({ end }) => end > this.nowMs);
+      const done = this.queue.splice(0, open < 0 ? this.queue.length : open);
+      this.latencies.push(...done.map(({ begun }) => this.nowMs - begun));
+      this.pace.ended(this.nowMs, done.length);
       this.pace.turn(this.nowMs);
       if (moving) this.pace.hurry(this.nowMs);
       if (!moving && !tiles && !this.pace.isSharpDue(this.nowMs)) continue;
@@ -66,9 +66,23 @@ describe('the pace of frames', () => {
     card.run(200, { moving: true });
     pace.hurry(10_000);
     pace.began(10_000, 1);
-    pace.ended(10_900);
+    pace.ended(10_900, 1);
     pace.hurry(11_000);
     expect(pace.ask(11_000)).toBe(1);
+  });
+
+  it('does not take two frames that are told of in the same turn for a quick card', () => {
+    const pace = new FramePace(true);
+    for (let now = 0; now < 1000; now += 130) {
+      pace.turn(now); // of a page that has other things to do
+      pace.ended(now, 2);
+      pace.hurry(now);
+      for (const begun of [now, now + 10]) {
+        const scale = pace.ask(begun);
+        expect(300 * scale! ** 2).toBeLessThanOrEqual(MOVING_FRAME_MS);
+        pace.began(begun, scale!);
+      }
+    }
   });
 
   it('is as sharp as before when the card is quick again', () => {
@@ -81,7 +95,7 @@ describe('the pace of frames', () => {
     for (let i = 0; i < 20; ++i, now += 20) {
       pace.hurry(now);
       pace.began(now, pace.ask(now)!);
-      pace.ended(now + 16); // however few pixels: it is told at the next tick of the clock
+      pace.ended(now + 16, 1); // however few pixels: it is told at the next tick of the clock
     }
     pace.hurry(now);
     expect(pace.ask(now)).toBe(1);
@@ -96,7 +110,7 @@ describe('the pace of frames', () => {
       const scale = pace.ask(now);
       expect(scale).toBeLessThan(1);
       pace.began(now, scale!);
-      pace.ended(now + 100);
+      pace.ended(now + 100, 1);
     }
   });
 

@@ -1,4 +1,5 @@
-import { errorsShown, within } from '../../../client/web/src/ui/error_plot';
+import { errorsShown, ticksBetween, within } from '../../../client/web/src/ui/error_plot';
+import { briefly } from '../../../client/web/src/ui/scene_panel';
 import { scaleLabels } from '../../../client/web/src/ui/legend';
 
 describe('the legend of false colours', () => {
@@ -18,9 +19,32 @@ describe('the plot of error against time', () => {
     expect(errorsShown([{ seconds: 1, total: 0.02, residual: 1e-9, sampling: 0 }])).toEqual([0.02]);
   });
 
+  it('has ticks enough to be read by, however little it spans, and no more than there is room for', () => {
+    const near = (low: number, high: number) => ticksBetween(low, high).map((tick) => Number(tick.toPrecision(3)));
+    expect(near(0.0009, 1.1)).toEqual([0.001, 0.01, 0.1, 1]);
+    expect(near(0.018, 1.1)).toEqual([0.02, 0.05, 0.1, 0.2, 0.5, 1]);
+    expect(near(0.0108, 0.034)).toEqual([0.015, 0.02, 0.03]);
+    expect(near(0.0095, 0.034)).toEqual([0.01, 0.02, 0.03]);
+    expect(near(0.9, 1.98)).toEqual([1, 1.5]);
+    for (let low = 1e-3; low < 10; low *= 1.07)
+      for (let span = 2.2; span < 1e5; span *= 1.1) {
+        const ticks = ticksBetween(low, low * span);
+        expect(ticks.length, `${low} to ${low * span}`).toBeGreaterThan(1);
+        const gaps = ticks.slice(1).map((tick, i) => Math.log(tick / ticks[i]!) / Math.log(span));
+        expect(Math.min(...gaps), `${low} to ${low * span}`).toBeGreaterThan(0.149);
+      }
+  });
+
   it('keeps the texts of its ticks whole', () => {
     expect(within(266, 30, 274)).toBe(259);
     expect(within(4, 30, 274)).toBe(15);
     expect(within(100, 30, 274)).toBe(100);
   });
+});
+
+it('numbers of a place are brief, and none of them nothing but what rounding leaves', () => {
+  const given = [0.36833, -0.000662, 0.0596, -50.8237, 38.3579, 1, 0, 1e-15, 123.456, -1234.567, 9.99999, 2e-8];
+  expect(given.map(briefly)).toEqual(
+    ['0.3683', '-6.6e-4', '0.0596', '-50.82', '38.36', '1', '0', '0', '123.46', '-1234.57', '10', '2.0e-8'], // prettier-ignore
+  );
 });

@@ -12,6 +12,7 @@ import {
   BadTile,
   decodeTile,
   HEADER_BYTES,
+  KINDS,
   readTileHeader,
   rescaled,
 } from '../../../client/web/src/protocol/tile_frame';
@@ -88,6 +89,23 @@ describe('tile frame', () => {
     const tile = await decodeTile(sharedExponentFrame(words, deflated));
     expect(Array.from(tile.texels)).toEqual(words);
     expect(tile.exponent).toBe(1);
+  });
+
+  it('shows what is owed by its size, and of other quantities nothing below zero', async () => {
+    const below = (kind: number) =>
+      changed((view) => {
+        view.setUint8(5, kind);
+        for (const at of [0, 2, 4])
+          view.setUint16(HEADER_BYTES + at, view.getUint16(HEADER_BYTES + at, true) | 0x8000, true);
+        view.setUint32(60, crc32c(new Uint8Array(view.buffer, HEADER_BYTES)), true);
+      });
+    const first = async (kind: (typeof KINDS)[number]) => {
+      const { header, texels, exponent } = await decodeTile(below(KINDS.indexOf(kind)));
+      expect(header.kind).toBe(kind);
+      return decodeRgb9e5(texels[0]!).map((c) => c * 2 ** exponent);
+    };
+    expect(await first('unshot')).toEqual([1, 0.5, 0.25]);
+    expect(await first('irradiance')).toEqual([0, 0, 0]);
   });
 
   it.each<[string, (view: DataView) => void]>([

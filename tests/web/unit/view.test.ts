@@ -3,7 +3,7 @@ import { editCommand } from '../../../client/web/src/app_share';
 import { encodeRgb9e5, scaleRgb9e5 } from '../../../client/web/src/protocol/rgb9e5';
 import { pageExponent } from '../../../client/web/src/view/lightmap_page';
 import { baseMipFor } from '../../../client/web/src/view/lightmap_set';
-import { fromHex, parseNumber, percent, readable, toHex } from '../../../client/web/src/ui/dom';
+import { fromHex, measured, parseNumber, percent, readable, toHex, withError } from '../../../client/web/src/ui/dom';
 
 describe('automatic exposure', () => {
   it('brings an even picture to middle grey', () => {
@@ -65,6 +65,43 @@ it('numbers are readable', () => {
     '–',
   ]);
   expect(percent(0.0183)).toBe('1.8 %');
+});
+
+it('what was measured keeps the zeros at its end', () => {
+  expect([0.8, 0.191, 12, 0.37, -5, 100, 1234.5, 2e-7, 0, NaN].map(measured)).toEqual([
+    '0.800',
+    '0.191',
+    '12.0',
+    '0.370',
+    '-5.00',
+    '100',
+    '1,235',
+    '2.00e-7',
+    '0.00',
+    '–',
+  ]);
+});
+
+describe('a value and its error', () => {
+  it.each([
+    ['to the second digit of the error', 123.456, 1.234, '123.5 ± 1.2'],
+    ['though that rounds up to a digit more', 9.996, 0.0996, '10.00 ± 0.10'],
+    ['with thousands set apart', 1_234_567, 12_345, '1,235,000 ± 12,000'],
+    ['of nothing, which is as sure as its error', 0, 0.034, '0.000 ± 0.034'],
+    ['of nothing that is sure', 0, 0, '0 ± 0'],
+    ['that is sure', 12.3456, 0, '12.346 ± 0.000'],
+    ['that is less than its error', 0.5, 32, '1 ± 32'],
+    ['that is nothing beside its error, and below zero', -0.01, 3.2, '0.0 ± 3.2'],
+    ['with five digits at most, the error no less than one of the last', 123_456, 0.0012, '123,460 ± 10'],
+    ['in powers of ten where it is small', 1.23e-7, 3e-9, '(1.230 ± 0.030) × 10⁻⁷'],
+    ['in powers of ten where both are small', 0, 3e-9, '(0.0 ± 3.0) × 10⁻⁹'],
+    ['in powers of ten where it is large', 5e8, 1.2e6, '(5.000 ± 0.012) × 10⁸'],
+    ['whose error has a sign', 1, -0.5, '1.00 ± 0.50'],
+    ['that is not known', NaN, 1, '– ± 1'],
+    ['whose error is not known', 1, Infinity, '1 ± –'],
+  ])('is written %s', (_, value, error, text) => {
+    expect(withError(value, error).join(' ± ')).toBe(text);
+  });
 });
 
 it('the command survives a shell', () => {

@@ -141,7 +141,9 @@ function toSharedExponent(header: TileHeader, raw: DataView): { texels: Uint32Ar
     return { texels, exponent: 0 };
   }
   const half = header.format === 'rgba16f';
-  const read = half ? (at: number) => decodeHalf(raw.getUint16(at, true)) : (at: number) => raw.getFloat32(at, true);
+  const number = half ? (at: number) => decodeHalf(raw.getUint16(at, true)) : (at: number) => raw.getFloat32(at, true);
+  // Of what was passed on before it came the storage knows no sign: its size is what there is to see.
+  const read = header.kind === 'unshot' ? (at: number) => Math.abs(number(at)) : number;
   const [channel, stride] = half ? [2, 8] : [4, 16];
   let largest = 0;
   for (let i = 0; i < count; ++i)

@@ -116,6 +116,40 @@ export function readable(value: number, digits = 3): string {
   });
 }
 
+/** The same for what was measured: a zero at its end was measured, too. */
+export function measured(value: number): string {
+  const text = readable(value);
+  if (!/^-?[\d.]+$/.test(text)) return text; // without a fraction, or as a power of ten: nothing was left out
+  return value.toLocaleString('en', { minimumSignificantDigits: 3, maximumSignificantDigits: 3 });
+}
+
+/** Digits of a measured value at most, however small its error. */
+const MOST_DIGITS = 5;
+
+/**
+ * A measured value and its error, one written as the other: to the second significant digit of the error, and where
+ * either would be long, as multiples of the same power of ten. Between them belongs " ± ", after them the unit.
+ */
+export function withError(value: number, error: number): [string, string] {
+  const roundedError = Number(Math.abs(error).toPrecision(2));
+  const top = (v: number) => Math.floor(Math.log10(v));
+  const largest = Math.max(Math.abs(value), roundedError);
+  if (!(largest > 0 && Number.isFinite(largest))) return [readable(value), readable(error)];
+  const last = Math.max(top(roundedError), top(largest) + 2 - MOST_DIGITS) - 1;
+  const power = largest < 1e-3 || largest >= 1e7 ? top(largest) : 0;
+  const decimals = Math.max(0, power - last);
+  const format = { minimumFractionDigits: decimals, maximumFractionDigits: decimals };
+  const write = (units: number) => (units * 10 ** (last - power)).toLocaleString('en', format);
+  const v = Math.round(value / 10 ** last) + 0; // -0 would be written with its sign
+  // An error that is less than the last digit is no more than one of it.
+  const e = Math.max(roundedError > 0 ? 1 : 0, Math.round(roundedError / 10 ** last));
+  return power === 0 ? [write(v), write(e)] : [`(${write(v)}`, `${write(e)}) × 10${superscript(power)}`];
+}
+
+function superscript(n: number): string {
+  return [...String(n)].map((c) => (c === '-' ? '⁻' : '⁰¹²³⁴⁵⁶⁷⁸⁹'[Number(c)]!)).join('');
+}
+
 /**
  * The number that somebody wrote, with a point or a comma before its fraction; NaN: none. Commas between groups of three
  * digits, as readable() writes them, set thousands apart: "1,500" is 1500, "1,5" and "0,125" are fractions.

@@ -68,11 +68,11 @@ export class ErrorPlot {
     const style = getComputedStyle(this.element);
     const x = scale(
       this.samples.map((s) => s.seconds),
-      [0.1, 1],
+      1,
       MARGIN.left,
       width - MARGIN.right,
     );
-    const y = scale([...errorsShown(this.samples), this.target || 0.02], [0.01, 1], height - MARGIN.bottom, MARGIN.top);
+    const y = scale([...errorsShown(this.samples), this.target || 0.02], 1, height - MARGIN.bottom, MARGIN.top);
     this.axes(context, style, x, y, width, height);
     context.save();
     context.beginPath();
@@ -150,19 +150,35 @@ interface LogScale {
   ticks: number[];
 }
 
-/** Decades that hold all values and at least `atLeast`; ticks at powers of ten, and at 2 and 5 where there is room. */
-function scale(values: number[], atLeast: [number, number], from: number, to: number): LogScale {
+/** Powers of ten alone; finer ones where those are too few to read a logarithmic scale by. */
+const STEPS = [[1], [1, 2, 5], [1, 2, 3, 5, 7], [1, 1.5, 2, 3, 4, 5, 7]];
+const FEWEST_TICKS = 3;
+/** Texts of ticks have room beside each other, as a part of the scale. */
+const LEAST_GAP = 0.15;
+
+/** Of a logarithmic scale. */
+export function ticksBetween(low: number, high: number): number[] {
+  let ticks: number[] = [];
+  for (const steps of STEPS) {
+    const finer: number[] = [];
+    for (let decade = Math.floor(Math.log10(low)); 10 ** decade <= high; ++decade)
+      finer.push(...steps.map((step) => step * 10 ** decade).filter((tick) => tick >= low && tick <= high));
+    const gaps = finer.slice(1).map((tick, i) => Math.log(tick / finer[i]!) / Math.log(high / low));
+    if (steps.length > 1 && Math.min(...gaps) < LEAST_GAP) break;
+    ticks = finer;
+    if (ticks.length >= FEWEST_TICKS) break;
+  }
+  return ticks;
+}
+
+/** Holds all values and `atLeast`, with a little room beyond. */
+function scale(values: number[], atLeast: number, from: number, to: number): LogScale {
   const good = values.filter((v) => v > 0 && Number.isFinite(v));
-  const low = Math.log10(Math.min(atLeast[1], ...good) * 0.9);
-  const high = Math.log10(Math.max(values.length ? 0 : atLeast[1], ...good, 10 ** low * 2) * 1.1);
-  const ticks: number[] = [];
-  const steps = high - low > 1.8 ? [1] : [1, 2, 5];
-  for (let decade = Math.floor(low); decade <= high; ++decade)
-    for (const step of steps) {
-      const tick = step * 10 ** decade;
-      if (Math.log10(tick) >= low && Math.log10(tick) <= high) ticks.push(tick);
-    }
-  return { at: (value) => from + ((Math.log10(value) - low) / (high - low)) * (to - from), ticks };
+  const least = 0.9 * Math.min(atLeast, ...good);
+  const most = 1.1 * Math.max(values.length ? 0 : atLeast, ...good, 2 * least);
+  const [low, high] = [Math.log10(least), Math.log10(most)];
+  const at = (value: number) => from + ((Math.log10(value) - low) / (high - low)) * (to - from);
+  return { at, ticks: ticksBetween(least, most) };
 }
 
 function short(value: number): string {

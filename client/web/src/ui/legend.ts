@@ -1,7 +1,7 @@
 // The scale of a false-colour picture: what colour means how many lux, or which mip.
 
 import { MIP_STOPS, paletteCss } from '../view/palette';
-import { h, readable } from './dom';
+import { h, measured, readable, withError } from './dom';
 
 const LABELS = 5;
 
@@ -70,8 +70,11 @@ export class MeterCard {
   /** `lux` undefined: no light known there. `error`: lux, either side. */
   show(x: number, y: number, lux: number | undefined, error: number | undefined, details: string): void {
     this.element.hidden = false;
-    this.value.textContent = lux === undefined ? 'no light known' : `${readable(lux)} lx`;
-    this.bar.textContent = lux === undefined || error === undefined ? '' : ` ± ${readable(error, 2)}`;
+    const sure = error === undefined || !Number.isFinite(error);
+    const [value, either] =
+      lux === undefined ? ['no light known', ''] : sure ? [measured(lux), ''] : withError(lux, error);
+    this.value.textContent = value;
+    this.bar.textContent = lux === undefined ? '' : either ? ` ± ${either} lx` : ' lx';
     this.more.textContent = details;
     const { offsetWidth: w, offsetHeight: hgt } = this.element;
     const left = Math.min(Math.max(8, x + 18), Math.max(8, innerWidth - w - 8));

@@ -31,6 +31,14 @@ const MOST_LISTED = 400;
 const FEW = 12;
 const MOST_LETTERS = 200;
 
+/** What a narrow field has room for: four digits, hundredths of what is large, and nothing where there is but rounding. */
+export function briefly(value: number): string {
+  const size = Math.abs(value);
+  if (size < 1e-9) return '0';
+  if (size < 1e-3) return value.toExponential(1);
+  return String(Number(size < 100 ? value.toFixed(Math.min(4, 3 - Math.floor(Math.log10(size)))) : value.toFixed(2)));
+}
+
 interface ListEntry {
   node: number;
   depth: number;
@@ -221,17 +229,21 @@ export class ScenePanel {
   }
 
   private vector(label: string, value: Vec3, changed: (value: Vec3) => void): HTMLElement {
+    // What nobody wrote anew stays as exact as it was, whatever there is room for.
+    const read = (input: HTMLInputElement, i: number) =>
+      input.value === briefly(value[i]!) ? value[i]! : parseNumber(input.value);
     const inputs = value.map((v, i) =>
       h('input', {
         type: 'text',
         inputMode: 'decimal',
         class: 'number',
-        value: String(Number(v.toPrecision(5))),
+        value: briefly(v),
+        title: String(v),
         'aria-label': `${label}, ${'xyz'[i]}`,
         onchange: () => {
-          const next = inputs.map((input) => parseNumber(input.value)) as Vec3;
+          const next = inputs.map(read) as Vec3;
           if (next.every(Number.isFinite)) changed(next);
-          else this.refuse(inputs.find((input) => !Number.isFinite(parseNumber(input.value)))!);
+          else this.refuse(inputs.find((input, i) => !Number.isFinite(read(input, i)))!);
         },
       }),
     );
@@ -245,7 +257,8 @@ export class ScenePanel {
     const top = Math.max(...emission);
     const strength = material.extensions?.KHR_materials_emissive_strength?.emissiveStrength ?? 1;
     const colour = this.colour(toHex(base), (hex) => this.actions.setColour(index, fromHex(hex)));
-    // Luminance at full colour: the factor's brightest channel belongs to the strength, so that both sliders are free.
+    // The factor's brightest channel belongs to the strength, so that both can be changed by themselves. The luminance of a
+    // colour is less than that.
     const glow = this.colour(toHex(top > 0 ? emission.map((c) => c / top) : [1, 1, 1]), () => send());
     const nits = this.number(String(Number((top * strength).toPrecision(5))), () => send());
     const send = () => {
@@ -275,7 +288,7 @@ export class ScenePanel {
       chooser,
       field('Colour', colour),
       field('Emission', glow),
-      field('Luminance, nit', nits),
+      field('Strength, nit', nits),
     );
   }
 

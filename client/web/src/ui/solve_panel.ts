@@ -100,7 +100,10 @@ export class SolvePanel {
       ['Shots', `${readable(progress.shots, 4)} (${readable(progress.shotsPerSecond, 2)}/s)`],
       ['Solve time', duration(progress.seconds)],
       ['Time left, about', progress.secondsLeft === undefined ? '–' : duration(progress.secondsLeft)],
-      ['Unshot', `${readable(progress.energy['unshot'] ?? 0)} of ${readable(progress.energy['emitted'] ?? 0)} lm`],
+      [
+        'Unshot',
+        `${readable(Math.abs(progress.energy['unshot'] ?? 0))} of ${readable(progress.energy['emitted'] ?? 0)} lm`,
+      ],
       ['Patches', readable(progress.patches, 4)],
       ['Surfaces', readable(progress.surfaces, 4)],
     ]);

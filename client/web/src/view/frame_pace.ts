@@ -79,15 +79,20 @@ export class FramePace {
     this.lastScale = scale;
   }
 
-  /** The card is done with the oldest frame. */
-  ended(nowMs: number): void {
-    const frame = this.underWay.shift();
-    if (!frame) return;
-    const tookMs = nowMs - Math.max(frame.begunMs, this.lastEndMs);
+  /**
+   * The card is done with the oldest frames. Of more than one in the same turn it is known only what all of them took
+   * together: none of them was drawn in no time.
+   */
+  ended(nowMs: number, count: number): void {
+    const frames = this.underWay.splice(0, count);
+    const [oldest] = frames;
+    if (!oldest) return;
+    const tookMs = nowMs - Math.max(oldest.begunMs, this.lastEndMs);
     this.lastEndMs = nowMs;
     if (tookMs > LONGEST_FRAME_MS) return;
-    this.lastTookMs = tookMs;
-    this.wholeFrameMs = [this.wholeFrameMs[1], tookMs / frame.scale ** 2];
+    const pixels = frames.reduce((sum, { scale }) => sum + scale ** 2, 0);
+    this.lastTookMs = (tookMs * frames.at(-1)!.scale ** 2) / pixels;
+    this.wholeFrameMs = [this.wholeFrameMs[1], tookMs / pixels];
   }
 
   /** The card was taken away, and all it had to draw. */

@@ -50,12 +50,22 @@ vec3 encodeSrgb(vec3 c) {
   return mix(1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, c * 12.92, vec3(lessThanEqual(c, vec3(0.0031308))));
 }
 
+vec3 toneMapped(vec3 radiance) {
+  if (toneCurve == 1) return ACESFilmicToneMapping(radiance);
+  if (toneCurve == 2) return AgXToneMapping(radiance);
+  if (toneCurve == 3) return radiance * toneMappingExposure;
+  return NeutralToneMapping(radiance);
+}
+
+// Half a step of the screen's 256, up or down, so that light that fades over a wall ends in no bands. The pattern is
+// interleaved gradient noise (Jimenez, Next Generation Post Processing in Call of Duty, 2014), the same in every frame.
+vec3 dither() {
+  float noise = fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715))));
+  return (fract(noise + vec3(0.0, 1.0, 2.0) / 3.0) - 0.5) / 255.0;
+}
+
 vec3 displayed(vec3 radiance) {
-  if (measuring) return radiance;
-  if (toneCurve == 1) return encodeSrgb(ACESFilmicToneMapping(radiance));
-  if (toneCurve == 2) return encodeSrgb(AgXToneMapping(radiance));
-  if (toneCurve == 3) return encodeSrgb(radiance * toneMappingExposure);
-  return encodeSrgb(NeutralToneMapping(radiance));
+  return measuring ? radiance : encodeSrgb(toneMapped(radiance)) + dither();
 }
 
 vec3 measured(float value) {

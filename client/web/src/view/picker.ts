@@ -1,6 +1,7 @@
 // What lies under the pointer: the object to select, and the light that falls there.
 
 import { Mesh, Raycaster, Vector2, Vector3, type Intersection, type PerspectiveCamera } from 'three';
+import { LitMaterial } from './lit_material';
 import type { LightmapPage } from './lightmap_page';
 import type { LitScene } from './lit_scene';
 
@@ -11,6 +12,8 @@ export interface Reading {
   irradiance: [number, number, number] | undefined;
   /** Its estimated error, lux, luminance; undefined where the server does not stream it. */
   error: number | undefined;
+  /** Light that leaves, lm/m^2, luminance; undefined where it differs within the surface. */
+  radiosity: number | undefined;
   node: number | undefined;
   material: number | undefined;
   page: number | undefined;
@@ -41,11 +44,15 @@ export function readingAt(scene: LitScene, hit: Intersection, errors?: readonly 
   const normal = (hit.normal ?? new Vector3()).clone().transformDirection(hit.object.matrixWorld);
   const index = page ? scene.set.pages.indexOf(page) : -1;
   const error = uv ? errors?.[index]?.sample(uv.x, uv.y) : undefined;
+  const irradiance = page && uv ? page.sample(uv.x, uv.y) : undefined;
+  const material: unknown = hit.object instanceof Mesh ? hit.object.material : undefined;
+  const radiance = irradiance && material instanceof LitMaterial && material.isPlain && material.radianceOf(irradiance);
   return {
     point: hit.point.clone(),
     normal,
-    irradiance: page && uv ? page.sample(uv.x, uv.y) : undefined,
+    irradiance,
     error: error && luminance(error),
+    radiosity: radiance ? Math.PI * luminance(radiance) : undefined,
     node: scene.nodeOf(hit.object),
     material: scene.materialIndexOf(hit.object),
     page: page ? index : undefined,

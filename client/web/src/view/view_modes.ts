@@ -7,6 +7,8 @@ export interface ViewMode {
   hint: string;
   /** Quantity of the tiles that are needed; what the server does not stream cannot be shown. */
   quantity: 'irradiance' | 'radiosity' | 'error' | 'unshot' | 'patchId' | 'mipLevel';
+  /** What the false-colour legend calls it, where that is not the label. */
+  legend?: string;
   /** Unit of the false-colour legend; undefined: there is nothing to measure. */
   unit?: string;
   falseColour: 'off' | 'choice' | 'always';
@@ -30,16 +32,17 @@ export const VIEW_MODES: readonly ViewMode[] = [
     number: 2,
     hint: 'Light that leaves: emitted and reflected',
     quantity: 'irradiance',
-    unit: 'lx',
+    unit: 'lm/m²',
     falseColour: 'always',
   },
   {
     id: 'unshot',
     label: 'Unshot',
     number: 3,
-    hint: 'Light that has arrived and not been passed on',
+    hint: 'Light that is still to be passed on; once done, by how much patches differ from what was passed on for them',
     quantity: 'unshot',
-    unit: 'lx',
+    legend: 'Unshot radiosity',
+    unit: 'lm/m²',
     falseColour: 'always',
   },
   {
@@ -48,6 +51,7 @@ export const VIEW_MODES: readonly ViewMode[] = [
     number: 4,
     hint: 'Estimated error of each texel',
     quantity: 'error',
+    legend: 'Estimated error',
     unit: 'lx',
     falseColour: 'always',
   },
@@ -82,6 +86,7 @@ export const VIEW_MODES: readonly ViewMode[] = [
     number: 1,
     hint: 'The lightmaps themselves',
     quantity: 'irradiance',
+    legend: 'Irradiance',
     unit: 'lx',
     falseColour: 'choice',
     flat: true,

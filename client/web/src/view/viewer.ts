@@ -290,7 +290,7 @@ export class Viewer {
     this.lastFrame = now;
     if (this.lost) return;
     this.pace.turn(now);
-    for (let done = this.fences.poll(now); done > 0; --done) this.pace.ended(now);
+    this.pace.ended(now, this.fences.poll(now));
     const taken = (this.set?.takeUp(tileMs) ?? 0) + (this.dataSet?.takeUp(tileMs) ?? 0);
     if (taken > 0) this.invalidate();
     this.promote(now);
