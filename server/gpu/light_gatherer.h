@@ -96,6 +96,9 @@ class LightGatherer {
   void findVisibility(std::size_t sums, std::size_t points);
   [[nodiscard]] double delivered() const;
   [[nodiscard]] double conserve(double area, double kept) const;
+  /// Whether any do: not where part of the polygon is missing, which the light that arrives does not tell (a wall would
+  /// be lit by a hole), nor where light passes through surfaces, which rays do not.
+  [[nodiscard]] bool mayHaveEdges(const solver::GatherShot& shot) const;
   /// Whether this one of those lit looks for itself at the part of the polygon before its plane.
   [[nodiscard]] bool isEdge(std::size_t lit) const;
   /// It does, at the last of parts_.

@@ -1,22 +1,17 @@
-// Visibility of a polygon of which only a small part lies in front of a receiver's plane, but near to the receiver: a
-// wall's foot and a piece of floor that reaches out from under the wall. A point on the polygon seldom lies in that
-// part. When it does, it would count for all those that do not, and make one texel far too bright. So the receiver asks
-// by rays, for points drawn in the part itself.
-#include <algorithm>
-#include <array>
+// Visibility of a polygon of which only part lies in front of a receiver's plane, but near to the receiver: a wall's
+// foot and a piece of floor that reaches out from under the wall. A point on the polygon may seldom lie in that part.
+// When it does, it would count for all those that do not, and make one texel far too bright. And of many points the few
+// that are nearest to the receiver would tell of them all. So the receiver asks by rays, one for each point, drawn as
+// the light of the part itself would arrive.
 #include <bit>
-#include <cmath>
 #include <glm/geometric.hpp>
 
 #include "server/gpu/light_gatherer.h"
 #include "server/solver/near_edge.h"
+#include "server/solver/polygon_directions.h"
 
 namespace radiosity::gpu {
 namespace {
-
-/// Each ray goes to one of so many points, by what form factor these have: visibility is the part of the form factor
-/// that is seen, and that of points at the near end of the part may be a hundred times that of those at its far end.
-constexpr std::size_t kCandidates = 4;
 
 /// Numbers that are as good as random, made of the two places that are looked at and from, which are the same
 /// wherever, and with whatever other receivers, the shot is taken.
@@ -26,9 +21,9 @@ class Draw {
     for (const float value : {a.x, a.y, a.z, b.x, b.y, b.z}) mix(std::bit_cast<std::uint32_t>(value));
   }
   /// In [0, 1).
-  float next() {
+  double next() {
     mix(0x9e3779b9U);
-    return static_cast<float>(state_ >> 8U) * 0x1p-24F;
+    return static_cast<double>(state_) * 0x1p-32;
   }
 
  private:
@@ -42,24 +37,15 @@ class Draw {
   std::uint32_t state_ = 0;
 };
 
-/// Evenly over a convex polygon: in one of the triangles from its first corner, by their areas.
-glm::vec3 drawPoint(const ClippedPolygon& polygon, Draw& draw) {
-  const auto& corner = polygon.corner;
-  std::array<float, 16> area{};
-  float all = 0.0F;
-  for (std::size_t k = 1; k + 1 < polygon.count; ++k)
-    all += area[k] = glm::length(glm::cross(corner[k] - corner[0], corner[k + 1] - corner[0]));
-  float left = draw.next() * all;
-  std::size_t k = 1;
-  while (k + 2 < polygon.count && left >= area[k]) left -= area[k++];
-  const float across = std::sqrt(draw.next()), along = across * draw.next();
-  return corner[0] + (across - along) * (corner[k] - corner[0]) + along * (corner[k + 1] - corner[0]);
-}
-
 }  // namespace
 
+bool LightGatherer::mayHaveEdges(const solver::GatherShot& shot) const {
+  return shot.fill >= 1.0F && receivers_->patches().opacity.empty();
+}
+
 bool LightGatherer::isEdge(std::size_t lit) const {
-  return lit_.front[lit] < 1.0F && lit_.form_factor[lit] > solver::kNearEdge * lit_.front[lit];
+  const float front = lit_.front[lit];
+  return front < 1.0F && lit_.form_factor[lit] > solver::kNearEdge * front;
 }
 
 void LightGatherer::addEdge(std::size_t lit) {
@@ -81,18 +67,15 @@ void LightGatherer::lookFromEdges(const solver::GatherShot& shot, const solver::
     const auto i = edge.lit;
     const glm::vec3 at(lit_.x[i], lit_.y[i], lit_.z[i]), normal(lit_.nx[i], lit_.ny[i], lit_.nz[i]);
     Draw draw(point.origin, at);
-    glm::vec3 chosen(0.0F);
-    float sum = 0.0F;
-    for (std::size_t k = 0; k < kCandidates; ++k) {
-      const auto candidate = drawPoint(parts_[edge.part], draw);
-      const auto way = candidate - at;
-      const float square = glm::dot(way, way);
-      const float weight = std::max(0.0F, glm::dot(way, normal)) * std::max(0.0F, -glm::dot(way, shot.normal)) /
-                           std::max(square * square, 1e-30F);
-      sum += weight;
-      if (draw.next() * sum < weight) chosen = way;
-    }
-    if (sum > 0.0F && !receivers_->isBlocked({at, normal, chosen, 1.0F, 0.0F})) edge.seen[half] += 1.0F;
+    const auto& part = parts_[edge.part];
+    const solver::PolygonDirections directions(at, normal, std::span(part.corner.data(), part.count));
+    const auto direction = directions.draw([&draw] { return draw.next(); });
+    const glm::dvec3 light_normal(shot.normal);
+    const double along = glm::dot(light_normal, glm::dvec3(part.corner[0]) - glm::dvec3(at));
+    const double slope = glm::dot(light_normal, direction);
+    if (slope >= 0.0 || along >= 0.0) continue;
+    if (!receivers_->isBlocked({at, normal, glm::vec3(direction * (along / slope)), 1.0F, 0.0F}))
+      edge.seen[half] += 1.0F;
   }
 }
 

@@ -227,6 +227,7 @@ void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers
   if (!whole) weighWhole(shot);
   const std::size_t begin = lit_count_;
   const auto ball = nearBall(corners, surface, plane.du);
+  const bool may_have_edges = mayHaveEdges(shot);
   const auto add = [&](const Receivers::Receiver& receiver) {
     forEachPlace(shot, ball, *receivers_, receiver, [&](const Receivers::Place& place, float share) {
       const auto normal = surface.planar ? plane_normal : group.side * place.frame->normal;
@@ -235,7 +236,7 @@ void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers
         if (form_factor.value <= 0.0) return;
         lit_.form_factor[lit_count_] = static_cast<float>(form_factor.value * shining(shot.fill, form_factor.front));
         lit_.front[lit_count_] = frontOfShining(shot.fill, form_factor.front);
-        if (isEdge(lit_count_)) {
+        if (may_have_edges && isEdge(lit_count_)) {
           parts_.push_back(clipToPlane(corners, place.point, normal));
           addEdge(lit_count_);
         }
@@ -277,7 +278,7 @@ void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers
     for (std::size_t k = begin; k < lit_count_; ++k) {
       lit_.form_factor[k] *= static_cast<float>(shining(shot.fill, kept));
       lit_.front[k] = frontOfShining(shot.fill, kept);
-      if (isEdge(k)) addEdge(k);
+      if (may_have_edges && isEdge(k)) addEdge(k);
     }
     if (edges_.empty() || edges_.back().part + 1 < parts_.size()) parts_.pop_back();
   }

@@ -1,5 +1,5 @@
-// Receivers whose plane cuts off all of a shooter but a small part that is near to them. They look at points of that
-// part instead of the shooter's own (server/gpu/light_gatherer_edge.cpp), which edits have to know.
+// Receivers whose plane cuts off part of a shooter, where what it leaves is near to them. They look at places of that
+// part instead of the shooter's own points (server/gpu/light_gatherer_edge.cpp), which edits have to know.
 #pragma once
 
 #include <algorithm>

@@ -15,6 +15,7 @@
 
 #include "tests/accuracy/compare.h"
 #include "tests/accuracy/reference_store.h"
+#include "tests/accuracy/solve_run.h"
 
 namespace {
 
@@ -63,18 +64,6 @@ void printWorst(const radiosity::accuracy::LitScene& lit, const radiosity::accur
   }
 }
 
-/// As `radiosity solve --sky` had it: grey, one colour, or one above and one below the horizon; nits.
-void setSky(const std::vector<double>& nits, radiosity::accuracy::LitScene& lit) {
-  if (nits.empty()) return;
-  if (nits.size() != 1 && nits.size() != 3 && nits.size() != 6)
-    throw std::invalid_argument("--sky takes 1, 3 or 6 numbers");
-  const auto colour = [&](std::size_t first) {
-    return nits.size() == 1 ? glm::dvec3(nits[0]) : glm::dvec3(nits[first], nits[first + 1], nits[first + 2]);
-  };
-  lit.scene.sky_upper = colour(0);
-  lit.scene.sky_lower = colour(nits.size() == 6 ? 3 : 0);
-}
-
 /// Without light nothing can be wrong, and every lightmap would pass.
 void requireLight(const radiosity::accuracy::Reference& reference) {
   const auto isLit = [](const radiosity::accuracy::Reference::TexelMean& texel) {
@@ -91,7 +80,7 @@ int main(int argc, char** argv) {
   std::string file;
   radiosity::accuracy::ReferenceOptions options;
   bool json = false;
-  std::vector<double> sky;
+  std::string sky;
   std::size_t worst = 0;
   std::string folder;
   app.add_option("LIT.glb", file, "output of `radiosity solve`")->required()->check(CLI::ExistingFile);
@@ -100,8 +89,7 @@ int main(int argc, char** argv) {
   app.add_option("--points", options.points, "surface points for the total error")->capture_default_str();
   app.add_option("--seed", options.seed)->capture_default_str();
   app.add_flag("--closed-form", options.closed_form, "take the exact value, without noise, where the scene has one");
-  app.add_option("--sky", sky, "the sky it was solved under: 1, 3 or 6 numbers with commas between, nits")
-      ->delimiter(',');
+  app.add_option("--sky", sky, "the sky it was solved under, as `radiosity solve` takes it; a scene's own comes first");
   app.add_flag("--json", json, "print JSON");
   app.add_option("--worst", worst, "show the texels with most of the squared error");
   app.add_option("--references", folder, "folder where references are kept between runs; empty: not kept");
@@ -109,7 +97,7 @@ int main(int argc, char** argv) {
   options.point_samples = options.texel_samples;
   try {
     auto lit = radiosity::accuracy::readLitScene(file);
-    setSky(sky, lit);
+    if (!sky.empty()) radiosity::accuracy::setSky(sky, lit);
     const auto reference = folder.empty() ? radiosity::accuracy::makeReference(lit, options)
                                           : radiosity::accuracy::findReference(lit, options, folder).reference;
     requireLight(reference);

@@ -12,6 +12,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "protocol/sky.h"
+
 namespace radiosity::accuracy {
 namespace {
 
@@ -64,6 +66,16 @@ SolveRun runSolve(const std::filesystem::path& client, const std::filesystem::pa
   run.last_line = lastLine(log);
   if (std::ifstream in(report); in) run.report = nlohmann::json::parse(in);
   return run;
+}
+
+void setSky(const std::string& option, LitScene& lit) {
+  const auto sky = protocol::parseSky(option);
+  if (!sky) throw std::invalid_argument(sky.error().text());
+  if (lit.scene.has_sky) return;
+  const auto& [upper, lower] = *sky;
+  lit.scene.sky_upper = {upper[0], upper[1], upper[2]};
+  lit.scene.sky_lower = {lower[0], lower[1], lower[2]};
+  lit.scene.has_sky = true;
 }
 
 }  // namespace radiosity::accuracy

@@ -23,4 +23,8 @@ struct SolveRun {
 [[nodiscard]] SolveRun runSolve(const std::filesystem::path& client, const std::filesystem::path& scene,
                                 const std::filesystem::path& folder, const std::vector<std::string>& arguments);
 
+/// Lights a scene as `radiosity solve --sky OPTION` had it; as there, a sky of the scene's own comes first. Throws
+/// std::invalid_argument for an option that is none.
+void setSky(const std::string& option, LitScene& lit);
+
 }  // namespace radiosity::accuracy

@@ -1,70 +1,20 @@
 // Direct light gathered at leaves: exact where nothing is in between, exact umbra, penumbra and energy.
 #include <gtest/gtest.h>
-#include <span>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
+#include <span>
 
-#include "server/gpu/gpu_transport.h"
 #include "server/scene/coverage.h"
 #include "server/solver/polygon_form_factor.h"
-#include "tests/gl/scene_builder.h"
+#include "tests/gl/gather_fixture.h"
 #include "tests/unit/scene/shapes.h"
 
 namespace radiosity::test {
 namespace {
-
-/// A gather shot of a quad surface with points on a jittered grid.
-solver::ShotBatch gatherFrom(const scene::PatchScene& scene, std::uint32_t surface, std::uint32_t points_a_side,
-                             std::mt19937& random) {
-  const auto& chart = scene.surfaces[surface];
-  const auto first_vertex = scene.indices[3 * static_cast<std::size_t>(chart.first_triangle)];
-  solver::ShotBatch batch;
-  batch.flux_scale = kFluxScale;
-  solver::GatherShot shot;
-  shot.corner_count = 4;
-  for (std::uint32_t i = 0; i < 4; ++i) shot.corners[i] = scene.vertices[first_vertex + i].position;
-  shot.normal = scene.triangles[chart.first_triangle].normal;
-  shot.radiosity = {1.0, 2.0, 0.0};
-  shot.point_count = points_a_side * points_a_side;
-  std::uniform_real_distribution<float> unit(0.0F, 1.0F);
-  for (std::uint32_t i = 0; i < shot.point_count; ++i) {
-    const auto side = static_cast<float>(points_a_side);
-    const float u = (static_cast<float>(i % points_a_side) + unit(random)) / side;
-    const float v = (static_cast<float>(i / points_a_side) + unit(random)) / side;
-    batch.points.push_back(shotFrom(scene, surface, u, v, 64, random).frame);
-  }
-  batch.gather = {shot};
-  return batch;
-}
-
-/// Irradiance of leaf (x, y), channel 0.
-double irradiance(const scene::PatchScene& scene, const solver::FluxAccumulators& flux, std::uint32_t surface,
-                  std::uint32_t x, std::uint32_t y) {
-  const auto& chart = scene.surfaces[surface];
-  const auto id = chart.first_node[0] + y * chart.width + x;
-  return static_cast<double>(flux.node[0][id][0]) / kFluxScale / static_cast<double>(scene.node_area[id]);
-}
-
-class Gather : public ::testing::Test {
- protected:
-  void SetUp() override {
-    auto made = gpu::makeInProcessTransport();
-    if (!made) GTEST_SKIP() << made.error().text();
-    transport_ = std::move(*made);
-  }
-  solver::FluxAccumulators run(const std::shared_ptr<const scene::PatchScene>& scene, const solver::ShotBatch& batch) {
-    EXPECT_TRUE(transport_->setScene(scene).has_value());
-    auto flux = accumulators(*scene);
-    const auto counters = transport_->run(batch, flux);
-    EXPECT_TRUE(counters.has_value()) << counters.error().text();
-    return flux;
-  }
-  std::unique_ptr<solver::Transport> transport_;
-};
 
 TEST(PolygonFormFactor, MatchesTheClosedFormOfAPointFacingARectangle) {
   // receiver under the corner of an a x b rectangle at distance c
@@ -135,44 +85,6 @@ TEST_F(Gather, OfALampThatAWallsPlaneCutsThePartInFrontIsReceived) {
   EXPECT_GT(exact, 0.5);
   // The point lies in front in three of five shots, binomially: standard error sqrt(0.4 / 0.6 / 400) = 4 %.
   EXPECT_NEAR(all / exact, 1.0, 0.12);
-}
-
-// A floor that reaches out from under a wall: a twentieth of it lies before the wall's plane, at its foot, where the
-// wall sees all of it, and a seventieth past a skirting board. One point on the floor tells, wherever it lies.
-TEST_F(Gather, AWallLooksItselfAtTheFewOfALightThatLieAtItsFoot) {
-  for (const bool covered : {false, true}) {
-    SceneBuilder builder;
-    const auto wall = builder.add({{0.0F, -0.3F, 0.001F}, {0, 0, 0.1F}, {0, 0.6F, 0}, 2, 12});  // faces -x
-    const auto floor = builder.add({{-0.02F, -0.3F, 0.0F}, {0.4F, 0, 0}, {0, 0.6F, 0}, 1, 1});
-    if (covered) builder.add({{-0.002F, -0.5F, 0.0F}, {0, 1, 0}, {0, 0, 0.5F}, 1, 1});
-    const auto scene = builder.build();
-    const auto& chart = scene->surfaces[wall];
-    const auto& frame = scene->triangles[chart.first_triangle];
-    ASSERT_LT(frame.normal.x, -0.99F);
-    std::mt19937 random(5);
-    double sum = 0.0, exact = 0.0;
-    for (int i = 0; i < 20; ++i) {
-      auto batch = gatherFrom(*scene, floor, 1, random);
-      batch.gather[0].receiver_jitter = {0.5F, 0.5F};
-      const auto flux = run(scene, batch);
-      for (std::uint32_t k = 0; k < 12; ++k) {
-        const auto received = irradiance(*scene, flux, wall, 0, k);
-        const auto at = frame.origin + 0.5F * frame.du + (static_cast<float>(k) + 0.5F) * frame.dv;
-        const auto expected =
-            solver::polygonFormFactor(glm::dvec3(at), glm::dvec3(frame.normal),
-                                      std::span(batch.gather[0].corners).first(batch.gather[0].corner_count));
-        sum += received;
-        exact += expected;
-        if (covered) continue;
-        EXPECT_NEAR(received, expected, 1e-3 * expected) << i << ", " << k;
-      }
-    }
-    EXPECT_GT(exact, 1.0);
-    // 240 rays of which one in seventy arrives: standard error 0.008.
-    if (covered) {
-      EXPECT_NEAR(sum / exact, 0.0145, 0.04);
-    }
-  }
 }
 
 // Many texels away: what is near looks from two places.

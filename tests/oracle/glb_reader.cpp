@@ -178,6 +178,8 @@ class Reader {
     const auto extras = gltf_.value("extras", json::object());
     if (!extras.is_object() || !extras.contains("radiositySky")) return;
     const auto& sky = extras["radiositySky"];
+    if (sky.is_null()) return;
+    scene_.has_sky = true;
     scene_.sky_upper = vector3(sky.at("upper"));
     scene_.sky_lower = sky.contains("lower") ? vector3(sky["lower"]) : scene_.sky_upper;
   }

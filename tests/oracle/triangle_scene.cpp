@@ -69,6 +69,7 @@ TriangleScene triangulate(const test_scenes::TestScene& scene) {
   }
   result.sky_upper = scene.sky_upper_nits;
   result.sky_lower = scene.sky_lower_nits;
+  result.has_sky = scene.sky_upper_nits != glm::dvec3(0.0) || scene.sky_lower_nits != glm::dvec3(0.0);
   return result;
 }
 

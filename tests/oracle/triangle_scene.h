@@ -55,6 +55,7 @@ struct TriangleScene {
   std::vector<Texture> textures;
   std::vector<Lamp> lamps;
   glm::dvec3 sky_upper{0.0}, sky_lower{0.0};  ///< radiance from above and from below the horizon (+Y), nits
+  bool has_sky = false;                       ///< the file names one, be it black
   std::vector<std::string> node_names;
   std::vector<std::string> warnings;  ///< what the reader does not model (textures, blending), named
 };

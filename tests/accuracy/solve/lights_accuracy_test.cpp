@@ -224,8 +224,7 @@ TEST(SolvedLights, AlphaBlendModeTestUnderASkyMatchesThePathTracer) {
   const auto solved =
       solveFile(file, {"--error", "0.03", "--time-limit", "60", "--texels", "6000", "--sky", "1000/300"});
   auto compared = solved;
-  compared.lit.scene.sky_upper = glm::dvec3(1000.0);
-  compared.lit.scene.sky_lower = glm::dvec3(300.0);
+  setSky("1000/300", compared.lit);
   // Labels lie on the sloping front of the bed, one on another, closer than single precision tells apart: what is below
   // them is not seen and not compared. They stay in the scene.
   for (auto& triangle : compared.lit.scene.triangles) {
