@@ -2,6 +2,7 @@
 // server/solver/polygon_form_factor.h is the plain version, which the tests hold this one against.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <glm/vec3.hpp>
@@ -18,6 +19,12 @@ struct ClippedPolygon {
 /// The part of the polygon in front of the plane through `point` with `normal`. In double inside.
 [[nodiscard]] ClippedPolygon clipToPlane(std::span<const glm::vec3> corners, const glm::vec3& point,
                                          const glm::vec3& normal);
+
+/// How much of the part of a polygon in front of a receiver shines where of the whole polygon `fill` does: not more
+/// than all. `front`: that part, of the polygon's area.
+[[nodiscard]] inline double shining(double fill, double front) {
+  return front > 0.0 ? std::min(1.0, fill / front) : 1.0;
+}
 
 /// Receivers at (x, y, z)[i], all with the same normal, in the plane that `polygon` was clipped to. form_factor[i] in
 /// [0, 1]; about 1e-7 absolute.

@@ -96,14 +96,16 @@ class LightGatherer {
   void findVisibility(std::size_t sums, std::size_t points);
   [[nodiscard]] double delivered() const;
   [[nodiscard]] double conserve(double area, double kept) const;
-  /// Whether any do: not where part of the polygon is missing, which the light that arrives does not tell (a wall would
-  /// be lit by a hole), nor where light passes through surfaces, which rays do not.
-  [[nodiscard]] bool mayHaveEdges(const solver::GatherShot& shot) const;
-  /// Whether this one of those lit looks for itself at the part of the polygon before its plane.
-  [[nodiscard]] bool isEdge(std::size_t lit) const;
+  void weighPart(const solver::GatherShot& shot, std::size_t lit, double front);
+  /// Whether this one of those lit, before whose plane the part `front` of the polygon lies, looks for itself. Not
+  /// where light passes through surfaces, which rays do not.
+  [[nodiscard]] bool isEdge(const solver::GatherShot& shot, std::size_t lit, double front) const;
   /// It does, at the last of parts_.
   void addEdge(std::size_t lit);
   void clearEdges();
+  /// How much of the leaf that `place` on the polygon lies in shines.
+  [[nodiscard]] double shiningAt(const solver::GatherShot& shot, const glm::vec3& place, const glm::vec3& at,
+                                 const glm::vec3& normal) const;
   void beginEdges();
   void lookFromEdges(const solver::GatherShot& shot, const solver::HemicubeFrame& point, std::size_t half);
   void takeEdges(std::size_t half, std::size_t points);

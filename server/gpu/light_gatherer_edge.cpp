@@ -3,12 +3,15 @@
 // When it does, it would count for all those that do not, and make one texel far too bright. And of many points the few
 // that are nearest to the receiver would tell of them all. So the receiver asks by rays, one for each point, drawn as
 // the light of the part itself would arrive.
+#include <array>
 #include <bit>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include "server/gpu/light_gatherer.h"
 #include "server/solver/near_edge.h"
 #include "server/solver/polygon_directions.h"
+#include "server/solver/polygon_form_factor.h"
 
 namespace radiosity::gpu {
 namespace {
@@ -37,15 +40,43 @@ class Draw {
   std::uint32_t state_ = 0;
 };
 
-}  // namespace
+/// A leaf that shines so far shines everywhere: areas are in single precision.
+constexpr double kWhole = 0.998;
 
-bool LightGatherer::mayHaveEdges(const solver::GatherShot& shot) const {
-  return shot.fill >= 1.0F && receivers_->patches().opacity.empty();
+/// In leaves from the origin of the frame, whose axes need not be at right angles.
+glm::vec2 texelAt(const scene::TriangleFrame& frame, const glm::vec3& place) {
+  const glm::dvec3 du(frame.du), dv(frame.dv), way = glm::dvec3(place) - glm::dvec3(frame.origin);
+  const double uu = glm::dot(du, du), uv = glm::dot(du, dv), vv = glm::dot(dv, dv);
+  const double u = glm::dot(way, du), v = glm::dot(way, dv), under = uu * vv - uv * uv;
+  return {(u * vv - v * uv) / under, (v * uu - u * uv) / under};
 }
 
-bool LightGatherer::isEdge(std::size_t lit) const {
-  const float front = lit_.front[lit];
-  return front < 1.0F && lit_.form_factor[lit] > solver::kNearEdge * front;
+}  // namespace
+
+bool LightGatherer::isEdge(const solver::GatherShot& shot, std::size_t lit, double front) const {
+  if (shot.fill < 1.0F && shot.triangle == scene::kNone) return false;
+  return front < 1.0 && static_cast<double>(lit_.form_factor[lit]) > static_cast<double>(solver::kNearEdge) * front &&
+         receivers_->patches().opacity.empty();
+}
+
+/// How much of the leaf that `place` on the polygon lies in shines, of the part of it before the plane of the receiver
+/// at `at`: 0 in a hole.
+double LightGatherer::shiningAt(const solver::GatherShot& shot, const glm::vec3& place, const glm::vec3& at,
+                                const glm::vec3& normal) const {
+  const auto& patches = receivers_->patches();
+  const auto& frame = patches.triangles[shot.triangle];
+  const auto& surface = patches.surfaces[patches.triangle_surface[shot.triangle]];
+  const auto texel = glm::floor(texelAt(frame, place));
+  const auto width = static_cast<float>(surface.width), height = static_cast<float>(surface.height);
+  if (!(texel.x >= 0.0F && texel.x < width && texel.y >= 0.0F && texel.y < height)) return 0.0;
+  const auto leaf = static_cast<std::uint32_t>(texel.y) * surface.width + static_cast<std::uint32_t>(texel.x);
+  const auto corner = frame.origin + texel.x * frame.du + texel.y * frame.dv;
+  const std::array corners{corner, corner + frame.du, corner + frame.du + frame.dv, corner + frame.dv};
+  const double area = solver::polygonArea(corners);
+  const double fill = static_cast<double>(patches.node_area[surface.first_node[shot.side] + leaf]) / area;
+  if (fill <= 0.0 || fill >= kWhole) return fill;
+  const auto before = clipToPlane(corners, at, normal);
+  return shining(fill, solver::polygonArea(std::span(before.corner.data(), before.count)) / area);
 }
 
 void LightGatherer::addEdge(std::size_t lit) {
@@ -74,8 +105,9 @@ void LightGatherer::lookFromEdges(const solver::GatherShot& shot, const solver::
     const double along = glm::dot(light_normal, glm::dvec3(part.corner[0]) - glm::dvec3(at));
     const double slope = glm::dot(light_normal, direction);
     if (slope >= 0.0 || along >= 0.0) continue;
-    if (!receivers_->isBlocked({at, normal, glm::vec3(direction * (along / slope)), 1.0F, 0.0F}))
-      edge.seen[half] += 1.0F;
+    const glm::vec3 way(direction * (along / slope));
+    if (shot.fill < 1.0F && draw.next() >= shiningAt(shot, at + way, at, normal)) continue;
+    if (!receivers_->isBlocked({at, normal, way, 1.0F, 0.0F})) edge.seen[half] += 1.0F;
   }
 }
 

@@ -41,12 +41,6 @@ bool sameGeometry(const solver::GatherShot& a, const solver::GatherShot& b) {
          a.fill == b.fill;
 }
 
-/// How much of the part of a polygon in front of a receiver shines where of the whole polygon `fill` does: not more
-/// than all. `front`: that part, of the polygon's area.
-double shining(float fill, double front) {
-  return front > 0.0 ? std::min(1.0, static_cast<double>(fill) / front) : 1.0;
-}
-
 /// How much of what shines lies in front, then.
 float frontOfShining(float fill, double front) {
   return static_cast<float>(std::min(1.0, front / static_cast<double>(fill)));
@@ -210,6 +204,12 @@ void LightGatherer::shareAmongPlaces(std::size_t begin) {
   for (std::size_t k = begin; k < lit_count_; ++k) lit_.form_factor[k] *= lit_.share[k];
 }
 
+/// A receiver before whose plane only part of the polygon lies.
+void LightGatherer::weighPart(const solver::GatherShot& shot, std::size_t lit, double front) {
+  lit_.form_factor[lit] *= static_cast<float>(shining(static_cast<double>(shot.fill), front));
+  lit_.front[lit] = frontOfShining(shot.fill, front);
+}
+
 void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers::Group& group) {
   const auto& surface = receivers_->patches().surfaces[group.surface];
   const auto& plane = receivers_->patches().triangles[surface.first_triangle];
@@ -227,18 +227,18 @@ void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers
   if (!whole) weighWhole(shot);
   const std::size_t begin = lit_count_;
   const auto ball = nearBall(corners, surface, plane.du);
-  const bool may_have_edges = mayHaveEdges(shot);
   const auto add = [&](const Receivers::Receiver& receiver) {
     forEachPlace(shot, ball, *receivers_, receiver, [&](const Receivers::Place& place, float share) {
       const auto normal = surface.planar ? plane_normal : group.side * place.frame->normal;
       if (!surface.planar) {
         const auto form_factor = solver::formFactorInFront(place.point, normal, corners);
         if (form_factor.value <= 0.0) return;
-        lit_.form_factor[lit_count_] = static_cast<float>(form_factor.value * shining(shot.fill, form_factor.front));
-        lit_.front[lit_count_] = frontOfShining(shot.fill, form_factor.front);
-        if (may_have_edges && isEdge(lit_count_)) {
+        lit_.form_factor[lit_count_] = static_cast<float>(form_factor.value);
+        if (isEdge(shot, lit_count_, form_factor.front)) {
           parts_.push_back(clipToPlane(corners, place.point, normal));
           addEdge(lit_count_);
+        } else {
+          weighPart(shot, lit_count_, form_factor.front);
         }
       }
       lit_.share[lit_count_] = share;
@@ -276,9 +276,11 @@ void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers
         solver::polygonArea(std::span(polygon.corner.data(), polygon.count)) / solver::polygonArea(corners);
     parts_.push_back(polygon);
     for (std::size_t k = begin; k < lit_count_; ++k) {
-      lit_.form_factor[k] *= static_cast<float>(shining(shot.fill, kept));
-      lit_.front[k] = frontOfShining(shot.fill, kept);
-      if (may_have_edges && isEdge(k)) addEdge(k);
+      if (isEdge(shot, k, kept)) {
+        addEdge(k);
+      } else {
+        weighPart(shot, k, kept);
+      }
     }
     if (edges_.empty() || edges_.back().part + 1 < parts_.size()) parts_.pop_back();
   }

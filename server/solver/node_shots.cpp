@@ -127,6 +127,8 @@ void NodeShots::addGather(const NodePlace& node, std::size_t half, std::uint32_t
   const double area = areaOf(node, polygon);
   const auto shining = static_cast<double>(patches_.node_area[nodeId(side, node)]);
   shot.fill = whole ? 1.0F : static_cast<float>(std::min(1.0, shining / area));
+  shot.triangle = flatTriangle(node);
+  shot.side = side.side;
   shot.resolution = resolution;
   const std::uint64_t node_key = mixKeys(key(node), half);
   // The halves look at opposite places of a texel: what is linear in it cancels in their mean and shows in their

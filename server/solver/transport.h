@@ -83,10 +83,12 @@ struct GatherShot {
   std::uint32_t corner_count = 3;  ///< 3 to kMaxCorners, counter-clockwise seen from the lit side
   glm::vec3 normal{0.0F};
   std::array<double, 3> radiosity{};  ///< signed, lm/m^2, times the shot's weight in the average
-  /// The part of the polygon that shines, when something covers the rest (a floor under a block). Nobody knows which
-  /// part; a receiver whose horizon cuts the polygon is taken to see the shining part first, as the block's own sides
-  /// do.
+  /// The part of the polygon that shines, when something covers the rest (a floor under a block) or nothing is there.
+  /// Which part is not known from afar; a receiver whose horizon cuts the polygon is taken to see the shining part
+  /// first, as the block's own sides do. Receivers close by find it out from the leaves.
   float fill = 1.0F;
+  std::uint32_t triangle = scene::kNone;  ///< its frame is that of the leaves under the polygon; kNone: there are none
+  std::uint32_t side = 0;                 ///< of the triangle's surface: 0 front, 1 back
   std::uint32_t resolution = 128;
   glm::vec2 receiver_jitter{0.5F};  ///< where in a leaf the receiving point lies (PatchScene::spotAt)
   std::uint32_t spot_row =
