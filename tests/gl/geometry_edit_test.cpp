@@ -171,6 +171,18 @@ TEST_F(GeometryEdit, WhatIsGoneOrAddedMendsTheLinksThatMeasuringAllFinds) {
                    {{"op", "add"}, {"path", "/scenes/0/nodes/-"}, {"value", before_.document.gltf["nodes"].size()}}}));
 }
 
+// Where receivers look past their planes' edges, and at floor of which part is covered: beside a wall, a hair's breadth
+// further, thin as a leaf, and tilted into the floor.
+TEST_F(GeometryEdit, WhatStandsBesideAWallMendsTheLinksThatMeasuringAllFinds) {
+  settings_.seed = 3;
+  start(test::blockRoom());
+  expectMendedIsMeasured(replaced("/nodes/2/translation", {0.301, 0.0, 0.302}));
+  expectMendedIsMeasured(replaced("/nodes/2/scale", {0.02, 2.2, 0.02}));
+  expectMendedIsMeasured(replaced("/nodes/2/rotation", {0.0871557, 0.0, 0.0, 0.9961947}));
+  before_ = edited(before_, replaced("/nodes/2/translation", {0.31, 0.03, 0.6}));
+  expectMendedIsMeasured(replaced("/nodes/2/translation", {0.3105, 0.03, 0.6}));
+}
+
 /// A room full of chairs, of which one is moved.
 class ChairEdit : public GeometryEdit {
  protected:
