@@ -11,6 +11,7 @@
 #include <optional>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 
 #include "tests/oracle/burial.h"
 #include "tests/oracle/directions.h"
@@ -200,9 +201,14 @@ class PathTracer::Scene {
   [[nodiscard]] glm::dvec3 lifted(const Point& point) const { return toUnit(point.position) + point.normal * kLift; }
 
   [[nodiscard]] std::optional<Hit> trace(const Point& from, const glm::dvec3& direction) const {
-    auto query = embreeRay(lifted(from), direction, std::numeric_limits<double>::infinity());
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
+    return trace(from, direction, context);
+  }
+
+  [[nodiscard]] std::optional<Hit> trace(const Point& from, const glm::dvec3& direction,
+                                         RTCIntersectContext& context) const {
+    auto query = embreeRay(lifted(from), direction, std::numeric_limits<double>::infinity());
     rtcIntersect1(scene_, &context, &query);
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
     Hit hit;
@@ -217,37 +223,66 @@ class PathTracer::Scene {
     return hit;
   }
 
-  /// The nearest surface that stops the ray: each that it meets does so with the probability of its opacity there.
-  [[nodiscard]] std::optional<Hit> traceThrough(const Point& from, const glm::dvec3& direction, Random& random) const {
-    Point at = from;
-    for (int met = 0;; ++met) {
-      auto hit = trace(at, direction);
-      if (!hit || met == kMaxLayers || random.uniform() < opacityAt(*hit)) {
-        if (hit) hit->distance = glm::length(hit->point.position - from.position);
-        return hit;
-      }
-      at = {hit->point.position, -hit->point.normal};  // lifted off the far side
+  /// Embree hands the context to the filter.
+  struct Passing {
+    RTCIntersectContext context;
+    const Scene* scene;
+    std::uint64_t seed;
+  };
+
+  /// What it meets lets the ray through with the probability of its transmittance there. Embree may ask for a triangle
+  /// more than once, in any order: the answer is the triangle's own.
+  static void letThrough(const RTCFilterFunctionNArguments* arguments) {
+    const auto& passing = *reinterpret_cast<const Passing*>(arguments->context);
+    for (unsigned i = 0; i < arguments->N; ++i) {
+      if (arguments->valid[i] != -1) continue;
+      const auto t = RTCHitN_primID(arguments->hit, arguments->N, i);
+      const auto& triangle = passing.scene->triangles_[t];
+      if (!triangle.see_through) continue;
+      const auto u = static_cast<double>(RTCHitN_u(arguments->hit, arguments->N, i));
+      const auto v = static_cast<double>(RTCHitN_v(arguments->hit, arguments->N, i));
+      Random random(Random::seedFrom(passing.seed, t, 0));
+      if (random.uniform() >= passing.scene->opacityAt(triangle, u, v)) arguments->valid[i] = 0;
     }
   }
 
-  [[nodiscard]] double opacityAt(const Hit& hit) const {
-    return opacityAt(triangles_[hit.triangle], hit.point.position);
+  /// The nearest surface that stops the ray: each that it meets does so with the probability of its opacity there, also
+  /// where several lie in one place.
+  [[nodiscard]] std::optional<Hit> traceThrough(const Point& from, const glm::dvec3& direction, Random& random) const {
+    Passing passing{{}, this, random.next()};
+    rtcInitIntersectContext(&passing.context);
+    passing.context.filter = &Scene::letThrough;
+    return trace(from, direction, passing.context);
   }
 
   [[nodiscard]] double opacityAt(const Triangle& triangle, const glm::dvec3& position) const {
+    const auto [u, v] = weightsAt(triangle, position);
+    return opacityAt(triangle, u, v);
+  }
+
+  /// (u, v): weights of its second and third corner.
+  [[nodiscard]] double opacityAt(const Triangle& triangle, double u, double v) const {
     if (!triangle.see_through) return 1.0;
-    double alpha = triangle.alpha * textureAt(triangle, position).w;
+    double alpha = triangle.alpha * textureAt(triangle, u, v).w;
     if (triangle.cutoff >= 0.0) alpha = alpha >= triangle.cutoff ? 1.0 : 0.0;
     return alpha * (1.0 - triangle.transmission);
   }
 
-  [[nodiscard]] glm::dvec4 textureAt(const Triangle& triangle, const glm::dvec3& position) const {
-    if (triangle.texture < 0) return glm::dvec4(1.0);
+  [[nodiscard]] static std::pair<double, double> weightsAt(const Triangle& triangle, const glm::dvec3& position) {
     const auto& [a, b, c] = triangle.corners;
     const auto normal = glm::cross(b - a, c - a);
     const double square = glm::dot(normal, normal);
-    const double u = glm::dot(glm::cross(position - a, c - a), normal) / square;
-    const double v = glm::dot(glm::cross(b - a, position - a), normal) / square;
+    return {glm::dot(glm::cross(position - a, c - a), normal) / square,
+            glm::dot(glm::cross(b - a, position - a), normal) / square};
+  }
+
+  [[nodiscard]] glm::dvec4 textureAt(const Triangle& triangle, const glm::dvec3& position) const {
+    const auto [u, v] = weightsAt(triangle, position);
+    return textureAt(triangle, u, v);
+  }
+
+  [[nodiscard]] glm::dvec4 textureAt(const Triangle& triangle, double u, double v) const {
+    if (triangle.texture < 0) return glm::dvec4(1.0);
     const auto& uv = triangle.texture_uv;
     return textures_[static_cast<std::size_t>(triangle.texture)].at(uv[0] * (1.0 - u - v) + uv[1] * u + uv[2] * v);
   }
@@ -256,7 +291,7 @@ class PathTracer::Scene {
   [[nodiscard]] bool onHole(const Point& point) const {
     const Point above{point.position + point.normal * (4.0 * kLift / scale_), -point.normal};
     const auto hit = trace(above, -point.normal);
-    return hit && triangles_[hit->triangle].see_through && opacityAt(*hit) <= 0.0;
+    return hit && opacityAt(triangles_[hit->triangle], hit->point.position) <= 0.0;
   }
 
   [[nodiscard]] bool sees(const Point& a, const Point& b, Random& random) const {
@@ -418,7 +453,6 @@ class PathTracer::Scene {
 
   static constexpr double kLift = 2e-6;  // of a box of size 2
   static constexpr double kAllCovered = 0.999;
-  static constexpr int kMaxLayers = 1000;  // that a ray may pass through
 
   std::vector<Triangle> triangles_;
   std::vector<Texture> textures_;
