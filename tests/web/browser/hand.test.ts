@@ -130,7 +130,7 @@ it('saves files that are what their names say', async () => {
   const served = Buffer.from(await (await fetch(`${server.url}/lightmaps/0.exr`)).arrayBuffer());
   expect(exr.equals(served)).toBe(true);
 
-  const [, snapshot] = await save("Server's picture (.png)");
+  const [, snapshot] = await save('Server snapshot (.png)');
   expect(snapshot.subarray(0, 8)).toEqual(PNG);
   expect(sizeOf(snapshot)).toEqual([1920, 1080]);
 });
@@ -150,10 +150,10 @@ it('takes a number with a comma, and says so where there is none', async () => {
   expect(changed.targetError).toBeCloseTo(0.019, 12);
   await goal.fill('half');
   await goal.press('Enter');
-  await said(page, /^“half” cannot stand there$/);
+  await said(page, /^“half” is not accepted: enter a percentage above 0, up to 100$/);
   expect(await goal.inputValue()).toBe('1.9');
   // What the server refuses does not stay in the field either.
-  const texels = page.getByLabel('Texels, about');
+  const texels = page.getByLabel('Texels, approx.');
   const before = await texels.inputValue();
   await texels.fill('1e15');
   await texels.press('Enter');

@@ -6,6 +6,10 @@ describe('the legend of false colours', () => {
   it('says of its ends that what lies beyond has their colour', () => {
     expect(scaleLabels(0.1, 1000)).toEqual(['≤ 0.1', '1', '10', '100', '≥ 1,000']);
   });
+
+  it('writes small values as the light meter does, fewer of them, as they are long', () => {
+    expect(scaleLabels(3.4e-6, 3.4e-4)).toEqual(['≤ 3.4 × 10⁻⁶', '3.4 × 10⁻⁵', '≥ 3.4 × 10⁻⁴']);
+  });
 });
 
 describe('the plot of error against time', () => {

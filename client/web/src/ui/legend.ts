@@ -4,13 +4,18 @@ import { MIP_STOPS, paletteCss } from '../view/palette';
 import { h, measured, readable, withError } from './dom';
 
 const LABELS = 5;
+/** Of those that are written as multiples of powers of ten. */
+const LONG_LABELS = 3;
 
 /** Of colours on a logarithmic scale. The first and the last colour are those of all that lies beyond it, too, as lamps do. */
 export function scaleLabels(low: number, high: number): string[] {
-  return Array.from({ length: LABELS }, (_, i) => {
-    const sign = i === 0 ? '≤ ' : i === LABELS - 1 ? '≥ ' : '';
-    return sign + readable(low * (high / low) ** (i / (LABELS - 1)), 2);
-  });
+  const labels = (count: number) =>
+    Array.from({ length: count }, (_, i) => {
+      const sign = i === 0 ? '≤ ' : i === count - 1 ? '≥ ' : '';
+      return sign + readable(low * (high / low) ** (i / (count - 1)), 2);
+    });
+  const all = labels(LABELS);
+  return all.some((label) => label.includes('×')) ? labels(LONG_LABELS) : all;
 }
 
 export class Legend {
@@ -19,7 +24,7 @@ export class Legend {
   private readonly title = h('div', { class: 'title' });
   readonly element = h(
     'figure',
-    { class: 'legend card', 'aria-label': 'Scale of colours', hidden: true },
+    { class: 'legend card', 'aria-label': 'Colour scale', hidden: true },
     this.title,
     this.bar,
     this.ticks,
@@ -35,7 +40,7 @@ export class Legend {
 
   showMips(): void {
     const labels = MIP_STOPS.map((_, mip) =>
-      mip === 0 ? '0, sharp' : mip < MIP_STOPS.length - 1 ? `${mip}` : `${mip} +`,
+      mip === 0 ? '0, finest' : mip < MIP_STOPS.length - 1 ? `${mip}` : `${mip} +`,
     );
     this.fill('Mip level of the light', paletteCss('to right', MIP_STOPS), labels);
   }
@@ -72,7 +77,7 @@ export class MeterCard {
     this.element.hidden = false;
     const sure = error === undefined || !Number.isFinite(error);
     const [value, either] =
-      lux === undefined ? ['no light known', ''] : sure ? [measured(lux), ''] : withError(lux, error);
+      lux === undefined ? ['no light yet', ''] : sure ? [measured(lux), ''] : withError(lux, error);
     this.value.textContent = value;
     this.bar.textContent = lux === undefined ? '' : either ? ` ± ${either} lx` : ' lx';
     this.more.textContent = details;

@@ -89,6 +89,8 @@ export class Viewer {
   private lost = false;
   /** What is shown took the place of another scene's light. */
   private replaced = false;
+  /** Irradiance at the dark and bright end of what was last known, lux. */
+  private lightRange: [number, number] | undefined;
   private layoutKnown = true;
   private readonly gate = new LightGate();
   private document: Gltf = { asset: { version: '2.0' } };
@@ -273,7 +275,9 @@ export class Viewer {
     this.setSigns(true);
     this.invalidate();
     return new Promise((resolve, reject) =>
-      this.canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error('the picture could not be made')))),
+      this.canvas.toBlob((blob) =>
+        blob ? resolve(blob) : reject(new Error('the browser could not encode the picture')),
+      ),
     );
   }
 
@@ -382,12 +386,19 @@ export class Viewer {
     this.invalidate();
   }
 
+  /**
+   * Unshot light has the scale of radiosity: by one of its own the little that is left at the end would look like much. As
+   * long as it is streamed no irradiance comes, and a layout that comes meanwhile has none: the last scale stays.
+   */
   private updateRange(): void {
-    const data = this.mode?.quantity === 'irradiance' ? this.shown?.set : this.shownData;
-    const range = this.autoRange ? data?.range() : undefined;
+    if (!this.autoRange) return;
+    const isUnshot = this.mode?.quantity === 'unshot';
+    const isOfLight = isUnshot || this.mode?.quantity === 'irradiance';
+    const range = (isOfLight ? this.shown?.set : this.shownData)?.range() ?? (isUnshot ? this.lightRange : undefined);
     if (!range) return;
+    if (isOfLight) this.lightRange = range;
     const [low, high] = range;
-    this.uniforms.all.falseRange.value.set(this.mode?.id === 'radiosity' ? DARKEST * low : low, high);
+    this.uniforms.all.falseRange.value.set(isUnshot || this.mode?.id === 'radiosity' ? DARKEST * low : low, high);
   }
 
   /** The first scene shows at once; a later one when its light has come, so that nothing goes dark in between. */
