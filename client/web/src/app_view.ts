@@ -6,6 +6,7 @@ import { nodeName } from './document/gltf';
 import { measured } from './ui/dom';
 import { listenToKeys } from './ui/keys';
 import { ViewPanel } from './ui/view_panel';
+import { insideView } from './view/first_view';
 import type { LitScene } from './view/lit_scene';
 import { luminance } from './view/picker';
 import { TONE_CURVES, VIEW_MODES, viewMode, type ViewMode } from './view/view_modes';
@@ -101,7 +102,14 @@ export class ViewSession {
     if (this.placed) return;
     this.placed = true;
     if (scene.cameras.length > 0) this.useCamera(0);
-    else this.app.viewer.rig.overview(scene.bounds);
+    else this.lookAtAll(scene);
+  }
+
+  private lookAtAll(scene: LitScene): void {
+    const { rig } = this.app.viewer;
+    rig.overview(scene.bounds);
+    const inside = insideView(scene, rig.camera);
+    if (inside) rig.stand(inside.eye, inside.target);
   }
 
   /** Somebody has loaded one; its geometry follows. The same scene, laid out anew, is looked at from where one was. */
