@@ -27,7 +27,7 @@ export class Frame {
   });
   readonly toasts = new Toasts();
   readonly legend = new Legend();
-  readonly meter = new MeterCard();
+  readonly meter = new MeterCard(this.legend.element);
   readonly help = makeHelp();
   private readonly state = h('span', { class: 'state', role: 'status' }, 'Connecting');
   private readonly dot = h('span', { class: 'dot' });

@@ -56,6 +56,36 @@ export class Legend {
   }
 }
 
+interface Size {
+  width: number;
+  height: number;
+}
+
+interface Point {
+  x: number;
+  y: number;
+}
+
+/** Of a card at the pointer, in a page of a size: its left and top, clear of something else where that can be. */
+export function besidePointer(pointer: Point, card: Size, page: Size, other?: Point & Size): Point {
+  const right = Math.min(Math.max(8, pointer.x + 18), Math.max(8, page.width - card.width - 8));
+  const left = Math.max(8, pointer.x - card.width - 14);
+  const [below, above] = [pointer.y + 18, pointer.y - card.height - 14];
+  const isFree = ({ x, y }: Point) =>
+    y >= 0 &&
+    y + card.height <= page.height &&
+    !(
+      other &&
+      x < other.x + other.width &&
+      x + card.width > other.x &&
+      y < other.y + other.height &&
+      y + card.height > other.y
+    );
+  const overOther = { x: right, y: (other?.y ?? page.height) - card.height - 8 };
+  const places = [below, above].flatMap((y) => [right, left].map((x) => ({ x, y })));
+  return [...places, overOther].find(isFree) ?? { x: right, y: below + card.height > page.height ? above : below };
+}
+
 /** The light meter's reading, beside the pointer. */
 export class MeterCard {
   private readonly value = h('strong', {});
@@ -67,6 +97,9 @@ export class MeterCard {
     h('div', {}, this.value, this.bar),
     this.more,
   );
+
+  /** `legend`: what it is not to cover. */
+  constructor(private readonly legend: HTMLElement) {}
 
   hide(): void {
     this.element.hidden = true;
@@ -81,9 +114,9 @@ export class MeterCard {
     this.value.textContent = value;
     this.bar.textContent = lux === undefined ? '' : either ? ` ± ${either} lx` : ' lx';
     this.more.textContent = details;
-    const { offsetWidth: w, offsetHeight: hgt } = this.element;
-    const left = Math.min(Math.max(8, x + 18), Math.max(8, innerWidth - w - 8));
-    const top = y + 18 + hgt > innerHeight ? y - hgt - 14 : y + 18;
-    this.element.style.transform = `translate(${Math.round(left)}px, ${Math.round(top)}px)`;
+    const { offsetWidth: width, offsetHeight: height } = this.element;
+    const legend = this.legend.hidden ? undefined : this.legend.getBoundingClientRect();
+    const at = besidePointer({ x, y }, { width, height }, { width: innerWidth, height: innerHeight }, legend);
+    this.element.style.transform = `translate(${Math.round(at.x)}px, ${Math.round(at.y)}px)`;
   }
 }

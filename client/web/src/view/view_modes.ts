@@ -39,7 +39,7 @@ export const VIEW_MODES: readonly ViewMode[] = [
     id: 'unshot',
     label: 'Unshot',
     number: 3,
-    hint: 'Light not shot yet, on the same scale as radiosity; when the solve is done, how far patches differ from what was shot for them',
+    hint: 'Light not shot yet, on a scale fixed by the irradiance; when the solve is done, how far patches differ from what was shot for them',
     quantity: 'unshot',
     legend: 'Unshot radiosity',
     unit: 'lm/m²',

@@ -40,6 +40,8 @@ const PERSON_SIZE = 0.04;
 
 /** What leaves a surface is this much less than what arrives, at the dark end of the scale. */
 const DARKEST = 0.1;
+/** What is left to shoot counts for nothing where it is less than this of what arrives at the bright end. */
+const LEAST_UNSHOT = 0.01;
 
 export interface ViewerEvents {
   used(bytes: number): void;
@@ -387,8 +389,8 @@ export class Viewer {
   }
 
   /**
-   * Unshot light has the scale of radiosity: by one of its own the little that is left at the end would look like much. As
-   * long as it is streamed no irradiance comes, and a layout that comes meanwhile has none: the last scale stays.
+   * Unshot light is shown by how bright the scene is: by a scale of its own the little that is left at the end would look
+   * like much. As long as it is streamed no irradiance comes, and a layout that comes meanwhile has none: the last stays.
    */
   private updateRange(): void {
     if (!this.autoRange) return;
@@ -398,7 +400,8 @@ export class Viewer {
     if (!range) return;
     if (isOfLight) this.lightRange = range;
     const [low, high] = range;
-    this.uniforms.all.falseRange.value.set(isUnshot || this.mode?.id === 'radiosity' ? DARKEST * low : low, high);
+    const darkest = isUnshot ? LEAST_UNSHOT * high : this.mode?.id === 'radiosity' ? DARKEST * low : low;
+    this.uniforms.all.falseRange.value.set(darkest, high);
   }
 
   /** The first scene shows at once; a later one when its light has come, so that nothing goes dark in between. */
