@@ -130,6 +130,7 @@ export class App {
       drawn: () => {
         this.view.onDrawn();
         this.people.tellSoon();
+        if (this.progress) this.showState(this.progress); // the last tiles may be in the picture now
       },
       sceneShown: (scene) => {
         this.view.onSceneShown(scene);
@@ -290,19 +291,32 @@ export class App {
   }
 
   private showState(progress: Progress): void {
-    const done = ['converged', 'timeLimit', 'limited'].includes(progress.state);
+    const isOver = ['converged', 'timeLimit', 'limited'].includes(progress.state);
+    const done = isOver && !this.isLightUnderWay(progress);
     const bad = progress.state === 'failed';
     const stated = hasScene(progress) && progress.state !== 'loading';
     const error = stated ? `${percent(progress.error.total)} error` : '';
     const rate = progress.state === 'solving' ? `${readable(progress.shotsPerSecond, 2)} shots/s` : '';
     this.frame.setState(
-      progress.state === 'loading' && this.viewer.shown ? 'First light' : stateName(progress.state),
-      bad ? 'bad' : done ? 'good' : progress.state === 'solving' ? 'busy' : 'idle',
+      isOver && !done
+        ? 'Receiving light'
+        : progress.state === 'loading' && this.viewer.shown
+          ? 'First light'
+          : stateName(progress.state),
+      bad ? 'bad' : done ? 'good' : isOver || progress.state === 'solving' ? 'busy' : 'idle',
       error,
       rate,
     );
     this.frame.setWelcome(hasScene(progress) && bad ? '' : progress.state, progress.failure);
     this.showFailure(hasScene(progress) && bad ? (progress.failure ?? 'the server gave no reason') : undefined);
+  }
+
+  /** The solve is over before its last tiles are here, and they before they are in the picture. */
+  private isLightUnderWay({ tileVersion }: Progress): boolean {
+    const { dataSet, set } = this.viewer;
+    if (!set || dataSet) return false; // of other quantities nothing is known
+    const isHere = this.bookmark?.quantity === 'irradiance' && this.bookmark.tileVersion >= tileVersion;
+    return !isHere || set.waiting > 0;
   }
 
   /** The light that there is stays to be looked at; that nothing comes after it is said for as long as it holds. */
@@ -390,6 +404,7 @@ export class App {
       this.bookmark = bookmark;
       const { quantity, revision, tileVersion } = bookmark;
       if (quantity === 'irradiance') this.resume = { epoch: this.epoch, revision, tileVersion };
+      if (this.progress) this.showState(this.progress);
     });
   }
 

@@ -75,9 +75,9 @@ export class Frame {
   }
 
   setState(text: string, tone: 'busy' | 'good' | 'bad' | 'idle', error = '', rate = ''): void {
-    this.state.textContent = text;
-    this.error.textContent = error;
-    this.rate.textContent = rate;
+    // What is written anew is read out anew, though it is the same.
+    const texts: [HTMLElement, string][] = [[this.state, text], [this.error, error], [this.rate, rate]]; // prettier-ignore
+    for (const [element, wanted] of texts) if (element.textContent !== wanted) element.textContent = wanted;
     this.dot.className = `dot ${tone}`;
   }
 

@@ -217,7 +217,8 @@ export class Viewer {
     this.shown?.applyPointers(document, pointers);
     this.staged?.scene?.applyPointers(document, pointers);
     this.gizmo.refresh();
-    this.pace.hurry(performance.now(), EDIT_HURRY_MS);
+    // The document of a scene that has just come is no edit: its first light may be sharp.
+    if (this.shown?.set.showsLight) this.pace.hurry(performance.now(), EDIT_HURRY_MS);
     this.invalidate();
   }
 
