@@ -43,6 +43,24 @@ std::string countText(std::uint64_t count) {
   return text;
 }
 
+std::string bytesText(std::uint64_t bytes) {
+  if (bytes < 1000) return fmt::format("{} B", bytes);
+  double value = static_cast<double>(bytes) / 1000.0;
+  const char* unit = "kB";
+  for (const char* larger : {"MB", "GB", "TB"}) {
+    if (value < 999.5) break;  // what would be written as 1000
+    value /= 1000.0;
+    unit = larger;
+  }
+  return value < 9.95 ? fmt::format("{:.1f} {}", value, unit) : fmt::format("{:.0f} {}", value, unit);
+}
+
+std::string transferText(std::uint64_t done_bytes, std::uint64_t total_bytes) {
+  if (total_bytes == 0) return bytesText(done_bytes);
+  const double percent = 100.0 * static_cast<double>(done_bytes) / static_cast<double>(total_bytes);
+  return fmt::format("{} of {}, {:.0f} %", bytesText(done_bytes), bytesText(total_bytes), percent);
+}
+
 std::string durationText(double seconds) {
   constexpr double kLongest = 1e9;
   if (!std::isfinite(seconds) || seconds < 0.0 || seconds > kLongest) return "?";

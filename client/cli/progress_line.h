@@ -30,6 +30,10 @@ struct ProgressView {
 [[nodiscard]] std::string durationText(double seconds);
 /// "1,234,567"
 [[nodiscard]] std::string countText(std::uint64_t count);
+/// "812 B", "4.2 kB", "37 kB", "1.5 MB": powers of 1000, two digits at least
+[[nodiscard]] std::string bytesText(std::uint64_t bytes);
+/// What has been sent or has come of a file: "37 kB of 1.5 MB, 2 %"; `total_bytes` 0: not known, "37 kB"
+[[nodiscard]] std::string transferText(std::uint64_t done_bytes, std::uint64_t total_bytes);
 /// Relative value as a percentage with three digits: "1.98 %", "0.0213 %"
 [[nodiscard]] std::string percentText(double value);
 

@@ -34,16 +34,10 @@ Result<std::string> readToken(const std::string& path) {
   return token;
 }
 
-/// Numbers of a transfer for the progress line.
+/// How far a transfer is, for the progress line.
 client::TransferProgress showTransfer(ProgressDisplay& display, std::string what) {
   return [&display, what = std::move(what)](std::uint64_t done_bytes, std::uint64_t total_bytes) {
-    constexpr double kMega = 1e6;
-    const double share =
-        total_bytes > 0 ? 100.0 * static_cast<double>(done_bytes) / static_cast<double>(total_bytes) : 0.0;
-    display.showText(total_bytes > 0 ? fmt::format("{} {:.1f} of {:.1f} MB, {:.0f} %", what,
-                                                   static_cast<double>(done_bytes) / kMega,
-                                                   static_cast<double>(total_bytes) / kMega, share)
-                                     : fmt::format("{} {:.1f} MB", what, static_cast<double>(done_bytes) / kMega));
+    display.showText(fmt::format("{} {}", what, transferText(done_bytes, total_bytes)));
   };
 }
 

@@ -28,7 +28,7 @@ struct ErrorEstimate {
   double total = 1.0, residual = 1.0, sampling = 0.0, variation = 0.0, discretization = 0.0;
 };
 
-/// Luminous flux, lumens (sum of the three channels).
+/// Luminous flux, lumens (luminance: the channels weighted by Rec. 709).
 /// emitted = absorbed + escaped + backface + unshot + imbalance.
 struct EnergyBalance {
   double emitted = 0.0, absorbed = 0.0, escaped = 0.0, backface = 0.0, unshot = 0.0;

@@ -5,8 +5,9 @@
 namespace radiosity::engine {
 namespace {
 
+/// Weights of Rec. 709, as lux has them: the sum of the channels would be three times what a white lamp gives.
 double lumens(const std::array<double, 3>& flux, double scale_m) {
-  return (flux[0] + flux[1] + flux[2]) * scale_m * scale_m;
+  return (0.2126 * flux[0] + 0.7152 * flux[1] + 0.0722 * flux[2]) * scale_m * scale_m;
 }
 
 /// Sides of surfaces that neither reflect nor shine: they receive light and never shoot.

@@ -96,7 +96,7 @@ export class App {
       pauseOrResume: () => this.pauseOrResume(),
       restart: () => void this.ask('solve.restart'),
       configure: (settings) => void this.configure(settings),
-      notUnderstood: (text) => this.notUnderstood(text),
+      notAccepted: (text, wanted) => this.notAccepted(text, wanted),
     });
     this.view = new ViewSession(this);
     this.edit = new EditSession(this, me, (patch, id) => this.sendPatch(patch, id));
@@ -130,6 +130,7 @@ export class App {
       drawn: () => {
         this.view.onDrawn();
         this.people.tellSoon();
+        if (this.progress) this.showState(this.progress); // the last tiles may be in the picture now
       },
       sceneShown: (scene) => {
         this.view.onSceneShown(scene);
@@ -140,7 +141,7 @@ export class App {
       gizmoDragging: (active) => this.edit.onGizmoDragging(active),
       gizmoChanged: (object, mode) => this.edit.onGizmoChanged(object, mode),
       contextLost: (lost) => {
-        this.frame.setBanner(lost ? 'The graphics card was taken away; waiting for it to come back.' : undefined);
+        this.frame.setBanner(lost ? 'The browser has lost the graphics card; waiting for it to return.' : undefined);
         this.failure = undefined;
         if (!lost && this.progress) this.showState(this.progress);
       },
@@ -167,8 +168,8 @@ export class App {
   }
 
   /** Of a field in which something else was expected. */
-  notUnderstood(text: string): void {
-    this.frame.toasts.show(`“${text}” cannot stand there`, 'bad');
+  notAccepted(text: string, wanted: string): void {
+    this.frame.toasts.show(`“${text}” is not accepted: enter ${wanted}`, 'bad');
   }
 
   /** A call whose refusal is shown. */
@@ -217,7 +218,7 @@ export class App {
       this.failure = undefined;
       this.progress = undefined; // that of a server which has started again is not that of its scene
       this.frame.setBanner(undefined);
-      if (this.everOpen) this.frame.toasts.show('Connected again', 'good');
+      if (this.everOpen) this.frame.toasts.show('Reconnected', 'good');
       this.everOpen = true;
     } else if (state === 'waiting') {
       this.frame.setState('Not connected', 'bad');
@@ -290,19 +291,32 @@ export class App {
   }
 
   private showState(progress: Progress): void {
-    const done = ['converged', 'timeLimit', 'limited'].includes(progress.state);
+    const isOver = ['converged', 'timeLimit', 'limited'].includes(progress.state);
+    const done = isOver && !this.isLightUnderWay(progress);
     const bad = progress.state === 'failed';
     const stated = hasScene(progress) && progress.state !== 'loading';
     const error = stated ? `${percent(progress.error.total)} error` : '';
     const rate = progress.state === 'solving' ? `${readable(progress.shotsPerSecond, 2)} shots/s` : '';
     this.frame.setState(
-      progress.state === 'loading' && this.viewer.shown ? 'First light' : stateName(progress.state),
-      bad ? 'bad' : done ? 'good' : progress.state === 'solving' ? 'busy' : 'idle',
+      isOver && !done
+        ? 'Receiving light'
+        : progress.state === 'loading' && this.viewer.shown
+          ? 'First light'
+          : stateName(progress.state),
+      bad ? 'bad' : done ? 'good' : isOver || progress.state === 'solving' ? 'busy' : 'idle',
       error,
       rate,
     );
     this.frame.setWelcome(hasScene(progress) && bad ? '' : progress.state, progress.failure);
-    this.showFailure(hasScene(progress) && bad ? (progress.failure ?? 'the server does not say why') : undefined);
+    this.showFailure(hasScene(progress) && bad ? (progress.failure ?? 'the server gave no reason') : undefined);
+  }
+
+  /** The solve is over before its last tiles are here, and they before they are in the picture. */
+  private isLightUnderWay({ tileVersion }: Progress): boolean {
+    const { dataSet, set } = this.viewer;
+    if (!set || dataSet) return false; // of other quantities nothing is known
+    const isHere = this.bookmark?.quantity === 'irradiance' && this.bookmark.tileVersion >= tileVersion;
+    return !isHere || set.waiting > 0;
   }
 
   /** The light that there is stays to be looked at; that nothing comes after it is said for as long as it holds. */
@@ -310,7 +324,7 @@ export class App {
     if (why === this.failure || this.viewer.isLost) return; // the card comes first; it is said when that is back
     this.failure = why;
     if (why === undefined) return this.frame.setBanner(undefined);
-    this.frame.setBanner(`The solve has failed: ${why}.`, 'Start again', () => void this.ask('solve.restart'));
+    this.frame.setBanner(`The solve failed: ${why}.`, 'Restart', () => void this.ask('solve.restart'));
   }
 
   /** The server has none: it was started again without, could not have the one whose first light it showed, or lost it. */
@@ -367,7 +381,8 @@ export class App {
 
   private onNoDocument(error: Error): void {
     if (error instanceof RpcError && error.code === NOT_FOUND) return; // there is none: the server's state says so
-    if (!(error instanceof ConnectionLost)) this.frame.toasts.show(`The scene: ${error.message}`, 'bad');
+    if (!(error instanceof ConnectionLost))
+      this.frame.toasts.show(`The scene could not be fetched: ${error.message}`, 'bad');
   }
 
   private async onLightmaps(note: LightmapsNote): Promise<void> {
@@ -389,6 +404,7 @@ export class App {
       this.bookmark = bookmark;
       const { quantity, revision, tileVersion } = bookmark;
       if (quantity === 'irradiance') this.resume = { epoch: this.epoch, revision, tileVersion };
+      if (this.progress) this.showState(this.progress);
     });
   }
 
@@ -420,7 +436,7 @@ export class App {
     const epoch = this.epoch;
     for (;;) {
       if (!this.connection.isOpen) await new Promise<void>((resolve) => this.awaited.push(resolve));
-      if (this.epoch !== epoch) throw new Error('the server has started again and does not know this scene');
+      if (this.epoch !== epoch) throw new Error('the server has restarted and no longer has this scene');
       try {
         return await this.connection.call<ScenePatchReply>('scene.patch', { patch, requestId });
       } catch (error) {

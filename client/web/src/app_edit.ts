@@ -46,7 +46,7 @@ export class EditSession {
       frameSelection: () => app.view.frameSelection(),
       endGesture: () => this.document.endGesture(),
       loadFile: (file) => void this.loadFile(file),
-      notUnderstood: (text) => app.notUnderstood(text),
+      notAccepted: (text, wanted) => app.notAccepted(text, wanted),
     });
   }
 
@@ -136,7 +136,7 @@ export class EditSession {
     const placement: edits.Placement = { translation: rounded(object.position.toArray()) as Vec3 };
     if (mode === 'rotate') placement.rotation = unit(object.quaternion.toArray() as Vec4);
     if (mode === 'scale') placement.scale = rounded(object.scale.toArray()) as Vec3;
-    const label = mode === 'translate' ? 'Move' : mode === 'rotate' ? 'Turn' : 'Scale';
+    const label = mode === 'translate' ? 'Move' : mode === 'rotate' ? 'Rotate' : 'Scale';
     this.make(`${label} ${nodeName(this.document.gltf, node)}`, edits.setPlacement(node, placement), `${mode} ${node}`);
   }
 
@@ -176,7 +176,7 @@ export class EditSession {
   async loadFile(file: File): Promise<void> {
     const { toasts } = this.app.frame;
     const limit = this.app.connection.info?.limits['uploadBytes'] ?? Infinity;
-    if (file.size > limit) return toasts.show(`${file.name} is larger than the server takes`, 'bad');
+    if (file.size > limit) return toasts.show(`${file.name} is larger than the server accepts`, 'bad');
     toasts.show(`Loading ${file.name}…`);
     this.upload?.abort.abort(); // the last one is meant, however long an earlier one takes
     const placed = this.upload?.placed ?? this.app.view.forgetCamera();

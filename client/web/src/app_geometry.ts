@@ -24,7 +24,8 @@ export class GeometrySession {
       const glb = await this.fetch(note.uvs, () => viewer.set === set, signal);
       if (glb && viewer.set === set) await viewer.load(glb, set);
     } catch (error) {
-      if (viewer.set === set && !signal.aborted) frame.toasts.show(`The geometry: ${(error as Error).message}`, 'bad');
+      if (viewer.set === set && !signal.aborted)
+        frame.toasts.show(`The geometry could not be fetched: ${(error as Error).message}`, 'bad');
     }
   }
 

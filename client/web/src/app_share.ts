@@ -68,7 +68,7 @@ export class Share {
       const pages = await fetchLightmaps(this.layouts);
       pages.forEach((blob, page) => download(blob, `lightmap.${page}.exr`));
     } catch (error) {
-      this.app.frame.toasts.show(`Download: ${(error as Error).message}`, 'bad');
+      this.app.frame.toasts.show(`Download failed: ${(error as Error).message}`, 'bad');
     }
   }
 
@@ -78,6 +78,6 @@ export class Share {
 
   private async copy(text: string, done: string): Promise<void> {
     const copied = await copyText(text);
-    this.app.frame.toasts.show(copied ? done : 'The browser did not let the page copy', copied ? 'good' : 'bad');
+    this.app.frame.toasts.show(copied ? done : 'The browser blocked copying', copied ? 'good' : 'bad');
   }
 }

@@ -6,6 +6,7 @@ import { nodeName } from './document/gltf';
 import { measured } from './ui/dom';
 import { listenToKeys } from './ui/keys';
 import { ViewPanel } from './ui/view_panel';
+import { insideView } from './view/first_view';
 import type { LitScene } from './view/lit_scene';
 import { luminance } from './view/picker';
 import { TONE_CURVES, VIEW_MODES, viewMode, type ViewMode } from './view/view_modes';
@@ -31,6 +32,8 @@ export class ViewSession {
   private sharpMarked = false;
   private bounds: Box3 | undefined;
   private sceneIsNew = false;
+  /** A view that the page's address asks for, and that was not shown yet. */
+  private linked: string | undefined;
 
   constructor(private readonly app: App) {
     this.panel = new ViewPanel({
@@ -42,7 +45,7 @@ export class ViewSession {
       setToneCurve: (id) => this.setToneCurve(id),
       setBackground: (id) => (document.documentElement.dataset['background'] = id),
       useCamera: (index) => this.useCamera(index),
-      notUnderstood: (text) => app.notUnderstood(text),
+      notAccepted: (text, wanted) => app.notAccepted(text, wanted),
     });
   }
 
@@ -52,7 +55,9 @@ export class ViewSession {
     const link = new URLSearchParams(location.hash.slice(1));
     this.placed = this.app.viewer.rig.fromText(link.get('camera') ?? '');
     this.app.frame.setWalk(this.app.viewer.rig.mode === 'walk');
-    void this.setMode(link.get('view') ?? 'lit');
+    void this.setMode('lit');
+    this.linked = link.get('view') ?? undefined;
+    this.followLink();
     if (link.get('ui') === '0') this.app.frame.toggleChrome();
     this.listenToPointer(canvas);
     listenToKeys(canvas, {
@@ -73,6 +78,18 @@ export class ViewSession {
   onCapabilities(): void {
     this.panel.setAvailable((mode) => this.available(mode));
     if (!this.available(this.mode)) void this.setMode('lit');
+    this.followLink();
+  }
+
+  /**
+   * To the view that a link names, once the server is known to stream it. What is no light comes after the first light,
+   * which tells how bright the scene is.
+   */
+  private followLink(): void {
+    const mode = this.linked === undefined ? undefined : viewMode(this.linked);
+    if (!mode || !this.available(mode)) return;
+    if (mode.quantity !== 'irradiance' && !this.app.viewer.shown?.set.covered) return;
+    void this.setMode(mode.id);
   }
 
   onSceneShown(scene: LitScene): void {
@@ -85,7 +102,14 @@ export class ViewSession {
     if (this.placed) return;
     this.placed = true;
     if (scene.cameras.length > 0) this.useCamera(0);
-    else this.app.viewer.rig.overview(scene.bounds);
+    else this.lookAtAll(scene);
+  }
+
+  private lookAtAll(scene: LitScene): void {
+    const { rig } = this.app.viewer;
+    rig.overview(scene.bounds);
+    const inside = insideView(scene, rig.camera);
+    if (inside) rig.stand(inside.eye, inside.target);
   }
 
   /** Somebody has loaded one; its geometry follows. The same scene, laid out anew, is looked at from where one was. */
@@ -115,6 +139,7 @@ export class ViewSession {
       this.sharpMarked = true;
       this.app.mark('sharp');
     }
+    this.followLink();
     this.showLegend();
     if (this.metering) this.readMeter();
   }
@@ -132,6 +157,7 @@ export class ViewSession {
     const before = this.app.viewer.dataSet?.quantity;
     this.mode = mode;
     const data = mode.quantity === 'irradiance' ? undefined : mode.quantity;
+    this.linked = undefined;
     this.app.viewer.setDataQuantity(data);
     this.app.viewer.setMode(mode);
     this.applyFalseColour();
@@ -294,7 +320,7 @@ export class ViewSession {
     const details = [
       reading.irradiance ? reading.irradiance.map((c, i) => `${'RGB'[i]} ${measured(c)}`).join('  ') : '',
       this.mode.id === 'radiosity' && reading.radiosity !== undefined
-        ? `leaves ${measured(reading.radiosity)} lm/m²`
+        ? `radiosity ${measured(reading.radiosity)} lm/m²`
         : '',
       reading.node === undefined ? '' : nodeName(edit.document.gltf, reading.node),
       reading.texel ? `page ${reading.page}, texel ${reading.texel.join(', ')}` : '',

@@ -24,7 +24,7 @@ try {
       h(
         'p',
         {},
-        'It needs WebGL 2. What the server is doing also stands on its ',
+        'It needs WebGL 2. The progress of the solve is also on the ',
         h('a', { href: '/status' }, 'status page'),
         '.',
       ),

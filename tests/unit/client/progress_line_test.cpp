@@ -27,6 +27,22 @@ TEST(ProgressFraction, staysInRangeForAnyInput) {
   EXPECT_EQ(progressFraction(0.5, 1.0), 1.0);
 }
 
+TEST(BytesText, hasAUnitThatFits) {
+  EXPECT_EQ(bytesText(0), "0 B");
+  EXPECT_EQ(bytesText(812), "812 B");
+  EXPECT_EQ(bytesText(4242), "4.2 kB");
+  EXPECT_EQ(bytesText(9'960), "10 kB");
+  EXPECT_EQ(bytesText(37'400), "37 kB");
+  EXPECT_EQ(bytesText(999'600), "1.0 MB");
+  EXPECT_EQ(bytesText(1'500'000), "1.5 MB");
+  EXPECT_EQ(bytesText(23'000'000'000), "23 GB");
+}
+
+TEST(TransferText, saysHowMuchOfWhatWhereThatIsKnown) {
+  EXPECT_EQ(transferText(37'400, 1'500'000), "37 kB of 1.5 MB, 2 %");
+  EXPECT_EQ(transferText(812, 0), "812 B");
+}
+
 TEST(ProgressLine, showsErrorTargetRateAndTimeLeft) {
   const ProgressView view{.state = "solving",
                           .error = 0.1,

@@ -184,7 +184,7 @@ it('does by keys alone what a designer does: choose, move, look at, undo', async
   expect(await until(height, (y) => y === 0.05)).toBe(0.05);
   expect(await place()).toEqual([was[0], 0.05, was[2]]); // to the last digit, though fewer are shown
   // A key that takes an object away does not do so from another control.
-  const look = page.getByRole('button', { name: 'Look at it' });
+  const look = page.getByRole('button', { name: 'Frame object' });
   await look.focus();
   const eye = () => page.evaluate(() => window.viewer!.viewer.rig.target.toArray());
   const from = await eye();

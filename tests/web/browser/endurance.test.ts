@@ -17,7 +17,7 @@ it('outlives a server that is killed and started again', async () => {
   // The picture stays, and can be turned about.
   expect(difference(before, await pixels(page, 60)).p99).toBeLessThanOrEqual(1);
   await server.start();
-  await said(page, /^Connected again$/);
+  await said(page, /^Reconnected$/);
   await converged(page);
   expect(await page.locator('.banner').isVisible()).toBe(false);
   expect(difference(before, await pixels(page, 60)).mean).toBeLessThan(2);

@@ -130,9 +130,59 @@ it('saves files that are what their names say', async () => {
   const served = Buffer.from(await (await fetch(`${server.url}/lightmaps/0.exr`)).arrayBuffer());
   expect(exr.equals(served)).toBe(true);
 
-  const [, snapshot] = await save("Server's picture (.png)");
+  const [, snapshot] = await save('Server snapshot (.png)');
   expect(snapshot.subarray(0, 8)).toEqual(PNG);
   expect(sizeOf(snapshot)).toEqual([1920, 1080]);
+});
+
+it('refuses a scale of 0 with a reason, by hand and by the handles', async () => {
+  const page = await pages.open(server.url, SIDE.width, SIDE.height);
+  await converged(page);
+  const node = await page.evaluate(() => {
+    const { edit, frame } = window.viewer!;
+    const index = edit.document.gltf.nodes!.findIndex(({ name }) => name === 'tall_block');
+    edit.select({ node: index, material: undefined });
+    frame.showTab('Scene');
+    return index;
+  });
+  const before = await placementOf(node);
+  const field = page.getByLabel('Scale, y');
+  const shown = await field.inputValue();
+  await field.fill('0');
+  await field.press('Enter');
+  await said(page, /^“0” is not accepted: enter a number other than 0$/);
+  expect(await field.inputValue()).toBe(shown);
+  // Handles that are dragged over the middle of the object, and one that was taken hold of there.
+  const factors = await page.evaluate((node) => {
+    const { edit, viewer } = window.viewer!;
+    edit.setGizmo('scale');
+    const { controls, pivot } = viewer.gizmo as unknown as {
+      controls: { dispatchEvent(event: object): void };
+      pivot: { scale: { set(x: number, y: number, z: number): void } };
+    };
+    const { scale } = viewer.shown!.nodes.get(node)!;
+    const was = scale.clone();
+    pivot.scale.set(0, -3, NaN);
+    controls.dispatchEvent({ type: 'objectChange' });
+    return scale.divide(was).toArray();
+  }, node);
+  [0.01, 0.01, 1].forEach((factor, i) => expect(factors[i]).toBeCloseTo(factor, 6));
+  await answered(page);
+  await page.evaluate(() => window.viewer!.edit.document.endGesture());
+  // What glTF allows is taken: an object turned inside out.
+  await field.fill('-0.5');
+  await field.press('Enter');
+  await until(
+    () => placementOf(node),
+    ({ scale }) => scale[1] === -0.5,
+  );
+  await page.locator('canvas.view').focus();
+  await page.keyboard.press('Control+z');
+  await page.keyboard.press('Control+z');
+  await until(
+    () => placementOf(node),
+    (now) => JSON.stringify(now) === JSON.stringify(before),
+  );
 });
 
 it('takes a number with a comma, and says so where there is none', async () => {
@@ -150,10 +200,10 @@ it('takes a number with a comma, and says so where there is none', async () => {
   expect(changed.targetError).toBeCloseTo(0.019, 12);
   await goal.fill('half');
   await goal.press('Enter');
-  await said(page, /^“half” cannot stand there$/);
+  await said(page, /^“half” is not accepted: enter a percentage above 0, up to 100$/);
   expect(await goal.inputValue()).toBe('1.9');
   // What the server refuses does not stay in the field either.
-  const texels = page.getByLabel('Texels, about');
+  const texels = page.getByLabel('Texels, approx.');
   const before = await texels.inputValue();
   await texels.fill('1e15');
   await texels.press('Enter');

@@ -127,7 +127,7 @@ it('selects with a tap', async () => {
   await page.getByRole('button', { name: 'Panel', exact: true }).tap();
   await page.getByRole('tab', { name: 'Scene' }).tap();
   const before = await place(page);
-  await page.getByRole('button', { name: 'Look at it' }).tap();
+  await page.getByRole('button', { name: 'Frame object' }).tap();
   expect((await place(page)).target).not.toEqual(before.target);
 });
 

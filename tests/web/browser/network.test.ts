@@ -40,7 +40,7 @@ it('says that the server does not answer, and comes back by itself with what was
   await other.evaluate((p) => window.viewer!.connection.call('scene.patch', { patch: p }), patch);
   await converged(other);
   await emulate(session, false);
-  await said(page, /^Connected again$/);
+  await said(page, /^Reconnected$/);
   await until(
     () => page.evaluate((m) => window.viewer!.edit.document.gltf.materials![m]!.emissiveFactor?.join(), light),
     (factor) => factor === '0.1,0.3,1',

@@ -131,7 +131,7 @@ it('fetches geometry again when the line broke, though its light is here', async
   });
   gate.open = true;
   await gate.held[0]!.abort('connectionreset');
-  await said(page, /^Connected again$/);
+  await said(page, /^Reconnected$/);
   await converged(page);
   expect(Math.max(...(await pixels(page, 16)))).toBeGreaterThan(60);
   forgiveRequests();

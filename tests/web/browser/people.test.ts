@@ -63,7 +63,7 @@ it('shows nothing of who does not want it, and nothing to them', async () => {
   await converged(second);
   await shows(first, second);
   await second.getByRole('tab', { name: 'Share' }).click();
-  await second.getByLabel('Show cameras').uncheck();
+  await second.getByLabel('Share cameras').uncheck();
   const left = await until(
     () => others(first),
     (all) => all.length === 0,
@@ -75,8 +75,8 @@ it('shows nothing of who does not want it, and nothing to them', async () => {
   await converged(second);
   expect(await others(first)).toEqual([]);
   await second.getByRole('tab', { name: 'Share' }).click();
-  expect(await second.getByLabel('Show cameras').isChecked()).toBe(false);
-  await second.getByLabel('Show cameras').check();
+  expect(await second.getByLabel('Share cameras').isChecked()).toBe(false);
+  await second.getByLabel('Share cameras').check();
   await shows(first, second);
   await shows(second, first);
 });

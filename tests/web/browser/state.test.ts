@@ -112,7 +112,7 @@ it('does not go on showing a scene that its server has lost, and says why', asyn
   tell(failed(await told(page), 0));
   const card = page.locator('.welcome');
   await card.getByText('The server has lost the scene').waitFor();
-  await card.getByText('It says: out of memory (bad_alloc).').waitFor();
+  await card.getByText('Reason: out of memory (bad_alloc).').waitFor();
   expect(await page.locator('.chip').innerText()).toBe('Failed');
   await drawn(page);
   expect(await page.evaluate(() => window.viewer!.viewer.shown)).toBeUndefined();
@@ -129,7 +129,7 @@ it('says what failed to who comes after it', async () => {
   const { page } = await openTold(server.url, (text) =>
     text.replaceAll('"state":"empty"', '"state":"failed","failure":"out of memory (bad_alloc)"'),
   );
-  await page.locator('.welcome').getByText('It says: out of memory (bad_alloc).').waitFor();
+  await page.locator('.welcome').getByText('Reason: out of memory (bad_alloc).').waitFor();
   expect(await page.locator('.chip').innerText()).toBe('Failed');
   const other = await serve(`${SCENES}/cornell.glb`);
   const glb = await (await fetch(`${other.url}/scene.glb`)).arrayBuffer();
@@ -145,10 +145,10 @@ it('keeps the light of a solve that has failed, says why, and starts it again', 
   const { surfaces } = await told(page);
   tell(failed(await told(page), surfaces));
   const banner = page.locator('.banner');
-  await banner.getByText('The solve has failed: out of memory (bad_alloc).').waitFor();
+  await banner.getByText('The solve failed: out of memory (bad_alloc).').waitFor();
   expect(await page.evaluate(() => window.viewer!.viewer.shown !== undefined)).toBe(true);
   expect(await page.locator('.welcome').isVisible()).toBe(false);
-  await banner.getByRole('button', { name: 'Start again' }).click();
+  await banner.getByRole('button', { name: 'Restart' }).click();
   await converged(page);
   expect(await banner.isVisible()).toBe(false);
 });

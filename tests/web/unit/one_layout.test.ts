@@ -64,8 +64,8 @@ describe('what is downloaded', () => {
 
   it('is given up with a message where the layout changes all the time', async () => {
     const { layouts, asked } = server(() => true);
-    await expect(fetchLightmaps(layouts)).rejects.toThrow(/laid out anew/);
-    await expect(fetchLitScene(layouts)).rejects.toThrow(/at rest/);
+    await expect(fetchLightmaps(layouts)).rejects.toThrow(/kept changing/);
+    await expect(fetchLitScene(layouts)).rejects.toThrow(/nobody is editing/);
     expect(asked.length).toBe(4 * 4 + 4);
   });
 

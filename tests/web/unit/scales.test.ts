@@ -1,10 +1,14 @@
 import { errorsShown, ticksBetween, within } from '../../../client/web/src/ui/error_plot';
 import { briefly } from '../../../client/web/src/ui/scene_panel';
-import { scaleLabels } from '../../../client/web/src/ui/legend';
+import { besidePointer, scaleLabels } from '../../../client/web/src/ui/legend';
 
 describe('the legend of false colours', () => {
   it('says of its ends that what lies beyond has their colour', () => {
     expect(scaleLabels(0.1, 1000)).toEqual(['≤ 0.1', '1', '10', '100', '≥ 1,000']);
+  });
+
+  it('writes small values as the light meter does, fewer of them, as they are long', () => {
+    expect(scaleLabels(3.4e-6, 3.4e-4)).toEqual(['≤ 3.4 × 10⁻⁶', '3.4 × 10⁻⁵', '≥ 3.4 × 10⁻⁴']);
   });
 });
 
@@ -47,4 +51,24 @@ it('numbers of a place are brief, and none of them nothing but what rounding lea
   expect(given.map(briefly)).toEqual(
     ['0.3683', '-6.6e-4', '0.0596', '-50.82', '38.36', '1', '0', '0', '123.46', '-1234.57', '10', '2.0e-8'], // prettier-ignore
   );
+});
+
+describe('the card of the light meter', () => {
+  const [card, page] = [
+    { width: 200, height: 90 },
+    { width: 360, height: 740 },
+  ];
+  const legend = { x: 10, y: 611, width: 266, height: 70 };
+  const at = (x: number, y: number, other?: typeof legend) => Object.values(besidePointer({ x, y }, card, page, other));
+
+  it('is below the pointer to its right, where there is room', () => {
+    expect(at(50, 100)).toEqual([68, 118]);
+    expect(at(300, 100)).toEqual([152, 118]);
+    expect(at(50, 700)).toEqual([68, 596]);
+  });
+
+  it('keeps off the legend', () => {
+    expect(at(50, 100, legend)).toEqual([68, 118]);
+    for (const y of [500, 550, 600, 650, 680, 720]) expect(at(50, y, legend)[1]! + card.height).toBeLessThan(612);
+  });
 });

@@ -61,7 +61,7 @@ it('numbers are readable', () => {
     '1,235',
     '0.0123',
     '0',
-    '1.00e-7',
+    '1.00 × 10⁻⁷',
     '–',
   ]);
   expect(percent(0.0183)).toBe('1.8 %');
@@ -76,7 +76,7 @@ it('what was measured keeps the zeros at its end', () => {
     '-5.00',
     '100',
     '1,235',
-    '2.00e-7',
+    '2.00 × 10⁻⁷',
     '0.00',
     '–',
   ]);

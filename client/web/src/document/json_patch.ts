@@ -12,7 +12,7 @@ interface Place {
 
 export function parsePointer(pointer: string): string[] {
   if (pointer === '') return [];
-  if (!pointer.startsWith('/')) throw new PatchError(`${pointer} is no JSON pointer`);
+  if (!pointer.startsWith('/')) throw new PatchError(`${pointer} is not a JSON pointer`);
   return pointer
     .slice(1)
     .split('/')
@@ -61,16 +61,16 @@ function child(value: Json | undefined, token: string): Json | undefined {
 function placeOf(document: Json, pointer: string): Place {
   const tokens = parsePointer(pointer);
   const key = tokens.pop();
-  if (key === undefined) throw new PatchError('the whole document is not replaced by a patch');
+  if (key === undefined) throw new PatchError('a patch cannot replace the whole document');
   let at: Json | undefined = document;
   for (const token of tokens) at = child(at, token);
-  if (!Array.isArray(at) && !isObject(at)) throw new PatchError(`${pointer}: there is nothing to hold it`);
+  if (!Array.isArray(at) && !isObject(at)) throw new PatchError(`${pointer}: its parent does not exist`);
   return { parent: at, key };
 }
 
 function indexIn(array: Json[], key: string, pointer: string, end: number): number {
   const index = key === '-' ? array.length : /^(0|[1-9]\d*)$/.test(key) ? Number(key) : NaN;
-  if (!(index <= end)) throw new PatchError(`${pointer} is outside of its array`);
+  if (!(index <= end)) throw new PatchError(`${pointer} is outside its array`);
   return index;
 }
 
@@ -101,7 +101,7 @@ function remove(document: Json, pointer: string): { removed: Json; inverse: Patc
 
 function existing(parent: Place['parent'], key: string, pointer: string): Json {
   const value = child(parent, key);
-  if (value === undefined) throw new PatchError(`${pointer}: there is nothing`);
+  if (value === undefined) throw new PatchError(`${pointer} does not exist`);
   return value;
 }
 
@@ -143,7 +143,7 @@ function applyOperation(document: Json, operation: PatchOperation): Patch {
       return [replace(document, path, copied(operation))];
     case 'copy': {
       const value = valueAt(document, withoutNames(document, sourceOf(operation)));
-      if (value === undefined) throw new PatchError(`${operation.from}: there is nothing`);
+      if (value === undefined) throw new PatchError(`${operation.from} does not exist`);
       return [add(document, path, structuredClone(value))];
     }
     case 'move': {
@@ -154,10 +154,10 @@ function applyOperation(document: Json, operation: PatchOperation): Patch {
     }
     case 'test':
       if (operation.value === undefined || !sameJson(valueAt(document, path), operation.value))
-        throw new PatchError(`${path} is not what the patch expects`);
+        throw new PatchError(`${path} does not have the value that the patch expects`);
       return [];
     default:
-      throw new PatchError(`${String(operation.op)} is no operation of JSON Patch`);
+      throw new PatchError(`${String(operation.op)} is not a JSON Patch operation`);
   }
 }
 

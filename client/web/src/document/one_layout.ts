@@ -52,5 +52,5 @@ async function ofOneLayout<T>(layouts: Layouts, take: (note: LightmapsNote) => P
     if (taken !== undefined) return taken;
     for (let pause = 0; pause < PAUSES && layouts.now() === note; ++pause) await layouts.pause();
   }
-  throw new Error('the scene was laid out anew each time before all of it was there; try again when it is at rest');
+  throw new Error('the scene kept changing while it was fetched; try again when nobody is editing it');
 }

@@ -107,13 +107,18 @@ export function checkbox(checked: boolean, onChange: (on: boolean) => void): HTM
   return element;
 }
 
-/** Number with `digits` significant digits and thousands set apart. */
+/** Number with `digits` significant digits and thousands set apart; what is very small or large as a multiple of a power of ten. */
 export function readable(value: number, digits = 3): string {
   if (!Number.isFinite(value)) return '–';
-  if (value !== 0 && (Math.abs(value) < 1e-3 || Math.abs(value) >= 1e7)) return value.toExponential(digits - 1);
+  if (value !== 0 && (Math.abs(value) < 1e-3 || Math.abs(value) >= 1e7)) return scientific(value, digits);
   return value.toLocaleString('en', {
     maximumSignificantDigits: Math.max(digits, 1 + Math.floor(Math.log10(Math.abs(value) || 1))),
   });
+}
+
+function scientific(value: number, digits: number): string {
+  const [units, power] = value.toExponential(digits - 1).split('e');
+  return `${units} × 10${superscript(Number(power))}`;
 }
 
 /** The same for what was measured: a zero at its end was measured, too. */
@@ -160,6 +165,11 @@ export function parseNumber(text: string): number {
   if (!/^[-+]?(\d+[.,]?\d*|[.,]\d+)(e[-+]?\d+)?$/i.test(plain)) return NaN;
   const value = Number(plain.replace(',', '.'));
   return Number.isFinite(value) ? value : NaN; // "1e999" is none that a message could carry
+}
+
+/** Three digits of a number as somebody would write it. */
+export function inField(value: number): string {
+  return String(Number(value.toPrecision(3)));
 }
 
 export function percent(fraction: number): string {

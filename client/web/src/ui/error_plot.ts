@@ -22,7 +22,7 @@ export class ErrorPlot {
   readonly element = h('canvas', {
     class: 'plot',
     role: 'img',
-    'aria-label': 'Error against solve time, both logarithmic',
+    'aria-label': 'Error against solve time, on logarithmic axes',
   });
   private samples: Sample[] = [];
   private target = 0;

@@ -27,13 +27,13 @@ export class Frame {
   });
   readonly toasts = new Toasts();
   readonly legend = new Legend();
-  readonly meter = new MeterCard();
+  readonly meter = new MeterCard(this.legend.element);
   readonly help = makeHelp();
   private readonly state = h('span', { class: 'state', role: 'status' }, 'Connecting');
   private readonly dot = h('span', { class: 'dot' });
   private readonly error = h('span', { class: 'error-now' });
   private readonly rate = h('span', { class: 'rate' });
-  private readonly people = h('span', { class: 'people', title: 'People who watch', hidden: true });
+  private readonly people = h('span', { class: 'people', title: 'Viewers', hidden: true });
   private readonly banner = h('div', { class: 'banner', role: 'alert', hidden: true });
   private readonly welcome = h('div', { class: 'welcome card', hidden: true });
   /** There is a picture, which no message shall cover. */
@@ -75,9 +75,9 @@ export class Frame {
   }
 
   setState(text: string, tone: 'busy' | 'good' | 'bad' | 'idle', error = '', rate = ''): void {
-    this.state.textContent = text;
-    this.error.textContent = error;
-    this.rate.textContent = rate;
+    // What is written anew is read out anew, though it is the same.
+    const texts: [HTMLElement, string][] = [[this.state, text], [this.error, error], [this.rate, rate]]; // prettier-ignore
+    for (const [element, wanted] of texts) if (element.textContent !== wanted) element.textContent = wanted;
     this.dot.className = `dot ${tone}`;
   }
 
@@ -120,11 +120,11 @@ export class Frame {
     if (state === 'loading')
       return this.welcome.replaceChildren(
         h('h2', {}, 'Loading the scene'),
-        h('p', {}, 'Its surfaces are laid out for light; a large one takes a while.'),
+        h('p', {}, 'Laying out its surfaces for lightmaps; a large scene takes a while.'),
       );
     this.welcome.replaceChildren(
       h('h2', {}, state === 'failed' ? 'The server has lost the scene' : 'No scene yet'),
-      failure && h('p', {}, `It says: ${failure}.`),
+      failure && h('p', {}, `Reason: ${failure}.`),
       h('p', {}, 'Drop a .glb here, or send one:'),
       h('pre', { class: 'code' }, `curl -T room.glb ${location.origin}/scene`),
     );
@@ -135,7 +135,7 @@ export class Frame {
     const form = h(
       'form',
       { class: 'token' },
-      h('span', {}, `This server wants a token: ${reason}.`),
+      h('span', {}, `This server requires a token: ${reason}.`),
       input,
       h('button', {}, 'Connect'),
     );
@@ -187,7 +187,7 @@ export class Frame {
       frame: tool('frame', 'Frame everything', 'F', () => actions.frameAll()),
       meter: tool('meter', 'Light meter', 'M', () => actions.toggleMeter()),
       translate: tool('move', 'Move', 'T', () => actions.gizmo('translate')),
-      rotate: tool('rotate', 'Turn', 'R', () => actions.gizmo('rotate')),
+      rotate: tool('rotate', 'Rotate', 'R', () => actions.gizmo('rotate')),
       scale: tool('scale', 'Scale', 'Y', () => actions.gizmo('scale')),
       lamp: tool('lamp', 'Add a lamp', 'L', () => actions.addLamp()),
       undo: tool('undo', 'Undo', 'Ctrl+Z', () => actions.undo()),
@@ -223,7 +223,7 @@ export class Frame {
     const apply = () => {
       document.documentElement.dataset['theme'] = theme !== 'auto' ? theme : system.matches ? 'light' : 'dark';
       element.textContent = theme === 'auto' ? '◐' : theme === 'dark' ? '☾' : '☀';
-      element.title = `Colours: ${theme}`;
+      element.title = `Theme: ${theme}`;
       element.setAttribute('aria-label', element.title);
     };
     const element: HTMLButtonElement = button(

@@ -4,13 +4,18 @@ import { MIP_STOPS, paletteCss } from '../view/palette';
 import { h, measured, readable, withError } from './dom';
 
 const LABELS = 5;
+/** Of those that are written as multiples of powers of ten. */
+const LONG_LABELS = 3;
 
 /** Of colours on a logarithmic scale. The first and the last colour are those of all that lies beyond it, too, as lamps do. */
 export function scaleLabels(low: number, high: number): string[] {
-  return Array.from({ length: LABELS }, (_, i) => {
-    const sign = i === 0 ? '≤ ' : i === LABELS - 1 ? '≥ ' : '';
-    return sign + readable(low * (high / low) ** (i / (LABELS - 1)), 2);
-  });
+  const labels = (count: number) =>
+    Array.from({ length: count }, (_, i) => {
+      const sign = i === 0 ? '≤ ' : i === count - 1 ? '≥ ' : '';
+      return sign + readable(low * (high / low) ** (i / (count - 1)), 2);
+    });
+  const all = labels(LABELS);
+  return all.some((label) => label.includes('×')) ? labels(LONG_LABELS) : all;
 }
 
 export class Legend {
@@ -19,7 +24,7 @@ export class Legend {
   private readonly title = h('div', { class: 'title' });
   readonly element = h(
     'figure',
-    { class: 'legend card', 'aria-label': 'Scale of colours', hidden: true },
+    { class: 'legend card', 'aria-label': 'Colour scale', hidden: true },
     this.title,
     this.bar,
     this.ticks,
@@ -35,7 +40,7 @@ export class Legend {
 
   showMips(): void {
     const labels = MIP_STOPS.map((_, mip) =>
-      mip === 0 ? '0, sharp' : mip < MIP_STOPS.length - 1 ? `${mip}` : `${mip} +`,
+      mip === 0 ? '0, finest' : mip < MIP_STOPS.length - 1 ? `${mip}` : `${mip} +`,
     );
     this.fill('Mip level of the light', paletteCss('to right', MIP_STOPS), labels);
   }
@@ -51,6 +56,36 @@ export class Legend {
   }
 }
 
+interface Size {
+  width: number;
+  height: number;
+}
+
+interface Point {
+  x: number;
+  y: number;
+}
+
+/** Of a card at the pointer, in a page of a size: its left and top, clear of something else where that can be. */
+export function besidePointer(pointer: Point, card: Size, page: Size, other?: Point & Size): Point {
+  const right = Math.min(Math.max(8, pointer.x + 18), Math.max(8, page.width - card.width - 8));
+  const left = Math.max(8, pointer.x - card.width - 14);
+  const [below, above] = [pointer.y + 18, pointer.y - card.height - 14];
+  const isFree = ({ x, y }: Point) =>
+    y >= 0 &&
+    y + card.height <= page.height &&
+    !(
+      other &&
+      x < other.x + other.width &&
+      x + card.width > other.x &&
+      y < other.y + other.height &&
+      y + card.height > other.y
+    );
+  const overOther = { x: right, y: (other?.y ?? page.height) - card.height - 8 };
+  const places = [below, above].flatMap((y) => [right, left].map((x) => ({ x, y })));
+  return [...places, overOther].find(isFree) ?? { x: right, y: below + card.height > page.height ? above : below };
+}
+
 /** The light meter's reading, beside the pointer. */
 export class MeterCard {
   private readonly value = h('strong', {});
@@ -63,6 +98,9 @@ export class MeterCard {
     this.more,
   );
 
+  /** `legend`: what it is not to cover. */
+  constructor(private readonly legend: HTMLElement) {}
+
   hide(): void {
     this.element.hidden = true;
   }
@@ -72,13 +110,13 @@ export class MeterCard {
     this.element.hidden = false;
     const sure = error === undefined || !Number.isFinite(error);
     const [value, either] =
-      lux === undefined ? ['no light known', ''] : sure ? [measured(lux), ''] : withError(lux, error);
+      lux === undefined ? ['no light yet', ''] : sure ? [measured(lux), ''] : withError(lux, error);
     this.value.textContent = value;
     this.bar.textContent = lux === undefined ? '' : either ? ` ± ${either} lx` : ' lx';
     this.more.textContent = details;
-    const { offsetWidth: w, offsetHeight: hgt } = this.element;
-    const left = Math.min(Math.max(8, x + 18), Math.max(8, innerWidth - w - 8));
-    const top = y + 18 + hgt > innerHeight ? y - hgt - 14 : y + 18;
-    this.element.style.transform = `translate(${Math.round(left)}px, ${Math.round(top)}px)`;
+    const { offsetWidth: width, offsetHeight: height } = this.element;
+    const legend = this.legend.hidden ? undefined : this.legend.getBoundingClientRect();
+    const at = besidePointer({ x, y }, { width, height }, { width: innerWidth, height: innerHeight }, legend);
+    this.element.style.transform = `translate(${Math.round(at.x)}px, ${Math.round(at.y)}px)`;
   }
 }

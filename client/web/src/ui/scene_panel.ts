@@ -23,7 +23,8 @@ export interface ScenePanelActions {
   frameSelection(): void;
   endGesture(): void;
   loadFile(file: File): void;
-  notUnderstood(text: string): void;
+  /** `wanted`: what the field takes. */
+  notAccepted(text: string, wanted: string): void;
 }
 
 const MOST_LISTED = 400;
@@ -38,6 +39,9 @@ export function briefly(value: number): string {
   if (size < 1e-3) return value.toExponential(1);
   return String(Number(size < 100 ? value.toFixed(Math.min(4, 3 - Math.floor(Math.log10(size)))) : value.toFixed(2)));
 }
+
+/** What a field takes, and how it is asked for. */
+const ANY_NUMBER = { wanted: 'a number', isGood: (value: number) => Number.isFinite(value) };
 
 interface ListEntry {
   node: number;
@@ -151,8 +155,8 @@ export class ScenePanel {
       return h('li', {}, element);
     });
     if (found > listed.length)
-      items.push(h('li', { class: 'dim' }, `and ${found - listed.length} more: find them by name`));
-    if (found === 0) items.push(h('li', { class: 'dim' }, 'None.'));
+      items.push(h('li', { class: 'dim' }, `and ${found - listed.length} more: search by name`));
+    if (found === 0) items.push(h('li', { class: 'dim' }, 'None found.'));
     this.list.replaceChildren(...items);
     this.list.scrollTop = scrollTop;
     if (had) this.entries.get(this.selection?.node ?? -1)?.focus();
@@ -185,7 +189,7 @@ export class ScenePanel {
     const { selection, gltf } = this;
     const node = selection && gltf.nodes?.[selection.node];
     if (!selection || !node) {
-      this.editor.replaceChildren(h('p', { class: 'dim' }, 'Click an object to change it.'));
+      this.editor.replaceChildren(h('p', { class: 'dim' }, 'Click an object to edit it.'));
       return;
     }
     const light = lightOf(gltf, selection.node);
@@ -202,7 +206,7 @@ export class ScenePanel {
         h(
           'div',
           { class: 'buttons' },
-          button('Look at it', () => this.actions.frameSelection(), { title: 'Shift+F' }),
+          button('Frame object', () => this.actions.frameSelection(), { title: 'Shift+F' }),
           button('Remove', () => this.actions.remove(selection.node), { title: 'Delete' }),
         ),
       ),
@@ -224,14 +228,19 @@ export class ScenePanel {
         const euler = new Euler(...([x, y, z].map((a) => MathUtils.degToRad(a)) as Vec3), 'YXZ');
         this.actions.setPlacement(index, { rotation: new Quaternion().setFromEuler(euler).toArray() as Vec4 });
       }),
-      this.vector('Scale', node.scale ?? [1, 1, 1], (scale) => this.actions.setPlacement(index, { scale })),
+      // A scale of 0 makes a sheet of a body: faces that look both ways in one plane, which no light can tell apart.
+      this.vector('Scale', node.scale ?? [1, 1, 1], (scale) => this.actions.setPlacement(index, { scale }), {
+        wanted: 'a number other than 0',
+        isGood: (value) => Number.isFinite(value) && value !== 0,
+      }),
     ];
   }
 
-  private vector(label: string, value: Vec3, changed: (value: Vec3) => void): HTMLElement {
-    // What nobody wrote anew stays as exact as it was, whatever there is room for.
-    const read = (input: HTMLInputElement, i: number) =>
-      input.value === briefly(value[i]!) ? value[i]! : parseNumber(input.value);
+  private vector(label: string, value: Vec3, changed: (value: Vec3) => void, accepts = ANY_NUMBER): HTMLElement {
+    // What nobody wrote anew stays as exact as it was, whatever there is room for, and is not asked whether it is good.
+    const isKept = (input: HTMLInputElement, i: number) => input.value === briefly(value[i]!);
+    const read = (input: HTMLInputElement, i: number) => (isKept(input, i) ? value[i]! : parseNumber(input.value));
+    const isBad = (input: HTMLInputElement, i: number) => !isKept(input, i) && !accepts.isGood(read(input, i));
     const inputs = value.map((v, i) =>
       h('input', {
         type: 'text',
@@ -241,9 +250,9 @@ export class ScenePanel {
         title: String(v),
         'aria-label': `${label}, ${'xyz'[i]}`,
         onchange: () => {
-          const next = inputs.map(read) as Vec3;
-          if (next.every(Number.isFinite)) changed(next);
-          else this.refuse(inputs.find((input, i) => !Number.isFinite(read(input, i)))!);
+          const bad = inputs.find(isBad);
+          if (bad) this.refuse(bad, accepts.wanted);
+          else changed(inputs.map(read) as Vec3);
         },
       }),
     );
@@ -263,7 +272,7 @@ export class ScenePanel {
     const nits = this.number(String(Number((top * strength).toPrecision(5))), () => send());
     const send = () => {
       const value = parseNumber(nits.value);
-      if (!(value >= 0)) return this.refuse(nits);
+      if (!(value >= 0)) return this.refuse(nits, 'a number, 0 or more');
       this.actions.setEmission(index, value > 0 ? fromHex(glow.value) : [0, 0, 0], value > 0 ? value : 1);
     };
     const chooser =
@@ -288,7 +297,7 @@ export class ScenePanel {
       chooser,
       field('Colour', colour),
       field('Emission', glow),
-      field('Strength, nit', nits),
+      field('Strength, nits', nits),
     );
   }
 
@@ -301,14 +310,14 @@ export class ScenePanel {
     const strength = this.number(String(Number((light.intensity ?? 1).toPrecision(5))), () => {
       const value = parseNumber(strength.value);
       if (value >= 0) this.actions.setLight(index, { intensity: value });
-      else this.refuse(strength);
+      else this.refuse(strength, 'a number, 0 or more');
     });
     return section(`Light: ${light.type}`, field('Colour', colour), field(`Intensity, ${unit}`, strength));
   }
 
   /** What it was before stands there again. */
-  private refuse(input: HTMLInputElement): void {
-    this.actions.notUnderstood(input.value);
+  private refuse(input: HTMLInputElement, wanted = 'a number'): void {
+    this.actions.notAccepted(input.value, wanted);
     this.showEditor();
   }
 

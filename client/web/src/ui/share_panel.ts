@@ -13,7 +13,7 @@ export interface SharePanelActions {
 
 export class SharePanel {
   readonly element: HTMLElement;
-  private readonly edit = h('pre', { class: 'code', tabIndex: 0 }, 'Nothing was changed yet.');
+  private readonly edit = h('pre', { class: 'code', tabIndex: 0 }, 'No edits yet.');
   private readonly about = h('dl', { class: 'facts' });
   private readonly copies: HTMLButtonElement[];
 
@@ -37,10 +37,10 @@ export class SharePanel {
       section(
         'People',
         field(
-          'Show cameras',
+          'Share cameras',
           checkbox(actions.sharing, (on) => actions.setSharing(on)),
         ),
-        h('p', { class: 'dim' }, 'Who shows where they look from sees where the others do.'),
+        h('p', { class: 'dim' }, 'Viewers who share their cameras see where the others look from.'),
       ),
       section('Last edit', this.edit, h('div', { class: 'buttons' }, ...this.copies)),
       section(
@@ -51,7 +51,7 @@ export class SharePanel {
           button('Lit scene (.glb)', () => actions.download('glb'), { title: 'With lightmap coordinates' }),
           button('Baked scene (.glb)', () => actions.download('unlit'), { title: 'For any glTF viewer' }),
           button('Lightmaps (.exr)', () => actions.download('exr'), { title: 'Irradiance in lux, 32-bit float' }),
-          button("Server's picture (.png)", () => actions.download('snapshot')),
+          button('Server snapshot (.png)', () => actions.download('snapshot')),
         ),
       ),
       section('Server', this.about),

@@ -1,14 +1,15 @@
 // The panel "Solve": how far the light is, and how far it shall go.
 
 import type { Progress, Settings } from '../protocol/messages';
-import { button, field, h, parseNumber, percent, readable, section } from './dom';
+import { button, field, h, inField, parseNumber, percent, readable, section } from './dom';
 import { ErrorPlot } from './error_plot';
 
 export interface SolvePanelActions {
   pauseOrResume(): void;
   restart(): void;
   configure(settings: Partial<Settings>): void;
-  notUnderstood(text: string): void;
+  /** `wanted`: what the field takes. */
+  notAccepted(text: string, wanted: string): void;
 }
 
 const STATES: Record<string, string> = {
@@ -18,7 +19,7 @@ const STATES: Record<string, string> = {
   paused: 'Paused',
   converged: 'Done',
   timeLimit: 'Time limit reached',
-  limited: 'Limit reached',
+  limited: 'Stopped above target',
   failed: 'Failed',
 };
 
@@ -39,7 +40,7 @@ export class SolvePanel {
   private readonly facts = h('dl', { class: 'facts' });
   private readonly warnings = h('details', { hidden: true });
   private readonly pause: HTMLButtonElement;
-  private readonly bar = h('progress', { max: 1, value: 0, 'aria-label': 'Way to the target error' });
+  private readonly bar = h('progress', { max: 1, value: 0, 'aria-label': 'Progress towards the target error' });
   private readonly target: HTMLInputElement;
   private readonly texels: HTMLInputElement;
   private settings: Settings | undefined;
@@ -51,14 +52,14 @@ export class SolvePanel {
     this.target.onchange = () => {
       const value = parseNumber(this.target.value.replace('%', '')) / 100;
       if (value > 0 && value <= 1) return actions.configure({ targetError: value });
-      actions.notUnderstood(this.target.value);
+      actions.notAccepted(this.target.value, 'a percentage above 0, up to 100');
       this.showSettings();
     };
     this.texels = h('input', { type: 'text', class: 'number', inputMode: 'numeric' });
     this.texels.onchange = () => {
       const value = Math.round(parseNumber(this.texels.value));
       if (value >= 1) return actions.configure({ texels: value });
-      actions.notUnderstood(this.texels.value);
+      actions.notAccepted(this.texels.value, 'a number, 1 or more');
       this.showSettings();
     };
     this.element = h(
@@ -72,11 +73,11 @@ export class SolvePanel {
           'div',
           { class: 'buttons' },
           this.pause,
-          button('Start again', () => actions.restart()),
+          button('Restart', () => actions.restart()),
         ),
       ),
       section('Error against time', this.plot.element, legendLine()),
-      section('Goal', field('Error, %', this.target), field('Texels, about', this.texels)),
+      section('Target', field('Error, %', this.target), field('Texels, approx.', this.texels)),
       this.warnings,
     );
   }
@@ -92,14 +93,14 @@ export class SolvePanel {
     this.pause.disabled = progress.state !== 'paused' && progress.state !== 'solving';
     this.showFacts([
       ['State', progress.failure ? `${stateName(progress.state)}: ${progress.failure}` : stateName(progress.state)],
-      ['Error', `${percent(error.total)} of ${percent(target)}`],
+      ['Error', `${percent(error.total)} (target ${percent(target)})`],
       ['Residual', percent(error.residual)],
       ['Sampling', percent(error.sampling)],
       ['Within texels', percent(error.variation ?? 0)],
-      ['Too coarse texels', percent(error.discretization)],
+      ['Between texels', percent(error.discretization)],
       ['Shots', `${readable(progress.shots, 4)} (${readable(progress.shotsPerSecond, 2)}/s)`],
       ['Solve time', duration(progress.seconds)],
-      ['Time left, about', progress.secondsLeft === undefined ? '–' : duration(progress.secondsLeft)],
+      ['Time left, approx.', progress.secondsLeft === undefined ? '–' : duration(progress.secondsLeft)],
       [
         'Unshot',
         `${readable(Math.abs(progress.energy['unshot'] ?? 0))} of ${readable(progress.energy['emitted'] ?? 0)} lm`,
@@ -126,7 +127,7 @@ export class SolvePanel {
   /** What stands in the fields: the server's, also after it has refused others. */
   showSettings(): void {
     if (!this.settings) return;
-    this.target.value = readable(100 * this.settings.targetError);
+    this.target.value = inField(100 * this.settings.targetError);
     this.texels.value = String(this.settings.texels);
   }
 
@@ -147,6 +148,6 @@ function legendLine(): HTMLElement {
     swatch('a', 'total'),
     swatch('b', 'sampling'),
     swatch('c', 'residual'),
-    swatch('t', 'goal'),
+    swatch('t', 'target'),
   );
 }

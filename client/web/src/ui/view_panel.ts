@@ -1,10 +1,10 @@
 // The panel "View": what is shown and how bright, from where.
 
 import { TONE_CURVES, VIEW_MODES, type ViewMode } from '../view/view_modes';
-import { button, checkbox, field, h, parseNumber, pressed, readable, section, select } from './dom';
+import { button, checkbox, field, h, inField, parseNumber, pressed, readable, section, select } from './dom';
 
 export const BACKGROUNDS = [
-  { id: 'theme', label: 'As the page' },
+  { id: 'theme', label: 'Same as page' },
   { id: 'black', label: 'Black' },
   { id: 'grey', label: 'Grey' },
   { id: 'white', label: 'White' },
@@ -20,7 +20,8 @@ export interface ViewPanelActions {
   setToneCurve(id: string): void;
   setBackground(id: string): void;
   useCamera(index: number): void;
-  notUnderstood(text: string): void;
+  /** `wanted`: what the field takes. */
+  notAccepted(text: string, wanted: string): void;
 }
 
 export class ViewPanel {
@@ -38,7 +39,7 @@ export class ViewPanel {
   private readonly falseRow: HTMLElement;
 
   constructor(private readonly actions: ViewPanelActions) {
-    const grid = h('div', { class: 'modes', role: 'group', 'aria-label': 'What is shown' });
+    const grid = h('div', { class: 'modes', role: 'group', 'aria-label': 'View' });
     VIEW_MODES.forEach((mode, i) => {
       const key = String((i + 1) % 10);
       const element = button(mode.label, () => actions.setMode(mode.id), { title: `${mode.hint} (${key})` });
@@ -61,7 +62,7 @@ export class ViewPanel {
         field('Auto exposure', this.auto),
         field('Exposure', this.stops, this.stopsValue),
         field(
-          'Tone curve',
+          'Tone mapping',
           select(TONE_CURVES, 'neutral', (id) => actions.setToneCurve(id)),
         ),
         field(
@@ -69,7 +70,7 @@ export class ViewPanel {
           select(BACKGROUNDS, 'theme', (id) => actions.setBackground(id)),
         ),
       ),
-      section('Cameras of the scene', this.cameras),
+      section('Scene cameras', this.cameras),
     );
     this.setStops(0);
   }
@@ -87,7 +88,7 @@ export class ViewPanel {
     for (const mode of VIEW_MODES) {
       const element = this.modes.get(mode.id)!;
       element.disabled = !available(mode);
-      if (element.disabled) element.title = `${mode.hint}: this server does not stream it`;
+      if (element.disabled) element.title = `${mode.hint} (not available from this server)`;
     }
   }
 
@@ -102,14 +103,14 @@ export class ViewPanel {
 
   showRange(low: number, high: number): void {
     if (!this.autoRange.checked) return;
-    this.low.value = readable(low, 3).replaceAll(',', '');
-    this.high.value = readable(high, 3).replaceAll(',', '');
+    this.low.value = inField(low);
+    this.high.value = inField(high);
   }
 
   setCameras(names: string[]): void {
     this.cameras.replaceChildren(
       ...names.map((name, i) => button(name, () => this.actions.useCamera(i))),
-      ...(names.length === 0 ? [h('p', { class: 'dim' }, 'The scene has none.')] : []),
+      ...(names.length === 0 ? [h('p', { class: 'dim' }, 'None in this scene.')] : []),
     );
   }
 
@@ -129,6 +130,6 @@ export class ViewPanel {
     const [low, high] = [parseNumber(this.low.value), parseNumber(this.high.value)];
     if (automatic) this.actions.setRange(undefined);
     else if (low > 0 && high > low) this.actions.setRange([low, high]);
-    else this.actions.notUnderstood(`${this.low.value} to ${this.high.value}`);
+    else this.actions.notAccepted(`${this.low.value} to ${this.high.value}`, 'a value above 0 and a higher one');
   }
 }

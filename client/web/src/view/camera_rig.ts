@@ -1,6 +1,6 @@
 // Where one looks from: orbiting about a point, or walking in the first person, by mouse, touch and keyboard.
 
-import { Box3, Euler, MathUtils, PerspectiveCamera, Quaternion, Sphere, Vector3 } from 'three';
+import { Box3, Euler, MathUtils, PerspectiveCamera, Quaternion, Vector3 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 
 export type Walk = 'orbit' | 'walk';
@@ -13,6 +13,11 @@ const WALK_KEYS: Record<string, [number, number, number]> = {
   KeyE: [0, 1, 0],
   KeyQ: [0, -1, 0],
 };
+
+/** Room around what is framed. */
+const FRAME_MARGIN = 1.08;
+/** Degrees: in a room one is near to what one sees. */
+const ROOM_FOV = 65;
 
 export class CameraRig {
   readonly camera = new PerspectiveCamera(45, 1, 0.01, 1000);
@@ -119,13 +124,22 @@ export class CameraRig {
     this.orbit.maxDistance = this.size * 20;
   }
 
+  /** Looks at the middle of the box from as near as its corners let it. */
   frame(box: Box3): void {
-    const sphere = box.getBoundingSphere(new Sphere());
-    const half = MathUtils.degToRad(Math.min(this.camera.fov, this.horizontalFov)) / 2;
+    const center = box.getCenter(new Vector3());
     const back = this.camera.getWorldDirection(new Vector3()).negate();
-    const distance = Math.max(sphere.radius, this.size * 1e-3) / Math.sin(half);
-    this.target.copy(sphere.center);
-    this.camera.position.copy(sphere.center).addScaledVector(back, distance);
+    const upright = MathUtils.degToRad(this.camera.fov) / 2;
+    const sideways = MathUtils.degToRad(this.horizontalFov) / 2;
+    const turned = this.camera.quaternion.clone().invert();
+    let distance = this.size * 2e-3;
+    for (let corner = 0; corner < 8; ++corner) {
+      const at = new Vector3(...'xyz'.split('').map((axis, i) => box[corner & (1 << i) ? 'max' : 'min'][axis as 'x']));
+      const { x, y, z } = at.sub(center).applyQuaternion(turned);
+      distance = Math.max(distance, z + (FRAME_MARGIN * Math.abs(x)) / Math.tan(sideways));
+      distance = Math.max(distance, z + (FRAME_MARGIN * Math.abs(y)) / Math.tan(upright));
+    }
+    this.target.copy(center);
+    this.camera.position.copy(center).addScaledVector(back, distance);
     if (this.mode === 'orbit') this.orbit.update();
     this.moved();
   }
@@ -150,6 +164,13 @@ export class CameraRig {
     this.camera.lookAt(target);
     if (this.mode === 'orbit') this.orbit.update();
     this.moved();
+  }
+
+  /** Looks about in a room. */
+  stand(eye: Vector3, target: Vector3): void {
+    this.fov = ROOM_FOV;
+    this.resize(this.camera.aspect);
+    this.lookFrom(eye, target);
   }
 
   /** Looks at the scene from in front, a little above. */

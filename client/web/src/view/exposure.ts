@@ -62,10 +62,11 @@ export class ExposureMeter {
     ++this.scene;
   }
 
-  /** Shown at once, until there is a measurement to go over to. */
+  /** Shown at once, until there is a measurement, which differs little: to go over to that takes frames for nothing. */
   guess(value: number): void {
     this.take(value);
     this.waits = false;
+    this.fresh = true;
   }
 
   /** How brightly to show light is still to be found out. */

@@ -171,6 +171,8 @@ export class Gizmo {
       const { x, y } = this.pointer.clone().sub(this.grabbed);
       scale.setScalar(2 ** ((x - y) / DOUBLING_PX));
     }
+    // Never nothing, nor less: a drag over the middle ends at the least. What was taken hold of in the middle has no ratio.
+    for (const axis of ['x', 'y', 'z'] as const) if (Number.isNaN(scale[axis])) scale[axis] = 1;
     scale.clampScalar(1 / MOST_SCALE, MOST_SCALE);
   }
 

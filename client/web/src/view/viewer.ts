@@ -40,6 +40,8 @@ const PERSON_SIZE = 0.04;
 
 /** What leaves a surface is this much less than what arrives, at the dark end of the scale. */
 const DARKEST = 0.1;
+/** What is left to shoot counts for nothing where it is less than this of what arrives at the bright end. */
+const LEAST_UNSHOT = 0.01;
 
 export interface ViewerEvents {
   used(bytes: number): void;
@@ -89,6 +91,8 @@ export class Viewer {
   private lost = false;
   /** What is shown took the place of another scene's light. */
   private replaced = false;
+  /** Irradiance at the dark and bright end of what was last known, lux. */
+  private lightRange: [number, number] | undefined;
   private layoutKnown = true;
   private readonly gate = new LightGate();
   private document: Gltf = { asset: { version: '2.0' } };
@@ -213,7 +217,8 @@ export class Viewer {
     this.shown?.applyPointers(document, pointers);
     this.staged?.scene?.applyPointers(document, pointers);
     this.gizmo.refresh();
-    this.pace.hurry(performance.now(), EDIT_HURRY_MS);
+    // The document of a scene that has just come is no edit: its first light may be sharp.
+    if (this.shown?.set.showsLight) this.pace.hurry(performance.now(), EDIT_HURRY_MS);
     this.invalidate();
   }
 
@@ -273,7 +278,9 @@ export class Viewer {
     this.setSigns(true);
     this.invalidate();
     return new Promise((resolve, reject) =>
-      this.canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error('the picture could not be made')))),
+      this.canvas.toBlob((blob) =>
+        blob ? resolve(blob) : reject(new Error('the browser could not encode the picture')),
+      ),
     );
   }
 
@@ -382,12 +389,20 @@ export class Viewer {
     this.invalidate();
   }
 
+  /**
+   * Unshot light is shown by how bright the scene is: by a scale of its own the little that is left at the end would look
+   * like much. As long as it is streamed no irradiance comes, and a layout that comes meanwhile has none: the last stays.
+   */
   private updateRange(): void {
-    const data = this.mode?.quantity === 'irradiance' ? this.shown?.set : this.shownData;
-    const range = this.autoRange ? data?.range() : undefined;
+    if (!this.autoRange) return;
+    const isUnshot = this.mode?.quantity === 'unshot';
+    const isOfLight = isUnshot || this.mode?.quantity === 'irradiance';
+    const range = (isOfLight ? this.shown?.set : this.shownData)?.range() ?? (isUnshot ? this.lightRange : undefined);
     if (!range) return;
+    if (isOfLight) this.lightRange = range;
     const [low, high] = range;
-    this.uniforms.all.falseRange.value.set(this.mode?.id === 'radiosity' ? DARKEST * low : low, high);
+    const darkest = isUnshot ? LEAST_UNSHOT * high : this.mode?.id === 'radiosity' ? DARKEST * low : low;
+    this.uniforms.all.falseRange.value.set(darkest, high);
   }
 
   /** The first scene shows at once; a later one when its light has come, so that nothing goes dark in between. */
