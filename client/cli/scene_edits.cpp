@@ -286,6 +286,9 @@ Result<Json> rotatePatch(const Json& gltf, const std::string& node, double degre
 Result<Json> scalePatch(const Json& gltf, const std::string& node, const std::array<double, 3>& factor) {
   const auto index = findNode(gltf, node);
   if (!index) return tl::unexpected(index.error());
+  const auto isGood = [](double by) { return std::isfinite(by) && by != 0.0; };
+  if (!std::ranges::all_of(factor, isGood))
+    return bad("FACTOR must be finite and not 0, which would make the faces of a body lie on each other", node);
   auto scale = numbersOf<3>(gltf["nodes"][*index], "scale", {1.0, 1.0, 1.0});
   for (std::size_t i = 0; i < 3; ++i) scale[i] *= factor[i];
   return replaceTransform(gltf, *index, "scale", scale);

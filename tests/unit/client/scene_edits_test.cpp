@@ -84,6 +84,8 @@ TEST(SceneEdits, nodesMoveTurnAndGrowFromWhereTheyAre) {
               R"([{"op":"replace","path":"/nodes/@lamp/translation","value":[1.0,2.0,3.0]}])");
   expectPatch(movePatch(document(), "/nodes/0", {1, 2, 3}, true),
               R"([{"op":"replace","path":"/nodes/@lamp/translation","value":[1.0,3.0,3.0]}])");
+  EXPECT_FALSE(scalePatch(document(), "@bulb", {2, 0, 1}));
+  EXPECT_FALSE(scalePatch(document(), "@bulb", {2, 1, std::numeric_limits<double>::quiet_NaN()}));
   expectPatch(scalePatch(document(), "@bulb", {2, 2, 1}),
               R"([{"op":"replace","path":"/nodes/@bulb/scale","value":[2.0,4.0,1.0]}])");
   auto gltf = document();

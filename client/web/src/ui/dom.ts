@@ -141,13 +141,14 @@ export function withError(value: number, error: number): [string, string] {
   const largest = Math.max(Math.abs(value), roundedError);
   if (!(largest > 0 && Number.isFinite(largest))) return [readable(value), readable(error)];
   const last = Math.max(top(roundedError), top(largest) + 2 - MOST_DIGITS) - 1;
-  const power = largest < 1e-3 || largest >= 1e7 ? top(largest) : 0;
-  const decimals = Math.max(0, power - last);
-  const format = { minimumFractionDigits: decimals, maximumFractionDigits: decimals };
-  const write = (units: number) => (units * 10 ** (last - power)).toLocaleString('en', format);
   const v = Math.round(value / 10 ** last) + 0; // -0 would be written with its sign
   // An error that is less than the last digit is no more than one of it.
   const e = Math.max(roundedError > 0 ? 1 : 0, Math.round(roundedError / 10 ** last));
+  const written = Number(`${Math.max(Math.abs(v), e)}e${last}`); // which may have rounded up to a power of ten
+  const power = written < 1e-3 || written >= 1e7 ? top(written) : 0;
+  const decimals = Math.max(0, power - last);
+  const format = { minimumFractionDigits: decimals, maximumFractionDigits: decimals };
+  const write = (units: number) => (units * 10 ** (last - power)).toLocaleString('en', format);
   return power === 0 ? [write(v), write(e)] : [`(${write(v)}`, `${write(e)}) × 10${superscript(power)}`];
 }
 

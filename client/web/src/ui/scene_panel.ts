@@ -268,12 +268,20 @@ export class ScenePanel {
     const colour = this.colour(toHex(base), (hex) => this.actions.setColour(index, fromHex(hex)));
     // The factor's brightest channel belongs to the strength, so that both can be changed by themselves. The luminance of a
     // colour is less than that.
-    const glow = this.colour(toHex(top > 0 ? emission.map((c) => c / top) : [1, 1, 1]), () => send());
-    const nits = this.number(String(Number((top * strength).toPrecision(5))), () => send());
+    let hue = (top > 0 ? emission.map((c) => c / top) : [1, 1, 1]) as Vec3;
+    let value = top * strength;
+    // The one that nobody changed stays as exact as it was: fields hold less.
+    const glow = this.colour(toHex(hue), (hex) => {
+      hue = fromHex(hex);
+      send();
+    });
+    const nits = this.number(String(Number(value.toPrecision(5))), () => {
+      value = parseNumber(nits.value);
+      send();
+    });
     const send = () => {
-      const value = parseNumber(nits.value);
       if (!(value >= 0)) return this.refuse(nits, 'a number, 0 or more');
-      this.actions.setEmission(index, value > 0 ? fromHex(glow.value) : [0, 0, 0], value > 0 ? value : 1);
+      this.actions.setEmission(index, value > 0 ? hue : [0, 0, 0], value > 0 ? value : 1);
     };
     const chooser =
       all.length > 1
