@@ -24,6 +24,25 @@ it('shows the Cornell box in the colours of the server', async () => {
   expect(p99).toBeLessThan(12);
 });
 
+it('fades over a wall without bands', async () => {
+  const page = await pages.open(bare());
+  await converged(page);
+  const changes = await page.evaluate(async () => {
+    const image = await createImageBitmap(await window.viewer!.viewer.picture());
+    const context = new OffscreenCanvas(image.width, image.height).getContext('2d')!;
+    context.drawImage(image, 0, 0);
+    // A piece of the back wall.
+    const [x, y, width, height] = [0.4, 0.24, 0.2, 0.1].map((part) => Math.round(part * image.width)) as never[];
+    const { data } = context.getImageData(x, y, width, height);
+    const steps: number[] = [];
+    for (let i = 4; i < data.length; i += 4) if ((i / 4) % width > 0) steps.push(Math.abs(data[i]! - data[i - 4]!));
+    return { some: steps.filter((step) => step > 0).length / steps.length, most: Math.max(...steps) };
+  });
+  // Neighbours are dithered apart all over, by one step of 255; what fades changes in few places, along contours.
+  expect(changes.some).toBeGreaterThan(0.3);
+  expect(changes.most).toBeLessThanOrEqual(2);
+});
+
 it('gives a late joiner the same picture', async () => {
   const first = await pages.open(bare());
   await converged(first);
