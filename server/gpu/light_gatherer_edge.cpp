@@ -80,6 +80,7 @@ double LightGatherer::shiningAt(const solver::GatherShot& shot, const glm::vec3&
 }
 
 void LightGatherer::addEdge(std::size_t lit) {
+  lit_.front[lit] = 1.0F;  // of what it looks at
   edges_.push_back({static_cast<std::uint32_t>(lit), static_cast<std::uint32_t>(parts_.size() - 1), {}});
 }
 
@@ -99,6 +100,7 @@ void LightGatherer::lookFromEdges(const solver::GatherShot& shot, const solver::
     const glm::vec3 at(lit_.x[i], lit_.y[i], lit_.z[i]), normal(lit_.nx[i], lit_.ny[i], lit_.nz[i]);
     Draw draw(point.origin, at);
     const auto& part = parts_[edge.part];
+    if (part.count < 3) continue;  // no more than rounding
     const solver::PolygonDirections directions(at, normal, std::span(part.corner.data(), part.count));
     const auto direction = directions.draw([&draw] { return draw.next(); });
     const glm::dvec3 light_normal(shot.normal);
