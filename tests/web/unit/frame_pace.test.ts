@@ -54,6 +54,14 @@ describe('the pace of frames', () => {
     expect(card.scales.slice(before)).toEqual([1]);
   });
 
+  it('is soon at rest after one long turn, as when a scene is taken up', () => {
+    const pace = new FramePace(true);
+    for (const now of [0, 900]) pace.turn(now);
+    pace.hurry(900);
+    for (const now of [916, 932, 948, 1110]) pace.turn(now);
+    expect(pace.ask(1110)).toBe(1);
+  });
+
   it('begins coarsely where no card draws', () => {
     const pace = new FramePace(true);
     pace.hurry(0);

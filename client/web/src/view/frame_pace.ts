@@ -17,7 +17,6 @@ const MOST_UNDER_WAY = 2;
 const SOFTWARE_FRAME_MS = 300;
 /** A page that nobody looked at has not been told when its frames were done. */
 const LONGEST_FRAME_MS = 5000;
-const LONGEST_TURN_MS = 1000;
 
 interface Frame {
   scale: number;
@@ -34,7 +33,7 @@ export class FramePace {
   private lastTookMs = 0;
   private hurryUntilMs = -Infinity;
   private lastTurnMs = -Infinity;
-  private turnMs = 0;
+  private turnsSinceHurry = Infinity;
   private lastScale = 1;
 
   /** `software`: no card draws, as far as is known. */
@@ -46,24 +45,29 @@ export class FramePace {
 
   /** Once for every turn of the page, before anything else. */
   turn(nowMs: number): void {
-    this.turnMs = Math.min(LONGEST_TURN_MS, nowMs - this.lastTurnMs);
+    if (nowMs > this.lastTurnMs) ++this.turnsSinceHurry;
     this.lastTurnMs = nowMs;
   }
 
   /** Something moves, and for so long a soon picture is worth more than a sharp one. */
   hurry(nowMs: number, forMs = REST_MS): void {
-    const rest = Math.max(forMs, REST_TURNS * this.turnMs);
-    this.hurryUntilMs = Math.max(this.hurryUntilMs, nowMs + rest);
+    this.turnsSinceHurry = 0;
+    this.hurryUntilMs = Math.max(this.hurryUntilMs, nowMs + forMs);
+  }
+
+  /** Turns are counted as they come: one long turn, as when a scene is taken up, says nothing of the next ones. */
+  private isHurried(nowMs: number): boolean {
+    return nowMs < this.hurryUntilMs || this.turnsSinceHurry < REST_TURNS;
   }
 
   /** What is on the screen was drawn in a hurry that is over: it is to be drawn anew. */
   isSharpDue(nowMs: number): boolean {
-    return this.lastScale < 1 && nowMs >= this.hurryUntilMs;
+    return this.lastScale < 1 && !this.isHurried(nowMs);
   }
 
   /** The scale of a frame that is drawn now; undefined: later, as the card has enough to do. */
   ask(nowMs: number): number | undefined {
-    if (nowMs < this.hurryUntilMs) return this.underWay.length < MOST_UNDER_WAY ? this.movingScale : undefined;
+    if (this.isHurried(nowMs)) return this.underWay.length < MOST_UNDER_WAY ? this.movingScale : undefined;
     const pause = this.lastTookMs > MOVING_FRAME_MS ? Math.min(MOST_PAUSE_MS, this.lastTookMs) : 0;
     return this.underWay.length > 0 || nowMs - this.lastEndMs < pause ? undefined : 1;
   }
