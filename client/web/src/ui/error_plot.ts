@@ -159,9 +159,11 @@ const LEAST_GAP = 0.15;
 /** Of a logarithmic scale. */
 export function ticksBetween(low: number, high: number): number[] {
   let ticks: number[] = [];
+  // Where one after the other there is no room for powers of ten, every second or third of them.
+  const stride = Math.max(1, Math.ceil(LEAST_GAP * Math.log10(high / low)));
   for (const steps of STEPS) {
     const finer: number[] = [];
-    for (let decade = Math.floor(Math.log10(low)); 10 ** decade <= high; ++decade)
+    for (let decade = stride * Math.floor(Math.log10(low) / stride); 10 ** decade <= high; decade += stride)
       finer.push(...steps.map((step) => step * 10 ** decade).filter((tick) => tick >= low && tick <= high));
     const gaps = finer.slice(1).map((tick, i) => Math.log(tick / finer[i]!) / Math.log(high / low));
     if (steps.length > 1 && Math.min(...gaps) < LEAST_GAP) break;
