@@ -24,6 +24,25 @@ it('shows the Cornell box in the colours of the server', async () => {
   expect(p99).toBeLessThan(12);
 });
 
+it('shows light that fades over a wall without bands: every step is spread over many pixels', async () => {
+  const side = 480;
+  const page = await pages.open(bare(), side, side);
+  await converged(page);
+  const shown = await pixels(page, side);
+  // On the back wall, right of the block. Of what is only rounded, a row changes once a band, and never there and back.
+  let [alone, steps, all] = [0, 0, 0];
+  for (let y = 140; y < 190; ++y)
+    for (let x = 270; x < 350; ++x)
+      for (let channel = 0; channel < 3; ++channel) {
+        const [left, here, right] = [-1, 0, 1].map((by) => shown[3 * (y * side + x + by) + channel]!);
+        if (here !== left && left === right) ++alone;
+        steps = Math.max(steps, Math.abs(here! - left!));
+        ++all;
+      }
+  expect(alone / all).toBeGreaterThan(0.05); // measured: 0.14, and 0.0002 of what is only rounded
+  expect(steps).toBeLessThanOrEqual(2);
+});
+
 it('gives a late joiner the same picture', async () => {
   const first = await pages.open(bare());
   await converged(first);
