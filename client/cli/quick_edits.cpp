@@ -117,7 +117,10 @@ void addScale(CLI::App& app, Run& run) {
   };
   auto options = std::make_shared<Options>();
   auto& command = nodeCommand(app, "scale", "make a node larger or smaller", *options);
-  command.add_option("FACTOR", options->factor, "one number, or X Y Z")->required()->expected(1, 3)->type_name("");
+  command.add_option("FACTOR", options->factor, "one number, or X Y Z; none of them 0")
+      ->required()
+      ->expected(1, 3)
+      ->type_name("");
   command.callback([options, &run] {
     run = [options]() -> ExitCode {
       auto f = options->factor;

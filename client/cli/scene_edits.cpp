@@ -23,7 +23,7 @@ struct Property {
   const char* name;
   Kind kind;
   const char* path;
-  enum class Value { kAny, kColor, kBaseColor, kAlpha } value;
+  enum class Value { kAny, kColor, kBaseColor, kAlpha, kScale } value;
   const char* help;
 };
 
@@ -43,7 +43,7 @@ constexpr std::array kProperties = {
     Property{"range", Kind::kLight, "/range", Property::Value::kAny, "metres"},
     Property{"translation", Kind::kNode, "/translation", Property::Value::kAny, "X,Y,Z in metres"},
     Property{"rotation", Kind::kNode, "/rotation", Property::Value::kAny, "quaternion X,Y,Z,W"},
-    Property{"scale", Kind::kNode, "/scale", Property::Value::kAny, "X,Y,Z"},
+    Property{"scale", Kind::kNode, "/scale", Property::Value::kScale, "X,Y,Z, none of them 0"},
     Property{"visible", Kind::kNode, "/extensions/KHR_node_visibility/visible", Property::Value::kAny, "true or false"},
     Property{"texelScale", Kind::kNode, "/extras/radiosityTexelScale", Property::Value::kAny,
              "texels a metre, relative to the rest of the scene"},
@@ -78,6 +78,13 @@ std::string arrayOf(Kind kind) {
 }
 
 std::string nounOf(Kind kind) { return kind == Kind::kMaterial ? "material" : kind == Kind::kLight ? "light" : "node"; }
+
+/// A scale of 0 makes a sheet of a body: faces that look both ways in one plane, which no light can tell apart.
+bool isScale(const std::array<double, 3>& scale) {
+  return std::ranges::all_of(scale, [](double part) { return std::isfinite(part) && part != 0.0; });
+}
+
+constexpr auto kNoScale = "each of X, Y and Z must be a finite number other than 0";
 
 /// Names that are there, for an error: the nearest guess is left to the reader.
 std::string someNames(const Json& array) {
@@ -131,6 +138,13 @@ Json valueOf(const std::string& text) {
 Result<Json> propertyValue(const Property& property, const std::string& text, const Json& before) {
   auto value = valueOf(text);
   if (property.value == Property::Value::kAny) return value;
+  if (property.value == Property::Value::kScale) {
+    const auto isNumber = [](const Json& part) { return part.is_number(); };
+    if (!value.is_array() || value.size() != 3 || !std::ranges::all_of(value, isNumber) ||
+        !isScale(value.get<std::array<double, 3>>()))
+      return bad(kNoScale, property.name);
+    return value;
+  }
   if (property.value == Property::Value::kAlpha) {
     if (!value.is_number() || !before.is_array() || before.size() != 4) return bad("must be a number", property.name);
     return Json::array({before[0], before[1], before[2], value});
@@ -286,11 +300,11 @@ Result<Json> rotatePatch(const Json& gltf, const std::string& node, double degre
 Result<Json> scalePatch(const Json& gltf, const std::string& node, const std::array<double, 3>& factor) {
   const auto index = findNode(gltf, node);
   if (!index) return tl::unexpected(index.error());
-  const auto isGood = [](double by) { return std::isfinite(by) && by != 0.0; };
-  if (!std::ranges::all_of(factor, isGood))
-    return bad("FACTOR must be finite and not 0, which would make the faces of a body lie on each other", node);
+  if (!isScale(factor)) return bad(kNoScale, node);
   auto scale = numbersOf<3>(gltf["nodes"][*index], "scale", {1.0, 1.0, 1.0});
+  const bool was_good = isScale(scale);
   for (std::size_t i = 0; i < 3; ++i) scale[i] *= factor[i];
+  if (was_good && !isScale(scale)) return bad("that makes it too large or too small for a number", node);
   return replaceTransform(gltf, *index, "scale", scale);
 }
 

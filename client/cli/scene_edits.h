@@ -25,7 +25,7 @@ using Json = nlohmann::json;
 /// points at the eye. `absolute`: from no rotation at all.
 [[nodiscard]] Result<Json> rotatePatch(const Json& gltf, const std::string& node, double degrees,
                                        const std::array<double, 3>& axis, bool absolute);
-/// Multiplies the node's scale.
+/// Multiplies the node's scale; no part of the factor may be 0.
 [[nodiscard]] Result<Json> scalePatch(const Json& gltf, const std::string& node, const std::array<double, 3>& factor);
 [[nodiscard]] Result<Json> visibilityPatch(const Json& gltf, const std::string& node, bool visible);
 /// Detaches the node, and all below it, from its parent and its scenes; its index stays taken.

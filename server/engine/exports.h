@@ -13,14 +13,14 @@ namespace radiosity::engine {
 /// The same with one channel "Y" of 32-bit whole numbers.
 [[nodiscard]] Result<Bytes> encodeExr(const IdImage& ids, Quantity quantity);
 
-/// 8-bit RGB PNG of an image already in [0, 1] and sRGB-encoded.
-[[nodiscard]] Result<Bytes> encodePng(const Image& display);
-
 /// Exposes, maps with the Khronos PBR neutral curve (hue-preserving, near-linear up to 0.8) and encodes as sRGB.
 [[nodiscard]] Image toneMap(const Image& radiance, float exposure);
 
-/// A picture in [0, 1], encoded, moved by less than half an 8-bit step, evenly in every square of 8 x 8 pixels: light
-/// that changes by less than a step over a wall has no contours in the PNG then. What lies on a step stays there.
+/// An image already in [0, 1] and sRGB-encoded, moved by less than half an 8-bit step, evenly in every square of 8 x 8
+/// pixels: light that changes by less than a step over a wall has no contours then. What lies on a step stays there.
 [[nodiscard]] Image dithered(Image display);
+
+/// 8-bit RGB PNG of an image already in [0, 1] and sRGB-encoded.
+[[nodiscard]] Result<Bytes> encodePng(const Image& display);
 
 }  // namespace radiosity::engine

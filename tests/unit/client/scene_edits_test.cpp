@@ -79,13 +79,34 @@ TEST(SceneEdits, whatIsNotThereIsSaidWithWhatIs) {
   EXPECT_THAT(fault("@a/b.alpha", "thick"), HasSubstr("must be a number"));
 }
 
+TEST(SceneEdits, scaleOfZeroOrOfNoNumberIsRefusedWithAReason) {
+  const auto expectRefused = [](const Result<Json>& patch, const char* reason) {
+    ASSERT_FALSE(patch) << patch->dump();
+    EXPECT_THAT(patch.error().text(), HasSubstr(reason));
+  };
+  const double infinite = std::numeric_limits<double>::infinity(), none = std::numeric_limits<double>::quiet_NaN();
+  for (const double wrong : {0.0, -0.0, infinite, none}) {
+    expectRefused(scalePatch(document(), "@lamp", {wrong, 1, 1}), "other than 0");
+    expectRefused(scalePatch(document(), "@lamp", {1, wrong, 1}), "other than 0");
+    expectRefused(scalePatch(document(), "@lamp", {1, 1, wrong}), "other than 0");
+  }
+  for (const char* wrong : {"1,0,1", "0,0,0", "1,1", "2", "[1,1,\"x\"]"})
+    expectRefused(setPatch(document(), "@lamp.scale", wrong), "other than 0");
+  EXPECT_TRUE(scalePatch(document(), "@lamp", {-1, 1, 1}));  // a mirror image
+
+  auto gltf = document();
+  gltf["nodes"][0]["scale"] = {1e-200, 1.0, 1e200};
+  expectRefused(scalePatch(gltf, "@lamp", {1e-200, 1, 1}), "too small");
+  expectRefused(scalePatch(gltf, "@lamp", {1, 1, 1e200}), "too large");
+  gltf["nodes"][0]["scale"] = {0.0, 1.0, 1.0};
+  EXPECT_TRUE(scalePatch(gltf, "@lamp", {2, 2, 2})) << "a sheet that came as one may grow";
+}
+
 TEST(SceneEdits, nodesMoveTurnAndGrowFromWhereTheyAre) {
   expectPatch(movePatch(document(), "@lamp", {1, 2, 3}, false),
               R"([{"op":"replace","path":"/nodes/@lamp/translation","value":[1.0,2.0,3.0]}])");
   expectPatch(movePatch(document(), "/nodes/0", {1, 2, 3}, true),
               R"([{"op":"replace","path":"/nodes/@lamp/translation","value":[1.0,3.0,3.0]}])");
-  EXPECT_FALSE(scalePatch(document(), "@bulb", {2, 0, 1}));
-  EXPECT_FALSE(scalePatch(document(), "@bulb", {2, 1, std::numeric_limits<double>::quiet_NaN()}));
   expectPatch(scalePatch(document(), "@bulb", {2, 2, 1}),
               R"([{"op":"replace","path":"/nodes/@bulb/scale","value":[2.0,4.0,1.0]}])");
   auto gltf = document();

@@ -30,9 +30,9 @@ describe('the plot of error against time', () => {
     expect(near(0.0108, 0.034)).toEqual([0.015, 0.02, 0.03]);
     expect(near(0.0095, 0.034)).toEqual([0.01, 0.02, 0.03]);
     expect(near(0.9, 1.98)).toEqual([1, 1.5]);
-    expect(near(1e-9, 1.1)).toEqual([1e-8, 1e-6, 1e-4, 0.01, 1]);
-    for (let low = 1e-3; low < 10; low *= 1.07)
-      for (let span = 2.2; span < 1e15; span *= 1.1) {
+    expect(near(0.9e-6, 1.1e6)).toEqual([1e-6, 1e-4, 0.01, 1, 100, 1e4, 1e6]);
+    for (let low = 1e-3; low < 10; low *= 1.13)
+      for (let span = 2.2; span < 1e20; span *= 1.1) {
         const ticks = ticksBetween(low, low * span);
         expect(ticks.length, `${low} to ${low * span}`).toBeGreaterThan(1);
         const gaps = ticks.slice(1).map((tick, i) => Math.log(tick / ticks[i]!) / Math.log(span));

@@ -131,21 +131,26 @@ export function measured(value: number): string {
 /** Digits of a measured value at most, however small its error. */
 const MOST_DIGITS = 5;
 
+/** Place of the first digit: 0 is that of units. What rounding took from 1000 in the last bits is not missed. */
+function firstDigit(value: number): number {
+  return value === 0 ? -Infinity : Number(value.toExponential(8).split('e')[1]);
+}
+
 /**
  * A measured value and its error, one written as the other: to the second significant digit of the error, and where
  * either would be long, as multiples of the same power of ten. Between them belongs " ± ", after them the unit.
  */
 export function withError(value: number, error: number): [string, string] {
   const roundedError = Number(Math.abs(error).toPrecision(2));
-  const top = (v: number) => Math.floor(Math.log10(v));
-  const largest = Math.max(Math.abs(value), roundedError);
+  const largest = Math.max(Math.abs(Number(value.toPrecision(MOST_DIGITS))), roundedError);
   if (!(largest > 0 && Number.isFinite(largest))) return [readable(value), readable(error)];
-  const last = Math.max(top(roundedError), top(largest) + 2 - MOST_DIGITS) - 1;
+  const last = Math.max(firstDigit(roundedError), firstDigit(largest) + 2 - MOST_DIGITS) - 1;
   const v = Math.round(value / 10 ** last) + 0; // -0 would be written with its sign
   // An error that is less than the last digit is no more than one of it.
   const e = Math.max(roundedError > 0 ? 1 : 0, Math.round(roundedError / 10 ** last));
-  const written = Number(`${Math.max(Math.abs(v), e)}e${last}`); // which may have rounded up to a power of ten
-  const power = written < 1e-3 || written >= 1e7 ? top(written) : 0;
+  // Of what is written: a value may have got a digit more when it was rounded.
+  const first = firstDigit(Math.max(Math.abs(v), e)) + last;
+  const power = first < -3 || first >= 7 ? first : 0;
   const decimals = Math.max(0, power - last);
   const format = { minimumFractionDigits: decimals, maximumFractionDigits: decimals };
   const write = (units: number) => (units * 10 ** (last - power)).toLocaleString('en', format);

@@ -150,7 +150,7 @@ interface LogScale {
   ticks: number[];
 }
 
-/** Powers of ten alone, or some of them; finer ones where those are too few to read a logarithmic scale by. */
+/** Powers of ten alone; finer ones where those are too few to read a logarithmic scale by. */
 const STEPS = [[1], [1, 2, 5], [1, 2, 3, 5, 7], [1, 1.5, 2, 3, 4, 5, 7]];
 const FEWEST_TICKS = 3;
 /** Texts of ticks have room beside each other, as a part of the scale. */
@@ -159,11 +159,11 @@ const LEAST_GAP = 0.15;
 /** Of a logarithmic scale. */
 export function ticksBetween(low: number, high: number): number[] {
   let ticks: number[] = [];
-  const apart = Math.max(1, Math.ceil(LEAST_GAP * Math.log10(high / low)));
+  // Where one after the other there is no room for powers of ten, every second or third of them.
+  const stride = Math.max(1, Math.ceil(LEAST_GAP * Math.log10(high / low)));
   for (const steps of STEPS) {
     const finer: number[] = [];
-    const every = steps.length > 1 ? 1 : apart;
-    for (let decade = every * Math.floor(Math.log10(low) / every); 10 ** decade <= high; decade += every)
+    for (let decade = stride * Math.floor(Math.log10(low) / stride); 10 ** decade <= high; decade += stride)
       finer.push(...steps.map((step) => step * 10 ** decade).filter((tick) => tick >= low && tick <= high));
     const gaps = finer.slice(1).map((tick, i) => Math.log(tick / finer[i]!) / Math.log(high / low));
     if (steps.length > 1 && Math.min(...gaps) < LEAST_GAP) break;

@@ -5,6 +5,7 @@ import { isVisible } from '../document/edits';
 import { hangingNodes, lightOf, materialName, nodeName, type Gltf, type Vec3, type Vec4 } from '../document/gltf';
 import type { Placement } from '../document/edits';
 import { button, checkbox, field, fromHex, h, parseNumber, row, section, toHex } from './dom';
+import { emissionFields, emissionWritten } from './emission_fields';
 
 export interface Selection {
   node: number;
@@ -262,26 +263,14 @@ export class ScenePanel {
   private materialEditor(index: number, all: number[]): HTMLElement {
     const material = this.gltf.materials![index]!;
     const base = material.pbrMetallicRoughness?.baseColorFactor ?? [1, 1, 1, 1];
-    const emission = material.emissiveFactor ?? [0, 0, 0];
-    const top = Math.max(...emission);
-    const strength = material.extensions?.KHR_materials_emissive_strength?.emissiveStrength ?? 1;
     const colour = this.colour(toHex(base), (hex) => this.actions.setColour(index, fromHex(hex)));
-    // The factor's brightest channel belongs to the strength, so that both can be changed by themselves. The luminance of a
-    // colour is less than that.
-    let hue = (top > 0 ? emission.map((c) => c / top) : [1, 1, 1]) as Vec3;
-    let value = top * strength;
-    // The one that nobody changed stays as exact as it was: fields hold less.
-    const glow = this.colour(toHex(hue), (hex) => {
-      hue = fromHex(hex);
-      send();
-    });
-    const nits = this.number(String(Number(value.toPrecision(5))), () => {
-      value = parseNumber(nits.value);
-      send();
-    });
+    const shown = emissionFields(material);
+    const glow = this.colour(shown.colour, () => send());
+    const nits = this.number(shown.nits, () => send());
     const send = () => {
-      if (!(value >= 0)) return this.refuse(nits, 'a number, 0 or more');
-      this.actions.setEmission(index, value > 0 ? hue : [0, 0, 0], value > 0 ? value : 1);
+      const written = emissionWritten(material, { colour: glow.value, nits: nits.value });
+      if (!written) return this.refuse(nits, 'a number, 0 or more');
+      this.actions.setEmission(index, written.factor, written.strength);
     };
     const chooser =
       all.length > 1

@@ -11,6 +11,7 @@ import {
   LineSegments,
   Matrix4,
   Mesh,
+  MeshBasicMaterial,
   Object3D,
   type PerspectiveCamera,
   Scene,
@@ -132,6 +133,7 @@ export class Gizmo {
     controls.size = 0.8;
     controls.setMode(this.mode);
     this.scene.add(controls.getHelper());
+    this.asOnScreen(controls);
     controls.addEventListener('change', () => this.events.redraw());
     controls.addEventListener('dragging-changed', ({ value }) => {
       if (!value) this.placePivot();
@@ -145,6 +147,15 @@ export class Gizmo {
       this.events.changed(this.object, this.mode);
     });
     return controls;
+  }
+
+  /** Frames take colours as they are: grey of light that three.js computed from the screen's would be nearly black. */
+  private asOnScreen(controls: TransformControls): void {
+    const materials = new Set<MeshBasicMaterial>();
+    controls.getHelper().traverse((part) => {
+      if (part instanceof Mesh && part.material instanceof MeshBasicMaterial) materials.add(part.material);
+    });
+    for (const { color } of materials) color.convertLinearToSRGB();
   }
 
   /** Into the middle of the object, turned as it is, so that scaling along the handles does not skew it. */
