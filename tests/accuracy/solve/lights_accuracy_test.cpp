@@ -101,7 +101,8 @@ TEST(SolvedLights, PointLightOverAPlane) {
                     }),
             kMiddleForMean);
   expectBalance(solved.report);
-  EXPECT_NEAR(solved.report["energy"]["emitted"].get<double>(), 4.0 * std::numbers::pi * 170.0, 0.01);
+  const double candela = 0.2126 * 100.0 + 0.7152 * 50.0 + 0.0722 * 20.0;
+  EXPECT_NEAR(solved.report["energy"]["emitted"].get<double>(), 4.0 * std::numbers::pi * candela, 0.01);
 }
 
 TEST(SolvedLights, SunOnAPlane) {

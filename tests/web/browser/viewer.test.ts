@@ -233,6 +233,8 @@ it('changes of an emission what somebody wrote, and keeps the rest as exact as i
   expect(coloured[1]).toBe(123.45678);
   await page.evaluate(() => window.viewer!.connection.call('scene.undo'));
   expect(await until(strengthOf, ([factor]) => (factor as number[])[2] === 1)).toEqual([[0.2, 0.5, 1], 123.45678]);
+  const colour = () => page.getByLabel('Emission').inputValue();
+  expect(await until(colour, (value) => value !== '#ff8000')).not.toBe('#ff8000'); // heard of by the page
   await field.fill('1500');
   await field.press('Enter');
   expect(await until(strengthOf, ([, value]) => value === 1500)).toEqual([[0.2, 0.5, 1], 1500]);

@@ -93,7 +93,12 @@ export class ScenePanel {
       this.editor,
     );
     this.find.addEventListener('input', () => this.showList());
-    this.editor.addEventListener('input', () => (this.typing = true));
+    // Before the field hears of it: what it sends would set all fields anew.
+    this.editor.addEventListener('input', () => (this.typing = true), true);
+    // A colour is being chosen from when it is asked for until its picker is closed.
+    this.editor.addEventListener('click', ({ target }) => {
+      if ((target as HTMLInputElement).type === 'color') this.typing = true;
+    });
     this.editor.addEventListener('change', () => (this.typing = false));
     // What was selected while another tab was open is scrolled to when this one is.
     new ResizeObserver(() => this.revealSelection()).observe(this.list);
@@ -116,8 +121,7 @@ export class ScenePanel {
    */
   refresh(): void {
     this.showList();
-    const at = this.editor.contains(document.activeElement) ? (document.activeElement as HTMLInputElement) : undefined;
-    if (!at || (at.type !== 'color' && !this.typing)) this.showEditor();
+    if (!this.typing || !this.editor.contains(document.activeElement)) this.showEditor();
   }
 
   private showList(): void {
