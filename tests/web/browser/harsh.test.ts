@@ -84,7 +84,7 @@ it('lists ten thousand objects, and finds one of them by its name', async () => 
   await page.getByText('Position, m').waitFor();
   expect(await page.locator('.tree button').count()).toBe(1);
   await page.getByLabel('Find an object by name').fill('nothing of that name');
-  await page.locator('.tree').getByText('None.').waitFor();
+  await page.locator('.tree').getByText('None found.').waitFor();
 });
 
 it('shows scenes without anything, and forgets one that its server has no more', async () => {
