@@ -10,7 +10,7 @@ namespace radiosity::gpu {
 namespace {
 
 /// A chunk costs a message there and back (about 50 us with the wake-up): it should take well over a millisecond.
-constexpr double kMinChunkCost = 150'000.0;  // pixels
+constexpr double kMinChunkCost = 60'000.0;  // pixels
 /// A chunk is at most this part of a worker's share of the batch, and of its share of what is left: the last ones are
 /// small, so that all workers come to their end together.
 constexpr double kLargestPart = 1.0 / 8.0;

@@ -11,10 +11,10 @@ struct ShotCost {
   double receivers = 0.0;  ///< that a gathered shot weighs and each of its points looks at, where it names none
 
   static constexpr double kTrianglePixels = 4.0;
-  static constexpr double kReceiverPixels = 0.5;
+  static constexpr double kReceiverPixels = 0.5, kNamedPixels = 5000.0;
   [[nodiscard]] double operator()(const ScatterShot& shot) const { return hemicube(shot.resolution); }
   [[nodiscard]] double operator()(const GatherShot& shot) const {
-    const double looks = shot.run_count > 0 ? 0.0 : kReceiverPixels * receivers;
+    const double looks = shot.run_count > 0 ? kNamedPixels : kReceiverPixels * receivers;
     return looks + shot.point_count * (looks + hemicube(shot.resolution));
   }
   [[nodiscard]] double operator()(const PointShot& shot) const { return hemicube(shot.resolution); }
