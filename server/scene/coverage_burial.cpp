@@ -5,6 +5,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <iterator>
 #include <optional>
 #include <utility>
 
@@ -19,6 +20,8 @@ constexpr std::uint32_t kFewSamples = 16, kManySamples = 64;
 constexpr std::uint64_t kMaxSamples = 2'000'000;  ///< a scene; beyond it leaves get fewer
 /// Leaves: what is found of so many is held at once; fewer are not worth a thread.
 constexpr std::size_t kMeasuredAtOnce = 65536, kFewestAShare = 64;
+/// Surfaces, likewise.
+constexpr std::size_t kFewestSurfaces = 32;
 /// Of more leaves it is not kept how they were found, nor where that takes more, and from more places than these rays
 /// were cast for hardly any.
 constexpr std::size_t kMostRecorded = 50'000, kMostRecordedBytes = std::size_t{16} << 20, kMostFans = 64;
@@ -90,7 +93,7 @@ class Burial {
     first_piece_.assign(patches_.leaves.size() + 1, 0);
     for (const LeafPiece& piece : pieces_) ++first_piece_[piece.leaf + 1];
     for (std::size_t i = 1; i < first_piece_.size(); ++i) first_piece_[i] += first_piece_[i - 1];
-    for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) classify(s);
+    classifyAll();
     const std::uint64_t wanted = std::uint64_t{kFewSamples} * contacts_.size();
     few_ = wanted <= kMaxSamples ? kFewSamples
                                  : static_cast<std::uint32_t>(std::max<std::uint64_t>(
@@ -134,49 +137,71 @@ class Burial {
     return solids_.buries(position, normal, hits, notes);
   }
 
+  /// Of one surface: leaves in contact, and what is buried beside them.
+  struct Split {
+    std::vector<Contact> contacts;
+    std::vector<BuriedPart> buried;
+  };
+
+  /// Surfaces side by side, taken in their order.
+  void classifyAll() {
+    std::vector<Split> splits(patches_.surfaces.size());
+    inShares(splits.size() / kFewestSurfaces, [&](std::size_t share, std::size_t shares) {
+      Hits hits;
+      for (auto s = share; s < splits.size(); s += shares) classify(static_cast<std::uint32_t>(s), hits, splits[s]);
+    });
+    for (std::size_t s = 0; s < splits.size(); ++s) {
+      auto& split = splits[s];
+      const Surface& surface = patches_.surfaces[s];
+      for (const auto& part : split.buried)
+        patches_.node_area[surface.first_node[part.side] + (part.leaf - surface.first_leaf)] = 0.0F;
+      contacts_.insert(contacts_.end(), split.contacts.begin(), split.contacts.end());
+      changes_.insert(changes_.end(), std::make_move_iterator(split.buried.begin()),
+                      std::make_move_iterator(split.buried.end()));
+    }
+  }
+
   /// Splits a surface into nodes that no other solid comes near (all visible or all buried: one test) and single leaves
   /// in contact with one, or with an earlier surface that covers some of them.
-  void classify(std::uint32_t s) {
+  void classify(std::uint32_t s, Hits& hits, Split& split) const {
     const NodeBoxes boxes(patches_, s, pieces_, first_piece_);
     const Surface& surface = patches_.surfaces[s];
     for (std::uint32_t side = 0; side < 2; ++side)
-      if (surface.first_node[side] != kNone) descend(boxes, s, side, surface.level_count - 1, 0, 0);
+      if (surface.first_node[side] != kNone) descend(boxes, {s, side, 0, 0}, surface.level_count - 1, hits, split);
   }
 
-  void descend(const NodeBoxes& boxes, std::uint32_t s, std::uint32_t side, std::uint32_t level, std::uint32_t x,
-               std::uint32_t y) {
-    const Surface& surface = patches_.surfaces[s];
-    const Bounds box = boxes.box(level, x, y);
+  /// `node`: its place in the grid of its level.
+  void descend(const NodeBoxes& boxes, const Contact& node, std::uint32_t level, Hits& hits, Split& split) const {
+    const Surface& surface = patches_.surfaces[node.surface];
+    const Bounds box = boxes.box(level, node.x, node.y);
     if (box.empty()) return;
-    if (!solids_.near(box, s) && (side != 0 || !coincidence_.mayCover(s, box))) {
-      settleUniform(s, side, level, x, y);
+    if (!solids_.near(box, node.surface) && (node.side != 0 || !coincidence_.mayCover(node.surface, box))) {
+      settleUniform(node, level, hits, split);
       return;
     }
     if (level == 0) {
-      if (patches_.leaves[surface.first_leaf + y * surface.width + x].triangle != kNone)
-        contacts_.push_back({s, side, x, y});
+      if (patches_.leaves[leafOf(node)].triangle != kNone) split.contacts.push_back(node);
       return;
     }
     const LevelGrid below = levelGrid(surface.width, surface.height, level - 1);
-    for (std::uint32_t cy = 2 * y; cy < std::min(2 * y + 2, below.height); ++cy)
-      for (std::uint32_t cx = 2 * x; cx < std::min(2 * x + 2, below.width); ++cx)
-        descend(boxes, s, side, level - 1, cx, cy);
+    for (std::uint32_t y = 2 * node.y; y < std::min(2 * node.y + 2, below.height); ++y)
+      for (std::uint32_t x = 2 * node.x; x < std::min(2 * node.x + 2, below.width); ++x)
+        descend(boxes, {node.surface, node.side, x, y}, level - 1, hits, split);
   }
 
-  void settleUniform(std::uint32_t s, std::uint32_t side, std::uint32_t level, std::uint32_t x, std::uint32_t y) {
-    const Surface& surface = patches_.surfaces[s];
-    const std::uint32_t x_end = std::min((x + 1) << level, surface.width);
-    const std::uint32_t y_end = std::min((y + 1) << level, surface.height);
+  void settleUniform(const Contact& node, std::uint32_t level, Hits& hits, Split& split) const {
+    const Surface& surface = patches_.surfaces[node.surface];
+    const std::uint32_t x_end = std::min((node.x + 1) << level, surface.width);
+    const std::uint32_t y_end = std::min((node.y + 1) << level, surface.height);
     bool known = false;
-    for (std::uint32_t ly = y << level; ly < y_end; ++ly)
-      for (std::uint32_t lx = x << level; lx < x_end; ++lx) {
-        const Contact leaf{s, side, lx, ly};
+    for (std::uint32_t y = node.y << level; y < y_end; ++y)
+      for (std::uint32_t x = node.x << level; x < x_end; ++x) {
+        const Contact leaf{node.surface, node.side, x, y};
         const LeafPoint& point = patches_.leaves[leafOf(leaf)];
         if (point.triangle == kNone) continue;
-        if (!known && !buried(point.triangle, glm::dvec2(point.texel), side, hits_)) return;
+        if (!known && !buried(point.triangle, glm::dvec2(point.texel), node.side, hits)) return;
         known = true;
-        patches_.node_area[nodeOf(leaf)] = 0.0F;
-        changes_.push_back({leafOf(leaf), side, {}, {}, 0.0F});
+        split.buried.push_back({leafOf(leaf), node.side, {}, {}, 0.0F});
       }
   }
 
@@ -398,7 +423,6 @@ class Burial {
   std::vector<std::size_t> first_piece_;
   std::vector<Contact> contacts_, touched_;
   std::vector<BuriedPart> changes_;
-  Hits hits_;
   std::uint32_t few_ = kFewSamples;
 };
 

@@ -4,7 +4,9 @@
 #include <array>
 #include <glm/geometric.hpp>
 #include <utility>
+#include <vector>
 
+#include "common/parallel.h"
 #include "server/scene/bvh.h"
 #include "server/scene/coverage.h"
 
@@ -107,6 +109,8 @@ constexpr float kLift = 2e-5F, kInterior = 0.9F;
 /// What hovers beside a leaf counts so many leaf widths away, a pixel or two of an item buffer: a lamp in front of a
 /// hole in the ceiling, whose shadow there falls on nothing that could make up for what pixels give it of the rim.
 constexpr float kBeside = 2.0F;
+/// Surfaces: fewer are not worth a thread.
+constexpr std::size_t kFewestAShare = 32;
 
 class Gaps {
  public:
@@ -117,11 +121,20 @@ class Gaps {
     tree_ = Bvh(std::move(triangles));
   }
 
+  /// Found side by side, kept in the order of the surfaces.
   void run() {
-    for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
-      const Surface& surface = patches_.surfaces[s];
-      for (std::size_t side = 0; side < 2 && surface.planar; ++side)
-        if (surface.first_node[side] != kNone) descend(s, side == 0 ? 1.0F : -1.0F, surface.level_count - 1, {0, 0});
+    std::vector<std::vector<glm::uvec2>> found(patches_.surfaces.size());
+    inShares(found.size() / kFewestAShare, [&](std::size_t share, std::size_t shares) {
+      for (auto s = static_cast<std::uint32_t>(share); s < found.size(); s += static_cast<std::uint32_t>(shares)) {
+        const Surface& surface = patches_.surfaces[s];
+        for (std::size_t side = 0; side < 2 && surface.planar; ++side) {
+          if (surface.first_node[side] == kNone) continue;
+          descend(s, side == 0 ? 1.0F : -1.0F, surface.level_count - 1, {0, 0}, found[s]);
+        }
+      }
+    });
+    for (std::size_t s = 0; s < found.size(); ++s) {
+      for (const auto& at : found[s]) place(patches_.surfaces[s], at);
     }
   }
 
@@ -143,18 +156,22 @@ class Gaps {
     return box;
   }
 
-  void descend(std::uint32_t s, float side, std::uint32_t level, glm::uvec2 at) {
+  void descend(std::uint32_t s, float side, std::uint32_t level, glm::uvec2 at, std::vector<glm::uvec2>& found) const {
     const Surface& surface = patches_.surfaces[s];
     if (!tree_.touches(boxBefore(s, side, level, at, kInterior - 1.0F), patches_.triangle_surface, s) &&
         !tree_.hoversIn(boxBefore(s, side, level, at, 2.0F * kBeside), patches_.triangle_surface, s))
       return;
-    if (level > 0) {
-      const LevelGrid below = levelGrid(surface.width, surface.height, level - 1);
-      for (std::uint32_t y = 2 * at.y; y < std::min(2 * at.y + 2, below.height); ++y)
-        for (std::uint32_t x = 2 * at.x; x < std::min(2 * at.x + 2, below.width); ++x)
-          descend(s, side, level - 1, {x, y});
+    if (level == 0) {
+      found.push_back(at);
       return;
     }
+    const LevelGrid below = levelGrid(surface.width, surface.height, level - 1);
+    for (std::uint32_t y = 2 * at.y; y < std::min(2 * at.y + 2, below.height); ++y)
+      for (std::uint32_t x = 2 * at.x; x < std::min(2 * at.x + 2, below.width); ++x)
+        descend(s, side, level - 1, {x, y}, found);
+  }
+
+  void place(const Surface& surface, glm::uvec2 at) {
     auto& leaf = patches_.leaves[surface.first_leaf + at.y * surface.width + at.x];
     if (!leaf.full || leaf.first_spot != kNone) return;
     std::array<LeafSpot, kLeafSpots> places;
