@@ -218,30 +218,38 @@ void LinkColumn::replace(std::span<const ValueRun> leaves, std::span<const float
 LinkColumn LinkColumn::renumbered(const std::vector<std::uint32_t>& side_after, const std::vector<Side>& before,
                                   const std::vector<Side>& after) const {
   struct Piece {
-    std::uint32_t side, from;  // new number; where its codes are
+    std::uint32_t side, from, count;  // new number; where its codes are
   };
   std::vector<Piece> pieces;
+  std::size_t codes = 0;
   for (const auto& old : runs_) {
     for (std::uint32_t s = old.side; s < old.side + old.side_count; ++s) {
-      if (side_after[s] != scene::kNone)
-        pieces.push_back({side_after[s], old.offset + (before[s].first_value - old.first_value)});
+      if (side_after[s] == scene::kNone) continue;
+      const auto count = after[side_after[s]].leaf_count;
+      pieces.push_back({side_after[s], old.offset + (before[s].first_value - old.first_value), count});
+      codes += count;
     }
   }
   // An edit that changes the order of nodes changes that of sides.
-  std::sort(pieces.begin(), pieces.end(), [](const Piece& a, const Piece& b) { return a.side < b.side; });
+  if (!std::ranges::is_sorted(pieces, {}, &Piece::side)) std::ranges::sort(pieces, {}, &Piece::side);
   std::vector<Run> runs;
   std::vector<std::uint16_t> code;
-  std::size_t codes = 0;
-  for (const auto& piece : pieces) codes += after[piece.side].leaf_count;
   code.reserve(codes);  // not more, or they would be copied once more to give the rest back
-  for (const auto& [side, offset] : pieces) {
-    const auto size = static_cast<std::uint32_t>(code.size());
-    const bool joins = !runs.empty() && runs.back().side + runs.back().side_count == side;
-    if (!joins) runs.push_back({side, 0, after[side].first_value, 0, size});
-    ++runs.back().side_count;
-    runs.back().count += after[side].leaf_count;
-    const auto from = code_.begin() + offset;
-    code.insert(code.end(), from, from + after[side].leaf_count);
+  for (std::size_t p = 0, end = 0; p < pieces.size(); p = end) {
+    // Neighbours that were neighbours before go over together.
+    const auto first = pieces[p].from;
+    std::uint32_t count = 0;
+    for (end = p; end < pieces.size() && pieces[end].from == first + count; ++end) {
+      const auto side = pieces[end].side;
+      const bool joins = !runs.empty() && runs.back().side + runs.back().side_count == side;
+      if (!joins)
+        runs.push_back({side, 0, after[side].first_value, 0, static_cast<std::uint32_t>(code.size()) + count});
+      ++runs.back().side_count;
+      runs.back().count += pieces[end].count;
+      count += pieces[end].count;
+    }
+    const auto from = code_.begin() + first;
+    code.insert(code.end(), from, from + count);
   }
   runs.shrink_to_fit();
   LinkColumn column;
