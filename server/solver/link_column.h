@@ -57,6 +57,8 @@ class LinkColumn {
   /// nothing; the bounds are wider than what one random point of a wall makes of the walls of a cube (0.3 to 3), or
   /// such a room would lose light with every bounce.
   [[nodiscard]] double gain() const { return static_cast<double>(gain_); }
+  /// What was last said of all links together.
+  [[nodiscard]] Totals totals() const { return {due_, escaped_, absorbed_, open_looks_}; }
   /// Flux that leaves the scene, and that falls on unlit sides, for a radiosity of one.
   [[nodiscard]] double escaped() const { return escaped_; }
   [[nodiscard]] double absorbed() const { return absorbed_; }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <span>
 
 #include "server/solver/change_reach.h"
 #include "server/solver/linked_solver.h"
@@ -12,16 +13,19 @@ namespace radiosity::solver {
 namespace {
 
 /// Of the sum of what columns are wrong by, as ChangeReach has it, the light that they bring is wrong by less, since
-/// not all are wrong at the same places: by 0.34 to 0.63 of it where chairs and tables of a room were moved and added.
-constexpr double kInAll = 0.75;
+/// not all are wrong at the same places: by 0.34 to 0.63 of it where few waited, after chairs and tables of a room were
+/// moved and added, and by 0.15 to 0.44 where many did (26 edits of things and lamps in three scenes).
+constexpr double kInAll = 0.65;
 /// What waits may cause this part of the target error at least: in the sum of squares, 4 % of it. More where the solve
 /// before left room under the target, of which it takes a part, so that the edit may make the rest somewhat worse.
-constexpr double kPostponed = 0.2, kMostPostponed = 0.5, kOfRoom = 0.7;
+constexpr double kPostponed = 0.2, kMostPostponed = 0.5, kOfRoom = 0.75;
+/// And lights that look again with a part of their points (lightsAreTooRough).
+constexpr double kRough = 0.1, kMostRough = 0.3, kRoughOfRoom = 0.5;
 /// When light is solved for it is other light than that by which they were chosen: so many times that.
 constexpr double kStillPostponed = 1.5;
 
-/// Part of the target that what waits may take, beside what takes this part of it; squares add up.
-double roomBeside(double part) { return kOfRoom * std::sqrt(std::max(0.0, 1.0 - part * part)); }
+/// Part of the target that there is room for beside what takes this part of it; squares add up.
+double roomBeside(double part) { return std::sqrt(std::max(0.0, 1.0 - part * part)); }
 
 }  // namespace
 
@@ -46,6 +50,8 @@ double LinkedSolver::reachOf(const Repair& repair, const ChangeReach& change) co
 /// Area-weighted norm of the error of irradiance, mean of the halves, that a column's old links may cause.
 double LinkedSolver::missing(const Repair& repair) const {
   const auto& shooter = system_.shooters()[repair.shooter];
+  // What few points know of a shadow is as uncertain as the halves show.
+  if (repair.looked > 0 && lights_may_be_rough_) return 0.0;
   if (!std::isfinite(repair.reach)) return HUGE_VAL;
   const double radiosity = shooter.carried(repair.half) * static_cast<double>(glm::length(shooter.sent[repair.half]));
   return 0.5 * kInAll * radiosity * repair.reach;
@@ -76,7 +82,9 @@ double LinkedSolver::errorBesideMissing() const {
 
 /// `error`: all but what waits, as far as is known.
 void LinkedSolver::setPostponed(double error) {
-  postponed_ = std::clamp(roomBeside(error / settings_.target_error), kPostponed, kMostPostponed);
+  const double room = roomBeside(error / settings_.target_error);
+  postponed_ = std::clamp(kOfRoom * room, kPostponed, kMostPostponed);
+  roughness_ = std::clamp(kRoughOfRoom * room, kRough, kMostRough);
 }
 
 /// The strongest first, and only as many as must be. `norm`: of irradiance, about.
@@ -112,9 +120,15 @@ bool LinkedSolver::findsMoreDue() {
 bool LinkedSolver::isDueForTarget() {
   if (error_.total <= settings_.target_error || repaired_ == repairs_.size()) return false;
   const double norm = fieldNorm(), waits = missing() / norm;
+  if (lights_may_be_rough_ && std::ranges::any_of(std::span(repairs_).subspan(repaired_),
+                                                  [](const Repair& repair) { return repair.looked > 0; })) {
+    lights_may_be_rough_ = false;  // their few points may be what is missing
+    planDue(norm);
+    return true;
+  }
   const double rest = std::sqrt(std::max(0.0, error_.total * error_.total - waits * waits));
   if (!(rest < settings_.target_error)) return false;
-  postponed_ = std::min(roomBeside(rest / settings_.target_error), kOfRoom * waits / settings_.target_error);
+  postponed_ = kOfRoom * std::min(roomBeside(rest / settings_.target_error), waits / settings_.target_error);
   planDue(norm);
   return repaired_ < due_;
 }
@@ -127,6 +141,9 @@ Result<StepOutcome> LinkedSolver::catchUp() {
   return advance();
 }
 
-void LinkedSolver::beExact() { due_ = repairs_.size(); }
+void LinkedSolver::beExact() {
+  lights_may_be_rough_ = false;
+  due_ = repairs_.size();
+}
 
 }  // namespace radiosity::solver

@@ -22,6 +22,15 @@ constexpr double kNoSum = 0.005;
 /// Repairs of a slice before it is known how long they take.
 constexpr std::size_t kMostAtOnce = 1024;
 
+/// Adds to sums of links times points what is there already, the mean of so many points.
+void addEarlierLooks(const LinkColumn& column, std::uint32_t points, const LinkColumn::ValueRun& run,
+                     std::span<float> sums, std::vector<float>& links) {
+  links.assign(run.count, 0.0F);
+  if (!column.decode(run.first, links)) return;
+  const auto weight = static_cast<float>(points / column.gain());
+  for (std::uint32_t i = 0; i < run.count; ++i) sums[i] += weight * links[i];
+}
+
 /// Of the corners of a polygon about their middle.
 std::pair<glm::vec3, float> circle(const LightPolygon& light) {
   const std::span corners(light.corners.data(), light.corner_count);
@@ -41,14 +50,15 @@ struct LinkedSolver::RepairBatch {
   ShotBatch shots;
   struct Sample {
     std::uint32_t repair, points;
-    bool last;
+    bool first, last;
   };
   std::vector<Sample> gathered, scattered;
-  std::vector<float> sum;  ///< by leaf value: of the repair on its way, links times points
-  std::uint32_t points = 0;
+  std::vector<float> sum;     ///< by leaf value: of the repair on its way, links times points
+  std::uint32_t points = 0;   ///< with those that looked before
   LinkColumn::Totals totals;  ///< times points
   bool open = false;          ///< so much is lost that only the sum of all links tells what arrives
   std::vector<Repair> anew;   ///< whole, since they are open now
+  std::vector<Repair> rough;  ///< of lights whose other points will look later
 };
 
 /// Leaves in repairs_ what is needed, and makes room for what it may bring.
@@ -76,6 +86,8 @@ void LinkedSolver::planRepairs(double norm, const ChangeReach& change) {
     reach[r] = reach[r + 1] = std::sqrt(0.5 * (reach[r] * reach[r] + reach[r + 1] * reach[r + 1]));
   }
   for (std::size_t r = 0; r < repairs_.size(); ++r) repairs_[r].reach += reach[r];
+  norm_before_ = norm;
+  lights_may_be_rough_ = norm > 0.0;
   planDue(norm);
 }
 
@@ -106,7 +118,7 @@ bool LinkedSolver::isNeeded(Repair& repair) {
   return true;
 }
 
-/// The shots that the column was made of; of a light, as many points.
+/// The shots that the column was made of; of a light, as many points, or those of them that look now.
 void LinkedSolver::addSamples(const Repair& repair, ShotBatch& batch) const {
   const auto& shooter = system_.shooters()[repair.shooter];
   if (!shooter.isLight()) {
@@ -114,9 +126,11 @@ void LinkedSolver::addSamples(const Repair& repair, ShotBatch& batch) const {
       shots_.add(shooter.place, repair.half, i, shooter.resolution, batch);
     return;
   }
-  std::uint32_t points = 1 + (repair.samples - 1) % kLightPoints;
-  for (std::uint32_t i = 0; i * kLightPoints < repair.samples; ++i, points = kLightPoints)
-    shots_.add(lights_[shooter.light], repair.half, i, points, settings_.planner.light_resolution, batch);
+  const std::uint32_t few = 1 + (repair.samples - 1) % kLightPoints;  // the first shot has the rest of a division
+  const auto [first, end] = shotsOfLight(repair);
+  for (auto i = first; i < end; ++i)
+    shots_.add(lights_[shooter.light], repair.half, i, i == 0 ? few : kLightPoints, settings_.planner.light_resolution,
+               batch);
 }
 
 void LinkedSolver::findCutLinks(RepairBatch& repairs) const {
@@ -157,7 +171,12 @@ Result<void> LinkedSolver::repairSlice() {
   for (auto& repair : std::span(repairs_).subspan(repaired_, count)) {
     // Of one that waited there may be more by now.
     const auto& shooter = system_.shooters()[repair.shooter];
-    if (!repair.whole && !shooter.isLight()) repair.samples = shooter.column[repair.half].samples();
+    const auto& column = shooter.column[repair.half];
+    const auto samples = shooter.isLight() ? static_cast<std::uint32_t>(column.points()) : column.samples();
+    if (repair.whole || samples == repair.samples) continue;
+    repair.samples = samples;
+    repair.looked = 0;  // what is there is no longer the mean of what looked
+    repair.found = {};
   }
   batch.repairs = std::span(repairs_).subspan(repaired_, count);
   batch.sum.resize(system_.emission().size());
@@ -181,10 +200,10 @@ Result<void> LinkedSolver::repairSlice() {
     }
     const std::size_t gathered = shots.gather.size(), scattered = shots.scatter.size();
     addSamples(repair, shots);
-    std::uint32_t looks = 0;
+    auto looks = repair.looked;
     for (auto i = gathered; i < shots.gather.size(); ++i) {
       auto& shot = shots.gather[i];
-      batch.gathered.push_back({r, shot.point_count, i + 1 == shots.gather.size()});
+      batch.gathered.push_back({r, shot.point_count, i == gathered, i + 1 == shots.gather.size()});
       if (repair.whole) continue;
       shot.first_run = first_run;
       shot.run_count = static_cast<std::uint32_t>(shots.receivers.size()) - first_run;
@@ -194,7 +213,7 @@ Result<void> LinkedSolver::repairSlice() {
       const auto& column = system_.shooters()[repair.shooter].column[repair.half];
       shot.open_looks = column.openLooks().from(std::exchange(looks, looks + shot.point_count), shot.point_count);
     }
-    for (auto i = scattered; i < shots.scatter.size(); ++i) batch.scattered.push_back({r, 1, false});
+    for (auto i = scattered; i < shots.scatter.size(); ++i) batch.scattered.push_back({r, 1, false, false});
     (repair.whole ? edits_.retaken : edits_.repaired) +=
         shots.gather.size() - gathered + shots.scatter.size() - scattered;
   }
@@ -209,6 +228,7 @@ Result<void> LinkedSolver::repairSlice() {
       fewest_a_slice_, kMostAtOnce);
   repairs_.insert(repairs_.begin() + static_cast<std::ptrdiff_t>(due_), batch.anew.begin(), batch.anew.end());
   due_ += batch.anew.size();
+  repairs_.insert(repairs_.end(), batch.rough.begin(), batch.rough.end());
   if (repaired_ == repairs_.size()) {
     repairs_.clear();
     repaired_ = due_ = 0;
@@ -229,6 +249,10 @@ void LinkedSolver::takePart(RepairBatch& repairs, std::size_t shot, LinkSample& 
     system_.addSample(repair.shooter, repair.half, expander_, links, sample.points);
     return;
   }
+  if (sample.first) {
+    repairs.points = repair.looked;
+    repairs.totals = repair.found;
+  }
   repairs.totals.open_looks.add(links.open_looks, std::exchange(repairs.points, repairs.points + sample.points),
                                 sample.points);
   const auto area = system_.shooters()[repair.shooter].area;
@@ -247,19 +271,40 @@ void LinkedSolver::takePart(RepairBatch& repairs, std::size_t shot, LinkSample& 
     for (std::uint32_t v = run.first; v < run.first + run.count; ++v)
       repairs.sum[v] += static_cast<float>(sample.points) * expander_.values()[v];
   }
-  if (!sample.last) return;
-  const double part = 1.0 / std::exchange(repairs.points, 0);
-  const auto totals = std::exchange(repairs.totals, {});
-  const auto& leaves = repairs.leaves[sample.repair];
+  if (sample.last) replacePart(repairs, sample.repair);
+}
+
+/// All samples of a repair have come: their mean takes the place of what was there.
+void LinkedSolver::replacePart(RepairBatch& repairs, std::uint32_t index) {
+  const auto& repair = repairs.repairs[index];
+  const auto& leaves = repairs.leaves[index];
+  const auto& column = system_.shooters()[repair.shooter].column[repair.half];
+  const double part = 1.0 / repairs.points;
+  std::vector<float> before;
   for (const auto& run : leaves) {
-    for (std::uint32_t v = run.first; v < run.first + run.count; ++v) repairs.sum[v] *= static_cast<float>(part);
+    const auto sum = std::span(repairs.sum).subspan(run.first, run.count);
+    if (repair.looked > 0) addEarlierLooks(column, repair.looked, run, sum, before);
+    for (auto& value : sum) value *= static_cast<float>(part);
   }
+  const auto& found = repairs.totals;
   if (std::exchange(repairs.open, false)) {
     system_.forget(repair.shooter, repair.half);
     repairs.anew.push_back({repair.shooter, repair.old_shooter, repair.half, repair.samples, true, repair.overtaken});
+  } else if (repairs.points < repair.samples && system_.shooters()[repair.shooter].isLight()) {
+    // So few say too little of what is lost, and nothing of what the others lose.
+    auto totals = column.totals();
+    const auto others = Looks::kMany + 1 - std::min(repairs.points, Looks::kMany + 1);
+    const auto open = totals.open_looks.from(repairs.points, others);
+    totals.open_looks = found.open_looks;
+    totals.open_looks.add(open, repairs.points, others);
+    system_.replaceLinks(repair.shooter, repair.half, leaves, repairs.sum, totals);
+    repairs.rough.push_back(repair);
+    repairs.rough.back().looked = repairs.points;
+    repairs.rough.back().found = found;
+    repairs.rough.back().noise = noiseBetweenHalves(repair, leaves);
   } else {
     system_.replaceLinks(repair.shooter, repair.half, leaves, repairs.sum,
-                         {part * totals.due, part * totals.escaped, part * totals.absorbed, totals.open_looks});
+                         {part * found.due, part * found.escaped, part * found.absorbed, found.open_looks});
   }
   for (const auto& run : leaves) std::fill_n(repairs.sum.begin() + run.first, run.count, 0.0F);
 }

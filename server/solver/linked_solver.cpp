@@ -173,6 +173,7 @@ Result<StepOutcome> LinkedSolver::advance() {
     return StepOutcome::kSlice;
   }
   if (from_links_ == FromLinks::kAfterEdit) {
+    if (lightsAreTooRough()) return StepOutcome::kSlice;
     if (!edit_lights_planned_) {  // what was switched on, or moved: all that follows depends on its light
       memory_.begin(system_);
       wanted_ = planLights();

@@ -98,6 +98,11 @@ class LinkedSolver final : public Solver {
     bool whole = false;         ///< all their links; the column is empty
     bool overtaken = false;     ///< nor were they taken again after the edit before
     double reach = HUGE_VAL;    ///< what the old links are wrong by (ChangeReach); infinite: cannot wait
+    // Of a light, of which some points look first and stand for all of them:
+    std::uint32_t first_shots = 2;  ///< those that shall have looked next
+    std::uint32_t looked = 0;       ///< points that have
+    LinkColumn::Totals found = {};  ///< by them, times points
+    double noise = 0.0;             ///< square of the error of irradiance times area, where both halves have as many
   };
   /// Where the sides of the scene before are now.
   struct Renumbering {
@@ -139,11 +144,18 @@ class LinkedSolver final : public Solver {
   void setPostponed(double error);
   [[nodiscard]] bool findsMoreDue();
   [[nodiscard]] bool isDueForTarget();
+  struct ShotRange {
+    std::uint32_t first, end;
+  };
+  [[nodiscard]] ShotRange shotsOfLight(const Repair& repair) const;
+  [[nodiscard]] double noiseBetweenHalves(const Repair& repair, std::span<const LinkColumn::ValueRun> leaves) const;
+  [[nodiscard]] bool lightsAreTooRough();
   [[nodiscard]] Result<StepOutcome> catchUp();
   [[nodiscard]] bool isNeeded(Repair& repair);
   void addSamples(const Repair& repair, ShotBatch& batch) const;
   void findCutLinks(RepairBatch& repairs) const;
   void takePart(RepairBatch& repairs, std::size_t shot, LinkSample& links);
+  void replacePart(RepairBatch& repairs, std::uint32_t index);
   [[nodiscard]] Result<void> repairSlice();
   [[nodiscard]] bool isFull() const;
   [[nodiscard]] std::vector<Measurement> plan();
@@ -199,6 +211,9 @@ class LinkedSolver final : public Solver {
   std::size_t repaired_ = 0;                          // of these
   std::size_t due_ = 0;                               // of these, before anything else is done
   double postponed_ = 0.0;                            // part of the target error that the others may cause
+  double roughness_ = 0.0;                            // likewise: lights that look again with some points only
+  bool lights_may_be_rough_ = true;                   // that they may
+  double norm_before_ = 0.0;                          // of irradiance before the edit; 0: not known
   std::unique_ptr<Shadows> shadows_;                  // of the edit
   std::unique_ptr<Shadows> earlier_shadows_;          // and of those before it, for links that no edit saw taken again
   std::uint32_t key_end_ = 0, triangle_key_end_ = 0;  // keys of sides that never were

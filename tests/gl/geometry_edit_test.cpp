@@ -212,6 +212,24 @@ class ChairEdit : public GeometryEdit {
     return std::sqrt(sum / scale);
   }
 
+  /// Links of lights that differ.
+  static std::size_t unlikeLights(const LinkedSolver& a, const LinkedSolver& b, const scene::PatchScene& patches) {
+    std::size_t differ = 0;
+    for (std::size_t n = 0; n < a.system().shooters().size(); ++n) {
+      const auto &x = a.system().shooters()[n], &y = b.system().shooters()[n];
+      for (const auto& side : solver::makeSides(patches)) {
+        std::vector<float> u(side.leaf_count, 0.0F), v(side.leaf_count, 0.0F);
+        for (std::size_t half = 0; half < 2 && x.isLight(); ++half) {
+          (void)x.column[half].decode(side.first_value, u);
+          (void)y.column[half].decode(side.first_value, v);
+          for (std::size_t i = 0; i < u.size(); ++i)
+            differ += std::abs(u[i] - v[i]) > 0.0015F * std::max(u[i], v[i]) + 1e-6F ? 1 : 0;
+        }
+      }
+    }
+    return differ;
+  }
+
   json move_;
 };
 
@@ -269,6 +287,33 @@ TEST_F(ChairEdit, WithLittleRoomUnderTheTargetWaitsForLess) {
   };
   const double error = tight->error().total;
   EXPECT_LT(waiting(*tight, 1.05 * error), waiting(*loose, 2.0 * error));
+}
+
+TEST_F(ChairEdit, LightsLookWithFewPointsFirstWhereTheShadowsMayBeThatRough) {
+  const auto after = edited(before_, move_);
+  const auto measured = solved(before_), loose = solved(before_), tight = solved(before_);
+  const auto map = mapOf(before_, after);
+  const double error = tight->error().total;
+  const auto exact = successor(*measured, after, map);
+  const auto early = [&](LinkedSolver& former, double target) {
+    settings_.target_error = target;
+    auto solver = std::make_unique<LinkedSolver>(after.patches, after.materials, *transport_, settings_,
+                                                 solver::LightSources{}, former, map);
+    for (int i = 0; i < 1000 && solver->isRepairing(); ++i) EXPECT_TRUE(solver->step());
+    return solver;
+  };
+  const auto rough = early(*loose, 2.0 * error), fine = early(*tight, 1.01 * error);
+  EXPECT_GT(unlikeLights(*rough, *exact, *after.patches), 0U);
+  EXPECT_FALSE(rough->directIrradiance().empty()) << "it is shown";
+  ASSERT_TRUE(fine->step());
+  EXPECT_TRUE(fine->isRepairing()) << "with more points";
+  while (fine->isRepairing()) ASSERT_TRUE(fine->step());
+  EXPECT_LT(unlikeLights(*fine, *exact, *after.patches), unlikeLights(*rough, *exact, *after.patches));
+  ASSERT_TRUE(rough->step());
+  EXPECT_FALSE(rough->isRepairing());
+  finish(*rough);
+  for (int i = 0; i < 1000 && rough->isBehind(); ++i) ASSERT_TRUE(rough->step());
+  EXPECT_EQ(unlikeLights(*rough, *exact, *after.patches), 0U) << "in the end";
 }
 
 TEST_F(ChairEdit, OfASceneThatIsBehindCountsWhatWaitedForEarlierEdits) {
