@@ -215,7 +215,7 @@ bool LitScene::showDirectLight() {
 /// Goes on with what changed: materials_, or the sources of light that are no surfaces.
 void LitScene::updateSolver(bool materials, bool lights) {
   sources_ = lightSources(*scene_);
-  power_ = emittedPower();
+  const double power_before = std::exchange(power_, emittedPower());
   // Integers have a scale that was chosen for the power at the start. Far outside it they could overflow or lose the
   // small lights.
   if (solver_->hasFluxScale() && (power_ > 4.0 * solver_power_ || power_ < solver_power_ / 64.0)) {
@@ -225,8 +225,22 @@ void LitScene::updateSolver(bool materials, bool lights) {
     makeSolver();
     return;
   }
+  std::vector<scene::LightmapPage> direct;
+  if ((lights || power_ != power_before) && !solver_->isRepairing() && solver_->linkCounters().bytes >= slow_links_)
+    direct = directPages();
   if (materials) solver_->setMaterials(materials_);
   if (lights) solver_->setLights(sources_);
+  if (!direct.empty()) showLightsFirst(direct);
+}
+
+/// Until the solver has the light over all its links.
+void LitScene::showLightsFirst(const std::vector<scene::LightmapPage>& direct_before) {
+  const auto fresh = directPages();
+  if (fresh.empty()) return;
+  until_settled_ = until_settled_ || old_light_.empty();
+  old_light_ = replacePart(pagesOfNow(), direct_before, fresh);
+  old_direct_.clear();
+  new_share_ = 0.0;
 }
 
 bool LitScene::setSky(const SolveSettings& settings) {
@@ -262,8 +276,19 @@ std::vector<scene::LightmapPage> LitScene::pages() const {
   return scene::assemblePages(*patches_, irradiance);
 }
 
+/// What is shown as long as nothing new is known.
+std::vector<scene::LightmapPage> LitScene::pagesOfNow() const {
+  if (old_light_.empty()) return pages();
+  return new_share_ > 0.0 ? blendPages(old_light_, pages(), new_share_) : old_light_;
+}
+
 std::vector<scene::LightmapPage> LitScene::shownPages() {
   if (old_light_.empty()) return pages();
+  if (new_share_ <= 0.0 && solver_->isUnsettled()) return old_light_;  // its next slices settle it
+  if (until_settled_) {
+    endFade();
+    return pages();
+  }
   solver_->assess();
   new_share_ = std::max(new_share_, newLightShare(solver_->error().total, settings_.target_error));
   if (new_share_ <= 0.0) return old_light_;

@@ -112,7 +112,11 @@ class LitScene {
   void endFade() {
     old_light_.clear();
     old_direct_.clear();
+    until_settled_ = false;
   }
+  /// From how many bytes of links on an edit of light shows the lights' own part first: the light over fewer is solved
+  /// for sooner than anyone sees that it is late.
+  void setSlowLinks(std::size_t bytes) { slow_links_ = bytes; }
   /// While an edit of geometry is being solved, as soon as the lights' own part of the new light is known: shows it in
   /// the place of their old one, so that shadows move long before reflected light follows. True: what viewers see has
   /// changed. Once for each edit; costs two passes over the pages.
@@ -127,6 +131,8 @@ class LitScene {
   [[nodiscard]] bool nothingShines() const { return power_ <= 0.0 && !patches_->surfaces.empty(); }
   void makeSolver(const solver::FormerSolver* former = nullptr);
   void updateSolver(bool materials, bool lights);
+  [[nodiscard]] std::vector<scene::LightmapPage> pagesOfNow() const;
+  void showLightsFirst(const std::vector<scene::LightmapPage>& direct_before);
   [[nodiscard]] std::vector<scene::LightmapPage> directPages() const;
   [[nodiscard]] std::optional<scene::PatchMap> mapFrom(const LitScene& former) const;
   [[nodiscard]] std::uint64_t touchedSurfaces(std::size_t before, const std::optional<scene::PatchMap>& matched) const;
@@ -151,6 +157,8 @@ class LitScene {
   std::vector<scene::LightmapPage> old_light_;   // what was shown before an edit; empty: no fade
   std::vector<scene::LightmapPage> old_direct_;  // of it, what came straight from lights; empty: not known, or replaced
   double new_share_ = 0.0;                       // of the solver's own light in what is shown; never falls
+  std::size_t slow_links_ = std::size_t{64} << 20;
+  bool until_settled_ = false;  // old_light_ has the lights' new part, and stands in for that long
 };
 
 }  // namespace radiosity::engine

@@ -52,6 +52,7 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] std::vector<glm::vec3> halfIrradiance(std::uint32_t half) const override;
   [[nodiscard]] std::vector<glm::vec3> directIrradiance() const override;
   [[nodiscard]] bool isRepairing() const override { return repaired_ < due_; }
+  [[nodiscard]] bool isUnsettled() const override { return from_links_ == FromLinks::kAfterEdit; }
   /// When all links are there, the light over them is still to be solved for.
   [[nodiscard]] bool isBehind() const override {
     return lacksLinks() || (phase_ == Phase::kDone && from_links_ == FromLinks::kToConfirm);

@@ -95,6 +95,9 @@ class Solver {
   [[nodiscard]] virtual std::vector<glm::vec3> directIrradiance() const { return {}; }
   /// After an edit of geometry: irradiance() is not there yet, since links are being measured again.
   [[nodiscard]] virtual bool isRepairing() const { return false; }
+  /// An edit is still to be taken in: irradiance() is the light before it, and assess() would take the time of several
+  /// steps.
+  [[nodiscard]] virtual bool isUnsettled() const { return false; }
   /// After an edit of geometry: links that matter little beside the target error are still those of before, which
   /// error() counts. Further steps after kConverged measure them, and end with kConverged once more.
   [[nodiscard]] virtual bool isBehind() const { return false; }

@@ -86,8 +86,11 @@ class Watcher final : public engine::Listener {
   void onLightmaps(const std::shared_ptr<const engine::Lightmaps>& lightmaps) override {
     const std::scoped_lock lock(mutex_);
     if (lightmaps->revision < revision_ || first_tile_) return;
-    // The first publication shows the light that was there before, on new pages perhaps.
-    if (std::exchange(published_, true) == false) return;
+    // The first publication on new pages shows the light that was there before.
+    if (!std::exchange(published_, true) && lightmaps->layout != layout_) {
+      layout_ = lightmaps->layout;
+      return;
+    }
     // A tile counts when its light changed in this very version.
     for (const auto& page : lightmaps->pages) {
       for (const auto& mip : page->tile_version) {
@@ -103,7 +106,7 @@ class Watcher final : public engine::Listener {
   std::condition_variable changed_;
   Clock::time_point start_;
   double processor_start_ = 0.0;
-  std::uint64_t revision_ = 0;
+  std::uint64_t revision_ = 0, layout_ = 0;
   std::optional<double> first_tile_;
   std::optional<Times> solved_;
   bool failed_ = false, published_ = false;

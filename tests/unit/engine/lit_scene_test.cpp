@@ -123,5 +123,57 @@ TEST(LitScene, ShadowsMoveBeforeReflectedLightIsKnown) {
   EXPECT_GE(nearer, 9 * (darker + brighter) / 10);
 }
 
+TEST(LitScene, LampsAreSeenToChangeBeforeTheirReflectedLightIsKnown) {
+  engine::SolveSettings settings;
+  settings.target_error = 0.03;
+  settings.texels = 600;
+  RayTransport transport(400);
+  const auto room = valueOf(LitScene::make(roomDocument(), settings, transport));
+  auto& lit = *room;
+  ASSERT_TRUE(lit.upload());
+  lit.startSolve();
+  solveToEnd(lit);
+  const auto old_light = lightOf(lit.shownPages());
+  const auto twice = [&](double strength) {
+    auto patch = nlohmann::json::array();
+    const auto& materials = lit.document().gltf["materials"];
+    for (std::size_t m = 0; m < materials.size(); ++m) {
+      const auto path =
+          "/materials/" + std::to_string(m) + "/extensions/KHR_materials_emissive_strength/emissiveStrength";
+      patch.push_back({{"op", "replace"}, {"path", path}, {"value", strength}});
+    }
+    auto edited = valueOf(scene::editDocument(lit.document(), patch, {}));
+    const auto change = lit.changeTo(edited.scene);
+    EXPECT_FALSE(change.geometry);
+    lit.reshade(std::move(edited.document), std::make_shared<const scene::Scene>(std::move(edited.scene)), change);
+  };
+  double strength = 1.0;
+  for (const auto& material : lit.document().gltf["materials"]) {
+    const auto lamp = nlohmann::json::json_pointer("/extensions/KHR_materials_emissive_strength/emissiveStrength");
+    if (material.contains(lamp)) strength = std::max(strength, material[lamp].get<double>());
+  }
+  twice(2.0 * strength);
+  EXPECT_EQ(lightOf(lit.shownPages()), old_light) << "the light over few links is there soon enough";
+  solveToEnd(lit);
+  const auto doubled = lightOf(lit.shownPages());
+
+  lit.setSlowLinks(0);
+  twice(4.0 * strength);
+  const auto shown = lightOf(lit.shownPages());
+  EXPECT_TRUE(lit.solver().isUnsettled()) << "who looks does not wait for it";
+  solveToEnd(lit);
+  const auto fresh = lightOf(lit.shownPages());
+  EXPECT_EQ(fresh, lightOf(lit.pages()));
+  std::size_t between = 0, direct = 0;
+  for (std::size_t i = 0; i < shown.size(); ++i) {
+    EXPECT_GE(shown[i], 0.999F * doubled[i]) << i;
+    EXPECT_LE(shown[i], 1.001F * fresh[i]) << i;
+    between += shown[i] < 0.95F * fresh[i] ? 1 : 0;
+    direct += shown[i] > 1.5F * doubled[i] ? 1 : 0;
+  }
+  EXPECT_GT(between, shown.size() / 4) << "reflected light is that of before";
+  EXPECT_GT(direct, shown.size() / 8) << "what the lamps light is theirs";
+}
+
 }  // namespace
 }  // namespace radiosity::test
