@@ -225,20 +225,28 @@ void LitScene::updateSolver(bool materials, bool lights) {
     makeSolver();
     return;
   }
-  std::vector<scene::LightmapPage> direct;
+  std::vector<glm::vec3> direct;
   if ((lights || power_ != power_before) && !solver_->isRepairing() && solver_->linkCounters().bytes >= slow_links_)
-    direct = directPages();
+    direct = solver_->directIrradiance();
   if (materials) solver_->setMaterials(materials_);
   if (lights) solver_->setLights(sources_);
   if (!direct.empty()) showLightsFirst(direct);
 }
 
 /// Until the solver has the light over all its links.
-void LitScene::showLightsFirst(const std::vector<scene::LightmapPage>& direct_before) {
-  const auto fresh = directPages();
-  if (fresh.empty()) return;
-  until_settled_ = until_settled_ || old_light_.empty();
-  old_light_ = replacePart(pagesOfNow(), direct_before, fresh);
+void LitScene::showLightsFirst(const std::vector<glm::vec3>& direct_before) {
+  const auto direct = solver_->directIrradiance();
+  if (direct.empty()) return;
+  if (old_light_.empty()) {
+    auto irradiance = solver_->irradiance();
+    for (std::size_t n = 0; n < irradiance.size(); ++n)
+      irradiance[n] = glm::max(glm::max(irradiance[n], 0.0F) + direct[n] - direct_before[n], 0.0F);
+    old_light_ = scene::assemblePages(*patches_, irradiance);
+    until_settled_ = true;
+  } else {
+    old_light_ = replacePart(pagesOfNow(), scene::assemblePages(*patches_, direct_before),
+                             scene::assemblePages(*patches_, direct));
+  }
   old_direct_.clear();
   new_share_ = 0.0;
 }
@@ -276,9 +284,8 @@ std::vector<scene::LightmapPage> LitScene::pages() const {
   return scene::assemblePages(*patches_, irradiance);
 }
 
-/// What is shown as long as nothing new is known.
+/// What is shown of a fade as long as nothing new is known.
 std::vector<scene::LightmapPage> LitScene::pagesOfNow() const {
-  if (old_light_.empty()) return pages();
   return new_share_ > 0.0 ? blendPages(old_light_, pages(), new_share_) : old_light_;
 }
 

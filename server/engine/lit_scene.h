@@ -132,7 +132,7 @@ class LitScene {
   void makeSolver(const solver::FormerSolver* former = nullptr);
   void updateSolver(bool materials, bool lights);
   [[nodiscard]] std::vector<scene::LightmapPage> pagesOfNow() const;
-  void showLightsFirst(const std::vector<scene::LightmapPage>& direct_before);
+  void showLightsFirst(const std::vector<glm::vec3>& direct_before);
   [[nodiscard]] std::vector<scene::LightmapPage> directPages() const;
   [[nodiscard]] std::optional<scene::PatchMap> mapFrom(const LitScene& former) const;
   [[nodiscard]] std::uint64_t touchedSurfaces(std::size_t before, const std::optional<scene::PatchMap>& matched) const;

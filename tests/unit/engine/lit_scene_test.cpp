@@ -43,6 +43,16 @@ void solveToEnd(LitScene& lit) {
   }
 }
 
+/// Which texels lie wholly on their surfaces. What is around them is drawn out from there and fitted to what is beyond
+/// a seam, and may become darker where all else becomes brighter.
+std::vector<bool> wholeTexels(const std::vector<scene::LightmapPage>& pages) {
+  std::vector<bool> whole;
+  for (const auto& page : pages) {
+    for (const float part : page.coverage) whole.push_back(part >= 1.0F);
+  }
+  return whole;
+}
+
 /// Green light of all texels.
 std::vector<float> lightOf(const std::vector<scene::LightmapPage>& pages) {
   std::vector<float> light;
@@ -164,8 +174,10 @@ TEST(LitScene, LampsAreSeenToChangeBeforeTheirReflectedLightIsKnown) {
   solveToEnd(lit);
   const auto fresh = lightOf(lit.shownPages());
   EXPECT_EQ(fresh, lightOf(lit.pages()));
+  const auto whole = wholeTexels(lit.pages());
   std::size_t between = 0, direct = 0;
   for (std::size_t i = 0; i < shown.size(); ++i) {
+    if (!whole[i]) continue;
     EXPECT_GE(shown[i], 0.999F * doubled[i]) << i;
     EXPECT_LE(shown[i], 1.001F * fresh[i]) << i;
     between += shown[i] < 0.95F * fresh[i] ? 1 : 0;
