@@ -161,6 +161,10 @@ def main():
         return 0
     if options.root is None or options.root.exists():
         parser.error("--root must name a folder that does not exist yet")
+    if not (options.base and options.base.exists()) and shutil.which("debootstrap") is None:
+        parser.error("debootstrap is not installed (apt-get install debootstrap); or --base names a bare Debian 12")
+    if os.geteuid() != 0:
+        parser.error("needs root: debootstrap and chroot do")
     options.root.mkdir(parents=True)
     stages = build(steps, options.root.resolve(), options.base and options.base.resolve())
     return stages[-1].run(options.command, network=False) if options.command else 0

@@ -6,6 +6,7 @@ import pathlib
 import re
 import shutil
 import subprocess
+import sys
 import tempfile
 import unittest
 
@@ -88,6 +89,17 @@ class Dockerfile(unittest.TestCase):
     def test_a_dockerfile_that_is_cut_short_is_refused(self):
         with self.assertRaises(ValueError):
             load(DOCKER / "without_docker.py").parse("FROM a\nRUN x \\\n")
+
+
+    def test_what_it_takes_to_do_without_docker_is_asked_for_first(self):
+        with tempfile.TemporaryDirectory() as folder:
+            root = pathlib.Path(folder) / "stages"
+            done = subprocess.run([sys.executable, DOCKER / "without_docker.py", "--root", root], env={"PATH": folder},
+                                  capture_output=True, text=True, check=False)
+            self.assertEqual(done.returncode, 2)
+            self.assertIn("apt-get install debootstrap", done.stderr)
+            self.assertNotIn("Traceback", done.stderr)
+            self.assertFalse(root.exists())
 
 
 class OpenJobDescription(unittest.TestCase):
