@@ -103,7 +103,7 @@ class LightGatherer {
   /// It does, at the last of parts_.
   void addEdge(std::size_t lit);
   void clearEdges();
-  /// How much of the leaf that `place` on the polygon lies in shines.
+  /// How much of the leaf that `place` on the polygon lies in shines, there.
   [[nodiscard]] double shiningAt(const solver::GatherShot& shot, const glm::vec3& place, const glm::vec3& at,
                                  const glm::vec3& normal) const;
   void beginEdges();

@@ -3,6 +3,7 @@
 // When it does, it would count for all those that do not, and make one texel far too bright. And of many points the few
 // that are nearest to the receiver would tell of them all. So the receiver asks by rays, one for each point, drawn as
 // the light of the part itself would arrive.
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <glm/common.hpp>
@@ -40,6 +41,10 @@ class Draw {
   std::uint32_t state_ = 0;
 };
 
+/// A plane that leaves more than this of the polygon cuts off no more than rounding, or next to nothing.
+constexpr double kCutOff = 0.999;
+/// No place on a leaf is farther from the nearest of so many that were tried, in leaf widths: half a cell's diagonal.
+constexpr float kBetweenSpots = 0.09F;
 /// A leaf that shines so far shines everywhere: areas are in single precision.
 constexpr double kWhole = 0.998;
 
@@ -55,18 +60,18 @@ glm::vec2 texelAt(const scene::TriangleFrame& frame, const glm::vec3& place) {
 
 bool LightGatherer::isEdge(const solver::GatherShot& shot, std::size_t lit, double front) const {
   if (shot.fill < 1.0F && shot.triangle == scene::kNone) return false;
-  return front < 1.0 && static_cast<double>(lit_.form_factor[lit]) > static_cast<double>(solver::kNearEdge) * front &&
+  return front<kCutOff&& static_cast<double>(lit_.form_factor[lit])> static_cast<double>(solver::kNearEdge) * front &&
          receivers_->patches().opacity.empty();
 }
 
-/// How much of the leaf that `place` on the polygon lies in shines, of the part of it before the plane of the receiver
-/// at `at`: 0 in a hole.
+/// How much of what is around `place` on the polygon shines, before the plane of the receiver at `at`: 0 in a hole. Of
+/// leaves whose spots are known, whether one is near: rays meet once more what hides the rest, if that is a solid.
 double LightGatherer::shiningAt(const solver::GatherShot& shot, const glm::vec3& place, const glm::vec3& at,
                                 const glm::vec3& normal) const {
   const auto& patches = receivers_->patches();
   const auto& frame = patches.triangles[shot.triangle];
   const auto& surface = patches.surfaces[patches.triangle_surface[shot.triangle]];
-  const auto texel = glm::floor(texelAt(frame, place));
+  const auto here = texelAt(frame, place), texel = glm::floor(here);
   const auto width = static_cast<float>(surface.width), height = static_cast<float>(surface.height);
   if (!(texel.x >= 0.0F && texel.x < width && texel.y >= 0.0F && texel.y < height)) return 0.0;
   const auto leaf = static_cast<std::uint32_t>(texel.y) * surface.width + static_cast<std::uint32_t>(texel.x);
@@ -75,6 +80,12 @@ double LightGatherer::shiningAt(const solver::GatherShot& shot, const glm::vec3&
   const double area = solver::polygonArea(corners);
   const double fill = static_cast<double>(patches.node_area[surface.first_node[shot.side] + leaf]) / area;
   if (fill <= 0.0 || fill >= kWhole) return fill;
+  const auto& point = patches.leaves[surface.first_leaf + leaf];
+  if (!point.full && point.first_spot != scene::kNone) {
+    const auto spots = std::span(patches.spots).subspan(point.first_spot, scene::kLeafSpots);
+    const auto isNear = [&](const scene::LeafSpot& spot) { return glm::distance(spot.texel, here) < kBetweenSpots; };
+    return std::any_of(spots.begin(), spots.end(), isNear) ? 1.0 : 0.0;
+  }
   const auto before = clipToPlane(corners, at, normal);
   return shining(fill, solver::polygonArea(std::span(before.corner.data(), before.count)) / area);
 }

@@ -18,7 +18,7 @@ std::uint32_t shotsFor(std::uint32_t points) { return (points + kLightPoints - 1
 /// Of a light's shots, those that are next.
 LinkedSolver::ShotRange LinkedSolver::shotsOfLight(const Repair& repair) const {
   const auto all = shotsFor(repair.samples), first = shotsFor(repair.looked);
-  const bool rest = repair.whole || !lights_may_be_rough_ || phase_ == Phase::kDone;
+  const bool rest = repair.whole || !lights_may_be_rough_ || phase_ == Phase::kDone || repair.first_shots <= first;
   return {first, rest ? all : std::min(all, repair.first_shots)};
 }
 

@@ -227,7 +227,7 @@ StepOutcome LinkedSolver::finishRound() {
 /// What waits may be what is missing.
 StepOutcome LinkedSolver::exhausted(SolveLimit limit) {
   if (lacksLinks() && !isRepairing()) {
-    due_ = repairs_.size();
+    beExact();
     from_links_ = FromLinks::kToConfirm;
     return StepOutcome::kSlice;
   }

@@ -14,7 +14,7 @@ namespace {
 constexpr double kPoint = 1e-11;
 
 /// A direction is accepted with the ratio of its cosine to the greatest: more often than once in three for all but
-/// needles that stand upright, for which the last one drawn does.
+/// needles that stand upright, for which their middle does.
 constexpr int kTries = 64;
 
 /// The unit vector of the part of `a` that is at right angles to the unit vector `to`.
@@ -77,7 +77,6 @@ double PolygonDirections::greatestCosine(std::span<const glm::dvec3> corners) co
 }
 
 glm::dvec3 PolygonDirections::draw(const std::function<double()>& uniform) const {
-  glm::dvec3 direction = middle_;
   for (int i = 0; i < kTries && count_ > 0; ++i) {
     double left = uniform() * solid_angle_;
     std::size_t k = 0;
@@ -91,10 +90,10 @@ glm::dvec3 PolygonDirections::draw(const std::function<double()>& uniform) const
     const double q = under != 0.0 ? std::clamp(((v * t - u * s) * cosine - v) / under, -1.0, 1.0) : 1.0;
     const auto d = q * of.a + std::sqrt(1.0 - q * q) * across(of.c, of.a);
     const double z = 1.0 - uniform() * (1.0 - glm::dot(d, of.b));
-    direction = z * of.b + std::sqrt(std::max(0.0, 1.0 - z * z)) * across(d, of.b);
-    if (uniform() * most_ < glm::dot(direction, normal_)) break;
+    const auto direction = z * of.b + std::sqrt(std::max(0.0, 1.0 - z * z)) * across(d, of.b);
+    if (uniform() * most_ < glm::dot(direction, normal_)) return direction;
   }
-  return direction;
+  return middle_;
 }
 
 }  // namespace radiosity::solver
