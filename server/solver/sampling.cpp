@@ -46,13 +46,30 @@ constexpr Directions makeDirections(std::uint32_t degree, std::uint32_t polynomi
 constexpr std::array<Directions, 3> kDirections = {makeDirections(1, 0, {1, 0, 0}), makeDirections(2, 1, {1, 3, 0}),
                                                    makeDirections(3, 1, {1, 3, 1})};
 
+/// By byte of the index, and its value: what its bits contribute. A shuffled index has 32 bits, of which any may be
+/// set.
+using ByteTables = std::array<std::array<std::uint32_t, 256>, 4>;
+
+constexpr ByteTables makeTables(const Directions& directions) {
+  ByteTables tables{};
+  for (std::uint32_t byte = 0; byte < 4; ++byte) {
+    for (std::uint32_t value = 0; value < 256; ++value) {
+      for (std::uint32_t bit = 0; bit < 8; ++bit) {
+        if ((value >> bit) & 1U) tables[byte][value] ^= directions[8 * byte + bit];
+      }
+    }
+  }
+  return tables;
+}
+
+constexpr std::array<ByteTables, 3> kTables = {makeTables(kDirections[0]), makeTables(kDirections[1]),
+                                               makeTables(kDirections[2])};
+
 std::uint32_t sobolBits(std::uint32_t index, std::uint32_t dimension) {
   if (dimension == 0) return reverseBits(index);
-  std::uint32_t x = 0;
-  for (std::uint32_t bit = 0; index != 0; ++bit, index >>= 1) {
-    if (index & 1U) x ^= kDirections[dimension - 1][bit];
-  }
-  return x;
+  const auto& table = kTables[dimension - 1];
+  return table[0][index & 255U] ^ table[1][(index >> 8U) & 255U] ^ table[2][(index >> 16U) & 255U] ^
+         table[3][index >> 24U];
 }
 
 }  // namespace
