@@ -22,6 +22,9 @@ std::uint32_t ditherOf(std::uint32_t value, std::uint32_t sample) {
   return (x ^ (x >> 16U)) & 0xfffU;
 }
 
+/// Of codes that are shared at least so many are in use.
+constexpr double kWorthSharing = 0.9;
+
 /// The float whose exponent is the smallest of a link's, in units of a link's last bit.
 constexpr std::uint32_t kExponentBase = 97U << 11U;
 
@@ -99,10 +102,10 @@ void LinkColumn::makeRoom(std::span<const std::uint32_t> reached, const std::vec
   auto to = runs.begin();
   for (const auto& old : runs_) {
     while (to->first_value + to->count <= old.first_value) ++to;
-    std::copy_n(code_.begin() + old.offset, old.count, code.begin() + to->offset + (old.first_value - to->first_value));
+    std::copy_n(code_.at(old.offset), old.count, code.begin() + to->offset + (old.first_value - to->first_value));
   }
   runs_ = std::move(runs);
-  code_ = std::move(code);
+  code_.set(std::move(code));
 }
 
 /// Room for the largest link of a sample, with as much again for what averages and further samples may bring.
@@ -159,7 +162,7 @@ void LinkColumn::addTo(const Run& run, std::uint32_t first_value, std::uint32_t 
                        std::span<const float> fresh) {
   // To the average of very many, one more adds less than half a last bit: then chance rounds, and the mean stays true.
   const bool chance = samples_ >= kExactSamples;
-  std::uint16_t* code = &code_[run.offset + (first_value - run.first_value)];
+  std::uint16_t* code = &code_.own()[run.offset + (first_value - run.first_value)];
   for (std::uint32_t i = 0; i < count; ++i) {
     const std::uint32_t dither = chance ? ditherOf(first_value + i, samples_) : 2048;
     code[i] = encodeLink(kept * decodeOne(code[i]) + added * (fresh.empty() ? 0.0F : fresh[i]), dither);
@@ -171,7 +174,7 @@ void LinkColumn::keepFlux(std::span<const float> leaf_area) {
   double coded = 0.0;
   for (const auto& run : runs_) {
     links.resize(run.count);
-    decodeAll(&code_[run.offset], run.count, 1.0F, links.data());
+    decodeAll(code_.at(run.offset), run.count, 1.0F, links.data());
     coded += fluxOf(links, &leaf_area[run.first_value]);
   }
   coded *= static_cast<double>(scale_);
@@ -197,7 +200,7 @@ void LinkColumn::replace(std::span<const ValueRun> leaves, std::span<const float
   const float old_scale = scale_;
   growTo(largest);
   if (scale_ != old_scale) {
-    for (auto& code : code_) code = encodeLink(old_scale / scale_ * decodeOne(code));
+    for (auto& code : code_.own()) code = encodeLink(old_scale / scale_ * decodeOne(code));
   }
   const float unit = 1.0F / scale_;
   auto to = runs_.begin();
@@ -205,7 +208,7 @@ void LinkColumn::replace(std::span<const ValueRun> leaves, std::span<const float
     while (to != runs_.end() && to->first_value + to->count <= run.first) ++to;
     if (to == runs_.end()) break;
     if (to->first_value > run.first) continue;  // no room was made: all of them are zero
-    std::uint16_t* code = &code_[to->offset + (run.first - to->first_value)];
+    std::uint16_t* code = &code_.own()[to->offset + (run.first - to->first_value)];
     for (std::uint32_t i = 0; i < run.count; ++i) code[i] = encodeLink(unit * values[run.first + i]);
   }
   due_ = delivered_ = totals.due;  // of a shooter that loses next to nothing
@@ -232,29 +235,27 @@ LinkColumn LinkColumn::renumbered(const std::vector<std::uint32_t>& side_after, 
   }
   // An edit that changes the order of nodes changes that of sides.
   if (!std::ranges::is_sorted(pieces, {}, &Piece::side)) std::ranges::sort(pieces, {}, &Piece::side);
+  const bool share = static_cast<double>(codes) >= kWorthSharing * static_cast<double>(code_.all().size());
   std::vector<Run> runs;
   std::vector<std::uint16_t> code;
-  code.reserve(codes);  // not more, or they would be copied once more to give the rest back
-  for (std::size_t p = 0, end = 0; p < pieces.size(); p = end) {
-    // Neighbours that were neighbours before go over together.
-    const auto first = pieces[p].from;
-    std::uint32_t count = 0;
-    for (end = p; end < pieces.size() && pieces[end].from == first + count; ++end) {
-      const auto side = pieces[end].side;
-      const bool joins = !runs.empty() && runs.back().side + runs.back().side_count == side;
-      if (!joins)
-        runs.push_back({side, 0, after[side].first_value, 0, static_cast<std::uint32_t>(code.size()) + count});
-      ++runs.back().side_count;
-      runs.back().count += pieces[end].count;
-      count += pieces[end].count;
-    }
-    const auto from = code_.begin() + first;
-    code.insert(code.end(), from, from + count);
+  if (!share) code.reserve(codes);  // not more, or they would be copied once more to give the rest back
+  for (const auto& piece : pieces) {
+    const auto offset = share ? piece.from : static_cast<std::uint32_t>(code.size());
+    if (!share) code.insert(code.end(), code_.at(piece.from), code_.at(piece.from) + piece.count);
+    const bool joins = !runs.empty() && runs.back().side + runs.back().side_count == piece.side &&
+                       runs.back().offset + runs.back().count == offset;
+    if (!joins) runs.push_back({piece.side, 0, after[piece.side].first_value, 0, offset});
+    ++runs.back().side_count;
+    runs.back().count += piece.count;
   }
   runs.shrink_to_fit();
   LinkColumn column;
   column.runs_ = std::move(runs);
-  column.code_ = std::move(code);
+  if (share) {
+    column.code_ = code_;
+  } else {
+    column.code_.set(std::move(code));
+  }
   column.scale_ = scale_;
   column.gain_ = gain_;
   column.samples_ = samples_;
@@ -270,7 +271,7 @@ LinkColumn LinkColumn::renumbered(const std::vector<std::uint32_t>& side_after, 
 void LinkColumn::apply(const std::array<float, 3>& radiosity, const std::array<float*, 3>& irradiance) const {
   const float scale = scale_ * gain_;
   for (const auto& run : runs_) {
-    addScaled(&code_[run.offset], run.count, scale * radiosity[0], scale * radiosity[1], scale * radiosity[2],
+    addScaled(code_.at(run.offset), run.count, scale * radiosity[0], scale * radiosity[1], scale * radiosity[2],
               irradiance[0] + run.first_value, irradiance[1] + run.first_value, irradiance[2] + run.first_value);
   }
 }
@@ -279,7 +280,7 @@ void LinkColumn::addSquares(float factor, std::span<float> sums) const {
   const float scale = scale_ * gain_;
   for (const auto& run : runs_) {
     for (std::uint32_t i = 0; i < run.count; ++i) {
-      const float link = scale * decodeOne(code_[run.offset + i]);
+      const float link = scale * decodeOne(*code_.at(run.offset + i));
       sums[run.first_value + i] += factor * link * link;
     }
   }
@@ -294,8 +295,8 @@ double LinkColumn::product(const LinkColumn& a, const LinkColumn& b, std::span<c
     for (auto with = other; with != b.runs_.end() && with->first_value < run_end; ++with) {
       const std::uint32_t first = std::max(run.first_value, with->first_value);
       const std::uint32_t end = std::min(run_end, with->first_value + with->count);
-      sum += static_cast<double>(productOf(&a.code_[run.offset + (first - run.first_value)],
-                                           &b.code_[with->offset + (first - with->first_value)], &leaf_area[first],
+      sum += static_cast<double>(productOf(a.code_.at(run.offset + (first - run.first_value)),
+                                           b.code_.at(with->offset + (first - with->first_value)), &leaf_area[first],
                                            end - first));
     }
   }
@@ -308,7 +309,7 @@ bool LinkColumn::decode(std::uint32_t first_value, std::span<float> leaves) cons
   if (after == runs_.begin()) return false;
   const Run& run = *(after - 1);
   if (first_value >= run.first_value + run.count) return false;
-  decodeAll(&code_[run.offset + (first_value - run.first_value)], leaves.size(), scale_ * gain_, leaves.data());
+  decodeAll(code_.at(run.offset + (first_value - run.first_value)), leaves.size(), scale_ * gain_, leaves.data());
   return true;
 }
 

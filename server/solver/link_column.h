@@ -4,7 +4,9 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "common/archive.h"
@@ -18,6 +20,29 @@ namespace radiosity::solver {
 /// cut off is rounded up when it is more than `dither` / 4096 of the last bit: 2048 is to nearest.
 [[nodiscard]] std::uint16_t encodeLink(float value, std::uint32_t dither = 2048);
 [[nodiscard]] float decodeLink(std::uint16_t code);
+
+/// Codes of links, which copies share until one of them is changed: an edit of geometry leaves most columns as they
+/// are, and the scene before it stays, too.
+class SharedCodes {
+ public:
+  [[nodiscard]] const std::vector<std::uint16_t>& all() const { return *codes_; }
+  [[nodiscard]] const std::uint16_t* at(std::size_t offset) const { return codes_->data() + offset; }
+  /// To be changed.
+  [[nodiscard]] std::vector<std::uint16_t>& own() {
+    if (codes_.use_count() > 1) codes_ = std::make_shared<std::vector<std::uint16_t>>(*codes_);
+    return *codes_;
+  }
+  void set(std::vector<std::uint16_t>&& codes) {
+    codes_ = std::make_shared<std::vector<std::uint16_t>>(std::move(codes));
+  }
+
+ private:
+  static std::shared_ptr<std::vector<std::uint16_t>> none() {
+    static const auto empty = std::make_shared<std::vector<std::uint16_t>>();
+    return empty;
+  }
+  std::shared_ptr<std::vector<std::uint16_t>> codes_ = none();
+};
 
 class LinkColumn {
  public:
@@ -38,7 +63,7 @@ class LinkColumn {
   void replace(std::span<const ValueRun> leaves, std::span<const float> values, const Totals& totals,
                std::span<const float> leaf_area, const std::vector<Side>& sides);
   /// The same links in a scene whose sides are numbered otherwise, in any order. `side_after`: by old side, kNone: its
-  /// links are left out, what they delivered is not.
+  /// links are left out, what they delivered is not. Shares the codes, unless many of them are of what is left out.
   [[nodiscard]] LinkColumn renumbered(const std::vector<std::uint32_t>& side_after, const std::vector<Side>& before,
                                       const std::vector<Side>& after) const;
 
@@ -62,7 +87,7 @@ class LinkColumn {
   /// Flux that leaves the scene, and that falls on unlit sides, for a radiosity of one.
   [[nodiscard]] double escaped() const { return escaped_; }
   [[nodiscard]] double absorbed() const { return absorbed_; }
-  [[nodiscard]] std::size_t bytes() const { return code_.size() * sizeof(code_[0]) + runs_.size() * sizeof(runs_[0]); }
+  [[nodiscard]] std::size_t bytes() const { return code_.all().size() * kLeafBytes + runs_.size() * sizeof(runs_[0]); }
 
   /// Adds radiosity[c] times the links to plane c of irradiance, by leaf value.
   void apply(const std::array<float, 3>& radiosity, const std::array<float*, 3>& irradiance) const;
@@ -87,9 +112,11 @@ class LinkColumn {
   [[nodiscard]] std::span<const Run> runs() const { return runs_; }
 
  private:
+  [[nodiscard]] static const std::vector<std::uint16_t>& codesOf(const LinkColumn& self) { return self.code_.all(); }
+  [[nodiscard]] static std::vector<std::uint16_t>& codesOf(LinkColumn& self) { return self.code_.own(); }
   template <typename Archive, typename Self>
   static void visit(Archive& archive, Self& self) {
-    archive(self.runs_, self.scale_, self.gain_, self.code_, self.samples_, self.points_, self.due_, self.delivered_,
+    archive(self.runs_, self.scale_, self.gain_, codesOf(self), self.samples_, self.points_, self.due_, self.delivered_,
             self.escaped_, self.absorbed_, self.open_looks_.bits);
   }
   void makeRoom(std::span<const std::uint32_t> reached, const std::vector<Side>& sides);
@@ -103,7 +130,7 @@ class LinkColumn {
   std::vector<Run> runs_;    // by ascending side
   float scale_ = 0x1p-100F;  // of the codes; a power of two that grows with the largest link
   float gain_ = 1.0F;
-  std::vector<std::uint16_t> code_;
+  SharedCodes code_;
   std::uint32_t samples_ = 0;
   double points_ = 0.0, due_ = 0.0, delivered_ = 0.0, escaped_ = 0.0, absorbed_ = 0.0;
   Looks open_looks_;

@@ -22,7 +22,7 @@ bool LinkColumn::restore(ArchiveReader& from, std::size_t sides, std::size_t val
   visit(from, *this);
   const auto fits = [&](const Run& run) {
     return std::uint64_t{run.side} + run.side_count <= sides && std::uint64_t{run.first_value} + run.count <= values &&
-           std::uint64_t{run.offset} + run.count <= code_.size();
+           std::uint64_t{run.offset} + run.count <= code_.all().size();
   };
   return from.ok() && std::all_of(runs_.begin(), runs_.end(), fits);
 }

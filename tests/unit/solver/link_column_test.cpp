@@ -325,5 +325,43 @@ TEST_F(LinkColumns, OneThatWasRenumberedIsTheOneMadeInTheNewNumbers) {
   }
 }
 
+TEST_F(LinkColumns, WhatIsRenumberedStaysAsItIsWhenTheOtherChanges) {
+  const std::vector<std::uint32_t> same = {0, 1, 2, 3, 4, 5};
+  LinkSample sample;
+  for (std::uint32_t side = 0; side < 6; ++side) {
+    for (std::uint32_t i = 0; i < 16; ++i)
+      sample.add(sides_[side].first_node + i, 0.02F + 0.001F * static_cast<float>(i));
+  }
+  const auto linksOf = [&](const LinkColumn& column) {
+    std::vector<float> links(6 * 16);
+    for (std::uint32_t side = 0; side < 6; ++side)
+      EXPECT_TRUE(column.decode(sides_[side].first_value, std::span(links).subspan(16 * side, 16)));
+    return links;
+  };
+  LinkSample brighter = sample;
+  for (auto& value : brighter.irradiance) value *= 3.0F;
+  const std::vector<float> values(6 * 16, 0.5F);
+  const std::vector<LinkColumn::ValueRun> leaves = {{sides_[1].first_value, 16}};
+  const std::vector<float> areas(6 * 16, 0.01F);
+  // By another sample, by a larger one (which scales the codes of all), and by other links to some leaves.
+  for (int change = 0; change < 3; ++change) {
+    for (const bool of_copy : {false, true}) {
+      LinkColumn column;
+      add(column, sample, 2.0);
+      auto copy = column.renumbered(same, sides_, sides_);
+      const auto before = linksOf(column);
+      EXPECT_EQ(linksOf(copy), before);
+      auto& changed = of_copy ? copy : column;
+      if (change == 2) {
+        changed.replace(leaves, values, {0.25, 0.0, 0.0, {}}, areas, sides_);
+      } else {
+        add(changed, change == 0 ? sample : brighter, 1.0);
+      }
+      EXPECT_EQ(linksOf(of_copy ? column : copy), before) << change;
+      EXPECT_EQ(change == 0 || linksOf(changed) != before, true) << change;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace radiosity::solver
