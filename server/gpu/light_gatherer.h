@@ -73,6 +73,7 @@ class LightGatherer {
   void weighLostInside(const ViewWindow& window, const solver::HemicubeFrame& point,
                        std::span<const std::uint32_t> items, std::uint32_t resolution, const HemicubeWeights& weights,
                        Lost& lost) const;
+  [[nodiscard]] bool addCorners(const solver::GatherShot& shot, std::size_t first, std::size_t end);
   void makeRoom(std::size_t more);
   void findLit(const solver::GatherShot& shot);
   void findLitGroup(const solver::GatherShot& shot, const Receivers::Group& group);
@@ -82,6 +83,7 @@ class LightGatherer {
   [[nodiscard]] bool behind(const solver::GatherShot& shot, const scene::Surface& surface) const;
   void testPoint(const solver::GatherShot& shot, const solver::HemicubeFrame& point,
                  std::span<const std::uint32_t> items, std::size_t half);
+  void settleEvenGaps(std::span<const std::uint32_t> items, std::size_t size);
   [[nodiscard]] std::array<std::uint32_t, 9> itemsAround(std::size_t i, std::span<const std::uint32_t> items,
                                                          std::size_t size) const;
   [[nodiscard]] Receivers::Ray rayTo(std::size_t i, const glm::vec3& light, std::size_t size) const;
@@ -124,10 +126,12 @@ class LightGatherer {
   bool lit_valid_ = false;
   Lit lit_;
   std::size_t lit_count_ = 0;
-  std::vector<Edge> edges_;            ///< of what is lit
-  std::vector<ClippedPolygon> parts_;  ///< of the polygon, before their planes
-  std::size_t weighed_ = 0;            ///< of those lit: the others wait for their form factors
-  Lost look_lost_;                     ///< of the looks since beginLinks
+  std::vector<Edge> edges_;                   ///< of what is lit
+  std::vector<ClippedPolygon> parts_;         ///< of the polygon, before their planes
+  std::vector<std::uint8_t> along_, uneven_;  ///< of the look under way, by pixel
+  std::size_t gaps_ = 0;                      ///< of those lit, how many lie in gaps
+  std::size_t weighed_ = 0;                   ///< of those lit: the others wait for their form factors
+  Lost look_lost_;                            ///< of the looks since beginLinks
   std::uint32_t look_count_ = 0;
   solver::Looks open_looks_;  ///< likewise: of them those that lost something
   std::vector<std::uint32_t> starts_;

@@ -8,22 +8,15 @@
 #include "common/clones.h"
 #include "server/gpu/form_factor_kernel.h"
 #include "server/gpu/light_gatherer.h"
+#include "server/gpu/receiver_places.h"
 #include "server/solver/polygon_form_factor.h"
 
 namespace radiosity::gpu {
 namespace {
 
-/// So many pixels around the places of named receivers are drawn: their own pixel's middle lies within, and those of
-/// its neighbours, which receivers that want care ask too.
-constexpr float kPixelsAround = 0.8F, kPixelsAroundMore = 2.2F;
-
 constexpr std::size_t kFewestLit = 4096;
 /// Spots are asked for before they are looked at, by so many receivers: each lies on a line of the cache of its own.
 constexpr std::size_t kSpotsAhead = 8;
-/// A receiver nearer than this to what shines, in texels, looks from two opposite places: what it receives changes
-/// steeply across it, and would be most of what samples differ by.
-constexpr float kNearTexels = 6.0F;
-
 /// Least and greatest height of a polygon above a plane.
 std::array<float, 2> heights(std::span<const glm::vec3> corners, const glm::vec3& point, const glm::vec3& normal) {
   float low = 1e30F, high = -1e30F;
@@ -46,27 +39,6 @@ float frontOfShining(float fill, double front) {
   return static_cast<float>(std::min(1.0, front / static_cast<double>(fill)));
 }
 
-struct Ball {
-  glm::vec3 middle{0.0F};
-  float radius = 0.0F;
-};
-
-/// Around the places of a surface that are near to a polygon; of radius 0 where there are none.
-Ball nearBall(std::span<const glm::vec3> corners, const scene::Surface& surface, const glm::vec3& texel) {
-  Ball ball;
-  for (const auto& corner : corners) ball.middle += corner / static_cast<float>(corners.size());
-  for (const auto& corner : corners) ball.radius = std::max(ball.radius, glm::distance(ball.middle, corner));
-  ball.radius += kNearTexels * glm::length(texel);
-  const auto closest = glm::clamp(ball.middle, surface.bounds_min, surface.bounds_max);
-  if (glm::distance(ball.middle, closest) > ball.radius) ball.radius = 0.0F;
-  return ball;
-}
-
-bool isNear(const Ball& ball, const Receivers::Block& block) {
-  return ball.radius > 0.0F &&
-         glm::distance(ball.middle, glm::clamp(ball.middle, block.low, block.high)) <= ball.radius;
-}
-
 /// Least and greatest height of a box above the polygon's plane.
 std::array<float, 2> heights(const solver::GatherShot& shot, const glm::vec3& low, const glm::vec3& high) {
   const auto rises = glm::greaterThan(shot.normal, glm::vec3(0.0F));
@@ -84,64 +56,6 @@ RADIOSITY_CLONES void findPlaces(const scene::TriangleFrame& frame, const glm::v
     y[i] = o.y + across * u.y + up * v.y;
     z[i] = o.z + across * u.z + up * v.z;
   }
-}
-
-/// The first of two opposite places. For the opposite jitter, that of the other half, they lie in the other two
-/// quarters of the receiver, as far from its edges as these are from its middle: what is linear across it cancels in
-/// each half, what is quadratic nearly so in their mean, and shows in their difference.
-glm::vec2 nearPlace(const glm::vec2& jitter) {
-  if (jitter.x <= 0.5F) return jitter;
-  const auto inverted = [](float offset) { return std::copysign(0.5F - std::abs(offset), offset); };
-  return {0.5F + inverted(jitter.x - 0.5F), 0.5F - inverted(jitter.y - 0.5F)};
-}
-
-/// The rows of spots that count for a shot.
-struct SpotRows {
-  std::uint32_t first, apart;
-};
-
-SpotRows spotRows(const solver::GatherShot& shot) {
-  const std::uint32_t apart = scene::kSpotRows / shot.spot_rows;
-  return {shot.spot_row * apart / scene::kSpotRows, apart};
-}
-
-/// Which of the rows of its spots is a receiver's first. Neighbours differ: in a narrow gap what the edges of shooters
-/// do to one row they would do to the same row of all, and so few draws neither average out nor tell how large their
-/// error is. By where it lies on its surface, which edits elsewhere do not change.
-std::uint32_t firstRow(const Receivers::Receiver& receiver, const SpotRows& rows) {
-  std::uint32_t mixed = static_cast<std::uint32_t>(receiver.texel.x) * 0x9e3779b1U +
-                        static_cast<std::uint32_t>(receiver.texel.y) * 0x85ebca77U;
-  mixed = (mixed ^ (mixed >> 15)) * 0x2c1b3c6dU;
-  return (rows.first + (mixed >> 16)) % rows.apart;
-}
-
-/// Where a receiver looks at a polygon, which is near inside a ball: takes each place before the polygon's plane, and
-/// its share of the receiver. Places stay in registers: through memory they cost more than all else that is done here.
-template <typename Take>
-[[gnu::always_inline]] inline void forEachPlace(const solver::GatherShot& shot, const Ball& ball,
-                                                const Receivers& receivers, const Receivers::Receiver& receiver,
-                                                const Take& take) {
-  const auto offer = [&](const Receivers::Place& place, float share) {
-    if (glm::dot(shot.normal, place.point - shot.corners[0]) > kInPlane) take(place, share);
-  };
-  if (receiver.hasSpots()) {
-    const auto rows = spotRows(shot);
-    const float share = static_cast<float>(rows.apart) / static_cast<float>(scene::kLeafSpots);
-    for (std::uint32_t row = firstRow(receiver, rows); row < scene::kSpotRows; row += rows.apart) {
-      for (std::uint32_t k = 0; k < scene::kSpotQuarters; ++k)
-        offer(receivers.spot(receiver, row * scene::kSpotQuarters + k), share);
-    }
-    return;
-  }
-  const auto place = receivers.place(receiver, shot.receiver_jitter);
-  const auto way = place.point - ball.middle;
-  if (glm::dot(way, way) >= ball.radius * ball.radius) {
-    offer(place, 1.0F);
-    return;
-  }
-  const auto at = nearPlace(shot.receiver_jitter);
-  offer(receivers.place(receiver, at), 0.5F);
-  offer(receivers.place(receiver, 1.0F - at), 0.5F);
 }
 
 }  // namespace
@@ -174,7 +88,7 @@ bool LightGatherer::behind(const solver::GatherShot& shot, const scene::Surface&
 
 void LightGatherer::findLit(const solver::GatherShot& shot) {
   if (lit_valid_ && sameGeometry(shot, lit_for_)) return;
-  lit_count_ = weighed_ = 0;
+  lit_count_ = weighed_ = gaps_ = 0;
   clearEdges();
   for (const auto& group : receivers_->groups()) {
     if (!behind(shot, receivers_->patches().surfaces[group.surface])) findLitGroup(shot, group);
@@ -314,72 +228,7 @@ void LightGatherer::addLit(const Receivers::Receiver& receiver, const Receivers:
   lit_.nz[k] = normal.z;
   lit_.node[k] = receiver.node;
   lit_.care[k] = receivers_->careOf(receiver);
-}
-
-/// The parts of groups that runs of leaves name.
-template <typename Take>
-void LightGatherer::forEachGroup(std::span<const solver::NodeRun> named, const Take& take) const {
-  const auto& all = receivers_->all();
-  auto group = receivers_->groups().begin();
-  const auto end = receivers_->groups().end();
-  for (const auto& run : named) {
-    const auto before = [](const Receivers::Receiver& receiver, std::uint32_t node) { return receiver.node < node; };
-    while (group != end && (group->count == 0 || all[group->first + group->count - 1].node < run.first_node)) ++group;
-    for (auto part = group; part != end; ++part) {
-      if (part->count == 0) continue;
-      const auto first = all.begin() + static_cast<std::ptrdiff_t>(part->first);
-      const auto last = first + static_cast<std::ptrdiff_t>(part->count);
-      if (first->node >= run.first_node + run.count) break;
-      const auto low = std::lower_bound(first, last, run.first_node, before);
-      const auto high = std::lower_bound(low, last, run.first_node + run.count, before);
-      if (low == high) continue;
-      take(Receivers::Group{part->surface, static_cast<std::size_t>(low - all.begin()),
-                            static_cast<std::size_t>(high - low), part->side, part->first_block});
-    }
-  }
-}
-
-void LightGatherer::findWanted(const solver::GatherShot& shot, std::span<const solver::NodeRun> named) {
-  places_.clear();
-  pixels_around_ = kPixelsAround;
-  forEachGroup(named, [&](const Receivers::Group& group) {
-    const auto& surface = receivers_->patches().surfaces[group.surface];
-    if (behind(shot, surface)) return;
-    const auto ball = nearBall(std::span(shot.corners.data(), shot.corner_count), surface,
-                               receivers_->patches().triangles[surface.first_triangle].du);
-    for (std::size_t i = group.first; i < group.first + group.count; ++i) {
-      const auto& receiver = receivers_->all()[i];
-      if (receivers_->careOf(receiver) != 0) pixels_around_ = kPixelsAroundMore;
-      forEachPlace(shot, ball, *receivers_, receiver,
-                   [&](const Receivers::Place& place, float /*share*/) { places_.push_back(place.point); });
-    }
-  });
-}
-
-std::optional<ViewWindow> LightGatherer::windowOf(const solver::GatherShot& shot, const solver::HemicubeFrame& point,
-                                                  std::span<const scene::ChangedBox> boxes) const {
-  return windowAround(point, places_, boxes, pixels_around_ * 2.0F / static_cast<float>(shot.resolution));
-}
-
-void LightGatherer::beginLinks(const solver::GatherShot& shot, std::span<const solver::NodeRun> named) {
-  if (named.empty()) {
-    findLit(shot);
-  } else {
-    lit_count_ = weighed_ = 0;
-    clearEdges();
-    lit_valid_ = false;
-    forEachGroup(named, [&](const Receivers::Group& group) {
-      if (!behind(shot, receivers_->patches().surfaces[group.surface])) findLitGroup(shot, group);
-    });
-    weighWhole(shot);
-  }
-  for (auto* sum : {&lit_.weight[0], &lit_.visible_weight[0]}) {
-    std::fill_n(sum->begin(), lit_count_, 0.0F);
-  }
-  beginEdges();
-  look_lost_ = {};
-  open_looks_ = {};
-  look_count_ = 0;
+  gaps_ += (lit_.care[k] & Receivers::kInGap) != 0 ? 1 : 0;
 }
 
 }  // namespace radiosity::gpu

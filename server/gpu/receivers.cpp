@@ -222,13 +222,14 @@ bool Receivers::hidesAtEdge(std::uint32_t item, const Ray& ray) const {
 
 std::optional<bool> Receivers::hiddenAmong(std::span<const std::uint32_t> items, const Ray& ray) const {
   bool met = false;
-  std::array<std::uint32_t, 9> behind_all{};
+  std::array<std::uint32_t, 9> asked{};
   std::size_t count = 0;
   for (const auto item : items) {
-    if (item == scene::kNone || !behind(item, ray) || !liesBefore(item, ray)) continue;
-    const auto end = behind_all.begin() + static_cast<std::ptrdiff_t>(count);
-    if (std::find(behind_all.begin(), end, item) != end) continue;
-    if (count < behind_all.size()) behind_all[count++] = item;
+    // Each is asked once: nine pixels show two or three items.
+    const auto end = asked.begin() + static_cast<std::ptrdiff_t>(count);
+    if (item == scene::kNone || std::find(asked.begin(), end, item) != end) continue;
+    if (count < asked.size()) asked[count++] = item;
+    if (!behind(item, ray) || !liesBefore(item, ray)) continue;
     if (!wide(item, ray)) return std::nullopt;
     const auto meeting = met ? Meeting::kSolid : meet(item, ray);
     if (meeting == Meeting::kChance) return std::nullopt;

@@ -1,0 +1,99 @@
+// From where on a receiver LightGatherer looks at a polygon. Pure functions.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <span>
+
+#include "server/gpu/receivers.h"
+#include "server/solver/transport.h"
+
+namespace radiosity::gpu {
+
+/// A receiver nearer than this to what shines, in texels, looks from two opposite places: what it receives changes
+/// steeply across it, and would be most of what samples differ by.
+inline constexpr float kNearTexels = 6.0F;
+
+struct NearBall {
+  glm::vec3 middle{0.0F};
+  float radius = 0.0F;
+};
+
+/// Around the places of a surface that are near to a polygon; of radius 0 where there are none.
+inline NearBall nearBall(std::span<const glm::vec3> corners, const scene::Surface& surface, const glm::vec3& texel) {
+  NearBall ball;
+  for (const auto& corner : corners) ball.middle += corner / static_cast<float>(corners.size());
+  for (const auto& corner : corners) ball.radius = std::max(ball.radius, glm::distance(ball.middle, corner));
+  ball.radius += kNearTexels * glm::length(texel);
+  const auto closest = glm::clamp(ball.middle, surface.bounds_min, surface.bounds_max);
+  if (glm::distance(ball.middle, closest) > ball.radius) ball.radius = 0.0F;
+  return ball;
+}
+
+inline bool isNear(const NearBall& ball, const Receivers::Block& block) {
+  return ball.radius > 0.0F &&
+         glm::distance(ball.middle, glm::clamp(ball.middle, block.low, block.high)) <= ball.radius;
+}
+
+/// The first of two opposite places. For the opposite jitter, that of the other half, they lie in the other two
+/// quarters of the receiver, as far from its edges as these are from its middle: what is linear across it cancels in
+/// each half, what is quadratic nearly so in their mean, and shows in their difference.
+inline glm::vec2 nearPlace(const glm::vec2& jitter) {
+  if (jitter.x <= 0.5F) return jitter;
+  const auto inverted = [](float offset) { return std::copysign(0.5F - std::abs(offset), offset); };
+  return {0.5F + inverted(jitter.x - 0.5F), 0.5F - inverted(jitter.y - 0.5F)};
+}
+
+/// The rows of spots that count for a shot.
+struct SpotRows {
+  std::uint32_t first, apart;
+};
+
+inline SpotRows spotRows(const solver::GatherShot& shot) {
+  const std::uint32_t apart = scene::kSpotRows / shot.spot_rows;
+  return {shot.spot_row * apart / scene::kSpotRows, apart};
+}
+
+/// Which of the rows of its spots is a receiver's first. Neighbours differ: in a narrow gap what the edges of shooters
+/// do to one row they would do to the same row of all, and so few draws neither average out nor tell how large their
+/// error is. By where it lies on its surface, which edits elsewhere do not change.
+inline std::uint32_t firstRow(const Receivers::Receiver& receiver, const SpotRows& rows) {
+  std::uint32_t mixed = static_cast<std::uint32_t>(receiver.texel.x) * 0x9e3779b1U +
+                        static_cast<std::uint32_t>(receiver.texel.y) * 0x85ebca77U;
+  mixed = (mixed ^ (mixed >> 15)) * 0x2c1b3c6dU;
+  return (rows.first + (mixed >> 16)) % rows.apart;
+}
+
+/// Where a receiver looks at a polygon, which is near inside a ball: takes each place before the polygon's plane, and
+/// its share of the receiver. Places stay in registers: through memory they cost more than all else that is done here.
+template <typename Take>
+[[gnu::always_inline]] inline void forEachPlace(const solver::GatherShot& shot, const NearBall& ball,
+                                                const Receivers& receivers, const Receivers::Receiver& receiver,
+                                                const Take& take) {
+  const auto offer = [&](const Receivers::Place& place, float share) {
+    if (glm::dot(shot.normal, place.point - shot.corners[0]) > kInPlane) take(place, share);
+  };
+  if (receiver.hasSpots()) {
+    const auto rows = spotRows(shot);
+    const float share = static_cast<float>(rows.apart) / static_cast<float>(scene::kLeafSpots);
+    for (std::uint32_t row = firstRow(receiver, rows); row < scene::kSpotRows; row += rows.apart) {
+      for (std::uint32_t k = 0; k < scene::kSpotQuarters; ++k)
+        offer(receivers.spot(receiver, row * scene::kSpotQuarters + k), share);
+    }
+    return;
+  }
+  const auto place = receivers.place(receiver, shot.receiver_jitter);
+  const auto way = place.point - ball.middle;
+  if (glm::dot(way, way) >= ball.radius * ball.radius) {
+    offer(place, 1.0F);
+    return;
+  }
+  const auto at = nearPlace(shot.receiver_jitter);
+  offer(receivers.place(receiver, at), 0.5F);
+  offer(receivers.place(receiver, 1.0F - at), 0.5F);
+}
+
+}  // namespace radiosity::gpu
