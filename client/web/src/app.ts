@@ -66,7 +66,7 @@ export class App {
   private epoch = '';
   private awaited: (() => void)[] = [];
   /** Why the solve of the scene that is there has failed, as the page says it. */
-  private failure: string | undefined;
+  private trouble: string | undefined;
 
   constructor() {
     // Nobody else has this name, so the page knows its own patches when it is told of them.
@@ -142,7 +142,7 @@ export class App {
       gizmoChanged: (object, mode) => this.edit.onGizmoChanged(object, mode),
       contextLost: (lost) => {
         this.frame.setBanner(lost ? 'The browser has lost the graphics card; waiting for it to return.' : undefined);
-        this.failure = undefined;
+        this.trouble = undefined;
         if (!lost && this.progress) this.showState(this.progress);
       },
     });
@@ -215,7 +215,7 @@ export class App {
     this.document.forget();
     this.edit?.history.forget(); // the first time there is no page yet
     if (state === 'open') {
-      this.failure = undefined;
+      this.trouble = undefined;
       this.progress = undefined; // that of a server which has started again is not that of its scene
       this.frame.setBanner(undefined);
       if (this.everOpen) this.frame.toasts.show('Reconnected', 'good');
@@ -308,7 +308,7 @@ export class App {
       rate,
     );
     this.frame.setWelcome(hasScene(progress) && bad ? '' : progress.state, progress.failure);
-    this.showFailure(hasScene(progress) && bad ? (progress.failure ?? 'the server gave no reason') : undefined);
+    this.showTrouble(progress, isOver);
   }
 
   /** The solve is over before its last tiles are here, and they before they are in the picture. */
@@ -319,12 +319,23 @@ export class App {
     return !isHere || set.waiting > 0;
   }
 
-  /** The light that there is stays to be looked at; that nothing comes after it is said for as long as it holds. */
-  private showFailure(why: string | undefined): void {
-    if (why === this.failure || this.viewer.isLost) return; // the card comes first; it is said when that is back
-    this.failure = why;
-    if (why === undefined) return this.frame.setBanner(undefined);
-    this.frame.setBanner(`The solve failed: ${why}.`, 'Restart', () => void this.ask('solve.restart'));
+  /**
+   * What there is to see stays to be looked at; that no light comes after it, or that there is none, is said for as long
+   * as it holds.
+   */
+  private showTrouble(progress: Progress, isOver: boolean): void {
+    const { failure = 'the server gave no reason' } = progress;
+    const failed = hasScene(progress) && progress.state === 'failed';
+    const dark = hasScene(progress) && isOver && progress.energy['emitted'] === 0;
+    const trouble = failed
+      ? `The solve failed: ${failure}.`
+      : dark
+        ? 'Nothing shines in this scene, so that all of it is dark.'
+        : undefined;
+    if (trouble === this.trouble || this.viewer.isLost) return; // the card comes first; it is said when that is back
+    this.trouble = trouble;
+    if (failed) this.frame.setBanner(trouble, 'Restart', () => void this.ask('solve.restart'));
+    else this.frame.setBanner(trouble, 'Add a lamp', () => void this.edit.addLamp());
   }
 
   /** The server has none: it was started again without, could not have the one whose first light it showed, or lost it. */

@@ -152,3 +152,22 @@ it('keeps the light of a solve that has failed, says why, and starts it again', 
   await converged(page);
   expect(await banner.isVisible()).toBe(false);
 });
+
+it('says that nothing shines, and offers a lamp', async () => {
+  const server = await serve(`${SCENES}/cornell.glb`);
+  const page = await pages.open(server.url);
+  await converged(page);
+  const banner = page.locator('.banner');
+  expect(await banner.isVisible()).toBe(false);
+  await page.evaluate(() =>
+    window.viewer!.connection.call('scene.patch', {
+      patch: [{ op: 'replace', path: '/materials/@light/emissiveFactor', value: [0, 0, 0] }],
+    }),
+  );
+  await banner.getByText('Nothing shines in this scene').waitFor();
+  await banner.getByRole('button', { name: 'Add a lamp' }).click();
+  await banner.waitFor({ state: 'hidden' });
+  await converged(page);
+  expect(await banner.isVisible()).toBe(false);
+  expect((await told(page)).energy['emitted']).toBeGreaterThan(0);
+});
