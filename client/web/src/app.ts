@@ -287,10 +287,10 @@ export class App {
     this.solve.update(progress);
     if (!hasScene(progress)) this.forgetScene();
     this.showState(progress);
-    this.settleLight();
   }
 
   private showState(progress: Progress): void {
+    this.settleLight();
     const isOver = ['converged', 'timeLimit', 'limited'].includes(progress.state);
     const done = isOver && !this.isLightUnderWay(progress);
     const bad = progress.state === 'failed';
@@ -347,11 +347,12 @@ export class App {
     this.frame.sceneShown = false;
   }
 
-  /** Black is no light yet as long as the solve goes on. */
+  /** Black is no light yet as long as the solve goes on, or its last tiles are still to come. */
   private settleLight(): void {
     const { progress, viewer } = this;
-    const goesOn = !progress || ['empty', 'loading', 'solving'].includes(progress.state);
-    if (!goesOn && viewer.set && viewer.set.note.revision <= progress.revision) viewer.settleLight();
+    if (!progress || !viewer.set || viewer.dataSet || viewer.set.note.revision > progress.revision) return;
+    const goesOn = ['empty', 'loading', 'solving'].includes(progress.state);
+    if (!goesOn && !this.isLightUnderWay(progress)) viewer.settleLight();
   }
 
   /** On a slow line intermediate versions are left out; moving about needs no network at all. */

@@ -171,3 +171,31 @@ it('says that nothing shines, and offers a lamp', async () => {
   expect(await banner.isVisible()).toBe(false);
   expect((await told(page)).energy['emitted']).toBeGreaterThan(0);
 });
+
+it('does not take the black before the last tiles for the light of a solve that is over', async () => {
+  const server = await serve(`${SCENES}/cornell.glb`);
+  await converged(await pages.open(server.url));
+  const page = await pages.open('about:blank', 900, 600);
+  let held: (() => void)[] | undefined = [];
+  await page.routeWebSocket(/\/ws$/, (socket) => {
+    const upstream = socket.connectToServer();
+    socket.onMessage((message) => upstream.send(message));
+    upstream.onMessage((message) => {
+      const isLight = typeof message !== 'string' || message.includes('"method":"bookmark"');
+      if (isLight && held) held.push(() => socket.send(message));
+      else socket.send(message);
+    });
+  });
+  await page.goto(server.url);
+  await page.waitForFunction(() => {
+    const { progress, viewer } = window.viewer ?? {};
+    return progress?.state === 'converged' && viewer?.set !== undefined;
+  });
+  await drawn(page);
+  expect(held.length).toBeGreaterThan(0);
+  expect(await page.evaluate(() => window.viewer!.viewer.set!.lit)).toBe(false);
+  for (const send of held) send();
+  held = undefined;
+  await converged(page);
+  expect(await page.evaluate(() => window.viewer!.viewer.shown!.set.showsLight)).toBe(true);
+});
