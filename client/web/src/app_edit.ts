@@ -220,6 +220,8 @@ export class EditSession {
       this.select(node && this.selection);
       this.panel.setDocument(this.document.gltf, (node) => this.materialsOf(node));
     } else {
+      const hangs = hangingNodes(this.document.gltf).some(({ node }) => node === this.selection?.node);
+      if (this.selection && !hangs) this.select(undefined); // somebody has removed it
       this.panel.refresh();
     }
   }

@@ -199,3 +199,41 @@ it('does not take the black before the last tiles for the light of a solve that 
   await converged(page);
   expect(await page.evaluate(() => window.viewer!.viewer.shown!.set.showsLight)).toBe(true);
 });
+
+it('undoes on past what somebody else has undone, and lets go of what is no more', async () => {
+  const server = await serve(`${SCENES}/cornell.glb`);
+  const page = await pages.open(server.url, 1200, 800);
+  await converged(page);
+  const before = await emissionOf(server);
+  await page.evaluate(() => {
+    const { document } = window.viewer!.edit;
+    const value = [0.2, 0.4, 1];
+    return document.edit('Colour', [{ op: 'replace', path: '/materials/@light/emissiveFactor', value }]);
+  });
+  await page
+    .getByRole('button', { name: /Add a lamp/ })
+    .first()
+    .click();
+  await answered(page);
+  await page.waitForFunction(() => window.viewer!.edit.selection !== undefined);
+  const lamps = (await sceneOf(server)).nodes.length;
+  const other = await pages.open(server.url);
+  await other.waitForFunction(() => window.viewer?.connection.isOpen);
+  await other.evaluate(() => window.viewer!.connection.call('scene.undo', {}));
+  await until(
+    async () => (await sceneOf(server)).nodes.length,
+    (count) => count < lamps,
+  );
+  await page.waitForFunction(() => window.viewer!.edit.selection === undefined);
+
+  await page.locator('canvas.view').focus();
+  await page.keyboard.press('Control+z');
+  await said(page, /^Undo Add lamp: /);
+  await page.keyboard.press('Control+z');
+  expect(
+    await until(
+      () => emissionOf(server),
+      (value) => value.join() === before.join(),
+    ),
+  ).toEqual(before);
+});

@@ -137,8 +137,10 @@ export class SceneDocument {
     try {
       await this.enqueue(label, patch, role, undefined);
       if (generation === this.generation) to.push(entry);
-    } catch {
-      if (generation === this.generation) from.push(entry); // the reason was shown
+    } catch (error) {
+      // The reason was shown. What the server refuses it will refuse again, as where somebody else has undone it already:
+      // that must not stand before the steps below.
+      if (generation === this.generation && !(error instanceof RpcError)) from.push(entry);
     }
     this.events.historyChanged();
   }

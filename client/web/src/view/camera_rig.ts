@@ -26,6 +26,7 @@ export class CameraRig {
   private size = 1;
   private readonly down = new Set<string>();
   private readonly look = new Euler(0, 0, 0, 'YXZ');
+  private active = true;
   private readonly drags = new Map<number, { x: number; y: number }>();
   /** Vertical field of view that the camera was given, degrees; narrower screens see more above and below. */
   private fov = 45;
@@ -53,29 +54,35 @@ export class CameraRig {
 
   setMode(mode: Walk): void {
     this.mode = mode;
-    this.orbit.enabled = mode === 'orbit';
+    this.orbit.enabled = this.active && mode === 'orbit';
     if (mode === 'walk') this.look.setFromQuaternion(this.camera.quaternion);
     else this.aimAhead();
     this.moved();
   }
 
-  /** Nothing is dragged while something else is (the gizmo). */
+  /** Nothing moves the camera while something else is dragged (the gizmo), or where it shows nothing (pages). */
   set enabled(enabled: boolean) {
+    this.active = enabled;
     this.orbit.enabled = enabled && this.mode === 'orbit';
-    if (!enabled) this.drags.clear();
+    if (enabled) return;
+    this.drags.clear();
+    this.down.clear();
   }
 
   /** True: the key moves the camera. */
   key(event: KeyboardEvent, pressed: boolean): boolean {
-    if (!(event.code in WALK_KEYS) || event.ctrlKey || event.metaKey || event.altKey) return false;
+    // Let go of with Control held it is let go of all the same, and with Command held browsers do not tell of it.
+    if (!pressed) this.down.delete(event.code);
+    if (event.key === 'Meta') this.down.clear();
+    if (!this.active || !(event.code in WALK_KEYS) || event.ctrlKey || event.metaKey || event.altKey) return false;
     if (pressed) this.down.add(event.code);
-    else this.down.delete(event.code);
     this.moved();
     return true;
   }
 
   /** Arrow keys: turns about the target, or looks about. Radians. */
   turn(right: number, up: number): void {
+    if (!this.active) return;
     if (this.mode === 'walk') {
       this.lookBy(-right, up);
       return;
@@ -93,6 +100,7 @@ export class CameraRig {
 
   /** Nearer for factors below 1. */
   zoom(factor: number): void {
+    if (!this.active) return;
     if (this.mode === 'walk') {
       this.camera.translateZ((factor - 1) * this.size * 0.3);
     } else {
@@ -237,7 +245,7 @@ export class CameraRig {
   }
 
   private startDrag(event: PointerEvent): void {
-    if (this.mode === 'walk') this.drags.set(event.pointerId, { x: event.clientX, y: event.clientY });
+    if (this.active && this.mode === 'walk') this.drags.set(event.pointerId, { x: event.clientX, y: event.clientY });
   }
 
   /** One finger or button looks about, two walk. */

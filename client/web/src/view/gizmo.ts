@@ -50,6 +50,7 @@ export class Gizmo {
     transparent: true,
     opacity: 0.9,
   });
+  private visible = true;
   private outline: Object3D[] = [];
   /** In pixels of the page; where it took hold, and where it is now. */
   private readonly grabbed = new Vector2();
@@ -95,6 +96,7 @@ export class Gizmo {
     this.placePivot();
     if (object) this.controls.attach(this.pivot);
     else this.made?.detach();
+    this.showHandles();
     if (object) this.makeOutline(object);
   }
 
@@ -120,8 +122,16 @@ export class Gizmo {
   }
 
   setVisible(visible: boolean): void {
-    if (this.made) this.made.getHelper().visible = visible && this.made.object !== undefined;
+    this.visible = visible;
+    this.showHandles();
     for (const line of this.outline) line.visible = visible;
+  }
+
+  /** Handles that are not seen are not for the pointer either. */
+  private showHandles(): void {
+    if (!this.made) return;
+    this.made.getHelper().visible = this.visible && this.made.object !== undefined;
+    this.made.enabled = this.visible;
   }
 
   private get controls(): TransformControls {

@@ -31,6 +31,8 @@ const READY_AFTER_MS = 900;
 const MEASURE_EVERY_MS = 250;
 /** Reading back waits for all that the card has still to draw, which a slow one makes long: rest so many times that. */
 const MEASURE_SHARE = 8;
+/** A card that is busy with the first light takes long: what it told of half of that is not to stay for ten times as long. */
+const MOST_PAUSE_MS = 1500;
 /** A driver that never says it is done (a lost context) holds nothing up for longer. */
 const MOST_COMPILING_MS = 2000;
 /** What an edit changes shall be seen soon; how sharp comes after it. */
@@ -346,7 +348,8 @@ export class Viewer {
       }
     }
     const { unknown, automatic } = this.exposure;
-    const pause = unknown ? 0 : Math.max(MEASURE_EVERY_MS, MEASURE_SHARE * this.exposure.tookMs);
+    const share = Math.min(MOST_PAUSE_MS, MEASURE_SHARE * this.exposure.tookMs);
+    const pause = unknown ? 0 : Math.max(MEASURE_EVERY_MS, share);
     if (!this.exposureDue || now - this.lastMeasure < pause) return;
     const { covered, complete, waiting } = this.shown?.set ?? {};
     if (!this.gate.mayMeasure(now, covered === true, complete === true && waiting === 0)) return;
