@@ -63,6 +63,7 @@ class Bvh {
   [[nodiscard]] std::size_t size() const { return triangles_.size(); }
 
  private:
+  friend class RayTree;  // made of the same boxes
   struct Node {
     glm::vec3 min, max;
     std::uint32_t first;  ///< leaf: into order_; inner: left child (the right one follows it)

@@ -16,6 +16,8 @@ namespace radiosity::solver {
 class Gmres {
  public:
   using Vectors = std::array<std::vector<double>, 3>;  ///< by channel and unknown
+  /// Vectors of each channel that are kept at once, beside three more. No scene of links has needed as many.
+  static constexpr std::size_t kRestart = 24;
   /// Replaces x by G x, or by G x + g where `affine`.
   using Sweep = std::function<void(Vectors& x, bool affine)>;
 
@@ -34,8 +36,6 @@ class Gmres {
   [[nodiscard]] int sweeps() const { return sweeps_; }
 
  private:
-  static constexpr std::size_t kRestart = 24;  // basis vectors: no scene has needed more
-
   /// The least squares of one channel, brought up to date column by column by Givens rotations.
   struct Channel {
     std::vector<std::vector<double>> basis;

@@ -38,14 +38,45 @@ LeafRays::LeafRays(const scene::PatchScene& patches, const std::vector<Side>& si
   for (std::size_t i = 0; i < patches.indices.size(); ++i)
     triangles[i / 3][i % 3] = patches.vertices[patches.indices[i]].position;
   tree_ = scene::Bvh(std::move(triangles));
+  wide_ = scene::RayTree(tree_);
   for (std::uint32_t s = 0; s < sides.size(); ++s) {
+    side_of_value_.insert(side_of_value_.end(), sides[s].leaf_count, s);
     side_of_[sides[s].surface][sides[s].side] = s;
     greatest_width_ = std::max(greatest_width_, widthOf(sides[s].first_value));
   }
+  findStandIns();
 }
 
-const Side& LeafRays::sideOf(std::uint32_t value) const {
-  return *std::prev(std::ranges::upper_bound(sides_, value, {}, &Side::first_value));
+void LeafRays::findStandIns() {
+  for (const auto& side : sides_) {
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+      const bool whole = patches_.node_area[side.first_node + leaf] > 0.0F;
+      stand_in_.push_back(whole ? side.first_value + leaf : neighbourOf(side, leaf));
+    }
+  }
+}
+
+/// Who is lit in the place of a leaf without area: what covers it, or the first of the eight around it that has some.
+std::uint32_t LeafRays::neighbourOf(const Side& side, std::uint32_t leaf) const {
+  const auto has_area = [&](const Side& of, std::uint32_t which) {
+    return patches_.node_area[of.first_node + which] > 0.0F;
+  };
+  const auto number = patches_.surfaces[side.surface].first_leaf + leaf;
+  const auto cover = std::ranges::lower_bound(patches_.covered, number, {}, &scene::PatchScene::Covered::leaf);
+  if (cover != patches_.covered.end() && cover->leaf == number) {
+    if (const auto s = side_of_[cover->surface][side.side]; s != scene::kNone) {
+      const auto x = std::clamp(cover->texel.x, 0.0F, static_cast<float>(sides_[s].width - 1));
+      const auto y = std::clamp(cover->texel.y, 0.0F, static_cast<float>(sides_[s].height - 1));
+      const auto there = static_cast<std::uint32_t>(y) * sides_[s].width + static_cast<std::uint32_t>(x);
+      if (has_area(sides_[s], there)) return sides_[s].first_value + there;
+    }
+  }
+  const auto x = leaf % side.width, y = leaf / side.width;
+  for (auto ny = y - std::min(y, 1U); ny < std::min(y + 2, side.height); ++ny) {
+    for (auto nx = x - std::min(x, 1U); nx < std::min(x + 2, side.width); ++nx)
+      if (has_area(side, ny * side.width + nx)) return side.first_value + ny * side.width + nx;
+  }
+  return kNothing;
 }
 
 double LeafRays::areaOf(std::uint32_t value) const {
@@ -77,15 +108,27 @@ LeafRays::Sight LeafRays::look(const Place& from, const glm::dvec3& direction, d
   const auto s = side_of_[patches_.triangle_surface[hit->triangle]][hit->front ? 0 : 1];
   if (s == scene::kNone) return sight;
   const auto& frame = patches_.triangles[hit->triangle];
-  const Side& side = sides_[s];
   sight.end.position = origin + hit->t * direction;
   sight.end.normal = glm::dvec3(hit->front ? frame.normal : -frame.normal);
-  const auto texel = texelAt(frame, sight.end.position);
+  const auto value = leafAt(sides_[s], hit->triangle, sight.end.position);
+  if (stand_in_[value] == value) sight.end.value = value;
+  return sight;
+}
+
+std::uint32_t LeafRays::leafAt(const Side& side, std::uint32_t triangle, const glm::dvec3& point) const {
+  const auto texel = texelAt(patches_.triangles[triangle], point);
   const auto x = static_cast<std::uint32_t>(std::clamp(texel.x, 0.0, static_cast<double>(side.width - 1)));
   const auto y = static_cast<std::uint32_t>(std::clamp(texel.y, 0.0, static_cast<double>(side.height - 1)));
-  const auto leaf = y * side.width + x;
-  if (patches_.node_area[side.first_node + leaf] > 0.0F) sight.end.value = side.first_value + leaf;
-  return sight;
+  return side.first_value + y * side.width + x;
+}
+
+std::uint32_t LeafRays::see(const Place& from, const glm::dvec3& direction) const {
+  const auto origin = lifted(from);
+  scene::RayHit hit{};
+  if (!wide_.nearestHit(glm::vec3(origin), glm::vec3(direction), static_cast<float>(kFar), hit))
+    return direction.y >= 0.0 ? kSkyAbove : kSkyBelow;
+  const auto s = side_of_[patches_.triangle_surface[hit.triangle]][hit.front ? 0 : 1];
+  return s == scene::kNone ? kNothing : stand_in_[leafAt(sides_[s], hit.triangle, origin + hit.t * direction)];
 }
 
 LeafRays::Sight LeafRays::look(const Place& from, const glm::dvec3& direction) const {

@@ -1,7 +1,8 @@
-// What single places of leaves see, by rays: for light that varies within a leaf, of which links know nothing. Plain
-// values; any thread.
+// What single places of leaves see, by rays: for light that varies within a leaf, of which links know nothing, and for
+// light that is gathered from wherever it comes. Plain values; any thread.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
@@ -9,6 +10,7 @@
 
 #include "server/scene/bvh.h"
 #include "server/scene/patch_scene.h"
+#include "server/scene/ray_tree.h"
 #include "server/solver/side.h"
 
 namespace radiosity::solver {
@@ -28,7 +30,7 @@ class LeafRays {
   /// O(n log n) in triangles. Both are to outlive it.
   LeafRays(const scene::PatchScene& patches, const std::vector<Side>& sides);
 
-  [[nodiscard]] const Side& sideOf(std::uint32_t value) const;
+  [[nodiscard]] const Side& sideOf(std::uint32_t value) const { return sides_[side_of_value_[value]]; }
   /// Unit box squared: what is covered and not buried.
   [[nodiscard]] double areaOf(std::uint32_t value) const;
   /// Edge of a leaf, unit box: of the whole texel.
@@ -45,13 +47,25 @@ class LeafRays {
   [[nodiscard]] Sight look(const Place& from, const glm::dvec3& direction, double reach) const;
   /// The same without bounds; `value` may be one of the sky's.
   [[nodiscard]] Sight look(const Place& from, const glm::dvec3& direction) const;
+  /// The leaf value that is seen that way, kNothing or one of the sky's. Where a leaf has no area of its own (buried
+  /// right behind another, or so little of it that its neighbours took it) it is theirs. Costs a third of look().
+  [[nodiscard]] std::uint32_t see(const Place& from, const glm::dvec3& direction) const;
   [[nodiscard]] bool isOpen(const Place& from, const glm::dvec3& to) const;
 
  private:
   const scene::PatchScene& patches_;
   const std::vector<Side>& sides_;
+  void findStandIns();
+  [[nodiscard]] std::uint32_t neighbourOf(const Side& side, std::uint32_t leaf) const;
+  /// The leaf of a side that a point of a triangle's plane lies on, by value.
+  [[nodiscard]] std::uint32_t leafAt(const Side& side, std::uint32_t triangle, const glm::dvec3& point) const;
+
   scene::Bvh tree_;
+  scene::RayTree wide_;
   std::vector<std::array<std::uint32_t, 2>> side_of_;  ///< by surface
+  std::vector<std::uint32_t> side_of_value_;
+  /// By leaf value: itself, or who stands for it where it has no area: another, or kNothing.
+  std::vector<std::uint32_t> stand_in_;
   double greatest_width_ = 0.0;
 };
 

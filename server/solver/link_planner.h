@@ -61,6 +61,9 @@ class LinkPlanner {
   void setShare(double share) { share_ = share; }
   [[nodiscard]] double share() const { return share_; }
 
+  /// Nodes of less radiosity, all channels, are no shooters: rays bring their light. 0: all are.
+  void setLeastRadiosity(double radiosity) { least_radiosity_ = radiosity; }
+
   /// Mean reflectance of the scene: what roulette creates or loses by chance is reflected so often, so that in bright
   /// rooms fewer nodes play.
   void setReflectance(double mean);
@@ -143,6 +146,7 @@ class LinkPlanner {
   std::uint32_t resolution_ = 32;
   PlannerCounters counters_;
   double share_ = 0.0;
+  double least_radiosity_ = 0.0;
   double roulette_share_ = 0.0;  ///< nodes weaker than this part of a share play
   double left_out_ = 0.0;
 };

@@ -52,7 +52,11 @@ void LinkedSolver::assess() {
   // Parts of a node are signed: what of them would have taken light away is no light that is missing.
   const double unlinked = std::max(0.0, planner_.unlinked(system_));
   const double left_out = planner_.leftOut() + (growing_ ? 0.0 : unlinked);
-  owed += growing_ ? net_unshot_ + unlinked : left_out;
+  if (by_rays_) {
+    if (!gathers()) owed += net_unshot_ + varying_;  // rays will bring it
+  } else {
+    owed += growing_ ? net_unshot_ + unlinked : left_out;
+  }
   if (field.square() <= 0.0) {
     error_.residual = error_.total = owed + varying_ > 0.0 ? 1.0 : 0.0;  // all or nothing is missing
     return;
@@ -61,7 +65,7 @@ void LinkedSolver::assess() {
   by_links_ = error_.sampling = field.sampling();
   error_.discretization = field.discretization();
   const double varying = std::sqrt(planner_.variation(system_, unshot_, *patches_) / field.square());
-  error_.residual = owed / (1.0 - kept) / received + varying + system_.unsolved();
+  error_.residual = owed / (1.0 - kept) / received + varying + system_.unsolved() + (gathers() ? gather_->unsolved() : 0.0);
   error_.residual = std::hypot(error_.residual, missing() / std::sqrt(field.square()));  // of links that wait
   varying_share_ = error_.residual > 0.0 ? varying / error_.residual : 0.0;
   left_out_ = left_out / (1.0 - kept) / received;
@@ -94,6 +98,11 @@ LinkCounters LinkedSolver::linkCounters() const {
   counters.repaired = edits_.repaired;
   counters.repaired_links = edits_.repaired_links;
   counters.retaken = edits_.retaken;
+  if (gather_) {
+    counters.bytes += gather_->sights().bytes();
+    counters.rays = gather_->rays();
+    counters.rays_kept = gather_->sights().kept();
+  }
   for (const auto& repair : std::span(repairs_).subspan(repaired_)) counters.waiting += repair.samples;
   std::uint64_t nodes = 0;
   for (const auto& shooter : system_.shooters()) {
@@ -159,6 +168,7 @@ EnergyParts LinkedSolver::energy() const {
         if (shooter.light != scene::kNone) sent_for[c] += sent * shooter.area;
       }
     }
+    if (gathers()) continue;  // rays make up for it
     // Shooters that won at roulette sent more than their own leaves have, those that lost nothing.
     for (std::size_t half = 0; half < 2 && !shooter.isLight(); ++half) {
       for (int c = 0; c < 3; ++c)
@@ -183,6 +193,10 @@ EnergyParts LinkedSolver::energy() const {
     }
   }
   for (std::size_t c = 0; c < 3; ++c) {
+    if (gathers()) {
+      parts.escaped[c] += gather_->escapedFlux()[c];
+      parts.backface[c] += gather_->absorbedFlux()[c];
+    }
     parts.unshot[c] -= sent_for[c];
     parts.imbalance[c] = parts.emitted[c] - parts.absorbed[c] - parts.escaped[c] - parts.backface[c] - parts.unshot[c];
   }

@@ -48,6 +48,10 @@ std::vector<std::uint8_t> LinkedSolver::shotLevels() const {
       }
     }
   }
+  for (const auto& side : sides_) {  // rays see single leaves
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count && gathers(); ++leaf)
+      if (patches_->node_area[side.first_node + leaf] > 0.0F) levels[side.first_node + leaf] = 0;
+  }
   return levels;
 }
 

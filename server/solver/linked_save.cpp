@@ -84,7 +84,7 @@ void LinkedSolver::visit(Archive& archive, Self& self) {
   archive(self.lights_, self.sources_, self.phase_, self.limit_, self.lights_fit_, self.from_links_,
           self.edit_lights_planned_, self.settling_, self.wanted_, self.measured_, self.growing_, self.share_part_,
           self.left_out_, self.rounds_, self.solutions_, self.sweeps_, self.replayed_, self.varying_share_, self.half_,
-          self.refined_, self.by_links_, self.error_, self.counters_);
+          self.refined_, self.by_links_, self.error_, self.counters_, self.by_rays_, self.sample_goal_);
   LinkPlanner::visit(archive, self.planner_);
   LinkMemory::visit(archive, self.memory_);
 }
@@ -94,6 +94,8 @@ bool LinkedSolver::save(ArchiveWriter& to) const {
   to(kKind, static_cast<std::uint64_t>(system_.emission().size()));
   visit(to, *this);
   system_.save(to);
+  to(gather_ != nullptr);
+  if (gather_) gather_->save(to);
   to(variation_ != nullptr);
   if (variation_) LeafVariation::visit(to, *variation_);
   return true;
@@ -115,6 +117,12 @@ bool LinkedSolver::restore(ArchiveReader& from) {
   if (half_[0].size() != values || half_[1].size() != values || measured_ > wanted_.size() ||
       !std::all_of(shooters.begin(), shooters.end(), known) || !std::all_of(wanted_.begin(), wanted_.end(), exists))
     return false;
+  bool gathers = false;
+  from(gathers);
+  if (gathers) {
+    startRays();
+    if (!gather_->restore(from)) return false;
+  }
   bool varies = false;
   from(varies);
   if (varies) {

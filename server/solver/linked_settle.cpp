@@ -45,15 +45,25 @@ bool LinkedSolver::settle() {
     }
   }
   if (pass_ == Pass::kSecond && !advanceSolution()) return false;
-  pass_ = Pass::kNone;
-  lightLeaves();
-  return true;
+  return lightLeaves();
 }
 
-void LinkedSolver::lightLeaves() {
-  inBothHalves([&](std::size_t half) { system_.irradiance(half, half_[half]); });
+/// By the links, solved for, and then by the rays. False: not yet, go on with the next slice.
+bool LinkedSolver::lightLeaves() {
+  if (pass_ != Pass::kRays) {
+    inBothHalves([&](std::size_t half) { system_.irradiance(half, over_links_[half]); });
+    pass_ = Pass::kRays;
+    if (gather_) gather_->begin(leftLight());
+  }
+  if (gather_ && !gather_->advance(kSliceSeconds)) return false;
+  half_ = std::move(over_links_);
+  for (std::size_t half = 0; half < 2 && gather_; ++half) {
+    for (std::size_t v = 0; v < half_[half].size(); ++v) half_[half][v] += gather_->irradiance(half)[v];
+  }
+  pass_ = Pass::kNone;
   findUnshot();
   if (variation_) updateVariation();
+  return true;
 }
 
 void LinkedSolver::findUnshot() {
@@ -77,6 +87,10 @@ void LinkedSolver::findUnshot() {
 /// Radiosity less what stands for it on the deepest shooter above each leaf.
 void LinkedSolver::leafUnshot(std::uint32_t s, std::vector<glm::vec3>& leaves) const {
   const Side& side = sides_[s];
+  if (gathers()) {  // shooters stand for what they sent, and rays for all that is left
+    leaves.assign(side.leaf_count, glm::vec3(0.0F));
+    return;
+  }
   system_.standIn(s, leaves);
   for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
     const auto v = side.first_value + leaf;
@@ -200,10 +214,8 @@ bool LinkedSolver::settleFromLinks() {
     system_.begin();  // from the first solution, which depends on nothing else either
     pass_ = Pass::kSecond;
   }
-  if (!advanceSolution()) return false;
-  pass_ = Pass::kNone;
-  lightLeaves();
-  return true;
+  if (pass_ == Pass::kSecond && !advanceSolution()) return false;
+  return lightLeaves();
 }
 
 }  // namespace radiosity::solver

@@ -19,7 +19,6 @@ namespace {
 constexpr double kRefinement = 2.0;
 /// More refinements than this find nothing: everything is split to its leaves.
 constexpr double kMinShare = 1e-9;
-constexpr std::uint32_t kMaxRounds = 100'000;
 /// Shares are refined when what roulette and weakness cause is this part of the error: a wave of growth lowers it by
 /// more than a wave of samples, long before it is the larger part.
 constexpr double kByShare = 0.35;
@@ -64,6 +63,7 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
   takeMaterials(materials);
   takeSources(sources);
   share_part_ = 1.0 / settings_.planner.first_shooters;
+  by_rays_ = raysPay();
   for (auto& half : half_) half.assign(system_.emission().size(), glm::vec3(0.0F));
   findUnshot();
 }
@@ -133,6 +133,7 @@ Result<void> LinkedSolver::measureSlice() {
 
 void LinkedSolver::startGrowth() {
   planner_.setShare(powerToShoot() * share_part_);
+  planner_.setLeastRadiosity(by_rays_ ? leastRadiosity() : 0.0);
   phase_ = Phase::kGrow;
 }
 
@@ -142,6 +143,11 @@ bool LinkedSolver::isFull() const { return memory_.isFull() || share_part_ < kMi
 std::vector<Measurement> LinkedSolver::plan() {
   memory_.begin(system_);
   if (phase_ == Phase::kLights) return planLights();
+  if (phase_ == Phase::kImprove && gather_) {
+    if (sample_goal_ <= 0.0) return {};
+    const double links = std::sqrt(std::max(0.0, by_links_ * by_links_ - raysError() * raysError()));
+    return planner_.improve(system_, unshot_, *patches_, false, memory_, {links, 0.0, 0.0, sample_goal_});
+  }
   if (phase_ == Phase::kImprove) {
     const double varying = varying_share_ * error_.residual;
     const ErrorGoal goal{by_links_, varying, error_.residual - varying, targetOfLinks()};
@@ -195,7 +201,7 @@ Result<StepOutcome> LinkedSolver::advance() {
     wanted_ = plan();
     measured_ = 0;
     const bool dark = phase_ == Phase::kLights && net_unshot_ + varying_ <= 0.0;
-    if (wanted_.empty() && phase_ == Phase::kImprove)  // no sample that there is room for can lower the error
+    if (wanted_.empty() && phase_ == Phase::kImprove && !(gather_ && gather_->isBehind()))  // no sample that there is room for can lower the error
       return exhausted(memory_.lacksSamples() || memory_.isFull() ? SolveLimit::kLinkMemory : SolveLimit::kPatches);
     if (wanted_.empty() && (dark || phase_ == Phase::kGrow)) return finishRound();
   }
@@ -212,6 +218,7 @@ Result<StepOutcome> LinkedSolver::advance() {
 
 /// An edit is taken in whole: its links would not be true otherwise.
 void LinkedSolver::endWave() {
+  if (gather_ && from_links_ == FromLinks::kNo) gather_->giveUp();
   if (isRepairing() || from_links_ != FromLinks::kNo || settling_ || measured_ == 0) return;
   wanted_.resize(measured_);
   settling_ = true;
@@ -266,6 +273,7 @@ StepOutcome LinkedSolver::chooseFurther() {
     return StepOutcome::kRoundDone;
   }
   if (refineVariation()) return StepOutcome::kRoundDone;
+  if (by_rays_) return chooseRays();
   // Roulette's part of the sampling error, and what was too weak to play, fall with the share alone.
   const double total = std::hypot(by_links_, error_.residual);
   if (total <= targetOfLinks()) return exhausted(SolveLimit::kWithin);

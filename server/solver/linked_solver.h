@@ -14,6 +14,7 @@
 
 #include "common/result.h"
 #include "server/solver/change_reach.h"
+#include "server/solver/leaf_gather.h"
 #include "server/solver/leaf_variation.h"
 #include "server/solver/lights.h"
 #include "server/solver/link_memory.h"
@@ -83,9 +84,10 @@ class LinkedSolver final : public Solver {
   /// Short enough that nobody notices the wait, long enough that the workers' waiting for the last of them does not
   /// count.
   static constexpr double kSliceSeconds = 0.06;
+  static constexpr std::uint32_t kMaxRounds = 100'000;
   enum class Phase { kLights, kGrow, kImprove, kDone };
   /// Solving over links goes in slices too: which of its passes is under way.
-  enum class Pass { kNone, kFirst, kSecond };
+  enum class Pass { kNone, kFirst, kSecond, kRays };
   /// What a solution over nothing but the links is for.
   enum class FromLinks { kNo, kAfterEdit, kToConfirm };
 
@@ -174,7 +176,7 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] bool settleFromLinks();
   [[nodiscard]] bool finishEdit();
   [[nodiscard]] bool mayGoWithout();
-  void lightLeaves();
+  [[nodiscard]] bool lightLeaves();
   void takeMaterials(const scene::PatchMaterials& materials);
   void takeLights();
   [[nodiscard]] bool settle();
@@ -184,6 +186,18 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] bool wantsVariation() const;
   [[nodiscard]] bool refineVariation();
   [[nodiscard]] double targetOfLinks() const;
+  [[nodiscard]] bool raysPay() const;
+  /// Rays have brought light, and nothing is left to shoot.
+  [[nodiscard]] bool gathers() const { return gather_ && gather_->hasGathered(); }
+  [[nodiscard]] double shotCost() const;
+  [[nodiscard]] double rayCost() const;
+  [[nodiscard]] double samplesCost() const;
+  [[nodiscard]] double leastRadiosity() const;
+  [[nodiscard]] double raysError() const;
+  [[nodiscard]] LeftLight leftLight() const;
+  void startRays();
+  void inheritRays(const LinkedSolver& former, const Renumbering& numbers);
+  [[nodiscard]] StepOutcome chooseRays();
   void leafUnshot(std::uint32_t side, std::vector<glm::vec3>& leaves) const;
   void startGrowth();
   [[nodiscard]] Result<StepOutcome> advance();
@@ -208,6 +222,9 @@ class LinkedSolver final : public Solver {
   LinkMemory memory_;
   UnshotPyramid unshot_;
   LinkPlanner planner_;
+  bool by_rays_ = false;                              // reflected light, but for what is bright and small
+  std::unique_ptr<LeafGather> gather_;                // then: once lights, and that, are measured
+  double sample_goal_ = 0.0;                          // sampling error that further samples of links shall reach; 0: none
   std::vector<Repair> repairs_;                       // after an edit of geometry
   std::size_t repaired_ = 0;                          // of these
   std::size_t due_ = 0;                               // of these, before anything else is done
@@ -239,6 +256,7 @@ class LinkedSolver final : public Solver {
   double varying_ = 0.0, net_unshot_ = 0.0;        // flux, all channels
   double varying_share_ = 0.0;                     // of the residual, what light that varies inside shooters causes
   std::array<std::vector<glm::vec3>, 2> half_;     // irradiance by leaf value
+  std::array<std::vector<glm::vec3>, 2> over_links_;  // of a new solution, while what rays bring is solved for
   std::vector<glm::vec3> irradiance_;              // by node
   std::unique_ptr<LeafVariation> variation_;       // once little else is in error
   std::unique_ptr<LeafVariation> next_variation_;  // after an edit of geometry, until then

@@ -1,7 +1,5 @@
 #include "server/solver/sampling.h"
 
-#include <array>
-
 namespace radiosity::solver {
 namespace {
 
@@ -81,15 +79,19 @@ std::uint64_t mixKeys(std::uint64_t a, std::uint64_t b) {
   return z ^ (z >> 31);
 }
 
-glm::dvec4 sobol4(std::uint32_t index, std::uint64_t key) {
-  const std::uint32_t shuffled = owenScramble(index, static_cast<std::uint32_t>(mixKeys(key, 0)));
+Sobol4::Sobol4(std::uint64_t key) : shuffle_(static_cast<std::uint32_t>(mixKeys(key, 0))) {
+  for (std::uint32_t d = 0; d < 4; ++d) scramble_[d] = static_cast<std::uint32_t>(mixKeys(key, d + 1));
+}
+
+glm::dvec4 Sobol4::operator()(std::uint32_t index) const {
+  const std::uint32_t shuffled = owenScramble(index, shuffle_);
   glm::dvec4 point;
-  for (std::uint32_t d = 0; d < 4; ++d) {
-    const auto seed = static_cast<std::uint32_t>(mixKeys(key, d + 1));
-    point[static_cast<int>(d)] = owenScramble(sobolBits(shuffled, d), seed) * 0x1p-32;
-  }
+  for (std::uint32_t d = 0; d < 4; ++d)
+    point[static_cast<int>(d)] = owenScramble(sobolBits(shuffled, d), scramble_[d]) * 0x1p-32;
   return point;
 }
+
+glm::dvec4 sobol4(std::uint32_t index, std::uint64_t key) { return Sobol4(key)(index); }
 
 double uniformFromKey(std::uint64_t key) { return static_cast<double>(mixKeys(key, 77) >> 11) * 0x1p-53; }
 

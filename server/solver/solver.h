@@ -30,6 +30,10 @@ struct SolverSettings {
   /// Bytes that remembered links never exceed. When they are used up no more nodes become shooters; a scene that could
   /// not even have a few hundred, or whose lights alone would take half of it, is solved without.
   std::size_t link_memory = std::size_t{1} << 30;
+  /// How reflected light comes to the leaves: over links from shooters, or, but for what is bright and small, by rays
+  /// from the leaves (LeafGather). kChosen: by what either is likely to take.
+  enum class Reflected { kChosen, kByLinks, kByRays };
+  Reflected reflected = Reflected::kChosen;
   PlannerSettings planner;
 };
 
@@ -63,6 +67,8 @@ struct LinkCounters {
   // Of edits of geometry, in all: samples that no change was seen from; that were taken again for the leaves whose
   // links may have changed, and how many these were; that were taken again. And those that still wait for that.
   std::uint64_t kept = 0, repaired = 0, repaired_links = 0, retaken = 0, waiting = 0;
+  std::uint64_t rays = 0;       ///< that leaves gather by
+  std::uint64_t rays_kept = 0;  ///< of these, that an edit of geometry left as they were
 };
 
 class Solver {

@@ -1,0 +1,48 @@
+// The nearest triangle that a ray meets, for very many rays (solver/leaf_sights.h): a Bvh with eight boxes below each
+// (Wald, Benthin and Boulos 2008, "Getting rid of packets"), whose children or triangles are tested together. Single
+// precision; what lies at an edge counts for both triangles, so that no ray slips between two. Immutable once built, so
+// any number of threads may ask.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <vector>
+
+#include "server/scene/bvh.h"
+
+namespace radiosity::scene {
+
+class RayTree {
+ public:
+  static constexpr std::uint32_t kWidth = 8;
+
+  RayTree() = default;
+  /// O(n); the Bvh is not needed any more.
+  explicit RayTree(const Bvh& tree);
+
+  /// Of the hit with the least t > 0, in units of the direction's length, below t_max; false: none is.
+  [[nodiscard]] bool nearestHit(const glm::vec3& origin, const glm::vec3& direction, float t_max, RayHit& hit) const;
+
+ private:
+  struct alignas(32) Node {
+    std::array<std::array<float, kWidth>, 6> plane;  ///< low x, y, z, high x, y, z
+    std::array<std::uint32_t, kWidth> child;         ///< kLeaf: of a block; else of a node
+  };
+  struct alignas(32) Block {
+    std::array<std::array<float, kWidth>, 3> corner, edge1, edge2;
+    std::array<std::uint32_t, kWidth> triangle;
+  };
+  static constexpr std::uint32_t kLeaf = 1U << 31U;
+  [[nodiscard]] static std::vector<std::uint32_t> childrenOf(const Bvh& tree, std::uint32_t node,
+                                                             const std::vector<std::uint32_t>& count);
+  [[nodiscard]] std::uint32_t addBlock(const Bvh& tree, std::uint32_t first, std::uint32_t count);
+  struct Ray;
+  [[nodiscard]] static std::uint32_t meetBoxes(const Node& node, const Ray& ray, float t_max, float* entry);
+  static void meetTriangles(const Block& block, const Ray& ray, float* t, float* turn);
+
+  std::vector<Node> nodes_;
+  std::vector<Block> blocks_;
+};
+
+}  // namespace radiosity::scene

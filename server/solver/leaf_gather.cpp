@@ -1,0 +1,289 @@
+#include "server/solver/leaf_gather.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <queue>
+
+#include "common/clones.h"
+#include "server/solver/halves.h"
+
+namespace radiosity::solver {
+namespace {
+
+/// Rays of each half of a leaf that a solve begins with.
+constexpr std::uint16_t kFirstRays = 4;
+/// What is known of the noise of so many leaves in a row is known of each: single ones are too uncertain to choose by.
+constexpr std::uint32_t kBlock = 64;
+/// In a round a leaf gets at most so many times as many rays as it had, in powers of two.
+constexpr std::uint32_t kMostTimes = 4;
+/// The square of the error of n rays falls as n^-1.3: measured in three rooms, from 4 to 64 rays (Sobol's points; the
+/// edges of what is seen keep it from n^-1.5).
+constexpr double kFall = 1.3;
+/// The residual that is left, of all that is gathered: far below any sampling error.
+constexpr double kSolved = 1e-6;
+constexpr int kMaxSweeps = 400;
+/// Of a leaf in each half, doubles: what GMRES keeps, and the sweeps; and what there is of its light, floats.
+constexpr std::size_t kVectors = 3 * (Gmres::kRestart + 3) + 3 * 4, kLights = 5 * 3;
+
+template <typename Light>
+__attribute__((always_inline)) inline void add(Light& sum, const Light& light) {
+  for (std::size_t c = 0; c < 4; ++c) sum[c] += light[c];
+}
+
+/// Means over the rays of leaves [0, count).
+template <typename Light>
+RADIOSITY_CLONES void averageSeen(const LeafSights& sights, std::size_t half, const Light* radiosity, Light* mean) {
+  const auto counts = sights.counts();
+  for (std::uint32_t value = 0; value < sights.leafCount(); ++value) {
+    Light sum{};
+    for (const auto end : sights.seen(half, value)) add(sum, radiosity[end]);
+    const double part = counts[value] > 0 ? 1.0 / counts[value] : 0.0;
+    for (auto& channel : sum) channel *= part;
+    mean[value] = sum;
+  }
+}
+
+}  // namespace
+
+LeafGather::LeafGather(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed,
+                       std::size_t most_bytes)
+    : patches_(patches), sights_(patches, sides, seed), most_bytes_(most_bytes) {
+  for (const auto& side : sides) {
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
+      area_.push_back(static_cast<double>(patches.node_area[side.first_node + leaf]));
+  }
+}
+
+std::size_t LeafGather::leastBytes(std::size_t leaves) {
+  return leaves * (2 * (kVectors * sizeof(double) + kLights * sizeof(float)) + kFirstRays * LeafSights::kRayBytes);
+}
+
+void LeafGather::start() {
+  const auto counts = sights_.counts();
+  if (std::ranges::any_of(counts, [](std::uint16_t count) { return count > 0; })) return;
+  sights_.ask(std::vector<std::uint16_t>(sights_.leafCount(), kFirstRays));
+}
+
+void LeafGather::begin(LeftLight light) {
+  light_ = std::move(light);
+  stage_ = Stage::kTracing;
+}
+
+bool LeafGather::advance(double seconds) {
+  const auto start = std::chrono::steady_clock::now();
+  const auto spent = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); };
+  if (stage_ == Stage::kTracing) {
+    if (!sights_.trace(seconds)) return false;
+    inBothHalves([&](std::size_t half) { takeLight(half); });
+    stage_ = Stage::kSolving;
+  }
+  if (stage_ == Stage::kSolving) {
+    inBothHalves([&](std::size_t h) {
+      while (!halves_[h].done && spent() < seconds) {
+        halves_[h].done = halves_[h].gmres.advance([&](Gmres::Vectors& x, bool affine) { sweep(h, x, affine); });
+        if (halves_[h].done) take(h);
+      }
+    });
+    if (!halves_[0].done || !halves_[1].done) return false;
+    finish();
+  }
+  return true;
+}
+
+/// What the solution tells of itself; what it was made with takes no more memory.
+void LeafGather::finish() {
+  weighNoise();
+  weighLost();
+  unsolved_ = 0.0;
+  double area = 0.0;
+  for (const double a : area_) area += a;
+  for (auto& half : halves_) {
+    double left = 0.0;
+    for (const double residual : half.gmres.residual()) left += residual * std::sqrt(area);
+    if (half.shining > 0.0) unsolved_ = std::max(unsolved_, left / half.shining);
+    half = {};
+  }
+  light_ = {};
+  stage_ = Stage::kDone;
+  has_gathered_ = true;
+}
+
+/// From nothing: the solution depends on rays and light alone.
+void LeafGather::takeLight(std::size_t h) {
+  Half& half = halves_[h];
+  const std::size_t leaves = sights_.leafCount();
+  half.source.assign(leaves + 2, {});
+  half.radiosity.assign(leaves + 2, {});
+  half.arriving.assign(leaves, {});
+  half.shining = 0.0;
+  std::array<double, 3> shining{};
+  double area = 0.0;
+  for (std::size_t v = 0; v < leaves; ++v) {
+    if (area_[v] <= 0.0) continue;
+    area += area_[v];
+    for (std::size_t c = 0; c < 3; ++c) {
+      const auto i = static_cast<int>(c);
+      const double left = static_cast<double>(light_.emission[v][i]) +
+                          static_cast<double>(light_.reflectance[v][i]) * static_cast<double>(light_.irradiance[h][v][i]) -
+                          static_cast<double>(light_.shot[h][v][i]);
+      half.source[v][c] = left;
+      shining[c] += area_[v] * std::abs(left);
+    }
+  }
+  std::array<double, 3> tolerance{};
+  for (std::size_t c = 0; c < 3; ++c) {
+    half.shining += shining[c];
+    // A norm over areas bounds the sum over them (Cauchy and Schwarz).
+    if (area > 0.0) tolerance[c] = kSolved * shining[c] / std::sqrt(area);
+  }
+  Gmres::Vectors nothing;
+  for (auto& channel : nothing) channel.assign(leaves, 0.0);
+  half.gmres.begin(std::move(nothing), area_, tolerance, kMaxSweeps);
+  half.done = false;
+}
+
+void LeafGather::average(std::size_t half, const std::vector<Light>& radiosity, std::vector<Light>& mean) const {
+  averageSeen(sights_, half, radiosity.data(), mean.data());
+}
+
+void LeafGather::sweep(std::size_t h, Gmres::Vectors& x, bool affine) {
+  Half& half = halves_[h];
+  const std::size_t leaves = sights_.leafCount();
+  for (std::size_t v = 0; v < leaves; ++v) {
+    for (std::size_t c = 0; c < 3; ++c)
+      half.radiosity[v][c] = static_cast<double>(light_.reflectance[v][static_cast<int>(c)]) * x[c][v] +
+                             (affine ? half.source[v][c] : 0.0);
+  }
+  average(h, half.radiosity, half.arriving);
+  for (std::size_t v = 0; v < leaves; ++v) {
+    for (std::size_t c = 0; c < 3; ++c) x[c][v] = half.arriving[v][c];
+  }
+}
+
+/// The last affine sweep's: `radiosity` is what it carried.
+void LeafGather::take(std::size_t h) {
+  const auto& solution = halves_[h].gmres.solution();
+  auto& gathered = gathered_[h];
+  gathered.resize(sights_.leafCount());
+  for (std::size_t v = 0; v < gathered.size(); ++v)
+    gathered[v] = {static_cast<float>(solution[0][v]), static_cast<float>(solution[1][v]),
+                   static_cast<float>(solution[2][v])};
+}
+
+/// What the rays of both halves make of the same light: light that differs is not theirs.
+void LeafGather::weighNoise() {
+  const std::size_t leaves = sights_.leafCount();
+  std::vector<Light> radiosity(leaves + 2, Light{});
+  for (std::size_t v = 0; v < leaves; ++v) {
+    for (std::size_t c = 0; c < 3; ++c)
+      radiosity[v][c] = 0.5 * (halves_[0].radiosity[v][c] + halves_[1].radiosity[v][c]);
+  }
+  inBothHalves([&](std::size_t half) { average(half, radiosity, halves_[half].arriving); });
+  block_noise_.assign((leaves + kBlock - 1) / kBlock, 0.0);
+  noise_ = 0.0;
+  for (std::size_t v = 0; v < leaves; ++v) {
+    double square = 0.0;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double off = 0.5 * (halves_[0].arriving[v][c] - halves_[1].arriving[v][c]);
+      square += off * off;
+    }
+    block_noise_[v / kBlock] += area_[v] * square;
+  }
+  for (const double block : block_noise_) noise_ += block;
+}
+
+/// A ray is drawn as light leaves, too: what part of a leaf's rays leave the scene, or end on unlit sides, that part of
+/// its light does.
+void LeafGather::weighLost() {
+  escaped_ = absorbed_ = {};
+  const auto counts = sights_.counts();
+  for (std::uint32_t v = 0; v < sights_.leafCount(); ++v) {
+    for (std::size_t half = 0; half < 2; ++half) {
+      const auto seen = sights_.seen(half, v);
+      const auto escaped = std::ranges::count(seen, sights_.escaped());
+      const auto absorbed = std::ranges::count(seen, sights_.absorbed());
+      if (escaped + absorbed == 0) continue;
+      for (std::size_t c = 0; c < 3; ++c) {
+        const double flux = 0.5 * area_[v] * halves_[half].radiosity[v][c] / counts[v];
+        escaped_[c] += flux * static_cast<double>(escaped);
+        absorbed_[c] += flux * static_cast<double>(absorbed);
+      }
+    }
+  }
+}
+
+double LeafGather::noiseLeft(double times) { return std::pow(times, -kFall); }
+
+double LeafGather::timesFor(double left) { return left < 1.0 ? std::pow(left, -1.0 / kFall) : 1.0; }
+
+std::uint64_t LeafGather::rays() const {
+  std::uint64_t all = 0;
+  for (const auto count : sights_.counts()) all += 2U * count;
+  return all;
+}
+
+bool LeafGather::refine(double goal) {
+  struct Block {
+    double gain;  ///< of noise() for each ray of its next doubling
+    std::uint32_t index, times;
+    bool operator<(const Block& other) const { return gain != other.gain ? gain < other.gain : index > other.index; }
+  };
+  const auto counts = sights_.counts();
+  std::vector<std::uint32_t> rays(block_noise_.size(), 0);
+  std::vector<std::uint16_t> most(block_noise_.size(), 0);
+  for (std::uint32_t v = 0; v < counts.size(); ++v) {
+    rays[v / kBlock] += counts[v];
+    most[v / kBlock] = std::max(most[v / kBlock], counts[v]);
+  }
+  const auto gain = [&](std::uint32_t b, std::uint32_t times) {
+    const double noise = block_noise_[b] * noiseLeft(times);
+    return noise * (1.0 - noiseLeft(2.0)) / (static_cast<double>(times) * rays[b]);
+  };
+  std::priority_queue<Block> queue;
+  for (std::uint32_t b = 0; b < rays.size(); ++b)
+    if (block_noise_[b] > 0.0 && rays[b] > 0) queue.push({gain(b, 1), b, 1});
+  double noise = noise_;
+  std::size_t bytes = leastBytes(counts.size()) + sights_.bytes();
+  std::vector<std::uint32_t> times(block_noise_.size(), 1);
+  bool any = false;
+  while (!queue.empty() && noise > goal) {
+    const Block block = queue.top();
+    queue.pop();
+    const std::size_t more = std::size_t{block.times} * rays[block.index];
+    if (2U * block.times * most[block.index] > LeafSights::kMostRays ||
+        bytes + more * LeafSights::kRayBytes > most_bytes_)
+      continue;
+    any = true;
+    bytes += more * LeafSights::kRayBytes;
+    noise -= block_noise_[block.index] * (noiseLeft(block.times) - noiseLeft(2.0 * block.times));
+    times[block.index] = 2 * block.times;
+    if (2 * block.times < kMostTimes) queue.push({gain(block.index, 2 * block.times), block.index, 2 * block.times});
+  }
+  if (!any) return false;
+  std::vector<std::uint16_t> asked(counts.begin(), counts.end());
+  for (std::uint32_t v = 0; v < asked.size(); ++v)
+    asked[v] = static_cast<std::uint16_t>(asked[v] * times[v / kBlock]);
+  sights_.ask(asked);
+  return true;
+}
+
+void LeafGather::save(ArchiveWriter& to) const {
+  const auto counts = sights_.counts();
+  to(has_gathered_, std::vector<std::uint16_t>(counts.begin(), counts.end()), noise_, block_noise_, escaped_, absorbed_);
+}
+
+bool LeafGather::restore(ArchiveReader& from) {
+  std::vector<std::uint16_t> counts;
+  from(has_gathered_, counts, noise_, block_noise_, escaped_, absorbed_);
+  const auto fits = [](std::uint16_t count) { return count <= LeafSights::kMostRays; };
+  std::size_t all = 0;
+  for (const auto count : counts) all += count;
+  if (!from.ok() || counts.size() != sights_.leafCount() || !std::ranges::all_of(counts, fits) ||
+      all * LeafSights::kRayBytes > most_bytes_ || (!block_noise_.empty() && block_noise_.size() != (counts.size() + kBlock - 1) / kBlock))
+    return false;
+  if (all > 0) sights_.ask(counts);
+  return true;
+}
+
+}  // namespace radiosity::solver

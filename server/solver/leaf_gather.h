@@ -1,0 +1,120 @@
+// Reflected light gathered at the leaves, over the leaves that rays from there see (LeafSights): the radiosity equation
+// on leaves,
+//
+//   x = R (r + rho x),
+//
+// where r is the radiosity of each leaf that no shooter stands for and R the mean over a leaf's rays. So light comes
+// over links from whatever is worth an image of its own, and from all else by rays, and nothing comes twice: what
+// shooters send less than a leaf has, or more, is in r, signed. In rooms of hundreds of surfaces a ray to each sample
+// costs less than an image of all of them from each. Rays see leaves as they are, so that nothing varies within a
+// shooter, and what is near, or half hidden, needs no care of its own.
+//
+// Solved by GMRES. Two independent halves of the rays give two independent solutions; where their difference is worth
+// more rays than it is elsewhere, leaves get more. Owned by LinkedSolver; one thread outside of the calls.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <span>
+#include <vector>
+
+#include "server/solver/gmres.h"
+#include "server/solver/leaf_sights.h"
+
+namespace radiosity::solver {
+
+/// Light as shooters left it. By leaf value; lux, and lm/m^2.
+struct LeftLight {
+  std::vector<glm::vec3> emission;  ///< of what is no light polygon
+  std::vector<glm::vec3> reflectance;
+  std::array<std::vector<glm::vec3>, 2> irradiance;  ///< over links, by half
+  std::array<std::vector<glm::vec3>, 2> shot;        ///< radiosity that shooters stand for, by half
+};
+
+class LeafGather {
+ public:
+  /// `most_bytes`: for all that it remembers; rays that would take more are not asked for.
+  LeafGather(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed,
+             std::size_t most_bytes);
+
+  /// What the equation takes at most, without rays, and with those that a solve begins with.
+  [[nodiscard]] static std::size_t leastBytes(std::size_t leaves);
+
+  /// After an edit of geometry (LeafSights::inherit).
+  void inherit(const LeafGather& former, std::span<const std::uint32_t> value_before, const Shadows& change) {
+    sights_.inherit(former.sights_, value_before, change);
+  }
+  /// Light was brought, once at least.
+  [[nodiscard]] bool hasGathered() const { return has_gathered_; }
+  /// All leaves get as many as a solve begins with, where there are none.
+  void start();
+
+  /// Brings rays and light up to date, in slices: until advance() is true. The result depends on rays and `light`
+  /// alone. Throws std::bad_alloc.
+  void begin(LeftLight light);
+  bool advance(double seconds);
+  /// Rays are asked for that are not traced: advance() will take its time.
+  [[nodiscard]] bool isBehind() const { return !sights_.isTraced(); }
+  /// Those are given up, where there are others.
+  void giveUp() { sights_.giveUp(); }
+
+  /// x, to be added to what came over links.
+  [[nodiscard]] std::span<const glm::vec3> irradiance(std::size_t half) const { return gathered_[half]; }
+  /// Square of the error that rays leave in the mean of the halves: sum over leaves and channels, times area.
+  [[nodiscard]] double noise() const { return noise_; }
+  /// Flux that the equation does not account for, of what is gathered.
+  [[nodiscard]] double unsolved() const { return unsolved_; }
+  /// Flux that leaves the scene, and that falls on unlit sides, by channel.
+  [[nodiscard]] const std::array<double, 3>& escapedFlux() const { return escaped_; }
+  [[nodiscard]] const std::array<double, 3>& absorbedFlux() const { return absorbed_; }
+
+  /// Asks for more rays where they lower noise() most for their number, until it is likely to be `goal`; a leaf at most
+  /// four times as many. False: there can be no more.
+  [[nodiscard]] bool refine(double goal);
+  /// Part of noise() that is left when there are so many times as many rays.
+  [[nodiscard]] static double noiseLeft(double times);
+  /// How many times as many leave so much of it; at least 1.
+  [[nodiscard]] static double timesFor(double left);
+  [[nodiscard]] std::uint64_t rays() const;
+  [[nodiscard]] const LeafSights& sights() const { return sights_; }
+
+  /// How many rays there are; they are traced anew from it.
+  void save(ArchiveWriter& to) const;
+  [[nodiscard]] bool restore(ArchiveReader& from);
+
+ private:
+  /// Four, so that a leaf's are one vector; the last is 0.
+  using Light = std::array<double, 4>;
+  struct Half {
+    std::vector<Light> source;      ///< r; by what may be seen, so two more than leaves
+    std::vector<Light> radiosity;   ///< r + rho x
+    std::vector<Light> arriving;    ///< its means
+    Gmres gmres;
+    double shining = 0.0;  ///< flux of |r|, all channels
+    bool done = true;
+  };
+  enum class Stage { kDone, kTracing, kSolving };
+  void takeLight(std::size_t half);
+  void average(std::size_t half, const std::vector<Light>& radiosity, std::vector<Light>& mean) const;
+  void sweep(std::size_t half, Gmres::Vectors& x, bool affine);
+  void take(std::size_t half);
+  void weighNoise();
+  void weighLost();
+  void finish();
+
+  const scene::PatchScene& patches_;
+  LeafSights sights_;
+  std::size_t most_bytes_;
+  bool has_gathered_ = false;
+  std::vector<double> area_;  ///< by leaf value
+  LeftLight light_;
+  Stage stage_ = Stage::kDone;
+  std::array<Half, 2> halves_;
+  std::array<std::vector<glm::vec3>, 2> gathered_;
+  double noise_ = 0.0, unsolved_ = 0.0;
+  std::vector<double> block_noise_;  ///< parts of it, by kBlock leaves
+  std::array<double, 3> escaped_{}, absorbed_{};
+};
+
+}  // namespace radiosity::solver

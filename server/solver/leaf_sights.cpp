@@ -1,0 +1,177 @@
+#include "server/solver/leaf_sights.h"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+
+#include "common/parallel.h"
+#include "server/solver/halves.h"
+
+namespace radiosity::solver {
+namespace {
+
+/// Leaves between two looks at the clock, of all threads together, and of one at a time.
+constexpr std::uint32_t kLeavesASlice = 2048, kLeavesAtOnce = 64;
+/// Rays and boxes are held against each other with so much to spare (unit box).
+constexpr double kMargin = 1e-5;
+
+/// Whether a ray meets a box.
+bool meetsBox(const scene::ChangedBox& box, const glm::dvec3& from, const glm::dvec3& direction) {
+  double first = 0.0, last = 1e9;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double low = static_cast<double>(box.low[axis]) - kMargin - from[axis];
+    const double high = static_cast<double>(box.high[axis]) + kMargin - from[axis];
+    if (direction[axis] == 0.0) {
+      if (low > 0.0 || high < 0.0) return false;
+      continue;
+    }
+    const double a = low / direction[axis], b = high / direction[axis];
+    first = std::max(first, std::min(a, b));
+    last = std::min(last, std::max(a, b));
+  }
+  return first <= last;
+}
+
+}  // namespace
+
+LeafSights::LeafSights(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed)
+    : sides_(sides), rays_(patches, sides), seed_(mixKeys(seed, 0x53494748ULL)) {
+  for (const auto& side : sides) leaf_count_ = std::max(leaf_count_, side.first_value + side.leaf_count);
+  count_.assign(leaf_count_, 0);
+  before_ = count_;
+  first_.assign(leaf_count_, 0);
+  cursor_ = leaf_count_;
+}
+
+void LeafSights::ask(std::span<const std::uint16_t> counts) {
+  before_ = count_;
+  layOut(counts);
+  cursor_ = 0;
+}
+
+/// What is known moves to where it belongs; before a half is laid out anew nothing is lost should memory run out.
+void LeafSights::layOut(std::span<const std::uint16_t> counts) {
+  std::vector<std::uint16_t> count(leaf_count_, 0);
+  std::vector<std::size_t> first(leaf_count_, 0);
+  std::size_t all = 0;
+  for (std::uint32_t value = 0; value < leaf_count_; ++value) {
+    first[value] = all;
+    if (rays_.areaOf(value) > 0.0) count[value] = counts[value];
+    all += count[value];
+  }
+  std::array<std::vector<std::uint32_t>, 2> seen;
+  for (std::size_t half = 0; half < 2; ++half) {
+    seen[half].assign(all, kUntraced);
+    for (std::uint32_t value = 0; value < leaf_count_; ++value)
+      std::copy_n(seen_[half].begin() + static_cast<std::ptrdiff_t>(first_[value]),
+                  std::min(count_[value], count[value]), seen[half].begin() + static_cast<std::ptrdiff_t>(first[value]));
+  }
+  count_ = std::move(count);
+  first_ = std::move(first);
+  seen_ = std::move(seen);
+}
+
+void LeafSights::giveUp() {
+  if (isTraced()) return;
+  auto counts = count_;
+  for (auto value = cursor_; value < leaf_count_; ++value)
+    if (before_[value] > 0) counts[value] = before_[value];
+  layOut(counts);
+}
+
+Sobol4 LeafSights::draws(std::uint32_t value, const Side& side, std::size_t half) const {
+  const auto leaf = std::uint64_t{value - side.first_value} * 2 + half;
+  return Sobol4(mixKeys(mixKeys(seed_, side.key), leaf));
+}
+
+std::uint32_t LeafSights::traceLeaf(std::uint32_t value, const Side& side, std::size_t half) {
+  const auto seen = std::span(seen_[half]).subspan(first_[value], count_[value]);
+  const auto wanted = static_cast<std::uint32_t>(std::ranges::count(seen, kUntraced));
+  if (wanted == 0) return 0;
+  const auto draw = draws(value, side, half);
+  for (std::uint32_t k = 0; k < seen.size(); ++k) {
+    if (seen[k] != kUntraced) continue;
+    const auto at = draw(k);
+    const auto place = rays_.placeOn(value, {at.z, at.w});
+    const auto end = rays_.see(place, cosineDirection(place.normal, at.x, at.y));
+    const bool sky = end == LeafRays::kSkyAbove || end == LeafRays::kSkyBelow;
+    seen[k] = sky ? escaped() : end == LeafRays::kNothing ? absorbed() : end;
+  }
+  return wanted;
+}
+
+bool LeafSights::trace(double seconds) {
+  const auto start = std::chrono::steady_clock::now();
+  while (cursor_ < leaf_count_) {
+    const auto end = std::min(leaf_count_, cursor_ + kLeavesASlice);
+    std::atomic<std::uint32_t> next{cursor_};
+    std::atomic<std::uint64_t> traced{0};
+    inShares((end - cursor_ + kLeavesAtOnce - 1) / kLeavesAtOnce, [&](std::size_t, std::size_t) {
+      for (auto from = next.fetch_add(kLeavesAtOnce); from < end; from = next.fetch_add(kLeavesAtOnce)) {
+        std::uint64_t rays = 0;
+        for (auto value = from; value < std::min(end, from + kLeavesAtOnce); ++value) {
+          if (count_[value] == 0) continue;
+          const Side& side = rays_.sideOf(value);
+          for (std::size_t half = 0; half < 2; ++half) rays += traceLeaf(value, side, half);
+        }
+        traced += rays;
+      }
+    });
+    traced_ += traced;
+    cursor_ = end;
+    if (std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() >= seconds) break;
+  }
+  return isTraced();
+}
+
+bool LeafSights::isPassed(const Shadows& change, std::uint32_t value, const glm::dvec4& draw) const {
+  const auto place = rays_.placeOn(value, {draw.z, draw.w});
+  const auto direction = cosineDirection(place.normal, draw.x, draw.y);
+  return std::ranges::any_of(
+      change.change().boxes, [&](const scene::ChangedBox& box) { return meetsBox(box, place.position, direction); });
+}
+
+void LeafSights::inherit(const LeafSights& former, std::span<const std::uint32_t> value_before, const Shadows& change) {
+  // New leaves get as many rays as most have: in the middle of all.
+  auto sorted = former.count_;
+  std::erase(sorted, 0);
+  if (sorted.empty()) return;
+  std::ranges::nth_element(sorted, sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2));
+  const auto usual = sorted[sorted.size() / 2];
+  std::vector<std::uint16_t> counts(leaf_count_, usual);
+  std::vector<std::uint32_t> value_after(former.leaf_count_ + 2, kUntraced);
+  value_after[former.absorbed()] = absorbed();
+  value_after[former.escaped()] = escaped();
+  for (std::uint32_t value = 0; value < leaf_count_; ++value) {
+    if (value_before[value] == scene::kNone) continue;
+    value_after[value_before[value]] = value;
+    if (former.count_[value_before[value]] > 0) counts[value] = former.count_[value_before[value]];
+  }
+  ask(counts);
+  before_.assign(leaf_count_, 0);
+  inBothHalves([&](std::size_t half) {
+    for (std::uint32_t value = 0; value < leaf_count_; ++value) {
+      const auto before = value_before[value];
+      if (count_[value] == 0 || before == scene::kNone || former.count_[before] == 0) continue;
+      const auto draw = draws(value, rays_.sideOf(value), half);
+      const auto old = std::span(former.seen_[half]).subspan(former.first_[before], former.count_[before]);
+      for (std::uint32_t k = 0; k < old.size(); ++k) {
+        if (old[k] == kUntraced) continue;
+        const auto end = value_after[old[k]];
+        if (end == kUntraced) continue;  // it saw what is gone, or moved
+        const bool may_pass = end >= leaf_count_ || change.isPassed(value, end);
+        if (!may_pass || !isPassed(change, value, draw(k))) seen_[half][first_[value] + k] = end;
+      }
+    }
+  });
+  kept_ = former.kept_;
+  traced_ = former.traced_;
+  for (const auto& half : seen_)
+    kept_ += static_cast<std::uint64_t>(std::ranges::count_if(half, [](auto end) { return end != kUntraced; }));
+}
+
+std::size_t LeafSights::bytes() const {
+  return (seen_[0].size() + seen_[1].size()) * sizeof(std::uint32_t) + first_.size() * sizeof(std::size_t);
+}
+
+}  // namespace radiosity::solver

@@ -1,0 +1,77 @@
+// Which leaves each leaf sees, by rays from all over it, more of them near its normal, as light arrives: the mean
+// radiosity of those seen is its irradiance. Points and directions are Sobol's, scrambled leaf by leaf, so that more
+// rays go on where fewer ended. Two independent halves. Owned by LeafGather; one thread outside of the calls.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "server/solver/leaf_rays.h"
+#include "server/solver/sampling.h"
+#include "server/solver/shadows.h"
+
+namespace radiosity::solver {
+
+class LeafSights {
+ public:
+  /// More rays no half of a leaf ever has.
+  static constexpr std::uint32_t kMostRays = 16'384;
+
+  LeafSights(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed);
+
+  /// Leaf values. What is seen is one of them, below this, or escaped(), or absorbed().
+  [[nodiscard]] std::uint32_t leafCount() const { return leaf_count_; }
+  [[nodiscard]] std::uint32_t absorbed() const { return leaf_count_; }
+  [[nodiscard]] std::uint32_t escaped() const { return leaf_count_ + 1; }
+
+  /// How many rays each half of a leaf has, by leaf value; 0 where it has no area.
+  [[nodiscard]] std::span<const std::uint16_t> counts() const { return count_; }
+  /// As many as this, or more than there are; leaves without area have none all the same. They are traced by trace().
+  /// Throws std::bad_alloc.
+  void ask(std::span<const std::uint16_t> counts);
+  /// What is asked for and not traced is given up, where there are others.
+  void giveUp();
+  [[nodiscard]] bool isTraced() const { return cursor_ == leaf_count_; }
+  /// Goes on for about `seconds`, on all cores. True: isTraced(). Where the cuts lie changes nothing.
+  bool trace(double seconds);
+
+  /// After isTraced(): what is seen from a leaf.
+  [[nodiscard]] std::span<const std::uint32_t> seen(std::size_t half, std::uint32_t value) const {
+    return {seen_[half].data() + first_[value], count_[value]};
+  }
+
+  /// After an edit of geometry, at first: rays of the scene before that pass nothing that changed see what they saw.
+  /// `value_before`: by leaf value, what it was there, or kNone where it is new, moved or altered. All others are
+  /// traced with the next trace(), so that all see what they would without it.
+  void inherit(const LeafSights& former, std::span<const std::uint32_t> value_before, const Shadows& change);
+
+  [[nodiscard]] std::size_t bytes() const;
+  /// Bytes of a ray asked for.
+  static constexpr std::size_t kRayBytes = 2 * sizeof(std::uint32_t);
+  /// Rays traced so far, of both halves; those inherited count apart.
+  [[nodiscard]] std::uint64_t traced() const { return traced_; }
+  [[nodiscard]] std::uint64_t kept() const { return kept_; }
+
+ private:
+  static constexpr std::uint32_t kUntraced = scene::kNone;
+  void layOut(std::span<const std::uint16_t> counts);
+  /// Returns how many rays.
+  std::uint32_t traceLeaf(std::uint32_t value, const Side& side, std::size_t half);
+  /// Draws of the rays of a leaf.
+  [[nodiscard]] Sobol4 draws(std::uint32_t value, const Side& side, std::size_t half) const;
+  [[nodiscard]] bool isPassed(const Shadows& change, std::uint32_t value, const glm::dvec4& draw) const;
+
+  const std::vector<Side>& sides_;
+  LeafRays rays_;
+  std::uint64_t seed_;
+  std::uint32_t leaf_count_ = 0;
+  std::uint32_t cursor_ = 0;                   ///< leaves below are traced
+  std::vector<std::uint16_t> count_, before_;  ///< by leaf value; before what was asked for last
+  std::vector<std::size_t> first_;             ///< by leaf value: into seen_
+  std::array<std::vector<std::uint32_t>, 2> seen_;
+  std::uint64_t traced_ = 0, kept_ = 0;
+};
+
+}  // namespace radiosity::solver

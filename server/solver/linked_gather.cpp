@@ -1,0 +1,143 @@
+// LinkedSolver where rays bring reflected light: whether they do, which of rays and samples of links comes next.
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "server/solver/linked_solver.h"
+
+namespace radiosity::solver {
+namespace {
+
+// What things take, in microseconds of one core, as measured in rooms of 38 to 57,000 triangles; only their ratios
+// count. An image and what is gathered from it: by leaf, and by the root of the triangles, since most are left out. A
+// ray: by level of the tree.
+constexpr double kShotLeaf = 0.02, kShotTriangle = 13.0, kRayLevel = 0.05;
+/// Samples of reflected light that links take to 2 %, by surface, and rays of a leaf. Further down both grow alike.
+constexpr double kFewestShots = 550.0, kShotsASurface = 3.0, kRaysALeaf = 128.0;
+/// An image of a lamp, beside one of a node.
+constexpr double kLightShot = 2.0;
+/// What shines so many times as bright as all does in the mean is worth links: rays find what is small too seldom.
+constexpr double kBright = 4.0;
+/// A round ends where it is likely to bring the error to this part of the target: what it goes by is uncertain.
+constexpr double kAim = 0.85;
+/// The part of the room that either of rays and samples gets is found to one in so many.
+constexpr int kParts = 32;
+
+}  // namespace
+
+double LinkedSolver::shotCost() const {
+  return kShotLeaf * static_cast<double>(system_.emission().size()) +
+         kShotTriangle * std::sqrt(static_cast<double>(patches_->triangles.size()));
+}
+
+double LinkedSolver::rayCost() const {
+  return kRayLevel * std::log2(2.0 + static_cast<double>(patches_->triangles.size()));
+}
+
+bool LinkedSolver::raysPay() const {
+  const auto leaves = system_.emission().size();
+  if (LeafGather::leastBytes(leaves) > settings_.link_memory / 2) return false;
+  if (settings_.reflected != SolverSettings::Reflected::kChosen)
+    return settings_.reflected == SolverSettings::Reflected::kByRays;
+  const double shots = kFewestShots + kShotsASurface * static_cast<double>(patches_->surfaces.size());
+  return kRaysALeaf * static_cast<double>(leaves) * rayCost() < shots * shotCost();
+}
+
+/// Of nodes that are worth links, all channels.
+double LinkedSolver::leastRadiosity() const {
+  double area = 0.0, flux = 0.0;
+  for (const auto& side : sides_) {
+    const auto root = side.first_node + side.node_count - 1;
+    area += static_cast<double>(patches_->node_area[root]);
+    flux += static_cast<double>(unshot_.rough(root));
+  }
+  return area > 0.0 ? kBright * flux / area : 0.0;
+}
+
+void LinkedSolver::startRays() {
+  gather_ = std::make_unique<LeafGather>(*patches_, sides_, settings_.seed, settings_.link_memory / 2);
+}
+
+LeftLight LinkedSolver::leftLight() const {
+  LeftLight light;
+  light.emission = system_.emission();
+  light.reflectance = system_.reflectance();
+  light.irradiance = over_links_;
+  for (auto& shot : light.shot) shot.assign(light.emission.size(), glm::vec3(0.0F));
+  for (const auto& side : sides_) {
+    if (side.gathered) std::fill_n(light.emission.begin() + side.first_value, side.leaf_count, glm::vec3(0.0F));
+  }
+  for (const auto& shooter : system_.shooters()) {
+    if (shooter.isLight()) continue;
+    const Side& side = sides_[shooter.place.side];
+    const auto rect = leafRect(side, shooter.place);
+    for (std::size_t half = 0; half < 2; ++half) {
+      const glm::vec3 sent = static_cast<float>(shooter.carried(half)) * shooter.sent[half];
+      for (auto y = rect.y0; y < rect.y1; ++y) {
+        for (auto x = rect.x0; x < rect.x1; ++x) light.shot[half][side.first_value + y * side.width + x] += sent;
+      }
+    }
+  }
+  return light;
+}
+
+void LinkedSolver::inheritRays(const LinkedSolver& former, const Renumbering& numbers) {
+  startRays();
+  std::vector<std::uint32_t> value_before(system_.emission().size(), scene::kNone);
+  for (std::uint32_t s = 0; s < former.sides_.size(); ++s) {
+    if (numbers.unmoved_after[s] == scene::kNone) continue;
+    const Side &side = sides_[numbers.unmoved_after[s]], &before = former.sides_[s];
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+      const auto value = side.first_value + leaf;
+      if (!shadows_->change().altered[value]) value_before[value] = before.first_value + leaf;
+    }
+  }
+  gather_->inherit(*former.gather_, value_before, *shadows_);
+  gather_->start();
+}
+
+/// What samples of links took so far.
+double LinkedSolver::samplesCost() const {
+  double points = 0.0;
+  for (const auto& shooter : system_.shooters()) {
+    for (const auto& column : shooter.column) points += (shooter.isLight() ? kLightShot : 1.0) * column.points();
+  }
+  return points * shotCost();
+}
+
+/// Relative error that rays leave.
+double LinkedSolver::raysError() const {
+  const double norm = fieldNorm();
+  return gather_ && norm > 0.0 ? std::sqrt(gather_->noise()) / norm : 0.0;
+}
+
+/// More rays, more samples of links, or both, so that the target is reached at the least cost.
+StepOutcome LinkedSolver::chooseRays() {
+  if (rounds_ >= kMaxRounds) return exhausted(SolveLimit::kRounds);
+  phase_ = Phase::kImprove;
+  sample_goal_ = 0.0;
+  if (!gather_) {
+    startRays();
+    gather_->start();
+    return StepOutcome::kRoundDone;
+  }
+  const double aim = kAim * targetOfLinks(), rest = error_.residual;
+  const double room = aim * aim - rest * rest;
+  if (room <= 0.0 || by_links_ * by_links_ <= room) return exhausted(SolveLimit::kWithin);
+  const double rays = raysError() * raysError(), links = std::max(0.0, by_links_ * by_links_ - rays);
+  const double rays_cost = static_cast<double>(gather_->rays()) * rayCost(), links_cost = samplesCost();
+  double best = HUGE_VAL, part = 0.0;
+  for (int i = 1; i < kParts; ++i) {
+    const double for_rays = room * i / kParts, for_links = room - for_rays;
+    // The square of the error of samples falls as their number.
+    const double cost = rays_cost * LeafGather::timesFor(for_rays / std::max(rays, 1e-300)) +
+                        links_cost * std::max(1.0, links / for_links);
+    if (cost < best) best = cost, part = static_cast<double>(i) / kParts;
+  }
+  const bool refined = rays > part * room && gather_->refine(part * room / std::max(rays, 1e-300) * gather_->noise());
+  if (links > (1.0 - part) * room) sample_goal_ = std::sqrt((1.0 - part) * room);
+  if (!refined && sample_goal_ <= 0.0) return exhausted(SolveLimit::kLinkMemory);
+  return StepOutcome::kRoundDone;
+}
+
+}  // namespace radiosity::solver
