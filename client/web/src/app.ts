@@ -150,7 +150,7 @@ export class App {
     this.frame.overPicture(this.people.people.labels);
     this.share = new Share(this, sharePanel);
     this.tiles = new TileFeed({
-      set: (kind) => this.viewer.setOf(kind),
+      set: (kind) => this.viewer.layouts.setOf(kind),
       dropped: (bytes, reason) => {
         this.connection.used(bytes);
         if (reason) console.warn(`a tile was dropped: ${reason}`);
@@ -241,7 +241,7 @@ export class App {
     this.mark('ready');
     if (this.epoch !== '' && this.epoch !== hello.epoch) this.resume = undefined;
     this.epoch = hello.epoch;
-    if (!hello.resumed) this.viewer.forgetLayout();
+    if (!hello.resumed) this.viewer.layouts.forget();
     for (const resolve of this.awaited.splice(0)) resolve();
     this.view.onCapabilities();
     this.share.onServer(info);
@@ -398,7 +398,7 @@ export class App {
   }
 
   private async onLightmaps(note: LightmapsNote): Promise<void> {
-    const set = this.viewer.expectLayout(note);
+    const set = this.viewer.layouts.expect(note);
     if (!set) return;
     this.settleLight();
     if (this.view.renewData() || set.baseMip > 0) await this.resubscribe();
@@ -407,11 +407,11 @@ export class App {
 
   private onBookmark(bookmark: Bookmark): void {
     const { info } = this.connection;
-    const set = this.viewer.setOf(bookmark.quantity);
+    const set = this.viewer.layouts.setOf(bookmark.quantity);
     // Tiles on their way through the decoder belong to this bookmark, too.
     this.tiles.afterAll(() => {
       // Another is looked at by now, or pages have another layout: nothing was said of that one.
-      if (!set || set !== this.viewer.setOf(bookmark.quantity) || info !== this.connection.info) return;
+      if (!set || set !== this.viewer.layouts.setOf(bookmark.quantity) || info !== this.connection.info) return;
       set.complete = true;
       this.bookmark = bookmark;
       const { quantity, revision, tileVersion } = bookmark;

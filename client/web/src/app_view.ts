@@ -225,7 +225,7 @@ export class ViewSession {
 
   private setRange(range: [number, number] | undefined): void {
     const { viewer } = this.app;
-    viewer.autoRange = range === undefined;
+    viewer.brightness.autoRange = range === undefined;
     if (range) viewer.uniforms.all.falseRange.value.set(...range);
     viewer.setMode(this.mode);
   }

@@ -140,7 +140,7 @@ it('keeps a page of many texels, and forty pages, within the memory that it stat
     ];
     for (const [i, pages] of layouts.entries()) {
       const note = { ...viewer.set!.note, layout: 1000 + i, pages };
-      taken.push(viewer.expectLayout(note)!.bytes);
+      taken.push(viewer.layouts.expect(note)!.bytes);
       await new Promise((resolve) => setTimeout(resolve, 100));
     }
     return taken;

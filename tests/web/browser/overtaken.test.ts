@@ -16,7 +16,6 @@ declare global {
 
 /** What of the viewer is nobody else's business. */
 interface Inside {
-  staged?: { scene?: object };
   compile(scene: object): Promise<void>;
 }
 
@@ -81,7 +80,7 @@ it('shows the newest of layouts that come faster than their geometry, and keeps 
     const inside = viewer as unknown as Inside;
     const glb = await (await fetch('/scene.glb')).arrayBuffer();
     const { note } = viewer.set!;
-    const expect = (step: number) => viewer.expectLayout({ ...note, layout: note.layout + 1000 + step })!;
+    const expect = (step: number) => viewer.layouts.expect({ ...note, layout: note.layout + 1000 + step })!;
     const first = expect(0);
     const reading = viewer.load(glb.slice(0), first);
     const second = expect(1);
@@ -102,7 +101,7 @@ it('shows the newest of layouts that come faster than their geometry, and keeps 
     release();
     await loading;
     delete (inside as Partial<Inside>).compile;
-    return { staged: inside.staged?.scene !== undefined, third: viewer.set === third };
+    return { staged: viewer.layouts.stagedScene !== undefined, third: viewer.set === third };
   });
   expect(kept).toEqual({ staged: false, third: true });
   await configure(page, 12_000);
@@ -153,7 +152,7 @@ it('takes a bookmark for the layout that it is of: one that is overtaken says no
     const ticket = ++inside.tiles.sent; // a tile that is being decoded
     inside.onBookmark({ ...app.bookmark!, tileVersion: tileVersion + 1 });
     const { note } = viewer.set!;
-    const set = viewer.expectLayout({ ...note, layout: note.layout + 1000 })!;
+    const set = viewer.layouts.expect({ ...note, layout: note.layout + 1000 })!;
     inside.tiles.take({ ticket, bytes: 0 });
     return { complete: set.complete, moved: inside.resume.tileVersion - tileVersion };
   });
@@ -183,7 +182,7 @@ it('shows a layout that has come while the graphics card was gone', async () => 
   );
   await page.waitForFunction(
     () =>
-      (window.viewer!.viewer as unknown as Inside).staged?.scene !== undefined ||
+      window.viewer!.viewer.layouts.stagedScene !== undefined ||
       window.notes!.some((text) => text.startsWith('The geometry')),
   );
   await page.evaluate(async () => {
@@ -305,7 +304,7 @@ it('shows errors of the layout that is on the screen, until the next one takes i
   const page = await pages.open(server.url, 480, 480);
   await converged(page);
   await page.evaluate(() => window.viewer!.view.setMode('error'));
-  await page.waitForFunction(() => window.viewer!.viewer.shownData?.complete === true);
+  await page.waitForFunction(() => window.viewer!.viewer.layouts.shownData?.complete === true);
   await drawn(page);
   await page.evaluate(() => {
     const seen: { layout: number; data: (number | undefined)[]; scale: number }[] = [];
@@ -318,8 +317,8 @@ it('shows errors of the layout that is on the screen, until the next one takes i
       let scale = Infinity;
       viewer.shown!.eachMaterial(({ page, own }) => {
         if (!page) return;
-        const isData = viewer.shownData?.pages.some(({ texture }) => texture === own.dataPage.value);
-        data.add(isData ? viewer.shownData!.note.layout : undefined);
+        const isData = viewer.layouts.shownData?.pages.some(({ texture }) => texture === own.dataPage.value);
+        data.add(isData ? viewer.layouts.shownData!.note.layout : undefined);
         scale = Math.min(scale, own.dataScale.value);
       });
       seen.push({ layout: viewer.shown!.set.note.layout, data: [...data], scale });

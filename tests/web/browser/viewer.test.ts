@@ -294,14 +294,14 @@ it('shows unshot light by how bright the scene is, from a link too: of a solve t
   const page = await pages.open(`${server.url}/#view=unshot`, 600, 500);
   await page.waitForFunction(() => {
     const { progress, viewer } = window.viewer ?? {};
-    const data = viewer?.shownData;
+    const data = viewer?.layouts.shownData;
     return progress?.state === 'converged' && data?.quantity === 'unshot' && data.complete && data.waiting === 0;
   });
   await drawn(page);
   const scale = () => page.evaluate(() => window.viewer!.viewer.uniforms.all.falseRange.value.toArray());
   const [low, high] = (await scale()) as [number, number];
   // What came first may be of the middle of the solve; what there is at its end follows.
-  const left = () => page.evaluate(() => window.viewer!.viewer.shownData!.range()![1]);
+  const left = () => page.evaluate(() => window.viewer!.viewer.layouts.shownData!.range()![1]);
   expect(await until(left, (most) => most < 0.1 * high)).toBeLessThan(0.1 * high);
   expect(low / high).toBeCloseTo(0.01, 6);
   await page.evaluate(() => window.viewer!.view.setMode('radiosity'));

@@ -1,0 +1,142 @@
+// How brightly the picture is shown: when its exposure, and the range of its false colours, are found anew, and of what.
+// Rests between measurements, as the card is needed for the picture itself.
+
+import type { PerspectiveCamera, Scene, WebGLRenderer } from 'three';
+import { ExposureMeter } from './exposure';
+import type { Layouts } from './layouts';
+import { LightGate } from './light_gate';
+import type { ViewUniforms } from './lit_material';
+import { exposureByRays } from './ray_exposure';
+import type { ViewMode } from './view_modes';
+
+const MEASURE_EVERY_MS = 250;
+/** Reading back waits for all that the card has still to draw, which a slow one makes long: rest so many times that. */
+const MEASURE_SHARE = 8;
+/** A card that is busy with the first light takes long: what it told of half of that is not to stay for ten times as long. */
+const MOST_PAUSE_MS = 1500;
+
+/** What leaves a surface is this much less than what arrives, at the dark end of the scale. */
+const DARKEST = 0.1;
+/** What is left to shoot counts for nothing where it is less than this of what arrives at the bright end. */
+const LEAST_UNSHOT = 0.01;
+
+/** What is measured. */
+export interface Picture {
+  readonly renderer: WebGLRenderer;
+  readonly uniforms: ViewUniforms;
+  readonly layouts: Layouts;
+  readonly world: Scene;
+  readonly camera: PerspectiveCamera;
+  mode(): ViewMode | undefined;
+  /** Signs and handles are no part of the scene's light. */
+  withoutSigns<T>(draw: () => T): T;
+  isCardIdle(): boolean;
+  /** It is to be drawn as it is to be shown now. */
+  redraw(): void;
+}
+
+export class Brightness {
+  readonly exposure: ExposureMeter;
+  /** The range of false colours follows the light. */
+  autoRange = true;
+  private readonly gate = new LightGate();
+  /** Something has changed that the range, and the exposure, may depend on. */
+  private rangeDue = true;
+  private exposureDue = true;
+  private lastRange = 0;
+  private lastMeasure = 0;
+  /** Irradiance at the dark and bright end of what was last known, lux. */
+  private lightRange: [number, number] | undefined;
+
+  constructor(private readonly picture: Picture) {
+    this.exposure = new ExposureMeter(picture.renderer, picture.uniforms, () => picture.isCardIdle());
+  }
+
+  /** The picture is another one. */
+  changed(): void {
+    this.rangeDue = true;
+    this.exposureDue = true;
+  }
+
+  /** Once for every turn of the page. `replaces`: what is shown took the place of another scene's light. */
+  turn(now: number, replaces: boolean): void {
+    this.gate.turn(now, this.picture.layouts.shown?.set.lit === true && this.exposure.unknown, replaces);
+    this.measureRange(now);
+    this.measureExposure(now);
+  }
+
+  /** It is not known yet how brightly to show the light there is. */
+  holdsLightBack(now: number): boolean {
+    return this.gate.isClosed(now);
+  }
+
+  /** The card shall have nothing else to do than to find that out. */
+  standsStill(now: number): boolean {
+    return this.gate.standsStill(now);
+  }
+
+  /** Ends when the exposure is the one that the light there is now asks for. */
+  async settle(): Promise<void> {
+    // The first may have been on its way.
+    for (let again = 0; again < 2 && this.picture.layouts.shown; ++again) await this.measureNow();
+    this.exposure.settle();
+    this.exposure.step(0);
+  }
+
+  /**
+   * Unshot light is shown by how bright the scene is: by a scale of its own the little that is left at the end would look
+   * like much. As long as it is streamed no irradiance comes, and a layout that comes meanwhile has none: the last stays.
+   */
+  updateRange(): void {
+    if (!this.autoRange) return;
+    const { uniforms, layouts } = this.picture;
+    const mode = this.picture.mode();
+    const isUnshot = mode?.quantity === 'unshot';
+    const isOfLight = isUnshot || mode?.quantity === 'irradiance';
+    const set = isOfLight ? layouts.shown?.set : layouts.shownData;
+    const range = set?.range() ?? (isUnshot ? this.lightRange : undefined);
+    if (!range) return;
+    if (isOfLight) this.lightRange = range;
+    const [low, high] = range;
+    const darkest = isUnshot ? LEAST_UNSHOT * high : mode?.id === 'radiosity' ? DARKEST * low : low;
+    uniforms.all.falseRange.value.set(darkest, high);
+  }
+
+  /** What changes during a pause is measured after it: the last tiles of a solve, too. */
+  private measureRange(now: number): void {
+    if (!this.rangeDue || now - this.lastRange < MEASURE_EVERY_MS) return;
+    this.lastRange = now;
+    this.rangeDue = false;
+    if (!this.picture.uniforms.all.falseColour.value) return;
+    this.updateRange();
+    this.picture.redraw();
+  }
+
+  private measureExposure(now: number): void {
+    const { unknown, automatic } = this.exposure;
+    const share = Math.min(MOST_PAUSE_MS, MEASURE_SHARE * this.exposure.tookMs);
+    const pause = unknown ? 0 : Math.max(MEASURE_EVERY_MS, share);
+    if (!this.exposureDue || now - this.lastMeasure < pause) return;
+    const { covered, complete, waiting } = this.picture.layouts.shown?.set ?? {};
+    if (!this.gate.mayMeasure(now, covered === true, complete === true && waiting === 0)) return;
+    this.lastMeasure = now;
+    if (unknown && this.guessExposure(now)) return; // and the card has the first light itself to draw
+    this.exposureDue = false;
+    if (automatic && (unknown || !this.picture.mode()?.flat)) void this.measureNow().then(() => this.picture.redraw());
+  }
+
+  private guessExposure(now: number): boolean {
+    const { shown } = this.picture.layouts;
+    const guess = shown && exposureByRays(shown, this.picture.camera);
+    if (guess === undefined) return false;
+    this.exposure.guess(guess);
+    this.gate.turn(now, false);
+    this.picture.redraw();
+    return true;
+  }
+
+  private measureNow(): Promise<void> {
+    const { world, camera } = this.picture;
+    return this.picture.withoutSigns(() => this.exposure.measure(world, camera));
+  }
+}
