@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <numeric>
 #include <queue>
 
 #include "common/clones.h"
@@ -20,11 +21,13 @@ constexpr std::uint32_t kMostTimes = 4;
 /// The square of the error of n rays falls as n^-1.3: measured in three rooms, from 4 to 64 rays (Sobol's points; the
 /// edges of what is seen keep it from n^-1.5).
 constexpr double kFall = 1.3;
+/// Rays that know the level of all light this badly are few, or there is next to none.
+constexpr double kMostOff = 0.25;
 /// The residual that is left, of all that is gathered: far below any sampling error.
 constexpr double kSolved = 1e-6;
 constexpr int kMaxSweeps = 400;
 /// Of a leaf in each half, doubles: what GMRES keeps, and the sweeps; and what there is of its light, floats.
-constexpr std::size_t kVectors = 3 * (Gmres::kRestart + 3) + 3 * 4, kLights = 5 * 3;
+constexpr std::size_t kVectors = 3 * (Gmres::kRestart + 3) + 3 * 4, kLights = 5 * 3 + 2;
 
 template <typename Light>
 __attribute__((always_inline)) inline void add(Light& sum, const Light& light) {
@@ -48,7 +51,7 @@ RADIOSITY_CLONES void averageSeen(const LeafSights& sights, std::size_t half, co
 
 LeafGather::LeafGather(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed,
                        std::size_t most_bytes)
-    : patches_(patches), sights_(patches, sides, seed), most_bytes_(most_bytes) {
+    : sights_(patches, sides, seed), most_bytes_(most_bytes), sides_(sides) {
   for (const auto& side : sides) {
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
       area_.push_back(static_cast<double>(patches.node_area[side.first_node + leaf]));
@@ -74,7 +77,9 @@ bool LeafGather::advance(double seconds) {
   const auto start = std::chrono::steady_clock::now();
   const auto spent = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); };
   if (stage_ == Stage::kTracing) {
+    const bool traced = sights_.isTraced() && !lost_[0].empty();
     if (!sights_.trace(seconds)) return false;
+    if (!traced) weighRays();
     inBothHalves([&](std::size_t half) { takeLight(half); });
     stage_ = Stage::kSolving;
   }
@@ -161,14 +166,79 @@ void LeafGather::sweep(std::size_t h, Gmres::Vectors& x, bool affine) {
   }
 }
 
-/// The last affine sweep's: `radiosity` is what it carried.
+/// How much of their light leaves lose, and which sides see each other, if over others.
+void LeafGather::weighRays() {
+  const auto counts = sights_.counts();
+  part_.resize(sides_.size());
+  std::iota(part_.begin(), part_.end(), 0U);
+  const auto root = [&](std::uint32_t side) {
+    while (part_[side] != side) side = part_[side] = part_[part_[side]];
+    return side;
+  };
+  for (auto& lost : lost_) lost.assign(sights_.leafCount(), {});
+  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
+    for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
+      for (std::size_t half = 0; half < 2; ++half) {
+        std::uint32_t escaped = 0, absorbed = 0;
+        for (const auto end : sights_.seen(half, v)) {
+          escaped += end == sights_.escaped() ? 1 : 0;
+          absorbed += end == sights_.absorbed() ? 1 : 0;
+          if (end >= sights_.leafCount()) continue;
+          const auto a = root(s), b = root(sights_.sideOf(end));
+          part_[std::max(a, b)] = std::min(a, b);
+        }
+        const float one = counts[v] > 0 ? 1.0F / static_cast<float>(counts[v]) : 0.0F;
+        lost_[half][v] = {static_cast<float>(escaped) * one, static_cast<float>(absorbed) * one};
+      }
+    }
+  }
+  for (std::uint32_t s = 0; s < sides_.size(); ++s) part_[s] = root(s);
+}
+
+/// By part of the scene and channel: what x is to be multiplied by, so that
+/// sum a x = sum a h (r + rho x), h being the part of a leaf's light that other leaves get.
+std::vector<std::array<double, 3>> LeafGather::levels(std::size_t h) const {
+  struct Sum {
+    double left = 0.0, kept = 0.0;
+  };
+  std::vector<std::array<Sum, 3>> sums(sides_.size());
+  const auto& solution = halves_[h].gmres.solution();
+  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
+    auto& sum = sums[part_[s]];
+    for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
+      const double sends = 1.0 - static_cast<double>(lost_[h][v].escaped) - static_cast<double>(lost_[h][v].absorbed);
+      for (std::size_t c = 0; c < 3 && area_[v] > 0.0; ++c) {
+        const double reflectance = static_cast<double>(light_.reflectance[v][static_cast<int>(c)]);
+        sum[c].left += area_[v] * sends * halves_[h].source[v][c];
+        sum[c].kept += area_[v] * (1.0 - sends * reflectance) * solution[c][v];
+      }
+    }
+  }
+  std::vector<std::array<double, 3>> levels(sides_.size(), {1.0, 1.0, 1.0});
+  for (std::size_t p = 0; p < sums.size(); ++p) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double level = sums[p][c].left / sums[p][c].kept;
+      if (std::abs(level - 1.0) < kMostOff) levels[p][c] = level;
+    }
+  }
+  return levels;
+}
+
 void LeafGather::take(std::size_t h) {
+  const auto levels = this->levels(h);
   const auto& solution = halves_[h].gmres.solution();
   auto& gathered = gathered_[h];
-  gathered.resize(sights_.leafCount());
-  for (std::size_t v = 0; v < gathered.size(); ++v)
-    gathered[v] = {static_cast<float>(solution[0][v]), static_cast<float>(solution[1][v]),
-                   static_cast<float>(solution[2][v])};
+  gathered.assign(sights_.leafCount(), glm::vec3(0.0F));
+  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
+    for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
+      for (std::size_t c = 0; c < 3; ++c) {
+        const auto i = static_cast<int>(c);
+        const double arrives = levels[part_[s]][c] * solution[c][v];
+        gathered[v][i] = static_cast<float>(arrives);
+        halves_[h].radiosity[v][c] = halves_[h].source[v][c] + static_cast<double>(light_.reflectance[v][i]) * arrives;
+      }
+    }
+  }
 }
 
 /// What the rays of both halves make of the same light: light that differs is not theirs.
@@ -197,17 +267,14 @@ void LeafGather::weighNoise() {
 /// its light does.
 void LeafGather::weighLost() {
   escaped_ = absorbed_ = {};
-  const auto counts = sights_.counts();
-  for (std::uint32_t v = 0; v < sights_.leafCount(); ++v) {
-    for (std::size_t half = 0; half < 2; ++half) {
-      const auto seen = sights_.seen(half, v);
-      const auto escaped = std::ranges::count(seen, sights_.escaped());
-      const auto absorbed = std::ranges::count(seen, sights_.absorbed());
-      if (escaped + absorbed == 0) continue;
+  for (std::size_t half = 0; half < 2; ++half) {
+    for (std::uint32_t v = 0; v < sights_.leafCount(); ++v) {
+      const auto& lost = lost_[half][v];
+      if (lost.escaped + lost.absorbed <= 0.0F) continue;
       for (std::size_t c = 0; c < 3; ++c) {
-        const double flux = 0.5 * area_[v] * halves_[half].radiosity[v][c] / counts[v];
-        escaped_[c] += flux * static_cast<double>(escaped);
-        absorbed_[c] += flux * static_cast<double>(absorbed);
+        const double flux = 0.5 * area_[v] * halves_[half].radiosity[v][c];
+        escaped_[c] += flux * static_cast<double>(lost.escaped);
+        absorbed_[c] += flux * static_cast<double>(lost.absorbed);
       }
     }
   }

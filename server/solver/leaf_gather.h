@@ -9,7 +9,10 @@
 // costs less than an image of all of them from each. Rays see leaves as they are, so that nothing varies within a
 // shooter, and what is near, or half hidden, needs no care of its own.
 //
-// Solved by GMRES. Two independent halves of the rays give two independent solutions; where their difference is worth
+// Solved by GMRES. What is sent and does not leave the scene arrives: of each part of the scene that sees nothing of the
+// others the level of x, which rays know to a thousandth or so, is the one that makes it so.
+//
+// Two independent halves of the rays give two independent solutions; where their difference is worth
 // more rays than it is elsewhere, leaves get more. Owned by LinkedSolver; one thread outside of the calls.
 #pragma once
 
@@ -99,15 +102,23 @@ class LeafGather {
   void average(std::size_t half, const std::vector<Light>& radiosity, std::vector<Light>& mean) const;
   void sweep(std::size_t half, Gmres::Vectors& x, bool affine);
   void take(std::size_t half);
+  void weighRays();
+  [[nodiscard]] std::vector<std::array<double, 3>> levels(std::size_t half) const;
   void weighNoise();
   void weighLost();
   void finish();
 
-  const scene::PatchScene& patches_;
   LeafSights sights_;
   std::size_t most_bytes_;
   bool has_gathered_ = false;
+  const std::vector<Side>& sides_;
   std::vector<double> area_;  ///< by leaf value
+  // Of the rays that there are:
+  struct Lost {
+    float escaped = 0.0F, absorbed = 0.0F;  ///< parts of a leaf's rays
+  };
+  std::array<std::vector<Lost>, 2> lost_;  ///< by half and leaf value
+  std::vector<std::uint32_t> part_;        ///< by side: which part of the scene, whose number is that of a side
   LeftLight light_;
   Stage stage_ = Stage::kDone;
   std::array<Half, 2> halves_;

@@ -30,6 +30,7 @@ class LeafRays {
   /// O(n log n) in triangles. Both are to outlive it.
   LeafRays(const scene::PatchScene& patches, const std::vector<Side>& sides);
 
+  [[nodiscard]] std::uint32_t indexOfSide(std::uint32_t value) const { return side_of_value_[value]; }
   [[nodiscard]] const Side& sideOf(std::uint32_t value) const { return sides_[side_of_value_[value]]; }
   /// Unit box squared: what is covered and not buried.
   [[nodiscard]] double areaOf(std::uint32_t value) const;

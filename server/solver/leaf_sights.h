@@ -26,6 +26,9 @@ class LeafSights {
   [[nodiscard]] std::uint32_t absorbed() const { return leaf_count_; }
   [[nodiscard]] std::uint32_t escaped() const { return leaf_count_ + 1; }
 
+  /// Index of the side of a leaf.
+  [[nodiscard]] std::uint32_t sideOf(std::uint32_t value) const { return rays_.indexOfSide(value); }
+
   /// How many rays each half of a leaf has, by leaf value; 0 where it has no area.
   [[nodiscard]] std::span<const std::uint16_t> counts() const { return count_; }
   /// As many as this, or more than there are; leaves without area have none all the same. They are traced by trace().

@@ -48,6 +48,7 @@ class LinkPlanner {
   void inherit(const LinkPlanner& former, const std::vector<std::uint32_t>& side_after) {
     draws_.inherit(former.draws_, side_after);
     share_ = former.share_;
+    least_radiosity_ = former.least_radiosity_;
     counters_ = former.counters_;
   }
 
@@ -109,7 +110,7 @@ class LinkPlanner {
   /// What its choices depend on, beside the system and the settings.
   template <typename Archive, typename Self>
   static void visit(Archive& archive, Self& self) {
-    archive(self.counters_, self.share_, self.left_out_);
+    archive(self.counters_, self.share_, self.least_radiosity_, self.left_out_);
   }
 
  private:

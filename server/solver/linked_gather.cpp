@@ -14,12 +14,16 @@ namespace {
 constexpr double kShotLeaf = 0.02, kShotTriangle = 13.0, kRayLevel = 0.05;
 /// Samples of reflected light that links take to 2 %, by surface, and rays of a leaf. Further down both grow alike.
 constexpr double kFewestShots = 550.0, kShotsASurface = 3.0, kRaysALeaf = 128.0;
+/// Where there are fewer surfaces links are few, and each is exact.
+constexpr std::size_t kFewestSurfaces = 64;
 /// An image of a lamp, beside one of a node.
 constexpr double kLightShot = 2.0;
 /// What shines so many times as bright as all does in the mean is worth links: rays find what is small too seldom.
 constexpr double kBright = 4.0;
 /// A round ends where it is likely to bring the error to this part of the target: what it goes by is uncertain.
 constexpr double kAim = 0.85;
+/// And of its square this is left for rays and samples, whatever else there is.
+constexpr double kLeastRoom = 0.1;
 /// The part of the room that either of rays and samples gets is found to one in so many.
 constexpr int kParts = 32;
 
@@ -36,6 +40,8 @@ double LinkedSolver::rayCost() const {
 
 bool LinkedSolver::raysPay() const {
   const auto leaves = system_.emission().size();
+  if (settings_.reflected == SolverSettings::Reflected::kChosen && patches_->surfaces.size() < kFewestSurfaces)
+    return false;
   if (LeafGather::leastBytes(leaves) > settings_.link_memory / 2) return false;
   if (settings_.reflected != SolverSettings::Reflected::kChosen)
     return settings_.reflected == SolverSettings::Reflected::kByRays;
@@ -122,8 +128,8 @@ StepOutcome LinkedSolver::chooseRays() {
     return StepOutcome::kRoundDone;
   }
   const double aim = kAim * targetOfLinks(), rest = error_.residual;
-  const double room = aim * aim - rest * rest;
-  if (room <= 0.0 || by_links_ * by_links_ <= room) return exhausted(SolveLimit::kWithin);
+  const double room = std::max(aim * aim - rest * rest, kLeastRoom * aim * aim);
+  if (by_links_ * by_links_ <= room) return exhausted(SolveLimit::kWithin);
   const double rays = raysError() * raysError(), links = std::max(0.0, by_links_ * by_links_ - rays);
   const double rays_cost = static_cast<double>(gather_->rays()) * rayCost(), links_cost = samplesCost();
   double best = HUGE_VAL, part = 0.0;
