@@ -23,8 +23,8 @@ constexpr std::uint32_t kMostTimes = 4;
 constexpr double kFall = 1.3;
 /// Rays that know the level of all light this badly are few, or there is next to none.
 constexpr double kMostOff = 0.25;
-/// The residual that is left, of all that is gathered: far below any sampling error.
-constexpr double kSolved = 1e-6;
+/// The residual that is left, of all that is gathered: far below any sampling error, and the level is right anyway.
+constexpr double kSolved = 1e-5;
 constexpr int kMaxSweeps = 400;
 /// Of a leaf in each half, doubles: what GMRES keeps, and the sweeps; and what there is of its light, floats.
 constexpr std::size_t kVectors = 3 * (Gmres::kRestart + 3) + 3 * 4, kLights = 5 * 3 + 2;

@@ -21,7 +21,7 @@ constexpr double kLightShot = 2.0;
 /// What shines so many times as bright as all does in the mean is worth links: rays find what is small too seldom.
 constexpr double kBright = 4.0;
 /// A round ends where it is likely to bring the error to this part of the target: what it goes by is uncertain.
-constexpr double kAim = 0.85;
+constexpr double kAim = 0.9;
 /// And of its square this is left for rays and samples, whatever else there is.
 constexpr double kLeastRoom = 0.1;
 /// The part of the room that either of rays and samples gets is found to one in so many.
