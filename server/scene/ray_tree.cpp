@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <limits>
 
 #include "common/clones.h"
@@ -16,8 +17,8 @@ constexpr std::size_t kStackDepth = 512;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 /// By which boxes grow (unit box): by more than rounding moves their sides, and where a ray meets them.
 constexpr float kGrowth = 2e-6F;
-/// By which triangles grow, of their edges.
-constexpr float kEdge = 1e-6F;
+/// By which triangles grow, as a ray sees them (unit box): by more than rounding moves it past their edges.
+constexpr float kEdge = 5e-7F;
 /// Instead of the component of a direction that is 0.
 constexpr float kLeast = 1e-20F;
 
@@ -85,8 +86,9 @@ __attribute__((always_inline)) inline void RayTree::meetTriangles(const Block& b
     const float qx = sy * a[2][k] - sz * a[1][k], qy = sz * a[0][k] - sx * a[2][k], qz = sx * a[1][k] - sy * a[0][k];
     const float v = (dx * qx + dy * qy + dz * qz) * inverse;
     const float at = (b[0][k] * qx + b[1][k] * qy + b[2][k] * qz) * inverse;
+    const float edge = block.slack[k] * std::abs(inverse);
     // Empty lanes, of no area: not a number, so no hit.
-    const bool hit = (u >= -kEdge) & (v >= -kEdge) & (u + v <= 1.0F + kEdge) & (at > 0.0F);
+    const bool hit = (u >= -edge) & (v >= -edge) & (u + v <= 1.0F + edge) & (at > 0.0F);
     t[k] = hit ? at : kInfinity;
     turn[k] = determinant;
   }
@@ -165,6 +167,7 @@ std::uint32_t RayTree::addBlock(const Bvh& tree, std::uint32_t first, std::uint3
       block.edge1[axis][k] = b[i] - a[i];
       block.edge2[axis][k] = c[i] - a[i];
     }
+    block.slack[k] = kEdge * std::max(glm::length(b - a), glm::length(c - a));
     block.triangle[k] = tree.order_[first + k];
   }
   blocks_.push_back(block);

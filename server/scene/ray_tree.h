@@ -31,6 +31,7 @@ class RayTree {
   };
   struct alignas(32) Block {
     std::array<std::array<float, kWidth>, 3> corner, edge1, edge2;
+    std::array<float, kWidth> slack;  ///< by which it grows, times the longer edge
     std::array<std::uint32_t, kWidth> triangle;
   };
   static constexpr std::uint32_t kLeaf = 1U << 31U;

@@ -129,9 +129,10 @@ void LeafGather::takeLight(std::size_t h) {
     area += area_[v];
     for (std::size_t c = 0; c < 3; ++c) {
       const auto i = static_cast<int>(c);
-      const double left = static_cast<double>(light_.emission[v][i]) +
-                          static_cast<double>(light_.reflectance[v][i]) * static_cast<double>(light_.irradiance[h][v][i]) -
-                          static_cast<double>(light_.shot[h][v][i]);
+      const double left =
+          static_cast<double>(light_.emission[v][i]) +
+          static_cast<double>(light_.reflectance[v][i]) * static_cast<double>(light_.irradiance[h][v][i]) -
+          static_cast<double>(light_.shot[h][v][i]);
       half.source[v][c] = left;
       shining[c] += area_[v] * std::abs(left);
     }
@@ -329,15 +330,15 @@ bool LeafGather::refine(double goal) {
   }
   if (!any) return false;
   std::vector<std::uint16_t> asked(counts.begin(), counts.end());
-  for (std::uint32_t v = 0; v < asked.size(); ++v)
-    asked[v] = static_cast<std::uint16_t>(asked[v] * times[v / kBlock]);
+  for (std::uint32_t v = 0; v < asked.size(); ++v) asked[v] = static_cast<std::uint16_t>(asked[v] * times[v / kBlock]);
   sights_.ask(asked);
   return true;
 }
 
 void LeafGather::save(ArchiveWriter& to) const {
   const auto counts = sights_.counts();
-  to(has_gathered_, std::vector<std::uint16_t>(counts.begin(), counts.end()), noise_, block_noise_, escaped_, absorbed_);
+  to(has_gathered_, std::vector<std::uint16_t>(counts.begin(), counts.end()), noise_, block_noise_, escaped_,
+     absorbed_);
 }
 
 bool LeafGather::restore(ArchiveReader& from) {
@@ -347,7 +348,8 @@ bool LeafGather::restore(ArchiveReader& from) {
   std::size_t all = 0;
   for (const auto count : counts) all += count;
   if (!from.ok() || counts.size() != sights_.leafCount() || !std::ranges::all_of(counts, fits) ||
-      all * LeafSights::kRayBytes > most_bytes_ || (!block_noise_.empty() && block_noise_.size() != (counts.size() + kBlock - 1) / kBlock))
+      all * LeafSights::kRayBytes > most_bytes_ ||
+      (!block_noise_.empty() && block_noise_.size() != (counts.size() + kBlock - 1) / kBlock))
     return false;
   if (all > 0) sights_.ask(counts);
   return true;

@@ -9,8 +9,8 @@
 // costs less than an image of all of them from each. Rays see leaves as they are, so that nothing varies within a
 // shooter, and what is near, or half hidden, needs no care of its own.
 //
-// Solved by GMRES. What is sent and does not leave the scene arrives: of each part of the scene that sees nothing of the
-// others the level of x, which rays know to a thousandth or so, is the one that makes it so.
+// Solved by GMRES. What is sent and does not leave the scene arrives: of each part of the scene that sees nothing of
+// the others the level of x, which rays know to a thousandth or so, is the one that makes it so.
 //
 // Two independent halves of the rays give two independent solutions; where their difference is worth
 // more rays than it is elsewhere, leaves get more. Owned by LinkedSolver; one thread outside of the calls.
@@ -90,9 +90,9 @@ class LeafGather {
   /// Four, so that a leaf's are one vector; the last is 0.
   using Light = std::array<double, 4>;
   struct Half {
-    std::vector<Light> source;      ///< r; by what may be seen, so two more than leaves
-    std::vector<Light> radiosity;   ///< r + rho x
-    std::vector<Light> arriving;    ///< its means
+    std::vector<Light> source;     ///< r; by what may be seen, so two more than leaves
+    std::vector<Light> radiosity;  ///< r + rho x
+    std::vector<Light> arriving;   ///< its means
     Gmres gmres;
     double shining = 0.0;  ///< flux of |r|, all channels
     bool done = true;

@@ -64,7 +64,8 @@ void LeafSights::layOut(std::span<const std::uint16_t> counts) {
     seen[half].assign(all, kUntraced);
     for (std::uint32_t value = 0; value < leaf_count_; ++value)
       std::copy_n(seen_[half].begin() + static_cast<std::ptrdiff_t>(first_[value]),
-                  std::min(count_[value], count[value]), seen[half].begin() + static_cast<std::ptrdiff_t>(first[value]));
+                  std::min(count_[value], count[value]),
+                  seen[half].begin() + static_cast<std::ptrdiff_t>(first[value]));
   }
   count_ = std::move(count);
   first_ = std::move(first);
@@ -127,8 +128,8 @@ bool LeafSights::trace(double seconds) {
 bool LeafSights::isPassed(const Shadows& change, std::uint32_t value, const glm::dvec4& draw) const {
   const auto place = rays_.placeOn(value, {draw.z, draw.w});
   const auto direction = cosineDirection(place.normal, draw.x, draw.y);
-  return std::ranges::any_of(
-      change.change().boxes, [&](const scene::ChangedBox& box) { return meetsBox(box, place.position, direction); });
+  return std::ranges::any_of(change.change().boxes,
+                             [&](const scene::ChangedBox& box) { return meetsBox(box, place.position, direction); });
 }
 
 void LeafSights::inherit(const LeafSights& former, std::span<const std::uint32_t> value_before, const Shadows& change) {

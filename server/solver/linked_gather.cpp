@@ -13,7 +13,7 @@ namespace {
 // ray: by level of the tree.
 constexpr double kShotLeaf = 0.02, kShotTriangle = 13.0, kRayLevel = 0.05;
 /// Samples of reflected light that links take to 2 %, by surface, and rays of a leaf. Further down both grow alike.
-constexpr double kFewestShots = 550.0, kShotsASurface = 3.0, kRaysALeaf = 128.0;
+constexpr double kFewestShots = 1200.0, kShotsASurface = 3.0, kRaysALeaf = 128.0;
 /// Where there are fewer surfaces links are few, and each is exact.
 constexpr std::size_t kFewestSurfaces = 64;
 /// An image of a lamp, beside one of a node.

@@ -201,7 +201,8 @@ Result<StepOutcome> LinkedSolver::advance() {
     wanted_ = plan();
     measured_ = 0;
     const bool dark = phase_ == Phase::kLights && net_unshot_ + varying_ <= 0.0;
-    if (wanted_.empty() && phase_ == Phase::kImprove && !(gather_ && gather_->isBehind()))  // no sample that there is room for can lower the error
+    if (wanted_.empty() && phase_ == Phase::kImprove &&
+        !(gather_ && gather_->isBehind()))  // no sample that there is room for can lower the error
       return exhausted(memory_.lacksSamples() || memory_.isFull() ? SolveLimit::kLinkMemory : SolveLimit::kPatches);
     if (wanted_.empty() && (dark || phase_ == Phase::kGrow)) return finishRound();
   }

@@ -79,6 +79,8 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] std::size_t lightBytes() const;
   /// What is remembered.
   [[nodiscard]] const LinkSystem& system() const { return system_; }
+  /// The rays that reflected light comes by; null: it comes over links, or is not there yet.
+  [[nodiscard]] const LeafGather* gathered() const { return gather_.get(); }
 
  private:
   /// Short enough that nobody notices the wait, long enough that the workers' waiting for the last of them does not
@@ -222,18 +224,18 @@ class LinkedSolver final : public Solver {
   LinkMemory memory_;
   UnshotPyramid unshot_;
   LinkPlanner planner_;
-  bool by_rays_ = false;                              // reflected light, but for what is bright and small
-  std::unique_ptr<LeafGather> gather_;                // then: once lights, and that, are measured
-  double sample_goal_ = 0.0;                          // sampling error that further samples of links shall reach; 0: none
-  std::vector<Repair> repairs_;                       // after an edit of geometry
-  std::size_t repaired_ = 0;                          // of these
-  std::size_t due_ = 0;                               // of these, before anything else is done
-  double postponed_ = 0.0;                            // part of the target error that the others may cause
-  double roughness_ = 0.0;                            // likewise: lights that look again with some points only
-  bool lights_may_be_rough_ = true;                   // that they may
-  double norm_before_ = 0.0;                          // of irradiance before the edit; 0: not known
-  std::unique_ptr<Shadows> shadows_;                  // of the edit
-  std::unique_ptr<Shadows> earlier_shadows_;          // and of those before it, for links that no edit saw taken again
+  bool by_rays_ = false;                      // reflected light, but for what is bright and small
+  std::unique_ptr<LeafGather> gather_;        // then: once lights, and that, are measured
+  double sample_goal_ = 0.0;                  // sampling error that further samples of links shall reach; 0: none
+  std::vector<Repair> repairs_;               // after an edit of geometry
+  std::size_t repaired_ = 0;                  // of these
+  std::size_t due_ = 0;                       // of these, before anything else is done
+  double postponed_ = 0.0;                    // part of the target error that the others may cause
+  double roughness_ = 0.0;                    // likewise: lights that look again with some points only
+  bool lights_may_be_rough_ = true;           // that they may
+  double norm_before_ = 0.0;                  // of irradiance before the edit; 0: not known
+  std::unique_ptr<Shadows> shadows_;          // of the edit
+  std::unique_ptr<Shadows> earlier_shadows_;  // and of those before it, for links that no edit saw taken again
   std::uint32_t key_end_ = 0, triangle_key_end_ = 0;  // keys of sides that never were
   std::uint64_t affected_ = 0;
   LinkCounters edits_;  // what repairs add to linkCounters()
@@ -253,17 +255,17 @@ class LinkedSolver final : public Solver {
   double left_out_ = 0.0;             // relative error by nodes too weak to play roulette
   std::uint32_t rounds_ = 0;
   std::uint64_t solutions_ = 0, sweeps_ = 0, replayed_ = 0;
-  double varying_ = 0.0, net_unshot_ = 0.0;        // flux, all channels
-  double varying_share_ = 0.0;                     // of the residual, what light that varies inside shooters causes
-  std::array<std::vector<glm::vec3>, 2> half_;     // irradiance by leaf value
+  double varying_ = 0.0, net_unshot_ = 0.0;           // flux, all channels
+  double varying_share_ = 0.0;                        // of the residual, what light that varies inside shooters causes
+  std::array<std::vector<glm::vec3>, 2> half_;        // irradiance by leaf value
   std::array<std::vector<glm::vec3>, 2> over_links_;  // of a new solution, while what rays bring is solved for
-  std::vector<glm::vec3> irradiance_;              // by node
-  std::unique_ptr<LeafVariation> variation_;       // once little else is in error
-  std::unique_ptr<LeafVariation> next_variation_;  // after an edit of geometry, until then
-  std::vector<glm::vec3> corrected_;               // irradiance by node, with what leaves lack; empty: nothing
-  bool refined_ = false;                           // more paths were traced: what is next is to be chosen anew
-  double square_ = 0.0;                            // of the light that it was brought up to date with, times area
-  double by_links_ = 0.0;                          // sampling error without the noise of that
+  std::vector<glm::vec3> irradiance_;                 // by node
+  std::unique_ptr<LeafVariation> variation_;          // once little else is in error
+  std::unique_ptr<LeafVariation> next_variation_;     // after an edit of geometry, until then
+  std::vector<glm::vec3> corrected_;                  // irradiance by node, with what leaves lack; empty: nothing
+  bool refined_ = false;                              // more paths were traced: what is next is to be chosen anew
+  double square_ = 0.0;                               // of the light that it was brought up to date with, times area
+  double by_links_ = 0.0;                             // sampling error without the noise of that
   ErrorParts error_;
   TransportCounters counters_;
 };

@@ -1,19 +1,12 @@
 // Links that an edit of geometry leaves alone, or mends in parts, are those that measuring all of them again finds.
+#include "tests/gl/geometry_edit_fixture.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
-#include <glm/geometric.hpp>
-#include <memory>
-#include <nlohmann/json.hpp>
 #include <vector>
 
-#include "server/gpu/gpu_transport.h"
-#include "server/scene/document.h"
-#include "server/scene/lineage.h"
-#include "server/solver/linked_solver.h"
-#include "tests/scenes/glb_writer.h"
-#include "tests/scenes/scenes.h"
 #include "tests/unit/engine/block_room.h"
 
 namespace radiosity {
@@ -21,136 +14,8 @@ namespace {
 
 using nlohmann::json;
 using solver::LinkedSolver;
-using solver::StepOutcome;
-
-struct Built {
-  scene::Document document;
-  scene::Scene scene;
-  std::shared_ptr<const scene::PatchScene> patches;
-  scene::PatchMaterials materials;
-};
-
-class GeometryEdit : public testing::Test {
- protected:
-  static constexpr std::uint64_t kTexels = 1500;
-
-  void start(const test_scenes::TestScene& scene) {
-    before_.document = scene::parseDocument("room.glb", test_scenes::encodeGlb(scene)).value();
-    before_.scene = scene::importScene(before_.document).value();
-    build(before_, nullptr);
-    transport_ = gpu::makeInProcessTransport().value();
-    settings_.target_error = 0.05;
-  }
-
-  static void build(Built& built, const Built* former) {
-    scene::ChartOptions charts;
-    charts.texel_budget = kTexels;
-    std::optional<scene::FormerScene> old;
-    if (former != nullptr) old.emplace(scene::FormerScene{former->scene, *former->patches});
-    built.patches = std::make_shared<const scene::PatchScene>(
-        scene::buildPatchScene(built.scene, charts, old ? &*old : nullptr).value());
-    built.materials = scene::shadePatches(built.scene, *built.patches);
-  }
-
-  Built edited(const Built& from, const json& patch) const {
-    auto edit = scene::editDocument(from.document, patch).value();
-    Built built{std::move(edit.document), std::move(edit.scene), nullptr, {}};
-    build(built, &from);
-    return built;
-  }
-
-  static void finish(LinkedSolver& solver) {
-    for (int i = 0; i < 5000; ++i) {
-      const auto outcome = solver.step();
-      ASSERT_TRUE(outcome.has_value()) << outcome.error().text();
-      if (*outcome == StepOutcome::kConverged || *outcome == StepOutcome::kExhausted) return;
-    }
-    FAIL() << "no end";
-  }
-
-  /// Until all links are true and light is solved for over them.
-  static void settle(LinkedSolver& solver) {
-    while (true) {
-      const auto outcome = solver.step();
-      ASSERT_TRUE(outcome.has_value()) << outcome.error().text();
-      if (*outcome != StepOutcome::kSlice) return;
-    }
-  }
-
-  std::unique_ptr<LinkedSolver> solved(const Built& built) {
-    EXPECT_TRUE(transport_->setScene(built.patches));
-    auto solver = std::make_unique<LinkedSolver>(built.patches, built.materials, *transport_, settings_);
-    finish(*solver);
-    return solver;
-  }
-
-  std::unique_ptr<LinkedSolver> successor(LinkedSolver& former, const Built& after, const scene::PatchMap& map) {
-    EXPECT_TRUE(transport_->setScene(after.patches));
-    auto solver = std::make_unique<LinkedSolver>(after.patches, after.materials, *transport_, settings_,
-                                                 solver::LightSources{}, former, map);
-    solver->beExact();
-    settle(*solver);
-    return solver;
-  }
-
-  static scene::PatchMap mapOf(const Built& before, const Built& after) {
-    return scene::matchPatches(before.scene, *before.patches, after.scene, *after.patches);
-  }
-
-  /// Links are kept as 16 bits: 2^-12, twice over where their unit was another.
-  static void expectSameLinks(const LinkedSolver& mended, const LinkedSolver& measured,
-                              const scene::PatchScene& patches) {
-    const auto &a = mended.system().shooters(), &b = measured.system().shooters();
-    ASSERT_EQ(a.size(), b.size());
-    const auto sides = solver::makeSides(patches);
-    std::size_t differ = 0, compared = 0;
-    for (std::size_t n = 0; n < a.size(); ++n) {
-      for (std::size_t half = 0; half < 2; ++half) {
-        const auto &x = a[n].column[half], &y = b[n].column[half];
-        ASSERT_EQ(x.points(), y.points()) << n;
-        EXPECT_NEAR(x.escaped(), y.escaped(), 1e-9);
-        EXPECT_NEAR(x.absorbed(), y.absorbed(), 1e-9);
-        EXPECT_NEAR(x.gain(), y.gain(), 1e-3);
-        for (const auto& side : sides) {
-          std::vector<float> u(side.leaf_count, 0.0F), v(side.leaf_count, 0.0F);
-          (void)x.decode(side.first_value, u);
-          (void)y.decode(side.first_value, v);
-          for (std::size_t i = 0; i < u.size(); ++i) {
-            ++compared;
-            if (std::abs(u[i] - v[i]) > 0.0015F * std::max(u[i], v[i]) + 1e-6F) ++differ;
-          }
-        }
-      }
-    }
-    EXPECT_GT(compared, 100'000U);
-    EXPECT_EQ(differ, 0U) << "of " << compared;
-  }
-
-  /// The same edit twice: mended, and with everything measured again.
-  void expectMendedIsMeasured(const json& patch) {
-    SCOPED_TRACE(patch.dump());
-    const auto after = edited(before_, patch);
-    const auto first = solved(before_), second = solved(before_);
-    const auto map = mapOf(before_, after);
-    const auto mended = successor(*first, after, map);
-    auto all = map;
-    std::fill(all.leaf_altered.begin(), all.leaf_altered.end(), true);
-    const auto measured = successor(*second, after, all);
-    const auto counters = mended->linkCounters(), everything = measured->linkCounters();
-    EXPECT_GT(counters.repaired, 0U);
-    EXPECT_LT(everything.repaired, 10U) << "only lights, for all leaves";
-    EXPECT_LT(counters.retaken, everything.retaken);
-    expectSameLinks(*mended, *measured, *after.patches);
-  }
-
-  Built before_;
-  std::unique_ptr<solver::Transport> transport_;
-  solver::SolverSettings settings_;
-};
-
-json replaced(const std::string& path, json value) {
-  return json::array({{{"op", "replace"}, {"path", path}, {"value", std::move(value)}}});
-}
+using test::GeometryEdit;
+using test::replaced;
 
 TEST_F(GeometryEdit, MovesMendTheLinksThatMeasuringAllFinds) {
   start(test::blockRoom());
@@ -183,34 +48,9 @@ TEST_F(GeometryEdit, WhatStandsBesideAWallMendsTheLinksThatMeasuringAllFinds) {
   expectMendedIsMeasured(replaced("/nodes/2/translation", {0.3105, 0.03, 0.6}));
 }
 
-/// A room full of chairs, of which one is moved.
-class ChairEdit : public GeometryEdit {
+class ChairEdit : public test::ChairRoom {
  protected:
-  void SetUp() override {
-    for (const auto& [name, make] : test_scenes::allScenes()) {
-      if (name == "room_small") start(make());
-    }
-    const auto& nodes = before_.document.gltf["nodes"];
-    for (std::size_t n = 0; n < nodes.size(); ++n) {
-      auto at = nodes[n].value("translation", json::array());
-      if (nodes[n].value("name", "") != "chair1") continue;
-      at[0] = at[0].get<double>() + 0.15;
-      move_ = replaced("/nodes/" + std::to_string(n) + "/translation", at);
-    }
-  }
-
-  /// Area-weighted RMS, relative to that of `b`.
-  static double difference(const LinkedSolver& a, const LinkedSolver& b, const scene::PatchScene& patches) {
-    double sum = 0.0, scale = 0.0;
-    for (const auto& side : solver::makeSides(patches)) {
-      for (auto node = side.first_node; node < side.first_node + side.leaf_count; ++node) {
-        const glm::dvec3 d(a.irradiance()[node] - b.irradiance()[node]), v(b.irradiance()[node]);
-        sum += static_cast<double>(patches.node_area[node]) * glm::dot(d, d);
-        scale += static_cast<double>(patches.node_area[node]) * glm::dot(v, v);
-      }
-    }
-    return std::sqrt(sum / scale);
-  }
+  ChairEdit() { settings_.reflected = solver::SolverSettings::Reflected::kByLinks; }
 
   /// Links of lights that differ.
   static std::size_t unlikeLights(const LinkedSolver& a, const LinkedSolver& b, const scene::PatchScene& patches) {
@@ -229,8 +69,6 @@ class ChairEdit : public GeometryEdit {
     }
     return differ;
   }
-
-  json move_;
 };
 
 TEST_F(ChairEdit, MendsTheLinksThatMeasuringAllFinds) {
