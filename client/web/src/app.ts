@@ -60,7 +60,7 @@ export class App {
     failed: (error) => this.onNoDocument(error),
   });
   private resume: Resume | undefined;
-  private token = readToken();
+  private token = addressedToken() ?? stored('token', 'session');
   private slow = false;
   private everOpen = false;
   private epoch = '';
@@ -161,6 +161,10 @@ export class App {
     this.edit.start();
     document.addEventListener('visibilitychange', () => this.onVisible());
     window.addEventListener('online', () => this.connection.open());
+    window.addEventListener('hashchange', () => {
+      const token = addressedToken();
+      if (token) this.giveToken(token);
+    });
   }
 
   mark(name: string): void {
@@ -463,14 +467,14 @@ function hasScene({ state, surfaces }: Progress): boolean {
   return state !== 'empty' && (state !== 'failed' || surfaces > 0);
 }
 
-/** From the link (#token=...), where it does not stay to be seen, or from this tab's memory. */
-function readToken(): string | undefined {
+/** From the link (#token=...), where it does not stay to be seen. */
+function addressedToken(): string | undefined {
   const hash = new URLSearchParams(location.hash.slice(1));
-  const token = hash.get('token');
+  const token = hash.get('token') ?? undefined;
   if (token) {
     store('token', token, 'session');
     hash.delete('token');
     history.replaceState(null, '', `#${hash}`);
   }
-  return token ?? stored('token', 'session');
+  return token;
 }
