@@ -52,18 +52,17 @@ export class ViewSession {
   /** When the page is there. */
   start(): void {
     const { canvas } = this.app.frame;
-    const link = new URLSearchParams(location.hash.slice(1));
-    this.placed = this.app.viewer.rig.fromText(link.get('camera') ?? '');
-    this.app.frame.setWalk(this.app.viewer.rig.mode === 'walk');
+    const { rig, pagesView } = this.app.viewer;
     void this.setMode('lit');
-    this.linked = link.get('view') ?? undefined;
-    this.followLink();
-    if (link.get('ui') === '0') this.app.frame.toggleChrome();
+    this.followAddress();
+    if (addressed().get('ui') === '0') this.app.frame.toggleChrome();
+    // Somebody follows another link in the same tab, or goes back: only what stands behind the # has changed.
+    window.addEventListener('hashchange', () => this.followAddress());
     this.listenToPointer(canvas);
     listenToKeys(canvas, {
       camera: (event, down) => this.app.viewer.rig.key(event, down),
-      turn: (right, up) => this.app.viewer.rig.turn(right, up),
-      zoom: (factor) => this.app.viewer.rig.zoom(factor),
+      turn: (right, up) => (this.mode.flat ? pagesView.pan(right, up) : rig.turn(right, up)),
+      zoom: (factor) => (this.mode.flat ? pagesView.zoom(factor) : rig.zoom(factor)),
       press: (key, event) => this.press(key, event),
     });
   }
@@ -72,7 +71,22 @@ export class ViewSession {
   linkHash(): string {
     const hash = new URLSearchParams({ camera: this.app.viewer.rig.toText() });
     if (this.mode.id !== 'lit') hash.set('view', this.mode.id);
+    if (this.mode.falseColour === 'choice' && this.falseColour) hash.set('colours', 'false');
     return hash.toString();
+  }
+
+  /** To where the page's address says that one looks from, and to the view that it names. */
+  private followAddress(): void {
+    const link = addressed();
+    const { rig } = this.app.viewer;
+    if (rig.fromText(link.get('camera') ?? '')) {
+      this.placed = true;
+      this.linked = 'lit'; // which links do not name
+    }
+    this.app.frame.setWalk(rig.mode === 'walk');
+    this.linked = link.get('view') ?? this.linked;
+    if (this.linked !== undefined) this.setFalseColour(link.get('colours') === 'false');
+    this.followLink();
   }
 
   onCapabilities(): void {
@@ -333,11 +347,13 @@ export class ViewSession {
 
   private press(key: string, event: KeyboardEvent): boolean {
     const { app } = this;
-    const command = event.ctrlKey || event.metaKey;
+    // Where [ and ] are written with AltGr, some systems tell of that as of Control and Alt.
+    const isWritten = event.getModifierState('AltGraph');
+    const command = !isWritten && (event.ctrlKey || event.metaKey);
     if (command && key.toLowerCase() === 'z')
       return done(event.shiftKey ? app.edit.history.redo() : app.edit.history.undo());
     if (command && key.toLowerCase() === 'y') return done(app.edit.history.redo());
-    if (command || event.altKey) return false;
+    if (command || (event.altKey && !isWritten)) return false;
     if (key === 'Delete' || key === 'Backspace') return isAmongObjects(event.target) && done(app.edit.removeSelected());
     if (/^\d$/.test(key)) return done(this.setMode(VIEW_MODES[(Number(key) + 9) % 10]?.id ?? 'lit'));
     const actions: Record<string, () => unknown> = {
@@ -370,6 +386,10 @@ export class ViewSession {
 function alike(a: Box3, b: Box3): boolean {
   const size = a.getSize(new Vector3()).length();
   return a.min.distanceTo(b.min) + a.max.distanceTo(b.max) < 0.25 * size;
+}
+
+function addressed(): URLSearchParams {
+  return new URLSearchParams(location.hash.slice(1));
 }
 
 function done(_result: unknown): true {

@@ -1,7 +1,7 @@
 // For those who see little, have no pointer, or a small screen.
 import type { Page } from 'playwright-core';
 import type {} from '../../../client/web/src/main';
-import { converged, sceneOf, serveAll, turns, until } from './harness';
+import { converged, drawn, sceneOf, serveAll, turns, until } from './harness';
 
 const { server, pages } = serveAll('cornell.glb');
 
@@ -226,4 +226,41 @@ it('reads the light by touch, and shows what was tapped in the list', async () =
       return at.top >= list.top && at.bottom <= list.bottom;
     });
   expect(await until(seen, (is) => is)).toBe(true);
+});
+
+it('pans and zooms the pages by keys', async () => {
+  const page = await pages.open(server.url, 900, 600);
+  await converged(page);
+  await page.evaluate(() => window.viewer!.view.setMode('pages'));
+  const flat = () =>
+    page.evaluate(() => {
+      const { position, zoom } = window.viewer!.viewer.pagesView.camera;
+      return { x: position.x, y: position.y, zoom };
+    });
+  const before = await flat();
+  await page.locator('canvas.view').focus();
+  for (const key of ['ArrowRight', 'ArrowUp', '+']) await page.keyboard.press(key);
+  const after = await flat();
+  expect(after.x).toBeGreaterThan(before.x);
+  expect(after.y).toBeGreaterThan(before.y);
+  expect(after.zoom).toBeGreaterThan(before.zoom);
+  await drawn(page);
+  expect(await flat()).toEqual(after);
+  await page.keyboard.press('f');
+  expect(await flat()).toEqual(before);
+});
+
+it('takes a bracket that is written with AltGr', async () => {
+  const page = await pages.open(server.url, 900, 600);
+  await converged(page);
+  const stops = () => page.evaluate(() => window.viewer!.viewer.exposure.stops);
+  const press = (modifierAltGraph: boolean) =>
+    page.evaluate((modifierAltGraph) => {
+      const init = { key: ']', code: 'Digit9', ctrlKey: true, altKey: true, modifierAltGraph, bubbles: true };
+      document.querySelector('canvas.view')!.dispatchEvent(new KeyboardEvent('keydown', init));
+    }, modifierAltGraph);
+  await press(true);
+  expect(await stops()).toBe(0.25);
+  await press(false); // is a command of the browser or of the system
+  expect(await stops()).toBe(0.25);
 });
