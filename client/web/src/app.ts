@@ -113,7 +113,7 @@ export class App {
         toggleWalk: () => this.view.toggleWalk(),
         frameAll: () => this.view.frameAll(),
         gizmo: (mode) => this.edit.setGizmo(mode),
-        toggleMeter: () => this.view.toggleMeter(),
+        toggleMeter: () => this.view.meter.toggle(),
         addLamp: () => void this.edit.addLamp(),
         undo: () => void this.edit.history.undo(),
         redo: () => void this.edit.history.redo(),
@@ -298,6 +298,7 @@ export class App {
     const isOver = ['converged', 'timeLimit', 'limited'].includes(progress.state);
     const done = isOver && !this.isLightUnderWay(progress);
     const bad = progress.state === 'failed';
+    const isBusy = isOver || progress.state === 'solving';
     const stated = hasScene(progress) && progress.state !== 'loading';
     const error = stated ? `${percent(progress.error.total)} error` : '';
     const rate = progress.state === 'solving' ? `${readable(progress.shotsPerSecond, 2)} shots/s` : '';
@@ -307,7 +308,7 @@ export class App {
         : progress.state === 'loading' && this.viewer.shown
           ? 'First light'
           : stateName(progress.state),
-      bad ? 'bad' : done ? 'good' : isOver || progress.state === 'solving' ? 'busy' : 'idle',
+      bad ? 'bad' : done ? (progress.state === 'converged' ? 'good' : 'short') : isBusy ? 'busy' : 'idle',
       error,
       rate,
     );

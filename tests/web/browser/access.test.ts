@@ -81,7 +81,7 @@ it.each(['dark', 'light'] as const)('can be read in %s colours', async (scheme) 
     const { frame, edit, view } = window.viewer!;
     edit.selectNext(1);
     void view.setMode('irradiance');
-    view.toggleMeter();
+    view.meter.toggle();
     frame.toasts.show('A note', 'good');
     frame.toasts.show('A refusal', 'bad');
     frame.setBanner('No connection.', 'Try now', () => undefined);
@@ -263,4 +263,25 @@ it('takes a bracket that is written with AltGr', async () => {
   expect(await stops()).toBe(0.25);
   await press(false); // is a command of the browser or of the system
   expect(await stops()).toBe(0.25);
+});
+
+it('reads where the pointer is, nothing where that has left the picture, and its middle by keys', async () => {
+  const page = await pages.open(server.url, 1200, 800);
+  await converged(page);
+  const [card, mark] = [page.locator('.meter'), page.locator('.meter-mark')];
+  await page.mouse.move(400, 260);
+  await page.keyboard.press('m');
+  await card.waitFor();
+  expect(await mark.isVisible()).toBe(false); // the pointer shows what is read
+  await page.mouse.move(1100, 400);
+  await drawn(page); // light that comes is no reason to read anywhere else
+  expect(await card.isVisible()).toBe(false);
+  await page.locator('canvas.view').focus();
+  await page.keyboard.press('ArrowRight');
+  await card.waitFor();
+  const [box, around] = [(await page.locator('canvas.view').boundingBox())!, (await mark.boundingBox())!];
+  expect(Math.abs(around.x + around.width / 2 - box.x - box.width / 2)).toBeLessThan(1.5);
+  expect(Math.abs(around.y + around.height / 2 - box.y - box.height / 2)).toBeLessThan(1.5);
+  await page.keyboard.press('m');
+  expect([await card.isVisible(), await mark.isVisible()]).toEqual([false, false]);
 });

@@ -143,7 +143,22 @@ it('adds a lamp, and takes it out again', async () => {
   );
   expect(lit.nodes.at(-1)!.name).toMatch(/^lamp/);
   await page.getByLabel('Intensity, cd').waitFor();
+  // Its handles are where it shines, and it can be looked at, though it has no surface.
+  const place = lit.nodes.at(-1)!.translation;
+  const off = (what: 'handles' | 'target') =>
+    page.evaluate(
+      ({ place, what }) => {
+        const { gizmo, rig } = window.viewer!.viewer;
+        const at = (what === 'handles' ? gizmo.middle : rig.target).toArray();
+        return Math.hypot(...at.map((v, i) => v - place[i]!));
+      },
+      { place, what },
+    );
+  expect(await off('handles')).toBeLessThan(1e-3);
+  await page.keyboard.press('Shift+F');
+  expect(await off('target')).toBeLessThan(1e-3);
   await converged(page);
+  expect(await off('handles')).toBeLessThan(1e-3);
   await page.keyboard.press('Delete');
   const out = await until(
     () => sceneOf(server),
