@@ -285,3 +285,44 @@ it('reads where the pointer is, nothing where that has left the picture, and its
   await page.keyboard.press('m');
   expect([await card.isVisible(), await mark.isVisible()]).toEqual([false, false]);
 });
+
+it.each([
+  [360, 640],
+  [1200, 800],
+])('keeps clear of the notch and the bar of a screen of %i x %i', async (width, height) => {
+  const page = await pages.open(server.url, width, height);
+  await converged(page);
+  await page.evaluate(() => window.viewer!.view.setMode('radiosity')); // which has a legend
+  const session = await page.context().newCDPSession(page);
+  const beside = width > height ? 47 : 0; // a notch is at the short side
+  const insets = { top: 47 - beside, left: beside, bottom: 34, right: beside };
+  await session.send('Emulation.setSafeAreaInsetsOverride' as never, { insets } as never);
+  await page.evaluate(() => {
+    const { frame } = window.viewer!;
+    frame.toasts.show('A note');
+    frame.setBanner('No connection.');
+  });
+  const outside = (selectors: string) =>
+    page.evaluate(
+      ({ selectors, insets }) =>
+        [...document.querySelectorAll<HTMLElement>(selectors)]
+          .filter((element) => element.checkVisibility())
+          .filter((element) => {
+            const { top, left, bottom, right } = element.getBoundingClientRect();
+            const isBelow = bottom > innerHeight - insets.bottom;
+            return top < insets.top || left < insets.left || right > innerWidth - insets.right || isBelow;
+          })
+          .map(({ className }) => className),
+      { selectors, insets },
+    );
+  const floating = '.bar > *, .tools, .legend, .toast, .banner, .tabs button';
+  for (const open of [false, true]) {
+    if ((await page.evaluate(() => window.viewer!.frame.panelOpen)) !== open)
+      await page.evaluate(() => window.viewer!.frame.togglePanel());
+    expect(await outside(floating), open ? 'with the panel' : 'without the panel').toEqual([]);
+  }
+  // What stands last in the panel can be scrolled to where it is seen.
+  await page.evaluate(() => window.viewer!.frame.showTab('Share'));
+  await page.evaluate(() => document.querySelector('#tab-Share')!.scrollTo(0, 1e6));
+  expect(await outside('#tab-Share section:last-child dd:last-child')).toEqual([]);
+});
