@@ -60,7 +60,7 @@ export class App {
     failed: (error) => this.onNoDocument(error),
   });
   private resume: Resume | undefined;
-  private token = readToken();
+  private token = addressedToken() ?? stored('token', 'session');
   private slow = false;
   private everOpen = false;
   private epoch = '';
@@ -113,7 +113,7 @@ export class App {
         toggleWalk: () => this.view.toggleWalk(),
         frameAll: () => this.view.frameAll(),
         gizmo: (mode) => this.edit.setGizmo(mode),
-        toggleMeter: () => this.view.toggleMeter(),
+        toggleMeter: () => this.view.meter.toggle(),
         addLamp: () => void this.edit.addLamp(),
         undo: () => void this.edit.history.undo(),
         redo: () => void this.edit.history.redo(),
@@ -161,6 +161,10 @@ export class App {
     this.edit.start();
     document.addEventListener('visibilitychange', () => this.onVisible());
     window.addEventListener('online', () => this.connection.open());
+    window.addEventListener('hashchange', () => {
+      const token = addressedToken();
+      if (token) this.giveToken(token);
+    });
   }
 
   mark(name: string): void {
@@ -294,6 +298,7 @@ export class App {
     const isOver = ['converged', 'timeLimit', 'limited'].includes(progress.state);
     const done = isOver && !this.isLightUnderWay(progress);
     const bad = progress.state === 'failed';
+    const isBusy = isOver || progress.state === 'solving';
     const stated = hasScene(progress) && progress.state !== 'loading';
     const error = stated ? `${percent(progress.error.total)} error` : '';
     const rate = progress.state === 'solving' ? `${readable(progress.shotsPerSecond, 2)} shots/s` : '';
@@ -303,7 +308,7 @@ export class App {
         : progress.state === 'loading' && this.viewer.shown
           ? 'First light'
           : stateName(progress.state),
-      bad ? 'bad' : done ? 'good' : isOver || progress.state === 'solving' ? 'busy' : 'idle',
+      bad ? 'bad' : done ? (progress.state === 'converged' ? 'good' : 'short') : isBusy ? 'busy' : 'idle',
       error,
       rate,
     );
@@ -463,14 +468,14 @@ function hasScene({ state, surfaces }: Progress): boolean {
   return state !== 'empty' && (state !== 'failed' || surfaces > 0);
 }
 
-/** From the link (#token=...), where it does not stay to be seen, or from this tab's memory. */
-function readToken(): string | undefined {
+/** From the link (#token=...), where it does not stay to be seen. */
+function addressedToken(): string | undefined {
   const hash = new URLSearchParams(location.hash.slice(1));
-  const token = hash.get('token');
+  const token = hash.get('token') ?? undefined;
   if (token) {
     store('token', token, 'session');
     hash.delete('token');
     history.replaceState(null, '', `#${hash}`);
   }
-  return token ?? stored('token', 'session');
+  return token;
 }

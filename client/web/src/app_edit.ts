@@ -52,16 +52,26 @@ export class EditSession {
 
   start(): void {
     this.panel.setSelection(undefined);
+    this.takeDrops();
+  }
+
+  private takeDrops(): void {
+    const setDropping = (on: boolean) => document.body.classList.toggle('dropping', on);
     window.addEventListener('dragover', (event) => {
+      if (!event.dataTransfer?.types.includes('Files')) return; // a text or a picture of the page is no scene
       event.preventDefault();
-      document.body.classList.add('dropping');
+      setDropping(true);
     });
-    for (const type of ['dragleave', 'drop'] as const)
-      window.addEventListener(type, () => document.body.classList.remove('dropping'));
+    // Whatever is dragged leaves each part of the page for the next; of the page itself there is no next.
+    window.addEventListener('dragleave', (event) => {
+      if (!event.relatedTarget) setDropping(false);
+    });
     window.addEventListener('drop', (event) => {
-      event.preventDefault();
+      setDropping(false);
       const file = event.dataTransfer?.files[0];
-      if (file) void this.loadFile(file);
+      if (!file) return;
+      event.preventDefault();
+      void this.loadFile(file);
     });
   }
 

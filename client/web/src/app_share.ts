@@ -19,12 +19,19 @@ export function editCommand(patch: Patch, server: string, token = false): string
   return `echo '${json}' | radiosity edit ${server} -${token ? ' --token-file token' : ''}`;
 }
 
+/** Of files that a page saves faster, browsers keep ten and drop the rest without a word. */
+const SAVE_EVERY_MS = 250;
+
+function pause(ms: number): Promise<void> {
+  return new Promise((resolve) => setTimeout(resolve, ms));
+}
+
 export class Share {
   private lastEdit: Patch | undefined;
   private readonly layouts: Layouts = {
     now: () => this.app.viewer.set?.note,
     fetch: (path, init) => this.app.fetch(path, init),
-    pause: () => new Promise((resolve) => setTimeout(resolve, 100)),
+    pause: () => pause(100),
   };
 
   constructor(
@@ -66,7 +73,10 @@ export class Share {
       if (what === 'unlit') return await this.save('/scene-unlit.glb', 'scene-unlit.glb');
       if (what === 'snapshot') return await this.save('/snapshot.png?width=1920&height=1080', 'snapshot.png');
       const pages = await fetchLightmaps(this.layouts);
-      pages.forEach((blob, page) => download(blob, `lightmap.${page}.exr`));
+      for (const [page, blob] of pages.entries()) {
+        if (page > 0) await pause(SAVE_EVERY_MS);
+        download(blob, `lightmap.${page}.exr`);
+      }
     } catch (error) {
       this.app.frame.toasts.show(`Download failed: ${(error as Error).message}`, 'bad');
     }

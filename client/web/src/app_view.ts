@@ -1,14 +1,12 @@
 // What is shown and from where: views, exposure, cameras, the light meter. Part of the App.
 
-import { Box3, Vector3 } from 'three';
+import { type Box3, Vector3 } from 'three';
 import type { App } from './app';
-import { nodeName } from './document/gltf';
-import { measured } from './ui/dom';
+import { MeterSession } from './app_meter';
 import { listenToKeys } from './ui/keys';
 import { ViewPanel } from './ui/view_panel';
 import { insideView } from './view/first_view';
 import type { LitScene } from './view/lit_scene';
-import { luminance } from './view/picker';
 import { TONE_CURVES, VIEW_MODES, viewMode, type ViewMode } from './view/view_modes';
 
 /** A click that moves less is no drag, pixels. */
@@ -22,11 +20,9 @@ export interface Placed {
 
 export class ViewSession {
   readonly panel: ViewPanel;
+  readonly meter: MeterSession;
   mode: ViewMode = viewMode('lit');
   private falseColour = false;
-  private metering = false;
-  private pointer: { x: number; y: number } | undefined;
-  private meterWaits = false;
   private camera = -1;
   private placed = false;
   private sharpMarked = false;
@@ -36,6 +32,7 @@ export class ViewSession {
   private linked: string | undefined;
 
   constructor(private readonly app: App) {
+    this.meter = new MeterSession(app);
     this.panel = new ViewPanel({
       setMode: (id) => void this.setMode(id),
       setFalseColour: (on) => this.setFalseColour(on),
@@ -52,18 +49,17 @@ export class ViewSession {
   /** When the page is there. */
   start(): void {
     const { canvas } = this.app.frame;
-    const link = new URLSearchParams(location.hash.slice(1));
-    this.placed = this.app.viewer.rig.fromText(link.get('camera') ?? '');
-    this.app.frame.setWalk(this.app.viewer.rig.mode === 'walk');
+    const { rig, pagesView } = this.app.viewer;
     void this.setMode('lit');
-    this.linked = link.get('view') ?? undefined;
-    this.followLink();
-    if (link.get('ui') === '0') this.app.frame.toggleChrome();
+    this.followAddress();
+    if (addressed().get('ui') === '0') this.app.frame.toggleChrome();
+    // Somebody follows another link in the same tab, or goes back: only what stands behind the # has changed.
+    window.addEventListener('hashchange', () => this.followAddress());
     this.listenToPointer(canvas);
     listenToKeys(canvas, {
-      camera: (event, down) => this.app.viewer.rig.key(event, down),
-      turn: (right, up) => this.app.viewer.rig.turn(right, up),
-      zoom: (factor) => this.app.viewer.rig.zoom(factor),
+      camera: (event, down) => this.aimed(rig.key(event, down)),
+      turn: (right, up) => this.aimed(this.mode.flat ? pagesView.pan(right, up) : rig.turn(right, up)),
+      zoom: (factor) => this.aimed(this.mode.flat ? pagesView.zoom(factor) : rig.zoom(factor)),
       press: (key, event) => this.press(key, event),
     });
   }
@@ -72,7 +68,22 @@ export class ViewSession {
   linkHash(): string {
     const hash = new URLSearchParams({ camera: this.app.viewer.rig.toText() });
     if (this.mode.id !== 'lit') hash.set('view', this.mode.id);
+    if (this.mode.falseColour === 'choice' && this.falseColour) hash.set('colours', 'false');
     return hash.toString();
+  }
+
+  /** To where the page's address says that one looks from, and to the view that it names. */
+  private followAddress(): void {
+    const link = addressed();
+    const { rig } = this.app.viewer;
+    if (rig.fromText(link.get('camera') ?? '')) {
+      this.placed = true;
+      this.linked = 'lit'; // which links do not name
+    }
+    this.app.frame.setWalk(rig.mode === 'walk');
+    this.linked = link.get('view') ?? this.linked;
+    if (this.linked !== undefined) this.setFalseColour(link.get('colours') === 'false');
+    this.followLink();
   }
 
   onCapabilities(): void {
@@ -141,7 +152,7 @@ export class ViewSession {
     }
     this.followLink();
     this.showLegend();
-    if (this.metering) this.readMeter();
+    this.meter.onDrawn();
   }
 
   /** Pages have a new layout: what is looked at besides light has new ones too. False: nothing is. */
@@ -178,19 +189,11 @@ export class ViewSession {
   }
 
   frameSelection(): void {
-    const node = this.app.edit.selection?.node;
-    const object = node === undefined ? undefined : this.app.viewer.shown?.nodes.get(node);
-    const box = object && new Box3().setFromObject(object);
-    if (!box || box.isEmpty()) return this.frameAll();
-    this.app.viewer.rig.frame(box);
-  }
-
-  toggleMeter(): void {
-    this.metering = !this.metering;
-    this.app.frame.setMeter(this.metering);
-    this.app.frame.canvas.classList.toggle('metering', this.metering);
-    if (this.metering) this.readMeter();
-    else this.app.frame.meter.hide();
+    const { viewer, edit } = this.app;
+    const node = edit.selection?.node;
+    const box = node === undefined ? undefined : viewer.boxOf(node);
+    if (box) viewer.rig.frame(box);
+    else this.frameAll();
   }
 
   private available(mode: ViewMode): boolean {
@@ -275,69 +278,37 @@ export class ViewSession {
       if (moved !== undefined && moved <= CLICK_SLACK && event.button === 0) this.click(event);
     });
     canvas.addEventListener('pointermove', (event) => {
-      this.pointer = { x: event.clientX, y: event.clientY };
-      if (this.metering) this.readMeterSoon();
+      this.meter.pointTo(event);
     });
     canvas.addEventListener('pointerleave', ({ pointerType }) => {
       if (pointerType === 'touch') return; // a finger that is lifted has left: what it pointed at is still meant
-      this.pointer = undefined;
-      this.app.frame.meter.hide();
+      this.meter.leave();
     });
   }
 
   private click(event: PointerEvent): void {
-    this.pointer = { x: event.clientX, y: event.clientY };
-    if (this.metering) return this.readMeter();
-    const hit = this.app.viewer.pickAt(...this.toDevice(event.clientX, event.clientY));
+    if (this.meter.isOn) return this.meter.pointTo(event);
+    const hit = this.app.viewer.pickAt(...this.app.frame.toDevice(event.clientX, event.clientY));
     this.app.edit.selectHit(hit?.object);
-  }
-
-  private toDevice(x: number, y: number): [number, number] {
-    const box = this.app.frame.canvas.getBoundingClientRect();
-    return [((x - box.left) / box.width) * 2 - 1, 1 - ((y - box.top) / box.height) * 2];
-  }
-
-  /** At most once a frame, however often the pointer tells of itself. */
-  private readMeterSoon(): void {
-    if (this.meterWaits) return;
-    this.meterWaits = true;
-    requestAnimationFrame(() => {
-      this.meterWaits = false;
-      if (this.metering) this.readMeter();
-    });
-  }
-
-  /** Without a pointer (keyboard) the meter reads in the middle of the picture. */
-  private readMeter(): void {
-    const { viewer, frame, edit } = this.app;
-    const box = frame.canvas.getBoundingClientRect();
-    const { x, y } = this.pointer ?? { x: box.left + box.width / 2, y: box.top + box.height / 2 };
-    const reading = viewer.readAt(...this.toDevice(x, y));
-    if (!reading) return frame.meter.hide();
-    const lux = reading.irradiance && luminance(reading.irradiance);
-    // Where errors of single texels are not streamed, the scene's own stands for them.
-    const error = reading.error ?? (lux === undefined ? undefined : lux * (this.app.progress?.error.total ?? NaN));
-    const details = [
-      reading.irradiance ? reading.irradiance.map((c, i) => `${'RGB'[i]} ${measured(c)}`).join('  ') : '',
-      this.mode.id === 'radiosity' && reading.radiosity !== undefined
-        ? `radiosity ${measured(reading.radiosity)} lm/m²`
-        : '',
-      reading.node === undefined ? '' : nodeName(edit.document.gltf, reading.node),
-      reading.texel ? `page ${reading.page}, texel ${reading.texel.join(', ')}` : '',
-      position(reading.point),
-    ];
-    frame.meter.show(x, y, lux, error, details.filter((text) => text !== '').join('\n'));
   }
 
   // ---- keys ----
 
+  /** By keys, which aim the meter; `result` of what they did. */
+  private aimed<T>(result: T): T {
+    if (result !== false) this.meter.aimByKeys();
+    return result;
+  }
+
   private press(key: string, event: KeyboardEvent): boolean {
     const { app } = this;
-    const command = event.ctrlKey || event.metaKey;
+    // Where [ and ] are written with AltGr, some systems tell of that as of Control and Alt.
+    const isWritten = event.getModifierState('AltGraph');
+    const command = !isWritten && (event.ctrlKey || event.metaKey);
     if (command && key.toLowerCase() === 'z')
       return done(event.shiftKey ? app.edit.history.redo() : app.edit.history.undo());
     if (command && key.toLowerCase() === 'y') return done(app.edit.history.redo());
-    if (command || event.altKey) return false;
+    if (command || (event.altKey && !isWritten)) return false;
     if (key === 'Delete' || key === 'Backspace') return isAmongObjects(event.target) && done(app.edit.removeSelected());
     if (/^\d$/.test(key)) return done(this.setMode(VIEW_MODES[(Number(key) + 9) % 10]?.id ?? 'lit'));
     const actions: Record<string, () => unknown> = {
@@ -348,7 +319,7 @@ export class ViewSession {
       x: () => this.mode.falseColour === 'choice' && this.setFalseColour(!this.falseColour),
       '[': () => this.setStops(app.viewer.exposure.stops - 0.25),
       ']': () => this.setStops(app.viewer.exposure.stops + 0.25),
-      m: () => this.toggleMeter(),
+      m: () => this.aimed(this.meter.toggle()),
       n: () => app.edit.selectNext(1),
       N: () => app.edit.selectNext(-1),
       t: () => app.edit.setGizmo('translate'),
@@ -372,6 +343,10 @@ function alike(a: Box3, b: Box3): boolean {
   return a.min.distanceTo(b.min) + a.max.distanceTo(b.max) < 0.25 * size;
 }
 
+function addressed(): URLSearchParams {
+  return new URLSearchParams(location.hash.slice(1));
+}
+
 function done(_result: unknown): true {
   return true;
 }
@@ -379,11 +354,4 @@ function done(_result: unknown): true {
 /** Keys that take something away do so in the picture and in the list of objects: elsewhere they were meant for a control. */
 function isAmongObjects(target: EventTarget | null): boolean {
   return target === document.body || (target instanceof Element && target.closest('canvas.view, .tree') !== null);
-}
-
-function position(point: Vector3): string {
-  return `at ${point
-    .toArray()
-    .map((v) => measured(v))
-    .join(', ')} m`;
 }

@@ -1,7 +1,7 @@
 // For those who see little, have no pointer, or a small screen.
 import type { Page } from 'playwright-core';
 import type {} from '../../../client/web/src/main';
-import { converged, sceneOf, serveAll, turns, until } from './harness';
+import { converged, drawn, sceneOf, serveAll, turns, until } from './harness';
 
 const { server, pages } = serveAll('cornell.glb');
 
@@ -81,7 +81,7 @@ it.each(['dark', 'light'] as const)('can be read in %s colours', async (scheme) 
     const { frame, edit, view } = window.viewer!;
     edit.selectNext(1);
     void view.setMode('irradiance');
-    view.toggleMeter();
+    view.meter.toggle();
     frame.toasts.show('A note', 'good');
     frame.toasts.show('A refusal', 'bad');
     frame.setBanner('No connection.', 'Try now', () => undefined);
@@ -226,4 +226,103 @@ it('reads the light by touch, and shows what was tapped in the list', async () =
       return at.top >= list.top && at.bottom <= list.bottom;
     });
   expect(await until(seen, (is) => is)).toBe(true);
+});
+
+it('pans and zooms the pages by keys', async () => {
+  const page = await pages.open(server.url, 900, 600);
+  await converged(page);
+  await page.evaluate(() => window.viewer!.view.setMode('pages'));
+  const flat = () =>
+    page.evaluate(() => {
+      const { position, zoom } = window.viewer!.viewer.pagesView.camera;
+      return { x: position.x, y: position.y, zoom };
+    });
+  const before = await flat();
+  await page.locator('canvas.view').focus();
+  for (const key of ['ArrowRight', 'ArrowUp', '+']) await page.keyboard.press(key);
+  const after = await flat();
+  expect(after.x).toBeGreaterThan(before.x);
+  expect(after.y).toBeGreaterThan(before.y);
+  expect(after.zoom).toBeGreaterThan(before.zoom);
+  await drawn(page);
+  expect(await flat()).toEqual(after);
+  await page.keyboard.press('f');
+  expect(await flat()).toEqual(before);
+});
+
+it('takes a bracket that is written with AltGr', async () => {
+  const page = await pages.open(server.url, 900, 600);
+  await converged(page);
+  const stops = () => page.evaluate(() => window.viewer!.viewer.exposure.stops);
+  const press = (modifierAltGraph: boolean) =>
+    page.evaluate((modifierAltGraph) => {
+      const init = { key: ']', code: 'Digit9', ctrlKey: true, altKey: true, modifierAltGraph, bubbles: true };
+      document.querySelector('canvas.view')!.dispatchEvent(new KeyboardEvent('keydown', init));
+    }, modifierAltGraph);
+  await press(true);
+  expect(await stops()).toBe(0.25);
+  await press(false); // is a command of the browser or of the system
+  expect(await stops()).toBe(0.25);
+});
+
+it('reads where the pointer is, nothing where that has left the picture, and its middle by keys', async () => {
+  const page = await pages.open(server.url, 1200, 800);
+  await converged(page);
+  const [card, mark] = [page.locator('.meter'), page.locator('.meter-mark')];
+  await page.mouse.move(400, 260);
+  await page.keyboard.press('m');
+  await card.waitFor();
+  expect(await mark.isVisible()).toBe(false); // the pointer shows what is read
+  await page.mouse.move(1100, 400);
+  await drawn(page); // light that comes is no reason to read anywhere else
+  expect(await card.isVisible()).toBe(false);
+  await page.locator('canvas.view').focus();
+  await page.keyboard.press('ArrowRight');
+  await card.waitFor();
+  const [box, around] = [(await page.locator('canvas.view').boundingBox())!, (await mark.boundingBox())!];
+  expect(Math.abs(around.x + around.width / 2 - box.x - box.width / 2)).toBeLessThan(1.5);
+  expect(Math.abs(around.y + around.height / 2 - box.y - box.height / 2)).toBeLessThan(1.5);
+  await page.keyboard.press('m');
+  expect([await card.isVisible(), await mark.isVisible()]).toEqual([false, false]);
+});
+
+it.each([
+  [360, 640],
+  [1200, 800],
+])('keeps clear of the notch and the bar of a screen of %i x %i', async (width, height) => {
+  const page = await pages.open(server.url, width, height);
+  await converged(page);
+  await page.evaluate(() => window.viewer!.view.setMode('radiosity')); // which has a legend
+  const session = await page.context().newCDPSession(page);
+  const beside = width > height ? 47 : 0; // a notch is at the short side
+  const insets = { top: 47 - beside, left: beside, bottom: 34, right: beside };
+  await session.send('Emulation.setSafeAreaInsetsOverride' as never, { insets } as never);
+  await page.evaluate(() => {
+    const { frame } = window.viewer!;
+    frame.toasts.show('A note');
+    frame.setBanner('No connection.');
+  });
+  const outside = (selectors: string) =>
+    page.evaluate(
+      ({ selectors, insets }) =>
+        [...document.querySelectorAll<HTMLElement>(selectors)]
+          .filter((element) => element.checkVisibility())
+          .filter((element) => {
+            const { top, left, bottom, right } = element.getBoundingClientRect();
+            const isBelow = bottom > innerHeight - insets.bottom;
+            return top < insets.top || left < insets.left || right > innerWidth - insets.right || isBelow;
+          })
+          .map(({ className }) => className),
+      { selectors, insets },
+    );
+  const floating = '.bar > *, .tools, .legend, .toast, .banner, .tabs button';
+  for (const open of [false, true]) {
+    if ((await page.evaluate(() => window.viewer!.frame.panelOpen)) !== open)
+      await page.evaluate(() => window.viewer!.frame.togglePanel());
+    expect(await outside(floating), open ? 'with the panel' : 'without the panel').toEqual([]);
+  }
+  // What stands last in the panel can be scrolled to where it is seen.
+  await page.evaluate(() => window.viewer!.frame.showTab('Share'));
+  await page.evaluate(() => document.querySelector('#tab-Share')!.scrollTo(0, 1e6));
+  expect(await outside('#tab-Share section:last-child dd:last-child')).toEqual([]);
 });

@@ -40,6 +40,29 @@ it('waits for a scene, and loads one that is dropped', async () => {
   expect(Math.max(...(await pixels(page, 16)))).toBeGreaterThan(60);
 });
 
+it('offers to take a file for as long as one is held over the page, and nothing else', async () => {
+  const server = await serve(`${SCENES}/cornell.glb`);
+  const page = await pages.open(server.url, 900, 600);
+  const offersAfter = (type: string, what: 'file' | 'text', to?: string) =>
+    page.evaluate(
+      ({ type, what, to }) => {
+        const dataTransfer = new DataTransfer();
+        if (what === 'file') dataTransfer.items.add(new File([], 'box.glb'));
+        else dataTransfer.setData('text/plain', 'box');
+        const relatedTarget = to ? document.querySelector(to) : null;
+        const init = { dataTransfer, relatedTarget, cancelable: true, bubbles: true };
+        document.querySelector('canvas.view')!.dispatchEvent(new DragEvent(type, init));
+        return document.body.classList.contains('dropping');
+      },
+      { type, what, to },
+    );
+  await page.waitForFunction(() => window.viewer !== undefined);
+  expect(await offersAfter('dragover', 'text')).toBe(false);
+  expect(await offersAfter('dragover', 'file')).toBe(true);
+  expect(await offersAfter('dragleave', 'file', '.tools')).toBe(true); // to another part of the page
+  expect(await offersAfter('dragleave', 'file')).toBe(false);
+});
+
 it('says what is wrong with a file that is no scene', async () => {
   const server = await serve(`${SCENES}/cornell.glb`);
   const page = await pages.open(server.url, 900, 600);
@@ -64,6 +87,11 @@ it('asks for the token, and works with it', async () => {
   const linked = await pages.open(`${server.url}/#token=${token}`, 900, 600);
   await converged(linked);
   expect(linked.url()).not.toContain(token);
+  const asked = await pages.open(server.url, 900, 600);
+  await asked.getByLabel('Token').waitFor();
+  await asked.goto(`${server.url}/#token=${token}`); // in the same tab, which is not loaded anew
+  await converged(asked);
+  expect(asked.url()).not.toContain(token);
 });
 
 it('loads nothing from anywhere else', async () => {

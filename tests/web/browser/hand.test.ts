@@ -135,6 +135,22 @@ it('saves files that are what their names say', async () => {
   expect(sizeOf(snapshot)).toEqual([1920, 1080]);
 });
 
+it('saves all of many lightmaps', async () => {
+  const page = await pages.open(server.url, SIDE.width, SIDE.height);
+  await converged(page);
+  await page.route('**/lightmaps/*.exr', (route) => route.fulfill({ body: route.request().url() }));
+  const count = 14; // browsers take ten at a time
+  await page.evaluate((count) => {
+    const { pages } = window.viewer!.viewer.set!.note;
+    while (pages.length < count) pages.push(pages[0]!);
+  }, count);
+  const names: string[] = [];
+  page.on('download', (download) => names.push(download.suggestedFilename()));
+  await page.evaluate(() => window.viewer!.share.download('exr'));
+  await until(async () => names.length, (n) => n === count); // prettier-ignore
+  expect(names).toEqual(Array.from({ length: count }, (_, i) => `lightmap.${i}.exr`));
+});
+
 it('refuses a scale of 0 with a reason, by hand and by the handles', async () => {
   const page = await pages.open(server.url, SIDE.width, SIDE.height);
   await converged(page);

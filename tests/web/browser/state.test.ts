@@ -172,6 +172,21 @@ it('says that nothing shines, and offers a lamp', async () => {
   expect((await told(page)).energy['emitted']).toBeGreaterThan(0);
 });
 
+it('does not call good what has stopped short of its target', async () => {
+  const server = await serve(`${SCENES}/cornell.glb`);
+  const page = await pages.open(server.url, 900, 600);
+  await converged(page);
+  const dotOf = (state: string) =>
+    page.evaluate((state) => {
+      const app = window.viewer! as unknown as { progress: object; onProgress(progress: object): void };
+      app.onProgress({ ...app.progress, state });
+      return document.querySelector('.chip .dot')!.className;
+    }, state);
+  expect(await dotOf('limited')).toBe('dot short');
+  expect(await dotOf('timeLimit')).toBe('dot short');
+  expect(await dotOf('converged')).toBe('dot good');
+});
+
 it('does not take the black before the last tiles for the light of a solve that is over', async () => {
   const server = await serve(`${SCENES}/cornell.glb`);
   await converged(await pages.open(server.url));

@@ -143,7 +143,22 @@ it('adds a lamp, and takes it out again', async () => {
   );
   expect(lit.nodes.at(-1)!.name).toMatch(/^lamp/);
   await page.getByLabel('Intensity, cd').waitFor();
+  // Its handles are where it shines, and it can be looked at, though it has no surface.
+  const place = lit.nodes.at(-1)!.translation;
+  const off = (what: 'handles' | 'target') =>
+    page.evaluate(
+      ({ place, what }) => {
+        const { gizmo, rig } = window.viewer!.viewer;
+        const at = (what === 'handles' ? gizmo.middle : rig.target).toArray();
+        return Math.hypot(...at.map((v, i) => v - place[i]!));
+      },
+      { place, what },
+    );
+  expect(await off('handles')).toBeLessThan(1e-3);
+  await page.keyboard.press('Shift+F');
+  expect(await off('target')).toBeLessThan(1e-3);
   await converged(page);
+  expect(await off('handles')).toBeLessThan(1e-3);
   await page.keyboard.press('Delete');
   const out = await until(
     () => sceneOf(server),
@@ -384,4 +399,30 @@ it('carries the camera in a link', async () => {
   const [a, b] = [await place(page), await place(other)];
   // Five digits are in the link.
   a.forEach((v, i) => expect(Math.abs(v - b[i]!)).toBeLessThan(1e-3));
+});
+
+it('follows a link that is opened in the same tab, to its place, view and colours, and goes back', async () => {
+  const other = await pages.open(server.url, 900, 600);
+  await converged(other);
+  await other.keyboard.press('ArrowRight');
+  await other.evaluate(() => window.viewer!.view.setMode('irradiance'));
+  await other.keyboard.press('x');
+  const hash = await other.evaluate(() => window.viewer!.view.linkHash());
+  const page = await pages.open(`${server.url}/#camera=2,2,9,2,2,2,45,0`, 900, 600);
+  await converged(page);
+  const state = () =>
+    page.evaluate(() => {
+      const { view, viewer } = window.viewer!;
+      const { x } = viewer.rig.camera.position;
+      return { mode: view.mode.id, colours: viewer.uniforms.all.falseColour.value, x: Number(x.toFixed(3)) };
+    });
+  const before = await state();
+  expect(before).toEqual({ mode: 'lit', colours: false, x: 2 });
+  await page.goto(`${server.url}/#${hash}`);
+  const place = await other.evaluate(() => window.viewer!.viewer.rig.camera.position.x);
+  const there = await until(state, ({ mode }) => mode === 'irradiance');
+  expect(there.colours).toBe(true);
+  expect(Math.abs(there.x - place)).toBeLessThan(2e-3);
+  await page.goBack();
+  expect(await until(state, ({ mode }) => mode === 'lit')).toEqual(before);
 });

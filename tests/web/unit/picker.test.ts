@@ -1,8 +1,18 @@
-import { Color, Mesh, MeshStandardMaterial, PlaneGeometry, Raycaster, Texture, Vector3 } from 'three';
+import {
+  Color,
+  Mesh,
+  MeshStandardMaterial,
+  PerspectiveCamera,
+  PlaneGeometry,
+  Raycaster,
+  Texture,
+  Vector3,
+} from 'three';
 import { LitMaterial, ViewUniforms } from '../../../client/web/src/view/lit_material';
 import type { LightmapPage } from '../../../client/web/src/view/lightmap_page';
 import type { LitScene } from '../../../client/web/src/view/lit_scene';
-import { luminance, readingAt, type Reading } from '../../../client/web/src/view/picker';
+import { LampMarker } from '../../../client/web/src/view/lamp_marker';
+import { luminance, pick, pickSurface, readingAt, type Reading } from '../../../client/web/src/view/picker';
 
 type Rgb = [number, number, number];
 
@@ -48,6 +58,20 @@ describe('the light meter', () => {
     const metal = grey();
     metal.metalness = 0.75;
     expect(reading([400, 400, 400], metal).radiosity).toBeCloseTo(0.25 * 0.5 * 400, 10);
+  });
+
+  it('reads the surface behind the sign of a lamp, which is for the hand', () => {
+    const wall = new Mesh(new PlaneGeometry(2, 2), new LitMaterial(grey(), new ViewUniforms(), undefined));
+    const sign = new LampMarker(3);
+    sign.position.z = 1;
+    sign.scale.setScalar(0.1);
+    sign.updateMatrixWorld(true);
+    const camera = new PerspectiveCamera();
+    camera.position.z = 3;
+    camera.updateMatrixWorld();
+    const scene = { pickable: () => [wall, sign] } as unknown as LitScene;
+    expect(pick(scene, camera, 0, 0)?.object.parent).toBe(sign);
+    expect(pickSurface(scene, camera, 0, 0)?.object).toBe(wall);
   });
 
   it('says nothing of what leaves where that differs within the surface, or where no light is known', () => {

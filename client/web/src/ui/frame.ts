@@ -65,6 +65,7 @@ export class Frame {
       h('main', {}, this.canvas, readings, tools, this.welcome, this.banner),
       bar,
       this.panel,
+      this.meter.mark,
       this.meter.element,
       this.toasts.element,
       this.help,
@@ -74,7 +75,7 @@ export class Frame {
     this.setHistory(false, false);
   }
 
-  setState(text: string, tone: 'busy' | 'good' | 'bad' | 'idle', error = '', rate = ''): void {
+  setState(text: string, tone: 'busy' | 'good' | 'short' | 'bad' | 'idle', error = '', rate = ''): void {
     // What is written anew is read out anew, though it is the same.
     const texts: [HTMLElement, string][] = [[this.state, text], [this.error, error], [this.rate, rate]]; // prettier-ignore
     for (const [element, wanted] of texts) if (element.textContent !== wanted) element.textContent = wanted;
@@ -151,6 +152,12 @@ export class Frame {
   /** Lies over the picture, below the tools. */
   overPicture(element: HTMLElement): void {
     this.canvas.after(element);
+  }
+
+  /** From pixels of the page to those from -1 to 1 that the picture is projected to. */
+  toDevice(x: number, y: number): [number, number] {
+    const box = this.canvas.getBoundingClientRect();
+    return [((x - box.left) / box.width) * 2 - 1, 1 - ((y - box.top) / box.height) * 2];
   }
 
   togglePanel(): void {

@@ -4,7 +4,7 @@ import { button, h } from './dom';
 
 const KEYS: [string, string][] = [
   ['Drag, wheel, right drag', 'orbit, zoom, pan; by touch: one finger, pinch, two fingers'],
-  ['Arrows, + −', 'orbit, zoom'],
+  ['Arrows, + −', 'orbit, zoom; in the first person: look about; of pages: pan, zoom'],
   ['W A S D, Q E', 'move, down, up'],
   ['V', 'switch between orbit and first person'],
   ['F, Shift+F', 'frame everything, frame the selection'],

@@ -98,16 +98,28 @@ export class MeterCard {
     this.more,
   );
 
+  /** On the place that is read, where no pointer shows it. */
+  readonly mark = h('div', { class: 'meter-mark', hidden: true });
+
   /** `legend`: what it is not to cover. */
   constructor(private readonly legend: HTMLElement) {}
 
   hide(): void {
-    this.element.hidden = true;
+    this.element.hidden = this.mark.hidden = true;
   }
 
   /** `lux` undefined: no light known there. `error`: lux, either side. */
-  show(x: number, y: number, lux: number | undefined, error: number | undefined, details: string): void {
+  show(
+    x: number,
+    y: number,
+    lux: number | undefined,
+    error: number | undefined,
+    details: string,
+    isMarked: boolean,
+  ): void {
     this.element.hidden = false;
+    this.mark.hidden = !isMarked;
+    this.mark.style.transform = `translate(${Math.round(x)}px, ${Math.round(y)}px) translate(-50%, -50%)`;
     const sure = error === undefined || !Number.isFinite(error);
     const [value, either] =
       lux === undefined ? ['no light yet', ''] : sure ? [measured(lux), ''] : withError(lux, error);

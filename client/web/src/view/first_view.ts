@@ -4,7 +4,7 @@
 import { DoubleSide, Matrix3, Mesh, Raycaster, Triangle, Vector3, type PerspectiveCamera, type Side } from 'three';
 import { LitMaterial } from './lit_material';
 import type { LitScene } from './lit_scene';
-import { pick } from './picker';
+import { pickSurface } from './picker';
 
 export interface Place {
   eye: Vector3;
@@ -59,7 +59,12 @@ function litShare(scene: LitScene, room: Room, lamps: readonly LampPoint[], came
   let [seen, lit] = [0, 0];
   for (let i = 1; i <= RAYS; ++i) {
     // Evenly spread for every number of rays (the R2 sequence of Martin Roberts, 2018).
-    const hit = pick(scene, camera, 2 * ((i * 0.7548776662466927) % 1) - 1, 2 * ((i * 0.5698402909980532) % 1) - 1);
+    const hit = pickSurface(
+      scene,
+      camera,
+      2 * ((i * 0.7548776662466927) % 1) - 1,
+      2 * ((i * 0.5698402909980532) % 1) - 1,
+    );
     if (!hit?.face || !(hit.object instanceof Mesh)) continue;
     ++seen;
     const normal = hit.face.normal.clone().applyNormalMatrix(new Matrix3().getNormalMatrix(hit.object.matrixWorld));

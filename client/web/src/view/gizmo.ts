@@ -2,7 +2,6 @@
 // of the object, wherever its own origin may be: many scenes have all their origins in one corner.
 
 import {
-  Box3,
   Box3Helper,
   type BufferGeometry,
   EdgesGeometry,
@@ -20,6 +19,7 @@ import {
 } from 'three';
 import { TransformControls } from 'three/addons/controls/TransformControls.js';
 import { LampMarker } from './lamp_marker';
+import { surfaceBox } from './object_box';
 
 export type GizmoMode = 'translate' | 'rotate' | 'scale';
 
@@ -116,7 +116,7 @@ export class Gizmo {
         line.matrix.copy(of.matrixWorld);
         line.matrixWorld.copy(of.matrixWorld);
       } else if (this.object) {
-        (line as Box3Helper).box.setFromObject(this.object);
+        (line as Box3Helper).box.copy(surfaceBox(this.object));
       }
     }
   }
@@ -173,7 +173,7 @@ export class Gizmo {
     const { object, pivot } = this;
     if (!object) return;
     object.updateWorldMatrix(true, true);
-    const box = new Box3().setFromObject(object);
+    const box = surfaceBox(object);
     if (box.isEmpty()) object.getWorldPosition(pivot.position);
     else box.getCenter(pivot.position);
     object.getWorldQuaternion(pivot.quaternion);
@@ -215,7 +215,7 @@ export class Gizmo {
       triangles += (geometry.index?.count ?? geometry.getAttribute('position').count) / 3;
     });
     if (triangles > MAX_EDGE_TRIANGLES || meshes.length > 200) {
-      this.outline = [new Box3Helper(new Box3().setFromObject(object), this.lines.color)];
+      this.outline = [new Box3Helper(surfaceBox(object), this.lines.color)];
     } else {
       this.outline = meshes.map((mesh) => {
         const line = new LineSegments(new EdgesGeometry(mesh.geometry as BufferGeometry, 20), this.lines);

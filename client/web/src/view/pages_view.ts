@@ -20,7 +20,7 @@ export class PagesView {
   constructor(
     element: HTMLElement,
     private readonly view: ViewUniforms,
-    moved: () => void,
+    private readonly moved: () => void,
   ) {
     this.camera.position.z = 5;
     this.controls = new OrbitControls(this.camera, element);
@@ -67,6 +67,22 @@ export class PagesView {
     this.camera.zoom = 1;
     this.resize(this.camera.right / this.camera.top);
     this.controls.update();
+  }
+
+  /** By so much of what is seen. */
+  pan(right: number, up: number): void {
+    const { top, zoom, position } = this.camera;
+    const step = new Vector3(right, up, 0).multiplyScalar((2 * top) / zoom);
+    position.add(step);
+    this.controls.target.add(step);
+    this.moved();
+  }
+
+  /** Nearer for factors below 1. */
+  zoom(factor: number): void {
+    this.camera.zoom /= factor;
+    this.camera.updateProjectionMatrix();
+    this.moved();
   }
 
   resize(aspect: number): void {

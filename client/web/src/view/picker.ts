@@ -26,16 +26,34 @@ export function luminance([r, g, b]: readonly [number, number, number]): number 
 
 const caster = new Raycaster();
 
-/** `x`, `y`: normalised device coordinates. */
+/** The object to select, a lamp's sign included. `x`, `y`: normalised device coordinates. */
 export function pick(scene: LitScene, camera: PerspectiveCamera, x: number, y: number): Intersection | undefined {
-  caster.setFromCamera(new Vector2(x, y), camera);
-  caster.params.Line = { threshold: 0 };
-  return caster.intersectObjects(scene.pickable(), true).find((hit) => hit.object instanceof Mesh && shown(hit.object));
+  return hits(scene, camera, x, y)[0];
 }
 
 function shown(object: Mesh): boolean {
   for (let at: Mesh['parent'] = object; at; at = at.parent) if (!at.visible) return false;
   return true;
+}
+
+/** The nearest surface: signs of lamps hide none of the light. */
+export function pickSurface(
+  scene: LitScene,
+  camera: PerspectiveCamera,
+  x: number,
+  y: number,
+): Intersection | undefined {
+  return hits(scene, camera, x, y).find(
+    ({ object }) => object instanceof Mesh && object.material instanceof LitMaterial,
+  );
+}
+
+function hits(scene: LitScene, camera: PerspectiveCamera, x: number, y: number): Intersection[] {
+  caster.setFromCamera(new Vector2(x, y), camera);
+  caster.params.Line = { threshold: 0 };
+  return caster
+    .intersectObjects(scene.pickable(), true)
+    .filter(({ object }) => object instanceof Mesh && shown(object));
 }
 
 export function readingAt(scene: LitScene, hit: Intersection, errors?: readonly LightmapPage[]): Reading {

@@ -5,7 +5,7 @@ import { Mesh, type PerspectiveCamera } from 'three';
 import { exposureOf } from './exposure';
 import { LitMaterial } from './lit_material';
 import type { LitScene } from './lit_scene';
-import { luminance, pick } from './picker';
+import { luminance, pickSurface } from './picker';
 
 /** Of so many, even a picture whose luminances differ by factors of three is told to a fifth of a stop. */
 const MOST_RAYS = 128;
@@ -22,7 +22,12 @@ export function exposureByRays(scene: LitScene, camera: PerspectiveCamera): numb
   const seen: number[] = [];
   for (let i = 1; i <= rays; ++i) {
     // Evenly spread for every number of rays (the R2 sequence of Martin Roberts, 2018).
-    const hit = pick(scene, camera, 2 * ((i * 0.7548776662466927) % 1) - 1, 2 * ((i * 0.5698402909980532) % 1) - 1);
+    const hit = pickSurface(
+      scene,
+      camera,
+      2 * ((i * 0.7548776662466927) % 1) - 1,
+      2 * ((i * 0.5698402909980532) % 1) - 1,
+    );
     const material: unknown = hit?.object instanceof Mesh ? hit.object.material : undefined;
     if (!hit || !(material instanceof LitMaterial)) continue;
     if (!material.isPlain) return undefined;

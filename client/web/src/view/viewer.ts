@@ -1,7 +1,16 @@
 // The picture: owns the WebGL context, the scene on the screen and the light on it. Draws only when something changed.
 // Main thread.
 
-import { type Intersection, LinearSRGBColorSpace, NoToneMapping, type Object3D, Scene, WebGLRenderer } from 'three';
+import {
+  type Box3,
+  type Intersection,
+  LinearSRGBColorSpace,
+  NoToneMapping,
+  type Object3D,
+  Scene,
+  Vector3,
+  WebGLRenderer,
+} from 'three';
 import type { Gltf } from '../document/gltf';
 import { Brightness } from './brightness';
 import { CameraRig } from './camera_rig';
@@ -13,9 +22,10 @@ import { Layouts } from './layouts';
 import type { LightmapSet } from './lightmap_set';
 import { ViewUniforms } from './lit_material';
 import { LitScene } from './lit_scene';
+import { surfaceBox } from './object_box';
 import type { People } from './people';
 import { PagesView } from './pages_view';
-import { pick, readingAt, type Reading } from './picker';
+import { pick, pickSurface, readingAt, type Reading } from './picker';
 import { release } from './release';
 import { Screen } from './screen';
 import type { ViewMode } from './view_modes';
@@ -30,6 +40,8 @@ const MOST_COMPILING_MS = 2000;
 const EDIT_HURRY_MS = 700;
 /** Length of the pyramid that stands for another viewer, of the scene's diagonal. */
 const PERSON_SIZE = 0.04;
+/** Of what is looked at around a lamp, of the same. */
+const LAMP_ROOM = 0.2;
 
 export interface ViewerEvents {
   used(bytes: number): void;
@@ -198,7 +210,7 @@ export class Viewer {
   }
 
   readAt(x: number, y: number): Reading | undefined {
-    const hit = this.pickAt(x, y);
+    const hit = this.shown && !this.mode?.flat ? pickSurface(this.shown, this.rig.camera, x, y) : undefined;
     const { shownData } = this.layouts;
     const errors = shownData?.quantity === 'error' ? shownData.pages : undefined;
     return hit && this.shown ? readingAt(this.shown, hit, errors) : undefined;
@@ -216,9 +228,19 @@ export class Viewer {
   }
 
   select(node: number | undefined): void {
-    const object = node === undefined ? undefined : (this.lampRoot(node) ?? this.shown?.nodes.get(node));
-    this.gizmo.attach(object);
+    this.gizmo.attach(node === undefined ? undefined : this.objectOf(node));
     this.moved();
+  }
+
+  /** What there is to look at of a node: its surfaces, or the room around a lamp that has none. Metres. */
+  boxOf(node: number): Box3 | undefined {
+    const object = this.objectOf(node);
+    const box = object && surfaceBox(object);
+    if (!box?.isEmpty()) return box;
+    const room = new Vector3().setScalar(LAMP_ROOM * this.rig.sceneSize);
+    return this.shown?.lamps.has(node)
+      ? box.setFromCenterAndSize(object!.getWorldPosition(new Vector3()), room)
+      : undefined;
   }
 
   /** PNG of what is on the screen. */
@@ -234,8 +256,8 @@ export class Viewer {
   }
 
   /** A lamp that came with an edit has a marker before it has a node in the geometry. */
-  private lampRoot(node: number): Object3D | undefined {
-    return this.shown?.nodes.has(node) ? undefined : this.shown?.lamps.get(node);
+  private objectOf(node: number): Object3D | undefined {
+    return this.shown?.nodes.get(node) ?? this.shown?.lamps.get(node);
   }
 
   private frame(now: number): void {
