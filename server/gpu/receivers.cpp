@@ -207,12 +207,7 @@ bool Receivers::isMet(std::uint32_t item, const Ray& ray) const {
 Receivers::Meeting Receivers::opacityAt(std::uint32_t triangle, const glm::vec2& texel) const {
   const auto& surface = patches_->surfaces[patches_->triangle_surface[triangle]];
   if (!surface.see_through) return Meeting::kSolid;
-  const auto cell = [&](float place, std::uint32_t leaves) {
-    const auto scaled = static_cast<std::uint32_t>(std::max(place, 0.0F) * static_cast<float>(surface.opacity_scale));
-    return std::min(scaled, leaves * surface.opacity_scale - 1);
-  };
-  const auto row = std::size_t{cell(texel.y, surface.height)} * surface.width * surface.opacity_scale;
-  const auto opacity = patches_->opacity[surface.first_opacity + row + cell(texel.x, surface.width)];
+  const auto opacity = patches_->opacityAt(surface, texel);
   return opacity == 0 ? Meeting::kNothing : opacity == 255 ? Meeting::kSolid : Meeting::kChance;
 }
 

@@ -131,6 +131,17 @@ struct PatchScene {
   std::uint64_t polygons = 0;  ///< coplanar facets (what the paper calls polygons)
   std::uint64_t triangles_dropped = 0;
 
+  /// How much a place of a surface that one can see through holds back; 255: all.
+  [[nodiscard]] std::uint8_t opacityAt(const Surface& surface, const glm::vec2& texel) const {
+    const auto cell = [&](float place, std::uint32_t leaves) {
+      const auto scaled =
+          static_cast<std::uint32_t>((place > 0.0F ? place : 0.0F) * static_cast<float>(surface.opacity_scale));
+      return scaled < leaves * surface.opacity_scale ? scaled : leaves * surface.opacity_scale - 1;
+    };
+    const auto row = std::size_t{cell(texel.y, surface.height)} * surface.width * surface.opacity_scale;
+    return opacity[surface.first_opacity + row + cell(texel.x, surface.width)];
+  }
+
   [[nodiscard]] std::size_t nodeCount() const { return node_area.size(); }
 
   /// A place on a leaf that is not empty, by two uniform numbers in [0, 1); leaf (x, y) of its surface.

@@ -174,8 +174,8 @@ std::uint32_t RayTree::addBlock(const Bvh& tree, std::uint32_t first, std::uint3
   return static_cast<std::uint32_t>(blocks_.size() - 1);
 }
 
-RADIOSITY_CLONES bool RayTree::nearestHit(const glm::vec3& origin, const glm::vec3& direction, float t_max,
-                                          RayHit& hit) const {
+RADIOSITY_CLONES bool RayTree::nearestHit(const glm::vec3& origin, const glm::vec3& direction, float t_max, RayHit& hit,
+                                          std::span<const std::uint32_t> passed) const {
   if (nodes_.empty()) return false;
   const Ray ray(origin, direction);
   struct Task {
@@ -195,6 +195,7 @@ RADIOSITY_CLONES bool RayTree::nearestHit(const glm::vec3& origin, const glm::ve
       meetTriangles(block, ray, lane, turn);
       for (std::size_t k = 0; k < kLanes; ++k) {
         if (!(lane[k] < t_max)) continue;
+        if (!passed.empty() && std::ranges::find(passed, block.triangle[k]) != passed.end()) continue;
         t_max = lane[k];
         hit.triangle = block.triangle[k];
         hit.front = turn[k] > 0.0F;

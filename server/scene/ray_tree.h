@@ -7,6 +7,7 @@
 #include <array>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <span>
 #include <vector>
 
 #include "server/scene/bvh.h"
@@ -21,8 +22,10 @@ class RayTree {
   /// O(n); the Bvh is not needed any more.
   explicit RayTree(const Bvh& tree);
 
-  /// Of the hit with the least t > 0, in units of the direction's length, below t_max; false: none is.
-  [[nodiscard]] bool nearestHit(const glm::vec3& origin, const glm::vec3& direction, float t_max, RayHit& hit) const;
+  /// Of the hit with the least t > 0, in units of the direction's length, below t_max; false: none is. `passed`:
+  /// triangles that do not count.
+  [[nodiscard]] bool nearestHit(const glm::vec3& origin, const glm::vec3& direction, float t_max, RayHit& hit,
+                                std::span<const std::uint32_t> passed = {}) const;
 
  private:
   struct alignas(32) Node {

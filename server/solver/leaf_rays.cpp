@@ -5,6 +5,8 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "server/solver/sampling.h"
+
 namespace radiosity::solver {
 namespace {
 
@@ -12,6 +14,8 @@ namespace {
 constexpr double kLift = 2e-6;
 /// Farther than the unit box is wide.
 constexpr double kFar = 4.0;
+/// After so many that one can see through the next stops a ray.
+constexpr std::size_t kMostSheets = 64;
 
 /// Where in a frame a point of its plane lies.
 glm::dvec2 texelAt(const scene::TriangleFrame& frame, const glm::dvec3& point) {
@@ -122,13 +126,30 @@ std::uint32_t LeafRays::leafAt(const Side& side, std::uint32_t triangle, const g
   return side.first_value + y * side.width + x;
 }
 
-std::uint32_t LeafRays::see(const Place& from, const glm::dvec3& direction) const {
+/// Whether a ray goes on through what it met.
+bool LeafRays::passes(const scene::RayHit& hit, const glm::dvec3& at, std::uint64_t key) const {
+  const auto& surface = patches_.surfaces[patches_.triangle_surface[hit.triangle]];
+  if (!surface.see_through) return false;
+  const double opacity = patches_.opacityAt(surface, glm::vec2(texelAt(patches_.triangles[hit.triangle], at))) / 255.0;
+  return uniformFromKey(mixKeys(key, hit.triangle)) >= opacity;
+}
+
+std::uint32_t LeafRays::see(const Place& from, const glm::dvec3& direction, std::uint64_t key) const {
   const auto origin = lifted(from);
-  scene::RayHit hit{};
-  if (!wide_.nearestHit(glm::vec3(origin), glm::vec3(direction), static_cast<float>(kFar), hit))
-    return direction.y >= 0.0 ? kSkyAbove : kSkyBelow;
-  const auto s = side_of_[patches_.triangle_surface[hit.triangle]][hit.front ? 0 : 1];
-  return s == scene::kNone ? kNothing : stand_in_[leafAt(sides_[s], hit.triangle, origin + hit.t * direction)];
+  std::array<std::uint32_t, kMostSheets> passed;
+  for (std::size_t sheets = 0;; ++sheets) {
+    scene::RayHit hit{};
+    if (!wide_.nearestHit(glm::vec3(origin), glm::vec3(direction), static_cast<float>(kFar), hit,
+                          std::span(passed).first(sheets)))
+      return direction.y >= 0.0 ? kSkyAbove : kSkyBelow;
+    const auto at = origin + hit.t * direction;
+    if (sheets < kMostSheets && passes(hit, at, key)) {
+      passed[sheets] = hit.triangle;  // those that lie in the same place count, too
+      continue;
+    }
+    const auto s = side_of_[patches_.triangle_surface[hit.triangle]][hit.front ? 0 : 1];
+    return s == scene::kNone ? kNothing : stand_in_[leafAt(sides_[s], hit.triangle, at)];
+  }
 }
 
 LeafRays::Sight LeafRays::look(const Place& from, const glm::dvec3& direction) const {

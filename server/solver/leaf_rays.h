@@ -49,8 +49,9 @@ class LeafRays {
   /// The same without bounds; `value` may be one of the sky's.
   [[nodiscard]] Sight look(const Place& from, const glm::dvec3& direction) const;
   /// The leaf value that is seen that way, kNothing or one of the sky's. Where a leaf has no area of its own (buried
-  /// right behind another, or so little of it that its neighbours took it) it is theirs. Costs a third of look().
-  [[nodiscard]] std::uint32_t see(const Place& from, const glm::dvec3& direction) const;
+  /// right behind another, or so little of it that its neighbours took it) it is theirs. What one can see through stops
+  /// the ray or not, by chance from `key`. Costs a third of look().
+  [[nodiscard]] std::uint32_t see(const Place& from, const glm::dvec3& direction, std::uint64_t key) const;
   [[nodiscard]] bool isOpen(const Place& from, const glm::dvec3& to) const;
 
  private:
@@ -58,6 +59,7 @@ class LeafRays {
   const std::vector<Side>& sides_;
   void findStandIns();
   [[nodiscard]] std::uint32_t neighbourOf(const Side& side, std::uint32_t leaf) const;
+  [[nodiscard]] bool passes(const scene::RayHit& hit, const glm::dvec3& at, std::uint64_t key) const;
   /// The leaf of a side that a point of a triangle's plane lies on, by value.
   [[nodiscard]] std::uint32_t leafAt(const Side& side, std::uint32_t triangle, const glm::dvec3& point) const;
 

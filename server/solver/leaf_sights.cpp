@@ -90,11 +90,12 @@ std::uint32_t LeafSights::traceLeaf(std::uint32_t value, const Side& side, std::
   const auto wanted = static_cast<std::uint32_t>(std::ranges::count(seen, kUntraced));
   if (wanted == 0) return 0;
   const auto draw = draws(value, side, half);
+  const auto chance = mixKeys(mixKeys(seed_, value), half);
   for (std::uint32_t k = 0; k < seen.size(); ++k) {
     if (seen[k] != kUntraced) continue;
     const auto at = draw(k);
     const auto place = rays_.placeOn(value, {at.z, at.w});
-    const auto end = rays_.see(place, cosineDirection(place.normal, at.x, at.y));
+    const auto end = rays_.see(place, cosineDirection(place.normal, at.x, at.y), mixKeys(chance, k));
     const bool sky = end == LeafRays::kSkyAbove || end == LeafRays::kSkyBelow;
     seen[k] = sky ? escaped() : end == LeafRays::kNothing ? absorbed() : end;
   }

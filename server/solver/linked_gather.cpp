@@ -38,19 +38,27 @@ double LinkedSolver::rayCost() const {
   return kRayLevel * std::log2(2.0 + static_cast<double>(patches_->triangles.size()));
 }
 
+bool LinkedSolver::mayGather(const scene::PatchScene& patches, const SolverSettings& settings) {
+  return settings.reflected != SolverSettings::Reflected::kByLinks &&
+         LeafGather::leastBytes(2 * patches.leaves.size()) <= settings.link_memory / 2;
+}
+
 bool LinkedSolver::raysPay() const {
   const auto leaves = system_.emission().size();
+  if (!mayGather(*patches_, settings_)) return false;
+  if (!patches_->opacity.empty()) return true;
   if (settings_.reflected == SolverSettings::Reflected::kChosen && patches_->surfaces.size() < kFewestSurfaces)
     return false;
-  if (LeafGather::leastBytes(leaves) > settings_.link_memory / 2) return false;
   if (settings_.reflected != SolverSettings::Reflected::kChosen)
     return settings_.reflected == SolverSettings::Reflected::kByRays;
   const double shots = kFewestShots + kShotsASurface * static_cast<double>(patches_->surfaces.size());
   return kRaysALeaf * static_cast<double>(leaves) * rayCost() < shots * shotCost();
 }
 
-/// Of nodes that are worth links, all channels.
+/// Of nodes that are worth links, all channels. None where there is something to see through: links between sheets that
+/// all but touch are too uncertain.
 double LinkedSolver::leastRadiosity() const {
+  if (!patches_->opacity.empty()) return HUGE_VAL;
   double area = 0.0, flux = 0.0;
   for (const auto& side : sides_) {
     const auto root = side.first_node + side.node_count - 1;

@@ -18,12 +18,14 @@ std::unique_ptr<Solver> makeSolver(std::shared_ptr<const scene::PatchScene> patc
                                    const SolverSettings& settings, const LightSources& sources,
                                    const FormerSolver* former) {
   // Coverage by chance, pixel by pixel, makes links to what one can see through too uncertain to solve over: light
-  // between sheets that all but touch would grow from bounce to bounce.
+  // between sheets that all but touch would grow from bounce to bounce. Rays bring no more than there is.
   const bool see_through = !patches->opacity.empty();
-  if (settings.paper_mode || see_through || patches->leaves.size() * kLeafBytes * kMinShooters > settings.link_memory) {
+  if (settings.paper_mode || (see_through && !LinkedSolver::mayGather(*patches, settings)) ||
+      patches->leaves.size() * kLeafBytes * kMinShooters > settings.link_memory) {
     return std::make_unique<ShootingSolver>(std::move(patches), materials, transport, settings, sources);
   }
-  auto* linked_before = former != nullptr ? dynamic_cast<LinkedSolver*>(&former->solver) : nullptr;
+  // What chance let through before an edit of geometry it may not let through again.
+  auto* linked_before = former != nullptr && !see_through ? dynamic_cast<LinkedSolver*>(&former->solver) : nullptr;
   std::unique_ptr<LinkedSolver> linked;
   if (linked_before != nullptr) {
     linked = std::make_unique<LinkedSolver>(patches, materials, transport, settings, sources, *linked_before,
