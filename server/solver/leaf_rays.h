@@ -51,6 +51,8 @@ class LeafRays {
   /// The leaf value that is seen that way, kNothing or one of the sky's. Where a leaf has no area of its own (buried
   /// right behind another, or so little of it that its neighbours took it) it is theirs. Costs a third of look().
   [[nodiscard]] std::uint32_t see(const Place& from, const glm::dvec3& direction) const;
+  /// Who is seen where a leaf lies: itself, unless it has no area.
+  [[nodiscard]] std::uint32_t standInOf(std::uint32_t value) const { return stand_in_[value]; }
   [[nodiscard]] bool isOpen(const Place& from, const glm::dvec3& to) const;
 
  private:
