@@ -122,7 +122,7 @@ StepOutcome LinkedSolver::chooseRays() {
   if (rounds_ >= kMaxRounds) return exhausted(SolveLimit::kRounds);
   phase_ = Phase::kImprove;
   sample_goal_ = 0.0;
-  if (!gather_) {
+  if (!gathers()) {
     startRays();
     gather_->start();
     return StepOutcome::kRoundDone;
