@@ -108,6 +108,15 @@ TEST(GatheredSolver, ScenesWithNothingToGatherEnd) {
   }
 }
 
+// Samples of links do not lower what rays leave: a round after the other of them, each with little, never ended.
+TEST(GatheredSolver, WithoutMemoryForTheRaysThatTheTargetTakesEnds) {
+  Solve room(cubeQuads(8, {0, 4, 0, 0, 0, 0}, kGrey), 1e-3, 2'000'000, 64);
+  EXPECT_EQ(room.run(), StepOutcome::kExhausted);
+  EXPECT_EQ(room.solver->limit(), SolveLimit::kLinkMemory);
+  EXPECT_LT(room.solver->rounds(), 200U);
+  EXPECT_LE(room.solver->linkCounters().bytes, room.settings.link_memory);
+}
+
 double sum(const LinkedSolver& solver) {
   double sum = 0.0;
   for (const auto& light : solver.irradiance()) sum += static_cast<double>(light.x);
