@@ -15,10 +15,14 @@ constexpr std::size_t kLanes = RayTree::kWidth;
 /// Of a tree of 2^32 triangles, seven of eight children waiting at each level.
 constexpr std::size_t kStackDepth = 512;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
+/// Sides of boxes around whatever there is.
+constexpr float kEverywhere = 1e9F;
 /// By which boxes grow (unit box): by more than rounding moves their sides, and where a ray meets them.
 constexpr float kGrowth = 2e-6F;
 /// By which triangles grow, as a ray sees them (unit box): by more than rounding moves it past their edges.
 constexpr float kEdge = 5e-7F;
+/// Hits no farther apart coincide (unit box): what rounding makes of one place on two triangles.
+constexpr float kSame = 1e-6F;
 /// Instead of the component of a direction that is 0.
 constexpr float kLeast = 1e-20F;
 
@@ -123,8 +127,8 @@ RayTree::RayTree(const Bvh& tree) {
         node.plane[axis][k] = tree.nodes_[n].min[static_cast<int>(axis)] - kGrowth;
         node.plane[axis + 3][k] = tree.nodes_[n].max[static_cast<int>(axis)] + kGrowth;
       }
-      if (count[n] <= kWidth) {
-        node.child[k++] = kLeaf | addBlock(tree, first[n], count[n]);
+      if (count[n] <= kWidth || tree.nodes_[n].count > 0) {
+        node.child[k++] = addLeaf(tree, first[n], count[n]);
         continue;
       }
       node.child[k++] = static_cast<std::uint32_t>(nodes_.size());
@@ -157,6 +161,30 @@ std::vector<std::uint32_t> RayTree::childrenOf(const Bvh& tree, std::uint32_t no
   return below;
 }
 
+/// A block; where a Bvh that is as deep as it may be has left more than fit in one, as where triangles crowd ever
+/// closer to one point, a node above several, none of which a box leaves out.
+std::uint32_t RayTree::addLeaf(const Bvh& tree, std::uint32_t first, std::uint32_t count) {
+  if (count <= kWidth) return kLeaf | addBlock(tree, first, count);
+  const auto index = static_cast<std::uint32_t>(nodes_.size());
+  nodes_.emplace_back();
+  Node node;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    node.plane[axis].fill(kInfinity);
+    node.plane[axis + 3].fill(-kInfinity);
+  }
+  node.child.fill(0);
+  const std::uint32_t part = std::max(kWidth, (count + kWidth - 1) / kWidth);
+  for (std::uint32_t k = 0, from = 0; from < count; ++k, from += part) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      node.plane[axis][k] = -kEverywhere;
+      node.plane[axis + 3][k] = kEverywhere;
+    }
+    node.child[k] = addLeaf(tree, first + from, std::min(part, count - from));
+  }
+  nodes_[index] = node;
+  return index;
+}
+
 std::uint32_t RayTree::addBlock(const Bvh& tree, std::uint32_t first, std::uint32_t count) {
   Block block{};
   for (std::uint32_t k = 0; k < count; ++k) {
@@ -186,26 +214,33 @@ RADIOSITY_CLONES bool RayTree::nearestHit(const glm::vec3& origin, const glm::ve
   std::size_t depth = 1;
   stack[0] = {0, 0.0F};
   bool found = false;
+  float nearest = t_max, reach = t_max;  // what lies as near as the nearest is looked at, too
   alignas(32) float lane[kLanes], turn[kLanes];
   while (depth > 0) {
     const Task task = stack[--depth];
-    if (task.entry > t_max) continue;
+    if (task.entry > reach) continue;
     if ((task.child & kLeaf) != 0) {
       const Block& block = blocks_[task.child & ~kLeaf];
       meetTriangles(block, ray, lane, turn);
       for (std::size_t k = 0; k < kLanes; ++k) {
-        if (!(lane[k] < t_max)) continue;
         if (!passed.empty() && std::ranges::find(passed, block.triangle[k]) != passed.end()) continue;
-        t_max = lane[k];
+        const bool front = turn[k] > 0.0F;
+        if (found && std::abs(lane[k] - nearest) <= kSame) {
+          if (front != hit.front ? hit.front : hit.triangle < block.triangle[k]) continue;
+        } else if (!(lane[k] < nearest)) {
+          continue;
+        }
+        nearest = lane[k];
+        reach = std::min(t_max, nearest + kSame);
         hit.triangle = block.triangle[k];
-        hit.front = turn[k] > 0.0F;
+        hit.front = front;
         found = true;
       }
       continue;
     }
     const Node& node = nodes_[task.child];
     const std::size_t base = depth;
-    for (std::uint32_t mask = meetBoxes(node, ray, t_max, lane); mask != 0; mask &= mask - 1) {
+    for (std::uint32_t mask = meetBoxes(node, ray, reach, lane); mask != 0; mask &= mask - 1) {
       const auto k = static_cast<std::size_t>(std::countr_zero(mask));
       const Task next{node.child[k], lane[k]};
       std::size_t at = depth++;  // the nearest is taken first
@@ -213,7 +248,7 @@ RADIOSITY_CLONES bool RayTree::nearestHit(const glm::vec3& origin, const glm::ve
       stack[at] = next;
     }
   }
-  hit.t = static_cast<double>(t_max);
+  hit.t = static_cast<double>(nearest);
   return found;
 }
 

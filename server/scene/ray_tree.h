@@ -1,7 +1,8 @@
 // The nearest triangle that a ray meets, for very many rays (solver/leaf_sights.h): a Bvh with eight boxes below each
 // (Wald, Benthin and Boulos 2008, "Getting rid of packets"), whose children or triangles are tested together. Single
-// precision; what lies at an edge counts for both triangles, so that no ray slips between two. Immutable once built, so
-// any number of threads may ask.
+// precision; what lies at an edge counts for both triangles, so that no ray slips between two. Of triangles that
+// coincide the one that shows its front is hit, then the first: walls of no thickness are two, back to back. Immutable
+// once built, so any number of threads may ask.
 #pragma once
 
 #include <array>
@@ -41,6 +42,7 @@ class RayTree {
   [[nodiscard]] static std::vector<std::uint32_t> childrenOf(const Bvh& tree, std::uint32_t node,
                                                              const std::vector<std::uint32_t>& count);
   [[nodiscard]] std::uint32_t addBlock(const Bvh& tree, std::uint32_t first, std::uint32_t count);
+  [[nodiscard]] std::uint32_t addLeaf(const Bvh& tree, std::uint32_t first, std::uint32_t count);
   struct Ray;
   [[nodiscard]] static std::uint32_t meetBoxes(const Node& node, const Ray& ray, float t_max, float* entry);
   static void meetTriangles(const Block& block, const Ray& ray, float* t, float* turn);

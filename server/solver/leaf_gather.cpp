@@ -21,8 +21,8 @@ constexpr std::uint32_t kMostTimes = 4;
 /// The square of the error of n rays falls as n^-1.3: measured in three rooms, from 4 to 64 rays (Sobol's points; the
 /// edges of what is seen keep it from n^-1.5).
 constexpr double kFall = 1.3;
-/// Rays that know the level of all light this badly are few, or there is next to none.
-constexpr double kMostOff = 0.25;
+/// By more than this the level of all light is not changed: rays that know it this badly are few.
+constexpr double kMostLevel = 4.0, kMostOff = 0.5;
 /// The residual that is left, of all that is gathered: far below any sampling error, and the level is right anyway.
 constexpr double kSolved = 1e-5;
 constexpr int kMaxSweeps = 400;
@@ -77,9 +77,10 @@ bool LeafGather::advance(double seconds) {
   const auto start = std::chrono::steady_clock::now();
   const auto spent = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); };
   if (stage_ == Stage::kTracing) {
-    const bool traced = sights_.isTraced() && !lost_[0].empty();
+    if (!sights_.isTraced()) is_weighed_ = false;  // nor is it where memory ends in between
     if (!sights_.trace(seconds)) return false;
-    if (!traced) weighRays();
+    if (!is_weighed_) weighRays();
+    is_weighed_ = true;
     inBothHalves([&](std::size_t half) { takeLight(half); });
     stage_ = Stage::kSolving;
   }
@@ -196,30 +197,47 @@ void LeafGather::weighRays() {
   for (std::uint32_t s = 0; s < sides_.size(); ++s) part_[s] = root(s);
 }
 
-/// By part of the scene and channel: what x is to be multiplied by, so that
-/// sum a x = sum a h (r + rho x), h being the part of a leaf's light that other leaves get.
-std::vector<std::array<double, 3>> LeafGather::levels(std::size_t h) const {
+/// x, but for what few rays find too much missing of: with what came over links no leaf gets less than no light.
+double LeafGather::solved(std::size_t h, std::size_t c, std::size_t v) const {
+  return std::max(halves_[h].gmres.solution()[c][v],
+                  -static_cast<double>(light_.irradiance[h][v][static_cast<int>(c)]));
+}
+
+/// By part of the scene and channel: what makes
+/// sum a x = sum a h (r + rho x), h being the part of a leaf's light that other leaves get: x times a factor. Where x
+/// is as much below nothing as above it, as where shooters have sent the mean of what is there and its pattern is left,
+/// that says nothing; all light of the part, with what came over links, makes up for what little is off then.
+std::vector<std::array<LeafGather::Level, 3>> LeafGather::levels(std::size_t h) const {
   struct Sum {
-    double left = 0.0, kept = 0.0;
+    double left = 0.0, kept = 0.0, size = 0.0, all = 0.0;
+    double least = 0.0;  ///< x, where it is below 0, of what came over links there
   };
   std::vector<std::array<Sum, 3>> sums(sides_.size());
-  const auto& solution = halves_[h].gmres.solution();
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
     auto& sum = sums[part_[s]];
     for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
       const double sends = 1.0 - static_cast<double>(lost_[h][v].escaped) - static_cast<double>(lost_[h][v].absorbed);
       for (std::size_t c = 0; c < 3 && area_[v] > 0.0; ++c) {
-        const double reflectance = static_cast<double>(light_.reflectance[v][static_cast<int>(c)]);
+        const auto i = static_cast<int>(c);
+        const double x = solved(h, c, v), over_links = static_cast<double>(light_.irradiance[h][v][i]);
+        const double stays = 1.0 - sends * static_cast<double>(light_.reflectance[v][i]);
         sum[c].left += area_[v] * sends * halves_[h].source[v][c];
-        sum[c].kept += area_[v] * (1.0 - sends * reflectance) * solution[c][v];
+        sum[c].kept += area_[v] * stays * x;
+        sum[c].size += area_[v] * stays * std::abs(x);
+        sum[c].all += area_[v] * stays * (x + over_links);
+        if (x < 0.0) sum[c].least = std::min(sum[c].least, x / over_links);
       }
     }
   }
-  std::vector<std::array<double, 3>> levels(sides_.size(), {1.0, 1.0, 1.0});
+  std::vector<std::array<Level, 3>> levels(sides_.size());
   for (std::size_t p = 0; p < sums.size(); ++p) {
     for (std::size_t c = 0; c < 3; ++c) {
-      const double level = sums[p][c].left / sums[p][c].kept;
-      if (std::abs(level - 1.0) < kMostOff) levels[p][c] = level;
+      const auto& sum = sums[p][c];
+      const double level = sum.left / sum.kept, part = (sum.left - sum.kept) / sum.all;
+      if (2.0 * sum.kept > sum.size && level * sum.least >= -1.0 && level > 1.0 / kMostLevel && level < kMostLevel)
+        levels[p][c].gathered = level;
+      else if (sum.all > 0.0 && std::abs(part) < kMostOff)
+        levels[p][c] = {1.0 + part, part};
     }
   }
   return levels;
@@ -227,14 +245,15 @@ std::vector<std::array<double, 3>> LeafGather::levels(std::size_t h) const {
 
 void LeafGather::take(std::size_t h) {
   const auto levels = this->levels(h);
-  const auto& solution = halves_[h].gmres.solution();
   auto& gathered = gathered_[h];
   gathered.assign(sights_.leafCount(), glm::vec3(0.0F));
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
     for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
       for (std::size_t c = 0; c < 3; ++c) {
         const auto i = static_cast<int>(c);
-        const double arrives = levels[part_[s]][c] * solution[c][v];
+        const auto& level = levels[part_[s]][c];
+        const double arrives =
+            level.gathered * solved(h, c, v) + level.over_links * static_cast<double>(light_.irradiance[h][v][i]);
         gathered[v][i] = static_cast<float>(arrives);
         halves_[h].radiosity[v][c] = halves_[h].source[v][c] + static_cast<double>(light_.reflectance[v][i]) * arrives;
       }
@@ -337,13 +356,13 @@ bool LeafGather::refine(double goal) {
 
 void LeafGather::save(ArchiveWriter& to) const {
   const auto counts = sights_.counts();
-  to(has_gathered_, std::vector<std::uint16_t>(counts.begin(), counts.end()), noise_, block_noise_, escaped_,
-     absorbed_);
+  to(has_gathered_, std::vector<std::uint16_t>(counts.begin(), counts.end()), noise_, block_noise_, escaped_, absorbed_,
+     unsolved_);
 }
 
 bool LeafGather::restore(ArchiveReader& from) {
   std::vector<std::uint16_t> counts;
-  from(has_gathered_, counts, noise_, block_noise_, escaped_, absorbed_);
+  from(has_gathered_, counts, noise_, block_noise_, escaped_, absorbed_, unsolved_);
   const auto fits = [](std::uint16_t count) { return count <= LeafSights::kMostRays; };
   std::size_t all = 0;
   for (const auto count : counts) all += count;

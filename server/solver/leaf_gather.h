@@ -103,7 +103,12 @@ class LeafGather {
   void sweep(std::size_t half, Gmres::Vectors& x, bool affine);
   void take(std::size_t half);
   void weighRays();
-  [[nodiscard]] std::vector<std::array<double, 3>> levels(std::size_t half) const;
+  [[nodiscard]] double solved(std::size_t half, std::size_t channel, std::size_t value) const;
+  /// Factors of x, and of what came over links, that x becomes the sum of.
+  struct Level {
+    double gathered = 1.0, over_links = 0.0;
+  };
+  [[nodiscard]] std::vector<std::array<Level, 3>> levels(std::size_t half) const;
   void weighNoise();
   void weighLost();
   void finish();
@@ -117,6 +122,7 @@ class LeafGather {
   struct Lost {
     float escaped = 0.0F, absorbed = 0.0F;  ///< parts of a leaf's rays
   };
+  bool is_weighed_ = false;                ///< the following are known
   std::array<std::vector<Lost>, 2> lost_;  ///< by half and leaf value
   std::vector<std::uint32_t> part_;        ///< by side: which part of the scene, whose number is that of a side
   LeftLight light_;

@@ -52,6 +52,8 @@ class LeafRays {
   /// right behind another, or so little of it that its neighbours took it) it is theirs. What one can see through stops
   /// the ray or not, by chance from `key`. Costs a third of look().
   [[nodiscard]] std::uint32_t see(const Place& from, const glm::dvec3& direction, std::uint64_t key) const;
+  /// Who is seen where a leaf lies: itself, unless it has no area.
+  [[nodiscard]] std::uint32_t standInOf(std::uint32_t value) const { return stand_in_[value]; }
   [[nodiscard]] bool isOpen(const Place& from, const glm::dvec3& to) const;
 
  private:

@@ -133,6 +133,21 @@ bool LeafSights::isPassed(const Shadows& change, std::uint32_t value, const glm:
                              [&](const scene::ChangedBox& box) { return meetsBox(box, place.position, direction); });
 }
 
+/// Who was seen in the place of a leaf without area, and is no longer: which rays saw that is not known, so none that
+/// ended there are.
+void LeafSights::forgetStandIns(const LeafSights& former, std::vector<std::uint32_t>& value_after) const {
+  const auto after = value_after;
+  for (std::uint32_t before = 0; before < former.leaf_count_; ++before) {
+    const auto stood_in = former.rays_.standInOf(before);
+    if (stood_in == before) continue;
+    const auto seen = stood_in == LeafRays::kNothing ? former.absorbed() : stood_in;
+    const auto here = after[before];
+    const auto now = here == kUntraced ? LeafRays::kNothing : rays_.standInOf(here);
+    const bool is_same = here != kUntraced && (now == LeafRays::kNothing ? absorbed() : now) == after[seen];
+    if (!is_same) value_after[seen] = kUntraced;
+  }
+}
+
 void LeafSights::inherit(const LeafSights& former, std::span<const std::uint32_t> value_before, const Shadows& change) {
   // New leaves get as many rays as most have: in the middle of all.
   auto sorted = former.count_;
@@ -149,6 +164,7 @@ void LeafSights::inherit(const LeafSights& former, std::span<const std::uint32_t
     value_after[value_before[value]] = value;
     if (former.count_[value_before[value]] > 0) counts[value] = former.count_[value_before[value]];
   }
+  forgetStandIns(former, value_after);
   ask(counts);
   before_.assign(leaf_count_, 0);
   inBothHalves([&](std::size_t half) {

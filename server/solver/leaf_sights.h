@@ -64,6 +64,7 @@ class LeafSights {
   std::uint32_t traceLeaf(std::uint32_t value, const Side& side, std::size_t half);
   /// Draws of the rays of a leaf.
   [[nodiscard]] Sobol4 draws(std::uint32_t value, const Side& side, std::size_t half) const;
+  void forgetStandIns(const LeafSights& former, std::vector<std::uint32_t>& value_after) const;
   [[nodiscard]] bool isPassed(const Shadows& change, std::uint32_t value, const glm::dvec4& draw) const;
 
   const std::vector<Side>& sides_;

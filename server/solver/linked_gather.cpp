@@ -130,7 +130,7 @@ StepOutcome LinkedSolver::chooseRays() {
   if (rounds_ >= kMaxRounds) return exhausted(SolveLimit::kRounds);
   phase_ = Phase::kImprove;
   sample_goal_ = 0.0;
-  if (!gather_) {
+  if (!gathers()) {
     startRays();
     gather_->start();
     return StepOutcome::kRoundDone;
@@ -149,6 +149,11 @@ StepOutcome LinkedSolver::chooseRays() {
     if (cost < best) best = cost, part = static_cast<double>(i) / kParts;
   }
   const bool refined = rays > part * room && gather_->refine(part * room / std::max(rays, 1e-300) * gather_->noise());
+  if (!refined && rays > room) {  // out of reach, whatever samples of links do: these get as good as the rays
+    if (links <= rays) return exhausted(SolveLimit::kLinkMemory);
+    sample_goal_ = std::sqrt(rays);
+    return StepOutcome::kRoundDone;
+  }
   if (links > (1.0 - part) * room) sample_goal_ = std::sqrt((1.0 - part) * room);
   if (!refined && sample_goal_ <= 0.0) return exhausted(SolveLimit::kLinkMemory);
   return StepOutcome::kRoundDone;

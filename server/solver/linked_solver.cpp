@@ -163,10 +163,12 @@ Result<StepOutcome> LinkedSolver::step() {
   try {
     return advance();
   } catch (const std::bad_alloc&) {
+    pass_ = Pass::kNone;  // what was half done is begun anew
     return fail(ErrorCode::kTooLarge, "out of memory with " + std::to_string(system_.shooters().size()) +
                                           " shooters and " + std::to_string(system_.bytes() >> 20U) +
                                           " MiB of links; fewer texels, or a larger error, need less");
   } catch (const std::system_error& error) {
+    pass_ = Pass::kNone;
     return fail(ErrorCode::kUnavailable, std::string("no thread to solve with: ") + error.what());
   }
 }
@@ -210,6 +212,7 @@ Result<StepOutcome> LinkedSolver::advance() {
     if (const auto done = measureSlice(); !done) return tl::unexpected<Error>(done.error());
     if (measured_ < wanted_.size()) return StepOutcome::kSlice;
   }
+  settling_ = true;  // also where memory runs out
   settling_ = !settle();
   if (settling_) return StepOutcome::kSlice;
   if (phase_ == Phase::kImprove) return finishRound();
@@ -219,7 +222,7 @@ Result<StepOutcome> LinkedSolver::advance() {
 
 /// An edit is taken in whole: its links would not be true otherwise.
 void LinkedSolver::endWave() {
-  if (gather_ && from_links_ == FromLinks::kNo) gather_->giveUp();
+  if (gather_ && from_links_ == FromLinks::kNo) tryNow([this] { gather_->giveUp(); });
   if (isRepairing() || from_links_ != FromLinks::kNo || settling_ || measured_ == 0) return;
   wanted_.resize(measured_);
   settling_ = true;
@@ -228,7 +231,9 @@ void LinkedSolver::endWave() {
 StepOutcome LinkedSolver::finishRound() {
   growing_ = false;
   ++rounds_;
+  refined_ = true;
   assessStep();
+  refined_ = false;
   return chooseNext();
 }
 
@@ -274,7 +279,12 @@ StepOutcome LinkedSolver::chooseFurther() {
     return StepOutcome::kRoundDone;
   }
   if (refineVariation()) return StepOutcome::kRoundDone;
-  if (by_rays_) return chooseRays();
+  if (by_rays_) {
+    refined_ = true;  // should memory run out, it is chosen anew
+    const auto next = chooseRays();
+    refined_ = false;
+    return next;
+  }
   // Roulette's part of the sampling error, and what was too weak to play, fall with the share alone.
   const double total = std::hypot(by_links_, error_.residual);
   if (total <= targetOfLinks()) return exhausted(SolveLimit::kWithin);
