@@ -57,6 +57,8 @@ void addCounters(const LitScene& lit, Status& status) {
     counters["links.samples"] = static_cast<double>(links.samples);
     counters["links.solutions"] = static_cast<double>(links.solutions);
     counters["links.sweeps"] = static_cast<double>(links.sweeps);
+    counters["rays"] = static_cast<double>(links.rays);
+    counters["skip.raysKept"] = static_cast<double>(links.rays_kept);
     counters["links.rows"] = static_cast<double>(links.rows);
     counters["skip.shotsKept"] = static_cast<double>(links.kept);
     counters["edits.shotsRepaired"] = static_cast<double>(links.repaired);

@@ -62,6 +62,13 @@ std::size_t LeafGather::leastBytes(std::size_t leaves) {
   return leaves * (2 * (kVectors * sizeof(double) + kLights * sizeof(float)) + kFirstRays * LeafSights::kRayBytes);
 }
 
+void LeafGather::inherit(const LeafGather& former, std::span<const std::uint32_t> value_before, const Shadows& change) {
+  const std::size_t leaves = std::max(1U, sights_.leafCount()), least = leastBytes(leaves);
+  const std::size_t rays = most_bytes_ > least ? (most_bytes_ - least) / (leaves * LeafSights::kRayBytes) : 0;
+  const auto most = std::clamp<std::size_t>(rays, kFirstRays, LeafSights::kMostRays);
+  sights_.inherit(former.sights_, value_before, change, static_cast<std::uint16_t>(most));
+}
+
 void LeafGather::start() {
   const auto counts = sights_.counts();
   if (std::ranges::any_of(counts, [](std::uint16_t count) { return count > 0; })) return;

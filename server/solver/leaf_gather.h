@@ -45,9 +45,7 @@ class LeafGather {
   [[nodiscard]] static std::size_t leastBytes(std::size_t leaves);
 
   /// After an edit of geometry (LeafSights::inherit).
-  void inherit(const LeafGather& former, std::span<const std::uint32_t> value_before, const Shadows& change) {
-    sights_.inherit(former.sights_, value_before, change);
-  }
+  void inherit(const LeafGather& former, std::span<const std::uint32_t> value_before, const Shadows& change);
   /// Light was brought, once at least.
   [[nodiscard]] bool hasGathered() const { return has_gathered_; }
   /// All leaves get as many as a solve begins with, where there are none.

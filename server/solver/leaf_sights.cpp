@@ -148,21 +148,22 @@ void LeafSights::forgetStandIns(const LeafSights& former, std::vector<std::uint3
   }
 }
 
-void LeafSights::inherit(const LeafSights& former, std::span<const std::uint32_t> value_before, const Shadows& change) {
+void LeafSights::inherit(const LeafSights& former, std::span<const std::uint32_t> value_before, const Shadows& change,
+                         std::uint16_t most) {
   // New leaves get as many rays as most have: in the middle of all.
   auto sorted = former.count_;
   std::erase(sorted, 0);
   if (sorted.empty()) return;
   std::ranges::nth_element(sorted, sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2));
   const auto usual = sorted[sorted.size() / 2];
-  std::vector<std::uint16_t> counts(leaf_count_, usual);
+  std::vector<std::uint16_t> counts(leaf_count_, std::min(usual, most));
   std::vector<std::uint32_t> value_after(former.leaf_count_ + 2, kUntraced);
   value_after[former.absorbed()] = absorbed();
   value_after[former.escaped()] = escaped();
   for (std::uint32_t value = 0; value < leaf_count_; ++value) {
     if (value_before[value] == scene::kNone) continue;
     value_after[value_before[value]] = value;
-    if (former.count_[value_before[value]] > 0) counts[value] = former.count_[value_before[value]];
+    if (former.count_[value_before[value]] > 0) counts[value] = std::min(most, former.count_[value_before[value]]);
   }
   forgetStandIns(former, value_after);
   ask(counts);
@@ -172,7 +173,8 @@ void LeafSights::inherit(const LeafSights& former, std::span<const std::uint32_t
       const auto before = value_before[value];
       if (count_[value] == 0 || before == scene::kNone || former.count_[before] == 0) continue;
       const auto draw = draws(value, rays_.sideOf(value), half);
-      const auto old = std::span(former.seen_[half]).subspan(former.first_[before], former.count_[before]);
+      const auto old =
+          std::span(former.seen_[half]).subspan(former.first_[before], std::min(former.count_[before], count_[value]));
       for (std::uint32_t k = 0; k < old.size(); ++k) {
         if (old[k] == kUntraced) continue;
         const auto end = value_after[old[k]];

@@ -47,8 +47,9 @@ class LeafSights {
 
   /// After an edit of geometry, at first: rays of the scene before that pass nothing that changed see what they saw.
   /// `value_before`: by leaf value, what it was there, or kNone where it is new, moved or altered. All others are
-  /// traced with the next trace(), so that all see what they would without it.
-  void inherit(const LeafSights& former, std::span<const std::uint32_t> value_before, const Shadows& change);
+  /// traced with the next trace(), so that all see what they would without it. No half of a leaf gets more than `most`.
+  void inherit(const LeafSights& former, std::span<const std::uint32_t> value_before, const Shadows& change,
+               std::uint16_t most);
 
   [[nodiscard]] std::size_t bytes() const;
   /// Bytes of a ray asked for.

@@ -50,7 +50,7 @@ TEST(LeafSightsEdit, ALeafThatHasAreaAgainIsSeenInsteadOfWhoStoodInForIt) {
   std::vector<std::uint32_t> value_before(fresh.leafCount());
   std::iota(value_before.begin(), value_before.end(), 0U);
   value_before[kLeaf] = scene::kNone;
-  edited.inherit(former, value_before, shadows);
+  edited.inherit(former, value_before, shadows, LeafSights::kMostRays);
   EXPECT_GT(edited.kept(), former.traced() / 2);
   ASSERT_TRUE(edited.trace(HUGE_VAL));
   EXPECT_EQ(all(edited), all(fresh));
@@ -94,7 +94,7 @@ TEST(LeafSightsEdit, OfCoincidentSurfacesStayWhatTheyWere) {
     change.altered[former.leafCount() + i - 9] = true;
   }
   const Shadows shadows(*after.patches, sides_after, change);
-  edited.inherit(former, value_before, shadows);
+  edited.inherit(former, value_before, shadows, LeafSights::kMostRays);
   ASSERT_TRUE(edited.trace(HUGE_VAL));
   const auto a = all(edited), b = all(fresh);
   std::size_t other = 0;
