@@ -95,7 +95,6 @@ bool LeafGather::advance(double seconds) {
     inBothHalves([&](std::size_t h) {
       while (!halves_[h].done && spent() < seconds) {
         halves_[h].done = halves_[h].gmres.advance([&](Gmres::Vectors& x, bool affine) { sweep(h, x, affine); });
-        if (halves_[h].done) take(h);
       }
     });
     if (!halves_[0].done || !halves_[1].done) return false;
@@ -106,7 +105,13 @@ bool LeafGather::advance(double seconds) {
 
 /// What the solution tells of itself; what it was made with takes no more memory.
 void LeafGather::finish() {
-  weighNoise();
+  takeSolutions();
+  LeafSmoother smoother(sides_, area_);
+  smoother.smooth(solved_);
+  inBothHalves([&](std::size_t half) { take(half); });
+  solved_ = {};
+  bias_ = smoother.bias();
+  weighNoise(smoother);
   weighLost();
   unsolved_ = 0.0;
   double area = 0.0;
@@ -206,8 +211,7 @@ void LeafGather::weighRays() {
 
 /// x, but for what few rays find too much missing of: with what came over links no leaf gets less than no light.
 double LeafGather::solved(std::size_t h, std::size_t c, std::size_t v) const {
-  return std::max(halves_[h].gmres.solution()[c][v],
-                  -static_cast<double>(light_.irradiance[h][v][static_cast<int>(c)]));
+  return std::max(solved_[h][v][c], -static_cast<double>(light_.irradiance[h][v][static_cast<int>(c)]));
 }
 
 /// By part of the scene and channel: what makes
@@ -250,6 +254,15 @@ std::vector<std::array<LeafGather::Level, 3>> LeafGather::levels(std::size_t h) 
   return levels;
 }
 
+void LeafGather::takeSolutions() {
+  for (std::size_t h = 0; h < 2; ++h) {
+    const auto& solution = halves_[h].gmres.solution();
+    solved_[h].assign(sights_.leafCount(), {});
+    for (std::uint32_t v = 0; v < sights_.leafCount(); ++v)
+      solved_[h][v] = {solution[0][v], solution[1][v], solution[2][v], 0.0};
+  }
+}
+
 void LeafGather::take(std::size_t h) {
   const auto levels = this->levels(h);
   auto& gathered = gathered_[h];
@@ -269,16 +282,19 @@ void LeafGather::take(std::size_t h) {
 }
 
 /// What the rays of both halves make of the same light: light that differs is not theirs.
-void LeafGather::weighNoise() {
+void LeafGather::weighNoise(const LeafSmoother& smoother) {
   const std::size_t leaves = sights_.leafCount();
   std::vector<Light> radiosity(leaves + 2, Light{});
   for (std::size_t v = 0; v < leaves; ++v) {
     for (std::size_t c = 0; c < 3; ++c)
       radiosity[v][c] = 0.5 * (halves_[0].radiosity[v][c] + halves_[1].radiosity[v][c]);
   }
-  inBothHalves([&](std::size_t half) { average(half, radiosity, halves_[half].arriving); });
+  inBothHalves([&](std::size_t half) {
+    average(half, radiosity, halves_[half].arriving);
+    smoother.apply(halves_[half].arriving);
+  });
   block_noise_.assign((leaves + kBlock - 1) / kBlock, 0.0);
-  noise_ = 0.0;
+  noise_ = bias_;
   for (std::size_t v = 0; v < leaves; ++v) {
     double square = 0.0;
     for (std::size_t c = 0; c < 3; ++c) {
@@ -337,7 +353,9 @@ bool LeafGather::refine(double goal) {
   std::priority_queue<Block> queue;
   for (std::uint32_t b = 0; b < rays.size(); ++b)
     if (block_noise_[b] > 0.0 && rays[b] > 0) queue.push({gain(b, 1), b, 1});
-  double noise = noise_;
+  // What smoothing takes of the light becomes less as there is less noise to smooth.
+  double noise = noise_ - bias_;
+  goal *= noise_ > 0.0 ? noise / noise_ : 1.0;
   std::size_t bytes = leastBytes(counts.size()) + sights_.bytes();
   std::vector<std::uint32_t> times(block_noise_.size(), 1);
   bool any = false;
@@ -363,13 +381,13 @@ bool LeafGather::refine(double goal) {
 
 void LeafGather::save(ArchiveWriter& to) const {
   const auto counts = sights_.counts();
-  to(has_gathered_, std::vector<std::uint16_t>(counts.begin(), counts.end()), noise_, block_noise_, escaped_, absorbed_,
-     unsolved_);
+  to(has_gathered_, std::vector<std::uint16_t>(counts.begin(), counts.end()), noise_, bias_, block_noise_, escaped_,
+     absorbed_, unsolved_);
 }
 
 bool LeafGather::restore(ArchiveReader& from) {
   std::vector<std::uint16_t> counts;
-  from(has_gathered_, counts, noise_, block_noise_, escaped_, absorbed_, unsolved_);
+  from(has_gathered_, counts, noise_, bias_, block_noise_, escaped_, absorbed_, unsolved_);
   const auto fits = [](std::uint16_t count) { return count <= LeafSights::kMostRays; };
   std::size_t all = 0;
   for (const auto count : counts) all += count;

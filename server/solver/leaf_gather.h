@@ -24,6 +24,7 @@
 
 #include "server/solver/gmres.h"
 #include "server/solver/leaf_sights.h"
+#include "server/solver/leaf_smoother.h"
 
 namespace radiosity::solver {
 
@@ -64,6 +65,8 @@ class LeafGather {
   [[nodiscard]] std::span<const glm::vec3> irradiance(std::size_t half) const { return gathered_[half]; }
   /// Square of the error that rays leave in the mean of the halves: sum over leaves and channels, times area.
   [[nodiscard]] double noise() const { return noise_; }
+  /// The part of it that the halves have in common: what smoothing took of the light itself.
+  [[nodiscard]] double bias() const { return bias_; }
   /// Flux that the equation does not account for, of what is gathered.
   [[nodiscard]] double unsolved() const { return unsolved_; }
   /// Flux that leaves the scene, and that falls on unlit sides, by channel.
@@ -86,7 +89,7 @@ class LeafGather {
 
  private:
   /// Four, so that a leaf's are one vector; the last is 0.
-  using Light = std::array<double, 4>;
+  using Light = LeafSmoother::Light;
   struct Half {
     std::vector<Light> source;     ///< r; by what may be seen, so two more than leaves
     std::vector<Light> radiosity;  ///< r + rho x
@@ -100,6 +103,7 @@ class LeafGather {
   void average(std::size_t half, const std::vector<Light>& radiosity, std::vector<Light>& mean) const;
   void sweep(std::size_t half, Gmres::Vectors& x, bool affine);
   void take(std::size_t half);
+  void takeSolutions();
   void weighRays();
   [[nodiscard]] double solved(std::size_t half, std::size_t channel, std::size_t value) const;
   /// Factors of x, and of what came over links, that x becomes the sum of.
@@ -107,7 +111,7 @@ class LeafGather {
     double gathered = 1.0, over_links = 0.0;
   };
   [[nodiscard]] std::vector<std::array<Level, 3>> levels(std::size_t half) const;
-  void weighNoise();
+  void weighNoise(const LeafSmoother& smoother);
   void weighLost();
   void finish();
 
@@ -126,8 +130,9 @@ class LeafGather {
   LeftLight light_;
   Stage stage_ = Stage::kDone;
   std::array<Half, 2> halves_;
+  std::array<std::vector<Light>, 2> solved_;  ///< by half and leaf value: x, smoothed; while taking it
   std::array<std::vector<glm::vec3>, 2> gathered_;
-  double noise_ = 0.0, unsolved_ = 0.0;
+  double noise_ = 0.0, bias_ = 0.0, unsolved_ = 0.0;
   std::vector<double> block_noise_;  ///< parts of it, by kBlock leaves
   std::array<double, 3> escaped_{}, absorbed_{};
 };

@@ -62,7 +62,9 @@ void LinkedSolver::assess() {
     return;
   }
   const double kept = std::min(kMostKept, (1.0 - lostPart()) * reflected / received);
-  by_links_ = error_.sampling = field.sampling();
+  by_links_ = field.sampling();
+  if (gathers()) by_links_ = std::hypot(by_links_, std::sqrt(gather_->bias() / field.square()));
+  error_.sampling = by_links_;
   error_.discretization = field.discretization();
   const double varying = std::sqrt(planner_.variation(system_, unshot_, *patches_) / field.square());
   error_.residual =

@@ -38,14 +38,14 @@ double LinkedSolver::rayCost() const {
   return kRayLevel * std::log2(2.0 + static_cast<double>(patches_->triangles.size()));
 }
 
-bool LinkedSolver::mayGather(const scene::PatchScene& patches, const SolverSettings& settings) {
+bool LinkedSolver::mayGather(std::size_t leaves, const SolverSettings& settings) {
   return settings.reflected != SolverSettings::Reflected::kByLinks &&
-         LeafGather::leastBytes(2 * patches.leaves.size()) <= settings.link_memory / 2;
+         LeafGather::leastBytes(leaves) <= settings.link_memory / 2;
 }
 
 bool LinkedSolver::raysPay() const {
   const auto leaves = system_.emission().size();
-  if (!mayGather(*patches_, settings_)) return false;
+  if (!mayGather(leaves, settings_)) return false;
   if (!patches_->opacity.empty()) return true;
   if (settings_.reflected == SolverSettings::Reflected::kChosen && patches_->surfaces.size() < kFewestSurfaces)
     return false;
@@ -149,9 +149,10 @@ StepOutcome LinkedSolver::chooseRays() {
     if (cost < best) best = cost, part = static_cast<double>(i) / kParts;
   }
   const bool refined = rays > part * room && gather_->refine(part * room / std::max(rays, 1e-300) * gather_->noise());
-  if (!refined && rays > room) {  // out of reach, whatever samples of links do: these get as good as the rays
-    if (links <= rays) return exhausted(SolveLimit::kLinkMemory);
-    sample_goal_ = std::sqrt(rays);
+  if (!refined && rays > part * room) {  // no more to be had: links get what they leave, or as good as they are
+    const double goal = std::max(room - rays, rays);
+    if (links <= goal) return exhausted(SolveLimit::kLinkMemory);
+    sample_goal_ = std::sqrt(goal);
     return StepOutcome::kRoundDone;
   }
   if (links > (1.0 - part) * room) sample_goal_ = std::sqrt((1.0 - part) * room);

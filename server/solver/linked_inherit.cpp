@@ -49,7 +49,6 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
   replayed_ = former.replayed_;
   share_part_ = former.share_part_;
   by_rays_ = former.by_rays_;
-  if (by_rays_) memory_.leaveHalf();
   planner_.inherit(former.planner_, numbers.side_after);
   inheritLights(former, numbers);
   takeMaterials(materials);

@@ -64,7 +64,6 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
   takeSources(sources);
   share_part_ = 1.0 / settings_.planner.first_shooters;
   by_rays_ = raysPay();
-  if (by_rays_) memory_.leaveHalf();  // to the rays
   for (auto& half : half_) half.assign(system_.emission().size(), glm::vec3(0.0F));
   findUnshot();
 }

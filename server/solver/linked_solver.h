@@ -73,8 +73,8 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] bool save(ArchiveWriter& to) const override;
   [[nodiscard]] bool restore(ArchiveReader& from) override;
 
-  /// Whether rays could bring reflected light, as far as settings and memory go.
-  [[nodiscard]] static bool mayGather(const scene::PatchScene& patches, const SolverSettings& settings);
+  /// Whether rays could bring reflected light to so many leaf values, as far as settings and memory go.
+  [[nodiscard]] static bool mayGather(std::size_t leaves, const SolverSettings& settings);
   /// After an edit of geometry: no light before all links are true.
   void beExact();
   /// What the links of all lights can come to take.

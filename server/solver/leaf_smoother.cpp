@@ -1,0 +1,151 @@
+#include "server/solver/leaf_smoother.h"
+
+#include <algorithm>
+
+namespace radiosity::solver {
+namespace {
+
+using Light = LeafSmoother::Light;
+
+/// Distances, in leaves, of those that are averaged, pass after pass.
+constexpr std::array<std::uint32_t, 3> kSteps{1, 2, 4};
+/// How far a leaf goes is told by what it and those so near to it would gain. Of fewer what is gained is chance, which
+/// the error that is stated does not know: with 2 the truth was 1.34 times as much in two rooms, with 6 it is 1.2
+/// times.
+constexpr std::uint32_t kAround = 6;
+
+double dot(const Light& a, const Light& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+Light less(const Light& a, const Light& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2], 0.0}; }
+
+void move(Light& from, const Light& to, double part) {
+  for (std::size_t c = 0; c < 3; ++c) from[c] += part * (to[c] - from[c]);
+}
+
+/// The error of a step of length w towards the mean is a + 2 b w + c w^2.
+struct Gain {
+  double slope = 0.0, bend = 0.0;
+  std::uint32_t leaves = 1;
+};
+
+/// Sums over all leaves before (x, y), for sums over rectangles (Crow 1984, "Summed-area tables").
+class GainTable {
+ public:
+  GainTable(const Side& side, std::span<const Gain> gains)
+      : width_(side.width + 1), height_(side.height + 1), sums_(std::size_t{width_} * height_) {
+    for (std::uint32_t y = 1; y < height_; ++y) {
+      Gain row;
+      for (std::uint32_t x = 1; x < width_; ++x) {
+        const auto& gain = gains[(y - 1) * side.width + x - 1];
+        row = {row.slope + gain.slope, row.bend + gain.bend, 1};
+        const auto& above = sums_[(y - 1) * width_ + x];
+        sums_[y * width_ + x] = {above.slope + row.slope, above.bend + row.bend, 1};
+      }
+    }
+  }
+
+  /// Of a square of leaves around (x, y), and how many these are.
+  [[nodiscard]] Gain around(std::uint32_t x, std::uint32_t y) const {
+    const auto x0 = x - std::min(x, kAround), x1 = std::min(x + kAround + 1, width_ - 1);
+    const auto y0 = y - std::min(y, kAround), y1 = std::min(y + kAround + 1, height_ - 1);
+    const auto &a = sums_[y0 * width_ + x0], &b = sums_[y0 * width_ + x1];
+    const auto &c = sums_[y1 * width_ + x0], &d = sums_[y1 * width_ + x1];
+    return {d.slope - b.slope - c.slope + a.slope, d.bend - b.bend - c.bend + a.bend, (x1 - x0) * (y1 - y0)};
+  }
+
+ private:
+  std::uint32_t width_, height_;
+  std::vector<Gain> sums_;
+};
+
+}  // namespace
+
+/// Binomial, of the leaves there are.
+void LeafSmoother::average(const Side& side, std::uint32_t step, std::span<const Light> from,
+                           std::span<Light> means) const {
+  const auto near = [&](std::uint32_t at, std::uint32_t size, auto take) {
+    take(at, 2.0);
+    if (at >= step) take(at - step, 1.0);
+    if (at + step < size) take(at + step, 1.0);
+  };
+  for (std::uint32_t y = 0; y < side.height; ++y) {
+    for (std::uint32_t x = 0; x < side.width; ++x) {
+      Light sum{};
+      double all = 0.0;
+      near(y, side.height, [&](std::uint32_t ny, double wy) {
+        near(x, side.width, [&](std::uint32_t nx, double wx) {
+          const auto leaf = ny * side.width + nx;
+          const double weight = wx * wy * area_[side.first_value + leaf];
+          for (std::size_t c = 0; c < 3; ++c) sum[c] += weight * from[leaf][c];
+          all += weight;
+        });
+      });
+      auto& mean = means[y * side.width + x];
+      mean = from[y * side.width + x];
+      for (std::size_t c = 0; c < 3 && all > 0.0; ++c) mean[c] = sum[c] / all;
+    }
+  }
+}
+
+void LeafSmoother::smooth(std::array<std::vector<Light>, 2>& halves) {
+  const auto raw = halves;
+  towards_.assign(kSteps.size(), std::vector<float>(area_.size(), 0.0F));
+  bias_ = 0.0;
+  double taken = 0.0;
+  for (const auto& side : sides_) {
+    if (side.leaf_count < 2) continue;
+    for (std::size_t pass = 0; pass < kSteps.size(); ++pass) smoothSide(side, pass, raw, halves);
+    for (auto v = side.first_value; v < side.first_value + side.leaf_count; ++v)
+      taken += area_[v] * dot(less(halves[0][v], raw[0][v]), less(halves[1][v], raw[1][v]));
+  }
+  bias_ += std::max(0.0, taken);
+}
+
+void LeafSmoother::smoothSide(const Side& side, std::size_t pass, const std::array<std::vector<Light>, 2>& raw,
+                              std::array<std::vector<Light>, 2>& halves) {
+  const auto first = side.first_value;
+  std::array<std::vector<Light>, 2> means;
+  for (std::size_t h = 0; h < 2; ++h) {
+    means[h].resize(side.leaf_count);
+    average(side, kSteps[pass], std::span(halves[h]).subspan(first, side.leaf_count), means[h]);
+  }
+  std::vector<Gain> gains(side.leaf_count);
+  for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+    const auto v = first + leaf;
+    // Of what was taken so far (p) and what the step would take (q) the halves' noise is independent, so that it
+    // cancels in products across; of the noise that is left half the difference is known.
+    const auto p0 = less(halves[0][v], raw[0][v]), p1 = less(halves[1][v], raw[1][v]);
+    const auto q0 = less(means[0][leaf], halves[0][v]), q1 = less(means[1][leaf], halves[1][v]);
+    const auto noise = less(halves[0][v], halves[1][v]), change = less(q0, q1);
+    gains[leaf] = {area_[v] * (0.5 * (dot(p0, q1) + dot(q0, p1)) + 0.25 * dot(noise, change)),
+                   area_[v] * (dot(q0, q1) + 0.25 * dot(change, change)), 1};
+  }
+  const GainTable table(side, gains);
+  for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+    const auto gain = table.around(leaf % side.width, leaf / side.width);
+    // One number that is chosen by the noise of n leaves gains twice an nth of it by chance (Mallows 1973, "Some
+    // comments on Cp"), which neither the halves' difference nor what they have in common shows.
+    const auto noise = less(halves[0][first + leaf], halves[1][first + leaf]);
+    bias_ += area_[first + leaf] * 2.0 * 0.25 * dot(noise, noise) / gain.leaves;
+    const double part = gain.slope >= 0.0 ? 0.0 : gain.bend > -gain.slope ? -gain.slope / gain.bend : 1.0;
+    towards_[pass][first + leaf] = static_cast<float>(part);
+    for (std::size_t h = 0; h < 2; ++h)
+      move(halves[h][first + leaf], means[h][leaf], static_cast<double>(towards_[pass][first + leaf]));
+  }
+}
+
+void LeafSmoother::apply(std::vector<Light>& values) const {
+  std::vector<Light> means;
+  for (const auto& side : sides_) {
+    if (side.leaf_count < 2) continue;
+    for (std::size_t pass = 0; pass < towards_.size(); ++pass) {
+      means.resize(side.leaf_count);
+      average(side, kSteps[pass], std::span(values).subspan(side.first_value, side.leaf_count), means);
+      for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
+        move(values[side.first_value + leaf], means[leaf],
+             static_cast<double>(towards_[pass][side.first_value + leaf]));
+    }
+  }
+}
+
+}  // namespace radiosity::solver

@@ -1,0 +1,45 @@
+// Takes out of gathered light what single leaves got by chance, where their neighbours tell: light that comes from all
+// around changes little from leaf to leaf, and the noise of rays does not know of the next leaf's. Each leaf moves
+// towards the mean of those around it, on its own side, as far as that lowers the error: two independent halves tell
+// how much noise that takes away and how much of the light itself. (Wavelets with holes: Dammertz and others 2010,
+// "Edge-avoiding a-trous wavelet transform"; errors from two halves: Rousselle, Knaus and Zwicker 2012, "Adaptive
+// rendering with non-local means filtering".) Plain values; one thread.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "server/solver/side.h"
+
+namespace radiosity::solver {
+
+class LeafSmoother {
+ public:
+  /// By channel; the last counts for nothing.
+  using Light = std::array<double, 4>;
+
+  /// `area`: by leaf value, 0 where there is no leaf. Both are to outlive it.
+  LeafSmoother(const std::vector<Side>& sides, const std::vector<double>& area) : sides_(sides), area_(area) {}
+
+  /// Smooths both halves (by leaf value), and remembers how. O(leaves).
+  void smooth(std::array<std::vector<Light>, 2>& halves);
+  /// Does the same to other values.
+  void apply(std::vector<Light>& values) const;
+  /// What it took of the light itself, or put where there was less, and what was gained by chance: squares of it, times
+  /// area, all leaves and channels. An estimate, of which what was taken is not below zero.
+  [[nodiscard]] double bias() const { return bias_; }
+
+ private:
+  void smoothSide(const Side& side, std::size_t pass, const std::array<std::vector<Light>, 2>& raw,
+                  std::array<std::vector<Light>, 2>& halves);
+  void average(const Side& side, std::uint32_t step, std::span<const Light> from, std::span<Light> means) const;
+
+  const std::vector<Side>& sides_;
+  const std::vector<double>& area_;
+  std::vector<std::vector<float>> towards_;  ///< by pass and leaf value: part of the way to the mean
+  double bias_ = 0.0;
+};
+
+}  // namespace radiosity::solver
