@@ -182,8 +182,8 @@ TEST(LeafGather, ItsNoiseIsWhatItIsOffBy) {
     }
   }
   EXPECT_GT(off, 10.0 * better.gather.noise());
-  // Squares: light goes on to bounce, which is not counted, a tenth of it; and on sides of 16 leaves what smoothing gains
-  // by chance is counted in full, also where it smooths as far as it may, a fifth too much.
+  // Squares: light goes on to bounce, which is not counted, a tenth of it; and on sides of 16 leaves what smoothing
+  // gains by chance is counted in full, also where it smooths as far as it may, a fifth too much.
   EXPECT_LT(off / stated, 1.15);
   EXPECT_GT(off / stated, 0.8);
 }
