@@ -6,7 +6,8 @@
 ///
 /// The thread sanitizer has one alone: GCC instruments what decides as well, which runs before the sanitizer does, and
 /// the program ends with a segmentation fault before main().
-#if defined(__SANITIZE_THREAD__)
+/// So has Clang, which builds for static checks and fuzzers: its sanitizers instrument that as well.
+#if defined(__SANITIZE_THREAD__) || defined(__clang__)
 #define RADIOSITY_CLONES
 #else
 #define RADIOSITY_CLONES __attribute__((target_clones("avx2", "default")))

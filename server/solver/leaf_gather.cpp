@@ -29,13 +29,13 @@ constexpr int kMaxSweeps = 400;
 /// Of a leaf in each half, doubles: what GMRES keeps, and the sweeps; and what there is of its light, floats.
 constexpr std::size_t kVectors = 3 * (Gmres::kRestart + 3) + 3 * 4, kLights = 5 * 3 + 2;
 
-template <typename Light>
+using Light = LeafSmoother::Light;
+
 __attribute__((always_inline)) inline void add(Light& sum, const Light& light) {
   for (std::size_t c = 0; c < 4; ++c) sum[c] += light[c];
 }
 
-/// Means over the rays of leaves [0, count).
-template <typename Light>
+/// Means over the rays of all leaves.
 RADIOSITY_CLONES void averageSeen(const LeafSights& sights, std::size_t half, const Light* radiosity, Light* mean) {
   const auto counts = sights.counts();
   for (std::uint32_t value = 0; value < sights.leafCount(); ++value) {
