@@ -15,6 +15,18 @@ using test::makeQuadScene;
 
 constexpr std::size_t kPlenty = std::size_t{1} << 28U;
 
+/// All that shines, where nothing comes over links.
+LeftLight shining(const test::QuadScene& scene, const std::vector<Side>& sides) {
+  LeftLight light;
+  for (const auto& side : sides) {
+    light.emission.insert(light.emission.end(), side.leaf_count, scene.materials.emission[side.first_node]);
+    light.reflectance.insert(light.reflectance.end(), side.leaf_count, scene.materials.reflectance[side.first_node]);
+  }
+  for (auto& half : light.irradiance) half.assign(light.emission.size(), glm::vec3(0.0F));
+  light.shot = light.irradiance;
+  return light;
+}
+
 /// A cube whose faces shine by themselves: nothing comes over links, so what is gathered is all irradiance.
 class Gathered {
  public:
@@ -27,18 +39,7 @@ class Gathered {
     gather.start();
   }
 
-  [[nodiscard]] LeftLight light() const {
-    LeftLight light;
-    for (const auto& side : sides_) {
-      for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
-        light.emission.push_back(scene_.materials.emission[side.first_node + leaf]);
-        light.reflectance.push_back(scene_.materials.reflectance[side.first_node + leaf]);
-      }
-    }
-    for (auto& half : light.irradiance) half.assign(light.emission.size(), glm::vec3(0.0F));
-    light.shot = light.irradiance;
-    return light;
-  }
+  [[nodiscard]] LeftLight light() const { return shining(scene_, sides_); }
   void solve() {
     gather.begin(light());
     while (!gather.advance(0.001)) continue;
@@ -105,13 +106,7 @@ TEST(LeafGather, WhatIsSentArrivesOrIsLost) {
   const auto sides = makeSides(*scene.patches);
   LeafGather gather(*scene.patches, sides, 1, kPlenty);
   gather.start();
-  LeftLight light;
-  for (const auto& side : sides) {
-    light.emission.insert(light.emission.end(), side.leaf_count, scene.materials.emission[side.first_node]);
-    light.reflectance.insert(light.reflectance.end(), side.leaf_count, scene.materials.reflectance[side.first_node]);
-  }
-  for (auto& half : light.irradiance) half.assign(light.emission.size(), glm::vec3(0.0F));
-  light.shot = light.irradiance;
+  const auto light = shining(scene, sides);
   gather.begin(light);
   while (!gather.advance(0.001)) continue;
   double sent = 0.0, arrived = 0.0;
@@ -142,13 +137,7 @@ TEST(LeafGather, RoomsApartKeepTheirLightToThemselves) {
     const auto sides = makeSides(*scene.patches);
     LeafGather gather(*scene.patches, sides, 1, kPlenty);
     gather.start();
-    LeftLight light;
-    for (const auto& side : sides) {
-      light.emission.insert(light.emission.end(), side.leaf_count, scene.materials.emission[side.first_node]);
-      light.reflectance.insert(light.reflectance.end(), side.leaf_count, scene.materials.reflectance[side.first_node]);
-    }
-    for (auto& half : light.irradiance) half.assign(light.emission.size(), glm::vec3(0.0F));
-    light.shot = light.irradiance;
+    const auto light = shining(scene, sides);
     gather.begin(light);
     while (!gather.advance(0.001)) continue;
     double sum = 0.0;
@@ -198,13 +187,7 @@ TEST(LeafGather, MoreRaysGoWhereTheyLowerNoiseMost) {
   const auto sides = makeSides(*scene.patches);
   LeafGather gather(*scene.patches, sides, 1, kPlenty);
   gather.start();
-  LeftLight light;
-  for (const auto& side : sides) {
-    light.emission.insert(light.emission.end(), side.leaf_count, scene.materials.emission[side.first_node]);
-    light.reflectance.insert(light.reflectance.end(), side.leaf_count, scene.materials.reflectance[side.first_node]);
-  }
-  for (auto& half : light.irradiance) half.assign(light.emission.size(), glm::vec3(0.0F));
-  light.shot = light.irradiance;
+  const auto light = shining(scene, sides);
   const auto solve = [&] {
     gather.begin(light);
     while (!gather.advance(0.001)) continue;
