@@ -7,23 +7,13 @@
 #include <random>
 
 #include "server/scene/scene.h"
+#include "tests/unit/scene/triangle_soup.h"
 
 namespace radiosity::scene {
 namespace {
 
-std::vector<Bvh::Triangle> soup(std::size_t count) {
-  std::mt19937 random(3);
-  std::uniform_real_distribution<float> uniform(-0.5F, 0.5F);
-  std::vector<Bvh::Triangle> triangles(count);
-  for (auto& t : triangles) {
-    const glm::vec3 centre(uniform(random), uniform(random), uniform(random));
-    for (auto& p : t) p = centre + 0.2F * glm::vec3(uniform(random), uniform(random), uniform(random));
-  }
-  return triangles;
-}
-
 TEST(Bvh, FindsTheHitsThatASearchOfAllTrianglesFinds) {
-  const auto triangles = soup(500);
+  const auto triangles = test::triangleSoup(500, 3);
   const Bvh tree(triangles);
   std::vector<Bvh> single;
   for (const auto& t : triangles) single.emplace_back(std::vector<Bvh::Triangle>{t});
@@ -51,7 +41,7 @@ TEST(Bvh, FindsTheHitsThatASearchOfAllTrianglesFinds) {
 }
 
 TEST(Bvh, TheNearestHitIsTheFirstOfAll) {
-  const Bvh tree(soup(500));
+  const Bvh tree(test::triangleSoup(500, 3));
   std::mt19937 random(5);
   std::uniform_real_distribution<double> uniform(-0.5, 0.5);
   std::size_t met = 0, missed = 0;

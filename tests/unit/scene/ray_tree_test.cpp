@@ -6,27 +6,17 @@
 #include <random>
 
 #include "server/scene/bvh.h"
+#include "tests/unit/scene/triangle_soup.h"
 
 namespace radiosity::scene {
 namespace {
-
-std::vector<Bvh::Triangle> soup(std::size_t count, std::uint32_t seed) {
-  std::mt19937 random(seed);
-  std::uniform_real_distribution<float> uniform(-0.5F, 0.5F);
-  std::vector<Bvh::Triangle> triangles(count);
-  for (auto& t : triangles) {
-    const glm::vec3 centre(uniform(random), uniform(random), uniform(random));
-    for (auto& p : t) p = centre + 0.2F * glm::vec3(uniform(random), uniform(random), uniform(random));
-  }
-  return triangles;
-}
 
 // For every number of triangles around what fits in a block, and in a node of blocks.
 TEST(RayTree, FindsTheHitThatTheDoublePrecisionTreeFinds) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> uniform(-0.5, 0.5);
   for (const std::size_t count : {1U, 7U, 8U, 9U, 64U, 65U, 700U}) {
-    const Bvh exact(soup(count, 3));
+    const Bvh exact(test::triangleSoup(count, 3));
     const RayTree tree(exact);
     std::size_t met = 0, missed = 0;
     for (int ray = 0; ray < 2000; ++ray) {
@@ -55,7 +45,7 @@ TEST(RayTree, FindsTheHitThatTheDoublePrecisionTreeFinds) {
 // Edges of all triangles together are some 900 unit boxes long, and by rounding a ray may pass within 5e-7 on the other
 // side of them: of rays through the box that is 4.5e-4.
 TEST(RayTree, FindsAnotherTriangleOnlyAsOftenAsRoundingPassesAnEdge) {
-  const Bvh exact(soup(3000, 8));
+  const Bvh exact(test::triangleSoup(3000, 8));
   const RayTree tree(exact);
   std::mt19937 random(9);
   std::uniform_real_distribution<double> uniform(-0.5, 0.5);
