@@ -23,6 +23,8 @@ constexpr std::uint32_t kMostTimes = 4;
 constexpr double kFall = 1.3;
 /// By more than this the level of all light is not changed: rays that know it this badly are few.
 constexpr double kMostLevel = 4.0, kMostOff = 0.5;
+/// Light that both halves lack by more than so many times what they differ by is not lacking by chance.
+constexpr double kByChance = 2.0;
 /// The residual that is left, of all that is gathered: far below any sampling error, and the level is right anyway.
 constexpr double kSolved = 1e-5;
 constexpr int kMaxSweeps = 400;
@@ -108,10 +110,15 @@ void LeafGather::finish() {
   takeSolutions();
   LeafSmoother smoother(sides_, area_);
   smoother.smooth(solved_);
-  inBothHalves([&](std::size_t half) { take(half); });
+  std::array<Levels, 2> levels;
+  inBothHalves([&](std::size_t half) {
+    levels[half] = this->levels(half);
+    take(half, levels[half]);
+  });
   solved_ = {};
-  bias_ = smoother.bias();
+  smoothed_ = bias_ = smoother.bias();
   weighNoise(smoother);
+  weighMissed(levels);
   weighLost();
   unsolved_ = 0.0;
   double area = 0.0;
@@ -218,7 +225,7 @@ double LeafGather::solved(std::size_t h, std::size_t c, std::size_t v) const {
 /// sum a x = sum a h (r + rho x), h being the part of a leaf's light that other leaves get: x times a factor. Where x
 /// is as much below nothing as above it, as where shooters have sent the mean of what is there and its pattern is left,
 /// that says nothing; all light of the part, with what came over links, makes up for what little is off then.
-std::vector<std::array<LeafGather::Level, 3>> LeafGather::levels(std::size_t h) const {
+LeafGather::Levels LeafGather::levels(std::size_t h) const {
   struct Sum {
     double left = 0.0, kept = 0.0, size = 0.0, all = 0.0;
     double least = 0.0;  ///< x, where it is below 0, of what came over links there
@@ -240,7 +247,7 @@ std::vector<std::array<LeafGather::Level, 3>> LeafGather::levels(std::size_t h) 
       }
     }
   }
-  std::vector<std::array<Level, 3>> levels(sides_.size());
+  Levels levels(sides_.size());
   for (std::size_t p = 0; p < sums.size(); ++p) {
     for (std::size_t c = 0; c < 3; ++c) {
       const auto& sum = sums[p][c];
@@ -249,6 +256,7 @@ std::vector<std::array<LeafGather::Level, 3>> LeafGather::levels(std::size_t h) 
         levels[p][c].gathered = level;
       else if (sum.all > 0.0 && std::abs(part) < kMostOff)
         levels[p][c] = {1.0 + part, part};
+      levels[p][c].missed = sum.left - sum.kept;
     }
   }
   return levels;
@@ -263,8 +271,7 @@ void LeafGather::takeSolutions() {
   }
 }
 
-void LeafGather::take(std::size_t h) {
-  const auto levels = this->levels(h);
+void LeafGather::take(std::size_t h, const Levels& levels) {
   auto& gathered = gathered_[h];
   gathered.assign(sights_.leafCount(), glm::vec3(0.0F));
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
@@ -294,7 +301,7 @@ void LeafGather::weighNoise(const LeafSmoother& smoother) {
     smoother.apply(halves_[half].arriving);
   });
   block_noise_.assign((leaves + kBlock - 1) / kBlock, 0.0);
-  noise_ = bias_;
+  noise_ = smoothed_;
   for (std::size_t v = 0; v < leaves; ++v) {
     double square = 0.0;
     for (std::size_t c = 0; c < 3; ++c) {
@@ -304,6 +311,32 @@ void LeafGather::weighNoise(const LeafSmoother& smoother) {
     block_noise_[v / kBlock] += area_[v] * square;
   }
   for (const double block : block_noise_) noise_ += block;
+}
+
+/// What is small, and shines, neither half may have seen: its light is sent and does not arrive, in both alike, and the
+/// level gives it to others. Nobody knows where it belongs, so that all leaves of the part of the scene lack the same.
+void LeafGather::weighMissed(const std::array<Levels, 2>& levels) {
+  std::vector<double> area(sides_.size(), 0.0), square(sides_.size(), 0.0);
+  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
+    for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v)
+      area[part_[s]] += area_[v];
+  }
+  for (std::size_t p = 0; p < sides_.size(); ++p) {
+    for (std::size_t c = 0; c < 3 && area[p] > 0.0; ++c) {
+      const double a = levels[0][p][c].missed, b = levels[1][p][c].missed;
+      const double both = 0.5 * (a + b), chance = kByChance * 0.5 * (a - b);
+      square[p] += std::max(0.0, both * both - chance * chance) / area[p];
+    }
+  }
+  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
+    for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
+      if (area_[v] <= 0.0) continue;
+      const double part = square[part_[s]] * area_[v] / area[part_[s]];
+      block_noise_[v / kBlock] += part;
+      noise_ += part;
+      bias_ += part;
+    }
+  }
 }
 
 /// A ray is drawn as light leaves, too: what part of a leaf's rays leave the scene, or end on unlit sides, that part of
@@ -354,7 +387,7 @@ bool LeafGather::refine(double goal) {
   for (std::uint32_t b = 0; b < rays.size(); ++b)
     if (block_noise_[b] > 0.0 && rays[b] > 0) queue.push({gain(b, 1), b, 1});
   // What smoothing takes of the light becomes less as there is less noise to smooth.
-  double noise = noise_ - bias_;
+  double noise = noise_ - smoothed_;
   goal *= noise_ > 0.0 ? noise / noise_ : 1.0;
   std::size_t bytes = leastBytes(counts.size()) + sights_.bytes();
   std::vector<std::uint32_t> times(block_noise_.size(), 1);
@@ -381,13 +414,13 @@ bool LeafGather::refine(double goal) {
 
 void LeafGather::save(ArchiveWriter& to) const {
   const auto counts = sights_.counts();
-  to(has_gathered_, std::vector<std::uint16_t>(counts.begin(), counts.end()), noise_, bias_, block_noise_, escaped_,
-     absorbed_, unsolved_);
+  to(has_gathered_, std::vector<std::uint16_t>(counts.begin(), counts.end()), noise_, smoothed_, bias_, block_noise_,
+     escaped_, absorbed_, unsolved_);
 }
 
 bool LeafGather::restore(ArchiveReader& from) {
   std::vector<std::uint16_t> counts;
-  from(has_gathered_, counts, noise_, bias_, block_noise_, escaped_, absorbed_, unsolved_);
+  from(has_gathered_, counts, noise_, smoothed_, bias_, block_noise_, escaped_, absorbed_, unsolved_);
   const auto fits = [](std::uint16_t count) { return count <= LeafSights::kMostRays; };
   std::size_t all = 0;
   for (const auto count : counts) all += count;

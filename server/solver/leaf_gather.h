@@ -65,7 +65,8 @@ class LeafGather {
   [[nodiscard]] std::span<const glm::vec3> irradiance(std::size_t half) const { return gathered_[half]; }
   /// Square of the error that rays leave in the mean of the halves: sum over leaves and channels, times area.
   [[nodiscard]] double noise() const { return noise_; }
-  /// The part of it that the halves have in common: what smoothing took of the light itself.
+  /// The part of it that the halves have in common: what smoothing took of the light itself, and what neither of them
+  /// saw, by the light that is sent and does not arrive.
   [[nodiscard]] double bias() const { return bias_; }
   /// Flux that the equation does not account for, of what is gathered.
   [[nodiscard]] double unsolved() const { return unsolved_; }
@@ -98,19 +99,22 @@ class LeafGather {
     double shining = 0.0;  ///< flux of |r|, all channels
     bool done = true;
   };
+  /// Factors of x, and of what came over links, that x becomes the sum of.
+  struct Level {
+    double gathered = 1.0, over_links = 0.0;
+    double missed = 0.0;  ///< flux that was sent, and that x without them does not have
+  };
+  using Levels = std::vector<std::array<Level, 3>>;
   enum class Stage { kDone, kTracing, kSolving };
   void takeLight(std::size_t half);
   void average(std::size_t half, const std::vector<Light>& radiosity, std::vector<Light>& mean) const;
   void sweep(std::size_t half, Gmres::Vectors& x, bool affine);
-  void take(std::size_t half);
+  void take(std::size_t half, const Levels& levels);
   void takeSolutions();
   void weighRays();
   [[nodiscard]] double solved(std::size_t half, std::size_t channel, std::size_t value) const;
-  /// Factors of x, and of what came over links, that x becomes the sum of.
-  struct Level {
-    double gathered = 1.0, over_links = 0.0;
-  };
-  [[nodiscard]] std::vector<std::array<Level, 3>> levels(std::size_t half) const;
+  [[nodiscard]] Levels levels(std::size_t half) const;
+  void weighMissed(const std::array<Levels, 2>& levels);
   void weighNoise(const LeafSmoother& smoother);
   void weighLost();
   void finish();
@@ -132,8 +136,8 @@ class LeafGather {
   std::array<Half, 2> halves_;
   std::array<std::vector<Light>, 2> solved_;  ///< by half and leaf value: x, smoothed; while taking it
   std::array<std::vector<glm::vec3>, 2> gathered_;
-  double noise_ = 0.0, bias_ = 0.0, unsolved_ = 0.0;
-  std::vector<double> block_noise_;  ///< parts of it, by kBlock leaves
+  double noise_ = 0.0, smoothed_ = 0.0, bias_ = 0.0, unsolved_ = 0.0;
+  std::vector<double> block_noise_;  ///< parts of it but for smoothed_, what smoothing took, by kBlock leaves
   std::array<double, 3> escaped_{}, absorbed_{};
 };
 

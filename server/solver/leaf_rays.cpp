@@ -14,8 +14,10 @@ namespace {
 constexpr double kLift = 2e-6;
 /// Farther than the unit box is wide.
 constexpr double kFar = 4.0;
-/// After so many that one can see through the next stops a ray.
-constexpr std::size_t kMostSheets = 64;
+/// A ray keeps in mind so many that it went through; then it starts anew from the last of them, so often at most.
+constexpr std::size_t kMostSheets = 64, kMostStarts = 64;
+/// Sheets within this of the last may lie in the same place (scene::RayTree).
+constexpr float kSame = 4e-6F;
 
 /// Where in a frame a point of its plane lies.
 glm::dvec2 texelAt(const scene::TriangleFrame& frame, const glm::dvec3& point) {
@@ -135,16 +137,26 @@ bool LeafRays::passes(const scene::RayHit& hit, const glm::dvec3& at, std::uint6
 }
 
 std::uint32_t LeafRays::see(const Place& from, const glm::dvec3& direction, std::uint64_t key) const {
-  const auto origin = lifted(from);
+  auto origin = lifted(from);
   std::array<std::uint32_t, kMostSheets> passed;
-  for (std::size_t sheets = 0;; ++sheets) {
+  std::array<float, kMostSheets> distance;
+  std::size_t sheets = 0, starts = 0;
+  while (true) {
     scene::RayHit hit{};
     if (!wide_.nearestHit(glm::vec3(origin), glm::vec3(direction), static_cast<float>(kFar), hit,
                           std::span(passed).first(sheets)))
       return direction.y >= 0.0 ? kSkyAbove : kSkyBelow;
     const auto at = origin + hit.t * direction;
-    if (sheets < kMostSheets && passes(hit, at, key)) {
+    if (starts < kMostStarts && passes(hit, at, key)) {
       passed[sheets] = hit.triangle;  // those that lie in the same place count, too
+      distance[sheets++] = hit.t;
+      if (sheets < kMostSheets) continue;
+      origin = at;
+      ++starts;
+      sheets = 0;
+      for (std::size_t i = 0; i < kMostSheets; ++i)
+        if (hit.t - distance[i] <= kSame && sheets < kMostSheets / 2) passed[sheets++] = passed[i];
+      for (std::size_t i = 0; i < sheets; ++i) distance[i] = 0.0F;
       continue;
     }
     const auto s = side_of_[patches_.triangle_surface[hit.triangle]][hit.front ? 0 : 1];

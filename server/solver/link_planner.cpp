@@ -157,7 +157,8 @@ void LinkPlanner::addShooter(const Node& node, LinkSystem& system, const UnshotP
                              const scene::PatchScene& patches, LinkMemory& memory, std::vector<Measurement>& wanted) {
   const auto id = nodeId(sides_[node.place.side], node.place);
   if (patches.node_area[id] <= 0.0F || node.net <= 0.0) return;
-  if (node.net < least_radiosity_ * static_cast<double>(patches.node_area[id])) return;
+  const double least = least_radiosity_.empty() ? 0.0 : least_radiosity_[node.place.side];
+  if (node.net < least * static_cast<double>(patches.node_area[id])) return;
   // Right beside a buried edge one would see single leaves come and go, and each of them is most of the light of one
   // texel: there nobody plays.
   const bool certain = node.beside_edge && chance(node.power) >= 1.0 / kMaxWeight;

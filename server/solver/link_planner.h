@@ -48,7 +48,6 @@ class LinkPlanner {
   void inherit(const LinkPlanner& former, const std::vector<std::uint32_t>& side_after) {
     draws_.inherit(former.draws_, side_after);
     share_ = former.share_;
-    least_radiosity_ = former.least_radiosity_;
     counters_ = former.counters_;
   }
 
@@ -62,8 +61,11 @@ class LinkPlanner {
   void setShare(double share) { share_ = share; }
   [[nodiscard]] double share() const { return share_; }
 
-  /// Nodes of less radiosity, all channels, are no shooters: rays bring their light. 0: all are.
-  void setLeastRadiosity(double radiosity) { least_radiosity_ = radiosity; }
+  /// By side. Nodes of less radiosity, all channels, are no shooters: rays bring their light. Empty: all are.
+  void setLeastRadiosity(std::vector<double> radiosity) { least_radiosity_ = std::move(radiosity); }
+
+  /// After a restore: what is known by side is of so many.
+  [[nodiscard]] bool fits() const { return least_radiosity_.empty() || least_radiosity_.size() == sides_.size(); }
 
   /// Mean reflectance of the scene: what roulette creates or loses by chance is reflected so often, so that in bright
   /// rooms fewer nodes play.
@@ -147,8 +149,8 @@ class LinkPlanner {
   std::uint32_t resolution_ = 32;
   PlannerCounters counters_;
   double share_ = 0.0;
-  double least_radiosity_ = 0.0;
-  double roulette_share_ = 0.0;  ///< nodes weaker than this part of a share play
+  std::vector<double> least_radiosity_;  // by side
+  double roulette_share_ = 0.0;          ///< nodes weaker than this part of a share play
   double left_out_ = 0.0;
 };
 

@@ -19,8 +19,10 @@ constexpr double kMostKept = 0.99999;
 }  // namespace
 
 void LinkedSolver::assess() {
-  if (isRepairing()) return;                   // nothing is known before all links are true
-  if (from_links_ == FromLinks::kAfterEdit) {  // somebody wants to know before the next step
+  if (isRepairing()) return;  // nothing is known before all links are true
+  if (from_links_ == FromLinks::kAfterEdit) {
+    if (gather_ && gather_->isBehind()) return;  // nor before all rays are traced, which steps do in slices
+    // Somebody wants to know before the next step.
     tryNow([this] {
       do {
         while (!settleFromLinks()) continue;
@@ -58,7 +60,8 @@ void LinkedSolver::assess() {
     owed += growing_ ? net_unshot_ + unlinked : left_out;
   }
   if (field.square() <= 0.0) {
-    error_.residual = error_.total = owed + varying_ > 0.0 ? 1.0 : 0.0;  // all or nothing is missing
+    const bool lacks = owed + varying_ > 0.0 || (gathers() && gather_->bias() > 0.0);
+    error_.residual = error_.total = lacks ? 1.0 : 0.0;  // all or nothing is missing
     return;
   }
   const double kept = std::min(kMostKept, (1.0 - lostPart()) * reflected / received);
@@ -147,7 +150,7 @@ double LinkedSolver::powerToShoot() const {
     }
   }
   const double kept = received > 0.0 ? std::min(0.95, (1.0 - lostPart()) * reflected / received) : 0.5;
-  return shot + net_unshot_ / (1.0 - kept);
+  return shot + (gathers() ? net_unshot_ : net_unshot_ / (1.0 - kept));
 }
 
 EnergyParts LinkedSolver::energy() const {

@@ -55,17 +55,27 @@ bool LinkedSolver::raysPay() const {
   return kRaysALeaf * static_cast<double>(leaves) * rayCost() < shots * shotCost();
 }
 
-/// Of nodes that are worth links, all channels. None where there is something to see through: links between sheets that
-/// all but touch are too uncertain.
-double LinkedSolver::leastRadiosity() const {
-  if (!patches_->opacity.empty()) return HUGE_VAL;
+/// By side: of nodes that are worth links, all channels. Where there is something to see through only lamps are: links
+/// between sheets that all but touch are too uncertain.
+std::vector<double> LinkedSolver::leastRadiosity() const {
   double area = 0.0, flux = 0.0;
   for (const auto& side : sides_) {
     const auto root = side.first_node + side.node_count - 1;
     area += static_cast<double>(patches_->node_area[root]);
     flux += static_cast<double>(unshot_.rough(root));
   }
-  return area > 0.0 ? kBright * flux / area : 0.0;
+  const double least = area > 0.0 ? kBright * flux / area : 0.0;
+  std::vector<double> of_side(sides_.size(), least);
+  for (std::uint32_t s = 0; s < sides_.size() && !patches_->opacity.empty(); ++s) {
+    if (patches_->surfaces[sides_[s].surface].see_through || !sideShines(s)) of_side[s] = HUGE_VAL;
+  }
+  return of_side;
+}
+
+/// By itself, and not as a polygon.
+bool LinkedSolver::sideShines(std::uint32_t s) const {
+  const auto emission = std::span(system_.emission()).subspan(sides_[s].first_value, sides_[s].leaf_count);
+  return !sides_[s].gathered && std::ranges::any_of(emission, [](const glm::vec3& e) { return e != glm::vec3(0.0F); });
 }
 
 void LinkedSolver::startRays() {

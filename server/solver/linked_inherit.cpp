@@ -48,7 +48,9 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
   sweeps_ = former.sweeps_;
   replayed_ = former.replayed_;
   share_part_ = former.share_part_;
-  by_rays_ = former.by_rays_;
+  by_rays_ = former.by_rays_ && mayGather(expander_.values().size(), settings_);
+  aim_ = std::max(former.aim_, settings_.target_error);
+  planner_.setTarget(aim_);
   planner_.inherit(former.planner_, numbers.side_after);
   inheritLights(former, numbers);
   takeMaterials(materials);
@@ -58,7 +60,7 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
   setPostponed(former.phase_ == Phase::kDone ? former.errorBesideMissing() : settings_.target_error);
   planRepairs(former.isRepairing() ? 0.0 : former.fieldNorm(), ChangeReach(*former.patches_, *patches_, map));
   if (former.variation_) inheritVariation(former, numbers);
-  if (former.gather_) inheritRays(former, numbers);
+  if (by_rays_ && former.gather_) inheritRays(former, numbers);
   for (auto& half : half_) half.assign(system_.emission().size(), glm::vec3(0.0F));
   findUnshot();
   solveAnew();

@@ -66,7 +66,7 @@ bool LinkedSolver::lightLeaves() {
   return true;
 }
 
-void LinkedSolver::findUnshot() {
+void LinkedSolver::findUnshot(Unshot which) {
   varying_ = net_unshot_ = 0.0;
   std::vector<glm::vec3> unshot;
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
@@ -75,7 +75,7 @@ void LinkedSolver::findUnshot() {
       const auto v = side.first_value + leaf;
       irradiance_[side.first_node + leaf] = 0.5F * (half_[0][v] + half_[1][v]);
     }
-    leafUnshot(s, unshot);
+    leafUnshot(s, unshot, which);
     unshot_.pull(side, unshot);
     const auto root = side.first_node + side.node_count - 1;
     const auto net = static_cast<double>(channelSum(unshot_.flux(root)));
@@ -85,9 +85,9 @@ void LinkedSolver::findUnshot() {
 }
 
 /// Radiosity less what stands for it on the deepest shooter above each leaf.
-void LinkedSolver::leafUnshot(std::uint32_t s, std::vector<glm::vec3>& leaves) const {
+void LinkedSolver::leafUnshot(std::uint32_t s, std::vector<glm::vec3>& leaves, Unshot which) const {
   const Side& side = sides_[s];
-  if (gathers()) {  // shooters stand for what they sent, and rays for all that is left
+  if (gathers() && which == Unshot::kNotByRays) {  // shooters stand for what they sent, and rays for all that is left
     leaves.assign(side.leaf_count, glm::vec3(0.0F));
     return;
   }
@@ -151,11 +151,12 @@ bool LinkedSolver::finishEdit() {
   growing_ = true;
   phase_ = Phase::kLights;
   const auto& shooters = system_.shooters();
-  if (net_unshot_ > 0.0 && std::ranges::none_of(shooters, [](const Shooter& shooter) { return shooter.owes(); })) {
+  if ((net_unshot_ > 0.0 || gathers()) &&
+      std::ranges::none_of(shooters, [](const Shooter& shooter) { return shooter.owes(); })) {
     // Where nothing needs links that are not there, the solution over those that are is the end already.
     startGrowth();
     wanted_ = plan();
-    growing_ = !wanted_.empty() && !mayGoWithout();
+    growing_ = !wanted_.empty() && (wantsLamp() || !mayGoWithout());
   }
   assessStep();
   if (isDueForTarget()) {
@@ -163,7 +164,8 @@ bool LinkedSolver::finishEdit() {
     from_links_ = FromLinks::kAfterEdit;
     return false;
   }
-  if (error_.total <= settings_.target_error) {
+  const bool lacks_lamp = growing_ && wantsLamp();
+  if (error_.total <= settings_.target_error && !lacks_lamp) {
     wanted_.clear();
     phase_ = Phase::kDone;
   } else if (!growing_) {
@@ -171,6 +173,15 @@ bool LinkedSolver::finishEdit() {
     (void)chooseFurther();
   }
   return true;
+}
+
+/// What shines by itself and is small: rays may not find it at all, and then do not tell that they did not.
+bool LinkedSolver::wantsLamp() const {
+  if (!gathers()) return false;
+  return std::ranges::any_of(wanted_, [&](const Measurement& want) {
+    const auto& shooter = system_.shooters()[want.shooter];
+    return !shooter.isLight() && sideShines(shooter.place.side);
+  });
 }
 
 /// After an edit some node or other is just strong enough to be a shooter now. Where the target is reached while the

@@ -28,6 +28,11 @@ constexpr double kIdleSampling = 0.1;
 constexpr std::size_t kFirstTriangles = 1'600'000;
 constexpr std::size_t kFewestMeasurements = 8;
 
+/// A small error is worked towards by way of larger ones, from the first of these on, each so many times the next. That
+/// takes no longer, and whoever looks before the end, or sets a limit of time, sees as much light as somebody who asked
+/// for less.
+constexpr double kFirstAim = 0.02, kAimStep = 2.0;
+
 PunctualSettings punctualSettings(const SolverSettings& settings) {
   PunctualSettings punctual;
   punctual.seed = settings.seed;
@@ -52,7 +57,8 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, Tra
       irradiance_(patches_->nodeCount(), glm::vec3(0.0F)) {
   slice_ = std::clamp<std::size_t>(kFirstTriangles / std::max<std::size_t>(1, patches_->triangles.size()), 2, 16);
   fewest_a_slice_ = std::min(slice_, kFewestMeasurements);
-  planner_.setTarget(settings_.target_error);
+  aim_ = std::max(settings_.target_error, kFirstAim);
+  planner_.setTarget(aim_);
 }
 
 LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
@@ -132,8 +138,10 @@ Result<void> LinkedSolver::measureSlice() {
 }
 
 void LinkedSolver::startGrowth() {
+  if (gathers()) findUnshot(Unshot::kByRaysToo);
   planner_.setShare(powerToShoot() * share_part_);
-  planner_.setLeastRadiosity(by_rays_ ? leastRadiosity() : 0.0);
+  planner_.setLeastRadiosity(by_rays_ ? leastRadiosity() : std::vector<double>());
+  if (gathers()) findUnshot();
   phase_ = Phase::kGrow;
 }
 
@@ -156,7 +164,11 @@ std::vector<Measurement> LinkedSolver::plan() {
   if (planner_.share() <= 0.0) return {};
   // Also where there is no room: the walk finds out how much light goes without.
   const std::size_t limit = std::max<std::size_t>(settings_.planner.pairs_a_wave, system_.shooters().size() / 2);
-  return planner_.grow(system_, unshot_, *patches_, limit, memory_);
+  // What rays bring is left to them, but for what after an edit is bright and small.
+  if (gathers()) findUnshot(Unshot::kByRaysToo);
+  auto wanted = planner_.grow(system_, unshot_, *patches_, limit, memory_);
+  if (gathers()) findUnshot();
+  return wanted;
 }
 
 Result<StepOutcome> LinkedSolver::step() {
@@ -244,6 +256,7 @@ StepOutcome LinkedSolver::exhausted(SolveLimit limit) {
     from_links_ = FromLinks::kToConfirm;
     return StepOutcome::kSlice;
   }
+  if (aimFurther()) return chooseNext();
   limit_ = limit;
   phase_ = Phase::kDone;
   return StepOutcome::kExhausted;
@@ -256,12 +269,25 @@ StepOutcome LinkedSolver::ended() const {
 
 StepOutcome LinkedSolver::chooseNext() {
   limit_ = SolveLimit::kNone;
+  while (error_.total <= aim_ && aimFurther()) {
+  }
   if (error_.total > settings_.target_error) return chooseFurther();
   from_links_ = FromLinks::kToConfirm;
   return confirm();
 }
 
 /// A solve that is done depends on its links alone, not on the way to them.
+/// False: the target itself is aimed at already.
+bool LinkedSolver::aimFurther() {
+  if (aim_ <= settings_.target_error) return false;
+  aim_ = std::max(aim_ / kAimStep, settings_.target_error);
+  planner_.setTarget(aim_);
+  if (!variation_) return true;
+  updateVariation();
+  assess();
+  return true;
+}
+
 StepOutcome LinkedSolver::confirm() {
   if (!settleFromLinks()) return StepOutcome::kSlice;
   from_links_ = FromLinks::kNo;
@@ -306,12 +332,13 @@ StepOutcome LinkedSolver::chooseFurther() {
 
 void LinkedSolver::setTargetError(double target) {
   settings_.target_error = target;
-  planner_.setTarget(target);
+  aim_ = std::max(aim_, target);
+  planner_.setTarget(aim_);
   if (variation_) tryNow([this] { updateVariation(); });
   if (phase_ != Phase::kDone || from_links_ != FromLinks::kNo) return;
   tryNow([this] {
     (void)chooseNext();
-    while (from_links_ == FromLinks::kToConfirm) (void)confirm();
+    while (from_links_ == FromLinks::kToConfirm && !(gather_ && gather_->isBehind())) (void)confirm();
   });
 }
 

@@ -184,25 +184,29 @@ class LinkedSolver final : public Solver {
   void takeMaterials(const scene::PatchMaterials& materials);
   void takeLights();
   [[nodiscard]] bool settle();
-  void findUnshot();
+  enum class Unshot { kNotByRays, kByRaysToo };
+  void findUnshot(Unshot which = Unshot::kNotByRays);
+  [[nodiscard]] bool wantsLamp() const;
+  [[nodiscard]] bool sideShines(std::uint32_t side) const;
   void assessStep();
   void updateVariation();
   [[nodiscard]] bool wantsVariation() const;
   [[nodiscard]] bool refineVariation();
   [[nodiscard]] double targetOfLinks() const;
+  [[nodiscard]] bool aimFurther();
   [[nodiscard]] bool raysPay() const;
   /// Rays have brought light, and nothing is left to shoot.
   [[nodiscard]] bool gathers() const { return gather_ && gather_->hasGathered(); }
   [[nodiscard]] double shotCost() const;
   [[nodiscard]] double rayCost() const;
   [[nodiscard]] double samplesCost() const;
-  [[nodiscard]] double leastRadiosity() const;
+  [[nodiscard]] std::vector<double> leastRadiosity() const;
   [[nodiscard]] double raysError() const;
   [[nodiscard]] LeftLight leftLight() const;
   void startRays();
   void inheritRays(const LinkedSolver& former, const Renumbering& numbers);
   [[nodiscard]] StepOutcome chooseRays();
-  void leafUnshot(std::uint32_t side, std::vector<glm::vec3>& leaves) const;
+  void leafUnshot(std::uint32_t side, std::vector<glm::vec3>& leaves, Unshot which = Unshot::kNotByRays) const;
   void startGrowth();
   [[nodiscard]] Result<StepOutcome> advance();
   [[nodiscard]] StepOutcome finishRound();
@@ -253,6 +257,7 @@ class LinkedSolver final : public Solver {
   std::size_t slice_ = 16;            // measurements that take some 50 ms
   std::size_t fewest_a_slice_ = 8;    // so many at least, for the workers
   bool growing_ = true;               // light is still missing: until the first walk found nothing more to add
+  double aim_ = 0.0;                  // error that is worked towards, step by step down to the target
   double share_part_ = 0.0;           // of all power, that one shooter should have
   double left_out_ = 0.0;             // relative error by nodes too weak to play roulette
   std::uint32_t rounds_ = 0;

@@ -24,8 +24,7 @@ constexpr double kLeastByLinks = 0.5;
 }  // namespace
 
 bool LinkedSolver::wantsVariation() const {
-  if (variation_ || growing_ || !settings_.within_leaves ||
-      error_.total > std::max(kSoon * settings_.target_error, kLittle))
+  if (variation_ || growing_ || !settings_.within_leaves || error_.total > std::max(kSoon * aim_, kLittle))
     return false;
   if (lights_.size() + sources_.size() > kMostLights) return false;
   return std::ranges::none_of(patches_->surfaces, [](const scene::Surface& surface) { return surface.see_through; });
@@ -54,7 +53,7 @@ void LinkedSolver::updateVariation() {
     }
   }
   square_ = square;
-  const double bound = kNegligible * settings_.target_error;
+  const double bound = kNegligible * aim_;
   variation_->update({emission, system_.reflectance(), {half_[0], half_[1]}, lights_, sources_},
                      bound * bound * square);
   corrected_.clear();
@@ -73,8 +72,8 @@ void LinkedSolver::updateVariation() {
 /// What is to be reached by links, beside what varies within leaves.
 double LinkedSolver::targetOfLinks() const {
   const double noise = error_.sampling * error_.sampling - by_links_ * by_links_;
-  const double rest = settings_.target_error * settings_.target_error - noise - error_.variation * error_.variation;
-  return std::max(std::sqrt(std::max(0.0, rest)), kLeastByLinks * settings_.target_error);
+  const double rest = aim_ * aim_ - noise - error_.variation * error_.variation;
+  return std::max(std::sqrt(std::max(0.0, rest)), kLeastByLinks * aim_);
 }
 
 /// False: it is links that are wanted more, or more paths help no more.

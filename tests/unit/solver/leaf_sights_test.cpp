@@ -14,8 +14,9 @@ using test::cubeQuads;
 using test::makeQuadScene;
 
 struct Sights {
-  explicit Sights(const std::vector<test::Quad>& quads, std::uint64_t seed = 1)
-      : scene(makeQuadScene(quads)), sides(makeSides(*scene.patches)), sights(*scene.patches, sides, seed) {}
+  explicit Sights(const std::vector<test::Quad>& quads, std::uint64_t seed = 1) : Sights(makeQuadScene(quads), seed) {}
+  explicit Sights(test::QuadScene made, std::uint64_t seed = 1)
+      : scene(std::move(made)), sides(makeSides(*scene.patches)), sights(*scene.patches, sides, seed) {}
 
   void trace(std::uint16_t count) {
     sights.ask(std::vector<std::uint16_t>(sights.leafCount(), count));
@@ -61,6 +62,28 @@ TEST(LeafSights, OfAnOpenCubeEscapeWhereAWallIsMissing) {
     for (const auto end : open.sights.seen(0, v)) escaped += end == open.sights.escaped() ? 1.0 : 0.0;
   }
   EXPECT_NEAR(escaped / (16 * 1024), 0.1998248957, 0.003);
+}
+
+// More of them than a ray keeps in mind at a time.
+TEST(LeafSights, ThroughAnyNumberOfSheetsAreWhatTheirOpacityLeaves) {
+  constexpr double kOpacity = 2.0 / 255.0;
+  for (const int count : {60, 66, 140}) {
+    auto quads = cubeQuads(4, kDark, kGrey);
+    for (int i = 0; i < count; ++i) {
+      const float height = -0.3F + 0.6F * static_cast<float>(i) / static_cast<float>(count);
+      quads.push_back({{-0.5F, height, -0.5F}, {0, 0, 1}, {1, 0, 0}, 1, 1, {}, glm::vec3(0.5F)});
+    }
+    auto made = makeQuadScene(quads);
+    made.patches->opacity.assign(1, 2);
+    for (std::size_t s = 6; s < quads.size(); ++s) {
+      made.patches->surfaces[s].see_through = true;
+      made.patches->surfaces[s].first_opacity = 0;
+    }
+    Sights sheets(std::move(made));
+    sheets.trace(128);
+    // Of 4,096 rays some 0.1 get through, by chance: three times 0.005.
+    EXPECT_NEAR(sheets.formFactor(1, 0), 0.1998248957 * std::pow(1.0 - kOpacity, count), 0.015) << count;
+  }
 }
 
 TEST(LeafSights, OfBacksAreAbsorbed) {

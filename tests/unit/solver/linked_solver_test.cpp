@@ -197,6 +197,36 @@ double awayFromFurnace(const LinkedSolver& solver, const scene::PatchScene& patc
   return std::sqrt(square / area);
 }
 
+// Whoever asks for less than can be had in the time there is sees as much as somebody who asks for just that.
+TEST(LinkedSolver, ASmallErrorIsReachedByWayOfLargerOnes) {
+  const auto made = makeQuadScene(cubeQuads(8, {0, 4, 0, 0, 0, 0}, {0.5F, 0.6F, 0.7F, 0.5F, 0.3F, 0.5F}));
+  struct Work {
+    std::uint64_t shots = 0;
+    std::uint32_t resolution = 0;
+  };
+  const auto workTo = [&](double error, double target) {
+    RayTransport rays(64);
+    EXPECT_TRUE(rays.setScene(made.patches));
+    SolverSettings settings;
+    settings.target_error = target;
+    LinkedSolver solver(made.patches, made.materials, rays, settings);
+    for (int i = 0; i < 100'000; ++i) {
+      const auto outcome = solver.step();
+      if (!outcome || *outcome == StepOutcome::kConverged || *outcome == StepOutcome::kExhausted) break;
+      if (*outcome == StepOutcome::kRoundDone && solver.error().total <= error) break;
+    }
+    EXPECT_LE(solver.error().total, error);
+    Work work{solver.shots(), 0};
+    for (const auto& shooter : solver.system().shooters())
+      work.resolution = std::max(work.resolution, shooter.resolution);
+    return work;
+  };
+  const auto straight = workTo(0.02, 0.02), on_the_way = workTo(0.02, 1e-3);
+  EXPECT_LE(on_the_way.shots, straight.shots);
+  EXPECT_EQ(on_the_way.resolution, straight.resolution);
+  EXPECT_GT(workTo(2e-3, 2e-3).resolution, straight.resolution);
+}
+
 // At a time limit the wave under way ends. The nodes that it was to measure are shooters by then: their light is not
 // unshot, and goes nowhere.
 TEST(LinkedSolver, LightOfShootersThatAShortenedWaveDidNotMeasureIsStatedAsMissing) {
