@@ -11,6 +11,8 @@ import type { Patch, ScenePatchedNote } from './protocol/messages';
 import { ScenePanel, type Selection } from './ui/scene_panel';
 import type { GizmoMode } from './view/gizmo';
 
+const GIZMO_LABELS = { translate: 'Move', rotate: 'Rotate', scale: 'Scale' } as const;
+
 export class EditSession {
   readonly panel: ScenePanel;
   readonly document: SceneDocument;
@@ -18,6 +20,8 @@ export class EditSession {
   selection: Selection | undefined;
   /** A file that is on its way, and where one looked from before it. */
   private upload: { abort: AbortController; placed: Placed } | undefined;
+  /** What is held by its handles, as it was before. */
+  private dragged: { node: number; before: edits.Placement } | undefined;
 
   constructor(
     private readonly app: App,
@@ -129,25 +133,42 @@ export class EditSession {
   }
 
   setGizmo(mode: GizmoMode): void {
+    if (this.app.viewer.gizmo.dragging) return; // what is held by one kind of handles is let go first
     this.app.viewer.gizmo.setMode(mode);
     this.app.frame.setGizmo(mode);
     this.app.viewer.invalidate();
   }
 
   onGizmoDragging(active: boolean): void {
+    const node = active ? this.selection?.node : undefined;
+    const { translation, rotation, scale } = (node === undefined ? undefined : this.document.gltf.nodes?.[node]) ?? {};
+    this.dragged = node === undefined ? undefined : { node, before: { translation, rotation, scale } };
     if (!active) this.document.endGesture();
+  }
+
+  /** What is held by its handles goes back to where it was, here and on the server. False: nothing is held. */
+  cancelDrag(): boolean {
+    const { gizmo } = this.app.viewer;
+    if (!gizmo.cancel()) return false;
+    if (!this.dragged) return true;
+    const { node, before } = this.dragged;
+    const patch = edits.setPlacement(node, written(gizmo.mode, before));
+    const label = `${GIZMO_LABELS[gizmo.mode]} ${nodeName(this.document.gltf, node)}`;
+    this.document.cancelGesture(label, `${gizmo.mode} ${node}`, patch).catch(() => undefined); // the refusal was shown
+    return true;
   }
 
   onGizmoChanged(object: Object3D, mode: GizmoMode): void {
     const node = this.selection?.node;
     if (node === undefined) return;
     const rounded = (values: number[]) => values.map((v) => Number(v.toPrecision(7)));
-    // Turning and scaling go about the object's middle, so they move its origin.
-    const placement: edits.Placement = { translation: rounded(object.position.toArray()) as Vec3 };
-    if (mode === 'rotate') placement.rotation = unit(object.quaternion.toArray() as Vec4);
-    if (mode === 'scale') placement.scale = rounded(object.scale.toArray()) as Vec3;
-    const label = mode === 'translate' ? 'Move' : mode === 'rotate' ? 'Rotate' : 'Scale';
-    this.make(`${label} ${nodeName(this.document.gltf, node)}`, edits.setPlacement(node, placement), `${mode} ${node}`);
+    const placement = written(mode, {
+      translation: rounded(object.position.toArray()) as Vec3,
+      rotation: unit(object.quaternion.toArray() as Vec4),
+      scale: rounded(object.scale.toArray()) as Vec3,
+    });
+    const label = `${GIZMO_LABELS[mode]} ${nodeName(this.document.gltf, node)}`;
+    this.make(label, edits.setPlacement(node, placement), `${mode} ${node}`);
   }
 
   /** In front of the camera, a third of the way to what it looks at, as bright as the scene is exposed for. */
@@ -240,6 +261,15 @@ export class EditSession {
     this.history?.show();
     if (this.document.lastEdit) this.app.share?.onEdit(this.document.lastEdit);
   }
+}
+
+/** Of a placement, what handles of a mode write: turning and scaling go about the object's middle, and move its origin. */
+function written(mode: GizmoMode, { translation, rotation, scale }: edits.Placement): edits.Placement {
+  return {
+    translation: translation ?? [0, 0, 0],
+    ...(mode === 'rotate' ? { rotation: rotation ?? [0, 0, 0, 1] } : {}),
+    ...(mode === 'scale' ? { scale: scale ?? [1, 1, 1] } : {}),
+  };
 }
 
 /** Rounded, and still of unit length to the last digit that counts. */

@@ -329,7 +329,7 @@ export class ViewSession {
       ' ': () => app.togglePause(),
       p: () => app.frame.togglePanel(),
       h: () => app.frame.toggleChrome(),
-      Escape: () => app.edit.select(undefined),
+      Escape: () => app.edit.cancelDrag() || app.edit.select(undefined),
       '?': () => app.frame.help.showModal(),
     };
     const action = actions[key];
