@@ -69,7 +69,7 @@ vec3 displayed(vec3 radiance) {
 }
 
 vec3 measured(float value) {
-  if (!(value > 0.0)) return kStops[0] * 0.5;
+  if (!(value > 0.0)) return kStops[0] * 0.5;  // NOTHING of palette.ts
   return paletteColour(log(value / falseRange.x) / log(falseRange.y / falseRange.x));
 }
 
@@ -123,10 +123,12 @@ export const OUTPUT_FRAGMENT = `
     diffuseColor.a = 1.0;
   #endif
   vec3 shade = vec3(0.0);
-  if (viewMode == 0 || measuring) {
+  bool isOfIrradiance = viewMode == 1 || viewMode == 5;  // shownLight() of view_modes.ts
+  if (viewMode == 0 || (measuring && !isOfIrradiance)) {
     shade = displayed(outgoingLight);
-  } else if (viewMode == 1) {
-    shade = falseColour ? measured(luminanceOf(pageIrradiance)) : displayed(pageIrradiance * RECIPROCAL_PI);
+  } else if (viewMode == 1 || measuring) {
+    bool isFalse = falseColour && !measuring;
+    shade = isFalse ? measured(luminanceOf(pageIrradiance)) : displayed(pageIrradiance * RECIPROCAL_PI);
   } else if (viewMode == 2) {
     shade = measured(luminanceOf(outgoingLight * PI));
   } else if (viewMode == 3 || viewMode == 4) {
