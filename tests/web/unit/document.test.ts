@@ -1,6 +1,6 @@
 import { existsSync, readFileSync } from 'node:fs';
 import * as edits from '../../../client/web/src/document/edits';
-import { hangingNodes, type Gltf } from '../../../client/web/src/document/gltf';
+import { handlesOf, hangingNodes, type Gltf, type GltfLight } from '../../../client/web/src/document/gltf';
 import { applyPatch, sameJson, withoutNames } from '../../../client/web/src/document/json_patch';
 import { SceneDocument } from '../../../client/web/src/document/scene_document';
 import type { Json, Patch, ScenePatchReply } from '../../../client/web/src/protocol/messages';
@@ -197,6 +197,29 @@ describe('nodes of the scene', () => {
     const all = hangingNodes(scene(chain, [0]));
     expect(all.length).toBe(count);
     expect(all.at(-1)).toEqual({ node: count - 1, depth: count - 1 });
+  });
+});
+
+describe('handles', () => {
+  const lamp = (type: GltfLight['type'], more: object = {}): Gltf => ({
+    asset: { version: '2.0' },
+    nodes: [{ extensions: { KHR_lights_punctual: { light: 0 } }, ...more }, { mesh: 0 }, {}],
+    extensions: { KHR_lights_punctual: { lights: [{ type }] } },
+  });
+  const all = ['translate', 'rotate', 'scale'];
+
+  it('are offered where they change something', () => {
+    expect(handlesOf(lamp('point'), 0)).toEqual(['translate']);
+    expect(handlesOf(lamp('spot'), 0)).toEqual(['translate', 'rotate']);
+    expect(handlesOf(lamp('directional'), 0)).toEqual(['rotate']);
+    expect(handlesOf(lamp('point'), 1)).toEqual(all);
+    expect(handlesOf(lamp('point'), 2)).toEqual(all);
+    expect(handlesOf(lamp('area' as never), 0)).toEqual(all);
+  });
+
+  it('are all offered of a lamp with something else to it', () => {
+    expect(handlesOf(lamp('point', { mesh: 0 }), 0)).toEqual(all);
+    expect(handlesOf(lamp('point', { children: [1] }), 0)).toEqual(all);
   });
 });
 

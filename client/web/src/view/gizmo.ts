@@ -18,10 +18,11 @@ import {
   type Vector3,
 } from 'three';
 import { TransformControls } from 'three/addons/controls/TransformControls.js';
+import type { Handle } from '../document/gltf';
 import { LampMarker } from './lamp_marker';
 import { surfaceBox } from './object_box';
 
-export type GizmoMode = 'translate' | 'rotate' | 'scale';
+export type GizmoMode = Handle;
 
 /** Finding edges takes about a microsecond a triangle; larger objects show their box. */
 const MAX_EDGE_TRIANGLES = 30_000;

@@ -111,10 +111,15 @@ export class LightmapSet {
     return taken;
   }
 
-  /** Values at the dark and bright end of what is there, lux; undefined: nothing yet. */
-  range(): [number, number] | undefined {
+  /** Some of the values that are there and more than nothing, lux, luminance. */
+  someValues(): number[] {
     const each = Math.max(64, Math.floor(RANGE_SAMPLES / this.pages.length));
-    const values = Float64Array.from(this.pages.flatMap((page) => page.someValues(each))).sort();
+    return this.pages.flatMap((page) => page.someValues(each));
+  }
+
+  /** Values at the dark and bright end of what is there, lux; undefined: nothing is more than nothing. */
+  range(): [number, number] | undefined {
+    const values = Float64Array.from(this.someValues()).sort();
     if (values.length === 0) return undefined;
     const at = (q: number) => values[Math.min(values.length - 1, Math.floor(q * values.length))]!;
     const high = at(0.995);

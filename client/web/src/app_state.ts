@@ -1,0 +1,89 @@
+// What the page says of its server's solve: how far it is, what has failed, and that there is no scene. Part of the App.
+
+import type { App } from './app';
+import type { Progress } from './protocol/messages';
+import { percent, readable } from './ui/dom';
+import { stateName } from './ui/solve_panel';
+
+export class StateSession {
+  /** Why the solve of the scene that is there has failed, as the page says it. */
+  private trouble: string | undefined;
+
+  constructor(private readonly app: App) {}
+
+  /** The banner says something else by now. */
+  forgetTrouble(): void {
+    this.trouble = undefined;
+  }
+
+  /** Once more, as the picture has changed. */
+  again(): void {
+    if (this.app.progress) this.show(this.app.progress);
+  }
+
+  show(progress: Progress): void {
+    const { frame } = this.app;
+    this.settleLight();
+    const isOver = ['converged', 'timeLimit', 'limited'].includes(progress.state);
+    const done = isOver && !this.isLightUnderWay(progress);
+    const bad = progress.state === 'failed';
+    const isBusy = isOver || progress.state === 'solving';
+    const stated = hasScene(progress) && progress.state !== 'loading';
+    const error = stated ? `${percent(progress.error.total)} error` : '';
+    const rate = progress.state === 'solving' ? `${readable(progress.shotsPerSecond, 2)} shots/s` : '';
+    frame.setState(
+      isOver && !done
+        ? 'Receiving light'
+        : progress.state === 'loading' && this.app.viewer.shown
+          ? 'First light'
+          : stateName(progress.state),
+      bad ? 'bad' : done ? (progress.state === 'converged' ? 'good' : 'short') : isBusy ? 'busy' : 'idle',
+      error,
+      rate,
+    );
+    frame.setWelcome(hasScene(progress) && bad ? '' : progress.state, progress.failure);
+    this.showTrouble(progress, isOver);
+  }
+
+  /** Black is no light yet as long as the solve goes on, or its last tiles are still to come. */
+  settleLight(): void {
+    const { progress, viewer } = this.app;
+    if (!progress || !viewer.set || viewer.dataSet || viewer.set.note.revision > progress.revision) return;
+    const goesOn = ['empty', 'loading', 'solving'].includes(progress.state);
+    if (!goesOn && !this.isLightUnderWay(progress)) viewer.settleLight();
+  }
+
+  /** The solve is over before its last tiles are here, and they before they are in the picture. */
+  private isLightUnderWay({ tileVersion }: Progress): boolean {
+    const { bookmark, viewer } = this.app;
+    const { dataSet, set } = viewer;
+    if (!set || dataSet) return false; // of other quantities nothing is known
+    const isHere = bookmark?.quantity === 'irradiance' && bookmark.tileVersion >= tileVersion;
+    return !isHere || set.waiting > 0;
+  }
+
+  /**
+   * What there is to see stays to be looked at; that no light comes after it, or that there is none, is said for as long
+   * as it holds.
+   */
+  private showTrouble(progress: Progress, isOver: boolean): void {
+    const { frame, viewer, edit } = this.app;
+    const { failure = 'the server gave no reason' } = progress;
+    const failed = hasScene(progress) && progress.state === 'failed';
+    const dark = hasScene(progress) && isOver && progress.energy['emitted'] === 0;
+    const trouble = failed
+      ? `The solve failed: ${failure}.`
+      : dark
+        ? 'Nothing shines in this scene, so that all of it is dark.'
+        : undefined;
+    if (trouble === this.trouble || viewer.isLost) return; // the card comes first; it is said when that is back
+    this.trouble = trouble;
+    if (failed) frame.setBanner(trouble, 'Restart', () => void this.app.ask('solve.restart'));
+    else frame.setBanner(trouble, 'Add a lamp', () => void edit.addLamp());
+  }
+}
+
+/** `failed` may mean both: that a scene is not solved further, and that there is none. */
+export function hasScene({ state, surfaces }: Progress): boolean {
+  return state !== 'empty' && (state !== 'failed' || surfaces > 0);
+}
