@@ -5,6 +5,13 @@ import type { Progress } from './protocol/messages';
 import { percent, readable } from './ui/dom';
 import { stateName } from './ui/solve_panel';
 
+interface Trouble {
+  text: string;
+  /** What mends it, or shows what there is. */
+  label: string;
+  act(): void;
+}
+
 export class StateSession {
   /** Why the solve of the scene that is there has failed, as the page says it. */
   private trouble: string | undefined;
@@ -67,19 +74,32 @@ export class StateSession {
    * as it holds.
    */
   private showTrouble(progress: Progress, isOver: boolean): void {
-    const { frame, viewer, edit } = this.app;
+    const trouble = hasScene(progress) ? this.troubleOf(progress, isOver) : undefined;
+    if (trouble?.text === this.trouble || this.app.viewer.isLost) return; // the card comes first; it is said when that is back
+    this.trouble = trouble?.text;
+    this.app.frame.setBanner(trouble?.text, trouble?.label, trouble?.act);
+  }
+
+  private troubleOf(progress: Progress, isOver: boolean): Trouble | undefined {
+    const { edit, view, viewer } = this.app;
     const { failure = 'the server gave no reason' } = progress;
-    const failed = hasScene(progress) && progress.state === 'failed';
-    const dark = hasScene(progress) && isOver && progress.energy['emitted'] === 0;
-    const trouble = failed
-      ? `The solve failed: ${failure}.`
-      : dark
-        ? 'Nothing shines in this scene, so that all of it is dark.'
-        : undefined;
-    if (trouble === this.trouble || viewer.isLost) return; // the card comes first; it is said when that is back
-    this.trouble = trouble;
-    if (failed) frame.setBanner(trouble, 'Restart', () => void this.app.ask('solve.restart'));
-    else frame.setBanner(trouble, 'Add a lamp', () => void edit.addLamp());
+    if (progress.state === 'failed')
+      return { text: `The solve failed: ${failure}.`, label: 'Restart', act: () => void this.app.ask('solve.restart') };
+    if (!isOver) return undefined;
+    if (progress.energy['emitted'] === 0)
+      return {
+        text: 'Nothing shines in this scene, so that all of it is dark.',
+        label: 'Add a lamp',
+        act: () => void edit.addLamp(),
+      };
+    // A file without materials has the one that glTF gives it, a metal.
+    if (view.mode.id === 'lit' && viewer.shown?.isBlack)
+      return {
+        text: 'All surfaces are metal, or black, and reflect no light that a lightmap could hold.',
+        label: 'Show irradiance',
+        act: () => void view.setMode('irradiance'),
+      };
+    return undefined;
   }
 }
 

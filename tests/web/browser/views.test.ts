@@ -55,6 +55,26 @@ it('says that there is nothing to measure, where there is no light, instead of a
   expect(await legend.innerText()).not.toMatch(/1,000|≤|≥/);
 });
 
+it('says why all is black where nothing reflects, and shows the light that arrives', async () => {
+  const server = await serve();
+  const nodes = [{ mesh: 0, translation: [0, 1, 0], rotation: [1, 0, 0, 0] }, { mesh: 1 }];
+  const metal = { pbrMetallicRoughness: { metallicFactor: 1 } };
+  await putScene(server, squares(nodes, [lamp, metal]));
+  const page = await pages.open(server.url, 900, 600);
+  await converged(page);
+  const banner = page.locator('.banner');
+  expect(await banner.isVisible()).toBe(false); // the lamp is seen
+  const extensions = { KHR_lights_punctual: { lights: [{ type: 'point', intensity: 100 }] } };
+  const dark = JSON.parse(squares([{ mesh: 0 }, { translation: [0, 1, 0], name: 'lamp' }], [metal])) as object;
+  const lit = { ...dark, extensions, extensionsUsed: ['KHR_lights_punctual'] } as unknown as { nodes: object[] };
+  Object.assign(lit.nodes[1]!, { extensions: { KHR_lights_punctual: { light: 0 } } });
+  await putScene(server, JSON.stringify(lit));
+  await banner.getByText('All surfaces are metal, or black').waitFor();
+  await banner.getByRole('button', { name: 'Show irradiance' }).click();
+  await banner.waitFor({ state: 'hidden' });
+  expect(await page.evaluate(() => window.viewer!.view.mode.id)).toBe('irradiance');
+});
+
 it('carries exposure, tone mapping and scale in a link, and shows them again', async () => {
   const server = await serve(`${SCENES}/cornell.glb`);
   const page = await pages.open(server.url, 900, 600);
