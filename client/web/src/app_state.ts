@@ -63,10 +63,11 @@ export class StateSession {
   /** The solve is over before its last tiles are here, and they before they are in the picture. */
   private isLightUnderWay({ tileVersion }: Progress): boolean {
     const { bookmark, viewer } = this.app;
-    const { dataSet, set } = viewer;
-    if (!set || dataSet) return false; // of other quantities nothing is known
-    const isHere = bookmark?.quantity === 'irradiance' && bookmark.tileVersion >= tileVersion;
-    return !isHere || set.waiting > 0;
+    const streamed = viewer.dataSet ?? viewer.set;
+    if (!streamed) return false;
+    // All quantities that anybody looks at are published by the same versions.
+    const isHere = bookmark?.quantity === streamed.quantity && bookmark.tileVersion >= tileVersion;
+    return !isHere || streamed.waiting > 0;
   }
 
   /**
