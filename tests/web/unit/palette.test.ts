@@ -1,3 +1,4 @@
+import { readFileSync } from 'node:fs';
 import { NOTHING, paletteGlsl, STOPS } from '../../../client/web/src/view/palette';
 
 /** CIE 1976 L* of an sRGB colour, D65. */
@@ -29,6 +30,13 @@ describe('the palette of false colours', () => {
 
   it('shows nothing darker than the least', () => {
     expect(lightness(NOTHING)).toBeLessThan(lightness(STOPS[0]!) - 5);
+  });
+
+  it('is the same in pictures of the server', () => {
+    const shader = readFileSync(new URL('../../../server/gpu/shaders/view.frag', import.meta.url), 'utf8');
+    const list = /kStops\[9\] = vec3\[\]\((.*?)\);/s.exec(shader)![1]!;
+    const theirs = [...list.matchAll(/vec3\(([^)]*)\)/g)].map(([, stop]) => stop!.split(',').map(Number));
+    expect(theirs).toEqual(STOPS.map((stop) => stop.map((c) => Math.round(255 * c))));
   });
 
   it('is the same in the shader', () => {
