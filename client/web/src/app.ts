@@ -3,13 +3,13 @@
 
 import { EditSession } from './app_edit';
 import { GeometrySession } from './app_geometry';
+import { InputSession } from './app_input';
 import { PeopleSession } from './app_people';
+import { SceneSession } from './app_scene';
+import { hasScene, StateSession } from './app_state';
 import { ViewSession } from './app_view';
-import { DocumentFetch } from './document/document_fetch';
-import type { Gltf } from './document/gltf';
 import { Connection, type LinkState } from './protocol/connection';
 import {
-  NOT_FOUND,
   type Bookmark,
   type HelloReply,
   type LightmapsNote,
@@ -23,12 +23,11 @@ import {
   type Status,
   type SubscribeParams,
 } from './protocol/messages';
-import { ConnectionLost, RpcError } from './protocol/rpc';
+import { ConnectionLost } from './protocol/rpc';
 import { TileFeed } from './tiles/tile_feed';
 import { Frame } from './ui/frame';
-import { percent, readable } from './ui/dom';
 import { SharePanel } from './ui/share_panel';
-import { SolvePanel, stateName } from './ui/solve_panel';
+import { SolvePanel } from './ui/solve_panel';
 import { store, stored } from './ui/stored';
 import { Share } from './app_share';
 import { MOST_MIPS } from './view/lightmap_page';
@@ -47,6 +46,8 @@ export class App {
   readonly share: Share;
   readonly people: PeopleSession;
   readonly solve: SolvePanel;
+  readonly scene = new SceneSession(this);
+  readonly state = new StateSession(this);
   /** What the server has told of its solve over this connection. */
   progress: Progress | undefined;
   /** Up to where all light has come over this connection, and was decoded. */
@@ -55,18 +56,13 @@ export class App {
   readonly marks: Record<string, number> = {};
   private readonly tiles: TileFeed;
   private readonly geometry = new GeometrySession(this);
-  private readonly document = new DocumentFetch({
-    ask: (signal) => this.askDocument(signal),
-    failed: (error) => this.onNoDocument(error),
-  });
-  private resume: Resume | undefined;
+  /** Up to where the light that is here is known to be all there was, to go on from. */
+  resume: Resume | undefined;
   private token = addressedToken() ?? stored('token', 'session');
   private slow = false;
   private everOpen = false;
   private epoch = '';
   private awaited: (() => void)[] = [];
-  /** Why the solve of the scene that is there has failed, as the page says it. */
-  private trouble: string | undefined;
 
   constructor() {
     // Nobody else has this name, so the page knows its own patches when it is told of them.
@@ -130,20 +126,20 @@ export class App {
       drawn: () => {
         this.view.onDrawn();
         this.people.tellSoon();
-        if (this.progress) this.showState(this.progress); // the last tiles may be in the picture now
+        this.state.again(); // the last tiles may be in the picture now
       },
       sceneShown: (scene) => {
         this.view.onSceneShown(scene);
         this.edit.onSceneShown();
         this.frame.sceneShown = true;
-        if (this.progress) this.showState(this.progress); // no message covers the picture
+        this.state.again(); // no message covers the picture
       },
       gizmoDragging: (active) => this.edit.onGizmoDragging(active),
       gizmoChanged: (object, mode) => this.edit.onGizmoChanged(object, mode),
       contextLost: (lost) => {
         this.frame.setBanner(lost ? 'The browser has lost the graphics card; waiting for it to return.' : undefined);
-        this.trouble = undefined;
-        if (!lost && this.progress) this.showState(this.progress);
+        this.state.forgetTrouble();
+        if (!lost) this.state.again();
       },
     });
     this.viewer.showPeople(this.people.people);
@@ -158,7 +154,9 @@ export class App {
       queued: () => this.viewer.invalidate(),
     });
     this.view.start();
+    new InputSession(this).start();
     this.edit.start();
+    this.scene.takeDrops();
     document.addEventListener('visibilitychange', () => this.onVisible());
     window.addEventListener('online', () => this.connection.open());
     window.addEventListener('hashchange', () => {
@@ -216,10 +214,10 @@ export class App {
 
   private onLink(state: LinkState, detail: string): void {
     this.bookmark = undefined;
-    this.document.forget();
+    this.scene.document.forget();
     this.edit?.history.forget(); // the first time there is no page yet
     if (state === 'open') {
-      this.trouble = undefined;
+      this.state.forgetTrouble();
       this.progress = undefined; // that of a server which has started again is not that of its scene
       this.frame.setBanner(undefined);
       if (this.everOpen) this.frame.toasts.show('Reconnected', 'good');
@@ -243,7 +241,10 @@ export class App {
 
   private async onReady(info: ServerInfo, hello: HelloReply): Promise<void> {
     this.mark('ready');
-    if (this.epoch !== '' && this.epoch !== hello.epoch) this.resume = undefined;
+    if (this.epoch !== '' && this.epoch !== hello.epoch) {
+      this.resume = undefined;
+      this.scene.onServerAnew();
+    }
     this.epoch = hello.epoch;
     if (!hello.resumed) this.viewer.layouts.forget();
     for (const resolve of this.awaited.splice(0)) resolve();
@@ -251,7 +252,7 @@ export class App {
     this.share.onServer(info);
     this.people.onReady();
     this.edit.history.askSoon();
-    if (hello.revision > 0 && (!hello.resumed || this.document.isOwed)) this.document.want();
+    if (hello.revision > 0 && (!hello.resumed || this.scene.document.isOwed)) this.scene.document.want();
     await this.fetchStatus();
     const { count } = await this.connection.call<{ count: number }>('viewers').catch(() => ({ count: 1 }));
     this.onViewers(count);
@@ -272,10 +273,10 @@ export class App {
     const handlers: { [M in keyof Notifications]?: (note: Notifications[M]) => void } = {
       progress: (note) => this.onProgress(note),
       'scene.patched': (note) => {
-        this.edit.onPatched(note, () => this.document.want(note.revision));
+        this.edit.onPatched(note, () => this.scene.document.want(note.revision));
         this.edit.history.askSoon();
       },
-      'scene.loaded': () => this.onLoaded(),
+      'scene.loaded': (note) => this.scene.onLoaded(note.revision),
       lightmaps: (note) => void this.onLightmaps(note),
       bookmark: (note) => this.onBookmark(note),
       viewers: (note) => this.onViewers(note.count),
@@ -289,75 +290,8 @@ export class App {
   private onProgress(progress: Progress): void {
     this.progress = progress;
     this.solve.update(progress);
-    if (!hasScene(progress)) this.forgetScene();
-    this.showState(progress);
-  }
-
-  private showState(progress: Progress): void {
-    this.settleLight();
-    const isOver = ['converged', 'timeLimit', 'limited'].includes(progress.state);
-    const done = isOver && !this.isLightUnderWay(progress);
-    const bad = progress.state === 'failed';
-    const isBusy = isOver || progress.state === 'solving';
-    const stated = hasScene(progress) && progress.state !== 'loading';
-    const error = stated ? `${percent(progress.error.total)} error` : '';
-    const rate = progress.state === 'solving' ? `${readable(progress.shotsPerSecond, 2)} shots/s` : '';
-    this.frame.setState(
-      isOver && !done
-        ? 'Receiving light'
-        : progress.state === 'loading' && this.viewer.shown
-          ? 'First light'
-          : stateName(progress.state),
-      bad ? 'bad' : done ? (progress.state === 'converged' ? 'good' : 'short') : isBusy ? 'busy' : 'idle',
-      error,
-      rate,
-    );
-    this.frame.setWelcome(hasScene(progress) && bad ? '' : progress.state, progress.failure);
-    this.showTrouble(progress, isOver);
-  }
-
-  /** The solve is over before its last tiles are here, and they before they are in the picture. */
-  private isLightUnderWay({ tileVersion }: Progress): boolean {
-    const { dataSet, set } = this.viewer;
-    if (!set || dataSet) return false; // of other quantities nothing is known
-    const isHere = this.bookmark?.quantity === 'irradiance' && this.bookmark.tileVersion >= tileVersion;
-    return !isHere || set.waiting > 0;
-  }
-
-  /**
-   * What there is to see stays to be looked at; that no light comes after it, or that there is none, is said for as long
-   * as it holds.
-   */
-  private showTrouble(progress: Progress, isOver: boolean): void {
-    const { failure = 'the server gave no reason' } = progress;
-    const failed = hasScene(progress) && progress.state === 'failed';
-    const dark = hasScene(progress) && isOver && progress.energy['emitted'] === 0;
-    const trouble = failed
-      ? `The solve failed: ${failure}.`
-      : dark
-        ? 'Nothing shines in this scene, so that all of it is dark.'
-        : undefined;
-    if (trouble === this.trouble || this.viewer.isLost) return; // the card comes first; it is said when that is back
-    this.trouble = trouble;
-    if (failed) this.frame.setBanner(trouble, 'Restart', () => void this.ask('solve.restart'));
-    else this.frame.setBanner(trouble, 'Add a lamp', () => void this.edit.addLamp());
-  }
-
-  /** The server has none: it was started again without, could not have the one whose first light it showed, or lost it. */
-  private forgetScene(): void {
-    if (!this.viewer.set) return;
-    this.resume = undefined;
-    this.viewer.clear();
-    this.edit.document.reset({ asset: { version: '2.0' } }, this.progress!.revision);
-    this.frame.sceneShown = false;
-  }
-
-  /** Black is no light yet as long as the solve goes on, or its last tiles are still to come. */
-  private settleLight(): void {
-    const { progress, viewer } = this;
-    if (!progress || !viewer.set || viewer.dataSet || viewer.set.note.revision > progress.revision) return;
-    const goesOn = ['empty', 'loading', 'solving'].includes(progress.state);
-    if (!goesOn && !this.isLightUnderWay(progress)) viewer.settleLight();
+    if (!hasScene(progress)) this.scene.forget();
+    this.state.show(progress);
   }
 
   /** On a slow line intermediate versions are left out; moving about needs no network at all. */
@@ -370,42 +304,15 @@ export class App {
     if (slow) this.frame.toasts.show('Slow network: light is updated less often');
   }
 
-  private onLoaded(): void {
-    this.resume = undefined;
-    this.edit.select(undefined); // numbers of nodes mean others now
-    this.view.sceneComes();
-    this.edit.history.askSoon();
-    this.document.want();
-    void this.fetchStatus();
-  }
-
-  private async fetchStatus(): Promise<void> {
+  async fetchStatus(): Promise<void> {
     const status = await this.connection.call<Status>('status').catch(() => undefined);
     if (status) this.onStatus(status);
-  }
-
-  private async askDocument(signal: AbortSignal): Promise<{ revision: number; take: () => void }> {
-    const reply = await this.connection.call<{ revision: number; gltf?: Gltf; url?: string }>('scene.get');
-    let { gltf, revision } = reply;
-    if (!gltf) {
-      const file = await this.fetch(reply.url!, { signal });
-      revision = Number(file.headers.get('X-Revision') ?? revision); // it may be newer than the answer
-      gltf = (await file.json()) as Gltf;
-    }
-    const whole = gltf;
-    return { revision, take: () => this.edit.document.reset(whole, revision) };
-  }
-
-  private onNoDocument(error: Error): void {
-    if (error instanceof RpcError && error.code === NOT_FOUND) return; // there is none: the server's state says so
-    if (!(error instanceof ConnectionLost))
-      this.frame.toasts.show(`The scene could not be fetched: ${error.message}`, 'bad');
   }
 
   private async onLightmaps(note: LightmapsNote): Promise<void> {
     const set = this.viewer.layouts.expect(note);
     if (!set) return;
-    this.settleLight();
+    this.state.settleLight();
     if (this.view.renewData() || set.baseMip > 0) await this.resubscribe();
     await this.geometry.load(note, set);
   }
@@ -421,7 +328,7 @@ export class App {
       this.bookmark = bookmark;
       const { quantity, revision, tileVersion } = bookmark;
       if (quantity === 'irradiance') this.resume = { epoch: this.epoch, revision, tileVersion };
-      if (this.progress) this.showState(this.progress);
+      this.state.again();
     });
   }
 
@@ -461,11 +368,6 @@ export class App {
       }
     }
   }
-}
-
-/** `failed` may mean both: that a scene is not solved further, and that there is none. */
-function hasScene({ state, surfaces }: Progress): boolean {
-  return state !== 'empty' && (state !== 'failed' || surfaces > 0);
 }
 
 /** From the link (#token=...), where it does not stay to be seen. */

@@ -3,21 +3,25 @@
 import { Vector3, type Object3D } from 'three';
 import type { App } from './app';
 import { EditHistory } from './app_history';
-import type { Placed } from './app_view';
 import * as edits from './document/edits';
-import { hangingNodes, lightOf, nodeName, type Vec3, type Vec4 } from './document/gltf';
+import { handlesOf, hangingNodes, lightOf, nodeName, type Vec3, type Vec4 } from './document/gltf';
 import { SceneDocument, type SendPatch } from './document/scene_document';
 import type { Patch, ScenePatchedNote } from './protocol/messages';
 import { ScenePanel, type Selection } from './ui/scene_panel';
 import type { GizmoMode } from './view/gizmo';
+
+const HANDLES: readonly GizmoMode[] = ['translate', 'rotate', 'scale'];
+const GIZMO_LABELS = { translate: 'Move', rotate: 'Rotate', scale: 'Scale' } as const;
 
 export class EditSession {
   readonly panel: ScenePanel;
   readonly document: SceneDocument;
   readonly history: EditHistory;
   selection: Selection | undefined;
-  /** A file that is on its way, and where one looked from before it. */
-  private upload: { abort: AbortController; placed: Placed } | undefined;
+  /** The handles that the user has chosen. */
+  private wanted: GizmoMode = 'translate';
+  /** What is held by its handles, as it was before. */
+  private dragged: { node: number; before: edits.Placement } | undefined;
 
   constructor(
     private readonly app: App,
@@ -45,34 +49,13 @@ export class EditSession {
       addLamp: () => void this.addLamp(),
       frameSelection: () => app.view.frameSelection(),
       endGesture: () => this.document.endGesture(),
-      loadFile: (file) => void this.loadFile(file),
+      loadFile: (file) => void app.scene.loadFile(file),
       notAccepted: (text, wanted) => app.notAccepted(text, wanted),
     });
   }
 
   start(): void {
     this.panel.setSelection(undefined);
-    this.takeDrops();
-  }
-
-  private takeDrops(): void {
-    const setDropping = (on: boolean) => document.body.classList.toggle('dropping', on);
-    window.addEventListener('dragover', (event) => {
-      if (!event.dataTransfer?.types.includes('Files')) return; // a text or a picture of the page is no scene
-      event.preventDefault();
-      setDropping(true);
-    });
-    // Whatever is dragged leaves each part of the page for the next; of the page itself there is no next.
-    window.addEventListener('dragleave', (event) => {
-      if (!event.relatedTarget) setDropping(false);
-    });
-    window.addEventListener('drop', (event) => {
-      setDropping(false);
-      const file = event.dataTransfer?.files[0];
-      if (!file) return;
-      event.preventDefault();
-      void this.loadFile(file);
-    });
   }
 
   onPatched(note: ScenePatchedNote, fetchAnew: () => void): void {
@@ -95,6 +78,7 @@ export class EditSession {
   select(selection: Selection | undefined): void {
     this.selection = selection;
     this.app.viewer.select(selection?.node);
+    this.offerHandles();
     this.panel.setSelection(selection);
     if (selection && this.app.frame.panelOpen) this.app.frame.showTab('Scene');
   }
@@ -129,25 +113,52 @@ export class EditSession {
   }
 
   setGizmo(mode: GizmoMode): void {
-    this.app.viewer.gizmo.setMode(mode);
-    this.app.frame.setGizmo(mode);
+    if (this.app.viewer.gizmo.dragging) return; // what is held by one kind of handles is let go first
+    this.wanted = mode;
+    this.offerHandles();
     this.app.viewer.invalidate();
   }
 
+  /** Of the handles, those by which something changes; the user's choice where it is among them. */
+  private offerHandles(): void {
+    const { gizmo } = this.app.viewer;
+    const node = this.selection?.node;
+    const offered = node === undefined ? HANDLES : handlesOf(this.document.gltf, node);
+    const mode = offered.includes(this.wanted) ? this.wanted : offered[0]!;
+    if (mode !== gizmo.mode && !gizmo.dragging) gizmo.setMode(mode);
+    this.app.frame.setGizmo(mode, offered);
+  }
+
   onGizmoDragging(active: boolean): void {
+    const node = active ? this.selection?.node : undefined;
+    const { translation, rotation, scale } = (node === undefined ? undefined : this.document.gltf.nodes?.[node]) ?? {};
+    this.dragged = node === undefined ? undefined : { node, before: { translation, rotation, scale } };
     if (!active) this.document.endGesture();
+  }
+
+  /** What is held by its handles goes back to where it was, here and on the server. False: nothing is held. */
+  cancelDrag(): boolean {
+    const { gizmo } = this.app.viewer;
+    if (!gizmo.cancel()) return false;
+    if (!this.dragged) return true;
+    const { node, before } = this.dragged;
+    const patch = edits.setPlacement(node, written(gizmo.mode, before));
+    const label = `${GIZMO_LABELS[gizmo.mode]} ${nodeName(this.document.gltf, node)}`;
+    this.document.cancelGesture(label, `${gizmo.mode} ${node}`, patch).catch(() => undefined); // the refusal was shown
+    return true;
   }
 
   onGizmoChanged(object: Object3D, mode: GizmoMode): void {
     const node = this.selection?.node;
     if (node === undefined) return;
     const rounded = (values: number[]) => values.map((v) => Number(v.toPrecision(7)));
-    // Turning and scaling go about the object's middle, so they move its origin.
-    const placement: edits.Placement = { translation: rounded(object.position.toArray()) as Vec3 };
-    if (mode === 'rotate') placement.rotation = unit(object.quaternion.toArray() as Vec4);
-    if (mode === 'scale') placement.scale = rounded(object.scale.toArray()) as Vec3;
-    const label = mode === 'translate' ? 'Move' : mode === 'rotate' ? 'Rotate' : 'Scale';
-    this.make(`${label} ${nodeName(this.document.gltf, node)}`, edits.setPlacement(node, placement), `${mode} ${node}`);
+    const placement = written(mode, {
+      translation: rounded(object.position.toArray()) as Vec3,
+      rotation: unit(object.quaternion.toArray() as Vec4),
+      scale: rounded(object.scale.toArray()) as Vec3,
+    });
+    const label = `${GIZMO_LABELS[mode]} ${nodeName(this.document.gltf, node)}`;
+    this.make(label, edits.setPlacement(node, placement), `${mode} ${node}`);
   }
 
   /** In front of the camera, a third of the way to what it looks at, as bright as the scene is exposed for. */
@@ -161,7 +172,7 @@ export class EditSession {
     shown.bounds.clampPoint(at, at);
     // A grey wall at a quarter of the scene's size away would be a middle grey.
     const reach = shown.bounds.getSize(new Vector3()).length() / 4;
-    const candela = Number(((0.5 * Math.PI * reach * reach) / exposure.value).toPrecision(2));
+    const candela = Number(((0.5 * Math.PI * reach * reach) / exposure.ofLeaving).toPrecision(2));
     const place = at.toArray().map((v) => Number(v.toPrecision(4))) as Vec3;
     const { patch, node } = edits.addLamp(this.document.gltf, place, candela);
     try {
@@ -183,45 +194,6 @@ export class EditSession {
     this.make(`Remove ${nodeName(this.document.gltf, node)}`, patch);
   }
 
-  async loadFile(file: File): Promise<void> {
-    const { toasts } = this.app.frame;
-    const limit = this.app.connection.info?.limits['uploadBytes'] ?? Infinity;
-    if (file.size > limit) return toasts.show(`${file.name} is larger than the server accepts`, 'bad');
-    toasts.show(`Loading ${file.name}…`);
-    this.upload?.abort.abort(); // the last one is meant, however long an earlier one takes
-    const placed = this.upload?.placed ?? this.app.view.forgetCamera();
-    const upload = (this.upload = { abort: new AbortController(), placed });
-    try {
-      const url = await this.send(file, upload.abort.signal);
-      // On the one connection: what is asked for later is loaded later, even if an upload that was given up arrives.
-      if (upload !== this.upload) return;
-      const { warnings } = await this.app.connection.call<{ warnings: string[] }>('scene.load', { url });
-      if (upload !== this.upload) return;
-      const count = warnings.length;
-      toasts.show(
-        count ? `${file.name} loaded; ${count} warning${count > 1 ? 's' : ''}, see Solve` : `${file.name} loaded`,
-        'good',
-      );
-    } catch (error) {
-      if (upload !== this.upload) return;
-      if (this.app.viewer.shown) this.app.view.keepCamera(placed);
-      toasts.show(`${file.name}: ${(error as Error).message}`, 'bad');
-    } finally {
-      if (upload === this.upload) this.upload = undefined;
-    }
-  }
-
-  /** Keeps the file on the server. Returns its URL there; rejects with what the server says against it. */
-  private async send(file: File, signal: AbortSignal): Promise<string> {
-    const response = await this.app.fetch(`/uploads?name=${encodeURIComponent(file.name)}`, {
-      method: 'PUT',
-      body: file,
-      headers: { 'Content-Type': 'application/octet-stream' },
-      signal,
-    });
-    return ((await response.json()) as { url: string }).url;
-  }
-
   private onChanged(pointers: string[]): void {
     this.app.viewer.applyDocument(this.document.gltf, pointers);
     if (pointers.length === 0) {
@@ -232,6 +204,7 @@ export class EditSession {
     } else {
       const hangs = hangingNodes(this.document.gltf).some(({ node }) => node === this.selection?.node);
       if (this.selection && !hangs) this.select(undefined); // somebody has removed it
+      this.offerHandles(); // a lamp may be of another kind now
       this.panel.refresh();
     }
   }
@@ -240,6 +213,15 @@ export class EditSession {
     this.history?.show();
     if (this.document.lastEdit) this.app.share?.onEdit(this.document.lastEdit);
   }
+}
+
+/** Of a placement, what handles of a mode write: turning and scaling go about the object's middle, and move its origin. */
+function written(mode: GizmoMode, { translation, rotation, scale }: edits.Placement): edits.Placement {
+  return {
+    translation: translation ?? [0, 0, 0],
+    ...(mode === 'rotate' ? { rotation: rotation ?? [0, 0, 0, 1] } : {}),
+    ...(mode === 'scale' ? { scale: scale ?? [1, 1, 1] } : {}),
+  };
 }
 
 /** Rounded, and still of unit length to the last digit that counts. */

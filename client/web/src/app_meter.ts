@@ -72,7 +72,7 @@ export class MeterSession {
         : '',
       reading.node === undefined ? '' : nodeName(this.app.edit.document.gltf, reading.node),
       reading.texel ? `page ${reading.page}, texel ${reading.texel.join(', ')}` : '',
-      position(reading.point),
+      reading.point ? position(reading.point) : '',
     ];
     frame.meter.show(x, y, lux, error, details.filter((text) => text !== '').join('\n'), !isSeen);
   }

@@ -1,16 +1,13 @@
-// What is shown and from where: views, exposure, cameras, the light meter. Part of the App.
+// What is shown and from where: views, exposure, cameras, the light meter, links to all of it. Part of the App.
 
 import { type Box3, Vector3 } from 'three';
 import type { App } from './app';
 import { MeterSession } from './app_meter';
-import { listenToKeys } from './ui/keys';
 import { ViewPanel } from './ui/view_panel';
 import { insideView } from './view/first_view';
+import { fromLink, MOST_STOPS, toLink, type ShownAs } from './view/link';
 import type { LitScene } from './view/lit_scene';
-import { TONE_CURVES, VIEW_MODES, viewMode, type ViewMode } from './view/view_modes';
-
-/** A click that moves less is no drag, pixels. */
-const CLICK_SLACK = 5;
+import { TONE_CURVES, viewMode, type ViewMode } from './view/view_modes';
 
 /** Whether one has found a place in the scene to look from, and the number of its camera. */
 export interface Placed {
@@ -48,20 +45,11 @@ export class ViewSession {
 
   /** When the page is there. */
   start(): void {
-    const { canvas } = this.app.frame;
-    const { rig, pagesView } = this.app.viewer;
     void this.setMode('lit');
     this.followAddress();
     if (addressed().get('ui') === '0') this.app.frame.toggleChrome();
     // Somebody follows another link in the same tab, or goes back: only what stands behind the # has changed.
     window.addEventListener('hashchange', () => this.followAddress());
-    this.listenToPointer(canvas);
-    listenToKeys(canvas, {
-      camera: (event, down) => this.aimed(rig.key(event, down)),
-      turn: (right, up) => this.aimed(this.mode.flat ? pagesView.pan(right, up) : rig.turn(right, up)),
-      zoom: (factor) => this.aimed(this.mode.flat ? pagesView.zoom(factor) : rig.zoom(factor)),
-      press: (key, event) => this.press(key, event),
-    });
   }
 
   /** The hash of a link to this very view. */
@@ -69,6 +57,7 @@ export class ViewSession {
     const hash = new URLSearchParams({ camera: this.app.viewer.rig.toText() });
     if (this.mode.id !== 'lit') hash.set('view', this.mode.id);
     if (this.mode.falseColour === 'choice' && this.falseColour) hash.set('colours', 'false');
+    for (const [name, text] of Object.entries(toLink(this.shownAs()))) hash.set(name, text);
     return hash.toString();
   }
 
@@ -83,7 +72,29 @@ export class ViewSession {
     this.app.frame.setWalk(rig.mode === 'walk');
     this.linked = link.get('view') ?? this.linked;
     if (this.linked !== undefined) this.setFalseColour(link.get('colours') === 'false');
+    this.showAs(fromLink(link), this.linked !== undefined);
     this.followLink();
+  }
+
+  private shownAs(): ShownAs {
+    const { exposure, brightness, uniforms } = this.app.viewer;
+    const { falseRange, toneCurve } = uniforms.all;
+    return {
+      stops: exposure.stops,
+      exposure: exposure.automatic ? undefined : exposure.base,
+      tone: TONE_CURVES.find(({ number }) => number === toneCurve.value)?.id,
+      scale: brightness.autoRange ? undefined : [falseRange.value.x, falseRange.value.y],
+    };
+  }
+
+  /** `whole`: what is not said is as it is without a link. */
+  private showAs({ stops, exposure, tone, scale }: ShownAs, whole: boolean): void {
+    if (whole || stops !== undefined) this.setStops(stops ?? 0);
+    if (whole || exposure !== undefined) this.setAutoExposure(exposure === undefined, exposure);
+    if (whole || tone !== undefined) this.setToneCurve(tone ?? TONE_CURVES[0].id);
+    if (!whole && scale === undefined) return;
+    this.setRange(scale);
+    this.panel.setRange(scale);
   }
 
   onCapabilities(): void {
@@ -208,9 +219,13 @@ export class ViewSession {
     rig.take(chosen.camera, shown!.bounds);
   }
 
-  private nextCamera(): void {
+  nextCamera(): void {
     const count = this.app.viewer.shown?.cameras.length ?? 0;
     if (count > 0) this.useCamera((this.camera + 1) % count);
+  }
+
+  toggleFalseColour(): void {
+    if (this.mode.falseColour === 'choice') this.setFalseColour(!this.falseColour);
   }
 
   private setFalseColour(on: boolean): void {
@@ -233,24 +248,26 @@ export class ViewSession {
     viewer.setMode(this.mode);
   }
 
-  private setAutoExposure(on: boolean): void {
+  /** Where it is manual it stays what it is, or becomes `base`. */
+  private setAutoExposure(on: boolean, base?: number): void {
     const { exposure } = this.app.viewer;
-    if (!on) exposure.base = exposure.value / 2 ** exposure.stops;
+    if (!on) exposure.base = base ?? exposure.value / 2 ** exposure.stops;
     exposure.automatic = on;
     this.panel.setAuto(on);
     this.app.viewer.invalidate();
   }
 
-  private setStops(stops: number): void {
-    const clamped = Math.min(8, Math.max(-8, stops));
+  setStops(stops: number): void {
+    const clamped = Math.min(MOST_STOPS, Math.max(-MOST_STOPS, stops));
     this.app.viewer.exposure.stops = clamped;
     this.panel.setStops(clamped);
     this.app.viewer.moved();
   }
 
   private setToneCurve(id: string): void {
-    const curve = TONE_CURVES.find((one) => one.id === id);
-    this.app.viewer.uniforms.all.toneCurve.value = curve?.number ?? 0;
+    const curve = TONE_CURVES.find((one) => one.id === id) ?? TONE_CURVES[0];
+    this.app.viewer.uniforms.all.toneCurve.value = curve.number;
+    this.panel.setTone(curve.id);
     this.app.viewer.invalidate();
   }
 
@@ -259,81 +276,16 @@ export class ViewSession {
     if (this.mode.id === 'mips') return frame.legend.showMips();
     if (!viewer.uniforms.all.falseColour.value || !this.mode.unit || !viewer.shown) return frame.legend.hide();
     const { x: low, y: high } = viewer.uniforms.all.falseRange.value;
-    frame.legend.show(this.mode.legend ?? this.mode.label, this.mode.unit, low, high);
+    const title = this.mode.legend ?? this.mode.label;
+    if (!viewer.brightness.hasRange) return frame.legend.showNothing(title, this.mode.unit, this.whyNothing());
+    frame.legend.show(title, this.mode.unit, low, high);
     this.panel.showRange(low, high);
   }
 
-  // ---- pointer ----
-
-  private listenToPointer(canvas: HTMLCanvasElement): void {
-    let down: { x: number; y: number } | undefined;
-    canvas.addEventListener('pointerdown', (event) => {
-      canvas.focus({ preventScroll: true });
-      // Touch tells of its place only when it comes down, so the gizmo may not know yet that it is meant.
-      down = this.app.viewer.gizmo.busy ? undefined : { x: event.clientX, y: event.clientY };
-    });
-    canvas.addEventListener('pointerup', (event) => {
-      const moved = down && Math.hypot(event.clientX - down.x, event.clientY - down.y);
-      down = undefined;
-      if (moved !== undefined && moved <= CLICK_SLACK && event.button === 0) this.click(event);
-    });
-    canvas.addEventListener('pointermove', (event) => {
-      this.meter.pointTo(event);
-    });
-    canvas.addEventListener('pointerleave', ({ pointerType }) => {
-      if (pointerType === 'touch') return; // a finger that is lifted has left: what it pointed at is still meant
-      this.meter.leave();
-    });
-  }
-
-  private click(event: PointerEvent): void {
-    if (this.meter.isOn) return this.meter.pointTo(event);
-    const hit = this.app.viewer.pickAt(...this.app.frame.toDevice(event.clientX, event.clientY));
-    this.app.edit.selectHit(hit?.object);
-  }
-
-  // ---- keys ----
-
-  /** By keys, which aim the meter; `result` of what they did. */
-  private aimed<T>(result: T): T {
-    if (result !== false) this.meter.aimByKeys();
-    return result;
-  }
-
-  private press(key: string, event: KeyboardEvent): boolean {
-    const { app } = this;
-    // Where [ and ] are written with AltGr, some systems tell of that as of Control and Alt.
-    const isWritten = event.getModifierState('AltGraph');
-    const command = !isWritten && (event.ctrlKey || event.metaKey);
-    if (command && key.toLowerCase() === 'z')
-      return done(event.shiftKey ? app.edit.history.redo() : app.edit.history.undo());
-    if (command && key.toLowerCase() === 'y') return done(app.edit.history.redo());
-    if (command || (event.altKey && !isWritten)) return false;
-    if (key === 'Delete' || key === 'Backspace') return isAmongObjects(event.target) && done(app.edit.removeSelected());
-    if (/^\d$/.test(key)) return done(this.setMode(VIEW_MODES[(Number(key) + 9) % 10]?.id ?? 'lit'));
-    const actions: Record<string, () => unknown> = {
-      v: () => this.toggleWalk(),
-      f: () => this.frameAll(),
-      F: () => this.frameSelection(),
-      c: () => this.nextCamera(),
-      x: () => this.mode.falseColour === 'choice' && this.setFalseColour(!this.falseColour),
-      '[': () => this.setStops(app.viewer.exposure.stops - 0.25),
-      ']': () => this.setStops(app.viewer.exposure.stops + 0.25),
-      m: () => this.aimed(this.meter.toggle()),
-      n: () => app.edit.selectNext(1),
-      N: () => app.edit.selectNext(-1),
-      t: () => app.edit.setGizmo('translate'),
-      r: () => app.edit.setGizmo('rotate'),
-      y: () => app.edit.setGizmo('scale'),
-      l: () => app.edit.addLamp(),
-      ' ': () => app.togglePause(),
-      p: () => app.frame.togglePanel(),
-      h: () => app.frame.toggleChrome(),
-      Escape: () => app.edit.select(undefined),
-      '?': () => app.frame.help.showModal(),
-    };
-    const action = actions[key];
-    return action ? done(action()) : false;
+  private whyNothing(): string {
+    const { shown, shownData } = this.app.viewer.layouts;
+    const set = this.mode.quantity === 'irradiance' ? shown?.set : shownData;
+    return set?.complete && set.waiting === 0 ? '0 everywhere: nothing to measure' : 'Nothing has come yet';
   }
 }
 
@@ -345,13 +297,4 @@ function alike(a: Box3, b: Box3): boolean {
 
 function addressed(): URLSearchParams {
   return new URLSearchParams(location.hash.slice(1));
-}
-
-function done(_result: unknown): true {
-  return true;
-}
-
-/** Keys that take something away do so in the picture and in the list of objects: elsewhere they were meant for a control. */
-function isAmongObjects(target: EventTarget | null): boolean {
-  return target === document.body || (target instanceof Element && target.closest('canvas.view, .tree') !== null);
 }

@@ -16,10 +16,15 @@ layout(location = 4) uniform float data_scale;    // brings the data of kError a
 
 const float kPi = 3.14159265358979;
 
-// Blue, cyan, green, yellow, red over 0..1.
+// Every ninth colour of viridis (matplotlib, CC0), sRGB of 255, over 0..1: lighter all the way. The live viewer has the same.
+const vec3 kStops[9] = vec3[](vec3(68, 1, 84), vec3(71, 45, 123), vec3(59, 82, 139),
+                            vec3(44, 114, 142), vec3(33, 145, 140), vec3(40, 174, 128),
+                            vec3(94, 201, 98), vec3(173, 220, 48), vec3(253, 231, 37));
+
 vec3 falseColor(float t) {
-  t = clamp(t, 0.0, 1.0) * 4.0;
-  return clamp(vec3(t - 2.0, t < 3.0 ? t : 4.0 - t, 2.0 - t), 0.0, 1.0);
+  t = clamp(t, 0.0, 1.0) * 8.0;
+  int low = min(int(t), 7);
+  return mix(kStops[low], kStops[low + 1], t - float(low)) / 255.0;
 }
 
 vec3 hashColor(uint id) {

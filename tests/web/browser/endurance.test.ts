@@ -67,7 +67,7 @@ it('says what is wrong with a file that is no scene', async () => {
   const server = await serve(`${SCENES}/cornell.glb`);
   const page = await pages.open(server.url, 900, 600);
   await converged(page);
-  await page.evaluate(() => void window.viewer!.edit.loadFile(new File(['not a scene'], 'notes.glb')));
+  await page.evaluate(() => void window.viewer!.scene.loadFile(new File(['not a scene'], 'notes.glb')));
   await said(page, /^notes\.glb: /);
   await converged(page); // the scene that was there is there
   // The refusal is an answer of 400, which the browser's console tells of; nothing else may.

@@ -71,7 +71,14 @@ it.each(['', 'view=irradiance', 'view=pages'])(
   'shows a solved scene in its final brightness at once (%s)',
   async (view) => {
     const server = await serve(`${SCENES}/cornell.glb`);
-    await converged(await pages.open(server.url));
+    const other = await pages.open(server.url);
+    await converged(other);
+    // So that what it is to be shown by is far from nothing, in all views.
+    await other.evaluate(() => {
+      const path = '/materials/@light/extensions/KHR_materials_emissive_strength/emissiveStrength';
+      return window.viewer!.connection.call('scene.patch', { patch: [{ op: 'replace', path, value: 0.1 }] });
+    });
+    await converged(other);
     const frames = await framesOf(await openWatched(`${server.url}/#ui=0&${view}`));
     const first = frames.findIndex(({ light }) => light);
     const last = frames.at(-1)!;

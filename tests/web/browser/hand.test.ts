@@ -15,8 +15,17 @@ async function placementOf(node: number): Promise<Placement> {
   return (await sceneOf(server)).nodes[node] as unknown as Placement;
 }
 
-/** Chooses the object, and drags the handles of a mode from so far beside their middle, in pixels. Returns its node. */
-async function drag(page: Page, key: string, from: [number, number], by: [number, number]): Promise<number> {
+/**
+ * Chooses the object, and drags the handles of a mode from so far beside their middle, in pixels. Returns its node.
+ * `held`: what is done before it is let go.
+ */
+async function drag(
+  page: Page,
+  key: string,
+  from: [number, number],
+  by: [number, number],
+  held: () => Promise<void> = async () => undefined,
+): Promise<number> {
   const node = await page.evaluate(() => {
     const { edit } = window.viewer!;
     const index = edit.document.gltf.nodes!.findIndex(({ name }) => name === 'tall_block');
@@ -36,6 +45,7 @@ async function drag(page: Page, key: string, from: [number, number], by: [number
   await page.mouse.move(x, y);
   await page.mouse.down();
   for (let step = 1; step <= 8; ++step) await page.mouse.move(x + (by[0] * step) / 8, y + (by[1] * step) / 8);
+  await held();
   await page.mouse.up();
   return node;
 }
@@ -82,6 +92,49 @@ it.each([
     (now) => JSON.stringify(now) === JSON.stringify(before),
   );
   expect(undone).toEqual(before);
+  await converged(page);
+});
+
+it.each([
+  { name: 'moved', key: 't', from: [0, 0], by: [-60, -20] },
+  { name: 'turned', key: 'r', from: [55, 55], by: [-60, 40] },
+  { name: 'scaled', key: 'y', from: [0, 0], by: [50, -30] },
+] as const)('Escape puts back what is being $name, here and on the server, and keeps it selected', async (hand) => {
+  const page = await pages.open(server.url, SIDE.width, SIDE.height);
+  await converged(page);
+  const camera = () => page.evaluate(() => window.viewer!.viewer.rig.camera.matrixWorld.toArray());
+  const index = (await sceneOf(server)).nodes.findIndex(({ name }) => name === 'tall_block');
+  const [before, place] = [await placementOf(index), await camera()];
+  const shown = () =>
+    page.evaluate((n) => {
+      const { position, quaternion, scale } = window.viewer!.viewer.shown!.nodes.get(n)!;
+      return [...position.toArray(), ...quaternion.toArray(), ...scale.toArray()];
+    }, index);
+  const stood = await shown();
+  await drag(page, hand.key, [...hand.from], [...hand.by], async () => {
+    // The server has heard of it before it is cancelled, ...
+    await until(
+      () => placementOf(index),
+      (now) => JSON.stringify(now) !== JSON.stringify(before),
+    );
+    await page.keyboard.press('Escape');
+    expect(distance(await shown(), stood)).toBeLessThan(1e-5);
+    // ... and what the hand goes on to do means nothing, not even to the camera.
+    for (let step = 1; step <= 4; ++step) await page.mouse.move(300 + 20 * step, 300);
+  });
+  await answered(page);
+  expect(await placementOf(index)).toEqual(before);
+  expect(distance(await shown(), stood)).toBeLessThan(1e-5);
+  expect(await camera()).toEqual(place);
+  const state = () =>
+    page.evaluate(() => {
+      const { document, selection } = window.viewer!.edit;
+      return { node: selection?.node, steps: document.undoStack.length };
+    });
+  expect(await state()).toEqual({ node: index, steps: 0 });
+  // With nothing in the hand it lets go of the selection, as ever.
+  await page.keyboard.press('Escape');
+  expect((await state()).node).toBeUndefined();
   await converged(page);
 });
 

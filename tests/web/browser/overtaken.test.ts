@@ -228,7 +228,7 @@ it('shows the last of the files that are dropped, and one from where one was whe
   for (let i = 0; i < 3; ++i) await page.keyboard.press('ArrowRight');
   const eye = () => page.evaluate(() => window.viewer!.viewer.rig.camera.position.toArray());
   const drop = (name: string, text: string) =>
-    page.evaluate(([n, t]) => void window.viewer!.edit.loadFile(new File([t!], n!)), [name, text]);
+    page.evaluate(([n, t]) => void window.viewer!.scene.loadFile(new File([t!], n!)), [name, text]);
   const gate = await holdBack(page, '/uploads');
   const given: string[] = [];
   page.on('requestfailed', (request) => given.push(new URL(request.url()).search));
@@ -278,17 +278,17 @@ it('asks for the last of the files that are dropped after those before it, howev
   // Both are on the server before the first is asked for.
   const asked = await page.evaluate(
     async ([first, second]) => {
-      const { connection, edit } = window.viewer!;
+      const { connection, scene } = window.viewer!;
       const call = connection.call.bind(connection);
       const urls: string[] = [];
       let dropped: Promise<void> | undefined;
       connection.call = <T>(method: string, params: { url?: string } = {}) => {
         if (method === 'scene.load') urls.push(params.url!);
         // The second is dropped when the first has just been asked for.
-        if (method === 'scene.load') dropped ??= edit.loadFile(new File([second!], 'second.gltf'));
+        if (method === 'scene.load') dropped ??= scene.loadFile(new File([second!], 'second.gltf'));
         return call<T>(method, params);
       };
-      await edit.loadFile(new File([first!], 'first.gltf'));
+      await scene.loadFile(new File([first!], 'first.gltf'));
       await dropped;
       return urls.length;
     },

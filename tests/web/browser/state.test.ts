@@ -215,6 +215,36 @@ it('does not take the black before the last tiles for the light of a solve that 
   expect(await page.evaluate(() => window.viewer!.viewer.shown!.set.showsLight)).toBe(true);
 });
 
+it('says that a solve which is over is done when the errors of its end are here, too', async () => {
+  const server = await serve(`${SCENES}/cornell.glb`);
+  await converged(await pages.open(server.url));
+  const page = await pages.open('about:blank', 900, 600);
+  let held: (() => void)[] = [];
+  let holds = false;
+  await page.routeWebSocket(/\/ws$/, (socket) => {
+    const upstream = socket.connectToServer();
+    socket.onMessage((message) => upstream.send(message));
+    upstream.onMessage((message) => {
+      if (holds && typeof message === 'string' && message.includes('"method":"bookmark"'))
+        held.push(() => socket.send(message));
+      else socket.send(message);
+    });
+  });
+  await page.goto(server.url);
+  await converged(page);
+  const chip = () => page.locator('.chip .state').innerText();
+  expect(await chip()).toBe('Done');
+  holds = true;
+  await page.evaluate(() => window.viewer!.view.setMode('error'));
+  await until(async () => held.length, (count) => count > 0); // prettier-ignore
+  await drawn(page);
+  expect(await chip()).toBe('Receiving light');
+  holds = false;
+  for (const send of held) send();
+  held = [];
+  await until(chip, (text) => text === 'Done');
+});
+
 it('undoes on past what somebody else has undone, and lets go of what is no more', async () => {
   const server = await serve(`${SCENES}/cornell.glb`);
   const page = await pages.open(server.url, 1200, 800);

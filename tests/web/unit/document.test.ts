@@ -1,6 +1,6 @@
 import { existsSync, readFileSync } from 'node:fs';
 import * as edits from '../../../client/web/src/document/edits';
-import { hangingNodes, type Gltf } from '../../../client/web/src/document/gltf';
+import { handlesOf, hangingNodes, type Gltf, type GltfLight } from '../../../client/web/src/document/gltf';
 import { applyPatch, sameJson, withoutNames } from '../../../client/web/src/document/json_patch';
 import { SceneDocument } from '../../../client/web/src/document/scene_document';
 import type { Json, Patch, ScenePatchReply } from '../../../client/web/src/protocol/messages';
@@ -200,6 +200,29 @@ describe('nodes of the scene', () => {
   });
 });
 
+describe('handles', () => {
+  const lamp = (type: GltfLight['type'], more: object = {}): Gltf => ({
+    asset: { version: '2.0' },
+    nodes: [{ extensions: { KHR_lights_punctual: { light: 0 } }, ...more }, { mesh: 0 }, {}],
+    extensions: { KHR_lights_punctual: { lights: [{ type }] } },
+  });
+  const all = ['translate', 'rotate', 'scale'];
+
+  it('are offered where they change something', () => {
+    expect(handlesOf(lamp('point'), 0)).toEqual(['translate']);
+    expect(handlesOf(lamp('spot'), 0)).toEqual(['translate', 'rotate']);
+    expect(handlesOf(lamp('directional'), 0)).toEqual(['rotate']);
+    expect(handlesOf(lamp('point'), 1)).toEqual(all);
+    expect(handlesOf(lamp('point'), 2)).toEqual(all);
+    expect(handlesOf(lamp('area' as never), 0)).toEqual(all);
+  });
+
+  it('are all offered of a lamp with something else to it', () => {
+    expect(handlesOf(lamp('point', { mesh: 0 }), 0)).toEqual(all);
+    expect(handlesOf(lamp('point', { children: [1] }), 0)).toEqual(all);
+  });
+});
+
 describe('scene document', () => {
   it('keeps one step of a drag whose last edits are answered after it ended', async () => {
     const { document, calls } = session();
@@ -219,6 +242,57 @@ describe('scene document', () => {
     expect(calls[3]!.patch).toEqual([{ op: 'replace', path: '/nodes/1/translation', value: [6, 0, 0] }]);
     calls[3]!.answer(reply(5));
     await undone;
+  });
+
+  it('takes back a drag that is cancelled, of which the server has heard and hears, and keeps no step of it', async () => {
+    const { document, calls } = session();
+    const at = () => document.gltf.nodes![1]!.translation;
+    const first = document.edit('Move', move(5), 'move 1');
+    void document.edit('Move', move(6), 'move 1'); // waits, and is not told
+    const cancelled = document.cancelGesture('Move', 'move 1', move(1));
+    expect(at()).toEqual([1, 0, 0]);
+    calls[0]!.answer(reply(2));
+    await first;
+    await settle();
+    expect(at()).toEqual([1, 0, 0]);
+    expect(calls.map(({ patch }) => patch)).toEqual([move(5), move(1)]);
+    calls[1]!.answer(reply(3));
+    await cancelled;
+    expect(at()).toEqual([1, 0, 0]);
+    expect(document.undoStack).toEqual([]);
+    // To take back what put it back would be to move it again.
+    expect([...document.takenBack]).toEqual([3]);
+  });
+
+  it('takes back a drag that is cancelled after the server has answered all of it, and nothing before it', async () => {
+    const { document, calls } = session();
+    for (const [i, x] of [3, 4].entries()) {
+      const moved = document.edit('Move', move(x), 'move 1');
+      document.endGesture();
+      calls[i]!.answer(reply(2 + i));
+      await moved;
+    }
+    const dragged = document.edit('Move', move(7), 'move 1');
+    calls[2]!.answer(reply(4));
+    await dragged;
+    const cancelled = document.cancelGesture('Move', 'move 1', move(4));
+    expect(calls[3]!.patch).toEqual(move(4));
+    calls[3]!.answer(reply(5));
+    await cancelled;
+    expect(document.undoStack.map(({ forward }) => forward)).toEqual([move(3), move(4)]);
+  });
+
+  it('tells the server nothing of a cancelled drag that it has not heard of', async () => {
+    const { document, calls } = session();
+    const other = document.edit('Colour', [{ op: 'replace', path: '/materials/0/name', value: 'grey' }]);
+    void document.edit('Move', move(5), 'move 1');
+    await document.cancelGesture('Move', 'move 1', move(1));
+    expect(document.gltf.nodes![1]!.translation).toEqual([1, 0, 0]);
+    calls[0]!.answer(reply(2));
+    await other;
+    await document.settled();
+    expect(calls.length).toBe(1);
+    expect(document.undoStack.length).toBe(1);
   });
 
   it('shows an edit at once, and undoes it to what stood there before', async () => {

@@ -1,4 +1,5 @@
 import { offerOf } from '../../../client/web/src/app_history';
+import { loadNote } from '../../../client/web/src/app_scene';
 import type { PastRevision, SceneHistory } from '../../../client/web/src/protocol/messages';
 
 const history = (undoable: number, redoable: number, revisions: PastRevision[]): SceneHistory => ({
@@ -40,4 +41,20 @@ describe('what is offered to be undone and redone', () => {
   it('is undone without knowing it where there is more than was asked for', () => {
     expect(offerOf(history(40, 0, [{ revision: 90, kind: 'redo' }]), new Set([3])).undo).toBe(true);
   });
+});
+
+it('people are told who has loaded which scene, as far as that is known', () => {
+  const loads: PastRevision[] = [
+    { revision: 4, kind: 'load', summary: 'room.glb', by: 'Ann' },
+    { revision: 5, kind: 'undo' },
+    { revision: 6, kind: 'load', summary: 'hall.glb' },
+    { revision: 7, kind: 'load' },
+  ];
+  expect([4, 5, 6, 7, 8].map((revision) => loadNote(loads, revision))).toEqual([
+    'Ann loaded room.glb',
+    undefined,
+    'Someone loaded hall.glb',
+    'Someone loaded another scene',
+    undefined,
+  ]);
 });

@@ -180,3 +180,17 @@ describe('a set of pages', () => {
     expect(set.pages[0]!.sample(32 / 1024, 32 / 1024)![0]).toBe(59_904 * 8);
   });
 });
+
+it('spans a factor of two at least, however alike all values are, and nothing where none is above nothing', () => {
+  const note = { layout: 1, revision: 1, pages: [{ width: 64, height: 64, mips: 7 }], uvs: '' };
+  const set = new LightmapSet(new Card().renderer, note, 'irradiance', () => undefined);
+  expect(set.range()).toBeUndefined();
+  const header = { page: 0, mip: 0, x: 0, y: 0, width: 64, height: 64, revision: 1, error: 0.01 };
+  for (const value of [0, 100]) {
+    set.enqueue({ ...tile(0, 0, value, 0), header: header as Tile['header'] }, 1);
+    set.takeUp(ALWAYS);
+  }
+  const [low, high] = set.range()!;
+  expect(high).toBeCloseTo(0.2126 * 100 + 0.7152 * 50 + 0.0722 * 25, -1);
+  expect(high / low).toBeCloseTo(2, 10);
+});

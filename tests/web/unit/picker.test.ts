@@ -46,7 +46,7 @@ describe('the light meter', () => {
     expect(read.irradiance).toEqual([300, 200, 100]);
     expect(read.error).toBeCloseTo(luminance([3, 2, 1]), 10);
     expect([read.page, read.texel, read.node, read.material]).toEqual([0, [16, 8], 7, 2]);
-    expect(read.point.toArray().map((v) => Math.round(v * 1e6) / 1e6 + 0)).toEqual([-0.5, -0.5, 0]);
+    expect(read.point!.toArray().map((v) => Math.round(v * 1e6) / 1e6 + 0)).toEqual([-0.5, -0.5, 0]);
   });
 
   it('reads the light that leaves a plain surface: what it reflects and what it emits', () => {

@@ -68,6 +68,22 @@ export function lightOf(gltf: Gltf, node: number): { index: number; light: GltfL
   return index === undefined || !light ? undefined : { index, light };
 }
 
+export type Handle = 'translate' | 'rotate' | 'scale';
+
+const ALL_HANDLES: readonly Handle[] = ['translate', 'rotate', 'scale'];
+const LIGHT_HANDLES: Record<GltfLight['type'], readonly Handle[]> = {
+  point: ['translate'],
+  spot: ['translate', 'rotate'],
+  directional: ['rotate'],
+};
+
+/** By what a node can be placed so that anything changes: a lamp alone has no size, and shines the same all around. */
+export function handlesOf(gltf: Gltf, node: number): readonly Handle[] {
+  const { mesh, children } = gltf.nodes?.[node] ?? {};
+  const type = lightOf(gltf, node)?.light.type;
+  return !type || mesh !== undefined || children?.length ? ALL_HANDLES : (LIGHT_HANDLES[type] ?? ALL_HANDLES);
+}
+
 /** Where a node hangs: pointer of the list that names it, and its place there. */
 export function holderOf(gltf: Gltf, node: number): { list: string; place: number } | undefined {
   for (const [s, scene] of (gltf.scenes ?? []).entries()) {

@@ -14,8 +14,8 @@ export interface EditEntry {
   inverse: Patch;
 }
 
-/** What an edit is to the history: a step of it, or one of them taken back or made again. */
-type Role = 'step' | 'undo' | 'redo';
+/** What an edit is to the history: a step of it, one of them taken back or made again, or the end of one that shall not be. */
+type Role = 'step' | 'undo' | 'redo' | 'cancel';
 
 interface PendingEdit extends EditEntry {
   /** Edits with the same key replace each other while they wait, and are one step of undo. */
@@ -119,6 +119,19 @@ export class SceneDocument {
     ++this.gesture;
   }
 
+  /**
+   * The gesture `kind` that is under way shall not have been: `patch` puts back what was there before it. Where the server
+   * has heard of none of it, nor does it hear of this; no step of undo stays.
+   */
+  async cancelGesture(label: string, kind: string, patch: Patch): Promise<void> {
+    const key = `${kind} #${this.gesture}`;
+    this.endGesture();
+    const dropped = this.dropWaiting(key);
+    if (this.openKey === key || this.pending.some((edit) => edit.key === key))
+      return this.enqueue(`Cancel ${label}`, patch, 'cancel', undefined, key);
+    if (dropped) this.events.changed(patch.map((operation) => operation.path));
+  }
+
   async undo(): Promise<void> {
     const entry = this.undoStack.pop();
     if (entry) await this.step('undo', entry, entry.inverse, this.undoStack, this.redoStack);
@@ -149,16 +162,26 @@ export class SceneDocument {
     return this.gltf as unknown as Json;
   }
 
-  private enqueue(label: string, forward: Patch, role: Role, kind: string | undefined): Promise<void> {
-    const key = kind === undefined ? undefined : `${kind} #${this.gesture}`;
+  /** The newest of a gesture's edits, where it is not on its way yet. */
+  private dropWaiting(key: string): boolean {
+    const waiting = this.pending.at(-1);
+    const onTheWay = this.sending ? this.pending[0] : undefined;
+    if (!waiting || waiting === onTheWay || waiting.key !== key) return false;
+    this.takeBack(waiting);
+    this.pending.pop();
+    waiting.done();
+    return true;
+  }
+
+  private enqueue(
+    label: string,
+    forward: Patch,
+    role: Role,
+    kind: string | undefined,
+    key = kind === undefined ? undefined : `${kind} #${this.gesture}`,
+  ): Promise<void> {
     return new Promise((resolve, reject) => {
-      const waiting = this.pending.at(-1);
-      const onTheWay = this.sending ? this.pending[0] : undefined;
-      if (key !== undefined && waiting && waiting !== onTheWay && waiting.key === key) {
-        this.takeBack(waiting);
-        this.pending.pop();
-        waiting.done();
-      }
+      if (key !== undefined) this.dropWaiting(key);
       const edit: PendingEdit = {
         label,
         forward,
@@ -232,7 +255,8 @@ export class SceneDocument {
     edit.shown = [];
     this.lastEdit = edit.forward;
     if (edit.role === 'step') this.remember(edit, undoOnServer(edit.forward, inverse));
-    if (edit.role === 'undo') this.takenBack.add(revision);
+    if (edit.role === 'cancel') this.forgetStep(edit.key);
+    if (edit.role === 'undo' || edit.role === 'cancel') this.takenBack.add(revision);
     this.events.historyChanged();
   }
 
@@ -246,6 +270,11 @@ export class SceneDocument {
       if (this.undoStack.length > MAX_HISTORY) this.undoStack.shift();
     }
     this.openKey = edit.key;
+  }
+
+  private forgetStep(key: string | undefined): void {
+    if (this.openKey === key) this.undoStack.pop();
+    this.openKey = undefined;
   }
 
   private refuse(edit: PendingEdit, error: Error): void {

@@ -135,6 +135,9 @@ export interface Notifications {
 export interface PastRevision {
   revision: number;
   kind: 'load' | 'patch' | 'undo' | 'redo';
+  /** Of a load: the scene's name. */
+  summary?: string;
+  by?: string;
   /** Of a patch: it is taken back at present. */
   undone?: boolean;
 }

@@ -9,13 +9,14 @@ import { Toasts } from './toast';
 export interface FrameActions {
   toggleWalk(): void;
   frameAll(): void;
-  gizmo(mode: 'translate' | 'rotate' | 'scale'): void;
+  gizmo(mode: (typeof HANDLES)[number]): void;
   toggleMeter(): void;
   addLamp(): void;
   undo(): void;
   redo(): void;
 }
 
+const HANDLES = ['translate', 'rotate', 'scale'] as const;
 const THEMES = ['auto', 'dark', 'light'] as const;
 
 export class Frame {
@@ -96,8 +97,12 @@ export class Frame {
     pressed(this.tools['meter']!, on);
   }
 
-  setGizmo(mode: string): void {
-    for (const name of ['translate', 'rotate', 'scale']) pressed(this.tools[name]!, name === mode);
+  /** `offered`: the others would change nothing. */
+  setGizmo(mode: string, offered: readonly string[] = HANDLES): void {
+    for (const name of HANDLES) {
+      pressed(this.tools[name]!, name === mode);
+      this.tools[name]!.disabled = !offered.includes(name);
+    }
   }
 
   setHistory(undo: boolean, redo: boolean): void {

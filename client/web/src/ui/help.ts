@@ -21,7 +21,7 @@ const KEYS: [string, string][] = [
   ['Ctrl+Z, Ctrl+Shift+Z', 'undo, redo'],
   ['Space', 'pause or resume the solve'],
   ['P, H', 'show or hide the panel, everything but the picture'],
-  ['Escape', 'clear the selection'],
+  ['Escape', 'take back what is being dragged; clear the selection'],
   ['?', 'this list'],
 ];
 

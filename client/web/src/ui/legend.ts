@@ -1,6 +1,6 @@
 // The scale of a false-colour picture: what colour means how many lux, or which mip.
 
-import { MIP_STOPS, paletteCss } from '../view/palette';
+import { MIP_STOPS, NOTHING, paletteCss } from '../view/palette';
 import { h, measured, readable, withError } from './dom';
 
 const LABELS = 5;
@@ -38,6 +38,11 @@ export class Legend {
     this.fill(`${title}, ${unit}`, paletteCss('to right'), scaleLabels(low, high));
   }
 
+  /** Where there is nothing to be scaled by. */
+  showNothing(title: string, unit: string, why: string): void {
+    this.fill(`${title}, ${unit}`, `rgb(${NOTHING.map((c) => Math.round(255 * c)).join(' ')})`, [why]);
+  }
+
   showMips(): void {
     const labels = MIP_STOPS.map((_, mip) =>
       mip === 0 ? '0, finest' : mip < MIP_STOPS.length - 1 ? `${mip}` : `${mip} +`,
@@ -47,7 +52,7 @@ export class Legend {
 
   private fill(title: string, background: string, labels: string[]): void {
     this.element.hidden = false;
-    const text = [title, ...labels].join(' ');
+    const text = [title, background, ...labels].join(' ');
     if (this.ticks.dataset['text'] === text) return;
     this.ticks.dataset['text'] = text;
     this.title.textContent = title;

@@ -2,7 +2,17 @@
 
 import { MathUtils, Euler, Quaternion } from 'three';
 import { isVisible } from '../document/edits';
-import { hangingNodes, lightOf, materialName, nodeName, type Gltf, type Vec3, type Vec4 } from '../document/gltf';
+import {
+  handlesOf,
+  hangingNodes,
+  lightOf,
+  materialName,
+  nodeName,
+  type Gltf,
+  type Handle,
+  type Vec3,
+  type Vec4,
+} from '../document/gltf';
 import type { Placement } from '../document/edits';
 import { button, checkbox, field, fromHex, h, parseNumber, row, section, toHex } from './dom';
 import { emissionFields, emissionWritten } from './emission_fields';
@@ -225,20 +235,24 @@ export class ScenePanel {
     if (node.matrix) return [h('p', { class: 'dim' }, 'Placed by a skewed matrix, which cannot be edited here.')];
     const turn = new Euler().setFromQuaternion(new Quaternion(...(node.rotation ?? [0, 0, 0, 1])), 'YXZ');
     const degrees = [turn.x, turn.y, turn.z].map((a) => MathUtils.radToDeg(a)) as Vec3;
-    return [
-      this.vector('Position, m', node.translation ?? [0, 0, 0], (translation) =>
-        this.actions.setPlacement(index, { translation }),
-      ),
-      this.vector('Rotation, °', degrees, ([x, y, z]) => {
-        const euler = new Euler(...([x, y, z].map((a) => MathUtils.degToRad(a)) as Vec3), 'YXZ');
-        this.actions.setPlacement(index, { rotation: new Quaternion().setFromEuler(euler).toArray() as Vec4 });
-      }),
+    const rows: Record<Handle, () => HTMLElement> = {
+      translate: () =>
+        this.vector('Position, m', node.translation ?? [0, 0, 0], (translation) =>
+          this.actions.setPlacement(index, { translation }),
+        ),
+      rotate: () =>
+        this.vector('Rotation, °', degrees, ([x, y, z]) => {
+          const euler = new Euler(...([x, y, z].map((a) => MathUtils.degToRad(a)) as Vec3), 'YXZ');
+          this.actions.setPlacement(index, { rotation: new Quaternion().setFromEuler(euler).toArray() as Vec4 });
+        }),
       // A scale of 0 makes a sheet of a body: faces that look both ways in one plane, which no light can tell apart.
-      this.vector('Scale', node.scale ?? [1, 1, 1], (scale) => this.actions.setPlacement(index, { scale }), {
-        wanted: 'a number other than 0',
-        isGood: (value) => Number.isFinite(value) && value !== 0,
-      }),
-    ];
+      scale: () =>
+        this.vector('Scale', node.scale ?? [1, 1, 1], (scale) => this.actions.setPlacement(index, { scale }), {
+          wanted: 'a number other than 0',
+          isGood: (value) => Number.isFinite(value) && value !== 0,
+        }),
+    };
+    return handlesOf(this.gltf, index).map((handle) => rows[handle]());
   }
 
   private vector(label: string, value: Vec3, changed: (value: Vec3) => void, accepts = ANY_NUMBER): HTMLElement {

@@ -31,6 +31,7 @@ export class ViewPanel {
   private readonly stops: HTMLInputElement;
   private readonly stopsValue = h('output', { class: 'value' });
   private readonly auto: HTMLInputElement;
+  private readonly tone = select(TONE_CURVES, TONE_CURVES[0].id, (id) => this.actions.setToneCurve(id));
   private readonly cameras = h('div', { class: 'list' });
   private readonly low = this.rangeInput('Lowest');
   private readonly high = this.rangeInput('Highest');
@@ -61,10 +62,7 @@ export class ViewPanel {
         'Picture',
         field('Auto exposure', this.auto),
         field('Exposure', this.stops, this.stopsValue),
-        field(
-          'Tone mapping',
-          select(TONE_CURVES, 'neutral', (id) => actions.setToneCurve(id)),
-        ),
+        field('Tone mapping', this.tone),
         field(
           'Background',
           select(BACKGROUNDS, 'theme', (id) => actions.setBackground(id)),
@@ -99,6 +97,19 @@ export class ViewPanel {
 
   setAuto(on: boolean): void {
     this.auto.checked = on;
+  }
+
+  setTone(id: string): void {
+    this.tone.value = id;
+  }
+
+  /** A scale that a link asks for; undefined: it follows the light. */
+  setRange(range: [number, number] | undefined): void {
+    this.autoRange.checked = range === undefined;
+    this.low.disabled = this.high.disabled = range === undefined;
+    if (!range) return;
+    this.low.value = inField(range[0]);
+    this.high.value = inField(range[1]);
   }
 
   showRange(low: number, high: number): void {

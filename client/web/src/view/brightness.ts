@@ -2,12 +2,12 @@
 // Rests between measurements, as the card is needed for the picture itself.
 
 import type { PerspectiveCamera, Scene, WebGLRenderer } from 'three';
-import { ExposureMeter } from './exposure';
+import { ExposureMeter, exposureOf } from './exposure';
 import type { Layouts } from './layouts';
 import { LightGate } from './light_gate';
 import type { ViewUniforms } from './lit_material';
 import { exposureByRays } from './ray_exposure';
-import type { ViewMode } from './view_modes';
+import { shownLight, type ViewMode } from './view_modes';
 
 const MEASURE_EVERY_MS = 250;
 /** Reading back waits for all that the card has still to draw, which a slow one makes long: rest so many times that. */
@@ -39,6 +39,8 @@ export class Brightness {
   readonly exposure: ExposureMeter;
   /** The range of false colours follows the light. */
   autoRange = true;
+  /** There is a value to be measured by that range; else none that is known is more than nothing. */
+  hasRange = true;
   private readonly gate = new LightGate();
   /** Something has changed that the range, and the exposure, may depend on. */
   private rangeDue = true;
@@ -56,6 +58,14 @@ export class Brightness {
   changed(): void {
     this.rangeDue = true;
     this.exposureDue = true;
+  }
+
+  /** Another view: the light that it shows has an exposure of its own. */
+  setMode(mode: ViewMode): void {
+    this.exposure.setLight(shownLight(mode));
+    if (this.exposure.unknown) this.guessOfPages();
+    this.updateRange();
+    this.changed();
   }
 
   /** Once for every turn of the page. `replaces`: what is shown took the place of another scene's light. */
@@ -88,6 +98,7 @@ export class Brightness {
    * like much. As long as it is streamed no irradiance comes, and a layout that comes meanwhile has none: the last stays.
    */
   updateRange(): void {
+    this.hasRange = true;
     if (!this.autoRange) return;
     const { uniforms, layouts } = this.picture;
     const mode = this.picture.mode();
@@ -95,6 +106,7 @@ export class Brightness {
     const isOfLight = isUnshot || mode?.quantity === 'irradiance';
     const set = isOfLight ? layouts.shown?.set : layouts.shownData;
     const range = set?.range() ?? (isUnshot ? this.lightRange : undefined);
+    this.hasRange = range !== undefined || mode?.id === 'radiosity'; // of which lamps have some that nothing is lit by
     if (!range) return;
     if (isOfLight) this.lightRange = range;
     const [low, high] = range;
@@ -122,21 +134,44 @@ export class Brightness {
     this.lastMeasure = now;
     if (unknown && this.guessExposure(now)) return; // and the card has the first light itself to draw
     this.exposureDue = false;
-    if (automatic && (unknown || !this.picture.mode()?.flat)) void this.measureNow().then(() => this.picture.redraw());
+    if (automatic) void this.measureNow().then(() => this.picture.redraw());
   }
 
   private guessExposure(now: number): boolean {
     const { shown } = this.picture.layouts;
-    const guess = shown && exposureByRays(shown, this.picture.camera);
-    if (guess === undefined) return false;
-    this.exposure.guess(guess);
+    const mode = this.picture.mode();
+    if (mode && shownLight(mode) === 'arriving') {
+      if (!this.guessOfPages()) return false;
+    } else {
+      const guess = shown && exposureByRays(shown, this.picture.camera);
+      if (guess === undefined) return false;
+      this.exposure.guess(guess);
+    }
     this.gate.turn(now, false);
     this.picture.redraw();
     return true;
   }
 
-  private measureNow(): Promise<void> {
+  /** Of light that arrives, what all pages hold tells nearly as much as what is seen of them. */
+  private guessOfPages(): boolean {
+    const guess = this.exposureOfPages();
+    if (guess !== undefined) this.exposure.guess(guess);
+    return guess !== undefined;
+  }
+
+  private exposureOfPages(): number | undefined {
+    const mode = this.picture.mode();
+    if (!mode || shownLight(mode) !== 'arriving') return undefined;
+    return exposureOf((this.picture.layouts.shown?.set.someValues() ?? []).map((lux) => lux / Math.PI));
+  }
+
+  private async measureNow(): Promise<void> {
     const { world, camera } = this.picture;
+    if (this.picture.mode()?.flat) {
+      const found = this.exposureOfPages();
+      if (found !== undefined) this.exposure.found(found);
+      return;
+    }
     return this.picture.withoutSigns(() => this.exposure.measure(world, camera));
   }
 }

@@ -5,6 +5,7 @@ import { FloatType, HalfFloatType, WebGLRenderTarget, type Camera, type Scene, t
 import { decodeHalf } from '../protocol/rgb9e5';
 import type { ViewUniforms } from './lit_material';
 import { Readback } from './readback';
+import type { ShownLight } from './view_modes';
 
 const WIDTH = 64;
 const HEIGHT = 48;
@@ -31,6 +32,9 @@ export class ExposureMeter {
   base = 1;
   /** How long the last measurement was on its way. */
   tookMs = 0;
+  /** What was measured last of either light: who goes back to a view finds it as bright as it was. */
+  private readonly known = new Map<ShownLight, number>();
+  private light: ShownLight = 'leaving';
   private measured = 1;
   private shown = 1;
   /** The next value is taken at once: the eye need not get used to it. */
@@ -57,6 +61,20 @@ export class ExposureMeter {
 
   /** Another scene, or another part of it: what was measured says nothing about it. */
   forget(): void {
+    this.known.clear();
+    this.renew();
+  }
+
+  /** Light that leaves surfaces and light that reaches them differ by how dark the surfaces are: each has its own. */
+  setLight(light: ShownLight): void {
+    if (light === this.light) return;
+    this.light = light;
+    this.renew();
+    const known = this.known.get(light);
+    if (known !== undefined) this.guess(known);
+  }
+
+  private renew(): void {
     this.fresh = this.waits = true;
     this.running = undefined;
     ++this.scene;
@@ -105,6 +123,18 @@ export class ExposureMeter {
     return this.shown;
   }
 
+  /** Of light that leaves surfaces, whatever is shown. */
+  get ofLeaving(): number {
+    const known = this.automatic ? this.known.get('leaving') : undefined;
+    return known === undefined ? this.shown : known * 2 ** this.stops;
+  }
+
+  /** Was found out without a picture. */
+  found(value: number): void {
+    this.take(value);
+    this.waits = false;
+  }
+
   /** Ends when there is a new value; the one that is on its way counts. */
   measure(scene: Scene, camera: Camera): Promise<void> {
     if (this.running) return this.running;
@@ -140,6 +170,7 @@ export class ExposureMeter {
 
   private take(value: number): void {
     this.measured = value;
+    this.known.set(this.light, value);
     if (this.fresh) this.settle();
     this.fresh = false;
   }

@@ -18,10 +18,11 @@ import {
   type Vector3,
 } from 'three';
 import { TransformControls } from 'three/addons/controls/TransformControls.js';
+import type { Handle } from '../document/gltf';
 import { LampMarker } from './lamp_marker';
 import { surfaceBox } from './object_box';
 
-export type GizmoMode = 'translate' | 'rotate' | 'scale';
+export type GizmoMode = Handle;
 
 /** Finding edges takes about a microsecond a triangle; larger objects show their box. */
 const MAX_EDGE_TRIANGLES = 30_000;
@@ -55,6 +56,8 @@ export class Gizmo {
   /** In pixels of the page; where it took hold, and where it is now. */
   private readonly grabbed = new Vector2();
   private readonly pointer = new Vector2();
+  /** Where the object was when it was taken hold of, in its parent. */
+  private readonly before = new Object3D();
 
   constructor(
     private readonly scene: Scene,
@@ -78,6 +81,27 @@ export class Gizmo {
 
   get dragging(): boolean {
     return this.made?.dragging ?? false;
+  }
+
+  /** What is held follows the pointer; after cancel() it does not, though the button is still down. */
+  get moves(): boolean {
+    return this.dragging && this.made?.axis !== null;
+  }
+
+  /**
+   * Puts the object back to where it was taken hold of. The drag goes on without it until the pointer is let go, so that
+   * what is left of it does not turn the camera. False: nothing is held.
+   */
+  cancel(): boolean {
+    if (!this.moves || !this.object) return false;
+    this.made!.axis = null;
+    const { position, quaternion, scale } = this.before;
+    this.object.position.copy(position);
+    this.object.quaternion.copy(quaternion);
+    this.object.scale.copy(scale);
+    this.refresh();
+    this.events.redraw();
+    return true;
   }
 
   /** The pointer is over a handle, or holds one. */
@@ -108,7 +132,7 @@ export class Gizmo {
 
   /** The object was moved, by these handles or by someone else. */
   refresh(): void {
-    if (!this.dragging) this.placePivot();
+    if (!this.moves) this.placePivot();
     for (const line of this.outline) {
       const of = line.userData['of'] as Object3D | undefined;
       if (of) {
@@ -147,6 +171,7 @@ export class Gizmo {
     controls.addEventListener('change', () => this.events.redraw());
     controls.addEventListener('dragging-changed', ({ value }) => {
       if (!value) this.placePivot();
+      else this.keepPlace();
       this.events.dragging(value as boolean);
     });
     controls.addEventListener('objectChange', () => {
@@ -166,6 +191,14 @@ export class Gizmo {
       if (part instanceof Mesh && part.material instanceof MeshBasicMaterial) materials.add(part.material);
     });
     for (const { color } of materials) color.convertLinearToSRGB();
+  }
+
+  private keepPlace(): void {
+    if (!this.object) return;
+    const { position, quaternion, scale } = this.object;
+    this.before.position.copy(position);
+    this.before.quaternion.copy(quaternion);
+    this.before.scale.copy(scale);
   }
 
   /** Into the middle of the object, turned as it is, so that scaling along the handles does not skew it. */

@@ -31,7 +31,7 @@ export class LampMarker extends Object3D {
 
   constructor(readonly node: number) {
     super();
-    this.line.color.setRGB(1, 0.8, 0.3, LinearSRGBColorSpace);
+    this.line.color.setRGB(0.94, 0.62, 0.12, LinearSRGBColorSpace);
     this.add(this.ball, new LineLoop(RING, this.line), this.ray);
   }
 

@@ -17,6 +17,8 @@ const LEAST_TILES = 8;
 
 /** Texels that the legend's range is made of, of all pages together. */
 const RANGE_SAMPLES = 16_384;
+/** From the dark to the bright end of the range. */
+const LEAST_SPAN = 2;
 
 /** The finest mip of all pages that fits into the budget. */
 export function baseMipFor(pages: LightmapsNote['pages'], budget = MEMORY_BUDGET_BYTES): number {
@@ -111,15 +113,22 @@ export class LightmapSet {
     return taken;
   }
 
-  /** Values at the dark and bright end of what is there, lux; undefined: nothing yet. */
-  range(): [number, number] | undefined {
+  /** Some of the values that are there and more than nothing, lux, luminance. */
+  someValues(): number[] {
     const each = Math.max(64, Math.floor(RANGE_SAMPLES / this.pages.length));
-    const values = Float64Array.from(this.pages.flatMap((page) => page.someValues(each))).sort();
+    return this.pages.flatMap((page) => page.someValues(each));
+  }
+
+  /** Values at the dark and bright end of what is there, lux; undefined: nothing is more than nothing. */
+  range(): [number, number] | undefined {
+    const values = Float64Array.from(this.someValues()).sort();
     if (values.length === 0) return undefined;
     const at = (q: number) => values[Math.min(values.length - 1, Math.floor(q * values.length))]!;
+    // Where all is lit alike, what little it differs by is not to look like much.
     const high = at(0.995);
+    const low = Math.min(at(0.005), high / LEAST_SPAN);
     // Errors and remainders are nothing in many places, and differ little where they are something.
-    return [Math.max(at(0.005), high / (this.quantity === 'irradiance' ? 1e4 : 1e3)), high];
+    return [Math.max(low, high / (this.quantity === 'irradiance' ? 1e4 : 1e3)), high];
   }
 
   /** The context is lost. */

@@ -2,6 +2,7 @@
 // with reflectance base colour x (1 - metallic), at most 0.999, as the server has it.
 
 import {
+  type Color,
   DoubleSide,
   FrontSide,
   MeshLambertMaterial,
@@ -91,6 +92,13 @@ export class LitMaterial extends MeshLambertMaterial {
   /** All of a surface looks the same but for its light. */
   get isPlain(): boolean {
     return !this.map && !this.emissiveMap && !this.vertexColors && !this.transparent && this.alphaTest === 0;
+  }
+
+  /** It neither reflects nor emits light, as a metal that is seen by its mirror images alone. */
+  get isBlack(): boolean {
+    const { color, emissive, emissiveIntensity: strength } = this;
+    const most = (c: Color) => Math.max(c.r, c.g, c.b);
+    return most(color) * this.own.diffuseScale.value < 1e-4 && most(emissive) * strength === 0;
   }
 
   /** Of a plain surface, in nits, as the program has it; irradiance in lux. */

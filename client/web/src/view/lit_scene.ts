@@ -109,6 +109,11 @@ export class LitScene {
     return index;
   }
 
+  /** None of its surfaces can be seen by the light they reflect or emit. */
+  get isBlack(): boolean {
+    return this.made.size > 0 && [...this.made.values()].every((material) => material.isBlack);
+  }
+
   eachMaterial(visit: (material: LitMaterial) => void): void {
     for (const material of this.made.values()) visit(material);
   }

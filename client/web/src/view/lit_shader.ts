@@ -69,7 +69,7 @@ vec3 displayed(vec3 radiance) {
 }
 
 vec3 measured(float value) {
-  if (!(value > 0.0)) return kStops[0] * 0.5;
+  if (!(value > 0.0)) return kStops[0] * 0.5;  // NOTHING of palette.ts
   return paletteColour(log(value / falseRange.x) / log(falseRange.y / falseRange.x));
 }
 
@@ -80,7 +80,8 @@ vec3 mipColour(float mip) {
   return mix(colours[int(at)], colours[int(at) + 1], fract(at));
 }
 
-// Every texel its own shade, with a line around it where it is large enough on the screen.
+// Every texel its own tint, with a line around it, each where it is large enough on the screen: smaller, they would be
+// dots and moire.
 vec3 patchColour(vec2 uv, vec3 shade) {
   vec2 at = uv * pageSize;
   uvec2 id = uvec2(at);
@@ -88,8 +89,10 @@ vec3 patchColour(vec2 uv, vec3 shade) {
   hash = (hash ^ (hash >> 7u)) * 0x2c1b3c6du;
   vec3 tint = 0.55 + 0.45 * vec3(float(hash & 255u), float((hash >> 8u) & 255u), float((hash >> 16u) & 255u)) / 255.0;
   vec2 width = fwidth(at);
+  float most = max(width.x, width.y);
+  tint = mix(tint, vec3(0.775), smoothstep(0.4, 1.0, most));
   vec2 border = min(fract(at), 1.0 - fract(at)) / max(width, vec2(1e-6));
-  float line = (1.0 - smoothstep(0.4, 1.1, min(border.x, border.y))) * (1.0 - smoothstep(0.25, 0.5, max(width.x, width.y)));
+  float line = (1.0 - smoothstep(0.4, 1.1, min(border.x, border.y))) * (1.0 - smoothstep(0.1, 0.3, most));
   return mix(shade * tint, vec3(0.02), 0.8 * line);
 }`;
 
@@ -123,10 +126,12 @@ export const OUTPUT_FRAGMENT = `
     diffuseColor.a = 1.0;
   #endif
   vec3 shade = vec3(0.0);
-  if (viewMode == 0 || measuring) {
+  bool isOfIrradiance = viewMode == 1 || viewMode == 5;  // shownLight() of view_modes.ts
+  if (viewMode == 0 || (measuring && !isOfIrradiance)) {
     shade = displayed(outgoingLight);
-  } else if (viewMode == 1) {
-    shade = falseColour ? measured(luminanceOf(pageIrradiance)) : displayed(pageIrradiance * RECIPROCAL_PI);
+  } else if (viewMode == 1 || measuring) {
+    bool isFalse = falseColour && !measuring;
+    shade = isFalse ? measured(luminanceOf(pageIrradiance)) : displayed(pageIrradiance * RECIPROCAL_PI);
   } else if (viewMode == 2) {
     shade = measured(luminanceOf(outgoingLight * PI));
   } else if (viewMode == 3 || viewMode == 4) {
@@ -135,14 +140,15 @@ export const OUTPUT_FRAGMENT = `
     #endif
   } else if (viewMode == 5) {
     #ifdef USE_LIGHTMAP
-      shade = patchColour(vLightMapUv, displayed(pageIrradiance * RECIPROCAL_PI));
+      // Tints and lines take light away.
+      shade = patchColour(vLightMapUv, displayed(pageIrradiance * (1.6 * RECIPROCAL_PI)));
     #endif
   } else if (viewMode == 6) {
     shade = mipColour(pageMip) * (0.7 + 0.3 * abs(normal.z));
   } else if (viewMode == 7) {
     shade = inverseTransformDirection(normal, viewMatrix) * 0.5 + 0.5;
   } else {
-    shade = encodeSrgb(diffuseColor.rgb);
+    shade = encodeSrgb(diffuseColor.rgb) * (0.82 + 0.18 * abs(normal.z)); // white before white has edges
   }
   gl_FragColor = vec4(shade, diffuseColor.a);
   #ifdef USE_LIGHTMAP

@@ -6,8 +6,12 @@ import type { ViewUniforms } from './lit_material';
 import type { LightmapPage } from './lightmap_page';
 import type { LightmapSet } from './lightmap_set';
 import { FLAT_FRAGMENT, FLAT_VERTEX } from './lit_shader';
+import type { Reading } from './picker';
 
 const GAP = 0.04;
+
+/** What a page does not tell of its texels. */
+const NOWHERE = { point: undefined, error: undefined, radiosity: undefined, node: undefined, material: undefined };
 
 export class PagesView {
   readonly scene = new Scene();
@@ -90,6 +94,21 @@ export class PagesView {
     const half = 0.56 * Math.max(size.y, size.x / aspect);
     Object.assign(this.camera, { left: -half * aspect, right: half * aspect, top: half, bottom: -half });
     this.camera.updateProjectionMatrix();
+  }
+
+  /** The light of the texel that lies there; undefined: beside the pages. `x`, `y`: normalised device coordinates. */
+  readAt(x: number, y: number): Reading | undefined {
+    const at = new Vector3(x, y, 0).unproject(this.camera);
+    for (const [index, { mesh, page }] of this.made.entries()) {
+      const { width, height } = (mesh.geometry as PlaneGeometry).parameters;
+      const [u, v] = [(at.x - mesh.position.x) / width + 0.5, (at.y - mesh.position.y) / height + 0.5];
+      if (u < 0 || u >= 1 || v < 0 || v >= 1) continue;
+      const texel: [number, number] = [Math.floor(u * page.width), Math.floor(v * page.height)];
+      // The texel itself, as it is drawn: its neighbours may be of surfaces elsewhere.
+      const irradiance = page.sample((texel[0] + 0.5) / page.width, (texel[1] + 0.5) / page.height);
+      return { ...NOWHERE, irradiance, page: index, texel };
+    }
+    return undefined;
   }
 
   refresh(): void {

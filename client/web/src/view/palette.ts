@@ -1,17 +1,23 @@
 // The colours of false-colour pictures: one list for the shader and for the legend.
 
-/** sRGB, from dark to bright; dark and bright ends differ in lightness too, for those who see no hues. */
+/**
+ * sRGB, from dark to bright: every ninth colour of viridis (Smith and van der Walt, matplotlib 1.5, 2015; CC0), whose
+ * lightness rises evenly all the way, so that more is brighter also to those who see no hues, and in print.
+ */
 export const STOPS: readonly (readonly [number, number, number])[] = [
-  [0.07, 0.05, 0.2],
-  [0.17, 0.2, 0.62],
-  [0.06, 0.47, 0.75],
-  [0.06, 0.66, 0.55],
-  [0.47, 0.78, 0.25],
-  [0.95, 0.8, 0.2],
-  [0.95, 0.5, 0.16],
-  [0.85, 0.2, 0.2],
-  [1.0, 0.9, 0.86],
-];
+  [68, 1, 84],
+  [71, 45, 123],
+  [59, 82, 139],
+  [44, 114, 142],
+  [33, 145, 140],
+  [40, 174, 128],
+  [94, 201, 98],
+  [173, 220, 48],
+  [253, 231, 37],
+].map(([r, g, b]) => [r! / 255, g! / 255, b! / 255] as const);
+
+/** Where nothing is measured: darker than the least. */
+export const NOTHING = STOPS[0]!.map((c) => 0.5 * c);
 
 /** sRGB, of mip 0, 1, ...; between them where a lookup lies between two mips. */
 export const MIP_STOPS: readonly (readonly [number, number, number])[] = [

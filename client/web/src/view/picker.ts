@@ -1,13 +1,13 @@
 // What lies under the pointer: the object to select, and the light that falls there.
 
-import { Mesh, Raycaster, Vector2, Vector3, type Intersection, type PerspectiveCamera } from 'three';
+import { Mesh, Raycaster, Vector2, type Vector3, type Intersection, type PerspectiveCamera } from 'three';
 import { LitMaterial } from './lit_material';
 import type { LightmapPage } from './lightmap_page';
 import type { LitScene } from './lit_scene';
 
 export interface Reading {
-  point: Vector3;
-  normal: Vector3;
+  /** Metres; undefined where pages are looked at, and not the scene. */
+  point: Vector3 | undefined;
   /** Irradiance, lux: linear R, G, B; undefined: no light is known there. */
   irradiance: [number, number, number] | undefined;
   /** Its estimated error, lux, luminance; undefined where the server does not stream it. */
@@ -59,7 +59,6 @@ function hits(scene: LitScene, camera: PerspectiveCamera, x: number, y: number):
 export function readingAt(scene: LitScene, hit: Intersection, errors?: readonly LightmapPage[]): Reading {
   const page = hit.object.userData['page'] as LightmapPage | undefined;
   const uv = hit.uv1;
-  const normal = (hit.normal ?? new Vector3()).clone().transformDirection(hit.object.matrixWorld);
   const index = page ? scene.set.pages.indexOf(page) : -1;
   const error = uv ? errors?.[index]?.sample(uv.x, uv.y) : undefined;
   const irradiance = page && uv ? page.sample(uv.x, uv.y) : undefined;
@@ -67,7 +66,6 @@ export function readingAt(scene: LitScene, hit: Intersection, errors?: readonly 
   const radiance = irradiance && material instanceof LitMaterial && material.isPlain && material.radianceOf(irradiance);
   return {
     point: hit.point.clone(),
-    normal,
     irradiance,
     error: error && luminance(error),
     radiosity: radiance ? Math.PI * luminance(radiance) : undefined,

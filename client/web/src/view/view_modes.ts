@@ -104,6 +104,13 @@ export function viewMode(id: string): ViewMode {
   return VIEW_MODES.find((mode) => mode.id === id) ?? VIEW_MODES[0]!;
 }
 
+/** What a picture in the colours of light shows: light that leaves the surfaces, or light that reaches them, over pi. */
+export type ShownLight = 'leaving' | 'arriving';
+
+export function shownLight({ number }: ViewMode): ShownLight {
+  return number === 1 || number === 5 ? 'arriving' : 'leaving';
+}
+
 export const TONE_CURVES = [
   { id: 'neutral', label: 'Neutral', number: 0 },
   { id: 'aces', label: 'ACES', number: 1 },

@@ -201,7 +201,7 @@ export class Viewer {
     this.rig.enabled = !mode.flat;
     this.gizmo.setVisible(!mode.flat);
     if (mode.flat) this.pagesView.show(this.shown?.set);
-    this.brightness.updateRange();
+    this.brightness.setMode(mode);
     this.moved();
   }
 
@@ -210,7 +210,8 @@ export class Viewer {
   }
 
   readAt(x: number, y: number): Reading | undefined {
-    const hit = this.shown && !this.mode?.flat ? pickSurface(this.shown, this.rig.camera, x, y) : undefined;
+    if (this.mode?.flat) return this.pagesView.readAt(x, y);
+    const hit = this.shown && pickSurface(this.shown, this.rig.camera, x, y);
     const { shownData } = this.layouts;
     const errors = shownData?.quantity === 'error' ? shownData.pages : undefined;
     return hit && this.shown ? readingAt(this.shown, hit, errors) : undefined;

@@ -1,0 +1,156 @@
+// Which scene there is: its document from the server, files that this page sends, and who has loaded another. Part of the
+// App.
+
+import type { App } from './app';
+import type { Placed } from './app_view';
+import { DocumentFetch } from './document/document_fetch';
+import type { Gltf } from './document/gltf';
+import { NOT_FOUND, type PastRevision, type SceneHistory } from './protocol/messages';
+import { ConnectionLost, RpcError } from './protocol/rpc';
+
+/** What people are told of another scene, given the newest revisions; undefined: this revision is no load. */
+export function loadNote(revisions: readonly PastRevision[], revision: number): string | undefined {
+  const load = revisions.find((past) => past.revision === revision && past.kind === 'load');
+  return load && `${load.by || 'Someone'} loaded ${load.summary || 'another scene'}`;
+}
+
+/** A file that is on its way, where one looked from before it, and whether the server was asked to load it. */
+interface Upload {
+  abort: AbortController;
+  placed: Placed;
+  asked: boolean;
+}
+
+/** The scene that a server begins with: nobody's work is replaced by it. */
+const FIRST = 1;
+
+export class SceneSession {
+  readonly document = new DocumentFetch({
+    ask: (signal) => this.ask(signal),
+    failed: (error) => this.onNone(error),
+  });
+  private upload: Upload | undefined;
+  /** Revision of the newest load that was told of, or was this page's own. */
+  private told = FIRST;
+
+  constructor(private readonly app: App) {}
+
+  /** Files that are dropped on the page. */
+  takeDrops(): void {
+    const setDropping = (on: boolean) => document.body.classList.toggle('dropping', on);
+    window.addEventListener('dragover', (event) => {
+      if (!event.dataTransfer?.types.includes('Files')) return; // a text or a picture of the page is no scene
+      event.preventDefault();
+      setDropping(true);
+    });
+    // Whatever is dragged leaves each part of the page for the next; of the page itself there is no next.
+    window.addEventListener('dragleave', (event) => {
+      if (!event.relatedTarget) setDropping(false);
+    });
+    window.addEventListener('drop', (event) => {
+      setDropping(false);
+      const file = event.dataTransfer?.files[0];
+      if (!file) return;
+      event.preventDefault();
+      void this.loadFile(file);
+    });
+  }
+
+  /** Its revisions count anew. */
+  onServerAnew(): void {
+    this.told = FIRST;
+  }
+
+  /** Another one is there. Who has sent it from here is told by what sends it. */
+  onLoaded(revision: number): void {
+    const { app } = this;
+    app.resume = undefined;
+    app.edit.select(undefined); // numbers of nodes mean others now
+    app.view.sceneComes();
+    app.edit.history.askSoon();
+    this.document.want();
+    void app.fetchStatus();
+    if (!this.upload?.asked) void this.tellOfLoad(revision);
+  }
+
+  /** The server has none: it was started again without, could not have the one whose first light it showed, or lost it. */
+  forget(): void {
+    const { app } = this;
+    if (!app.viewer.set) return;
+    app.resume = undefined;
+    app.viewer.clear();
+    app.edit.document.reset({ asset: { version: '2.0' } }, app.progress!.revision);
+    app.frame.sceneShown = false;
+  }
+
+  async loadFile(file: File): Promise<void> {
+    const { toasts } = this.app.frame;
+    const limit = this.app.connection.info?.limits['uploadBytes'] ?? Infinity;
+    if (file.size > limit) return toasts.show(`${file.name} is larger than the server accepts`, 'bad');
+    toasts.show(`Loading ${file.name}…`);
+    this.upload?.abort.abort(); // the last one is meant, however long an earlier one takes
+    const placed = this.upload?.placed ?? this.app.view.forgetCamera();
+    const upload: Upload = (this.upload = { abort: new AbortController(), placed, asked: false });
+    try {
+      const url = await this.send(file, upload.abort.signal);
+      // On the one connection: what is asked for later is loaded later, even if an upload that was given up arrives.
+      if (upload !== this.upload) return;
+      upload.asked = true;
+      const loaded = await this.app.connection.call<{ revision: number; warnings: string[] }>('scene.load', { url });
+      this.told = Math.max(this.told, loaded.revision);
+      if (upload !== this.upload) return;
+      const count = loaded.warnings.length;
+      toasts.show(
+        count ? `${file.name} loaded; ${count} warning${count > 1 ? 's' : ''}, see Solve` : `${file.name} loaded`,
+        'good',
+      );
+    } catch (error) {
+      if (upload !== this.upload) return;
+      if (this.app.viewer.shown) this.app.view.keepCamera(placed);
+      toasts.show(`${file.name}: ${(error as Error).message}`, 'bad');
+    } finally {
+      if (upload === this.upload) this.upload = undefined;
+    }
+  }
+
+  /** Keeps the file on the server. Returns its URL there; rejects with what the server says against it. */
+  private async send(file: File, signal: AbortSignal): Promise<string> {
+    const response = await this.app.fetch(`/uploads?name=${encodeURIComponent(file.name)}`, {
+      method: 'PUT',
+      body: file,
+      headers: { 'Content-Type': 'application/octet-stream' },
+      signal,
+    });
+    return ((await response.json()) as { url: string }).url;
+  }
+
+  private async tellOfLoad(revision: number): Promise<void> {
+    const { connection, frame } = this.app;
+    if (revision <= this.told || !connection.has('scene.history')) return;
+    const history = await connection.call<SceneHistory>('scene.history').catch(() => undefined);
+    const note = loadNote(history?.revisions ?? [], revision);
+    // The same scene may come twice: with its first light, which is not in the history yet, and whole.
+    if (!note || revision <= this.told) return;
+    this.told = revision;
+    frame.toasts.show(note);
+  }
+
+  private async ask(signal: AbortSignal): Promise<{ revision: number; take: () => void }> {
+    const { app } = this;
+    const reply = await app.connection.call<{ revision: number; gltf?: Gltf; url?: string }>('scene.get');
+    let { gltf, revision } = reply;
+    if (!gltf) {
+      const file = await app.fetch(reply.url!, { signal });
+      revision = Number(file.headers.get('X-Revision') ?? revision); // it may be newer than the answer
+      gltf = (await file.json()) as Gltf;
+    }
+    const whole = gltf;
+    return { revision, take: () => app.edit.document.reset(whole, revision) };
+  }
+
+  private onNone(error: Error): void {
+    if (error instanceof RpcError && error.code === NOT_FOUND) return; // there is none: the server's state says so
+    if (!(error instanceof ConnectionLost))
+      this.app.frame.toasts.show(`The scene could not be fetched: ${error.message}`, 'bad');
+  }
+}
