@@ -117,6 +117,7 @@ void LeafGather::finish() {
   });
   solved_ = {};
   smoothed_ = bias_ = smoother.bias();
+  leaf_bias_ = smoother.biasOfLeaves();
   weighNoise(smoother);
   weighMissed(levels);
   weighLost();
@@ -335,6 +336,7 @@ void LeafGather::weighMissed(const std::array<Levels, 2>& levels) {
       block_noise_[v / kBlock] += part;
       noise_ += part;
       bias_ += part;
+      leaf_bias_[v] += static_cast<float>(part / area_[v]);
     }
   }
 }
@@ -415,18 +417,19 @@ bool LeafGather::refine(double goal) {
 void LeafGather::save(ArchiveWriter& to) const {
   const auto counts = sights_.counts();
   to(has_gathered_, std::vector<std::uint16_t>(counts.begin(), counts.end()), noise_, smoothed_, bias_, block_noise_,
-     escaped_, absorbed_, unsolved_);
+     escaped_, absorbed_, unsolved_, leaf_bias_);
 }
 
 bool LeafGather::restore(ArchiveReader& from) {
   std::vector<std::uint16_t> counts;
-  from(has_gathered_, counts, noise_, smoothed_, bias_, block_noise_, escaped_, absorbed_, unsolved_);
+  from(has_gathered_, counts, noise_, smoothed_, bias_, block_noise_, escaped_, absorbed_, unsolved_, leaf_bias_);
   const auto fits = [](std::uint16_t count) { return count <= LeafSights::kMostRays; };
   std::size_t all = 0;
   for (const auto count : counts) all += count;
   if (!from.ok() || counts.size() != sights_.leafCount() || !std::ranges::all_of(counts, fits) ||
       all * LeafSights::kRayBytes > most_bytes_ ||
-      (!block_noise_.empty() && block_noise_.size() != (counts.size() + kBlock - 1) / kBlock))
+      (!block_noise_.empty() && block_noise_.size() != (counts.size() + kBlock - 1) / kBlock) ||
+      (!leaf_bias_.empty() && leaf_bias_.size() != counts.size()))
     return false;
   if (all > 0) sights_.ask(counts);
   return true;

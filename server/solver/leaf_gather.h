@@ -58,6 +58,7 @@ class LeafGather {
   bool advance(double seconds);
   /// Rays are asked for that are not traced: advance() will take its time.
   [[nodiscard]] bool isBehind() const { return !sights_.isTraced(); }
+  [[nodiscard]] std::uint64_t raysBehind() const { return sights_.untraced(); }
   /// Those are given up, where there are others.
   void giveUp() { sights_.giveUp(); }
 
@@ -68,6 +69,8 @@ class LeafGather {
   /// The part of it that the halves have in common: what smoothing took of the light itself, and what neither of them
   /// saw, by the light that is sent and does not arrive.
   [[nodiscard]] double bias() const { return bias_; }
+  /// bias() by leaf value, not times area.
+  [[nodiscard]] std::span<const float> biasOfLeaves() const { return leaf_bias_; }
   /// Flux that the equation does not account for, of what is gathered.
   [[nodiscard]] double unsolved() const { return unsolved_; }
   /// Flux that leaves the scene, and that falls on unlit sides, by channel.
@@ -138,6 +141,7 @@ class LeafGather {
   std::array<std::vector<glm::vec3>, 2> gathered_;
   double noise_ = 0.0, smoothed_ = 0.0, bias_ = 0.0, unsolved_ = 0.0;
   std::vector<double> block_noise_;  ///< parts of it but for smoothed_, what smoothing took, by kBlock leaves
+  std::vector<float> leaf_bias_;
   std::array<double, 3> escaped_{}, absorbed_{};
 };
 

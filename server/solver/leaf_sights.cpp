@@ -190,6 +190,13 @@ void LeafSights::inherit(const LeafSights& former, std::span<const std::uint32_t
     kept_ += static_cast<std::uint64_t>(std::ranges::count_if(half, [](auto end) { return end != kUntraced; }));
 }
 
+std::uint64_t LeafSights::untraced() const {
+  if (isTraced()) return 0;
+  std::uint64_t rays = 0;
+  for (const auto& half : seen_) rays += static_cast<std::uint64_t>(std::ranges::count(half, kUntraced));
+  return rays;
+}
+
 std::size_t LeafSights::bytes() const {
   return (seen_[0].size() + seen_[1].size()) * sizeof(std::uint32_t) + first_.size() * sizeof(std::size_t);
 }

@@ -37,6 +37,8 @@ class LeafSights {
   /// What is asked for and not traced is given up, where there are others.
   void giveUp();
   [[nodiscard]] bool isTraced() const { return cursor_ == leaf_count_; }
+  /// How many are asked for and not traced, of both halves. O(rays).
+  [[nodiscard]] std::uint64_t untraced() const;
   /// Goes on for about `seconds`, on all cores. True: isTraced(). Where the cuts lie changes nothing.
   bool trace(double seconds);
 

@@ -1,6 +1,7 @@
 #include "server/solver/leaf_smoother.h"
 
 #include <algorithm>
+#include <numeric>
 
 namespace radiosity::solver {
 namespace {
@@ -90,15 +91,37 @@ void LeafSmoother::average(const Side& side, std::uint32_t step, std::span<const
 void LeafSmoother::smooth(std::array<std::vector<Light>, 2>& halves) {
   const auto raw = halves;
   towards_.assign(kSteps.size(), std::vector<float>(area_.size(), 0.0F));
-  bias_ = 0.0;
-  double taken = 0.0;
+  taken_.assign(area_.size(), 0.0);
+  by_chance_.assign(area_.size(), 0.0);
   for (const auto& side : sides_) {
     if (side.leaf_count < 2) continue;
     for (std::size_t pass = 0; pass < kSteps.size(); ++pass) smoothSide(side, pass, raw, halves);
     for (auto v = side.first_value; v < side.first_value + side.leaf_count; ++v)
-      taken += area_[v] * dot(less(halves[0][v], raw[0][v]), less(halves[1][v], raw[1][v]));
+      taken_[v] = area_[v] * dot(less(halves[0][v], raw[0][v]), less(halves[1][v], raw[1][v]));
   }
-  bias_ += std::max(0.0, taken);
+  bias_ = std::max(0.0, std::reduce(taken_.begin(), taken_.end())) + std::reduce(by_chance_.begin(), by_chance_.end());
+}
+
+/// What was taken of one leaf is a product of two uncertain numbers; of many around it the mean tells.
+std::vector<float> LeafSmoother::biasOfLeaves() const {
+  std::vector<double> bias(by_chance_);
+  for (const auto& side : sides_) {
+    std::vector<Gain> taken(side.leaf_count);
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
+      taken[leaf] = {taken_[side.first_value + leaf], area_[side.first_value + leaf], 1};
+    const GainTable table(side, taken);
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+      const auto around = table.around(leaf % side.width, leaf / side.width);
+      const auto v = side.first_value + leaf;
+      if (around.bend > 0.0) bias[v] += std::max(0.0, around.slope) * area_[v] / around.bend;
+    }
+  }
+  const double all = std::reduce(bias.begin(), bias.end());
+  std::vector<float> of_leaf(bias.size(), 0.0F);
+  for (std::size_t v = 0; v < bias.size(); ++v) {
+    if (all > 0.0 && area_[v] > 0.0) of_leaf[v] = static_cast<float>(bias_ / all * bias[v] / area_[v]);
+  }
+  return of_leaf;
 }
 
 void LeafSmoother::smoothSide(const Side& side, std::size_t pass, const std::array<std::vector<Light>, 2>& raw,
@@ -126,7 +149,7 @@ void LeafSmoother::smoothSide(const Side& side, std::size_t pass, const std::arr
     // One number that is chosen by the noise of n leaves gains twice an nth of it by chance (Mallows 1973, "Some
     // comments on Cp"), which neither the halves' difference nor what they have in common shows.
     const auto noise = less(halves[0][first + leaf], halves[1][first + leaf]);
-    bias_ += area_[first + leaf] * 2.0 * 0.25 * dot(noise, noise) / gain.leaves;
+    by_chance_[first + leaf] += area_[first + leaf] * 2.0 * 0.25 * dot(noise, noise) / gain.leaves;
     const double part = gain.slope >= 0.0 ? 0.0 : gain.bend > -gain.slope ? -gain.slope / gain.bend : 1.0;
     towards_[pass][first + leaf] = static_cast<float>(part);
     for (std::size_t h = 0; h < 2; ++h)

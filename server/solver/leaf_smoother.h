@@ -30,6 +30,8 @@ class LeafSmoother {
   /// What it took of the light itself, or put where there was less, and what was gained by chance: squares of it, times
   /// area, all leaves and channels. An estimate, of which what was taken is not below zero.
   [[nodiscard]] double bias() const { return bias_; }
+  /// The same by leaf value, not times area, shared out over leaves that are near: together bias(). O(leaves).
+  [[nodiscard]] std::vector<float> biasOfLeaves() const;
 
  private:
   void smoothSide(const Side& side, std::size_t pass, const std::array<std::vector<Light>, 2>& raw,
@@ -39,6 +41,7 @@ class LeafSmoother {
   const std::vector<Side>& sides_;
   const std::vector<double>& area_;
   std::vector<std::vector<float>> towards_;  ///< by pass and leaf value: part of the way to the mean
+  std::vector<double> taken_, by_chance_;    ///< by leaf value, times area: see bias(); the former signed
   double bias_ = 0.0;
 };
 

@@ -13,6 +13,8 @@
 namespace radiosity::solver {
 namespace {
 
+/// So many, some tenths of a second of them, are traced for somebody who wants to know the light.
+constexpr std::uint64_t kRaysAtOnce = 2'000'000;
 /// Largest mean reflectance that is told from one.
 constexpr double kMostKept = 0.99999;
 
@@ -21,7 +23,7 @@ constexpr double kMostKept = 0.99999;
 void LinkedSolver::assess() {
   if (isRepairing()) return;  // nothing is known before all links are true
   if (from_links_ == FromLinks::kAfterEdit) {
-    if (gather_ && gather_->isBehind()) return;  // nor before all rays are traced, which steps do in slices
+    if (gather_ && gather_->raysBehind() > kRaysAtOnce) return;  // nor is it now: steps trace rays in slices
     // Somebody wants to know before the next step.
     tryNow([this] {
       do {

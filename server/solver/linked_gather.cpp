@@ -12,10 +12,8 @@ namespace {
 // count. An image and what is gathered from it: by leaf, and by the root of the triangles, since most are left out. A
 // ray: by level of the tree.
 constexpr double kShotLeaf = 0.02, kShotTriangle = 13.0, kRayLevel = 0.05;
-/// Samples of reflected light that links take to 2 %, by surface, and rays of a leaf. Further down both grow alike.
-constexpr double kFewestShots = 1200.0, kShotsASurface = 3.0, kRaysALeaf = 128.0;
-/// Where there are fewer surfaces links are few, and each is exact.
-constexpr std::size_t kFewestSurfaces = 64;
+/// Where there are fewer triangles, as in a room with one block, links are few, and each is exact.
+constexpr std::size_t kFewestTriangles = 32;
 /// An image of a lamp, beside one of a node.
 constexpr double kLightShot = 2.0;
 /// What shines so many times as bright as all does in the mean is worth links: rays find what is small too seldom.
@@ -29,6 +27,12 @@ constexpr int kParts = 32;
 
 }  // namespace
 
+bool LinkedSolver::raysPay() const {
+  if (!mayGather(system_.emission().size(), settings_)) return false;
+  return settings_.reflected == SolverSettings::Reflected::kByRays || !patches_->opacity.empty() ||
+         patches_->triangles.size() >= kFewestTriangles;
+}
+
 double LinkedSolver::shotCost() const {
   return kShotLeaf * static_cast<double>(system_.emission().size()) +
          kShotTriangle * std::sqrt(static_cast<double>(patches_->triangles.size()));
@@ -41,18 +45,6 @@ double LinkedSolver::rayCost() const {
 bool LinkedSolver::mayGather(std::size_t leaves, const SolverSettings& settings) {
   return settings.reflected != SolverSettings::Reflected::kByLinks &&
          LeafGather::leastBytes(leaves) <= settings.link_memory / 2;
-}
-
-bool LinkedSolver::raysPay() const {
-  const auto leaves = system_.emission().size();
-  if (!mayGather(leaves, settings_)) return false;
-  if (!patches_->opacity.empty()) return true;
-  if (settings_.reflected == SolverSettings::Reflected::kChosen && patches_->surfaces.size() < kFewestSurfaces)
-    return false;
-  if (settings_.reflected != SolverSettings::Reflected::kChosen)
-    return settings_.reflected == SolverSettings::Reflected::kByRays;
-  const double shots = kFewestShots + kShotsASurface * static_cast<double>(patches_->surfaces.size());
-  return kRaysALeaf * static_cast<double>(leaves) * rayCost() < shots * shotCost();
 }
 
 /// By side: of nodes that are worth links, all channels. Where there is something to see through only lamps are: links

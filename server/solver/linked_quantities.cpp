@@ -76,4 +76,20 @@ std::vector<float> LinkedSolver::residualShape() const {
   return shape;
 }
 
+/// Of all channels together: each has of it as it has of the leaf's light.
+std::vector<glm::vec3> LinkedSolver::commonErrorSquared() const {
+  if (!gathers()) return {};
+  std::vector<glm::vec3> squares(patches_->nodeCount(), glm::vec3(0.0F));
+  const auto bias = gather_->biasOfLeaves();
+  for (const auto& side : sides_) {
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+      const glm::vec3 irradiance = irradiance_[side.first_node + leaf], square = irradiance * irradiance;
+      const float all = square.x + square.y + square.z;
+      const glm::vec3 parts = all > 0.0F ? square / all : glm::vec3(1.0F / 3.0F);
+      squares[side.first_node + leaf] = bias[side.first_value + leaf] * parts;
+    }
+  }
+  return squares;
+}
+
 }  // namespace radiosity::solver

@@ -61,6 +61,7 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] std::vector<glm::vec3> unshot() const override;
   [[nodiscard]] std::vector<std::uint8_t> shotLevels() const override;
   [[nodiscard]] std::vector<float> residualShape() const override;
+  [[nodiscard]] std::vector<glm::vec3> commonErrorSquared() const override;
   [[nodiscard]] const ErrorParts& error() const override { return error_; }
   [[nodiscard]] EnergyParts energy() const override;
   [[nodiscard]] const TransportCounters& transportCounters() const override { return counters_; }
@@ -194,9 +195,9 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] bool refineVariation();
   [[nodiscard]] double targetOfLinks() const;
   [[nodiscard]] bool aimFurther();
-  [[nodiscard]] bool raysPay() const;
   /// Rays have brought light, and nothing is left to shoot.
   [[nodiscard]] bool gathers() const { return gather_ && gather_->hasGathered(); }
+  [[nodiscard]] bool raysPay() const;
   [[nodiscard]] double shotCost() const;
   [[nodiscard]] double rayCost() const;
   [[nodiscard]] double samplesCost() const;

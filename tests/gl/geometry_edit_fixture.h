@@ -37,6 +37,8 @@ class GeometryEdit : public testing::Test {
  protected:
   static constexpr std::uint64_t kTexels = 1500;
 
+  GeometryEdit() { settings_.reflected = solver::SolverSettings::Reflected::kByLinks; }
+
   void start(const test_scenes::TestScene& scene) {
     before_.document = scene::parseDocument("room.glb", test_scenes::encodeGlb(scene)).value();
     before_.scene = scene::importScene(before_.document).value();

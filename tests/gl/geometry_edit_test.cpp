@@ -50,8 +50,6 @@ TEST_F(GeometryEdit, WhatStandsBesideAWallMendsTheLinksThatMeasuringAllFinds) {
 
 class ChairEdit : public test::ChairRoom {
  protected:
-  ChairEdit() { settings_.reflected = solver::SolverSettings::Reflected::kByLinks; }
-
   /// Links of lights that differ.
   static std::size_t unlikeLights(const LinkedSolver& a, const LinkedSolver& b, const scene::PatchScene& patches) {
     std::size_t differ = 0;

@@ -22,6 +22,12 @@ const LinkedSolver& linked(const Solve& solve) {
   return *found;
 }
 
+solver::SolverSettings byLinks() {
+  solver::SolverSettings settings;
+  settings.reflected = solver::SolverSettings::Reflected::kByLinks;
+  return settings;
+}
+
 /// Flux that a radiosity of one of a shooter brings to leaves [x0, x1) x [y0, y1) of a side, by half.
 double fluxTo(const Solve& solve, const Shooter& shooter, std::size_t half, const solver::Side& side,
               const solver::LeafRect& rect) {
@@ -38,7 +44,7 @@ double fluxTo(const Solve& solve, const Shooter& shooter, std::size_t half, cons
 }
 
 TEST(Invariants, RowSumsOfFormFactorsAreOneWithinAMillionthInAClosedRoom) {
-  Solve solve(load(litRoom(), 1500));
+  Solve solve(load(litRoom(), 1500), byLinks());
   ASSERT_TRUE(solve.run());
   const auto sides = solver::makeSides(solve.patches());
   std::size_t rows = 0;
@@ -57,7 +63,7 @@ TEST(Invariants, RowSumsOfFormFactorsAreOneWithinAMillionthInAClosedRoom) {
 
 /// A_i F_ij = A_j F_ji, where each side of it was found by other images, and the two halves tell how far chance is off.
 TEST(Invariants, LinksAreReciprocalWithinThreeSigma) {
-  Solve solve(load(litRoom(), 1500));
+  Solve solve(load(litRoom(), 1500), byLinks());
   ASSERT_TRUE(solve.run());
   const auto sides = solver::makeSides(solve.patches());
   const auto& shooters = linked(solve).system().shooters();

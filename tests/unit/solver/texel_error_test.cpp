@@ -32,7 +32,7 @@ struct TexelError : testing::Test {
 
   [[nodiscard]] std::vector<glm::vec3> squared(const Solver& solver, const ErrorParts& stated) const {
     return texelErrorSquared(*made.patches, solver.halfIrradiance(0), solver.halfIrradiance(1), solver.irradiance(),
-                             stated);
+                             stated, {}, solver.commonErrorSquared());
   }
   /// Area-weighted sum over leaves and channels.
   template <typename ValueOf>
