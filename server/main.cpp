@@ -8,6 +8,7 @@
 #include <string_view>
 #include <thread>
 
+#include "common/freed_memory.h"
 #include "common/log.h"
 #include "server/engine/solve_loop.h"
 #include "server/gpu/gpu_transport.h"
@@ -112,6 +113,7 @@ int serve(Options options) {
 }
 
 int run(int argc, char** argv) {
+  keepFreedMemory();
   if (argc > 1 && std::string_view(argv[1]) == "--worker") {
     const char* format = std::getenv(kLogFormatVariable);
     const bool json = format != nullptr && std::string_view(format) == "json";

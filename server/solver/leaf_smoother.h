@@ -3,7 +3,7 @@
 // towards the mean of those around it, on its own side, as far as that lowers the error: two independent halves tell
 // how much noise that takes away and how much of the light itself. (Wavelets with holes: Dammertz and others 2010,
 // "Edge-avoiding a-trous wavelet transform"; errors from two halves: Rousselle, Knaus and Zwicker 2012, "Adaptive
-// rendering with non-local means filtering".) Plain values; one thread.
+// rendering with non-local means filtering".) Plain values; one thread outside of the calls, which use all cores.
 #pragma once
 
 #include <array>

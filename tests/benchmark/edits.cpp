@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "common/check.h"
+#include "common/freed_memory.h"
 #include "server/engine/solve_loop.h"
 #include "server/gpu/gpu_transport.h"
 #include "tests/scenes/glb_writer.h"
@@ -344,6 +345,7 @@ int run(const Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  radiosity::keepFreedMemory();  // as radiosityd does
   Options options;
   CLI::App app("How long live edits take, beside full solves", "edits");
   if (const char* folder = std::getenv("RADIOSITY_BENCH_OUTPUT")) options.output = folder;

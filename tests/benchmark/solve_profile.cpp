@@ -16,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "common/freed_memory.h"
 #include "server/gpu/gpu_transport.h"
 #include "server/scene/document.h"
 #include "server/scene/patch_scene.h"
@@ -360,6 +361,7 @@ int profile(const std::string& file, std::map<std::string, std::string> options)
 
 int main(int argc, char** argv) {
   if (argc < 2) return std::fprintf(stderr, "usage: solve_profile SCENE.glb [--option value ...]\n"), 2;
+  radiosity::keepFreedMemory();  // as radiosityd does
   std::map<std::string, std::string> options;
   for (int i = 2; i + 1 < argc; i += 2) options[argv[i]] = argv[i + 1];
   return radiosity::profile(argv[1], options);
