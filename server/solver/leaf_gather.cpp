@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <numeric>
 #include <queue>
 
@@ -13,7 +14,7 @@ namespace radiosity::solver {
 namespace {
 
 /// Rays of each half of a leaf that a solve begins with.
-constexpr std::uint16_t kFirstRays = 4;
+constexpr std::uint16_t kFirstRays = 8;
 /// What is known of the noise of so many leaves in a row is known of each: single ones are too uncertain to choose by.
 constexpr std::uint32_t kBlock = 64;
 /// In a round a leaf gets at most so many times as many rays as it had, in powers of two.
@@ -21,6 +22,9 @@ constexpr std::uint32_t kMostTimes = 4;
 /// The square of the error of n rays falls as n^-1.3: measured in three rooms, from 4 to 64 rays (Sobol's points; the
 /// edges of what is seen keep it from n^-1.5).
 constexpr double kFall = 1.3;
+/// Noise beside light of less than this part of what is usual is black; and so many rays of a half are enough anywhere.
+constexpr double kBlack = 0.02;
+constexpr std::uint32_t kMostForBlotches = 256;
 /// By more than this the level of all light is not changed: rays that know it this badly are few.
 constexpr double kMostLevel = 4.0, kMostOff = 0.5;
 /// Light that both halves lack by more than so many times what they differ by is not lacking by chance.
@@ -302,14 +306,24 @@ void LeafGather::weighNoise(const LeafSmoother& smoother) {
     smoother.apply(halves_[half].arriving);
   });
   block_noise_.assign((leaves + kBlock - 1) / kBlock, 0.0);
+  block_light_ = block_noise_;
   noise_ = smoothed_;
-  for (std::size_t v = 0; v < leaves; ++v) {
-    double square = 0.0;
-    for (std::size_t c = 0; c < 3; ++c) {
-      const double off = 0.5 * (halves_[0].arriving[v][c] - halves_[1].arriving[v][c]);
-      square += off * off;
+  side_noise_.assign(sides_.size(), 0.0);
+  side_light_ = side_noise_;
+  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
+    for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
+      double square = 0.0;
+      for (std::size_t c = 0; c < 3; ++c) {
+        const double off = 0.5 * (halves_[0].arriving[v][c] - halves_[1].arriving[v][c]);
+        square += off * off;
+      }
+      const glm::dvec3 light(0.5F *
+                             (gathered_[0][v] + gathered_[1][v] + light_.irradiance[0][v] + light_.irradiance[1][v]));
+      block_noise_[v / kBlock] += area_[v] * square;
+      block_light_[v / kBlock] += area_[v] * glm::dot(light, light);
+      side_noise_[s] += area_[v] * square;
+      side_light_[s] += area_[v] * glm::dot(light, light);
     }
-    block_noise_[v / kBlock] += area_[v] * square;
   }
   for (const double block : block_noise_) noise_ += block;
 }
@@ -368,48 +382,88 @@ std::uint64_t LeafGather::rays() const {
   return all;
 }
 
-bool LeafGather::refine(double goal) {
-  struct Block {
-    double gain;  ///< of noise() for each ray of its next doubling
-    std::uint32_t index, times;
-    bool operator<(const Block& other) const { return gain != other.gain ? gain < other.gain : index > other.index; }
-  };
+std::vector<LeafGather::BlockRays> LeafGather::blockRays() const {
+  std::vector<BlockRays> blocks(block_noise_.size());
   const auto counts = sights_.counts();
-  std::vector<std::uint32_t> rays(block_noise_.size(), 0);
-  std::vector<std::uint16_t> most(block_noise_.size(), 0);
   for (std::uint32_t v = 0; v < counts.size(); ++v) {
-    rays[v / kBlock] += counts[v];
-    most[v / kBlock] = std::max(most[v / kBlock], counts[v]);
+    auto& block = blocks[v / kBlock];
+    block.rays += counts[v];
+    block.most = std::max<std::uint32_t>(block.most, counts[v]);
   }
-  const auto gain = [&](std::uint32_t b, std::uint32_t times) {
-    const double noise = block_noise_[b] * noiseLeft(times);
-    return noise * (1.0 - noiseLeft(2.0)) / (static_cast<double>(times) * rays[b]);
+  return blocks;
+}
+
+/// All rays take so many bytes already.
+bool LeafGather::mayDouble(const BlockRays& block, std::size_t bytes) const {
+  return block.rays > 0 && block.times < kMostTimes && 2 * block.times * block.most <= LeafSights::kMostRays &&
+         bytes + std::size_t{block.times} * block.rays * LeafSights::kRayBytes <= most_bytes_;
+}
+
+/// Half a difference of smoothed light says little of few leaves, whose noise goes together: a block is as noisy as it
+/// is itself, or as its side is.
+void LeafGather::refineBlotches(double most, std::vector<BlockRays>& blocks, std::size_t& bytes) const {
+  const double light = std::reduce(side_light_.begin(), side_light_.end());
+  const double all = std::reduce(area_.begin(), area_.end());
+  const double black = all > 0.0 ? kBlack * kBlack * light / all : 0.0;
+  std::vector<double> noisy(blocks.size(), 0.0), area(blocks.size(), 0.0);  // squares of noise, of those of light
+  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
+    const auto first = area_.begin() + sides_[s].first_value;
+    const double side = side_light_[s] + black * std::reduce(first, first + sides_[s].leaf_count);
+    for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
+      area[v / kBlock] += area_[v];
+      if (area_[v] > 0.0) noisy[v / kBlock] = std::max(noisy[v / kBlock], side_noise_[s] / side);
+    }
+  }
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    if (area[b] <= 0.0) continue;
+    noisy[b] = std::max(noisy[b], block_noise_[b] / (block_light_[b] + black * area[b]));
+    auto& block = blocks[b];
+    while (noisy[b] * noiseLeft(block.times) > most * most && 2 * block.times * block.most <= kMostForBlotches &&
+           mayDouble(block, bytes)) {
+      bytes += std::size_t{block.times} * block.rays * LeafSights::kRayBytes;
+      block.times *= 2;
+    }
+  }
+}
+
+bool LeafGather::refine(double goal, double most_beside_light) {
+  struct Gain {
+    double gain;  ///< of noise() for each ray of its next doubling
+    std::uint32_t block;
+    bool operator<(const Gain& other) const { return gain != other.gain ? gain < other.gain : block > other.block; }
   };
-  std::priority_queue<Block> queue;
-  for (std::uint32_t b = 0; b < rays.size(); ++b)
-    if (block_noise_[b] > 0.0 && rays[b] > 0) queue.push({gain(b, 1), b, 1});
+  auto blocks = blockRays();
+  std::size_t bytes = leastBytes(sights_.leafCount()) + sights_.bytes();
+  refineBlotches(most_beside_light, blocks, bytes);
   // What smoothing takes of the light becomes less as there is less noise to smooth.
   double noise = noise_ - smoothed_;
   goal *= noise_ > 0.0 ? noise / noise_ : 1.0;
-  std::size_t bytes = leastBytes(counts.size()) + sights_.bytes();
-  std::vector<std::uint32_t> times(block_noise_.size(), 1);
-  bool any = false;
-  while (!queue.empty() && noise > goal) {
-    const Block block = queue.top();
-    queue.pop();
-    const std::size_t more = std::size_t{block.times} * rays[block.index];
-    if (2U * block.times * most[block.index] > LeafSights::kMostRays ||
-        bytes + more * LeafSights::kRayBytes > most_bytes_)
-      continue;
-    any = true;
-    bytes += more * LeafSights::kRayBytes;
-    noise -= block_noise_[block.index] * (noiseLeft(block.times) - noiseLeft(2.0 * block.times));
-    times[block.index] = 2 * block.times;
-    if (2 * block.times < kMostTimes) queue.push({gain(block.index, 2 * block.times), block.index, 2 * block.times});
+  std::priority_queue<Gain> queue;
+  const auto push = [&](std::uint32_t b) {
+    const auto& block = blocks[b];
+    if (block.rays == 0 || block_noise_[b] <= 0.0 || block.times >= kMostTimes) return;
+    const double left = block_noise_[b] * noiseLeft(block.times);
+    queue.push({left * (1.0 - noiseLeft(2.0)) / (static_cast<double>(block.times) * block.rays), b});
+  };
+  for (std::uint32_t b = 0; b < blocks.size(); ++b) {
+    noise -= block_noise_[b] * (1.0 - noiseLeft(blocks[b].times));
+    push(b);
   }
-  if (!any) return false;
+  while (!queue.empty() && noise > goal) {
+    const auto b = queue.top().block;
+    queue.pop();
+    auto& block = blocks[b];
+    if (!mayDouble(block, bytes)) continue;
+    bytes += std::size_t{block.times} * block.rays * LeafSights::kRayBytes;
+    noise -= block_noise_[b] * (noiseLeft(block.times) - noiseLeft(2.0 * block.times));
+    block.times *= 2;
+    push(b);
+  }
+  if (std::ranges::all_of(blocks, [](const BlockRays& block) { return block.times == 1; })) return false;
+  const auto counts = sights_.counts();
   std::vector<std::uint16_t> asked(counts.begin(), counts.end());
-  for (std::uint32_t v = 0; v < asked.size(); ++v) asked[v] = static_cast<std::uint16_t>(asked[v] * times[v / kBlock]);
+  for (std::uint32_t v = 0; v < asked.size(); ++v)
+    asked[v] = static_cast<std::uint16_t>(asked[v] * blocks[v / kBlock].times);
   sights_.ask(asked);
   return true;
 }
@@ -417,18 +471,21 @@ bool LeafGather::refine(double goal) {
 void LeafGather::save(ArchiveWriter& to) const {
   const auto counts = sights_.counts();
   to(has_gathered_, std::vector<std::uint16_t>(counts.begin(), counts.end()), noise_, smoothed_, bias_, block_noise_,
-     escaped_, absorbed_, unsolved_, leaf_bias_);
+     escaped_, absorbed_, unsolved_, leaf_bias_, block_light_, side_noise_, side_light_);
 }
 
 bool LeafGather::restore(ArchiveReader& from) {
   std::vector<std::uint16_t> counts;
-  from(has_gathered_, counts, noise_, smoothed_, bias_, block_noise_, escaped_, absorbed_, unsolved_, leaf_bias_);
+  from(has_gathered_, counts, noise_, smoothed_, bias_, block_noise_, escaped_, absorbed_, unsolved_, leaf_bias_,
+       block_light_, side_noise_, side_light_);
   const auto fits = [](std::uint16_t count) { return count <= LeafSights::kMostRays; };
   std::size_t all = 0;
   for (const auto count : counts) all += count;
   if (!from.ok() || counts.size() != sights_.leafCount() || !std::ranges::all_of(counts, fits) ||
       all * LeafSights::kRayBytes > most_bytes_ ||
       (!block_noise_.empty() && block_noise_.size() != (counts.size() + kBlock - 1) / kBlock) ||
+      block_light_.size() != block_noise_.size() || side_noise_.size() != side_light_.size() ||
+      (!block_noise_.empty() && side_noise_.size() != sides_.size()) ||
       (!leaf_bias_.empty() && leaf_bias_.size() != counts.size()))
     return false;
   if (all > 0) sights_.ask(counts);

@@ -77,9 +77,10 @@ class LeafGather {
   [[nodiscard]] const std::array<double, 3>& escapedFlux() const { return escaped_; }
   [[nodiscard]] const std::array<double, 3>& absorbedFlux() const { return absorbed_; }
 
-  /// Asks for more rays where they lower noise() most for their number, until it is likely to be `goal`; a leaf at most
-  /// four times as many. False: there can be no more.
-  [[nodiscard]] bool refine(double goal);
+  /// Asks for more rays: where the noise is more than this part of the light there is, so that nobody sees it as
+  /// blotches in what is dark, and where they lower noise() most for their number, until it is likely to be `goal`. A
+  /// leaf gets at most four times as many. False: that is so, or there can be no more.
+  [[nodiscard]] bool refine(double goal, double most_beside_light);
   /// Part of noise() that is left when there are so many times as many rays.
   [[nodiscard]] static double noiseLeft(double times);
   /// How many times as many leave so much of it; at least 1.
@@ -120,6 +121,13 @@ class LeafGather {
   void weighMissed(const std::array<Levels, 2>& levels);
   void weighNoise(const LeafSmoother& smoother);
   void weighLost();
+  /// By block of leaves: how many rays they have, and the one with most; how many times as many are asked for.
+  struct BlockRays {
+    std::uint32_t rays = 0, most = 0, times = 1;
+  };
+  [[nodiscard]] std::vector<BlockRays> blockRays() const;
+  [[nodiscard]] bool mayDouble(const BlockRays& block, std::size_t bytes) const;
+  void refineBlotches(double most, std::vector<BlockRays>& blocks, std::size_t& bytes) const;
   void finish();
 
   LeafSights sights_;
@@ -141,6 +149,8 @@ class LeafGather {
   std::array<std::vector<glm::vec3>, 2> gathered_;
   double noise_ = 0.0, smoothed_ = 0.0, bias_ = 0.0, unsolved_ = 0.0;
   std::vector<double> block_noise_;  ///< parts of it but for smoothed_, what smoothing took, by kBlock leaves
+  std::vector<double> block_light_;  ///< likewise, of all irradiance
+  std::vector<double> side_noise_, side_light_;  ///< likewise, by side
   std::vector<float> leaf_bias_;
   std::array<double, 3> escaped_{}, absorbed_{};
 };

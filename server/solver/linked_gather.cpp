@@ -22,6 +22,11 @@ constexpr double kBright = 4.0;
 constexpr double kAim = 0.9;
 /// And of its square this is left for rays and samples, whatever else there is.
 constexpr double kLeastRoom = 0.1;
+/// Noise beside the light where it is, of the error aimed at: in a picture of 2 % as much shows as blotches, in dark
+/// corners where all light is known well enough. Less than kUnseen never does.
+constexpr double kBlotches = 3.0, kUnseen = 0.03;
+/// A round for nothing else is worth it where there is so many times as much.
+constexpr double kAlone = 1.5;
 /// The part of the room that either of rays and samples gets is found to one in so many.
 constexpr int kParts = 32;
 
@@ -127,6 +132,16 @@ double LinkedSolver::raysError() const {
   return gather_ && norm > 0.0 ? std::sqrt(gather_->noise()) / norm : 0.0;
 }
 
+/// The error of all light may be reached while what is dark has far more of its own than others have of theirs.
+double LinkedSolver::blotch() const { return std::max(kBlotches * aim_, kUnseen); }
+
+bool LinkedSolver::refineBlotches() {
+  if (!gathers() || rounds_ >= kMaxRounds || !gather_->refine(HUGE_VAL, kAlone * blotch())) return false;
+  phase_ = Phase::kImprove;
+  sample_goal_ = 0.0;
+  return true;
+}
+
 /// More rays, more samples of links, or both, so that the target is reached at the least cost.
 StepOutcome LinkedSolver::chooseRays() {
   if (rounds_ >= kMaxRounds) return exhausted(SolveLimit::kRounds);
@@ -150,7 +165,8 @@ StepOutcome LinkedSolver::chooseRays() {
                         links_cost * std::max(1.0, links / for_links);
     if (cost < best) best = cost, part = static_cast<double>(i) / kParts;
   }
-  const bool refined = rays > part * room && gather_->refine(part * room / std::max(rays, 1e-300) * gather_->noise());
+  const double goal_of_rays = part * room / std::max(rays, 1e-300) * gather_->noise();
+  const bool refined = rays > part * room && gather_->refine(goal_of_rays, blotch());
   if (!refined && rays > part * room) {  // no more to be had: links get what they leave, or as good as they are
     const double goal = std::max(room - rays, rays);
     if (links <= goal) return exhausted(SolveLimit::kLinkMemory);

@@ -272,6 +272,7 @@ StepOutcome LinkedSolver::chooseNext() {
   while (error_.total <= aim_ && aimFurther()) {
   }
   if (error_.total > settings_.target_error) return chooseFurther();
+  if (refineBlotches()) return StepOutcome::kRoundDone;
   from_links_ = FromLinks::kToConfirm;
   return confirm();
 }

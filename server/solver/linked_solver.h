@@ -207,6 +207,8 @@ class LinkedSolver final : public Solver {
   void startRays();
   void inheritRays(const LinkedSolver& former, const Renumbering& numbers);
   [[nodiscard]] StepOutcome chooseRays();
+  [[nodiscard]] bool refineBlotches();
+  [[nodiscard]] double blotch() const;
   void leafUnshot(std::uint32_t side, std::vector<glm::vec3>& leaves, Unshot which = Unshot::kNotByRays) const;
   void startGrowth();
   [[nodiscard]] Result<StepOutcome> advance();

@@ -27,6 +27,11 @@ std::string cyclesTime(const SceneSeries& series, const Summary& summary) {
   return series.cycles && !series.cycles->rows.empty() ? orDash(summary.cycles) : "-";
 }
 
+std::string orDash(const std::optional<Summary::Ratio>& ratio) {
+  if (!ratio) return "-";
+  return fmt::format("{}{:.3f}", ratio->at_most ? "<= " : "", ratio->value);
+}
+
 std::string ratioText(const Summary& summary) {
   if (!summary.ratio_at_best) return orDash(summary.ratio);
   return fmt::format("{:.2f} at {} %", summary.ratio_at_best->ratio, percent(summary.ratio_at_best->error));

@@ -17,10 +17,13 @@ std::vector<ErrorAtTime> curveOf(const Rows& rows, Time time, Error error) {
   return curve;
 }
 
+/// Those with a limit of time, and the one that was asked for an error, as they took longer.
 std::vector<SolveRow> measuredRows(const SceneSeries& series) {
   std::vector<SolveRow> rows;
-  std::copy_if(series.rows.begin(), series.rows.end(), std::back_inserter(rows),
-               [](const SolveRow& row) { return row.measured; });
+  const auto measured = [](const SolveRow& row) { return row.measured; };
+  std::copy_if(series.rows.begin(), series.rows.end(), std::back_inserter(rows), measured);
+  if (series.asked && series.asked->measured) rows.push_back(*series.asked);
+  std::stable_sort(rows.begin(), rows.end(), [](const auto& a, const auto& b) { return a.seconds < b.seconds; });
   return rows;
 }
 
@@ -29,10 +32,10 @@ double renderSeconds(const CyclesRow& row, const LinearCost& cost) {
   return std::max(row.seconds - cost.setup_seconds, 0.5 * cost.seconds_a_sample * row.samples);
 }
 
-std::optional<double> ratioOf(const std::optional<TimeToError>& ours, const std::optional<TimeToError>& theirs) {
-  if (!ours || !theirs || !(theirs->seconds > 0.0)) return {};
-  if (ours->kind == TimeToError::Kind::kAtMost || theirs->kind == TimeToError::Kind::kAtMost) return {};
-  return ours->seconds / theirs->seconds;
+std::optional<Summary::Ratio> ratioOf(const std::optional<TimeToError>& ours,
+                                      const std::optional<TimeToError>& theirs) {
+  if (!ours || !theirs || !(theirs->seconds > 0.0) || theirs->kind == TimeToError::Kind::kAtMost) return {};
+  return Summary::Ratio{ours->seconds / theirs->seconds, ours->kind == TimeToError::Kind::kAtMost};
 }
 
 void summarizeCycles(const SceneSeries& series, const std::vector<SolveRow>& rows, Summary& summary) {
@@ -62,13 +65,17 @@ void summarizeCycles(const SceneSeries& series, const std::vector<SolveRow>& row
   const auto best =
       *std::min_element(rows.begin(), rows.end(), [&](const auto& a, const auto& b) { return plain(a) < plain(b); });
   const auto theirs = timeToError(curveOf(cycles.rows, rendering, plain), plain(best), kMonteCarlo);
-  if (const auto ratio = ratioOf(TimeToError{best.seconds}, theirs)) summary.ratio_at_best = {plain(best), *ratio};
+  if (const auto ratio = ratioOf(TimeToError{best.seconds}, theirs))
+    summary.ratio_at_best = {plain(best), ratio->value};
 }
 
 /// A tenth, and a little for limits that were overrun: of rows at 1, 2, 5 and 10 s all belong to the last decade.
 constexpr double kLate = 0.09;
 
 json orNull(const std::optional<double>& value) { return value ? json(*value) : json(nullptr); }
+json orNull(const std::optional<Summary::Ratio>& ratio) {
+  return ratio ? json{{"value", ratio->value}, {"at_most", ratio->at_most}} : json(nullptr);
+}
 
 json toJson(const std::optional<TimeToError>& time) {
   if (!time) return nullptr;

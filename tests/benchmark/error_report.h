@@ -25,8 +25,12 @@ struct Summary {
   std::optional<TimeToError> plain, plain_wall;    ///< ours: solve seconds, the whole command
   std::optional<TimeToError> cycles, cycles_wall;  ///< Cycles: rendering alone, the whole program
   std::optional<LinearCost> cycles_cost;
-  /// Ours over Cycles, smaller is better; only where neither is a bound.
-  std::optional<double> ratio, ratio_wall;
+  /// Ours over Cycles, smaller is better; none where Cycles' time is a bound.
+  struct Ratio {
+    double value = 0.0;
+    bool at_most = false;  ///< ours was better from its first row on
+  };
+  std::optional<Ratio> ratio, ratio_wall;
   /// Where ours never comes down to the goal: the same at the smallest error it reached.
   struct RatioAt {
     double error = 0.0, ratio = 0.0;

@@ -66,16 +66,27 @@ TEST(Summary, CyclesIsChargedForRenderingAndInAllForItsWholeRun) {
   EXPECT_NEAR(summary.cycles->seconds, 1.0, 1e-9);  // 100 samples
   EXPECT_EQ(summary.cycles->kind, TimeToError::Kind::kExtrapolated);
   EXPECT_NEAR(summary.cycles_wall->seconds, 4.0, 1e-9);
-  EXPECT_NEAR(summary.ratio.value(), 1.0, 1e-9);
-  EXPECT_NEAR(summary.ratio_wall.value(), summary.plain_wall->seconds / 4.0, 1e-9);
+  EXPECT_NEAR(summary.ratio.value().value, 1.0, 1e-9);
+  EXPECT_NEAR(summary.ratio_wall.value().value, summary.plain_wall->seconds / 4.0, 1e-9);
 }
 
-TEST(Summary, NoRatioFromABound) {
+TEST(Summary, ABoundGivesARatioThatIsOne) {
   auto bounded = series();
   bounded.rows.erase(bounded.rows.begin());
   const auto summary = summarize(bounded);
   EXPECT_EQ(summary.plain->kind, TimeToError::Kind::kAtMost);
-  EXPECT_FALSE(summary.ratio);
+  EXPECT_TRUE(summary.ratio.value().at_most);
+  EXPECT_NEAR(summary.ratio.value().value, bounded.rows.front().seconds, 1e-9);
+}
+
+TEST(Summary, ARunThatWasAskedForAnErrorIsARowOfTheCurve) {
+  auto asked = series();
+  asked.asked = asked.rows.front();
+  asked.asked->seconds = 0.01;
+  asked.asked->plain = metrics(0.015, 0.003);
+  const auto summary = summarize(asked);
+  EXPECT_TRUE(summary.ratio.value().at_most);
+  EXPECT_NEAR(summary.ratio.value().value, 0.01, 1e-9);
 }
 
 TEST(Summary, ACurveThatNeverReachesTheGoalIsComparedAtItsBest) {
