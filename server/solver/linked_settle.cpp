@@ -107,7 +107,7 @@ void LinkedSolver::solveAnew() {
   settling_ = false;
   pass_ = Pass::kNone;
   from_links_ = FromLinks::kAfterEdit;
-  refined_ = false;
+  refined_ = is_confirmed_ = false;
   edit_lights_planned_ = false;
   error_ = {};  // unknown
 }

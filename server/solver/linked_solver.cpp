@@ -225,8 +225,11 @@ Result<StepOutcome> LinkedSolver::advance() {
     if (measured_ < wanted_.size()) return StepOutcome::kSlice;
   }
   settling_ = true;  // also where memory runs out
-  settling_ = !settle();
+  // Over the few links that there are beside rays nothing is gained by going on from the light before.
+  const bool from_nothing = gather_ && phase_ == Phase::kImprove;
+  settling_ = !(from_nothing ? settleFromLinks() : settle());
   if (settling_) return StepOutcome::kSlice;
+  is_confirmed_ = from_nothing;
   if (phase_ == Phase::kImprove) return finishRound();
   if (phase_ == Phase::kLights) startGrowth();
   return StepOutcome::kShot;
@@ -268,11 +271,16 @@ StepOutcome LinkedSolver::ended() const {
 }
 
 StepOutcome LinkedSolver::chooseNext() {
+  const bool is_confirmed = std::exchange(is_confirmed_, false);
   limit_ = SolveLimit::kNone;
   while (error_.total <= aim_ && aimFurther()) {
   }
   if (error_.total > settings_.target_error) return chooseFurther();
   if (refineBlotches()) return StepOutcome::kRoundDone;
+  if (is_confirmed) {
+    phase_ = Phase::kDone;
+    return StepOutcome::kConverged;
+  }
   from_links_ = FromLinks::kToConfirm;
   return confirm();
 }

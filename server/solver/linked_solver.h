@@ -254,6 +254,7 @@ class LinkedSolver final : public Solver {
   Pass pass_ = Pass::kNone;
   FromLinks from_links_ = FromLinks::kNo;
   bool edit_lights_planned_ = false;  // of the edit being taken in
+  bool is_confirmed_ = false;         // the light that there is was solved for from links and rays alone, just now
   bool settling_ = false;             // a wave is measured, its light is still to be solved for
   std::vector<Measurement> wanted_;   // the wave under way
   std::size_t measured_ = 0;          // of the wave
