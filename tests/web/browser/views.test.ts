@@ -118,8 +118,8 @@ it('carries exposure, tone mapping and scale in a link, and shows them again', a
   expect(await other.getByLabel('Tone mapping').inputValue()).toBe('agx');
   expect(await other.getByLabel('Lowest value of the scale').inputValue()).toBe('2');
   expect(await other.locator('.legend').innerText()).toMatch(/≤ 2\b[^]*≥ 300/);
-  const { base } = made;
-  expect(await other.evaluate(() => window.viewer!.viewer.exposure.value)).toBeCloseTo(Number(base) * 2 ** 1.5, 3);
+  const shown = await other.evaluate(() => window.viewer!.viewer.exposure.value);
+  expect(shown / (Number(made.base) * 2 ** 1.5)).toBeCloseTo(1, 2); // `base` has three digits
   // What such a link does not say is as it is without one, and what nobody can mean is not said.
   await other.goto(`${server.url}/#view=irradiance&stops=99&tone=toString&scale=5,1&exposure=-3`);
   const plain = { automatic: true, stops: 0, tone: 0, autoRange: true };
