@@ -5,7 +5,6 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numeric>
-#include <queue>
 
 #include "common/clones.h"
 #include "server/solver/halves.h"
@@ -15,16 +14,6 @@ namespace {
 
 /// Rays of each half of a leaf that a solve begins with.
 constexpr std::uint16_t kFirstRays = 8;
-/// What is known of the noise of so many leaves in a row is known of each: single ones are too uncertain to choose by.
-constexpr std::uint32_t kBlock = 64;
-/// In a round a leaf gets at most so many times as many rays as it had, in powers of two.
-constexpr std::uint32_t kMostTimes = 4;
-/// The square of the error of n rays falls as n^-1.3: measured in three rooms, from 4 to 64 rays (Sobol's points; the
-/// edges of what is seen keep it from n^-1.5).
-constexpr double kFall = 1.3;
-/// Noise beside light of less than this part of what is usual is black; and so many rays of a half are enough anywhere.
-constexpr double kBlack = 0.02;
-constexpr std::uint32_t kMostForBlotches = 256;
 /// By more than this the level of all light is not changed: rays that know it this badly are few.
 constexpr double kMostLevel = 4.0, kMostOff = 0.5;
 /// Light that both halves lack by more than so many times what they differ by is not lacking by chance.
@@ -232,7 +221,7 @@ double LeafGather::solved(std::size_t h, std::size_t c, std::size_t v) const {
 /// that says nothing; all light of the part, with what came over links, makes up for what little is off then.
 LeafGather::Levels LeafGather::levels(std::size_t h) const {
   struct Sum {
-    double left = 0.0, kept = 0.0, size = 0.0, all = 0.0;
+    double left = 0.0, kept = 0.0, size = 0.0, all = 0.0, area = 0.0, stays = 0.0;
     double least = 0.0;  ///< x, where it is below 0, of what came over links there
   };
   std::vector<std::array<Sum, 3>> sums(sides_.size());
@@ -248,6 +237,8 @@ LeafGather::Levels LeafGather::levels(std::size_t h) const {
         sum[c].kept += area_[v] * stays * x;
         sum[c].size += area_[v] * stays * std::abs(x);
         sum[c].all += area_[v] * stays * (x + over_links);
+        sum[c].area += area_[v];
+        sum[c].stays += area_[v] * stays;
         if (x < 0.0) sum[c].least = std::min(sum[c].least, x / over_links);
       }
     }
@@ -257,11 +248,15 @@ LeafGather::Levels LeafGather::levels(std::size_t h) const {
     for (std::size_t c = 0; c < 3; ++c) {
       const auto& sum = sums[p][c];
       const double level = sum.left / sum.kept, part = (sum.left - sum.kept) / sum.all;
-      if (2.0 * sum.kept > sum.size && level * sum.least >= -1.0 && level > 1.0 / kMostLevel && level < kMostLevel)
-        levels[p][c].gathered = level;
-      else if (sum.all > 0.0 && std::abs(part) < kMostOff)
-        levels[p][c] = {1.0 + part, part};
       levels[p][c].missed = sum.left - sum.kept;
+      if (2.0 * sum.kept > sum.size && level * sum.least >= -1.0 && level > 1.0 / kMostLevel && level < kMostLevel) {
+        levels[p][c].gathered = level;
+      } else if (sum.all > 0.0 && std::abs(part) < kMostOff) {
+        levels[p][c].gathered = 1.0 + part;
+        levels[p][c].over_links = part;
+      } else if (sum.stays > 0.0) {
+        levels[p][c].missed *= sum.area / sum.stays;  // nothing makes up for it: all its bounces are missing, too
+      }
     }
   }
   return levels;
@@ -372,102 +367,6 @@ void LeafGather::weighLost() {
   }
 }
 
-double LeafGather::noiseLeft(double times) { return std::pow(times, -kFall); }
-
-double LeafGather::timesFor(double left) { return left < 1.0 ? std::pow(left, -1.0 / kFall) : 1.0; }
-
-std::uint64_t LeafGather::rays() const {
-  std::uint64_t all = 0;
-  for (const auto count : sights_.counts()) all += 2U * count;
-  return all;
-}
-
-std::vector<LeafGather::BlockRays> LeafGather::blockRays() const {
-  std::vector<BlockRays> blocks(block_noise_.size());
-  const auto counts = sights_.counts();
-  for (std::uint32_t v = 0; v < counts.size(); ++v) {
-    auto& block = blocks[v / kBlock];
-    block.rays += counts[v];
-    block.most = std::max<std::uint32_t>(block.most, counts[v]);
-  }
-  return blocks;
-}
-
-/// All rays take so many bytes already.
-bool LeafGather::mayDouble(const BlockRays& block, std::size_t bytes) const {
-  return block.rays > 0 && block.times < kMostTimes && 2 * block.times * block.most <= LeafSights::kMostRays &&
-         bytes + std::size_t{block.times} * block.rays * LeafSights::kRayBytes <= most_bytes_;
-}
-
-/// Half a difference of smoothed light says little of few leaves, whose noise goes together: a block is as noisy as it
-/// is itself, or as its side is.
-void LeafGather::refineBlotches(double most, std::vector<BlockRays>& blocks, std::size_t& bytes) const {
-  const double light = std::reduce(side_light_.begin(), side_light_.end());
-  const double all = std::reduce(area_.begin(), area_.end());
-  const double black = all > 0.0 ? kBlack * kBlack * light / all : 0.0;
-  std::vector<double> noisy(blocks.size(), 0.0), area(blocks.size(), 0.0);  // squares of noise, of those of light
-  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
-    const auto first = area_.begin() + sides_[s].first_value;
-    const double side = side_light_[s] + black * std::reduce(first, first + sides_[s].leaf_count);
-    for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
-      area[v / kBlock] += area_[v];
-      if (area_[v] > 0.0) noisy[v / kBlock] = std::max(noisy[v / kBlock], side_noise_[s] / side);
-    }
-  }
-  for (std::size_t b = 0; b < blocks.size(); ++b) {
-    if (area[b] <= 0.0) continue;
-    noisy[b] = std::max(noisy[b], block_noise_[b] / (block_light_[b] + black * area[b]));
-    auto& block = blocks[b];
-    while (noisy[b] * noiseLeft(block.times) > most * most && 2 * block.times * block.most <= kMostForBlotches &&
-           mayDouble(block, bytes)) {
-      bytes += std::size_t{block.times} * block.rays * LeafSights::kRayBytes;
-      block.times *= 2;
-    }
-  }
-}
-
-bool LeafGather::refine(double goal, double most_beside_light) {
-  struct Gain {
-    double gain;  ///< of noise() for each ray of its next doubling
-    std::uint32_t block;
-    bool operator<(const Gain& other) const { return gain != other.gain ? gain < other.gain : block > other.block; }
-  };
-  auto blocks = blockRays();
-  std::size_t bytes = leastBytes(sights_.leafCount()) + sights_.bytes();
-  refineBlotches(most_beside_light, blocks, bytes);
-  // What smoothing takes of the light becomes less as there is less noise to smooth.
-  double noise = noise_ - smoothed_;
-  goal *= noise_ > 0.0 ? noise / noise_ : 1.0;
-  std::priority_queue<Gain> queue;
-  const auto push = [&](std::uint32_t b) {
-    const auto& block = blocks[b];
-    if (block.rays == 0 || block_noise_[b] <= 0.0 || block.times >= kMostTimes) return;
-    const double left = block_noise_[b] * noiseLeft(block.times);
-    queue.push({left * (1.0 - noiseLeft(2.0)) / (static_cast<double>(block.times) * block.rays), b});
-  };
-  for (std::uint32_t b = 0; b < blocks.size(); ++b) {
-    noise -= block_noise_[b] * (1.0 - noiseLeft(blocks[b].times));
-    push(b);
-  }
-  while (!queue.empty() && noise > goal) {
-    const auto b = queue.top().block;
-    queue.pop();
-    auto& block = blocks[b];
-    if (!mayDouble(block, bytes)) continue;
-    bytes += std::size_t{block.times} * block.rays * LeafSights::kRayBytes;
-    noise -= block_noise_[b] * (noiseLeft(block.times) - noiseLeft(2.0 * block.times));
-    block.times *= 2;
-    push(b);
-  }
-  if (std::ranges::all_of(blocks, [](const BlockRays& block) { return block.times == 1; })) return false;
-  const auto counts = sights_.counts();
-  std::vector<std::uint16_t> asked(counts.begin(), counts.end());
-  for (std::uint32_t v = 0; v < asked.size(); ++v)
-    asked[v] = static_cast<std::uint16_t>(asked[v] * blocks[v / kBlock].times);
-  sights_.ask(asked);
-  return true;
-}
-
 void LeafGather::save(ArchiveWriter& to) const {
   const auto counts = sights_.counts();
   to(has_gathered_, std::vector<std::uint16_t>(counts.begin(), counts.end()), noise_, smoothed_, bias_, block_noise_,
@@ -486,7 +385,7 @@ bool LeafGather::restore(ArchiveReader& from) {
       (!block_noise_.empty() && block_noise_.size() != (counts.size() + kBlock - 1) / kBlock) ||
       block_light_.size() != block_noise_.size() || side_noise_.size() != side_light_.size() ||
       (!block_noise_.empty() && side_noise_.size() != sides_.size()) ||
-      (!leaf_bias_.empty() && leaf_bias_.size() != counts.size()))
+      (has_gathered_ ? leaf_bias_.size() != counts.size() : !leaf_bias_.empty()))
     return false;
   if (all > 0) sights_.ask(counts);
   return true;

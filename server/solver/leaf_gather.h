@@ -16,6 +16,7 @@
 // more rays than it is elsewhere, leaves get more. Owned by LinkedSolver; one thread outside of the calls.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <glm/vec3.hpp>
@@ -66,8 +67,11 @@ class LeafGather {
   [[nodiscard]] std::span<const glm::vec3> irradiance(std::size_t half) const { return gathered_[half]; }
   /// Square of the error that rays leave in the mean of the halves: sum over leaves and channels, times area.
   [[nodiscard]] double noise() const { return noise_; }
-  /// The part of it that the halves have in common: what smoothing took of the light itself, and what neither of them
-  /// saw, by the light that is sent and does not arrive.
+  /// Of it, but for what smoothing took: more rays lower this part.
+  [[nodiscard]] double rayNoise() const { return std::max(0.0, noise_ - smoothed_); }
+  [[nodiscard]] double smoothedSquare() const { return smoothed_; }
+  /// The part of noise() that the halves have in common: what smoothing took of the light itself, and what neither of
+  /// them saw, by the light that is sent and does not arrive.
   [[nodiscard]] double bias() const { return bias_; }
   /// bias() by leaf value, not times area.
   [[nodiscard]] std::span<const float> biasOfLeaves() const { return leaf_bias_; }
@@ -78,9 +82,11 @@ class LeafGather {
   [[nodiscard]] const std::array<double, 3>& absorbedFlux() const { return absorbed_; }
 
   /// Asks for more rays: where the noise is more than this part of the light there is, so that nobody sees it as
-  /// blotches in what is dark, and where they lower noise() most for their number, until it is likely to be `goal`. A
-  /// leaf gets at most four times as many. False: that is so, or there can be no more.
+  /// blotches in what is dark, and where they lower rayNoise() most for their number, until it is likely to be
+  /// `goal`. A leaf gets at most four times as many. False: that is so, or there can be no more.
   [[nodiscard]] bool refine(double goal, double most_beside_light);
+  /// Whether the last refine() would have asked for more, had there been room for them.
+  [[nodiscard]] bool lacksMemory() const { return lacks_memory_; }
   /// Part of noise() that is left when there are so many times as many rays.
   [[nodiscard]] static double noiseLeft(double times);
   /// How many times as many leave so much of it; at least 1.
@@ -93,6 +99,9 @@ class LeafGather {
   [[nodiscard]] bool restore(ArchiveReader& from);
 
  private:
+  /// What is known of the noise of so many leaves in a row is known of each: single ones are too uncertain to choose
+  /// by.
+  static constexpr std::uint32_t kBlock = 64;
   /// Four, so that a leaf's are one vector; the last is 0.
   using Light = LeafSmoother::Light;
   struct Half {
@@ -106,7 +115,7 @@ class LeafGather {
   /// Factors of x, and of what came over links, that x becomes the sum of.
   struct Level {
     double gathered = 1.0, over_links = 0.0;
-    double missed = 0.0;  ///< flux that was sent, and that x without them does not have
+    double missed = 0.0;  ///< flux that was sent and that x, as it was, does not have; with its bounces, if it stays so
   };
   using Levels = std::vector<std::array<Level, 3>>;
   enum class Stage { kDone, kTracing, kSolving };
@@ -126,13 +135,13 @@ class LeafGather {
     std::uint32_t rays = 0, most = 0, times = 1;
   };
   [[nodiscard]] std::vector<BlockRays> blockRays() const;
-  [[nodiscard]] bool mayDouble(const BlockRays& block, std::size_t bytes) const;
-  void refineBlotches(double most, std::vector<BlockRays>& blocks, std::size_t& bytes) const;
+  [[nodiscard]] bool mayDouble(const BlockRays& block, std::size_t bytes);
+  void refineBlotches(double most, std::vector<BlockRays>& blocks, std::size_t& bytes);
   void finish();
 
   LeafSights sights_;
   std::size_t most_bytes_;
-  bool has_gathered_ = false;
+  bool has_gathered_ = false, lacks_memory_ = false;
   const std::vector<Side>& sides_;
   std::vector<double> area_;  ///< by leaf value
   // Of the rays that there are:

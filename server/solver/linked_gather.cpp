@@ -28,6 +28,8 @@ constexpr double kLeastRoom = 0.1;
 constexpr double kBlotches = 3.0, kUnseen = 0.03;
 /// A round for nothing else is worth it where there is so many times as much.
 constexpr double kAlone = 1.5;
+/// A round of samples alone that leaves more than this of the error was in vain.
+constexpr double kSampleGain = 0.97;
 /// The part of the room that either of rays and samples gets is found to one in so many.
 constexpr int kParts = 32;
 
@@ -127,10 +129,14 @@ double LinkedSolver::samplesCost() const {
   return points * shotCost();
 }
 
-/// Relative error that rays leave.
-double LinkedSolver::raysError() const {
-  const double norm = fieldNorm();
-  return gather_ && norm > 0.0 ? std::sqrt(gather_->noise()) / norm : 0.0;
+/// What smoothing takes of light grows with the noise that there is to take, whosever that is.
+LinkedSolver::Noise LinkedSolver::noise() const {
+  const double norm = fieldNorm(), square = norm * norm, all = by_links_ * by_links_;
+  if (!gather_ || square <= 0.0) return {0.0, all};
+  const double rays = gather_->rayNoise() / square, smoothed = gather_->smoothedSquare() / square;
+  const double links = std::max(0.0, all - smoothed - rays);
+  const double share = rays + links > 0.0 ? smoothed / (rays + links) : 0.0;
+  return {rays * (1.0 + share), links * (1.0 + share)};
 }
 
 /// The error of all light may be reached while what is dark has far more of its own than others have of theirs.
@@ -156,7 +162,7 @@ StepOutcome LinkedSolver::chooseRays() {
   const double aim = kAim * targetOfLinks(), rest = error_.residual;
   const double room = std::max(aim * aim - rest * rest, kLeastRoom * aim * aim);
   if (by_links_ * by_links_ <= room) return exhausted(SolveLimit::kWithin);
-  const double rays = raysError() * raysError(), links = std::max(0.0, by_links_ * by_links_ - rays);
+  const auto [rays, links] = noise();
   const double rays_cost = static_cast<double>(gather_->rays()) * rayCost(), links_cost = samplesCost();
   double best = HUGE_VAL, part = 0.0;
   for (int i = 1; i < kParts; ++i) {
@@ -166,16 +172,20 @@ StepOutcome LinkedSolver::chooseRays() {
                         links_cost * std::max(1.0, links / for_links);
     if (cost < best) best = cost, part = static_cast<double>(i) / kParts;
   }
-  const double goal_of_rays = part * room / std::max(rays, 1e-300) * gather_->noise();
+  const double goal_of_rays = part * room / std::max(rays, 1e-300) * gather_->rayNoise();
   const bool refined = rays > part * room && gather_->refine(goal_of_rays, blotch());
+  const auto end = gather_->lacksMemory() ? SolveLimit::kLinkMemory : SolveLimit::kPatches;
   if (!refined && rays > part * room) {  // no more to be had: links get what they leave, or as good as they are
     const double goal = std::max(room - rays, rays);
-    if (links <= goal) return exhausted(SolveLimit::kLinkMemory);
+    // What halves of the rays differ by may be taken for the links', but no sample makes it less.
+    if (links <= goal || (sampled_alone_ > 0.0 && by_links_ > kSampleGain * sampled_alone_)) return exhausted(end);
+    sampled_alone_ = by_links_;
     sample_goal_ = std::sqrt(goal);
     return StepOutcome::kRoundDone;
   }
+  sampled_alone_ = 0.0;
   if (links > (1.0 - part) * room) sample_goal_ = std::sqrt((1.0 - part) * room);
-  if (!refined && sample_goal_ <= 0.0) return exhausted(SolveLimit::kLinkMemory);
+  if (!refined && sample_goal_ <= 0.0) return exhausted(end);
   return StepOutcome::kRoundDone;
 }
 

@@ -84,7 +84,8 @@ void LinkedSolver::visit(Archive& archive, Self& self) {
   archive(self.lights_, self.sources_, self.phase_, self.limit_, self.lights_fit_, self.from_links_,
           self.edit_lights_planned_, self.settling_, self.wanted_, self.measured_, self.growing_, self.share_part_,
           self.left_out_, self.rounds_, self.solutions_, self.sweeps_, self.replayed_, self.varying_share_, self.half_,
-          self.refined_, self.by_links_, self.error_, self.counters_, self.by_rays_, self.sample_goal_, self.aim_);
+          self.refined_, self.by_links_, self.error_, self.counters_, self.by_rays_, self.sample_goal_, self.aim_,
+          self.sampled_alone_);
   LinkPlanner::visit(archive, self.planner_);
   LinkMemory::visit(archive, self.memory_);
 }
@@ -107,7 +108,8 @@ bool LinkedSolver::restore(ArchiveReader& from) {
   from(kind, values);
   if (!from.ok() || kind != kKind || values != system_.emission().size()) return false;
   visit(from, *this);
-  if (!planner_.fits() || !system_.restore(from)) return false;
+  if (!(aim_ > 0.0 && aim_ <= 1.0) || !planner_.fits() || !system_.restore(from)) return false;
+  planner_.setTarget(aim_);
   const auto& shooters = system_.shooters();
   const auto known = [&](const Shooter& shooter) {
     return (shooter.light == scene::kNone || shooter.light < lights_.size()) &&

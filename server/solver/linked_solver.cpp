@@ -137,11 +137,26 @@ Result<void> LinkedSolver::measureSlice() {
   return {};
 }
 
+/// While it lives unshot light is what no shooter stands for, whether rays bring it or not.
+class LinkedSolver::AllUnshot {
+ public:
+  explicit AllUnshot(LinkedSolver& solver) : solver_(solver) {
+    if (solver_.gathers()) solver_.findUnshot(Unshot::kByRaysToo);
+  }
+  ~AllUnshot() {
+    if (solver_.gathers()) solver_.tryNow([this] { solver_.findUnshot(); });
+  }
+  AllUnshot(const AllUnshot&) = delete;
+  AllUnshot& operator=(const AllUnshot&) = delete;
+
+ private:
+  LinkedSolver& solver_;
+};
+
 void LinkedSolver::startGrowth() {
-  if (gathers()) findUnshot(Unshot::kByRaysToo);
+  const AllUnshot all(*this);
   planner_.setShare(powerToShoot() * share_part_);
   planner_.setLeastRadiosity(by_rays_ ? leastRadiosity() : std::vector<double>());
-  if (gathers()) findUnshot();
   phase_ = Phase::kGrow;
 }
 
@@ -153,8 +168,8 @@ std::vector<Measurement> LinkedSolver::plan() {
   if (phase_ == Phase::kLights) return planLights();
   if (phase_ == Phase::kImprove && gather_) {
     if (sample_goal_ <= 0.0) return {};
-    const double links = std::sqrt(std::max(0.0, by_links_ * by_links_ - raysError() * raysError()));
-    return planner_.improve(system_, unshot_, *patches_, false, memory_, {links, 0.0, 0.0, sample_goal_});
+    return planner_.improve(system_, unshot_, *patches_, false, memory_,
+                            {std::sqrt(noise().links), 0.0, 0.0, sample_goal_});
   }
   if (phase_ == Phase::kImprove) {
     const double varying = varying_share_ * error_.residual;
@@ -165,10 +180,8 @@ std::vector<Measurement> LinkedSolver::plan() {
   // Also where there is no room: the walk finds out how much light goes without.
   const std::size_t limit = std::max<std::size_t>(settings_.planner.pairs_a_wave, system_.shooters().size() / 2);
   // What rays bring is left to them, but for what after an edit is bright and small.
-  if (gathers()) findUnshot(Unshot::kByRaysToo);
-  auto wanted = planner_.grow(system_, unshot_, *patches_, limit, memory_);
-  if (gathers()) findUnshot();
-  return wanted;
+  const AllUnshot all(*this);
+  return planner_.grow(system_, unshot_, *patches_, limit, memory_);
 }
 
 Result<StepOutcome> LinkedSolver::step() {
@@ -273,10 +286,12 @@ StepOutcome LinkedSolver::ended() const {
 StepOutcome LinkedSolver::chooseNext() {
   const bool is_confirmed = std::exchange(is_confirmed_, false);
   limit_ = SolveLimit::kNone;
-  while (error_.total <= aim_ && aimFurther()) {
-  }
+  refined_ = true;  // should memory run out, it is chosen anew
+  while (error_.total <= aim_ && aimFurther()) continue;
+  const bool blotched = error_.total <= settings_.target_error && refineBlotches();
+  refined_ = false;
   if (error_.total > settings_.target_error) return chooseFurther();
-  if (refineBlotches()) return StepOutcome::kRoundDone;
+  if (blotched) return StepOutcome::kRoundDone;
   if (is_confirmed) {
     phase_ = Phase::kDone;
     return StepOutcome::kConverged;
@@ -346,7 +361,10 @@ void LinkedSolver::setTargetError(double target) {
   if (variation_) tryNow([this] { updateVariation(); });
   if (phase_ != Phase::kDone || from_links_ != FromLinks::kNo) return;
   tryNow([this] {
-    (void)chooseNext();
+    limit_ = SolveLimit::kNone;
+    while (error_.total <= aim_ && aimFurther()) continue;
+    if (error_.total > settings_.target_error) (void)chooseFurther();
+    if (error_.total <= settings_.target_error) from_links_ = FromLinks::kToConfirm;
     while (from_links_ == FromLinks::kToConfirm && !(gather_ && gather_->isBehind())) (void)confirm();
   });
 }

@@ -193,12 +193,12 @@ TEST(LeafGather, MoreRaysGoWhereTheyLowerNoiseMost) {
     while (!gather.advance(0.001)) continue;
   };
   solve();
-  const double before = gather.noise();
+  const double before = gather.rayNoise();
   const auto rays_before = gather.rays();
   ASSERT_TRUE(gather.refine(0.5 * before, HUGE_VAL));
   const auto rays = gather.rays();
   solve();
-  EXPECT_LT(gather.noise(), 0.75 * before);
+  EXPECT_LT(gather.rayNoise(), 0.75 * before);
   EXPECT_LT(rays, 2U * rays_before) << "not all of them twice";
   const auto counts = gather.sights().counts();
   EXPECT_LT(*std::ranges::min_element(counts), *std::ranges::max_element(counts));

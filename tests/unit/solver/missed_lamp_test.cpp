@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <tuple>
 
 #include "server/solver/linked_solver.h"
 #include "tests/unit/solver/quad_scene.h"
@@ -110,6 +111,25 @@ TEST(MissedLamp, InASceneThatOneCanSeeThroughAllItsLightArrives) {
       // Nothing leaves, and half of what arrives is kept: 1 / (1 - 1/2).
       EXPECT_NEAR(solve.received(), 2.0, 2.0 * kTarget) << width << ", seed " << seed;
     }
+  }
+}
+
+// In a bright room all bounces of what is missed are missing, too; and once there are no more rays to be had samples of
+// the ceiling find it no better.
+TEST(MissedLamp, ThatIsASheetInABrightRoomIsNoSolveThatIsDone) {
+  for (const auto& [reflectance, ratio, target] :
+       {std::tuple{0.97F, 3.5F, 0.12}, {0.9F, 4.0F, 0.3}, {0.85F, 3.5F, 0.1}}) {
+    const float width = 0.002F;
+    LampRoom room(width, ratio / (width * width), 1.0F);
+    for (std::size_t face = 0; face < 6; ++face) room.quads[face].reflectance = glm::vec3(reflectance);
+    room.addPane();
+    const double all = (1.0 + static_cast<double>(ratio)) / (1.0 - static_cast<double>(reflectance));
+    const Solve solve(room.make(true), 1, target);
+    const double truth = std::abs(solve.received() / all - 1.0);
+    // The lamp's own two leaves and the pane, of reflectance 0.5, take up to a tenth of it.
+    EXPECT_LT(truth, 1.5 * solve.solver->error().total + 0.1) << reflectance;
+    EXPECT_LT(solve.solver->rounds(), 40U) << reflectance;
+    EXPECT_NE(solve.solver->limit(), SolveLimit::kLinkMemory) << "a GiB is not used up";
   }
 }
 

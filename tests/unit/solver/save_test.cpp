@@ -147,5 +147,45 @@ TYPED_TEST(Saved, NeverTakesMoreThanItMay) {
   EXPECT_LE(to.bytes().size(), 1000U);
 }
 
+// The renderer of this test knows no pixels, but those of the real one depend on how far the solve has come.
+TEST(SavedLinks, GoOnWithTheSamePixels) {
+  const auto made = makeQuadScene(cubeQuads(6, {0, 4, 0, 0, 0, 0}, {0.5F, 0.5F, 0.6F, 0.5F, 0.5F, 0.5F}));
+  RayTransport rays(64);
+  ASSERT_TRUE(rays.setScene(made.patches));
+  SolverSettings settings;
+  settings.target_error = 2e-3;
+  settings.reflected = SolverSettings::Reflected::kByLinks;
+  LinkedSolver whole(made.patches, made.materials, rays, settings);
+  std::unique_ptr<LinkedSolver> next;
+  for (int i = 0; i < 100'000 && !next; ++i) {
+    const auto outcome = whole.step();
+    ASSERT_TRUE(outcome);
+    if (*outcome != StepOutcome::kRoundDone || whole.error().total > 0.01) continue;
+    ArchiveWriter to(kRoom);
+    if (!whole.save(to)) continue;
+    next = std::make_unique<LinkedSolver>(made.patches, made.materials, rays, settings);
+    ArchiveReader from(to.bytes());
+    ASSERT_TRUE(next->restore(from));
+  }
+  ASSERT_TRUE(next);
+  for (auto* solver : {&whole, next.get()}) {
+    for (int i = 0; i < 100'000; ++i) {
+      const auto outcome = solver->step();
+      ASSERT_TRUE(outcome);
+      if (*outcome == StepOutcome::kConverged || *outcome == StepOutcome::kExhausted) break;
+    }
+  }
+  const auto &a = whole.system().shooters(), &b = next->system().shooters();
+  ASSERT_EQ(a.size(), b.size());
+  std::uint32_t least = ~0U, most = 0;
+  for (std::size_t n = 0; n < a.size(); ++n) {
+    EXPECT_EQ(a[n].resolution, b[n].resolution) << n;
+    if (a[n].isLight()) continue;
+    least = std::min(least, a[n].resolution);
+    most = std::max(most, a[n].resolution);
+  }
+  EXPECT_LT(least, most) << "they are to differ on the way";
+}
+
 }  // namespace
 }  // namespace radiosity::solver
