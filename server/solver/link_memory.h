@@ -19,6 +19,9 @@ class LinkMemory {
   /// `bytes`: SolverSettings::link_memory.
   LinkMemory(const scene::PatchScene& patches, const std::vector<Side>& sides, std::size_t bytes);
 
+  /// So much of it is for links: rays have the rest. Before the first plan.
+  void limit(std::size_t bytes) { bytes_ = bytes; }
+
   /// Bytes that a column of links can come to take: two for each leaf of the sides that can be seen from there. Those
   /// of a planar side are in front of it; a curved one may see all. Cost: O(sides), for a side only the first time.
   [[nodiscard]] std::size_t mostBytes(std::uint32_t side);

@@ -41,6 +41,9 @@ bool LinkedSolver::raysPay() const {
          patches_->triangles.size() >= kFewestTriangles;
 }
 
+/// Rays may take half of the memory, so links get the other.
+void LinkedSolver::limitLinks() { memory_.limit(by_rays_ ? settings_.link_memory / 2 : settings_.link_memory); }
+
 double LinkedSolver::shotCost() const {
   return kShotLeaf * static_cast<double>(system_.emission().size()) +
          kShotTriangle * std::sqrt(static_cast<double>(patches_->triangles.size()));

@@ -49,6 +49,7 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
   replayed_ = former.replayed_;
   share_part_ = former.share_part_;
   by_rays_ = former.by_rays_ && mayGather(expander_.values().size(), settings_);
+  limitLinks();
   aim_ = std::max(former.aim_, settings_.target_error);
   planner_.setTarget(aim_);
   planner_.inherit(former.planner_, numbers.side_after);

@@ -70,6 +70,7 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
   takeSources(sources);
   share_part_ = 1.0 / settings_.planner.first_shooters;
   by_rays_ = raysPay();
+  limitLinks();
   for (auto& half : half_) half.assign(system_.emission().size(), glm::vec3(0.0F));
   findUnshot();
 }

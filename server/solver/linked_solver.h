@@ -199,6 +199,7 @@ class LinkedSolver final : public Solver {
   /// Rays have brought light, and nothing is left to shoot.
   [[nodiscard]] bool gathers() const { return gather_ && gather_->hasGathered(); }
   [[nodiscard]] bool raysPay() const;
+  void limitLinks();
   [[nodiscard]] double shotCost() const;
   [[nodiscard]] double rayCost() const;
   [[nodiscard]] double samplesCost() const;
