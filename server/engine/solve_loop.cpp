@@ -28,6 +28,8 @@ std::string limitText(solver::SolveLimit limit, std::uint64_t link_memory_bytes)
                          static_cast<double>(link_memory_bytes) / kMebi);
     case solver::SolveLimit::kPatches:
       return "every patch shoots for itself and no sample lowers the error any more; more texels would";
+    case solver::SolveLimit::kRays:
+      return "texels cast as many rays as they may; more texels would lower the error";
     case solver::SolveLimit::kWithin:
       return "light varies within texels of which others see only a part; more texels would lower the error";
     case solver::SolveLimit::kRounds:

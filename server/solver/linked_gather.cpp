@@ -177,7 +177,7 @@ StepOutcome LinkedSolver::chooseRays() {
   }
   const double goal_of_rays = part * room / std::max(rays, 1e-300) * gather_->rayNoise();
   const bool refined = rays > part * room && gather_->refine(goal_of_rays, blotch());
-  const auto end = gather_->lacksMemory() ? SolveLimit::kLinkMemory : SolveLimit::kPatches;
+  const auto end = gather_->lacksMemory() ? SolveLimit::kLinkMemory : SolveLimit::kRays;
   if (!refined && rays > part * room) {  // no more to be had: links get what they leave, or as good as they are
     const double goal = std::max(room - rays, rays);
     // What halves of the rays differ by may be taken for the links', but no sample makes it less.

@@ -54,6 +54,7 @@ enum class SolveLimit {
   kRounds,      ///< as many rounds as sums have room for
   kPatches,     ///< every node is split to its leaves, or no sample can lower the error any more
   kWithin,      ///< light that varies within leaves
+  kRays,        ///< every leaf has as many rays as it may have
 };
 
 /// What is remembered, and what for, for reports.
