@@ -301,7 +301,6 @@ StepOutcome LinkedSolver::chooseNext() {
   return confirm();
 }
 
-/// A solve that is done depends on its links alone, not on the way to them.
 /// False: the target itself is aimed at already.
 bool LinkedSolver::aimFurther() {
   if (aim_ <= settings_.target_error) return false;
@@ -313,6 +312,7 @@ bool LinkedSolver::aimFurther() {
   return true;
 }
 
+/// A solve that is done depends on its links and rays alone, not on the way to them.
 StepOutcome LinkedSolver::confirm() {
   if (!settleFromLinks()) return StepOutcome::kSlice;
   from_links_ = FromLinks::kNo;

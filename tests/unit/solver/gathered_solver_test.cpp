@@ -36,16 +36,7 @@ struct Solve {
     return std::make_unique<LinkedSolver>(made.patches, made.materials, rays, settings);
   }
   /// Until it has ended, one way or the other.
-  StepOutcome run() {
-    for (int i = 0; i < 100'000; ++i) {
-      const auto outcome = solver->step();
-      EXPECT_TRUE(outcome) << outcome.error().text();
-      if (!outcome || *outcome == StepOutcome::kConverged || *outcome == StepOutcome::kExhausted)
-        return outcome ? *outcome : StepOutcome::kExhausted;
-    }
-    ADD_FAILURE() << "no end";
-    return StepOutcome::kSlice;
-  }
+  StepOutcome run() { return test::runToEnd(*solver); }
   [[nodiscard]] float darkest() const {
     float least = HUGE_VALF;
     for (const auto& light : solver->irradiance()) least = std::min({least, light.x, light.y, light.z});

@@ -73,6 +73,11 @@ class Gathered {
 std::array<float, 6> all(float value) { return {value, value, value, value, value, value}; }
 
 // Whatever rays see is as bright: their number does not matter.
+void bring(const LeftLight& light, LeafGather& gather) {
+  gather.begin(light);
+  while (!gather.advance(0.001)) continue;
+}
+
 TEST(LeafGather, AFurnaceIsExactWithFewRays) {
   for (const float reflectance : {0.5F, 0.99F, 0.999F}) {
     Gathered furnace(4, all(1.0F), all(reflectance));
@@ -188,16 +193,12 @@ TEST(LeafGather, MoreRaysGoWhereTheyLowerNoiseMost) {
   LeafGather gather(*scene.patches, sides, 1, kPlenty);
   gather.start();
   const auto light = shining(scene, sides);
-  const auto solve = [&] {
-    gather.begin(light);
-    while (!gather.advance(0.001)) continue;
-  };
-  solve();
+  bring(light, gather);
   const double before = gather.rayNoise();
   const auto rays_before = gather.rays();
   ASSERT_TRUE(gather.refine(0.5 * before, HUGE_VAL));
   const auto rays = gather.rays();
-  solve();
+  bring(light, gather);
   EXPECT_LT(gather.rayNoise(), 0.75 * before);
   EXPECT_LT(rays, 2U * rays_before) << "not all of them twice";
   const auto counts = gather.sights().counts();
@@ -213,19 +214,15 @@ TEST(LeafGather, MoreRaysGoToWhatIsDarkAndNoisy) {
   LeafGather gather(*scene.patches, sides, 1, kPlenty);
   gather.start();
   const auto light = shining(scene, sides);
-  const auto solve = [&] {
-    gather.begin(light);
-    while (!gather.advance(0.001)) continue;
-  };
-  solve();
+  bring(light, gather);
   EXPECT_FALSE(gather.refine(HUGE_VAL, HUGE_VAL)) << "nobody asks for any";
   const auto noise = gather.noise();
   ASSERT_TRUE(gather.refine(HUGE_VAL, 0.1));
-  solve();
+  bring(light, gather);
   const auto counts = gather.sights().counts();
   EXPECT_LT(*std::ranges::min_element(counts), *std::ranges::max_element(counts));
   EXPECT_LT(gather.noise(), noise);
-  for (int i = 0; i < 8 && gather.refine(HUGE_VAL, 0.1); ++i) solve();
+  for (int i = 0; i < 8 && gather.refine(HUGE_VAL, 0.1); ++i) bring(light, gather);
   EXPECT_FALSE(gather.refine(HUGE_VAL, 0.1)) << "it comes to an end";
 }
 
@@ -243,8 +240,7 @@ TEST(LeafGather, NeverTakesMoreThanItMay) {
   light.shot = light.irradiance;
   int rounds = 0;
   do {
-    gather.begin(light);
-    while (!gather.advance(0.001)) continue;
+    bring(light, gather);
     ++rounds;
   } while (gather.refine(0.0, HUGE_VAL));
   EXPECT_GT(rounds, 2);

@@ -7,6 +7,7 @@
 
 #include "server/solver/linked_solver.h"
 #include "tests/unit/solver/quad_scene.h"
+#include "tests/unit/solver/solve.h"
 
 namespace radiosity::solver {
 namespace {
@@ -60,16 +61,7 @@ struct Solve {
     solver = std::make_unique<LinkedSolver>(made.patches, made.materials, rays, settings);
     outcome = run();
   }
-  StepOutcome run() {
-    for (int i = 0; i < 100'000; ++i) {
-      const auto step = solver->step();
-      EXPECT_TRUE(step) << step.error().text();
-      if (!step || *step == StepOutcome::kConverged || *step == StepOutcome::kExhausted)
-        return step ? *step : StepOutcome::kExhausted;
-    }
-    ADD_FAILURE() << "no end";
-    return StepOutcome::kSlice;
-  }
+  StepOutcome run() { return test::runToEnd(*solver); }
   /// One channel, of all leaves.
   [[nodiscard]] double received() const {
     double flux = 0.0;

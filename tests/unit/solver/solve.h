@@ -7,6 +7,19 @@
 
 namespace radiosity::test {
 
+/// Steps until the solver has ended, one way or the other.
+inline solver::StepOutcome runToEnd(solver::Solver& solver) {
+  using solver::StepOutcome;
+  for (int i = 0; i < 100'000; ++i) {
+    const auto outcome = solver.step();
+    EXPECT_TRUE(outcome) << outcome.error().text();
+    if (!outcome) return StepOutcome::kExhausted;
+    if (*outcome == StepOutcome::kConverged || *outcome == StepOutcome::kExhausted) return *outcome;
+  }
+  ADD_FAILURE() << "no end";
+  return StepOutcome::kSlice;
+}
+
 /// Steps until the solver says that it has converged.
 inline void solve(solver::Solver& solver) {
   for (int i = 0; i < 100000; ++i) {
