@@ -3,17 +3,16 @@
 namespace radiosity::solver {
 namespace {
 
-std::uint32_t reverseBits(std::uint32_t x) {
+constexpr std::uint32_t reverseBits(std::uint32_t x) {
   x = ((x >> 1) & 0x55555555U) | ((x & 0x55555555U) << 1);
   x = ((x >> 2) & 0x33333333U) | ((x & 0x33333333U) << 2);
   x = ((x >> 4) & 0x0F0F0F0FU) | ((x & 0x0F0F0F0FU) << 4);
-  x = ((x >> 8) & 0x00FF00FFU) | ((x & 0x00FF00FFU) << 8);
-  return (x >> 16) | (x << 16);
+  return __builtin_bswap32(x);
 }
 
-/// Laine-Karras style permutation with Vegdahl's constants; acts on reversed bits, so that it is an Owen scramble.
-std::uint32_t owenScramble(std::uint32_t x, std::uint32_t seed) {
-  x = reverseBits(x);
+/// Laine-Karras style permutation with Vegdahl's constants. It acts on reversed bits, so that it is an Owen scramble;
+/// what comes out is not reversed any more.
+std::uint32_t owenScrambleReversed(std::uint32_t x, std::uint32_t seed) {
   x ^= x * 0x3d20adeaU;
   x += seed;
   x *= (seed >> 16) | 1U;
@@ -44,8 +43,8 @@ constexpr Directions makeDirections(std::uint32_t degree, std::uint32_t polynomi
 constexpr std::array<Directions, 3> kDirections = {makeDirections(1, 0, {1, 0, 0}), makeDirections(2, 1, {1, 3, 0}),
                                                    makeDirections(3, 1, {1, 3, 1})};
 
-/// By byte of the index, and its value: what its bits contribute. A shuffled index has 32 bits, of which any may be
-/// set.
+/// By byte of the index, and its value: what its bits contribute, reversed. A shuffled index has 32 bits, of which any
+/// may be set.
 using ByteTables = std::array<std::array<std::uint32_t, 256>, 4>;
 
 constexpr ByteTables makeTables(const Directions& directions) {
@@ -53,7 +52,7 @@ constexpr ByteTables makeTables(const Directions& directions) {
   for (std::uint32_t byte = 0; byte < 4; ++byte) {
     for (std::uint32_t value = 0; value < 256; ++value) {
       for (std::uint32_t bit = 0; bit < 8; ++bit) {
-        if ((value >> bit) & 1U) tables[byte][value] ^= directions[8 * byte + bit];
+        if ((value >> bit) & 1U) tables[byte][value] ^= reverseBits(directions[8 * byte + bit]);
       }
     }
   }
@@ -63,8 +62,9 @@ constexpr ByteTables makeTables(const Directions& directions) {
 constexpr std::array<ByteTables, 3> kTables = {makeTables(kDirections[0]), makeTables(kDirections[1]),
                                                makeTables(kDirections[2])};
 
-std::uint32_t sobolBits(std::uint32_t index, std::uint32_t dimension) {
-  if (dimension == 0) return reverseBits(index);
+/// Dimension 0 is the index itself, reversed.
+std::uint32_t reversedSobolBits(std::uint32_t index, std::uint32_t dimension) {
+  if (dimension == 0) return index;
   const auto& table = kTables[dimension - 1];
   return table[0][index & 255U] ^ table[1][(index >> 8U) & 255U] ^ table[2][(index >> 16U) & 255U] ^
          table[3][index >> 24U];
@@ -84,10 +84,10 @@ Sobol4::Sobol4(std::uint64_t key) : shuffle_(static_cast<std::uint32_t>(mixKeys(
 }
 
 glm::dvec4 Sobol4::operator()(std::uint32_t index) const {
-  const std::uint32_t shuffled = owenScramble(index, shuffle_);
+  const std::uint32_t shuffled = owenScrambleReversed(reverseBits(index), shuffle_);
   glm::dvec4 point;
   for (std::uint32_t d = 0; d < 4; ++d)
-    point[static_cast<int>(d)] = owenScramble(sobolBits(shuffled, d), scramble_[d]) * 0x1p-32;
+    point[static_cast<int>(d)] = owenScrambleReversed(reversedSobolBits(shuffled, d), scramble_[d]) * 0x1p-32;
   return point;
 }
 
