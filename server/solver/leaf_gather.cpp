@@ -64,10 +64,16 @@ void LeafGather::inherit(const LeafGather& former, std::span<const std::uint32_t
   sights_.inherit(former.sights_, value_before, change, static_cast<std::uint16_t>(most));
 }
 
-void LeafGather::start() {
+void LeafGather::start(const std::vector<bool>& has_other) {
   const auto counts = sights_.counts();
   if (std::ranges::any_of(counts, [](std::uint16_t count) { return count > 0; })) return;
-  sights_.ask(std::vector<std::uint16_t>(sights_.leafCount(), kFirstRays));
+  std::vector<std::uint16_t> asked(sights_.leafCount(), kFirstRays);
+  const std::size_t most = leastBytes(asked.size()) + asked.size() * kFirstRays * LeafSights::kRayBytes;
+  for (std::size_t s = 0; s < has_other.size() && most <= most_bytes_; ++s) {
+    if (!has_other[s] && isWide(sides_[s]))
+      std::fill_n(asked.begin() + sides_[s].first_value, sides_[s].leaf_count, std::uint16_t{2 * kFirstRays});
+  }
+  sights_.ask(asked);
 }
 
 void LeafGather::begin(LeftLight light) {

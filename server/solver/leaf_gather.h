@@ -18,6 +18,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <span>
@@ -50,8 +51,11 @@ class LeafGather {
   void inherit(const LeafGather& former, std::span<const std::uint32_t> value_before, const Shadows& change);
   /// Light was brought, once at least.
   [[nodiscard]] bool hasGathered() const { return has_gathered_; }
-  /// All leaves get as many as a solve begins with, where there are none.
-  void start();
+  /// All leaves get as many as a solve begins with, where there are none; twice as many on wide sides whose light
+  /// comes by rays alone, so that nothing hides their noise. `has_other`: by side, whether there is other light.
+  void start(const std::vector<bool>& has_other = {});
+  /// Of so many leaves that noise shows as blotches which on fewer would be a shade.
+  [[nodiscard]] static bool isWide(const Side& side) { return side.leaf_count >= kWide; }
 
   /// Brings rays and light up to date, in slices: until advance() is true. The result depends on rays and `light`
   /// alone. Throws std::bad_alloc.
@@ -81,10 +85,14 @@ class LeafGather {
   [[nodiscard]] const std::array<double, 3>& escapedFlux() const { return escaped_; }
   [[nodiscard]] const std::array<double, 3>& absorbedFlux() const { return absorbed_; }
 
-  /// Asks for more rays: where the noise is more than this part of the light there is, so that nobody sees it as
-  /// blotches in what is dark, and where they lower rayNoise() most for their number, until it is likely to be
-  /// `goal`. A leaf gets at most four times as many. False: that is so, or there can be no more.
-  [[nodiscard]] bool refine(double goal, double most_beside_light);
+  /// Noise, as parts of the light where it is, that is borne, and that what is not is brought to.
+  struct BesideLight {
+    double borne = HUGE_VAL, goal = HUGE_VAL;
+  };
+  /// Asks for more rays: where the noise beside the light is not borne, so that nobody sees it as blotches in what is
+  /// dark, and where they lower rayNoise() most for their number, until it is likely to be `goal`. A leaf gets at most
+  /// four times as many. False: that is so, or there can be no more.
+  [[nodiscard]] bool refine(double goal, const BesideLight& beside);
   /// Whether the last refine() would have asked for more, had there been room for them.
   [[nodiscard]] bool lacksMemory() const { return lacks_memory_; }
   /// Part of noise() that is left when there are so many times as many rays.
@@ -102,6 +110,7 @@ class LeafGather {
   /// What is known of the noise of so many leaves in a row is known of each: single ones are too uncertain to choose
   /// by.
   static constexpr std::uint32_t kBlock = 64;
+  static constexpr std::uint32_t kWide = 150;
   /// Four, so that a leaf's are one vector; the last is 0.
   using Light = LeafSmoother::Light;
   struct Half {
@@ -136,7 +145,7 @@ class LeafGather {
   };
   [[nodiscard]] std::vector<BlockRays> blockRays() const;
   [[nodiscard]] bool mayDouble(const BlockRays& block, std::size_t bytes);
-  void refineBlotches(double most, std::vector<BlockRays>& blocks, std::size_t& bytes);
+  void refineBlotches(const BesideLight& beside, std::vector<BlockRays>& blocks, std::size_t& bytes);
   void finish();
 
   LeafSights sights_;

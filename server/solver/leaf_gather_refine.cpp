@@ -17,6 +17,8 @@ constexpr double kFall = 1.3;
 /// Noise beside light of less than this part of what is usual is black; and so many rays of a half are enough anywhere.
 constexpr double kBlack = 0.02;
 constexpr std::uint32_t kMostForBlotches = 256;
+/// What is borne on wide sides, of what is elsewhere.
+constexpr double kOnWide = 0.3;
 
 }  // namespace
 
@@ -52,7 +54,7 @@ bool LeafGather::mayDouble(const BlockRays& block, std::size_t bytes) {
 
 /// Half a difference of smoothed light says little of few leaves, whose noise goes together: a block is as noisy as it
 /// is itself, or as its side is.
-void LeafGather::refineBlotches(double most, std::vector<BlockRays>& blocks, std::size_t& bytes) {
+void LeafGather::refineBlotches(const BesideLight& beside, std::vector<BlockRays>& blocks, std::size_t& bytes) {
   const double light = std::reduce(side_light_.begin(), side_light_.end());
   const double all = std::reduce(area_.begin(), area_.end());
   const double black = all > 0.0 ? kBlack * kBlack * light / all : 0.0;
@@ -60,24 +62,26 @@ void LeafGather::refineBlotches(double most, std::vector<BlockRays>& blocks, std
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
     const auto first = area_.begin() + sides_[s].first_value;
     const double side = side_light_[s] + black * std::reduce(first, first + sides_[s].leaf_count);
+    const double noise = side_noise_[s] / side / (isWide(sides_[s]) ? kOnWide * kOnWide : 1.0);
     for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
       area[v / kBlock] += area_[v];
-      if (area_[v] > 0.0) noisy[v / kBlock] = std::max(noisy[v / kBlock], side_noise_[s] / side);
+      if (area_[v] > 0.0) noisy[v / kBlock] = std::max(noisy[v / kBlock], noise);
     }
   }
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     if (area[b] <= 0.0) continue;
     noisy[b] = std::max(noisy[b], block_noise_[b] / (block_light_[b] + black * area[b]));
     auto& block = blocks[b];
-    while (noisy[b] * noiseLeft(block.times) > most * most && 2 * block.times * block.most <= kMostForBlotches &&
-           mayDouble(block, bytes)) {
+    if (noisy[b] <= beside.borne * beside.borne) continue;
+    while (noisy[b] * noiseLeft(block.times) > beside.goal * beside.goal &&
+           2 * block.times * block.most <= kMostForBlotches && mayDouble(block, bytes)) {
       bytes += std::size_t{block.times} * block.rays * LeafSights::kRayBytes;
       block.times *= 2;
     }
   }
 }
 
-bool LeafGather::refine(double goal, double most_beside_light) {
+bool LeafGather::refine(double goal, const BesideLight& beside) {
   struct Gain {
     double gain;  ///< of noise() for each ray of its next doubling
     std::uint32_t block;
@@ -86,7 +90,7 @@ bool LeafGather::refine(double goal, double most_beside_light) {
   auto blocks = blockRays();
   lacks_memory_ = false;
   std::size_t bytes = leastBytes(sights_.leafCount()) + sights_.bytes();
-  refineBlotches(most_beside_light, blocks, bytes);
+  refineBlotches(beside, blocks, bytes);
   double noise = rayNoise();
   std::priority_queue<Gain> queue;
   const auto push = [&](std::uint32_t b) {

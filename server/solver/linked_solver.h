@@ -209,6 +209,7 @@ class LinkedSolver final : public Solver {
   };
   [[nodiscard]] Noise noise() const;
   [[nodiscard]] LeftLight leftLight() const;
+  [[nodiscard]] std::vector<bool> lightOverLinks() const;
   void startRays();
   void inheritRays(const LinkedSolver& former, const Renumbering& numbers);
   [[nodiscard]] StepOutcome chooseRays();

@@ -1,5 +1,6 @@
 #include "server/solver/leaf_gather.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -47,7 +48,7 @@ class Gathered {
   /// To `times` times as many rays in all, about.
   void refine(int rounds) {
     for (int i = 0; i < rounds; ++i) {
-      ASSERT_TRUE(gather.refine(0.0, HUGE_VAL));
+      ASSERT_TRUE(gather.refine(0.0, {}));
       solve();
     }
   }
@@ -196,7 +197,7 @@ TEST(LeafGather, MoreRaysGoWhereTheyLowerNoiseMost) {
   bring(light, gather);
   const double before = gather.rayNoise();
   const auto rays_before = gather.rays();
-  ASSERT_TRUE(gather.refine(0.5 * before, HUGE_VAL));
+  ASSERT_TRUE(gather.refine(0.5 * before, {}));
   const auto rays = gather.rays();
   bring(light, gather);
   EXPECT_LT(gather.rayNoise(), 0.75 * before);
@@ -215,15 +216,51 @@ TEST(LeafGather, MoreRaysGoToWhatIsDarkAndNoisy) {
   gather.start();
   const auto light = shining(scene, sides);
   bring(light, gather);
-  EXPECT_FALSE(gather.refine(HUGE_VAL, HUGE_VAL)) << "nobody asks for any";
+  EXPECT_FALSE(gather.refine(HUGE_VAL, {})) << "nobody asks for any";
   const auto noise = gather.noise();
-  ASSERT_TRUE(gather.refine(HUGE_VAL, 0.1));
+  ASSERT_TRUE(gather.refine(HUGE_VAL, {0.1, 0.1}));
   bring(light, gather);
   const auto counts = gather.sights().counts();
   EXPECT_LT(*std::ranges::min_element(counts), *std::ranges::max_element(counts));
   EXPECT_LT(gather.noise(), noise);
-  for (int i = 0; i < 8 && gather.refine(HUGE_VAL, 0.1); ++i) bring(light, gather);
-  EXPECT_FALSE(gather.refine(HUGE_VAL, 0.1)) << "it comes to an end";
+  for (int i = 0; i < 8 && gather.refine(HUGE_VAL, {0.1, 0.1}); ++i) bring(light, gather);
+  EXPECT_FALSE(gather.refine(HUGE_VAL, {0.1, 0.1})) << "it comes to an end";
+}
+
+TEST(LeafGather, WideSidesWithoutOtherLightBeginWithTwiceAsManyRays) {
+  auto quads = cubeQuads(16, {}, all(0.5F));
+  for (std::size_t small = 4; small < 6; ++small) quads[small].width = quads[small].height = 8;
+  const auto scene = makeQuadScene(quads);
+  const auto sides = makeSides(*scene.patches);
+  const std::vector<bool> has_other{true, false, true, false, true, false};
+  const auto raysOf = [&](std::size_t most_bytes) {
+    LeafGather gather(*scene.patches, sides, 1, most_bytes);
+    gather.start(has_other);
+    std::vector<std::uint32_t> rays;
+    for (const auto& side : sides) rays.push_back(gather.sights().counts()[side.first_value]);
+    return rays;
+  };
+  const auto rays = raysOf(kPlenty);
+  ASSERT_GT(rays[0], 0U);
+  EXPECT_THAT(rays, testing::ElementsAre(rays[0], 2 * rays[0], rays[0], 2 * rays[0], rays[0], rays[0]));
+  EXPECT_THAT(raysOf(LeafGather::leastBytes(4 * 256 + 2 * 64)), testing::Each(rays[0])) << "there is no room for more";
+}
+
+TEST(LeafGather, NoiseThatIsNotBorneIsBroughtBelowThatWhichIs) {
+  auto quads = cubeQuads(16, {0.0F, 4.0F, 0.0F, 0.0F, 0.0F, 0.0F}, all(0.3F));
+  const auto scene = makeQuadScene(quads);
+  const auto sides = makeSides(*scene.patches);
+  const auto raysOf = [&](const LeafGather::BesideLight& beside) {
+    LeafGather gather(*scene.patches, sides, 1, kPlenty);
+    gather.start();
+    bring(shining(scene, sides), gather);
+    return gather.refine(HUGE_VAL, beside) ? gather.rays() : 0;
+  };
+  double borne = 1.0;
+  while (raysOf({borne, borne}) == 0 && borne > 1e-6) borne *= 0.9;
+  ASSERT_GT(borne, 1e-6);
+  EXPECT_EQ(raysOf({borne / 0.9, 0.1 * borne}), 0U) << "what is borne gets no rays, whatever the goal";
+  EXPECT_GT(raysOf({borne, 0.1 * borne}), raysOf({borne, borne}));
 }
 
 TEST(LeafGather, NeverTakesMoreThanItMay) {
@@ -242,7 +279,7 @@ TEST(LeafGather, NeverTakesMoreThanItMay) {
   do {
     bring(light, gather);
     ++rounds;
-  } while (gather.refine(0.0, HUGE_VAL));
+  } while (gather.refine(0.0, {}));
   EXPECT_GT(rounds, 2);
   EXPECT_LE(gather.sights().bytes(), 384 * (40 * LeafSights::kRayBytes + sizeof(std::size_t) + 64));
 }
