@@ -94,6 +94,7 @@ class SolveLoop final : public Engine {
   [[nodiscard]] bool runCommands();
   void takeTurn();  ///< what is done between commands
   void solveSlice();
+  [[nodiscard]] Result<solver::StepOutcome> stepSolver();
   /// Solved and told; what was left for later since it matters little is done between commands.
   [[nodiscard]] bool isBehind() const;
   void catchUp();
@@ -115,6 +116,7 @@ class SolveLoop final : public Engine {
   [[nodiscard]] Clock::duration publishPause(Clock::duration took) const;
   /// Those who came while nothing changes are told what there is.
   void welcomeWatchers();
+  [[nodiscard]] bool lacksPages() const;
   void updateStatus(bool announce);
 
   [[nodiscard]] LoadBegun install(Result<scene::Document> document);
@@ -217,6 +219,7 @@ class SolveLoop final : public Engine {
   double seconds_ = 0.0;
   bool unpublished_ = false;
   std::uint64_t unwatched_ = 0;  // publications that nobody was there for
+  bool stepped_ = false;         // the solver, since the present version began
   Clock::time_point next_publish_{}, next_progress_{};
   bool renderer_lost_ = false;
   unsigned recoveries_ = 0;  // of this solve

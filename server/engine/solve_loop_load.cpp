@@ -163,7 +163,7 @@ Result<void> SolveLoop::makeWhole(const scene::EditedDocument& edited) {
 void SolveLoop::firstLightSlice() {
   if (*first_light_->made) return endFirstLight();
   if (!first_light_->goes_on) return;
-  const auto outcome = lit_->solver().step();
+  const auto outcome = stepSolver();
   if (queue_.closed()) return;
   tellLosses();
   first_light_->goes_on =
