@@ -191,10 +191,23 @@ it('tells which scene somebody else has loaded, and not of its own', async () =>
   const page = await pages.open(server.url, 900, 600);
   await converged(page);
   await putScene(server, darkRoom());
-  await said(page, /^\S+ loaded squares/);
+  await said(page, /^Ann loaded squares/);
   await page.evaluate((text) => window.viewer!.scene.loadFile(new File([text], 'mine.gltf')), squares([{ mesh: 0 }]));
   await said(page, /^mine\.gltf loaded/);
   await converged(page);
   const notes = await page.evaluate(() => window.notes!.filter((text) => / loaded /.test(`${text} `)));
   expect(notes.filter((text) => !text.startsWith('mine.gltf'))).toHaveLength(1);
+});
+
+it('tells who has loaded the first scene of a server, and of none that it began with', async () => {
+  const server = await serve(undefined);
+  const [sender, watcher] = [await pages.open(server.url, 900, 600), await pages.open(server.url, 900, 600)];
+  await watcher.waitForFunction(() => window.viewer?.connection.isOpen);
+  await sender.evaluate((text) => window.viewer!.scene.loadFile(new File([text], 'mine.gltf')), squares([{ mesh: 0 }]));
+  await said(watcher, /^viewer \w+ loaded mine\.gltf/);
+  await converged(sender);
+  expect(await sender.evaluate(() => window.notes!.filter((text) => /^viewer/.test(text)))).toEqual([]);
+  const late = await pages.open(server.url, 900, 600);
+  await converged(late);
+  expect(await late.evaluate(() => window.notes!.filter((text) => /loaded/.test(text)))).toEqual([]);
 });
