@@ -140,20 +140,35 @@ it('reads the light on flat pages', async () => {
       for (let x = -0.9; x < 0.9; x += 0.06) {
         const read = viewer.readAt(x, y);
         if (!read?.irradiance || read.irradiance[0] < 1) continue;
+        const { point } = read;
         const page = viewer.shown!.set.pages[read.page!]!;
         const [u, v] = read.texel!.map((t, i) => (t + 0.5) / [page.width, page.height][i]!);
         const [left, top] = [box.left + ((x + 1) / 2) * box.width, box.top + ((1 - y) / 2) * box.height];
-        return { left, top, read: read.irradiance, sample: page.sample(u!, v!) };
+        return { left, top, read: read.irradiance, sample: page.sample(u!, v!), point };
       }
     return undefined;
   });
   expect(at!.read).toEqual(at!.sample);
+  expect(at!.point).toBeDefined();
   await page.mouse.move(at!.left, at!.top);
   await page.keyboard.press('m');
   const meter = page.locator('.meter');
   await meter.getByText(/page 0, texel \d+, \d+/).waitFor();
   expect(await meter.innerText()).toMatch(/^[\d.,]+ ± [\d.,]+ lx/);
-  expect(await meter.innerText()).not.toContain(' m\n');
+  expect(await meter.innerText()).toMatch(/\n(floor|ceiling|back|left|right|short|tall|lamp|light)[^]* m$/i); // whose it is
+  // Between the charts nothing is lit, which is not the same as dark.
+  const gap = await page.evaluate(() => {
+    const { viewer } = window.viewer!;
+    const box = viewer.canvas.getBoundingClientRect();
+    for (let y = -0.99; y < 0.99; y += 0.01)
+      for (let x = -0.99; x < 0.99; x += 0.01)
+        if (viewer.readAt(x, y)?.isGap)
+          return { left: box.left + ((x + 1) / 2) * box.width, top: box.top + ((1 - y) / 2) * box.height };
+    return undefined;
+  });
+  await page.mouse.move(gap!.left, gap!.top);
+  await meter.getByText('no surface here').waitFor();
+  expect(await meter.innerText()).toMatch(/^no surface here\npage 0, texel \d+, \d+$/);
   // Beside the pages there is nothing to read.
   const box = (await page.locator('canvas.view').boundingBox())!;
   await page.mouse.move(box.x + 4, box.y + box.height / 2);

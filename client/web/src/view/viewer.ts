@@ -210,7 +210,7 @@ export class Viewer {
   }
 
   readAt(x: number, y: number): Reading | undefined {
-    if (this.mode?.flat) return this.pagesView.readAt(x, y);
+    if (this.mode?.flat) return this.shown && this.pagesView.readAt(this.shown, x, y);
     const hit = this.shown && pickSurface(this.shown, this.rig.camera, x, y);
     const { shownData } = this.layouts;
     const errors = shownData?.quantity === 'error' ? shownData.pages : undefined;
