@@ -271,7 +271,10 @@ export class Viewer {
     this.pace.turn(now);
     this.pace.ended(now, this.fences.poll(now));
     const taken = (this.set?.takeUp(tileMs) ?? 0) + (this.dataSet?.takeUp(tileMs) ?? 0);
-    if (taken > 0) this.invalidate();
+    if (taken > 0) {
+      this.invalidate();
+      this.pace.lightCame(now);
+    }
     this.promote(now);
     if (this.rig.update(seconds)) this.invalidate();
     if (this.people?.step(seconds, this.rig.sceneSize * PERSON_SIZE)) this.wanted = true;
