@@ -61,9 +61,7 @@ export class EditSession {
   onPatched(note: ScenePatchedNote, fetchAnew: () => void): void {
     if (!this.document.patched(note.revision, note.patch, note.by)) fetchAnew();
     if (note.by !== this.me)
-      this.app.frame.toasts.show(
-        `${note.by || 'Someone'} changed ${edits.describePatch(this.document.gltf, note.patch)}`,
-      );
+      this.app.frame.toasts.show(`${note.by || 'Someone'} ${edits.describePatch(this.document.gltf, note.patch)}`);
   }
 
   /** The objects are new; what was selected may still be there. */
