@@ -246,6 +246,27 @@ it('leaves the picture free of the legend where the panel leaves little of it', 
   }
 });
 
+it.each([360, 1000])(
+  'shows notes beside the legend on a page of %i pixels, with and without the panel',
+  async (width) => {
+    const page = await pages.open(server.url, width, 640);
+    await converged(page);
+    await page.evaluate(() => window.viewer!.view.setMode('radiosity'));
+    await page.locator('.legend').waitFor();
+    await page.evaluate(() =>
+      window.viewer!.frame.toasts.show('A note that is long enough to be as wide as it may be', 'bad'),
+    );
+    for (let i = 0; i < 2; ++i) {
+      await page.evaluate(() => window.viewer!.frame.togglePanel());
+      const [note, legend] = [
+        (await page.locator('.toast').boundingBox())!,
+        (await page.locator('.legend').boundingBox())!,
+      ];
+      expect(note.y + note.height, `${i}`).toBeLessThanOrEqual(legend.y);
+    }
+  },
+);
+
 it('pans and zooms the pages by keys', async () => {
   const page = await pages.open(server.url, 900, 600);
   await converged(page);
