@@ -290,7 +290,8 @@ export class App {
   private onProgress(progress: Progress): void {
     // A solve that goes on, or stops, without an edit: somebody may have changed its settings, which nobody is told of.
     const { state, revision } = this.progress ?? progress;
-    if (state !== progress.state && revision === progress.revision) void this.fetchStatus();
+    const goesOn = state !== 'solving' && progress.state === 'solving' && revision === progress.revision;
+    if (goesOn) void this.fetchStatus();
     this.progress = progress;
     this.solve.update(progress);
     if (!hasScene(progress)) this.scene.forget();
