@@ -6,6 +6,7 @@ import type { Placed } from './app_view';
 import { DocumentFetch } from './document/document_fetch';
 import type { Gltf } from './document/gltf';
 import { NOT_FOUND, type PastRevision, type SceneHistory } from './protocol/messages';
+import { shownName } from './protocol/page_name';
 import { ConnectionLost, RpcError } from './protocol/rpc';
 
 /** The scene that a server begins with, where nobody is known to have loaded it: nobody's work is replaced by it. */
@@ -15,7 +16,7 @@ const FIRST = 1;
 export function loadNote(revisions: readonly PastRevision[], revision: number): string | undefined {
   const load = revisions.find((past) => past.revision === revision && past.kind === 'load');
   if (!load || (!load.by && revision === FIRST)) return undefined;
-  return `${load.by || 'Someone'} loaded ${load.summary || 'another scene'}`;
+  return `${shownName(load.by ?? '') || 'Someone'} loaded ${load.summary || 'another scene'}`;
 }
 
 /** A file that is on its way, where one looked from before it, and whether the server was asked to load it. */

@@ -163,7 +163,7 @@ function session() {
   }[] = [];
   const refused: string[] = [];
   const document = new SceneDocument(
-    'me',
+    (by) => by === 'me',
     (patch, id) =>
       new Promise((answer, refuse) => {
         calls.push({ patch, id, answer, refuse });
