@@ -102,7 +102,7 @@ export class App {
     this.edit = new EditSession(this, name, (patch, id) => this.sendPatch(patch, id));
     this.people = new PeopleSession(this);
     const sharePanel = new SharePanel({
-      name: { person: name.person, placeholder: name.unnamed },
+      name: { person: name.person, unnamed: name.unnamed },
       setName: (person) => this.rename(person),
       sharing: this.people.sharing,
       setSharing: (on) => this.people.setSharing(on),

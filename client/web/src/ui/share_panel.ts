@@ -5,7 +5,7 @@ import { button, checkbox, field, h, section } from './dom';
 
 export interface SharePanelActions {
   /** What the user is called, and how the page is called where that is not said. */
-  name: { person: string; placeholder: string };
+  name: { person: string; unnamed: string };
   setName(person: string): void;
   /** What the box says at first. */
   sharing: boolean;
@@ -64,8 +64,14 @@ export class SharePanel {
   }
 
   private nameField({ name, setName }: SharePanelActions): HTMLElement {
-    const { person: value, placeholder } = name;
-    const input = h('input', { type: 'text', value, placeholder, maxLength: LONGEST_NAME, autocomplete: 'name' });
+    const title = `Shown with what you do; without one that is “${name.unnamed}”`;
+    const input = h('input', {
+      type: 'text',
+      value: name.person,
+      title,
+      maxLength: LONGEST_NAME,
+      autocomplete: 'name',
+    });
     input.onchange = () => setName(input.value);
     return input;
   }
