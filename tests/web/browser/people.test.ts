@@ -90,7 +90,10 @@ it('calls people what they call themselves, from then on and on their next visit
   const label = () => first.evaluate(() => window.viewer!.people.people.labels.textContent ?? '');
   expect(await label()).toMatch(/^viewer \w{4}$/);
   await second.getByRole('tab', { name: 'Share' }).click();
-  await second.getByLabel('Your name').fill('Ann Lee');
+  const [panel, field] = [second.locator('#tab-Share'), second.getByLabel('Your name')];
+  const [around, box] = [(await panel.boundingBox())!, (await field.boundingBox())!];
+  expect(box.x + box.width).toBeLessThan(around.x + around.width);
+  await field.fill('Ann Lee');
   await second.keyboard.press('Enter');
   expect(await until(label, (text) => text === 'Ann Lee')).toBe('Ann Lee');
   await second.evaluate(() =>
