@@ -240,13 +240,13 @@ class Engine {
 
   virtual ~Engine() = default;
 
-  /// `name` is for messages and file names ("room.glb"). `file` (a path) or `bytes`, not both.
-  virtual void loadBytes(std::string name, SharedBytes bytes, Callback<LoadOutcome> done) = 0;
-  virtual void loadFile(std::string path, Callback<LoadOutcome> done) = 0;
+  /// `name` is for messages and file names ("room.glb"); `by`: who, for the history, empty where nobody asked for it.
+  virtual void loadBytes(std::string name, SharedBytes bytes, std::string by, Callback<LoadOutcome> done) = 0;
+  virtual void loadFile(std::string path, std::string by, Callback<LoadOutcome> done) = 0;
   /// The scene to start with: goes on with the one that outlived the last process, edits included, if there is one,
   /// with a warning where that was not loaded from the very same file; unless it is to be taken anew.
   virtual void openFile(std::string path, bool /*anew*/, Callback<LoadOutcome> done) {
-    loadFile(std::move(path), std::move(done));
+    loadFile(std::move(path), {}, std::move(done));
   }
   virtual void patch(PatchRequest request, Callback<PatchOutcome> done) = 0;
   /// Takes the latest edit back that is not taken back, whoever made it, or makes it again. A new revision; kNotFound

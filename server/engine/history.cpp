@@ -61,9 +61,9 @@ void History::noteStep(const PastRevision& entry) {
   }
 }
 
-History::Next History::nextLoad(std::uint64_t revision, const std::string& name) {
+History::Next History::nextLoad(std::uint64_t revision, const std::string& by, const std::string& name) {
   Next next;
-  next.entry = {revision, PastRevision::Kind::kLoad, {}, shortened(name), now()};
+  next.entry = {revision, PastRevision::Kind::kLoad, by, shortened(name), now()};
   return next;
 }
 

@@ -33,7 +33,7 @@ class History {
     std::size_t done = 0;                  ///< of the edits; those behind are taken back
   };
   /// Another scene: nothing before it can come back.
-  [[nodiscard]] static Next nextLoad(std::uint64_t revision, const std::string& name);
+  [[nodiscard]] static Next nextLoad(std::uint64_t revision, const std::string& by, const std::string& name);
   /// An edit; what had been taken back can then no longer be made again.
   [[nodiscard]] Next nextEdit(std::uint64_t revision, const std::string& by, const nlohmann::json& patch,
                               const scene::Document& before, const scene::Document& after) const;
@@ -44,7 +44,9 @@ class History {
   void take(Next next);
 
   /// nextLoad() and take() in one.
-  void loaded(std::uint64_t revision, const std::string& name) { take(nextLoad(revision, name)); }
+  void loaded(std::uint64_t revision, const std::string& by, const std::string& name) {
+    take(nextLoad(revision, by, name));
+  }
   /// nextEdit() and take() in one.
   void edited(std::uint64_t revision, const std::string& by, const nlohmann::json& patch, const scene::Document& before,
               const scene::Document& after) {

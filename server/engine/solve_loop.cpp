@@ -143,7 +143,7 @@ void SolveLoop::solveSlice() {
   if (renderer_lost_ && !rendererIsBack()) return;
   if (lit_->isStale()) lit_->restart(settings_);
   const auto begin = Clock::now();
-  const auto outcome = lit_->solver().step();
+  const auto outcome = stepSolver();
   seconds_ += std::chrono::duration<double>(Clock::now() - begin).count();
   if (queue_.closed()) return;  // nobody is left to be told
   tellLosses();
@@ -180,13 +180,18 @@ void SolveLoop::solveSlice() {
   }
 }
 
+Result<solver::StepOutcome> SolveLoop::stepSolver() {
+  stepped_ = true;
+  return lit_->solver().step();
+}
+
 bool SolveLoop::isBehind() const {
   return state_ == SolveState::kConverged && lit_ && !lit_->isStale() && lit_->solver().isBehind();
 }
 
 /// Takes no solve time, and says nothing before it is done: what is shown is solved.
 void SolveLoop::catchUp() {
-  const auto outcome = lit_->solver().step();
+  const auto outcome = stepSolver();
   if (queue_.closed()) return;
   tellLosses();
   if (outcome && *outcome == solver::StepOutcome::kSlice) return;

@@ -46,8 +46,8 @@ class SolveLoop final : public Engine {
   /// Starts the thread and the transport; returns when both are up.
   [[nodiscard]] Result<void> start();
 
-  void loadBytes(std::string name, SharedBytes bytes, Callback<LoadOutcome> done) override;
-  void loadFile(std::string path, Callback<LoadOutcome> done) override;
+  void loadBytes(std::string name, SharedBytes bytes, std::string by, Callback<LoadOutcome> done) override;
+  void loadFile(std::string path, std::string by, Callback<LoadOutcome> done) override;
   void openFile(std::string path, bool anew, Callback<LoadOutcome> done) override;
   void patch(PatchRequest request, Callback<PatchOutcome> done) override;
   void step(StepRequest request, Callback<PatchOutcome> done) override;
@@ -94,6 +94,7 @@ class SolveLoop final : public Engine {
   [[nodiscard]] bool runCommands();
   void takeTurn();  ///< what is done between commands
   void solveSlice();
+  [[nodiscard]] Result<solver::StepOutcome> stepSolver();
   /// Solved and told; what was left for later since it matters little is done between commands.
   [[nodiscard]] bool isBehind() const;
   void catchUp();
@@ -115,23 +116,25 @@ class SolveLoop final : public Engine {
   [[nodiscard]] Clock::duration publishPause(Clock::duration took) const;
   /// Those who came while nothing changes are told what there is.
   void welcomeWatchers();
+  [[nodiscard]] bool lacksPages() const;
   void updateStatus(bool announce);
 
-  [[nodiscard]] LoadBegun install(Result<scene::Document> document);
+  [[nodiscard]] LoadBegun install(Result<scene::Document> document, const std::string& by);
   /// A load of many texels: what is shown while they are being made, and who waits for them.
   struct FirstLight {
     std::future<Result<std::unique_ptr<LitScene>>> whole;
     Callback<LoadOutcome> done;
+    std::string by;                           ///< who has loaded it
     std::shared_ptr<std::atomic<bool>> made;  ///< `whole` is there, but for the moment that its thread takes to end
     bool goes_on = true;                      ///< its solve
   };
   [[nodiscard]] bool wantsFirstLight(const scene::Scene& scene) const;
-  [[nodiscard]] Result<void> showFirstLight(const scene::EditedDocument& edited);
+  [[nodiscard]] Result<void> showFirstLight(const scene::EditedDocument& edited, const std::string& by);
   [[nodiscard]] Result<void> makeWhole(const scene::EditedDocument& edited);
   void firstLightSlice();
   /// Puts the whole scene in place of its first light; waits for it. Nothing to do where no first light is shown.
   void endFirstLight();
-  [[nodiscard]] Result<LoadOutcome> settleIn(Result<std::unique_ptr<LitScene>> made);
+  [[nodiscard]] Result<LoadOutcome> settleIn(Result<std::unique_ptr<LitScene>> made, const std::string& by);
   void unload(SolveState state);
   /// Called when nothing but the disk can fail any more: what is about to come is brought there.
   using Keep = std::function<Result<void>(const PatchOutcome&)>;
@@ -216,6 +219,7 @@ class SolveLoop final : public Engine {
   std::uint64_t revision_ = 0;
   double seconds_ = 0.0;
   bool unpublished_ = false;
+  bool stepped_ = false;         // the solver, since the present version began
   std::uint64_t unwatched_ = 0;  // publications that nobody was there for
   Clock::time_point next_publish_{}, next_progress_{};
   bool renderer_lost_ = false;

@@ -39,17 +39,18 @@ void SolveLoop::load(Callback<LoadOutcome> done, std::function<LoadBegun()> begi
   (*answer)(fail(ErrorCode::kBusy, "too many requests are waiting for the solver, try again"));
 }
 
-void SolveLoop::loadBytes(std::string name, SharedBytes bytes, Callback<LoadOutcome> done) {
-  load(std::move(done), [this, name = std::move(name), bytes = std::move(bytes)] {
-    return install(scene::parseDocument(name, *bytes));
+void SolveLoop::loadBytes(std::string name, SharedBytes bytes, std::string by, Callback<LoadOutcome> done) {
+  load(std::move(done), [this, name = std::move(name), bytes = std::move(bytes), by = std::move(by)] {
+    return install(scene::parseDocument(name, *bytes), by);
   });
 }
 
-void SolveLoop::loadFile(std::string path, Callback<LoadOutcome> done) {
-  load(std::move(done), [this, path = std::move(path)] { return install(scene::loadDocument(path)); });
+void SolveLoop::loadFile(std::string path, std::string by, Callback<LoadOutcome> done) {
+  load(std::move(done),
+       [this, path = std::move(path), by = std::move(by)] { return install(scene::loadDocument(path), by); });
 }
 
-auto SolveLoop::install(Result<scene::Document> document) -> LoadBegun {
+auto SolveLoop::install(Result<scene::Document> document, const std::string& by) -> LoadBegun {
   if (!document) return tl::unexpected<Error>(document.error());
   if (goesOnWith(*document, false)) return LoadOutcome{revision_, lit_->warnings()};
   const SolveState before = std::exchange(state_, SolveState::kLoading);
@@ -63,20 +64,20 @@ auto SolveLoop::install(Result<scene::Document> document) -> LoadBegun {
   if (!scene) return refuse(scene.error());
   scene::EditedDocument edited{std::move(*document), std::move(*scene)};
   if (wantsFirstLight(edited.scene)) {
-    if (withinMemory([&] { return showFirstLight(edited); })) return std::nullopt;
+    if (withinMemory([&] { return showFirstLight(edited, by); })) return std::nullopt;
     first_light_.reset();  // then all at once, or the reason why not
     lit_.reset();
   }
-  auto settled = settleIn(withinMemory([&] { return LitScene::make(std::move(edited), settings_, *transport_); }));
+  auto settled = settleIn(withinMemory([&] { return LitScene::make(std::move(edited), settings_, *transport_); }), by);
   if (!settled) return refuse(settled.error());
   return std::move(*settled);
 }
 
-Result<LoadOutcome> SolveLoop::settleIn(Result<std::unique_ptr<LitScene>> made) {
+Result<LoadOutcome> SolveLoop::settleIn(Result<std::unique_ptr<LitScene>> made, const std::string& by) {
   if (!made) return tl::unexpected<Error>(made.error());
   const bool announced = lit_ && first_light_;
   const auto revision = announced ? revision_ : revision_ + 1;
-  auto next = History::nextLoad(revision, (*made)->document().name);
+  auto next = History::nextLoad(revision, by, (*made)->document().name);
   const auto keep = [&](const LitScene& lit, const LitScene::Affected&) { return keepLoad(next, lit.document()); };
   history_.makeRoom();
   const auto relation = announced ? Relation::kSolvedAnew : Relation::kOther;
@@ -116,7 +117,7 @@ bool SolveLoop::wantsFirstLight(const scene::Scene& scene) const {
   return leaves > options_.first_light_above && leaves > options_.first_texels && leaves <= scene::kMaxLeaves;
 }
 
-Result<void> SolveLoop::showFirstLight(const scene::EditedDocument& edited) {
+Result<void> SolveLoop::showFirstLight(const scene::EditedDocument& edited, const std::string& by) {
   auto settings = settings_;
   settings.texels = options_.first_texels;
   settings.texel_size_m = 0.0;
@@ -124,6 +125,7 @@ Result<void> SolveLoop::showFirstLight(const scene::EditedDocument& edited) {
   auto shown = LitScene::make(edited, settings, *transport_);
   if (const auto lit = relight(std::move(shown), Relation::kOther); !lit) return tl::unexpected<Error>(lit.error());
   first_light_.emplace();
+  first_light_->by = by;
   first_light_->made = std::make_shared<std::atomic<bool>>(false);
   if (auto begun = makeWhole(edited); !begun) return begun;
   ++revision_;
@@ -163,7 +165,7 @@ Result<void> SolveLoop::makeWhole(const scene::EditedDocument& edited) {
 void SolveLoop::firstLightSlice() {
   if (*first_light_->made) return endFirstLight();
   if (!first_light_->goes_on) return;
-  const auto outcome = lit_->solver().step();
+  const auto outcome = stepSolver();
   if (queue_.closed()) return;
   tellLosses();
   first_light_->goes_on =
@@ -175,9 +177,10 @@ void SolveLoop::firstLightSlice() {
 void SolveLoop::endFirstLight() {
   if (!first_light_) return;
   const auto done = std::move(first_light_->done);
+  const auto by = std::move(first_light_->by);
   const auto outcome = withinMemory([&]() -> Result<LoadOutcome> {
     try {
-      return settleIn(first_light_->whole.get());
+      return settleIn(first_light_->whole.get(), by);
     } catch (const std::system_error& error) {
       return fail(ErrorCode::kUnavailable, std::string("no thread to load with: ") + error.what());
     }

@@ -32,11 +32,23 @@ void SolveLoop::publishLightmaps(bool final) {
     return;
   }
   const auto begin = threadTime();
-  if (unpublished_ || final) publisher_.startVersion();
+  if (unpublished_ || final || (stepped_ && lacksPages())) {
+    publisher_.startVersion();
+    stepped_ = false;
+  }
   unpublished_ = false;
   updateStatus(false);
   for (const auto quantity : kQuantities) publishQuantity(quantity);
   next_publish_ = Clock::now() + publishPause(threadTime() - begin);
+}
+
+/// Someone watches what the present version has no pages of: it was not asked for, or forgotten since. What was made of
+/// it before may still be held, by those who come back to it and encoded: of a later moment it must not be made again.
+bool SolveLoop::lacksPages() const {
+  return std::any_of(kQuantities.begin(), kQuantities.end(), [&](auto quantity) {
+    const auto& latest = publisher_.latest(quantity);
+    return watches_.wants(quantity) && !(latest && latest->tile_version == publisher_.version());
+  });
 }
 
 /// After pages that took so long: never longer than the solve is old, where that leaves it most of its time.

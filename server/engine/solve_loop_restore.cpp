@@ -195,7 +195,7 @@ bool SolveLoop::goesOnWith(const scene::Document& document, bool with_edits) con
 void SolveLoop::openFile(std::string path, bool anew, Callback<LoadOutcome> done) {
   load(std::move(done), [this, path = std::move(path), anew]() -> LoadBegun {
     auto document = scene::loadDocument(path);
-    if (!document || !as_restored_ || anew) return install(std::move(document));
+    if (!document || !as_restored_ || anew) return install(std::move(document), {});
     if (!goesOnWith(*document, true))
       log::warn(
           "{} is not what the kept scene came from: it has changed, or a client loaded another. The kept scene goes on "

@@ -147,7 +147,7 @@ void SolveLoop::keepSolve(std::chrono::milliseconds patience) {
       return (checkpoint_revision_ == revision_ && checkpoint_shots_ == lit_->solver().shots()) || takeCheckpoint();
     };
     while (lit_ && !isTaken() && state_ == SolveState::kSolving && Clock::now() < deadline) {
-      if (!lit_->solver().step()) break;
+      if (!stepSolver()) break;
     }
     state_ = SolveState::kPaused;  // what would be found from here on is lost
     taken->set_value();

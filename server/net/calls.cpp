@@ -190,7 +190,7 @@ void Calls::run(const protocol::SceneLoadCall& call, const Slot& slot) {
     const auto blob = hub_.findUpload(std::string_view(call.url).substr(kUpload.size()));
     if (!blob)
       return slot.error({RpcCode::kNotFound, "there is no such upload (any more); PUT it to /uploads", "/params/url"});
-    return hub_.engine().loadBytes(blob->name, blob->bytes, std::move(done));
+    return hub_.engine().loadBytes(blob->name, blob->bytes, client_, std::move(done));
   }
   if (!call.url.starts_with(kFile))
     return slot.error({RpcCode::kInvalidParams, "/params/url must be /uploads/<id> or file:<name>", "/params/url"});
@@ -198,7 +198,7 @@ void Calls::run(const protocol::SceneLoadCall& call, const Slot& slot) {
     return slot.error({RpcCode::kForbidden, "this server reads no files of its own (--scene-root)", "/params/url"});
   auto path = fileBelow(hub_.options().scene_root, std::string_view(call.url).substr(kFile.size()));
   if (!path) return slot.error({RpcCode::kNotFound, path.error().message, "/params/url"});
-  hub_.engine().loadFile(std::move(*path), std::move(done));
+  hub_.engine().loadFile(std::move(*path), client_, std::move(done));
 }
 
 void Calls::run(const protocol::ScenePatchCall& call, const Slot& slot) {

@@ -18,6 +18,7 @@ struct HttpRequest {
   std::string path;                          ///< "/scene.glb", percent-decoded
   std::map<std::string, std::string> query;  ///< percent-decoded
   std::string content_type, name;            ///< name: header X-Name, or ?name=
+  std::string client;                        ///< who: header X-Client, or ?client=, or else User-Agent
   std::string accept_encoding, if_none_match;
   Bytes body;
   std::string body_sha256;  ///< of one that is named by it (PUT /uploads): taken while it came

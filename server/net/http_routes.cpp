@@ -96,16 +96,18 @@ void getStatus(const std::shared_ptr<Hub>& hub, HttpRequest& /*request*/, const 
 void putScene(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond& done) {
   if (hub->draining()) return done(errorResponse({ErrorCode::kBusy, "the server is shutting down", {}}));
   auto bytes = std::make_shared<const Bytes>(std::move(request.body));
-  auto answer = [hub = hub.get(), name = request.name, done](const Result<engine::LoadOutcome>& outcome) {
+  auto answer = [hub = hub.get(), name = request.name, by = request.client,
+                 done](const Result<engine::LoadOutcome>& outcome) {
     if (!outcome) return done(errorResponse(outcome.error()));
     hub->sawRevision(outcome->revision);
     const LogScope about({.revision = outcome->revision});
-    log::info("scene {} uploaded", name);
+    log::info("scene {} loaded by {}", name, by);
     auto response = plain(200, protocol::encodeHttpLoad({outcome->revision, outcome->warnings}));
     response.content_type = "application/json";
     done(std::move(response));
   };
-  hub->engine().loadBytes(request.name, std::move(bytes), hub->fromEngine<engine::LoadOutcome>(std::move(answer)));
+  hub->engine().loadBytes(request.name, std::move(bytes), request.client,
+                          hub->fromEngine<engine::LoadOutcome>(std::move(answer)));
 }
 
 void putUpload(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond& done) {

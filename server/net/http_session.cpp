@@ -38,6 +38,8 @@ using Serializer = http::response_serializer<http::span_body<const char>>;
 
 std::string_view view(boost::core::string_view text) { return {text.data(), text.size()}; }
 
+std::string_view firstWord(std::string_view text) { return text.substr(0, text.find(' ')); }
+
 /// RFC 9110 section 5.6.7.
 std::string httpDate() {
   std::array<char, 64> text{};
@@ -113,6 +115,10 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   void cutWhenStalled();
 
   [[nodiscard]] std::string_view field(http::field name) const { return view(parser_->get()[name]); }
+  [[nodiscard]] std::string queryOr(const char* key, std::string_view otherwise) const {
+    const auto found = request_.query.find(key);
+    return found != request_.query.end() ? found->second : std::string(otherwise);
+  }
 
   Stream stream_;
   const Stream::executor_type executor_;  ///< for other threads: the stream goes elsewhere with an upgrade
@@ -174,9 +180,11 @@ void HttpSession::onHeader(BoostError error) {
   request_.content_type = field(http::field::content_type);
   request_.accept_encoding = field(http::field::accept_encoding);
   request_.if_none_match = field(http::field::if_none_match);
-  const auto named = request_.query.find("name");
-  request_.name = named != request_.query.end() ? named->second : std::string(view(message["X-Name"]));
+  request_.name = queryOr("name", view(message["X-Name"]));
   if (request_.name.empty()) request_.name = "upload";
+  request_.client = queryOr("client", view(message["X-Client"]));
+  if (request_.client.empty()) request_.client = firstWord(field(http::field::user_agent));
+  request_.client.resize(std::min(request_.client.size(), protocol::kMaxTextBytes));
   if (refuseEarly()) return;
   readBody();
 }
@@ -324,7 +332,7 @@ void HttpSession::prepare(bool close) {
     m.set(http::field::access_control_allow_origin, origin_);
     m.set(http::field::vary, "Origin");
     m.set(http::field::access_control_allow_methods, "GET, HEAD, PUT, OPTIONS");
-    m.set(http::field::access_control_allow_headers, "Authorization, Content-Type, X-Name");
+    m.set(http::field::access_control_allow_headers, "Authorization, Content-Type, X-Client, X-Name");
     m.set(http::field::access_control_expose_headers, "Location, Retry-After, X-Revision");
   }
   for (const auto& [name, value] : response_.headers) m.set(name, value);

@@ -193,7 +193,7 @@ class Bench {
     const auto glb = std::make_shared<const Bytes>(test_scenes::encodeGlb(sceneNamed(scene_)));
     watcher_->begin(++revision_);
     const auto loaded =
-        call<engine::LoadOutcome>([&](auto done) { engine_->loadBytes(scene_ + ".glb", glb, std::move(done)); });
+        call<engine::LoadOutcome>([&](auto done) { engine_->loadBytes(scene_ + ".glb", glb, {}, std::move(done)); });
     if (!loaded) return tl::unexpected(loaded.error());
     const auto full = finish("full solve");
     if (!full) return tl::unexpected(full.error());

@@ -225,16 +225,16 @@ void FakeEngine::loaded(std::string what, Callback<engine::LoadOutcome> done) {
   });
 }
 
-void FakeEngine::loadBytes(std::string name, SharedBytes bytes, Callback<engine::LoadOutcome> done) {
+void FakeEngine::loadBytes(std::string name, SharedBytes bytes, std::string by, Callback<engine::LoadOutcome> done) {
   if (bytes->size() >= 3 && std::equal(bytes->begin(), bytes->begin() + 3, "bad"))
     return answer([done, name] {
       done(fail(ErrorCode::kInvalidScene, "count is larger than the buffer view", name + ": /accessors/4/count"));
     });
-  loaded(fmt::format("{}: {} bytes", name, bytes->size()), std::move(done));
+  loaded(fmt::format("{}: {} bytes by {}", name, bytes->size(), by), std::move(done));
 }
 
-void FakeEngine::loadFile(std::string path, Callback<engine::LoadOutcome> done) {
-  loaded("file " + path, std::move(done));
+void FakeEngine::loadFile(std::string path, std::string by, Callback<engine::LoadOutcome> done) {
+  loaded("file " + path + " by " + by, std::move(done));
 }
 
 void FakeEngine::patch(engine::PatchRequest request, Callback<engine::PatchOutcome> done) {

@@ -42,11 +42,11 @@ class FakeEngine : public engine::Engine {
   std::atomic<double> busy_seconds{0.0};
   /// Once: `meanwhile` happens after status() was taken, and before whoever asked for it has it.
   void overtakeStatus(std::function<void()> meanwhile);
-  [[nodiscard]] std::string lastLoad() const;  ///< "name: 123 bytes" or "file PATH"
+  [[nodiscard]] std::string lastLoad() const;  ///< "name: 123 bytes by WHO" or "file PATH by WHO"
 
   // ---- engine::Engine ----
-  void loadBytes(std::string name, SharedBytes bytes, Callback<engine::LoadOutcome> done) override;
-  void loadFile(std::string path, Callback<engine::LoadOutcome> done) override;
+  void loadBytes(std::string name, SharedBytes bytes, std::string by, Callback<engine::LoadOutcome> done) override;
+  void loadFile(std::string path, std::string by, Callback<engine::LoadOutcome> done) override;
   void patch(engine::PatchRequest request, Callback<engine::PatchOutcome> done) override;
   void step(engine::StepRequest request, Callback<engine::PatchOutcome> done) override;
   void history(Callback<engine::HistoryReport> done) override;

@@ -39,7 +39,7 @@ int main(int argc, char** argv) {
     return exitCodeOf(server.error());
   }
   (*server)->drainOnSignals();
-  if (!parsed.options.scene.empty()) fake.loadFile(parsed.options.scene, [](const auto&) {});
+  if (!parsed.options.scene.empty()) fake.loadFile(parsed.options.scene, {}, [](const auto&) {});
   std::atomic<bool> stop{false};
   std::thread solver([&] {
     for (double error = 1.0; !stop; error *= 0.97) {

@@ -23,6 +23,7 @@ import {
   type Status,
   type SubscribeParams,
 } from './protocol/messages';
+import { PageName } from './protocol/page_name';
 import { ConnectionLost } from './protocol/rpc';
 import { TileFeed } from './tiles/tile_feed';
 import { Frame } from './ui/frame';
@@ -58,20 +59,23 @@ export class App {
   private readonly geometry = new GeometrySession(this);
   /** Up to where the light that is here is known to be all there was, to go on from. */
   resume: Resume | undefined;
+  private readonly name = new PageName(stored('name') ?? '');
   private token = addressedToken() ?? stored('token', 'session');
   private slow = false;
   private everOpen = false;
+  private isRenaming = false;
   private epoch = '';
   private awaited: (() => void)[] = [];
 
   constructor() {
-    // Nobody else has this name, so the page knows its own patches when it is told of them.
-    const me = `viewer ${Math.random().toString(36).slice(2, 6)}`;
+    const { name } = this;
     // First of all: while the server answers, the page builds itself. Nothing comes in before this is done.
     this.connection = new Connection(
       {
         url: `${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/ws`,
-        client: me,
+        get client() {
+          return name.client;
+        },
         token: () => this.token,
         resume: () => this.resume,
         subscription: () => this.subscription(),
@@ -95,9 +99,11 @@ export class App {
       notAccepted: (text, wanted) => this.notAccepted(text, wanted),
     });
     this.view = new ViewSession(this);
-    this.edit = new EditSession(this, me, (patch, id) => this.sendPatch(patch, id));
+    this.edit = new EditSession(this, name, (patch, id) => this.sendPatch(patch, id));
     this.people = new PeopleSession(this);
     const sharePanel = new SharePanel({
+      name: { person: name.person, unnamed: name.unnamed },
+      setName: (person) => this.rename(person),
       sharing: this.people.sharing,
       setSharing: (on) => this.people.setSharing(on),
       copyLink: () => void this.share.copyLink(),
@@ -220,8 +226,9 @@ export class App {
       this.state.forgetTrouble();
       this.progress = undefined; // that of a server which has started again is not that of its scene
       this.frame.setBanner(undefined);
-      if (this.everOpen) this.frame.toasts.show('Reconnected', 'good');
+      if (this.everOpen && !this.isRenaming) this.frame.toasts.show('Reconnected', 'good');
       this.everOpen = true;
+      this.isRenaming = false;
     } else if (state === 'waiting') {
       this.frame.setState('Not connected', 'bad');
       this.frame.setBanner(`No connection: ${detail}.`, 'Try now', () => this.connection.open());
@@ -231,6 +238,14 @@ export class App {
     } else if (!this.everOpen) {
       this.frame?.setState('Connecting', 'busy');
     }
+  }
+
+  /** A session keeps its name: there is a new one, which goes on where this one is. */
+  private rename(person: string): void {
+    this.name.person = person;
+    store('name', this.name.person);
+    this.isRenaming = this.connection.isOpen;
+    this.connection.renew();
   }
 
   private giveToken(token: string): void {
@@ -288,6 +303,10 @@ export class App {
   }
 
   private onProgress(progress: Progress): void {
+    // A solve that goes on without an edit: somebody may have changed its settings, which nobody is told of.
+    const { state, revision } = this.progress ?? progress;
+    const goesOn = state !== 'solving' && progress.state === 'solving' && revision === progress.revision;
+    if (goesOn) void this.fetchStatus();
     this.progress = progress;
     this.solve.update(progress);
     if (!hasScene(progress)) this.scene.forget();

@@ -7,6 +7,7 @@ import * as edits from './document/edits';
 import { handlesOf, hangingNodes, lightOf, nodeName, type Vec3, type Vec4 } from './document/gltf';
 import { SceneDocument, type SendPatch } from './document/scene_document';
 import type { Patch, ScenePatchedNote } from './protocol/messages';
+import { type PageName, shownName } from './protocol/page_name';
 import { ScenePanel, type Selection } from './ui/scene_panel';
 import type { GizmoMode } from './view/gizmo';
 
@@ -25,10 +26,10 @@ export class EditSession {
 
   constructor(
     private readonly app: App,
-    private readonly me: string,
+    private readonly name: PageName,
     send: SendPatch,
   ) {
-    this.document = new SceneDocument(me, send, {
+    this.document = new SceneDocument((by) => name.isMine(by), send, {
       changed: (pointers) => this.onChanged(pointers),
       refused: (label, reason) => app.frame.toasts.show(`${label}: ${reason}`, 'bad'),
       historyChanged: () => this.onHistory(),
@@ -60,9 +61,9 @@ export class EditSession {
 
   onPatched(note: ScenePatchedNote, fetchAnew: () => void): void {
     if (!this.document.patched(note.revision, note.patch, note.by)) fetchAnew();
-    if (note.by !== this.me)
+    if (!this.name.isMine(note.by))
       this.app.frame.toasts.show(
-        `${note.by || 'Someone'} changed ${edits.describePatch(this.document.gltf, note.patch)}`,
+        `${shownName(note.by) || 'Someone'} ${edits.describePatch(this.document.gltf, note.patch)}`,
       );
   }
 

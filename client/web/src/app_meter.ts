@@ -63,6 +63,7 @@ export class MeterSession {
     const reading = viewer.readAt(...frame.toDevice(x, y));
     if (!reading) return frame.meter.hide();
     const lux = reading.irradiance && luminance(reading.irradiance);
+    const light = lux ?? (reading.isGap ? 'no surface here' : 'no light yet');
     // Where errors of single texels are not streamed, the scene's own stands for them.
     const error = reading.error ?? (lux === undefined ? undefined : lux * (this.app.progress?.error.total ?? NaN));
     const details = [
@@ -74,7 +75,7 @@ export class MeterSession {
       reading.texel ? `page ${reading.page}, texel ${reading.texel.join(', ')}` : '',
       reading.point ? position(reading.point) : '',
     ];
-    frame.meter.show(x, y, lux, error, details.filter((text) => text !== '').join('\n'), !isSeen);
+    frame.meter.show(x, y, light, error, details.filter((text) => text !== '').join('\n'), !isSeen);
   }
 }
 

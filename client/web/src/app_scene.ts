@@ -6,12 +6,17 @@ import type { Placed } from './app_view';
 import { DocumentFetch } from './document/document_fetch';
 import type { Gltf } from './document/gltf';
 import { NOT_FOUND, type PastRevision, type SceneHistory } from './protocol/messages';
+import { shownName } from './protocol/page_name';
 import { ConnectionLost, RpcError } from './protocol/rpc';
 
-/** What people are told of another scene, given the newest revisions; undefined: this revision is no load. */
+/** The scene that a server begins with, where nobody is known to have loaded it: nobody's work is replaced by it. */
+const FIRST = 1;
+
+/** What people are told of another scene, given the newest revisions; undefined: this revision is no load by anyone. */
 export function loadNote(revisions: readonly PastRevision[], revision: number): string | undefined {
   const load = revisions.find((past) => past.revision === revision && past.kind === 'load');
-  return load && `${load.by || 'Someone'} loaded ${load.summary || 'another scene'}`;
+  if (!load || (!load.by && revision === FIRST)) return undefined;
+  return `${shownName(load.by ?? '') || 'Someone'} loaded ${load.summary || 'another scene'}`;
 }
 
 /** A file that is on its way, where one looked from before it, and whether the server was asked to load it. */
@@ -21,9 +26,6 @@ interface Upload {
   asked: boolean;
 }
 
-/** The scene that a server begins with: nobody's work is replaced by it. */
-const FIRST = 1;
-
 export class SceneSession {
   readonly document = new DocumentFetch({
     ask: (signal) => this.ask(signal),
@@ -31,7 +33,7 @@ export class SceneSession {
   });
   private upload: Upload | undefined;
   /** Revision of the newest load that was told of, or was this page's own. */
-  private told = FIRST;
+  private told = 0;
 
   constructor(private readonly app: App) {}
 
@@ -58,7 +60,7 @@ export class SceneSession {
 
   /** Its revisions count anew. */
   onServerAnew(): void {
-    this.told = FIRST;
+    this.told = 0;
   }
 
   /** Another one is there. Who has sent it from here is told by what sends it. */

@@ -149,7 +149,20 @@ TEST(Http, PutSceneLoadsAndReportsWarnings) {
   ASSERT_TRUE(reply.has_value());
   EXPECT_EQ(reply->revision, 1U);
   EXPECT_EQ(reply->warnings.size(), 1U);
-  EXPECT_EQ(server.engine.lastLoad(), "room.glb: 300000 bytes");
+  EXPECT_EQ(server.engine.lastLoad(), "room.glb: 300000 bytes by ");
+}
+
+TEST(Http, WhoLoadsASceneIsNamedOrElseByTheProgram) {
+  RunningServer server;
+  const auto loadedBy = [&](const std::string& target, const std::string& headers) {
+    EXPECT_EQ(request(server.port(), "PUT", target, headers, "12345").status, 200);
+    return server.engine.lastLoad();
+  };
+  const std::string curl = "User-Agent: curl/7.88.1 (x86_64)\r\n";
+  EXPECT_EQ(loadedBy("/scene", curl), "upload: 5 bytes by curl/7.88.1");
+  EXPECT_EQ(loadedBy("/scene", curl + "X-Client: Ann\r\n"), "upload: 5 bytes by Ann");
+  EXPECT_EQ(loadedBy("/scene?client=Ben%20Bo", curl + "X-Client: Ann\r\n"), "upload: 5 bytes by Ben Bo");
+  EXPECT_EQ(loadedBy("/scene?client=" + std::string(1000, 'x'), {}), "upload: 5 bytes by " + std::string(256, 'x'));
 }
 
 TEST(Http, ASceneThatIsRefusedSaysWhere) {

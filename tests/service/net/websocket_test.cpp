@@ -250,7 +250,7 @@ TEST(Scene, AnUploadIsLoadedByItsUrl) {
   EXPECT_EQ(put.status, 201);
   const auto reply = replyOf<SceneLoadReply>(socket.call(SceneLoadCall{*decodeHttpUrl(put.body)}));
   EXPECT_EQ(reply.revision, 1U);
-  EXPECT_EQ(server.engine.lastLoad(), "hall.glb: 5 bytes");
+  EXPECT_EQ(server.engine.lastLoad(), "hall.glb: 5 bytes by test");
   EXPECT_TRUE(socket.waitFor("scene.loaded").has_value());
   EXPECT_EQ(codeOf(socket.call(SceneLoadCall{"/uploads/none"})), -32004);
   EXPECT_EQ(codeOf(socket.call(SceneLoadCall{"http://elsewhere.example/a.glb"})), -32602);
@@ -273,7 +273,7 @@ TEST(Scene, AFileIsLoadedOnlyFromBelowTheSceneRoot) {
     TestSocket socket(server.port());
     socket.hello();
     EXPECT_EQ(codeOf(socket.call(SceneLoadCall{"file:sub/a.glb"})), 0);
-    EXPECT_THAT(server.engine.lastLoad(), HasSubstr("root/sub/a.glb"));
+    EXPECT_THAT(server.engine.lastLoad(), HasSubstr("root/sub/a.glb by test"));
     for (const auto* name : {"../outside.glb", "link.glb", "sub", "none.glb", "sub/../../outside.glb", "up/outside.glb",
                              "../root-beside/b.glb", "%2e%2e/outside.glb", "..%2foutside.glb",
                              "sub/%2e%2e/%2e%2e/outside.glb", "/etc/passwd", "//etc/passwd", "", ".", "sub/a.glb/"})

@@ -97,6 +97,25 @@ class KilledTest(StateCase):
 
         self.run_async(second())
 
+    def test_whoHasLoadedTheSceneIsKnownAfterwards(self):
+        async def loads(url):
+            session = await Session.open(url)
+            return [(r["kind"], r.get("by")) for r in (await session.call("scene.history"))["revisions"]]
+
+        async def load(url, upload):
+            await (await Session.open(url)).call("scene.load", url=upload)
+
+        server = self.keeper()
+        self.assertEqual(self.run_async(loads(server.url)), [("load", None)])  # the command line's
+        body = self.scene.read_bytes()
+        self.put(server.url, "/scene?client=Ann", body)
+        self.assertEqual(self.run_async(loads(server.url)), [("load", "Ann")])
+        self.put(server.url, "/scene", body)
+        self.assertRegex(self.run_async(loads(server.url))[0][1], "^Python-urllib/[0-9.]+$")
+        self.run_async(load(server.url, self.put(server.url, "/uploads", body)["url"]))
+        server.kill()
+        self.assertEqual(self.run_async(loads(self.keeper().url)), [("load", "service test")])
+
     def test_whoComesBackGetsWhatWasMissed(self):
         server = self.keeper()
 

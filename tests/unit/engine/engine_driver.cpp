@@ -142,7 +142,8 @@ void EngineTest::SetUp() {
 
 Result<engine::LoadOutcome> EngineTest::load(const test_scenes::TestScene& scene) {
   const auto bytes = std::make_shared<const Bytes>(test_scenes::encodeGlb(scene));
-  return call<engine::LoadOutcome>([&](auto done) { engine_->loadBytes(scene.name + ".glb", bytes, std::move(done)); });
+  return call<engine::LoadOutcome>(
+      [&](auto done) { engine_->loadBytes(scene.name + ".glb", bytes, "ann", std::move(done)); });
 }
 
 Result<engine::PatchOutcome> EngineTest::patch(engine::PatchRequest request) {

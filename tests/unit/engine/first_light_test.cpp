@@ -51,7 +51,8 @@ TEST_F(FirstLight, IsShownOnFewTexelsAndThenOnAllOfThem) {
   EXPECT_GT(texelsOf(*shown.back()), kMany / 2);
   EXPECT_GT(shown.back()->layout, shown.front()->layout);
   EXPECT_GT(status().patches, kMany / 2);
-  EXPECT_EQ(history().revisions.size(), 1U);
+  ASSERT_EQ(history().revisions.size(), 1U);
+  EXPECT_EQ(history().revisions[0].by, "ann");
   // Whoever comes to the whole sees the light of the few until its own is as good.
   const auto whole = std::ranges::find_if(shown, [](const auto& maps) { return texelsOf(*maps) > kMany / 2; });
   ASSERT_NE(whole, shown.end());
@@ -82,7 +83,7 @@ TEST_F(FirstLight, LeavesNoTraceInTheResult) {
 TEST_F(FirstLight, AnEditOfASceneThatIsStillBeingLoadedWaitsForAllOfIt) {
   const auto bytes = std::make_shared<const Bytes>(test_scenes::encodeGlb(lumpedCube(0.5)));
   std::promise<Result<engine::LoadOutcome>> loaded;
-  engine().loadBytes("cube.glb", bytes, [&](auto outcome) { loaded.set_value(std::move(outcome)); });
+  engine().loadBytes("cube.glb", bytes, "ann", [&](auto outcome) { loaded.set_value(std::move(outcome)); });
   const auto edited = patch(emissionPatch(0, 2.0));
   ASSERT_TRUE(edited) << edited.error().text();
   EXPECT_EQ(edited->revision, 2U);
@@ -127,7 +128,7 @@ TEST_F(FirstLight, IsWantedWhereTexelsAreSmallToo) {
 
 TEST_F(FirstLight, AnEngineMayEndWhileTheWholeIsBeingMade) {
   const auto bytes = std::make_shared<const Bytes>(test_scenes::encodeGlb(lumpedCube(0.5)));
-  engine().loadBytes("cube.glb", bytes, [](const auto&) {});
+  engine().loadBytes("cube.glb", bytes, "ann", [](const auto&) {});
   EXPECT_TRUE(eventually([&] { return !recorder_->loaded().empty(); }));
   watching_.reset();
   engine_.reset();

@@ -12,7 +12,7 @@ SharedBytes bytesOf(std::size_t size) { return std::make_shared<const Bytes>(siz
 
 /// Makes edits as the engine does and holds the document.
 struct Editing {
-  explicit Editing(const History::Bounds& bounds = {}) : history(bounds) { history.loaded(1, "room.glb"); }
+  explicit Editing(const History::Bounds& bounds = {}) : history(bounds) { history.loaded(1, "ann", "room.glb"); }
 
   void edit(const std::string& pointer, const json& value, const std::string& by = "ann") {
     auto next = document;
@@ -97,6 +97,7 @@ TEST(History, TellsWhoDidWhat) {
   ASSERT_EQ(report.revisions.size(), 4U);
   EXPECT_EQ(report.revisions[0].kind, PastRevision::Kind::kLoad);
   EXPECT_EQ(report.revisions[0].summary, "room.glb");
+  EXPECT_EQ(report.revisions[0].by, "ann");
   EXPECT_EQ(report.revisions[1].by, "ann");
   EXPECT_EQ(report.revisions[1].summary, "add /x");
   EXPECT_FALSE(report.revisions[1].undone);
@@ -124,9 +125,10 @@ TEST(History, IsBounded) {
 TEST(History, ALoadedSceneHasNoPast) {
   Editing editing;
   editing.edit("/x", 1);
-  editing.history.loaded(3, "other.glb");
+  editing.history.loaded(3, "ben", "other.glb");
   EXPECT_FALSE(editing.step(false));
-  EXPECT_EQ(editing.history.report(3).revisions.size(), 1U);
+  ASSERT_EQ(editing.history.report(3).revisions.size(), 1U);
+  EXPECT_EQ(editing.history.report(3).revisions[0].by, "ben");
 }
 
 }  // namespace

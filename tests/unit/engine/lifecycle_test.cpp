@@ -86,7 +86,7 @@ TEST_F(Lifecycle, BytesThatAreNoSceneLeaveTheOldOneAsItWas) {
   const auto before = status();
   const auto uploads = script_->uploads.load();
   const auto refused = call<engine::LoadOutcome>([&](auto done) {
-    engine().loadBytes("junk.glb", std::make_shared<const Bytes>(Bytes{'j', 'u', 'n', 'k'}), std::move(done));
+    engine().loadBytes("junk.glb", std::make_shared<const Bytes>(Bytes{'j', 'u', 'n', 'k'}), {}, std::move(done));
   });
   ASSERT_FALSE(refused);
   EXPECT_THAT(refused.error().text(), testing::HasSubstr("junk.glb"));

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 
 #include "tests/scenes/scenes.h"
@@ -57,6 +58,28 @@ TEST_F(Quantities, OnlyWhatIsWatchedIsPublished) {
   EXPECT_NE(told(Quantity::kIrradiance), nullptr);
   EXPECT_EQ(told(Quantity::kError), nullptr);
   EXPECT_EQ(engine().lightmaps(Quantity::kError), nullptr);
+}
+
+/// Who holds tiles of a version may come back to it, and encoded tiles are kept by it.
+TEST_F(Quantities, OneVersionIsOfOneMomentHoweverOftenItIsLookedAt) {
+  for (const bool paper_mode : {false, true}) {
+    ASSERT_TRUE(configure([&](auto& settings) {
+      settings.paper_mode = paper_mode;
+      settings.texels = 60'000;
+      settings.target_error = kNever;
+    }));
+    ASSERT_TRUE(load(lumpedCube(0.5)));
+    std::map<std::uint64_t, std::shared_ptr<const engine::Lightmaps>> seen;
+    for (int i = 0; i < 60; ++i) {
+      recorder_->forget();
+      const auto unshot = shown(Quantity::kUnshot);
+      ASSERT_NE(unshot, nullptr);
+      const auto& before = *seen.try_emplace(unshot->tile_version, unshot).first->second;
+      ASSERT_TRUE(before.pages[0]->mips[0].pixels == unshot->pages[0]->mips[0].pixels)
+          << "version " << unshot->tile_version << (paper_mode ? " of the paper's" : "");
+      (void)shown(Quantity::kNormal);  // somebody comes for something else: what nobody looks at is forgotten
+    }
+  }
 }
 
 TEST_F(Quantities, EveryOneThatIsWatchedComesWithEachVersion) {

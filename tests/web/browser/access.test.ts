@@ -228,6 +228,45 @@ it('reads the light by touch, and shows what was tapped in the list', async () =
   expect(await until(seen, (is) => is)).toBe(true);
 });
 
+it('leaves the picture free of the legend where the panel leaves little of it', async () => {
+  const page = await pages.open(server.url, 360, 640);
+  await converged(page);
+  const picture = () => page.locator('canvas.view').boundingBox();
+  await page.evaluate(() => window.viewer!.frame.togglePanel());
+  const whole = (await picture())!;
+  for (const mode of ['radiosity', 'mips'] as const) {
+    await page.evaluate((mode) => window.viewer!.view.setMode(mode), mode);
+    const legend = page.locator('.legend');
+    await legend.waitFor();
+    const [around, free] = [(await legend.boundingBox())!, (await picture())!];
+    expect(around.y, mode).toBeGreaterThanOrEqual(free.y + free.height);
+    expect(free.height, mode).toBeGreaterThan(whole.height - 40);
+    const cut = () => page.evaluate(() => [...document.querySelectorAll('.legend, .legend *')].filter((e) => e.scrollWidth > e.clientWidth + 1 || e.scrollHeight > e.clientHeight + 1).map((e) => e.className)); // prettier-ignore
+    expect(await cut(), mode).toEqual([]);
+  }
+});
+
+it.each([360, 1000])(
+  'shows notes beside the legend on a page of %i pixels, with and without the panel',
+  async (width) => {
+    const page = await pages.open(server.url, width, 640);
+    await converged(page);
+    await page.evaluate(() => window.viewer!.view.setMode('radiosity'));
+    await page.locator('.legend').waitFor();
+    await page.evaluate(() =>
+      window.viewer!.frame.toasts.show('A note that is long enough to be as wide as it may be', 'bad'),
+    );
+    for (let i = 0; i < 2; ++i) {
+      await page.evaluate(() => window.viewer!.frame.togglePanel());
+      const [note, legend] = [
+        (await page.locator('.toast').boundingBox())!,
+        (await page.locator('.legend').boundingBox())!,
+      ];
+      expect(note.y + note.height, `${i}`).toBeLessThanOrEqual(legend.y);
+    }
+  },
+);
+
 it('pans and zooms the pages by keys', async () => {
   const page = await pages.open(server.url, 900, 600);
   await converged(page);

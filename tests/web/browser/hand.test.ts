@@ -267,6 +267,7 @@ it('takes a number with a comma, and says so where there is none', async () => {
     );
   const changed = await until(settings, ({ targetError }) => targetError !== 0.02);
   expect(changed.targetError).toBeCloseTo(0.019, 12);
+  await page.getByText('(target 1.9 %)').waitFor();
   await goal.fill('half');
   await goal.press('Enter');
   await said(page, /^“half” is not accepted: enter a percentage above 0, up to 100$/);
@@ -280,5 +281,14 @@ it('takes a number with a comma, and says so where there is none', async () => {
     () => texels.inputValue(),
     (value) => value === before,
   );
+  // What somebody else asks for is shown here, and what is being typed stays.
+  await texels.pressSequentially('5');
+  const other = await pages.open(server.url, SIDE.width, SIDE.height);
+  await converged(other);
+  await other.evaluate(() => window.viewer!.connection.call('solve.configure', { targetError: 0.01 }));
+  await page.getByText('(target 1 %)').waitFor();
+  await until(() => goal.inputValue(), (value) => value === '1'); // prettier-ignore
+  expect(await texels.inputValue()).toBe(`${before}5`);
+  await texels.fill(before);
   await page.evaluate(() => window.viewer!.connection.call('solve.configure', { targetError: 0.02 }));
 });

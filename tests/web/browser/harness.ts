@@ -397,9 +397,9 @@ export function squares(nodes: GltfNode[], materials: object[] = [PAPER], meshNa
   });
 }
 
-/** Loads a glTF as another program would. */
+/** Loads a glTF as another program of Ann's would. */
 export async function putScene(server: Server, gltf: string): Promise<void> {
-  const answer = await fetch(`${server.url}/scene?name=squares.gltf`, {
+  const answer = await fetch(`${server.url}/scene?name=squares.gltf&client=Ann`, {
     method: 'PUT',
     body: gltf,
     headers: { 'Content-Type': 'model/gltf+json' },

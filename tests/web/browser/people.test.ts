@@ -1,6 +1,6 @@
 import type { Page } from 'playwright-core';
 import type {} from '../../../client/web/src/main';
-import { converged, serveAll, until } from './harness';
+import { converged, said, serveAll, until } from './harness';
 
 const { server, pages } = serveAll('cornell.glb');
 
@@ -79,4 +79,34 @@ it('shows nothing of who does not want it, and nothing to them', async () => {
   await second.getByLabel('Share cameras').check();
   await shows(first, second);
   await shows(second, first);
+});
+
+it('calls people what they call themselves, from then on and on their next visit', async () => {
+  const first = await pages.open(server.url, 1200, 800);
+  await converged(first);
+  const second = await pages.open(server.url, 1200, 800);
+  await converged(second);
+  await shows(first, second);
+  const label = () => first.evaluate(() => window.viewer!.people.people.labels.textContent ?? '');
+  expect(await label()).toMatch(/^viewer \w{4}$/);
+  await second.getByRole('tab', { name: 'Share' }).click();
+  const [panel, field] = [second.locator('#tab-Share'), second.getByLabel('Your name')];
+  const [around, box] = [(await panel.boundingBox())!, (await field.boundingBox())!];
+  expect(box.x + box.width).toBeLessThan(around.x + around.width);
+  await field.fill('Ann Lee');
+  await second.keyboard.press('Enter');
+  expect(await until(label, (text) => text === 'Ann Lee')).toBe('Ann Lee');
+  await second.evaluate(() =>
+    window.viewer!.edit.document.edit('Colour', [
+      { op: 'replace', path: '/materials/@white/pbrMetallicRoughness/baseColorFactor', value: [0.5, 0.6, 0.7, 1] },
+    ]),
+  );
+  await said(first, /^Ann Lee changed white: colour$/);
+  await converged(second);
+  // The page that was given another name has gone on where it was.
+  expect(await second.evaluate(() => window.notes!)).toEqual([]);
+  await second.reload();
+  await converged(second);
+  await shows(first, second);
+  expect(await until(label, (text) => text === 'Ann Lee')).toBe('Ann Lee');
 });

@@ -140,20 +140,35 @@ it('reads the light on flat pages', async () => {
       for (let x = -0.9; x < 0.9; x += 0.06) {
         const read = viewer.readAt(x, y);
         if (!read?.irradiance || read.irradiance[0] < 1) continue;
+        const { point } = read;
         const page = viewer.shown!.set.pages[read.page!]!;
         const [u, v] = read.texel!.map((t, i) => (t + 0.5) / [page.width, page.height][i]!);
         const [left, top] = [box.left + ((x + 1) / 2) * box.width, box.top + ((1 - y) / 2) * box.height];
-        return { left, top, read: read.irradiance, sample: page.sample(u!, v!) };
+        return { left, top, read: read.irradiance, sample: page.sample(u!, v!), point };
       }
     return undefined;
   });
   expect(at!.read).toEqual(at!.sample);
+  expect(at!.point).toBeDefined();
   await page.mouse.move(at!.left, at!.top);
   await page.keyboard.press('m');
   const meter = page.locator('.meter');
   await meter.getByText(/page 0, texel \d+, \d+/).waitFor();
   expect(await meter.innerText()).toMatch(/^[\d.,]+ ± [\d.,]+ lx/);
-  expect(await meter.innerText()).not.toContain(' m\n');
+  expect(await meter.innerText()).toMatch(/\n(floor|ceiling|back|left|right|short|tall|lamp|light)[^]* m$/i); // whose it is
+  // Between the charts nothing is lit, which is not the same as dark.
+  const gap = await page.evaluate(() => {
+    const { viewer } = window.viewer!;
+    const box = viewer.canvas.getBoundingClientRect();
+    for (let y = -0.99; y < 0.99; y += 0.01)
+      for (let x = -0.99; x < 0.99; x += 0.01)
+        if (viewer.readAt(x, y)?.isGap)
+          return { left: box.left + ((x + 1) / 2) * box.width, top: box.top + ((1 - y) / 2) * box.height };
+    return undefined;
+  });
+  await page.mouse.move(gap!.left, gap!.top);
+  await meter.getByText('no surface here').waitFor();
+  expect(await meter.innerText()).toMatch(/^no surface here\npage 0, texel \d+, \d+$/);
   // Beside the pages there is nothing to read.
   const box = (await page.locator('canvas.view').boundingBox())!;
   await page.mouse.move(box.x + 4, box.y + box.height / 2);
@@ -191,10 +206,23 @@ it('tells which scene somebody else has loaded, and not of its own', async () =>
   const page = await pages.open(server.url, 900, 600);
   await converged(page);
   await putScene(server, darkRoom());
-  await said(page, /^\S+ loaded squares/);
+  await said(page, /^Ann loaded squares/);
   await page.evaluate((text) => window.viewer!.scene.loadFile(new File([text], 'mine.gltf')), squares([{ mesh: 0 }]));
   await said(page, /^mine\.gltf loaded/);
   await converged(page);
   const notes = await page.evaluate(() => window.notes!.filter((text) => / loaded /.test(`${text} `)));
   expect(notes.filter((text) => !text.startsWith('mine.gltf'))).toHaveLength(1);
+});
+
+it('tells who has loaded the first scene of a server, and of none that it began with', async () => {
+  const server = await serve(undefined);
+  const [sender, watcher] = [await pages.open(server.url, 900, 600), await pages.open(server.url, 900, 600)];
+  await watcher.waitForFunction(() => window.viewer?.connection.isOpen);
+  await sender.evaluate((text) => window.viewer!.scene.loadFile(new File([text], 'mine.gltf')), squares([{ mesh: 0 }]));
+  await said(watcher, /^viewer \w+ loaded mine\.gltf/);
+  await converged(sender);
+  expect(await sender.evaluate(() => window.notes!.filter((text) => /^viewer/.test(text)))).toEqual([]);
+  const late = await pages.open(server.url, 900, 600);
+  await converged(late);
+  expect(await late.evaluate(() => window.notes!.filter((text) => /loaded/.test(text)))).toEqual([]);
 });

@@ -134,10 +134,22 @@ describe('edits', () => {
   });
 
   it('are told in words', () => {
-    expect(edits.describePatch(room(), edits.setColour(0, room(), [1, 0, 0]))).toBe('white: colour');
+    expect(edits.describePatch(room(), edits.setColour(0, room(), [1, 0, 0]))).toBe('changed white: colour');
     expect(edits.describePatch(room(), [{ op: 'replace', path: '/nodes/@box/translation', value: [0, 0, 0] }])).toBe(
-      'box: position',
+      'changed box: position',
     );
+    const gltf = room();
+    const { patch, node } = edits.addLamp(gltf, [0, 1, 0], 5);
+    applyPatch(json(gltf), patch);
+    expect(edits.describePatch(gltf, patch)).toBe('added lamp');
+    const removed = edits.detachNode(gltf, node)!;
+    const back = applyPatch(json(gltf), removed);
+    expect(edits.describePatch(gltf, removed)).toBe('removed lamp');
+    applyPatch(json(gltf), back);
+    expect(edits.describePatch(gltf, back)).toBe('added lamp');
+    expect(edits.describePatch(gltf, [])).toBe('changed the scene');
+    expect(edits.describePatch(gltf, [{ op: 'remove', path: `/nodes/${node}` }, { op: 'remove', path: '/scenes/0/nodes/1' }])).toBe('removed an object'); // prettier-ignore
+    expect(edits.describePatch(gltf, [{ op: 'replace', path: '/scenes/0/nodes', value: [0] }])).toBe('changed objects of the scene'); // prettier-ignore
   });
 });
 
@@ -151,7 +163,7 @@ function session() {
   }[] = [];
   const refused: string[] = [];
   const document = new SceneDocument(
-    'me',
+    (by) => by === 'me',
     (patch, id) =>
       new Promise((answer, refuse) => {
         calls.push({ patch, id, answer, refuse });

@@ -22,6 +22,7 @@ class Card {
       this.pace.ended(this.nowMs, done.length);
       this.pace.turn(this.nowMs);
       if (moving) this.pace.hurry(this.nowMs);
+      if (tiles) this.pace.lightCame(this.nowMs);
       if (!moving && !tiles && !this.pace.isSharpDue(this.nowMs)) continue;
       const scale = this.pace.ask(this.nowMs);
       if (scale === undefined) continue;
@@ -66,6 +67,23 @@ describe('the pace of frames', () => {
     const pace = new FramePace(true);
     pace.hurry(0);
     expect(pace.ask(0)).toBeLessThan(0.5);
+  });
+
+  it('shows light that comes in quick succession coarsely first, for a second at most, and sharply ever after', () => {
+    const card = new Card(new FramePace(true), 300);
+    card.run(100, { moving: true });
+    card.latencies.length = card.scales.length = 0;
+    card.run(900, { tiles: true });
+    expect(card.scales).not.toContain(1);
+    for (const latency of card.latencies) expect(latency).toBeLessThan(2 * (MOVING_FRAME_MS + 16));
+    card.run(3000, { tiles: true });
+    const first = card.scales.indexOf(1);
+    expect(new Set(card.scales.slice(first))).toEqual(new Set([1]));
+    // Where it rests before, so does the picture.
+    const resting = new Card(new FramePace(true), 300);
+    resting.run(100, { tiles: true, moving: true });
+    resting.run(500, {});
+    expect(resting.scales.at(-1)).toBe(1);
   });
 
   it('takes one slow frame for a hiccup', () => {

@@ -57,4 +57,6 @@ it('people are told who has loaded which scene, as far as that is known', () => 
     'Someone loaded another scene',
     undefined,
   ]);
+  expect(loadNote([{ revision: 1, kind: 'load', summary: 'room.glb', by: 'Ann' }], 1)).toBe('Ann loaded room.glb');
+  expect(loadNote([{ revision: 1, kind: 'load', summary: 'room.glb' }], 1)).toBeUndefined(); // the command line's
 });

@@ -140,24 +140,52 @@ export function redoOnServer(patch: Patch): Patch {
   return grows(patch) ? patch.filter((operation) => HANGING.test(operation.path)) : patch;
 }
 
-/** A sentence for people: what a patch does. */
+/** What people are told that a patch has done: "added lamp 2", "changed wall: colour". `gltf`: the document after it. */
 export function describePatch(gltf: Gltf, patch: Patch): string {
-  const parts = new Set<string>();
-  for (const { path } of patch) {
-    const [, list, key, ...rest] = path.split('/');
-    const index = Number(key?.startsWith('@') ? NaN : key);
-    const named = key?.startsWith('@') ? key.slice(1) : undefined;
-    const member = (rest.at(-1) ?? '').replace('KHR_node_visibility', 'visibility');
-    if (list === 'materials' && rest.length > 0)
-      parts.add(`${named ?? gltf.materials?.[index]?.name ?? `material ${key}`}: ${readable(member)}`);
-    else if (list === 'nodes' && rest.length > 0)
-      parts.add(`${named ?? (gltf.nodes?.[index] ? nodeName(gltf, index) : `node ${key}`)}: ${readable(member)}`);
-    else if (list === 'nodes') parts.add('a new object');
-    else if (list === 'scenes') parts.add('objects of the scene');
-    else if (path.startsWith('/extensions/KHR_lights_punctual/lights/')) parts.add(`light: ${readable(member)}`);
-    else if (path.startsWith('/extras/radiositySky')) parts.add('sky');
+  const told = { added: new Set<string>(), removed: new Set<string>(), changed: new Set<string>() };
+  const isNew = patch.some(({ path }) => path === '/nodes/-');
+  for (const operation of patch) {
+    const { op, path } = operation;
+    if (path === '/nodes/-') told.added.add(nameIn(operation.value) ?? 'an object');
+    else if (op === 'test' && HANGING.test(path)) told.removed.add(nodeNamed(gltf, operation.value));
+    else if (op === 'add' && HANGING.test(path) && !isNew) told.added.add(nodeNamed(gltf, operation.value));
+    else if (op === 'remove' && /^\/nodes\/\d+$/.test(path)) told.removed.add('an object');
+    else if (op !== 'test' && !(isNew && (HANGING.test(path) || GROWING.test(path)))) {
+      const part = changedPart(gltf, path);
+      if (part) told.changed.add(part);
+    }
   }
-  return [...parts].slice(0, 3).join(', ') || 'the scene';
+  // Where objects come or go, the lists that name them change, too.
+  if (told.added.size + told.removed.size > 0) told.changed.delete(OBJECTS);
+  const phrases = Object.entries(told).flatMap(([verb, parts]) =>
+    parts.size > 0 ? [`${verb} ${[...parts].slice(0, 3).join(', ')}${parts.size > 3 ? ' and more' : ''}`] : [],
+  );
+  return phrases.join(', ') || 'changed the scene';
+}
+
+const OBJECTS = 'objects of the scene';
+
+function changedPart(gltf: Gltf, path: string): string | undefined {
+  const [, list, key, ...rest] = path.split('/');
+  const index = Number(key?.startsWith('@') ? NaN : key);
+  const named = key?.startsWith('@') ? key.slice(1) : undefined;
+  const member = (rest.at(-1) ?? '').replace('KHR_node_visibility', 'visibility');
+  if (HANGING.test(path)) return OBJECTS;
+  if (list === 'materials' && rest.length > 0)
+    return `${named ?? gltf.materials?.[index]?.name ?? `material ${key}`}: ${readable(member)}`;
+  if (list === 'nodes' && rest.length > 0)
+    return `${named ?? (gltf.nodes?.[index] ? nodeName(gltf, index) : `node ${key}`)}: ${readable(member)}`;
+  if (path.startsWith('/extensions/KHR_lights_punctual/lights/')) return `light: ${readable(member)}`;
+  return path.startsWith('/extras/radiositySky') ? 'sky' : undefined;
+}
+
+function nameIn(value: Json | undefined): string | undefined {
+  const name = value && typeof value === 'object' && !Array.isArray(value) ? value['name'] : undefined;
+  return typeof name === 'string' && name !== '' ? name : undefined;
+}
+
+function nodeNamed(gltf: Gltf, value: Json | undefined): string {
+  return typeof value === 'number' && gltf.nodes?.[value] ? nodeName(gltf, value) : 'an object';
 }
 
 function readable(member: string): string {

@@ -55,9 +55,9 @@ export class SceneDocument {
 
   private generation = 0;
 
-  /** `me`: the name under which the server tells others of our patches; nobody else has it. */
+  /** `isMine`: whether the server tells of our patches under that name; nobody else's does. */
   constructor(
-    private readonly me: string,
+    private readonly isMine: (by: string) => boolean,
     private readonly send: SendPatch,
     private readonly events: DocumentEvents,
   ) {}
@@ -82,12 +82,12 @@ export class SceneDocument {
     if (revision <= this.revision) return true;
     if (revision !== this.revision + 1) return false; // one was lost on the way
     const first = this.pending[0];
-    if (by === this.me && first && sameJson(first.forward as unknown as Json, patch as unknown as Json)) {
+    if (this.isMine(by) && first && sameJson(first.forward as unknown as Json, patch as unknown as Json)) {
       this.confirm(first, revision);
       return true;
     }
     // A server that was started again tells what it had made of ours in its own words.
-    if (by === this.me && first) return false;
+    if (this.isMine(by) && first) return false;
     this.takeBackPending();
     try {
       applyPatch(this.json, patch);

@@ -84,6 +84,16 @@ export class Connection {
     socket.onclose = ({ code, reason }) => this.onClose(socket, code, reason);
   }
 
+  /** Says hello anew, as the options are now, and goes on where it was. Without a connection the next one will. */
+  renew(): void {
+    const { socket } = this;
+    if (!socket || !this.isOpen) return;
+    this.forget();
+    socket.onclose = socket.onmessage = null;
+    socket.close(1000);
+    this.open();
+  }
+
   close(): void {
     this.stopped = true;
     clearTimeout(this.timer);
@@ -168,13 +178,17 @@ export class Connection {
     clearTimeout(lost);
   }
 
-  private onClose(socket: WebSocket, code: number, reason: string): void {
-    if (socket !== this.socket) return;
+  private forget(): void {
     this.socket = undefined;
     this.info = undefined;
     clearInterval(this.probe);
     this.rpc?.close();
     this.rpc = undefined;
+  }
+
+  private onClose(socket: WebSocket, code: number, reason: string): void {
+    if (socket !== this.socket) return;
+    this.forget();
     if (this.stopped) return;
     // Closed with the same code without an answer, hello only came too late: the machine was busy.
     if (code === CLOSE_UNAUTHENTICATED && this.isRefused)

@@ -113,11 +113,11 @@ export class MeterCard {
     this.element.hidden = this.mark.hidden = true;
   }
 
-  /** `lux` undefined: no light known there. `error`: lux, either side. */
+  /** `light`: lux, or why there is none. `error`: lux, either side. */
   show(
     x: number,
     y: number,
-    lux: number | undefined,
+    light: number | string,
     error: number | undefined,
     details: string,
     isMarked: boolean,
@@ -126,10 +126,10 @@ export class MeterCard {
     this.mark.hidden = !isMarked;
     this.mark.style.transform = `translate(${Math.round(x)}px, ${Math.round(y)}px) translate(-50%, -50%)`;
     const sure = error === undefined || !Number.isFinite(error);
-    const [value, either] =
-      lux === undefined ? ['no light yet', ''] : sure ? [measured(lux), ''] : withError(lux, error);
+    const isDark = typeof light === 'string';
+    const [value, either] = isDark ? [light, ''] : sure ? [measured(light), ''] : withError(light, error);
     this.value.textContent = value;
-    this.bar.textContent = lux === undefined ? '' : either ? ` ± ${either} lx` : ' lx';
+    this.bar.textContent = isDark ? '' : either ? ` ± ${either} lx` : ' lx';
     this.more.textContent = details;
     const { offsetWidth: width, offsetHeight: height } = this.element;
     const legend = this.legend.hidden ? undefined : this.legend.getBoundingClientRect();

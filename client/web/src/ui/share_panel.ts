@@ -1,8 +1,12 @@
 // The panel "Share": a link that carries the camera, the last edit as a command, and files to take away.
 
+import { LONGEST_NAME } from '../protocol/page_name';
 import { button, checkbox, field, h, section } from './dom';
 
 export interface SharePanelActions {
+  /** What the user is called, and how the page is called where that is not said. */
+  name: { person: string; unnamed: string };
+  setName(person: string): void;
   /** What the box says at first. */
   sharing: boolean;
   setSharing(on: boolean): void;
@@ -36,6 +40,7 @@ export class SharePanel {
       ),
       section(
         'People',
+        field('Your name', this.nameField(actions)),
         field(
           'Share cameras',
           checkbox(actions.sharing, (on) => actions.setSharing(on)),
@@ -56,6 +61,19 @@ export class SharePanel {
       ),
       section('Server', this.about),
     );
+  }
+
+  private nameField({ name, setName }: SharePanelActions): HTMLElement {
+    const title = `Shown with what you do; without one that is “${name.unnamed}”`;
+    const input = h('input', {
+      type: 'text',
+      value: name.person,
+      title,
+      maxLength: LONGEST_NAME,
+      autocomplete: 'name',
+    });
+    input.onchange = () => setName(input.value);
+    return input;
   }
 
   setEdit(json: string): void {

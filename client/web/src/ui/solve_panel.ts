@@ -44,12 +44,15 @@ export class SolvePanel {
   private readonly target: HTMLInputElement;
   private readonly texels: HTMLInputElement;
   private settings: Settings | undefined;
+  private progress: Progress | undefined;
+  private typing: HTMLInputElement | undefined;
   private firstError = 1;
 
   constructor(actions: SolvePanelActions) {
     this.pause = button('Pause', () => actions.pauseOrResume());
     this.target = h('input', { type: 'text', class: 'number', inputMode: 'decimal' });
     this.target.onchange = () => {
+      this.typing = undefined;
       const value = parseNumber(this.target.value.replace('%', '')) / 100;
       if (value > 0 && value <= 1) return actions.configure({ targetError: value });
       actions.notAccepted(this.target.value, 'a percentage above 0, up to 100');
@@ -57,11 +60,16 @@ export class SolvePanel {
     };
     this.texels = h('input', { type: 'text', class: 'number', inputMode: 'numeric' });
     this.texels.onchange = () => {
+      this.typing = undefined;
       const value = Math.round(parseNumber(this.texels.value));
       if (value >= 1) return actions.configure({ texels: value });
       actions.notAccepted(this.texels.value, 'a number, 1 or more');
       this.showSettings();
     };
+    for (const input of [this.target, this.texels]) {
+      input.oninput = () => (this.typing = input);
+      input.onblur = () => (this.typing = undefined);
+    }
     this.element = h(
       'div',
       {},
@@ -83,8 +91,13 @@ export class SolvePanel {
   }
 
   update(progress: Progress): void {
-    const { error } = progress;
     this.plot.add(progress);
+    this.progress = progress;
+    this.showProgress(progress);
+  }
+
+  private showProgress(progress: Progress): void {
+    const { error } = progress;
     if (progress.shots === 0 || error.total > this.firstError) this.firstError = Math.max(error.total, 1e-6);
     const target = this.settings?.targetError ?? 0.02;
     const way = Math.log(this.firstError / error.total) / Math.log(this.firstError / target);
@@ -114,6 +127,7 @@ export class SolvePanel {
     this.settings = settings;
     this.plot.setTarget(settings.targetError);
     this.showSettings();
+    if (this.progress) this.showProgress(this.progress); // what is done may stay as it is, and nothing be told of it
   }
 
   setWarnings(warnings: string[], count: number): void {
@@ -124,11 +138,11 @@ export class SolvePanel {
     );
   }
 
-  /** What stands in the fields: the server's, also after it has refused others. */
+  /** What stands in the fields: the server's, also after it has refused others; not where somebody is typing. */
   showSettings(): void {
     if (!this.settings) return;
-    this.target.value = inField(100 * this.settings.targetError);
-    this.texels.value = String(this.settings.texels);
+    if (this.typing !== this.target) this.target.value = inField(100 * this.settings.targetError);
+    if (this.typing !== this.texels) this.texels.value = String(this.settings.texels);
   }
 
   private showFacts(facts: [string, string][]): void {

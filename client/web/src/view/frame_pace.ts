@@ -9,6 +9,8 @@ export const MOVING_FRAME_MS = 40;
 /** Nothing has moved for so long, and for so many turns of a page that may be slow: all is at rest. */
 const REST_MS = 200;
 const REST_TURNS = 3;
+/** Of light that comes in quick succession coarse pictures go before the sharp one, but for no longer. */
+const MOST_COARSE_MS = 1000;
 /** Frames at rest leave a slow card as much time as they take, so that what moves next need not wait; but no more. */
 const MOST_PAUSE_MS = 500;
 /** One is drawn while the next is made: more would only show what is asked for later. */
@@ -35,6 +37,8 @@ export class FramePace {
   private lastTurnMs = -Infinity;
   private turnsSinceHurry = Infinity;
   private lastScale = 1;
+  /** Since when light has come to a picture that is coarse. */
+  private coarseSinceMs: number | undefined;
 
   /** `software`: no card draws, as far as is known. */
   constructor(software: boolean) {
@@ -53,6 +57,17 @@ export class FramePace {
   hurry(nowMs: number, forMs = REST_MS): void {
     this.turnsSinceHurry = 0;
     this.hurryUntilMs = Math.max(this.hurryUntilMs, nowMs + forMs);
+  }
+
+  /**
+   * Tiles have been taken up. A sharp picture of the first of them would keep a slow card from showing the next ones; one
+   * that is sharp already stays so, as it would flicker otherwise.
+   */
+  lightCame(nowMs: number): void {
+    if (this.lastScale === 1) return;
+    this.coarseSinceMs ??= nowMs;
+    const leftMs = this.coarseSinceMs + MOST_COARSE_MS - nowMs;
+    if (leftMs > 0) this.hurry(nowMs, Math.min(REST_MS, leftMs));
   }
 
   /** Turns are counted as they come: one long turn, as when a scene is taken up, says nothing of the next ones. */
@@ -81,6 +96,7 @@ export class FramePace {
   began(nowMs: number, scale: number): void {
     this.underWay.push({ scale, begunMs: nowMs });
     this.lastScale = scale;
+    if (scale === 1) this.coarseSinceMs = undefined;
   }
 
   /**

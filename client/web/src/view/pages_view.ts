@@ -1,17 +1,27 @@
 // The lightmap pages side by side, flat, to be panned and zoomed.
 
-import { Box3, Mesh, OrthographicCamera, PlaneGeometry, Scene, ShaderMaterial, Vector3 } from 'three';
+import { Box3, Mesh, OrthographicCamera, PlaneGeometry, Scene, ShaderMaterial, Vector2, Vector3 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import type { ViewUniforms } from './lit_material';
 import type { LightmapPage } from './lightmap_page';
 import type { LightmapSet } from './lightmap_set';
 import { FLAT_FRAGMENT, FLAT_VERTEX } from './lit_shader';
-import type { Reading } from './picker';
+import type { LitScene } from './lit_scene';
+import { surfaceAt } from './page_surface';
+import { readingAt, type Reading } from './picker';
 
 const GAP = 0.04;
 
-/** What a page does not tell of its texels. */
-const NOWHERE = { point: undefined, error: undefined, radiosity: undefined, node: undefined, material: undefined };
+/** What a page tells of texels that are no surface's. */
+const NOWHERE = {
+  point: undefined,
+  irradiance: undefined,
+  error: undefined,
+  radiosity: undefined,
+  node: undefined,
+  material: undefined,
+  isGap: true,
+};
 
 export class PagesView {
   readonly scene = new Scene();
@@ -96,8 +106,11 @@ export class PagesView {
     this.camera.updateProjectionMatrix();
   }
 
-  /** The light of the texel that lies there; undefined: beside the pages. `x`, `y`: normalised device coordinates. */
-  readAt(x: number, y: number): Reading | undefined {
+  /**
+   * The light of the texel that lies there, and whose surface that is; undefined: beside the pages. `x`, `y`: normalised
+   * device coordinates. `scene`: the one whose pages they are.
+   */
+  readAt(scene: LitScene, x: number, y: number): Reading | undefined {
     const at = new Vector3(x, y, 0).unproject(this.camera);
     for (const [index, { mesh, page }] of this.made.entries()) {
       const { width, height } = (mesh.geometry as PlaneGeometry).parameters;
@@ -105,8 +118,10 @@ export class PagesView {
       if (u < 0 || u >= 1 || v < 0 || v >= 1) continue;
       const texel: [number, number] = [Math.floor(u * page.width), Math.floor(v * page.height)];
       // The texel itself, as it is drawn: its neighbours may be of surfaces elsewhere.
-      const irradiance = page.sample((texel[0] + 0.5) / page.width, (texel[1] + 0.5) / page.height);
-      return { ...NOWHERE, irradiance, page: index, texel };
+      const middle = new Vector2((texel[0] + 0.5) / page.width, (texel[1] + 0.5) / page.height);
+      const hit = surfaceAt(scene, page, new Vector2(u, v)) ?? surfaceAt(scene, page, middle);
+      if (!hit) return { ...NOWHERE, page: index, texel };
+      return { ...readingAt(scene, hit), irradiance: page.sample(middle.x, middle.y), page: index, texel };
     }
     return undefined;
   }

@@ -16,6 +16,7 @@ import {
   type PerspectiveCamera,
 } from 'three';
 import type { SharedCamera } from '../protocol/messages';
+import { shownName } from '../protocol/page_name';
 import { button, h } from '../ui/dom';
 
 /** Of the way that is left, gone in this time, seconds. */
@@ -61,9 +62,9 @@ class Person extends Object3D {
     this.side = new MeshBasicMaterial({ color, transparent: true, opacity: 0.35, side: 2, depthWrite: false });
     this.edge = new LineBasicMaterial({ color });
     this.add(new Mesh(SIDES, this.side), new LineSegments(EDGES, this.edge));
-    this.label = button(camera.name, () => visit(this.eye, this.aim), {
+    this.label = button(shownName(camera.name), () => visit(this.eye, this.aim), {
       class: 'person',
-      title: `Look from where ${camera.name} looks`,
+      title: `Look from where ${shownName(camera.name)} looks`,
     });
     this.label.style.setProperty('--hue', String(hue));
   }

@@ -6,10 +6,12 @@ import type { LightmapPage } from './lightmap_page';
 import type { LitScene } from './lit_scene';
 
 export interface Reading {
-  /** Metres; undefined where pages are looked at, and not the scene. */
+  /** Metres; undefined in a gap. */
   point: Vector3 | undefined;
   /** Irradiance, lux: linear R, G, B; undefined: no light is known there. */
   irradiance: [number, number, number] | undefined;
+  /** Of a page: between the charts, where light falls on nothing. */
+  isGap?: boolean;
   /** Its estimated error, lux, luminance; undefined where the server does not stream it. */
   error: number | undefined;
   /** Light that leaves, lm/m^2, luminance; undefined where it differs within the surface. */

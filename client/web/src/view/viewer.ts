@@ -210,7 +210,7 @@ export class Viewer {
   }
 
   readAt(x: number, y: number): Reading | undefined {
-    if (this.mode?.flat) return this.pagesView.readAt(x, y);
+    if (this.mode?.flat) return this.shown && this.pagesView.readAt(this.shown, x, y);
     const hit = this.shown && pickSurface(this.shown, this.rig.camera, x, y);
     const { shownData } = this.layouts;
     const errors = shownData?.quantity === 'error' ? shownData.pages : undefined;
@@ -271,7 +271,10 @@ export class Viewer {
     this.pace.turn(now);
     this.pace.ended(now, this.fences.poll(now));
     const taken = (this.set?.takeUp(tileMs) ?? 0) + (this.dataSet?.takeUp(tileMs) ?? 0);
-    if (taken > 0) this.invalidate();
+    if (taken > 0) {
+      this.invalidate();
+      this.pace.lightCame(now);
+    }
     this.promote(now);
     if (this.rig.update(seconds)) this.invalidate();
     if (this.people?.step(seconds, this.rig.sceneSize * PERSON_SIZE)) this.wanted = true;
