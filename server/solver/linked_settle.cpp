@@ -154,8 +154,11 @@ bool LinkedSolver::finishEdit() {
   if ((net_unshot_ > 0.0 || gathers()) &&
       std::ranges::none_of(shooters, [](const Shooter& shooter) { return shooter.owes(); })) {
     // Where nothing needs links that are not there, the solution over those that are is the end already.
-    startGrowth();
-    wanted_ = plan();
+    {
+      const AllUnshot all(*this);
+      startGrowth();
+      wanted_ = plan();
+    }
     growing_ = !wanted_.empty() && (wantsLamp() || !mayGoWithout());
   }
   assessStep();

@@ -138,22 +138,6 @@ Result<void> LinkedSolver::measureSlice() {
   return {};
 }
 
-/// While it lives unshot light is what no shooter stands for, whether rays bring it or not.
-class LinkedSolver::AllUnshot {
- public:
-  explicit AllUnshot(LinkedSolver& solver) : solver_(solver) {
-    if (solver_.gathers()) solver_.findUnshot(Unshot::kByRaysToo);
-  }
-  ~AllUnshot() {
-    if (solver_.gathers()) solver_.tryNow([this] { solver_.findUnshot(); });
-  }
-  AllUnshot(const AllUnshot&) = delete;
-  AllUnshot& operator=(const AllUnshot&) = delete;
-
- private:
-  LinkedSolver& solver_;
-};
-
 void LinkedSolver::startGrowth() {
   const AllUnshot all(*this);
   planner_.setShare(powerToShoot() * share_part_);

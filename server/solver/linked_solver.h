@@ -187,7 +187,27 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] bool settle();
   enum class Unshot { kNotByRays, kByRaysToo };
   void findUnshot(Unshot which = Unshot::kNotByRays);
-  class AllUnshot;
+  /// While it lives unshot light is what no shooter stands for, whether rays bring it or not. Within another of its
+  /// kind it does nothing.
+  class AllUnshot {
+   public:
+    explicit AllUnshot(LinkedSolver& solver) : solver_(solver), is_outer_(solver.gathers() && !solver.all_unshot_) {
+      if (!is_outer_) return;
+      solver_.findUnshot(Unshot::kByRaysToo);
+      solver_.all_unshot_ = true;
+    }
+    ~AllUnshot() {
+      if (!is_outer_) return;
+      solver_.all_unshot_ = false;
+      solver_.tryNow([this] { solver_.findUnshot(); });
+    }
+    AllUnshot(const AllUnshot&) = delete;
+    AllUnshot& operator=(const AllUnshot&) = delete;
+
+   private:
+    LinkedSolver& solver_;
+    bool is_outer_;
+  };
   [[nodiscard]] bool wantsLamp() const;
   [[nodiscard]] bool sideShines(std::uint32_t side) const;
   void assessStep();
@@ -273,6 +293,7 @@ class LinkedSolver final : public Solver {
   std::uint32_t rounds_ = 0;
   std::uint64_t solutions_ = 0, sweeps_ = 0, replayed_ = 0;
   double varying_ = 0.0, net_unshot_ = 0.0;           // flux, all channels
+  bool all_unshot_ = false;                           // an AllUnshot lives
   double varying_share_ = 0.0;                        // of the residual, what light that varies inside shooters causes
   std::array<std::vector<glm::vec3>, 2> half_;        // irradiance by leaf value
   std::array<std::vector<glm::vec3>, 2> over_links_;  // of a new solution, while what rays bring is solved for
