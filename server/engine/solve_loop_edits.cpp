@@ -221,7 +221,7 @@ void SolveLoop::announceEdit(const PatchOutcome& outcome, const std::string& pat
     } else {
       updateStatus(true);
     }
-    publishLightmaps(false);
+    if (!showsNothingNew()) publishLightmaps(false);
   });
   if (shown) return;
   unpublished_ = true;

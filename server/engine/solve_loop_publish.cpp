@@ -39,6 +39,15 @@ void SolveLoop::publishLightmaps(bool final) {
   next_publish_ = Clock::now() + publishPause(threadTime() - begin);
 }
 
+/// Until the next slices have solved for other light or colours irradiance is what was published before; pages of it
+/// would take a tenth of the time that such an edit does. Other quantities have other colours at once.
+bool SolveLoop::showsNothingNew() const {
+  if (!lit_ || state_ != SolveState::kSolving || !lit_->showsOwnLight() || !lit_->solver().isUnsettled() ||
+      lit_->solver().isRepairing() || !publisher_.latest(Quantity::kIrradiance))
+    return false;
+  return std::ranges::none_of(kQuantities, [&](auto q) { return q != Quantity::kIrradiance && watches_.wants(q); });
+}
+
 /// After pages that took so long: never longer than the solve is old, where that leaves it most of its time.
 auto SolveLoop::publishPause(Clock::duration took) const -> Clock::duration {
   const auto age = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds_));
