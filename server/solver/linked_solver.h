@@ -159,6 +159,7 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] double noiseBetweenHalves(const Repair& repair, std::span<const LinkColumn::ValueRun> leaves) const;
   [[nodiscard]] bool lightsAreTooRough();
   [[nodiscard]] Result<StepOutcome> catchUp();
+  [[nodiscard]] std::uint32_t shotsOf(const Repair& repair) const;
   [[nodiscard]] bool isNeeded(Repair& repair);
   void addSamples(const Repair& repair, ShotBatch& batch) const;
   void findCutLinks(RepairBatch& repairs) const;
@@ -265,6 +266,7 @@ class LinkedSolver final : public Solver {
   std::vector<Repair> repairs_;         // after an edit of geometry
   std::size_t repaired_ = 0;            // of these
   std::size_t due_ = 0;                 // of these, before anything else is done
+  double repair_shot_seconds_ = 0.0;    // as the last of them took; 0: not known
   double postponed_ = 0.0;              // part of the target error that the others may cause
   double roughness_ = 0.0;              // likewise: lights that look again with some points only
   bool lights_may_be_rough_ = true;     // that they may
