@@ -102,6 +102,7 @@ void LinkedSolver::leafUnshot(std::uint32_t s, std::vector<glm::vec3>& leaves, U
 /// After an edit: the next steps solve over the links there are. What was still to be measured will be asked for again.
 void LinkedSolver::solveAnew() {
   if (memory_.isMostlyRows(system_)) dropNodes();
+  rounds_before_edit_ = rounds_;
   wanted_.clear();
   measured_ = 0;
   settling_ = false;

@@ -326,7 +326,7 @@ StepOutcome LinkedSolver::chooseFurther() {
   const double roulette = by_links_ * std::sqrt(LinkPlanner::rouletteShare(system_));
   const bool by_share = std::hypot(roulette, left_out_) > kByShare * total;
   const double by_samples = std::sqrt(std::max(0.0, by_links_ * by_links_ - roulette * roulette));
-  if (rounds_ >= kMaxRounds) return exhausted(SolveLimit::kRounds);
+  if (!hasRounds()) return exhausted(SolveLimit::kRounds);
   if (isFull() && (by_share || by_samples < kIdleSampling * error_.residual))
     return exhausted(memory_.isFull() ? SolveLimit::kLinkMemory : SolveLimit::kPatches);
   if (by_share) {
@@ -340,6 +340,7 @@ StepOutcome LinkedSolver::chooseFurther() {
 }
 
 void LinkedSolver::setTargetError(double target) {
+  rounds_before_edit_ = rounds_;
   settings_.target_error = target;
   aim_ = std::max(aim_, target);
   planner_.setTarget(aim_);

@@ -89,7 +89,6 @@ class LinkedSolver final : public Solver {
   /// Short enough that nobody notices the wait, long enough that the workers' waiting for the last of them does not
   /// count.
   static constexpr double kSliceSeconds = 0.06;
-  static constexpr std::uint32_t kMaxRounds = 100'000;
   enum class Phase { kLights, kGrow, kImprove, kDone };
   /// Solving over links goes in slices too: which of its passes is under way.
   enum class Pass { kNone, kFirst, kSecond, kRays };
@@ -167,6 +166,8 @@ class LinkedSolver final : public Solver {
   void replacePart(RepairBatch& repairs, std::uint32_t index);
   [[nodiscard]] Result<void> repairSlice();
   [[nodiscard]] bool isFull() const;
+  /// Rounds are counted on from edit to edit, and no number of edits takes them away from those that follow.
+  [[nodiscard]] bool hasRounds() const { return rounds_ - rounds_before_edit_ < settings_.max_rounds; }
   [[nodiscard]] std::vector<Measurement> plan();
   [[nodiscard]] std::vector<Measurement> planLights();
   [[nodiscard]] bool forgetWeakest();
@@ -292,7 +293,7 @@ class LinkedSolver final : public Solver {
   double aim_ = 0.0;                  // error that is worked towards, step by step down to the target
   double share_part_ = 0.0;           // of all power, that one shooter should have
   double left_out_ = 0.0;             // relative error by nodes too weak to play roulette
-  std::uint32_t rounds_ = 0;
+  std::uint32_t rounds_ = 0, rounds_before_edit_ = 0;
   std::uint64_t solutions_ = 0, sweeps_ = 0, replayed_ = 0;
   double varying_ = 0.0, net_unshot_ = 0.0;           // flux, all channels
   bool all_unshot_ = false;                           // an AllUnshot lives
