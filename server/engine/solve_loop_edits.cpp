@@ -129,7 +129,7 @@ Result<PatchOutcome> SolveLoop::applyStep(const StepRequest& request) {
   if (auto ok = checkBase(request.base_revision); !ok) return tl::unexpected<Error>(ok.error());
   auto step = history_.step(request.redo, lit_->document());
   if (!step) return tl::unexpected<Error>(step.error());
-  auto edited = scene::importEdited(std::move(step->document), lit_->document());
+  auto edited = scene::importEdited(std::move(step->document), &lit_->document());
   if (!edited) return tl::unexpected<Error>(edited.error());
   auto next = history_.nextStep(revision_ + 1, request.by, request.redo);
   const auto keep = keepEdit(next, request.receipt, edited->document);

@@ -65,9 +65,9 @@ struct EditedDocument {
   Scene scene;
 };
 
-/// importScene on a document that was made from `former`: what of its JSON is as it was there is not parsed again,
-/// which is most of what importing takes. The same scene, or the same error.
-[[nodiscard]] Result<EditedDocument> importEdited(Document document, const Document& former,
+/// importScene on a document that was made from `former`, if from any: what of its JSON is as it was there is not
+/// parsed again, which is most of what importing takes. The same scene, or the same error.
+[[nodiscard]] Result<EditedDocument> importEdited(Document document, const Document* former,
                                                   const ImportLimits& limits = {});
 
 /// applyPatch and importEdited in one. `where` of an error is the JSON pointer alone; `operation` is the one that

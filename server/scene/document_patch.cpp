@@ -122,7 +122,7 @@ Result<EditedDocument> editDocument(const Document& document, const nlohmann::js
   std::vector<Tokens> touched;
   auto next = applyPatch(document, patch, uploads, limits, &touched);
   if (!next) return tl::unexpected(blame(next.error(), document.name, touched));
-  auto edited = importEdited(std::move(*next), document, limits);
+  auto edited = importEdited(std::move(*next), &document, limits);
   if (!edited) return tl::unexpected(blame(edited.error(), document.name, touched));
   return edited;
 }

@@ -283,9 +283,9 @@ Result<Scene> importScene(const Document& document, const ImportLimits& limits) 
   return import(document, nullptr, limits, model);
 }
 
-Result<EditedDocument> importEdited(Document document, const Document& former, const ImportLimits& limits) {
+Result<EditedDocument> importEdited(Document document, const Document* former, const ImportLimits& limits) {
   auto parsed = std::make_shared<ParsedModel>();
-  auto scene = import(document, &former, limits, parsed->model);
+  auto scene = import(document, former, limits, parsed->model);
   if (!scene) return tl::unexpected(scene.error());
   const auto& model = parsed->model;
   if (model.nodes.size() + model.meshes.size() + model.accessors.size() <= kMostParsed)
