@@ -108,6 +108,8 @@ class LitScene {
   [[nodiscard]] std::vector<scene::LightmapPage> pages() const;
   /// What viewers see: after an edit the light that was there before fades into pages() as these become as good.
   [[nodiscard]] std::vector<scene::LightmapPage> shownPages();
+  /// Nothing of the light before an edit is in what is shown.
+  [[nodiscard]] bool showsOwnLight() const { return old_light_.empty(); }
   /// From here on the solver's own light is shown, as good as it is.
   void endFade() {
     old_light_.clear();

@@ -225,10 +225,9 @@ void SolveLoop::endSolve(SolveState state) {
   recoveries_ = 0;
   if (queue_.closed()) return;
   if (lit_) {
-    lit_->solver().assess();
+    if (state != SolveState::kConverged) lit_->solver().assess();  // that it says of what it knows now
     if (state != SolveState::kFailed) lit_->endFade();
   }
-  updateStatus(false);
   publishLightmaps(true);
   updateStatus(true);
   // Of the short solves of a drag the next periodic one will do: thirty a second would stand in the way of the edits.

@@ -111,6 +111,7 @@ class SolveLoop final : public Engine {
 
   /// What is watched and not published yet; `final`: as a new version in any case.
   void publishLightmaps(bool final);
+  [[nodiscard]] bool showsNothingNew() const;
   [[nodiscard]] QuantityPages pagesToShow(Quantity quantity);
   void publishQuantity(Quantity quantity);
   [[nodiscard]] Clock::duration publishPause(Clock::duration took) const;

@@ -129,11 +129,11 @@ Result<PatchOutcome> SolveLoop::applyStep(const StepRequest& request) {
   if (auto ok = checkBase(request.base_revision); !ok) return tl::unexpected<Error>(ok.error());
   auto step = history_.step(request.redo, lit_->document());
   if (!step) return tl::unexpected<Error>(step.error());
-  auto scene = scene::importScene(step->document);
-  if (!scene) return tl::unexpected<Error>(scene.error());
+  auto edited = scene::importEdited(std::move(step->document), &lit_->document());
+  if (!edited) return tl::unexpected<Error>(edited.error());
   auto next = history_.nextStep(revision_ + 1, request.by, request.redo);
-  const auto keep = keepEdit(next, request.receipt, step->document);
-  auto outcome = adopt({std::move(step->document), std::move(*scene)}, keep);
+  const auto keep = keepEdit(next, request.receipt, edited->document);
+  auto outcome = adopt(std::move(*edited), keep);
   if (!outcome) return outcome;
   outcome->stepped = step->edit;
   history_.take(std::move(next));
@@ -221,7 +221,7 @@ void SolveLoop::announceEdit(const PatchOutcome& outcome, const std::string& pat
     } else {
       updateStatus(true);
     }
-    publishLightmaps(false);
+    if (!showsNothingNew()) publishLightmaps(false);
   });
   if (shown) return;
   unpublished_ = true;

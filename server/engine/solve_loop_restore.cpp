@@ -164,7 +164,10 @@ Result<std::unique_ptr<LitScene>> SolveLoop::resumedScene(const scene::Document&
     return fail(ErrorCode::kBadInput, fmt::format("it is of revision {}, and has other buffers", head.revision));
   auto then = document;
   const bool is_newest = head.gltf == textOf(document.gltf);
-  if (!is_newest) then.gltf = json::parse(head.gltf, nullptr, false);
+  if (!is_newest) {
+    then.gltf = json::parse(head.gltf, nullptr, false);
+    then.parsed.reset();
+  }
   if (then.gltf.is_discarded()) return fail(ErrorCode::kBadInput, "its document is no JSON");
   auto settings = settings_;
   settings.target_error = head.target_error;

@@ -16,6 +16,8 @@ namespace {
 constexpr double kGrazing = 2e-4;
 /// Boxes are larger by this (unit box) than what is in them: well above what rounding moves rays and positions.
 constexpr float kMargin = 1e-5F;
+/// Rays that pass the boxes around all that changed are held against so many surfaces of it one by one.
+constexpr std::size_t kMostParts = 128;
 constexpr std::uint32_t kHemisphere = 5, kAlong = kBurialWays - kFirstWayAlong;
 
 struct Turn {
@@ -33,9 +35,10 @@ const std::array<Turn, kBurialWays>& turns() {
   return all;
 }
 
-/// Whether a ray from somewhere in a box of this half size about `from` meets the other box.
-bool sweeps(const glm::dvec3& from, const glm::dvec3& half, const glm::dvec3& way, const ChangedBox& box) {
-  double near = 0.0, far = kBurialRayLength;
+/// Whether a ray of such a length from somewhere in a box of this half size about `from` meets the other box.
+bool sweeps(const glm::dvec3& from, const glm::dvec3& half, const glm::dvec3& way, double length,
+            const ChangedBox& box) {
+  double near = 0.0, far = length;
   for (int axis = 0; axis < 3; ++axis) {
     const double low = static_cast<double>(box.low[axis]) - half[axis] - from[axis];
     const double high = static_cast<double>(box.high[axis]) + half[axis] - from[axis];
@@ -73,21 +76,25 @@ bool RayFan::mayMeet(std::span<const ChangedBox> boxes) const {
     if ((ways >> way & 1U) == 0) continue;
     const auto direction = all.of(way);
     for (const auto& box : boxes) {
-      if (sweeps(middle, half, direction, box)) return true;
+      if (sweeps(middle, half, direction, reach, box)) return true;
     }
   }
   return false;
 }
 
-void RayNotes::add(const glm::dvec3& origin, const glm::vec3& normal, std::uint32_t from, std::uint32_t way) {
-  const auto same = [&](const RayFan& fan) { return fan.from == from && fan.normal == normal; };
+void RayNotes::add(const Ray& ray) {
+  const auto isWhole = [](double reach) { return reach >= kBurialRayLength; };
+  const auto same = [&](const RayFan& fan) {
+    return fan.from == ray.from && fan.normal == ray.normal && isWhole(fan.reach) == isWhole(ray.reach);
+  };
   auto fan = std::ranges::find_if(fans_, same);
   if (fan == fans_.end()) {
-    fans_.push_back({{}, normal, from, 0});
+    fans_.push_back({{}, ray.normal, ray.from, 0, 0.0});
     fan = std::prev(fans_.end());
   }
-  fan->origins.add(glm::vec3(origin));
-  fan->ways |= 1U << way;
+  fan->origins.add(glm::vec3(ray.origin));
+  fan->ways |= 1U << ray.way;
+  fan->reach = std::max(fan->reach, ray.reach);
 }
 
 void BurialRecord::sort() {
@@ -119,6 +126,7 @@ FormerBurial::FormerBurial(const PatchScene& before, const BurialRecord& record,
   for (std::uint32_t s = 0; s < before.surfaces.size(); ++s) {
     if (!stayed[s] && record.solid[s]) add(before.surfaces[s]);
   }
+  if (boxes_.size() <= kMostParts) parts_ = boxes_;
   joinBoxes(boxes_);
 }
 
@@ -127,7 +135,7 @@ const BurialRecord::Leaf* FormerBurial::find(std::uint32_t surface, std::uint32_
   const auto former = surface_before_[surface];
   if (former == kNone || record_.covered[former] || record_.few != few) return nullptr;
   const auto* found = record_.find(before_.surfaces[former].first_leaf + leaf, side, pass);
-  const auto meets = [&](const RayFan& fan) { return fan.mayMeet(boxes_); };
+  const auto meets = [&](const RayFan& fan) { return fan.mayMeet(boxes_) && (parts_.empty() || fan.mayMeet(parts_)); };
   return found == nullptr || std::ranges::any_of(found->fans, meets) ? nullptr : found;
 }
 

@@ -39,16 +39,24 @@ struct RayFan {
   glm::vec3 normal{0.0F};
   std::uint32_t from = kNone;  ///< the triangle that they start from, of some list; kNone: the leaf's own
   std::uint32_t ways = 0;      ///< bits
+  double reach = 0.0;          ///< what lies farther away decided nothing
 
   /// False: none of the rays comes near any of the boxes.
   [[nodiscard]] bool mayMeet(std::span<const ChangedBox> boxes) const;
 };
 
-/// Notes rays. Those that start from other triangles become fans of their own.
+/// Notes rays. Those that start from other triangles become fans of their own, and so do those that end early: from
+/// within a solid it decides where they leave it, and nothing beyond.
 class RayNotes {
  public:
+  struct Ray {
+    glm::dvec3 origin;
+    glm::vec3 normal;
+    std::uint32_t from, way;
+    double reach;
+  };
   void clear() { fans_.clear(); }
-  void add(const glm::dvec3& origin, const glm::vec3& normal, std::uint32_t from, std::uint32_t way);
+  void add(const Ray& ray);
   [[nodiscard]] const std::vector<RayFan>& fans() const { return fans_; }
 
  private:
@@ -106,6 +114,7 @@ class FormerBurial {
   const PatchScene& after_;
   std::vector<std::uint32_t> surface_before_;
   std::vector<ChangedBox> boxes_;  ///< where a solid was or is that is not the same
+  std::vector<ChangedBox> parts_;  ///< the same, each surface by itself; empty: too many
 };
 
 /// As buildPatchScene(), and how burial was found, for edits. `record`: that of the former scene, if it was kept: what

@@ -24,7 +24,7 @@ constexpr std::size_t kMeasuredAtOnce = 65536, kFewestAShare = 64;
 constexpr std::size_t kFewestSurfaces = 32;
 /// Of more leaves it is not kept how they were found, nor where that takes more, and from more places than these rays
 /// were cast for hardly any.
-constexpr std::size_t kMostRecorded = 50'000, kMostRecordedBytes = std::size_t{16} << 20, kMostFans = 64;
+constexpr std::size_t kMostRecorded = 80'000, kMostRecordedBytes = std::size_t{16} << 20, kMostFans = 64;
 
 /// Boxes around the nodes of one surface, for the question where other solids come near.
 class NodeBoxes {
@@ -275,7 +275,8 @@ class Burial {
 
   /// All of the leaf is visible, as one look from all of it at once shows: most are, beside the few that a solid
   /// covers.
-  [[nodiscard]] bool isOpen(const Contact& contact, std::size_t first_piece, std::size_t end_piece) const {
+  [[nodiscard]] bool isOpen(const Contact& contact, std::size_t first_piece, std::size_t end_piece,
+                            RayNotes& notes) const {
     const auto triangle = patches_.leaves[leafOf(contact)].triangle;
     const auto normal = facing(triangle, contact.side);
     const glm::dvec2 corner(contact.x, contact.y);
@@ -290,7 +291,10 @@ class Burial {
       if (!add(pieces_[piece].triangle)) return false;
     }
     if (contact.side == 0 && coincidence_.mayCover(contact.surface, box)) return false;
-    return !solids_.mayBury(box, normal);
+    if (solids_.mayBury(box, normal)) return false;
+    for (const auto& end : {box.min, box.max})
+      notes.add({glm::dvec3(end) + kBurialLift * glm::dvec3(normal), normal, kNone, 0, kBurialRayLength});
+    return true;
   }
 
   /// Visible area of one leaf and side from `count` samples; none where all of it is visible.
@@ -299,7 +303,7 @@ class Burial {
     const LeafPoint point = patches_.leaves[leaf];
     const std::size_t first = first_piece_[leaf], end = first_piece_[leaf + 1];
     const glm::dvec2 corner(contact.x, contact.y);
-    if (isOpen(contact, first, end)) return std::nullopt;
+    if (isOpen(contact, first, end, scratch.notes)) return std::nullopt;
     auto& parts = scratch.parts;
     parts.assign(std::max<std::size_t>(1, end - first), Part{});
     LeafPoint visible;

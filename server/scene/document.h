@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <span>
 #include <string>
@@ -27,11 +28,15 @@ struct ImportLimits {
   std::size_t max_nodes = std::size_t{1} << 20;
 };
 
+struct ParsedModel;  // import_model.h
+
 struct Document {
   std::string name;                  ///< for messages: "room.glb"
   nlohmann::json gltf;               ///< defaults materialised, `matrix` turned into TRS (protocol.md)
   std::vector<SharedBytes> buffers;  ///< one for each /buffers entry
   std::vector<SharedBytes> images;   ///< encoded bytes (PNG, JPEG), one for each /images entry
+  /// Of `gltf` as it is, by importEdited(); null: not known, or too large. Whoever changes `gltf` lets it go.
+  std::shared_ptr<const ParsedModel> parsed = {};
 };
 
 /// Reads .glb or .gltf. External buffers and images are read from the file's own folder and nowhere above it.
@@ -60,7 +65,12 @@ struct EditedDocument {
   Scene scene;
 };
 
-/// applyPatch and importScene in one. `where` of an error is the JSON pointer alone; `operation` is the one that
+/// importScene on a document that was made from `former`, if from any: what of its JSON is as it was there is not
+/// parsed again, which is most of what importing takes. The same scene, or the same error.
+[[nodiscard]] Result<EditedDocument> importEdited(Document document, const Document* former,
+                                                  const ImportLimits& limits = {});
+
+/// applyPatch and importEdited in one. `where` of an error is the JSON pointer alone; `operation` is the one that
 /// failed, or the one whose path lies nearest to what makes the result no scene.
 [[nodiscard]] Result<EditedDocument> editDocument(const Document& document, const nlohmann::json& patch,
                                                   const FindUpload& uploads = {}, const ImportLimits& limits = {});

@@ -122,9 +122,9 @@ Result<EditedDocument> editDocument(const Document& document, const nlohmann::js
   std::vector<Tokens> touched;
   auto next = applyPatch(document, patch, uploads, limits, &touched);
   if (!next) return tl::unexpected(blame(next.error(), document.name, touched));
-  auto scene = importScene(*next, limits);
-  if (!scene) return tl::unexpected(blame(scene.error(), document.name, touched));
-  return EditedDocument{std::move(*next), std::move(*scene)};
+  auto edited = importEdited(std::move(*next), &document, limits);
+  if (!edited) return tl::unexpected(blame(edited.error(), document.name, touched));
+  return edited;
 }
 
 }  // namespace radiosity::scene

@@ -1,31 +1,63 @@
 #include "server/scene/import_model.h"
 
+#include <algorithm>
 #include <array>
 #include <limits>
+#include <span>
+#include <vector>
 
 #include "server/scene/json_text.h"
 
 namespace radiosity::scene {
 namespace {
 
-constexpr std::array<const char*, 12> kKept = {"asset",          "accessors", "bufferViews", "cameras",
-                                               "extensionsUsed", "scene",     "materials",   "meshes",
-                                               "samplers",       "scenes",    "nodes",       "textures"};
+/// Members of a document that are parsed together, or not at all, and what they become.
+struct Part {
+  std::array<const char*, 3> members;
+  void (*take)(const tinygltf::Model& from, tinygltf::Model& to);
+};
+/// tinygltf looks from meshes to their accessors and views.
+const std::array kParts = {
+    Part{{"accessors", "bufferViews", "meshes"},
+         [](const tinygltf::Model& from, tinygltf::Model& to) {
+           to.accessors = from.accessors;
+           to.bufferViews = from.bufferViews;
+           to.meshes = from.meshes;
+         }},
+    Part{{"nodes"}, [](const tinygltf::Model& from, tinygltf::Model& to) { to.nodes = from.nodes; }},
+    Part{{"materials"}, [](const tinygltf::Model& from, tinygltf::Model& to) { to.materials = from.materials; }},
+};
+/// These are small.
+constexpr std::array kAlways = {"asset", "cameras", "extensionsUsed", "samplers", "scene", "scenes", "textures"};
 
-/// The part of the JSON that tinygltf is to see. It copies extras and extensions into values of its own; ours are read
-/// from Document::gltf, so they need not go there, except lights.
-Json reduced(const Json& gltf) {
-  Json out = Json::object();
-  for (const auto* member : kKept) {
-    if (const auto found = gltf.find(member); found != gltf.end()) out[member] = *found;
+bool isSame(const Part& part, const Json& a, const Json& b) {
+  return std::ranges::all_of(part.members, [&](const char* member) {
+    if (member == nullptr) return true;
+    const auto in_a = a.find(member), in_b = b.find(member);
+    return in_a == a.end() || in_b == b.end() ? (in_a == a.end()) == (in_b == b.end()) : *in_a == *in_b;
+  });
+}
+
+void addMember(const Json& gltf, const char* member, Json& out) {
+  const auto found = gltf.find(member);
+  if (found == gltf.end()) return;
+  auto& copy = out[member] = *found;
+  if (!copy.is_array()) return;
+  for (auto& entry : copy) {
+    if (!entry.is_object()) continue;
+    entry.erase("extras");
+    entry.erase("extensions");
   }
-  for (auto& [key, list] : out.items()) {
-    if (!list.is_array()) continue;
-    for (auto& entry : list) {
-      if (!entry.is_object()) continue;
-      entry.erase("extras");
-      entry.erase("extensions");
-    }
+}
+
+/// The part of the JSON that tinygltf is to see: `parts`, and what is always parsed. It copies extras and extensions
+/// into values of its own; ours are read from Document::gltf, so they need not go there, except lights.
+Json reduced(const Json& gltf, std::span<const Part* const> parts) {
+  Json out = Json::object();
+  for (const auto* member : kAlways) addMember(gltf, member, out);
+  for (const auto* part : parts) {
+    for (const auto* member : part->members)
+      if (member != nullptr) addMember(gltf, member, out);
   }
   const auto extensions = gltf.value("extensions", Json::object());
   if (extensions.contains("KHR_lights_punctual")) {
@@ -50,6 +82,7 @@ void addZeroView(Json& gltf) {
   }
 }
 
+/// `gltf`: as it was parsed.
 bool sameShape(const tinygltf::Model& model, const Json& gltf) {
   const auto size = [&](const char* list) { return gltf.contains(list) ? gltf[list].size() : 0; };
   if (model.nodes.size() != size("nodes") || model.meshes.size() != size("meshes") ||
@@ -81,9 +114,13 @@ bool refuseImage(tinygltf::Image*, int, std::string*, std::string*, int, int, co
 
 }  // namespace
 
-Result<tinygltf::Model> parseModel(const Document& document) {
-  auto json = reduced(document.gltf);
-  addZeroView(json);
+Result<tinygltf::Model> parseModel(const Document& document, const Document* former) {
+  const bool is_known = former != nullptr && former->parsed != nullptr;
+  std::vector<const Part*> parsed, taken;
+  for (const auto& part : kParts)
+    (is_known && isSame(part, document.gltf, former->gltf) ? taken : parsed).push_back(&part);
+  auto json = reduced(document.gltf, parsed);
+  if (std::ranges::find(parsed, &kParts[0]) != parsed.end()) addZeroView(json);
   const auto text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
   if (text.size() > std::numeric_limits<unsigned>::max()) {
     return fail(ErrorCode::kTooLarge, "JSON has more than 4 GiB", document.name);
@@ -99,6 +136,7 @@ Result<tinygltf::Model> parseModel(const Document& document) {
   if (!ok || !sameShape(model, json)) {
     return fail(ErrorCode::kInvalidScene, "tinygltf cannot read it: " + error, place(document.name, "/"));
   }
+  for (const auto* part : taken) part->take(former->parsed->model, model);
   return model;
 }
 

@@ -4,7 +4,9 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/gtc/type_ptr.hpp>
+#include <memory>
 #include <numbers>
+#include <utility>
 
 #include "server/scene/import_check.h"
 #include "server/scene/import_context.h"
@@ -12,12 +14,15 @@
 #include "server/scene/import_lint.h"
 #include "server/scene/import_material.h"
 #include "server/scene/import_mesh.h"
+#include "server/scene/import_model.h"
 #include "server/scene/import_schema.h"
 
 namespace radiosity::scene {
 namespace {
 
 constexpr double kMaxSkyNits = 1e12;
+/// Of more nodes, meshes and accessors, about a kilobyte each, it is not kept what they were parsed to.
+constexpr std::size_t kMostParsed = 20'000;
 constexpr double kMinTexelScale = 1.0 / 64.0, kMaxTexelScale = 64.0;
 
 glm::dmat4 localMatrix(const tinygltf::Node& node) {
@@ -253,21 +258,39 @@ Result<void> importSky(ImportContext& context) {
   return {};
 }
 
-}  // namespace
-
-Result<Scene> importScene(const Document& document, const ImportLimits& limits) {
+/// `model`: gets what tinygltf knows of the document.
+Result<Scene> import(const Document& document, const Document* former, const ImportLimits& limits,
+                     tinygltf::Model& model) {
   Scene scene;
   if (auto ok = checkSchema(document.gltf, document.name, scene.warnings); !ok) return tl::unexpected(ok.error());
   if (auto ok = checkExtensions(document.gltf, document.name, scene.warnings); !ok) return tl::unexpected(ok.error());
-  const auto model = parseModel(document);
-  if (!model) return tl::unexpected(model.error());
-  ImportContext context{document, limits, *model, scene};
+  auto parsed = parseModel(document, former);
+  if (!parsed) return tl::unexpected(parsed.error());
+  model = std::move(*parsed);
+  ImportContext context{document, limits, model, scene};
   if (auto ok = checkModel(context); !ok) return tl::unexpected(ok.error());
   if (auto ok = importMaterials(context); !ok) return tl::unexpected(ok.error());
   if (auto ok = NodeWalk(context).run(); !ok) return tl::unexpected(ok.error());
   if (auto ok = importSky(context); !ok) return tl::unexpected(ok.error());
   warnAboutOddities(context);
   return scene;
+}
+
+}  // namespace
+
+Result<Scene> importScene(const Document& document, const ImportLimits& limits) {
+  tinygltf::Model model;
+  return import(document, nullptr, limits, model);
+}
+
+Result<EditedDocument> importEdited(Document document, const Document* former, const ImportLimits& limits) {
+  auto parsed = std::make_shared<ParsedModel>();
+  auto scene = import(document, former, limits, parsed->model);
+  if (!scene) return tl::unexpected(scene.error());
+  const auto& model = parsed->model;
+  if (model.nodes.size() + model.meshes.size() + model.accessors.size() <= kMostParsed)
+    document.parsed = std::move(parsed);
+  return EditedDocument{std::move(document), std::move(*scene)};
 }
 
 }  // namespace radiosity::scene

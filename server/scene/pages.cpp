@@ -206,32 +206,45 @@ class PageMaker {
       }
   }
 
-  /// Plain dilation of what is left of the gutters, for coarser mips and imprecise lookups.
+  /// Plain dilation of what is left of the gutters, for coarser mips and imprecise lookups. After the first round only
+  /// what lies beside what it found can come next.
   void dilate(LightmapPage& page, PageOwners& owners) const {
-    const int width = page.irradiance.width, height = page.irradiance.height;
-    for (int round = 0; round < 4; ++round) {
+    constexpr int kRounds = 4;
+    std::vector<std::size_t> empty;
+    for (std::size_t i = 0; i < owners.surface.size(); ++i)
+      if (owners.surface[i] == kNone) empty.push_back(i);
+    for (int round = 0; round < kRounds && !empty.empty(); ++round) {
       std::vector<std::pair<std::size_t, glm::vec3>> found;
-      for (int y = 0; y < height; ++y)
-        for (int x = 0; x < width; ++x) {
-          const std::size_t i = page.irradiance.index(x, y);
-          if (owners.surface[i] != kNone) continue;
-          glm::vec3 sum(0.0F);
-          float weight = 0.0F;
-          for (int ny = std::max(0, y - 1); ny <= std::min(height - 1, y + 1); ++ny)
-            for (int nx = std::max(0, x - 1); nx <= std::min(width - 1, x + 1); ++nx) {
-              const std::size_t n = page.irradiance.index(nx, ny);
-              if (owners.surface[n] == kNone) continue;
-              sum += page.irradiance.pixels[n];
-              weight += 1.0F;
-            }
-          if (weight > 0.0F) found.emplace_back(i, sum / weight);
-        }
-      if (found.empty()) return;
+      for (const auto i : empty) {
+        glm::vec3 sum(0.0F);
+        float weight = 0.0F;
+        aroundTexel(page.irradiance, i, [&](std::size_t n) {
+          if (owners.surface[n] == kNone) return;
+          sum += page.irradiance.pixels[n];
+          weight += 1.0F;
+        });
+        if (weight > 0.0F) found.emplace_back(i, sum / weight);
+      }
+      empty.clear();
       for (const auto& [i, value] : found) {
         page.irradiance.pixels[i] = value;
         owners.surface[i] = kNone - 1;
       }
+      for (const auto& [i, value] : found)
+        aroundTexel(page.irradiance, i, [&](std::size_t n) {
+          if (owners.surface[n] == kNone) empty.push_back(n);
+        });
+      std::ranges::sort(empty);
+      empty.erase(std::ranges::unique(empty).begin(), empty.end());
     }
+  }
+
+  /// A texel and its neighbours.
+  template <typename Take>
+  static void aroundTexel(const Image& image, std::size_t i, const Take& take) {
+    const int x = static_cast<int>(i) % image.width, y = static_cast<int>(i) / image.width;
+    for (int ny = std::max(0, y - 1); ny <= std::min(image.height - 1, y + 1); ++ny)
+      for (int nx = std::max(0, x - 1); nx <= std::min(image.width - 1, x + 1); ++nx) take(image.index(nx, ny));
   }
 
   const PatchScene& patches_;

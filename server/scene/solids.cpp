@@ -6,6 +6,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
+#include <optional>
 #include <tuple>
 #include <utility>
 
@@ -20,6 +21,10 @@ constexpr float kSameWay = 0.9999F;
 constexpr double kSamePlane = 2e-5;
 /// So many places of a leaf are looked at for what covers it.
 constexpr std::uint32_t kPlaces = 16;
+/// Rays first look for the end of a solid so near (unit box), where few triangles are.
+constexpr double kSmallSolid = 0.1;
+/// Hits so near to each other are one, on an edge.
+constexpr double kSameHit = 1e-9;
 
 /// Of a position in the triangle's plane.
 glm::vec2 texelAt(const TriangleFrame& frame, const glm::vec3& position) {
@@ -27,6 +32,21 @@ glm::vec2 texelAt(const TriangleFrame& frame, const glm::vec3& position) {
   const double uu = glm::dot(u, u), uv = glm::dot(u, v), vv = glm::dot(v, v);
   const double along_u = glm::dot(way, u), along_v = glm::dot(way, v), determinant = uu * vv - uv * uv;
   return {(along_u * vv - along_v * uv) / determinant, (along_v * uu - along_u * uv) / determinant};
+}
+
+/// Where a ray that meets these leaves the solid that it started in, if in one.
+std::optional<double> endOfSolid(const Hits& hits) {
+  int depth = 0;
+  double last = -1.0;
+  bool last_front = false;
+  for (const RayHit& hit : hits) {
+    if (last_front == hit.front && hit.t - last < kSameHit) continue;  // the edge between two triangles
+    last = hit.t;
+    last_front = hit.front;
+    depth += hit.front ? 1 : -1;
+    if (depth < 0) return hit.t;
+  }
+  return std::nullopt;
 }
 
 }  // namespace
@@ -64,8 +84,7 @@ bool Solids::mayBury(const Bounds& positions, const glm::vec3& normal) const {
 bool Solids::raysLeave(const Start& start, Hits& hits, RayNotes* notes) const {
   const BurialWays ways(start.normal);
   for (std::uint32_t way = 0; way < kFirstWayAlong; ++way) {
-    if (notes != nullptr) notes->add(start.origin, start.normal, start.triangle, way);
-    if (!leavesSolid(start.origin, ways.of(way), hits)) return false;
+    if (!leavesSolid(start, way, ways.of(way), hits, notes)) return false;
   }
   return true;
 }
@@ -75,9 +94,8 @@ bool Solids::raysLeave(const Start& start, Hits& hits, RayNotes* notes) const {
 bool Solids::seesOutAlong(const Start& start, Hits& hits, RayNotes* notes) const {
   const BurialWays ways(start.normal);
   for (auto way = kFirstWayAlong; way < kBurialWays; ++way) {
-    if (notes != nullptr) notes->add(start.origin, start.normal, start.triangle, way);
     const auto direction = ways.of(way);
-    if (leavesSolid(start.origin, direction, hits)) continue;
+    if (leavesSolid(start, way, direction, hits, notes)) continue;
     if (hits.empty()) return true;
     const RayHit first = hits.front();
     const glm::vec3 facing = normal_[first.triangle];
@@ -88,22 +106,21 @@ bool Solids::seesOutAlong(const Start& start, Hits& hits, RayNotes* notes) const
 }
 
 /// Walks a ray to the end: +1 for every solid entered (front), -1 for every one left (back); below zero, the origin
-/// was inside. Leaves what it met in `hits`, in order, which no other part of the scene changes.
-bool Solids::leavesSolid(const glm::dvec3& origin, const glm::dvec3& direction, Hits& hits) const {
-  hits.clear();
-  tree_.collectHits(origin, direction, 0.0, kBurialRayLength, hits);
-  std::ranges::sort(hits, {}, [](const RayHit& hit) { return std::tuple(hit.t, hit.front, hit.triangle); });
-  int depth = 0;
-  double last = -1.0;
-  bool last_front = false;
-  for (const RayHit& hit : hits) {
-    if (last_front == hit.front && hit.t - last < 1e-9) continue;  // the edge between two triangles
-    last = hit.t;
-    last_front = hit.front;
-    depth += hit.front ? 1 : -1;
-    if (depth < 0) return true;
-  }
-  return false;
+/// was inside. Then nothing farther away matters, and most solids are small. Otherwise leaves what it met in `hits`, in
+/// order, which no other part of the scene changes.
+bool Solids::leavesSolid(const Start& start, std::uint32_t way, const glm::dvec3& direction, Hits& hits,
+                         RayNotes* notes) const {
+  const auto meet = [&](double length) {
+    hits.clear();
+    tree_.collectHits(start.origin, direction, 0.0, length, hits);
+    std::ranges::sort(hits, {}, [](const RayHit& hit) { return std::tuple(hit.t, hit.front, hit.triangle); });
+    return endOfSolid(hits);
+  };
+  std::optional<double> end;
+  if (way != 0) end = meet(kSmallSolid);  // of most places the first ray finds that they are in no solid
+  if (!end) end = meet(kBurialRayLength);
+  if (notes != nullptr) notes->add({start.origin, start.normal, start.triangle, way, end.value_or(kBurialRayLength)});
+  return end.has_value();
 }
 
 Coincidence::Coincidence(PatchScene& patches) : patches_(patches) {

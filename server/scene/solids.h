@@ -53,7 +53,8 @@ class Solids {
   };
   [[nodiscard]] bool raysLeave(const Start& start, Hits& hits, RayNotes* notes) const;
   [[nodiscard]] bool seesOutAlong(const Start& start, Hits& hits, RayNotes* notes) const;
-  [[nodiscard]] bool leavesSolid(const glm::dvec3& origin, const glm::dvec3& direction, Hits& hits) const;
+  [[nodiscard]] bool leavesSolid(const Start& start, std::uint32_t way, const glm::dvec3& direction, Hits& hits,
+                                 RayNotes* notes) const;
 
   Bvh tree_;
   std::vector<std::uint32_t> surface_;  ///< by triangle of the tree

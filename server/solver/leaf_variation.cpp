@@ -22,7 +22,7 @@ constexpr double kSurely = 2.0;
 constexpr double kDoubtful = 0.1;
 /// A receiver never has more paths than these; a round of refinement adds no more than those in all.
 constexpr std::uint32_t kMostPaths = 4096, kMostAdded = 16'384;
-/// And all together never more than these, 50 MB.
+/// And all together never more than these, 56 MB, and 16 MB for lights that shone before.
 constexpr std::size_t kMostInAll = 1'000'000;
 /// A round of refinement is for the receivers with so much of what it could lower.
 constexpr double kRefinedPart = 0.8;
@@ -83,7 +83,7 @@ void LeafVariation::update(const LeafLight& light, double bound) {
   for (std::size_t i = 0; i < light.sources.size(); ++i)
     if (light.sources[i].intensity != glm::dvec3(0.0))
       shining = mixKeys(shining, mixKeys(~i, light.sources[i].shapeKey()));
-  if (is_traced_ && shining != traced_for_) followOtherLights(light);
+  if (is_traced_ && shining != traced_for_) takeOtherLights(light, shining);
   traced_for_ = shining;
   if (!is_traced_) {
     wanted_.clear();

@@ -89,6 +89,11 @@ class LeafVariation {
     std::uint16_t index = 0;                          ///< which one of the receiver's, in its half
     bool sees_near = false;                           ///< one of `seen` is near, and may vary within itself
   };
+  /// Of a path: what it has of the lights that shine.
+  struct Lit {
+    std::uint32_t light, source;
+    float light_factor, source_factor;
+  };
   /// Irradiance that a receiver lacks: what is sure, and what comes over a second leaf near by, of whose light the mean
   /// is known. In a gap between bright surfaces that may be as wrong as what it is to correct.
   struct Lack {
@@ -114,7 +119,8 @@ class LeafVariation {
   void trace(std::span<const Task> tasks, const LeafLight& light);
   void follow(const Task& task, std::size_t half, const LeafLight& light, std::vector<Path>& paths) const;
   void followLights(const std::array<Place, 2>& places, const LeafLight& light, Path& path) const;
-  void followOtherLights(const LeafLight& light);
+  void takeOtherLights(const LeafLight& light, std::uint64_t shining);
+  void followOtherLights(const LeafLight& light, std::size_t half, std::size_t first);
   /// Of the scene before: a path that there was.
   struct Known {
     std::uint64_t number = 0;           ///< numberOf()
@@ -142,13 +148,15 @@ class LeafVariation {
   const std::vector<Side>& sides_;
   LeafRays rays_;
   std::uint64_t seed_;
-  std::vector<std::uint32_t> receivers_;    ///< leaf values, ascending
-  double stands_for_ = 1.0;                 ///< leaves, for each receiver
-  std::vector<std::uint16_t> count_;        ///< paths of each half, by receiver; empty: none were traced yet
-  std::uint64_t traced_for_ = 0;            ///< which lights
-  bool is_traced_ = false;                  ///< as many paths as count_ says
-  std::vector<Task> wanted_;                ///< by refine()
-  std::array<std::vector<Path>, 2> paths_;  ///< by half
+  std::vector<std::uint32_t> receivers_;        ///< leaf values, ascending
+  double stands_for_ = 1.0;                     ///< leaves, for each receiver
+  std::vector<std::uint16_t> count_;            ///< paths of each half, by receiver; empty: none were traced yet
+  std::uint64_t traced_for_ = 0;                ///< which lights
+  bool is_traced_ = false;                      ///< as many paths as count_ says
+  std::vector<Task> wanted_;                    ///< by refine()
+  std::array<std::vector<Path>, 2> paths_;      ///< by half
+  std::array<std::vector<Lit>, 2> lit_before_;  ///< of the first of them: by lights that shone before
+  std::uint64_t lit_before_for_ = 0;            ///< which
   // After an edit of geometry, until paths are traced:
   std::vector<std::uint16_t> known_;          ///< by leaf value: of so many paths it is known which there are; or empty
   std::array<std::vector<Known>, 2> there_;   ///< by half: these, ascending

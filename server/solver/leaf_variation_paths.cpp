@@ -3,6 +3,8 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
+#include <span>
+#include <utility>
 
 #include "common/parallel.h"
 #include "server/solver/leaf_variation.h"
@@ -174,16 +176,45 @@ void LeafVariation::followLights(const std::array<Place, 2>& places, const LeafL
   followSource(places, mixKeys(path.key, 4), light, path);
 }
 
-/// Other lights shine than did: where paths go stays as it is.
-void LeafVariation::followOtherLights(const LeafLight& light) {
-  for (auto& paths : paths_) {
-    inShares(paths.size() / kTasksAShare, [&](std::size_t share, std::size_t shares) {
-      std::array<Place, 2> places;
-      for (auto i = share; i < paths.size(); i += shares) {
-        if (findPlaces(paths[i].receiver, paths[i].key, places)) followLights(places, light, paths[i]);
-      }
-    });
+/// Other lights shine than did: where paths go stays as it is. Of what is switched off, and on again, it is kept what
+/// paths have of it.
+void LeafVariation::takeOtherLights(const LeafLight& light, std::uint64_t shining) {
+  std::array<std::vector<Lit>, 2> lit;
+  for (std::size_t half = 0; half < 2; ++half) {
+    lit[half].reserve(paths_[half].size());
+    for (const auto& path : paths_[half])
+      lit[half].push_back({path.light, path.source, path.light_factor, path.source_factor});
   }
+  lit.swap(lit_before_);
+  const bool is_known = std::exchange(lit_before_for_, std::exchange(traced_for_, 0)) == shining;
+  for (std::size_t half = 0; half < 2; ++half) {
+    const std::size_t known = is_known ? lit[half].size() : 0;
+    for (std::size_t i = 0; i < known; ++i) {
+      auto& path = paths_[half][i];
+      path.light = lit[half][i].light;
+      path.source = lit[half][i].source;
+      path.light_factor = lit[half][i].light_factor;
+      path.source_factor = lit[half][i].source_factor;
+    }
+    followOtherLights(light, half, known);
+  }
+}
+
+/// Paths from `first` on.
+void LeafVariation::followOtherLights(const LeafLight& light, std::size_t half, std::size_t first) {
+  const auto paths = std::span(paths_[half]).subspan(first);
+  const auto isDark = [](const auto& strength) { return strength == decltype(strength + strength)(0); };
+  if (std::ranges::all_of(light.lights, isDark, &LightPolygon::emission) &&
+      std::ranges::all_of(light.sources, isDark, &PunctualLights::Source::intensity)) {
+    for (auto& path : paths) path.light_factor = path.source_factor = 0.0F;
+    return;
+  }
+  inShares(paths.size() / kTasksAShare, [&](std::size_t share, std::size_t shares) {
+    std::array<Place, 2> places;
+    for (auto i = share; i < paths.size(); i += shares) {
+      if (findPlaces(paths[i].receiver, paths[i].key, places)) followLights(places, light, paths[i]);
+    }
+  });
 }
 
 /// The order of paths, and so the bits of their sums, does not depend on how many threads share them.

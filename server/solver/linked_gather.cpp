@@ -167,7 +167,7 @@ LinkedSolver::Noise LinkedSolver::noise() const {
 double LinkedSolver::blotch() const { return std::max(kBlotches * aim_, kUnseen); }
 
 bool LinkedSolver::refineBlotches() {
-  if (!gathers() || rounds_ >= kMaxRounds || !gather_->refine(HUGE_VAL, {kAlone * blotch(), blotch()})) return false;
+  if (!gathers() || !hasRounds() || !gather_->refine(HUGE_VAL, {kAlone * blotch(), blotch()})) return false;
   phase_ = Phase::kImprove;
   sample_goal_ = 0.0;
   return true;
@@ -175,7 +175,7 @@ bool LinkedSolver::refineBlotches() {
 
 /// More rays, more samples of links, or both, so that the target is reached at the least cost.
 StepOutcome LinkedSolver::chooseRays() {
-  if (rounds_ >= kMaxRounds) return exhausted(SolveLimit::kRounds);
+  if (!hasRounds()) return exhausted(SolveLimit::kRounds);
   phase_ = Phase::kImprove;
   sample_goal_ = 0.0;
   if (!gathers()) {

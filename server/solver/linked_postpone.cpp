@@ -133,11 +133,23 @@ bool LinkedSolver::isDueForTarget() {
   return repaired_ < due_;
 }
 
+std::uint32_t LinkedSolver::shotsOf(const Repair& repair) const {
+  if (!system_.shooters()[repair.shooter].isLight()) return repair.samples;
+  const auto [first, end] = shotsOfLight(repair);
+  return end - first;
+}
+
 /// Solved and told: the next of the links that waited, and in the end the light over all of them. An edit that comes in
-/// between need not wait for the others, nor long for those under way: an undo takes less time than a whole slice.
+/// between need not wait for the others, nor long for those under way: an undo takes less time than a whole slice, and
+/// the many points of a few lights take longer than all nodes that wait.
 Result<StepOutcome> LinkedSolver::catchUp() {
-  constexpr std::size_t kPart = 4;
-  due_ = std::min(repairs_.size(), repaired_ + std::max(fewest_a_slice_, slice_ / kPart));
+  constexpr std::size_t kFewest = 2, kPart = 4;
+  const auto most = std::min(repairs_.size() - repaired_, std::max(kFewest, slice_ / kPart));
+  double seconds = 0.0;
+  std::size_t count = 0;
+  while (count < most && (count < kFewest || seconds < kSliceSeconds / kPart))
+    seconds += repair_shot_seconds_ * shotsOf(repairs_[repaired_ + count++]);
+  due_ = repaired_ + count;
   return advance();
 }
 

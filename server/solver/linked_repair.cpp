@@ -221,11 +221,14 @@ Result<void> LinkedSolver::repairSlice() {
   const auto done = transport_.measure(shots, take);
   if (!done) return tl::unexpected<Error>(done.error());
   counters_ += *done;
+  std::uint32_t shots_taken = 0;
+  for (const auto& repair : batch.repairs) shots_taken += shotsOf(repair);
   repaired_ += batch.repairs.size();
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   slice_ = std::clamp(
       static_cast<std::size_t>(static_cast<double>(batch.repairs.size()) * kSliceSeconds / std::max(seconds, 1e-6)),
       fewest_a_slice_, kMostAtOnce);
+  repair_shot_seconds_ = seconds / std::max(1U, shots_taken);
   repairs_.insert(repairs_.begin() + static_cast<std::ptrdiff_t>(due_), batch.anew.begin(), batch.anew.end());
   due_ += batch.anew.size();
   repairs_.insert(repairs_.end(), batch.rough.begin(), batch.rough.end());

@@ -110,6 +110,7 @@ bool LinkedSolver::restore(ArchiveReader& from) {
   visit(from, *this);
   if (!(aim_ > 0.0 && aim_ <= 1.0) || !planner_.fits() || !system_.restore(from)) return false;
   planner_.setTarget(aim_);
+  rounds_before_edit_ = rounds_;
   limitLinks();
   const auto& shooters = system_.shooters();
   const auto known = [&](const Shooter& shooter) {

@@ -102,6 +102,7 @@ void LinkedSolver::leafUnshot(std::uint32_t s, std::vector<glm::vec3>& leaves, U
 /// After an edit: the next steps solve over the links there are. What was still to be measured will be asked for again.
 void LinkedSolver::solveAnew() {
   if (memory_.isMostlyRows(system_)) dropNodes();
+  rounds_before_edit_ = rounds_;
   wanted_.clear();
   measured_ = 0;
   settling_ = false;
@@ -154,8 +155,11 @@ bool LinkedSolver::finishEdit() {
   if ((net_unshot_ > 0.0 || gathers()) &&
       std::ranges::none_of(shooters, [](const Shooter& shooter) { return shooter.owes(); })) {
     // Where nothing needs links that are not there, the solution over those that are is the end already.
-    startGrowth();
-    wanted_ = plan();
+    {
+      const AllUnshot all(*this);
+      startGrowth();
+      wanted_ = plan();
+    }
     growing_ = !wanted_.empty() && (wantsLamp() || !mayGoWithout());
   }
   assessStep();

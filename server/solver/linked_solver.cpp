@@ -138,22 +138,6 @@ Result<void> LinkedSolver::measureSlice() {
   return {};
 }
 
-/// While it lives unshot light is what no shooter stands for, whether rays bring it or not.
-class LinkedSolver::AllUnshot {
- public:
-  explicit AllUnshot(LinkedSolver& solver) : solver_(solver) {
-    if (solver_.gathers()) solver_.findUnshot(Unshot::kByRaysToo);
-  }
-  ~AllUnshot() {
-    if (solver_.gathers()) solver_.tryNow([this] { solver_.findUnshot(); });
-  }
-  AllUnshot(const AllUnshot&) = delete;
-  AllUnshot& operator=(const AllUnshot&) = delete;
-
- private:
-  LinkedSolver& solver_;
-};
-
 void LinkedSolver::startGrowth() {
   const AllUnshot all(*this);
   planner_.setShare(powerToShoot() * share_part_);
@@ -342,7 +326,7 @@ StepOutcome LinkedSolver::chooseFurther() {
   const double roulette = by_links_ * std::sqrt(LinkPlanner::rouletteShare(system_));
   const bool by_share = std::hypot(roulette, left_out_) > kByShare * total;
   const double by_samples = std::sqrt(std::max(0.0, by_links_ * by_links_ - roulette * roulette));
-  if (rounds_ >= kMaxRounds) return exhausted(SolveLimit::kRounds);
+  if (!hasRounds()) return exhausted(SolveLimit::kRounds);
   if (isFull() && (by_share || by_samples < kIdleSampling * error_.residual))
     return exhausted(memory_.isFull() ? SolveLimit::kLinkMemory : SolveLimit::kPatches);
   if (by_share) {
@@ -356,6 +340,7 @@ StepOutcome LinkedSolver::chooseFurther() {
 }
 
 void LinkedSolver::setTargetError(double target) {
+  rounds_before_edit_ = rounds_;
   settings_.target_error = target;
   aim_ = std::max(aim_, target);
   planner_.setTarget(aim_);

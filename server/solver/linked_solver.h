@@ -89,7 +89,6 @@ class LinkedSolver final : public Solver {
   /// Short enough that nobody notices the wait, long enough that the workers' waiting for the last of them does not
   /// count.
   static constexpr double kSliceSeconds = 0.06;
-  static constexpr std::uint32_t kMaxRounds = 100'000;
   enum class Phase { kLights, kGrow, kImprove, kDone };
   /// Solving over links goes in slices too: which of its passes is under way.
   enum class Pass { kNone, kFirst, kSecond, kRays };
@@ -159,6 +158,7 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] double noiseBetweenHalves(const Repair& repair, std::span<const LinkColumn::ValueRun> leaves) const;
   [[nodiscard]] bool lightsAreTooRough();
   [[nodiscard]] Result<StepOutcome> catchUp();
+  [[nodiscard]] std::uint32_t shotsOf(const Repair& repair) const;
   [[nodiscard]] bool isNeeded(Repair& repair);
   void addSamples(const Repair& repair, ShotBatch& batch) const;
   void findCutLinks(RepairBatch& repairs) const;
@@ -166,6 +166,8 @@ class LinkedSolver final : public Solver {
   void replacePart(RepairBatch& repairs, std::uint32_t index);
   [[nodiscard]] Result<void> repairSlice();
   [[nodiscard]] bool isFull() const;
+  /// Rounds are counted on from edit to edit, and no number of edits takes them away from those that follow.
+  [[nodiscard]] bool hasRounds() const { return rounds_ - rounds_before_edit_ < settings_.max_rounds; }
   [[nodiscard]] std::vector<Measurement> plan();
   [[nodiscard]] std::vector<Measurement> planLights();
   [[nodiscard]] bool forgetWeakest();
@@ -187,7 +189,27 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] bool settle();
   enum class Unshot { kNotByRays, kByRaysToo };
   void findUnshot(Unshot which = Unshot::kNotByRays);
-  class AllUnshot;
+  /// While it lives unshot light is what no shooter stands for, whether rays bring it or not. Within another of its
+  /// kind it does nothing.
+  class AllUnshot {
+   public:
+    explicit AllUnshot(LinkedSolver& solver) : solver_(solver), is_outer_(solver.gathers() && !solver.all_unshot_) {
+      if (!is_outer_) return;
+      solver_.findUnshot(Unshot::kByRaysToo);
+      solver_.all_unshot_ = true;
+    }
+    ~AllUnshot() {
+      if (!is_outer_) return;
+      solver_.all_unshot_ = false;
+      solver_.tryNow([this] { solver_.findUnshot(); });
+    }
+    AllUnshot(const AllUnshot&) = delete;
+    AllUnshot& operator=(const AllUnshot&) = delete;
+
+   private:
+    LinkedSolver& solver_;
+    bool is_outer_;
+  };
   [[nodiscard]] bool wantsLamp() const;
   [[nodiscard]] bool sideShines(std::uint32_t side) const;
   void assessStep();
@@ -246,6 +268,7 @@ class LinkedSolver final : public Solver {
   std::vector<Repair> repairs_;         // after an edit of geometry
   std::size_t repaired_ = 0;            // of these
   std::size_t due_ = 0;                 // of these, before anything else is done
+  double repair_shot_seconds_ = 0.0;    // as the last of them took; 0: not known
   double postponed_ = 0.0;              // part of the target error that the others may cause
   double roughness_ = 0.0;              // likewise: lights that look again with some points only
   bool lights_may_be_rough_ = true;     // that they may
@@ -271,9 +294,10 @@ class LinkedSolver final : public Solver {
   double aim_ = 0.0;                  // error that is worked towards, step by step down to the target
   double share_part_ = 0.0;           // of all power, that one shooter should have
   double left_out_ = 0.0;             // relative error by nodes too weak to play roulette
-  std::uint32_t rounds_ = 0;
+  std::uint32_t rounds_ = 0, rounds_before_edit_ = 0;
   std::uint64_t solutions_ = 0, sweeps_ = 0, replayed_ = 0;
   double varying_ = 0.0, net_unshot_ = 0.0;           // flux, all channels
+  bool all_unshot_ = false;                           // an AllUnshot lives
   double varying_share_ = 0.0;                        // of the residual, what light that varies inside shooters causes
   std::array<std::vector<glm::vec3>, 2> half_;        // irradiance by leaf value
   std::array<std::vector<glm::vec3>, 2> over_links_;  // of a new solution, while what rays bring is solved for

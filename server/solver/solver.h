@@ -36,6 +36,8 @@ struct SolverSettings {
   /// of thousands.
   enum class Reflected { kChosen, kByLinks, kByRays };
   Reflected reflected = Reflected::kChosen;
+  /// A solve over links ends, whatever its error, so many rounds after the last edit or its start: no round helps then.
+  std::uint32_t max_rounds = 100'000;
   PlannerSettings planner;
 };
 

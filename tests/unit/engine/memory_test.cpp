@@ -27,8 +27,10 @@ class Memory : public EngineTest {
     auto options = rayOptions(script_);
     options.checkpoint_bytes = 0;
     ASSERT_NO_FATAL_FAILURE(startOn(folder_.file("state"), std::move(options)));
+    watching_ = engine().watch(engine::Quantity::kRadiosity);  // of which an edit of light makes pages at once
   }
   void restart() {
+    watching_.reset();
     engine_.reset();
     start();
   }
@@ -109,6 +111,7 @@ class Memory : public EngineTest {
   }
 
   TemporaryFolder folder_;
+  std::shared_ptr<void> watching_;
   int requests_ = 0;
 };
 

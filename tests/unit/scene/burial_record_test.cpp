@@ -160,7 +160,7 @@ TEST(BurialWays, AreTheWaysThatFansSweep) {
   for (std::uint32_t way = 0; way < kBurialWays; ++way) {
     const glm::vec3 from(0.1F, 0.2F, 0.3F), there = from + 0.4F * glm::vec3(ways.of(way));
     RayNotes notes;
-    notes.add(glm::dvec3(from), normal, kNone, way);
+    notes.add({glm::dvec3(from), normal, kNone, way, kBurialRayLength});
     const std::array met{ChangedBox{there - 0.001F, there + 0.001F}};
     EXPECT_TRUE(notes.fans().front().mayMeet(met));
     const std::array behind{ChangedBox{2.0F * from - there - 0.001F, 2.0F * from - there + 0.001F}};

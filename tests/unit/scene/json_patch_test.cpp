@@ -280,6 +280,40 @@ TEST_F(ScenePatch, aFaultOfTheSceneNamesTheOperationThatMadeIt) {
   EXPECT_EQ(fault(R"([{"op":"replace","path":"/nodes/1/rotation","value":[0,0,0,0]}])").operation, 0U);
 }
 
+/// What of an edited document is taken from the one before must be what importing it would find.
+TEST_F(ScenePatch, aChainOfEditsImportsAsEachDocumentWouldByItself) {
+  auto now = document_;
+  for (const auto* patch :
+       {R"([{"op":"replace","path":"/materials/0/emissiveFactor","value":[0.5,1,2]}])",
+        R"([{"op":"replace","path":"/nodes/@wall/translation","value":[1,2,3]}])",
+        R"([{"op":"add","path":"/materials/-","value":{"name":"new"}}])",
+        R"([{"op":"add","path":"/meshes/0/primitives/0/material","value":1}])",
+        R"([{"op":"add","path":"/nodes/-","value":{"name":"more","mesh":0,"scale":[2,2,2]}},
+            {"op":"add","path":"/scenes/0/nodes/-","value":2}])",
+        R"([{"op":"replace","path":"/nodes/@wall/extensions/KHR_node_visibility/visible","value":false}])",
+        R"([{"op":"add","path":"/extensions","value":{"KHR_lights_punctual":{"lights":[{"type":"point"}]}}},
+            {"op":"add","path":"/nodes/@lamp/extensions/KHR_lights_punctual","value":{"light":0}}])",
+        R"([{"op":"remove","path":"/nodes/@more/mesh"}])",
+        R"([{"op":"replace","path":"/materials/0/alphaMode","value":"BLEND"}])"}) {
+    const auto edited = editDocument(now, Json::parse(patch));
+    ASSERT_TRUE(edited) << patch << edited.error().text();
+    ASSERT_TRUE(edited->document.parsed);
+    now = edited->document;
+    auto alone = now;
+    alone.parsed.reset();
+    const auto fresh = importScene(alone);
+    ASSERT_TRUE(fresh) << patch;
+    EXPECT_EQ(edited->scene.materials, fresh->materials) << patch;
+    EXPECT_EQ(edited->scene.primitives, fresh->primitives) << patch;
+    EXPECT_EQ(edited->scene.instances, fresh->instances) << patch;
+    EXPECT_EQ(edited->scene.lights, fresh->lights) << patch;
+    EXPECT_EQ(edited->scene.warnings, fresh->warnings) << patch;
+  }
+  const auto refused = editDocument(now, R"([{"op":"replace","path":"/nodes/0/mesh","value":9}])"_json);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().where, "/nodes/0/mesh");
+}
+
 Json accessorPatch(const std::string& uri) {
   // A triangle: three positions of 12 bytes.
   return Json::parse(R"([{"op":"add","path":"/buffers/-","value":{"uri":")" + uri + R"("}},

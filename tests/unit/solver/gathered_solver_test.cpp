@@ -89,6 +89,24 @@ TEST(GatheredSolver, EditsOfLightAndBackGiveTheSameBits) {
   EXPECT_EQ(room.solver->irradiance(), before);
 }
 
+/// Rounds are counted over all edits; how many a solve may have begins anew with each.
+TEST(GatheredSolver, ManyEditsUseUpNoRoundsOfThoseThatFollow) {
+  auto quads = cubeQuads(6, {0, 4, 0, 0, 0, 0}, kGrey);
+  double target = 0.02;
+  Solve room(quads, target, std::size_t{1} << 30, 64);
+  room.settings.max_rounds = 30;
+  room.solver = room.make();
+  ASSERT_EQ(room.run(), StepOutcome::kConverged);
+  for (std::size_t edit = 0; edit < 40 && room.solver->rounds() <= room.settings.max_rounds; ++edit) {
+    for (auto& quad : quads) quad.emission = glm::vec3(0.0F);
+    quads[edit % 6].emission = glm::vec3(4.0F);
+    room.solver->setTargetError(target *= 0.95);  // so that it takes rounds
+    room.solver->setMaterials(makeQuadScene(quads).materials);
+    ASSERT_EQ(room.run(), StepOutcome::kConverged) << "edit " << edit << ", round " << room.solver->rounds();
+  }
+  EXPECT_GT(room.solver->rounds(), room.settings.max_rounds);
+}
+
 TEST(GatheredSolver, ScenesWithNothingToGatherEnd) {
   for (const auto& quads : {std::vector<Quad>{}, cubeQuads(4, {}, kGrey), cubeQuads(4, {0, 4, 0, 0, 0, 0}, {}),
                             std::vector<Quad>{cubeQuads(4, {1}, kGrey)[0]}}) {

@@ -158,6 +158,31 @@ TEST_F(LeafVariationTest, TheSamePathsFollowOtherLight) {
   for (std::size_t half = 0; half < 2; ++half) EXPECT_EQ(variation.correction(half)[looks], before[half]);
 }
 
+// What paths had of a lamp is kept while it is off; those that were added meanwhile know nothing of it.
+TEST_F(LeafVariationTest, PathsThatWereAddedWhileALampWasOffSeeItWhenItIsOnAgain) {
+  lamps_.push_back(lamps_[0]);
+  lamps_[1].key = 2;
+  for (auto& corner : lamps_[1].corners) corner.z *= 0.5F;
+  LeafVariation variation(*scene_.patches, sides_, 1);
+  variation.update(light(), 0.0);
+  lamps_[1].emission = glm::vec3(0.0F);
+  variation.update(light(), 0.0);
+  int added = 0;
+  for (; added < 3 && variation.refine(); ++added) variation.update(light(), 0.0);
+  ASSERT_EQ(added, 3);
+  lamps_[1].emission = glm::vec3(1.0F);
+  variation.update(light(), 0.0);
+  std::vector<std::uint32_t> same(1 + kLooks);
+  for (std::uint32_t value = 0; value < same.size(); ++value) same[value] = value;
+  LeafVariation anew(*scene_.patches, sides_, 1);
+  anew.inherit(variation, same, std::vector<bool>(same.size(), false));
+  anew.update(light(), 0.0);
+  ASSERT_TRUE(anew.corrects());
+  for (std::size_t half = 0; half < 2; ++half) {
+    for (const auto value : same) EXPECT_EQ(variation.correction(half)[value], anew.correction(half)[value]);
+  }
+}
+
 TEST_F(LeafVariationTest, AfterAnEditWhatIsClearOfItKeepsWhatItsPathsFound) {
   LeafVariation former(*scene_.patches, sides_, 1);
   former.update(light(), 0.0);
