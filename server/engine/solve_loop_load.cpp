@@ -60,26 +60,14 @@ auto SolveLoop::install(Result<scene::Document> document, const std::string& by)
     return tl::unexpected<Error>(error);
   };
   updateStatus(true);
-<<<<<<< HEAD
-  auto scene = withinMemory([&] { return scene::importScene(*document); });
-  if (!scene) return refuse(scene.error());
-  scene::EditedDocument edited{std::move(*document), std::move(*scene)};
-  if (wantsFirstLight(edited.scene)) {
-    if (withinMemory([&] { return showFirstLight(edited, by); })) return std::nullopt;
-    first_light_.reset();  // then all at once, or the reason why not
-    lit_.reset();
-  }
-  auto settled = settleIn(withinMemory([&] { return LitScene::make(std::move(edited), settings_, *transport_); }), by);
-=======
   auto edited = withinMemory([&] { return scene::importEdited(std::move(*document), nullptr); });
   if (!edited) return refuse(edited.error());
   if (wantsFirstLight(edited->scene)) {
-    if (withinMemory([&] { return showFirstLight(*edited); })) return std::nullopt;
+    if (withinMemory([&] { return showFirstLight(*edited, by); })) return std::nullopt;
     first_light_.reset();  // then all at once, or the reason why not
     lit_.reset();
   }
-  auto settled = settleIn(withinMemory([&] { return LitScene::make(std::move(*edited), settings_, *transport_); }));
->>>>>>> edits
+  auto settled = settleIn(withinMemory([&] { return LitScene::make(std::move(*edited), settings_, *transport_); }), by);
   if (!settled) return refuse(settled.error());
   return std::move(*settled);
 }

@@ -42,7 +42,6 @@ void SolveLoop::publishLightmaps(bool final) {
   next_publish_ = Clock::now() + publishPause(threadTime() - begin);
 }
 
-<<<<<<< HEAD
 /// Someone watches what the present version has no pages of: it was not asked for, or forgotten since. What was made of
 /// it before may still be held, by those who come back to it and encoded: of a later moment it must not be made again.
 bool SolveLoop::lacksPages() const {
@@ -50,7 +49,8 @@ bool SolveLoop::lacksPages() const {
     const auto& latest = publisher_.latest(quantity);
     return watches_.wants(quantity) && !(latest && latest->tile_version == publisher_.version());
   });
-=======
+}
+
 /// Until the next slices have solved for other light or colours irradiance is what was published before; pages of it
 /// would take a tenth of the time that such an edit does. Other quantities have other colours at once.
 bool SolveLoop::showsNothingNew() const {
@@ -58,7 +58,6 @@ bool SolveLoop::showsNothingNew() const {
       lit_->solver().isRepairing() || !publisher_.latest(Quantity::kIrradiance))
     return false;
   return std::ranges::none_of(kQuantities, [&](auto q) { return q != Quantity::kIrradiance && watches_.wants(q); });
->>>>>>> edits
 }
 
 /// After pages that took so long: never longer than the solve is old, where that leaves it most of its time.
