@@ -235,7 +235,7 @@ class PageMaker {
           if (owners.surface[n] == kNone) empty.push_back(n);
         });
       std::ranges::sort(empty);
-      empty.erase(std::ranges::unique(empty).begin(), empty.end());
+      empty.erase(std::unique(empty.begin(), empty.end()), empty.end());
     }
   }
 

@@ -64,8 +64,8 @@ bool LinkedSolver::lightsAreTooRough() {
     if (roughness(repair) * lights >= squares) rough[repair.shooter] = true;
   }
   const auto looks = [&](const Repair& repair) { return repair.looked > 0 && rough[repair.shooter]; };
-  const auto others = std::ranges::stable_partition(waiting, looks);
-  due_ = repairs_.size() - others.size();
+  const auto others = std::stable_partition(waiting.begin(), waiting.end(), looks);
+  due_ = repaired_ + static_cast<std::size_t>(others - waiting.begin());
   for (auto& repair : waiting.first(due_ - repaired_)) {
     const double all = 1.0 / repair.samples, now = 1.0 / repair.looked;
     const auto points = static_cast<std::uint32_t>(1.0 / (all + (now - all) * most / squares));

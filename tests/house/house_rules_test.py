@@ -122,6 +122,12 @@ class EachRule(unittest.TestCase):
         self.write("server/solver/a.cpp", f"{clones} float a();\n")
         self.assertEqual(len(self.complaints(house_rules.clones_are_made_in_one_way)), 1)
 
+    def test_what_clang_refuses(self):
+        self.write("server/a.cpp", "std::ranges::sort(a);  // std::ranges::unique(a)\nstd::unique(a.begin(), a.end());\n")
+        self.assertEqual(self.complaints(house_rules.clang_14_can_compile_it), [])
+        self.write("server/a.cpp", "std::ranges::unique(a);\nfor (auto b : a | std::views::reverse) c(b);\n")
+        self.assertEqual(len(self.complaints(house_rules.clang_14_can_compile_it)), 2)
+
     def test_machine_paths(self):
         self.write("README.md", "at/home/a, ~/home/a, ../home/b, $HOME/home/c, https://example.org/home/\n")
         self.assertEqual(self.complaints(house_rules.no_machine_is_named), [])
