@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <numbers>
 #include <tuple>
 
 #include "server/scene/lineage.h"
@@ -18,18 +19,30 @@ constexpr double kGrazing = 2e-4;
 constexpr float kMargin = 1e-5F;
 /// Rays that pass the boxes around all that changed are held against so many surfaces of it one by one.
 constexpr std::size_t kMostParts = 128;
-constexpr std::uint32_t kHemisphere = 5, kAlong = kBurialWays - kFirstWayAlong;
+constexpr std::uint32_t kHemisphere = kFirstWayAlong - 1, kAlong = kBurialWays - kFirstWayAlong;
 
+/// Of four bits.
+constexpr std::uint32_t reversed(std::uint32_t i) {
+  return (i & 1U) << 3U | (i & 2U) << 1U | (i & 4U) >> 1U | (i & 8U) >> 3U;
+}
+
+/// About the normal, and how far up and away from it.
 struct Turn {
-  double cosine, sine;
+  double cosine, sine, up, out;
 };
-/// About the normal, by way. Odd angles, so that no ray runs along modelled edges.
+/// By way. Odd angles, so that no ray runs along modelled edges; into the hemisphere each lies between the others, and
+/// the first few are spread as all are.
 const std::array<Turn, kBurialWays>& turns() {
   static const auto all = [] {
     std::array<Turn, kBurialWays> made{};
-    const auto set = [&](std::uint32_t way, double angle) { made[way] = {std::cos(angle), std::sin(angle)}; };
-    for (std::uint32_t i = 0; i < kHemisphere; ++i) set(1 + i, 0.3217 + 2.0 * M_PI * i / 5.0);
-    for (std::uint32_t i = 0; i < kAlong; ++i) set(kFirstWayAlong + i, 0.2871 + 2.0 * M_PI * i / 8.0);
+    const auto set = [&](std::uint32_t way, double angle, double up, double out) {
+      made[way] = {std::cos(angle), std::sin(angle), up, out};
+    };
+    for (std::uint32_t i = 0; i < kHemisphere; ++i) {
+      const double square = (reversed(i) + 0.5) / kHemisphere;
+      set(1 + i, 0.3217 + 2.0 * M_PI * i / std::numbers::phi, std::sqrt(1.0 - square), std::sqrt(square));
+    }
+    for (std::uint32_t i = 0; i < kAlong; ++i) set(kFirstWayAlong + i, 0.2871 + 2.0 * M_PI * i / kAlong, kGrazing, 1.0);
     return made;
   }();
   return all;
@@ -63,9 +76,8 @@ BurialWays::BurialWays(const glm::vec3& normal) : n_(normal) {
 
 glm::dvec3 BurialWays::of(std::uint32_t way) const {
   if (way == 0) return n_ + 0.0713 * u_ + 0.0427 * v_;
-  const auto [cosine, sine] = turns()[way];
-  if (way < kFirstWayAlong) return 0.6 * n_ + 0.8 * (cosine * u_ + sine * v_);
-  return kGrazing * n_ + cosine * u_ + sine * v_;
+  const auto& turn = turns()[way];
+  return turn.up * n_ + turn.out * (turn.cosine * u_ + turn.sine * v_);
 }
 
 bool RayFan::mayMeet(std::span<const ChangedBox> boxes) const {

@@ -19,9 +19,9 @@ namespace radiosity::scene {
 inline constexpr double kBurialLift = 2e-5;
 /// They end well outside of the unit box, in units of their directions' lengths, which are about one.
 inline constexpr double kBurialRayLength = 8.0;
-/// Ways that rays go from a place of some normal: one that decides most, those into the hemisphere, and those along
-/// the surface.
-inline constexpr std::uint32_t kBurialWays = 14, kFirstWayAlong = 6;
+/// Ways that rays go from a place of some normal: one that decides most, those into the hemisphere, spread by the
+/// cosine, and those along the surface.
+inline constexpr std::uint32_t kBurialWays = 25, kFirstWayAlong = 17;
 
 /// Directions about a normal, by way. A few sines.
 class BurialWays {

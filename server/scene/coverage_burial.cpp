@@ -129,12 +129,13 @@ class Burial {
     return side == 0 ? n : -n;
   }
   /// Inside a solid, or under a face that lies on this one.
-  [[nodiscard]] bool buried(std::uint32_t triangle, const glm::dvec2& texel, std::uint32_t side, Hits& hits,
-                            RayNotes* notes = nullptr) const {
+  [[nodiscard]] Solids::Answer ask(std::uint32_t triangle, const glm::dvec2& texel, std::uint32_t side, Hits& hits,
+                                   RayNotes* notes = nullptr) const {
     const auto position = positionAt(patches_.triangles[triangle], texel);
     const auto normal = facing(triangle, side);
-    if (side == 0 && coincidence_.covers(patches_.triangle_surface[triangle], position, normal, hits)) return true;
-    return solids_.buries(position, normal, hits, notes);
+    if (side == 0 && coincidence_.covers(patches_.triangle_surface[triangle], position, normal, hits))
+      return {true, true};
+    return solids_.ask(position, normal, hits, notes);
   }
 
   /// Of one surface: leaves in contact, and what is buried beside them.
@@ -161,8 +162,8 @@ class Burial {
     }
   }
 
-  /// Splits a surface into nodes that no other solid comes near (all visible or all buried: one test) and single leaves
-  /// in contact with one, or with an earlier surface that covers some of them.
+  /// Splits a surface into nodes that no other solid comes near (all visible or all buried: one test, if it is clear)
+  /// and single leaves in contact with one, or with an earlier surface that covers some of them.
   void classify(std::uint32_t s, Hits& hits, Split& split) const {
     const NodeBoxes boxes(patches_, s, pieces_, first_piece_);
     const Surface& surface = patches_.surfaces[s];
@@ -193,14 +194,18 @@ class Burial {
     const Surface& surface = patches_.surfaces[node.surface];
     const std::uint32_t x_end = std::min((node.x + 1) << level, surface.width);
     const std::uint32_t y_end = std::min((node.y + 1) << level, surface.height);
-    bool known = false;
+    std::optional<bool> one_by_one;  // as the first place tells
     for (std::uint32_t y = node.y << level; y < y_end; ++y)
       for (std::uint32_t x = node.x << level; x < x_end; ++x) {
         const Contact leaf{node.surface, node.side, x, y};
         const LeafPoint& point = patches_.leaves[leafOf(leaf)];
         if (point.triangle == kNone) continue;
-        if (!known && !buried(point.triangle, glm::dvec2(point.texel), node.side, hits)) return;
-        known = true;
+        if (one_by_one.value_or(true)) {
+          const auto answer = ask(point.triangle, glm::dvec2(point.texel), node.side, hits);
+          if (!one_by_one) one_by_one = !answer.agreed;
+          if (!answer.buried && !*one_by_one) return;
+          if (!answer.buried) continue;
+        }
         split.buried.push_back({leafOf(leaf), node.side, {}, {}, 0.0F});
       }
   }
@@ -322,7 +327,7 @@ class Burial {
         triangle = found->triangle;
       }
       ++parts[part].samples;
-      if (buried(triangle, texel, contact.side, scratch.hits, &scratch.notes)) {
+      if (ask(triangle, texel, contact.side, scratch.hits, &scratch.notes).buried) {
         ++parts[part].buried;
         continue;
       }
@@ -356,7 +361,8 @@ class Burial {
       Part& p = scratch.parts[part];
       if (p.samples == 0) {
         p.samples = 1;
-        p.buried = buried(point.triangle, glm::dvec2(point.texel), contact.side, scratch.hits, &scratch.notes) ? 1 : 0;
+        p.buried =
+            ask(point.triangle, glm::dvec2(point.texel), contact.side, scratch.hits, &scratch.notes).buried ? 1 : 0;
       }
       const double area = first == end ? patches_.node_area[nodeOf(contact)] : pieces_[first + part].area;
       outcome.samples += p.samples;

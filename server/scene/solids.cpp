@@ -23,6 +23,8 @@ constexpr double kSamePlane = 2e-5;
 constexpr std::uint32_t kPlaces = 16;
 /// Rays first look for the end of a solid so near (unit box), where few triangles are.
 constexpr double kSmallSolid = 0.1;
+/// So many rays that say the same are enough. More where a place would be lost.
+constexpr std::uint32_t kAgreeOutside = 3, kAgreeInside = 6;
 /// Hits so near to each other are one, on an edge.
 constexpr double kSameHit = 1e-9;
 
@@ -70,9 +72,11 @@ bool Solids::near(const Bounds& box, std::uint32_t surface) const {
   return tree_.touches(box.min - margin, box.max + margin, surface_, surface);
 }
 
-bool Solids::buries(const glm::vec3& position, const glm::vec3& normal, Hits& hits, RayNotes* notes) const {
+Solids::Answer Solids::ask(const glm::vec3& position, const glm::vec3& normal, Hits& hits, RayNotes* notes) const {
   const glm::dvec3 origin = glm::dvec3(position) + kBurialLift * glm::dvec3(normal);
-  return raysLeave({origin, normal, kNone}, hits, notes) && !seesOutAlong({origin, normal, kNone}, hits, notes);
+  auto answer = vote({origin, normal, kNone}, hits, notes);
+  answer.buried = answer.buried && !seesOutAlong({origin, normal, kNone}, hits, notes);
+  return answer;
 }
 
 bool Solids::mayBury(const Bounds& positions, const glm::vec3& normal) const {
@@ -80,16 +84,25 @@ bool Solids::mayBury(const Bounds& positions, const glm::vec3& normal) const {
   return tree_.mayMeetBack(positions.min + lift, positions.max + lift, BurialWays(normal).of(0), kBurialRayLength);
 }
 
-/// One ray that does not leave a solid decides.
-bool Solids::raysLeave(const Start& start, Hits& hits, RayNotes* notes) const {
+/// A first ray that meets no back decides, and so do some that agree. Otherwise the majority of all.
+Solids::Answer Solids::vote(const Start& start, Hits& hits, RayNotes* notes) const {
   const BurialWays ways(start.normal);
+  std::uint32_t leave = 0, stay = 0;
   for (std::uint32_t way = 0; way < kFirstWayAlong; ++way) {
-    if (!leavesSolid(start, way, ways.of(way), hits, notes)) return false;
+    if (leavesSolid(start, way, ways.of(way), hits, notes)) {
+      ++leave;
+    } else {
+      ++stay;
+      if (way == 0 && std::ranges::all_of(hits, &RayHit::front)) return {};
+    }
+    if (leave == 0 && stay == kAgreeOutside) return {};
+    if (stay == 0 && leave == kAgreeInside) return {true, true};
+    if (2 * std::max(leave, stay) > kFirstWayAlong) break;
   }
-  return true;
+  return {leave > stay, false};
 }
 
-/// Whether a ray along the surface gets, before it leaves a solid, to where rays do not all leave one, or out of the
+/// Whether a ray along the surface gets, before it leaves a solid, to where most rays leave none, or out of the
 /// scene. What it meets first may be a part of the surface, in a hollow, or of another that is buried as well.
 bool Solids::seesOutAlong(const Start& start, Hits& hits, RayNotes* notes) const {
   const BurialWays ways(start.normal);
@@ -100,7 +113,7 @@ bool Solids::seesOutAlong(const Start& start, Hits& hits, RayNotes* notes) const
     const RayHit first = hits.front();
     const glm::vec3 facing = normal_[first.triangle];
     const auto there = start.origin + first.t * direction + kBurialLift * glm::dvec3(facing);
-    if (!raysLeave({there, facing, first.triangle}, hits, notes)) return true;
+    if (!vote({there, facing, first.triangle}, hits, notes).buried) return true;
   }
   return false;
 }

@@ -34,12 +34,17 @@ class Solids {
   /// True when a solid's surface, other than `surface` itself, passes through or touches the box.
   [[nodiscard]] bool near(const Bounds& box, std::uint32_t surface) const;
 
-  /// Buried when rays into the whole hemisphere leave more solids than they enter. One odd face that is turned the
+  /// Buried when most rays into the hemisphere leave more solids than they enter. One odd face that is turned the
   /// wrong way, or a room whose roof was modelled from outside, does not bury what can be seen from elsewhere. Nor does
   /// a panel that hangs before a wall, whose back hides the wall from nearly everywhere: one sees out along the wall.
+  /// `agreed`: all rays that were asked said the same. They do unless a model is open, and then what holds for one
+  /// place need not hold for another, though nothing lies between.
+  struct Answer {
+    bool buried = false, agreed = true;
+  };
   /// `notes`: where they are not null, of the rays that decided.
-  [[nodiscard]] bool buries(const glm::vec3& position, const glm::vec3& normal, Hits& hits,
-                            RayNotes* notes = nullptr) const;
+  [[nodiscard]] Answer ask(const glm::vec3& position, const glm::vec3& normal, Hits& hits,
+                           RayNotes* notes = nullptr) const;
 
   /// False: it buries no position in the box, of this normal. True: it may. Costs as much as one that is not buried.
   [[nodiscard]] bool mayBury(const Bounds& positions, const glm::vec3& normal) const;
@@ -51,7 +56,7 @@ class Solids {
     glm::vec3 normal;
     std::uint32_t triangle;  ///< of the tree; kNone: the place that is asked for
   };
-  [[nodiscard]] bool raysLeave(const Start& start, Hits& hits, RayNotes* notes) const;
+  [[nodiscard]] Answer vote(const Start& start, Hits& hits, RayNotes* notes) const;
   [[nodiscard]] bool seesOutAlong(const Start& start, Hits& hits, RayNotes* notes) const;
   [[nodiscard]] bool leavesSolid(const Start& start, std::uint32_t way, const glm::dvec3& direction, Hits& hits,
                                  RayNotes* notes) const;

@@ -248,11 +248,11 @@ void Shadows::find(std::span<const glm::vec3> points, const glm::vec3& normal, f
                    Scratch& scratch, std::vector<LinkColumn::ValueRun>& runs) const {
   // A pixel is 2 / N wide at a depth of one; depths are at most distances.
   const float spread = 2.0F * kHalfDiagonal / static_cast<float>(resolution);
-  const auto [middle, apart] = ballAround(points);
+  const Ball around = ballAround(points);
   // Pixels are widest where seen from the point that is farthest away.
-  const float reach = radius + apart * (1.0F + spread * kMostReach);
+  const float reach = radius + around.radius * (1.0F + spread * kMostReach);
   const auto wayTo = [&](const scene::ChangedBox& box) {
-    return Way{middle, box.low - reach, box.high + reach, spread};
+    return Way{around.middle, box.low - reach, box.high + reach, spread};
   };
   const glm::vec4 plane(normal, glm::dot(normal, points.front()));
   scratch.tiles.assign(tiles_.size(), kMissed);

@@ -119,6 +119,7 @@ oracle::ErrorMetrics measureTexels(const std::vector<Page>& pages, const Referen
   std::vector<oracle::Comparison> texels;
   for (const auto& texel : reference.texels) {
     if (choice == TexelChoice::kPlain && !texel.plain) continue;
+    if (choice == TexelChoice::kDecided && !texel.decided()) continue;
     texels.push_back({pages.at(static_cast<std::size_t>(texel.page)).at(texel.x, texel.y), texel.irradiance.mean_lux,
                       texel.irradiance.standard_error, texel.area});
   }
@@ -132,6 +133,15 @@ Accuracy measure(const LitScene& lit, const Reference& reference) {
                       point.irradiance.standard_error, 1.0});
   }
   return {measureTexels(lit.pages, reference, TexelChoice::kAll), oracle::measureError(points)};
+}
+
+double undecidedArea(const Reference& reference) {
+  double undecided = 0.0, all = 0.0;
+  for (const auto& texel : reference.texels) {
+    all += texel.area;
+    if (!texel.decided()) undecided += texel.area;
+  }
+  return all > 0.0 ? undecided / all : 0.0;
 }
 
 nlohmann::json toJson(const oracle::ErrorMetrics& metrics) {

@@ -30,6 +30,9 @@ struct Reference {
     /// a texel is: they average over buried parts too, and derive irradiance from reflected light.
     bool plain = false;
     oracle::Irradiance irradiance;
+
+    /// No more than a hundredth of it lies where models are so open that rays disagree about whether it is inside.
+    [[nodiscard]] bool decided() const { return irradiance.undecided_fraction <= 0.01; }
   };
   struct Point {
     int page = 0;
@@ -51,11 +54,14 @@ struct Accuracy {
 /// `lit` must have the layout that the reference was made for.
 [[nodiscard]] Accuracy measure(const LitScene& lit, const Reference& reference);
 
-enum class TexelChoice { kAll, kPlain };
+enum class TexelChoice { kAll, kDecided, kPlain };
 
 /// The first half of measure(), for pages in the layout that the reference was made for.
 [[nodiscard]] oracle::ErrorMetrics measureTexels(const std::vector<Page>& pages, const Reference& reference,
                                                  TexelChoice choice);
+
+/// Of the area of the reference's texels, those for which it has no answer how much of them is visible.
+[[nodiscard]] double undecidedArea(const Reference& reference);
 
 [[nodiscard]] nlohmann::json toJson(const oracle::ErrorMetrics& metrics);
 

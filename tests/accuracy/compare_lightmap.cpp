@@ -57,10 +57,11 @@ void printWorst(const radiosity::accuracy::LitScene& lit, const radiosity::accur
     const auto error = glm::abs(value - texel->irradiance.mean_lux);
     const int c = error.x > error.y && error.x > error.z ? 0 : error.y > error.z ? 1 : 2;
     std::printf(
-        "%4.1f %% page %d (%d, %d), \"%s\" at (%.3g, %.3g, %.3g): %.5g lux for %.5g +-%.2g (%s), %.0f %% visible\n",
+        "%4.1f %% page %d (%d, %d), \"%s\" at (%.3g, %.3g, %.3g): %.5g lux for %.5g +-%.2g (%s), %.0f %% visible%s\n",
         100 * square / sum, texel->page, texel->x, texel->y, lit.scene.node_names.at(place.node).c_str(), at.x, at.y,
         at.z, value[c], texel->irradiance.mean_lux[c], texel->irradiance.standard_error[c],
-        std::array{"red", "green", "blue"}[static_cast<std::size_t>(c)], 100 * texel->irradiance.visible_fraction);
+        std::array{"red", "green", "blue"}[static_cast<std::size_t>(c)], 100 * texel->irradiance.visible_fraction,
+        texel->decided() ? "" : ", not decided");
   }
 }
 
@@ -102,8 +103,13 @@ int main(int argc, char** argv) {
                                           : radiosity::accuracy::findReference(lit, options, folder).reference;
     requireLight(reference);
     const auto accuracy = radiosity::accuracy::measure(lit, reference);
+    const auto decided =
+        radiosity::accuracy::measureTexels(lit.pages, reference, radiosity::accuracy::TexelChoice::kDecided);
+    const double undecided = radiosity::accuracy::undecidedArea(reference);
     if (json) {
       const nlohmann::json out{{"solver", radiosity::accuracy::toJson(accuracy.solver)},
+                               {"solver_decided", radiosity::accuracy::toJson(decided)},
+                               {"undecided_area", undecided},
                                {"total", radiosity::accuracy::toJson(accuracy.total)},
                                {"reference_seconds", reference.seconds},
                                {"warnings", lit.scene.warnings}};
@@ -112,6 +118,12 @@ int main(int argc, char** argv) {
     }
     for (const auto& warning : lit.scene.warnings) std::printf("note: %s\n", warning.c_str());
     print("solver error", accuracy.solver);
+    if (undecided > 0.0) {
+      print("  decided", decided);
+      std::printf(
+          "%.1f %% of the area is not decided: models are so open there that rays disagree about what is inside\n",
+          100 * undecided);
+    }
     print("total error", accuracy.total);
     if (worst > 0) printWorst(lit, reference, worst);
   } catch (const std::exception& error) {

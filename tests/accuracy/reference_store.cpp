@@ -9,7 +9,7 @@
 namespace radiosity::accuracy {
 namespace {
 
-constexpr char kMagic[8] = {'R', 'A', 'D', 'R', 'E', 'F', '0', '3'};
+constexpr char kMagic[8] = {'R', 'A', 'D', 'R', 'E', 'F', '0', '4'};
 constexpr std::size_t kMaxRecords = 1 << 26;
 constexpr std::size_t kProbes = 16;
 constexpr std::uint32_t kProbeSamples = 64;
@@ -61,12 +61,14 @@ void addProbe(const LitScene& lit, Hash& hash) {
 template <typename Visit>
 void visitTexel(Reference::TexelMean& texel, Visit visit) {
   visit(texel.page), visit(texel.x), visit(texel.y), visit(texel.area), visit(texel.plain);
-  visit(texel.irradiance.mean_lux), visit(texel.irradiance.standard_error), visit(texel.irradiance.visible_fraction);
+  visit(texel.irradiance.mean_lux), visit(texel.irradiance.standard_error), visit(texel.irradiance.visible_fraction),
+      visit(texel.irradiance.undecided_fraction);
 }
 template <typename Visit>
 void visitPoint(Reference::Point& point, Visit visit) {
   visit(point.page), visit(point.uv);
-  visit(point.irradiance.mean_lux), visit(point.irradiance.standard_error), visit(point.irradiance.visible_fraction);
+  visit(point.irradiance.mean_lux), visit(point.irradiance.standard_error), visit(point.irradiance.visible_fraction),
+      visit(point.irradiance.undecided_fraction);
 }
 
 template <typename Visit>

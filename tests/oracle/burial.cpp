@@ -20,6 +20,8 @@ constexpr double kSamePlane = 1e-6;
 constexpr double kSameCrossing = 1e-6;
 constexpr double kSameFacing = 0.9999;
 constexpr int kRays = 16;
+/// So few that say otherwise leave no doubt: where half of all rays leave, so few of kRays do in one case of a hundred.
+constexpr int kFew = 3;
 /// Rays along a surface rise by this part of their length: through any gap that is wider than a thousandth of its
 /// depth.
 constexpr double kGrazing = 2e-4;
@@ -92,38 +94,51 @@ bool Burial::leavesSolid(const glm::dvec3& point, const glm::dvec3& direction) c
   return leavesMore(solidCrossings(point, direction), direction);
 }
 
-bool Burial::mostRaysLeave(const glm::dvec3& point, const glm::dvec3& normal) const {
+/// Of rays into the hemisphere.
+Where Burial::vote(const glm::dvec3& point, const glm::dvec3& normal) const {
   const auto lifted = point + normal * kLift;
-  int leave = 0;
-  for (int i = 0; i < kRays; ++i) {
-    if (leavesSolid(lifted, cosineDirection(normal, (i + 0.5) / kRays, i * std::numbers::phi))) ++leave;
-    if (2 * leave > kRays || 2 * (i + 1 - leave) >= kRays) break;
+  int leave = 0, stay = 0;
+  while (leave + stay < kRays && leave < kRays - kFew && stay < kRays - kFew) {
+    const int i = leave + stay;
+    const bool leaves = leavesSolid(lifted, cosineDirection(normal, (i + 0.5) / kRays, i * std::numbers::phi));
+    ++(leaves ? leave : stay);
   }
-  return 2 * leave > kRays;
+  if (leave >= kRays - kFew) return Where::kInside;
+  if (stay >= kRays - kFew) return Where::kOutside;
+  return 2 * leave > kRays ? Where::kUndecidedInside : Where::kUndecidedOutside;
 }
 
-/// Whether a ray along the surface gets to where one is not inside, or out of the scene, before it leaves a solid.
-bool Burial::seesOutAlong(const glm::dvec3& point, const glm::dvec3& normal) const {
+/// Whether rays along the surface get to where one is not inside, or out of the scene, before they leave a solid.
+Where Burial::alongSurface(const glm::dvec3& point, const glm::dvec3& normal) const {
   const auto [s, t] = tangents(normal);
   const auto from = point + normal * kOnSurface;
-  for (int i = 0; i < kRays; ++i) {
+  int out = 0, perhaps_out = 0, perhaps_in = 0;
+  for (int i = 0; i < kRays && out <= kFew; ++i) {
     const double phi = 2.0 * std::numbers::pi * (i + 0.3) / kRays;
     const auto direction = glm::normalize(s * std::cos(phi) + t * std::sin(phi) + normal * kGrazing);
     const auto met = solidCrossings(from, direction);
     if (leavesMore(met, direction)) continue;
     // What it meets first may be a part of the surface, in a hollow, or of another that is inside as well.
-    if (met.empty() || !mostRaysLeave(from + direction * met.front().distance, triangles_[met.front().triangle].normal))
-      return true;
+    const auto there = met.empty()
+                           ? Where::kOutside
+                           : vote(from + direction * met.front().distance, triangles_[met.front().triangle].normal);
+    out += there == Where::kOutside ? 1 : 0;
+    perhaps_out += there == Where::kUndecidedOutside ? 1 : 0;
+    perhaps_in += there == Where::kUndecidedInside ? 1 : 0;
   }
-  return false;
+  if (out > kFew) return Where::kOutside;
+  if (out + perhaps_out > 0) return Where::kUndecidedOutside;
+  return perhaps_in > 0 ? Where::kUndecidedInside : Where::kInside;
 }
 
-bool Burial::insideSolid(const glm::dvec3& point, const glm::dvec3& normal) const {
-  if (!mostRaysLeave(point, normal)) return false;
+Where Burial::whereIs(const glm::dvec3& point, const glm::dvec3& normal) const {
+  const auto votes = vote(point, normal);
+  if (votes == Where::kOutside) return votes;
   const auto above = solidCrossings(point + normal * kLift, normal);
-  const bool lies_on =
-      !above.empty() && above.front().distance < kOnSurface && !isFront(above.front().triangle, normal);
-  return lies_on || !seesOutAlong(point, normal);
+  if (!above.empty() && above.front().distance < kOnSurface && !isFront(above.front().triangle, normal)) return votes;
+  const auto along = alongSurface(point, normal);
+  if (along == Where::kInside) return votes;
+  return along == Where::kUndecidedInside && !isInside(votes) ? votes : along;
 }
 
 bool Burial::underEarlier(const glm::dvec3& point, const glm::dvec3& normal, std::uint32_t triangle) const {

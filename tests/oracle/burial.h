@@ -13,6 +13,13 @@
 
 namespace radiosity::oracle {
 
+/// Where a point of a surface lies. Models are open here and there, and from within an open one some rays get out.
+/// Where few or most of them leave a solid the question has an answer, and so where several or none along the surface
+/// see out. Between it depends on the rays that one asks: undecided.
+enum class Where { kOutside, kUndecidedOutside, kUndecidedInside, kInside };
+[[nodiscard]] constexpr bool isInside(Where where) { return where >= Where::kUndecidedInside; }
+[[nodiscard]] constexpr bool isDecided(Where where) { return where == Where::kOutside || where == Where::kInside; }
+
 class Burial {
  public:
   /// Keeps both. `scene`: one geometry that holds `triangles` in their order, in a box of size 2 about the origin, made
@@ -23,7 +30,7 @@ class Burial {
   /// single-sided triangles bound: most rays from inside leave more of them than they enter. That does not suffice for
   /// a panel that hangs before a wall, whose back hides the wall from nearly everywhere: behind it one sees out along
   /// the wall, and inside a solid one does not. What lies on the surface, nearer than kOnSurface, leaves no gap.
-  [[nodiscard]] bool insideSolid(const glm::dvec3& point, const glm::dvec3& normal) const;
+  [[nodiscard]] Where whereIs(const glm::dvec3& point, const glm::dvec3& normal) const;
 
   /// One ray of the question: false where the point cannot be inside, at much less cost when asked at many points.
   [[nodiscard]] bool leavesSolid(const glm::dvec3& point, const glm::dvec3& direction) const;
@@ -43,8 +50,8 @@ class Burial {
   [[nodiscard]] std::vector<Crossing> solidCrossings(const glm::dvec3& from, const glm::dvec3& direction) const;
   [[nodiscard]] bool isFront(std::uint32_t triangle, const glm::dvec3& direction) const;
   [[nodiscard]] bool leavesMore(std::span<const Crossing> crossings, const glm::dvec3& direction) const;
-  [[nodiscard]] bool mostRaysLeave(const glm::dvec3& point, const glm::dvec3& normal) const;
-  [[nodiscard]] bool seesOutAlong(const glm::dvec3& point, const glm::dvec3& normal) const;
+  [[nodiscard]] Where vote(const glm::dvec3& point, const glm::dvec3& normal) const;
+  [[nodiscard]] Where alongSurface(const glm::dvec3& point, const glm::dvec3& normal) const;
 
   RTCScene scene_;
   std::span<const Triangle> triangles_;

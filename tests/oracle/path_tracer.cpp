@@ -54,6 +54,7 @@ struct Tally {
   glm::dvec3 sum{0.0};
   double visible = 0.0, tried = 0.0;
   double front = 0.0, covered = 0.0;  ///< of those tried, on fronts, and of these under an earlier face
+  double undecided = 0.0;             ///< of those tried, whether they are inside a solid
 };
 
 }  // namespace
@@ -90,8 +91,8 @@ class PathTracer::Scene {
   Scene(const Scene&) = delete;
   Scene& operator=(const Scene&) = delete;
 
-  [[nodiscard]] bool inside(const Point& point) const {
-    return burial_->insideSolid(toUnit(point.position), point.normal);
+  [[nodiscard]] Where whereIs(const Point& point) const {
+    return burial_->whereIs(toUnit(point.position), point.normal);
   }
 
   /// Under an earlier triangle in the same plane.
@@ -111,7 +112,7 @@ class PathTracer::Scene {
         const auto u = lattice.point(i);
         const auto point = pointOn(footprint, cumulative, u[0], u[1]);
         tallies[b].tried += 1.0;
-        if (check_burial && (leaveOut(point, tallies[b]) || inside(point))) continue;
+        if (check_burial && leaveOut(point, tallies[b])) continue;
         if (see_through_ && onHole(point)) continue;
         tallies[b].visible += 1.0;
         tallies[b].sum += path(point, {u[2], u[3], u[4], u[5], u[6]}, random);
@@ -120,12 +121,15 @@ class PathTracer::Scene {
     return summarize(tallies);
   }
 
-  /// Whether the point is under an earlier face; counts it.
+  /// Whether the point is under an earlier face or inside a solid; counts it.
   [[nodiscard]] bool leaveOut(const Point& point, Tally& tally) const {
-    const bool out = covered(point);
+    const bool under = covered(point);
     tally.front += point.triangle != kNoTriangle ? 1.0 : 0.0;
-    tally.covered += out ? 1.0 : 0.0;
-    return out;
+    tally.covered += under ? 1.0 : 0.0;
+    if (under) return true;
+    const auto where = whereIs(point);
+    tally.undecided += isDecided(where) ? 0.0 : 1.0;
+    return isInside(where);
   }
 
  private:
@@ -434,12 +438,14 @@ class PathTracer::Scene {
       all.tried += tally.tried;
       all.front += tally.front;
       all.covered += tally.covered;
+      all.undecided += tally.undecided;
     }
     // A lightmap shows there what the earlier face receives, also where the back of this one is seen. One in some ten
     // thousand points lies so near an edge that rounding puts it beside the earlier face.
     if (all.covered > 0.0 && all.covered >= kAllCovered * all.front) all.visible = 0.0;
     Irradiance result;
     result.visible_fraction = all.tried > 0.0 ? all.visible / all.tried : 0.0;
+    result.undecided_fraction = all.tried > 0.0 ? all.undecided / all.tried : 0.0;
     if (all.visible <= 0.0) return result;
     result.mean_lux = all.sum / all.visible;
     glm::dvec3 variance(0.0);  // of the ratio of sums, batch by batch
@@ -490,7 +496,7 @@ std::vector<Irradiance> PathTracer::irradiance(std::span<const Footprint> footpr
 }
 
 bool PathTracer::buried(const glm::dvec3& point, const glm::dvec3& normal) const {
-  return scene_->inside({point, normal, kNoTriangle});
+  return isInside(scene_->whereIs({point, normal, kNoTriangle}));
 }
 
 }  // namespace radiosity::oracle

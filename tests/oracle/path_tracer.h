@@ -36,6 +36,8 @@ struct Irradiance {
   glm::dvec3 standard_error{0.0};
   /// Of the footprint's area: the rest is buried and left out. 0 where all of its front lies under an earlier face.
   double visible_fraction = 1.0;
+  /// Of the footprint's area: where models are open, so that it has no answer whether it is buried (burial.h).
+  double undecided_fraction = 0.0;
 };
 
 struct PathOptions {

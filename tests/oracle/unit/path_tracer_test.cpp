@@ -152,6 +152,26 @@ TEST(PathTracer, UnderABoxIsInsideASolidWithOrWithoutItsLid) {
   }
 }
 
+// Where half of a box's lid is missing, half of the rays from its bottom get out.
+TEST(PathTracer, InAHalfOpenBoxItIsNotDecidedWhatIsInside) {
+  auto made = test_scenes::furnace(glm::dvec3(0.5), glm::dvec3(1.0));
+  test_scenes::Object box{"box", {}, {}};
+  test_scenes::appendBox(box, {0.3, 0.0, 0.3}, {0.7, 0.01, 0.7}, test_scenes::allFaces(0), test_scenes::kYMax);
+  box.polygons.push_back({{{0.3, 0.01, 0.3}, {0.3, 0.01, 0.7}, {0.5, 0.01, 0.7}, {0.5, 0.01, 0.3}}, 0});
+  made.objects.push_back(box);
+  const PathTracer tracer(triangulate(made));
+  const auto undecidedAt = [&](double x) {
+    const auto at = Footprint::at({x, 0.0, 0.52}, {0, 1, 0});
+    return tracer.irradiance(std::vector{at}, {.samples = 256})[0].undecided_fraction;
+  };
+  EXPECT_EQ(undecidedAt(0.35), 0.0);  // under the lid
+  EXPECT_EQ(undecidedAt(0.5), 1.0);
+  EXPECT_EQ(undecidedAt(0.65), 0.0);
+  EXPECT_EQ(undecidedAt(0.2), 0.0);
+  EXPECT_TRUE(tracer.buried({0.35, 0.0, 0.52}, {0, 1, 0}));
+  EXPECT_FALSE(tracer.buried({0.65, 0.0, 0.52}, {0, 1, 0}));
+}
+
 // The gap between a ceiling and a closed box is no part of the box.
 TEST(PathTracer, BetweenACeilingAndABoxIsNotInsideIt) {
   const PathTracer tracer(roomWithBoxAbove({0.3, 0.9, 0.3}, {0.7, 0.9995, 0.7}, test_scenes::kNoFace));
