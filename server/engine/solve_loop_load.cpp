@@ -123,9 +123,10 @@ Result<void> SolveLoop::showFirstLight(const scene::EditedDocument& edited, cons
   settings.target_error = std::max(kFirstLightError, settings.target_error);
   auto shown = LitScene::make(edited, settings, *transport_);
   if (const auto lit = relight(std::move(shown), Relation::kOther); !lit) return tl::unexpected<Error>(lit.error());
-  first_light_.emplace();
-  first_light_->by = by;
-  first_light_->made = std::make_shared<std::atomic<bool>>(false);
+  FirstLight first;
+  first.by = by;
+  first.made = std::make_shared<std::atomic<bool>>(false);
+  first_light_ = std::move(first);
   if (auto begun = makeWhole(edited); !begun) return begun;
   ++revision_;
   updateStatus(true);

@@ -67,7 +67,7 @@ TEST(Invariants, LinksAreReciprocalWithinThreeSigma) {
   ASSERT_TRUE(solve.run());
   const auto sides = solver::makeSides(solve.patches());
   const auto& shooters = linked(solve).system().shooters();
-  double difference = 0.0, variance = 0.0, square = 0.0, net = 0.0;
+  double difference = 0.0, variance = 0.0, square = 0.0;
   std::size_t pairs = 0;
   for (std::size_t i = 0; i < shooters.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {
@@ -87,7 +87,6 @@ TEST(Invariants, LinksAreReciprocalWithinThreeSigma) {
       ++pairs;
       const double off = 0.5 * (there[0] + there[1]) - 0.5 * (back[0] + back[1]);
       difference += off * off;
-      net += off;
       // Of the mean of two: a quarter of the square of their difference.
       variance += 0.25 * (std::pow(there[0] - there[1], 2) + std::pow(back[0] - back[1], 2));
       square += std::pow(0.25 * (there[0] + there[1] + back[0] + back[1]), 2);
