@@ -91,7 +91,7 @@ class Receivers {
   /// A place on a receiver, by `at` in [0, 1)^2.
   [[nodiscard]] Place place(const Receiver& receiver, const glm::vec2& at) const {
     if (receiver.full) return placeOf({receiver.texel + at, receiver.triangle});
-    return placeOf(patches_->spotAt({receiver.texel, receiver.triangle, false, receiver.first_spot}, 0, 0, at));
+    return placeOf(patches_->spotAt({receiver.texel, receiver.triangle, false, false, receiver.first_spot}, 0, 0, at));
   }
   /// One of its places, spot < kLeafSpots; of a receiver that has them.
   [[nodiscard]] Place spot(const Receiver& receiver, std::uint32_t spot) const {

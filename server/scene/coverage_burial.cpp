@@ -410,6 +410,7 @@ class Burial {
       if (both) ++i;
       if (open.point.triangle != kNone) {
         point = open.point;
+        point.cut = true;
         keepSpots(patches_, point, open.places);
       } else if (both || !two_sided) {
         point = {};

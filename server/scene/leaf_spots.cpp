@@ -104,6 +104,8 @@ namespace {
 
 /// Leaves are looked at in so many leaf widths before them, ...
 constexpr float kGap = 0.5F;
+/// What is so near cuts them.
+constexpr float kCut = 0.25F;
 /// ... starting well above the rounding of positions, and without their rims: walls that meet a floor are no gap.
 constexpr float kLift = 2e-5F, kInterior = 0.9F;
 /// What hovers beside a leaf counts so many leaf widths away, a pixel or two of an item buffer: a lamp in front of a
@@ -123,7 +125,7 @@ class Gaps {
 
   /// Found side by side, kept in the order of the surfaces.
   void run() {
-    std::vector<std::vector<glm::uvec2>> found(patches_.surfaces.size());
+    std::vector<std::vector<Found>> found(patches_.surfaces.size());
     inShares(found.size() / kFewestAShare, [&](std::size_t share, std::size_t shares) {
       for (auto s = static_cast<std::uint32_t>(share); s < found.size(); s += static_cast<std::uint32_t>(shares)) {
         const Surface& surface = patches_.surfaces[s];
@@ -134,20 +136,24 @@ class Gaps {
       }
     });
     for (std::size_t s = 0; s < found.size(); ++s) {
-      for (const auto& at : found[s]) place(patches_.surfaces[s], at);
+      for (const auto& leaf : found[s]) place(patches_.surfaces[s], leaf);
     }
   }
 
  private:
+  struct Found {
+    glm::uvec2 at;
+    bool cut;
+  };
   /// Space right before a node, on one side, wider than the node by so many leaf widths.
-  [[nodiscard]] Bvh::OrientedBox boxBefore(std::uint32_t s, float side, std::uint32_t level, glm::uvec2 at,
-                                           float wider) const {
+  [[nodiscard]] Bvh::OrientedBox boxBefore(std::uint32_t s, float side, std::uint32_t level, glm::uvec2 at, float wider,
+                                           float gap = kGap) const {
     const Surface& surface = patches_.surfaces[s];
     const TriangleFrame& frame = patches_.triangles[surface.first_triangle];
     const glm::vec2 low(at << level);
     const glm::vec2 high(glm::min((at + 1U) << level, glm::uvec2(surface.width, surface.height)));
     const glm::vec2 middle = 0.5F * (low + high), extent = 0.5F * (high - low + wider);
-    const float across = glm::length(frame.du), up = glm::length(frame.dv), depth = kGap * std::min(across, up);
+    const float across = glm::length(frame.du), up = glm::length(frame.dv), depth = gap * std::min(across, up);
     const glm::vec3 normal = side * frame.normal, u = frame.du / across;
     Bvh::OrientedBox box;
     box.centre = frame.origin + middle.x * frame.du + middle.y * frame.dv + (kLift + 0.5F * depth) * normal;
@@ -156,13 +162,14 @@ class Gaps {
     return box;
   }
 
-  void descend(std::uint32_t s, float side, std::uint32_t level, glm::uvec2 at, std::vector<glm::uvec2>& found) const {
+  void descend(std::uint32_t s, float side, std::uint32_t level, glm::uvec2 at, std::vector<Found>& found) const {
     const Surface& surface = patches_.surfaces[s];
     if (!tree_.touches(boxBefore(s, side, level, at, kInterior - 1.0F), patches_.triangle_surface, s) &&
         !tree_.hoversIn(boxBefore(s, side, level, at, 2.0F * kBeside), patches_.triangle_surface, s))
       return;
     if (level == 0) {
-      found.push_back(at);
+      found.push_back(
+          {at, tree_.touches(boxBefore(s, side, 0, at, kInterior - 1.0F, kCut), patches_.triangle_surface, s)});
       return;
     }
     const LevelGrid below = levelGrid(surface.width, surface.height, level - 1);
@@ -171,13 +178,15 @@ class Gaps {
         descend(s, side, level - 1, {x, y}, found);
   }
 
-  void place(const Surface& surface, glm::uvec2 at) {
+  void place(const Surface& surface, const Found& found) {
+    const auto at = found.at;
     auto& leaf = patches_.leaves[surface.first_leaf + at.y * surface.width + at.x];
     if (!leaf.full || leaf.first_spot != kNone) return;
     std::array<LeafSpot, kLeafSpots> places;
     for (std::uint32_t i = 0; i < kLeafSpots; ++i)
       places[i] = {glm::vec2(glm::dvec2(at) + latticePoint(i, kLeafSpots)), leaf.triangle};
     keepSpots(patches_, leaf, places);
+    leaf.cut = found.cut;
   }
 
   PatchScene& patches_;

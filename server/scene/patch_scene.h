@@ -54,6 +54,7 @@ struct LeafPoint {
   glm::vec2 texel;
   std::uint32_t triangle = kNone;  ///< kNone: the leaf is empty
   bool full = false;
+  bool cut = false;                  ///< something passes through the leaf, or right before it
   std::uint32_t first_spot = kNone;  ///< into PatchScene::spots; kNone: any point stands for all
 };
 

@@ -22,7 +22,7 @@ constexpr double kByChance = 2.0;
 constexpr double kSolved = 1e-4;
 constexpr int kMaxSweeps = 400;
 /// Of a leaf in each half, doubles: what GMRES keeps, and the sweeps; and what there is of its light, floats.
-constexpr std::size_t kVectors = 3 * (Gmres::kRestart + 3) + 3 * 4, kLights = 5 * 3 + 2;
+constexpr std::size_t kVectors = 3 * (Gmres::kRestart + 3) + 3 * 4, kLights = 5 * 3 + 4;
 
 using Light = LeafSmoother::Light;
 
@@ -117,9 +117,10 @@ void LeafGather::finish() {
   solved_ = {};
   smoothed_ = bias_ = smoother.bias();
   leaf_bias_ = smoother.biasOfLeaves();
+  weighLost();
   weighNoise(smoother);
   weighMissed(levels);
-  weighLost();
+  weighDoubt();
   unsolved_ = 0.0;
   double area = 0.0;
   for (const double a : area_) area += a;
@@ -138,8 +139,12 @@ void LeafGather::finish() {
 void LeafGather::takeLight(std::size_t h) {
   Half& half = halves_[h];
   const std::size_t leaves = sights_.leafCount();
-  half.source.assign(leaves + 2, {});
-  half.radiosity.assign(leaves + 2, {});
+  half.source.assign(sights_.endCount(), {});
+  half.radiosity.assign(sights_.endCount() + sights_.steps(h).size(), {});
+  for (std::size_t c = 0; c < 3; ++c) {
+    half.source[sights_.skyAbove()][c] = light_.sky[0][static_cast<int>(c)];
+    half.source[sights_.skyBelow()][c] = light_.sky[1][static_cast<int>(c)];
+  }
   half.arriving.assign(leaves, {});
   half.shining = 0.0;
   std::array<double, 3> shining{};
@@ -154,7 +159,7 @@ void LeafGather::takeLight(std::size_t h) {
           static_cast<double>(light_.reflectance[v][i]) * static_cast<double>(light_.irradiance[h][v][i]) -
           static_cast<double>(light_.shot[h][v][i]);
       half.source[v][c] = left;
-      shining[c] += area_[v] * std::abs(left);
+      shining[c] += area_[v] * (std::abs(left) + skyAt(h, c, v));
     }
   }
   std::array<double, 3> tolerance{};
@@ -173,6 +178,19 @@ void LeafGather::average(std::size_t half, const std::vector<Light>& radiosity, 
   averageSeen(sights_, half, radiosity.data(), mean.data());
 }
 
+/// Where rays go on: what the leaf there has but for what comes by rays, and what the ray finds of that. `source`: null
+/// for none.
+void LeafGather::followSteps(std::size_t half, const std::vector<Light>* source, std::vector<Light>& radiosity) const {
+  auto to = radiosity.begin() + sights_.endCount();
+  for (const auto& step : sights_.steps(half)) {
+    const auto& reflectance = light_.reflectance[step.by];
+    for (std::size_t c = 0; c < 3; ++c)
+      (*to)[c] = static_cast<double>(reflectance[static_cast<int>(c)]) * radiosity[step.next][c] +
+                 (source != nullptr ? (*source)[step.by][c] : 0.0);
+    ++to;
+  }
+}
+
 void LeafGather::sweep(std::size_t h, Gmres::Vectors& x, bool affine) {
   Half& half = halves_[h];
   const std::size_t leaves = sights_.leafCount();
@@ -181,6 +199,8 @@ void LeafGather::sweep(std::size_t h, Gmres::Vectors& x, bool affine) {
       half.radiosity[v][c] = static_cast<double>(light_.reflectance[v][static_cast<int>(c)]) * x[c][v] +
                              (affine ? half.source[v][c] : 0.0);
   }
+  for (auto end = leaves; end < half.source.size(); ++end) half.radiosity[end] = affine ? half.source[end] : Light{};
+  followSteps(h, affine ? &half.source : nullptr, half.radiosity);
   average(h, half.radiosity, half.arriving);
   for (std::size_t v = 0; v < leaves; ++v) {
     for (std::size_t c = 0; c < 3; ++c) x[c][v] = half.arriving[v][c];
@@ -196,21 +216,35 @@ void LeafGather::weighRays() {
     while (part_[side] != side) side = part_[side] = part_[part_[side]];
     return side;
   };
+  const auto join = [&](std::uint32_t one, std::uint32_t other) {
+    const auto a = root(one), b = root(other);
+    part_[std::max(a, b)] = std::min(a, b);
+  };
   for (auto& lost : lost_) lost.assign(sights_.leafCount(), {});
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
     for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
       for (std::size_t half = 0; half < 2; ++half) {
-        std::uint32_t escaped = 0, absorbed = 0;
+        std::uint32_t above = 0, below = 0, absorbed = 0, doubtful = 0;
         for (const auto end : sights_.seen(half, v)) {
-          escaped += end == sights_.escaped() ? 1 : 0;
+          above += end == sights_.skyAbove() ? 1 : 0;
+          below += end == sights_.skyBelow() ? 1 : 0;
           absorbed += end == sights_.absorbed() ? 1 : 0;
-          if (end >= sights_.leafCount()) continue;
-          const auto a = root(s), b = root(sights_.sideOf(end));
-          part_[std::max(a, b)] = std::min(a, b);
+          if (end < sights_.leafCount()) join(s, sights_.sideOf(end));
+          if (end < sights_.endCount()) continue;
+          join(s, sights_.sideOf(sights_.steps(half)[end - sights_.endCount()].by));
+          doubtful += sights_.isDoubtful(half, end) ? 1 : 0;
         }
         const float one = counts[v] > 0 ? 1.0F / static_cast<float>(counts[v]) : 0.0F;
-        lost_[half][v] = {static_cast<float>(escaped) * one, static_cast<float>(absorbed) * one};
+        lost_[half][v] = {static_cast<float>(above) * one, static_cast<float>(below) * one,
+                          static_cast<float>(absorbed) * one, static_cast<float>(doubtful) * one};
       }
+    }
+  }
+  for (std::size_t half = 0; half < 2; ++half) {
+    const auto steps = sights_.steps(half);
+    for (const auto& step : steps) {
+      const auto next = step.next < sights_.endCount() ? step.next : steps[step.next - sights_.endCount()].by;
+      if (next < sights_.leafCount()) join(sights_.sideOf(step.by), sights_.sideOf(next));
     }
   }
   for (std::uint32_t s = 0; s < sides_.size(); ++s) part_[s] = root(s);
@@ -221,8 +255,16 @@ double LeafGather::solved(std::size_t h, std::size_t c, std::size_t v) const {
   return std::max(solved_[h][v][c], -static_cast<double>(light_.irradiance[h][v][static_cast<int>(c)]));
 }
 
+/// What comes straight from the sky, by rays as they are.
+double LeafGather::skyAt(std::size_t h, std::size_t c, std::size_t v) const {
+  const auto i = static_cast<int>(c);
+  return static_cast<double>(lost_[h][v].above) * light_.sky[0][i] +
+         static_cast<double>(lost_[h][v].below) * light_.sky[1][i];
+}
+
 /// By part of the scene and channel: what makes
-/// sum a x = sum a h (r + rho x), h being the part of a leaf's light that other leaves get: x times a factor. Where x
+/// sum a x = sum a (h (r + rho x) + s), h being the part of a leaf's light that other leaves get and s what comes from
+/// the sky: x times a factor. Where x
 /// is as much below nothing as above it, as where shooters have sent the mean of what is there and its pattern is left,
 /// that says nothing; all light of the part, with what came over links, makes up for what little is off then.
 LeafGather::Levels LeafGather::levels(std::size_t h) const {
@@ -234,12 +276,12 @@ LeafGather::Levels LeafGather::levels(std::size_t h) const {
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
     auto& sum = sums[part_[s]];
     for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
-      const double sends = 1.0 - static_cast<double>(lost_[h][v].escaped) - static_cast<double>(lost_[h][v].absorbed);
+      const double sends = 1.0 - lost_[h][v].escaped() - static_cast<double>(lost_[h][v].absorbed);
       for (std::size_t c = 0; c < 3 && area_[v] > 0.0; ++c) {
         const auto i = static_cast<int>(c);
         const double x = solved(h, c, v), over_links = static_cast<double>(light_.irradiance[h][v][i]);
         const double stays = 1.0 - sends * static_cast<double>(light_.reflectance[v][i]);
-        sum[c].left += area_[v] * sends * halves_[h].source[v][c];
+        sum[c].left += area_[v] * (sends * halves_[h].source[v][c] + skyAt(h, c, v));
         sum[c].kept += area_[v] * stays * x;
         sum[c].size += area_[v] * stays * std::abs(x);
         sum[c].all += area_[v] * stays * (x + over_links);
@@ -297,13 +339,18 @@ void LeafGather::take(std::size_t h, const Levels& levels) {
 /// What the rays of both halves make of the same light: light that differs is not theirs.
 void LeafGather::weighNoise(const LeafSmoother& smoother) {
   const std::size_t leaves = sights_.leafCount();
-  std::vector<Light> radiosity(leaves + 2, Light{});
+  auto radiosity = halves_[0].source, source = radiosity;  // for the sky
   for (std::size_t v = 0; v < leaves; ++v) {
-    for (std::size_t c = 0; c < 3; ++c)
+    for (std::size_t c = 0; c < 3; ++c) {
+      source[v][c] = 0.5 * (halves_[0].source[v][c] + halves_[1].source[v][c]);
       radiosity[v][c] = 0.5 * (halves_[0].radiosity[v][c] + halves_[1].radiosity[v][c]);
+    }
   }
   inBothHalves([&](std::size_t half) {
-    average(half, radiosity, halves_[half].arriving);
+    auto& sent = halves_[half].radiosity;
+    std::ranges::copy(radiosity, sent.begin());
+    followSteps(half, &source, sent);
+    average(half, sent, halves_[half].arriving);
     smoother.apply(halves_[half].arriving);
   });
   block_noise_.assign((leaves + kBlock - 1) / kBlock, 0.0);
@@ -356,18 +403,32 @@ void LeafGather::weighMissed(const std::array<Levels, 2>& levels) {
   }
 }
 
+/// What such rays bring may be the light of another side of a wall, or no light where there is some.
+void LeafGather::weighDoubt() {
+  doubt_ = 0.0;
+  for (std::uint32_t v = 0; v < sights_.leafCount(); ++v) {
+    const float part = 0.5F * (lost_[0][v].doubtful + lost_[1][v].doubtful);
+    if (part <= 0.0F) continue;
+    const glm::vec3 brought = 0.5F * part * (gathered_[0][v] + gathered_[1][v]);
+    const float square = glm::dot(brought, brought);
+    doubt_ += area_[v] * static_cast<double>(square);
+    leaf_bias_[v] += square;
+  }
+}
+
 /// A ray is drawn as light leaves, too: what part of a leaf's rays leave the scene, or end on unlit sides, that part of
 /// its light does.
 void LeafGather::weighLost() {
-  escaped_ = absorbed_ = {};
+  escaped_ = absorbed_ = from_sky_ = {};
   for (std::size_t half = 0; half < 2; ++half) {
     for (std::uint32_t v = 0; v < sights_.leafCount(); ++v) {
       const auto& lost = lost_[half][v];
-      if (lost.escaped + lost.absorbed <= 0.0F) continue;
+      if (lost.escaped() <= 0.0 && lost.absorbed <= 0.0F) continue;
       for (std::size_t c = 0; c < 3; ++c) {
         const double flux = 0.5 * area_[v] * halves_[half].radiosity[v][c];
-        escaped_[c] += flux * static_cast<double>(lost.escaped);
+        escaped_[c] += flux * lost.escaped();
         absorbed_[c] += flux * static_cast<double>(lost.absorbed);
+        from_sky_[c] += 0.5 * area_[v] * skyAt(half, c, v);
       }
     }
   }
@@ -375,14 +436,14 @@ void LeafGather::weighLost() {
 
 void LeafGather::save(ArchiveWriter& to) const {
   const auto counts = sights_.counts();
-  to(has_gathered_, std::vector<std::uint16_t>(counts.begin(), counts.end()), noise_, smoothed_, bias_, block_noise_,
-     escaped_, absorbed_, unsolved_, leaf_bias_, block_light_, side_noise_, side_light_);
+  to(has_gathered_, std::vector<std::uint16_t>(counts.begin(), counts.end()), noise_, smoothed_, bias_, doubt_,
+     block_noise_, escaped_, absorbed_, from_sky_, unsolved_, leaf_bias_, block_light_, side_noise_, side_light_);
 }
 
 bool LeafGather::restore(ArchiveReader& from) {
   std::vector<std::uint16_t> counts;
-  from(has_gathered_, counts, noise_, smoothed_, bias_, block_noise_, escaped_, absorbed_, unsolved_, leaf_bias_,
-       block_light_, side_noise_, side_light_);
+  from(has_gathered_, counts, noise_, smoothed_, bias_, doubt_, block_noise_, escaped_, absorbed_, from_sky_, unsolved_,
+       leaf_bias_, block_light_, side_noise_, side_light_);
   const auto fits = [](std::uint16_t count) { return count <= LeafSights::kMostRays; };
   std::size_t all = 0;
   for (const auto count : counts) all += count;

@@ -3,7 +3,8 @@
 //
 //   x = R (r + rho x),
 //
-// where r is the radiosity of each leaf that no shooter stands for and R the mean over a leaf's rays. So light comes
+// where r is the radiosity of each leaf that no shooter stands for, and of the sky, and R the mean over a leaf's rays.
+// So light comes
 // over links from whatever is worth an image of its own, and from all else by rays, and nothing comes twice: what
 // shooters send less than a leaf has, or more, is in r, signed. In rooms of hundreds of surfaces a ray to each sample
 // costs less than an image of all of them from each. Rays see leaves as they are, so that nothing varies within a
@@ -36,6 +37,7 @@ struct LeftLight {
   std::vector<glm::vec3> reflectance;
   std::array<std::vector<glm::vec3>, 2> irradiance;  ///< over links, by half
   std::array<std::vector<glm::vec3>, 2> shot;        ///< radiosity that shooters stand for, by half
+  std::array<glm::dvec3, 2> sky{};                   ///< pi times its radiance, above the horizon and below
 };
 
 class LeafGather {
@@ -77,13 +79,17 @@ class LeafGather {
   /// The part of noise() that the halves have in common: what smoothing took of the light itself, and what neither of
   /// them saw, by the light that is sent and does not arrive.
   [[nodiscard]] double bias() const { return bias_; }
-  /// bias() by leaf value, not times area.
+  /// bias() and doubt() by leaf value, not times area.
   [[nodiscard]] std::span<const float> biasOfLeaves() const { return leaf_bias_; }
+  /// The same of what no ray can tell: they end within a gap that has no end. No part of noise().
+  [[nodiscard]] double doubt() const { return doubt_; }
   /// Flux that the equation does not account for, of what is gathered.
   [[nodiscard]] double unsolved() const { return unsolved_; }
-  /// Flux that leaves the scene, and that falls on unlit sides, by channel.
+  /// Flux that leaves the scene, and that falls on unlit sides, by channel: of what leaves send.
   [[nodiscard]] const std::array<double, 3>& escapedFlux() const { return escaped_; }
   [[nodiscard]] const std::array<double, 3>& absorbedFlux() const { return absorbed_; }
+  /// Flux that comes straight from the sky.
+  [[nodiscard]] const std::array<double, 3>& skyFlux() const { return from_sky_; }
 
   /// Noise, as parts of the light where it is, that is borne, and that what is not is brought to.
   struct BesideLight {
@@ -114,8 +120,8 @@ class LeafGather {
   /// Four, so that a leaf's are one vector; the last is 0.
   using Light = LeafSmoother::Light;
   struct Half {
-    std::vector<Light> source;     ///< r; by what may be seen, so two more than leaves
-    std::vector<Light> radiosity;  ///< r + rho x
+    std::vector<Light> source;     ///< r; by what may be seen (LeafSights::endCount)
+    std::vector<Light> radiosity;  ///< r + rho x; and then by step
     std::vector<Light> arriving;   ///< its means
     Gmres gmres;
     double shining = 0.0;  ///< flux of |r|, all channels
@@ -130,22 +136,29 @@ class LeafGather {
   enum class Stage { kDone, kTracing, kSolving };
   void takeLight(std::size_t half);
   void average(std::size_t half, const std::vector<Light>& radiosity, std::vector<Light>& mean) const;
+  void followSteps(std::size_t half, const std::vector<Light>* source, std::vector<Light>& radiosity) const;
   void sweep(std::size_t half, Gmres::Vectors& x, bool affine);
   void take(std::size_t half, const Levels& levels);
   void takeSolutions();
   void weighRays();
   [[nodiscard]] double solved(std::size_t half, std::size_t channel, std::size_t value) const;
+  [[nodiscard]] double skyAt(std::size_t half, std::size_t channel, std::size_t value) const;
   [[nodiscard]] Levels levels(std::size_t half) const;
   void weighMissed(const std::array<Levels, 2>& levels);
   void weighNoise(const LeafSmoother& smoother);
   void weighLost();
+  void weighDoubt();
   /// By block of leaves: how many rays they have, and the one with most; how many times as many are asked for.
   struct BlockRays {
     std::uint32_t rays = 0, most = 0, times = 1;
   };
   [[nodiscard]] std::vector<BlockRays> blockRays() const;
-  [[nodiscard]] bool mayDouble(const BlockRays& block, std::size_t bytes);
-  void refineBlotches(const BesideLight& beside, std::vector<BlockRays>& blocks, std::size_t& bytes);
+  /// For more rays.
+  struct Room {
+    std::size_t bytes, ray_bytes;
+  };
+  [[nodiscard]] bool takeDouble(BlockRays& block, Room& taken);
+  void refineBlotches(const BesideLight& beside, std::vector<BlockRays>& blocks, Room& taken);
   void finish();
 
   LeafSights sights_;
@@ -155,7 +168,9 @@ class LeafGather {
   std::vector<double> area_;  ///< by leaf value
   // Of the rays that there are:
   struct Lost {
-    float escaped = 0.0F, absorbed = 0.0F;  ///< parts of a leaf's rays
+    // Parts of a leaf's rays: into the sky, on unlit sides, and of which it is not told where they end.
+    float above = 0.0F, below = 0.0F, absorbed = 0.0F, doubtful = 0.0F;
+    [[nodiscard]] double escaped() const { return static_cast<double>(above) + static_cast<double>(below); }
   };
   bool is_weighed_ = false;                ///< the following are known
   std::array<std::vector<Lost>, 2> lost_;  ///< by half and leaf value
@@ -165,12 +180,12 @@ class LeafGather {
   std::array<Half, 2> halves_;
   std::array<std::vector<Light>, 2> solved_;  ///< by half and leaf value: x, smoothed; while taking it
   std::array<std::vector<glm::vec3>, 2> gathered_;
-  double noise_ = 0.0, smoothed_ = 0.0, bias_ = 0.0, unsolved_ = 0.0;
+  double noise_ = 0.0, smoothed_ = 0.0, bias_ = 0.0, doubt_ = 0.0, unsolved_ = 0.0;
   std::vector<double> block_noise_;  ///< parts of it but for smoothed_, what smoothing took, by kBlock leaves
   std::vector<double> block_light_;  ///< likewise, of all irradiance
   std::vector<double> side_noise_, side_light_;  ///< likewise, by side
   std::vector<float> leaf_bias_;
-  std::array<double, 3> escaped_{}, absorbed_{};
+  std::array<double, 3> escaped_{}, absorbed_{}, from_sky_{};
 };
 
 }  // namespace radiosity::solver

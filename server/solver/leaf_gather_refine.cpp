@@ -43,18 +43,23 @@ std::vector<LeafGather::BlockRays> LeafGather::blockRays() const {
   return blocks;
 }
 
-/// All rays take so many bytes already.
-bool LeafGather::mayDouble(const BlockRays& block, std::size_t bytes) {
+/// Twice as many, if that many may be, and there is room for them beside what all rays take already.
+bool LeafGather::takeDouble(BlockRays& block, Room& taken) {
   if (block.rays == 0 || block.times >= kMostTimes || 2 * block.times * block.most > LeafSights::kMostRays)
     return false;
-  const bool fits = bytes + std::size_t{block.times} * block.rays * LeafSights::kRayBytes <= most_bytes_;
-  lacks_memory_ = lacks_memory_ || !fits;
-  return fits;
+  const auto more = std::size_t{block.times} * block.rays * taken.ray_bytes;
+  if (taken.bytes + more > most_bytes_) {
+    lacks_memory_ = true;
+    return false;
+  }
+  taken.bytes += more;
+  block.times *= 2;
+  return true;
 }
 
 /// Half a difference of smoothed light says little of few leaves, whose noise goes together: a block is as noisy as it
 /// is itself, or as its side is.
-void LeafGather::refineBlotches(const BesideLight& beside, std::vector<BlockRays>& blocks, std::size_t& bytes) {
+void LeafGather::refineBlotches(const BesideLight& beside, std::vector<BlockRays>& blocks, Room& taken) {
   const double light = std::reduce(side_light_.begin(), side_light_.end());
   const double all = std::reduce(area_.begin(), area_.end());
   const double black = all > 0.0 ? kBlack * kBlack * light / all : 0.0;
@@ -74,10 +79,8 @@ void LeafGather::refineBlotches(const BesideLight& beside, std::vector<BlockRays
     auto& block = blocks[b];
     if (noisy[b] <= beside.borne * beside.borne) continue;
     while (noisy[b] * noiseLeft(block.times) > beside.goal * beside.goal &&
-           2 * block.times * block.most <= kMostForBlotches && mayDouble(block, bytes)) {
-      bytes += std::size_t{block.times} * block.rays * LeafSights::kRayBytes;
-      block.times *= 2;
-    }
+           2 * block.times * block.most <= kMostForBlotches && takeDouble(block, taken))
+      continue;
   }
 }
 
@@ -89,8 +92,9 @@ bool LeafGather::refine(double goal, const BesideLight& beside) {
   };
   auto blocks = blockRays();
   lacks_memory_ = false;
-  std::size_t bytes = leastBytes(sights_.leafCount()) + sights_.bytes();
-  refineBlotches(beside, blocks, bytes);
+  Room taken{leastBytes(sights_.leafCount()) + sights_.bytes(), sights_.rayBytes(sizeof(Light))};
+  taken.bytes += (sights_.steps(0).size() + sights_.steps(1).size()) * sizeof(Light);
+  refineBlotches(beside, blocks, taken);
   double noise = rayNoise();
   std::priority_queue<Gain> queue;
   const auto push = [&](std::uint32_t b) {
@@ -107,10 +111,8 @@ bool LeafGather::refine(double goal, const BesideLight& beside) {
     const auto b = queue.top().block;
     queue.pop();
     auto& block = blocks[b];
-    if (!mayDouble(block, bytes)) continue;
-    bytes += std::size_t{block.times} * block.rays * LeafSights::kRayBytes;
-    noise -= block_noise_[b] * (noiseLeft(block.times) - noiseLeft(2.0 * block.times));
-    block.times *= 2;
+    if (!takeDouble(block, taken)) continue;
+    noise -= block_noise_[b] * (noiseLeft(block.times / 2.0) - noiseLeft(block.times));
     push(b);
   }
   if (std::ranges::all_of(blocks, [](const BlockRays& block) { return block.times == 1; })) return false;

@@ -58,6 +58,7 @@ void LeafRays::findStandIns() {
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
       const bool whole = patches_.node_area[side.first_node + leaf] > 0.0F;
       stand_in_.push_back(whole ? side.first_value + leaf : neighbourOf(side, leaf));
+      is_cut_.push_back(whole && patches_.leaves[patches_.surfaces[side.surface].first_leaf + leaf].cut);
     }
   }
 }
@@ -136,7 +137,7 @@ bool LeafRays::passes(const scene::RayHit& hit, const glm::dvec3& at, std::uint6
   return uniformFromKey(mixKeys(key, hit.triangle)) >= opacity;
 }
 
-std::uint32_t LeafRays::see(const Place& from, const glm::dvec3& direction, std::uint64_t key) const {
+std::uint32_t LeafRays::see(const Place& from, const glm::dvec3& direction, std::uint64_t key, Place& end) const {
   auto origin = lifted(from);
   std::array<std::uint32_t, kMostSheets> passed;
   std::array<float, kMostSheets> distance;
@@ -160,7 +161,11 @@ std::uint32_t LeafRays::see(const Place& from, const glm::dvec3& direction, std:
       continue;
     }
     const auto s = side_of_[patches_.triangle_surface[hit.triangle]][hit.front ? 0 : 1];
-    return s == scene::kNone ? kNothing : stand_in_[leafAt(sides_[s], hit.triangle, at)];
+    if (s == scene::kNone) return kNothing;
+    const auto value = leafAt(sides_[s], hit.triangle, at);
+    const auto& normal = patches_.triangles[hit.triangle].normal;
+    end = {at, glm::dvec3(hit.front ? normal : -normal), value};
+    return stand_in_[value];
   }
 }
 

@@ -51,7 +51,10 @@ class LeafRays {
   /// The leaf value that is seen that way, kNothing or one of the sky's. Where a leaf has no area of its own (buried
   /// right behind another, or so little of it that its neighbours took it) it is theirs. What one can see through stops
   /// the ray or not, by chance from `key`. Costs a third of look().
-  [[nodiscard]] std::uint32_t see(const Place& from, const glm::dvec3& direction, std::uint64_t key) const;
+  /// `end`: where it is seen, if it is not of another's that its value is told.
+  [[nodiscard]] std::uint32_t see(const Place& from, const glm::dvec3& direction, std::uint64_t key, Place& end) const;
+  /// Light may change within the leaf from one place to the next: something passes through it or right before it.
+  [[nodiscard]] bool isCut(std::uint32_t value) const { return is_cut_[value]; }
   /// Who is seen where a leaf lies: itself, unless it has no area.
   [[nodiscard]] std::uint32_t standInOf(std::uint32_t value) const { return stand_in_[value]; }
   [[nodiscard]] bool isOpen(const Place& from, const glm::dvec3& to) const;
@@ -71,6 +74,7 @@ class LeafRays {
   std::vector<std::uint32_t> side_of_value_;
   /// By leaf value: itself, or who stands for it where it has no area: another, or kNothing.
   std::vector<std::uint32_t> stand_in_;
+  std::vector<bool> is_cut_;  ///< by leaf value
   double greatest_width_ = 0.0;
 };
 

@@ -12,6 +12,8 @@ namespace {
 
 /// Leaves between two looks at the clock, of all threads together, and of one at a time.
 constexpr std::uint32_t kLeavesASlice = 2048, kLeavesAtOnce = 64;
+/// A ray goes on from so many leaves at most; then the mean of the next has to do. In gaps it might go on for ever.
+constexpr std::size_t kMostSteps = 32;
 /// Rays and boxes are held against each other with so much to spare (unit box).
 constexpr double kMargin = 1e-5;
 
@@ -49,7 +51,8 @@ void LeafSights::ask(std::span<const std::uint16_t> counts) {
   cursor_ = 0;
 }
 
-/// What is known moves to where it belongs; before a half is laid out anew nothing is lost should memory run out.
+/// What is known moves to where it belongs, and steps that no ray has are dropped; before a half is laid out anew
+/// nothing is lost should memory run out.
 void LeafSights::layOut(std::span<const std::uint16_t> counts) {
   std::vector<std::uint16_t> count(leaf_count_, 0);
   std::vector<std::size_t> first(leaf_count_, 0);
@@ -60,16 +63,29 @@ void LeafSights::layOut(std::span<const std::uint16_t> counts) {
     all += count[value];
   }
   std::array<std::vector<std::uint32_t>, 2> seen;
+  std::array<std::vector<Step>, 2> steps;
   for (std::size_t half = 0; half < 2; ++half) {
     seen[half].assign(all, kUntraced);
-    for (std::uint32_t value = 0; value < leaf_count_; ++value)
-      std::copy_n(seen_[half].begin() + static_cast<std::ptrdiff_t>(first_[value]),
-                  std::min(count_[value], count[value]),
-                  seen[half].begin() + static_cast<std::ptrdiff_t>(first[value]));
+    for (std::uint32_t value = 0; value < leaf_count_; ++value) {
+      const auto known = std::min(count_[value], count[value]);
+      for (std::size_t k = 0; k < known; ++k) {
+        const auto end = seen_[half][first_[value] + k];
+        seen[half][first[value] + k] = end == kUntraced ? end : withSteps(end, half, steps[half]);
+      }
+    }
   }
   count_ = std::move(count);
   first_ = std::move(first);
   seen_ = std::move(seen);
+  steps_ = std::move(steps);
+}
+
+/// An end, whose steps are taken over.
+std::uint32_t LeafSights::withSteps(std::uint32_t end, std::size_t half, std::vector<Step>& steps) const {
+  if (end < endCount()) return end;
+  const auto& step = steps_[half][end - endCount()];
+  steps.push_back({step.by, withSteps(step.next, half, steps)});
+  return endCount() + static_cast<std::uint32_t>(steps.size() - 1);
 }
 
 void LeafSights::giveUp() {
@@ -80,47 +96,111 @@ void LeafSights::giveUp() {
   layOut(counts);
 }
 
-Sobol4 LeafSights::draws(std::uint32_t value, const Side& side, std::size_t half) const {
-  const auto leaf = std::uint64_t{value - side.first_value} * 2 + half;
-  return Sobol4(mixKeys(mixKeys(seed_, side.key), leaf));
+std::uint64_t LeafSights::keyOf(std::uint32_t value, const Side& side, std::size_t half) const {
+  return mixKeys(mixKeys(seed_, side.key), std::uint64_t{value - side.first_value} * 2 + half);
 }
 
-std::uint32_t LeafSights::traceLeaf(std::uint32_t value, const Side& side, std::size_t half) {
+/// Its steps are made from the last to the first.
+std::uint32_t LeafSights::endOfRay(LeafRays::Place place, glm::dvec3 direction, std::uint64_t key,
+                                   std::vector<Step>& steps) const {
+  std::array<std::uint32_t, kMostSteps> by{};
+  std::size_t count = 0;
+  LeafRays::Place there;
+  auto seen = rays_.see(place, direction, key, there);
+  while (count < kMostSteps && seen < leaf_count_ && seen == there.value && rays_.isCut(seen)) {
+    by[count++] = seen;
+    key = mixKeys(key, count);
+    const auto draw = sobol4(0, key);
+    place = there;
+    seen = rays_.see(place, cosineDirection(place.normal, draw.x, draw.y), key, there);
+  }
+  std::uint32_t end = seen == LeafRays::kSkyAbove   ? skyAbove()
+                      : seen == LeafRays::kSkyBelow ? skyBelow()
+                      : seen == LeafRays::kNothing  ? absorbed()
+                                                    : seen;
+  while (count > 0) {
+    steps.push_back({by[--count], end});
+    end = endCount() + static_cast<std::uint32_t>(steps.size() - 1);
+  }
+  return end;
+}
+
+bool LeafSights::isDoubtful(std::size_t half, std::uint32_t end) const {
+  std::size_t count = 0;
+  for (; end >= endCount(); ++count) end = steps_[half][end - endCount()].next;
+  return count == kMostSteps && end < leaf_count_ && rays_.isCut(end);
+}
+
+std::uint32_t LeafSights::traceLeaf(std::uint32_t value, const Side& side, std::size_t half, NewSteps& made) {
   const auto seen = std::span(seen_[half]).subspan(first_[value], count_[value]);
   const auto wanted = static_cast<std::uint32_t>(std::ranges::count(seen, kUntraced));
   if (wanted == 0) return 0;
   const auto draw = draws(value, side, half);
-  const auto chance = mixKeys(mixKeys(seed_, value), half);
+  const auto chance = mixKeys(keyOf(value, side, half), 1);
   for (std::uint32_t k = 0; k < seen.size(); ++k) {
     if (seen[k] != kUntraced) continue;
     const auto at = draw(k);
     const auto place = rays_.placeOn(value, {at.z, at.w});
-    const auto end = rays_.see(place, cosineDirection(place.normal, at.x, at.y), mixKeys(chance, k));
-    const bool sky = end == LeafRays::kSkyAbove || end == LeafRays::kSkyBelow;
-    seen[k] = sky ? escaped() : end == LeafRays::kNothing ? absorbed() : end;
+    const auto end = endOfRay(place, cosineDirection(place.normal, at.x, at.y), mixKeys(chance, k), made.steps);
+    if (end >= endCount()) made.rays.push_back(first_[value] + k);
+    seen[k] = end;
   }
   return wanted;
+}
+
+/// In the order of leaves, whoever traced them.
+void LeafSights::takeSteps(std::span<const std::array<NewSteps, 2>> made) {
+  for (std::size_t half = 0; half < 2; ++half) {  // all room first
+    std::size_t more = 0;
+    for (const auto& halves : made) more += halves[half].steps.size();
+    if (steps_[half].size() + more > steps_[half].capacity())
+      steps_[half].reserve(std::max(steps_[half].size() + more, 2 * steps_[half].capacity()));
+  }
+  for (const auto& halves : made) {
+    for (std::size_t half = 0; half < 2; ++half) {
+      const auto before = static_cast<std::uint32_t>(steps_[half].size());
+      for (const auto ray : halves[half].rays) seen_[half][ray] += before;
+      for (const auto& step : halves[half].steps)
+        steps_[half].push_back({step.by, step.next < endCount() ? step.next : step.next + before});
+    }
+  }
+}
+
+/// From cursor_ to `end`. Where memory runs out, rays with steps are as good as not traced.
+void LeafSights::traceSlice(std::uint32_t end) {
+  const auto parts = (end - cursor_ + kLeavesAtOnce - 1) / kLeavesAtOnce;
+  std::vector<std::array<NewSteps, 2>> made(parts);
+  std::atomic<std::uint32_t> next{0};
+  std::atomic<std::uint64_t> traced{0};
+  try {
+    inShares(parts, [&](std::size_t, std::size_t) {
+      for (auto part = next++; part < parts; part = next++) {
+        const auto from = cursor_ + part * kLeavesAtOnce;
+        std::uint64_t rays = 0;
+        for (auto value = from; value < std::min(end, from + kLeavesAtOnce); ++value) {
+          if (count_[value] == 0) continue;
+          const Side& side = rays_.sideOf(value);
+          for (std::size_t half = 0; half < 2; ++half) rays += traceLeaf(value, side, half, made[part][half]);
+        }
+        traced += rays;
+      }
+    });
+    takeSteps(made);
+  } catch (...) {
+    for (const auto& halves : made) {
+      for (std::size_t half = 0; half < 2; ++half)
+        for (const auto ray : halves[half].rays) seen_[half][ray] = kUntraced;
+    }
+    throw;
+  }
+  traced_ += traced;
+  cursor_ = end;
 }
 
 bool LeafSights::trace(double seconds) {
   const auto start = std::chrono::steady_clock::now();
   while (cursor_ < leaf_count_) {
-    const auto end = std::min(leaf_count_, cursor_ + kLeavesASlice);
-    std::atomic<std::uint32_t> next{cursor_};
-    std::atomic<std::uint64_t> traced{0};
-    inShares((end - cursor_ + kLeavesAtOnce - 1) / kLeavesAtOnce, [&](std::size_t, std::size_t) {
-      for (auto from = next.fetch_add(kLeavesAtOnce); from < end; from = next.fetch_add(kLeavesAtOnce)) {
-        std::uint64_t rays = 0;
-        for (auto value = from; value < std::min(end, from + kLeavesAtOnce); ++value) {
-          if (count_[value] == 0) continue;
-          const Side& side = rays_.sideOf(value);
-          for (std::size_t half = 0; half < 2; ++half) rays += traceLeaf(value, side, half);
-        }
-        traced += rays;
-      }
-    });
-    traced_ += traced;
-    cursor_ = end;
+    traceSlice(std::min(leaf_count_, cursor_ + kLeavesASlice));
     if (std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() >= seconds) break;
   }
   return isTraced();
@@ -157,9 +237,10 @@ void LeafSights::inherit(const LeafSights& former, std::span<const std::uint32_t
   std::ranges::nth_element(sorted, sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2));
   const auto usual = sorted[sorted.size() / 2];
   std::vector<std::uint16_t> counts(leaf_count_, std::min(usual, most));
-  std::vector<std::uint32_t> value_after(former.leaf_count_ + 2, kUntraced);
+  std::vector<std::uint32_t> value_after(former.endCount(), kUntraced);
   value_after[former.absorbed()] = absorbed();
-  value_after[former.escaped()] = escaped();
+  value_after[former.skyAbove()] = skyAbove();
+  value_after[former.skyBelow()] = skyBelow();
   for (std::uint32_t value = 0; value < leaf_count_; ++value) {
     if (value_before[value] == scene::kNone) continue;
     value_after[value_before[value]] = value;
@@ -176,7 +257,7 @@ void LeafSights::inherit(const LeafSights& former, std::span<const std::uint32_t
       const auto old =
           std::span(former.seen_[half]).subspan(former.first_[before], std::min(former.count_[before], count_[value]));
       for (std::uint32_t k = 0; k < old.size(); ++k) {
-        if (old[k] == kUntraced) continue;
+        if (old[k] >= former.endCount()) continue;  // not traced; and where those with steps pass is not known
         const auto end = value_after[old[k]];
         if (end == kUntraced) continue;  // it saw what is gone, or moved
         const bool may_pass = end >= leaf_count_ || change.isPassed(value, end);
@@ -198,7 +279,13 @@ std::uint64_t LeafSights::untraced() const {
 }
 
 std::size_t LeafSights::bytes() const {
-  return (seen_[0].size() + seen_[1].size()) * sizeof(std::uint32_t) + first_.size() * sizeof(std::size_t);
+  return (seen_[0].size() + seen_[1].size()) * sizeof(std::uint32_t) + first_.size() * sizeof(std::size_t) +
+         (steps_[0].size() + steps_[1].size()) * sizeof(Step);
+}
+
+std::size_t LeafSights::rayBytes(std::size_t step_bytes) const {
+  const auto rays = std::max<std::size_t>(1, seen_[0].size()), steps = steps_[0].size() + steps_[1].size();
+  return kRayBytes + (steps * (sizeof(Step) + step_bytes) + rays - 1) / rays;
 }
 
 }  // namespace radiosity::solver

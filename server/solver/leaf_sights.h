@@ -1,6 +1,10 @@
 // Which leaves each leaf sees, by rays from all over it, more of them near its normal, as light arrives: the mean
 // radiosity of those seen is its irradiance. Points and directions are Sobol's, scrambled leaf by leaf, so that more
 // rays go on where fewer ended. Two independent halves. Owned by LeafGather; one thread outside of the calls.
+//
+// What passes through a leaf, or right before it, parts its light: a wall that stands on a leaf of the floor has the
+// day on one side and the night on the other, and the leaf's mean would bring each to the other. So rays that end on
+// such a leaf go on from where they end.
 #pragma once
 
 #include <array>
@@ -21,10 +25,21 @@ class LeafSights {
 
   LeafSights(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed);
 
-  /// Leaf values. What is seen is one of them, below this, or escaped(), or absorbed().
+  /// Leaf values. What is seen is one of them, below this, or absorbed(), or the sky, above the horizon or below.
   [[nodiscard]] std::uint32_t leafCount() const { return leaf_count_; }
   [[nodiscard]] std::uint32_t absorbed() const { return leaf_count_; }
-  [[nodiscard]] std::uint32_t escaped() const { return leaf_count_ + 1; }
+  [[nodiscard]] std::uint32_t skyAbove() const { return leaf_count_ + 1; }
+  [[nodiscard]] std::uint32_t skyBelow() const { return leaf_count_ + 2; }
+  /// All of these are below this. What is not is a step: of number end - endCount().
+  [[nodiscard]] std::uint32_t endCount() const { return leaf_count_ + 3; }
+  /// The ray reached a leaf that something cuts, and what it saw from there. Later ones go on to earlier ones.
+  struct Step {
+    std::uint32_t by;    ///< leaf value
+    std::uint32_t next;  ///< an end, or the step before
+  };
+  [[nodiscard]] std::span<const Step> steps(std::size_t half) const { return steps_[half]; }
+  /// The ray went on as often as a ray may, and ends on another leaf that something cuts.
+  [[nodiscard]] bool isDoubtful(std::size_t half, std::uint32_t end) const;
 
   /// Index of the side of a leaf.
   [[nodiscard]] std::uint32_t sideOf(std::uint32_t value) const { return rays_.indexOfSide(value); }
@@ -54,19 +69,34 @@ class LeafSights {
                std::uint16_t most);
 
   [[nodiscard]] std::size_t bytes() const;
-  /// Bytes of a ray asked for.
+  /// Bytes of a ray asked for, one of each half, but for its steps.
   static constexpr std::size_t kRayBytes = 2 * sizeof(std::uint32_t);
+  /// The same with as many steps as those there are have; `step_bytes`: whoever follows them takes for each.
+  [[nodiscard]] std::size_t rayBytes(std::size_t step_bytes) const;
   /// Rays traced so far, of both halves; those inherited count apart.
   [[nodiscard]] std::uint64_t traced() const { return traced_; }
   [[nodiscard]] std::uint64_t kept() const { return kept_; }
 
  private:
   static constexpr std::uint32_t kUntraced = scene::kNone;
+  /// Steps, numbered from 0, and which rays have them.
+  struct NewSteps {
+    std::vector<Step> steps;
+    std::vector<std::size_t> rays;  ///< into seen_
+  };
   void layOut(std::span<const std::uint16_t> counts);
   /// Returns how many rays.
-  std::uint32_t traceLeaf(std::uint32_t value, const Side& side, std::size_t half);
+  std::uint32_t traceLeaf(std::uint32_t value, const Side& side, std::size_t half, NewSteps& made);
+  [[nodiscard]] std::uint32_t endOfRay(LeafRays::Place place, glm::dvec3 direction, std::uint64_t key,
+                                       std::vector<Step>& steps) const;
+  [[nodiscard]] std::uint32_t withSteps(std::uint32_t end, std::size_t half, std::vector<Step>& steps) const;
+  void traceSlice(std::uint32_t end);
+  void takeSteps(std::span<const std::array<NewSteps, 2>> made);
   /// Draws of the rays of a leaf.
-  [[nodiscard]] Sobol4 draws(std::uint32_t value, const Side& side, std::size_t half) const;
+  [[nodiscard]] std::uint64_t keyOf(std::uint32_t value, const Side& side, std::size_t half) const;
+  [[nodiscard]] Sobol4 draws(std::uint32_t value, const Side& side, std::size_t half) const {
+    return Sobol4(keyOf(value, side, half));
+  }
   void forgetStandIns(const LeafSights& former, std::vector<std::uint32_t>& value_after) const;
   [[nodiscard]] bool isPassed(const Shadows& change, std::uint32_t value, const glm::dvec4& draw) const;
 
@@ -78,6 +108,7 @@ class LeafSights {
   std::vector<std::uint16_t> count_, before_;  ///< by leaf value; before what was asked for last
   std::vector<std::size_t> first_;             ///< by leaf value: into seen_
   std::array<std::vector<std::uint32_t>, 2> seen_;
+  std::array<std::vector<Step>, 2> steps_;
   std::uint64_t traced_ = 0, kept_ = 0;
 };
 

@@ -30,6 +30,7 @@ struct LeafLight {
   std::array<std::span<const glm::vec3>, 2> irradiance;  ///< by half
   std::span<const LightPolygon> lights;                  ///< dark ones too; more may come, none goes
   std::span<const PunctualLights::Source> sources;
+  bool by_rays = false;  ///< reflected light comes by rays, which know what varies where something cuts a leaf
 };
 
 class LeafVariation {

@@ -57,7 +57,8 @@ void LinkedSolver::assess() {
   const double unlinked = std::max(0.0, planner_.unlinked(system_));
   const double left_out = planner_.leftOut() + (growing_ ? 0.0 : unlinked);
   if (by_rays_) {
-    if (!gathers()) owed += net_unshot_ + varying_;  // rays will bring it
+    const auto sky = skyFlux();
+    if (!gathers()) owed += net_unshot_ + varying_ + sky[0] + sky[1] + sky[2];  // rays will bring it
   } else {
     owed += growing_ ? net_unshot_ + unlinked : left_out;
   }
@@ -69,7 +70,8 @@ void LinkedSolver::assess() {
   const double kept = std::min(kMostKept, (1.0 - lostPart()) * reflected / received);
   by_links_ = field.sampling();
   if (gathers()) by_links_ = std::hypot(by_links_, std::sqrt(gather_->bias() / field.square()));
-  error_.sampling = by_links_;
+  const double doubt = gathers() ? gather_->doubt() : 0.0;
+  error_.sampling = std::hypot(by_links_, std::sqrt(doubt / field.square()));
   error_.discretization = field.discretization();
   const double varying = std::sqrt(planner_.variation(system_, unshot_, *patches_) / field.square());
   error_.residual =
@@ -79,7 +81,7 @@ void LinkedSolver::assess() {
   left_out_ = left_out / (1.0 - kept) / received;
   error_.total = std::hypot(error_.residual, error_.sampling);
   if (!variation_) return;
-  error_.sampling = std::hypot(by_links_, std::sqrt(variation_->noise() / field.square()));
+  error_.sampling = std::hypot(by_links_, std::sqrt((variation_->noise() + doubt) / field.square()));
   error_.variation = std::sqrt(variation_->left() / field.square());
   error_.total = std::hypot(error_.residual, error_.sampling, error_.variation);
 }
@@ -200,10 +202,14 @@ EnergyParts LinkedSolver::energy() const {
       }
     }
   }
+  const auto sky = skyFlux();
   for (std::size_t c = 0; c < 3; ++c) {
+    parts.emitted[c] += sky[c];
     if (gathers()) {
-      parts.escaped[c] += gather_->escapedFlux()[c];
+      parts.escaped[c] += gather_->escapedFlux()[c] + sky[c] - gather_->skyFlux()[c];
       parts.backface[c] += gather_->absorbedFlux()[c];
+    } else {
+      parts.unshot[c] += sky[c];
     }
     parts.unshot[c] -= sent_for[c];
     parts.imbalance[c] = parts.emitted[c] - parts.absorbed[c] - parts.escaped[c] - parts.backface[c] - parts.unshot[c];

@@ -2,7 +2,9 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <numbers>
 #include <numeric>
+#include <utility>
 
 #include "server/solver/linked_solver.h"
 
@@ -111,6 +113,7 @@ LeftLight LinkedSolver::leftLight() const {
   light.emission = system_.emission();
   light.reflectance = system_.reflectance();
   light.irradiance = over_links_;
+  for (const auto& source : sky_) light.sky[source.direction.y > 0.0F ? 0 : 1] += std::numbers::pi * source.intensity;
   for (auto& shot : light.shot) shot.assign(light.emission.size(), glm::vec3(0.0F));
   for (const auto& side : sides_) {
     if (side.gathered) std::fill_n(light.emission.begin() + side.first_value, side.leaf_count, glm::vec3(0.0F));
@@ -186,8 +189,9 @@ StepOutcome LinkedSolver::chooseRays() {
   const double aim = kAim * targetOfLinks(), rest = error_.residual;
   const double room = std::max(aim * aim - rest * rest, kLeastRoom * aim * aim);
   if (by_links_ * by_links_ <= room) return exhausted(SolveLimit::kWithin);
-  const auto [rays, links] = noise();
+  auto [rays, links] = noise();
   const double rays_cost = static_cast<double>(gather_->rays()) * rayCost(), links_cost = samplesCost();
+  if (links_cost <= 0.0) rays += std::exchange(links, 0.0);  // under a sky there may be none
   double best = HUGE_VAL, part = 0.0;
   for (int i = 1; i < kParts; ++i) {
     const double for_rays = room * i / kParts, for_links = room - for_rays;
@@ -201,7 +205,7 @@ StepOutcome LinkedSolver::chooseRays() {
   const auto end = gather_->lacksMemory() ? SolveLimit::kLinkMemory : SolveLimit::kRays;
   if (!refined && rays > part * room) {  // no more to be had: links get what they leave, or as good as they are
     const double goal = std::max(room - rays, rays);
-    // What halves of the rays differ by may be taken for the links', but no sample makes it less.
+    // What halves of the rays differ by after a bounce may be taken for the links', but no sample makes it less.
     if (links <= goal || (sampled_alone_ > 0.0 && by_links_ > kSampleGain * sampled_alone_)) return exhausted(end);
     sampled_alone_ = by_links_;
     sample_goal_ = std::sqrt(goal);

@@ -67,9 +67,9 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
   key_end_ = static_cast<std::uint32_t>(patches_->nodeCount());
   triangle_key_end_ = static_cast<std::uint32_t>(patches_->triangles.size());
   takeMaterials(materials);
+  by_rays_ = raysPay();
   takeSources(sources);
   share_part_ = 1.0 / settings_.planner.first_shooters;
-  by_rays_ = raysPay();
   limitLinks();
   for (auto& half : half_) half.assign(system_.emission().size(), glm::vec3(0.0F));
   findUnshot();

@@ -175,6 +175,7 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] Result<void> measureSource(const Measurement& want);
   void takeSources(const LightSources& sources);
   void addSource(const PunctualLights::Source& source);
+  [[nodiscard]] std::array<double, 3> skyFlux() const;
   [[nodiscard]] double powerToShoot() const;
   [[nodiscard]] double lostPart() const;
   void solveAnew();
@@ -255,6 +256,7 @@ class LinkedSolver final : public Solver {
   std::vector<LightPolygon> lights_;  // those switched off stay, dark: their links are still good
   PunctualLights punctual_;
   std::vector<PunctualLights::Source> sources_;  // those switched off stay, dark
+  std::vector<PunctualLights::Source> sky_;      // its hemispheres, where rays bring their light
   NodeShots shots_;
   LinkSystem system_;
   LinkExpander expander_;

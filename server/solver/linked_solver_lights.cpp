@@ -44,10 +44,15 @@ std::size_t LinkedSolver::lightBytes() const {
   return bytes;
 }
 
-/// So is every light without extent.
+/// So is every light without extent, but for a sky that rays see.
 void LinkedSolver::takeSources(const LightSources& sources) {
   for (auto& source : sources_) source.intensity = glm::dvec3(0.0);
+  sky_.clear();
   for (const auto& source : punctual_.makeSources(*patches_, sources)) {
+    if (by_rays_ && source.kind == PunctualLights::Source::Kind::kSky) {
+      sky_.push_back(source);
+      continue;
+    }
     const auto known =
         std::find_if(sources_.begin(), sources_.end(), [&](const auto& old) { return old.sameShape(source); });
     if (known != sources_.end()) {
@@ -59,6 +64,15 @@ void LinkedSolver::takeSources(const LightSources& sources) {
   for (auto& shooter : system_.shooters()) {
     if (shooter.source != scene::kNone) shooter.sent.fill(glm::vec3(sources_[shooter.source].intensity));
   }
+}
+
+/// What enters the scene's box from it, whether it meets anything or not.
+std::array<double, 3> LinkedSolver::skyFlux() const {
+  std::array<double, 3> flux{};
+  for (const auto& source : sky_) {
+    for (std::size_t c = 0; c < 3; ++c) flux[c] += source.flux_per_intensity * source.intensity[static_cast<int>(c)];
+  }
+  return flux;
 }
 
 /// In the place of one that is dark, once there are some: a lamp that is dragged about leaves no trail.

@@ -27,6 +27,7 @@ bool LinkedSolver::wantsVariation() const {
   if (variation_ || growing_ || !settings_.within_leaves || error_.total > std::max(kSoon * aim_, kLittle))
     return false;
   if (lights_.size() + sources_.size() > kMostLights) return false;
+  // There rays find most lamps, too, and where something cuts a leaf they know what varies.
   return std::ranges::none_of(patches_->surfaces, [](const scene::Surface& surface) { return surface.see_through; });
 }
 
@@ -53,8 +54,10 @@ void LinkedSolver::updateVariation() {
     }
   }
   square_ = square;
+  auto sources = sources_;  // paths find the sky where they end, and those before it by their numbers
+  sources.insert(sources.end(), sky_.begin(), sky_.end());
   const double bound = kNegligible * aim_;
-  variation_->update({emission, system_.reflectance(), {half_[0], half_[1]}, lights_, sources_},
+  variation_->update({emission, system_.reflectance(), {half_[0], half_[1]}, lights_, sources, gathers()},
                      bound * bound * square);
   corrected_.clear();
   if (!variation_->corrects()) return;

@@ -21,6 +21,8 @@ namespace {
 
 using nlohmann::json;
 
+constexpr double kMostReflectance = 0.999;
+
 struct MaterialValues {
   glm::dvec3 reflectance{0.0}, emission_lux{0.0};
   bool double_sided = false;
@@ -105,7 +107,7 @@ class Reader {
     const auto pbr = material.value("pbrMetallicRoughness", json::object());
     const double metallic = pbr.value("metallicFactor", 1.0) * meanMetallic(pbr);
     values.reflectance = pbr.contains("baseColorFactor") ? vector3(pbr["baseColorFactor"]) : glm::dvec3(1.0);
-    values.reflectance = glm::min(values.reflectance * (1.0 - metallic), glm::dvec3(0.999));
+    values.reflectance = glm::min(values.reflectance * (1.0 - metallic), glm::dvec3(kMostReflectance));
     if (material.contains("emissiveFactor")) {
       double strength = 1.0;
       const auto extensions = material.value("extensions", json::object());
@@ -341,7 +343,8 @@ class Reader {
                        bool flipped, std::uint32_t node) {
     Triangle triangle;
     triangle.node = node;
-    MaterialValues values;  // the default material is a perfect metal
+    MaterialValues values;
+    values.reflectance = glm::dvec3(kMostReflectance);  // glTF's default is a perfect metal, ours is white (README)
     if (primitive.contains("material")) {
       triangle.material = primitive["material"].get<std::uint32_t>();
       values = materials_.at(triangle.material);
@@ -367,7 +370,7 @@ class Reader {
       const auto normal = glm::cross(b - a, c - a);
       if (!(glm::length(normal) > 0.0)) continue;
       triangle.normal = glm::normalize(normal);
-      triangle.reflectance = glm::min(values.reflectance * oneColour(corners.colours, indices, i), glm::dvec3(0.999));
+      triangle.reflectance = glm::min(values.reflectance * oneColour(corners.colours, indices, i), glm::dvec3(kMostReflectance));
       scene_.triangles.push_back(triangle);
     }
   }

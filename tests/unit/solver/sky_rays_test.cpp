@@ -1,0 +1,216 @@
+// LinkedSolver where the light of the sky comes by rays, and rays that go on where something cuts a leaf.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
+
+#include "server/solver/linked_solver.h"
+#include "tests/unit/solver/quad_scene.h"
+#include "tests/unit/solver/solve.h"
+
+namespace radiosity::solver {
+namespace {
+
+using test::cubeQuads;
+using test::makeQuadScene;
+using test::Quad;
+using test::RayTransport;
+using Reflected = SolverSettings::Reflected;
+
+constexpr std::array<float, 6> kDark{};
+/// From a face of a cube to the one before it.
+constexpr double kOpposite = 0.1998248957;
+
+std::array<float, 6> grey(float reflectance) {
+  std::array<float, 6> all{};
+  all.fill(reflectance);
+  return all;
+}
+
+LightSources skyOf(float above, float below) {
+  LightSources sources;
+  sources.sky = {glm::vec3(above), glm::vec3(below)};
+  return sources;
+}
+
+struct Solve {
+  explicit Solve(test::QuadScene scene, const LightSources& sources, Reflected reflected = Reflected::kByRays,
+                 double target = 0.005)
+      : made(std::move(scene)) {
+    settings.reflected = reflected;
+    settings.target_error = target;
+    EXPECT_TRUE(rays.setScene(made.patches));
+    solver = std::make_unique<LinkedSolver>(made.patches, made.materials, rays, settings, sources);
+    outcome = test::runToEnd(*solver);
+  }
+  /// Mean irradiance of one channel, of a surface's front.
+  [[nodiscard]] double mean(std::size_t surface) const {
+    const auto& of = made.patches->surfaces[surface];
+    double flux = 0.0, area = 0.0;
+    for (auto node = of.first_node[0]; node < of.first_node[0] + of.width * of.height; ++node) {
+      flux += static_cast<double>(made.patches->node_area[node] * solver->irradiance()[node].x);
+      area += static_cast<double>(made.patches->node_area[node]);
+    }
+    return flux / area;
+  }
+
+  test::QuadScene made;
+  RayTransport rays{64};
+  SolverSettings settings;
+  std::unique_ptr<LinkedSolver> solver;
+  StepOutcome outcome = StepOutcome::kSlice;
+};
+
+std::vector<Quad> openCube(std::size_t missing, float reflectance) {
+  auto quads = cubeQuads(6, kDark, grey(reflectance));
+  quads.erase(quads.begin() + static_cast<std::ptrdiff_t>(missing));
+  return quads;
+}
+
+TEST(SkyRays, OfTheRightHalfComeThroughAnOpening) {
+  const double whole = std::numbers::pi * kOpposite;
+  const Solve lid(makeQuadScene(openCube(1, 0.0F)), skyOf(1.0F, 50.0F)),
+      floor(makeQuadScene(openCube(0, 0.0F)), skyOf(50.0F, 2.0F));
+  EXPECT_EQ(lid.outcome, StepOutcome::kConverged);
+  EXPECT_NEAR(lid.mean(0), whole, 0.005 * whole);
+  EXPECT_NEAR(floor.mean(0), 2.0 * whole, 0.01 * whole);  // the ceiling's
+  EXPECT_EQ(lid.solver->transportCounters().pixels, 0U) << "no image";
+  for (const auto& energy : {lid.solver->energy(), floor.solver->energy()}) {
+    EXPECT_GT(energy.escaped[0], 0.0) << "most passes by";
+    EXPECT_NEAR(energy.imbalance[0], 0.0, 1e-6 * energy.emitted[0]);
+  }
+}
+
+// By images of the sky, and links of all that it lights: other code but for the leaves.
+TEST(SkyRays, BringWhatLinksBring) {
+  const auto made = makeQuadScene(openCube(5, 0.7F));
+  const auto sky = skyOf(1.0F, 0.3F);
+  const Solve rays(made, sky), links(made, sky, Reflected::kByLinks, 0.01);
+  ASSERT_EQ(rays.outcome, StepOutcome::kConverged);
+  ASSERT_EQ(links.outcome, StepOutcome::kConverged);
+  double square = 0.0, difference = 0.0;
+  for (const auto& side : makeSides(*made.patches)) {
+    for (auto node = side.first_node; node < side.first_node + side.leaf_count; ++node) {
+      const glm::dvec3 a(rays.solver->irradiance()[node]), b(links.solver->irradiance()[node]);
+      square += static_cast<double>(made.patches->node_area[node]) * glm::dot(b, b);
+      difference += static_cast<double>(made.patches->node_area[node]) * glm::dot(a - b, a - b);
+    }
+  }
+  // This transport brings a sky to the middles of leaves.
+  EXPECT_LT(std::sqrt(difference / square), 1.5 * std::hypot(rays.solver->error().total, links.solver->error().total));
+  const auto energy = rays.solver->energy();
+  EXPECT_NEAR(energy.imbalance[0], 0.0, 1e-6 * energy.emitted[0]);
+}
+
+TEST(SkyRays, AnotherSkyAndBackGivesTheSameBits) {
+  Solve room(makeQuadScene(openCube(1, 0.5F)), skyOf(1.0F, 0.0F));
+  const auto before = room.solver->irradiance();
+  const auto rays = room.solver->linkCounters().rays;
+  room.solver->setLights(skyOf(3.0F, 0.0F));
+  EXPECT_EQ(test::runToEnd(*room.solver), StepOutcome::kConverged);
+  for (std::size_t node = 0; node < before.size(); ++node)
+    ASSERT_NEAR(room.solver->irradiance()[node].x, 3.0F * before[node].x, 1e-4F * before[node].x);
+  room.solver->setLights(skyOf(0.0F, 0.0F));
+  EXPECT_EQ(test::runToEnd(*room.solver), StepOutcome::kConverged);
+  EXPECT_EQ(room.mean(0), 0.0);
+  room.solver->setLights(skyOf(1.0F, 0.0F));
+  EXPECT_EQ(test::runToEnd(*room.solver), StepOutcome::kConverged);
+  EXPECT_EQ(room.solver->irradiance(), before);
+  EXPECT_EQ(room.solver->linkCounters().rays, rays);
+}
+
+TEST(SkyRays, ASkyThatComesToADarkSceneLightsIt) {
+  Solve room(makeQuadScene(openCube(1, 0.5F)), {});
+  EXPECT_EQ(room.solver->error().total, 0.0);
+  room.solver->setLights(skyOf(1.0F, 0.0F));
+  EXPECT_EQ(test::runToEnd(*room.solver), StepOutcome::kConverged);
+  const Solve fresh(makeQuadScene(openCube(1, 0.5F)), skyOf(1.0F, 0.0F));
+  EXPECT_NEAR(room.mean(0), fresh.mean(0), 0.01 * fresh.mean(0));
+}
+
+TEST(SkyRays, WhatWasSavedGoesOnToTheSameEnd) {
+  Solve room(makeQuadScene(openCube(1, 0.5F)), skyOf(1.0F, 0.5F));
+  ArchiveWriter to(std::size_t{64} << 20);
+  ASSERT_TRUE(room.solver->save(to));
+  LinkedSolver next(room.made.patches, room.made.materials, room.rays, room.settings, skyOf(1.0F, 0.5F));
+  ArchiveReader from(to.bytes());
+  ASSERT_TRUE(next.restore(from));
+  next.assess();
+  EXPECT_EQ(next.error().total, room.solver->error().total);
+  EXPECT_EQ(next.energy().escaped, room.solver->energy().escaped);
+  EXPECT_EQ(next.irradiance(), room.solver->irradiance());
+}
+
+/// A cube open to the left that a wall without thickness parts in two. Of five columns of leaves it stands on the
+/// middle one.
+test::QuadScene partedCube(bool is_cut, float reflectance = 0.9F) {
+  auto quads = cubeQuads(5, kDark, grey(reflectance));
+  quads.erase(quads.begin() + 4);
+  const glm::vec3 low(0.0F, -0.5F, -0.5F), y(0, 1, 0), z(0, 0, 1);
+  quads.push_back({low, y, z, 5, 5, {}, glm::vec3(reflectance)});
+  quads.push_back({low, z, y, 5, 5, {}, glm::vec3(reflectance)});
+  auto made = makeQuadScene(quads);
+  for (std::size_t s = 0; s < 4; ++s) {
+    const auto& surface = made.patches->surfaces[s];
+    for (std::uint32_t i = 0; i < surface.width * surface.height; ++i) {
+      auto& leaf = made.patches->leaves[surface.first_leaf + i];
+      const auto& frame = made.patches->triangles[leaf.triangle];
+      const auto x = frame.origin.x + leaf.texel.x * frame.du.x + leaf.texel.y * frame.dv.x;
+      leaf.cut = is_cut && std::abs(x) < 0.05F;
+    }
+  }
+  return made;
+}
+
+TEST(CutLeaves, LetNoLightThroughAWall) {
+  const Solve blind(partedCube(false), skyOf(1.0F, 1.0F)), room(partedCube(true), skyOf(1.0F, 1.0F));
+  constexpr std::size_t kRight = 4, kWallRight = 5, kWallLeft = 6;
+  ASSERT_GT(blind.mean(kRight), 0.05 * blind.mean(kWallLeft)) << "through the middle of the floor";
+  for (const auto surface : {kRight, kWallRight}) EXPECT_NEAR(room.mean(surface), 0.0, 1e-5) << surface;
+  EXPECT_GT(room.mean(kWallLeft), 0.5 * std::numbers::pi);
+  const auto energy = room.solver->energy();
+  EXPECT_NEAR(energy.imbalance[0], 0.0, 1e-6 * energy.emitted[0]);
+}
+
+// Where all leaves are cut rays end somewhere, and nobody knows on which side of what.
+TEST(CutLeaves, WithoutEndAreStatedAsDoubtful) {
+  auto made = partedCube(true, 0.999F);
+  for (auto& leaf : made.patches->leaves) leaf.cut = true;
+  const Solve room(std::move(made), skyOf(1.0F, 1.0F));
+  constexpr std::size_t kRight = 4;
+  double light = 0.0, error = 0.0;
+  for (const auto& square : room.solver->commonErrorSquared()) error = std::max(error, static_cast<double>(square.x));
+  light = room.mean(kRight);
+  EXPECT_LE(light, std::sqrt(3.0 * error)) << "truth is none";
+  EXPECT_GT(room.solver->error().total, 0.1);
+}
+
+TEST(CutLeaves, NoMoreThreadsNorSlicesChangeABit) {
+  const auto made = partedCube(true);
+  const auto sides = makeSides(*made.patches);
+  LeafSights at_once(*made.patches, sides, 1), sliced(*made.patches, sides, 1);
+  std::vector<std::uint16_t> counts(at_once.leafCount(), 8);
+  at_once.ask(counts);
+  ASSERT_TRUE(at_once.trace(HUGE_VAL));
+  sliced.ask(counts);
+  while (!sliced.trace(0.0)) continue;
+  std::ranges::fill(counts, std::uint16_t{16});
+  for (auto* sights : {&at_once, &sliced}) {
+    sights->ask(counts);
+    ASSERT_TRUE(sights->trace(HUGE_VAL));
+  }
+  ASSERT_GT(at_once.steps(0).size(), 100U);
+  for (std::uint32_t value = 0; value < at_once.leafCount(); ++value)
+    EXPECT_TRUE(std::ranges::equal(at_once.seen(1, value), sliced.seen(1, value)));
+  // Half of the rays are given up: so are their steps.
+  const auto steps = at_once.steps(0).size();
+  std::ranges::fill(counts, std::uint16_t{8});
+  at_once.ask(counts);
+  EXPECT_LT(at_once.steps(0).size(), steps);
+  EXPECT_TRUE(at_once.trace(0.0));
+}
+
+}  // namespace
+}  // namespace radiosity::solver
