@@ -298,15 +298,12 @@ export class App {
       cameras: (note) => this.people.onCameras(note.cameras),
       draining: () => this.frame.toasts.show('The server is stopping'),
       notice: (note) => this.frame.toasts.show(note.text),
+      'solve.configured': (settings) => this.solve.setSettings(settings),
     };
     handlers[method]?.(params);
   }
 
   private onProgress(progress: Progress): void {
-    // A solve that goes on without an edit: somebody may have changed its settings, which nobody is told of.
-    const { state, revision } = this.progress ?? progress;
-    const goesOn = state !== 'solving' && progress.state === 'solving' && revision === progress.revision;
-    if (goesOn) void this.fetchStatus();
     this.progress = progress;
     this.solve.update(progress);
     if (!hasScene(progress)) this.scene.forget();
