@@ -12,11 +12,19 @@ import { ConnectionLost, RpcError } from './protocol/rpc';
 /** The scene that a server begins with, where nobody is known to have loaded it: nobody's work is replaced by it. */
 const FIRST = 1;
 
+/** What the server calls a scene that was sent to it without a name. */
+const UNNAMED = 'unnamed scene';
+
 /** What people are told of another scene, given the newest revisions; undefined: this revision is no load by anyone. */
 export function loadNote(revisions: readonly PastRevision[], revision: number): string | undefined {
   const load = revisions.find((past) => past.revision === revision && past.kind === 'load');
   if (!load || (!load.by && revision === FIRST)) return undefined;
-  return `${shownName(load.by ?? '') || 'Someone'} loaded ${load.summary || 'another scene'}`;
+  return `${shownName(load.by ?? '') || 'Someone'} loaded ${sceneName(load.summary)}`;
+}
+
+function sceneName(summary: string | undefined): string {
+  if (!summary) return 'another scene';
+  return summary === UNNAMED ? 'a scene without a name' : summary;
 }
 
 /** A file that is on its way, where one looked from before it, and whether the server was asked to load it. */

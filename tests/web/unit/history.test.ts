@@ -59,4 +59,6 @@ it('people are told who has loaded which scene, as far as that is known', () => 
   ]);
   expect(loadNote([{ revision: 1, kind: 'load', summary: 'room.glb', by: 'Ann' }], 1)).toBe('Ann loaded room.glb');
   expect(loadNote([{ revision: 1, kind: 'load', summary: 'room.glb' }], 1)).toBeUndefined(); // the command line's
+  const nameless = { revision: 2, kind: 'load', summary: 'unnamed scene', by: 'curl/7.88.1' } as const;
+  expect(loadNote([nameless], 2)).toBe('curl/7.88.1 loaded a scene without a name');
 });
