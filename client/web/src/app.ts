@@ -143,9 +143,8 @@ export class App {
       gizmoDragging: (active) => this.edit.onGizmoDragging(active),
       gizmoChanged: (object, mode) => this.edit.onGizmoChanged(object, mode),
       contextLost: (lost) => {
-        this.frame.setBanner(lost ? 'The browser has lost the graphics card; waiting for it to return.' : undefined);
-        this.state.forgetTrouble();
-        if (!lost) this.state.again();
+        const text = lost ? 'The browser has lost the graphics card; waiting for it to return.' : undefined;
+        this.frame.setBanner('card', text);
       },
     });
     this.viewer.showPeople(this.people.people);
@@ -225,13 +224,13 @@ export class App {
     if (state === 'open') {
       this.state.forgetTrouble();
       this.progress = undefined; // that of a server which has started again is not that of its scene
-      this.frame.setBanner(undefined);
+      this.frame.setBanner('link', undefined);
       if (this.everOpen && !this.isRenaming) this.frame.toasts.show('Reconnected', 'good');
       this.everOpen = true;
       this.isRenaming = false;
     } else if (state === 'waiting') {
       this.frame.setState('Not connected', 'bad');
-      this.frame.setBanner(`No connection: ${detail}.`, 'Try now', () => this.connection.open());
+      this.frame.setBanner('link', `No connection: ${detail}.`, 'Try now', () => this.connection.open());
     } else if (state === 'refused') {
       this.frame.setState('Not connected', 'bad');
       this.frame.askToken(detail, (token) => this.giveToken(token));
