@@ -1,5 +1,5 @@
 import { offerOf } from '../../../client/web/src/app_history';
-import { loadNote } from '../../../client/web/src/app_scene';
+import { loadNote, wasReplaced } from '../../../client/web/src/app_scene';
 import type { PastRevision, SceneHistory } from '../../../client/web/src/protocol/messages';
 
 const history = (undoable: number, redoable: number, revisions: PastRevision[]): SceneHistory => ({
@@ -41,6 +41,14 @@ describe('what is offered to be undone and redone', () => {
   it('is undone without knowing it where there is more than was asked for', () => {
     expect(offerOf(history(40, 0, [{ revision: 90, kind: 'redo' }]), new Set([3])).undo).toBe(true);
   });
+});
+
+it('a scene was replaced where a later load is known, or too much was done for it to be', () => {
+  const [loaded, patch] = [{ revision: 4, kind: 'load' } as const, { revision: 5, kind: 'patch' } as const];
+  expect(wasReplaced(history(1, 0, [loaded, patch]), 3)).toBe(true);
+  expect(wasReplaced(history(1, 0, [loaded, patch]), 4)).toBe(false);
+  expect(wasReplaced(history(1, 0, [patch]), 4)).toBe(false);
+  expect(wasReplaced(history(1, 0, [patch]), 3)).toBe(true);
 });
 
 it('people are told who has loaded which scene, as far as that is known', () => {
