@@ -276,8 +276,8 @@ class RemoteTest(ServiceCase):
         waitForLine(watching.stderr, "shots")
         scene = self.scene.read_bytes()
         for query, said in (("?name=room.glb&client=Ann", "room.glb loaded by Ann"),
-                            ("?client=Ben%0ABo", "unnamed scene loaded by Ben")):
-            request = urllib.request.Request(f"{server.url}/scene{query}", scene, method="PUT")
+                            ("?client=Ben%0ABo", "unnamed scene loaded by Ben Bo")):
+            request = urllib.request.Request(f"{server.url}/scene{query}", scene, {"Content-Type": "model/gltf-binary"}, method="PUT")
             urllib.request.urlopen(request).close()
             waitForLine(watching.stderr, said)
         watching.send_signal(signal.SIGINT)
