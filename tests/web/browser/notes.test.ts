@@ -13,14 +13,17 @@ it('keeps what failed in sight while others do a lot, and puts a note that comes
     const { toasts } = window.viewer!.frame;
     toasts.show('Move box: would not be a scene', 'bad');
     for (let i = 0; i < 30; ++i) toasts.show(`Ann changed box ${i}: position`);
-    for (let i = 0; i < 30; ++i) toasts.show('Ben changed wall: colour');
+    for (let i = 0; i < 30; ++i) {
+      toasts.show('Cid changed lamp: position');
+      toasts.show('Ben changed wall: colour');
+    }
   });
   const texts = await page.locator('.toast span').allInnerTexts();
   expect(texts).toHaveLength(4);
   expect(texts).toContain('Move box: would not be a scene');
   expect(texts.at(-1)).toBe('Ben changed wall: colour');
   // Each that is put into the page is read out.
-  expect(await page.evaluate(() => window.notes!.filter((text) => text.startsWith('Ben')))).toHaveLength(1);
+  expect(await page.evaluate(() => window.notes!.filter((text) => /^(Ben|Cid)/.test(text)))).toHaveLength(2);
   await page.evaluate(() => {
     for (let i = 0; i < 6; ++i) window.viewer!.frame.toasts.show(`Refusal ${i}`, 'bad');
   });

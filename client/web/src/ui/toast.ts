@@ -19,8 +19,8 @@ export class Toasts {
     const text = plainText(whole.length > MOST_LETTERS ? `${whole.slice(0, MOST_LETTERS)}…` : whole);
     const notes = [...this.element.children];
     const same = notes.find((note) => note.firstChild?.textContent === text);
-    // What somebody drags is told of thirty times a second: put there anew, it would be read out as often.
-    if (same && same === notes.at(-1) && same.classList.contains(tone)) return this.goLater(same, tone);
+    // What two people drag is told of thirty times a second each: put there anew, it would be read out as often.
+    if (same?.classList.contains(tone)) return this.goLater(same, tone);
     same?.remove();
     const toast = h('div', { class: `toast ${tone}` }, h('span', {}, text));
     toast.append(button('×', () => toast.remove(), { 'aria-label': 'Dismiss' }));
