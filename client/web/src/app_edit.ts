@@ -73,7 +73,7 @@ export class EditSession {
   onPatched(note: ScenePatchedNote, fetchAnew: () => void): void {
     if (!this.document.patched(note.revision, note.patch, note.by)) fetchAnew();
     if (!this.name.isMine(note.by))
-      this.app.frame.toasts.show(
+      this.app.frame.toasts.showOnce(
         `${shownName(note.by) || 'Someone'} ${edits.describePatch(this.document.gltf, note.patch)}`,
       );
   }

@@ -5,17 +5,17 @@ import { converged, serveAll } from './harness';
 
 const { server, pages } = serveAll('cornell.glb');
 
-it('keeps what failed in sight while others do a lot, and puts a note that comes again there once', async () => {
+it('keeps what failed in sight while others do a lot, and puts what they go on with there once', async () => {
   const page = await pages.open(server.url, 900, 600);
   await converged(page);
   await page.evaluate(() => (window.notes!.length = 0));
   await page.evaluate(() => {
     const { toasts } = window.viewer!.frame;
     toasts.show('Move box: would not be a scene', 'bad');
-    for (let i = 0; i < 30; ++i) toasts.show(`Ann changed box ${i}: position`);
+    for (let i = 0; i < 30; ++i) toasts.showOnce(`Ann changed box ${i}: position`);
     for (let i = 0; i < 30; ++i) {
-      toasts.show('Cid changed lamp: position');
-      toasts.show('Ben changed wall: colour');
+      toasts.showOnce('Cid changed lamp: position');
+      toasts.showOnce('Ben changed wall: colour');
     }
   });
   const texts = await page.locator('.toast span').allInnerTexts();

@@ -143,3 +143,25 @@ it('looks at the scene that a server has come back with, and not at its objects 
   expect(Math.abs(after[0]! - 500)).toBeLessThan(50);
   expect(await page.evaluate(() => window.viewer!.edit.selection)).toBeUndefined();
 });
+
+it('tells of a scene that somebody loaded while the own one was asked for, where that does not come', async () => {
+  const server = await serve();
+  await putScene(server, FIRST);
+  const page = await pages.open(server.url, 900, 600);
+  await converged(page);
+  await page.evaluate(async (text) => {
+    const { connection, edit, scene } = window.viewer!;
+    const call = connection.call.bind(connection) as (method: string, params?: object) => Promise<never>;
+    connection.call = async (method: string, params?: object) => {
+      if (method !== 'scene.load') return call(method, params);
+      const { revision } = edit.document;
+      await fetch('/scene?name=hers.gltf&client=Ann', { method: 'PUT', body: text });
+      while (edit.document.revision === revision) await new Promise((resolve) => setTimeout(resolve, 20));
+      throw new Error('is no scene');
+    };
+    await scene.loadFile(new File(['x'], 'mine.gltf'));
+    connection.call = call;
+  }, OTHER);
+  await said(page, /^mine\.gltf: is no scene$/);
+  await said(page, /^Ann loaded hers\.gltf$/);
+});

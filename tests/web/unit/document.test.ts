@@ -403,7 +403,10 @@ describe('scene document', () => {
     expect(await Promise.all(ends)).toEqual(['another scene was loaded', 'another scene was loaded']);
     expect(calls[0]!.isMeant()).toBe(false); // where its answer was lost it is not asked for again
     await document.edit('Move', move(3)).catch(() => undefined);
-    expect(refused).toEqual(['Colour: another scene was loaded', 'Move: another scene is there, and not here yet']);
+    expect(refused).toEqual([
+      'Colour: another scene was loaded',
+      'Move: the server has another scene, which is still on its way',
+    ]);
     calls[0]!.refuse(new Error('late'));
     await settle();
     document.reset(room(), 7);

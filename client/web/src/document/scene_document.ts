@@ -211,7 +211,7 @@ export class SceneDocument {
   ): Promise<void> {
     return new Promise((resolve, reject) => {
       if (this.isGone) {
-        const error = new Error('another scene is there, and not here yet');
+        const error = new Error('the server has another scene, which is still on its way');
         this.events.changed(forward.map((operation) => operation.path)); // what was dragged goes back
         this.events.refused(label, error.message);
         return reject(error);

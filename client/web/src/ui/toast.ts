@@ -15,18 +15,27 @@ export class Toasts {
   private readonly timers = new WeakMap<Element, ReturnType<typeof setTimeout>>();
 
   show(whole: string, tone: Tone = 'info'): void {
-    // Names of a scene may be as long as they like.
-    const text = plainText(whole.length > MOST_LETTERS ? `${whole.slice(0, MOST_LETTERS)}…` : whole);
-    const notes = [...this.element.children];
-    const same = notes.find((note) => note.firstChild?.textContent === text);
-    // What two people drag is told of thirty times a second each: put there anew, it would be read out as often.
-    if (same?.classList.contains(tone)) return this.goLater(same, tone);
-    same?.remove();
+    const text = shortened(whole);
+    this.find(text)?.remove(); // what one does again is answered, and read out, again
     const toast = h('div', { class: `toast ${tone}` }, h('span', {}, text));
     toast.append(button('×', () => toast.remove(), { 'aria-label': 'Dismiss' }));
     this.element.append(toast);
     while (this.element.children.length > MOST) this.leastOfAll().remove();
     this.goLater(toast, tone);
+  }
+
+  /**
+   * Of what others do: what they drag is told of thirty times a second, and would be read out as often if it were put
+   * there anew each time.
+   */
+  showOnce(whole: string): void {
+    const same = this.find(shortened(whole));
+    if (same) this.goLater(same, 'info');
+    else this.show(whole);
+  }
+
+  private find(text: string): Element | undefined {
+    return [...this.element.children].find((note) => note.firstChild?.textContent === text);
   }
 
   /** The oldest of those that tell of nothing wrong, but for the newest of all. */
@@ -42,4 +51,9 @@ export class Toasts {
       setTimeout(() => note.remove(), SHOWN_MS[tone]),
     );
   }
+}
+
+/** Names of a scene may be as long as they like. */
+function shortened(text: string): string {
+  return plainText(text.length > MOST_LETTERS ? `${text.slice(0, MOST_LETTERS)}…` : text);
 }
