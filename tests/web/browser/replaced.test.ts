@@ -155,7 +155,8 @@ it('tells of a scene that somebody loaded while the own one was asked for, where
     connection.call = async (method: string, params?: object) => {
       if (method !== 'scene.load') return call(method, params);
       const { revision } = edit.document;
-      await fetch('/scene?name=hers.gltf&client=Ann', { method: 'PUT', body: text });
+      const headers = { 'Content-Type': 'model/gltf+json' };
+      await fetch('/scene?name=hers.gltf&client=Ann', { method: 'PUT', body: text, headers });
       while (edit.document.revision === revision) await new Promise((resolve) => setTimeout(resolve, 20));
       throw new Error('is no scene');
     };
