@@ -349,7 +349,13 @@ struct ServerNote {
   std::string text;  ///< for people
 };
 
+/// Somebody has changed what the solve aims at.
+struct SolveConfigured {
+  static constexpr std::string_view kMethod = "solve.configured";
+  Settings settings;  ///< all that are in force
+};
+
 using Notification = std::variant<ServerInfo, ProgressNote, ScenePatched, SceneLoaded, LightmapsNote, Bookmark,
-                                  ViewersNote, CamerasNote, Draining, ServerNote>;
+                                  ViewersNote, CamerasNote, Draining, ServerNote, SolveConfigured>;
 
 }  // namespace radiosity::protocol

@@ -52,6 +52,7 @@ std::string params(const CamerasNote& n) {
 }
 std::string params(const Draining& n) { return dumpJson({{"graceMs", n.grace_ms}}); }
 std::string params(const ServerNote& n) { return dumpJson({{"kind", n.kind}, {"text", n.text}}); }
+std::string params(const SolveConfigured& n) { return dumpJson(toJson(n.settings)); }
 
 void read(Reader& r, ServerInfo& n) {
   r.text("server", n.server, Need::kRequired, kAnyText);
@@ -112,6 +113,7 @@ void read(Reader& r, ServerNote& n) {
   r.text("kind", n.kind, Need::kRequired, kMaxTextBytes);
   r.text("text", n.text, Need::kOptional, kAnyText);
 }
+void read(Reader& r, SolveConfigured& n) { read(r, n.settings); }
 
 using Decoded = tl::expected<Notification, RpcError>;
 

@@ -1,9 +1,12 @@
 // radiosity watch: follows a solve from afar.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include "client/cli/commands.h"
 #include "client/cli/interrupt.h"
@@ -64,6 +67,7 @@ class Watch {
     connection.onNotification([this](const protocol::Notification& note) { onNotification(note); });
     while (!interrupted()) {
       ask_now_ = false;
+      tellOfLoad(connection);
       const auto status = connection.call(protocol::StatusCall{});
       if (!status && status.error().rpc) return complainCleared(status.error());
       if (!status) {
@@ -108,13 +112,35 @@ class Watch {
       show(progress->progress);
       ask_now_ = ask_now_ || (!options_.follow && progress->progress.state != "solving");
     } else if (const auto* patched = std::get_if<protocol::ScenePatched>(&note)) {
-      display_.message(
-          fmt::format("revision {}: edited by {}", patched->revision, patched->by.empty() ? "somebody" : patched->by));
+      display_.message(fmt::format("revision {}: edited by {}", patched->revision,
+                                   patched->by.empty() ? "somebody" : oneLine(patched->by)));
     } else if (const auto* loaded = std::get_if<protocol::SceneLoaded>(&note)) {
-      display_.message(fmt::format("revision {}: another scene", loaded->revision));
+      loaded_ = loaded->revision;
+      ask_now_ = true;  // of whom: from in here nothing can be asked
     } else if (std::holds_alternative<protocol::Draining>(note)) {
       display_.message("the server is shutting down");
     }
+  }
+
+  /// Whose scene it is that has come, as far as the server knows. A scene whose first light is shown is not in the
+  /// history yet; it is told of again when it is.
+  void tellOfLoad(client::Connection& connection) {
+    if (!loaded_) return;
+    const auto revision = *std::exchange(loaded_, std::nullopt);
+    const auto history = connection.call(protocol::SceneHistoryCall{});
+    if (history && history->revision < revision) return;
+    if (revision == std::exchange(told_, revision)) return;
+    const auto text = history ? changeText(history->revisions, revision) : std::string("another scene");
+    display_.message(fmt::format("revision {}: {}", revision, text));
+  }
+
+  static std::string changeText(const std::vector<protocol::PastRevision>& revisions, std::uint64_t revision) {
+    const auto past = std::find_if(revisions.begin(), revisions.end(),
+                                   [revision](const auto& each) { return each.revision == revision; });
+    if (past == revisions.end()) return "another scene";
+    const auto who = past->by.empty() ? "somebody" : oneLine(past->by);
+    return past->kind == "load" ? fmt::format("{} loaded by {}", oneLine(past->summary), who)
+                                : fmt::format("edited by {}", who);  // an undo that was too long to be told in full
   }
 
   void waitBeforeRetry(const std::string& why) {
@@ -131,6 +157,8 @@ class Watch {
   client::BackOff back_off_;
   double target_error_ = 0.02;
   bool ask_now_ = false;
+  std::optional<std::uint64_t> loaded_;  ///< revision of a load that was not told of yet
+  std::uint64_t told_ = 0;               ///< of the last that was
 };
 
 }  // namespace

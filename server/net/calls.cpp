@@ -237,10 +237,14 @@ void Calls::run(const protocol::SceneHistoryCall& call, const Slot& slot) {
 }
 
 void Calls::run(const protocol::SolveConfigureCall& call, const Slot& slot) {
+  auto answer = [hub = &hub_, slot](const Result<engine::SolveSettings>& settings) {
+    if (!settings) return slot.fail(settings);
+    // A solve that is over tells of no progress, so others would not hear of what it aims at now.
+    hub->broadcast(protocol::SolveConfigured{toSettings(*settings)});
+    slot.reply(toSettings(*settings));
+  };
   hub_.engine().configure([call](const engine::SolveSettings& now) { return merged(now, call); },
-                          hub_.fromEngine<engine::SolveSettings>([slot](const Result<engine::SolveSettings>& settings) {
-                            settings ? slot.reply(toSettings(*settings)) : slot.fail(settings);
-                          }));
+                          hub_.fromEngine<engine::SolveSettings>(std::move(answer)));
 }
 
 namespace {

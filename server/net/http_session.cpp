@@ -181,7 +181,7 @@ void HttpSession::onHeader(BoostError error) {
   request_.accept_encoding = field(http::field::accept_encoding);
   request_.if_none_match = field(http::field::if_none_match);
   request_.name = queryOr("name", view(message["X-Name"]));
-  if (request_.name.empty()) request_.name = "upload";
+  if (request_.name.empty()) request_.name = "unnamed scene";
   request_.client = queryOr("client", view(message["X-Client"]));
   if (request_.client.empty()) request_.client = firstWord(field(http::field::user_agent));
   request_.client.resize(std::min(request_.client.size(), protocol::kMaxTextBytes));

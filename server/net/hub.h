@@ -75,6 +75,7 @@ class Hub : public engine::Listener, public std::enable_shared_from_this<Hub> {
   [[nodiscard]] std::optional<std::uint64_t> shareCamera(const Viewer& viewer, const std::string& name,
                                                          const protocol::CameraPose& pose);
   void hideCamera(const Viewer& viewer);
+  void broadcast(const protocol::Notification& notification);  ///< to all viewers
 
   /// From now on calls are refused; tells viewers and connections.
   void drain();
@@ -156,7 +157,6 @@ class Hub : public engine::Listener, public std::enable_shared_from_this<Hub> {
   // Both under the lock.
   [[nodiscard]] std::vector<std::shared_ptr<Viewer>> presentViewers() const;
   [[nodiscard]] std::optional<std::vector<SharedText>> missedSince(const protocol::Resume& resume) const;
-  void broadcast(const protocol::Notification& notification);
   /// Calls `ask` with what is to hear the engine's outcome, unless the request was made before.
   void askOnce(const engine::Receipt& receipt, const std::string& by, EditAnswer done,
                const std::function<void(engine::Engine::Callback<engine::PatchOutcome>)>& ask);

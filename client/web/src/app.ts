@@ -66,6 +66,8 @@ export class App {
   private isRenaming = false;
   private epoch = '';
   private awaited: (() => void)[] = [];
+  /** Over a new connection it is asked first whether edits that wait are still meant. */
+  private sceneKnown = Promise.resolve();
 
   constructor() {
     const { name } = this;
@@ -99,7 +101,7 @@ export class App {
       notAccepted: (text, wanted) => this.notAccepted(text, wanted),
     });
     this.view = new ViewSession(this);
-    this.edit = new EditSession(this, name, (patch, id) => this.sendPatch(patch, id));
+    this.edit = new EditSession(this, name, (...edit) => this.sendPatch(...edit));
     this.people = new PeopleSession(this);
     const sharePanel = new SharePanel({
       name: { person: name.person, unnamed: name.unnamed },
@@ -143,9 +145,8 @@ export class App {
       gizmoDragging: (active) => this.edit.onGizmoDragging(active),
       gizmoChanged: (object, mode) => this.edit.onGizmoChanged(object, mode),
       contextLost: (lost) => {
-        this.frame.setBanner(lost ? 'The browser has lost the graphics card; waiting for it to return.' : undefined);
-        this.state.forgetTrouble();
-        if (!lost) this.state.again();
+        const text = lost ? 'The browser has lost the graphics card; waiting for it to return.' : undefined;
+        this.frame.setBanner('card', text);
       },
     });
     this.viewer.showPeople(this.people.people);
@@ -225,13 +226,13 @@ export class App {
     if (state === 'open') {
       this.state.forgetTrouble();
       this.progress = undefined; // that of a server which has started again is not that of its scene
-      this.frame.setBanner(undefined);
+      this.frame.setBanner('link', undefined);
       if (this.everOpen && !this.isRenaming) this.frame.toasts.show('Reconnected', 'good');
       this.everOpen = true;
       this.isRenaming = false;
     } else if (state === 'waiting') {
       this.frame.setState('Not connected', 'bad');
-      this.frame.setBanner(`No connection: ${detail}.`, 'Try now', () => this.connection.open());
+      this.frame.setBanner('link', `No connection: ${detail}.`, 'Try now', () => this.connection.open());
     } else if (state === 'refused') {
       this.frame.setState('Not connected', 'bad');
       this.frame.askToken(detail, (token) => this.giveToken(token));
@@ -248,6 +249,11 @@ export class App {
     this.connection.renew();
   }
 
+  /** Whether something was done by this page. */
+  isMine(by: string): boolean {
+    return this.name.isMine(by);
+  }
+
   private giveToken(token: string): void {
     this.token = token;
     store('token', token, 'session');
@@ -259,6 +265,8 @@ export class App {
     if (this.epoch !== '' && this.epoch !== hello.epoch) {
       this.resume = undefined;
       this.scene.onServerAnew();
+    } else if (this.epoch !== '' && !hello.resumed) {
+      this.sceneKnown = this.scene.onUnresumed();
     }
     this.epoch = hello.epoch;
     if (!hello.resumed) this.viewer.layouts.forget();
@@ -267,7 +275,8 @@ export class App {
     this.share.onServer(info);
     this.people.onReady();
     this.edit.history.askSoon();
-    if (hello.revision > 0 && (!hello.resumed || this.scene.document.isOwed)) this.scene.document.want();
+    const isOwed = hello.revision > 0 && (!hello.resumed || this.scene.document.isOwed);
+    if (isOwed) void this.sceneKnown.then(() => this.connection.info === info && this.scene.document.want());
     await this.fetchStatus();
     const { count } = await this.connection.call<{ count: number }>('viewers').catch(() => ({ count: 1 }));
     this.onViewers(count);
@@ -298,15 +307,12 @@ export class App {
       cameras: (note) => this.people.onCameras(note.cameras),
       draining: () => this.frame.toasts.show('The server is stopping'),
       notice: (note) => this.frame.toasts.show(note.text),
+      'solve.configured': (settings) => this.solve.setSettings(settings),
     };
     handlers[method]?.(params);
   }
 
   private onProgress(progress: Progress): void {
-    // A solve that goes on without an edit: somebody may have changed its settings, which nobody is told of.
-    const { state, revision } = this.progress ?? progress;
-    const goesOn = state !== 'solving' && progress.state === 'solving' && revision === progress.revision;
-    if (goesOn) void this.fetchStatus();
     this.progress = progress;
     this.solve.update(progress);
     if (!hasScene(progress)) this.scene.forget();
@@ -375,11 +381,11 @@ export class App {
   }
 
   /** A lost answer is asked for again with the same id, which the server does once. */
-  private async sendPatch(patch: Patch, requestId: string): Promise<ScenePatchReply> {
-    const epoch = this.epoch;
+  private async sendPatch(patch: Patch, requestId: string, isMeant: () => boolean): Promise<ScenePatchReply> {
     for (;;) {
       if (!this.connection.isOpen) await new Promise<void>((resolve) => this.awaited.push(resolve));
-      if (this.epoch !== epoch) throw new Error('the server has restarted and no longer has this scene');
+      await this.sceneKnown;
+      if (!isMeant()) throw new Error('its scene is gone');
       try {
         return await this.connection.call<ScenePatchReply>('scene.patch', { patch, requestId });
       } catch (error) {

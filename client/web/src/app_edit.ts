@@ -4,7 +4,16 @@ import { Vector3, type Object3D } from 'three';
 import type { App } from './app';
 import { EditHistory } from './app_history';
 import * as edits from './document/edits';
-import { handlesOf, hangingNodes, lightOf, nodeName, type Vec3, type Vec4 } from './document/gltf';
+import {
+  type Gltf,
+  handlesOf,
+  hangingNodes,
+  isSameScene,
+  lightOf,
+  nodeName,
+  type Vec3,
+  type Vec4,
+} from './document/gltf';
 import { SceneDocument, type SendPatch } from './document/scene_document';
 import type { Patch, ScenePatchedNote } from './protocol/messages';
 import { type PageName, shownName } from './protocol/page_name';
@@ -21,6 +30,8 @@ export class EditSession {
   selection: Selection | undefined;
   /** The handles that the user has chosen. */
   private wanted: GizmoMode = 'translate';
+  /** The document as it came last. */
+  private known: Gltf | undefined;
   /** What is held by its handles, as it was before. */
   private dragged: { node: number; before: edits.Placement } | undefined;
 
@@ -62,7 +73,7 @@ export class EditSession {
   onPatched(note: ScenePatchedNote, fetchAnew: () => void): void {
     if (!this.document.patched(note.revision, note.patch, note.by)) fetchAnew();
     if (!this.name.isMine(note.by))
-      this.app.frame.toasts.show(
+      this.app.frame.toasts.showOnce(
         `${shownName(note.by) || 'Someone'} ${edits.describePatch(this.document.gltf, note.patch)}`,
       );
   }
@@ -78,15 +89,21 @@ export class EditSession {
 
   select(selection: Selection | undefined): void {
     this.selection = selection;
-    this.app.viewer.select(selection?.node);
+    this.app.viewer.select(this.isPictureOld ? undefined : selection?.node);
     this.offerHandles();
     this.panel.setSelection(selection);
     if (selection && this.app.frame.panelOpen) this.app.frame.showTab('Scene');
   }
 
+  /** Its scene was replaced, and numbers of its objects are those of others: the next picture follows. */
+  private get isPictureOld(): boolean {
+    const { shown } = this.app.viewer;
+    return shown !== undefined && this.known?.nodes !== undefined && !isSameScene(shown.source, this.known);
+  }
+
   selectHit(object: Object3D | undefined): void {
     const scene = this.app.viewer.shown;
-    const node = object && scene?.nodeOf(object);
+    const node = object && !this.isPictureOld ? scene?.nodeOf(object) : undefined;
     this.select(node === undefined ? undefined : { node, material: object && scene?.materialIndexOf(object) });
   }
 
@@ -198,9 +215,12 @@ export class EditSession {
   private onChanged(pointers: string[]): void {
     this.app.viewer.applyDocument(this.document.gltf, pointers);
     if (pointers.length === 0) {
-      // The document may come after the picture: what was clicked meanwhile stays selected.
-      const node = this.selection && this.document.gltf.nodes?.[this.selection.node];
-      this.select(node && this.selection);
+      const { gltf } = this.document;
+      // The document may come after the picture: what was clicked meanwhile stays selected. Numbers of another scene, which
+      // a server has that comes back, mean other objects.
+      const isKept = this.known?.nodes === undefined || isSameScene(this.known, gltf);
+      this.known = gltf;
+      this.select(isKept && this.selection && gltf.nodes?.[this.selection.node] ? this.selection : undefined);
       this.panel.setDocument(this.document.gltf, (node) => this.materialsOf(node));
     } else {
       const hangs = hangingNodes(this.document.gltf).some(({ node }) => node === this.selection?.node);

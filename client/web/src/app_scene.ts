@@ -12,11 +12,25 @@ import { ConnectionLost, RpcError } from './protocol/rpc';
 /** The scene that a server begins with, where nobody is known to have loaded it: nobody's work is replaced by it. */
 const FIRST = 1;
 
+/** What the server calls a scene that was sent to it without a name. */
+const UNNAMED = 'unnamed scene';
+
 /** What people are told of another scene, given the newest revisions; undefined: this revision is no load by anyone. */
 export function loadNote(revisions: readonly PastRevision[], revision: number): string | undefined {
   const load = revisions.find((past) => past.revision === revision && past.kind === 'load');
   if (!load || (!load.by && revision === FIRST)) return undefined;
-  return `${shownName(load.by ?? '') || 'Someone'} loaded ${load.summary || 'another scene'}`;
+  return `${shownName(load.by ?? '') || 'Someone'} loaded ${sceneName(load.summary)}`;
+}
+
+/** Whether the scene of a revision was replaced; it counts as such where too much was done since for the history to tell. */
+export function wasReplaced({ revisions }: SceneHistory, revision: number): boolean {
+  const load = revisions.filter(({ kind }) => kind === 'load').at(-1);
+  return load ? load.revision > revision : (revisions[0]?.revision ?? 0) > revision + 1;
+}
+
+function sceneName(summary: string | undefined): string {
+  if (!summary) return 'another scene';
+  return summary === UNNAMED ? 'a scene without a name' : summary;
 }
 
 /** A file that is on its way, where one looked from before it, and whether the server was asked to load it. */
@@ -32,8 +46,12 @@ export class SceneSession {
     failed: (error) => this.onNone(error),
   });
   private upload: Upload | undefined;
+  /** Revision of the newest scene that was told to be there: its first light may come before it, and all of it again. */
+  private newest = 0;
   /** Revision of the newest load that was told of, or was this page's own. */
   private told = 0;
+  /** Of a load that came while this page's own was asked for, and may be that; 0: none. */
+  private untold = 0;
 
   constructor(private readonly app: App) {}
 
@@ -60,19 +78,35 @@ export class SceneSession {
 
   /** Its revisions count anew. */
   onServerAnew(): void {
-    this.told = 0;
+    this.told = this.newest = 0;
+    this.app.edit.document.leave('the server has restarted and no longer has this scene');
+  }
+
+  /** Over a connection that knows nothing of what was there before it. */
+  async onUnresumed(): Promise<void> {
+    const { document } = this.app.edit;
+    const { revision } = document;
+    const history = await this.app.connection.call<SceneHistory>('scene.history').catch(() => undefined);
+    if (!history || !wasReplaced(history, revision)) return;
+    this.app.edit.select(undefined);
+    document.leave('another scene was loaded meanwhile');
   }
 
   /** Another one is there. Who has sent it from here is told by what sends it. */
   onLoaded(revision: number): void {
     const { app } = this;
     app.resume = undefined;
-    app.edit.select(undefined); // numbers of nodes mean others now
+    if (revision !== this.newest && revision !== app.edit.document.revision) {
+      app.edit.select(undefined); // numbers of nodes mean others now
+      app.edit.document.leave('another scene was loaded');
+    }
+    this.newest = revision;
     app.view.sceneComes();
     app.edit.history.askSoon();
     this.document.want();
     void app.fetchStatus();
-    if (!this.upload?.asked) void this.tellOfLoad(revision);
+    if (this.upload?.asked) this.untold = revision;
+    else void this.tellOfLoad(revision);
   }
 
   /** The server has none: it was started again without, could not have the one whose first light it showed, or lost it. */
@@ -110,8 +144,12 @@ export class SceneSession {
       if (upload !== this.upload) return;
       if (this.app.viewer.shown) this.app.view.keepCamera(placed);
       toasts.show(`${file.name}: ${(error as Error).message}`, 'bad');
+      if (this.untold > 0) void this.tellOfLoad(this.untold); // it was somebody else's
     } finally {
-      if (upload === this.upload) this.upload = undefined;
+      if (upload === this.upload) {
+        this.upload = undefined;
+        this.untold = 0;
+      }
     }
   }
 
@@ -132,9 +170,14 @@ export class SceneSession {
     const history = await connection.call<SceneHistory>('scene.history').catch(() => undefined);
     const note = loadNote(history?.revisions ?? [], revision);
     // The same scene may come twice: with its first light, which is not in the history yet, and whole.
-    if (!note || revision <= this.told) return;
+    if (!note || revision <= this.told || this.isMine(history!.revisions, revision)) return;
     this.told = revision;
     frame.toasts.show(note);
+  }
+
+  /** Of a file that another one has followed since. */
+  private isMine(revisions: readonly PastRevision[], revision: number): boolean {
+    return revisions.some((past) => past.revision === revision && this.app.isMine(past.by ?? ''));
   }
 
   private async ask(signal: AbortSignal): Promise<{ revision: number; take: () => void }> {

@@ -13,10 +13,10 @@ export function formatPatch(patch: Patch): string {
   return `[\n${patch.map((operation) => `  ${JSON.stringify(operation)}`).join(',\n')}\n]`;
 }
 
-/** What makes the same edit from a shell. `token`: the server wants one, which stays out of what is copied. */
+/** What makes the same edit from a shell, of which some take what echo is given apart at its backslashes. `token`: the server wants one, which stays out of what is copied. */
 export function editCommand(patch: Patch, server: string, token = false): string {
   const json = JSON.stringify(patch).replaceAll("'", `'\\''`);
-  return `echo '${json}' | radiosity edit ${server} -${token ? ' --token-file token' : ''}`;
+  return `printf %s '${json}' | radiosity edit ${server} -${token ? ' --token-file token' : ''}`;
 }
 
 /** Of files that a page saves faster, browsers keep ten and drop the rest without a word. */

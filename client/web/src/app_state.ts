@@ -18,9 +18,10 @@ export class StateSession {
 
   constructor(private readonly app: App) {}
 
-  /** The banner says something else by now. */
+  /** It was that of a server which may have started again. */
   forgetTrouble(): void {
     this.trouble = undefined;
+    this.app.frame.setBanner('solve', undefined);
   }
 
   /** Once more, as the picture has changed. */
@@ -76,9 +77,9 @@ export class StateSession {
    */
   private showTrouble(progress: Progress, isOver: boolean): void {
     const trouble = hasScene(progress) ? this.troubleOf(progress, isOver) : undefined;
-    if (trouble?.text === this.trouble || this.app.viewer.isLost) return; // the card comes first; it is said when that is back
+    if (trouble?.text === this.trouble) return;
     this.trouble = trouble?.text;
-    this.app.frame.setBanner(trouble?.text, trouble?.label, trouble?.act);
+    this.app.frame.setBanner('solve', trouble?.text, trouble?.label, trouble?.act);
   }
 
   private troubleOf(progress: Progress, isOver: boolean): Trouble | undefined {

@@ -3,6 +3,7 @@
 import { type Box3, Vector3 } from 'three';
 import type { App } from './app';
 import { MeterSession } from './app_meter';
+import { type Gltf, isSameScene } from './document/gltf';
 import { ViewPanel } from './ui/view_panel';
 import { insideView } from './view/first_view';
 import { fromLink, MOST_STOPS, toLink, type ShownAs } from './view/link';
@@ -24,6 +25,7 @@ export class ViewSession {
   private placed = false;
   private sharpMarked = false;
   private bounds: Box3 | undefined;
+  private source: Gltf | undefined;
   private sceneIsNew = false;
   /** A view that the page's address asks for, and that was not shown yet. */
   private linked: string | undefined;
@@ -117,6 +119,9 @@ export class ViewSession {
   onSceneShown(scene: LitScene): void {
     this.panel.setCameras(scene.cameras.map((camera) => camera.name));
     const elsewhere = this.bounds !== undefined && !alike(this.bounds, scene.bounds);
+    // A server that comes back may have another, and tells of no load.
+    this.sceneIsNew ||= this.source !== undefined && !isSameScene(this.source, scene.source);
+    this.source = scene.source;
     this.bounds = scene.bounds;
     if (this.sceneIsNew && elsewhere) this.forgetCamera();
     if (this.sceneIsNew || !this.placed) this.app.viewer.exposure.forget();

@@ -159,10 +159,11 @@ TEST(Http, WhoLoadsASceneIsNamedOrElseByTheProgram) {
     return server.engine.lastLoad();
   };
   const std::string curl = "User-Agent: curl/7.88.1 (x86_64)\r\n";
-  EXPECT_EQ(loadedBy("/scene", curl), "upload: 5 bytes by curl/7.88.1");
-  EXPECT_EQ(loadedBy("/scene", curl + "X-Client: Ann\r\n"), "upload: 5 bytes by Ann");
-  EXPECT_EQ(loadedBy("/scene?client=Ben%20Bo", curl + "X-Client: Ann\r\n"), "upload: 5 bytes by Ben Bo");
-  EXPECT_EQ(loadedBy("/scene?client=" + std::string(1000, 'x'), {}), "upload: 5 bytes by " + std::string(256, 'x'));
+  EXPECT_EQ(loadedBy("/scene", curl), "unnamed scene: 5 bytes by curl/7.88.1");
+  EXPECT_EQ(loadedBy("/scene", curl + "X-Client: Ann\r\n"), "unnamed scene: 5 bytes by Ann");
+  EXPECT_EQ(loadedBy("/scene?client=Ben%20Bo", curl + "X-Client: Ann\r\n"), "unnamed scene: 5 bytes by Ben Bo");
+  EXPECT_EQ(loadedBy("/scene?client=" + std::string(1000, 'x'), {}),
+            "unnamed scene: 5 bytes by " + std::string(256, 'x'));
 }
 
 TEST(Http, ASceneThatIsRefusedSaysWhere) {

@@ -358,6 +358,19 @@ TEST(Solve, ConfigureKeepsWhatIsNotNamed) {
   EXPECT_EQ(replyOf<StateReply>(socket.call(SolveResumeCall{})).state, "solving");
 }
 
+TEST(Solve, EveryoneIsToldOfNewSettings) {
+  RunningServer server;
+  TestSocket first(server.port()), second(server.port());
+  first.hello();
+  second.hello();
+  SolveConfigureCall call;
+  call.target_error = 0.1;
+  EXPECT_EQ(replyOf<Settings>(second.call(call)).target_error, 0.1);
+  const auto told = first.waitFor("solve.configured");
+  ASSERT_TRUE(told.has_value());
+  EXPECT_EQ(told->params->at("targetError"), 0.1);
+}
+
 TEST(Solve, ChangesOfSettingsThatFollowEachOtherAtOnceAllHold) {
   RunningServer server;
   TestSocket socket(server.port());

@@ -8,6 +8,7 @@ import re
 import signal
 import struct
 import unittest
+import urllib.request
 import uuid
 from http import HTTPStatus
 
@@ -266,6 +267,19 @@ class RemoteTest(ServiceCase):
         waitForLine(watching.stderr, "trying again")
         self.server(port=server.port)
         waitForLine(watching.stderr, "empty")
+        watching.send_signal(signal.SIGINT)
+        self.assertEqual(watching.wait(60), 75)
+
+    def test_watchTellsWhoHasLoadedAnotherScene(self):
+        server = self.solved()
+        watching = self.start("watch", server.url, "--follow")
+        waitForLine(watching.stderr, "shots")
+        scene = self.scene.read_bytes()
+        for query, said in (("?name=room.glb&client=Ann", "room.glb loaded by Ann"),
+                            ("?client=Ben%0ABo", "unnamed scene loaded by Ben Bo")):
+            request = urllib.request.Request(f"{server.url}/scene{query}", scene, {"Content-Type": "model/gltf-binary"}, method="PUT")
+            urllib.request.urlopen(request).close()
+            waitForLine(watching.stderr, said)
         watching.send_signal(signal.SIGINT)
         self.assertEqual(watching.wait(60), 75)
 

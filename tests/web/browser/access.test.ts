@@ -84,7 +84,7 @@ it.each(['dark', 'light'] as const)('can be read in %s colours', async (scheme) 
     view.meter.toggle();
     frame.toasts.show('A note', 'good');
     frame.toasts.show('A refusal', 'bad');
-    frame.setBanner('No connection.', 'Try now', () => undefined);
+    frame.setBanner('link', 'No connection.', 'Try now', () => undefined);
     frame.setWelcome('empty');
     frame.legend.show('Irradiance', 'lx', 1, 1000);
   });
@@ -339,7 +339,7 @@ it.each([
   await page.evaluate(() => {
     const { frame } = window.viewer!;
     frame.toasts.show('A note');
-    frame.setBanner('No connection.');
+    frame.setBanner('link', 'No connection.');
   });
   const outside = (selectors: string) =>
     page.evaluate(

@@ -39,3 +39,15 @@ it('looks from outside where light is seen from there', async () => {
   const [, , z] = await eyeIn(ROOM);
   expect(z).toBeGreaterThan(1);
 });
+
+it('takes no camera of a link from which there would be no way back', async () => {
+  const server = await serve();
+  await putScene(server, squares(ROOM, [PLASTER, LAMP]));
+  const page = await pages.open(`${server.url}/#camera=1e300,0,0,0,0,0,50,0`);
+  await converged(page);
+  const eye = await page.evaluate(() => window.viewer!.viewer.rig.camera.position.toArray());
+  expect(
+    eye.every((v) => Math.abs(v) < 10),
+    eye.join(),
+  ).toBe(true);
+});

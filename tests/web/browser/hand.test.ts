@@ -287,6 +287,12 @@ it('takes a number with a comma, and says so where there is none', async () => {
   await converged(other);
   await other.evaluate(() => window.viewer!.connection.call('solve.configure', { targetError: 0.01 }));
   await page.getByText('(target 1 %)').waitFor();
+  // So it is where the solve has nothing to do for it, and tells of no progress.
+  await converged(page);
+  await other.evaluate(() => window.viewer!.connection.call('solve.configure', { targetError: 0.012 }));
+  await page.getByText('(target 1.2 %)').waitFor();
+  await other.evaluate(() => window.viewer!.connection.call('solve.configure', { targetError: 0.01 }));
+  await page.getByText('(target 1 %)').waitFor();
   await until(() => goal.inputValue(), (value) => value === '1'); // prettier-ignore
   expect(await texels.inputValue()).toBe(`${before}5`);
   await texels.fill(before);

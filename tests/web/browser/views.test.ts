@@ -207,11 +207,14 @@ it('tells which scene somebody else has loaded, and not of its own', async () =>
   await converged(page);
   await putScene(server, darkRoom());
   await said(page, /^Ann loaded squares/);
+  const headers = { 'Content-Type': 'model/gltf+json', 'User-Agent': 'curl/7.88.1' };
+  await fetch(`${server.url}/scene`, { method: 'PUT', body: darkRoom(), headers });
+  await said(page, /^curl\/7\.88\.1 loaded a scene without a name$/);
   await page.evaluate((text) => window.viewer!.scene.loadFile(new File([text], 'mine.gltf')), squares([{ mesh: 0 }]));
   await said(page, /^mine\.gltf loaded/);
   await converged(page);
   const notes = await page.evaluate(() => window.notes!.filter((text) => / loaded /.test(`${text} `)));
-  expect(notes.filter((text) => !text.startsWith('mine.gltf'))).toHaveLength(1);
+  expect(notes.filter((text) => !text.startsWith('mine.gltf'))).toHaveLength(2);
 });
 
 it('tells who has loaded the first scene of a server, and of none that it began with', async () => {

@@ -1,6 +1,6 @@
 import { existsSync, readFileSync } from 'node:fs';
 import * as edits from '../../../client/web/src/document/edits';
-import { handlesOf, hangingNodes, type Gltf, type GltfLight } from '../../../client/web/src/document/gltf';
+import { handlesOf, hangingNodes, isSameScene, type Gltf, type GltfLight } from '../../../client/web/src/document/gltf';
 import { applyPatch, sameJson, withoutNames } from '../../../client/web/src/document/json_patch';
 import { SceneDocument } from '../../../client/web/src/document/scene_document';
 import type { Json, Patch, ScenePatchReply } from '../../../client/web/src/protocol/messages';
@@ -160,13 +160,14 @@ function session() {
     id: string;
     answer: (reply: ScenePatchReply) => void;
     refuse: (error: Error) => void;
+    isMeant: () => boolean;
   }[] = [];
   const refused: string[] = [];
   const document = new SceneDocument(
     (by) => by === 'me',
-    (patch, id) =>
+    (patch, id, isMeant) =>
       new Promise((answer, refuse) => {
-        calls.push({ patch, id, answer, refuse });
+        calls.push({ patch, id, answer, refuse, isMeant });
       }),
     {
       changed: () => undefined,
@@ -209,6 +210,17 @@ describe('nodes of the scene', () => {
     const all = hangingNodes(scene(chain, [0]));
     expect(all.length).toBe(count);
     expect(all.at(-1)).toEqual({ node: count - 1, depth: count - 1 });
+  });
+});
+
+describe('scenes', () => {
+  const named = (...names: (string | undefined)[]): Gltf => ({ asset: { version: '2.0' }, nodes: names.map((name) => ({ name })) }); // prettier-ignore
+
+  it('are the same where most objects of a number have one name', () => {
+    expect(isSameScene(named('a', 'b', 'c'), named('a', 'b', 'd'))).toBe(true);
+    expect(isSameScene(named('a', undefined), named('a', undefined, 'lamp'))).toBe(true);
+    expect(isSameScene(named('floor', 'wall'), named('far away'))).toBe(false);
+    expect(isSameScene(named('a'), named('x', 'y', 'a'))).toBe(false);
   });
 });
 
@@ -381,6 +393,43 @@ describe('scene document', () => {
       expect(document.gltf.nodes!.length).toBe(3);
       expect(document.gltf.scenes![0]!.nodes).toEqual([0, 1, 2]);
     }
+  });
+
+  it('sends nothing to a scene that has taken the place of the one it was meant for, and says so once', async () => {
+    const { document, calls, refused } = session();
+    const edited = [document.edit('Move', move(2), 'drag'), document.edit('Colour', [{ op: 'replace', path: '/materials/0/name', value: 'grey' }])]; // prettier-ignore
+    const ends = edited.map((edit) => edit.catch((error: Error) => error.message));
+    document.leave('another scene was loaded');
+    expect(await Promise.all(ends)).toEqual(['another scene was loaded', 'another scene was loaded']);
+    expect(calls[0]!.isMeant()).toBe(false); // where its answer was lost it is not asked for again
+    await document.edit('Move', move(3)).catch(() => undefined);
+    expect(refused).toEqual([
+      'Colour: another scene was loaded',
+      'Move: the server has another scene, which is still on its way',
+    ]);
+    calls[0]!.refuse(new Error('late'));
+    await settle();
+    document.reset(room(), 7);
+    const next = document.edit('Move', move(4));
+    expect(calls.map(({ patch }) => patch)).toEqual([move(2), move(4)]);
+    calls[1]!.answer(reply(8));
+    await next;
+    expect(refused.length).toBe(2);
+  });
+
+  it('lays what waits to be sent upon the document that comes anew', async () => {
+    const { document, calls } = session();
+    const first = document.edit('Move', move(2));
+    const second = document.edit('Name', [{ op: 'replace', path: '/nodes/1/name', value: 'crate' }]);
+    document.reset(room(), 5);
+    expect(document.gltf.nodes![1]).toMatchObject({ name: 'crate', translation: [1, 0, 0] });
+    calls[0]!.answer(reply(6));
+    await first;
+    await settle();
+    calls[1]!.answer(reply(7));
+    await second;
+    expect(document.undoStack.map(({ label }) => label)).toEqual(['Name']);
+    expect(document.gltf.nodes![1]!.name).toBe('crate');
   });
 
   it('asks for the scene anew when a patch does not fit', () => {

@@ -1,5 +1,5 @@
 import { offerOf } from '../../../client/web/src/app_history';
-import { loadNote } from '../../../client/web/src/app_scene';
+import { loadNote, wasReplaced } from '../../../client/web/src/app_scene';
 import type { PastRevision, SceneHistory } from '../../../client/web/src/protocol/messages';
 
 const history = (undoable: number, redoable: number, revisions: PastRevision[]): SceneHistory => ({
@@ -43,6 +43,14 @@ describe('what is offered to be undone and redone', () => {
   });
 });
 
+it('a scene was replaced where a later load is known, or too much was done for it to be', () => {
+  const [loaded, patch] = [{ revision: 4, kind: 'load' } as const, { revision: 5, kind: 'patch' } as const];
+  expect(wasReplaced(history(1, 0, [loaded, patch]), 3)).toBe(true);
+  expect(wasReplaced(history(1, 0, [loaded, patch]), 4)).toBe(false);
+  expect(wasReplaced(history(1, 0, [patch]), 4)).toBe(false);
+  expect(wasReplaced(history(1, 0, [patch]), 3)).toBe(true);
+});
+
 it('people are told who has loaded which scene, as far as that is known', () => {
   const loads: PastRevision[] = [
     { revision: 4, kind: 'load', summary: 'room.glb', by: 'Ann' },
@@ -59,4 +67,6 @@ it('people are told who has loaded which scene, as far as that is known', () => 
   ]);
   expect(loadNote([{ revision: 1, kind: 'load', summary: 'room.glb', by: 'Ann' }], 1)).toBe('Ann loaded room.glb');
   expect(loadNote([{ revision: 1, kind: 'load', summary: 'room.glb' }], 1)).toBeUndefined(); // the command line's
+  const nameless = { revision: 2, kind: 'load', summary: 'unnamed scene', by: 'curl/7.88.1' } as const;
+  expect(loadNote([nameless], 2)).toBe('curl/7.88.1 loaded a scene without a name');
 });

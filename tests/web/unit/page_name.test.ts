@@ -9,6 +9,13 @@ describe('the name of a page', () => {
     expect(shownName('script (nightly)')).toBe('script (nightly)');
   });
 
+  it('is shown so that it changes nothing of the text around it, however it is written', () => {
+    expect(shownName('\u202eAnn\u2066\n')).toBe('Ann');
+    expect(shownName(' \t\u200f')).toBe('');
+    expect(new PageName('\u202eAnn').person).toBe('Ann');
+    expect(shownName('x'.repeat(256))).toBe(`${'x'.repeat(60)}…`);
+  });
+
   it('is one of its own where that is not said', () => {
     const name = new PageName('');
     expect(name.client).toMatch(/^viewer [a-z0-9]{4}$/);

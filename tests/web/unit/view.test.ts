@@ -1,9 +1,11 @@
+import { execFileSync } from 'node:child_process';
 import { exposureOf } from '../../../client/web/src/view/exposure';
 import { editCommand } from '../../../client/web/src/app_share';
 import { encodeRgb9e5, scaleRgb9e5 } from '../../../client/web/src/protocol/rgb9e5';
 import { pageExponent } from '../../../client/web/src/view/lightmap_page';
 import { baseMipFor } from '../../../client/web/src/view/lightmap_set';
 import { fromHex, measured, parseNumber, percent, readable, toHex, withError } from '../../../client/web/src/ui/dom';
+import type { Patch } from '../../../client/web/src/protocol/messages';
 
 describe('automatic exposure', () => {
   it('brings an even picture to middle grey', () => {
@@ -117,9 +119,14 @@ it('the command survives a shell', () => {
     },
   ];
   expect(editCommand(patch, 'host:1')).toBe(
-    `echo '[{"op":"replace","path":"/nodes/@Ann'\\''s lamp/translation","value":[0,1,0]}]' | radiosity edit host:1 -`,
+    `printf %s '[{"op":"replace","path":"/nodes/@Ann'\\''s lamp/translation","value":[0,1,0]}]' | radiosity edit host:1 -`,
   );
-  expect(editCommand([], 'https://host', true)).toBe(`echo '[]' | radiosity edit https://host - --token-file token`);
+  expect(editCommand([], 'https://host', true)).toBe(
+    `printf %s '[]' | radiosity edit https://host - --token-file token`,
+  );
+  const named: Patch = [{ op: 'replace', path: '/nodes/0/name', value: 'C:\\new\n"100 %"' }];
+  const told = execFileSync('sh', ['-c', editCommand(named, 'host').replace(/ \| radiosity .*/s, '')]);
+  expect(JSON.parse(told.toString())).toEqual(named);
 });
 
 describe('a number that somebody wrote', () => {

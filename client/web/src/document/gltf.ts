@@ -51,6 +51,16 @@ export interface Gltf {
   extras?: Json;
 }
 
+/**
+ * Whether numbers of objects mean the same in both: at least half are called alike. Documents of one scene, between which
+ * there were edits, are; those of two scenes are by chance alone.
+ */
+export function isSameScene(a: Gltf, b: Gltf): boolean {
+  const [left, right] = [a.nodes ?? [], b.nodes ?? []];
+  const alike = left.filter(({ name }, i) => i < right.length && (name ?? '') === (right[i]!.name ?? '')).length;
+  return 2 * alike >= Math.max(left.length, right.length);
+}
+
 export function nodeName(gltf: Gltf, index: number): string {
   const node = gltf.nodes?.[index];
   const mesh = node?.mesh !== undefined ? gltf.meshes?.[node.mesh]?.name : undefined;

@@ -25,6 +25,8 @@ interface PendingEdit extends EditEntry {
   shown: Patch;
   role: Role;
   confirmed: boolean;
+  /** Its scene is gone, which was told. */
+  left: boolean;
   done: (error?: Error) => void;
 }
 
@@ -35,7 +37,8 @@ export interface DocumentEvents {
   historyChanged(): void;
 }
 
-export type SendPatch = (patch: Patch, requestId: string) => Promise<ScenePatchReply>;
+/** `isMeant`: false once the scene that the patch was made for is gone, after which it must not be sent (again). */
+export type SendPatch = (patch: Patch, requestId: string, isMeant: () => boolean) => Promise<ScenePatchReply>;
 
 const MAX_HISTORY = 200;
 
@@ -50,10 +53,13 @@ export class SceneDocument {
   lastEdit: Patch | undefined;
   private pending: PendingEdit[] = [];
   private gesture = 0;
-  private sending = false;
+  /** On its way to the server; no more of the list where that was taken away. */
+  private sending: PendingEdit | undefined;
   private openKey: string | undefined;
 
   private generation = 0;
+  /** Another scene is on the server: numbers of the copy's objects mean others there. */
+  private isGone = false;
 
   /** `isMine`: whether the server tells of our patches under that name; nobody else's does. */
   constructor(
@@ -62,12 +68,18 @@ export class SceneDocument {
     private readonly events: DocumentEvents,
   ) {}
 
-  /** Another scene: what was on its way belongs to the old one. */
+  /**
+   * The document as the server has it. What waits to be sent is laid upon it; of what is on its way it is not known
+   * whether the document has it already, which the notification will tell.
+   */
   reset(gltf: Gltf, revision: number): void {
     this.gltf = gltf;
     this.revision = revision;
-    this.pending = [];
-    for (const done of this.waiting.splice(0)) done();
+    this.isGone = false;
+    this.pending = this.pending.filter((edit) => edit !== this.sending);
+    for (const edit of this.pending) edit.shown = [];
+    this.showPending();
+    if (this.pending.length === 0) for (const done of this.waiting.splice(0)) done();
     this.undoStack.length = 0;
     this.redoStack.length = 0;
     this.takenBack.clear();
@@ -75,6 +87,24 @@ export class SceneDocument {
     ++this.generation;
     this.events.changed([]);
     this.events.historyChanged();
+  }
+
+  /**
+   * Another scene is on the server, and its document follows: what has not been made was meant for objects of this one,
+   * and would change whatever has their numbers there. Until then nothing is edited.
+   */
+  leave(reason: string): void {
+    this.isGone = true;
+    const left = this.pending.filter((edit) => !edit.confirmed);
+    this.takeBackPending();
+    this.pending = [];
+    for (const done of this.waiting.splice(0)) done();
+    for (const edit of left) {
+      edit.left = true;
+      edit.done(new Error(reason));
+    }
+    const last = left.at(-1);
+    if (last) this.events.refused(last.label, reason);
   }
 
   /** A patch that the server has made, ours or someone else's. False: the copy does not fit; fetch the scene anew. */
@@ -165,8 +195,7 @@ export class SceneDocument {
   /** The newest of a gesture's edits, where it is not on its way yet. */
   private dropWaiting(key: string): boolean {
     const waiting = this.pending.at(-1);
-    const onTheWay = this.sending ? this.pending[0] : undefined;
-    if (!waiting || waiting === onTheWay || waiting.key !== key) return false;
+    if (!waiting || waiting === this.sending || waiting.key !== key) return false;
     this.takeBack(waiting);
     this.pending.pop();
     waiting.done();
@@ -181,6 +210,12 @@ export class SceneDocument {
     key = kind === undefined ? undefined : `${kind} #${this.gesture}`,
   ): Promise<void> {
     return new Promise((resolve, reject) => {
+      if (this.isGone) {
+        const error = new Error('the server has another scene, which is still on its way');
+        this.events.changed(forward.map((operation) => operation.path)); // what was dragged goes back
+        this.events.refused(label, error.message);
+        return reject(error);
+      }
       if (key !== undefined) this.dropWaiting(key);
       const edit: PendingEdit = {
         label,
@@ -191,6 +226,7 @@ export class SceneDocument {
         requestId: newRequestId(),
         shown: [],
         confirmed: false,
+        left: false,
         done: (error) => (error ? reject(error) : resolve()),
       };
       this.pending.push(edit);
@@ -225,11 +261,10 @@ export class SceneDocument {
 
   private async pump(): Promise<void> {
     if (this.sending) return;
-    this.sending = true;
     while (this.pending.length > 0) {
-      const edit = this.pending[0]!;
+      const edit = (this.sending = this.pending[0]!);
       try {
-        const reply = await this.send(edit.forward, edit.requestId);
+        const reply = await this.send(edit.forward, edit.requestId, () => !edit.left);
         this.confirm(edit, reply.revision);
         edit.done();
       } catch (error) {
@@ -238,7 +273,7 @@ export class SceneDocument {
       // A scene that came meanwhile has taken the list away, or the notification has taken the edit off it.
       if (this.pending[0] === edit) this.pending.shift();
     }
-    this.sending = false;
+    this.sending = undefined;
     for (const done of this.waiting.splice(0)) done();
   }
 
@@ -278,6 +313,7 @@ export class SceneDocument {
   }
 
   private refuse(edit: PendingEdit, error: Error): void {
+    if (edit.left) return;
     if (edit.confirmed) return edit.done(); // the answer was lost on its way, the notification was not
     if (this.pending[0] === edit) {
       this.takeBackPending();

@@ -129,6 +129,7 @@ export interface Notifications {
   cameras: { cameras: SharedCamera[] };
   draining: { graceMs: number };
   notice: { kind: string; text: string };
+  'solve.configured': Settings;
 }
 
 /** One of the revisions since the scene was loaded. */

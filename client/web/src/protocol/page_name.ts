@@ -6,9 +6,22 @@ export const LONGEST_NAME = 48;
 
 const MARKED = /^(.+) \([a-z0-9]{4}\)$/s;
 
-/** "Ann" of "Ann (x3fa)"; names of other programs as they are. */
+/** Characters of names that are shown, of which programs may have longer ones. */
+const LONGEST_SHOWN = 60;
+
+/** Control characters, and those that turn the direction of all the text that follows them. */
+const TURNING = /[\u0000-\u001f\u007f-\u009f\u200e\u200f\u202a-\u202e\u2066-\u2069]/g;
+
+/** Of a text that others have written: nothing of it changes how the text around it reads. */
+export function plainText(text: string): string {
+  return text.replace(TURNING, ' ').trim();
+}
+
+/** "Ann" of "Ann (x3fa)"; names of other programs as they are. Empty where there is nothing to be read. */
 export function shownName(client: string): string {
-  return MARKED.exec(client)?.[1] ?? client;
+  const plain = plainText(MARKED.exec(client)?.[1] ?? client);
+  const letters = [...plain];
+  return letters.length > LONGEST_SHOWN ? `${letters.slice(0, LONGEST_SHOWN).join('')}…` : plain;
 }
 
 export class PageName {
@@ -25,7 +38,7 @@ export class PageName {
   }
 
   set person(called: string) {
-    this.called = [...called.replace(/[\u0000-\u001f\u007f]/g, ' ').trim()].slice(0, LONGEST_NAME).join('').trim();
+    this.called = [...plainText(called)].slice(0, LONGEST_NAME).join('').trim();
   }
 
   /** How the page is called where its user is not. */

@@ -17,6 +17,8 @@ export interface FrameActions {
 }
 
 const HANDLES = ['translate', 'rotate', 'scale'] as const;
+/** What may be wrong; without the first nothing of the others can be mended. */
+const BANNERS = ['link', 'card', 'solve'] as const;
 const THEMES = ['auto', 'dark', 'light'] as const;
 
 export class Frame {
@@ -35,6 +37,7 @@ export class Frame {
   private readonly error = h('span', { class: 'error-now' });
   private readonly rate = h('span', { class: 'rate' });
   private readonly people = h('span', { class: 'people', title: 'Viewers', hidden: true });
+  private readonly banners = new Map<(typeof BANNERS)[number], HTMLElement[]>();
   private readonly banner = h('div', { class: 'banner', role: 'alert', hidden: true });
   private readonly welcome = h('div', { class: 'welcome card', hidden: true });
   /** There is a picture, which no message shall cover. */
@@ -110,11 +113,18 @@ export class Frame {
     this.tools['redo']!.disabled = !redo;
   }
 
-  /** Something that stays until it is mended; undefined: nothing is wrong. */
-  setBanner(text: string | undefined, label = '', act?: () => void): void {
-    this.banner.hidden = text === undefined;
-    if (text === undefined) return;
-    this.banner.replaceChildren(h('span', {}, text), ...(act ? [button(label, act)] : []));
+  /** Something that stays until it is mended; undefined: nothing is wrong about that. */
+  setBanner(about: (typeof BANNERS)[number], text: string | undefined, label = '', act?: () => void): void {
+    if (text === undefined) this.banners.delete(about);
+    else this.banners.set(about, [h('span', {}, text), ...(act ? [button(label, act)] : [])]);
+    this.showBanner();
+  }
+
+  /** What is wrong besides is said once the first is mended. */
+  private showBanner(): void {
+    const first = BANNERS.map((about) => this.banners.get(about)).find((one) => one !== undefined);
+    this.banner.hidden = first === undefined;
+    if (first && first[0] !== this.banner.firstChild) this.banner.replaceChildren(...first);
   }
 
   /** Says what there is to do where there is no scene, and that one is coming. */
@@ -149,8 +159,8 @@ export class Frame {
       event.preventDefault();
       if (input.value) give(input.value.trim());
     };
-    this.banner.hidden = false;
-    this.banner.replaceChildren(form);
+    this.banners.set('link', [form]);
+    this.showBanner();
     input.focus();
   }
 

@@ -19,6 +19,9 @@ const FRAME_MARGIN = 1.08;
 /** Degrees: in a room one is near to what one sees. */
 const ROOM_FOV = 65;
 
+/** Of a camera in a link, as of those that viewers share. */
+const FARTHEST_M = 1e12;
+
 export class CameraRig {
   readonly camera = new PerspectiveCamera(45, 1, 0.01, 1000);
   readonly orbit: OrbitControls;
@@ -205,7 +208,9 @@ export class CameraRig {
 
   fromText(text: string): boolean {
     const n = text.split(',').map(Number);
-    if (n.length !== 8 || !n.every(Number.isFinite) || !(n[6]! > 1 && n[6]! < 170)) return false;
+    // From farther away there is no way back: distances overflow, and framing the scene needs a direction.
+    const isNear = n.slice(0, 6).every((v) => Math.abs(v) <= FARTHEST_M);
+    if (n.length !== 8 || !isNear || !Number.isFinite(n[7]) || !(n[6]! > 1 && n[6]! < 170)) return false;
     this.camera.position.set(n[0]!, n[1]!, n[2]!);
     this.target.set(n[3]!, n[4]!, n[5]!);
     this.fov = n[6]!;

@@ -26,6 +26,8 @@ interface Association {
 
 export class LitScene {
   readonly root = new Group();
+  /** The document that it was made of. */
+  readonly source: Gltf;
   readonly nodes = new Map<number, Object3D>();
   readonly lamps = new Map<number, LampMarker>();
   readonly cameras: { name: string; camera: PerspectiveCamera }[] = [];
@@ -48,6 +50,7 @@ export class LitScene {
     view: ViewUniforms,
     anisotropy: number,
   ) {
+    this.source = gltf.parser.json as Gltf;
     const associations = gltf.parser.associations as unknown as Map<object, Association>;
     const lights: Object3D[] = [];
     gltf.scene.updateMatrixWorld(true);

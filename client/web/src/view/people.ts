@@ -62,9 +62,10 @@ class Person extends Object3D {
     this.side = new MeshBasicMaterial({ color, transparent: true, opacity: 0.35, side: 2, depthWrite: false });
     this.edge = new LineBasicMaterial({ color });
     this.add(new Mesh(SIDES, this.side), new LineSegments(EDGES, this.edge));
-    this.label = button(shownName(camera.name), () => visit(this.eye, this.aim), {
+    const name = shownName(camera.name) || 'Someone';
+    this.label = button(name, () => visit(this.eye, this.aim), {
       class: 'person',
-      title: `Look from where ${shownName(camera.name)} looks`,
+      title: `Look from where ${name} looks`,
     });
     this.label.style.setProperty('--hue', String(hue));
   }
