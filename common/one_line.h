@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 
 namespace radiosity {
 
@@ -15,6 +16,35 @@ namespace radiosity {
       text[i] = text[i + 1] = ' ';
   }
   return text;
+}
+
+/// Bytes of the character that it begins with; 0: none of UTF-8 (RFC 3629, without what it forbids among three and four
+/// bytes but for the first).
+[[nodiscard]] inline std::size_t characterLength(std::string_view text) {
+  const auto lead = text.empty() ? 0xff : static_cast<unsigned char>(text[0]);
+  const std::size_t length = lead < 0x80                   ? 1
+                             : lead >= 0xc2 && lead < 0xe0 ? 2
+                             : lead >= 0xe0 && lead < 0xf0 ? 3
+                             : lead >= 0xf0 && lead < 0xf5 ? 4
+                                                           : 0;
+  if (length > text.size()) return 0;
+  for (std::size_t i = 1; i < length; ++i) {
+    if ((static_cast<unsigned char>(text[i]) & 0xc0U) != 0x80) return 0;
+  }
+  return length;
+}
+
+/// The same of at most so many bytes, which end with a character; a byte that is no part of one becomes '?'.
+[[nodiscard]] inline std::string shortLine(std::string_view text, std::size_t most) {
+  std::string line;
+  while (!text.empty()) {
+    const auto length = characterLength(text);
+    const auto taken = length > 0 ? length : 1;
+    if (line.size() + taken > most) break;
+    line += length > 0 ? text.substr(0, length) : "?";
+    text.remove_prefix(taken);
+  }
+  return oneLine(std::move(line));
 }
 
 }  // namespace radiosity

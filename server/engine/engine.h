@@ -68,6 +68,8 @@ struct SolveSettings {
   std::optional<SkySetting> sky;  ///< for scenes that have none of their own
   bool paper_mode = false;        ///< Lum, Ma and Max 2002 to the letter (server option, comparisons)
   std::uint64_t link_memory_bytes = std::uint64_t{1} << 30;  ///< that remembered links never exceed (server option)
+
+  bool operator==(const SolveSettings&) const = default;
 };
 
 /// Warnings that a Status holds at most: it is made ten times a second, and scenes have as many as they have materials.

@@ -220,6 +220,7 @@ class SolveLoop final : public Engine {
   std::uint64_t revision_ = 0;
   double seconds_ = 0.0;
   bool unpublished_ = false;
+  bool shown_is_own_ = true;     // what was published last is of this solver, not of one that it took turns with
   bool stepped_ = false;         // the solver, since the present version began
   std::uint64_t unwatched_ = 0;  // publications that nobody was there for
   Clock::time_point next_publish_{}, next_progress_{};

@@ -185,7 +185,10 @@ Result<PatchOutcome> SolveLoop::adopt(scene::EditedDocument edited, const Keep& 
 Result<PatchOutcome> SolveLoop::rebuild(scene::EditedDocument edited, const Keep& keep) {
   if (former_) {
     const auto change = former_->changeTo(edited.scene);
-    if (!change.geometry) return goBack(std::move(edited), change, keep);
+    if (!change.geometry) {
+      shown_is_own_ = false;
+      return goBack(std::move(edited), change, keep);
+    }
   }
   PatchOutcome outcome;
   outcome.revision = revision_ + 1;
@@ -234,6 +237,7 @@ void SolveLoop::configure(ChangeSettings change, Callback<SolveSettings> done) {
 }
 
 Result<SolveSettings> SolveLoop::applySettings(const SolveSettings& settings) {
+  if (settings == settings_) return settings_;  // who asks what they are changes nothing
   const SolveSettings before = settings_;
   const bool resized = before.texels != settings.texels || before.texel_size_m != settings.texel_size_m;
   const bool anew = before.seed != settings.seed || before.paper_mode != settings.paper_mode ||
@@ -299,7 +303,10 @@ void SolveLoop::reconsiderStop() {
 
 void SolveLoop::pause(Callback<SolveState> done) {
   askToChange<SolveState>(std::move(done), [this]() -> Result<SolveState> {
-    if (state_ == SolveState::kSolving) state_ = SolveState::kPaused;
+    if (state_ == SolveState::kSolving) {
+      state_ = SolveState::kPaused;
+      if (unpublished_ && !fitsMemory([&] { publishLightmaps(false); })) unpublished_ = true;  // nothing else would
+    }
     updateStatus(true);
     return state_;
   });

@@ -37,6 +37,7 @@ void SolveLoop::publishLightmaps(bool final) {
     stepped_ = false;
   }
   unpublished_ = false;
+  shown_is_own_ = true;
   updateStatus(false);
   for (const auto quantity : kQuantities) publishQuantity(quantity);
   next_publish_ = Clock::now() + publishPause(threadTime() - begin);
@@ -54,8 +55,8 @@ bool SolveLoop::lacksPages() const {
 /// Until the next slices have solved for other light or colours irradiance is what was published before; pages of it
 /// would take a tenth of the time that such an edit does. Other quantities have other colours at once.
 bool SolveLoop::showsNothingNew() const {
-  if (!lit_ || state_ != SolveState::kSolving || !lit_->showsOwnLight() || !lit_->solver().isUnsettled() ||
-      lit_->solver().isRepairing() || !publisher_.latest(Quantity::kIrradiance))
+  if (!lit_ || !shown_is_own_ || state_ != SolveState::kSolving || !lit_->showsOwnLight() ||
+      !lit_->solver().isUnsettled() || lit_->solver().isRepairing() || !publisher_.latest(Quantity::kIrradiance))
     return false;
   return std::ranges::none_of(kQuantities, [&](auto q) { return q != Quantity::kIrradiance && watches_.wants(q); });
 }

@@ -17,6 +17,7 @@
 #include <span>
 #include <utility>
 
+#include "common/one_line.h"
 #include "common/sha256.h"
 #include "server/net/access.h"
 #include "server/net/http_routes.h"
@@ -182,9 +183,10 @@ void HttpSession::onHeader(BoostError error) {
   request_.if_none_match = field(http::field::if_none_match);
   request_.name = queryOr("name", view(message["X-Name"]));
   if (request_.name.empty()) request_.name = "unnamed scene";
-  request_.client = queryOr("client", view(message["X-Client"]));
+  request_.client = queryOr("client", {});
+  if (request_.client.empty()) request_.client = view(message["X-Client"]);
   if (request_.client.empty()) request_.client = firstWord(field(http::field::user_agent));
-  request_.client.resize(std::min(request_.client.size(), protocol::kMaxTextBytes));
+  request_.client = shortLine(request_.client, protocol::kMaxTextBytes);
   if (refuseEarly()) return;
   readBody();
 }

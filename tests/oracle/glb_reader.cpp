@@ -370,7 +370,8 @@ class Reader {
       const auto normal = glm::cross(b - a, c - a);
       if (!(glm::length(normal) > 0.0)) continue;
       triangle.normal = glm::normalize(normal);
-      triangle.reflectance = glm::min(values.reflectance * oneColour(corners.colours, indices, i), glm::dvec3(kMostReflectance));
+      triangle.reflectance =
+          glm::min(values.reflectance * oneColour(corners.colours, indices, i), glm::dvec3(kMostReflectance));
       scene_.triangles.push_back(triangle);
     }
   }

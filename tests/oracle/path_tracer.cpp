@@ -91,9 +91,7 @@ class PathTracer::Scene {
   Scene(const Scene&) = delete;
   Scene& operator=(const Scene&) = delete;
 
-  [[nodiscard]] Where whereIs(const Point& point) const {
-    return burial_->whereIs(toUnit(point.position), point.normal);
-  }
+  [[nodiscard]] Where whereIs(const Point& at) const { return burial_->whereIs(toUnit(at.position), at.normal); }
 
   /// Under an earlier triangle in the same plane.
   [[nodiscard]] bool covered(const Point& point) const {

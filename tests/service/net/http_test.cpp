@@ -164,6 +164,11 @@ TEST(Http, WhoLoadsASceneIsNamedOrElseByTheProgram) {
   EXPECT_EQ(loadedBy("/scene?client=Ben%20Bo", curl + "X-Client: Ann\r\n"), "unnamed scene: 5 bytes by Ben Bo");
   EXPECT_EQ(loadedBy("/scene?client=" + std::string(1000, 'x'), {}),
             "unnamed scene: 5 bytes by " + std::string(256, 'x'));
+  EXPECT_EQ(loadedBy("/scene?client=", curl + "X-Client: Ann\r\n"), "unnamed scene: 5 bytes by Ann");
+  EXPECT_EQ(loadedBy("/scene?client=%ff%fe%0a%0dAnn%c3%a9", {}), "unnamed scene: 5 bytes by ??  Ann\xc3\xa9");
+  EXPECT_EQ(loadedBy("/scene?client=" + std::string(255, 'x') + "%c3%a9", {}),
+            "unnamed scene: 5 bytes by " + std::string(255, 'x'))
+      << "no half of a character";
 }
 
 TEST(Http, ASceneThatIsRefusedSaysWhere) {
