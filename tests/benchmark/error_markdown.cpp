@@ -102,10 +102,16 @@ std::string referenceText(const SceneSeries& series) {
     return fmt::format("Reference: the closed form, exact, at {} texels and {} points.", series.reference_texels,
                        series.reference_points);
   }
-  return fmt::format(
+  auto text = fmt::format(
       "Reference: path traced, {} texels with noise {} % (subtracted), {} points with {} %; {:.0f} s to trace{}.",
       series.reference_texels, percent(series.texel_noise), series.reference_points, percent(series.point_noise),
       series.reference_seconds, series.reference_from_disk ? ", kept from an earlier run" : "");
+  if (series.undecided > 0.0)
+    text += fmt::format(
+        " {} % of the area is left out of the solver error: models are so open there that it has no answer what of a "
+        "texel is inside.",
+        percent(series.undecided));
+  return text;
 }
 
 std::string sceneSection(const SceneSeries& series) {

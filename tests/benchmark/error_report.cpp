@@ -125,6 +125,7 @@ json toJson(const SceneSeries& series) {
             {"plain_texels", series.plain_texels},
             {"points", series.reference_points},
             {"texel_noise", series.texel_noise},
+            {"undecided_area", series.undecided},
             {"point_noise", series.point_noise},
             {"seconds", series.reference_seconds},
             {"from_disk", series.reference_from_disk},

@@ -77,7 +77,8 @@ SolveRow solveOnce(const std::filesystem::path& scene, double time, double error
   if (series.unmeasured = whyNotJudged(run.report, lit); !series.unmeasured.empty()) return row;
   judge.prepare(std::move(lit), options, series);
   const auto measured = accuracy::measure(*judge.lit, judge.reference);
-  row.solver = measured.solver;
+  row.solver = accuracy::measureTexels(judge.lit->pages, judge.reference, accuracy::TexelChoice::kDecided);
+  series.undecided = accuracy::undecidedArea(judge.reference);
   row.total = measured.total;
   row.plain = accuracy::measureTexels(judge.lit->pages, judge.reference, accuracy::TexelChoice::kPlain);
   row.measured = true;

@@ -67,6 +67,7 @@ struct SceneSeries {
   std::string renderer;
   std::size_t reference_texels = 0, plain_texels = 0, reference_points = 0;
   double texel_noise = 0.0, point_noise = 0.0, reference_seconds = 0.0;
+  double undecided = 0.0;  ///< part of the texels' area, left out: models are open there (accuracy::undecidedArea)
   bool reference_from_disk = false, reference_exact = false;
   std::vector<SolveRow> rows;
   std::optional<SolveRow> asked;  ///< one that was asked for a stated error of `goal`: what a user gets for it
