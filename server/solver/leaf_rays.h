@@ -8,6 +8,7 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
+#include "server/scene/bounds.h"
 #include "server/scene/bvh.h"
 #include "server/scene/patch_scene.h"
 #include "server/scene/ray_tree.h"
@@ -38,6 +39,8 @@ class LeafRays {
   [[nodiscard]] double widthOf(std::uint32_t value) const;
   [[nodiscard]] double greatestWidth() const { return greatest_width_; }
 
+  /// Adds the whole texel to the box. False: it is not known where all of it lies, since its chart is not flat.
+  [[nodiscard]] bool addTo(scene::Bounds& box, std::uint32_t value) const;
   /// The place at (u, v) in [0, 1)^2, uniform over what is left of a leaf that has area.
   [[nodiscard]] Place placeOn(std::uint32_t value, const glm::dvec2& at) const;
   /// What lies that way within `reach` (unit box); `value` is kNothing where nothing does, and where it is no leaf.

@@ -213,6 +213,35 @@ bool LeafSights::isPassed(const Shadows& change, std::uint32_t value, const glm:
                              [&](const scene::ChangedBox& box) { return meetsBox(box, place.position, direction); });
 }
 
+/// Whether something of it lies in the box around two leaves, so that a ray from one to the other may pass it.
+bool LeafSights::isBetween(const Shadows& change, std::uint32_t one, std::uint32_t other) const {
+  scene::Bounds around;
+  if (!rays_.addTo(around, one) || !rays_.addTo(around, other)) return true;
+  return std::ranges::any_of(change.change().boxes, [&](const scene::ChangedBox& box) {
+    for (int axis = 0; axis < 3; ++axis) {
+      if (static_cast<double>(box.low[axis]) - kMargin > static_cast<double>(around.max[axis]) ||
+          static_cast<double>(box.high[axis]) + kMargin < static_cast<double>(around.min[axis]))
+        return false;
+    }
+    return true;
+  });
+}
+
+/// A step of the scene before and those that it goes on to; kUntraced: where it passes may have changed, or is not
+/// known. Where a ray into the sky passes never is.
+std::uint32_t LeafSights::inheritStep(const LeafSights& former, std::size_t half, std::uint32_t end,
+                                      std::span<const std::uint32_t> value_after, const Shadows& change) {
+  const auto& step = former.steps_[half][end - former.endCount()];
+  const bool is_last = step.next < former.endCount();
+  const auto then = is_last ? step.next : former.steps_[half][step.next - former.endCount()].by;
+  const auto by = value_after[step.by], to = value_after[then];
+  if (by == kUntraced || to == kUntraced || to >= leaf_count_ || isBetween(change, by, to)) return kUntraced;
+  const auto next = is_last ? to : inheritStep(former, half, step.next, value_after, change);
+  if (next == kUntraced) return kUntraced;
+  steps_[half].push_back({by, next});
+  return endCount() + static_cast<std::uint32_t>(steps_[half].size() - 1);
+}
+
 /// Who was seen in the place of a leaf without area, and is no longer: which rays saw that is not known, so none that
 /// ended there are.
 void LeafSights::forgetStandIns(const LeafSights& former, std::vector<std::uint32_t>& value_after) const {
@@ -257,8 +286,9 @@ void LeafSights::inherit(const LeafSights& former, std::span<const std::uint32_t
       const auto old =
           std::span(former.seen_[half]).subspan(former.first_[before], std::min(former.count_[before], count_[value]));
       for (std::uint32_t k = 0; k < old.size(); ++k) {
-        if (old[k] >= former.endCount()) continue;  // not traced; and where those with steps pass is not known
-        const auto end = value_after[old[k]];
+        if (old[k] == kUntraced) continue;
+        const bool goes_on = old[k] >= former.endCount();
+        const auto end = goes_on ? inheritStep(former, half, old[k], value_after, change) : value_after[old[k]];
         if (end == kUntraced) continue;  // it saw what is gone, or moved
         const bool may_pass = end >= leaf_count_ || change.isPassed(value, end);
         if (!may_pass || !isPassed(change, value, draw(k))) seen_[half][first_[value] + k] = end;

@@ -99,6 +99,9 @@ class LeafSights {
   }
   void forgetStandIns(const LeafSights& former, std::vector<std::uint32_t>& value_after) const;
   [[nodiscard]] bool isPassed(const Shadows& change, std::uint32_t value, const glm::dvec4& draw) const;
+  [[nodiscard]] bool isBetween(const Shadows& change, std::uint32_t one, std::uint32_t other) const;
+  std::uint32_t inheritStep(const LeafSights& former, std::size_t half, std::uint32_t end,
+                            std::span<const std::uint32_t> value_after, const Shadows& change);
 
   const std::vector<Side>& sides_;
   LeafRays rays_;
