@@ -81,7 +81,7 @@ bool LinkSystem::restore(ArchiveReader& from) {
 
 template <typename Archive, typename Self>
 void LinkedSolver::visit(Archive& archive, Self& self) {
-  archive(self.lights_, self.sources_, self.phase_, self.limit_, self.lights_fit_, self.from_links_,
+  archive(self.lights_, self.sources_, self.sky_, self.phase_, self.limit_, self.lights_fit_, self.from_links_,
           self.edit_lights_planned_, self.settling_, self.wanted_, self.measured_, self.growing_, self.share_part_,
           self.left_out_, self.rounds_, self.solutions_, self.sweeps_, self.replayed_, self.varying_share_, self.half_,
           self.refined_, self.by_links_, self.error_, self.counters_, self.by_rays_, self.sample_goal_, self.aim_,

@@ -143,6 +143,22 @@ TEST(SkyRays, WhatWasSavedGoesOnToTheSameEnd) {
   EXPECT_EQ(next.irradiance(), room.solver->irradiance());
 }
 
+// Whether it comes by rays was decided with the scene before an edit; what was saved knows, and the new solver may not.
+TEST(SkyRays, WhatWasSavedByRaysIsRestoredByRays) {
+  Solve room(makeQuadScene(openCube(1, 0.5F)), skyOf(1.0F, 0.5F));
+  ArchiveWriter to(std::size_t{64} << 20);
+  ASSERT_TRUE(room.solver->save(to));
+  auto settings = room.settings;
+  settings.reflected = Reflected::kByLinks;
+  LinkedSolver next(room.made.patches, room.made.materials, room.rays, settings, skyOf(1.0F, 0.5F));
+  ArchiveReader from(to.bytes());
+  ASSERT_TRUE(next.restore(from));
+  next.assess();
+  const auto energy = next.energy();
+  EXPECT_EQ(energy.emitted, room.solver->energy().emitted);
+  EXPECT_NEAR(energy.imbalance[0], 0.0, 1e-6 * energy.emitted[0]);
+}
+
 /// A cube open to the left that a wall without thickness parts in two. Of five columns of leaves it stands on the
 /// middle one.
 test::QuadScene partedCube(bool is_cut, float reflectance = 0.9F) {
