@@ -186,8 +186,9 @@ Result<PatchOutcome> SolveLoop::rebuild(scene::EditedDocument edited, const Keep
   if (former_) {
     const auto change = former_->changeTo(edited.scene);
     if (!change.geometry) {
-      shown_is_own_ = false;
-      return goBack(std::move(edited), change, keep);
+      auto outcome = goBack(std::move(edited), change, keep);
+      if (outcome) shown_is_own_ = false;
+      return outcome;
     }
   }
   PatchOutcome outcome;

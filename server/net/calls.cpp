@@ -237,14 +237,19 @@ void Calls::run(const protocol::SceneHistoryCall& call, const Slot& slot) {
 }
 
 void Calls::run(const protocol::SolveConfigureCall& call, const Slot& slot) {
-  auto answer = [hub = &hub_, slot](const Result<engine::SolveSettings>& settings) {
+  const auto changed = std::make_shared<bool>(false);  // written before the engine answers
+  auto answer = [hub = &hub_, slot, changed](const Result<engine::SolveSettings>& settings) {
     if (!settings) return slot.fail(settings);
     // A solve that is over tells of no progress, so others would not hear of what it aims at now.
-    hub->broadcast(protocol::SolveConfigured{toSettings(*settings)});
+    if (*changed) hub->broadcast(protocol::SolveConfigured{toSettings(*settings)});
     slot.reply(toSettings(*settings));
   };
-  hub_.engine().configure([call](const engine::SolveSettings& now) { return merged(now, call); },
-                          hub_.fromEngine<engine::SolveSettings>(std::move(answer)));
+  const auto change = [call, changed](const engine::SolveSettings& now) {
+    auto settings = merged(now, call);
+    *changed = settings != now;
+    return settings;
+  };
+  hub_.engine().configure(change, hub_.fromEngine<engine::SolveSettings>(std::move(answer)));
 }
 
 namespace {

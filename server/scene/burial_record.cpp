@@ -21,7 +21,8 @@ constexpr float kMargin = 1e-5F;
 constexpr std::size_t kMostParts = 128;
 constexpr std::uint32_t kHemisphere = kFirstWayAlong - 1, kAlong = kBurialWays - kFirstWayAlong;
 
-/// Of four bits.
+/// Of the four bits that number a way into the hemisphere.
+static_assert(kHemisphere == 16);
 constexpr std::uint32_t reversed(std::uint32_t i) {
   return (i & 1U) << 3U | (i & 2U) << 1U | (i & 4U) >> 1U | (i & 8U) >> 3U;
 }

@@ -264,9 +264,9 @@ double LeafGather::skyAt(std::size_t h, std::size_t c, std::size_t v) const {
 
 /// By part of the scene and channel: what makes
 /// sum a x = sum a (h (r + rho x) + s), h being the part of a leaf's light that other leaves get and s what comes from
-/// the sky: x times a factor. Where x
-/// is as much below nothing as above it, as where shooters have sent the mean of what is there and its pattern is left,
-/// that says nothing; all light of the part, with what came over links, makes up for what little is off then.
+/// the sky: x times a factor. Where x is as much below nothing as above it, as where shooters have sent the mean of
+/// what is there and its pattern is left, that says nothing; all light of the part, with what came over links, makes up
+/// for what little is off then.
 LeafGather::Levels LeafGather::levels(std::size_t h) const {
   struct Sum {
     double left = 0.0, kept = 0.0, size = 0.0, all = 0.0, area = 0.0, stays = 0.0;

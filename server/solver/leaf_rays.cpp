@@ -102,10 +102,9 @@ bool LeafRays::addTo(scene::Bounds& box, std::uint32_t value) const {
   const auto triangle = patches_.leaves[surface.first_leaf + leaf].triangle;
   if (!surface.planar || triangle == scene::kNone) return false;
   const auto& frame = patches_.triangles[triangle];
-  for (std::uint32_t corner = 0; corner < 4; ++corner) {
-    const auto u = static_cast<float>(leaf % side.width + corner % 2),
-               v = static_cast<float>(leaf / side.width + corner / 2);
-    box.add(frame.origin + u * frame.du + v * frame.dv);
+  const auto x = static_cast<float>(leaf % side.width), y = static_cast<float>(leaf / side.width);
+  for (const float u : {x - 1.0F, x + 2.0F}) {
+    for (const float v : {y - 1.0F, y + 2.0F}) box.add(frame.origin + u * frame.du + v * frame.dv);
   }
   return true;
 }

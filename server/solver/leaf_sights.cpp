@@ -288,10 +288,11 @@ void LeafSights::inherit(const LeafSights& former, std::span<const std::uint32_t
       for (std::uint32_t k = 0; k < old.size(); ++k) {
         if (old[k] == kUntraced) continue;
         const bool goes_on = old[k] >= former.endCount();
-        const auto end = goes_on ? inheritStep(former, half, old[k], value_after, change) : value_after[old[k]];
-        if (end == kUntraced) continue;  // it saw what is gone, or moved
-        const bool may_pass = end >= leaf_count_ || change.isPassed(value, end);
-        if (!may_pass || !isPassed(change, value, draw(k))) seen_[half][first_[value] + k] = end;
+        const auto first = value_after[goes_on ? former.steps_[half][old[k] - former.endCount()].by : old[k]];
+        if (first == kUntraced) continue;  // it saw what is gone, or moved
+        const bool may_pass = first >= leaf_count_ || change.isPassed(value, first);
+        if (may_pass && isPassed(change, value, draw(k))) continue;
+        seen_[half][first_[value] + k] = goes_on ? inheritStep(former, half, old[k], value_after, change) : first;
       }
     }
   });

@@ -358,11 +358,12 @@ TEST(Solve, ConfigureKeepsWhatIsNotNamed) {
   EXPECT_EQ(replyOf<StateReply>(socket.call(SolveResumeCall{})).state, "solving");
 }
 
-TEST(Solve, EveryoneIsToldOfNewSettings) {
+TEST(Solve, EveryoneIsToldOfNewSettingsAndOfNoOthers) {
   RunningServer server;
   TestSocket first(server.port()), second(server.port());
   first.hello();
   second.hello();
+  EXPECT_EQ(replyOf<Settings>(second.call(SolveConfigureCall{})).target_error, 0.02);  // asks what they are
   SolveConfigureCall call;
   call.target_error = 0.1;
   EXPECT_EQ(replyOf<Settings>(second.call(call)).target_error, 0.1);

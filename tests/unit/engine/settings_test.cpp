@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <future>
 
 #include "tests/scenes/scenes.h"
 #include "tests/unit/engine/engine_driver.h"
@@ -36,6 +37,27 @@ TEST_F(Settings, GivenBeforeAnySceneTheyHoldForTheFirst) {
   solve(lumpedCube(0.5));
   EXPECT_EQ(status().settings.seed, 7U);
   EXPECT_GT(status().patches, 300U);  // the options of the fixture ask for 150
+}
+
+// An edit of light shows nothing before it is solved for. Paused before that, what there is counts as of its revision.
+TEST_F(Settings, APauseRightAfterAnEditShowsWhatThereIs) {
+  solve(lumpedCube(0.5));
+  std::promise<void> busy, go;
+  std::promise<Result<SolveState>> paused;
+  const auto wait = [&busy, &go](SolveSettings settings) {
+    busy.set_value();
+    go.get_future().wait();
+    return settings;
+  };
+  engine().configure(wait, [](const auto&) {});
+  busy.get_future().wait();  // so that the next two come without a slice between
+  engine().patch({emissionPatch(1, 2.0), {}, false, "test"}, [](const auto&) {});
+  engine().pause([&](auto state) { paused.set_value(std::move(state)); });
+  go.set_value();
+  EXPECT_EQ(paused.get_future().get(), SolveState::kPaused);
+  EXPECT_EQ(status().revision, 2U);
+  EXPECT_EQ(engine().lightmaps()->revision, 2U);
+  EXPECT_FALSE(engine().lightmaps()->final);
 }
 
 TEST_F(Settings, TheTimeLimitStopsTheSolveShortOfItsTarget) {

@@ -14,12 +14,11 @@ namespace radiosity::solver {
 namespace {
 
 using test::cubeQuads;
+using test::kGrey;
 using test::makeQuadScene;
 using test::Quad;
 using test::RayTransport;
 using test::solve;
-
-constexpr std::array<float, 6> kGrey{0.5F, 0.5F, 0.5F, 0.5F, 0.5F, 0.5F};
 
 struct Solve {
   explicit Solve(const std::vector<Quad>& quads, double target = 0.02, std::size_t memory = std::size_t{1} << 30,

@@ -12,10 +12,10 @@ namespace radiosity::solver {
 namespace {
 
 using test::cubeQuads;
+using test::kDark;
+using test::kGrey;
 using test::makeQuadScene;
 using test::Quad;
-
-const std::array<float, 6> kDark{}, kGrey{0.5F, 0.5F, 0.5F, 0.5F, 0.5F, 0.5F};
 
 std::vector<std::uint32_t> all(const LeafSights& sights) {
   std::vector<std::uint32_t> ends;

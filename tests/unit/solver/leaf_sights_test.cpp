@@ -11,6 +11,8 @@ namespace radiosity::solver {
 namespace {
 
 using test::cubeQuads;
+using test::kDark;
+using test::kGrey;
 using test::makeQuadScene;
 
 struct Sights {
@@ -40,8 +42,6 @@ struct Sights {
   std::vector<Side> sides;
   LeafSights sights;
 };
-
-const std::array<float, 6> kDark{}, kGrey{0.5F, 0.5F, 0.5F, 0.5F, 0.5F, 0.5F};
 
 TEST(LeafSights, OfACubeAreItsFormFactors) {
   Sights cube(cubeQuads(4, kDark, kGrey));

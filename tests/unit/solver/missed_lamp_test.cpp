@@ -13,11 +13,11 @@ namespace radiosity::solver {
 namespace {
 
 using test::cubeQuads;
+using test::kGrey;
 using test::makeQuadScene;
 using test::Quad;
 using test::RayTransport;
 
-constexpr std::array<float, 6> kGrey{0.5F, 0.5F, 0.5F, 0.5F, 0.5F, 0.5F};
 constexpr double kTarget = 0.02;
 
 /// A closed grey cube and in it a lamp of the given width that is no polygon (`planar` is false, as of a bulb).

@@ -26,6 +26,9 @@ struct QuadScene {
 /// Full, unburied leaves; emission and reflectance uniform over a quad.
 [[nodiscard]] QuadScene makeQuadScene(const std::vector<Quad>& quads);
 
+/// For cubeQuads().
+inline constexpr std::array<float, 6> kDark{}, kGrey{0.5F, 0.5F, 0.5F, 0.5F, 0.5F, 0.5F};
+
 /// The six inward faces of a cube of side 1 around the origin, each with `emission[i]`, `reflectance[i]`.
 [[nodiscard]] std::vector<Quad> cubeQuads(std::uint32_t leaves, const std::array<float, 6>& emission,
                                           const std::array<float, 6>& reflectance);
