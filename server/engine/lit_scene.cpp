@@ -183,17 +183,36 @@ void LitScene::reshade(scene::Document document, std::shared_ptr<const scene::Sc
 }
 
 void LitScene::fadeFrom(LitScene& before, bool same_layout) {
+  endFade();
+  new_share_ = 0.0;
+  // Only of links that are taken over is the lights' part known before all else.
+  const bool known = former_map_ && !former_map_->nothingKept();
+  if (before.showsOwnLight()) {
+    former_light_.emplace(FormerLight{before.scene_, before.patches_, same_layout, before.ownLight(), {}});
+    if (known) former_light_->direct = before.solver_->directIrradiance();
+    return;
+  }
   const auto carried = [&](std::vector<scene::LightmapPage> pages) {
     return same_layout ? std::move(pages) : carryLight({*before.scene_, *before.patches_, pages}, *scene_, *patches_);
   };
   old_light_ = carried(before.shownPages());
-  old_direct_.clear();
-  // Only of links that are taken over is the lights' part known before all else.
-  const bool known = former_map_ && !former_map_->nothingKept();
-  std::vector<scene::LightmapPage> direct;
-  if (known) direct = before.old_direct_.empty() ? before.directPages() : before.old_direct_;
+  if (!known) return;
+  auto direct = before.old_direct_.empty() ? before.directPages() : before.old_direct_;
   if (!direct.empty()) old_direct_ = carried(std::move(direct));
-  new_share_ = 0.0;
+}
+
+std::vector<scene::LightmapPage> LitScene::FormerLight::pages(const std::vector<glm::vec3>& light,
+                                                              const LitScene& to) const {
+  auto made = scene::assemblePages(*patches, light);
+  return same_layout ? std::move(made) : carryLight({*scene, *patches, made}, *to.scene_, *to.patches_);
+}
+
+void LitScene::makeOldPages() {
+  if (!former_light_) return;
+  auto light = former_light_->pages(former_light_->all, *this);
+  if (!former_light_->direct.empty()) old_direct_ = former_light_->pages(former_light_->direct, *this);
+  old_light_ = std::move(light);
+  former_light_.reset();
 }
 
 /// Empty: not known.
@@ -204,7 +223,9 @@ std::vector<scene::LightmapPage> LitScene::directPages() const {
 }
 
 bool LitScene::showDirectLight() {
-  if (old_light_.empty() || old_direct_.empty() || !solver_->isRepairing()) return false;
+  if (showsOwnLight() || !solver_->isRepairing()) return false;
+  makeOldPages();
+  if (old_direct_.empty()) return false;
   const auto fresh = directPages();
   if (fresh.empty()) return false;
   old_light_ = replacePart(std::move(old_light_), old_direct_, fresh);
@@ -237,7 +258,7 @@ void LitScene::updateSolver(bool materials, bool lights) {
 void LitScene::showLightsFirst(const std::vector<glm::vec3>& direct_before) {
   const auto direct = solver_->directIrradiance();
   if (direct.empty()) return;
-  if (old_light_.empty()) {
+  if (showsOwnLight()) {
     auto irradiance = solver_->irradiance();
     for (std::size_t n = 0; n < irradiance.size(); ++n)
       irradiance[n] = glm::max(glm::max(irradiance[n], 0.0F) + direct[n] - direct_before[n], 0.0F);
@@ -278,32 +299,37 @@ std::size_t LitScene::warningCount() const {
 
 /// Children shoot how they differ from their parents, so noise leaves single leaves a little darker than black. Nothing
 /// is: cutting it off only takes error away.
-std::vector<scene::LightmapPage> LitScene::pages() const {
+std::vector<glm::vec3> LitScene::ownLight() const {
   std::vector<glm::vec3> irradiance = solver_->irradiance();
   for (auto& value : irradiance) value = glm::max(value, 0.0F);
-  return scene::assemblePages(*patches_, irradiance);
+  return irradiance;
 }
 
+std::vector<scene::LightmapPage> LitScene::pages() const { return scene::assemblePages(*patches_, ownLight()); }
+
 /// What is shown of a fade as long as nothing new is known.
-std::vector<scene::LightmapPage> LitScene::pagesOfNow() const {
+std::vector<scene::LightmapPage> LitScene::pagesOfNow() {
+  makeOldPages();
   return new_share_ > 0.0 ? blendPages(old_light_, pages(), new_share_) : old_light_;
 }
 
 std::vector<scene::LightmapPage> LitScene::shownPages() {
-  if (old_light_.empty()) return pages();
-  if (new_share_ <= 0.0 && solver_->isUnsettled()) return old_light_;  // its next slices settle it
+  if (showsOwnLight()) return pages();
+  if (new_share_ <= 0.0 && solver_->isUnsettled()) {  // its next slices settle it
+    makeOldPages();
+    return old_light_;
+  }
   if (until_settled_) {
     endFade();
     return pages();
   }
   solver_->assess();
   new_share_ = std::max(new_share_, newLightShare(solver_->error().total, settings_.target_error));
-  if (new_share_ <= 0.0) return old_light_;
   if (new_share_ >= 1.0) {
     endFade();
     return pages();
   }
-  return blendPages(old_light_, pages(), new_share_);
+  return pagesOfNow();
 }
 
 }  // namespace radiosity::engine

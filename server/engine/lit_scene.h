@@ -109,9 +109,10 @@ class LitScene {
   /// What viewers see: after an edit the light that was there before fades into pages() as these become as good.
   [[nodiscard]] std::vector<scene::LightmapPage> shownPages();
   /// Nothing of the light before an edit is in what is shown.
-  [[nodiscard]] bool showsOwnLight() const { return old_light_.empty(); }
+  [[nodiscard]] bool showsOwnLight() const { return old_light_.empty() && !former_light_; }
   /// From here on the solver's own light is shown, as good as it is.
   void endFade() {
+    former_light_.reset();
     old_light_.clear();
     old_direct_.clear();
     until_settled_ = false;
@@ -130,10 +131,21 @@ class LitScene {
         settings_(settings),
         transport_(transport),
         scene_(std::make_shared<const scene::Scene>(std::move(edited.scene))) {}
+  /// Light before an edit, by node, and the scene that had it: most edits are solved before anyone looks at it.
+  struct FormerLight {
+    std::shared_ptr<const scene::Scene> scene;
+    std::shared_ptr<const scene::PatchScene> patches;
+    bool same_layout;
+    std::vector<glm::vec3> all, direct;  ///< lux; direct empty: not known
+
+    [[nodiscard]] std::vector<scene::LightmapPage> pages(const std::vector<glm::vec3>& light, const LitScene& to) const;
+  };
   [[nodiscard]] bool nothingShines() const { return power_ <= 0.0 && !patches_->surfaces.empty(); }
   void makeSolver(const solver::FormerSolver* former = nullptr);
   void updateSolver(bool materials, bool lights);
-  [[nodiscard]] std::vector<scene::LightmapPage> pagesOfNow() const;
+  [[nodiscard]] std::vector<glm::vec3> ownLight() const;
+  [[nodiscard]] std::vector<scene::LightmapPage> pagesOfNow();
+  void makeOldPages();
   void showLightsFirst(const std::vector<glm::vec3>& direct_before);
   [[nodiscard]] std::vector<scene::LightmapPage> directPages() const;
   [[nodiscard]] std::optional<scene::PatchMap> mapFrom(const LitScene& former) const;
@@ -156,6 +168,7 @@ class LitScene {
   solver::LightSources sources_;                 // that the solver knows of
   double power_ = 0.0;                           // emitted, all channels
   double solver_power_ = 0.0;                    // emitted power the solver's flux scale was chosen for
+  std::optional<FormerLight> former_light_;      // of which the next two are still to be made
   std::vector<scene::LightmapPage> old_light_;   // what was shown before an edit; empty: no fade
   std::vector<scene::LightmapPage> old_direct_;  // of it, what came straight from lights; empty: not known, or replaced
   double new_share_ = 0.0;                       // of the solver's own light in what is shown; never falls
