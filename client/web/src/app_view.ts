@@ -80,11 +80,11 @@ export class ViewSession {
 
   private shownAs(): ShownAs {
     const { exposure, brightness, uniforms } = this.app.viewer;
-    const { falseRange, toneCurve } = uniforms.all;
+    const { falseRange } = uniforms.all;
     return {
       stops: exposure.stops,
       exposure: exposure.automatic ? undefined : exposure.base,
-      tone: TONE_CURVES.find(({ number }) => number === toneCurve.value)?.id,
+      tone: TONE_CURVES.find(({ number }) => number === uniforms.defines.TONE_CURVE)?.id,
       scale: brightness.autoRange ? undefined : [falseRange.value.x, falseRange.value.y],
     };
   }
@@ -241,7 +241,7 @@ export class ViewSession {
   private applyFalseColour(): void {
     const { viewer } = this.app;
     const on = this.mode.falseColour === 'always' || (this.mode.falseColour === 'choice' && this.falseColour);
-    viewer.uniforms.all.falseColour.value = on;
+    viewer.uniforms.choose({ FALSE_COLOUR: Number(on) });
     this.panel.setMode(this.mode, on);
     viewer.invalidate();
   }
@@ -271,7 +271,7 @@ export class ViewSession {
 
   private setToneCurve(id: string): void {
     const curve = TONE_CURVES.find((one) => one.id === id) ?? TONE_CURVES[0];
-    this.app.viewer.uniforms.all.toneCurve.value = curve.number;
+    this.app.viewer.uniforms.choose({ TONE_CURVE: curve.number });
     this.panel.setTone(curve.id);
     this.app.viewer.invalidate();
   }
@@ -279,7 +279,7 @@ export class ViewSession {
   private showLegend(): void {
     const { frame, viewer } = this.app;
     if (this.mode.id === 'mips') return frame.legend.showMips();
-    if (!viewer.uniforms.all.falseColour.value || !this.mode.unit || !viewer.shown) return frame.legend.hide();
+    if (!viewer.uniforms.defines.FALSE_COLOUR || !this.mode.unit || !viewer.shown) return frame.legend.hide();
     const { x: low, y: high } = viewer.uniforms.all.falseRange.value;
     const title = this.mode.legend ?? this.mode.label;
     if (!viewer.brightness.hasRange) return frame.legend.showNothing(title, this.mode.unit, this.whyNothing());

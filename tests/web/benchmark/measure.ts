@@ -119,30 +119,62 @@ export async function openLoading(pages: Pages, scene: string, runs: number): Pr
   return openings;
 }
 
-/** Answers of a connection that the viewer knows nothing of. Times are milliseconds since 1970, as all pages have them. */
-async function recolour(editor: Page, rgb: number[]): Promise<{ revision: number; asked: number; answered: number }> {
-  return editor.evaluate(async (rgb) => {
+/**
+ * Calls over a connection that the viewer knows nothing of; what the last answers. Times are milliseconds since 1970, as
+ * all pages have them, around the last.
+ */
+async function call(
+  editor: Page,
+  calls: { method: string; params: object }[],
+): Promise<{ result: unknown; asked: number; answered: number }> {
+  return editor.evaluate(async (calls) => {
     const now = () => performance.timeOrigin + performance.now();
     const socket = new WebSocket(`ws://${location.host}/ws`, 'radiosity.v1');
-    const answers = new Map<number, (result: { revision: number }) => void>();
+    const answers = new Map<number, (message: { result?: unknown; error?: unknown }) => void>();
     socket.onmessage = ({ data }) => {
-      const { id, result } = JSON.parse(data as string) as { id?: number; result: { revision: number } };
-      if (id !== undefined) answers.get(id)?.(result);
+      const message = JSON.parse(data as string) as { id?: number; result?: unknown; error?: unknown };
+      if (message.id !== undefined) answers.get(message.id)?.(message);
     };
     await new Promise((resolve) => (socket.onopen = resolve));
-    const call = (id: number, method: string, params: object) =>
-      new Promise<{ revision: number }>((resolve) => {
+    let last = { result: undefined as unknown, asked: 0, answered: 0 };
+    for (const [id, { method, params }] of [{ method: 'hello', params: { client: 'benchmark' } }, ...calls].entries()) {
+      const asked = now();
+      const message = await new Promise<{ result?: unknown; error?: unknown }>((resolve) => {
         answers.set(id, resolve);
         socket.send(JSON.stringify({ jsonrpc: '2.0', id, method, params }));
       });
-    await call(1, 'hello', { client: 'benchmark' });
-    const asked = now();
-    const patch = [{ op: 'replace', path: '/materials/@light/emissiveFactor', value: rgb }];
-    const { revision } = await call(2, 'scene.patch', { patch });
-    const answered = now();
+      if (message.error) throw new Error(`${method}: ${JSON.stringify(message.error)}`);
+      last = { result: message.result, asked, answered: now() };
+    }
     socket.close();
-    return { revision, asked, answered };
-  }, rgb);
+    return last;
+  }, calls);
+}
+
+async function recolour(editor: Page, rgb: number[]): Promise<{ revision: number; asked: number; answered: number }> {
+  const patch = [{ op: 'replace', path: '/materials/@light/emissiveFactor', value: rgb }];
+  const { result, ...times } = await call(editor, [{ method: 'scene.patch', params: { patch } }]);
+  return { ...(result as { revision: number }), ...times };
+}
+
+/** A solve to a small error, from its beginning, in a page that is open already: of each tile, until it is seen. */
+export async function watchSolve(pages: Pages, scene: string): Promise<number[]> {
+  const TARGET_ERROR = 0.003;
+  const server = new Server(`${SCENES}/${scene}`);
+  await server.start();
+  try {
+    const page = await openProbed(pages, server.url);
+    await converged(page);
+    const editor = await pages.open(`${server.url}/status`, 100, 100);
+    await page.evaluate(() => (window.probe!.tileToPicture = []));
+    const settings = { method: 'solve.configure', params: { targetError: TARGET_ERROR } };
+    await call(editor, [settings, { method: 'solve.restart', params: {} }]);
+    await converged(page);
+    return await page.evaluate(() => window.probe!.tileToPicture);
+  } finally {
+    await pages.closeAll();
+    await server.stop('SIGTERM');
+  }
 }
 
 /** A lamp that somebody else recolours, seen in an open page; the solve comes to rest before the next. */

@@ -11,6 +11,8 @@ export interface Row {
 export interface Figures {
   rows: Row[];
   edits: Edit[];
+  /** From the arrival of each tile of a long solve to the picture with it. */
+  solve: number[];
   size: { packed: number; unpacked: number };
 }
 
@@ -23,7 +25,7 @@ const isLong = (value: number) => value > TARGETS.task;
 const met = (is: boolean) => (is ? 'met' : 'missed');
 
 /** Each figure over all openings: what is bounded, what came of it, and whether that is within bounds. */
-export function targetsTable({ rows, edits, size }: Figures): string {
+export function targetsTable({ rows, edits, solve, size }: Figures): string {
   const openings = all(rows);
   const light = openings.map((opening) => opening.light);
   const tiles = openings.flatMap((opening) => opening.tileToPicture);
@@ -37,7 +39,8 @@ export function targetsTable({ rows, edits, size }: Figures): string {
     ['figure: median (largest)', 'measured', 'target', ''],
     [
       ['first light after opening', `${spread(light)} ms`, `under ${TARGETS.light} ms`, met(most(light) < TARGETS.light)],
-      ['tile from its arrival to the screen, while a solve goes on', `${spread(tiles)} ms`, `under ${TARGETS.tile} ms`, met(median(tiles) < TARGETS.tile)],
+      ['tile from its arrival to the screen, while a solve goes on', `${spread(solve)} ms`, `under ${TARGETS.tile} ms`, met(median(solve) < TARGETS.tile)],
+      ['the same while the page itself is starting', `${spread(tiles)} ms`, `under ${TARGETS.tile} ms`, met(median(tiles) < TARGETS.tile)],
       ['tile from the edit that it shows to the screen', `${spread(relit)} ms`, `under ${TARGETS.tile} ms`, met(median(relit) < TARGETS.tile)],
       ['tasks over 50 ms while tiles arrive, by processor time', tasks(byProcessor), 'none', met(byProcessor.length === 0)],
       ['the same by the clock, other programs included', tasks(byClock), 'none', met(byClock.length === 0)],

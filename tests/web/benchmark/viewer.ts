@@ -5,8 +5,8 @@ import { cpus, loadavg } from 'node:os';
 import { join } from 'node:path';
 import { parseArgs } from 'node:util';
 import { Pages } from '../browser/harness';
-import { ms } from './figures';
-import { openLoading, openSolved, scriptSize, watchEdits, type Opening } from './measure';
+import { ms, spread } from './figures';
+import { openLoading, openSolved, scriptSize, watchEdits, watchSolve, type Opening } from './measure';
 import { editsTable, framesTable, openingsTable, targetsTable, type Figures, type Row } from './report';
 
 const USAGE = `Usage: ./dev bench viewer [OPTION...]
@@ -47,7 +47,8 @@ async function measureAll(pages: Pages, runs: number, edits: number): Promise<Fi
       rows.push(row(await stage(`${label}, ${how}`, () => open(pages, file, runs), told)));
     }
   const seen = await stage('edits', () => watchEdits(pages, SCENES[0]!.file, edits), editsTable);
-  return { rows, edits: seen, size: await scriptSize(pages, SCENES[0]!.file) };
+  const solve = await stage('a solve', () => watchSolve(pages, SCENES[0]!.file), (tiles) => `${tiles.length} tiles: ${spread(tiles)} ms`); // prettier-ignore
+  return { rows, edits: seen, solve, size: await scriptSize(pages, SCENES[0]!.file) };
 }
 
 async function main(): Promise<void> {

@@ -291,7 +291,7 @@ it('scales what is measured by its own values, to the last tile', async () => {
           const { view, viewer } = window.viewer!;
           if (view.mode.id !== mode) {
             void view.setMode(mode);
-            viewer.uniforms.all.falseColour.value = true;
+            viewer.uniforms.choose({ FALSE_COLOUR: 1 });
           }
           const set = mode === 'irradiance' ? viewer.shown!.set : viewer.dataSet;
           const all = set?.quantity === mode && set.complete && set.waiting === 0 ? set.range() : undefined;
@@ -414,7 +414,7 @@ it('follows a link that is opened in the same tab, to its place, view and colour
     page.evaluate(() => {
       const { view, viewer } = window.viewer!;
       const { x } = viewer.rig.camera.position;
-      return { mode: view.mode.id, colours: viewer.uniforms.all.falseColour.value, x: Number(x.toFixed(3)) };
+      return { mode: view.mode.id, colours: viewer.uniforms.defines.FALSE_COLOUR === 1, x: Number(x.toFixed(3)) };
     });
   const before = await state();
   expect(before).toEqual({ mode: 'lit', colours: false, x: 2 });

@@ -96,14 +96,14 @@ it('carries exposure, tone mapping and scale in a link, and shows them again', a
   const state = (p: Page) =>
     p.evaluate(() => {
       const { brightness, exposure, uniforms } = window.viewer!.viewer;
-      const { falseRange, toneCurve } = uniforms.all;
+      const { falseRange } = uniforms.all;
       const { automatic, base, stops } = exposure;
       return {
         mode: window.viewer!.view.mode.id,
         automatic,
         base: base.toPrecision(3),
         stops,
-        tone: toneCurve.value,
+        tone: uniforms.defines.TONE_CURVE,
         autoRange: brightness.autoRange,
         range: brightness.autoRange ? [] : falseRange.value.toArray(),
       };

@@ -119,7 +119,7 @@ export class Brightness {
     if (!this.rangeDue || now - this.lastRange < MEASURE_EVERY_MS) return;
     this.lastRange = now;
     this.rangeDue = false;
-    if (!this.picture.uniforms.all.falseColour.value) return;
+    if (!this.picture.uniforms.defines.FALSE_COLOUR) return;
     this.updateRange();
     this.picture.redraw();
   }

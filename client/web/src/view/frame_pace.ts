@@ -15,7 +15,7 @@ const MOST_COARSE_MS = 1000;
 const MOST_PAUSE_MS = 500;
 /** One is drawn while the next is made: more would only show what is asked for later. */
 const MOST_UNDER_WAY = 2;
-/** Of a whole frame, where the browser says that it draws without a card: 1280 x 720 on two cores, about. */
+/** Of a whole frame, where the browser says that it draws without a card: 2560 x 1600 on two cores, about. */
 const SOFTWARE_FRAME_MS = 300;
 /** A page that nobody looked at has not been told when its frames were done. */
 const LONGEST_FRAME_MS = 5000;

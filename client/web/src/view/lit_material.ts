@@ -16,17 +16,34 @@ import type { GltfMaterial } from '../document/gltf';
 import type { LightmapPage } from './lightmap_page';
 import { FRAGMENT_PARS, LIGHT_FRAGMENT, OUTPUT_FRAGMENT } from './lit_shader';
 
-/** Uniforms of all materials together. */
+/** What is compiled into programs, by its name there. */
+export type Defines = Readonly<Record<'VIEW_MODE' | 'TONE_CURVE' | 'FALSE_COLOUR', number>>;
+
+/** What all materials have in common. */
 export class ViewUniforms {
   readonly all = {
-    viewMode: { value: 0 },
-    toneCurve: { value: 0 },
     measuring: { value: false },
-    falseColour: { value: false },
     falseRange: { value: new Vector2(1, 1000) },
     previewLight: { value: 1 },
     toneMappingExposure: { value: 1 },
   };
+  /** Another object whenever something in it is another. */
+  defines: Defines = { VIEW_MODE: 0, TONE_CURVE: 0, FALSE_COLOUR: 0 };
+
+  /** Materials take it up when they are next refreshed. */
+  choose(change: Partial<Defines>): void {
+    const chosen = { ...this.defines, ...change };
+    const names = Object.keys(chosen) as (keyof Defines)[];
+    if (names.some((name) => chosen[name] !== this.defines[name])) this.defines = chosen;
+  }
+}
+
+/** Gives a material the program of the view that is chosen now. True: it had another. */
+export function specialise(material: Material, view: ViewUniforms): boolean {
+  if (material.defines === view.defines) return false;
+  material.defines = view.defines; // with those it had before three.js keeps the program, too
+  material.needsUpdate = true;
+  return true;
 }
 
 export class LitMaterial extends MeshLambertMaterial {
@@ -39,8 +56,13 @@ export class LitMaterial extends MeshLambertMaterial {
   dataPage: LightmapPage | undefined;
   private meanMetal = 1;
 
-  constructor(source: Material, view: ViewUniforms, page: LightmapPage | undefined) {
+  constructor(
+    source: Material,
+    private readonly view: ViewUniforms,
+    page: LightmapPage | undefined,
+  ) {
     super();
+    this.defines = view.defines;
     const from = source as MeshStandardMaterial;
     this.name = from.name;
     this.color.copy(from.color);
@@ -76,6 +98,11 @@ export class LitMaterial extends MeshLambertMaterial {
   /** One program for all of them: what differs is in defines that three.js knows of. */
   override customProgramCacheKey(): string {
     return 'radiosity';
+  }
+
+  /** For the view that is chosen now. True: it had the program of another. */
+  specialise(): boolean {
+    return specialise(this, this.view);
   }
 
   /** The page's scale may have grown since the last frame. */

@@ -121,6 +121,13 @@ export class LitScene {
     for (const material of this.made.values()) visit(material);
   }
 
+  /** For the view that is chosen now. True: some materials had the programs of another. */
+  specialise(): boolean {
+    let differed = false;
+    this.eachMaterial((material) => (differed = material.specialise() || differed));
+    return differed;
+  }
+
   pickable(): Object3D[] {
     return [this.root, ...this.lamps.values()];
   }

@@ -1,5 +1,6 @@
 // GLSL that turns a three.js Lambert material into one lit by pages of irradiance, with all the views of the scene.
-// One program serves all views, tone curves and the exposure meter, so that switching never waits for a compiler.
+// Each view and tone curve has a program of its own (ViewUniforms.defines): one for all of them took three times as long
+// for every pixel where software draws, which goes both ways of every branch. The exposure meter shares them.
 
 import { ShaderChunk } from 'three';
 import { glslList, MIP_STOPS, paletteGlsl } from './palette';
@@ -16,13 +17,11 @@ const float kNothing = 15.5;
 // The finest mip that all four texels of a bilinear lookup have.
 float residentMip(vec2 uv) {
   if (!pageLightShown && !measuring) return 255.0;
-  vec2 size = vec2(textureSize(pageResident, 0));
-  vec2 texel = 0.75 / pageSize;
-  vec2 tiles = pageSize / (pageTiles * size);
+  vec2 texel = 0.75 / pageSize, tiles = pageSize / pageTiles;
   float mip = 0.0;
   for (int i = 0; i < 4; ++i) {
     vec2 at = clamp(uv + texel * vec2((i & 1) != 0 ? 1.0 : -1.0, (i & 2) != 0 ? 1.0 : -1.0), vec2(0.0), vec2(0.9999));
-    mip = max(mip, texture(pageResident, at * tiles).r * 255.0);
+    mip = max(mip, texelFetch(pageResident, ivec2(at * tiles), 0).r * 255.0);
   }
   return mip;
 }
@@ -36,9 +35,7 @@ float lookupMip(vec2 uv, out float resident) {
 }`;
 
 const VIEW_PARS = `
-uniform int viewMode;
-uniform int toneCurve;       // 0 neutral, 1 ACES, 2 AgX, 3 none
-uniform bool falseColour;
+// VIEW_MODE: ViewMode.number; TONE_CURVE: 0 neutral, 1 ACES, 2 AgX, 3 none; FALSE_COLOUR: 0 or 1
 uniform vec2 falseRange;     // lowest and highest value of the legend, on a logarithmic scale
 uniform float previewLight;  // irradiance of surfaces that no light has been heard of yet
 ${paletteGlsl()}
@@ -51,10 +48,15 @@ vec3 encodeSrgb(vec3 c) {
 }
 
 vec3 toneMapped(vec3 radiance) {
-  if (toneCurve == 1) return ACESFilmicToneMapping(radiance);
-  if (toneCurve == 2) return AgXToneMapping(radiance);
-  if (toneCurve == 3) return radiance * toneMappingExposure;
-  return NeutralToneMapping(radiance);
+  #if TONE_CURVE == 0
+    return NeutralToneMapping(radiance);
+  #elif TONE_CURVE == 1
+    return ACESFilmicToneMapping(radiance);
+  #elif TONE_CURVE == 2
+    return AgXToneMapping(radiance);
+  #else
+    return radiance * toneMappingExposure;
+  #endif
 }
 
 // Half a step of the screen's 256, up or down, so that light that fades over a wall ends in no bands. The pattern is
@@ -64,9 +66,7 @@ vec3 dither() {
   return (fract(noise + vec3(0.0, 1.0, 2.0) / 3.0) - 0.5) / 255.0;
 }
 
-vec3 displayed(vec3 radiance) {
-  return measuring ? radiance : encodeSrgb(toneMapped(radiance)) + dither();
-}
+vec3 displayed(vec3 radiance) { return encodeSrgb(toneMapped(radiance)) + dither(); }
 
 vec3 measured(float value) {
   if (!(value > 0.0)) return kStops[0] * 0.5;  // NOTHING of palette.ts
@@ -125,31 +125,37 @@ export const OUTPUT_FRAGMENT = `
   #ifdef OPAQUE
     diffuseColor.a = 1.0;
   #endif
+  #if VIEW_MODE == 1 || VIEW_MODE == 5  // shownLight() of view_modes.ts
+    vec3 shownLight = pageIrradiance * RECIPROCAL_PI;
+  #else
+    vec3 shownLight = outgoingLight;
+  #endif
   vec3 shade = vec3(0.0);
-  bool isOfIrradiance = viewMode == 1 || viewMode == 5;  // shownLight() of view_modes.ts
-  if (viewMode == 0 || (measuring && !isOfIrradiance)) {
-    shade = displayed(outgoingLight);
-  } else if (viewMode == 1 || measuring) {
-    bool isFalse = falseColour && !measuring;
-    shade = isFalse ? measured(luminanceOf(pageIrradiance)) : displayed(pageIrradiance * RECIPROCAL_PI);
-  } else if (viewMode == 2) {
+  #if VIEW_MODE == 0
+    shade = displayed(shownLight);
+  #elif VIEW_MODE == 1 && FALSE_COLOUR == 1
+    shade = measured(luminanceOf(pageIrradiance));
+  #elif VIEW_MODE == 1
+    shade = displayed(shownLight);
+  #elif VIEW_MODE == 2
     shade = measured(luminanceOf(outgoingLight * PI));
-  } else if (viewMode == 3 || viewMode == 4) {
+  #elif VIEW_MODE == 3 || VIEW_MODE == 4
     #ifdef USE_LIGHTMAP
       shade = measured(luminanceOf(textureLod(dataPage, vLightMapUv, 0.0).rgb * dataScale));
     #endif
-  } else if (viewMode == 5) {
+  #elif VIEW_MODE == 5
     #ifdef USE_LIGHTMAP
       // Tints and lines take light away.
-      shade = patchColour(vLightMapUv, displayed(pageIrradiance * (1.6 * RECIPROCAL_PI)));
+      shade = patchColour(vLightMapUv, displayed(1.6 * shownLight));
     #endif
-  } else if (viewMode == 6) {
+  #elif VIEW_MODE == 6
     shade = mipColour(pageMip) * (0.7 + 0.3 * abs(normal.z));
-  } else if (viewMode == 7) {
+  #elif VIEW_MODE == 7
     shade = inverseTransformDirection(normal, viewMatrix) * 0.5 + 0.5;
-  } else {
+  #else
     shade = encodeSrgb(diffuseColor.rgb) * (0.82 + 0.18 * abs(normal.z)); // white before white has edges
-  }
+  #endif
+  if (measuring) shade = shownLight;
   gl_FragColor = vec4(shade, diffuseColor.a);
   #ifdef USE_LIGHTMAP
     if (measuring && resident > kNothing) gl_FragColor.a = 0.0; // what nothing is known of is no part of the picture
@@ -178,6 +184,10 @@ void main() {
   vec2 texel = (floor(vUv * pageSize) + 0.5) / pageSize;
   bool magnified = max(fwidth(vUv.x) * pageSize.x, fwidth(vUv.y) * pageSize.y) < 0.5;
   vec3 irradiance = textureLod(lightMap, magnified && resident < 0.5 ? texel : vUv, resident).rgb * lightMapIntensity;
-  vec3 shade = falseColour ? measured(luminanceOf(irradiance)) : displayed(irradiance * RECIPROCAL_PI);
+  #if FALSE_COLOUR == 1
+    vec3 shade = measured(luminanceOf(irradiance));
+  #else
+    vec3 shade = displayed(irradiance * RECIPROCAL_PI);
+  #endif
   gl_FragColor = vec4(resident > kNothing ? vec3(0.25) : shade, 1.0);
 }`;

@@ -2,7 +2,7 @@
 
 import { Box3, Mesh, OrthographicCamera, PlaneGeometry, Scene, ShaderMaterial, Vector2, Vector3 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
-import type { ViewUniforms } from './lit_material';
+import { specialise, type ViewUniforms } from './lit_material';
 import type { LightmapPage } from './lightmap_page';
 import type { LightmapSet } from './lightmap_set';
 import { FLAT_FRAGMENT, FLAT_VERTEX } from './lit_shader';
@@ -128,13 +128,17 @@ export class PagesView {
 
   refresh(): void {
     this.controls.update();
-    for (const { material, page } of this.made) material.uniforms['lightMapIntensity']!.value = page.scale;
+    for (const { material, page } of this.made) {
+      specialise(material, this.view);
+      material.uniforms['lightMapIntensity']!.value = page.scale;
+    }
   }
 
   private makeMesh(page: LightmapPage, largest: number): Mesh {
     const material = new ShaderMaterial({
       vertexShader: FLAT_VERTEX,
       fragmentShader: FLAT_FRAGMENT,
+      defines: this.view.defines,
       uniforms: {
         ...this.view.all,
         ...page.uniforms,

@@ -73,6 +73,7 @@ export class Viewer {
   private wanted = true;
   private lastFrame = 0;
   private lost = false;
+  private compiling = false;
   /** What is shown took the place of another scene's light. */
   private replaced = false;
   private document: Gltf = { asset: { version: '2.0' } };
@@ -82,7 +83,7 @@ export class Viewer {
     private readonly events: ViewerEvents,
   ) {
     this.renderer = new WebGLRenderer({ canvas, antialias: false, alpha: true, powerPreference: 'high-performance' });
-    this.renderer.toneMapping = NoToneMapping; // our shaders do it, and the encoding, so that one program serves all
+    this.renderer.toneMapping = NoToneMapping; // our shaders do it, and the encoding: they know which values are light
     this.renderer.outputColorSpace = LinearSRGBColorSpace;
     // Each answer about a program's text waits for all that the card has to do; a program that fails is heard of anyway.
     this.renderer.debug.checkShaderErrors = import.meta.env.DEV;
@@ -164,6 +165,17 @@ export class Viewer {
     await Promise.race([this.renderer.compileAsync(scene.root, this.rig.camera, this.world), timeUp]);
   }
 
+  /** True: another view was chosen, and its programs are being made. */
+  private recompile(): boolean {
+    if (!this.shown?.specialise()) return false;
+    this.compiling = true;
+    void this.compile(this.shown).finally(() => {
+      this.compiling = false;
+      this.wanted = true;
+    });
+    return true;
+  }
+
   /** The solve does not go on: where nothing has shone there is no light. */
   settleLight(): void {
     if (this.set?.lit !== false) return;
@@ -196,7 +208,7 @@ export class Viewer {
 
   setMode(mode: ViewMode): void {
     this.mode = mode;
-    this.uniforms.all.viewMode.value = mode.number;
+    this.uniforms.choose({ VIEW_MODE: mode.number });
     this.pagesView.active = mode.flat === true;
     this.rig.enabled = !mode.flat;
     this.gizmo.setVisible(!mode.flat);
@@ -278,6 +290,7 @@ export class Viewer {
     this.promote(now);
     if (this.rig.update(seconds)) this.invalidate();
     if (this.people?.step(seconds, this.rig.sceneSize * PERSON_SIZE)) this.wanted = true;
+    if (this.compiling || this.recompile()) return; // the last picture stays
     this.brightness.turn(now, this.replaced);
     if (this.exposure.step(seconds)) this.wanted = true;
     const streamed = this.dataSet ?? this.shown?.set;
@@ -297,6 +310,7 @@ export class Viewer {
   private draw(scale: number): void {
     this.scale = scale;
     if (!this.brightness.holdsLightBack(performance.now())) this.shown?.set.showLight();
+    this.shown?.specialise(); // where the picture cannot wait
     this.shown?.eachMaterial((material) => material.refresh());
     this.pagesView.refresh();
     this.people?.leaveOut(this.rig.camera);
@@ -341,6 +355,7 @@ export class Viewer {
   /** Ends when the picture has the exposure that the light there is now asks for. */
   async settle(): Promise<void> {
     while (this.shown && this.set?.waiting) await new Promise((resolve) => setTimeout(resolve, 20));
+    this.shown?.specialise();
     await this.brightness.settle();
     this.shown?.set.showLight();
     this.invalidate();
