@@ -9,6 +9,8 @@
 
 #include "server/scene/bounds.h"
 
+#include "common/give_back.h"
+
 namespace radiosity::scene {
 namespace {
 
@@ -110,7 +112,7 @@ Bvh::Bvh(std::vector<Triangle> triangles) : triangles_(std::move(triangles)), or
   centres_.reserve(triangles_.size());
   for (const auto& t : triangles_) centres_.push_back((t[0] + t[1] + t[2]) / 3.0F);
   build();
-  centres_ = {};
+  giveBack(centres_);
   std::vector<Triangle> ordered;  // leaf after leaf, as rays ask for them
   ordered.reserve(triangles_.size());
   for (const auto index : order_) ordered.push_back(triangles_[index]);

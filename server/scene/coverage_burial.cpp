@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "common/give_back.h"
 #include "common/parallel.h"
 #include "server/scene/coverage.h"
 #include "server/scene/solids.h"
@@ -265,7 +266,7 @@ class Burial {
                        (found.buried ? found.buried->places.size() * sizeof(LeafSpot) : 0);
     is_too_much_ = recorded_bytes_ > kMostRecordedBytes || record_.leaves.size() >= kMostRecorded;
     if (is_too_much_) {
-      record_.leaves = {};
+      giveBack(record_.leaves);
     } else {
       record_.leaves.push_back({leafOf(contact), contact.side, pass, std::move(*found.fans), found.buried});
     }

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "common/clones.h"
+#include "common/give_back.h"
 #include "server/solver/halves.h"
 
 namespace radiosity::solver {
@@ -45,8 +46,9 @@ RADIOSITY_CLONES void averageSeen(const LeafSights& sights, std::size_t half, co
 }  // namespace
 
 LeafGather::LeafGather(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed,
-                       std::size_t most_bytes)
-    : sights_(patches, sides, seed), most_bytes_(most_bytes), sides_(sides) {
+                       std::size_t most_bytes, std::shared_ptr<const LeafRays> rays)
+    : sights_(patches, sides, seed, std::move(rays)), most_bytes_(most_bytes), sides_(sides) {
+  area_.reserve(sights_.leafCount());
   for (const auto& side : sides) {
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
       area_.push_back(static_cast<double>(patches.node_area[side.first_node + leaf]));
@@ -209,7 +211,6 @@ void LeafGather::sweep(std::size_t h, Gmres::Vectors& x, bool affine) {
 
 /// How much of their light leaves lose, and which sides see each other, if over others.
 void LeafGather::weighRays() {
-  const auto counts = sights_.counts();
   part_.resize(sides_.size());
   std::iota(part_.begin(), part_.end(), 0U);
   const auto root = [&](std::uint32_t side) {
@@ -224,23 +225,24 @@ void LeafGather::weighRays() {
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
     for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
       for (std::size_t half = 0; half < 2; ++half) {
-        std::uint32_t above = 0, below = 0, absorbed = 0, doubtful = 0;
+        LostRays lost;
         for (const auto end : sights_.seen(half, v)) {
-          above += end == sights_.skyAbove() ? 1 : 0;
-          below += end == sights_.skyBelow() ? 1 : 0;
-          absorbed += end == sights_.absorbed() ? 1 : 0;
+          if (end == sights_.skyAbove()) ++lost.above;
+          if (end == sights_.skyBelow()) ++lost.below;
+          if (end == sights_.absorbed()) ++lost.absorbed;
           if (end < sights_.leafCount()) join(s, sights_.sideOf(end));
           if (end < sights_.endCount()) continue;
           join(s, sights_.sideOf(sights_.steps(half)[end - sights_.endCount()].by));
-          doubtful += sights_.isDoubtful(half, end) ? 1 : 0;
+          if (sights_.isDoubtful(half, end)) ++lost.doubtful;
         }
-        const float one = counts[v] > 0 ? 1.0F / static_cast<float>(counts[v]) : 0.0F;
-        lost_[half][v] = {static_cast<float>(above) * one, static_cast<float>(below) * one,
-                          static_cast<float>(absorbed) * one, static_cast<float>(doubtful) * one};
+        lost_[half][v] = lost;
       }
     }
   }
   for (std::size_t half = 0; half < 2; ++half) {
+    // Of a closed room nothing is lost.
+    if (std::ranges::all_of(lost_[half], [](const LostRays& lost) { return lost == LostRays{}; }))
+      giveBack(lost_[half]);
     const auto steps = sights_.steps(half);
     for (const auto& step : steps) {
       const auto next = step.next < sights_.endCount() ? step.next : steps[step.next - sights_.endCount()].by;
@@ -258,8 +260,8 @@ double LeafGather::solved(std::size_t h, std::size_t c, std::size_t v) const {
 /// What comes straight from the sky, by rays as they are.
 double LeafGather::skyAt(std::size_t h, std::size_t c, std::size_t v) const {
   const auto i = static_cast<int>(c);
-  return static_cast<double>(lost_[h][v].above) * light_.sky[0][i] +
-         static_cast<double>(lost_[h][v].below) * light_.sky[1][i];
+  const auto lost = lostOf(h, v);
+  return static_cast<double>(lost.above) * light_.sky[0][i] + static_cast<double>(lost.below) * light_.sky[1][i];
 }
 
 /// By part of the scene and channel: what makes
@@ -276,7 +278,8 @@ LeafGather::Levels LeafGather::levels(std::size_t h) const {
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
     auto& sum = sums[part_[s]];
     for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
-      const double sends = 1.0 - lost_[h][v].escaped() - static_cast<double>(lost_[h][v].absorbed);
+      const auto lost = lostOf(h, v);
+      const double sends = 1.0 - lost.escaped() - static_cast<double>(lost.absorbed);
       for (std::size_t c = 0; c < 3 && area_[v] > 0.0; ++c) {
         const auto i = static_cast<int>(c);
         const double x = solved(h, c, v), over_links = static_cast<double>(light_.irradiance[h][v][i]);
@@ -407,7 +410,7 @@ void LeafGather::weighMissed(const std::array<Levels, 2>& levels) {
 void LeafGather::weighDoubt() {
   doubt_ = 0.0;
   for (std::uint32_t v = 0; v < sights_.leafCount(); ++v) {
-    const float part = 0.5F * (lost_[0][v].doubtful + lost_[1][v].doubtful);
+    const float part = 0.5F * (lostOf(0, v).doubtful + lostOf(1, v).doubtful);
     if (part <= 0.0F) continue;
     const glm::vec3 brought = 0.5F * part * (gathered_[0][v] + gathered_[1][v]);
     const float square = glm::dot(brought, brought);
@@ -422,7 +425,7 @@ void LeafGather::weighLost() {
   escaped_ = absorbed_ = from_sky_ = {};
   for (std::size_t half = 0; half < 2; ++half) {
     for (std::uint32_t v = 0; v < sights_.leafCount(); ++v) {
-      const auto& lost = lost_[half][v];
+      const auto lost = lostOf(half, v);
       if (lost.escaped() <= 0.0 && lost.absorbed <= 0.0F) continue;
       for (std::size_t c = 0; c < 3; ++c) {
         const double flux = 0.5 * area_[v] * halves_[half].radiosity[v][c];

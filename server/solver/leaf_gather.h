@@ -22,6 +22,7 @@
 #include <cmath>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -43,8 +44,9 @@ struct LeftLight {
 class LeafGather {
  public:
   /// `most_bytes`: for all that it remembers; rays that would take more are not asked for.
+  /// `rays`: as of LeafSights.
   LeafGather(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed,
-             std::size_t most_bytes);
+             std::size_t most_bytes, std::shared_ptr<const LeafRays> rays = nullptr);
 
   /// What the equation takes at most, without rays, and with those that a solve begins with.
   [[nodiscard]] static std::size_t leastBytes(std::size_t leaves);
@@ -69,8 +71,9 @@ class LeafGather {
   /// Those are given up, where there are others.
   void giveUp() { sights_.giveUp(); }
 
-  /// x, to be added to what came over links.
+  /// x, to be added to what came over links. Until it is forgotten.
   [[nodiscard]] std::span<const glm::vec3> irradiance(std::size_t half) const { return gathered_[half]; }
+  void forgetIrradiance() { gathered_ = {}; }
   /// Square of the error that rays leave in the mean of the halves: sum over leaves and channels, times area.
   [[nodiscard]] double noise() const { return noise_; }
   /// Of it, but for what smoothing took: more rays lower this part.
@@ -167,14 +170,26 @@ class LeafGather {
   const std::vector<Side>& sides_;
   std::vector<double> area_;  ///< by leaf value
   // Of the rays that there are:
+  /// Of a leaf's rays: into the sky, on unlit sides, and of which it is not told where they end.
+  struct LostRays {
+    std::uint16_t above = 0, below = 0, absorbed = 0, doubtful = 0;
+    bool operator==(const LostRays&) const = default;
+  };
+  /// As parts of all of them.
   struct Lost {
-    // Parts of a leaf's rays: into the sky, on unlit sides, and of which it is not told where they end.
     float above = 0.0F, below = 0.0F, absorbed = 0.0F, doubtful = 0.0F;
     [[nodiscard]] double escaped() const { return static_cast<double>(above) + static_cast<double>(below); }
   };
-  bool is_weighed_ = false;                ///< the following are known
-  std::array<std::vector<Lost>, 2> lost_;  ///< by half and leaf value
-  std::vector<std::uint32_t> part_;        ///< by side: which part of the scene, whose number is that of a side
+  [[nodiscard]] Lost lostOf(std::size_t half, std::size_t value) const {
+    const auto count = sights_.counts()[value];
+    if (lost_[half].empty() || count == 0) return {};
+    const auto part = [one = 1.0F / static_cast<float>(count)](std::uint16_t rays) { return rays * one; };
+    const auto& rays = lost_[half][value];
+    return {part(rays.above), part(rays.below), part(rays.absorbed), part(rays.doubtful)};
+  }
+  bool is_weighed_ = false;                    ///< the following are known
+  std::array<std::vector<LostRays>, 2> lost_;  ///< by half and leaf value; empty: none
+  std::vector<std::uint32_t> part_;            ///< by side: which part of the scene, whose number is that of a side
   LeftLight light_;
   Stage stage_ = Stage::kDone;
   std::array<Half, 2> halves_;

@@ -45,6 +45,9 @@ LeafRays::LeafRays(const scene::PatchScene& patches, const std::vector<Side>& si
     triangles[i / 3][i % 3] = patches.vertices[patches.indices[i]].position;
   tree_ = scene::Bvh(std::move(triangles));
   wide_ = scene::RayTree(tree_);
+  std::size_t leaves = 0;
+  for (const auto& side : sides) leaves += side.leaf_count;
+  side_of_value_.reserve(leaves);
   for (std::uint32_t s = 0; s < sides.size(); ++s) {
     side_of_value_.insert(side_of_value_.end(), sides[s].leaf_count, s);
     side_of_[sides[s].surface][sides[s].side] = s;
@@ -54,6 +57,8 @@ LeafRays::LeafRays(const scene::PatchScene& patches, const std::vector<Side>& si
 }
 
 void LeafRays::findStandIns() {
+  stand_in_.reserve(side_of_value_.size());
+  is_cut_.reserve(side_of_value_.size());
   for (const auto& side : sides_) {
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
       const bool whole = patches_.node_area[side.first_node + leaf] > 0.0F;

@@ -36,8 +36,11 @@ bool meetsBox(const scene::ChangedBox& box, const glm::dvec3& from, const glm::d
 
 }  // namespace
 
-LeafSights::LeafSights(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed)
-    : sides_(sides), rays_(patches, sides), seed_(mixKeys(seed, 0x53494748ULL)) {
+LeafSights::LeafSights(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed,
+                       std::shared_ptr<const LeafRays> rays)
+    : sides_(sides),
+      rays_(rays ? std::move(rays) : std::make_shared<const LeafRays>(patches, sides)),
+      seed_(mixKeys(seed, 0x53494748ULL)) {
   for (const auto& side : sides) leaf_count_ = std::max(leaf_count_, side.first_value + side.leaf_count);
   count_.assign(leaf_count_, 0);
   before_ = count_;
@@ -59,7 +62,7 @@ void LeafSights::layOut(std::span<const std::uint16_t> counts) {
   std::size_t all = 0;
   for (std::uint32_t value = 0; value < leaf_count_; ++value) {
     first[value] = all;
-    if (rays_.areaOf(value) > 0.0) count[value] = counts[value];
+    if (rays_->areaOf(value) > 0.0) count[value] = counts[value];
     all += count[value];
   }
   std::array<std::vector<std::uint32_t>, 2> seen;
@@ -106,13 +109,13 @@ std::uint32_t LeafSights::endOfRay(LeafRays::Place place, glm::dvec3 direction, 
   std::array<std::uint32_t, kMostSteps> by{};
   std::size_t count = 0;
   LeafRays::Place there;
-  auto seen = rays_.see(place, direction, key, there);
-  while (count < kMostSteps && seen < leaf_count_ && seen == there.value && rays_.isCut(seen)) {
+  auto seen = rays_->see(place, direction, key, there);
+  while (count < kMostSteps && seen < leaf_count_ && seen == there.value && rays_->isCut(seen)) {
     by[count++] = seen;
     key = mixKeys(key, count);
     const auto draw = sobol4(0, key);
     place = there;
-    seen = rays_.see(place, cosineDirection(place.normal, draw.x, draw.y), key, there);
+    seen = rays_->see(place, cosineDirection(place.normal, draw.x, draw.y), key, there);
   }
   std::uint32_t end = seen == LeafRays::kSkyAbove   ? skyAbove()
                       : seen == LeafRays::kSkyBelow ? skyBelow()
@@ -128,7 +131,7 @@ std::uint32_t LeafSights::endOfRay(LeafRays::Place place, glm::dvec3 direction, 
 bool LeafSights::isDoubtful(std::size_t half, std::uint32_t end) const {
   std::size_t count = 0;
   for (; end >= endCount(); ++count) end = steps_[half][end - endCount()].next;
-  return count == kMostSteps && end < leaf_count_ && rays_.isCut(end);
+  return count == kMostSteps && end < leaf_count_ && rays_->isCut(end);
 }
 
 std::uint32_t LeafSights::traceLeaf(std::uint32_t value, const Side& side, std::size_t half, NewSteps& made) {
@@ -140,7 +143,7 @@ std::uint32_t LeafSights::traceLeaf(std::uint32_t value, const Side& side, std::
   for (std::uint32_t k = 0; k < seen.size(); ++k) {
     if (seen[k] != kUntraced) continue;
     const auto at = draw(k);
-    const auto place = rays_.placeOn(value, {at.z, at.w});
+    const auto place = rays_->placeOn(value, {at.z, at.w});
     const auto end = endOfRay(place, cosineDirection(place.normal, at.x, at.y), mixKeys(chance, k), made.steps);
     if (end >= endCount()) made.rays.push_back(first_[value] + k);
     seen[k] = end;
@@ -179,7 +182,7 @@ void LeafSights::traceSlice(std::uint32_t end) {
         std::uint64_t rays = 0;
         for (auto value = from; value < std::min(end, from + kLeavesAtOnce); ++value) {
           if (count_[value] == 0) continue;
-          const Side& side = rays_.sideOf(value);
+          const Side& side = rays_->sideOf(value);
           for (std::size_t half = 0; half < 2; ++half) rays += traceLeaf(value, side, half, made[part][half]);
         }
         traced += rays;
@@ -203,11 +206,13 @@ bool LeafSights::trace(double seconds) {
     traceSlice(std::min(leaf_count_, cursor_ + kLeavesASlice));
     if (std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() >= seconds) break;
   }
-  return isTraced();
+  if (!isTraced()) return false;
+  for (auto& half : steps_) half.shrink_to_fit();  // they grew by doubling
+  return true;
 }
 
 bool LeafSights::isPassed(const Shadows& change, std::uint32_t value, const glm::dvec4& draw) const {
-  const auto place = rays_.placeOn(value, {draw.z, draw.w});
+  const auto place = rays_->placeOn(value, {draw.z, draw.w});
   const auto direction = cosineDirection(place.normal, draw.x, draw.y);
   return std::ranges::any_of(change.change().boxes,
                              [&](const scene::ChangedBox& box) { return meetsBox(box, place.position, direction); });
@@ -216,7 +221,7 @@ bool LeafSights::isPassed(const Shadows& change, std::uint32_t value, const glm:
 /// Whether something of it lies in the box around two leaves, so that a ray from one to the other may pass it.
 bool LeafSights::isBetween(const Shadows& change, std::uint32_t one, std::uint32_t other) const {
   scene::Bounds around;
-  if (!rays_.addTo(around, one) || !rays_.addTo(around, other)) return true;
+  if (!rays_->addTo(around, one) || !rays_->addTo(around, other)) return true;
   return std::ranges::any_of(change.change().boxes, [&](const scene::ChangedBox& box) {
     for (int axis = 0; axis < 3; ++axis) {
       if (static_cast<double>(box.low[axis]) - kMargin > static_cast<double>(around.max[axis]) ||
@@ -247,11 +252,11 @@ std::uint32_t LeafSights::inheritStep(const LeafSights& former, std::size_t half
 void LeafSights::forgetStandIns(const LeafSights& former, std::vector<std::uint32_t>& value_after) const {
   const auto after = value_after;
   for (std::uint32_t before = 0; before < former.leaf_count_; ++before) {
-    const auto stood_in = former.rays_.standInOf(before);
+    const auto stood_in = former.rays_->standInOf(before);
     if (stood_in == before) continue;
     const auto seen = stood_in == LeafRays::kNothing ? former.absorbed() : stood_in;
     const auto here = after[before];
-    const auto now = here == kUntraced ? LeafRays::kNothing : rays_.standInOf(here);
+    const auto now = here == kUntraced ? LeafRays::kNothing : rays_->standInOf(here);
     const bool is_same = here != kUntraced && (now == LeafRays::kNothing ? absorbed() : now) == after[seen];
     if (!is_same) value_after[seen] = kUntraced;
   }
@@ -282,7 +287,7 @@ void LeafSights::inherit(const LeafSights& former, std::span<const std::uint32_t
     for (std::uint32_t value = 0; value < leaf_count_; ++value) {
       const auto before = value_before[value];
       if (count_[value] == 0 || before == scene::kNone || former.count_[before] == 0) continue;
-      const auto draw = draws(value, rays_.sideOf(value), half);
+      const auto draw = draws(value, rays_->sideOf(value), half);
       const auto old =
           std::span(former.seen_[half]).subspan(former.first_[before], std::min(former.count_[before], count_[value]));
       for (std::uint32_t k = 0; k < old.size(); ++k) {

@@ -9,6 +9,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -23,7 +24,9 @@ class LeafSights {
   /// More rays no half of a leaf ever has.
   static constexpr std::uint32_t kMostRays = 16'384;
 
-  LeafSights(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed);
+  /// `rays`: of the same two, where there are some already.
+  LeafSights(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed,
+             std::shared_ptr<const LeafRays> rays = nullptr);
 
   /// Leaf values. What is seen is one of them, below this, or absorbed(), or the sky, above the horizon or below.
   [[nodiscard]] std::uint32_t leafCount() const { return leaf_count_; }
@@ -42,7 +45,7 @@ class LeafSights {
   [[nodiscard]] bool isDoubtful(std::size_t half, std::uint32_t end) const;
 
   /// Index of the side of a leaf.
-  [[nodiscard]] std::uint32_t sideOf(std::uint32_t value) const { return rays_.indexOfSide(value); }
+  [[nodiscard]] std::uint32_t sideOf(std::uint32_t value) const { return rays_->indexOfSide(value); }
 
   /// How many rays each half of a leaf has, by leaf value; 0 where it has no area.
   [[nodiscard]] std::span<const std::uint16_t> counts() const { return count_; }
@@ -104,7 +107,7 @@ class LeafSights {
                             std::span<const std::uint32_t> value_after, const Shadows& change);
 
   const std::vector<Side>& sides_;
-  LeafRays rays_;
+  std::shared_ptr<const LeafRays> rays_;
   std::uint64_t seed_;
   std::uint32_t leaf_count_ = 0;
   std::uint32_t cursor_ = 0;                   ///< leaves below are traced

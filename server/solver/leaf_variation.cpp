@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "common/give_back.h"
 #include "server/solver/halves.h"
 #include "server/solver/sampling.h"
 
@@ -34,8 +35,11 @@ glm::dvec3 all(const Lack& lack) {
 
 }  // namespace
 
-LeafVariation::LeafVariation(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed)
-    : sides_(sides), rays_(patches, sides), seed_(mixKeys(seed, 0x4c454146ULL)) {
+LeafVariation::LeafVariation(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed,
+                             std::shared_ptr<const LeafRays> rays)
+    : sides_(sides),
+      rays_(rays ? std::move(rays) : std::make_shared<const LeafRays>(patches, sides)),
+      seed_(mixKeys(seed, 0x4c454146ULL)) {
   for (const auto& side : sides) {
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
       if (patches.node_area[side.first_node + leaf] > 0.0F) receivers_.push_back(side.first_value + leaf);
@@ -92,7 +96,7 @@ void LeafVariation::update(const LeafLight& light, double bound) {
   }
   trace(wanted_, light);
   wanted_.clear();
-  for (auto& half : correction_) half = {};
+  for (auto& half : correction_) giveBack(half);
   sumUp(light);
   // Until it is known: all receivers get more of them.
   const auto fewest = [&] { return count_.empty() ? kEvenPaths : std::uint32_t{*std::ranges::min_element(count_)}; };
@@ -105,9 +109,9 @@ void LeafVariation::update(const LeafLight& light, double bound) {
   }
   left_ = std::max(0.0, found_);
   noise_ = 0.0;
-  gain_ = {};
+  giveBack(gain_);
   if (stands_for_ == 1.0 && found_ + deviation_ > bound) correct();
-  for (auto& half : lacking_) half = {};
+  for (auto& half : lacking_) giveBack(half);
 }
 
 void LeafVariation::sumUp(const LeafLight& light) {
@@ -129,7 +133,7 @@ void LeafVariation::sumUp(const LeafLight& light) {
     // The halves are independent, so that their noise cancels in the product.
     const double product = glm::dot(all(lacking_[0][value]), all(lacking_[1][value]));
     if (product == 0.0) continue;
-    const double here = rays_.areaOf(value) * product;
+    const double here = rays_->areaOf(value) * product;
     sum += here;
     squares += here * here;
   }
@@ -154,7 +158,7 @@ void LeafVariation::weigh(const Side& side) {
     const auto &first = lacking_[0][side.first_value + leaf], &second = lacking_[1][side.first_value + leaf];
     const glm::dvec3 one = all(first), other = all(second), doubtful(0.5F * (first.doubtful + second.doubtful));
     if (one == glm::dvec3(0.0) && other == glm::dvec3(0.0)) continue;
-    const double area = rays_.areaOf(side.first_value + leaf);
+    const double area = rays_->areaOf(side.first_value + leaf);
     signal[leaf] = area * glm::dot(one, other);
     noise[leaf] = 0.25 * area * glm::dot(one - other, one - other);
     doubt[leaf] = area * glm::dot(doubtful, doubtful);

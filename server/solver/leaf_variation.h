@@ -13,6 +13,7 @@
 #include <array>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -35,7 +36,9 @@ struct LeafLight {
 
 class LeafVariation {
  public:
-  LeafVariation(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed);
+  /// `rays`: of the same two, where there are some already.
+  LeafVariation(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed,
+                std::shared_ptr<const LeafRays> rays = nullptr);
 
   /// After an edit of geometry, before the first update(): what the paths of the scene before have found.
   /// `value_before`: by leaf value, what it was there, or kNone. `clear`: by leaf value, whether it is one of them, and
@@ -147,7 +150,7 @@ class LeafVariation {
   [[nodiscard]] std::vector<Task> twiceAsMany() const;
 
   const std::vector<Side>& sides_;
-  LeafRays rays_;
+  std::shared_ptr<const LeafRays> rays_;
   std::uint64_t seed_;
   std::vector<std::uint32_t> receivers_;        ///< leaf values, ascending
   double stands_for_ = 1.0;                     ///< leaves, for each receiver

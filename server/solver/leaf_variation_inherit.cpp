@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <glm/geometric.hpp>
 
+#include "common/give_back.h"
 #include "server/solver/halves.h"
 #include "server/solver/leaf_variation.h"
 
@@ -85,7 +86,7 @@ const LeafVariation::Known* LeafVariation::findKnown(std::uint32_t receiver, std
 }
 
 void LeafVariation::forgetFormer() {
-  known_ = {};
+  giveBack(known_);
   there_ = {};
   kept_ = {};
 }

@@ -98,7 +98,7 @@ void LeafVariation::followLight(const std::array<Place, 2>& places, std::uint64_
   for (std::size_t p = 0; p < 2; ++p) {
     // Of a lamp that the place's plane cuts only what lies before it is seen: points behind it stand for nothing.
     const bool before = glm::dot(point - places[p].position, places[p].normal) > 0.0;
-    if (drawn.unhidden[p] <= 0.0 || !before || !rays_.isOpen(places[p], point)) continue;
+    if (drawn.unhidden[p] <= 0.0 || !before || !rays_->isOpen(places[p], point)) continue;
     const auto seen =
         formFactorInFront(places[p].position, places[p].normal, std::span(lamp.corners.data(), lamp.corner_count));
     if (seen.front > 0.0) factor += (p == 0 ? 1.0 : -1.0) * seen.value / seen.front;
@@ -118,30 +118,30 @@ void LeafVariation::followSource(const std::array<Place, 2>& places, std::uint64
   double factor = 0.0;
   for (std::size_t p = 0; p < 2; ++p) {
     const auto to = places[p].position + wayTo(light.sources[drawn.index], places[p]);
-    if (drawn.unhidden[p] > 0.0 && rays_.isOpen(places[p], to)) factor += (p == 0 ? 1.0 : -1.0) * drawn.unhidden[p];
+    if (drawn.unhidden[p] > 0.0 && rays_->isOpen(places[p], to)) factor += (p == 0 ? 1.0 : -1.0) * drawn.unhidden[p];
   }
   path.source = drawn.index;
   path.source_factor = static_cast<float>(factor / drawn.chance);
 }
 
-double LeafVariation::nearest() const { return kNear * rays_.greatestWidth(); }
+double LeafVariation::nearest() const { return kNear * rays_->greatestWidth(); }
 
 bool LeafVariation::isNear(const LeafRays::Sight& sight) const {
-  return sight.end.value < LeafRays::kSkyBelow && sight.distance <= kNear * rays_.widthOf(sight.end.value);
+  return sight.end.value < LeafRays::kSkyBelow && sight.distance <= kNear * rays_->widthOf(sight.end.value);
 }
 
 /// Where a path passes the leaf near by, and the other place of that. False: no leaf is near that way.
 bool LeafVariation::findPlaces(std::uint32_t receiver, std::uint64_t key, std::array<Place, 2>& places) const {
   const glm::dvec4 at = sobol4(0, key), first = sobol4(0, mixKeys(key, 1));
-  const auto from = rays_.placeOn(receiver, {at.x, at.y});
-  const auto sight = rays_.look(from, cosineDirection(from.normal, first.x, first.y), kNear * rays_.greatestWidth());
+  const auto from = rays_->placeOn(receiver, {at.x, at.y});
+  const auto sight = rays_->look(from, cosineDirection(from.normal, first.x, first.y), kNear * rays_->greatestWidth());
   if (!isNear(sight)) return false;
-  places = {sight.end, rays_.placeOn(sight.end.value, {first.z, first.w})};
+  places = {sight.end, rays_->placeOn(sight.end.value, {first.z, first.w})};
   return true;
 }
 
 void LeafVariation::follow(const Task& task, std::size_t half, const LeafLight& light, std::vector<Path>& paths) const {
-  const Side& side = rays_.sideOf(task.receiver);
+  const Side& side = rays_->sideOf(task.receiver);
   const auto leaf_key = mixKeys(mixKeys(seed_, side.key), task.receiver - side.first_value);
   std::array<Place, 2> places;
   for (auto k = task.first; k < task.end; ++k) {
@@ -161,7 +161,7 @@ void LeafVariation::follow(const Task& task, std::size_t half, const LeafLight& 
     path.by = places[0].value;
     const glm::dvec4 second = sobol4(0, mixKeys(path.key, 2));
     for (std::size_t p = 0; p < 2; ++p) {
-      const auto seen = rays_.look(places[p], cosineDirection(places[p].normal, second.x, second.y));
+      const auto seen = rays_->look(places[p], cosineDirection(places[p].normal, second.x, second.y));
       path.seen[p] = seen.end.value;
       path.sees_near = path.sees_near || isNear(seen);
     }
@@ -250,7 +250,7 @@ LeafVariation::Lack LeafVariation::lacking(const Path& path, const LeafLight& li
   glm::vec3 direct(0.0F);
   if (path.light_factor != 0.0F) direct += path.light_factor * light.lights[path.light].emission;
   if (path.source_factor != 0.0F) direct += path.source_factor * glm::vec3(light.sources[path.source].intensity);
-  const bool is_known = light.by_rays && rays_.isCut(path.by);
+  const bool is_known = light.by_rays && rays_->isCut(path.by);
   const auto reflected = is_known ? glm::vec3(0.0F) : radiosity(path.seen[0]) - radiosity(path.seen[1]);
   const glm::vec3 by = light.reflectance[path.by];
   if (path.sees_near) return {by * direct, by * reflected};

@@ -104,8 +104,13 @@ std::vector<bool> LinkedSolver::lightOverLinks() const {
   return has_light;
 }
 
+std::shared_ptr<const LeafRays> LinkedSolver::leafRays() {
+  if (!leaf_rays_) leaf_rays_ = std::make_shared<const LeafRays>(*patches_, sides_);
+  return leaf_rays_;
+}
+
 void LinkedSolver::startRays() {
-  gather_ = std::make_unique<LeafGather>(*patches_, sides_, settings_.seed, settings_.link_memory / 2);
+  gather_ = std::make_unique<LeafGather>(*patches_, sides_, settings_.seed, settings_.link_memory / 2, leafRays());
 }
 
 LeftLight LinkedSolver::leftLight() const {

@@ -196,7 +196,7 @@ void LinkedSolver::planRepairsOf(const Shooter& from, std::uint32_t old_index, s
 
 /// Where nothing changed near a leaf, what its paths meet there is what they met.
 void LinkedSolver::inheritVariation(const LinkedSolver& former, const Renumbering& numbers) {
-  next_variation_ = std::make_unique<LeafVariation>(*patches_, sides_, settings_.seed);
+  next_variation_ = std::make_unique<LeafVariation>(*patches_, sides_, settings_.seed, leafRays());
   const auto reach = static_cast<float>(std::max(next_variation_->nearest(), former.variation_->nearest()));
   const auto& change = shadows_->change();
   std::vector<std::uint32_t> value_before(change.altered.size(), scene::kNone);

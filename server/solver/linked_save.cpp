@@ -130,7 +130,7 @@ bool LinkedSolver::restore(ArchiveReader& from) {
   bool varies = false;
   from(varies);
   if (varies) {
-    variation_ = std::make_unique<LeafVariation>(*patches_, sides_, settings_.seed);
+    variation_ = std::make_unique<LeafVariation>(*patches_, sides_, settings_.seed, leafRays());
     LeafVariation::visit(from, *variation_);
     if (!variation_->isWhole()) return false;
   }

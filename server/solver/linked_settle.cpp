@@ -60,6 +60,7 @@ bool LinkedSolver::lightLeaves() {
   for (std::size_t half = 0; half < 2 && gather_; ++half) {
     for (std::size_t v = 0; v < half_[half].size(); ++v) half_[half][v] += gather_->irradiance(half)[v];
   }
+  if (gather_) gather_->forgetIrradiance();
   pass_ = Pass::kNone;
   findUnshot();
   if (variation_) updateVariation();

@@ -234,6 +234,7 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] LeftLight leftLight() const;
   [[nodiscard]] std::vector<bool> lightOverLinks() const;
   void startRays();
+  [[nodiscard]] std::shared_ptr<const LeafRays> leafRays();
   void inheritRays(const LinkedSolver& former, const Renumbering& numbers);
   [[nodiscard]] StepOutcome chooseRays();
   [[nodiscard]] bool refineBlotches();
@@ -263,19 +264,20 @@ class LinkedSolver final : public Solver {
   LinkMemory memory_;
   UnshotPyramid unshot_;
   LinkPlanner planner_;
-  bool by_rays_ = false;                // reflected light, but for what is bright and small
-  std::unique_ptr<LeafGather> gather_;  // then: once lights, and that, are measured
-  double sampled_alone_ = 0.0;          // error before the last round that brought samples and no rays; 0: none did
-  double sample_goal_ = 0.0;            // sampling error that further samples of links shall reach; 0: none
-  std::vector<Repair> repairs_;         // after an edit of geometry
-  std::size_t repaired_ = 0;            // of these
-  std::size_t due_ = 0;                 // of these, before anything else is done
-  double repair_shot_seconds_ = 0.0;    // as the last of them took; 0: not known
-  double postponed_ = 0.0;              // part of the target error that the others may cause
-  double roughness_ = 0.0;              // likewise: lights that look again with some points only
-  bool lights_may_be_rough_ = true;     // that they may
-  double norm_before_ = 0.0;            // of irradiance before the edit; 0: not known
-  std::unique_ptr<Shadows> shadows_;    // of the edit
+  std::shared_ptr<const LeafRays> leaf_rays_;  // of rays and paths; null: not asked for yet
+  bool by_rays_ = false;                       // reflected light, but for what is bright and small
+  std::unique_ptr<LeafGather> gather_;         // then: once lights, and that, are measured
+  double sampled_alone_ = 0.0;        // error before the last round that brought samples and no rays; 0: none did
+  double sample_goal_ = 0.0;          // sampling error that further samples of links shall reach; 0: none
+  std::vector<Repair> repairs_;       // after an edit of geometry
+  std::size_t repaired_ = 0;          // of these
+  std::size_t due_ = 0;               // of these, before anything else is done
+  double repair_shot_seconds_ = 0.0;  // as the last of them took; 0: not known
+  double postponed_ = 0.0;            // part of the target error that the others may cause
+  double roughness_ = 0.0;            // likewise: lights that look again with some points only
+  bool lights_may_be_rough_ = true;   // that they may
+  double norm_before_ = 0.0;          // of irradiance before the edit; 0: not known
+  std::unique_ptr<Shadows> shadows_;  // of the edit
   std::unique_ptr<Shadows> earlier_shadows_;          // and of those before it, for links that no edit saw taken again
   std::uint32_t key_end_ = 0, triangle_key_end_ = 0;  // keys of sides that never were
   std::uint64_t affected_ = 0;

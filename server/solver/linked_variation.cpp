@@ -36,8 +36,8 @@ bool LinkedSolver::wantsVariation() const {
 void LinkedSolver::assessStep() {
   assess();
   if (!wantsVariation()) return;
-  variation_ =
-      next_variation_ ? std::move(next_variation_) : std::make_unique<LeafVariation>(*patches_, sides_, settings_.seed);
+  variation_ = next_variation_ ? std::move(next_variation_)
+                               : std::make_unique<LeafVariation>(*patches_, sides_, settings_.seed, leafRays());
   updateVariation();
   assess();
 }

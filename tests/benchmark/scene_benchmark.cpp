@@ -7,6 +7,7 @@
 #include "server/scene/lightmap.h"
 #include "server/solver/solver.h"
 #include "tests/benchmark/built_scenes.h"
+#include "tests/benchmark/whole_solve.h"
 
 namespace radiosity::benchmarks {
 namespace {
@@ -51,19 +52,13 @@ void pages(benchmark::State& state) {
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(patches.leaves.size()));
 }
 
-/// Bytes that stay allocated, by leaf patch: the patch scene, what materials make of it, and a solver's state with its
-/// accumulators. Workers and OpenGL not included.
+/// Bytes that stay allocated, by leaf patch: the patch scene, what materials make of it, and a solver at a stated 2 %
+/// with its links and rays. Workers and OpenGL not included.
 void memory(benchmark::State& state) {
   label(state);
-  class NoTransport final : public solver::Transport {
-    Result<void> setScene(std::shared_ptr<const scene::PatchScene>) override { return {}; }
-    Result<solver::TransportCounters> run(const solver::ShotBatch&, solver::FluxAccumulators&) override {
-      return solver::TransportCounters{};
-    }
-    [[nodiscard]] std::string description() const override { return "none"; }
-    [[nodiscard]] std::shared_ptr<const scene::PatchScene> scene() const override { return nullptr; }
-  } transport;
   (void)importedScene(state.range(0));
+  const auto transport = makeTransport(1, state);
+  if (!transport) return;
   double scene_bytes = 0, material_bytes = 0, solver_bytes = 0, leaves = 1, nodes = 1;
   for (auto _ : state) {
     const auto before = heapBytes();
@@ -73,8 +68,13 @@ void memory(benchmark::State& state) {
     const auto with_scene = heapBytes();
     const auto materials = scene::shadePatches(importedScene(state.range(0)), *patches);
     const auto with_materials = heapBytes();
-    const auto solver = solver::makeSolver(patches, materials, transport, {});
-    solver_bytes = static_cast<double>(heapBytes() - with_materials);
+    if (const auto set = transport->setScene(patches); !set) return state.SkipWithError(set.error().text().c_str());
+    const auto with_transport = heapBytes();
+    solver::SolverSettings settings;
+    settings.target_error = 0.02;
+    const auto solver = solver::makeSolver(patches, materials, *transport, settings);
+    solveToEnd(state, *solver);
+    solver_bytes = static_cast<double>(heapBytes() - with_transport);
     material_bytes = static_cast<double>(with_materials - with_scene);
     scene_bytes = static_cast<double>(with_scene - before);
     leaves = static_cast<double>(patches->leaves.size());

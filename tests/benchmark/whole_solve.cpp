@@ -34,21 +34,25 @@ void report(benchmark::State& state, const solver::Solver& solver) {
 
 }  // namespace
 
+void solveToEnd(benchmark::State& state, solver::Solver& solver) {
+  using solver::StepOutcome;
+  const auto begin = std::chrono::steady_clock::now();
+  for (auto outcome = StepOutcome::kShot; outcome != StepOutcome::kConverged && outcome != StepOutcome::kExhausted;) {
+    const auto step = solver.step();
+    if (!step) return state.SkipWithError(step.error().text().c_str());
+    outcome = *step;
+    const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - begin;
+    if (passed.count() > kPatienceSeconds) return state.SkipWithError("did not reach the stated error in 60 s");
+  }
+}
+
 void runSolve(benchmark::State& state, const Patches& scene, std::int64_t workers,
               const solver::SolverSettings& settings) {
-  using solver::StepOutcome;
   const auto transport = makeTransport(workers, state);
   if (!transport || !transport->setScene(scene.patches)) return;
   for (auto _ : state) {
-    const auto begin = std::chrono::steady_clock::now();
     const auto solver = solver::makeSolver(scene.patches, scene.materials, *transport, settings);
-    for (auto outcome = StepOutcome::kShot; outcome != StepOutcome::kConverged && outcome != StepOutcome::kExhausted;) {
-      const auto step = solver->step();
-      if (!step) return state.SkipWithError(step.error().text().c_str());
-      outcome = *step;
-      const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - begin;
-      if (passed.count() > kPatienceSeconds) return state.SkipWithError("did not reach the stated error in 60 s");
-    }
+    solveToEnd(state, *solver);
     report(state, *solver);
   }
 }
