@@ -14,7 +14,7 @@ namespace radiosity {
 /// threads of their own, one a core, at most `most`. When all have ended, what one of them threw is thrown here.
 template <typename Work>
 void inShares(std::size_t most, const Work& work) {
-  const std::size_t cores = std::max(1U, std::thread::hardware_concurrency());
+  static const std::size_t cores = std::max(1U, std::thread::hardware_concurrency());  // which reads a file
   const std::size_t shares = std::clamp<std::size_t>(most, 1, std::min<std::size_t>(cores, 16));
   std::vector<std::future<void>> others;
   others.reserve(shares);

@@ -20,7 +20,7 @@ constexpr double kMostLevel = 4.0, kMostOff = 0.5;
 /// Light that both halves lack by more than so many times what they differ by is not lacking by chance.
 constexpr double kByChance = 2.0;
 /// The residual that is left, of all that is gathered: far below any sampling error, and the level is right anyway.
-constexpr double kSolved = 1e-4;
+constexpr double kSolved = 4e-4;
 constexpr int kMaxSweeps = 400;
 /// Of a leaf in each half, doubles: what GMRES keeps, and the sweeps; and what there is of its light, floats.
 constexpr std::size_t kVectors = 3 * (Gmres::kRestart + 3) + 3 * 4, kLights = 5 * 3 + 4;
