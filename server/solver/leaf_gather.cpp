@@ -229,7 +229,7 @@ void LeafGather::weighRays() {
         for (const auto end : sights_.seen(half, v)) {
           if (end == sights_.skyAbove()) ++lost.above;
           if (end == sights_.skyBelow()) ++lost.below;
-          if (end == sights_.absorbed()) ++lost.absorbed;
+          if (sights_.isAbsorbed(end)) ++lost.absorbed;
           if (end < sights_.leafCount()) join(s, sights_.sideOf(end));
           if (end < sights_.endCount()) continue;
           join(s, sights_.sideOf(sights_.steps(half)[end - sights_.endCount()].by));

@@ -180,6 +180,7 @@ std::uint32_t LeafRays::see(const Place& from, const glm::dvec3& direction, std:
       continue;
     }
     const auto s = side_of_[patches_.triangle_surface[hit.triangle]][hit.front ? 0 : 1];
+    end = {at, {}, kNothing};
     if (s == scene::kNone) return kNothing;
     const auto value = leafAt(sides_[s], hit.triangle, at);
     const auto& normal = patches_.triangles[hit.triangle].normal;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <glm/geometric.hpp>
 
 #include "common/parallel.h"
 #include "server/solver/halves.h"
@@ -12,6 +13,8 @@ namespace {
 
 /// Leaves between two looks at the clock, of all threads together, and of one at a time.
 constexpr std::uint32_t kLeavesASlice = 2048, kLeavesAtOnce = 64;
+/// So many rays of each half tell whether a leaf lies in part inside of something.
+constexpr std::size_t kLooks = 8;
 /// A ray goes on from so many leaves at most; then the mean of the next has to do. In gaps it might go on for ever.
 constexpr std::size_t kMostSteps = 32;
 /// Rays and boxes are held against each other with so much to spare (unit box).
@@ -110,7 +113,9 @@ std::uint32_t LeafSights::endOfRay(LeafRays::Place place, glm::dvec3 direction, 
   std::size_t count = 0;
   LeafRays::Place there;
   auto seen = rays_->see(place, direction, key, there);
-  while (count < kMostSteps && seen < leaf_count_ && seen == there.value && rays_->isCut(seen)) {
+  const bool at_once = seen == LeafRays::kNothing && there.value == LeafRays::kNothing &&
+                       glm::distance(place.position, there.position) < rays_->widthOf(place.value);
+  while (count < kMostSteps && seen < leaf_count_ && seen == there.value && isParted(seen)) {
     by[count++] = seen;
     key = mixKeys(key, count);
     const auto draw = sobol4(0, key);
@@ -119,6 +124,7 @@ std::uint32_t LeafSights::endOfRay(LeafRays::Place place, glm::dvec3 direction, 
   }
   std::uint32_t end = seen == LeafRays::kSkyAbove   ? skyAbove()
                       : seen == LeafRays::kSkyBelow ? skyBelow()
+                      : at_once                     ? absorbedAtOnce()
                       : seen == LeafRays::kNothing  ? absorbed()
                                                     : seen;
   while (count > 0) {
@@ -131,7 +137,7 @@ std::uint32_t LeafSights::endOfRay(LeafRays::Place place, glm::dvec3 direction, 
 bool LeafSights::isDoubtful(std::size_t half, std::uint32_t end) const {
   std::size_t count = 0;
   for (; end >= endCount(); ++count) end = steps_[half][end - endCount()].next;
-  return count == kMostSteps && end < leaf_count_ && rays_->isCut(end);
+  return count == kMostSteps && end < leaf_count_ && isParted(end);
 }
 
 std::uint32_t LeafSights::traceLeaf(std::uint32_t value, const Side& side, std::size_t half, NewSteps& made) {
@@ -200,11 +206,53 @@ void LeafSights::traceSlice(std::uint32_t end) {
   cursor_ = end;
 }
 
+/// By the first rays of all, whatever comes after them: which leaves they are does not depend on how many rays there
+/// are.
+std::vector<bool> LeafSights::findPartlyInside() const {
+  std::vector<bool> found;
+  for (std::uint32_t value = 0; value < leaf_count_; ++value) {
+    const auto looks = std::min<std::size_t>(count_[value], kLooks);
+    std::ptrdiff_t inside = 0;
+    for (std::size_t half = 0; half < 2; ++half)
+      inside += std::ranges::count(seen(half, value).first(looks), absorbedAtOnce());
+    if (inside == 0 || inside == static_cast<std::ptrdiff_t>(2 * looks)) continue;
+    found.resize(leaf_count_);
+    found[value] = true;
+  }
+  return found;
+}
+
+/// Rays that ended where they are to go on, and those that went on from where they are not to, are to be traced anew.
+/// False: there are none.
+bool LeafSights::takePartlyInside() {
+  auto found = findPartlyInside();
+  if (found == partly_inside_) return false;
+  const auto is = [](const std::vector<bool>& leaves, std::uint32_t value) {
+    return value < leaves.size() && leaves[value];
+  };
+  const auto differs = [&](std::uint32_t value) { return is(found, value) != is(partly_inside_, value); };
+  for (std::size_t half = 0; half < 2; ++half) {
+    for (auto& end : seen_[half]) {
+      auto last = end;
+      bool differed = false;
+      for (; last >= endCount(); last = steps_[half][last - endCount()].next)
+        differed = differed || differs(steps_[half][last - endCount()].by);
+      if (differed || differs(last)) end = kUntraced;
+    }
+  }
+  partly_inside_ = std::move(found);
+  before_ = count_;
+  layOut(before_);  // without the steps of those
+  return true;
+}
+
 bool LeafSights::trace(double seconds) {
   const auto start = std::chrono::steady_clock::now();
+  const auto spent = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); };
   while (cursor_ < leaf_count_) {
     traceSlice(std::min(leaf_count_, cursor_ + kLeavesASlice));
-    if (std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() >= seconds) break;
+    if (isTraced() && takePartlyInside()) cursor_ = 0;
+    if (spent() >= seconds) break;
   }
   if (!isTraced()) return false;
   for (auto& half : steps_) half.shrink_to_fit();  // they grew by doubling
@@ -273,6 +321,7 @@ void LeafSights::inherit(const LeafSights& former, std::span<const std::uint32_t
   std::vector<std::uint16_t> counts(leaf_count_, std::min(usual, most));
   std::vector<std::uint32_t> value_after(former.endCount(), kUntraced);
   value_after[former.absorbed()] = absorbed();
+  value_after[former.absorbedAtOnce()] = absorbedAtOnce();
   value_after[former.skyAbove()] = skyAbove();
   value_after[former.skyBelow()] = skyBelow();
   for (std::uint32_t value = 0; value < leaf_count_; ++value) {
@@ -282,6 +331,10 @@ void LeafSights::inherit(const LeafSights& former, std::span<const std::uint32_t
   }
   forgetStandIns(former, value_after);
   ask(counts);
+  for (std::uint32_t value = 0; value < leaf_count_ && !former.partly_inside_.empty(); ++value) {
+    partly_inside_.resize(leaf_count_);
+    partly_inside_[value] = value_before[value] != scene::kNone && former.partly_inside_[value_before[value]];
+  }
   before_.assign(leaf_count_, 0);
   inBothHalves([&](std::size_t half) {
     for (std::uint32_t value = 0; value < leaf_count_; ++value) {

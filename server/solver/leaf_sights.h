@@ -4,7 +4,8 @@
 //
 // What passes through a leaf, or right before it, parts its light: a wall that stands on a leaf of the floor has the
 // day on one side and the night on the other, and the leaf's mean would bring each to the other. So rays that end on
-// such a leaf go on from where they end.
+// such a leaf go on from where they end. So they do on leaves that lie in part within a wall of an open model: there
+// some rays end at once, on the backs of what bounds it. In closed pockets what leaks is kept for all bounces.
 #pragma once
 
 #include <array>
@@ -28,20 +29,24 @@ class LeafSights {
   LeafSights(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed,
              std::shared_ptr<const LeafRays> rays = nullptr);
 
-  /// Leaf values. What is seen is one of them, below this, or absorbed(), or the sky, above the horizon or below.
+  /// Leaf values. What is seen is one of them, below this, or it isAbsorbed(), or the sky, above the horizon or below.
   [[nodiscard]] std::uint32_t leafCount() const { return leaf_count_; }
-  [[nodiscard]] std::uint32_t absorbed() const { return leaf_count_; }
-  [[nodiscard]] std::uint32_t skyAbove() const { return leaf_count_ + 1; }
-  [[nodiscard]] std::uint32_t skyBelow() const { return leaf_count_ + 2; }
+  [[nodiscard]] bool isAbsorbed(std::uint32_t end) const { return end == absorbed() || end == absorbedAtOnce(); }
+  [[nodiscard]] std::uint32_t skyAbove() const { return leaf_count_ + 2; }
+  [[nodiscard]] std::uint32_t skyBelow() const { return leaf_count_ + 3; }
   /// All of these are below this. What is not is a step: of number end - endCount().
-  [[nodiscard]] std::uint32_t endCount() const { return leaf_count_ + 3; }
-  /// The ray reached a leaf that something cuts, and what it saw from there. Later ones go on to earlier ones.
+  [[nodiscard]] std::uint32_t endCount() const { return leaf_count_ + 4; }
+  /// Rays that end on this leaf go on.
+  [[nodiscard]] bool isParted(std::uint32_t value) const {
+    return rays_->isCut(value) || (!partly_inside_.empty() && partly_inside_[value]);
+  }
+  /// The ray reached a leaf that is parted, and what it saw from there. Later ones go on to earlier ones.
   struct Step {
     std::uint32_t by;    ///< leaf value
     std::uint32_t next;  ///< an end, or the step before
   };
   [[nodiscard]] std::span<const Step> steps(std::size_t half) const { return steps_[half]; }
-  /// The ray went on as often as a ray may, and ends on another leaf that something cuts.
+  /// The ray went on as often as a ray may, and ends on another leaf that is parted.
   [[nodiscard]] bool isDoubtful(std::size_t half, std::uint32_t end) const;
 
   /// Index of the side of a leaf.
@@ -82,6 +87,9 @@ class LeafSights {
 
  private:
   static constexpr std::uint32_t kUntraced = scene::kNone;
+  /// On an unlit side; within the width of the leaf that the ray comes from.
+  [[nodiscard]] std::uint32_t absorbed() const { return leaf_count_; }
+  [[nodiscard]] std::uint32_t absorbedAtOnce() const { return leaf_count_ + 1; }
   /// Steps, numbered from 0, and which rays have them.
   struct NewSteps {
     std::vector<Step> steps;
@@ -94,6 +102,8 @@ class LeafSights {
                                        std::vector<Step>& steps) const;
   [[nodiscard]] std::uint32_t withSteps(std::uint32_t end, std::size_t half, std::vector<Step>& steps) const;
   void traceSlice(std::uint32_t end);
+  [[nodiscard]] std::vector<bool> findPartlyInside() const;
+  [[nodiscard]] bool takePartlyInside();
   void takeSteps(std::span<const std::array<NewSteps, 2>> made);
   /// Draws of the rays of a leaf.
   [[nodiscard]] std::uint64_t keyOf(std::uint32_t value, const Side& side, std::size_t half) const;
@@ -115,6 +125,7 @@ class LeafSights {
   std::vector<std::size_t> first_;             ///< by leaf value: into seen_
   std::array<std::vector<std::uint32_t>, 2> seen_;
   std::array<std::vector<Step>, 2> steps_;
+  std::vector<bool> partly_inside_;  ///< by leaf value; empty: none is
   std::uint64_t traced_ = 0, kept_ = 0;
 };
 

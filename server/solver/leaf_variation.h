@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "server/solver/leaf_rays.h"
+#include "server/solver/leaf_sights.h"
 #include "server/solver/lights.h"
 #include "server/solver/punctual_lights.h"
 #include "server/solver/shadows.h"
@@ -31,7 +32,8 @@ struct LeafLight {
   std::array<std::span<const glm::vec3>, 2> irradiance;  ///< by half
   std::span<const LightPolygon> lights;                  ///< dark ones too; more may come, none goes
   std::span<const PunctualLights::Source> sources;
-  bool by_rays = false;  ///< reflected light comes by rays, which know what varies where something cuts a leaf
+  /// Null: reflected light does not come by rays, which know what varies where a leaf is parted.
+  const LeafSights* sights = nullptr;
 };
 
 class LeafVariation {

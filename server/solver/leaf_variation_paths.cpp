@@ -250,7 +250,7 @@ LeafVariation::Lack LeafVariation::lacking(const Path& path, const LeafLight& li
   glm::vec3 direct(0.0F);
   if (path.light_factor != 0.0F) direct += path.light_factor * light.lights[path.light].emission;
   if (path.source_factor != 0.0F) direct += path.source_factor * glm::vec3(light.sources[path.source].intensity);
-  const bool is_known = light.by_rays && rays_->isCut(path.by);
+  const bool is_known = light.sights != nullptr && light.sights->isParted(path.by);
   const auto reflected = is_known ? glm::vec3(0.0F) : radiosity(path.seen[0]) - radiosity(path.seen[1]);
   const glm::vec3 by = light.reflectance[path.by];
   if (path.sees_near) return {by * direct, by * reflected};

@@ -57,7 +57,12 @@ void LinkedSolver::updateVariation() {
   auto sources = sources_;  // paths find the sky where they end, and those before it by their numbers
   sources.insert(sources.end(), sky_.begin(), sky_.end());
   const double bound = kNegligible * aim_;
-  variation_->update({emission, system_.reflectance(), {half_[0], half_[1]}, lights_, sources, gathers()},
+  variation_->update({emission,
+                      system_.reflectance(),
+                      {half_[0], half_[1]},
+                      lights_,
+                      sources,
+                      gathers() ? &gather_->sights() : nullptr},
                      bound * bound * square);
   corrected_.clear();
   if (!variation_->corrects()) return;
