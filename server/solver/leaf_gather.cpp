@@ -22,6 +22,10 @@ constexpr double kByChance = 2.0;
 /// The residual that is left, of all that is gathered: far below any sampling error, and the level is right anyway.
 constexpr double kSolved = 4e-4;
 constexpr int kMaxSweeps = 400;
+/// Of what a ray brings that went on from as many leaves as it may, this part is not sure, however little each of them
+/// reflects. In a gap of a tenth of a texel above a lamp (reflectance 0.4 and 0.8) with 0 the truth was 1.5 to 2.1
+/// times what was stated, and with 1 (all of it) 0.6.
+constexpr double kUnsure = 0.4;
 /// Of a leaf in each half, doubles: what GMRES keeps, and the sweeps; and what there is of its light, floats.
 constexpr std::size_t kVectors = 3 * (Gmres::kRestart + 3) + 3 * 4, kLights = 5 * 3 + 4;
 
@@ -406,17 +410,32 @@ void LeafGather::weighMissed(const std::array<Levels, 2>& levels) {
   }
 }
 
-/// What such rays bring may be the light of another side of a wall, or no light where there is some.
+/// What such rays bring from where they end may be the light of another side of a wall, or no light where there is
+/// some: after all the leaves that they went on from, of which each took its part. And of those the means were taken,
+/// of light that changes within them.
 void LeafGather::weighDoubt() {
   doubt_ = 0.0;
+  const auto counts = sights_.counts();
   for (std::uint32_t v = 0; v < sights_.leafCount(); ++v) {
-    const float part = 0.5F * (lostOf(0, v).doubtful + lostOf(1, v).doubtful);
-    if (part <= 0.0F) continue;
-    const glm::vec3 brought = 0.5F * part * (gathered_[0][v] + gathered_[1][v]);
-    const float square = glm::dot(brought, brought);
-    doubt_ += area_[v] * static_cast<double>(square);
-    leaf_bias_[v] += square;
+    const double part = 0.5 * static_cast<double>(lostOf(0, v).doubtful + lostOf(1, v).doubtful);
+    if (part <= 0.0) continue;
+    glm::dvec3 brought = kUnsure * part * 0.5 * glm::dvec3(gathered_[0][v] + gathered_[1][v]);
+    for (std::size_t half = 0; half < 2; ++half) {
+      for (const auto end : sights_.seen(half, v))
+        if (sights_.isDoubtful(half, end)) brought += 0.5 / counts[v] * fromTheEnd(half, end);
+    }
+    const double square = glm::dot(brought, brought);
+    doubt_ += area_[v] * square;
+    leaf_bias_[v] += static_cast<float>(square);
   }
+}
+
+glm::dvec3 LeafGather::fromTheEnd(std::size_t half, std::uint32_t end) const {
+  glm::dvec3 part(1.0);
+  for (; end >= sights_.endCount(); end = sights_.steps(half)[end - sights_.endCount()].next)
+    part *= glm::dvec3(light_.reflectance[sights_.steps(half)[end - sights_.endCount()].by]);
+  const auto& radiosity = halves_[half].radiosity[end];
+  return part * glm::dvec3(std::abs(radiosity[0]), std::abs(radiosity[1]), std::abs(radiosity[2]));
 }
 
 /// A ray is drawn as light leaves, too: what part of a leaf's rays leave the scene, or end on unlit sides, that part of

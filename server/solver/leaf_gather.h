@@ -151,6 +151,7 @@ class LeafGather {
   void weighNoise(const LeafSmoother& smoother);
   void weighLost();
   void weighDoubt();
+  [[nodiscard]] glm::dvec3 fromTheEnd(std::size_t half, std::uint32_t end) const;
   /// By block of leaves: how many rays they have, and the one with most; how many times as many are asked for.
   struct BlockRays {
     std::uint32_t rays = 0, most = 0, times = 1;
