@@ -52,6 +52,8 @@ RADIOSITY_CLONES void averageSeen(const LeafSights& sights, std::size_t half, co
 LeafGather::LeafGather(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed,
                        std::size_t most_bytes, std::shared_ptr<const LeafRays> rays)
     : sights_(patches, sides, seed, std::move(rays)), most_bytes_(most_bytes), sides_(sides) {
+  const std::size_t leaves = sights_.leafCount(), first = leaves * kFirstRays * LeafSights::kRayBytes;
+  sights_.limit(most_bytes - std::min(most_bytes, leastBytes(leaves) - first), sizeof(Light));
   area_.reserve(sights_.leafCount());
   for (const auto& side : sides) {
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)

@@ -17,6 +17,8 @@ constexpr std::uint32_t kLeavesASlice = 2048, kLeavesAtOnce = 64;
 constexpr std::size_t kLooks = 8;
 /// A ray goes on from so many leaves at most; then the mean of the next has to do. In gaps it might go on for ever.
 constexpr std::size_t kMostSteps = 32;
+/// Of steps, so that no slice makes more than 32 bits number.
+constexpr std::size_t kMostNumbers = std::size_t{1} << 30;
 /// Rays and boxes are held against each other with so much to spare (unit box).
 constexpr double kMargin = 1e-5;
 
@@ -115,7 +117,7 @@ std::uint32_t LeafSights::endOfRay(LeafRays::Place place, glm::dvec3 direction, 
   auto seen = rays_->see(place, direction, key, there);
   const bool at_once = seen == LeafRays::kNothing && there.value == LeafRays::kNothing &&
                        glm::distance(place.position, there.position) < rays_->widthOf(place.value);
-  while (count < kMostSteps && seen < leaf_count_ && seen == there.value && isParted(seen)) {
+  while (goes_on_ && count < kMostSteps && seen < leaf_count_ && seen == there.value && isParted(seen)) {
     by[count++] = seen;
     key = mixKeys(key, count);
     const auto draw = sobol4(0, key);
@@ -137,7 +139,7 @@ std::uint32_t LeafSights::endOfRay(LeafRays::Place place, glm::dvec3 direction, 
 bool LeafSights::isDoubtful(std::size_t half, std::uint32_t end) const {
   std::size_t count = 0;
   for (; end >= endCount(); ++count) end = steps_[half][end - endCount()].next;
-  return count == kMostSteps && end < leaf_count_ && isParted(end);
+  return (count == kMostSteps || is_short_) && end < leaf_count_ && isParted(end);
 }
 
 std::uint32_t LeafSights::traceLeaf(std::uint32_t value, const Side& side, std::size_t half, NewSteps& made) {
@@ -177,6 +179,9 @@ void LeafSights::takeSteps(std::span<const std::array<NewSteps, 2>> made) {
 
 /// From cursor_ to `end`. Where memory runs out, rays with steps are as good as not traced.
 void LeafSights::traceSlice(std::uint32_t end) {
+  const auto steps = steps_[0].size() + steps_[1].size();
+  goes_on_ = bytes() + steps * step_bytes_ < most_bytes_ && steps < kMostNumbers;
+  is_short_ = is_short_ || !goes_on_;
   const auto parts = (end - cursor_ + kLeavesAtOnce - 1) / kLeavesAtOnce;
   std::vector<std::array<NewSteps, 2>> made(parts);
   std::atomic<std::uint32_t> next{0};
@@ -354,6 +359,7 @@ void LeafSights::inherit(const LeafSights& former, std::span<const std::uint32_t
       }
     }
   });
+  is_short_ = former.is_short_;
   kept_ = former.kept_;
   traced_ = former.traced_;
   for (const auto& half : seen_)

@@ -29,6 +29,13 @@ class LeafSights {
   LeafSights(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed,
              std::shared_ptr<const LeafRays> rays = nullptr);
 
+  /// Where bytes(), with so many more for each step, are more than `most`, no ray goes on any further, but for those of
+  /// the slice of 2,048 leaves under way. Those that do not end as rays do that went on as often as they may.
+  void limit(std::size_t most, std::size_t step_bytes) {
+    most_bytes_ = most;
+    step_bytes_ = step_bytes;
+  }
+
   /// Leaf values. What is seen is one of them, below this, or it isAbsorbed(), or the sky, above the horizon or below.
   [[nodiscard]] std::uint32_t leafCount() const { return leaf_count_; }
   [[nodiscard]] bool isAbsorbed(std::uint32_t end) const { return end == absorbed() || end == absorbedAtOnce(); }
@@ -46,7 +53,8 @@ class LeafSights {
     std::uint32_t next;  ///< an end, or the step before
   };
   [[nodiscard]] std::span<const Step> steps(std::size_t half) const { return steps_[half]; }
-  /// The ray went on as often as a ray may, and ends on another leaf that is parted.
+  /// The ray went on as often as a ray may, or there is no memory for more of that, and ends on another leaf that is
+  /// parted.
   [[nodiscard]] bool isDoubtful(std::size_t half, std::uint32_t end) const;
 
   /// Index of the side of a leaf.
@@ -126,6 +134,8 @@ class LeafSights {
   std::array<std::vector<std::uint32_t>, 2> seen_;
   std::array<std::vector<Step>, 2> steps_;
   std::vector<bool> partly_inside_;  ///< by leaf value; empty: none is
+  std::size_t most_bytes_ = SIZE_MAX, step_bytes_ = 0;
+  bool goes_on_ = true, is_short_ = false;  ///< rays of this slice; some did not
   std::uint64_t traced_ = 0, kept_ = 0;
 };
 

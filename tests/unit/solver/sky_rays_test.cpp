@@ -212,6 +212,30 @@ TEST(CutLeaves, WithoutEndAreStatedAsDoubtful) {
   EXPECT_GT(room.solver->error().total, 0.1);
 }
 
+TEST(CutLeaves, TakeNoMoreStepsThanThereIsMemoryFor) {
+  const auto made = makeQuadScene(cubeQuads(32, kDark, grey(0.5F)));
+  for (auto& leaf : made.patches->leaves) leaf.cut = true;
+  const auto sides = makeSides(*made.patches);
+  LeafSights free(*made.patches, sides, 1), bound(*made.patches, sides, 1), sliced(*made.patches, sides, 1);
+  const std::vector<std::uint16_t> counts(free.leafCount(), 2);
+  constexpr std::size_t kStepBytes = 32, kSlice = std::size_t{2048} * 2 * 32 * (8 + kStepBytes);
+  for (auto* sights : {&bound, &sliced}) sights->limit(sights->bytes() + kSlice, kStepBytes);
+  for (auto* sights : {&free, &bound, &sliced}) sights->ask(counts);
+  ASSERT_TRUE(free.trace(HUGE_VAL));
+  ASSERT_TRUE(bound.trace(HUGE_VAL));
+  while (!sliced.trace(0.0)) continue;
+  const auto taken = [](const LeafSights& sights) {
+    return sights.bytes() + kStepBytes * (sights.steps(0).size() + sights.steps(1).size());
+  };
+  EXPECT_GT(taken(free), 5 * kSlice);
+  EXPECT_LT(taken(bound), 3 * kSlice);
+  EXPECT_EQ(taken(bound), taken(sliced));
+  const auto last = bound.leafCount() - 1;
+  EXPECT_LT(bound.seen(0, last)[0], bound.leafCount()) << "it does not go on";
+  EXPECT_TRUE(bound.isDoubtful(0, bound.seen(0, last)[0]));
+  EXPECT_TRUE(bound.isDoubtful(1, bound.seen(1, 0)[0]));
+}
+
 TEST(CutLeaves, NoMoreThreadsNorSlicesChangeABit) {
   const auto made = partedCube(true);
   const auto sides = makeSides(*made.patches);
