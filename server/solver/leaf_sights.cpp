@@ -228,10 +228,10 @@ std::vector<bool> LeafSights::findPartlyInside() const {
 }
 
 /// Rays that ended where they are to go on, and those that went on from where they are not to, are to be traced anew.
-/// False: there are none.
-bool LeafSights::takePartlyInside() {
+void LeafSights::takePartlyInside() {
   auto found = findPartlyInside();
-  if (found == partly_inside_) return false;
+  if (found == partly_inside_) return;
+  cursor_ = 0;  // whatever happens, what is given up below is traced before anyone asks for it
   const auto is = [](const std::vector<bool>& leaves, std::uint32_t value) {
     return value < leaves.size() && leaves[value];
   };
@@ -240,7 +240,7 @@ bool LeafSights::takePartlyInside() {
     for (auto& end : seen_[half]) {
       auto last = end;
       bool differed = false;
-      for (; last >= endCount(); last = steps_[half][last - endCount()].next)
+      for (; last >= endCount() && last != kUntraced; last = steps_[half][last - endCount()].next)
         differed = differed || differs(steps_[half][last - endCount()].by);
       if (differed || differs(last)) end = kUntraced;
     }
@@ -248,7 +248,6 @@ bool LeafSights::takePartlyInside() {
   partly_inside_ = std::move(found);
   before_ = count_;
   layOut(before_);  // without the steps of those
-  return true;
 }
 
 bool LeafSights::trace(double seconds) {
@@ -256,7 +255,7 @@ bool LeafSights::trace(double seconds) {
   const auto spent = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); };
   while (cursor_ < leaf_count_) {
     traceSlice(std::min(leaf_count_, cursor_ + kLeavesASlice));
-    if (isTraced() && takePartlyInside()) cursor_ = 0;
+    if (isTraced()) takePartlyInside();
     if (spent() >= seconds) break;
   }
   if (!isTraced()) return false;

@@ -111,7 +111,7 @@ class LeafSights {
   [[nodiscard]] std::uint32_t withSteps(std::uint32_t end, std::size_t half, std::vector<Step>& steps) const;
   void traceSlice(std::uint32_t end);
   [[nodiscard]] std::vector<bool> findPartlyInside() const;
-  [[nodiscard]] bool takePartlyInside();
+  void takePartlyInside();
   void takeSteps(std::span<const std::array<NewSteps, 2>> made);
   /// Draws of the rays of a leaf.
   [[nodiscard]] std::uint64_t keyOf(std::uint32_t value, const Side& side, std::size_t half) const;
