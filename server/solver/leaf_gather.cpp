@@ -15,10 +15,6 @@ namespace {
 
 /// Rays of each half of a leaf that a solve begins with.
 constexpr std::uint16_t kFirstRays = 8;
-/// By more than this the level of all light is not changed: rays that know it this badly are few.
-constexpr double kMostLevel = 4.0, kMostOff = 0.5;
-/// Light that both halves lack by more than so many times what they differ by is not lacking by chance.
-constexpr double kByChance = 2.0;
 /// The residual that is left, of all that is gathered: far below any sampling error, and the level is right anyway.
 constexpr double kSolved = 4e-4;
 constexpr int kMaxSweeps = 400;
@@ -115,7 +111,7 @@ bool LeafGather::advance(double seconds) {
 /// What the solution tells of itself; what it was made with takes no more memory.
 void LeafGather::finish() {
   takeSolutions();
-  LeafSmoother smoother(sides_, area_);
+  LeafSmoother smoother(sides_, area_, [this](std::uint32_t v) { return sights_.isParted(v); });
   smoother.smooth(solved_);
   std::array<Levels, 2> levels;
   inBothHalves([&](std::size_t half) {
@@ -228,6 +224,9 @@ void LeafGather::weighRays() {
     part_[std::max(a, b)] = std::min(a, b);
   };
   for (auto& lost : lost_) lost.assign(sights_.leafCount(), {});
+  has_parted_ = false;
+  for (std::uint32_t v = 0; v < sights_.leafCount() && !has_parted_; ++v)
+    has_parted_ = area_[v] > 0.0 && sights_.isParted(v);
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
     for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
       for (std::size_t half = 0; half < 2; ++half) {
@@ -237,9 +236,8 @@ void LeafGather::weighRays() {
           if (end == sights_.skyBelow()) ++lost.below;
           if (sights_.isAbsorbed(end)) ++lost.absorbed;
           if (end < sights_.leafCount()) join(s, sights_.sideOf(end));
-          if (end < sights_.endCount()) continue;
-          join(s, sights_.sideOf(sights_.steps(half)[end - sights_.endCount()].by));
           if (sights_.isDoubtful(half, end)) ++lost.doubtful;
+          if (end >= sights_.endCount()) join(s, sights_.sideOf(sights_.steps(half)[end - sights_.endCount()].by));
         }
         lost_[half][v] = lost;
       }
@@ -256,67 +254,6 @@ void LeafGather::weighRays() {
     }
   }
   for (std::uint32_t s = 0; s < sides_.size(); ++s) part_[s] = root(s);
-}
-
-/// x, but for what few rays find too much missing of: with what came over links no leaf gets less than no light.
-double LeafGather::solved(std::size_t h, std::size_t c, std::size_t v) const {
-  return std::max(solved_[h][v][c], -static_cast<double>(light_.irradiance[h][v][static_cast<int>(c)]));
-}
-
-/// What comes straight from the sky, by rays as they are.
-double LeafGather::skyAt(std::size_t h, std::size_t c, std::size_t v) const {
-  const auto i = static_cast<int>(c);
-  const auto lost = lostOf(h, v);
-  return static_cast<double>(lost.above) * light_.sky[0][i] + static_cast<double>(lost.below) * light_.sky[1][i];
-}
-
-/// By part of the scene and channel: what makes
-/// sum a x = sum a (h (r + rho x) + s), h being the part of a leaf's light that other leaves get and s what comes from
-/// the sky: x times a factor. Where x is as much below nothing as above it, as where shooters have sent the mean of
-/// what is there and its pattern is left, that says nothing; all light of the part, with what came over links, makes up
-/// for what little is off then.
-LeafGather::Levels LeafGather::levels(std::size_t h) const {
-  struct Sum {
-    double left = 0.0, kept = 0.0, size = 0.0, all = 0.0, area = 0.0, stays = 0.0;
-    double least = 0.0;  ///< x, where it is below 0, of what came over links there
-  };
-  std::vector<std::array<Sum, 3>> sums(sides_.size());
-  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
-    auto& sum = sums[part_[s]];
-    for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
-      const auto lost = lostOf(h, v);
-      const double sends = 1.0 - lost.escaped() - static_cast<double>(lost.absorbed);
-      for (std::size_t c = 0; c < 3 && area_[v] > 0.0; ++c) {
-        const auto i = static_cast<int>(c);
-        const double x = solved(h, c, v), over_links = static_cast<double>(light_.irradiance[h][v][i]);
-        const double stays = 1.0 - sends * static_cast<double>(light_.reflectance[v][i]);
-        sum[c].left += area_[v] * (sends * halves_[h].source[v][c] + skyAt(h, c, v));
-        sum[c].kept += area_[v] * stays * x;
-        sum[c].size += area_[v] * stays * std::abs(x);
-        sum[c].all += area_[v] * stays * (x + over_links);
-        sum[c].area += area_[v];
-        sum[c].stays += area_[v] * stays;
-        if (x < 0.0) sum[c].least = std::min(sum[c].least, x / over_links);
-      }
-    }
-  }
-  Levels levels(sides_.size());
-  for (std::size_t p = 0; p < sums.size(); ++p) {
-    for (std::size_t c = 0; c < 3; ++c) {
-      const auto& sum = sums[p][c];
-      const double level = sum.left / sum.kept, part = (sum.left - sum.kept) / sum.all;
-      levels[p][c].missed = sum.left - sum.kept;
-      if (2.0 * sum.kept > sum.size && level * sum.least >= -1.0 && level > 1.0 / kMostLevel && level < kMostLevel) {
-        levels[p][c].gathered = level;
-      } else if (sum.all > 0.0 && std::abs(part) < kMostOff) {
-        levels[p][c].gathered = 1.0 + part;
-        levels[p][c].over_links = part;
-      } else if (sum.stays > 0.0) {
-        levels[p][c].missed *= sum.area / sum.stays;  // nothing makes up for it: all its bounces are missing, too
-      }
-    }
-  }
-  return levels;
 }
 
 void LeafGather::takeSolutions() {
@@ -385,33 +322,6 @@ void LeafGather::weighNoise(const LeafSmoother& smoother) {
   for (const double block : block_noise_) noise_ += block;
 }
 
-/// What is small, and shines, neither half may have seen: its light is sent and does not arrive, in both alike, and the
-/// level gives it to others. Nobody knows where it belongs, so that all leaves of the part of the scene lack the same.
-void LeafGather::weighMissed(const std::array<Levels, 2>& levels) {
-  std::vector<double> area(sides_.size(), 0.0), square(sides_.size(), 0.0);
-  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
-    for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v)
-      area[part_[s]] += area_[v];
-  }
-  for (std::size_t p = 0; p < sides_.size(); ++p) {
-    for (std::size_t c = 0; c < 3 && area[p] > 0.0; ++c) {
-      const double a = levels[0][p][c].missed, b = levels[1][p][c].missed;
-      const double both = 0.5 * (a + b), chance = kByChance * 0.5 * (a - b);
-      square[p] += std::max(0.0, both * both - chance * chance) / area[p];
-    }
-  }
-  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
-    for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
-      if (area_[v] <= 0.0) continue;
-      const double part = square[part_[s]] * area_[v] / area[part_[s]];
-      block_noise_[v / kBlock] += part;
-      noise_ += part;
-      bias_ += part;
-      leaf_bias_[v] += static_cast<float>(part / area_[v]);
-    }
-  }
-}
-
 /// What such rays bring from where they end may be the light of another side of a wall, or no light where there is
 /// some: after all the leaves that they went on from, of which each took its part. And of those the means were taken,
 /// of light that changes within them.
@@ -440,44 +350,29 @@ glm::dvec3 LeafGather::fromTheEnd(std::size_t half, std::uint32_t end) const {
   return part * glm::dvec3(std::abs(radiosity[0]), std::abs(radiosity[1]), std::abs(radiosity[2]));
 }
 
-/// A ray is drawn as light leaves, too: what part of a leaf's rays leave the scene, or end on unlit sides, that part of
-/// its light does.
-void LeafGather::weighLost() {
-  escaped_ = absorbed_ = from_sky_ = {};
-  for (std::size_t half = 0; half < 2; ++half) {
-    for (std::uint32_t v = 0; v < sights_.leafCount(); ++v) {
-      const auto lost = lostOf(half, v);
-      if (lost.escaped() <= 0.0 && lost.absorbed <= 0.0F) continue;
-      for (std::size_t c = 0; c < 3; ++c) {
-        const double flux = 0.5 * area_[v] * halves_[half].radiosity[v][c];
-        escaped_[c] += flux * lost.escaped();
-        absorbed_[c] += flux * static_cast<double>(lost.absorbed);
-        from_sky_[c] += 0.5 * area_[v] * skyAt(half, c, v);
-      }
-    }
-  }
-}
-
 void LeafGather::save(ArchiveWriter& to) const {
   const auto counts = sights_.counts();
-  to(has_gathered_, std::vector<std::uint16_t>(counts.begin(), counts.end()), noise_, smoothed_, bias_, doubt_,
-     block_noise_, escaped_, absorbed_, from_sky_, unsolved_, leaf_bias_, block_light_, side_noise_, side_light_);
+  to(has_gathered_, std::vector<std::uint16_t>(counts.begin(), counts.end()), sights_.partlyInside(), noise_, smoothed_,
+     bias_, doubt_, block_noise_, escaped_, absorbed_, from_sky_, unsolved_, leaf_bias_, block_light_, side_noise_,
+     side_light_);
 }
 
 bool LeafGather::restore(ArchiveReader& from) {
   std::vector<std::uint16_t> counts;
-  from(has_gathered_, counts, noise_, smoothed_, bias_, doubt_, block_noise_, escaped_, absorbed_, from_sky_, unsolved_,
-       leaf_bias_, block_light_, side_noise_, side_light_);
+  std::vector<bool> partly_inside;
+  from(has_gathered_, counts, partly_inside, noise_, smoothed_, bias_, doubt_, block_noise_, escaped_, absorbed_,
+       from_sky_, unsolved_, leaf_bias_, block_light_, side_noise_, side_light_);
   const auto fits = [](std::uint16_t count) { return count <= LeafSights::kMostRays; };
   std::size_t all = 0;
   for (const auto count : counts) all += count;
   if (!from.ok() || counts.size() != sights_.leafCount() || !std::ranges::all_of(counts, fits) ||
-      all * LeafSights::kRayBytes > most_bytes_ ||
+      all * LeafSights::kRayBytes > most_bytes_ || (!partly_inside.empty() && partly_inside.size() != counts.size()) ||
       (!block_noise_.empty() && block_noise_.size() != (counts.size() + kBlock - 1) / kBlock) ||
       block_light_.size() != block_noise_.size() || side_noise_.size() != side_light_.size() ||
       (!block_noise_.empty() && side_noise_.size() != sides_.size()) ||
       (has_gathered_ ? leaf_bias_.size() != counts.size() : !leaf_bias_.empty()))
     return false;
+  sights_.expectPartlyInside(std::move(partly_inside));
   if (all > 0) sights_.ask(counts);
   return true;
 }

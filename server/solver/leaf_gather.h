@@ -146,7 +146,15 @@ class LeafGather {
   void weighRays();
   [[nodiscard]] double solved(std::size_t half, std::size_t channel, std::size_t value) const;
   [[nodiscard]] double skyAt(std::size_t half, std::size_t channel, std::size_t value) const;
-  [[nodiscard]] Levels levels(std::size_t half) const;
+  /// What the level of a part of the scene follows from.
+  struct LevelSum {
+    double left = 0.0, kept = 0.0, size = 0.0, all = 0.0, area = 0.0, stays = 0.0;
+    double least = 0.0;  ///< x, where it is below 0, of what came over links there
+  };
+  [[nodiscard]] Levels levels(std::size_t half);
+  [[nodiscard]] std::vector<std::array<LevelSum, 3>> levelSums(std::size_t half);
+  void addParted(std::size_t half, std::vector<std::array<LevelSum, 3>>& sums);
+  [[nodiscard]] std::vector<std::array<double, 3>> broughtByParted(std::size_t half, std::array<double, 3>& all) const;
   void weighMissed(const std::array<Levels, 2>& levels);
   void weighNoise(const LeafSmoother& smoother);
   void weighLost();
@@ -189,6 +197,7 @@ class LeafGather {
     return {part(rays.above), part(rays.below), part(rays.absorbed), part(rays.doubtful)};
   }
   bool is_weighed_ = false;                    ///< the following are known
+  bool has_parted_ = false;                    ///< leaves, as of LeafSights
   std::array<std::vector<LostRays>, 2> lost_;  ///< by half and leaf value; empty: none
   std::vector<std::uint32_t> part_;            ///< by side: which part of the scene, whose number is that of a side
   LeftLight light_;

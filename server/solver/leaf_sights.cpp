@@ -13,8 +13,11 @@ namespace {
 
 /// Leaves between two looks at the clock, of all threads together, and of one at a time.
 constexpr std::uint32_t kLeavesASlice = 2048, kLeavesAtOnce = 64;
-/// So many rays of each half tell whether a leaf lies in part inside of something.
-constexpr std::size_t kLooks = 8;
+/// And as few as that where there is little memory for steps.
+constexpr std::uint32_t kFewestASlice = 64;
+/// So many rays of each half at most tell whether a leaf lies in part inside of something. With 8 those were missed of
+/// which less than a tenth does, and that tenth kept its light from all rays that met the rest.
+constexpr std::size_t kLooks = 64;
 /// A ray goes on from so many leaves at most; then the mean of the next has to do. In gaps it might go on for ever.
 constexpr std::size_t kMostSteps = 32;
 /// Of steps, so that no slice makes more than 32 bits number.
@@ -95,6 +98,8 @@ std::uint32_t LeafSights::withSteps(std::uint32_t end, std::size_t half, std::ve
   steps.push_back({step.by, withSteps(step.next, half, steps)});
   return endCount() + static_cast<std::uint32_t>(steps.size() - 1);
 }
+
+void LeafSights::expectPartlyInside(std::vector<bool> leaves) { partly_inside_ = std::move(leaves); }
 
 void LeafSights::giveUp() {
   if (isTraced()) return;
@@ -177,11 +182,26 @@ void LeafSights::takeSteps(std::span<const std::array<NewSteps, 2>> made) {
   }
 }
 
+/// Where the slice that begins at cursor_ ends: before what it may take at most is more than there is room for. Where
+/// that is not even enough for a few leaves no ray goes on.
+std::uint32_t LeafSights::beginSlice() {
+  const auto steps = steps_[0].size() + steps_[1].size();
+  const auto taken = bytes() + steps * step_bytes_;
+  const auto room = taken < most_bytes_ ? (most_bytes_ - taken) / (sizeof(Step) + step_bytes_) : 0;
+  const auto most = std::min(room, kMostNumbers - std::min(kMostNumbers, steps)) / (2 * kMostSteps);
+  std::uint32_t end = cursor_;
+  for (std::size_t rays = 0; end < std::min(leaf_count_, cursor_ + kLeavesASlice); ++end) {
+    rays += count_[end];
+    if (rays > most) break;
+  }
+  const auto fewest = std::min(leaf_count_, cursor_ + kFewestASlice);
+  goes_on_ = end >= fewest;
+  is_short_ = is_short_ || !goes_on_;
+  return std::max(end, fewest);
+}
+
 /// From cursor_ to `end`. Where memory runs out, rays with steps are as good as not traced.
 void LeafSights::traceSlice(std::uint32_t end) {
-  const auto steps = steps_[0].size() + steps_[1].size();
-  goes_on_ = bytes() + steps * step_bytes_ < most_bytes_ && steps < kMostNumbers;
-  is_short_ = is_short_ || !goes_on_;
   const auto parts = (end - cursor_ + kLeavesAtOnce - 1) / kLeavesAtOnce;
   std::vector<std::array<NewSteps, 2>> made(parts);
   std::atomic<std::uint32_t> next{0};
@@ -211,8 +231,7 @@ void LeafSights::traceSlice(std::uint32_t end) {
   cursor_ = end;
 }
 
-/// By the first rays of all, whatever comes after them: which leaves they are does not depend on how many rays there
-/// are.
+/// By the first rays of all.
 std::vector<bool> LeafSights::findPartlyInside() const {
   std::vector<bool> found;
   for (std::uint32_t value = 0; value < leaf_count_; ++value) {
@@ -254,7 +273,7 @@ bool LeafSights::trace(double seconds) {
   const auto start = std::chrono::steady_clock::now();
   const auto spent = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); };
   while (cursor_ < leaf_count_) {
-    traceSlice(std::min(leaf_count_, cursor_ + kLeavesASlice));
+    traceSlice(beginSlice());
     if (isTraced()) takePartlyInside();
     if (spent() >= seconds) break;
   }
@@ -340,6 +359,12 @@ void LeafSights::inherit(const LeafSights& former, std::span<const std::uint32_t
     partly_inside_[value] = value_before[value] != scene::kNone && former.partly_inside_[value_before[value]];
   }
   before_.assign(leaf_count_, 0);
+  // Rays that are said to end on these may end beside them.
+  std::vector<bool> stands_in(leaf_count_, false);
+  for (std::uint32_t value = 0; value < leaf_count_; ++value) {
+    const auto seen = rays_->standInOf(value);
+    if (seen != value && seen < leaf_count_) stands_in[seen] = true;
+  }
   inBothHalves([&](std::size_t half) {
     for (std::uint32_t value = 0; value < leaf_count_; ++value) {
       const auto before = value_before[value];
@@ -352,7 +377,7 @@ void LeafSights::inherit(const LeafSights& former, std::span<const std::uint32_t
         const bool goes_on = old[k] >= former.endCount();
         const auto first = value_after[goes_on ? former.steps_[half][old[k] - former.endCount()].by : old[k]];
         if (first == kUntraced) continue;  // it saw what is gone, or moved
-        const bool may_pass = first >= leaf_count_ || change.isPassed(value, first);
+        const bool may_pass = first >= leaf_count_ || stands_in[first] || change.isPassed(value, first);
         if (may_pass && isPassed(change, value, draw(k))) continue;
         seen_[half][first_[value] + k] = goes_on ? inheritStep(former, half, old[k], value_after, change) : first;
       }

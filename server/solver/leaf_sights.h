@@ -29,8 +29,8 @@ class LeafSights {
   LeafSights(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed,
              std::shared_ptr<const LeafRays> rays = nullptr);
 
-  /// Where bytes(), with so many more for each step, are more than `most`, no ray goes on any further, but for those of
-  /// the slice of 2,048 leaves under way. Those that do not end as rays do that went on as often as they may.
+  /// Where bytes(), with so many more for each step, might become more than `most`, no ray goes on any further. Those
+  /// that do not end as rays do that went on as often as they may.
   void limit(std::size_t most, std::size_t step_bytes) {
     most_bytes_ = most;
     step_bytes_ = step_bytes;
@@ -47,6 +47,10 @@ class LeafSights {
   [[nodiscard]] bool isParted(std::uint32_t value) const {
     return rays_->isCut(value) || (!partly_inside_.empty() && partly_inside_[value]);
   }
+  /// It does that, or ends there.
+  [[nodiscard]] bool endsOnParted(std::uint32_t end) const {
+    return end >= endCount() || (end < leaf_count_ && isParted(end));
+  }
   /// The ray reached a leaf that is parted, and what it saw from there. Later ones go on to earlier ones.
   struct Step {
     std::uint32_t by;    ///< leaf value
@@ -59,6 +63,11 @@ class LeafSights {
 
   /// Index of the side of a leaf.
   [[nodiscard]] std::uint32_t sideOf(std::uint32_t value) const { return rays_->indexOfSide(value); }
+
+  /// By leaf value: which lie in part inside of something, as far as is known; empty: none.
+  [[nodiscard]] const std::vector<bool>& partlyInside() const { return partly_inside_; }
+  /// That is known of rays to be traced anew.
+  void expectPartlyInside(std::vector<bool> leaves);
 
   /// How many rays each half of a leaf has, by leaf value; 0 where it has no area.
   [[nodiscard]] std::span<const std::uint16_t> counts() const { return count_; }
@@ -109,6 +118,7 @@ class LeafSights {
   [[nodiscard]] std::uint32_t endOfRay(LeafRays::Place place, glm::dvec3 direction, std::uint64_t key,
                                        std::vector<Step>& steps) const;
   [[nodiscard]] std::uint32_t withSteps(std::uint32_t end, std::size_t half, std::vector<Step>& steps) const;
+  [[nodiscard]] std::uint32_t beginSlice();
   void traceSlice(std::uint32_t end);
   [[nodiscard]] std::vector<bool> findPartlyInside() const;
   void takePartlyInside();

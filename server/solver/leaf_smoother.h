@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -20,8 +21,10 @@ class LeafSmoother {
   /// By channel; the last counts for nothing.
   using Light = std::array<double, 4>;
 
-  /// `area`: by leaf value, 0 where there is no leaf. Both are to outlive it.
-  LeafSmoother(const std::vector<Side>& sides, const std::vector<double>& area) : sides_(sides), area_(area) {}
+  /// `area`: by leaf value, 0 where there is no leaf. Both are to outlive it. `is_parted`: by leaf value, whether light
+  /// may be another on both sides of something that stands there: no mean is taken of it, nor across it.
+  LeafSmoother(const std::vector<Side>& sides, const std::vector<double>& area,
+               const std::function<bool(std::uint32_t)>& is_parted = {});
 
   /// Smooths both halves (by leaf value), and remembers how. O(leaves).
   void smooth(std::array<std::vector<Light>, 2>& halves);
@@ -37,9 +40,12 @@ class LeafSmoother {
   void smoothSide(const Side& side, std::size_t pass, const std::array<std::vector<Light>, 2>& raw,
                   std::array<std::vector<Light>, 2>& halves);
   void average(const Side& side, std::uint32_t step, std::span<const Light> from, std::span<Light> means) const;
+  void averageApart(const Side& side, std::uint32_t step, std::span<const Light> from, std::span<Light> means) const;
 
   const std::vector<Side>& sides_;
   const std::vector<double>& area_;
+  std::vector<bool> parts_;                  ///< by leaf value: nothing is taken of it, nor across it
+  std::vector<bool> has_some_;               ///< by side: such leaves
   std::vector<std::vector<float>> towards_;  ///< by pass and leaf value: part of the way to the mean
   std::vector<double> taken_, by_chance_;    ///< by leaf value, times area: see bias(); the former signed
   double bias_ = 0.0;

@@ -7,7 +7,7 @@
 namespace radiosity::solver {
 namespace {
 
-constexpr std::uint32_t kKind = 0x344b4e4cU;  // "LNK4": what there is below, and in which order
+constexpr std::uint32_t kKind = 0x354b4e4cU;  // "LNK5": what there is below, and in which order
 
 /// All of a shooter but its links.
 template <typename Archive, typename Self>
