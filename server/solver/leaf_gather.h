@@ -153,8 +153,12 @@ class LeafGather {
   };
   [[nodiscard]] Levels levels(std::size_t half);
   [[nodiscard]] std::vector<std::array<LevelSum, 3>> levelSums(std::size_t half);
-  void addParted(std::size_t half, std::vector<std::array<LevelSum, 3>>& sums);
-  [[nodiscard]] std::vector<std::array<double, 3>> broughtByParted(std::size_t half, std::array<double, 3>& all) const;
+  void weighPartedLoss(std::size_t half);
+  /// It is parted, and some of its rays are lost.
+  [[nodiscard]] bool losesApart(std::size_t half, std::uint32_t value) const {
+    return has_parted_ && sights_.isParted(value) && lostOf(half, value).all() > 0.0;
+  }
+  [[nodiscard]] double lossOf(std::size_t half, std::size_t channel, std::uint32_t value) const;
   void weighMissed(const std::array<Levels, 2>& levels);
   void weighNoise(const LeafSmoother& smoother);
   void weighLost();
@@ -188,6 +192,7 @@ class LeafGather {
   struct Lost {
     float above = 0.0F, below = 0.0F, absorbed = 0.0F, doubtful = 0.0F;
     [[nodiscard]] double escaped() const { return static_cast<double>(above) + static_cast<double>(below); }
+    [[nodiscard]] double all() const { return escaped() + static_cast<double>(absorbed); }
   };
   [[nodiscard]] Lost lostOf(std::size_t half, std::size_t value) const {
     const auto count = sights_.counts()[value];
@@ -196,10 +201,11 @@ class LeafGather {
     const auto& rays = lost_[half][value];
     return {part(rays.above), part(rays.below), part(rays.absorbed), part(rays.doubtful)};
   }
-  bool is_weighed_ = false;                    ///< the following are known
-  bool has_parted_ = false;                    ///< leaves, as of LeafSights
-  std::array<std::vector<LostRays>, 2> lost_;  ///< by half and leaf value; empty: none
-  std::vector<std::uint32_t> part_;            ///< by side: which part of the scene, whose number is that of a side
+  bool is_weighed_ = false;                                        ///< the following are known
+  bool has_parted_ = false;                                        ///< leaves, as of LeafSights
+  std::array<std::vector<std::array<double, 3>>, 2> parted_loss_;  ///< by half, part and channel: see there
+  std::array<std::vector<LostRays>, 2> lost_;                      ///< by half and leaf value; empty: none
+  std::vector<std::uint32_t> part_;  ///< by side: which part of the scene, whose number is that of a side
   LeftLight light_;
   Stage stage_ = Stage::kDone;
   std::array<Half, 2> halves_;

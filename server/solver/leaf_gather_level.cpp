@@ -26,35 +26,58 @@ double LeafGather::skyAt(std::size_t h, std::size_t c, std::size_t v) const {
   return static_cast<double>(lost.above) * light_.sky[0][i] + static_cast<double>(lost.below) * light_.sky[1][i];
 }
 
-/// Of what ends on leaves that are parted, of the light in radiosity: by part of the scene and channel, and all of it.
-std::vector<std::array<double, 3>> LeafGather::broughtByParted(std::size_t h, std::array<double, 3>& all) const {
-  const auto& radiosity = halves_[h].radiosity;
-  const auto counts = sights_.counts();
-  std::vector<std::array<double, 3>> brought(sides_.size());
-  all = {};
-  for (std::uint32_t s = 0; s < sides_.size() && has_parted_; ++s) {
-    for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
-      Light sum{};
-      for (const auto end : sights_.seen(h, v)) {
-        if (!sights_.endsOnParted(end)) continue;
-        for (std::size_t c = 0; c < 3; ++c) sum[c] += radiosity[end][c];
-      }
-      for (std::size_t c = 0; c < 3 && counts[v] > 0; ++c) {
-        brought[part_[s]][c] += area_[v] * sum[c] / counts[v];
-        all[c] += area_[v] * sum[c] / counts[v];
-      }
+/// Of a leaf that is parted rays may be lost in a dark strip of it, under a floor that it reaches through, which sends
+/// nothing. By part of the scene and channel: how much of its light such leaves lose, of what they would lose if they
+/// shone evenly: none of it, or several times as much where the other part is dark. They send, and where rays of others
+/// end on them that much arrives; the rest is lost.
+void LeafGather::weighPartedLoss(std::size_t h) {
+  struct Flux {
+    double sent = 0.0, even = 0.0, arrives = 0.0;  // `even`: lost by leaves that shine evenly
+  };
+  parted_loss_[h].assign(sides_.size(), {1.0, 1.0, 1.0});
+  auto& radiosity = halves_[h].radiosity;
+  std::ranges::copy(halves_[h].source, radiosity.begin());
+  std::vector<std::array<Flux, 3>> fluxes(sides_.size());
+  for (std::uint32_t v = 0; v < sights_.leafCount(); ++v) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      radiosity[v][c] += static_cast<double>(light_.reflectance[v][static_cast<int>(c)]) * solved(h, c, v);
+      if (!losesApart(h, v)) continue;
+      auto& flux = fluxes[part_[sights_.sideOf(v)]][c];
+      flux.sent += area_[v] * radiosity[v][c];
+      flux.even += area_[v] * radiosity[v][c] * lostOf(h, v).all();
     }
   }
-  return brought;
+  followSteps(h, &halves_[h].source, radiosity);
+  const auto steps = sights_.steps(h);
+  for (std::uint32_t v = 0; v < sights_.leafCount(); ++v) {
+    if (sights_.counts()[v] == 0) continue;
+    const double share = area_[v] / sights_.counts()[v];
+    for (const auto end : sights_.seen(h, v)) {
+      const auto by = end < sights_.endCount() ? end : steps[end - sights_.endCount()].by;
+      if (by >= sights_.leafCount() || !losesApart(h, by)) continue;
+      for (std::size_t c = 0; c < 3; ++c) fluxes[part_[sights_.sideOf(by)]][c].arrives += share * radiosity[end][c];
+    }
+  }
+  for (std::size_t p = 0; p < fluxes.size(); ++p) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      const auto& flux = fluxes[p][c];
+      if (flux.even > 0.0) parted_loss_[h][p][c] = std::clamp((flux.sent - flux.arrives) / flux.even, 0.0, kMostLevel);
+    }
+  }
+}
+
+/// Part of a leaf's light that is lost, of what rays of it are.
+double LeafGather::lossOf(std::size_t h, std::size_t c, std::uint32_t v) const {
+  return losesApart(h, v) ? parted_loss_[h][part_[sights_.sideOf(v)]][c] : 1.0;
 }
 
 /// By part of the scene and channel: what makes
 /// sum a x = sum a (h (r + rho x) + s), h being the part of a leaf's light that other leaves get and s what comes from
-/// the sky: x times a factor. Of a leaf that is parted the part that rays lose may be a dark one, under a floor that it
-/// reaches through, which sends nothing: of what such leaves send only that is known which arrives. Where x is as much
-/// below nothing as above it, as where shooters have sent the mean of what is there and its pattern is left, that says
-/// nothing; all light of the part, with what came over links, makes up for what little is off then.
+/// the sky: x times a factor. Where x is as much below nothing as above it, as where shooters have sent the mean of
+/// what is there and its pattern is left, that says nothing; all light of the part, with what came over links, makes up
+/// for what little is off then.
 LeafGather::Levels LeafGather::levels(std::size_t h) {
+  if (has_parted_) weighPartedLoss(h);
   const auto sums = levelSums(h);
   Levels levels(sides_.size());
   for (std::size_t p = 0; p < sums.size(); ++p) {
@@ -82,10 +105,10 @@ std::vector<std::array<LeafGather::LevelSum, 3>> LeafGather::levelSums(std::size
     auto& sum = sums[part_[s]];
     for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
       const auto lost = lostOf(h, v);
-      const double sends = sights_.isParted(v) ? 0.0 : 1.0 - lost.escaped() - static_cast<double>(lost.absorbed);
       for (std::size_t c = 0; c < 3 && area_[v] > 0.0; ++c) {
         const auto i = static_cast<int>(c);
         const double x = solved(h, c, v), over_links = static_cast<double>(light_.irradiance[h][v][i]);
+        const double sends = 1.0 - lossOf(h, c, v) * lost.all();
         const double stays = 1.0 - sends * static_cast<double>(light_.reflectance[v][i]);
         sum[c].left += area_[v] * (sends * halves_[h].source[v][c] + skyAt(h, c, v));
         sum[c].kept += area_[v] * stays * x;
@@ -97,32 +120,7 @@ std::vector<std::array<LeafGather::LevelSum, 3>> LeafGather::levelSums(std::size
       }
     }
   }
-  if (has_parted_) addParted(h, sums);
   return sums;
-}
-
-/// What parted leaves send, by what is left by shooters and by x, each by itself.
-void LeafGather::addParted(std::size_t h, std::vector<std::array<LevelSum, 3>>& sums) {
-  auto& half = halves_[h];
-  std::array<double, 3> all{};
-  const auto brought = [&](bool by_source) {
-    std::ranges::fill(half.radiosity, Light{});
-    if (by_source) std::ranges::copy(half.source, half.radiosity.begin());
-    for (std::uint32_t v = 0; v < sights_.leafCount() && !by_source; ++v) {
-      for (std::size_t c = 0; c < 3; ++c)
-        half.radiosity[v][c] = static_cast<double>(light_.reflectance[v][static_cast<int>(c)]) * solved(h, c, v);
-    }
-    followSteps(h, by_source ? &half.source : nullptr, half.radiosity);
-    return broughtByParted(h, all);
-  };
-  const auto by_source = brought(true), by_x = brought(false);
-  for (std::size_t p = 0; p < sums.size(); ++p) {
-    for (std::size_t c = 0; c < 3; ++c) {
-      auto& sum = sums[p][c];
-      sum.left += by_source[p][c];
-      for (auto* of : {&sum.kept, &sum.size, &sum.all}) *of -= by_x[p][c];
-    }
-  }
 }
 
 /// What is small, and shines, neither half may have seen: its light is sent and does not arrive, in both alike, and the
@@ -153,32 +151,19 @@ void LeafGather::weighMissed(const std::array<Levels, 2>& levels) {
 }
 
 /// A ray is drawn as light leaves, too: what part of a leaf's rays leave the scene, or end on unlit sides, that part of
-/// its light does. Of leaves that are parted it is what they send and nobody gets.
+/// its light does.
 void LeafGather::weighLost() {
   escaped_ = absorbed_ = from_sky_ = {};
   for (std::size_t half = 0; half < 2; ++half) {
-    std::array<double, 3> escaped{}, absorbed{}, sent{}, arrives{};  // of parted leaves
-    auto& radiosity = halves_[half].radiosity;
-    if (has_parted_) {
-      followSteps(half, &halves_[half].source, radiosity);
-      (void)broughtByParted(half, arrives);
-    }
     for (std::uint32_t v = 0; v < sights_.leafCount(); ++v) {
       const auto lost = lostOf(half, v);
-      const bool is_parted = sights_.isParted(v);
+      if (lost.all() <= 0.0) continue;
       for (std::size_t c = 0; c < 3; ++c) {
-        const double flux = 0.5 * area_[v] * radiosity[v][c];
-        (is_parted ? escaped : escaped_)[c] += flux * lost.escaped();
-        (is_parted ? absorbed : absorbed_)[c] += flux * static_cast<double>(lost.absorbed);
-        if (is_parted) sent[c] += flux;
+        const double flux = 0.5 * area_[v] * halves_[half].radiosity[v][c] * lossOf(half, c, v);
+        escaped_[c] += flux * lost.escaped();
+        absorbed_[c] += flux * static_cast<double>(lost.absorbed);
         from_sky_[c] += 0.5 * area_[v] * skyAt(half, c, v);
       }
-    }
-    for (std::size_t c = 0; c < 3; ++c) {
-      const double all = escaped[c] + absorbed[c], lost = std::max(0.0, sent[c] - 0.5 * arrives[c]);
-      if (all <= 0.0) continue;
-      escaped_[c] += lost * escaped[c] / all;
-      absorbed_[c] += lost * absorbed[c] / all;
     }
   }
 }

@@ -47,10 +47,6 @@ class LeafSights {
   [[nodiscard]] bool isParted(std::uint32_t value) const {
     return rays_->isCut(value) || (!partly_inside_.empty() && partly_inside_[value]);
   }
-  /// It does that, or ends there.
-  [[nodiscard]] bool endsOnParted(std::uint32_t end) const {
-    return end >= endCount() || (end < leaf_count_ && isParted(end));
-  }
   /// The ray reached a leaf that is parted, and what it saw from there. Later ones go on to earlier ones.
   struct Step {
     std::uint32_t by;    ///< leaf value

@@ -23,16 +23,21 @@ class RayEdit : public test::ChairRoom {
     const solver::LeafSights& sights;
     std::size_t half;
   };
-  /// Over the same leaves.
+  /// Over the same leaves, up to one of which it is known here, and not there, that it lies in part within something:
+  /// more rays tell of more such leaves, and the two have different numbers of rays.
   static bool endsAlike(const Half& a, std::uint32_t here, const Half& b, std::uint32_t there) {
     const auto ends = a.sights.endCount();
-    for (; here >= ends && there >= ends;) {
-      const auto &x = a.sights.steps(a.half)[here - ends], &y = b.sights.steps(b.half)[there - ends];
-      if (x.by != y.by) return false;
-      here = x.next;
-      there = y.next;
+    const auto first = [ends](const Half& of, std::uint32_t end) {
+      return end < ends ? end : of.sights.steps(of.half)[end - ends].by;
+    };
+    while (true) {
+      const auto x = first(a, here), y = first(b, there);
+      if (x != y) return false;
+      if (x < a.sights.leafCount() && a.sights.isParted(x) != b.sights.isParted(x)) return true;
+      if (here < ends || there < ends) return here == there;
+      here = a.sights.steps(a.half)[here - ends].next;
+      there = b.sights.steps(b.half)[there - ends].next;
     }
-    return here == there;
   }
 
   /// How many rays see something else, of those that both have traced.
