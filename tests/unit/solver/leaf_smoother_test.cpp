@@ -80,6 +80,28 @@ TEST(LeafSmoother, StatesWhatIsLeftBesideAnEdge) {
   EXPECT_LT(off / stated, 1.5 * 1.5);
 }
 
+// A wall stands on a column of leaves, with the day on one side and the night on the other.
+TEST(LeafSmoother, TakesNoMeanAcrossAWall) {
+  constexpr std::uint32_t kWall = 11;
+  Field field([](std::uint32_t x, auto) { return x < kWall ? 1.0 : x > kWall ? 0.0 : 0.3; }, 0.0, 1);
+  for (auto& half : field.halves) {  // noise of the day, none of the night
+    std::mt19937 random(&half == &field.halves[0] ? 1 : 2);
+    std::normal_distribution<double> off(0.0, 0.3);
+    for (std::uint32_t leaf = 0; leaf < kSize * kSize; ++leaf) {
+      if (leaf % kSize < kWall) half[leaf][0] += off(random);
+    }
+  }
+  const auto raw = field.halves;
+  LeafSmoother smoother(field.sides, field.area, [](std::uint32_t leaf) { return leaf % kSize == kWall; });
+  smoother.smooth(field.halves);
+  EXPECT_NE(field.halves[0][kWall - 1], raw[0][kWall - 1]) << "nothing is smoothed";
+  for (std::uint32_t leaf = 0; leaf < kSize * kSize; ++leaf) {
+    if (leaf % kSize >= kWall) {
+      ASSERT_EQ(field.halves[0][leaf], raw[0][leaf]) << leaf;
+    }
+  }
+}
+
 TEST(LeafSmoother, DoesToOtherValuesWhatItDid) {
   Field field([](std::uint32_t x, auto) { return 0.01 * x; }, 0.1, 3);
   auto other = field.halves[0];

@@ -236,6 +236,54 @@ TEST(CutLeaves, TakeNoMoreStepsThanThereIsMemoryFor) {
   EXPECT_TRUE(bound.isDoubtful(1, bound.seen(1, 0)[0]));
 }
 
+// Light behind the wall where there should be none: that is stated.
+TEST(CutLeaves, WithoutMemoryToGoOnAreStatedAsDoubtful) {
+  const auto made = partedCube(true);
+  const auto sides = makeSides(*made.patches);
+  LeftLight light;
+  for (const auto& side : sides) {
+    light.emission.insert(light.emission.end(), side.leaf_count, glm::vec3(0.0F));
+    light.reflectance.insert(light.reflectance.end(), side.leaf_count, glm::vec3(0.9F));
+  }
+  for (auto& half : light.irradiance) half.assign(light.emission.size(), glm::vec3(0.0F));
+  light.shot = light.irradiance;
+  light.sky = {glm::dvec3(1.0), glm::dvec3(1.0)};
+  const auto behind = [&](std::size_t most_bytes, double& doubt) {
+    LeafGather gather(*made.patches, sides, 1, most_bytes);
+    gather.start();
+    gather.begin(light);
+    while (!gather.advance(1.0)) continue;
+    doubt = gather.doubt();
+    double sum = 0.0;
+    for (const auto& side : sides) {
+      for (auto v = side.first_value; side.surface == 4 && v < side.first_value + side.leaf_count; ++v)
+        sum += static_cast<double>(made.patches->node_area[side.first_node + v - side.first_value]) *
+               std::pow(static_cast<double>(gather.irradiance(0)[v].x), 2.0);
+    }
+    return sum;
+  };
+  double ample_doubt = 0.0, short_doubt = 0.0;
+  EXPECT_NEAR(behind(std::size_t{1} << 30, ample_doubt), 0.0, 1e-10);
+  EXPECT_EQ(ample_doubt, 0.0);
+  const double wrong = behind(LeafGather::leastBytes(made.patches->leaves.size()), short_doubt);
+  EXPECT_GT(wrong, 1e-4) << "they are not short";
+  EXPECT_GT(short_doubt, wrong);
+}
+
+// Which leaves lie in part inside of something rays alone tell, and they are traced anew when they are needed.
+TEST(PartlyInside, AreSavedWithAllElse) {
+  const Solve room(partedCube(false, 0.9F, 0.1F), skyOf(1.0F, 1.0F), Reflected::kByRays, 0.02);
+  ArchiveWriter to(std::size_t{64} << 20);
+  ASSERT_TRUE(room.solver->save(to));
+  auto transport = room.rays;
+  LinkedSolver next(room.made.patches, room.made.materials, transport, room.settings, skyOf(1.0F, 1.0F));
+  ArchiveReader from(to.bytes());
+  ASSERT_TRUE(next.restore(from));
+  next.assess();
+  EXPECT_EQ(next.error().total, room.solver->error().total);
+  EXPECT_EQ(next.error().variation, room.solver->error().variation);
+}
+
 TEST(CutLeaves, NoMoreThreadsNorSlicesChangeABit) {
   const auto made = partedCube(true);
   const auto sides = makeSides(*made.patches);
