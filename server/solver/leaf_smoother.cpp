@@ -66,51 +66,58 @@ class GainTable {
 
 LeafSmoother::LeafSmoother(const std::vector<Side>& sides, const std::vector<double>& area,
                            const std::function<bool(std::uint32_t)>& is_parted)
-    : sides_(sides), area_(area), parts_(area.size(), false), has_some_(sides.size(), false) {
-  for (std::size_t s = 0; s < sides.size() && is_parted; ++s) {
-    for (auto v = sides[s].first_value; v < sides[s].first_value + sides[s].leaf_count; ++v) {
-      if (area[v] <= 0.0 || !is_parted(v)) continue;
-      parts_[v] = has_some_[s] = true;
-    }
-  }
+    : sides_(sides), area_(area), parts_(area.size(), false), beside_(sides.size()) {
+  for (std::size_t s = 0; s < sides.size() && is_parted; ++s) findParted(s, is_parted);
 }
 
-/// As average(), of those between which and the leaf nothing stands.
-void LeafSmoother::averageApart(const Side& side, std::uint32_t step, std::span<const Light> from,
-                                std::span<Light> means) const {
-  const auto apart = static_cast<std::int64_t>(step);
-  const auto at = [&](std::int64_t x, std::int64_t y) {
-    return static_cast<std::uint32_t>(y) * side.width + static_cast<std::uint32_t>(x);
+void LeafSmoother::findParted(std::size_t s, const std::function<bool(std::uint32_t)>& is_parted) {
+  constexpr std::uint32_t kReach = kSteps.back();
+  const auto& side = sides_[s];
+  std::vector<bool> beside;
+  for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+    if (area_[side.first_value + leaf] <= 0.0 || !is_parted(side.first_value + leaf)) continue;
+    parts_[side.first_value + leaf] = true;
+    beside.resize(side.leaf_count);
+    const auto x = leaf % side.width, y = leaf / side.width;
+    for (auto ny = y - std::min(y, kReach); ny < std::min(y + kReach + 1, side.height); ++ny)
+      for (auto nx = x - std::min(x, kReach); nx < std::min(x + kReach + 1, side.width); ++nx)
+        beside[ny * side.width + nx] = true;
+  }
+  for (std::uint32_t leaf = 0; leaf < beside.size(); ++leaf)
+    if (beside[leaf]) beside_[s].push_back(leaf);
+}
+
+/// As average(), of one leaf and of those between which and it nothing stands.
+LeafSmoother::Light LeafSmoother::averageApart(const Side& side, std::uint32_t leaf, std::uint32_t step,
+                                               std::span<const Light> from) const {
+  Light mean = from[leaf];
+  if (parts_[side.first_value + leaf]) return mean;
+  const std::int64_t x = leaf % side.width, y = leaf / side.width, apart = step;
+  const auto at = [&](std::int64_t to_x, std::int64_t to_y) {
+    return static_cast<std::uint32_t>(to_y) * side.width + static_cast<std::uint32_t>(to_x);
   };
   const auto isWithin = [](std::int64_t k, std::uint32_t size) { return k >= 0 && k < std::int64_t{size}; };
-  for (std::int64_t y = 0; y < side.height; ++y) {
-    for (std::int64_t x = 0; x < side.width; ++x) {
-      auto& mean = means[at(x, y)];
-      mean = from[at(x, y)];
-      if (parts_[side.first_value + at(x, y)]) continue;
-      Light sum{};
-      double all = 0.0;
-      for (std::int64_t way = 0; way < 9; ++way) {
-        const std::int64_t dx = way % 3 - 1, dy = way / 3 - 1;
-        if (!isWithin(x + apart * dx, side.width) || !isWithin(y + apart * dy, side.height)) continue;
-        bool is_open = true;
-        for (std::int64_t k = 1; k <= apart && is_open && way != 4; ++k)
-          is_open = !parts_[side.first_value + at(x + k * dx, y + k * dy)];
-        if (!is_open) continue;
-        const auto leaf = at(x + apart * dx, y + apart * dy);
-        const double weight = (dx == 0 ? 2.0 : 1.0) * (dy == 0 ? 2.0 : 1.0) * area_[side.first_value + leaf];
-        for (std::size_t c = 0; c < 3; ++c) sum[c] += weight * from[leaf][c];
-        all += weight;
-      }
-      for (std::size_t c = 0; c < 3 && all > 0.0; ++c) mean[c] = sum[c] / all;
-    }
+  Light sum{};
+  double all = 0.0;
+  for (std::int64_t way = 0; way < 9; ++way) {
+    const std::int64_t dx = way % 3 - 1, dy = way / 3 - 1;
+    if (!isWithin(x + apart * dx, side.width) || !isWithin(y + apart * dy, side.height)) continue;
+    bool is_open = true;
+    for (std::int64_t k = 1; k <= apart && is_open; ++k)
+      is_open = !parts_[side.first_value + at(x + k * dx, y + k * dy)];
+    if (!is_open) continue;
+    const auto there = at(x + apart * dx, y + apart * dy);
+    const double weight = (dx == 0 ? 2.0 : 1.0) * (dy == 0 ? 2.0 : 1.0) * area_[side.first_value + there];
+    for (std::size_t c = 0; c < 3; ++c) sum[c] += weight * from[there][c];
+    all += weight;
   }
+  for (std::size_t c = 0; c < 3 && all > 0.0; ++c) mean[c] = sum[c] / all;
+  return mean;
 }
 
 /// Binomial, of the leaves there are.
 void LeafSmoother::average(const Side& side, std::uint32_t step, std::span<const Light> from,
                            std::span<Light> means) const {
-  if (has_some_[static_cast<std::size_t>(&side - sides_.data())]) return averageApart(side, step, from, means);
   const auto near = [&](std::uint32_t at, std::uint32_t size, auto take) {
     take(at, 2.0);
     if (at >= step) take(at - step, 1.0);
@@ -133,6 +140,8 @@ void LeafSmoother::average(const Side& side, std::uint32_t step, std::span<const
       for (std::size_t c = 0; c < 3 && all > 0.0; ++c) mean[c] = sum[c] / all;
     }
   }
+  for (const auto leaf : beside_[static_cast<std::size_t>(&side - sides_.data())])
+    means[leaf] = averageApart(side, leaf, step, from);
 }
 
 void LeafSmoother::smooth(std::array<std::vector<Light>, 2>& halves) {

@@ -40,12 +40,15 @@ class LeafSmoother {
   void smoothSide(const Side& side, std::size_t pass, const std::array<std::vector<Light>, 2>& raw,
                   std::array<std::vector<Light>, 2>& halves);
   void average(const Side& side, std::uint32_t step, std::span<const Light> from, std::span<Light> means) const;
-  void averageApart(const Side& side, std::uint32_t step, std::span<const Light> from, std::span<Light> means) const;
+  [[nodiscard]] Light averageApart(const Side& side, std::uint32_t leaf, std::uint32_t step,
+                                   std::span<const Light> from) const;
+  void findParted(std::size_t s, const std::function<bool(std::uint32_t)>& is_parted);
 
   const std::vector<Side>& sides_;
   const std::vector<double>& area_;
-  std::vector<bool> parts_;                  ///< by leaf value: nothing is taken of it, nor across it
-  std::vector<bool> has_some_;               ///< by side: such leaves
+  std::vector<bool> parts_;  ///< by leaf value: nothing is taken of it, nor across it
+  /// By side: leaves so near to such leaves that some means may not be taken.
+  std::vector<std::vector<std::uint32_t>> beside_;
   std::vector<std::vector<float>> towards_;  ///< by pass and leaf value: part of the way to the mean
   std::vector<double> taken_, by_chance_;    ///< by leaf value, times area: see bias(); the former signed
   double bias_ = 0.0;
