@@ -12,6 +12,10 @@ namespace {
 constexpr double kMostLevel = 4.0, kMostOff = 0.5;
 /// Light that both halves lack by more than so many times what they differ by is not lacking by chance.
 constexpr double kByChance = 2.0;
+/// Parted leaves lose no more than so many times what they would if they shone evenly: of one of which a quarter
+/// shines, and loses all that is lost.
+constexpr double kMostLoss = 4.0;
+
 }  // namespace
 
 /// x, but for what few rays find too much missing of: with what came over links no leaf gets less than no light.
@@ -35,13 +39,20 @@ void LeafGather::weighPartedLoss(std::size_t h) {
     double sent = 0.0, even = 0.0, arrives = 0.0;  // `even`: lost by leaves that shine evenly
   };
   parted_loss_[h].assign(sides_.size(), {1.0, 1.0, 1.0});
+  std::vector<bool> loses(sights_.leafCount());
+  bool do_some = false;
+  for (std::uint32_t v = 0; v < loses.size(); ++v) {
+    loses[v] = losesApart(h, v);
+    do_some = do_some || loses[v];
+  }
+  if (!do_some) return;
   auto& radiosity = halves_[h].radiosity;
   std::ranges::copy(halves_[h].source, radiosity.begin());
   std::vector<std::array<Flux, 3>> fluxes(sides_.size());
-  for (std::uint32_t v = 0; v < sights_.leafCount(); ++v) {
+  for (std::uint32_t v = 0; v < loses.size(); ++v) {
     for (std::size_t c = 0; c < 3; ++c) {
       radiosity[v][c] += static_cast<double>(light_.reflectance[v][static_cast<int>(c)]) * solved(h, c, v);
-      if (!losesApart(h, v)) continue;
+      if (!loses[v]) continue;
       auto& flux = fluxes[part_[sights_.sideOf(v)]][c];
       flux.sent += area_[v] * radiosity[v][c];
       flux.even += area_[v] * radiosity[v][c] * lostOf(h, v).all();
@@ -49,19 +60,18 @@ void LeafGather::weighPartedLoss(std::size_t h) {
   }
   followSteps(h, &halves_[h].source, radiosity);
   const auto steps = sights_.steps(h);
-  for (std::uint32_t v = 0; v < sights_.leafCount(); ++v) {
-    if (sights_.counts()[v] == 0) continue;
-    const double share = area_[v] / sights_.counts()[v];
+  for (std::uint32_t v = 0; v < loses.size(); ++v) {
     for (const auto end : sights_.seen(h, v)) {
       const auto by = end < sights_.endCount() ? end : steps[end - sights_.endCount()].by;
-      if (by >= sights_.leafCount() || !losesApart(h, by)) continue;
+      if (by >= loses.size() || !loses[by]) continue;
+      const double share = area_[v] / sights_.counts()[v];
       for (std::size_t c = 0; c < 3; ++c) fluxes[part_[sights_.sideOf(by)]][c].arrives += share * radiosity[end][c];
     }
   }
   for (std::size_t p = 0; p < fluxes.size(); ++p) {
     for (std::size_t c = 0; c < 3; ++c) {
       const auto& flux = fluxes[p][c];
-      if (flux.even > 0.0) parted_loss_[h][p][c] = std::clamp((flux.sent - flux.arrives) / flux.even, 0.0, kMostLevel);
+      if (flux.even > 0.0) parted_loss_[h][p][c] = std::clamp((flux.sent - flux.arrives) / flux.even, 0.0, kMostLoss);
     }
   }
 }

@@ -13,8 +13,6 @@ namespace {
 
 /// Leaves between two looks at the clock, of all threads together, and of one at a time.
 constexpr std::uint32_t kLeavesASlice = 2048, kLeavesAtOnce = 64;
-/// And as few as that where there is little memory for steps.
-constexpr std::uint32_t kFewestASlice = 64;
 /// So many rays of each half at most tell whether a leaf lies in part inside of something. With 8 those were missed of
 /// which less than a tenth does, and that tenth kept its light from all rays that met the rest.
 constexpr std::size_t kLooks = 64;
@@ -182,22 +180,22 @@ void LeafSights::takeSteps(std::span<const std::array<NewSteps, 2>> made) {
   }
 }
 
-/// Where the slice that begins at cursor_ ends: before what it may take at most is more than there is room for. Where
-/// that is not even enough for a few leaves no ray goes on.
+/// Where the slice that begins at cursor_ ends: before its rays, should all go on as often as rays may, would take more
+/// than there is room for. Where that is so of a single leaf no ray of some goes on.
 std::uint32_t LeafSights::beginSlice() {
   const auto steps = steps_[0].size() + steps_[1].size();
   const auto taken = bytes() + steps * step_bytes_;
   const auto room = taken < most_bytes_ ? (most_bytes_ - taken) / (sizeof(Step) + step_bytes_) : 0;
-  const auto most = std::min(room, kMostNumbers - std::min(kMostNumbers, steps)) / (2 * kMostSteps);
-  std::uint32_t end = cursor_;
+  const auto most = std::min(room, kMostNumbers - std::min(kMostNumbers, steps)) / kMostSteps;
+  auto end = cursor_;
   for (std::size_t rays = 0; end < std::min(leaf_count_, cursor_ + kLeavesASlice); ++end) {
-    rays += count_[end];
+    for (std::size_t half = 0; half < 2; ++half)
+      rays += static_cast<std::size_t>(std::ranges::count(seen(half, end), kUntraced));
     if (rays > most) break;
   }
-  const auto fewest = std::min(leaf_count_, cursor_ + kFewestASlice);
-  goes_on_ = end >= fewest;
+  goes_on_ = end > cursor_;
   is_short_ = is_short_ || !goes_on_;
-  return std::max(end, fewest);
+  return goes_on_ ? end : std::min(leaf_count_, cursor_ + kLeavesAtOnce);
 }
 
 /// From cursor_ to `end`. Where memory runs out, rays with steps are as good as not traced.

@@ -66,7 +66,7 @@ class GainTable {
 
 LeafSmoother::LeafSmoother(const std::vector<Side>& sides, const std::vector<double>& area,
                            const std::function<bool(std::uint32_t)>& is_parted)
-    : sides_(sides), area_(area), parts_(area.size(), false), beside_(sides.size()) {
+    : sides_(sides), area_(area), is_parted_(area.size(), false), beside_(sides.size()) {
   for (std::size_t s = 0; s < sides.size() && is_parted; ++s) findParted(s, is_parted);
 }
 
@@ -76,7 +76,7 @@ void LeafSmoother::findParted(std::size_t s, const std::function<bool(std::uint3
   std::vector<bool> beside;
   for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
     if (area_[side.first_value + leaf] <= 0.0 || !is_parted(side.first_value + leaf)) continue;
-    parts_[side.first_value + leaf] = true;
+    is_parted_[side.first_value + leaf] = true;
     beside.resize(side.leaf_count);
     const auto x = leaf % side.width, y = leaf / side.width;
     for (auto ny = y - std::min(y, kReach); ny < std::min(y + kReach + 1, side.height); ++ny)
@@ -91,7 +91,7 @@ void LeafSmoother::findParted(std::size_t s, const std::function<bool(std::uint3
 LeafSmoother::Light LeafSmoother::averageApart(const Side& side, std::uint32_t leaf, std::uint32_t step,
                                                std::span<const Light> from) const {
   Light mean = from[leaf];
-  if (parts_[side.first_value + leaf]) return mean;
+  if (is_parted_[side.first_value + leaf]) return mean;
   const std::int64_t x = leaf % side.width, y = leaf / side.width, apart = step;
   const auto at = [&](std::int64_t to_x, std::int64_t to_y) {
     return static_cast<std::uint32_t>(to_y) * side.width + static_cast<std::uint32_t>(to_x);
@@ -104,7 +104,7 @@ LeafSmoother::Light LeafSmoother::averageApart(const Side& side, std::uint32_t l
     if (!isWithin(x + apart * dx, side.width) || !isWithin(y + apart * dy, side.height)) continue;
     bool is_open = true;
     for (std::int64_t k = 1; k <= apart && is_open; ++k)
-      is_open = !parts_[side.first_value + at(x + k * dx, y + k * dy)];
+      is_open = !is_parted_[side.first_value + at(x + k * dx, y + k * dy)];
     if (!is_open) continue;
     const auto there = at(x + apart * dx, y + apart * dy);
     const double weight = (dx == 0 ? 2.0 : 1.0) * (dy == 0 ? 2.0 : 1.0) * area_[side.first_value + there];

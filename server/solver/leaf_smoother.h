@@ -46,7 +46,7 @@ class LeafSmoother {
 
   const std::vector<Side>& sides_;
   const std::vector<double>& area_;
-  std::vector<bool> parts_;  ///< by leaf value: nothing is taken of it, nor across it
+  std::vector<bool> is_parted_;  ///< by leaf value: nothing is taken of it, nor across it
   /// By side: leaves so near to such leaves that some means may not be taken.
   std::vector<std::vector<std::uint32_t>> beside_;
   std::vector<std::vector<float>> towards_;  ///< by pass and leaf value: part of the way to the mean

@@ -219,7 +219,8 @@ TEST(CutLeaves, TakeNoMoreStepsThanThereIsMemoryFor) {
   LeafSights free(*made.patches, sides, 1), bound(*made.patches, sides, 1), sliced(*made.patches, sides, 1);
   const std::vector<std::uint16_t> counts(free.leafCount(), 2);
   constexpr std::size_t kStepBytes = 32, kSlice = std::size_t{2048} * 2 * 32 * (8 + kStepBytes);
-  for (auto* sights : {&bound, &sliced}) sights->limit(sights->bytes() + kSlice, kStepBytes);
+  const auto most = bound.bytes() + kSlice;
+  for (auto* sights : {&bound, &sliced}) sights->limit(most, kStepBytes);
   for (auto* sights : {&free, &bound, &sliced}) sights->ask(counts);
   ASSERT_TRUE(free.trace(HUGE_VAL));
   ASSERT_TRUE(bound.trace(HUGE_VAL));
@@ -228,7 +229,8 @@ TEST(CutLeaves, TakeNoMoreStepsThanThereIsMemoryFor) {
     return sights.bytes() + kStepBytes * (sights.steps(0).size() + sights.steps(1).size());
   };
   EXPECT_GT(taken(free), 5 * kSlice);
-  EXPECT_LT(taken(bound), 3 * kSlice);
+  EXPECT_LE(taken(bound), most);
+  EXPECT_GT(taken(bound), most / 2) << "it goes on as long as it can";
   EXPECT_EQ(taken(bound), taken(sliced));
   const auto last = bound.leafCount() - 1;
   EXPECT_LT(bound.seen(0, last)[0], bound.leafCount()) << "it does not go on";
