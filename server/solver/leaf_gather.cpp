@@ -43,6 +43,15 @@ RADIOSITY_CLONES void averageSeen(const LeafSights& sights, std::size_t half, co
   }
 }
 
+/// At the edges of a side smoothing has leaves on two of four sides only, and another side's light changes most.
+std::uint16_t firstRaysOfWide(const Side& side, std::uint32_t leaf, bool is_alone) {
+  const auto x = leaf % side.width, y = leaf / side.width;
+  const auto from_edge = std::min({x, y, side.width - 1 - x, side.height - 1 - y});
+  const std::uint32_t usual = is_alone ? 2 * kFirstRays : kFirstRays;
+  const std::uint32_t times = from_edge == 0 ? 4 : from_edge == 1 && is_alone ? 2 : 1;
+  return static_cast<std::uint16_t>(times * usual);
+}
+
 }  // namespace
 
 LeafGather::LeafGather(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed,
@@ -72,11 +81,14 @@ void LeafGather::start(const std::vector<bool>& has_other) {
   const auto counts = sights_.counts();
   if (std::ranges::any_of(counts, [](std::uint16_t count) { return count > 0; })) return;
   std::vector<std::uint16_t> asked(sights_.leafCount(), kFirstRays);
-  const std::size_t most = leastBytes(asked.size()) + asked.size() * kFirstRays * LeafSights::kRayBytes;
-  for (std::size_t s = 0; s < has_other.size() && most <= most_bytes_; ++s) {
-    if (!has_other[s] && isWide(sides_[s]))
-      std::fill_n(asked.begin() + sides_[s].first_value, sides_[s].leaf_count, std::uint16_t{2 * kFirstRays});
+  for (std::size_t s = 0; s < sides_.size(); ++s) {
+    const auto& side = sides_[s];
+    const bool is_alone = !has_other.empty() && !has_other[s];
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count && isWide(side); ++leaf)
+      asked[side.first_value + leaf] = firstRaysOfWide(side, leaf, is_alone);
   }
+  const auto rays = std::reduce(asked.begin(), asked.end(), std::size_t{0});
+  if (leastBytes(asked.size()) + rays * LeafSights::kRayBytes > most_bytes_) std::ranges::fill(asked, kFirstRays);
   sights_.ask(asked);
 }
 

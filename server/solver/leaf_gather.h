@@ -56,7 +56,8 @@ class LeafGather {
   /// Light was brought, once at least.
   [[nodiscard]] bool hasGathered() const { return has_gathered_; }
   /// All leaves get as many as a solve begins with, where there are none; twice as many on wide sides whose light
-  /// comes by rays alone, so that nothing hides their noise. `has_other`: by side, whether there is other light.
+  /// comes by rays alone, so that nothing hides their noise, and four times as many at the edges of wide sides, where
+  /// little is there to smooth it with. `has_other`: by side, whether there is other light.
   void start(const std::vector<bool>& has_other = {});
   /// Of so many leaves that noise shows as blotches which on fewer would be a shade.
   [[nodiscard]] static bool isWide(const Side& side) { return side.leaf_count >= kWide; }
@@ -164,9 +165,10 @@ class LeafGather {
   void weighLost();
   void weighDoubt();
   [[nodiscard]] glm::dvec3 fromTheEnd(std::size_t half, std::uint32_t end) const;
-  /// By block of leaves: how many rays they have, and the one with most; how many times as many are asked for.
+  /// By block of leaves: how many rays they have, how many have some, and the one with most; how many times as many
+  /// are asked for.
   struct BlockRays {
-    std::uint32_t rays = 0, most = 0, times = 1;
+    std::uint32_t rays = 0, leaves = 0, most = 0, times = 1;
   };
   [[nodiscard]] std::vector<BlockRays> blockRays() const;
   /// For more rays.

@@ -38,6 +38,7 @@ std::vector<LeafGather::BlockRays> LeafGather::blockRays() const {
   for (std::uint32_t v = 0; v < counts.size(); ++v) {
     auto& block = blocks[v / kBlock];
     block.rays += counts[v];
+    block.leaves += counts[v] > 0 ? 1U : 0U;
     block.most = std::max<std::uint32_t>(block.most, counts[v]);
   }
   return blocks;
@@ -79,7 +80,7 @@ void LeafGather::refineBlotches(const BesideLight& beside, std::vector<BlockRays
     auto& block = blocks[b];
     if (noisy[b] <= beside.borne * beside.borne) continue;
     while (noisy[b] * noiseLeft(block.times) > beside.goal * beside.goal &&
-           2 * block.times * block.most <= kMostForBlotches && takeDouble(block, taken))
+           2 * block.times * block.rays <= kMostForBlotches * block.leaves && takeDouble(block, taken))
       continue;
   }
 }

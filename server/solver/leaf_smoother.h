@@ -39,8 +39,17 @@ class LeafSmoother {
  private:
   void smoothSide(const Side& side, std::size_t pass, const std::array<std::vector<Light>, 2>& raw,
                   std::array<std::vector<Light>, 2>& halves);
-  void average(const Side& side, std::uint32_t step, std::span<const Light> from, std::span<Light> means) const;
-  [[nodiscard]] Light averageApart(const Side& side, std::uint32_t leaf, std::uint32_t step,
+  /// Which leaves are averaged: so far apart, and whether one may count whose mirror image there is not.
+  struct Pass {
+    std::uint32_t step;
+    bool one_sided;
+    /// Whether it does anything along an edge of so many leaves, at its ends.
+    [[nodiscard]] bool takesEnds(std::uint32_t size) const;
+  };
+  static const std::array<Pass, 5> kPasses;
+  [[nodiscard]] static bool isFor(const Pass& pass, const Side& side);
+  void average(const Side& side, const Pass& pass, std::span<const Light> from, std::span<Light> means) const;
+  [[nodiscard]] Light averageApart(const Side& side, std::uint32_t leaf, const Pass& pass,
                                    std::span<const Light> from) const;
   void findParted(std::size_t s, const std::function<bool(std::uint32_t)>& is_parted);
 

@@ -226,6 +226,7 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] double shotCost() const;
   [[nodiscard]] double rayCost() const;
   [[nodiscard]] double samplesCost() const;
+  [[nodiscard]] double usualRadiosity() const;
   [[nodiscard]] std::vector<double> leastRadiosity() const;
   struct Noise {
     double rays = 0.0, links = 0.0;  ///< squares of relative errors; what smoothing took is shared out between them

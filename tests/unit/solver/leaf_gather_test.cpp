@@ -227,23 +227,28 @@ TEST(LeafGather, MoreRaysGoToWhatIsDarkAndNoisy) {
   EXPECT_FALSE(gather.refine(HUGE_VAL, {0.1, 0.1})) << "it comes to an end";
 }
 
-TEST(LeafGather, WideSidesWithoutOtherLightBeginWithTwiceAsManyRays) {
+TEST(LeafGather, WideSidesWithoutOtherLightBeginWithTwiceAsManyRaysAndTheirEdgesWithMore) {
   auto quads = cubeQuads(16, {}, all(0.5F));
   for (std::size_t small = 4; small < 6; ++small) quads[small].width = quads[small].height = 8;
   const auto scene = makeQuadScene(quads);
   const auto sides = makeSides(*scene.patches);
   const std::vector<bool> has_other{true, false, true, false, true, false};
-  const auto raysOf = [&](std::size_t most_bytes) {
+  const auto raysOf = [&](std::size_t most_bytes, std::uint32_t from_edge) {
     LeafGather gather(*scene.patches, sides, 1, most_bytes);
     gather.start(has_other);
     std::vector<std::uint32_t> rays;
-    for (const auto& side : sides) rays.push_back(gather.sights().counts()[side.first_value]);
+    for (const auto& side : sides)
+      rays.push_back(gather.sights().counts()[side.first_value + from_edge * side.width + side.width / 2]);
     return rays;
   };
-  const auto rays = raysOf(kPlenty);
-  ASSERT_GT(rays[0], 0U);
-  EXPECT_THAT(rays, testing::ElementsAre(rays[0], 2 * rays[0], rays[0], 2 * rays[0], rays[0], rays[0]));
-  EXPECT_THAT(raysOf(LeafGather::leastBytes(4 * 256 + 2 * 64)), testing::Each(rays[0])) << "there is no room for more";
+  using testing::ElementsAre;
+  const auto rays = raysOf(kPlenty, 2);
+  const auto n = rays[0];
+  ASSERT_GT(n, 0U);
+  EXPECT_THAT(rays, ElementsAre(n, 2 * n, n, 2 * n, n, n));
+  EXPECT_THAT(raysOf(kPlenty, 0), ElementsAre(4 * n, 8 * n, 4 * n, 8 * n, n, n));
+  EXPECT_THAT(raysOf(kPlenty, 1), ElementsAre(n, 4 * n, n, 4 * n, n, n));
+  EXPECT_THAT(raysOf(LeafGather::leastBytes(4 * 256 + 2 * 64), 0), testing::Each(n)) << "there is no room for more";
 }
 
 TEST(LeafGather, NoiseThatIsNotBorneIsBroughtBelowThatWhichIs) {
