@@ -8,6 +8,8 @@
 #include <numeric>
 #include <unordered_map>
 
+#include "server/gpu/self_crossing.h"
+
 namespace radiosity::gpu {
 namespace {
 
@@ -45,6 +47,13 @@ class UnionFind {
   std::vector<std::uint32_t> parent_;
 };
 
+Corners cornersOf(const scene::PatchScene& patches, std::uint32_t triangle) {
+  const auto corner = [&](std::size_t c) {
+    return patches.vertices[patches.indices[std::size_t{3} * triangle + c]].position;
+  };
+  return {corner(0), corner(1), corner(2)};
+}
+
 struct Edge {
   std::uint64_t key;  ///< its two places, the smaller first
   std::uint32_t triangle;
@@ -66,9 +75,9 @@ std::vector<Edge> sortedEdges(const scene::PatchScene& patches) {
   return edges;
 }
 
-}  // namespace
-
-ClosedSolids findClosedSolids(const scene::PatchScene& patches) {
+/// By triangle: one of those it is connected with, the same for all of them; kNone where they have an open edge, can be
+/// seen through, or enclose no positive volume.
+std::vector<std::uint32_t> closedParts(const scene::PatchScene& patches) {
   const auto triangles = patches.indices.size() / 3;
   UnionFind parts(triangles);
   std::vector<bool> open(triangles, false);
@@ -87,29 +96,50 @@ ClosedSolids findClosedSolids(const scene::PatchScene& patches) {
     const auto part = parts.find(i);
     const bool see_through = patches.surfaces[patches.triangle_surface[i]].see_through;
     if (open[i] || see_through) part_open[part] = true;
-    const auto corner = [&](std::size_t c) {
-      return glm::dvec3(patches.vertices[patches.indices[std::size_t{3} * i + c]].position);
-    };
-    volume[part] += glm::dot(corner(0), glm::cross(corner(1), corner(2)));
+    const auto [a, b, c] = cornersOf(patches, i);
+    volume[part] += glm::dot(glm::dvec3(a), glm::cross(glm::dvec3(b), glm::dvec3(c)));
   }
-
-  ClosedSolids solids;
-  solids.solid_of.assign(triangles, scene::kNone);
-  std::vector<std::uint32_t> number(triangles, scene::kNone);
+  std::vector<std::uint32_t> part_of(triangles, scene::kNone);
   for (std::uint32_t i = 0; i < triangles; ++i) {
     const auto part = parts.find(i);
-    if (part_open[part] || volume[part] <= 0.0) continue;
-    if (number[part] == scene::kNone) {
-      number[part] = static_cast<std::uint32_t>(solids.bounds.size());
-      solids.bounds.push_back({glm::vec3(1e30F), glm::vec3(-1e30F)});
+    if (!part_open[part] && volume[part] > 0.0) part_of[i] = part;
+  }
+  return part_of;
+}
+
+}  // namespace
+
+/// A connected surface that keeps clear of itself has two sides, and where the volume is positive its backs are within:
+/// no two volumes of it overlap, and none is turned inside out.
+ClosedSolids findClosedSolids(const scene::PatchScene& patches) {
+  const auto part_of = closedParts(patches);
+  std::vector<std::uint32_t> order;  // part after part, in the order of their first triangles
+  std::vector<std::uint32_t> first_of(part_of.size(), scene::kNone);
+  for (std::uint32_t i = 0; i < part_of.size(); ++i) {
+    if (part_of[i] == scene::kNone) continue;
+    if (first_of[part_of[i]] == scene::kNone) first_of[part_of[i]] = i;
+    order.push_back(i);
+  }
+  const auto first = [&](std::uint32_t triangle) { return first_of[part_of[triangle]]; };
+  std::ranges::stable_sort(order, {}, first);
+
+  ClosedSolids solids;
+  solids.solid_of.assign(part_of.size(), scene::kNone);
+  std::vector<Corners> triangles;
+  for (auto begin = order.begin(), end = begin; begin != order.end(); begin = end) {
+    end = std::find_if(begin, order.end(), [&](std::uint32_t i) { return first(i) != first(*begin); });
+    triangles.clear();
+    for (auto i = begin; i != end; ++i) triangles.push_back(cornersOf(patches, *i));
+    if (!keepsClearOfItself(triangles)) continue;
+    ClosedSolids::Bounds bounds{glm::vec3(1e30F), glm::vec3(-1e30F)};
+    for (const auto& corners : triangles) {
+      for (const auto& position : corners) {
+        bounds.low = glm::min(bounds.low, position);
+        bounds.high = glm::max(bounds.high, position);
+      }
     }
-    solids.solid_of[i] = number[part];
-    auto& bounds = solids.bounds[number[part]];
-    for (std::size_t c = 0; c < 3; ++c) {
-      const auto& position = patches.vertices[patches.indices[std::size_t{3} * i + c]].position;
-      bounds.low = glm::min(bounds.low, position);
-      bounds.high = glm::max(bounds.high, position);
-    }
+    for (auto i = begin; i != end; ++i) solids.solid_of[*i] = static_cast<std::uint32_t>(solids.bounds.size());
+    solids.bounds.push_back(bounds);
   }
   return solids;
 }

@@ -1,6 +1,6 @@
 // Finds the closed solids of a scene: connected triangles in which every edge is shared by exactly two, running
-// opposite ways, and which enclose a positive volume. From outside such a solid its back faces can never be seen, so
-// they need not be drawn. Pure functions of values.
+// opposite ways, which nowhere cross each other, and which enclose a positive volume. From outside such a solid its
+// back faces can never be seen, so they need not be drawn. Pure functions of values.
 #pragma once
 
 #include <cstdint>
