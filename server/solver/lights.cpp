@@ -11,6 +11,30 @@ namespace {
 /// More polygons than this on one surface (a tessellated lamp) cost more as gather shots than as scatter shots.
 constexpr std::uint32_t kMaxPolygonsPerSurface = 16;
 
+std::array<glm::vec3, 3> triangleCorners(const scene::PatchScene& patches, std::uint32_t triangle) {
+  std::array<glm::vec3, 3> corners{};
+  for (std::uint32_t k = 0; k < 3; ++k) corners[k] = patches.vertices[patches.indices[3 * triangle + k]].position;
+  return corners;
+}
+
+/// A polygon shines whole. Of its area no more may lie in solids or behind what covers it than so small a part, which
+/// errors that are asked for do not show; whether anything does, rounding leaves open: leaves know their areas in
+/// single precision, each clipped apart.
+constexpr double kHidden = 1e-3;
+
+/// Whether all of the triangles can be seen on this side.
+bool isWhole(const scene::PatchScene& patches, const Side& side) {
+  const auto& surface = patches.surfaces[side.surface];
+  double whole = 0.0, seen = 0.0;
+  for (auto t = surface.first_triangle; t < surface.first_triangle + surface.triangle_count; ++t) {
+    const auto [a, b, c] = triangleCorners(patches, t);
+    whole += 0.5 * glm::length(glm::cross(glm::dvec3(b) - glm::dvec3(a), glm::dvec3(c) - glm::dvec3(a)));
+  }
+  for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
+    seen += static_cast<double>(patches.node_area[side.first_node + leaf]);
+  return seen >= (1.0 - kHidden) * whole;
+}
+
 bool uniformEmission(const scene::PatchScene& patches, const Side& side, std::span<const glm::vec3> emissions,
                      glm::vec3& emission) {
   bool found = false;
@@ -22,12 +46,6 @@ bool uniformEmission(const scene::PatchScene& patches, const Side& side, std::sp
     found = true;
   }
   return found && emission != glm::vec3(0.0F);
-}
-
-std::array<glm::vec3, 3> triangleCorners(const scene::PatchScene& patches, std::uint32_t triangle) {
-  std::array<glm::vec3, 3> corners{};
-  for (std::uint32_t k = 0; k < 3; ++k) corners[k] = patches.vertices[patches.indices[3 * triangle + k]].position;
-  return corners;
 }
 
 /// The quad a, b, c, d if two triangles share an edge and their union is a convex quadrilateral.
@@ -112,7 +130,7 @@ std::vector<LightPolygon> findLightPolygons(const scene::PatchScene& patches, st
     const auto& surface = patches.surfaces[side.surface];
     glm::vec3 uniform(0.0F);
     side.gathered = surface.planar && !surface.see_through && surface.triangle_count <= 2 * kMaxPolygonsPerSurface &&
-                    uniformEmission(patches, side, emission, uniform);
+                    uniformEmission(patches, side, emission, uniform) && isWhole(patches, side);
     if (side.gathered) addPolygons(patches, side, uniform, lights);
   }
   return lights;

@@ -30,8 +30,9 @@ struct LightPolygon {
   [[nodiscard]] glm::vec3 point(double u, double v) const;
 };
 
-/// Emissive planar surfaces of few polygons and uniform emission become light polygons, and their sides are marked
-/// `gathered`; the emission of all others is shot like reflected light. `emission` by leaf value.
+/// Emissive planar surfaces of few polygons and uniform emission, of which nothing is hidden, become light polygons,
+/// and their sides are marked `gathered`; the emission of all others is shot like reflected light: of a lamp that
+/// something covers in part, or that stands in a solid, leaves know how much shines. `emission` by leaf value.
 [[nodiscard]] std::vector<LightPolygon> findLightPolygons(const scene::PatchScene& patches, std::vector<Side>& sides,
                                                           std::span<const glm::vec3> emission);
 

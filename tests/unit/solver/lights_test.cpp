@@ -1,0 +1,55 @@
+// Which lamps are gathered as polygons: those that shine whole.
+#include "server/solver/lights.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/unit/solver/quad_scene.h"
+
+namespace radiosity::solver {
+namespace {
+
+using test::cubeQuads;
+using test::makeQuadScene;
+
+struct Found {
+  std::vector<LightPolygon> lights;
+  std::vector<Side> sides;
+};
+
+/// In a cube whose ceiling shines, with so much of each leaf of it in its first `columns`, of 4.
+Found find(std::uint32_t columns, float part) {
+  const auto made = makeQuadScene(cubeQuads(4, {0, 4, 0, 0, 0, 0}, test::kGrey));
+  const auto first = made.patches->surfaces[1].first_node[0];
+  for (std::uint32_t leaf = 0; leaf < 16; ++leaf)
+    if (leaf % 4 < columns) made.patches->node_area[first + leaf] *= part;
+  Found found{{}, makeSides(*made.patches)};
+  std::vector<glm::vec3> emission(found.sides.back().first_value + found.sides.back().leaf_count);
+  const auto& ceiling = found.sides[1];
+  std::fill_n(emission.begin() + ceiling.first_value, ceiling.leaf_count, glm::vec3(4.0F));
+  found.lights = findLightPolygons(*made.patches, found.sides, emission);
+  return found;
+}
+
+TEST(LightPolygons, AreFoundOfALampThatCanBeSeenWhole) {
+  for (const float part : {1.0F, 0.9996F}) {
+    const auto found = find(4, part);
+    ASSERT_EQ(found.lights.size(), 1U) << part;
+    EXPECT_NEAR(found.lights[0].area, 1.0, 1e-6);
+    EXPECT_TRUE(found.sides[1].gathered);
+    EXPECT_FALSE(found.sides[0].gathered);
+  }
+}
+
+// One that something covers, or that stands in a solid, in part: a polygon would shine whole.
+TEST(LightPolygons, AreNotFoundOfALampThatIsHiddenInPart) {
+  for (const std::uint32_t columns : {1U, 2U, 4U}) {
+    for (const float part : {0.0F, 0.5F, 0.99F}) {
+      const auto found = find(columns, part);
+      EXPECT_TRUE(found.lights.empty()) << columns << ' ' << part;
+      EXPECT_FALSE(found.sides[1].gathered) << columns << ' ' << part;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace radiosity::solver
