@@ -6,6 +6,8 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <numeric>
+#include <tuple>
+#include <utility>
 
 #include "server/scene/bounds.h"
 
@@ -82,6 +84,43 @@ bool meetsTriangle(const Bvh::Triangle& triangle, const glm::dvec3& origin, cons
   hit.front = determinant > 0.0;
   return true;
 }
+
+/// Hits so near to each other are one, on an edge.
+constexpr double kSameHit = 1e-9;
+
+/// Walks along the hits of a ray in order: +1 for every solid entered (front), -1 for every one left (back); below
+/// zero, the origin was inside.
+class SolidWalk {
+ public:
+  explicit SolidWalk(std::vector<RayHit>& hits) : hits_(hits) { hits_.clear(); }
+
+  /// They come nearly in order.
+  void add(const RayHit& hit) {
+    const auto key = [](const RayHit& of) { return std::tuple(of.t, of.front, of.triangle); };
+    hits_.push_back(hit);
+    for (auto i = hits_.size() - 1; i > 0 && key(hits_[i]) < key(hits_[i - 1]); --i) std::swap(hits_[i], hits_[i - 1]);
+  }
+
+  /// Goes on to `end`, before which no more hits will come.
+  [[nodiscard]] std::optional<double> leaveBefore(double end) {
+    for (; next_ < hits_.size() && hits_[next_].t < end; ++next_) {
+      const RayHit& hit = hits_[next_];
+      if (last_front_ == hit.front && hit.t - last_ < kSameHit) continue;  // the edge between two triangles
+      last_ = hit.t;
+      last_front_ = hit.front;
+      depth_ += hit.front ? 1 : -1;
+      if (depth_ < 0) return hit.t;
+    }
+    return std::nullopt;
+  }
+
+ private:
+  std::vector<RayHit>& hits_;
+  std::size_t next_ = 0;
+  int depth_ = 0;
+  double last_ = -1.0;
+  bool last_front_ = false;
+};
 
 /// Separating axes of a triangle and a box (Akenine-Moller 2001): box faces, triangle plane, nine edge products.
 bool touchesBox(const Bvh::Triangle& triangle, const glm::vec3& low, const glm::vec3& high) {
@@ -211,6 +250,91 @@ void Bvh::collectHits(const glm::dvec3& origin, const glm::dvec3& direction, dou
       if (meetsTriangle(triangles_[i], origin, direction, hit) && hit.t > t_min && hit.t < t_max) hits.push_back(hit);
     }
   }
+}
+
+/// Nearer children first; what waits bounds from below what is still to come.
+std::optional<double> Bvh::endOfSolid(const glm::dvec3& origin, const glm::dvec3& direction, double t_max,
+                                      std::vector<RayHit>& hits, std::uint64_t& work) const {
+  constexpr float kNever = std::numeric_limits<float>::infinity();
+  SolidWalk walk(hits);
+  if (triangles_.empty()) return std::nullopt;
+  const SlabRay ray(origin, direction, 0.0, t_max);
+  struct Task {
+    std::uint32_t node;
+    float entry, soonest;  ///< of it, and of all that wait below it as well
+  };
+  std::array<Task, kStackDepth> stack;
+  std::size_t depth = 0;
+  const auto soonest = [&] { return depth == 0 ? kNever : stack[depth - 1].soonest; };
+  const auto push = [&](std::uint32_t node, float entry) {
+    if (entry == kNever) return;
+    stack[depth] = {node, entry, std::min(entry, soonest())};
+    ++depth;
+  };
+  push(0, ray.entry(nodes_[0].min, nodes_[0].max));
+  while (depth > 0) {
+    const Node& node = nodes_[stack[--depth].node];
+    work += 1 + node.count;
+    if (node.count == 0) {
+      const float left = ray.entry(nodes_[node.first].min, nodes_[node.first].max);
+      const float right = ray.entry(nodes_[node.first + 1].min, nodes_[node.first + 1].max);
+      const std::uint32_t far = left <= right ? 1 : 0;
+      push(node.first + far, std::max(left, right));
+      push(node.first + 1 - far, std::min(left, right));
+      continue;
+    }
+    for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
+      RayHit hit{0.0, order_[i], false};
+      if (meetsTriangle(triangles_[i], origin, direction, hit) && hit.t > 0.0 && hit.t < t_max) walk.add(hit);
+    }
+    if (const auto end = walk.leaveBefore(static_cast<double>(soonest()))) return end;
+  }
+  return walk.leaveBefore(static_cast<double>(kNever));
+}
+
+std::vector<std::uint32_t> Bvh::leastTags(std::span<const std::uint32_t> tags) const {
+  std::vector<std::uint32_t> least(nodes_.size(), std::numeric_limits<std::uint32_t>::max());
+  for (auto n = nodes_.size(); n-- > 0;) {  // children follow
+    const Node& node = nodes_[n];
+    if (node.count == 0) least[n] = std::min(least[node.first], least[node.first + 1]);
+    for (std::uint32_t i = node.first; i < node.first + node.count; ++i) least[n] = std::min(least[n], tags[order_[i]]);
+  }
+  return least;
+}
+
+std::optional<RayHit> Bvh::leastHit(const glm::dvec3& origin, const glm::dvec3& direction, double t_min, double t_max,
+                                    std::span<const std::uint32_t> tags, std::span<const std::uint32_t> least,
+                                    std::uint32_t end, const std::function<bool(const RayHit&)>& counts) const {
+  if (triangles_.empty()) return std::nullopt;
+  const SlabRay ray(origin, direction, t_min, t_max);
+  std::array<std::uint32_t, kStackDepth> stack;
+  std::size_t depth = 0;
+  stack[depth++] = 0;
+  std::optional<RayHit> found;
+  std::uint32_t found_in = 0;  // collectHits() comes to later parts of the list first
+  const auto isEarlier = [&](std::uint32_t tag, std::uint32_t part) {
+    return found ? tag < tags[found->triangle] || (tag == tags[found->triangle] && part > found_in) : tag < end;
+  };
+  while (depth > 0) {
+    const auto index = stack[--depth];
+    const Node& node = nodes_[index];
+    if ((found ? least[index] > tags[found->triangle] : least[index] >= end) || !ray.meets(node.min, node.max))
+      continue;
+    if (node.count == 0) {
+      const std::uint32_t later = least[node.first] < least[node.first + 1] ? 1 : 0;
+      stack[depth++] = node.first + later;
+      stack[depth++] = node.first + 1 - later;
+      continue;
+    }
+    for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
+      RayHit hit{0.0, order_[i], false};
+      if (!isEarlier(tags[hit.triangle], node.first) || !meetsTriangle(triangles_[i], origin, direction, hit)) continue;
+      if (!(hit.t > t_min && hit.t < t_max) || !counts(hit)) continue;
+      found = hit;
+      found_in = node.first;
+    }
+  }
+  return found;
 }
 
 /// A ray from the middle of the box, past what is larger by half the box on all sides. Triangles seen edge-on count as

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <glm/vec3.hpp>
 #include <optional>
 #include <span>
@@ -30,6 +31,21 @@ class Bvh {
   /// All hits with t in (t_min, t_max), unsorted, appended to `hits`.
   void collectHits(const glm::dvec3& origin, const glm::dvec3& direction, double t_min, double t_max,
                    std::vector<RayHit>& hits) const;
+
+  /// Where the ray leaves the solid that it starts in: the first back of a triangle that ends more solids than fronts
+  /// began. Looks no farther: what lies behind costs nothing. None: it starts in no solid, and `hits` are all with t in
+  /// (0, t_max), by t. `work`: grows by the boxes and triangles that were looked at.
+  [[nodiscard]] std::optional<double> endOfSolid(const glm::dvec3& origin, const glm::dvec3& direction, double t_max,
+                                                 std::vector<RayHit>& hits, std::uint64_t& work) const;
+
+  /// By node: the least tag of its triangles. `tags`: one for each triangle.
+  [[nodiscard]] std::vector<std::uint32_t> leastTags(std::span<const std::uint32_t> tags) const;
+  /// Of the hits with t in (t_min, t_max) that count, the one with the least tag below `end`; the first of those that
+  /// collectHits() would find. `least`: leastTags(tags). However many lie there, it looks at few.
+  [[nodiscard]] std::optional<RayHit> leastHit(const glm::dvec3& origin, const glm::dvec3& direction, double t_min,
+                                               double t_max, std::span<const std::uint32_t> tags,
+                                               std::span<const std::uint32_t> least, std::uint32_t end,
+                                               const std::function<bool(const RayHit&)>& counts) const;
 
   /// False: no ray in this direction from anywhere in the box meets the back of a triangle (RayHit::front) with t in
   /// (0, t_max). True: one might.

@@ -134,8 +134,7 @@ class Burial {
                                    RayNotes* notes = nullptr) const {
     const auto position = positionAt(patches_.triangles[triangle], texel);
     const auto normal = facing(triangle, side);
-    if (side == 0 && coincidence_.covers(patches_.triangle_surface[triangle], position, normal, hits))
-      return {true, true};
+    if (side == 0 && coincidence_.covers(patches_.triangle_surface[triangle], position, normal)) return {true, true};
     return solids_.ask(position, normal, hits, notes);
   }
 

@@ -21,12 +21,8 @@ constexpr float kSameWay = 0.9999F;
 constexpr double kSamePlane = 2e-5;
 /// So many places of a leaf are looked at for what covers it.
 constexpr std::uint32_t kPlaces = 16;
-/// Rays first look for the end of a solid so near (unit box), where few triangles are.
-constexpr double kSmallSolid = 0.1;
 /// So many rays that say the same are enough. More where a place would be lost.
 constexpr std::uint32_t kAgreeOutside = 3, kAgreeInside = 6;
-/// Hits so near to each other are one, on an edge.
-constexpr double kSameHit = 1e-9;
 
 /// Of a position in the triangle's plane.
 glm::vec2 texelAt(const TriangleFrame& frame, const glm::vec3& position) {
@@ -34,21 +30,6 @@ glm::vec2 texelAt(const TriangleFrame& frame, const glm::vec3& position) {
   const double uu = glm::dot(u, u), uv = glm::dot(u, v), vv = glm::dot(v, v);
   const double along_u = glm::dot(way, u), along_v = glm::dot(way, v), determinant = uu * vv - uv * uv;
   return {(along_u * vv - along_v * uv) / determinant, (along_v * uu - along_u * uv) / determinant};
-}
-
-/// Where a ray that meets these leaves the solid that it started in, if in one.
-std::optional<double> endOfSolid(const Hits& hits) {
-  int depth = 0;
-  double last = -1.0;
-  bool last_front = false;
-  for (const RayHit& hit : hits) {
-    if (last_front == hit.front && hit.t - last < kSameHit) continue;  // the edge between two triangles
-    last = hit.t;
-    last_front = hit.front;
-    depth += hit.front ? 1 : -1;
-    if (depth < 0) return hit.t;
-  }
-  return std::nullopt;
 }
 
 }  // namespace
@@ -118,20 +99,11 @@ bool Solids::seesOutAlong(const Start& start, Hits& hits, RayNotes* notes) const
   return false;
 }
 
-/// Walks a ray to the end: +1 for every solid entered (front), -1 for every one left (back); below zero, the origin
-/// was inside. Then nothing farther away matters, and most solids are small. Otherwise leaves what it met in `hits`, in
-/// order, which no other part of the scene changes.
+/// Whether the place that a ray starts from lies in a solid, as that ray tells. Otherwise leaves what it met in `hits`,
+/// in order, which no other part of the scene changes.
 bool Solids::leavesSolid(const Start& start, std::uint32_t way, const glm::dvec3& direction, Hits& hits,
                          RayNotes* notes) const {
-  const auto meet = [&](double length) {
-    hits.clear();
-    tree_.collectHits(start.origin, direction, 0.0, length, hits);
-    std::ranges::sort(hits, {}, [](const RayHit& hit) { return std::tuple(hit.t, hit.front, hit.triangle); });
-    return endOfSolid(hits);
-  };
-  std::optional<double> end;
-  if (way != 0) end = meet(kSmallSolid);  // of most places the first ray finds that they are in no solid
-  if (!end) end = meet(kBurialRayLength);
+  const auto end = tree_.endOfSolid(start.origin, direction, kBurialRayLength, hits, hits.work);
   if (notes != nullptr) notes->add({start.origin, start.normal, start.triangle, way, end.value_or(kBurialRayLength)});
   return end.has_value();
 }
@@ -143,6 +115,7 @@ Coincidence::Coincidence(PatchScene& patches) : patches_(patches) {
                          patches.vertices[patches.indices[3 * t + 1]].position,
                          patches.vertices[patches.indices[3 * t + 2]].position});
   tree_ = Bvh(std::move(triangles));
+  least_ = tree_.leastTags(patches.triangle_surface);
 }
 
 void Coincidence::run() {
@@ -163,30 +136,23 @@ void Coincidence::run() {
                   patches_.surfaces[first.first].instance));
 }
 
-std::uint32_t Coincidence::coveredAt(std::uint32_t s, const glm::vec3& position, const glm::vec3& normal,
-                                     Hits& hits) const {
-  const auto triangle = triangleOver(s, position, normal, hits);
+std::uint32_t Coincidence::coveredAt(std::uint32_t s, const glm::vec3& position, const glm::vec3& normal) const {
+  const auto triangle = triangleOver(s, position, normal);
   return triangle == kNone ? kNone : patches_.triangle_surface[triangle];
 }
 
 /// Of the earliest surface that covers `s` there.
-std::uint32_t Coincidence::triangleOver(std::uint32_t s, const glm::vec3& position, const glm::vec3& normal,
-                                        Hits& hits) const {
+std::uint32_t Coincidence::triangleOver(std::uint32_t s, const glm::vec3& position, const glm::vec3& normal) const {
   const glm::dvec3 n(normal);
-  hits.clear();
-  tree_.collectHits(glm::dvec3(position) + n * 1e-6, -n, 0.0, 2e-6, hits);
-  std::uint32_t earliest = s, over = kNone;
-  for (const RayHit& hit : hits) {
-    const std::uint32_t other = patches_.triangle_surface[hit.triangle];
-    if (other >= earliest || glm::dot(patches_.triangles[hit.triangle].normal, normal) <= kSameWay) continue;
-    earliest = other;
-    over = hit.triangle;
-  }
-  return over;
+  const auto counts = [&](const RayHit& hit) {
+    return glm::dot(patches_.triangles[hit.triangle].normal, normal) > kSameWay;
+  };
+  const auto over =
+      tree_.leastHit(glm::dvec3(position) + n * 1e-6, -n, 0.0, 2e-6, patches_.triangle_surface, least_, s, counts);
+  return over ? over->triangle : kNone;
 }
 
 void Coincidence::keepCovered() {
-  Hits hits;
   for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
     const Surface& surface = patches_.surfaces[s];
     if (!covered_[s] || !surface.planar || surface.first_node[0] == kNone) continue;
@@ -197,7 +163,7 @@ void Coincidence::keepCovered() {
       const glm::dvec2 corner(i % surface.width, i / surface.width);
       auto over = kNone;
       for (std::uint32_t k = 0; k < kPlaces && over == kNone; ++k)
-        over = triangleOver(s, positionAt(frame, corner + latticePoint(k, kPlaces)), frame.normal, hits);
+        over = triangleOver(s, positionAt(frame, corner + latticePoint(k, kPlaces)), frame.normal);
       if (over == kNone) continue;
       const auto texel = texelAt(patches_.triangles[over], positionAt(frame, corner + 0.5));
       patches_.covered.push_back({surface.first_leaf + i, patches_.triangle_surface[over], texel});
@@ -230,8 +196,8 @@ std::vector<bool> Coincidence::coplanarWithEarlier() const {
       for (auto k = i + 1; k < planes.size() && planes[k].cell == planes[i].cell &&
                            planes[k].low <= a.bounds_max.x + static_cast<float>(kSamePlane);
            ++k) {
-        if (lieTogether(a, patches_.surfaces[planes[k].surface]))
-          found[std::max(planes[i].surface, planes[k].surface)] = true;
+        const auto later = std::max(planes[i].surface, planes[k].surface);
+        if (!found[later] && lieTogether(a, patches_.surfaces[planes[k].surface])) found[later] = true;
       }
     }
   }
@@ -257,12 +223,11 @@ std::uint32_t Coincidence::coveredBy(std::uint32_t s, bool closely) const {
   const Surface& surface = patches_.surfaces[s];
   const std::uint32_t leaves = surface.width * surface.height;
   const std::uint32_t step = closely ? 1U : std::max(1U, leaves / 16);
-  Hits hits;
   for (std::uint32_t i = step / 2; i < leaves; i += step) {
     const LeafPoint& point = patches_.leaves[surface.first_leaf + i];
     if (point.triangle == kNone) continue;
     const TriangleFrame& frame = patches_.triangles[point.triangle];
-    const std::uint32_t other = coveredAt(s, positionAt(frame, glm::dvec2(point.texel)), frame.normal, hits);
+    const std::uint32_t other = coveredAt(s, positionAt(frame, glm::dvec2(point.texel)), frame.normal);
     if (other != kNone) return other;
   }
   return kNone;

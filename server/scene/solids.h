@@ -21,7 +21,10 @@ namespace radiosity::scene {
   return glm::vec3(glm::dvec3(frame.origin) + texel.x * glm::dvec3(frame.du) + texel.y * glm::dvec3(frame.dv));
 }
 
-using Hits = std::vector<RayHit>;
+/// Of one thread's rays. `work`: boxes and triangles that they were held against, all together.
+struct Hits : std::vector<RayHit> {
+  std::uint64_t work = 0;
+};
 
 /// The triangles that bound solids, and the question whether a point lies inside one.
 class Solids {
@@ -87,22 +90,21 @@ class Coincidence {
   [[nodiscard]] bool mayCover(std::uint32_t s, const Bounds& box) const;
 
   /// Whether the front of `s` is covered there. Only asked of surfaces that are covered somewhere.
-  [[nodiscard]] bool covers(std::uint32_t s, const glm::vec3& position, const glm::vec3& normal, Hits& hits) const {
-    return covered_[s] && coveredAt(s, position, normal, hits) != kNone;
+  [[nodiscard]] bool covers(std::uint32_t s, const glm::vec3& position, const glm::vec3& normal) const {
+    return covered_[s] && coveredAt(s, position, normal) != kNone;
   }
 
  private:
-  [[nodiscard]] std::uint32_t coveredAt(std::uint32_t s, const glm::vec3& position, const glm::vec3& normal,
-                                        Hits& hits) const;
-  [[nodiscard]] std::uint32_t triangleOver(std::uint32_t s, const glm::vec3& position, const glm::vec3& normal,
-                                           Hits& hits) const;
+  [[nodiscard]] std::uint32_t coveredAt(std::uint32_t s, const glm::vec3& position, const glm::vec3& normal) const;
+  [[nodiscard]] std::uint32_t triangleOver(std::uint32_t s, const glm::vec3& position, const glm::vec3& normal) const;
   [[nodiscard]] std::vector<bool> coplanarWithEarlier() const;
   [[nodiscard]] bool lieTogether(const Surface& a, const Surface& b) const;
   [[nodiscard]] std::uint32_t coveredBy(std::uint32_t s, bool closely) const;
 
   PatchScene& patches_;
   Bvh tree_;
-  std::vector<bool> covered_;  ///< by surface: somewhere
+  std::vector<std::uint32_t> least_;  ///< by node of the tree: the earliest surface there
+  std::vector<bool> covered_;         ///< by surface: somewhere
 };
 
 }  // namespace radiosity::scene
