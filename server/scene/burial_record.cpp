@@ -67,6 +67,11 @@ bool sweeps(const glm::dvec3& from, const glm::dvec3& half, const glm::dvec3& wa
   return near <= far;
 }
 
+/// Whether leaves are looked at in as many places.
+bool sameOf(BurialRecord::Pass pass, const BurialPlaces& a, const BurialPlaces& b) {
+  return a.many == b.many && (pass == BurialRecord::Pass::kFew ? a.few == b.few : a.beside == b.beside);
+}
+
 }  // namespace
 
 BurialWays::BurialWays(const glm::vec3& normal) : n_(normal) {
@@ -144,9 +149,9 @@ FormerBurial::FormerBurial(const PatchScene& before, const BurialRecord& record,
 }
 
 const BurialRecord::Leaf* FormerBurial::find(std::uint32_t surface, std::uint32_t leaf, std::uint32_t side,
-                                             BurialRecord::Pass pass, std::uint32_t few) const {
+                                             BurialRecord::Pass pass, const BurialPlaces& places) const {
   const auto former = surface_before_[surface];
-  if (former == kNone || record_.covered[former] || record_.few != few) return nullptr;
+  if (former == kNone || record_.covered[former] || !sameOf(pass, record_.places, places)) return nullptr;
   const auto* found = record_.find(before_.surfaces[former].first_leaf + leaf, side, pass);
   const auto meets = [&](const RayFan& fan) { return fan.mayMeet(boxes_) && (parts_.empty() || fan.mayMeet(parts_)); };
   return found == nullptr || std::ranges::any_of(found->fans, meets) ? nullptr : found;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "server/scene/bounds.h"
+#include "server/scene/burial_budget.h"
 #include "server/scene/patch_scene.h"
 
 namespace radiosity::scene {
@@ -83,7 +84,7 @@ class BurialRecord {
     std::optional<BuriedPart> buried;  ///< none: all of it is visible
   };
 
-  std::uint32_t few = 0;      ///< places that were looked at in the first pass
+  BurialPlaces places;        ///< that were looked at
   std::vector<bool> solid;    ///< by surface
   std::vector<bool> covered;  ///< by surface: an earlier one lies on it somewhere, which no ray tells
   std::vector<Leaf> leaves;   ///< by leaf, side and pass once sort() was called
@@ -104,7 +105,7 @@ class FormerBurial {
   /// What was found of the leaf of `after`; null: it must be looked at again. `leaf` counts from the first of the
   /// surface. A few ray and box tests.
   [[nodiscard]] const BurialRecord::Leaf* find(std::uint32_t surface, std::uint32_t leaf, std::uint32_t side,
-                                               BurialRecord::Pass pass, std::uint32_t few) const;
+                                               BurialRecord::Pass pass, const BurialPlaces& places) const;
   /// In the numbers of `after`.
   [[nodiscard]] BuriedPart renumbered(const BuriedPart& part, std::uint32_t surface) const;
 

@@ -45,8 +45,8 @@ void placeSpots(PatchScene& patches, const std::vector<LeafPiece>& pieces);
 /// light changes within a leaf. Both sides.
 void placeSpotsInGaps(PatchScene& patches);
 
-/// Point `i` of `count` (16 or 64; others lie less evenly) in [0, 1)^2. Rank-1 lattice: every point has its own u and
-/// its own v, so axis-parallel borders are placed within 1/count.
+/// Point `i` of `count`, a power of two, in [0, 1)^2. Every point has its own u and its own v, so axis-parallel borders
+/// are placed within 1/count. From 16 on a rank-1 lattice (32 and 128 lie less evenly).
 [[nodiscard]] glm::dvec2 latticePoint(std::uint32_t i, std::uint32_t count);
 
 /// Sums level 0 of node_area up all pyramids.

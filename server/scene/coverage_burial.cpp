@@ -11,16 +11,15 @@
 
 #include "common/give_back.h"
 #include "common/parallel.h"
+#include "server/scene/burial_budget.h"
 #include "server/scene/coverage.h"
 #include "server/scene/solids.h"
 
 namespace radiosity::scene {
 namespace {
 
-constexpr std::uint32_t kFewSamples = 16, kManySamples = 64;
-constexpr std::uint64_t kMaxSamples = 2'000'000;  ///< a scene; beyond it leaves get fewer
 /// Leaves: what is found of so many is held at once; fewer are not worth a thread.
-constexpr std::size_t kMeasuredAtOnce = 65536, kFewestAShare = 64;
+constexpr std::size_t kMeasuredAtOnce = 65536, kFewestAShare = 64, kFewestTries = 16;
 /// Surfaces, likewise.
 constexpr std::size_t kFewestSurfaces = 32;
 /// Of more leaves it is not kept how they were found, nor where that takes more, and from more places than these rays
@@ -95,12 +94,10 @@ class Burial {
     for (const LeafPiece& piece : pieces_) ++first_piece_[piece.leaf + 1];
     for (std::size_t i = 1; i < first_piece_.size(); ++i) first_piece_[i] += first_piece_[i - 1];
     classifyAll();
-    const std::uint64_t wanted = std::uint64_t{kFewSamples} * contacts_.size();
-    few_ = wanted <= kMaxSamples ? kFewSamples
-                                 : static_cast<std::uint32_t>(std::max<std::uint64_t>(
-                                       1, kMaxSamples / std::max<std::size_t>(1, contacts_.size())));
-    measureAll(contacts_, few_, BurialRecord::Pass::kFew);
+    tryLeaves();
+    measureAll(contacts_, places_.few, BurialRecord::Pass::kFew);
     refineBorders();
+    if (auto warning = budgetWarning(places_); !warning.empty()) patches_.warnings.push_back(std::move(warning));
     settleSides();
     return keptRecord();
   }
@@ -217,6 +214,23 @@ class Burial {
     std::vector<Part> parts;
   };
 
+  /// Sets how many places of the others are asked.
+  void tryLeaves() {
+    tried_.resize(triedLeaves(contacts_.size()));
+    places_ = {TriedLeaf::kPlaces, TriedLeaf::kPlaces, TriedLeaf::kPlaces};
+    inShares(tried_.size() / kFewestTries, [&](std::size_t share, std::size_t shares) {
+      Scratch scratch;
+      for (auto i = share; i < tried_.size(); i += shares) {
+        scratch.hits.work = 0;
+        scratch.notes.clear();
+        const auto& contact = contacts_[(2 * i + 1) * contacts_.size() / (2 * tried_.size())];
+        const auto found = measure(contact, TriedLeaf::kPlaces, scratch);
+        tried_[i] = {scratch.hits.work, found.has_value(), !found || found->visible_area > 0.0F};
+      }
+    });
+    places_ = affordablePlaces(contacts_.size(), tried_);
+  }
+
   /// Visible areas of leaves: measured side by side, taken in their order.
   void measureAll(const std::vector<Contact>& contacts, std::uint32_t count, BurialRecord::Pass pass) {
     std::vector<Measured> measured;
@@ -246,7 +260,7 @@ class Burial {
     const bool by_rays = !record_.covered[contact.surface];
     if (by_rays && former_ != nullptr) {
       const auto leaf = leafOf(contact) - patches_.surfaces[contact.surface].first_leaf;
-      if (const auto* known = former_->find(contact.surface, leaf, contact.side, pass, few_)) {
+      if (const auto* known = former_->find(contact.surface, leaf, contact.side, pass, places_)) {
         Measured same{{}, known->fans};
         if (known->buried) same.buried = former_->renumbered(*known->buried, contact.surface);
         return same;
@@ -273,7 +287,7 @@ class Burial {
 
   std::shared_ptr<const BurialRecord> keptRecord() {
     if (is_too_much_) return nullptr;
-    record_.few = few_;
+    record_.places = places_;
     record_.sort();
     return std::make_shared<const BurialRecord>(std::move(record_));
   }
@@ -339,7 +353,7 @@ class Burial {
     }
     const Outcome outcome = sumParts(point, contact, first, end, scratch);
     if (outcome.buried == 0) return std::nullopt;
-    if (count != kManySamples && outcome.buried < outcome.samples) return measure(contact, kManySamples, scratch);
+    if (count < places_.many && outcome.buried < outcome.samples) return measure(contact, places_.many, scratch);
     if (outcome.visible_area <= 0.0) {
       visible = {};
     } else if (visible.triangle == kNone) {
@@ -374,7 +388,6 @@ class Burial {
 
   /// A few samples may all miss a narrow strip: look closer beside leaves where something was buried.
   void refineBorders() {
-    if (few_ != kFewSamples) return;
     std::vector<bool> done(patches_.leaves.size() * 2, false);
     const auto slot = [&](const Contact& c) { return std::size_t{2} * leafOf(c) + c.side; };
     for (const BuriedPart& change : changes_) done[std::size_t{2} * change.leaf + change.side] = true;
@@ -392,7 +405,8 @@ class Burial {
           beside.push_back(neighbour);
         }
     }
-    measureAll(beside, kManySamples, BurialRecord::Pass::kMany);
+    places_.beside = affordableBeside(beside.size(), places_, tried_);
+    if (places_.beside > places_.few) measureAll(beside, places_.beside, BurialRecord::Pass::kMany);
   }
 
   /// Both sides share a leaf's point: the front's visible point, or the back's where the front is buried.
@@ -434,7 +448,8 @@ class Burial {
   std::vector<std::size_t> first_piece_;
   std::vector<Contact> contacts_, touched_;
   std::vector<BuriedPart> changes_;
-  std::uint32_t few_ = kFewSamples;
+  std::vector<TriedLeaf> tried_;
+  BurialPlaces places_;
 };
 
 }  // namespace

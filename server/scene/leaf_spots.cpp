@@ -13,6 +13,11 @@
 namespace radiosity::scene {
 
 glm::dvec2 latticePoint(std::uint32_t i, std::uint32_t count) {
+  if (count < 16) {  // no generator spreads so few; these are Hammersley's
+    std::uint32_t reversed = 0;
+    for (std::uint32_t bit = 1; bit < count; bit *= 2) reversed = 2 * reversed + ((i & bit) != 0 ? 1 : 0);
+    return {(i + 0.5) / count, (reversed + 0.5) / count};
+  }
   const std::uint32_t generator = count == 1024 ? 275 : count == 256 ? 75 : count == 64 ? 19 : 5;
   return {(i + 0.5) / count, static_cast<double>((std::uint64_t{i} * generator) % count + 0.5) / count};
 }

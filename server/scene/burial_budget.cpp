@@ -1,0 +1,67 @@
+#include "server/scene/burial_budget.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+
+namespace radiosity::scene {
+namespace {
+
+constexpr BurialPlaces kAll;
+/// Of a scene: places of the first look, so that there is a bound on what is held of them, and of the look beside.
+constexpr std::uint64_t kMaxPlaces = 2'000'000, kMaxBeside = 8'000'000;
+/// Boxes and triangles: 2 or 3 s of one core. Twice what a model of 60,000 triangles takes, all of which touch. It is
+/// counted and not measured, so that a scene is the same whoever builds it, and from few leaves, so that it is also the
+/// same after an edit, when most are remembered.
+constexpr double kMaxWork = 400e6;
+constexpr std::size_t kLeavesATry = 32, kMostTried = 128;
+
+}  // namespace
+
+std::size_t triedLeaves(std::size_t leaves) { return std::min(kMostTried, leaves / kLeavesATry); }
+
+BurialPlaces affordablePlaces(std::size_t leaves, std::span<const TriedLeaf> tried) {
+  auto places = kAll;
+  const auto most = kMaxPlaces / std::max<std::uint64_t>(1, leaves);
+  places.few = std::bit_floor(static_cast<std::uint32_t>(std::clamp<std::uint64_t>(most, 1, kAll.few)));
+  double first = 0.0, again = 0.0;  // work of a place of each of the tried
+  for (const auto& leaf : tried) {
+    const double work = static_cast<double>(leaf.work) / TriedLeaf::kPlaces;
+    first += work;
+    if (leaf.buried && leaf.visible) again += work;
+  }
+  const double each = static_cast<double>(leaves) / static_cast<double>(std::max<std::size_t>(1, tried.size()));
+  while (places.many > 1 && (places.few * first + places.many * again) * each > kMaxWork) {
+    places.few = std::max(1U, places.few / 2);
+    places.many /= 2;
+  }
+  places.beside = places.many;
+  return places;
+}
+
+std::uint32_t affordableBeside(std::size_t beside, const BurialPlaces& places, std::span<const TriedLeaf> tried) {
+  double work = 0.0;
+  std::size_t count = 0;
+  for (const auto& leaf : tried) {
+    if (leaf.buried) continue;
+    work += static_cast<double>(leaf.work) / TriedLeaf::kPlaces;
+    ++count;
+  }
+  if (count > 0) work /= static_cast<double>(count);
+  const auto leaves = static_cast<double>(beside);
+  auto each = places.beside;
+  while (each > 1 && (leaves * each > static_cast<double>(kMaxBeside) || leaves * each * work > kMaxWork)) each /= 2;
+  return each;
+}
+
+std::string budgetWarning(const BurialPlaces& places) {
+  if (places.few == kAll.few && places.many == kAll.many && places.beside == kAll.beside) return {};
+  return fmt::format(
+      "So much touches that only {} places of each texel beside something else, {} at edges, were asked whether they "
+      "are hidden within a solid ({} and {} otherwise): next to such edges texels may be too dark or too bright. "
+      "Larger texels, or materials with doubleSided true, which bound no solid, help",
+      places.few, std::min(places.many, places.beside), kAll.few, kAll.many);
+}
+
+}  // namespace radiosity::scene

@@ -1,0 +1,40 @@
+// How many places of each leaf are asked whether they are buried: as many as can be paid for. Plain values.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+
+namespace radiosity::scene {
+
+/// Powers of two, by which latticePoint() spreads them.
+struct BurialPlaces {
+  std::uint32_t few = 16;     ///< of each leaf that something touches
+  std::uint32_t many = 64;    ///< instead, where these do not agree
+  std::uint32_t beside = 64;  ///< of those beside leaves where something was buried
+};
+
+/// What a few places of a leaf told.
+struct TriedLeaf {
+  static constexpr std::uint32_t kPlaces = 4;
+  std::uint64_t work = 0;  ///< boxes and triangles that rays were held against
+  bool buried = false;     ///< some of it
+  bool visible = false;    ///< likewise
+};
+
+/// Of so many leaves that something touches, so many are tried: for a hundredth of what all cost.
+[[nodiscard]] std::size_t triedLeaves(std::size_t leaves);
+
+/// For so many leaves, of which these were tried.
+[[nodiscard]] BurialPlaces affordablePlaces(std::size_t leaves, std::span<const TriedLeaf> tried);
+
+/// BurialPlaces::beside when it is known how many leaves are beside others; no more than BurialPlaces::few: it is not
+/// worth it.
+[[nodiscard]] std::uint32_t affordableBeside(std::size_t beside, const BurialPlaces& places,
+                                             std::span<const TriedLeaf> tried);
+
+/// Empty: nothing was left out.
+[[nodiscard]] std::string budgetWarning(const BurialPlaces& places);
+
+}  // namespace radiosity::scene
