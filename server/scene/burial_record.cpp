@@ -126,7 +126,7 @@ const BurialRecord::Leaf* BurialRecord::find(std::uint32_t leaf, std::uint32_t s
 }
 
 FormerBurial::FormerBurial(const PatchScene& before, const BurialRecord& record, const PatchScene& after,
-                           std::vector<std::uint32_t> surface_before, const std::vector<bool>& solid)
+                           std::vector<std::uint32_t> surface_before, const std::vector<Hides>& hides)
     : before_(before), record_(record), after_(after), surface_before_(std::move(surface_before)) {
   std::vector<bool> stayed(before.surfaces.size(), false);
   const auto add = [&](const Surface& surface) {
@@ -134,15 +134,15 @@ FormerBurial::FormerBurial(const PatchScene& before, const BurialRecord& record,
   };
   for (std::uint32_t s = 0; s < after.surfaces.size(); ++s) {
     auto& former = surface_before_[s];
-    if (former != kNone && record.solid[former] != solid[s]) former = kNone;
+    if (former != kNone && record.hides[former] != hides[s]) former = kNone;
     if (former != kNone) {
       stayed[former] = true;
-    } else if (solid[s]) {
+    } else if (hides[s] != Hides::kNothing) {
       add(after.surfaces[s]);
     }
   }
   for (std::uint32_t s = 0; s < before.surfaces.size(); ++s) {
-    if (!stayed[s] && record.solid[s]) add(before.surfaces[s]);
+    if (!stayed[s] && record.hides[s] != Hides::kNothing) add(before.surfaces[s]);
   }
   if (boxes_.size() <= kMostParts) parts_ = boxes_;
   joinBoxes(boxes_);

@@ -11,6 +11,7 @@
 
 #include "server/scene/bounds.h"
 #include "server/scene/burial_budget.h"
+#include "server/scene/coverage.h"
 #include "server/scene/patch_scene.h"
 
 namespace radiosity::scene {
@@ -85,7 +86,7 @@ class BurialRecord {
   };
 
   BurialPlaces places;        ///< that were looked at
-  std::vector<bool> solid;    ///< by surface
+  std::vector<Hides> hides;   ///< by surface
   std::vector<bool> covered;  ///< by surface: an earlier one lies on it somewhere, which no ray tells
   std::vector<Leaf> leaves;   ///< by leaf, side and pass once sort() was called
 
@@ -98,9 +99,9 @@ class BurialRecord {
 class FormerBurial {
  public:
   /// `surface_before`: by surface of `after`, the one of `before` that is the same in all triangles, or kNone.
-  /// `record`: of `before`. `solid`: by surface of `after`. Refers to the first three.
+  /// `record`: of `before`. `hides`: by surface of `after`. Refers to the first three.
   FormerBurial(const PatchScene& before, const BurialRecord& record, const PatchScene& after,
-               std::vector<std::uint32_t> surface_before, const std::vector<bool>& solid);
+               std::vector<std::uint32_t> surface_before, const std::vector<Hides>& hides);
 
   /// What was found of the leaf of `after`; null: it must be looked at again. `leaf` counts from the first of the
   /// surface. A few ray and box tests.
@@ -114,7 +115,7 @@ class FormerBurial {
   const BurialRecord& record_;
   const PatchScene& after_;
   std::vector<std::uint32_t> surface_before_;
-  std::vector<ChangedBox> boxes_;  ///< where a solid was or is that is not the same
+  std::vector<ChangedBox> boxes_;  ///< where something opaque was or is that is not the same
   std::vector<ChangedBox> parts_;  ///< the same, each surface by itself; empty: too many
 };
 

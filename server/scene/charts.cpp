@@ -66,17 +66,17 @@ class Builder {
     if (auto sized = numberNodes(); !sized) return tl::unexpected(sized.error());
     const std::vector<LeafPiece> pieces = measureCoverage(patches_);
     setTexelAreas();
-    std::vector<bool> solid;  // what one can see through, or see from behind, bounds no solid
+    std::vector<Hides> hides;
     for (const Surface& surface : patches_.surfaces) {
       const Material& material = materialOf(scene_, surface.instance);
-      solid.push_back(!material.double_sided && !isSeeThrough(material));
+      hides.push_back(isSeeThrough(material) ? Hides::kNothing : material.double_sided ? Hides::kSheet : Hides::kSolid);
     }
     std::optional<FormerBurial> former;
     if (former_ != nullptr && record_ != nullptr) {
       former.emplace(former_->patches, *record_, patches_,
-                     matchSurfaces(former_->scene, former_->patches, scene_, patches_), solid);
+                     matchSurfaces(former_->scene, former_->patches, scene_, patches_), hides);
     }
-    burial_ = removeBuried(patches_, pieces, solid, former ? &*former : nullptr);
+    burial_ = removeBuried(patches_, pieces, hides, former ? &*former : nullptr);
     placeSpots(patches_, pieces);
     placeSpotsInGaps(patches_);
     patches_.spots.shrink_to_fit();  // of rooms full of chairs they are most of what a patch takes

@@ -15,6 +15,13 @@ namespace radiosity::scene {
 class BurialRecord;
 class FormerBurial;
 
+/// What a surface is to what lies behind it.
+enum class Hides : std::uint8_t {
+  kNothing,  ///< one can see through it
+  kSheet,    ///< opaque and seen from both sides: bounds no solid, but one does not see beyond it either
+  kSolid,    ///< opaque and seen from one side: bounds a solid
+};
+
 /// The part of a leaf that one triangle covers; kept only for leaves that no single triangle covers wholly.
 struct LeafPiece {
   std::uint32_t leaf;  ///< into PatchScene::leaves
@@ -28,11 +35,11 @@ struct LeafPiece {
 [[nodiscard]] std::vector<LeafPiece> measureCoverage(PatchScene& patches);
 
 /// Takes the part of each leaf that lies inside another solid out of node_area and moves leaf points to what is left.
-/// `solid`: by surface; opaque and single-sided, so that it can bound a solid. Adds warnings about coincident faces.
+/// `hides`: by surface. Adds warnings about coincident faces.
 /// Returns how it was found, or null where that is too much to keep. `former`: what is known of the scene before an
 /// edit; leaves that it answers for are not looked at again, and get the same bits.
 std::shared_ptr<const BurialRecord> removeBuried(PatchScene& patches, const std::vector<LeafPiece>& pieces,
-                                                 const std::vector<bool>& solid, const FormerBurial* former = nullptr);
+                                                 const std::vector<Hides>& hides, const FormerBurial* former = nullptr);
 
 /// Places on a leaf that is not full: kLeafSpots of `places`, which lie evenly over what is left of it. Sorts them
 /// anew.

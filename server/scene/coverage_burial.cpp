@@ -81,10 +81,10 @@ class NodeBoxes {
 
 class Burial {
  public:
-  Burial(PatchScene& patches, const std::vector<LeafPiece>& pieces, const std::vector<bool>& solid,
+  Burial(PatchScene& patches, const std::vector<LeafPiece>& pieces, const std::vector<Hides>& hides,
          const Coincidence& coincidence, const FormerBurial* former)
-      : patches_(patches), pieces_(pieces), solids_(patches, solid), coincidence_(coincidence), former_(former) {
-    record_.solid = solid;
+      : patches_(patches), pieces_(pieces), solids_(patches, hides), coincidence_(coincidence), former_(former) {
+    record_.hides = hides;
     record_.covered = coincidence.covered();
   }
 
@@ -131,7 +131,7 @@ class Burial {
                                    RayNotes* notes = nullptr) const {
     const auto position = positionAt(patches_.triangles[triangle], texel);
     const auto normal = facing(triangle, side);
-    if (side == 0 && coincidence_.covers(patches_.triangle_surface[triangle], position, normal)) return {true, true};
+    if (coincidence_.covers(triangle, side, position)) return {true, true};
     return solids_.ask(position, normal, hits, notes);
   }
 
@@ -173,7 +173,7 @@ class Burial {
     const Surface& surface = patches_.surfaces[node.surface];
     const Bounds box = boxes.box(level, node.x, node.y);
     if (box.empty()) return;
-    if (!solids_.near(box, node.surface) && (node.side != 0 || !coincidence_.mayCover(node.surface, box))) {
+    if (!solids_.near(box, node.surface) && !coincidence_.mayCover(node.surface, node.side, box)) {
       settleUniform(node, level, hits, split);
       return;
     }
@@ -187,23 +187,21 @@ class Burial {
         descend(boxes, {node.surface, node.side, x, y}, level - 1, hits, split);
   }
 
+  /// Nothing comes near: where one place is visible and no ray disagreed all are. What is buried is asked leaf by leaf,
+  /// since it loses all its light: models are open at their ends, and a chart may pass through itself.
   void settleUniform(const Contact& node, std::uint32_t level, Hits& hits, Split& split) const {
     const Surface& surface = patches_.surfaces[node.surface];
     const std::uint32_t x_end = std::min((node.x + 1) << level, surface.width);
     const std::uint32_t y_end = std::min((node.y + 1) << level, surface.height);
-    std::optional<bool> one_by_one;  // as the first place tells
+    bool is_first = true;
     for (std::uint32_t y = node.y << level; y < y_end; ++y)
       for (std::uint32_t x = node.x << level; x < x_end; ++x) {
         const Contact leaf{node.surface, node.side, x, y};
         const LeafPoint& point = patches_.leaves[leafOf(leaf)];
         if (point.triangle == kNone) continue;
-        if (one_by_one.value_or(true)) {
-          const auto answer = ask(point.triangle, glm::dvec2(point.texel), node.side, hits);
-          if (!one_by_one) one_by_one = !answer.agreed;
-          if (!answer.buried && !*one_by_one) return;
-          if (!answer.buried) continue;
-        }
-        split.buried.push_back({leafOf(leaf), node.side, {}, {}, 0.0F});
+        const auto answer = ask(point.triangle, glm::dvec2(point.texel), node.side, hits);
+        if (std::exchange(is_first, false) && !answer.buried && answer.agreed) return;
+        if (answer.buried) split.buried.push_back({leafOf(leaf), node.side, {}, {}, 0.0F});
       }
   }
 
@@ -309,7 +307,7 @@ class Burial {
     for (auto piece = first_piece; piece < end_piece; ++piece) {
       if (!add(pieces_[piece].triangle)) return false;
     }
-    if (contact.side == 0 && coincidence_.mayCover(contact.surface, box)) return false;
+    if (coincidence_.mayCover(contact.surface, contact.side, box)) return false;
     if (solids_.mayBury(box, normal)) return false;
     for (const auto& end : {box.min, box.max})
       notes.add({glm::dvec3(end) + kBurialLift * glm::dvec3(normal), normal, kNone, 0, kBurialRayLength});
@@ -417,14 +415,18 @@ class Burial {
     for (std::size_t i = 0; i < changes_.size(); ++i) {
       BuriedPart& change = changes_[i];
       const bool both = i + 1 < changes_.size() && changes_[i + 1].leaf == change.leaf;
-      const bool two_sided = isTwoSided(change.leaf);
+      const auto surface = surfaceOf(change.leaf);
+      const bool two_sided = patches_.surfaces[surface].first_node[1] != kNone;
       LeafPoint& point = patches_.leaves[change.leaf];
+      // Of a side that has lost all nobody asks where it is: the other keeps its places.
+      if (!both && two_sided && change.point.triangle == kNone) continue;
       point.full = false;
       BuriedPart& open = both && change.point.triangle == kNone ? changes_[i + 1] : change;
       if (both) ++i;
       if (open.point.triangle != kNone) {
         point = open.point;
         point.cut = true;
+        point.beneath = record_.covered[surface];
         keepSpots(patches_, point, open.places);
       } else if (both || !two_sided) {
         point = {};
@@ -432,9 +434,9 @@ class Burial {
     }
   }
 
-  [[nodiscard]] bool isTwoSided(std::uint32_t leaf) const {
+  [[nodiscard]] std::uint32_t surfaceOf(std::uint32_t leaf) const {
     const auto after = std::ranges::upper_bound(patches_.surfaces, leaf, {}, &Surface::first_leaf);
-    return std::prev(after)->first_node[1] != kNone;
+    return static_cast<std::uint32_t>(after - patches_.surfaces.begin() - 1);
   }
 
   PatchScene& patches_;
@@ -455,10 +457,10 @@ class Burial {
 }  // namespace
 
 std::shared_ptr<const BurialRecord> removeBuried(PatchScene& patches, const std::vector<LeafPiece>& pieces,
-                                                 const std::vector<bool>& solid, const FormerBurial* former) {
-  Coincidence coincidence(patches);
+                                                 const std::vector<Hides>& hides, const FormerBurial* former) {
+  Coincidence coincidence(patches, hides);
   coincidence.run();
-  auto record = Burial(patches, pieces, solid, coincidence, former).run();
+  auto record = Burial(patches, pieces, hides, coincidence, former).run();
   coincidence.keepCovered();
   return record;
 }

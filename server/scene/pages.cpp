@@ -148,7 +148,13 @@ class PageMaker {
   std::vector<LightmapPage> make(Seams seams) {
     for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
       Patchwork p = gather(patches_, patches_.surfaces[s], values_);
-      takeFromCovers(s, p);
+      fillUnknown(p);
+      place(s, p);
+    }
+    // Surfaces may cover each other here and there: once all have their places.
+    for (std::uint32_t s = 0; s < patches_.surfaces.size() && !patches_.covered.empty(); ++s) {
+      Patchwork p = gather(patches_, patches_.surfaces[s], values_);
+      if (!takeFromCovers(s, p)) continue;
       fillUnknown(p);
       place(s, p);
     }
@@ -158,18 +164,22 @@ class PageMaker {
   }
 
  private:
-  /// The light of leaves that earlier surfaces cover, whose charts have their places already.
-  void takeFromCovers(std::uint32_t s, Patchwork& p) {
+  /// The light of leaves that other surfaces cover, whose charts have their places already. False: there are none.
+  bool takeFromCovers(std::uint32_t s, Patchwork& p) {
     const Surface& surface = patches_.surfaces[s];
     const auto end_leaf = surface.first_leaf + surface.width * surface.height;
-    for (; next_covered_ < patches_.covered.size() && patches_.covered[next_covered_].leaf < end_leaf;
-         ++next_covered_) {
-      const auto& covered = patches_.covered[next_covered_];
+    bool found = false;
+    auto next = std::ranges::lower_bound(patches_.covered, surface.first_leaf, {}, &PatchScene::Covered::leaf);
+    for (; next != patches_.covered.end() && next->leaf < end_leaf; ++next) {
+      const auto& covered = *next;
       const auto i = covered.leaf - surface.first_leaf;
       const auto to = p.at(surface.page_x + i % surface.width - p.x0, surface.page_y + i / surface.width - p.y0);
+      if (covered.side != 0 && p.ring[to] == 0) continue;  // the front is what is looked at
       p.value[to] = lookUp(patches_.surfaces[covered.surface], covered.texel);
       p.ring[to] = 0;
+      found = true;
     }
+    return found;
   }
 
   /// Bilinear, within the chart.
@@ -196,7 +206,8 @@ class PageMaker {
         const std::size_t from = p.at(x, y);
         if (p.ring[from] == kMaxRing) continue;
         const std::size_t to = page.irradiance.index(static_cast<int>(p.x0 + x), static_cast<int>(p.y0 + y));
-        const bool better = owners.surface[to] == kNone || p.visible[from] > page.coverage[to] ||
+        const bool better = owners.surface[to] == kNone || owners.surface[to] == s ||
+                            p.visible[from] > page.coverage[to] ||
                             (p.visible[from] == page.coverage[to] && p.ring[from] < owners.ring[to]);
         if (!better) continue;
         page.irradiance.pixels[to] = p.value[from];
@@ -251,7 +262,6 @@ class PageMaker {
   std::span<const glm::vec3> values_;
   std::vector<LightmapPage> pages_;
   std::vector<PageOwners> owners_;
-  std::size_t next_covered_ = 0;
 };
 
 }  // namespace

@@ -56,6 +56,7 @@ struct LeafPoint {
   bool full = false;
   bool cut = false;                  ///< something passes through the leaf, or right before it
   std::uint32_t first_spot = kNone;  ///< into PatchScene::spots; kNone: any point stands for all
+  bool beneath = false;              ///< another surface lies in its plane and covers some of it
 };
 
 struct Surface {
@@ -116,13 +117,15 @@ struct PatchScene {
   };
   std::vector<Seam> seams;
 
-  /// A leaf right behind another surface that faces the same way and is lit in its place, and where on that. Lightmaps
+  /// A side of a leaf right behind that of another surface which faces the same way and is lit in its place, and where
+  /// on that: an earlier surface, or one that is opaque where this is not. Lightmaps
   /// show that light in both: who draws them sees now one, now the other.
   struct Covered {
-    std::uint32_t leaf, surface;  ///< the surface is an earlier one
+    std::uint32_t leaf, side;
+    std::uint32_t surface, surface_side;  ///< that covers it
     glm::vec2 texel;
   };
-  std::vector<Covered> covered;  ///< leaves ascending
+  std::vector<Covered> covered;  ///< leaves ascending, sides of each likewise
 
   /// Edge of a texel where nothing asks for another (unit box): as charts were laid out, and as a first guess decided
   /// which facets are charts of their own.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
+#include <numeric>
 #include <optional>
 #include <tuple>
 #include <utility>
@@ -32,20 +33,46 @@ glm::vec2 texelAt(const TriangleFrame& frame, const glm::vec3& position) {
   return {(along_u * vv - along_v * uv) / determinant, (along_v * uu - along_u * uv) / determinant};
 }
 
+/// By leaf: a triangle that lies on it, or in the same plane. Leaf points do not tell of leaves that are covered.
+std::vector<std::uint32_t> trianglesOn(const PatchScene& patches, const Surface& surface) {
+  std::vector<std::uint32_t> on(std::size_t{surface.width} * surface.height, kNone);
+  const glm::uvec2 most(surface.width - 1, surface.height - 1);
+  for (auto t = surface.first_triangle; t < surface.first_triangle + surface.triangle_count; ++t) {
+    glm::vec2 low(most), high(0.0F);
+    for (std::size_t c = 0; c < 3; ++c) {
+      const auto& texel = patches.vertices[patches.indices[std::size_t{3} * t + c]].texel;
+      low = glm::min(low, texel);
+      high = glm::max(high, texel);
+    }
+    const glm::uvec2 first(glm::max(low, 0.0F)), last = glm::min(glm::uvec2(high), most);
+    for (auto y = first.y; y <= last.y; ++y) {
+      for (auto x = first.x; x <= last.x; ++x) {
+        auto& triangle = on[std::size_t{y} * surface.width + x];
+        for (std::uint32_t k = 0; k < kPlaces && triangle == kNone; ++k)
+          if (triangleHolds(patches, t, glm::dvec2(x, y) + latticePoint(k, kPlaces), 0.0)) triangle = t;
+      }
+    }
+  }
+  if (surface.planar) std::ranges::replace(on, kNone, surface.first_triangle);
+  return on;
+}
+
 }  // namespace
 
-Solids::Solids(const PatchScene& patches, const std::vector<bool>& solid) {
-  std::vector<Bvh::Triangle> triangles;
+Solids::Solids(const PatchScene& patches, const std::vector<Hides>& hides) {
+  std::vector<Bvh::Triangle> triangles, sheets;
   for (std::uint32_t t = 0; t < patches.triangles.size(); ++t) {
-    if (!solid[patches.triangle_surface[t]]) continue;
+    const auto hiding = hides[patches.triangle_surface[t]];
+    if (hiding == Hides::kNothing) continue;
     Bvh::Triangle triangle;
     for (std::size_t c = 0; c < 3; ++c)
       triangle[c] = patches.vertices[patches.indices[std::size_t{3} * t + c]].position;
-    triangles.push_back(triangle);
-    surface_.push_back(patches.triangle_surface[t]);
-    normal_.push_back(patches.triangles[t].normal);
+    (hiding == Hides::kSolid ? triangles : sheets).push_back(triangle);
+    (hiding == Hides::kSolid ? normal_ : sheet_normal_).push_back(patches.triangles[t].normal);
+    if (hiding == Hides::kSolid) surface_.push_back(patches.triangle_surface[t]);
   }
   tree_ = Bvh(std::move(triangles));
+  sheets_ = Bvh(std::move(sheets));
 }
 
 bool Solids::near(const Bounds& box, std::uint32_t surface) const {
@@ -69,14 +96,17 @@ bool Solids::mayBury(const Bounds& positions, const glm::vec3& normal) const {
 Solids::Answer Solids::vote(const Start& start, Hits& hits, RayNotes* notes) const {
   const BurialWays ways(start.normal);
   std::uint32_t leave = 0, stay = 0;
+  bool agreed = true;
   for (std::uint32_t way = 0; way < kFirstWayAlong; ++way) {
-    if (leavesSolid(start, way, ways.of(way), hits, notes)) {
+    const auto ray = follow(start, way, ways.of(way), hits, notes);
+    agreed = agreed && ray != Ray::kEndsOnSheet;
+    if (ray == Ray::kLeaves) {
       ++leave;
     } else {
       ++stay;
       if (way == 0 && std::ranges::all_of(hits, &RayHit::front)) return {};
     }
-    if (leave == 0 && stay == kAgreeOutside) return {};
+    if (leave == 0 && stay == kAgreeOutside) return {false, agreed};
     if (stay == 0 && leave == kAgreeInside) return {true, true};
     if (2 * std::max(leave, stay) > kFirstWayAlong) break;
   }
@@ -89,44 +119,66 @@ bool Solids::seesOutAlong(const Start& start, Hits& hits, RayNotes* notes) const
   const BurialWays ways(start.normal);
   for (auto way = kFirstWayAlong; way < kBurialWays; ++way) {
     const auto direction = ways.of(way);
-    if (leavesSolid(start, way, direction, hits, notes)) continue;
-    if (hits.empty()) return true;
-    const RayHit first = hits.front();
-    const glm::vec3 facing = normal_[first.triangle];
-    const auto there = start.origin + first.t * direction + kBurialLift * glm::dvec3(facing);
-    if (!vote({there, facing, first.triangle}, hits, notes).buried) return true;
+    if (follow(start, way, direction, hits, notes) == Ray::kLeaves) continue;
+    const auto there = firstMet(start, direction, hits);
+    if (!there || !vote(*there, hits, notes).buried) return true;
   }
   return false;
 }
 
-/// Whether the place that a ray starts from lies in a solid, as that ray tells. Otherwise leaves what it met in `hits`,
-/// in order, which no other part of the scene changes.
-bool Solids::leavesSolid(const Start& start, std::uint32_t way, const glm::dvec3& direction, Hits& hits,
-                         RayNotes* notes) const {
-  const auto end = tree_.endOfSolid(start.origin, direction, kBurialRayLength, hits, hits.work);
-  if (notes != nullptr) notes->add({start.origin, start.normal, start.triangle, way, end.value_or(kBurialRayLength)});
-  return end.has_value();
+/// Before the nearest of `hits`, or the sheet that it meets earlier.
+std::optional<Solids::Start> Solids::firstMet(const Start& start, const glm::dvec3& direction, const Hits& hits) const {
+  const double reach = hits.empty() ? kBurialRayLength : hits.front().t;
+  const auto sheet = sheets_.empty() ? std::nullopt : sheets_.nearestHit(start.origin, direction, 0.0, reach);
+  if (!sheet && hits.empty()) return std::nullopt;
+  const double t = sheet ? sheet->t : hits.front().t;
+  glm::vec3 facing = sheet ? sheet_normal_[sheet->triangle] : normal_[hits.front().triangle];
+  if (sheet && !sheet->front) facing = -facing;
+  const auto triangle = sheet ? static_cast<std::uint32_t>(normal_.size()) + sheet->triangle : hits.front().triangle;
+  return Start{start.origin + t * direction + kBurialLift * glm::dvec3(facing), facing, triangle};
 }
 
-Coincidence::Coincidence(PatchScene& patches) : patches_(patches) {
+/// Where a ray from the place ends, if the place lies in a solid: before a sheet, or where it leaves the solid.
+/// Otherwise leaves what it met in `hits`, in order, which no other part of the scene changes.
+Solids::Ray Solids::follow(const Start& start, std::uint32_t way, const glm::dvec3& direction, Hits& hits,
+                           RayNotes* notes) const {
+  const auto end = tree_.endOfSolid(start.origin, direction, kBurialRayLength, hits, hits.work);
+  if (notes != nullptr) notes->add({start.origin, start.normal, start.triangle, way, end.value_or(kBurialRayLength)});
+  if (!end) return Ray::kStays;
+  return !sheets_.empty() && sheets_.meets(start.origin, direction, 0.0, *end) ? Ray::kEndsOnSheet : Ray::kLeaves;
+}
+
+Coincidence::Coincidence(PatchScene& patches, const std::vector<Hides>& hides)
+    : patches_(patches), rank_(patches.triangles.size()) {
+  std::vector<std::uint32_t> order(rank_.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::ranges::sort(order, {}, [&](std::uint32_t t) {  // charts of a mesh lie in any order
+    const auto s = patches.triangle_surface[t];
+    return std::tuple(hides[s] == Hides::kNothing, patches.surfaces[s].instance, patches.triangle_source[t], t);
+  });
+  for (std::uint32_t i = 0; i < order.size(); ++i) rank_[order[i]] = i;
   std::vector<Bvh::Triangle> triangles;
   for (std::size_t t = 0; t < patches.triangles.size(); ++t)
     triangles.push_back({patches.vertices[patches.indices[3 * t]].position,
                          patches.vertices[patches.indices[3 * t + 1]].position,
                          patches.vertices[patches.indices[3 * t + 2]].position});
   tree_ = Bvh(std::move(triangles));
-  least_ = tree_.leastTags(patches.triangle_surface);
+  least_ = tree_.leastTags(rank_);
 }
 
 void Coincidence::run() {
   std::uint64_t count = 0;
   std::pair<std::uint32_t, std::uint32_t> first{kNone, kNone};
-  const auto coplanar = coplanarWithEarlier();
+  const auto coplanar = coplanarWithOthers();
   for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
-    const std::uint32_t other = coveredBy(s, coplanar[s]);
-    covered_.push_back(other != kNone);
-    if (other == kNone) continue;
-    if (count++ == 0) first = {other, s};
+    auto by = kNone;
+    for (std::uint32_t side = 0; side < 2; ++side) {
+      const std::uint32_t other = isLit(s, side) ? coveredBy(s, side, coplanar[slot(s, side)]) : kNone;
+      covered_.push_back(other != kNone);
+      if (by == kNone) by = other;
+    }
+    if (by == kNone) continue;
+    if (count++ == 0) first = {by, s};
   }
   if (count == 0) return;
   patches_.warnings.push_back(
@@ -136,99 +188,120 @@ void Coincidence::run() {
                   patches_.surfaces[first.first].instance));
 }
 
-std::uint32_t Coincidence::coveredAt(std::uint32_t s, const glm::vec3& position, const glm::vec3& normal) const {
-  const auto triangle = triangleOver(s, position, normal);
-  return triangle == kNone ? kNone : patches_.triangle_surface[triangle];
+std::vector<bool> Coincidence::covered() const {
+  std::vector<bool> of_surface(patches_.surfaces.size());
+  for (std::uint32_t s = 0; s < of_surface.size(); ++s) of_surface[s] = covered_[slot(s, 0)] || covered_[slot(s, 1)];
+  return of_surface;
 }
 
-/// Of the earliest surface that covers `s` there.
-std::uint32_t Coincidence::triangleOver(std::uint32_t s, const glm::vec3& position, const glm::vec3& normal) const {
-  const glm::dvec3 n(normal);
-  const auto counts = [&](const RayHit& hit) {
-    return glm::dot(patches_.triangles[hit.triangle].normal, normal) > kSameWay;
+glm::vec3 Coincidence::facing(std::uint32_t triangle, std::uint32_t side) const {
+  const auto& normal = patches_.triangles[triangle].normal;
+  return side == 0 ? normal : -normal;
+}
+
+/// The earliest that covers the triangle there.
+Coincidence::Over Coincidence::over(std::uint32_t triangle, std::uint32_t side, const glm::vec3& position) const {
+  const auto facing = this->facing(triangle, side);
+  const auto own = patches_.triangle_surface[triangle];
+  const auto sideOf = [&](const RayHit& hit) {
+    return glm::dot(patches_.triangles[hit.triangle].normal, facing) > 0.0F ? 0U : 1U;
   };
-  const auto over =
-      tree_.leastHit(glm::dvec3(position) + n * 1e-6, -n, 0.0, 2e-6, patches_.triangle_surface, least_, s, counts);
-  return over ? over->triangle : kNone;
+  const auto counts = [&](const RayHit& hit) {
+    const auto s = patches_.triangle_surface[hit.triangle];
+    return s != own && std::abs(glm::dot(patches_.triangles[hit.triangle].normal, facing)) > kSameWay &&
+           isLit(s, sideOf(hit));
+  };
+  const glm::dvec3 n(facing);
+  const auto first =
+      tree_.leastHit(glm::dvec3(position) + n * 1e-6, -n, 0.0, 2e-6, rank_, least_, rank_[triangle], counts);
+  return first ? Over{first->triangle, sideOf(*first)} : Over{};
 }
 
 void Coincidence::keepCovered() {
   for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
-    const Surface& surface = patches_.surfaces[s];
-    if (!covered_[s] || !surface.planar || surface.first_node[0] == kNone) continue;
-    const TriangleFrame& frame = patches_.triangles[surface.first_triangle];
-    for (std::uint32_t i = 0; i < surface.width * surface.height; ++i) {
-      if (patches_.node_area[surface.first_node[0] + i] > 0.0F) continue;
-      // The middle of a texel that is wider than the surface may lie beside both.
-      const glm::dvec2 corner(i % surface.width, i / surface.width);
-      auto over = kNone;
-      for (std::uint32_t k = 0; k < kPlaces && over == kNone; ++k)
-        over = triangleOver(s, positionAt(frame, corner + latticePoint(k, kPlaces)), frame.normal);
-      if (over == kNone) continue;
-      const auto texel = texelAt(patches_.triangles[over], positionAt(frame, corner + 0.5));
-      patches_.covered.push_back({surface.first_leaf + i, patches_.triangle_surface[over], texel});
+    for (std::uint32_t side = 0; side < 2; ++side)
+      if (covered_[slot(s, side)]) keepCovered(s, side);
+  }
+  std::ranges::stable_sort(patches_.covered, {}, &PatchScene::Covered::leaf);
+}
+
+void Coincidence::keepCovered(std::uint32_t s, std::uint32_t side) {
+  const Surface& surface = patches_.surfaces[s];
+  const auto triangle_on = trianglesOn(patches_, surface);
+  for (std::uint32_t i = 0; i < surface.width * surface.height; ++i) {
+    if (patches_.node_area[surface.first_node[side] + i] > 0.0F || triangle_on[i] == kNone) continue;
+    const TriangleFrame& frame = patches_.triangles[triangle_on[i]];
+    // The middle of a texel that is wider than the surface may lie beside both.
+    const glm::dvec2 corner(i % surface.width, i / surface.width);
+    Over seen;
+    for (std::uint32_t k = 0; k < kPlaces && seen.triangle == kNone; ++k) {
+      seen = over(triangle_on[i], side, positionAt(frame, corner + latticePoint(k, kPlaces)));
     }
+    if (seen.triangle == kNone) continue;
+    const auto texel = texelAt(patches_.triangles[seen.triangle], positionAt(frame, corner + 0.5));
+    patches_.covered.push_back(
+        {surface.first_leaf + i, side, patches_.triangle_surface[seen.triangle], seen.side, texel});
   }
 }
 
-/// By surface: planar, in one plane with an earlier one that reaches into its bounds, and facing the same way. Planes
-/// are sorted into cells of distance, and then swept along x; twice, so that no pair lies on both sides of a cell's
-/// end.
-std::vector<bool> Coincidence::coplanarWithEarlier() const {
-  struct Plane {
-    std::int64_t cell;
-    float low;  ///< along x
-    std::uint32_t surface;
-  };
-  std::vector<bool> found(patches_.surfaces.size(), false);
+/// By surface and side: planar, in one plane with another that reaches into its bounds, and facing the same way.
+/// Planes are sorted into cells of distance, and then swept along x; twice, so that no pair lies on both sides of a
+/// cell's end.
+std::vector<bool> Coincidence::coplanarWithOthers() const {
+  std::vector<bool> found(2 * patches_.surfaces.size(), false);
   for (const double shift : {0.0, 0.5}) {
     std::vector<Plane> planes;
     for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
       const Surface& surface = patches_.surfaces[s];
-      if (!surface.planar) continue;
-      const TriangleFrame& frame = patches_.triangles[surface.first_triangle];
-      const auto distance = static_cast<double>(glm::dot(frame.normal, frame.origin));
-      planes.push_back({static_cast<std::int64_t>(std::floor(distance / kSamePlane + shift)), surface.bounds_min.x, s});
+      for (std::uint32_t side = 0; side < 2; ++side) {
+        if (!surface.planar || !isLit(s, side)) continue;
+        const auto distance = static_cast<double>(
+            glm::dot(facing(surface.first_triangle, side), patches_.triangles[surface.first_triangle].origin));
+        const auto cell = static_cast<std::int64_t>(std::floor(distance / kSamePlane + shift));
+        planes.push_back({cell, surface.bounds_min.x, s, side});
+      }
     }
-    std::ranges::sort(planes, {}, [](const Plane& plane) { return std::tuple(plane.cell, plane.low, plane.surface); });
+    std::ranges::sort(planes, {},
+                      [](const Plane& plane) { return std::tuple(plane.cell, plane.low, plane.surface, plane.side); });
     for (std::size_t i = 0; i < planes.size(); ++i) {
       const Surface& a = patches_.surfaces[planes[i].surface];
       for (auto k = i + 1; k < planes.size() && planes[k].cell == planes[i].cell &&
                            planes[k].low <= a.bounds_max.x + static_cast<float>(kSamePlane);
            ++k) {
-        const auto later = std::max(planes[i].surface, planes[k].surface);
-        if (!found[later] && lieTogether(a, patches_.surfaces[planes[k].surface])) found[later] = true;
+        const auto one = slot(planes[i].surface, planes[i].side), other = slot(planes[k].surface, planes[k].side);
+        if ((!found[one] || !found[other]) && lieTogether(planes[i], planes[k])) found[one] = found[other] = true;
       }
     }
   }
   return found;
 }
 
-/// Of two surfaces in one plane: they face the same way, and their bounds meet.
-bool Coincidence::lieTogether(const Surface& a, const Surface& b) const {
+/// Of two sides in one plane: they face the same way, and their bounds meet.
+bool Coincidence::lieTogether(const Plane& one, const Plane& other) const {
+  const Surface &a = patches_.surfaces[one.surface], &b = patches_.surfaces[other.surface];
   const auto margin = static_cast<float>(kSamePlane);
-  return glm::dot(patches_.triangles[a.first_triangle].normal, patches_.triangles[b.first_triangle].normal) >
-             kSameWay &&
+  return one.surface != other.surface &&
+         glm::dot(facing(a.first_triangle, one.side), facing(b.first_triangle, other.side)) > kSameWay &&
          !glm::any(glm::greaterThan(a.bounds_min, b.bounds_max + margin)) &&
          !glm::any(glm::greaterThan(b.bounds_min, a.bounds_max + margin));
 }
 
-bool Coincidence::mayCover(std::uint32_t s, const Bounds& box) const {
+bool Coincidence::mayCover(std::uint32_t s, std::uint32_t side, const Bounds& box) const {
   const glm::vec3 margin(2.0e-6F);
-  return covered_[s] && tree_.touches(box.min - margin, box.max + margin, patches_.triangle_surface, s);
+  return covered_[slot(s, side)] && tree_.touches(box.min - margin, box.max + margin, patches_.triangle_surface, s);
 }
 
-/// An earlier surface found right at some of this surface's leaf points, or `closely`, at one of them at least.
-std::uint32_t Coincidence::coveredBy(std::uint32_t s, bool closely) const {
+/// A surface found right before some of this surface's leaf points, or `closely`, at one of them at least.
+std::uint32_t Coincidence::coveredBy(std::uint32_t s, std::uint32_t side, bool closely) const {
   const Surface& surface = patches_.surfaces[s];
   const std::uint32_t leaves = surface.width * surface.height;
   const std::uint32_t step = closely ? 1U : std::max(1U, leaves / 16);
   for (std::uint32_t i = step / 2; i < leaves; i += step) {
     const LeafPoint& point = patches_.leaves[surface.first_leaf + i];
     if (point.triangle == kNone) continue;
-    const TriangleFrame& frame = patches_.triangles[point.triangle];
-    const std::uint32_t other = coveredAt(s, positionAt(frame, glm::dvec2(point.texel)), frame.normal);
-    if (other != kNone) return other;
+    const auto position = positionAt(patches_.triangles[point.triangle], glm::dvec2(point.texel));
+    const auto seen = over(point.triangle, side, position);
+    if (seen.triangle != kNone) return patches_.triangle_surface[seen.triangle];
   }
   return kNone;
 }

@@ -8,6 +8,7 @@
 #include <glm/common.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <optional>
 #include <vector>
 
 #include "server/scene/bounds.h"
@@ -26,11 +27,13 @@ struct Hits : std::vector<RayHit> {
   std::uint64_t work = 0;
 };
 
-/// The triangles that bound solids, and the question whether a point lies inside one.
+/// The triangles that bound solids, and the question whether a point lies inside one. Sheets that are seen from both
+/// sides bound none, but what lies beyond them does not count: a room of such walls within a house that is closed is no
+/// inside of the house.
 class Solids {
  public:
-  /// `solid`: by surface.
-  Solids(const PatchScene& patches, const std::vector<bool>& solid);
+  /// `hides`: by surface.
+  Solids(const PatchScene& patches, const std::vector<Hides>& hides);
 
   [[nodiscard]] bool empty() const { return tree_.empty(); }
 
@@ -40,8 +43,8 @@ class Solids {
   /// Buried when most rays into the hemisphere leave more solids than they enter. One odd face that is turned the
   /// wrong way, or a room whose roof was modelled from outside, does not bury what can be seen from elsewhere. Nor does
   /// a panel that hangs before a wall, whose back hides the wall from nearly everywhere: one sees out along the wall.
-  /// `agreed`: all rays that were asked said the same. They do unless a model is open, and then what holds for one
-  /// place need not hold for another, though nothing lies between.
+  /// `agreed`: all rays that were asked said the same, and none ended on a sheet. They do unless a model is open, and
+  /// then what holds for one place need not hold for another, though nothing lies between.
   struct Answer {
     bool buried = false, agreed = true;
   };
@@ -57,22 +60,28 @@ class Solids {
   struct Start {
     glm::dvec3 origin;
     glm::vec3 normal;
-    std::uint32_t triangle;  ///< of the tree; kNone: the place that is asked for
+    std::uint32_t triangle;  ///< of the tree, and after those of the sheets; kNone: the place that is asked for
   };
   [[nodiscard]] Answer vote(const Start& start, Hits& hits, RayNotes* notes) const;
   [[nodiscard]] bool seesOutAlong(const Start& start, Hits& hits, RayNotes* notes) const;
-  [[nodiscard]] bool leavesSolid(const Start& start, std::uint32_t way, const glm::dvec3& direction, Hits& hits,
-                                 RayNotes* notes) const;
+  enum class Ray { kStays, kLeaves, kEndsOnSheet };
+  [[nodiscard]] Ray follow(const Start& start, std::uint32_t way, const glm::dvec3& direction, Hits& hits,
+                           RayNotes* notes) const;
+  [[nodiscard]] std::optional<Start> firstMet(const Start& start, const glm::dvec3& direction, const Hits& hits) const;
 
   Bvh tree_;
   std::vector<std::uint32_t> surface_;  ///< by triangle of the tree
   std::vector<glm::vec3> normal_;       ///< likewise
+  Bvh sheets_;
+  std::vector<glm::vec3> sheet_normal_;
 };
 
-/// Pairs of surfaces that lie on each other and face the same way: the earlier is seen, the later gets no light.
+/// Sides of surfaces that lie on each other and face the same way: the earlier is seen, the later gets no light. What
+/// one can see through comes after all that is opaque: a decal does not hide the wall.
 class Coincidence {
  public:
-  explicit Coincidence(PatchScene& patches);
+  /// `hides`: by surface.
+  Coincidence(PatchScene& patches, const std::vector<Hides>& hides);
 
   /// Finds the pairs; adds a warning to the scene where there are some.
   void run();
@@ -83,28 +92,45 @@ class Coincidence {
   /// Whether there are any.
   [[nodiscard]] bool found() const { return std::ranges::find(covered_, true) != covered_.end(); }
 
-  /// By surface: somewhere.
-  [[nodiscard]] const std::vector<bool>& covered() const { return covered_; }
+  /// By surface: a side of it is, somewhere.
+  [[nodiscard]] std::vector<bool> covered() const;
 
-  /// Whether the front of `s` may be covered in the box.
-  [[nodiscard]] bool mayCover(std::uint32_t s, const Bounds& box) const;
+  /// Whether a side of `s` may be covered in the box.
+  [[nodiscard]] bool mayCover(std::uint32_t s, std::uint32_t side, const Bounds& box) const;
 
-  /// Whether the front of `s` is covered there. Only asked of surfaces that are covered somewhere.
-  [[nodiscard]] bool covers(std::uint32_t s, const glm::vec3& position, const glm::vec3& normal) const {
-    return covered_[s] && coveredAt(s, position, normal) != kNone;
+  /// Whether this side of a triangle is covered there.
+  [[nodiscard]] bool covers(std::uint32_t triangle, std::uint32_t side, const glm::vec3& position) const {
+    return covered_[slot(patches_.triangle_surface[triangle], side)] &&
+           over(triangle, side, position).triangle != kNone;
   }
 
  private:
-  [[nodiscard]] std::uint32_t coveredAt(std::uint32_t s, const glm::vec3& position, const glm::vec3& normal) const;
-  [[nodiscard]] std::uint32_t triangleOver(std::uint32_t s, const glm::vec3& position, const glm::vec3& normal) const;
-  [[nodiscard]] std::vector<bool> coplanarWithEarlier() const;
-  [[nodiscard]] bool lieTogether(const Surface& a, const Surface& b) const;
-  [[nodiscard]] std::uint32_t coveredBy(std::uint32_t s, bool closely) const;
+  static std::size_t slot(std::uint32_t s, std::uint32_t side) { return std::size_t{2} * s + side; }
+  /// Which side of which triangle is seen.
+  struct Over {
+    std::uint32_t triangle = kNone, side = 0;
+  };
+  [[nodiscard]] Over over(std::uint32_t triangle, std::uint32_t side, const glm::vec3& position) const;
+  [[nodiscard]] glm::vec3 facing(std::uint32_t triangle, std::uint32_t side) const;
+  [[nodiscard]] bool isLit(std::uint32_t s, std::uint32_t side) const {
+    return patches_.surfaces[s].first_node[side] != kNone;
+  }
+  [[nodiscard]] std::vector<bool> coplanarWithOthers() const;
+  /// A side of a planar surface.
+  struct Plane {
+    std::int64_t cell;  ///< of distance
+    float low;          ///< along x
+    std::uint32_t surface, side;
+  };
+  [[nodiscard]] bool lieTogether(const Plane& one, const Plane& other) const;
+  [[nodiscard]] std::uint32_t coveredBy(std::uint32_t s, std::uint32_t side, bool closely) const;
+  void keepCovered(std::uint32_t s, std::uint32_t side);
 
   PatchScene& patches_;
   Bvh tree_;
-  std::vector<std::uint32_t> least_;  ///< by node of the tree: the earliest surface there
-  std::vector<bool> covered_;         ///< by surface: somewhere
+  /// By triangle: what is of less is seen; by node of the tree, the least there.
+  std::vector<std::uint32_t> rank_, least_;
+  std::vector<bool> covered_;  ///< by surface and side: somewhere
 };
 
 }  // namespace radiosity::scene

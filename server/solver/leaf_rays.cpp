@@ -4,6 +4,9 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
+#include <span>
+#include <tuple>
+#include <utility>
 
 #include "server/solver/sampling.h"
 
@@ -74,9 +77,10 @@ std::uint32_t LeafRays::neighbourOf(const Side& side, std::uint32_t leaf) const 
     return patches_.node_area[of.first_node + which] > 0.0F;
   };
   const auto number = patches_.surfaces[side.surface].first_leaf + leaf;
-  const auto cover = std::ranges::lower_bound(patches_.covered, number, {}, &scene::PatchScene::Covered::leaf);
+  auto cover = std::ranges::lower_bound(patches_.covered, number, {}, &scene::PatchScene::Covered::leaf);
+  while (cover != patches_.covered.end() && cover->leaf == number && cover->side != side.side) ++cover;
   if (cover != patches_.covered.end() && cover->leaf == number) {
-    if (const auto s = side_of_[cover->surface][side.side]; s != scene::kNone) {
+    if (const auto s = side_of_[cover->surface][cover->surface_side]; s != scene::kNone) {
       const auto x = std::clamp(cover->texel.x, 0.0F, static_cast<float>(sides_[s].width - 1));
       const auto y = std::clamp(cover->texel.y, 0.0F, static_cast<float>(sides_[s].height - 1));
       const auto there = static_cast<std::uint32_t>(y) * sides_[s].width + static_cast<std::uint32_t>(x);
@@ -179,14 +183,46 @@ std::uint32_t LeafRays::see(const Place& from, const glm::dvec3& direction, std:
       for (std::size_t i = 0; i < sheets; ++i) distance[i] = 0.0F;
       continue;
     }
-    const auto s = side_of_[patches_.triangle_surface[hit.triangle]][hit.front ? 0 : 1];
+    auto s = side_of_[patches_.triangle_surface[hit.triangle]][hit.front ? 0 : 1];
     end = {at, {}, kNothing};
     if (s == scene::kNone) return kNothing;
-    const auto value = leafAt(sides_[s], hit.triangle, at);
+    auto value = leafAt(sides_[s], hit.triangle, at);
+    if (sheets + 1 < kMostSheets && isBeneath(sides_[s], value) &&
+        uncover(hit, origin, direction, std::span(passed), sheets)) {
+      s = side_of_[patches_.triangle_surface[hit.triangle]][hit.front ? 0 : 1];
+      value = leafAt(sides_[s], hit.triangle, at);
+    }
     const auto& normal = patches_.triangles[hit.triangle].normal;
     end = {at, glm::dvec3(hit.front ? normal : -normal), value};
     return stand_in_[value];
   }
+}
+
+bool LeafRays::isBeneath(const Side& side, std::uint32_t value) const {
+  return patches_.leaves[patches_.surfaces[side.surface].first_leaf + value - side.first_value].beneath;
+}
+
+/// Which triangle comes before all others, and among those that lie on each other is the one that is seen.
+bool LeafRays::isBefore(std::uint32_t one, std::uint32_t other) const {
+  const auto key = [&](std::uint32_t triangle) {
+    const auto& surface = patches_.surfaces[patches_.triangle_surface[triangle]];
+    return std::tuple(surface.see_through, surface.instance, patches_.triangle_source[triangle], triangle);
+  };
+  return key(one) < key(other);
+}
+
+/// What lies in the same place as the hit and is seen there instead, if that is something: then the hit is that.
+bool LeafRays::uncover(scene::RayHit& hit, const glm::dvec3& origin, const glm::dvec3& direction,
+                       std::span<std::uint32_t> passed, std::size_t sheets) const {
+  const auto reach = static_cast<float>(hit.t) + kSame;
+  auto seen = hit;
+  auto met = hit;
+  for (passed[sheets++] = met.triangle; sheets < passed.size(); passed[sheets++] = met.triangle) {
+    if (!wide_.nearestHit(glm::vec3(origin), glm::vec3(direction), reach, met, passed.first(sheets))) break;
+    const auto s = side_of_[patches_.triangle_surface[met.triangle]][met.front ? 0 : 1];
+    if (s != scene::kNone && isBefore(met.triangle, seen.triangle)) seen = met;
+  }
+  return seen.triangle != std::exchange(hit, seen).triangle;
 }
 
 LeafRays::Sight LeafRays::look(const Place& from, const glm::dvec3& direction) const {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <span>
 #include <vector>
 
 #include "server/scene/bounds.h"
@@ -69,6 +70,10 @@ class LeafRays {
   const std::vector<Side>& sides_;
   void findStandIns();
   [[nodiscard]] std::uint32_t neighbourOf(const Side& side, std::uint32_t leaf) const;
+  [[nodiscard]] bool isBeneath(const Side& side, std::uint32_t value) const;
+  [[nodiscard]] bool isBefore(std::uint32_t one, std::uint32_t other) const;
+  bool uncover(scene::RayHit& hit, const glm::dvec3& origin, const glm::dvec3& direction,
+               std::span<std::uint32_t> passed, std::size_t sheets) const;
   [[nodiscard]] bool passes(const scene::RayHit& hit, const glm::dvec3& at, std::uint64_t key) const;
   /// The leaf of a side that a point of a triangle's plane lies on, by value.
   [[nodiscard]] std::uint32_t leafAt(const Side& side, std::uint32_t triangle, const glm::dvec3& point) const;

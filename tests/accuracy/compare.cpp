@@ -57,12 +57,12 @@ std::vector<SurfacePoint> choosePoints(const LitScene& lit, const ReferenceOptio
     const auto mix = [&](const auto& c) { return c[0] * (1.0 - root) + c[1] * (root * (1.0 - v)) + c[2] * (root * v); };
     SurfacePoint point{{triangle.lightmap_page, mix(triangle.lightmap_uv), {}}, {}};
     point.footprint = oracle::Footprint::at(mix(triangle.corners), triangle.normal);
+    point.footprint.pieces[0].triangle = index;
     if (triangle.double_sided) {
       auto back = point.footprint.pieces[0];
       back.normal = -back.normal;
       point.footprint.pieces.push_back(back);
     }
-    point.footprint.pieces[0].triangle = index;
     points.push_back(std::move(point));
   }
   return points;

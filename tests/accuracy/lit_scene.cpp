@@ -63,7 +63,7 @@ void addPieces(Texel& texel, const Polygon& polygon, const oracle::Triangle& tri
   for (std::size_t i = 1; i + 1 < polygon.size(); ++i) {
     const std::array<glm::dvec3, 3> corners{polygon[0].world, polygon[i].world, polygon[i + 1].world};
     texel.footprint.pieces.push_back({corners, triangle.normal, index});
-    if (triangle.double_sided) texel.footprint.pieces.push_back({corners, -triangle.normal, oracle::kNoTriangle});
+    if (triangle.double_sided) texel.footprint.pieces.push_back({corners, -triangle.normal, index});
   }
 }
 

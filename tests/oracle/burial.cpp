@@ -65,11 +65,16 @@ std::vector<Burial::Crossing> Burial::crossings(const glm::dvec3& from, const gl
 
 std::vector<Burial::Crossing> Burial::solidCrossings(const glm::dvec3& from, const glm::dvec3& direction) const {
   auto met = crossings(from, direction, std::numeric_limits<double>::infinity());
-  std::erase_if(met, [&](const Crossing& crossing) {
-    const auto& triangle = triangles_[crossing.triangle];
-    return triangle.double_sided || triangle.see_through;
-  });
+  std::erase_if(met, [&](const Crossing& crossing) { return triangles_[crossing.triangle].see_through; });
+  const auto sheet = std::find_if(met.begin(), met.end(), [&](const auto& crossing) { return isSheet(crossing); });
+  if (sheet != met.end()) met.erase(sheet + 1, met.end());
   return met;
+}
+
+/// Opaque, and lit on both sides: nobody sees beyond it.
+bool Burial::isSheet(const Crossing& crossing) const {
+  const auto& triangle = triangles_[crossing.triangle];
+  return triangle.double_sided && !triangle.see_through;
 }
 
 bool Burial::isFront(std::uint32_t triangle, const glm::dvec3& direction) const {
@@ -79,7 +84,7 @@ bool Burial::isFront(std::uint32_t triangle, const glm::dvec3& direction) const 
 /// From the start to some place on the ray: then the start is inside what is left there.
 bool Burial::leavesMore(std::span<const Crossing> crossings, const glm::dvec3& direction) const {
   int entered = 0;
-  for (std::size_t i = 0; i < crossings.size(); ++i) {
+  for (std::size_t i = 0; i < crossings.size() && !isSheet(crossings[i]); ++i) {
     const bool front = isFront(crossings[i].triangle, direction);
     const bool same = i > 0 && crossings[i].distance - crossings[i - 1].distance < kSameCrossing &&
                       front == isFront(crossings[i - 1].triangle, direction);
@@ -119,9 +124,12 @@ Where Burial::alongSurface(const glm::dvec3& point, const glm::dvec3& normal) co
     const auto met = solidCrossings(from, direction);
     if (leavesMore(met, direction)) continue;
     // What it meets first may be a part of the surface, in a hollow, or of another that is inside as well.
-    const auto there = met.empty()
-                           ? Where::kOutside
-                           : vote(from + direction * met.front().distance, triangles_[met.front().triangle].normal);
+    auto there = Where::kOutside;
+    if (!met.empty()) {
+      const auto& normal = triangles_[met.front().triangle].normal;
+      const bool from_behind = isSheet(met.front()) && !isFront(met.front().triangle, direction);
+      there = vote(from + direction * met.front().distance, from_behind ? -normal : normal);
+    }
     out += there == Where::kOutside ? 1 : 0;
     perhaps_out += there == Where::kUndecidedOutside ? 1 : 0;
     perhaps_in += there == Where::kUndecidedInside ? 1 : 0;
@@ -135,7 +143,9 @@ Where Burial::whereIs(const glm::dvec3& point, const glm::dvec3& normal) const {
   const auto votes = vote(point, normal);
   if (votes == Where::kOutside) return votes;
   const auto above = solidCrossings(point + normal * kLift, normal);
-  if (!above.empty() && above.front().distance < kOnSurface && !isFront(above.front().triangle, normal)) return votes;
+  if (!above.empty() && above.front().distance < kOnSurface && !isSheet(above.front()) &&
+      !isFront(above.front().triangle, normal))
+    return votes;
   const auto along = alongSurface(point, normal);
   if (along == Where::kInside) return votes;
   return along == Where::kUndecidedInside && !isInside(votes) ? votes : along;
@@ -144,7 +154,11 @@ Where Burial::whereIs(const glm::dvec3& point, const glm::dvec3& normal) const {
 bool Burial::underEarlier(const glm::dvec3& point, const glm::dvec3& normal, std::uint32_t triangle) const {
   const auto met = crossings(point + normal * kSamePlane, -normal, 2.0 * kSamePlane);
   return std::any_of(met.begin(), met.end(), [&](const Crossing& crossing) {
-    return crossing.triangle < triangle && glm::dot(triangles_[crossing.triangle].normal, normal) > kSameFacing;
+    const auto& other = triangles_[crossing.triangle];
+    const double same = glm::dot(other.normal, normal);
+    const bool through = triangles_[triangle].see_through;
+    const bool before = through == other.see_through ? crossing.triangle < triangle : through;
+    return before && (same > kSameFacing || (other.double_sided && same < -kSameFacing));
   });
 }
 

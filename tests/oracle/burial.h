@@ -35,8 +35,8 @@ class Burial {
   /// One ray of the question: false where the point cannot be inside, at much less cost when asked at many points.
   [[nodiscard]] bool leavesSolid(const glm::dvec3& point, const glm::dvec3& direction) const;
 
-  /// Whether a triangle that comes before `triangle` in the file lies in its plane, faces the same way and holds the
-  /// point (of the box): that one is lit.
+  /// Whether a triangle lies in the plane of `triangle`, faces the same way and holds the point (of the box), and comes
+  /// before it in the file, or is opaque where one can see through this one: that one is lit.
   [[nodiscard]] bool underEarlier(const glm::dvec3& point, const glm::dvec3& normal, std::uint32_t triangle) const;
 
  private:
@@ -48,6 +48,7 @@ class Burial {
   static void keep(const RTCFilterFunctionNArguments* arguments);
   [[nodiscard]] std::vector<Crossing> crossings(const glm::dvec3& from, const glm::dvec3& way, double far) const;
   [[nodiscard]] std::vector<Crossing> solidCrossings(const glm::dvec3& from, const glm::dvec3& direction) const;
+  [[nodiscard]] bool isSheet(const Crossing& crossing) const;
   [[nodiscard]] bool isFront(std::uint32_t triangle, const glm::dvec3& direction) const;
   [[nodiscard]] bool leavesMore(std::span<const Crossing> crossings, const glm::dvec3& direction) const;
   [[nodiscard]] Where vote(const glm::dvec3& point, const glm::dvec3& normal) const;

@@ -93,7 +93,6 @@ class PathTracer::Scene {
 
   [[nodiscard]] Where whereIs(const Point& at) const { return burial_->whereIs(toUnit(at.position), at.normal); }
 
-  /// Under an earlier triangle in the same plane.
   [[nodiscard]] bool covered(const Point& point) const {
     return point.triangle != kNoTriangle && burial_->underEarlier(toUnit(point.position), point.normal, point.triangle);
   }
@@ -122,8 +121,10 @@ class PathTracer::Scene {
   /// Whether the point is under an earlier face or inside a solid; counts it.
   [[nodiscard]] bool leaveOut(const Point& point, Tally& tally) const {
     const bool under = covered(point);
-    tally.front += point.triangle != kNoTriangle ? 1.0 : 0.0;
-    tally.covered += under ? 1.0 : 0.0;
+    const bool is_front =
+        point.triangle != kNoTriangle && glm::dot(triangles_[point.triangle].normal, point.normal) > 0;
+    tally.front += is_front ? 1.0 : 0.0;
+    tally.covered += is_front && under ? 1.0 : 0.0;
     if (under) return true;
     const auto where = whereIs(point);
     tally.undecided += isDecided(where) ? 0.0 : 1.0;
@@ -421,9 +422,8 @@ class PathTracer::Scene {
     for (std::uint32_t i = 0; i < 128; ++i) {
       const auto u = lattice.point(i);
       const auto point = pointOn(footprint, cumulative, u[0], u[1]);
-      const auto place = toUnit(point.position);
-      if (point.triangle != kNoTriangle && burial_->underEarlier(place, point.normal, point.triangle)) return true;
-      if (burial_->leavesSolid(place + point.normal * kLift, cosineDirection(point.normal, u[2], u[3]))) return true;
+      const auto place = toUnit(point.position) + point.normal * kLift;
+      if (covered(point) || burial_->leavesSolid(place, cosineDirection(point.normal, u[2], u[3]))) return true;
     }
     return false;
   }

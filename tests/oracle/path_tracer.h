@@ -22,7 +22,7 @@ struct Footprint {
   struct Piece {
     std::array<glm::dvec3, 3> corners{};
     glm::dvec3 normal{0.0};  ///< unit; light arrives on this side
-    /// Of the scene, whose front this is a part of: what lies under an earlier one in its plane is left out.
+    /// Of the scene, that this is a part of: what lies under an earlier one in its plane is left out.
     std::uint32_t triangle = kNoTriangle;
   };
   std::vector<Piece> pieces;
