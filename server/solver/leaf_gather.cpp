@@ -48,7 +48,7 @@ std::uint16_t firstRaysOfWide(const Side& side, std::uint32_t leaf, bool is_alon
   const auto x = leaf % side.width, y = leaf / side.width;
   const auto from_edge = std::min({x, y, side.width - 1 - x, side.height - 1 - y});
   const std::uint32_t usual = is_alone ? 2 * kFirstRays : kFirstRays;
-  const std::uint32_t times = from_edge == 0 ? 4 : from_edge == 1 && is_alone ? 2 : 1;
+  const std::uint32_t times = from_edge > 1 ? 1 : from_edge == 0 && is_alone ? 4 : from_edge == 0 || is_alone ? 2 : 1;
   return static_cast<std::uint16_t>(times * usual);
 }
 

@@ -70,10 +70,12 @@ class GainTable {
 const std::array<LeafSmoother::Pass, 5> LeafSmoother::kPasses{Pass{1, false}, Pass{2, false}, Pass{4, false},
                                                               Pass{1, true}, Pass{2, true}};
 
-bool LeafSmoother::Pass::takesEnds(std::uint32_t size) const { return one_sided && size <= kNarrow; }
+bool LeafSmoother::Pass::takesEnds(std::uint32_t size) const { return one_sided && size <= kNarrow && size > step; }
 
+/// False: there are none to average.
 bool LeafSmoother::isFor(const Pass& pass, const Side& side) {
-  return side.leaf_count > 1 && (!pass.one_sided || pass.takesEnds(side.width) || pass.takesEnds(side.height));
+  if (pass.one_sided) return pass.takesEnds(side.width) || pass.takesEnds(side.height);
+  return std::max(side.width, side.height) > 2 * pass.step;
 }
 
 LeafSmoother::LeafSmoother(const std::vector<Side>& sides, const std::vector<double>& area,

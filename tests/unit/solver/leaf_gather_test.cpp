@@ -246,7 +246,7 @@ TEST(LeafGather, WideSidesWithoutOtherLightBeginWithTwiceAsManyRaysAndTheirEdges
   const auto n = rays[0];
   ASSERT_GT(n, 0U);
   EXPECT_THAT(rays, ElementsAre(n, 2 * n, n, 2 * n, n, n));
-  EXPECT_THAT(raysOf(kPlenty, 0), ElementsAre(4 * n, 8 * n, 4 * n, 8 * n, n, n));
+  EXPECT_THAT(raysOf(kPlenty, 0), ElementsAre(2 * n, 8 * n, 2 * n, 8 * n, n, n));
   EXPECT_THAT(raysOf(kPlenty, 1), ElementsAre(n, 4 * n, n, 4 * n, n, n));
   EXPECT_THAT(raysOf(LeafGather::leastBytes(4 * 256 + 2 * 64), 0), testing::Each(n)) << "there is no room for more";
 }
