@@ -114,14 +114,14 @@ it('carries exposure, tone mapping and scale in a link, and shows them again', a
   const other = await pages.open(`${server.url}/#${hash}`, 900, 600);
   await converged(other);
   await drawn(other);
-  const shown = await state(other);
-  expect({ ...shown, base: made.base }).toEqual(made);
-  expect(shown.base / made.base).toBeCloseTo(1, 3); // links carry four digits
+  const seen = await state(other);
+  expect({ ...seen, base: made.base }).toEqual(made);
+  expect(seen.base / made.base).toBeCloseTo(1, 3); // links carry four digits
   expect(await other.getByLabel('Tone mapping').inputValue()).toBe('agx');
   expect(await other.getByLabel('Lowest value of the scale').inputValue()).toBe('2');
   expect(await other.locator('.legend').innerText()).toMatch(/≤ 2\b[^]*≥ 300/);
   const shown = await other.evaluate(() => window.viewer!.viewer.exposure.value);
-  expect(shown / (Number(made.base) * 2 ** 1.5)).toBeCloseTo(1, 2); // `base` has three digits
+  expect(shown / (made.base * 2 ** 1.5)).toBeCloseTo(1, 2);
   // What such a link does not say is as it is without one, and what nobody can mean is not said.
   await other.goto(`${server.url}/#view=irradiance&stops=99&tone=toString&scale=5,1&exposure=-3`);
   const plain = { automatic: true, stops: 0, tone: 0, autoRange: true };
