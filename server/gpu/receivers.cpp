@@ -56,7 +56,7 @@ Receivers::Receivers(std::shared_ptr<const scene::PatchScene> patches)
         const auto& leaf = patches_->leaves[surface.first_leaf + i];
         if (!receives(leaf, patches_->node_area[first + i])) continue;
         const auto texel = leaf.full ? glm::vec2(i % surface.width, i / surface.width) : leaf.texel;
-        receivers_.push_back({first + i, leaf.triangle, texel, leaf.first_spot, leaf.full, leaf.beneath});
+        receivers_.push_back({first + i, leaf.triangle, texel, leaf.first_spot, leaf.full});
       }
       groups_.push_back({s, begin, receivers_.size() - begin, side == 0 ? 1.0F : -1.0F, blocks_.size()});
       findBlocks(groups_.back());

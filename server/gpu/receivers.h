@@ -30,11 +30,11 @@ class Receivers {
     std::uint32_t node, triangle;
     glm::vec2 texel;           ///< corner of the leaf when full, else the point itself
     std::uint32_t first_spot;  ///< its places (PatchScene::spots), or kNone
-    bool full, beneath;        ///< as of scene::LeafPoint
+    bool full;
 
     [[nodiscard]] bool hasSpots() const { return first_spot != scene::kNone; }
-    /// Something hovers right before it, or beside that; or lies on it, so that pixels name either.
-    [[nodiscard]] bool liesInGap() const { return (full || beneath) && hasSpots(); }
+    /// Something hovers right before it, or beside that.
+    [[nodiscard]] bool liesInGap() const { return full && hasSpots(); }
   };
   /// Receivers of one side of a surface; they lie together.
   struct Group {

@@ -97,8 +97,8 @@ class SolidWalk {
   /// They come nearly in order.
   void add(const RayHit& hit) {
     const auto key = [](const RayHit& of) { return std::tuple(of.t, of.front, of.triangle); };
-    hits_.push_back(hit);
-    for (auto i = hits_.size() - 1; i > 0 && key(hits_[i]) < key(hits_[i - 1]); --i) std::swap(hits_[i], hits_[i - 1]);
+    const bool in_order = hits_.empty() || key(hits_.back()) < key(hit);
+    hits_.insert(in_order ? hits_.end() : std::ranges::upper_bound(hits_, key(hit), {}, key), hit);
   }
 
   /// Goes on to `end`, before which no more hits will come.

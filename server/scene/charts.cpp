@@ -67,9 +67,10 @@ class Builder {
     const std::vector<LeafPiece> pieces = measureCoverage(patches_);
     setTexelAreas();
     std::vector<Hides> hides;
-    for (const Surface& surface : patches_.surfaces) {
+    for (Surface& surface : patches_.surfaces) {
       const Material& material = materialOf(scene_, surface.instance);
-      hides.push_back(isSeeThrough(material) ? Hides::kNothing : material.double_sided ? Hides::kSheet : Hides::kSolid);
+      surface.see_through = isSeeThrough(material);
+      hides.push_back(surface.see_through ? Hides::kNothing : material.double_sided ? Hides::kSheet : Hides::kSolid);
     }
     std::optional<FormerBurial> former;
     if (former_ != nullptr && record_ != nullptr) {

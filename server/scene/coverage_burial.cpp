@@ -458,7 +458,7 @@ class Burial {
 
 std::shared_ptr<const BurialRecord> removeBuried(PatchScene& patches, const std::vector<LeafPiece>& pieces,
                                                  const std::vector<Hides>& hides, const FormerBurial* former) {
-  Coincidence coincidence(patches, hides);
+  Coincidence coincidence(patches);
   coincidence.run();
   auto record = Burial(patches, pieces, hides, coincidence, former).run();
   coincidence.keepCovered();

@@ -182,7 +182,6 @@ bool isSeeThrough(const Material& material) {
 void measureOpacity(const Scene& scene, PatchScene& patches) {
   std::uint64_t cells = 0;
   for (Surface& surface : patches.surfaces) {
-    surface.see_through = isSeeThrough(materialOf(scene, surface));
     if (!surface.see_through) continue;
     surface.opacity_scale = SurfaceOpacity(scene, patches, surface).wantedScale();
     cells += cellsOf(surface);

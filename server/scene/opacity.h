@@ -9,9 +9,9 @@ namespace radiosity::scene {
 /// Whether a material lets any light through.
 [[nodiscard]] bool isSeeThrough(const Material& material);
 
-/// Marks the surfaces one can see through and fills their opacity grids: MASK gives the part of a cell above the
-/// cutoff, BLEND alpha, transmission 1 - factor; all of them multiplied. Grids together have at most 2^26 cells: beyond
-/// that they are coarser, with a warning. Needs surfaces, vertices and triangle_source.
+/// Fills the opacity grids of surfaces one can see through (Surface::see_through): MASK gives the part of a cell above
+/// the cutoff, BLEND alpha, transmission 1 - factor; all of them multiplied. Grids together have at most 2^26 cells:
+/// beyond that they are coarser, with a warning. Needs vertices and triangle_source, too.
 void measureOpacity(const Scene& scene, PatchScene& patches);
 
 /// Multiplies the leaf areas of those surfaces by the opacity of the leaf; what is wholly cut out becomes empty.

@@ -152,9 +152,11 @@ class PageMaker {
       place(s, p);
     }
     // Surfaces may cover each other here and there: once all have their places.
-    for (std::uint32_t s = 0; s < patches_.surfaces.size() && !patches_.covered.empty(); ++s) {
+    for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
+      const auto covered = coveredOf(patches_.surfaces[s]);
+      if (covered.empty()) continue;
       Patchwork p = gather(patches_, patches_.surfaces[s], values_);
-      if (!takeFromCovers(s, p)) continue;
+      takeFromCovers(patches_.surfaces[s], covered, p);
       fillUnknown(p);
       place(s, p);
     }
@@ -164,22 +166,22 @@ class PageMaker {
   }
 
  private:
-  /// The light of leaves that other surfaces cover, whose charts have their places already. False: there are none.
-  bool takeFromCovers(std::uint32_t s, Patchwork& p) {
-    const Surface& surface = patches_.surfaces[s];
-    const auto end_leaf = surface.first_leaf + surface.width * surface.height;
-    bool found = false;
-    auto next = std::ranges::lower_bound(patches_.covered, surface.first_leaf, {}, &PatchScene::Covered::leaf);
-    for (; next != patches_.covered.end() && next->leaf < end_leaf; ++next) {
-      const auto& covered = *next;
+  [[nodiscard]] std::span<const PatchScene::Covered> coveredOf(const Surface& surface) const {
+    const auto from = [&](std::uint32_t leaf) {
+      return std::ranges::lower_bound(patches_.covered, leaf, {}, &PatchScene::Covered::leaf);
+    };
+    return {from(surface.first_leaf), from(surface.first_leaf + surface.width * surface.height)};
+  }
+
+  /// The light of leaves that other surfaces cover, whose charts have their places already.
+  void takeFromCovers(const Surface& surface, std::span<const PatchScene::Covered> all, Patchwork& p) const {
+    for (const auto& covered : all) {
       const auto i = covered.leaf - surface.first_leaf;
       const auto to = p.at(surface.page_x + i % surface.width - p.x0, surface.page_y + i / surface.width - p.y0);
       if (covered.side != 0 && p.ring[to] == 0) continue;  // the front is what is looked at
       p.value[to] = lookUp(patches_.surfaces[covered.surface], covered.texel);
       p.ring[to] = 0;
-      found = true;
     }
-    return found;
   }
 
   /// Bilinear, within the chart.

@@ -148,14 +148,10 @@ Solids::Ray Solids::follow(const Start& start, std::uint32_t way, const glm::dve
   return !sheets_.empty() && sheets_.meets(start.origin, direction, 0.0, *end) ? Ray::kEndsOnSheet : Ray::kLeaves;
 }
 
-Coincidence::Coincidence(PatchScene& patches, const std::vector<Hides>& hides)
-    : patches_(patches), rank_(patches.triangles.size()) {
+Coincidence::Coincidence(PatchScene& patches) : patches_(patches), rank_(patches.triangles.size()) {
   std::vector<std::uint32_t> order(rank_.size());
   std::iota(order.begin(), order.end(), 0U);
-  std::ranges::sort(order, {}, [&](std::uint32_t t) {  // charts of a mesh lie in any order
-    const auto s = patches.triangle_surface[t];
-    return std::tuple(hides[s] == Hides::kNothing, patches.surfaces[s].instance, patches.triangle_source[t], t);
-  });
+  std::ranges::sort(order, {}, [&](std::uint32_t t) { return seenOrder(patches, t); });
   for (std::uint32_t i = 0; i < order.size(); ++i) rank_[order[i]] = i;
   std::vector<Bvh::Triangle> triangles;
   for (std::size_t t = 0; t < patches.triangles.size(); ++t)

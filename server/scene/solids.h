@@ -80,8 +80,7 @@ class Solids {
 /// one can see through comes after all that is opaque: a decal does not hide the wall.
 class Coincidence {
  public:
-  /// `hides`: by surface.
-  Coincidence(PatchScene& patches, const std::vector<Hides>& hides);
+  explicit Coincidence(PatchScene& patches);
 
   /// Finds the pairs; adds a warning to the scene where there are some.
   void run();

@@ -5,9 +5,9 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 #include <span>
-#include <tuple>
 #include <utility>
 
+#include "server/scene/coverage.h"
 #include "server/solver/sampling.h"
 
 namespace radiosity::solver {
@@ -202,15 +202,6 @@ bool LeafRays::isBeneath(const Side& side, std::uint32_t value) const {
   return patches_.leaves[patches_.surfaces[side.surface].first_leaf + value - side.first_value].beneath;
 }
 
-/// Which triangle comes before all others, and among those that lie on each other is the one that is seen.
-bool LeafRays::isBefore(std::uint32_t one, std::uint32_t other) const {
-  const auto key = [&](std::uint32_t triangle) {
-    const auto& surface = patches_.surfaces[patches_.triangle_surface[triangle]];
-    return std::tuple(surface.see_through, surface.instance, patches_.triangle_source[triangle], triangle);
-  };
-  return key(one) < key(other);
-}
-
 /// What lies in the same place as the hit and is seen there instead, if that is something: then the hit is that.
 bool LeafRays::uncover(scene::RayHit& hit, const glm::dvec3& origin, const glm::dvec3& direction,
                        std::span<std::uint32_t> passed, std::size_t sheets) const {
@@ -220,7 +211,8 @@ bool LeafRays::uncover(scene::RayHit& hit, const glm::dvec3& origin, const glm::
   for (passed[sheets++] = met.triangle; sheets < passed.size(); passed[sheets++] = met.triangle) {
     if (!wide_.nearestHit(glm::vec3(origin), glm::vec3(direction), reach, met, passed.first(sheets))) break;
     const auto s = side_of_[patches_.triangle_surface[met.triangle]][met.front ? 0 : 1];
-    if (s != scene::kNone && isBefore(met.triangle, seen.triangle)) seen = met;
+    if (s != scene::kNone && scene::seenOrder(patches_, met.triangle) < scene::seenOrder(patches_, seen.triangle))
+      seen = met;
   }
   return seen.triangle != std::exchange(hit, seen).triangle;
 }

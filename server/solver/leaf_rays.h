@@ -71,7 +71,6 @@ class LeafRays {
   void findStandIns();
   [[nodiscard]] std::uint32_t neighbourOf(const Side& side, std::uint32_t leaf) const;
   [[nodiscard]] bool isBeneath(const Side& side, std::uint32_t value) const;
-  [[nodiscard]] bool isBefore(std::uint32_t one, std::uint32_t other) const;
   bool uncover(scene::RayHit& hit, const glm::dvec3& origin, const glm::dvec3& direction,
                std::span<std::uint32_t> passed, std::size_t sheets) const;
   [[nodiscard]] bool passes(const scene::RayHit& hit, const glm::dvec3& at, std::uint64_t key) const;
