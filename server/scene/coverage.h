@@ -6,7 +6,6 @@
 #include <glm/vec2.hpp>
 #include <memory>
 #include <span>
-#include <tuple>
 #include <vector>
 
 #include "server/scene/patch_scene.h"
@@ -22,13 +21,6 @@ enum class Hides : std::uint8_t {
   kSheet,    ///< opaque and seen from both sides: bounds no solid, but one does not see beyond it either
   kSolid,    ///< opaque and seen from one side: bounds a solid
 };
-
-/// Of triangles that lie in one place and face the same way that of least order is seen: what is opaque first, and then
-/// as in the file, since charts of a mesh lie in any order. Once Surface::see_through is known.
-[[nodiscard]] inline auto seenOrder(const PatchScene& patches, std::uint32_t triangle) {
-  const Surface& surface = patches.surfaces[patches.triangle_surface[triangle]];
-  return std::tuple(surface.see_through, surface.instance, patches.triangle_source[triangle], triangle);
-}
 
 /// The part of a leaf that one triangle covers; kept only for leaves that no single triangle covers wholly.
 struct LeafPiece {

@@ -12,6 +12,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "common/result.h"
@@ -144,6 +145,13 @@ struct PatchScene {
     };
     const auto row = std::size_t{cell(texel.y, surface.height)} * surface.width * surface.opacity_scale;
     return opacity[surface.first_opacity + row + cell(texel.x, surface.width)];
+  }
+
+  /// Of triangles that lie in one place and face the same way that of least order is seen: what is opaque first, and
+  /// then as in the file, since charts of a mesh lie in any order. Once Surface::see_through is known.
+  [[nodiscard]] auto seenOrder(std::uint32_t triangle) const {
+    const Surface& surface = surfaces[triangle_surface[triangle]];
+    return std::tuple(surface.see_through, surface.instance, triangle_source[triangle], triangle);
   }
 
   [[nodiscard]] std::size_t nodeCount() const { return node_area.size(); }

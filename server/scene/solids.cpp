@@ -151,7 +151,7 @@ Solids::Ray Solids::follow(const Start& start, std::uint32_t way, const glm::dve
 Coincidence::Coincidence(PatchScene& patches) : patches_(patches), rank_(patches.triangles.size()) {
   std::vector<std::uint32_t> order(rank_.size());
   std::iota(order.begin(), order.end(), 0U);
-  std::ranges::sort(order, {}, [&](std::uint32_t t) { return seenOrder(patches, t); });
+  std::ranges::sort(order, {}, [&](std::uint32_t t) { return patches.seenOrder(t); });
   for (std::uint32_t i = 0; i < order.size(); ++i) rank_[order[i]] = i;
   std::vector<Bvh::Triangle> triangles;
   for (std::size_t t = 0; t < patches.triangles.size(); ++t)

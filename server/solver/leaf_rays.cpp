@@ -7,7 +7,6 @@
 #include <span>
 #include <utility>
 
-#include "server/scene/coverage.h"
 #include "server/solver/sampling.h"
 
 namespace radiosity::solver {
@@ -211,8 +210,7 @@ bool LeafRays::uncover(scene::RayHit& hit, const glm::dvec3& origin, const glm::
   for (passed[sheets++] = met.triangle; sheets < passed.size(); passed[sheets++] = met.triangle) {
     if (!wide_.nearestHit(glm::vec3(origin), glm::vec3(direction), reach, met, passed.first(sheets))) break;
     const auto s = side_of_[patches_.triangle_surface[met.triangle]][met.front ? 0 : 1];
-    if (s != scene::kNone && scene::seenOrder(patches_, met.triangle) < scene::seenOrder(patches_, seen.triangle))
-      seen = met;
+    if (s != scene::kNone && patches_.seenOrder(met.triangle) < patches_.seenOrder(seen.triangle)) seen = met;
   }
   return seen.triangle != std::exchange(hit, seen).triangle;
 }

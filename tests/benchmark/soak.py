@@ -39,11 +39,7 @@ SETTINGS = ("--texels", 2000, "--error", 0.05, "--max-clients", 200, "--workers"
 
 def processes(server):
     """Of the server and its workers, by a name that stays when one is replaced."""
-    found = {"server": server.process.pid}
-    for task in pathlib.Path(f"/proc/{server.process.pid}/task").iterdir():
-        for child in (task / "children").read_text().split():
-            found[f"worker {len(found)}"] = int(child)
-    return found
+    return {"server": server.process.pid, **{f"worker {i}": pid for i, pid in enumerate(server.workers(), 1)}}
 
 
 def usage(pid):

@@ -59,6 +59,20 @@ class Server:
     def log(self):
         return self.log_path.read_text(errors="replace")
 
+    def workers(self):
+        """Numbers of its renderer processes, ascending. Looked for among all, since a thread's children have another
+        parent thread once it ends."""
+        found = []
+        for entry in pathlib.Path("/proc").iterdir():
+            try:
+                if entry.name.isdigit() and b"--worker" in (entry / "cmdline").read_bytes():
+                    stat = (entry / "stat").read_text().rsplit(")", 1)[1].split()
+                    if int(stat[1]) == self.process.pid and stat[0] != "Z":
+                        found.append(int(entry.name))
+            except OSError:
+                continue  # it has ended
+        return sorted(found)
+
     def terminate(self, seconds=60):
         """SIGTERM; returns the exit status."""
         self.process.send_signal(signal.SIGTERM)

@@ -42,19 +42,6 @@ class Renderers(ServiceCase):
         file.touch()
         return file
 
-    def workers(self, server):
-        """Numbers of the server's renderer processes."""
-        found = []
-        for entry in pathlib.Path("/proc").iterdir():
-            try:
-                if entry.name.isdigit() and b"--worker" in (entry / "cmdline").read_bytes():
-                    stat = (entry / "stat").read_text().rsplit(")", 1)[1].split()
-                    if int(stat[1]) == server.process.pid and stat[0] != "Z":
-                        found.append(int(entry.name))
-            except OSError:
-                continue  # it has ended
-        return sorted(found)
-
     def light(self, server):
         with urllib.request.urlopen(server.url + "/lightmaps/0.exr", timeout=60 * PATIENCE) as reply:
             return reply.read()
@@ -115,7 +102,7 @@ class Renderers(ServiceCase):
 
     def test_a_renderer_that_is_killed_is_replaced(self):
         async def kill(server, session):
-            os.kill(self.workers(server)[0], signal.SIGKILL)
+            os.kill(server.workers()[0], signal.SIGKILL)
             note = (await session.note("notice", SECONDS))["params"]
             self.assertEqual(note["kind"], "rendererReplaced")
             self.assertIn("signal 9", note["text"])
@@ -123,16 +110,16 @@ class Renderers(ServiceCase):
         light, _, server = self.disturbed(kill)
         self.assertEqual(light, self.expected())
         self.assertEqual(self.metric(server, "renderers_replaced_total"), 1)
-        self.assertEqual(len(self.workers(server)), 2)
+        self.assertEqual(len(server.workers()), 2)
 
     def test_a_renderer_that_hangs_is_given_up_and_replaced(self):
         async def stop(server, session):
-            stopped = self.workers(server)[1]
+            stopped = server.workers()[1]
             os.kill(stopped, signal.SIGSTOP)
             note = (await session.note("notice", SECONDS))["params"]
             self.assertEqual(note["kind"], "rendererReplaced")
             self.assertIn("hangs", note["text"])
-            self.assertNotIn(stopped, self.workers(server))
+            self.assertNotIn(stopped, server.workers())
 
         light, _, _ = self.disturbed(stop)
         self.assertEqual(light, self.expected())
@@ -140,7 +127,7 @@ class Renderers(ServiceCase):
     def test_when_all_renderers_are_lost_again_and_again_the_solve_starts_over(self):
         async def massacre(server, session):
             while "no renderer" not in await asyncio.to_thread(self.readiness, server):
-                for worker in self.workers(server):
+                for worker in server.workers():
                     try:
                         os.kill(worker, signal.SIGKILL)
                     except ProcessLookupError:
@@ -155,12 +142,12 @@ class Renderers(ServiceCase):
 
     def test_a_renderer_that_loses_its_graphics_context_is_replaced(self):
         async def lose(server, session):
-            before, fault = self.workers(server), self.fault("worker-reset.0")
+            before, fault = server.workers(), self.fault("worker-reset.0")
             note = (await session.note("notice", SECONDS))["params"]
             self.assertEqual(note["kind"], "rendererReplaced")
             self.assertIn("the graphics context was lost", note["text"])
             self.assertFalse(fault.exists())
-            self.assertEqual(len(set(before) - set(self.workers(server))), 1)
+            self.assertEqual(len(set(before) - set(server.workers())), 1)
 
         light, _, server = self.disturbed(lose)
         self.assertEqual(light, self.expected())

@@ -2,7 +2,6 @@
 by the harness's 20 s), with status 0, the promised words to the clients, and no process left."""
 import asyncio
 import os
-import pathlib
 import signal
 import struct
 import unittest
@@ -50,12 +49,6 @@ class ShutdownTest(ServiceCase):
         while (await session.call("status"))["state"] != wanted:
             await asyncio.sleep(0.02)
 
-    def workers(self, server):
-        found = []
-        for task in pathlib.Path(f"/proc/{server.process.pid}/task").iterdir():
-            found += [int(pid) for pid in (task / "children").read_text().split()]
-        return found
-
     def test_solvingServerSaysGoodbyeAndIsGoneWithItsWorkers(self):
         for number in (signal.SIGINT, signal.SIGTERM):
             server = self.server(self.scene, *ENDLESS)
@@ -63,7 +56,7 @@ class ShutdownTest(ServiceCase):
             async def body():
                 session = await Session.open(server.url)
                 await self.state_reached(session, "solving")
-                self.assertEqual(len(self.workers(server)), 2)
+                self.assertEqual(len(server.workers()), 2)
                 server.process.send_signal(number)
                 self.assertIn("graceMs", (await session.note("draining"))["params"])
                 with self.assertRaises(websockets.ConnectionClosed):
@@ -93,7 +86,7 @@ class ShutdownTest(ServiceCase):
         async def body():
             session = await Session.open(server.url)
             await self.state_reached(session, "solving")
-            for worker in self.workers(server):
+            for worker in server.workers():
                 os.kill(worker, signal.SIGSTOP)
             await asyncio.sleep(0.5)  # they owe an answer by now
             await session.close()
