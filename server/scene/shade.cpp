@@ -22,6 +22,11 @@ struct Value {
   glm::vec3 emission{0.0F}, reflectance{0.0F};
 };
 
+/// Of a leaf's samples: the mean of what is everywhere the same is just that.
+struct Sum {
+  glm::dvec3 emission{0.0}, reflectance{0.0};
+};
+
 class MaterialShader {
  public:
   MaterialShader(const Scene& scene, const PatchScene& patches, std::uint32_t material, PatchMaterials& out)
@@ -114,7 +119,7 @@ class MaterialShader {
   /// Triangle by triangle, each sample point of the leaf grid that lies in it.
   void shadeLeaves() {
     const std::size_t count = std::size_t{surface_.width} * surface_.height;
-    sums_.assign(count, Value{});
+    sums_.assign(count, Sum{});
     samples_.assign(count, 0);
     for (std::uint32_t t = surface_.first_triangle; t < surface_.first_triangle + surface_.triangle_count; ++t)
       sampleTriangle(cornersOf(patches_, t, *instance_, *primitive_));
@@ -122,8 +127,8 @@ class MaterialShader {
       const LeafPoint& point = patches_.leaves[surface_.first_leaf + i];
       Value value;
       if (samples_[i] > 0) {
-        value = {sums_[i].emission / static_cast<float>(samples_[i]),
-                 sums_[i].reflectance / static_cast<float>(samples_[i])};
+        const auto samples = static_cast<double>(samples_[i]);
+        value = {sums_[i].emission / samples, sums_[i].reflectance / samples};
       } else if (point.triangle != kNone) {
         value = valueAt(cornersOf(patches_, point.triangle, *instance_, *primitive_), glm::dvec2(point.texel));
       }
@@ -148,8 +153,8 @@ class MaterialShader {
         const std::size_t leaf =
             static_cast<std::size_t>(y / kSide) * surface_.width + static_cast<std::size_t>(x / kSide);
         const Value value = valueAt(c, p);
-        sums_[leaf].emission += value.emission;
-        sums_[leaf].reflectance += value.reflectance;
+        sums_[leaf].emission += glm::dvec3(value.emission);
+        sums_[leaf].reflectance += glm::dvec3(value.reflectance);
         ++samples_[leaf];
       }
   }
@@ -186,7 +191,7 @@ class MaterialShader {
   Surface surface_;
   const Instance* instance_ = nullptr;
   const Primitive* primitive_ = nullptr;
-  std::vector<Value> sums_;
+  std::vector<Sum> sums_;
   std::vector<std::uint32_t> samples_;
   bool was_clamped_ = false;
 };

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <numeric>
 
@@ -18,10 +19,13 @@ constexpr std::uint16_t kFirstRays = 8;
 /// The residual that is left, of all that is gathered: far below any sampling error, and the level is right anyway.
 constexpr double kSolved = 4e-4;
 constexpr int kMaxSweeps = 400;
-/// Of what a ray brings that went on from as many leaves as it may, this part is not sure, however little each of them
-/// reflects. In a gap of a tenth of a texel above a lamp (reflectance 0.4 and 0.8) with 0 the truth was 1.5 to 2.1
-/// times what was stated, and with 1 (all of it) 0.6.
-constexpr double kUnsure = 0.4;
+/// What rays that went on from as many leaves as they may bring from where they end counts so many times: in a level of
+/// closed pockets the error is 3.6 to 4.0 %, with this 3.1 % are stated, and with 1 2.2 %.
+constexpr double kUnsure = 1.4;
+/// What comes over links to a place of a leaf on the way is off by so large a part of what it differs by beside the
+/// leaf. Of a lamp that shines on the ceiling from a fourteenth of a texel 2.6 % are true and 2.7 % stated; with 0 and
+/// 0.5 that is 2.0 and 4.7 %.
+constexpr double kWithin = 0.2;
 /// Of a leaf in each half, doubles: what GMRES keeps, and the sweeps; and what there is of its light, floats.
 constexpr std::size_t kVectors = 3 * (Gmres::kRestart + 3) + 3 * 4, kLights = 5 * 3 + 4;
 
@@ -335,18 +339,17 @@ void LeafGather::weighNoise(const LeafSmoother& smoother) {
 }
 
 /// What such rays bring from where they end may be the light of another side of a wall, or no light where there is
-/// some: after all the leaves that they went on from, of which each took its part. And of those the means were taken,
-/// of light that changes within them.
+/// some: after all the leaves that they went on from, of which each took its part. And what came over links to those is
+/// known as a mean over each, while it changes within them.
 void LeafGather::weighDoubt() {
   doubt_ = 0.0;
   const auto counts = sights_.counts();
   for (std::uint32_t v = 0; v < sights_.leafCount(); ++v) {
-    const double part = 0.5 * static_cast<double>(lostOf(0, v).doubtful + lostOf(1, v).doubtful);
-    if (part <= 0.0) continue;
-    glm::dvec3 brought = kUnsure * part * 0.5 * glm::dvec3(gathered_[0][v] + gathered_[1][v]);
+    if (lostOf(0, v).doubtful + lostOf(1, v).doubtful <= 0.0F) continue;
+    glm::dvec3 brought(0.0);
     for (std::size_t half = 0; half < 2; ++half) {
       for (const auto end : sights_.seen(half, v))
-        if (sights_.isDoubtful(half, end)) brought += 0.5 / counts[v] * fromTheEnd(half, end);
+        if (sights_.isDoubtful(half, end)) brought += 0.5 / counts[v] * doubtOf(half, end);
     }
     const double square = glm::dot(brought, brought);
     doubt_ += area_[v] * square;
@@ -354,12 +357,38 @@ void LeafGather::weighDoubt() {
   }
 }
 
-glm::dvec3 LeafGather::fromTheEnd(std::size_t half, std::uint32_t end) const {
-  glm::dvec3 part(1.0);
-  for (; end >= sights_.endCount(); end = sights_.steps(half)[end - sights_.endCount()].next)
-    part *= glm::dvec3(light_.reflectance[sights_.steps(half)[end - sights_.endCount()].by]);
-  const auto& radiosity = halves_[half].radiosity[end];
-  return part * glm::dvec3(std::abs(radiosity[0]), std::abs(radiosity[1]), std::abs(radiosity[2]));
+glm::dvec3 LeafGather::doubtOf(std::size_t half, std::uint32_t end) const {
+  glm::dvec3 part(1.0), sum(0.0);
+  while (end >= sights_.endCount()) {
+    const auto& step = sights_.steps(half)[end - sights_.endCount()];
+    part *= glm::dvec3(light_.reflectance[step.by]);
+    sum += kWithin * part * changeAcross(step.by);
+    end = step.next;
+  }
+  const auto& sent = halves_[half].radiosity[end];
+  return sum + kUnsure * part * glm::abs(glm::dvec3(sent[0], sent[1], sent[2]));
+}
+
+/// By how much what came over links differs beside the leaf, at most; all of it where nothing is beside.
+glm::dvec3 LeafGather::changeAcross(std::uint32_t value) const {
+  const auto lightOf = [&](std::uint32_t v) {
+    return 0.5 * glm::dvec3(light_.irradiance[0][v] + light_.irradiance[1][v]);
+  };
+  const Side& side = sides_[sights_.sideOf(value)];
+  const auto x = (value - side.first_value) % side.width, y = (value - side.first_value) / side.width;
+  const auto here = lightOf(value);
+  glm::dvec3 most(0.0);
+  bool is_alone = true;
+  const auto look = [&](bool is_there, std::uint32_t beside) {
+    if (!is_there || area_[beside] <= 0.0) return;
+    is_alone = false;
+    most = glm::max(most, glm::abs(lightOf(beside) - here));
+  };
+  look(x > 0, value - 1);
+  look(x + 1 < side.width, value + 1);
+  look(y > 0, value - side.width);
+  look(y + 1 < side.height, value + side.width);
+  return is_alone ? here : most;
 }
 
 void LeafGather::save(ArchiveWriter& to) const {

@@ -164,7 +164,8 @@ class LeafGather {
   void weighNoise(const LeafSmoother& smoother);
   void weighLost();
   void weighDoubt();
-  [[nodiscard]] glm::dvec3 fromTheEnd(std::size_t half, std::uint32_t end) const;
+  [[nodiscard]] glm::dvec3 doubtOf(std::size_t half, std::uint32_t end) const;
+  [[nodiscard]] glm::dvec3 changeAcross(std::uint32_t value) const;
   /// By block of leaves: how many rays they have, how many have some, and the one with most; how many times as many
   /// are asked for.
   struct BlockRays {

@@ -1,7 +1,9 @@
 #include "server/solver/lights.h"
 
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
 #include <optional>
 #include <utility>
 
@@ -35,15 +37,18 @@ bool isWhole(const scene::PatchScene& patches, const Side& side) {
   return seen >= (1.0 - kHidden) * whole;
 }
 
+/// Of one emission. Leaves differ by so small a part where it is a texture of one colour, whose pixels are averaged.
+constexpr float kSameEmission = 1e-5F;
+
 bool uniformEmission(const scene::PatchScene& patches, const Side& side, std::span<const glm::vec3> emissions,
                      glm::vec3& emission) {
   bool found = false;
   for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
     if (patches.node_area[side.first_node + leaf] <= 0.0F) continue;
     const glm::vec3 here = emissions[side.first_value + leaf];
-    if (found && here != emission) return false;
-    emission = here;
+    if (!found) emission = here;
     found = true;
+    if (glm::any(glm::greaterThan(glm::abs(here - emission), kSameEmission * emission))) return false;
   }
   return found && emission != glm::vec3(0.0F);
 }

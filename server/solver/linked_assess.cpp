@@ -54,7 +54,7 @@ void LinkedSolver::assess() {
   }
   // What a wave that ended early did not measure stands for its leaves, so that it is not unshot, and sends nothing.
   // Parts of a node are signed: what of them would have taken light away is no light that is missing.
-  const double unlinked = std::max(0.0, planner_.unlinked(system_));
+  const double of_lights = owed, unlinked = std::max(0.0, planner_.unlinked(system_));
   const double left_out = planner_.leftOut() + (growing_ ? 0.0 : unlinked);
   if (by_rays_) {
     const auto sky = skyFlux();
@@ -63,7 +63,10 @@ void LinkedSolver::assess() {
     owed += growing_ ? net_unshot_ + unlinked : left_out;
   }
   if (field.square() <= 0.0) {
-    const bool lacks = owed + varying_ > 0.0 || (gathers() && gather_->bias() > 0.0);
+    // What convex lamps send leaves the scene, however it varies within nodes that were seen to light nothing.
+    const bool is_open = growing_ || (by_rays_ && !gathers());
+    const double unseen = is_open ? owed + varying_ : of_lights + unlinked;
+    const bool lacks = unseen > 0.0 || (gathers() && gather_->bias() > 0.0);
     error_.residual = error_.total = lacks ? 1.0 : 0.0;  // all or nothing is missing
     return;
   }

@@ -119,6 +119,32 @@ TEST(Shade, EmissiveTextureLightsOnlyItsPart) {
   EXPECT_NEAR(high, 2.0 * M_PI, 1e-4);
 }
 
+// Lamps that shine alike all over are polygons, whatever colours and textures their reflectance has.
+TEST(Shade, EmissionThatNothingChangesIsTheSameInEveryLeaf) {
+  Primitive p = floorQuad(1.0);
+  p.texcoord0 = {{0, 0}, {0, 3}, {5, 3}, {5, 0}};
+  p.color0 = {{0.1F, 0.3F, 0.7F, 1}, {0.9F, 0.3F, 0.2F, 1}, {0.8F, 0, 0, 1}, {0.4F, 0.6F, 1, 1}};
+  Material material;
+  material.emission = {100.0F, 70.3F, 1.0F / 3.0F};
+  for (const bool has_white : {false, true}) {
+    Scene scene;
+    scene.textures.push_back(textureOf(3, 1, {255, 255, 255}, true));
+    if (has_white) material.emissive_texture.texture = 0;
+    place(scene, p, glm::dmat4(1.0), material);
+    const PatchScene patches = build(scene, 1000);
+    const PatchMaterials materials = shadePatches(scene, patches);
+    const float tolerance = has_white ? 1e-6F : 0.0F;  // means of a texture's pixels are rounded
+    const auto& surface = patches.surfaces[0];
+    ASSERT_GT(surface.width * surface.height, 900U);
+    for (std::uint32_t i = 0; i < surface.width * surface.height; ++i) {
+      for (int c = 0; c < 3; ++c) {
+        const float whole = material.emission[c] * static_cast<float>(M_PI);
+        EXPECT_NEAR(materials.emission[i][c], whole, tolerance * whole) << has_white << ' ' << i;
+      }
+    }
+  }
+}
+
 TEST(Shade, VertexColoursAreInterpolatedAndMirroringKeepsTheirCorners) {
   Primitive p = floorQuad(1.0);
   p.color0 = {{0, 0, 0, 1}, {0, 0, 0, 1}, {0.8F, 0, 0, 1}, {0.8F, 0, 0, 1}};  // red grows with x

@@ -16,8 +16,9 @@ struct Found {
   std::vector<Side> sides;
 };
 
-/// In a cube whose ceiling shines, with so much of each leaf of it in its first `columns`, of 4.
-Found find(std::uint32_t columns, float part) {
+/// In a cube whose ceiling shines, with so much of each leaf of it in its first `columns`, of 4. One leaf shines so
+/// many times as brightly.
+Found find(std::uint32_t columns, float part, float brighter = 1.0F) {
   const auto made = makeQuadScene(cubeQuads(4, {0, 4, 0, 0, 0, 0}, test::kGrey));
   const auto first = made.patches->surfaces[1].first_node[0];
   for (std::uint32_t leaf = 0; leaf < 16; ++leaf)
@@ -26,6 +27,7 @@ Found find(std::uint32_t columns, float part) {
   std::vector<glm::vec3> emission(found.sides.back().first_value + found.sides.back().leaf_count);
   const auto& ceiling = found.sides[1];
   std::fill_n(emission.begin() + ceiling.first_value, ceiling.leaf_count, glm::vec3(4.0F));
+  emission[ceiling.first_value + 5] *= brighter;
   found.lights = findLightPolygons(*made.patches, found.sides, emission);
   return found;
 }
@@ -49,6 +51,12 @@ TEST(LightPolygons, AreNotFoundOfALampThatIsHiddenInPart) {
       EXPECT_FALSE(found.sides[1].gathered) << columns << ' ' << part;
     }
   }
+}
+
+// Means over a texture of one colour are rounded. What is told apart would take many images in the place of a polygon.
+TEST(LightPolygons, ShineAlikeAllOver) {
+  EXPECT_EQ(find(4, 1.0F, 1.000002F).lights.size(), 1U);
+  for (const float brighter : {0.0F, 0.999F, 1.001F}) EXPECT_TRUE(find(4, 1.0F, brighter).lights.empty()) << brighter;
 }
 
 }  // namespace

@@ -184,6 +184,20 @@ TEST(LinkedSolver, ATinyLightIsNotBlack) {
   EXPECT_NEAR(energy.absorbed[0] / energy.emitted[0], 1.0, 0.05);
 }
 
+// A lone pane whose light varies sends all of it out of the scene: there is none to be wrong about.
+TEST(LinkedSolver, LightThatReachesNothingLeavesNoError) {
+  auto made = makeQuadScene({{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 16, 16, glm::vec3(1.0F), glm::vec3(0.5F)}});
+  for (std::uint32_t leaf = 0; leaf < 256; ++leaf)
+    made.materials.emission[leaf] *= 0.1F * static_cast<float>(leaf % 7 + leaf / 30);
+  RayTransport rays(64);
+  ASSERT_TRUE(rays.setScene(made.patches));
+  LinkedSolver solver(made.patches, made.materials, rays, SolverSettings{});
+  EXPECT_GT(solver.error().total, 0.5) << "nobody has looked yet";
+  solve(solver);
+  EXPECT_EQ(solver.error().total, 0.0);
+  EXPECT_NEAR(solver.energy().escaped[0] / solver.energy().emitted[0], 1.0, 1e-6);
+}
+
 /// Relative RMS error where all walls of a room shine and reflect alike, and with them all light is known.
 double awayFromFurnace(const LinkedSolver& solver, const scene::PatchScene& patches, double irradiance) {
   double square = 0.0, area = 0.0;

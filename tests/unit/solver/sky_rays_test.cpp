@@ -272,6 +272,34 @@ TEST(CutLeaves, WithoutMemoryToGoOnAreStatedAsDoubtful) {
   EXPECT_GT(short_doubt, wrong);
 }
 
+// Rays that never get out know what comes over links to where they go on, but for what changes within leaves.
+TEST(CutLeaves, AreInDoubtOfLightThatChangesFromLeafToLeaf) {
+  const auto made = makeQuadScene(cubeQuads(8, kDark, grey(0.5F)));
+  for (auto& leaf : made.patches->leaves) leaf.cut = true;
+  const auto sides = makeSides(*made.patches);
+  const auto relative = [&](float change) {
+    LeftLight light;
+    const auto leaves = sides.back().first_value + sides.back().leaf_count;
+    light.emission.assign(leaves, glm::vec3(0.0F));
+    light.reflectance.assign(leaves, glm::vec3(0.5F));
+    light.shot[0] = light.shot[1] = light.emission;
+    for (auto& half : light.irradiance) {
+      for (std::uint32_t v = 0; v < leaves; ++v)
+        half.emplace_back((v % 8 + v / 8) % 2 == 0 ? 1.0F + change : 1.0F - change);
+    }
+    LeafGather gather(*made.patches, sides, 1, std::size_t{1} << 30);
+    gather.start();
+    gather.begin(light);
+    while (!gather.advance(1.0)) continue;
+    double sum = 0.0;  // over areas of one in all
+    for (const auto& x : gather.irradiance(0)) sum += static_cast<double>(glm::dot(x, x)) / leaves;
+    return std::sqrt(gather.doubt() / 6.0 / sum);
+  };
+  EXPECT_LT(relative(0.0F), 1e-6);
+  EXPECT_GT(relative(1.0F), 0.2);
+  EXPECT_NEAR(relative(0.5F), 0.5 * relative(1.0F), 0.05 * relative(1.0F));
+}
+
 // Which leaves lie in part inside of something rays alone tell, and they are traced anew when they are needed.
 TEST(PartlyInside, AreSavedWithAllElse) {
   const Solve room(partedCube(false, 0.9F, 0.1F), skyOf(1.0F, 1.0F), Reflected::kByRays, 0.02);
