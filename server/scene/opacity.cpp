@@ -1,12 +1,15 @@
 #include "server/scene/opacity.h"
 
 #include <algorithm>
-#include <array>
+#include <atomic>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <glm/matrix.hpp>
+#include <optional>
+#include <vector>
 
+#include "common/give_back.h"
+#include "common/parallel.h"
 #include "server/scene/chart_corners.h"
 #include "server/scene/shade_texture.h"
 
@@ -14,8 +17,9 @@ namespace radiosity::scene {
 namespace {
 
 constexpr std::uint64_t kMaxCells = std::uint64_t{1} << 26;
-constexpr std::uint32_t kMaxScale = 64;  ///< cells across a leaf
-constexpr int kSamples = 3;              ///< kSamples^2 looks at the texture in each cell
+constexpr std::uint32_t kMaxScale = 64;        ///< cells across a leaf
+constexpr int kSamples = 3;                    ///< kSamples^2 looks at the texture in each cell
+constexpr std::uint32_t kCellsAtOnce = 16384;  ///< of one thread, about
 
 const Material& materialOf(const Scene& scene, const Surface& surface) {
   static const Material kDefault;
@@ -27,10 +31,27 @@ std::uint8_t byteOf(float opacity) {
   return static_cast<std::uint8_t>(std::lround(255.0F * (opacity > 0.0F ? std::min(opacity, 1.0F) : 0.0F)));
 }
 
+/// Texture coordinates over a triangle, which are affine in the chart's.
+struct UvMap {
+  glm::dvec2 origin, across, up;
+
+  UvMap(const ChartCorners& c, const std::vector<glm::vec2>& set) : origin(0.0), across(0.0), up(0.0) {
+    if (set.empty()) return;
+    const glm::dvec2 uv(set[c.vertex[0]]), to1 = glm::dvec2(set[c.vertex[1]]) - uv,
+                                           to2 = glm::dvec2(set[c.vertex[2]]) - uv;
+    const glm::dvec2 edge1 = c.texel[1] - c.texel[0], edge2 = c.texel[2] - c.texel[0];
+    across = c.inverse_area * (edge2.y * to1 - edge1.y * to2);
+    up = c.inverse_area * (edge1.x * to2 - edge2.x * to1);
+    origin = uv - c.texel[0].x * across - c.texel[0].y * up;
+  }
+
+  [[nodiscard]] glm::vec2 at(const glm::dvec2& p) const { return glm::vec2(origin + p.x * across + p.y * up); }
+};
+
 /// Opacity over one surface.
 class SurfaceOpacity {
  public:
-  SurfaceOpacity(const Scene& scene, PatchScene& patches, const Surface& surface)
+  SurfaceOpacity(const Scene& scene, PatchScene& patches, Surface& surface)
       : patches_(patches),
         surface_(surface),
         material_(materialOf(scene, surface)),
@@ -38,48 +59,66 @@ class SurfaceOpacity {
         primitive_(scene.primitives[instance_.primitive]) {
     const auto texture = material_.base_color_texture.texture;
     if (texture < scene.textures.size() && material_.alpha_mode != AlphaMode::kOpaque) {
-      texture_ = &scene.textures[texture];
+      texture_.emplace(scene.textures[texture], material_.base_color_texture);
+      texture_size_ = glm::dvec2(scene.textures[texture].width, scene.textures[texture].height);
     }
   }
 
   /// Cells across a leaf that follow the alpha texture's pixels: a power of two.
   [[nodiscard]] std::uint32_t wantedScale() const {
-    if (texture_ == nullptr) return 1;
-    float pixels = 1.0F;  // of the texture, across a leaf
+    if (!texture_) return 1;
+    double pixels = 1.0;  // of the texture, across a leaf
     for (std::uint32_t i = 0; i < std::min(surface_.triangle_count, 64U); ++i) {
-      const ChartCorners corners = cornersOf(patches_, surface_.first_triangle + i, instance_, primitive_);
-      const glm::vec2 size = glm::vec2(texture_->width, texture_->height) * material_.base_color_texture.scale;
-      const glm::vec2 at = uvAt(corners, corners.texel[0]);
-      for (const glm::dvec2 step : {glm::dvec2(1.0, 0.0), glm::dvec2(0.0, 1.0)}) {
-        const float across = glm::length((uvAt(corners, corners.texel[0] + step) - at) * size);
+      const UvMap uv(cornersOf(patches_, surface_.first_triangle + i, instance_, primitive_), texcoords());
+      const auto size = texture_size_ * glm::dvec2(material_.base_color_texture.scale);
+      for (const auto& step : {uv.across, uv.up}) {
+        const double across = glm::length(step * size);
         if (std::isfinite(across)) pixels = std::max(pixels, across);
       }
     }
     std::uint32_t scale = 1;
-    while (scale < kMaxScale && static_cast<float>(scale) < pixels) scale *= 2;
+    while (scale < kMaxScale && scale < pixels) scale *= 2;
     return scale;
   }
 
-  void fill() {
+  [[nodiscard]] Surface& surface() { return surface_; }
+  [[nodiscard]] std::uint64_t cellCount() const {
+    return std::uint64_t{surface_.width} * surface_.height * surface_.opacity_scale * surface_.opacity_scale;
+  }
+
+  /// Once the surface has its place among all cells. Returns how many rows there are.
+  std::uint32_t start() {
     width_ = surface_.width * surface_.opacity_scale;
     height_ = surface_.height * surface_.opacity_scale;
-    known_.assign(std::size_t{width_} * height_, false);
+    known_.assign(std::size_t{width_} * height_, 0);
+    return height_;
+  }
+  [[nodiscard]] std::uint32_t width() const { return width_; }
+
+  /// Of some rows; others may be filled by other threads.
+  void fill(std::uint32_t first_row, std::uint32_t end_row) {
     for (std::uint32_t i = 0; i < surface_.triangle_count; ++i)
-      fillTriangle(cornersOf(patches_, surface_.first_triangle + i, instance_, primitive_));
-    fillBorders();
+      fillTriangle(cornersOf(patches_, surface_.first_triangle + i, instance_, primitive_), first_row, end_row);
+  }
+
+  /// Cells that triangles only touch, without their middles, are as the next one. When all rows are filled.
+  void fillBorders() {
+    for (std::uint32_t y = 0; y < height_; ++y) {
+      for (std::uint32_t x = 0; x < width_; ++x) {
+        if (known_[std::size_t{y} * width_ + x] == 0) cell(x, y) = neighbour(x, y);
+      }
+    }
+    giveBack(known_);
   }
 
  private:
-  [[nodiscard]] glm::vec2 uvAt(const ChartCorners& c, const glm::dvec2& p) const {
-    const auto& set = material_.base_color_texture.texcoord == 1 ? primitive_.texcoord1 : primitive_.texcoord0;
-    if (set.empty()) return glm::vec2(0.0F);
-    const glm::vec3 w = c.weightsAt(p);
-    return set[c.vertex[0]] * w[0] + set[c.vertex[1]] * w[1] + set[c.vertex[2]] * w[2];
+  [[nodiscard]] const std::vector<glm::vec2>& texcoords() const {
+    return material_.base_color_texture.texcoord == 1 ? primitive_.texcoord1 : primitive_.texcoord0;
   }
 
-  [[nodiscard]] float alphaAt(const ChartCorners& c, const glm::dvec2& p) const {
+  [[nodiscard]] float alphaAt(const ChartCorners& c, const UvMap& uv, const glm::dvec2& p) const {
     float alpha = material_.alpha;
-    if (texture_ != nullptr) alpha *= sampleAlpha(*texture_, material_.base_color_texture, uvAt(c, p));
+    if (texture_) alpha *= texture_->at(uv.at(p));
     if (!primitive_.color0.empty()) {
       const glm::vec3 w = glm::clamp(c.weightsAt(p), 0.0F, 1.0F);
       const auto& color = primitive_.color0;
@@ -88,16 +127,16 @@ class SurfaceOpacity {
     return alpha;
   }
 
-  [[nodiscard]] float opacityOf(const ChartCorners& c, const glm::dvec2& cell) const {
+  [[nodiscard]] float opacityOf(const ChartCorners& c, const UvMap& uv, const glm::dvec2& cell) const {
     const float transmitted = 1.0F - material_.transmission;
     if (material_.alpha_mode == AlphaMode::kOpaque) return transmitted;
-    const bool uniform = texture_ == nullptr && primitive_.color0.empty();
+    const bool uniform = !texture_ && primitive_.color0.empty();
     const int side = uniform ? 1 : kSamples;
     float sum = 0.0F;
     for (int y = 0; y < side; ++y) {
       for (int x = 0; x < side; ++x) {
         const glm::dvec2 at = (cell + (glm::dvec2(x, y) + 0.5) / double(side)) / double(surface_.opacity_scale);
-        const float alpha = alphaAt(c, at);
+        const float alpha = alphaAt(c, uv, at);
         const bool mask = material_.alpha_mode == AlphaMode::kMask;
         sum += mask ? (alpha >= material_.alpha_cutoff ? 1.0F : 0.0F) : std::clamp(alpha, 0.0F, 1.0F);
       }
@@ -109,36 +148,27 @@ class SurfaceOpacity {
     return patches_.opacity[surface_.first_opacity + std::size_t{y} * width_ + x];
   }
 
-  void fillTriangle(const ChartCorners& c) {
+  void fillTriangle(const ChartCorners& c, std::uint32_t first_row, std::uint32_t end_row) {
     const auto scale = static_cast<double>(surface_.opacity_scale);
     const glm::dvec2 low = glm::min(glm::min(c.texel[0], c.texel[1]), c.texel[2]) * scale;
     const glm::dvec2 high = glm::max(glm::max(c.texel[0], c.texel[1]), c.texel[2]) * scale;
     const auto end_x = std::min(width_, static_cast<std::uint32_t>(std::ceil(std::max(high.x, 0.0))));
-    const auto end_y = std::min(height_, static_cast<std::uint32_t>(std::ceil(std::max(high.y, 0.0))));
-    for (auto y = static_cast<std::uint32_t>(std::max(low.y, 0.0)); y < end_y; ++y) {
+    const auto end_y = std::min(end_row, static_cast<std::uint32_t>(std::ceil(std::max(high.y, 0.0))));
+    const UvMap uv(c, texcoords());
+    for (auto y = std::max(first_row, static_cast<std::uint32_t>(std::max(low.y, 0.0))); y < end_y; ++y) {
       for (auto x = static_cast<std::uint32_t>(std::max(low.x, 0.0)); x < end_x; ++x) {
         const glm::vec3 w = c.weightsAt((glm::dvec2(x, y) + 0.5) / scale);
         if (std::min({w.x, w.y, w.z}) < -1e-6F) continue;
-        cell(x, y) = byteOf(opacityOf(c, glm::dvec2(x, y)));
-        known_[std::size_t{y} * width_ + x] = true;
+        cell(x, y) = byteOf(opacityOf(c, uv, glm::dvec2(x, y)));
+        known_[std::size_t{y} * width_ + x] = 1;
       }
     }
   }
 
-  /// Cells that triangles only touch, without their middles, are as the next one.
-  void fillBorders() {
-    const auto before = known_;
-    for (std::uint32_t y = 0; y < height_; ++y) {
-      for (std::uint32_t x = 0; x < width_; ++x) {
-        if (!before[std::size_t{y} * width_ + x]) cell(x, y) = neighbour(before, x, y);
-      }
-    }
-  }
-
-  [[nodiscard]] std::uint8_t neighbour(const std::vector<bool>& known, std::uint32_t x, std::uint32_t y) {
+  [[nodiscard]] std::uint8_t neighbour(std::uint32_t x, std::uint32_t y) {
     for (std::uint32_t ny = y == 0 ? 0 : y - 1; ny < std::min(y + 2, height_); ++ny) {
       for (std::uint32_t nx = x == 0 ? 0 : x - 1; nx < std::min(x + 2, width_); ++nx) {
-        if (known[std::size_t{ny} * width_ + nx]) return cell(nx, ny);
+        if (known_[std::size_t{ny} * width_ + nx] != 0) return cell(nx, ny);
       }
     }
     // Slivers that hold no cell's middle: as the surface would be without a texture.
@@ -147,17 +177,42 @@ class SurfaceOpacity {
   }
 
   PatchScene& patches_;
-  const Surface& surface_;
+  Surface& surface_;
   const Material& material_;
   const Instance& instance_;
   const Primitive& primitive_;
-  const Texture* texture_ = nullptr;
+  std::optional<AlphaTexture> texture_;
+  glm::dvec2 texture_size_{0.0};
   std::uint32_t width_ = 0, height_ = 0;
-  std::vector<bool> known_;
+  std::vector<std::uint8_t> known_;  // by cell
 };
 
-std::uint64_t cellsOf(const Surface& surface) {
-  return std::uint64_t{surface.width} * surface.height * surface.opacity_scale * surface.opacity_scale;
+/// As fine as wanted, as long as that is not too much.
+void chooseScales(PatchScene& patches, std::vector<SurfaceOpacity>& some) {
+  std::uint64_t cells = 0;
+  for (auto& one : some) {
+    one.surface().opacity_scale = one.wantedScale();
+    cells += one.cellCount();
+  }
+  bool coarser = false;
+  for (bool more = true; cells > kMaxCells && more;) {
+    more = false;
+    cells = 0;
+    for (auto& one : some) {
+      if (one.surface().opacity_scale > 1) {
+        one.surface().opacity_scale /= 2;
+        more = coarser = true;
+      }
+      cells += one.cellCount();
+    }
+  }
+  if (coarser) patches.warnings.emplace_back("cut-outs are coarser than their textures: there are too many of them");
+  patches.opacity.assign(cells, 255);
+  std::uint64_t first = 0;
+  for (auto& one : some) {
+    one.surface().first_opacity = static_cast<std::uint32_t>(first);
+    first += one.cellCount();
+  }
 }
 
 /// Mean over the cells of a leaf, in [0, 1].
@@ -180,34 +235,27 @@ bool isSeeThrough(const Material& material) {
 }
 
 void measureOpacity(const Scene& scene, PatchScene& patches) {
-  std::uint64_t cells = 0;
-  for (Surface& surface : patches.surfaces) {
-    if (!surface.see_through) continue;
-    surface.opacity_scale = SurfaceOpacity(scene, patches, surface).wantedScale();
-    cells += cellsOf(surface);
+  std::vector<SurfaceOpacity> some;
+  for (Surface& surface : patches.surfaces)
+    if (surface.see_through) some.emplace_back(scene, patches, surface);
+  chooseScales(patches, some);
+  struct Rows {
+    std::size_t of;
+    std::uint32_t first, end;
+  };
+  std::vector<Rows> parts;
+  for (std::size_t i = 0; i < some.size(); ++i) {
+    const auto rows = some[i].start(), step = std::max(1U, kCellsAtOnce / std::max(1U, some[i].width()));
+    for (std::uint32_t first = 0; first < rows; first += step)
+      parts.push_back({i, first, std::min(rows, first + step)});
   }
-  bool coarser = false;
-  for (bool more = true; cells > kMaxCells && more;) {
-    more = false;
-    cells = 0;
-    for (Surface& surface : patches.surfaces) {
-      if (!surface.see_through) continue;
-      if (surface.opacity_scale > 1) {
-        surface.opacity_scale /= 2;
-        more = coarser = true;
-      }
-      cells += cellsOf(surface);
-    }
-  }
-  if (coarser) patches.warnings.emplace_back("cut-outs are coarser than their textures: there are too many of them");
-  patches.opacity.assign(cells, 255);
-  std::uint64_t first = 0;
-  for (Surface& surface : patches.surfaces) {
-    if (!surface.see_through) continue;
-    surface.first_opacity = static_cast<std::uint32_t>(first);
-    first += cellsOf(surface);
-    SurfaceOpacity(scene, patches, surface).fill();
-  }
+  std::atomic<std::size_t> next{0}, next_border{0};
+  inShares(parts.size(), [&](std::size_t, std::size_t) {
+    for (auto i = next++; i < parts.size(); i = next++) some[parts[i].of].fill(parts[i].first, parts[i].end);
+  });
+  inShares(some.size(), [&](std::size_t, std::size_t) {
+    for (auto i = next_border++; i < some.size(); i = next_border++) some[i].fillBorders();
+  });
 }
 
 void applyOpacity(PatchScene& patches) {

@@ -22,6 +22,7 @@ const std::array<float, 256>& srgbTable() {
 }
 
 int wrap(int i, int size, bool repeat, bool mirror) {
+  if (i >= 0 && i < size) return i;
   if (!repeat) return std::clamp(i, 0, size - 1);
   const int period = mirror ? 2 * size : size;
   int m = i % period;
@@ -32,7 +33,10 @@ int wrap(int i, int size, bool repeat, bool mirror) {
 /// The same place of the texture as `uv`, within its first two repeats (two, for mirrors) or, where it does not repeat,
 /// within one texture's width of it: so that a wild UV overflows no integer, and pixels are told apart around it.
 /// Exact.
-float fold(float uv, bool repeat) { return repeat ? std::fmod(uv, 2.0F) : std::clamp(uv, -1.0F, 2.0F); }
+float fold(float uv, bool repeat) {
+  if (!repeat) return std::clamp(uv, -1.0F, 2.0F);
+  return std::abs(uv) < 2.0F ? uv : std::fmod(uv, 2.0F);
+}
 
 /// What a bilinear lookup mixes: the first pixel, and the weights of the next ones.
 struct Lookup {
@@ -70,20 +74,24 @@ glm::vec2 transformUv(const TextureUse& use, const glm::vec2& uv) {
   return use.offset + glm::vec2(c * s.x + d * s.y, -d * s.x + c * s.y);
 }
 
-float sampleAlpha(const Texture& texture, const TextureUse& use, const glm::vec2& uv) {
-  const glm::vec2 turned = transformUv(use, uv);
+AlphaTexture::AlphaTexture(const Texture& texture, const TextureUse& use) : texture_(texture), use_(use) {
   const auto pixels =
       static_cast<std::size_t>(std::max(0, texture.width)) * static_cast<std::size_t>(std::max(0, texture.height));
-  if (pixels == 0 || texture.rgba.size() < 4 * pixels || !std::isfinite(turned.x) || !std::isfinite(turned.y)) {
-    return 1.0F;
-  }
-  const Lookup lookup = lookupAt(use, turned, texture.width, texture.height);
+  has_pixels_ = pixels > 0 && texture.rgba.size() >= 4 * pixels;
+  const float c = std::cos(use.rotation), d = std::sin(use.rotation);
+  turn_ = {c * use.scale.x, -d * use.scale.x, d * use.scale.y, c * use.scale.y};
+}
+
+float AlphaTexture::at(const glm::vec2& uv) const {
+  const glm::vec2 turned = use_.offset + turn_ * uv;
+  if (!has_pixels_ || !std::isfinite(turned.x) || !std::isfinite(turned.y)) return 1.0F;
+  const Lookup lookup = lookupAt(use_, turned, texture_.width, texture_.height);
   const auto at = [&](int dx, int dy) {
-    const int x = wrap(lookup.x + dx, texture.width, use.repeat_u, use.mirror_u);
-    const int y = wrap(lookup.y + dy, texture.height, use.repeat_v, use.mirror_v);
+    const int x = wrap(lookup.x + dx, texture_.width, use_.repeat_u, use_.mirror_u);
+    const int y = wrap(lookup.y + dy, texture_.height, use_.repeat_v, use_.mirror_v);
     const auto index =
-        static_cast<std::size_t>(y) * static_cast<std::size_t>(texture.width) + static_cast<std::size_t>(x);
-    return static_cast<float>(texture.rgba[4 * index + 3]) / 255.0F;
+        static_cast<std::size_t>(y) * static_cast<std::size_t>(texture_.width) + static_cast<std::size_t>(x);
+    return static_cast<float>(texture_.rgba[4 * index + 3]) / 255.0F;
   };
   return glm::mix(glm::mix(at(0, 0), at(1, 0), lookup.next.x), glm::mix(at(0, 1), at(1, 1), lookup.next.x),
                   lookup.next.y);

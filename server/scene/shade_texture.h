@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/mat2x2.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <vector>
@@ -37,8 +38,19 @@ class TexturePyramid {
 /// uv -> offset + rotate(scale * uv), KHR_texture_transform.
 [[nodiscard]] glm::vec2 transformUv(const TextureUse& use, const glm::vec2& uv);
 
-/// Alpha of a texture around `uv` (after TextureUse's transform and wrapping), bilinear, in [0, 1]; 1 where it has no
-/// pixels.
-[[nodiscard]] float sampleAlpha(const Texture& texture, const TextureUse& use, const glm::vec2& uv);
+/// Alpha of a texture. Refers to it, and to its use.
+class AlphaTexture {
+ public:
+  AlphaTexture(const Texture& texture, const TextureUse& use);
+
+  /// Around `uv` (after TextureUse's transform and wrapping), bilinear, in [0, 1]; 1 where it has no pixels.
+  [[nodiscard]] float at(const glm::vec2& uv) const;
+
+ private:
+  const Texture& texture_;
+  const TextureUse& use_;
+  bool has_pixels_;
+  glm::mat2 turn_;  ///< after which comes TextureUse::offset
+};
 
 }  // namespace radiosity::scene
