@@ -11,7 +11,7 @@ namespace {
 constexpr BurialPlaces kAll;
 /// Of a scene: places of the first look, so that there is a bound on what is held of them, and of the look beside.
 constexpr std::uint64_t kMaxPlaces = 2'000'000, kMaxBeside = 8'000'000;
-/// Boxes and triangles: 2 or 3 s of one core. Twice what a model of 60,000 triangles takes, all of which touch. It is
+/// Hits::work: 2 or 3 s of one core. Three times what a model of 60,000 triangles takes, all of which touch. It is
 /// counted and not measured, so that a scene is the same whoever builds it, and from few leaves, so that it is also the
 /// same after an edit, when most are remembered.
 constexpr double kMaxWork = 400e6;

@@ -18,7 +18,7 @@ struct BurialPlaces {
 /// What a few places of a leaf told.
 struct TriedLeaf {
   static constexpr std::uint32_t kPlaces = 4;
-  std::uint64_t work = 0;  ///< boxes and triangles that rays were held against
+  std::uint64_t work = 0;  ///< of its rays (Hits)
   bool buried = false;     ///< some of it
   bool visible = false;    ///< likewise
 };

@@ -6,12 +6,11 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <numeric>
-#include <tuple>
 #include <utility>
 
-#include "server/scene/bounds.h"
-
 #include "common/give_back.h"
+#include "server/scene/bounds.h"
+#include "server/scene/triangle_hit.h"
 
 namespace radiosity::scene {
 namespace {
@@ -58,68 +57,6 @@ struct SlabRay {
     }
     return near <= far ? near : std::numeric_limits<float>::infinity();
   }
-};
-
-/// One and more than rounding.
-constexpr double kJustAbove = 1.0 + 1e-12;
-
-/// Moller and Trumbore 1997, in double so that edges leak less than a part in 1e12.
-bool meetsTriangle(const Bvh::Triangle& triangle, const glm::dvec3& origin, const glm::dvec3& direction, RayHit& hit) {
-  const glm::dvec3 a(triangle[0]);
-  const glm::dvec3 e1 = glm::dvec3(triangle[1]) - a;
-  const glm::dvec3 e2 = glm::dvec3(triangle[2]) - a;
-  const glm::dvec3 p = glm::cross(direction, e2);
-  const double determinant = glm::dot(e1, p);
-  if (determinant == 0.0) return false;
-  const glm::dvec3 s = origin - a;
-  // Most rays pass by: that is known before anything is divided.
-  const double scaled = glm::dot(s, p), sign = determinant > 0.0 ? 1.0 : -1.0;
-  if (scaled * sign < 0.0 || scaled * sign > kJustAbove * determinant * sign) return false;
-  const double u = scaled / determinant;
-  if (!(u >= 0.0 && u <= 1.0)) return false;
-  const glm::dvec3 q = glm::cross(s, e1);
-  const double v = glm::dot(direction, q) / determinant;
-  if (!(v >= 0.0 && u + v <= 1.0)) return false;
-  hit.t = glm::dot(e2, q) / determinant;
-  hit.front = determinant > 0.0;
-  return true;
-}
-
-/// Hits so near to each other are one, on an edge.
-constexpr double kSameHit = 1e-9;
-
-/// Walks along the hits of a ray in order: +1 for every solid entered (front), -1 for every one left (back); below
-/// zero, the origin was inside.
-class SolidWalk {
- public:
-  explicit SolidWalk(std::vector<RayHit>& hits) : hits_(hits) { hits_.clear(); }
-
-  /// They come nearly in order.
-  void add(const RayHit& hit) {
-    const auto key = [](const RayHit& of) { return std::tuple(of.t, of.front, of.triangle); };
-    const bool in_order = hits_.empty() || key(hits_.back()) < key(hit);
-    hits_.insert(in_order ? hits_.end() : std::ranges::upper_bound(hits_, key(hit), {}, key), hit);
-  }
-
-  /// Goes on to `end`, before which no more hits will come.
-  [[nodiscard]] std::optional<double> leaveBefore(double end) {
-    for (; next_ < hits_.size() && hits_[next_].t < end; ++next_) {
-      const RayHit& hit = hits_[next_];
-      if (last_front_ == hit.front && hit.t - last_ < kSameHit) continue;  // the edge between two triangles
-      last_ = hit.t;
-      last_front_ = hit.front;
-      depth_ += hit.front ? 1 : -1;
-      if (depth_ < 0) return hit.t;
-    }
-    return std::nullopt;
-  }
-
- private:
-  std::vector<RayHit>& hits_;
-  std::size_t next_ = 0;
-  int depth_ = 0;
-  double last_ = -1.0;
-  bool last_front_ = false;
 };
 
 /// Separating axes of a triangle and a box (Akenine-Moller 2001): box faces, triangle plane, nine edge products.
@@ -250,46 +187,6 @@ void Bvh::collectHits(const glm::dvec3& origin, const glm::dvec3& direction, dou
       if (meetsTriangle(triangles_[i], origin, direction, hit) && hit.t > t_min && hit.t < t_max) hits.push_back(hit);
     }
   }
-}
-
-/// Nearer children first; what waits bounds from below what is still to come.
-std::optional<double> Bvh::endOfSolid(const glm::dvec3& origin, const glm::dvec3& direction, double t_max,
-                                      std::vector<RayHit>& hits, std::uint64_t& work) const {
-  constexpr float kNever = std::numeric_limits<float>::infinity();
-  SolidWalk walk(hits);
-  if (triangles_.empty()) return std::nullopt;
-  const SlabRay ray(origin, direction, 0.0, t_max);
-  struct Task {
-    std::uint32_t node;
-    float entry, soonest;  ///< of it, and of all that wait below it as well
-  };
-  std::array<Task, kStackDepth> stack;
-  std::size_t depth = 0;
-  const auto soonest = [&] { return depth == 0 ? kNever : stack[depth - 1].soonest; };
-  const auto push = [&](std::uint32_t node, float entry) {
-    if (entry == kNever) return;
-    stack[depth] = {node, entry, std::min(entry, soonest())};
-    ++depth;
-  };
-  push(0, ray.entry(nodes_[0].min, nodes_[0].max));
-  while (depth > 0) {
-    const Node& node = nodes_[stack[--depth].node];
-    work += 1 + node.count;
-    if (node.count == 0) {
-      const float left = ray.entry(nodes_[node.first].min, nodes_[node.first].max);
-      const float right = ray.entry(nodes_[node.first + 1].min, nodes_[node.first + 1].max);
-      const std::uint32_t far = left <= right ? 1 : 0;
-      push(node.first + far, std::max(left, right));
-      push(node.first + 1 - far, std::min(left, right));
-      continue;
-    }
-    for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
-      RayHit hit{0.0, order_[i], false};
-      if (meetsTriangle(triangles_[i], origin, direction, hit) && hit.t > 0.0 && hit.t < t_max) walk.add(hit);
-    }
-    if (const auto end = walk.leaveBefore(static_cast<double>(soonest()))) return end;
-  }
-  return walk.leaveBefore(static_cast<double>(kNever));
 }
 
 std::vector<std::uint32_t> Bvh::leastTags(std::span<const std::uint32_t> tags) const {

@@ -32,12 +32,6 @@ class Bvh {
   void collectHits(const glm::dvec3& origin, const glm::dvec3& direction, double t_min, double t_max,
                    std::vector<RayHit>& hits) const;
 
-  /// Where the ray leaves the solid that it starts in: the first back of a triangle that ends more solids than fronts
-  /// began. Looks no farther: what lies behind costs nothing. None: it starts in no solid, and `hits` are all with t in
-  /// (0, t_max), by t. `work`: grows by the boxes and triangles that were looked at.
-  [[nodiscard]] std::optional<double> endOfSolid(const glm::dvec3& origin, const glm::dvec3& direction, double t_max,
-                                                 std::vector<RayHit>& hits, std::uint64_t& work) const;
-
   /// By node: the least tag of its triangles. `tags`: one for each triangle.
   [[nodiscard]] std::vector<std::uint32_t> leastTags(std::span<const std::uint32_t> tags) const;
   /// Of the hits with t in (t_min, t_max) that count, the one with the least tag below `end`; the first of those that
@@ -79,7 +73,10 @@ class Bvh {
   [[nodiscard]] std::size_t size() const { return triangles_.size(); }
 
  private:
-  friend class RayTree;  // made of the same boxes
+  // Made of the same boxes and triangles:
+  friend class RayTree;
+  friend class SolidTree;
+  friend class WideNodes;
   struct Node {
     glm::vec3 min, max;
     std::uint32_t first;  ///< leaf: into order_; inner: left child (the right one follows it)

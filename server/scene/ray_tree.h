@@ -1,8 +1,7 @@
-// The nearest triangle that a ray meets, for very many rays (solver/leaf_sights.h): a Bvh with eight boxes below each
-// (Wald, Benthin and Boulos 2008, "Getting rid of packets"), whose children or triangles are tested together. Single
-// precision; what lies at an edge counts for both triangles, so that no ray slips between two. Of triangles that
-// coincide the one that shows its front is hit, then the first: walls of no thickness are two, back to back. Immutable
-// once built, so any number of threads may ask.
+// The nearest triangle that a ray meets, for very many rays (solver/leaf_sights.h): a Bvh with eight boxes below each,
+// whose children or triangles are tested together. Single precision; what lies at an edge counts for both triangles, so
+// that no ray slips between two. Of triangles that coincide the one that shows its front is hit, then the first: walls
+// of no thickness are two, back to back. Immutable once built, so any number of threads may ask.
 #pragma once
 
 #include <array>
@@ -11,13 +10,13 @@
 #include <span>
 #include <vector>
 
-#include "server/scene/bvh.h"
+#include "server/scene/wide_nodes.h"
 
 namespace radiosity::scene {
 
 class RayTree {
  public:
-  static constexpr std::uint32_t kWidth = 8;
+  static constexpr std::uint32_t kWidth = WideNodes::kWidth;
 
   RayTree() = default;
   /// O(n); the Bvh is not needed any more.
@@ -29,26 +28,16 @@ class RayTree {
                                 std::span<const std::uint32_t> passed = {}) const;
 
  private:
-  struct alignas(32) Node {
-    std::array<std::array<float, kWidth>, 6> plane;  ///< low x, y, z, high x, y, z
-    std::array<std::uint32_t, kWidth> child;         ///< kLeaf: of a block; else of a node
-  };
   struct alignas(32) Block {
     std::array<std::array<float, kWidth>, 3> corner, edge1, edge2;
     std::array<float, kWidth> slack;  ///< by which it grows, times the longer edge
     std::array<std::uint32_t, kWidth> triangle;
   };
-  static constexpr std::uint32_t kLeaf = 1U << 31U;
-  [[nodiscard]] static std::vector<std::uint32_t> childrenOf(const Bvh& tree, std::uint32_t node,
-                                                             const std::vector<std::uint32_t>& count);
   [[nodiscard]] std::uint32_t addBlock(const Bvh& tree, std::uint32_t first, std::uint32_t count);
-  [[nodiscard]] std::uint32_t addLeaf(const Bvh& tree, std::uint32_t first, std::uint32_t count);
-  struct Ray;
-  [[nodiscard]] static std::uint32_t meetBoxes(const Node& node, const Ray& ray, float t_max, float* entry);
-  static void meetTriangles(const Block& block, const Ray& ray, float* t, float* turn);
+  static void meetTriangles(const Block& block, const WideNodes::Ray& ray, float* t, float* turn);
 
-  std::vector<Node> nodes_;
-  std::vector<Block> blocks_;
+  std::vector<Block> blocks_;  // before the nodes, which number them
+  WideNodes nodes_;
 };
 
 }  // namespace radiosity::scene

@@ -72,6 +72,7 @@ Solids::Solids(const PatchScene& patches, const std::vector<Hides>& hides) {
     if (hiding == Hides::kSolid) surface_.push_back(patches.triangle_surface[t]);
   }
   tree_ = Bvh(std::move(triangles));
+  ends_ = SolidTree(tree_);
   sheets_ = Bvh(std::move(sheets));
 }
 
@@ -142,7 +143,7 @@ std::optional<Solids::Start> Solids::firstMet(const Start& start, const glm::dve
 /// Otherwise leaves what it met in `hits`, in order, which no other part of the scene changes.
 Solids::Ray Solids::follow(const Start& start, std::uint32_t way, const glm::dvec3& direction, Hits& hits,
                            RayNotes* notes) const {
-  const auto end = tree_.endOfSolid(start.origin, direction, kBurialRayLength, hits, hits.work);
+  const auto end = ends_.endOfSolid(start.origin, direction, kBurialRayLength, hits, hits.work);
   if (notes != nullptr) notes->add({start.origin, start.normal, start.triangle, way, end.value_or(kBurialRayLength)});
   if (!end) return Ray::kStays;
   return !sheets_.empty() && sheets_.meets(start.origin, direction, 0.0, *end) ? Ray::kEndsOnSheet : Ray::kLeaves;

@@ -15,6 +15,7 @@
 #include "server/scene/burial_record.h"
 #include "server/scene/bvh.h"
 #include "server/scene/patch_scene.h"
+#include "server/scene/solid_tree.h"
 
 namespace radiosity::scene {
 
@@ -22,7 +23,7 @@ namespace radiosity::scene {
   return glm::vec3(glm::dvec3(frame.origin) + texel.x * glm::dvec3(frame.du) + texel.y * glm::dvec3(frame.dv));
 }
 
-/// Of one thread's rays. `work`: boxes and triangles that they were held against, all together.
+/// Of one thread's rays. `work`: what they took, all together, in units of some 6 ns.
 struct Hits : std::vector<RayHit> {
   std::uint64_t work = 0;
 };
@@ -34,6 +35,8 @@ class Solids {
  public:
   /// `hides`: by surface.
   Solids(const PatchScene& patches, const std::vector<Hides>& hides);
+  Solids(const Solids&) = delete;  // a part refers to another
+  Solids& operator=(const Solids&) = delete;
 
   [[nodiscard]] bool empty() const { return tree_.empty(); }
 
@@ -70,6 +73,7 @@ class Solids {
   [[nodiscard]] std::optional<Start> firstMet(const Start& start, const glm::dvec3& direction, const Hits& hits) const;
 
   Bvh tree_;
+  SolidTree ends_;                      ///< of the same
   std::vector<std::uint32_t> surface_;  ///< by triangle of the tree
   std::vector<glm::vec3> normal_;       ///< likewise
   Bvh sheets_;

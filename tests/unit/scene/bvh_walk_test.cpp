@@ -6,7 +6,7 @@
 #include <random>
 #include <tuple>
 
-#include "server/scene/bvh.h"
+#include "server/scene/solid_tree.h"
 #include "tests/unit/scene/triangle_soup.h"
 
 namespace radiosity::scene {
@@ -30,6 +30,7 @@ std::optional<double> endOf(const std::vector<RayHit>& hits) {
 
 TEST(BvhWalk, FindsTheEndOfASolidThatAllHitsTell) {
   const Bvh tree(test::triangleSoup(2000, 3));
+  const SolidTree solids(tree);
   std::mt19937 random(6);
   std::uniform_real_distribution<double> uniform(-0.5, 0.5);
   std::size_t inside = 0, outside = 0;
@@ -40,7 +41,7 @@ TEST(BvhWalk, FindsTheEndOfASolidThatAllHitsTell) {
     const auto all = sortedHits(tree, origin, direction, 2.0);
     std::vector<RayHit> hits;
     std::uint64_t work = 0;
-    const auto end = tree.endOfSolid(origin, direction, 2.0, hits, work);
+    const auto end = solids.endOfSolid(origin, direction, 2.0, hits, work);
     ASSERT_EQ(end, endOf(all));
     (end ? inside : outside) += 1;
     if (end) continue;
@@ -58,11 +59,12 @@ TEST(BvhWalk, WhatLiesBehindTheEndOfASolidCostsNothing) {
     sheets.push_back({glm::vec3(-1, -1, z), glm::vec3(1, -1, z), glm::vec3(0, 1, z)});
   }
   const Bvh tree(sheets);
+  const SolidTree solids(tree);
   std::vector<RayHit> hits;
   std::uint64_t work = 0;
   for (int i = 0; i < 100; ++i) {
     const double z = i / 100.0 + 0.0001;
-    EXPECT_TRUE(tree.endOfSolid({0.01, -0.1, z}, {0.01, 0.02, 1.0}, 8.0, hits, work));
+    EXPECT_TRUE(solids.endOfSolid({0.01, -0.1, z}, {0.01, 0.02, 1.0}, 8.0, hits, work));
   }
   EXPECT_LT(work / 100, 100U) << "of 4000";
 }

@@ -1,0 +1,150 @@
+#include "server/scene/solid_tree.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <tuple>
+
+#include "common/clones.h"
+#include "server/scene/triangle_hit.h"
+
+namespace radiosity::scene {
+namespace {
+
+/// Of a node with its boxes, or of a block with its triangles: what time it takes, in units of Hits::work.
+constexpr std::uint64_t kNodeWork = 4;
+/// By which a ray may seem to miss a triangle that it meets (unit box): twice what rounding makes of it.
+constexpr float kEdge = 1e-6F;
+
+/// Hits so near to each other are one, on an edge.
+constexpr double kSameHit = 1e-9;
+
+/// Walks along the hits of a ray in order: +1 for every solid entered (front), -1 for every one left (back); below
+/// zero, the origin was inside.
+class SolidWalk {
+ public:
+  explicit SolidWalk(std::vector<RayHit>& hits) : hits_(hits) { hits_.clear(); }
+
+  /// They come nearly in order.
+  void add(const RayHit& hit) {
+    const auto key = [](const RayHit& of) { return std::tuple(of.t, of.front, of.triangle); };
+    const bool in_order = hits_.empty() || key(hits_.back()) < key(hit);
+    hits_.insert(in_order ? hits_.end() : std::ranges::upper_bound(hits_, key(hit), {}, key), hit);
+  }
+
+  /// Goes on to `end`, before which no more hits will come.
+  [[nodiscard]] std::optional<double> leaveBefore(double end) {
+    for (; next_ < hits_.size() && hits_[next_].t < end; ++next_) {
+      const RayHit& hit = hits_[next_];
+      if (last_front_ == hit.front && hit.t - last_ < kSameHit) continue;  // the edge between two triangles
+      last_ = hit.t;
+      last_front_ = hit.front;
+      depth_ += hit.front ? 1 : -1;
+      if (depth_ < 0) return hit.t;
+    }
+    return std::nullopt;
+  }
+
+ private:
+  std::vector<RayHit>& hits_;
+  std::size_t next_ = 0;
+  int depth_ = 0;
+  double last_ = -1.0;
+  bool last_front_ = false;
+};
+
+}  // namespace
+
+SolidTree::SolidTree(const Bvh& tree)
+    : tree_(&tree), nodes_(tree, [&](std::uint32_t first, std::uint32_t count) { return addBlock(first, count); }) {}
+
+std::uint32_t SolidTree::addBlock(std::uint32_t first, std::uint32_t count) {
+  Block block{};
+  block.first = first;
+  block.slack.fill(-1.0F);
+  for (std::uint32_t k = 0; k < count; ++k) {
+    const auto& [a, b, c] = tree_->triangles_[first + k];
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto i = static_cast<int>(axis);
+      block.corner[axis][k] = a[i];
+      block.edge1[axis][k] = b[i] - a[i];
+      block.edge2[axis][k] = c[i] - a[i];
+    }
+    block.slack[k] = kEdge * std::max(glm::length(b - a), glm::length(c - a));
+  }
+  blocks_.push_back(block);
+  return static_cast<std::uint32_t>(blocks_.size() - 1);
+}
+
+/// Moller and Trumbore 1997, without a division. As bits.
+__attribute__((always_inline)) inline std::uint32_t SolidTree::mayMeet(const Block& block, const WideNodes::Ray& ray) {
+  const auto& c = block.corner;
+  const auto& a = block.edge1;
+  const auto& b = block.edge2;
+  const float dx = ray.direction[0], dy = ray.direction[1], dz = ray.direction[2];
+  std::uint32_t bits[kWidth];
+  for (std::size_t k = 0; k < kWidth; ++k) {
+    const float px = dy * b[2][k] - dz * b[1][k], py = dz * b[0][k] - dx * b[2][k], pz = dx * b[1][k] - dy * b[0][k];
+    const float determinant = a[0][k] * px + a[1][k] * py + a[2][k] * pz;
+    const float sx = ray.origin[0] - c[0][k], sy = ray.origin[1] - c[1][k], sz = ray.origin[2] - c[2][k];
+    const float qx = sy * a[2][k] - sz * a[1][k], qy = sz * a[0][k] - sx * a[2][k], qz = sx * a[1][k] - sy * a[0][k];
+    const float way = determinant < 0.0F ? -1.0F : 1.0F;
+    const float u = way * (sx * px + sy * py + sz * pz), v = way * (dx * qx + dy * qy + dz * qz);
+    const float t = way * (b[0][k] * qx + b[1][k] * qy + b[2][k] * qz);
+    const float slack = block.slack[k];
+    const bool may = (u >= -slack) & (v >= -slack) & (u + v <= way * determinant + 2.0F * slack) & (t >= -slack);
+    bits[k] = may ? 1U << k : 0U;
+  }
+  std::uint32_t mask = 0;
+  for (std::size_t k = 0; k < kWidth; ++k) mask |= bits[k];
+  return mask;
+}
+
+/// Nearer children first; what waits bounds from below what is still to come.
+RADIOSITY_CLONES std::optional<double> SolidTree::endOfSolid(const glm::dvec3& origin, const glm::dvec3& direction,
+                                                             double t_max, std::vector<RayHit>& hits,
+                                                             std::uint64_t& work) const {
+  constexpr float kNever = std::numeric_limits<float>::infinity();
+  SolidWalk walk(hits);
+  if (nodes_.empty()) return std::nullopt;
+  const WideNodes::Ray ray{glm::vec3(origin), glm::vec3(direction)};
+  const auto reach = static_cast<float>(t_max) * (1.0F + 1e-6F);
+  struct Task {
+    std::uint32_t child;
+    float entry, soonest;  ///< of it, and of all that wait below it as well
+  };
+  Task stack[WideNodes::kStackDepth];
+  std::size_t depth = 1;
+  stack[0] = {0, 0.0F, 0.0F};
+  alignas(32) float entry[kWidth];
+  while (depth > 0) {
+    const auto child = stack[--depth].child;
+    work += kNodeWork;
+    if ((child & WideNodes::kLeaf) == 0) {
+      const auto& node = nodes_[child];
+      const std::size_t base = depth;
+      for (std::uint32_t mask = WideNodes::meet(node, ray, reach, entry); mask != 0; mask &= mask - 1) {
+        const auto k = static_cast<std::size_t>(std::countr_zero(mask));
+        std::size_t at = depth++;
+        for (; at > base && stack[at - 1].entry < entry[k]; --at) stack[at] = stack[at - 1];
+        stack[at] = {node.child[k], entry[k], 0.0F};
+      }
+      for (auto at = base; at < depth; ++at)
+        stack[at].soonest = std::min(stack[at].entry, at == 0 ? kNever : stack[at - 1].soonest);
+      continue;
+    }
+    const Block& block = blocks_[child & ~WideNodes::kLeaf];
+    for (std::uint32_t mask = mayMeet(block, ray); mask != 0; mask &= mask - 1) {
+      const auto i = block.first + static_cast<std::uint32_t>(std::countr_zero(mask));
+      RayHit hit{0.0, tree_->order_[i], false};
+      if (meetsTriangle(tree_->triangles_[i], origin, direction, hit) && hit.t > 0.0 && hit.t < t_max) walk.add(hit);
+    }
+    const float soonest = depth == 0 ? kNever : stack[depth - 1].soonest;
+    if (const auto end = walk.leaveBefore(static_cast<double>(soonest))) return end;
+  }
+  return walk.leaveBefore(static_cast<double>(kNever));
+}
+
+}  // namespace radiosity::scene
