@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "common/clones.h"
@@ -11,33 +12,52 @@ namespace {
 
 /// A cycle aims lower than asked, so that its true residual, checked afterwards, is seldom a little too large.
 constexpr double kAim = 0.3;
+/// What is left of a vector when so small a part of it is, is rounding.
+template <typename Real>
+constexpr double kRounding = 45.0 * std::numeric_limits<Real>::epsilon();
 
 /// Sum of w a b, in the order of so many lanes whichever processor adds them: one sum after the other waits for each.
-RADIOSITY_CLONES double weightedProduct(const double* w, const double* a, const double* b, std::size_t count) {
-  constexpr std::size_t kLanes = 16;
-  std::array<double, kLanes> sums{};
-  const std::size_t whole = count - count % kLanes;
-  for (std::size_t i = 0; i < whole; i += kLanes) {
-    for (std::size_t k = 0; k < kLanes; ++k) sums[k] += w[i + k] * a[i + k] * b[i + k];
-  }
+template <typename Real>
+__attribute__((always_inline)) inline double sumOfProducts(const Real* w, const Real* a, const Real* b,
+                                                           std::size_t count) {
+  constexpr std::size_t kLanes = 128 / sizeof(Real), kRun = 64 * kLanes;  // so many are added up in Real
   double sum = 0.0;
-  for (const double lane : sums) sum += lane;
-  for (std::size_t i = whole; i < count; ++i) sum += w[i] * a[i] * b[i];
+  for (std::size_t first = 0; first < count; first += kRun) {
+    const std::size_t end = std::min(count, first + kRun), whole = end - (end - first) % kLanes;
+    std::array<Real, kLanes> sums{};
+    for (std::size_t i = first; i < whole; i += kLanes) {
+      for (std::size_t k = 0; k < kLanes; ++k) sums[k] += w[i + k] * a[i + k] * b[i + k];
+    }
+    for (const Real lane : sums) sum += static_cast<double>(lane);
+    for (std::size_t i = whole; i < end; ++i) sum += static_cast<double>(w[i] * a[i] * b[i]);
+  }
   return sum;
+}
+RADIOSITY_CLONES double weightedProduct(const double* w, const double* a, const double* b, std::size_t count) {
+  return sumOfProducts(w, a, b, count);
+}
+RADIOSITY_CLONES double weightedProduct(const float* w, const float* a, const float* b, std::size_t count) {
+  return sumOfProducts(w, a, b, count);
 }
 
 /// to += factor from.
 RADIOSITY_CLONES void addScaled(double factor, const double* from, double* to, std::size_t count) {
   for (std::size_t i = 0; i < count; ++i) to[i] += factor * from[i];
 }
+RADIOSITY_CLONES void addScaled(float factor, const float* from, float* to, std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i) to[i] += factor * from[i];
+}
 
 }  // namespace
 
-double Gmres::product(const std::vector<double>& a, const std::vector<double>& b) const {
+template <typename Real>
+double Gmres<Real>::product(const std::vector<Real>& a, const std::vector<Real>& b) const {
   return weightedProduct(weight_.data(), a.data(), b.data(), a.size());
 }
 
-void Gmres::begin(Vectors start, std::vector<double> weight, const std::array<double, 3>& tolerance, int max_sweeps) {
+template <typename Real>
+void Gmres<Real>::begin(Vectors start, std::vector<Real> weight, const std::array<double, 3>& tolerance,
+                        int max_sweeps) {
   x_ = std::move(start);
   weight_ = std::move(weight);
   tolerance_ = tolerance;
@@ -46,7 +66,8 @@ void Gmres::begin(Vectors start, std::vector<double> weight, const std::array<do
   in_cycle_ = false;
 }
 
-bool Gmres::advance(const Sweep& sweep) {
+template <typename Real>
+bool Gmres<Real>::advance(const Sweep& sweep) {
   ++sweeps_;
   if (!in_cycle_) {
     solution_ = x_;
@@ -59,7 +80,7 @@ bool Gmres::advance(const Sweep& sweep) {
     if (channel_[c].growing) {
       image_[c] = channel_[c].basis.back();
     } else {
-      image_[c].assign(weight_.size(), 0.0);
+      image_[c].assign(weight_.size(), Real{0});
     }
   }
   sweep(image_, false);
@@ -71,19 +92,22 @@ bool Gmres::advance(const Sweep& sweep) {
 }
 
 /// Measures the residual; a channel that is not done gets it as the first vector of its basis.
-void Gmres::startCycle() {
+template <typename Real>
+void Gmres<Real>::startCycle() {
   for (std::size_t c = 0; c < 3; ++c) {
     Channel& channel = channel_[c];
     auto& residual = image_[c];
     residual.resize(weight_.size());
-    for (std::size_t i = 0; i < residual.size(); ++i) residual[i] = weight_[i] > 0.0 ? solution_[c][i] - x_[c][i] : 0.0;
+    for (std::size_t i = 0; i < residual.size(); ++i)
+      residual[i] = weight_[i] > Real{0} ? solution_[c][i] - x_[c][i] : Real{0};
     residual_[c] = std::sqrt(product(residual, residual));
     channel.basis.clear();
     channel.columns = 0;
     // What is no number any more will not become one.
     channel.growing = residual_[c] > tolerance_[c] && std::isfinite(residual_[c]);
     if (!channel.growing) continue;
-    for (auto& value : residual) value /= residual_[c];
+    const auto scale = static_cast<Real>(1.0 / residual_[c]);
+    for (auto& value : residual) value *= scale;
     channel.right = {};
     channel.right[0] = residual_[c];
     channel.basis.push_back(std::move(residual));
@@ -92,19 +116,20 @@ void Gmres::startCycle() {
 }
 
 /// `image` is G v of the last basis vector v; the operator of the equation is v - G v.
-void Gmres::addColumn(std::size_t c, std::vector<double>& image) {
+template <typename Real>
+void Gmres<Real>::addColumn(std::size_t c, std::vector<Real>& image) {
   Channel& channel = channel_[c];
   const std::size_t k = channel.columns++;
   const auto& last = channel.basis.back();
-  for (std::size_t i = 0; i < image.size(); ++i) image[i] = weight_[i] > 0.0 ? last[i] - image[i] : 0.0;
+  for (std::size_t i = 0; i < image.size(); ++i) image[i] = weight_[i] > Real{0} ? last[i] - image[i] : Real{0};
   auto& column = channel.triangle[k];
   const double before = std::sqrt(product(image, image));
   for (std::size_t j = 0; j <= k; ++j) {
     column[j] = product(channel.basis[j], image);
-    addScaled(-column[j], channel.basis[j].data(), image.data(), image.size());
+    addScaled(static_cast<Real>(-column[j]), channel.basis[j].data(), image.data(), image.size());
   }
   double length = std::sqrt(product(image, image));
-  if (!(length > 1e-14 * before)) length = 0.0;  // the basis holds the solution
+  if (!(length > kRounding<Real> * before)) length = 0.0;  // the basis holds the solution
   for (std::size_t j = 0; j < k; ++j) {
     const double upper = channel.cosine[j] * column[j] + channel.sine[j] * column[j + 1];
     column[j + 1] = channel.cosine[j] * column[j + 1] - channel.sine[j] * column[j];
@@ -119,12 +144,14 @@ void Gmres::addColumn(std::size_t c, std::vector<double>& image) {
   channel.growing = length > 0.0 && channel.columns < kRestart && sweeps_ + 1 < max_sweeps_ &&
                     std::abs(channel.right[k + 1]) > kAim * tolerance_[c];
   if (!channel.growing) return;
-  for (auto& value : image) value /= length;
+  const auto scale = static_cast<Real>(1.0 / length);
+  for (auto& value : image) value *= scale;
   channel.basis.push_back(std::move(image));
 }
 
 /// Adds the combinations of the basis vectors that leave the least residual.
-void Gmres::endCycle() {
+template <typename Real>
+void Gmres<Real>::endCycle() {
   for (std::size_t c = 0; c < 3; ++c) {
     Channel& channel = channel_[c];
     if (channel.columns == 0) {  // was done before
@@ -137,10 +164,13 @@ void Gmres::endCycle() {
       for (std::size_t k = j + 1; k < channel.columns; ++k) rest -= channel.triangle[k][j] * factor[k];
       // A column of zeros: G leaves something as it is, light that nothing takes away.
       factor[j] = channel.triangle[j][j] > 0.0 ? rest / channel.triangle[j][j] : 0.0;
-      addScaled(factor[j], channel.basis[j].data(), x_[c].data(), x_[c].size());
+      addScaled(static_cast<Real>(factor[j]), channel.basis[j].data(), x_[c].data(), x_[c].size());
     }
   }
   in_cycle_ = false;
 }
+
+template class Gmres<float>;
+template class Gmres<double>;
 
 }  // namespace radiosity::solver

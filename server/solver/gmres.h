@@ -1,8 +1,7 @@
 // Restarted GMRES (Saad and Schultz 1986) around sweeps of Gauss and Seidel: x = G x + g for the three channels at
 // once, each a system of its own. A sweep alone gains a digit after 2.3 / (1 - rho) of them; here what converges slowly
-// (the level of light in a room of reflectance near one, one unknown a room) is found within a few. All in double
-// precision and in a fixed order: the same bits whoever calls, however the calls are spread over time. One thread at a
-// time.
+// (the level of light in a room of reflectance near one, one unknown a room) is found within a few. In a fixed order:
+// the same bits whoever calls, however the calls are spread over time. One thread at a time.
 #pragma once
 
 #include <array>
@@ -13,9 +12,12 @@
 
 namespace radiosity::solver {
 
+/// `Real`: float takes half of the memory, and of the time that it takes to go through it; for tolerances well above
+/// 1e-6 of what is solved for. Sums over the unknowns are doubles all the same.
+template <typename Real>
 class Gmres {
  public:
-  using Vectors = std::array<std::vector<double>, 3>;  ///< by channel and unknown
+  using Vectors = std::array<std::vector<Real>, 3>;  ///< by channel and unknown
   /// Vectors of each channel that are kept at once, beside three more. No scene of links has needed as many.
   static constexpr std::size_t kRestart = 24;
   /// Replaces x by G x, or by G x + g where `affine`.
@@ -24,7 +26,7 @@ class Gmres {
   /// From `start` until the norm of each channel's residual G x + g - x, weighted by `weight`, is at most its
   /// tolerance, or `max_sweeps` are used up. Unknowns of weight 0 are left alone: a sweep must not change them where
   /// `affine`, and finds 0 there otherwise.
-  void begin(Vectors start, std::vector<double> weight, const std::array<double, 3>& tolerance, int max_sweeps);
+  void begin(Vectors start, std::vector<Real> weight, const std::array<double, 3>& tolerance, int max_sweeps);
 
   /// Does one sweep. True: solution() is done.
   bool advance(const Sweep& sweep);
@@ -38,7 +40,7 @@ class Gmres {
  private:
   /// The least squares of one channel, brought up to date column by column by Givens rotations.
   struct Channel {
-    std::vector<std::vector<double>> basis;
+    std::vector<std::vector<Real>> basis;
     std::array<std::array<double, kRestart>, kRestart> triangle{};  // by column
     std::array<double, kRestart> cosine{}, sine{};
     std::array<double, kRestart + 1> right{};
@@ -46,16 +48,19 @@ class Gmres {
     bool growing = false;
   };
   void startCycle();
-  void addColumn(std::size_t c, std::vector<double>& image);
+  void addColumn(std::size_t c, std::vector<Real>& image);
   void endCycle();
-  [[nodiscard]] double product(const std::vector<double>& a, const std::vector<double>& b) const;
+  [[nodiscard]] double product(const std::vector<Real>& a, const std::vector<Real>& b) const;
 
-  std::vector<double> weight_;
+  std::vector<Real> weight_;
   std::array<double, 3> tolerance_{}, residual_{};
   Vectors x_, solution_, image_;
   std::array<Channel, 3> channel_;
   int sweeps_ = 0, max_sweeps_ = 0;
   bool in_cycle_ = false;
 };
+
+extern template class Gmres<float>;
+extern template class Gmres<double>;
 
 }  // namespace radiosity::solver

@@ -26,25 +26,32 @@ constexpr double kUnsure = 1.4;
 /// leaf. Of a lamp that shines on the ceiling from a fourteenth of a texel 2.6 % are true and 2.7 % stated; with 0 and
 /// 0.5 that is 2.0 and 4.7 %.
 constexpr double kWithin = 0.2;
-/// Of a leaf in each half, doubles: what GMRES keeps, and the sweeps; and what there is of its light, floats.
-constexpr std::size_t kVectors = 3 * (Gmres::kRestart + 3) + 3 * 4, kLights = 5 * 3 + 4;
+/// Of a leaf in each half, floats: what GMRES keeps, and the sweeps, of which what is sent is known in double; and what
+/// there is of its light.
+constexpr std::size_t kVectors = 3 * (Gmres<float>::kRestart + 3) + 4 * 4, kLights = 5 * 3 + 4;
 
 using Light = LeafSmoother::Light;
 
-__attribute__((always_inline)) inline void add(Light& sum, const Light& light) {
+using Shone = std::array<float, 4>;
+
+__attribute__((always_inline)) inline void add(Shone& sum, const Shone& light) {
   for (std::size_t c = 0; c < 4; ++c) sum[c] += light[c];
 }
 
 /// Means over the rays of all leaves.
-RADIOSITY_CLONES void averageSeen(const LeafSights& sights, std::size_t half, const Light* radiosity, Light* mean) {
+RADIOSITY_CLONES void averageSeen(const LeafSights& sights, std::size_t half, const Shone* radiosity, Shone* mean) {
   const auto counts = sights.counts();
   for (std::uint32_t value = 0; value < sights.leafCount(); ++value) {
-    Light sum{};
+    Shone sum{};
     for (const auto end : sights.seen(half, value)) add(sum, radiosity[end]);
-    const double part = counts[value] > 0 ? 1.0 / counts[value] : 0.0;
+    const float part = counts[value] > 0 ? 1.0F / static_cast<float>(counts[value]) : 0.0F;
     for (auto& channel : sum) channel *= part;
     mean[value] = sum;
   }
+}
+
+Shone rounded(const Light& light) {
+  return {static_cast<float>(light[0]), static_cast<float>(light[1]), static_cast<float>(light[2]), 0.0F};
 }
 
 /// At the edges of a side smoothing has leaves on two of four sides only, and another side's light changes most.
@@ -62,7 +69,7 @@ LeafGather::LeafGather(const scene::PatchScene& patches, const std::vector<Side>
                        std::size_t most_bytes, std::shared_ptr<const LeafRays> rays)
     : sights_(patches, sides, seed, std::move(rays)), most_bytes_(most_bytes), sides_(sides) {
   const std::size_t leaves = sights_.leafCount(), first = leaves * kFirstRays * LeafSights::kRayBytes;
-  sights_.limit(most_bytes - std::min(most_bytes, leastBytes(leaves) - first), sizeof(Light));
+  sights_.limit(most_bytes - std::min(most_bytes, leastBytes(leaves) - first), sizeof(Shone));
   area_.reserve(sights_.leafCount());
   for (const auto& side : sides) {
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
@@ -71,7 +78,7 @@ LeafGather::LeafGather(const scene::PatchScene& patches, const std::vector<Side>
 }
 
 std::size_t LeafGather::leastBytes(std::size_t leaves) {
-  return leaves * (2 * (kVectors * sizeof(double) + kLights * sizeof(float)) + kFirstRays * LeafSights::kRayBytes);
+  return leaves * (2 * (kVectors + kLights) * sizeof(float) + kFirstRays * LeafSights::kRayBytes);
 }
 
 void LeafGather::inherit(const LeafGather& former, std::span<const std::uint32_t> value_before, const Shadows& change) {
@@ -107,7 +114,10 @@ bool LeafGather::advance(double seconds) {
   if (stage_ == Stage::kTracing) {
     if (!sights_.isTraced()) is_weighed_ = false;  // nor is it where memory ends in between
     if (!sights_.trace(seconds)) return false;
-    if (!is_weighed_) weighRays();
+    if (!is_weighed_) {
+      weighRays();
+      smoother_.emplace(sides_, area_, [this](std::uint32_t v) { return sights_.isParted(v); });
+    }
     is_weighed_ = true;
     inBothHalves([&](std::size_t half) { takeLight(half); });
     stage_ = Stage::kSolving;
@@ -115,7 +125,7 @@ bool LeafGather::advance(double seconds) {
   if (stage_ == Stage::kSolving) {
     inBothHalves([&](std::size_t h) {
       while (!halves_[h].done && spent() < seconds) {
-        halves_[h].done = halves_[h].gmres.advance([&](Gmres::Vectors& x, bool affine) { sweep(h, x, affine); });
+        halves_[h].done = halves_[h].gmres.advance([&](Solver::Vectors& x, bool affine) { sweep(h, x, affine); });
       }
     });
     if (!halves_[0].done || !halves_[1].done) return false;
@@ -127,18 +137,18 @@ bool LeafGather::advance(double seconds) {
 /// What the solution tells of itself; what it was made with takes no more memory.
 void LeafGather::finish() {
   takeSolutions();
-  LeafSmoother smoother(sides_, area_, [this](std::uint32_t v) { return sights_.isParted(v); });
-  smoother.smooth(solved_);
+  smoother_->smooth(solved_);
   std::array<Levels, 2> levels;
   inBothHalves([&](std::size_t half) {
     levels[half] = this->levels(half);
     take(half, levels[half]);
   });
   solved_ = {};
-  smoothed_ = bias_ = smoother.bias();
-  leaf_bias_ = smoother.biasOfLeaves();
+  smoothed_ = bias_ = smoother_->bias();
+  leaf_bias_ = smoother_->biasOfLeaves();
   weighLost();
-  weighNoise(smoother);
+  weighNoise();
+  smoother_->forget();
   weighMissed(levels);
   weighDoubt();
   unsolved_ = 0.0;
@@ -172,6 +182,7 @@ void LeafGather::takeLight(std::size_t h) {
   for (std::size_t v = 0; v < leaves; ++v) {
     if (area_[v] <= 0.0) continue;
     area += area_[v];
+    const auto lost = lostOf(h, v);
     for (std::size_t c = 0; c < 3; ++c) {
       const auto i = static_cast<int>(c);
       const double left =
@@ -179,7 +190,7 @@ void LeafGather::takeLight(std::size_t h) {
           static_cast<double>(light_.reflectance[v][i]) * static_cast<double>(light_.irradiance[h][v][i]) -
           static_cast<double>(light_.shot[h][v][i]);
       half.source[v][c] = left;
-      shining[c] += area_[v] * (std::abs(left) + skyAt(h, c, v));
+      shining[c] += area_[v] * (std::abs(left) + skyAt(lost, c));
     }
   }
   std::array<double, 3> tolerance{};
@@ -188,40 +199,44 @@ void LeafGather::takeLight(std::size_t h) {
     // A norm over areas bounds the sum over them (Cauchy and Schwarz).
     if (area > 0.0) tolerance[c] = kSolved * shining[c] / std::sqrt(area);
   }
-  Gmres::Vectors nothing;
-  for (auto& channel : nothing) channel.assign(leaves, 0.0);
-  half.gmres.begin(std::move(nothing), area_, tolerance, kMaxSweeps);
+  Solver::Vectors nothing;
+  for (auto& channel : nothing) channel.assign(leaves, 0.0F);
+  half.gmres.begin(std::move(nothing), std::vector<float>(area_.begin(), area_.end()), tolerance, kMaxSweeps);
   half.done = false;
 }
 
-void LeafGather::average(std::size_t half, const std::vector<Light>& radiosity, std::vector<Light>& mean) const {
-  averageSeen(sights_, half, radiosity.data(), mean.data());
+void LeafGather::average(std::size_t half) {
+  averageSeen(sights_, half, halves_[half].radiosity.data(), halves_[half].arriving.data());
 }
 
 /// Where rays go on: what the leaf there has but for what comes by rays, and what the ray finds of that. `source`: null
 /// for none.
-void LeafGather::followSteps(std::size_t half, const std::vector<Light>* source, std::vector<Light>& radiosity) const {
+void LeafGather::followSteps(std::size_t half, const std::vector<Light>* source) {
+  auto& radiosity = halves_[half].radiosity;
   auto to = radiosity.begin() + sights_.endCount();
   for (const auto& step : sights_.steps(half)) {
     const auto& reflectance = light_.reflectance[step.by];
-    for (std::size_t c = 0; c < 3; ++c)
-      (*to)[c] = static_cast<double>(reflectance[static_cast<int>(c)]) * radiosity[step.next][c] +
-                 (source != nullptr ? (*source)[step.by][c] : 0.0);
+    const auto& next = radiosity[step.next];
+    for (std::size_t c = 0; c < 3; ++c) {
+      const float own = source != nullptr ? static_cast<float>((*source)[step.by][c]) : 0.0F;
+      (*to)[c] = reflectance[static_cast<int>(c)] * next[c] + own;
+    }
     ++to;
   }
 }
 
-void LeafGather::sweep(std::size_t h, Gmres::Vectors& x, bool affine) {
+void LeafGather::sweep(std::size_t h, Solver::Vectors& x, bool affine) {
   Half& half = halves_[h];
   const std::size_t leaves = sights_.leafCount();
   for (std::size_t v = 0; v < leaves; ++v) {
     for (std::size_t c = 0; c < 3; ++c)
-      half.radiosity[v][c] = static_cast<double>(light_.reflectance[v][static_cast<int>(c)]) * x[c][v] +
-                             (affine ? half.source[v][c] : 0.0);
+      half.radiosity[v][c] = light_.reflectance[v][static_cast<int>(c)] * x[c][v] +
+                             (affine ? static_cast<float>(half.source[v][c]) : 0.0F);
   }
-  for (auto end = leaves; end < half.source.size(); ++end) half.radiosity[end] = affine ? half.source[end] : Light{};
-  followSteps(h, affine ? &half.source : nullptr, half.radiosity);
-  average(h, half.radiosity, half.arriving);
+  for (auto end = leaves; end < half.source.size(); ++end)
+    half.radiosity[end] = affine ? rounded(half.source[end]) : Shone{};
+  followSteps(h, affine ? &half.source : nullptr);
+  average(h);
   for (std::size_t v = 0; v < leaves; ++v) {
     for (std::size_t c = 0; c < 3; ++c) x[c][v] = half.arriving[v][c];
   }
@@ -277,7 +292,7 @@ void LeafGather::takeSolutions() {
     const auto& solution = halves_[h].gmres.solution();
     solved_[h].assign(sights_.leafCount(), {});
     for (std::uint32_t v = 0; v < sights_.leafCount(); ++v)
-      solved_[h][v] = {solution[0][v], solution[1][v], solution[2][v], 0.0};
+      for (std::size_t c = 0; c < 3; ++c) solved_[h][v][c] = static_cast<double>(solution[c][v]);
   }
 }
 
@@ -292,28 +307,32 @@ void LeafGather::take(std::size_t h, const Levels& levels) {
         const double arrives =
             level.gathered * solved(h, c, v) + level.over_links * static_cast<double>(light_.irradiance[h][v][i]);
         gathered[v][i] = static_cast<float>(arrives);
-        halves_[h].radiosity[v][c] = halves_[h].source[v][c] + static_cast<double>(light_.reflectance[v][i]) * arrives;
+        halves_[h].radiosity[v][c] =
+            static_cast<float>(halves_[h].source[v][c] + static_cast<double>(light_.reflectance[v][i]) * arrives);
       }
     }
   }
 }
 
 /// What the rays of both halves make of the same light: light that differs is not theirs.
-void LeafGather::weighNoise(const LeafSmoother& smoother) {
+void LeafGather::weighNoise() {
   const std::size_t leaves = sights_.leafCount();
-  auto radiosity = halves_[0].source, source = radiosity;  // for the sky
+  auto source = halves_[0].source;  // with the sky
   for (std::size_t v = 0; v < leaves; ++v) {
     for (std::size_t c = 0; c < 3; ++c) {
       source[v][c] = 0.5 * (halves_[0].source[v][c] + halves_[1].source[v][c]);
-      radiosity[v][c] = 0.5 * (halves_[0].radiosity[v][c] + halves_[1].radiosity[v][c]);
+      const float radiosity = 0.5F * (halves_[0].radiosity[v][c] + halves_[1].radiosity[v][c]);
+      halves_[0].radiosity[v][c] = halves_[1].radiosity[v][c] = radiosity;
     }
   }
+  std::array<std::vector<Light>, 2> arriving;
   inBothHalves([&](std::size_t half) {
-    auto& sent = halves_[half].radiosity;
-    std::ranges::copy(radiosity, sent.begin());
-    followSteps(half, &source, sent);
-    average(half, sent, halves_[half].arriving);
-    smoother.apply(halves_[half].arriving);
+    for (auto end = leaves; end < source.size(); ++end) halves_[half].radiosity[end] = rounded(source[end]);
+    followSteps(half, &source);
+    average(half);
+    arriving[half].reserve(leaves);
+    for (const auto& mean : halves_[half].arriving) arriving[half].push_back({mean[0], mean[1], mean[2], 0.0});
+    smoother_->apply(arriving[half]);
   });
   block_noise_.assign((leaves + kBlock - 1) / kBlock, 0.0);
   block_light_ = block_noise_;
@@ -324,7 +343,7 @@ void LeafGather::weighNoise(const LeafSmoother& smoother) {
     for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
       double square = 0.0;
       for (std::size_t c = 0; c < 3; ++c) {
-        const double off = 0.5 * (halves_[0].arriving[v][c] - halves_[1].arriving[v][c]);
+        const double off = 0.5 * (arriving[0][v][c] - arriving[1][v][c]);
         square += off * off;
       }
       const glm::dvec3 light(0.5F *

@@ -23,6 +23,7 @@
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -123,11 +124,15 @@ class LeafGather {
   static constexpr std::uint32_t kWide = 150;
   /// Four, so that a leaf's are one vector; the last is 0.
   using Light = LeafSmoother::Light;
+  /// What rays read at random, for each of their ends: half of it lies in the caches. Single precision is far more than
+  /// the equation is solved to.
+  using Shone = std::array<float, 4>;
+  using Solver = Gmres<float>;
   struct Half {
     std::vector<Light> source;     ///< r; by what may be seen (LeafSights::endCount)
-    std::vector<Light> radiosity;  ///< r + rho x; and then by step
-    std::vector<Light> arriving;   ///< its means
-    Gmres gmres;
+    std::vector<Shone> radiosity;  ///< r + rho x; and then by step
+    std::vector<Shone> arriving;   ///< its means
+    Solver gmres;
     double shining = 0.0;  ///< flux of |r|, all channels
     bool done = true;
   };
@@ -139,14 +144,13 @@ class LeafGather {
   using Levels = std::vector<std::array<Level, 3>>;
   enum class Stage { kDone, kTracing, kSolving };
   void takeLight(std::size_t half);
-  void average(std::size_t half, const std::vector<Light>& radiosity, std::vector<Light>& mean) const;
-  void followSteps(std::size_t half, const std::vector<Light>* source, std::vector<Light>& radiosity) const;
-  void sweep(std::size_t half, Gmres::Vectors& x, bool affine);
+  void average(std::size_t half);
+  void followSteps(std::size_t half, const std::vector<Light>* source);
+  void sweep(std::size_t half, Solver::Vectors& x, bool affine);
   void take(std::size_t half, const Levels& levels);
   void takeSolutions();
   void weighRays();
   [[nodiscard]] double solved(std::size_t half, std::size_t channel, std::size_t value) const;
-  [[nodiscard]] double skyAt(std::size_t half, std::size_t channel, std::size_t value) const;
   /// What the level of a part of the scene follows from.
   struct LevelSum {
     double left = 0.0, kept = 0.0, size = 0.0, all = 0.0, area = 0.0, stays = 0.0;
@@ -159,9 +163,8 @@ class LeafGather {
   [[nodiscard]] bool losesApart(std::size_t half, std::uint32_t value) const {
     return has_parted_ && sights_.isParted(value) && lostOf(half, value).all() > 0.0;
   }
-  [[nodiscard]] double lossOf(std::size_t half, std::size_t channel, std::uint32_t value) const;
   void weighMissed(const std::array<Levels, 2>& levels);
-  void weighNoise(const LeafSmoother& smoother);
+  void weighNoise();
   void weighLost();
   void weighDoubt();
   [[nodiscard]] glm::dvec3 doubtOf(std::size_t half, std::uint32_t end) const;
@@ -204,7 +207,10 @@ class LeafGather {
     const auto& rays = lost_[half][value];
     return {part(rays.above), part(rays.below), part(rays.absorbed), part(rays.doubtful)};
   }
-  bool is_weighed_ = false;                                        ///< the following are known
+  [[nodiscard]] double skyAt(const Lost& lost, std::size_t channel) const;
+  [[nodiscard]] const std::array<double, 3>& lossOf(std::size_t half, std::uint32_t value) const;
+  bool is_weighed_ = false;  ///< the following are known
+  std::optional<LeafSmoother> smoother_;
   bool has_parted_ = false;                                        ///< leaves, as of LeafSights
   std::array<std::vector<std::array<double, 3>>, 2> parted_loss_;  ///< by half, part and channel: see there
   std::array<std::vector<LostRays>, 2> lost_;                      ///< by half and leaf value; empty: none

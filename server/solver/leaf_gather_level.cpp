@@ -24,9 +24,8 @@ double LeafGather::solved(std::size_t h, std::size_t c, std::size_t v) const {
 }
 
 /// What comes straight from the sky, by rays as they are.
-double LeafGather::skyAt(std::size_t h, std::size_t c, std::size_t v) const {
+double LeafGather::skyAt(const Lost& lost, std::size_t c) const {
   const auto i = static_cast<int>(c);
-  const auto lost = lostOf(h, v);
   return static_cast<double>(lost.above) * light_.sky[0][i] + static_cast<double>(lost.below) * light_.sky[1][i];
 }
 
@@ -47,25 +46,30 @@ void LeafGather::weighPartedLoss(std::size_t h) {
   }
   if (!do_some) return;
   auto& radiosity = halves_[h].radiosity;
-  std::ranges::copy(halves_[h].source, radiosity.begin());
   std::vector<std::array<Flux, 3>> fluxes(sides_.size());
   for (std::uint32_t v = 0; v < loses.size(); ++v) {
     for (std::size_t c = 0; c < 3; ++c) {
-      radiosity[v][c] += static_cast<double>(light_.reflectance[v][static_cast<int>(c)]) * solved(h, c, v);
+      const double sent =
+          halves_[h].source[v][c] + static_cast<double>(light_.reflectance[v][static_cast<int>(c)]) * solved(h, c, v);
+      radiosity[v][c] = static_cast<float>(sent);
       if (!loses[v]) continue;
       auto& flux = fluxes[part_[sights_.sideOf(v)]][c];
-      flux.sent += area_[v] * radiosity[v][c];
-      flux.even += area_[v] * radiosity[v][c] * lostOf(h, v).all();
+      flux.sent += area_[v] * sent;
+      flux.even += area_[v] * sent * lostOf(h, v).all();
     }
   }
-  followSteps(h, &halves_[h].source, radiosity);
+  for (auto end = sights_.leafCount(); end < sights_.endCount(); ++end) {
+    for (std::size_t c = 0; c < 3; ++c) radiosity[end][c] = static_cast<float>(halves_[h].source[end][c]);
+  }
+  followSteps(h, &halves_[h].source);
   const auto steps = sights_.steps(h);
   for (std::uint32_t v = 0; v < loses.size(); ++v) {
     for (const auto end : sights_.seen(h, v)) {
       const auto by = end < sights_.endCount() ? end : steps[end - sights_.endCount()].by;
       if (by >= loses.size() || !loses[by]) continue;
       const double share = area_[v] / sights_.counts()[v];
-      for (std::size_t c = 0; c < 3; ++c) fluxes[part_[sights_.sideOf(by)]][c].arrives += share * radiosity[end][c];
+      for (std::size_t c = 0; c < 3; ++c)
+        fluxes[part_[sights_.sideOf(by)]][c].arrives += share * static_cast<double>(radiosity[end][c]);
     }
   }
   for (std::size_t p = 0; p < fluxes.size(); ++p) {
@@ -76,9 +80,10 @@ void LeafGather::weighPartedLoss(std::size_t h) {
   }
 }
 
-/// Part of a leaf's light that is lost, of what rays of it are.
-double LeafGather::lossOf(std::size_t h, std::size_t c, std::uint32_t v) const {
-  return losesApart(h, v) ? parted_loss_[h][part_[sights_.sideOf(v)]][c] : 1.0;
+/// Part of a leaf's light that is lost, of what rays of it are; by channel.
+const std::array<double, 3>& LeafGather::lossOf(std::size_t h, std::uint32_t v) const {
+  static constexpr std::array<double, 3> kAsRays{1.0, 1.0, 1.0};
+  return losesApart(h, v) ? parted_loss_[h][part_[sights_.sideOf(v)]] : kAsRays;
 }
 
 /// By part of the scene and channel: what makes
@@ -115,12 +120,13 @@ std::vector<std::array<LeafGather::LevelSum, 3>> LeafGather::levelSums(std::size
     auto& sum = sums[part_[s]];
     for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
       const auto lost = lostOf(h, v);
+      const auto& loss = lossOf(h, v);
       for (std::size_t c = 0; c < 3 && area_[v] > 0.0; ++c) {
         const auto i = static_cast<int>(c);
         const double x = solved(h, c, v), over_links = static_cast<double>(light_.irradiance[h][v][i]);
-        const double sends = 1.0 - lossOf(h, c, v) * lost.all();
+        const double sends = 1.0 - loss[c] * lost.all();
         const double stays = 1.0 - sends * static_cast<double>(light_.reflectance[v][i]);
-        sum[c].left += area_[v] * (sends * halves_[h].source[v][c] + skyAt(h, c, v));
+        sum[c].left += area_[v] * (sends * halves_[h].source[v][c] + skyAt(lost, c));
         sum[c].kept += area_[v] * stays * x;
         sum[c].size += area_[v] * stays * std::abs(x);
         sum[c].all += area_[v] * stays * (x + over_links);
@@ -168,11 +174,12 @@ void LeafGather::weighLost() {
     for (std::uint32_t v = 0; v < sights_.leafCount(); ++v) {
       const auto lost = lostOf(half, v);
       if (lost.all() <= 0.0) continue;
+      const auto& loss = lossOf(half, v);
       for (std::size_t c = 0; c < 3; ++c) {
-        const double flux = 0.5 * area_[v] * halves_[half].radiosity[v][c] * lossOf(half, c, v);
+        const double flux = 0.5 * area_[v] * static_cast<double>(halves_[half].radiosity[v][c]) * loss[c];
         escaped_[c] += flux * lost.escaped();
         absorbed_[c] += flux * static_cast<double>(lost.absorbed);
-        from_sky_[c] += 0.5 * area_[v] * skyAt(half, c, v);
+        from_sky_[c] += 0.5 * area_[v] * skyAt(lost, c);
       }
     }
   }

@@ -93,8 +93,8 @@ bool LeafGather::refine(double goal, const BesideLight& beside) {
   };
   auto blocks = blockRays();
   lacks_memory_ = false;
-  Room taken{leastBytes(sights_.leafCount()) + sights_.bytes(), sights_.rayBytes(sizeof(Light))};
-  taken.bytes += (sights_.steps(0).size() + sights_.steps(1).size()) * sizeof(Light);
+  Room taken{leastBytes(sights_.leafCount()) + sights_.bytes(), sights_.rayBytes(sizeof(Shone))};
+  taken.bytes += (sights_.steps(0).size() + sights_.steps(1).size()) * sizeof(Shone);
   refineBlotches(beside, blocks, taken);
   double noise = rayNoise();
   std::priority_queue<Gain> queue;

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <numeric>
 
+#include "common/give_back.h"
 #include "common/parallel.h"
 
 namespace radiosity::solver {
@@ -67,15 +68,15 @@ class GainTable {
 /// Pairs on both sides first, whose mean is that of the leaf wherever light changes evenly, as it does towards a wall
 /// that stands at the edge of this one: means over one side made the outermost row of a ceiling 5 % too bright. At the
 /// ends of what is narrow that leaves little to average, so there others follow, as far as they lower the error.
-const std::array<LeafSmoother::Pass, 5> LeafSmoother::kPasses{Pass{1, false}, Pass{2, false}, Pass{4, false},
-                                                              Pass{1, true}, Pass{2, true}};
+const std::array<LeafSmoother::Pass, 5> LeafSmoother::kPasses{Pass{0, false}, Pass{1, false}, Pass{2, false},
+                                                              Pass{0, true}, Pass{1, true}};
 
-bool LeafSmoother::Pass::takesEnds(std::uint32_t size) const { return one_sided && size <= kNarrow && size > step; }
+bool LeafSmoother::Pass::takesEnds(std::uint32_t size) const { return one_sided && size <= kNarrow && size > step(); }
 
 /// False: there are none to average.
 bool LeafSmoother::isFor(const Pass& pass, const Side& side) {
   if (pass.one_sided) return pass.takesEnds(side.width) || pass.takesEnds(side.height);
-  return std::max(side.width, side.height) > 2 * pass.step;
+  return std::max(side.width, side.height) > 2 * pass.step();
 }
 
 LeafSmoother::LeafSmoother(const std::vector<Side>& sides, const std::vector<double>& area,
@@ -85,7 +86,7 @@ LeafSmoother::LeafSmoother(const std::vector<Side>& sides, const std::vector<dou
 }
 
 void LeafSmoother::findParted(std::size_t s, const std::function<bool(std::uint32_t)>& is_parted) {
-  constexpr std::uint32_t kReach = 4;  // of passes
+  constexpr std::uint32_t kReach = kSteps.back();
   const auto& side = sides_[s];
   std::vector<bool> beside;
   for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
@@ -98,31 +99,41 @@ void LeafSmoother::findParted(std::size_t s, const std::function<bool(std::uint3
         beside[ny * side.width + nx] = true;
   }
   for (std::uint32_t leaf = 0; leaf < beside.size(); ++leaf)
-    if (beside[leaf]) beside_[s].push_back(leaf);
+    if (beside[leaf]) beside_[s].push_back({leaf, {}});
+  for (auto& one : beside_[s])
+    for (std::size_t k = 0; k < kSteps.size(); ++k) one.open[k] = openWays(side, one.leaf, kSteps[k]);
+}
+
+/// Nothing stands between the leaf and where these bits say, nor on either.
+std::uint16_t LeafSmoother::openWays(const Side& side, std::uint32_t leaf, std::uint32_t step) const {
+  const std::int64_t x = leaf % side.width, y = leaf / side.width, apart = step;
+  const auto isOpen = [&](std::int64_t dx, std::int64_t dy) {
+    for (std::int64_t k = 0; k <= apart; ++k) {
+      const auto to_x = x + k * dx, to_y = y + k * dy;
+      if (to_x < 0 || to_y < 0 || to_x >= std::int64_t{side.width} || to_y >= std::int64_t{side.height}) return false;
+      const auto there = static_cast<std::uint32_t>(to_y) * side.width + static_cast<std::uint32_t>(to_x);
+      if (is_parted_[side.first_value + there]) return false;
+    }
+    return true;
+  };
+  std::uint32_t open = 0;
+  for (std::uint32_t way = 0; way < 9; ++way)
+    if (isOpen(std::int64_t{way % 3} - 1, std::int64_t{way / 3} - 1)) open |= 1U << way;
+  return static_cast<std::uint16_t>(open);
 }
 
 /// As average(), of one leaf and of those between which and it nothing stands.
-LeafSmoother::Light LeafSmoother::averageApart(const Side& side, std::uint32_t leaf, const Pass& pass,
+LeafSmoother::Light LeafSmoother::averageApart(const Side& side, const Beside& beside, const Pass& pass,
                                                std::span<const Light> from) const {
-  Light mean = from[leaf];
-  if (is_parted_[side.first_value + leaf]) return mean;
-  const std::int64_t x = leaf % side.width, y = leaf / side.width, apart = pass.step;
-  const auto at = [&](std::int64_t to_x, std::int64_t to_y) {
-    return static_cast<std::uint32_t>(to_y) * side.width + static_cast<std::uint32_t>(to_x);
-  };
-  const auto isWithin = [](std::int64_t k, std::uint32_t size) { return k >= 0 && k < std::int64_t{size}; };
-  const auto isOpen = [&](std::int64_t dx, std::int64_t dy) {
-    if (!isWithin(x + apart * dx, side.width) || !isWithin(y + apart * dy, side.height)) return false;
-    for (std::int64_t k = 1; k <= apart; ++k)
-      if (is_parted_[side.first_value + at(x + k * dx, y + k * dy)]) return false;
-    return true;
-  };
-  Light sum{};
+  Light mean = from[beside.leaf], sum{};
+  const auto open = beside.open[pass.step_index];
+  const auto isOpen = [&](std::size_t way) { return ((open >> way) & 1U) != 0; };
   double all = 0.0;
-  for (std::int64_t way = 0; way < 9; ++way) {
-    const std::int64_t dx = way % 3 - 1, dy = way / 3 - 1;
-    if (!isOpen(dx, dy) || (!pass.one_sided && !isOpen(-dx, -dy))) continue;
-    const auto there = at(x + apart * dx, y + apart * dy);
+  for (std::size_t way = 0; way < 9; ++way) {
+    if (!isOpen(way) || (!pass.one_sided && !isOpen(8 - way))) continue;
+    const std::ptrdiff_t dx = static_cast<std::ptrdiff_t>(way % 3) - 1, dy = static_cast<std::ptrdiff_t>(way / 3) - 1;
+    const std::ptrdiff_t apart = pass.step(), width = side.width;
+    const auto there = static_cast<std::size_t>(std::ptrdiff_t{beside.leaf} + apart * (dy * width + dx));
     const double weight = (dx == 0 ? 2.0 : 1.0) * (dy == 0 ? 2.0 : 1.0) * area_[side.first_value + there];
     for (std::size_t c = 0; c < 3; ++c) sum[c] += weight * from[there][c];
     all += weight;
@@ -134,7 +145,7 @@ LeafSmoother::Light LeafSmoother::averageApart(const Side& side, std::uint32_t l
 /// Binomial, of the leaves there are.
 void LeafSmoother::average(const Side& side, const Pass& pass, std::span<const Light> from,
                            std::span<Light> means) const {
-  const auto step = pass.step;
+  const auto step = pass.step();
   const auto near = [&](std::uint32_t at, std::uint32_t size, auto take) {
     take(at, 2.0);
     const bool below = at >= step, above = at + step < size;
@@ -161,8 +172,8 @@ void LeafSmoother::average(const Side& side, const Pass& pass, std::span<const L
       for (std::size_t c = 0; c < 3 && all > 0.0; ++c) mean[c] = sum[c] / all;
     }
   }
-  for (const auto leaf : beside_[static_cast<std::size_t>(&side - sides_.data())])
-    means[leaf] = averageApart(side, leaf, pass, from);
+  for (const auto& beside : beside_[static_cast<std::size_t>(&side - sides_.data())])
+    means[beside.leaf] = averageApart(side, beside, pass, from);
 }
 
 void LeafSmoother::smooth(std::array<std::vector<Light>, 2>& halves) {
@@ -181,6 +192,12 @@ void LeafSmoother::smooth(std::array<std::vector<Light>, 2>& halves) {
     }
   });
   bias_ = std::max(0.0, std::reduce(taken_.begin(), taken_.end())) + std::reduce(by_chance_.begin(), by_chance_.end());
+}
+
+void LeafSmoother::forget() {
+  giveBack(towards_);
+  giveBack(taken_);
+  giveBack(by_chance_);
 }
 
 /// What was taken of one leaf is a product of two uncertain numbers; of many around it the mean tells.

@@ -35,29 +35,40 @@ class LeafSmoother {
   [[nodiscard]] double bias() const { return bias_; }
   /// The same by leaf value, not times area, shared out over leaves that are near: together bias(). O(leaves).
   [[nodiscard]] std::vector<float> biasOfLeaves() const;
+  /// How it smoothed, until it does again, and with it what all but smooth() needs.
+  void forget();
 
  private:
   void smoothSide(const Side& side, std::size_t pass, const std::array<std::vector<Light>, 2>& raw,
                   std::array<std::vector<Light>, 2>& halves);
+  /// So far apart are leaves that passes average.
+  static constexpr std::array<std::uint32_t, 3> kSteps{1, 2, 4};
   /// Which leaves are averaged: so far apart, and whether one may count whose mirror image there is not.
   struct Pass {
-    std::uint32_t step;
+    std::size_t step_index;  ///< into kSteps
     bool one_sided;
+    [[nodiscard]] std::uint32_t step() const { return kSteps[step_index]; }
     /// Whether it does anything along an edge of so many leaves, at its ends.
     [[nodiscard]] bool takesEnds(std::uint32_t size) const;
   };
   static const std::array<Pass, 5> kPasses;
   [[nodiscard]] static bool isFor(const Pass& pass, const Side& side);
   void average(const Side& side, const Pass& pass, std::span<const Light> from, std::span<Light> means) const;
-  [[nodiscard]] Light averageApart(const Side& side, std::uint32_t leaf, const Pass& pass,
+  /// A leaf of a side, and by step which of the nine around it, as bits, it may be averaged with.
+  struct Beside {
+    std::uint32_t leaf;
+    std::array<std::uint16_t, kSteps.size()> open;
+  };
+  [[nodiscard]] Light averageApart(const Side& side, const Beside& beside, const Pass& pass,
                                    std::span<const Light> from) const;
   void findParted(std::size_t s, const std::function<bool(std::uint32_t)>& is_parted);
+  [[nodiscard]] std::uint16_t openWays(const Side& side, std::uint32_t leaf, std::uint32_t step) const;
 
   const std::vector<Side>& sides_;
   const std::vector<double>& area_;
   std::vector<bool> is_parted_;  ///< by leaf value: nothing is taken of it, nor across it
   /// By side: leaves so near to such leaves that some means may not be taken.
-  std::vector<std::vector<std::uint32_t>> beside_;
+  std::vector<std::vector<Beside>> beside_;
   std::vector<std::vector<float>> towards_;  ///< by pass and leaf value: part of the way to the mean
   std::vector<double> taken_, by_chance_;    ///< by leaf value, times area: see bias(); the former signed
   double bias_ = 0.0;

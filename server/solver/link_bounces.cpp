@@ -118,7 +118,7 @@ void LinkSystem::beginHalf(std::size_t h) {
   half.shining = {};
   half.area = 0.0;
   std::vector<double> area(count, 0.0);
-  Gmres::Vectors start;
+  Gmres<double>::Vectors start;
   for (auto& channel : start) channel.resize(count);
   for (std::size_t n = 0; n < count; ++n) {
     const Shooter& shooter = shooters_[n];
@@ -148,7 +148,7 @@ void LinkSystem::beginHalf(std::size_t h) {
 /// little light is missing, which the balance of energy shows.
 void LinkSystem::advanceHalf(std::size_t h) {
   Half& half = halves_[h];
-  const bool solved = half.gmres.advance([&](Gmres::Vectors& x, bool affine) { sweep(h, x, affine); });
+  const bool solved = half.gmres.advance([&](Gmres<double>::Vectors& x, bool affine) { sweep(h, x, affine); });
   ++half.sweeps;
   if (!solved) return;
   if (isPhysical(half)) {
@@ -210,7 +210,7 @@ void LinkSystem::take(std::size_t h) {
 double LinkSystem::unsolved() const { return std::max(halves_[0].unsolved, halves_[1].unsolved); }
 
 /// Of Gauss and Seidel. Where not `affine` nothing shines, and there is 0 where lights would be.
-void LinkSystem::sweep(std::size_t h, Gmres::Vectors& x, bool affine) {
+void LinkSystem::sweep(std::size_t h, Gmres<double>::Vectors& x, bool affine) {
   Half& half = halves_[h];
   const std::size_t count = shooters_.size();
   for (std::size_t c = 0; c < 3; ++c) {

@@ -142,8 +142,8 @@ class LinkSystem {
   };
   struct Half {
     std::vector<std::vector<float>> matrix;  ///< by row: entries by column
-    Gmres gmres;
-    Gmres::Vectors sent, mean;  ///< of the sweep under way; weights included
+    Gmres<double> gmres;
+    Gmres<double>::Vectors sent, mean;  ///< of the sweep under way; weights included
     std::array<double, 3> shining{};
     double area = 0.0;
     int attempt = 0, sweeps = 0;
@@ -166,7 +166,7 @@ class LinkSystem {
   void shareAmongChildren(std::size_t half);
   void beginHalf(std::size_t half);
   void advanceHalf(std::size_t half);
-  void sweep(std::size_t half, Gmres::Vectors& sent, bool affine);
+  void sweep(std::size_t half, Gmres<double>::Vectors& sent, bool affine);
   [[nodiscard]] bool isPhysical(const Half& half) const;
   void take(std::size_t half);
   void lowerWeights(std::size_t half, double most);

@@ -82,7 +82,7 @@ TEST(LitScene, ShadowsMoveBeforeReflectedLightIsKnown) {
   engine::SolveSettings settings;
   settings.target_error = 0.03;
   settings.texels = 600;
-  settings.link_memory_bytes = 1'500'000;  // too little for rays, which would be done with everything at once
+  settings.link_memory_bytes = 1'000'000;  // too little for rays, which would be done with everything at once
   RayTransport transport(400);
   const auto former = valueOf(LitScene::make(roomDocument(), settings, transport));
   auto& before = *former;
