@@ -41,9 +41,10 @@ __attribute__((always_inline)) inline void add(Shone& sum, const Shone& light) {
 /// Means over the rays of all leaves.
 RADIOSITY_CLONES void averageSeen(const LeafSights& sights, std::size_t half, const Shone* radiosity, Shone* mean) {
   const auto counts = sights.counts();
-  for (std::uint32_t value = 0; value < sights.leafCount(); ++value) {
+  std::size_t first = 0;
+  for (std::uint32_t value = 0; value < sights.leafCount(); first += counts[value++]) {
     Shone sum{};
-    for (const auto end : sights.seen(half, value)) add(sum, radiosity[end]);
+    for (const auto end : sights.ends(half, first, counts[value])) add(sum, radiosity[end]);
     const float part = counts[value] > 0 ? 1.0F / static_cast<float>(counts[value]) : 0.0F;
     for (auto& channel : sum) channel *= part;
     mean[value] = sum;
@@ -83,7 +84,8 @@ std::size_t LeafGather::leastBytes(std::size_t leaves) {
 
 void LeafGather::inherit(const LeafGather& former, std::span<const std::uint32_t> value_before, const Shadows& change) {
   const std::size_t leaves = std::max(1U, sights_.leafCount()), least = leastBytes(leaves);
-  const std::size_t rays = most_bytes_ > least ? (most_bytes_ - least) / (leaves * LeafSights::kRayBytes) : 0;
+  const std::size_t of_ray = former.sights_.rayBytes(sizeof(Shone));
+  const std::size_t rays = most_bytes_ > least ? (most_bytes_ - least) / (leaves * of_ray) : 0;
   const auto most = std::clamp<std::size_t>(rays, kFirstRays, LeafSights::kMostRays);
   sights_.inherit(former.sights_, value_before, change, static_cast<std::uint16_t>(most));
 }
@@ -258,11 +260,13 @@ void LeafGather::weighRays() {
   has_parted_ = false;
   for (std::uint32_t v = 0; v < sights_.leafCount() && !has_parted_; ++v)
     has_parted_ = area_[v] > 0.0 && sights_.isParted(v);
+  std::size_t first = 0;
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
-    for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
+    for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count;
+         first += sights_.counts()[v++]) {
       for (std::size_t half = 0; half < 2; ++half) {
         LostRays lost;
-        for (const auto end : sights_.seen(half, v)) {
+        for (const auto end : sights_.ends(half, first, sights_.counts()[v])) {
           if (end == sights_.skyAbove()) ++lost.above;
           if (end == sights_.skyBelow()) ++lost.below;
           if (sights_.isAbsorbed(end)) ++lost.absorbed;
@@ -426,7 +430,7 @@ bool LeafGather::restore(ArchiveReader& from) {
   std::size_t all = 0;
   for (const auto count : counts) all += count;
   if (!from.ok() || counts.size() != sights_.leafCount() || !std::ranges::all_of(counts, fits) ||
-      all * LeafSights::kRayBytes > most_bytes_ || (!partly_inside.empty() && partly_inside.size() != counts.size()) ||
+      all * sights_.rayBytes(0) > most_bytes_ || (!partly_inside.empty() && partly_inside.size() != counts.size()) ||
       (!block_noise_.empty() && block_noise_.size() != (counts.size() + kBlock - 1) / kBlock) ||
       block_light_.size() != block_noise_.size() || side_noise_.size() != side_light_.size() ||
       (!block_noise_.empty() && side_noise_.size() != sides_.size()) ||

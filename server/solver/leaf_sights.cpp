@@ -5,6 +5,7 @@
 #include <chrono>
 #include <glm/geometric.hpp>
 
+#include "common/give_back.h"
 #include "common/parallel.h"
 #include "server/solver/halves.h"
 
@@ -49,9 +50,31 @@ LeafSights::LeafSights(const scene::PatchScene& patches, const std::vector<Side>
       seed_(mixKeys(seed, 0x53494748ULL)) {
   for (const auto& side : sides) leaf_count_ = std::max(leaf_count_, side.first_value + side.leaf_count);
   count_.assign(leaf_count_, 0);
-  before_ = count_;
-  first_.assign(leaf_count_, 0);
+  first_.assign((leaf_count_ + kLeavesAFirst - 1) / kLeavesAFirst, 0);
   cursor_ = leaf_count_;
+}
+
+PackedNumbers LeafSights::roomFor(std::size_t rays, std::size_t steps) const {
+  return {rays, endCount() + static_cast<std::uint32_t>(steps)};  // one more than there can be
+}
+
+/// So that so many steps have numbers.
+void LeafSights::widen(std::size_t half, std::size_t steps) {
+  if (endCount() + steps <= seen_[half].most()) return;
+  auto room = roomFor(seen_[half].size(), steps);
+  std::size_t ray = 0;
+  for (const auto end : seen_[half].all()) {
+    if (end != seen_[half].most()) room.set(ray, end);
+    ++ray;
+  }
+  seen_[half] = std::move(room);
+}
+
+std::uint32_t LeafSights::untracedOf(std::size_t half, std::uint32_t value) const {
+  const auto first = firstOf(value);
+  std::uint32_t rays = 0;
+  for (std::uint32_t k = 0; k < count_[value]; ++k) rays += endAt(half, first + k) == kUntraced ? 1 : 0;
+  return rays;
 }
 
 void LeafSights::ask(std::span<const std::uint16_t> counts) {
@@ -64,23 +87,26 @@ void LeafSights::ask(std::span<const std::uint16_t> counts) {
 /// nothing is lost should memory run out.
 void LeafSights::layOut(std::span<const std::uint16_t> counts) {
   std::vector<std::uint16_t> count(leaf_count_, 0);
-  std::vector<std::size_t> first(leaf_count_, 0);
+  std::vector<std::size_t> first(first_.size(), 0);
   std::size_t all = 0;
   for (std::uint32_t value = 0; value < leaf_count_; ++value) {
-    first[value] = all;
+    if (value % kLeavesAFirst == 0) first[value / kLeavesAFirst] = all;
     if (rays_->areaOf(value) > 0.0) count[value] = counts[value];
     all += count[value];
   }
-  std::array<std::vector<std::uint32_t>, 2> seen;
+  std::array<PackedNumbers, 2> seen;
   std::array<std::vector<Step>, 2> steps;
   for (std::size_t half = 0; half < 2; ++half) {
-    seen[half].assign(all, kUntraced);
+    seen[half] = roomFor(all, steps_[half].size());
+    std::size_t old_first = 0, new_first = 0;
     for (std::uint32_t value = 0; value < leaf_count_; ++value) {
-      const auto known = std::min(count_[value], count[value]);
-      for (std::size_t k = 0; k < known; ++k) {
-        const auto end = seen_[half][first_[value] + k];
-        seen[half][first[value] + k] = end == kUntraced ? end : withSteps(end, half, steps[half]);
+      auto ray = new_first;
+      for (const auto end : ends(half, old_first, std::min(count_[value], count[value]))) {
+        if (end != seen_[half].most()) seen[half].set(ray, withSteps(end, half, steps[half]));
+        ++ray;
       }
+      old_first += count_[value];
+      new_first += count[value];
     }
   }
   count_ = std::move(count);
@@ -102,6 +128,7 @@ void LeafSights::expectPartlyInside(std::vector<bool> leaves) { partly_inside_ =
 void LeafSights::giveUp() {
   if (isTraced()) return;
   auto counts = count_;
+  before_.resize(leaf_count_);
   for (auto value = cursor_; value < leaf_count_; ++value)
     if (before_[value] > 0) counts[value] = before_[value];
   layOut(counts);
@@ -146,18 +173,21 @@ bool LeafSights::isDoubtful(std::size_t half, std::uint32_t end) const {
 }
 
 std::uint32_t LeafSights::traceLeaf(std::uint32_t value, const Side& side, std::size_t half, NewSteps& made) {
-  const auto seen = std::span(seen_[half]).subspan(first_[value], count_[value]);
-  const auto wanted = static_cast<std::uint32_t>(std::ranges::count(seen, kUntraced));
+  const auto wanted = untracedOf(half, value);
   if (wanted == 0) return 0;
   const auto draw = draws(value, side, half);
   const auto chance = mixKeys(keyOf(value, side, half), 1);
-  for (std::uint32_t k = 0; k < seen.size(); ++k) {
-    if (seen[k] != kUntraced) continue;
+  const auto first = firstOf(value);
+  for (std::uint32_t k = 0; k < count_[value]; ++k) {
+    if (endAt(half, first + k) != kUntraced) continue;
     const auto at = draw(k);
     const auto place = rays_->placeOn(value, {at.z, at.w});
     const auto end = endOfRay(place, cosineDirection(place.normal, at.x, at.y), mixKeys(chance, k), made.steps);
-    if (end >= endCount()) made.rays.push_back(first_[value] + k);
-    seen[k] = end;
+    if (end < endCount()) {
+      seen_[half].set(first + k, end);
+    } else {
+      made.rays.push_back({first + k, end});
+    }
   }
   return wanted;
 }
@@ -167,13 +197,14 @@ void LeafSights::takeSteps(std::span<const std::array<NewSteps, 2>> made) {
   for (std::size_t half = 0; half < 2; ++half) {  // all room first
     std::size_t more = 0;
     for (const auto& halves : made) more += halves[half].steps.size();
+    widen(half, steps_[half].size() + more);
     if (steps_[half].size() + more > steps_[half].capacity())
       steps_[half].reserve(std::max(steps_[half].size() + more, 2 * steps_[half].capacity()));
   }
   for (const auto& halves : made) {
     for (std::size_t half = 0; half < 2; ++half) {
       const auto before = static_cast<std::uint32_t>(steps_[half].size());
-      for (const auto ray : halves[half].rays) seen_[half][ray] += before;
+      for (const auto& [ray, end] : halves[half].rays) seen_[half].set(ray, end + before);
       for (const auto& step : halves[half].steps)
         steps_[half].push_back({step.by, step.next < endCount() ? step.next : step.next + before});
     }
@@ -185,12 +216,21 @@ void LeafSights::takeSteps(std::span<const std::array<NewSteps, 2>> made) {
 std::uint32_t LeafSights::beginSlice() {
   const auto steps = steps_[0].size() + steps_[1].size();
   const auto taken = bytes() + steps * step_bytes_;
-  const auto room = taken < most_bytes_ ? (most_bytes_ - taken) / (sizeof(Step) + step_bytes_) : 0;
+  const auto roomBeside = [&](std::size_t bytes) {
+    return bytes < most_bytes_ ? (most_bytes_ - bytes) / (sizeof(Step) + step_bytes_) : 0;
+  };
+  // With so many steps ends may need wider numbers.
+  const auto most_steps = static_cast<std::uint32_t>(std::min(kMostNumbers, steps + roomBeside(taken)));
+  std::size_t wider = 0;
+  for (const auto& half : seen_) {
+    const auto needed = PackedNumbers::widthFor(endCount() + most_steps);
+    wider += half.size() * (std::max(needed, half.width()) - half.width());
+  }
+  const auto room = roomBeside(taken + wider);
   const auto most = std::min(room, kMostNumbers - std::min(kMostNumbers, steps)) / kMostSteps;
   auto end = cursor_;
   for (std::size_t rays = 0; end < std::min(leaf_count_, cursor_ + kLeavesASlice); ++end) {
-    for (std::size_t half = 0; half < 2; ++half)
-      rays += static_cast<std::size_t>(std::ranges::count(seen(half, end), kUntraced));
+    for (std::size_t half = 0; half < 2; ++half) rays += untracedOf(half, end);
     if (rays > most) break;
   }
   goes_on_ = end > cursor_;
@@ -204,27 +244,19 @@ void LeafSights::traceSlice(std::uint32_t end) {
   std::vector<std::array<NewSteps, 2>> made(parts);
   std::atomic<std::uint32_t> next{0};
   std::atomic<std::uint64_t> traced{0};
-  try {
-    inShares(parts, [&](std::size_t, std::size_t) {
-      for (auto part = next++; part < parts; part = next++) {
-        const auto from = cursor_ + part * kLeavesAtOnce;
-        std::uint64_t rays = 0;
-        for (auto value = from; value < std::min(end, from + kLeavesAtOnce); ++value) {
-          if (count_[value] == 0) continue;
-          const Side& side = rays_->sideOf(value);
-          for (std::size_t half = 0; half < 2; ++half) rays += traceLeaf(value, side, half, made[part][half]);
-        }
-        traced += rays;
+  inShares(parts, [&](std::size_t, std::size_t) {
+    for (auto part = next++; part < parts; part = next++) {
+      const auto from = cursor_ + part * kLeavesAtOnce;
+      std::uint64_t rays = 0;
+      for (auto value = from; value < std::min(end, from + kLeavesAtOnce); ++value) {
+        if (count_[value] == 0) continue;
+        const Side& side = rays_->sideOf(value);
+        for (std::size_t half = 0; half < 2; ++half) rays += traceLeaf(value, side, half, made[part][half]);
       }
-    });
-    takeSteps(made);
-  } catch (...) {
-    for (const auto& halves : made) {
-      for (std::size_t half = 0; half < 2; ++half)
-        for (const auto ray : halves[half].rays) seen_[half][ray] = kUntraced;
+      traced += rays;
     }
-    throw;
-  }
+  });
+  takeSteps(made);
   traced_ += traced;
   cursor_ = end;
 }
@@ -232,11 +264,11 @@ void LeafSights::traceSlice(std::uint32_t end) {
 /// By the first rays of all.
 std::vector<bool> LeafSights::findPartlyInside() const {
   std::vector<bool> found;
-  for (std::uint32_t value = 0; value < leaf_count_; ++value) {
+  std::size_t first = 0;
+  for (std::uint32_t value = 0; value < leaf_count_; first += count_[value++]) {
     const auto looks = std::min<std::size_t>(count_[value], kLooks);
     std::ptrdiff_t inside = 0;
-    for (std::size_t half = 0; half < 2; ++half)
-      inside += std::ranges::count(seen(half, value).first(looks), absorbedAtOnce());
+    for (const auto& half : seen_) inside += std::ranges::count(half.run(first, looks), absorbedAtOnce());
     if (inside == 0 || inside == static_cast<std::ptrdiff_t>(2 * looks)) continue;
     found.resize(leaf_count_);
     found[value] = true;
@@ -254,12 +286,12 @@ void LeafSights::takePartlyInside() {
   };
   const auto differs = [&](std::uint32_t value) { return is(found, value) != is(partly_inside_, value); };
   for (std::size_t half = 0; half < 2; ++half) {
-    for (auto& end : seen_[half]) {
-      auto last = end;
+    for (std::size_t ray = 0; ray < seen_[half].size(); ++ray) {
+      auto last = endAt(half, ray);
       bool differed = false;
       for (; last >= endCount() && last != kUntraced; last = steps_[half][last - endCount()].next)
         differed = differed || differs(steps_[half][last - endCount()].by);
-      if (differed || differs(last)) end = kUntraced;
+      if (differed || differs(last)) seen_[half].set(ray, seen_[half].most());
     }
   }
   partly_inside_ = std::move(found);
@@ -277,6 +309,7 @@ bool LeafSights::trace(double seconds) {
   }
   if (!isTraced()) return false;
   for (auto& half : steps_) half.shrink_to_fit();  // they grew by doubling
+  giveBack(before_);
   return true;
 }
 
@@ -364,20 +397,22 @@ void LeafSights::inherit(const LeafSights& former, std::span<const std::uint32_t
     if (seen != value && seen < leaf_count_) stands_in[seen] = true;
   }
   inBothHalves([&](std::size_t half) {
-    for (std::uint32_t value = 0; value < leaf_count_; ++value) {
+    widen(half, former.steps_[half].size());
+    std::size_t first_ray = 0;
+    for (std::uint32_t value = 0; value < leaf_count_; first_ray += count_[value++]) {
       const auto before = value_before[value];
       if (count_[value] == 0 || before == scene::kNone || former.count_[before] == 0) continue;
       const auto draw = draws(value, rays_->sideOf(value), half);
-      const auto old =
-          std::span(former.seen_[half]).subspan(former.first_[before], std::min(former.count_[before], count_[value]));
+      const auto old = former.ends(half, former.firstOf(before), std::min(former.count_[before], count_[value]));
       for (std::uint32_t k = 0; k < old.size(); ++k) {
-        if (old[k] == kUntraced) continue;
+        if (old[k] == former.seen_[half].most()) continue;
         const bool goes_on = old[k] >= former.endCount();
         const auto first = value_after[goes_on ? former.steps_[half][old[k] - former.endCount()].by : old[k]];
         if (first == kUntraced) continue;  // it saw what is gone, or moved
         const bool may_pass = first >= leaf_count_ || stands_in[first] || change.isPassed(value, first);
         if (may_pass && isPassed(change, value, draw(k))) continue;
-        seen_[half][first_[value] + k] = goes_on ? inheritStep(former, half, old[k], value_after, change) : first;
+        const auto end = goes_on ? inheritStep(former, half, old[k], value_after, change) : first;
+        if (end != kUntraced) seen_[half].set(first_ray + k, end);
       }
     }
   });
@@ -385,24 +420,25 @@ void LeafSights::inherit(const LeafSights& former, std::span<const std::uint32_t
   kept_ = former.kept_;
   traced_ = former.traced_;
   for (const auto& half : seen_)
-    kept_ += static_cast<std::uint64_t>(std::ranges::count_if(half, [](auto end) { return end != kUntraced; }));
+    kept_ += half.size() - static_cast<std::uint64_t>(std::ranges::count(half.all(), half.most()));
 }
 
 std::uint64_t LeafSights::untraced() const {
   if (isTraced()) return 0;
   std::uint64_t rays = 0;
-  for (const auto& half : seen_) rays += static_cast<std::uint64_t>(std::ranges::count(half, kUntraced));
+  for (const auto& half : seen_) rays += static_cast<std::uint64_t>(std::ranges::count(half.all(), half.most()));
   return rays;
 }
 
 std::size_t LeafSights::bytes() const {
-  return (seen_[0].size() + seen_[1].size()) * sizeof(std::uint32_t) + first_.size() * sizeof(std::size_t) +
+  return seen_[0].bytes() + seen_[1].bytes() + first_.size() * sizeof(std::size_t) +
          (steps_[0].size() + steps_[1].size()) * sizeof(Step);
 }
 
 std::size_t LeafSights::rayBytes(std::size_t step_bytes) const {
   const auto rays = std::max<std::size_t>(1, seen_[0].size()), steps = steps_[0].size() + steps_[1].size();
-  return kRayBytes + (steps * (sizeof(Step) + step_bytes) + rays - 1) / rays;
+  const auto width = std::max({seen_[0].width(), seen_[1].width(), PackedNumbers::widthFor(endCount())});
+  return 2 * width + (steps * (sizeof(Step) + step_bytes) + rays - 1) / rays;
 }
 
 }  // namespace radiosity::solver

@@ -14,6 +14,7 @@
 #include <span>
 #include <vector>
 
+#include "common/packed_numbers.h"
 #include "server/solver/leaf_rays.h"
 #include "server/solver/sampling.h"
 #include "server/solver/shadows.h"
@@ -79,8 +80,12 @@ class LeafSights {
   bool trace(double seconds);
 
   /// After isTraced(): what is seen from a leaf.
-  [[nodiscard]] std::span<const std::uint32_t> seen(std::size_t half, std::uint32_t value) const {
-    return {seen_[half].data() + first_[value], count_[value]};
+  [[nodiscard]] PackedNumbers::Run seen(std::size_t half, std::uint32_t value) const {
+    return ends(half, firstOf(value), count_[value]);
+  }
+  /// The same by rays of all leaves, in their order.
+  [[nodiscard]] PackedNumbers::Run ends(std::size_t half, std::size_t first, std::size_t count) const {
+    return seen_[half].run(first, count);
   }
 
   /// After an edit of geometry, at first: rays of the scene before that pass nothing that changed see what they saw.
@@ -90,9 +95,10 @@ class LeafSights {
                std::uint16_t most);
 
   [[nodiscard]] std::size_t bytes() const;
-  /// Bytes of a ray asked for, one of each half, but for its steps.
+  /// Bytes of a ray asked for, one of each half, but for its steps, in a scene of any size.
   static constexpr std::size_t kRayBytes = 2 * sizeof(std::uint32_t);
-  /// The same with as many steps as those there are have; `step_bytes`: whoever follows them takes for each.
+  /// The same of this scene, with as many steps as those there are have; `step_bytes`: whoever follows them takes for
+  /// each.
   [[nodiscard]] std::size_t rayBytes(std::size_t step_bytes) const;
   /// Rays traced so far, of both halves; those inherited count apart.
   [[nodiscard]] std::uint64_t traced() const { return traced_; }
@@ -100,13 +106,33 @@ class LeafSights {
 
  private:
   static constexpr std::uint32_t kUntraced = scene::kNone;
+  /// Leaves of which it is known together where their rays begin.
+  static constexpr std::uint32_t kLeavesAFirst = 16;
+  [[nodiscard]] std::size_t firstOf(std::uint32_t value) const {
+    std::size_t first = first_[value / kLeavesAFirst];
+    for (auto before = value / kLeavesAFirst * kLeavesAFirst; before < value; ++before) first += count_[before];
+    return first;
+  }
+  /// Where a ray ends, or kUntraced.
+  [[nodiscard]] std::uint32_t endAt(std::size_t half, std::size_t ray) const {
+    const auto end = seen_[half][ray];
+    return end == seen_[half].most() ? kUntraced : end;
+  }
+  [[nodiscard]] std::uint32_t untracedOf(std::size_t half, std::uint32_t value) const;
+  /// For rays, of which none is traced, that may end anywhere, or go on over so many steps.
+  [[nodiscard]] PackedNumbers roomFor(std::size_t rays, std::size_t steps) const;
+  void widen(std::size_t half, std::size_t steps);
   /// On an unlit side; within the width of the leaf that the ray comes from.
   [[nodiscard]] std::uint32_t absorbed() const { return leaf_count_; }
   [[nodiscard]] std::uint32_t absorbedAtOnce() const { return leaf_count_ + 1; }
-  /// Steps, numbered from 0, and which rays have them.
+  /// Steps, numbered from 0, and the rays that have them.
   struct NewSteps {
+    struct Ray {
+      std::size_t ray;    ///< into seen_
+      std::uint32_t end;  ///< by these numbers
+    };
     std::vector<Step> steps;
-    std::vector<std::size_t> rays;  ///< into seen_
+    std::vector<Ray> rays;
   };
   void layOut(std::span<const std::uint16_t> counts);
   /// Returns how many rays.
@@ -136,8 +162,8 @@ class LeafSights {
   std::uint32_t leaf_count_ = 0;
   std::uint32_t cursor_ = 0;                   ///< leaves below are traced
   std::vector<std::uint16_t> count_, before_;  ///< by leaf value; before what was asked for last
-  std::vector<std::size_t> first_;             ///< by leaf value: into seen_
-  std::array<std::vector<std::uint32_t>, 2> seen_;
+  std::vector<std::size_t> first_;             ///< by kLeavesAFirst leaf values: into seen_
+  std::array<PackedNumbers, 2> seen_;          ///< the largest that fits: not traced
   std::array<std::vector<Step>, 2> steps_;
   std::vector<bool> partly_inside_;  ///< by leaf value; empty: none is
   std::size_t most_bytes_ = SIZE_MAX, step_bytes_ = 0;
