@@ -29,7 +29,7 @@ class Receivers {
   struct Receiver {
     std::uint32_t node, triangle;
     glm::vec2 texel;           ///< corner of the leaf when full, else the point itself
-    std::uint32_t first_spot;  ///< its places (PatchScene::spots), or kNone
+    std::uint32_t first_spot;  ///< its places (LeafPoint)
     bool full;
 
     [[nodiscard]] bool hasSpots() const { return first_spot != scene::kNone; }
@@ -95,11 +95,13 @@ class Receivers {
   }
   /// One of its places, spot < kLeafSpots; of a receiver that has them.
   [[nodiscard]] Place spot(const Receiver& receiver, std::uint32_t spot) const {
+    if (receiver.full) return placeOf({receiver.texel + scene::kSpotsOfFull[spot], receiver.triangle});
     return placeOf(patches_->spots[receiver.first_spot + spot]);
   }
   /// Has a row of its spots, if there are any, brought nearer.
   void fetchSpots(const Receiver& receiver, std::uint32_t row) const {
-    if (receiver.hasSpots()) __builtin_prefetch(&patches_->spots[receiver.first_spot + row * scene::kSpotQuarters]);
+    if (receiver.hasSpots() && !receiver.full)
+      __builtin_prefetch(&patches_->spots[receiver.first_spot + row * scene::kSpotQuarters]);
   }
   [[nodiscard]] glm::vec3 point(const Receiver& receiver, const glm::vec2& at) const {
     return place(receiver, at).point;

@@ -35,17 +35,34 @@ void orderByPlace(std::span<LeafSpot> places, int axis) {
   orderByPlace(places.subspan(half), 1 - axis);
 }
 
+/// At even steps, so that what is a tenth of the leaf has a tenth of the spots, to one of them.
+std::array<LeafSpot, kLeafSpots> chooseSpots(std::span<LeafSpot> places) {
+  orderByPlace(places, 0);
+  std::array<LeafSpot, kLeafSpots> spots;
+  for (std::size_t k = 0; k < kLeafSpots; ++k) {
+    const std::size_t place = k % kSpotQuarters * std::size_t{kSpotRows} + k / kSpotQuarters;
+    spots[k] = places[(2 * place + 1) * places.size() / (2 * std::size_t{kLeafSpots})];
+  }
+  return spots;
+}
+
+std::array<glm::vec2, kLeafSpots> spotsOfFull() {
+  std::array<LeafSpot, kLeafSpots> places;
+  for (std::uint32_t i = 0; i < kLeafSpots; ++i) places[i].texel = glm::vec2(latticePoint(i, kLeafSpots));
+  std::array<glm::vec2, kLeafSpots> spots;
+  std::ranges::transform(chooseSpots(places), spots.begin(), &LeafSpot::texel);
+  return spots;
+}
+
 }  // namespace
+
+const std::array<glm::vec2, kLeafSpots> kSpotsOfFull = spotsOfFull();
 
 void keepSpots(PatchScene& patches, LeafPoint& leaf, std::span<LeafSpot> places) {
   if (places.size() < 2) return;
   leaf.first_spot = static_cast<std::uint32_t>(patches.spots.size());
-  orderByPlace(places, 0);
-  // At even steps, so that what is a tenth of the leaf has a tenth of the spots, to one of them.
-  for (std::size_t k = 0; k < kLeafSpots; ++k) {
-    const std::size_t place = k % kSpotQuarters * std::size_t{kSpotRows} + k / kSpotQuarters;
-    patches.spots.push_back(places[(2 * place + 1) * places.size() / (2 * std::size_t{kLeafSpots})]);
-  }
+  const auto chosen = chooseSpots(places);
+  patches.spots.insert(patches.spots.end(), chosen.begin(), chosen.end());
 }
 
 namespace {
@@ -187,10 +204,7 @@ class Gaps {
     const auto at = found.at;
     auto& leaf = patches_.leaves[surface.first_leaf + at.y * surface.width + at.x];
     if (!leaf.full || leaf.first_spot != kNone) return;
-    std::array<LeafSpot, kLeafSpots> places;
-    for (std::uint32_t i = 0; i < kLeafSpots; ++i)
-      places[i] = {glm::vec2(glm::dvec2(at) + latticePoint(i, kLeafSpots)), leaf.triangle};
-    keepSpots(patches_, leaf, places);
+    leaf.first_spot = kFullSpots;
     leaf.cut = found.cut;
   }
 

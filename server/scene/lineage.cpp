@@ -114,7 +114,7 @@ class Matcher {
     if (!old_one.full && old_one.texel != new_one.texel) return false;
     if ((old_one.first_spot == kNone) != (new_one.first_spot == kNone)) return false;
     for (std::uint32_t k = 0; old_one.first_spot != kNone && k < kLeafSpots; ++k) {
-      const auto &s = before_.spots[old_one.first_spot + k], &t = after_.spots[new_one.first_spot + k];
+      const auto s = before_.spot(old_one, k), t = after_.spot(new_one, k);
       if (s.texel != t.texel || !sameTriangle(s.triangle, t.triangle)) return false;
     }
     for (std::size_t side = 0; side < 2; ++side) {

@@ -9,6 +9,7 @@
 
 #include <array>
 #include <cstdint>
+#include <glm/common.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <string>
@@ -47,6 +48,10 @@ inline constexpr std::uint32_t kLeafSpots = 64;
 /// together.
 inline constexpr std::uint32_t kSpotQuarters = 4;
 inline constexpr std::uint32_t kSpotRows = kLeafSpots / kSpotQuarters;
+/// Of full leaves, within the leaf: all have the same, so that none is kept of any.
+extern const std::array<glm::vec2, kLeafSpots> kSpotsOfFull;
+/// LeafPoint::first_spot of those.
+inline constexpr std::uint32_t kFullSpots = kNone - 1;
 
 /// Where a leaf is: a point (texel coordinates) on the part of the leaf that is covered and not buried inside another
 /// solid, and the triangle that holds it. `full`: wholly covered by coplanar triangles and wholly unburied, so any
@@ -56,7 +61,7 @@ struct LeafPoint {
   std::uint32_t triangle = kNone;  ///< kNone: the leaf is empty
   bool full = false;
   bool cut = false;                  ///< something passes through the leaf, or right before it
-  std::uint32_t first_spot = kNone;  ///< into PatchScene::spots; kNone: any point stands for all
+  std::uint32_t first_spot = kNone;  ///< into PatchScene::spots, or kFullSpots; kNone: any point stands for all
   bool beneath = false;              ///< another surface lies in its plane and covers some of it
 };
 
@@ -93,8 +98,8 @@ struct PatchScene {
   std::vector<std::uint32_t> triangle_source;  ///< by triangle: which one of its instance's primitive it was
   std::vector<Surface> surfaces;
   std::vector<LeafPoint> leaves;
-  /// kLeafSpots of each leaf that is neither empty nor full, and of full ones in narrow gaps or right beside what
-  /// hovers before them: spread evenly over the covered and unburied part, by rows of kSpotQuarters.
+  /// kLeafSpots of each leaf that is neither empty nor full: spread evenly over the covered and unburied part, by rows
+  /// of kSpotQuarters. Full ones in narrow gaps, or right beside what hovers before them, have kFullSpots.
   std::vector<LeafSpot> spots;
   /// Unit box squared: covered and unburied part, times its opacity; parent = sum of children; 0 = empty. What a leaf
   /// catches of the light is irradiance times this, so irradiance needs no opacity anywhere.
@@ -162,7 +167,12 @@ struct PatchScene {
     if (leaf.first_spot == kNone) return {leaf.texel, leaf.triangle};
     const auto wanted = static_cast<std::uint32_t>(at.x * static_cast<float>(kLeafSpots));
     const auto place = wanted < kLeafSpots ? wanted : kLeafSpots - 1;  // by place: a quarter after the other
-    return spots[leaf.first_spot + place % kSpotRows * kSpotQuarters + place / kSpotRows];
+    return spot(leaf, place % kSpotRows * kSpotQuarters + place / kSpotRows);
+  }
+  /// Spot k < kLeafSpots of a leaf that has them.
+  [[nodiscard]] LeafSpot spot(const LeafPoint& leaf, std::uint32_t k) const {
+    if (leaf.first_spot == kFullSpots) return {glm::floor(leaf.texel) + kSpotsOfFull[k], leaf.triangle};
+    return spots[leaf.first_spot + k];
   }
 };
 

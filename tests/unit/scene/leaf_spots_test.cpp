@@ -39,7 +39,7 @@ TEST(LeafSpots, LieEvenlyOverWhatABlockLeavesOfALeaf) {
     ++seen;
     glm::dvec3 mean(0.0);
     for (std::uint32_t k = 0; k < kLeafSpots; ++k) {
-      const auto at = worldOf(patches, patches.spots[leaf.first_spot + k]);
+      const auto at = worldOf(patches, patches.spot(leaf, k));
       EXPECT_FALSE(at.x > -1.15 && at.x < 1.0 && std::abs(at.z) < 1.0) << at.x << " " << at.z;
       mean += at / double{kLeafSpots};
     }
@@ -63,7 +63,7 @@ TEST(LeafSpots, EveryEighthRowHasSomeInEveryQuarter) {
       std::uint32_t quarters = 0;
       for (std::uint32_t k = 0; k < 2 * kSpotQuarters; ++k) {
         const std::uint32_t row = first + 8 * (k / kSpotQuarters);
-        const glm::vec2 in = patches.spots[leaf.first_spot + row * kSpotQuarters + k % kSpotQuarters].texel - low;
+        const glm::vec2 in = patches.spot(leaf, row * kSpotQuarters + k % kSpotQuarters).texel - low;
         quarters |= 1U << (2U * (in.y > 0.5F ? 1U : 0U) + (in.x > 0.5F ? 1U : 0U));
       }
       EXPECT_EQ(quarters, 15U);
