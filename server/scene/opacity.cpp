@@ -91,14 +91,21 @@ class SurfaceOpacity {
     width_ = surface_.width * surface_.opacity_scale;
     height_ = surface_.height * surface_.opacity_scale;
     known_.assign(std::size_t{width_} * height_, 0);
+    rows_.reserve(surface_.triangle_count);
+    for (std::uint32_t i = 0; i < surface_.triangle_count; ++i) {
+      const auto [low, high] = extentOf(cornersOf(patches_, surface_.first_triangle + i, instance_, primitive_));
+      rows_.push_back({rowAt(std::floor(low.y)), rowAt(std::ceil(high.y))});
+    }
     return height_;
   }
   [[nodiscard]] std::uint32_t width() const { return width_; }
 
   /// Of some rows; others may be filled by other threads.
   void fill(std::uint32_t first_row, std::uint32_t end_row) {
-    for (std::uint32_t i = 0; i < surface_.triangle_count; ++i)
+    for (std::uint32_t i = 0; i < surface_.triangle_count; ++i) {
+      if (rows_[i].end <= first_row || rows_[i].first >= end_row) continue;
       fillTriangle(cornersOf(patches_, surface_.first_triangle + i, instance_, primitive_), first_row, end_row);
+    }
   }
 
   /// Cells that triangles only touch, without their middles, are as the next one. When all rows are filled.
@@ -109,11 +116,25 @@ class SurfaceOpacity {
       }
     }
     giveBack(known_);
+    giveBack(rows_);
   }
 
  private:
   [[nodiscard]] const std::vector<glm::vec2>& texcoords() const {
     return material_.base_color_texture.texcoord == 1 ? primitive_.texcoord1 : primitive_.texcoord0;
+  }
+
+  struct Extent {
+    glm::dvec2 low, high;
+  };
+  /// Of a triangle, in cells.
+  [[nodiscard]] Extent extentOf(const ChartCorners& c) const {
+    const auto scale = static_cast<double>(surface_.opacity_scale);
+    return {glm::min(glm::min(c.texel[0], c.texel[1]), c.texel[2]) * scale,
+            glm::max(glm::max(c.texel[0], c.texel[1]), c.texel[2]) * scale};
+  }
+  [[nodiscard]] std::uint32_t rowAt(double y) const {
+    return static_cast<std::uint32_t>(std::clamp(y, 0.0, static_cast<double>(height_)));
   }
 
   [[nodiscard]] float alphaAt(const ChartCorners& c, const UvMap& uv, const glm::dvec2& p) const {
@@ -150,8 +171,7 @@ class SurfaceOpacity {
 
   void fillTriangle(const ChartCorners& c, std::uint32_t first_row, std::uint32_t end_row) {
     const auto scale = static_cast<double>(surface_.opacity_scale);
-    const glm::dvec2 low = glm::min(glm::min(c.texel[0], c.texel[1]), c.texel[2]) * scale;
-    const glm::dvec2 high = glm::max(glm::max(c.texel[0], c.texel[1]), c.texel[2]) * scale;
+    const auto [low, high] = extentOf(c);
     const auto end_x = std::min(width_, static_cast<std::uint32_t>(std::ceil(std::max(high.x, 0.0))));
     const auto end_y = std::min(end_row, static_cast<std::uint32_t>(std::ceil(std::max(high.y, 0.0))));
     const UvMap uv(c, texcoords());
@@ -185,6 +205,10 @@ class SurfaceOpacity {
   glm::dvec2 texture_size_{0.0};
   std::uint32_t width_ = 0, height_ = 0;
   std::vector<std::uint8_t> known_;  // by cell
+  struct Rows {
+    std::uint32_t first, end;
+  };
+  std::vector<Rows> rows_;  // by triangle: that it may reach into
 };
 
 /// As fine as wanted, as long as that is not too much.

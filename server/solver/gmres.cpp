@@ -17,20 +17,22 @@ template <typename Real>
 constexpr double kRounding = 45.0 * std::numeric_limits<Real>::epsilon();
 
 /// Sum of w a b, in the order of so many lanes whichever processor adds them: one sum after the other waits for each.
+/// In double: squares of what is small are beyond single precision.
 template <typename Real>
 __attribute__((always_inline)) inline double sumOfProducts(const Real* w, const Real* a, const Real* b,
                                                            std::size_t count) {
-  constexpr std::size_t kLanes = 128 / sizeof(Real), kRun = 64 * kLanes;  // so many are added up in Real
-  double sum = 0.0;
-  for (std::size_t first = 0; first < count; first += kRun) {
-    const std::size_t end = std::min(count, first + kRun), whole = end - (end - first) % kLanes;
-    std::array<Real, kLanes> sums{};
-    for (std::size_t i = first; i < whole; i += kLanes) {
-      for (std::size_t k = 0; k < kLanes; ++k) sums[k] += w[i + k] * a[i + k] * b[i + k];
-    }
-    for (const Real lane : sums) sum += static_cast<double>(lane);
-    for (std::size_t i = whole; i < end; ++i) sum += static_cast<double>(w[i] * a[i] * b[i]);
+  constexpr std::size_t kLanes = 16;
+  const auto product = [&](std::size_t i) {
+    return static_cast<double>(w[i]) * static_cast<double>(a[i]) * static_cast<double>(b[i]);
+  };
+  std::array<double, kLanes> sums{};
+  const std::size_t whole = count - count % kLanes;
+  for (std::size_t i = 0; i < whole; i += kLanes) {
+    for (std::size_t k = 0; k < kLanes; ++k) sums[k] += product(i + k);
   }
+  double sum = 0.0;
+  for (const double lane : sums) sum += lane;
+  for (std::size_t i = whole; i < count; ++i) sum += product(i);
   return sum;
 }
 RADIOSITY_CLONES double weightedProduct(const double* w, const double* a, const double* b, std::size_t count) {

@@ -13,7 +13,7 @@
 namespace radiosity::solver {
 
 /// `Real`: float takes half of the memory, and of the time that it takes to go through it; for tolerances well above
-/// 1e-6 of what is solved for. Sums over the unknowns are doubles all the same.
+/// 1e-6 of what is solved for, times one less the largest reflectance. Sums over the unknowns are doubles all the same.
 template <typename Real>
 class Gmres {
  public:

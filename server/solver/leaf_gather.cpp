@@ -38,16 +38,22 @@ __attribute__((always_inline)) inline void add(Shone& sum, const Shone& light) {
   for (std::size_t c = 0; c < 4; ++c) sum[c] += light[c];
 }
 
-/// Means over the rays of all leaves.
+/// Means over the rays of all leaves. So many are added up in single precision: of thousands equal numbers all sums
+/// would be rounded alike, and white rooms make a thousand times as much of that.
+constexpr std::size_t kRun = 32;
 RADIOSITY_CLONES void averageSeen(const LeafSights& sights, std::size_t half, const Shone* radiosity, Shone* mean) {
   const auto counts = sights.counts();
   std::size_t first = 0;
   for (std::uint32_t value = 0; value < sights.leafCount(); first += counts[value++]) {
-    Shone sum{};
-    for (const auto end : sights.ends(half, first, counts[value])) add(sum, radiosity[end]);
-    const float part = counts[value] > 0 ? 1.0F / static_cast<float>(counts[value]) : 0.0F;
-    for (auto& channel : sum) channel *= part;
-    mean[value] = sum;
+    std::array<double, 4> all{};
+    for (std::size_t ray = 0; ray < counts[value]; ray += kRun) {
+      Shone sum{};
+      for (const auto end : sights.ends(half, first + ray, std::min(kRun, counts[value] - ray)))
+        add(sum, radiosity[end]);
+      for (std::size_t c = 0; c < 4; ++c) all[c] += static_cast<double>(sum[c]);
+    }
+    const double part = counts[value] > 0 ? 1.0 / counts[value] : 0.0;
+    for (std::size_t c = 0; c < 4; ++c) mean[value][c] = static_cast<float>(part * all[c]);
   }
 }
 
@@ -84,7 +90,7 @@ std::size_t LeafGather::leastBytes(std::size_t leaves) {
 
 void LeafGather::inherit(const LeafGather& former, std::span<const std::uint32_t> value_before, const Shadows& change) {
   const std::size_t leaves = std::max(1U, sights_.leafCount()), least = leastBytes(leaves);
-  const std::size_t of_ray = former.sights_.rayBytes(sizeof(Shone));
+  const std::size_t of_ray = std::max(former.sights_.rayBytes(sizeof(Shone)), sights_.rayBytes(0));
   const std::size_t rays = most_bytes_ > least ? (most_bytes_ - least) / (leaves * of_ray) : 0;
   const auto most = std::clamp<std::size_t>(rays, kFirstRays, LeafSights::kMostRays);
   sights_.inherit(former.sights_, value_before, change, static_cast<std::uint16_t>(most));

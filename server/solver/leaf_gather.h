@@ -124,8 +124,7 @@ class LeafGather {
   static constexpr std::uint32_t kWide = 150;
   /// Four, so that a leaf's are one vector; the last is 0.
   using Light = LeafSmoother::Light;
-  /// What rays read at random, for each of their ends: half of it lies in the caches. Single precision is far more than
-  /// the equation is solved to.
+  /// What rays read at random, for each of their ends: half of it lies in the caches.
   using Shone = std::array<float, 4>;
   using Solver = Gmres<float>;
   struct Half {

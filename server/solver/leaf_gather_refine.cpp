@@ -10,7 +10,7 @@ namespace radiosity::solver {
 namespace {
 
 /// In a round a leaf gets at most so many times as many rays as it had, in powers of two.
-constexpr std::uint32_t kMostTimes = 4;
+constexpr auto kMostTimes = std::uint32_t{LeafSights::kMostTimes};
 /// The square of the error of n rays falls as n^-1.3: measured in three rooms, from 4 to 64 rays (Sobol's points; the
 /// edges of what is seen keep it from n^-1.5).
 constexpr double kFall = 1.3;
@@ -93,7 +93,8 @@ bool LeafGather::refine(double goal, const BesideLight& beside) {
   };
   auto blocks = blockRays();
   lacks_memory_ = false;
-  Room taken{leastBytes(sights_.leafCount()) + sights_.bytes(), sights_.rayBytes(sizeof(Shone))};
+  Room taken{leastBytes(sights_.leafCount()) + sights_.bytes() + sights_.widerBytes(kMostTimes),
+             sights_.rayBytes(sizeof(Shone))};
   taken.bytes += (sights_.steps(0).size() + sights_.steps(1).size()) * sizeof(Shone);
   refineBlotches(beside, blocks, taken);
   double noise = rayNoise();

@@ -220,11 +220,10 @@ std::uint32_t LeafSights::beginSlice() {
     return bytes < most_bytes_ ? (most_bytes_ - bytes) / (sizeof(Step) + step_bytes_) : 0;
   };
   // With so many steps ends may need wider numbers.
-  const auto most_steps = static_cast<std::uint32_t>(std::min(kMostNumbers, steps + roomBeside(taken)));
+  const auto most_steps = steps + roomBeside(taken);
   std::size_t wider = 0;
   for (const auto& half : seen_) {
-    const auto needed = PackedNumbers::widthFor(endCount() + most_steps);
-    wider += half.size() * (std::max(needed, half.width()) - half.width());
+    wider += half.size() * (std::max(widthOf(most_steps), half.width()) - half.width());
   }
   const auto room = roomBeside(taken + wider);
   const auto most = std::min(room, kMostNumbers - std::min(kMostNumbers, steps)) / kMostSteps;
@@ -437,8 +436,21 @@ std::size_t LeafSights::bytes() const {
 
 std::size_t LeafSights::rayBytes(std::size_t step_bytes) const {
   const auto rays = std::max<std::size_t>(1, seen_[0].size()), steps = steps_[0].size() + steps_[1].size();
-  const auto width = std::max({seen_[0].width(), seen_[1].width(), PackedNumbers::widthFor(endCount())});
+  const auto width = std::max({seen_[0].width(), seen_[1].width(), widthOf(kMostTimes * steps)});
   return 2 * width + (steps * (sizeof(Step) + step_bytes) + rays - 1) / rays;
+}
+
+std::size_t LeafSights::widthOf(std::size_t steps) const {
+  return PackedNumbers::widthFor(endCount() + static_cast<std::uint32_t>(std::min(steps, kMostNumbers)));
+}
+
+std::size_t LeafSights::widerBytes(std::size_t times) const {
+  std::size_t wider = 0;
+  for (std::size_t half = 0; half < 2; ++half) {
+    const auto width = seen_[half].width();
+    wider += seen_[half].size() * (std::max(width, widthOf(times * steps_[half].size())) - width);
+  }
+  return wider;
 }
 
 }  // namespace radiosity::solver

@@ -100,6 +100,10 @@ class LeafSights {
   /// The same of this scene, with as many steps as those there are have; `step_bytes`: whoever follows them takes for
   /// each.
   [[nodiscard]] std::size_t rayBytes(std::size_t step_bytes) const;
+  /// What the rays there are take more once there are so many times as many, and their steps need wider numbers.
+  [[nodiscard]] std::size_t widerBytes(std::size_t times) const;
+  /// In a round there come to be at most so many times as many rays.
+  static constexpr std::size_t kMostTimes = 4;
   /// Rays traced so far, of both halves; those inherited count apart.
   [[nodiscard]] std::uint64_t traced() const { return traced_; }
   [[nodiscard]] std::uint64_t kept() const { return kept_; }
@@ -122,6 +126,8 @@ class LeafSights {
   /// For rays, of which none is traced, that may end anywhere, or go on over so many steps.
   [[nodiscard]] PackedNumbers roomFor(std::size_t rays, std::size_t steps) const;
   void widen(std::size_t half, std::size_t steps);
+  /// Bytes of each end, for so many steps.
+  [[nodiscard]] std::size_t widthOf(std::size_t steps) const;
   /// On an unlit side; within the width of the leaf that the ray comes from.
   [[nodiscard]] std::uint32_t absorbed() const { return leaf_count_; }
   [[nodiscard]] std::uint32_t absorbedAtOnce() const { return leaf_count_ + 1; }

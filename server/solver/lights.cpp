@@ -48,7 +48,7 @@ bool uniformEmission(const scene::PatchScene& patches, const Side& side, std::sp
     const glm::vec3 here = emissions[side.first_value + leaf];
     if (!found) emission = here;
     found = true;
-    if (glm::any(glm::greaterThan(glm::abs(here - emission), kSameEmission * emission))) return false;
+    if (!glm::all(glm::lessThanEqual(glm::abs(here - emission), kSameEmission * emission))) return false;
   }
   return found && emission != glm::vec3(0.0F);
 }

@@ -63,10 +63,12 @@ void LinkedSolver::assess() {
     owed += growing_ ? net_unshot_ + unlinked : left_out;
   }
   if (field.square() <= 0.0) {
-    // What convex lamps send leaves the scene, however it varies within nodes that were seen to light nothing.
+    // What convex lamps send leaves the scene, however it varies within nodes that were seen to light nothing. Of those
+    // that are left out, being weak beside such lamps or for want of memory, nobody knows.
     const bool is_open = growing_ || (by_rays_ && !gathers());
-    const double unseen = is_open ? owed + varying_ : of_lights + unlinked;
+    const double unseen = is_open ? owed + varying_ : of_lights + (by_rays_ ? unlinked : left_out);
     const bool lacks = unseen > 0.0 || (gathers() && gather_->bias() > 0.0);
+    left_out_ = !is_open && !by_rays_ && left_out > 0.0 ? 1.0 : 0.0;
     error_.residual = error_.total = lacks ? 1.0 : 0.0;  // all or nothing is missing
     return;
   }

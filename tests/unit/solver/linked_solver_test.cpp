@@ -198,6 +198,31 @@ TEST(LinkedSolver, LightThatReachesNothingLeavesNoError) {
   EXPECT_NEAR(solver.energy().escaped[0] / solver.energy().emitted[0], 1.0, 1e-6);
 }
 
+// A sign that shines out of the scene, and a lamp above a floor whose parts are too weak beside it to be seen at first.
+TEST(LinkedSolver, ADimLampBesideABrightSignIsNotLeftOut) {
+  for (const float bright : {1e2F, 1e4F, 1e6F}) {
+    auto made =
+        makeQuadScene({{{-0.5F, 0.5F, 0.5F}, {1, 0, 0}, {0, 0, -1}, 16, 16, glm::vec3(bright), glm::vec3(0.5F)},
+                       {{-0.1F, 0.0F, -0.1F}, {0.2F, 0, 0}, {0, 0, 0.2F}, 8, 8, glm::vec3(1.0F), glm::vec3(0.5F)},
+                       {{-0.5F, -0.5F, 0.5F}, {1, 0, 0}, {0, 0, -1}, 16, 16, {}, glm::vec3(0.5F)}});
+    for (const std::size_t s : {0U, 1U}) {
+      const auto& surface = made.patches->surfaces[s];
+      for (std::uint32_t i = 0; i < surface.width * surface.height; ++i)
+        made.materials.emission[surface.first_node[0] + i] *= 0.1F * static_cast<float>(1 + i % 7);
+    }
+    RayTransport rays(64);
+    ASSERT_TRUE(rays.setScene(made.patches));
+    SolverSettings settings;
+    settings.target_error = 0.03;
+    LinkedSolver solver(made.patches, made.materials, rays, settings);
+    solve(solver);
+    double light = 0.0;
+    for (const auto& irradiance : solver.irradiance()) light += static_cast<double>(irradiance.x);
+    EXPECT_NEAR(light, 2.3, 0.1) << bright;
+    EXPECT_LE(solver.error().total, 0.03) << bright;
+  }
+}
+
 /// Relative RMS error where all walls of a room shine and reflect alike, and with them all light is known.
 double awayFromFurnace(const LinkedSolver& solver, const scene::PatchScene& patches, double irradiance) {
   double square = 0.0, area = 0.0;
