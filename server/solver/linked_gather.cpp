@@ -217,7 +217,8 @@ StepOutcome LinkedSolver::chooseRays() {
   }
   const double aim = kAim * targetOfLinks(), rest = error_.residual;
   const double room = std::max(aim * aim - rest * rest, kLeastRoom * aim * aim);
-  if (by_links_ * by_links_ <= room) return exhausted(SolveLimit::kWithin);
+  // What is in doubt is no reason for the rest to be mottled.
+  if (by_links_ * by_links_ <= room) return refineBlotches() ? StepOutcome::kRoundDone : exhausted(SolveLimit::kWithin);
   auto [rays, links] = noise();
   const double rays_cost = static_cast<double>(gather_->rays()) * rayCost(), links_cost = samplesCost();
   if (links_cost <= 0.0) rays += std::exchange(links, 0.0);  // under a sky there may be none
