@@ -51,14 +51,7 @@ RayTree::RayTree(const Bvh& tree)
 std::uint32_t RayTree::addBlock(const Bvh& tree, std::uint32_t first, std::uint32_t count) {
   Block block{};
   for (std::uint32_t k = 0; k < count; ++k) {
-    const auto& [a, b, c] = tree.triangles_[first + k];
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto i = static_cast<int>(axis);
-      block.corner[axis][k] = a[i];
-      block.edge1[axis][k] = b[i] - a[i];
-      block.edge2[axis][k] = c[i] - a[i];
-    }
-    block.slack[k] = kEdge * std::max(glm::length(b - a), glm::length(c - a));
+    block.set(k, tree.triangles_[first + k], kEdge);
     block.triangle[k] = tree.order_[first + k];
   }
   blocks_.push_back(block);

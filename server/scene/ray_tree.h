@@ -28,9 +28,7 @@ class RayTree {
                                 std::span<const std::uint32_t> passed = {}) const;
 
  private:
-  struct alignas(32) Block {
-    std::array<std::array<float, kWidth>, 3> corner, edge1, edge2;
-    std::array<float, kWidth> slack;  ///< by which it grows, times the longer edge
+  struct Block : TriangleLanes {
     std::array<std::uint32_t, kWidth> triangle;
   };
   [[nodiscard]] std::uint32_t addBlock(const Bvh& tree, std::uint32_t first, std::uint32_t count);

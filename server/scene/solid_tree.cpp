@@ -65,14 +65,7 @@ std::uint32_t SolidTree::addBlock(std::uint32_t first, std::uint32_t count) {
   block.first = first;
   block.slack.fill(-1.0F);
   for (std::uint32_t k = 0; k < count; ++k) {
-    const auto& [a, b, c] = tree_->triangles_[first + k];
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto i = static_cast<int>(axis);
-      block.corner[axis][k] = a[i];
-      block.edge1[axis][k] = b[i] - a[i];
-      block.edge2[axis][k] = c[i] - a[i];
-    }
-    block.slack[k] = kEdge * std::max(glm::length(b - a), glm::length(c - a));
+    block.set(k, tree_->triangles_[first + k], kEdge);
   }
   blocks_.push_back(block);
   return static_cast<std::uint32_t>(blocks_.size() - 1);

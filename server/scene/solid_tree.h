@@ -27,10 +27,9 @@ class SolidTree {
 
  private:
   static constexpr std::uint32_t kWidth = WideNodes::kWidth;
-  struct alignas(32) Block {
-    std::array<std::array<float, kWidth>, 3> corner, edge1, edge2;
-    std::array<float, kWidth> slack;  ///< by which rounding may be off; 1 below nothing: no triangle is there
-    std::uint32_t first;              ///< of the Bvh's triangles
+  /// Slack below nothing: no triangle is there.
+  struct Block : TriangleLanes {
+    std::uint32_t first;  ///< of the Bvh's triangles
   };
   [[nodiscard]] std::uint32_t addBlock(std::uint32_t first, std::uint32_t count);
   [[nodiscard]] static std::uint32_t mayMeet(const Block& block, const WideNodes::Ray& ray);

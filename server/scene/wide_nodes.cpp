@@ -1,6 +1,7 @@
 #include "server/scene/wide_nodes.h"
 
 #include <algorithm>
+#include <glm/geometric.hpp>
 #include <limits>
 
 namespace radiosity::scene {
@@ -13,6 +14,17 @@ constexpr float kEverywhere = 1e9F;
 constexpr float kGrowth = 2e-6F;
 
 }  // namespace
+
+void TriangleLanes::set(std::size_t lane, const Bvh::Triangle& triangle, float slack_of_edge) {
+  const glm::vec3 a = triangle[1] - triangle[0], b = triangle[2] - triangle[0];
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto i = static_cast<int>(axis);
+    corner[axis][lane] = triangle[0][i];
+    edge1[axis][lane] = a[i];
+    edge2[axis][lane] = b[i];
+  }
+  slack[lane] = slack_of_edge * std::max(glm::length(a), glm::length(b));
+}
 
 WideNodes::WideNodes(const Bvh& tree, const NumberLeaf& leaf) {
   if (tree.empty()) return;

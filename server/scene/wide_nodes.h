@@ -14,6 +14,16 @@
 
 namespace radiosity::scene {
 
+/// Eight triangles at most, to be tested together.
+struct alignas(32) TriangleLanes {
+  template <typename T>
+  using Lanes = std::array<T, 8>;
+  std::array<Lanes<float>, 3> corner{}, edge1{}, edge2{};
+  Lanes<float> slack{};  ///< times the longer edge: what is off by less counts as met
+
+  void set(std::size_t lane, const Bvh::Triangle& triangle, float slack_of_edge);
+};
+
 class WideNodes {
  public:
   static constexpr std::uint32_t kWidth = 8;

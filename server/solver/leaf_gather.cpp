@@ -32,23 +32,23 @@ constexpr std::size_t kVectors = 3 * (Gmres<float>::kRestart + 3) + 4 * 4, kLigh
 
 using Light = LeafSmoother::Light;
 
-using Shone = std::array<float, 4>;
+using Light32 = std::array<float, 4>;
 
-__attribute__((always_inline)) inline void add(Shone& sum, const Shone& light) {
+__attribute__((always_inline)) inline void add(Light32& sum, const Light32& light) {
   for (std::size_t c = 0; c < 4; ++c) sum[c] += light[c];
 }
 
 /// Means over the rays of all leaves. So many are added up in single precision: of thousands equal numbers all sums
 /// would be rounded alike, and white rooms make a thousand times as much of that.
-constexpr std::size_t kRun = 32;
-RADIOSITY_CLONES void averageSeen(const LeafSights& sights, std::size_t half, const Shone* radiosity, Shone* mean) {
+constexpr std::size_t kSummedAtOnce = 32;
+RADIOSITY_CLONES void averageSeen(const LeafSights& sights, std::size_t half, const Light32* radiosity, Light32* mean) {
   const auto counts = sights.counts();
   std::size_t first = 0;
   for (std::uint32_t value = 0; value < sights.leafCount(); first += counts[value++]) {
     std::array<double, 4> all{};
-    for (std::size_t ray = 0; ray < counts[value]; ray += kRun) {
-      Shone sum{};
-      for (const auto end : sights.ends(half, first + ray, std::min(kRun, counts[value] - ray)))
+    for (std::size_t ray = 0; ray < counts[value]; ray += kSummedAtOnce) {
+      Light32 sum{};
+      for (const auto end : sights.ends(half, first + ray, std::min(kSummedAtOnce, counts[value] - ray)))
         add(sum, radiosity[end]);
       for (std::size_t c = 0; c < 4; ++c) all[c] += static_cast<double>(sum[c]);
     }
@@ -57,7 +57,7 @@ RADIOSITY_CLONES void averageSeen(const LeafSights& sights, std::size_t half, co
   }
 }
 
-Shone rounded(const Light& light) {
+Light32 rounded(const Light& light) {
   return {static_cast<float>(light[0]), static_cast<float>(light[1]), static_cast<float>(light[2]), 0.0F};
 }
 
@@ -76,7 +76,7 @@ LeafGather::LeafGather(const scene::PatchScene& patches, const std::vector<Side>
                        std::size_t most_bytes, std::shared_ptr<const LeafRays> rays)
     : sights_(patches, sides, seed, std::move(rays)), most_bytes_(most_bytes), sides_(sides) {
   const std::size_t leaves = sights_.leafCount(), first = leaves * kFirstRays * LeafSights::kRayBytes;
-  sights_.limit(most_bytes - std::min(most_bytes, leastBytes(leaves) - first), sizeof(Shone));
+  sights_.limit(most_bytes - std::min(most_bytes, leastBytes(leaves) - first), sizeof(Light32));
   area_.reserve(sights_.leafCount());
   for (const auto& side : sides) {
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
@@ -90,7 +90,7 @@ std::size_t LeafGather::leastBytes(std::size_t leaves) {
 
 void LeafGather::inherit(const LeafGather& former, std::span<const std::uint32_t> value_before, const Shadows& change) {
   const std::size_t leaves = std::max(1U, sights_.leafCount()), least = leastBytes(leaves);
-  const std::size_t of_ray = std::max(former.sights_.rayBytes(sizeof(Shone)), sights_.rayBytes(0));
+  const std::size_t of_ray = std::max(former.sights_.rayBytes(sizeof(Light32)), sights_.rayBytes(0));
   const std::size_t rays = most_bytes_ > least ? (most_bytes_ - least) / (leaves * of_ray) : 0;
   const auto most = std::clamp<std::size_t>(rays, kFirstRays, LeafSights::kMostRays);
   sights_.inherit(former.sights_, value_before, change, static_cast<std::uint16_t>(most));
@@ -133,7 +133,7 @@ bool LeafGather::advance(double seconds) {
   if (stage_ == Stage::kSolving) {
     inBothHalves([&](std::size_t h) {
       while (!halves_[h].done && spent() < seconds) {
-        halves_[h].done = halves_[h].gmres.advance([&](Solver::Vectors& x, bool affine) { sweep(h, x, affine); });
+        halves_[h].done = halves_[h].gmres.advance([&](RayGmres::Vectors& x, bool affine) { sweep(h, x, affine); });
       }
     });
     if (!halves_[0].done || !halves_[1].done) return false;
@@ -207,7 +207,7 @@ void LeafGather::takeLight(std::size_t h) {
     // A norm over areas bounds the sum over them (Cauchy and Schwarz).
     if (area > 0.0) tolerance[c] = kSolved * shining[c] / std::sqrt(area);
   }
-  Solver::Vectors nothing;
+  RayGmres::Vectors nothing;
   for (auto& channel : nothing) channel.assign(leaves, 0.0F);
   half.gmres.begin(std::move(nothing), std::vector<float>(area_.begin(), area_.end()), tolerance, kMaxSweeps);
   half.done = false;
@@ -233,7 +233,7 @@ void LeafGather::followSteps(std::size_t half, const std::vector<Light>* source)
   }
 }
 
-void LeafGather::sweep(std::size_t h, Solver::Vectors& x, bool affine) {
+void LeafGather::sweep(std::size_t h, RayGmres::Vectors& x, bool affine) {
   Half& half = halves_[h];
   const std::size_t leaves = sights_.leafCount();
   for (std::size_t v = 0; v < leaves; ++v) {
@@ -242,7 +242,7 @@ void LeafGather::sweep(std::size_t h, Solver::Vectors& x, bool affine) {
                              (affine ? static_cast<float>(half.source[v][c]) : 0.0F);
   }
   for (auto end = leaves; end < half.source.size(); ++end)
-    half.radiosity[end] = affine ? rounded(half.source[end]) : Shone{};
+    half.radiosity[end] = affine ? rounded(half.source[end]) : Light32{};
   followSteps(h, affine ? &half.source : nullptr);
   average(h);
   for (std::size_t v = 0; v < leaves; ++v) {

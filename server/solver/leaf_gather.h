@@ -125,13 +125,13 @@ class LeafGather {
   /// Four, so that a leaf's are one vector; the last is 0.
   using Light = LeafSmoother::Light;
   /// What rays read at random, for each of their ends: half of it lies in the caches.
-  using Shone = std::array<float, 4>;
-  using Solver = Gmres<float>;
+  using Light32 = std::array<float, 4>;
+  using RayGmres = Gmres<float>;
   struct Half {
-    std::vector<Light> source;     ///< r; by what may be seen (LeafSights::endCount)
-    std::vector<Shone> radiosity;  ///< r + rho x; and then by step
-    std::vector<Shone> arriving;   ///< its means
-    Solver gmres;
+    std::vector<Light> source;       ///< r; by what may be seen (LeafSights::endCount)
+    std::vector<Light32> radiosity;  ///< r + rho x; and then by step
+    std::vector<Light32> arriving;   ///< its means
+    RayGmres gmres;
     double shining = 0.0;  ///< flux of |r|, all channels
     bool done = true;
   };
@@ -145,7 +145,7 @@ class LeafGather {
   void takeLight(std::size_t half);
   void average(std::size_t half);
   void followSteps(std::size_t half, const std::vector<Light>* source);
-  void sweep(std::size_t half, Solver::Vectors& x, bool affine);
+  void sweep(std::size_t half, RayGmres::Vectors& x, bool affine);
   void take(std::size_t half, const Levels& levels);
   void takeSolutions();
   void weighRays();

@@ -93,9 +93,10 @@ bool LeafGather::refine(double goal, const BesideLight& beside) {
   };
   auto blocks = blockRays();
   lacks_memory_ = false;
-  Room taken{leastBytes(sights_.leafCount()) + sights_.bytes() + sights_.widerBytes(kMostTimes),
-             sights_.rayBytes(sizeof(Shone))};
-  taken.bytes += (sights_.steps(0).size() + sights_.steps(1).size()) * sizeof(Shone);
+  const auto steps = sights_.steps(0).size() + sights_.steps(1).size();
+  Room taken{leastBytes(sights_.leafCount()) + sights_.bytes() + sights_.widerBytes(kMostTimes * steps),
+             sights_.rayBytes(sizeof(Light32))};
+  taken.bytes += steps * sizeof(Light32);
   refineBlotches(beside, blocks, taken);
   double noise = rayNoise();
   std::priority_queue<Gain> queue;

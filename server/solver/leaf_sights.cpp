@@ -219,13 +219,7 @@ std::uint32_t LeafSights::beginSlice() {
   const auto roomBeside = [&](std::size_t bytes) {
     return bytes < most_bytes_ ? (most_bytes_ - bytes) / (sizeof(Step) + step_bytes_) : 0;
   };
-  // With so many steps ends may need wider numbers.
-  const auto most_steps = steps + roomBeside(taken);
-  std::size_t wider = 0;
-  for (const auto& half : seen_) {
-    wider += half.size() * (std::max(widthOf(most_steps), half.width()) - half.width());
-  }
-  const auto room = roomBeside(taken + wider);
+  const auto room = roomBeside(taken + widerBytes(steps + roomBeside(taken)));
   const auto most = std::min(room, kMostNumbers - std::min(kMostNumbers, steps)) / kMostSteps;
   auto end = cursor_;
   for (std::size_t rays = 0; end < std::min(leaf_count_, cursor_ + kLeavesASlice); ++end) {
@@ -444,12 +438,9 @@ std::size_t LeafSights::widthOf(std::size_t steps) const {
   return PackedNumbers::widthFor(endCount() + static_cast<std::uint32_t>(std::min(steps, kMostNumbers)));
 }
 
-std::size_t LeafSights::widerBytes(std::size_t times) const {
+std::size_t LeafSights::widerBytes(std::size_t steps) const {
   std::size_t wider = 0;
-  for (std::size_t half = 0; half < 2; ++half) {
-    const auto width = seen_[half].width();
-    wider += seen_[half].size() * (std::max(width, widthOf(times * steps_[half].size())) - width);
-  }
+  for (const auto& half : seen_) wider += half.size() * (std::max(widthOf(steps), half.width()) - half.width());
   return wider;
 }
 

@@ -100,8 +100,8 @@ class LeafSights {
   /// The same of this scene, with as many steps as those there are have; `step_bytes`: whoever follows them takes for
   /// each.
   [[nodiscard]] std::size_t rayBytes(std::size_t step_bytes) const;
-  /// What the rays there are take more once there are so many times as many, and their steps need wider numbers.
-  [[nodiscard]] std::size_t widerBytes(std::size_t times) const;
+  /// What the rays there are take more once there are so many steps, which need wider numbers.
+  [[nodiscard]] std::size_t widerBytes(std::size_t steps) const;
   /// In a round there come to be at most so many times as many rays.
   static constexpr std::size_t kMostTimes = 4;
   /// Rays traced so far, of both halves; those inherited count apart.
