@@ -32,6 +32,7 @@ json params(const ScenePatchCall& c) {
   json out = {{"patch", json::parse(c.patch, nullptr, false)}};
   if (out["patch"].is_discarded()) out["patch"] = c.patch;  // the server says what is wrong with it
   if (c.base_revision) out["baseRevision"] = *c.base_revision;
+  if (c.same_scene_as) out["sameSceneAs"] = *c.same_scene_as;
   if (!c.request_id.empty()) out["requestId"] = c.request_id;
   if (c.dry_run) out["dryRun"] = true;
   return out;
@@ -127,6 +128,7 @@ void readPatch(Reader& r, ScenePatchCall& c) {
 void read(Reader& r, ScenePatchCall& c) {
   readPatch(r, c);
   r.optionalInteger("baseRevision", c.base_revision, 0, kAnyInteger);
+  r.optionalInteger("sameSceneAs", c.same_scene_as, 0, kAnyInteger);
   r.text("requestId", c.request_id, Need::kOptional, kMaxTextBytes);
   r.boolean("dryRun", c.dry_run, Need::kOptional);
 }

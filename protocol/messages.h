@@ -199,7 +199,8 @@ struct ScenePatchCall {
   using Reply = ScenePatchReply;
   std::string patch;  ///< JSON text of the RFC 6902 array (a JSON value on the wire)
   std::optional<std::uint64_t> base_revision = {};
-  std::string request_id = {};  ///< empty: none
+  std::optional<std::uint64_t> same_scene_as = {};  ///< a revision since which no other scene may have been loaded
+  std::string request_id = {};                      ///< empty: none
   bool dry_run = false;
 };
 struct SceneUndoCall {

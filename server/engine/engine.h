@@ -148,9 +148,10 @@ struct Receipt {
 
 struct PatchRequest {
   std::string patch;  ///< JSON text of the RFC 6902 array, depth and size already bounded
-  std::optional<std::uint64_t> base_revision;
+  std::optional<std::uint64_t> base_revision = {};
+  std::optional<std::uint64_t> same_scene_as = {};  ///< a revision since which no other scene may have been loaded
   bool dry_run = false;
-  std::string by;  ///< who, for scene.patched
+  std::string by = {};  ///< who, for scene.patched
   /// The bytes of an upload that the patch refers to; null: there is no such upload. Called on the solve thread.
   std::function<SharedBytes(const std::string& uri)> find_upload = {};
   Receipt receipt = {};

@@ -136,6 +136,11 @@ void History::take(Next next) {
   log(std::move(next.entry));
 }
 
+bool History::isSameSceneSince(std::uint64_t revision) const {
+  // A load clears the log, and is its first entry until 256 others have come: what is in it is of one scene.
+  return !log_.empty() && revision >= log_.front().revision && revision <= log_.back().revision;
+}
+
 void History::restore(std::vector<PastRevision> log_entries, std::vector<state::Edit> edits, std::size_t done) {
   log_.clear();
   for (auto& entry : log_entries) log(std::move(entry));

@@ -67,6 +67,9 @@ class History {
   /// What outlived the last process: a log whose `undone` is not set yet, and edits of which so many are done.
   void restore(std::vector<PastRevision> log, std::vector<state::Edit> edits, std::size_t done);
 
+  /// Whether no other scene was loaded after that revision; false also where that is too long ago to tell.
+  [[nodiscard]] bool isSameSceneSince(std::uint64_t revision) const;
+
   [[nodiscard]] HistoryReport report(std::uint64_t revision) const;
 
  private:

@@ -163,6 +163,7 @@ class SolveLoop final : public Engine {
   [[nodiscard]] bool holdsBoth() const;  ///< the memory for links those of `lit_` and of `former_`
   void putBack();                        ///< the present scene, after another was tried
   [[nodiscard]] Result<void> checkBase(const std::optional<std::uint64_t>& base_revision) const;
+  [[nodiscard]] Result<void> checkScene(const std::optional<std::uint64_t>& same_scene_as) const;
   [[nodiscard]] Result<PatchOutcome> applyRequest(const PatchRequest& request);
   [[nodiscard]] Result<PatchOutcome> applyStep(const StepRequest& request);
   /// Makes the edited scene the present one; raises no revision and tells nobody yet.

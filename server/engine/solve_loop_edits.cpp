@@ -1,4 +1,6 @@
 // What changes the scene or the solve: patching, settings, pause.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -105,8 +107,16 @@ Result<void> SolveLoop::checkBase(const std::optional<std::uint64_t>& base_revis
               "the scene is at revision " + std::to_string(revision_) + ", not " + std::to_string(*base_revision));
 }
 
+/// Indices of an edit mean other objects in another scene.
+Result<void> SolveLoop::checkScene(const std::optional<std::uint64_t>& same_scene_as) const {
+  if (!same_scene_as || history_.isSameSceneSince(*same_scene_as)) return {};
+  return fail(ErrorCode::kStaleRevision,
+              fmt::format("another scene was loaded since revision {}, or too much was done to tell", *same_scene_as));
+}
+
 Result<PatchOutcome> SolveLoop::applyRequest(const PatchRequest& request) {
   if (auto ok = checkBase(request.base_revision); !ok) return tl::unexpected<Error>(ok.error());
+  if (auto ok = checkScene(request.same_scene_as); !ok) return tl::unexpected<Error>(ok.error());
   const auto patch = nlohmann::json::parse(request.patch, nullptr, false);
   if (patch.is_discarded()) return fail(ErrorCode::kBadInput, "the patch is not JSON");
   auto edited = scene::editDocument(lit_->document(), patch, request.find_upload);

@@ -218,9 +218,8 @@ class Bench {
     return call<engine::PatchOutcome>([&](auto done) { engine_->step({false, {}, "bench"}, std::move(done)); });
   }
   Result<engine::PatchOutcome> patch(const std::string& text) {
-    return call<engine::PatchOutcome>([&](auto done) {
-      engine_->patch({text, {}, false, "bench", {}}, std::move(done));
-    });
+    return call<engine::PatchOutcome>(
+        [&](auto done) { engine_->patch({.patch = text, .by = "bench"}, std::move(done)); });
   }
 
   static test_scenes::TestScene sceneNamed(const std::string& name) {

@@ -254,11 +254,9 @@ void FakeEngine::patch(engine::PatchRequest request, Callback<engine::PatchOutco
 }
 
 void FakeEngine::step(engine::StepRequest request, Callback<engine::PatchOutcome> done) {
-  patch({R"([{"op":"replace","path":"/asset/generator","value":"a step"}])",
-         request.base_revision,
-         false,
-         request.by,
-         {}},
+  patch({.patch = R"([{"op":"replace","path":"/asset/generator","value":"a step"}])",
+         .base_revision = request.base_revision,
+         .by = request.by},
         [done = std::move(done)](Result<engine::PatchOutcome> outcome) {
           if (outcome) outcome->stepped = outcome->revision - 1;
           done(std::move(outcome));

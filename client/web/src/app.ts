@@ -8,13 +8,13 @@ import { PeopleSession } from './app_people';
 import { SceneSession } from './app_scene';
 import { hasScene, StateSession } from './app_state';
 import { ViewSession } from './app_view';
+import type { SentEdit } from './document/scene_document';
 import { Connection, type LinkState } from './protocol/connection';
 import {
   type Bookmark,
   type HelloReply,
   type LightmapsNote,
   type Notifications,
-  type Patch,
   type Progress,
   type Resume,
   type ScenePatchReply,
@@ -101,7 +101,7 @@ export class App {
       notAccepted: (text, wanted) => this.notAccepted(text, wanted),
     });
     this.view = new ViewSession(this);
-    this.edit = new EditSession(this, name, (...edit) => this.sendPatch(...edit));
+    this.edit = new EditSession(this, name, (...edit) => this.sendEdit(...edit));
     this.people = new PeopleSession(this);
     const sharePanel = new SharePanel({
       name: { person: name.person, unnamed: name.unnamed },
@@ -381,13 +381,13 @@ export class App {
   }
 
   /** A lost answer is asked for again with the same id, which the server does once. */
-  private async sendPatch(patch: Patch, requestId: string, isMeant: () => boolean): Promise<ScenePatchReply> {
+  private async sendEdit(edit: SentEdit, isMeant: () => boolean): Promise<ScenePatchReply> {
     for (;;) {
       if (!this.connection.isOpen) await new Promise<void>((resolve) => this.awaited.push(resolve));
       await this.sceneKnown;
       if (!isMeant()) throw new Error('its scene is gone');
       try {
-        return await this.connection.call<ScenePatchReply>('scene.patch', { patch, requestId });
+        return await this.connection.call<ScenePatchReply>('scene.patch', edit);
       } catch (error) {
         if (!(error instanceof ConnectionLost) && this.connection.isOpen) throw error;
       }

@@ -14,7 +14,7 @@ import {
   type Vec3,
   type Vec4,
 } from './document/gltf';
-import { SceneDocument, type SendPatch } from './document/scene_document';
+import { SceneDocument, type SendEdit } from './document/scene_document';
 import type { Patch, ScenePatchedNote } from './protocol/messages';
 import { type PageName, shownName } from './protocol/page_name';
 import { ScenePanel, type Selection } from './ui/scene_panel';
@@ -38,7 +38,7 @@ export class EditSession {
   constructor(
     private readonly app: App,
     private readonly name: PageName,
-    send: SendPatch,
+    send: SendEdit,
   ) {
     this.document = new SceneDocument((by) => name.isMine(by), send, {
       changed: (pointers) => this.onChanged(pointers),

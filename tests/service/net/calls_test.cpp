@@ -75,7 +75,7 @@ class CallsTest : public ::testing::Test {
   }
   void wait() { calls.handle(R"({"jsonrpc":"2.0","id":"w","method":"solve.wait","params":{"timeoutMs":86400000}})"); }
   void edit() {
-    engine.patch({R"([{"op":"replace","path":"/asset/generator","value":"x"}])", {}, false, "other", {}, {}},
+    engine.patch({.patch = R"([{"op":"replace","path":"/asset/generator","value":"x"}])", .by = "other"},
                  [](const auto&) {});
   }
 

@@ -21,7 +21,9 @@ Reply replyOf(const protocol::RpcResponse& response) {
 }
 
 inline protocol::ScenePatchCall somePatch(std::optional<std::uint64_t> base = {}, std::string id = {}) {
-  return {R"([{"op":"replace","path":"/nodes/@lamp/translation","value":[0,2,0]}])", base, std::move(id), false};
+  return {.patch = R"([{"op":"replace","path":"/nodes/@lamp/translation","value":[0,2,0]}])",
+          .base_revision = base,
+          .request_id = std::move(id)};
 }
 
 /// Reads to the end of the connection.

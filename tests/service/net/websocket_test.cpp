@@ -324,7 +324,7 @@ void expectMissedPatchesToCome(std::size_t count, std::size_t bytes) {
   }
   for (std::size_t i = 0; i < count; ++i) {
     const auto patch = R"([{"op":"add","path":"/extras","value":")" + std::string(bytes, 'x') + "\"}]";
-    server.engine.patch({patch, {}, false, "other", {}, {}}, [](const auto&) {});
+    server.engine.patch({.patch = patch, .by = "other"}, [](const auto&) {});
   }
   TestSocket socket(server.port());
   ASSERT_TRUE(replyOf<HelloReply>(socket.call(back)).resumed);

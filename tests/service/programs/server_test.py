@@ -164,6 +164,19 @@ class ServerTest(ServiceCase):
 
         self.run_async(body())
 
+    def test_anEditOfASceneThatWasReplacedIsRefused(self):
+        async def body():
+            session, status = await self.solved()
+            first = await session.call("scene.patch", **doubled(), sameSceneAs=status["revision"])
+            await asyncio.to_thread(self.client, "load", self.url, self.scene)
+            with self.assertRaises(RpcError) as refused:
+                await session.call("scene.patch", **doubled(), sameSceneAs=first["revision"])
+            self.assertEqual(refused.exception.code, -32009)
+            self.assertEqual(refused.exception.data["revision"], first["revision"] + 1)
+            await session.close()
+
+        self.run_async(body())
+
     def test_sameRequestIdIsAppliedOnce(self):
         async def body():
             session, _ = await self.solved()

@@ -43,17 +43,34 @@ TEST_F(Edits, AnEditOnAStaleRevisionIsRefused) {
   solve(lumpedCube(0.5));
   ASSERT_TRUE(patch(emissionPatch(1, 1.0)));
   const auto text = sceneText();
-  const auto late = patch({emissionPatch(1, 5.0), 1, false, "late"});
+  const auto late = patch({.patch = emissionPatch(1, 5.0), .base_revision = 1, .by = "late"});
   ASSERT_FALSE(late);
   EXPECT_EQ(late.error().code, ErrorCode::kStaleRevision);
   EXPECT_EQ(sceneText(), text);
 }
 
+TEST_F(Edits, AnEditOfASceneThatWasReplacedDoesNotLandInTheOther) {
+  solve(lumpedCube(0.5));
+  ASSERT_TRUE(patch(emissionPatch(1, 1.0)));
+  // Others' edits do not matter.
+  ASSERT_TRUE(patch({.patch = emissionPatch(1, 2.0), .same_scene_as = 1, .by = "ben"}));
+  ASSERT_TRUE(load(lumpedCube(0.4)));
+  const auto text = sceneText();
+  const auto late = patch({.patch = emissionPatch(1, 5.0), .same_scene_as = 3, .by = "ben"});
+  ASSERT_FALSE(late);
+  EXPECT_EQ(late.error().code, ErrorCode::kStaleRevision);
+  EXPECT_EQ(sceneText(), text);
+  EXPECT_EQ(status().revision, 4U);
+  EXPECT_TRUE(patch({.patch = emissionPatch(1, 5.0), .same_scene_as = 4, .by = "ben"}));
+}
+
 TEST_F(Edits, OfTwoWritersOnOneRevisionExactlyOneWins) {
   solve(lumpedCube(0.5));
   std::promise<Result<engine::PatchOutcome>> first, second;
-  engine().patch({emissionPatch(1, 2.0), 1, false, "a"}, [&](auto outcome) { first.set_value(std::move(outcome)); });
-  engine().patch({emissionPatch(1, 3.0), 1, false, "b"}, [&](auto outcome) { second.set_value(std::move(outcome)); });
+  engine().patch({.patch = emissionPatch(1, 2.0), .base_revision = 1, .by = "a"},
+                 [&](auto outcome) { first.set_value(std::move(outcome)); });
+  engine().patch({.patch = emissionPatch(1, 3.0), .base_revision = 1, .by = "b"},
+                 [&](auto outcome) { second.set_value(std::move(outcome)); });
   EXPECT_EQ(first.get_future().get().value().revision, 2U);
   EXPECT_EQ(second.get_future().get().error().code, ErrorCode::kStaleRevision);
   ASSERT_EQ(recorder_->patched().size(), 1U);
@@ -88,13 +105,15 @@ TEST_F(Edits, ADryRunChecksAndChangesNothing) {
   solve(lumpedCube(0.5));
   const auto text = sceneText();
   recorder_->forget();
-  const auto outcome = patch({emissionPatch(1, 9.0), 1, true, "dry"});
+  const auto outcome = patch({.patch = emissionPatch(1, 9.0), .base_revision = 1, .dry_run = true, .by = "dry"});
   ASSERT_TRUE(outcome) << outcome.error().text();
   EXPECT_EQ(outcome->revision, 1U);
   EXPECT_EQ(sceneText(), text);
   EXPECT_EQ(status().state, SolveState::kConverged);
   EXPECT_TRUE(recorder_->patched().empty());
-  EXPECT_EQ(patch({R"([{"op":"replace","path":"/nodes/0/mesh","value":99}])", {}, true, "dry"}).error().code,
+  EXPECT_EQ(patch({.patch = R"([{"op":"replace","path":"/nodes/0/mesh","value":99}])", .dry_run = true, .by = "dry"})
+                .error()
+                .code,
             ErrorCode::kInvalidScene);
 }
 
@@ -102,7 +121,7 @@ TEST_F(Edits, ABrighterLampKeepsTheLayoutAndScalesTheLight) {
   solve(lumpedCube(0.5));
   const auto before = engine().lightmaps();
   const auto uploads = script_->uploads.load();
-  const auto outcome = patch({emissionPatch(1, 2.0 / kPi), 1, false, "ann"});
+  const auto outcome = patch({.patch = emissionPatch(1, 2.0 / kPi), .base_revision = 1, .by = "ann"});
   ASSERT_TRUE(outcome) << outcome.error().text();
   EXPECT_EQ(outcome->revision, 2U);
   EXPECT_EQ(outcome->affected_surfaces, 1U);
@@ -332,11 +351,12 @@ TEST_F(Edits, AppendingWhatNobodyPlacesYetCostsNothing) {
 
 TEST_F(Edits, ADryRunTellsWhatItWouldTouch) {
   solve(lumpedCube(0.5));
-  const auto bright = patch({emissionPatch(1, 9.0), 1, true, "dry"});
+  const auto bright = patch({.patch = emissionPatch(1, 9.0), .base_revision = 1, .dry_run = true, .by = "dry"});
   ASSERT_TRUE(bright);
   EXPECT_EQ(bright->affected_surfaces, 1U);
   EXPECT_EQ(bright->affected_shots, 0U);
-  const auto moved = patch({R"([{"op":"replace","path":"/nodes/0/translation","value":[0,2,0]}])", {}, true, "dry"});
+  const auto moved = patch(
+      {.patch = R"([{"op":"replace","path":"/nodes/0/translation","value":[0,2,0]}])", .dry_run = true, .by = "dry"});
   ASSERT_TRUE(moved);
   EXPECT_EQ(moved->affected_surfaces, status().surfaces);
   EXPECT_EQ(moved->affected_shots, status().shots);

@@ -85,7 +85,7 @@ class EngineTest : public testing::Test {
 
   Result<engine::LoadOutcome> load(const test_scenes::TestScene& scene);
   Result<engine::PatchOutcome> patch(engine::PatchRequest request);
-  Result<engine::PatchOutcome> patch(std::string json) { return patch({std::move(json), {}, false, "test"}); }
+  Result<engine::PatchOutcome> patch(std::string json) { return patch({.patch = std::move(json), .by = "test"}); }
   Result<engine::PatchOutcome> step(engine::StepRequest request);
   Result<engine::PatchOutcome> undo() { return step({false, {}, "undoer"}); }
   Result<engine::PatchOutcome> redo() { return step({true, {}, "redoer"}); }

@@ -131,5 +131,24 @@ TEST(History, ALoadedSceneHasNoPast) {
   EXPECT_EQ(editing.history.report(3).revisions[0].by, "ben");
 }
 
+TEST(History, TellsSinceWhenTheSceneIsTheSame) {
+  History history({.revisions = 10});
+  EXPECT_FALSE(history.isSameSceneSince(0));
+  history.loaded(4, "ann", "room.glb");
+  EXPECT_FALSE(history.isSameSceneSince(3));
+  EXPECT_TRUE(history.isSameSceneSince(4));
+  EXPECT_FALSE(history.isSameSceneSince(5));  // which nobody can have seen
+  const scene::Document document{"room.glb", {{"a", 1}}, {}, {}};
+  for (std::uint64_t revision = 5; revision < 14; ++revision)
+    history.edited(revision, "ann", json::array(), document, document);
+  EXPECT_TRUE(history.isSameSceneSince(4));
+  history.edited(14, "ann", json::array(), document, document);
+  EXPECT_FALSE(history.isSameSceneSince(4));  // forgotten
+  EXPECT_TRUE(history.isSameSceneSince(5));
+  history.loaded(15, "ben", "other.glb");
+  EXPECT_FALSE(history.isSameSceneSince(14));
+  EXPECT_TRUE(history.isSameSceneSince(15));
+}
+
 }  // namespace
 }  // namespace radiosity::engine

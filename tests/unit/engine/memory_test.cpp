@@ -47,7 +47,7 @@ class Memory : public EngineTest {
     // All that follows is taken from the queue together, so that nothing else comes between.
     engine().history([all_queued](const auto&) { all_queued.wait(); });
     engine().history([=](const auto&) { failAllocation(number, kLeastBytes, shortage); });
-    auto request = engine::PatchRequest{edit, {}, false, "test"};
+    auto request = engine::PatchRequest{.patch = edit, .by = "test"};
     request.receipt = {"an id that is longer than what a string holds without memory " + std::to_string(++requests_),
                        1};
     engine().patch(std::move(request), [&](Result<PatchOutcome> answer) {

@@ -51,7 +51,7 @@ TEST_F(Settings, APauseRightAfterAnEditShowsWhatThereIs) {
   };
   engine().configure(wait, [](const auto&) {});
   busy.get_future().wait();  // so that the next two come without a slice between
-  engine().patch({emissionPatch(1, 2.0), {}, false, "test"}, [](const auto&) {});
+  engine().patch({.patch = emissionPatch(1, 2.0), .by = "test"}, [](const auto&) {});
   engine().pause([&](auto state) { paused.set_value(std::move(state)); });
   go.set_value();
   EXPECT_EQ(paused.get_future().get(), SolveState::kPaused);

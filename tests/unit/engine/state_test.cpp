@@ -50,7 +50,7 @@ class Kept : public EngineTest {
 
 TEST_F(Kept, TheSceneIsBackAtItsLastRevisionWithItsPast) {
   solve(lumpedCube(0.5));
-  ASSERT_TRUE(patch({emissionPatch(0, 2.0), {}, false, "ann", {}, {"id-1", 77}}));
+  ASSERT_TRUE(patch({.patch = emissionPatch(0, 2.0), .by = "ann", .receipt = {"id-1", 77}}));
   ASSERT_TRUE(patch(translationPatch(0.25)));
   ASSERT_TRUE(undo());
   const auto text = sceneText();
@@ -83,8 +83,9 @@ TEST_F(Kept, TheSceneIsBackAtItsLastRevisionWithItsPast) {
 // How many shots an edit of geometry touches is known only after it was kept.
 TEST_F(Kept, AnEditIsAnsweredAfterTheRestartAsItWasBefore) {
   solve(blockRoom());
-  const auto moved = patch(
-      {R"([{"op":"replace","path":"/nodes/2/translation","value":[0.7,0,0.6]}])", {}, false, "test", {}, {"move", 7}});
+  const auto moved = patch({.patch = R"([{"op":"replace","path":"/nodes/2/translation","value":[0.7,0,0.6]}])",
+                            .by = "test",
+                            .receipt = {"move", 7}});
   ASSERT_TRUE(moved) << moved.error().text();
   restart();
   const auto& answers = engine().past().answers;

@@ -9,6 +9,12 @@ import { converged, putScene, said, sceneOf, serveEach, squares, until } from '.
 
 const { pages, serve } = serveEach();
 
+declare global {
+  interface Window {
+    letHear?: () => void;
+  }
+}
+
 const room = (...names: string[]) => squares(names.map((name, i) => ({ name, mesh: 0, translation: [2 * i, 0, 0] })));
 const FIRST = room('floor', 'box', 'shelf');
 const OTHER = room('lawn', 'tree', 'bench');
@@ -69,6 +75,34 @@ it('makes edits that waited for the line once it is back, and none of them in a 
   expect(await names(page)).toEqual(['lawn', 'tree', 'bench']);
   expect((await sceneOf(server)).nodes.map(({ translation }) => translation[0])).toEqual([0, 2, 4]);
   expect(await page.evaluate(() => window.viewer!.edit.selection)).toBeUndefined();
+});
+
+it('makes no edit in a scene that it has not heard of yet', async () => {
+  const server = await serve();
+  await putScene(server, FIRST);
+  const page = await pages.open(server.url, 900, 600);
+  await converged(page);
+  // What is on its way to the server while the news comes: here the news waits, as long as it takes.
+  await page.evaluate(() => {
+    const { scene } = window.viewer!;
+    const held: number[] = [];
+    scene.onLoaded = (revision) => void held.push(revision);
+    window.letHear = () => {
+      delete (scene as Partial<typeof scene>).onLoaded;
+      for (const revision of held) scene.onLoaded(revision);
+    };
+  });
+  await putScene(server, OTHER);
+  await move(page, 1, 30);
+  await said(page, /^Move: another scene was loaded since revision 1/);
+  await page.evaluate(() => window.letHear!());
+  await until(() => names(page), (all) => all[0] === 'lawn'); // prettier-ignore
+  expect((await sceneOf(server)).nodes.map(({ translation }) => translation[0])).toEqual([0, 2, 4]);
+  await move(page, 1, 3);
+  await until(
+    async () => (await sceneOf(server)).nodes.map(({ translation }) => translation[0]),
+    (all) => all.join() === '0,3,4',
+  );
 });
 
 it('lets go of what is dragged when somebody loads another scene, and moves nothing in that', async () => {

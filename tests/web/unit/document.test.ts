@@ -158,6 +158,7 @@ function session() {
   const calls: {
     patch: Patch;
     id: string;
+    sameSceneAs: number;
     answer: (reply: ScenePatchReply) => void;
     refuse: (error: Error) => void;
     isMeant: () => boolean;
@@ -165,9 +166,9 @@ function session() {
   const refused: string[] = [];
   const document = new SceneDocument(
     (by) => by === 'me',
-    (patch, id, isMeant) =>
+    ({ patch, requestId: id, sameSceneAs }, isMeant) =>
       new Promise((answer, refuse) => {
-        calls.push({ patch, id, answer, refuse, isMeant });
+        calls.push({ patch, id, sameSceneAs, answer, refuse, isMeant });
       }),
     {
       changed: () => undefined,
@@ -415,6 +416,26 @@ describe('scene document', () => {
     calls[1]!.answer(reply(8));
     await next;
     expect(refused.length).toBe(2);
+  });
+
+  it('tells with each edit of which scene it is, by the revision that it was made at', async () => {
+    const { document, calls, refused } = session();
+    const first = document.edit('Move', move(2));
+    const second = document.edit('Move', move(3)).catch((error: Error) => error.message);
+    document.patched(2, [{ op: 'replace', path: '/materials/0/name', value: 'grey' }], 'ann');
+    calls[0]!.answer(reply(3));
+    await first;
+    await settle();
+    const late = document.edit('Move', move(4)).catch((error: Error) => error.message);
+    // Another scene is there, of which this page has not heard: the server has, and what waits is of the same scene.
+    for (const call of [1, 2]) {
+      calls[call]!.refuse(new RpcError(-32009, 'another scene was loaded since'));
+      await settle();
+    }
+    expect(await Promise.all([second, late])).toEqual(Array(2).fill('another scene was loaded since'));
+    expect(calls.map(({ sameSceneAs }) => sameSceneAs)).toEqual([1, 1, 3]);
+    expect(refused.length).toBe(2);
+    expect(document.gltf.nodes![1]!.translation).toEqual([2, 0, 0]);
   });
 
   it('lays what waits to be sent upon the document that comes anew', async () => {

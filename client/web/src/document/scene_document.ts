@@ -21,6 +21,8 @@ interface PendingEdit extends EditEntry {
   /** Edits with the same key replace each other while they wait, and are one step of undo. */
   key: string | undefined;
   requestId: string;
+  /** Of the copy when it was made. */
+  revision: number;
   /** Puts the copy back; empty while the edit is not shown. */
   shown: Patch;
   role: Role;
@@ -37,8 +39,16 @@ export interface DocumentEvents {
   historyChanged(): void;
 }
 
-/** `isMeant`: false once the scene that the patch was made for is gone, after which it must not be sent (again). */
-export type SendPatch = (patch: Patch, requestId: string, isMeant: () => boolean) => Promise<ScenePatchReply>;
+/** An edit as the server hears of it, in the same words each time that it is sent. */
+export interface SentEdit {
+  patch: Patch;
+  requestId: string;
+  /** The revision that it was made at: the server refuses it where another scene was loaded since. */
+  sameSceneAs: number;
+}
+
+/** `isMeant`: false once the scene that the edit was made for is known to be gone: it must not be sent (again). */
+export type SendEdit = (edit: SentEdit, isMeant: () => boolean) => Promise<ScenePatchReply>;
 
 const MAX_HISTORY = 200;
 
@@ -64,7 +74,7 @@ export class SceneDocument {
   /** `isMine`: whether the server tells of our patches under that name; nobody else's does. */
   constructor(
     private readonly isMine: (by: string) => boolean,
-    private readonly send: SendPatch,
+    private readonly send: SendEdit,
     private readonly events: DocumentEvents,
   ) {}
 
@@ -224,6 +234,7 @@ export class SceneDocument {
         role,
         key,
         requestId: newRequestId(),
+        revision: this.revision,
         shown: [],
         confirmed: false,
         left: false,
@@ -264,7 +275,8 @@ export class SceneDocument {
     while (this.pending.length > 0) {
       const edit = (this.sending = this.pending[0]!);
       try {
-        const reply = await this.send(edit.forward, edit.requestId, () => !edit.left);
+        const { forward: patch, requestId, revision: sameSceneAs } = edit;
+        const reply = await this.send({ patch, requestId, sameSceneAs }, () => !edit.left);
         this.confirm(edit, reply.revision);
         edit.done();
       } catch (error) {
