@@ -30,8 +30,10 @@ class PackedNumbers {
 
   /// Also while others are set.
   [[nodiscard]] std::uint32_t operator[](std::size_t i) const {
-    std::uint32_t number = 0;
-    for (std::size_t k = 0; k < width_; ++k) number |= std::uint32_t{bytes_[i * width_ + k]} << 8 * k;
+    const auto* byte = bytes_.data() + i * width_;
+    std::uint32_t number = byte[0] | std::uint32_t{byte[1]} << 8;
+    if (width_ > 2) number |= std::uint32_t{byte[2]} << 16;
+    if (width_ > 3) number |= std::uint32_t{byte[3]} << 24;
     return number;
   }
   void set(std::size_t i, std::uint32_t number) {

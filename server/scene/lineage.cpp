@@ -301,8 +301,10 @@ PatchMap matchPatches(const Scene& scene_before, const PatchScene& before, const
     if (!stayed[s]) old_boxes.add(s);
   }
   old_boxes.appendTo(map.boxes);
-  new_boxes.appendTo(map.boxes);
+  new_boxes.appendTo(map.came);
+  map.boxes.insert(map.boxes.end(), map.came.begin(), map.came.end());
   joinBoxes(map.boxes);
+  joinBoxes(map.came);
   return map;
 }
 

@@ -210,6 +210,7 @@ struct PatchMap {
   std::vector<bool> leaf_altered;
   /// Around all that was or is now where something else is or was, one for each part of an instance or fewer.
   std::vector<ChangedBox> boxes;
+  std::vector<ChangedBox> came;  ///< likewise, of what is there now alone
 
   [[nodiscard]] bool nothingKept() const;
 };

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <chrono>
 #include <glm/geometric.hpp>
+#include <numeric>
 
 #include "common/give_back.h"
 #include "common/parallel.h"
@@ -221,10 +222,14 @@ std::uint32_t LeafSights::beginSlice() {
   };
   const auto room = roomBeside(taken + widerBytes(steps + roomBeside(taken)));
   const auto most = std::min(room, kMostNumbers - std::min(kMostNumbers, steps)) / kMostSteps;
-  auto end = cursor_;
-  for (std::size_t rays = 0; end < std::min(leaf_count_, cursor_ + kLeavesASlice); ++end) {
-    for (std::size_t half = 0; half < 2; ++half) rays += untracedOf(half, end);
-    if (rays > most) break;
+  const auto last = std::min(leaf_count_, cursor_ + kLeavesASlice);
+  auto end = last;
+  if (2 * std::accumulate(count_.begin() + cursor_, count_.begin() + last, std::size_t{0}) > most) {
+    end = cursor_;
+    for (std::size_t rays = 0; end < last; ++end) {
+      for (std::size_t half = 0; half < 2; ++half) rays += untracedOf(half, end);
+      if (rays > most) break;
+    }
   }
   goes_on_ = end > cursor_;
   is_short_ = is_short_ || !goes_on_;
@@ -256,13 +261,20 @@ void LeafSights::traceSlice(std::uint32_t end) {
 
 /// By the first rays of all.
 std::vector<bool> LeafSights::findPartlyInside() const {
+  std::array<std::vector<std::uint8_t>, 2> inside;
+  inBothHalves([&](std::size_t half) {
+    inside[half].resize(leaf_count_);
+    std::size_t first = 0;
+    for (std::uint32_t value = 0; value < leaf_count_; first += count_[value++]) {
+      const auto run = ends(half, first, std::min<std::size_t>(count_[value], kLooks));
+      inside[half][value] = static_cast<std::uint8_t>(std::count(run.begin(), run.end(), absorbedAtOnce()));
+    }
+  });
   std::vector<bool> found;
-  std::size_t first = 0;
-  for (std::uint32_t value = 0; value < leaf_count_; first += count_[value++]) {
-    const auto looks = std::min<std::size_t>(count_[value], kLooks);
-    std::ptrdiff_t inside = 0;
-    for (const auto& half : seen_) inside += std::ranges::count(half.run(first, looks), absorbedAtOnce());
-    if (inside == 0 || inside == static_cast<std::ptrdiff_t>(2 * looks)) continue;
+  for (std::uint32_t value = 0; value < leaf_count_; ++value) {
+    const auto looks = 2 * std::min<std::size_t>(count_[value], kLooks);
+    const std::size_t of_both = std::size_t{inside[0][value]} + inside[1][value];
+    if (of_both == 0 || of_both == looks) continue;
     found.resize(leaf_count_);
     found[value] = true;
   }
@@ -274,22 +286,37 @@ void LeafSights::takePartlyInside() {
   auto found = findPartlyInside();
   if (found == partly_inside_) return;
   cursor_ = 0;  // whatever happens, what is given up below is traced before anyone asks for it
-  const auto is = [](const std::vector<bool>& leaves, std::uint32_t value) {
-    return value < leaves.size() && leaves[value];
-  };
-  const auto differs = [&](std::uint32_t value) { return is(found, value) != is(partly_inside_, value); };
-  for (std::size_t half = 0; half < 2; ++half) {
-    for (std::size_t ray = 0; ray < seen_[half].size(); ++ray) {
-      auto last = endAt(half, ray);
-      bool differed = false;
-      for (; last >= endCount() && last != kUntraced; last = steps_[half][last - endCount()].next)
-        differed = differed || differs(steps_[half][last - endCount()].by);
-      if (differed || differs(last)) seen_[half].set(ray, seen_[half].most());
-    }
-  }
+  std::vector<bool> differs(endCount(), false);
+  for (std::uint32_t value = 0; value < leaf_count_; ++value)
+    differs[value] = (!found.empty() && found[value]) != (!partly_inside_.empty() && partly_inside_[value]);
+  std::array<bool, 2> gives_up_steps{};
+  inBothHalves([&](std::size_t half) { gives_up_steps[half] = giveUpRaysAt(differs, half); });
   partly_inside_ = std::move(found);
   before_ = count_;
-  layOut(before_);  // without the steps of those
+  if (gives_up_steps[0] || gives_up_steps[1]) layOut(before_);  // without these
+}
+
+/// Those that end on such leaves, or go on from there. True: some of them had steps.
+bool LeafSights::giveUpRaysAt(const std::vector<bool>& leaves, std::size_t half) {
+  auto& seen = seen_[half];
+  bool had_steps = false;
+  std::size_t ray = 0;
+  for (const auto end : seen.all()) {
+    const auto at = ray++;
+    if (end < endCount()) {
+      if (leaves[end]) seen.set(at, seen.most());
+      continue;
+    }
+    if (end == seen.most()) continue;
+    bool passes = false;
+    auto last = end;
+    for (; last >= endCount(); last = steps_[half][last - endCount()].next)
+      passes = passes || leaves[steps_[half][last - endCount()].by];
+    if (!passes && !leaves[last]) continue;
+    seen.set(at, seen.most());
+    had_steps = true;
+  }
+  return had_steps;
 }
 
 bool LeafSights::trace(double seconds) {
@@ -306,18 +333,18 @@ bool LeafSights::trace(double seconds) {
   return true;
 }
 
-bool LeafSights::isPassed(const Shadows& change, std::uint32_t value, const glm::dvec4& draw) const {
+bool LeafSights::passes(std::span<const scene::ChangedBox> boxes, std::uint32_t value, const glm::dvec4& draw) const {
   const auto place = rays_->placeOn(value, {draw.z, draw.w});
   const auto direction = cosineDirection(place.normal, draw.x, draw.y);
-  return std::ranges::any_of(change.change().boxes,
+  return std::ranges::any_of(boxes,
                              [&](const scene::ChangedBox& box) { return meetsBox(box, place.position, direction); });
 }
 
-/// Whether something of it lies in the box around two leaves, so that a ray from one to the other may pass it.
-bool LeafSights::isBetween(const Shadows& change, std::uint32_t one, std::uint32_t other) const {
+/// Whether something lies in the box around two leaves, so that a ray from one to the other may pass it.
+bool LeafSights::isBetween(std::span<const scene::ChangedBox> boxes, std::uint32_t one, std::uint32_t other) const {
   scene::Bounds around;
   if (!rays_->addTo(around, one) || !rays_->addTo(around, other)) return true;
-  return std::ranges::any_of(change.change().boxes, [&](const scene::ChangedBox& box) {
+  return std::ranges::any_of(boxes, [&](const scene::ChangedBox& box) {
     for (int axis = 0; axis < 3; ++axis) {
       if (static_cast<double>(box.low[axis]) - kMargin > static_cast<double>(around.max[axis]) ||
           static_cast<double>(box.high[axis]) + kMargin < static_cast<double>(around.min[axis]))
@@ -330,13 +357,14 @@ bool LeafSights::isBetween(const Shadows& change, std::uint32_t one, std::uint32
 /// A step of the scene before and those that it goes on to; kUntraced: where it passes may have changed, or is not
 /// known. Where a ray into the sky passes never is.
 std::uint32_t LeafSights::inheritStep(const LeafSights& former, std::size_t half, std::uint32_t end,
-                                      std::span<const std::uint32_t> value_after, const Shadows& change) {
+                                      std::span<const std::uint32_t> value_after,
+                                      std::span<const scene::ChangedBox> came) {
   const auto& step = former.steps_[half][end - former.endCount()];
   const bool is_last = step.next < former.endCount();
   const auto then = is_last ? step.next : former.steps_[half][step.next - former.endCount()].by;
   const auto by = value_after[step.by], to = value_after[then];
-  if (by == kUntraced || to == kUntraced || to >= leaf_count_ || isBetween(change, by, to)) return kUntraced;
-  const auto next = is_last ? to : inheritStep(former, half, step.next, value_after, change);
+  if (by == kUntraced || to == kUntraced || to >= leaf_count_ || isBetween(came, by, to)) return kUntraced;
+  const auto next = is_last ? to : inheritStep(former, half, step.next, value_after, came);
   if (next == kUntraced) return kUntraced;
   steps_[half].push_back({by, next});
   return endCount() + static_cast<std::uint32_t>(steps_[half].size() - 1);
@@ -389,6 +417,7 @@ void LeafSights::inherit(const LeafSights& former, std::span<const std::uint32_t
     const auto seen = rays_->standInOf(value);
     if (seen != value && seen < leaf_count_) stands_in[seen] = true;
   }
+  const std::span<const scene::ChangedBox> all = change.change().boxes, came = change.change().came;
   inBothHalves([&](std::size_t half) {
     widen(half, former.steps_[half].size());
     std::size_t first_ray = 0;
@@ -402,9 +431,11 @@ void LeafSights::inherit(const LeafSights& former, std::span<const std::uint32_t
         const bool goes_on = old[k] >= former.endCount();
         const auto first = value_after[goes_on ? former.steps_[half][old[k] - former.endCount()].by : old[k]];
         if (first == kUntraced) continue;  // it saw what is gone, or moved
-        const bool may_pass = first >= leaf_count_ || stands_in[first] || change.isPassed(value, first);
-        if (may_pass && isPassed(change, value, draw(k))) continue;
-        const auto end = goes_on ? inheritStep(former, half, old[k], value_after, change) : first;
+        // What is gone had hidden nothing from a ray whose end is known, and may be what another ended on.
+        const bool is_known = first < leaf_count_ || first >= skyAbove();
+        const bool may_pass = first >= leaf_count_ || stands_in[first] || change.mayHide(value, first);
+        if (may_pass && passes(is_known ? came : all, value, draw(k))) continue;
+        const auto end = goes_on ? inheritStep(former, half, old[k], value_after, came) : first;
         if (end != kUntraced) seen_[half].set(first_ray + k, end);
       }
     }

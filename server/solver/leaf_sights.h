@@ -150,6 +150,7 @@ class LeafSights {
   void traceSlice(std::uint32_t end);
   [[nodiscard]] std::vector<bool> findPartlyInside() const;
   void takePartlyInside();
+  bool giveUpRaysAt(const std::vector<bool>& leaves, std::size_t half);
   void takeSteps(std::span<const std::array<NewSteps, 2>> made);
   /// Draws of the rays of a leaf.
   [[nodiscard]] std::uint64_t keyOf(std::uint32_t value, const Side& side, std::size_t half) const;
@@ -157,10 +158,11 @@ class LeafSights {
     return Sobol4(keyOf(value, side, half));
   }
   void forgetStandIns(const LeafSights& former, std::vector<std::uint32_t>& value_after) const;
-  [[nodiscard]] bool isPassed(const Shadows& change, std::uint32_t value, const glm::dvec4& draw) const;
-  [[nodiscard]] bool isBetween(const Shadows& change, std::uint32_t one, std::uint32_t other) const;
+  [[nodiscard]] bool passes(std::span<const scene::ChangedBox> boxes, std::uint32_t value,
+                            const glm::dvec4& draw) const;
+  [[nodiscard]] bool isBetween(std::span<const scene::ChangedBox> boxes, std::uint32_t one, std::uint32_t other) const;
   std::uint32_t inheritStep(const LeafSights& former, std::size_t half, std::uint32_t end,
-                            std::span<const std::uint32_t> value_after, const Shadows& change);
+                            std::span<const std::uint32_t> value_after, std::span<const scene::ChangedBox> came);
 
   const std::vector<Side>& sides_;
   std::shared_ptr<const LeafRays> rays_;

@@ -59,7 +59,7 @@ void LeafVariation::keepPaths(const LeafVariation& former, std::size_t half, std
     if (path.by == scene::kNone) return false;
     for (auto& seen : path.seen) {
       seen = after(seen);  // nothing of the sky, and of what receives no light
-      if (seen == scene::kNone || change->isPassed(path.by, seen)) return false;
+      if (seen == scene::kNone || change->mayHide(path.by, seen)) return false;
     }
     return lights.empty() || !change->isPassed(path.by, lights[path.light].corners[0], reach[path.light]);
   };

@@ -101,6 +101,7 @@ LinkedSolver::Renumbering LinkedSolver::renumber(const LinkedSolver& former, con
 GeometryChange LinkedSolver::changeOf(const Renumbering& numbers) const {
   GeometryChange change;
   change.boxes = numbers.map.boxes;
+  change.came = numbers.map.came;
   for (const auto& side : sides_) {
     const auto first = numbers.map.leaf_altered.begin() + patches_->surfaces[side.surface].first_leaf;
     change.altered.insert(change.altered.end(), first, first + side.leaf_count);

@@ -25,6 +25,8 @@ constexpr float kMostReach = 3.0F;
 constexpr float kHalfDiagonal = 0.7072F;
 
 constexpr float kMissed = -1.0F;
+/// Boxes are larger by this (unit box) than they are, where numbers are rounded that are of its size.
+constexpr float kRounding = 1e-6F;
 /// Slopes this small do not leave where they are.
 constexpr float kLevel = 1e-20F;
 
@@ -37,6 +39,36 @@ void include(scene::ChangedBox& box, const glm::vec3& centre, float radius) {
 
 inline float smaller(float a, float b) { return a < b ? a : b; }
 inline float larger(float a, float b) { return a > b ? a : b; }
+
+/// A way, and all within some distance of it.
+class Segment {
+ public:
+  Segment(const glm::vec3& from, const glm::vec3& to, float around)
+      : middle_(0.5F * (from + to)), half_(0.5F * (to - from)), reach_(glm::abs(half_) + around), around_(around) {}
+
+  /// False: what separates them is an axis, or the product of one and the way (Gottschalk, Lin and Manocha 1996).
+  [[nodiscard]] bool mayMeet(const scene::ChangedBox& box) const {
+    const glm::vec3 size = 0.5F * (box.high - box.low), apart = glm::abs(middle_ - 0.5F * (box.low + box.high));
+    if (apart.x > size.x + reach_.x || apart.y > size.y + reach_.y || apart.z > size.z + reach_.z) return false;
+    const glm::vec3 way = glm::abs(half_), wide = size + around_ + kRounding;
+    const glm::vec3 between = glm::abs(glm::cross(middle_ - 0.5F * (box.low + box.high), half_));
+    return between.x <= wide.y * way.z + wide.z * way.y && between.y <= wide.x * way.z + wide.z * way.x &&
+           between.z <= wide.x * way.y + wide.y * way.x;
+  }
+
+ private:
+  glm::vec3 middle_, half_, reach_;
+  float around_;
+};
+
+scene::ChangedBox around(std::span<const scene::ChangedBox> boxes) {
+  auto all = nothing();
+  for (const auto& box : boxes) {
+    all.low = glm::min(all.low, box.low);
+    all.high = glm::max(all.high, box.high);
+  }
+  return all;
+}
 
 struct Ball {
   glm::vec3 middle;
@@ -92,11 +124,8 @@ Shadows::Shadows(const scene::PatchScene& patches, const std::vector<Side>& side
     const auto size = box.high - box.low;
     return size.x * size.y + size.y * size.z + size.z * size.x;
   });
-  around_ = nothing();
-  for (const auto& box : change_.boxes) {
-    around_.low = glm::min(around_.low, box.low);
-    around_.high = glm::max(around_.high, box.high);
-  }
+  around_ = around(change_.boxes);
+  around_came_ = around(change_.came);
   place_.resize(value_.size());
   for (std::uint32_t i = 0; i < value_.size(); ++i) place_[value_[i]] = i;
   const auto altered = aroundAltered();
@@ -164,31 +193,27 @@ bool Shadows::passesWithin(const glm::vec3& middle, float radius) const {
   });
 }
 
-bool Shadows::isPassed(std::uint32_t value, const glm::vec3& to, float radius) const {
+bool Shadows::isPassed(const Boxes& boxes, std::uint32_t value, const glm::vec3& to, float radius) const {
   const auto i = place_[value];
-  if (leaves_.radius[i] < 0.0F) return true;
-  const auto from = leaves_.centre(i), way = to - from;
-  const float around = leaves_.radius[i] + radius;
-  const auto passes = [&](const scene::ChangedBox& box) {
-    float first = 0.0F, last = 1.0F;
-    for (int axis = 0; axis < 3; ++axis) {
-      const float low = box.low[axis] - around - from[axis], high = box.high[axis] + around - from[axis];
-      if (std::abs(way[axis]) < kLevel) {
-        if (low > 0.0F || high < 0.0F) return false;
-        continue;
-      }
-      const float a = low / way[axis], b = high / way[axis];
-      first = larger(first, smaller(a, b));
-      last = smaller(last, larger(a, b));
-    }
-    return first <= last;
-  };
-  return !change_.boxes.empty() && passes(around_) && std::ranges::any_of(change_.boxes, passes);
+  if (leaves_.radius[i] < 0.0F) return !boxes.each.empty();
+  const Segment way(leaves_.centre(i), to, leaves_.radius[i] + radius);
+  return way.mayMeet(boxes.all) &&
+         std::ranges::any_of(boxes.each, [&](const scene::ChangedBox& box) { return way.mayMeet(box); });
+}
+
+bool Shadows::isPassed(std::uint32_t value, const glm::vec3& to, float radius) const {
+  return isPassed(Boxes{change_.boxes, around_}, value, to, radius);
 }
 
 bool Shadows::isPassed(std::uint32_t value, std::uint32_t to) const {
   const auto i = place_[to];
   return leaves_.radius[i] < 0.0F || isPassed(value, leaves_.centre(i), leaves_.radius[i]);
+}
+
+bool Shadows::mayHide(std::uint32_t value, std::uint32_t to) const {
+  const auto i = place_[to];
+  if (leaves_.radius[i] < 0.0F) return !change_.came.empty();
+  return isPassed(Boxes{change_.came, around_came_}, value, leaves_.centre(i), leaves_.radius[i]);
 }
 
 bool Shadows::sees(const glm::vec3& point, const glm::vec3& normal) const {

@@ -18,8 +18,9 @@ namespace radiosity::solver {
 
 /// What changed, in the numbers of the edited scene.
 struct GeometryChange {
-  std::vector<scene::ChangedBox> boxes;
-  std::vector<bool> altered;  ///< by leaf value
+  std::vector<scene::ChangedBox> boxes;  ///< around what came and what is gone
+  std::vector<scene::ChangedBox> came;   ///< around what came: all that can hide what could be seen
+  std::vector<bool> altered;             ///< by leaf value
 };
 
 class Shadows {
@@ -38,6 +39,8 @@ class Shadows {
   /// another leaf.
   [[nodiscard]] bool isPassed(std::uint32_t value, const glm::vec3& to, float radius) const;
   [[nodiscard]] bool isPassed(std::uint32_t value, std::uint32_t to) const;
+  /// Of two leaves, whether anything that came may hide places of one from the other.
+  [[nodiscard]] bool mayHide(std::uint32_t value, std::uint32_t to) const;
   /// Whether a half space can see any of it.
   [[nodiscard]] bool sees(const glm::vec3& point, const glm::vec3& normal) const;
 
@@ -67,6 +70,12 @@ class Shadows {
   };
   static void markMet(const Way& way, const glm::vec4& plane, const Balls& balls, std::size_t first, std::size_t end,
                       float* marks);
+  /// Some boxes, and one around them.
+  struct Boxes {
+    std::span<const scene::ChangedBox> each;
+    scene::ChangedBox all;
+  };
+  [[nodiscard]] bool isPassed(const Boxes& boxes, std::uint32_t value, const glm::vec3& to, float radius) const;
   void takeTiles(Scratch& scratch) const;
   void markLeaves(std::size_t i, const glm::vec4& plane, Scratch& scratch) const;
   void addTiles(const Side& side);
@@ -80,6 +89,7 @@ class Shadows {
   GeometryChange change_;
   std::vector<scene::ChangedBox> all_;  ///< boxes, and one around all altered leaves
   scene::ChangedBox around_{};          ///< all boxes
+  scene::ChangedBox around_came_{};     ///< those of what came
   Balls leaves_;                        ///< tile after tile
   std::vector<std::uint32_t> value_;    ///< of these leaves
   std::vector<std::uint32_t> place_;    ///< by leaf value: where it is in leaves_

@@ -102,9 +102,10 @@ TEST(LeafSightsEdit, OfCoincidentSurfacesStayWhatTheyWere) {
   std::vector<std::uint32_t> value_before(fresh.leafCount(), scene::kNone);
   std::iota(value_before.begin(), value_before.begin() + former.leafCount(), 0U);
   for (std::size_t i = 9; i < quads.size(); ++i) {
-    change.boxes.push_back({quads[i].origin, quads[i].origin + quads[i].du + quads[i].dv});
+    change.came.push_back({quads[i].origin, quads[i].origin + quads[i].du + quads[i].dv});
     change.altered[former.leafCount() + i - 9] = true;
   }
+  change.boxes = change.came;
   const Shadows shadows(*after.patches, sides_after, change);
   edited.inherit(former, value_before, shadows, LeafSights::kMostRays);
   ASSERT_TRUE(edited.trace(HUGE_VAL));
@@ -128,6 +129,7 @@ TEST(LeafSightsEdit, LeavesPartlyInsideAreThoseOfTheSceneAsItIs) {
   trace(fresh, 16);
   GeometryChange change;
   change.boxes = {{glm::vec3(-0.06F, -0.5F, -0.5F), glm::vec3(0.26F, 0.5F, 0.5F)}};
+  change.came = {{glm::vec3(0.14F, -0.5F, -0.5F), glm::vec3(0.26F, 0.5F, 0.5F)}};
   change.altered.assign(fresh.leafCount(), false);
   std::vector<std::uint32_t> value_before(fresh.leafCount());
   std::iota(value_before.begin(), value_before.end(), 0U);

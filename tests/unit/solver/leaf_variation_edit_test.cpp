@@ -27,6 +27,7 @@ class MovedScreenTest : public testing::Test {
     change_.altered.assign(values, false);
     for (auto value = sides_[kWalls].first_value; value < values; ++value) change_.altered[value] = true;
     for (const float x : {-0.02F, 0.02F}) change_.boxes.push_back({{x, -0.05F, -0.05F}, {x, 0.05F, 0.05F}});
+    change_.came = {change_.boxes.back()};
     same_.assign(values, scene::kNone);
     for (std::uint32_t value = 0; value < values; ++value)
       if (!change_.altered[value]) same_[value] = value;
@@ -88,7 +89,7 @@ TEST_F(MovedScreenTest, PathsThatPassNothingThatChangedAreKeptAndOthersAreNot) {
   EXPECT_TRUE(isFoundAnew(former, &change, lamps_));
   EXPECT_TRUE(isFoundAnew(former, nullptr, lamps_));
   // Were paths kept whatever passes them, it would show.
-  const Shadows nothing(*after_.patches, sides_, {{}, std::vector<bool>(same_.size(), false)});
+  const Shadows nothing(*after_.patches, sides_, {{}, {}, std::vector<bool>(same_.size(), false)});
   EXPECT_FALSE(isFoundAnew(former, &nothing, lamps_));
   // That paths are kept by this change as well: they tell of the lamp where it was, which it must not be said to be.
   const auto lamps = std::exchange(lamps_, {makeLamp({-0.4F, -0.2F, -0.4F}, lamps_[0].key)});

@@ -74,6 +74,7 @@ class ShadowsTest : public testing::Test {
       }
       change.boxes.push_back(around);
     }
+    change.came = {change.boxes.back()};
     change.altered.resize(values_);
     for (std::size_t v = 0; v < values_; ++v) change.altered[v] = random_() % 50 == 0;
     return change;
@@ -155,8 +156,9 @@ TEST_F(ShadowsTest, OfLeavesAndLampsEveryWayThatIsPassedIsToldFromMostThatAreNot
       const double x = leaf % side.width + uniform(0.0, 1.0), y = leaf / side.width + uniform(0.0, 1.0);
       return glm::dvec3(frame.origin) + x * glm::dvec3(frame.du) + y * glm::dvec3(frame.dv);
     };
-    const auto isCutBetween = [&](const glm::dvec3& from, const glm::dvec3& to) {
-      return std::ranges::any_of(triangles_, [&](const Triangle& triangle) { return passes(from, to, triangle); });
+    const auto isCutBetween = [&](const glm::dvec3& from, const glm::dvec3& to, std::size_t first = 0) {
+      return std::ranges::any_of(std::span(triangles_).subspan(first),
+                                 [&](const Triangle& triangle) { return passes(from, to, triangle); });
     };
     for (int i = 0; i < 2'000; ++i) {
       const auto &side = sides_[random_() % sides_.size()], &other = sides_[random_() % sides_.size()];
@@ -166,10 +168,13 @@ TEST_F(ShadowsTest, OfLeavesAndLampsEveryWayThatIsPassedIsToldFromMostThatAreNot
       const auto lamp = pointIn(glm::dvec3(-0.49), glm::dvec3(0.49));
       const bool to_leaf = shadows.isPassed(side.first_value + leaf, other.first_value + seen);
       const bool to_lamp = shadows.isPassed(side.first_value + leaf, glm::vec3(lamp), static_cast<float>(radius));
-      const auto from = placeOn(side, leaf);
-      const bool cut_to_leaf = isCutBetween(from, placeOn(other, seen));
+      const bool hides = shadows.mayHide(side.first_value + leaf, other.first_value + seen);
+      const auto from = placeOn(side, leaf), to = placeOn(other, seen);
+      const bool cut_to_leaf = isCutBetween(from, to), hidden = isCutBetween(from, to, triangles_.size() - 6);
       const bool cut_to_lamp = isCutBetween(from, lamp + uniform(0.0, radius) * direction());
       ASSERT_TRUE(to_leaf || !cut_to_leaf) << "round " << round << ", " << i;
+      ASSERT_TRUE(hides || !hidden) << "round " << round << ", " << i;
+      ASSERT_TRUE(to_leaf || !hides) << "what came is a part of what changed";
       ASSERT_TRUE(to_lamp || !cut_to_lamp) << "round " << round << ", " << i;
       asked += 2;
       told += (to_leaf ? 1U : 0U) + (to_lamp ? 1U : 0U);
