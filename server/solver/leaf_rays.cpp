@@ -129,17 +129,17 @@ LeafRays::Place LeafRays::placeOn(std::uint32_t value, const glm::dvec2& at) con
 }
 
 LeafRays::Sight LeafRays::look(const Place& from, const glm::dvec3& direction, double reach) const {
-  Sight sight;
+  Sight sight{{}, reach};
   const auto origin = lifted(from);
-  const auto hit = tree_.nearestHit(origin, direction, 0.0, reach);
-  sight.distance = hit ? hit->t : reach;
-  if (!hit) return sight;
-  const auto s = side_of_[patches_.triangle_surface[hit->triangle]][hit->front ? 0 : 1];
+  scene::RayHit hit{};
+  if (!wide_.nearestHit(glm::vec3(origin), glm::vec3(direction), static_cast<float>(reach), hit)) return sight;
+  sight.distance = hit.t;
+  const auto s = side_of_[patches_.triangle_surface[hit.triangle]][hit.front ? 0 : 1];
   if (s == scene::kNone) return sight;
-  const auto& frame = patches_.triangles[hit->triangle];
-  sight.end.position = origin + hit->t * direction;
-  sight.end.normal = glm::dvec3(hit->front ? frame.normal : -frame.normal);
-  const auto value = leafAt(sides_[s], hit->triangle, sight.end.position);
+  const auto& frame = patches_.triangles[hit.triangle];
+  sight.end.position = origin + hit.t * direction;
+  sight.end.normal = glm::dvec3(hit.front ? frame.normal : -frame.normal);
+  const auto value = leafAt(sides_[s], hit.triangle, sight.end.position);
   if (stand_in_[value] == value) sight.end.value = value;
   return sight;
 }

@@ -126,8 +126,8 @@ Shadows::Shadows(const scene::PatchScene& patches, const std::vector<Side>& side
   });
   around_ = around(change_.boxes);
   around_came_ = around(change_.came);
-  place_.resize(value_.size());
-  for (std::uint32_t i = 0; i < value_.size(); ++i) place_[value_[i]] = i;
+  ball_.resize(value_.size());
+  for (std::size_t i = 0; i < value_.size(); ++i) ball_[value_[i]] = glm::vec4(leaves_.centre(i), leaves_.radius[i]);
   const auto altered = aroundAltered();
   if (altered.low.x <= altered.high.x) all_.push_back(altered);
 }
@@ -179,11 +179,11 @@ void Shadows::addLeaf(const Side& side, std::uint32_t leaf) {
 }
 
 bool Shadows::changesWithin(std::uint32_t value, float distance) const {
-  const auto i = place_[value];
-  if (leaves_.radius[i] < 0.0F) return true;
-  const auto reach = distance + leaves_.radius[i];
+  const auto& ball = ball_[value];
+  if (ball.w < 0.0F) return true;
+  const glm::vec3 centre(ball);
   return std::ranges::any_of(all_, [&](const scene::ChangedBox& box) {
-    return glm::distance(leaves_.centre(i), glm::clamp(leaves_.centre(i), box.low, box.high)) <= reach;
+    return glm::distance(centre, glm::clamp(centre, box.low, box.high)) <= distance + ball.w;
   });
 }
 
@@ -193,27 +193,23 @@ bool Shadows::passesWithin(const glm::vec3& middle, float radius) const {
   });
 }
 
-bool Shadows::isPassed(const Boxes& boxes, std::uint32_t value, const glm::vec3& to, float radius) const {
-  const auto i = place_[value];
-  if (leaves_.radius[i] < 0.0F) return !boxes.each.empty();
-  const Segment way(leaves_.centre(i), to, leaves_.radius[i] + radius);
+bool Shadows::isPassed(const Boxes& boxes, const glm::vec4& from, const glm::vec4& to) {
+  if (from.w < 0.0F || to.w < 0.0F) return !boxes.each.empty();
+  const Segment way(glm::vec3(from), glm::vec3(to), from.w + to.w);
   return way.mayMeet(boxes.all) &&
          std::ranges::any_of(boxes.each, [&](const scene::ChangedBox& box) { return way.mayMeet(box); });
 }
 
 bool Shadows::isPassed(std::uint32_t value, const glm::vec3& to, float radius) const {
-  return isPassed(Boxes{change_.boxes, around_}, value, to, radius);
+  return isPassed(Boxes{change_.boxes, around_}, ball_[value], glm::vec4(to, radius));
 }
 
 bool Shadows::isPassed(std::uint32_t value, std::uint32_t to) const {
-  const auto i = place_[to];
-  return leaves_.radius[i] < 0.0F || isPassed(value, leaves_.centre(i), leaves_.radius[i]);
+  return isPassed(Boxes{change_.boxes, around_}, ball_[value], ball_[to]);
 }
 
 bool Shadows::mayHide(std::uint32_t value, std::uint32_t to) const {
-  const auto i = place_[to];
-  if (leaves_.radius[i] < 0.0F) return !change_.came.empty();
-  return isPassed(Boxes{change_.came, around_came_}, value, leaves_.centre(i), leaves_.radius[i]);
+  return isPassed(Boxes{change_.came, around_came_}, ball_[value], ball_[to]);
 }
 
 bool Shadows::sees(const glm::vec3& point, const glm::vec3& normal) const {

@@ -75,7 +75,8 @@ class Shadows {
     std::span<const scene::ChangedBox> each;
     scene::ChangedBox all;
   };
-  [[nodiscard]] bool isPassed(const Boxes& boxes, std::uint32_t value, const glm::vec3& to, float radius) const;
+  /// Of balls that touch; nothing is known of those without a radius.
+  [[nodiscard]] static bool isPassed(const Boxes& boxes, const glm::vec4& from, const glm::vec4& to);
   void takeTiles(Scratch& scratch) const;
   void markLeaves(std::size_t i, const glm::vec4& plane, Scratch& scratch) const;
   void addTiles(const Side& side);
@@ -92,7 +93,7 @@ class Shadows {
   scene::ChangedBox around_came_{};     ///< those of what came
   Balls leaves_;                        ///< tile after tile
   std::vector<std::uint32_t> value_;    ///< of these leaves
-  std::vector<std::uint32_t> place_;    ///< by leaf value: where it is in leaves_
+  std::vector<glm::vec4> ball_;         ///< by leaf value: the same, in one place; its radius is w
   /// Leaves of a square of a side.
   struct Tile {
     std::size_t first, count;  ///< into leaves_
