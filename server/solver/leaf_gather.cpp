@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <numeric>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <numeric>
 
 #include "common/clones.h"
 #include "common/give_back.h"
@@ -248,53 +248,6 @@ void LeafGather::sweep(std::size_t h, RayGmres::Vectors& x, bool affine) {
   for (std::size_t v = 0; v < leaves; ++v) {
     for (std::size_t c = 0; c < 3; ++c) x[c][v] = half.arriving[v][c];
   }
-}
-
-/// How much of their light leaves lose, and which sides see each other, if over others.
-void LeafGather::weighRays() {
-  part_.resize(sides_.size());
-  std::iota(part_.begin(), part_.end(), 0U);
-  const auto root = [&](std::uint32_t side) {
-    while (part_[side] != side) side = part_[side] = part_[part_[side]];
-    return side;
-  };
-  const auto join = [&](std::uint32_t one, std::uint32_t other) {
-    const auto a = root(one), b = root(other);
-    part_[std::max(a, b)] = std::min(a, b);
-  };
-  for (auto& lost : lost_) lost.assign(sights_.leafCount(), {});
-  has_parted_ = false;
-  for (std::uint32_t v = 0; v < sights_.leafCount() && !has_parted_; ++v)
-    has_parted_ = area_[v] > 0.0 && sights_.isParted(v);
-  std::size_t first = 0;
-  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
-    for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count;
-         first += sights_.counts()[v++]) {
-      for (std::size_t half = 0; half < 2; ++half) {
-        LostRays lost;
-        for (const auto end : sights_.ends(half, first, sights_.counts()[v])) {
-          if (end == sights_.skyAbove()) ++lost.above;
-          if (end == sights_.skyBelow()) ++lost.below;
-          if (sights_.isAbsorbed(end)) ++lost.absorbed;
-          if (end < sights_.leafCount()) join(s, sights_.sideOf(end));
-          if (sights_.isDoubtful(half, end)) ++lost.doubtful;
-          if (end >= sights_.endCount()) join(s, sights_.sideOf(sights_.steps(half)[end - sights_.endCount()].by));
-        }
-        lost_[half][v] = lost;
-      }
-    }
-  }
-  for (std::size_t half = 0; half < 2; ++half) {
-    // Of a closed room nothing is lost.
-    if (std::ranges::all_of(lost_[half], [](const LostRays& lost) { return lost == LostRays{}; }))
-      giveBack(lost_[half]);
-    const auto steps = sights_.steps(half);
-    for (const auto& step : steps) {
-      const auto next = step.next < sights_.endCount() ? step.next : steps[step.next - sights_.endCount()].by;
-      if (next < sights_.leafCount()) join(sights_.sideOf(step.by), sights_.sideOf(next));
-    }
-  }
-  for (std::uint32_t s = 0; s < sides_.size(); ++s) part_[s] = root(s);
 }
 
 void LeafGather::takeSolutions() {

@@ -148,7 +148,9 @@ class LeafGather {
   void sweep(std::size_t half, RayGmres::Vectors& x, bool affine);
   void take(std::size_t half, const Levels& levels);
   void takeSolutions();
+  class Parts;
   void weighRays();
+  void weighRays(std::size_t half, Parts& parts);
   [[nodiscard]] double solved(std::size_t half, std::size_t channel, std::size_t value) const;
   /// What the level of a part of the scene follows from.
   struct LevelSum {

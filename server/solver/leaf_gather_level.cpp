@@ -1,8 +1,13 @@
 // The level of reflected light: what is sent and does not leave the scene arrives. Rays know each exchange between two
 // leaves badly, and this very well.
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numeric>
+#include <utility>
 
+#include "common/give_back.h"
+#include "server/solver/halves.h"
 #include "server/solver/leaf_gather.h"
 
 namespace radiosity::solver {
@@ -17,6 +22,65 @@ constexpr double kByChance = 2.0;
 constexpr double kMostLoss = 4.0;
 
 }  // namespace
+
+/// Sides that see each other, if over others, are of one part, which has the number of the first of them.
+class LeafGather::Parts {
+ public:
+  explicit Parts(std::size_t sides) : above_(sides) { std::iota(above_.begin(), above_.end(), 0U); }
+
+  [[nodiscard]] std::uint32_t of(std::uint32_t side) {
+    while (above_[side] != side) side = above_[side] = above_[above_[side]];
+    return side;
+  }
+  void join(std::uint32_t one, std::uint32_t other) {
+    const auto a = of(one), b = of(other);
+    above_[std::max(a, b)] = std::min(a, b);
+  }
+
+ private:
+  std::vector<std::uint32_t> above_;  ///< by side: another of its part, of a smaller number
+};
+
+/// How much of their light leaves lose, and which sides are of one part.
+void LeafGather::weighRays() {
+  has_parted_ = false;
+  for (std::uint32_t v = 0; v < sights_.leafCount() && !has_parted_; ++v)
+    has_parted_ = area_[v] > 0.0 && sights_.isParted(v);
+  std::array<Parts, 2> parts{Parts(sides_.size()), Parts(sides_.size())};
+  inBothHalves([&](std::size_t half) { weighRays(half, parts[half]); });
+  part_.resize(sides_.size());
+  for (std::uint32_t s = 0; s < sides_.size(); ++s) parts[0].join(s, parts[1].of(s));
+  for (std::uint32_t s = 0; s < sides_.size(); ++s) part_[s] = parts[0].of(s);
+}
+
+void LeafGather::weighRays(std::size_t half, Parts& parts) {
+  lost_[half].assign(sights_.leafCount(), {});
+  const auto steps = sights_.steps(half);
+  std::vector<std::uint32_t> joined(sides_.size(), scene::kNone);  // by side: the last that it was joined to
+  std::size_t first = 0;
+  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
+    for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count;
+         first += sights_.counts()[v++]) {
+      LostRays lost;
+      for (const auto end : sights_.ends(half, first, sights_.counts()[v])) {
+        if (end == sights_.skyAbove()) ++lost.above;
+        if (end == sights_.skyBelow()) ++lost.below;
+        if (sights_.isAbsorbed(end)) ++lost.absorbed;
+        if (sights_.isDoubtful(half, end)) ++lost.doubtful;
+        if (end >= sights_.leafCount() && end < sights_.endCount()) continue;
+        const auto seen = sights_.sideOf(end < sights_.endCount() ? end : steps[end - sights_.endCount()].by);
+        if (std::exchange(joined[seen], s) != s) parts.join(s, seen);
+      }
+      lost_[half][v] = lost;
+    }
+  }
+  // Of a closed room nothing is lost.
+  if (std::ranges::all_of(lost_[half], [](const LostRays& lost) { return lost == LostRays{}; })) giveBack(lost_[half]);
+  for (const auto& step : steps) {
+    const auto next = step.next < sights_.endCount() ? step.next : steps[step.next - sights_.endCount()].by;
+    if (next < sights_.leafCount()) parts.join(sights_.sideOf(step.by), sights_.sideOf(next));
+  }
+}
 
 /// x, but for what few rays find too much missing of: with what came over links no leaf gets less than no light.
 double LeafGather::solved(std::size_t h, std::size_t c, std::size_t v) const {
