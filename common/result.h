@@ -17,7 +17,7 @@ enum class ErrorCode {
   kUnsupported,    ///< a required feature we do not have, named
   kNotFound,       ///< a file, page, tile or revision that does not exist
   kTooLarge,       ///< over a stated limit (protocol -32013)
-  kStaleRevision,  ///< baseRevision is not the current one (protocol -32009)
+  kStaleRevision,  ///< baseRevision is not the current one, or sameSceneAs of another scene (protocol -32009)
   kTestFailed,     ///< a JSON Patch `test` did not hold (protocol -32010)
   kBusy,           ///< try again later: queue full, draining
   kUnavailable,    ///< no driver, no connection, port in use

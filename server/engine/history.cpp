@@ -129,6 +129,7 @@ void History::take(Next next) {
   if (next.entry.kind == PastRevision::Kind::kLoad) {
     log_.clear();
     edits_.clear();
+    same_since_ = next.entry.revision;
   }
   std::erase_if(edits_, [&](const auto& edit) { return std::ranges::count(next.forgotten, edit.revision) > 0; });
   if (next.edit) edits_.push_back(std::move(*next.edit));
@@ -137,13 +138,14 @@ void History::take(Next next) {
 }
 
 bool History::isSameSceneSince(std::uint64_t revision) const {
-  // A load clears the log, and is its first entry until 256 others have come: what is in it is of one scene.
-  return !log_.empty() && revision >= log_.front().revision && revision <= log_.back().revision;
+  return !log_.empty() && revision >= same_since_ && revision <= log_.back().revision;
 }
 
 void History::restore(std::vector<PastRevision> log_entries, std::vector<state::Edit> edits, std::size_t done) {
   log_.clear();
   for (auto& entry : log_entries) log(std::move(entry));
+  // A load clears the log: what is in it is of one scene, and so is what came right before, but for a load.
+  if (!log_.empty()) same_since_ = log_.front().revision - (log_.front().kind == PastRevision::Kind::kLoad ? 0 : 1);
   edits_.assign(std::make_move_iterator(edits.begin()), std::make_move_iterator(edits.end()));
   done_ = done;
 }

@@ -67,7 +67,7 @@ class History {
   /// What outlived the last process: a log whose `undone` is not set yet, and edits of which so many are done.
   void restore(std::vector<PastRevision> log, std::vector<state::Edit> edits, std::size_t done);
 
-  /// Whether no other scene was loaded after that revision; false also where that is too long ago to tell.
+  /// Whether that revision is there, and no other scene was loaded after it.
   [[nodiscard]] bool isSameSceneSince(std::uint64_t revision) const;
 
   [[nodiscard]] HistoryReport report(std::uint64_t revision) const;
@@ -79,7 +79,8 @@ class History {
   Bounds bounds_;
   std::vector<PastRevision> log_;
   std::vector<state::Edit> edits_;
-  std::size_t done_ = 0;  // of edits_; those behind are taken back
+  std::size_t done_ = 0;          // of edits_; those behind are taken back
+  std::uint64_t same_since_ = 0;  // the first revision of this scene, or of what is known of it after a restart
 };
 
 }  // namespace radiosity::engine

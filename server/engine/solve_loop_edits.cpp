@@ -111,7 +111,7 @@ Result<void> SolveLoop::checkBase(const std::optional<std::uint64_t>& base_revis
 Result<void> SolveLoop::checkScene(const std::optional<std::uint64_t>& same_scene_as) const {
   if (!same_scene_as || history_.isSameSceneSince(*same_scene_as)) return {};
   return fail(ErrorCode::kStaleRevision,
-              fmt::format("another scene was loaded since revision {}, or too much was done to tell", *same_scene_as));
+              fmt::format("revision {} is of another scene than the present one", *same_scene_as));
 }
 
 Result<PatchOutcome> SolveLoop::applyRequest(const PatchRequest& request) {

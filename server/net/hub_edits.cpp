@@ -85,8 +85,8 @@ SharedBytes Hub::upload(const std::string& uri) {
 }
 
 void Hub::patch(const protocol::ScenePatchCall& call, const std::string& by, EditAnswer done) {
-  const auto text = fmt::format("{}|{}|{}|{}", call.base_revision.value_or(0), call.same_scene_as.value_or(0),
-                                call.dry_run, call.patch);
+  auto text = fmt::format("{}|{}|{}", call.base_revision.value_or(0), call.dry_run, call.patch);
+  if (call.same_scene_as) text += fmt::format("|{}", *call.same_scene_as);  // others' are kept over a restart
   const engine::Receipt receipt{call.request_id, call.request_id.empty() ? 0 : fingerprintOf(text)};
   engine::PatchRequest request{
       .patch = call.patch,

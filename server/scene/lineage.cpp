@@ -109,7 +109,8 @@ class Matcher {
     const auto sameTriangle = [&](std::uint32_t t, std::uint32_t u) {
       return t == kNone || u == kNone ? t == u : t - a.first_triangle == u - b.first_triangle;
     };
-    if (!sameTriangle(old_one.triangle, new_one.triangle) || old_one.full != new_one.full || old_one.cut != new_one.cut)
+    if (!sameTriangle(old_one.triangle, new_one.triangle) || old_one.full != new_one.full ||
+        old_one.cut != new_one.cut || old_one.beneath != new_one.beneath)
       return false;
     if (!old_one.full && old_one.texel != new_one.texel) return false;
     if ((old_one.first_spot == kNone) != (new_one.first_spot == kNone)) return false;

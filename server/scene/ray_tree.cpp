@@ -59,7 +59,7 @@ std::uint32_t RayTree::addBlock(const Bvh& tree, std::uint32_t first, std::uint3
 }
 
 RADIOSITY_CLONES bool RayTree::nearestHit(const glm::vec3& origin, const glm::vec3& direction, float t_max, RayHit& hit,
-                                          std::span<const std::uint32_t> passed) const {
+                                          std::span<const std::uint32_t> passed, std::uint32_t own) const {
   if (nodes_.empty()) return false;
   const WideNodes::Ray ray(origin, direction);
   struct Task {
@@ -79,13 +79,11 @@ RADIOSITY_CLONES bool RayTree::nearestHit(const glm::vec3& origin, const glm::ve
       const Block& block = blocks_[task.child & ~WideNodes::kLeaf];
       meetTriangles(block, ray, lane, turn);
       for (std::size_t k = 0; k < kLanes; ++k) {
+        const bool ties = found && std::abs(lane[k] - nearest) <= kSame;
+        if ((!ties && !(lane[k] < nearest)) || block.triangle[k] == own) continue;
         if (!passed.empty() && std::ranges::find(passed, block.triangle[k]) != passed.end()) continue;
         const bool front = turn[k] > 0.0F;
-        if (found && std::abs(lane[k] - nearest) <= kSame) {
-          if (front != hit.front ? hit.front : hit.triangle < block.triangle[k]) continue;
-        } else if (!(lane[k] < nearest)) {
-          continue;
-        }
+        if (ties && (front != hit.front ? hit.front : hit.triangle < block.triangle[k])) continue;
         nearest = lane[k];
         reach = std::min(t_max, nearest + kSame);
         hit.triangle = block.triangle[k];

@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "server/scene/scene.h"
 #include "server/scene/wide_nodes.h"
 
 namespace radiosity::scene {
@@ -23,9 +24,9 @@ class RayTree {
   explicit RayTree(const Bvh& tree);
 
   /// Of the hit with the least t > 0, in units of the direction's length, below t_max; false: none is. `passed`:
-  /// triangles that do not count.
+  /// triangles that do not count. `own`: that the ray starts on, which it does not meet.
   [[nodiscard]] bool nearestHit(const glm::vec3& origin, const glm::vec3& direction, float t_max, RayHit& hit,
-                                std::span<const std::uint32_t> passed = {}) const;
+                                std::span<const std::uint32_t> passed = {}, std::uint32_t own = kNone) const;
 
  private:
   struct Block : TriangleLanes {

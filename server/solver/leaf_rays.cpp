@@ -29,6 +29,10 @@ glm::dvec2 texelAt(const scene::TriangleFrame& frame, const glm::dvec3& point) {
   return {(along_u * vv - along_v * uv) / determinant, (along_v * uu - along_u * uv) / determinant};
 }
 
+glm::dvec3 positionAt(const scene::TriangleFrame& frame, const glm::dvec2& texel) {
+  return glm::dvec3(frame.origin) + texel.x * glm::dvec3(frame.du) + texel.y * glm::dvec3(frame.dv);
+}
+
 glm::dvec3 lifted(const LeafRays::Place& place) { return place.position + kLift * place.normal; }
 
 }  // namespace
@@ -123,29 +127,27 @@ LeafRays::Place LeafRays::placeOn(std::uint32_t value, const glm::dvec2& at) con
   const auto& point = patches_.leaves[patches_.surfaces[side.surface].first_leaf + leaf];
   const auto [texel, triangle] = patches_.spotAt(point, leaf % side.width, leaf / side.width, glm::vec2(at));
   const auto& frame = patches_.triangles[triangle];
-  const glm::dvec3 position = glm::dvec3(frame.origin) + static_cast<double>(texel.x) * glm::dvec3(frame.du) +
-                              static_cast<double>(texel.y) * glm::dvec3(frame.dv);
-  return {position, glm::dvec3(side.side == 0 ? frame.normal : -frame.normal), value};
+  return {positionAt(frame, glm::dvec2(texel)), glm::dvec3(side.side == 0 ? frame.normal : -frame.normal), value,
+          triangle};
 }
 
 LeafRays::Sight LeafRays::look(const Place& from, const glm::dvec3& direction, double reach) const {
-  Sight sight{{}, reach};
+  Sight sight;
   const auto origin = lifted(from);
-  scene::RayHit hit{};
-  if (!wide_.nearestHit(glm::vec3(origin), glm::vec3(direction), static_cast<float>(reach), hit)) return sight;
-  sight.distance = hit.t;
-  const auto s = side_of_[patches_.triangle_surface[hit.triangle]][hit.front ? 0 : 1];
+  const auto hit = tree_.nearestHit(origin, direction, 0.0, reach);
+  sight.distance = hit ? hit->t : reach;
+  if (!hit) return sight;
+  const auto s = side_of_[patches_.triangle_surface[hit->triangle]][hit->front ? 0 : 1];
   if (s == scene::kNone) return sight;
-  const auto& frame = patches_.triangles[hit.triangle];
-  sight.end.position = origin + hit.t * direction;
-  sight.end.normal = glm::dvec3(hit.front ? frame.normal : -frame.normal);
-  const auto value = leafAt(sides_[s], hit.triangle, sight.end.position);
+  const auto& frame = patches_.triangles[hit->triangle];
+  sight.end.position = origin + hit->t * direction;
+  sight.end.normal = glm::dvec3(hit->front ? frame.normal : -frame.normal);
+  const auto value = leafAt(sides_[s], texelAt(frame, sight.end.position));
   if (stand_in_[value] == value) sight.end.value = value;
   return sight;
 }
 
-std::uint32_t LeafRays::leafAt(const Side& side, std::uint32_t triangle, const glm::dvec3& point) const {
-  const auto texel = texelAt(patches_.triangles[triangle], point);
+std::uint32_t LeafRays::leafAt(const Side& side, const glm::dvec2& texel) {
   const auto x = static_cast<std::uint32_t>(std::clamp(texel.x, 0.0, static_cast<double>(side.width - 1)));
   const auto y = static_cast<std::uint32_t>(std::clamp(texel.y, 0.0, static_cast<double>(side.height - 1)));
   return side.first_value + y * side.width + x;
@@ -167,7 +169,7 @@ std::uint32_t LeafRays::see(const Place& from, const glm::dvec3& direction, std:
   while (true) {
     scene::RayHit hit{};
     if (!wide_.nearestHit(glm::vec3(origin), glm::vec3(direction), static_cast<float>(kFar), hit,
-                          std::span(passed).first(sheets)))
+                          std::span(passed).first(sheets), from.triangle))
       return direction.y >= 0.0 ? kSkyAbove : kSkyBelow;
     const auto at = origin + hit.t * direction;
     if (starts < kMostStarts && passes(hit, at, key)) {
@@ -185,14 +187,17 @@ std::uint32_t LeafRays::see(const Place& from, const glm::dvec3& direction, std:
     auto s = side_of_[patches_.triangle_surface[hit.triangle]][hit.front ? 0 : 1];
     end = {at, {}, kNothing};
     if (s == scene::kNone) return kNothing;
-    auto value = leafAt(sides_[s], hit.triangle, at);
+    auto texel = texelAt(patches_.triangles[hit.triangle], at);
+    auto value = leafAt(sides_[s], texel);
     if (sheets + 1 < kMostSheets && isBeneath(sides_[s], value) &&
         uncover(hit, origin, direction, std::span(passed), sheets)) {
       s = side_of_[patches_.triangle_surface[hit.triangle]][hit.front ? 0 : 1];
-      value = leafAt(sides_[s], hit.triangle, at);
+      texel = texelAt(patches_.triangles[hit.triangle], at);
+      value = leafAt(sides_[s], texel);
     }
-    const auto& normal = patches_.triangles[hit.triangle].normal;
-    end = {at, glm::dvec3(hit.front ? normal : -normal), value};
+    // In the plane: `at` is off by what the distance is rounded, more than rays are lifted on long thin triangles.
+    const auto& frame = patches_.triangles[hit.triangle];
+    end = {positionAt(frame, texel), glm::dvec3(hit.front ? frame.normal : -frame.normal), value, hit.triangle};
     return stand_in_[value];
   }
 }

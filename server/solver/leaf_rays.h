@@ -26,7 +26,8 @@ class LeafRays {
   struct Place {
     glm::dvec3 position{0.0};
     glm::dvec3 normal{0.0};
-    std::uint32_t value = kNothing;  ///< leaf value
+    std::uint32_t value = kNothing;         ///< leaf value
+    std::uint32_t triangle = scene::kNone;  ///< that it lies on, where rays from it are seen by see()
   };
 
   /// O(n log n) in triangles. Both are to outlive it.
@@ -55,7 +56,7 @@ class LeafRays {
   [[nodiscard]] Sight look(const Place& from, const glm::dvec3& direction) const;
   /// The leaf value that is seen that way, kNothing or one of the sky's. Where a leaf has no area of its own (buried
   /// right behind another, or so little of it that its neighbours took it) it is theirs. What one can see through stops
-  /// the ray or not, by chance from `key`. Costs a third of look().
+  /// the ray or not, by chance from `key`. In single precision: a third of what look() costs.
   /// `end`: where the ray ends, and on which leaf, be it that another's value is told; kNothing: on an unlit side. As
   /// it was where it ends in the sky.
   [[nodiscard]] std::uint32_t see(const Place& from, const glm::dvec3& direction, std::uint64_t key, Place& end) const;
@@ -74,8 +75,8 @@ class LeafRays {
   bool uncover(scene::RayHit& hit, const glm::dvec3& origin, const glm::dvec3& direction,
                std::span<std::uint32_t> passed, std::size_t sheets) const;
   [[nodiscard]] bool passes(const scene::RayHit& hit, const glm::dvec3& at, std::uint64_t key) const;
-  /// The leaf of a side that a point of a triangle's plane lies on, by value.
-  [[nodiscard]] std::uint32_t leafAt(const Side& side, std::uint32_t triangle, const glm::dvec3& point) const;
+  /// The leaf of a side that a texel lies on, or the nearest, by value.
+  [[nodiscard]] static std::uint32_t leafAt(const Side& side, const glm::dvec2& texel);
 
   scene::Bvh tree_;
   scene::RayTree wide_;

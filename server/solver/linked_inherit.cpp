@@ -114,7 +114,9 @@ void LinkedSolver::addEarlier(const Renumbering& numbers, GeometryChange& change
   const auto& former = numbers.former;
   const auto& earlier = (former.earlier_shadows_ ? former.earlier_shadows_ : former.shadows_)->change();
   change.boxes.insert(change.boxes.end(), earlier.boxes.begin(), earlier.boxes.end());
+  change.came.insert(change.came.end(), earlier.came.begin(), earlier.came.end());
   scene::joinBoxes(change.boxes);
+  scene::joinBoxes(change.came);
   for (std::size_t s = 0; s < former.sides_.size(); ++s) {
     if (numbers.unmoved_after[s] == scene::kNone) continue;
     const auto from = former.sides_[s].first_value, to = sides_[numbers.unmoved_after[s]].first_value;

@@ -44,7 +44,10 @@ inline float larger(float a, float b) { return a > b ? a : b; }
 class Segment {
  public:
   Segment(const glm::vec3& from, const glm::vec3& to, float around)
-      : middle_(0.5F * (from + to)), half_(0.5F * (to - from)), reach_(glm::abs(half_) + around), around_(around) {}
+      : middle_(0.5F * (from + to)),
+        half_(0.5F * (to - from)),
+        reach_(glm::abs(half_) + around + kRounding),
+        around_(around) {}
 
   /// False: what separates them is an axis, or the product of one and the way (Gottschalk, Lin and Manocha 1996).
   [[nodiscard]] bool mayMeet(const scene::ChangedBox& box) const {

@@ -83,6 +83,7 @@ TEST(Lineage, WhatMovesKeepsItsPlaceOnThePageAndAllElseIsTheSame) {
              glm::all(glm::greaterThanEqual(box.high, surface.bounds_max));
     };
     EXPECT_TRUE(std::ranges::any_of(map.boxes, holds)) << "where it was, and where it is";
+    EXPECT_EQ(std::ranges::any_of(map.came, holds), scene == &moved) << "there it came, and nothing else";
   }
 }
 
@@ -95,6 +96,9 @@ TEST(Lineage, WhatComesTakesWhatIsFreeAndWhatWentLeavesItsPlace) {
   ASSERT_EQ(fewer.surfaces.size(), 3U);
   EXPECT_EQ(fewer.pages[0].width, patches.pages[0].width);
   expectDisjoint(fewer);
+  const auto gone = matchPatches(before, patches, without, fewer);
+  EXPECT_FALSE(gone.boxes.empty());
+  EXPECT_TRUE(gone.came.empty()) << "nothing came that hides anything";
   auto with = without;
   with.instances.push_back(placed(4, {2, 1, 2}, 1.0));
   const auto other = successor(without, fewer, with);
@@ -105,6 +109,8 @@ TEST(Lineage, WhatComesTakesWhatIsFreeAndWhatWentLeavesItsPlace) {
   const auto map = matchPatches(without, fewer, with, other);
   EXPECT_EQ(map.surface_before.back(), kNone);
   EXPECT_FALSE(map.moved[0]);
+  ASSERT_EQ(map.came.size(), 1U);
+  EXPECT_EQ(map.came[0].low, other.surfaces.back().bounds_min);
 }
 
 TEST(Lineage, BoxesLieAroundPartsAndNotAroundWhatIsBetweenThem) {

@@ -3,7 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <glm/geometric.hpp>
+#include <random>
+
 #include "tests/unit/scene/shapes.h"
+#include "tests/unit/solver/quad_scene.h"
 
 namespace radiosity::solver {
 namespace {
@@ -61,6 +65,45 @@ TEST(LeafRays, OfWhatLiesInOnePlaceTheEarlierIsSeen) {
       }
     }
   }
+}
+
+/// Whose distances single precision knows worse than rays are lifted.
+TEST(LeafRays, LongThinTurnedStripsDoNotHideTheSkyFromThemselves) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  const auto direction = [&] {
+    return glm::normalize(2.0 * glm::dvec3(unit(random), unit(random), unit(random)) - 1.0);
+  };
+  std::size_t hidden = 0, hidden_there = 0, seen = 0;
+  for (int turn = 0; turn < 50; ++turn) {
+    const glm::dvec3 along = direction(), across = glm::normalize(glm::cross(along, direction()));
+    constexpr double kLong = 0.8, kWide = kLong / 400.0;
+    const glm::dvec3 corner = -0.5 * (kLong * along + kWide * across);
+    const auto made =
+        test::makeQuadScene({{glm::vec3(corner), glm::vec3(kLong * along), glm::vec3(kWide * across), 40, 1}});
+    const auto sides = makeSides(*made.patches);
+    const LeafRays rays(*made.patches, sides);
+    const auto seesSky = [&](const LeafRays::Place& from, const glm::dvec3& way) {
+      LeafRays::Place end;
+      const auto seen = rays.see(from, way, 1, end);
+      return seen == LeafRays::kSkyAbove || seen == LeafRays::kSkyBelow;
+    };
+    for (int i = 0; i < 2'000; ++i) {
+      const auto place = rays.placeOn(static_cast<std::uint32_t>(i % 40), {unit(random), unit(random)});
+      LeafRays::Place end;
+      const auto way = cosineDirection(place.normal, unit(random), unit(random));
+      hidden += seesSky(place, way) ? 0 : 1;
+      const LeafRays::Place before{place.position + 0.3 * way, -way};
+      if (rays.see(before, -way, 1, end) >= LeafRays::kSkyBelow) continue;
+      ++seen;
+      const auto on = cosineDirection(end.normal, unit(random), unit(random));
+      hidden_there += seesSky(end, on) ? 0 : 1;
+    }
+  }
+  EXPECT_GT(seen, 90'000U) << "of 100,000";
+  // Of two triangles the other may be met, right at the edge between them.
+  EXPECT_LT(hidden, 20U);
+  EXPECT_LT(hidden_there, 20U);
 }
 
 }  // namespace

@@ -418,24 +418,25 @@ describe('scene document', () => {
     expect(refused.length).toBe(2);
   });
 
-  it('tells with each edit of which scene it is, by the revision that it was made at', async () => {
+  it('tells with each edit of which scene it is, and drops all of them where the server has another', async () => {
     const { document, calls, refused } = session();
-    const first = document.edit('Move', move(2));
-    const second = document.edit('Move', move(3)).catch((error: Error) => error.message);
+    const made = [document.edit('Move', move(2)), document.edit('Move', move(3))];
     document.patched(2, [{ op: 'replace', path: '/materials/0/name', value: 'grey' }], 'ann');
     calls[0]!.answer(reply(3));
-    await first;
+    await made[0];
+    const late = ['Tint', 'Turn'].map((label) => document.edit(label, move(4)).catch((error: Error) => error.message));
     await settle();
-    const late = document.edit('Move', move(4)).catch((error: Error) => error.message);
-    // Another scene is there, of which this page has not heard: the server has, and what waits is of the same scene.
-    for (const call of [1, 2]) {
-      calls[call]!.refuse(new RpcError(-32009, 'another scene was loaded since'));
-      await settle();
-    }
-    expect(await Promise.all([second, late])).toEqual(Array(2).fill('another scene was loaded since'));
+    calls[1]!.answer(reply(4));
+    await made[1];
+    await settle();
+    calls[2]!.refuse(new RpcError(-32009, 'revision 3 is of another scene than the present one'));
+    expect(await Promise.all(late)).toEqual(Array(2).fill('another scene was loaded'));
     expect(calls.map(({ sameSceneAs }) => sameSceneAs)).toEqual([1, 1, 3]);
-    expect(refused.length).toBe(2);
-    expect(document.gltf.nodes![1]!.translation).toEqual([2, 0, 0]);
+    expect(refused).toEqual(['Turn: another scene was loaded']);
+    expect(document.gltf.nodes![1]!.translation).toEqual([3, 0, 0]);
+    document.reset(room(), 7);
+    void document.edit('Move', move(5));
+    expect(calls[3]!.sameSceneAs).toBe(7);
   });
 
   it('lays what waits to be sent upon the document that comes anew', async () => {

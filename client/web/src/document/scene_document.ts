@@ -2,7 +2,7 @@
 // server refuses is taken back with its reason. One edit is on the way at a time: while somebody drags, later positions
 // replace the one that waits. Main thread; knows no pictures.
 
-import type { Json, Patch, ScenePatchReply } from '../protocol/messages';
+import { STALE_REVISION, type Json, type Patch, type ScenePatchReply } from '../protocol/messages';
 import { ConnectionLost, RpcError } from '../protocol/rpc';
 import { redoOnServer, undoOnServer } from './edits';
 import type { Gltf } from './gltf';
@@ -280,7 +280,9 @@ export class SceneDocument {
         this.confirm(edit, reply.revision);
         edit.done();
       } catch (error) {
-        this.refuse(edit, error as Error);
+        // It was made for another scene than the server has, of which news is on its way; so was all that waits.
+        if (error instanceof RpcError && error.code === STALE_REVISION) this.leave('another scene was loaded');
+        else this.refuse(edit, error as Error);
       }
       // A scene that came meanwhile has taken the list away, or the notification has taken the edit off it.
       if (this.pending[0] === edit) this.pending.shift();

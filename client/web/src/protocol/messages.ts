@@ -160,3 +160,4 @@ export const CLOSE_OVERLOAD = 1013;
 export const UNAUTHENTICATED = -32001;
 /** There is nothing of that name, or no scene. */
 export const NOT_FOUND = -32004;
+export const STALE_REVISION = -32009;
