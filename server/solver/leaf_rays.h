@@ -27,7 +27,7 @@ class LeafRays {
     glm::dvec3 position{0.0};
     glm::dvec3 normal{0.0};
     std::uint32_t value = kNothing;         ///< leaf value
-    std::uint32_t triangle = scene::kNone;  ///< that it lies on, where rays from it are seen by see()
+    std::uint32_t triangle = scene::kNone;  ///< that it lies on, which no ray of see() from there meets; if known
   };
 
   /// O(n log n) in triangles. Both are to outlive it.

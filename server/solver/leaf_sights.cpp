@@ -356,15 +356,15 @@ bool LeafSights::isBetween(std::span<const scene::ChangedBox> boxes, std::uint32
 
 /// A step of the scene before and those that it goes on to; kUntraced: where it passes may have changed, or is not
 /// known. Where a ray into the sky passes never is.
-std::uint32_t LeafSights::inheritStep(const LeafSights& former, std::size_t half, std::uint32_t end,
-                                      std::span<const std::uint32_t> value_after,
-                                      std::span<const scene::ChangedBox> came) {
+std::uint32_t LeafSights::inheritStep(std::size_t half, std::uint32_t end, const Inheritance& from) {
+  const auto& former = from.former;
   const auto& step = former.steps_[half][end - former.endCount()];
   const bool is_last = step.next < former.endCount();
   const auto then = is_last ? step.next : former.steps_[half][step.next - former.endCount()].by;
-  const auto by = value_after[step.by], to = value_after[then];
-  if (by == kUntraced || to == kUntraced || to >= leaf_count_ || isBetween(came, by, to)) return kUntraced;
-  const auto next = is_last ? to : inheritStep(former, half, step.next, value_after, came);
+  const auto by = from.value_after[step.by], to = from.value_after[then];
+  if (by == kUntraced || to == kUntraced || to >= leaf_count_ || isBetween(from.change.change().came, by, to))
+    return kUntraced;
+  const auto next = is_last ? to : inheritStep(half, step.next, from);
   if (next == kUntraced) return kUntraced;
   steps_[half].push_back({by, next});
   return endCount() + static_cast<std::uint32_t>(steps_[half].size() - 1);
@@ -382,6 +382,31 @@ void LeafSights::forgetStandIns(const LeafSights& former, std::vector<std::uint3
     const auto now = here == kUntraced ? LeafRays::kNothing : rays_->standInOf(here);
     const bool is_same = here != kUntraced && (now == LeafRays::kNothing ? absorbed() : now) == after[seen];
     if (!is_same) value_after[seen] = kUntraced;
+  }
+}
+
+void LeafSights::inheritHalf(std::size_t half, const Inheritance& from) {
+  const auto& former = from.former;
+  const auto& change = from.change.change();
+  widen(half, former.steps_[half].size());
+  std::size_t first_ray = 0;
+  for (std::uint32_t value = 0; value < leaf_count_; first_ray += count_[value++]) {
+    const auto before = from.value_before[value];
+    if (count_[value] == 0 || before == scene::kNone || former.count_[before] == 0) continue;
+    const auto draw = draws(value, rays_->sideOf(value), half);
+    const auto old = former.ends(half, former.firstOf(before), std::min(former.count_[before], count_[value]));
+    for (std::uint32_t k = 0; k < old.size(); ++k) {
+      if (old[k] == former.seen_[half].most()) continue;
+      const bool goes_on = old[k] >= former.endCount();
+      const auto first = from.value_after[goes_on ? former.steps_[half][old[k] - former.endCount()].by : old[k]];
+      if (first == kUntraced) continue;  // it saw what is gone, or moved
+      // What is gone had hidden nothing from a ray whose end is known, and may be what another ended on.
+      const bool is_known = first < leaf_count_ || first >= skyAbove();
+      const bool may_pass = first >= leaf_count_ || from.stands_in[first] || from.change.mayHide(value, first);
+      if (may_pass && passes(is_known ? change.came : change.boxes, value, draw(k))) continue;
+      const auto end = goes_on ? inheritStep(half, old[k], from) : first;
+      if (end != kUntraced) seen_[half].set(first_ray + k, end);
+    }
   }
 }
 
@@ -411,35 +436,13 @@ void LeafSights::inherit(const LeafSights& former, std::span<const std::uint32_t
     partly_inside_[value] = value_before[value] != scene::kNone && former.partly_inside_[value_before[value]];
   }
   before_.assign(leaf_count_, 0);
-  // Rays that are said to end on these may end beside them.
   std::vector<bool> stands_in(leaf_count_, false);
   for (std::uint32_t value = 0; value < leaf_count_; ++value) {
     const auto seen = rays_->standInOf(value);
     if (seen != value && seen < leaf_count_) stands_in[seen] = true;
   }
-  const std::span<const scene::ChangedBox> all = change.change().boxes, came = change.change().came;
-  inBothHalves([&](std::size_t half) {
-    widen(half, former.steps_[half].size());
-    std::size_t first_ray = 0;
-    for (std::uint32_t value = 0; value < leaf_count_; first_ray += count_[value++]) {
-      const auto before = value_before[value];
-      if (count_[value] == 0 || before == scene::kNone || former.count_[before] == 0) continue;
-      const auto draw = draws(value, rays_->sideOf(value), half);
-      const auto old = former.ends(half, former.firstOf(before), std::min(former.count_[before], count_[value]));
-      for (std::uint32_t k = 0; k < old.size(); ++k) {
-        if (old[k] == former.seen_[half].most()) continue;
-        const bool goes_on = old[k] >= former.endCount();
-        const auto first = value_after[goes_on ? former.steps_[half][old[k] - former.endCount()].by : old[k]];
-        if (first == kUntraced) continue;  // it saw what is gone, or moved
-        // What is gone had hidden nothing from a ray whose end is known, and may be what another ended on.
-        const bool is_known = first < leaf_count_ || first >= skyAbove();
-        const bool may_pass = first >= leaf_count_ || stands_in[first] || change.mayHide(value, first);
-        if (may_pass && passes(is_known ? came : all, value, draw(k))) continue;
-        const auto end = goes_on ? inheritStep(former, half, old[k], value_after, came) : first;
-        if (end != kUntraced) seen_[half].set(first_ray + k, end);
-      }
-    }
-  });
+  const Inheritance from{former, value_before, value_after, stands_in, change};
+  inBothHalves([&](std::size_t half) { inheritHalf(half, from); });
   is_short_ = former.is_short_;
   kept_ = former.kept_;
   traced_ = former.traced_;

@@ -161,8 +161,15 @@ class LeafSights {
   [[nodiscard]] bool passes(std::span<const scene::ChangedBox> boxes, std::uint32_t value,
                             const glm::dvec4& draw) const;
   [[nodiscard]] bool isBetween(std::span<const scene::ChangedBox> boxes, std::uint32_t one, std::uint32_t other) const;
-  std::uint32_t inheritStep(const LeafSights& former, std::size_t half, std::uint32_t end,
-                            std::span<const std::uint32_t> value_after, std::span<const scene::ChangedBox> came);
+  /// What is taken over after an edit of geometry.
+  struct Inheritance {
+    const LeafSights& former;
+    std::span<const std::uint32_t> value_before, value_after;  ///< by leaf value; by ends of `former`
+    const std::vector<bool>& stands_in;  ///< by leaf value: rays that are said to end on it may end beside it
+    const Shadows& change;
+  };
+  void inheritHalf(std::size_t half, const Inheritance& from);
+  std::uint32_t inheritStep(std::size_t half, std::uint32_t end, const Inheritance& from);
 
   const std::vector<Side>& sides_;
   std::shared_ptr<const LeafRays> rays_;

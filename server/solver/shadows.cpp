@@ -51,10 +51,11 @@ class Segment {
 
   /// False: what separates them is an axis, or the product of one and the way (Gottschalk, Lin and Manocha 1996).
   [[nodiscard]] bool mayMeet(const scene::ChangedBox& box) const {
-    const glm::vec3 size = 0.5F * (box.high - box.low), apart = glm::abs(middle_ - 0.5F * (box.low + box.high));
+    const glm::vec3 size = 0.5F * (box.high - box.low), to = middle_ - 0.5F * (box.low + box.high);
+    const glm::vec3 apart = glm::abs(to);
     if (apart.x > size.x + reach_.x || apart.y > size.y + reach_.y || apart.z > size.z + reach_.z) return false;
     const glm::vec3 way = glm::abs(half_), wide = size + around_ + kRounding;
-    const glm::vec3 between = glm::abs(glm::cross(middle_ - 0.5F * (box.low + box.high), half_));
+    const glm::vec3 between = glm::abs(glm::cross(to, half_));
     return between.x <= wide.y * way.z + wide.z * way.y && between.y <= wide.x * way.z + wide.z * way.x &&
            between.z <= wide.x * way.y + wide.y * way.x;
   }

@@ -75,7 +75,8 @@ class Shadows {
     std::span<const scene::ChangedBox> each;
     scene::ChangedBox all;
   };
-  /// Of balls that touch; nothing is known of those without a radius.
+  /// Whether some way between places within two balls (w: the radius) may pass a box. True where one is below zero and
+  /// there are boxes: nothing is known of that leaf.
   [[nodiscard]] static bool isPassed(const Boxes& boxes, const glm::vec4& from, const glm::vec4& to);
   void takeTiles(Scratch& scratch) const;
   void markLeaves(std::size_t i, const glm::vec4& plane, Scratch& scratch) const;
