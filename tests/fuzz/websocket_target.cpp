@@ -6,6 +6,10 @@
 #include <unistd.h>
 
 #include <array>
+#include <cerrno>
+#include <chrono>
+#include <cstdio>
+#include <cstring>
 #include <string>
 #include <thread>
 
@@ -62,31 +66,63 @@ const std::string kUpgrade =
 const std::string kHello = R"({"jsonrpc":"2.0","id":1,"method":"hello","params":{"client":"fuzz"}})";
 const std::string kSubscribe = R"({"jsonrpc":"2.0","id":2,"method":"subscribe","params":{"quantity":"irradiance"}})";
 
-/// Sends everything, says that nothing more comes, and reads to the end. False: no server.
-bool talk(std::uint16_t port, const std::string& bytes) {
-  const int socket = ::socket(AF_INET, SOCK_STREAM, 0);
+sockaddr_in loopback(std::uint32_t host, std::uint16_t port) {
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(port);
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  const bool there = ::connect(socket, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
-  if (there) {
-    const timeval limit{5, 0};
-    (void)::setsockopt(socket, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
-    (void)::setsockopt(socket, SOL_SOCKET, SO_SNDTIMEO, &limit, sizeof limit);
-    std::size_t sent = 0;
-    while (sent < bytes.size()) {
-      const auto n = ::send(socket, bytes.data() + sent, bytes.size() - sent, MSG_NOSIGNAL);
-      if (n <= 0) break;
-      sent += static_cast<std::size_t>(n);
-    }
-    (void)::shutdown(socket, SHUT_WR);
-    std::array<char, 65536> sink{};
-    while (::recv(socket, sink.data(), sink.size(), 0) > 0) {
-    }
+  address.sin_addr.s_addr = htonl(host);
+  return address;
+}
+
+/// -1, with errno set: no connection. Each call comes from the next of 200 addresses: after it, the system keeps the
+/// port of who closes first for a minute, and some hundred a second from one address use up all there are.
+int connectOnce(std::uint16_t port) {
+  static std::uint32_t calls = 0;
+  const int socket = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  if (socket < 0) return -1;
+  const int late = 1;  // the port is chosen once it is known where to
+  (void)::setsockopt(socket, IPPROTO_IP, IP_BIND_ADDRESS_NO_PORT, &late, sizeof late);
+  const auto from = loopback(INADDR_LOOPBACK + 1 + calls++ % 200, 0), to = loopback(INADDR_LOOPBACK, port);
+  const auto reached = [socket](auto call, const sockaddr_in& address) {
+    return call(socket, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+  };
+  if (reached(::bind, from) && reached(::connect, to)) return socket;
+  const int reason = errno;
+  ::close(socket);
+  errno = reason;
+  return -1;
+}
+
+/// Asks again for five seconds, since a machine may be short of something for a moment: a server that is gone stays
+/// gone.
+int connectTo(std::uint16_t port) {
+  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(5);
+  for (;;) {
+    const int socket = connectOnce(port);
+    if (socket >= 0) return socket;
+    std::fprintf(stderr, "no connection to port %d: %s\n", port, std::strerror(errno));
+    require(std::chrono::steady_clock::now() < until, "the server is still there");
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  }
+}
+
+/// Sends everything, says that nothing more comes, and reads to the end.
+void talk(std::uint16_t port, const std::string& bytes) {
+  const int socket = connectTo(port);
+  const timeval limit{5, 0};
+  (void)::setsockopt(socket, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
+  (void)::setsockopt(socket, SOL_SOCKET, SO_SNDTIMEO, &limit, sizeof limit);
+  std::size_t sent = 0;
+  while (sent < bytes.size()) {
+    const auto n = ::send(socket, bytes.data() + sent, bytes.size() - sent, MSG_NOSIGNAL);
+    if (n <= 0) break;
+    sent += static_cast<std::size_t>(n);
+  }
+  (void)::shutdown(socket, SHUT_WR);
+  std::array<char, 65536> sink{};
+  while (::recv(socket, sink.data(), sink.size(), 0) > 0) {
   }
   ::close(socket);
-  return there;
 }
 
 }  // namespace
@@ -120,6 +156,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (start != fuzz::kHttp) bytes += fuzz::kUpgrade;
   if (start == fuzz::kViewer) bytes += fuzz::textFrame(fuzz::kHello);
   bytes.append(reinterpret_cast<const char*>(data) + 1, size - 1);
-  fuzz::require(fuzz::talk(server->port(), bytes), "the server is still there");
+  fuzz::talk(server->port(), bytes);
   return 0;
 }
