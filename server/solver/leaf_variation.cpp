@@ -28,6 +28,36 @@ constexpr std::size_t kMostInAll = 1'000'000;
 /// A round of refinement is for the receivers with so much of what it could lower.
 constexpr double kRefinedPart = 0.8;
 
+/// The leaves around one, without itself: with it, its share of a signal would be the larger the more of it is chance,
+/// and what is left would come out too small. A leaf without neighbours has to do.
+class Neighbours {
+ public:
+  Neighbours(const Side& side, std::uint32_t leaf) : side_(side), leaf_(leaf) {
+    const auto x = leaf % side.width, y = leaf / side.width;
+    x_ = {x - std::min(x, 1U), std::min(x + 2, side.width)};
+    y_ = {y - std::min(y, 1U), std::min(y + 2, side.height)};
+  }
+
+  [[nodiscard]] double sumOf(const std::vector<double>& values) const {
+    double sum = 0.0;
+    for (auto y = y_.first; y < y_.end; ++y)
+      for (auto x = x_.first; x < x_.end; ++x) sum += values[y * side_.width + x];
+    return side_.leaf_count > 1 ? sum - values[leaf_] : sum;
+  }
+  [[nodiscard]] double count() const {
+    const auto all = (x_.end - x_.first) * (y_.end - y_.first);
+    return all > 1 ? all - 1 : 1;
+  }
+
+ private:
+  struct Range {
+    std::uint32_t first, end;
+  };
+  const Side& side_;
+  std::uint32_t leaf_;
+  Range x_{}, y_{};
+};
+
 template <typename Lack>
 glm::dvec3 all(const Lack& lack) {
   return glm::dvec3(lack.sure) + glm::dvec3(lack.doubtful);
@@ -163,22 +193,16 @@ void LeafVariation::weigh(const Side& side) {
     noise[leaf] = 0.25 * area * glm::dot(one - other, one - other);
     doubt[leaf] = area * glm::dot(doubtful, doubtful);
   }
-  // Without the leaf itself, whose share of the signal would be the larger the more of it is chance: what is left
-  // would come out too small. A leaf without neighbours has to do.
-  const auto around = [&](const std::vector<double>& values, std::uint32_t leaf) {
-    const auto x = leaf % side.width, y = leaf / side.width;
-    double sum = 0.0;
-    for (auto ny = y - std::min(y, 1U); ny < std::min(y + 2, side.height); ++ny)
-      for (auto nx = x - std::min(x, 1U); nx < std::min(x + 2, side.width); ++nx) sum += values[ny * side.width + nx];
-    return side.leaf_count > 1 ? sum - values[leaf] : sum;
-  };
   for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
     const auto value = side.first_value + leaf;
-    const double s = around(signal, leaf), n = around(noise, leaf);
-    const bool found = s > n && s > 0.0, known = found && around(doubt, leaf) < kDoubtful * s;
+    const Neighbours around(side, leaf);
+    const double s = around.sumOf(signal), n = around.sumOf(noise);
+    const bool found = s > n && s > 0.0, known = found && around.sumOf(doubt) < kDoubtful * s;
     if (!found) unknown_ += noise[leaf];
     if (found && !known) doubtful_ += signal[leaf];
-    const double weight = known ? s / (s + n) : 0.0;
+    // The leaf's own noise, where that is more: a single path that brings much would be a blotch. Of what one half
+    // alone has found no more is left than half of the root of the signal around.
+    const double weight = known ? s / (s + std::max(n, around.count() * noise[leaf])) : 0.0;
     for (std::size_t h = 0; h < 2 && known; ++h)
       correction_[h][value] = static_cast<float>(weight) * glm::vec3(all(lacking_[h][value]));
     left_ += (1.0 - weight) * (1.0 - weight) * signal[leaf];

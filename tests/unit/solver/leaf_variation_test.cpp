@@ -218,6 +218,39 @@ TEST_F(LeafVariationTest, AfterAnEditWhatIsClearOfItKeepsWhatItsPathsFound) {
   }
 }
 
+// A wall far off, of which a small part is very bright: few paths see that, and each of them would be a blotch.
+TEST_F(LeafVariationTest, WhatOnePathFindsByChanceIsNoCorrection) {
+  test::Quad floor{{0.0F, 0.0F, 0.0F}, {0.2F, 0.0F, 0.0F}, {0.0F, 0.2F, 0.0F}};
+  floor.reflectance = glm::vec3(static_cast<float>(kReflectance));
+  test::Quad looks{{0.0F, 0.0F, 0.02F}, {0.0F, 0.2F, 0.0F}, {0.0F, 0.0F, 0.02F}};
+  test::Quad spark{{0.9F, 0.12F, 0.3F}, {0.0F, -0.04F, 0.0F}, {0.0F, 0.0F, 0.04F}};
+  floor.width = floor.height = looks.height = spark.width = spark.height = 1;
+  looks.width = kLooks;
+  const auto scene = test::makeQuadScene({floor, looks, spark});
+  const auto sides = makeSides(*scene.patches);
+  emission_.emplace_back(400.0F);
+  reflectance_.emplace_back(0.0F);
+  irradiance_.emplace_back(0.0F);
+  // In the mean it adds less than the lamp beside the floor does. One path that sees it brings twenty times as much and
+  // more, where its neighbours' noise alone is weighed.
+  const double most = 4.0 * lacking();
+  int corrected = 0;
+  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+    LeafVariation variation(*scene.patches, sides, seed);
+    variation.update(light(), 0.0);
+    for (int round = 0; round < 4 && variation.refine(); ++round) variation.update(light(), 0.0);
+    if (!variation.corrects()) continue;
+    ++corrected;
+    for (std::uint32_t leaf = 0; leaf < kLooks; ++leaf) {
+      const auto value = sides[1].first_value + leaf;
+      const double mean =
+          0.5 * static_cast<double>(variation.correction(0)[value].x + variation.correction(1)[value].x);
+      EXPECT_LT(std::abs(mean), most) << "leaf " << leaf << ", seed " << seed;
+    }
+  }
+  EXPECT_GT(corrected, 30);
+}
+
 // The furnace: every place sees the same radiosity whichever way it looks.
 TEST(LeafVariation, EvenLightLeavesNothing) {
   const auto scene = test::makeQuadScene(test::cubeQuads(4, {1, 1, 1, 1, 1, 1}, {0.5F, 0.5F, 0.5F, 0.5F, 0.5F, 0.5F}));
