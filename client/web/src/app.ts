@@ -349,7 +349,7 @@ export class App {
     this.tiles.afterAll(() => {
       // Another is looked at by now, or pages have another layout: nothing was said of that one.
       if (!set || set !== this.viewer.layouts.setOf(bookmark.quantity) || info !== this.connection.info) return;
-      set.complete = true;
+      set.close();
       this.bookmark = bookmark;
       const { quantity, revision, tileVersion } = bookmark;
       if (quantity === 'irradiance') this.resume = { epoch: this.epoch, revision, tileVersion };

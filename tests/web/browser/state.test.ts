@@ -176,15 +176,21 @@ it('does not call good what has stopped short of its target', async () => {
   const server = await serve(`${SCENES}/cornell.glb`);
   const page = await pages.open(server.url, 900, 600);
   await converged(page);
-  const dotOf = (state: string) =>
+  const tell = (state: string) =>
     page.evaluate((state) => {
       const app = window.viewer! as unknown as { progress: object; onProgress(progress: object): void };
       app.onProgress({ ...app.progress, state });
-      return document.querySelector('.chip .dot')!.className;
     }, state);
-  expect(await dotOf('limited')).toBe('dot short');
-  expect(await dotOf('timeLimit')).toBe('dot short');
-  expect(await dotOf('converged')).toBe('dot good');
+  const dot = () => page.evaluate(() => document.querySelector('.chip .dot')!.className);
+  for (const [state, shown] of [
+    ['limited', 'short'],
+    ['converged', 'good'],
+    ['timeLimit', 'short'],
+  ] as const) {
+    // prettier-ignore
+    await tell(state);
+    await until(dot, (name) => name === `dot ${shown}`);
+  }
 });
 
 it('does not take the black before the last tiles for the light of a solve that is over', async () => {

@@ -325,6 +325,48 @@ it('shows unshot light by how bright the scene is, from a link too: of a solve t
   expect((await scale())[1]! / high).toBeCloseTo(1, 1);
 });
 
+it('looks nothing up of what has come once all light is there, and does again for a new layout', async () => {
+  const page = await pages.open(bare());
+  const whole = () =>
+    page.evaluate(() => {
+      const { shown, renderer } = window.viewer!.viewer;
+      const defines = new Set<unknown>();
+      shown!.eachMaterial((material) => defines.add(material.defines!['WHOLE_PAGES']));
+      return { values: [...defines], programs: renderer.info.programs!.length };
+    });
+  await converged(page);
+  const { programs } = await until(whole, ({ values }) => values.length === 1 && values[0] === 1);
+  await drawn(page);
+  const seen = await pixels(page, 60);
+  // What it looks up says the same.
+  await page.evaluate(() => {
+    const { shown, wholePrograms } = window.viewer!.viewer as unknown as {
+      shown: { showsWhole: boolean };
+      wholePrograms: { turn(): void };
+    };
+    wholePrograms.turn = () => undefined;
+    shown.showsWhole = false;
+    window.viewer!.viewer.invalidate();
+  });
+  await until(whole, ({ values }) => values.length === 1 && values[0] === 0);
+  await drawn(page);
+  expect(difference(seen, await pixels(page, 60)).p99).toBeLessThanOrEqual(1);
+  await page.reload();
+  await converged(page);
+  await until(whole, ({ values }) => values[0] === 1);
+  // Pages of another layout come bit by bit; and programs are those there are.
+  const layOut = async (texels: number) => {
+    const layout = await page.evaluate(() => window.viewer!.viewer.set!.note.layout);
+    await page.evaluate((texels) => window.viewer!.connection.call('solve.configure', { texels }), texels);
+    await page.waitForFunction((layout) => window.viewer!.viewer.shown!.set.note.layout > layout, layout);
+    await converged(page);
+  };
+  await layOut(9000);
+  await until(whole, ({ values }) => values.length === 1 && values[0] === 1);
+  expect((await whole()).programs).toBe(programs);
+  await layOut(16_000);
+});
+
 it('comes back when the graphics context was lost', async () => {
   const page = await pages.open(bare());
   await converged(page);

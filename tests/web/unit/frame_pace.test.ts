@@ -140,11 +140,63 @@ describe('the pace of frames', () => {
     }
   });
 
-  it('leaves a slow card half of its time when only light changes', () => {
+  it('leaves a slow card a quarter of its time when only light changes', () => {
     const card = new Card(new FramePace(false), 320);
     card.run(10_000, { tiles: true });
     expect(new Set(card.scales)).toEqual(new Set([1]));
-    expect(card.scales.length).toBeLessThan(18);
-    expect(card.scales.length).toBeGreaterThan(12);
+    expect(card.scales.length).toBeLessThan(27); // of 31
+    expect(card.scales.length).toBeGreaterThan(20);
+  });
+
+  it('waits for the light of an edit where a picture without it would be in its way, and not for long', () => {
+    for (const software of [true, false]) {
+      const pace = new FramePace(software);
+      pace.hurry(0);
+      pace.awaitLight(0);
+      expect(pace.ask(99) === undefined).toBe(software);
+      expect(pace.ask(100)).toBeDefined();
+      pace.allCame(); // of the light before
+      expect(pace.ask(50) === undefined).toBe(software);
+      pace.lightCame(50);
+      pace.allCame();
+      expect(pace.ask(50)).toBeDefined();
+    }
+  });
+
+  it('shows edits in quick succession though none of them brings light, and what is moved by hand at once', () => {
+    const pace = new FramePace(true);
+    const drawn: number[] = [];
+    for (let now = 0; now < 1000; now += 16) {
+      pace.turn(now);
+      pace.hurry(now);
+      pace.awaitLight(now);
+      const scale = pace.ask(now);
+      if (scale === undefined) continue;
+      drawn.push(now);
+      pace.began(now, scale);
+      pace.ended(now + 8, 1);
+    }
+    expect(drawn.length).toBeGreaterThan(7);
+    pace.awaitLight(1000);
+    pace.moved(1008);
+    expect(pace.ask(1008)).toBeDefined();
+    pace.awaitLight(1016); // that movement's own edit
+    expect(pace.ask(1016)).toBeDefined();
+  });
+
+  it('puts tiles that come together into one picture, where each takes long', () => {
+    const pace = new FramePace(true);
+    pace.lightCame(1000);
+    expect(pace.ask(1039)).toBeUndefined();
+    pace.lightCame(1039); // these wait no longer than the first
+    expect(pace.ask(1040)).toBe(1);
+    pace.began(1040, 1);
+    pace.ended(1300, 1);
+    pace.lightCame(2000);
+    pace.allCame();
+    expect(pace.ask(2000)).toBe(1);
+    const quick = new FramePace(false);
+    quick.lightCame(1000);
+    expect(quick.ask(1000)).toBe(1);
   });
 });

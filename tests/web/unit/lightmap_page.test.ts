@@ -147,6 +147,38 @@ describe('a set of pages', () => {
     expect(set.pages[0]!.uniforms.pageLightShown.value).toBe(true);
   });
 
+  it('is whole when all of it shows light as finely as it is kept', () => {
+    const wide = { ...note, pages: [{ width: 128, height: 128, mips: 8 }] };
+    const set = new LightmapSet(new Card().renderer, wide, 'irradiance', () => undefined);
+    const put = (x: number, y: number, mip: number) => {
+      const { header, ...rest } = tile(x, y, 5, 0, mip);
+      set.enqueue({ ...rest, header: { ...header, page: 0 } }, 1);
+      set.takeUp(ALWAYS);
+    };
+    put(0, 0, 1);
+    set.showLight();
+    expect([set.covered, set.whole]).toEqual([true, false]);
+    for (const [x, y] of [[0, 0], [0, 0], [64, 0], [0, 64]] as const) put(x, y, 0); // prettier-ignore
+    expect(set.whole).toBe(false);
+    put(64, 64, 0);
+    expect(set.whole).toBe(true);
+    put(0, 0, 1); // a coarser one that comes late takes nothing away
+    expect(set.whole).toBe(true);
+  });
+
+  it('expects more until the server says that this is all, and that is taken up', () => {
+    const set = new LightmapSet(new Card().renderer, note, 'irradiance', () => undefined);
+    expect(set.expectsMore).toBe(false);
+    set.enqueue({ ...lit, header: { ...lit.header, page: 0 } }, 1);
+    set.close();
+    expect([set.expectsMore, set.complete]).toEqual([true, true]);
+    set.takeUp(ALWAYS);
+    expect(set.expectsMore).toBe(false);
+    set.enqueue({ ...lit, header: { ...lit.header, page: 0 } }, 1);
+    set.takeUp(ALWAYS);
+    expect(set.expectsMore).toBe(true);
+  });
+
   it('takes black for black when the solve is over', () => {
     const set = new LightmapSet(new Card().renderer, note, 'irradiance', () => undefined);
     set.settle();

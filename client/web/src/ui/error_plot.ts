@@ -34,6 +34,7 @@ export class ErrorPlot {
     matchMedia('(prefers-color-scheme: light)').addEventListener('change', () => this.draw());
   }
 
+  /** To be drawn with the next draw(). */
   add(progress: Progress): void {
     const last = this.samples.at(-1);
     // Solve time runs backwards when an edit or another scene begins a new solve.
@@ -42,7 +43,6 @@ export class ErrorPlot {
     this.samples.push({ seconds: progress.seconds, ...progress.error });
     // Samples lie evenly in time, the plot is logarithmic: every second one is enough where there are many.
     if (this.samples.length > MOST) this.samples = this.samples.filter((_, i) => i % 2 === 0 || i > MOST - 50);
-    this.draw();
   }
 
   setTarget(target: number): void {

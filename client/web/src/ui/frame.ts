@@ -3,6 +3,7 @@
 import { button, h, icon, iconButton, pressed } from './dom';
 import { makeHelp } from './help';
 import { Legend, MeterCard } from './legend';
+import { Spaced } from './spaced';
 import { store, stored } from './stored';
 import { Toasts } from './toast';
 
@@ -16,6 +17,7 @@ export interface FrameActions {
   redo(): void;
 }
 
+type Tone = 'busy' | 'good' | 'short' | 'bad' | 'idle';
 const HANDLES = ['translate', 'rotate', 'scale'] as const;
 /** What may be wrong; without the first nothing of the others can be mended. */
 const BANNERS = ['link', 'card', 'solve'] as const;
@@ -36,6 +38,8 @@ export class Frame {
   private readonly dot = h('span', { class: 'dot' });
   private readonly error = h('span', { class: 'error-now' });
   private readonly rate = h('span', { class: 'rate' });
+  private told: { text: string; tone: Tone; error: string; rate: string } | undefined;
+  private readonly spaced = new Spaced(() => this.showState());
   private readonly people = h('span', { class: 'people', title: 'Viewers', hidden: true });
   private readonly banners = new Map<(typeof BANNERS)[number], HTMLElement[]>();
   private readonly banner = h('div', { class: 'banner', role: 'alert', hidden: true });
@@ -79,7 +83,16 @@ export class Frame {
     this.setHistory(false, false);
   }
 
-  setState(text: string, tone: 'busy' | 'good' | 'short' | 'bad' | 'idle', error = '', rate = ''): void {
+  /** Shows a little later, but for what went wrong. */
+  setState(text: string, tone: Tone, error = '', rate = ''): void {
+    this.told = { text, tone, error, rate };
+    if (tone === 'bad') this.spaced.now();
+    else this.spaced.soon();
+  }
+
+  private showState(): void {
+    if (!this.told) return;
+    const { text, tone, error, rate } = this.told;
     // What is written anew is read out anew, though it is the same.
     const texts: [HTMLElement, string][] = [[this.state, text], [this.error, error], [this.rate, rate]]; // prettier-ignore
     for (const [element, wanted] of texts) if (element.textContent !== wanted) element.textContent = wanted;

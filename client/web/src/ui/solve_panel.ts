@@ -3,6 +3,7 @@
 import type { Progress, Settings } from '../protocol/messages';
 import { button, field, h, inField, parseNumber, percent, readable, section } from './dom';
 import { ErrorPlot } from './error_plot';
+import { Spaced } from './spaced';
 
 export interface SolvePanelActions {
   pauseOrResume(): void;
@@ -11,6 +12,9 @@ export interface SolvePanelActions {
   /** `wanted`: what the field takes. */
   notAccepted(text: string, wanted: string): void;
 }
+
+/** What a solve goes through by itself; what else it comes to, somebody waits for. */
+const ITS_OWN = ['solving', 'converged', 'limited', 'timeLimit'];
 
 const STATES: Record<string, string> = {
   empty: 'No scene',
@@ -45,6 +49,7 @@ export class SolvePanel {
   private readonly texels: HTMLInputElement;
   private settings: Settings | undefined;
   private progress: Progress | undefined;
+  private readonly spaced = new Spaced(() => this.showProgress());
   private typing: HTMLInputElement | undefined;
   private firstError = 1;
 
@@ -93,12 +98,17 @@ export class SolvePanel {
   update(progress: Progress): void {
     this.plot.add(progress);
     this.progress = progress;
-    this.showProgress(progress);
+    if (progress.shots === 0 || progress.error.total > this.firstError)
+      this.firstError = Math.max(progress.error.total, 1e-6);
+    if (ITS_OWN.includes(progress.state)) this.spaced.soon();
+    else this.spaced.now();
   }
 
-  private showProgress(progress: Progress): void {
+  private showProgress(): void {
+    const { progress } = this;
+    if (!progress) return;
     const { error } = progress;
-    if (progress.shots === 0 || error.total > this.firstError) this.firstError = Math.max(error.total, 1e-6);
+    this.plot.draw();
     const target = this.settings?.targetError ?? 0.02;
     const way = Math.log(this.firstError / error.total) / Math.log(this.firstError / target);
     this.bar.value = progress.state === 'converged' ? 1 : Math.min(1, Math.max(0, Number.isFinite(way) ? way : 0));
@@ -127,7 +137,7 @@ export class SolvePanel {
     this.settings = settings;
     this.plot.setTarget(settings.targetError);
     this.showSettings();
-    if (this.progress) this.showProgress(this.progress); // what is done may stay as it is, and nothing be told of it
+    this.showProgress(); // what is done may stay as it is, and nothing be told of it
   }
 
   setWarnings(warnings: string[], count: number): void {

@@ -11,8 +11,13 @@ const REST_MS = 200;
 const REST_TURNS = 3;
 /** Of light that comes in quick succession coarse pictures go before the sharp one, but for no longer. */
 const MOST_COARSE_MS = 1000;
-/** Frames at rest leave a slow card as much time as they take, so that what moves next need not wait; but no more. */
+/** Frames at rest leave a slow card some of the time they take, so that what moves next need not wait; but no more. */
+const PAUSE_SHARE = 0.3;
 const MOST_PAUSE_MS = 500;
+/** What an edit changes waits so long for its light, where a picture without it would be what the light has to wait for. */
+const MOST_AWAIT_MS = 100;
+/** And the first of some tiles so long for the others, which would have to wait for a picture of it alone. */
+const MOST_GATHER_MS = 40;
 /** One is drawn while the next is made: more would only show what is asked for later. */
 const MOST_UNDER_WAY = 2;
 /** Of a whole frame, where the browser says that it draws without a card: 2560 x 1600 on two cores, about. */
@@ -37,6 +42,9 @@ export class FramePace {
   private lastTurnMs = -Infinity;
   private turnsSinceHurry = Infinity;
   private lastScale = 1;
+  /** Until when, at most, the next frame waits for light, and for more of it; undefined: it has not waited for any. */
+  private awaitUntilMs: number | undefined;
+  private gatherUntilMs: number | undefined;
   /** Since when light has come to a picture that is coarse. */
   private coarseSinceMs: number | undefined;
 
@@ -53,6 +61,17 @@ export class FramePace {
     this.lastTurnMs = nowMs;
   }
 
+  /** Something was edited, and its light is a moment behind. A card that is quick shows the one and then the other. */
+  awaitLight(nowMs: number): void {
+    if (this.movingScale < 1) this.awaitUntilMs ??= nowMs + MOST_AWAIT_MS;
+  }
+
+  /** Something is moved by hand: that does not wait. */
+  moved(nowMs: number): void {
+    this.awaitUntilMs = this.gatherUntilMs = -Infinity;
+    this.hurry(nowMs);
+  }
+
   /** Something moves, and for so long a soon picture is worth more than a sharp one. */
   hurry(nowMs: number, forMs = REST_MS): void {
     this.turnsSinceHurry = 0;
@@ -64,10 +83,17 @@ export class FramePace {
    * that is sharp already stays so, as it would flicker otherwise.
    */
   lightCame(nowMs: number): void {
+    this.awaitUntilMs = -Infinity;
+    if (this.movingScale < 1) this.gatherUntilMs ??= nowMs + MOST_GATHER_MS;
     if (this.lastScale === 1) return;
     this.coarseSinceMs ??= nowMs;
     const leftMs = this.coarseSinceMs + MOST_COARSE_MS - nowMs;
     if (leftMs > 0) this.hurry(nowMs, Math.min(REST_MS, leftMs));
+  }
+
+  /** No more is on its way. */
+  allCame(): void {
+    if (this.gatherUntilMs !== undefined) this.gatherUntilMs = -Infinity;
   }
 
   /** Turns are counted as they come: one long turn, as when a scene is taken up, says nothing of the next ones. */
@@ -82,8 +108,9 @@ export class FramePace {
 
   /** The scale of a frame that is drawn now; undefined: later, as the card has enough to do. */
   ask(nowMs: number): number | undefined {
+    if (nowMs < Math.max(this.awaitUntilMs ?? -Infinity, this.gatherUntilMs ?? -Infinity)) return undefined;
     if (this.isHurried(nowMs)) return this.underWay.length < MOST_UNDER_WAY ? this.movingScale : undefined;
-    const pause = this.lastTookMs > MOVING_FRAME_MS ? Math.min(MOST_PAUSE_MS, this.lastTookMs) : 0;
+    const pause = this.lastTookMs > MOVING_FRAME_MS ? Math.min(MOST_PAUSE_MS, PAUSE_SHARE * this.lastTookMs) : 0;
     return this.underWay.length > 0 || nowMs - this.lastEndMs < pause ? undefined : 1;
   }
 
@@ -92,10 +119,16 @@ export class FramePace {
     return this.underWay.length === 0;
   }
 
+  /** The picture is sharp, and nothing is being drawn or moves. */
+  isAtRest(nowMs: number): boolean {
+    return this.isIdle && this.lastScale === 1 && !this.isHurried(nowMs);
+  }
+
   /** A frame was handed to the card. */
   began(nowMs: number, scale: number): void {
     this.underWay.push({ scale, begunMs: nowMs });
     this.lastScale = scale;
+    this.awaitUntilMs = this.gatherUntilMs = undefined;
     if (scale === 1) this.coarseSinceMs = undefined;
   }
 

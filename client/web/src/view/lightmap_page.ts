@@ -45,7 +45,9 @@ export class LightmapPage {
   private readonly mips: Mip[] = [];
   private readonly columns: number;
   private readonly rows: number;
+  /** Tiles of which nothing has come yet, and of which the finest mip has not. */
   private missing: number;
+  private coarse: number;
   private gotTile = false;
   private growth: Growth | undefined;
 
@@ -69,7 +71,7 @@ export class LightmapPage {
     }
     this.columns = Math.ceil(this.width / TILE_SIDE);
     this.rows = Math.ceil(this.height / TILE_SIDE);
-    this.missing = this.columns * this.rows;
+    this.missing = this.coarse = this.columns * this.rows;
     const tiles = new Uint8Array(this.missing).fill(NO_MIP);
     this.resident = new DataTexture(tiles, this.columns, this.rows, RedFormat, UnsignedByteType);
     this.resident.minFilter = this.resident.magFilter = NearestFilter;
@@ -95,6 +97,11 @@ export class LightmapPage {
   /** Some light is known everywhere. */
   get covered(): boolean {
     return this.missing === 0;
+  }
+
+  /** All light is there, as finely as it is kept. */
+  get whole(): boolean {
+    return this.coarse === 0;
   }
 
   get scale(): number {
@@ -228,6 +235,7 @@ export class LightmapPage {
         const before = tiles[row * this.columns + c]!;
         if (before <= level) continue;
         if (before === NO_MIP) --this.missing;
+        if (level === 0) --this.coarse;
         tiles[row * this.columns + c] = level;
         changed = true;
       }

@@ -33,7 +33,7 @@ export class LightmapSet {
   readonly baseMip: number;
   /** Smallest error that a tile's header told of, as a fraction; Infinity: no tile yet. */
   error = Infinity;
-  /** The server has said that everything it has was sent. */
+  /** The server has said once that everything it had was sent. */
   complete = false;
   tilesTaken = 0;
   /** Scene revision of the newest tile that was taken up; 0: none. */
@@ -45,6 +45,8 @@ export class LightmapSet {
   lit = false;
   /** Uniform of all pages: until light is shown, surfaces show as those that nothing has come for. */
   private readonly lightShown = { value: false };
+  /** The server has not said yet that the newest tiles are all it has by now. */
+  private open = false;
   private queue: { tile: Tile; bytes: number }[] = [];
 
   constructor(
@@ -65,6 +67,17 @@ export class LightmapSet {
     return this.pages.reduce((sum, page) => sum + page.bytes, 0);
   }
 
+  /** More tiles are to be taken up soon. */
+  get expectsMore(): boolean {
+    return this.open || this.queue.length > 0;
+  }
+
+  /** The server has sent everything that it has by now. */
+  close(): void {
+    this.complete = true;
+    this.open = false;
+  }
+
   get waiting(): number {
     return this.queue.length;
   }
@@ -72,6 +85,11 @@ export class LightmapSet {
   /** Light is known on all surfaces. */
   get covered(): boolean {
     return this.lit && (this.complete || this.pages.every((page) => page.covered));
+  }
+
+  /** All surfaces show light, as finely as it is kept. */
+  get whole(): boolean {
+    return this.showsLight && this.pages.every((page) => page.whole);
   }
 
   get showsLight(): boolean {
@@ -90,6 +108,7 @@ export class LightmapSet {
 
   /** `bytes` of the frame are given back to the server when the tile was taken up. */
   enqueue(tile: Tile, bytes: number): void {
+    this.open = true;
     this.queue.push({ tile, bytes });
   }
 

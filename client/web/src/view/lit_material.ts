@@ -17,7 +17,7 @@ import type { LightmapPage } from './lightmap_page';
 import { FRAGMENT_PARS, LIGHT_FRAGMENT, OUTPUT_FRAGMENT } from './lit_shader';
 
 /** What is compiled into programs, by its name there. */
-export type Defines = Readonly<Record<'VIEW_MODE' | 'TONE_CURVE' | 'FALSE_COLOUR', number>>;
+export type Defines = Readonly<Record<'VIEW_MODE' | 'TONE_CURVE' | 'FALSE_COLOUR' | 'WHOLE_PAGES', number>>;
 
 /** What all materials have in common. */
 export class ViewUniforms {
@@ -28,20 +28,24 @@ export class ViewUniforms {
     toneMappingExposure: { value: 1 },
   };
   /** Another object whenever something in it is another. */
-  defines: Defines = { VIEW_MODE: 0, TONE_CURVE: 0, FALSE_COLOUR: 0 };
+  defines: Defines = { VIEW_MODE: 0, TONE_CURVE: 0, FALSE_COLOUR: 0, WHOLE_PAGES: 0 };
+  /** The same, for pages of which all light is there. */
+  wholeDefines: Defines = { ...this.defines, WHOLE_PAGES: 1 };
 
   /** Materials take it up when they are next refreshed. */
-  choose(change: Partial<Defines>): void {
+  choose(change: Partial<Omit<Defines, 'WHOLE_PAGES'>>): void {
     const chosen = { ...this.defines, ...change };
     const names = Object.keys(chosen) as (keyof Defines)[];
-    if (names.some((name) => chosen[name] !== this.defines[name])) this.defines = chosen;
+    if (names.every((name) => chosen[name] === this.defines[name])) return;
+    this.defines = chosen;
+    this.wholeDefines = { ...chosen, WHOLE_PAGES: 1 };
   }
 }
 
-/** Gives a material the program of the view that is chosen now. True: it had another. */
-export function specialise(material: Material, view: ViewUniforms): boolean {
-  if (material.defines === view.defines) return false;
-  material.defines = view.defines; // with those it had before three.js keeps the program, too
+/** Gives a material the program with these. True: it had another. */
+export function specialise(material: Material, defines: Defines): boolean {
+  if (material.defines === defines) return false;
+  material.defines = defines; // with those it had before three.js keeps the program, too
   material.needsUpdate = true;
   return true;
 }
@@ -100,9 +104,9 @@ export class LitMaterial extends MeshLambertMaterial {
     return 'radiosity';
   }
 
-  /** For the view that is chosen now. True: it had the program of another. */
-  specialise(): boolean {
-    return specialise(this, this.view);
+  /** For the view that is chosen now, and pages that are whole or not. True: it had the program of another. */
+  specialise(whole: boolean): boolean {
+    return specialise(this, whole ? this.view.wholeDefines : this.view.defines);
   }
 
   /** The page's scale may have grown since the last frame. */

@@ -32,6 +32,8 @@ export class LitScene {
   readonly lamps = new Map<number, LampMarker>();
   readonly cameras: { name: string; camera: PerspectiveCamera }[] = [];
   triangles = 0;
+  /** Its materials have the programs for pages of which all light is there. */
+  showsWhole = false;
   private readonly materials = new Map<number, LitMaterial[]>();
   private readonly made = new Map<string, LitMaterial>();
   private readonly geometries = new Set<BufferGeometry>();
@@ -122,9 +124,9 @@ export class LitScene {
   }
 
   /** For the view that is chosen now. True: some materials had the programs of another. */
-  specialise(): boolean {
+  specialise(whole = this.showsWhole): boolean {
     let differed = false;
-    this.eachMaterial((material) => (differed = material.specialise() || differed));
+    this.eachMaterial((material) => (differed = material.specialise(whole) || differed));
     return differed;
   }
 

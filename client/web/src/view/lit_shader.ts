@@ -28,7 +28,11 @@ float residentMip(vec2 uv) {
 
 // Charts lie two texels apart: beyond mip 1 they run into each other, so that is how far minification may go.
 float lookupMip(vec2 uv, out float resident) {
-  resident = residentMip(uv);
+  #if WHOLE_PAGES == 1  // nothing to look up: a third of a frame, where software draws
+    resident = 0.0;
+  #else
+    resident = residentMip(uv);
+  #endif
   vec2 dx = dFdx(uv) * pageSize, dy = dFdy(uv) * pageSize;
   float wanted = clamp(0.5 * log2(max(dot(dx, dx), dot(dy, dy))), 0.0, 1.0);
   return max(wanted, resident);

@@ -129,7 +129,7 @@ export class PagesView {
   refresh(): void {
     this.controls.update();
     for (const { material, page } of this.made) {
-      specialise(material, this.view);
+      specialise(material, this.view.defines);
       material.uniforms['lightMapIntensity']!.value = page.scale;
     }
   }

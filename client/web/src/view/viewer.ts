@@ -29,6 +29,7 @@ import { pick, pickSurface, readingAt, type Reading } from './picker';
 import { release } from './release';
 import { Screen } from './screen';
 import type { ViewMode } from './view_modes';
+import { WholePrograms } from './whole_programs';
 
 /** For taking up tiles, of the 16 that a frame has; of longer ones the same share, but no task of 50. */
 const TILE_BUDGET_MS = 5;
@@ -68,6 +69,7 @@ export class Viewer {
   private readonly anisotropy: number;
   private readonly pace: FramePace;
   private readonly fences: FrameFences;
+  private readonly wholePrograms: WholePrograms;
   private scale: number;
   private readonly world = new Scene();
   private wanted = true;
@@ -97,6 +99,7 @@ export class Viewer {
     this.screen = new Screen(this.renderer, gl); // which smooths edges
     this.rig = new CameraRig(canvas, () => this.moved());
     this.layouts = new Layouts(this.renderer, events.used);
+    this.wholePrograms = new WholePrograms(this.renderer, this.rig.camera, this.world);
     this.brightness = this.makeBrightness();
     this.exposure = this.brightness.exposure;
     this.pagesView = new PagesView(canvas, this.uniforms, () => this.moved());
@@ -122,7 +125,7 @@ export class Viewer {
 
   /** What is looked at moves, or was changed by hand: it shall be seen soon. */
   moved(): void {
-    this.pace.hurry(performance.now());
+    this.pace.moved(performance.now());
     this.invalidate();
   }
 
@@ -149,6 +152,8 @@ export class Viewer {
       scene.applyDocument(this.document);
       await this.compile(scene);
       if (!this.layouts.awaits(set)) return;
+      // Other materials lose the programs that the shown scene has, unless they have them while it is there.
+      if (this.shown?.showsWhole) this.wholePrograms.make(scene);
       scene.applyDocument(this.document); // it may have been edited meanwhile
       this.layouts.stage(scene, set);
       taken = true;
@@ -196,7 +201,10 @@ export class Viewer {
     this.layouts.stagedScene?.applyPointers(document, pointers);
     this.gizmo.refresh();
     // The document of a scene that has just come is no edit: its first light may be sharp.
-    if (this.shown?.set.showsLight) this.pace.hurry(performance.now(), EDIT_HURRY_MS);
+    if (this.shown?.set.showsLight) {
+      this.pace.hurry(performance.now(), EDIT_HURRY_MS);
+      this.pace.awaitLight(performance.now());
+    }
     this.invalidate();
   }
 
@@ -287,9 +295,11 @@ export class Viewer {
       this.invalidate();
       this.pace.lightCame(now);
     }
+    if (!this.set?.expectsMore && !this.dataSet?.expectsMore) this.pace.allCame();
     this.promote(now);
     if (this.rig.update(seconds)) this.invalidate();
     if (this.people?.step(seconds, this.rig.sceneSize * PERSON_SIZE)) this.wanted = true;
+    this.wholePrograms.turn(this.shown, this.pace.isAtRest(now));
     if (this.compiling || this.recompile()) return; // the last picture stays
     this.brightness.turn(now, this.replaced);
     if (this.exposure.step(seconds)) this.wanted = true;
@@ -402,6 +412,7 @@ export class Viewer {
     this.pace.forget();
     this.fences.forget();
     this.screen.forget();
+    this.wholePrograms.forget();
     this.exposure.forgetCard();
     const { sets, stagedScene } = this.layouts;
     if (lost) {
