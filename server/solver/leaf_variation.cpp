@@ -19,6 +19,8 @@ constexpr std::uint32_t kEvenPaths = 8;
 constexpr std::size_t kFewestPaths = 512;
 /// So many times its standard deviation what was found is not by chance.
 constexpr double kSurely = 2.0;
+/// So much of a leaf's own noise counts as that of its neighbours: only where it is several times as much.
+constexpr double kOwnNoise = 0.25;
 /// Where what is doubtful is more than this part of all that is lacking, squared, nothing is corrected.
 constexpr double kDoubtful = 0.1;
 /// A receiver never has more paths than these; a round of refinement adds no more than those in all.
@@ -43,10 +45,6 @@ class Neighbours {
     for (auto y = y_.first; y < y_.end; ++y)
       for (auto x = x_.first; x < x_.end; ++x) sum += values[y * side_.width + x];
     return side_.leaf_count > 1 ? sum - values[leaf_] : sum;
-  }
-  [[nodiscard]] double count() const {
-    const auto all = (x_.end - x_.first) * (y_.end - y_.first);
-    return all > 1 ? all - 1 : 1;
   }
 
  private:
@@ -183,12 +181,12 @@ void LeafVariation::correct() {
 /// What is found by chance at one leaf is not found at its neighbours too: a leaf gets as much of what it lacks as
 /// there is of signal in signal and noise around it (Wiener), and nothing where noise is the larger part.
 void LeafVariation::weigh(const Side& side) {
-  std::vector<double> signal(side.leaf_count, 0.0), noise(side.leaf_count, 0.0), doubt(side.leaf_count, 0.0);
+  std::vector<double> signal(side.leaf_count, 0.0), noise(signal), doubt(signal), found_in(signal);
   for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
     const auto &first = lacking_[0][side.first_value + leaf], &second = lacking_[1][side.first_value + leaf];
     const glm::dvec3 one = all(first), other = all(second), doubtful(0.5F * (first.doubtful + second.doubtful));
     if (one == glm::dvec3(0.0) && other == glm::dvec3(0.0)) continue;
-    const double area = rays_->areaOf(side.first_value + leaf);
+    const double area = found_in[leaf] = rays_->areaOf(side.first_value + leaf);
     signal[leaf] = area * glm::dot(one, other);
     noise[leaf] = 0.25 * area * glm::dot(one - other, one - other);
     doubt[leaf] = area * glm::dot(doubtful, doubtful);
@@ -200,9 +198,10 @@ void LeafVariation::weigh(const Side& side) {
     const bool found = s > n && s > 0.0, known = found && around.sumOf(doubt) < kDoubtful * s;
     if (!found) unknown_ += noise[leaf];
     if (found && !known) doubtful_ += signal[leaf];
-    // The leaf's own noise, where that is more: a single path that brings much would be a blotch. Of what one half
-    // alone has found no more is left than half of the root of the signal around.
-    const double weight = known ? s / (s + std::max(n, around.count() * noise[leaf])) : 0.0;
+    // A single path that brings much would be a blotch: of what one half alone has found no more is left than the root
+    // of the signal around. More of its own noise would prefer leaves whose halves agree by chance.
+    const double own = noise[leaf] > 0.0 ? kOwnNoise * noise[leaf] * around.sumOf(found_in) / found_in[leaf] : 0.0;
+    const double weight = known ? s / (s + std::max(n, own)) : 0.0;
     for (std::size_t h = 0; h < 2 && known; ++h)
       correction_[h][value] = static_cast<float>(weight) * glm::vec3(all(lacking_[h][value]));
     left_ += (1.0 - weight) * (1.0 - weight) * signal[leaf];

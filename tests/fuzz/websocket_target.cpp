@@ -109,7 +109,7 @@ int connectTo(std::uint16_t port) {
 /// Sends everything, says that nothing more comes, and reads to the end.
 void talk(std::uint16_t port, const std::string& bytes) {
   const int socket = connectTo(port);
-  const timeval limit{5, 0};
+  const timeval limit{20, 0};
   (void)::setsockopt(socket, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
   (void)::setsockopt(socket, SOL_SOCKET, SO_SNDTIMEO, &limit, sizeof limit);
   std::size_t sent = 0;
@@ -120,8 +120,10 @@ void talk(std::uint16_t port, const std::string& bytes) {
   }
   (void)::shutdown(socket, SHUT_WR);
   std::array<char, 65536> sink{};
-  while (::recv(socket, sink.data(), sink.size(), 0) > 0) {
-  }
+  ssize_t got = 0;
+  do got = ::recv(socket, sink.data(), sink.size(), 0);
+  while (got > 0);
+  require(got == 0 || (errno != EAGAIN && errno != EWOULDBLOCK), "the server ends a connection that its client has");
   ::close(socket);
 }
 

@@ -245,7 +245,7 @@ it('says that a solve which is over is done when the errors of its end are here,
   await page.evaluate(() => window.viewer!.view.setMode('error'));
   await until(async () => held.length, (count) => count > 0); // prettier-ignore
   await drawn(page);
-  expect(await chip()).toBe('Receiving light');
+  await until(chip, (text) => text === 'Receiving light');
   holds = false;
   for (const send of held) send();
   held = [];

@@ -361,7 +361,18 @@ it('looks nothing up of what has come once all light is there, and does again fo
     await page.waitForFunction((layout) => window.viewer!.viewer.shown!.set.note.layout > layout, layout);
     await converged(page);
   };
+  const first = await page.evaluateHandle(() => {
+    const { edit, viewer } = window.viewer!;
+    const values: unknown[] = [];
+    const others = edit.onSceneShown.bind(edit);
+    edit.onSceneShown = () => {
+      viewer.shown!.eachMaterial((material) => values.push(material.defines!['WHOLE_PAGES']));
+      others();
+    };
+    return values;
+  });
   await layOut(9000);
+  expect(new Set(await first.jsonValue())).toEqual(new Set([0]));
   await until(whole, ({ values }) => values.length === 1 && values[0] === 1);
   expect((await whole()).programs).toBe(programs);
   await layOut(16_000);

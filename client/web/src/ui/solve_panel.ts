@@ -13,7 +13,7 @@ export interface SolvePanelActions {
   notAccepted(text: string, wanted: string): void;
 }
 
-/** What a solve goes through by itself; what else it comes to, somebody waits for. */
+/** What a solve goes through by itself; what else it comes to, or from, somebody waits for. */
 const ITS_OWN = ['solving', 'converged', 'limited', 'timeLimit'];
 
 const STATES: Record<string, string> = {
@@ -97,10 +97,11 @@ export class SolvePanel {
 
   update(progress: Progress): void {
     this.plot.add(progress);
+    const states = [progress.state, this.progress?.state ?? ''];
     this.progress = progress;
     if (progress.shots === 0 || progress.error.total > this.firstError)
       this.firstError = Math.max(progress.error.total, 1e-6);
-    if (ITS_OWN.includes(progress.state)) this.spaced.soon();
+    if (states.every((state) => ITS_OWN.includes(state))) this.spaced.soon();
     else this.spaced.now();
   }
 

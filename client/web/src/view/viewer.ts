@@ -99,7 +99,7 @@ export class Viewer {
     this.screen = new Screen(this.renderer, gl); // which smooths edges
     this.rig = new CameraRig(canvas, () => this.moved());
     this.layouts = new Layouts(this.renderer, events.used);
-    this.wholePrograms = new WholePrograms(this.renderer, this.rig.camera, this.world);
+    this.wholePrograms = new WholePrograms(this.renderer, this.rig.camera, this.world, this.uniforms);
     this.brightness = this.makeBrightness();
     this.exposure = this.brightness.exposure;
     this.pagesView = new PagesView(canvas, this.uniforms, () => this.moved());
@@ -295,11 +295,11 @@ export class Viewer {
       this.invalidate();
       this.pace.lightCame(now);
     }
-    if (!this.set?.expectsMore && !this.dataSet?.expectsMore) this.pace.allCame();
+    if (!(this.dataSet ?? this.set)?.expectsMore) this.pace.allCame();
     this.promote(now);
-    if (this.rig.update(seconds)) this.invalidate();
+    if (this.rig.update(seconds)) this.moved();
     if (this.people?.step(seconds, this.rig.sceneSize * PERSON_SIZE)) this.wanted = true;
-    this.wholePrograms.turn(this.shown, this.pace.isAtRest(now));
+    this.wholePrograms.turn(this.shown, !this.compiling && this.pace.isAtRest(now));
     if (this.compiling || this.recompile()) return; // the last picture stays
     this.brightness.turn(now, this.replaced);
     if (this.exposure.step(seconds)) this.wanted = true;
