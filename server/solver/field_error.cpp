@@ -27,16 +27,14 @@ class ParentLevel {
     }
   }
 
-  /// False where one of the four parents is empty.
+  /// At the middle of a leaf. False where one of the four parents around it is empty, or beyond the side.
   [[nodiscard]] bool at(std::uint32_t x, std::uint32_t y, glm::vec3& value) const {
-    const float px = (static_cast<float>(x) + 0.5F) / 2.0F - 0.5F, py = (static_cast<float>(y) + 0.5F) / 2.0F - 0.5F;
-    const float fx = std::floor(px), fy = std::floor(py);
-    if (fx < 0.0F || fy < 0.0F || fx + 1.0F >= static_cast<float>(width_) || fy + 1.0F >= static_cast<float>(height_))
-      return false;
-    const std::size_t i = static_cast<std::size_t>(fy) * width_ + static_cast<std::size_t>(fx);
+    const std::uint32_t right = (x + 1) / 2, below = (y + 1) / 2;
+    if (right < 1 || below < 1 || right >= width_ || below >= height_) return false;
+    const std::size_t i = std::size_t{below - 1} * width_ + right - 1;
     if (area_[i] <= 0.0F || area_[i + 1] <= 0.0F || area_[i + width_] <= 0.0F || area_[i + width_ + 1] <= 0.0F)
       return false;
-    const float u = px - fx, v = py - fy;
+    const float u = x % 2 == 0 ? 0.75F : 0.25F, v = y % 2 == 0 ? 0.75F : 0.25F;
     value = (1.0F - v) * ((1.0F - u) * mean_[i] + u * mean_[i + 1]) +
             v * ((1.0F - u) * mean_[i + width_] + u * mean_[i + width_ + 1]);
     return true;

@@ -193,18 +193,18 @@ EnergyParts LinkedSolver::energy() const {
   }
   for (const auto& side : sides_) {
     const glm::dvec3 net(unshot_.flux(side.first_node + side.node_count - 1));
+    glm::dvec3 emitted(0.0), absorbed(0.0);
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+      const auto v = side.first_value + leaf;
+      const auto area = static_cast<double>(patches_->node_area[side.first_node + leaf]);
+      emitted += area * glm::dvec3(system_.emission()[v]);
+      absorbed += area * (1.0 - glm::dvec3(system_.reflectance()[v])) * glm::dvec3(irradiance_[side.first_node + leaf]);
+    }
     for (int c = 0; c < 3; ++c) {
       const auto i = static_cast<std::size_t>(c);
-      parts.unshot[i] += net[c];
-      for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
-        const auto v = side.first_value + leaf;
-        const auto area = static_cast<double>(patches_->node_area[side.first_node + leaf]);
-        const double emitted = area * static_cast<double>(system_.emission()[v][c]);
-        parts.emitted[i] += emitted;
-        if (side.gathered) parts.unshot[i] += emitted;
-        parts.absorbed[i] += area * (1.0 - static_cast<double>(system_.reflectance()[v][c])) *
-                             static_cast<double>(irradiance_[side.first_node + leaf][c]);
-      }
+      parts.emitted[i] += emitted[c];
+      parts.unshot[i] += net[c] + (side.gathered ? emitted[c] : 0.0);
+      parts.absorbed[i] += absorbed[c];
     }
   }
   const auto sky = skyFlux();
