@@ -181,12 +181,12 @@ void LeafVariation::correct() {
 /// What is found by chance at one leaf is not found at its neighbours too: a leaf gets as much of what it lacks as
 /// there is of signal in signal and noise around it (Wiener), and nothing where noise is the larger part.
 void LeafVariation::weigh(const Side& side) {
-  std::vector<double> signal(side.leaf_count, 0.0), noise(signal), doubt(signal), found_in(signal);
+  std::vector<double> signal(side.leaf_count, 0.0), noise(signal), doubt(signal), lacking_area(signal);
   for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
     const auto &first = lacking_[0][side.first_value + leaf], &second = lacking_[1][side.first_value + leaf];
     const glm::dvec3 one = all(first), other = all(second), doubtful(0.5F * (first.doubtful + second.doubtful));
     if (one == glm::dvec3(0.0) && other == glm::dvec3(0.0)) continue;
-    const double area = found_in[leaf] = rays_->areaOf(side.first_value + leaf);
+    const double area = lacking_area[leaf] = rays_->areaOf(side.first_value + leaf);
     signal[leaf] = area * glm::dot(one, other);
     noise[leaf] = 0.25 * area * glm::dot(one - other, one - other);
     doubt[leaf] = area * glm::dot(doubtful, doubtful);
@@ -200,7 +200,8 @@ void LeafVariation::weigh(const Side& side) {
     if (found && !known) doubtful_ += signal[leaf];
     // A single path that brings much would be a blotch: of what one half alone has found no more is left than the root
     // of the signal around. More of its own noise would prefer leaves whose halves agree by chance.
-    const double own = noise[leaf] > 0.0 ? kOwnNoise * noise[leaf] * around.sumOf(found_in) / found_in[leaf] : 0.0;
+    const double own =
+        noise[leaf] > 0.0 ? kOwnNoise * noise[leaf] * around.sumOf(lacking_area) / lacking_area[leaf] : 0.0;
     const double weight = known ? s / (s + std::max(n, own)) : 0.0;
     for (std::size_t h = 0; h < 2 && known; ++h)
       correction_[h][value] = static_cast<float>(weight) * glm::vec3(all(lacking_[h][value]));

@@ -123,7 +123,8 @@ void talk(std::uint16_t port, const std::string& bytes) {
   ssize_t got = 0;
   do got = ::recv(socket, sink.data(), sink.size(), 0);
   while (got > 0);
-  require(got == 0 || (errno != EAGAIN && errno != EWOULDBLOCK), "the server ends a connection that its client has");
+  require(got == 0 || (errno != EAGAIN && errno != EWOULDBLOCK),
+          "the server ends a connection that its client has ended");
   ::close(socket);
 }
 

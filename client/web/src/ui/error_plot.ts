@@ -45,9 +45,9 @@ export class ErrorPlot {
     if (this.samples.length > MOST) this.samples = this.samples.filter((_, i) => i % 2 === 0 || i > MOST - 50);
   }
 
+  /** To be drawn with the next draw(). */
   setTarget(target: number): void {
     this.target = target;
-    this.draw();
   }
 
   draw(): void {

@@ -106,10 +106,10 @@ export class SolvePanel {
   }
 
   private showProgress(): void {
+    this.plot.draw();
     const { progress } = this;
     if (!progress) return;
     const { error } = progress;
-    this.plot.draw();
     const target = this.settings?.targetError ?? 0.02;
     const way = Math.log(this.firstError / error.total) / Math.log(this.firstError / target);
     this.bar.value = progress.state === 'converged' ? 1 : Math.min(1, Math.max(0, Number.isFinite(way) ? way : 0));
