@@ -15,8 +15,16 @@ using scene::Seams;
 std::vector<glm::vec3> radiosity(const LitScene& lit) {
   const auto& irradiance = lit.solver().irradiance();
   std::vector<glm::vec3> values(irradiance.size());
-  for (std::size_t n = 0; n < values.size(); ++n)
-    values[n] = lit.materials().emission[n] + lit.materials().reflectance[n] * glm::max(irradiance[n], 0.0F);
+  std::size_t side = 0;
+  for (const auto& surface : lit.patches().surfaces) {
+    for (const auto first : surface.first_node) {
+      if (first == scene::kNone) continue;
+      const auto emission = lit.materials().emission.side(side), reflectance = lit.materials().reflectance.side(side);
+      for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf)
+        values[first + leaf] = emission[leaf] + reflectance[leaf] * glm::max(irradiance[first + leaf], 0.0F);
+      ++side;
+    }
+  }
   return values;
 }
 

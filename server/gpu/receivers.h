@@ -91,7 +91,9 @@ class Receivers {
   /// A place on a receiver, by `at` in [0, 1)^2.
   [[nodiscard]] Place place(const Receiver& receiver, const glm::vec2& at) const {
     if (receiver.full) return placeOf({receiver.texel + at, receiver.triangle});
-    return placeOf(patches_->spotAt({receiver.texel, receiver.triangle, false, false, receiver.first_spot}, 0, 0, at));
+    scene::LeafPoint leaf{receiver.texel, receiver.triangle};
+    leaf.first_spot = receiver.first_spot;
+    return placeOf(patches_->spotAt(leaf, 0, 0, at));
   }
   /// One of its places, spot < kLeafSpots; of a receiver that has them.
   [[nodiscard]] Place spot(const Receiver& receiver, std::uint32_t spot) const {

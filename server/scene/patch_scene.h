@@ -18,6 +18,7 @@
 
 #include "common/result.h"
 #include "server/scene/scene.h"
+#include "server/scene/side_colours.h"
 
 namespace radiosity::scene {
 
@@ -61,8 +62,8 @@ struct LeafPoint {
   std::uint32_t triangle = kNone;  ///< kNone: the leaf is empty
   bool full = false;
   bool cut = false;                  ///< something passes through the leaf, or right before it
-  std::uint32_t first_spot = kNone;  ///< into PatchScene::spots, or kFullSpots; kNone: any point stands for all
   bool beneath = false;              ///< another surface lies in its plane and covers some of it
+  std::uint32_t first_spot = kNone;  ///< into PatchScene::spots, or kFullSpots; kNone: any point stands for all
 };
 
 struct Surface {
@@ -248,10 +249,10 @@ inline constexpr std::uint64_t kMaxLeaves = std::uint64_t{1} << 28;  ///< some 6
                                                  const FormerScene* former = nullptr);
 
 /// Emission (exitance E = pi L_e, lm/m^2) and reflectance of every node: leaves integrated over textures and vertex
-/// colours (16 samples a leaf), parents area-weighted means. Index = node. Reflectance is clamped to 0.999.
+/// colours (16 samples a leaf), parents area-weighted means. Reflectance is clamped to 0.999.
 struct PatchMaterials {
-  std::vector<glm::vec3> emission;
-  std::vector<glm::vec3> reflectance;
+  SideColours emission;
+  SideColours reflectance;
   std::vector<std::string> warnings;
 };
 [[nodiscard]] PatchMaterials shadePatches(const Scene& scene, const PatchScene& patches);

@@ -45,8 +45,13 @@ class MaterialShader {
       return;
     }
     shadeLeaves();
-    for (const std::uint32_t first : surface_.first_node)
-      if (first != kNone) average(first);
+    for (const std::uint32_t first : surface_.first_node) {
+      if (first == kNone) continue;
+      average(first);
+      const auto side = out_.emission.sideOf(first);
+      out_.emission.assign(side, emission_);
+      out_.reflectance.assign(side, reflectance_);
+    }
   }
 
   [[nodiscard]] bool wasClamped() const { return was_clamped_; }
@@ -80,11 +85,11 @@ class MaterialShader {
   }
 
   void fill(const Value& value) {
-    const LevelGrid last = levelGrid(surface_.width, surface_.height, surface_.level_count - 1);
     for (const std::uint32_t first : surface_.first_node) {
       if (first == kNone) continue;
-      std::fill_n(out_.emission.begin() + first, last.offset + 1, value.emission);
-      std::fill_n(out_.reflectance.begin() + first, last.offset + 1, value.reflectance);
+      const auto side = out_.emission.sideOf(first);
+      out_.emission.fill(side, value.emission);
+      out_.reflectance.fill(side, value.reflectance);
     }
   }
 
@@ -121,6 +126,9 @@ class MaterialShader {
     const std::size_t count = std::size_t{surface_.width} * surface_.height;
     sums_.assign(count, Sum{});
     samples_.assign(count, 0);
+    const std::size_t nodes = levelGrid(surface_.width, surface_.height, surface_.level_count).offset;
+    emission_.resize(nodes);
+    reflectance_.resize(nodes);
     for (std::uint32_t t = surface_.first_triangle; t < surface_.first_triangle + surface_.triangle_count; ++t)
       sampleTriangle(cornersOf(patches_, t, *instance_, *primitive_));
     for (std::size_t i = 0; i < count; ++i) {
@@ -132,11 +140,8 @@ class MaterialShader {
       } else if (point.triangle != kNone) {
         value = valueAt(cornersOf(patches_, point.triangle, *instance_, *primitive_), glm::dvec2(point.texel));
       }
-      for (const std::uint32_t first : surface_.first_node) {
-        if (first == kNone) continue;
-        out_.emission[first + i] = value.emission;
-        out_.reflectance[first + i] = value.reflectance;
-      }
+      emission_[i] = value.emission;
+      reflectance_[i] = value.reflectance;
     }
   }
 
@@ -159,6 +164,7 @@ class MaterialShader {
       }
   }
 
+  /// Of the levels above leaves, by what of them is there on the side that begins with node `first`.
   void average(std::uint32_t first) {
     LevelGrid below = levelGrid(surface_.width, surface_.height, 0);
     for (std::uint32_t level = 1; level < surface_.level_count; ++level) {
@@ -169,15 +175,15 @@ class MaterialShader {
           double weight = 0.0;
           for (std::uint32_t cy = 2 * y; cy < std::min(2 * y + 2, below.height); ++cy)
             for (std::uint32_t cx = 2 * x; cx < std::min(2 * x + 2, below.width); ++cx) {
-              const std::uint32_t child = first + below.offset + cy * below.width + cx;
-              const double area = patches_.node_area[child];
+              const std::uint32_t child = below.offset + cy * below.width + cx;
+              const double area = patches_.node_area[first + child];
               weight += area;
-              emission += glm::dvec3(out_.emission[child]) * area;
-              reflectance += glm::dvec3(out_.reflectance[child]) * area;
+              emission += glm::dvec3(emission_[child]) * area;
+              reflectance += glm::dvec3(reflectance_[child]) * area;
             }
-          const std::uint32_t node = first + grid.offset + y * grid.width + x;
-          out_.emission[node] = weight > 0.0 ? glm::vec3(emission / weight) : glm::vec3(0.0F);
-          out_.reflectance[node] = weight > 0.0 ? glm::vec3(reflectance / weight) : glm::vec3(0.0F);
+          const std::uint32_t node = grid.offset + y * grid.width + x;
+          emission_[node] = weight > 0.0 ? glm::vec3(emission / weight) : glm::vec3(0.0F);
+          reflectance_[node] = weight > 0.0 ? glm::vec3(reflectance / weight) : glm::vec3(0.0F);
         }
       below = grid;
     }
@@ -193,6 +199,7 @@ class MaterialShader {
   const Primitive* primitive_ = nullptr;
   std::vector<Sum> sums_;
   std::vector<std::uint32_t> samples_;
+  std::vector<glm::vec3> emission_, reflectance_;  ///< by node of a side
   bool was_clamped_ = false;
 };
 
@@ -214,8 +221,7 @@ std::vector<std::uint32_t> reshadeMaterial(const Scene& scene, const PatchScene&
 
 PatchMaterials shadePatches(const Scene& scene, const PatchScene& patches) {
   PatchMaterials materials;
-  materials.emission.resize(patches.nodeCount(), glm::vec3(0.0F));
-  materials.reflectance.resize(patches.nodeCount(), glm::vec3(0.0F));
+  materials.emission = materials.reflectance = SideColours(patches);
   std::vector<std::uint32_t> used;
   for (const Surface& surface : patches.surfaces) used.push_back(surface.material);
   std::ranges::sort(used);

@@ -74,14 +74,12 @@ std::uint16_t firstRaysOfWide(const Side& side, std::uint32_t leaf, bool is_alon
 
 LeafGather::LeafGather(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed,
                        std::size_t most_bytes, std::shared_ptr<const LeafRays> rays)
-    : sights_(patches, sides, seed, std::move(rays)), most_bytes_(most_bytes), sides_(sides) {
+    : sights_(patches, sides, seed, std::move(rays)),
+      most_bytes_(most_bytes),
+      sides_(sides),
+      area_(leafAreas(patches, sides)) {
   const std::size_t leaves = sights_.leafCount(), first = leaves * kFirstRays * LeafSights::kRayBytes;
   sights_.limit(most_bytes - std::min(most_bytes, leastBytes(leaves) - first), sizeof(Light32));
-  area_.reserve(sights_.leafCount());
-  for (const auto& side : sides) {
-    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
-      area_.push_back(static_cast<double>(patches.node_area[side.first_node + leaf]));
-  }
 }
 
 std::size_t LeafGather::leastBytes(std::size_t leaves) {
@@ -161,7 +159,7 @@ void LeafGather::finish() {
   weighDoubt();
   unsolved_ = 0.0;
   double area = 0.0;
-  for (const double a : area_) area += a;
+  for (const float a : area_) area += static_cast<double>(a);
   for (auto& half : halves_) {
     double left = 0.0;
     for (const double residual : half.gmres.residual()) left += residual * std::sqrt(area);
@@ -188,8 +186,8 @@ void LeafGather::takeLight(std::size_t h) {
   std::array<double, 3> shining{};
   double area = 0.0;
   for (std::size_t v = 0; v < leaves; ++v) {
-    if (area_[v] <= 0.0) continue;
-    area += area_[v];
+    if (areaOf(v) <= 0.0) continue;
+    area += areaOf(v);
     const auto lost = lostOf(h, v);
     for (std::size_t c = 0; c < 3; ++c) {
       const auto i = static_cast<int>(c);
@@ -198,7 +196,7 @@ void LeafGather::takeLight(std::size_t h) {
           static_cast<double>(light_.reflectance[v][i]) * static_cast<double>(light_.irradiance[h][v][i]) -
           static_cast<double>(light_.shot[h][v][i]);
       half.source[v][c] = left;
-      shining[c] += area_[v] * (std::abs(left) + skyAt(lost, c));
+      shining[c] += areaOf(v) * (std::abs(left) + skyAt(lost, c));
     }
   }
   std::array<double, 3> tolerance{};
@@ -209,7 +207,7 @@ void LeafGather::takeLight(std::size_t h) {
   }
   RayGmres::Vectors nothing;
   for (auto& channel : nothing) channel.assign(leaves, 0.0F);
-  half.gmres.begin(std::move(nothing), std::vector<float>(area_.begin(), area_.end()), tolerance, kMaxSweeps);
+  half.gmres.begin(std::move(nothing), area_, tolerance, kMaxSweeps);
   half.done = false;
 }
 
@@ -311,10 +309,10 @@ void LeafGather::weighNoise() {
       }
       const glm::dvec3 light(0.5F *
                              (gathered_[0][v] + gathered_[1][v] + light_.irradiance[0][v] + light_.irradiance[1][v]));
-      block_noise_[v / kBlock] += area_[v] * square;
-      block_light_[v / kBlock] += area_[v] * glm::dot(light, light);
-      side_noise_[s] += area_[v] * square;
-      side_light_[s] += area_[v] * glm::dot(light, light);
+      block_noise_[v / kBlock] += areaOf(v) * square;
+      block_light_[v / kBlock] += areaOf(v) * glm::dot(light, light);
+      side_noise_[s] += areaOf(v) * square;
+      side_light_[s] += areaOf(v) * glm::dot(light, light);
     }
   }
   for (const double block : block_noise_) noise_ += block;
@@ -334,7 +332,7 @@ void LeafGather::weighDoubt() {
         if (sights_.isDoubtful(half, end)) brought += 0.5 / counts[v] * doubtOf(half, end);
     }
     const double square = glm::dot(brought, brought);
-    doubt_ += area_[v] * square;
+    doubt_ += areaOf(v) * square;
     leaf_bias_[v] += static_cast<float>(square);
   }
 }
@@ -362,7 +360,7 @@ glm::dvec3 LeafGather::changeAcross(std::uint32_t value) const {
   glm::dvec3 most(0.0);
   bool is_alone = true;
   const auto look = [&](bool is_there, std::uint32_t beside) {
-    if (!is_there || area_[beside] <= 0.0) return;
+    if (!is_there || areaOf(beside) <= 0.0) return;
     is_alone = false;
     most = glm::max(most, glm::abs(lightOf(beside) - here));
   };

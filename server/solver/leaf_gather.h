@@ -188,7 +188,8 @@ class LeafGather {
   std::size_t most_bytes_;
   bool has_gathered_ = false, lacks_memory_ = false;
   const std::vector<Side>& sides_;
-  std::vector<double> area_;  ///< by leaf value
+  std::vector<float> area_;  ///< by leaf value, unit box squared
+  [[nodiscard]] double areaOf(std::size_t value) const { return static_cast<double>(area_[value]); }
   // Of the rays that there are:
   /// Of a leaf's rays: into the sky, on unlit sides, and of which it is not told where they end.
   struct LostRays {

@@ -45,7 +45,7 @@ class LeafGather::Parts {
 void LeafGather::weighRays() {
   has_parted_ = false;
   for (std::uint32_t v = 0; v < sights_.leafCount() && !has_parted_; ++v)
-    has_parted_ = area_[v] > 0.0 && sights_.isParted(v);
+    has_parted_ = areaOf(v) > 0.0 && sights_.isParted(v);
   std::array<Parts, 2> parts{Parts(sides_.size()), Parts(sides_.size())};
   inBothHalves([&](std::size_t half) { weighRays(half, parts[half]); });
   part_.resize(sides_.size());
@@ -118,8 +118,8 @@ void LeafGather::weighPartedLoss(std::size_t h) {
       radiosity[v][c] = static_cast<float>(sent);
       if (!loses[v]) continue;
       auto& flux = fluxes[part_[sights_.sideOf(v)]][c];
-      flux.sent += area_[v] * sent;
-      flux.even += area_[v] * sent * lostOf(h, v).all();
+      flux.sent += areaOf(v) * sent;
+      flux.even += areaOf(v) * sent * lostOf(h, v).all();
     }
   }
   for (auto end = sights_.leafCount(); end < sights_.endCount(); ++end) {
@@ -131,7 +131,7 @@ void LeafGather::weighPartedLoss(std::size_t h) {
     for (const auto end : sights_.seen(h, v)) {
       const auto by = end < sights_.endCount() ? end : steps[end - sights_.endCount()].by;
       if (by >= loses.size() || !loses[by]) continue;
-      const double share = area_[v] / sights_.counts()[v];
+      const double share = areaOf(v) / sights_.counts()[v];
       for (std::size_t c = 0; c < 3; ++c)
         fluxes[part_[sights_.sideOf(by)]][c].arrives += share * static_cast<double>(radiosity[end][c]);
     }
@@ -185,17 +185,17 @@ std::vector<std::array<LeafGather::LevelSum, 3>> LeafGather::levelSums(std::size
     for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
       const auto lost = lostOf(h, v);
       const auto& loss = lossOf(h, v);
-      for (std::size_t c = 0; c < 3 && area_[v] > 0.0; ++c) {
+      for (std::size_t c = 0; c < 3 && areaOf(v) > 0.0; ++c) {
         const auto i = static_cast<int>(c);
         const double x = solved(h, c, v), over_links = static_cast<double>(light_.irradiance[h][v][i]);
         const double sends = 1.0 - loss[c] * lost.all();
         const double stays = 1.0 - sends * static_cast<double>(light_.reflectance[v][i]);
-        sum[c].left += area_[v] * (sends * halves_[h].source[v][c] + skyAt(lost, c));
-        sum[c].kept += area_[v] * stays * x;
-        sum[c].size += area_[v] * stays * std::abs(x);
-        sum[c].all += area_[v] * stays * (x + over_links);
-        sum[c].area += area_[v];
-        sum[c].stays += area_[v] * stays;
+        sum[c].left += areaOf(v) * (sends * halves_[h].source[v][c] + skyAt(lost, c));
+        sum[c].kept += areaOf(v) * stays * x;
+        sum[c].size += areaOf(v) * stays * std::abs(x);
+        sum[c].all += areaOf(v) * stays * (x + over_links);
+        sum[c].area += areaOf(v);
+        sum[c].stays += areaOf(v) * stays;
         if (x < 0.0) sum[c].least = std::min(sum[c].least, x / over_links);
       }
     }
@@ -209,7 +209,7 @@ void LeafGather::weighMissed(const std::array<Levels, 2>& levels) {
   std::vector<double> area(sides_.size(), 0.0), square(sides_.size(), 0.0);
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
     for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v)
-      area[part_[s]] += area_[v];
+      area[part_[s]] += areaOf(v);
   }
   for (std::size_t p = 0; p < sides_.size(); ++p) {
     for (std::size_t c = 0; c < 3 && area[p] > 0.0; ++c) {
@@ -220,12 +220,12 @@ void LeafGather::weighMissed(const std::array<Levels, 2>& levels) {
   }
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
     for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
-      if (area_[v] <= 0.0) continue;
-      const double part = square[part_[s]] * area_[v] / area[part_[s]];
+      if (areaOf(v) <= 0.0) continue;
+      const double part = square[part_[s]] * areaOf(v) / area[part_[s]];
       block_noise_[v / kBlock] += part;
       noise_ += part;
       bias_ += part;
-      leaf_bias_[v] += static_cast<float>(part / area_[v]);
+      leaf_bias_[v] += static_cast<float>(part / areaOf(v));
     }
   }
 }
@@ -240,10 +240,10 @@ void LeafGather::weighLost() {
       if (lost.all() <= 0.0) continue;
       const auto& loss = lossOf(half, v);
       for (std::size_t c = 0; c < 3; ++c) {
-        const double flux = 0.5 * area_[v] * static_cast<double>(halves_[half].radiosity[v][c]) * loss[c];
+        const double flux = 0.5 * areaOf(v) * static_cast<double>(halves_[half].radiosity[v][c]) * loss[c];
         escaped_[c] += flux * lost.escaped();
         absorbed_[c] += flux * static_cast<double>(lost.absorbed);
-        from_sky_[c] += 0.5 * area_[v] * skyAt(lost, c);
+        from_sky_[c] += 0.5 * areaOf(v) * skyAt(lost, c);
       }
     }
   }

@@ -62,16 +62,21 @@ bool LeafGather::takeDouble(BlockRays& block, Room& taken) {
 /// is itself, or as its side is.
 void LeafGather::refineBlotches(const BesideLight& beside, std::vector<BlockRays>& blocks, Room& taken) {
   const double light = std::reduce(side_light_.begin(), side_light_.end());
-  const double all = std::reduce(area_.begin(), area_.end());
+  const auto areaBetween = [this](std::size_t first, std::size_t end) {
+    double sum = 0.0;
+    for (auto v = first; v < end; ++v) sum += areaOf(v);
+    return sum;
+  };
+  const double all = areaBetween(0, area_.size());
   const double black = all > 0.0 ? kBlack * kBlack * light / all : 0.0;
   std::vector<double> noisy(blocks.size(), 0.0), area(blocks.size(), 0.0);  // squares of noise, of those of light
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
-    const auto first = area_.begin() + sides_[s].first_value;
-    const double side = side_light_[s] + black * std::reduce(first, first + sides_[s].leaf_count);
+    const auto first = sides_[s].first_value;
+    const double side = side_light_[s] + black * areaBetween(first, first + sides_[s].leaf_count);
     const double noise = side_noise_[s] / side / (isWide(sides_[s]) ? kOnWide * kOnWide : 1.0);
     for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
-      area[v / kBlock] += area_[v];
-      if (area_[v] > 0.0) noisy[v / kBlock] = std::max(noisy[v / kBlock], noise);
+      area[v / kBlock] += areaOf(v);
+      if (areaOf(v) > 0.0) noisy[v / kBlock] = std::max(noisy[v / kBlock], noise);
     }
   }
   for (std::size_t b = 0; b < blocks.size(); ++b) {

@@ -63,15 +63,20 @@ LeafRays::LeafRays(const scene::PatchScene& patches, const std::vector<Side>& si
 }
 
 void LeafRays::findStandIns() {
-  stand_in_.reserve(side_of_value_.size());
+  has_stand_in_.reserve(side_of_value_.size());
   is_cut_.reserve(side_of_value_.size());
   for (const auto& side : sides_) {
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
       const bool whole = patches_.node_area[side.first_node + leaf] > 0.0F;
-      stand_in_.push_back(whole ? side.first_value + leaf : neighbourOf(side, leaf));
+      has_stand_in_.push_back(!whole);
+      if (!whole) stand_ins_.emplace_back(side.first_value + leaf, neighbourOf(side, leaf));
       is_cut_.push_back(whole && patches_.leaves[patches_.surfaces[side.surface].first_leaf + leaf].cut);
     }
   }
+}
+
+std::uint32_t LeafRays::foundStandIn(std::uint32_t value) const {
+  return std::ranges::lower_bound(stand_ins_, value, {}, [](const auto& pair) { return pair.first; })->second;
 }
 
 /// Who is lit in the place of a leaf without area: what covers it, or the first of the eight around it that has some.
@@ -143,7 +148,7 @@ LeafRays::Sight LeafRays::look(const Place& from, const glm::dvec3& direction, d
   sight.end.position = origin + hit->t * direction;
   sight.end.normal = glm::dvec3(hit->front ? frame.normal : -frame.normal);
   const auto value = leafAt(sides_[s], texelAt(frame, sight.end.position));
-  if (stand_in_[value] == value) sight.end.value = value;
+  if (!has_stand_in_[value]) sight.end.value = value;
   return sight;
 }
 
@@ -198,7 +203,7 @@ std::uint32_t LeafRays::see(const Place& from, const glm::dvec3& direction, std:
     // In the plane: `at` is off by what the distance is rounded, more than rays are lifted on long thin triangles.
     const auto& frame = patches_.triangles[hit.triangle];
     end = {positionAt(frame, texel), glm::dvec3(hit.front ? frame.normal : -frame.normal), value, hit.triangle};
-    return stand_in_[value];
+    return standInOf(value);
   }
 }
 

@@ -7,6 +7,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "server/scene/bounds.h"
@@ -63,13 +64,16 @@ class LeafRays {
   /// Light may change within the leaf from one place to the next: something passes through it or right before it.
   [[nodiscard]] bool isCut(std::uint32_t value) const { return is_cut_[value]; }
   /// Who is seen where a leaf lies: itself, unless it has no area.
-  [[nodiscard]] std::uint32_t standInOf(std::uint32_t value) const { return stand_in_[value]; }
+  [[nodiscard]] std::uint32_t standInOf(std::uint32_t value) const {
+    return has_stand_in_[value] ? foundStandIn(value) : value;
+  }
   [[nodiscard]] bool isOpen(const Place& from, const glm::dvec3& to) const;
 
  private:
   const scene::PatchScene& patches_;
   const std::vector<Side>& sides_;
   void findStandIns();
+  [[nodiscard]] std::uint32_t foundStandIn(std::uint32_t value) const;
   [[nodiscard]] std::uint32_t neighbourOf(const Side& side, std::uint32_t leaf) const;
   [[nodiscard]] bool isBeneath(const Side& side, std::uint32_t value) const;
   bool uncover(scene::RayHit& hit, const glm::dvec3& origin, const glm::dvec3& direction,
@@ -82,8 +86,9 @@ class LeafRays {
   scene::RayTree wide_;
   std::vector<std::array<std::uint32_t, 2>> side_of_;  ///< by surface
   std::vector<std::uint32_t> side_of_value_;
-  /// By leaf value: itself, or who stands for it where it has no area: another, or kNothing.
-  std::vector<std::uint32_t> stand_in_;
+  std::vector<bool> has_stand_in_;  ///< by leaf value: it has no area
+  /// Who stands for a leaf value that has no area: another, or kNothing. Ascending.
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> stand_ins_;
   std::vector<bool> is_cut_;  ///< by leaf value
   double greatest_width_ = 0.0;
 };

@@ -79,7 +79,7 @@ bool LeafSmoother::isFor(const Pass& pass, const Side& side) {
   return std::max(side.width, side.height) > 2 * pass.step();
 }
 
-LeafSmoother::LeafSmoother(const std::vector<Side>& sides, const std::vector<double>& area,
+LeafSmoother::LeafSmoother(const std::vector<Side>& sides, const std::vector<float>& area,
                            const std::function<bool(std::uint32_t)>& is_parted)
     : sides_(sides), area_(area), is_parted_(area.size(), false), beside_(sides.size()) {
   for (std::size_t s = 0; s < sides.size() && is_parted; ++s) findParted(s, is_parted);
@@ -90,7 +90,7 @@ void LeafSmoother::findParted(std::size_t s, const std::function<bool(std::uint3
   const auto& side = sides_[s];
   std::vector<bool> beside;
   for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
-    if (area_[side.first_value + leaf] <= 0.0 || !is_parted(side.first_value + leaf)) continue;
+    if (areaOf(side.first_value + leaf) <= 0.0 || !is_parted(side.first_value + leaf)) continue;
     is_parted_[side.first_value + leaf] = true;
     beside.resize(side.leaf_count);
     const auto x = leaf % side.width, y = leaf / side.width;
@@ -134,7 +134,7 @@ LeafSmoother::Light LeafSmoother::averageApart(const Side& side, const Beside& b
     const std::ptrdiff_t dx = static_cast<std::ptrdiff_t>(way % 3) - 1, dy = static_cast<std::ptrdiff_t>(way / 3) - 1;
     const std::ptrdiff_t apart = pass.step(), width = side.width;
     const auto there = static_cast<std::size_t>(std::ptrdiff_t{beside.leaf} + apart * (dy * width + dx));
-    const double weight = (dx == 0 ? 2.0 : 1.0) * (dy == 0 ? 2.0 : 1.0) * area_[side.first_value + there];
+    const double weight = (dx == 0 ? 2.0 : 1.0) * (dy == 0 ? 2.0 : 1.0) * areaOf(side.first_value + there);
     for (std::size_t c = 0; c < 3; ++c) sum[c] += weight * from[there][c];
     all += weight;
   }
@@ -164,7 +164,7 @@ void LeafSmoother::average(const Side& side, const Pass& pass, std::span<const L
       near(y, side.height, [&](std::uint32_t ny, double wy) {
         near(x, side.width, [&](std::uint32_t nx, double wx) {
           const auto leaf = ny * side.width + nx;
-          const double weight = wx * wy * area_[side.first_value + leaf];
+          const double weight = wx * wy * areaOf(side.first_value + leaf);
           for (std::size_t c = 0; c < 3; ++c) sum[c] += weight * from[leaf][c];
           all += weight;
         });
@@ -188,7 +188,7 @@ void LeafSmoother::smooth(std::array<std::vector<Light>, 2>& halves) {
       for (std::size_t pass = 0; pass < kPasses.size(); ++pass)
         if (isFor(kPasses[pass], side)) smoothSide(side, pass, raw, halves);
       for (auto v = side.first_value; v < side.first_value + side.leaf_count; ++v)
-        taken_[v] = area_[v] * dot(less(halves[0][v], raw[0][v]), less(halves[1][v], raw[1][v]));
+        taken_[v] = areaOf(v) * dot(less(halves[0][v], raw[0][v]), less(halves[1][v], raw[1][v]));
     }
   });
   bias_ = std::max(0.0, std::reduce(taken_.begin(), taken_.end())) + std::reduce(by_chance_.begin(), by_chance_.end());
@@ -206,18 +206,18 @@ std::vector<float> LeafSmoother::biasOfLeaves() const {
   for (const auto& side : sides_) {
     std::vector<Gain> taken(side.leaf_count);
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
-      taken[leaf] = {taken_[side.first_value + leaf], area_[side.first_value + leaf], 1};
+      taken[leaf] = {taken_[side.first_value + leaf], areaOf(side.first_value + leaf), 1};
     const GainTable table(side, taken);
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
       const auto around = table.around(leaf % side.width, leaf / side.width);
       const auto v = side.first_value + leaf;
-      if (around.bend > 0.0) bias[v] += std::max(0.0, around.slope) * area_[v] / around.bend;
+      if (around.bend > 0.0) bias[v] += std::max(0.0, around.slope) * areaOf(v) / around.bend;
     }
   }
   const double all = std::reduce(bias.begin(), bias.end());
   std::vector<float> of_leaf(bias.size(), 0.0F);
   for (std::size_t v = 0; v < bias.size(); ++v) {
-    if (all > 0.0 && area_[v] > 0.0) of_leaf[v] = static_cast<float>(bias_ / all * bias[v] / area_[v]);
+    if (all > 0.0 && areaOf(v) > 0.0) of_leaf[v] = static_cast<float>(bias_ / all * bias[v] / areaOf(v));
   }
   return of_leaf;
 }
@@ -238,8 +238,8 @@ void LeafSmoother::smoothSide(const Side& side, std::size_t pass, const std::arr
     const auto p0 = less(halves[0][v], raw[0][v]), p1 = less(halves[1][v], raw[1][v]);
     const auto q0 = less(means[0][leaf], halves[0][v]), q1 = less(means[1][leaf], halves[1][v]);
     const auto noise = less(halves[0][v], halves[1][v]), change = less(q0, q1);
-    gains[leaf] = {area_[v] * (0.5 * (dot(p0, q1) + dot(q0, p1)) + 0.25 * dot(noise, change)),
-                   area_[v] * (dot(q0, q1) + 0.25 * dot(change, change)), 1};
+    gains[leaf] = {areaOf(v) * (0.5 * (dot(p0, q1) + dot(q0, p1)) + 0.25 * dot(noise, change)),
+                   areaOf(v) * (dot(q0, q1) + 0.25 * dot(change, change)), 1};
   }
   const GainTable table(side, gains);
   for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
@@ -250,7 +250,7 @@ void LeafSmoother::smoothSide(const Side& side, std::size_t pass, const std::arr
     // has no say in it (Stein 1981, "Estimation of the mean of a multivariate normal distribution").
     const auto noise = less(halves[0][first + leaf], halves[1][first + leaf]);
     if (part > 0.0 && part < 1.0)
-      by_chance_[first + leaf] += area_[first + leaf] * 2.0 * 0.25 * dot(noise, noise) / gain.leaves;
+      by_chance_[first + leaf] += areaOf(first + leaf) * 2.0 * 0.25 * dot(noise, noise) / gain.leaves;
     towards_[pass][first + leaf] = static_cast<float>(part);
     for (std::size_t h = 0; h < 2; ++h)
       move(halves[h][first + leaf], means[h][leaf], static_cast<double>(towards_[pass][first + leaf]));

@@ -124,7 +124,8 @@ void LeafVariation::update(const LeafLight& light, double bound) {
   }
   trace(wanted_, light);
   wanted_.clear();
-  for (auto& half : correction_) giveBack(half);
+  corrects_ = false;
+  giveBack(corrections_);
   sumUp(light);
   // Until it is known: all receivers get more of them.
   const auto fewest = [&] { return count_.empty() ? kEvenPaths : std::uint32_t{*std::ranges::min_element(count_)}; };
@@ -171,7 +172,7 @@ void LeafVariation::sumUp(const LeafLight& light) {
 
 /// Receivers get what they lack, as far as it is more than noise and sure.
 void LeafVariation::correct() {
-  for (auto& half : correction_) half.assign(lacking_[0].size(), glm::vec3(0.0F));
+  corrects_ = true;
   gain_.assign(lacking_[0].size(), 0.0F);
   left_ = noise_ = unknown_ = doubtful_ = 0.0;
   for (const auto& side : sides_) weigh(side);
@@ -194,6 +195,7 @@ void LeafVariation::weigh(const Side& side) {
   for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
     const auto value = side.first_value + leaf;
     const Neighbours around(side, leaf);
+    const auto &first = lacking_[0][value], &second = lacking_[1][value];
     const double s = around.sumOf(signal), n = around.sumOf(noise);
     const bool found = s > n && s > 0.0, known = found && around.sumOf(doubt) < kDoubtful * s;
     if (!found) unknown_ += noise[leaf];
@@ -203,8 +205,10 @@ void LeafVariation::weigh(const Side& side) {
     const double own =
         noise[leaf] > 0.0 ? kOwnNoise * noise[leaf] * around.sumOf(lacking_area) / lacking_area[leaf] : 0.0;
     const double weight = known ? s / (s + std::max(n, own)) : 0.0;
-    for (std::size_t h = 0; h < 2 && known; ++h)
-      correction_[h][value] = static_cast<float>(weight) * glm::vec3(all(lacking_[h][value]));
+    if (known) {
+      const auto part = static_cast<float>(weight);
+      corrections_.push_back({value, {part * glm::vec3(all(first)), part * glm::vec3(all(second))}});
+    }
     left_ += (1.0 - weight) * (1.0 - weight) * signal[leaf];
     noise_ += weight * weight * noise[leaf];
     gain_[value] = static_cast<float>(n + noise[leaf]);

@@ -71,10 +71,15 @@ class LeafVariation {
   /// because it is doubtful.
   [[nodiscard]] double unsettled() const { return noise_ + unknown_ + std::max(0.0, left_ - doubtful_); }
 
-  [[nodiscard]] bool corrects() const { return !correction_[0].empty(); }
-  /// To be added to irradiance, lux, by leaf value; the halves are independent but for how much of them is. Empty:
-  /// nothing.
-  [[nodiscard]] std::span<const glm::vec3> correction(std::size_t half) const { return correction_[half]; }
+  [[nodiscard]] bool corrects() const { return corrects_; }
+  /// To be added to irradiance, lux, by half: these are independent but for how much of them is.
+  struct Correction {
+    std::uint32_t value;  ///< leaf value
+    std::array<glm::vec3, 2> lacks;
+    bool operator==(const Correction&) const = default;
+  };
+  /// By ascending leaf value; nothing elsewhere.
+  [[nodiscard]] std::span<const Correction> corrections() const { return corrections_; }
 
   /// How many paths each receiver has; the paths are traced anew from it.
   template <typename Archive, typename Self>
@@ -171,7 +176,8 @@ class LeafVariation {
   std::array<std::vector<Path>, 2> kept_;     ///< and those that are what they were, ...
   std::uint64_t kept_for_ = 0;                ///< ... by these lights
   std::array<std::vector<Lack>, 2> lacking_;  ///< by half and leaf value: mean of the paths; while updating
-  std::array<std::vector<glm::vec3>, 2> correction_;
+  bool corrects_ = false;                     ///< what varies is worth it
+  std::vector<Correction> corrections_;
   std::vector<float> gain_;               ///< by leaf value: what more paths would lower; while correcting
   double found_ = 0.0, deviation_ = 0.0;  ///< sum of what varies, and its standard deviation
   double left_ = 0.0, noise_ = 0.0, unknown_ = 0.0, doubtful_ = 0.0;

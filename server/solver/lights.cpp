@@ -40,12 +40,12 @@ bool isWhole(const scene::PatchScene& patches, const Side& side) {
 /// Of one emission. Leaves differ by so small a part where it is a texture of one colour, whose pixels are averaged.
 constexpr float kSameEmission = 1e-5F;
 
-bool uniformEmission(const scene::PatchScene& patches, const Side& side, std::span<const glm::vec3> emissions,
+bool uniformEmission(const scene::PatchScene& patches, const Side& side, scene::SideColours::OfSide emissions,
                      glm::vec3& emission) {
   bool found = false;
   for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
     if (patches.node_area[side.first_node + leaf] <= 0.0F) continue;
-    const glm::vec3 here = emissions[side.first_value + leaf];
+    const glm::vec3 here = emissions[leaf];
     if (!found) emission = here;
     found = true;
     if (!glm::all(glm::lessThanEqual(glm::abs(here - emission), kSameEmission * emission))) return false;
@@ -129,13 +129,13 @@ glm::vec3 LightPolygon::point(double u, double v) const {
 }
 
 std::vector<LightPolygon> findLightPolygons(const scene::PatchScene& patches, std::vector<Side>& sides,
-                                            std::span<const glm::vec3> emission) {
+                                            const scene::SideColours& emission) {
   std::vector<LightPolygon> lights;
   for (auto& side : sides) {
     const auto& surface = patches.surfaces[side.surface];
     glm::vec3 uniform(0.0F);
     side.gathered = surface.planar && !surface.see_through && surface.triangle_count <= 2 * kMaxPolygonsPerSurface &&
-                    uniformEmission(patches, side, emission, uniform) && isWhole(patches, side);
+                    uniformEmission(patches, side, emission.side(side.number), uniform) && isWhole(patches, side);
     if (side.gathered) addPolygons(patches, side, uniform, lights);
   }
   return lights;

@@ -34,6 +34,6 @@ struct LightPolygon {
 /// and their sides are marked `gathered`; the emission of all others is shot like reflected light: of a lamp that
 /// something covers in part, or that stands in a solid, leaves know how much shines. `emission` by leaf value.
 [[nodiscard]] std::vector<LightPolygon> findLightPolygons(const scene::PatchScene& patches, std::vector<Side>& sides,
-                                                          std::span<const glm::vec3> emission);
+                                                          const scene::SideColours& emission);
 
 }  // namespace radiosity::solver

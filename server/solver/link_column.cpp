@@ -123,7 +123,7 @@ void LinkColumn::growTo(float largest) {
 }
 
 void LinkColumn::add(const LinkExpander& sample, const LinkSample& totals, double points,
-                     const std::vector<Side>& sides, double factor) {
+                     std::span<const float> leaf_areas, const std::vector<Side>& sides, double factor) {
   makeRoom(sample.sidesReached(), sides);
   const double sum = points_ + points;
   const auto old_part = static_cast<float>(points_ / sum), new_part = static_cast<float>(points / sum);
@@ -154,7 +154,7 @@ void LinkColumn::add(const LinkExpander& sample, const LinkSample& totals, doubl
   open_looks_.add(open, static_cast<std::uint32_t>(points_), static_cast<std::uint32_t>(points));
   points_ = sum;
   ++samples_;
-  keepFlux(sample.leafAreas());
+  keepFlux(leaf_areas);
 }
 
 /// `fresh`: what the sample brings to the `count` values from `first_value` on; empty: nothing.

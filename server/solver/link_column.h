@@ -47,9 +47,10 @@ class SharedCodes {
 class LinkColumn {
  public:
   /// Averages a new sample of `points` points into what is there. `factor`: of what it says should arrive, escape and
-  /// be absorbed. The flux of all links together is kept exactly, whatever 16 bits make of each.
-  void add(const LinkExpander& sample, const LinkSample& totals, double points, const std::vector<Side>& sides,
-           double factor = 1.0);
+  /// be absorbed. The flux of all links together is kept exactly, whatever 16 bits make of each. `leaf_areas`: unit box
+  /// squared, by leaf value.
+  void add(const LinkExpander& sample, const LinkSample& totals, double points, std::span<const float> leaf_areas,
+           const std::vector<Side>& sides, double factor = 1.0);
 
   struct ValueRun {
     std::uint32_t first, count;

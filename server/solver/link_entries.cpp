@@ -78,10 +78,11 @@ void LinkSystem::fillRow(std::size_t half, std::uint32_t member, std::uint32_t c
     return;
   }
   glm::dvec3 sum(0.0);
+  const auto reflectance = reflectance_.side(side.number);
   for (auto y = rect.y0; y < rect.y1; ++y) {
     for (auto x = rect.x0; x < rect.x1; ++x) {
       const auto leaf = y * side.width + x;
-      sum += glm::dvec3(area[leaf] * links[leaf] * reflectance_[side.first_value + leaf]);
+      sum += glm::dvec3(area[leaf] * links[leaf] * reflectance[leaf]);
     }
   }
   for (int c = 0; c < 3; ++c)
@@ -124,11 +125,11 @@ bool LinkSystem::hasSameReflectance(std::uint32_t member, const LinkSystem& form
   const NodePlace &place = shooters_[member].place, &old_place = former.shooters_[old_member].place;
   const Side &side = sides_[place.side], &old_side = former.sides_[old_place.side];
   const auto rect = leafRect(side, place);
+  const auto now = reflectance_.side(side.number), before = former.reflectance_.side(old_side.number);
   for (auto y = rect.y0; y < rect.y1; ++y) {
-    const auto row = y * side.width + rect.x0;
-    const auto first = reflectance_.begin() + side.first_value + row;
-    if (!std::equal(first, first + (rect.x1 - rect.x0), former.reflectance_.begin() + old_side.first_value + row))
-      return false;
+    for (auto x = rect.x0; x < rect.x1; ++x) {
+      if (now[y * side.width + x] != before[y * side.width + x]) return false;
+    }
   }
   return true;
 }

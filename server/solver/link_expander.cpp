@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "common/clones.h"
+#include "common/give_back.h"
 
 namespace radiosity::solver {
 namespace {
@@ -27,23 +28,22 @@ RADIOSITY_CLONES double sumOf(const float* value, const float* area, std::size_t
 double fluxOf(std::span<const float> values, const float* areas) { return sumOf(values.data(), areas, values.size()); }
 
 LinkExpander::LinkExpander(const scene::PatchScene& patches, const std::vector<Side>& sides)
-    : patches_(patches),
-      sides_(sides),
-      side_of_node_(patches.nodeCount(), 0),
-      coarse_(patches.nodeCount(), 0.0F),
-      is_reached_(sides.size(), false),
-      has_coarse_(sides.size(), false) {
-  std::size_t values = 0;
-  for (std::uint32_t s = 0; s < sides.size(); ++s) {
-    std::fill_n(side_of_node_.begin() + sides[s].first_node, sides[s].node_count, s);
-    values += sides[s].leaf_count;
-  }
-  values_.resize(values);
-  leaf_area_.reserve(values);
-  for (const auto& side : sides) {
-    const auto leaves = patches.node_area.begin() + side.first_node;
-    leaf_area_.insert(leaf_area_.end(), leaves, leaves + side.leaf_count);
-  }
+    : patches_(patches), sides_(sides), is_reached_(sides.size(), false), has_coarse_(sides.size(), false) {}
+
+void LinkExpander::prepare() {
+  if (!side_of_node_.empty()) return;
+  side_of_node_.resize(patches_.nodeCount());
+  coarse_.assign(patches_.nodeCount(), 0.0F);
+  for (const auto& side : sides_) std::fill_n(side_of_node_.begin() + side.first_node, side.node_count, side.number);
+  if (!sides_.empty()) values_.resize(sides_.back().first_value + sides_.back().leaf_count);
+}
+
+void LinkExpander::forget() {
+  for (const auto side : reached_) is_reached_[side] = false;
+  giveBack(reached_);
+  giveBack(side_of_node_);
+  giveBack(values_);
+  giveBack(coarse_);
 }
 
 /// What reaches a leaf and the slivers that share with it arrives at all of them alike.
@@ -51,10 +51,10 @@ void LinkExpander::shareSlivers() {
   if (!slivers_) slivers_ = findSlivers(patches_, sides_);
   for (auto first = slivers_->begin(); first != slivers_->end();) {
     const auto [leaf, leaf_side, sliver, sliver_side] = *first;
-    double area = static_cast<double>(leaf_area_[leaf]), flux = fluxTo(leaf, leaf_side);
+    double area = static_cast<double>(areaOf(leaf, leaf_side)), flux = fluxTo(leaf, leaf_side);
     auto last = first;
     for (; last != slivers_->end() && last->leaf == leaf; ++last) {
-      area += static_cast<double>(leaf_area_[last->sliver]);
+      area += static_cast<double>(areaOf(last->sliver, last->sliver_side));
       flux += fluxTo(last->sliver, last->sliver_side);
     }
     if (flux > 0.0) {
@@ -72,14 +72,14 @@ void LinkExpander::shareSlivers() {
 }
 
 double LinkExpander::fluxTo(std::uint32_t value, std::uint32_t side) const {
-  return is_reached_[side] ? static_cast<double>(leaf_area_[value]) * static_cast<double>(values_[value]) : 0.0;
+  return is_reached_[side] ? static_cast<double>(areaOf(value, side)) * static_cast<double>(values_[value]) : 0.0;
 }
 
 double LinkExpander::flux() const {
   double sum = 0.0;
   for (const auto s : reached_) {
     const auto first = sides_[s].first_value;
-    sum += fluxOf(std::span(values_).subspan(first, sides_[s].leaf_count), &leaf_area_[first]);
+    sum += fluxOf(std::span(values_).subspan(first, sides_[s].leaf_count), &patches_.node_area[sides_[s].first_node]);
   }
   return sum;
 }
@@ -92,6 +92,7 @@ void LinkExpander::reach(std::uint32_t side) {
 }
 
 void LinkExpander::expand(const LinkSample& sample, bool by_pixels) {
+  prepare();
   for (const auto side : reached_) is_reached_[side] = false;
   reached_.clear();
   const float* value = sample.irradiance.data();

@@ -30,19 +30,24 @@ class LinkExpander {
   [[nodiscard]] std::span<const std::uint32_t> sidesReached() const { return reached_; }
   /// Sum of irradiance times area over all leaves.
   [[nodiscard]] double flux() const;
-  /// Unit box squared, by leaf value.
-  [[nodiscard]] std::span<const float> leafAreas() const { return leaf_area_; }
+  /// The next sample takes its memory anew.
+  void forget();
 
  private:
+  void prepare();
   void reach(std::uint32_t side);
   void pushDown(std::uint32_t side);
   void shareSlivers();
+  [[nodiscard]] float areaOf(std::uint32_t value, std::uint32_t side) const {
+    return patches_.node_area[sides_[side].first_node + (value - sides_[side].first_value)];
+  }
   [[nodiscard]] double fluxTo(std::uint32_t value, std::uint32_t side) const;
 
   const scene::PatchScene& patches_;
   const std::vector<Side>& sides_;
+  // Empty until a sample comes:
   std::vector<std::uint32_t> side_of_node_;
-  std::vector<float> values_, leaf_area_;
+  std::vector<float> values_;
   std::vector<float> coarse_;  // by node: what was linked above level 0
   std::vector<std::uint32_t> reached_;
   std::vector<bool> is_reached_, has_coarse_;

@@ -141,8 +141,8 @@ std::vector<Measurement> LinkPlanner::firstLight(const LinkSystem& system) const
 bool LinkPlanner::mustSplit(const Node& node, const LinkSystem& system) const {
   if (node.place.level == 0) return false;
   const auto id = nodeId(sides_[node.place.side], node.place);
-  if (system.hasBelow(id)) return true;
-  if (system.at(id) != scene::kNone) return false;
+  if (system.hasBelow(node.place.side, id)) return true;
+  if (system.at(node.place.side, id) != scene::kNone) return false;
   if (node.power > share_) return true;
   return isPartial(node);
 }
@@ -226,7 +226,7 @@ std::vector<Measurement> LinkPlanner::grow(LinkSystem& system, const UnshotPyram
       }
       continue;
     }
-    const auto there = system.at(nodeId(sides_[place.side], place));
+    const auto there = system.at(place.side, nodeId(sides_[place.side], place));
     if (there == scene::kNone) {
       addShooter(node, system, unshot, patches, memory, wanted);
       continue;
@@ -268,7 +268,7 @@ double LinkPlanner::squaredVariation(const Shooter& shooter, const LinkSystem& s
                                      const scene::PatchScene& patches) const {
   if (shooter.isLight() || shooter.place.level == 0) return 0.0;
   const auto id = nodeId(sides_[shooter.place.side], shooter.place);
-  if (system.hasBelow(id)) return 0.0;
+  if (system.hasBelow(shooter.place.side, id)) return 0.0;
   const double rough = static_cast<double>(unshot.rough(id)) / static_cast<double>(patches.node_area[id]);
   return kVariation * rough * rough;
 }

@@ -27,22 +27,17 @@ double Shooter::spread() const {
 LinkSystem::LinkSystem(const scene::PatchScene& patches, const std::vector<Side>& sides)
     : patches_(patches),
       sides_(sides),
-      shooter_of_node_(patches.nodeCount(), scene::kNone),
-      below_(patches.nodeCount(), false),
+      nodes_(sides.size()),
       members_(sides.size()),
-      uniform_(sides.size(), true) {
-  for (const auto& side : sides) {
-    const auto leaves = patches.node_area.begin() + side.first_node;
-    leaf_area_.insert(leaf_area_.end(), leaves, leaves + side.leaf_count);
-  }
-}
+      leaf_area_(solver::leafAreas(patches, sides)),
+      uniform_(sides.size(), true) {}
 
 void LinkSystem::addSample(std::uint32_t index, std::size_t half, const LinkExpander& links, const LinkSample& totals,
                            double points) {
   auto& shooter = shooters_[index];
   const double factor =
       roundingOf(shooter, totals.due > 0.0 ? totals.due : links.flux(), totals.escaped, totals.absorbed);
-  shooter.column[half].add(links, totals, points, sides_, factor);
+  shooter.column[half].add(links, totals, points, leaf_area_, sides_, factor);
   noteChange(index, half);
 }
 
@@ -69,25 +64,25 @@ void LinkSystem::noteChange(std::uint32_t index, std::size_t half) {
   changed_[half][index] = true;
 }
 
-void LinkSystem::setMaterials(std::vector<glm::vec3> emission, std::vector<glm::vec3> reflectance) {
-  bool same_rows = reflectance_.size() == reflectance.size();
+void LinkSystem::setMaterials(const scene::SideColours& emission, const scene::SideColours& reflectance) {
+  bool same_rows = reflectance_.sideCount() == reflectance.sideCount();
   for (std::size_t s = 0; s < sides_.size(); ++s) {
     const Side& side = sides_[s];
+    const auto now = reflectance.side(s), before = same_rows ? reflectance_.side(s) : now;
     std::uint32_t first = scene::kNone;
     bool uniform = true, same = same_rows;
-    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count && !now.isUniform(); ++leaf) {
       if (patches_.node_area[side.first_node + leaf] <= 0.0F) continue;
       if (first == scene::kNone) first = leaf;
-      const auto v = side.first_value + leaf;
-      if (reflectance[v] != reflectance[side.first_value + first]) uniform = false;
-      if (same && reflectance[v] != reflectance_[v]) same = false;
+      if (now[leaf] != now[first]) uniform = false;
+      if (same && now[leaf] != before[leaf]) same = false;
     }
     // Rows of a side of one reflectance do not hold it.
     same_rows = same_rows && uniform == uniform_[s] && (uniform || same);
     uniform_[s] = uniform;
   }
-  emission_ = std::move(emission);
-  reflectance_ = std::move(reflectance);
+  emission_ = emission;
+  reflectance_ = reflectance;
   emission_mean_.clear();
   if (same_rows) return;
   known_ = 0;
@@ -105,14 +100,19 @@ std::uint32_t LinkSystem::add(const Shooter& shooter) {
   const auto node = nodeId(side, place);
   // The sum of its leaves to the last digit: what the area of a node rounds off would be lost at every bounce.
   shooters_[index].area = areaOf(shooters_[index]);
-  RAD_CHECK(shooter_of_node_[node] == scene::kNone && !below_[node]);
-  shooter_of_node_[node] = index;
+  RAD_CHECK(at(place.side, node) == scene::kNone && !hasBelow(place.side, node));
+  auto& nodes = nodes_[place.side];
+  if (nodes.shooter.empty()) {
+    nodes.shooter.assign(side.node_count, scene::kNone);
+    nodes.has_below.assign(side.node_count, false);
+  }
+  nodes.shooter[node - side.first_node] = index;
   members_[place.side].push_back(index);
   for (std::uint32_t level = place.level + 1; level < side.level_count; ++level) {
     const std::uint32_t up = level - place.level;
-    const auto above = nodeId(side, {place.side, level, place.x >> up, place.y >> up});
-    below_[above] = true;
-    if (shooters_[index].parent == scene::kNone) shooters_[index].parent = shooter_of_node_[above];
+    const auto above = nodeId(side, {place.side, level, place.x >> up, place.y >> up}) - side.first_node;
+    nodes.has_below[above] = true;
+    if (shooters_[index].parent == scene::kNone) shooters_[index].parent = nodes.shooter[above];
   }
   return index;
 }
@@ -156,14 +156,15 @@ void LinkSystem::updateMeans() {
     const Shooter& shooter = shooters_[m];
     if (shooter.isLight()) continue;
     const Side& side = sides_[shooter.place.side];
+    const auto emissions = emission_.side(side.number), reflectances = reflectance_.side(side.number);
     glm::dvec3 emission(0.0), reflectance(0.0);
     const auto rect = leafRect(side, shooter.place);
     for (auto y = rect.y0; y < rect.y1; ++y) {
       for (auto x = rect.x0; x < rect.x1; ++x) {
         const auto leaf = y * side.width + x;
         const auto a = static_cast<double>(patches_.node_area[side.first_node + leaf]);
-        emission += a * glm::dvec3(emission_[side.first_value + leaf]);
-        reflectance += a * glm::dvec3(reflectance_[side.first_value + leaf]);
+        emission += a * glm::dvec3(emissions[leaf]);
+        reflectance += a * glm::dvec3(reflectances[leaf]);
       }
     }
     emission_mean_[m] = side.gathered ? glm::vec3(0.0F) : glm::vec3(emission / shooter.area);
@@ -173,14 +174,14 @@ void LinkSystem::updateMeans() {
 
 void LinkSystem::irradiance(std::size_t half, std::vector<glm::vec3>& values, From from) const {
   std::array<std::vector<float>, 3> planes;
-  for (auto& plane : planes) plane.assign(reflectance_.size(), 0.0F);
+  for (auto& plane : planes) plane.assign(leaf_area_.size(), 0.0F);
   for (const auto& shooter : shooters_) {
     if (from == From::kLights && !shooter.isLight()) continue;
     const glm::vec3 sent = static_cast<float>(shooter.carried(half)) * shooter.sent[half];
     if (sent == glm::vec3(0.0F)) continue;
     shooter.column[half].apply({sent.x, sent.y, sent.z}, {planes[0].data(), planes[1].data(), planes[2].data()});
   }
-  values.resize(reflectance_.size());
+  values.resize(leaf_area_.size());
   for (std::size_t v = 0; v < values.size(); ++v) values[v] = {planes[0][v], planes[1][v], planes[2][v]};
 }
 

@@ -69,18 +69,26 @@ class LinkSystem {
   LinkSystem(const scene::PatchScene& patches, const std::vector<Side>& sides);
 
   /// By leaf value. Entries of the matrix stay unless they hold a reflectance that changed.
-  void setMaterials(std::vector<glm::vec3> emission, std::vector<glm::vec3> reflectance);
-  [[nodiscard]] const std::vector<glm::vec3>& emission() const { return emission_; }
-  [[nodiscard]] const std::vector<glm::vec3>& reflectance() const { return reflectance_; }
+  void setMaterials(const scene::SideColours& emission, const scene::SideColours& reflectance);
+  [[nodiscard]] const scene::SideColours& emission() const { return emission_; }
+  [[nodiscard]] const scene::SideColours& reflectance() const { return reflectance_; }
+  /// Unit box squared, by leaf value.
+  [[nodiscard]] std::span<const float> leafAreas() const { return leaf_area_; }
 
   /// Index of the new shooter. Ancestors must come before their descendants.
   std::uint32_t add(const Shooter& shooter);
   [[nodiscard]] std::vector<Shooter>& shooters() { return shooters_; }
   [[nodiscard]] const std::vector<Shooter>& shooters() const { return shooters_; }
-  /// The shooter at exactly this node, or kNone.
-  [[nodiscard]] std::uint32_t at(std::uint32_t node) const { return shooter_of_node_[node]; }
-  /// Whether shooters lie below this node.
-  [[nodiscard]] bool hasBelow(std::uint32_t node) const { return below_[node]; }
+  /// The shooter at exactly this node of a side, or kNone.
+  [[nodiscard]] std::uint32_t at(std::uint32_t side, std::uint32_t node) const {
+    const auto& there = nodes_[side].shooter;
+    return there.empty() ? scene::kNone : there[node - sides_[side].first_node];
+  }
+  /// Whether shooters lie below this node of a side.
+  [[nodiscard]] bool hasBelow(std::uint32_t side, std::uint32_t node) const {
+    const auto& below = nodes_[side].has_below;
+    return !below.empty() && below[node - sides_[side].first_node];
+  }
 
   /// Averages a new sample into the links of a shooter. What it delivers, loses and lets escape is brought to exactly
   /// what the shooter sends where only rounding lies between.
@@ -176,17 +184,21 @@ class LinkSystem {
   std::vector<Shooter> shooters_;
   std::vector<Rows> rows_;                                   // by shooter
   std::vector<glm::vec3> emission_mean_, reflectance_mean_;  // by shooter
-  std::vector<std::uint32_t> shooter_of_node_;
-  std::vector<bool> below_;
+  /// Of a side, by its nodes; empty: there are no shooters.
+  struct SideNodes {
+    std::vector<std::uint32_t> shooter;
+    std::vector<bool> has_below;
+  };
+  std::vector<SideNodes> nodes_;
   std::vector<std::vector<std::uint32_t>> members_;  // nodes by side
   std::array<std::vector<bool>, 2> changed_;         // by half, by shooter: its column's entries are stale
   std::vector<bool> no_row_;                         // by shooter: of those below known_; empty: none
   std::size_t known_ = 0;                            // shooters whose rows are there
   std::uint32_t next_column_ = 0;                    // to be brought up to date
   std::array<Half, 2> halves_;
-  std::vector<glm::vec3> emission_, reflectance_;  // by leaf value
-  std::vector<float> leaf_area_;                   // by leaf value
-  std::vector<bool> uniform_;                      // by side: of one reflectance
+  scene::SideColours emission_, reflectance_;
+  std::vector<float> leaf_area_;  // by leaf value
+  std::vector<bool> uniform_;     // by side: of one reflectance
 };
 
 }  // namespace radiosity::solver

@@ -39,10 +39,11 @@ void LinkedSolver::assess() {
       return std::span<const glm::vec3>(&half_[half][side.first_value], side.leaf_count);
     };
     field.addSide(side, leaves(0), leaves(1));
+    const auto reflectance = system_.reflectance().side(side.number);
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
-      const glm::vec3 flux = irradiance_[side.first_node + leaf] * patches_->node_area[side.first_node + leaf];
+      const glm::vec3 flux = lightOf(side.first_value + leaf) * patches_->node_area[side.first_node + leaf];
       received += static_cast<double>(channelSum(flux));
-      reflected += static_cast<double>(glm::dot(flux, system_.reflectance()[side.first_value + leaf]));
+      reflected += static_cast<double>(glm::dot(flux, reflectance[leaf]));
     }
   }
   error_ = {};
@@ -152,10 +153,11 @@ double LinkedSolver::powerToShoot() const {
     if (!shooter.isLight() && shooter.parent == scene::kNone) shot += shooter.power();
   }
   for (const auto& side : sides_) {
+    const auto reflectance = system_.reflectance().side(side.number);
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
-      const glm::vec3 flux = irradiance_[side.first_node + leaf] * patches_->node_area[side.first_node + leaf];
+      const glm::vec3 flux = lightOf(side.first_value + leaf) * patches_->node_area[side.first_node + leaf];
       received += static_cast<double>(channelSum(flux));
-      reflected += static_cast<double>(glm::dot(flux, system_.reflectance()[side.first_value + leaf]));
+      reflected += static_cast<double>(glm::dot(flux, reflectance[leaf]));
     }
   }
   const double kept = received > 0.0 ? std::min(0.95, (1.0 - lostPart()) * reflected / received) : 0.5;
@@ -193,12 +195,12 @@ EnergyParts LinkedSolver::energy() const {
   }
   for (const auto& side : sides_) {
     const glm::dvec3 net(unshot_.flux(side.first_node + side.node_count - 1));
+    const auto emission = system_.emission().side(side.number), reflectance = system_.reflectance().side(side.number);
     glm::dvec3 emitted(0.0), absorbed(0.0);
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
-      const auto v = side.first_value + leaf;
       const auto area = static_cast<double>(patches_->node_area[side.first_node + leaf]);
-      emitted += area * glm::dvec3(system_.emission()[v]);
-      absorbed += area * (1.0 - glm::dvec3(system_.reflectance()[v])) * glm::dvec3(irradiance_[side.first_node + leaf]);
+      emitted += area * glm::dvec3(emission[leaf]);
+      absorbed += area * (1.0 - glm::dvec3(reflectance[leaf])) * glm::dvec3(lightOf(side.first_value + leaf));
     }
     for (int c = 0; c < 3; ++c) {
       const auto i = static_cast<std::size_t>(c);

@@ -43,7 +43,7 @@ constexpr int kParts = 32;
 }  // namespace
 
 bool LinkedSolver::raysPay() const {
-  if (!mayGather(system_.emission().size(), settings_)) return false;
+  if (!mayGather(system_.leafAreas().size(), settings_)) return false;
   return settings_.reflected == SolverSettings::Reflected::kByRays || !patches_->opacity.empty() ||
          patches_->triangles.size() >= kFewestTriangles;
 }
@@ -52,7 +52,7 @@ bool LinkedSolver::raysPay() const {
 void LinkedSolver::limitLinks() { memory_.limit(by_rays_ ? settings_.link_memory / 2 : settings_.link_memory); }
 
 double LinkedSolver::shotCost() const {
-  return kShotLeaf * static_cast<double>(system_.emission().size()) +
+  return kShotLeaf * static_cast<double>(system_.leafAreas().size()) +
          kShotTriangle * std::sqrt(static_cast<double>(patches_->triangles.size()));
 }
 
@@ -106,8 +106,11 @@ std::vector<double> LinkedSolver::leastRadiosity() const {
 
 /// By itself, and not as a polygon.
 bool LinkedSolver::sideShines(std::uint32_t s) const {
-  const auto emission = std::span(system_.emission()).subspan(sides_[s].first_value, sides_[s].leaf_count);
-  return !sides_[s].gathered && std::ranges::any_of(emission, [](const glm::vec3& e) { return e != glm::vec3(0.0F); });
+  const auto emission = system_.emission().side(s);
+  if (sides_[s].gathered) return false;
+  for (std::uint32_t leaf = 0; leaf < (emission.isUniform() ? 1 : sides_[s].leaf_count); ++leaf)
+    if (emission[leaf] != glm::vec3(0.0F)) return true;
+  return false;
 }
 
 /// By side: whether much of its light comes over links. What rays bring is not known yet; it is not far from the mean
@@ -137,16 +140,32 @@ void LinkedSolver::startRays() {
   gather_ = std::make_unique<LeafGather>(*patches_, sides_, settings_.seed, settings_.link_memory / 2, leafRays());
 }
 
+std::vector<glm::vec3> LinkedSolver::ofLeaves(const scene::SideColours& colours) const {
+  std::vector<glm::vec3> values;
+  values.reserve(system_.leafAreas().size());
+  for (const auto& side : sides_) {
+    const auto of_side = colours.side(side.number);
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) values.push_back(of_side[leaf]);
+  }
+  return values;
+}
+
+/// Emission of what is no light polygon.
+std::vector<glm::vec3> LinkedSolver::shiningOfLeaves() const {
+  auto emission = ofLeaves(system_.emission());
+  for (const auto& side : sides_) {
+    if (side.gathered) std::fill_n(emission.begin() + side.first_value, side.leaf_count, glm::vec3(0.0F));
+  }
+  return emission;
+}
+
 LeftLight LinkedSolver::leftLight() const {
   LeftLight light;
-  light.emission = system_.emission();
-  light.reflectance = system_.reflectance();
+  light.emission = shiningOfLeaves();
+  light.reflectance = ofLeaves(system_.reflectance());
   light.irradiance = over_links_;
   for (const auto& source : sky_) light.sky[source.direction.y > 0.0F ? 0 : 1] += std::numbers::pi * source.intensity;
   for (auto& shot : light.shot) shot.assign(light.emission.size(), glm::vec3(0.0F));
-  for (const auto& side : sides_) {
-    if (side.gathered) std::fill_n(light.emission.begin() + side.first_value, side.leaf_count, glm::vec3(0.0F));
-  }
   for (const auto& shooter : system_.shooters()) {
     if (shooter.isLight()) continue;
     const Side& side = sides_[shooter.place.side];
@@ -163,7 +182,7 @@ LeftLight LinkedSolver::leftLight() const {
 
 void LinkedSolver::inheritRays(const LinkedSolver& former, const Renumbering& numbers) {
   startRays();
-  std::vector<std::uint32_t> value_before(system_.emission().size(), scene::kNone);
+  std::vector<std::uint32_t> value_before(system_.leafAreas().size(), scene::kNone);
   for (std::uint32_t s = 0; s < former.sides_.size(); ++s) {
     if (numbers.unmoved_after[s] == scene::kNone) continue;
     const Side &side = sides_[numbers.unmoved_after[s]], &before = former.sides_[s];

@@ -48,7 +48,7 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
   sweeps_ = former.sweeps_;
   replayed_ = former.replayed_;
   share_part_ = former.share_part_;
-  by_rays_ = former.by_rays_ && mayGather(expander_.values().size(), settings_);
+  by_rays_ = former.by_rays_ && mayGather(system_.leafAreas().size(), settings_);
   limitLinks();
   aim_ = std::max(former.aim_, settings_.target_error);
   planner_.setTarget(aim_);
@@ -62,7 +62,7 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
   planRepairs(former.isRepairing() ? 0.0 : former.fieldNorm(), ChangeReach(*former.patches_, *patches_, map));
   if (former.variation_) inheritVariation(former, numbers);
   if (by_rays_ && former.gather_) inheritRays(former, numbers);
-  for (auto& half : half_) half.assign(system_.emission().size(), glm::vec3(0.0F));
+  for (auto& half : half_) half.assign(system_.leafAreas().size(), glm::vec3(0.0F));
   findUnshot();
   solveAnew();
 }

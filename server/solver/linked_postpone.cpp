@@ -67,7 +67,7 @@ double LinkedSolver::fieldNorm() const {
   double square = 0.0;
   for (const auto& side : sides_) {
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
-      const auto& light = irradiance_[side.first_node + leaf];
+      const auto light = lightOf(side.first_value + leaf);
       square += static_cast<double>(patches_->node_area[side.first_node + leaf] * glm::dot(light, light));
     }
   }

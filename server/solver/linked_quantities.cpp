@@ -1,5 +1,7 @@
 // What LinkedSolver shows of itself, leaf by leaf.
 #include <algorithm>
+#include <glm/common.hpp>
+#include <iterator>
 #include <vector>
 
 #include "server/solver/linked_solver.h"
@@ -13,15 +15,33 @@ constexpr double kStaysNear = 0.5;
 
 }  // namespace
 
+/// All light there is, with what leaves lack.
+std::vector<glm::vec3> LinkedSolver::irradiance() const {
+  std::vector<glm::vec3> values(patches_->nodeCount(), glm::vec3(0.0F));
+  for (const auto& side : sides_) {
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
+      values[side.first_node + leaf] = lightOf(side.first_value + leaf);
+  }
+  if (!variation_) return values;
+  for (const auto& [value, lacks] : variation_->corrections()) {
+    auto& light = values[nodeOf(value)];
+    light = glm::max(light + 0.5F * (lacks[0] + lacks[1]), glm::vec3(0.0F));  // by noise it might be less
+  }
+  return values;
+}
+
+std::uint32_t LinkedSolver::nodeOf(std::uint32_t value) const {
+  const auto after = std::ranges::upper_bound(sides_, value, {}, &Side::first_value);
+  const Side& side = *std::prev(after);
+  return side.first_node + (value - side.first_value);
+}
+
 std::vector<glm::vec3> LinkedSolver::halfIrradiance(std::uint32_t half) const {
   std::vector<glm::vec3> values(patches_->nodeCount(), glm::vec3(0.0F));
   for (const auto& side : sides_)
     std::copy_n(half_[half].begin() + side.first_value, side.leaf_count, values.begin() + side.first_node);
-  if (!variation_ || !variation_->corrects()) return values;
-  for (const auto& side : sides_) {
-    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
-      values[side.first_node + leaf] += variation_->correction(half)[side.first_value + leaf];
-  }
+  if (!variation_) return values;
+  for (const auto& correction : variation_->corrections()) values[nodeOf(correction.value)] += correction.lacks[half];
   return values;
 }
 
@@ -83,7 +103,7 @@ std::vector<glm::vec3> LinkedSolver::commonErrorSquared() const {
   const auto bias = gather_->biasOfLeaves();
   for (const auto& side : sides_) {
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
-      const glm::vec3 irradiance = irradiance_[side.first_node + leaf], square = irradiance * irradiance;
+      const glm::vec3 irradiance = lightOf(side.first_value + leaf), square = irradiance * irradiance;
       const float all = square.x + square.y + square.z;
       const glm::vec3 parts = all > 0.0F ? square / all : glm::vec3(1.0F / 3.0F);
       squares[side.first_node + leaf] = bias[side.first_value + leaf] * parts;

@@ -179,7 +179,7 @@ Result<void> LinkedSolver::repairSlice() {
     repair.found = {};
   }
   batch.repairs = std::span(repairs_).subspan(repaired_, count);
-  batch.sum.resize(system_.emission().size());
+  batch.sum.resize(system_.leafAreas().size());
   findCutLinks(batch);
   auto& shots = batch.shots;
   const auto& boxes = shadows_->change().boxes;

@@ -39,7 +39,7 @@ double LinkedSolver::noiseBetweenHalves(const Repair& repair, std::span<const Li
     }
     for (std::uint32_t i = 0; i < run.count; ++i) {
       const float differ = sent[0] * links[0][i] - sent[1] * links[1][i];
-      square += static_cast<double>(expander_.leafAreas()[run.first + i] * differ * differ);
+      square += static_cast<double>(system_.leafAreas()[run.first + i] * differ * differ);
     }
   }
   return square;

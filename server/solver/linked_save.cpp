@@ -41,7 +41,7 @@ bool LinkSystem::isPlace(const NodePlace& place) const {
   const auto grid = scene::levelGrid(sides_[place.side].width, sides_[place.side].height, place.level);
   if (place.x >= grid.width || place.y >= grid.height) return false;
   const auto node = nodeId(sides_[place.side], place);
-  return shooter_of_node_[node] == scene::kNone && !below_[node];
+  return at(place.side, node) == scene::kNone && !hasBelow(place.side, node);
 }
 
 void LinkSystem::clear() {
@@ -49,8 +49,7 @@ void LinkSystem::clear() {
   rows_.clear();
   emission_mean_.clear();
   reflectance_mean_.clear();
-  std::fill(shooter_of_node_.begin(), shooter_of_node_.end(), scene::kNone);
-  std::fill(below_.begin(), below_.end(), false);
+  nodes_.assign(sides_.size(), {});
   for (auto& members : members_) members.clear();
   changed_ = {};
   no_row_.clear();
@@ -92,7 +91,7 @@ void LinkedSolver::visit(Archive& archive, Self& self) {
 
 bool LinkedSolver::save(ArchiveWriter& to) const {
   if (pass_ != Pass::kNone || isBehind()) return false;
-  to(kKind, static_cast<std::uint64_t>(system_.emission().size()));
+  to(kKind, static_cast<std::uint64_t>(system_.leafAreas().size()));
   visit(to, *this);
   system_.save(to);
   to(gather_ != nullptr);
@@ -106,7 +105,7 @@ bool LinkedSolver::restore(ArchiveReader& from) {
   std::uint32_t kind = 0;
   std::uint64_t values = 0;
   from(kind, values);
-  if (!from.ok() || kind != kKind || values != system_.emission().size()) return false;
+  if (!from.ok() || kind != kKind || values != system_.leafAreas().size()) return false;
   visit(from, *this);
   if (!(aim_ > 0.0 && aim_ <= 1.0) || !planner_.fits() || !system_.restore(from)) return false;
   planner_.setTarget(aim_);

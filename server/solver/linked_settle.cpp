@@ -51,6 +51,7 @@ bool LinkedSolver::settle() {
 /// By the links, solved for, and then by the rays. False: not yet, go on with the next slice.
 bool LinkedSolver::lightLeaves() {
   if (pass_ != Pass::kRays) {
+    expander_.forget();
     inBothHalves([&](std::size_t half) { system_.irradiance(half, over_links_[half]); });
     pass_ = Pass::kRays;
     if (gather_) gather_->begin(leftLight());
@@ -69,13 +70,10 @@ bool LinkedSolver::lightLeaves() {
 
 void LinkedSolver::findUnshot(Unshot which) {
   varying_ = net_unshot_ = 0.0;
+  if (isAllSent(which)) return unshot_.clear();
   std::vector<glm::vec3> unshot;
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
     const Side& side = sides_[s];
-    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
-      const auto v = side.first_value + leaf;
-      irradiance_[side.first_node + leaf] = 0.5F * (half_[0][v] + half_[1][v]);
-    }
     leafUnshot(s, unshot, which);
     unshot_.pull(side, unshot);
     const auto root = side.first_node + side.node_count - 1;
@@ -88,15 +86,15 @@ void LinkedSolver::findUnshot(Unshot which) {
 /// Radiosity less what stands for it on the deepest shooter above each leaf.
 void LinkedSolver::leafUnshot(std::uint32_t s, std::vector<glm::vec3>& leaves, Unshot which) const {
   const Side& side = sides_[s];
-  if (gathers() && which == Unshot::kNotByRays) {  // shooters stand for what they sent, and rays for all that is left
+  if (isAllSent(which)) {
     leaves.assign(side.leaf_count, glm::vec3(0.0F));
     return;
   }
   system_.standIn(s, leaves);
+  const auto emission = system_.emission().side(s), reflectance = system_.reflectance().side(s);
   for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
-    const auto v = side.first_value + leaf;
-    const glm::vec3 emission = side.gathered ? glm::vec3(0.0F) : system_.emission()[v];
-    leaves[leaf] = system_.reflectance()[v] * irradiance_[side.first_node + leaf] + emission - leaves[leaf];
+    const glm::vec3 own = side.gathered ? glm::vec3(0.0F) : emission[leaf];
+    leaves[leaf] = reflectance[leaf] * lightOf(side.first_value + leaf) + own - leaves[leaf];
   }
 }
 

@@ -53,8 +53,7 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, Tra
       expander_(*patches_, sides_),
       memory_(*patches_, sides_, settings.link_memory),
       unshot_(*patches_),
-      planner_(*patches_, sides_, shots_, settings_.planner, settings_.seed),
-      irradiance_(patches_->nodeCount(), glm::vec3(0.0F)) {
+      planner_(*patches_, sides_, shots_, settings_.planner, settings_.seed) {
   slice_ = std::clamp<std::size_t>(kFirstTriangles / std::max<std::size_t>(1, patches_->triangles.size()), 2, 16);
   fewest_a_slice_ = std::min(slice_, kFewestMeasurements);
   aim_ = std::max(settings_.target_error, kFirstAim);
@@ -71,27 +70,20 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
   takeSources(sources);
   share_part_ = 1.0 / settings_.planner.first_shooters;
   limitLinks();
-  for (auto& half : half_) half.assign(system_.emission().size(), glm::vec3(0.0F));
+  for (auto& half : half_) half.assign(system_.leafAreas().size(), glm::vec3(0.0F));
   findUnshot();
 }
 
 void LinkedSolver::takeMaterials(const scene::PatchMaterials& materials) {
-  std::vector<glm::vec3> emissions, reflectances;  // by leaf value
-  for (auto* values : {&emissions, &reflectances}) values->reserve(expander_.values().size());
-  for (const auto& side : sides_) {
-    const auto emission = materials.emission.begin() + side.first_node;
-    const auto reflectance = materials.reflectance.begin() + side.first_node;
-    emissions.insert(emissions.end(), emission, emission + side.leaf_count);
-    reflectances.insert(reflectances.end(), reflectance, reflectance + side.leaf_count);
-  }
-  system_.setMaterials(std::move(emissions), std::move(reflectances));
+  system_.setMaterials(materials.emission, materials.reflectance);
   takeLights();
   double area = 0.0;
   glm::dvec3 reflectance(0.0);
   for (const auto& side : sides_) {
+    const auto of_side = system_.reflectance().side(side.number);
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
       const auto a = static_cast<double>(patches_->node_area[side.first_node + leaf]);
-      reflectance += a * glm::dvec3(system_.reflectance()[side.first_value + leaf]);
+      reflectance += a * glm::dvec3(of_side[leaf]);
       area += a;
     }
   }

@@ -47,9 +47,7 @@ class LinkedSolver final : public Solver {
   void endWave() override;
   void assess() override;
 
-  [[nodiscard]] const std::vector<glm::vec3>& irradiance() const override {
-    return corrected_.empty() ? irradiance_ : corrected_;
-  }
+  [[nodiscard]] std::vector<glm::vec3> irradiance() const override;
   [[nodiscard]] std::vector<glm::vec3> halfIrradiance(std::uint32_t half) const override;
   [[nodiscard]] std::vector<glm::vec3> directIrradiance() const override;
   [[nodiscard]] bool isRepairing() const override { return repaired_ < due_; }
@@ -190,6 +188,11 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] bool settle();
   enum class Unshot { kNotByRays, kByRaysToo };
   void findUnshot(Unshot which = Unshot::kNotByRays);
+  /// Shooters stand for what they sent, and rays for all that is left.
+  [[nodiscard]] bool isAllSent(Unshot which) const { return gathers() && which == Unshot::kNotByRays; }
+  [[nodiscard]] std::uint32_t nodeOf(std::uint32_t value) const;
+  /// Of a leaf value, without what varies within leaves.
+  [[nodiscard]] glm::vec3 lightOf(std::size_t value) const { return 0.5F * (half_[0][value] + half_[1][value]); }
   /// While it lives unshot light is what no shooter stands for, whether rays bring it or not. Within another of its
   /// kind it does nothing.
   class AllUnshot {
@@ -232,6 +235,9 @@ class LinkedSolver final : public Solver {
     double rays = 0.0, links = 0.0;  ///< squares of relative errors; what smoothing took is shared out between them
   };
   [[nodiscard]] Noise noise() const;
+  /// By leaf value.
+  [[nodiscard]] std::vector<glm::vec3> ofLeaves(const scene::SideColours& colours) const;
+  [[nodiscard]] std::vector<glm::vec3> shiningOfLeaves() const;
   [[nodiscard]] LeftLight leftLight() const;
   [[nodiscard]] std::vector<bool> lightOverLinks() const;
   void startRays();
@@ -306,10 +312,8 @@ class LinkedSolver final : public Solver {
   double varying_share_ = 0.0;                        // of the residual, what light that varies inside shooters causes
   std::array<std::vector<glm::vec3>, 2> half_;        // irradiance by leaf value
   std::array<std::vector<glm::vec3>, 2> over_links_;  // of a new solution, while what rays bring is solved for
-  std::vector<glm::vec3> irradiance_;                 // by node
   std::unique_ptr<LeafVariation> variation_;          // once little else is in error
   std::unique_ptr<LeafVariation> next_variation_;     // after an edit of geometry, until then
-  std::vector<glm::vec3> corrected_;                  // irradiance by node, with what leaves lack; empty: nothing
   bool refined_ = false;                              // more paths were traced: what is next is to be chosen anew
   double square_ = 0.0;                               // of the light that it was brought up to date with, times area
   double by_links_ = 0.0;                             // sampling error without the noise of that

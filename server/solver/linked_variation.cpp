@@ -44,12 +44,11 @@ void LinkedSolver::assessStep() {
 
 /// For the light that leaves have now.
 void LinkedSolver::updateVariation() {
-  std::vector<glm::vec3> emission = system_.emission();
+  const auto emission = shiningOfLeaves(), reflectance = ofLeaves(system_.reflectance());
   double square = 0.0;
   for (const auto& side : sides_) {
-    if (side.gathered) std::fill_n(emission.begin() + side.first_value, side.leaf_count, glm::vec3(0.0F));
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
-      const glm::dvec3 irradiance(irradiance_[side.first_node + leaf]);
+      const glm::dvec3 irradiance(lightOf(side.first_value + leaf));
       square += static_cast<double>(patches_->node_area[side.first_node + leaf]) * glm::dot(irradiance, irradiance);
     }
   }
@@ -57,24 +56,9 @@ void LinkedSolver::updateVariation() {
   auto sources = sources_;  // paths find the sky where they end, and those before it by their numbers
   sources.insert(sources.end(), sky_.begin(), sky_.end());
   const double bound = kNegligible * aim_;
-  variation_->update({emission,
-                      system_.reflectance(),
-                      {half_[0], half_[1]},
-                      lights_,
-                      sources,
-                      gathers() ? &gather_->sights() : nullptr},
-                     bound * bound * square);
-  corrected_.clear();
-  if (!variation_->corrects()) return;
-  corrected_ = irradiance_;
-  for (const auto& side : sides_) {
-    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
-      const auto v = side.first_value + leaf;
-      auto& corrected = corrected_[side.first_node + leaf];
-      const auto lacking = 0.5F * (variation_->correction(0)[v] + variation_->correction(1)[v]);
-      corrected = glm::max(corrected + lacking, glm::vec3(0.0F));  // by noise it might be less
-    }
-  }
+  variation_->update(
+      {emission, reflectance, {half_[0], half_[1]}, lights_, sources, gathers() ? &gather_->sights() : nullptr},
+      bound * bound * square);
 }
 
 /// What is to be reached by links, beside what varies within leaves.

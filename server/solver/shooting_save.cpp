@@ -11,7 +11,7 @@ constexpr std::uint32_t kKind = 0x544f4853U;  // "SHOT"
 }  // namespace
 
 bool RadiosityState::isWhole() const {
-  const auto nodes = patches_->nodeCount(), values = emission_.size();
+  const auto nodes = patches_->nodeCount(), values = irradiance_.size();
   return received_[0].size() == nodes && received_[1].size() == nodes && shot_.size() == values &&
          shot_level_.size() == values && irradiance_.size() == values && unshot_.size() == values &&
          node_rough_.size() == nodes && node_flux_.size() == nodes;

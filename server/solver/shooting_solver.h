@@ -32,7 +32,7 @@ class ShootingSolver final : public Solver {
   void setTargetError(double target) override;
   void assess() override;
 
-  [[nodiscard]] const std::vector<glm::vec3>& irradiance() const override { return irradiance_; }
+  [[nodiscard]] std::vector<glm::vec3> irradiance() const override { return irradiance_; }
   [[nodiscard]] std::vector<glm::vec3> halfIrradiance(std::uint32_t half) const override;
   [[nodiscard]] std::vector<glm::vec3> unshot() const override;
   [[nodiscard]] std::vector<std::uint8_t> shotLevels() const override;

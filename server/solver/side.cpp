@@ -12,6 +12,7 @@ std::vector<Side> makeSides(const scene::PatchScene& patches) {
     for (std::uint32_t face = 0; face < 2; ++face) {
       if (surface.first_node[face] == scene::kNone) continue;
       Side side;
+      side.number = static_cast<std::uint32_t>(sides.size());
       side.surface = s;
       side.side = face;
       side.first_node = side.key = surface.first_node[face];
@@ -27,6 +28,16 @@ std::vector<Side> makeSides(const scene::PatchScene& patches) {
     }
   }
   return sides;
+}
+
+std::vector<float> leafAreas(const scene::PatchScene& patches, const std::vector<Side>& sides) {
+  std::vector<float> areas;
+  if (!sides.empty()) areas.reserve(sides.back().first_value + sides.back().leaf_count);
+  for (const auto& side : sides) {
+    const auto leaves = patches.node_area.begin() + side.first_node;
+    areas.insert(areas.end(), leaves, leaves + side.leaf_count);
+  }
+  return areas;
 }
 
 LeafRect leafRect(const Side& side, const NodePlace& node) {

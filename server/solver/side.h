@@ -12,6 +12,7 @@ namespace radiosity::solver {
 
 /// One side of a surface that has patches: the paper's "polygon" with its quadtree.
 struct Side {
+  std::uint32_t number = 0;  ///< among all sides; by it SideColours knows it
   std::uint32_t surface = 0;
   std::uint32_t side = 0;        ///< 0 front, 1 back
   std::uint32_t first_node = 0;  ///< level 0 starts here
@@ -31,6 +32,8 @@ struct Side {
 
 /// All sides of the scene; leaf values lie side after side.
 [[nodiscard]] std::vector<Side> makeSides(const scene::PatchScene& patches);
+/// Unit box squared, by leaf value; 0 where there is no leaf.
+[[nodiscard]] std::vector<float> leafAreas(const scene::PatchScene& patches, const std::vector<Side>& sides);
 
 /// A node of a side's quadtree: leaves [x 2^level, (x+1) 2^level) x ... of the side's grid.
 struct NodePlace {

@@ -98,7 +98,7 @@ class Solver {
   virtual void assess() = 0;
 
   /// Irradiance (lux) by node, level 0. Grows with every wave at first; later it changes from round to round.
-  [[nodiscard]] virtual const std::vector<glm::vec3>& irradiance() const = 0;
+  [[nodiscard]] virtual std::vector<glm::vec3> irradiance() const = 0;
   /// The same from one of the two independent halves of the samples.
   [[nodiscard]] virtual std::vector<glm::vec3> halfIrradiance(std::uint32_t half) const = 0;
   /// The part of irradiance that comes straight from lights, by node, level 0; empty: not known, or not by itself.

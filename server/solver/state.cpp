@@ -26,8 +26,6 @@ RadiosityState::RadiosityState(std::shared_ptr<const scene::PatchScene> patches,
     : patches_(std::move(patches)), sides_(makeSides(*patches_)) {
   std::size_t values = 0;
   for (const auto& side : sides_) values += side.leaf_count;
-  emission_.resize(values);
-  reflectance_.resize(values);
   shot_.assign(values, glm::vec3(0.0F));
   shot_level_.assign(values, 255);
   irradiance_.assign(values, glm::vec3(0.0F));
@@ -40,12 +38,10 @@ RadiosityState::RadiosityState(std::shared_ptr<const scene::PatchScene> patches,
 }
 
 void RadiosityState::setMaterials(const scene::PatchMaterials& materials) {
+  emission_ = materials.emission;
+  reflectance_ = materials.reflectance;
   for (auto& side : sides_) {
-    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
-      emission_[side.first_value + leaf] = materials.emission[side.first_node + leaf];
-      reflectance_[side.first_value + leaf] = materials.reflectance[side.first_node + leaf];
-    }
-    side.mean_reflectance = channelSum(materials.reflectance[side.first_node + side.node_count - 1]) / 3.0F;
+    side.mean_reflectance = channelSum(reflectance_.side(side.number)[side.node_count - 1]) / 3.0F;
     side.dirty = true;
     side.unshot_power = HUGE_VAL;  // unknown until pulled; infinite makes sure that it is
   }
@@ -110,9 +106,8 @@ void RadiosityState::receive(const FluxAccumulators& batch) {
 }
 
 glm::vec3 RadiosityState::scatterRadiosity(const Side& side, std::uint32_t leaf) const {
-  const std::uint32_t v = side.first_value + leaf;
-  const glm::vec3 reflected = reflectance_[v] * irradiance_[v];
-  return side.gathered ? reflected : emission_[v] + reflected;
+  const glm::vec3 reflected = reflectance(side, leaf) * irradiance(side, leaf);
+  return side.gathered ? reflected : emission(side, leaf) + reflected;
 }
 
 void RadiosityState::pushHalf(const Side& side, std::uint32_t half, std::vector<glm::dvec3>& density) const {

@@ -88,12 +88,12 @@ class RadiosityState {
   /// Irradiance by leaf value from one of the two independent halves; pushed on the fly. `out` is leaf_count long.
   void halfIrradiance(const Side& side, std::uint32_t half, std::span<glm::vec3> out) const;
 
-  [[nodiscard]] std::span<const glm::vec3> emissions() const { return emission_; }  ///< by leaf value
+  [[nodiscard]] const scene::SideColours& emissions() const { return emission_; }
   [[nodiscard]] glm::vec3 emission(const Side& side, std::uint32_t leaf) const {
-    return emission_[side.first_value + leaf];
+    return emission_.side(side.number)[leaf];
   }
   [[nodiscard]] glm::vec3 reflectance(const Side& side, std::uint32_t leaf) const {
-    return reflectance_[side.first_value + leaf];
+    return reflectance_.side(side.number)[leaf];
   }
   [[nodiscard]] float leafArea(const Side& side, std::uint32_t leaf) const {
     return patches_->node_area[side.first_node + leaf];
@@ -127,13 +127,13 @@ class RadiosityState {
 
   std::shared_ptr<const scene::PatchScene> patches_;
   std::vector<Side> sides_;
-  std::vector<glm::vec3> emission_, reflectance_;  // by leaf value
-  std::array<std::vector<Flux3>, 2> received_;     // by node, H as integers, unpushed
-  std::vector<glm::vec3> shot_;                    // by leaf value: S, summed over rounds
-  std::vector<std::uint8_t> shot_level_;           // by leaf value
-  std::vector<glm::vec3> irradiance_, unshot_;     // by leaf value, derived by pushPull
-  std::vector<float> node_rough_;                  // by node, derived by pushPull
-  std::vector<glm::vec3> node_flux_;               // by node, derived by pushPull
+  scene::SideColours emission_, reflectance_;
+  std::array<std::vector<Flux3>, 2> received_;  // by node, H as integers, unpushed
+  std::vector<glm::vec3> shot_;                 // by leaf value: S, summed over rounds
+  std::vector<std::uint8_t> shot_level_;        // by leaf value
+  std::vector<glm::vec3> irradiance_, unshot_;  // by leaf value, derived by pushPull
+  std::vector<float> node_rough_;               // by node, derived by pushPull
+  std::vector<glm::vec3> node_flux_;            // by node, derived by pushPull
   Flux3 escaped_{}, backface_{}, gathered_{}, scattered_{};
   double flux_scale_ = 1.0;
   std::uint32_t rounds_ = 1;

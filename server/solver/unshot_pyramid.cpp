@@ -2,11 +2,20 @@
 
 #include <cmath>
 
+#include "common/give_back.h"
+
 namespace radiosity::solver {
 
 float channelSum(const glm::vec3& v) { return std::abs(v.x) + std::abs(v.y) + std::abs(v.z); }
 
+void UnshotPyramid::clear() {
+  giveBack(flux_);
+  giveBack(rough_);
+}
+
 void UnshotPyramid::pull(const Side& side, std::span<const glm::vec3> unshot) {
+  flux_.resize(patches_.nodeCount(), glm::vec3(0.0F));
+  rough_.resize(patches_.nodeCount(), 0.0F);
   for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
     flux_[side.first_node + leaf] = unshot[leaf] * patches_.node_area[side.first_node + leaf];
     rough_[side.first_node + leaf] = channelSum(flux_[side.first_node + leaf]);

@@ -15,21 +15,22 @@ namespace radiosity::solver {
 
 class UnshotPyramid {
  public:
-  explicit UnshotPyramid(const scene::PatchScene& patches)
-      : patches_(patches), flux_(patches.nodeCount(), glm::vec3(0.0F)), rough_(patches.nodeCount(), 0.0F) {}
+  explicit UnshotPyramid(const scene::PatchScene& patches) : patches_(patches) {}
 
   /// `unshot`: radiosity by leaf of the side.
   void pull(const Side& side, std::span<const glm::vec3> unshot);
+  /// Nothing is unshot anywhere, which takes no memory.
+  void clear();
 
   /// Unshot flux of the subtree per channel, signed: what the node would shoot as one.
-  [[nodiscard]] const glm::vec3& flux(std::uint32_t node) const { return flux_[node]; }
+  [[nodiscard]] glm::vec3 flux(std::uint32_t node) const { return flux_.empty() ? glm::vec3(0.0F) : flux_[node]; }
   /// Sum of |unshot| area over the leaves of the subtree, all channels.
-  [[nodiscard]] float rough(std::uint32_t node) const { return rough_[node]; }
+  [[nodiscard]] float rough(std::uint32_t node) const { return rough_.empty() ? 0.0F : rough_[node]; }
 
  private:
   const scene::PatchScene& patches_;
-  std::vector<glm::vec3> flux_;
-  std::vector<float> rough_;
+  std::vector<glm::vec3> flux_;  ///< by node; empty: none
+  std::vector<float> rough_;     ///< likewise
 };
 
 }  // namespace radiosity::solver

@@ -151,9 +151,10 @@ class GeometryEdit : public testing::Test {
   /// Area-weighted RMS, relative to that of `b`.
   static double difference(const LinkedSolver& a, const LinkedSolver& b, const scene::PatchScene& patches) {
     double sum = 0.0, scale = 0.0;
+    const auto light_a = a.irradiance(), light_b = b.irradiance();
     for (const auto& side : solver::makeSides(patches)) {
       for (auto node = side.first_node; node < side.first_node + side.leaf_count; ++node) {
-        const glm::dvec3 d(a.irradiance()[node] - b.irradiance()[node]), v(b.irradiance()[node]);
+        const glm::dvec3 d(light_a[node] - light_b[node]), v(light_b[node]);
         sum += static_cast<double>(patches.node_area[node]) * glm::dot(d, d);
         scale += static_cast<double>(patches.node_area[node]) * glm::dot(v, v);
       }

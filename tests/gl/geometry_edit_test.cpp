@@ -98,7 +98,7 @@ TEST_F(ChairEdit, ShowsLightBeforeItHasWhatMattersLittleAndHasAllInTheEnd) {
   EXPECT_LT(stated(), 0.5 * settings_.target_error) << "what may wait";
   // In other light too, the old links of what is stronger now included.
   auto brighter = after.materials;
-  for (auto& emission : brighter.emission) emission *= 5.0F;
+  brighter.emission.scale(glm::vec3(5.0F));
   early.setMaterials(brighter);
   exact->setMaterials(brighter);
   finish(early), finish(*exact);
@@ -175,13 +175,13 @@ TEST_F(ChairEdit, WhileItsLampIsOffIsMeasuredWhenItIsOn) {
   const auto exact = successor(*second, after, mapOf(before_, after));
   finish(*exact);
   auto dark = before_.materials;
-  std::ranges::fill(dark.emission, glm::vec3(0.0F));
+  dark.emission.fill(glm::vec3(0.0F));
   ASSERT_TRUE(transport_->setScene(before_.patches));
   first->setMaterials(dark);
   finish(*first);
   ASSERT_TRUE(transport_->setScene(after.patches));
   auto dark_after = after.materials;
-  std::ranges::fill(dark_after.emission, glm::vec3(0.0F));
+  dark_after.emission.fill(glm::vec3(0.0F));
   LinkedSolver early(after.patches, dark_after, *transport_, settings_, {}, *first, mapOf(before_, after));
   finish(early);
   EXPECT_GT(early.linkCounters().waiting, 0U);

@@ -38,11 +38,12 @@ Solved solveCornell(bool paper) {
     if (!outcome || *outcome == solver::StepOutcome::kConverged) break;
   }
   Solved solved;
+  const auto light = solver.irradiance();
   for (const auto& surface : patches->surfaces) {
     double flux = 0.0;
     for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf) {
       const auto node = surface.first_node[0] + leaf;
-      const glm::vec3 h = solver.irradiance()[node];
+      const glm::vec3 h = light[node];
       flux += static_cast<double>((h.x + h.y + h.z) * patches->node_area[node]);
     }
     solved.surface_flux.push_back(flux);

@@ -128,8 +128,8 @@ TEST_F(RayEdit, OfLightAndBackGivesTheSameBits) {
   const auto light = solver->irradiance();
   const auto rays = solver->linkCounters().rays;
   auto other = before_.materials;
-  for (auto& emission : other.emission) emission *= glm::vec3(2.0F, 1.0F, 0.5F);
-  for (auto& reflectance : other.reflectance) reflectance *= 0.9F;
+  other.emission.scale({2.0F, 1.0F, 0.5F});
+  other.reflectance.scale(glm::vec3(0.9F));
   solver->setMaterials(other);
   finish(*solver);
   EXPECT_NE(solver->irradiance(), light);
@@ -143,12 +143,12 @@ TEST_F(RayEdit, ARoomInTheDarkTakesLightOverTheRaysThatItHas) {
   const auto solver = solved(before_);
   const auto light = solver->irradiance();
   auto dark = before_.materials;
-  std::ranges::fill(dark.emission, glm::vec3(0.0F));
+  dark.emission.fill(glm::vec3(0.0F));
   solver->setMaterials(dark);
   finish(*solver);
   EXPECT_EQ(solver->error().total, 0.0);
-  EXPECT_EQ(*std::ranges::max_element(solver->irradiance(), {}, [](const glm::vec3& h) { return h.x; }),
-            glm::vec3(0.0F));
+  const auto none = solver->irradiance();
+  EXPECT_TRUE(std::ranges::all_of(none, [](const glm::vec3& h) { return h == glm::vec3(0.0F); }));
   solver->setMaterials(before_.materials);
   finish(*solver);
   EXPECT_EQ(solver->irradiance(), light);

@@ -35,10 +35,9 @@ void editAndTakeBack(int edits, int check_every, std::uint64_t texels, double ta
   auto materials = loaded.materials;
   const auto set = [&](const Old& edit) {
     const auto& surface = loaded.patches->surfaces[edit.surface];
-    const auto grid = scene::levelGrid(surface.width, surface.height, surface.level_count - 1);
-    auto& values = edit.emission ? materials.emission : materials.reflectance;
-    const glm::vec3 old = values[surface.first_node[0]];
-    for (auto n = surface.first_node[0]; n <= surface.first_node[0] + grid.offset; ++n) values[n] = edit.value;
+    auto& colours = edit.emission ? materials.emission : materials.reflectance;
+    const glm::vec3 old = colours[surface.first_node[0]];
+    colours.fill(colours.sideOf(surface.first_node[0]), edit.value);
     ASSERT_TRUE(solve.edit(materials));
     olds.push_back({edit.surface, edit.emission, old});
   };

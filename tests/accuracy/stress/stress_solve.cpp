@@ -59,9 +59,7 @@ test_scenes::TestScene litRoom(double scale, glm::dvec3 offset_m) {
   return scene;
 }
 
-void paint(Loaded& loaded, float reflectance) {
-  std::fill(loaded.materials.reflectance.begin(), loaded.materials.reflectance.end(), glm::vec3(reflectance));
-}
+void paint(Loaded& loaded, float reflectance) { loaded.materials.reflectance.fill(glm::vec3(reflectance)); }
 
 Solve::Solve(const Loaded& loaded, const solver::SolverSettings& settings, int workers) : patches_(loaded.patches) {
   transport_ =
@@ -98,8 +96,9 @@ FromConstant compareToConstant(const Solve& solve, double exact) {
 
 double largestDifference(const Solve& a, const Solve& b, double scale_of_b) {
   double worst = 0.0, square = 0.0, area = 0.0;
+  const auto of_b = b.solver().irradiance();
   a.eachLeaf([&](std::uint32_t node, double leaf, const glm::dvec3& h) {
-    const glm::dvec3 off = h - scale_of_b * glm::dvec3(b.solver().irradiance()[node]);
+    const glm::dvec3 off = h - scale_of_b * glm::dvec3(of_b[node]);
     worst = std::max({worst, std::abs(off.x), std::abs(off.y), std::abs(off.z)});
     square += leaf * glm::dot(h, h);
     area += 3.0 * leaf;

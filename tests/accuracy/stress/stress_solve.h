@@ -46,12 +46,13 @@ class Solve {
   /// Calls visit(node, area, irradiance) for every leaf with area; areas in the unit box.
   template <typename Visit>
   void eachLeaf(const Visit& visit) const {
+    const auto light = solver_->irradiance();
     for (const auto& surface : patches_->surfaces) {
       for (const auto first : surface.first_node) {
         if (first == scene::kNone) continue;
         for (auto node = first; node < first + surface.width * surface.height; ++node) {
           if (const auto area = static_cast<double>(patches_->node_area[node]); area > 0.0)
-            visit(node, area, glm::dvec3(solver_->irradiance()[node]));
+            visit(node, area, glm::dvec3(light[node]));
         }
       }
     }

@@ -36,10 +36,13 @@ void expectUsable(const Scene& scene, const PatchScene& patches) {
     ASSERT_LE(s.page_y + s.height, patches.pages[s.page].height);
   }
   const PatchMaterials materials = shadePatches(scene, patches);
-  for (const glm::vec3& rho : materials.reflectance)
-    for (int c = 0; c < 3; ++c) ASSERT_TRUE(rho[c] >= 0.0F && rho[c] <= 0.999F);
-  for (const glm::vec3& e : materials.emission)
-    for (int c = 0; c < 3; ++c) ASSERT_TRUE(e[c] >= 0.0F && std::isfinite(e[c]));
+  for (std::uint32_t n = 0; n < patches.nodeCount(); ++n) {
+    const glm::vec3 rho = materials.reflectance[n], e = materials.emission[n];
+    for (int c = 0; c < 3; ++c) {
+      ASSERT_TRUE(rho[c] >= 0.0F && rho[c] <= 0.999F);
+      ASSERT_TRUE(e[c] >= 0.0F && std::isfinite(e[c]));
+    }
+  }
   const auto pages = assemblePages(patches, std::vector<glm::vec3>(patches.nodeCount(), glm::vec3(1.0F)));
   for (const LightmapPage& page : pages)
     for (std::size_t i = 0; i < page.coverage.size(); ++i)

@@ -50,7 +50,7 @@ void expectSane(const Scene& scene) {
   options.texel_budget = 16;
   const PatchScene patches = buildPatchScene(scene, options).value();
   const PatchMaterials materials = shadePatches(scene, patches);
-  for (std::size_t i = 0; i < patches.nodeCount(); ++i) {
+  for (std::uint32_t i = 0; i < patches.nodeCount(); ++i) {
     ASSERT_GE(patches.node_area[i], 0.0F);
     for (int c = 0; c < 3; ++c) {
       ASSERT_TRUE(materials.reflectance[i][c] >= 0.0F && materials.reflectance[i][c] <= 0.999F);

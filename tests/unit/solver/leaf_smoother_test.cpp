@@ -13,7 +13,7 @@ constexpr std::uint32_t kSize = 32;
 /// A side of square leaves, and what two halves found of a light there.
 struct Field {
   std::vector<Side> sides{1};
-  std::vector<double> area = std::vector<double>(kSize * kSize, 1.0 / (kSize * kSize));
+  std::vector<float> area = std::vector<float>(kSize * kSize, 1.0F / (kSize * kSize));
   std::vector<double> truth;
   std::array<std::vector<LeafSmoother::Light>, 2> halves;
 

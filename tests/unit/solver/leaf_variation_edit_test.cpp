@@ -64,10 +64,8 @@ class MovedScreenTest : public testing::Test {
     anew.update(light(), kAlways);
     kept.update(light(), kAlways);
     EXPECT_TRUE(anew.corrects() && kept.corrects());
-    bool same = anew.left() == kept.left() && anew.noise() == kept.noise();
-    for (std::size_t half = 0; half < 2 && anew.corrects() && kept.corrects(); ++half)
-      same = same && std::ranges::equal(anew.correction(half), kept.correction(half));
-    return same;
+    const bool same = anew.left() == kept.left() && anew.noise() == kept.noise();
+    return same && std::ranges::equal(anew.corrections(), kept.corrections());
   }
 
   test::QuadScene before_, after_;

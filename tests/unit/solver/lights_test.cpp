@@ -24,10 +24,8 @@ Found find(std::uint32_t columns, float part, float brighter = 1.0F) {
   for (std::uint32_t leaf = 0; leaf < 16; ++leaf)
     if (leaf % 4 < columns) made.patches->node_area[first + leaf] *= part;
   Found found{{}, makeSides(*made.patches)};
-  std::vector<glm::vec3> emission(found.sides.back().first_value + found.sides.back().leaf_count);
-  const auto& ceiling = found.sides[1];
-  std::fill_n(emission.begin() + ceiling.first_value, ceiling.leaf_count, glm::vec3(4.0F));
-  emission[ceiling.first_value + 5] *= brighter;
+  auto emission = made.materials.emission;
+  emission.set(first + 5, glm::vec3(4.0F * brighter));
   found.lights = findLightPolygons(*made.patches, found.sides, emission);
   return found;
 }

@@ -36,8 +36,10 @@ class BuriedEdgeTest : public testing::Test {
     UnshotPyramid unshot(patches);
     unshot.pull(side, std::vector<glm::vec3>(side.leaf_count, glm::vec3(1.0F)));
     system_.emplace(patches, sides_);
-    system_->setMaterials(std::vector<glm::vec3>(side.leaf_count, glm::vec3(1.0F)),
-                          std::vector<glm::vec3>(side.leaf_count, glm::vec3(0.5F)));
+    scene::SideColours emission(patches), reflectance(patches);
+    emission.fill(glm::vec3(1.0F));
+    reflectance.fill(glm::vec3(0.5F));
+    system_->setMaterials(emission, reflectance);
     LinkMemory memory(patches, sides_, std::size_t{1} << 30U);
     memory.begin(*system_);
     planner.setReflectance(0.5);
@@ -46,7 +48,7 @@ class BuriedEdgeTest : public testing::Test {
     left_out_leaves_ = planner.leftOut() / (3.0 * static_cast<double>(leaf));
   }
   [[nodiscard]] const Shooter* shooterAt(const NodePlace& place) const {
-    const auto index = system_->at(nodeId(sides_[place.side], place));
+    const auto index = system_->at(place.side, nodeId(sides_[place.side], place));
     return index == scene::kNone ? nullptr : &system_->shooters()[index];
   }
 

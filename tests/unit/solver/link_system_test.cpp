@@ -25,7 +25,7 @@ class LinkSystems : public testing::Test {
   /// Every wall shoots as a whole, and two of them in four parts as well. Links by chance; each column sums to one.
   [[nodiscard]] LinkSystem makeSystem() const {
     LinkSystem system(*made_.patches, sides_);
-    system.setMaterials(emission_, reflectance_);
+    setMaterials(system);
     LinkExpander expander(*made_.patches, sides_);
     std::mt19937 random(5);
     std::uniform_real_distribution<float> uniform(0.1F, 1.0F);
@@ -124,6 +124,17 @@ class LinkSystems : public testing::Test {
     return b;
   }
 
+  void setMaterials(LinkSystem& system) const { system.setMaterials(ofNodes(emission_), ofNodes(reflectance_)); }
+  /// Nodes above leaves are black: nobody asks for them.
+  [[nodiscard]] scene::SideColours ofNodes(const std::vector<glm::vec3>& values) const {
+    scene::SideColours colours(*made_.patches);
+    for (const auto& side : sides_) {
+      std::vector<glm::vec3> of_side(side.node_count, glm::vec3(0.0F));
+      std::copy_n(values.begin() + side.first_value, side.leaf_count, of_side.begin());
+      colours.assign(side.number, std::move(of_side));
+    }
+    return colours;
+  }
   void paint(float reflectance) { std::fill(reflectance_.begin(), reflectance_.end(), glm::vec3(reflectance)); }
   /// Every leaf another colour.
   void paintAtRandom() {
@@ -245,7 +256,7 @@ TEST_F(LinkSystems, AfterEditsHaveTheBitsOfFreshOnes) {
   auto edited = makeSystem();
   edited.solve();
   const auto expectFresh = [&] {
-    edited.setMaterials(emission_, reflectance_);
+    setMaterials(edited);
     for (auto& shooter : edited.shooters()) shooter.mean = shooter.sent = {};
     edited.solve();
     auto fresh = makeSystem();

@@ -65,18 +65,20 @@ struct Solve {
   /// One channel, of all leaves.
   [[nodiscard]] double received() const {
     double flux = 0.0;
+    const auto light = solver->irradiance();
     for (const auto& side : makeSides(*made.patches)) {
       for (auto node = side.first_node; node < side.first_node + side.leaf_count; ++node)
-        flux += static_cast<double>(made.patches->node_area[node] * solver->irradiance()[node].x);
+        flux += static_cast<double>(made.patches->node_area[node] * light[node].x);
     }
     return flux;
   }
   /// Relative RMS over leaves.
   [[nodiscard]] double awayFrom(const Solve& other) const {
     double square = 0.0, difference = 0.0;
+    const auto here = solver->irradiance(), there = other.solver->irradiance();
     for (const auto& side : makeSides(*made.patches)) {
       for (auto node = side.first_node; node < side.first_node + side.leaf_count; ++node) {
-        const glm::dvec3 a(solver->irradiance()[node]), b(other.solver->irradiance()[node]);
+        const glm::dvec3 a(here[node]), b(there[node]);
         const auto area = static_cast<double>(made.patches->node_area[node]);
         square += area * glm::dot(b, b);
         difference += area * glm::dot(a - b, a - b);

@@ -24,11 +24,12 @@ constexpr double kPi = std::numbers::pi;
 LightSources lamp(float candela) { return {{{.position = {0.1, 0.2, 0.0}, .intensity = glm::vec3(candela)}}, {}}; }
 
 double received(const scene::PatchScene& patches, const Solver& solver) {
+  const auto light = solver.irradiance();
   double sum = 0.0;
   for (const auto& surface : patches.surfaces) {
     for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf) {
       const auto node = surface.first_node[0] + leaf;
-      sum += static_cast<double>(solver.irradiance()[node].x) * static_cast<double>(patches.node_area[node]);
+      sum += static_cast<double>(light[node].x) * static_cast<double>(patches.node_area[node]);
     }
   }
   return sum;

@@ -48,8 +48,6 @@ void addQuad(const Quad& quad, QuadScene& out) {
         const auto leaves = (std::min((x + 1) << level, quad.width) - (x << level)) *
                             (std::min((y + 1) << level, quad.height) - (y << level));
         patches.node_area.push_back(surface.texel_area * static_cast<float>(leaves));
-        out.materials.emission.push_back(quad.emission);
-        out.materials.reflectance.push_back(quad.reflectance);
       }
     }
   }
@@ -73,6 +71,11 @@ QuadScene makeQuadScene(const std::vector<Quad>& quads) {
   QuadScene out;
   out.patches = std::make_shared<scene::PatchScene>();
   for (const auto& quad : quads) addQuad(quad, out);
+  out.materials.emission = out.materials.reflectance = scene::SideColours(*out.patches);
+  for (std::size_t q = 0; q < quads.size(); ++q) {
+    out.materials.emission.fill(q, quads[q].emission);
+    out.materials.reflectance.fill(q, quads[q].reflectance);
+  }
   return out;
 }
 

@@ -48,9 +48,10 @@ struct Solve {
   /// Mean irradiance of one channel, of a surface's front.
   [[nodiscard]] double mean(std::size_t surface) const {
     const auto& of = made.patches->surfaces[surface];
+    const auto light = solver->irradiance();
     double flux = 0.0, area = 0.0;
     for (auto node = of.first_node[0]; node < of.first_node[0] + of.width * of.height; ++node) {
-      flux += static_cast<double>(made.patches->node_area[node] * solver->irradiance()[node].x);
+      flux += static_cast<double>(made.patches->node_area[node] * light[node].x);
       area += static_cast<double>(made.patches->node_area[node]);
     }
     return flux / area;
@@ -91,9 +92,10 @@ TEST(SkyRays, BringWhatLinksBring) {
   ASSERT_EQ(rays.outcome, StepOutcome::kConverged);
   ASSERT_EQ(links.outcome, StepOutcome::kConverged);
   double square = 0.0, difference = 0.0;
+  const auto by_rays = rays.solver->irradiance(), by_links = links.solver->irradiance();
   for (const auto& side : makeSides(*made.patches)) {
     for (auto node = side.first_node; node < side.first_node + side.leaf_count; ++node) {
-      const glm::dvec3 a(rays.solver->irradiance()[node]), b(links.solver->irradiance()[node]);
+      const glm::dvec3 a(by_rays[node]), b(by_links[node]);
       square += static_cast<double>(made.patches->node_area[node]) * glm::dot(b, b);
       difference += static_cast<double>(made.patches->node_area[node]) * glm::dot(a - b, a - b);
     }
@@ -110,8 +112,9 @@ TEST(SkyRays, AnotherSkyAndBackGivesTheSameBits) {
   const auto rays = room.solver->linkCounters().rays;
   room.solver->setLights(skyOf(3.0F, 0.0F));
   EXPECT_EQ(test::runToEnd(*room.solver), StepOutcome::kConverged);
+  const auto brighter = room.solver->irradiance();
   for (std::size_t node = 0; node < before.size(); ++node)
-    ASSERT_NEAR(room.solver->irradiance()[node].x, 3.0F * before[node].x, 1e-4F * before[node].x);
+    ASSERT_NEAR(brighter[node].x, 3.0F * before[node].x, 1e-4F * before[node].x);
   room.solver->setLights(skyOf(0.0F, 0.0F));
   EXPECT_EQ(test::runToEnd(*room.solver), StepOutcome::kConverged);
   EXPECT_EQ(room.mean(0), 0.0);
@@ -206,9 +209,10 @@ TEST(CutLeaves, WithoutEndAreStatedAsDoubtful) {
   const Solve room(std::move(made), skyOf(1.0F, 1.0F));
   const auto& right = room.made.patches->surfaces[4];
   const auto squares = room.solver->commonErrorSquared();
+  const auto light = room.solver->irradiance();
   ASSERT_GT(room.mean(4), 0.1) << "truth is none";
   for (auto node = right.first_node[0]; node < right.first_node[0] + right.width * right.height; ++node)
-    EXPECT_LE(room.solver->irradiance()[node].x, 1.01F * std::sqrt(squares[node].x));
+    EXPECT_LE(light[node].x, 1.01F * std::sqrt(squares[node].x));
   EXPECT_GT(room.solver->error().total, 0.1);
 }
 

@@ -21,9 +21,10 @@ using test::solve;
 
 double meanIrradiance(const QuadScene& made, const Solver& solver, std::uint32_t surface) {
   const auto& s = made.patches->surfaces[surface];
+  const auto light = solver.irradiance();
   double sum = 0.0;
   for (std::uint32_t leaf = 0; leaf < s.width * s.height; ++leaf)
-    sum += static_cast<double>(solver.irradiance()[s.first_node[0] + leaf].x);
+    sum += static_cast<double>(light[s.first_node[0] + leaf].x);
   return sum / (s.width * s.height);
 }
 

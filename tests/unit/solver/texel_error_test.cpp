@@ -84,8 +84,9 @@ TEST_F(TexelError, IsTheScatterOfManySeeds) {
     auto sampling = solver.error();
     sampling.residual = 0.0;
     const auto error = squared(solver, sampling);
+    const auto light = solver.irradiance();
     for (std::size_t n = 0; n < nodes; ++n) {
-      const glm::dvec3 h(solver.irradiance()[n]);
+      const glm::dvec3 h(light[n]);
       sum[n] += h;
       square[n] += h * h;
       said[n] += glm::dvec3(error[n]) / static_cast<double>(kSeeds);

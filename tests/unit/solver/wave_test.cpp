@@ -90,9 +90,10 @@ TEST(Wave, LightUnderWayIsUnshotInTheBalanceAndInTheError) {
 
 /// Mean irradiance of the wall opposite the lamp.
 double meanOfFirst(const QuadScene& made, const Solver& solver) {
+  const auto light = solver.irradiance();
   double sum = 0.0;
   for (std::uint32_t leaf = 0; leaf < 16; ++leaf)
-    sum += static_cast<double>(solver.irradiance()[made.patches->surfaces[0].first_node[0] + leaf].x);
+    sum += static_cast<double>(light[made.patches->surfaces[0].first_node[0] + leaf].x);
   return sum / 16.0;
 }
 
