@@ -118,6 +118,7 @@ std::string sceneSection(const SceneSeries& series) {
   std::string out = fmt::format("\n## {}\n\n", series.name);
   if (!series.unmeasured.empty()) return out + "Not judged: " + series.unmeasured + ".\n";
   const auto summary = summarize(series);
+  if (!series.sky.empty()) out += fmt::format("Nothing in it shines: lit by a sky (`--sky {}`). ", series.sky);
   out += fmt::format("{} polygons, {} patches; {}. {}\n\n![{} against time]({}.svg)\n\n", series.polygons,
                      series.patches, series.renderer, referenceText(series), series.name, series.name);
   out += solveTable(series);

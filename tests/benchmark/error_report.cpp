@@ -117,6 +117,7 @@ json toJson(const SceneSeries& series) {
   for (const auto& row : series.rows) rows.push_back(toJson(row));
   return {{"scene", series.name},
           {"unmeasured", series.unmeasured},
+          {"sky", series.sky},
           {"patches", series.patches},
           {"polygons", series.polygons},
           {"gl_renderer", series.renderer},

@@ -14,7 +14,8 @@ namespace {
 
 using nlohmann::json;
 
-constexpr double kPatience = 30.0;           // seconds of solving for the run that asks for an error
+constexpr double kPatience = 30.0;  // seconds of solving for the run that asks for an error
+constexpr const char* kDark = "nothing in it shines";
 constexpr int kReached = 0, kTimeLimit = 3;  // exit codes of `radiosity solve` that come with an output
 
 /// What the rows of one scene share. Runs of one scene nearly always have the same texels, so the same reference.
@@ -45,7 +46,7 @@ StatedError statedOf(const json& report) {
 
 /// What makes the truth unknown: no light, or something that the reference does not model.
 std::string whyNotJudged(const json& report, const accuracy::LitScene& lit) {
-  if (!(report.value("energy", json::object()).value("emitted", 0.0) > 0.0)) return "nothing in it shines";
+  if (!(report.value("energy", json::object()).value("emitted", 0.0) > 0.0)) return kDark;
   std::string text;
   for (const auto& warning : lit.scene.warnings) {
     if (warning.find("not modelled") != std::string::npos) text += (text.empty() ? "" : "; ") + warning;
@@ -59,6 +60,7 @@ SolveRow solveOnce(const std::filesystem::path& scene, double time, double error
   row.asked_seconds = time;
   std::vector<std::string> arguments{"--time-limit", fmt::format("{:g}", time), "--error", fmt::format("{:g}", error)};
   arguments.insert(arguments.end(), options.solve_arguments.begin(), options.solve_arguments.end());
+  if (!series.sky.empty()) arguments.insert(arguments.end(), {"--sky", series.sky});
   const auto run = accuracy::runSolve(options.client, scene, options.work_folder / series.name, arguments);
   row.exit_code = run.exit_code;
   row.wall_seconds = run.wall_seconds;
@@ -74,6 +76,7 @@ SolveRow solveOnce(const std::filesystem::path& scene, double time, double error
   series.polygons = run.report.value("polygons", std::uint64_t{0});
   series.renderer = run.report.value("gl_renderer", "");
   auto lit = accuracy::readLitScene(run.output);
+  if (!series.sky.empty()) accuracy::setSky(series.sky, lit);
   if (series.unmeasured = whyNotJudged(run.report, lit); !series.unmeasured.empty()) return row;
   judge.prepare(std::move(lit), options, series);
   const auto measured = accuracy::measure(*judge.lit, judge.reference);
@@ -104,21 +107,32 @@ bool solveAll(const std::filesystem::path& scene, const SeriesOptions& options, 
   return series.asked->measured;
 }
 
-}  // namespace
-
-SceneSeries measureScene(const std::filesystem::path& scene, const SeriesOptions& options) {
+SceneSeries measureUnder(const std::string& sky, const std::filesystem::path& scene, const SeriesOptions& options) {
   SceneSeries series;
   series.name = scene.stem().string();
+  series.sky = sky;
   Judge judge;
   try {
     if (!solveAll(scene, options, judge, series)) return series;
     const auto glb = options.work_folder / series.name / (series.name + "-lit.glb");
-    if (options.cycles) series.cycles = bakeWithCycles(glb, *judge.lit, judge.reference, options);
+    if (!options.cycles) return series;
+    if (sky.empty()) {
+      series.cycles = bakeWithCycles(glb, *judge.lit, judge.reference, options);
+    } else {
+      series.cycles.emplace().missing = "a sky, which the bake has not, is all its light";
+    }
   } catch (const std::exception& error) {  // a scene that the reference's reader refuses; the others go on
     series.unmeasured = error.what();
     std::fprintf(stderr, "%s: not judged: %s\n", series.name.c_str(), error.what());
   }
   return series;
+}
+
+}  // namespace
+
+SceneSeries measureScene(const std::filesystem::path& scene, const SeriesOptions& options) {
+  auto series = measureUnder("", scene, options);
+  return series.unmeasured == kDark && !options.sky.empty() ? measureUnder(options.sky, scene, options) : series;
 }
 
 }  // namespace radiosity::benchmark

@@ -18,6 +18,7 @@ struct SeriesOptions {
   double floor = 0.002;                                       ///< stated error at which longer runs add nothing
   std::string client = "radiosity";
   std::vector<std::string> solve_arguments;
+  std::string sky = "1000";  ///< of scenes in which nothing shines, as `radiosity solve --sky` takes it
   accuracy::ReferenceOptions reference;
   std::filesystem::path reference_folder, work_folder;
 
@@ -62,6 +63,7 @@ struct CyclesSeries {
 
 struct SceneSeries {
   std::string name;
+  std::string sky;         ///< that it was lit by, since nothing in it shines; empty: none
   std::string unmeasured;  ///< why there is no truth; empty: there is
   std::uint64_t patches = 0, polygons = 0;
   std::string renderer;

@@ -171,6 +171,8 @@ int main(int argc, char** argv) {
   app.add_option("--texels", series.reference.texels, "texels compared, 0: all; quick: 2000")->capture_default_str();
   app.add_option("--points", series.reference.points, "surface points compared; quick: 1000")->capture_default_str();
   app.add_option("--solve-argument", series.solve_arguments, "passed on to `radiosity solve` (repeat)");
+  app.add_option("--sky", series.sky, "of scenes in which nothing shines, as `radiosity solve` takes it")
+      ->capture_default_str();
   app.add_flag("--no-cycles", options.no_cycles, "leave Cycles out");
   app.add_option("--blender", series.blender, "the Blender program")->capture_default_str();
   app.add_option("--cycles-seconds", series.cycles_seconds, "of the longest bake, about; quick: 8")

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
+#include <glm/mat3x3.hpp>
 #include <glm/mat4x4.hpp>
 #include <glm/vec4.hpp>
 #include <iterator>
@@ -29,6 +30,7 @@ struct MaterialValues {
   bool see_through = false;
   double alpha = 1.0, cutoff = -1.0, transmission = 0.0;
   int texture = -1, texcoord = 0;
+  glm::dmat3 texture_transform{1.0};
 };
 
 glm::dvec3 vector3(const json& array) {
@@ -136,10 +138,27 @@ class Reader {
   }
 
   void readTextureUse(const json& use, MaterialValues& values) {
-    if (use.contains("extensions")) warn("texture transforms are not modelled");
     const auto& texture = member("textures").at(use.at("index").get<std::size_t>());
     values.texture = texture.value("source", -1);
     values.texcoord = use.value("texCoord", 0);
+    const auto extensions = use.value("extensions", json::object());
+    if (!extensions.contains("KHR_texture_transform")) return;
+    const auto& transform = extensions["KHR_texture_transform"];
+    values.texcoord = transform.value("texCoord", values.texcoord);
+    values.texture_transform = textureMatrix(transform);
+  }
+
+  /// Translation times rotation times scale; counter-clockwise as one sees it, v being down.
+  static glm::dmat3 textureMatrix(const json& transform) {
+    const auto pair = [&](const char* name, double without) {
+      const auto found = transform.value(name, std::vector<double>{without, without});
+      return glm::dvec2(found.at(0), found.at(1));
+    };
+    const glm::dvec2 offset = pair("offset", 0.0), scale = pair("scale", 1.0);
+    const double angle = transform.value("rotation", 0.0), c = std::cos(angle), s = std::sin(angle);
+    const glm::dmat3 translation(1, 0, 0, 0, 1, 0, offset.x, offset.y, 1);
+    const glm::dmat3 rotation(c, -s, 0, s, c, 0, 0, 0, 1);
+    return translation * rotation * glm::dmat3(scale.x, 0, 0, 0, scale.y, 0, 0, 0, 1);
   }
 
   static void readOpacity(const json& material, const json& pbr, MaterialValues& values) {
@@ -295,13 +314,14 @@ class Reader {
       visitAccessor(accessor, 2, [&](auto i, auto c, double v) { uvs.at(i)[static_cast<int>(c)] = v; });
     }
     std::vector<glm::dvec2> texture_uvs(positions.size());
-    int texcoord = 0;
-    if (primitive.contains("material")) texcoord = materials_.at(primitive["material"].get<std::size_t>()).texcoord;
-    if (const auto name = "TEXCOORD_" + std::to_string(texcoord); attributes.contains(name)) {
+    MaterialValues material;
+    if (primitive.contains("material")) material = materials_.at(primitive["material"].get<std::size_t>());
+    if (const auto name = "TEXCOORD_" + std::to_string(material.texcoord); attributes.contains(name)) {
       const auto accessor = attributes[name].get<std::size_t>();
       if (member("accessors").at(accessor).at("componentType") != 5126) warn(name + " is not float");
       visitAccessor(accessor, 2, [&](auto i, auto c, double v) { texture_uvs.at(i)[static_cast<int>(c)] = v; });
     }
+    for (auto& uv : texture_uvs) uv = glm::dvec2(material.texture_transform * glm::dvec3(uv, 1.0));
     std::vector<glm::dvec3> colours(positions.size(), glm::dvec3(1.0));
     if (attributes.contains("COLOR_0")) readColours(attributes["COLOR_0"].get<std::size_t>(), colours);
     std::vector<std::size_t> indices;

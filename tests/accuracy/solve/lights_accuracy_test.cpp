@@ -213,8 +213,8 @@ TEST(SolvedLights, MixedLightingMatchesThePathTracer) {
   if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is not there";
   const auto solved = solveFile(file, {"--error", "0.05", "--time-limit", "60", "--texels", "6000"});
   const auto accuracy = compare(solved);
-  // The oracle does not model metallic textures and texture transforms of the chair: its reflected light differs a
-  // little. Texels of the chair's curved charts bend by 15 degrees.
+  // The oracle takes the mean of metallic textures: reflected light differs a little. Texels of the chair's curved
+  // charts bend by 15 degrees.
   EXPECT_LT(accuracy.solver.solverRms(), 0.10);
   EXPECT_LT(std::abs(accuracy.solver.bias), 0.03);
 }

@@ -51,6 +51,21 @@ TEST(LitScene, ExrSurvivesTheRoundTripWithRowZeroFirst) {
   EXPECT_EQ(read.pixels, page.pixels);
 }
 
+/// A GLB of `gltf`, whose only buffer is `bin`.
+void writeGlb(const nlohmann::json& gltf, const std::string& bin, const std::filesystem::path& file) {
+  std::string text = gltf.dump();
+  text.resize((text.size() + 3) / 4 * 4, ' ');
+  std::string bytes = "glTF";
+  const auto put = [&](std::size_t v) { bytes.append(reinterpret_cast<const char*>(&v), 4); };
+  put(2);
+  put(28 + text.size() + bin.size());
+  put(text.size());
+  bytes += "JSON" + text;
+  put(bin.size());
+  bytes.append("BIN\0", 4);
+  std::ofstream(file, std::ios::binary) << bytes << bin;
+}
+
 TEST(LitScene, GlbAndPagesAreReadAsWritten) {
   // one right triangle, its node moved and turned upside down by a mirror
   const std::vector<float> numbers{0, 0, 0, 1, 0, 0, 0, 1, 0, /* uv */ 0, 0, 1, 0, 0, 1};
@@ -81,21 +96,11 @@ TEST(LitScene, GlbAndPagesAreReadAsWritten) {
         {{"bufferView", 1}, {"componentType", 5126}, {"count", 3}, {"type", "VEC2"}},
         {{"bufferView", 2}, {"componentType", 5121}, {"count", 3}, {"type", "SCALAR"}},
         {{"bufferView", 3}, {"componentType", 5121}, {"normalized", true}, {"count", 3}, {"type", "VEC4"}}}}};
-  std::string text = gltf.dump();
-  text.resize((text.size() + 3) / 4 * 4, ' ');
-  std::string bytes = "glTF";
-  const auto put = [&](std::uint32_t v) { bytes.append(reinterpret_cast<const char*>(&v), 4); };
-  put(2);
-  put(static_cast<std::uint32_t>(28 + text.size() + 76));
-  put(static_cast<std::uint32_t>(text.size()));
-  bytes += "JSON" + text;
-  put(76);
-  bytes.append("BIN\0", 4);
-  bytes.append(reinterpret_cast<const char*>(numbers.data()), 60);
-  bytes.append("\0\1\2\0", 4);
-  for (int corner = 0; corner < 3; ++corner) bytes.append("\xFF\x33\0\xFF", 4);  // red 1, green 0.2, blue 0
+  std::string bin(reinterpret_cast<const char*>(numbers.data()), 60);
+  bin.append("\0\1\2\0", 4);
+  for (int corner = 0; corner < 3; ++corner) bin.append("\xFF\x33\0\xFF", 4);  // red 1, green 0.2, blue 0
   const auto glb = scratch("lit.glb");
-  std::ofstream(glb, std::ios::binary) << bytes;
+  writeGlb(gltf, bin, glb);
   writeExr({1, 1, {{7, 8, 9}}}, scratch("lit.lightmap.0.exr"));
 
   const auto lit = readLitScene(glb);
@@ -110,6 +115,44 @@ TEST(LitScene, GlbAndPagesAreReadAsWritten) {
   EXPECT_TRUE(triangle.double_sided);
   EXPECT_EQ(lit.scene.node_names[triangle.node], "thing");
   EXPECT_EQ(lit.pages.at(0).at(0, 0), glm::dvec3(7, 8, 9));
+}
+
+// As on the board of the extension's sample: turned counter-clockwise, v being down, after it is scaled.
+TEST(LitScene, TexturesAreMovedTurnedAndScaled) {
+  const std::vector<float> numbers{0, 0, 0, 1, 0, 0, 0, 1, 0, /* uv */ 0, 0, 1, 0, 0, 1};
+  const double turn = std::numbers::pi / 6.0;
+  const nlohmann::json transform{{"offset", {0.25, 0.5}}, {"rotation", turn}, {"scale", {2.0, 4.0}}};
+  const nlohmann::json gltf{
+      {"asset", {{"version", "2.0"}}},
+      {"scenes", {{{"nodes", {0}}}}},
+      {"nodes", {{{"mesh", 0}}}},
+      {"images", {{{"uri", "elsewhere.png"}}}},
+      {"textures", {{{"source", 0}}}},
+      {"materials",
+       {{{"pbrMetallicRoughness",
+          {{"baseColorTexture", {{"index", 0}, {"extensions", {{"KHR_texture_transform", transform}}}}}}}}}},
+      {"meshes",
+       {{{"primitives",
+          {{{"attributes", {{"POSITION", 0}, {"TEXCOORD_0", 1}, {"TEXCOORD_1", 1}}},
+            {"material", 0},
+            {"extras", {{"lightmap", 0}}}}}}}}},
+      {"buffers", {{{"byteLength", 60}}}},
+      {"bufferViews",
+       {{{"buffer", 0}, {"byteOffset", 0}, {"byteLength", 36}},
+        {{"buffer", 0}, {"byteOffset", 36}, {"byteLength", 24}}}},
+      {"accessors",
+       {{{"bufferView", 0}, {"componentType", 5126}, {"count", 3}, {"type", "VEC3"}},
+        {{"bufferView", 1}, {"componentType", 5126}, {"count", 3}, {"type", "VEC2"}}}}};
+  const auto glb = scratch("turned.glb");
+  writeGlb(gltf, std::string(reinterpret_cast<const char*>(numbers.data()), 60), glb);
+  const auto scene = oracle::readGlb(glb);
+  ASSERT_EQ(scene.triangles.size(), 1U);
+  const auto& uv = scene.triangles[0].texture_uv;
+  const double c = std::cos(turn), s = std::sin(turn);
+  const std::array<glm::dvec2, 3> expected{
+      glm::dvec2(0.25, 0.5), {0.25 + 2 * c, 0.5 - 2 * s}, {0.25 + 4 * s, 0.5 + 4 * c}};
+  for (std::size_t k = 0; k < 3; ++k) EXPECT_LT(glm::distance(uv[k], expected[k]), 1e-6) << k;
+  EXPECT_EQ(scene.triangles[0].lightmap_uv[1], glm::dvec2(1.0, 0.0));
 }
 
 TEST(LitScene, BilinearLookupHasTexelCentresAtHalfIntegers) {
