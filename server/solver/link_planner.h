@@ -79,12 +79,15 @@ class LinkPlanner {
   [[nodiscard]] std::vector<Measurement> grow(LinkSystem& system, const UnshotPyramid& unshot,
                                               const scene::PatchScene& patches, std::size_t limit, LinkMemory& memory);
 
+  /// How much a wave of improvement brings at most: little, since the next may choose better where the equation over
+  /// links alone is solved in no time, or as much as there is, where the equation over all rays takes longer.
+  enum class Wave { kShort, kDoubling };
   /// Whatever lowers the error most for its cost: further samples of shooters whose halves differ, or shooters for the
   /// children of nodes inside which light varies (where `may_split`), as far as there is memory, and until the error is
   /// likely to be what it should.
   [[nodiscard]] std::vector<Measurement> improve(LinkSystem& system, const UnshotPyramid& unshot,
-                                                 const scene::PatchScene& patches, bool may_split, LinkMemory& memory,
-                                                 const ErrorGoal& goal);
+                                                 const scene::PatchScene& patches, bool may_split, Wave wave,
+                                                 LinkMemory& memory, const ErrorGoal& goal);
 
   /// Square of the error of irradiance, summed over leaves by area and over channels, that light which varies inside
   /// the shooters causes.
@@ -128,7 +131,7 @@ class LinkPlanner {
     std::uint32_t points;
     double cost;  ///< in a node's samples from one point
   };
-  [[nodiscard]] std::vector<FurtherSample> furtherSamples(const Shooter& shooter) const;
+  [[nodiscard]] std::vector<FurtherSample> furtherSamples(const Shooter& shooter, Wave wave) const;
   [[nodiscard]] double chance(double power) const;
   [[nodiscard]] bool plays(const NodePlace& place, std::size_t half, double power) const;
   [[nodiscard]] double squaredVariation(const Shooter& shooter, const LinkSystem& system, const UnshotPyramid& unshot,

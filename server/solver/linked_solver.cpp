@@ -145,13 +145,13 @@ std::vector<Measurement> LinkedSolver::plan() {
   if (phase_ == Phase::kLights) return planLights();
   if (phase_ == Phase::kImprove && gather_) {
     if (sample_goal_ <= 0.0) return {};
-    return planner_.improve(system_, unshot_, *patches_, false, memory_,
+    return planner_.improve(system_, unshot_, *patches_, false, LinkPlanner::Wave::kDoubling, memory_,
                             {std::sqrt(noise().links), 0.0, 0.0, sample_goal_});
   }
   if (phase_ == Phase::kImprove) {
     const double varying = varying_share_ * error_.residual;
     const ErrorGoal goal{by_links_, varying, error_.residual - varying, targetOfLinks()};
-    return planner_.improve(system_, unshot_, *patches_, !isFull(), memory_, goal);
+    return planner_.improve(system_, unshot_, *patches_, !isFull(), LinkPlanner::Wave::kShort, memory_, goal);
   }
   if (planner_.share() <= 0.0) return {};
   // Also where there is no room: the walk finds out how much light goes without.

@@ -75,5 +75,44 @@ TEST_F(BuriedEdgeTest, WhoWouldCountTooOftenIsLeftOutAndToldOf) {
   EXPECT_NEAR(left_out_leaves_, 0.05, 1e-4);
 }
 
+/// Measurements that a wave asks for of a lamp with `samples` of eight points in either half, which differ.
+std::size_t wantedOf(LinkPlanner::Wave wave, std::uint32_t samples, double target) {
+  const auto made = test::makeQuadScene(test::cubeQuads(4, test::kDark, test::kGrey));
+  const auto sides = makeSides(*made.patches);
+  const NodeShots shots(*made.patches, sides, 1);
+  const PlannerSettings settings;
+  LinkPlanner planner(*made.patches, sides, shots, settings, 1);
+  LinkSystem system(*made.patches, sides);
+  LinkMemory memory(*made.patches, sides, std::size_t{1} << 30U);
+  LinkExpander expander(*made.patches, sides);
+  Shooter lamp;
+  lamp.light = 0;
+  lamp.area = 0.1;
+  lamp.sent.fill(glm::vec3(1.0F));
+  (void)system.add(lamp);
+  for (std::uint32_t k = 0; k < samples; ++k) {
+    for (std::size_t half = 0; half < 2; ++half) {
+      LinkSample sample;
+      for (std::uint32_t leaf = 0; leaf < 16; ++leaf)
+        sample.add(sides[0].first_node + leaf, 0.1F + 0.02F * static_cast<float>((leaf + half) % 2));
+      expander.expand(sample);
+      system.addSample(0, half, expander, sample, kLightPoints);
+    }
+  }
+  memory.begin(system);
+  const auto wanted = planner.improve(system, UnshotPyramid(*made.patches), *made.patches, false, wave, memory,
+                                      {1.0, 0.0, 0.0, target});
+  for (const auto& want : wanted) EXPECT_GE(want.index, samples) << "none is measured twice";
+  return wanted.size();
+}
+
+TEST(LinkPlanner, AWaveThatDoublesBringsAsManySamplesAsThereAreAndNoMoreThanTheGoalNeeds) {
+  EXPECT_EQ(wantedOf(LinkPlanner::Wave::kShort, 40, 1e-3), 2U * 8U);
+  EXPECT_EQ(wantedOf(LinkPlanner::Wave::kDoubling, 40, 1e-3), 2U * 40U);
+  EXPECT_EQ(wantedOf(LinkPlanner::Wave::kShort, 3, 1e-3), 2U * 3U);
+  // To 0.9 of the error, surely: the square of it falls as their number, 0.85 x 0.9 takes 1.71 times as many.
+  EXPECT_NEAR(static_cast<double>(wantedOf(LinkPlanner::Wave::kDoubling, 100, 0.9)), 2.0 * 71.0, 4.0);
+}
+
 }  // namespace
 }  // namespace radiosity::solver
