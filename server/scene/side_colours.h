@@ -31,8 +31,8 @@ class SideColours {
     const glm::vec3* first_;
     std::size_t step_;
   };
-  [[nodiscard]] OfSide side(std::size_t side) const { return *sides_[side].colours; }
-  [[nodiscard]] std::size_t sideCount() const { return sides_.size(); }
+  [[nodiscard]] OfSide side(std::size_t side) const { return *colours_[side]; }
+  [[nodiscard]] std::size_t sideCount() const { return colours_.size(); }
   /// The side that a node is of. O(log sides).
   [[nodiscard]] std::size_t sideOf(std::uint32_t node) const;
   /// Of a node by its number in the scene. O(log sides).
@@ -53,14 +53,15 @@ class SideColours {
 
  private:
   using Shared = std::shared_ptr<const std::vector<glm::vec3>>;
-  struct Side {
-    std::uint32_t first_node = 0, node_count = 0;
-    Shared colours;  ///< one, or one for each node
-  };
   static Shared one(const glm::vec3& colour);
+  [[nodiscard]] std::size_t nodeCount(std::size_t side) const {
+    return (*first_nodes_)[side + 1] - (*first_nodes_)[side];
+  }
 
-  std::vector<Side> sides_;
-  Shared last_filled_;  ///< what a side was filled with last
+  /// By side, and where the nodes of the last one end. Of all copies there is one.
+  std::shared_ptr<const std::vector<std::uint32_t>> first_nodes_;
+  std::vector<Shared> colours_;  ///< by side: one, or one for each node
+  Shared last_filled_;           ///< what a side was filled with last
 };
 
 }  // namespace radiosity::scene

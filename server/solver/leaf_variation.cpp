@@ -124,8 +124,7 @@ void LeafVariation::update(const LeafLight& light, double bound) {
   }
   trace(wanted_, light);
   wanted_.clear();
-  corrects_ = false;
-  giveBack(corrections_);
+  forgetCorrections();
   sumUp(light);
   // Until it is known: all receivers get more of them.
   const auto fewest = [&] { return count_.empty() ? kEvenPaths : std::uint32_t{*std::ranges::min_element(count_)}; };
@@ -141,6 +140,11 @@ void LeafVariation::update(const LeafLight& light, double bound) {
   giveBack(gain_);
   if (stands_for_ == 1.0 && found_ + deviation_ > bound) correct();
   for (auto& half : lacking_) giveBack(half);
+}
+
+void LeafVariation::forgetCorrections() {
+  corrects_ = false;
+  giveBack(corrections_);
 }
 
 void LeafVariation::sumUp(const LeafLight& light) {

@@ -57,6 +57,8 @@ class LeafVariation {
   /// irradiance squared times area as below, or is found to be more. Below the bound nothing is corrected.
   void update(const LeafLight& light, double bound);
 
+  /// What it corrects is of another light: it corrects nothing until the next update().
+  void forgetCorrections();
   /// More paths for those receivers where they help most; update() is to follow. False: there are as many as there may
   /// be.
   [[nodiscard]] bool refine();

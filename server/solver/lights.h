@@ -32,7 +32,7 @@ struct LightPolygon {
 
 /// Emissive planar surfaces of few polygons and uniform emission, of which nothing is hidden, become light polygons,
 /// and their sides are marked `gathered`; the emission of all others is shot like reflected light: of a lamp that
-/// something covers in part, or that stands in a solid, leaves know how much shines. `emission` by leaf value.
+/// something covers in part, or that stands in a solid, leaves know how much shines.
 [[nodiscard]] std::vector<LightPolygon> findLightPolygons(const scene::PatchScene& patches, std::vector<Side>& sides,
                                                           const scene::SideColours& emission);
 

@@ -32,10 +32,10 @@ LinkExpander::LinkExpander(const scene::PatchScene& patches, const std::vector<S
 
 void LinkExpander::prepare() {
   if (!side_of_node_.empty()) return;
-  side_of_node_.resize(patches_.nodeCount());
   coarse_.assign(patches_.nodeCount(), 0.0F);
-  for (const auto& side : sides_) std::fill_n(side_of_node_.begin() + side.first_node, side.node_count, side.number);
   if (!sides_.empty()) values_.resize(sides_.back().first_value + sides_.back().leaf_count);
+  side_of_node_.resize(patches_.nodeCount());  // the last: that it is there says that all are
+  for (const auto& side : sides_) std::fill_n(side_of_node_.begin() + side.first_node, side.node_count, side.number);
 }
 
 void LinkExpander::forget() {

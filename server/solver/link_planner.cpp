@@ -362,6 +362,7 @@ std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPy
   };
   std::vector<Gain> gains;
   double variances = 0.0, variations = 0.0;
+  double waits = 0.0;  // the greatest gain of a sample that this wave may not bring
   for (std::uint32_t n = 0; n < system.shooters().size(); ++n) {
     const auto& shooter = system.shooters()[n];
     if (shooter.column[0].points() == 0.0 || shooter.column[1].points() == 0.0) {
@@ -375,11 +376,16 @@ std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPy
     // Of each further sample, were those before it taken. At most as many as there are: their worth is only guessed.
     variances += variance;
     double before = taken;
-    for (const auto& sample : furtherSamples(shooter, wave)) {
-      const double after = before + sample.points, less = variance * taken * (1.0 / before - 1.0 / after);
-      gains.push_back({less / (2.0 * sample.cost), n, sample.points, less});
-      before = after;
+    const auto gainOf = [&](const FurtherSample& sample) {
+      const double less = variance * taken * (1.0 / before - 1.0 / (before + sample.points));
+      return Gain{less / (2.0 * sample.cost), n, sample.points, less};
+    };
+    const auto samples = furtherSamples(shooter, wave);
+    for (const auto& sample : samples) {
+      gains.push_back(gainOf(sample));
+      before += sample.points;
     }
+    waits = std::max(waits, gainOf(samples.back()).gain);
     const double varying = variation(shooter, system, unshot, patches);
     variations += varying;
     if (may_split && varying > 0.0) gains.push_back({varying / 8.0, n, 0, kResolved * varying});
@@ -396,6 +402,7 @@ std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPy
   for (const auto& gain : gains) {
     if (planned >= limit || gain.gain <= 0.0) break;
     if (planned >= short_wave / kLeastPartOfWave && forecast.isReached()) break;
+    if (planned >= short_wave && gain.gain < waits) break;  // what waits for the next wave is worth more
     if (gain.points == 0) {
       const auto before = wanted.size();
       if (!memory.isFull())
@@ -405,7 +412,8 @@ std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPy
       continue;
     }
     const auto& shooter = system.shooters()[gain.shooter];
-    if (!memory.takeSample(shooter, 0) || !memory.takeSample(shooter, 1)) continue;
+    // Its columns grow once, whatever the number of samples.
+    if (further[gain.shooter] == 0 && (!memory.takeSample(shooter, 0) || !memory.takeSample(shooter, 1))) continue;
     forecast.sample(gain.less);
     for (std::size_t half = 0; half < 2; ++half) {
       const auto index = shooter.column[half].samples() + further[gain.shooter];

@@ -92,6 +92,8 @@ void LinkSystem::setMaterials(const scene::SideColours& emission, const scene::S
 
 std::uint32_t LinkSystem::add(const Shooter& shooter) {
   const auto index = static_cast<std::uint32_t>(shooters_.size());
+  if (!shooter.isLight() && nodes_[shooter.place.side].empty())
+    nodes_[shooter.place.side].assign(sides_[shooter.place.side].node_count, kNobody);
   shooters_.push_back(shooter);
   for (auto& changed : changed_) changed.push_back(true);
   if (shooter.isLight()) return index;
@@ -102,17 +104,13 @@ std::uint32_t LinkSystem::add(const Shooter& shooter) {
   shooters_[index].area = areaOf(shooters_[index]);
   RAD_CHECK(at(place.side, node) == scene::kNone && !hasBelow(place.side, node));
   auto& nodes = nodes_[place.side];
-  if (nodes.shooter.empty()) {
-    nodes.shooter.assign(side.node_count, scene::kNone);
-    nodes.has_below.assign(side.node_count, false);
-  }
-  nodes.shooter[node - side.first_node] = index;
+  nodes[node - side.first_node] = index;
   members_[place.side].push_back(index);
   for (std::uint32_t level = place.level + 1; level < side.level_count; ++level) {
     const std::uint32_t up = level - place.level;
-    const auto above = nodeId(side, {place.side, level, place.x >> up, place.y >> up}) - side.first_node;
-    nodes.has_below[above] = true;
-    if (shooters_[index].parent == scene::kNone) shooters_[index].parent = nodes.shooter[above];
+    const auto above = nodeId(side, {place.side, level, place.x >> up, place.y >> up});
+    nodes[above - side.first_node] |= kHasBelow;
+    if (shooters_[index].parent == scene::kNone) shooters_[index].parent = at(place.side, above);
   }
   return index;
 }

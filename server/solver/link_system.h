@@ -68,7 +68,7 @@ class LinkSystem {
  public:
   LinkSystem(const scene::PatchScene& patches, const std::vector<Side>& sides);
 
-  /// By leaf value. Entries of the matrix stay unless they hold a reflectance that changed.
+  /// Entries of the matrix stay unless they hold a reflectance that changed.
   void setMaterials(const scene::SideColours& emission, const scene::SideColours& reflectance);
   [[nodiscard]] const scene::SideColours& emission() const { return emission_; }
   [[nodiscard]] const scene::SideColours& reflectance() const { return reflectance_; }
@@ -81,13 +81,12 @@ class LinkSystem {
   [[nodiscard]] const std::vector<Shooter>& shooters() const { return shooters_; }
   /// The shooter at exactly this node of a side, or kNone.
   [[nodiscard]] std::uint32_t at(std::uint32_t side, std::uint32_t node) const {
-    const auto& there = nodes_[side].shooter;
-    return there.empty() ? scene::kNone : there[node - sides_[side].first_node];
+    const auto known = nodes_[side].empty() ? kNobody : nodes_[side][node - sides_[side].first_node] & ~kHasBelow;
+    return known == kNobody ? scene::kNone : known;
   }
   /// Whether shooters lie below this node of a side.
   [[nodiscard]] bool hasBelow(std::uint32_t side, std::uint32_t node) const {
-    const auto& below = nodes_[side].has_below;
-    return !below.empty() && below[node - sides_[side].first_node];
+    return !nodes_[side].empty() && (nodes_[side][node - sides_[side].first_node] & kHasBelow) != 0;
   }
 
   /// Averages a new sample into the links of a shooter. What it delivers, loses and lets escape is brought to exactly
@@ -184,12 +183,9 @@ class LinkSystem {
   std::vector<Shooter> shooters_;
   std::vector<Rows> rows_;                                   // by shooter
   std::vector<glm::vec3> emission_mean_, reflectance_mean_;  // by shooter
-  /// Of a side, by its nodes; empty: there are no shooters.
-  struct SideNodes {
-    std::vector<std::uint32_t> shooter;
-    std::vector<bool> has_below;
-  };
-  std::vector<SideNodes> nodes_;
+  static constexpr std::uint32_t kHasBelow = 1U << 31U, kNobody = kHasBelow - 1;
+  /// By side and node: its shooter or kNobody, and whether there are some below. Empty: the side has none.
+  std::vector<std::vector<std::uint32_t>> nodes_;
   std::vector<std::vector<std::uint32_t>> members_;  // nodes by side
   std::array<std::vector<bool>, 2> changed_;         // by half, by shooter: its column's entries are stale
   std::vector<bool> no_row_;                         // by shooter: of those below known_; empty: none

@@ -337,6 +337,12 @@ void LinkedSolver::setTargetError(double target) {
   aim_ = std::max(aim_, target);
   planner_.setTarget(aim_);
   if (variation_) tryNow([this] { updateVariation(); });
+  if (phase_ == Phase::kImprove && gather_ && from_links_ == FromLinks::kNo && !isRepairing() &&
+      error_.total <= target) {  // what the wave still brings is not needed, and may take as long as all before it
+    tryNow([this] { gather_->giveUp(); });
+    wanted_.resize(measured_);
+    settling_ = true;
+  }
   if (phase_ != Phase::kDone || from_links_ != FromLinks::kNo) return;
   tryNow([this] {
     limit_ = SolveLimit::kNone;

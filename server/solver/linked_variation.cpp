@@ -44,6 +44,7 @@ void LinkedSolver::assessStep() {
 
 /// For the light that leaves have now.
 void LinkedSolver::updateVariation() {
+  variation_->forgetCorrections();  // also where memory ends on the way
   const auto emission = shiningOfLeaves(), reflectance = ofLeaves(system_.reflectance());
   double square = 0.0;
   for (const auto& side : sides_) {

@@ -97,7 +97,8 @@ class Solver {
   /// Brings irradiance() and error() up to date when the solve is stopped before its first round ended.
   virtual void assess() = 0;
 
-  /// Irradiance (lux) by node, level 0. Grows with every wave at first; later it changes from round to round.
+  /// Irradiance (lux) by node, level 0. Grows with every wave at first; later it changes from round to round. Summed up
+  /// at each call, O(nodes).
   [[nodiscard]] virtual std::vector<glm::vec3> irradiance() const = 0;
   /// The same from one of the two independent halves of the samples.
   [[nodiscard]] virtual std::vector<glm::vec3> halfIrradiance(std::uint32_t half) const = 0;

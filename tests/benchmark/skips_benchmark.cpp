@@ -110,8 +110,12 @@ void channelSkip(benchmark::State& state) {
   state.SetLabel(state.range(0) == 0 ? "every surface of one colour" : "as if every surface were textured");
   if (state.range(0) == 1) {
     auto& reflectance = scene.materials.reflectance;
-    for (std::uint32_t node = 0; node < scene.patches->nodeCount(); node += 2)
-      reflectance.set(node, 0.999F * reflectance[node]);
+    for (const auto& side : solver::makeSides(*scene.patches)) {
+      std::vector<glm::vec3> colours(side.node_count);
+      for (std::uint32_t n = 0; n < side.node_count; ++n)
+        colours[n] = (n % 2 == 0 ? 0.999F : 1.0F) * reflectance.side(side.number)[n];
+      reflectance.assign(side.number, std::move(colours));
+    }
   }
   solver::SolverSettings settings;
   settings.target_error = kSolveGoal;

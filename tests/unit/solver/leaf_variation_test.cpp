@@ -25,13 +25,13 @@ double kernel(const glm::dvec3& from, const glm::dvec3& normal, const glm::dvec3
 
 double middle(int i) { return (i + 0.5) / kGrid; }
 
-/// A floor of one leaf, and on its edge a wall: below, a strip that shines, above it one that looks.
 glm::vec3 correctionOf(const LeafVariation& variation, std::size_t half, std::uint32_t value) {
   for (const auto& correction : variation.corrections())
     if (correction.value == value) return correction.lacks[half];
   return glm::vec3(0.0F);
 }
 
+/// A floor of one leaf, and on its edge a wall: below, a strip that shines, above it one that looks.
 class LeafVariationTest : public testing::Test {
  protected:
   static constexpr double kWidth = 0.2, kHeight = 0.02;
