@@ -2,8 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <utility>
 
 #include "server/solver/linked_solver.h"
 #include "tests/unit/engine/failing_memory.h"
@@ -47,6 +49,27 @@ struct Solve {
   SolverSettings settings;
   std::unique_ptr<LinkedSolver> solver;
 };
+
+// A wave may take as long as all before it.
+TEST(GatheredSolver, ATargetThatIsRaisedEndsAWaveThatNobodyNeeds) {
+  Solve room(cubeQuads(8, {0, 4, 0, 0, 0, 0}, kGrey), 0.001);
+  room.rays.pause = std::chrono::milliseconds(5);  // so that a wave takes several slices
+  auto isInWave = [&, before = std::uint64_t{0}](StepOutcome outcome) mutable {
+    const auto samples = room.solver->linkCounters().samples;
+    const bool grew = std::exchange(before, samples) < samples;
+    return grew && outcome == StepOutcome::kSlice && room.solver->error().total < 0.02;
+  };
+  for (int i = 0; i < 10'000; ++i) {
+    const auto outcome = room.solver->step();
+    ASSERT_TRUE(outcome);
+    ASSERT_NE(*outcome, StepOutcome::kConverged) << "no wave took more than a slice";
+    if (isInWave(*outcome)) break;
+  }
+  const auto samples = room.solver->linkCounters().samples;
+  room.solver->setTargetError(1.5 * room.solver->error().total);
+  EXPECT_EQ(room.run(), StepOutcome::kConverged);
+  EXPECT_EQ(room.solver->linkCounters().samples, samples);
+}
 
 TEST(GatheredSolver, WhereverItWasSavedTheEndIsTheSame) {
   const auto quads = cubeQuads(8, {0, 4, 0, 0, 0, 0}, kGrey);
