@@ -347,26 +347,18 @@ std::vector<LinkPlanner::FurtherSample> LinkPlanner::furtherSamples(const Shoote
   return samples;
 }
 
-std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPyramid& unshot,
-                                              const scene::PatchScene& patches, bool may_split, Wave wave,
-                                              LinkMemory& memory, const ErrorGoal& goal) {
+LinkPlanner::Gains LinkPlanner::findGains(const LinkSystem& system, const UnshotPyramid& unshot,
+                                          const scene::PatchScene& patches, bool may_split, Wave wave) const {
   double spread = 0.0, squares = 0.0;
   for (const auto& shooter : system.shooters()) {
     spread += shooter.spread();
     squares += carriedPower(shooter) * carriedPower(shooter);
   }
-  struct Gain {
-    double gain;
-    std::uint32_t shooter, points;  // 0 points: split
-    double less;                    // of the square of the error
-  };
-  std::vector<Gain> gains;
-  double variances = 0.0, variations = 0.0;
-  double waits = 0.0;  // the greatest gain of a sample that this wave may not bring
+  Gains gains;
   for (std::uint32_t n = 0; n < system.shooters().size(); ++n) {
     const auto& shooter = system.shooters()[n];
     if (shooter.column[0].points() == 0.0 || shooter.column[1].points() == 0.0) {
-      variances += 0.25 * shooter.spread();  // of roulette: no sample lowers it
+      gains.variances += 0.25 * shooter.spread();  // of roulette: no sample lowers it
       continue;
     }
     const double taken = shooter.column[0].points();
@@ -374,7 +366,7 @@ std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPy
     const double usual = squares > 0.0 ? spread / squares * carriedPower(shooter) * carriedPower(shooter) : 0.0;
     const double variance = 0.25 * (shooter.spread() * taken + kPrior * usual) / (taken + kPrior);
     // Of each further sample, were those before it taken. At most as many as there are: their worth is only guessed.
-    variances += variance;
+    gains.variances += variance;
     double before = taken;
     const auto gainOf = [&](const FurtherSample& sample) {
       const double less = variance * taken * (1.0 / before - 1.0 / (before + sample.points));
@@ -382,27 +374,34 @@ std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPy
     };
     const auto samples = furtherSamples(shooter, wave);
     for (const auto& sample : samples) {
-      gains.push_back(gainOf(sample));
+      gains.all.push_back(gainOf(sample));
       before += sample.points;
     }
-    waits = std::max(waits, gainOf(samples.back()).gain);
+    gains.waits = std::max(gains.waits, gainOf(samples.back()).gain);
     const double varying = variation(shooter, system, unshot, patches);
-    variations += varying;
-    if (may_split && varying > 0.0) gains.push_back({varying / 8.0, n, 0, kResolved * varying});
+    gains.variations += varying;
+    if (may_split && varying > 0.0) gains.all.push_back({varying / 8.0, n, 0, kResolved * varying});
   }
-  std::sort(gains.begin(), gains.end(), [](const Gain& a, const Gain& b) {
+  std::sort(gains.all.begin(), gains.all.end(), [](const Gain& a, const Gain& b) {
     return std::tie(b.gain, a.shooter, a.points) < std::tie(a.gain, b.shooter, b.points);
   });
+  return gains;
+}
+
+std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPyramid& unshot,
+                                              const scene::PatchScene& patches, bool may_split, Wave wave,
+                                              LinkMemory& memory, const ErrorGoal& goal) {
+  const auto gains = findGains(system, unshot, patches, may_split, wave);
   const std::size_t short_wave = 2 * std::max<std::size_t>(settings_.pairs_a_wave, system.shooters().size() / 8);
   const std::size_t limit = wave == Wave::kShort ? short_wave : std::numeric_limits<std::size_t>::max();
   std::vector<Measurement> wanted;
   std::vector<std::uint32_t> further(system.shooters().size(), 0);
-  Forecast forecast(goal, variances, variations);
+  Forecast forecast(goal, gains.variances, gains.variations);
   std::size_t planned = 0;  // samples of lights, points of nodes
-  for (const auto& gain : gains) {
+  for (const auto& gain : gains.all) {
     if (planned >= limit || gain.gain <= 0.0) break;
     if (planned >= short_wave / kLeastPartOfWave && forecast.isReached()) break;
-    if (planned >= short_wave && gain.gain < waits) break;  // what waits for the next wave is worth more
+    if (planned >= short_wave && gain.gain < gains.waits) break;  // what waits for the next wave is worth more
     if (gain.points == 0) {
       const auto before = wanted.size();
       if (!memory.isFull())

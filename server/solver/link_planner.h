@@ -132,6 +132,19 @@ class LinkPlanner {
     double cost;  ///< in a node's samples from one point
   };
   [[nodiscard]] std::vector<FurtherSample> furtherSamples(const Shooter& shooter, Wave wave) const;
+  struct Gain {
+    double gain;
+    std::uint32_t shooter, points;  ///< 0 points: split
+    double less;                    ///< of the square of the error
+  };
+  struct Gains {
+    std::vector<Gain> all;    ///< the greatest first
+    double variances = 0.0;   ///< of all samples
+    double variations = 0.0;  ///< square of the error by what varies inside shooters
+    double waits = 0.0;       ///< the greatest of those samples that the wave may not bring
+  };
+  [[nodiscard]] Gains findGains(const LinkSystem& system, const UnshotPyramid& unshot, const scene::PatchScene& patches,
+                                bool may_split, Wave wave) const;
   [[nodiscard]] double chance(double power) const;
   [[nodiscard]] bool plays(const NodePlace& place, std::size_t half, double power) const;
   [[nodiscard]] double squaredVariation(const Shooter& shooter, const LinkSystem& system, const UnshotPyramid& unshot,
