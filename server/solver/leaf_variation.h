@@ -73,6 +73,7 @@ class LeafVariation {
   /// because it is doubtful.
   [[nodiscard]] double unsettled() const { return noise_ + unknown_ + std::max(0.0, left_ - doubtful_); }
 
+  /// Whether corrections were looked for: what varies is no less than the bound.
   [[nodiscard]] bool corrects() const { return corrects_; }
   /// To be added to irradiance, lux, by half: these are independent but for how much of them is.
   struct Correction {
@@ -178,7 +179,7 @@ class LeafVariation {
   std::array<std::vector<Path>, 2> kept_;     ///< and those that are what they were, ...
   std::uint64_t kept_for_ = 0;                ///< ... by these lights
   std::array<std::vector<Lack>, 2> lacking_;  ///< by half and leaf value: mean of the paths; while updating
-  bool corrects_ = false;                     ///< what varies is worth it
+  bool corrects_ = false;                     ///< what varies was worth it, though nothing may be sure enough
   std::vector<Correction> corrections_;
   std::vector<float> gain_;               ///< by leaf value: what more paths would lower; while correcting
   double found_ = 0.0, deviation_ = 0.0;  ///< sum of what varies, and its standard deviation
