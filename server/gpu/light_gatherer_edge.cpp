@@ -43,8 +43,6 @@ class Draw {
 
 /// A plane that leaves more than this of the polygon cuts off no more than rounding, or next to nothing.
 constexpr double kCutOff = 0.999;
-/// No place on a leaf is farther from the nearest of so many that were tried, in leaf widths: half a cell's diagonal.
-constexpr float kBetweenSpots = 0.09F;
 /// A leaf that shines so far shines everywhere: areas are in single precision.
 constexpr double kWhole = 0.998;
 
@@ -81,10 +79,11 @@ double LightGatherer::shiningAt(const solver::GatherShot& shot, const glm::vec3&
   const double fill = static_cast<double>(patches.node_area[surface.first_node[shot.side] + leaf]) / area;
   if (fill <= 0.0 || fill >= kWhole) return fill;
   const auto& point = patches.leaves[surface.first_leaf + leaf];
-  if (!point.full && point.first_spot != scene::kNone) {
-    const auto spots = std::span(patches.spots).subspan(point.first_spot, scene::kLeafSpots);
-    const auto isNear = [&](const scene::LeafSpot& spot) { return glm::distance(spot.texel, here) < kBetweenSpots; };
-    return std::any_of(spots.begin(), spots.end(), isNear) ? 1.0 : 0.0;
+  if (!point.full && point.hasSpots()) {
+    const float between = patches.spots.latticeOf(point.spot_list).apart();
+    for (std::uint32_t k = 0; k < patches.spotCount(point); ++k)
+      if (glm::distance(patches.spot(point, k).texel, here) < between) return 1.0;
+    return 0.0;
   }
   const auto before = clipToPlane(corners, at, normal);
   return shining(fill, solver::polygonArea(std::span(before.corner.data(), before.count)) / area);

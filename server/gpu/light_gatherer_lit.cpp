@@ -15,8 +15,6 @@ namespace radiosity::gpu {
 namespace {
 
 constexpr std::size_t kFewestLit = 4096;
-/// Spots are asked for before they are looked at, by so many receivers: each lies on a line of the cache of its own.
-constexpr std::size_t kSpotsAhead = 8;
 /// Least and greatest height of a polygon above a plane.
 std::array<float, 2> heights(std::span<const glm::vec3> corners, const glm::vec3& point, const glm::vec3& normal) {
   float low = 1e30F, high = -1e30F;
@@ -160,7 +158,6 @@ void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers
     });
   };
   const auto end = group.first + group.count;
-  const auto rows = spotRows(shot);
   auto block = receivers_->blocks().begin() + static_cast<std::ptrdiff_t>(group.first_block);
   for (auto i = group.first; i < end; ++block) {
     const auto stop = std::min(end, block->first + block->count);
@@ -174,10 +171,6 @@ void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers
       i = stop;
     }
     for (; i < stop; ++i) {
-      if (i + kSpotsAhead < receivers_->all().size()) {
-        const auto& ahead = receivers_->all()[i + kSpotsAhead];
-        if (ahead.hasSpots()) receivers_->fetchSpots(ahead, firstRow(ahead, rows));
-      }
       add(receivers_->all()[i]);
     }
   }

@@ -78,10 +78,11 @@ template <typename Take>
   };
   if (receiver.hasSpots()) {
     const auto rows = spotRows(shot);
-    const float share = static_cast<float>(rows.apart) / static_cast<float>(scene::kLeafSpots);
+    const float share = static_cast<float>(rows.apart) / (scene::kSpotRows * scene::kSpotQuarters);
+    const auto count = receivers.spotCount(receiver);
     for (std::uint32_t row = firstRow(receiver, rows); row < scene::kSpotRows; row += rows.apart) {
       for (std::uint32_t k = 0; k < scene::kSpotQuarters; ++k)
-        offer(receivers.spot(receiver, row * scene::kSpotQuarters + k), share);
+        offer(receivers.spot(receiver, scene::LeafSpots::indexOf(count, row, k, shot.receiver_jitter.x)), share);
     }
     return;
   }

@@ -56,7 +56,7 @@ Receivers::Receivers(std::shared_ptr<const scene::PatchScene> patches)
         const auto& leaf = patches_->leaves[surface.first_leaf + i];
         if (!receives(leaf, patches_->node_area[first + i])) continue;
         const auto texel = leaf.full ? glm::vec2(i % surface.width, i / surface.width) : leaf.texel;
-        receivers_.push_back({first + i, leaf.triangle, texel, leaf.first_spot, leaf.full});
+        receivers_.push_back({first + i, leaf.triangle, texel, leaf.spot_list, leaf.full});
       }
       groups_.push_back({s, begin, receivers_.size() - begin, side == 0 ? 1.0F : -1.0F, blocks_.size()});
       findBlocks(groups_.back());
@@ -109,7 +109,8 @@ void Receivers::findBlocks(Group& group) {
       block.low = glm::min(block.low, point);
       block.high = glm::max(block.high, point);
     };
-    for (std::uint32_t k = 0; receiver.hasSpots() && k < scene::kLeafSpots; ++k) hold(spot(receiver, k).point);
+    const auto spots = receiver.hasSpots() && !receiver.full ? spotCount(receiver) : 0;
+    for (std::uint32_t k = 0; k < spots; ++k) hold(spot(receiver, k).point);
     for (int corner = 0; corner < 4; ++corner) hold(place(receiver, {corner % 2, corner / 2}).point);
     texel_x_.push_back(receiver.texel.x);
     texel_y_.push_back(receiver.texel.y);

@@ -28,11 +28,11 @@ class Receivers {
   /// A side of a leaf that can receive light.
   struct Receiver {
     std::uint32_t node, triangle;
-    glm::vec2 texel;           ///< corner of the leaf when full, else the point itself
-    std::uint32_t first_spot;  ///< its places (LeafPoint)
+    glm::vec2 texel;          ///< corner of the leaf when full, else the point itself
+    std::uint32_t spot_list;  ///< its places (LeafPoint)
     bool full;
 
-    [[nodiscard]] bool hasSpots() const { return first_spot != scene::kNone; }
+    [[nodiscard]] bool hasSpots() const { return spot_list != scene::kNone; }
     /// Something hovers right before it, or beside that.
     [[nodiscard]] bool liesInGap() const { return full && hasSpots(); }
   };
@@ -92,18 +92,17 @@ class Receivers {
   [[nodiscard]] Place place(const Receiver& receiver, const glm::vec2& at) const {
     if (receiver.full) return placeOf({receiver.texel + at, receiver.triangle});
     scene::LeafPoint leaf{receiver.texel, receiver.triangle};
-    leaf.first_spot = receiver.first_spot;
+    leaf.spot_list = receiver.spot_list;
     return placeOf(patches_->spotAt(leaf, 0, 0, at));
   }
-  /// One of its places, spot < kLeafSpots; of a receiver that has them.
+  /// Of a receiver that has spots.
+  [[nodiscard]] std::uint32_t spotCount(const Receiver& receiver) const {
+    return receiver.full ? scene::kLeafLattice : patches_->spots.countOf(receiver.spot_list);
+  }
+  /// One of them, spot < spotCount().
   [[nodiscard]] Place spot(const Receiver& receiver, std::uint32_t spot) const {
     if (receiver.full) return placeOf({receiver.texel + scene::kSpotsOfFull[spot], receiver.triangle});
-    return placeOf(patches_->spots[receiver.first_spot + spot]);
-  }
-  /// Has a row of its spots, if there are any, brought nearer.
-  void fetchSpots(const Receiver& receiver, std::uint32_t row) const {
-    if (receiver.hasSpots() && !receiver.full)
-      __builtin_prefetch(&patches_->spots[receiver.first_spot + row * scene::kSpotQuarters]);
+    return placeOf(patches_->spots.at(receiver.spot_list, spot, receiver.triangle));
   }
   [[nodiscard]] glm::vec3 point(const Receiver& receiver, const glm::vec2& at) const {
     return place(receiver, at).point;

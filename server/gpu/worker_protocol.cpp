@@ -37,7 +37,7 @@ void visitScene(Scene& scene, Visit visit) {
   visit(scene.triangle_surface);
   visit(scene.surfaces);
   visit(scene.leaves);
-  visit(scene.spots);
+  scene::LeafSpots::visitParts(scene.spots, visit);
   visit(scene.node_area);
   visit(scene.opacity);
 }

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <bit>
 
+#include "server/scene/finer_places.h"
+
 namespace radiosity::scene {
 namespace {
 
@@ -32,7 +34,9 @@ BurialPlaces affordablePlaces(std::size_t leaves, std::span<const TriedLeaf> tri
     if (leaf.buried && leaf.visible) again += work;
   }
   const double each = static_cast<double>(leaves) / static_cast<double>(std::max<std::size_t>(1, tried.size()));
-  while (places.many > 1 && (places.few * first + places.many * again) * each > kMaxWork) {
+  const auto work = [&](std::uint32_t many) { return (places.few * first + many * again) * each; };
+  places.finer = work(places.many + kFinerAsked) <= kMaxWork;
+  while (places.many > 1 && work(places.many) > kMaxWork) {
     places.few = std::max(1U, places.few / 2);
     places.many /= 2;
   }

@@ -13,6 +13,7 @@ struct BurialPlaces {
   std::uint32_t few = 16;     ///< of each leaf that something touches
   std::uint32_t many = 64;    ///< instead, where these do not agree
   std::uint32_t beside = 64;  ///< of those beside leaves where something was buried
+  bool finer = true;          ///< edges that cross a leaf are looked at more closely (finer_places.h)
 };
 
 /// What a few places of a leaf told.

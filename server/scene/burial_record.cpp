@@ -69,7 +69,8 @@ bool sweeps(const glm::dvec3& from, const glm::dvec3& half, const glm::dvec3& wa
 
 /// Whether leaves are looked at in as many places.
 bool sameOf(BurialRecord::Pass pass, const BurialPlaces& a, const BurialPlaces& b) {
-  return a.many == b.many && (pass == BurialRecord::Pass::kFew ? a.few == b.few : a.beside == b.beside);
+  return a.many == b.many && a.finer == b.finer &&
+         (pass == BurialRecord::Pass::kFew ? a.few == b.few : a.beside == b.beside);
 }
 
 }  // namespace
@@ -165,7 +166,7 @@ BuriedPart FormerBurial::renumbered(const BuriedPart& part, std::uint32_t surfac
   BuriedPart after = part;
   after.leaf = part.leaf - from.first_leaf + to.first_leaf;
   number(after.point.triangle);
-  for (auto& place : after.places) number(place.triangle);
+  for (auto& place : after.visible.places) number(place.triangle);
   return after;
 }
 

@@ -69,7 +69,7 @@ class RayNotes {
 struct BuriedPart {
   std::uint32_t leaf = kNone, side = 0;
   LeafPoint point;
-  std::vector<LeafSpot> places;  ///< where it is visible
+  LeafPlaces visible;  ///< where it is
   float visible_area = 0.0F;
 };
 

@@ -80,7 +80,7 @@ class Builder {
     burial_ = removeBuried(patches_, pieces, hides, former ? &*former : nullptr);
     placeSpots(patches_, pieces);
     placeSpotsInGaps(patches_);
-    patches_.spots.shrink_to_fit();  // of rooms full of chairs they are most of what a patch takes
+    patches_.spots.shrinkToFit();
     measureOpacity(scene_, patches_);
     applyOpacity(patches_);
     sumAncestors(patches_);

@@ -41,9 +41,14 @@ struct LeafPiece {
 std::shared_ptr<const BurialRecord> removeBuried(PatchScene& patches, const std::vector<LeafPiece>& pieces,
                                                  const std::vector<Hides>& hides, const FormerBurial* former = nullptr);
 
-/// Places on a leaf that is not full: kLeafSpots of `places`, which lie evenly over what is left of it. Sorts them
-/// anew.
-void keepSpots(PatchScene& patches, LeafPoint& leaf, std::span<LeafSpot> places);
+/// Places on a leaf, which lie evenly over what is left of it.
+struct LeafPlaces {
+  LeafSpots::Lattice lattice;
+  std::vector<LeafSpots::Place> places;
+};
+
+/// Of a leaf that is not full; fewer than two are no more than its point.
+void keepSpots(PatchScene& patches, LeafPoint& leaf, LeafPlaces places);
 
 /// Places on every leaf that is neither empty nor full and has none yet.
 void placeSpots(PatchScene& patches, const std::vector<LeafPiece>& pieces);
@@ -51,10 +56,6 @@ void placeSpots(PatchScene& patches, const std::vector<LeafPiece>& pieces);
 /// The same for full leaves of planes right before which something else stands (a lamp close under a ceiling): there,
 /// light changes within a leaf. Both sides.
 void placeSpotsInGaps(PatchScene& patches);
-
-/// Point `i` of `count`, a power of two, in [0, 1)^2. Every point has its own u and its own v, so axis-parallel borders
-/// are placed within 1/count. From 16 on a rank-1 lattice (32 and 128 lie less evenly).
-[[nodiscard]] glm::dvec2 latticePoint(std::uint32_t i, std::uint32_t count);
 
 /// Sums level 0 of node_area up all pyramids.
 void sumAncestors(PatchScene& patches);

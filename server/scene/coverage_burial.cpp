@@ -13,6 +13,7 @@
 #include "common/parallel.h"
 #include "server/scene/burial_budget.h"
 #include "server/scene/coverage.h"
+#include "server/scene/leaf_burial.h"
 #include "server/scene/solids.h"
 
 namespace radiosity::scene {
@@ -29,10 +30,9 @@ constexpr std::size_t kMostRecorded = 80'000, kMostRecordedBytes = std::size_t{1
 /// Boxes around the nodes of one surface, for the question where other solids come near.
 class NodeBoxes {
  public:
-  NodeBoxes(const PatchScene& patches, std::uint32_t id, const std::vector<LeafPiece>& pieces,
-            const std::vector<std::size_t>& first_piece)
+  NodeBoxes(const PatchScene& patches, std::uint32_t id, const std::vector<LeafPiece>& pieces, const LeafBurial& leaves)
       : patches_(patches), surface_(patches.surfaces[id]) {
-    if (!surface_.planar) fillCurved(pieces, first_piece);
+    if (!surface_.planar) fillCurved(pieces, leaves);
   }
 
   [[nodiscard]] Bounds box(std::uint32_t level, std::uint32_t x, std::uint32_t y) const {
@@ -53,7 +53,7 @@ class NodeBoxes {
     return box;
   }
 
-  void fillCurved(const std::vector<LeafPiece>& pieces, const std::vector<std::size_t>& first_piece) {
+  void fillCurved(const std::vector<LeafPiece>& pieces, const LeafBurial& leaves) {
     const LevelGrid top = levelGrid(surface_.width, surface_.height, surface_.level_count - 1);
     boxes_.resize(top.offset + 1);
     for (std::uint32_t i = 0; i < surface_.width * surface_.height; ++i) {
@@ -61,7 +61,8 @@ class NodeBoxes {
       if (patches_.leaves[leaf].triangle == kNone) continue;
       const glm::uvec2 low(i % surface_.width, i / surface_.width);
       boxes_[i] = cornersBox(patches_.triangles[patches_.leaves[leaf].triangle], low, low + 1U);
-      for (std::size_t p = first_piece[leaf]; p < first_piece[leaf + 1]; ++p)
+      const auto of_leaf = leaves.piecesOf(leaf);
+      for (auto p = of_leaf.first; p < of_leaf.end; ++p)
         boxes_[i].add(cornersBox(patches_.triangles[pieces[p].triangle], low, low + 1U));
     }
     LevelGrid below = levelGrid(surface_.width, surface_.height, 0);
@@ -83,16 +84,18 @@ class Burial {
  public:
   Burial(PatchScene& patches, const std::vector<LeafPiece>& pieces, const std::vector<Hides>& hides,
          const Coincidence& coincidence, const FormerBurial* former)
-      : patches_(patches), pieces_(pieces), solids_(patches, hides), coincidence_(coincidence), former_(former) {
+      : patches_(patches),
+        pieces_(pieces),
+        solids_(patches, hides),
+        coincidence_(coincidence),
+        former_(former),
+        leaves_(patches, pieces, solids_, coincidence) {
     record_.hides = hides;
     record_.covered = coincidence.covered();
   }
 
   std::shared_ptr<const BurialRecord> run() {
     if (solids_.empty() && !coincidence_.found()) return nullptr;
-    first_piece_.assign(patches_.leaves.size() + 1, 0);
-    for (const LeafPiece& piece : pieces_) ++first_piece_[piece.leaf + 1];
-    for (std::size_t i = 1; i < first_piece_.size(); ++i) first_piece_[i] += first_piece_[i - 1];
     classifyAll();
     tryLeaves();
     measureAll(contacts_, places_.few, BurialRecord::Pass::kFew);
@@ -103,37 +106,10 @@ class Burial {
   }
 
  private:
-  struct Contact {
-    std::uint32_t surface, side, x, y;
-  };
   struct Measured {
     std::optional<BuriedPart> buried;  ///< none: all of it is visible
     std::optional<std::vector<RayFan>> fans;
   };
-  struct Part {
-    std::uint32_t samples = 0, buried = 0;
-  };
-
-  [[nodiscard]] std::uint32_t leafOf(const Contact& c) const {
-    const Surface& surface = patches_.surfaces[c.surface];
-    return surface.first_leaf + c.y * surface.width + c.x;
-  }
-  [[nodiscard]] std::uint32_t nodeOf(const Contact& c) const {
-    const Surface& surface = patches_.surfaces[c.surface];
-    return surface.first_node[c.side] + c.y * surface.width + c.x;
-  }
-  [[nodiscard]] glm::vec3 facing(std::uint32_t triangle, std::uint32_t side) const {
-    const glm::vec3& n = patches_.triangles[triangle].normal;
-    return side == 0 ? n : -n;
-  }
-  /// Inside a solid, or under a face that lies on this one.
-  [[nodiscard]] Solids::Answer ask(std::uint32_t triangle, const glm::dvec2& texel, std::uint32_t side, Hits& hits,
-                                   RayNotes* notes = nullptr) const {
-    const auto position = positionAt(patches_.triangles[triangle], texel);
-    const auto normal = facing(triangle, side);
-    if (coincidence_.covers(triangle, side, position)) return {true, true};
-    return solids_.ask(position, normal, hits, notes);
-  }
 
   /// Of one surface: leaves in contact, and what is buried beside them.
   struct Split {
@@ -162,7 +138,7 @@ class Burial {
   /// Splits a surface into nodes that no other solid comes near (all visible or all buried: one test, if it is clear)
   /// and single leaves in contact with one, or with an earlier surface that covers some of them.
   void classify(std::uint32_t s, Hits& hits, Split& split) const {
-    const NodeBoxes boxes(patches_, s, pieces_, first_piece_);
+    const NodeBoxes boxes(patches_, s, pieces_, leaves_);
     const Surface& surface = patches_.surfaces[s];
     for (std::uint32_t side = 0; side < 2; ++side)
       if (surface.first_node[side] != kNone) descend(boxes, {s, side, 0, 0}, surface.level_count - 1, hits, split);
@@ -178,7 +154,7 @@ class Burial {
       return;
     }
     if (level == 0) {
-      if (patches_.leaves[leafOf(node)].triangle != kNone) split.contacts.push_back(node);
+      if (patches_.leaves[leaves_.leafOf(node)].triangle != kNone) split.contacts.push_back(node);
       return;
     }
     const LevelGrid below = levelGrid(surface.width, surface.height, level - 1);
@@ -197,32 +173,25 @@ class Burial {
     for (std::uint32_t y = node.y << level; y < y_end; ++y)
       for (std::uint32_t x = node.x << level; x < x_end; ++x) {
         const Contact leaf{node.surface, node.side, x, y};
-        const LeafPoint& point = patches_.leaves[leafOf(leaf)];
+        const LeafPoint& point = patches_.leaves[leaves_.leafOf(leaf)];
         if (point.triangle == kNone) continue;
-        const auto answer = ask(point.triangle, glm::dvec2(point.texel), node.side, hits);
+        const auto answer = leaves_.ask(point.triangle, glm::dvec2(point.texel), node.side, hits);
         if (std::exchange(is_first, false) && !answer.buried && answer.agreed) return;
-        if (answer.buried) split.buried.push_back({leafOf(leaf), node.side, {}, {}, 0.0F});
+        if (answer.buried) split.buried.push_back({leaves_.leafOf(leaf), node.side, {}, {}, 0.0F});
       }
   }
-
-  /// What a thread of its own needs to measure leaves.
-  struct Scratch {
-    Hits hits;
-    RayNotes notes;
-    std::vector<Part> parts;
-  };
 
   /// Sets how many places of the others are asked.
   void tryLeaves() {
     tried_.resize(triedLeaves(contacts_.size()));
     places_ = {TriedLeaf::kPlaces, TriedLeaf::kPlaces, TriedLeaf::kPlaces};
     inShares(tried_.size() / kFewestTries, [&](std::size_t share, std::size_t shares) {
-      Scratch scratch;
+      LeafBurial::Scratch scratch;
       for (auto i = share; i < tried_.size(); i += shares) {
         scratch.hits.work = 0;
         scratch.notes.clear();
         const auto& contact = contacts_[(2 * i + 1) * contacts_.size() / (2 * tried_.size())];
-        const auto found = measure(contact, TriedLeaf::kPlaces, scratch);
+        const auto found = leaves_.measure(contact, TriedLeaf::kPlaces, places_, scratch);
         tried_[i] = {scratch.hits.work, found.has_value(), !found || found->visible_area > 0.0F};
       }
     });
@@ -236,7 +205,7 @@ class Burial {
       const auto end = std::min(contacts.size(), first + kMeasuredAtOnce);
       measured.assign(end - first, {});
       inShares((end - first) / kFewestAShare, [&](std::size_t share, std::size_t shares) {
-        Scratch scratch;
+        LeafBurial::Scratch scratch;
         for (auto i = first + share; i < end; i += shares)
           measured[i - first] = remember(contacts[i], count, pass, scratch);
       });
@@ -245,7 +214,7 @@ class Burial {
         const auto& contact = contacts[i];
         if (found.fans) record(contact, pass, found);
         if (!found.buried) continue;
-        patches_.node_area[nodeOf(contact)] = found.buried->visible_area;
+        patches_.node_area[leaves_.nodeOf(contact)] = found.buried->visible_area;
         changes_.push_back(std::move(*found.buried));
         touched_.push_back(contact);
       }
@@ -254,10 +223,10 @@ class Burial {
 
   /// As measure(), or from what was found before an edit.
   [[nodiscard]] Measured remember(const Contact& contact, std::uint32_t count, BurialRecord::Pass pass,
-                                  Scratch& scratch) const {
+                                  LeafBurial::Scratch& scratch) const {
     const bool by_rays = !record_.covered[contact.surface];
     if (by_rays && former_ != nullptr) {
-      const auto leaf = leafOf(contact) - patches_.surfaces[contact.surface].first_leaf;
+      const auto leaf = leaves_.leafOf(contact) - patches_.surfaces[contact.surface].first_leaf;
       if (const auto* known = former_->find(contact.surface, leaf, contact.side, pass, places_)) {
         Measured same{{}, known->fans};
         if (known->buried) same.buried = former_->renumbered(*known->buried, contact.surface);
@@ -265,7 +234,7 @@ class Burial {
       }
     }
     scratch.notes.clear();
-    Measured found{measure(contact, count, scratch), {}};
+    Measured found{leaves_.measure(contact, count, places_, scratch), {}};
     const auto& fans = scratch.notes.fans();
     if (by_rays && !fans.empty() && fans.size() <= kMostFans) found.fans = fans;
     return found;
@@ -274,12 +243,12 @@ class Burial {
   void record(const Contact& contact, BurialRecord::Pass pass, Measured& found) {
     if (is_too_much_) return;
     recorded_bytes_ += sizeof(BurialRecord::Leaf) + found.fans->size() * sizeof(RayFan) +
-                       (found.buried ? found.buried->places.size() * sizeof(LeafSpot) : 0);
+                       (found.buried ? found.buried->visible.places.size() * sizeof(LeafSpots::Place) : 0);
     is_too_much_ = recorded_bytes_ > kMostRecordedBytes || record_.leaves.size() >= kMostRecorded;
     if (is_too_much_) {
       giveBack(record_.leaves);
     } else {
-      record_.leaves.push_back({leafOf(contact), contact.side, pass, std::move(*found.fans), found.buried});
+      record_.leaves.push_back({leaves_.leafOf(contact), contact.side, pass, std::move(*found.fans), found.buried});
     }
   }
 
@@ -290,104 +259,10 @@ class Burial {
     return std::make_shared<const BurialRecord>(std::move(record_));
   }
 
-  /// All of the leaf is visible, as one look from all of it at once shows: most are, beside the few that a solid
-  /// covers.
-  [[nodiscard]] bool isOpen(const Contact& contact, std::size_t first_piece, std::size_t end_piece,
-                            RayNotes& notes) const {
-    const auto triangle = patches_.leaves[leafOf(contact)].triangle;
-    const auto normal = facing(triangle, contact.side);
-    const glm::dvec2 corner(contact.x, contact.y);
-    Bounds box;
-    const auto add = [&](std::uint32_t of) {
-      for (const auto& at : {corner, corner + glm::dvec2(1, 0), corner + glm::dvec2(0, 1), corner + 1.0})
-        box.add(positionAt(patches_.triangles[of], at));
-      return facing(of, contact.side) == normal;
-    };
-    if (!add(triangle)) return false;
-    for (auto piece = first_piece; piece < end_piece; ++piece) {
-      if (!add(pieces_[piece].triangle)) return false;
-    }
-    if (coincidence_.mayCover(contact.surface, contact.side, box)) return false;
-    if (solids_.mayBury(box, normal)) return false;
-    for (const auto& end : {box.min, box.max})
-      notes.add({glm::dvec3(end) + kBurialLift * glm::dvec3(normal), normal, kNone, 0, kBurialRayLength});
-    return true;
-  }
-
-  /// Visible area of one leaf and side from `count` samples; none where all of it is visible.
-  [[nodiscard]] std::optional<BuriedPart> measure(const Contact& contact, std::uint32_t count, Scratch& scratch) const {
-    const std::uint32_t leaf = leafOf(contact);
-    const LeafPoint point = patches_.leaves[leaf];
-    const std::size_t first = first_piece_[leaf], end = first_piece_[leaf + 1];
-    const glm::dvec2 corner(contact.x, contact.y);
-    if (isOpen(contact, first, end, scratch.notes)) return std::nullopt;
-    auto& parts = scratch.parts;
-    parts.assign(std::max<std::size_t>(1, end - first), Part{});
-    LeafPoint visible;
-    std::vector<LeafSpot> places;
-    double nearest = std::numeric_limits<double>::infinity();
-    for (std::uint32_t i = 0; i < count; ++i) {
-      const glm::dvec2 texel = corner + latticePoint(i, count);
-      std::uint32_t triangle = point.triangle;
-      std::size_t part = 0;
-      if (first != end) {
-        const auto found = std::find_if(
-            pieces_.begin() + static_cast<std::ptrdiff_t>(first), pieces_.begin() + static_cast<std::ptrdiff_t>(end),
-            [&](const LeafPiece& p) { return triangleHolds(patches_, p.triangle, texel, 0.0); });
-        part = static_cast<std::size_t>(found - pieces_.begin()) - first;
-        if (part == end - first) continue;  // not covered here
-        triangle = found->triangle;
-      }
-      ++parts[part].samples;
-      if (ask(triangle, texel, contact.side, scratch.hits, &scratch.notes).buried) {
-        ++parts[part].buried;
-        continue;
-      }
-      places.push_back({glm::vec2(texel), triangle});
-      const double distance = glm::distance(texel, corner + 0.5);
-      if (distance >= nearest) continue;
-      nearest = distance;
-      visible = {glm::vec2(texel), triangle, false};
-    }
-    const Outcome outcome = sumParts(point, contact, first, end, scratch);
-    if (outcome.buried == 0) return std::nullopt;
-    if (count < places_.many && outcome.buried < outcome.samples) return measure(contact, places_.many, scratch);
-    if (outcome.visible_area <= 0.0) {
-      visible = {};
-    } else if (visible.triangle == kNone) {
-      visible = {point.texel, point.triangle, false};
-    }
-    return BuriedPart{leaf, contact.side, visible, std::move(places), static_cast<float>(outcome.visible_area)};
-  }
-
-  struct Outcome {
-    std::uint32_t samples = 0, buried = 0;
-    double visible_area = 0.0;
-  };
-
-  /// Pieces too small to hold a sample go the way of the leaf's own point.
-  Outcome sumParts(const LeafPoint& point, const Contact& contact, std::size_t first, std::size_t end,
-                   Scratch& scratch) const {
-    Outcome outcome;
-    for (std::size_t part = 0; part < scratch.parts.size(); ++part) {
-      Part& p = scratch.parts[part];
-      if (p.samples == 0) {
-        p.samples = 1;
-        p.buried =
-            ask(point.triangle, glm::dvec2(point.texel), contact.side, scratch.hits, &scratch.notes).buried ? 1 : 0;
-      }
-      const double area = first == end ? patches_.node_area[nodeOf(contact)] : pieces_[first + part].area;
-      outcome.samples += p.samples;
-      outcome.buried += p.buried;
-      outcome.visible_area += area * (p.samples - p.buried) / p.samples;
-    }
-    return outcome;
-  }
-
   /// A few samples may all miss a narrow strip: look closer beside leaves where something was buried.
   void refineBorders() {
     std::vector<bool> done(patches_.leaves.size() * 2, false);
-    const auto slot = [&](const Contact& c) { return std::size_t{2} * leafOf(c) + c.side; };
+    const auto slot = [&](const Contact& c) { return std::size_t{2} * leaves_.leafOf(c) + c.side; };
     for (const BuriedPart& change : changes_) done[std::size_t{2} * change.leaf + change.side] = true;
     const std::vector<Contact> buried = std::exchange(touched_, {});
     std::vector<bool> in_contact(patches_.leaves.size() * 2, false);
@@ -427,7 +302,7 @@ class Burial {
         point = open.point;
         point.cut = true;
         point.beneath = record_.covered[surface];
-        keepSpots(patches_, point, open.places);
+        keepSpots(patches_, point, open.visible);
       } else if (both || !two_sided) {
         point = {};
       }
@@ -444,10 +319,10 @@ class Burial {
   Solids solids_;
   const Coincidence& coincidence_;
   const FormerBurial* former_;
+  const LeafBurial leaves_;
   BurialRecord record_;
   std::size_t recorded_bytes_ = 0;
   bool is_too_much_ = false;
-  std::vector<std::size_t> first_piece_;
   std::vector<Contact> contacts_, touched_;
   std::vector<BuriedPart> changes_;
   std::vector<TriedLeaf> tried_;

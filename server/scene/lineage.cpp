@@ -113,8 +113,10 @@ class Matcher {
         old_one.cut != new_one.cut || old_one.beneath != new_one.beneath)
       return false;
     if (!old_one.full && old_one.texel != new_one.texel) return false;
-    if ((old_one.first_spot == kNone) != (new_one.first_spot == kNone)) return false;
-    for (std::uint32_t k = 0; old_one.first_spot != kNone && k < kLeafSpots; ++k) {
+    if (old_one.hasSpots() != new_one.hasSpots()) return false;
+    const auto count = old_one.hasSpots() ? before_.spotCount(old_one) : 0;
+    if (count > 0 && count != after_.spotCount(new_one)) return false;
+    for (std::uint32_t k = 0; k < count; ++k) {
       const auto s = before_.spot(old_one, k), t = after_.spot(new_one, k);
       if (s.texel != t.texel || !sameTriangle(s.triangle, t.triangle)) return false;
     }

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "common/result.h"
+#include "server/scene/leaf_spots.h"
 #include "server/scene/scene.h"
 #include "server/scene/side_colours.h"
 
@@ -36,22 +37,7 @@ struct TriangleFrame {
   glm::vec3 origin, du, dv, normal;
 };
 
-/// A place on a leaf: texel coordinates, and the triangle whose frame they belong to.
-struct LeafSpot {
-  glm::vec2 texel{0.0F};
-  std::uint32_t triangle = kNone;
-};
-
-/// So many places are kept of each leaf within which light changes much: enough for the mean over what is left of it,
-/// also where a thin strip behind something is lit and all before it is not. A power of two.
-inline constexpr std::uint32_t kLeafSpots = 64;
-/// Spots are kept by so many in a row, which lie in different quarters of the leaf: what few of them are looked at lies
-/// together.
-inline constexpr std::uint32_t kSpotQuarters = 4;
-inline constexpr std::uint32_t kSpotRows = kLeafSpots / kSpotQuarters;
-/// Of full leaves, within the leaf: all have the same, so that none is kept of any.
-extern const std::array<glm::vec2, kLeafSpots> kSpotsOfFull;
-/// LeafPoint::first_spot of those.
+/// LeafPoint::spot_list of full leaves: that of kSpotsOfFull.
 inline constexpr std::uint32_t kFullSpots = kNone - 1;
 
 /// Where a leaf is: a point (texel coordinates) on the part of the leaf that is covered and not buried inside another
@@ -61,9 +47,11 @@ struct LeafPoint {
   glm::vec2 texel;
   std::uint32_t triangle = kNone;  ///< kNone: the leaf is empty
   bool full = false;
-  bool cut = false;                  ///< something passes through the leaf, or right before it
-  bool beneath = false;              ///< another surface lies in its plane and covers some of it
-  std::uint32_t first_spot = kNone;  ///< into PatchScene::spots, or kFullSpots; kNone: any point stands for all
+  bool cut = false;                 ///< something passes through the leaf, or right before it
+  bool beneath = false;             ///< another surface lies in its plane and covers some of it
+  std::uint32_t spot_list = kNone;  ///< of PatchScene::spots, or kFullSpots; kNone: any point stands for all
+
+  [[nodiscard]] bool hasSpots() const { return spot_list != kNone; }
 };
 
 struct Surface {
@@ -99,9 +87,9 @@ struct PatchScene {
   std::vector<std::uint32_t> triangle_source;  ///< by triangle: which one of its instance's primitive it was
   std::vector<Surface> surfaces;
   std::vector<LeafPoint> leaves;
-  /// kLeafSpots of each leaf that is neither empty nor full: spread evenly over the covered and unburied part, by rows
-  /// of kSpotQuarters. Full ones in narrow gaps, or right beside what hovers before them, have kFullSpots.
-  std::vector<LeafSpot> spots;
+  /// Of each leaf that is neither empty nor full: spread evenly over the covered and unburied part. Full ones in narrow
+  /// gaps, or right beside what hovers before them, have kFullSpots.
+  LeafSpots spots;
   /// Unit box squared: covered and unburied part, times its opacity; parent = sum of children; 0 = empty. What a leaf
   /// catches of the light is irradiance times this, so irradiance needs no opacity anywhere.
   std::vector<float> node_area;
@@ -165,15 +153,19 @@ struct PatchScene {
   /// A place on a leaf that is not empty, by two uniform numbers in [0, 1); leaf (x, y) of its surface.
   [[nodiscard]] LeafSpot spotAt(const LeafPoint& leaf, std::uint32_t x, std::uint32_t y, const glm::vec2& at) const {
     if (leaf.full) return {glm::vec2(x, y) + at, leaf.triangle};
-    if (leaf.first_spot == kNone) return {leaf.texel, leaf.triangle};
-    const auto wanted = static_cast<std::uint32_t>(at.x * static_cast<float>(kLeafSpots));
-    const auto place = wanted < kLeafSpots ? wanted : kLeafSpots - 1;  // by place: a quarter after the other
-    return spot(leaf, place % kSpotRows * kSpotQuarters + place / kSpotRows);
+    if (!leaf.hasSpots()) return {leaf.texel, leaf.triangle};
+    const auto count = spotCount(leaf);
+    const auto wanted = static_cast<std::uint32_t>(at.x * static_cast<float>(count));
+    return spot(leaf, wanted < count ? wanted : count - 1);
   }
-  /// Spot k < kLeafSpots of a leaf that has them.
+  /// Of a leaf that has spots.
+  [[nodiscard]] std::uint32_t spotCount(const LeafPoint& leaf) const {
+    return leaf.spot_list == kFullSpots ? kLeafLattice : spots.countOf(leaf.spot_list);
+  }
+  /// Spot k < spotCount(leaf); any part of them in a row is a part of the leaf.
   [[nodiscard]] LeafSpot spot(const LeafPoint& leaf, std::uint32_t k) const {
-    if (leaf.first_spot == kFullSpots) return {glm::floor(leaf.texel) + kSpotsOfFull[k], leaf.triangle};
-    return spots[leaf.first_spot + k];
+    if (leaf.spot_list == kFullSpots) return {glm::floor(leaf.texel) + kSpotsOfFull[k], leaf.triangle};
+    return spots.at(leaf.spot_list, k, leaf.triangle);
   }
 };
 

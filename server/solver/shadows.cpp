@@ -111,7 +111,7 @@ void Shadows::Balls::add(const glm::vec3& centre, float r, float pixels) {
 
 /// Leaves in gaps, and those of surfaces with two sides, ask the pixels around their own as well.
 float Shadows::reachOf(const scene::Surface& surface, const scene::LeafPoint& leaf) const {
-  const bool in_gap = leaf.full && leaf.first_spot != scene::kNone;
+  const bool in_gap = leaf.full && leaf.hasSpots();
   const bool two_sided = surface.first_node[0] != scene::kNone && surface.first_node[1] != scene::kNone;
   return in_gap || two_sided ? kMostReach : 1.0F;
 }

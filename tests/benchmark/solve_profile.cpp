@@ -280,7 +280,7 @@ int profile(const std::string& file, std::map<std::string, std::string> options)
               static_cast<unsigned long long>(patches->polygons), patches->surfaces.size(), patches->nodeCount(),
               patches->leaves.size(), std::chrono::duration<double>(Clock::now() - begin).count());
   auto leaves = planarLeaves(*patches);
-  std::printf("%zu leaves with spots\n", patches->spots.size() / scene::kLeafSpots);
+  std::printf("%zu leaves with spots of %zu bytes\n", patches->spots.listCount(), patches->spots.bytes());
   auto truth = reference(file, leaves, static_cast<std::uint32_t>(number("--samples", 4096)), options["--reference"]);
   leaveOutBuried(leaves, truth);
   const int workers = static_cast<int>(number("--workers", 0));

@@ -204,12 +204,9 @@ TEST_F(GatherBesideHoles, WhatASolidHidesOfALeafIsMissedOnce) {
   const auto& surface = made->surfaces[light_];
   auto& leaf = made->leaves[surface.first_leaf + 1];
   leaf.full = false;
-  leaf.first_spot = static_cast<std::uint32_t>(made->spots.size());
-  for (std::uint32_t k = 0; k < scene::kLeafSpots; ++k) {
-    const auto x = 1.5F + (static_cast<float>(k) + 0.5F) / (2.0F * scene::kLeafSpots);
-    made->spots.push_back(
-        {{x, (static_cast<float>(k * 19 % scene::kLeafSpots) + 0.5F) / scene::kLeafSpots}, leaf.triangle});
-  }
+  std::vector<scene::LeafSpots::Place> places;
+  for (std::uint16_t i = 0; i < 64; ++i) places.push_back({i, leaf.triangle});
+  leaf.spot_list = made->spots.add({{1.5F, 0.0F}, {0.5F, 1.0F}, 64}, places, true);
   scene_ = made;
   double open = 0.0, seen = 0.0;
   for (std::uint32_t y = 0; y < 12; ++y) {

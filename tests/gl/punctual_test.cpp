@@ -250,9 +250,9 @@ TEST_F(Punctual, ALeafThatTurnsAwayFromTheSkyTakesWhatAnotherOfItsTrianglesSees)
   surface.planar = false;
   auto& leaf = scene->leaves[surface.first_leaf];
   leaf.full = false;
-  leaf.first_spot = static_cast<std::uint32_t>(scene->spots.size());
-  for (std::uint32_t i = 0; i < scene::kLeafSpots; ++i)
-    scene->spots.push_back({glm::vec2(0.5F), i % 2 == 0 ? own : other});
+  std::vector<scene::LeafSpots::Place> places;
+  for (std::uint16_t i = 0; i < 64; ++i) places.push_back({i, i % 2 == 0 ? own : other});
+  leaf.spot_list = scene->spots.add({glm::vec2(0.5F), glm::vec2(0.0F), 64}, places, false);
   solver::LightSources sources;
   sources.sky = {glm::vec3(1.0F), glm::vec3(0.0F)};
   const auto flux = runRound(scene, sources);

@@ -91,16 +91,18 @@ class BurialRecords : public testing::Test {
 
   static void expectSame(const PatchScene& a, const PatchScene& b) {
     EXPECT_EQ(a.node_area, b.node_area);
-    ASSERT_EQ(a.spots.size(), b.spots.size());
-    for (std::size_t i = 0; i < a.spots.size(); ++i) {
-      ASSERT_EQ(a.spots[i].texel, b.spots[i].texel);
-      ASSERT_EQ(a.spots[i].triangle, b.spots[i].triangle);
-    }
+    ASSERT_EQ(a.spots.listCount(), b.spots.listCount());
     ASSERT_EQ(a.leaves.size(), b.leaves.size());
     for (std::size_t i = 0; i < a.leaves.size(); ++i) {
       const auto &leaf = a.leaves[i], &other = b.leaves[i];
       ASSERT_TRUE(leaf.texel == other.texel && leaf.triangle == other.triangle && leaf.full == other.full &&
-                  leaf.first_spot == other.first_spot);
+                  leaf.spot_list == other.spot_list);
+      if (!leaf.hasSpots()) continue;
+      ASSERT_EQ(a.spotCount(leaf), b.spotCount(other));
+      for (std::uint32_t k = 0; k < a.spotCount(leaf); ++k) {
+        ASSERT_EQ(a.spot(leaf, k).texel, b.spot(other, k).texel);
+        ASSERT_EQ(a.spot(leaf, k).triangle, b.spot(other, k).triangle);
+      }
     }
   }
 

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <vector>
 
 #include "server/scene/patch_scene.h"
 #include "tests/unit/scene/shapes.h"
@@ -35,39 +37,88 @@ TEST(LeafSpots, LieEvenlyOverWhatABlockLeavesOfALeaf) {
   for (std::size_t i = 0; i < 1600; ++i) {
     const auto& leaf = patches.leaves[patches.surfaces[0].first_leaf + i];
     if (leaf.triangle == kNone || leaf.full) continue;
-    ASSERT_NE(leaf.first_spot, kNone) << i;
+    ASSERT_TRUE(leaf.hasSpots()) << i;
     ++seen;
     glm::dvec3 mean(0.0);
-    for (std::uint32_t k = 0; k < kLeafSpots; ++k) {
+    const auto count = patches.spotCount(leaf);
+    EXPECT_NEAR(count, 0.4 * kLeafLattice, 1.0) << "the block's left face leaves 0.1 of 0.25";
+    for (std::uint32_t k = 0; k < count; ++k) {
       const auto at = worldOf(patches, patches.spot(leaf, k));
       EXPECT_FALSE(at.x > -1.15 && at.x < 1.0 && std::abs(at.z) < 1.0) << at.x << " " << at.z;
-      mean += at / double{kLeafSpots};
+      mean += at / static_cast<double>(count);
     }
-    // The block's left face cuts a column of leaves from x = -1.25 to -1.0: 0.1 of 0.25 is left.
-    EXPECT_NEAR(mean.x, -1.2, 0.01);
+    EXPECT_NEAR(mean.x, -1.2, 0.001);
     const double row = std::floor(mean.z / 0.25) * 0.25;
-    EXPECT_NEAR(mean.z, row + 0.125, 0.04) << "they are places of a lattice of 64, of which 26 are left";
+    EXPECT_NEAR(mean.z, row + 0.125, 0.002) << "a lattice of 256, of which 102 are left";
   }
   EXPECT_EQ(seen, 8U);
 }
 
-TEST(LeafSpots, EveryEighthRowHasSomeInEveryQuarter) {
+// A sheet of light's edge may lie anywhere: the part of the spots on one side of a line is that of what is left.
+TEST(LeafSpots, AThinStripBehindAPostIsAPartLikeAnyOther) {
   Scene scene;
-  place(scene, floorQuad(4.0));
-  place(scene, floorQuad(2.0, 1.0, 1.0), glm::dmat4(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0.01, 0, 1));
-  const PatchScene patches = build(scene, 0.5);
-  for (const auto& leaf : patches.leaves) {
-    if (leaf.first_spot == kNone) continue;
-    const glm::vec2 low = glm::floor(leaf.texel);
+  place(scene, floorQuad(10.0, -5.0, -5.0));
+  place(scene, box({0.023, 0.0, -2.0}, {0.12, 2.0, 2.0}));  // of leaves 0.25 wide: 0.023 before it, 0.13 behind
+  const PatchScene patches = build(scene, 0.25);
+  std::size_t seen = 0;
+  for (std::size_t i = 0; i < 1600; ++i) {
+    const auto& leaf = patches.leaves[patches.surfaces[0].first_leaf + i];
+    if (leaf.triangle == kNone || leaf.full || !leaf.hasSpots()) continue;
+    ++seen;
+    const auto count = patches.spotCount(leaf);
+    double before = 0.0;
+    for (std::uint32_t k = 0; k < count; ++k) before += worldOf(patches, patches.spot(leaf, k)).x < 0.05 ? 1 : 0;
+    EXPECT_NEAR(before / count, 0.023 / 0.153, 1.0 / count) << "one place more or less";
+  }
+  EXPECT_EQ(seen, 16U);
+}
+
+TEST(LeafSpots, EveryEighthRowHasSomeInEveryQuarter) {
+  for (const float at : {0.0F, 0.4F, 0.999F}) {
     for (std::uint32_t first = 0; first < 8; ++first) {
       std::uint32_t quarters = 0;
       for (std::uint32_t k = 0; k < 2 * kSpotQuarters; ++k) {
         const std::uint32_t row = first + 8 * (k / kSpotQuarters);
-        const glm::vec2 in = patches.spot(leaf, row * kSpotQuarters + k % kSpotQuarters).texel - low;
+        const glm::vec2 in = kSpotsOfFull[LeafSpots::indexOf(kLeafLattice, row, k % kSpotQuarters, at)];
         quarters |= 1U << (2U * (in.y > 0.5F ? 1U : 0U) + (in.x > 0.5F ? 1U : 0U));
       }
       EXPECT_EQ(quarters, 15U);
     }
+  }
+}
+
+// Also where their number is no multiple of the rows': or a part of the leaf would count twice.
+TEST(LeafSpots, AllAreLookedAtEquallyOften) {
+  constexpr std::uint32_t kSteps = 1000;
+  for (const std::uint32_t count : {2U, 47U, 64U, 183U, 256U}) {
+    std::vector<double> times(count, 0.0);
+    for (std::uint32_t row = 0; row < kSpotRows; ++row)
+      for (std::uint32_t quarter = 0; quarter < kSpotQuarters; ++quarter)
+        for (std::uint32_t step = 0; step < kSteps; ++step)
+          times.at(LeafSpots::indexOf(count, row, quarter, (static_cast<float>(step) + 0.5F) / kSteps)) += 1.0;
+    const double mean = 1.0 * kSpotRows * kSpotQuarters * kSteps / count;
+    for (const double one : times) EXPECT_NEAR(one / mean, 1.0, 0.01) << count << ": steps of a thousandth";
+  }
+}
+
+TEST(LeafSpots, AnyPartOfAListIsAPartOfTheLeaf) {
+  LeafSpots spots;
+  std::vector<LeafSpots::Place> places;
+  for (std::uint16_t i = 0; i < 256; ++i)
+    if (latticePoint(i, 256).x < 0.6875) places.push_back({i, 7});
+  const auto list = spots.add({{10.0F, 20.0F}, glm::vec2(1.0F), 256}, places, true);
+  ASSERT_EQ(spots.countOf(list), places.size());
+  const auto eighth = spots.countOf(list) / 8;
+  for (std::uint32_t part = 0; part < 8; ++part) {
+    glm::vec2 low(1e9F), high(-1e9F);
+    for (auto k = part * eighth; k < (part + 1) * eighth; ++k) {
+      const auto spot = spots.at(list, k, 3);
+      EXPECT_EQ(spot.triangle, 3U) << "in one frame: the leaf's own";
+      low = glm::min(low, spot.texel);
+      high = glm::max(high, spot.texel);
+    }
+    const auto size = high - low;
+    EXPECT_LT(size.x * size.y, 0.6875 / 8.0);
   }
 }
 
@@ -82,7 +133,7 @@ TEST(LeafSpots, FullLeavesHaveThemOnlyInNarrowGapsAndBesideThem) {
   for (const auto& surface : patches.surfaces) {
     for (std::uint32_t i = 0; i < surface.width * surface.height; ++i) {
       const auto& leaf = patches.leaves[surface.first_leaf + i];
-      if (!leaf.full || leaf.first_spot == kNone) continue;
+      if (!leaf.full || !leaf.hasSpots()) continue;
       const auto at = worldOf(patches, {leaf.texel, leaf.triangle});
       EXPECT_GT(at.y, 2.9) << "walls that meet are no gap";
       const double beside = std::max({1.5 - at.x, at.x - 2.5, 1.5 - at.z, at.z - 2.5});

@@ -98,11 +98,12 @@ TEST(FlatNodes, OneOddSpotOfALeafIsAFold) {
   auto patches = sheet({bent(0.0F), bent(1.0F)}, [](std::uint32_t /*x*/, std::uint32_t /*y*/) { return 0U; });
   auto& leaf = patches.leaves[5];
   leaf.full = false;
-  leaf.first_spot = 0;
   leaf.texel = {5.5F, 0.5F};
-  patches.spots.assign(scene::kLeafSpots, {glm::vec2(5.5F, 0.5F), 0});
+  std::vector<scene::LeafSpots::Place> places{{0, 0}, {1, 0}};
+  leaf.spot_list = patches.spots.add({{5.0F, 0.0F}, glm::vec2(1.0F), 64}, places, false);
   EXPECT_EQ(FlatNodes(patches).triangle(0, 0, 5, 0), 0U);
-  patches.spots.back().triangle = 1;
+  places.back().triangle = 1;
+  patches.leaves[5].spot_list = patches.spots.add({{5.0F, 0.0F}, glm::vec2(1.0F), 64}, places, false);
   const FlatNodes flat(patches);
   EXPECT_EQ(flat.triangle(0, 0, 5, 0), kNone);
   EXPECT_EQ(flat.triangle(0, 3, 0, 0), kNone);

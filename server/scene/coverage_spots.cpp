@@ -1,0 +1,187 @@
+// Where on a leaf that is not full one may stand, several times over: its irradiance is the mean over what is left of
+// it.
+#include <algorithm>
+#include <array>
+#include <glm/geometric.hpp>
+#include <utility>
+#include <vector>
+
+#include "common/parallel.h"
+#include "server/scene/bvh.h"
+#include "server/scene/coverage.h"
+
+namespace radiosity::scene {
+namespace {
+
+/// Coordinates on two triangles of one plane mean the same around a leaf, to a thousandth of it.
+bool isOneFrame(const PatchScene& patches, std::uint32_t a, std::uint32_t b, const glm::vec2& at) {
+  if (a == b) return true;
+  const auto &one = patches.triangles[a], &other = patches.triangles[b];
+  const float texel = glm::length(one.du) + glm::length(one.dv);
+  const auto agree = [&](const glm::vec2& place) {
+    const auto way = (one.origin - other.origin) + place.x * (one.du - other.du) + place.y * (one.dv - other.dv);
+    return glm::length(way) <= 1e-3F * texel;
+  };
+  const auto low = glm::floor(at);
+  return glm::dot(one.normal, other.normal) > 0.999999F && agree(low) && agree({low.x + 1.0F, low.y}) &&
+         agree({low.x, low.y + 1.0F});
+}
+
+}  // namespace
+
+void keepSpots(PatchScene& patches, LeafPoint& leaf, LeafPlaces places) {
+  if (places.places.size() < 2) return;
+  const auto sharesFrame = [&](const LeafSpots::Place& place) {
+    return isOneFrame(patches, leaf.triangle, place.triangle, leaf.texel);
+  };
+  const bool in_one_frame = std::ranges::all_of(places.places, sharesFrame);
+  leaf.spot_list = patches.spots.add(places.lattice, places.places, in_one_frame);
+}
+
+namespace {
+
+/// Points of the lattice over what is covered of a leaf; where fewer than the first of them lie on it, of a finer one.
+constexpr std::array<std::uint32_t, 3> kPlacesTried{64, 256, 1024};
+
+/// Of a leaf, what pieces cover of it, in texels.
+LeafSpots::Lattice boxAround(const PatchScene& patches, std::span<const LeafPiece> pieces, const glm::dvec2& corner) {
+  glm::dvec2 low = corner + 1.0, high = corner;
+  for (const auto& piece : pieces) {
+    const std::size_t first = 3 * std::size_t{piece.triangle};
+    const auto texel = [&](std::size_t k) { return glm::dvec2(patches.vertices[patches.indices[first + k]].texel); };
+    low = glm::min(low, glm::min(texel(0), glm::min(texel(1), texel(2))));
+    high = glm::max(high, glm::max(texel(0), glm::max(texel(1), texel(2))));
+  }
+  low = glm::clamp(low, corner, corner + 1.0);
+  return {glm::vec2(low), glm::vec2(glm::clamp(high, low, corner + 1.0) - low)};
+}
+
+/// Evenly over what is covered: a sliver of a leaf of which all places were drawn would have one or two of them, and
+/// these would stand for all of it in every sample.
+LeafPlaces findPlaces(const PatchScene& patches, std::span<const LeafPiece> pieces, const glm::dvec2& corner) {
+  LeafPlaces found{boxAround(patches, pieces, corner), {}};
+  for (const auto count : kPlacesTried) {
+    found.lattice.points = count;
+    found.places.clear();
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const glm::dvec2 texel(found.lattice.at(i));
+      const auto holds = [&](const LeafPiece& piece) { return triangleHolds(patches, piece.triangle, texel, 0.0); };
+      const auto at = std::ranges::find_if(pieces, holds);
+      if (at != pieces.end()) found.places.push_back({static_cast<std::uint16_t>(i), at->triangle});
+    }
+    if (found.places.size() >= kPlacesTried.front()) break;
+  }
+  return found;
+}
+
+}  // namespace
+
+void placeSpots(PatchScene& patches, const std::vector<LeafPiece>& pieces) {
+  std::size_t surface = 0;
+  for (std::size_t first = 0, end = 0; first < pieces.size(); first = end) {
+    const std::uint32_t index = pieces[first].leaf;
+    while (end < pieces.size() && pieces[end].leaf == index) ++end;
+    auto& leaf = patches.leaves[index];
+    if (leaf.triangle == kNone || leaf.full || leaf.spot_list != kNone) continue;
+    while (surface + 1 < patches.surfaces.size() && patches.surfaces[surface + 1].first_leaf <= index) ++surface;
+    const std::uint32_t local = index - patches.surfaces[surface].first_leaf, width = patches.surfaces[surface].width;
+    const glm::dvec2 corner(local % width, local / width);
+    keepSpots(patches, leaf, findPlaces(patches, std::span(pieces).subspan(first, end - first), corner));
+  }
+}
+
+namespace {
+
+/// Leaves are looked at in so many leaf widths before them, ...
+constexpr float kGap = 0.5F;
+/// What is so near cuts them.
+constexpr float kCut = 0.25F;
+/// ... starting well above the rounding of positions, and without their rims: walls that meet a floor are no gap.
+constexpr float kLift = 2e-5F, kInterior = 0.9F;
+/// What hovers beside a leaf counts so many leaf widths away, a pixel or two of an item buffer: a lamp in front of a
+/// hole in the ceiling, whose shadow there falls on nothing that could make up for what pixels give it of the rim.
+constexpr float kBeside = 2.0F;
+/// Surfaces: fewer are not worth a thread.
+constexpr std::size_t kFewestAShare = 32;
+
+class Gaps {
+ public:
+  explicit Gaps(PatchScene& patches) : patches_(patches) {
+    std::vector<Bvh::Triangle> triangles(patches.triangles.size());
+    for (std::size_t i = 0; i < patches.indices.size(); ++i)
+      triangles[i / 3][i % 3] = patches.vertices[patches.indices[i]].position;
+    tree_ = Bvh(std::move(triangles));
+  }
+
+  /// Found side by side, kept in the order of the surfaces.
+  void run() {
+    std::vector<std::vector<Found>> found(patches_.surfaces.size());
+    inShares(found.size() / kFewestAShare, [&](std::size_t share, std::size_t shares) {
+      for (auto s = static_cast<std::uint32_t>(share); s < found.size(); s += static_cast<std::uint32_t>(shares)) {
+        const Surface& surface = patches_.surfaces[s];
+        for (std::size_t side = 0; side < 2 && surface.planar; ++side) {
+          if (surface.first_node[side] == kNone) continue;
+          descend(s, side == 0 ? 1.0F : -1.0F, surface.level_count - 1, {0, 0}, found[s]);
+        }
+      }
+    });
+    for (std::size_t s = 0; s < found.size(); ++s) {
+      for (const auto& leaf : found[s]) place(patches_.surfaces[s], leaf);
+    }
+  }
+
+ private:
+  struct Found {
+    glm::uvec2 at;
+    bool cut;
+  };
+  /// Space right before a node, on one side, wider than the node by so many leaf widths.
+  [[nodiscard]] Bvh::OrientedBox boxBefore(std::uint32_t s, float side, std::uint32_t level, glm::uvec2 at, float wider,
+                                           float gap = kGap) const {
+    const Surface& surface = patches_.surfaces[s];
+    const TriangleFrame& frame = patches_.triangles[surface.first_triangle];
+    const glm::vec2 low(at << level);
+    const glm::vec2 high(glm::min((at + 1U) << level, glm::uvec2(surface.width, surface.height)));
+    const glm::vec2 middle = 0.5F * (low + high), extent = 0.5F * (high - low + wider);
+    const float across = glm::length(frame.du), up = glm::length(frame.dv), depth = gap * std::min(across, up);
+    const glm::vec3 normal = side * frame.normal, u = frame.du / across;
+    Bvh::OrientedBox box;
+    box.centre = frame.origin + middle.x * frame.du + middle.y * frame.dv + (kLift + 0.5F * depth) * normal;
+    box.axes = {u, glm::normalize(glm::cross(normal, u)), normal};
+    box.half = {extent.x * across, extent.y * up, 0.5F * depth};
+    return box;
+  }
+
+  void descend(std::uint32_t s, float side, std::uint32_t level, glm::uvec2 at, std::vector<Found>& found) const {
+    const Surface& surface = patches_.surfaces[s];
+    if (!tree_.touches(boxBefore(s, side, level, at, kInterior - 1.0F), patches_.triangle_surface, s) &&
+        !tree_.hoversIn(boxBefore(s, side, level, at, 2.0F * kBeside), patches_.triangle_surface, s))
+      return;
+    if (level == 0) {
+      found.push_back(
+          {at, tree_.touches(boxBefore(s, side, 0, at, kInterior - 1.0F, kCut), patches_.triangle_surface, s)});
+      return;
+    }
+    const LevelGrid below = levelGrid(surface.width, surface.height, level - 1);
+    for (std::uint32_t y = 2 * at.y; y < std::min(2 * at.y + 2, below.height); ++y)
+      for (std::uint32_t x = 2 * at.x; x < std::min(2 * at.x + 2, below.width); ++x)
+        descend(s, side, level - 1, {x, y}, found);
+  }
+
+  void place(const Surface& surface, const Found& found) {
+    const auto at = found.at;
+    auto& leaf = patches_.leaves[surface.first_leaf + at.y * surface.width + at.x];
+    if (!leaf.full || leaf.spot_list != kNone) return;
+    leaf.spot_list = kFullSpots;
+    leaf.cut = found.cut;
+  }
+
+  PatchScene& patches_;
+  Bvh tree_;
+};
+
+}  // namespace
+
+void placeSpotsInGaps(PatchScene& patches) { Gaps(patches).run(); }
+
+}  // namespace radiosity::scene

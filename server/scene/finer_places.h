@@ -1,0 +1,24 @@
+// Which of a leaf's places tell what is around others, four times as dense: along the edge of what hides a part of a
+// leaf a sixty-fourth of it is a tenth of the light of what is left, and far from the edge there is nothing to ask.
+// Plain values; any thread.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "server/scene/leaf_spots.h"
+
+namespace radiosity::scene {
+
+/// That all leaves are asked for which something covers in part: as of latticePoint().
+inline constexpr std::uint32_t kCoarsePlaces = 64;
+/// Of kLeafLattice places so many are asked, in the mean, where an edge crosses the leaf.
+inline constexpr std::uint32_t kFinerAsked = 34;
+
+/// Those of kCoarsePlaces that lie around one of kLeafLattice: where they agree it is as they are, as it seems.
+/// Ascending.
+[[nodiscard]] std::span<const std::uint8_t> coarseAround(std::uint32_t finer);
+/// Those of kLeafLattice right beside one of them: where they do not agree, it seemed wrong.
+[[nodiscard]] std::span<const std::uint8_t> finerAround(std::uint32_t finer);
+
+}  // namespace radiosity::scene

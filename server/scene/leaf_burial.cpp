@@ -1,0 +1,170 @@
+#include "server/scene/leaf_burial.h"
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <utility>
+
+#include "server/scene/finer_places.h"
+
+namespace radiosity::scene {
+
+LeafBurial::LeafBurial(const PatchScene& patches, const std::vector<LeafPiece>& pieces, const Solids& solids,
+                       const Coincidence& coincidence)
+    : patches_(patches), pieces_(pieces), solids_(solids), coincidence_(coincidence) {
+  first_piece_.assign(patches_.leaves.size() + 1, 0);
+  for (const LeafPiece& piece : pieces_) ++first_piece_[piece.leaf + 1];
+  for (std::size_t i = 1; i < first_piece_.size(); ++i) first_piece_[i] += first_piece_[i - 1];
+}
+
+Solids::Answer LeafBurial::ask(std::uint32_t triangle, const glm::dvec2& texel, std::uint32_t side, Hits& hits,
+                               RayNotes* notes) const {
+  const auto position = positionAt(patches_.triangles[triangle], texel);
+  const auto normal = facing(triangle, side);
+  if (coincidence_.covers(triangle, side, position)) return {true, true};
+  return solids_.ask(position, normal, hits, notes);
+}
+
+/// All of the leaf is visible, as one look from all of it at once shows: most are, beside the few that a solid covers.
+bool LeafBurial::isOpen(const Contact& contact, const Pieces& pieces, RayNotes& notes) const {
+  const auto triangle = patches_.leaves[leafOf(contact)].triangle;
+  const auto normal = facing(triangle, contact.side);
+  const glm::dvec2 corner(contact.x, contact.y);
+  Bounds box;
+  const auto add = [&](std::uint32_t of) {
+    for (const auto& at : {corner, corner + glm::dvec2(1, 0), corner + glm::dvec2(0, 1), corner + 1.0})
+      box.add(positionAt(patches_.triangles[of], at));
+    return facing(of, contact.side) == normal;
+  };
+  if (!add(triangle)) return false;
+  for (auto piece = pieces.first; piece < pieces.end; ++piece) {
+    if (!add(pieces_[piece].triangle)) return false;
+  }
+  if (coincidence_.mayCover(contact.surface, contact.side, box)) return false;
+  if (solids_.mayBury(box, normal)) return false;
+  for (const auto& end : {box.min, box.max})
+    notes.add({glm::dvec3(end) + kBurialLift * glm::dvec3(normal), normal, kNone, 0, kBurialRayLength});
+  return true;
+}
+
+std::optional<BuriedPart> LeafBurial::measure(const Contact& contact, std::uint32_t count, const BurialPlaces& all,
+                                              Scratch& scratch) const {
+  const auto pieces = piecesOf(leafOf(contact));
+  if (isOpen(contact, pieces, scratch.notes)) return std::nullopt;
+  askPlaces(contact, pieces, count, scratch);
+  auto outcome = sumParts(contact, pieces, scratch);
+  if (outcome.buried == 0) return std::nullopt;
+  if (count < all.many && outcome.isMixed()) return measure(contact, all.many, all, scratch);
+  if (count == kCoarsePlaces && all.finer && outcome.isMixed()) {
+    askFiner(contact, pieces, scratch);
+    outcome = sumParts(contact, pieces, scratch);
+  }
+  return takePart(contact, outcome, scratch);
+}
+
+void LeafBurial::askPlaces(const Contact& contact, const Pieces& pieces, std::uint32_t count, Scratch& scratch) const {
+  scratch.places.clear();
+  for (std::uint32_t i = 0; i < count; ++i) {
+    auto& place = scratch.places.emplace_back(placeOn(contact, pieces, i, count));
+    if (place.triangle != kNone) answer(contact, place, scratch);
+  }
+}
+
+/// Of more places those around which not all is visible, or buried, and from there on along the edge.
+void LeafBurial::askFiner(const Contact& contact, const Pieces& pieces, Scratch& scratch) const {
+  scratch.asked_before.swap(scratch.places);
+  auto& places = scratch.places;
+  places.clear();
+  scratch.beside.clear();
+  const auto askOne = [&](std::uint32_t i) {
+    answer(contact, places[i], scratch);
+    places[i].is_asked = true;
+    scratch.beside.push_back(static_cast<std::uint8_t>(i));
+  };
+  for (std::uint32_t i = 0; i < kLeafLattice; ++i) {
+    auto& place = places.emplace_back(placeOn(contact, pieces, i, kLeafLattice));
+    if (place.triangle == kNone) continue;
+    bool agree = true;
+    for (const auto k : coarseAround(i)) {
+      const auto there = scratch.asked_before[k].answer;
+      if (there == Answer::kNone) continue;
+      agree = agree && (place.answer == Answer::kNone || place.answer == there);
+      place.answer = there;
+    }
+    if (!agree || place.answer == Answer::kNone) askOne(i);
+  }
+  while (!scratch.beside.empty()) {
+    const auto i = scratch.beside.back();
+    scratch.beside.pop_back();
+    for (const auto k : finerAround(i)) {
+      const auto& there = places[k];
+      if (!there.is_asked && there.answer != Answer::kNone && there.answer != places[i].answer) askOne(k);
+    }
+  }
+}
+
+LeafBurial::Place LeafBurial::placeOn(const Contact& contact, const Pieces& pieces, std::uint32_t number,
+                                      std::uint32_t count) const {
+  Place place{glm::dvec2(contact.x, contact.y) + latticePoint(number, count), patches_.leaves[leafOf(contact)].triangle,
+              0, static_cast<std::uint16_t>(number)};
+  if (pieces.first == pieces.end) return place;
+  const auto end = pieces_.begin() + static_cast<std::ptrdiff_t>(pieces.end);
+  const auto found =
+      std::find_if(pieces_.begin() + static_cast<std::ptrdiff_t>(pieces.first), end,
+                   [&](const LeafPiece& p) { return triangleHolds(patches_, p.triangle, place.texel, 0.0); });
+  place.part = static_cast<std::size_t>(found - pieces_.begin()) - pieces.first;
+  place.triangle = found == end ? kNone : found->triangle;
+  return place;
+}
+
+void LeafBurial::answer(const Contact& contact, Place& place, Scratch& scratch) const {
+  const bool buried = ask(place.triangle, place.texel, contact.side, scratch.hits, &scratch.notes).buried;
+  place.answer = buried ? Answer::kBuried : Answer::kVisible;
+}
+
+/// Pieces too small to hold a sample go the way of the leaf's own point.
+LeafBurial::Outcome LeafBurial::sumParts(const Contact& contact, const Pieces& pieces, Scratch& scratch) const {
+  const LeafPoint& point = patches_.leaves[leafOf(contact)];
+  scratch.parts.assign(std::max<std::size_t>(1, pieces.end - pieces.first), {});
+  for (const auto& place : scratch.places) {
+    if (place.answer == Answer::kNone) continue;
+    ++scratch.parts[place.part].samples;
+    if (place.answer == Answer::kBuried) ++scratch.parts[place.part].buried;
+  }
+  Outcome outcome;
+  for (std::size_t part = 0; part < scratch.parts.size(); ++part) {
+    auto& p = scratch.parts[part];
+    if (p.samples == 0) {
+      p.samples = 1;
+      p.buried =
+          ask(point.triangle, glm::dvec2(point.texel), contact.side, scratch.hits, &scratch.notes).buried ? 1 : 0;
+    }
+    const double area =
+        pieces.first == pieces.end ? patches_.node_area[nodeOf(contact)] : pieces_[pieces.first + part].area;
+    outcome.samples += p.samples;
+    outcome.buried += p.buried;
+    outcome.visible_area += area * (p.samples - p.buried) / p.samples;
+  }
+  return outcome;
+}
+
+/// What is visible, with the visible place nearest to the middle as its point.
+BuriedPart LeafBurial::takePart(const Contact& contact, const Outcome& outcome, const Scratch& scratch) const {
+  BuriedPart part{leafOf(contact), contact.side, {}, {}, static_cast<float>(outcome.visible_area)};
+  const glm::dvec2 corner(contact.x, contact.y);
+  part.visible.lattice = {.low = glm::vec2(corner), .points = static_cast<std::uint32_t>(scratch.places.size())};
+  const auto& point = patches_.leaves[part.leaf];
+  if (outcome.visible_area > 0.0) part.point = {point.texel, point.triangle, false};
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const auto& place : scratch.places) {
+    if (place.answer != Answer::kVisible) continue;
+    part.visible.places.push_back({place.number, place.triangle});
+    const double distance = glm::distance(place.texel, corner + 0.5);
+    if (distance >= nearest || outcome.visible_area <= 0.0) continue;
+    nearest = distance;
+    part.point = {glm::vec2(place.texel), place.triangle, false};
+  }
+  return part;
+}
+
+}  // namespace radiosity::scene

@@ -1,0 +1,106 @@
+// Places on leaves within which light changes much: those that something covers, or passes, in part. Plain values.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <glm/vec2.hpp>
+#include <span>
+#include <vector>
+
+namespace radiosity::scene {
+
+/// Point `i` of `count`, a power of two, in [0, 1)^2. Every point has its own u and its own v, so axis-parallel borders
+/// are placed within 1/count. From 16 on a rank-1 lattice (32, 128 and 512 lie less evenly); no generator spreads
+/// fewer, which are Hammersley's.
+template <typename Vec = glm::dvec2>
+[[nodiscard]] constexpr Vec latticePoint(std::uint32_t i, std::uint32_t count) {
+  using Number = typename Vec::value_type;
+  std::uint32_t up = 0;
+  if (count < 16) {
+    for (std::uint32_t bit = 1; bit < count; bit *= 2) up = 2 * up + ((i & bit) != 0 ? 1 : 0);
+  } else {
+    const std::uint32_t generator = count == 1024 ? 275 : count == 256 ? 75 : count == 64 ? 19 : 5;
+    up = i * generator & (count - 1);
+  }
+  const Number step = Number(1) / static_cast<Number>(count);
+  return {(static_cast<Number>(i) + Number(0.5)) * step, (static_cast<Number>(up) + Number(0.5)) * step};
+}
+
+/// A place on a leaf: texel coordinates, and the triangle whose frame they belong to.
+struct LeafSpot {
+  glm::vec2 texel{0.0F};
+  std::uint32_t triangle = ~std::uint32_t{0};
+};
+
+/// Of a leaf's spots so many are looked at together, which lie in different quarters of it ...
+inline constexpr std::uint32_t kSpotQuarters = 4;
+/// ... and of those in a quarter one for each of so many rows.
+inline constexpr std::uint32_t kSpotRows = 16;
+
+/// Lists of places, each of one leaf: points of a lattice over a box, of two bytes each. As many as there are, since
+/// along the edge of what hides a part of a leaf a sixty-fourth of it is a tenth of the light of what is left.
+class LeafSpots {
+ public:
+  /// A box in texels, and how many points a lattice over it has.
+  struct Lattice {
+    glm::vec2 low{0.0F}, size{1.0F};
+    std::uint32_t points = 1;
+
+    [[nodiscard]] glm::vec2 at(std::uint32_t number) const {
+      return low + size * latticePoint<glm::vec2>(number, points);
+    }
+    /// Nothing in the box is farther than this from the nearest point: about 0.7 steps.
+    [[nodiscard]] float apart() const;
+    bool operator==(const Lattice&) const = default;
+  };
+  struct Place {
+    std::uint16_t number;
+    std::uint32_t triangle;
+  };
+
+  /// A leaf's spots: puts `places` into an order of which each part is a part of the leaf. `in_one_frame`: texel
+  /// coordinates mean the same on all of their triangles. Returns the list's number.
+  std::uint32_t add(const Lattice& lattice, std::span<Place> places, bool in_one_frame);
+  [[nodiscard]] std::uint32_t countOf(std::uint32_t list) const { return lists_[list].count; }
+  [[nodiscard]] const Lattice& latticeOf(std::uint32_t list) const { return lists_[list].lattice; }
+  [[nodiscard]] bool isInOneFrame(std::uint32_t list) const { return lists_[list].first_triangle == kOneFrame; }
+  /// Spot k < countOf(list); `triangle`: the leaf's own.
+  [[nodiscard]] LeafSpot at(std::uint32_t list, std::uint32_t k, std::uint32_t triangle) const {
+    const auto& of = lists_[list];
+    if (of.first_triangle != kOneFrame) triangle = triangles_[of.first_triangle + k];
+    return {of.lattice.at(numbers_[of.first_number + k]), triangle};
+  }
+  /// Which of `count` spots is in that row and quarter, by a number in [0, 1) more: each as often as any other.
+  [[nodiscard]] static std::uint32_t indexOf(std::uint32_t count, std::uint32_t row, std::uint32_t quarter, float at) {
+    const float part = static_cast<float>(quarter) + (static_cast<float>(row) + at) / static_cast<float>(kSpotRows);
+    return std::min(count - 1, static_cast<std::uint32_t>(part * static_cast<float>(count) / kSpotQuarters));
+  }
+  [[nodiscard]] std::size_t listCount() const { return lists_.size(); }
+  [[nodiscard]] std::size_t bytes() const;
+  void shrinkToFit();
+  /// Calls visit(vector) for each part, of plain values.
+  template <typename Self, typename Visit>
+  static void visitParts(Self& self, const Visit& visit) {
+    visit(self.lists_);
+    visit(self.numbers_);
+    visit(self.triangles_);
+  }
+
+ private:
+  static constexpr std::uint32_t kOneFrame = ~std::uint32_t{0};
+  struct List {
+    Lattice lattice;
+    std::uint32_t count = 0, first_number = 0, first_triangle = kOneFrame;
+  };
+  std::vector<List> lists_;
+  std::vector<std::uint16_t> numbers_;
+  std::vector<std::uint32_t> triangles_;  ///< by place, of lists in several frames
+};
+
+/// Full leaves have all the same, so that none is kept of any: kLeafLattice points, in order.
+inline constexpr std::uint32_t kLeafLattice = 256;
+extern const std::array<glm::vec2, kLeafLattice> kSpotsOfFull;
+
+}  // namespace radiosity::scene
