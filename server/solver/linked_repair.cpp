@@ -129,8 +129,8 @@ void LinkedSolver::addSamples(const Repair& repair, ShotBatch& batch) const {
   const std::uint32_t few = 1 + (repair.samples - 1) % kLightPoints;  // the first shot has the rest of a division
   const auto [first, end] = shotsOfLight(repair);
   for (auto i = first; i < end; ++i)
-    shots_.add(lights_[shooter.light], repair.half, i, i == 0 ? few : kLightPoints, settings_.planner.light_resolution,
-               batch);
+    shots_.add(lights_[shooter.light], repair.half, i, i == 0 ? few : kLightPoints,
+               settings_.planner.lightResolution(i), batch);
 }
 
 void LinkedSolver::findCutLinks(RepairBatch& repairs) const {

@@ -105,7 +105,8 @@ Result<void> LinkedSolver::measureSlice() {
   for (const auto& want : slice) {
     const auto& shooter = system_.shooters()[want.shooter];
     if (shooter.isLight()) {
-      shots_.add(lights_[shooter.light], want.half, want.index, want.points, settings_.planner.light_resolution, batch);
+      shots_.add(lights_[shooter.light], want.half, want.index, want.points,
+                 settings_.planner.lightResolution(want.index), batch);
     } else {
       shots_.add(shooter.place, want.half, want.index, shooter.resolution, batch);
     }
