@@ -13,18 +13,10 @@
 namespace radiosity::scene {
 namespace {
 
-/// Coordinates on two triangles of one plane mean the same around a leaf, to a thousandth of it.
-bool isOneFrame(const PatchScene& patches, std::uint32_t a, std::uint32_t b, const glm::vec2& at) {
-  if (a == b) return true;
-  const auto &one = patches.triangles[a], &other = patches.triangles[b];
-  const float texel = glm::length(one.du) + glm::length(one.dv);
-  const auto agree = [&](const glm::vec2& place) {
-    const auto way = (one.origin - other.origin) + place.x * (one.du - other.du) + place.y * (one.dv - other.dv);
-    return glm::length(way) <= 1e-3F * texel;
-  };
-  const auto low = glm::floor(at);
-  return glm::dot(one.normal, other.normal) > 0.999999F && agree(low) && agree({low.x + 1.0F, low.y}) &&
-         agree({low.x, low.y + 1.0F});
+/// Coordinates on two triangles mean the same place, to the bit: what lies behind a surface by less than anybody sees
+/// has its light hidden by it.
+bool isOneFrame(const TriangleFrame& one, const TriangleFrame& other) {
+  return one.origin == other.origin && one.du == other.du && one.dv == other.dv && one.normal == other.normal;
 }
 
 }  // namespace
@@ -32,7 +24,7 @@ bool isOneFrame(const PatchScene& patches, std::uint32_t a, std::uint32_t b, con
 void keepSpots(PatchScene& patches, LeafPoint& leaf, LeafPlaces places) {
   if (places.places.size() < 2) return;
   const auto sharesFrame = [&](const LeafSpots::Place& place) {
-    return isOneFrame(patches, leaf.triangle, place.triangle, leaf.texel);
+    return isOneFrame(patches.triangles[leaf.triangle], patches.triangles[place.triangle]);
   };
   const bool in_one_frame = std::ranges::all_of(places.places, sharesFrame);
   leaf.spot_list = patches.spots.add(places.lattice, places.places, in_one_frame);

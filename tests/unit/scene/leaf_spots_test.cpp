@@ -54,6 +54,30 @@ TEST(LeafSpots, LieEvenlyOverWhatABlockLeavesOfALeaf) {
   EXPECT_EQ(seen, 8U);
 }
 
+// Two triangles of one chart, bent by less than what makes them two facets: a place of one in the frame of the other
+// would lie behind it, and everything hides its light.
+TEST(LeafSpots, LieOnTheirOwnTrianglesWhereAChartIsBentALittle) {
+  constexpr double kBend = 2e-4;
+  Primitive sheet;
+  sheet.positions = {{-2, 0, 0}, {0, 0, 0}, {2, 2 * kBend, 0}, {-2, 0, 2.03}, {0, 0, 2.03}, {2, 2 * kBend, 2.03}};
+  sheet.indices = {0, 3, 1, 1, 3, 4, 1, 4, 2, 2, 4, 5};
+  Scene scene;
+  place(scene, sheet);
+  const PatchScene patches = build(scene, 0.3);
+  std::size_t bent = 0;
+  for (const auto& leaf : patches.leaves) {
+    if (!leaf.hasSpots() || leaf.full) continue;
+    bool left = false, right = false;
+    for (std::uint32_t k = 0; k < patches.spotCount(leaf); ++k) {
+      const auto at = worldOf(patches, patches.spot(leaf, k));
+      EXPECT_NEAR(at.y, std::max(0.0, at.x) * kBend, 1e-6) << "rounding of 32 bits";
+      (at.x < 0.0 ? left : right) = true;
+    }
+    bent += left && right ? 1 : 0;
+  }
+  EXPECT_GE(bent, 1U);
+}
+
 // A sheet of light's edge may lie anywhere: the part of the spots on one side of a line is that of what is left.
 TEST(LeafSpots, AThinStripBehindAPostIsAPartLikeAnyOther) {
   Scene scene;
