@@ -79,12 +79,7 @@ double LightGatherer::shiningAt(const solver::GatherShot& shot, const glm::vec3&
   const double fill = static_cast<double>(patches.node_area[surface.first_node[shot.side] + leaf]) / area;
   if (fill <= 0.0 || fill >= kWhole) return fill;
   const auto& point = patches.leaves[surface.first_leaf + leaf];
-  if (!point.full && point.hasSpots()) {
-    const float between = patches.spots.latticeOf(point.spot_list).apart();
-    for (std::uint32_t k = 0; k < patches.spotCount(point); ++k)
-      if (glm::distance(patches.spot(point, k).texel, here) < between) return 1.0;
-    return 0.0;
-  }
+  if (!point.full && point.hasSpots()) return patches.spots.isNear(point.spot_list, here) ? 1.0 : 0.0;
   const auto before = clipToPlane(corners, at, normal);
   return shining(fill, solver::polygonArea(std::span(before.corner.data(), before.count)) / area);
 }

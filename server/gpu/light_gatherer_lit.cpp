@@ -28,7 +28,7 @@ std::array<float, 2> heights(std::span<const glm::vec3> corners, const glm::vec3
 
 bool sameGeometry(const solver::GatherShot& a, const solver::GatherShot& b) {
   return a.corners == b.corners && a.corner_count == b.corner_count && a.normal == b.normal &&
-         a.receiver_jitter == b.receiver_jitter && a.spot_row == b.spot_row && a.spot_rows == b.spot_rows &&
+         a.receiver_jitter == b.receiver_jitter && a.spots == b.spots && a.spot_rows == b.spot_rows &&
          a.fill == b.fill && a.triangle == b.triangle && a.side == b.side;
 }
 

@@ -54,7 +54,7 @@ struct SpotRows {
 
 inline SpotRows spotRows(const solver::GatherShot& shot) {
   const std::uint32_t apart = scene::kSpotRows / shot.spot_rows;
-  return {shot.spot_row * apart / scene::kSpotRows, apart};
+  return {shot.spots.row * apart / scene::kSpotRows, apart};
 }
 
 /// Which of the rows of its spots is a receiver's first. Neighbours differ: in a narrow gap what the edges of shooters
@@ -79,10 +79,10 @@ template <typename Take>
   if (receiver.hasSpots()) {
     const auto rows = spotRows(shot);
     const float share = static_cast<float>(rows.apart) / (scene::kSpotRows * scene::kSpotQuarters);
-    const auto count = receivers.spotCount(receiver);
+    const auto spots = receivers.spots(receiver);
     for (std::uint32_t row = firstRow(receiver, rows); row < scene::kSpotRows; row += rows.apart) {
       for (std::uint32_t k = 0; k < scene::kSpotQuarters; ++k)
-        offer(receivers.spot(receiver, scene::LeafSpots::indexOf(count, row, k, shot.receiver_jitter.x)), share);
+        offer(spots.at(scene::LeafSpots::indexOf(spots.count, row, k, shot.spots.at)), share);
     }
     return;
   }

@@ -109,8 +109,10 @@ void Receivers::findBlocks(Group& group) {
       block.low = glm::min(block.low, point);
       block.high = glm::max(block.high, point);
     };
-    const auto spots = receiver.hasSpots() && !receiver.full ? spotCount(receiver) : 0;
-    for (std::uint32_t k = 0; k < spots; ++k) hold(spot(receiver, k).point);
+    if (receiver.hasSpots() && !receiver.full) {
+      const auto of_receiver = spots(receiver);
+      for (std::uint32_t k = 0; k < of_receiver.count; ++k) hold(of_receiver.at(k).point);
+    }
     for (int corner = 0; corner < 4; ++corner) hold(place(receiver, {corner % 2, corner / 2}).point);
     texel_x_.push_back(receiver.texel.x);
     texel_y_.push_back(receiver.texel.y);

@@ -95,14 +95,23 @@ class Receivers {
     leaf.spot_list = receiver.spot_list;
     return placeOf(patches_->spotAt(leaf, 0, 0, at));
   }
-  /// Of a receiver that has spots.
-  [[nodiscard]] std::uint32_t spotCount(const Receiver& receiver) const {
-    return receiver.full ? scene::kLeafLattice : patches_->spots.countOf(receiver.spot_list);
-  }
-  /// One of them, spot < spotCount().
-  [[nodiscard]] Place spot(const Receiver& receiver, std::uint32_t spot) const {
-    if (receiver.full) return placeOf({receiver.texel + scene::kSpotsOfFull[spot], receiver.triangle});
-    return placeOf(patches_->spots.at(receiver.spot_list, spot, receiver.triangle));
+  /// Those of a receiver that has some.
+  struct Spots {
+    const Receivers& receivers;
+    const Receiver& receiver;
+    std::uint32_t count;
+    scene::LeafSpots::View list{};  ///< of one that is not full
+
+    /// k < count.
+    [[nodiscard]] Place at(std::uint32_t k) const {
+      if (receiver.full) return receivers.placeOf({receiver.texel + scene::kSpotsOfFull[k], receiver.triangle});
+      return receivers.placeOf(list.at(k, receiver.triangle));
+    }
+  };
+  [[nodiscard]] Spots spots(const Receiver& receiver) const {
+    if (receiver.full) return {*this, receiver, scene::kLeafLattice};
+    const auto& spots = patches_->spots;
+    return {*this, receiver, spots.countOf(receiver.spot_list), spots.of(receiver.spot_list)};
   }
   [[nodiscard]] glm::vec3 point(const Receiver& receiver, const glm::vec2& at) const {
     return place(receiver, at).point;

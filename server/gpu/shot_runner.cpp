@@ -68,13 +68,15 @@ Result<void> checkShots(const ShotSpan& shots) {
     const bool points_fit = inside(shot.first_point, shot.point_count, shots.points.size()) &&
                             inside(shot.first_run, shot.run_count, shots.receivers.size()) &&
                             inside(shot.first_box, shot.box_count, shots.boxes.size());
-    const bool rows_fit = std::has_single_bit(shot.spot_rows) && shot.spot_rows <= scene::kSpotRows;
+    const bool rows_fit = std::has_single_bit(shot.spot_rows) && shot.spot_rows <= scene::kSpotRows &&
+                          shot.spots.row < scene::kSpotRows && shot.spots.at >= 0.0F && shot.spots.at < 1.0F;
     if (!goodResolution(shot.resolution) || shot.half > solver::kBothHalves || shot.corner_count < 3 ||
         shot.corner_count > solver::kMaxCorners || !rows_fit || !points_fit) {
       return fail(
           ErrorCode::kInternal,
           "resolution must be even and 4..2048, half 0, 1 or both, 3 to 8 corners, 1 to 16 rows of spots (a power "
-          "of two), points, receivers and boxes inside the batch",
+          "of two), one of them within [0, 16) and a part of it within [0, 1), points, receivers and boxes inside the "
+          "batch",
           "gather shot " + std::to_string(i));
     }
     for (const auto& point : shots.points.subspan(shot.first_point, shot.point_count)) {

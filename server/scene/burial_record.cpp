@@ -166,7 +166,7 @@ BuriedPart FormerBurial::renumbered(const BuriedPart& part, std::uint32_t surfac
   BuriedPart after = part;
   after.leaf = part.leaf - from.first_leaf + to.first_leaf;
   number(after.point.triangle);
-  for (auto& place : after.visible.places) number(place.triangle);
+  for (auto& triangle : after.visible.triangles) number(triangle);
   return after;
 }
 

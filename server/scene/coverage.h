@@ -41,14 +41,18 @@ struct LeafPiece {
 std::shared_ptr<const BurialRecord> removeBuried(PatchScene& patches, const std::vector<LeafPiece>& pieces,
                                                  const std::vector<Hides>& hides, const FormerBurial* former = nullptr);
 
-/// Places on a leaf, which lie evenly over what is left of it.
+/// Places on a leaf, which lie evenly over what is left of it. Small, since edits remember those of many leaves.
 struct LeafPlaces {
   LeafSpots::Lattice lattice;
-  std::vector<LeafSpots::Place> places;
+  std::vector<std::uint16_t> numbers;
+  std::vector<std::uint32_t> triangles;  ///< by place; or one, of all
+
+  void add(std::uint16_t number, std::uint32_t triangle);
+  [[nodiscard]] std::size_t bytes() const { return numbers.size() * 2 + triangles.size() * 4; }
 };
 
-/// Of a leaf that is not full; fewer than two are no more than its point.
-void keepSpots(PatchScene& patches, LeafPoint& leaf, LeafPlaces places);
+/// Of a leaf that is not full; without any it keeps its point.
+void keepSpots(PatchScene& patches, LeafPoint& leaf, const LeafPlaces& places);
 
 /// Places on every leaf that is neither empty nor full and has none yet.
 void placeSpots(PatchScene& patches, const std::vector<LeafPiece>& pieces);

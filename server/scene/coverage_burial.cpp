@@ -1,10 +1,6 @@
 // The part of a surface that lies inside another solid (the floor under a block, a wall behind a cupboard) receives no
 // light and must not count as area. A solid is what single-sided surfaces bound: from inside, one meets backs first.
 #include <algorithm>
-#include <array>
-#include <cmath>
-#include <glm/common.hpp>
-#include <glm/geometric.hpp>
 #include <iterator>
 #include <optional>
 #include <utility>
@@ -243,7 +239,7 @@ class Burial {
   void record(const Contact& contact, BurialRecord::Pass pass, Measured& found) {
     if (is_too_much_) return;
     recorded_bytes_ += sizeof(BurialRecord::Leaf) + found.fans->size() * sizeof(RayFan) +
-                       (found.buried ? found.buried->visible.places.size() * sizeof(LeafSpots::Place) : 0);
+                       (found.buried ? found.buried->visible.bytes() : 0);
     is_too_much_ = recorded_bytes_ > kMostRecordedBytes || record_.leaves.size() >= kMostRecorded;
     if (is_too_much_) {
       giveBack(record_.leaves);

@@ -21,13 +21,26 @@ bool isOneFrame(const TriangleFrame& one, const TriangleFrame& other) {
 
 }  // namespace
 
-void keepSpots(PatchScene& patches, LeafPoint& leaf, LeafPlaces places) {
-  if (places.places.size() < 2) return;
-  const auto sharesFrame = [&](const LeafSpots::Place& place) {
-    return isOneFrame(patches.triangles[leaf.triangle], patches.triangles[place.triangle]);
-  };
-  const bool in_one_frame = std::ranges::all_of(places.places, sharesFrame);
-  leaf.spot_list = patches.spots.add(places.lattice, places.places, in_one_frame);
+void LeafPlaces::add(std::uint16_t number, std::uint32_t triangle) {
+  numbers.push_back(number);
+  if (triangles.empty() || (triangles.size() == 1 && triangles.front() == triangle)) {
+    triangles.assign(1, triangle);
+    return;
+  }
+  triangles.resize(numbers.size() - 1, triangles.front());
+  triangles.push_back(triangle);
+}
+
+void keepSpots(PatchScene& patches, LeafPoint& leaf, const LeafPlaces& places) {
+  if (places.numbers.empty()) return;
+  std::vector<LeafSpots::Place> of_leaf;
+  bool in_one_frame = true;
+  for (std::size_t i = 0; i < places.numbers.size(); ++i) {
+    const auto triangle = places.triangles.size() == 1 ? places.triangles.front() : places.triangles[i];
+    of_leaf.push_back({places.numbers[i], triangle});
+    in_one_frame = in_one_frame && isOneFrame(patches.triangles[leaf.triangle], patches.triangles[triangle]);
+  }
+  leaf.spot_list = patches.spots.add(places.lattice, of_leaf, in_one_frame);
 }
 
 namespace {
@@ -51,17 +64,18 @@ LeafSpots::Lattice boxAround(const PatchScene& patches, std::span<const LeafPiec
 /// Evenly over what is covered: a sliver of a leaf of which all places were drawn would have one or two of them, and
 /// these would stand for all of it in every sample.
 LeafPlaces findPlaces(const PatchScene& patches, std::span<const LeafPiece> pieces, const glm::dvec2& corner) {
-  LeafPlaces found{boxAround(patches, pieces, corner), {}};
+  LeafPlaces found{boxAround(patches, pieces, corner), {}, {}};
   for (const auto count : kPlacesTried) {
     found.lattice.points = count;
-    found.places.clear();
+    found.numbers.clear();
+    found.triangles.clear();
     for (std::uint32_t i = 0; i < count; ++i) {
       const glm::dvec2 texel(found.lattice.at(i));
       const auto holds = [&](const LeafPiece& piece) { return triangleHolds(patches, piece.triangle, texel, 0.0); };
       const auto at = std::ranges::find_if(pieces, holds);
-      if (at != pieces.end()) found.places.push_back({static_cast<std::uint16_t>(i), at->triangle});
+      if (at != pieces.end()) found.add(static_cast<std::uint16_t>(i), at->triangle);
     }
-    if (found.places.size() >= kPlacesTried.front()) break;
+    if (found.numbers.size() >= kPlacesTried.front()) break;
   }
   return found;
 }
@@ -74,7 +88,8 @@ void placeSpots(PatchScene& patches, const std::vector<LeafPiece>& pieces) {
     const std::uint32_t index = pieces[first].leaf;
     while (end < pieces.size() && pieces[end].leaf == index) ++end;
     auto& leaf = patches.leaves[index];
-    if (leaf.triangle == kNone || leaf.full || leaf.spot_list != kNone) continue;
+    if (leaf.triangle == kNone || leaf.full || leaf.hasSpots()) continue;
+    if (leaf.cut) continue;  // what is left of it is too small to hold any
     while (surface + 1 < patches.surfaces.size() && patches.surfaces[surface + 1].first_leaf <= index) ++surface;
     const std::uint32_t local = index - patches.surfaces[surface].first_leaf, width = patches.surfaces[surface].width;
     const glm::dvec2 corner(local % width, local / width);

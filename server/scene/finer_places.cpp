@@ -7,9 +7,9 @@
 namespace radiosity::scene {
 namespace {
 
-/// Texels. The lattices' own steps are 0.12 and 0.13, and 0.058 and 0.06, 0.07 and 0.074, 0.086. Of what an edge, a
-/// corner, a strip or a post hides 0.2 places are taken for what they are not, in the mean; in one step alone, without
-/// those beside, and for as many questions, 0.5, and strips along the leaf's rim lost a tenth.
+/// Texels. The lattices' own steps are 0.12 and 0.13, and 0.058 and 0.06, 0.07 and 0.074, 0.086. Of what an edge or a
+/// corner hides 0.2 places are taken for what they are not, in the mean; in one step alone, without those beside, and
+/// for as many questions, 0.5, and strips of a tenth along the leaf's rim lost a tenth.
 constexpr double kAround = 0.11, kBeside = 0.09;
 
 using Around = std::array<std::vector<std::uint8_t>, kLeafLattice>;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <glm/geometric.hpp>
 #include <limits>
-#include <utility>
 
 #include "server/scene/finer_places.h"
 
@@ -70,9 +69,28 @@ void LeafBurial::askPlaces(const Contact& contact, const Pieces& pieces, std::ui
   }
 }
 
+/// What few of the places that all leaves are asked for tell of may be a strip along which no two are near each other.
+bool LeafBurial::mayBeStrip(const Scratch& scratch) {
+  const auto countOf = [&](Answer answer) { return std::ranges::count(scratch.asked_before, answer, &Place::answer); };
+  return std::min(countOf(Answer::kVisible), countOf(Answer::kBuried)) <= kFewOfStrip;
+}
+
+/// As those around it are; none where they do not agree.
+LeafBurial::Answer LeafBurial::inferred(std::uint32_t finer, const Scratch& scratch) {
+  auto answer = Answer::kNone;
+  for (const auto k : coarseAround(finer)) {
+    const auto there = scratch.asked_before[k].answer;
+    if (there == Answer::kNone) continue;
+    if (answer != Answer::kNone && answer != there) return Answer::kNone;
+    answer = there;
+  }
+  return answer;
+}
+
 /// Of more places those around which not all is visible, or buried, and from there on along the edge.
 void LeafBurial::askFiner(const Contact& contact, const Pieces& pieces, Scratch& scratch) const {
   scratch.asked_before.swap(scratch.places);
+  const bool all = mayBeStrip(scratch);
   auto& places = scratch.places;
   places.clear();
   scratch.beside.clear();
@@ -84,16 +102,10 @@ void LeafBurial::askFiner(const Contact& contact, const Pieces& pieces, Scratch&
   for (std::uint32_t i = 0; i < kLeafLattice; ++i) {
     auto& place = places.emplace_back(placeOn(contact, pieces, i, kLeafLattice));
     if (place.triangle == kNone) continue;
-    bool agree = true;
-    for (const auto k : coarseAround(i)) {
-      const auto there = scratch.asked_before[k].answer;
-      if (there == Answer::kNone) continue;
-      agree = agree && (place.answer == Answer::kNone || place.answer == there);
-      place.answer = there;
-    }
-    if (!agree || place.answer == Answer::kNone) askOne(i);
+    if (!all) place.answer = inferred(i, scratch);
+    if (place.answer == Answer::kNone) askOne(i);
   }
-  while (!scratch.beside.empty()) {
+  while (!all && !scratch.beside.empty()) {
     const auto i = scratch.beside.back();
     scratch.beside.pop_back();
     for (const auto k : finerAround(i)) {
@@ -158,7 +170,7 @@ BuriedPart LeafBurial::takePart(const Contact& contact, const Outcome& outcome, 
   double nearest = std::numeric_limits<double>::infinity();
   for (const auto& place : scratch.places) {
     if (place.answer != Answer::kVisible) continue;
-    part.visible.places.push_back({place.number, place.triangle});
+    part.visible.add(place.number, place.triangle);
     const double distance = glm::distance(place.texel, corner + 0.5);
     if (distance >= nearest || outcome.visible_area <= 0.0) continue;
     nearest = distance;

@@ -88,6 +88,8 @@ class LeafBurial {
   [[nodiscard]] bool isOpen(const Contact& contact, const Pieces& pieces, RayNotes& notes) const;
   void askPlaces(const Contact& contact, const Pieces& pieces, std::uint32_t count, Scratch& scratch) const;
   void askFiner(const Contact& contact, const Pieces& pieces, Scratch& scratch) const;
+  [[nodiscard]] static bool mayBeStrip(const Scratch& scratch);
+  [[nodiscard]] static Answer inferred(std::uint32_t finer, const Scratch& scratch);
   [[nodiscard]] Place placeOn(const Contact& contact, const Pieces& pieces, std::uint32_t number,
                               std::uint32_t count) const;
   void answer(const Contact& contact, Place& place, Scratch& scratch) const;

@@ -1,33 +1,42 @@
 #include "server/scene/leaf_spots.h"
 
 #include <cmath>
+#include <glm/common.hpp>
 
 namespace radiosity::scene {
 namespace {
 
 /// Halves them, across and up in turn, so that each part of the order is a part of the leaf.
-void orderByPlace(const LeafSpots::Lattice& lattice, std::span<LeafSpots::Place> places, int axis = 0) {
+void orderByPlace(std::uint32_t points, std::span<LeafSpots::Place> places, bool across = true) {
   if (places.size() < 2) return;
   const auto half = static_cast<std::ptrdiff_t>(places.size() / 2);
-  const auto isBefore = [&](const LeafSpots::Place& a, const LeafSpots::Place& b) {
-    const auto p = latticePoint(a.number, lattice.points), q = latticePoint(b.number, lattice.points);
-    return p[axis] < q[axis];  // no two are equal
+  const auto line = [&](const LeafSpots::Place& place) {  // no two are on one
+    return across ? std::uint32_t{place.number} : latticeRow(place.number, points);
   };
-  std::nth_element(places.begin(), places.begin() + half, places.end(), isBefore);
-  orderByPlace(lattice, places.first(static_cast<std::size_t>(half)), 1 - axis);
-  orderByPlace(lattice, places.subspan(static_cast<std::size_t>(half)), 1 - axis);
+  std::ranges::nth_element(places, places.begin() + half, {}, line);
+  orderByPlace(points, places.first(static_cast<std::size_t>(half)), !across);
+  orderByPlace(points, places.subspan(static_cast<std::size_t>(half)), !across);
 }
 
 }  // namespace
 
-float LeafSpots::Lattice::apart() const {
-  return 0.72F * std::max(size.x, size.y) / std::sqrt(static_cast<float>(points));
+bool LeafSpots::isNear(std::uint32_t list, const glm::vec2& texel) const {
+  constexpr float kSteps = 1.12F;  // to the farthest place between points, but at corners
+  const auto view = of(list);
+  const float reach = kSteps / std::sqrt(static_cast<float>(view.lattice.points));
+  const auto size = glm::max(view.lattice.size, glm::vec2(1e-6F));
+  const auto here = (texel - view.lattice.low) / size;
+  for (std::uint32_t k = 0; k < countOf(list); ++k) {
+    const auto way = latticePoint<glm::vec2>(view.numbers[k], view.lattice.points) - here;
+    if (way.x * way.x + way.y * way.y < reach * reach) return true;
+  }
+  return false;
 }
 
 std::uint32_t LeafSpots::add(const Lattice& lattice, std::span<Place> places, bool in_one_frame) {
-  orderByPlace(lattice, places);
-  List list{lattice, static_cast<std::uint32_t>(places.size()), static_cast<std::uint32_t>(numbers_.size())};
-  if (!in_one_frame) list.first_triangle = static_cast<std::uint32_t>(triangles_.size());
+  orderByPlace(lattice.points, places);
+  List list{lattice, static_cast<std::uint32_t>(places.size()), numbers_.size()};
+  if (!in_one_frame) list.first_triangle = triangles_.size();
   for (const auto& place : places) {
     numbers_.push_back(place.number);
     if (!in_one_frame) triangles_.push_back(place.triangle);
@@ -51,7 +60,7 @@ std::array<glm::vec2, kLeafLattice> spotsOfFull() {
   const LeafSpots::Lattice lattice{.points = kLeafLattice};
   std::vector<LeafSpots::Place> places(kLeafLattice);
   for (std::uint32_t i = 0; i < kLeafLattice; ++i) places[i].number = static_cast<std::uint16_t>(i);
-  orderByPlace(lattice, places);
+  orderByPlace(kLeafLattice, places);
   std::array<glm::vec2, kLeafLattice> spots;
   for (std::size_t i = 0; i < kLeafLattice; ++i) spots[i] = lattice.at(places[i].number);
   return spots;

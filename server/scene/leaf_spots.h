@@ -11,21 +11,24 @@
 
 namespace radiosity::scene {
 
-/// Point `i` of `count`, a power of two, in [0, 1)^2. Every point has its own u and its own v, so axis-parallel borders
-/// are placed within 1/count. From 16 on a rank-1 lattice (32, 128 and 512 lie less evenly); no generator spreads
-/// fewer, which are Hammersley's.
+/// Point `i` of `count`, a power of two, lies in column i and this row: each has its own. From 16 on a rank-1 lattice
+/// (32, 128 and 512 lie less evenly); no generator spreads fewer, which are Hammersley's.
+[[nodiscard]] constexpr std::uint32_t latticeRow(std::uint32_t i, std::uint32_t count) {
+  if (count >= 16) {
+    const std::uint32_t generator = count == 1024 ? 275 : count == 256 ? 75 : count == 64 ? 19 : 5;
+    return i * generator & (count - 1);
+  }
+  std::uint32_t row = 0;
+  for (std::uint32_t bit = 1; bit < count; bit *= 2) row = 2 * row + ((i & bit) != 0 ? 1 : 0);
+  return row;
+}
+/// In [0, 1)^2: axis-parallel borders are placed within 1/count.
 template <typename Vec = glm::dvec2>
 [[nodiscard]] constexpr Vec latticePoint(std::uint32_t i, std::uint32_t count) {
   using Number = typename Vec::value_type;
-  std::uint32_t up = 0;
-  if (count < 16) {
-    for (std::uint32_t bit = 1; bit < count; bit *= 2) up = 2 * up + ((i & bit) != 0 ? 1 : 0);
-  } else {
-    const std::uint32_t generator = count == 1024 ? 275 : count == 256 ? 75 : count == 64 ? 19 : 5;
-    up = i * generator & (count - 1);
-  }
   const Number step = Number(1) / static_cast<Number>(count);
-  return {(static_cast<Number>(i) + Number(0.5)) * step, (static_cast<Number>(up) + Number(0.5)) * step};
+  return {(static_cast<Number>(i) + Number(0.5)) * step,
+          (static_cast<Number>(latticeRow(i, count)) + Number(0.5)) * step};
 }
 
 /// A place on a leaf: texel coordinates, and the triangle whose frame they belong to.
@@ -39,8 +42,23 @@ inline constexpr std::uint32_t kSpotQuarters = 4;
 /// ... and of those in a quarter one for each of so many rows.
 inline constexpr std::uint32_t kSpotRows = 16;
 
-/// Lists of places, each of one leaf: points of a lattice over a box, of two bytes each. As many as there are, since
-/// along the edge of what hides a part of a leaf a sixty-fourth of it is a tenth of the light of what is left.
+/// Which spots are looked at: a row of them, and which of those that the row stands for.
+struct SpotDraw {
+  std::uint32_t row = 0;
+  float at = 0.5F;  ///< in [0, 1)
+
+  /// From a number in [0, 1), so that evenly spread numbers draw all spots evenly.
+  [[nodiscard]] static SpotDraw from(double number) {
+    const double rows = number * kSpotRows;
+    const auto row = std::min(kSpotRows - 1, static_cast<std::uint32_t>(rows));
+    return {row, static_cast<float>(std::min(rows - row, 0.999999))};
+  }
+  bool operator==(const SpotDraw&) const = default;
+};
+
+/// Lists of places, each of one leaf: points of a lattice over a box, of two bytes each, and four more where they are
+/// in several frames. As many as there are, since along the edge of what hides a part of a leaf a sixty-fourth of it is
+/// a tenth of the light of what is left.
 class LeafSpots {
  public:
   /// A box in texels, and how many points a lattice over it has.
@@ -51,28 +69,41 @@ class LeafSpots {
     [[nodiscard]] glm::vec2 at(std::uint32_t number) const {
       return low + size * latticePoint<glm::vec2>(number, points);
     }
-    /// Nothing in the box is farther than this from the nearest point: about 0.7 steps.
-    [[nodiscard]] float apart() const;
     bool operator==(const Lattice&) const = default;
   };
   struct Place {
     std::uint16_t number;
     std::uint32_t triangle;
   };
+  /// One list, to look at several of its spots; until another is added.
+  struct View {
+    Lattice lattice;
+    const std::uint16_t* numbers;
+    const std::uint32_t* triangles;  ///< null: all are in the frame of the leaf's own
+
+    [[nodiscard]] LeafSpot at(std::uint32_t k, std::uint32_t own) const {
+      return {lattice.at(numbers[k]), triangles == nullptr ? own : triangles[k]};
+    }
+  };
 
   /// A leaf's spots: puts `places` into an order of which each part is a part of the leaf. `in_one_frame`: texel
-  /// coordinates mean the same on all of their triangles. Returns the list's number.
+  /// coordinates mean the same on all of their triangles. Returns the list's number. O(n log n).
   std::uint32_t add(const Lattice& lattice, std::span<Place> places, bool in_one_frame);
   [[nodiscard]] std::uint32_t countOf(std::uint32_t list) const { return lists_[list].count; }
-  [[nodiscard]] const Lattice& latticeOf(std::uint32_t list) const { return lists_[list].lattice; }
   [[nodiscard]] bool isInOneFrame(std::uint32_t list) const { return lists_[list].first_triangle == kOneFrame; }
-  /// Spot k < countOf(list); `triangle`: the leaf's own.
-  [[nodiscard]] LeafSpot at(std::uint32_t list, std::uint32_t k, std::uint32_t triangle) const {
+  [[nodiscard]] View of(std::uint32_t list) const {
     const auto& of = lists_[list];
-    if (of.first_triangle != kOneFrame) triangle = triangles_[of.first_triangle + k];
-    return {of.lattice.at(numbers_[of.first_number + k]), triangle};
+    return {of.lattice, numbers_.data() + of.first_number,
+            of.first_triangle == kOneFrame ? nullptr : triangles_.data() + of.first_triangle};
   }
-  /// Which of `count` spots is in that row and quarter, by a number in [0, 1) more: each as often as any other.
+  /// Spot k < countOf(list); `own`: the leaf's triangle.
+  [[nodiscard]] LeafSpot at(std::uint32_t list, std::uint32_t k, std::uint32_t own) const {
+    return of(list).at(k, own);
+  }
+  /// Whether one of the lattice's points around a place of the leaf is a spot. At the corners of the box, 2 % of it,
+  /// there may be none.
+  [[nodiscard]] bool isNear(std::uint32_t list, const glm::vec2& texel) const;
+  /// Which of `count` spots is in a row and quarter; in the mean over `at`, each as often as any other.
   [[nodiscard]] static std::uint32_t indexOf(std::uint32_t count, std::uint32_t row, std::uint32_t quarter, float at) {
     const float part = static_cast<float>(quarter) + (static_cast<float>(row) + at) / static_cast<float>(kSpotRows);
     return std::min(count - 1, static_cast<std::uint32_t>(part * static_cast<float>(count) / kSpotQuarters));
@@ -89,10 +120,11 @@ class LeafSpots {
   }
 
  private:
-  static constexpr std::uint32_t kOneFrame = ~std::uint32_t{0};
+  static constexpr std::uint64_t kOneFrame = ~std::uint64_t{0};
   struct List {
     Lattice lattice;
-    std::uint32_t count = 0, first_number = 0, first_triangle = kOneFrame;
+    std::uint32_t count = 0;
+    std::uint64_t first_number = 0, first_triangle = kOneFrame;
   };
   std::vector<List> lists_;
   std::vector<std::uint16_t> numbers_;

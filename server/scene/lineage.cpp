@@ -114,7 +114,7 @@ class Matcher {
       return false;
     if (!old_one.full && old_one.texel != new_one.texel) return false;
     if (old_one.hasSpots() != new_one.hasSpots()) return false;
-    const auto count = old_one.hasSpots() ? before_.spotCount(old_one) : 0;
+    const auto count = old_one.hasSpots() && !old_one.full ? before_.spotCount(old_one) : 0;  // full ones: all alike
     if (count > 0 && count != after_.spotCount(new_one)) return false;
     for (std::uint32_t k = 0; k < count; ++k) {
       const auto s = before_.spot(old_one, k), t = after_.spot(new_one, k);

@@ -62,7 +62,7 @@ bool FlatNodes::inOneFrame(std::uint32_t a, std::uint32_t b, const glm::vec2& lo
 
 std::uint32_t FlatNodes::ofLeaf(const scene::LeafPoint& leaf, const glm::vec2& corner) const {
   if (leaf.triangle == kNone || leaf.full) return leaf.triangle;
-  const auto spots = leaf.hasSpots() ? patches_.spotCount(leaf) : 0;
+  const auto spots = leaf.hasSpots() && !patches_.spots.isInOneFrame(leaf.spot_list) ? patches_.spotCount(leaf) : 0;
   for (std::uint32_t k = 0; k < spots; ++k) {
     if (!inOneFrame(leaf.triangle, patches_.spot(leaf, k).triangle, corner, corner + 1.0F)) return kCurved;
   }

@@ -28,7 +28,8 @@ class LeafRays {
     glm::dvec3 position{0.0};
     glm::dvec3 normal{0.0};
     std::uint32_t value = kNothing;         ///< leaf value
-    std::uint32_t triangle = scene::kNone;  ///< that it lies on, which no ray of see() from there meets; if known
+    std::uint32_t triangle = scene::kNone;  ///< no ray of see() from there meets it: on which it lies, if known, or
+                                            ///< one in the same plane and frame
   };
 
   /// O(n log n) in triangles. Both are to outlive it.

@@ -336,8 +336,10 @@ std::vector<LinkPlanner::FurtherSample> LinkPlanner::furtherSamples(const Shoote
   const auto most_of_wave = wave == Wave::kShort ? kMostOfShortWave : kMostOfWave;
   const auto most = std::min(most_of_wave, std::max(1U, taken));
   if (shooter.source != scene::kNone) return std::vector<FurtherSample>(most, {1, kSourceCost});
-  if (shooter.isLight()) return std::vector<FurtherSample>(most, {kLightPoints, kLightCost * kLightPoints});
   std::vector<FurtherSample> samples;
+  for (std::uint32_t k = 0; shooter.isLight() && k < most; ++k)
+    samples.push_back({kLightPoints, kLightCost * settings_.lightCost(taken + k) * kLightPoints});
+  if (shooter.isLight()) return samples;
   const auto most_points = std::min(most_of_wave, static_cast<std::uint32_t>(shooter.column[0].points()));
   for (std::uint32_t k = 0, all = 0; k == 0 || all < most_points; ++k) {
     const auto points = shots_.pointsOf(shooter.place, taken + k);

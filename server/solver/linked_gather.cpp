@@ -197,9 +197,14 @@ void LinkedSolver::inheritRays(const LinkedSolver& former, const Renumbering& nu
 
 /// What samples of links took so far.
 double LinkedSolver::samplesCost() const {
+  const auto& planner = settings_.planner;
+  const double coarse = 1.0 * planner.coarse_light_samples * kLightPoints, fine = planner.lightCost(~0U);
   double points = 0.0;
   for (const auto& shooter : system_.shooters()) {
-    for (const auto& column : shooter.column) points += (shooter.isLight() ? kLightShot : 1.0) * column.points();
+    for (const auto& column : shooter.column) {
+      const double first = shooter.isLight() ? std::min(column.points(), coarse) : column.points();
+      points += (shooter.isLight() ? kLightShot : 1.0) * (first + fine * (column.points() - first));
+    }
   }
   return points * shotCost();
 }

@@ -146,6 +146,7 @@ void LinkedSolver::findCutLinks(RepairBatch& repairs) const {
       if (shooter.isLight()) {
         const auto& light = lights_[shooter.light];
         const auto [middle, radius] = circle(light);
+        // As wide as pixels are at most, which the first samples' are.
         shadows.find({&middle, 1}, light.normal, radius, settings_.planner.light_resolution, scratch,
                      repairs.leaves[i]);
         continue;

@@ -15,7 +15,8 @@ std::uint32_t shotsFor(std::uint32_t points) { return (points + kLightPoints - 1
 
 }  // namespace
 
-/// Of a light's shots, those that are next.
+/// Of a light's shots, those that are next. The first have the coarse images (PlannerSettings::lightResolution): until
+/// the others look, what they blur is blurred beside leaves of which most samples did not.
 LinkedSolver::ShotRange LinkedSolver::shotsOfLight(const Repair& repair) const {
   const auto all = shotsFor(repair.samples), first = shotsFor(repair.looked);
   const bool rest = repair.whole || !lights_may_be_rough_ || phase_ == Phase::kDone || repair.first_shots <= first;

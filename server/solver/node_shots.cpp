@@ -37,12 +37,13 @@ std::uint32_t firstPointOf(std::uint32_t index) {
 /// The halves draw rows of spots each for itself, and never from the same quarter at once. The opposite row would not
 /// do: of so few rows two that are opposite are soon drawn by both halves, and what they do not show would not show in
 /// the halves' difference either.
-std::uint32_t rowOf(std::uint32_t index, std::uint64_t key, bool second) {
-  const std::uint32_t first = spotRow(sobol4(index, mixKeys(key, 3)).x);
+scene::SpotDraw spotsOf(std::uint32_t index, std::uint64_t key, bool second) {
+  const auto first = scene::SpotDraw::from(sobol4(index, mixKeys(key, 3)).x);
   if (!second) return first;
-  const std::uint32_t row = spotRow(sobol4(index, mixKeys(key, 4)).x);
+  auto draw = scene::SpotDraw::from(sobol4(index, mixKeys(key, 4)).x);
   constexpr std::uint32_t kQuarter = scene::kSpotRows / 4;
-  return row / kQuarter != first / kQuarter ? row : (row + 2 * kQuarter) % scene::kSpotRows;
+  if (draw.row / kQuarter == first.row / kQuarter) draw.row = (draw.row + 2 * kQuarter) % scene::kSpotRows;
+  return draw;
 }
 
 std::uint64_t blockOf(const NodePlace& node) {
@@ -138,7 +139,7 @@ void NodeShots::addGather(const NodePlace& node, std::size_t half, std::uint32_t
   const glm::dvec4 jitter = sobol4(index, mixKeys(mixKeys(seed_, side.key), 2));
   const bool opposite = (half + node.x / kJitterBlock + node.y / kJitterBlock) % 2 != 0;
   shot.receiver_jitter = glm::vec2(opposite ? 1.0 - glm::dvec2(jitter) : glm::dvec2(jitter));
-  shot.spot_row = rowOf(index, mixKeys(mixKeys(seed_, side.key), blockOf(node)), half != 0);
+  shot.spots = spotsOf(index, mixKeys(mixKeys(seed_, side.key), blockOf(node)), half != 0);
   shot.first_point = static_cast<std::uint32_t>(batch.points.size());
   shot.point_count = pointsOfSample(index);
   shot.spot_rows = shot.point_count;  // as many places of a receiver as before, looked at from each point
@@ -185,7 +186,7 @@ void NodeShots::add(const LightPolygon& light, std::size_t half, std::uint32_t i
   shot.spot_rows = kLightRows;
   shot.resolution = resolution;
   shot.receiver_jitter = glm::vec2(half == 0 ? glm::dvec2(jitter) : 1.0 - glm::dvec2(jitter));
-  shot.spot_row = rowOf(index, light_key, half != 0);
+  shot.spots = spotsOf(index, light_key, half != 0);
   shot.first_point = static_cast<std::uint32_t>(batch.points.size());
   shot.point_count = points;
   for (std::uint32_t p = 0; p < points; ++p) {

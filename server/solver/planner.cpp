@@ -141,7 +141,7 @@ void Planner::addNodeGather(const RadiosityState& state, const Side& side, const
   const std::uint64_t wave_key = mixKeys(node_key, 0x100 + wave_);
   const glm::dvec4 jitter = sobol4(state.rounds() - 1, mixKeys(wave_key, 2));
   shot.receiver_jitter = glm::vec2(jitter.x, jitter.y);
-  shot.spot_row = spotRow(jitter.x);
+  shot.spots = scene::SpotDraw::from(jitter.z);
   for (std::uint32_t p = 0; p < 2; ++p) {
     if (!plays[p]) continue;
     const glm::dvec4 sample = sobol4(2 * (state.rounds() - 1) + p, wave_key);
@@ -241,7 +241,7 @@ void Planner::addGatherShot(const LightPolygon& light, std::uint32_t rounds, std
   shot.resolution = settings_.light_resolution;
   shot.half = shot_index < shots ? 0 : 1;
   shot.receiver_jitter = glm::vec2(jitter.x, jitter.y);
-  shot.spot_row = spotRow(jitter.x);
+  shot.spots = scene::SpotDraw::from(jitter.z);
   shot.first_point = static_cast<std::uint32_t>(batch.points.size());
   shot.point_count = points;
   for (std::uint32_t p = 0; p < points; ++p) {

@@ -91,9 +91,8 @@ struct GatherShot {
   std::uint32_t side = 0;                 ///< of the triangle's surface: 0 front, 1 back
   std::uint32_t resolution = 128;
   glm::vec2 receiver_jitter{0.5F};  ///< where in a leaf the receiving point lies (PatchScene::spotAt)
-  std::uint32_t spot_row =
-      0;  ///< which row of a leaf's spots is the first, where it has spots: out of scene::kSpotRows
-  std::uint32_t spot_rows = 1;  ///< how many of them count: a power of two, at most kSpotRows
+  scene::SpotDraw spots;            ///< where a leaf has spots, which are the first
+  std::uint32_t spot_rows = 1;      ///< how many of them count: a power of two, at most kSpotRows
   std::uint32_t half = 0;
   std::uint32_t first_point = 0, point_count = 0;  ///< into ShotBatch::points
   /// Into ShotBatch::receivers, for measure(): only links to these leaves are wanted, others may be left out. 0: all.
@@ -103,11 +102,6 @@ struct GatherShot {
   std::uint32_t first_box = 0, box_count = 0;
   Looks open_looks;  ///< points of which all that escapes and is absorbed is wanted nevertheless
 };
-
-/// For GatherShot::spot_row, from a number in [0, 1).
-[[nodiscard]] inline std::uint32_t spotRow(double at) {
-  return std::min(scene::kSpotRows - 1, static_cast<std::uint32_t>(at * scene::kSpotRows));
-}
 
 /// Receiving points inside a full leaf over which a shot of light without extent is averaged, as (u, v) in [0, 1)^2.
 inline constexpr std::size_t kMaxReceiverPoints = 8;

@@ -148,6 +148,8 @@ nlohmann::json toJson(const oracle::ErrorMetrics& metrics) {
   return {{"relative_rms", metrics.solverRms()},
           {"relative_rms_with_noise", metrics.relative_rms},
           {"reference_noise", metrics.reference_noise},
+          {"relative_rms_low", metrics.solverRange()[0]},
+          {"relative_rms_high", metrics.solverRange()[1]},
           {"mean", metrics.mean},
           {"median", metrics.median},
           {"p99", metrics.p99},

@@ -20,10 +20,13 @@
 namespace {
 
 void print(const char* name, const radiosity::oracle::ErrorMetrics& m) {
+  const auto [low, high] = m.solverRange();
   std::printf(
-      "%-13s RMS %6.2f %%  median %6.2f %%  mean %6.2f %%  p99 %7.2f %%  bias %+6.2f %%  (%zu, reference +-%.2f %%)\n",
-      name, 100 * m.solverRms(), 100 * m.median, 100 * m.mean, 100 * m.p99, 100 * m.bias, m.count,
-      100 * m.reference_noise);
+      "%-13s RMS %6.2f %% (%.2f to %.2f)  median %6.2f %%  mean %6.2f %%  p99 %7.2f %%  bias %+6.2f %%  (%zu, "
+      "reference "
+      "+-%.2f %%)\n",
+      name, 100 * m.solverRms(), 100 * low, 100 * high, 100 * m.median, 100 * m.mean, 100 * m.p99, 100 * m.bias,
+      m.count, 100 * m.reference_noise);
 }
 
 /// Where the squared error sits: how much of it in texels that are partly buried or otherwise special, and the texels

@@ -16,8 +16,15 @@ std::string orDash(const std::optional<TimeToError>& time) {
   return fmt::format("{}{:.2f}", kMarks[static_cast<int>(time->kind)], time->seconds);
 }
 
+/// With what it lies between, where that is wider than a tenth of it to either side.
 std::string truth(const SolveRow& row) {
-  if (row.resolved()) return percent(row.solver.solverRms());
+  constexpr double kWide = 0.2;
+  if (row.resolved()) {
+    const auto rms = row.solver.solverRms();
+    const auto [low, high] = row.solver.solverRange();
+    if (high - low < kWide * rms) return percent(rms);
+    return fmt::format("{} ({} to {})", percent(rms), percent(low), percent(high));
+  }
   return "< " + percent(SolveRow::kResolved * row.solver.reference_noise);
 }
 

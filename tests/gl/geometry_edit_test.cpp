@@ -26,6 +26,20 @@ TEST_F(GeometryEdit, MovesMendTheLinksThatMeasuringAllFinds) {
   expectMendedIsMeasured(replaced("/nodes/1/translation", {0.9, 1.7, 1.0}));  // the lamp
 }
 
+// Images of a light's later samples are twice as wide, whoever takes them: all looked at once more, where nothing has
+// changed, is what the solve saw.
+TEST_F(GeometryEdit, LinksMeasuredOnceMoreAreTheSame) {
+  settings_.planner.coarse_light_samples = 1;
+  settings_.planner.light_points = 32;  // four samples
+  start(test::blockRoom());
+  const auto first = solved(before_), second = solved(before_);
+  auto all = mapOf(before_, before_);
+  std::fill(all.leaf_altered.begin(), all.leaf_altered.end(), true);
+  const auto again = successor(*first, before_, all);
+  EXPECT_GT(again->linkCounters().retaken + again->linkCounters().repaired, 0U);
+  expectSameLinks(*again, *second, *before_.patches);
+}
+
 TEST_F(GeometryEdit, WhatIsGoneOrAddedMendsTheLinksThatMeasuringAllFinds) {
   start(test::blockRoom());
   expectMendedIsMeasured(replaced("/nodes/2/extensions/KHR_node_visibility/visible", false));

@@ -27,9 +27,15 @@ double ErrorMetrics::solverRms() const {
   return std::sqrt(std::max(0.0, relative_rms * relative_rms - reference_noise * reference_noise));
 }
 
+std::array<double, 2> ErrorMetrics::solverRange() const {
+  const double square = relative_rms * relative_rms - reference_noise * reference_noise;
+  return {std::sqrt(std::max(0.0, square - square_uncertainty)), std::sqrt(std::max(0.0, square + square_uncertainty))};
+}
+
 ErrorMetrics measureError(std::span<const Comparison> comparisons) {
   ErrorMetrics metrics;
-  double square = 0.0, noise = 0.0, reference_square = 0.0, sum = 0.0, reference_sum = 0.0, weight_sum = 0.0;
+  double square = 0.0, noise = 0.0, uncertainty = 0.0, reference_square = 0.0, sum = 0.0, reference_sum = 0.0,
+         weight_sum = 0.0;
   std::vector<std::pair<double, double>> errors;
   for (const auto& c : comparisons) {
     if (!(c.weight > 0.0)) continue;
@@ -37,6 +43,8 @@ ErrorMetrics measureError(std::span<const Comparison> comparisons) {
     const auto difference = c.value - c.reference;
     square += c.weight * glm::dot(difference, difference);
     noise += c.weight * glm::dot(c.standard_error, c.standard_error);
+    const double excess = glm::dot(difference, difference) - glm::dot(c.standard_error, c.standard_error);
+    uncertainty += c.weight * c.weight * excess * excess;
     reference_square += c.weight * glm::dot(c.reference, c.reference);
     const double y = luminance(c.value);
     const double y_reference = luminance(c.reference);
@@ -51,6 +59,7 @@ ErrorMetrics measureError(std::span<const Comparison> comparisons) {
   std::sort(errors.begin(), errors.end());
   metrics.relative_rms = std::sqrt(square / reference_square);
   metrics.reference_noise = std::sqrt(noise / reference_square);
+  metrics.square_uncertainty = std::sqrt(uncertainty) / reference_square;
   metrics.mean /= weight_sum;
   metrics.median = quantile(errors, weight_sum, 0.5);
   metrics.p99 = quantile(errors, weight_sum, 0.99);

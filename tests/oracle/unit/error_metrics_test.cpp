@@ -5,6 +5,8 @@
 #include <cmath>
 #include <vector>
 
+#include "tests/oracle/random.h"
+
 namespace radiosity::oracle {
 namespace {
 
@@ -42,6 +44,29 @@ TEST(ErrorMetrics, ReferenceNoiseIsTakenOutInSquares) {
   const auto metrics = measureError(std::vector<Comparison>{{1.05 * one, one, 0.03 * one, 1.0}});
   EXPECT_NEAR(metrics.reference_noise, 0.03, 1e-12);
   EXPECT_NEAR(metrics.solverRms(), 0.04, 1e-12);
+}
+
+// 2,000 texels are 1 % wrong, and the reference three times as noisy: in 300 references the range holds the 1 % as
+// often as one standard error should, 68 times in 100, to 2.7 (one standard error of that) times three.
+TEST(ErrorMetrics, TheRangeHoldsTheTruthTwoTimesInThree) {
+  Random random(5);
+  const auto gauss = [&] {
+    return std::sqrt(-2.0 * std::log(1.0 - random.uniform())) * std::cos(2 * M_PI * random.uniform());
+  };
+  const glm::dvec3 one(1.0);
+  std::size_t held = 0;
+  for (int trial = 0; trial < 300; ++trial) {
+    std::vector<Comparison> comparisons(2000);
+    for (auto& c : comparisons) {
+      c.reference = one + 0.03 * glm::dvec3(gauss(), gauss(), gauss());
+      c.value = one + 0.01 * (random.uniform() < 0.5 ? one : -one);
+      c.standard_error = 0.03 * one;
+      c.weight = 1.0;
+    }
+    const auto [low, high] = measureError(comparisons).solverRange();
+    held += low <= 0.01 && 0.01 <= high ? 1 : 0;
+  }
+  EXPECT_NEAR(static_cast<double>(held) / 300.0, 0.683, 3 * 0.027);
 }
 
 TEST(ErrorMetrics, NothingToCompareGivesZeros) {

@@ -23,12 +23,12 @@ void expectPlaces(const BurialPlaces& places, std::uint32_t few, std::uint32_t m
 TEST(BurialBudget, WhatIsCheapIsAskedOfAllPlaces) {
   expectPlaces(affordablePlaces(0, {}), 16, 64);
   expectPlaces(affordablePlaces(10'000, alike(1000, true, false)), 16, 64);
-  expectPlaces(affordablePlaces(1000, alike(3000, true, true)), 16, 64);
-  EXPECT_TRUE(affordablePlaces(1000, alike(3000, true, true)).finer);
+  expectPlaces(affordablePlaces(1000, alike(2500, true, true)), 16, 64);
+  EXPECT_TRUE(affordablePlaces(1000, alike(2500, true, true)).finer);
   EXPECT_TRUE(budgetWarning({}).empty());
 }
 
-// (16 + 64) x 4,000 x 1,000 is within the budget, and with 34 more it is not.
+// (16 + 64) x 4,000 x 1,000 is within the budget, and with 77 more it is not.
 TEST(BurialBudget, EdgesAreNotLookedAtMoreCloselyWhereThatCostsTooMuch) {
   expectPlaces(affordablePlaces(1000, alike(4000, true, true)), 16, 64);
   EXPECT_FALSE(affordablePlaces(1000, alike(4000, true, true)).finer);

@@ -54,8 +54,7 @@ TEST(LeafSpots, LieEvenlyOverWhatABlockLeavesOfALeaf) {
   EXPECT_EQ(seen, 8U);
 }
 
-// Two triangles of one chart, bent by less than what makes them two facets: a place of one in the frame of the other
-// would lie behind it, and everything hides its light.
+// A chart of two facets: a place of one in the frame of the other would lie behind it, and everything hides its light.
 TEST(LeafSpots, LieOnTheirOwnTrianglesWhereAChartIsBentALittle) {
   constexpr double kBend = 2e-4;
   Primitive sheet;
@@ -76,6 +75,37 @@ TEST(LeafSpots, LieOnTheirOwnTrianglesWhereAChartIsBentALittle) {
     bent += left && right ? 1 : 0;
   }
   EXPECT_GE(bent, 1U);
+}
+
+std::vector<LeafSpot> spotsOf(const PatchScene& patches, const LeafPoint& leaf) {
+  std::vector<LeafSpot> spots;
+  for (std::uint32_t k = 0; leaf.hasSpots() && k < patches.spotCount(leaf); ++k) spots.push_back(patches.spot(leaf, k));
+  return spots;
+}
+
+// A wall 0.03 of a leaf thick: of the places right along it no two are near each other. And what a block leaves of
+// leaves at a rim, 0.0075 of 0.25.
+TEST(LeafSpots, WhatIsHiddenOrLeftMayBeNarrowerThanPlacesAreApart) {
+  for (const auto& [low, high] : {std::pair(0.1, 0.1075), std::pair(0.0075, 0.24)}) {
+    Scene scene;
+    place(scene, floorQuad(10.0, -5.0, -5.0));
+    place(scene, box({low, 0.0, -2.0}, {high, 2.0, 2.0}));
+    const PatchScene patches = build(scene, 0.25);
+    double area = 0.0, leaves = 0.0;
+    for (std::size_t i = 0; i < 1600; ++i) {
+      const auto& leaf = patches.leaves[patches.surfaces[0].first_leaf + i];
+      if (leaf.triangle == kNone || leaf.full || !leaf.hasSpots()) continue;
+      leaves += 1.0;
+      area +=
+          static_cast<double>(patches.node_area[patches.surfaces[0].first_node[0] + i]) * patches.scale * patches.scale;
+      for (const auto& spot : spotsOf(patches, leaf)) {
+        const auto at = worldOf(patches, spot);
+        EXPECT_FALSE(at.x > low + 1e-6 && at.x < high - 1e-6 && std::abs(at.z) < 2.0) << at.x << " " << at.z;
+      }
+    }
+    EXPECT_EQ(leaves, 16.0);
+    EXPECT_NEAR(area / leaves / 0.0625, 1.0 - (high - low) / 0.25, 1.0 / kLeafLattice) << "one place more or less";
+  }
 }
 
 // A sheet of light's edge may lie anywhere: the part of the spots on one side of a line is that of what is left.
@@ -109,6 +139,17 @@ TEST(LeafSpots, EveryEighthRowHasSomeInEveryQuarter) {
       EXPECT_EQ(quarters, 15U);
     }
   }
+}
+
+// One evenly spread number draws row and spot.
+TEST(LeafSpots, ADrawReachesAllOfThem) {
+  std::vector<int> times(102, 0);
+  for (int i = 0; i < 4096; ++i) {
+    const auto draw = SpotDraw::from((i + 0.5) / 4096);
+    for (std::uint32_t quarter = 0; quarter < kSpotQuarters; ++quarter)
+      ++times.at(LeafSpots::indexOf(102, draw.row, quarter, draw.at));
+  }
+  for (const int one : times) EXPECT_NEAR(one, 4096.0 * kSpotQuarters / 102, 1.0);
 }
 
 // Also where their number is no multiple of the rows': or a part of the leaf would count twice.
