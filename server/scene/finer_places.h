@@ -13,16 +13,18 @@ namespace radiosity::scene {
 
 /// That all leaves are asked for which something covers in part: as of latticePoint().
 inline constexpr std::uint32_t kCoarsePlaces = 64;
-/// Where no more of them are buried, or visible, all of kLeafLattice are asked: in what is narrower than 0.05 their
-/// points are farther apart than what is asked beside others: of walls 0.03 thick two thirds were missed. Two such
-/// strips may lie on a leaf.
-inline constexpr std::ptrdiff_t kFewOfStrip = 6;
+/// Where no more of them are buried, or visible, and most of these lie apart from each other, all of kLeafLattice are
+/// asked: in a strip narrower than 0.05 its points are farther apart than what is asked beside others, and of walls
+/// 0.03 thick two thirds were missed. Two such strips may lie on a leaf.
+inline constexpr std::size_t kMostOfStrips = 6;
 /// Of kLeafLattice places so many are asked, in the mean over where an edge may cross a leaf.
-inline constexpr std::uint32_t kFinerAsked = 77;
+inline constexpr std::uint32_t kFinerAsked = 50;
 
 /// Those of kCoarsePlaces that lie around one of kLeafLattice: where they agree it is as they are, as it seems.
 /// Ascending.
 [[nodiscard]] std::span<const std::uint8_t> coarseAround(std::uint32_t finer);
+/// Those of kCoarsePlaces right beside one of them.
+[[nodiscard]] std::span<const std::uint8_t> coarseBeside(std::uint32_t coarse);
 /// Those of kLeafLattice right beside one of them: where they do not agree, it seemed wrong.
 [[nodiscard]] std::span<const std::uint8_t> finerAround(std::uint32_t finer);
 

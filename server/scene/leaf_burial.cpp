@@ -69,10 +69,21 @@ void LeafBurial::askPlaces(const Contact& contact, const Pieces& pieces, std::ui
   }
 }
 
-/// What few of the places that all leaves are asked for tell of may be a strip along which no two are near each other.
+/// What few of the places that all leaves are asked for tell of, each for itself, may be a strip along which no two are
+/// near each other.
 bool LeafBurial::mayBeStrip(const Scratch& scratch) {
-  const auto countOf = [&](Answer answer) { return std::ranges::count(scratch.asked_before, answer, &Place::answer); };
-  return std::min(countOf(Answer::kVisible), countOf(Answer::kBuried)) <= kFewOfStrip;
+  const auto& asked = scratch.asked_before;
+  for (const auto answer : {Answer::kVisible, Answer::kBuried}) {
+    std::size_t few = 0, alone = 0;
+    for (std::uint32_t i = 0; i < asked.size(); ++i) {
+      if (asked[i].answer != answer) continue;
+      const auto isSame = [&](std::uint8_t k) { return asked[k].answer == answer; };
+      ++few;
+      alone += std::ranges::none_of(coarseBeside(i), isSame) ? 1 : 0;
+    }
+    if (few <= kMostOfStrips && 2 * alone > few) return true;
+  }
+  return false;
 }
 
 /// As those around it are; none where they do not agree.

@@ -28,7 +28,7 @@ TEST(BurialBudget, WhatIsCheapIsAskedOfAllPlaces) {
   EXPECT_TRUE(budgetWarning({}).empty());
 }
 
-// (16 + 64) x 4,000 x 1,000 is within the budget, and with 77 more it is not.
+// (16 + 64) x 4,000 x 1,000 is within the budget, and with 50 more it is not.
 TEST(BurialBudget, EdgesAreNotLookedAtMoreCloselyWhereThatCostsTooMuch) {
   expectPlaces(affordablePlaces(1000, alike(4000, true, true)), 16, 64);
   EXPECT_FALSE(affordablePlaces(1000, alike(4000, true, true)).finer);
