@@ -52,8 +52,12 @@ std::optional<BuriedPart> LeafBurial::measure(const Contact& contact, std::uint3
   if (isOpen(contact, pieces, scratch.notes)) return std::nullopt;
   askPlaces(contact, pieces, count, scratch);
   auto outcome = sumParts(contact, pieces, scratch);
+  if (count < all.many && outcome.isMixed()) {
+    count = all.many;
+    askPlaces(contact, pieces, count, scratch);
+    outcome = sumParts(contact, pieces, scratch);
+  }
   if (outcome.buried == 0) return std::nullopt;
-  if (count < all.many && outcome.isMixed()) return measure(contact, all.many, all, scratch);
   if (count == kCoarsePlaces && all.finer && outcome.isMixed()) {
     askFiner(contact, pieces, scratch);
     outcome = sumParts(contact, pieces, scratch);
