@@ -1,6 +1,7 @@
 #include "server/solver/leaf_gather.h"
 
 #include <algorithm>
+#include <bit>
 #include <chrono>
 #include <cmath>
 #include <glm/common.hpp>
@@ -70,6 +71,13 @@ std::uint16_t firstRaysOfWide(const Side& side, std::uint32_t leaf, bool is_alon
   return static_cast<std::uint16_t>(times * usual);
 }
 
+/// As many times as many rays each leaf has to begin with where leaves are few: a power of two.
+std::size_t timesOfFew(std::size_t leaves, std::size_t fewest) {
+  constexpr std::size_t kMost = LeafSights::kMostRays / kFirstRays / LeafSights::kMostTimes;  // noisy ones get more yet
+  const auto usual = std::max<std::size_t>(1, 2 * kFirstRays * leaves);
+  return std::bit_floor(std::clamp<std::size_t>(fewest / usual, 1, kMost));
+}
+
 }  // namespace
 
 LeafGather::LeafGather(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed,
@@ -94,7 +102,7 @@ void LeafGather::inherit(const LeafGather& former, std::span<const std::uint32_t
   sights_.inherit(former.sights_, value_before, change, static_cast<std::uint16_t>(most));
 }
 
-void LeafGather::start(const std::vector<bool>& has_other) {
+void LeafGather::start(const std::vector<bool>& has_other, std::size_t fewest) {
   const auto counts = sights_.counts();
   if (std::ranges::any_of(counts, [](std::uint16_t count) { return count > 0; })) return;
   std::vector<std::uint16_t> asked(sights_.leafCount(), kFirstRays);
@@ -104,6 +112,9 @@ void LeafGather::start(const std::vector<bool>& has_other) {
     for (std::uint32_t leaf = 0; leaf < side.leaf_count && isWide(side); ++leaf)
       asked[side.first_value + leaf] = firstRaysOfWide(side, leaf, is_alone);
   }
+  const auto times = timesOfFew(asked.size(), fewest);
+  for (auto& count : asked)
+    count = static_cast<std::uint16_t>(std::min<std::size_t>(times * count, LeafSights::kMostRays));
   const auto rays = std::reduce(asked.begin(), asked.end(), std::size_t{0});
   if (leastBytes(asked.size()) + rays * LeafSights::kRayBytes > most_bytes_) std::ranges::fill(asked, kFirstRays);
   sights_.ask(asked);

@@ -15,8 +15,9 @@ namespace {
 // count. An image and what is gathered from it: by leaf, and by the root of the triangles, since most are left out. A
 // ray: by level of the tree.
 constexpr double kShotLeaf = 0.02, kShotTriangle = 13.0, kRayLevel = 0.05;
-/// Where there are fewer triangles, as in a room with one block, links are few, and each is exact.
-constexpr std::size_t kFewestTriangles = 32;
+/// A solve begins with so many rays at least: of fewer leaves smoothing has few to average over, and their noise would
+/// be that of all light. They take no time worth the name.
+constexpr std::size_t kFewestRays = 65'536;
 /// An image of a lamp, beside one of a node.
 constexpr double kLightShot = 2.0;
 /// What shines so many times as bright as all does in the mean is worth links: rays find what is small too seldom. With
@@ -42,11 +43,7 @@ constexpr int kParts = 32;
 
 }  // namespace
 
-bool LinkedSolver::raysPay() const {
-  if (!mayGather(system_.leafAreas().size(), settings_)) return false;
-  return settings_.reflected == SolverSettings::Reflected::kByRays || !patches_->opacity.empty() ||
-         patches_->triangles.size() >= kFewestTriangles;
-}
+bool LinkedSolver::raysPay() const { return mayGather(system_.leafAreas().size(), settings_); }
 
 /// Rays may take half of the memory, so links get the other.
 void LinkedSolver::limitLinks() { memory_.limit(by_rays_ ? settings_.link_memory / 2 : settings_.link_memory); }
@@ -236,7 +233,7 @@ StepOutcome LinkedSolver::chooseRays() {
   sample_goal_ = 0.0;
   if (!gathers()) {
     startRays();
-    gather_->start(lightOverLinks());
+    gather_->start(lightOverLinks(), kFewestRays);
     return StepOutcome::kRoundDone;
   }
   const double aim = kAim * targetOfLinks(), rest = error_.residual;

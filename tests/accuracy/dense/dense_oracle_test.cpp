@@ -56,9 +56,13 @@ struct Outcome {
   std::vector<oracle::Corners> occluders;
 };
 
-Outcome solveBoth(const Case& c, bool paper_mode) {
+enum class Way { kByRays, kOverLinks, kOfThePaper };
+
+Outcome solveBoth(const Case& c, Way way) {
   Outcome outcome;
-  outcome.solve = solveReally(c.scene, {.target_error = c.target_error, .paper_mode = paper_mode});
+  outcome.solve = solveReally(
+      c.scene,
+      {.target_error = c.target_error, .paper_mode = way == Way::kOfThePaper, .over_links = way == Way::kOverLinks});
   if (c.occluded) outcome.occluders = oracle::allPolygons(c.scene);
   const auto patches = outcome.solve.patches();
   // Adaptive subdivision would never end at the edges of shadows: there a fixed rule.
@@ -78,8 +82,8 @@ constexpr double kCalibration = 1.5;
 
 class DenseOracle : public testing::TestWithParam<Case> {};
 
-TEST_P(DenseOracle, TheDefaultSolveHasTheIrradianceOfEveryTexel) {
-  const auto [solve, dense, difference, occluders] = solveBoth(GetParam(), false);
+void expectTheIrradianceOfEveryTexel(const Case& c, Way way) {
+  const auto [solve, dense, difference, occluders] = solveBoth(c, way);
   // A round looks at one point of each texel, for both of the halves whose difference is the stated sampling error:
   // what that costs is not stated.
   const double points = spreadInsideTexels(solve, dense, occluders) / std::sqrt(solve.rounds);
@@ -90,8 +94,14 @@ TEST_P(DenseOracle, TheDefaultSolveHasTheIrradianceOfEveryTexel) {
   EXPECT_LT(std::abs(difference.bias), 0.5 * solve.stated.total);
 }
 
+TEST_P(DenseOracle, RaysBringTheIrradianceOfEveryTexel) { expectTheIrradianceOfEveryTexel(GetParam(), Way::kByRays); }
+
+TEST_P(DenseOracle, LinksBringTheIrradianceOfEveryTexel) {
+  expectTheIrradianceOfEveryTexel(GetParam(), Way::kOverLinks);
+}
+
 TEST_P(DenseOracle, ThePaperModeHasTheLightOfEverySurfaceAndBlursItInside) {
-  const auto [solve, dense, difference, occluders] = solveBoth(GetParam(), true);
+  const auto [solve, dense, difference, occluders] = solveBoth(GetParam(), Way::kOfThePaper);
   EXPECT_LT(difference.surface, kCalibration * solve.stated.total);
   // A bias of one level makes links one to two levels coarser than what a pixel sees, and the Gaussian spreads further:
   // like the means of blocks of 4 x 4 texels. The stated error knows nothing of it, and the paper's one round ends

@@ -79,6 +79,8 @@ RealSolve solveReally(const test_scenes::TestScene& scene, const SolveOptions& o
   settings.target_error = options.target_error;
   settings.seed = options.seed;
   settings.paper_mode = options.paper_mode;
+  using Reflected = solver::SolverSettings::Reflected;
+  settings.reflected = options.over_links ? Reflected::kByLinks : Reflected::kByRays;
   settings.within_leaves = false;  // the dense solution is one of lumped patches
   const auto solver = solver::makeSolver(patches, materials, *transport, settings);
   auto outcome = solver::StepOutcome::kSlice;

@@ -17,7 +17,7 @@ namespace radiosity::accuracy {
 struct SolveOptions {
   double texel_size_m = 0.125;
   double target_error = 0.01;
-  bool paper_mode = false;
+  bool paper_mode = false, over_links = false;
   std::uint64_t seed = 1;
 };
 

@@ -24,7 +24,7 @@ class LinkedEdits : public testing::Test {
   void SetUp() override {
     made_ = makeQuadScene(quads_);
     ASSERT_TRUE(rays_.setScene(made_.patches));
-    solver_ = std::make_unique<LinkedSolver>(made_.patches, made_.materials, rays_, SolverSettings{});
+    solver_ = std::make_unique<LinkedSolver>(made_.patches, made_.materials, rays_, test::overLinks());
     solve(*solver_);
   }
 
@@ -116,19 +116,19 @@ LightSources lamp(const glm::dvec3& at, float candela) {
 }
 
 TEST_F(LinkedEdits, WhileALampIsHalfMeasuredLoseNoHalf) {
-  LinkedSolver solver(made_.patches, made_.materials, rays_, SolverSettings{}, lamp({0.1, 0.2, 0.0}, 5.0F));
+  LinkedSolver solver(made_.patches, made_.materials, rays_, test::overLinks(), lamp({0.1, 0.2, 0.0}, 5.0F));
   ASSERT_TRUE(solver.step());
   ASSERT_TRUE(solver.step());
   solver.setLights(lamp({0.1, 0.2, 0.0}, 10.0F));
   solve(solver);
-  LinkedSolver fresh(made_.patches, made_.materials, rays_, SolverSettings{}, lamp({0.1, 0.2, 0.0}, 10.0F));
+  LinkedSolver fresh(made_.patches, made_.materials, rays_, test::overLinks(), lamp({0.1, 0.2, 0.0}, 10.0F));
   solve(fresh);
   const auto node = made_.patches->surfaces[0].first_node[0] + 5;
   EXPECT_NEAR(solver.irradiance()[node].x / fresh.irradiance()[node].x, 1.0F, 0.06F);
 }
 
 TEST_F(LinkedEdits, ALampTooWeakForTheTargetIsMeasuredWhenTheTargetFalls) {
-  SolverSettings settings;
+  SolverSettings settings = test::overLinks();
   settings.target_error = 0.1;
   LinkedSolver solver(made_.patches, made_.materials, rays_, settings);
   solve(solver);
@@ -150,7 +150,7 @@ TEST_F(LinkedEdits, ALampDraggedAboutLeavesNoTrail) {
   }
   EXPECT_LE(solver_->system().shooters().size(), shooters);
   solve(*solver_);
-  LinkedSolver fresh(made_.patches, made_.materials, rays_, SolverSettings{},
+  LinkedSolver fresh(made_.patches, made_.materials, rays_, test::overLinks(),
                      lamp({0.002 * 199 - 0.2, 0.1, 0.0}, 3.0F));
   solve(fresh);
   const auto node = made_.patches->surfaces[0].first_node[0] + 5;
@@ -178,7 +178,7 @@ TEST(LinkedSolver, ATinyLightIsNotBlack) {
   const auto made = makeQuadScene(quads);
   RayTransport rays(64);
   ASSERT_TRUE(rays.setScene(made.patches));
-  LinkedSolver solver(made.patches, made.materials, rays, SolverSettings{});
+  LinkedSolver solver(made.patches, made.materials, rays, test::overLinks());
   solve(solver);
   const auto energy = solver.energy();
   EXPECT_NEAR(energy.absorbed[0] / energy.emitted[0], 1.0, 0.05);
@@ -192,7 +192,7 @@ TEST(LinkedSolver, LightThatReachesNothingLeavesNoError) {
     emission.set(leaf, 0.1F * static_cast<float>(leaf % 7 + leaf / 30) * emission[leaf]);
   RayTransport rays(64);
   ASSERT_TRUE(rays.setScene(made.patches));
-  LinkedSolver solver(made.patches, made.materials, rays, SolverSettings{});
+  LinkedSolver solver(made.patches, made.materials, rays, test::overLinks());
   EXPECT_GT(solver.error().total, 0.5) << "nobody has looked yet";
   solve(solver);
   EXPECT_EQ(solver.error().total, 0.0);
@@ -214,7 +214,7 @@ TEST(LinkedSolver, ADimLampBesideABrightSignIsNotLeftOut) {
     }
     RayTransport rays(64);
     ASSERT_TRUE(rays.setScene(made.patches));
-    SolverSettings settings;
+    SolverSettings settings = test::overLinks();
     settings.target_error = 0.03;
     LinkedSolver solver(made.patches, made.materials, rays, settings);
     solve(solver);
@@ -249,7 +249,7 @@ TEST(LinkedSolver, ASmallErrorIsReachedByWayOfLargerOnes) {
   const auto workTo = [&](double error, double target) {
     RayTransport rays(64);
     EXPECT_TRUE(rays.setScene(made.patches));
-    SolverSettings settings;
+    SolverSettings settings = test::overLinks();
     settings.target_error = target;
     LinkedSolver solver(made.patches, made.materials, rays, settings);
     for (int i = 0; i < 100'000; ++i) {
@@ -279,7 +279,7 @@ TEST(LinkedSolver, LightOfShootersThatAShortenedWaveDidNotMeasureIsStatedAsMissi
     RayTransport rays(256);
     rays.pause = std::chrono::milliseconds(10);  // so that a wave takes several slices
     ASSERT_TRUE(rays.setScene(made.patches));
-    LinkedSolver solver(made.patches, made.materials, rays, SolverSettings{});
+    LinkedSolver solver(made.patches, made.materials, rays, test::overLinks());
     for (int i = 0; i < steps; ++i) ASSERT_TRUE(solver.step());
     solver.endWave();
     for (int i = 0; i < 100; ++i) {
@@ -340,7 +340,7 @@ class LinkMemoryBound : public testing::Test {
   std::vector<test::Quad> quads_;
   test::QuadScene made_;
   std::unique_ptr<RayTransport> rays_;
-  SolverSettings settings_;
+  SolverSettings settings_ = test::overLinks();
   std::unique_ptr<LinkedSolver> solver_;
 };
 
@@ -465,7 +465,7 @@ TEST(LinkMemory, IsNotAskedForWhereLightsAloneWouldTakeHalfOfIt) {
   const auto made = makeQuadScene(cubeQuads(4, {0, 4, 0, 0, 0, 0}, {0.5F, 0.5F, 0.5F, 0.5F, 0.5F, 0.5F}));
   RayTransport rays(16);
   ASSERT_TRUE(rays.setScene(made.patches));
-  SolverSettings settings;
+  SolverSettings settings = test::overLinks();
   settings.link_memory = 100'000;  // room for 400 shooters
   LightSources lamps;
   EXPECT_FALSE(makeSolver(made.patches, made.materials, rays, settings, lamps)->hasFluxScale());

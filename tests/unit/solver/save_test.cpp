@@ -47,7 +47,7 @@ class Saved : public testing::Test {
   }
 
   test::QuadScene made_ = makeQuadScene(cubeQuads(6, {0, 4, 0, 0, 0, 0}, {0.5F, 0.5F, 0.6F, 0.5F, 0.5F, 0.5F}));
-  SolverSettings settings_;
+  SolverSettings settings_ = test::overLinks();
   RayTransport rays_{64};
 };
 
@@ -152,9 +152,8 @@ TEST(SavedLinks, GoOnWithTheSamePixels) {
   const auto made = makeQuadScene(cubeQuads(6, {0, 4, 0, 0, 0, 0}, {0.5F, 0.5F, 0.6F, 0.5F, 0.5F, 0.5F}));
   RayTransport rays(64);
   ASSERT_TRUE(rays.setScene(made.patches));
-  SolverSettings settings;
+  SolverSettings settings = test::overLinks();
   settings.target_error = 2e-3;
-  settings.reflected = SolverSettings::Reflected::kByLinks;
   LinkedSolver whole(made.patches, made.materials, rays, settings);
   std::unique_ptr<LinkedSolver> next;
   for (int i = 0; i < 100'000 && !next; ++i) {

@@ -53,7 +53,7 @@ struct TexelError : testing::Test {
 };
 
 TEST_F(TexelError, ItsAreaWeightedRmsIsTheStatedError) {
-  SolverSettings settings;
+  SolverSettings settings = test::overLinks();
   settings.target_error = kCoarse;
   LinkedSolver linked(made.patches, made.materials, rays, settings);
   ShootingSolver shooting(made.patches, made.materials, rays, settings);
@@ -76,7 +76,7 @@ TEST_F(TexelError, IsTheScatterOfManySeeds) {
   const auto nodes = made.patches->nodeCount();
   std::vector<glm::dvec3> sum(nodes), square(nodes), said(nodes);
   for (int seed = 1; seed <= kSeeds; ++seed) {
-    SolverSettings settings;
+    SolverSettings settings = test::overLinks();
     settings.target_error = kCoarse;
     settings.seed = static_cast<std::uint64_t>(seed);
     LinkedSolver solver(made.patches, made.materials, rays, settings);
