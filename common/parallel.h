@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <cstddef>
 #include <future>
 #include <system_error>
@@ -27,6 +28,17 @@ void inShares(std::size_t most, const Work& work) {
   work(std::size_t{0}, shares);  // throws: the destructors of `others` wait
   for (auto share = started; share < shares; ++share) work(share, shares);
   for (auto& other : others) other.get();
+}
+
+/// Calls work(part) once for every part in [0, parts), each by whichever thread of inShares() is free: where some parts
+/// take far longer than others, and nobody knows which. What one of them threw is thrown here when all threads have
+/// ended.
+template <typename Work>
+void inTurns(std::size_t parts, const Work& work) {
+  std::atomic<std::size_t> next{0};
+  inShares(parts, [&](std::size_t, std::size_t) {
+    for (auto part = next++; part < parts; part = next++) work(part);
+  });
 }
 
 }  // namespace radiosity

@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "common/give_back.h"
 #include "server/engine/carried_light.h"
 #include "server/scene/burial_record.h"
 
@@ -197,6 +198,7 @@ void LitScene::fadeFrom(LitScene& before, bool same_layout) {
   };
   old_light_ = carried(before.shownPages());
   if (!known) return;
+  before.makeOldDirectPages();
   auto direct = before.old_direct_.empty() ? before.directPages() : before.old_direct_;
   if (!direct.empty()) old_direct_ = carried(std::move(direct));
 }
@@ -208,11 +210,23 @@ std::vector<scene::LightmapPage> LitScene::FormerLight::pages(const std::vector<
 }
 
 void LitScene::makeOldPages() {
+  if (!former_light_ || !old_light_.empty()) return;
+  old_light_ = former_light_->pages(former_light_->all, *this);
+  giveBack(former_light_->all);
+}
+
+/// Only where the solve takes so long that direct light is shown first.
+void LitScene::makeOldDirectPages() {
+  makeOldPages();
   if (!former_light_) return;
-  auto light = former_light_->pages(former_light_->all, *this);
   if (!former_light_->direct.empty()) old_direct_ = former_light_->pages(former_light_->direct, *this);
-  old_light_ = std::move(light);
   former_light_.reset();
+}
+
+void LitScene::forgetOldDirect() {
+  makeOldPages();
+  former_light_.reset();
+  old_direct_.clear();
 }
 
 /// Empty: not known.
@@ -224,7 +238,7 @@ std::vector<scene::LightmapPage> LitScene::directPages() const {
 
 bool LitScene::showDirectLight() {
   if (showsOwnLight() || !solver_->isRepairing()) return false;
-  makeOldPages();
+  makeOldDirectPages();
   if (old_direct_.empty()) return false;
   const auto fresh = directPages();
   if (fresh.empty()) return false;
@@ -241,7 +255,7 @@ void LitScene::updateSolver(bool materials, bool lights) {
   // small lights.
   if (solver_->hasFluxScale() && (power_ > 4.0 * solver_power_ || power_ < solver_power_ / 64.0)) {
     old_light_ = shownPages();
-    old_direct_.clear();
+    forgetOldDirect();
     new_share_ = 0.0;
     makeSolver();
     return;
@@ -268,7 +282,7 @@ void LitScene::showLightsFirst(const std::vector<glm::vec3>& direct_before) {
     old_light_ = replacePart(pagesOfNow(), scene::assemblePages(*patches_, direct_before),
                              scene::assemblePages(*patches_, direct));
   }
-  old_direct_.clear();
+  forgetOldDirect();
   new_share_ = 0.0;
 }
 

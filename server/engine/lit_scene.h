@@ -110,6 +110,10 @@ class LitScene {
   [[nodiscard]] std::vector<scene::LightmapPage> shownPages();
   /// Nothing of the light before an edit is in what is shown.
   [[nodiscard]] bool showsOwnLight() const { return old_light_.empty() && !former_light_; }
+  /// What was shown before an edit is shown still, and lies where it lay.
+  [[nodiscard]] bool showsFormerLight() const {
+    return former_light_ && former_light_->same_layout && old_light_.empty();
+  }
   /// From here on the solver's own light is shown, as good as it is.
   void endFade() {
     former_light_.reset();
@@ -146,6 +150,8 @@ class LitScene {
   [[nodiscard]] std::vector<glm::vec3> ownLight() const;
   [[nodiscard]] std::vector<scene::LightmapPage> pagesOfNow();
   void makeOldPages();
+  void makeOldDirectPages();
+  void forgetOldDirect();
   void showLightsFirst(const std::vector<glm::vec3>& direct_before);
   [[nodiscard]] std::vector<scene::LightmapPage> directPages() const;
   [[nodiscard]] std::optional<scene::PatchMap> mapFrom(const LitScene& former) const;

@@ -52,12 +52,14 @@ bool SolveLoop::lacksPages() const {
   });
 }
 
-/// Until the next slices have solved for other light or colours irradiance is what was published before; pages of it
-/// would take a tenth of the time that such an edit does. Other quantities have other colours at once.
+/// Until the next slices have solved for other light or colours, or for what moved, irradiance is what was published
+/// before; pages of it would take a tenth of the time that such an edit does. Other quantities have other colours at
+/// once.
 bool SolveLoop::showsNothingNew() const {
-  if (!lit_ || !shown_is_own_ || state_ != SolveState::kSolving || !lit_->showsOwnLight() ||
-      !lit_->solver().isUnsettled() || lit_->solver().isRepairing() || !publisher_.latest(Quantity::kIrradiance))
+  if (!lit_ || !shown_is_own_ || state_ != SolveState::kSolving || !publisher_.latest(Quantity::kIrradiance))
     return false;
+  const bool is_own = lit_->showsOwnLight() && lit_->solver().isUnsettled() && !lit_->solver().isRepairing();
+  if (!is_own && !lit_->showsFormerLight()) return false;
   return std::ranges::none_of(kQuantities, [&](auto q) { return q != Quantity::kIrradiance && watches_.wants(q); });
 }
 
@@ -79,7 +81,10 @@ void SolveLoop::publishQuantity(Quantity quantity) {
     const bool added = watches_.takeAdded(quantity);
     const bool current = shown && shown->tile_version == publisher_.version();
     if (current && !added) return;
-    if (!current) shown = publisher_.publish(pagesToShow(quantity), status(), state_ == SolveState::kConverged);
+    if (!current) {
+      auto pages = pagesToShow(quantity);
+      shown = publisher_.publish(std::move(pages), status(), state_ == SolveState::kConverged);
+    }
   } else if (quantity == Quantity::kIrradiance) {
     return;  // its tile versions are for viewers who come back
   } else {

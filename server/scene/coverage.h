@@ -48,10 +48,12 @@ struct LeafPlaces {
   std::vector<std::uint32_t> triangles;  ///< by place; or one, of all
 
   void add(std::uint16_t number, std::uint32_t triangle);
+  /// As LeafSpots::order has them.
+  void order();
   [[nodiscard]] std::size_t bytes() const { return numbers.size() * 2 + triangles.size() * 4; }
 };
 
-/// Of a leaf that is not full; without any it keeps its point.
+/// Of a leaf that is not full, in order; without any it keeps its point.
 void keepSpots(PatchScene& patches, LeafPoint& leaf, const LeafPlaces& places);
 
 /// Places on every leaf that is neither empty nor full and has none yet.

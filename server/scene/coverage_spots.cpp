@@ -31,6 +31,17 @@ void LeafPlaces::add(std::uint16_t number, std::uint32_t triangle) {
   triangles.push_back(triangle);
 }
 
+void LeafPlaces::order() {
+  std::vector<LeafSpots::Place> places;
+  for (std::size_t i = 0; i < numbers.size(); ++i)
+    places.push_back({numbers[i], triangles.size() == 1 ? triangles.front() : triangles[i]});
+  LeafSpots::order(lattice.points, places);
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    numbers[i] = places[i].number;
+    if (triangles.size() > 1) triangles[i] = places[i].triangle;
+  }
+}
+
 void keepSpots(PatchScene& patches, LeafPoint& leaf, const LeafPlaces& places) {
   if (places.numbers.empty()) return;
   std::vector<LeafSpots::Place> of_leaf;
@@ -77,6 +88,7 @@ LeafPlaces findPlaces(const PatchScene& patches, std::span<const LeafPiece> piec
     }
     if (found.numbers.size() >= kPlacesTried.front()) break;
   }
+  found.order();
   return found;
 }
 

@@ -191,6 +191,7 @@ BuriedPart LeafBurial::takePart(const Contact& contact, const Outcome& outcome, 
     nearest = distance;
     part.point = {glm::vec2(place.texel), place.triangle, false};
   }
+  part.visible.order();  // here, where leaves are measured side by side
   return part;
 }
 

@@ -6,7 +6,7 @@
 namespace radiosity::scene {
 namespace {
 
-/// Halves them, across and up in turn, so that each part of the order is a part of the leaf.
+/// Halves them, across and up in turn.
 void orderByPlace(std::uint32_t points, std::span<LeafSpots::Place> places, bool across = true) {
   if (places.size() < 2) return;
   const auto half = static_cast<std::ptrdiff_t>(places.size() / 2);
@@ -33,8 +33,9 @@ bool LeafSpots::isNear(std::uint32_t list, const glm::vec2& texel) const {
   return false;
 }
 
-std::uint32_t LeafSpots::add(const Lattice& lattice, std::span<Place> places, bool in_one_frame) {
-  orderByPlace(lattice.points, places);
+void LeafSpots::order(std::uint32_t points, std::span<Place> places) { orderByPlace(points, places); }
+
+std::uint32_t LeafSpots::add(const Lattice& lattice, std::span<const Place> places, bool in_one_frame) {
   List list{lattice, static_cast<std::uint32_t>(places.size()), numbers_.size()};
   if (!in_one_frame) list.first_triangle = triangles_.size();
   for (const auto& place : places) {

@@ -86,9 +86,12 @@ class LeafSpots {
     }
   };
 
-  /// A leaf's spots: puts `places` into an order of which each part is a part of the leaf. `in_one_frame`: texel
-  /// coordinates mean the same on all of their triangles. Returns the list's number. O(n log n).
-  std::uint32_t add(const Lattice& lattice, std::span<Place> places, bool in_one_frame);
+  /// Puts places of a lattice of so many points into the order that lists have, of which each part is a part of the
+  /// leaf: the same, whatever order they come in. O(n log n), 15 us for 256.
+  static void order(std::uint32_t points, std::span<Place> places);
+  /// A leaf's spots, in order. `in_one_frame`: texel coordinates mean the same on all of their triangles. Returns the
+  /// list's number. O(n).
+  std::uint32_t add(const Lattice& lattice, std::span<const Place> places, bool in_one_frame);
   [[nodiscard]] std::uint32_t countOf(std::uint32_t list) const { return lists_[list].count; }
   [[nodiscard]] bool isInOneFrame(std::uint32_t list) const { return lists_[list].first_triangle == kOneFrame; }
   [[nodiscard]] View of(std::uint32_t list) const {

@@ -1,7 +1,6 @@
 #include "server/scene/opacity.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -273,13 +272,8 @@ void measureOpacity(const Scene& scene, PatchScene& patches) {
     for (std::uint32_t first = 0; first < rows; first += step)
       parts.push_back({i, first, std::min(rows, first + step)});
   }
-  std::atomic<std::size_t> next{0}, next_border{0};
-  inShares(parts.size(), [&](std::size_t, std::size_t) {
-    for (auto i = next++; i < parts.size(); i = next++) some[parts[i].of].fill(parts[i].first, parts[i].end);
-  });
-  inShares(some.size(), [&](std::size_t, std::size_t) {
-    for (auto i = next_border++; i < some.size(); i = next_border++) some[i].fillBorders();
-  });
+  inTurns(parts.size(), [&](std::size_t i) { some[parts[i].of].fill(parts[i].first, parts[i].end); });
+  inTurns(some.size(), [&](std::size_t i) { some[i].fillBorders(); });
 }
 
 void applyOpacity(PatchScene& patches) {

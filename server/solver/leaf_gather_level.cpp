@@ -102,35 +102,33 @@ void LeafGather::weighPartedLoss(std::size_t h) {
     double sent = 0.0, even = 0.0, arrives = 0.0;  // `even`: lost by leaves that shine evenly
   };
   parted_loss_[h].assign(sides_.size(), {1.0, 1.0, 1.0});
-  std::vector<bool> loses(sights_.leafCount());
-  bool do_some = false;
-  for (std::uint32_t v = 0; v < loses.size(); ++v) {
-    loses[v] = losesApart(h, v);
-    do_some = do_some || loses[v];
-  }
-  if (!do_some) return;
+  const auto leaves = sights_.leafCount();
+  const auto steps = sights_.steps(h);
+  std::vector<std::uint8_t> loses(sights_.endCount() + steps.size(), 0);  // by end of a ray
+  for (std::uint32_t v = 0; v < leaves; ++v) loses[v] = losesApart(h, v) ? 1 : 0;
+  if (std::ranges::count(loses, 1) == 0) return;
+  for (std::size_t i = 0; i < steps.size(); ++i) loses[sights_.endCount() + i] = loses[steps[i].by];
   auto& radiosity = halves_[h].radiosity;
   std::vector<std::array<Flux, 3>> fluxes(sides_.size());
-  for (std::uint32_t v = 0; v < loses.size(); ++v) {
+  for (std::uint32_t v = 0; v < leaves; ++v) {
     for (std::size_t c = 0; c < 3; ++c) {
       const double sent =
           halves_[h].source[v][c] + static_cast<double>(light_.reflectance[v][static_cast<int>(c)]) * solved(h, c, v);
       radiosity[v][c] = static_cast<float>(sent);
-      if (!loses[v]) continue;
+      if (loses[v] == 0) continue;
       auto& flux = fluxes[part_[sights_.sideOf(v)]][c];
       flux.sent += areaOf(v) * sent;
       flux.even += areaOf(v) * sent * lostOf(h, v).all();
     }
   }
-  for (auto end = sights_.leafCount(); end < sights_.endCount(); ++end) {
+  for (auto end = leaves; end < sights_.endCount(); ++end) {
     for (std::size_t c = 0; c < 3; ++c) radiosity[end][c] = static_cast<float>(halves_[h].source[end][c]);
   }
   followSteps(h, &halves_[h].source);
-  const auto steps = sights_.steps(h);
-  for (std::uint32_t v = 0; v < loses.size(); ++v) {
+  for (std::uint32_t v = 0; v < leaves; ++v) {
     for (const auto end : sights_.seen(h, v)) {
+      if (loses[end] == 0) continue;
       const auto by = end < sights_.endCount() ? end : steps[end - sights_.endCount()].by;
-      if (by >= loses.size() || !loses[by]) continue;
       const double share = areaOf(v) / sights_.counts()[v];
       for (std::size_t c = 0; c < 3; ++c)
         fluxes[part_[sights_.sideOf(by)]][c].arrives += share * static_cast<double>(radiosity[end][c]);

@@ -237,4 +237,18 @@ bool LeafRays::isOpen(const Place& from, const glm::dvec3& to) const {
   return length > 0.0 && !tree_.meets(origin, way / length, 0.0, length - kLift);
 }
 
+std::optional<LeafRays::Place> LeafRays::endOn(std::uint32_t value, const Place& from,
+                                               const glm::dvec3& direction) const {
+  const Side& side = sideOf(value);
+  const auto& surface = patches_.surfaces[side.surface];
+  const auto triangle = patches_.leaves[surface.first_leaf + value - side.first_value].triangle;
+  if (!surface.planar || triangle == scene::kNone) return std::nullopt;
+  const auto& frame = patches_.triangles[triangle];
+  const glm::dvec3 normal(side.side == 0 ? frame.normal : -frame.normal);
+  const double slope = glm::dot(normal, direction);
+  if (slope >= 0.0) return std::nullopt;
+  const double t = glm::dot(normal, glm::dvec3(frame.origin) - from.position) / slope;
+  return Place{from.position + t * direction, normal, value, triangle};
+}
+
 }  // namespace radiosity::solver

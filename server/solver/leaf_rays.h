@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -69,6 +70,8 @@ class LeafRays {
     return has_stand_in_[value] ? foundStandIn(value) : value;
   }
   [[nodiscard]] bool isOpen(const Place& from, const glm::dvec3& to) const;
+  /// Where a ray that ends on a leaf ends, without looking what lies before. Nothing: the leaf's surface is not flat.
+  [[nodiscard]] std::optional<Place> endOn(std::uint32_t value, const Place& from, const glm::dvec3& direction) const;
 
  private:
   const scene::PatchScene& patches_;

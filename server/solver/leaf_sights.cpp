@@ -97,7 +97,7 @@ void LeafSights::layOut(std::span<const std::uint16_t> counts) {
   }
   std::array<PackedNumbers, 2> seen;
   std::array<std::vector<Step>, 2> steps;
-  for (std::size_t half = 0; half < 2; ++half) {
+  inBothHalves([&](std::size_t half) {
     seen[half] = roomFor(all, steps_[half].size());
     std::size_t old_first = 0, new_first = 0;
     for (std::uint32_t value = 0; value < leaf_count_; ++value) {
@@ -109,7 +109,7 @@ void LeafSights::layOut(std::span<const std::uint16_t> counts) {
       old_first += count_[value];
       new_first += count[value];
     }
-  }
+  });
   count_ = std::move(count);
   first_ = std::move(first);
   seen_ = std::move(seen);
@@ -240,19 +240,16 @@ std::uint32_t LeafSights::beginSlice() {
 void LeafSights::traceSlice(std::uint32_t end) {
   const auto parts = (end - cursor_ + kLeavesAtOnce - 1) / kLeavesAtOnce;
   std::vector<std::array<NewSteps, 2>> made(parts);
-  std::atomic<std::uint32_t> next{0};
   std::atomic<std::uint64_t> traced{0};
-  inShares(parts, [&](std::size_t, std::size_t) {
-    for (auto part = next++; part < parts; part = next++) {
-      const auto from = cursor_ + part * kLeavesAtOnce;
-      std::uint64_t rays = 0;
-      for (auto value = from; value < std::min(end, from + kLeavesAtOnce); ++value) {
-        if (count_[value] == 0) continue;
-        const Side& side = rays_->sideOf(value);
-        for (std::size_t half = 0; half < 2; ++half) rays += traceLeaf(value, side, half, made[part][half]);
-      }
-      traced += rays;
+  inTurns(parts, [&](std::size_t part) {
+    const auto from = cursor_ + static_cast<std::uint32_t>(part) * kLeavesAtOnce;
+    std::uint64_t rays = 0;
+    for (auto value = from; value < std::min(end, from + kLeavesAtOnce); ++value) {
+      if (count_[value] == 0) continue;
+      const Side& side = rays_->sideOf(value);
+      for (std::size_t half = 0; half < 2; ++half) rays += traceLeaf(value, side, half, made[part][half]);
     }
+    traced += rays;
   });
   takeSteps(made);
   traced_ += traced;

@@ -1,7 +1,6 @@
 #include "server/solver/leaf_smoother.h"
 
 #include <algorithm>
-#include <atomic>
 #include <numeric>
 
 #include "common/give_back.h"
@@ -181,15 +180,12 @@ void LeafSmoother::smooth(std::array<std::vector<Light>, 2>& halves) {
   towards_.assign(kPasses.size(), std::vector<float>(area_.size(), 0.0F));
   taken_.assign(area_.size(), 0.0);
   by_chance_.assign(area_.size(), 0.0);
-  std::atomic<std::size_t> next{0};
-  inShares(sides_.size(), [&](std::size_t, std::size_t) {
-    for (auto s = next++; s < sides_.size(); s = next++) {
-      const auto& side = sides_[s];
-      for (std::size_t pass = 0; pass < kPasses.size(); ++pass)
-        if (isFor(kPasses[pass], side)) smoothSide(side, pass, raw, halves);
-      for (auto v = side.first_value; v < side.first_value + side.leaf_count; ++v)
-        taken_[v] = areaOf(v) * dot(less(halves[0][v], raw[0][v]), less(halves[1][v], raw[1][v]));
-    }
+  inTurns(sides_.size(), [&](std::size_t s) {
+    const auto& side = sides_[s];
+    for (std::size_t pass = 0; pass < kPasses.size(); ++pass)
+      if (isFor(kPasses[pass], side)) smoothSide(side, pass, raw, halves);
+    for (auto v = side.first_value; v < side.first_value + side.leaf_count; ++v)
+      taken_[v] = areaOf(v) * dot(less(halves[0][v], raw[0][v]), less(halves[1][v], raw[1][v]));
   });
   bias_ = std::max(0.0, std::reduce(taken_.begin(), taken_.end())) + std::reduce(by_chance_.begin(), by_chance_.end());
 }

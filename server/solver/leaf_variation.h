@@ -149,12 +149,22 @@ class LeafVariation {
   [[nodiscard]] const Known* findKnown(std::uint32_t receiver, std::uint32_t index, std::size_t half) const;
   void keepPaths(const LeafVariation& former, std::size_t half, std::span<const std::uint32_t> value_after,
                  const std::vector<bool>& clear, const Shadows* change, std::span<const LightPolygon> lights);
+  [[nodiscard]] bool passesNothing(const Path& path, const Shadows& change, std::span<const LightPolygon> lights) const;
   void forgetFormer();
+  /// From a receiver; and where the other place of the leaf that it meets lies on that.
+  struct Way {
+    Place from;
+    glm::dvec3 direction;
+    glm::dvec2 at;
+  };
+  [[nodiscard]] Way firstWay(std::uint32_t receiver, std::uint64_t key) const;
   [[nodiscard]] bool findPlaces(std::uint32_t receiver, std::uint64_t key, std::array<Place, 2>& places) const;
+  [[nodiscard]] static glm::dvec3 wayOn(const Path& path, const Place& from);
+  [[nodiscard]] static glm::dvec3 pointOn(const LightPolygon& lamp, const Path& path);
   template <typename Unhidden>
   [[nodiscard]] static Drawn draw(std::size_t count, std::uint64_t key, const Unhidden& unhidden);
-  void followLight(const std::array<Place, 2>& places, std::uint64_t key, const LeafLight& light, Path& path) const;
-  void followSource(const std::array<Place, 2>& places, std::uint64_t key, const LeafLight& light, Path& path) const;
+  void followLight(const std::array<Place, 2>& places, const LeafLight& light, Path& path) const;
+  void followSource(const std::array<Place, 2>& places, const LeafLight& light, Path& path) const;
   [[nodiscard]] Lack lacking(const Path& path, const LeafLight& light, std::size_t half) const;
   void sumUp(const LeafLight& light);
   void correct();

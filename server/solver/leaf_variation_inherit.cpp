@@ -53,15 +53,18 @@ void LeafVariation::keepPaths(const LeafVariation& former, std::size_t half, std
     for (std::size_t c = 1; c < light.corner_count; ++c)
       reach.back() = std::max(reach.back(), glm::distance(light.corners[0], light.corners[c]));
   }
-  // What it sees of what it meets, and of the light that was drawn for it, none of which moved.
+  // What it sees of what it meets, and of the light that was drawn for it, none of which moved. Leaves and lamps as a
+  // whole tell of most; something large right under a lamp is between it and most leaves, but not in most ways.
   const auto isWhatItWas = [&](Path& path) {
     path.by = after(path.by);
-    if (path.by == scene::kNone) return false;
+    bool may_pass = !lights.empty() && path.by != scene::kNone &&
+                    change->isPassed(path.by, lights[path.light].corners[0], reach[path.light]);
     for (auto& seen : path.seen) {
       seen = after(seen);  // nothing of the sky, and of what receives no light
-      if (seen == scene::kNone || change->mayHide(path.by, seen)) return false;
+      if (seen == scene::kNone || path.by == scene::kNone) return false;
+      may_pass = may_pass || change->mayHide(path.by, seen);
     }
-    return lights.empty() || !change->isPassed(path.by, lights[path.light].corners[0], reach[path.light]);
+    return !may_pass || passesNothing(path, *change, lights);
   };
   for (auto path : former.paths_[half]) {
     const auto receiver = after(path.receiver);
@@ -75,6 +78,20 @@ void LeafVariation::keepPaths(const LeafVariation& former, std::size_t half, std
     there_[half].push_back(known);
   }
   std::ranges::sort(there_[half], {}, &Known::number);
+}
+
+/// By its very ways, of a path in the numbers of this scene whose first part is as it was.
+bool LeafVariation::passesNothing(const Path& path, const Shadows& change, std::span<const LightPolygon> lights) const {
+  const auto way = firstWay(path.receiver, path.key);
+  const auto end = rays_->endOn(path.by, way.from, way.direction);
+  if (!end) return false;
+  const std::array<Place, 2> places{*end, rays_->placeOn(path.by, way.at)};
+  for (std::size_t p = 0; p < 2; ++p) {
+    const glm::vec3 from(places[p].position);
+    if (change.mayHide(from, glm::vec3(wayOn(path, places[p])), path.seen[p])) return false;
+    if (!lights.empty() && change.isPassed(from, glm::vec3(pointOn(lights[path.light], path)))) return false;
+  }
+  return true;
 }
 
 /// Nothing: no leaf is near that way.

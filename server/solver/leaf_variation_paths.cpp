@@ -22,10 +22,12 @@ constexpr double kNear = 4.0;
 constexpr double kOnLamp = 1e-6;
 /// Light from directions without an end comes from there.
 constexpr double kFar = 4.0;
-/// Fewer tasks than these are not worth a thread.
-constexpr std::size_t kTasksAShare = 256;
+/// Fewer tasks than these are not worth a thread's turn.
+constexpr std::size_t kTasksAShare = 64;
 
 using Kind = PunctualLights::Source::Kind;
+
+std::uint64_t keyOfLight(std::uint64_t path_key) { return mixKeys(path_key, 3); }
 
 /// Form factor of the whole lamp.
 double unhiddenLight(const LightPolygon& lamp, const LeafRays::Place& place) {
@@ -83,16 +85,27 @@ LeafVariation::Drawn LeafVariation::draw(std::size_t count, std::uint64_t key, c
   return drawn;
 }
 
-void LeafVariation::followLight(const std::array<Place, 2>& places, std::uint64_t key, const LeafLight& light,
-                                Path& path) const {
+/// Where a path goes on from either place.
+glm::dvec3 LeafVariation::wayOn(const Path& path, const Place& from) {
+  const glm::dvec4 second = sobol4(0, mixKeys(path.key, 2));
+  return cosineDirection(from.normal, second.x, second.y);
+}
+
+/// Of the lamp that was drawn for it.
+glm::dvec3 LeafVariation::pointOn(const LightPolygon& lamp, const Path& path) {
+  const glm::dvec4 at = sobol4(0, keyOfLight(path.key));
+  return {lamp.point(at.x, at.y)};
+}
+
+void LeafVariation::followLight(const std::array<Place, 2>& places, const LeafLight& light, Path& path) const {
+  const auto key = keyOfLight(path.key);
   const auto drawn = draw(light.lights.size(), key, [&](std::uint32_t i) -> std::array<double, 2> {
     const auto& lamp = light.lights[i];
     if (lamp.emission == glm::vec3(0.0F)) return {0.0, 0.0};
     return {unhiddenLight(lamp, places[0]), unhiddenLight(lamp, places[1])};
   });
   if (drawn.chance <= 0.0) return;
-  const glm::dvec4 at = sobol4(0, key);
-  const glm::dvec3 point(light.lights[drawn.index].point(at.x, at.y));
+  const auto point = pointOn(light.lights[drawn.index], path);
   double factor = 0.0;
   const auto& lamp = light.lights[drawn.index];
   for (std::size_t p = 0; p < 2; ++p) {
@@ -107,8 +120,8 @@ void LeafVariation::followLight(const std::array<Place, 2>& places, std::uint64_
   path.light_factor = static_cast<float>(factor / drawn.chance);
 }
 
-void LeafVariation::followSource(const std::array<Place, 2>& places, std::uint64_t key, const LeafLight& light,
-                                 Path& path) const {
+void LeafVariation::followSource(const std::array<Place, 2>& places, const LeafLight& light, Path& path) const {
+  const auto key = mixKeys(path.key, 4);
   const auto drawn = draw(light.sources.size(), key, [&](std::uint32_t i) -> std::array<double, 2> {
     const auto& source = light.sources[i];
     if (source.intensity == glm::dvec3(0.0)) return {0.0, 0.0};
@@ -130,13 +143,18 @@ bool LeafVariation::isNear(const LeafRays::Sight& sight) const {
   return sight.end.value < LeafRays::kSkyBelow && sight.distance <= kNear * rays_->widthOf(sight.end.value);
 }
 
-/// Where a path passes the leaf near by, and the other place of that. False: no leaf is near that way.
-bool LeafVariation::findPlaces(std::uint32_t receiver, std::uint64_t key, std::array<Place, 2>& places) const {
+LeafVariation::Way LeafVariation::firstWay(std::uint32_t receiver, std::uint64_t key) const {
   const glm::dvec4 at = sobol4(0, key), first = sobol4(0, mixKeys(key, 1));
   const auto from = rays_->placeOn(receiver, {at.x, at.y});
-  const auto sight = rays_->look(from, cosineDirection(from.normal, first.x, first.y), kNear * rays_->greatestWidth());
+  return {from, cosineDirection(from.normal, first.x, first.y), {first.z, first.w}};
+}
+
+/// Where a path passes the leaf near by, and the other place of that. False: no leaf is near that way.
+bool LeafVariation::findPlaces(std::uint32_t receiver, std::uint64_t key, std::array<Place, 2>& places) const {
+  const auto way = firstWay(receiver, key);
+  const auto sight = rays_->look(way.from, way.direction, kNear * rays_->greatestWidth());
   if (!isNear(sight)) return false;
-  places = {sight.end, rays_->placeOn(sight.end.value, {first.z, first.w})};
+  places = {sight.end, rays_->placeOn(sight.end.value, way.at)};
   return true;
 }
 
@@ -159,9 +177,8 @@ void LeafVariation::follow(const Task& task, std::size_t half, const LeafLight& 
     path.receiver = task.receiver;
     if (!findPlaces(path.receiver, path.key, places)) continue;
     path.by = places[0].value;
-    const glm::dvec4 second = sobol4(0, mixKeys(path.key, 2));
     for (std::size_t p = 0; p < 2; ++p) {
-      const auto seen = rays_->look(places[p], cosineDirection(places[p].normal, second.x, second.y));
+      const auto seen = rays_->look(places[p], wayOn(path, places[p]));
       path.seen[p] = seen.end.value;
       path.sees_near = path.sees_near || isNear(seen);
     }
@@ -172,8 +189,8 @@ void LeafVariation::follow(const Task& task, std::size_t half, const LeafLight& 
 
 void LeafVariation::followLights(const std::array<Place, 2>& places, const LeafLight& light, Path& path) const {
   path.light_factor = path.source_factor = 0.0F;
-  followLight(places, mixKeys(path.key, 3), light, path);
-  followSource(places, mixKeys(path.key, 4), light, path);
+  followLight(places, light, path);
+  followSource(places, light, path);
 }
 
 /// Other lights shine than did: where paths go stays as it is. Of what is switched off, and on again, it is kept what
@@ -222,11 +239,9 @@ void LeafVariation::trace(std::span<const Task> tasks, const LeafLight& light) {
   std::vector<std::array<std::vector<Path>, 2>> found;
   const std::size_t shares = std::max<std::size_t>(1, tasks.size() / kTasksAShare);
   found.resize(shares);
-  inShares(shares, [&](std::size_t first, std::size_t apart) {
-    for (auto share = first; share < shares; share += apart) {
-      for (auto i = share * tasks.size() / shares; i < (share + 1) * tasks.size() / shares; ++i) {
-        for (std::size_t half = 0; half < 2; ++half) follow(tasks[i], half, light, found[share][half]);
-      }
+  inTurns(shares, [&](std::size_t share) {
+    for (auto i = share * tasks.size() / shares; i < (share + 1) * tasks.size() / shares; ++i) {
+      for (std::size_t half = 0; half < 2; ++half) follow(tasks[i], half, light, found[share][half]);
     }
   });
   for (std::size_t half = 0; half < 2; ++half) {  // all room first: without memory nothing is to be there twice

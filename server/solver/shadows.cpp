@@ -27,6 +27,8 @@ constexpr float kHalfDiagonal = 0.7072F;
 constexpr float kMissed = -1.0F;
 /// Boxes are larger by this (unit box) than they are, where numbers are rounded that are of its size.
 constexpr float kRounding = 1e-6F;
+/// Rays start a little before a place (unit box).
+constexpr float kOfPlace = 1e-5F;
 /// Slopes this small do not leave where they are.
 constexpr float kLevel = 1e-20F;
 
@@ -212,8 +214,19 @@ bool Shadows::isPassed(std::uint32_t value, std::uint32_t to) const {
   return isPassed(Boxes{change_.boxes, around_}, ball_[value], ball_[to]);
 }
 
+bool Shadows::isPassed(const glm::vec3& from, const glm::vec3& to) const {
+  return isPassed(Boxes{change_.boxes, around_}, glm::vec4(from, kOfPlace), glm::vec4(to, kOfPlace));
+}
+
 bool Shadows::mayHide(std::uint32_t value, std::uint32_t to) const {
   return isPassed(Boxes{change_.came, around_came_}, ball_[value], ball_[to]);
+}
+
+bool Shadows::mayHide(const glm::vec3& from, const glm::vec3& direction, std::uint32_t to) const {
+  const auto& ball = ball_[to];
+  const auto end = from + (glm::distance(from, glm::vec3(ball)) + ball.w) * direction;
+  return isPassed(Boxes{change_.came, around_came_}, glm::vec4(from, kOfPlace),
+                  glm::vec4(end, ball.w < 0.0F ? ball.w : kOfPlace));
 }
 
 bool Shadows::sees(const glm::vec3& point, const glm::vec3& normal) const {

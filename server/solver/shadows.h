@@ -39,8 +39,12 @@ class Shadows {
   /// another leaf.
   [[nodiscard]] bool isPassed(std::uint32_t value, const glm::vec3& to, float radius) const;
   [[nodiscard]] bool isPassed(std::uint32_t value, std::uint32_t to) const;
+  /// Whether the way from a place to another may pass a box.
+  [[nodiscard]] bool isPassed(const glm::vec3& from, const glm::vec3& to) const;
   /// Of two leaves, whether anything that came may hide places of one from the other.
   [[nodiscard]] bool mayHide(std::uint32_t value, std::uint32_t to) const;
+  /// Whether it may lie before where a ray from a place, in a unit direction, ends on a leaf.
+  [[nodiscard]] bool mayHide(const glm::vec3& from, const glm::vec3& direction, std::uint32_t to) const;
   /// Whether a half space can see any of it.
   [[nodiscard]] bool sees(const glm::vec3& point, const glm::vec3& normal) const;
 

@@ -206,6 +206,7 @@ TEST_F(GatherBesideHoles, WhatASolidHidesOfALeafIsMissedOnce) {
   leaf.full = false;
   std::vector<scene::LeafSpots::Place> places;
   for (std::uint16_t i = 0; i < 64; ++i) places.push_back({i, leaf.triangle});
+  scene::LeafSpots::order(64, places);
   leaf.spot_list = made->spots.add({{1.5F, 0.0F}, {0.5F, 1.0F}, 64}, places, true);
   scene_ = made;
   double open = 0.0, seen = 0.0;

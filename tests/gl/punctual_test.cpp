@@ -252,6 +252,7 @@ TEST_F(Punctual, ALeafThatTurnsAwayFromTheSkyTakesWhatAnotherOfItsTrianglesSees)
   leaf.full = false;
   std::vector<scene::LeafSpots::Place> places;
   for (std::uint16_t i = 0; i < 64; ++i) places.push_back({i, i % 2 == 0 ? own : other});
+  scene::LeafSpots::order(64, places);
   leaf.spot_list = scene->spots.add({glm::vec2(0.5F), glm::vec2(0.0F), 64}, places, false);
   solver::LightSources sources;
   sources.sky = {glm::vec3(1.0F), glm::vec3(0.0F)};

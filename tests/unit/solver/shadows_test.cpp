@@ -147,7 +147,7 @@ TEST_F(ShadowsTest, EveryWayThatPassesWhatChangedIsFound) {
 }
 
 TEST_F(ShadowsTest, OfLeavesAndLampsEveryWayThatIsPassedIsToldFromMostThatAreNot) {
-  std::size_t cut = 0, told = 0, asked = 0;
+  std::size_t cut = 0, told = 0, asked = 0, told_of_leaves = 0, told_of_ways = 0;
   for (int round = 0; round < 40; ++round) {
     makeScene();
     const Shadows shadows(*scene_.patches, sides_, makeChange());
@@ -170,10 +170,17 @@ TEST_F(ShadowsTest, OfLeavesAndLampsEveryWayThatIsPassedIsToldFromMostThatAreNot
       const bool to_lamp = shadows.isPassed(side.first_value + leaf, glm::vec3(lamp), static_cast<float>(radius));
       const bool hides = shadows.mayHide(side.first_value + leaf, other.first_value + seen);
       const auto from = placeOn(side, leaf), to = placeOn(other, seen);
+      const bool way_to_leaf = shadows.isPassed(glm::vec3(from), glm::vec3(to));
+      const bool way_hides =
+          shadows.mayHide(glm::vec3(from), glm::vec3(glm::normalize(to - from)), other.first_value + seen);
       const bool cut_to_leaf = isCutBetween(from, to), hidden = isCutBetween(from, to, triangles_.size() - 6);
       const bool cut_to_lamp = isCutBetween(from, lamp + uniform(0.0, radius) * direction());
       ASSERT_TRUE(to_leaf || !cut_to_leaf) << "round " << round << ", " << i;
       ASSERT_TRUE(hides || !hidden) << "round " << round << ", " << i;
+      ASSERT_TRUE(way_to_leaf || !cut_to_leaf) << "round " << round << ", " << i;
+      ASSERT_TRUE(way_hides || !hidden) << "round " << round << ", " << i;
+      told_of_leaves += to_leaf ? 1U : 0U;
+      told_of_ways += way_to_leaf ? 1U : 0U;
       ASSERT_TRUE(to_leaf || !hides) << "what came is a part of what changed";
       ASSERT_TRUE(to_lamp || !cut_to_lamp) << "round " << round << ", " << i;
       asked += 2;
@@ -183,6 +190,7 @@ TEST_F(ShadowsTest, OfLeavesAndLampsEveryWayThatIsPassedIsToldFromMostThatAreNot
   }
   EXPECT_GT(cut, 1'000U) << "enough to tell";
   EXPECT_LT(told, asked / 2);
+  EXPECT_LT(told_of_ways, 3 * told_of_leaves / 4) << "single ways are worth asking for";
 }
 
 }  // namespace
