@@ -120,6 +120,7 @@ void Bvh::build() {
     pending.push_back({child, task.depth + 1});
     pending.push_back({child + 1, task.depth + 1});
   }
+  nodes_.shrink_to_fit();
 }
 
 /// Reorders order_[first, first + count) and returns how many go left; never all or none.

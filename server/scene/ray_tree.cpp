@@ -46,7 +46,9 @@ __attribute__((always_inline)) inline void RayTree::meetTriangles(const Block& b
 }
 
 RayTree::RayTree(const Bvh& tree)
-    : nodes_(tree, [&](std::uint32_t first, std::uint32_t count) { return addBlock(tree, first, count); }) {}
+    : nodes_(tree, [&](std::uint32_t first, std::uint32_t count) { return addBlock(tree, first, count); }) {
+  blocks_.shrink_to_fit();
+}
 
 std::uint32_t RayTree::addBlock(const Bvh& tree, std::uint32_t first, std::uint32_t count) {
   Block block{};

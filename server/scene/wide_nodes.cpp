@@ -65,6 +65,7 @@ WideNodes::WideNodes(const Bvh& tree, const NumberLeaf& leaf) {
     }
     nodes_[task.to] = node;
   }
+  nodes_.shrink_to_fit();
 }
 
 /// Up to kWidth nodes that make up all of a node: the largest are opened first, and none that fits in a block.

@@ -104,6 +104,7 @@ void Gmres<Real>::startCycle() {
       residual[i] = weight_[i] > Real{0} ? solution_[c][i] - x_[c][i] : Real{0};
     residual_[c] = std::sqrt(product(residual, residual));
     channel.basis.clear();
+    channel.triangle.clear();
     channel.columns = 0;
     // What is no number any more will not become one.
     channel.growing = residual_[c] > tolerance_[c] && std::isfinite(residual_[c]);
@@ -124,6 +125,7 @@ void Gmres<Real>::addColumn(std::size_t c, std::vector<Real>& image) {
   const std::size_t k = channel.columns++;
   const auto& last = channel.basis.back();
   for (std::size_t i = 0; i < image.size(); ++i) image[i] = weight_[i] > Real{0} ? last[i] - image[i] : Real{0};
+  channel.triangle.resize(k + 1);
   auto& column = channel.triangle[k];
   const double before = std::sqrt(product(image, image));
   for (std::size_t j = 0; j <= k; ++j) {

@@ -41,7 +41,7 @@ class Gmres {
   /// The least squares of one channel, brought up to date column by column by Givens rotations.
   struct Channel {
     std::vector<std::vector<Real>> basis;
-    std::array<std::array<double, kRestart>, kRestart> triangle{};  // by column
+    std::vector<std::array<double, kRestart>> triangle;  // by column
     std::array<double, kRestart> cosine{}, sine{};
     std::array<double, kRestart + 1> right{};
     std::size_t columns = 0;

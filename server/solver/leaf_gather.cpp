@@ -81,11 +81,12 @@ std::size_t timesOfFew(std::size_t leaves, std::size_t fewest) {
 }  // namespace
 
 LeafGather::LeafGather(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed,
-                       std::size_t most_bytes, std::shared_ptr<const LeafRays> rays)
+                       std::size_t most_bytes, std::shared_ptr<const LeafRays> rays, std::span<const float> areas)
     : sights_(patches, sides, seed, std::move(rays)),
       most_bytes_(most_bytes),
       sides_(sides),
-      area_(leafAreas(patches, sides)) {
+      own_area_(areas.empty() ? leafAreas(patches, sides) : std::vector<float>()),
+      area_(areas.empty() ? std::span<const float>(own_area_) : areas) {
   const std::size_t leaves = sights_.leafCount(), first = leaves * kFirstRays * LeafSights::kRayBytes;
   sights_.limit(most_bytes - std::min(most_bytes, leastBytes(leaves) - first), sizeof(Light32));
 }
@@ -218,7 +219,7 @@ void LeafGather::takeLight(std::size_t h) {
   }
   RayGmres::Vectors nothing;
   for (auto& channel : nothing) channel.assign(leaves, 0.0F);
-  half.gmres.begin(std::move(nothing), area_, tolerance, kMaxSweeps);
+  half.gmres.begin(std::move(nothing), {area_.begin(), area_.end()}, tolerance, kMaxSweeps);
   half.done = false;
 }
 

@@ -30,6 +30,7 @@
 #include "server/solver/gmres.h"
 #include "server/solver/leaf_sights.h"
 #include "server/solver/leaf_smoother.h"
+#include "server/solver/lost_rays.h"
 
 namespace radiosity::solver {
 
@@ -45,9 +46,11 @@ struct LeftLight {
 class LeafGather {
  public:
   /// `most_bytes`: for all that it remembers; rays that would take more are not asked for.
-  /// `rays`: as of LeafSights.
+  /// `rays`: as of LeafSights. `areas`: leafAreas(), which are to outlive it; empty: it finds them itself.
   LeafGather(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed,
-             std::size_t most_bytes, std::shared_ptr<const LeafRays> rays = nullptr);
+             std::size_t most_bytes, std::shared_ptr<const LeafRays> rays = nullptr, std::span<const float> areas = {});
+  LeafGather(const LeafGather&) = delete;
+  LeafGather& operator=(const LeafGather&) = delete;
 
   /// What the equation takes at most, without rays, and with those that a solve begins with.
   [[nodiscard]] static std::size_t leastBytes(std::size_t leaves);
@@ -189,14 +192,10 @@ class LeafGather {
   std::size_t most_bytes_;
   bool has_gathered_ = false, lacks_memory_ = false;
   const std::vector<Side>& sides_;
-  std::vector<float> area_;  ///< by leaf value, unit box squared
+  std::vector<float> own_area_;
+  std::span<const float> area_;  ///< by leaf value, unit box squared
   [[nodiscard]] double areaOf(std::size_t value) const { return static_cast<double>(area_[value]); }
   // Of the rays that there are:
-  /// Of a leaf's rays: into the sky, on unlit sides, and of which it is not told where they end.
-  struct LostRays {
-    std::uint16_t above = 0, below = 0, absorbed = 0, doubtful = 0;
-    bool operator==(const LostRays&) const = default;
-  };
   /// As parts of all of them.
   struct Lost {
     float above = 0.0F, below = 0.0F, absorbed = 0.0F, doubtful = 0.0F;
@@ -207,7 +206,7 @@ class LeafGather {
     const auto count = sights_.counts()[value];
     if (lost_[half].empty() || count == 0) return {};
     const auto part = [one = 1.0F / static_cast<float>(count)](std::uint16_t rays) { return rays * one; };
-    const auto& rays = lost_[half][value];
+    const auto rays = lost_[half].at(value);
     return {part(rays.above), part(rays.below), part(rays.absorbed), part(rays.doubtful)};
   }
   [[nodiscard]] double skyAt(const Lost& lost, std::size_t channel) const;
@@ -216,7 +215,7 @@ class LeafGather {
   std::optional<LeafSmoother> smoother_;
   bool has_parted_ = false;                                        ///< leaves, as of LeafSights
   std::array<std::vector<std::array<double, 3>>, 2> parted_loss_;  ///< by half, part and channel: see there
-  std::array<std::vector<LostRays>, 2> lost_;                      ///< by half and leaf value; empty: none
+  std::array<LostRays, 2> lost_;                                   ///< by half; empty: none
   std::vector<std::uint32_t> part_;  ///< by side: which part of the scene, whose number is that of a side
   LeftLight light_;
   Stage stage_ = Stage::kDone;

@@ -54,14 +54,14 @@ void LeafGather::weighRays() {
 }
 
 void LeafGather::weighRays(std::size_t half, Parts& parts) {
-  lost_[half].assign(sights_.leafCount(), {});
+  lost_[half] = LostRays(sights_.leafCount());
   const auto steps = sights_.steps(half);
   std::vector<std::uint32_t> joined(sides_.size(), scene::kNone);  // by side: the last that it was joined to
   std::size_t first = 0;
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
     for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count;
          first += sights_.counts()[v++]) {
-      LostRays lost;
+      LostRays::Counts lost;
       for (const auto end : sights_.ends(half, first, sights_.counts()[v])) {
         if (end == sights_.skyAbove()) ++lost.above;
         if (end == sights_.skyBelow()) ++lost.below;
@@ -71,11 +71,10 @@ void LeafGather::weighRays(std::size_t half, Parts& parts) {
         const auto seen = sights_.sideOf(end < sights_.endCount() ? end : steps[end - sights_.endCount()].by);
         if (std::exchange(joined[seen], s) != s) parts.join(s, seen);
       }
-      lost_[half][v] = lost;
+      lost_[half].add(v, lost);
     }
   }
-  // Of a closed room nothing is lost.
-  if (std::ranges::all_of(lost_[half], [](const LostRays& lost) { return lost == LostRays{}; })) giveBack(lost_[half]);
+  if (lost_[half].isNothing()) lost_[half] = {};  // of a closed room
   for (const auto& step : steps) {
     const auto next = step.next < sights_.endCount() ? step.next : steps[step.next - sights_.endCount()].by;
     if (next < sights_.leafCount()) parts.join(sights_.sideOf(step.by), sights_.sideOf(next));

@@ -78,7 +78,7 @@ bool LeafSmoother::isFor(const Pass& pass, const Side& side) {
   return std::max(side.width, side.height) > 2 * pass.step();
 }
 
-LeafSmoother::LeafSmoother(const std::vector<Side>& sides, const std::vector<float>& area,
+LeafSmoother::LeafSmoother(const std::vector<Side>& sides, std::span<const float> area,
                            const std::function<bool(std::uint32_t)>& is_parted)
     : sides_(sides), area_(area), is_parted_(area.size(), false), beside_(sides.size()) {
   for (std::size_t s = 0; s < sides.size() && is_parted; ++s) findParted(s, is_parted);
@@ -99,6 +99,7 @@ void LeafSmoother::findParted(std::size_t s, const std::function<bool(std::uint3
   }
   for (std::uint32_t leaf = 0; leaf < beside.size(); ++leaf)
     if (beside[leaf]) beside_[s].push_back({leaf, {}});
+  beside_[s].shrink_to_fit();
   for (auto& one : beside_[s])
     for (std::size_t k = 0; k < kSteps.size(); ++k) one.open[k] = openWays(side, one.leaf, kSteps[k]);
 }

@@ -23,7 +23,7 @@ class LeafSmoother {
 
   /// `area`: by leaf value, 0 where there is no leaf. Both are to outlive it. `is_parted`: by leaf value, whether light
   /// may be another on both sides of something that stands there: no mean is taken of it, nor across it.
-  LeafSmoother(const std::vector<Side>& sides, const std::vector<float>& area,
+  LeafSmoother(const std::vector<Side>& sides, std::span<const float> area,
                const std::function<bool(std::uint32_t)>& is_parted = {});
 
   /// Smooths both halves (by leaf value), and remembers how. O(leaves).
@@ -67,7 +67,7 @@ class LeafSmoother {
   [[nodiscard]] double areaOf(std::size_t value) const { return static_cast<double>(area_[value]); }
 
   const std::vector<Side>& sides_;
-  const std::vector<float>& area_;
+  std::span<const float> area_;
   std::vector<bool> is_parted_;  ///< by leaf value: nothing is taken of it, nor across it
   /// By side: leaves so near to such leaves that some means may not be taken.
   std::vector<std::vector<Beside>> beside_;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "common/check.h"
 #include "common/give_back.h"
 #include "server/solver/halves.h"
 #include "server/solver/sampling.h"
@@ -25,7 +26,7 @@ constexpr double kOwnNoise = 0.25;
 constexpr double kDoubtful = 0.1;
 /// A receiver never has more paths than these; a round of refinement adds no more than those in all.
 constexpr std::uint32_t kMostPaths = 4096, kMostAdded = 16'384;
-/// And all together never more than these, 56 MB, and 16 MB for lights that shone before.
+/// And all together never more than these, 32 MB, and 12 MB for lights that shone before.
 constexpr std::size_t kMostInAll = 1'000'000;
 /// A round of refinement is for the receivers with so much of what it could lower.
 constexpr double kRefinedPart = 0.8;
@@ -109,6 +110,7 @@ std::vector<LeafVariation::Task> LeafVariation::twiceAsMany() const {
 }
 
 void LeafVariation::update(const LeafLight& light, double bound) {
+  RAD_CHECK(std::max(light.lights.size(), light.sources.size()) <= std::size_t{1} << 16U);  // paths number them
   std::uint64_t shining = 1;
   for (std::size_t i = 0; i < light.lights.size(); ++i)
     if (light.lights[i].emission != glm::vec3(0.0F)) shining = mixKeys(shining, mixKeys(i, light.lights[i].key));

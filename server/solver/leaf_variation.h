@@ -96,18 +96,17 @@ class LeafVariation {
   using Place = LeafRays::Place;
   /// A way from a receiver over a leaf near by, and from another place of that.
   struct Path {
-    std::uint64_t key = 0;                            ///< of its draws
     std::uint32_t receiver = 0;                       ///< leaf value
     std::uint32_t by = 0;                             ///< leaf value of the leaf near by
     std::array<std::uint32_t, 2> seen{};              ///< leaf values that its two places see
-    std::uint32_t light = 0, source = 0;              ///< one of each
     float light_factor = 0.0F, source_factor = 0.0F;  ///< what the first place has of them more than the second
-    std::uint16_t index = 0;                          ///< which one of the receiver's, in its half
-    bool sees_near = false;                           ///< one of `seen` is near, and may vary within itself
+    std::uint16_t light = 0, source = 0;              ///< one of each
+    std::uint16_t index : 15 = 0;                     ///< which one of the receiver's, in its half
+    std::uint16_t sees_near : 1 = 0;                  ///< one of `seen` is near, and may vary within itself
   };
   /// Of a path: what it has of the lights that shine.
   struct Lit {
-    std::uint32_t light, source;
+    std::uint16_t light, source;
     float light_factor, source_factor;
   };
   /// Irradiance that a receiver lacks: what is sure, and what comes over a second leaf near by, of whose light the mean
@@ -134,7 +133,7 @@ class LeafVariation {
   void traceAll(const LeafLight& light);
   void trace(std::span<const Task> tasks, const LeafLight& light);
   void follow(const Task& task, std::size_t half, const LeafLight& light, std::vector<Path>& paths) const;
-  void followLights(const std::array<Place, 2>& places, const LeafLight& light, Path& path) const;
+  void followLights(const std::array<Place, 2>& places, std::uint64_t key, const LeafLight& light, Path& path) const;
   void takeOtherLights(const LeafLight& light, std::uint64_t shining);
   void followOtherLights(const LeafLight& light, std::size_t half, std::size_t first);
   /// Of the scene before: a path that there was.
@@ -149,7 +148,8 @@ class LeafVariation {
   [[nodiscard]] const Known* findKnown(std::uint32_t receiver, std::uint32_t index, std::size_t half) const;
   void keepPaths(const LeafVariation& former, std::size_t half, std::span<const std::uint32_t> value_after,
                  const std::vector<bool>& clear, const Shadows* change, std::span<const LightPolygon> lights);
-  [[nodiscard]] bool passesNothing(const Path& path, const Shadows& change, std::span<const LightPolygon> lights) const;
+  [[nodiscard]] bool passesNothing(const Path& path, std::size_t half, const Shadows& change,
+                                   std::span<const LightPolygon> lights) const;
   void forgetFormer();
   /// From a receiver; and where the other place of the leaf that it meets lies on that.
   struct Way {
@@ -159,12 +159,14 @@ class LeafVariation {
   };
   [[nodiscard]] Way firstWay(std::uint32_t receiver, std::uint64_t key) const;
   [[nodiscard]] bool findPlaces(std::uint32_t receiver, std::uint64_t key, std::array<Place, 2>& places) const;
-  [[nodiscard]] static glm::dvec3 wayOn(const Path& path, const Place& from);
-  [[nodiscard]] static glm::dvec3 pointOn(const LightPolygon& lamp, const Path& path);
+  /// Of the draws of a path.
+  [[nodiscard]] std::uint64_t keyOf(std::uint32_t receiver, std::uint32_t index, std::size_t half) const;
+  [[nodiscard]] static glm::dvec3 wayOn(std::uint64_t key, const Place& from);
+  [[nodiscard]] static glm::dvec3 pointOn(const LightPolygon& lamp, std::uint64_t key);
   template <typename Unhidden>
   [[nodiscard]] static Drawn draw(std::size_t count, std::uint64_t key, const Unhidden& unhidden);
-  void followLight(const std::array<Place, 2>& places, const LeafLight& light, Path& path) const;
-  void followSource(const std::array<Place, 2>& places, const LeafLight& light, Path& path) const;
+  void followLight(const std::array<Place, 2>& places, std::uint64_t key, const LeafLight& light, Path& path) const;
+  void followSource(const std::array<Place, 2>& places, std::uint64_t key, const LeafLight& light, Path& path) const;
   [[nodiscard]] Lack lacking(const Path& path, const LeafLight& light, std::size_t half) const;
   void sumUp(const LeafLight& light);
   void correct();

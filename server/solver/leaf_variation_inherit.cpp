@@ -64,7 +64,7 @@ void LeafVariation::keepPaths(const LeafVariation& former, std::size_t half, std
       if (seen == scene::kNone || path.by == scene::kNone) return false;
       may_pass = may_pass || change->mayHide(path.by, seen);
     }
-    return !may_pass || passesNothing(path, *change, lights);
+    return !may_pass || passesNothing(path, half, *change, lights);
   };
   for (auto path : former.paths_[half]) {
     const auto receiver = after(path.receiver);
@@ -81,15 +81,17 @@ void LeafVariation::keepPaths(const LeafVariation& former, std::size_t half, std
 }
 
 /// By its very ways, of a path in the numbers of this scene whose first part is as it was.
-bool LeafVariation::passesNothing(const Path& path, const Shadows& change, std::span<const LightPolygon> lights) const {
-  const auto way = firstWay(path.receiver, path.key);
+bool LeafVariation::passesNothing(const Path& path, std::size_t half, const Shadows& change,
+                                  std::span<const LightPolygon> lights) const {
+  const auto key = keyOf(path.receiver, path.index, half);
+  const auto way = firstWay(path.receiver, key);
   const auto end = rays_->endOn(path.by, way.from, way.direction);
   if (!end) return false;
   const std::array<Place, 2> places{*end, rays_->placeOn(path.by, way.at)};
   for (std::size_t p = 0; p < 2; ++p) {
     const glm::vec3 from(places[p].position);
-    if (change.mayHide(from, glm::vec3(wayOn(path, places[p])), path.seen[p])) return false;
-    if (!lights.empty() && change.isPassed(from, glm::vec3(pointOn(lights[path.light], path)))) return false;
+    if (change.mayHide(from, glm::vec3(wayOn(key, places[p])), path.seen[p])) return false;
+    if (!lights.empty() && change.isPassed(from, glm::vec3(pointOn(lights[path.light], key)))) return false;
   }
   return true;
 }

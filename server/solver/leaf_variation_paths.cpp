@@ -85,27 +85,32 @@ LeafVariation::Drawn LeafVariation::draw(std::size_t count, std::uint64_t key, c
   return drawn;
 }
 
+std::uint64_t LeafVariation::keyOf(std::uint32_t receiver, std::uint32_t index, std::size_t half) const {
+  const Side& side = rays_->sideOf(receiver);
+  return mixKeys(mixKeys(mixKeys(seed_, side.key), receiver - side.first_value), 2 * std::uint64_t{index} + half);
+}
+
 /// Where a path goes on from either place.
-glm::dvec3 LeafVariation::wayOn(const Path& path, const Place& from) {
-  const glm::dvec4 second = sobol4(0, mixKeys(path.key, 2));
+glm::dvec3 LeafVariation::wayOn(std::uint64_t key, const Place& from) {
+  const glm::dvec4 second = sobol4(0, mixKeys(key, 2));
   return cosineDirection(from.normal, second.x, second.y);
 }
 
 /// Of the lamp that was drawn for it.
-glm::dvec3 LeafVariation::pointOn(const LightPolygon& lamp, const Path& path) {
-  const glm::dvec4 at = sobol4(0, keyOfLight(path.key));
+glm::dvec3 LeafVariation::pointOn(const LightPolygon& lamp, std::uint64_t key) {
+  const glm::dvec4 at = sobol4(0, keyOfLight(key));
   return {lamp.point(at.x, at.y)};
 }
 
-void LeafVariation::followLight(const std::array<Place, 2>& places, const LeafLight& light, Path& path) const {
-  const auto key = keyOfLight(path.key);
-  const auto drawn = draw(light.lights.size(), key, [&](std::uint32_t i) -> std::array<double, 2> {
+void LeafVariation::followLight(const std::array<Place, 2>& places, std::uint64_t key, const LeafLight& light,
+                                Path& path) const {
+  const auto drawn = draw(light.lights.size(), keyOfLight(key), [&](std::uint32_t i) -> std::array<double, 2> {
     const auto& lamp = light.lights[i];
     if (lamp.emission == glm::vec3(0.0F)) return {0.0, 0.0};
     return {unhiddenLight(lamp, places[0]), unhiddenLight(lamp, places[1])};
   });
   if (drawn.chance <= 0.0) return;
-  const auto point = pointOn(light.lights[drawn.index], path);
+  const auto point = pointOn(light.lights[drawn.index], key);
   double factor = 0.0;
   const auto& lamp = light.lights[drawn.index];
   for (std::size_t p = 0; p < 2; ++p) {
@@ -116,13 +121,13 @@ void LeafVariation::followLight(const std::array<Place, 2>& places, const LeafLi
         formFactorInFront(places[p].position, places[p].normal, std::span(lamp.corners.data(), lamp.corner_count));
     if (seen.front > 0.0) factor += (p == 0 ? 1.0 : -1.0) * seen.value / seen.front;
   }
-  path.light = drawn.index;
+  path.light = static_cast<std::uint16_t>(drawn.index);
   path.light_factor = static_cast<float>(factor / drawn.chance);
 }
 
-void LeafVariation::followSource(const std::array<Place, 2>& places, const LeafLight& light, Path& path) const {
-  const auto key = mixKeys(path.key, 4);
-  const auto drawn = draw(light.sources.size(), key, [&](std::uint32_t i) -> std::array<double, 2> {
+void LeafVariation::followSource(const std::array<Place, 2>& places, std::uint64_t key, const LeafLight& light,
+                                 Path& path) const {
+  const auto drawn = draw(light.sources.size(), mixKeys(key, 4), [&](std::uint32_t i) -> std::array<double, 2> {
     const auto& source = light.sources[i];
     if (source.intensity == glm::dvec3(0.0)) return {0.0, 0.0};
     return {unhiddenSource(source, places[0]), unhiddenSource(source, places[1])};
@@ -133,7 +138,7 @@ void LeafVariation::followSource(const std::array<Place, 2>& places, const LeafL
     const auto to = places[p].position + wayTo(light.sources[drawn.index], places[p]);
     if (drawn.unhidden[p] > 0.0 && rays_->isOpen(places[p], to)) factor += (p == 0 ? 1.0 : -1.0) * drawn.unhidden[p];
   }
-  path.source = drawn.index;
+  path.source = static_cast<std::uint16_t>(drawn.index);
   path.source_factor = static_cast<float>(factor / drawn.chance);
 }
 
@@ -159,8 +164,6 @@ bool LeafVariation::findPlaces(std::uint32_t receiver, std::uint64_t key, std::a
 }
 
 void LeafVariation::follow(const Task& task, std::size_t half, const LeafLight& light, std::vector<Path>& paths) const {
-  const Side& side = rays_->sideOf(task.receiver);
-  const auto leaf_key = mixKeys(mixKeys(seed_, side.key), task.receiver - side.first_value);
   std::array<Place, 2> places;
   for (auto k = task.first; k < task.end; ++k) {
     if (isKnown(task.receiver, k)) {
@@ -172,25 +175,26 @@ void LeafVariation::follow(const Task& task, std::size_t half, const LeafLight& 
       }
     }
     Path path;
-    path.index = static_cast<std::uint16_t>(k);
-    path.key = mixKeys(leaf_key, 2 * std::uint64_t{k} + half);
+    path.index = static_cast<std::uint16_t>(k & 0x7FFF);
     path.receiver = task.receiver;
-    if (!findPlaces(path.receiver, path.key, places)) continue;
+    const auto key = keyOf(task.receiver, k, half);
+    if (!findPlaces(path.receiver, key, places)) continue;
     path.by = places[0].value;
     for (std::size_t p = 0; p < 2; ++p) {
-      const auto seen = rays_->look(places[p], wayOn(path, places[p]));
+      const auto seen = rays_->look(places[p], wayOn(key, places[p]));
       path.seen[p] = seen.end.value;
-      path.sees_near = path.sees_near || isNear(seen);
+      if (isNear(seen)) path.sees_near = 1;
     }
-    followLights(places, light, path);
+    followLights(places, key, light, path);
     paths.push_back(path);
   }
 }
 
-void LeafVariation::followLights(const std::array<Place, 2>& places, const LeafLight& light, Path& path) const {
+void LeafVariation::followLights(const std::array<Place, 2>& places, std::uint64_t key, const LeafLight& light,
+                                 Path& path) const {
   path.light_factor = path.source_factor = 0.0F;
-  followLight(places, light, path);
-  followSource(places, light, path);
+  followLight(places, key, light, path);
+  followSource(places, key, light, path);
 }
 
 /// Other lights shine than did: where paths go stays as it is. Of what is switched off, and on again, it is kept what
@@ -229,7 +233,9 @@ void LeafVariation::followOtherLights(const LeafLight& light, std::size_t half, 
   inShares(paths.size() / kTasksAShare, [&](std::size_t share, std::size_t shares) {
     std::array<Place, 2> places;
     for (auto i = share; i < paths.size(); i += shares) {
-      if (findPlaces(paths[i].receiver, paths[i].key, places)) followLights(places, light, paths[i]);
+      auto& path = paths[i];
+      const auto key = keyOf(path.receiver, path.index, half);
+      if (findPlaces(path.receiver, key, places)) followLights(places, key, light, path);
     }
   });
 }
@@ -268,7 +274,7 @@ LeafVariation::Lack LeafVariation::lacking(const Path& path, const LeafLight& li
   const bool is_known = light.sights != nullptr && light.sights->isParted(path.by);
   const auto reflected = is_known ? glm::vec3(0.0F) : radiosity(path.seen[0]) - radiosity(path.seen[1]);
   const glm::vec3 by = light.reflectance[path.by];
-  if (path.sees_near) return {by * direct, by * reflected};
+  if (path.sees_near != 0) return {by * direct, by * reflected};
   return {by * (direct + reflected), glm::vec3(0.0F)};
 }
 

@@ -134,7 +134,8 @@ std::shared_ptr<const LeafRays> LinkedSolver::leafRays() {
 }
 
 void LinkedSolver::startRays() {
-  gather_ = std::make_unique<LeafGather>(*patches_, sides_, settings_.seed, settings_.link_memory / 2, leafRays());
+  gather_ = std::make_unique<LeafGather>(*patches_, sides_, settings_.seed, settings_.link_memory / 2, leafRays(),
+                                         system_.leafAreas());
 }
 
 std::vector<glm::vec3> LinkedSolver::ofLeaves(const scene::SideColours& colours) const {

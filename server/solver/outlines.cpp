@@ -29,19 +29,6 @@ std::vector<glm::dvec2> convexHull(std::vector<glm::dvec2> points) {
   return hull;
 }
 
-TexelPolygon outlineOf(const scene::PatchScene& patches, const scene::Surface& surface) {
-  std::vector<glm::dvec2> corners;
-  for (std::uint32_t t = surface.first_triangle; t < surface.first_triangle + surface.triangle_count; ++t) {
-    for (std::uint32_t k = 0; k < 3; ++k) corners.emplace_back(patches.vertices[patches.indices[3 * t + k]].texel);
-  }
-  const auto hull = convexHull(std::move(corners));
-  TexelPolygon outline;
-  if (hull.size() < 3 || hull.size() > 4) return outline;
-  outline.count = static_cast<std::uint32_t>(hull.size());
-  std::copy(hull.begin(), hull.end(), outline.corner.begin());
-  return outline;
-}
-
 /// Sutherland and Hodgman: the part of `polygon` to the left of the line from a to b.
 TexelPolygon cut(const TexelPolygon& polygon, const glm::dvec2& a, const glm::dvec2& b) {
   TexelPolygon left;
@@ -81,9 +68,23 @@ glm::dvec2 TexelPolygon::point(double u, double v) const {
   return corner[0];
 }
 
+Outlines::Outline Outlines::of(const scene::PatchScene& patches, const scene::Surface& surface) {
+  std::vector<glm::dvec2> corners;
+  for (std::uint32_t t = surface.first_triangle; t < surface.first_triangle + surface.triangle_count; ++t) {
+    for (std::uint32_t k = 0; k < 3; ++k) corners.emplace_back(patches.vertices[patches.indices[3 * t + k]].texel);
+  }
+  const auto hull = convexHull(std::move(corners));
+  Outline outline;
+  if (hull.size() < 3 || hull.size() > 4) return outline;
+  outline.count = static_cast<std::uint32_t>(hull.size());
+  std::copy(hull.begin(), hull.end(), outline.corner.begin());
+  return outline;
+}
+
 Outlines::Outlines(const scene::PatchScene& patches) : patches_(patches) {
+  outline_.reserve(patches.surfaces.size());
   for (const auto& surface : patches.surfaces) {
-    outline_.push_back(surface.planar ? outlineOf(patches, surface) : TexelPolygon{});
+    outline_.push_back(surface.planar ? of(patches, surface) : Outline{});
   }
 }
 

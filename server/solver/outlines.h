@@ -30,8 +30,13 @@ class Outlines {
   [[nodiscard]] TexelPolygon node(std::uint32_t surface, std::uint32_t level, std::uint32_t x, std::uint32_t y) const;
 
  private:
+  struct Outline {
+    std::array<glm::dvec2, 4> corner{};
+    std::uint32_t count = 0;  // 0: the whole rectangle
+  };
+  static Outline of(const scene::PatchScene& patches, const scene::Surface& surface);
   const scene::PatchScene& patches_;
-  std::vector<TexelPolygon> outline_;  // by surface; count 0: the whole rectangle
+  std::vector<Outline> outline_;  // by surface
 };
 
 }  // namespace radiosity::solver

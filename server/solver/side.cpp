@@ -27,6 +27,7 @@ std::vector<Side> makeSides(const scene::PatchScene& patches) {
       sides.push_back(side);
     }
   }
+  sides.shrink_to_fit();
   return sides;
 }
 
