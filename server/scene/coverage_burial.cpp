@@ -15,8 +15,8 @@
 namespace radiosity::scene {
 namespace {
 
-/// Leaves: what is found of so many is held at once; fewer are not worth a thread.
-constexpr std::size_t kMeasuredAtOnce = 65536, kFewestAShare = 64, kFewestTries = 16;
+/// Leaves: what is found of so many is held at once; so many are measured in a turn; fewer are not tried in a thread.
+constexpr std::size_t kMeasuredAtOnce = 65536, kLeavesATurn = 16, kFewestTries = 16;
 /// Surfaces, likewise.
 constexpr std::size_t kFewestSurfaces = 32;
 /// Of more leaves it is not kept how they were found, nor where that takes more, and from more places than these rays
@@ -200,9 +200,11 @@ class Burial {
     for (std::size_t first = 0; first < contacts.size(); first += kMeasuredAtOnce) {
       const auto end = std::min(contacts.size(), first + kMeasuredAtOnce);
       measured.assign(end - first, {});
-      inShares((end - first) / kFewestAShare, [&](std::size_t share, std::size_t shares) {
+      // Most are remembered after an edit, and those that are not lie together.
+      inTurns((end - first + kLeavesATurn - 1) / kLeavesATurn, [&](std::size_t part) {
         LeafBurial::Scratch scratch;
-        for (auto i = first + share; i < end; i += shares)
+        const auto from = first + part * kLeavesATurn;
+        for (auto i = from; i < std::min(end, from + kLeavesATurn); ++i)
           measured[i - first] = remember(contacts[i], count, pass, scratch);
       });
       for (auto i = first; i < end; ++i) {
