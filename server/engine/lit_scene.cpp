@@ -189,7 +189,7 @@ void LitScene::fadeFrom(LitScene& before, bool same_layout) {
   // Only of links that are taken over is the lights' part known before all else.
   const bool known = former_map_ && !former_map_->nothingKept();
   if (before.showsOwnLight()) {
-    former_light_.emplace(FormerLight{before.scene_, before.patches_, same_layout, before.ownLight(), {}});
+    former_light_.emplace(FormerLight{before.scene_, before.patches_, same_layout, before.ownLight(), {}, false});
     if (known) former_light_->direct = before.solver_->directIrradiance();
     return;
   }
@@ -210,12 +210,14 @@ std::vector<scene::LightmapPage> LitScene::FormerLight::pages(const std::vector<
 }
 
 void LitScene::makeOldPages() {
-  if (!former_light_ || !old_light_.empty()) return;
-  old_light_ = former_light_->pages(former_light_->all, *this);
+  if (!former_light_ || former_light_->has_pages) return;
+  old_light_ = former_light_->pages(former_light_->all, *this);  // of a scene without pages: none
   giveBack(former_light_->all);
+  former_light_->has_pages = true;
+  if (former_light_->direct.empty()) former_light_.reset();
 }
 
-/// Only where the solve takes so long that direct light is shown first.
+/// Where the solve takes so long that direct light is shown first, or the next edit comes before its end.
 void LitScene::makeOldDirectPages() {
   makeOldPages();
   if (!former_light_) return;

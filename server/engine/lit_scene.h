@@ -110,9 +110,9 @@ class LitScene {
   [[nodiscard]] std::vector<scene::LightmapPage> shownPages();
   /// Nothing of the light before an edit is in what is shown.
   [[nodiscard]] bool showsOwnLight() const { return old_light_.empty() && !former_light_; }
-  /// What was shown before an edit is shown still, and lies where it lay.
+  /// The light that the solver had before an edit is to be shown still, and lies where it lay.
   [[nodiscard]] bool showsFormerLight() const {
-    return former_light_ && former_light_->same_layout && old_light_.empty();
+    return former_light_ && former_light_->same_layout && !former_light_->has_pages;
   }
   /// From here on the solver's own light is shown, as good as it is.
   void endFade() {
@@ -141,6 +141,7 @@ class LitScene {
     std::shared_ptr<const scene::PatchScene> patches;
     bool same_layout;
     std::vector<glm::vec3> all, direct;  ///< lux; direct empty: not known
+    bool has_pages = false;              ///< `all` is in old_light_, and given back
 
     [[nodiscard]] std::vector<scene::LightmapPage> pages(const std::vector<glm::vec3>& light, const LitScene& to) const;
   };
@@ -174,7 +175,7 @@ class LitScene {
   solver::LightSources sources_;                 // that the solver knows of
   double power_ = 0.0;                           // emitted, all channels
   double solver_power_ = 0.0;                    // emitted power the solver's flux scale was chosen for
-  std::optional<FormerLight> former_light_;      // of which the next two are still to be made
+  std::optional<FormerLight> former_light_;      // of which the next two, or the second, are to be made
   std::vector<scene::LightmapPage> old_light_;   // what was shown before an edit; empty: no fade
   std::vector<scene::LightmapPage> old_direct_;  // of it, what came straight from lights; empty: not known, or replaced
   double new_share_ = 0.0;                       // of the solver's own light in what is shown; never falls

@@ -113,11 +113,15 @@ void LeafGather::start(const std::vector<bool>& has_other, std::size_t fewest) {
     for (std::uint32_t leaf = 0; leaf < side.leaf_count && isWide(side); ++leaf)
       asked[side.first_value + leaf] = firstRaysOfWide(side, leaf, is_alone);
   }
-  const auto times = timesOfFew(asked.size(), fewest);
+  const auto usual = std::reduce(asked.begin(), asked.end(), std::size_t{0});
+  const auto fits = [&](std::size_t rays) {
+    return leastBytes(asked.size()) + rays * LeafSights::kRayBytes <= most_bytes_;
+  };
+  auto times = timesOfFew(asked.size(), fewest);
+  while (times > 1 && !fits(times * usual)) times /= 2;
   for (auto& count : asked)
     count = static_cast<std::uint16_t>(std::min<std::size_t>(times * count, LeafSights::kMostRays));
-  const auto rays = std::reduce(asked.begin(), asked.end(), std::size_t{0});
-  if (leastBytes(asked.size()) + rays * LeafSights::kRayBytes > most_bytes_) std::ranges::fill(asked, kFirstRays);
+  if (!fits(times * usual)) std::ranges::fill(asked, kFirstRays);
   sights_.ask(asked);
 }
 

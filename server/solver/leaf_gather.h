@@ -61,8 +61,9 @@ class LeafGather {
   [[nodiscard]] bool hasGathered() const { return has_gathered_; }
   /// All leaves get as many as a solve begins with, where there are none; twice as many on wide sides whose light
   /// comes by rays alone, so that nothing hides their noise; at the edges of wide sides, where little is there to
-  /// smooth it with, two or four times as many as within. `has_other`: by side, whether there is other light. `fewest`:
-  /// of all leaves and both halves together, about, where there is memory for them.
+  /// smooth it with, two or four times as many as within. `has_other`: by side, whether there is other light. Where
+  /// leaves are few all have as many times as many, a power of two, as `fewest` rays in all, of both halves, allow and
+  /// there is memory for.
   void start(const std::vector<bool>& has_other = {}, std::size_t fewest = 0);
   /// Of so many leaves that noise shows as blotches which on fewer would be a shade.
   [[nodiscard]] static bool isWide(const Side& side) { return side.leaf_count >= kWide; }

@@ -14,6 +14,8 @@ namespace {
 
 /// Rays start so far from a surface (unit box), well above the rounding of positions.
 constexpr double kLift = 2e-6;
+/// Planes of triangles are known to some 1e-7: places on them, along a ray, to so many times less.
+constexpr double kLeastSlope = 0.05;
 /// Farther than the unit box is wide.
 constexpr double kFar = 4.0;
 /// A ray keeps in mind so many that it went through; then it starts anew from the last of them, so often at most.
@@ -60,6 +62,17 @@ LeafRays::LeafRays(const scene::PatchScene& patches, const std::vector<Side>& si
     greatest_width_ = std::max(greatest_width_, widthOf(sides[s].first_value));
   }
   findStandIns();
+  findEven();
+}
+
+/// Charts of a file may be flat but for the rounding of their corners.
+void LeafRays::findEven() {
+  for (const auto& surface : patches_.surfaces) {
+    const auto of = std::span(patches_.triangles).subspan(surface.first_triangle, surface.triangle_count);
+    is_even_.push_back(surface.planar && std::ranges::all_of(of, [&](const scene::TriangleFrame& frame) {
+                         return frame.normal == of.front().normal;
+                       }));
+  }
 }
 
 void LeafRays::findStandIns() {
@@ -242,13 +255,13 @@ std::optional<LeafRays::Place> LeafRays::endOn(std::uint32_t value, const Place&
   const Side& side = sideOf(value);
   const auto& surface = patches_.surfaces[side.surface];
   const auto triangle = patches_.leaves[surface.first_leaf + value - side.first_value].triangle;
-  if (!surface.planar || triangle == scene::kNone) return std::nullopt;
+  if (!is_even_[side.surface] || triangle == scene::kNone) return std::nullopt;
   const auto& frame = patches_.triangles[triangle];
-  const glm::dvec3 normal(side.side == 0 ? frame.normal : -frame.normal);
+  const glm::dvec3 normal(side.side == 0 ? frame.normal : -frame.normal), origin = lifted(from);
   const double slope = glm::dot(normal, direction);
-  if (slope >= 0.0) return std::nullopt;
-  const double t = glm::dot(normal, glm::dvec3(frame.origin) - from.position) / slope;
-  return Place{from.position + t * direction, normal, value, triangle};
+  if (slope > -kLeastSlope) return std::nullopt;
+  const double t = glm::dot(normal, glm::dvec3(frame.origin) - origin) / slope;
+  return Place{origin + t * direction, normal, value, triangle};
 }
 
 }  // namespace radiosity::solver

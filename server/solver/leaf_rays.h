@@ -70,13 +70,15 @@ class LeafRays {
     return has_stand_in_[value] ? foundStandIn(value) : value;
   }
   [[nodiscard]] bool isOpen(const Place& from, const glm::dvec3& to) const;
-  /// Where a ray that ends on a leaf ends, without looking what lies before. Nothing: the leaf's surface is not flat.
+  /// Where a ray of look() that ends on a leaf ends, without looking what lies before, to a few millionths. Nothing:
+  /// the triangles of its surface have not all the same normal, or it is met at too flat an angle.
   [[nodiscard]] std::optional<Place> endOn(std::uint32_t value, const Place& from, const glm::dvec3& direction) const;
 
  private:
   const scene::PatchScene& patches_;
   const std::vector<Side>& sides_;
   void findStandIns();
+  void findEven();
   [[nodiscard]] std::uint32_t foundStandIn(std::uint32_t value) const;
   [[nodiscard]] std::uint32_t neighbourOf(const Side& side, std::uint32_t leaf) const;
   [[nodiscard]] bool isBeneath(const Side& side, std::uint32_t value) const;
@@ -93,7 +95,8 @@ class LeafRays {
   std::vector<bool> has_stand_in_;  ///< by leaf value: it has no area
   /// Who stands for a leaf value that has no area: another, or kNothing. Ascending.
   std::vector<std::pair<std::uint32_t, std::uint32_t>> stand_ins_;
-  std::vector<bool> is_cut_;  ///< by leaf value
+  std::vector<bool> is_cut_;   ///< by leaf value
+  std::vector<bool> is_even_;  ///< by surface: flat, and all normals are the same to the bit
   double greatest_width_ = 0.0;
 };
 

@@ -24,6 +24,10 @@ constexpr std::size_t kMostSteps = 32;
 constexpr std::size_t kMostNumbers = std::size_t{1} << 30;
 /// Rays and boxes are held against each other with so much to spare (unit box).
 constexpr double kMargin = 1e-5;
+/// After an edit new leaves never have more rays of a half than these where all new ones together would have more than
+/// the scene had, or than these.
+constexpr std::uint16_t kMostOfNew = 32;
+constexpr std::size_t kFewForNew = 65'536;
 
 /// Whether a ray meets a box.
 bool meetsBox(const scene::ChangedBox& box, const glm::dvec3& from, const glm::dvec3& direction) {
@@ -414,8 +418,12 @@ void LeafSights::inherit(const LeafSights& former, std::span<const std::uint32_t
   std::erase(sorted, 0);
   if (sorted.empty()) return;
   std::ranges::nth_element(sorted, sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2));
-  const auto usual = sorted[sorted.size() / 2];
-  std::vector<std::uint16_t> counts(leaf_count_, std::min(usual, most));
+  auto usual = std::min(sorted[sorted.size() / 2], most);
+  // In a scene of a few leaves, of thousands of rays each, they might be thousands.
+  const auto before = std::reduce(sorted.begin(), sorted.end(), std::size_t{0});
+  const auto news = static_cast<std::size_t>(std::ranges::count(value_before, scene::kNone));
+  while (usual > kMostOfNew && usual * news > std::max(before, kFewForNew)) usual /= 2;
+  std::vector<std::uint16_t> counts(leaf_count_, usual);
   std::vector<std::uint32_t> value_after(former.endCount(), kUntraced);
   value_after[former.absorbed()] = absorbed();
   value_after[former.absorbedAtOnce()] = absorbedAtOnce();

@@ -15,8 +15,8 @@ namespace {
 // count. An image and what is gathered from it: by leaf, and by the root of the triangles, since most are left out. A
 // ray: by level of the tree.
 constexpr double kShotLeaf = 0.02, kShotTriangle = 13.0, kRayLevel = 0.05;
-/// A solve begins with so many rays at least: of fewer leaves smoothing has few to average over, and their noise would
-/// be that of all light. They take no time worth the name.
+/// A solve begins with more than half as many rays: of fewer leaves smoothing has few to average over, and their noise
+/// would be that of all light. They take no time worth the name.
 constexpr std::size_t kFewestRays = 65'536;
 /// An image of a lamp, beside one of a node.
 constexpr double kLightShot = 2.0;

@@ -44,6 +44,10 @@ void LinkedSolver::assessStep() {
 
 /// For the light that leaves have now.
 void LinkedSolver::updateVariation() {
+  if (lights_.size() + sources_.size() > kMostLights) {  // an edit lit them
+    variation_.reset();
+    return next_variation_.reset();
+  }
   variation_->forgetCorrections();  // also where memory ends on the way
   const auto emission = shiningOfLeaves(), reflectance = ofLeaves(system_.reflectance());
   double square = 0.0;

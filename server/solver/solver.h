@@ -32,8 +32,8 @@ struct SolverSettings {
   std::size_t link_memory = std::size_t{1} << 30;
   /// How reflected light comes to the leaves: by rays from the leaves (LeafGather), but for what is bright and small,
   /// unless half of link_memory is too little for them; or over links from shooters. By rays 2 % take half of the time
-  /// in a box of 17 polygons, and a tenth in a room of thousands; in a furnace, whose links are exact but for where
-  /// leaves look from, they take as long, and the error is a tenth.
+  /// in a box of 17 polygons, and a tenth in a room of thousands; in furnaces, whose links are exact but for where
+  /// leaves look from, they take from half to one and a third of it, and the error is a tenth.
   enum class Reflected { kByRays, kByLinks };
   Reflected reflected = Reflected::kByRays;
   /// A solve over links ends, whatever its error, so many rounds after the last edit or its start: no round helps then.

@@ -303,5 +303,23 @@ TEST(LeafGather, NeverTakesMoreThanItMay) {
   EXPECT_LE(gather.sights().bytes(), 384 * (40 * LeafSights::kRayBytes + sizeof(std::size_t) + 64));
 }
 
+TEST(LeafGather, FewLeavesBeginWithMoreRaysWhereThereIsMemory) {
+  const auto scene = makeQuadScene(cubeQuads(4, {1, 0, 0, 0, 0, 0}, {}));
+  const auto sides = makeSides(*scene.patches);
+  const std::size_t leaves = 96, least = LeafGather::leastBytes(leaves);
+  const auto raysOf = [&](std::size_t fewest, std::size_t most_bytes) {
+    LeafGather gather(*scene.patches, sides, 1, most_bytes);
+    gather.start({}, fewest);
+    return gather.sights().counts()[0];
+  };
+  EXPECT_EQ(raysOf(0, kPlenty), 8U);
+  EXPECT_EQ(raysOf(16 * leaves, kPlenty), 8U);
+  EXPECT_EQ(raysOf(100 * leaves, kPlenty), 32U) << "a power of two";
+  EXPECT_EQ(raysOf(1'000'000'000, kPlenty), 4096U) << "noisy ones may get more yet";
+  // As many as there is room for, be it not for all.
+  EXPECT_EQ(raysOf(100 * leaves, least + 20 * leaves * LeafSights::kRayBytes), 16U);
+  EXPECT_EQ(raysOf(100 * leaves, least), 8U);
+}
+
 }  // namespace
 }  // namespace radiosity::solver

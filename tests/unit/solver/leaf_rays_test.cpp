@@ -106,5 +106,35 @@ TEST(LeafRays, LongThinTurnedStripsDoNotHideTheSkyFromThemselves) {
   EXPECT_LT(hidden_there, 20U);
 }
 
+// Who asks where a ray ends that is known to end on a leaf saves looking for it.
+TEST(LeafRays, EndWhereTheyAreSeenToEndWhereAllNormalsAreTheSame) {
+  const auto made = test::makeQuadScene(test::cubeQuads(8, test::kDark, test::kGrey));
+  const auto sides = makeSides(*made.patches);
+  const LeafRays rays(*made.patches, sides);
+  auto bent = *made.patches;  // within what is flat in a file
+  bent.triangles[bent.surfaces[0].first_triangle].normal.x += 1e-6F;
+  const LeafRays of_bent(bent, sides);
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  std::size_t known = 0, flat = 0, asked = 0;
+  for (std::uint32_t value = 0; value < 6 * 64; ++value) {
+    for (int i = 0; i < 20; ++i, ++asked) {
+      const auto place = rays.placeOn(value, {uniform(random), uniform(random)});
+      const auto direction = cosineDirection(place.normal, uniform(random), uniform(random));
+      const auto sight = rays.look(place, direction);
+      ASSERT_LT(sight.end.value, LeafRays::kSkyBelow);
+      const auto end = rays.endOn(sight.end.value, place, direction);
+      flat += glm::dot(sight.end.normal, direction) > -0.05 ? 1 : 0;
+      if (!end) continue;
+      ++known;
+      EXPECT_LT(glm::distance(end->position, sight.end.position), 2e-6);
+      EXPECT_EQ(end->normal, sight.end.normal);
+      EXPECT_EQ(of_bent.endOn(sight.end.value, place, direction).has_value(), sides[sight.end.value / 64].surface != 0);
+    }
+  }
+  EXPECT_EQ(known + flat, asked) << "all but those that hardly meet the plane";
+  EXPECT_GT(known, 9 * asked / 10);
+}
+
 }  // namespace
 }  // namespace radiosity::solver
