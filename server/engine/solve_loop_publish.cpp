@@ -81,10 +81,7 @@ void SolveLoop::publishQuantity(Quantity quantity) {
     const bool added = watches_.takeAdded(quantity);
     const bool current = shown && shown->tile_version == publisher_.version();
     if (current && !added) return;
-    if (!current) {
-      auto pages = pagesToShow(quantity);
-      shown = publisher_.publish(std::move(pages), status(), state_ == SolveState::kConverged);
-    }
+    if (!current) shown = publisher_.publish(pagesToShow(quantity), status(), state_ == SolveState::kConverged);
   } else if (quantity == Quantity::kIrradiance) {
     return;  // its tile versions are for viewers who come back
   } else {

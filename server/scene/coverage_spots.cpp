@@ -19,6 +19,13 @@ bool isOneFrame(const TriangleFrame& one, const TriangleFrame& other) {
   return one.origin == other.origin && one.du == other.du && one.dv == other.dv && one.normal == other.normal;
 }
 
+std::vector<LeafSpots::Place> listOf(const LeafPlaces& places) {
+  std::vector<LeafSpots::Place> list;
+  for (std::size_t i = 0; i < places.numbers.size(); ++i)
+    list.push_back({places.numbers[i], places.triangles.size() == 1 ? places.triangles.front() : places.triangles[i]});
+  return list;
+}
+
 }  // namespace
 
 void LeafPlaces::add(std::uint16_t number, std::uint32_t triangle) {
@@ -32,9 +39,7 @@ void LeafPlaces::add(std::uint16_t number, std::uint32_t triangle) {
 }
 
 void LeafPlaces::order() {
-  std::vector<LeafSpots::Place> places;
-  for (std::size_t i = 0; i < numbers.size(); ++i)
-    places.push_back({numbers[i], triangles.size() == 1 ? triangles.front() : triangles[i]});
+  auto places = listOf(*this);
   LeafSpots::order(lattice.points, places);
   for (std::size_t i = 0; i < places.size(); ++i) {
     numbers[i] = places[i].number;
@@ -44,14 +49,10 @@ void LeafPlaces::order() {
 
 void keepSpots(PatchScene& patches, LeafPoint& leaf, const LeafPlaces& places) {
   if (places.numbers.empty()) return;
-  std::vector<LeafSpots::Place> of_leaf;
-  bool in_one_frame = true;
-  for (std::size_t i = 0; i < places.numbers.size(); ++i) {
-    const auto triangle = places.triangles.size() == 1 ? places.triangles.front() : places.triangles[i];
-    of_leaf.push_back({places.numbers[i], triangle});
-    in_one_frame = in_one_frame && isOneFrame(patches.triangles[leaf.triangle], patches.triangles[triangle]);
-  }
-  leaf.spot_list = patches.spots.add(places.lattice, of_leaf, in_one_frame);
+  const bool in_one_frame = std::ranges::all_of(places.triangles, [&](std::uint32_t triangle) {
+    return isOneFrame(patches.triangles[leaf.triangle], patches.triangles[triangle]);
+  });
+  leaf.spot_list = patches.spots.add(places.lattice, listOf(places), in_one_frame);
 }
 
 namespace {
