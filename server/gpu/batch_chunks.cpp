@@ -15,13 +15,18 @@ constexpr double kMinChunkCost = 60'000.0;  // pixels
 /// small, so that all workers come to their end together.
 constexpr double kLargestPart = 1.0 / 8.0;
 constexpr double kPartOfRest = 1.0 / 3.0;
+/// Of workers with many hands, who come to their end together by themselves: something for each to do, several times,
+/// and so many chunks that the links of one can be taken in while the next is worked on.
+constexpr double kLargestPartOfMany = 1.0 / 4.0;
+constexpr std::size_t kShotsAHand = 2;
 /// Links of so many shots fit into one report, in scenes where those of one shot are few.
 constexpr std::size_t kMaxShots = 64;
-constexpr std::size_t kMaxLinkBytes = std::size_t{16} << 20;
+constexpr std::size_t kMaxLinkBytes = std::size_t{16} << 20, kMaxLinkBytesOfMany = std::size_t{64} << 20;
 
 /// A link is a float; at most every node has one.
-std::size_t maxShots(std::size_t nodes) {
-  return std::clamp<std::size_t>(kMaxLinkBytes / (sizeof(float) * std::max<std::size_t>(nodes, 1)), 1, kMaxShots);
+std::size_t maxShots(std::size_t nodes, std::size_t hands) {
+  const auto bytes = std::min(kMaxLinkBytes * hands, kMaxLinkBytesOfMany);
+  return std::clamp<std::size_t>(bytes / (sizeof(float) * std::max<std::size_t>(nodes, 1)), 1, kMaxShots * hands);
 }
 
 /// What a batch is cut by.
@@ -30,11 +35,12 @@ struct Cutter {
   std::size_t most;  ///< shots of a chunk
   double share;      ///< cost of a worker's share of the batch
   double left;       ///< what it costs to do what is not cut yet, a worker's share
-  std::size_t workers;
+  Workforce force;
   std::vector<Chunk> chunks;
 
   /// Small batches still give every worker something to do.
   [[nodiscard]] double target() const {
+    if (force.hands > 1) return kLargestPartOfMany * share;
     return std::min(std::max(kMinChunkCost, std::min(kLargestPart * share, kPartOfRest * left)), share);
   }
 
@@ -44,9 +50,11 @@ struct Cutter {
     std::size_t first = 0;
     for (std::size_t i = 0; i < shots.size(); ++i) {
       sum += cost(shots[i]);
-      if (sum < target() && i + 1 < shots.size() && i + 1 - first < most) continue;
-      chunks.push_back({kind, first, i + 1 - first, sum});
-      left -= sum / static_cast<double>(workers);
+      const std::size_t count = i + 1 - first;
+      const bool full = count >= most || (sum >= target() && (force.hands == 1 || count >= kShotsAHand * force.hands));
+      if (!full && i + 1 < shots.size()) continue;
+      chunks.push_back({kind, first, count, sum});
+      left -= sum / static_cast<double>(force.workers);
       first = i + 1;
       sum = 0.0;
     }
@@ -104,16 +112,16 @@ void packGather(const solver::ShotBatch& batch, const Chunk& chunk, Packed& pack
 
 }  // namespace
 
-std::vector<Chunk> cutBatch(const solver::ShotBatch& batch, const SceneSize& scene, std::size_t workers) {
+std::vector<Chunk> cutBatch(const solver::ShotBatch& batch, const SceneSize& scene, const Workforce& force) {
   const solver::ShotCost cost{static_cast<double>(scene.triangles), static_cast<double>(scene.nodes)};
-  const std::size_t most = maxShots(scene.nodes);
+  const std::size_t most = maxShots(scene.nodes, force.hands);
   double total = 0.0;
   for (const auto& shot : batch.scatter) total += cost(shot);
   for (const auto& shot : batch.gather) total += cost(shot);
   for (const auto& shot : batch.point_lights) total += cost(shot);
   for (const auto& shot : batch.parallel) total += cost(shot);
-  const double share = total / static_cast<double>(workers);
-  Cutter cutter{cost, most, share, share, workers, {}};
+  const double share = total / static_cast<double>(force.workers);
+  Cutter cutter{cost, most, share, share, force, {}};
   cutter.cut(batch.gather, ShotKind::kGather);
   cutter.cut(batch.parallel, ShotKind::kParallel);
   cutter.cut(batch.point_lights, ShotKind::kPoint);

@@ -22,10 +22,16 @@ struct SceneSize {
   std::size_t triangles = 0, nodes = 0;
 };
 
+/// Who shares a batch: processes, and the threads of each.
+struct Workforce {
+  std::size_t workers = 1, hands = 1;
+};
+
 /// Gather shots first: they are the longest. Cost of a shot: its pixels and, for each hemicube, the scene's triangles
-/// and the receivers that look. The links of a chunk, which travel and wait for their turn, take some 16 MiB at most,
-/// or are those of one shot.
-[[nodiscard]] std::vector<Chunk> cutBatch(const solver::ShotBatch& batch, const SceneSize& scene, std::size_t workers);
+/// and the receivers that look. The links of a chunk, which travel and wait for their turn, take some 16 MiB a worker's
+/// hand at most (and 64 MiB in all), or are those of one shot.
+[[nodiscard]] std::vector<Chunk> cutBatch(const solver::ShotBatch& batch, const SceneSize& scene,
+                                          const Workforce& force);
 
 /// The chunk as the body of a message; `measure`: links are wanted, shot by shot.
 [[nodiscard]] std::vector<std::byte> packChunk(const solver::ShotBatch& batch, const Chunk& chunk, std::uint64_t id,

@@ -41,6 +41,22 @@ void FluxSink::drainInto(solver::FluxAccumulators& into) const {
   *totals = {};
 }
 
+void FluxSink::drainInto(const FluxSink& into) const {
+  takeMarked(*this, [&](std::size_t half, std::size_t first, std::size_t count) {
+    RAD_CHECK_LE(first + count, into.node[half].size());
+    for (std::size_t i = first; i < first + count; ++i) {
+      addTo(into.node[half][i], node[half][i]);
+      node[half][i] = {};
+    }
+    into.mark[half][first / kMarkNodes] = 1;
+  });
+  addTo(into.totals->escaped, totals->escaped);
+  addTo(into.totals->backface, totals->backface);
+  addTo(into.totals->scattered, totals->scattered);
+  addTo(into.totals->gathered, totals->gathered);
+  *totals = {};
+}
+
 void FluxSink::clear() const {
   takeMarked(*this, [&](std::size_t half, std::size_t first, std::size_t count) {
     std::fill_n(node[half].begin() + static_cast<std::ptrdiff_t>(first), count, solver::Flux3{});

@@ -34,6 +34,8 @@ struct FluxSink {
 
   /// Adds everything to `into` and leaves the sink empty.
   void drainInto(solver::FluxAccumulators& into) const;
+  /// The same into another sink for as many nodes.
+  void drainInto(const FluxSink& into) const;
   /// Forgets everything.
   void clear() const;
 };

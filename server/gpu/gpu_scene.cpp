@@ -92,7 +92,7 @@ Result<GpuScene> GpuScene::upload(const EglContext& context, std::shared_ptr<con
   glEnableVertexArrayAttrib(array, RAD_ATTRIBUTE_SURFACE);
   glVertexArrayAttribIFormat(array, RAD_ATTRIBUTE_SURFACE, 1, GL_UNSIGNED_INT, offsetof(Vertex, surface));
   glVertexArrayAttribBinding(array, RAD_ATTRIBUTE_SURFACE, 0);
-  for (GLuint i = 0; i < 4; ++i) {  // binding 1: the renderer's FaceViews
+  for (GLuint i = 0; i < 5; ++i) {  // binding 1: the renderer's FaceViews
     attribute(RAD_ATTRIBUTE_VIEW + i, 4, i * sizeof(glm::vec4));
     glVertexArrayAttribBinding(array, RAD_ATTRIBUTE_VIEW + i, 1);
   }

@@ -11,8 +11,12 @@
 namespace radiosity::gpu {
 
 /// One EGL context in the calling thread, which must also be the thread that uses and destroys it.
-/// kUnavailable, naming every platform tried and why it failed, when there is no OpenGL 4.5 core.
-[[nodiscard]] Result<std::unique_ptr<solver::Transport>> makeInProcessTransport();
+/// kUnavailable, naming every platform tried and why it failed, when there is no OpenGL 4.5 core. `hands`: threads that
+/// look at images (see ShotCrew); 0: as many as suit the context.
+[[nodiscard]] Result<std::unique_ptr<solver::Transport>> makeInProcessTransport(std::size_t hands = 0);
+
+/// How many hands each of so many contexts shall have: with a card, all cores together; one where processors draw.
+[[nodiscard]] std::size_t handsFor(bool software, std::size_t contexts);
 
 struct WorkerOptions {
   int workers = 0;         ///< 0: one for each core with llvmpipe, one on a GPU
@@ -20,6 +24,7 @@ struct WorkerOptions {
   /// A worker that owes an answer for longer than this, and 2 us for each pixel it has to draw (50 times what llvmpipe
   /// takes), counts as hung. Long, because to be wrong costs its work twice.
   std::chrono::milliseconds patience{30'000};
+  std::size_t hands = 0;  ///< of each worker (ShotCrew); 0: as many as suit the driver
 };
 
 /// Worker processes, each with its own EGL display, results in shared memory. A worker that dies or hangs is replaced

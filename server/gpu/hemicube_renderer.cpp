@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <chrono>
 #include <tuple>
 
@@ -13,15 +14,24 @@ namespace {
 /// Pixels of one atlas. On a CPU it should stay in the second-level cache with its depth; on a GPU a large one hides
 /// the latency of the readback.
 constexpr std::size_t kSoftwareAtlasPixels = std::size_t{1} << 16U;
-constexpr std::size_t kGpuAtlasPixels = std::size_t{1} << 24U;
+constexpr std::size_t kCardAtlasPixels = std::size_t{1} << 22U;
+/// A card is asked for so many triangles at once at most: systems end work that keeps one busy for seconds.
+constexpr std::size_t kCardTriangles = std::size_t{1} << 26U;
 constexpr std::size_t kMaxLayers = 256;
 /// Reading the depth of a view takes about as long as drawing so many triangles.
 constexpr std::size_t kWorthASecondLook = 256;
 
+void setViewport(std::uint32_t resolution, std::size_t face) {
+  const auto n = static_cast<GLsizei>(resolution);
+  const auto row = face == 0 ? 0 : n + (static_cast<GLsizei>(face) - 1) * n / 2;
+  glViewport(0, row, n, face == 0 ? n : n / 2);
+}
+
 }  // namespace
 
-Result<HemicubeRenderer::Programs> HemicubeRenderer::buildPrograms(const EglContext& context,
+Result<HemicubeRenderer::Programs> HemicubeRenderer::buildPrograms(const EglContext& context, Drawing drawing,
                                                                    std::vector<std::string> defines) {
+  if (drawing == Drawing::kByCard) defines.emplace_back("CULL_BELOW");
   const auto build = [&](const char* fragment_shader, const char* define) {
     auto all = defines;
     if (define != nullptr) all.emplace_back(define);
@@ -36,9 +46,9 @@ Result<HemicubeRenderer::Programs> HemicubeRenderer::buildPrograms(const EglCont
   return Programs{std::move(*nodes), std::move(*paper), std::move(*items)};
 }
 
-Result<HemicubeRenderer> HemicubeRenderer::create(const EglContext& context) {
-  HemicubeRenderer renderer(context);
-  auto programs = buildPrograms(context, {});
+Result<HemicubeRenderer> HemicubeRenderer::create(const EglContext& context, std::optional<Drawing> drawing) {
+  HemicubeRenderer renderer(context, drawing.value_or(drawingOf(context)));
+  auto programs = buildPrograms(context, renderer.drawing_, {});
   if (!programs) return tl::unexpected(programs.error());
   renderer.opaque_ = std::move(*programs);
   renderer.views_buffer_ = Buffer(context, "hemicube views");
@@ -49,11 +59,17 @@ Result<HemicubeRenderer> HemicubeRenderer::create(const EglContext& context) {
 
 Result<void> HemicubeRenderer::setScene(GpuScene scene, const Culling& culling) {
   if (scene.seeThrough() && !see_through_) {
-    auto programs = buildPrograms(*context_, {kSeeThrough});
+    auto programs = buildPrograms(*context_, drawing_, {kSeeThrough});
     if (!programs) return tl::unexpected(programs.error());
     see_through_ = std::move(*programs);
   }
-  culler_ = TriangleCuller(scene.patches(), culling);
+  if (drawing_ == Drawing::kByProcessor) {
+    culler_ = TriangleCuller(scene.patches(), culling);
+  } else {
+    const std::span<const std::uint32_t> all(scene.patches().indices);
+    fill(indices_buffer_, all, GL_STATIC_DRAW);
+    index_count_ = all.size();
+  }
   scene_ = std::move(scene);
   paper_ids_.reset();
   return {};
@@ -81,17 +97,21 @@ Result<void> HemicubeRenderer::preparePaper() {
 }
 
 std::size_t HemicubeRenderer::capacity(std::uint32_t resolution) const {
-  const auto budget = context_->software() ? kSoftwareAtlasPixels : kGpuAtlasPixels;
-  return std::clamp<std::size_t>(budget / hemicubePixels(resolution), 1, kMaxLayers);
+  const auto pixels = hemicubePixels(resolution);
+  if (drawing_ == Drawing::kByProcessor) return std::clamp<std::size_t>(kSoftwareAtlasPixels / pixels, 1, kMaxLayers);
+  const auto triangles = std::max<std::size_t>(RAD_FACES * index_count_ / 3, 1);
+  return std::clamp<std::size_t>(std::min(kCardAtlasPixels / pixels, kCardTriangles / triangles), 1, kMaxLayers);
 }
 
-HemicubeRenderer::Target& HemicubeRenderer::target(std::uint32_t resolution) {
+/// A card clears all layers of a target whatever is drawn, and takes long to get large ones: it has what was asked for.
+HemicubeRenderer::Target& HemicubeRenderer::target(std::uint32_t resolution, std::size_t views) {
+  const std::size_t wanted = drawing_ == Drawing::kByProcessor ? capacity(resolution) : std::bit_ceil(views);
   auto found = targets_.find(resolution);
-  if (found != targets_.end()) return found->second;
+  if (found != targets_.end() && found->second.layers >= wanted) return found->second;
   const auto width = static_cast<GLsizei>(resolution);
   const auto height = static_cast<GLsizei>(3 * resolution);
-  const auto layers = static_cast<GLsizei>(capacity(resolution));
-  Target made{Texture(*context_, "hemicube ids", GL_TEXTURE_2D_ARRAY),
+  const auto layers = static_cast<GLsizei>(wanted);
+  Target made{wanted, Texture(*context_, "hemicube ids", GL_TEXTURE_2D_ARRAY),
               Texture(*context_, "hemicube depth", GL_TEXTURE_2D_ARRAY), Framebuffer(*context_, "hemicubes")};
   glTextureStorage3D(made.ids.name(), 1, GL_R32UI, width, height, layers);
   glTextureStorage3D(made.depth.name(), 1, GL_DEPTH_COMPONENT32F, width, height, layers);
@@ -99,17 +119,14 @@ HemicubeRenderer::Target& HemicubeRenderer::target(std::uint32_t resolution) {
   glNamedFramebufferTexture(made.framebuffer.name(), GL_DEPTH_ATTACHMENT, made.depth.name(), 0);
   RAD_CHECK_EQ(glCheckNamedFramebufferStatus(made.framebuffer.name(), GL_DRAW_FRAMEBUFFER),
                GLenum{GL_FRAMEBUFFER_COMPLETE});
-  return targets_.emplace(resolution, std::move(made)).first->second;
+  return targets_.insert_or_assign(resolution, std::move(made)).first->second;
 }
 
 std::size_t HemicubeRenderer::select(std::uint32_t resolution, std::span<const HemicubeView> views,
                                      solver::TransportCounters& counters) {
-  face_views_.clear();
   selections_.resize(std::max(selections_.size(), views.size()));
   std::size_t waiting = 0;
   for (std::size_t i = 0; i < views.size(); ++i) {
-    const auto faces = faceViews(views[i].frame, resolution, views[i].level_bias, static_cast<std::uint32_t>(i));
-    face_views_.insert(face_views_.end(), faces.begin(), faces.end());
     culler_.select(views[i].frame, resolution, selections_[i], views[i].window ? &*views[i].window : nullptr);
     counters.triangles_between += selections_[i].between;
     counters.triangles_culled += RAD_FACES * culler_.triangleCount();
@@ -138,7 +155,7 @@ void HemicubeRenderer::draw(TriangleCuller::Lists TriangleCuller::Selection::*li
         const auto indices = (selections_[i].*lists)[l].valid();
         if (indices.empty()) continue;
         commands_.push_back({static_cast<std::uint32_t>(indices.size()), 1, static_cast<std::uint32_t>(indices_.size()),
-                             0, static_cast<std::uint32_t>(i * RAD_FACES + face)});
+                             0, static_cast<std::uint32_t>(face * views + i)});
         indices_.insert(indices_.end(), indices.begin(), indices.end());
       }
     }
@@ -149,34 +166,38 @@ void HemicubeRenderer::draw(TriangleCuller::Lists TriangleCuller::Selection::*li
   counters.triangles_culled -= indices_.size() / 3;
   fill(indices_buffer_, std::span<const std::uint32_t>(indices_), GL_STREAM_DRAW);
   fill(commands_buffer_, std::span<const DrawCommand>(commands_), GL_STREAM_DRAW);
-  const auto n = static_cast<GLsizei>(resolution);
   for (std::size_t face = 0; face < RAD_FACES; ++face) {
     const auto count = first[face + 1] - first[face];
     if (count == 0) continue;
-    const auto row = face == 0 ? 0 : n + (static_cast<GLsizei>(face) - 1) * n / 2;
-    glViewport(0, row, n, face == 0 ? n : n / 2);
+    setViewport(resolution, face);
     const auto* from = reinterpret_cast<const void*>(first[face] * sizeof(DrawCommand));
     glMultiDrawElementsIndirect(GL_TRIANGLES, GL_UNSIGNED_INT, from, static_cast<GLsizei>(count), 0);
   }
 }
 
+void HemicubeRenderer::drawEverything(std::uint32_t resolution, std::size_t views,
+                                      solver::TransportCounters& counters) {
+  if (index_count_ == 0) return;
+  for (std::size_t face = 0; face < RAD_FACES; ++face) {
+    setViewport(resolution, face);
+    glDrawElementsInstancedBaseInstance(GL_TRIANGLES, static_cast<GLsizei>(index_count_), GL_UNSIGNED_INT, nullptr,
+                                        static_cast<GLsizei>(views), static_cast<GLuint>(face * views));
+  }
+  counters.faces += RAD_FACES * views;
+  counters.triangles_drawn += RAD_FACES * views * (index_count_ / 3);
+}
+
 void HemicubeRenderer::takeHidden(std::uint32_t resolution, std::span<const HemicubeView> views, const Target& target,
                                   solver::TransportCounters& counters) {
-  read(target.depth, resolution, views.size(), GL_DEPTH_COMPONENT, GL_FLOAT, depth_);
   const auto pixels = hemicubePixels(resolution);
+  depth_.resize(views.size() * pixels);
+  glGetTextureSubImage(target.depth.name(), 0, 0, 0, 0, static_cast<GLsizei>(resolution),
+                       static_cast<GLsizei>(3 * resolution), static_cast<GLsizei>(views.size()), GL_DEPTH_COMPONENT,
+                       GL_FLOAT, static_cast<GLsizei>(depth_.size() * sizeof(float)), depth_.data());
   for (std::size_t i = 0; i < views.size(); ++i) {
     counters.triangles_hidden += culler_.takeHidden(
         views[i].frame, resolution, std::span<const float>(depth_).subspan(i * pixels, pixels), selections_[i]);
   }
-}
-
-template <typename T>
-void HemicubeRenderer::read(const Texture& from, std::uint32_t resolution, std::size_t views, unsigned format,
-                            unsigned type, std::vector<T>& into) {
-  into.resize(views * hemicubePixels(resolution));
-  glGetTextureSubImage(from.name(), 0, 0, 0, 0, static_cast<GLsizei>(resolution), static_cast<GLsizei>(3 * resolution),
-                       static_cast<GLsizei>(views), format, type, static_cast<GLsizei>(into.size() * sizeof(T)),
-                       into.data());
 }
 
 void HemicubeRenderer::setState(HemicubePass pass, const Target& target) {
@@ -213,32 +234,47 @@ void HemicubeRenderer::useProgram(HemicubePass pass) const {
   }
 }
 
-std::span<const std::uint32_t> HemicubeRenderer::render(HemicubePass pass, std::uint32_t resolution,
-                                                        std::span<const HemicubeView> views,
-                                                        solver::TransportCounters& counters) {
+/// All views of one face after the other, so that one call can draw them.
+void HemicubeRenderer::placeFaces(std::uint32_t resolution, std::span<const HemicubeView> views) {
+  face_views_.resize(RAD_FACES * views.size());
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const auto faces = faceViews(views[i].frame, resolution, views[i].level_bias, static_cast<std::uint32_t>(i));
+    for (std::size_t face = 0; face < RAD_FACES; ++face) face_views_[face * views.size() + i] = faces[face];
+  }
+  fill(views_buffer_, std::span<const FaceView>(face_views_), GL_STREAM_DRAW);
+}
+
+void HemicubeRenderer::drawSelected(std::uint32_t resolution, std::span<const HemicubeView> views, const Target& into,
+                                    solver::TransportCounters& counters) {
+  const auto waiting = select(resolution, views, counters);
+  draw(&TriangleCuller::Selection::first, resolution, views.size(), counters);
+  if (waiting >= kWorthASecondLook * views.size()) takeHidden(resolution, views, into, counters);
+  draw(&TriangleCuller::Selection::second, resolution, views.size(), counters);
+}
+
+void HemicubeRenderer::render(HemicubePass pass, std::uint32_t resolution, std::span<const HemicubeView> views,
+                              solver::TransportCounters& counters, std::vector<std::uint32_t>& pixels) {
   RAD_CHECK(scene_.has_value());
   RAD_CHECK(pass != HemicubePass::kPaper || paper_ids_.has_value());
   RAD_CHECK_LE(views.size(), capacity(resolution));
   const auto start = std::chrono::steady_clock::now();
   context_->makeCurrent();
-  auto& into = target(resolution);
-  const auto waiting = select(resolution, views, counters);
-  fill(views_buffer_, std::span<const FaceView>(face_views_), GL_STREAM_DRAW);
-
+  auto& into = target(resolution, views.size());
+  placeFaces(resolution, views);
   setState(pass, into);
   const GLuint background = pass == HemicubePass::kNodes ? scene_->escapedId() : RAD_ITEM_NONE;
   const float far_depth = 0.0F;
   glClearNamedFramebufferuiv(into.framebuffer.name(), GL_COLOR, 0, &background);
   glClearNamedFramebufferfv(into.framebuffer.name(), GL_DEPTH, 0, &far_depth);
-  draw(&TriangleCuller::Selection::first, resolution, views.size(), counters);
-  if (waiting >= kWorthASecondLook * views.size()) takeHidden(resolution, views, into, counters);
-  draw(&TriangleCuller::Selection::second, resolution, views.size(), counters);
-
-  read(into.ids, resolution, views.size(), GL_RED_INTEGER, GL_UNSIGNED_INT, pixels_);
-  if (pass == HemicubePass::kPaper) paper_ids_->decode(pixels_, scene_->escapedId());
-  counters.pixels += pixels_.size();
+  if (drawing_ == Drawing::kByProcessor) {
+    drawSelected(resolution, views, into, counters);
+  } else {
+    drawEverything(resolution, views.size(), counters);
+  }
+  readback_.read(into.ids, resolution, 3 * resolution, views.size(), pixels);
+  if (pass == HemicubePass::kPaper) paper_ids_->decode(pixels, scene_->escapedId());
+  counters.pixels += pixels.size();
   counters.render_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  return pixels_;
 }
 
 }  // namespace radiosity::gpu

@@ -2,8 +2,9 @@
 // context and its thread.
 //
 // Each shooter has its own layer, with its faces always in the same place, so that its pixels are the same whatever
-// else is rendered with it. Large scenes are drawn in two steps, the second without what the first hides (see
-// triangle_culler.h).
+// else is rendered with it. What a processor draws it first looks through for what can be left out; large scenes in two
+// steps, the second without what the first hides (see triangle_culler.h). A card draws all of the scene for many
+// shooters in five calls, sooner than a processor could choose.
 #pragma once
 
 #include <map>
@@ -11,8 +12,10 @@
 #include <span>
 #include <vector>
 
+#include "server/gpu/drawing.h"
 #include "server/gpu/gl_objects.h"
 #include "server/gpu/gpu_scene.h"
+#include "server/gpu/image_readback.h"
 #include "server/gpu/paper_ids.h"
 #include "server/gpu/triangle_culler.h"
 #include "server/solver/transport.h"
@@ -34,7 +37,9 @@ enum class HemicubePass {
 
 class HemicubeRenderer {
  public:
-  [[nodiscard]] static Result<HemicubeRenderer> create(const EglContext& context);
+  /// `drawing`: what suits the context, but for tests.
+  [[nodiscard]] static Result<HemicubeRenderer> create(const EglContext& context,
+                                                       std::optional<Drawing> drawing = std::nullopt);
 
   /// Fails when the driver does not compile the variant for scenes that one can see through.
   [[nodiscard]] Result<void> setScene(GpuScene scene, const Culling& culling = {});
@@ -45,12 +50,13 @@ class HemicubeRenderer {
   /// How many views one render() may take at this resolution.
   [[nodiscard]] std::size_t capacity(std::uint32_t resolution) const;
 
-  /// hemicubePixels(resolution) ids for each view, in the layout of hemicube_weights.h. Valid until the next call.
-  std::span<const std::uint32_t> render(HemicubePass pass, std::uint32_t resolution,
-                                        std::span<const HemicubeView> views, solver::TransportCounters& counters);
+  /// hemicubePixels(resolution) ids for each view, in the layout of hemicube_weights.h.
+  void render(HemicubePass pass, std::uint32_t resolution, std::span<const HemicubeView> views,
+              solver::TransportCounters& counters, std::vector<std::uint32_t>& pixels);
 
  private:
   struct Target {
+    std::size_t layers;
     Texture ids, depth;
     Framebuffer framebuffer;
   };
@@ -60,8 +66,13 @@ class HemicubeRenderer {
     std::uint32_t base_instance;
   };
 
-  explicit HemicubeRenderer(const EglContext& context) : context_(&context) {}
-  Target& target(std::uint32_t resolution);
+  HemicubeRenderer(const EglContext& context, Drawing drawing)
+      : context_(&context), drawing_(drawing), readback_(context, drawing) {}
+  Target& target(std::uint32_t resolution, std::size_t views);
+  void drawSelected(std::uint32_t resolution, std::span<const HemicubeView> views, const Target& into,
+                    solver::TransportCounters& counters);
+  void drawEverything(std::uint32_t resolution, std::size_t views, solver::TransportCounters& counters);
+  void placeFaces(std::uint32_t resolution, std::span<const HemicubeView> views);
   /// Returns the number of triangles that wait for a second step.
   std::size_t select(std::uint32_t resolution, std::span<const HemicubeView> views,
                      solver::TransportCounters& counters);
@@ -71,28 +82,28 @@ class HemicubeRenderer {
             solver::TransportCounters& counters);
   void useProgram(HemicubePass pass) const;
   void setState(HemicubePass pass, const Target& target);
-  template <typename T>
-  void read(const Texture& from, std::uint32_t resolution, std::size_t views, unsigned format, unsigned type,
-            std::vector<T>& into);
 
   const EglContext* context_;
+  Drawing drawing_;
+  ImageReadback readback_;
   std::optional<GpuScene> scene_;
   TriangleCuller culler_;
   struct Programs {
     Program nodes, paper, items;
   };
-  [[nodiscard]] static Result<Programs> buildPrograms(const EglContext& context, std::vector<std::string> defines);
+  [[nodiscard]] static Result<Programs> buildPrograms(const EglContext& context, Drawing drawing,
+                                                      std::vector<std::string> defines);
   Programs opaque_;
   std::optional<Programs> see_through_;  ///< made for the first scene that needs them
   std::optional<PaperIds> paper_ids_;
   Texture paper_texture_;
   Buffer views_buffer_, indices_buffer_, commands_buffer_;
+  std::size_t index_count_ = 0;              ///< in the buffer for good, where everything is drawn
   std::map<std::uint32_t, Target> targets_;  ///< by resolution
   std::vector<FaceView> face_views_;
   std::vector<TriangleCuller::Selection> selections_;  ///< by view
   std::vector<std::uint32_t> indices_;
   std::vector<DrawCommand> commands_;
-  std::vector<std::uint32_t> pixels_;
   std::vector<float> depth_;
 };
 

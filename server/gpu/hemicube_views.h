@@ -26,6 +26,7 @@ struct HemicubeAxes {
 /// One face as hemicube.vert reads it.
 struct FaceView {
   glm::vec4 right, up, depth, origin;
+  glm::vec4 normal{0.0F};  ///< of the hemicube, where it is the card that leaves out what lies below
 };
 
 /// `layer`: where the image goes. `level_bias`: of the shot.
@@ -45,10 +46,14 @@ struct FaceView {
     return FaceView{{right + shift_x * depth, footprint},
                     {2.0F * n + shift_side * depth, 0.0F},
                     {depth, static_cast<float>(layer)},
-                    {origin, level_bias}};
+                    {origin, level_bias},
+                    {n, 0.0F}};
   };
-  const FaceView top{
-      {t + shift_x * n, footprint}, {b + shift_top * n, 0.0F}, {n, static_cast<float>(layer)}, {origin, level_bias}};
+  const FaceView top{{t + shift_x * n, footprint},
+                     {b + shift_top * n, 0.0F},
+                     {n, static_cast<float>(layer)},
+                     {origin, level_bias},
+                     {n, 0.0F}};
   return {top, side(b, t), side(b, -t), side(t, b), side(t, -b)};
 }
 

@@ -1,25 +1,28 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <thread>
+
 #include "common/check.h"
 #include "server/gpu/gpu_transport.h"
-#include "server/gpu/shot_runner.h"
+#include "server/gpu/shot_crew.h"
 
 namespace radiosity::gpu {
 namespace {
 
 class InProcessTransport final : public solver::Transport {
  public:
-  explicit InProcessTransport(std::unique_ptr<ShotRunner> runner) : runner_(std::move(runner)) {}
+  explicit InProcessTransport(std::unique_ptr<ShotCrew> crew) : crew_(std::move(crew)) {}
 
   Result<void> setScene(std::shared_ptr<const scene::PatchScene> patches) override {
     store_ = FluxStore(patches->nodeCount());
     patches_ = patches;
-    return runner_->setScene(std::move(patches));
+    return crew_->setScene(std::move(patches));
   }
 
   Result<solver::TransportCounters> run(const solver::ShotBatch& batch, solver::FluxAccumulators& into) override {
     const auto sink = store_.sink();
-    auto counters = runner_->run(spanOf(batch), sink);
+    auto counters = crew_->run(spanOf(batch), sink);
     if (counters) {
       sink.drainInto(into);
     } else {
@@ -29,28 +32,35 @@ class InProcessTransport final : public solver::Transport {
   }
 
   Result<solver::TransportCounters> measure(const solver::ShotBatch& batch, const TakeLinks& take) override {
-    return runner_->measure(spanOf(batch), take);
+    return crew_->measure(spanOf(batch), take);
   }
 
   [[nodiscard]] std::string description() const override {
-    return fmt::format("{}, in process", runner_->context().renderer());
+    return fmt::format("{}, in process", crew_->context().renderer());
   }
 
  protected:
   [[nodiscard]] std::shared_ptr<const scene::PatchScene> scene() const override { return patches_; }
 
  private:
-  std::unique_ptr<ShotRunner> runner_;
+  std::unique_ptr<ShotCrew> crew_;
   std::shared_ptr<const scene::PatchScene> patches_;
   FluxStore store_;
 };
 
 }  // namespace
 
-Result<std::unique_ptr<solver::Transport>> makeInProcessTransport() {
-  auto runner = ShotRunner::create();
-  if (!runner) return tl::unexpected(runner.error());
-  return std::make_unique<InProcessTransport>(std::move(*runner));
+std::size_t handsFor(bool software, std::size_t contexts) {
+  if (software) return 1;
+  constexpr std::size_t kMostHands = 32;  // each holds as much memory as a worker in software
+  return std::clamp<std::size_t>(std::thread::hardware_concurrency() / contexts, 1, kMostHands);
+}
+
+Result<std::unique_ptr<solver::Transport>> makeInProcessTransport(std::size_t hands) {
+  auto crew = ShotCrew::create();
+  if (!crew) return tl::unexpected(crew.error());
+  (*crew)->setHands(hands > 0 ? hands : handsFor((*crew)->context().software(), 1));
+  return std::make_unique<InProcessTransport>(std::move(*crew));
 }
 
 }  // namespace radiosity::gpu

@@ -105,12 +105,12 @@ void LightGatherer::finishLinks(const solver::GatherShot& shot, solver::LinkSamp
 }
 
 void LightGatherer::gather(const solver::GatherShot& shot, std::span<const solver::HemicubeFrame> points,
-                           double flux_scale, HemicubeRenderer& renderer, WeightCache& weights, const FluxSink& sink,
+                           double flux_scale, ImageSource& source, WeightCache& weights, const FluxSink& sink,
                            solver::TransportCounters& counters) {
   if (points.empty()) return;
   using Clock = std::chrono::steady_clock;
   const auto start = Clock::now();
-  const double rendered_before = counters.render_seconds;
+  const double waited_before = source.seconds();
   findLit(shot);
   const bool both = shot.half == solver::kBothHalves && points.size() > 1;
   for (std::size_t half = 0; half < 2; ++half) {
@@ -120,12 +120,12 @@ void LightGatherer::gather(const solver::GatherShot& shot, std::span<const solve
   }
   beginEdges();
   std::array<Lost, 2> lost{};
-  const auto capacity = renderer.capacity(shot.resolution);
+  const auto capacity = source.hemicubeCapacity(shot.resolution);
   std::vector<HemicubeView> views;
   for (std::size_t first = 0; first < points.size(); first += capacity) {
     views.clear();
     for (const auto& point : points.subspan(first, std::min(capacity, points.size() - first))) views.push_back({point});
-    const auto images = renderer.render(HemicubePass::kItems, shot.resolution, views, counters);
+    const auto images = source.hemicubes(HemicubePass::kItems, shot.resolution, views, counters);
     const auto pixels = hemicubePixels(shot.resolution);
     for (std::size_t i = 0; i < views.size(); ++i) {
       const auto items = images.subspan(i * pixels, pixels);
@@ -155,7 +155,7 @@ void LightGatherer::gather(const solver::GatherShot& shot, std::span<const solve
   counters.gather_points += points.size();
   ++counters.gather_shots;
   counters.gather_seconds +=
-      std::chrono::duration<double>(Clock::now() - start).count() - (counters.render_seconds - rendered_before);
+      std::chrono::duration<double>(Clock::now() - start).count() - (source.seconds() - waited_before);
 }
 
 }  // namespace radiosity::gpu

@@ -15,8 +15,8 @@
 
 #include "server/gpu/flux_sink.h"
 #include "server/gpu/form_factor_kernel.h"
-#include "server/gpu/hemicube_renderer.h"
 #include "server/gpu/hemicube_weights.h"
+#include "server/gpu/image_source.h"
 #include "server/gpu/receivers.h"
 #include "server/gpu/view_window.h"
 
@@ -28,8 +28,7 @@ class LightGatherer {
   explicit LightGatherer(std::shared_ptr<const Receivers> receivers);
 
   void gather(const solver::GatherShot& shot, std::span<const solver::HemicubeFrame> points, double flux_scale,
-              HemicubeRenderer& renderer, WeightCache& weights, const FluxSink& sink,
-              solver::TransportCounters& counters);
+              ImageSource& source, WeightCache& weights, const FluxSink& sink, solver::TransportCounters& counters);
 
   /// Links of one shot, in steps, so that item buffers of several shots can be drawn at once: begin, one look for each
   /// point, finish.

@@ -9,15 +9,17 @@
 namespace radiosity::gpu {
 namespace {
 
-/// Pixels of one image array: as for hemicubes, small on a CPU and large on a GPU.
+/// Pixels of one image array: as for hemicubes, small where the processor draws and large with a card.
 constexpr std::size_t kSoftwarePixels = std::size_t{1} << 16U;
-constexpr std::size_t kGpuPixels = std::size_t{1} << 22U;
+constexpr std::size_t kCardPixels = std::size_t{1} << 22U;
+/// As for hemicubes.
+constexpr std::size_t kCardTriangles = std::size_t{1} << 26U;
 constexpr std::size_t kMaxLayers = 64;
 
 }  // namespace
 
-Result<ParallelRenderer> ParallelRenderer::create(const EglContext& context) {
-  ParallelRenderer renderer(context);
+Result<ParallelRenderer> ParallelRenderer::create(const EglContext& context, std::optional<Drawing> drawing) {
+  ParallelRenderer renderer(context, drawing.value_or(drawingOf(context)));
   auto program = buildProgram(context, "hemicube.vert", "hemicube_items.frag", {"PARALLEL"});
   if (!program) return tl::unexpected(program.error());
   renderer.program_ = std::move(*program);
@@ -33,7 +35,13 @@ Result<void> ParallelRenderer::setScene(const GpuScene& scene) {
     if (!program) return tl::unexpected(program.error());
     see_through_ = std::move(*program);
   }
-  culler_ = ParallelCuller(scene.patches());
+  if (drawing_ == Drawing::kByProcessor) {
+    culler_ = ParallelCuller(scene.patches());
+  } else {
+    const std::span<const std::uint32_t> all(scene.patches().indices);
+    fill(indices_buffer_, all, GL_STATIC_DRAW);
+    index_count_ = all.size();
+  }
   const auto box = solver::sceneBox(scene.patches());
   centre_ = 0.5F * (box[0] + box[1]);
   radius_ = std::max(0.5F * glm::length(box[1] - box[0]), 1.0e-6F);
@@ -41,8 +49,10 @@ Result<void> ParallelRenderer::setScene(const GpuScene& scene) {
 }
 
 std::size_t ParallelRenderer::capacity(std::uint32_t resolution) const {
-  const auto budget = context_->software() ? kSoftwarePixels : kGpuPixels;
-  return std::clamp<std::size_t>(budget / (std::size_t{resolution} * resolution), 1, kMaxLayers);
+  const auto pixels = std::size_t{resolution} * resolution;
+  if (drawing_ == Drawing::kByProcessor) return std::clamp<std::size_t>(kSoftwarePixels / pixels, 1, kMaxLayers);
+  const auto triangles = std::max<std::size_t>(index_count_ / 3, 1);
+  return std::clamp<std::size_t>(std::min(kCardPixels / pixels, kCardTriangles / triangles), 1, kMaxLayers);
 }
 
 ParallelAxes ParallelRenderer::axes(const solver::ParallelView& view, std::uint32_t resolution) const {
@@ -70,12 +80,9 @@ ParallelRenderer::Target& ParallelRenderer::target(std::uint32_t resolution) {
   return targets_.emplace(resolution, std::move(made)).first->second;
 }
 
-/// What each view draws, and how it looks at the scene.
-void ParallelRenderer::select(std::uint32_t resolution, std::span<const solver::ParallelView> views,
-                              solver::TransportCounters& counters) {
+/// How each view looks at the scene.
+void ParallelRenderer::placeViews(std::uint32_t resolution, std::span<const solver::ParallelView> views) {
   faces_.clear();
-  indices_.clear();
-  commands_.clear();
   for (std::uint32_t i = 0; i < views.size(); ++i) {
     const auto a = axes(views[i], resolution);
     const float to_clip = 2.0F / static_cast<float>(resolution);
@@ -84,26 +91,37 @@ void ParallelRenderer::select(std::uint32_t resolution, std::span<const solver::
                       {to_clip * a.up, shift.y},
                       {views[i].direction / (2.1F * radius_), static_cast<float>(i)},
                       {a.centre, 0.0F}});
+  }
+  fill(views_buffer_, std::span<const FaceView>(faces_), GL_STREAM_DRAW);
+}
+
+/// What each view draws.
+void ParallelRenderer::select(std::uint32_t resolution, std::span<const solver::ParallelView> views,
+                              solver::TransportCounters& counters) {
+  indices_.clear();
+  commands_.clear();
+  for (std::uint32_t i = 0; i < views.size(); ++i) {
     const auto first = static_cast<std::uint32_t>(indices_.size());
-    culler_.select(a, views[i].direction, indices_);
+    culler_.select(axes(views[i], resolution), views[i].direction, indices_);
     const auto count = static_cast<std::uint32_t>(indices_.size()) - first;
     if (count > 0) commands_.push_back({count, 1, first, 0, i});
     counters.triangles_drawn += count / 3;
     counters.triangles_culled += culler_.triangleCount() - count / 3;
   }
+  fill(indices_buffer_, std::span<const std::uint32_t>(indices_), GL_STREAM_DRAW);
+  fill(commands_buffer_, std::span<const DrawCommand>(commands_), GL_STREAM_DRAW);
 }
 
-std::span<const std::uint32_t> ParallelRenderer::render(const GpuScene& scene, std::uint32_t resolution,
-                                                        std::span<const solver::ParallelView> views,
-                                                        solver::TransportCounters& counters) {
+void ParallelRenderer::render(const GpuScene& scene, std::uint32_t resolution,
+                              std::span<const solver::ParallelView> views, solver::TransportCounters& counters,
+                              std::vector<std::uint32_t>& pixels) {
   RAD_CHECK_LE(views.size(), capacity(resolution));
   const auto start = std::chrono::steady_clock::now();
   context_->makeCurrent();
   auto& into = target(resolution);
-  select(resolution, views, counters);
-  fill(views_buffer_, std::span<const FaceView>(faces_), GL_STREAM_DRAW);
-  fill(indices_buffer_, std::span<const std::uint32_t>(indices_), GL_STREAM_DRAW);
-  fill(commands_buffer_, std::span<const DrawCommand>(commands_), GL_STREAM_DRAW);
+  const bool selects = drawing_ == Drawing::kByProcessor;
+  if (selects) select(resolution, views, counters);
+  placeViews(resolution, views);
   glViewport(0, 0, static_cast<GLsizei>(resolution), static_cast<GLsizei>(resolution));
   glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
   glEnable(GL_DEPTH_TEST);
@@ -123,15 +141,16 @@ std::span<const std::uint32_t> ParallelRenderer::render(const GpuScene& scene, s
   glClearNamedFramebufferuiv(into.framebuffer.name(), GL_COLOR, 0, &background);
   glClearNamedFramebufferfv(into.framebuffer.name(), GL_DEPTH, 0, &far_depth);
   glBindBuffer(GL_DRAW_INDIRECT_BUFFER, commands_buffer_.name());
-  if (!commands_.empty())
+  if (selects && !commands_.empty())
     glMultiDrawElementsIndirect(GL_TRIANGLES, GL_UNSIGNED_INT, nullptr, static_cast<GLsizei>(commands_.size()), 0);
-  pixels_.resize(views.size() * resolution * resolution);
-  glGetTextureSubImage(into.ids.name(), 0, 0, 0, 0, static_cast<GLsizei>(resolution), static_cast<GLsizei>(resolution),
-                       static_cast<GLsizei>(views.size()), GL_RED_INTEGER, GL_UNSIGNED_INT,
-                       static_cast<GLsizei>(pixels_.size() * sizeof(std::uint32_t)), pixels_.data());
-  counters.pixels += pixels_.size();
+  if (!selects && index_count_ > 0) {
+    glDrawElementsInstanced(GL_TRIANGLES, static_cast<GLsizei>(index_count_), GL_UNSIGNED_INT, nullptr,
+                            static_cast<GLsizei>(views.size()));
+    counters.triangles_drawn += views.size() * (index_count_ / 3);
+  }
+  readback_.read(into.ids, resolution, resolution, views.size(), pixels);
+  counters.pixels += pixels.size();
   counters.render_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  return pixels_;
 }
 
 }  // namespace radiosity::gpu

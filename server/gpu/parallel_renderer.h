@@ -8,9 +8,11 @@
 #include <span>
 #include <vector>
 
+#include "server/gpu/drawing.h"
 #include "server/gpu/gl_objects.h"
 #include "server/gpu/gpu_scene.h"
 #include "server/gpu/hemicube_views.h"
+#include "server/gpu/image_readback.h"
 #include "server/gpu/parallel_culler.h"
 #include "server/solver/transport.h"
 
@@ -18,7 +20,9 @@ namespace radiosity::gpu {
 
 class ParallelRenderer {
  public:
-  [[nodiscard]] static Result<ParallelRenderer> create(const EglContext& context);
+  /// `drawing`: what suits the context, but for tests.
+  [[nodiscard]] static Result<ParallelRenderer> create(const EglContext& context,
+                                                       std::optional<Drawing> drawing = std::nullopt);
 
   /// Fails when the driver does not compile the variant for scenes that one can see through.
   [[nodiscard]] Result<void> setScene(const GpuScene& scene);
@@ -27,11 +31,9 @@ class ParallelRenderer {
   [[nodiscard]] std::size_t capacity(std::uint32_t resolution) const;
   [[nodiscard]] ParallelAxes axes(const solver::ParallelView& view, std::uint32_t resolution) const;
 
-  /// resolution^2 items for each view, rows from below; a triangle of the plane seen, or RAD_ITEM_NONE. Valid until the
-  /// next call.
-  std::span<const std::uint32_t> render(const GpuScene& scene, std::uint32_t resolution,
-                                        std::span<const solver::ParallelView> views,
-                                        solver::TransportCounters& counters);
+  /// resolution^2 items for each view, rows from below; a triangle of the plane seen, or RAD_ITEM_NONE.
+  void render(const GpuScene& scene, std::uint32_t resolution, std::span<const solver::ParallelView> views,
+              solver::TransportCounters& counters, std::vector<std::uint32_t>& pixels);
 
  private:
   struct Target {
@@ -45,12 +47,16 @@ class ParallelRenderer {
     std::uint32_t base_instance;
   };
 
-  explicit ParallelRenderer(const EglContext& context) : context_(&context) {}
+  ParallelRenderer(const EglContext& context, Drawing drawing)
+      : context_(&context), drawing_(drawing), readback_(context, drawing) {}
+  void placeViews(std::uint32_t resolution, std::span<const solver::ParallelView> views);
   void select(std::uint32_t resolution, std::span<const solver::ParallelView> views,
               solver::TransportCounters& counters);
   Target& target(std::uint32_t resolution);
 
   const EglContext* context_;
+  Drawing drawing_;
+  ImageReadback readback_;
   Program program_;
   std::optional<Program> see_through_;  ///< made for the first scene that needs it
   Buffer indices_buffer_, views_buffer_, commands_buffer_;
@@ -58,10 +64,10 @@ class ParallelRenderer {
   std::vector<FaceView> faces_;
   std::vector<std::uint32_t> indices_;
   std::vector<DrawCommand> commands_;
+  std::size_t index_count_ = 0;  ///< in the buffer for good, where everything is drawn
   glm::vec3 centre_{0.0F};
   float radius_ = 1.0F;
   std::map<std::uint32_t, Target> targets_;  ///< by resolution
-  std::vector<std::uint32_t> pixels_;
 };
 
 }  // namespace radiosity::gpu

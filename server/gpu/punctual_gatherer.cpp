@@ -201,12 +201,12 @@ PunctualGatherer::Lost PunctualGatherer::weighLost(const solver::PointShot& shot
   return lost;
 }
 
-void PunctualGatherer::gather(const solver::PointShot& shot, double flux_scale, HemicubeRenderer& renderer,
+void PunctualGatherer::gather(const solver::PointShot& shot, double flux_scale, ImageSource& source,
                               const FluxSink& sink, solver::TransportCounters& counters) {
   const auto start = Clock::now();
-  const double rendered_before = counters.render_seconds;
+  const double waited_before = source.seconds();
   const HemicubeView view{shot.frame, 0.0F};
-  const auto items = renderer.render(HemicubePass::kItems, shot.resolution, std::span(&view, 1), counters);
+  const auto items = source.hemicubes(HemicubePass::kItems, shot.resolution, std::span(&view, 1), counters);
   sum_.assign(receivers_->all().size(), 0.0F);
   for (const auto& group : receivers_->groups()) {
     const auto& surface = receivers_->patches().surfaces[group.surface];
@@ -216,7 +216,7 @@ void PunctualGatherer::gather(const solver::PointShot& shot, double flux_scale, 
   deliver(shot.intensity, shot.emitted, weighLost(shot, items), shot.half, flux_scale, sink, counters);
   ++counters.point_images;
   counters.gather_seconds +=
-      std::chrono::duration<double>(Clock::now() - start).count() - (counters.render_seconds - rendered_before);
+      std::chrono::duration<double>(Clock::now() - start).count() - (source.seconds() - waited_before);
 }
 
 void PunctualGatherer::lightGroup(const solver::ParallelShot& shot, const ParallelAxes& axes,
@@ -303,21 +303,21 @@ void PunctualGatherer::scaleToSky(const solver::ParallelShot& shot, std::span<co
 }
 
 void PunctualGatherer::gather(const solver::ParallelShot& shot, std::span<const solver::ParallelView> views,
-                              double flux_scale, const GpuScene& scene, ParallelRenderer& renderer,
-                              const FluxSink& sink, solver::TransportCounters& counters) {
+                              double flux_scale, ImageSource& source, const FluxSink& sink,
+                              solver::TransportCounters& counters) {
   const auto start = Clock::now();
-  const double rendered_before = counters.render_seconds;
+  const double waited_before = source.seconds();
   const auto mine = views.subspan(shot.first_view, shot.view_count);
   const auto pixels = std::size_t{shot.resolution} * shot.resolution;
-  const auto capacity = renderer.capacity(shot.resolution);
+  const auto capacity = source.parallelCapacity(shot.resolution);
   sum_.assign(receivers_->all().size(), 0.0F);
   Lost lost;
   for (std::size_t first = 0; first < mine.size(); first += capacity) {
     const auto some = mine.subspan(first, std::min(capacity, mine.size() - first));
-    const auto images = renderer.render(scene, shot.resolution, some, counters);
+    const auto images = source.parallel(shot.resolution, some, counters);
     for (std::size_t i = 0; i < some.size(); ++i) {
       const auto items = images.subspan(i * pixels, pixels);
-      const auto axes = renderer.axes(some[i], shot.resolution);
+      const auto axes = source.axes(some[i], shot.resolution);
       for (const auto& group : receivers_->groups()) lightGroup(shot, axes, some[i], first + i, group, items);
       const auto of_view = weighLost(some[i], axes.pixel_area, items);
       lost.all += of_view.all;
@@ -329,7 +329,7 @@ void PunctualGatherer::gather(const solver::ParallelShot& shot, std::span<const 
   deliver(shot.irradiance, shot.emitted, lost, shot.half, flux_scale, sink, counters);
   counters.parallel_images += mine.size();
   counters.gather_seconds +=
-      std::chrono::duration<double>(Clock::now() - start).count() - (counters.render_seconds - rendered_before);
+      std::chrono::duration<double>(Clock::now() - start).count() - (source.seconds() - waited_before);
 }
 
 void PunctualGatherer::deliver(const std::array<double, 3>& unit, const std::array<double, 3>& emitted,

@@ -7,8 +7,7 @@
 #include <vector>
 
 #include "server/gpu/flux_sink.h"
-#include "server/gpu/hemicube_renderer.h"
-#include "server/gpu/parallel_renderer.h"
+#include "server/gpu/image_source.h"
 #include "server/gpu/receivers.h"
 
 namespace radiosity::gpu {
@@ -19,12 +18,11 @@ class PunctualGatherer {
   explicit PunctualGatherer(std::shared_ptr<const Receivers> receivers)
       : receivers_(std::move(receivers)), box_(solver::sceneBox(receivers_->patches())) {}
 
-  void gather(const solver::PointShot& shot, double flux_scale, HemicubeRenderer& renderer, const FluxSink& sink,
+  void gather(const solver::PointShot& shot, double flux_scale, ImageSource& source, const FluxSink& sink,
               solver::TransportCounters& counters);
   /// `views` of the whole batch.
   void gather(const solver::ParallelShot& shot, std::span<const solver::ParallelView> views, double flux_scale,
-              const GpuScene& scene, ParallelRenderer& renderer, const FluxSink& sink,
-              solver::TransportCounters& counters);
+              ImageSource& source, const FluxSink& sink, solver::TransportCounters& counters);
 
  private:
   /// Shares of a shot's flux that left the scene, and that fell on unlit sides.

@@ -15,6 +15,10 @@
 #define RAD_LEVEL_MASK 31u
 #define RAD_ABSORBING_LEVELS 1u
 
+// Heights above the shooter's plane (unit box) that are taken for the plane itself: rounding puts neighbours in the
+// same plane up to 1e-7 above it, where they would cover everything.
+#define RAD_COPLANAR 1.0e-6
+
 // Item buffer and composed ids: a pixel that shows nothing.
 #define RAD_ITEM_NONE 0xFFFFFFFFu
 
@@ -24,7 +28,7 @@
 #define RAD_ATTRIBUTE_TEXEL 2
 #define RAD_ATTRIBUTE_NODES 3
 #define RAD_ATTRIBUTE_SURFACE 4
-#define RAD_ATTRIBUTE_VIEW 5  // four vec4
+#define RAD_ATTRIBUTE_VIEW 5  // five vec4
 
 // Shader storage bindings.
 #define RAD_BINDING_LEVELS 0

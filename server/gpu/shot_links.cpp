@@ -8,12 +8,12 @@
 namespace radiosity::gpu {
 
 Result<solver::TransportCounters> ShotRunner::measure(const ShotSpan& shots, const solver::Transport::TakeLinks& take) {
-  if (!has_scene_) return fail(ErrorCode::kInternal, "setScene must come before measure");
+  if (!receivers_) return fail(ErrorCode::kInternal, "setScene must come before measure");
   if (const auto good = checkShots(shots); !good) return tl::unexpected(good.error());
   solver::TransportCounters counters;
   measureGather(shots, take, counters);
   measureScatter(shots, take, counters);
-  if (const auto good = context_->check(); !good) return tl::unexpected(good.error());
+  if (const auto good = images_.check(); !good) return tl::unexpected(good.error());
   return counters;
 }
 
@@ -21,7 +21,7 @@ Result<solver::TransportCounters> ShotRunner::measure(const ShotSpan& shots, con
 void ShotRunner::measureScatter(const ShotSpan& shots, const solver::Transport::TakeLinks& take,
                                 solver::TransportCounters& counters) {
   if (shots.scatter.empty()) return;
-  if (!link_store_) link_store_.emplace(patches_->nodeCount());
+  if (!link_store_) link_store_.emplace(receivers_->patches().nodeCount());
   const auto sink = link_store_->sink();
   for (std::size_t i = 0; i < shots.scatter.size(); ++i) {
     auto shot = shots.scatter[i];
@@ -37,7 +37,7 @@ void ShotRunner::measureScatter(const ShotSpan& shots, const solver::Transport::
       if (sink.mark[0][block] == 0) continue;
       const auto first = static_cast<std::uint32_t>(block * kMarkNodes);
       const auto last = std::min<std::size_t>(first + kMarkNodes, sink.node[0].size());
-      for (auto node = first; node < last; ++node) links.addFlux(node, sink.node[0][node][0], *patches_);
+      for (auto node = first; node < last; ++node) links.addFlux(node, sink.node[0][node][0], receivers_->patches());
     }
     links.escaped += static_cast<double>(sink.totals->escaped[0]) / solver::kMeasureScale;
     links.absorbed += static_cast<double>(sink.totals->backface[0]) / solver::kMeasureScale;
@@ -63,7 +63,7 @@ void ShotRunner::measureGather(const ShotSpan& shots, const solver::Transport::T
     const auto resolution = shots.gather[looks[first].shot].resolution;
     views.clear();
     auto last = first;
-    for (; last < looks.size() && views.size() < renderer_.capacity(resolution) &&
+    for (; last < looks.size() && views.size() < images_.hemicubeCapacity(resolution) &&
            shots.gather[looks[last].shot].resolution == resolution;
          ++last) {
       const auto& shot = shots.gather[looks[last].shot];
@@ -75,7 +75,7 @@ void ShotRunner::measureGather(const ShotSpan& shots, const solver::Transport::T
       if (!shot.open_looks.has(static_cast<std::uint32_t>(looks[last].point - shot.first_point)))
         views.back().window = gatherer_.windowOf(shot, point, shots.boxes.subspan(shot.first_box, shot.box_count));
     }
-    const auto images = renderer_.render(HemicubePass::kItems, resolution, views, counters);
+    const auto images = images_.hemicubes(HemicubePass::kItems, resolution, views, counters);
     const auto start = Clock::now();
     const auto pixels = hemicubePixels(resolution);
     for (auto i = first; i < last; ++i) {

@@ -88,48 +88,31 @@ Result<void> checkShots(const ShotSpan& shots) {
   return {};
 }
 
-Result<std::unique_ptr<ShotRunner>> ShotRunner::create() {
-  auto context = EglContext::create();
-  if (!context) return tl::unexpected(context.error());
-  auto renderer = HemicubeRenderer::create(**context);
-  if (!renderer) return tl::unexpected(renderer.error());
-  auto parallel = ParallelRenderer::create(**context);
-  if (!parallel) return tl::unexpected(parallel.error());
-  return std::unique_ptr<ShotRunner>(new ShotRunner(std::move(*context), std::move(*renderer), std::move(*parallel)));
-}
-
-Result<void> ShotRunner::setScene(std::shared_ptr<const scene::PatchScene> patches) {
-  auto scene = GpuScene::upload(*context_, patches);
-  if (!scene) return tl::unexpected(scene.error());
-  if (auto set = renderer_.setScene(std::move(*scene)); !set) return set;
-  if (auto set = parallel_.setScene(renderer_.scene()); !set) return set;
-  const auto receivers = std::make_shared<const Receivers>(patches);
+void ShotRunner::setScene(const std::shared_ptr<const Receivers>& receivers) {
+  receivers_ = receivers;
   punctual_ = PunctualGatherer(receivers);
-  accumulator_ = ScatterAccumulator(patches->nodeCount());
+  accumulator_ = ScatterAccumulator(receivers->patches().nodeCount());
   gatherer_ = LightGatherer(receivers);
-  patches_ = std::move(patches);
   link_store_.reset();
-  has_scene_ = true;
-  return context_->check();
 }
 
 Result<solver::TransportCounters> ShotRunner::run(const ShotSpan& shots, const FluxSink& sink) {
-  if (!has_scene_) return fail(ErrorCode::kInternal, "setScene must come before run");
+  if (!receivers_) return fail(ErrorCode::kInternal, "setScene must come before run");
   if (const auto good = checkShots(shots); !good) return tl::unexpected(good.error());
   if (shots.mode == solver::LinkMode::kPaperMipmap) {
-    if (auto prepared = renderer_.preparePaper(); !prepared) return tl::unexpected(prepared.error());
+    if (auto prepared = images_.preparePaper(); !prepared) return tl::unexpected(prepared.error());
   }
   solver::TransportCounters counters;
   scatter(shots, sink, counters);
   for (const auto& shot : shots.gather) {
-    gatherer_.gather(shot, shots.points.subspan(shot.first_point, shot.point_count), shots.flux_scale, renderer_,
+    gatherer_.gather(shot, shots.points.subspan(shot.first_point, shot.point_count), shots.flux_scale, images_,
                      weights_, sink, counters);
   }
-  for (const auto& shot : shots.point_lights) punctual_.gather(shot, shots.flux_scale, renderer_, sink, counters);
+  for (const auto& shot : shots.point_lights) punctual_.gather(shot, shots.flux_scale, images_, sink, counters);
   for (const auto& shot : shots.parallel) {
-    punctual_.gather(shot, shots.views, shots.flux_scale, renderer_.scene(), parallel_, sink, counters);
+    punctual_.gather(shot, shots.views, shots.flux_scale, images_, sink, counters);
   }
-  if (const auto good = context_->check(); !good) return tl::unexpected(good.error());
+  if (const auto good = images_.check(); !good) return tl::unexpected(good.error());
   return counters;
 }
 
@@ -139,14 +122,14 @@ void ShotRunner::scatter(const ShotSpan& shots, const FluxSink& sink, solver::Tr
   for (std::size_t first = 0; first < shots.scatter.size();) {
     // Neighbours of equal resolution share an atlas.
     const auto resolution = shots.scatter[first].resolution;
-    const auto capacity = renderer_.capacity(resolution);
+    const auto capacity = images_.hemicubeCapacity(resolution);
     views.clear();
     auto last = first;
     for (; last < shots.scatter.size() && views.size() < capacity && shots.scatter[last].resolution == resolution;
          ++last) {
       views.push_back({shots.scatter[last].frame, shots.scatter[last].level_bias});
     }
-    const auto images = renderer_.render(pass, resolution, views, counters);
+    const auto images = images_.hemicubes(pass, resolution, views, counters);
     const auto start = std::chrono::steady_clock::now();
     const auto pixels = hemicubePixels(resolution);
     for (auto i = first; i < last; ++i) {

@@ -1,5 +1,4 @@
-// Carries out shots in one OpenGL context: what the in-process transport and every worker process have inside. One
-// thread.
+// Carries out shots, one after the other, with images from wherever its source has them. One thread.
 #pragma once
 
 #include <memory>
@@ -7,11 +6,9 @@
 #include <span>
 #include <string>
 
-#include "server/gpu/egl_context.h"
 #include "server/gpu/flux_sink.h"
-#include "server/gpu/hemicube_renderer.h"
+#include "server/gpu/image_source.h"
 #include "server/gpu/light_gatherer.h"
-#include "server/gpu/parallel_renderer.h"
 #include "server/gpu/punctual_gatherer.h"
 #include "server/gpu/scatter_accumulator.h"
 
@@ -34,34 +31,29 @@ struct ShotSpan {
 
 class ShotRunner {
  public:
-  [[nodiscard]] static Result<std::unique_ptr<ShotRunner>> create();
+  explicit ShotRunner(ImageSource images) : images_(std::move(images)) {}
 
-  [[nodiscard]] Result<void> setScene(std::shared_ptr<const scene::PatchScene> patches);
+  /// After the scene of the renderers.
+  void setScene(const std::shared_ptr<const Receivers>& receivers);
   [[nodiscard]] Result<solver::TransportCounters> run(const ShotSpan& shots, const FluxSink& sink);
   /// Links of every gather shot, then of every scatter shot, each by itself (Transport::measure).
   [[nodiscard]] Result<solver::TransportCounters> measure(const ShotSpan& shots,
                                                           const solver::Transport::TakeLinks& take);
-  [[nodiscard]] const EglContext& context() const { return *context_; }
 
  private:
-  ShotRunner(std::unique_ptr<EglContext> context, HemicubeRenderer renderer, ParallelRenderer parallel)
-      : context_(std::move(context)), renderer_(std::move(renderer)), parallel_(std::move(parallel)) {}
   void scatter(const ShotSpan& shots, const FluxSink& sink, solver::TransportCounters& counters);
   void measureGather(const ShotSpan& shots, const solver::Transport::TakeLinks& take,
                      solver::TransportCounters& counters);
   void measureScatter(const ShotSpan& shots, const solver::Transport::TakeLinks& take,
                       solver::TransportCounters& counters);
 
-  std::unique_ptr<EglContext> context_;  // outlives what lives in it
-  HemicubeRenderer renderer_;
-  ParallelRenderer parallel_;
+  ImageSource images_;
   WeightCache weights_;
   ScatterAccumulator accumulator_;
   LightGatherer gatherer_;
-  std::shared_ptr<const scene::PatchScene> patches_;
+  std::shared_ptr<const Receivers> receivers_;
   std::optional<FluxStore> link_store_;
   PunctualGatherer punctual_;
-  bool has_scene_ = false;
 };
 
 /// kInternal, naming the shot, if the batch breaks the contract of transport.h (a peer process sent it).

@@ -11,9 +11,7 @@
 namespace radiosity::gpu {
 namespace {
 
-/// Heights above the shooter's plane that are taken for the plane itself: rounding puts neighbours in the same plane up
-/// to 1e-7 above it, where they would cover everything.
-constexpr float kCoplanar = 1.0e-6F;
+constexpr auto kCoplanar = static_cast<float>(RAD_COPLANAR);
 /// The shooter must be this far (unit box) outside a solid's bounds to count as outside.
 constexpr float kOutside = 1.0e-6F;
 /// Fewer make more boxes to look at, more make larger ones.

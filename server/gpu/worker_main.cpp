@@ -3,12 +3,14 @@
 #include <sys/prctl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <csignal>
 #include <cstdlib>
 #include <optional>
 
 #include "common/log.h"
 #include "server/gpu/gpu_transport.h"
+#include "server/gpu/shot_crew.h"
 #include "server/gpu/worker_protocol.h"
 
 namespace radiosity::gpu {
@@ -18,7 +20,7 @@ std::span<const std::byte> textBytes(const std::string& text) { return std::as_b
 
 class Worker {
  public:
-  Worker(int socket, std::unique_ptr<ShotRunner> runner) : socket_(socket), runner_(std::move(runner)) {}
+  Worker(int socket, std::unique_ptr<ShotCrew> crew) : socket_(socket), crew_(std::move(crew)) {}
 
   /// Until the transport closes the socket (true) or something cannot go on (false).
   bool serve() {
@@ -42,7 +44,7 @@ class Worker {
 
  private:
   Result<void> takeScene(Message& message) {
-    const auto nodes = BodyReader(message.body).value<SceneBody>().nodes;
+    const auto [nodes, hands] = BodyReader(message.body).value<SceneBody>();
     auto packed = SharedMemory::map(std::move(message.fds[0]));
     if (!packed) return tl::unexpected(packed.error());
     auto flux = SharedMemory::map(std::move(message.fds[1]));
@@ -52,7 +54,8 @@ class Worker {
     if ((*scene)->nodeCount() != nodes || flux->bytes().size() < fluxRegionBytes(nodes)) {
       return fail(ErrorCode::kInternal, "accumulators do not fit the scene");
     }
-    if (auto set = runner_->setScene(std::move(*scene)); !set) return set;
+    crew_->setHands(std::max<std::size_t>(hands, 1));
+    if (auto set = crew_->setScene(std::move(*scene)); !set) return set;
     flux_ = std::move(*flux);
     sink_ = fluxRegionSink(flux_.bytes(), nodes);
     return reply(MessageKind::kSceneDone, {});
@@ -75,7 +78,7 @@ class Worker {
                          point_lights, parallel,        views,   receivers, boxes};
     std::vector<std::byte> links;
     const auto pack = [&](std::size_t, const solver::LinkSample& sample) { packLinks(links, sample); };
-    const auto counters = head.measure != 0 ? runner_->measure(shots, pack) : runner_->run(shots, *sink_);
+    const auto counters = head.measure != 0 ? crew_->measure(shots, pack) : crew_->run(shots, *sink_);
     if (!counters) return tl::unexpected(counters.error());
     std::vector<std::byte> report;
     appendValue(report, ChunkDoneBody{head.chunk, *counters});
@@ -89,7 +92,7 @@ class Worker {
   }
 
   int socket_;
-  std::unique_ptr<ShotRunner> runner_;
+  std::unique_ptr<ShotCrew> crew_;
   SharedMemory flux_;
   std::optional<FluxSink> sink_;
 };
@@ -110,17 +113,17 @@ int workerMain(int argc, char** argv) {
   // Workers are the parallelism: a second thread inside each rasteriser only gets in the way.
   setenv("LP_NUM_THREADS", "0", 1);
 
-  auto runner = ShotRunner::create();
-  if (!runner) {
-    (void)sendMessage(socket, MessageKind::kFailed, textBytes(runner.error().text()));
+  auto crew = ShotCrew::create();
+  if (!crew) {
+    (void)sendMessage(socket, MessageKind::kFailed, textBytes(crew.error().text()));
     return 1;
   }
   std::vector<std::byte> ready;
-  const auto& context = (*runner)->context();
+  const auto& context = (*crew)->context();
   appendValue(ready, ReadyBody{static_cast<std::uint32_t>(context.software())});
   append(ready, context.renderer().data(), context.renderer().size());
   if (!sendMessage(socket, MessageKind::kReady, ready)) return 1;
-  return Worker(socket, std::move(*runner)).serve() ? 0 : 1;
+  return Worker(socket, std::move(*crew)).serve() ? 0 : 1;
 }
 
 }  // namespace radiosity::gpu

@@ -35,7 +35,7 @@ struct ReadyBody {
   std::uint32_t software = 0;
 };
 struct SceneBody {
-  std::uint64_t nodes = 0;
+  std::uint64_t nodes = 0, hands = 1;
 };
 struct ChunkBody {
   std::uint64_t chunk = 0;

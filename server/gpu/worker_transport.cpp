@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <atomic>
 #include <deque>
+#include <filesystem>
 #include <optional>
 #include <thread>
 
@@ -61,6 +62,7 @@ class WorkerTransport final : public solver::Transport {
       : options_(std::move(options)),
         slots_(std::move(slots)),
         renderer_(slots_.front().process->renderer()),
+        hands_(options_.hands > 0 ? options_.hands : handsFor(slots_.front().process->software(), slots_.size())),
         wake_(std::move(wake)) {}
   ~WorkerTransport() override { killAll(); }
   WorkerTransport(const WorkerTransport&) = delete;
@@ -82,7 +84,8 @@ class WorkerTransport final : public solver::Transport {
     std::vector<std::optional<Error>> failed(slots_.size());
     for (std::size_t i = 0; i < slots_.size(); ++i) {
       if (!slots_[i].process) continue;
-      if (auto sent = slots_[i].process->sendScene(packed_, nodes_, scenePatience()); !sent) failed[i] = sent.error();
+      if (auto sent = slots_[i].process->sendScene(packed_, nodes_, hands_, scenePatience()); !sent)
+        failed[i] = sent.error();
     }
     for (std::size_t i = 0; i < slots_.size(); ++i) {
       if (slots_[i].process && !failed[i]) {
@@ -124,7 +127,9 @@ class WorkerTransport final : public solver::Transport {
   [[nodiscard]] Losses losses() const override { return {losses_, last_death_}; }
 
   [[nodiscard]] std::string description() const override {
-    return fmt::format("{}, {} worker{}", renderer_, slots_.size(), slots_.size() == 1 ? "" : "s");
+    auto text = fmt::format("{}, {} worker{}", renderer_, slots_.size(), slots_.size() == 1 ? "" : "s");
+    if (hands_ > 1) text += fmt::format(" of {} threads", hands_);
+    return text;
   }
 
  protected:
@@ -138,7 +143,7 @@ class WorkerTransport final : public solver::Transport {
     if (batch.mode == solver::LinkMode::kPaperMipmap && !paper_fits_) return tl::unexpected(paper_error_);
     deaths_ = 0;
     gather_shots_ = batch.gather.size();
-    chunks_ = cutBatch(batch, {triangles_, nodes_}, slots_.size());
+    chunks_ = cutBatch(batch, {triangles_, nodes_}, {slots_.size(), hands_});
     queue_.clear();
     for (std::size_t i = 0; i < chunks_.size(); ++i) queue_.push_back(i);
     for (auto& slot : slots_) {
@@ -202,10 +207,9 @@ class WorkerTransport final : public solver::Transport {
     slot.used_before = slot.used_lately = slot.process->processorTime();
   }
 
-  /// On a busy machine a worker that draws on the processor may be late because it was hardly let run. It is given as
-  /// long again, as long as it uses what it gets, and until it has had in processor time what a chunk may take.
+  /// On a busy machine a worker may be late because it was hardly let run. It is given as long again, as long as it
+  /// uses what it gets, and until it has had in processor time what a chunk may take.
   [[nodiscard]] static bool givenMoreTime(Slot& slot) {
-    if (!slot.process->software()) return false;
     const Clock::duration used = slot.process->processorTime();
     const bool runs = used - slot.used_lately >= slot.patience / kLeastUse;
     if (!runs || used - slot.used_before >= slot.patience) return false;
@@ -314,7 +318,8 @@ class WorkerTransport final : public solver::Transport {
     if (!process) return process;
     if (auto ready = process->awaitReady(startPatience()); !ready) return tl::unexpected(ready.error());
     if (!has_scene_) return process;
-    if (auto sent = process->sendScene(packed_, nodes_, scenePatience()); !sent) return tl::unexpected(sent.error());
+    if (auto sent = process->sendScene(packed_, nodes_, hands_, scenePatience()); !sent)
+      return tl::unexpected(sent.error());
     if (auto taken = process->awaitScene(scenePatience()); !taken) return tl::unexpected(taken.error());
     return process;
   }
@@ -322,6 +327,7 @@ class WorkerTransport final : public solver::Transport {
   WorkerOptions options_;
   std::vector<Slot> slots_;
   std::string renderer_;
+  std::size_t hands_;  ///< of each worker
   FileDescriptor wake_;
   std::atomic<bool> interrupted_{false};
   std::shared_ptr<const scene::PatchScene> patches_;
@@ -341,6 +347,44 @@ class WorkerTransport final : public solver::Transport {
   std::string last_death_;
 };
 
+/// Whether some driver may have a card: false only where there is none.
+bool mayHaveCard() {
+  std::error_code ignored;
+  for (const auto* device : {"/dev/dri", "/dev/nvidiactl", "/dev/dxg"}) {
+    if (std::filesystem::exists(device, ignored)) return true;
+  }
+  return false;
+}
+
+/// Adds workers until there are `count`; all start at the same time.
+Result<void> addWorkers(const WorkerOptions& options, std::size_t count, std::vector<Slot>& slots) {
+  const auto first = slots.size();
+  while (slots.size() < count) {
+    auto process = WorkerProcess::start(options.executable);
+    if (!process) return tl::unexpected(process.error());
+    slots.emplace_back().process = std::move(*process);
+  }
+  for (auto i = first; i < slots.size(); ++i) {
+    const Patience patience{Clock::now() + kStartPatience, -1};
+    if (auto ready = slots[i].process->awaitReady(patience); !ready) return tl::unexpected(ready.error());
+  }
+  return {};
+}
+
+/// One context keeps a card busy; several only take turns, and a second each to start. So the others wait until the
+/// first one tells what draws.
+Result<std::vector<Slot>> startWorkers(const WorkerOptions& options, std::size_t count) {
+  std::vector<Slot> slots;
+  const bool asks = options.workers == 0 && mayHaveCard();
+  if (auto added = addWorkers(options, asks ? 1 : count, slots); !added) return tl::unexpected(added.error());
+  if (options.workers == 0 && !slots.front().process->software()) {
+    slots.erase(slots.begin() + 1, slots.end());
+  } else if (auto added = addWorkers(options, count, slots); !added) {
+    return tl::unexpected(added.error());
+  }
+  return slots;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<solver::Transport>> makeWorkerTransport(const WorkerOptions& options) {
@@ -354,19 +398,9 @@ Result<std::unique_ptr<solver::Transport>> makeWorkerTransport(const WorkerOptio
   if (chosen.executable.empty()) chosen.executable = "/proc/self/exe";
   FileDescriptor wake(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
   if (wake.get() < 0) return fail(ErrorCode::kUnavailable, "cannot make an event descriptor: too many are open");
-  std::vector<Slot> slots(static_cast<std::size_t>(count));
-  for (auto& slot : slots) {  // all start at the same time
-    auto process = WorkerProcess::start(chosen.executable);
-    if (!process) return tl::unexpected(process.error());
-    slot.process = std::move(*process);
-  }
-  for (auto& slot : slots) {
-    const Patience patience{Clock::now() + kStartPatience, -1};
-    if (auto ready = slot.process->awaitReady(patience); !ready) return tl::unexpected(ready.error());
-  }
-  // One context keeps a GPU busy; more only take its memory.
-  if (options.workers == 0 && !slots.front().process->software()) slots.erase(slots.begin() + 1, slots.end());
-  return std::make_unique<WorkerTransport>(std::move(chosen), std::move(slots), std::move(wake));
+  auto slots = startWorkers(chosen, static_cast<std::size_t>(count));
+  if (!slots) return tl::unexpected(slots.error());
+  return std::make_unique<WorkerTransport>(std::move(chosen), std::move(*slots), std::move(wake));
 }
 
 }  // namespace radiosity::gpu

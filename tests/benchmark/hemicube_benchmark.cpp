@@ -26,6 +26,7 @@ std::vector<solver::ScatterShot> shooters(const scene::PatchScene& scene, std::u
 struct Stage {
   std::unique_ptr<gpu::EglContext> context;
   std::optional<gpu::HemicubeRenderer> renderer;
+  std::vector<std::uint32_t> pixels;
 
   static std::unique_ptr<Stage> make(std::int64_t scene, benchmark::State& state) {
     auto stage = std::make_unique<Stage>();
@@ -45,7 +46,8 @@ struct Stage {
 
   std::span<const std::uint32_t> image(const solver::ScatterShot& shot, solver::TransportCounters& counters) {
     const gpu::HemicubeView view{shot.frame, shot.level_bias};
-    return renderer->render(gpu::HemicubePass::kNodes, shot.resolution, {&view, 1}, counters);
+    renderer->render(gpu::HemicubePass::kNodes, shot.resolution, {&view, 1}, counters, pixels);
+    return pixels;
   }
 };
 

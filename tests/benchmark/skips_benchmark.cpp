@@ -35,7 +35,7 @@ void imageSkip(benchmark::State& state) {
   const auto scene = roomOf(state.range(0));
   auto context = gpu::EglContext::create();
   if (!context) return state.SkipWithError(context.error().text().c_str());
-  auto renderer = gpu::HemicubeRenderer::create(**context);
+  auto renderer = gpu::HemicubeRenderer::create(**context, gpu::Drawing::kByProcessor);
   auto uploaded = gpu::GpuScene::upload(**context, scene);
   if (!renderer || !uploaded || !renderer->setScene(std::move(*uploaded), variant.culling))
     return state.SkipWithError("the scene cannot be drawn");
@@ -49,11 +49,12 @@ void imageSkip(benchmark::State& state) {
   }
   solver::TransportCounters counters;
   const auto step = renderer->capacity(64);
+  std::vector<std::uint32_t> pixels;
   std::size_t next = 0, shots = 0;
   for (auto _ : state) {
     if (next + step > views.size()) next = 0;
-    benchmark::DoNotOptimize(
-        renderer->render(gpu::HemicubePass::kItems, 64, std::span(views).subspan(next, step), counters).data());
+    renderer->render(gpu::HemicubePass::kItems, 64, std::span(views).subspan(next, step), counters, pixels);
+    benchmark::DoNotOptimize(pixels.data());
     next += step;
     shots += step;
   }

@@ -91,9 +91,9 @@ TEST_F(Paper, HardwareAndFormulaChooseLevelsWithinOneOfEachOther) {
   for (std::uint32_t i = 0; i < 40; ++i) {
     const auto shot = shotFrom(*scene, i % 6, 0.3F, 0.6F, 64, random);
     const std::array<gpu::HemicubeView, 1> views{gpu::HemicubeView{shot.frame, 0.5F}};
-    const auto formula = renderer->render(gpu::HemicubePass::kNodes, 64, views, counters);
-    const std::vector<std::uint32_t> by_formula(formula.begin(), formula.end());
-    const auto by_hardware = renderer->render(gpu::HemicubePass::kPaper, 64, views, counters);
+    std::vector<std::uint32_t> by_formula, by_hardware;
+    renderer->render(gpu::HemicubePass::kNodes, 64, views, counters, by_formula);
+    renderer->render(gpu::HemicubePass::kPaper, 64, views, counters, by_hardware);
     for (std::size_t p = 0; p < by_formula.size(); ++p) {
       const auto& a = place[by_formula[p]];
       const auto& b = place[by_hardware[p]];

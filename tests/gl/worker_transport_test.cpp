@@ -15,43 +15,11 @@
 #include "server/gpu/batch_chunks.h"
 #include "server/gpu/gpu_transport.h"
 #include "server/solver/shot_cost.h"
+#include "tests/gl/mixed_batch.h"
 #include "tests/gl/scene_builder.h"
 
 namespace radiosity::test {
 namespace {
-
-solver::ShotBatch mixedBatch(const scene::PatchScene& scene, std::uint32_t shots) {
-  std::mt19937 random(23);
-  solver::ShotBatch batch;
-  batch.flux_scale = kFluxScale;
-  for (std::uint32_t i = 0; i < shots; ++i) {
-    batch.scatter.push_back(shotFrom(scene, i % 40, 0.27F, 0.7F, i % 7 == 0 ? 128 : 64, random));
-    batch.scatter.back().half = i % 2;
-  }
-  for (std::uint32_t light = 0; light < 3; ++light) {
-    const auto& chart = scene.surfaces[6 + light];
-    const auto first = scene.indices[3 * static_cast<std::size_t>(chart.first_triangle)];
-    solver::GatherShot shot;
-    shot.corner_count = 4;
-    for (std::uint32_t i = 0; i < 4; ++i) shot.corners[i] = scene.vertices[first + i].position;
-    shot.normal = scene.triangles[chart.first_triangle].normal;
-    shot.radiosity = {3.0, 2.0, 1.0 / 3.0};
-    shot.first_point = static_cast<std::uint32_t>(batch.points.size());
-    shot.point_count = 5;
-    shot.half = light % 2;
-    for (int i = 0; i < 5; ++i) batch.points.push_back(shotFrom(scene, 6 + light, 0.5F, 0.5F, 64, random).frame);
-    batch.gather.push_back(shot);
-  }
-  return batch;
-}
-
-void expectSame(const solver::FluxAccumulators& a, const solver::FluxAccumulators& b) {
-  EXPECT_EQ(a.node, b.node);
-  EXPECT_EQ(a.escaped, b.escaped);
-  EXPECT_EQ(a.backface, b.backface);
-  EXPECT_EQ(a.scattered, b.scattered);
-  EXPECT_EQ(a.gathered, b.gathered);
-}
 
 /// Processes whose parent is this one and whose executable is the test's worker.
 std::vector<pid_t> childWorkers() {
@@ -114,7 +82,7 @@ TEST(BatchChunks, CoverEveryShotOnce) {
   for (const std::size_t workers : {1U, 2U, 7U}) {
     std::size_t scatter = 0;
     std::size_t gather = 0;
-    for (const auto& chunk : gpu::cutBatch(batch, {120, 1000}, workers)) {
+    for (const auto& chunk : gpu::cutBatch(batch, {120, 1000}, {workers, 1})) {
       auto& next = chunk.kind == gpu::ShotKind::kGather ? gather : scatter;
       EXPECT_EQ(chunk.first, next);
       EXPECT_GT(chunk.count, 0U);
@@ -123,7 +91,7 @@ TEST(BatchChunks, CoverEveryShotOnce) {
     EXPECT_EQ(scatter, batch.scatter.size());
     EXPECT_EQ(gather, batch.gather.size());
   }
-  EXPECT_TRUE(gpu::cutBatch({}, {}, 2).empty());
+  EXPECT_TRUE(gpu::cutBatch({}, {}, {2, 1}).empty());
 }
 
 // So that no worker waits long for another at the end.
@@ -131,7 +99,7 @@ TEST(BatchChunks, GetSmallTowardsTheEndOfABatch) {
   const auto scene = randomRoom(60, 2000, 1);
   auto batch = mixedBatch(*scene, 700);
   batch.gather.clear();
-  const auto chunks = gpu::cutBatch(batch, {200'000, 1000}, 2);  // of many triangles: each shot costs something
+  const auto chunks = gpu::cutBatch(batch, {200'000, 1000}, {2, 1});  // of many triangles: each shot costs something
   ASSERT_GT(chunks.size(), 8U);
   EXPECT_LT(chunks.back().cost, 0.25 * chunks.front().cost);
   for (std::size_t i = 1; i < chunks.size(); ++i) EXPECT_LT(chunks[i].cost, 1.3 * chunks[i - 1].cost) << i;
@@ -143,7 +111,7 @@ TEST(BatchChunks, OfGatheredShotsCountTheReceiversThatLook) {
   batch.scatter.clear();
   const auto cost = [&](std::size_t nodes) {
     double sum = 0.0;
-    for (const auto& chunk : gpu::cutBatch(batch, {120, nodes}, 2)) sum += chunk.cost;
+    for (const auto& chunk : gpu::cutBatch(batch, {120, nodes}, {2, 1})) sum += chunk.cost;
     return sum;
   };
   ASSERT_EQ(batch.gather.size(), 3U);  // of five points each, all receivers weighed once and looked at from each point
@@ -158,12 +126,30 @@ TEST(BatchChunks, OfScenesWithManyNodesHaveFewShotsSoThatTheirLinksStaySmall) {
   const auto batch = mixedBatch(*scene, 400);
   const auto longest = [&](std::size_t nodes) {
     std::size_t most = 0;
-    for (const auto& chunk : gpu::cutBatch(batch, {120, nodes}, 1)) most = std::max(most, chunk.count);
+    for (const auto& chunk : gpu::cutBatch(batch, {120, nodes}, {1, 1})) most = std::max(most, chunk.count);
     return most;
   };
   EXPECT_GT(longest(1000), 4U);
   EXPECT_EQ(longest(1U << 20U), 4U);  // 4 MiB of links a shot
   EXPECT_EQ(longest(1U << 26U), 1U);
+}
+
+TEST(BatchChunks, OfWorkersWithManyHandsHoldSomethingForEachAndAsManyLinksAsFit) {
+  const auto scene = randomRoom(60, 2000, 1);
+  const auto batch = mixedBatch(*scene, 1000);
+  std::size_t next = 0;
+  for (const auto& chunk : gpu::cutBatch(batch, {120, 1000}, {1, 16})) {
+    if (chunk.kind != gpu::ShotKind::kScatter) continue;
+    EXPECT_EQ(chunk.first, next);
+    next += chunk.count;
+    if (next < batch.scatter.size()) {
+      EXPECT_GE(chunk.count, 32U);
+    }
+    EXPECT_LE(chunk.count, 400U);  // one is worked on while the links of another are taken in
+  }
+  EXPECT_EQ(next, batch.scatter.size());
+  for (const auto& chunk : gpu::cutBatch(batch, {120, std::size_t{1} << 20U}, {1, 16}))
+    EXPECT_LE(chunk.count, 16U);  // 4 MiB of links a shot, 64 in all
 }
 
 TEST_F(Workers, AnyNumberOfWorkersGivesTheBitsOfOneProcess) {

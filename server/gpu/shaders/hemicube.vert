@@ -11,6 +11,11 @@ layout(location = RAD_ATTRIBUTE_VIEW) in vec4 view_right;       // clip.x; w: pi
 layout(location = RAD_ATTRIBUTE_VIEW + 1) in vec4 view_up;      // clip.y axis
 layout(location = RAD_ATTRIBUTE_VIEW + 2) in vec4 view_depth;   // clip.w axis; w: layer
 layout(location = RAD_ATTRIBUTE_VIEW + 3) in vec4 view_origin;  // shooter; w: level bias
+#ifdef CULL_BELOW
+layout(location = RAD_ATTRIBUTE_VIEW + 4) in vec4 view_normal;
+// A triangle with all corners below is left out; what rises from below is clipped at the horizon.
+out float gl_CullDistance[1];
+#endif
 
 #if defined(PAPER) || defined(SEE_THROUGH)
 layout(location = RAD_ATTRIBUTE_SURFACE) in uint surface;
@@ -46,6 +51,9 @@ void main() {
   gl_Position = vec4(dot(view_right.xyz, d), dot(view_up.xyz, d), RAD_NEAR, dot(view_depth.xyz, d));
 #endif
   gl_Layer = int(view_depth.w);
+#ifdef CULL_BELOW
+  gl_CullDistance[0] = dot(view_normal.xyz, d) - RAD_COPLANAR;
+#endif
 #ifdef SEE_THROUGH
   // The view alone makes the seed, not its layer: a shot's pixels do not depend on what else is in the batch.
   uvec3 bits = floatBitsToUint(view_right.xyz) * uvec3(0x9E3779B1u, 0x85EBCA77u, 0xC2B2AE3Du);

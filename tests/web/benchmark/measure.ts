@@ -18,6 +18,8 @@ export interface Opening {
   tileToPicture: number[];
   /** Pictures a second while it turns. */
   rate: number;
+  /** Milliseconds that the card takes for a picture of all pixels, of many drawn without a pause. */
+  picture: number;
 }
 
 export interface Edit {
@@ -27,21 +29,22 @@ export interface Edit {
   askToPicture: number;
 }
 
-const SIZE = [1280, 800] as const;
 /** Of pages of which nothing is timed: in software every pixel of theirs would cost time of the machine. */
 const SMALL = [160, 100] as const;
-const TURNING_PICTURES = 40;
+const TURNING_PICTURES = 60;
+/** Drawn without a pause between them. */
+const PICTURES_ON_END = 10;
 /** Where pictures take long there are fewer. */
 const MOST_TURNING_MS = 3000;
 
 async function openProbed(pages: Pages, url: string): Promise<Page> {
-  const page = await pages.open('about:blank', ...SIZE);
+  const page = await pages.open('about:blank');
   await page.addInitScript(installProbe);
   await page.goto(url);
   return page;
 }
 
-/** Turns the picture with every turn of the page. Returns how many pictures a second that gives. */
+/** Turns the picture with every turn of the page. Returns how many pictures a second that gives, from the first on. */
 async function turn(page: Page): Promise<number> {
   return page.evaluate(
     async ([count, mostMs]) => {
@@ -55,14 +58,54 @@ async function turn(page: Page): Promise<number> {
         await nextTurn();
       }
       performance.mark('probe: turned');
-      return (1000 * (pictures.length - before)) / (performance.now() - begin);
+      const done = pictures.slice(before).map((picture) => picture.done);
+      return (1000 * (done.length - 1)) / (done.at(-1)! - done[0]!);
     },
     [TURNING_PICTURES, MOST_TURNING_MS],
   );
 }
 
+/** What the card takes for a picture of all pixels, whatever the browser then does with it. */
+async function drawOften(page: Page): Promise<number> {
+  return page.evaluate((count) => {
+    const { viewer } = window.viewer!;
+    const drawing = viewer as unknown as { draw(scale: number): void };
+    const gl = viewer.renderer.getContext() as WebGL2RenderingContext;
+    const finish = () => gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+    drawing.draw(1);
+    finish();
+    const begin = performance.now();
+    for (let i = 0; i < count; ++i) drawing.draw(1);
+    finish();
+    return (performance.now() - begin) / count;
+  }, PICTURES_ON_END);
+}
+
+/** Turns a second of a page that does no more than clear a canvas of the same size: what the browser leaves a viewer. */
+export async function browsersRate(pages: Pages): Promise<number> {
+  const page = await pages.open('about:blank');
+  const rate = await page.evaluate(async (count) => {
+    const canvas = document.createElement('canvas');
+    [canvas.width, canvas.height] = [innerWidth, innerHeight];
+    document.body.style.margin = '0';
+    document.body.append(canvas);
+    const gl = canvas.getContext('webgl2')!;
+    const nextTurn = () => new Promise((resolve) => requestAnimationFrame(resolve));
+    let begin = 0;
+    for (let i = -5; i <= count; ++i) {
+      await nextTurn();
+      if (i === 0) begin = performance.now();
+      gl.clearColor((i & 1) / 2, 0, 0, 1);
+      gl.clear(gl.COLOR_BUFFER_BIT);
+    }
+    return (1000 * count) / (performance.now() - begin);
+  }, TURNING_PICTURES);
+  await pages.closeAll();
+  return rate;
+}
+
 async function takeOpening(pages: Pages, url: string): Promise<Opening> {
-  const page = await pages.open('about:blank', ...SIZE);
+  const page = await pages.open('about:blank');
   await page.addInitScript(installProbe);
   await startTrace(pages.started, page);
   await page.goto(url);
@@ -70,6 +113,7 @@ async function takeOpening(pages: Pages, url: string): Promise<Opening> {
   const rate = await turn(page);
   await page.waitForTimeout(300); // a task that has just begun is told of when it is over
   const thread = await endTrace(pages.started);
+  const picture = await drawOften(page);
   const firstTile = await page.evaluate(() => window.viewer!.marks['firstTile']!);
   const probe: Probe = await page.evaluate(() => window.probe!);
   const until = probe.converged!;
@@ -82,6 +126,7 @@ async function takeOpening(pages: Pages, url: string): Promise<Opening> {
     thread,
     tileToPicture: probe.tileToPicture,
     rate,
+    picture,
   };
 }
 

@@ -6,7 +6,7 @@ import { join } from 'node:path';
 import { parseArgs } from 'node:util';
 import { Pages } from '../browser/harness';
 import { ms, spread } from './figures';
-import { openLoading, openSolved, scriptSize, watchEdits, watchSolve, type Opening } from './measure';
+import { browsersRate, openLoading, openSolved, scriptSize, watchEdits, watchSolve, type Opening } from './measure';
 import { editsTable, framesTable, openingsTable, targetsTable, type Figures, type Row } from './report';
 
 const USAGE = `Usage: ./dev bench viewer [OPTION...]
@@ -15,6 +15,7 @@ Opens radiosityd in Chromium and measures what a visitor waits for. Figures are 
 
   --runs N    openings of each scene (3)
   --edits N   edits of the lamp (10)
+  --size WxH  pixels of the page (1280x800)
   --gpu       let Chromium use the graphics card; otherwise it renders in software, on the same cores as the server
   --help
 `;
@@ -23,6 +24,11 @@ const SCENES = [
   { file: 'cornell.glb', label: 'Cornell box' },
   { file: 'room_small.glb', label: 'room of 402 polygons' },
 ];
+
+/** What a Chromium without a screen needs to draw with a card; CHROMIUM_CARD in the environment holds others. */
+const CARD = (
+  process.env['CHROMIUM_CARD'] ?? '--use-angle=vulkan --enable-features=Vulkan --disable-vulkan-surface'
+).split(' ');
 
 const say = (text: string) => process.stderr.write(`${text}\n`);
 
@@ -48,7 +54,8 @@ async function measureAll(pages: Pages, runs: number, edits: number): Promise<Fi
     }
   const seen = await stage('edits', () => watchEdits(pages, SCENES[0]!.file, edits), editsTable);
   const solve = await stage('a solve', () => watchSolve(pages, SCENES[0]!.file), (tiles) => `${tiles.length} tiles: ${spread(tiles)} ms`); // prettier-ignore
-  return { rows, edits: seen, solve, size: await scriptSize(pages, SCENES[0]!.file) };
+  const browser = await browsersRate(pages);
+  return { rows, edits: seen, solve, browser, size: await scriptSize(pages, SCENES[0]!.file) };
 }
 
 async function main(): Promise<void> {
@@ -57,6 +64,7 @@ async function main(): Promise<void> {
     options: {
       runs: { type: 'string', default: '3' },
       edits: { type: 'string', default: '10' },
+      size: { type: 'string', default: '1280x800' },
       gpu: { type: 'boolean', default: false },
       help: { type: 'boolean', default: false },
     },
@@ -64,19 +72,21 @@ async function main(): Promise<void> {
   if (values.help) return void process.stdout.write(USAGE);
   const [runs, edits] = [Number(values.runs), Number(values.edits)];
   if (!(runs >= 1 && edits >= 1)) throw new Error('--runs and --edits are numbers of at least 1');
+  const size = /^([1-9]\d{1,3})x([1-9]\d{1,3})$/.exec(values.size)?.slice(1).map(Number);
+  if (!size) throw new Error('--size is WIDTHxHEIGHT, pixels, e.g. 1920x1080');
   const load = loadavg()[0]!;
 
-  const pages = new Pages();
-  await pages.launch(values.gpu);
+  const pages = new Pages([size[0]!, size[1]!]);
+  await pages.launch(values.gpu ? CARD : undefined);
   try {
     const figures = await measureAll(pages, runs, edits);
     const renderer = await pages.renderer();
-    const { rows, size } = figures;
+    const { rows, size: scripts } = figures;
     const text = [
       '# The live viewer',
       '',
-      `${cpus().length} cores, load ${load.toFixed(1)} when it began; Chromium draws with ${renderer}. ${runs} openings of each, ${edits} edits; median (largest).`,
-      `JavaScript: ${ms(size.packed / 1000)} kB packed, ${ms(size.unpacked / 1000)} kB unpacked.`,
+      `${cpus().length} cores, load ${load.toFixed(1)} when it began; Chromium draws ${values.size} pixels with ${renderer}. ${runs} openings of each, ${edits} edits; median (largest).`,
+      `JavaScript: ${ms(scripts.packed / 1000)} kB packed, ${ms(scripts.unpacked / 1000)} kB unpacked.`,
       '',
       targetsTable(figures),
       '',

@@ -110,13 +110,16 @@ export class Pages {
   private browser: Browser | undefined;
   private contexts: BrowserContext[] = [];
 
-  /** Without `card` Chromium renders in software, so that tests need no graphics card. */
-  async launch(card = false): Promise<void> {
+  /** `size`: of pages that are opened without one, pixels. */
+  constructor(private readonly size: readonly [width: number, height: number] = [480, 480]) {}
+
+  /** Without `card`, Chromium's arguments for one, it renders in software, so that tests need no graphics card. */
+  async launch(card?: readonly string[]): Promise<void> {
     const software = ['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader'];
     this.browser = await chromium.launch({
       executablePath: program('CHROMIUM', '/usr/bin/chromium'),
       // Containers have no room for Chromium's sandbox. A renderer in software that gets no processor does not hang.
-      args: ['--no-sandbox', '--ignore-gpu-blocklist', '--disable-gpu-watchdog', ...(card ? [] : software)],
+      args: ['--no-sandbox', '--ignore-gpu-blocklist', '--disable-gpu-watchdog', ...(card ?? software)],
       timeout: PATIENCE_MS,
     });
   }
@@ -138,7 +141,12 @@ export class Pages {
     return name;
   }
 
-  async open(url: string, width = 480, height = 480, options: { touch?: boolean } = {}): Promise<Page> {
+  async open(
+    url: string,
+    width = this.size[0],
+    height = this.size[1],
+    options: { touch?: boolean } = {},
+  ): Promise<Page> {
     const context = await this.browser!.newContext({
       viewport: { width, height },
       hasTouch: options.touch ?? false,

@@ -63,6 +63,18 @@ describe('the pace of frames', () => {
     expect(pace.ask(1110)).toBe(1);
   });
 
+  it('knows a quick card by its last two frames, and none before', () => {
+    const pace = new FramePace(false);
+    expect(pace.isQuick).toBe(false);
+    const draw = (begunMs: number, endMs: number) => (pace.began(begunMs, 1), pace.ended(endMs, 1));
+    draw(0, 17);
+    expect(pace.isQuick).toBe(false);
+    draw(17, 33);
+    expect(pace.isQuick).toBe(true);
+    draw(33, 93);
+    expect(pace.isQuick).toBe(false);
+  });
+
   it('begins coarsely where no card draws', () => {
     const pace = new FramePace(true);
     pace.hurry(0);

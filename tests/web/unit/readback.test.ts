@@ -43,6 +43,20 @@ describe('Readback', () => {
     expect([back.arrived, card.fetched, card.buffers]).toEqual([false, 1, 0]);
   });
 
+  it('asks for no quiet where there is nothing to wait for', async () => {
+    const card = new Card();
+    card.drawn = true;
+    const back = readback(card, () => true);
+    const reading = back.read(new Float32Array(4));
+    const asked: boolean[] = [];
+    while (card.fetched === 0) {
+      await vi.advanceTimersByTimeAsync(1);
+      asked.push(back.arrived);
+    }
+    await reading;
+    expect(asked).not.toContain(true);
+  });
+
   it('asks for quiet until the last of two has been fetched', async () => {
     const card = new Card();
     card.drawn = true;

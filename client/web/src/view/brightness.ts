@@ -30,7 +30,8 @@ export interface Picture {
   mode(): ViewMode | undefined;
   /** Signs and handles are no part of the scene's light. */
   withoutSigns<T>(draw: () => T): T;
-  isCardIdle(): boolean;
+  /** To fetch something from it does not hold the page up, nor the picture: it is idle, or quick. */
+  isCardQuiet(): boolean;
   /** It is to be drawn as it is to be shown now. */
   redraw(): void;
 }
@@ -51,7 +52,7 @@ export class Brightness {
   private lightRange: [number, number] | undefined;
 
   constructor(private readonly picture: Picture) {
-    this.exposure = new ExposureMeter(picture.renderer, picture.uniforms, () => picture.isCardIdle());
+    this.exposure = new ExposureMeter(picture.renderer, picture.uniforms, () => picture.isCardQuiet());
   }
 
   /** The picture is another one. */

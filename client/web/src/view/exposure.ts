@@ -92,7 +92,7 @@ export class ExposureMeter {
     return this.automatic && this.waits;
   }
 
-  /** A measurement is to be fetched as soon as the card has nothing to draw. */
+  /** A measurement is to be fetched as soon as the card has nothing to draw: not where it is quick. */
   get wantsQuiet(): boolean {
     return this.readback.arrived;
   }

@@ -22,6 +22,8 @@ const MOST_GATHER_MS = 40;
 const MOST_UNDER_WAY = 2;
 /** Of a whole frame, where the browser says that it draws without a card: 2560 x 1600 on two cores, about. */
 const SOFTWARE_FRAME_MS = 300;
+/** A frame that takes less is done by the next turn of the page, or the one after. */
+const QUICK_FRAME_MS = 25;
 /** A page that nobody looked at has not been told when its frames were done. */
 const LONGEST_FRAME_MS = 5000;
 
@@ -117,6 +119,11 @@ export class FramePace {
   /** The card has drawn all that it was given. */
   get isIdle(): boolean {
     return this.underWay.length === 0;
+  }
+
+  /** What the card was given last was done so soon that nothing else need wait for it to be idle. */
+  get isQuick(): boolean {
+    return this.wholeFrameMs.every((ms) => ms > 0 && ms < QUICK_FRAME_MS); // 0: as long as none was measured
   }
 
   /** The picture is sharp, and nothing is being drawn or moves. */

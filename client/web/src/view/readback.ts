@@ -1,5 +1,6 @@
-// Brings a small picture back from the card without waiting for it: the page looks now and then whether it is there. It is
-// fetched while the card has nothing else to do, as Chromium answers in turn, after all that it was given meanwhile.
+// Brings a small picture back from the card without waiting for it: the page looks now and then whether it is there. From a
+// slow card it is fetched while that has nothing else to do, as Chromium answers in turn, after all that it was given
+// meanwhile.
 
 /** Between looks; where a card takes long, it is not asked as often. */
 const LOOK_MS = 4;

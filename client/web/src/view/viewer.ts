@@ -343,7 +343,7 @@ export class Viewer {
       camera: rig.camera,
       mode: () => this.mode,
       withoutSigns: (draw) => this.withoutSigns(draw),
-      isCardIdle: () => this.pace.isIdle,
+      isCardQuiet: () => this.pace.isIdle || this.pace.isQuick,
       redraw: () => (this.wanted = true),
     });
   }
