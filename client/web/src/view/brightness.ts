@@ -48,6 +48,8 @@ export class Brightness {
   private exposureDue = true;
   private lastRange = 0;
   private lastMeasure = 0;
+  /** The turn in which the exposure of the first light was found without a picture. */
+  private guessedAt = -1;
   /** Irradiance at the dark and bright end of what was last known, lux. */
   private lightRange: [number, number] | undefined;
 
@@ -81,9 +83,9 @@ export class Brightness {
     return this.gate.isClosed(now);
   }
 
-  /** The card shall have nothing else to do than to find that out. */
+  /** The card shall have nothing else to do than to find that out; or the page had enough to do with that in this turn. */
   standsStill(now: number): boolean {
-    return this.gate.standsStill(now);
+    return this.gate.standsStill(now) || this.guessedAt === now;
   }
 
   /** Ends when the exposure is the one that the light there is now asks for. */
@@ -149,6 +151,7 @@ export class Brightness {
       this.exposure.guess(guess);
     }
     this.gate.turn(now, false);
+    this.guessedAt = now;
     this.picture.redraw();
     return true;
   }
