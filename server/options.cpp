@@ -64,7 +64,8 @@ void addSolveOptions(CLI::App& app, Options& o, Raw& raw) {
       ->capture_default_str();
   app.add_option("--seed", o.solve.seed, "Seed of the sampling; the same seed gives the same bits")
       ->capture_default_str();
-  app.add_option("--workers", o.workers, "Renderer processes; 0: one for each core in software, one on a GPU, whose threads use all cores")
+  app.add_option("--workers", o.workers,
+                 "Renderer processes; 0: one for each core in software, one on a GPU, with a thread for each core")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
   app.add_option("--sky", raw.sky,

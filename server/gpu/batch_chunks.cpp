@@ -18,10 +18,10 @@ constexpr double kPartOfRest = 1.0 / 3.0;
 /// Of workers with many hands, who come to their end together by themselves: something for each to do, several times,
 /// and so many chunks that the links of one can be taken in while the next is worked on.
 constexpr double kLargestPartOfMany = 1.0 / 4.0;
-constexpr std::size_t kShotsAHand = 2;
+constexpr std::size_t kShotsAHand = 4;
 /// Links of so many shots fit into one report, in scenes where those of one shot are few.
 constexpr std::size_t kMaxShots = 64;
-constexpr std::size_t kMaxLinkBytes = std::size_t{16} << 20, kMaxLinkBytesOfMany = std::size_t{64} << 20;
+constexpr std::size_t kMaxLinkBytes = std::size_t{16} << 20, kMaxLinkBytesOfMany = std::size_t{256} << 20;
 
 /// A link is a float; at most every node has one.
 std::size_t maxShots(std::size_t nodes, std::size_t hands) {

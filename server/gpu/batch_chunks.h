@@ -29,7 +29,7 @@ struct Workforce {
 
 /// Gather shots first: they are the longest. Cost of a shot: its pixels and, for each hemicube, the scene's triangles
 /// and the receivers that look. The links of a chunk, which travel and wait for their turn, take some 16 MiB a worker's
-/// hand at most (and 64 MiB in all), or are those of one shot.
+/// hand at most (and 256 MiB in all), or are those of one shot.
 [[nodiscard]] std::vector<Chunk> cutBatch(const solver::ShotBatch& batch, const SceneSize& scene,
                                           const Workforce& force);
 

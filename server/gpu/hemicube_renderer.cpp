@@ -103,15 +103,17 @@ std::size_t HemicubeRenderer::capacity(std::uint32_t resolution) const {
   return std::clamp<std::size_t>(std::min(kCardAtlasPixels / pixels, kCardTriangles / triangles), 1, kMaxLayers);
 }
 
-/// A card clears all layers of a target whatever is drawn, and takes long to get large ones: it has what was asked for.
+/// A card clears all layers of a target, however few are drawn, and takes long to get large ones: there are several,
+/// each twice as large as the one before.
 HemicubeRenderer::Target& HemicubeRenderer::target(std::uint32_t resolution, std::size_t views) {
   const std::size_t wanted = drawing_ == Drawing::kByProcessor ? capacity(resolution) : std::bit_ceil(views);
-  auto found = targets_.find(resolution);
-  if (found != targets_.end() && found->second.layers >= wanted) return found->second;
+  const std::pair key{resolution, wanted};
+  const auto found = targets_.find(key);
+  if (found != targets_.end()) return found->second;
   const auto width = static_cast<GLsizei>(resolution);
   const auto height = static_cast<GLsizei>(3 * resolution);
   const auto layers = static_cast<GLsizei>(wanted);
-  Target made{wanted, Texture(*context_, "hemicube ids", GL_TEXTURE_2D_ARRAY),
+  Target made{Texture(*context_, "hemicube ids", GL_TEXTURE_2D_ARRAY),
               Texture(*context_, "hemicube depth", GL_TEXTURE_2D_ARRAY), Framebuffer(*context_, "hemicubes")};
   glTextureStorage3D(made.ids.name(), 1, GL_R32UI, width, height, layers);
   glTextureStorage3D(made.depth.name(), 1, GL_DEPTH_COMPONENT32F, width, height, layers);
@@ -119,7 +121,7 @@ HemicubeRenderer::Target& HemicubeRenderer::target(std::uint32_t resolution, std
   glNamedFramebufferTexture(made.framebuffer.name(), GL_DEPTH_ATTACHMENT, made.depth.name(), 0);
   RAD_CHECK_EQ(glCheckNamedFramebufferStatus(made.framebuffer.name(), GL_DRAW_FRAMEBUFFER),
                GLenum{GL_FRAMEBUFFER_COMPLETE});
-  return targets_.insert_or_assign(resolution, std::move(made)).first->second;
+  return targets_.emplace(key, std::move(made)).first->second;
 }
 
 std::size_t HemicubeRenderer::select(std::uint32_t resolution, std::span<const HemicubeView> views,

@@ -10,6 +10,7 @@
 #include <map>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "server/gpu/drawing.h"
@@ -56,7 +57,6 @@ class HemicubeRenderer {
 
  private:
   struct Target {
-    std::size_t layers;
     Texture ids, depth;
     Framebuffer framebuffer;
   };
@@ -98,8 +98,8 @@ class HemicubeRenderer {
   std::optional<PaperIds> paper_ids_;
   Texture paper_texture_;
   Buffer views_buffer_, indices_buffer_, commands_buffer_;
-  std::size_t index_count_ = 0;              ///< in the buffer for good, where everything is drawn
-  std::map<std::uint32_t, Target> targets_;  ///< by resolution
+  std::size_t index_count_ = 0;  ///< in the buffer for good, where everything is drawn
+  std::map<std::pair<std::uint32_t, std::size_t>, Target> targets_;  ///< by resolution and layers
   std::vector<FaceView> face_views_;
   std::vector<TriangleCuller::Selection> selections_;  ///< by view
   std::vector<std::uint32_t> indices_;

@@ -102,10 +102,12 @@ HemicubeWeights computeWeights(std::uint32_t resolution, std::uint32_t lattice) 
 }
 
 const HemicubeWeights& WeightCache::get(std::uint32_t resolution, std::uint32_t lattice) {
-  const auto key = std::pair{resolution, lattice};
-  auto found = tables_.find(key);
-  if (found == tables_.end()) found = tables_.emplace(key, computeWeights(resolution, lattice)).first;
-  return found->second;
+  auto& table = [&]() -> Table& {
+    const std::lock_guard lock(mutex_);
+    return tables_[{resolution, lattice}];  // stays where it is, whatever comes beside it
+  }();
+  std::call_once(table.made, [&] { table.weights = computeWeights(resolution, lattice); });
+  return table.weights;
 }
 
 }  // namespace radiosity::gpu

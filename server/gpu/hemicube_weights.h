@@ -10,6 +10,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <mutex>
 #include <vector>
 
 #include "server/solver/transport.h"
@@ -39,13 +40,19 @@ struct HemicubeWeights {
 
 [[nodiscard]] HemicubeWeights computeWeights(std::uint32_t resolution, std::uint32_t lattice);
 
-/// Tables made when first asked for and kept. One thread.
+/// Tables made when first asked for and kept: 4 bytes a pixel each. Any thread; who asks for one that is being made
+/// waits.
 class WeightCache {
  public:
   const HemicubeWeights& get(std::uint32_t resolution, std::uint32_t lattice);
 
  private:
-  std::map<std::pair<std::uint32_t, std::uint32_t>, HemicubeWeights> tables_;
+  std::mutex mutex_;
+  struct Table {
+    std::once_flag made;
+    HemicubeWeights weights;
+  };
+  std::map<std::pair<std::uint32_t, std::uint32_t>, Table> tables_;
 };
 
 }  // namespace radiosity::gpu

@@ -21,10 +21,12 @@ void ImageReadback::read(const Texture& from, std::uint32_t width, std::uint32_t
                          static_cast<GLsizei>(layers), GL_RED_INTEGER, GL_UNSIGNED_INT,
                          static_cast<GLsizei>(count * sizeof(std::uint32_t)), to);
   };
-  if (drawing_ == Drawing::kByProcessor || !makeRoom(count)) {
+  if (drawing_ == Drawing::kByProcessor) {
     get(into.data());
     return;
   }
+  makeRoom(count);
+  if (mapped_ == nullptr) return;  // no such memory is left, which EglContext::check() will say
   glBindBuffer(GL_PIXEL_PACK_BUFFER, buffer_.name());
   get(nullptr);
   glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);
@@ -32,15 +34,13 @@ void ImageReadback::read(const Texture& from, std::uint32_t width, std::uint32_t
   std::copy_n(mapped_, count, into.data());
 }
 
-/// False: the driver has no such memory left.
-bool ImageReadback::makeRoom(std::size_t count) {
-  if (count <= room_) return mapped_ != nullptr;
+void ImageReadback::makeRoom(std::size_t count) {
+  if (count <= room_ && mapped_ != nullptr) return;
   room_ = std::bit_ceil(count);
   const auto bytes = static_cast<GLsizeiptr>(room_ * sizeof(std::uint32_t));
   buffer_ = Buffer(*context_, "images on their way");
   glNamedBufferStorage(buffer_.name(), bytes, nullptr, kAccess | GL_CLIENT_STORAGE_BIT);
   mapped_ = static_cast<const std::uint32_t*>(glMapNamedBufferRange(buffer_.name(), 0, bytes, kAccess));
-  return mapped_ != nullptr;
 }
 
 }  // namespace radiosity::gpu

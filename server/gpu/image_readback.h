@@ -19,7 +19,7 @@ class ImageReadback {
             std::vector<std::uint32_t>& into);
 
  private:
-  bool makeRoom(std::size_t count);
+  void makeRoom(std::size_t count);
 
   const EglContext* context_;
   Drawing drawing_;

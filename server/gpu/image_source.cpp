@@ -4,12 +4,12 @@
 
 namespace radiosity::gpu {
 
-Result<std::unique_ptr<Renderers>> Renderers::create() {
+Result<std::unique_ptr<Renderers>> Renderers::create(std::optional<Drawing> drawing) {
   auto context = EglContext::create();
   if (!context) return tl::unexpected(context.error());
-  auto hemicubes = HemicubeRenderer::create(**context);
+  auto hemicubes = HemicubeRenderer::create(**context, drawing);
   if (!hemicubes) return tl::unexpected(hemicubes.error());
-  auto parallel = ParallelRenderer::create(**context);
+  auto parallel = ParallelRenderer::create(**context, drawing);
   if (!parallel) return tl::unexpected(parallel.error());
   return std::unique_ptr<Renderers>(new Renderers{std::move(*context), std::move(*hemicubes), std::move(*parallel)});
 }

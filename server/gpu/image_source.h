@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -18,7 +19,8 @@ struct Renderers {
   HemicubeRenderer hemicubes;
   ParallelRenderer parallel;
 
-  [[nodiscard]] static Result<std::unique_ptr<Renderers>> create();
+  /// `drawing`: what suits the context, but for tests.
+  [[nodiscard]] static Result<std::unique_ptr<Renderers>> create(std::optional<Drawing> drawing = std::nullopt);
   [[nodiscard]] Result<void> setScene(std::shared_ptr<const scene::PatchScene> patches);
 };
 

@@ -36,7 +36,8 @@ class InProcessTransport final : public solver::Transport {
   }
 
   [[nodiscard]] std::string description() const override {
-    return fmt::format("{}, in process", crew_->context().renderer());
+    const auto hands = crew_->hands() > 1 ? fmt::format(", {} threads", crew_->hands()) : "";
+    return fmt::format("{}, in process{}", crew_->context().renderer(), hands);
   }
 
  protected:
@@ -52,12 +53,12 @@ class InProcessTransport final : public solver::Transport {
 
 std::size_t handsFor(bool software, std::size_t contexts) {
   if (software) return 1;
-  constexpr std::size_t kMostHands = 32;  // each holds as much memory as a worker in software
+  constexpr std::size_t kMostHands = 32;  // more would wait for the one that draws
   return std::clamp<std::size_t>(std::thread::hardware_concurrency() / contexts, 1, kMostHands);
 }
 
-Result<std::unique_ptr<solver::Transport>> makeInProcessTransport(std::size_t hands) {
-  auto crew = ShotCrew::create();
+Result<std::unique_ptr<solver::Transport>> makeInProcessTransport(std::size_t hands, std::optional<Drawing> drawing) {
+  auto crew = ShotCrew::create(drawing);
   if (!crew) return tl::unexpected(crew.error());
   (*crew)->setHands(hands > 0 ? hands : handsFor((*crew)->context().software(), 1));
   return std::make_unique<InProcessTransport>(std::move(*crew));

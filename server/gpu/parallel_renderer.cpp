@@ -1,6 +1,7 @@
 #include "server/gpu/parallel_renderer.h"
 
 #include <algorithm>
+#include <bit>
 #include <chrono>
 #include <glm/geometric.hpp>
 
@@ -64,11 +65,14 @@ ParallelAxes ParallelRenderer::axes(const solver::ParallelView& view, std::uint3
   return {centre_, scale * view.right, scale * up, glm::vec2(0.5F * n - 0.5F) + view.shift, side * side};
 }
 
-ParallelRenderer::Target& ParallelRenderer::target(std::uint32_t resolution) {
-  auto found = targets_.find(resolution);
+/// As of HemicubeRenderer.
+ParallelRenderer::Target& ParallelRenderer::target(std::uint32_t resolution, std::size_t views) {
+  const std::size_t wanted = drawing_ == Drawing::kByProcessor ? capacity(resolution) : std::bit_ceil(views);
+  const std::pair key{resolution, wanted};
+  const auto found = targets_.find(key);
   if (found != targets_.end()) return found->second;
   const auto size = static_cast<GLsizei>(resolution);
-  const auto layers = static_cast<GLsizei>(capacity(resolution));
+  const auto layers = static_cast<GLsizei>(wanted);
   Target made{Texture(*context_, "parallel ids", GL_TEXTURE_2D_ARRAY),
               Texture(*context_, "parallel depth", GL_TEXTURE_2D_ARRAY), Framebuffer(*context_, "parallel")};
   glTextureStorage3D(made.ids.name(), 1, GL_R32UI, size, size, layers);
@@ -77,7 +81,7 @@ ParallelRenderer::Target& ParallelRenderer::target(std::uint32_t resolution) {
   glNamedFramebufferTexture(made.framebuffer.name(), GL_DEPTH_ATTACHMENT, made.depth.name(), 0);
   RAD_CHECK_EQ(glCheckNamedFramebufferStatus(made.framebuffer.name(), GL_DRAW_FRAMEBUFFER),
                GLenum{GL_FRAMEBUFFER_COMPLETE});
-  return targets_.emplace(resolution, std::move(made)).first->second;
+  return targets_.emplace(key, std::move(made)).first->second;
 }
 
 /// How each view looks at the scene.
@@ -118,7 +122,7 @@ void ParallelRenderer::render(const GpuScene& scene, std::uint32_t resolution,
   RAD_CHECK_LE(views.size(), capacity(resolution));
   const auto start = std::chrono::steady_clock::now();
   context_->makeCurrent();
-  auto& into = target(resolution);
+  auto& into = target(resolution, views.size());
   const bool selects = drawing_ == Drawing::kByProcessor;
   if (selects) select(resolution, views, counters);
   placeViews(resolution, views);

@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "server/gpu/drawing.h"
@@ -52,7 +53,7 @@ class ParallelRenderer {
   void placeViews(std::uint32_t resolution, std::span<const solver::ParallelView> views);
   void select(std::uint32_t resolution, std::span<const solver::ParallelView> views,
               solver::TransportCounters& counters);
-  Target& target(std::uint32_t resolution);
+  Target& target(std::uint32_t resolution, std::size_t views);
 
   const EglContext* context_;
   Drawing drawing_;
@@ -67,7 +68,7 @@ class ParallelRenderer {
   std::size_t index_count_ = 0;  ///< in the buffer for good, where everything is drawn
   glm::vec3 centre_{0.0F};
   float radius_ = 1.0F;
-  std::map<std::uint32_t, Target> targets_;  ///< by resolution
+  std::map<std::pair<std::uint32_t, std::size_t>, Target> targets_;  ///< by resolution and layers
 };
 
 }  // namespace radiosity::gpu

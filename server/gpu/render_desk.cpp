@@ -7,15 +7,17 @@ namespace radiosity::gpu {
 struct RenderDesk::Order {
   const std::function<void()>* work = nullptr;
   bool done = false;
-  std::exception_ptr thrown = nullptr;
+  std::condition_variable served = {};
+  std::exception_ptr thrown = {};
 };
 
 void RenderDesk::ask(const std::function<void()>& work) {
-  Order order{&work};
+  Order order;
+  order.work = &work;
   std::unique_lock lock(mutex_);
   orders_.push_back(&order);
   ordered_.notify_one();
-  served_.wait(lock, [&] { return order.done; });
+  order.served.wait(lock, [&] { return order.done; });
   if (order.thrown) std::rethrow_exception(order.thrown);
 }
 
@@ -39,8 +41,8 @@ void RenderDesk::serve(std::size_t askers) {
       order.thrown = std::current_exception();
     }
     lock.lock();
-    order.done = true;  // and may be gone as soon as the lock is
-    served_.notify_all();
+    order.done = true;  // and is gone as soon as the lock is
+    order.served.notify_one();
   }
   left_ = 0;
 }

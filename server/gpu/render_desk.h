@@ -23,7 +23,7 @@ class RenderDesk {
   struct Order;
 
   std::mutex mutex_;
-  std::condition_variable ordered_, served_;
+  std::condition_variable ordered_;
   std::deque<Order*> orders_;
   std::size_t left_ = 0;
 };

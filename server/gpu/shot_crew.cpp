@@ -2,69 +2,94 @@
 
 #include <algorithm>
 #include <atomic>
+#include <exception>
 #include <future>
-#include <system_error>
 
 namespace radiosity::gpu {
 namespace {
 
-/// Parts for each hand: several, since no two take the same time; not one for each shot, since each asks for its images
-/// once.
-constexpr std::size_t kPartsAHand = 4;
+/// Parts for each hand: two, since no two take the same time; not more, since each asks for its images once.
+constexpr std::size_t kPartsAHand = 2;
+/// What hands may hold, and what one holds for each node and whatever the scene: sums of flux, places on receivers,
+/// images.
+constexpr std::size_t kHandsBytes = std::size_t{1} << 30U;
+constexpr std::size_t kNodeBytes = 200, kImageBytes = std::size_t{20} << 20U;
 
 }  // namespace
 
-Result<std::unique_ptr<ShotCrew>> ShotCrew::create() {
-  auto renderers = Renderers::create();
+Result<std::unique_ptr<ShotCrew>> ShotCrew::create(std::optional<Drawing> drawing) {
+  auto renderers = Renderers::create(drawing);
   if (!renderers) return tl::unexpected(renderers.error());
   return std::unique_ptr<ShotCrew>(new ShotCrew(std::move(*renderers)));
 }
 
 Result<void> ShotCrew::setScene(std::shared_ptr<const scene::PatchScene> patches) {
+  hands_.clear();  // before others take their memory; and what they know is of no use to other images
   if (auto set = renderers_->setScene(patches); !set) return set;
-  hands_.clear();
-  auto* desk = wanted_ > 1 ? &desk_ : nullptr;
-  for (std::size_t i = 0; i < wanted_; ++i) hands_.push_back(std::make_unique<Hand>(ImageSource(*renderers_, desk)));
   const auto receivers = std::make_shared<const Receivers>(patches);
-  for (auto& hand : hands_) {
-    hand->runner.setScene(receivers);
-    if (desk != nullptr) hand->store = FluxStore(patches->nodeCount());
+  const std::size_t fit = kHandsBytes / (kImageBytes + kNodeBytes * patches->nodeCount());
+  const std::size_t count = std::clamp<std::size_t>(fit, 1, wanted_);
+  std::vector<std::unique_ptr<Hand>> hands;
+  for (std::size_t i = 0; i < count; ++i) {
+    hands.push_back(std::make_unique<Hand>(ImageSource(*renderers_, count > 1 ? &desk_ : nullptr), weights_));
+    hands.back()->runner.setScene(receivers);
+    if (count > 1) hands.back()->store = FluxStore(patches->nodeCount());
   }
+  hands_ = std::move(hands);
   return {};
 }
 
 Result<solver::TransportCounters> ShotCrew::run(const ShotSpan& shots, const FluxSink& sink) {
+  if (hands_.empty()) return fail(ErrorCode::kInternal, "setScene must come before run");
   if (hands_.size() == 1) return hands_.front()->runner.run(shots, sink);
-  auto done = share(partsOf(shots),
-                    [](Hand& hand, const Part& part) { return hand.runner.run(part.shots, hand.store.sink()); });
-  for (auto& hand : hands_) {
-    if (done) {
-      hand->store.sink().drainInto(sink);
-    } else {
-      hand->store.sink().clear();
-    }
+  Result<solver::TransportCounters> done;
+  try {
+    done = share(partsOf(shots),
+                 [](Hand& hand, const Part& part) { return hand.runner.run(part.shots, hand.store.sink()); });
+  } catch (...) {
+    clearStores();
+    throw;
+  }
+  if (done) {
+    for (auto& hand : hands_) hand->store.sink().drainInto(sink);
+  } else {
+    clearStores();
   }
   return done;
 }
 
+/// Links are handed on as soon as those of all shots before are there, by this thread, as others ask it for images.
 Result<solver::TransportCounters> ShotCrew::measure(const ShotSpan& shots, const solver::Transport::TakeLinks& take) {
+  if (hands_.empty()) return fail(ErrorCode::kInternal, "setScene must come before measure");
   if (hands_.size() == 1) return hands_.front()->runner.measure(shots, take);
-  std::vector<solver::LinkSample> links(shots.gather.size() + shots.scatter.size());
-  auto done = share(partsOf(shots), [&](Hand& hand, const Part& part) {
-    const auto keep = [&](std::size_t i, solver::LinkSample&& sample) { links[part.first + i] = std::move(sample); };
-    return hand.runner.measure(part.shots, keep);
+  std::vector<std::optional<solver::LinkSample>> links(shots.gather.size() + shots.scatter.size());
+  std::size_t taken = 0;
+  const auto hand_on = [&](std::size_t first, std::vector<solver::LinkSample>& found) {
+    for (std::size_t i = 0; i < found.size(); ++i) links[first + i] = std::move(found[i]);
+    for (; taken < links.size() && links[taken]; ++taken) {
+      take(taken, std::move(*links[taken]));
+      links[taken].reset();
+    }
+  };
+  return share(partsOf(shots), [&](Hand& hand, const Part& part) {
+    std::vector<solver::LinkSample> found;
+    auto done = hand.runner.measure(
+        part.shots, [&](std::size_t, solver::LinkSample&& sample) { found.push_back(std::move(sample)); });
+    if (done) desk_.ask([&] { hand_on(part.first, found); });
+    return done;
   });
-  if (!done) return done;
-  for (std::size_t i = 0; i < links.size(); ++i) take(i, std::move(links[i]));
-  return done;
+}
+
+void ShotCrew::clearStores() {
+  for (auto& hand : hands_) hand->store.sink().clear();
 }
 
 std::vector<ShotCrew::Part> ShotCrew::partsOf(const ShotSpan& shots) const {
   std::vector<Part> parts;
+  const std::size_t wanted = kPartsAHand * hands_.size();
   const auto cut = [&](auto ShotSpan::*kind, std::size_t before) {
     const auto all = shots.*kind;
-    const std::size_t most =
-        std::max<std::size_t>((all.size() + kPartsAHand * hands_.size() - 1) / (kPartsAHand * hands_.size()), 1);
+    const std::size_t most = std::max<std::size_t>((all.size() + wanted - 1) / wanted, 1);
     for (std::size_t first = 0; first < all.size(); first += most) {
       Part part{shots, before + first};
       part.shots.scatter = {};
@@ -84,28 +109,36 @@ std::vector<ShotCrew::Part> ShotCrew::partsOf(const ShotSpan& shots) const {
 
 /// Hands take parts in turn, each in a thread of its own; this one draws for them. After an error the rest is left.
 Result<solver::TransportCounters> ShotCrew::share(const std::vector<Part>& parts, const Work& work) {
-  if (hands_.empty()) return fail(ErrorCode::kInternal, "setScene must come before run");
   std::atomic<std::size_t> next{0};
   std::vector<Result<solver::TransportCounters>> done(parts.size());
   const auto workThrough = [&](Hand& hand) {
     struct Leave {
       RenderDesk& desk;
-      ~Leave() { desk.leave(); }
-    } leave{desk_};
+      std::atomic<std::size_t>& next;
+      std::size_t end;
+      ~Leave() {
+        if (std::uncaught_exceptions() > 0) next = end;
+        desk.leave();
+      }
+    } leave{desk_, next, parts.size()};
     for (auto i = next++; i < parts.size(); i = next++) {
       done[i] = work(hand, parts[i]);
       if (!done[i]) next = parts.size();
     }
   };
   std::vector<std::future<void>> threads;
+  threads.reserve(hands_.size());
+  std::exception_ptr not_started;
   try {
-    for (std::size_t i = 0; i < std::min(hands_.size(), parts.size()); ++i)
-      threads.push_back(std::async(std::launch::async, workThrough, std::ref(*hands_[i])));
-  } catch (const std::system_error& error) {  // no more threads to be had: those that there are do it all
-    if (threads.empty()) return fail(ErrorCode::kUnavailable, std::string("cannot start a thread: ") + error.what());
+    while (threads.size() < std::min(hands_.size(), parts.size()))
+      threads.push_back(std::async(std::launch::async, workThrough, std::ref(*hands_[threads.size()])));
+  } catch (...) {  // no more threads to be had: those that there are do it all
+    not_started = std::current_exception();
   }
-  desk_.serve(threads.size());
+  desk_.serve(threads.size());  // come what may: they wait for it
+  for (auto& thread : threads) thread.wait();
   for (auto& thread : threads) thread.get();
+  if (threads.empty() && not_started) std::rethrow_exception(not_started);
   solver::TransportCounters counters;
   for (const auto& part : done) {
     if (!part) return tl::unexpected(part.error());

@@ -6,6 +6,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "server/gpu/shot_runner.h"
@@ -14,13 +15,15 @@ namespace radiosity::gpu {
 
 class ShotCrew {
  public:
-  /// A context of this thread, and one hand.
-  [[nodiscard]] static Result<std::unique_ptr<ShotCrew>> create();
+  /// A context of this thread, and one hand. `drawing`: what suits the context, but for tests.
+  [[nodiscard]] static Result<std::unique_ptr<ShotCrew>> create(std::optional<Drawing> drawing = std::nullopt);
 
-  /// Takes effect with the next scene. At least 1.
+  /// From the next scene on, at least 1; fewer in scenes so large that so many would take more than 1 GiB.
   void setHands(std::size_t hands) { wanted_ = hands; }
+  [[nodiscard]] std::size_t hands() const { return hands_.size(); }
+  /// After an error there is no scene.
   [[nodiscard]] Result<void> setScene(std::shared_ptr<const scene::PatchScene> patches);
-  /// As ShotRunner's; links come in the order of the shots, in this thread.
+  /// As ShotRunner's. What a hand, or `take`, throws is thrown here, when all hands have stopped.
   [[nodiscard]] Result<solver::TransportCounters> run(const ShotSpan& shots, const FluxSink& sink);
   [[nodiscard]] Result<solver::TransportCounters> measure(const ShotSpan& shots,
                                                           const solver::Transport::TakeLinks& take);
@@ -28,7 +31,7 @@ class ShotCrew {
 
  private:
   struct Hand {
-    explicit Hand(const ImageSource& images) : runner(images) {}
+    Hand(const ImageSource& images, WeightCache& weights) : runner(images, weights) {}
     ShotRunner runner;
     FluxStore store;
   };
@@ -42,10 +45,12 @@ class ShotCrew {
   explicit ShotCrew(std::unique_ptr<Renderers> renderers) : renderers_(std::move(renderers)) {}
   [[nodiscard]] std::vector<Part> partsOf(const ShotSpan& shots) const;
   [[nodiscard]] Result<solver::TransportCounters> share(const std::vector<Part>& parts, const Work& work);
+  void clearStores();
 
   std::unique_ptr<Renderers> renderers_;
+  WeightCache weights_;
   RenderDesk desk_;
-  std::vector<std::unique_ptr<Hand>> hands_;
+  std::vector<std::unique_ptr<Hand>> hands_;  ///< none: there is no scene
   std::size_t wanted_ = 1;
 };
 

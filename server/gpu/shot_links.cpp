@@ -84,8 +84,8 @@ void ShotRunner::measureGather(const ShotSpan& shots, const solver::Transport::T
         gatherer_.beginLinks(shot, shots.receivers.subspan(shot.first_run, shot.run_count));
       const auto& frame = shots.points[looks[i].point];
       const auto& window = views[i - first].window;
-      gatherer_.look(shot, frame, images.subspan((i - first) * pixels, pixels), weights_.get(resolution, frame.lattice),
-                     window ? &*window : nullptr);
+      gatherer_.look(shot, frame, images.subspan((i - first) * pixels, pixels),
+                     weights_->get(resolution, frame.lattice), window ? &*window : nullptr);
       if (looks[i].point + 1 == shot.first_point + shot.point_count) {
         solver::LinkSample links;
         gatherer_.finishLinks(shot, links, counters);

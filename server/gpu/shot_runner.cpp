@@ -106,7 +106,7 @@ Result<solver::TransportCounters> ShotRunner::run(const ShotSpan& shots, const F
   scatter(shots, sink, counters);
   for (const auto& shot : shots.gather) {
     gatherer_.gather(shot, shots.points.subspan(shot.first_point, shot.point_count), shots.flux_scale, images_,
-                     weights_, sink, counters);
+                     *weights_, sink, counters);
   }
   for (const auto& shot : shots.point_lights) punctual_.gather(shot, shots.flux_scale, images_, sink, counters);
   for (const auto& shot : shots.parallel) {
@@ -135,7 +135,7 @@ void ShotRunner::scatter(const ShotSpan& shots, const FluxSink& sink, solver::Tr
     for (auto i = first; i < last; ++i) {
       const auto& shot = shots.scatter[i];
       accumulator_.accumulate(images.subspan((i - first) * pixels, pixels),
-                              weights_.get(resolution, shot.frame.lattice), shot, shots.flux_scale, sink, counters);
+                              weights_->get(resolution, shot.frame.lattice), shot, shots.flux_scale, sink, counters);
     }
     counters.accumulate_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     first = last;

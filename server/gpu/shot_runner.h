@@ -31,7 +31,8 @@ struct ShotSpan {
 
 class ShotRunner {
  public:
-  explicit ShotRunner(ImageSource images) : images_(std::move(images)) {}
+  /// `weights` outlive it; others may use them at the same time.
+  ShotRunner(ImageSource images, WeightCache& weights) : images_(std::move(images)), weights_(&weights) {}
 
   /// After the scene of the renderers.
   void setScene(const std::shared_ptr<const Receivers>& receivers);
@@ -48,7 +49,7 @@ class ShotRunner {
                       solver::TransportCounters& counters);
 
   ImageSource images_;
-  WeightCache weights_;
+  WeightCache* weights_;
   ScatterAccumulator accumulator_;
   LightGatherer gatherer_;
   std::shared_ptr<const Receivers> receivers_;

@@ -35,6 +35,8 @@ constexpr double kSlowPixelSeconds = 2e-6;
 /// Of the time that a late worker is given again it must have used this part: one that is stopped, or waits for ever,
 /// uses nothing.
 constexpr int kLeastUse = 5000;
+/// And it is given time so often at most: what waits for a card that hangs may look now and then whether it still does.
+constexpr int kMostExtensions = 30;
 /// A worker takes in a scene at ten times this rate at least.
 constexpr double kSlowSceneBytesPerSecond = 5e6;
 
@@ -53,6 +55,7 @@ struct Slot {
   Clock::duration patience{};            ///< that the chunk may take
   Clock::duration used_before{};         ///< processor time of the worker when it started on that chunk, ...
   Clock::duration used_lately{};         ///< ... and when it was last given time
+  int extensions = 0;                    ///< how often it was
   solver::TransportCounters counters;
 };
 
@@ -205,14 +208,17 @@ class WorkerTransport final : public solver::Transport {
     slot.patience = options_.patience + seconds(kSlowPixelSeconds * chunks_[slot.held.front()].cost);
     slot.deadline = Clock::now() + slot.patience;
     slot.used_before = slot.used_lately = slot.process->processorTime();
+    slot.extensions = 0;
   }
 
   /// On a busy machine a worker may be late because it was hardly let run. It is given as long again, as long as it
   /// uses what it gets, and until it has had in processor time what a chunk may take.
-  [[nodiscard]] static bool givenMoreTime(Slot& slot) {
+  [[nodiscard]] bool givenMoreTime(Slot& slot) const {
     const Clock::duration used = slot.process->processorTime();
     const bool runs = used - slot.used_lately >= slot.patience / kLeastUse;
-    if (!runs || used - slot.used_before >= slot.patience) return false;
+    const auto most = slot.patience * static_cast<int>(hands_);  // that all its threads together may use
+    if (!runs || used - slot.used_before >= most) return false;
+    if (!slot.process->software() && ++slot.extensions > kMostExtensions) return false;
     slot.used_lately = used;
     slot.deadline = Clock::now() + slot.patience;
     return true;
@@ -347,7 +353,7 @@ class WorkerTransport final : public solver::Transport {
   std::string last_death_;
 };
 
-/// Whether some driver may have a card: false only where there is none.
+/// Whether there may be a card: where it is not found the first worker tells, and all others were started in vain.
 bool mayHaveCard() {
   std::error_code ignored;
   for (const auto* device : {"/dev/dri", "/dev/nvidiactl", "/dev/dxg"}) {

@@ -143,13 +143,16 @@ TEST(BatchChunks, OfWorkersWithManyHandsHoldSomethingForEachAndAsManyLinksAsFit)
     EXPECT_EQ(chunk.first, next);
     next += chunk.count;
     if (next < batch.scatter.size()) {
-      EXPECT_GE(chunk.count, 32U);
+      EXPECT_GE(chunk.count, 64U);
     }
     EXPECT_LE(chunk.count, 400U);  // one is worked on while the links of another are taken in
   }
   EXPECT_EQ(next, batch.scatter.size());
-  for (const auto& chunk : gpu::cutBatch(batch, {120, std::size_t{1} << 20U}, {1, 16}))
-    EXPECT_LE(chunk.count, 16U);  // 4 MiB of links a shot, 64 in all
+  for (const auto& chunk : gpu::cutBatch(batch, {120, std::size_t{1} << 22U}, {1, 16})) {
+    if (chunk.kind == gpu::ShotKind::kScatter && chunk.first + chunk.count < batch.scatter.size()) {
+      EXPECT_EQ(chunk.count, 16U);  // 16 MiB of links a shot, 256 in all
+    }
+  }
 }
 
 TEST_F(Workers, AnyNumberOfWorkersGivesTheBitsOfOneProcess) {

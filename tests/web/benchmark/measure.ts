@@ -18,7 +18,7 @@ export interface Opening {
   tileToPicture: number[];
   /** Pictures a second while it turns. */
   rate: number;
-  /** Milliseconds that the card takes for a picture of all pixels, of many drawn without a pause. */
+  /** Milliseconds that page and card take for a picture of all pixels, of many drawn without a pause. */
   picture: number;
 }
 
@@ -59,13 +59,13 @@ async function turn(page: Page): Promise<number> {
       }
       performance.mark('probe: turned');
       const done = pictures.slice(before).map((picture) => picture.done);
-      return (1000 * (done.length - 1)) / (done.at(-1)! - done[0]!);
+      return done.length < 2 ? 0 : (1000 * (done.length - 1)) / (done.at(-1)! - done[0]!);
     },
     [TURNING_PICTURES, MOST_TURNING_MS],
   );
 }
 
-/** What the card takes for a picture of all pixels, whatever the browser then does with it. */
+/** What page and card take for a picture of all pixels, whatever the browser then does with it. */
 async function drawOften(page: Page): Promise<number> {
   return page.evaluate((count) => {
     const { viewer } = window.viewer!;

@@ -47,9 +47,9 @@ export function targetsTable({ rows, edits, solve, size, browser }: Figures): st
       ['tasks over 50 ms while tiles arrive, by processor time', tasks(byProcessor), 'none', met(byProcessor.length === 0)],
       ['the same by the clock, other programs included', tasks(byClock), 'none', met(byClock.length === 0)],
       ['JavaScript, packed', `${ms(packed)} kB`, `under ${TARGETS.script} kB`, met(packed < TARGETS.script)],
-      ['a picture of all pixels, of the card alone', `${spread(openings.map((opening) => opening.picture))} ms`, '–', ''],
+      ['a picture of all pixels, of many without a pause', `${spread(openings.map((opening) => opening.picture))} ms`, '–', ''],
       ['turns a second of a page that only clears such a canvas', ms(browser), '–', ''],
-      ['pictures a second while it turns: median (fewest)', `${ms(median(rate))} (${ms(Math.min(...rate))})`, `${TARGETS.rate} with a card`, met(median(rate) >= 0.99 * TARGETS.rate)],
+      ['pictures a second while it turns: median (fewest)', `${ms(median(rate))} (${ms(Math.min(...rate))})`, `${TARGETS.rate} with a card, to one in a hundred`, met(median(rate) >= 0.99 * TARGETS.rate)],
     ], // prettier-ignore
   );
 }

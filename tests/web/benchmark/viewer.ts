@@ -26,9 +26,9 @@ const SCENES = [
 ];
 
 /** What a Chromium without a screen needs to draw with a card; CHROMIUM_CARD in the environment holds others. */
-const CARD = (
-  process.env['CHROMIUM_CARD'] ?? '--use-angle=vulkan --enable-features=Vulkan --disable-vulkan-surface'
-).split(' ');
+const CARD = (process.env['CHROMIUM_CARD'] ?? '--use-angle=vulkan --enable-features=Vulkan --disable-vulkan-surface')
+  .split(' ')
+  .filter(Boolean);
 
 const say = (text: string) => process.stderr.write(`${text}\n`);
 

@@ -63,16 +63,26 @@ describe('the pace of frames', () => {
     expect(pace.ask(1110)).toBe(1);
   });
 
-  it('knows a quick card by its last two frames, and none before', () => {
+  it('is quiet where nothing is drawn, or one frame by a card that was done with the last two by the next turn', () => {
     const pace = new FramePace(false);
-    expect(pace.isQuick).toBe(false);
-    const draw = (begunMs: number, endMs: number) => (pace.began(begunMs, 1), pace.ended(endMs, 1));
-    draw(0, 17);
-    expect(pace.isQuick).toBe(false);
-    draw(17, 33);
-    expect(pace.isQuick).toBe(true);
-    draw(33, 93);
-    expect(pace.isQuick).toBe(false);
+    let nowMs = 0;
+    const turn = (ended = 0) => (pace.turn((nowMs += 16)), pace.ended(nowMs, ended));
+    const begin = () => (pace.began(nowMs, 1), pace.isQuiet);
+    turn();
+    expect(pace.isQuiet).toBe(true);
+    expect(begin()).toBe(false); // nobody knows this card
+    turn(1);
+    expect(begin()).toBe(false);
+    turn(1);
+    expect(begin()).toBe(true);
+    expect(begin()).toBe(false); // two at a time
+    turn(2);
+    expect(begin()).toBe(true);
+    turn();
+    turn(1); // that took two turns
+    expect([pace.isQuiet, begin()]).toEqual([true, false]);
+    pace.forget();
+    expect([pace.isQuiet, begin()]).toEqual([true, false]);
   });
 
   it('begins coarsely where no card draws', () => {

@@ -43,7 +43,7 @@ describe('Readback', () => {
     expect([back.arrived, card.fetched, card.buffers]).toEqual([false, 1, 0]);
   });
 
-  it('asks for no quiet where there is nothing to wait for', async () => {
+  it('asks for no quiet where it is quiet already', async () => {
     const card = new Card();
     card.drawn = true;
     const back = readback(card, () => true);

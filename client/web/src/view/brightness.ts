@@ -30,7 +30,7 @@ export interface Picture {
   mode(): ViewMode | undefined;
   /** Signs and handles are no part of the scene's light. */
   withoutSigns<T>(draw: () => T): T;
-  /** To fetch something from it does not hold the page up, nor the picture: it is idle, or quick. */
+  /** To fetch something from it does not hold the page up for long: it is idle, or quick. */
   isCardQuiet(): boolean;
   /** It is to be drawn as it is to be shown now. */
   redraw(): void;

@@ -22,14 +22,13 @@ const MOST_GATHER_MS = 40;
 const MOST_UNDER_WAY = 2;
 /** Of a whole frame, where the browser says that it draws without a card: 2560 x 1600 on two cores, about. */
 const SOFTWARE_FRAME_MS = 300;
-/** A frame that takes less is done by the next turn of the page, or the one after. */
-const QUICK_FRAME_MS = 25;
 /** A page that nobody looked at has not been told when its frames were done. */
 const LONGEST_FRAME_MS = 5000;
 
 interface Frame {
   scale: number;
   begunMs: number;
+  turn: number;
 }
 
 export class FramePace {
@@ -43,6 +42,9 @@ export class FramePace {
   private hurryUntilMs = -Infinity;
   private lastTurnMs = -Infinity;
   private turnsSinceHurry = Infinity;
+  private turns = 0;
+  /** After how many turns the newest two frames were done. */
+  private turnsTaken: [number, number] = [Infinity, Infinity];
   private lastScale = 1;
   /** Until when, at most, the next frame waits for light, and for more of it; undefined: it has not waited for any. */
   private awaitUntilMs: number | undefined;
@@ -59,7 +61,10 @@ export class FramePace {
 
   /** Once for every turn of the page, before anything else. */
   turn(nowMs: number): void {
-    if (nowMs > this.lastTurnMs) ++this.turnsSinceHurry;
+    if (nowMs > this.lastTurnMs) {
+      ++this.turnsSinceHurry;
+      ++this.turns;
+    }
     this.lastTurnMs = nowMs;
   }
 
@@ -121,9 +126,12 @@ export class FramePace {
     return this.underWay.length === 0;
   }
 
-  /** What the card was given last was done so soon that nothing else need wait for it to be idle. */
-  get isQuick(): boolean {
-    return this.wholeFrameMs.every((ms) => ms > 0 && ms < QUICK_FRAME_MS); // 0: as long as none was measured
+  /**
+   * Who asks it for something waits for less than a turn: it is idle, or has one frame, and was done with the last two by the
+   * turn after theirs.
+   */
+  get isQuiet(): boolean {
+    return this.isIdle || (this.underWay.length === 1 && this.turnsTaken.every((turns) => turns <= 1));
   }
 
   /** The picture is sharp, and nothing is being drawn or moves. */
@@ -133,7 +141,7 @@ export class FramePace {
 
   /** A frame was handed to the card. */
   began(nowMs: number, scale: number): void {
-    this.underWay.push({ scale, begunMs: nowMs });
+    this.underWay.push({ scale, begunMs: nowMs, turn: this.turns });
     this.lastScale = scale;
     this.awaitUntilMs = this.gatherUntilMs = undefined;
     if (scale === 1) this.coarseSinceMs = undefined;
@@ -147,6 +155,7 @@ export class FramePace {
     const frames = this.underWay.splice(0, count);
     const [oldest] = frames;
     if (!oldest) return;
+    this.turnsTaken = [this.turnsTaken[1], this.turns - oldest.turn];
     const tookMs = nowMs - Math.max(oldest.begunMs, this.lastEndMs);
     this.lastEndMs = nowMs;
     if (tookMs > LONGEST_FRAME_MS) return;
@@ -158,6 +167,7 @@ export class FramePace {
   /** The card was taken away, and all it had to draw. */
   forget(): void {
     this.underWay.length = 0;
+    this.turnsTaken = [Infinity, Infinity];
   }
 
   /** The finest that is quick enough. One slow frame may be a hiccup (a program being compiled): two are not. */

@@ -343,7 +343,7 @@ export class Viewer {
       camera: rig.camera,
       mode: () => this.mode,
       withoutSigns: (draw) => this.withoutSigns(draw),
-      isCardQuiet: () => this.pace.isIdle || this.pace.isQuick,
+      isCardQuiet: () => this.pace.isQuiet,
       redraw: () => (this.wanted = true),
     });
   }
