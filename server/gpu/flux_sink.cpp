@@ -11,6 +11,16 @@ void addTo(solver::Flux3& into, const solver::Flux3& flux) {
   for (std::size_t channel = 0; channel < 3; ++channel) into[channel] += flux[channel];
 }
 
+/// `into`: FluxTotals, or FluxAccumulators, which have the same.
+template <typename Into>
+void takeTotals(FluxTotals& from, Into& into) {
+  addTo(into.escaped, from.escaped);
+  addTo(into.backface, from.backface);
+  addTo(into.scattered, from.scattered);
+  addTo(into.gathered, from.gathered);
+  from = {};
+}
+
 /// Calls visit(half, first node, node count) for each marked block and removes the mark.
 template <typename Visit>
 void takeMarked(const FluxSink& sink, Visit visit) {
@@ -34,11 +44,7 @@ void FluxSink::drainInto(solver::FluxAccumulators& into) const {
       node[half][i] = {};
     }
   });
-  addTo(into.escaped, totals->escaped);
-  addTo(into.backface, totals->backface);
-  addTo(into.scattered, totals->scattered);
-  addTo(into.gathered, totals->gathered);
-  *totals = {};
+  takeTotals(*totals, into);
 }
 
 void FluxSink::drainInto(const FluxSink& into) const {
@@ -50,11 +56,7 @@ void FluxSink::drainInto(const FluxSink& into) const {
     }
     into.mark[half][first / kMarkNodes] = 1;
   });
-  addTo(into.totals->escaped, totals->escaped);
-  addTo(into.totals->backface, totals->backface);
-  addTo(into.totals->scattered, totals->scattered);
-  addTo(into.totals->gathered, totals->gathered);
-  *totals = {};
+  takeTotals(*totals, *into.totals);
 }
 
 void FluxSink::clear() const {

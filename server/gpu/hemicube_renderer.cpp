@@ -15,8 +15,6 @@ namespace {
 /// the latency of the readback.
 constexpr std::size_t kSoftwareAtlasPixels = std::size_t{1} << 16U;
 constexpr std::size_t kCardAtlasPixels = std::size_t{1} << 22U;
-/// A card is asked for so many triangles at once at most: systems end work that keeps one busy for seconds.
-constexpr std::size_t kCardTriangles = std::size_t{1} << 26U;
 constexpr std::size_t kMaxLayers = 256;
 /// Reading the depth of a view takes about as long as drawing so many triangles.
 constexpr std::size_t kWorthASecondLook = 256;

@@ -13,8 +13,6 @@ namespace {
 /// Pixels of one image array: as for hemicubes, small where the processor draws and large with a card.
 constexpr std::size_t kSoftwarePixels = std::size_t{1} << 16U;
 constexpr std::size_t kCardPixels = std::size_t{1} << 22U;
-/// As for hemicubes.
-constexpr std::size_t kCardTriangles = std::size_t{1} << 26U;
 constexpr std::size_t kMaxLayers = 64;
 
 }  // namespace
