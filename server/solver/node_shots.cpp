@@ -17,7 +17,7 @@ constexpr std::uint32_t kJitterBlock = 4;
 
 /// Rows of a leaf's spots that count for a sample of a light: light and shadow of a lamp differ more across a leaf than
 /// anything else.
-constexpr std::uint32_t kLightRows = 4;
+constexpr std::uint32_t kLightRows = 1;
 
 /// Points of a polygon's sample, by its number, and of all before it.
 std::uint32_t pointsOfSample(std::uint32_t index) {
