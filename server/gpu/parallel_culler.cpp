@@ -1,7 +1,6 @@
 #include "server/gpu/parallel_culler.h"
 
 #include "common/clones.h"
-#include "server/gpu/closed_solids.h"
 
 namespace radiosity::gpu {
 namespace {
@@ -54,7 +53,7 @@ RADIOSITY_CLONES void classify(const ParallelAxes& axes, const glm::vec3& direct
 
 ParallelCuller::ParallelCuller(const scene::PatchScene& patches) : indices_(patches.indices) {
   const std::size_t count = indices_.size() / 3;
-  const auto solids = findClosedSolids(patches);
+  const auto& solid_of = patches.solids.solid_of;
   skipped_.resize(count);
   for (auto& part : solid_normal_) part.resize(count);
   for (auto& corner : corner_) {
@@ -64,7 +63,7 @@ ParallelCuller::ParallelCuller(const scene::PatchScene& patches) : indices_(patc
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto a = static_cast<int>(axis);
       for (std::size_t c = 0; c < 3; ++c) corner_[c][axis][i] = patches.vertices[indices_[3 * i + c]].position[a];
-      const bool solid = solids.solid_of[i] != scene::kNone;
+      const bool solid = i < solid_of.size() && solid_of[i] != scene::kNone;
       solid_normal_[axis][i] = solid ? patches.vertices[indices_[3 * i]].normal[a] : 0.0F;
     }
   }

@@ -236,9 +236,10 @@ Spans spansOf(const HemicubeAxes& axes, const TriangleClusters::Cluster& cluster
 TriangleCuller::TriangleCuller(const scene::PatchScene& patches, const Culling& culling)
     : culling_(culling),
       clusters_(makeClusters(patches, kClusterTriangles)),
-      solids_(findClosedSolids(patches)),
+      solids_(patches.solids),
       outside_(solids_.bounds.size()) {
   const std::size_t count = clusters_.order.size();
+  solids_.solid_of.resize(count, scene::kNone);
   culling_.hidden = culling.hidden && count >= kManyTriangles;
   for (auto& part : plane_) part.resize(count);
   for (auto& corner : corner_) {

@@ -12,7 +12,6 @@
 #include <span>
 #include <vector>
 
-#include "server/gpu/closed_solids.h"
 #include "server/gpu/hemicube_views.h"
 #include "server/gpu/triangle_clusters.h"
 #include "server/gpu/view_window.h"
@@ -81,7 +80,7 @@ class TriangleCuller {
   std::vector<float> area_;
   std::vector<std::uint32_t> solid_, indices_;
   std::vector<std::uint32_t> seen_;  ///< bits of what classify() found
-  ClosedSolids solids_;
+  scene::ClosedSolids solids_;
   std::vector<std::uint8_t> outside_;  ///< by solid: the shooter is
 };
 

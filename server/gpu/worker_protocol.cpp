@@ -36,6 +36,8 @@ void visitScene(Scene& scene, Visit visit) {
   visit(scene.triangles);
   visit(scene.triangle_surface);
   visit(scene.surfaces);
+  visit(scene.solids.solid_of);
+  visit(scene.solids.bounds);
   visit(scene.leaves);
   scene::LeafSpots::visitParts(scene.spots, visit);
   visit(scene.node_area);

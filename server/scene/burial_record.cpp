@@ -67,6 +67,28 @@ bool sweeps(const glm::dvec3& from, const glm::dvec3& half, const glm::dvec3& wa
   return near <= far;
 }
 
+/// Marks the other surfaces of closed solids, and of what is hollow, that have a surface among those marked; returns
+/// which of the latter.
+std::vector<bool> markParts(const PatchScene& patches, std::vector<bool>& marked) {
+  const auto& solids = patches.solids;
+  std::vector<bool> solid(solids.bounds.size(), false), hollow(solids.hollows.size(), false);
+  const auto forEachFace = [&](const auto& take) {
+    for (std::size_t t = 0; t < solids.solid_of.size(); ++t) {
+      const auto surface = patches.triangle_surface[t];
+      if (solids.solid_of[t] != kNone) take(solid, solids.solid_of[t], surface);
+      if (solids.hollow_of[t] != kNone) take(hollow, solids.hollow_of[t], surface);
+    }
+  };
+  const auto before = marked;
+  forEachFace([&](auto& parts, std::uint32_t part, std::uint32_t surface) {
+    if (before[surface]) parts[part] = true;
+  });
+  forEachFace([&](auto& parts, std::uint32_t part, std::uint32_t surface) {
+    if (parts[part]) marked[surface] = true;
+  });
+  return hollow;
+}
+
 /// Whether leaves are looked at in as many places.
 bool sameOf(BurialRecord::Pass pass, const BurialPlaces& a, const BurialPlaces& b) {
   return a.many == b.many && a.finer == b.finer &&
@@ -133,9 +155,9 @@ FormerBurial::FormerBurial(const PatchScene& before, const BurialRecord& record,
   const auto add = [&](const Surface& surface) {
     boxes_.push_back({surface.bounds_min - kMargin, surface.bounds_max + kMargin});
   };
+  findChanged(hides);
   for (std::uint32_t s = 0; s < after.surfaces.size(); ++s) {
-    auto& former = surface_before_[s];
-    if (former != kNone && record.hides[former] != hides[s]) former = kNone;
+    const auto former = surface_before_[s];
     if (former != kNone) {
       stayed[former] = true;
     } else if (hides[s] != Hides::kNothing) {
@@ -147,6 +169,30 @@ FormerBurial::FormerBurial(const PatchScene& before, const BurialRecord& record,
   }
   if (boxes_.size() <= kMostParts) parts_ = boxes_;
   joinBoxes(boxes_);
+}
+
+/// What is a part of a closed solid that has changed counts as changed itself: the solid may be closed no longer, or
+/// just so now, and then its faces count for other places than before (SolidParts). So do all places in what is hollow.
+void FormerBurial::findChanged(const std::vector<Hides>& hides) {
+  std::vector<bool> gone(before_.surfaces.size(), true), is_new(after_.surfaces.size(), false);
+  for (std::uint32_t s = 0; s < is_new.size(); ++s) {
+    const auto former = surface_before_[s];
+    is_new[s] = former == kNone || record_.hides[former] != hides[s];
+    if (!is_new[s]) gone[former] = false;
+  }
+  const auto take = [&](const PatchScene& patches, std::vector<bool>& changed) {
+    const auto hollow = markParts(patches, changed);
+    for (std::size_t i = 0; i < hollow.size(); ++i) {
+      const auto& [low, high] = patches.solids.hollows[i];
+      if (hollow[i]) boxes_.push_back({low - kMargin, high + kMargin});
+    }
+  };
+  take(before_, gone);
+  take(after_, is_new);
+  for (std::uint32_t s = 0; s < is_new.size(); ++s) {
+    auto& former = surface_before_[s];
+    if (former != kNone && (is_new[s] || gone[former])) former = kNone;
+  }
 }
 
 const BurialRecord::Leaf* FormerBurial::find(std::uint32_t surface, std::uint32_t leaf, std::uint32_t side,

@@ -111,6 +111,8 @@ class FormerBurial {
   [[nodiscard]] BuriedPart renumbered(const BuriedPart& part, std::uint32_t surface) const;
 
  private:
+  void findChanged(const std::vector<Hides>& hides);
+
   const PatchScene& before_;
   const BurialRecord& record_;
   const PatchScene& after_;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
 #include <limits>
 #include <numeric>
 #include <utility>
@@ -341,6 +342,16 @@ bool Bvh::touches(const glm::vec3& box_min, const glm::vec3& box_max, std::span<
                   std::uint32_t ignored_tag) const {
   return anyTriangle(box_min, box_max, [&](std::uint32_t i) {
     return tags[order_[i]] != ignored_tag && touchesBox(triangles_[i], box_min, box_max);
+  });
+}
+
+void Bvh::collectNear(const glm::vec3& box_min, const glm::vec3& box_max, std::vector<std::uint32_t>& triangles) const {
+  (void)anyTriangle(box_min, box_max, [&](std::uint32_t i) {
+    const auto& [a, b, c] = triangles_[i];
+    const auto low = glm::min(glm::min(a, b), c), high = glm::max(glm::max(a, b), c);
+    if (glm::all(glm::lessThanEqual(low, box_max)) && glm::all(glm::lessThanEqual(box_min, high)))
+      triangles.push_back(order_[i]);
+    return false;
   });
 }
 

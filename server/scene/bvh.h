@@ -17,6 +17,7 @@ struct RayHit {
   double t;                ///< in units of the direction's length
   std::uint32_t triangle;  ///< index into the list the tree was built from
   bool front;              ///< the ray meets the counter-clockwise side
+  std::uint16_t tree = 0;  ///< of several that were asked
 };
 
 class Bvh {
@@ -68,6 +69,9 @@ class Bvh {
   /// The same, of triangles alone that lie wholly above the lower face of the box along its third axis.
   [[nodiscard]] bool hoversIn(const OrientedBox& box, std::span<const std::uint32_t> tags,
                               std::uint32_t ignored_tag) const;
+
+  /// Numbers of the triangles whose bounds reach into the box.
+  void collectNear(const glm::vec3& box_min, const glm::vec3& box_max, std::vector<std::uint32_t>& triangles) const;
 
   [[nodiscard]] bool empty() const { return triangles_.empty(); }
   [[nodiscard]] std::size_t size() const { return triangles_.size(); }

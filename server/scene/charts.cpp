@@ -72,6 +72,7 @@ class Builder {
       surface.see_through = isSeeThrough(material);
       hides.push_back(surface.see_through ? Hides::kNothing : material.double_sided ? Hides::kSheet : Hides::kSolid);
     }
+    patches_.solids = findClosedSolids(patches_);
     std::optional<FormerBurial> former;
     if (former_ != nullptr && record_ != nullptr) {
       former.emplace(former_->patches, *record_, patches_,

@@ -16,40 +16,51 @@ LeafBurial::LeafBurial(const PatchScene& patches, const std::vector<LeafPiece>& 
   for (std::size_t i = 1; i < first_piece_.size(); ++i) first_piece_[i] += first_piece_[i - 1];
 }
 
-Solids::Answer LeafBurial::ask(std::uint32_t triangle, const glm::dvec2& texel, std::uint32_t side, Hits& hits,
-                               RayNotes* notes) const {
+Solids::Answer LeafBurial::ask(std::uint32_t triangle, const glm::dvec2& texel, std::uint32_t side, Hits& hits) const {
   const auto position = positionAt(patches_.triangles[triangle], texel);
-  const auto normal = facing(triangle, side);
   if (coincidence_.covers(triangle, side, position)) return {true, true};
-  return solids_.ask(position, normal, hits, notes);
+  return solids_.ask(position, facing(triangle, side), hits);
 }
 
-/// All of the leaf is visible, as one look from all of it at once shows: most are, beside the few that a solid covers.
-bool LeafBurial::isOpen(const Contact& contact, const Pieces& pieces, RayNotes& notes) const {
-  const auto triangle = patches_.leaves[leafOf(contact)].triangle;
-  const auto normal = facing(triangle, contact.side);
+/// The same of a place on the leaf that is measured.
+bool LeafBurial::isBuried(std::uint32_t triangle, const glm::dvec2& texel, std::uint32_t side, Scratch& scratch) const {
+  const auto position = positionAt(patches_.triangles[triangle], texel);
+  if (coincidence_.covers(triangle, side, position)) return true;
+  return solids_.ask(position, facing(triangle, side), scratch.around, scratch.hits, &scratch.notes).buried;
+}
+
+/// Around all of a leaf, wherever it is covered.
+Bounds LeafBurial::boxOf(const Contact& contact, const Pieces& pieces) const {
   const glm::dvec2 corner(contact.x, contact.y);
   Bounds box;
   const auto add = [&](std::uint32_t of) {
     for (const auto& at : {corner, corner + glm::dvec2(1, 0), corner + glm::dvec2(0, 1), corner + 1.0})
       box.add(positionAt(patches_.triangles[of], at));
-    return facing(of, contact.side) == normal;
   };
-  if (!add(triangle)) return false;
+  add(patches_.leaves[leafOf(contact)].triangle);
+  for (auto piece = pieces.first; piece < pieces.end; ++piece) add(pieces_[piece].triangle);
+  return box;
+}
+
+/// All of the leaf is visible, as one look from all of it at once shows: most are, beside the few that a solid covers.
+bool LeafBurial::isOpen(const Contact& contact, const Pieces& pieces, const Bounds& box, Scratch& scratch) const {
+  const auto normal = facing(patches_.leaves[leafOf(contact)].triangle, contact.side);
   for (auto piece = pieces.first; piece < pieces.end; ++piece) {
-    if (!add(pieces_[piece].triangle)) return false;
+    if (facing(pieces_[piece].triangle, contact.side) != normal) return false;
   }
   if (coincidence_.mayCover(contact.surface, contact.side, box)) return false;
-  if (solids_.mayBury(box, normal)) return false;
+  if (solids_.mayBury(box, normal, scratch.around)) return false;
   for (const auto& end : {box.min, box.max})
-    notes.add({glm::dvec3(end) + kBurialLift * glm::dvec3(normal), normal, kNone, 0, kBurialRayLength});
+    scratch.notes.add({glm::dvec3(end) + kBurialLift * glm::dvec3(normal), normal, kNone, 0, kBurialRayLength});
   return true;
 }
 
 std::optional<BuriedPart> LeafBurial::measure(const Contact& contact, std::uint32_t count, const BurialPlaces& all,
                                               Scratch& scratch) const {
   const auto pieces = piecesOf(leafOf(contact));
-  if (isOpen(contact, pieces, scratch.notes)) return std::nullopt;
+  const auto box = boxOf(contact, pieces);
+  solids_.findAround(box, scratch.around);
+  if (isOpen(contact, pieces, box, scratch)) return std::nullopt;
   askPlaces(contact, pieces, count, scratch);
   auto outcome = sumParts(contact, pieces, scratch);
   if (count < all.many && outcome.isMixed()) {
@@ -145,7 +156,7 @@ LeafBurial::Place LeafBurial::placeOn(const Contact& contact, const Pieces& piec
 }
 
 void LeafBurial::answer(const Contact& contact, Place& place, Scratch& scratch) const {
-  const bool buried = ask(place.triangle, place.texel, contact.side, scratch.hits, &scratch.notes).buried;
+  const bool buried = isBuried(place.triangle, place.texel, contact.side, scratch);
   place.answer = buried ? Answer::kBuried : Answer::kVisible;
 }
 
@@ -163,8 +174,7 @@ LeafBurial::Outcome LeafBurial::sumParts(const Contact& contact, const Pieces& p
     auto& p = scratch.parts[part];
     if (p.samples == 0) {
       p.samples = 1;
-      p.buried =
-          ask(point.triangle, glm::dvec2(point.texel), contact.side, scratch.hits, &scratch.notes).buried ? 1 : 0;
+      p.buried = isBuried(point.triangle, glm::dvec2(point.texel), contact.side, scratch) ? 1 : 0;
     }
     const double area =
         pieces.first == pieces.end ? patches_.node_area[nodeOf(contact)] : pieces_[pieces.first + part].area;

@@ -44,6 +44,7 @@ class LeafBurial {
     std::vector<Place> places, asked_before;
     std::vector<Part> parts;
     std::vector<std::uint8_t> beside;  ///< places whose neighbours have not been looked at
+    SolidParts::Around around;         ///< the leaf
   };
 
   /// All are to outlive it. `pieces`: sorted by leaf.
@@ -64,9 +65,9 @@ class LeafBurial {
   };
   [[nodiscard]] Pieces piecesOf(std::uint32_t leaf) const { return {first_piece_[leaf], first_piece_[leaf + 1]}; }
 
-  /// Whether a place is inside a solid, or under a face that lies on it. `notes`: as of Solids.
-  [[nodiscard]] Solids::Answer ask(std::uint32_t triangle, const glm::dvec2& texel, std::uint32_t side, Hits& hits,
-                                   RayNotes* notes = nullptr) const;
+  /// Whether a place is inside a solid, or under a face that lies on it.
+  [[nodiscard]] Solids::Answer ask(std::uint32_t triangle, const glm::dvec2& texel, std::uint32_t side,
+                                   Hits& hits) const;
 
   /// Visible area of a leaf, as `count` places of it tell, and BurialPlaces::many where these do not agree; none where
   /// all of it is visible.
@@ -85,7 +86,10 @@ class LeafBurial {
     const glm::vec3& n = patches_.triangles[triangle].normal;
     return side == 0 ? n : -n;
   }
-  [[nodiscard]] bool isOpen(const Contact& contact, const Pieces& pieces, RayNotes& notes) const;
+  [[nodiscard]] bool isBuried(std::uint32_t triangle, const glm::dvec2& texel, std::uint32_t side,
+                              Scratch& scratch) const;
+  [[nodiscard]] Bounds boxOf(const Contact& contact, const Pieces& pieces) const;
+  [[nodiscard]] bool isOpen(const Contact& contact, const Pieces& pieces, const Bounds& box, Scratch& scratch) const;
   void askPlaces(const Contact& contact, const Pieces& pieces, std::uint32_t count, Scratch& scratch) const;
   void askFiner(const Contact& contact, const Pieces& pieces, Scratch& scratch) const;
   [[nodiscard]] static bool mayBeStrip(const Scratch& scratch);

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "common/result.h"
+#include "server/scene/closed_solids.h"
 #include "server/scene/leaf_spots.h"
 #include "server/scene/scene.h"
 #include "server/scene/side_colours.h"
@@ -86,6 +87,7 @@ struct PatchScene {
   std::vector<std::uint32_t> triangle_surface;
   std::vector<std::uint32_t> triangle_source;  ///< by triangle: which one of its instance's primitive it was
   std::vector<Surface> surfaces;
+  ClosedSolids solids;  ///< findClosedSolids(); empty: none is known
   std::vector<LeafPoint> leaves;
   /// Of each leaf that is neither empty nor full: spread evenly over the covered and unburied part. Full ones in narrow
   /// gaps, or right beside what hovers before them, have kFullSpots.

@@ -18,18 +18,23 @@ constexpr std::uint64_t kNodeWork = 4;
 /// By which a ray may seem to miss a triangle that it meets (unit box): twice what rounding makes of it.
 constexpr float kEdge = 1e-6F;
 
+/// Trees that are followed side by side.
+constexpr std::size_t kTreesAtOnce = 64;
+
 /// Hits so near to each other are one, on an edge.
 constexpr double kSameHit = 1e-9;
 
+}  // namespace
+
 /// Walks along the hits of a ray in order: +1 for every solid entered (front), -1 for every one left (back); below
 /// zero, the origin was inside.
-class SolidWalk {
+class SolidTree::Walk {
  public:
-  explicit SolidWalk(std::vector<RayHit>& hits) : hits_(hits) { hits_.clear(); }
+  explicit Walk(std::vector<RayHit>& hits) : hits_(hits) { hits_.clear(); }
 
   /// They come nearly in order.
   void add(const RayHit& hit) {
-    const auto key = [](const RayHit& of) { return std::tuple(of.t, of.front, of.triangle); };
+    const auto key = [](const RayHit& of) { return std::tuple(of.t, of.front, of.tree, of.triangle); };
     const bool in_order = hits_.empty() || key(hits_.back()) < key(hit);
     hits_.insert(in_order ? hits_.end() : std::ranges::upper_bound(hits_, key(hit), {}, key), hit);
   }
@@ -38,9 +43,9 @@ class SolidWalk {
   [[nodiscard]] std::optional<double> leaveBefore(double end) {
     for (; next_ < hits_.size() && hits_[next_].t < end; ++next_) {
       const RayHit& hit = hits_[next_];
-      if (last_front_ == hit.front && hit.t - last_ < kSameHit) continue;  // the edge between two triangles
-      last_ = hit.t;
-      last_front_ = hit.front;
+      // The edge between two triangles; two solids may begin in one plane.
+      if (last_.front == hit.front && last_.tree == hit.tree && hit.t - last_.t < kSameHit) continue;
+      last_ = hit;
       depth_ += hit.front ? 1 : -1;
       if (depth_ < 0) return hit.t;
     }
@@ -51,11 +56,13 @@ class SolidWalk {
   std::vector<RayHit>& hits_;
   std::size_t next_ = 0;
   int depth_ = 0;
-  double last_ = -1.0;
-  bool last_front_ = false;
+  RayHit last_{-1.0, 0, false};
 };
 
-}  // namespace
+struct SolidTree::Ray {
+  glm::dvec3 origin, direction;
+  double t_max;
+};
 
 SolidTree::SolidTree(const Bvh& tree)
     : tree_(&tree), nodes_(tree, [&](std::uint32_t first, std::uint32_t count) { return addBlock(first, count); }) {}
@@ -95,49 +102,75 @@ __attribute__((always_inline)) inline std::uint32_t SolidTree::mayMeet(const Blo
   return mask;
 }
 
-/// Nearer children first; what waits bounds from below what is still to come.
-RADIOSITY_CLONES std::optional<double> SolidTree::endOfSolid(const glm::dvec3& origin, const glm::dvec3& direction,
-                                                             double t_max, std::vector<RayHit>& hits,
-                                                             std::uint64_t& work) const {
+std::optional<double> SolidTree::endOfSolid(const glm::dvec3& origin, const glm::dvec3& direction, double t_max,
+                                            std::vector<RayHit>& hits, std::uint64_t& work) const {
+  const auto* self = this;
+  return endOfSolid({&self, 1}, origin, direction, t_max, hits, work);
+}
+
+std::optional<double> SolidTree::endOfSolid(std::span<const SolidTree* const> trees, const glm::dvec3& origin,
+                                            const glm::dvec3& direction, double t_max, std::vector<RayHit>& hits,
+                                            std::uint64_t& work) {
+  Walk walk(hits);
+  const Ray ray{origin, direction, t_max};
+  if (trees.size() <= kTreesAtOnce) return follow(trees, 0, ray, true, walk, work);
+  for (std::size_t first = 0; first < trees.size(); first += kTreesAtOnce) {
+    const auto some = trees.subspan(first, std::min(trees.size() - first, kTreesAtOnce));
+    (void)follow(some, static_cast<std::uint16_t>(first), ray, false, walk, work);
+  }
+  return walk.leaveBefore(std::numeric_limits<double>::infinity());
+}
+
+/// Nearer children first; what waits bounds from below what is still to come. `all`: no other trees follow, and where
+/// the ray leaves the solid is the end. `first`: number of the first.
+RADIOSITY_CLONES std::optional<double> SolidTree::follow(std::span<const SolidTree* const> trees, std::uint16_t first,
+                                                         const Ray& from, bool all, Walk& walk, std::uint64_t& work) {
   constexpr float kNever = std::numeric_limits<float>::infinity();
-  SolidWalk walk(hits);
-  if (nodes_.empty()) return std::nullopt;
-  const WideNodes::Ray ray{glm::vec3(origin), glm::vec3(direction)};
-  const auto reach = static_cast<float>(t_max) * (1.0F + 1e-6F);
+  const WideNodes::Ray ray{glm::vec3(from.origin), glm::vec3(from.direction)};
+  const auto reach = static_cast<float>(from.t_max) * (1.0F + 1e-6F);
   struct Task {
+    const SolidTree* tree;
+    std::uint16_t number;  ///< of the tree
     std::uint32_t child;
     float entry, soonest;  ///< of it, and of all that wait below it as well
   };
-  Task stack[WideNodes::kStackDepth];
-  std::size_t depth = 1;
-  stack[0] = {0, 0.0F, 0.0F};
+  Task stack[WideNodes::kStackDepth + kTreesAtOnce];
+  std::size_t depth = 0;
+  for (const auto* tree : trees) {
+    if (!tree->nodes_.empty()) stack[depth++] = {tree, first++, 0, 0.0F, 0.0F};
+  }
   alignas(32) float entry[kWidth];
   while (depth > 0) {
-    const auto child = stack[--depth].child;
+    const auto* tree = stack[--depth].tree;
+    const auto number = stack[depth].number;
+    const auto child = stack[depth].child;
     work += kNodeWork;
     if ((child & WideNodes::kLeaf) == 0) {
-      const auto& node = nodes_[child];
+      const auto& node = tree->nodes_[child];
       const std::size_t base = depth;
       for (std::uint32_t mask = WideNodes::meet(node, ray, reach, entry); mask != 0; mask &= mask - 1) {
         const auto k = static_cast<std::size_t>(std::countr_zero(mask));
         std::size_t at = depth++;
         for (; at > base && stack[at - 1].entry < entry[k]; --at) stack[at] = stack[at - 1];
-        stack[at] = {node.child[k], entry[k], 0.0F};
+        stack[at] = {tree, number, node.child[k], entry[k], 0.0F};
       }
       for (auto at = base; at < depth; ++at)
         stack[at].soonest = std::min(stack[at].entry, at == 0 ? kNever : stack[at - 1].soonest);
       continue;
     }
-    const Block& block = blocks_[child & ~WideNodes::kLeaf];
+    const Block& block = tree->blocks_[child & ~WideNodes::kLeaf];
     for (std::uint32_t mask = mayMeet(block, ray); mask != 0; mask &= mask - 1) {
       const auto i = block.first + static_cast<std::uint32_t>(std::countr_zero(mask));
-      RayHit hit{0.0, tree_->order_[i], false};
-      if (meetsTriangle(tree_->triangles_[i], origin, direction, hit) && hit.t > 0.0 && hit.t < t_max) walk.add(hit);
+      const Bvh& of = *tree->tree_;
+      RayHit hit{0.0, of.order_[i], false, number};
+      if (meetsTriangle(of.triangles_[i], from.origin, from.direction, hit) && hit.t > 0.0 && hit.t < from.t_max)
+        walk.add(hit);
     }
+    if (!all) continue;
     const float soonest = depth == 0 ? kNever : stack[depth - 1].soonest;
     if (const auto end = walk.leaveBefore(static_cast<double>(soonest))) return end;
   }
-  return walk.leaveBefore(static_cast<double>(kNever));
+  return all ? walk.leaveBefore(static_cast<double>(kNever)) : std::nullopt;
 }
 
 }  // namespace radiosity::scene

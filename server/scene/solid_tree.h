@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "server/scene/wide_nodes.h"
@@ -24,6 +25,12 @@ class SolidTree {
   /// the unit box, or about. `work`: grows by what that took, in units of 6 ns or so.
   [[nodiscard]] std::optional<double> endOfSolid(const glm::dvec3& origin, const glm::dvec3& direction, double t_max,
                                                  std::vector<RayHit>& hits, std::uint64_t& work) const;
+  /// The same of all triangles of several trees, of which each numbers its own in `hits`.
+  [[nodiscard]] static std::optional<double> endOfSolid(std::span<const SolidTree* const> trees,
+                                                        const glm::dvec3& origin, const glm::dvec3& direction,
+                                                        double t_max, std::vector<RayHit>& hits, std::uint64_t& work);
+
+  [[nodiscard]] const Bvh& triangles() const { return *tree_; }
 
  private:
   static constexpr std::uint32_t kWidth = WideNodes::kWidth;
@@ -32,6 +39,10 @@ class SolidTree {
     std::uint32_t first;  ///< of the Bvh's triangles
   };
   [[nodiscard]] std::uint32_t addBlock(std::uint32_t first, std::uint32_t count);
+  class Walk;
+  struct Ray;
+  static std::optional<double> follow(std::span<const SolidTree* const> trees, std::uint16_t first, const Ray& from,
+                                      bool all, Walk& walk, std::uint64_t& work);
   [[nodiscard]] static std::uint32_t mayMeet(const Block& block, const WideNodes::Ray& ray);
 
   const Bvh* tree_ = nullptr;

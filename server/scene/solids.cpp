@@ -57,10 +57,30 @@ std::vector<std::uint32_t> trianglesOn(const PatchScene& patches, const Surface&
   return on;
 }
 
+/// As SolidParts takes it. A closed solid some of whose faces are sheets, or hide nothing, is open there.
+std::vector<std::uint32_t> partOf(const PatchScene& patches, const std::vector<Hides>& hides) {
+  const auto& solids = patches.solids;
+  std::vector<bool> is_open(solids.bounds.size(), false);
+  for (std::size_t t = 0; t < solids.solid_of.size(); ++t) {
+    const auto solid = solids.solid_of[t];
+    if (solid != kNone && hides[patches.triangle_surface[t]] != Hides::kSolid) is_open[solid] = true;
+  }
+  std::vector<std::uint32_t> part_of(patches.triangles.size(), kNone);
+  const auto closed = static_cast<std::uint32_t>(solids.bounds.size());
+  for (std::size_t t = 0; t < solids.solid_of.size(); ++t) {
+    const auto solid = solids.solid_of[t], hollow = solids.hollow_of[t];
+    if (solid != kNone) part_of[t] = 2 * solid + (is_open[solid] ? SolidParts::kHollow : SolidParts::kClosed);
+    if (hollow != kNone) part_of[t] = 2 * (closed + hollow) + SolidParts::kHollow;
+  }
+  return part_of;
+}
+
 }  // namespace
 
 Solids::Solids(const PatchScene& patches, const std::vector<Hides>& hides) {
   std::vector<Bvh::Triangle> triangles, sheets;
+  std::vector<std::uint32_t> part;
+  const auto part_of = partOf(patches, hides);
   for (std::uint32_t t = 0; t < patches.triangles.size(); ++t) {
     const auto hiding = hides[patches.triangle_surface[t]];
     if (hiding == Hides::kNothing) continue;
@@ -69,10 +89,12 @@ Solids::Solids(const PatchScene& patches, const std::vector<Hides>& hides) {
       triangle[c] = patches.vertices[patches.indices[std::size_t{3} * t + c]].position;
     (hiding == Hides::kSolid ? triangles : sheets).push_back(triangle);
     (hiding == Hides::kSolid ? normal_ : sheet_normal_).push_back(patches.triangles[t].normal);
-    if (hiding == Hides::kSolid) surface_.push_back(patches.triangle_surface[t]);
+    if (hiding != Hides::kSolid) continue;
+    surface_.push_back(patches.triangle_surface[t]);
+    part.push_back(part_of[t]);
   }
+  parts_ = SolidParts(triangles, part);
   tree_ = Bvh(std::move(triangles));
-  ends_ = SolidTree(tree_);
   sheets_ = Bvh(std::move(sheets));
 }
 
@@ -81,19 +103,36 @@ bool Solids::near(const Bounds& box, std::uint32_t surface) const {
   return tree_.touches(box.min - margin, box.max + margin, surface_, surface);
 }
 
-Solids::Answer Solids::ask(const glm::vec3& position, const glm::vec3& normal, Hits& hits, RayNotes* notes) const {
-  const glm::dvec3 origin = glm::dvec3(position) + kBurialLift * glm::dvec3(normal);
-  auto answer = vote({origin, normal, kNone}, hits, notes);
-  answer.buried = answer.buried && !seesOutAlong({origin, normal, kNone}, hits, notes);
+Solids::Answer Solids::ask(const glm::vec3& position, const glm::vec3& normal, const SolidParts::Around& around,
+                           Hits& hits, RayNotes* notes) const {
+  const Start start{glm::dvec3(position) + kBurialLift * glm::dvec3(normal), normal, kNone, &around};
+  auto answer = vote(start, hits, notes);
+  answer.buried = answer.buried && !seesOutAlong(start, hits, notes);
   return answer;
 }
 
-bool Solids::mayBury(const Bounds& positions, const glm::vec3& normal) const {
-  const glm::vec3 lift = static_cast<float>(kBurialLift) * normal;
-  return tree_.mayMeetBack(positions.min + lift, positions.max + lift, BurialWays(normal).of(0), kBurialRayLength);
+Solids::Answer Solids::ask(const glm::vec3& position, const glm::vec3& normal, Hits& hits) const {
+  findAround({position, position}, hits.around);
+  return ask(position, normal, hits.around, hits);
 }
 
-/// A first ray that meets no back decides, and so do some that agree. Otherwise the majority of all.
+/// Rays start a little before them.
+void Solids::findAround(const Bounds& positions, SolidParts::Around& around) const {
+  const glm::vec3 lift(static_cast<float>(kBurialLift));
+  parts_.find({positions.min - lift, positions.max + lift}, around);
+}
+
+bool Solids::mayBury(const Bounds& positions, const glm::vec3& normal, const SolidParts::Around& around) const {
+  const glm::vec3 lift = static_cast<float>(kBurialLift) * normal;
+  const auto direction = BurialWays(normal).of(0);
+  return around.in_hollow || std::ranges::any_of(around.trees, [&](const SolidTree* part) {
+           return part->triangles().mayMeetBack(positions.min + lift, positions.max + lift, direction,
+                                                kBurialRayLength);
+         });
+}
+
+/// A first ray that meets no back decides, unless it may have left a hollow by its open end, and so do some that agree.
+/// Otherwise the majority of all.
 Solids::Answer Solids::vote(const Start& start, Hits& hits, RayNotes* notes) const {
   const BurialWays ways(start.normal);
   std::uint32_t leave = 0, stay = 0;
@@ -105,7 +144,7 @@ Solids::Answer Solids::vote(const Start& start, Hits& hits, RayNotes* notes) con
       ++leave;
     } else {
       ++stay;
-      if (way == 0 && std::ranges::all_of(hits, &RayHit::front)) return {};
+      if (way == 0 && !start.around->in_hollow && std::ranges::all_of(hits, &RayHit::front)) return {};
     }
     if (leave == 0 && stay == kAgreeOutside) return {false, agreed};
     if (stay == 0 && leave == kAgreeInside) return {true, true};
@@ -121,29 +160,35 @@ bool Solids::seesOutAlong(const Start& start, Hits& hits, RayNotes* notes) const
   for (auto way = kFirstWayAlong; way < kBurialWays; ++way) {
     const auto direction = ways.of(way);
     if (follow(start, way, direction, hits, notes) == Ray::kLeaves) continue;
-    const auto there = firstMet(start, direction, hits);
-    if (!there || !vote(*there, hits, notes).buried) return true;
+    auto there = firstMet(start, direction);
+    if (!there) return true;
+    const glm::vec3 origin(there->origin);
+    findAround({origin, origin}, hits.beyond);
+    there->around = &hits.beyond;
+    if (!vote(*there, hits, notes).buried) return true;
   }
   return false;
 }
 
-/// Before the nearest of `hits`, or the sheet that it meets earlier.
-std::optional<Solids::Start> Solids::firstMet(const Start& start, const glm::dvec3& direction, const Hits& hits) const {
-  const double reach = hits.empty() ? kBurialRayLength : hits.front().t;
+/// Before the nearest face, or the sheet that it meets earlier. A way around there is not known yet.
+std::optional<Solids::Start> Solids::firstMet(const Start& start, const glm::dvec3& direction) const {
+  const auto face = tree_.nearestHit(start.origin, direction, 0.0, kBurialRayLength);
+  const double reach = face ? face->t : kBurialRayLength;
   const auto sheet = sheets_.empty() ? std::nullopt : sheets_.nearestHit(start.origin, direction, 0.0, reach);
-  if (!sheet && hits.empty()) return std::nullopt;
-  const double t = sheet ? sheet->t : hits.front().t;
-  glm::vec3 facing = sheet ? sheet_normal_[sheet->triangle] : normal_[hits.front().triangle];
+  if (!sheet && !face) return std::nullopt;
+  const double t = sheet ? sheet->t : face->t;
+  glm::vec3 facing = sheet ? sheet_normal_[sheet->triangle] : normal_[face->triangle];
   if (sheet && !sheet->front) facing = -facing;
-  const auto triangle = sheet ? static_cast<std::uint32_t>(normal_.size()) + sheet->triangle : hits.front().triangle;
-  return Start{start.origin + t * direction + kBurialLift * glm::dvec3(facing), facing, triangle};
+  const auto triangle = sheet ? static_cast<std::uint32_t>(normal_.size()) + sheet->triangle : face->triangle;
+  return Start{start.origin + t * direction + kBurialLift * glm::dvec3(facing), facing, triangle, nullptr};
 }
 
 /// Where a ray from the place ends, if the place lies in a solid: before a sheet, or where it leaves the solid.
-/// Otherwise leaves what it met in `hits`, in order, which no other part of the scene changes.
+/// Otherwise leaves what it met in `hits`, in order: of the parts that the place may lie in, and no others.
 Solids::Ray Solids::follow(const Start& start, std::uint32_t way, const glm::dvec3& direction, Hits& hits,
                            RayNotes* notes) const {
-  const auto end = ends_.endOfSolid(start.origin, direction, kBurialRayLength, hits, hits.work);
+  const auto end =
+      SolidTree::endOfSolid(start.around->trees, start.origin, direction, kBurialRayLength, hits, hits.work);
   if (notes != nullptr) notes->add({start.origin, start.normal, start.triangle, way, end.value_or(kBurialRayLength)});
   if (!end) return Ray::kStays;
   return !sheets_.empty() && sheets_.meets(start.origin, direction, 0.0, *end) ? Ray::kEndsOnSheet : Ray::kLeaves;

@@ -15,7 +15,7 @@
 #include "server/scene/burial_record.h"
 #include "server/scene/bvh.h"
 #include "server/scene/patch_scene.h"
-#include "server/scene/solid_tree.h"
+#include "server/scene/solid_parts.h"
 
 namespace radiosity::scene {
 
@@ -26,6 +26,7 @@ namespace radiosity::scene {
 /// Of one thread's rays. `work`: what they took, all together, in units of some 6 ns.
 struct Hits : std::vector<RayHit> {
   std::uint64_t work = 0;
+  SolidParts::Around around, beyond;  ///< room for where a place lies, and what a ray from there meets
 };
 
 /// The triangles that bound solids, and the question whether a point lies inside one. Sheets that are seen from both
@@ -51,12 +52,16 @@ class Solids {
   struct Answer {
     bool buried = false, agreed = true;
   };
-  /// `notes`: where they are not null, of the rays that decided.
-  [[nodiscard]] Answer ask(const glm::vec3& position, const glm::vec3& normal, Hits& hits,
-                           RayNotes* notes = nullptr) const;
+  /// `notes`: where they are not null, of the rays that decided. `around`: of a box that holds the position.
+  [[nodiscard]] Answer ask(const glm::vec3& position, const glm::vec3& normal, const SolidParts::Around& around,
+                           Hits& hits, RayNotes* notes = nullptr) const;
+  [[nodiscard]] Answer ask(const glm::vec3& position, const glm::vec3& normal, Hits& hits) const;
+
+  /// What positions in the box may lie in.
+  void findAround(const Bounds& positions, SolidParts::Around& around) const;
 
   /// False: it buries no position in the box, of this normal. True: it may. Costs as much as one that is not buried.
-  [[nodiscard]] bool mayBury(const Bounds& positions, const glm::vec3& normal) const;
+  [[nodiscard]] bool mayBury(const Bounds& positions, const glm::vec3& normal, const SolidParts::Around& around) const;
 
  private:
   /// Of rays: a place and what faces it.
@@ -64,16 +69,17 @@ class Solids {
     glm::dvec3 origin;
     glm::vec3 normal;
     std::uint32_t triangle;  ///< of the tree, and after those of the sheets; kNone: the place that is asked for
+    const SolidParts::Around* around;
   };
   [[nodiscard]] Answer vote(const Start& start, Hits& hits, RayNotes* notes) const;
   [[nodiscard]] bool seesOutAlong(const Start& start, Hits& hits, RayNotes* notes) const;
   enum class Ray { kStays, kLeaves, kEndsOnSheet };
   [[nodiscard]] Ray follow(const Start& start, std::uint32_t way, const glm::dvec3& direction, Hits& hits,
                            RayNotes* notes) const;
-  [[nodiscard]] std::optional<Start> firstMet(const Start& start, const glm::dvec3& direction, const Hits& hits) const;
+  [[nodiscard]] std::optional<Start> firstMet(const Start& start, const glm::dvec3& direction) const;
 
   Bvh tree_;
-  SolidTree ends_;                      ///< of the same
+  SolidParts parts_;                    ///< of the same
   std::vector<std::uint32_t> surface_;  ///< by triangle of the tree
   std::vector<glm::vec3> normal_;       ///< likewise
   Bvh sheets_;

@@ -9,7 +9,7 @@
 #include <glm/geometric.hpp>
 #include <set>
 
-#include "server/gpu/closed_solids.h"
+#include "server/scene/closed_solids.h"
 #include "tests/gl/scene_builder.h"
 
 namespace radiosity::test {
@@ -36,7 +36,7 @@ TEST(ParallelCuller, LeavesOutOnlyBacksOfSolidsAndWhatShowsNoSample) {
   const auto scene = randomRoom(1206, 1206, 4);
   gpu::ParallelCuller culler(*scene);
   ASSERT_EQ(culler.triangleCount(), scene->triangles.size());
-  const auto solids = gpu::findClosedSolids(*scene);
+  const auto solids = scene::findClosedSolids(*scene);
   std::size_t left_out = 0, between = 0;
   for (int view = 0; view < 6; ++view) {
     const auto angle = static_cast<float>(view);

@@ -79,6 +79,7 @@ std::uint32_t SceneBuilder::addBox(glm::vec3 low, glm::vec3 high, std::uint32_t 
 std::shared_ptr<const scene::PatchScene> SceneBuilder::build() const {
   auto scene = std::make_shared<scene::PatchScene>(scene_);
   scene->pages = {{64, 64}};
+  scene->solids = scene::findClosedSolids(*scene);
   return scene;
 }
 

@@ -9,8 +9,8 @@
 #include <glm/geometric.hpp>
 #include <set>
 
-#include "server/gpu/closed_solids.h"
 #include "server/gpu/hemicube_renderer.h"
+#include "server/scene/closed_solids.h"
 #include "tests/gl/scene_builder.h"
 
 namespace radiosity::test {
@@ -24,21 +24,21 @@ TEST(ClosedSolids, AClosedBoxIsOneAndARoomOrALidlessBoxIsNot) {
   builder.addBox(glm::vec3(-0.1F), glm::vec3(0.1F), 2, false);
   builder.addBox(glm::vec3(0.2F), glm::vec3(0.3F), 2, false);
   auto scene = *builder.build();
-  const auto solids = gpu::findClosedSolids(scene);
+  const auto solids = scene::findClosedSolids(scene);
   ASSERT_EQ(solids.bounds.size(), 2U);
   EXPECT_EQ(solids.bounds[0].high, glm::vec3(0.1F));
   for (std::size_t i = 0; i < 36; ++i) {
     EXPECT_EQ(solids.solid_of[i], i < 12 ? kNone : static_cast<std::uint32_t>(i / 12 - 1));
   }
   scene.indices.resize(scene.indices.size() - 3);  // a hole in the last box
-  EXPECT_EQ(gpu::findClosedSolids(scene).bounds.size(), 1U);
+  EXPECT_EQ(scene::findClosedSolids(scene).bounds.size(), 1U);
 }
 
 TEST(ClosedSolids, BoxesThatShareAnEdgeAreNotTakenApart) {
   SceneBuilder builder;
   builder.addBox(glm::vec3(0.0F), glm::vec3(0.25F), 1, false);
   builder.addBox(glm::vec3(0.25F, 0.25F, 0.0F), glm::vec3(0.5F, 0.5F, 0.25F), 1, false);
-  EXPECT_TRUE(gpu::findClosedSolids(*builder.build()).bounds.empty());
+  EXPECT_TRUE(scene::findClosedSolids(*builder.build()).bounds.empty());
 }
 
 /// Triangles a point sees through each face, brute force: some of many points of the triangle projects into the face.

@@ -14,9 +14,9 @@
 namespace radiosity::scene {
 namespace {
 
-constexpr std::uint32_t kBox = 0, kLidless = 1, kRoom = 2;
+constexpr std::uint32_t kBox = 0, kLidless = 1, kRoom = 2, kLid = 4;
 
-/// The unit cube about the origin, facing out, or without its lid, or facing in.
+/// The unit cube about the origin, facing out, or without its lid, or only that, or facing in.
 Primitive cube(std::uint32_t kind) {
   Primitive primitive;
   primitive.mesh = kind;
@@ -24,7 +24,8 @@ Primitive cube(std::uint32_t kind) {
   primitive.material = 0;
   for (int axis = 0; axis < 3; ++axis) {
     for (const float side : {-0.5F, 0.5F}) {
-      if (kind == kLidless && axis == 1 && side > 0.0F) continue;
+      const bool is_lid = axis == 1 && side > 0.0F;
+      if ((kind == kLidless && is_lid) || (kind == kLid && !is_lid)) continue;
       const auto first = static_cast<std::uint32_t>(primitive.positions.size());
       const int u = (axis + 1) % 3, v = (axis + 2) % 3;
       for (const auto& [a, b] : {std::pair(-0.5F, -0.5F), {0.5F, -0.5F}, {0.5F, 0.5F}, {-0.5F, 0.5F}}) {
@@ -46,7 +47,7 @@ class BurialRecords : public testing::Test {
   BurialRecords() {
     scene_.materials.resize(2);
     scene_.materials[1].double_sided = true;
-    scene_.primitives = {cube(kBox), cube(kLidless), cube(kRoom), cube(kBox)};
+    scene_.primitives = {cube(kBox), cube(kLidless), cube(kRoom), cube(kBox), cube(kLid)};
     scene_.primitives[3].mesh = 3;
     scene_.primitives[3].material = 1;
     scene_.instances.push_back({.node = 0, .primitive = kRoom, .world = glm::scale(glm::dmat4(1.0), glm::dvec3(4.0))});
@@ -130,6 +131,30 @@ TEST_F(BurialRecords, RandomEditsGiveTheBitsOfLookingAtAllLeavesAgain) {
     built = std::move(next);
   }
   EXPECT_GT(buried, 2000U);
+}
+
+/// A lid that is taken off, and put back: what was a closed solid is open then, and its walls count for other places.
+TEST_F(BurialRecords, ALidThatComesAndGoesGivesTheBitsOfLookingAtAllLeavesAgain) {
+  constexpr std::size_t kLids = 5;
+  for (std::size_t i = 1; i < 12; ++i) scene_.instances[i].primitive = i % 2 == 0 ? kLidless : kBox;
+  for (std::uint32_t k = 0; k < kLids; ++k)
+    scene_.instances.push_back({.node = 50 + k, .primitive = kLid, .world = scene_.instances[2 * (k + 1)].world});
+  auto before = scene_;
+  auto built = buildWithRecord(scene_, options_).value();
+  const auto closed = built.patches.solids.bounds.size();
+  EXPECT_EQ(closed, 11U);
+  for (std::size_t k = 0; k < kLids; ++k) {
+    auto& lid = scene_.instances[12 + k];
+    const auto home = lid.world;
+    for (const bool is_off : {true, false}) {
+      lid.world = is_off ? glm::translate(home, glm::dvec3(0.1, 0.3, 0.0)) : home;
+      auto next = build(before, built);
+      EXPECT_EQ(next.patches.solids.bounds.size(), is_off ? closed - 1 : closed);
+      ASSERT_NO_FATAL_FAILURE(expectSame(next.patches, build(before, built, false).patches)) << k << is_off;
+      before = scene_;
+      built = std::move(next);
+    }
+  }
 }
 
 /// What is remembered is what counts: other numbers in the record come out again, of those that were buried far away.

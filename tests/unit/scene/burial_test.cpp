@@ -72,6 +72,35 @@ TEST(Burial, WhatIsBuriedAtItsEndsIsVisibleBetween) {
   }
 }
 
+/// The outside of a box without its bottom and top.
+Primitive sleeve(glm::dvec3 low, glm::dvec3 high) {
+  auto p = box(low, high);
+  p.indices.erase(p.indices.begin(), p.indices.begin() + 12);
+  return p;
+}
+
+TEST(Burial, ALegWithoutEndsHidesTheFloorAndTheSeatThatItStandsBetween) {
+  // Through its ends one sees the floor from the seat, and the seat from the floor.
+  Scene scene;
+  place(scene, floorQuad(4.0, -2.0, -2.0));
+  place(scene, sleeve({-0.3, 0, -0.3}, {0.3, 0.8, 0.3}));
+  place(scene, box({-1, 0.8, -1}, {1, 1.0, 1}));
+  const PatchScene patches = build(scene, 20'000);
+  EXPECT_NEAR(areaOf(patches, 0, 0), 16.0 - 0.36, 0.01) << "floor";
+  EXPECT_NEAR(areaOf(patches, 0, 2), 8.0 + 8 * 0.2 - 0.36, 0.01) << "seat";
+  EXPECT_NEAR(areaOf(patches, 0, 1), 4 * 0.6 * 0.8, 0.01) << "leg";
+}
+
+TEST(Burial, TwoSolidsThatBeginInOnePlaneHideNothingBeforeThem) {
+  // A ray that enters both at once leaves them one after the other.
+  Scene scene;
+  place(scene, floorQuad(4.0, -2.0, -2.0));
+  place(scene, box({-1, 1, -1}, {1, 2, 1}));
+  place(scene, box({-0.7, 1, -0.7}, {0.7, 3, 0.7}));
+  const PatchScene patches = build(scene, 4'000);
+  EXPECT_NEAR(areaOf(patches, 0, 0), 16.0, 1e-3);
+}
+
 TEST(Burial, ABackThatLiesOnASolidTakesNothingFromTheFront) {
   Scene scene;
   place(scene, floorQuad(4.0), glm::dmat4(1.0), bothSides());

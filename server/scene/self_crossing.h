@@ -5,7 +5,7 @@
 #include <glm/vec3.hpp>
 #include <span>
 
-namespace radiosity::gpu {
+namespace radiosity::scene {
 
 using Corners = std::array<glm::vec3, 3>;
 
@@ -13,4 +13,4 @@ using Corners = std::array<glm::vec3, 3>;
 /// touch elsewhere, or too many lie near each other to be told within a time that grows as their number does.
 [[nodiscard]] bool keepsClearOfItself(std::span<const Corners> triangles);
 
-}  // namespace radiosity::gpu
+}  // namespace radiosity::scene

@@ -1,5 +1,5 @@
 // Of a closed surface that crosses itself some backs can be seen: it bounds no solid.
-#include "server/gpu/closed_solids.h"
+#include "server/scene/closed_solids.h"
 
 #include <gtest/gtest.h>
 
@@ -7,13 +7,14 @@
 #include <glm/vec2.hpp>
 #include <numbers>
 
-#include "server/gpu/self_crossing.h"
+#include "server/scene/patch_scene.h"
+#include "server/scene/self_crossing.h"
 
 namespace radiosity::test {
 namespace {
 
-using gpu::Corners;
-using gpu::keepsClearOfItself;
+using scene::Corners;
+using scene::keepsClearOfItself;
 
 scene::PatchScene sceneOf(const std::vector<Corners>& triangles) {
   scene::PatchScene scene;
@@ -61,7 +62,7 @@ std::vector<Corners> sphere(std::size_t rows) {
 }
 
 std::size_t solidsOf(const std::vector<Corners>& triangles) {
-  return gpu::findClosedSolids(sceneOf(triangles)).bounds.size();
+  return scene::findClosedSolids(sceneOf(triangles)).bounds.size();
 }
 
 /// Its larger half is turned outwards, so that it encloses a positive volume; of the other the backs are outside.
@@ -77,11 +78,37 @@ TEST(ClosedSolids, OthersInTheSceneStay) {
   const auto crossing = triangles.size();
   const auto other = prism({{0.2F, -0.1F}, {0.3F, -0.1F}, {0.3F, 0.1F}});
   triangles.insert(triangles.end(), other.begin(), other.end());
-  const auto solids = gpu::findClosedSolids(sceneOf(triangles));
+  const auto solids = scene::findClosedSolids(sceneOf(triangles));
   ASSERT_EQ(solids.bounds.size(), 1U);
   EXPECT_EQ(solids.bounds[0].low, glm::vec3(0.2F, -0.1F, 0.0F));
   for (std::size_t i = 0; i < triangles.size(); ++i)
     EXPECT_EQ(solids.solid_of[i], i < crossing ? scene::kNone : 0U) << "triangle " << i;
+}
+
+/// Without its ends; `turned`: facing in.
+std::vector<Corners> sleeve(float x, bool turned) {
+  auto triangles = prism({{x, -0.1F}, {x + 0.1F, -0.1F}, {x + 0.1F, 0.1F}, {x, 0.1F}});
+  std::erase_if(triangles, [](const Corners& t) { return t[0].z == t[1].z && t[1].z == t[2].z; });
+  for (auto& triangle : triangles) {
+    if (turned) std::swap(triangle[1], triangle[2]);
+  }
+  return triangles;
+}
+
+TEST(ClosedSolids, WhatIsOpenAtItsEndsIsHollowAndARoomOrAPanelIsNot) {
+  auto triangles = sleeve(-0.4F, false);
+  const auto in_sleeve = triangles.size();
+  for (const auto& others : {sleeve(-0.2F, true),
+                             {{{{0, 0, 0}, {0.1F, 0.1F, 0}, {0, 0.1F, 0.1F}}}},
+                             prism({{0.2F, -0.1F}, {0.3F, -0.1F}, {0.3F, 0.1F}})})
+    triangles.insert(triangles.end(), others.begin(), others.end());
+  const auto solids = scene::findClosedSolids(sceneOf(triangles));
+  EXPECT_EQ(solids.bounds.size(), 1U);
+  ASSERT_EQ(solids.hollows.size(), 1U);
+  EXPECT_EQ(solids.hollows[0].low, glm::vec3(-0.4F, -0.1F, 0.0F));
+  EXPECT_EQ(solids.hollows[0].high, glm::vec3(-0.3F, 0.1F, 0.1F));
+  for (std::size_t i = 0; i < triangles.size(); ++i)
+    EXPECT_EQ(solids.hollow_of[i], i < in_sleeve ? 0U : scene::kNone) << "triangle " << i;
 }
 
 TEST(SelfCrossing, HollowAndFlatPartsAndFineOnesAreNone) {

@@ -1,4 +1,4 @@
-#include "server/gpu/self_crossing.h"
+#include "server/scene/self_crossing.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -7,7 +7,7 @@
 #include <iterator>
 #include <vector>
 
-namespace radiosity::gpu {
+namespace radiosity::scene {
 namespace {
 
 /// Gaps are wider than rounding in double, as a part of coordinates within a unit box.
@@ -173,4 +173,4 @@ bool keepsClearOfItself(std::span<const Corners> triangles) {
   return Search(triangles).areClear(boxes);
 }
 
-}  // namespace radiosity::gpu
+}  // namespace radiosity::scene

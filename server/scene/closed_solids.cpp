@@ -1,4 +1,4 @@
-#include "server/gpu/closed_solids.h"
+#include "server/scene/closed_solids.h"
 
 #include <algorithm>
 #include <array>
@@ -6,11 +6,13 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <numeric>
+#include <span>
 #include <unordered_map>
 
-#include "server/gpu/self_crossing.h"
+#include "server/scene/patch_scene.h"
+#include "server/scene/self_crossing.h"
 
-namespace radiosity::gpu {
+namespace radiosity::scene {
 namespace {
 
 struct PositionHash {
@@ -22,7 +24,7 @@ struct PositionHash {
 };
 
 /// The same number for corners at the same place.
-std::vector<std::uint32_t> weld(const scene::PatchScene& patches) {
+std::vector<std::uint32_t> weld(const PatchScene& patches) {
   std::unordered_map<std::array<std::uint32_t, 3>, std::uint32_t, PositionHash> known;
   std::vector<std::uint32_t> place(patches.vertices.size());
   for (std::size_t i = 0; i < place.size(); ++i) {
@@ -47,7 +49,7 @@ class UnionFind {
   std::vector<std::uint32_t> parent_;
 };
 
-Corners cornersOf(const scene::PatchScene& patches, std::uint32_t triangle) {
+Corners cornersOf(const PatchScene& patches, std::uint32_t triangle) {
   const auto corner = [&](std::size_t c) {
     return patches.vertices[patches.indices[std::size_t{3} * triangle + c]].position;
   };
@@ -60,7 +62,7 @@ struct Edge {
   bool forward;  ///< from the smaller to the larger
 };
 
-std::vector<Edge> sortedEdges(const scene::PatchScene& patches) {
+std::vector<Edge> sortedEdges(const PatchScene& patches) {
   const auto place = weld(patches);
   std::vector<Edge> edges;
   edges.reserve(patches.indices.size());
@@ -75,73 +77,92 @@ std::vector<Edge> sortedEdges(const scene::PatchScene& patches) {
   return edges;
 }
 
-/// By triangle: one of those it is connected with, the same for all of them; kNone where they have an open edge, can be
-/// seen through, or enclose no positive volume.
-std::vector<std::uint32_t> closedParts(const scene::PatchScene& patches) {
+/// Of triangles connected with each other, by one of them.
+struct Part {
+  ClosedSolids::Bounds bounds{glm::vec3(1e30F), glm::vec3(-1e30F)};
+  bool open = false;    ///< an edge is, or one can see through it
+  double volume = 0.0;  ///< six times that, about the middle of its bounds
+};
+
+struct Parts {
+  std::vector<std::uint32_t> of;  ///< by triangle
+  std::vector<Part> all;          ///< by triangle: used where it is its own
+};
+
+Parts connectedParts(const PatchScene& patches) {
   const auto triangles = patches.indices.size() / 3;
-  UnionFind parts(triangles);
+  UnionFind joined(triangles);
+  Parts parts{std::vector<std::uint32_t>(triangles), std::vector<Part>(triangles)};
   std::vector<bool> open(triangles, false);
   const auto edges = sortedEdges(patches);
   for (std::size_t first = 0, last = 0; first < edges.size(); first = last) {
     while (last < edges.size() && edges[last].key == edges[first].key) ++last;
     const bool closed = last - first == 2 && edges[first].forward != edges[first + 1].forward;
     for (auto i = first; i < last; ++i) {
-      parts.join(edges[i].triangle, edges[first].triangle);
+      joined.join(edges[i].triangle, edges[first].triangle);
       if (!closed) open[edges[i].triangle] = true;
     }
   }
-  std::vector<bool> part_open(triangles, false);
-  std::vector<double> volume(triangles, 0.0);
   for (std::uint32_t i = 0; i < triangles; ++i) {
-    const auto part = parts.find(i);
-    const bool see_through = patches.surfaces[patches.triangle_surface[i]].see_through;
-    if (open[i] || see_through) part_open[part] = true;
+    auto& part = parts.all[parts.of[i] = joined.find(i)];
+    part.open = part.open || open[i] || patches.surfaces[patches.triangle_surface[i]].see_through;
+    for (const auto& corner : cornersOf(patches, i)) {
+      part.bounds.low = glm::min(part.bounds.low, corner);
+      part.bounds.high = glm::max(part.bounds.high, corner);
+    }
+  }
+  for (std::uint32_t i = 0; i < triangles; ++i) {
+    auto& part = parts.all[parts.of[i]];
+    const auto middle = 0.5 * (glm::dvec3(part.bounds.low) + glm::dvec3(part.bounds.high));
     const auto [a, b, c] = cornersOf(patches, i);
-    volume[part] += glm::dot(glm::dvec3(a), glm::cross(glm::dvec3(b), glm::dvec3(c)));
+    part.volume += glm::dot(glm::dvec3(a) - middle, glm::cross(glm::dvec3(b) - middle, glm::dvec3(c) - middle));
   }
-  std::vector<std::uint32_t> part_of(triangles, scene::kNone);
-  for (std::uint32_t i = 0; i < triangles; ++i) {
-    const auto part = parts.find(i);
-    if (!part_open[part] && volume[part] > 0.0) part_of[i] = part;
-  }
-  return part_of;
+  return parts;
+}
+
+/// Of its bounds: more than rounding makes of what is flat.
+bool holdsSomething(const Part& part) {
+  constexpr double kLeast = 1e-3;
+  const glm::dvec3 size(part.bounds.high - part.bounds.low);
+  return part.volume > kLeast * size.x * size.y * size.z;
 }
 
 }  // namespace
 
 /// A connected surface that keeps clear of itself has two sides, and where the volume is positive its backs are within:
 /// no two volumes of it overlap, and none is turned inside out.
-ClosedSolids findClosedSolids(const scene::PatchScene& patches) {
-  const auto part_of = closedParts(patches);
+ClosedSolids findClosedSolids(const PatchScene& patches) {
+  const auto parts = connectedParts(patches);
   std::vector<std::uint32_t> order;  // part after part, in the order of their first triangles
-  std::vector<std::uint32_t> first_of(part_of.size(), scene::kNone);
-  for (std::uint32_t i = 0; i < part_of.size(); ++i) {
-    if (part_of[i] == scene::kNone) continue;
-    if (first_of[part_of[i]] == scene::kNone) first_of[part_of[i]] = i;
+  std::vector<std::uint32_t> first_of(parts.of.size(), kNone);
+  for (std::uint32_t i = 0; i < parts.of.size(); ++i) {
+    if (first_of[parts.of[i]] == kNone) first_of[parts.of[i]] = i;
     order.push_back(i);
   }
-  const auto first = [&](std::uint32_t triangle) { return first_of[part_of[triangle]]; };
+  const auto first = [&](std::uint32_t triangle) { return first_of[parts.of[triangle]]; };
   std::ranges::stable_sort(order, {}, first);
 
   ClosedSolids solids;
-  solids.solid_of.assign(part_of.size(), scene::kNone);
+  solids.solid_of.assign(parts.of.size(), kNone);
+  solids.hollow_of = solids.solid_of;
+  const auto add = [&](std::span<const std::uint32_t> part, const ClosedSolids::Bounds& box,
+                       std::vector<std::uint32_t>& number, std::vector<ClosedSolids::Bounds>& bounds) {
+    for (const auto i : part) number[i] = static_cast<std::uint32_t>(bounds.size());
+    bounds.push_back(box);
+  };
   std::vector<Corners> triangles;
   for (auto begin = order.begin(), end = begin; begin != order.end(); begin = end) {
+    const auto& part = parts.all[parts.of[*begin]];
     end = std::find_if(begin, order.end(), [&](std::uint32_t i) { return first(i) != first(*begin); });
     triangles.clear();
-    for (auto i = begin; i != end; ++i) triangles.push_back(cornersOf(patches, *i));
-    if (!keepsClearOfItself(triangles)) continue;
-    ClosedSolids::Bounds bounds{glm::vec3(1e30F), glm::vec3(-1e30F)};
-    for (const auto& corners : triangles) {
-      for (const auto& position : corners) {
-        bounds.low = glm::min(bounds.low, position);
-        bounds.high = glm::max(bounds.high, position);
-      }
+    for (auto i = begin; i != end && !part.open && part.volume > 0.0; ++i) triangles.push_back(cornersOf(patches, *i));
+    if (!triangles.empty() && keepsClearOfItself(triangles)) {
+      add({begin, end}, part.bounds, solids.solid_of, solids.bounds);
+    } else if (holdsSomething(part)) {
+      add({begin, end}, part.bounds, solids.hollow_of, solids.hollows);
     }
-    for (auto i = begin; i != end; ++i) solids.solid_of[*i] = static_cast<std::uint32_t>(solids.bounds.size());
-    solids.bounds.push_back(bounds);
   }
   return solids;
 }
 
-}  // namespace radiosity::gpu
+}  // namespace radiosity::scene

@@ -1,0 +1,61 @@
+#include "server/scene/solid_parts.h"
+
+#include <utility>
+
+namespace radiosity::scene {
+namespace {
+
+/// Boxes are larger by this (unit box): well above what rounding moves positions.
+constexpr float kMargin = 1e-5F;
+/// Each takes a kilobyte or two; further closed solids go with what is open.
+constexpr std::size_t kMostParts = 65'536;
+
+}  // namespace
+
+SolidParts::SolidParts(std::span<const Bvh::Triangle> triangles, std::span<const std::uint32_t> part_of) {
+  std::vector<std::vector<Bvh::Triangle>> parts;
+  std::vector<Bvh::Triangle> others;
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    const auto part = part_of[i];
+    if (part >= kMostParts) {
+      others.push_back(triangles[i]);
+      continue;
+    }
+    if (part >= parts.size()) parts.resize(part + std::size_t{1});
+    parts[part].push_back(triangles[i]);
+  }
+  add(std::move(others), false);
+  std::vector<Bvh::Triangle> boxes;
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    if (parts[p].empty()) continue;
+    Bounds box;
+    for (const auto& triangle : parts[p])
+      for (const auto& corner : triangle) box.add(corner);
+    boxes.push_back({box.min - kMargin, box.max + kMargin, box.max + kMargin});
+    add(std::move(parts[p]), p % 2 == kHollow);
+  }
+  boxes_ = Bvh(std::move(boxes));
+}
+
+void SolidParts::add(std::vector<Bvh::Triangle> triangles, bool is_hollow) {
+  auto& part = parts_.emplace_back(std::make_unique<Part>());
+  part->tree = Bvh(std::move(triangles));
+  part->ends = SolidTree(part->tree);
+  part->is_hollow = is_hollow;
+}
+
+void SolidParts::find(const Bounds& places, Around& around) const {
+  around.trees.clear();
+  around.in_hollow = false;
+  if (parts_.empty()) return;
+  if (!parts_.front()->tree.empty()) around.trees.push_back(&parts_.front()->ends);
+  std::vector<std::uint32_t> near;
+  boxes_.collectNear(places.min, places.max, near);
+  for (const auto k : near) {
+    const Part& part = *parts_[std::size_t{k} + 1];
+    around.trees.push_back(&part.ends);
+    around.in_hollow = around.in_hollow || part.is_hollow;
+  }
+}
+
+}  // namespace radiosity::scene

@@ -1,0 +1,47 @@
+// The triangles that bound solids, parted so that a ray is held only against those of them that the place where it
+// starts may lie in: what it enters of a closed solid (closed_solids.h) that it starts outside of it leaves again, and
+// what is open at an end holds no place outside of its bounds. In a furnished room that leaves a few triangles of
+// thousands. Immutable once built, so any number of threads may ask.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "server/scene/bounds.h"
+#include "server/scene/bvh.h"
+#include "server/scene/solid_tree.h"
+
+namespace radiosity::scene {
+
+class SolidParts {
+ public:
+  /// What places in a box may lie in.
+  struct Around {
+    std::vector<const SolidTree*> trees;
+    bool in_hollow = false;  ///< something that is open: not all rays from within tell of it
+  };
+
+  SolidParts() = default;
+  static constexpr std::uint32_t kClosed = 0, kHollow = 1;
+  /// `part_of`: by triangle, twice the number of the part that it belongs to, and whether that is closed or hollow;
+  /// kNone: of none, so that it counts for all places. O(n log n).
+  SolidParts(std::span<const Bvh::Triangle> triangles, std::span<const std::uint32_t> part_of);
+
+  /// Takes the place of what is in `around`. O(log n + parts found).
+  void find(const Bounds& places, Around& around) const;
+
+ private:
+  struct Part {
+    Bvh tree;
+    SolidTree ends;  ///< of the same
+    bool is_hollow;
+  };
+  void add(std::vector<Bvh::Triangle> triangles, bool is_hollow);
+
+  std::vector<std::unique_ptr<Part>> parts_;  ///< that of what counts for all places first, which may be empty
+  Bvh boxes_;                                 ///< of the others, in their order: triangles that have these bounds
+};
+
+}  // namespace radiosity::scene

@@ -1,0 +1,119 @@
+// Rays that are held against a part of a scene's solids: they tell of a place what they tell when held against all.
+#include "server/scene/solid_parts.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "server/scene/patch_scene.h"
+
+namespace radiosity::scene {
+namespace {
+
+/// Twelve triangles, facing out.
+std::vector<Bvh::Triangle> block(const glm::vec3& low, const glm::vec3& high) {
+  std::vector<Bvh::Triangle> triangles;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const bool far : {false, true}) {
+      const auto corner = [&](bool u, bool v) {
+        glm::vec3 at(0.0F);
+        at[axis] = far ? high[axis] : low[axis];
+        at[(axis + 1) % 3] = u ? high[(axis + 1) % 3] : low[(axis + 1) % 3];
+        at[(axis + 2) % 3] = v ? high[(axis + 2) % 3] : low[(axis + 2) % 3];
+        return at;
+      };
+      const auto a = corner(false, false), b = corner(true, false), c = corner(true, true), d = corner(false, true);
+      if (far) {
+        triangles.insert(triangles.end(), {{a, b, c}, {a, c, d}});
+      } else {
+        triangles.insert(triangles.end(), {{c, b, a}, {d, c, a}});
+      }
+    }
+  }
+  return triangles;
+}
+
+class Parts : public testing::Test {
+ protected:
+  /// Blocks that overlap, here and there.
+  void addBlocks(std::uint32_t count) {
+    for (std::uint32_t k = 0; k < count; ++k) {
+      const glm::vec3 low(uniform(-0.5F, 0.4F), uniform(-0.5F, 0.4F), uniform(-0.5F, 0.4F));
+      add(block(low, low + glm::vec3(uniform(0.02F, 0.2F), uniform(0.02F, 0.2F), uniform(0.02F, 0.2F))), 2 * k);
+    }
+  }
+  void add(const std::vector<Bvh::Triangle>& triangles, std::uint32_t part) {
+    triangles_.insert(triangles_.end(), triangles.begin(), triangles.end());
+    part_of_.insert(part_of_.end(), triangles.size(), part);
+  }
+  float uniform(float low, float high) { return std::uniform_real_distribution<float>(low, high)(random_); }
+  glm::vec3 anywhere() { return {uniform(-0.6F, 0.6F), uniform(-0.6F, 0.6F), uniform(-0.6F, 0.6F)}; }
+
+  std::vector<Bvh::Triangle> triangles_;
+  std::vector<std::uint32_t> part_of_;
+  std::mt19937 random_{3};
+};
+
+TEST_F(Parts, OfClosedBlocksTellWhetherAPlaceLiesInOne) {
+  addBlocks(300);
+  const SolidParts parts(triangles_, part_of_);
+  const Bvh tree(triangles_);
+  const SolidTree all(tree);
+  SolidParts::Around around;
+  std::vector<RayHit> hits;
+  std::uint64_t work = 0, work_of_all = 0;
+  std::size_t inside = 0, blocks = 0;
+  for (int i = 0; i < 3000; ++i) {
+    const auto place = anywhere();
+    parts.find({place, place}, around);
+    const glm::dvec3 direction(anywhere());
+    const bool ends = SolidTree::endOfSolid(around.trees, place, direction, 8.0, hits, work).has_value();
+    EXPECT_EQ(ends, all.endOfSolid(place, direction, 8.0, hits, work_of_all).has_value());
+    EXPECT_FALSE(around.in_hollow);
+    inside += ends ? 1 : 0;
+    blocks += around.trees.size();
+  }
+  EXPECT_GT(inside, 100U);
+  EXPECT_LT(blocks, 3000U) << "most places lie in none";
+  EXPECT_LT(10 * work, work_of_all);
+}
+
+TEST_F(Parts, AreThoseWhoseBoundsHoldAPartOfABox) {
+  add(block({0, 0, 0}, {0.1F, 0.1F, 0.1F}), 4);
+  add(block({0.05F, 0, 0}, {0.2F, 0.1F, 0.1F}), 2 * 3 + SolidParts::kHollow);
+  add({{glm::vec3(-0.5F), glm::vec3(0.5F), glm::vec3(0.5F, -0.5F, 0.5F)}}, kNone);
+  const SolidParts parts(triangles_, part_of_);
+  SolidParts::Around around;
+  const auto found = [&](float x0, float x1) {
+    parts.find({{x0, 0.05F, 0.05F}, {x1, 0.06F, 0.06F}}, around);
+    return std::pair(around.trees.size(), around.in_hollow);
+  };
+  EXPECT_EQ(found(-0.2F, -0.1F), std::pair(std::size_t{1}, false)) << "what belongs to none counts everywhere";
+  EXPECT_EQ(found(-0.2F, 0.01F), std::pair(std::size_t{2}, false));
+  EXPECT_EQ(found(0.01F, 0.06F), std::pair(std::size_t{3}, true));
+  EXPECT_EQ(found(0.15F, 0.16F), std::pair(std::size_t{2}, true));
+}
+
+/// As many as go side by side, and more.
+TEST_F(Parts, HoweverManyHoldAPlaceAllCount) {
+  for (const std::uint32_t count : {3U, 64U, 200U}) {
+    triangles_.clear();
+    part_of_.clear();
+    for (std::uint32_t k = 0; k < count; ++k) {
+      const glm::vec3 half(0.1F + 0.3F * static_cast<float>((7 * k) % count) / static_cast<float>(count));
+      add(block(-half, half), 2 * k);
+    }
+    const SolidParts parts(triangles_, part_of_);
+    SolidParts::Around around;
+    parts.find({glm::vec3(0.0F), glm::vec3(0.0F)}, around);
+    ASSERT_EQ(around.trees.size(), count);
+    std::vector<RayHit> hits;
+    std::uint64_t work = 0;
+    const auto end = SolidTree::endOfSolid(around.trees, glm::dvec3(0.0), {0.03, 1.0, 0.02}, 8.0, hits, work);
+    ASSERT_TRUE(end);
+    EXPECT_NEAR(*end, 0.1, 1e-6) << "the smallest, of " << count;
+  }
+}
+
+}  // namespace
+}  // namespace radiosity::scene
