@@ -17,6 +17,8 @@ namespace {
 constexpr double kGrazing = 2e-4;
 /// Boxes are larger by this (unit box) than what is in them: well above what rounding moves rays and positions.
 constexpr float kMargin = 1e-5F;
+/// And by this where it is places in them that count: rays start a little before these.
+constexpr auto kAround = static_cast<float>(4.0 * kBurialLift);
 /// Rays that pass the boxes around all that changed are held against so many surfaces of it one by one.
 constexpr std::size_t kMostParts = 128;
 constexpr std::uint32_t kHemisphere = kFirstWayAlong - 1, kAlong = kBurialWays - kFirstWayAlong;
@@ -67,26 +69,26 @@ bool sweeps(const glm::dvec3& from, const glm::dvec3& half, const glm::dvec3& wa
   return near <= far;
 }
 
-/// Marks the other surfaces of closed solids, and of what is hollow, that have a surface among those marked; returns
-/// which of the latter.
-std::vector<bool> markParts(const PatchScene& patches, std::vector<bool>& marked) {
+/// Those of which some surface is marked. `part_of`: by triangle, one of `count`, or kNone.
+std::vector<bool> partsWithMarked(const PatchScene& patches, std::span<const std::uint32_t> part_of, std::size_t count,
+                                  const std::vector<bool>& marked) {
+  std::vector<bool> parts(count, false);
+  for (std::size_t t = 0; t < part_of.size(); ++t) {
+    if (part_of[t] != kNone && marked[patches.triangle_surface[t]]) parts[part_of[t]] = true;
+  }
+  return parts;
+}
+
+/// Marks the other surfaces of closed solids, and of what is hollow, that have one among those marked.
+void markParts(const PatchScene& patches, std::vector<bool>& marked) {
   const auto& solids = patches.solids;
-  std::vector<bool> solid(solids.bounds.size(), false), hollow(solids.hollows.size(), false);
-  const auto forEachFace = [&](const auto& take) {
-    for (std::size_t t = 0; t < solids.solid_of.size(); ++t) {
-      const auto surface = patches.triangle_surface[t];
-      if (solids.solid_of[t] != kNone) take(solid, solids.solid_of[t], surface);
-      if (solids.hollow_of[t] != kNone) take(hollow, solids.hollow_of[t], surface);
-    }
-  };
-  const auto before = marked;
-  forEachFace([&](auto& parts, std::uint32_t part, std::uint32_t surface) {
-    if (before[surface]) parts[part] = true;
-  });
-  forEachFace([&](auto& parts, std::uint32_t part, std::uint32_t surface) {
-    if (parts[part]) marked[surface] = true;
-  });
-  return hollow;
+  const auto solid = partsWithMarked(patches, solids.solid_of, solids.bounds.size(), marked);
+  const auto hollow = partsWithMarked(patches, solids.hollow_of, solids.hollows.size(), marked);
+  for (std::size_t t = 0; t < solids.solid_of.size(); ++t) {
+    const bool is_of_solid = solids.solid_of[t] != kNone && solid[solids.solid_of[t]];
+    const bool is_of_hollow = solids.hollow_of[t] != kNone && hollow[solids.hollow_of[t]];
+    if (is_of_solid || is_of_hollow) marked[patches.triangle_surface[t]] = true;
+  }
 }
 
 /// Whether leaves are looked at in as many places.
@@ -180,19 +182,24 @@ void FormerBurial::findChanged(const std::vector<Hides>& hides) {
     is_new[s] = former == kNone || record_.hides[former] != hides[s];
     if (!is_new[s]) gone[former] = false;
   }
-  const auto take = [&](const PatchScene& patches, std::vector<bool>& changed) {
-    const auto hollow = markParts(patches, changed);
-    for (std::size_t i = 0; i < hollow.size(); ++i) {
-      const auto& [low, high] = patches.solids.hollows[i];
-      if (hollow[i]) boxes_.push_back({low - kMargin, high + kMargin});
-    }
-  };
-  take(before_, gone);
-  take(after_, is_new);
+  markParts(before_, gone);
+  markParts(after_, is_new);
   for (std::uint32_t s = 0; s < is_new.size(); ++s) {
     auto& former = surface_before_[s];
-    if (former != kNone && (is_new[s] || gone[former])) former = kNone;
+    if (former == kNone || !(is_new[s] || gone[former])) continue;
+    is_new[s] = gone[former] = true;
+    former = kNone;
   }
+  const auto addHollows = [&](const PatchScene& patches, const std::vector<bool>& changed) {
+    const auto& solids = patches.solids;
+    const auto hollow = partsWithMarked(patches, solids.hollow_of, solids.hollows.size(), changed);
+    for (std::size_t i = 0; i < hollow.size(); ++i) {
+      const auto& [low, high] = solids.hollows[i];
+      if (hollow[i]) boxes_.push_back({low - kAround, high + kAround});
+    }
+  };
+  addHollows(before_, gone);
+  addHollows(after_, is_new);
 }
 
 const BurialRecord::Leaf* FormerBurial::find(std::uint32_t surface, std::uint32_t leaf, std::uint32_t side,

@@ -42,6 +42,12 @@ Bounds LeafBurial::boxOf(const Contact& contact, const Pieces& pieces) const {
   return box;
 }
 
+/// What it lies in decides how many rays are asked, however short they are.
+void LeafBurial::noteBox(const Contact& contact, const Bounds& box, RayNotes& notes) const {
+  const auto normal = facing(patches_.leaves[leafOf(contact)].triangle, contact.side);
+  for (const auto& end : {box.min, box.max}) notes.add({end, normal, kNone, 0, 0.0});
+}
+
 /// All of the leaf is visible, as one look from all of it at once shows: most are, beside the few that a solid covers.
 bool LeafBurial::isOpen(const Contact& contact, const Pieces& pieces, const Bounds& box, Scratch& scratch) const {
   const auto normal = facing(patches_.leaves[leafOf(contact)].triangle, contact.side);
@@ -60,6 +66,7 @@ std::optional<BuriedPart> LeafBurial::measure(const Contact& contact, std::uint3
   const auto pieces = piecesOf(leafOf(contact));
   const auto box = boxOf(contact, pieces);
   solids_.findAround(box, scratch.around);
+  noteBox(contact, box, scratch.notes);
   if (isOpen(contact, pieces, box, scratch)) return std::nullopt;
   askPlaces(contact, pieces, count, scratch);
   auto outcome = sumParts(contact, pieces, scratch);

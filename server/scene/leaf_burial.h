@@ -89,6 +89,7 @@ class LeafBurial {
   [[nodiscard]] bool isBuried(std::uint32_t triangle, const glm::dvec2& texel, std::uint32_t side,
                               Scratch& scratch) const;
   [[nodiscard]] Bounds boxOf(const Contact& contact, const Pieces& pieces) const;
+  void noteBox(const Contact& contact, const Bounds& box, RayNotes& notes) const;
   [[nodiscard]] bool isOpen(const Contact& contact, const Pieces& pieces, const Bounds& box, Scratch& scratch) const;
   void askPlaces(const Contact& contact, const Pieces& pieces, std::uint32_t count, Scratch& scratch) const;
   void askFiner(const Contact& contact, const Pieces& pieces, Scratch& scratch) const;

@@ -107,6 +107,16 @@ class BurialRecords : public testing::Test {
     }
   }
 
+  /// The rays that decided, too.
+  static void expectSame(const BurialRecord& a, const BurialRecord& b) {
+    ASSERT_EQ(a.leaves.size(), b.leaves.size());
+    for (std::size_t i = 0; i < a.leaves.size(); ++i) {
+      const auto &one = a.leaves[i], &other = b.leaves[i];
+      ASSERT_TRUE(one.leaf == other.leaf && one.side == other.side && one.pass == other.pass);
+      ASSERT_TRUE(std::ranges::equal(one.fans, other.fans, {}, &RayFan::ways, &RayFan::ways)) << "leaf " << one.leaf;
+    }
+  }
+
   Scene scene_;
   ChartOptions options_{.texel_budget = 6000};
   std::mt19937 random_{7};
@@ -150,7 +160,9 @@ TEST_F(BurialRecords, ALidThatComesAndGoesGivesTheBitsOfLookingAtAllLeavesAgain)
       lid.world = is_off ? glm::translate(home, glm::dvec3(0.1, 0.3, 0.0)) : home;
       auto next = build(before, built);
       EXPECT_EQ(next.patches.solids.bounds.size(), is_off ? closed - 1 : closed);
-      ASSERT_NO_FATAL_FAILURE(expectSame(next.patches, build(before, built, false).patches)) << k << is_off;
+      const auto anew = build(before, built, false);
+      ASSERT_NO_FATAL_FAILURE(expectSame(next.patches, anew.patches)) << k << is_off;
+      ASSERT_NO_FATAL_FAILURE(expectSame(*next.burial, *anew.burial)) << k << is_off;
       before = scene_;
       built = std::move(next);
     }

@@ -94,6 +94,20 @@ TEST_F(Parts, AreThoseWhoseBoundsHoldAPartOfABox) {
   EXPECT_EQ(found(0.15F, 0.16F), std::pair(std::size_t{2}, true));
 }
 
+/// A ray that enters both at once leaves them one after the other.
+TEST_F(Parts, ThatBeginInOnePlaneAreEnteredEach) {
+  add(block({0, 0, 0}, {0.1F, 0.1F, 0.1F}), 0);
+  add(block({0, 0, 0}, {0.2F, 0.1F, 0.1F}), 2);
+  const SolidParts parts(triangles_, part_of_);
+  SolidParts::Around around;
+  parts.find({glm::vec3(-0.1F), glm::vec3(0.1F)}, around);
+  ASSERT_EQ(around.trees.size(), 2U);
+  std::vector<RayHit> hits;
+  std::uint64_t work = 0;
+  EXPECT_FALSE(SolidTree::endOfSolid(around.trees, {-0.1, 0.04, 0.06}, {1.0, 0.0, 0.0}, 8.0, hits, work));
+  EXPECT_EQ(hits.size(), 4U);
+}
+
 /// As many as go side by side, and more.
 TEST_F(Parts, HoweverManyHoldAPlaceAllCount) {
   for (const std::uint32_t count : {3U, 64U, 200U}) {
