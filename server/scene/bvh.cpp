@@ -345,6 +345,27 @@ bool Bvh::touches(const glm::vec3& box_min, const glm::vec3& box_max, std::span<
   });
 }
 
+bool Bvh::risesAbove(const glm::vec3& normal, float height) const {
+  if (triangles_.empty()) return false;
+  std::array<std::uint32_t, kStackDepth> stack;
+  std::size_t depth = 0;
+  stack[depth++] = 0;
+  while (depth > 0) {
+    const Node& node = nodes_[stack[--depth]];
+    if (glm::dot(normal, glm::mix(node.min, node.max, glm::greaterThan(normal, glm::vec3(0.0F)))) <= height) continue;
+    if (node.count == 0) {
+      stack[depth++] = node.first;
+      stack[depth++] = node.first + 1;
+      continue;
+    }
+    for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
+      for (const auto& corner : triangles_[i])
+        if (glm::dot(normal, corner) > height) return true;
+    }
+  }
+  return false;
+}
+
 void Bvh::collectNear(const glm::vec3& box_min, const glm::vec3& box_max, std::vector<std::uint32_t>& triangles) const {
   (void)anyTriangle(box_min, box_max, [&](std::uint32_t i) {
     const auto& [a, b, c] = triangles_[i];

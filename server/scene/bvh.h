@@ -70,6 +70,9 @@ class Bvh {
   [[nodiscard]] bool hoversIn(const OrientedBox& box, std::span<const std::uint32_t> tags,
                               std::uint32_t ignored_tag) const;
 
+  /// Whether a corner lies above the plane dot(normal, p) = height.
+  [[nodiscard]] bool risesAbove(const glm::vec3& normal, float height) const;
+
   /// Numbers of the triangles whose bounds reach into the box.
   void collectNear(const glm::vec3& box_min, const glm::vec3& box_max, std::vector<std::uint32_t>& triangles) const;
 

@@ -29,32 +29,27 @@ bool LeafBurial::isBuried(std::uint32_t triangle, const glm::dvec2& texel, std::
   return solids_.ask(position, facing(triangle, side), scratch.around, scratch.hits, &scratch.notes).buried;
 }
 
-/// Around all of a leaf, wherever it is covered.
-Bounds LeafBurial::boxOf(const Contact& contact, const Pieces& pieces) const {
+LeafBurial::Extent LeafBurial::extentOf(const Contact& contact, const Pieces& pieces) const {
   const glm::dvec2 corner(contact.x, contact.y);
-  Bounds box;
+  const auto triangle = patches_.leaves[leafOf(contact)].triangle;
+  Extent extent{{}, facing(triangle, contact.side), true, std::numeric_limits<float>::infinity()};
   const auto add = [&](std::uint32_t of) {
-    for (const auto& at : {corner, corner + glm::dvec2(1, 0), corner + glm::dvec2(0, 1), corner + 1.0})
-      box.add(positionAt(patches_.triangles[of], at));
+    for (const auto& at : {corner, corner + glm::dvec2(1, 0), corner + glm::dvec2(0, 1), corner + 1.0}) {
+      const auto position = positionAt(patches_.triangles[of], at);
+      extent.box.add(position);
+      extent.height = std::min(extent.height, glm::dot(extent.normal, position));
+    }
+    extent.is_flat = extent.is_flat && facing(of, contact.side) == extent.normal;
   };
-  add(patches_.leaves[leafOf(contact)].triangle);
+  add(triangle);
   for (auto piece = pieces.first; piece < pieces.end; ++piece) add(pieces_[piece].triangle);
-  return box;
-}
-
-/// What it lies in decides how many rays are asked, however short they are.
-void LeafBurial::noteBox(const Contact& contact, const Bounds& box, RayNotes& notes) const {
-  const auto normal = facing(patches_.leaves[leafOf(contact)].triangle, contact.side);
-  for (const auto& end : {box.min, box.max}) notes.add({end, normal, kNone, 0, 0.0});
+  return extent;
 }
 
 /// All of the leaf is visible, as one look from all of it at once shows: most are, beside the few that a solid covers.
-bool LeafBurial::isOpen(const Contact& contact, const Pieces& pieces, const Bounds& box, Scratch& scratch) const {
-  const auto normal = facing(patches_.leaves[leafOf(contact)].triangle, contact.side);
-  for (auto piece = pieces.first; piece < pieces.end; ++piece) {
-    if (facing(pieces_[piece].triangle, contact.side) != normal) return false;
-  }
-  if (coincidence_.mayCover(contact.surface, contact.side, box)) return false;
+bool LeafBurial::isOpen(const Contact& contact, const Extent& extent, Scratch& scratch) const {
+  const auto& [box, normal, is_flat, height] = extent;
+  if (!is_flat || coincidence_.mayCover(contact.surface, contact.side, box)) return false;
   if (solids_.mayBury(box, normal, scratch.around)) return false;
   for (const auto& end : {box.min, box.max})
     scratch.notes.add({glm::dvec3(end) + kBurialLift * glm::dvec3(normal), normal, kNone, 0, kBurialRayLength});
@@ -64,10 +59,12 @@ bool LeafBurial::isOpen(const Contact& contact, const Pieces& pieces, const Boun
 std::optional<BuriedPart> LeafBurial::measure(const Contact& contact, std::uint32_t count, const BurialPlaces& all,
                                               Scratch& scratch) const {
   const auto pieces = piecesOf(leafOf(contact));
-  const auto box = boxOf(contact, pieces);
-  solids_.findAround(box, scratch.around);
-  noteBox(contact, box, scratch.notes);
-  if (isOpen(contact, pieces, box, scratch)) return std::nullopt;
+  const auto extent = extentOf(contact, pieces);
+  const auto facing = extent.is_flat ? std::optional(Solids::Facing{extent.normal, extent.height}) : std::nullopt;
+  solids_.findAround(extent.box, facing, scratch.around);
+  // What the leaf lies in decides how many rays are asked, however short they are.
+  for (const auto& end : {extent.box.min, extent.box.max}) scratch.notes.add({end, extent.normal, kNone, 0, 0.0});
+  if (isOpen(contact, extent, scratch)) return std::nullopt;
   askPlaces(contact, pieces, count, scratch);
   auto outcome = sumParts(contact, pieces, scratch);
   if (count < all.many && outcome.isMixed()) {

@@ -88,9 +88,15 @@ class LeafBurial {
   }
   [[nodiscard]] bool isBuried(std::uint32_t triangle, const glm::dvec2& texel, std::uint32_t side,
                               Scratch& scratch) const;
-  [[nodiscard]] Bounds boxOf(const Contact& contact, const Pieces& pieces) const;
-  void noteBox(const Contact& contact, const Bounds& box, RayNotes& notes) const;
-  [[nodiscard]] bool isOpen(const Contact& contact, const Pieces& pieces, const Bounds& box, Scratch& scratch) const;
+  /// Around all of a leaf, wherever it is covered.
+  struct Extent {
+    Bounds box;
+    glm::vec3 normal;     ///< where the leaf is bent, of some part of it
+    bool is_flat = true;  ///< it has one normal
+    float height = 0.0F;  ///< along that, of its lowest place
+  };
+  [[nodiscard]] Extent extentOf(const Contact& contact, const Pieces& pieces) const;
+  [[nodiscard]] bool isOpen(const Contact& contact, const Extent& extent, Scratch& scratch) const;
   void askPlaces(const Contact& contact, const Pieces& pieces, std::uint32_t count, Scratch& scratch) const;
   void askFiner(const Contact& contact, const Pieces& pieces, Scratch& scratch) const;
   [[nodiscard]] static bool mayBeStrip(const Scratch& scratch);

@@ -5,7 +5,9 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/vec3.hpp>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -29,8 +31,13 @@ class SolidParts {
   /// kNone: of none, so that it counts for all places. O(n log n).
   SolidParts(std::span<const Bvh::Triangle> triangles, std::span<const std::uint32_t> part_of);
 
+  /// Rays start above this plane, dot(normal, p) = height, and rise from it: what lies below they do not meet.
+  struct Plane {
+    glm::vec3 normal;
+    float height;
+  };
   /// Takes the place of what is in `around`. O(log n + parts found).
-  void find(const Bounds& places, Around& around) const;
+  void find(const Bounds& places, const std::optional<Plane>& plane, Around& around) const;
 
  private:
   struct Part {

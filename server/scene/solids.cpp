@@ -112,14 +112,17 @@ Solids::Answer Solids::ask(const glm::vec3& position, const glm::vec3& normal, c
 }
 
 Solids::Answer Solids::ask(const glm::vec3& position, const glm::vec3& normal, Hits& hits) const {
-  findAround({position, position}, hits.around);
+  findAround({position, position}, Facing{normal, glm::dot(normal, position)}, hits.around);
   return ask(position, normal, hits.around, hits);
 }
 
 /// Rays start a little before them.
-void Solids::findAround(const Bounds& positions, SolidParts::Around& around) const {
+void Solids::findAround(const Bounds& positions, const std::optional<Facing>& facing,
+                        SolidParts::Around& around) const {
   const glm::vec3 lift(static_cast<float>(kBurialLift));
-  parts_.find({positions.min - lift, positions.max + lift}, around);
+  std::optional<SolidParts::Plane> plane;
+  if (facing) plane = {facing->normal, facing->height + 0.5F * lift.x};
+  parts_.find({positions.min - lift, positions.max + lift}, plane, around);
 }
 
 bool Solids::mayBury(const Bounds& positions, const glm::vec3& normal, const SolidParts::Around& around) const {
@@ -162,8 +165,8 @@ bool Solids::seesOutAlong(const Start& start, Hits& hits, RayNotes* notes) const
     if (follow(start, way, direction, hits, notes) == Ray::kLeaves) continue;
     auto there = firstMet(start, direction);
     if (!there) return true;
-    const glm::vec3 origin(there->origin);
-    findAround({origin, origin}, hits.beyond);
+    const glm::vec3 origin(there->origin - kBurialLift * glm::dvec3(there->normal));
+    findAround({origin, origin}, Facing{there->normal, glm::dot(there->normal, origin)}, hits.beyond);
     there->around = &hits.beyond;
     if (!vote(*there, hits, notes).buried) return true;
   }

@@ -57,8 +57,12 @@ class Solids {
                            Hits& hits, RayNotes* notes = nullptr) const;
   [[nodiscard]] Answer ask(const glm::vec3& position, const glm::vec3& normal, Hits& hits) const;
 
-  /// What positions in the box may lie in.
-  void findAround(const Bounds& positions, SolidParts::Around& around) const;
+  /// What positions in the box may lie in, of some normals, or of one and as far along it as this at least.
+  struct Facing {
+    glm::vec3 normal;
+    float height;
+  };
+  void findAround(const Bounds& positions, const std::optional<Facing>& facing, SolidParts::Around& around) const;
 
   /// False: it buries no position in the box, of this normal. True: it may. Costs as much as one that is not buried.
   [[nodiscard]] bool mayBury(const Bounds& positions, const glm::vec3& normal, const SolidParts::Around& around) const;

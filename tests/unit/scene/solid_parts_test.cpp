@@ -65,7 +65,7 @@ TEST_F(Parts, OfClosedBlocksTellWhetherAPlaceLiesInOne) {
   std::size_t inside = 0, blocks = 0;
   for (int i = 0; i < 3000; ++i) {
     const auto place = anywhere();
-    parts.find({place, place}, around);
+    parts.find({place, place}, std::nullopt, around);
     const glm::dvec3 direction(anywhere());
     const bool ends = SolidTree::endOfSolid(around.trees, place, direction, 8.0, hits, work).has_value();
     EXPECT_EQ(ends, all.endOfSolid(place, direction, 8.0, hits, work_of_all).has_value());
@@ -85,7 +85,7 @@ TEST_F(Parts, AreThoseWhoseBoundsHoldAPartOfABox) {
   const SolidParts parts(triangles_, part_of_);
   SolidParts::Around around;
   const auto found = [&](float x0, float x1) {
-    parts.find({{x0, 0.05F, 0.05F}, {x1, 0.06F, 0.06F}}, around);
+    parts.find({{x0, 0.05F, 0.05F}, {x1, 0.06F, 0.06F}}, std::nullopt, around);
     return std::pair(around.trees.size(), around.in_hollow);
   };
   EXPECT_EQ(found(-0.2F, -0.1F), std::pair(std::size_t{1}, false)) << "what belongs to none counts everywhere";
@@ -100,7 +100,7 @@ TEST_F(Parts, ThatBeginInOnePlaneAreEnteredEach) {
   add(block({0, 0, 0}, {0.2F, 0.1F, 0.1F}), 2);
   const SolidParts parts(triangles_, part_of_);
   SolidParts::Around around;
-  parts.find({glm::vec3(-0.1F), glm::vec3(0.1F)}, around);
+  parts.find({glm::vec3(-0.1F), glm::vec3(0.1F)}, std::nullopt, around);
   ASSERT_EQ(around.trees.size(), 2U);
   std::vector<RayHit> hits;
   std::uint64_t work = 0;
@@ -119,7 +119,7 @@ TEST_F(Parts, HoweverManyHoldAPlaceAllCount) {
     }
     const SolidParts parts(triangles_, part_of_);
     SolidParts::Around around;
-    parts.find({glm::vec3(0.0F), glm::vec3(0.0F)}, around);
+    parts.find({glm::vec3(0.0F), glm::vec3(0.0F)}, std::nullopt, around);
     ASSERT_EQ(around.trees.size(), count);
     std::vector<RayHit> hits;
     std::uint64_t work = 0;
