@@ -156,6 +156,7 @@ class LeafGather {
   class Parts;
   void weighRays();
   void weighRays(std::size_t half, Parts& parts);
+  void joinSteps(std::size_t half, std::uint32_t end, Parts& parts) const;
   [[nodiscard]] double solved(std::size_t half, std::size_t channel, std::size_t value) const;
   /// What the level of a part of the scene follows from.
   struct LevelSum {

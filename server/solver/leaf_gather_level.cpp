@@ -70,13 +70,21 @@ void LeafGather::weighRays(std::size_t half, Parts& parts) {
         if (end >= sights_.leafCount() && end < sights_.endCount()) continue;
         const auto seen = sights_.sideOf(end < sights_.endCount() ? end : steps[end - sights_.endCount()].by);
         if (std::exchange(joined[seen], s) != s) parts.join(s, seen);
+        if (end >= sights_.endCount()) joinSteps(half, end, parts);
       }
       lost_[half].add(v, lost);
     }
   }
   if (lost_[half].isNothing()) lost_[half] = {};  // of a closed room
-  for (const auto& step : steps) {
-    const auto next = step.next < sights_.endCount() ? step.next : steps[step.next - sights_.endCount()].by;
+}
+
+/// Where a ray goes on, and on.
+void LeafGather::joinSteps(std::size_t half, std::uint32_t end, Parts& parts) const {
+  const auto steps = sights_.steps(half);
+  while (end >= sights_.endCount()) {
+    const auto& step = steps[end - sights_.endCount()];
+    end = step.next;
+    const auto next = end < sights_.endCount() ? end : steps[end - sights_.endCount()].by;
     if (next < sights_.leafCount()) parts.join(sights_.sideOf(step.by), sights_.sideOf(next));
   }
 }

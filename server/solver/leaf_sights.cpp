@@ -20,6 +20,8 @@ constexpr std::uint32_t kLeavesASlice = 2048, kLeavesAtOnce = 64;
 constexpr std::size_t kLooks = 64;
 /// A ray goes on from so many leaves at most; then the mean of the next has to do. In gaps it might go on for ever.
 constexpr std::size_t kMostSteps = 32;
+/// Steps that no ray has any more are kept until they are one of so many.
+constexpr std::size_t kFewSteps = 8;
 /// Of steps, so that no slice makes more than 32 bits number.
 constexpr std::size_t kMostNumbers = std::size_t{1} << 30;
 /// Rays and boxes are held against each other with so much to spare (unit box).
@@ -290,17 +292,19 @@ void LeafSights::takePartlyInside() {
   std::vector<bool> differs(endCount(), false);
   for (std::uint32_t value = 0; value < leaf_count_; ++value)
     differs[value] = (!found.empty() && found[value]) != (!partly_inside_.empty() && partly_inside_[value]);
-  std::array<bool, 2> gives_up_steps{};
-  inBothHalves([&](std::size_t half) { gives_up_steps[half] = giveUpRaysAt(differs, half); });
+  std::array<std::size_t, 2> without_ray{};
+  inBothHalves([&](std::size_t half) { without_ray[half] = giveUpRaysAt(differs, half); });
   partly_inside_ = std::move(found);
   before_ = count_;
-  if (gives_up_steps[0] || gives_up_steps[1]) layOut(before_);  // without these
+  // To drop a few takes longer than to keep them.
+  const auto steps = steps_[0].size() + steps_[1].size();
+  if (kFewSteps * (without_ray[0] + without_ray[1]) > steps) layOut(before_);
 }
 
-/// Those that end on such leaves, or go on from there. True: some of them had steps.
-bool LeafSights::giveUpRaysAt(const std::vector<bool>& leaves, std::size_t half) {
+/// Those that end on such leaves, or go on from there. How many steps they had.
+std::size_t LeafSights::giveUpRaysAt(const std::vector<bool>& leaves, std::size_t half) {
   auto& seen = seen_[half];
-  bool had_steps = false;
+  std::size_t steps = 0;
   std::size_t ray = 0;
   for (const auto end : seen.all()) {
     const auto at = ray++;
@@ -311,13 +315,14 @@ bool LeafSights::giveUpRaysAt(const std::vector<bool>& leaves, std::size_t half)
     if (end == seen.most()) continue;
     bool passes = false;
     auto last = end;
-    for (; last >= endCount(); last = steps_[half][last - endCount()].next)
+    std::size_t count = 0;
+    for (; last >= endCount(); last = steps_[half][last - endCount()].next, ++count)
       passes = passes || leaves[steps_[half][last - endCount()].by];
     if (!passes && !leaves[last]) continue;
     seen.set(at, seen.most());
-    had_steps = true;
+    steps += count;
   }
-  return had_steps;
+  return steps;
 }
 
 bool LeafSights::trace(double seconds) {
@@ -395,6 +400,7 @@ void LeafSights::inheritHalf(std::size_t half, const Inheritance& from) {
     const auto before = from.value_before[value];
     if (count_[value] == 0 || before == scene::kNone || former.count_[before] == 0) continue;
     const auto draw = draws(value, rays_->sideOf(value), half);
+    const auto look = from.change.lookFrom(value);
     const auto old = former.ends(half, former.firstOf(before), std::min(former.count_[before], count_[value]));
     for (std::uint32_t k = 0; k < old.size(); ++k) {
       if (old[k] == former.seen_[half].most()) continue;
@@ -403,7 +409,7 @@ void LeafSights::inheritHalf(std::size_t half, const Inheritance& from) {
       if (first == kUntraced) continue;  // it saw what is gone, or moved
       // What is gone had hidden nothing from a ray whose end is known, and may be what another ended on.
       const bool is_known = first < leaf_count_ || first >= skyAbove();
-      const bool may_pass = first >= leaf_count_ || from.stands_in[first] || from.change.mayHide(value, first);
+      const bool may_pass = first >= leaf_count_ || from.stands_in[first] || look.mayHide(first);
       if (may_pass && passes(is_known ? change.came : change.boxes, value, draw(k))) continue;
       const auto end = goes_on ? inheritStep(half, old[k], from) : first;
       if (end != kUntraced) seen_[half].set(first_ray + k, end);

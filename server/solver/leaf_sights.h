@@ -150,7 +150,7 @@ class LeafSights {
   void traceSlice(std::uint32_t end);
   [[nodiscard]] std::vector<bool> findPartlyInside() const;
   void takePartlyInside();
-  bool giveUpRaysAt(const std::vector<bool>& leaves, std::size_t half);
+  std::size_t giveUpRaysAt(const std::vector<bool>& leaves, std::size_t half);
   void takeSteps(std::span<const std::array<NewSteps, 2>> made);
   /// Draws of the rays of a leaf.
   [[nodiscard]] std::uint64_t keyOf(std::uint32_t value, const Side& side, std::size_t half) const;

@@ -29,6 +29,8 @@ constexpr float kMissed = -1.0F;
 constexpr float kRounding = 1e-6F;
 /// Rays start a little before a place (unit box).
 constexpr float kOfPlace = 1e-5F;
+/// Squares of distances are known to this factor, and well below it.
+constexpr float kApart = 1.001F;
 /// Slopes this small do not leave where they are.
 constexpr float kLevel = 1e-20F;
 
@@ -218,8 +220,24 @@ bool Shadows::isPassed(const glm::vec3& from, const glm::vec3& to) const {
   return isPassed(Boxes{change_.boxes, around_}, glm::vec4(from, kOfPlace), glm::vec4(to, kOfPlace));
 }
 
-bool Shadows::mayHide(std::uint32_t value, std::uint32_t to) const {
-  return isPassed(Boxes{change_.came, around_came_}, ball_[value], ball_[to]);
+Shadows::Look Shadows::lookFrom(std::uint32_t value) const {
+  Look look{};
+  look.shadows = this;
+  look.from = ball_[value];
+  look.to_middle = 0.5F * (around_came_.low + around_came_.high) - glm::vec3(look.from);
+  look.radius = 0.5F * glm::distance(around_came_.low, around_came_.high) + kRounding;
+  return look;
+}
+
+/// Most ways pass far from all of it: a ball is asked first, of a line that goes on without end both ways. Between
+/// places of two balls a way is nowhere farther from that between their middles than the larger of them is wide.
+bool Shadows::Look::mayHide(std::uint32_t to) const {
+  const auto& ball = shadows->ball_[to];
+  const auto way = glm::vec3(ball) - glm::vec3(from), beside = glm::cross(to_middle, way);
+  const float reach = radius + larger(from.w, ball.w);
+  if (smaller(from.w, ball.w) >= 0.0F && glm::dot(beside, beside) > kApart * reach * reach * glm::dot(way, way))
+    return false;
+  return isPassed(Boxes{shadows->change_.came, shadows->around_came_}, from, ball);
 }
 
 bool Shadows::mayHide(const glm::vec3& from, const glm::vec3& direction, std::uint32_t to) const {

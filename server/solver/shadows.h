@@ -42,7 +42,20 @@ class Shadows {
   /// Whether the way from a place to another may pass a box.
   [[nodiscard]] bool isPassed(const glm::vec3& from, const glm::vec3& to) const;
   /// Of two leaves, whether anything that came may hide places of one from the other.
-  [[nodiscard]] bool mayHide(std::uint32_t value, std::uint32_t to) const;
+  [[nodiscard]] bool mayHide(std::uint32_t value, std::uint32_t to) const { return lookFrom(value).mayHide(to); }
+  /// The same of one leaf and many others.
+  class Look {
+   public:
+    [[nodiscard]] bool mayHide(std::uint32_t to) const;
+
+   private:
+    friend class Shadows;
+    const Shadows* shadows;
+    glm::vec4 from;       ///< ball
+    glm::vec3 to_middle;  ///< of a ball around all that came
+    float radius;         ///< of that, and room for rounding
+  };
+  [[nodiscard]] Look lookFrom(std::uint32_t value) const;
   /// Whether it may lie before where a ray from a place, in a unit direction, ends on a leaf.
   [[nodiscard]] bool mayHide(const glm::vec3& from, const glm::vec3& direction, std::uint32_t to) const;
   /// Whether a half space can see any of it.
