@@ -4,10 +4,12 @@
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
 #include <numbers>
 #include <tuple>
 
 #include "server/scene/lineage.h"
+#include "server/scene/solid_parts.h"
 
 namespace radiosity::scene {
 namespace {
@@ -88,6 +90,30 @@ void markParts(const PatchScene& patches, std::vector<bool>& marked) {
     const bool is_of_solid = solids.solid_of[t] != kNone && solid[solids.solid_of[t]];
     const bool is_of_hollow = solids.hollow_of[t] != kNone && hollow[solids.hollow_of[t]];
     if (is_of_solid || is_of_hollow) marked[patches.triangle_surface[t]] = true;
+  }
+}
+
+/// Around what is marked and has faces that are no part of anything.
+void addLoose(const PatchScene& patches, const std::vector<bool>& marked, Bounds& box) {
+  const auto& solids = patches.solids;
+  for (std::size_t t = 0; t < solids.solid_of.size(); ++t) {
+    const auto& surface = patches.surfaces[patches.triangle_surface[t]];
+    if (solids.solid_of[t] != kNone || solids.hollow_of[t] != kNone || !marked[patches.triangle_surface[t]]) continue;
+    box.add(surface.bounds_min - kMargin);
+    box.add(surface.bounds_max + kMargin);
+  }
+}
+
+/// Marks the surfaces of parts that reach into a box.
+void markPartsIn(const PatchScene& patches, const Bounds& box, std::vector<bool>& marked) {
+  const auto& solids = patches.solids;
+  const auto reaches = [&](const ClosedSolids::Bounds& part) {
+    return glm::all(glm::lessThanEqual(part.low, box.max)) && glm::all(glm::lessThanEqual(box.min, part.high));
+  };
+  for (std::size_t t = 0; t < solids.solid_of.size(); ++t) {
+    const auto solid = solids.solid_of[t], hollow = solids.hollow_of[t];
+    if ((solid != kNone && reaches(solids.bounds[solid])) || (hollow != kNone && reaches(solids.hollows[hollow])))
+      marked[patches.triangle_surface[t]] = true;
   }
 }
 
@@ -174,7 +200,8 @@ FormerBurial::FormerBurial(const PatchScene& before, const BurialRecord& record,
 }
 
 /// What is a part of a closed solid that has changed counts as changed itself: the solid may be closed no longer, or
-/// just so now, and then its faces count for other places than before (SolidParts). So do all places in what is hollow.
+/// just so now, and then its faces count for other places than before (SolidParts). So do all places in it, of which
+/// more is asked where it is open, and parts that hold, or held, something that is no part itself.
 void FormerBurial::findChanged(const std::vector<Hides>& hides) {
   std::vector<bool> gone(before_.surfaces.size(), true), is_new(after_.surfaces.size(), false);
   for (std::uint32_t s = 0; s < is_new.size(); ++s) {
@@ -182,24 +209,43 @@ void FormerBurial::findChanged(const std::vector<Hides>& hides) {
     is_new[s] = former == kNone || record_.hides[former] != hides[s];
     if (!is_new[s]) gone[former] = false;
   }
-  markParts(before_, gone);
-  markParts(after_, is_new);
-  for (std::uint32_t s = 0; s < is_new.size(); ++s) {
-    auto& former = surface_before_[s];
-    if (former == kNone || !(is_new[s] || gone[former])) continue;
-    is_new[s] = gone[former] = true;
-    former = kNone;
-  }
-  const auto addHollows = [&](const PatchScene& patches, const std::vector<bool>& changed) {
-    const auto& solids = patches.solids;
-    const auto hollow = partsWithMarked(patches, solids.hollow_of, solids.hollows.size(), changed);
-    for (std::size_t i = 0; i < hollow.size(); ++i) {
-      const auto& [low, high] = solids.hollows[i];
-      if (hollow[i]) boxes_.push_back({low - kAround, high + kAround});
+  const auto forgetThose = [&] {
+    for (std::uint32_t s = 0; s < is_new.size(); ++s) {
+      auto& former = surface_before_[s];
+      if (former == kNone || !(is_new[s] || gone[former])) continue;
+      is_new[s] = gone[former] = true;
+      former = kNone;
     }
   };
-  addHollows(before_, gone);
-  addHollows(after_, is_new);
+  const auto isTooMany = [](const ClosedSolids& solids) {
+    return solids.bounds.size() + solids.hollows.size() > SolidParts::kMostParts;
+  };
+  if (isTooMany(before_.solids) || isTooMany(after_.solids)) is_new.assign(is_new.size(), true);
+  markParts(before_, gone);
+  markParts(after_, is_new);
+  forgetThose();
+  Bounds loose;
+  addLoose(before_, gone, loose);
+  addLoose(after_, is_new, loose);
+  if (!loose.empty()) {
+    markPartsIn(before_, loose, gone);
+    markPartsIn(after_, loose, is_new);
+    forgetThose();
+  }
+  addParts(before_, gone);
+  addParts(after_, is_new);
+}
+
+/// Around places of which more or less is asked.
+void FormerBurial::addParts(const PatchScene& patches, const std::vector<bool>& changed) {
+  const auto& solids = patches.solids;
+  const auto add = [&](std::span<const std::uint32_t> part_of, std::span<const ClosedSolids::Bounds> bounds) {
+    const auto parts = partsWithMarked(patches, part_of, bounds.size(), changed);
+    for (std::size_t i = 0; i < parts.size(); ++i)
+      if (parts[i]) boxes_.push_back({bounds[i].low - kAround, bounds[i].high + kAround});
+  };
+  add(solids.solid_of, solids.bounds);
+  add(solids.hollow_of, solids.hollows);
 }
 
 const BurialRecord::Leaf* FormerBurial::find(std::uint32_t surface, std::uint32_t leaf, std::uint32_t side,

@@ -112,6 +112,7 @@ class FormerBurial {
 
  private:
   void findChanged(const std::vector<Hides>& hides);
+  void addParts(const PatchScene& patches, const std::vector<bool>& changed);
 
   const PatchScene& before_;
   const BurialRecord& record_;

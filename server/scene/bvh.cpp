@@ -347,10 +347,13 @@ bool Bvh::touches(const glm::vec3& box_min, const glm::vec3& box_max, std::span<
 
 bool Bvh::risesAbove(const glm::vec3& normal, float height) const {
   if (triangles_.empty()) return false;
+  constexpr int kMostNodes = 64;  // of what lies in the plane itself, and is tilted, every box rises above it
+  int looked = 0;
   std::array<std::uint32_t, kStackDepth> stack;
   std::size_t depth = 0;
   stack[depth++] = 0;
   while (depth > 0) {
+    if (++looked > kMostNodes) return true;
     const Node& node = nodes_[stack[--depth]];
     if (glm::dot(normal, glm::mix(node.min, node.max, glm::greaterThan(normal, glm::vec3(0.0F)))) <= height) continue;
     if (node.count == 0) {
@@ -364,6 +367,14 @@ bool Bvh::risesAbove(const glm::vec3& normal, float height) const {
     }
   }
   return false;
+}
+
+bool Bvh::holdsOne(const glm::vec3& box_min, const glm::vec3& box_max) const {
+  return anyTriangle(box_min, box_max, [&](std::uint32_t i) {
+    return std::ranges::all_of(triangles_[i], [&](const glm::vec3& corner) {
+      return glm::all(glm::lessThanEqual(box_min, corner)) && glm::all(glm::lessThanEqual(corner, box_max));
+    });
+  });
 }
 
 void Bvh::collectNear(const glm::vec3& box_min, const glm::vec3& box_max, std::vector<std::uint32_t>& triangles) const {

@@ -70,8 +70,11 @@ class Bvh {
   [[nodiscard]] bool hoversIn(const OrientedBox& box, std::span<const std::uint32_t> tags,
                               std::uint32_t ignored_tag) const;
 
-  /// Whether a corner lies above the plane dot(normal, p) = height.
+  /// False: no corner lies above the plane dot(normal, p) = height. True: one does, or that would take long to tell.
   [[nodiscard]] bool risesAbove(const glm::vec3& normal, float height) const;
+
+  /// Whether a triangle lies wholly in the box.
+  [[nodiscard]] bool holdsOne(const glm::vec3& box_min, const glm::vec3& box_max) const;
 
   /// Numbers of the triangles whose bounds reach into the box.
   void collectNear(const glm::vec3& box_min, const glm::vec3& box_max, std::vector<std::uint32_t>& triangles) const;

@@ -7,8 +7,6 @@ namespace {
 
 /// Boxes are larger by this (unit box): well above what rounding moves positions.
 constexpr float kMargin = 1e-5F;
-/// Each takes a kilobyte or two; further closed solids go with what is open.
-constexpr std::size_t kMostParts = 65'536;
 
 }  // namespace
 
@@ -17,7 +15,7 @@ SolidParts::SolidParts(std::span<const Bvh::Triangle> triangles, std::span<const
   std::vector<Bvh::Triangle> others;
   for (std::size_t i = 0; i < triangles.size(); ++i) {
     const auto part = part_of[i];
-    if (part >= kMostParts) {
+    if (part >= 2 * kMostParts) {
       others.push_back(triangles[i]);
       continue;
     }

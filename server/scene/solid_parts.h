@@ -1,7 +1,7 @@
 // The triangles that bound solids, parted so that a ray is held only against those of them that the place where it
 // starts may lie in: what it enters of a closed solid (closed_solids.h) that it starts outside of it leaves again, and
-// what is open at an end holds no place outside of its bounds. In a furnished room that leaves a few triangles of
-// thousands. Immutable once built, so any number of threads may ask.
+// what is open at an end holds no place outside of its bounds. Neither has a cavity, or what does counts everywhere. In
+// a furnished room that leaves a few triangles of thousands. Immutable once built, so any number of threads may ask.
 #pragma once
 
 #include <cstdint>
@@ -27,6 +27,8 @@ class SolidParts {
 
   SolidParts() = default;
   static constexpr std::uint32_t kClosed = 0, kHollow = 1;
+  /// Each takes a kilobyte or two; further ones count for all places.
+  static constexpr std::size_t kMostParts = 32'768;
   /// `part_of`: by triangle, twice the number of the part that it belongs to, and whether that is closed or hollow;
   /// kNone: of none, so that it counts for all places. O(n log n).
   SolidParts(std::span<const Bvh::Triangle> triangles, std::span<const std::uint32_t> part_of);
@@ -36,7 +38,7 @@ class SolidParts {
     glm::vec3 normal;
     float height;
   };
-  /// Takes the place of what is in `around`. O(log n + parts found).
+  /// Takes the place of what is in `around`. O(parts found + log n).
   void find(const Bounds& places, const std::optional<Plane>& plane, Around& around) const;
 
  private:

@@ -18,7 +18,7 @@ constexpr std::uint64_t kNodeWork = 4;
 /// By which a ray may seem to miss a triangle that it meets (unit box): twice what rounding makes of it.
 constexpr float kEdge = 1e-6F;
 
-/// Trees that are followed side by side.
+/// Trees that are followed at once: one after the other, the first, which may be large, last.
 constexpr std::size_t kTreesAtOnce = 64;
 
 /// Hits so near to each other are one, on an edge.

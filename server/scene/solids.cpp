@@ -9,6 +9,7 @@
 #include <numeric>
 #include <optional>
 #include <tuple>
+#include <unordered_map>
 #include <utility>
 
 #include "server/scene/coverage.h"
@@ -57,6 +58,37 @@ std::vector<std::uint32_t> trianglesOn(const PatchScene& patches, const Surface&
   return on;
 }
 
+/// Of a part with a cavity in it, or a lining, whose faces are no part themselves, a ray from outside may meet those
+/// alone: all count for all places.
+void dropThoseThatHoldOthers(const PatchScene& patches, const std::vector<Hides>& hides,
+                             std::vector<std::uint32_t>& part_of) {
+  std::vector<Bvh::Triangle> others;
+  std::unordered_map<std::uint32_t, Bounds> bounds;
+  for (std::size_t t = 0; t < part_of.size(); ++t) {
+    if (hides[patches.triangle_surface[t]] != Hides::kSolid) continue;
+    Bvh::Triangle triangle;
+    for (std::size_t c = 0; c < 3; ++c)
+      triangle[c] = patches.vertices[patches.indices[std::size_t{3} * t + c]].position;
+    if (part_of[t] == kNone) {
+      others.push_back(triangle);
+    } else {
+      for (const auto& corner : triangle) bounds[part_of[t]].add(corner);
+    }
+  }
+  const Bvh tree(std::move(others));
+  const auto isDropped = [&](std::uint32_t part) {
+    const auto found = bounds.find(part);
+    return found != bounds.end() && tree.holdsOne(found->second.min, found->second.max);
+  };
+  std::unordered_map<std::uint32_t, bool> dropped;
+  for (auto& part : part_of) {
+    if (part == kNone) continue;
+    const auto [at, is_new] = dropped.try_emplace(part, false);
+    if (is_new) at->second = isDropped(part);
+    if (at->second) part = kNone;
+  }
+}
+
 /// As SolidParts takes it. A closed solid some of whose faces are sheets, or hide nothing, is open there.
 std::vector<std::uint32_t> partOf(const PatchScene& patches, const std::vector<Hides>& hides) {
   const auto& solids = patches.solids;
@@ -72,7 +104,17 @@ std::vector<std::uint32_t> partOf(const PatchScene& patches, const std::vector<H
     if (solid != kNone) part_of[t] = 2 * solid + (is_open[solid] ? SolidParts::kHollow : SolidParts::kClosed);
     if (hollow != kNone) part_of[t] = 2 * (closed + hollow) + SolidParts::kHollow;
   }
+  dropThoseThatHoldOthers(patches, hides, part_of);
   return part_of;
+}
+
+/// Of those at the same distance, whatever else there is in the tree.
+RayHit firstOfTied(const Bvh& tree, const glm::dvec3& origin, const glm::dvec3& direction, const RayHit& nearest) {
+  constexpr double kTied = 1e-9;
+  std::vector<RayHit> hits;
+  tree.collectHits(origin, direction, nearest.t - kTied, nearest.t + kTied, hits);
+  const auto key = [](const RayHit& hit) { return std::tuple(hit.t, hit.front, hit.triangle); };
+  return hits.empty() ? nearest : *std::ranges::min_element(hits, {}, key);
 }
 
 }  // namespace
@@ -175,7 +217,8 @@ bool Solids::seesOutAlong(const Start& start, Hits& hits, RayNotes* notes) const
 
 /// Before the nearest face, or the sheet that it meets earlier. A way around there is not known yet.
 std::optional<Solids::Start> Solids::firstMet(const Start& start, const glm::dvec3& direction) const {
-  const auto face = tree_.nearestHit(start.origin, direction, 0.0, kBurialRayLength);
+  auto face = tree_.nearestHit(start.origin, direction, 0.0, kBurialRayLength);
+  if (face) face = firstOfTied(tree_, start.origin, direction, *face);
   const double reach = face ? face->t : kBurialRayLength;
   const auto sheet = sheets_.empty() ? std::nullopt : sheets_.nearestHit(start.origin, direction, 0.0, reach);
   if (!sheet && !face) return std::nullopt;

@@ -120,6 +120,7 @@ void LeafSights::layOut(std::span<const std::uint16_t> counts) {
   first_ = std::move(first);
   seen_ = std::move(seen);
   steps_ = std::move(steps);
+  without_ray_ = {};
 }
 
 /// An end, whose steps are taken over.
@@ -292,13 +293,12 @@ void LeafSights::takePartlyInside() {
   std::vector<bool> differs(endCount(), false);
   for (std::uint32_t value = 0; value < leaf_count_; ++value)
     differs[value] = (!found.empty() && found[value]) != (!partly_inside_.empty() && partly_inside_[value]);
-  std::array<std::size_t, 2> without_ray{};
-  inBothHalves([&](std::size_t half) { without_ray[half] = giveUpRaysAt(differs, half); });
+  inBothHalves([&](std::size_t half) { without_ray_[half] += giveUpRaysAt(differs, half); });
   partly_inside_ = std::move(found);
   before_ = count_;
   // To drop a few takes longer than to keep them.
   const auto steps = steps_[0].size() + steps_[1].size();
-  if (kFewSteps * (without_ray[0] + without_ray[1]) > steps) layOut(before_);
+  if (kFewSteps * (without_ray_[0] + without_ray_[1]) > steps) layOut(before_);
 }
 
 /// Those that end on such leaves, or go on from there. How many steps they had.

@@ -179,6 +179,7 @@ class LeafSights {
   std::vector<std::uint16_t> count_, before_;  ///< by leaf value; before what was asked for last
   std::vector<std::size_t> first_;             ///< by kLeavesAFirst leaf values: into seen_
   std::array<PackedNumbers, 2> seen_;          ///< the largest that fits: not traced
+  std::array<std::size_t, 2> without_ray_{};   ///< of steps_, by half
   std::array<std::vector<Step>, 2> steps_;
   std::vector<bool> partly_inside_;  ///< by leaf value; empty: none is
   std::size_t most_bytes_ = SIZE_MAX, step_bytes_ = 0;

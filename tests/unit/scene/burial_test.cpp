@@ -91,6 +91,32 @@ TEST(Burial, ALegWithoutEndsHidesTheFloorAndTheSeatThatItStandsBetween) {
   EXPECT_NEAR(areaOf(patches, 0, 1), 4 * 0.6 * 0.8, 0.01) << "leg";
 }
 
+TEST(Burial, CavitiesOfWallsBuryNothingInTheRoom) {
+  // From the room one looks past their outside at the backs within, of shells of their own, or of loose linings.
+  for (const bool is_loose : {false, true}) {
+    Scene scene;
+    const auto wall = [&](glm::dvec3 low, glm::dvec3 high) {
+      place(scene, box(low, high));
+      auto cavity = box(low + 0.05, high - 0.05, true);
+      for (std::size_t i = 0; is_loose && i < cavity.positions.size(); ++i) {  // quads that share no corners
+        const auto* quad = &cavity.positions[i / 4 * 4];
+        const auto middle = i % 4 == 0 ? 0.5 * (quad[0] + quad[2]) : 0.5 * (quad[1] + quad[3]);
+        if (i % 4 == 1) cavity.positions[i] += 0.01 * (middle - cavity.positions[i]);
+      }
+      place(scene, cavity);
+    };
+    wall({-2.2, 0, -2.2}, {-2, 2, 2.2});
+    wall({2, 0, -2.2}, {2.2, 2, 2.2});
+    wall({-2, 0, -2.2}, {2, 2, -2});
+    wall({-2, 0, 2}, {2, 2, 2.2});
+    wall({-2.2, -0.2, -2.2}, {2.2, 0, 2.2});
+    wall({-2.2, 2, -2.2}, {2.2, 2.2, 2.2});
+    place(scene, box({-0.5, 0, -0.5}, {0.5, 1, 0.5}));
+    const PatchScene patches = build(scene, 6'000);
+    EXPECT_NEAR(areaOf(patches, 0, 12), 5.0, 0.01) << is_loose;
+  }
+}
+
 TEST(Burial, TwoSolidsThatBeginInOnePlaneHideNothingBeforeThem) {
   // A ray that enters both at once leaves them one after the other.
   Scene scene;

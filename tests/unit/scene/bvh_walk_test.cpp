@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <glm/geometric.hpp>
 #include <random>
 #include <tuple>
 
@@ -67,6 +68,25 @@ TEST(BvhWalk, WhatLiesBehindTheEndOfASolidCostsNothing) {
     EXPECT_TRUE(solids.endOfSolid({0.01, -0.1, z}, {0.01, 0.02, 1.0}, 8.0, hits, work));
   }
   EXPECT_LT(work / 100, 100U) << "of 4000";
+}
+
+TEST(BvhWalk, WhatRisesAboveAPlaneIsTold) {
+  const auto triangles = test::triangleSoup(40, 5);
+  const Bvh tree(triangles);
+  std::mt19937 random(8);
+  std::uniform_real_distribution<float> uniform(-1.0F, 1.0F);
+  std::size_t above = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const glm::vec3 normal(uniform(random), uniform(random), uniform(random));
+    float highest = -1e9F;
+    for (const auto& triangle : triangles)
+      for (const auto& corner : triangle) highest = std::max(highest, glm::dot(normal, corner));
+    const float height = highest * (1.0F + 0.1F * uniform(random));
+    EXPECT_EQ(tree.risesAbove(normal, height), highest > height);
+    above += highest > height ? 1 : 0;
+  }
+  EXPECT_GT(above, 500U);
+  EXPECT_LT(above, 1500U);
 }
 
 TEST(BvhWalk, TheLeastTagIsThatOfAllHits) {
