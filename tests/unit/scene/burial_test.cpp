@@ -96,7 +96,7 @@ TEST(Burial, CavitiesOfWallsBuryNothingInTheRoom) {
   for (const bool is_loose : {false, true}) {
     Scene scene;
     const auto wall = [&](glm::dvec3 low, glm::dvec3 high) {
-      place(scene, box(low, high));
+      place(scene, box(low + 0.003, high - 0.003));  // which share no edges
       auto cavity = box(low + 0.05, high - 0.05, true);
       for (std::size_t i = 0; is_loose && i < cavity.positions.size(); ++i) {  // quads that share no corners
         const auto* quad = &cavity.positions[i / 4 * 4];
@@ -113,7 +113,7 @@ TEST(Burial, CavitiesOfWallsBuryNothingInTheRoom) {
     wall({-2.2, 2, -2.2}, {2.2, 2.2, 2.2});
     place(scene, box({-0.5, 0, -0.5}, {0.5, 1, 0.5}));
     const PatchScene patches = build(scene, 6'000);
-    EXPECT_NEAR(areaOf(patches, 0, 12), 5.0, 0.01) << is_loose;
+    EXPECT_NEAR(areaOf(patches, 0, 12), 6.0, 0.01) << is_loose;
   }
 }
 
