@@ -42,6 +42,36 @@ Primitive cube(std::uint32_t kind) {
   return primitive;
 }
 
+/// Within the unit cube, an L seen from above, facing out: its walls but for one, and caps, or that one.
+Primitive angle(bool is_last_wall) {
+  constexpr std::array<glm::dvec2, 6> kProfile{
+      {{0.0, 0.0}, {-0.5, 0.0}, {-0.5, -0.5}, {0.5, -0.5}, {0.5, 0.5}, {0.0, 0.5}}};  // the first is the inner corner
+  Primitive primitive;
+  primitive.mesh = 20;
+  primitive.primitive = is_last_wall ? 1 : 0;
+  primitive.material = is_last_wall ? 1 : 0;
+  const auto add = [&](const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
+    for (const auto& corner : {a, b, c}) {
+      primitive.indices.push_back(static_cast<std::uint32_t>(primitive.positions.size()));
+      primitive.positions.push_back(corner);
+    }
+  };
+  const auto at = [&](std::size_t i, double y) {
+    const auto& place = kProfile[i % kProfile.size()];
+    return glm::dvec3(place.x, y, -place.y);
+  };
+  for (std::size_t i = 0; i < kProfile.size(); ++i) {
+    if (is_last_wall != (i + 1 == kProfile.size())) continue;
+    add(at(i, -0.5), at(i + 1, -0.5), at(i + 1, 0.5));
+    add(at(i, -0.5), at(i + 1, 0.5), at(i, 0.5));
+  }
+  for (std::size_t i = 1; i + 1 < kProfile.size() && !is_last_wall; ++i) {
+    add(at(0, 0.5), at(i, 0.5), at(i + 1, 0.5));
+    add(at(0, -0.5), at(i + 1, -0.5), at(i, -0.5));
+  }
+  return primitive;
+}
+
 class BurialRecords : public testing::Test {
  protected:
   BurialRecords() {
@@ -192,6 +222,31 @@ TEST_F(BurialRecords, SolidsOfTwoMaterialsAndCavitiesGiveTheBitsOfLookingAtAllLe
       ++next_node_;
     }
     auto next = build(before, built);
+    const auto anew = build(before, built, false);
+    ASSERT_NO_FATAL_FAILURE(expectSame(next.patches, anew.patches)) << i;
+    ASSERT_NO_FATAL_FAILURE(expectSame(*next.burial, *anew.burial)) << i;
+    before = scene_;
+    built = std::move(next);
+  }
+}
+
+/// Beside its inner corner a place lies in its bounds, but before none of its faces.
+TEST_F(BurialRecords, AnAngleClosedByASheetGivesTheBitsOfLookingAtAllLeavesAgain) {
+  scene_.primitives.insert(scene_.primitives.end(), {angle(false), angle(true)});
+  auto before = scene_;
+  auto built = buildWithRecord(scene_, options_).value();
+  const auto closed = built.patches.solids.bounds.size();
+  for (int i = 0; i < 12; ++i) {
+    if (i % 2 == 1) {
+      scene_.instances.resize(scene_.instances.size() - 2);
+    } else {
+      const auto home = placedAtRandom(0).world;
+      for (const std::uint32_t primitive : {5U, 6U})
+        scene_.instances.push_back({.node = next_node_, .primitive = primitive, .world = home});
+      ++next_node_;
+    }
+    auto next = build(before, built);
+    EXPECT_EQ(next.patches.solids.bounds.size(), i % 2 == 0 ? closed + 1 : closed);
     const auto anew = build(before, built, false);
     ASSERT_NO_FATAL_FAILURE(expectSame(next.patches, anew.patches)) << i;
     ASSERT_NO_FATAL_FAILURE(expectSame(*next.burial, *anew.burial)) << i;
