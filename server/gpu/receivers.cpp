@@ -5,6 +5,8 @@
 #include <glm/geometric.hpp>
 #include <numeric>
 
+#include "common/union_find.h"
+
 namespace radiosity::gpu {
 namespace {
 
@@ -19,11 +21,6 @@ constexpr float kSeal = 1.0e-5F;
 
 /// Rays start so far from a surface, and end so far before another (unit box): well above the rounding of positions.
 constexpr double kLift = 2.0e-6;
-
-std::uint32_t rootOf(std::vector<std::uint32_t>& parent, std::uint32_t i) {
-  while (parent[i] != i) i = parent[i] = parent[parent[i]];
-  return i;
-}
 
 bool receives(const scene::LeafPoint& leaf, float area) { return leaf.triangle != scene::kNone && area > 0.0F; }
 
@@ -123,17 +120,17 @@ void Receivers::findBlocks(Group& group) {
 void Receivers::findFacets() {
   // Corners are shared only within a plane, so triangles with a common corner belong together.
   const auto triangles = static_cast<std::uint32_t>(patches_->triangles.size());
-  std::vector<std::uint32_t> parent(triangles), owner(patches_->vertices.size(), scene::kNone);
-  std::iota(parent.begin(), parent.end(), 0U);
+  UnionFind parts(triangles);
+  std::vector<std::uint32_t> owner(patches_->vertices.size(), scene::kNone);
   for (std::uint32_t i = 0; i < 3 * triangles; ++i) {
     auto& first = owner[patches_->indices[i]];
     if (first == scene::kNone) first = i / 3;
-    parent[rootOf(parent, i / 3)] = rootOf(parent, first);
+    parts.join(i / 3, first);
   }
   facet_of_.resize(triangles);
   facet_triangles_.resize(triangles);
   std::iota(facet_triangles_.begin(), facet_triangles_.end(), 0U);
-  for (std::uint32_t t = 0; t < triangles; ++t) facet_of_[t] = rootOf(parent, t);
+  for (std::uint32_t t = 0; t < triangles; ++t) facet_of_[t] = parts.find(t);
   std::stable_sort(facet_triangles_.begin(), facet_triangles_.end(),
                    [&](std::uint32_t a, std::uint32_t b) { return facet_of_[a] < facet_of_[b]; });
   std::vector<std::uint32_t> number(triangles, scene::kNone);

@@ -22,7 +22,7 @@ constexpr float kMargin = 1e-5F;
 /// And by this where it is places in them that count: rays start a little before these.
 constexpr auto kAround = static_cast<float>(4.0 * kBurialLift);
 /// Rays that pass the boxes around all that changed are held against so many surfaces of it one by one.
-constexpr std::size_t kMostParts = 128;
+constexpr std::size_t kMostBoxes = 128;
 constexpr std::uint32_t kHemisphere = kFirstWayAlong - 1, kAlong = kBurialWays - kFirstWayAlong;
 
 /// Of the four bits that number a way into the hemisphere.
@@ -195,7 +195,7 @@ FormerBurial::FormerBurial(const PatchScene& before, const BurialRecord& record,
   for (std::uint32_t s = 0; s < before.surfaces.size(); ++s) {
     if (!stayed[s] && record.hides[s] != Hides::kNothing) add(before.surfaces[s]);
   }
-  if (boxes_.size() <= kMostParts) parts_ = boxes_;
+  if (boxes_.size() <= kMostBoxes) parts_ = boxes_;
   joinBoxes(boxes_);
 }
 

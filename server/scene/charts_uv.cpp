@@ -4,8 +4,8 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
-#include <numeric>
 
+#include "common/union_find.h"
 #include "server/scene/charts.h"
 
 namespace radiosity::scene {
@@ -41,23 +41,6 @@ std::string rangeFault(const Triangle2& corners, std::uint32_t source) {
   }
   return {};
 }
-
-class Islands {
- public:
-  explicit Islands(std::uint32_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0U); }
-  std::uint32_t find(std::uint32_t i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  void join(std::uint32_t a, std::uint32_t b) {
-    a = find(a);
-    b = find(b);
-    parent_[std::max(a, b)] = std::min(a, b);
-  }
-
- private:
-  std::vector<std::uint32_t> parent_;
-};
 
 /// One affine map explains every corner: then the island is flat and evenly stretched.
 bool isOneMap(const FlatScene& flat, const Chart& chart) {
@@ -118,7 +101,7 @@ std::vector<Chart> uvCharts(const Scene& scene, const FlatScene& flat, const std
       if (flat.triangles[t].points[c] == point) return corners[t - first][c];
     return glm::dvec2(-1.0);
   };
-  Islands islands(end - first);
+  UnionFind islands(end - first);
   for (std::uint32_t t = first; t < end; ++t)
     for (std::size_t e = 0; e < 3; ++e) {
       const std::uint32_t other = neighbours[std::size_t{3} * t + e];

@@ -5,10 +5,10 @@
 #include <cstring>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <numeric>
 #include <span>
 #include <unordered_map>
 
+#include "common/union_find.h"
 #include "server/scene/patch_scene.h"
 #include "server/scene/self_crossing.h"
 
@@ -35,19 +35,6 @@ std::vector<std::uint32_t> weld(const PatchScene& patches) {
   }
   return place;
 }
-
-class UnionFind {
- public:
-  explicit UnionFind(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0U); }
-  std::uint32_t find(std::uint32_t item) {
-    while (parent_[item] != item) item = parent_[item] = parent_[parent_[item]];
-    return item;
-  }
-  void join(std::uint32_t a, std::uint32_t b) { parent_[find(a)] = find(b); }
-
- private:
-  std::vector<std::uint32_t> parent_;
-};
 
 Corners cornersOf(const PatchScene& patches, std::uint32_t triangle) {
   const auto corner = [&](std::size_t c) {

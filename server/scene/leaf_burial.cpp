@@ -48,8 +48,9 @@ LeafBurial::Extent LeafBurial::extentOf(const Contact& contact, const Pieces& pi
 
 /// All of the leaf is visible, as one look from all of it at once shows: most are, beside the few that a solid covers.
 bool LeafBurial::isOpen(const Contact& contact, const Extent& extent, Scratch& scratch) const {
-  const auto& [box, normal, is_flat, height] = extent;
-  if (!is_flat || coincidence_.mayCover(contact.surface, contact.side, box)) return false;
+  const auto& box = extent.box;
+  const auto& normal = extent.normal;
+  if (!extent.is_flat || coincidence_.mayCover(contact.surface, contact.side, box)) return false;
   if (solids_.mayBury(box, normal, scratch.around)) return false;
   for (const auto& end : {box.min, box.max})
     scratch.notes.add({glm::dvec3(end) + kBurialLift * glm::dvec3(normal), normal, kNone, 0, kBurialRayLength});

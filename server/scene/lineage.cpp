@@ -4,12 +4,12 @@
 #include <glm/common.hpp>
 #include <limits>
 #include <map>
-#include <numeric>
 #include <span>
 #include <tuple>
 #include <utility>
 
 #include "common/check.h"
+#include "common/union_find.h"
 
 namespace radiosity::scene {
 namespace {
@@ -157,16 +157,10 @@ class Boxes {
 
   /// Surfaces that share a corner hang together. One for all of them where they are too many to tell apart.
   [[nodiscard]] std::vector<ChangedBox> partsOf(std::span<const std::uint32_t> surfaces) const {
-    std::vector<std::uint32_t> part(surfaces.size());
-    std::iota(part.begin(), part.end(), 0U);
-    const auto rootOf = [&](std::uint32_t i) {
-      while (part[i] != i) i = part[i] = part[part[i]];
-      return i;
-    };
+    UnionFind parts(surfaces.size());
     std::size_t triangles = 0;
     for (const auto surface : surfaces) triangles += patches_.surfaces[surface].triangle_count;
     const bool tells_apart = triangles <= kMostToTellApart;
-    if (!tells_apart) std::ranges::fill(part, 0U);
     std::vector<std::pair<Corner, std::uint32_t>> corners;
     for (std::uint32_t i = 0; i < surfaces.size() && tells_apart; ++i) {
       const auto& surface = patches_.surfaces[surfaces[i]];
@@ -177,13 +171,13 @@ class Boxes {
     }
     std::ranges::sort(corners);
     for (std::size_t k = 1; k < corners.size(); ++k) {
-      if (corners[k].first == corners[k - 1].first) part[rootOf(corners[k].second)] = rootOf(corners[k - 1].second);
+      if (corners[k].first == corners[k - 1].first) parts.join(corners[k].second, corners[k - 1].second);
     }
     std::map<std::uint32_t, ChangedBox> boxes;
     for (std::uint32_t i = 0; i < surfaces.size(); ++i) {
       const auto& surface = patches_.surfaces[surfaces[i]];
       const ChangedBox own{surface.bounds_min, surface.bounds_max};
-      const auto [box, is_new] = boxes.try_emplace(rootOf(i), own);
+      const auto [box, is_new] = boxes.try_emplace(tells_apart ? parts.find(i) : 0, own);
       if (!is_new) box->second = unionOf(box->second, own);
     }
     std::vector<ChangedBox> all;

@@ -102,12 +102,6 @@ __attribute__((always_inline)) inline std::uint32_t SolidTree::mayMeet(const Blo
   return mask;
 }
 
-std::optional<double> SolidTree::endOfSolid(const glm::dvec3& origin, const glm::dvec3& direction, double t_max,
-                                            std::vector<RayHit>& hits, std::uint64_t& work) const {
-  const auto* self = this;
-  return endOfSolid({&self, 1}, origin, direction, t_max, hits, work);
-}
-
 std::optional<double> SolidTree::endOfSolid(std::span<const SolidTree* const> trees, const glm::dvec3& origin,
                                             const glm::dvec3& direction, double t_max, std::vector<RayHit>& hits,
                                             std::uint64_t& work) {

@@ -20,12 +20,10 @@ class SolidTree {
   /// O(n). Refers to the Bvh.
   explicit SolidTree(const Bvh& tree);
 
-  /// The first back of a triangle that ends more solids than fronts began. Looks no farther: what lies behind costs
-  /// nothing. None: the ray starts in no solid, and `hits` are all with t in (0, t_max), by t. For rays that start in
-  /// the unit box, or about. `work`: grows by what that took, in units of 6 ns or so.
-  [[nodiscard]] std::optional<double> endOfSolid(const glm::dvec3& origin, const glm::dvec3& direction, double t_max,
-                                                 std::vector<RayHit>& hits, std::uint64_t& work) const;
-  /// The same of all triangles of several trees, of which each numbers its own in `hits`.
+  /// Of several trees, of which each numbers its own triangles in `hits`: the first back of a triangle that ends more
+  /// solids than fronts began. Looks no farther: what lies behind costs nothing. None: the ray starts in no solid, and
+  /// `hits` are all with t in (0, t_max), by t. For rays that start in the unit box, or about. `work`: grows by what
+  /// that took, in units of 6 ns or so.
   [[nodiscard]] static std::optional<double> endOfSolid(std::span<const SolidTree* const> trees,
                                                         const glm::dvec3& origin, const glm::dvec3& direction,
                                                         double t_max, std::vector<RayHit>& hits, std::uint64_t& work);

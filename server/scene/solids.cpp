@@ -215,7 +215,7 @@ bool Solids::seesOutAlong(const Start& start, Hits& hits, RayNotes* notes) const
   return false;
 }
 
-/// Before the nearest face, or the sheet that it meets earlier. A way around there is not known yet.
+/// Before the nearest face, or the sheet that it meets earlier. What it may lie in is not known yet.
 std::optional<Solids::Start> Solids::firstMet(const Start& start, const glm::dvec3& direction) const {
   auto face = tree_.nearestHit(start.origin, direction, 0.0, kBurialRayLength);
   if (face) face = firstOfTied(tree_, start.origin, direction, *face);

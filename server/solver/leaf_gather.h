@@ -27,6 +27,7 @@
 #include <span>
 #include <vector>
 
+#include "common/union_find.h"
 #include "server/solver/gmres.h"
 #include "server/solver/leaf_sights.h"
 #include "server/solver/leaf_smoother.h"
@@ -153,10 +154,9 @@ class LeafGather {
   void sweep(std::size_t half, RayGmres::Vectors& x, bool affine);
   void take(std::size_t half, const Levels& levels);
   void takeSolutions();
-  class Parts;
   void weighRays();
-  void weighRays(std::size_t half, Parts& parts);
-  void joinSteps(std::size_t half, std::uint32_t end, Parts& parts) const;
+  void weighRays(std::size_t half, UnionFind& parts);
+  void joinSteps(std::size_t half, std::uint32_t end, UnionFind& parts) const;
   [[nodiscard]] double solved(std::size_t half, std::size_t channel, std::size_t value) const;
   /// What the level of a part of the scene follows from.
   struct LevelSum {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
 #include "common/give_back.h"
@@ -23,37 +22,20 @@ constexpr double kMostLoss = 4.0;
 
 }  // namespace
 
-/// Sides that see each other, if over others, are of one part, which has the number of the first of them.
-class LeafGather::Parts {
- public:
-  explicit Parts(std::size_t sides) : above_(sides) { std::iota(above_.begin(), above_.end(), 0U); }
-
-  [[nodiscard]] std::uint32_t of(std::uint32_t side) {
-    while (above_[side] != side) side = above_[side] = above_[above_[side]];
-    return side;
-  }
-  void join(std::uint32_t one, std::uint32_t other) {
-    const auto a = of(one), b = of(other);
-    above_[std::max(a, b)] = std::min(a, b);
-  }
-
- private:
-  std::vector<std::uint32_t> above_;  ///< by side: another of its part, of a smaller number
-};
-
 /// How much of their light leaves lose, and which sides are of one part.
 void LeafGather::weighRays() {
   has_parted_ = false;
   for (std::uint32_t v = 0; v < sights_.leafCount() && !has_parted_; ++v)
     has_parted_ = areaOf(v) > 0.0 && sights_.isParted(v);
-  std::array<Parts, 2> parts{Parts(sides_.size()), Parts(sides_.size())};
+  // Sides that see each other, if over others, are of one part, which has the number of the first of them.
+  std::array<UnionFind, 2> parts{UnionFind(sides_.size()), UnionFind(sides_.size())};
   inBothHalves([&](std::size_t half) { weighRays(half, parts[half]); });
   part_.resize(sides_.size());
-  for (std::uint32_t s = 0; s < sides_.size(); ++s) parts[0].join(s, parts[1].of(s));
-  for (std::uint32_t s = 0; s < sides_.size(); ++s) part_[s] = parts[0].of(s);
+  for (std::uint32_t s = 0; s < sides_.size(); ++s) parts[0].join(s, parts[1].find(s));
+  for (std::uint32_t s = 0; s < sides_.size(); ++s) part_[s] = parts[0].find(s);
 }
 
-void LeafGather::weighRays(std::size_t half, Parts& parts) {
+void LeafGather::weighRays(std::size_t half, UnionFind& parts) {
   lost_[half] = LostRays(sights_.leafCount());
   const auto steps = sights_.steps(half);
   std::vector<std::uint32_t> joined(sides_.size(), scene::kNone);  // by side: the last that it was joined to
@@ -79,7 +61,7 @@ void LeafGather::weighRays(std::size_t half, Parts& parts) {
 }
 
 /// Where a ray goes on, and on.
-void LeafGather::joinSteps(std::size_t half, std::uint32_t end, Parts& parts) const {
+void LeafGather::joinSteps(std::size_t half, std::uint32_t end, UnionFind& parts) const {
   const auto steps = sights_.steps(half);
   while (end >= sights_.endCount()) {
     const auto& step = steps[end - sights_.endCount()];

@@ -147,6 +147,19 @@ class BurialRecords : public testing::Test {
     }
   }
 
+  /// The scene as it is now, built after that from before: with what was remembered, and without.
+  void takeEdit(Scene& before, BuiltScene& built) const {
+    auto next = build(before, built);
+    const auto anew = build(before, built, false);
+    ASSERT_NO_FATAL_FAILURE(expectSame(next.patches, anew.patches));
+    ASSERT_EQ(next.burial == nullptr, anew.burial == nullptr);  // where nothing is single-sided there are no solids
+    if (next.burial) {
+      ASSERT_NO_FATAL_FAILURE(expectSame(*next.burial, *anew.burial));
+    }
+    before = scene_;
+    built = std::move(next);
+  }
+
   Scene scene_;
   ChartOptions options_{.texel_budget = 6000};
   std::mt19937 random_{7};
@@ -159,16 +172,9 @@ TEST_F(BurialRecords, RandomEditsGiveTheBitsOfLookingAtAllLeavesAgain) {
   std::size_t buried = 0;
   for (int i = 0; i < 40; ++i) {
     editAtRandom();
-    auto next = build(before, built);
-    const auto anew = build(before, built, false);
-    ASSERT_NO_FATAL_FAILURE(expectSame(next.patches, anew.patches)) << "edit " << i;
-    ASSERT_EQ(next.burial == nullptr, anew.burial == nullptr);  // where nothing is single-sided there are no solids
-    if (next.burial) {
-      ASSERT_NO_FATAL_FAILURE(expectSame(*next.burial, *anew.burial)) << "edit " << i;
-      for (const auto& leaf : next.burial->leaves) buried += leaf.buried ? 1 : 0;
-    }
-    before = scene_;
-    built = std::move(next);
+    ASSERT_NO_FATAL_FAILURE(takeEdit(before, built)) << "edit " << i;
+    for (std::size_t k = 0; built.burial && k < built.burial->leaves.size(); ++k)
+      buried += built.burial->leaves[k].buried ? 1 : 0;
   }
   EXPECT_GT(buried, 2000U);
 }
@@ -188,13 +194,8 @@ TEST_F(BurialRecords, ALidThatComesAndGoesGivesTheBitsOfLookingAtAllLeavesAgain)
     const auto home = lid.world;
     for (const bool is_off : {true, false}) {
       lid.world = is_off ? glm::translate(home, glm::dvec3(0.1, 0.3, 0.0)) : home;
-      auto next = build(before, built);
-      EXPECT_EQ(next.patches.solids.bounds.size(), is_off ? closed - 1 : closed);
-      const auto anew = build(before, built, false);
-      ASSERT_NO_FATAL_FAILURE(expectSame(next.patches, anew.patches)) << k << is_off;
-      ASSERT_NO_FATAL_FAILURE(expectSame(*next.burial, *anew.burial)) << k << is_off;
-      before = scene_;
-      built = std::move(next);
+      ASSERT_NO_FATAL_FAILURE(takeEdit(before, built)) << k << is_off;
+      EXPECT_EQ(built.patches.solids.bounds.size(), is_off ? closed - 1 : closed);
     }
   }
 }
@@ -221,12 +222,7 @@ TEST_F(BurialRecords, SolidsOfTwoMaterialsAndCavitiesGiveTheBitsOfLookingAtAllLe
         scene_.instances.push_back({.node = next_node_, .primitive = primitive, .world = home});
       ++next_node_;
     }
-    auto next = build(before, built);
-    const auto anew = build(before, built, false);
-    ASSERT_NO_FATAL_FAILURE(expectSame(next.patches, anew.patches)) << i;
-    ASSERT_NO_FATAL_FAILURE(expectSame(*next.burial, *anew.burial)) << i;
-    before = scene_;
-    built = std::move(next);
+    ASSERT_NO_FATAL_FAILURE(takeEdit(before, built)) << i;
   }
 }
 
@@ -245,13 +241,8 @@ TEST_F(BurialRecords, AnAngleClosedByASheetGivesTheBitsOfLookingAtAllLeavesAgain
         scene_.instances.push_back({.node = next_node_, .primitive = primitive, .world = home});
       ++next_node_;
     }
-    auto next = build(before, built);
-    EXPECT_EQ(next.patches.solids.bounds.size(), i % 2 == 0 ? closed + 1 : closed);
-    const auto anew = build(before, built, false);
-    ASSERT_NO_FATAL_FAILURE(expectSame(next.patches, anew.patches)) << i;
-    ASSERT_NO_FATAL_FAILURE(expectSame(*next.burial, *anew.burial)) << i;
-    before = scene_;
-    built = std::move(next);
+    ASSERT_NO_FATAL_FAILURE(takeEdit(before, built)) << i;
+    EXPECT_EQ(built.patches.solids.bounds.size(), i % 2 == 0 ? closed + 1 : closed);
   }
 }
 

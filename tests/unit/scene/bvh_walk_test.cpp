@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <glm/geometric.hpp>
 #include <random>
 #include <tuple>
@@ -42,7 +43,7 @@ TEST(BvhWalk, FindsTheEndOfASolidThatAllHitsTell) {
     const auto all = sortedHits(tree, origin, direction, 2.0);
     std::vector<RayHit> hits;
     std::uint64_t work = 0;
-    const auto end = solids.endOfSolid(origin, direction, 2.0, hits, work);
+    const auto end = SolidTree::endOfSolid(std::array{&solids}, origin, direction, 2.0, hits, work);
     ASSERT_EQ(end, endOf(all));
     (end ? inside : outside) += 1;
     if (end) continue;
@@ -65,7 +66,7 @@ TEST(BvhWalk, WhatLiesBehindTheEndOfASolidCostsNothing) {
   std::uint64_t work = 0;
   for (int i = 0; i < 100; ++i) {
     const double z = i / 100.0 + 0.0001;
-    EXPECT_TRUE(solids.endOfSolid({0.01, -0.1, z}, {0.01, 0.02, 1.0}, 8.0, hits, work));
+    EXPECT_TRUE(SolidTree::endOfSolid(std::array{&solids}, {0.01, -0.1, z}, {0.01, 0.02, 1.0}, 8.0, hits, work));
   }
   EXPECT_LT(work / 100, 100U) << "of 4000";
 }

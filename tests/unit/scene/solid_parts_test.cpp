@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <random>
 
 #include "server/scene/patch_scene.h"
@@ -68,7 +69,7 @@ TEST_F(Parts, OfClosedBlocksTellWhetherAPlaceLiesInOne) {
     parts.find({place, place}, std::nullopt, around);
     const glm::dvec3 direction(anywhere());
     const bool ends = SolidTree::endOfSolid(around.trees, place, direction, 8.0, hits, work).has_value();
-    EXPECT_EQ(ends, all.endOfSolid(place, direction, 8.0, hits, work_of_all).has_value());
+    EXPECT_EQ(ends, SolidTree::endOfSolid(std::array{&all}, place, direction, 8.0, hits, work_of_all).has_value());
     EXPECT_FALSE(around.in_hollow);
     inside += ends ? 1 : 0;
     blocks += around.trees.size();
