@@ -4,39 +4,45 @@
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
-#include <future>
-#include <system_error>
-#include <thread>
-#include <vector>
+#include <cstdint>
 
 namespace radiosity {
 
-/// Calls work(share, shares) once for every share in [0, shares): share 0 in this thread, the others side by side in
-/// threads of their own, one a core, at most `most`. When all have ended, what one of them threw is thrown here.
+/// What is called for a share of the work. It refers to the callable, which is to outlive it.
+class ShareOfWork {
+ public:
+  template <typename Work>
+  explicit ShareOfWork(const Work& work)
+      : work_(&work), call_([](const void* of, std::size_t share) { (*static_cast<const Work*>(of))(share); }) {}
+  void operator()(std::size_t share) const { call_(work_, share); }
+
+ private:
+  const void* work_;
+  void (*call_)(const void* work, std::size_t share);
+};
+
+/// Calls work(share) once for every share in [0, shares): 0 in this thread, the others in threads that wait for such
+/// work, one a core but one, or in this one where none of them is free. So shares must not wait for each other; they
+/// may be divided again. When all have ended, what one of them threw is thrown here. It takes 10 to 20 us.
+void doShares(std::size_t shares, const ShareOfWork& work);
+/// Shares that can be done at the same time, 16 at most.
+[[nodiscard]] std::size_t mostShares();
+
+/// Calls work(share, shares) once for every share in [0, shares), of which there are `most`, or as many as can be done
+/// at the same time: as doShares().
 template <typename Work>
 void inShares(std::size_t most, const Work& work) {
-  static const std::size_t cores = std::max(1U, std::thread::hardware_concurrency());  // which reads a file
-  const std::size_t shares = std::clamp<std::size_t>(most, 1, std::min<std::size_t>(cores, 16));
-  std::vector<std::future<void>> others;
-  others.reserve(shares);
-  std::size_t started = 1;
-  try {
-    for (; started < shares; ++started)
-      others.push_back(std::async(std::launch::async, [&work, share = started, shares] { work(share, shares); }));
-  } catch (const std::system_error&) {  // no more threads to be had: this one does their shares
-  }
-  work(std::size_t{0}, shares);  // throws: the destructors of `others` wait
-  for (auto share = started; share < shares; ++share) work(share, shares);
-  for (auto& other : others) other.get();
+  const std::size_t shares = std::clamp<std::size_t>(most, 1, mostShares());
+  const auto one = [&](std::size_t share) { work(share, shares); };
+  doShares(shares, ShareOfWork(one));
 }
 
 /// Calls work(part) once for every part in [0, parts), each by whichever thread of inShares() is free: where some parts
-/// take far longer than others, and nobody knows which. What one of them threw is thrown here when all threads have
-/// ended.
+/// take far longer than others, and nobody knows which. At most `most` threads. As doShares().
 template <typename Work>
-void inTurns(std::size_t parts, const Work& work) {
+void inTurns(std::size_t parts, const Work& work, std::size_t most = SIZE_MAX) {
   std::atomic<std::size_t> next{0};
-  inShares(parts, [&](std::size_t, std::size_t) {
+  inShares(std::min(parts, most), [&](std::size_t, std::size_t) {
     for (auto part = next++; part < parts; part = next++) work(part);
   });
 }

@@ -1,0 +1,122 @@
+#include "common/parallel.h"
+
+#include <condition_variable>
+#include <deque>
+#include <exception>
+#include <mutex>
+#include <system_error>
+#include <thread>
+
+namespace radiosity {
+namespace {
+
+constexpr std::size_t kMostShares = 16;
+
+/// Shares of one piece of work. All but `work` is the helpers', under their lock.
+struct Job {
+  const ShareOfWork& work;
+  std::size_t shares;
+  std::size_t next = 1;       ///< to be taken; 0 is its thread's own
+  std::size_t under_way = 0;  ///< by helpers
+  std::exception_ptr failed;
+};
+
+/// Threads that wait for shares. To start one anew for each takes 50 us and more, with its stack and its heap, and a
+/// lamp's edit of a small room, 10 ms, asks for twenty.
+class Helpers {
+ public:
+  /// Never destroyed: a thread of the program may still be at work when the process ends.
+  static Helpers& all() {
+    static auto* helpers = new Helpers;
+    return *helpers;
+  }
+
+  void carryOut(Job& job) {
+    offer(job);
+    std::size_t share = 0;
+    do {
+      attempt(job, share);
+    } while (takeOwn(job, share));
+    std::unique_lock lock(mutex_);
+    done_.wait(lock, [&] { return job.under_way == 0; });
+  }
+
+ private:
+  void offer(Job& job) {
+    const std::scoped_lock lock(mutex_);
+    startThreads();
+    jobs_.push_back(&job);
+    for (auto waiting = std::min(idle_, job.shares - 1); waiting > 0; --waiting) offered_.notify_one();
+  }
+
+  void startThreads() {
+    try {
+      for (; started_ + 1 < mostShares(); ++started_) std::thread([this] { serve(); }).detach();
+    } catch (const std::system_error&) {  // no more threads to be had: those who ask do the work
+    }
+  }
+
+  /// The thread whose job it is takes what no helper has taken.
+  bool takeOwn(Job& job, std::size_t& share) {
+    const std::scoped_lock lock(mutex_);
+    if (job.next == job.shares) return false;
+    share = take(job);
+    return true;
+  }
+
+  std::size_t take(Job& job) {
+    const auto share = job.next++;
+    if (job.next == job.shares) std::erase(jobs_, &job);
+    return share;
+  }
+
+  void attempt(Job& job, std::size_t share) {
+    try {
+      job.work(share);
+    } catch (...) {
+      const std::scoped_lock lock(mutex_);
+      if (!job.failed) job.failed = std::current_exception();
+    }
+  }
+
+  [[noreturn]] void serve() {
+    std::unique_lock lock(mutex_);
+    while (true) {
+      ++idle_;
+      offered_.wait(lock, [&] { return !jobs_.empty(); });
+      --idle_;
+      auto& job = *jobs_.front();
+      const auto share = take(job);
+      ++job.under_way;
+      lock.unlock();
+      attempt(job, share);
+      lock.lock();
+      if (--job.under_way == 0) done_.notify_all();
+    }
+  }
+
+  std::mutex mutex_;
+  std::condition_variable offered_, done_;
+  std::deque<Job*> jobs_;  // of which shares are left
+  std::size_t started_ = 0, idle_ = 0;
+};
+
+}  // namespace
+
+std::size_t mostShares() {
+  static const std::size_t cores =
+      std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, kMostShares);  // which reads a file
+  return cores;
+}
+
+void doShares(std::size_t shares, const ShareOfWork& work) {
+  if (shares <= 1 || mostShares() == 1) {
+    for (std::size_t share = 0; share < shares; ++share) work(share);
+    return;
+  }
+  Job job{work, shares, 1, 0, nullptr};
+  Helpers::all().carryOut(job);
+  if (job.failed) std::rethrow_exception(job.failed);
+}
+
+}  // namespace radiosity
