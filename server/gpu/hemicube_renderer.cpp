@@ -25,6 +25,15 @@ void setViewport(std::uint32_t resolution, std::size_t face) {
   glViewport(0, row, n, face == 0 ? n : n / 2);
 }
 
+/// Large triangles that cross a window would fill the face.
+void setScissor(const ViewWindow& window, const solver::HemicubeFrame& frame, std::uint32_t resolution,
+                std::size_t face) {
+  const auto [first, end] = pixelsAround(window, frame, resolution, face);
+  glEnable(GL_SCISSOR_TEST);
+  glScissor(static_cast<GLint>(first.x), static_cast<GLint>(first.y), static_cast<GLsizei>(end.x - first.x),
+            static_cast<GLsizei>(end.y - first.y));
+}
+
 }  // namespace
 
 Result<HemicubeRenderer::Programs> HemicubeRenderer::buildPrograms(const EglContext& context, Drawing drawing,
@@ -145,7 +154,9 @@ std::size_t HemicubeRenderer::select(std::uint32_t resolution, std::span<const H
 /// shader chooses the viewport llvmpipe takes triangles apart, with an allocation and three vertices for each, which
 /// took as long as drawing them.
 void HemicubeRenderer::draw(TriangleCuller::Lists TriangleCuller::Selection::*lists, std::uint32_t resolution,
-                            std::size_t views, solver::TransportCounters& counters) {
+                            std::span<const HemicubeView> of, solver::TransportCounters& counters) {
+  const std::size_t views = of.size();
+  const auto* window = views == 1 && of[0].window ? &*of[0].window : nullptr;
   indices_.clear();
   commands_.clear();
   std::array<std::size_t, RAD_FACES + 1> first{};
@@ -170,9 +181,11 @@ void HemicubeRenderer::draw(TriangleCuller::Lists TriangleCuller::Selection::*li
     const auto count = first[face + 1] - first[face];
     if (count == 0) continue;
     setViewport(resolution, face);
+    if (window != nullptr) setScissor(*window, of[0].frame, resolution, face);
     const auto* from = reinterpret_cast<const void*>(first[face] * sizeof(DrawCommand));
     glMultiDrawElementsIndirect(GL_TRIANGLES, GL_UNSIGNED_INT, from, static_cast<GLsizei>(count), 0);
   }
+  if (window != nullptr) glDisable(GL_SCISSOR_TEST);
 }
 
 void HemicubeRenderer::drawEverything(std::uint32_t resolution, std::size_t views,
@@ -247,9 +260,9 @@ void HemicubeRenderer::placeFaces(std::uint32_t resolution, std::span<const Hemi
 void HemicubeRenderer::drawSelected(std::uint32_t resolution, std::span<const HemicubeView> views, const Target& into,
                                     solver::TransportCounters& counters) {
   const auto waiting = select(resolution, views, counters);
-  draw(&TriangleCuller::Selection::first, resolution, views.size(), counters);
+  draw(&TriangleCuller::Selection::first, resolution, views, counters);
   if (waiting >= kWorthASecondLook * views.size()) takeHidden(resolution, views, into, counters);
-  draw(&TriangleCuller::Selection::second, resolution, views.size(), counters);
+  draw(&TriangleCuller::Selection::second, resolution, views, counters);
 }
 
 void HemicubeRenderer::render(HemicubePass pass, std::uint32_t resolution, std::span<const HemicubeView> views,

@@ -78,8 +78,8 @@ class HemicubeRenderer {
                      solver::TransportCounters& counters);
   void takeHidden(std::uint32_t resolution, std::span<const HemicubeView> views, const Target& target,
                   solver::TransportCounters& counters);
-  void draw(TriangleCuller::Lists TriangleCuller::Selection::*lists, std::uint32_t resolution, std::size_t views,
-            solver::TransportCounters& counters);
+  void draw(TriangleCuller::Lists TriangleCuller::Selection::*lists, std::uint32_t resolution,
+            std::span<const HemicubeView> views, solver::TransportCounters& counters);
   void useProgram(HemicubePass pass) const;
   void setState(HemicubePass pass, const Target& target);
 

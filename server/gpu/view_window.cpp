@@ -180,4 +180,21 @@ PixelSpan pixelsInside(const ViewWindow& window, const solver::HemicubeFrame& fr
   return {static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(last) + 1};
 }
 
+PixelRectangle pixelsAround(const ViewWindow& window, const solver::HemicubeFrame& frame, std::uint32_t resolution,
+                            std::size_t face) {
+  const auto rows = face == 0 ? resolution : resolution / 2;
+  const auto low = face == 0 ? 0 : resolution + (static_cast<std::uint32_t>(face) - 1) * (resolution / 2);
+  PixelRectangle around{glm::uvec2(resolution, low + rows), glm::uvec2(0)};
+  for (auto row = low; row < low + rows; ++row) {
+    const auto inside = pixelsInside(window, frame, resolution, row);
+    if (inside.first == inside.end) continue;
+    around.first = {std::min(around.first.x, inside.first), std::min(around.first.y, row)};
+    around.end = {std::max(around.end.x, inside.end), row + 1};
+  }
+  if (around.end.x == 0) return {};
+  around.first = {around.first.x - std::min(around.first.x, 1U), std::max(around.first.y, low + 1) - 1};
+  around.end = {std::min(around.end.x + 1, resolution), std::min(around.end.y + 1, low + rows)};
+  return around;
+}
+
 }  // namespace radiosity::gpu

@@ -3,8 +3,10 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <optional>
 #include <span>
@@ -40,5 +42,13 @@ struct PixelSpan {
 };
 [[nodiscard]] PixelSpan pixelsInside(const ViewWindow& window, const solver::HemicubeFrame& frame,
                                      std::uint32_t resolution, std::uint32_t row);
+
+/// Of a face's pixels, those that hold all that lie in the window and their neighbours: columns and rows of the image,
+/// [first, end).
+struct PixelRectangle {
+  glm::uvec2 first{0}, end{0};
+};
+[[nodiscard]] PixelRectangle pixelsAround(const ViewWindow& window, const solver::HemicubeFrame& frame,
+                                          std::uint32_t resolution, std::size_t face);
 
 }  // namespace radiosity::gpu

@@ -154,7 +154,7 @@ Result<StepOutcome> LinkedSolver::catchUp() {
 }
 
 void LinkedSolver::beExact() {
-  lights_may_be_rough_ = false;
+  lights_may_be_rough_ = may_look_past_ = false;
   due_ = repairs_.size();
 }
 

@@ -19,6 +19,8 @@ namespace {
 /// What arrives, escapes and is absorbed makes all that is sent; a polygon's area is known to 0.002 of it. A sum of
 /// some links in the place of what should arrive does not.
 constexpr double kNoSum = 0.005;
+/// So much of what a shooter sends, in parts of the asked error, is too little to look for it.
+constexpr double kLittleLost = 0.01;
 /// Repairs of a slice before it is known how long they take.
 constexpr std::size_t kMostAtOnce = 1024;
 
@@ -45,7 +47,7 @@ std::pair<glm::vec3, float> circle(const LightPolygon& light) {
 
 /// Some repairs on their way.
 struct LinkedSolver::RepairBatch {
-  std::span<const Repair> repairs;
+  std::span<Repair> repairs;
   std::vector<std::vector<LinkColumn::ValueRun>> leaves;  ///< by repair: those to be taken again; unused where whole
   ShotBatch shots;
   struct Sample {
@@ -133,6 +135,15 @@ void LinkedSolver::addSamples(const Repair& repair, ShotBatch& batch) const {
                settings_.planner.lightResolution(i), batch);
 }
 
+/// Whether its looks need not see again what they lost before, in cracks and on backs: that is taken to be lost still,
+/// beside what is lost now where the change is. It is so much at most, and each edit adds to it, until it is no longer
+/// little and is looked at.
+bool LinkedSolver::losesLittle(const Repair& repair) const {
+  const auto& shooter = system_.shooters()[repair.shooter];
+  const auto& column = shooter.column[repair.half];
+  return column.escaped() + column.absorbed() <= kLittleLost * settings_.target_error * shooter.area;
+}
+
 void LinkedSolver::findCutLinks(RepairBatch& repairs) const {
   repairs.leaves.resize(repairs.repairs.size());
   inBothHalves([&](std::size_t worker) {
@@ -178,6 +189,7 @@ Result<void> LinkedSolver::repairSlice() {
     repair.samples = samples;
     repair.looked = 0;  // what is there is no longer the mean of what looked
     repair.found = {};
+    repair.past_losses = false;
   }
   batch.repairs = std::span(repairs_).subspan(repaired_, count);
   batch.sum.resize(system_.leafAreas().size());
@@ -190,8 +202,9 @@ Result<void> LinkedSolver::repairSlice() {
     shots.boxes.insert(shots.boxes.end(), earlier.begin(), earlier.end());
   }
   for (std::uint32_t r = 0; r < batch.repairs.size(); ++r) {
-    const auto& repair = batch.repairs[r];
+    auto& repair = batch.repairs[r];
     if (!repair.whole && batch.leaves[r].empty()) continue;
+    repair.past_losses = repair.past_losses || (may_look_past_ && losesLittle(repair));
     const auto first_run = static_cast<std::uint32_t>(shots.receivers.size());
     std::uint32_t side = 0;
     for (const auto& run : batch.leaves[r]) {
@@ -211,6 +224,7 @@ Result<void> LinkedSolver::repairSlice() {
       shot.first_box = repair.overtaken ? static_cast<std::uint32_t>(boxes.size()) : 0;
       shot.box_count = static_cast<std::uint32_t>(repair.overtaken ? shots.boxes.size() - boxes.size() : boxes.size());
       // Where nothing was lost, whatever is lost now is lost where the change is seen.
+      if (repair.past_losses) continue;
       const auto& column = system_.shooters()[repair.shooter].column[repair.half];
       shot.open_looks = column.openLooks().from(std::exchange(looks, looks + shot.point_count), shot.point_count);
     }
@@ -290,7 +304,8 @@ void LinkedSolver::replacePart(RepairBatch& repairs, std::uint32_t index) {
     if (repair.looked > 0) addEarlierLooks(column, repair.looked, run, sum, before);
     for (auto& value : sum) value *= static_cast<float>(part);
   }
-  const auto& found = repairs.totals;
+  auto& found = repairs.totals;
+  if (repair.past_losses) found.open_looks.bits |= column.openLooks().bits;
   if (std::exchange(repairs.open, false)) {
     system_.forget(repair.shooter, repair.half);
     repairs.anew.push_back({repair.shooter, repair.old_shooter, repair.half, repair.samples, true, repair.overtaken});
@@ -307,8 +322,13 @@ void LinkedSolver::replacePart(RepairBatch& repairs, std::uint32_t index) {
     repairs.rough.back().found = found;
     repairs.rough.back().noise = noiseBetweenHalves(repair, leaves);
   } else {
-    system_.replaceLinks(repair.shooter, repair.half, leaves, repairs.sum,
-                         {part * found.due, part * found.escaped, part * found.absorbed, found.open_looks});
+    LinkColumn::Totals totals{part * found.due, part * found.escaped, part * found.absorbed, found.open_looks};
+    if (repair.past_losses) {
+      totals.due -= column.escaped() + column.absorbed();
+      totals.escaped += column.escaped();
+      totals.absorbed += column.absorbed();
+    }
+    system_.replaceLinks(repair.shooter, repair.half, leaves, repairs.sum, totals);
   }
   for (const auto& run : leaves) std::fill_n(repairs.sum.begin() + run.first, run.count, 0.0F);
 }

@@ -108,6 +108,7 @@ class LinkedSolver final : public Solver {
     std::uint32_t looked = 0;       ///< points that have
     LinkColumn::Totals found = {};  ///< by them, times points
     double noise = 0.0;             ///< square of the error of irradiance times area, where both halves have as many
+    bool past_losses = false;       ///< its looks see where the change is alone, whatever is lost elsewhere
   };
   /// Where the sides of the scene before are now.
   struct Renumbering {
@@ -159,6 +160,7 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] std::uint32_t shotsOf(const Repair& repair) const;
   [[nodiscard]] bool isNeeded(Repair& repair);
   void addSamples(const Repair& repair, ShotBatch& batch) const;
+  [[nodiscard]] bool losesLittle(const Repair& repair) const;
   void findCutLinks(RepairBatch& repairs) const;
   void takePart(RepairBatch& repairs, std::size_t shot, LinkSample& links);
   void replacePart(RepairBatch& repairs, std::uint32_t index);
@@ -283,6 +285,7 @@ class LinkedSolver final : public Solver {
   double postponed_ = 0.0;            // part of the target error that the others may cause
   double roughness_ = 0.0;            // likewise: lights that look again with some points only
   bool lights_may_be_rough_ = true;   // that they may
+  bool may_look_past_ = true;         // of what is lost, little that is lost elsewhere need not be seen again
   double norm_before_ = 0.0;          // of irradiance before the edit; 0: not known
   std::unique_ptr<Shadows> shadows_;  // of the edit
   std::unique_ptr<Shadows> earlier_shadows_;          // and of those before it, for links that no edit saw taken again

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -120,8 +121,47 @@ TEST_F(ChairEdit, ShowsLightBeforeItHasWhatMattersLittleAndHasAllInTheEnd) {
   EXPECT_LT(stated(), 0.75 * settings_.target_error);
   for (int i = 0; i < 1000 && early.isBehind(); ++i) ASSERT_TRUE(early.step());
   EXPECT_FALSE(early.isBehind());  // nobody steps any further then: the light is that of the links
-  expectSameLinks(early, *exact, *after.patches);
+  expectSameLinks(early, *exact, *after.patches, 0.01 * settings_.target_error);
   EXPECT_LT(difference(early, *exact, *after.patches), 1e-4);
+}
+
+// Lamps lose a pixel here and there, in cracks and on backs. Looks that see again where the change is alone cannot know
+// of it, and need not while it is little beside the asked error: it counts as lost still, so that what is lost is never
+// taken for less than it is.
+TEST_F(ChairEdit, LooksPastWhatLittleIsLostElsewhere) {
+  settings_.target_error = 0.1;
+  const auto after = edited(before_, move_);
+  const auto map = mapOf(before_, after);
+  const auto first = solved(before_), second = solved(before_), third = solved(before_);
+  const auto exact = successor(*first, after, map);
+  const auto lostOf = [](const LinkedSolver& solver, std::size_t n, std::size_t half) {
+    const auto& column = solver.system().shooters()[n].column[half];
+    return column.escaped() + column.absorbed();
+  };
+  const auto seeAgain = [&](LinkedSolver& former) {
+    std::vector<std::array<double, 2>> before;  // which goes over to the other
+    for (std::size_t n = 0; n < former.system().shooters().size(); ++n)
+      before.push_back({lostOf(former, n, 0), lostOf(former, n, 1)});
+    LinkedSolver solver(after.patches, after.materials, *transport_, settings_, {}, former, map);
+    settle(solver);
+    for (int i = 0; i < 1000 && solver.isBehind(); ++i) EXPECT_TRUE(solver.step());
+    EXPECT_FALSE(solver.isBehind());
+    bool more = false;
+    for (std::size_t n = 0; n < solver.system().shooters().size(); ++n) {
+      const auto& shooter = solver.system().shooters()[n];
+      for (std::size_t half = 0; half < 2 && shooter.isLight(); ++half) {
+        const double lost = lostOf(solver, n, half), is_lost = lostOf(*exact, n, half);
+        EXPECT_NEAR(shooter.column[half].totals().due + lost, shooter.area, 1e-6 * shooter.area);
+        EXPECT_GE(lost, is_lost - 1e-9);
+        EXPECT_LE(lost, is_lost + before.at(n)[half] + 1e-9);
+        more = more || lost > is_lost + 1e-9;
+      }
+    }
+    EXPECT_EQ(more, settings_.target_error > 0.01) << "this scene tells nothing";
+  };
+  seeAgain(*second);
+  settings_.target_error = 1e-4;  // beside which nothing of what is lost is little
+  seeAgain(*third);
 }
 
 TEST_F(ChairEdit, WithLittleRoomUnderTheTargetWaitsForLess) {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <optional>
 #include <set>
 
 #include "server/gpu/hemicube_renderer.h"
@@ -184,6 +185,59 @@ TEST_F(CulledImages, AreThoseOfAllTrianglesThatStandOnTheShootersPlane) {
     EXPECT_EQ(images(scene, gpu::HemicubePass::kItems, resolution, views, {.hidden = false}), all);
     if (resolution <= 32) {
       EXPECT_LT(3 * counters_.triangles_drawn, 2 * drawn);
+    }
+  }
+}
+
+/// Around a part of what a view sees.
+std::optional<gpu::ViewWindow> windowIn(const gpu::HemicubeView& view, std::mt19937& random) {
+  std::uniform_real_distribution<float> any(-1.0F, 1.0F), narrow(-0.2F, 0.2F);
+  const auto axes = gpu::hemicubeAxes(view.frame);
+  const auto middle = axes.normal + any(random) * axes.tangent + any(random) * axes.bitangent;
+  std::vector<glm::vec3> points;
+  for (int i = 0; i < 4; ++i)
+    points.push_back(axes.origin + middle + narrow(random) * axes.tangent + narrow(random) * axes.bitangent);
+  return gpu::windowAround(view.frame, points, {}, 0.02F);
+}
+
+// What lies in a window is all there; of the rest nothing is drawn but what a single view's faces have around it.
+TEST_F(CulledImages, ThroughAWindowAreThoseOfAllTrianglesWithin) {
+  const auto scene = randomRoom(600, 600, 3);
+  std::mt19937 random(23);
+  std::vector<gpu::HemicubeView> views;
+  for (int i = 0; i < 24; ++i) views.push_back({shotFrom(*scene, random() % 600, 0.4F, 0.3F, 32, random).frame, 0.5F});
+  for (const std::uint32_t resolution : {32U, 128U}) {
+    const auto all = images(scene, gpu::HemicubePass::kItems, resolution, views, {});
+    auto within = views;
+    for (auto& view : within) view.window = windowIn(view, random);
+    const auto some = images(scene, gpu::HemicubePass::kItems, resolution, within, {});
+    ASSERT_EQ(some.size(), all.size());
+    std::size_t windows = 0, inside = 0, around = 0, unlike = 0, beyond = 0;
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      const auto& window = within[i].window;
+      const auto first = i * gpu::hemicubePixels(resolution);
+      windows += window ? 1 : 0;
+      for (std::uint32_t row = 0; row < 3 * resolution && window; ++row) {
+        const auto face = row < resolution ? 0 : 1 + (row - resolution) / (resolution / 2);
+        const auto span = gpu::pixelsInside(*window, views[i].frame, resolution, row);
+        const auto box = gpu::pixelsAround(*window, views[i].frame, resolution, face);
+        for (std::uint32_t column = 0; column < resolution; ++column) {
+          const auto pixel = first + row * resolution + column;
+          const bool is_in = column >= span.first && column < span.end;
+          const bool is_around = column >= box.first.x && column < box.end.x && row >= box.first.y && row < box.end.y;
+          inside += is_in ? 1 : 0;
+          around += is_around ? 1 : 0;
+          unlike += is_in && (some[pixel] != all[pixel] || !is_around) ? 1 : 0;
+          beyond += !is_around && some[pixel] != RAD_ITEM_NONE ? 1 : 0;
+        }
+      }
+    }
+    EXPECT_GT(windows, 16U);
+    EXPECT_GT(inside, windows * resolution * resolution / 100);
+    EXPECT_LT(around, windows * resolution * resolution);
+    EXPECT_EQ(unlike, 0U) << "of " << inside;
+    if (resolution == 128) {
+      EXPECT_EQ(beyond, 0U);
     }
   }
 }
