@@ -17,8 +17,6 @@ namespace {
 
 /// Rays of each half of a leaf that a solve begins with.
 constexpr std::uint16_t kFirstRays = 8;
-/// The residual that is left, of all that is gathered: far below any sampling error, and the level is right anyway.
-constexpr double kSolved = 4e-4;
 constexpr int kMaxSweeps = 400;
 /// What rays that went on from as many leaves as they may bring from where they end counts so many times: in a level of
 /// closed pockets the error is 3.6 to 4.0 %, with this 3.1 % are stated, and with 1 2.2 %.
@@ -219,7 +217,7 @@ void LeafGather::takeLight(std::size_t h) {
   for (std::size_t c = 0; c < 3; ++c) {
     half.shining += shining[c];
     // A norm over areas bounds the sum over them (Cauchy and Schwarz).
-    if (area > 0.0) tolerance[c] = kSolved * shining[c] / std::sqrt(area);
+    if (area > 0.0) tolerance[c] = light_.residual * shining[c] / std::sqrt(area);
   }
   RayGmres::Vectors nothing;
   for (auto& channel : nothing) channel.assign(leaves, 0.0F);

@@ -42,6 +42,7 @@ struct LeftLight {
   std::array<std::vector<glm::vec3>, 2> irradiance;  ///< over links, by half
   std::array<std::vector<glm::vec3>, 2> shot;        ///< radiosity that shooters stand for, by half
   std::array<glm::dvec3, 2> sky{};                   ///< pi times its radiance, above the horizon and below
+  double residual = 4e-4;                            ///< that may be left, of all that is gathered
 };
 
 class LeafGather {

@@ -25,6 +25,9 @@ constexpr double kLightShot = 2.0;
 /// most of a scene is dark, so many times as bright as what lies in the middle of all reflected light: in one room the
 /// former is 3.3 times that, and a lit living room in a dark shell takes half the time.
 constexpr double kBright = 8.0, kBrightBesideUsual = 3.3;
+/// The equation on leaves is solved to so much of the asked error, within these bounds: far below any sampling error,
+/// and the level of light is right anyway. The lower is what rounding leaves.
+constexpr double kResidual = 0.05, kLeastResidual = 2e-5, kMostResidual = 1e-3;
 /// A side has light over links that is worth the name: of the mean of all.
 constexpr double kLit = 0.5;
 /// A round ends where it is likely to bring the error to this part of the target: what it goes by is uncertain.
@@ -159,6 +162,7 @@ std::vector<glm::vec3> LinkedSolver::shiningOfLeaves() const {
 
 LeftLight LinkedSolver::leftLight() const {
   LeftLight light;
+  light.residual = std::clamp(kResidual * settings_.target_error, kLeastResidual, kMostResidual);
   light.emission = shiningOfLeaves();
   light.reflectance = ofLeaves(system_.reflectance());
   light.irradiance = over_links_;
