@@ -6,12 +6,15 @@
 #include <glm/common.hpp>
 
 #include "common/check.h"
+#include "common/parallel.h"
 
 namespace radiosity::scene {
 namespace {
 
 constexpr float kMinVisible = 0.25F;  // below that a texel's own value is too little light to be trusted
 constexpr std::uint8_t kMaxRing = 250;
+/// Texels of surfaces that are made side by side before they take their places, and that a thread is worth.
+constexpr std::size_t kTexelsAtOnce = std::size_t{1} << 18U, kTexelsAThread = 4096;
 
 /// A surface's texels with a margin of gutter around them.
 struct Patchwork {
@@ -29,6 +32,10 @@ struct Patchwork {
 /// The margin that no other chart's margin overlaps: pages are packed with `gutter` texels between charts, and a
 /// bilinear lookup on a chart reaches one texel beyond it at most.
 constexpr std::int64_t kMargin = 1;
+
+std::size_t texelsOf(const Surface& surface) {
+  return (std::size_t{surface.width} + 2 * kMargin) * (surface.height + 2 * kMargin);
+}
 
 Patchwork gather(const PatchScene& patches, const Surface& surface, std::span<const glm::vec3> values) {
   const Page& page = patches.pages[surface.page];
@@ -146,10 +153,11 @@ class PageMaker {
   }
 
   std::vector<LightmapPage> make(Seams seams) {
-    for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
-      Patchwork p = gather(patches_, patches_.surfaces[s], values_);
-      fillUnknown(p);
-      place(s, p);
+    const auto all = static_cast<std::uint32_t>(patches_.surfaces.size());
+    for (std::uint32_t first = 0, last = 0; first < all; first = last) {
+      std::size_t texels = 0;
+      while (last < all && texels < kTexelsAtOnce) texels += texelsOf(patches_.surfaces[last++]);
+      placeAll(first, last, texels);
     }
     // Surfaces may cover each other here and there: once all have their places.
     for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
@@ -171,6 +179,17 @@ class PageMaker {
       return std::ranges::lower_bound(patches_.covered, leaf, {}, &PatchScene::Covered::leaf);
     };
     return {from(surface.first_leaf), from(surface.first_leaf + surface.width * surface.height)};
+  }
+
+  /// Of surfaces of so many texels in all: one after the other takes its place, so that all cores come to the same.
+  void placeAll(std::uint32_t first, std::uint32_t last, std::size_t texels) {
+    std::vector<Patchwork> made(last - first);
+    const auto make = [&](std::size_t i) {
+      made[i] = gather(patches_, patches_.surfaces[first + i], values_);
+      fillUnknown(made[i]);
+    };
+    inTurns(made.size(), make, texels / kTexelsAThread);
+    for (auto s = first; s < last; ++s) place(s, made[s - first]);
   }
 
   /// The light of leaves that other surfaces cover, whose charts have their places already.

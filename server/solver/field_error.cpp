@@ -67,6 +67,13 @@ void FieldError::addSide(const Side& side, std::span<const glm::vec3> first, std
   }
 }
 
+void FieldError::add(const FieldError& other) {
+  square_ += other.square_;
+  spread_ += other.spread_;
+  bent_ += other.bent_;
+  bent_square_ += other.bent_square_;
+}
+
 double FieldError::sampling() const { return square_ > 0.0 ? std::sqrt(spread_ / square_) : 0.0; }
 
 double FieldError::discretization() const {

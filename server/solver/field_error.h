@@ -14,6 +14,8 @@ class FieldError {
   explicit FieldError(const scene::PatchScene& patches) : patches_(patches) {}
 
   void addSide(const Side& side, std::span<const glm::vec3> first, std::span<const glm::vec3> second);
+  /// Of other leaves.
+  void add(const FieldError& other);
 
   /// Area-weighted sum of the squares of the mean of the halves.
   [[nodiscard]] double square() const { return square_; }

@@ -251,7 +251,8 @@ void LeafSmoother::forget() {
 /// What was taken of one leaf is a product of two uncertain numbers; of many around it the mean tells.
 std::vector<float> LeafSmoother::biasOfLeaves() const {
   std::vector<double> bias(by_chance_);
-  for (const auto& side : sides_) {
+  const auto weighSide = [&](std::size_t s) {
+    const auto& side = sides_[s];
     std::vector<Gain> taken(side.leaf_count);
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
       taken[leaf] = {taken_[side.first_value + leaf], areaOf(side.first_value + leaf), 1};
@@ -261,7 +262,8 @@ std::vector<float> LeafSmoother::biasOfLeaves() const {
       const auto v = side.first_value + leaf;
       if (around.bend > 0.0) bias[v] += std::max(0.0, around.slope) * areaOf(v) / around.bend;
     }
-  }
+  };
+  inTurns(sides_.size(), weighSide, area_.size() / kLeavesAThread);
   const double all = std::reduce(bias.begin(), bias.end());
   std::vector<float> of_leaf(bias.size(), 0.0F);
   for (std::size_t v = 0; v < bias.size(); ++v) {

@@ -7,7 +7,7 @@
 #include <new>
 #include <system_error>
 
-#include "server/solver/field_error.h"
+#include "common/parallel.h"
 #include "server/solver/linked_solver.h"
 
 namespace radiosity::solver {
@@ -32,20 +32,7 @@ void LinkedSolver::assess() {
     });
     return;
   }
-  FieldError field(*patches_);
-  double received = 0.0, reflected = 0.0;
-  for (const auto& side : sides_) {
-    const auto leaves = [&](std::size_t half) {
-      return std::span<const glm::vec3>(&half_[half][side.first_value], side.leaf_count);
-    };
-    field.addSide(side, leaves(0), leaves(1));
-    const auto reflectance = system_.reflectance().side(side.number);
-    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
-      const glm::vec3 flux = lightOf(side.first_value + leaf) * patches_->node_area[side.first_node + leaf];
-      received += static_cast<double>(channelSum(flux));
-      reflected += static_cast<double>(glm::dot(flux, reflectance[leaf]));
-    }
-  }
+  const auto [field, received, reflected] = assessField();
   error_ = {};
   double owed = 0.0;  // by lights that are still to be measured
   for (const auto& shooter : system_.shooters()) {
@@ -90,6 +77,32 @@ void LinkedSolver::assess() {
   error_.sampling = std::hypot(by_links_, std::sqrt((variation_->noise() + doubt) / field.square()));
   error_.variation = std::sqrt(variation_->left() / field.square());
   error_.total = std::hypot(error_.residual, error_.sampling, error_.variation);
+}
+
+LinkedSolver::FieldSums LinkedSolver::assessField() const {
+  std::vector<FieldSums> of_side(sides_.size(), {FieldError(*patches_)});
+  const auto assessSide = [&](std::size_t s) {
+    const auto& side = sides_[s];
+    auto& sums = of_side[s];
+    const auto leaves = [&](std::size_t half) {
+      return std::span<const glm::vec3>(&half_[half][side.first_value], side.leaf_count);
+    };
+    sums.field.addSide(side, leaves(0), leaves(1));
+    const auto reflectance = system_.reflectance().side(side.number);
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+      const glm::vec3 flux = lightOf(side.first_value + leaf) * patches_->node_area[side.first_node + leaf];
+      sums.received += static_cast<double>(channelSum(flux));
+      sums.reflected += static_cast<double>(glm::dot(flux, reflectance[leaf]));
+    }
+  };
+  inTurns(sides_.size(), assessSide, system_.leafAreas().size() / kLeavesAThread);
+  FieldSums all{FieldError(*patches_)};
+  for (const auto& sums : of_side) {
+    all.field.add(sums.field);
+    all.received += sums.received;
+    all.reflected += sums.reflected;
+  }
+  return all;
 }
 
 /// Without memory or threads the next step will try again, and can say so.

@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 #include <vector>
 
+#include "common/parallel.h"
 #include "server/solver/halves.h"
 #include "server/solver/linked_solver.h"
 
@@ -71,11 +72,14 @@ bool LinkedSolver::lightLeaves() {
 void LinkedSolver::findUnshot(Unshot which) {
   varying_ = net_unshot_ = 0.0;
   if (isAllSent(which)) return unshot_.clear();
-  std::vector<glm::vec3> unshot;
-  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
-    const Side& side = sides_[s];
-    leafUnshot(s, unshot, which);
-    unshot_.pull(side, unshot);
+  unshot_.begin();
+  const auto pull = [&](std::size_t s) {
+    std::vector<glm::vec3> unshot;
+    leafUnshot(static_cast<std::uint32_t>(s), unshot, which);
+    unshot_.pull(sides_[s], unshot);
+  };
+  inTurns(sides_.size(), pull, system_.leafAreas().size() / kLeavesAThread);
+  for (const Side& side : sides_) {
     const auto root = side.first_node + side.node_count - 1;
     const auto net = static_cast<double>(channelSum(unshot_.flux(root)));
     net_unshot_ += net;

@@ -14,6 +14,7 @@
 
 #include "common/result.h"
 #include "server/solver/change_reach.h"
+#include "server/solver/field_error.h"
 #include "server/solver/leaf_gather.h"
 #include "server/solver/leaf_variation.h"
 #include "server/solver/lights.h"
@@ -219,6 +220,12 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] bool wantsLamp() const;
   [[nodiscard]] bool sideShines(std::uint32_t side) const;
   void assessStep();
+  /// What the halves' light says, of all leaves; received and reflected flux.
+  struct FieldSums {
+    FieldError field;
+    double received = 0.0, reflected = 0.0;
+  };
+  [[nodiscard]] FieldSums assessField() const;
   void updateVariation();
   [[nodiscard]] bool wantsVariation() const;
   [[nodiscard]] bool refineVariation();

@@ -10,6 +10,9 @@
 
 namespace radiosity::solver {
 
+/// Leaves of many sides, for each of which little is to be done, that a thread is worth: a tenth of a millisecond.
+inline constexpr std::size_t kLeavesAThread = 4096;
+
 /// One side of a surface that has patches: the paper's "polygon" with its quadtree.
 struct Side {
   std::uint32_t number = 0;  ///< among all sides; by it SideColours knows it

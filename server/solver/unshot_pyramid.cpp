@@ -13,9 +13,12 @@ void UnshotPyramid::clear() {
   giveBack(rough_);
 }
 
-void UnshotPyramid::pull(const Side& side, std::span<const glm::vec3> unshot) {
+void UnshotPyramid::begin() {
   flux_.resize(patches_.nodeCount(), glm::vec3(0.0F));
   rough_.resize(patches_.nodeCount(), 0.0F);
+}
+
+void UnshotPyramid::pull(const Side& side, std::span<const glm::vec3> unshot) {
   for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
     flux_[side.first_node + leaf] = unshot[leaf] * patches_.node_area[side.first_node + leaf];
     rough_[side.first_node + leaf] = channelSum(flux_[side.first_node + leaf]);

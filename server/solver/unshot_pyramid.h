@@ -1,5 +1,4 @@
-// What every node still has to shoot: net flux and what varies inside, pulled up from the leaves. Plain values; one
-// thread.
+// What every node still has to shoot: net flux and what varies inside, pulled up from the leaves. Plain values.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -17,7 +16,9 @@ class UnshotPyramid {
  public:
   explicit UnshotPyramid(const scene::PatchScene& patches) : patches_(patches) {}
 
-  /// `unshot`: radiosity by leaf of the side.
+  /// Makes room, before pull().
+  void begin();
+  /// `unshot`: radiosity by leaf of the side. Any thread, other sides by others at the same time.
   void pull(const Side& side, std::span<const glm::vec3> unshot);
   /// Nothing is unshot anywhere, which takes no memory.
   void clear();

@@ -34,6 +34,7 @@ class BuriedEdgeTest : public testing::Test {
     const PlannerSettings settings;
     LinkPlanner planner(patches, sides_, shots, settings, seed);
     UnshotPyramid unshot(patches);
+    unshot.begin();
     unshot.pull(side, std::vector<glm::vec3>(side.leaf_count, glm::vec3(1.0F)));
     system_.emplace(patches, sides_);
     scene::SideColours emission(patches), reflectance(patches);
