@@ -4,7 +4,6 @@
 #include <deque>
 #include <exception>
 #include <mutex>
-#include <system_error>
 #include <thread>
 
 namespace radiosity {
@@ -12,7 +11,7 @@ namespace {
 
 constexpr std::size_t kMostShares = 16;
 
-/// Shares of one piece of work. All but `work` is the helpers', under their lock.
+/// Shares of one piece of work. All but `work` and `shares` is the helpers', under their lock.
 struct Job {
   const ShareOfWork& work;
   std::size_t shares;
@@ -21,8 +20,9 @@ struct Job {
   std::exception_ptr failed;
 };
 
-/// Threads that wait for shares. To start one anew for each takes 50 us and more, with its stack and its heap, and a
-/// lamp's edit of a small room, 10 ms, asks for twenty.
+/// Threads that wait for shares: as many as there are cores, so that two who ask have one each on two cores. To start
+/// one anew for each share takes 50 us and more, with its stack and its heap, and a lamp's edit of a small room, 10 ms,
+/// asks for twenty.
 class Helpers {
  public:
   /// Never destroyed: a thread of the program may still be at work when the process ends.
@@ -51,8 +51,9 @@ class Helpers {
 
   void startThreads() {
     try {
-      for (; started_ + 1 < mostShares(); ++started_) std::thread([this] { serve(); }).detach();
-    } catch (const std::system_error&) {  // no more threads to be had: those who ask do the work
+      for (; started_ < mostShares(); ++started_) std::thread([this] { serve(); }).detach();
+    } catch (const std::exception&) {  // no more threads to be had, or no memory: those who ask do the work
+      started_ = mostShares();
     }
   }
 
@@ -110,10 +111,8 @@ std::size_t mostShares() {
 }
 
 void doShares(std::size_t shares, const ShareOfWork& work) {
-  if (shares <= 1 || mostShares() == 1) {
-    for (std::size_t share = 0; share < shares; ++share) work(share);
-    return;
-  }
+  if (shares == 0) return;
+  if (shares == 1) return work(0);
   Job job{work, shares, 1, 0, nullptr};
   Helpers::all().carryOut(job);
   if (job.failed) std::rethrow_exception(job.failed);

@@ -16,12 +16,14 @@ constexpr float kMostForOthers = 8.0F;
 
 /// A single pixel through which one looks out of the scene, between four that show something: where a corner of one
 /// wall meets the middle of another's edge, rounding leaves such holes, and no light must leave by them.
+/// Of a pixel at the edge of its face those on the face tell.
 bool isCrack(std::span<const std::uint32_t> items, std::size_t first, std::size_t end, std::size_t width) {
-  if (end - first != 1 || first < width || first + width >= items.size()) return false;
-  for (const auto neighbour : {first - 1, first + 1, first - width, first + width}) {
-    if (items[neighbour] == RAD_ITEM_NONE) return false;
-  }
-  return true;
+  if (end - first != 1) return false;
+  const auto column = first % width, row = first / width;
+  const auto rows = row < width ? width : width / 2, row_of_face = row < width ? row : (row - width) % rows;
+  const auto shows = [&](std::size_t pixel) { return items[pixel] != RAD_ITEM_NONE; };
+  return (column == 0 || shows(first - 1)) && (column + 1 == width || shows(first + 1)) &&
+         (row_of_face == 0 || shows(first - width)) && (row_of_face + 1 == rows || shows(first + width));
 }
 
 /// What the kernel below needs of a hemicube and of the receivers.

@@ -7,8 +7,8 @@
 
 namespace radiosity::solver {
 
-/// Calls work(0) in this thread and work(1) in another, as doShares(). When both have ended, what one of them threw is
-/// thrown here: out of a plain thread it would end the process.
+/// Calls work(0) in this thread and work(1) in another, where one is free: doShares(). When both have ended, what one
+/// of them threw is thrown here: out of a plain thread it would end the process.
 template <typename Work>
 void inBothHalves(const Work& work) {
   doShares(2, ShareOfWork(work));

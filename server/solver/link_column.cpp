@@ -149,6 +149,7 @@ void LinkColumn::add(const LinkExpander& sample, const LinkSample& totals, doubl
   average(delivered_, delivered);
   average(escaped_, totals.escaped);
   average(absorbed_, totals.absorbed);
+  average(presumed_, 0.0);
   const bool unsaid = totals.open_looks.bits == 0 && totals.escaped + totals.absorbed > 0.0;
   const Looks open = unsaid ? Looks{~std::uint64_t{0}} : totals.open_looks;
   open_looks_.add(open, static_cast<std::uint32_t>(points_), static_cast<std::uint32_t>(points));
@@ -215,6 +216,7 @@ void LinkColumn::replace(std::span<const ValueRun> leaves, std::span<const float
   escaped_ = totals.escaped;
   absorbed_ = totals.absorbed;
   open_looks_ = totals.open_looks;
+  presumed_ = totals.presumed;
   keepFlux(leaf_area);
 }
 
@@ -265,6 +267,7 @@ LinkColumn LinkColumn::renumbered(const std::vector<std::uint32_t>& side_after, 
   column.escaped_ = escaped_;
   column.absorbed_ = absorbed_;
   column.open_looks_ = open_looks_;
+  column.presumed_ = presumed_;
   return column;
 }
 

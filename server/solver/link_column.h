@@ -58,6 +58,7 @@ class LinkColumn {
   struct Totals {
     double due = 0.0, escaped = 0.0, absorbed = 0.0;  ///< as in LinkSample
     Looks open_looks;                                 ///< of all points
+    double presumed = 0.0;                            ///< of what is lost: it was once, and was not looked at since
   };
   /// Other links to some leaves, and what all together should deliver, from as many points as before: `values` by leaf
   /// value, of which those of `leaves` (runs of leaf values, ascending, none across sides) count.
@@ -84,7 +85,7 @@ class LinkColumn {
   /// such a room would lose light with every bounce.
   [[nodiscard]] double gain() const { return static_cast<double>(gain_); }
   /// What was last said of all links together.
-  [[nodiscard]] Totals totals() const { return {due_, escaped_, absorbed_, open_looks_}; }
+  [[nodiscard]] Totals totals() const { return {due_, escaped_, absorbed_, open_looks_, presumed_}; }
   /// Flux that leaves the scene, and that falls on unlit sides, for a radiosity of one.
   [[nodiscard]] double escaped() const { return escaped_; }
   [[nodiscard]] double absorbed() const { return absorbed_; }
@@ -118,7 +119,7 @@ class LinkColumn {
   template <typename Archive, typename Self>
   static void visit(Archive& archive, Self& self) {
     archive(self.runs_, self.scale_, self.gain_, codesOf(self), self.samples_, self.points_, self.due_, self.delivered_,
-            self.escaped_, self.absorbed_, self.open_looks_.bits);
+            self.escaped_, self.absorbed_, self.open_looks_.bits, self.presumed_);
   }
   void makeRoom(std::span<const std::uint32_t> reached, const std::vector<Side>& sides);
   void grow(const LinkExpander& sample, const std::vector<Side>& sides);
@@ -133,7 +134,7 @@ class LinkColumn {
   float gain_ = 1.0F;
   SharedCodes code_;
   std::uint32_t samples_ = 0;
-  double points_ = 0.0, due_ = 0.0, delivered_ = 0.0, escaped_ = 0.0, absorbed_ = 0.0;
+  double points_ = 0.0, due_ = 0.0, delivered_ = 0.0, escaped_ = 0.0, absorbed_ = 0.0, presumed_ = 0.0;
   Looks open_looks_;
 };
 

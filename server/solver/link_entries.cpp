@@ -89,7 +89,7 @@ void LinkSystem::fillRow(std::size_t half, std::uint32_t member, std::uint32_t c
     halves_[half].matrix[row.first + static_cast<std::uint32_t>(c)][column] = static_cast<float>(sum[c] / whole);
 }
 
-/// Of each half in a thread of its own.
+/// The halves side by side.
 void LinkSystem::inheritEntries(const LinkSystem& former, const FormerEntries& same) {
   makeRows();
   const auto count = static_cast<std::uint32_t>(shooters_.size());

@@ -46,7 +46,8 @@ void LinkSystem::replaceLinks(std::uint32_t index, std::size_t half, std::span<c
   auto& shooter = shooters_[index];
   const double factor = roundingOf(shooter, totals.due, totals.escaped, totals.absorbed);
   shooter.column[half].replace(
-      leaves, values, {factor * totals.due, factor * totals.escaped, factor * totals.absorbed, totals.open_looks},
+      leaves, values,
+      {factor * totals.due, factor * totals.escaped, factor * totals.absorbed, totals.open_looks, totals.presumed},
       leaf_area_, sides_);
   noteChange(index, half);
 }

@@ -5,6 +5,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <new>
+#include <optional>
 #include <system_error>
 
 #include "common/parallel.h"
@@ -34,10 +35,12 @@ void LinkedSolver::assess() {
   }
   const auto [field, received, reflected] = assessField();
   error_ = {};
-  double owed = 0.0;  // by lights that are still to be measured
+  double owed = 0.0, presumed = 0.0;  // by lights that are still to be measured; as lost, of what they send
   for (const auto& shooter : system_.shooters()) {
     for (const auto& column : shooter.column) {
-      if (shooter.isLight() && column.points() == 0.0) owed += 0.5 * shooter.power();
+      if (!shooter.isLight()) continue;
+      if (column.points() == 0.0) owed += 0.5 * shooter.power();
+      presumed += 0.5 * shooter.power() * column.totals().presumed / shooter.area;
     }
   }
   // What a wave that ended early did not measure stands for its leaves, so that it is not unshot, and sends nothing.
@@ -67,8 +70,8 @@ void LinkedSolver::assess() {
   error_.sampling = std::hypot(by_links_, std::sqrt(doubt / field.square()));
   error_.discretization = field.discretization();
   const double varying = std::sqrt(planner_.variation(system_, unshot_, *patches_) / field.square());
-  error_.residual =
-      owed / (1.0 - kept) / received + varying + system_.unsolved() + (gathers() ? gather_->unsolved() : 0.0);
+  error_.residual = (owed + presumed) / (1.0 - kept) / received + varying + system_.unsolved() +
+                    (gathers() ? gather_->unsolved() : 0.0);
   error_.residual = std::hypot(error_.residual, missing() / std::sqrt(field.square()));  // of links that wait
   varying_share_ = error_.residual > 0.0 ? varying / error_.residual : 0.0;
   left_out_ = left_out / (1.0 - kept) / received;
@@ -80,10 +83,10 @@ void LinkedSolver::assess() {
 }
 
 LinkedSolver::FieldSums LinkedSolver::assessField() const {
-  std::vector<FieldSums> of_side(sides_.size(), {FieldError(*patches_)});
+  std::vector<std::optional<FieldSums>> of_side(sides_.size());
   const auto assessSide = [&](std::size_t s) {
     const auto& side = sides_[s];
-    auto& sums = of_side[s];
+    FieldSums sums{FieldError(*patches_)};  // of neighbours in memory many threads would wait for each other
     const auto leaves = [&](std::size_t half) {
       return std::span<const glm::vec3>(&half_[half][side.first_value], side.leaf_count);
     };
@@ -94,13 +97,14 @@ LinkedSolver::FieldSums LinkedSolver::assessField() const {
       sums.received += static_cast<double>(channelSum(flux));
       sums.reflected += static_cast<double>(glm::dot(flux, reflectance[leaf]));
     }
+    of_side[s].emplace(sums);
   };
   inTurns(sides_.size(), assessSide, system_.leafAreas().size() / kLeavesAThread);
   FieldSums all{FieldError(*patches_)};
   for (const auto& sums : of_side) {
-    all.field.add(sums.field);
-    all.received += sums.received;
-    all.reflected += sums.reflected;
+    all.field.add(sums->field);
+    all.received += sums->received;
+    all.reflected += sums->reflected;
   }
   return all;
 }

@@ -155,6 +155,8 @@ Result<StepOutcome> LinkedSolver::catchUp() {
 
 void LinkedSolver::beExact() {
   lights_may_be_rough_ = may_look_past_ = false;
+  for (auto& repair : std::span(repairs_).subspan(repaired_))
+    if (repair.past_losses) repair.lookAnew();
   due_ = repairs_.size();
 }
 

@@ -19,8 +19,8 @@ namespace {
 /// What arrives, escapes and is absorbed makes all that is sent; a polygon's area is known to 0.002 of it. A sum of
 /// some links in the place of what should arrive does not.
 constexpr double kNoSum = 0.005;
-/// So much of what a shooter sends, in parts of the asked error, is too little to look for it.
-constexpr double kLittleLost = 0.01;
+/// So much of what a lamp sends is too little to look for it: of the asked error, and at most.
+constexpr double kLittleLost = 0.01, kMostPresumed = 2e-4;
 /// Repairs of a slice before it is known how long they take.
 constexpr std::size_t kMostAtOnce = 1024;
 
@@ -135,13 +135,14 @@ void LinkedSolver::addSamples(const Repair& repair, ShotBatch& batch) const {
                settings_.planner.lightResolution(i), batch);
 }
 
-/// Whether its looks need not see again what they lost before, in cracks and on backs: that is taken to be lost still,
-/// beside what is lost now where the change is. It is so much at most, and each edit adds to it, until it is no longer
-/// little and is looked at.
+/// Whether a lamp's looks need not see again what they lost before, in cracks and on backs: that is presumed to be lost
+/// still, beside what is lost now where the change is. It is so much at most, and each edit adds to it, until it is no
+/// longer little and is looked at. What others lose, they lose with every bounce.
 bool LinkedSolver::losesLittle(const Repair& repair) const {
   const auto& shooter = system_.shooters()[repair.shooter];
   const auto& column = shooter.column[repair.half];
-  return column.escaped() + column.absorbed() <= kLittleLost * settings_.target_error * shooter.area;
+  const double little = std::min(kLittleLost * settings_.target_error, kMostPresumed);
+  return shooter.isLight() && column.escaped() + column.absorbed() <= little * shooter.area;
 }
 
 void LinkedSolver::findCutLinks(RepairBatch& repairs) const {
@@ -187,9 +188,7 @@ Result<void> LinkedSolver::repairSlice() {
     const auto samples = shooter.isLight() ? static_cast<std::uint32_t>(column.points()) : column.samples();
     if (repair.whole || samples == repair.samples) continue;
     repair.samples = samples;
-    repair.looked = 0;  // what is there is no longer the mean of what looked
-    repair.found = {};
-    repair.past_losses = false;
+    repair.lookAnew();  // what is there is no longer the mean of what looked
   }
   batch.repairs = std::span(repairs_).subspan(repaired_, count);
   batch.sum.resize(system_.leafAreas().size());
@@ -204,7 +203,7 @@ Result<void> LinkedSolver::repairSlice() {
   for (std::uint32_t r = 0; r < batch.repairs.size(); ++r) {
     auto& repair = batch.repairs[r];
     if (!repair.whole && batch.leaves[r].empty()) continue;
-    repair.past_losses = repair.past_losses || (may_look_past_ && losesLittle(repair));
+    if (repair.looked == 0) repair.past_losses = may_look_past_ && losesLittle(repair);
     const auto first_run = static_cast<std::uint32_t>(shots.receivers.size());
     std::uint32_t side = 0;
     for (const auto& run : batch.leaves[r]) {
@@ -322,9 +321,10 @@ void LinkedSolver::replacePart(RepairBatch& repairs, std::uint32_t index) {
     repairs.rough.back().found = found;
     repairs.rough.back().noise = noiseBetweenHalves(repair, leaves);
   } else {
-    LinkColumn::Totals totals{part * found.due, part * found.escaped, part * found.absorbed, found.open_looks};
+    LinkColumn::Totals totals{part * found.due, part * found.escaped, part * found.absorbed, found.open_looks, 0.0};
     if (repair.past_losses) {
-      totals.due -= column.escaped() + column.absorbed();
+      totals.presumed = column.escaped() + column.absorbed();
+      totals.due -= totals.presumed;
       totals.escaped += column.escaped();
       totals.absorbed += column.absorbed();
     }

@@ -200,9 +200,9 @@ bool LinkedSolver::mayGoWithout() {
   return error_.total <= settings_.target_error;
 }
 
-/// From nothing but the links: the result depends on them and on light and materials alone, so that an edit and its
-/// inverse give the same bits as long as no link, no shooter without links (mayGoWithout) and no path was added in
-/// between. False: not yet.
+/// From nothing but the links: the result depends on them, on light and materials, and on the target, so that an edit
+/// and its inverse give the same bits as long as no link, no shooter without links (mayGoWithout) and no path was added
+/// in between. False: not yet.
 bool LinkedSolver::settleFromLinks() {
   const auto forgetLight = [&] {
     for (auto& shooter : system_.shooters()) {

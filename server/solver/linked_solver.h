@@ -34,9 +34,10 @@ class LinkedSolver final : public Solver {
                Transport& transport, const SolverSettings& settings, const LightSources& sources = {});
   /// After an edit of geometry: takes over the links of `former`, the solver of the scene before, that the edit left
   /// alone, and measures the others again with its first steps: same shooters, same points, so that links are those
-  /// that a fresh measurement of all would find. Of shooters that see the change, only links to leaves whose ways to
-  /// them pass it are measured (Shadows). `keep_former`: it stays what it was; else its links go as they are taken
-  /// over, so that memory never holds them twice, and it is of no use afterwards.
+  /// that a fresh measurement of all would find (and what lamps lose what it would, or a little more). Of shooters that
+  /// see the change, only links to leaves whose ways to them pass it are measured (Shadows). `keep_former`: it stays
+  /// what it was; else its links go as they are taken over, so that memory never holds them twice, and it is of no use
+  /// afterwards.
   LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
                Transport& transport, const SolverSettings& settings, const LightSources& sources, LinkedSolver& former,
                const scene::PatchMap& map, bool keep_former = false);
@@ -110,6 +111,13 @@ class LinkedSolver final : public Solver {
     LinkColumn::Totals found = {};  ///< by them, times points
     double noise = 0.0;             ///< square of the error of irradiance times area, where both halves have as many
     bool past_losses = false;       ///< its looks see where the change is alone, whatever is lost elsewhere
+
+    /// As if none had looked.
+    void lookAnew() {
+      looked = 0;
+      found = {};
+      past_losses = false;
+    }
   };
   /// Where the sides of the scene before are now.
   struct Renumbering {

@@ -183,12 +183,13 @@ class ChairRoom : public GeometryEdit {
     for (std::size_t n = 0; n < nodes.size(); ++n) {
       auto at = nodes[n].value("translation", json::array());
       if (nodes[n].value("name", "") != "chair1") continue;
+      home_ = at;
       at[0] = at[0].get<double>() + 0.15;
       move_ = replaced("/nodes/" + std::to_string(n) + "/translation", at);
     }
   }
 
-  json move_;
+  json move_, home_;  ///< the patch; where the chair was
 };
 
 }  // namespace radiosity::test

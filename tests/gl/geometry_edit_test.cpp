@@ -164,6 +164,36 @@ TEST_F(ChairEdit, LooksPastWhatLittleIsLostElsewhere) {
   seeAgain(*third);
 }
 
+// Each edit adds to what is presumed; when that is no longer little all of it is looked at, and nothing is presumed.
+TEST_F(ChairEdit, LooksAgainAtWhatManyEditsMadeNoLongerLittle) {
+  const auto presumed = [](const LinkedSolver& solver) {
+    double most = 0.0;
+    for (const auto& shooter : solver.system().shooters()) {
+      for (const auto& column : shooter.column) most = std::max(most, column.totals().presumed / shooter.area);
+    }
+    return most;
+  };
+  auto solver = solved(before_);
+  auto now = before_;
+  double most = 0.0;
+  bool fell = false;
+  for (int i = 0; i < 60 && !fell; ++i) {
+    auto next = edited(now, i % 2 == 0 ? move_ : replaced(move_[0]["path"], home_));
+    ASSERT_TRUE(transport_->setScene(next.patches));
+    auto after = std::make_unique<LinkedSolver>(next.patches, next.materials, *transport_, settings_,
+                                                solver::LightSources{}, *solver, mapOf(now, next));
+    finish(*after);
+    for (int step = 0; step < 1000 && after->isBehind(); ++step) ASSERT_TRUE(after->step());
+    now = std::move(next);
+    solver = std::move(after);
+    fell = presumed(*solver) < most;
+    most = std::max(most, presumed(*solver));
+    EXPECT_LE(presumed(*solver), 2e-4);
+  }
+  EXPECT_GT(most, 1e-5);
+  EXPECT_TRUE(fell) << "at " << most;
+}
+
 TEST_F(ChairEdit, WithLittleRoomUnderTheTargetWaitsForLess) {
   const auto after = edited(before_, move_);
   const auto loose = solved(before_), tight = solved(before_);
