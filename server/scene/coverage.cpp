@@ -4,11 +4,17 @@
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <utility>
 
 #include "common/check.h"
+#include "common/give_back.h"
+#include "common/parallel.h"
 
 namespace radiosity::scene {
 namespace {
+
+/// Leaves that a thread is worth.
+constexpr std::size_t kLeavesAThread = 4096;
 
 /// Convex polygon of at most a triangle's corners plus one for each of four clips.
 struct Polygon {
@@ -247,8 +253,16 @@ class SurfaceCoverage {
 }  // namespace
 
 std::vector<LeafPiece> measureCoverage(PatchScene& patches) {
+  const auto& surfaces = patches.surfaces;
+  std::vector<std::vector<LeafPiece>> of_surface(surfaces.size());
+  const auto measure = [&](std::size_t s) { SurfaceCoverage(patches, surfaces[s], of_surface[s]).run(); };
+  inTurns(surfaces.size(), measure, patches.leaves.size() / kLeavesAThread);
+  if (surfaces.size() == 1) return std::move(of_surface.front());  // it may be large
   std::vector<LeafPiece> pieces;
-  for (const Surface& surface : patches.surfaces) SurfaceCoverage(patches, surface, pieces).run();
+  for (auto& some : of_surface) {
+    pieces.insert(pieces.end(), some.begin(), some.end());
+    giveBack(some);
+  }
   return pieces;
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
@@ -12,6 +13,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "common/parallel.h"
 #include "server/scene/coverage.h"
 
 namespace radiosity::scene {
@@ -23,6 +25,8 @@ constexpr float kSameWay = 0.9999F;
 constexpr double kSamePlane = 2e-5;
 /// So many places of a leaf are looked at for what covers it.
 constexpr std::uint32_t kPlaces = 16;
+/// Surfaces that a thread is worth that looks for what covers them.
+constexpr std::size_t kSurfacesAThread = 64;
 /// So many rays that say the same are enough. More where a place would be lost.
 constexpr std::uint32_t kAgreeOutside = 3, kAgreeInside = 6;
 
@@ -258,10 +262,16 @@ void Coincidence::run() {
   std::uint64_t count = 0;
   std::pair<std::uint32_t, std::uint32_t> first{kNone, kNone};
   const auto coplanar = coplanarWithOthers();
+  std::vector<std::array<std::uint32_t, 2>> cover(patches_.surfaces.size());
+  const auto findCover = [&](std::size_t i) {
+    const auto s = static_cast<std::uint32_t>(i);
+    for (std::uint32_t side = 0; side < 2; ++side)
+      cover[s][side] = isLit(s, side) ? coveredBy(s, side, coplanar[slot(s, side)]) : kNone;
+  };
+  inTurns(cover.size(), findCover, cover.size() / kSurfacesAThread);
   for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
     auto by = kNone;
-    for (std::uint32_t side = 0; side < 2; ++side) {
-      const std::uint32_t other = isLit(s, side) ? coveredBy(s, side, coplanar[slot(s, side)]) : kNone;
+    for (const auto other : cover[s]) {
       covered_.push_back(other != kNone);
       if (by == kNone) by = other;
     }
