@@ -363,5 +363,54 @@ TEST_F(Gather, OppositeShotsCancelToExactlyNothing) {
   EXPECT_EQ(flux.backface, solver::Flux3{});
 }
 
+// A look that comes alone is drawn around its window and no further; of several in one image faces are filled. How many
+// come at once follows from how many workers there are.
+TEST_F(Gather, ThroughAWindowLinksAreTheSameBitsAloneAndAmongOthers) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> place(-0.45F, 0.35F), size(0.02F, 0.1F);
+  SceneBuilder builder;
+  builder.addBox(glm::vec3(-0.5F), glm::vec3(0.5F), 8, true);
+  for (int i = 0; i < 60; ++i)  // whose backs take what falls on them
+    builder.add({{place(random), place(random), place(random)}, {size(random), 0, 0}, {0, 0.02F, size(random)}, 4, 4});
+  const auto scene = builder.build();
+  ASSERT_TRUE(transport_->setScene(scene).has_value());
+  solver::ShotBatch all;
+  std::vector<solver::ShotBatch> alone;
+  for (std::uint32_t i = 0; i < 300; ++i) {
+    auto batch = gatherFrom(*scene, i % 66, 1, random);
+    const auto& seen = scene->surfaces[random() % scene->surfaces.size()];
+    const auto& corner = scene->vertices[scene->indices[3 * std::size_t{seen.first_triangle}]].position;
+    batch.receivers = {{seen.first_node[0], seen.width * seen.height}};
+    batch.boxes = {{corner - 0.03F, corner + 0.03F}};
+    auto& shot = batch.gather[0];
+    shot.run_count = shot.box_count = 1;
+    shot.resolution = 32;
+    alone.push_back(batch);
+    shot.first_point = shot.first_run = shot.first_box = i;
+    all.gather.push_back(shot);
+    all.points.push_back(batch.points[0]);
+    all.receivers.push_back(batch.receivers[0]);
+    all.boxes.push_back(batch.boxes[0]);
+  }
+  std::vector<solver::LinkSample> together(alone.size());
+  ASSERT_TRUE(transport_->measure(all, [&](std::size_t i, solver::LinkSample&& links) { together[i] = links; }));
+  std::size_t lost = 0, lit = 0;
+  for (std::size_t i = 0; i < alone.size(); ++i) {
+    SCOPED_TRACE(i);
+    const auto same = [&](std::size_t, solver::LinkSample&& links) {
+      EXPECT_EQ(links.irradiance, together[i].irradiance);
+      EXPECT_EQ(links.due, together[i].due);
+      EXPECT_EQ(links.escaped, together[i].escaped);
+      EXPECT_EQ(links.absorbed, together[i].absorbed);
+      EXPECT_EQ(links.open_looks.bits, together[i].open_looks.bits);
+      lost += links.open_looks.bits != 0 ? 1 : 0;
+      lit += links.irradiance.empty() ? 0 : 1;
+    };
+    ASSERT_TRUE(transport_->measure(alone[i], same));
+  }
+  EXPECT_GT(lit, 10U);
+  EXPECT_GT(lost, 10U);
+}
+
 }  // namespace
 }  // namespace radiosity::test
