@@ -52,8 +52,7 @@ class Helpers {
   void startThreads() {
     try {
       for (; started_ < mostShares(); ++started_) std::thread([this] { serve(); }).detach();
-    } catch (const std::exception&) {  // no more threads to be had, or no memory: those who ask do the work
-      started_ = mostShares();
+    } catch (const std::exception&) {  // no more threads to be had, or no memory: until there are, those who ask work
     }
   }
 

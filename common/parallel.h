@@ -23,7 +23,7 @@ class ShareOfWork {
 
 /// Calls work(share) once for every share in [0, shares): 0 in this thread, the others in threads that wait for such
 /// work, one a core, or in this one where none of them is free. So shares must not wait for each other; they
-/// may be divided again. When all have ended, what one of them threw is thrown here. It takes 10 to 20 us.
+/// may be divided again. When all have ended, what one of them threw is thrown here.
 void doShares(std::size_t shares, const ShareOfWork& work);
 /// Shares that can be done at the same time, 16 at most.
 [[nodiscard]] std::size_t mostShares();

@@ -25,11 +25,8 @@ void setViewport(std::uint32_t resolution, std::size_t face) {
   glViewport(0, row, n, face == 0 ? n : n / 2);
 }
 
-/// Large triangles that cross a window would fill the face.
-void setScissor(const ViewWindow& window, const solver::HemicubeFrame& frame, std::uint32_t resolution,
-                std::size_t face) {
-  const auto [first, end] = pixelsAround(window, frame, resolution, face);
-  glEnable(GL_SCISSOR_TEST);
+void setScissor(const PixelRectangle& around) {
+  const auto [first, end] = around;
   glScissor(static_cast<GLint>(first.x), static_cast<GLint>(first.y), static_cast<GLsizei>(end.x - first.x),
             static_cast<GLsizei>(end.y - first.y));
 }
@@ -156,7 +153,6 @@ std::size_t HemicubeRenderer::select(std::uint32_t resolution, std::span<const H
 void HemicubeRenderer::draw(TriangleCuller::Lists TriangleCuller::Selection::*lists, std::uint32_t resolution,
                             std::span<const HemicubeView> of, solver::TransportCounters& counters) {
   const std::size_t views = of.size();
-  const auto* window = views == 1 && of[0].window ? &*of[0].window : nullptr;
   indices_.clear();
   commands_.clear();
   std::array<std::size_t, RAD_FACES + 1> first{};
@@ -177,15 +173,17 @@ void HemicubeRenderer::draw(TriangleCuller::Lists TriangleCuller::Selection::*li
   counters.triangles_culled -= indices_.size() / 3;
   fill(indices_buffer_, std::span<const std::uint32_t>(indices_), GL_STREAM_DRAW);
   fill(commands_buffer_, std::span<const DrawCommand>(commands_), GL_STREAM_DRAW);
+  const bool is_part = views == 1 && of[0].window;
+  if (is_part) glEnable(GL_SCISSOR_TEST);  // large triangles that cross a window would fill the face
   for (std::size_t face = 0; face < RAD_FACES; ++face) {
     const auto count = first[face + 1] - first[face];
     if (count == 0) continue;
     setViewport(resolution, face);
-    if (window != nullptr) setScissor(*window, of[0].frame, resolution, face);
+    if (is_part) setScissor(around_window_[face]);
     const auto* from = reinterpret_cast<const void*>(first[face] * sizeof(DrawCommand));
     glMultiDrawElementsIndirect(GL_TRIANGLES, GL_UNSIGNED_INT, from, static_cast<GLsizei>(count), 0);
   }
-  if (window != nullptr) glDisable(GL_SCISSOR_TEST);
+  if (is_part) glDisable(GL_SCISSOR_TEST);
 }
 
 void HemicubeRenderer::drawEverything(std::uint32_t resolution, std::size_t views,
@@ -260,6 +258,8 @@ void HemicubeRenderer::placeFaces(std::uint32_t resolution, std::span<const Hemi
 void HemicubeRenderer::drawSelected(std::uint32_t resolution, std::span<const HemicubeView> views, const Target& into,
                                     solver::TransportCounters& counters) {
   const auto waiting = select(resolution, views, counters);
+  for (std::size_t face = 0; face < RAD_FACES && views.size() == 1 && views[0].window; ++face)
+    around_window_[face] = pixelsAround(*views[0].window, views[0].frame, resolution, face);
   draw(&TriangleCuller::Selection::first, resolution, views, counters);
   if (waiting >= kWorthASecondLook * views.size()) takeHidden(resolution, views, into, counters);
   draw(&TriangleCuller::Selection::second, resolution, views, counters);

@@ -7,6 +7,7 @@
 // shooters in five calls, sooner than a processor could choose.
 #pragma once
 
+#include <array>
 #include <map>
 #include <optional>
 #include <span>
@@ -101,7 +102,8 @@ class HemicubeRenderer {
   std::size_t index_count_ = 0;  ///< in the buffer for good, where everything is drawn
   std::map<std::pair<std::uint32_t, std::size_t>, Target> targets_;  ///< by resolution and layers
   std::vector<FaceView> face_views_;
-  std::vector<TriangleCuller::Selection> selections_;  ///< by view
+  std::array<PixelRectangle, RAD_FACES> around_window_{};  ///< of the one view that is drawn, where it has a window
+  std::vector<TriangleCuller::Selection> selections_;      ///< by view
   std::vector<std::uint32_t> indices_;
   std::vector<DrawCommand> commands_;
   std::vector<float> depth_;
