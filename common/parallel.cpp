@@ -20,9 +20,9 @@ struct Job {
   std::exception_ptr failed;
 };
 
-/// Threads that wait for shares: as many as there are cores, so that two who ask have one each on two cores. To start
-/// one anew for each share takes 50 us and more, with its stack and its heap, and a lamp's edit of a small room, 10 ms,
-/// asks for twenty.
+/// Threads that wait for shares: as many as there are cores, so that two who ask have one each on two cores. Such as
+/// are started anew for each share, with a stack and a heap of their own, take a twentieth more time in a small room,
+/// for its solve and for its edits; in larger ones nothing.
 class Helpers {
  public:
   /// Never destroyed: a thread of the program may still be at work when the process ends.
