@@ -359,8 +359,9 @@ float autoExposure(const Image& radiance) {
   std::vector<std::pair<double, double>> lit;
   for (const auto& pixel : radiance.pixels) {
     const double value = luminance(pixel);
-    // Weighed by the square root, neither a large dark nor a small bright area can outweigh what one wants to see.
-    if (value > 0.0 && std::isfinite(value)) lit.emplace_back(value, std::sqrt(value));
+    // By its fourth root neither a large dark nor a small bright area outweighs what one wants to see: lamps of 2,000
+    // times its light would have to cover an eighth of the picture, a dark of a thousandth 85 %.
+    if (value > 0.0 && std::isfinite(value)) lit.emplace_back(value, std::pow(value, 0.25));
   }
   constexpr double kRange = 24.0;
   const double typical = weightedQuantile(lit, 0.5);

@@ -128,6 +128,14 @@ TEST(AutoExposure, ATinyBrightLampDoesNotDarkenTheRoom) {
   EXPECT_NEAR(autoExposure(picture) * 2.0F, 0.18F, 0.01F);
 }
 
+TEST(AutoExposure, ALampCloseByDoesNotDarkenTheRoom) {
+  Image picture(100, 100, glm::vec3(0.8F));
+  for (int y = 0; y < 8; ++y) {
+    for (int x = 0; x < 100; ++x) picture.at(x, y) = glm::vec3(1440.0F);
+  }
+  EXPECT_NEAR(autoExposure(picture) * 0.8F, 0.18F, 0.01F);
+}
+
 TEST(AutoExposure, IsTheLogarithmicMeanWhereContrastIsModest) {
   Image picture(2, 1);
   picture.pixels = {glm::vec3(1.0F), glm::vec3(4.0F)};

@@ -19,6 +19,15 @@ describe('automatic exposure', () => {
     expect(exposureOf(picture)).toBeCloseTo(0.18 / mean, 10);
   });
 
+  it.each([
+    ['a lamp close by of a twelfth of the picture', 0.08, 1800],
+    ['a dark outside of four fifths', 0.8, 1e-3],
+  ])('does not take for what one looks at %s', (_, part, times) => {
+    const room = Array.from({ length: 1000 * (1 - part) }, () => 0.8);
+    const other = Array.from({ length: 1000 * part }, () => 0.8 * times);
+    expect(exposureOf([...room, ...other])).toBeCloseTo(0.18 / 0.8, 10);
+  });
+
   it('is undefined where nothing is lit', () => {
     expect(exposureOf([0, 0])).toBeUndefined();
     expect(exposureOf([])).toBeUndefined();
