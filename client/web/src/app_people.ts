@@ -84,9 +84,7 @@ export class PeopleSession {
   }
 
   private place(): string {
-    const { camera, target } = this.app.viewer.rig;
-    const rounded = (at: Vector3) => at.toArray().map((v) => Number(v.toPrecision(5)));
-    return JSON.stringify({ position: rounded(camera.position), target: rounded(target) });
+    return JSON.stringify(this.app.viewer.rig.place);
   }
 
   private visit(eye: Vector3, target: Vector3): void {

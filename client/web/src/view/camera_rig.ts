@@ -21,6 +21,8 @@ const ROOM_FOV = 65;
 
 /** Of a camera in a link, as of those that viewers share. */
 const FARTHEST_M = 1e12;
+/** Of the distance from eye to target: what nobody sees, a tenth of a pixel of a large screen. */
+const SAME_PICTURE = 3e-5;
 
 export class CameraRig {
   readonly camera = new PerspectiveCamera(45, 1, 0.01, 1000);
@@ -104,12 +106,9 @@ export class CameraRig {
   /** Nearer for factors below 1. */
   zoom(factor: number): void {
     if (!this.active) return;
-    if (this.mode === 'walk') {
-      this.camera.translateZ((factor - 1) * this.size * 0.3);
-    } else {
-      this.camera.position.sub(this.target).multiplyScalar(factor).add(this.target);
-      this.orbit.update();
-    }
+    if (this.mode === 'walk') return this.walk(() => this.camera.translateZ((factor - 1) * this.size * 0.3));
+    this.camera.position.sub(this.target).multiplyScalar(factor).add(this.target);
+    this.orbit.update();
     this.moved();
   }
 
@@ -131,8 +130,10 @@ export class CameraRig {
   /** How large the scene is: sets speeds and depth range. */
   setBounds(box: Box3): void {
     this.size = Math.max(box.getSize(new Vector3()).length(), 1e-6);
-    this.orbit.minDistance = this.size * 1e-3;
-    this.orbit.maxDistance = this.size * 20;
+    // Who is there already is not thrown out: somebody may have typed a position that is a million times too large.
+    const distance = this.camera.position.distanceTo(this.target);
+    this.orbit.minDistance = distance > 0 ? Math.min(this.size * 1e-3, distance) : this.size * 1e-3;
+    this.orbit.maxDistance = Math.max(this.size * 20, distance);
   }
 
   /** Looks at the middle of the box from as near as its corners let it. */
@@ -200,10 +201,18 @@ export class CameraRig {
     this.camera.updateProjectionMatrix();
   }
 
-  /** Nine numbers for a link: eye, target, field of view and mode. */
+  /** Eye and target, metres, in as few digits as show the same picture, however far from the origin that is. */
+  get place(): { position: number[]; target: number[] } {
+    const step = Math.max(this.camera.position.distanceTo(this.target), FARTHEST_M * 1e-15) * SAME_PICTURE;
+    const digits = Math.max(0, Math.ceil(-Math.log10(step)));
+    const rounded = (at: Vector3) => at.toArray().map((v) => Number(v.toFixed(digits)));
+    return { position: rounded(this.camera.position), target: rounded(this.target) };
+  }
+
+  /** Eight numbers for a link: eye, target, field of view and mode. */
   toText(): string {
-    const numbers = [...this.camera.position.toArray(), ...this.target.toArray(), this.fov];
-    return [...numbers.map((v) => Number(v.toPrecision(5))), this.mode === 'walk' ? 1 : 0].join(',');
+    const { position, target } = this.place;
+    return [...position, ...target, Number(this.fov.toPrecision(5)), this.mode === 'walk' ? 1 : 0].join(',');
   }
 
   fromText(text: string): boolean {
@@ -242,7 +251,9 @@ export class CameraRig {
 
   private fitPlanes(): void {
     const far = this.camera.position.distanceTo(this.target) + this.size * 2;
-    const near = Math.max(this.size * 2e-4, far * 1e-5);
+    // Where one thing lies a million times as far away as the others are large, these are to be seen all the same.
+    const distance = this.camera.position.distanceTo(this.target);
+    const near = Math.max(Math.min(this.size * 2e-4, distance * 0.02), far * 1e-6);
     if (Math.abs(this.camera.far / far - 1) < 0.2 && Math.abs(this.camera.near / near - 1) < 0.2) return;
     this.camera.near = near;
     this.camera.far = far;
@@ -262,9 +273,7 @@ export class CameraRig {
     const perPixel = MathUtils.degToRad(this.camera.fov) / this.element.clientHeight;
     if (this.drags.size === 1) return this.lookBy(dx * perPixel, dy * perPixel);
     const step = (this.size * 0.5) / this.element.clientHeight;
-    this.camera.translateX(-dx * step);
-    this.camera.translateZ(-dy * step);
-    this.moved();
+    this.walk(() => this.camera.translateX(-dx * step).translateZ(-dy * step));
   }
 
   private wheel(event: WheelEvent): void {
@@ -276,7 +285,14 @@ export class CameraRig {
     this.look.y += yaw;
     this.look.x = MathUtils.clamp(this.look.x + pitch, -1.55, 1.55);
     this.look.z = 0;
-    this.camera.quaternion.setFromEuler(this.look);
+    this.walk(() => this.camera.quaternion.setFromEuler(this.look));
+  }
+
+  /** In the first person. The target stays as far ahead as it was: links and others are told where one looks to. */
+  private walk(step: () => void): void {
+    const distance = this.camera.position.distanceTo(this.target);
+    step();
+    this.aimAt(distance);
     this.moved();
   }
 }

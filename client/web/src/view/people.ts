@@ -21,6 +21,8 @@ import { button, h } from '../ui/dom';
 
 /** Of the way that is left, gone in this time, seconds. */
 const EASE_S = 0.12;
+/** Length of a pyramid, of how far away it is: who stands close by hides no more of the picture. */
+const MOST_OF_DISTANCE = 0.12;
 /** Hues far from each other, whoever comes next: steps of the golden angle, degrees. */
 const HUE_STEP = 137.508;
 
@@ -52,6 +54,8 @@ class Person extends Object3D {
   private readonly shownAim = new Vector3();
   private readonly side: MeshBasicMaterial;
   private readonly edge: LineBasicMaterial;
+  /** Of the pyramid from afar, metres. */
+  length = 0;
   private placed = false;
 
   constructor(camera: SharedCamera, visit: (eye: Vector3, target: Vector3) => void) {
@@ -79,14 +83,15 @@ class Person extends Object3D {
     this.shownAim.copy(this.aim);
   }
 
-  /** True: still on its way. `size`: length of the pyramid, metres. */
-  step(seconds: number, size: number): boolean {
+  /** True: still on its way. `size`: length of the pyramid, metres, of one that is not close to `from`. */
+  step(seconds: number, size: number, from: Vector3): boolean {
     const part = 1 - Math.exp(-seconds / EASE_S);
     const left = Math.max(this.position.distanceTo(this.eye), this.shownAim.distanceTo(this.aim));
     const near = left < 1e-3 * size;
     this.position.lerp(this.eye, near ? 1 : part);
     this.shownAim.lerp(this.aim, near ? 1 : part);
-    this.scale.setScalar(size);
+    this.length = size;
+    this.scale.setScalar(Math.min(size, MOST_OF_DISTANCE * this.position.distanceTo(from)));
     if (this.position.distanceToSquared(this.shownAim) > 0) this.lookAt(this.shownAim);
     return left > 0;
   }
@@ -133,16 +138,16 @@ export class People {
   }
 
   /** True: somebody is still on the way to where they are. */
-  step(seconds: number, size: number): boolean {
+  step(seconds: number, size: number, from: Vector3): boolean {
     let moving = false;
-    for (const person of this.people.values()) moving = person.step(seconds, size) || moving;
+    for (const person of this.people.values()) moving = person.step(seconds, size, from) || moving;
     return moving;
   }
 
   /** Who is so near that the own eye is inside would only be in the way. */
   leaveOut(camera: PerspectiveCamera): void {
     for (const person of this.people.values())
-      person.visible = person.position.distanceTo(camera.position) > 1.3 * person.scale.x;
+      person.visible = person.position.distanceTo(camera.position) > 1.3 * person.length;
   }
 
   /** Puts the names where the eyes are; who is behind or beside the picture has none. */

@@ -298,7 +298,7 @@ export class Viewer {
     if (!(this.dataSet ?? this.set)?.expectsMore) this.pace.allCame();
     this.promote(now);
     if (this.rig.update(seconds)) this.moved();
-    if (this.people?.step(seconds, this.rig.sceneSize * PERSON_SIZE)) this.wanted = true;
+    if (this.people?.step(seconds, this.rig.sceneSize * PERSON_SIZE, this.rig.camera.position)) this.wanted = true;
     this.wholePrograms.turn(this.shown, !this.compiling && this.pace.isAtRest(now));
     if (this.compiling || this.recompile()) return; // the last picture stays
     this.brightness.turn(now, this.replaced);
