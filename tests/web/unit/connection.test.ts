@@ -307,6 +307,24 @@ describe('credit', () => {
     expect(credit.rate).toBe(0);
   });
 
+  it('does not take a page that is busy with something else for a slow network', () => {
+    const credit = new CreditWindow();
+    for (let i = 0, t = 0; i < 30; ++i, t += i === 10 ? 600 : 1) {
+      credit.received(16_000, t);
+      credit.used(16_000);
+    }
+    credit.idle();
+    expect(credit.rate).toBe(0);
+  });
+
+  it('finds out that a network which seemed slow is not, though little comes', () => {
+    const credit = run(16_000, 100);
+    credit.idle();
+    for (let i = 0; i < 50; ++i) credit.received(16_000, 20_000 + i);
+    credit.idle();
+    expect(credit.rate).toBeGreaterThan(10_000_000);
+  });
+
   it('grows where the server waits for the page, and all comes at once', () => {
     const credit = new CreditWindow();
     let free = FIRST_WINDOW;
