@@ -129,26 +129,7 @@ export class App {
         Share: sharePanel.element,
       },
     );
-    this.viewer = new Viewer(this.frame.canvas, {
-      used: (bytes) => this.connection.used(bytes),
-      drawn: () => {
-        this.view.onDrawn();
-        this.people.tellSoon();
-        this.state.again(); // the last tiles may be in the picture now
-      },
-      sceneShown: (scene) => {
-        this.view.onSceneShown(scene);
-        this.edit.onSceneShown();
-        this.frame.sceneShown = true;
-        this.state.again(); // no message covers the picture
-      },
-      gizmoDragging: (active) => this.edit.onGizmoDragging(active),
-      gizmoChanged: (object, mode) => this.edit.onGizmoChanged(object, mode),
-      contextLost: (lost) => {
-        const text = lost ? 'The browser has lost the graphics card; waiting for it to return.' : undefined;
-        this.frame.setBanner('card', text);
-      },
-    });
+    this.viewer = this.makeViewer();
     this.viewer.showPeople(this.people.people);
     this.frame.overPicture(this.people.people.labels);
     this.share = new Share(this, sharePanel);
@@ -170,6 +151,35 @@ export class App {
       const token = addressedToken();
       if (token) this.giveToken(token);
     });
+  }
+
+  /** Without WebGL 2 it throws, and nothing goes on: whoever opened the page is told by main.ts. */
+  private makeViewer(): Viewer {
+    try {
+      return new Viewer(this.frame.canvas, {
+        used: (bytes) => this.connection.used(bytes),
+        drawn: () => {
+          this.view.onDrawn();
+          this.people.tellSoon();
+          this.state.again(); // the last tiles may be in the picture now
+        },
+        sceneShown: (scene) => {
+          this.view.onSceneShown(scene);
+          this.edit.onSceneShown();
+          this.frame.sceneShown = true;
+          this.state.again(); // no message covers the picture
+        },
+        gizmoDragging: (active) => this.edit.onGizmoDragging(active),
+        gizmoChanged: (object, mode) => this.edit.onGizmoChanged(object, mode),
+        contextLost: (lost) => {
+          const text = lost ? 'The browser has lost the graphics card; waiting for it to return.' : undefined;
+          this.frame.setBanner('card', text);
+        },
+      });
+    } catch (error) {
+      this.connection.close();
+      throw error;
+    }
   }
 
   mark(name: string): void {

@@ -94,10 +94,13 @@ export class Connection {
     this.open();
   }
 
+  /** For good: nothing more is told. */
   close(): void {
     this.stopped = true;
     clearTimeout(this.timer);
-    this.socket?.close(1000);
+    if (!this.socket) return;
+    this.socket.onclose = this.socket.onmessage = null;
+    this.socket.close(1000);
   }
 
   get isOpen(): boolean {
