@@ -150,6 +150,54 @@ it('keeps a page of many texels, and forty pages, within the memory that it stat
   expect(bytes[2]).toBeLessThanOrEqual(512 * 2 ** 20);
 });
 
+it.each([
+  ['forty pages', 40, 1024, 214],
+  ['a page of 4096 x 4096', 1, 4096, 86],
+])('takes up all tiles of %s, and keeps no more on the card than it states', async (_, count, side, mebibytes) => {
+  const server = await serve(`${SCENES}/cornell.glb`);
+  const page = await pages.open(server.url, 900, 600);
+  await converged(page);
+  const kept = await page.evaluate(
+    async ({ count, side }) => {
+      const { viewer } = window.viewer!;
+      const gl = viewer.renderer.getContext() as WebGL2RenderingContext;
+      let onCard = 0;
+      const store = gl.texStorage2D.bind(gl);
+      gl.texStorage2D = (target, levels, format, width, height) => {
+        for (let level = 0; level < levels; ++level)
+          onCard += 4 * Math.max(1, width >> level) * Math.max(1, height >> level);
+        store(target, levels, format, width, height);
+      };
+      const shape = { width: side, height: side, mips: Math.log2(side) + 1 };
+      const layout = new Array<typeof shape>(count).fill(shape);
+      const set = viewer.layouts.expect({ ...viewer.set!.note, layout: 1000, pages: layout })!;
+      let tiles = 0;
+      for (let mip = shape.mips - 1; mip >= 0; --mip) {
+        const width = Math.min(64, side >> mip);
+        const texels = new Uint32Array(width * width).fill(0x80406030);
+        const sent = { revision: 1, tileVersion: 1, shots: 1, error: 0.01, payloadBytes: 0, crc: 0, scaleExponent: 0 };
+        const flags = { kind: 'irradiance', format: 'rgb9e5', deflated: false, final: false, reset: false } as const;
+        for (let page = 0; page < count; ++page)
+          for (let y = 0; y < side >> mip; y += 64)
+            for (let x = 0; x < side >> mip; x += 64, ++tiles)
+              set.enqueue({ header: { ...sent, ...flags, page, mip, x, y, width, height: width }, texels, exponent: 0 }, 0); // prettier-ignore
+      }
+      while (set.waiting > 0) {
+        viewer.invalidate();
+        await new Promise((resolve) => requestAnimationFrame(resolve));
+      }
+      return { tiles, taken: set.tilesTaken, covered: set.covered, stated: set.bytes, onCard, error: gl.getError() };
+    },
+    { count, side },
+  );
+  expect(kept.taken).toBe(kept.tiles);
+  expect(kept.covered).toBe(true);
+  expect(kept.error).toBe(0);
+  expect(kept.onCard).toBeGreaterThan(4 * count * side * side);
+  expect(kept.onCard).toBeLessThanOrEqual(kept.stated);
+  expect(kept.stated).toBeLessThanOrEqual(mebibytes * 2 ** 20);
+});
+
 it('gives back what edits, loads and views have taken on the card', async () => {
   const server = await serve(`${SCENES}/cornell.glb`);
   const page = await pages.open('about:blank', 480, 360);
