@@ -35,6 +35,10 @@ class Gmres {
   [[nodiscard]] const Vectors& solution() const { return solution_; }
   /// Norm of the residual before the last affine sweep, by channel.
   [[nodiscard]] const std::array<double, 3>& residual() const { return residual_; }
+  /// Estimated norm of what was lacking then, by channel, rather too large: of the error the last step of a cycle left
+  /// about the part q that it left of the residual, so that it is what that step added times q / (1 - q). Infinite
+  /// where no step tells.
+  [[nodiscard]] std::array<double, 3> error() const;
   [[nodiscard]] int sweeps() const { return sweeps_; }
 
  private:
@@ -46,10 +50,12 @@ class Gmres {
     std::array<double, kRestart + 1> right{};
     std::size_t columns = 0;
     bool growing = false;
+    double step = 0.0, before = 0.0;  ///< what the last column of a cycle added, and the residual before it
   };
   void startCycle();
   void addColumn(std::size_t c, std::vector<Real>& image);
   void endCycle();
+  [[nodiscard]] static std::array<double, kRestart> factors(const Channel& channel, std::size_t columns);
   [[nodiscard]] double product(const std::vector<Real>& a, const std::vector<Real>& b) const;
 
   std::vector<Real> weight_;

@@ -171,13 +171,15 @@ void LeafGather::finish() {
   smoother_->forget();
   weighMissed(levels);
   weighDoubt();
-  unsolved_ = 0.0;
+  unsolved_ = unsolved_square_ = 0.0;
   double area = 0.0;
   for (const float a : area_) area += static_cast<double>(a);
   for (auto& half : halves_) {
-    double left = 0.0;
+    double left = 0.0, square = 0.0;
     for (const double residual : half.gmres.residual()) left += residual * std::sqrt(area);
+    for (const double error : half.gmres.error()) square += error * error;
     if (half.shining > 0.0) unsolved_ = std::max(unsolved_, left / half.shining);
+    unsolved_square_ = std::max(unsolved_square_, square);
     half = {};
   }
   light_ = {};
@@ -388,15 +390,15 @@ glm::dvec3 LeafGather::changeAcross(std::uint32_t value) const {
 void LeafGather::save(ArchiveWriter& to) const {
   const auto counts = sights_.counts();
   to(has_gathered_, std::vector<std::uint16_t>(counts.begin(), counts.end()), sights_.partlyInside(), noise_, smoothed_,
-     bias_, doubt_, block_noise_, escaped_, absorbed_, from_sky_, unsolved_, leaf_bias_, block_light_, side_noise_,
-     side_light_);
+     bias_, doubt_, block_noise_, escaped_, absorbed_, from_sky_, unsolved_, unsolved_square_, leaf_bias_, block_light_,
+     side_noise_, side_light_);
 }
 
 bool LeafGather::restore(ArchiveReader& from) {
   std::vector<std::uint16_t> counts;
   std::vector<bool> partly_inside;
   from(has_gathered_, counts, partly_inside, noise_, smoothed_, bias_, doubt_, block_noise_, escaped_, absorbed_,
-       from_sky_, unsolved_, leaf_bias_, block_light_, side_noise_, side_light_);
+       from_sky_, unsolved_, unsolved_square_, leaf_bias_, block_light_, side_noise_, side_light_);
   const auto fits = [](std::uint16_t count) { return count <= LeafSights::kMostRays; };
   std::size_t all = 0;
   for (const auto count : counts) all += count;

@@ -95,8 +95,13 @@ class LeafGather {
   [[nodiscard]] std::span<const float> biasOfLeaves() const { return leaf_bias_; }
   /// The same of what no ray can tell: they end within a gap that has no end. No part of noise().
   [[nodiscard]] double doubt() const { return doubt_; }
-  /// Flux that the equation does not account for, of what is gathered.
+  /// Flux that the equation does not account for, of what shines: so much of all light at most, however often it is
+  /// reflected.
   [[nodiscard]] double unsolved() const { return unsolved_; }
+  /// And the square of the error that this makes, as the last steps of solving tell it: sum over leaves and channels,
+  /// times area. Before levels() put right what all leaves of a part of the scene lack alike, most of it where much is
+  /// reflected.
+  [[nodiscard]] double unsolvedSquare() const { return unsolved_square_; }
   /// Flux that leaves the scene, and that falls on unlit sides, by channel: of what leaves send.
   [[nodiscard]] const std::array<double, 3>& escapedFlux() const { return escaped_; }
   [[nodiscard]] const std::array<double, 3>& absorbedFlux() const { return absorbed_; }
@@ -225,7 +230,7 @@ class LeafGather {
   std::array<Half, 2> halves_;
   std::array<std::vector<Light>, 2> solved_;  ///< by half and leaf value: x, smoothed; while taking it
   std::array<std::vector<glm::vec3>, 2> gathered_;
-  double noise_ = 0.0, smoothed_ = 0.0, bias_ = 0.0, doubt_ = 0.0, unsolved_ = 0.0;
+  double noise_ = 0.0, smoothed_ = 0.0, bias_ = 0.0, doubt_ = 0.0, unsolved_ = 0.0, unsolved_square_ = 0.0;
   std::vector<double> block_noise_;  ///< parts of it but for smoothed_, what smoothing took, by kBlock leaves
   std::vector<double> block_light_;  ///< likewise, of all irradiance
   std::vector<double> side_noise_, side_light_;  ///< likewise, by side

@@ -70,8 +70,9 @@ void LinkedSolver::assess() {
   error_.sampling = std::hypot(by_links_, std::sqrt(doubt / field.square()));
   error_.discretization = field.discretization();
   const double varying = std::sqrt(planner_.variation(system_, unshot_, *patches_) / field.square());
-  error_.residual = (owed + presumed) / (1.0 - kept) / received + varying + system_.unsolved() +
-                    (gathers() ? gather_->unsolved() : 0.0);
+  const double unsolved =
+      gathers() ? std::min(gather_->unsolved(), std::sqrt(gather_->unsolvedSquare() / field.square())) : 0.0;
+  error_.residual = (owed + presumed) / (1.0 - kept) / received + varying + system_.unsolved() + unsolved;
   error_.residual = std::hypot(error_.residual, missing() / std::sqrt(field.square()));  // of links that wait
   varying_share_ = error_.residual > 0.0 ? varying / error_.residual : 0.0;
   left_out_ = left_out / (1.0 - kept) / received;

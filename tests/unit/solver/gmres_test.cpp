@@ -1,0 +1,114 @@
+// What Gmres says of the error of its solution, beside the error itself: equations of rooms that exchange light.
+#include "server/solver/gmres.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <tuple>
+#include <vector>
+
+namespace radiosity::solver {
+namespace {
+
+/// x = rho F x + g, F a matrix of form factors: rows sum to one.
+struct Equation {
+  std::vector<std::vector<double>> exchange;  ///< rho F
+  std::vector<double> shining, weight;
+};
+
+/// `rooms` of `size` leaves each, of which all see each other alike but for chance, and so much of what the next room
+/// has.
+Equation makeRooms(std::size_t rooms, std::size_t size, double rho, double door, std::uint32_t seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> chance(0.2, 1.0);
+  const std::size_t count = rooms * size;
+  Equation equation{std::vector<std::vector<double>>(count, std::vector<double>(count, 0.0)),
+                    std::vector<double>(count, 0.0), std::vector<double>(count, 0.0)};
+  for (std::size_t i = 0; i < count; ++i) {
+    double sum = 0.0;
+    for (std::size_t j = 0; j < count; ++j) {
+      const auto apart = i / size > j / size ? i / size - j / size : j / size - i / size;
+      if (apart <= 1) sum += equation.exchange[i][j] = chance(random) * (apart == 0 ? 1.0 : door);
+    }
+    const double reflectance = rho * (0.9 + 0.1 * chance(random));
+    for (auto& factor : equation.exchange[i]) factor *= reflectance / sum;
+    equation.weight[i] = chance(random);
+    if (i < size) equation.shining[i] = chance(random);  // the first room has the lamps
+  }
+  return equation;
+}
+
+void sweepOnce(const Equation& equation, Gmres<double>::Vectors& x, bool affine) {
+  for (auto& channel : x) {
+    auto next = affine ? equation.shining : std::vector<double>(channel.size(), 0.0);
+    for (std::size_t i = 0; i < next.size(); ++i) {
+      for (std::size_t j = 0; j < next.size(); ++j) next[i] += equation.exchange[i][j] * channel[j];
+    }
+    channel = std::move(next);
+  }
+}
+
+Gmres<double> solve(const Equation& equation, double tolerance) {
+  Gmres<double> gmres;
+  Gmres<double>::Vectors nothing;
+  for (auto& channel : nothing) channel.assign(equation.weight.size(), 0.0);
+  gmres.begin(nothing, equation.weight, {tolerance, tolerance, tolerance}, 2000);
+  while (!gmres.advance([&](Gmres<double>::Vectors& x, bool affine) { sweepOnce(equation, x, affine); })) continue;
+  return gmres;
+}
+
+double distance(const Equation& equation, const std::vector<double>& a, const std::vector<double>& b) {
+  double square = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) square += equation.weight[i] * (a[i] - b[i]) * (a[i] - b[i]);
+  return std::sqrt(square);
+}
+
+/// Told of real errors, by room.
+std::vector<double> toldOfErrors(std::size_t rooms, double rho, double door, std::vector<double>& of_bound) {
+  std::vector<double> ratios;
+  for (std::uint32_t seed = 1; seed <= 20; ++seed) {
+    const auto equation = makeRooms(rooms, 24, rho, door, seed);
+    const double shining = distance(equation, equation.shining, std::vector<double>(equation.weight.size(), 0.0));
+    const auto exact = solve(equation, 1e-13 * shining).solution()[0];
+    for (const double tolerance : {1e-1, 1e-2, 1e-3, 1e-4, 1e-5}) {
+      const auto gmres = solve(equation, tolerance * shining);
+      EXPECT_EQ(gmres.error()[0], gmres.error()[2]);
+      ratios.push_back(gmres.error()[0] / distance(equation, gmres.solution()[0], exact));
+      of_bound.push_back(gmres.error()[0] * (1.0 - rho) / gmres.residual()[0]);
+    }
+  }
+  std::ranges::sort(ratios);
+  std::ranges::sort(of_bound);
+  return ratios;
+}
+
+TEST(Gmres, TellsTheErrorOfItsSolution) {
+  // What the residual alone would have it be is an error of the level of all light, which is found first where there is
+  // one room or two: there this is far less.
+  for (const auto& [rooms, rho, door, most_of_bound] :
+       {std::tuple{1U, 0.5, 0.0, 2.0}, std::tuple{1U, 0.99, 0.0, 0.1}, std::tuple{2U, 0.9, 0.05, 0.5},
+        std::tuple{2U, 0.99, 0.001, 0.3}, std::tuple{5U, 0.95, 0.02, 2.0}}) {
+    SCOPED_TRACE(fmt::format("{} rooms of reflectance {}", rooms, rho));
+    std::vector<double> of_bound;
+    const auto ratios = toldOfErrors(rooms, rho, door, of_bound);
+    EXPECT_GT(ratios.front(), 0.3);  // of 100: a step that takes more of the residual than of the error
+    EXPECT_GT(ratios[5], 0.8);
+    // A sweep after the last step takes most of what is no level; where nothing else is left that is nearly all.
+    EXPECT_LT(ratios[50], 40.0);
+    EXPECT_LT(of_bound[50], most_of_bound);
+  }
+}
+
+TEST(Gmres, TellsNothingOfAnErrorWhereNoStepWasTaken) {
+  const auto equation = makeRooms(1, 8, 0.5, 0.0, 1);
+  EXPECT_TRUE(std::isinf(solve(equation, 1e9).error()[0]));
+  auto dark = equation;
+  std::ranges::fill(dark.shining, 0.0);
+  EXPECT_EQ(solve(dark, 0.0).error()[0], 0.0);
+}
+
+}  // namespace
+}  // namespace radiosity::solver
