@@ -44,10 +44,15 @@ std::string ratioText(const Summary& summary) {
   return fmt::format("{:.2f} at {} %", summary.ratio_at_best->ratio, percent(summary.ratio_at_best->error));
 }
 
+std::string slopes(const Summary& summary) {
+  const auto from = summary.texels_limit_from ? fmt::format("{:.2f}", *summary.texels_limit_from) : "-";
+  return fmt::format("{}, {}; {}", orDash(summary.slope_to_limit), from, orDash(summary.late_slope));
+}
+
 std::string summaryTable(const std::vector<SceneSeries>& scenes) {
   std::string out =
       "| scene | polygons | patches | s to 2 % | asked for 2 %: s, true % | last row: s, true % | stated / true | "
-      "late slope | Cycles: s to 2 % | ours / Cycles | whole commands "
+      "slope to texels' limit, from s; late | Cycles: s to 2 % | ours / Cycles | whole commands "
       "|\n|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
   for (const auto& series : scenes) {
     if (!series.unmeasured.empty()) {
@@ -59,8 +64,8 @@ std::string summaryTable(const std::vector<SceneSeries>& scenes) {
     const auto& last = series.rows.back();
     out += fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |\n", series.name, series.polygons,
                        series.patches, orDash(summary.to_goal), series.asked ? outcome(*series.asked) : "-",
-                       outcome(last), orDash(summary.stated_over_true), orDash(summary.late_slope),
-                       cyclesTime(series, summary), ratioText(summary), orDash(summary.ratio_wall));
+                       outcome(last), orDash(summary.stated_over_true), slopes(summary), cyclesTime(series, summary),
+                       ratioText(summary), orDash(summary.ratio_wall));
   }
   return out;
 }
@@ -121,6 +126,16 @@ std::string referenceText(const SceneSeries& series) {
   return text;
 }
 
+/// Until when the error is worth lowering without finer texels.
+std::string limitText(const Summary& summary) {
+  if (!summary.texels_limit_from) return "The size of texels limits nothing yet.";
+  return fmt::format(
+      "From {:.2f} s on the size of texels is most of what the lightmap is off by, and it says so; until then the "
+      "slope "
+      "is {}.",
+      *summary.texels_limit_from, orDash(summary.slope_to_limit));
+}
+
 std::string sceneSection(const SceneSeries& series) {
   std::string out = fmt::format("\n## {}\n\n", series.name);
   if (!series.unmeasured.empty()) return out + "Not judged: " + series.unmeasured + ".\n";
@@ -134,8 +149,8 @@ std::string sceneSection(const SceneSeries& series) {
     out += fmt::format("\nAsked for a stated 2 %: {:.2f} s of solving, {:.2f} s in all; stated {} %, true {} %.\n",
                        row.seconds, row.wall_seconds, percent(row.stated.total), truth(row));
   }
-  out += fmt::format("\nSlope of solver RMS in log-log: {}; over the last decade of time {}.\n", orDash(summary.slope),
-                     orDash(summary.late_slope));
+  out += fmt::format("\nSlope of solver RMS in log-log: {}; over the last decade of time {}. {}\n",
+                     orDash(summary.slope), orDash(summary.late_slope), limitText(summary));
   if (series.cycles) out += cyclesTable(series, summary);
   return out;
 }

@@ -136,6 +136,8 @@ json toJson(const SceneSeries& series) {
           {"cycles", series.cycles ? toJson(*series.cycles) : json(nullptr)},
           {"slope", orNull(summary.slope)},
           {"late_slope", orNull(summary.late_slope)},
+          {"texels_limit_from", orNull(summary.texels_limit_from)},
+          {"slope_to_limit", orNull(summary.slope_to_limit)},
           {"stated_over_true", orNull(summary.stated_over_true)},
           {"to_2_percent",
            {{"solver", toJson(summary.to_goal)},
@@ -163,6 +165,15 @@ Summary summarize(const SceneSeries& series) {
   auto late = resolved;
   std::erase_if(late, [&](const SolveRow& row) { return row.seconds < kLate * resolved.back().seconds; });
   summary.late_slope = logLogSlope(curveOf(late, seconds, error));
+  const auto limit =
+      std::ranges::find_if(rows, [](const SolveRow& row) { return row.stated.discretization > row.stated.total; });
+  if (limit != rows.end()) summary.texels_limit_from = limit->seconds;
+  auto falling = resolved;
+  std::erase_if(falling, [&](const SolveRow& row) {
+    const bool lacks_bounces = row.stated.residual > 0.5 * row.stated.total;
+    return lacks_bounces || row.seconds > summary.texels_limit_from.value_or(row.seconds);
+  });
+  summary.slope_to_limit = logLogSlope(curveOf(falling, seconds, error));
   std::vector<double> ratios;
   for (const auto& row : resolved) ratios.push_back(row.stated.total / row.solver.solverRms());
   summary.stated_over_true = geometricMean(ratios);

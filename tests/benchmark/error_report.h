@@ -17,8 +17,12 @@ inline constexpr double kGoal = 0.02;
 
 /// What is drawn from a scene's rows.
 struct Summary {
-  std::optional<double> slope;             ///< of solver error against solve time, resolved rows
-  std::optional<double> late_slope;        ///< the same over the last decade of time: whether it still falls
+  std::optional<double> slope;       ///< of solver error against solve time, resolved rows
+  std::optional<double> late_slope;  ///< the same over the last decade of time: whether it still falls
+  /// Solve seconds of the first row at which the size of texels is most of what the lightmap is off by, as it says
+  /// itself; none where it never is.
+  std::optional<double> texels_limit_from;
+  std::optional<double> slope_to_limit;    ///< from when all bounces are in until then, that row included
   std::optional<double> stated_over_true;  ///< geometric mean, resolved rows
   std::optional<TimeToError> to_goal;      ///< solver error, solve seconds
   // The same texels for both, from here on (texels that both can be judged on).

@@ -60,6 +60,23 @@ TEST(Summary, ACurveThatHasFlattenedHasAFlatLateSlope) {
   EXPECT_LT(summary.slope.value(), -0.3);
 }
 
+TEST(Summary, TheSlopeToTheLimitOfTexelsLeavesOutWhatComesBeforeAllBouncesAndAfterIt) {
+  SceneSeries series;
+  for (const double t : {0.1, 0.2, 0.5, 1.0, 2.0, 5.0}) {
+    const double error = t < 1.5 ? 0.01 / t : 0.009;
+    series.rows.push_back(rowAt(t, t < 0.15 ? 0.9 : error, t < 0.15 ? 0.9 : error));
+    series.rows.back().stated.residual = t < 0.15 ? 0.8 : 0.0;
+    series.rows.back().stated.discretization = 0.012;
+  }
+  const auto summary = summarize(series);
+  EXPECT_EQ(summary.texels_limit_from, 1.0);
+  EXPECT_NEAR(summary.slope_to_limit.value(), -1.0, 1e-9);
+  EXPECT_GT(summary.late_slope.value(), -0.6);
+  for (auto& row : series.rows) row.stated.discretization = 0.0;
+  EXPECT_FALSE(summarize(series).texels_limit_from);
+  EXPECT_GT(summarize(series).slope_to_limit.value(), -0.6);
+}
+
 TEST(Summary, CyclesIsChargedForRenderingAndInAllForItsWholeRun) {
   const auto summary = summarize(series());
   EXPECT_NEAR(summary.cycles_cost->setup_seconds, 1.0, 1e-9);
