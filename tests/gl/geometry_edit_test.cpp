@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <string>
 #include <vector>
 
 #include "tests/unit/engine/block_room.h"
@@ -82,6 +83,16 @@ class ChairEdit : public test::ChairRoom {
     }
     return differ;
   }
+
+  /// In software lamps lose a pixel here and there, of which some tests tell. A graphics card need not.
+  bool lampsLoseNothing(const LinkedSolver& solver) const {
+    double lost = 0.0;
+    for (const auto& shooter : solver.system().shooters()) {
+      for (const auto& column : shooter.column) lost += shooter.isLight() ? column.escaped() + column.absorbed() : 0.0;
+    }
+    EXPECT_TRUE(lost > 0.0 || transport_->description().find("llvmpipe") == std::string::npos);
+    return lost == 0.0;
+  }
 };
 
 TEST_F(ChairEdit, MendsTheLinksThatMeasuringAllFinds) {
@@ -133,6 +144,7 @@ TEST_F(ChairEdit, LooksPastWhatLittleIsLostElsewhere) {
   const auto after = edited(before_, move_);
   const auto map = mapOf(before_, after);
   const auto first = solved(before_), second = solved(before_), third = solved(before_);
+  if (lampsLoseNothing(*first)) GTEST_SKIP() << transport_->description() << ": nothing is lost";
   const auto exact = successor(*first, after, map);
   const auto lostOf = [](const LinkedSolver& solver, std::size_t n, std::size_t half) {
     const auto& column = solver.system().shooters()[n].column[half];
@@ -174,6 +186,7 @@ TEST_F(ChairEdit, LooksAgainAtWhatManyEditsMadeNoLongerLittle) {
     return most;
   };
   auto solver = solved(before_);
+  if (lampsLoseNothing(*solver)) GTEST_SKIP() << transport_->description() << ": nothing is lost";
   auto now = before_;
   double most = 0.0;
   bool fell = false;
