@@ -365,6 +365,7 @@ export interface GltfNode {
   mesh?: number;
   translation?: number[];
   rotation?: number[];
+  scale?: number[];
   children?: number[];
 }
 

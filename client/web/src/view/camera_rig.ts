@@ -23,6 +23,8 @@ const ROOM_FOV = 65;
 const FARTHEST_M = 1e12;
 /** Of the distance from eye to target: what nobody sees, a tenth of a pixel of a large screen. */
 const SAME_PICTURE = 3e-5;
+/** Behind the point, that numbers are written with. */
+const MOST_DIGITS = 100;
 
 export class CameraRig {
   readonly camera = new PerspectiveCamera(45, 1, 0.01, 1000);
@@ -203,8 +205,8 @@ export class CameraRig {
 
   /** Eye and target, metres, in as few digits as show the same picture, however far from the origin that is. */
   get place(): { position: number[]; target: number[] } {
-    const step = Math.max(this.camera.position.distanceTo(this.target), FARTHEST_M * 1e-15) * SAME_PICTURE;
-    const digits = Math.max(0, Math.ceil(-Math.log10(step)));
+    const step = (this.camera.position.distanceTo(this.target) || 1) * SAME_PICTURE;
+    const digits = MathUtils.clamp(Math.ceil(-Math.log10(step)), 0, MOST_DIGITS);
     const rounded = (at: Vector3) => at.toArray().map((v) => Number(v.toFixed(digits)));
     return { position: rounded(this.camera.position), target: rounded(this.target) };
   }
@@ -253,7 +255,7 @@ export class CameraRig {
     const far = this.camera.position.distanceTo(this.target) + this.size * 2;
     // Where one thing lies a million times as far away as the others are large, these are to be seen all the same.
     const distance = this.camera.position.distanceTo(this.target);
-    const near = Math.max(Math.min(this.size * 2e-4, distance * 0.02), far * 1e-6);
+    const near = Math.max(Math.min(this.size * 2e-4, distance * 0.2), far * 1e-6);
     if (Math.abs(this.camera.far / far - 1) < 0.2 && Math.abs(this.camera.near / near - 1) < 0.2) return;
     this.camera.near = near;
     this.camera.far = far;
