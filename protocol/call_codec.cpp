@@ -78,6 +78,7 @@ json params(const SnapshotCall& c) {
   if (c.exposure) out["exposure"] = *c.exposure;
   return out;
 }
+json params(const TexelCall& c) { return {{"page", c.page}, {"x", c.x}, {"y", c.y}}; }
 json params(const CameraCall& c) { return c.pose ? toJson(*c.pose) : json::object(); }
 template <typename C>
 json params(const C& /*no parameters*/) {
@@ -173,6 +174,12 @@ void read(Reader& r, SnapshotCall& c) {
   r.narrow("height", c.height, Need::kOptional, 1, kMaxSnapshotSide);
   r.text("quantity", c.quantity, Need::kOptional, 64);
   r.optionalNumber("exposure", c.exposure, {0.0, kMaxExposure, true});
+}
+void read(Reader& r, TexelCall& c) {
+  constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max();
+  r.narrow("page", c.page, Need::kRequired, 0, kMost);
+  r.narrow("x", c.x, Need::kRequired, 0, kMost);
+  r.narrow("y", c.y, Need::kRequired, 0, kMost);
 }
 void read(Reader& r, CameraCall& c) {
   if (r.find("position") != nullptr || r.find("target") != nullptr) read(r, c.pose.emplace());

@@ -161,6 +161,10 @@ struct SnapshotReply {
   std::string url;
   std::optional<double> exposure;  ///< 1/nit, as given or as measured; none: false colours
 };
+struct TexelReply {
+  std::uint64_t revision = 0, tile_version = 0;
+  std::array<double, 3> irradiance{}, error{};  ///< lux, as the quantities of these names
+};
 struct ViewersReply {
   std::uint64_t count = 0;
 };
@@ -276,6 +280,12 @@ struct SnapshotCall {
   std::string quantity = "lit";
   std::optional<double> exposure = {};  ///< 1/nit; none: measured
 };
+/// What one texel of the lightmaps has.
+struct TexelCall {
+  static constexpr std::string_view kMethod = "texel";
+  using Reply = TexelReply;
+  std::uint32_t page = 0, x = 0, y = 0;  ///< of mip 0; row 0 is v = 0
+};
 struct ViewersCall {
   static constexpr std::string_view kMethod = "viewers";
   using Reply = ViewersReply;
@@ -287,9 +297,10 @@ struct CameraCall {
   std::optional<CameraPose> pose = {};
 };
 
-using Call = std::variant<HelloCall, SceneGetCall, SceneLoadCall, ScenePatchCall, SceneUndoCall, SceneRedoCall,
-                          SceneHistoryCall, SolveConfigureCall, SolvePauseCall, SolveResumeCall, SolveRestartCall,
-                          SolveWaitCall, StatusCall, SubscribeCall, CreditCall, SnapshotCall, ViewersCall, CameraCall>;
+using Call =
+    std::variant<HelloCall, SceneGetCall, SceneLoadCall, ScenePatchCall, SceneUndoCall, SceneRedoCall, SceneHistoryCall,
+                 SolveConfigureCall, SolvePauseCall, SolveResumeCall, SolveRestartCall, SolveWaitCall, StatusCall,
+                 SubscribeCall, CreditCall, SnapshotCall, TexelCall, ViewersCall, CameraCall>;
 
 // ---- notifications from the server ----
 

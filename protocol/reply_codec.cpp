@@ -99,6 +99,13 @@ void read(Reader& r, SnapshotReply& reply) {
   r.text("url", reply.url, Need::kRequired, kAnyText);
   r.optionalNumber("exposure", reply.exposure, {0.0, std::numeric_limits<double>::max(), true});
 }
+void read(Reader& r, TexelReply& reply) {
+  constexpr double kMost = std::numeric_limits<double>::max();
+  r.integer("revision", reply.revision, Need::kRequired, 0, kAnyInteger);
+  r.integer("tileVersion", reply.tile_version, Need::kRequired, 0, kAnyInteger);
+  readTriple(r, "irradiance", Need::kRequired, -kMost, kMost, reply.irradiance);
+  readTriple(r, "error", Need::kRequired, 0.0, kMost, reply.error);
+}
 void read(Reader& r, CameraReply& reply) { r.optionalInteger("viewer", reply.viewer, 0, kAnyInteger); }
 void read(Reader& r, ViewersReply& reply) { r.integer("count", reply.count, Need::kRequired, 0, kAnyInteger); }
 
@@ -179,6 +186,13 @@ std::string encodeReply(const RequestId& id, const SnapshotReply& r) {
   return answer(id, std::move(out));
 }
 
+std::string encodeReply(const RequestId& id, const TexelReply& r) {
+  return answer(
+      id,
+      json{
+          {"revision", r.revision}, {"tileVersion", r.tile_version}, {"irradiance", r.irradiance}, {"error", r.error}});
+}
+
 std::string encodeReply(const RequestId& id, const ViewersReply& r) { return answer(id, json{{"count", r.count}}); }
 
 std::string encodeReply(const RequestId& id, const CameraReply& r) {
@@ -206,6 +220,7 @@ template Result<StatusReply> decodeReply<StatusReply>(const json&);
 template Result<SubscribeReply> decodeReply<SubscribeReply>(const json&);
 template Result<CreditReply> decodeReply<CreditReply>(const json&);
 template Result<SnapshotReply> decodeReply<SnapshotReply>(const json&);
+template Result<TexelReply> decodeReply<TexelReply>(const json&);
 template Result<ViewersReply> decodeReply<ViewersReply>(const json&);
 template Result<CameraReply> decodeReply<CameraReply>(const json&);
 

@@ -22,6 +22,7 @@ void buildApp(CLI::App& app, Run& run) {
   addWait(app, run);
   addScript(app, run);
   addStatus(app, run);
+  addTexel(app, run);
   addSnapshot(app, run);
   addSave(app, run);
 }

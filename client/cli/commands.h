@@ -20,6 +20,7 @@ void addQuickEdits(CLI::App& app, Run& run);
 void addWait(CLI::App& app, Run& run);
 void addScript(CLI::App& app, Run& run);
 void addStatus(CLI::App& app, Run& run);
+void addTexel(CLI::App& app, Run& run);
 void addSnapshot(CLI::App& app, Run& run);
 void addSave(CLI::App& app, Run& run);
 

@@ -1,10 +1,12 @@
-// radiosity load, status, snapshot and save: one exchange with a server each.
+// radiosity load, status, texel, snapshot and save: one exchange with a server each.
 #include <fmt/format.h>
 
+#include <array>
 #include <charconv>
 #include <chrono>
 #include <memory>
 #include <optional>
+#include <tuple>
 
 #include "client/cli/commands.h"
 #include "client/cli/remote.h"
@@ -44,6 +46,28 @@ ExitCode status(const StatusOptions& options) {
   const auto reply = connection->call(protocol::StatusCall{});
   if (!reply) return complain(reply.error());
   std::fputs((options.json ? statusJson(*reply) : statusText(*reply)).c_str(), stdout);
+  return ExitCode::kOk;
+}
+
+struct TexelOptions {
+  RemoteOptions server;
+  protocol::TexelCall texel;
+};
+
+double luminance(const std::array<double, 3>& rgb) { return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]; }
+
+ExitCode texel(const TexelOptions& options) {
+  const auto remote = remoteFrom(options.server);
+  if (!remote) return complain(remote.error());
+  auto connection = remote->connect();
+  if (!connection) return complain(connection.error());
+  const auto reply = connection->call(options.texel);
+  if (!reply) return complain(reply.error());
+  const auto& [light, error] = std::tie(reply->irradiance, reply->error);
+  std::fputs(fmt::format("{:.6g} +- {:.2g} lux\nR {:.6g} +- {:.2g}, G {:.6g} +- {:.2g}, B {:.6g} +- {:.2g}\n",
+                         luminance(light), luminance(error), light[0], error[0], light[1], error[1], light[2], error[2])
+                 .c_str(),
+             stdout);
   return ExitCode::kOk;
 }
 
@@ -135,6 +159,16 @@ void addStatus(CLI::App& app, Run& run) {
   addRemoteOptions(command, options->server);
   command.add_flag("--json", options->json, "as JSON (errors as fractions, seconds, lumens)");
   command.callback([options, &run] { run = [options] { return status(*options); }; });
+}
+
+void addTexel(CLI::App& app, Run& run) {
+  auto options = std::make_shared<TexelOptions>();
+  auto& command = *app.add_subcommand("texel", "tell the irradiance of one lightmap texel and its standard error, lux");
+  addRemoteOptions(command, options->server);
+  command.add_option("PAGE", options->texel.page, "the lightmap page, from 0")->required()->type_name("");
+  command.add_option("X", options->texel.x, "the texel's column, from 0")->required()->type_name("");
+  command.add_option("Y", options->texel.y, "the texel's row, from 0: v = 0")->required()->type_name("");
+  command.callback([options, &run] { run = [options] { return texel(*options); }; });
 }
 
 void addSnapshot(CLI::App& app, Run& run) {

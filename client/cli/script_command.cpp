@@ -81,8 +81,9 @@ Result<std::string> readScript(const std::string& path) {
 
 /// Commands of the program itself that make no sense on one server, or would read the script's own input.
 bool isAllowed(const std::string& command) {
-  constexpr std::array kAllowed = {"add",  "edit",  "hide", "history", "load",     "move",   "redo", "remove", "rotate",
-                                   "save", "scale", "set",  "show",    "snapshot", "status", "undo", "wait"};
+  constexpr std::array kAllowed = {"add",  "edit",     "hide",   "history", "load",  "move",
+                                   "redo", "remove",   "rotate", "save",    "scale", "set",
+                                   "show", "snapshot", "status", "texel",   "undo",  "wait"};
   return std::find(kAllowed.begin(), kAllowed.end(), command) != kAllowed.end();
 }
 
@@ -201,7 +202,7 @@ void addScript(CLI::App& app, Run& run) {
   command.add_flag("-q,--quiet", options->quiet, "do not tell each command on stderr");
   command.footer(
       "A line is a command of this program without `radiosity` and URL: set, move, rotate, scale, hide, show, remove,\n"
-      "add, edit, undo, redo, history, load, wait, snapshot, save, status; or `print WORD...`. Loops:\n"
+      "add, edit, undo, redo, history, load, wait, snapshot, save, status, texel; or `print WORD...`. Loops:\n"
       "  for s from 5 to 100 count 20 index i     # $s = 5, 10, ... 100; $i = 00, 01, ... 19\n"
       "    set @lamp.emissiveStrength $s\n"
       "    wait --error 0.02\n"

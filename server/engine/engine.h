@@ -219,6 +219,16 @@ struct Snapshot {
   std::optional<double> exposure;  ///< 1/nit, what radiance was multiplied by; none: false colours
 };
 
+struct TexelRequest {
+  std::uint32_t page = 0, x = 0, y = 0;  ///< of mip 0; row 0 is v = 0
+};
+
+/// What one texel of the lightmaps has, and the moment that it is of.
+struct Texel {
+  std::uint64_t revision = 0, tile_version = 0;
+  glm::vec3 irradiance{0.0F}, error{0.0F};  ///< Quantity::kIrradiance, kError; lux
+};
+
 /// Something mended itself that those who watch may wonder about.
 struct Notice {
   enum class Kind { kRendererReplaced, kSolveRestarted };
@@ -290,6 +300,9 @@ class Engine {
   /// OpenEXR, row 0 = v 0: 32-bit float RGB, or one channel "Y" of 32-bit whole numbers.
   virtual void lightmapExr(std::uint32_t page, Quantity quantity, Callback<SharedBytes> done) = 0;
   virtual void snapshot(SnapshotRequest request, Callback<Snapshot> done) = 0;
+  /// kNotFound where there is no such texel, or it belongs to no surface: Error::where is "page", "x" or "y". May be
+  /// asked often, by many: what it takes is made for all of them together, and seldom while the solve goes on.
+  virtual void texel(TexelRequest request, Callback<Texel> done) = 0;
 
   /// The same from the engine's start to its end.
   [[nodiscard]] virtual const Past& past() const {

@@ -86,6 +86,7 @@ void SolveLoop::threadMain(std::promise<Result<void>> started) {
   }
   checkpoints_.reset();
   first_light_.reset();
+  texels_.forget();
   former_.reset();
   lit_.reset();
   view_.reset();
@@ -114,6 +115,7 @@ bool SolveLoop::runCommands() {
 
 /// Where memory runs out in it the solve has failed: whatever frees some, an edit or a smaller scene, starts another.
 void SolveLoop::takeTurn() {
+  texels_.keepOnly(publisher_.layout());
   try {
     welcomeWatchers();
     if (first_light_)
@@ -124,6 +126,7 @@ void SolveLoop::takeTurn() {
       catchUp();
     checkpointIfDue();
   } catch (const std::bad_alloc&) {
+    texels_.forget();
     if (std::exchange(former_, nullptr)) return log::warn("out of memory: the scene before the last edit is forgotten");
     if (first_light_) {  // the whole may still be had
       first_light_->goes_on = unpublished_ = false;
@@ -182,6 +185,7 @@ void SolveLoop::solveSlice() {
 
 Result<solver::StepOutcome> SolveLoop::stepSolver() {
   stepped_ = true;
+  ++steps_;
   return lit_->solver().step();
 }
 

@@ -1,4 +1,4 @@
-// What can be fetched from the solve thread: the document, files in memory, pictures.
+// What can be fetched from the solve thread: the document, files in memory, pictures, single texels.
 #include <fmt/format.h>
 #include <map>
 #include <optional>
@@ -169,6 +169,25 @@ Result<Snapshot> SolveLoop::renderSnapshot(const SnapshotRequest& request) {
 
 void SolveLoop::snapshot(SnapshotRequest request, Callback<Snapshot> done) {
   askLit<Snapshot>(std::move(done), [this, request = std::move(request)] { return renderSnapshot(request); });
+}
+
+/// A version of irradiance that is published stands for all steps until the next. What nobody watches has no versions:
+/// what was published of it last may be of any time.
+Result<Texel> SolveLoop::readTexel(const TexelRequest& request) {
+  const auto version = publisher_.version();
+  const auto published = [&](Quantity quantity) {
+    const bool is_watched = watches_.wants(quantity) && !watches_.hasAdded(quantity);
+    const auto& latest = publisher_.latest(quantity);
+    return is_watched && latest && latest->tile_version == version ? latest : nullptr;
+  };
+  const PublishedTexels pages{published(Quantity::kIrradiance), published(Quantity::kError)};
+  const PagesMoment now{publisher_.layout(), revision_, version, pages.irradiance ? 0 : steps_};
+  return texels_.read(request, *lit_, now, pages);
+}
+
+void SolveLoop::texel(TexelRequest request, Callback<Texel> done) {
+  askLit<Texel>(
+      std::move(done), [this, request] { return readTexel(request); }, CommandQueue::Kind::kPrompt);
 }
 
 }  // namespace radiosity::engine

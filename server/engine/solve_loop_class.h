@@ -26,6 +26,7 @@
 #include "server/engine/memory.h"
 #include "server/engine/publisher.h"
 #include "server/engine/solve_loop.h"
+#include "server/engine/texel_reader.h"
 #include "server/engine/watches.h"
 #include "server/gpu/view_renderer.h"
 #include "server/scene/document.h"
@@ -65,6 +66,7 @@ class SolveLoop final : public Engine {
   void unlitGlb(Callback<SharedBytes> done) override;
   void lightmapExr(std::uint32_t page, Quantity quantity, Callback<SharedBytes> done) override;
   void snapshot(SnapshotRequest request, Callback<Snapshot> done) override;
+  void texel(TexelRequest request, Callback<Texel> done) override;
   void addListener(std::weak_ptr<Listener> listener) override;
   [[nodiscard]] const Past& past() const override { return past_; }
   void keepSolve(std::chrono::milliseconds patience) override;
@@ -196,6 +198,7 @@ class SolveLoop final : public Engine {
   [[nodiscard]] bool takeCheckpoint();
 
   [[nodiscard]] Result<Snapshot> renderSnapshot(const SnapshotRequest& request);
+  [[nodiscard]] Result<Texel> readTexel(const TexelRequest& request);
   [[nodiscard]] Result<SharedBytes> makeGlb();
   [[nodiscard]] Result<SharedBytes> makeUnlit();
   [[nodiscard]] Result<SharedBytes> makeExr(std::uint32_t page, Quantity quantity);
@@ -215,6 +218,7 @@ class SolveLoop final : public Engine {
   std::unique_ptr<LitScene> former_;       // before the last edit of geometry, solved, for the way back; null: not kept
   std::optional<FirstLight> first_light_;  // then lit_ is made of a few texels, in no history and on no disk
   Publisher publisher_;
+  TexelReader texels_;
   History history_;
   SolveState state_ = SolveState::kEmpty;
   std::string failure_;
@@ -223,6 +227,7 @@ class SolveLoop final : public Engine {
   bool unpublished_ = false;
   bool shown_is_own_ = true;     // what was published last is of this solver, not of one that it took turns with
   bool stepped_ = false;         // the solver, since the present version began
+  std::uint64_t steps_ = 0;      // of all solvers
   std::uint64_t unwatched_ = 0;  // publications that nobody was there for
   Clock::time_point next_publish_{}, next_progress_{};
   bool renderer_lost_ = false;

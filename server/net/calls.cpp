@@ -322,6 +322,16 @@ void Calls::run(const protocol::SnapshotCall& call, const Slot& slot) {
                          }));
 }
 
+void Calls::run(const protocol::TexelCall& call, const Slot& slot) {
+  hub_.engine().texel({call.page, call.x, call.y},
+                      hub_.fromEngine<engine::Texel>([slot](const Result<engine::Texel>& texel) {
+                        if (texel) return slot.reply(toTexelReply(*texel));
+                        auto error = protocol::toRpcError(texel.error());
+                        if (!error.pointer.empty()) error.pointer = "/params/" + error.pointer;
+                        slot.error(error);
+                      }));
+}
+
 void Calls::run(const protocol::ViewersCall& /*call*/, const Slot& slot) {
   slot.reply(protocol::ViewersReply{hub_.viewerCount()});
 }

@@ -70,6 +70,7 @@ class Calls {
   void run(const protocol::SubscribeCall& call, const Slot& slot);
   void run(const protocol::CreditCall& call, const Slot& slot);
   void run(const protocol::SnapshotCall& call, const Slot& slot);
+  void run(const protocol::TexelCall& call, const Slot& slot);
   void run(const protocol::ViewersCall& call, const Slot& slot);
   void run(const protocol::CameraCall& call, const Slot& slot);
   bool takeCameraCall();

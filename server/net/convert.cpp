@@ -144,6 +144,16 @@ protocol::SceneHistoryReply toHistoryReply(const engine::HistoryReport& report, 
   return reply;
 }
 
+protocol::TexelReply toTexelReply(const engine::Texel& texel) {
+  protocol::TexelReply reply{texel.revision, texel.tile_version, {}, {}};
+  for (int c = 0; c < 3; ++c) {
+    const auto i = static_cast<std::size_t>(c);
+    reply.irradiance[i] = finite(static_cast<double>(texel.irradiance[c]), 0.0);
+    reply.error[i] = finite(static_cast<double>(texel.error[c]), 0.0);
+  }
+  return reply;
+}
+
 protocol::StatusReply toStatusReply(const engine::Status& s) {
   protocol::StatusReply out;
   out.progress = toProgress(s);

@@ -146,6 +146,10 @@ TEST(Params, AnErrorNamesThePointerAndTheRange) {
   EXPECT_EQ(paramsError("credit", R"({"bytes":-1})").pointer, "/params/bytes");
   EXPECT_EQ(paramsError("snapshot", R"({"width":100000})").pointer, "/params/width");
   EXPECT_EQ(paramsError("snapshot", R"({"exposure":0})").message, "/params/exposure must be a number in (0, 1e+30]");
+  EXPECT_EQ(paramsError("texel", R"({"x":1,"y":2})").message, "/params/page is missing");
+  EXPECT_EQ(paramsError("texel", R"({"page":0,"x":-1,"y":2})").pointer, "/params/x");
+  EXPECT_EQ(paramsError("texel", R"({"page":0,"x":1.5,"y":2})").pointer, "/params/x");
+  EXPECT_EQ(paramsError("texel", R"({"page":0,"x":1,"y":4294967296})").pointer, "/params/y");
 }
 
 TEST(Params, APatchErrorNamesTheOperation) {

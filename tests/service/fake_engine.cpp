@@ -355,6 +355,28 @@ void FakeEngine::snapshot(engine::SnapshotRequest request, Callback<engine::Snap
   });
 }
 
+void FakeEngine::texel(engine::TexelRequest request, Callback<engine::Texel> done) {
+  engine::Status now;
+  Layout layout;
+  {
+    const std::lock_guard lock(mutex_);
+    now = status_;
+    layout = layout_;
+  }
+  answer([done, request, now, layout] {
+    const auto outside = [&](std::uint32_t value, int count, const char* member) {
+      const bool is = value >= static_cast<std::uint32_t>(count);
+      if (is) done(fail(ErrorCode::kNotFound, "there is no such texel", member));
+      return is;
+    };
+    if (outside(request.page, layout.pages, "page") || outside(request.x, layout.width, "x") ||
+        outside(request.y, layout.height, "y"))
+      return;
+    const auto x = static_cast<float>(request.x), y = static_cast<float>(request.y);
+    done(engine::Texel{now.revision, now.tile_version, {x, y, 0.5F}, {0.125F, 0.25F, x + y}});
+  });
+}
+
 void FakeEngine::addListener(std::weak_ptr<engine::Listener> listener) {
   const std::lock_guard lock(mutex_);
   listeners_.push_back(std::move(listener));

@@ -64,6 +64,7 @@ class FakeEngine : public engine::Engine {
   void unlitGlb(Callback<SharedBytes> done) override;
   void lightmapExr(std::uint32_t page, engine::Quantity quantity, Callback<SharedBytes> done) override;
   void snapshot(engine::SnapshotRequest request, Callback<engine::Snapshot> done) override;
+  void texel(engine::TexelRequest request, Callback<engine::Texel> done) override;
   void addListener(std::weak_ptr<engine::Listener> listener) override;
 
   /// The value that publish() put at a texel: for tests to compare what arrives.

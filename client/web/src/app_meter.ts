@@ -2,9 +2,10 @@
 
 import type { Vector3 } from 'three';
 import type { App } from './app';
+import { TexelErrors } from './app_texel';
 import { nodeName } from './document/gltf';
 import { measured } from './ui/dom';
-import { luminance } from './view/picker';
+import { luminance, type Reading } from './view/picker';
 
 export class MeterSession {
   isOn = false;
@@ -12,8 +13,20 @@ export class MeterSession {
   /** The pointer was on the picture and is elsewhere: nothing is pointed at, until keys aim. */
   private isAway = false;
   private waits = false;
+  private readonly errors: TexelErrors;
 
-  constructor(private readonly app: App) {}
+  constructor(private readonly app: App) {
+    this.errors = new TexelErrors({
+      ask: (place) => app.connection.call('texel', place),
+      version: () => {
+        const { progress, bookmark, connection } = app;
+        if (!progress || !connection.has('texel')) return undefined;
+        const tileVersion = Math.max(progress.tileVersion, bookmark?.tileVersion ?? 0);
+        return { revision: progress.revision, tileVersion };
+      },
+      changed: () => this.onDrawn(),
+    });
+  }
 
   toggle(): void {
     const { frame } = this.app;
@@ -64,8 +77,7 @@ export class MeterSession {
     if (!reading) return frame.meter.hide();
     const lux = reading.irradiance && luminance(reading.irradiance);
     const light = lux ?? (reading.isGap ? 'no surface here' : 'no light yet');
-    // Where errors of single texels are not streamed, the scene's own stands for them.
-    const error = reading.error ?? (lux === undefined ? undefined : lux * (this.app.progress?.error.total ?? NaN));
+    const error = reading.error ?? this.askedError(reading);
     const details = [
       reading.irradiance ? reading.irradiance.map((c, i) => `${'RGB'[i]} ${measured(c)}`).join('  ') : '',
       this.app.view.mode.id === 'radiosity' && reading.radiosity !== undefined
@@ -76,6 +88,12 @@ export class MeterSession {
       reading.point ? position(reading.point) : '',
     ];
     frame.meter.show(x, y, light, error, details.filter((text) => text !== '').join('\n'), !isSeen);
+  }
+
+  /** Where errors are not streamed, and the texel is one of the server's and not a mean of several. */
+  private askedError({ irradiance, page, texel }: Reading): number | undefined {
+    if (!irradiance || page === undefined || !texel || this.app.viewer.set?.baseMip !== 0) return undefined;
+    return this.errors.errorAt({ page, x: texel[0], y: texel[1] });
   }
 }
 

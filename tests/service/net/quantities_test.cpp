@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <nlohmann/json.hpp>
 
 #include "protocol/tile_frame.h"
@@ -183,6 +184,25 @@ TEST(Quantities, ANameThatIsNotKnownIsRefusedByItsPointer) {
     return;
   }
   FAIL() << "no answer";
+}
+
+TEST(Quantities, OfASingleTexelAreAnsweredAndWhatIsNotThereIsRefusedByItsPointer) {
+  RunningServer server;
+  const auto version = server.engine.publish();
+  TestSocket socket(server.port());
+  socket.hello();
+  const auto texel = replyOf<TexelReply>(socket.call(TexelCall{0, 12, 7}));
+  EXPECT_EQ(texel.tile_version, version);
+  EXPECT_EQ(texel.irradiance, (std::array{12.0, 7.0, 0.5})) << "of the fake engine";
+  EXPECT_EQ(texel.error, (std::array{0.125, 0.25, 19.0}));
+  const auto refused = [&](const TexelCall& call) {
+    const auto answer = socket.call(call);
+    EXPECT_EQ(codeOf(answer), -32004);
+    return answer.error->pointer;
+  };
+  EXPECT_EQ(refused({1, 0, 0}), "/params/page");
+  EXPECT_EQ(refused({0, 160, 0}), "/params/x");
+  EXPECT_EQ(refused({0, 0, 96}), "/params/y");
 }
 
 TEST(Quantities, AreDownloadedByName) {

@@ -192,6 +192,17 @@ class RemoteTest(ServiceCase):
         self.assertIn("nosuch", self.complaint("snapshot", server.url, "-o", "b.png", "--camera", "nosuch"))
         self.assertNotIn("b.png", self.files())
 
+    def test_texelTellsLuxAndItsErrorOrWhichArgumentIsWrong(self):
+        server = self.solved()
+        found = [self.client("texel", server.url, 0, x, x)[0] for x in (2, 3)]
+        for text in found:
+            lux, error = map(float, re.match(r"(\S+) \+- (\S+) lux\nR ", text).groups())
+            self.assertGreater(lux, 0)
+            self.assertTrue(0 < error < lux, text)
+        self.assertIn("/params/page", self.complaint("texel", server.url, 99, 0, 0))
+        self.assertIn("/params/x", self.complaint("texel", server.url, 0, 4294967295, 0))
+        self.assertIn("PAGE", self.complaint("texel", server.url, "x", 0, 0))
+
     def test_saveWritesSceneAndLightmaps(self):
         server = self.solved()
         out, _ = self.client("save", server.url, "-o", "again.glb", "--error-map")

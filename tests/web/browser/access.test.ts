@@ -213,7 +213,7 @@ it('reads the light by touch, and shows what was tapped in the list', async () =
   await page.touchscreen.tap(180, 250);
   await page.locator('canvas.view[data-left]').waitFor(); // a finger that is lifted leaves the picture
   await turns(page, 2); // what else would follow has followed
-  expect(await page.locator('.meter').innerText()).toMatch(/ ± .* lx/);
+  await page.locator('.meter').getByText(/ ± .* lx/).waitFor(); // prettier-ignore
   await page.getByRole('button', { name: 'Light meter' }).tap();
   // The last of the list, chosen while the list is not to be seen.
   await page.evaluate(() => window.viewer!.edit.selectNext(-1));

@@ -259,30 +259,6 @@ it('changes of an emission what somebody wrote, and keeps the rest as exact as i
   for (let i = 0; i < 2; ++i) await page.evaluate(() => window.viewer!.connection.call('scene.undo'));
 });
 
-it('reads the light under the pointer', async () => {
-  const page = await pages.open(server.url, 1200, 800);
-  await converged(page);
-  // First the pointer: a meter that has none reads the middle of the picture until the next frame.
-  await page.mouse.move(400, 260);
-  await page.keyboard.press('m');
-  const text = await until(
-    async () => (await page.locator('.meter').innerText()) || '',
-    (t) => / ± .* lx/.test(t),
-  );
-  expect(text).toMatch(/^[\d.,]+ ± [\d.,]+ lx/);
-  const reading = await page.evaluate(() => {
-    const box = window.viewer!.viewer.canvas.getBoundingClientRect();
-    return window.viewer!.viewer.readAt((400 / box.width) * 2 - 1, 1 - (260 / box.height) * 2)!.irradiance!;
-  });
-  // Against the lightmap file's own view of the page: the luminance shown is that of the texels sampled.
-  const lux = Number(/^([\d.,]+)/.exec(text)![1]!.replaceAll(',', ''));
-  const luminance = 0.2126 * reading[0] + 0.7152 * reading[1] + 0.0722 * reading[2];
-  // It has as many decimals as its error lets it have.
-  const decimals = /^[\d,]+\.?(\d*)/.exec(text)![1]!.length;
-  expect(Math.abs(lux - luminance), `${text} for ${luminance}`).toBeLessThan(0.501 * 10 ** -decimals);
-  expect(lux).toBeGreaterThan(0);
-});
-
 it('scales what is measured by its own values, to the last tile', async () => {
   const page = await pages.open(server.url, 600, 500);
   await converged(page);

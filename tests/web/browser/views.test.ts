@@ -156,6 +156,7 @@ it('reads the light on flat pages', async () => {
   await page.keyboard.press('m');
   const meter = page.locator('.meter');
   await meter.getByText(/page 0, texel \d+, \d+/).waitFor();
+  await meter.getByText(/ ± .* lx/).waitFor();
   expect(await meter.innerText()).toMatch(/^[\d.,]+ ± [\d.,]+ lx/);
   expect(await meter.innerText()).toMatch(/\n(floor|ceiling|back|left|right|short|tall|lamp|light)[^]* m$/i); // whose it is
   // Between the charts nothing is lit, which is not the same as dark.

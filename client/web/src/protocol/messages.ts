@@ -104,6 +104,14 @@ export interface SharedCamera {
   target: [number, number, number];
 }
 
+/** What one texel of the lightmaps has, and the moment that it is of; linear R, G, B, lux. */
+export interface TexelReply {
+  revision: number;
+  tileVersion: number;
+  irradiance: [number, number, number];
+  error: [number, number, number];
+}
+
 export interface SubscribeParams {
   lightmaps?: number[];
   minMip?: number;
