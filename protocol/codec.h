@@ -32,6 +32,7 @@ namespace radiosity::protocol {
 [[nodiscard]] std::string encodeReply(const RequestId& id, const SubscribeReply& reply);
 [[nodiscard]] std::string encodeReply(const RequestId& id, const CreditReply& reply);
 [[nodiscard]] std::string encodeReply(const RequestId& id, const SnapshotReply& reply);
+[[nodiscard]] std::string encodeReply(const RequestId& id, const SolveHistoryReply& reply);
 [[nodiscard]] std::string encodeReply(const RequestId& id, const TexelReply& reply);
 [[nodiscard]] std::string encodeReply(const RequestId& id, const ViewersReply& reply);
 [[nodiscard]] std::string encodeReply(const RequestId& id, const CameraReply& reply);

@@ -136,6 +136,15 @@ struct SceneHistoryReply {
   std::uint64_t undoable = 0, redoable = 0;
   std::vector<PastRevision> revisions;  ///< oldest first
 };
+/// Errors as in ErrorParts, at so many seconds of solve time.
+struct ErrorSample {
+  double seconds = 0.0;
+  double total = 1.0, residual = 1.0, sampling = 0.0, variation = 0.0;
+};
+struct SolveHistoryReply {
+  std::uint64_t revision = 0;
+  std::vector<ErrorSample> samples;  ///< of the present solve, oldest first; at most kMaxErrorSamples
+};
 struct StateReply {
   std::string state;
 };
@@ -255,6 +264,10 @@ struct SolveWaitCall {
   std::optional<std::uint64_t> revision = {};  ///< at least this one; none: the current one
   std::optional<std::uint64_t> timeout_ms = {};
 };
+struct SolveHistoryCall {
+  static constexpr std::string_view kMethod = "solve.history";
+  using Reply = SolveHistoryReply;
+};
 struct StatusCall {
   static constexpr std::string_view kMethod = "status";
   using Reply = StatusReply;
@@ -299,8 +312,8 @@ struct CameraCall {
 
 using Call =
     std::variant<HelloCall, SceneGetCall, SceneLoadCall, ScenePatchCall, SceneUndoCall, SceneRedoCall, SceneHistoryCall,
-                 SolveConfigureCall, SolvePauseCall, SolveResumeCall, SolveRestartCall, SolveWaitCall, StatusCall,
-                 SubscribeCall, CreditCall, SnapshotCall, TexelCall, ViewersCall, CameraCall>;
+                 SolveConfigureCall, SolvePauseCall, SolveResumeCall, SolveRestartCall, SolveWaitCall, SolveHistoryCall,
+                 StatusCall, SubscribeCall, CreditCall, SnapshotCall, TexelCall, ViewersCall, CameraCall>;
 
 // ---- notifications from the server ----
 

@@ -60,15 +60,31 @@ void read(Reader& r, PastRevision& past) {
   r.optionalInteger("edit", past.edit, 0, kAnyInteger);
   r.boolean("undone", past.undone, Need::kOptional);
 }
+void read(Reader& r, ErrorSample& sample) {
+  r.number("seconds", sample.seconds, Need::kRequired, {});
+  r.number("total", sample.total, Need::kRequired, {});
+  r.number("residual", sample.residual, Need::kRequired, {});
+  r.number("sampling", sample.sampling, Need::kRequired, {});
+  r.number("variation", sample.variation, Need::kRequired, {});
+}
+/// A list of objects.
+template <typename T>
+void readEach(Reader& r, const char* key, std::vector<T>& out) {
+  r.array(key, Need::kRequired, kMaxListEntries, [&](const json& element, const std::string& pointer) {
+    Reader inner(&element, pointer);
+    read(inner, out.emplace_back());
+    if (inner.failed()) r.refuse(inner.pointer(), inner.message().substr(inner.pointer().size() + 1));
+  });
+}
 void read(Reader& r, SceneHistoryReply& reply) {
   r.integer("revision", reply.revision, Need::kRequired, 0, kAnyInteger);
   r.integer("undoable", reply.undoable, Need::kRequired, 0, kAnyInteger);
   r.integer("redoable", reply.redoable, Need::kRequired, 0, kAnyInteger);
-  r.array("revisions", Need::kRequired, kMaxListEntries, [&](const json& element, const std::string& pointer) {
-    Reader inner(&element, pointer);
-    read(inner, reply.revisions.emplace_back());
-    if (inner.failed()) r.refuse(inner.pointer(), inner.message().substr(inner.pointer().size() + 1));
-  });
+  readEach(r, "revisions", reply.revisions);
+}
+void read(Reader& r, SolveHistoryReply& reply) {
+  r.integer("revision", reply.revision, Need::kRequired, 0, kAnyInteger);
+  readEach(r, "samples", reply.samples);
 }
 void read(Reader& r, StateReply& reply) { r.text("state", reply.state, Need::kRequired, kMaxTextBytes); }
 void read(Reader& r, StatusReply& reply) {
@@ -155,6 +171,17 @@ std::string encodeReply(const RequestId& id, const SceneHistoryReply& r) {
                          {"revisions", std::move(revisions)}});
 }
 
+std::string encodeReply(const RequestId& id, const SolveHistoryReply& r) {
+  json samples = json::array();
+  for (const auto& sample : r.samples)
+    samples.push_back({{"seconds", sample.seconds},
+                       {"total", sample.total},
+                       {"residual", sample.residual},
+                       {"sampling", sample.sampling},
+                       {"variation", sample.variation}});
+  return answer(id, json{{"revision", r.revision}, {"samples", std::move(samples)}});
+}
+
 std::string encodeReply(const RequestId& id, const Settings& r) { return answer(id, toJson(r)); }
 
 std::string encodeReply(const RequestId& id, const StateReply& r) { return answer(id, json{{"state", r.state}}); }
@@ -214,6 +241,7 @@ template Result<SceneLoadReply> decodeReply<SceneLoadReply>(const json&);
 template Result<ScenePatchReply> decodeReply<ScenePatchReply>(const json&);
 template Result<SceneStepReply> decodeReply<SceneStepReply>(const json&);
 template Result<SceneHistoryReply> decodeReply<SceneHistoryReply>(const json&);
+template Result<SolveHistoryReply> decodeReply<SolveHistoryReply>(const json&);
 template Result<Settings> decodeReply<Settings>(const json&);
 template Result<StateReply> decodeReply<StateReply>(const json&);
 template Result<StatusReply> decodeReply<StatusReply>(const json&);

@@ -36,6 +36,18 @@ struct EnergyBalance {
   double imbalance = 0.0;
 };
 
+/// The error at some time of a solve.
+struct ErrorSample {
+  double seconds = 0.0;  ///< solve time
+  ErrorEstimate error;
+};
+/// Samples that are kept of a solve, at most.
+inline constexpr std::size_t kErrorSamples = 300;
+struct SolveHistory {
+  std::uint64_t revision = 0;        ///< of the scene that is being solved
+  std::vector<ErrorSample> samples;  ///< of the present solve, oldest first
+};
+
 /// What a lightmap can hold.
 enum class Quantity {
   kIrradiance,  ///< H, lux
@@ -274,6 +286,9 @@ class Engine {
   virtual void restart(Callback<SolveState> done) = 0;
 
   [[nodiscard]] virtual Status status() const = 0;
+  /// How the error has fallen since the present solve began, as listeners were told: at most kErrorSamples, about
+  /// evenly in the logarithm of time.
+  [[nodiscard]] virtual SolveHistory solveHistory() const = 0;
   /// How long the solve thread has been at its present slice or command; 0 while it waits for one. Slices take less
   /// than a second, loads of large scenes minutes.
   [[nodiscard]] virtual double busySeconds() const = 0;

@@ -269,6 +269,7 @@ void SolveLoop::updateStatus(bool announce) {
   {
     const std::scoped_lock lock(mutex_);
     status_ = status;
+    if (announce) error_history_.add(status.seconds, status.error);
   }
   if (!announce) return;
   next_progress_ = Clock::now() + kProgressInterval;
@@ -280,6 +281,11 @@ Status SolveLoop::status() const {
   auto status = status_;
   if (loads_ > 0 && status.state == SolveState::kEmpty) status.state = SolveState::kLoading;
   return status;
+}
+
+SolveHistory SolveLoop::solveHistory() const {
+  const std::scoped_lock lock(mutex_);
+  return {status_.revision, error_history_.samples()};
 }
 
 void SolveLoop::addListener(std::weak_ptr<Listener> listener) { listeners_.add(std::move(listener)); }

@@ -20,6 +20,7 @@
 
 #include "server/engine/command_queue.h"
 #include "server/engine/engine.h"
+#include "server/engine/error_history.h"
 #include "server/engine/history.h"
 #include "server/engine/listeners.h"
 #include "server/engine/lit_scene.h"
@@ -58,6 +59,7 @@ class SolveLoop final : public Engine {
   void resume(Callback<SolveState> done) override;
   void restart(Callback<SolveState> done) override;
   [[nodiscard]] Status status() const override;
+  [[nodiscard]] SolveHistory solveHistory() const override;
   [[nodiscard]] double busySeconds() const override;
   [[nodiscard]] std::shared_ptr<void> watch(Quantity quantity) override;
   [[nodiscard]] std::shared_ptr<const Lightmaps> lightmaps(Quantity quantity) const override;
@@ -249,8 +251,9 @@ class SolveLoop final : public Engine {
   std::uint64_t went_back_ = 0;  // edits that led back to a solve that was kept
   Past past_;                    // constant once start() has returned
 
-  mutable std::mutex mutex_;  // for the two that any thread may read, and transport_ coming and going
+  mutable std::mutex mutex_;  // for the three that any thread may read, and transport_ coming and going
   Status status_;
+  ErrorHistory error_history_;
   std::array<std::shared_ptr<const Lightmaps>, kQuantityCount> lightmaps_;
   std::thread thread_;
 };

@@ -292,6 +292,10 @@ void Calls::run(const protocol::SolveWaitCall& call, const Slot& slot) {
   *waiter = hub_.wait(call, peer_, answer);
 }
 
+void Calls::run(const protocol::SolveHistoryCall& /*call*/, const Slot& slot) {
+  slot.reply(toSolveHistoryReply(hub_.engine().solveHistory()));
+}
+
 void Calls::run(const protocol::StatusCall& /*call*/, const Slot& slot) {
   slot.reply(toStatusReply(hub_.engine().status()));
 }

@@ -10,6 +10,11 @@ namespace {
 /// JSON has no infinity, and a client's arithmetic no use for it.
 double finite(double value, double otherwise) { return std::isfinite(value) ? value : otherwise; }
 
+protocol::ErrorParts toErrorParts(const engine::ErrorEstimate& error) {
+  return {finite(error.total, 1e9), finite(error.residual, 1e9), finite(error.sampling, 1e9),
+          finite(error.variation, 1e9), finite(error.discretization, 1e9)};
+}
+
 }  // namespace
 
 std::string_view stateName(engine::SolveState state) {
@@ -49,8 +54,7 @@ protocol::Progress toProgress(const engine::Status& s) {
   p.shots_per_second = finite(s.shots_per_second, 0.0);
   p.seconds = finite(s.seconds, 0.0);
   if (s.seconds_left && std::isfinite(*s.seconds_left)) p.seconds_left = std::max(0.0, *s.seconds_left);
-  p.error = {finite(s.error.total, 1e9), finite(s.error.residual, 1e9), finite(s.error.sampling, 1e9),
-             finite(s.error.variation, 1e9), finite(s.error.discretization, 1e9)};
+  p.error = toErrorParts(s.error);
   p.energy = {finite(s.energy.emitted, 0.0),  finite(s.energy.absorbed, 0.0), finite(s.energy.escaped, 0.0),
               finite(s.energy.backface, 0.0), finite(s.energy.unshot, 0.0),   finite(s.energy.imbalance, 0.0)};
   p.patches = s.patches;
@@ -140,6 +144,18 @@ protocol::SceneHistoryReply toHistoryReply(const engine::HistoryReport& report, 
     out.time_s = past.time_s;
     if (past.kind == Kind::kUndo || past.kind == Kind::kRedo) out.edit = past.stepped;
     out.undone = past.undone;
+  }
+  return reply;
+}
+
+static_assert(engine::kErrorSamples == protocol::kMaxErrorSamples);
+
+protocol::SolveHistoryReply toSolveHistoryReply(const engine::SolveHistory& history) {
+  protocol::SolveHistoryReply reply{history.revision, {}};
+  for (const auto& sample : history.samples) {
+    const auto error = toErrorParts(sample.error);
+    reply.samples.push_back(
+        {finite(sample.seconds, 0.0), error.total, error.residual, error.sampling, error.variation});
   }
   return reply;
 }

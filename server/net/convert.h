@@ -14,6 +14,7 @@ namespace radiosity::net {
 [[nodiscard]] std::vector<std::string> firstWarnings(const std::vector<std::string>& all);
 /// The newest `limit` revisions.
 [[nodiscard]] protocol::SceneHistoryReply toHistoryReply(const engine::HistoryReport& report, std::uint64_t limit);
+[[nodiscard]] protocol::SolveHistoryReply toSolveHistoryReply(const engine::SolveHistory& history);
 [[nodiscard]] protocol::TexelReply toTexelReply(const engine::Texel& texel);
 [[nodiscard]] protocol::StatusReply toStatusReply(const engine::Status& status);
 [[nodiscard]] protocol::Settings toSettings(const engine::SolveSettings& settings);

@@ -130,6 +130,7 @@ class Specification(unittest.TestCase):
         self.assertHas(section("Methods"), f"longer than {of['kMaxInlineSceneBytes'] >> 10} KiB")
         self.assertHas(section("Methods"), f"creditBytes? = {of['kDefaultCreditBytes']}")
         self.assertHas(section("Methods"), f"limit? = {of['kMaxHistory']}")
+        self.assertHas(section("Methods"), f"At most {of['kMaxErrorSamples']} samples")
         self.assertHas(section("Methods"), f"maxMip? = {of['kMaxMip']}")
         self.assertHas(section("Handshake"), f"Within {of['kHelloTimeoutMs'] // 1000} s")
         self.assertHas(section("Flow control"), f"within {of['kWriteDeadlineMs'] // 1000} s")

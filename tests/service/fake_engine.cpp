@@ -303,6 +303,11 @@ engine::Status FakeEngine::status() const {
   return status;
 }
 
+engine::SolveHistory FakeEngine::solveHistory() const {
+  const std::lock_guard lock(mutex_);
+  return {status_.revision, {{0.5 * status_.seconds, {}}, {status_.seconds, status_.error}}};
+}
+
 void FakeEngine::overtakeStatus(std::function<void()> meanwhile) {
   const std::lock_guard lock(mutex_);
   meanwhile_ = std::move(meanwhile);

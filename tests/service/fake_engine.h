@@ -55,6 +55,7 @@ class FakeEngine : public engine::Engine {
   void resume(Callback<engine::SolveState> done) override;
   void restart(Callback<engine::SolveState> done) override;
   [[nodiscard]] engine::Status status() const override;
+  [[nodiscard]] engine::SolveHistory solveHistory() const override;
   [[nodiscard]] double busySeconds() const override { return busy_seconds; }
   using engine::Engine::lightmaps;
   [[nodiscard]] std::shared_ptr<void> watch(engine::Quantity quantity) override;

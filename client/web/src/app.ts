@@ -20,6 +20,7 @@ import {
   type ScenePatchReply,
   type ServerInfo,
   type Settings,
+  type SolveHistory,
   type Status,
   type SubscribeParams,
 } from './protocol/messages';
@@ -288,6 +289,7 @@ export class App {
     const isOwed = hello.revision > 0 && (!hello.resumed || this.scene.document.isOwed);
     if (isOwed) void this.sceneKnown.then(() => this.connection.info === info && this.scene.document.want());
     await this.fetchStatus();
+    void this.fetchHistory(info);
     const { count } = await this.connection.call<{ count: number }>('viewers').catch(() => ({ count: 1 }));
     this.onViewers(count);
   }
@@ -342,6 +344,13 @@ export class App {
   async fetchStatus(): Promise<void> {
     const status = await this.connection.call<Status>('status').catch(() => undefined);
     if (status) this.onStatus(status);
+  }
+
+  /** After the status, by which the plot knows whether what it has is of this solve. */
+  private async fetchHistory(info: ServerInfo): Promise<void> {
+    if (!this.connection.has('solve.history')) return;
+    const history = await this.connection.call<SolveHistory>('solve.history').catch(() => undefined);
+    if (history && info === this.connection.info) this.solve.setHistory(history.samples);
   }
 
   private async onLightmaps(note: LightmapsNote): Promise<void> {

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <condition_variable>
+#include <limits>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -104,6 +105,15 @@ TEST(FirstWarnings, AreCountedAsAnAnswerHasThem) {
   EXPECT_EQ(net::firstWarnings(plain).size(), 100U);
   EXPECT_LE(net::firstWarnings(control).size() * 12'000, protocol::kMaxMessageBytes / 4);
   EXPECT_GE(net::firstWarnings(control).size(), 10U);
+}
+
+TEST_F(CallsTest, TheHistoryOfASolveIsToldInNumbersThatJsonHas) {
+  hello();
+  engine.progress(std::numeric_limits<double>::infinity());
+  calls.handle(R"({"jsonrpc":"2.0","id":"h","method":"solve.history"})");
+  EXPECT_THAT(peer->sent().back(),
+              HasSubstr(R"("samples":[{"residual":1.0,"sampling":0.0,"seconds":0.05,"total":1.0)"));
+  EXPECT_THAT(peer->sent().back(), HasSubstr(R"("seconds":0.1,"total":1000000000.0)"));
 }
 
 TEST_F(CallsTest, AWaitThatIsOverLeavesNoTimerBehind) {

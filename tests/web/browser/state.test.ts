@@ -289,3 +289,30 @@ it('undoes on past what somebody else has undone, and lets go of what is no more
     ),
   ).toEqual(before);
 });
+
+it('plots the whole of a solve, also where the page came when all was done, and begins anew with the next', async () => {
+  const server = await serve(`${SCENES}/cornell.glb`, '--error', '0.004');
+  const early = await pages.open(server.url);
+  await converged(early);
+  const late = await pages.open(server.url);
+  await converged(late);
+  const samplesOf = (page: Page) => page.evaluate(() => [...window.viewer!.solve.plot.drawn]);
+  const [first, ...more] = await until(
+    () => samplesOf(late),
+    (samples) => samples.length > 1,
+  );
+  const end = await late.evaluate(() => window.viewer!.progress!);
+  const times = [first!, ...more].map(({ seconds }) => seconds);
+  expect(times).toEqual([...times].sort((a, b) => a - b));
+  expect(times.at(-1)).toBe(end.seconds);
+  expect(more.at(-1)!.total).toBe(end.error.total);
+  expect(first!.total).toBeGreaterThan(2 * end.error.total);
+  // Of what both have seen they say the same.
+  const seen = new Map((await samplesOf(early)).map(({ seconds, total }) => [seconds, total]));
+  expect(more.some(({ seconds, total }) => seen.get(seconds) === total)).toBe(true);
+  await late.evaluate(() => window.viewer!.connection.call('solve.restart'));
+  await until(
+    () => samplesOf(late),
+    (samples) => samples.every(({ seconds }) => !times.includes(seconds)),
+  );
+});

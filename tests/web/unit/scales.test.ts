@@ -1,4 +1,4 @@
-import { errorsShown, ticksBetween, within } from '../../../client/web/src/ui/error_plot';
+import { errorsShown, ticksBetween, withHistory, within } from '../../../client/web/src/ui/error_plot';
 import { briefly } from '../../../client/web/src/ui/scene_panel';
 import { besidePointer, scaleLabels } from '../../../client/web/src/ui/legend';
 
@@ -17,6 +17,18 @@ describe('the plot of error against time', () => {
     const sample = { seconds: 95, total: 0.02, residual: 0.013, sampling: 0.015 };
     expect(Math.min(...errorsShown([sample]))).toBe(0.013);
     expect(Math.max(...errorsShown([sample]))).toBe(0.02);
+  });
+
+  it('puts what the server remembers in the place of its own, and keeps what lies before and after', () => {
+    const at = (seconds: number, total: number) => ({ seconds, total, residual: 0, sampling: total });
+    const own = [at(1, 0.9), at(2, 0.8), at(3, 0.7), at(9, 0.1)];
+    const history = [at(2, 0.5), at(2.5, 0.4), at(4, 0.3)];
+    const times = (samples: { seconds: number }[]) => samples.map(({ seconds }) => seconds);
+    expect(times(withHistory(own, history))).toEqual([1, 2, 2.5, 4, 9]);
+    expect(withHistory(own, history)[1]!.total).toBe(0.5);
+    expect(withHistory([at(4, 0.3)], history)).toEqual(history); // a page that came when all was done
+    expect(withHistory(own, [])).toEqual(own);
+    expect(withHistory([], history)).toEqual(history);
   });
 
   it('is not stretched by a part that is nothing beside the total', () => {

@@ -55,6 +55,21 @@ export interface Progress {
   failure?: string;
 }
 
+/** Errors as those of `progress`, at so many seconds of solve time. */
+export interface ErrorSample {
+  seconds: number;
+  total: number;
+  residual: number;
+  sampling: number;
+  variation: number;
+}
+
+/** How the error of the present solve has fallen, oldest first. */
+export interface SolveHistory {
+  revision: number;
+  samples: ErrorSample[];
+}
+
 export interface Settings {
   targetError: number;
   timeLimitMs: number | null;

@@ -45,6 +45,16 @@ export class ErrorPlot {
     if (this.samples.length > MOST) this.samples = this.samples.filter((_, i) => i % 2 === 0 || i > MOST - 50);
   }
 
+  /** Of the same solve, what came before the page did and while it was away. To be drawn with the next draw(). */
+  addHistory(history: readonly Sample[]): void {
+    this.samples = withHistory(this.samples, history);
+  }
+
+  /** What is drawn, by ascending time. */
+  get drawn(): readonly Sample[] {
+    return this.samples;
+  }
+
   /** To be drawn with the next draw(). */
   setTarget(target: number): void {
     this.target = target;
@@ -124,7 +134,7 @@ export class ErrorPlot {
     context.lineWidth = key === 'total' ? 2 : 1.2;
     for (const sample of this.samples) if (sample[key] > 0) context.lineTo(x.at(sample.seconds), y.at(sample[key]));
     context.stroke();
-    // Who comes when all is done has one sample, which makes no line.
+    // A solve that is done before it was first told of has one sample, which makes no line.
     const last = this.samples.at(-1);
     if (!last || !(last[key] > 0)) return;
     context.beginPath();
@@ -132,6 +142,14 @@ export class ErrorPlot {
     context.arc(x.at(last.seconds), y.at(last[key]), key === 'total' ? 3 : 2, 0, 2 * Math.PI);
     context.fill();
   }
+}
+
+/** As far as a server's samples reach they stand in the place of the page's own, which may have gaps. */
+export function withHistory(own: readonly Sample[], history: readonly Sample[]): Sample[] {
+  const [first, last] = [history[0], history.at(-1)];
+  if (!first || !last) return [...own];
+  const before = own.filter(({ seconds }) => seconds < first.seconds);
+  return [...before, ...history, ...own.filter(({ seconds }) => seconds > last.seconds)];
 }
 
 /** What the scale has to hold: all that the legend names, down to where a part is nothing beside the total. */

@@ -1,6 +1,6 @@
 // The panel "Solve": how far the light is, and how far it shall go.
 
-import type { Progress, Settings } from '../protocol/messages';
+import type { ErrorSample, Progress, Settings } from '../protocol/messages';
 import { button, field, h, inField, parseNumber, percent, readable, section } from './dom';
 import { ErrorPlot } from './error_plot';
 import { Spaced } from './spaced';
@@ -103,6 +103,12 @@ export class SolvePanel {
       this.firstError = Math.max(progress.error.total, 1e-6);
     if (states.every((state) => ITS_OWN.includes(state))) this.spaced.soon();
     else this.spaced.now();
+  }
+
+  /** What the server remembers of the solve that is going on. */
+  setHistory(samples: readonly ErrorSample[]): void {
+    this.plot.addHistory(samples);
+    this.spaced.soon();
   }
 
   private showProgress(): void {
