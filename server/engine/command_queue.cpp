@@ -11,7 +11,7 @@ bool CommandQueue::push(Command command, Kind kind) {
     if (kind == Kind::kPrompt) {
       prompt_.push_back(std::move(command));
     } else {
-      long_.push_back(std::move(command));
+      long_.push_back({std::move(command), Clock::now()});
     }
   }
   wake_.notify_one();
@@ -22,9 +22,11 @@ std::optional<std::vector<CommandQueue::Command>> CommandQueue::take(bool wait) 
   std::unique_lock lock(mutex_);
   if (wait) wake_.wait(lock, [this] { return closed_ || !prompt_.empty() || !long_.empty(); });
   if (closed_) return std::nullopt;
-  if (!prompt_.empty() || long_.empty()) return std::exchange(prompt_, {});
+  const bool is_overdue = gave_prompt_ && !long_.empty() && Clock::now() - long_.front().since >= patience_;
+  gave_prompt_ = !prompt_.empty() && !is_overdue;
+  if (gave_prompt_ || long_.empty()) return std::exchange(prompt_, {});
   std::vector<Command> one;
-  one.push_back(std::move(long_.front()));
+  one.push_back(std::move(long_.front().command));
   long_.pop_front();
   return one;
 }

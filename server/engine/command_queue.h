@@ -1,8 +1,10 @@
 // What other threads ask of the solve thread: commands in the order they came, never more than a fixed number. What may
-// take seconds (pictures, files) waits for all else, and comes out by itself: an edit is not to wait for them. push()
-// and close() from any thread, take() from the solve thread alone.
+// take seconds (pictures, files) waits for all else, and comes out by itself: an edit is not to wait for them. But not
+// for ever: whoever asks over and over, a light meter say, is not to keep others from getting the scene. push() and
+// close() from any thread, take() from the solve thread alone.
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <cstddef>
 #include <deque>
@@ -17,14 +19,16 @@ class CommandQueue {
  public:
   using Command = std::function<void()>;
 
-  explicit CommandQueue(std::size_t capacity) : capacity_(capacity) {}
+  /// `patience`: so long the oldest long command lets prompt ones go before it.
+  explicit CommandQueue(std::size_t capacity, std::chrono::nanoseconds patience = std::chrono::seconds(1))
+      : capacity_(capacity), patience_(patience) {}
 
   /// False: the queue is full or closed, and the command will never run.
   enum class Kind { kPrompt, kLong };
   [[nodiscard]] bool push(Command command, Kind kind = Kind::kPrompt);
 
-  /// All prompt ones that are due, oldest first; where there are none, the oldest long one. `wait`: sleeps until there
-  /// is something. Nothing: the queue was closed.
+  /// All prompt ones that are due, oldest first; where there are none, or the last call gave some and the oldest long
+  /// one has waited long enough, that. `wait`: sleeps until there is something. Nothing: the queue was closed.
   [[nodiscard]] std::optional<std::vector<Command>> take(bool wait);
 
   [[nodiscard]] bool closed() const;
@@ -33,12 +37,19 @@ class CommandQueue {
   void close();
 
  private:
+  using Clock = std::chrono::steady_clock;
+  struct Waiting {
+    Command command;
+    Clock::time_point since;
+  };
+
   const std::size_t capacity_;
+  const std::chrono::nanoseconds patience_;
   mutable std::mutex mutex_;
   std::condition_variable wake_;
   std::vector<Command> prompt_;
-  std::deque<Command> long_;
-  bool closed_ = false;
+  std::deque<Waiting> long_;
+  bool gave_prompt_ = false, closed_ = false;
 };
 
 }  // namespace radiosity::engine

@@ -316,7 +316,8 @@ class Engine {
   virtual void lightmapExr(std::uint32_t page, Quantity quantity, Callback<SharedBytes> done) = 0;
   virtual void snapshot(SnapshotRequest request, Callback<Snapshot> done) = 0;
   /// kNotFound where there is no such texel, or it belongs to no surface: Error::where is "page", "x" or "y". May be
-  /// asked often, by many: what it takes is made for all of them together, and seldom while the solve goes on.
+  /// asked often, by many: what it takes is made for all of them together, and seldom while the solve goes on; of a
+  /// layout that has just come kBusy instead.
   virtual void texel(TexelRequest request, Callback<Texel> done) = 0;
 
   /// The same from the engine's start to its end.

@@ -1,6 +1,7 @@
 // What can be fetched from the solve thread: the document, files in memory, pictures, single texels.
 #include <fmt/format.h>
 #include <map>
+#include <memory>
 #include <optional>
 #include <utility>
 
@@ -15,6 +16,8 @@ namespace {
 
 /// Stated error from which on a snapshot shows the solver's own light after an edit.
 constexpr double kPresentable = 0.5;
+/// So many may wait for the pages that single texels are read from.
+constexpr std::size_t kMostAwaited = 1024;
 
 }  // namespace
 
@@ -173,7 +176,7 @@ void SolveLoop::snapshot(SnapshotRequest request, Callback<Snapshot> done) {
 
 /// A version of irradiance that is published stands for all steps until the next. What nobody watches has no versions:
 /// what was published of it last may be of any time.
-Result<Texel> SolveLoop::readTexel(const TexelRequest& request) {
+std::optional<Result<Texel>> SolveLoop::readTexel(const TexelRequest& request, bool may_make) {
   const auto version = publisher_.version();
   const auto published = [&](Quantity quantity) {
     const bool is_watched = watches_.wants(quantity) && !watches_.hasAdded(quantity);
@@ -182,12 +185,33 @@ Result<Texel> SolveLoop::readTexel(const TexelRequest& request) {
   };
   const PublishedTexels pages{published(Quantity::kIrradiance), published(Quantity::kError)};
   const PagesMoment now{publisher_.layout(), revision_, version, pages.irradiance ? 0 : steps_};
-  return texels_.read(request, *lit_, now, pages);
+  return texels_.read(request, *lit_, now, pages, may_make);
 }
 
+/// What is there is told at once. Pages that must be made for it wait for all else, as files and pictures do, and are
+/// made once for all who ask.
 void SolveLoop::texel(TexelRequest request, Callback<Texel> done) {
-  askLit<Texel>(
-      std::move(done), [this, request] { return readTexel(request); }, CommandQueue::Kind::kPrompt);
+  const auto answer = std::make_shared<Callback<Texel>>(std::move(done));
+  const auto look = [this, request, answer] {
+    if (!lit_) return (*answer)(noScene());
+    if (auto known = readTexel(request, false)) return (*answer)(std::move(*known));
+    const bool is_first = awaited_texels_.empty();
+    if (awaited_texels_.size() < kMostAwaited &&
+        (!is_first || queue_.push([this] { answerTexels(); }, CommandQueue::Kind::kLong)))
+      return awaited_texels_.push_back({request, answer});
+    (*answer)(tooMany());
+  };
+  if (!queue_.push(look)) (*answer)(tooMany());
+}
+
+void SolveLoop::answerTexels() {
+  for (const auto& [request, answer] : std::exchange(awaited_texels_, {})) {
+    const auto read = [&]() -> Result<Texel> {
+      if (!lit_) return noScene();
+      return *readTexel(request, true);
+    };
+    (*answer)(withinMemory(read));
+  }
 }
 
 }  // namespace radiosity::engine

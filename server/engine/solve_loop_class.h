@@ -36,6 +36,9 @@
 
 namespace radiosity::engine {
 
+[[nodiscard]] inline tl::unexpected<Error> tooMany() {
+  return fail(ErrorCode::kBusy, "too many requests are waiting for the solver, try again");
+}
 [[nodiscard]] inline tl::unexpected<Error> noScene() { return fail(ErrorCode::kNotFound, "no scene is loaded"); }
 
 class SolveLoop final : public Engine {
@@ -200,7 +203,9 @@ class SolveLoop final : public Engine {
   [[nodiscard]] bool takeCheckpoint();
 
   [[nodiscard]] Result<Snapshot> renderSnapshot(const SnapshotRequest& request);
-  [[nodiscard]] Result<Texel> readTexel(const TexelRequest& request);
+  /// Nothing: pages must be made for it, and may not be.
+  [[nodiscard]] std::optional<Result<Texel>> readTexel(const TexelRequest& request, bool may_make);
+  void answerTexels();  ///< all that wait for pages
   [[nodiscard]] Result<SharedBytes> makeGlb();
   [[nodiscard]] Result<SharedBytes> makeUnlit();
   [[nodiscard]] Result<SharedBytes> makeExr(std::uint32_t page, Quantity quantity);
@@ -221,6 +226,11 @@ class SolveLoop final : public Engine {
   std::optional<FirstLight> first_light_;  // then lit_ is made of a few texels, in no history and on no disk
   Publisher publisher_;
   TexelReader texels_;
+  struct AwaitedTexel {
+    TexelRequest request;
+    std::shared_ptr<Callback<Texel>> answer;
+  };
+  std::vector<AwaitedTexel> awaited_texels_;  ///< of which pages are to be made
   History history_;
   SolveState state_ = SolveState::kEmpty;
   std::string failure_;
@@ -262,7 +272,7 @@ template <typename T, typename Work>
 void SolveLoop::ask(Callback<T> done, Work work, CommandQueue::Kind kind) {
   const auto answer = std::make_shared<Callback<T>>(std::move(done));
   if (queue_.push([answer, work = std::move(work)]() mutable { (*answer)(withinMemory(work)); }, kind)) return;
-  (*answer)(fail(ErrorCode::kBusy, "too many requests are waiting for the solver, try again"));
+  (*answer)(tooMany());
 }
 
 template <typename T, typename Work>

@@ -58,11 +58,15 @@ Result<void> check(const scene::PatchScene& patches, const TexelRequest& at) {
 
 }  // namespace
 
-Result<Texel> TexelReader::read(const TexelRequest& at, const LitScene& lit, const PagesMoment& now,
-                                const PublishedTexels& published) {
+std::optional<Result<Texel>> TexelReader::read(const TexelRequest& at, const LitScene& lit, const PagesMoment& now,
+                                               const PublishedTexels& published, bool may_make) {
   if (auto checked = check(lit.patches(), at); !checked) return tl::unexpected<Error>(checked.error());
-  const bool serve = !error_.empty() && of_.layout == now.layout;
-  if (!serve || (of_ != now && Clock::now() >= due_)) renew(lit, now, published);
+  const bool serve = !error_.empty() && of_.layout == now.layout, is_due = Clock::now() >= due_;
+  if (!serve && !is_due) return fail(ErrorCode::kBusy, "single texels of this layout cannot be read yet; ask again");
+  if (!serve || (of_ != now && is_due)) {
+    if (!may_make) return std::nullopt;
+    renew(lit, now, published);
+  }
   const auto x = static_cast<int>(at.x), y = static_cast<int>(at.y);
   return Texel{of_.revision, of_.tile_version, irradiance_[at.page]->at(x, y), error_[at.page]->at(x, y)};
 }

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "common/image.h"
@@ -32,8 +33,10 @@ class TexelReader {
   /// same, and in any case until making them was no more than a twentieth of the time since: so an answer may be of an
   /// earlier moment, of the same layout, and says of which. Costs a look at every surface, and where pages are made
   /// what makePages() costs; 12 bytes a texel for each quantity that is not published.
-  [[nodiscard]] Result<Texel> read(const TexelRequest& at, const LitScene& lit, const PagesMoment& now,
-                                   const PublishedTexels& published);
+  /// Pages of another layout that are asked for sooner than that are kBusy. `may_make`: without it nothing is where
+  /// pages would have to be made.
+  [[nodiscard]] std::optional<Result<Texel>> read(const TexelRequest& at, const LitScene& lit, const PagesMoment& now,
+                                                  const PublishedTexels& published, bool may_make);
 
   void forget();  ///< lets the pages go
   /// Lets pages of another layout go.

@@ -165,7 +165,7 @@ protocol::TexelReply toTexelReply(const engine::Texel& texel) {
   for (int c = 0; c < 3; ++c) {
     const auto i = static_cast<std::size_t>(c);
     reply.irradiance[i] = finite(static_cast<double>(texel.irradiance[c]), 0.0);
-    reply.error[i] = finite(static_cast<double>(texel.error[c]), 0.0);
+    reply.error[i] = finite(static_cast<double>(texel.error[c]), 1e9);
   }
   return reply;
 }

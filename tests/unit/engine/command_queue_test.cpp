@@ -39,6 +39,21 @@ TEST(CommandQueue, LongCommandsWaitForAllElseAndComeOutOneByOne) {
   EXPECT_EQ(done, (std::vector<int>{0, 1, 10, 2, 11}));
 }
 
+// Whoever asks over and over does not keep others from what takes longer, nor these each other's turns from it.
+TEST(CommandQueue, LongCommandsThatHaveWaitedLongEnoughTakeTurnsWithAllElse) {
+  CommandQueue queue(8, std::chrono::nanoseconds(0));
+  std::vector<int> done;
+  const auto note = [&done](int i) { return [&done, i] { done.push_back(i); }; };
+  for (int i = 0; i < 2; ++i) ASSERT_TRUE(queue.push(note(10 + i), CommandQueue::Kind::kLong));
+  for (int i = 0; i < 5; ++i) {
+    ASSERT_TRUE(queue.push(note(i)));
+    const auto due = queue.take(true);
+    ASSERT_TRUE(due);
+    for (const auto& command : *due) command();
+  }
+  EXPECT_EQ(done, (std::vector<int>{0, 10, 1, 2, 11, 3, 4}));
+}
+
 TEST(CommandQueue, FullQueueRefusesUntilItIsEmptied) {
   CommandQueue queue(2);
   EXPECT_TRUE(queue.push([] {}));
