@@ -12,8 +12,8 @@ namespace {
 
 /// A cycle aims a little lower than asked: rounding makes its true residual, checked afterwards, larger than it knows.
 constexpr double kAim = 0.95;
-/// Steps take more of the residual than of the error where the level of light converges last: in rooms of reflectance
-/// 0.99 one in eight leaves more than the estimate says, one in twenty more than this many times as much.
+/// Steps take more of the residual than of the error where the level of light converges last: in a room of reflectance
+/// 0.99 four in ten leave more than the estimate says, one in four more than this many times as much.
 constexpr double kDoubt = 2.0;
 /// What is left of a vector when so small a part of it is, is rounding.
 template <typename Real>
@@ -198,7 +198,8 @@ std::array<double, 3> Gmres<Real>::error() const {
     const auto& channel = channel_[c];
     if (residual_[c] == 0.0) continue;
     const double q = residual_[c] / channel.before;
-    const double by_step = q < 1.0 ? channel.step * q / (1.0 - q) : std::numeric_limits<double>::infinity();
+    const double by_step =
+        q < 1.0 && channel.step > 0.0 ? channel.step * q / (1.0 - q) : std::numeric_limits<double>::infinity();
     error[c] = std::max(residual_[c], kDoubt * by_step);
   }
   return error;

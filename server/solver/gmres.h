@@ -35,9 +35,9 @@ class Gmres {
   [[nodiscard]] const Vectors& solution() const { return solution_; }
   /// Norm of the residual before the last affine sweep, by channel.
   [[nodiscard]] const std::array<double, 3>& residual() const { return residual_; }
-  /// Estimated norm of what was lacking then, by channel, rather too large: of the error the last step of a cycle left
-  /// about the part q that it left of the residual, so that it is what that step added times q / (1 - q). Infinite
-  /// where no step tells.
+  /// Estimated norm of what was lacking then, by channel: of the error the last step of a cycle left about the part q
+  /// that it left of the residual, so that it is what that step added times q / (1 - q). Several times too small where
+  /// that step took most of all else and what is left is the level of light. Infinite where no step tells.
   [[nodiscard]] std::array<double, 3> error() const;
   [[nodiscard]] int sweeps() const { return sweeps_; }
 

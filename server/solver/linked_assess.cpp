@@ -16,6 +16,9 @@ namespace {
 
 /// So many, some tenths of a second of them, are traced for somebody who wants to know the light.
 constexpr std::uint64_t kRaysAtOnce = 2'000'000;
+/// What the last steps of solving tell of its error is several times too small at worst: no less than this part of what
+/// the residual would have it be.
+constexpr double kLeastUnsolved = 0.125;
 /// Largest mean reflectance that is told from one.
 constexpr double kMostKept = 0.99999;
 
@@ -70,8 +73,9 @@ void LinkedSolver::assess() {
   error_.sampling = std::hypot(by_links_, std::sqrt(doubt / field.square()));
   error_.discretization = field.discretization();
   const double varying = std::sqrt(planner_.variation(system_, unshot_, *patches_) / field.square());
-  const double unsolved =
-      gathers() ? std::min(gather_->unsolved(), std::sqrt(gather_->unsolvedSquare() / field.square())) : 0.0;
+  double unsolved = gathers() ? gather_->unsolved() : 0.0;
+  if (gathers())
+    unsolved = std::clamp(std::sqrt(gather_->unsolvedSquare() / field.square()), kLeastUnsolved * unsolved, unsolved);
   error_.residual = (owed + presumed) / (1.0 - kept) / received + varying + system_.unsolved() + unsolved;
   error_.residual = std::hypot(error_.residual, missing() / std::sqrt(field.square()));  // of links that wait
   varying_share_ = error_.residual > 0.0 ? varying / error_.residual : 0.0;

