@@ -280,6 +280,7 @@ export class App {
       this.sceneKnown = this.scene.onUnresumed();
     }
     this.epoch = hello.epoch;
+    this.view.meter.forget();
     if (!hello.resumed) this.viewer.layouts.forget();
     for (const resolve of this.awaited.splice(0)) resolve();
     this.view.onCapabilities();

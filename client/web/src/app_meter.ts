@@ -37,6 +37,11 @@ export class MeterSession {
     else frame.meter.hide();
   }
 
+  /** There is another session. */
+  forget(): void {
+    this.errors.forget();
+  }
+
   /** After each picture: light may have changed, and what is under the pointer. */
   onDrawn(): void {
     if (this.isOn) this.read();

@@ -6,6 +6,8 @@ import { luminance } from './view/picker';
 
 /** From one call to the next, at least: the pointer wanders, and while a solve goes on every answer is soon old. */
 const APART_MS = 200;
+/** And after a call that was refused. */
+const REFUSED_MS = 1000;
 
 export interface TexelPlace {
   page: number;
@@ -33,9 +35,17 @@ export class TexelErrors {
   private answer: (TexelPlace & LightVersion & { error: number | undefined }) | undefined;
   private isAsking = false;
   private lastMs = -Infinity;
+  private apartMs = APART_MS;
+  private session = 0;
   private timer: ReturnType<typeof setTimeout> | undefined;
 
   constructor(private readonly source: TexelSource) {}
+
+  /** There is another session: its server may count revisions anew. */
+  forget(): void {
+    this.answer = undefined;
+    ++this.session;
+  }
 
   /**
    * Standard error of the texel's irradiance, lux, luminance; undefined: not known, or not yet. What is not known, or is
@@ -54,7 +64,7 @@ export class TexelErrors {
   /** Too soon after the last call it is read once more when it is time: the pointer may be elsewhere by then. */
   private askSoon(place: TexelPlace, version: LightVersion): void {
     if (this.isAsking || this.timer !== undefined) return;
-    const wait = this.lastMs + APART_MS - performance.now();
+    const wait = this.lastMs + this.apartMs - performance.now();
     if (wait <= 0) return void this.ask(place, version);
     this.timer = setTimeout(() => {
       this.timer = undefined;
@@ -65,12 +75,15 @@ export class TexelErrors {
   private async ask({ page, x, y }: TexelPlace, version: LightVersion): Promise<void> {
     this.isAsking = true;
     this.lastMs = performance.now();
+    this.apartMs = APART_MS;
+    const { session } = this;
     try {
       const { revision, tileVersion, error } = await this.source.ask({ page, x, y });
-      this.answer = { page, x, y, revision, tileVersion, error: luminance(error) };
+      if (session === this.session) this.answer = { page, x, y, revision, tileVersion, error: luminance(error) };
     } catch (refusal) {
       const isNone = refusal instanceof RpcError && refusal.code === NOT_FOUND;
-      this.answer = isNone ? { page, x, y, ...version, error: undefined } : undefined;
+      if (session === this.session) this.answer = isNone ? { page, x, y, ...version, error: undefined } : undefined;
+      if (!isNone) this.apartMs = REFUSED_MS; // it is busy, or on its way out
     }
     this.isAsking = false;
     this.source.changed();

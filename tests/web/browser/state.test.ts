@@ -313,6 +313,6 @@ it('plots the whole of a solve, also where the page came when all was done, and 
   await late.evaluate(() => window.viewer!.connection.call('solve.restart'));
   await until(
     () => samplesOf(late),
-    (samples) => samples.every(({ seconds }) => !times.includes(seconds)),
+    (samples) => samples.length > 0 && samples.every(({ seconds }) => !times.includes(seconds)),
   );
 });

@@ -17,6 +17,7 @@ function makeMeter(at: TexelPlace = HERE) {
     shown: undefined as number | undefined,
     calls,
     read: () => void (meter.shown = errors.errorAt(meter.at)),
+    beginSession: () => errors.forget(),
     reply: async (error: number, version: Partial<LightVersion> = {}) => {
       const reply = { irradiance: [9, 9, 9], error: [error, error, error], revision: 1, tileVersion: 5, ...version };
       calls.at(-1)!.answer(reply as TexelReply);
@@ -98,6 +99,34 @@ it('asks nobody who cannot answer, and of what is not there once', async () => {
   meter.at = THERE;
   meter.read();
   meter.calls[1]!.refuse(new RpcError(-32029, 'too many'));
-  await vi.advanceTimersByTimeAsync(250);
+  await vi.advanceTimersByTimeAsync(1000);
   expect(meter.calls).toHaveLength(3);
+});
+
+it('asks a server that has begun anew, whose numbers may be those of before', async () => {
+  const meter = makeMeter();
+  meter.read();
+  await meter.reply(2, { tileVersion: 9 });
+  meter.beginSession();
+  meter.version = { revision: 1, tileVersion: 3 };
+  await vi.advanceTimersByTimeAsync(1000);
+  meter.read();
+  expect([meter.shown, meter.calls.length]).toEqual([undefined, 2]);
+  // An answer that was on its way when the session ended is not of the next one.
+  meter.beginSession();
+  await meter.reply(7, { tileVersion: 9 });
+  expect(meter.shown).toBeUndefined();
+});
+
+it('asks a server that is busy less often', async () => {
+  const meter = makeMeter();
+  meter.read();
+  for (let i = 0; i < 3; ++i) {
+    meter.calls.at(-1)!.refuse(new RpcError(-32013, 'busy'));
+    await vi.advanceTimersByTimeAsync(700);
+    meter.read();
+    expect(meter.calls).toHaveLength(i + 1);
+    await vi.advanceTimersByTimeAsync(300);
+    expect(meter.calls).toHaveLength(i + 2);
+  }
 });

@@ -99,8 +99,10 @@ export class Connection {
     this.stopped = true;
     clearTimeout(this.timer);
     if (!this.socket) return;
-    this.socket.onclose = this.socket.onmessage = null;
-    this.socket.close(1000);
+    const { socket } = this;
+    this.forget();
+    socket.onclose = socket.onmessage = null;
+    socket.close(1000);
   }
 
   get isOpen(): boolean {

@@ -7,9 +7,8 @@ const AHEAD_S = 0.5;
 const MEASURE_MS = 400;
 /** A tile of 64 x 64 texels in the format that is asked for first, with its header. */
 const FRAME = 64 * 64 * 4 + 64;
-/** Less than this may have lain in the buffers of the machine. */
-const LEAST_MS = 20;
-const LEAST_BYTES = 8 * FRAME;
+/** What comes no later than this after what came before it was there already. */
+const AT_ONCE_MS = 1;
 
 export const FIRST_WINDOW = 512 * 1024;
 
@@ -22,7 +21,7 @@ export class CreditWindow {
   private measuredBytes = 0;
   private lastMs = 0;
   /** Before some frame, since measuring began: the page may have been busy with something else. */
-  private longestPause = { ms: 0, bytes: 0 };
+  private longestPause = { ms: 0, bytes: 0, isOver: true };
 
   /** Bytes a second while tiles came without a pause; 0 until measured. */
   rate = 0;
@@ -33,9 +32,13 @@ export class CreditWindow {
     this.starved ||= this.ahead < FRAME;
     if (this.measuredSince < 0) return this.measureFrom(nowMs); // how long the first was on its way is not known
     this.measuredBytes += bytes;
-    if (nowMs - this.lastMs > this.longestPause.ms) this.longestPause = { ms: nowMs - this.lastMs, bytes };
+    const pause = nowMs - this.lastMs;
+    if (pause > this.longestPause.ms) this.longestPause = { ms: pause, bytes, isOver: false };
+    else if (pause > AT_ONCE_MS) this.longestPause.isOver = true;
+    else if (!this.longestPause.isOver) this.longestPause.bytes += bytes;
     this.lastMs = nowMs;
-    // The longest pause is left out, and what came after it: of what comes evenly that changes nothing.
+    // The longest pause is left out, and what came at once after it, which may have lain in buffers while the page was
+    // busy with something else: of what comes evenly that changes nothing.
     const took = nowMs - this.measuredSince - this.longestPause.ms;
     if (took < MEASURE_MS) return;
     const rate = (1000 * (this.measuredBytes - this.longestPause.bytes)) / took;
@@ -46,17 +49,13 @@ export class CreditWindow {
 
   /** Everything asked for has come: the pause that follows says nothing about the network. */
   idle(): void {
-    const took = this.lastMs - this.measuredSince;
-    // Too short to tell how quick the network is, it may tell that it is not as slow as it seemed.
-    if (this.measuredSince >= 0 && took >= LEAST_MS && this.measuredBytes >= LEAST_BYTES && this.rate > 0)
-      this.rate = Math.max(this.rate, (1000 * this.measuredBytes) / took);
     this.measuredSince = -1;
   }
 
   private measureFrom(nowMs: number): void {
     this.measuredSince = this.lastMs = nowMs;
     this.measuredBytes = 0;
-    this.longestPause = { ms: 0, bytes: 0 };
+    this.longestPause = { ms: 0, bytes: 0, isOver: true };
     this.starved = this.ahead < FRAME;
   }
 

@@ -21,7 +21,7 @@ const ROOM_FOV = 65;
 
 /** Of a camera in a link, as of those that viewers share. */
 const FARTHEST_M = 1e12;
-/** Of the distance from eye to target: what nobody sees, a tenth of a pixel of a large screen. */
+/** Of the distance from eye to target: of what lies there nobody sees it, a tenth of a pixel of a large screen. */
 const SAME_PICTURE = 3e-5;
 /** Behind the point, that numbers are written with. */
 const MOST_DIGITS = 100;
@@ -205,9 +205,11 @@ export class CameraRig {
 
   /** Eye and target, metres, in as few digits as show the same picture, however far from the origin that is. */
   get place(): { position: number[]; target: number[] } {
-    const step = (this.camera.position.distanceTo(this.target) || 1) * SAME_PICTURE;
-    const digits = MathUtils.clamp(Math.ceil(-Math.log10(step)), 0, MOST_DIGITS);
-    const rounded = (at: Vector3) => at.toArray().map((v) => Number(v.toFixed(digits)));
+    const distance = this.camera.position.distanceTo(this.target) || this.size;
+    const behindPoint = (step: number) => MathUtils.clamp(Math.ceil(-Math.log10(step)), 0, MOST_DIGITS);
+    // The target may lie far beyond what is looked at: five digits in any case.
+    const digits = (v: number) => behindPoint(Math.min(distance * SAME_PICTURE, Math.abs(v) * 1e-5 || Infinity));
+    const rounded = (at: Vector3) => at.toArray().map((v) => Number(v.toFixed(digits(v))));
     return { position: rounded(this.camera.position), target: rounded(this.target) };
   }
 
