@@ -205,12 +205,12 @@ void SolveLoop::texel(TexelRequest request, Callback<Texel> done) {
 }
 
 void SolveLoop::answerTexels() {
-  for (const auto& [request, answer] : std::exchange(awaited_texels_, {})) {
+  for (const auto& awaited : std::exchange(awaited_texels_, {})) {
     const auto read = [&]() -> Result<Texel> {
       if (!lit_) return noScene();
-      return *readTexel(request, true);
+      return *readTexel(awaited.request, true);
     };
-    (*answer)(withinMemory(read));
+    (*awaited.answer)(withinMemory(read));
   }
 }
 
