@@ -1,7 +1,12 @@
 // Single texels: what the engine says of one is what the lightmaps of both quantities hold there.
 #include <gmock/gmock.h>
 
+#include <chrono>
+#include <future>
 #include <limits>
+#include <memory>
+#include <utility>
+#include <vector>
 
 #include "tests/scenes/scenes.h"
 #include "tests/unit/engine/engine_driver.h"
@@ -104,16 +109,48 @@ TEST_F(Texels, ThatAreNotThereAreRefusedByTheNameOfTheMember) {
   for (const auto y : {static_cast<std::uint32_t>(size.y), kMost}) EXPECT_EQ(where(0, 2, y), "y");
 }
 
-/// An edit of geometry lays pages out anew: what was made for the old ones must not answer for the new.
-TEST_F(Texels, OfAnotherLayoutAreMadeAtOnce) {
+/// An edit of geometry lays pages out anew: what was made for the old ones must not answer for the new. Until pages may
+/// be made again, which a drag would have made over and over, nothing does.
+TEST_F(Texels, OfAnotherLayoutAreNotThoseOfTheOld) {
   solve(lumpedCube(0.5));
   ASSERT_TRUE(texel(0, 2, 2));
   ASSERT_TRUE(configure([](auto& settings) { settings.texels = 600; }));
   const auto revision = status().revision;
-  EXPECT_EQ(texel(0, 2, 2)->revision, revision);
+  ASSERT_TRUE(eventually([&] {
+    const auto read = texel(0, 2, 2);
+    EXPECT_EQ(read ? read->revision : revision, revision);
+    EXPECT_EQ(read ? ErrorCode::kBusy : read.error().code, ErrorCode::kBusy);
+    return read.has_value();
+  }));
   ASSERT_TRUE(reaches(State::kConverged));
   ASSERT_TRUE(eventually([&] { return texel(0, 2, 2)->error.x > 0.0F; }));
   EXPECT_GT(compareAll(), kTexels);
+}
+
+/// All of them wait for the same pages, however many there are, and none of what must not wait does.
+TEST_F(Texels, ThatManyAskForAtOnceAreAllAnswered) {
+  solve(lumpedCube(0.5));
+  constexpr int kAsked = 200;
+  std::vector<std::future<Result<engine::Texel>>> answers;
+  for (int i = 0; i < kAsked; ++i) {
+    auto promise = std::make_shared<std::promise<Result<engine::Texel>>>();
+    answers.push_back(promise->get_future());
+    engine().texel({0, 2, 2}, [promise](Result<engine::Texel> read) { promise->set_value(std::move(read)); });
+  }
+  ASSERT_EQ(answers.back().wait_for(std::chrono::seconds(60)), std::future_status::ready);
+  const auto here = texel(0, 2, 2);
+  ASSERT_TRUE(here);
+  int refused = 0;  // where the queue was full
+  for (auto& answer : answers) {
+    const auto read = answer.get();
+    if (read) {
+      EXPECT_EQ(read->irradiance, here->irradiance);
+    } else {
+      EXPECT_EQ(read.error().code, ErrorCode::kBusy);
+      ++refused;
+    }
+  }
+  EXPECT_LT(refused, kAsked / 2);
 }
 
 }  // namespace
