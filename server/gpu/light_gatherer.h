@@ -61,6 +61,19 @@ class LightGatherer {
 
     void resize(std::size_t count);
   };
+  /// Places from which the other half looks at what shines, of receivers that wait for their form factors.
+  struct Others {
+    std::vector<float> x, y, z, nx, ny, nz, form_factor;
+    /// So many of those lit that wait for one each or, of one receiver near to what shines, two for two.
+    struct Run {
+      std::uint32_t lit, count;
+      bool near;
+    };
+    std::vector<Run> runs;
+
+    void resize(std::size_t count);
+    void clear();
+  };
   /// Weight of what left the scene, and of what fell on unlit sides, summed over points.
   struct Lost {
     std::uint64_t escaped = 0, absorbed = 0;
@@ -74,11 +87,16 @@ class LightGatherer {
                        Lost& lost) const;
   [[nodiscard]] bool addCorners(const solver::GatherShot& shot, std::size_t first, std::size_t end);
   void makeRoom(std::size_t more);
+  void clearLit();
   void findLit(const solver::GatherShot& shot);
   void findLitGroup(const solver::GatherShot& shot, const Receivers::Group& group);
   void addPlain(const solver::GatherShot& shot, std::size_t first, std::size_t count, const glm::vec3& normal);
   void weighWhole(const solver::GatherShot& shot);
   void shareAmongPlaces(std::size_t begin);
+  /// Room for the places that match so many of those lit, from `lit` on: where they begin. All in one plane.
+  std::size_t addOthers(std::size_t lit, std::size_t count, bool near, const glm::vec3& normal);
+  template <typename Weigh>
+  void leanOnOthers(const Weigh& weigh);
   [[nodiscard]] bool behind(const solver::GatherShot& shot, const scene::Surface& surface) const;
   void testPoint(const solver::GatherShot& shot, const solver::HemicubeFrame& point,
                  std::span<const std::uint32_t> items, std::size_t half);
@@ -124,6 +142,7 @@ class LightGatherer {
   solver::GatherShot lit_for_;  ///< what lit_ was made for
   bool lit_valid_ = false;
   Lit lit_;
+  Others others_;
   std::size_t lit_count_ = 0;
   std::vector<Edge> edges_;                   ///< of what is lit
   std::vector<ClippedPolygon> parts_;         ///< of the polygon, before their planes

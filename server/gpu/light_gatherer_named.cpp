@@ -95,9 +95,7 @@ void LightGatherer::beginLinks(const solver::GatherShot& shot, std::span<const s
   if (named.empty()) {
     findLit(shot);
   } else {
-    lit_count_ = weighed_ = gaps_ = 0;
-    clearEdges();
-    lit_valid_ = false;
+    clearLit();
     forEachGroup(named, [&](const Receivers::Group& group) {
       if (!behind(shot, receivers_->patches().surfaces[group.surface])) findLitGroup(shot, group);
     });

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <glm/common.hpp>
@@ -67,14 +68,24 @@ inline std::uint32_t firstRow(const Receivers::Receiver& receiver, const SpotRow
   return (rows.first + (mixed >> 16)) % rows.apart;
 }
 
+/// For who does not ask from where the other half looks.
+struct NoOthers {
+  void operator()(const auto& /*others*/) const {}
+};
+
 /// Where a receiver looks at a polygon, which is near inside a ball: takes each place before the polygon's plane, and
-/// its share of the receiver. Places stay in registers: through memory they cost more than all else that is done here.
-template <typename Take>
+/// its share of the receiver. After these, where all of them and as many that the other half looks from lie before that
+/// plane, and the receiver has no spots, `takeOthers` gets an array of those. Places stay in registers: through memory
+/// they cost more than all else that is done here.
+template <typename Take, typename TakeOthers = NoOthers>
 [[gnu::always_inline]] inline void forEachPlace(const solver::GatherShot& shot, const NearBall& ball,
                                                 const Receivers& receivers, const Receivers::Receiver& receiver,
-                                                const Take& take) {
+                                                const Take& take, const TakeOthers& takeOthers = {}) {
+  const auto isBefore = [&](const Receivers::Place& place) {
+    return glm::dot(shot.normal, place.point - shot.corners[0]) > kInPlane;
+  };
   const auto offer = [&](const Receivers::Place& place, float share) {
-    if (glm::dot(shot.normal, place.point - shot.corners[0]) > kInPlane) take(place, share);
+    if (isBefore(place)) take(place, share);
   };
   if (receiver.hasSpots()) {
     const auto rows = spotRows(shot);
@@ -86,15 +97,20 @@ template <typename Take>
     }
     return;
   }
-  const auto place = receivers.place(receiver, shot.receiver_jitter);
+  const auto jitter = shot.receiver_jitter;
+  const auto place = receivers.place(receiver, jitter);
   const auto way = place.point - ball.middle;
   if (glm::dot(way, way) >= ball.radius * ball.radius) {
     offer(place, 1.0F);
+    const std::array others{receivers.place(receiver, 1.0F - jitter)};
+    if (isBefore(place) && isBefore(others[0])) takeOthers(others);
     return;
   }
-  const auto at = nearPlace(shot.receiver_jitter);
-  offer(receivers.place(receiver, at), 0.5F);
-  offer(receivers.place(receiver, 1.0F - at), 0.5F);
+  const auto at = nearPlace(jitter), other = nearPlace(1.0F - jitter);
+  const std::array places{receivers.place(receiver, at), receivers.place(receiver, 1.0F - at)};
+  const std::array others{receivers.place(receiver, other), receivers.place(receiver, 1.0F - other)};
+  for (const auto& near : places) offer(near, 0.5F);
+  if (std::ranges::all_of(places, isBefore) && std::ranges::all_of(others, isBefore)) takeOthers(others);
 }
 
 }  // namespace radiosity::gpu

@@ -197,10 +197,19 @@ std::array<double, 3> Gmres<Real>::error() const {
   for (std::size_t c = 0; c < 3; ++c) {
     const auto& channel = channel_[c];
     if (residual_[c] == 0.0) continue;
-    const double q = residual_[c] / channel.before;
+    const double q = left(c);
     const double by_step =
         q < 1.0 && channel.step > 0.0 ? channel.step * q / (1.0 - q) : std::numeric_limits<double>::infinity();
     error[c] = std::max(residual_[c], kDoubt * by_step);
+  }
+  return error;
+}
+
+template <typename Real>
+std::array<double, 3> Gmres<Real>::errorOfShape() const {
+  auto error = this->error();
+  for (std::size_t c = 0; c < 3; ++c) {
+    if (error[c] > 0.0 && std::isfinite(error[c])) error[c] *= std::min(1.0, left(c));
   }
   return error;
 }

@@ -39,6 +39,10 @@ class Gmres {
   /// that it left of the residual, so that it is what that step added times q / (1 - q). Several times too small where
   /// that step took most of all else and what is left is the level of light. Infinite where no step tells.
   [[nodiscard]] std::array<double, 3> error() const;
+  /// Of what is no level of light, what the last affine sweep left: as much again as the last step left of the
+  /// residual. For who finds the level otherwise. Too small, several times at worst, of what one room has more than the
+  /// next.
+  [[nodiscard]] std::array<double, 3> errorOfShape() const;
   [[nodiscard]] int sweeps() const { return sweeps_; }
 
  private:
@@ -56,6 +60,8 @@ class Gmres {
   void addColumn(std::size_t c, std::vector<Real>& image);
   void endCycle();
   [[nodiscard]] static std::array<double, kRestart> factors(const Channel& channel, std::size_t columns);
+  /// Of the residual of a channel, the part that the last step left.
+  [[nodiscard]] double left(std::size_t c) const { return residual_[c] / channel_[c].before; }
   [[nodiscard]] double product(const std::vector<Real>& a, const std::vector<Real>& b) const;
 
   std::vector<Real> weight_;

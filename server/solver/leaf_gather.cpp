@@ -177,7 +177,7 @@ void LeafGather::finish() {
   for (auto& half : halves_) {
     double left = 0.0, square = 0.0;
     for (const double residual : half.gmres.residual()) left += residual * std::sqrt(area);
-    for (const double error : half.gmres.error()) square += error * error;
+    for (const double error : half.gmres.errorOfShape()) square += error * error;
     if (half.shining > 0.0) unsolved_ = std::max(unsolved_, left / half.shining);
     unsolved_square_ = std::max(unsolved_square_, square);
     half = {};

@@ -98,8 +98,8 @@ class LeafGather {
   /// Flux that the equation does not account for, of what shines: so much of all light at most, however often it is
   /// reflected, where all reflect alike; up to four times as much beside lamps in a dark room.
   [[nodiscard]] double unsolved() const { return unsolved_; }
-  /// And the square of the error that this makes, as Gmres::error() tells it: sum over leaves and channels, times area.
-  /// Before levels() put right what all leaves of a part of the scene lack alike, of which it knows least.
+  /// And the square of the error that this makes, as Gmres::errorOfShape() tells it: sum over leaves and channels,
+  /// times area. What all leaves of a part of the scene lack alike, of which that knows nothing, levels() put right.
   [[nodiscard]] double unsolvedSquare() const { return unsolved_square_; }
   /// Flux that leaves the scene, and that falls on unlit sides, by channel: of what leaves send.
   [[nodiscard]] const std::array<double, 3>& escapedFlux() const { return escaped_; }

@@ -137,7 +137,9 @@ void LeafVariation::update(const LeafLight& light, double bound) {
       if (count < kEvenPaths) count = static_cast<std::uint16_t>(2 * count);
     sumUp(light);
   }
-  left_ = std::max(0.0, found_);
+  // Of what is within the noise one half is below zero; the other would be stated, and nearly all of it where nothing
+  // is.
+  left_ = found_ > deviation_ ? found_ : 0.0;
   noise_ = 0.0;
   giveBack(gain_);
   if (stands_for_ == 1.0 && found_ + deviation_ > bound) correct();
