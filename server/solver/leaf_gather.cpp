@@ -29,7 +29,7 @@ constexpr double kWithin = 0.2;
 /// there is of its light.
 constexpr std::size_t kVectors = 3 * (Gmres<float>::kRestart + 3) + 4 * 4, kLights = 5 * 3 + 4;
 
-using Light = LeafSmoother::Light;
+using Light = std::array<double, 4>;
 
 using Light32 = std::array<float, 4>;
 
@@ -265,12 +265,7 @@ void LeafGather::sweep(std::size_t h, RayGmres::Vectors& x, bool affine) {
 }
 
 void LeafGather::takeSolutions() {
-  for (std::size_t h = 0; h < 2; ++h) {
-    const auto& solution = halves_[h].gmres.solution();
-    solved_[h].assign(sights_.leafCount(), {});
-    for (std::uint32_t v = 0; v < sights_.leafCount(); ++v)
-      for (std::size_t c = 0; c < 3; ++c) solved_[h][v][c] = static_cast<double>(solution[c][v]);
-  }
+  for (std::size_t h = 0; h < 2; ++h) solved_[h] = halves_[h].gmres.solution();
 }
 
 void LeafGather::take(std::size_t h, const Levels& levels) {
@@ -294,7 +289,7 @@ void LeafGather::take(std::size_t h, const Levels& levels) {
 /// What the rays of both halves make of the same light: light that differs is not theirs.
 void LeafGather::weighNoise() {
   const std::size_t leaves = sights_.leafCount();
-  auto source = halves_[0].source;  // with the sky
+  auto& source = halves_[0].source;  // with the sky; neither half's own is needed any more
   for (std::size_t v = 0; v < leaves; ++v) {
     for (std::size_t c = 0; c < 3; ++c) {
       source[v][c] = 0.5 * (halves_[0].source[v][c] + halves_[1].source[v][c]);
@@ -302,13 +297,15 @@ void LeafGather::weighNoise() {
       halves_[0].radiosity[v][c] = halves_[1].radiosity[v][c] = radiosity;
     }
   }
-  std::array<std::vector<Light>, 2> arriving;
+  std::array<LeafSmoother::Light, 2> arriving;
   inBothHalves([&](std::size_t half) {
     for (auto end = leaves; end < source.size(); ++end) halves_[half].radiosity[end] = rounded(source[end]);
     followSteps(half, &source);
     average(half);
-    arriving[half].reserve(leaves);
-    for (const auto& mean : halves_[half].arriving) arriving[half].push_back({mean[0], mean[1], mean[2], 0.0});
+    for (std::size_t c = 0; c < 3; ++c) {
+      arriving[half][c].resize(leaves);
+      for (std::size_t v = 0; v < leaves; ++v) arriving[half][c][v] = halves_[half].arriving[v][c];
+    }
     smoother_->apply(arriving[half]);
   });
   block_noise_.assign((leaves + kBlock - 1) / kBlock, 0.0);
@@ -320,7 +317,7 @@ void LeafGather::weighNoise() {
     for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
       double square = 0.0;
       for (std::size_t c = 0; c < 3; ++c) {
-        const double off = 0.5 * (arriving[0][v][c] - arriving[1][v][c]);
+        const double off = 0.5 * static_cast<double>(arriving[0][c][v] - arriving[1][c][v]);
         square += off * off;
       }
       const glm::dvec3 light(0.5F *

@@ -134,7 +134,7 @@ class LeafGather {
   static constexpr std::uint32_t kBlock = 64;
   static constexpr std::uint32_t kWide = 150;
   /// Four, so that a leaf's are one vector; the last is 0.
-  using Light = LeafSmoother::Light;
+  using Light = std::array<double, 4>;
   /// What rays read at random, for each of their ends: half of it lies in the caches.
   using Light32 = std::array<float, 4>;
   using RayGmres = Gmres<float>;
@@ -227,7 +227,7 @@ class LeafGather {
   LeftLight light_;
   Stage stage_ = Stage::kDone;
   std::array<Half, 2> halves_;
-  std::array<std::vector<Light>, 2> solved_;  ///< by half and leaf value: x, smoothed; while taking it
+  std::array<LeafSmoother::Light, 2> solved_;  ///< by half: x, smoothed; while taking it
   std::array<std::vector<glm::vec3>, 2> gathered_;
   double noise_ = 0.0, smoothed_ = 0.0, bias_ = 0.0, doubt_ = 0.0, unsolved_ = 0.0, unsolved_square_ = 0.0;
   std::vector<double> block_noise_;  ///< parts of it but for smoothed_, what smoothing took, by kBlock leaves

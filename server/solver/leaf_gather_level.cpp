@@ -73,7 +73,7 @@ void LeafGather::joinSteps(std::size_t half, std::uint32_t end, UnionFind& parts
 
 /// x, but for what few rays find too much missing of: with what came over links no leaf gets less than no light.
 double LeafGather::solved(std::size_t h, std::size_t c, std::size_t v) const {
-  return std::max(solved_[h][v][c], -static_cast<double>(light_.irradiance[h][v][static_cast<int>(c)]));
+  return static_cast<double>(std::max(solved_[h][c][v], -light_.irradiance[h][v][static_cast<int>(c)]));
 }
 
 /// What comes straight from the sky, by rays as they are.
@@ -170,19 +170,21 @@ std::vector<std::array<LeafGather::LevelSum, 3>> LeafGather::levelSums(std::size
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
     auto& sum = sums[part_[s]];
     for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
+      const double area = areaOf(v);
+      if (area <= 0.0) continue;
       const auto lost = lostOf(h, v);
       const auto& loss = lossOf(h, v);
-      for (std::size_t c = 0; c < 3 && areaOf(v) > 0.0; ++c) {
+      for (std::size_t c = 0; c < 3; ++c) {
         const auto i = static_cast<int>(c);
         const double x = solved(h, c, v), over_links = static_cast<double>(light_.irradiance[h][v][i]);
         const double sends = 1.0 - loss[c] * lost.all();
         const double stays = 1.0 - sends * static_cast<double>(light_.reflectance[v][i]);
-        sum[c].left += areaOf(v) * (sends * halves_[h].source[v][c] + skyAt(lost, c));
-        sum[c].kept += areaOf(v) * stays * x;
-        sum[c].size += areaOf(v) * stays * std::abs(x);
-        sum[c].all += areaOf(v) * stays * (x + over_links);
-        sum[c].area += areaOf(v);
-        sum[c].stays += areaOf(v) * stays;
+        sum[c].left += area * (sends * halves_[h].source[v][c] + skyAt(lost, c));
+        sum[c].kept += area * stays * x;
+        sum[c].size += area * stays * std::abs(x);
+        sum[c].all += area * stays * (x + over_links);
+        sum[c].area += area;
+        sum[c].stays += area * stays;
         if (x < 0.0) sum[c].least = std::min(sum[c].least, x / over_links);
       }
     }

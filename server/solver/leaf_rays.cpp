@@ -18,6 +18,8 @@ constexpr double kLift = 2e-6;
 constexpr double kLeastSlope = 0.05;
 /// Farther than the unit box is wide.
 constexpr double kFar = 4.0;
+/// So much farther than in double precision a ray in single precision looks.
+constexpr double kFarther = 1.001;
 /// A ray keeps in mind so many that it went through; then it starts anew from the last of them, so often at most.
 constexpr std::size_t kMostSheets = 64, kMostStarts = 64;
 /// Sheets within this of the last may lie in the same place (scene::RayTree).
@@ -236,6 +238,11 @@ bool LeafRays::uncover(scene::RayHit& hit, const glm::dvec3& origin, const glm::
     if (s != scene::kNone && patches_.seenOrder(met.triangle) < patches_.seenOrder(seen.triangle)) seen = met;
   }
   return seen.triangle != std::exchange(hit, seen).triangle;
+}
+
+bool LeafRays::mayMeet(const Place& from, const glm::dvec3& direction, double reach) const {
+  scene::RayHit hit{};
+  return wide_.nearestHit(glm::vec3(lifted(from)), glm::vec3(direction), static_cast<float>(kFarther * reach), hit);
 }
 
 LeafRays::Sight LeafRays::look(const Place& from, const glm::dvec3& direction) const {

@@ -55,7 +55,9 @@ class LeafRays {
     double distance = 0.0;
   };
   [[nodiscard]] Sight look(const Place& from, const glm::dvec3& direction, double reach) const;
-  /// The same without bounds; `value` may be one of the sky's.
+  /// Whether look() may find something within `reach`: in single precision, a third of what that costs.
+  [[nodiscard]] bool mayMeet(const Place& from, const glm::dvec3& direction, double reach) const;
+  /// look() without bounds; `value` may be one of the sky's.
   [[nodiscard]] Sight look(const Place& from, const glm::dvec3& direction) const;
   /// The leaf value that is seen that way, kNothing or one of the sky's. Where a leaf has no area of its own (buried
   /// right behind another, or so little of it that its neighbours took it) it is theirs. What one can see through stops

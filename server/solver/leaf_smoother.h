@@ -18,8 +18,8 @@ namespace radiosity::solver {
 
 class LeafSmoother {
  public:
-  /// By channel; the last counts for nothing.
-  using Light = std::array<double, 4>;
+  /// By channel and leaf value. In single precision: what it works with is far above the rounding of that.
+  using Light = std::array<std::vector<float>, 3>;
 
   /// `area`: by leaf value, 0 where there is no leaf. Both are to outlive it. `is_parted`: by leaf value, whether light
   /// may be another on both sides of something that stands there: no mean is taken of it, nor across it.
@@ -27,9 +27,9 @@ class LeafSmoother {
                const std::function<bool(std::uint32_t)>& is_parted = {});
 
   /// Smooths both halves (by leaf value), and remembers how. O(leaves).
-  void smooth(std::array<std::vector<Light>, 2>& halves);
+  void smooth(std::array<Light, 2>& halves);
   /// Does the same to other values.
-  void apply(std::vector<Light>& values) const;
+  void apply(Light& values) const;
   /// What it took of the light itself, or put where there was less, and what was gained by chance: squares of it, times
   /// area, all leaves and channels. An estimate, of which what was taken is not below zero.
   [[nodiscard]] double bias() const { return bias_; }
@@ -39,8 +39,9 @@ class LeafSmoother {
   void forget();
 
  private:
-  void smoothSide(const Side& side, std::size_t pass, const std::array<std::vector<Light>, 2>& raw,
-                  std::array<std::vector<Light>, 2>& halves);
+  struct Room;
+  void smoothSide(const Side& side, std::size_t pass, const std::array<Light, 2>& raw, std::array<Light, 2>& halves,
+                  Room& room);
   /// So far apart are leaves that passes average.
   static constexpr std::array<std::uint32_t, 3> kSteps{1, 2, 4};
   /// Which leaves are averaged: so far apart, and whether one may count whose mirror image there is not.
@@ -53,16 +54,26 @@ class LeafSmoother {
   };
   static const std::array<Pass, 5> kPasses;
   [[nodiscard]] static bool isFor(const Pass& pass, const Side& side);
-  void average(const Side& side, const Pass& pass, std::span<const Light> from, std::span<Light> means) const;
+  void weigh(const Side& side, const Pass& pass, Room& room) const;
+  void chooseParts(const Side& side, Room& room, float* parts) const;
+  static void sumAround(const Side& side, const Pass& pass, std::vector<float>& values, std::vector<float>& rows);
+  void average(const Side& side, const Pass& pass, const float* from, float* means, Room& room) const;
   /// A leaf of a side, and by step which of the nine around it, as bits, it may be averaged with.
   struct Beside {
     std::uint32_t leaf;
     std::array<std::uint16_t, kSteps.size()> open;
+    std::array<bool, kSteps.size()> cut;  ///< other than where nothing stands
   };
-  [[nodiscard]] Light averageApart(const Side& side, const Beside& beside, const Pass& pass,
-                                   std::span<const Light> from) const;
+  /// A mean of some leaves around one.
+  struct Apart {
+    std::uint32_t leaf, count;
+    std::array<std::uint32_t, 9> with;
+    std::array<float, 9> weight;
+  };
+  [[nodiscard]] Apart apart(const Side& side, const Beside& beside, const Pass& pass) const;
   void findParted(std::size_t s, const std::function<bool(std::uint32_t)>& is_parted);
   [[nodiscard]] std::uint16_t openWays(const Side& side, std::uint32_t leaf, std::uint32_t step) const;
+  [[nodiscard]] static std::uint16_t waysWithin(const Side& side, std::uint32_t leaf, std::uint32_t step);
 
   [[nodiscard]] double areaOf(std::size_t value) const { return static_cast<double>(area_[value]); }
 

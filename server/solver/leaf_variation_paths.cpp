@@ -157,7 +157,8 @@ LeafVariation::Way LeafVariation::firstWay(std::uint32_t receiver, std::uint64_t
 /// Where a path passes the leaf near by, and the other place of that. False: no leaf is near that way.
 bool LeafVariation::findPlaces(std::uint32_t receiver, std::uint64_t key, std::array<Place, 2>& places) const {
   const auto way = firstWay(receiver, key);
-  const auto sight = rays_->look(way.from, way.direction, kNear * rays_->greatestWidth());
+  if (!rays_->mayMeet(way.from, way.direction, nearest())) return false;
+  const auto sight = rays_->look(way.from, way.direction, nearest());
   if (!isNear(sight)) return false;
   places = {sight.end, rays_->placeOn(sight.end.value, way.at)};
   return true;
