@@ -15,6 +15,8 @@ constexpr double kAim = 0.95;
 /// Steps take more of the residual than of the error where the level of light converges last: in a room of reflectance
 /// 0.99 four in ten leave more than the estimate says, one in four more than this many times as much.
 constexpr double kDoubt = 2.0;
+/// A start whose residual is so small a part of what is asked is the solution.
+constexpr double kNoStep = 1e-3;
 /// What is left of a vector when so small a part of it is, is rounding.
 template <typename Real>
 constexpr double kRounding = 45.0 * std::numeric_limits<Real>::epsilon();
@@ -61,9 +63,10 @@ double Gmres<Real>::product(const std::vector<Real>& a, const std::vector<Real>&
 }
 
 template <typename Real>
-void Gmres<Real>::begin(Vectors start, std::vector<Real> weight, const std::array<double, 3>& tolerance,
-                        int max_sweeps) {
+void Gmres<Real>::begin(Vectors start, std::vector<Real> weight, const std::array<double, 3>& tolerance, int max_sweeps,
+                        bool always_steps) {
   x_ = std::move(start);
+  always_steps_ = always_steps;
   weight_ = std::move(weight);
   tolerance_ = tolerance;
   max_sweeps_ = max_sweeps;
@@ -110,8 +113,9 @@ void Gmres<Real>::startCycle() {
     channel.basis.clear();
     channel.triangle.clear();
     channel.columns = 0;
+    const double enough = always_steps_ && sweeps_ == 1 ? kNoStep * tolerance_[c] : tolerance_[c];
     // What is no number any more will not become one.
-    channel.growing = residual_[c] > tolerance_[c] && std::isfinite(residual_[c]);
+    channel.growing = residual_[c] > enough && std::isfinite(residual_[c]);
     if (!channel.growing) continue;
     const auto scale = static_cast<Real>(1.0 / residual_[c]);
     for (auto& value : residual) value *= scale;

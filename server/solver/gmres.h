@@ -25,8 +25,9 @@ class Gmres {
 
   /// From `start` until the norm of each channel's residual G x + g - x, weighted by `weight`, is at most its
   /// tolerance, or `max_sweeps` are used up. Unknowns of weight 0 are left alone: a sweep must not change them where
-  /// `affine`, and finds 0 there otherwise.
-  void begin(Vectors start, std::vector<Real> weight, const std::array<double, 3>& tolerance, int max_sweeps);
+  /// `affine`, and finds 0 there otherwise. `always_steps`: also where the start is as good as asked, for error().
+  void begin(Vectors start, std::vector<Real> weight, const std::array<double, 3>& tolerance, int max_sweeps,
+             bool always_steps = false);
 
   /// Does one sweep. True: solution() is done.
   bool advance(const Sweep& sweep);
@@ -69,7 +70,7 @@ class Gmres {
   Vectors x_, solution_, image_;
   std::array<Channel, 3> channel_;
   int sweeps_ = 0, max_sweeps_ = 0;
-  bool in_cycle_ = false;
+  bool in_cycle_ = false, always_steps_ = false;
 };
 
 extern template class Gmres<float>;

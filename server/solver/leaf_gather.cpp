@@ -187,7 +187,7 @@ void LeafGather::finish() {
   has_gathered_ = true;
 }
 
-/// From nothing: the solution depends on rays and light alone.
+/// From what these tell, and not from a solution before: it depends on rays and light alone.
 void LeafGather::takeLight(std::size_t h) {
   Half& half = halves_[h];
   const std::size_t leaves = sights_.leafCount();
@@ -221,9 +221,7 @@ void LeafGather::takeLight(std::size_t h) {
     // A norm over areas bounds the sum over them (Cauchy and Schwarz).
     if (area > 0.0) tolerance[c] = light_.residual * shining[c] / std::sqrt(area);
   }
-  RayGmres::Vectors nothing;
-  for (auto& channel : nothing) channel.assign(leaves, 0.0F);
-  half.gmres.begin(std::move(nothing), {area_.begin(), area_.end()}, tolerance, kMaxSweeps);
+  half.gmres.begin(evenLight(h), {area_.begin(), area_.end()}, tolerance, kMaxSweeps, true);
   half.done = false;
 }
 

@@ -154,6 +154,7 @@ class LeafGather {
   using Levels = std::vector<std::array<Level, 3>>;
   enum class Stage { kDone, kTracing, kSolving };
   void takeLight(std::size_t half);
+  [[nodiscard]] RayGmres::Vectors evenLight(std::size_t half) const;
   void average(std::size_t half);
   void followSteps(std::size_t half, const std::vector<Light>* source);
   void sweep(std::size_t half, RayGmres::Vectors& x, bool affine);

@@ -164,6 +164,36 @@ LeafGather::Levels LeafGather::levels(std::size_t h) {
   return levels;
 }
 
+/// If all leaves of a part of the scene had the same light: what they take of it, and lose, is what shines there. That
+/// is most of what is solved for, and the sweeps that would find it last.
+Gmres<float>::Vectors LeafGather::evenLight(std::size_t h) const {
+  struct Sum {
+    double shines = 0.0, takes = 0.0;
+  };
+  std::vector<std::array<Sum, 3>> sums(sides_.size());
+  RayGmres::Vectors light;
+  for (auto& channel : light) channel.assign(sights_.leafCount(), 0.0F);
+  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
+    auto& sum = sums[part_[s]];
+    for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
+      const double area = areaOf(v), sends = 1.0 - lostOf(h, v).all();
+      for (std::size_t c = 0; c < 3; ++c) {
+        sum[c].shines += area * sends * halves_[h].source[v][c];
+        sum[c].takes += area * (1.0 - sends * static_cast<double>(light_.reflectance[v][static_cast<int>(c)]));
+      }
+    }
+  }
+  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      const auto& sum = sums[part_[s]][c];
+      const auto level = sum.takes > 0.0 ? static_cast<float>(sum.shines / sum.takes) : 0.0F;
+      for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v)
+        light[c][v] = area_[v] > 0.0F ? level : 0.0F;
+    }
+  }
+  return light;
+}
+
 /// By part of the scene and channel.
 std::vector<std::array<LeafGather::LevelSum, 3>> LeafGather::levelSums(std::size_t h) {
   std::vector<std::array<LevelSum, 3>> sums(sides_.size());

@@ -125,6 +125,27 @@ TEST(Gmres, TellsTheErrorOfItsSolution) {
   }
 }
 
+TEST(Gmres, StepsFromAStartThatIsGoodEnoughWhereItIsToTellItsError) {
+  const auto equation = makeRooms(1, 24, 0.5, 0.0, 3);
+  const double shining = distance(equation, equation.shining, std::vector<double>(equation.weight.size(), 0.0));
+  const auto exact = solve(equation, 1e-13 * shining).solution();
+  const auto solveFrom = [&](Gmres<double>::Vectors start, double tolerance, bool always_steps) {
+    Gmres<double> gmres;
+    gmres.begin(std::move(start), equation.weight, {tolerance, tolerance, tolerance}, 2000, always_steps);
+    while (!gmres.advance([&](Gmres<double>::Vectors& x, bool affine) { sweepOnce(equation, x, affine); })) continue;
+    return gmres;
+  };
+  auto near = exact;
+  for (auto& channel : near) channel[5] *= 1.0001;
+  const auto at_once = solveFrom(near, 1e-2 * shining, false), told = solveFrom(near, 1e-2 * shining, true);
+  EXPECT_EQ(at_once.sweeps(), 1);
+  EXPECT_TRUE(std::isinf(at_once.error()[0]));
+  EXPECT_EQ(told.sweeps(), 3) << "of the start, of its residual, and of what that brings";
+  EXPECT_GE(told.error()[0], distance(equation, told.solution()[0], exact[0]));
+  EXPECT_LT(told.error()[0], 1e-4 * shining);
+  EXPECT_EQ(solveFrom(exact, 1e-2 * shining, true).sweeps(), 1) << "nothing is left to step by";
+}
+
 TEST(Gmres, TellsNothingOfAnErrorWhereNoStepWasTaken) {
   const auto equation = makeRooms(1, 8, 0.5, 0.0, 1);
   EXPECT_TRUE(std::isinf(solve(equation, 1e9).error()[0]));
