@@ -15,12 +15,16 @@ namespace radiosity::gpu {
 namespace {
 
 constexpr std::size_t kFewestLit = 4096;
-/// The halves look from opposite places, of which most cancels in their mean and shows in their difference: that would
-/// say several times too large an error. So the form factors of a half lean on those of the other half's places, and
-/// keep this part of the difference: what the mean of all places errs by, beside half the difference of the halves,
-/// root mean squares over jitters. For one place of each half, from kNearTexels on, that is 0.05 to 0.11 (lamps of a
-/// texel at any height), for two near by 0.3 to 0.5 (0.4 for a wall and the floor at its foot). The mean stays as it
-/// is.
+/// More do not wait for their form factors: the other half's places would take memory.
+constexpr std::size_t kWeighedAtOnce = 65536;
+/// The halves look from opposite places, of which most cancels in their mean and shows in their difference: where
+/// nothing else is unknown, as in an empty room, that would say several times too large an error. So the form factors
+/// of a half lean on those of the other half's places, and keep this part of the difference: what the mean of all
+/// places errs by, beside half the difference of the halves, root mean squares over jitters. For one place of each
+/// half, from kNearTexels on, that is 0.05 to 0.11 (lamps of a texel at any height), for two near by 0.3 to 0.5 (0.4
+/// for a wall and the floor at its foot). The mean stays as it is. Where something may hide one place and not the other
+/// it would not: what is odd in the form factor times what is odd in what is seen is no part of the mean of the one
+/// alone.
 constexpr float kKept = 0.15F, kKeptNear = 0.4F;
 
 /// Least and greatest height of a polygon above a plane.
@@ -201,9 +205,10 @@ void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers
   }
   if (!whole) weighWhole(shot);
   const std::size_t begin = lit_count_;
+  const bool leans = receivers_->isConvex();
   const auto ball = nearBall(corners, surface, plane.du);
   const auto takeOthers = [&](const auto& others) {
-    if (!surface.planar) return;
+    if (!leans || !surface.planar) return;
     auto k = addOthers(lit_count_ - others.size(), others.size(), others.size() > 1, plane_normal);
     for (const auto& other : others) {
       others_.x[k] = other.point.x;
@@ -239,6 +244,7 @@ void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers
     makeRoom((stop - i) * std::max(2U, block->plain ? 0 : shot.spot_rows * scene::kSpotQuarters));
     const auto [low, high] = heights(shot, block->low, block->high);
     if (high <= 0.0F) i = stop;
+    if (whole && lit_count_ - weighed_ > kWeighedAtOnce) weighWhole(shot);
     if (block->plain && low > kInPlane && !isNear(ball, *block)) {
       addPlain(shot, i, stop - i, plane_normal);
       i = stop;
@@ -278,9 +284,11 @@ void LightGatherer::addPlain(const solver::GatherShot& shot, std::size_t first, 
   const auto& frame = receivers_->patches().triangles[receivers_->all()[first].triangle];
   findPlaces(frame, shot.receiver_jitter, count, receivers_->texelX() + first, receivers_->texelY() + first, &lit_.x[k],
              &lit_.y[k], &lit_.z[k]);
-  const auto o = addOthers(k, count, false, normal);
-  findPlaces(frame, 1.0F - shot.receiver_jitter, count, receivers_->texelX() + first, receivers_->texelY() + first,
-             &others_.x[o], &others_.y[o], &others_.z[o]);
+  if (receivers_->isConvex()) {
+    const auto o = addOthers(k, count, false, normal);
+    findPlaces(frame, 1.0F - shot.receiver_jitter, count, receivers_->texelX() + first, receivers_->texelY() + first,
+               &others_.x[o], &others_.y[o], &others_.z[o]);
+  }
   std::fill_n(&lit_.nx[k], count, normal.x);
   std::fill_n(&lit_.ny[k], count, normal.y);
   std::fill_n(&lit_.nz[k], count, normal.z);

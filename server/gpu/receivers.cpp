@@ -14,6 +14,8 @@ namespace {
 constexpr float kWidePixels = 1.5F;
 /// Facets of more triangles than this are not intersected.
 constexpr std::uint32_t kMaxFacetTriangles = 512;
+/// Of more triangles it is not asked whether they bound a convex room: each against all corners.
+constexpr std::size_t kMostConvex = 256;
 /// Of a facet with more corners a box around it stands for them.
 constexpr std::size_t kMostCorners = 8;
 /// Triangles are widened by this part of their size, so that a ray cannot pass between two that share an edge.
@@ -70,6 +72,16 @@ Receivers::Receivers(std::shared_ptr<const scene::PatchScene> patches)
     absorbs_.push_back({surface.first_node[0] == scene::kNone, surface.first_node[1] == scene::kNone});
   }
   findFacets();
+  is_convex_ = findConvex();
+}
+
+bool Receivers::findConvex() const {
+  if (planes_.size() > kMostConvex) return false;
+  return std::ranges::all_of(planes_, [this](const auto& plane) {
+    return std::ranges::all_of(corners_, [&](const auto& corners) {
+      return std::ranges::all_of(corners, [&](const glm::vec3& corner) { return plane.height(corner) >= -kInPlane; });
+    });
+  });
 }
 
 scene::Bvh Receivers::treeOfOpaque() const {

@@ -62,6 +62,9 @@ class Receivers {
   Receivers() = default;
   explicit Receivers(std::shared_ptr<const scene::PatchScene> patches);
 
+  /// Nothing hides anything: all that is there lies before the plane of each triangle, as in an empty room. False where
+  /// there is too much to look.
+  [[nodiscard]] bool isConvex() const { return is_convex_; }
   [[nodiscard]] const scene::PatchScene& patches() const { return *patches_; }
   [[nodiscard]] const std::vector<Group>& groups() const { return groups_; }
   [[nodiscard]] const std::vector<Receiver>& all() const { return receivers_; }
@@ -183,6 +186,7 @@ class Receivers {
 
  private:
   /// The opaque triangles, from when they are first asked for: many scenes never do.
+  bool is_convex_ = false;
   struct Opaque {
     std::once_flag made;
     scene::Bvh tree;
@@ -199,6 +203,7 @@ class Receivers {
   }
   void findBlocks(Group& group);
   void findFacets();
+  [[nodiscard]] bool findConvex() const;
   void measure(Facet& facet);
   [[nodiscard]] scene::Bvh treeOfOpaque() const;
   [[nodiscard]] static bool anyRises(std::span<const glm::vec3> corners, const glm::vec3& point,

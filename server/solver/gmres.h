@@ -25,7 +25,8 @@ class Gmres {
 
   /// From `start` until the norm of each channel's residual G x + g - x, weighted by `weight`, is at most its
   /// tolerance, or `max_sweeps` are used up. Unknowns of weight 0 are left alone: a sweep must not change them where
-  /// `affine`, and finds 0 there otherwise. `always_steps`: also where the start is as good as asked, for error().
+  /// `affine`, and finds 0 there otherwise. `always_steps`: also where the start is as good as asked, for error(),
+  /// unless a thousandth of that is left.
   void begin(Vectors start, std::vector<Real> weight, const std::array<double, 3>& tolerance, int max_sweeps,
              bool always_steps = false);
 

@@ -176,9 +176,10 @@ Gmres<float>::Vectors LeafGather::evenLight(std::size_t h) const {
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
     auto& sum = sums[part_[s]];
     for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
-      const double area = areaOf(v), sends = 1.0 - lostOf(h, v).all();
+      const auto lost = lostOf(h, v);
+      const double area = areaOf(v), sends = 1.0 - lost.all();
       for (std::size_t c = 0; c < 3; ++c) {
-        sum[c].shines += area * sends * halves_[h].source[v][c];
+        sum[c].shines += area * (sends * halves_[h].source[v][c] + skyAt(lost, c));
         sum[c].takes += area * (1.0 - sends * static_cast<double>(light_.reflectance[v][static_cast<int>(c)]));
       }
     }

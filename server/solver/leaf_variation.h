@@ -64,8 +64,9 @@ class LeafVariation {
   [[nodiscard]] bool refine();
 
   // Sums over leaves and channels of area (unit box squared) times irradiance (lux) squared.
-  /// Of what varies and is not corrected; never below zero. After refinement, which stops where noise seems small by
-  /// chance, this and noise() come out a quarter too small, an eighth of an error.
+  /// Of what varies and is not corrected; never below zero. Nothing where it is within the noise, and below the bound.
+  /// After refinement, which stops where noise seems small by chance, this and noise() come out a quarter too small, an
+  /// eighth of an error.
   [[nodiscard]] double left() const { return left_; }
   /// Of the noise of the corrections in the mean of the halves.
   [[nodiscard]] double noise() const { return noise_; }

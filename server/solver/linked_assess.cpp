@@ -16,8 +16,8 @@ namespace {
 
 /// So many, some tenths of a second of them, are traced for somebody who wants to know the light.
 constexpr std::uint64_t kRaysAtOnce = 2'000'000;
-/// What the last steps of solving tell of its error is several times too small at worst: no less than this part of what
-/// the residual would have it be.
+/// What the last steps and sweep of solving tell of its error may be several times too small where light passes from
+/// one bright room to the next: no less than this part of what the residual would have it be at worst.
 constexpr double kLeastUnsolved = 0.125;
 /// Largest mean reflectance that is told from one.
 constexpr double kMostKept = 0.99999;

@@ -88,23 +88,29 @@ TEST_F(Gather, OfALampThatAWallsPlaneCutsThePartInFrontIsReceived) {
 }
 
 // Many texels away: what is near looks from two places.
-// Far from the lamp: a half keeps 0.15 of what the two opposite places differ by.
+// Where nothing hides anything a half keeps 0.15 of what the two opposite places differ by; elsewhere all, since which
+// of them is hidden goes with how much they get.
 TEST_F(Gather, TheReceiverJitterMovesTheReceivingPoint) {
-  SceneBuilder builder;
-  const auto floor = builder.add({{-0.5F, -0.5F, -0.5F}, {1, 0, 0}, {0, 1, 0}, 32, 32});
-  const auto lamp = builder.add({{-0.1F, -0.2F, 0.4F}, {0, 0.3F, 0}, {0.2F, 0, 0}, 1, 1});
-  const auto scene = builder.build();
-  std::mt19937 random(1);
-  auto batch = gatherFrom(*scene, lamp, 2, random);
-  batch.gather[0].receiver_jitter = {0.125F, 0.75F};
-  const auto flux = run(scene, batch);
-  const auto at = [&](double x, double y) {
-    return solver::polygonFormFactor({-0.5 + x / 32, -0.5 + y / 32, -0.5}, {0, 0, 1},
-                                     std::span(batch.gather[0].corners).first(batch.gather[0].corner_count));
-  };
-  const double here = at(9.125, 22.75), opposite = at(9.875, 22.25), exact = 0.575 * here + 0.425 * opposite;
-  ASSERT_GT(std::abs(here - opposite), 1e-2 * exact);
-  EXPECT_NEAR(irradiance(*scene, flux, floor, 9, 22), exact, 1e-5 * exact);
+  for (const bool has_wall : {false, true}) {
+    SCOPED_TRACE(has_wall);
+    SceneBuilder builder;
+    const auto floor = builder.add({{-0.5F, -0.5F, -0.5F}, {1, 0, 0}, {0, 1, 0}, 32, 32});
+    const auto lamp = builder.add({{-0.1F, -0.2F, 0.4F}, {0, 0.3F, 0}, {0.2F, 0, 0}, 1, 1});
+    if (has_wall) builder.add({{0.45F, -0.5F, -0.5F}, {0, 0.1F, 0}, {0, 0, 0.1F}, 1, 1});
+    const auto scene = builder.build();
+    std::mt19937 random(1);
+    auto batch = gatherFrom(*scene, lamp, 2, random);
+    batch.gather[0].receiver_jitter = {0.125F, 0.75F};
+    const auto flux = run(scene, batch);
+    const auto at = [&](double x, double y) {
+      return solver::polygonFormFactor({-0.5 + x / 32, -0.5 + y / 32, -0.5}, {0, 0, 1},
+                                       std::span(batch.gather[0].corners).first(batch.gather[0].corner_count));
+    };
+    const double here = at(9.125, 22.75), opposite = at(9.875, 22.25);
+    const double exact = has_wall ? here : 0.575 * here + 0.425 * opposite;
+    ASSERT_GT(std::abs(here - opposite), 1e-2 * exact);
+    EXPECT_NEAR(irradiance(*scene, flux, floor, 9, 22), exact, 1e-5 * exact);
+  }
 }
 
 /// Share of the lamp's interval [-0.1, 0.1] that a point at distance x from the blocker's edge line sees past a
