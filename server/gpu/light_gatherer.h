@@ -116,6 +116,8 @@ class LightGatherer {
   [[nodiscard]] double delivered() const;
   [[nodiscard]] double conserve(double area, double kept) const;
   void weighPart(const solver::GatherShot& shot, std::size_t lit, double front);
+  void weighClipped(const solver::GatherShot& shot, const ClippedPolygon& polygon, const glm::vec3& normal,
+                    std::size_t begin);
   /// Whether this one of those lit, before whose plane the part `front` of the polygon lies, looks for itself. Not
   /// where light passes through surfaces, which rays do not.
   [[nodiscard]] bool isEdge(const solver::GatherShot& shot, std::size_t lit, double front) const;

@@ -189,6 +189,28 @@ void LightGatherer::weighPart(const solver::GatherShot& shot, std::size_t lit, d
   lit_.front[lit] = frontOfShining(shot.fill, front);
 }
 
+/// Receivers of one plane, lit from `begin` on, before which `polygon` is left of what shines.
+void LightGatherer::weighClipped(const solver::GatherShot& shot, const ClippedPolygon& polygon, const glm::vec3& normal,
+                                 std::size_t begin) {
+  planarFormFactors(polygon, normal, lit_.x.data() + begin, lit_.y.data() + begin, lit_.z.data() + begin,
+                    lit_count_ - begin, lit_.form_factor.data() + begin);
+  leanOnOthers([&] {
+    auto& o = others_;
+    planarFormFactors(polygon, normal, o.x.data(), o.y.data(), o.z.data(), o.x.size(), o.form_factor.data());
+  });
+  const double kept = solver::polygonArea(std::span(polygon.corner.data(), polygon.count)) /
+                      solver::polygonArea(std::span(shot.corners.data(), shot.corner_count));
+  parts_.push_back(polygon);
+  for (std::size_t k = begin; k < lit_count_; ++k) {
+    if (isEdge(shot, k, kept)) {
+      addEdge(k);
+    } else {
+      weighPart(shot, k, kept);
+    }
+  }
+  if (edges_.empty() || edges_.back().part + 1 < parts_.size()) parts_.pop_back();
+}
+
 void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers::Group& group) {
   const auto& surface = receivers_->patches().surfaces[group.surface];
   const auto& plane = receivers_->patches().triangles[surface.first_triangle];
@@ -255,25 +277,7 @@ void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers
   }
   if (whole) return;
   weighed_ = lit_count_;
-  if (surface.planar) {
-    planarFormFactors(polygon, plane_normal, lit_.x.data() + begin, lit_.y.data() + begin, lit_.z.data() + begin,
-                      lit_count_ - begin, lit_.form_factor.data() + begin);
-    leanOnOthers([&] {
-      auto& o = others_;
-      planarFormFactors(polygon, plane_normal, o.x.data(), o.y.data(), o.z.data(), o.x.size(), o.form_factor.data());
-    });
-    const double kept =
-        solver::polygonArea(std::span(polygon.corner.data(), polygon.count)) / solver::polygonArea(corners);
-    parts_.push_back(polygon);
-    for (std::size_t k = begin; k < lit_count_; ++k) {
-      if (isEdge(shot, k, kept)) {
-        addEdge(k);
-      } else {
-        weighPart(shot, k, kept);
-      }
-    }
-    if (edges_.empty() || edges_.back().part + 1 < parts_.size()) parts_.pop_back();
-  }
+  if (surface.planar) weighClipped(shot, polygon, plane_normal, begin);
   shareAmongPlaces(begin);
 }
 
