@@ -247,7 +247,9 @@ StepOutcome LinkedSolver::chooseRays() {
   if (by_links_ * by_links_ <= room) return refineBlotches() ? StepOutcome::kRoundDone : exhausted(SolveLimit::kWithin);
   auto [rays, links] = noise();
   const double rays_cost = static_cast<double>(gather_->rays()) * rayCost(), links_cost = samplesCost();
-  if (links_cost <= 0.0) rays += std::exchange(links, 0.0);  // under a sky there may be none
+  // Samples alone lowered nothing: what halves of the rays differ by after some bounces was taken for the links'.
+  const bool in_vain = sampled_alone_ > 0.0 && by_links_ > kSampleGain * sampled_alone_;
+  if (links_cost <= 0.0 || in_vain) rays += std::exchange(links, 0.0);  // under a sky there may be none
   double best = HUGE_VAL, part = 0.0;
   for (int i = 1; i < kParts; ++i) {
     const double for_rays = room * i / kParts, for_links = room - for_rays;
@@ -261,15 +263,14 @@ StepOutcome LinkedSolver::chooseRays() {
   const auto end = gather_->lacksMemory() ? SolveLimit::kLinkMemory : SolveLimit::kRays;
   if (!refined && rays > part * room) {  // no more to be had: links get what they leave, or as good as they are
     const double goal = std::max(room - rays, rays);
-    // What halves of the rays differ by after a bounce may be taken for the links', but no sample makes it less.
-    if (links <= goal || (sampled_alone_ > 0.0 && by_links_ > kSampleGain * sampled_alone_)) return exhausted(end);
+    if (links <= goal) return exhausted(end);
     sampled_alone_ = by_links_;
     sample_goal_ = std::sqrt(goal);
     return StepOutcome::kRoundDone;
   }
-  sampled_alone_ = 0.0;
   if (links > (1.0 - part) * room) sample_goal_ = std::sqrt((1.0 - part) * room);
   if (!refined && sample_goal_ <= 0.0) return exhausted(end);
+  sampled_alone_ = refined ? 0.0 : by_links_;
   return StepOutcome::kRoundDone;
 }
 

@@ -144,6 +144,40 @@ TEST(SolvedScene, LightThatVariesWithinTexelsIsCorrectedAndStated) {
   EXPECT_LT(accuracy.solver.solverRms(), 2.0 * report["error"]["total"].get<double>() + 0.005);
 }
 
+/// A white room with a lamp, a grey one, and a wall between them with a small hole.
+test_scenes::TestScene roomsWithAHole() {
+  constexpr double kHole = 0.02, kLow = 0.5 * (1.0 - kHole), kHigh = 0.5 * (1.0 + kHole);
+  test_scenes::TestScene scene;
+  scene.name = "hole";
+  const auto white = scene.add({"white", glm::dvec3(0.99), {}});
+  const auto grey = scene.add({"grey", glm::dvec3(0.9), {}});
+  const auto shining = scene.add({"shining", glm::dvec3(0.99), glm::dvec3(100.0)});
+  test_scenes::Object rooms{"rooms", {}, {}}, wall{"wall", {}, {}}, lamp{"lamp", {}, {}};
+  const auto faces = test_scenes::allFaces(white);
+  auto both = faces;
+  both[1] = grey;  // towards the other room
+  test_scenes::appendBox(rooms, {0, 0, 0}, {1, 1, 1}, faces, test_scenes::kXMax, true);
+  test_scenes::appendBox(rooms, {1, 0, 0}, {2, 1, 1}, test_scenes::allFaces(grey), test_scenes::kXMin, true);
+  constexpr unsigned kFlat = test_scenes::kYMin | test_scenes::kYMax | test_scenes::kZMin | test_scenes::kZMax;
+  test_scenes::appendBox(wall, {1, 0, 0}, {1, kLow, 1}, both, kFlat);
+  test_scenes::appendBox(wall, {1, kHigh, 0}, {1, 1, 1}, both, kFlat);
+  test_scenes::appendBox(wall, {1, kLow, 0}, {1, kHigh, kLow}, both, kFlat);
+  test_scenes::appendBox(wall, {1, kLow, kHigh}, {1, kHigh, 1}, both, kFlat);
+  test_scenes::appendBox(lamp, {0.4, 0.99, 0.4}, {0.6, 0.99, 0.6}, test_scenes::allFaces(shining),
+                         ~static_cast<unsigned>(test_scenes::kYMin));
+  scene.objects = {rooms, wall, lamp};
+  return scene;
+}
+
+// Rays that hardly ever find the hole make halves differ after many bounces, which more looks of the lamp do not lower.
+TEST(SolvedScene, WhiteRoomsWithAHoleBetweenThemReachTheirError) {
+  nlohmann::json report;
+  const auto lit = solve(roomsWithAHole(), {"--error", "0.02", "--time-limit", "60"}, &report);
+  EXPECT_TRUE(report["reached"].get<bool>());
+  EXPECT_LE(report["error"]["total"].get<double>(), 0.02);
+  EXPECT_FALSE(lit.pages.empty());
+}
+
 // Shooters whose light is signed leave noise below black where hardly any light comes.
 TEST(SolvedScene, NoTexelIsDarkerThanBlack) {
   const auto file = std::filesystem::path(RADIOSITY_SHARED_DIR) / "scenes/godot_living_room_panels.glb";
