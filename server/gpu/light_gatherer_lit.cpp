@@ -227,10 +227,9 @@ void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers
   }
   if (!whole) weighWhole(shot);
   const std::size_t begin = lit_count_;
-  const bool leans = receivers_->isConvex();
+  const bool leans = surface.planar && receivers_->isConvex();
   const auto ball = nearBall(corners, surface, plane.du);
   const auto takeOthers = [&](const auto& others) {
-    if (!leans || !surface.planar) return;
     auto k = addOthers(lit_count_ - others.size(), others.size(), others.size() > 1, plane_normal);
     for (const auto& other : others) {
       others_.x[k] = other.point.x;
@@ -255,7 +254,7 @@ void LightGatherer::findLitGroup(const solver::GatherShot& shot, const Receivers
       lit_.share[lit_count_] = share;
       addLit(receiver, place, normal);
     };
-    forEachPlace(shot, ball, *receivers_, receiver, take, takeOthers);
+    forEachPlace(shot, ball, *receivers_, receiver, take, leans, takeOthers);
   };
   const auto end = group.first + group.count;
   auto block = receivers_->blocks().begin() + static_cast<std::ptrdiff_t>(group.first_block);

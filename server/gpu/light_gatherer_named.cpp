@@ -79,8 +79,8 @@ void LightGatherer::findWanted(const solver::GatherShot& shot, std::span<const s
       }
       if (end - i >= kFewestAsOne && surface.planar && addCorners(shot, i, end)) continue;
       for (auto k = i; k < end; ++k) {
-        forEachPlace(shot, ball, *receivers_, all[k],
-                     [&](const Receivers::Place& place, float /*share*/) { places_.push_back(place.point); });
+        const auto take = [&](const Receivers::Place& place, float /*share*/) { places_.push_back(place.point); };
+        forEachPlace(shot, ball, *receivers_, all[k], take, false, [](const auto& /*others*/) {});
       }
     }
   });

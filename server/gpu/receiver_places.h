@@ -68,19 +68,14 @@ inline std::uint32_t firstRow(const Receivers::Receiver& receiver, const SpotRow
   return (rows.first + (mixed >> 16)) % rows.apart;
 }
 
-/// For who does not ask from where the other half looks.
-struct NoOthers {
-  void operator()(const auto& /*others*/) const {}
-};
-
 /// Where a receiver looks at a polygon, which is near inside a ball: takes each place before the polygon's plane, and
-/// its share of the receiver. After these, where all of them and as many that the other half looks from lie before that
-/// plane, and the receiver has no spots, `takeOthers` gets an array of those. Places stay in registers: through memory
-/// they cost more than all else that is done here.
-template <typename Take, typename TakeOthers = NoOthers>
+/// its share of the receiver. After these, where others are wanted, and all of these and as many that the other half
+/// looks from lie before that plane, and the receiver has no spots, `takeOthers` gets an array of those. Places stay in
+/// registers: through memory they cost more than all else that is done here.
+template <typename Take, typename TakeOthers>
 [[gnu::always_inline]] inline void forEachPlace(const solver::GatherShot& shot, const NearBall& ball,
                                                 const Receivers& receivers, const Receivers::Receiver& receiver,
-                                                const Take& take, const TakeOthers& takeOthers = {}) {
+                                                const Take& take, bool wants_others, const TakeOthers& takeOthers) {
   const auto isBefore = [&](const Receivers::Place& place) {
     return glm::dot(shot.normal, place.point - shot.corners[0]) > kInPlane;
   };
@@ -102,14 +97,17 @@ template <typename Take, typename TakeOthers = NoOthers>
   const auto way = place.point - ball.middle;
   if (glm::dot(way, way) >= ball.radius * ball.radius) {
     offer(place, 1.0F);
+    if (!wants_others) return;
     const std::array others{receivers.place(receiver, 1.0F - jitter)};
     if (isBefore(place) && isBefore(others[0])) takeOthers(others);
     return;
   }
-  const auto at = nearPlace(jitter), other = nearPlace(1.0F - jitter);
+  const auto at = nearPlace(jitter);
   const std::array places{receivers.place(receiver, at), receivers.place(receiver, 1.0F - at)};
-  const std::array others{receivers.place(receiver, other), receivers.place(receiver, 1.0F - other)};
   for (const auto& near : places) offer(near, 0.5F);
+  if (!wants_others) return;
+  const auto other = nearPlace(1.0F - jitter);
+  const std::array others{receivers.place(receiver, other), receivers.place(receiver, 1.0F - other)};
   if (std::ranges::all_of(places, isBefore) && std::ranges::all_of(others, isBefore)) takeOthers(others);
 }
 

@@ -42,8 +42,8 @@ class Gmres {
   /// that step took most of all else and what is left is the level of light. Infinite where no step tells.
   [[nodiscard]] std::array<double, 3> error() const;
   /// Of what is no level of light, what the last affine sweep left: as much again as the last step left of the
-  /// residual. For who finds the level otherwise. Too small, several times at worst, of what one room has more than the
-  /// next.
+  /// residual. For who finds the level otherwise. Too small, ten times now and then, of what one room has more than
+  /// the next.
   [[nodiscard]] std::array<double, 3> errorOfShape() const;
   [[nodiscard]] int sweeps() const { return sweeps_; }
 

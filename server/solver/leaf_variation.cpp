@@ -137,9 +137,9 @@ void LeafVariation::update(const LeafLight& light, double bound) {
       if (count < kEvenPaths) count = static_cast<std::uint16_t>(2 * count);
     sumUp(light);
   }
-  // Of what is within the noise one half is below zero; the other would be stated, and nearly all of it where nothing
-  // is.
-  left_ = found_ > deviation_ ? found_ : 0.0;
+  // Where nothing varies one half of what is found by chance is below zero, and the other would be stated.
+  const bool is_nothing = found_ <= deviation_ && found_ + deviation_ <= bound;
+  left_ = is_nothing ? 0.0 : std::max(0.0, found_);
   noise_ = 0.0;
   giveBack(gain_);
   if (stands_for_ == 1.0 && found_ + deviation_ > bound) correct();

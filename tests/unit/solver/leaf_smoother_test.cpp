@@ -148,7 +148,8 @@ class PlainSmoother {
   PlainSmoother(const Side& side, const std::vector<float>& area, const std::vector<bool>& parted)
       : width_(static_cast<int>(side.width)), height_(static_cast<int>(side.height)), area_(area), parted_(parted) {}
 
-  void smooth(Values& halves) const {
+  void smooth(Values& halves) {
+    raw_ = halves;
     for (const auto& [step, one_sided] : {std::pair{1, false}, {2, false}, {4, false}, {1, true}, {2, true}}) {
       if (one_sided ? !takesEnds(width_, step) && !takesEnds(height_, step) : std::max(width_, height_) <= 2 * step)
         continue;
@@ -206,7 +207,6 @@ class PlainSmoother {
           for (int x = 0; x < width_; ++x) means[h][c].push_back(mean(now[h][c], x, y, step, one_sided));
       }
     }
-    if (raw_[0][0].empty()) raw_ = now;
     std::vector<double> slope(count, 0.0), bend(count, 0.0);
     for (std::size_t v = 0; v < count; ++v) {
       for (std::size_t c = 0; c < 3; ++c) {
@@ -238,7 +238,7 @@ class PlainSmoother {
   int width_, height_;
   const std::vector<float>& area_;
   const std::vector<bool>& parted_;
-  mutable Values raw_;
+  Values raw_;
 };
 
 // Sides of all sizes, narrower than what is averaged too, of which a fifth of the leaves have no area and some are
