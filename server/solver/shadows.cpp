@@ -195,6 +195,11 @@ bool Shadows::changesWithin(std::uint32_t value, float distance) const {
   });
 }
 
+bool Shadows::changesAlong(const glm::vec3& from, const glm::vec3& to) const {
+  const Segment way(from, to, kOfPlace);
+  return std::ranges::any_of(all_, [&](const scene::ChangedBox& box) { return way.mayMeet(box); });
+}
+
 bool Shadows::passesWithin(const glm::vec3& middle, float radius) const {
   return std::ranges::any_of(change_.boxes, [&](const scene::ChangedBox& box) {
     return glm::distance(middle, glm::clamp(middle, box.low, box.high)) <= radius;
@@ -203,7 +208,7 @@ bool Shadows::passesWithin(const glm::vec3& middle, float radius) const {
 
 bool Shadows::isPassed(const Boxes& boxes, const glm::vec4& from, const glm::vec4& to) {
   if (from.w < 0.0F || to.w < 0.0F) return !boxes.each.empty();
-  const Segment way(glm::vec3(from), glm::vec3(to), from.w + to.w);
+  const Segment way(glm::vec3(from), glm::vec3(to), larger(from.w, to.w));  // in between no way is farther from it
   return way.mayMeet(boxes.all) &&
          std::ranges::any_of(boxes.each, [&](const scene::ChangedBox& box) { return way.mayMeet(box); });
 }
@@ -263,7 +268,7 @@ RADIOSITY_CLONES void Shadows::markMet(const Way& way, const glm::vec4& plane, c
   const float ox = way.from.x, oy = way.from.y, oz = way.from.z;
   const float lx = way.low.x, ly = way.low.y, lz = way.low.z, hx = way.high.x, hy = way.high.y, hz = way.high.z;
   const float nx = plane.x, ny = plane.y, nz = plane.z, nd = plane.w;
-  const float spread = way.spread;
+  const float spread = way.spread, wide = way.wide;
   const float *x = balls.x.data() + begin, *y = balls.y.data() + begin, *z = balls.z.data() + begin;
   const float *radius = balls.radius.data() + begin, *reach = balls.reach.data() + begin;
   float* __restrict mark = marks;
@@ -271,7 +276,7 @@ RADIOSITY_CLONES void Shadows::markMet(const Way& way, const glm::vec4& plane, c
   for (std::size_t i = 0; i < count; ++i) {
     const float r = radius[i];
     const float dx = x[i] - ox, dy = y[i] - oy, dz = z[i] - oz;
-    const float s = spread * reach[i] * std::sqrt(dx * dx + dy * dy + dz * dz);
+    const float s = spread * reach[i] * std::sqrt(dx * dx + dy * dy + dz * dz) - wide;
     // At part t of the way one is past the low face where t (d + s) >= low - r - o, and so on.
     const Clip a = clip(dx + s, lx - r - ox), b = clip(s - dx, ox - hx - r), c = clip(dy + s, ly - r - oy);
     const Clip d = clip(s - dy, oy - hy - r), e = clip(dz + s, lz - r - oz), f = clip(s - dz, oz - hz - r);
@@ -298,17 +303,17 @@ void Shadows::markNear(const EdgeBall& edge, Scratch& scratch) const {
 }
 
 /// Tiles that a way around all boxes meets, then those of them that the way to a single box meets, then their leaves.
-/// All from the middle of the points: a way from one of these is nowhere farther from that from the middle than they
-/// are apart, and what it meets of boxes grown by so much is hardly more than what they meet one by one.
+/// All from the middle of the points: a way from one of these is as far from that from the middle as they are apart,
+/// and ever less towards the leaf, so that boxes grow by that.
 void Shadows::find(std::span<const glm::vec3> points, const glm::vec3& normal, float radius, std::uint32_t resolution,
                    Scratch& scratch, std::vector<LinkColumn::ValueRun>& runs) const {
   // A pixel is 2 / N wide at a depth of one; depths are at most distances.
   const float spread = 2.0F * kHalfDiagonal / static_cast<float>(resolution);
   const Ball around = ballAround(points);
   // Pixels are widest where seen from the point that is farthest away.
-  const float reach = radius + around.radius * (1.0F + spread * kMostReach);
+  const float wide = radius + around.radius, reach = wide + around.radius * spread * kMostReach;
   const auto wayTo = [&](const scene::ChangedBox& box) {
-    return Way{around.middle, box.low - reach, box.high + reach, spread};
+    return Way{around.middle, box.low - reach, box.high + reach, spread, wide};
   };
   const glm::vec4 plane(normal, glm::dot(normal, points.front()));
   scratch.tiles.assign(tiles_.size(), kMissed);

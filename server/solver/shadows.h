@@ -33,6 +33,8 @@ class Shadows {
 
   /// Whether something of it may be so near to a leaf, or to a place on it.
   [[nodiscard]] bool changesWithin(std::uint32_t value, float distance) const;
+  /// Whether something of it may be on the way from a place to another.
+  [[nodiscard]] bool changesAlong(const glm::vec3& from, const glm::vec3& to) const;
   /// Whether ways within a ball may pass a box.
   [[nodiscard]] bool passesWithin(const glm::vec3& middle, float radius) const;
   /// Whether some way from a place on a leaf to one within `radius` of a point may pass a box. The second: to one on
@@ -84,6 +86,7 @@ class Shadows {
   struct Way {
     glm::vec3 from, low, high;
     float spread;  ///< the box counts as larger by so much for each unit of the way to it
+    float wide;    ///< and is by this: so far apart ways begin, and there is none of it where they end
   };
   static void markMet(const Way& way, const glm::vec4& plane, const Balls& balls, std::size_t first, std::size_t end,
                       float* marks);
