@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "server/scene/scene.h"
+#include "server/scene/shaft.h"
 #include "server/scene/wide_nodes.h"
 
 namespace radiosity::scene {
@@ -27,6 +28,10 @@ class RayTree {
   /// triangles that do not count. `own`: that the ray starts on, which it does not meet.
   [[nodiscard]] bool nearestHit(const glm::vec3& origin, const glm::vec3& direction, float t_max, RayHit& hit,
                                 std::span<const std::uint32_t> passed = {}, std::uint32_t own = kNone) const;
+
+  /// Which points at the end of a shaft triangles hide from where it begins: 1, or 0, by point. False: more than `most`
+  /// triangles may, and it is not known.
+  [[nodiscard]] bool hide(const Shaft& shaft, const ShaftPoints& points, std::size_t most, std::int32_t* hidden) const;
 
  private:
   struct Block : TriangleLanes {

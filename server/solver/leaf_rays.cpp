@@ -18,8 +18,8 @@ constexpr double kLift = 2e-6;
 constexpr double kLeastSlope = 0.05;
 /// Farther than the unit box is wide.
 constexpr double kFar = 4.0;
-/// So much farther than in double precision a ray in single precision looks.
-constexpr double kFarther = 1.001;
+/// What a ray in single precision is sent to is known to so much (unit box).
+constexpr double kNearEnd = 1e-5;
 /// A ray keeps in mind so many that it went through; then it starts anew from the last of them, so often at most.
 constexpr std::size_t kMostSheets = 64, kMostStarts = 64;
 /// Sheets within this of the last may lie in the same place (scene::RayTree).
@@ -53,8 +53,7 @@ LeafRays::LeafRays(const scene::PatchScene& patches, const std::vector<Side>& si
   std::vector<scene::Bvh::Triangle> triangles(patches.triangles.size());
   for (std::size_t i = 0; i < patches.indices.size(); ++i)
     triangles[i / 3][i % 3] = patches.vertices[patches.indices[i]].position;
-  tree_ = scene::Bvh(std::move(triangles));
-  wide_ = scene::RayTree(tree_);
+  wide_ = scene::RayTree(scene::Bvh(std::move(triangles)));
   std::size_t leaves = 0;
   for (const auto& side : sides) leaves += side.leaf_count;
   side_of_value_.reserve(leaves);
@@ -153,16 +152,18 @@ LeafRays::Place LeafRays::placeOn(std::uint32_t value, const glm::dvec2& at) con
 
 LeafRays::Sight LeafRays::look(const Place& from, const glm::dvec3& direction, double reach) const {
   Sight sight;
+  sight.distance = reach;
   const auto origin = lifted(from);
-  const auto hit = tree_.nearestHit(origin, direction, 0.0, reach);
-  sight.distance = hit ? hit->t : reach;
-  if (!hit) return sight;
-  const auto s = side_of_[patches_.triangle_surface[hit->triangle]][hit->front ? 0 : 1];
+  scene::RayHit hit{};
+  if (!wide_.nearestHit(glm::vec3(origin), glm::vec3(direction), static_cast<float>(reach), hit, {}, from.triangle))
+    return sight;
+  sight.distance = hit.t;
+  const auto s = side_of_[patches_.triangle_surface[hit.triangle]][hit.front ? 0 : 1];
   if (s == scene::kNone) return sight;
-  const auto& frame = patches_.triangles[hit->triangle];
-  sight.end.position = origin + hit->t * direction;
-  sight.end.normal = glm::dvec3(hit->front ? frame.normal : -frame.normal);
-  const auto value = leafAt(sides_[s], texelAt(frame, sight.end.position));
+  const auto& frame = patches_.triangles[hit.triangle];
+  const auto texel = texelAt(frame, origin + hit.t * direction);
+  const auto value = leafAt(sides_[s], texel);
+  sight.end = {positionAt(frame, texel), glm::dvec3(hit.front ? frame.normal : -frame.normal), kNothing, hit.triangle};
   if (!has_stand_in_[value]) sight.end.value = value;
   return sight;
 }
@@ -240,11 +241,6 @@ bool LeafRays::uncover(scene::RayHit& hit, const glm::dvec3& origin, const glm::
   return seen.triangle != std::exchange(hit, seen).triangle;
 }
 
-bool LeafRays::mayMeet(const Place& from, const glm::dvec3& direction, double reach) const {
-  scene::RayHit hit{};
-  return wide_.nearestHit(glm::vec3(lifted(from)), glm::vec3(direction), static_cast<float>(kFarther * reach), hit);
-}
-
 LeafRays::Sight LeafRays::look(const Place& from, const glm::dvec3& direction) const {
   auto sight = look(from, direction, kFar);
   if (sight.distance >= kFar) sight.end.value = direction.y >= 0.0 ? kSkyAbove : kSkyBelow;
@@ -253,9 +249,13 @@ LeafRays::Sight LeafRays::look(const Place& from, const glm::dvec3& direction) c
 
 bool LeafRays::isOpen(const Place& from, const glm::dvec3& to) const {
   const glm::dvec3 origin = lifted(from), way = to - origin;
-  const double length = glm::length(way);
-  return length > 0.0 && !tree_.meets(origin, way / length, 0.0, length - kLift);
+  const double part = 1.0 - kNearEnd / glm::length(way);
+  scene::RayHit hit{};
+  return part > 0.0 &&
+         !wide_.nearestHit(glm::vec3(origin), glm::vec3(way), static_cast<float>(part), hit, {}, from.triangle);
 }
+
+glm::vec3 LeafRays::startOf(const Place& place) { return glm::vec3(lifted(place)); }
 
 std::optional<LeafRays::Place> LeafRays::endOn(std::uint32_t value, const Place& from,
                                                const glm::dvec3& direction) const {

@@ -49,19 +49,18 @@ class LeafRays {
   [[nodiscard]] bool addTo(scene::Bounds& box, std::uint32_t value) const;
   /// The place at (u, v) in [0, 1)^2, uniform over what is left of a leaf that has area.
   [[nodiscard]] Place placeOn(std::uint32_t value, const glm::dvec2& at) const;
-  /// What lies that way within `reach` (unit box); `value` is kNothing where nothing does, and where it is no leaf.
+  /// What lies that way within `reach` (unit box), in single precision; `value` is kNothing where nothing does, and
+  /// where it is no leaf.
   struct Sight {
     Place end;
     double distance = 0.0;
   };
   [[nodiscard]] Sight look(const Place& from, const glm::dvec3& direction, double reach) const;
-  /// Whether look() may find something within `reach`: in single precision, a third of what that costs.
-  [[nodiscard]] bool mayMeet(const Place& from, const glm::dvec3& direction, double reach) const;
   /// look() without bounds; `value` may be one of the sky's.
   [[nodiscard]] Sight look(const Place& from, const glm::dvec3& direction) const;
   /// The leaf value that is seen that way, kNothing or one of the sky's. Where a leaf has no area of its own (buried
   /// right behind another, or so little of it that its neighbours took it) it is theirs. What one can see through stops
-  /// the ray or not, by chance from `key`. In single precision: a third of what look() costs.
+  /// the ray or not, by chance from `key`.
   /// `end`: where the ray ends, and on which leaf, be it that another's value is told; kNothing: on an unlit side. As
   /// it was where it ends in the sky.
   [[nodiscard]] std::uint32_t see(const Place& from, const glm::dvec3& direction, std::uint64_t key, Place& end) const;
@@ -71,7 +70,15 @@ class LeafRays {
   [[nodiscard]] std::uint32_t standInOf(std::uint32_t value) const {
     return has_stand_in_[value] ? foundStandIn(value) : value;
   }
+  /// Whether nothing lies between, but for what is nearer than a hundred-thousandth to `to`.
   [[nodiscard]] bool isOpen(const Place& from, const glm::dvec3& to) const;
+  /// Where ways from a place begin: a little before it.
+  [[nodiscard]] static glm::vec3 startOf(const Place& place);
+  /// scene::RayTree::hide().
+  [[nodiscard]] bool hide(const scene::Shaft& shaft, const scene::ShaftPoints& points, std::size_t most,
+                          std::int32_t* hidden) const {
+    return wide_.hide(shaft, points, most, hidden);
+  }
   /// Where a ray of look() that ends on a leaf ends, without looking what lies before, to a few millionths. Nothing:
   /// the triangles of its surface have not all the same normal, or it is met at too flat an angle.
   [[nodiscard]] std::optional<Place> endOn(std::uint32_t value, const Place& from, const glm::dvec3& direction) const;
@@ -90,7 +97,6 @@ class LeafRays {
   /// The leaf of a side that a texel lies on, or the nearest, by value.
   [[nodiscard]] static std::uint32_t leafAt(const Side& side, const glm::dvec2& texel);
 
-  scene::Bvh tree_;
   scene::RayTree wide_;
   std::vector<std::array<std::uint32_t, 2>> side_of_;  ///< by surface
   std::vector<std::uint32_t> side_of_value_;

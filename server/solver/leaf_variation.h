@@ -42,12 +42,18 @@ class LeafVariation {
   LeafVariation(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed,
                 std::shared_ptr<const LeafRays> rays = nullptr);
 
+  /// What the paths of the scene before tell of those of a leaf.
+  enum class Tells : std::uint8_t {
+    kNothing,  ///< it is new, moved or altered
+    kByWay,    ///< something changed within nearest() of it: of those alone whose ways to there do not pass it
+    kAll,      ///< nothing did: where no leaf was near, none is
+  };
   /// After an edit of geometry, before the first update(): what the paths of the scene before have found.
-  /// `value_before`: by leaf value, what it was there, or kNone. `clear`: by leaf value, whether it is one of them, and
-  /// nothing within nearest() of it changed: where no leaf was near, none is. All else is traced anew, so that paths
+  /// `value_before`: by leaf value, what it was there, or kNone. What they do not tell is traced anew, so that paths
   /// are the same as without it but for how many there are. `change`, where the same `lights` were there before, in the
-  /// same places: paths of which no way passes it are taken over, unless other lights shine by then.
-  void inherit(const LeafVariation& former, std::span<const std::uint32_t> value_before, const std::vector<bool>& clear,
+  /// same places: paths of which no way passes it are taken over, unless other lights shine by then. Without it
+  /// kByWay is kNothing.
+  void inherit(const LeafVariation& former, std::span<const std::uint32_t> value_before, std::span<const Tells> tells,
                const Shadows* change = nullptr, std::span<const LightPolygon> lights = {});
   /// Farther from a leaf than this (unit box) nothing is near to it.
   [[nodiscard]] double nearest() const;
@@ -137,18 +143,20 @@ class LeafVariation {
   void followLights(const std::array<Place, 2>& places, std::uint64_t key, const LeafLight& light, Path& path) const;
   void takeOtherLights(const LeafLight& light, std::uint64_t shining);
   void followOtherLights(const LeafLight& light, std::size_t half, std::size_t first);
-  /// Of the scene before: a path that there was.
+  /// Of the scene before: a path that there was, or that there may be by now.
   struct Known {
     std::uint64_t number = 0;           ///< numberOf()
-    std::uint32_t kept = scene::kNone;  ///< into kept_, where it is what it was
+    std::uint32_t kept = scene::kNone;  ///< into kept_, where it is what it was; otherwise there may be none any more
   };
   /// Whether the scene before tells whether there is such a path.
   [[nodiscard]] bool isKnown(std::uint32_t receiver, std::uint32_t index) const {
     return !known_.empty() && index < known_[receiver];
   }
-  [[nodiscard]] const Known* findKnown(std::uint32_t receiver, std::uint32_t index, std::size_t half) const;
+  using KnownOnes = std::span<const Known>;
+  [[nodiscard]] KnownOnes knownFrom(std::uint32_t receiver, std::size_t half) const;
+  void askWays(std::size_t half, std::span<const Tells> tells, const Shadows& change);
   void keepPaths(const LeafVariation& former, std::size_t half, std::span<const std::uint32_t> value_after,
-                 const std::vector<bool>& clear, const Shadows* change, std::span<const LightPolygon> lights);
+                 std::span<const Tells> tells, const Shadows* change, std::span<const LightPolygon> lights);
   [[nodiscard]] bool passesNothing(const Path& path, std::size_t half, const Shadows& change,
                                    std::span<const LightPolygon> lights) const;
   void forgetFormer();

@@ -11,8 +11,7 @@
 namespace radiosity::solver {
 
 void LeafVariation::inherit(const LeafVariation& former, std::span<const std::uint32_t> value_before,
-                            const std::vector<bool>& clear, const Shadows* change,
-                            std::span<const LightPolygon> lights) {
+                            std::span<const Tells> tells, const Shadows* change, std::span<const LightPolygon> lights) {
   if (!former.is_traced_ || stands_for_ != 1.0 || former.stands_for_ != 1.0) return;
   if (former.count_.empty() || !former.wanted_.empty()) return;  // what is still to be traced is not known
   const auto fewest = *std::ranges::min_element(former.count_);
@@ -34,16 +33,34 @@ void LeafVariation::inherit(const LeafVariation& former, std::span<const std::ui
     const auto value = receivers_[r], before = value_before[value];
     if (before >= count_before.size() || count_before[before] == 0) continue;
     count_[r] = count_before[before];
-    if (clear[value]) known_[value] = count_before[before];
+    if (tells[value] == Tells::kAll || (tells[value] == Tells::kByWay && change != nullptr))
+      known_[value] = count_before[before];
   }
   kept_for_ = former.traced_for_;
-  inBothHalves([&](std::size_t half) { keepPaths(former, half, value_after, clear, change, lights); });
+  inBothHalves([&](std::size_t half) { keepPaths(former, half, value_after, tells, change, lights); });
 }
 
-/// Those of receivers that are clear, in the order of their numbers.
+/// Of what something changed near to: ways that pass it may meet other leaves than they did.
+void LeafVariation::askWays(std::size_t half, std::span<const Tells> tells, const Shadows& change) {
+  for (const auto receiver : receivers_) {
+    if (tells[receiver] != Tells::kByWay) continue;
+    for (std::uint32_t k = 0; k < known_[receiver]; ++k) {
+      const auto way = firstWay(receiver, keyOf(receiver, k, half));
+      if (change.changesAlong(glm::vec3(way.from.position), glm::vec3(way.from.position + nearest() * way.direction)))
+        there_[half].push_back({numberOf(receiver, k)});
+    }
+  }
+}
+
+/// Those of receivers that are known, in the order of their numbers.
 void LeafVariation::keepPaths(const LeafVariation& former, std::size_t half, std::span<const std::uint32_t> value_after,
-                              const std::vector<bool>& clear, const Shadows* change,
+                              std::span<const Tells> tells, const Shadows* change,
                               std::span<const LightPolygon> lights) {
+  if (change != nullptr) askWays(half, tells, *change);
+  const auto asked = there_[half].size();
+  const auto isAsked = [&](std::uint64_t number) {
+    return std::ranges::binary_search(KnownOnes(there_[half]).first(asked), number, {}, &Known::number);
+  };
   const auto after = [&](std::uint32_t value) {
     return value < value_after.size() ? value_after[value] : scene::kNone;
   };
@@ -68,8 +85,9 @@ void LeafVariation::keepPaths(const LeafVariation& former, std::size_t half, std
   };
   for (auto path : former.paths_[half]) {
     const auto receiver = after(path.receiver);
-    if (receiver == scene::kNone || !clear[receiver]) continue;
-    Known known{numberOf(receiver, path.index), scene::kNone};
+    if (receiver == scene::kNone || known_[receiver] == 0) continue;
+    Known known{numberOf(receiver, path.index)};
+    if (tells[receiver] == Tells::kByWay && isAsked(known.number)) continue;
     path.receiver = receiver;
     if (change != nullptr && isWhatItWas(path)) {
       known.kept = static_cast<std::uint32_t>(kept_[half].size());
@@ -96,12 +114,11 @@ bool LeafVariation::passesNothing(const Path& path, std::size_t half, const Shad
   return true;
 }
 
-/// Nothing: no leaf is near that way.
-const LeafVariation::Known* LeafVariation::findKnown(std::uint32_t receiver, std::uint32_t index,
-                                                     std::size_t half) const {
-  const auto number = numberOf(receiver, index);
-  const auto found = std::ranges::lower_bound(there_[half], number, {}, &Known::number);
-  return found != there_[half].end() && found->number == number ? &*found : nullptr;
+/// Of this receiver and those after it.
+LeafVariation::KnownOnes LeafVariation::knownFrom(std::uint32_t receiver, std::size_t half) const {
+  const KnownOnes all(there_[half]);
+  const auto first = std::ranges::lower_bound(all, numberOf(receiver, 0), {}, &Known::number);
+  return all.subspan(static_cast<std::size_t>(first - all.begin()));
 }
 
 void LeafVariation::forgetFormer() {

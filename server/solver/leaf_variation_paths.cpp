@@ -157,7 +157,6 @@ LeafVariation::Way LeafVariation::firstWay(std::uint32_t receiver, std::uint64_t
 /// Where a path passes the leaf near by, and the other place of that. False: no leaf is near that way.
 bool LeafVariation::findPlaces(std::uint32_t receiver, std::uint64_t key, std::array<Place, 2>& places) const {
   const auto way = firstWay(receiver, key);
-  if (!rays_->mayMeet(way.from, way.direction, nearest())) return false;
   const auto sight = rays_->look(way.from, way.direction, nearest());
   if (!isNear(sight)) return false;
   places = {sight.end, rays_->placeOn(sight.end.value, way.at)};
@@ -166,12 +165,13 @@ bool LeafVariation::findPlaces(std::uint32_t receiver, std::uint64_t key, std::a
 
 void LeafVariation::follow(const Task& task, std::size_t half, const LeafLight& light, std::vector<Path>& paths) const {
   std::array<Place, 2> places;
+  auto known = knownFrom(task.receiver, half);
   for (auto k = task.first; k < task.end; ++k) {
     if (isKnown(task.receiver, k)) {
-      const auto* known = findKnown(task.receiver, k, half);
-      if (known == nullptr) continue;
-      if (known->kept != scene::kNone) {
-        paths.push_back(kept_[half][known->kept]);
+      while (!known.empty() && known.front().number < numberOf(task.receiver, k)) known = known.subspan(1);
+      if (known.empty() || known.front().number != numberOf(task.receiver, k)) continue;  // no leaf is near that way
+      if (known.front().kept != scene::kNone) {
+        paths.push_back(kept_[half][known.front().kept]);
         continue;
       }
     }

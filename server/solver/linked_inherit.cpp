@@ -203,7 +203,7 @@ void LinkedSolver::inheritVariation(const LinkedSolver& former, const Renumberin
   const auto reach = static_cast<float>(std::max(next_variation_->nearest(), former.variation_->nearest()));
   const auto& change = shadows_->change();
   std::vector<std::uint32_t> value_before(change.altered.size(), scene::kNone);
-  std::vector<bool> clear(change.altered.size(), false);
+  std::vector<LeafVariation::Tells> tells(change.altered.size(), LeafVariation::Tells::kNothing);
   for (std::uint32_t s = 0; s < former.sides_.size(); ++s) {
     if (numbers.unmoved_after[s] == scene::kNone) continue;
     const Side &side = sides_[numbers.unmoved_after[s]], &before = former.sides_[s];
@@ -211,14 +211,15 @@ void LinkedSolver::inheritVariation(const LinkedSolver& former, const Renumberin
       const auto value = side.first_value + leaf;
       if (change.altered[value]) continue;
       value_before[value] = before.first_value + leaf;
-      clear[value] = !shadows_->changesWithin(value, reach);
+      const bool is_near = shadows_->changesWithin(value, reach);
+      tells[value] = is_near ? LeafVariation::Tells::kByWay : LeafVariation::Tells::kAll;
     }
   }
   // Lamps that moved come after those that did not.
   const bool same_lights = std::ranges::equal(former.lights_, lights_, [](const auto& a, const auto& b) {
     return a.key == b.key && a.corners == b.corners && a.corner_count == b.corner_count;
   });
-  next_variation_->inherit(*former.variation_, value_before, clear, same_lights ? shadows_.get() : nullptr, lights_);
+  next_variation_->inherit(*former.variation_, value_before, tells, same_lights ? shadows_.get() : nullptr, lights_);
 }
 
 /// Of the matrix: rows of nodes that are what they were, and columns whose links went over as they are.

@@ -16,9 +16,11 @@ class MovedScreenTest : public testing::Test {
  protected:
   static constexpr std::uint32_t kLeaves = 12;
   static constexpr std::size_t kWalls = 6;
+  using Tells = LeafVariation::Tells;
   static constexpr double kAlways = -1.0;  ///< below any error: what varies is corrected even where it may be chance
 
-  MovedScreenTest() : before_(makeScene(-0.02F)), after_(makeScene(0.02F)), sides_(makeSides(*after_.patches)) {
+  explicit MovedScreenTest(float bottom = -0.05F)
+      : before_(makeScene(-0.02F, bottom)), after_(makeScene(0.02F, bottom)), sides_(makeSides(*after_.patches)) {
     const std::size_t values = sides_.back().first_value + sides_.back().leaf_count;
     reflectance_.assign(values, glm::vec3(0.8F));
     emission_.assign(values, glm::vec3(0.0F));
@@ -26,7 +28,7 @@ class MovedScreenTest : public testing::Test {
       irradiance_.emplace_back(1.0F + 0.01F * static_cast<float>(value * value % 13), 1.0F, 1.0F);
     change_.altered.assign(values, false);
     for (auto value = sides_[kWalls].first_value; value < values; ++value) change_.altered[value] = true;
-    for (const float x : {-0.02F, 0.02F}) change_.boxes.push_back({{x, -0.05F, -0.05F}, {x, 0.05F, 0.05F}});
+    for (const float x : {-0.02F, 0.02F}) change_.boxes.push_back({{x, bottom, -0.05F}, {x, bottom + 0.1F, 0.05F}});
     change_.came = {change_.boxes.back()};
     same_.assign(values, scene::kNone);
     for (std::uint32_t value = 0; value < values; ++value)
@@ -34,9 +36,9 @@ class MovedScreenTest : public testing::Test {
     lamps_.push_back(makeLamp({0.38F, -0.3F, 0.38F}, 1));
   }
 
-  static test::QuadScene makeScene(float x) {
+  static test::QuadScene makeScene(float x, float bottom) {
     auto quads = test::cubeQuads(kLeaves, {}, {0.5F, 0.5F, 0.5F, 0.5F, 0.5F, 0.5F});
-    quads.push_back({{x, -0.05F, -0.05F}, {0.0F, 0.1F, 0.0F}, {0.0F, 0.0F, 0.1F}});
+    quads.push_back({{x, bottom, -0.05F}, {0.0F, 0.1F, 0.0F}, {0.0F, 0.0F, 0.1F}});
     quads.back().width = quads.back().height = 2;
     return test::makeQuadScene(quads);
   }
@@ -56,11 +58,16 @@ class MovedScreenTest : public testing::Test {
   /// Whether what was taken over by this change is what is found anew by as many paths.
   [[nodiscard]] bool isFoundAnew(const LeafVariation& former, const Shadows* change,
                                  std::span<const LightPolygon> lights) const {
-    std::vector<bool> clear;
-    for (const auto before : same_) clear.push_back(before != scene::kNone);
+    const Shadows whole(*after_.patches, sides_, change_);
+    const auto reach = static_cast<float>(former.nearest());
+    std::vector<Tells> tells(same_.size(), Tells::kNothing);
+    for (const auto value : same_) {
+      if (value == scene::kNone) continue;
+      tells[value] = whole.changesWithin(value, reach) ? Tells::kByWay : Tells::kAll;
+    }
     LeafVariation anew(*after_.patches, sides_, 1), kept(*after_.patches, sides_, 1);
-    anew.inherit(former, same_, std::vector<bool>(same_.size(), false));
-    kept.inherit(former, same_, clear, change, lights);
+    anew.inherit(former, same_, std::vector(same_.size(), Tells::kNothing));
+    kept.inherit(former, same_, tells, change, lights);
     anew.update(light(), kAlways);
     kept.update(light(), kAlways);
     EXPECT_TRUE(anew.corrects() && kept.corrects());
@@ -93,6 +100,28 @@ TEST_F(MovedScreenTest, PathsThatPassNothingThatChangedAreKeptAndOthersAreNot) {
   const auto lamps = std::exchange(lamps_, {makeLamp({-0.4F, -0.2F, -0.4F}, lamps_[0].key)});
   EXPECT_TRUE(isFoundAnew(former, nullptr, lamps_));
   EXPECT_FALSE(isFoundAnew(former, &change, lamps));
+}
+
+/// The same right above the floor: some of its paths, and of the walls', met the screen, or meet it now.
+class ScreenNearTheFloorTest : public MovedScreenTest {
+ protected:
+  ScreenNearTheFloorTest() : MovedScreenTest(-0.48F) {}
+};
+
+TEST_F(ScreenNearTheFloorTest, PathsWhoseWaysPassNothingThatChangedAreKeptAndOthersAreNot) {
+  LeafVariation former(*before_.patches, sides_, 1);
+  former.update(light(), kAlways);
+  for (int round = 0; round < 3 && former.refine(); ++round) former.update(light(), kAlways);
+  ASSERT_TRUE(former.corrects());
+  const Shadows change(*after_.patches, sides_, change_);
+  const auto reach = static_cast<float>(former.nearest());
+  ASSERT_TRUE(std::ranges::any_of(
+      same_, [&](std::uint32_t value) { return value != scene::kNone && change.changesWithin(value, reach); }));
+  EXPECT_TRUE(isFoundAnew(former, &change, lamps_));
+  EXPECT_TRUE(isFoundAnew(former, nullptr, lamps_));
+  // Were the ways not asked, paths that the screen has come to stand in would be missing.
+  const Shadows nothing(*after_.patches, sides_, {{}, {}, std::vector<bool>(same_.size(), false)});
+  EXPECT_FALSE(isFoundAnew(former, &nothing, lamps_));
 }
 
 TEST_F(MovedScreenTest, WhereOtherLampsShineByThenAllIsFoundAnew) {

@@ -181,7 +181,7 @@ TEST_F(LeafVariationTest, PathsThatWereAddedWhileALampWasOffSeeItWhenItIsOnAgain
   std::vector<std::uint32_t> same(1 + kLooks);
   for (std::uint32_t value = 0; value < same.size(); ++value) same[value] = value;
   LeafVariation anew(*scene_.patches, sides_, 1);
-  anew.inherit(variation, same, std::vector<bool>(same.size(), false));
+  anew.inherit(variation, same, std::vector(same.size(), LeafVariation::Tells::kNothing));
   anew.update(light(), 0.0);
   ASSERT_TRUE(anew.corrects());
   for (std::size_t half = 0; half < 2; ++half) {
@@ -198,7 +198,8 @@ TEST_F(LeafVariationTest, AfterAnEditWhatIsClearOfItKeepsWhatItsPathsFound) {
   for (std::uint32_t value = 0; value < same.size(); ++value) same[value] = value;
   for (const bool clear : {true, false}) {
     LeafVariation next(*scene_.patches, sides_, 1);
-    next.inherit(former, same, std::vector<bool>(same.size(), clear));
+    next.inherit(former, same,
+                 std::vector(same.size(), clear ? LeafVariation::Tells::kAll : LeafVariation::Tells::kNothing));
     next.update(light(), 0.0);
     EXPECT_EQ(next.left(), former.left());
     EXPECT_EQ(next.noise(), former.noise());
@@ -217,7 +218,8 @@ TEST_F(LeafVariationTest, AfterAnEditWhatIsClearOfItKeepsWhatItsPathsFound) {
   ASSERT_FALSE(alone.corrects());
   for (const bool clear : {true, false}) {
     LeafVariation next(*scene_.patches, sides_, 1);
-    next.inherit(alone, same, std::vector<bool>(same.size(), clear));
+    next.inherit(alone, same,
+                 std::vector(same.size(), clear ? LeafVariation::Tells::kAll : LeafVariation::Tells::kNothing));
     next.update(light(), 0.0);
     EXPECT_EQ(next.corrects(), !clear);
   }
