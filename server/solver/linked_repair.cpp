@@ -24,13 +24,19 @@ constexpr double kLittleLost = 0.01, kMostPresumed = 2e-4;
 /// Repairs of a slice before it is known how long they take.
 constexpr std::size_t kMostAtOnce = 1024;
 
-/// Adds to sums of links times points what is there already, the mean of so many points.
-void addEarlierLooks(const LinkColumn& column, std::uint32_t points, const LinkColumn::ValueRun& run,
+/// Adds to sums of links times points, over so many of them, what is there already, the mean of so many others, and
+/// makes means of all. Of leaves that looked for themselves (ascending) what is there stays.
+void addEarlierLooks(const LinkColumn& column, std::uint32_t earlier, std::uint32_t points,
+                     const LinkColumn::ValueRun& run, std::span<const std::uint32_t> by_themselves,
                      std::span<float> sums, std::vector<float>& links) {
   links.assign(run.count, 0.0F);
-  if (!column.decode(run.first, links)) return;
-  const auto weight = static_cast<float>(points / column.gain());
-  for (std::uint32_t i = 0; i < run.count; ++i) sums[i] += weight * links[i];
+  (void)column.decode(run.first, links);
+  for (auto& link : links) link /= static_cast<float>(column.gain());
+  const float weight = 1.0F / static_cast<float>(earlier + points);
+  for (std::uint32_t i = 0; i < run.count; ++i) sums[i] = weight * (sums[i] + static_cast<float>(earlier) * links[i]);
+  for (auto leaf = std::ranges::lower_bound(by_themselves, run.first);
+       leaf != by_themselves.end() && *leaf < run.first + run.count; ++leaf)
+    sums[*leaf - run.first] = links[*leaf - run.first];
 }
 
 /// Of the corners of a polygon about their middle.
@@ -55,12 +61,13 @@ struct LinkedSolver::RepairBatch {
     bool first, last;
   };
   std::vector<Sample> gathered, scattered;
-  std::vector<float> sum;     ///< by leaf value: of the repair on its way, links times points
-  std::uint32_t points = 0;   ///< with those that looked before
-  LinkColumn::Totals totals;  ///< times points
-  bool open = false;          ///< so much is lost that only the sum of all links tells what arrives
-  std::vector<Repair> anew;   ///< whole, since they are open now
-  std::vector<Repair> rough;  ///< of lights whose other points will look later
+  std::vector<float> sum;                      ///< by leaf value: of the repair on its way, links times points
+  std::uint32_t points = 0;                    ///< with those that looked before
+  LinkColumn::Totals totals;                   ///< times points
+  bool open = false;                           ///< so much is lost that only the sum of all links tells what arrives
+  std::vector<Repair> anew;                    ///< whole, since they are open now
+  std::vector<Repair> rough;                   ///< of lights whose other points will look later
+  std::vector<std::uint32_t> leaves_of_rough;  ///< into `leaves`
 };
 
 /// Leaves in repairs_ what is needed, and makes room for what it may bring.
@@ -235,6 +242,7 @@ Result<void> LinkedSolver::repairSlice() {
   const auto done = transport_.measure(shots, take);
   if (!done) return tl::unexpected<Error>(done.error());
   counters_ += *done;
+  weighRough(batch);
   std::uint32_t shots_taken = 0;
   for (const auto& repair : batch.repairs) shots_taken += shotsOf(repair);
   repaired_ += batch.repairs.size();
@@ -253,6 +261,22 @@ Result<void> LinkedSolver::repairSlice() {
     earlier_shadows_.reset();
   }
   return {};
+}
+
+/// Lights of which some points have looked, once both halves have: the first may have in the slice before.
+void LinkedSolver::weighRough(RepairBatch& batch) {
+  for (std::size_t i = 0; i < batch.rough.size(); ++i) {
+    auto& second = batch.rough[i];
+    const auto isFirst = [&](const Repair& other) {
+      return other.shooter == second.shooter && other.half == 0 && other.looked == second.looked;
+    };
+    for (const auto among : {std::span(batch.rough), std::span(repairs_).subspan(due_)}) {
+      const auto first = std::ranges::find_if(among, isFirst);
+      if (second.half == 0 || first == among.end()) continue;
+      lookFromLeaves({&*first, &second}, batch.leaves[batch.leaves_of_rough[i]], batch.sum);
+      break;
+    }
+  }
 }
 
 /// One sample, whole or for some leaves; the last of a column puts them in the place of what was there.
@@ -300,8 +324,11 @@ void LinkedSolver::replacePart(RepairBatch& repairs, std::uint32_t index) {
   std::vector<float> before;
   for (const auto& run : leaves) {
     const auto sum = std::span(repairs.sum).subspan(run.first, run.count);
-    if (repair.looked > 0) addEarlierLooks(column, repair.looked, run, sum, before);
-    for (auto& value : sum) value *= static_cast<float>(part);
+    if (repair.looked > 0) {
+      addEarlierLooks(column, repair.looked, repairs.points - repair.looked, run, repair.by_themselves, sum, before);
+    } else {
+      for (auto& value : sum) value *= static_cast<float>(part);
+    }
   }
   auto& found = repairs.totals;
   if (repair.past_losses) found.open_looks.bits |= column.openLooks().bits;
@@ -319,7 +346,7 @@ void LinkedSolver::replacePart(RepairBatch& repairs, std::uint32_t index) {
     repairs.rough.push_back(repair);
     repairs.rough.back().looked = repairs.points;
     repairs.rough.back().found = found;
-    repairs.rough.back().noise = noiseBetweenHalves(repair, leaves);
+    repairs.leaves_of_rough.push_back(index);
   } else {
     LinkColumn::Totals totals{part * found.due, part * found.escaped, part * found.absorbed, found.open_looks, 0.0};
     if (repair.past_losses) {

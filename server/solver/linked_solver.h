@@ -106,17 +106,20 @@ class LinkedSolver final : public Solver {
     bool overtaken = false;     ///< nor were they taken again after the edit before
     double reach = HUGE_VAL;    ///< what the old links are wrong by (ChangeReach); infinite: cannot wait
     // Of a light, of which some points look first and stand for all of them:
-    std::uint32_t first_shots = 2;  ///< those that shall have looked next
+    std::uint32_t first_shots = 0;  ///< those that shall have looked next; 0: as many as look first
     std::uint32_t looked = 0;       ///< points that have
     LinkColumn::Totals found = {};  ///< by them, times points
-    double noise = 0.0;             ///< square of the error of irradiance times area, where both halves have as many
-    bool past_losses = false;       ///< its looks see where the change is alone, whatever is lost elsewhere
+    double noise = 0.0;             ///< square of the error of irradiance times area, where both halves have as many;
+                                    ///< what all points would leave of it counts by what share of them has looked
+    std::vector<std::uint32_t> by_themselves = {};  ///< leaves that looked at it so, by ascending value
+    bool past_losses = false;  ///< its looks see where the change is alone, whatever is lost elsewhere
 
     /// As if none had looked.
     void lookAnew() {
       looked = 0;
       found = {};
       past_losses = false;
+      by_themselves.clear();
     }
   };
   /// Where the sides of the scene before are now.
@@ -130,6 +133,11 @@ class LinkedSolver final : public Solver {
     std::vector<std::uint32_t> shooter_before;      ///< by shooter; it may be shorter
   };
   struct RepairBatch;
+  /// A leaf that looks at a light for itself.
+  struct LeafLook {
+    std::uint32_t value;
+    std::array<std::optional<float>, 2> link;  ///< by half, where it can
+  };
 
   /// All but its light.
   LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, Transport& transport, const SolverSettings& settings);
@@ -163,7 +171,17 @@ class LinkedSolver final : public Solver {
     std::uint32_t first, end;
   };
   [[nodiscard]] ShotRange shotsOfLight(const Repair& repair) const;
-  [[nodiscard]] double noiseBetweenHalves(const Repair& repair, std::span<const LinkColumn::ValueRun> leaves) const;
+  [[nodiscard]] std::vector<float> noiseOfLeaves(std::uint32_t shooter,
+                                                 std::span<const LinkColumn::ValueRun> leaves) const;
+  void weighRough(RepairBatch& batch);
+  [[nodiscard]] bool mayLookFromLeaves() const;
+  void lookFromLeaves(std::array<Repair*, 2> halves, std::span<const LinkColumn::ValueRun> leaves,
+                      std::span<float> room);
+  [[nodiscard]] std::vector<LeafLook> chooseUnsure(std::span<const LinkColumn::ValueRun> leaves,
+                                                   std::span<const float> noise, double wanted,
+                                                   std::span<float> room) const;
+  void takeLeafLooks(Repair& repair, std::span<const LinkColumn::ValueRun> leaves, std::span<const LeafLook> looks,
+                     std::span<float> room);
   [[nodiscard]] bool lightsAreTooRough();
   [[nodiscard]] Result<StepOutcome> catchUp();
   [[nodiscard]] std::uint32_t shotsOf(const Repair& repair) const;
