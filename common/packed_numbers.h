@@ -37,7 +37,11 @@ class PackedNumbers {
     return number;
   }
   void set(std::size_t i, std::uint32_t number) {
-    for (std::size_t k = 0; k < width_; ++k) bytes_[i * width_ + k] = static_cast<std::uint8_t>(number >> 8 * k);
+    auto* byte = bytes_.data() + i * width_;
+    byte[0] = static_cast<std::uint8_t>(number);
+    byte[1] = static_cast<std::uint8_t>(number >> 8);
+    if (width_ > 2) byte[2] = static_cast<std::uint8_t>(number >> 16);
+    if (width_ > 3) byte[3] = static_cast<std::uint8_t>(number >> 24);
   }
 
   /// Some in a row, read faster, while none is set.

@@ -393,27 +393,49 @@ void LeafSights::forgetStandIns(const LeafSights& former, std::vector<std::uint3
 
 void LeafSights::inheritHalf(std::size_t half, const Inheritance& from) {
   const auto& former = from.former;
-  const auto& change = from.change.change();
   widen(half, former.steps_[half].size());
+  FirstMet met;
   std::size_t first_ray = 0;
   for (std::uint32_t value = 0; value < leaf_count_; first_ray += count_[value++]) {
     const auto before = from.value_before[value];
     if (count_[value] == 0 || before == scene::kNone || former.count_[before] == 0) continue;
-    const auto draw = draws(value, rays_->sideOf(value), half);
-    const auto look = from.change.lookFrom(value);
     const auto old = former.ends(half, former.firstOf(before), std::min(former.count_[before], count_[value]));
-    for (std::uint32_t k = 0; k < old.size(); ++k) {
-      if (old[k] == former.seen_[half].most()) continue;
-      const bool goes_on = old[k] >= former.endCount();
-      const auto first = from.value_after[goes_on ? former.steps_[half][old[k] - former.endCount()].by : old[k]];
-      if (first == kUntraced) continue;  // it saw what is gone, or moved
-      // What is gone had hidden nothing from a ray whose end is known, and may be what another ended on.
-      const bool is_known = first < leaf_count_ || first >= skyAbove();
-      const bool may_pass = first >= leaf_count_ || from.stands_in[first] || look.mayHide(first);
-      if (may_pass && passes(is_known ? change.came : change.boxes, value, draw(k))) continue;
-      const auto end = goes_on ? inheritStep(half, old[k], from) : first;
-      if (end != kUntraced) seen_[half].set(first_ray + k, end);
-    }
+    findFirstMet(value, half, old, from, met);
+    inheritLeaf(value, half, first_ray, old, from, met);
+  }
+}
+
+void LeafSights::findFirstMet(std::uint32_t value, std::size_t half, const PackedNumbers::Run& old,
+                              const Inheritance& from, FirstMet& met) const {
+  const auto& former = from.former;
+  const auto untraced = former.seen_[half].most(), ends = former.endCount();
+  met.resize(old.size());
+  std::size_t k = 0;
+  for (const auto end : old) {
+    const bool goes_on = end >= ends && end != untraced;
+    const auto by = goes_on ? former.steps_[half][end - ends].by : end;
+    const auto after = end == untraced ? kUntraced : from.value_after[by];
+    met.end[k] = after;
+    met.leaf[k++] = after < leaf_count_ ? static_cast<std::int32_t>(after) : 0;
+  }
+  from.change.lookFrom(value).screen(met.leaf, met.may_hide.data());
+}
+
+void LeafSights::inheritLeaf(std::uint32_t value, std::size_t half, std::size_t first_ray,
+                             const PackedNumbers::Run& old, const Inheritance& from, const FirstMet& met) {
+  const auto& former = from.former;
+  const auto& change = from.change.change();
+  for (std::uint32_t k = 0; k < old.size(); ++k) {
+    const auto first = met.end[k];
+    if (first == kUntraced) continue;  // it saw what is gone, or moved
+    // What is gone had hidden nothing from a ray whose end is known, and may be what another ended on.
+    const bool is_known = first < leaf_count_ || first >= skyAbove();
+    const bool may_pass =
+        first >= leaf_count_ || from.stands_in[first] || (met.may_hide[k] != 0 && from.change.mayHide(value, first));
+    if (may_pass && passes(is_known ? change.came : change.boxes, value, draws(value, rays_->sideOf(value), half)(k)))
+      continue;
+    const auto end = old[k] >= former.endCount() ? inheritStep(half, old[k], from) : first;
+    if (end != kUntraced) seen_[half].set(first_ray + k, end);
   }
 }
 

@@ -168,7 +168,21 @@ class LeafSights {
     const std::vector<bool>& stands_in;  ///< by leaf value: rays that are said to end on it may end beside it
     const Shadows& change;
   };
+  /// Of rays of a leaf: where they end, or what parted leaf they meet first, in this scene; kUntraced: it is gone.
+  struct FirstMet {
+    std::vector<std::uint32_t> end;
+    std::vector<std::int32_t> leaf, may_hide;  ///< the same where it is a leaf; what Shadows::Look::screen() says
+    void resize(std::size_t rays) {
+      end.resize(rays);
+      leaf.resize(rays);
+      may_hide.resize(rays);
+    }
+  };
   void inheritHalf(std::size_t half, const Inheritance& from);
+  void findFirstMet(std::uint32_t value, std::size_t half, const PackedNumbers::Run& old, const Inheritance& from,
+                    FirstMet& met) const;
+  void inheritLeaf(std::uint32_t value, std::size_t half, std::size_t first_ray, const PackedNumbers::Run& old,
+                   const Inheritance& from, const FirstMet& met);
   std::uint32_t inheritStep(std::size_t half, std::uint32_t end, const Inheritance& from);
 
   const std::vector<Side>& sides_;

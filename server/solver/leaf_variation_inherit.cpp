@@ -43,7 +43,12 @@ void LeafVariation::inherit(const LeafVariation& former, std::span<const std::ui
 /// Of what something changed near to: ways that pass it may meet other leaves than they did.
 void LeafVariation::askWays(std::size_t half, std::span<const Tells> tells, const Shadows& change) {
   for (const auto receiver : receivers_) {
-    if (tells[receiver] != Tells::kByWay) continue;
+    if (tells[receiver] != Tells::kByWay || known_[receiver] == 0) continue;
+    const auto middle = rays_->placeOn(receiver, glm::dvec2(0.5));
+    const auto reach = nearest() + rays_->widthOf(receiver);
+    if (rays_->isEven(receiver) &&
+        !change.changesBefore(glm::vec3(middle.position), glm::vec3(middle.normal), static_cast<float>(reach)))
+      continue;
     for (std::uint32_t k = 0; k < known_[receiver]; ++k) {
       const auto way = firstWay(receiver, keyOf(receiver, k, half));
       if (change.changesAlong(glm::vec3(way.from.position), glm::vec3(way.from.position + nearest() * way.direction)))
@@ -64,18 +69,14 @@ void LeafVariation::keepPaths(const LeafVariation& former, std::size_t half, std
   const auto after = [&](std::uint32_t value) {
     return value < value_after.size() ? value_after[value] : scene::kNone;
   };
-  std::vector<float> reach;  // of the corners of a light about the first
-  for (const auto& light : lights) {
-    reach.push_back(0.0F);
-    for (std::size_t c = 1; c < light.corner_count; ++c)
-      reach.back() = std::max(reach.back(), glm::distance(light.corners[0], light.corners[c]));
-  }
+  std::vector<glm::vec4> ball;  // around lights
+  for (const auto& light : lights) ball.push_back(light.ball());
   // What it sees of what it meets, and of the light that was drawn for it, none of which moved. Leaves and lamps as a
   // whole tell of most; something large right under a lamp is between it and most leaves, but not in most ways.
   const auto isWhatItWas = [&](Path& path) {
     path.by = after(path.by);
     bool may_pass = !lights.empty() && path.by != scene::kNone &&
-                    change->isPassed(path.by, lights[path.light].corners[0], reach[path.light]);
+                    change->isPassed(path.by, glm::vec3(ball[path.light]), ball[path.light].w);
     for (auto& seen : path.seen) {
       seen = after(seen);  // nothing of the sky, and of what receives no light
       if (seen == scene::kNone || path.by == scene::kNone) return false;

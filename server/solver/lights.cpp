@@ -113,6 +113,15 @@ void addPolygons(const scene::PatchScene& patches, const Side& side, const glm::
 
 }  // namespace
 
+glm::vec4 LightPolygon::ball() const {
+  const std::span all(corners.data(), corner_count);
+  glm::vec3 middle(0.0F);
+  for (const auto& corner : all) middle += corner / static_cast<float>(all.size());
+  float radius = 0.0F;
+  for (const auto& corner : all) radius = std::max(radius, glm::distance(middle, corner));
+  return {middle, radius};
+}
+
 glm::vec3 LightPolygon::point(double u, double v) const {
   const glm::dvec3 a(corners[0]), b(corners[1]), c(corners[2]), d(corners[3]);
   double first = 1.0;  // share of the area in triangle a b c

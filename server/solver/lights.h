@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
 #include <span>
 #include <vector>
 
@@ -26,6 +27,8 @@ struct LightPolygon {
   [[nodiscard]] glm::dvec3 undelivered(std::uint32_t rounds) const {
     return static_cast<double>(rounds) * glm::dvec3(emission) - delivered;
   }
+  /// Around its corners, about their middle; w: the radius.
+  [[nodiscard]] glm::vec4 ball() const;
   /// The point at (u, v) in [0, 1)^2, uniform in area.
   [[nodiscard]] glm::vec3 point(double u, double v) const;
 };

@@ -39,16 +39,6 @@ void addEarlierLooks(const LinkColumn& column, std::uint32_t earlier, std::uint3
     sums[*leaf - run.first] = links[*leaf - run.first];
 }
 
-/// Of the corners of a polygon about their middle.
-std::pair<glm::vec3, float> circle(const LightPolygon& light) {
-  const std::span corners(light.corners.data(), light.corner_count);
-  glm::vec3 middle(0.0F);
-  for (const auto& corner : corners) middle += corner / static_cast<float>(corners.size());
-  float radius = 0.0F;
-  for (const auto& corner : corners) radius = std::max(radius, glm::distance(middle, corner));
-  return {middle, radius};
-}
-
 }  // namespace
 
 /// Some repairs on their way.
@@ -164,9 +154,10 @@ void LinkedSolver::findCutLinks(RepairBatch& repairs) const {
       const auto& shadows = shadowsOf(repair);
       if (shooter.isLight()) {
         const auto& light = lights_[shooter.light];
-        const auto [middle, radius] = circle(light);
+        const auto ball = light.ball();
+        const glm::vec3 middle(ball);
         // As wide as pixels are at most, which the first samples' are.
-        shadows.find({&middle, 1}, light.normal, radius, settings_.planner.light_resolution, scratch,
+        shadows.find({&middle, 1}, light.normal, ball.w, settings_.planner.light_resolution, scratch,
                      repairs.leaves[i]);
         continue;
       }

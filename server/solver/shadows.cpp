@@ -44,30 +44,70 @@ void include(scene::ChangedBox& box, const glm::vec3& centre, float radius) {
 inline float smaller(float a, float b) { return a < b ? a : b; }
 inline float larger(float a, float b) { return a > b ? a : b; }
 
-/// A way, and all within some distance of it.
-class Segment {
- public:
-  Segment(const glm::vec3& from, const glm::vec3& to, float around)
-      : middle_(0.5F * (from + to)),
-        half_(0.5F * (to - from)),
-        reach_(glm::abs(half_) + around + kRounding),
-        around_(around) {}
+/// The part of [0, 1] where slope t >= least.
+struct Clip {
+  float first, last;
+};
+inline Clip clip(float slope, float least) {
+  const bool rises = slope > -kLevel;
+  const float t = least / (rises ? larger(slope, kLevel) : slope);
+  return {rises ? larger(t, 0.0F) : 0.0F, rises ? 1.0F : smaller(t, 1.0F)};
+}
 
-  /// False: what separates them is an axis, or the product of one and the way (Gottschalk, Lin and Manocha 1996).
+/// All ways between places of two balls (w: their radius).
+class Ways {
+ public:
+  Ways(const glm::vec4& from, const glm::vec4& to)
+      : from_(from), way_(glm::vec3(to) - from_), radius_(from.w + kRounding), widens_(to.w - from.w) {}
+  Ways(const glm::vec3& from, const glm::vec3& to, float around)
+      : Ways(glm::vec4(from, around), glm::vec4(to, around)) {}
+
+  /// False: at each part of the way some coordinate is outside (Kay and Kajiya 1986), however much room the balls leave
+  /// there.
   [[nodiscard]] bool mayMeet(const scene::ChangedBox& box) const {
-    const glm::vec3 size = 0.5F * (box.high - box.low), to = middle_ - 0.5F * (box.low + box.high);
-    const glm::vec3 apart = glm::abs(to);
-    if (apart.x > size.x + reach_.x || apart.y > size.y + reach_.y || apart.z > size.z + reach_.z) return false;
-    const glm::vec3 way = glm::abs(half_), wide = size + around_ + kRounding;
-    const glm::vec3 between = glm::abs(glm::cross(to, half_));
-    return between.x <= wide.y * way.z + wide.z * way.y && between.y <= wide.x * way.z + wide.z * way.x &&
-           between.z <= wide.x * way.y + wide.y * way.x;
+    if (isApart(box)) return false;
+    float first = 0.0F, last = 1.0F;
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto low = clip(way_[axis] + widens_, box.low[axis] - radius_ - from_[axis]);
+      const auto high = clip(widens_ - way_[axis], from_[axis] - box.high[axis] - radius_);
+      first = larger(first, larger(low.first, high.first));
+      last = smaller(last, smaller(low.last, high.last));
+    }
+    return first <= last;
   }
 
  private:
-  glm::vec3 middle_, half_, reach_;
-  float around_;
+  /// Without divisions: an axis, or the product of one and the way, separates them (Gottschalk, Lin and Manocha 1996)
+  /// though all of the way is as wide as the larger ball.
+  [[nodiscard]] bool isApart(const scene::ChangedBox& box) const {
+    const glm::vec3 half = 0.5F * way_, along = glm::abs(half);
+    const glm::vec3 wide = 0.5F * (box.high - box.low) + radius_ + larger(widens_, 0.0F);
+    const glm::vec3 to = from_ + half - 0.5F * (box.low + box.high), apart = glm::abs(to);
+    if (apart.x > wide.x + along.x || apart.y > wide.y + along.y || apart.z > wide.z + along.z) return true;
+    const glm::vec3 between = glm::abs(glm::cross(to, half));
+    return between.x > wide.y * along.z + wide.z * along.y || between.y > wide.x * along.z + wide.z * along.x ||
+           between.z > wide.x * along.y + wide.y * along.x;
+  }
+
+  glm::vec3 from_, way_;
+  float radius_, widens_;
 };
+
+/// Ways from a ball to others, of which these pass another ball (from there, w: its radius), on a line that goes on
+/// without end both ways. Between places of two balls a way is nowhere farther from that between their middles than the
+/// larger of them is wide. Of balls below zero nothing is known. Both clones give the same.
+RADIOSITY_CLONES void screenBalls(const glm::vec4& from, const glm::vec4& past, std::size_t count,
+                                  const std::int32_t* to, const float* balls, std::int32_t* may) {
+  const float fx = from.x, fy = from.y, fz = from.z, fr = from.w, px = past.x, py = past.y, pz = past.z, pr = past.w;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::int32_t b = 4 * to[i];
+    const float x = balls[b] - fx, y = balls[b + 1] - fy, z = balls[b + 2] - fz, r = balls[b + 3];
+    const float cx = py * z - pz * y, cy = pz * x - px * z, cz = px * y - py * x;
+    const float reach = pr + larger(fr, r), apart = cx * cx + cy * cy + cz * cz;
+    const bool passes = !(apart > kApart * reach * reach * (x * x + y * y + z * z));
+    may[i] = (passes | (smaller(fr, r) < 0.0F)) ? 1 : 0;
+  }
+}
 
 scene::ChangedBox around(std::span<const scene::ChangedBox> boxes) {
   auto all = nothing();
@@ -89,14 +129,10 @@ Ball ballAround(std::span<const glm::vec3> points) {
   return ball;
 }
 
-/// The part of [0, 1] where slope t >= least.
-struct Clip {
-  float first, last;
-};
-inline Clip clip(float slope, float least) {
-  const bool rises = slope > -kLevel;
-  const float t = least / (rises ? larger(slope, kLevel) : slope);
-  return {rises ? larger(t, 0.0F) : 0.0F, rises ? 1.0F : smaller(t, 1.0F)};
+/// The corner that lies farthest that way.
+glm::vec3 farthest(const scene::ChangedBox& box, const glm::vec3& way) {
+  return {way.x > 0.0F ? box.high.x : box.low.x, way.y > 0.0F ? box.high.y : box.low.y,
+          way.z > 0.0F ? box.high.z : box.low.z};
 }
 
 }  // namespace
@@ -134,16 +170,27 @@ Shadows::Shadows(const scene::PatchScene& patches, const std::vector<Side>& side
   });
   around_ = around(change_.boxes);
   around_came_ = around(change_.came);
+  ball_of_came_ = glm::vec4(0.5F * (around_came_.low + around_came_.high),
+                            0.5F * glm::distance(around_came_.low, around_came_.high) + kRounding);
   ball_.resize(value_.size());
   for (std::size_t i = 0; i < value_.size(); ++i) ball_[value_[i]] = glm::vec4(leaves_.centre(i), leaves_.radius[i]);
-  const auto altered = aroundAltered();
+  const auto altered = aroundAltered(sides);
   if (altered.low.x <= altered.high.x) all_.push_back(altered);
 }
 
-scene::ChangedBox Shadows::aroundAltered() const {
+scene::ChangedBox Shadows::aroundAltered(const std::vector<Side>& sides) const {
   auto box = nothing();
-  for (std::size_t i = 0; i < value_.size(); ++i) {
-    if (change_.altered[value_[i]] && leaves_.radius[i] >= 0.0F) include(box, leaves_.centre(i), leaves_.radius[i]);
+  for (const auto& side : sides) {
+    const auto& surface = patches_.surfaces[side.surface];
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+      const auto value = side.first_value + leaf;
+      const auto triangle = patches_.leaves[surface.first_leaf + leaf].triangle;
+      if (!change_.altered[value] || triangle == scene::kNone) continue;
+      const auto& frame = patches_.triangles[triangle];
+      const glm::vec3 centre(ball_[value]), half = 0.5F * (glm::abs(frame.du) + glm::abs(frame.dv)) + kRounding;
+      box.low = glm::min(box.low, centre - (surface.planar ? half : glm::vec3(ball_[value].w)));
+      box.high = glm::max(box.high, centre + (surface.planar ? half : glm::vec3(ball_[value].w)));
+    }
   }
   return box;
 }
@@ -196,8 +243,15 @@ bool Shadows::changesWithin(std::uint32_t value, float distance) const {
 }
 
 bool Shadows::changesAlong(const glm::vec3& from, const glm::vec3& to) const {
-  const Segment way(from, to, kOfPlace);
+  const Ways way(from, to, kOfPlace);
   return std::ranges::any_of(all_, [&](const scene::ChangedBox& box) { return way.mayMeet(box); });
+}
+
+bool Shadows::changesBefore(const glm::vec3& point, const glm::vec3& normal, float distance) const {
+  return std::ranges::any_of(all_, [&](const scene::ChangedBox& box) {
+    return glm::dot(normal, farthest(box, normal) - point) > kOfPlace &&
+           glm::distance(point, glm::clamp(point, box.low, box.high)) <= distance;
+  });
 }
 
 bool Shadows::passesWithin(const glm::vec3& middle, float radius) const {
@@ -208,7 +262,7 @@ bool Shadows::passesWithin(const glm::vec3& middle, float radius) const {
 
 bool Shadows::isPassed(const Boxes& boxes, const glm::vec4& from, const glm::vec4& to) {
   if (from.w < 0.0F || to.w < 0.0F) return !boxes.each.empty();
-  const Segment way(glm::vec3(from), glm::vec3(to), larger(from.w, to.w));  // in between no way is farther from it
+  const Ways way(from, to);
   return way.mayMeet(boxes.all) &&
          std::ranges::any_of(boxes.each, [&](const scene::ChangedBox& box) { return way.mayMeet(box); });
 }
@@ -229,20 +283,21 @@ Shadows::Look Shadows::lookFrom(std::uint32_t value) const {
   Look look{};
   look.shadows = this;
   look.from = ball_[value];
-  look.to_middle = 0.5F * (around_came_.low + around_came_.high) - glm::vec3(look.from);
-  look.radius = 0.5F * glm::distance(around_came_.low, around_came_.high) + kRounding;
+  look.past = ball_of_came_ - glm::vec4(glm::vec3(look.from), 0.0F);
   return look;
 }
 
-/// Most ways pass far from all of it: a ball is asked first, of a line that goes on without end both ways. Between
-/// places of two balls a way is nowhere farther from that between their middles than the larger of them is wide.
+/// Most ways pass far from all of it: a ball is asked first.
 bool Shadows::Look::mayHide(std::uint32_t to) const {
-  const auto& ball = shadows->ball_[to];
-  const auto way = glm::vec3(ball) - glm::vec3(from), beside = glm::cross(to_middle, way);
-  const float reach = radius + larger(from.w, ball.w);
-  if (smaller(from.w, ball.w) >= 0.0F && glm::dot(beside, beside) > kApart * reach * reach * glm::dot(way, way))
-    return false;
-  return isPassed(Boxes{shadows->change_.came, shadows->around_came_}, from, ball);
+  const auto index = static_cast<std::int32_t>(to);
+  std::int32_t may = 0;
+  screen({&index, 1}, &may);
+  return may != 0 && isPassed(Boxes{shadows->change_.came, shadows->around_came_}, from, shadows->ball_[to]);
+}
+
+void Shadows::Look::screen(std::span<const std::int32_t> to, std::int32_t* may) const {
+  if (to.empty()) return;
+  screenBalls(from, past, to.size(), to.data(), &shadows->ball_.front().x, may);
 }
 
 bool Shadows::mayHide(const glm::vec3& from, const glm::vec3& direction, std::uint32_t to) const {
@@ -253,11 +308,8 @@ bool Shadows::mayHide(const glm::vec3& from, const glm::vec3& direction, std::ui
 }
 
 bool Shadows::sees(const glm::vec3& point, const glm::vec3& normal) const {
-  return std::ranges::any_of(all_, [&](const scene::ChangedBox& box) {
-    const glm::vec3 farthest(normal.x > 0.0F ? box.high.x : box.low.x, normal.y > 0.0F ? box.high.y : box.low.y,
-                             normal.z > 0.0F ? box.high.z : box.low.z);
-    return glm::dot(normal, farthest - point) > kInFront;
-  });
+  return std::ranges::any_of(
+      all_, [&](const scene::ChangedBox& box) { return glm::dot(normal, farthest(box, normal) - point) > kInFront; });
 }
 
 /// Raises the marks of balls that the way meets and that reach before the plane to 0 or more: segments and boxes (Kay

@@ -35,6 +35,8 @@ class Shadows {
   [[nodiscard]] bool changesWithin(std::uint32_t value, float distance) const;
   /// Whether something of it may be on the way from a place to another.
   [[nodiscard]] bool changesAlong(const glm::vec3& from, const glm::vec3& to) const;
+  /// Whether something of it lies before a plane, so near to a point.
+  [[nodiscard]] bool changesBefore(const glm::vec3& point, const glm::vec3& normal, float distance) const;
   /// Whether ways within a ball may pass a box.
   [[nodiscard]] bool passesWithin(const glm::vec3& middle, float radius) const;
   /// Whether some way from a place on a leaf to one within `radius` of a point may pass a box. The second: to one on
@@ -49,13 +51,14 @@ class Shadows {
   class Look {
    public:
     [[nodiscard]] bool mayHide(std::uint32_t to) const;
+    /// Of many leaves, those that it surely hides no places of: 0; mayHide() is to tell of the others.
+    void screen(std::span<const std::int32_t> to, std::int32_t* may) const;
 
    private:
     friend class Shadows;
     const Shadows* shadows;
-    glm::vec4 from;       ///< ball
-    glm::vec3 to_middle;  ///< of a ball around all that came
-    float radius;         ///< of that, and room for rounding
+    glm::vec4 from;  ///< ball
+    glm::vec4 past;  ///< a ball around all that came, with room for rounding, from there
   };
   [[nodiscard]] Look lookFrom(std::uint32_t value) const;
   /// Whether it may lie before where a ray from a place, in a unit direction, ends on a leaf.
@@ -104,7 +107,7 @@ class Shadows {
   void addTile(const Side& side, std::uint32_t x0, std::uint32_t y0);
   void addLeaf(const Side& side, std::uint32_t leaf);
   [[nodiscard]] float reachOf(const scene::Surface& surface, const scene::LeafPoint& leaf) const;
-  [[nodiscard]] scene::ChangedBox aroundAltered() const;
+  [[nodiscard]] scene::ChangedBox aroundAltered(const std::vector<Side>& sides) const;
   void takeRuns(Scratch& scratch, std::vector<LinkColumn::ValueRun>& runs) const;
 
   const scene::PatchScene& patches_;
@@ -112,6 +115,7 @@ class Shadows {
   std::vector<scene::ChangedBox> all_;  ///< boxes, and one around all altered leaves
   scene::ChangedBox around_{};          ///< all boxes
   scene::ChangedBox around_came_{};     ///< those of what came
+  glm::vec4 ball_of_came_{0.0F};        ///< around that, with room for rounding
   Balls leaves_;                        ///< tile after tile
   std::vector<std::uint32_t> value_;    ///< of these leaves
   std::vector<glm::vec4> ball_;         ///< by leaf value: the same, in one place; its radius is w
