@@ -42,6 +42,9 @@ class LitScene {
 
   /// Gives the geometry to the transport; must come before the solver's first step.
   [[nodiscard]] Result<void> upload() const { return transport_.setScene(patches_); }
+  /// The same in two steps, between which renderers take it in by themselves.
+  [[nodiscard]] Result<void> beginUpload() const { return transport_.beginScene(patches_); }
+  [[nodiscard]] Result<void> finishUpload() const { return transport_.finishScene(); }
 
   [[nodiscard]] SceneChange changeTo(const scene::Scene& next) const { return changeBetween(*scene_, next); }
 

@@ -35,13 +35,14 @@ Result<LitScene::Affected> SolveLoop::relight(Result<std::unique_ptr<LitScene>> 
 
 Result<LitScene::Affected> SolveLoop::tryOut(LitScene& made, LitScene* former, bool solve_anew, const KeepMade& keep,
                                              bool& keeps_layout) {
-  if (auto uploaded = made.upload(); !uploaded) return tl::unexpected<Error>(uploaded.error());
+  if (auto begun = made.beginUpload(); !begun) return tl::unexpected<Error>(begun.error());
   LitScene::Affected affected;
   if (former != nullptr) {
     affected = made.succeed(*former);
     keeps_layout = made.keepsLayoutOf(*former);
     made.fadeFrom(*former, keeps_layout);
   }
+  if (auto uploaded = made.finishUpload(); !uploaded) return tl::unexpected<Error>(uploaded.error());
   if (solve_anew) (void)made.startSolve();
   if (auto kept = keep ? keep(made, affected) : Result<void>(); !kept) return tl::unexpected<Error>(kept.error());
   return affected;

@@ -13,6 +13,7 @@
 #include <filesystem>
 #include <optional>
 #include <thread>
+#include <utility>
 
 #include "common/check.h"
 #include "common/log.h"
@@ -49,6 +50,7 @@ Clock::duration seconds(double value) {
 /// A process and what it has of the current batch.
 struct Slot {
   std::optional<WorkerProcess> process;  ///< none: died, to be replaced
+  bool takes_scene = false;              ///< it was sent one, and has not said that it has it
   std::deque<std::size_t> held;          ///< chunks sent, not yet reported
   std::vector<std::size_t> done;         ///< chunks reported, still only in its accumulators
   Clock::time_point deadline;            ///< of the chunk it has held longest
@@ -72,6 +74,13 @@ class WorkerTransport final : public solver::Transport {
   WorkerTransport& operator=(const WorkerTransport&) = delete;
 
   Result<void> setScene(std::shared_ptr<const scene::PatchScene> patches) override {
+    if (auto begun = beginScene(std::move(patches)); !begun) return begun;
+    return finishScene();
+  }
+
+  /// All upload at the same time.
+  Result<void> beginScene(std::shared_ptr<const scene::PatchScene> patches) override {
+    awaitScenes();  // of one that was not finished
     auto packed = packScene(*patches);
     if (!packed) return tl::unexpected(packed.error());
     packed_ = std::move(*packed);
@@ -83,19 +92,17 @@ class WorkerTransport final : public solver::Transport {
     if (!paper) paper_error_ = paper.error();
     has_scene_ = true;
     deaths_ = 0;
-    // All upload at the same time.
-    std::vector<std::optional<Error>> failed(slots_.size());
-    for (std::size_t i = 0; i < slots_.size(); ++i) {
-      if (!slots_[i].process) continue;
-      if (auto sent = slots_[i].process->sendScene(packed_, nodes_, hands_, scenePatience()); !sent)
-        failed[i] = sent.error();
+    for (auto& slot : slots_) {
+      if (!slot.process) continue;
+      slot.takes_scene = true;
+      if (auto sent = slot.process->sendScene(packed_, nodes_, hands_, scenePatience()); !sent)
+        lose(slot, sent.error());
     }
-    for (std::size_t i = 0; i < slots_.size(); ++i) {
-      if (slots_[i].process && !failed[i]) {
-        if (auto taken = slots_[i].process->awaitScene(scenePatience()); !taken) failed[i] = taken.error();
-      }
-      if (failed[i] && !interrupted_) bury(slots_[i], *failed[i]);
-    }
+    return {};
+  }
+
+  Result<void> finishScene() override {
+    awaitScenes();
     return replaceDead();
   }
 
@@ -141,6 +148,7 @@ class WorkerTransport final : public solver::Transport {
  private:
   Result<void> carryOut(const solver::ShotBatch& batch) {
     if (!has_scene_) return fail(ErrorCode::kInternal, "setScene must come before run");
+    RAD_CHECK(std::ranges::none_of(slots_, &Slot::takes_scene));
     const ShotSpan shots = spanOf(batch);
     if (auto good = checkShots(shots); !good) return good;
     if (batch.mode == solver::LinkMode::kPaperMipmap && !paper_fits_) return tl::unexpected(paper_error_);
@@ -157,6 +165,19 @@ class WorkerTransport final : public solver::Transport {
     auto done = work(batch);
     if (!done) killAll();  // what the workers have of this batch is void; so are they
     return done;
+  }
+
+  void awaitScenes() {
+    for (auto& slot : slots_) {
+      if (!std::exchange(slot.takes_scene, false)) continue;
+      if (auto taken = slot.process->awaitScene(scenePatience()); !taken) lose(slot, taken.error());
+    }
+  }
+
+  /// A worker that did not take a scene in.
+  void lose(Slot& slot, const Error& why) {
+    slot.takes_scene = false;
+    if (!interrupted_) bury(slot, why);
   }
 
   [[nodiscard]] bool finished() const {

@@ -237,6 +237,12 @@ class Transport {
 
   /// Uploads geometry; must come before run(). Blocks.
   [[nodiscard]] virtual Result<void> setScene(std::shared_ptr<const scene::PatchScene> patches) = 0;
+  /// The same in two steps, the second of which is to come before anything else but another setScene() or
+  /// beginScene(): between them renderers may take the scene in by themselves.
+  [[nodiscard]] virtual Result<void> beginScene(std::shared_ptr<const scene::PatchScene> patches) {
+    return setScene(std::move(patches));
+  }
+  [[nodiscard]] virtual Result<void> finishScene() { return {}; }
 
   /// Carries out the batch and adds what it delivered to `into` (sized by the caller). Blocks. On error `into` is
   /// unchanged.
