@@ -165,6 +165,8 @@ void SolveLoop::solveSlice() {
     if (Clock::now() >= next_publish_ && lit_->showDirectLight()) {
       unpublished_ = true;
       publishLightmaps(false);
+    } else if (owes_pages_ && Clock::now() >= *owes_pages_) {
+      publishLightmaps(false);
     }
     return tellProgress(false);
   }
@@ -178,7 +180,7 @@ void SolveLoop::solveSlice() {
   } else if (out_of_time) {
     endSolve(SolveState::kTimeLimit);
   } else {
-    if (Clock::now() >= next_publish_) publishLightmaps(false);
+    if (owes_pages_ || Clock::now() >= next_publish_) publishLightmaps(false);
     tellProgress(true);
   }
 }

@@ -119,6 +119,7 @@ class SolveLoop final : public Engine {
   /// What is watched and not published yet; `final`: as a new version in any case.
   void publishLightmaps(bool final);
   [[nodiscard]] bool showsNothingNew() const;
+  void showEdit();
   [[nodiscard]] QuantityPages pagesToShow(Quantity quantity);
   void publishQuantity(Quantity quantity);
   [[nodiscard]] Clock::duration publishPause(Clock::duration took) const;
@@ -242,6 +243,8 @@ class SolveLoop final : public Engine {
   std::uint64_t steps_ = 0;      // of all solvers
   std::uint64_t unwatched_ = 0;  // publications that nobody was there for
   Clock::time_point next_publish_{}, next_progress_{};
+  Clock::time_point edit_began_{};               // the last one
+  std::optional<Clock::time_point> owes_pages_;  // by then, of the light before an edit where things lie now
   bool renderer_lost_ = false;
   unsigned recoveries_ = 0;  // of this solve
   Clock::time_point retry_at_{};

@@ -116,6 +116,7 @@ Result<void> SolveLoop::checkScene(const std::optional<std::uint64_t>& same_scen
 }
 
 Result<PatchOutcome> SolveLoop::applyRequest(const PatchRequest& request) {
+  edit_began_ = Clock::now();
   if (auto ok = checkBase(request.base_revision); !ok) return tl::unexpected<Error>(ok.error());
   if (auto ok = checkScene(request.same_scene_as); !ok) return tl::unexpected<Error>(ok.error());
   const auto patch = nlohmann::json::parse(request.patch, nullptr, false);
@@ -137,6 +138,7 @@ Result<PatchOutcome> SolveLoop::applyRequest(const PatchRequest& request) {
 }
 
 Result<PatchOutcome> SolveLoop::applyStep(const StepRequest& request) {
+  edit_began_ = Clock::now();
   if (auto ok = checkBase(request.base_revision); !ok) return tl::unexpected<Error>(ok.error());
   auto step = history_.step(request.redo, lit_->document());
   if (!step) return tl::unexpected<Error>(step.error());
@@ -236,7 +238,7 @@ void SolveLoop::announceEdit(const PatchOutcome& outcome, const std::string& pat
     } else {
       updateStatus(true);
     }
-    if (!showsNothingNew()) publishLightmaps(false);
+    showEdit();
   });
   if (shown) return;
   unpublished_ = true;

@@ -13,6 +13,8 @@ namespace {
 
 /// Oftener than anyone can see a difference.
 constexpr auto kPublishInterval = std::chrono::milliseconds(50);
+/// Of edits of geometry; and how long their light may be waited for.
+constexpr auto kShortEdit = std::chrono::milliseconds(25), kSolvedSoon = std::chrono::milliseconds(30);
 /// Making pages takes no more than one part in so many of the solve thread's time, however large they are; ...
 constexpr int kPublishShare = 20;
 /// ... but while a solve is young, and every version shows much that is new, up to one part in so many.
@@ -37,6 +39,7 @@ void SolveLoop::publishLightmaps(bool final) {
     stepped_ = false;
   }
   unpublished_ = false;
+  owes_pages_.reset();
   shown_is_own_ = true;
   updateStatus(false);
   for (const auto quantity : kQuantities) publishQuantity(quantity);
@@ -61,6 +64,19 @@ bool SolveLoop::showsNothingNew() const {
   const bool is_own = lit_->showsOwnLight() && lit_->solver().isUnsettled() && !lit_->solver().isRepairing();
   if (!is_own && !lit_->showsFormerLight()) return false;
   return std::ranges::none_of(kQuantities, [&](auto q) { return q != Quantity::kIrradiance && watches_.wants(q); });
+}
+
+/// Where pages are laid out anew they show the light that there was. An edit that took so little time is solved for
+/// about as soon, and pages of both would take a tenth of that: those of the light before are left out, unless they are
+/// owed already.
+void SolveLoop::showEdit() {
+  if (showsNothingNew()) return;
+  const auto now = Clock::now();
+  if (state_ == SolveState::kSolving && !owes_pages_ && now - edit_began_ < kShortEdit) {
+    owes_pages_ = now + kSolvedSoon;
+  } else {
+    publishLightmaps(false);
+  }
 }
 
 /// After pages that took so long: never longer than the solve is old, where that leaves it most of its time.
