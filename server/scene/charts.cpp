@@ -73,12 +73,11 @@ class Builder {
       hides.push_back(surface.see_through ? Hides::kNothing : material.double_sided ? Hides::kSheet : Hides::kSolid);
     }
     patches_.solids = findClosedSolids(patches_);
-    std::optional<FormerBurial> former;
-    if (former_ != nullptr && record_ != nullptr) {
-      former.emplace(former_->patches, *record_, patches_,
-                     matchSurfaces(former_->scene, former_->patches, scene_, patches_), hides);
-    }
-    burial_ = removeBuried(patches_, pieces, hides, former ? &*former : nullptr);
+    burial_ = removeBuried(patches_, pieces, hides, [&]() -> std::unique_ptr<const FormerBurial> {
+      if (former_ == nullptr || record_ == nullptr) return nullptr;
+      auto same = matchSurfaces(former_->scene, former_->patches, scene_, patches_);
+      return std::make_unique<const FormerBurial>(former_->patches, *record_, patches_, std::move(same), hides);
+    });
     placeSpots(patches_, pieces);
     placeSpotsInGaps(patches_);
     patches_.spots.shrinkToFit();

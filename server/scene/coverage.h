@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <glm/vec2.hpp>
 #include <memory>
 #include <span>
@@ -34,12 +35,14 @@ struct LeafPiece {
 /// vertices and frames; sizes leaves and node_area. Returns the pieces, sorted by leaf.
 [[nodiscard]] std::vector<LeafPiece> measureCoverage(PatchScene& patches);
 
+using FindFormerBurial = std::function<std::unique_ptr<const FormerBurial>()>;
 /// Takes the part of each leaf that lies inside another solid out of node_area and moves leaf points to what is left.
 /// `hides`: by surface. Adds warnings about coincident faces.
-/// Returns how it was found, or null where that is too much to keep. `former`: what is known of the scene before an
-/// edit; leaves that it answers for are not looked at again, and get the same bits.
+/// Returns how it was found, or null where that is too much to keep. `find_former`: makes what is known of the scene
+/// before an edit, if anything, while other things are made; leaves that it answers for are not looked at again, and
+/// get the same bits.
 std::shared_ptr<const BurialRecord> removeBuried(PatchScene& patches, const std::vector<LeafPiece>& pieces,
-                                                 const std::vector<Hides>& hides, const FormerBurial* former = nullptr);
+                                                 const std::vector<Hides>& hides, const FindFormerBurial& find_former);
 
 /// Places on a leaf, which lie evenly over what is left of it. Small, since edits remember those of many leaves.
 struct LeafPlaces {

@@ -79,10 +79,10 @@ class NodeBoxes {
 class Burial {
  public:
   Burial(PatchScene& patches, const std::vector<LeafPiece>& pieces, const std::vector<Hides>& hides,
-         const Coincidence& coincidence, const FormerBurial* former)
+         const Solids& solids, const Coincidence& coincidence, const FormerBurial* former)
       : patches_(patches),
         pieces_(pieces),
-        solids_(patches, hides),
+        solids_(solids),
         coincidence_(coincidence),
         former_(former),
         leaves_(patches, pieces, solids_, coincidence) {
@@ -314,7 +314,7 @@ class Burial {
 
   PatchScene& patches_;
   const std::vector<LeafPiece>& pieces_;
-  Solids solids_;
+  const Solids& solids_;
   const Coincidence& coincidence_;
   const FormerBurial* former_;
   const LeafBurial leaves_;
@@ -330,10 +330,17 @@ class Burial {
 }  // namespace
 
 std::shared_ptr<const BurialRecord> removeBuried(PatchScene& patches, const std::vector<LeafPiece>& pieces,
-                                                 const std::vector<Hides>& hides, const FormerBurial* former) {
+                                                 const std::vector<Hides>& hides, const FindFormerBurial& find_former) {
   Coincidence coincidence(patches);
-  coincidence.run();
-  auto record = Burial(patches, pieces, hides, coincidence, former).run();
+  std::unique_ptr<const Solids> solids;
+  std::unique_ptr<const FormerBurial> former;
+  const auto prepare = [&](std::size_t part) {  // each reads what none of them writes
+    if (part == 0) coincidence.run();
+    if (part == 1) solids = std::make_unique<const Solids>(patches, hides);
+    if (part == 2) former = find_former();
+  };
+  inTurns(3, prepare);
+  auto record = Burial(patches, pieces, hides, *solids, coincidence, former.get()).run();
   coincidence.keepCovered();
   return record;
 }

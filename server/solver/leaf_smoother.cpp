@@ -119,6 +119,8 @@ Ends endsOf(std::uint32_t count, std::uint32_t step, bool alone) {
 
 /// Sides in a row that have so many leaves together, or one that has more.
 constexpr std::uint32_t kLeavesATurn = 512;
+/// Leaves beside parted ones that a thread is worth.
+constexpr std::size_t kBesideAShare = 64;
 std::vector<std::span<const Side>> groupsOf(const std::vector<Side>& sides) {
   std::vector<std::span<const Side>> groups;
   std::size_t first = 0, leaves = 0;
@@ -236,11 +238,15 @@ void LeafSmoother::findParted(std::size_t s, const std::function<bool(std::uint3
   for (std::uint32_t leaf = 0; leaf < beside.size(); ++leaf)
     if (beside[leaf]) beside_[s].push_back({leaf, {}, {}});
   beside_[s].shrink_to_fit();
-  for (auto& one : beside_[s])
-    for (std::size_t k = 0; k < kSteps.size(); ++k) {
-      one.open[k] = openWays(side, one.leaf, kSteps[k]);
-      one.cut[k] = one.open[k] != waysWithin(side, one.leaf, kSteps[k]);
+  inShares(beside_[s].size() / kBesideAShare, [&](std::size_t share, std::size_t shares) {
+    for (auto i = share; i < beside_[s].size(); i += shares) {
+      auto& one = beside_[s][i];
+      for (std::size_t k = 0; k < kSteps.size(); ++k) {
+        one.open[k] = openWays(side, one.leaf, kSteps[k]);
+        one.cut[k] = one.open[k] != waysWithin(side, one.leaf, kSteps[k]);
+      }
     }
+  });
 }
 
 /// Nothing stands between the leaf and where these bits say, nor on either.

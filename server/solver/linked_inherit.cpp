@@ -1,9 +1,11 @@
 // LinkedSolver after an edit of geometry: what it takes over from the solver of the scene before.
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <span>
 #include <utility>
 
+#include "common/parallel.h"
 #include "server/solver/halves.h"
 #include "server/solver/linked_solver.h"
 
@@ -40,7 +42,13 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
     addEarlier(numbers, all);
     earlier_shadows_ = std::make_unique<Shadows>(*patches_, sides_, std::move(all));
   }
-  shadows_ = std::make_unique<Shadows>(*patches_, sides_, std::move(change));
+  std::optional<ChangeReach> reach;
+  const auto prepare = [&](std::size_t part) {  // each reads what none of them writes
+    if (part == 0) shadows_ = std::make_unique<Shadows>(*patches_, sides_, std::move(change));
+    if (part == 1) reach.emplace(*former.patches_, *patches_, map);
+    if (part == 2 && (former.variation_ || former.gather_)) (void)leafRays();
+  };
+  inTurns(3, prepare);
   edits_ = former.edits_;
   counters_ = former.counters_;
   rounds_ = former.rounds_;
@@ -59,7 +67,7 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, con
   inheritNodes(former, numbers);
   inheritEntries(former, numbers);
   setPostponed(former.phase_ == Phase::kDone ? former.errorBesideMissing() : settings_.target_error);
-  planRepairs(former.isRepairing() ? 0.0 : former.fieldNorm(), ChangeReach(*former.patches_, *patches_, map));
+  planRepairs(former.isRepairing() ? 0.0 : former.fieldNorm(), *reach);
   if (former.variation_) inheritVariation(former, numbers);
   if (by_rays_ && former.gather_) inheritRays(former, numbers);
   for (auto& half : half_) half.assign(system_.leafAreas().size(), glm::vec3(0.0F));
@@ -204,8 +212,8 @@ void LinkedSolver::inheritVariation(const LinkedSolver& former, const Renumberin
   const auto& change = shadows_->change();
   std::vector<std::uint32_t> value_before(change.altered.size(), scene::kNone);
   std::vector<LeafVariation::Tells> tells(change.altered.size(), LeafVariation::Tells::kNothing);
-  for (std::uint32_t s = 0; s < former.sides_.size(); ++s) {
-    if (numbers.unmoved_after[s] == scene::kNone) continue;
+  const auto tell = [&](std::size_t s) {
+    if (numbers.unmoved_after[s] == scene::kNone) return;
     const Side &side = sides_[numbers.unmoved_after[s]], &before = former.sides_[s];
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
       const auto value = side.first_value + leaf;
@@ -214,7 +222,8 @@ void LinkedSolver::inheritVariation(const LinkedSolver& former, const Renumberin
       const bool is_near = shadows_->changesWithin(value, reach);
       tells[value] = is_near ? LeafVariation::Tells::kByWay : LeafVariation::Tells::kAll;
     }
-  }
+  };
+  inTurns(former.sides_.size(), tell, change.altered.size() / kLeavesAThread);
   // Lamps that moved come after those that did not.
   const bool same_lights = std::ranges::equal(former.lights_, lights_, [](const auto& a, const auto& b) {
     return a.key == b.key && a.corners == b.corners && a.corner_count == b.corner_count;

@@ -1,4 +1,5 @@
 #include "server/solver/linked_solver.h"
+#include "common/parallel.h"
 
 #include <algorithm>
 #include <chrono>
@@ -133,8 +134,15 @@ Result<void> LinkedSolver::measureSlice() {
 
 void LinkedSolver::startGrowth() {
   const AllUnshot all(*this);
-  planner_.setShare(powerToShoot() * share_part_);
-  planner_.setLeastRadiosity(by_rays_ ? leastRadiosity() : std::vector<double>());
+  double power = 0.0;
+  std::vector<double> least;
+  const auto find = [&](std::size_t part) {
+    if (part == 0) power = powerToShoot();
+    if (part == 1 && by_rays_) least = leastRadiosity();
+  };
+  doShares(2, ShareOfWork(find));
+  planner_.setShare(power * share_part_);
+  planner_.setLeastRadiosity(std::move(least));
   phase_ = Phase::kGrow;
 }
 

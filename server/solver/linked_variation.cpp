@@ -3,7 +3,9 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <numeric>
 
+#include "common/parallel.h"
 #include "server/solver/linked_solver.h"
 
 namespace radiosity::solver {
@@ -50,14 +52,18 @@ void LinkedSolver::updateVariation() {
   }
   variation_->forgetCorrections();  // also where memory ends on the way
   const auto emission = shiningOfLeaves(), reflectance = ofLeaves(system_.reflectance());
-  double square = 0.0;
-  for (const auto& side : sides_) {
+  std::vector<double> squares(sides_.size(), 0.0);
+  const auto sumUp = [&](std::size_t s) {
+    const Side& side = sides_[s];
+    double square = 0.0;  // in memory that no other thread writes to
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
       const glm::dvec3 irradiance(lightOf(side.first_value + leaf));
       square += static_cast<double>(patches_->node_area[side.first_node + leaf]) * glm::dot(irradiance, irradiance);
     }
-  }
-  square_ = square;
+    squares[s] = square;
+  };
+  inTurns(sides_.size(), sumUp, system_.leafAreas().size() / kLeavesAThread);
+  const double square = square_ = std::accumulate(squares.begin(), squares.end(), 0.0);
   auto sources = sources_;  // paths find the sky where they end, and those before it by their numbers
   sources.insert(sources.end(), sky_.begin(), sky_.end());
   const double bound = kNegligible * aim_;
