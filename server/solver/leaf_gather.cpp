@@ -76,6 +76,14 @@ std::size_t timesOfFew(std::size_t leaves, std::size_t fewest) {
   return std::bit_floor(std::clamp<std::size_t>(fewest / usual, 1, kMost));
 }
 
+/// Calls work(leaf value) for so many, on all cores where they are worth it.
+template <typename Work>
+void inLeaves(std::size_t leaves, const Work& work) {
+  inShares(leaves / kLeavesAThread, [&](std::size_t share, std::size_t shares) {
+    for (auto v = share * leaves / shares; v < (share + 1) * leaves / shares; ++v) work(v);
+  });
+}
+
 }  // namespace
 
 LeafGather::LeafGather(const scene::PatchScene& patches, const std::vector<Side>& sides, std::uint64_t seed,
@@ -288,13 +296,13 @@ void LeafGather::take(std::size_t h, const Levels& levels) {
 void LeafGather::weighNoise() {
   const std::size_t leaves = sights_.leafCount();
   auto& source = halves_[0].source;  // with the sky; neither half's own is needed any more
-  for (std::size_t v = 0; v < leaves; ++v) {
+  inLeaves(leaves, [&](std::size_t v) {
     for (std::size_t c = 0; c < 3; ++c) {
       source[v][c] = 0.5 * (halves_[0].source[v][c] + halves_[1].source[v][c]);
       const float radiosity = 0.5F * (halves_[0].radiosity[v][c] + halves_[1].radiosity[v][c]);
       halves_[0].radiosity[v][c] = halves_[1].radiosity[v][c] = radiosity;
     }
-  }
+  });
   std::array<LeafSmoother::Light, 2> arriving;
   inBothHalves([&](std::size_t half) {
     for (auto end = leaves; end < source.size(); ++end) halves_[half].radiosity[end] = rounded(source[end]);
@@ -311,19 +319,24 @@ void LeafGather::weighNoise() {
   noise_ = smoothed_;
   side_noise_.assign(sides_.size(), 0.0);
   side_light_ = side_noise_;
+  std::vector<std::array<double, 2>> squares(leaves);  // of noise and light, times area
+  inLeaves(leaves, [&](std::size_t v) {
+    double square = 0.0;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double off = 0.5 * static_cast<double>(arriving[0][c][v] - arriving[1][c][v]);
+      square += off * off;
+    }
+    const glm::dvec3 light(0.5F *
+                           (gathered_[0][v] + gathered_[1][v] + light_.irradiance[0][v] + light_.irradiance[1][v]));
+    squares[v] = {areaOf(v) * square, areaOf(v) * glm::dot(light, light)};
+  });
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
     for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
-      double square = 0.0;
-      for (std::size_t c = 0; c < 3; ++c) {
-        const double off = 0.5 * static_cast<double>(arriving[0][c][v] - arriving[1][c][v]);
-        square += off * off;
-      }
-      const glm::dvec3 light(0.5F *
-                             (gathered_[0][v] + gathered_[1][v] + light_.irradiance[0][v] + light_.irradiance[1][v]));
-      block_noise_[v / kBlock] += areaOf(v) * square;
-      block_light_[v / kBlock] += areaOf(v) * glm::dot(light, light);
-      side_noise_[s] += areaOf(v) * square;
-      side_light_[s] += areaOf(v) * glm::dot(light, light);
+      const auto [noise, light] = squares[v];
+      block_noise_[v / kBlock] += noise;
+      block_light_[v / kBlock] += light;
+      side_noise_[s] += noise;
+      side_light_[s] += light;
     }
   }
   for (const double block : block_noise_) noise_ += block;

@@ -58,6 +58,11 @@ class Neighbours {
 };
 
 template <typename Lack>
+bool finds(const Lack& lack) {
+  return lack.sure != glm::vec3(0.0F) || lack.doubtful != glm::vec3(0.0F);
+}
+
+template <typename Lack>
 glm::dvec3 all(const Lack& lack) {
   return glm::dvec3(lack.sure) + glm::dvec3(lack.doubtful);
 }
@@ -167,6 +172,7 @@ void LeafVariation::sumUp(const LeafLight& light) {
   });
   double sum = 0.0, squares = 0.0;
   for (const auto value : receivers_) {
+    if (!finds(lacking_[0][value]) || !finds(lacking_[1][value])) continue;
     // The halves are independent, so that their noise cancels in the product.
     const double product = glm::dot(all(lacking_[0][value]), all(lacking_[1][value]));
     if (product == 0.0) continue;

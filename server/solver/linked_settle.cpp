@@ -59,10 +59,12 @@ bool LinkedSolver::lightLeaves() {
   }
   if (gather_ && !gather_->advance(kSliceSeconds)) return false;
   half_ = std::move(over_links_);
-  for (std::size_t half = 0; half < 2 && gather_; ++half) {
-    for (std::size_t v = 0; v < half_[half].size(); ++v) half_[half][v] += gather_->irradiance(half)[v];
+  if (gather_) {
+    inBothHalves([&](std::size_t half) {
+      for (std::size_t v = 0; v < half_[half].size(); ++v) half_[half][v] += gather_->irradiance(half)[v];
+    });
+    gather_->forgetIrradiance();
   }
-  if (gather_) gather_->forgetIrradiance();
   pass_ = Pass::kNone;
   findUnshot();
   if (variation_) updateVariation();
