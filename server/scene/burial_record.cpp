@@ -254,16 +254,16 @@ const BurialRecord::Leaf* FormerBurial::find(std::uint32_t surface, std::uint32_
   if (former == kNone || record_.covered[former] || !sameOf(pass, record_.places, places)) return nullptr;
   const auto* found = record_.find(before_.surfaces[former].first_leaf + leaf, side, pass);
   const auto meets = [&](const RayFan& fan) { return fan.mayMeet(boxes_) && (parts_.empty() || fan.mayMeet(parts_)); };
-  return found == nullptr || std::ranges::any_of(found->fans, meets) ? nullptr : found;
+  return found == nullptr || std::ranges::any_of(found->found->fans, meets) ? nullptr : found;
 }
 
-BuriedPart FormerBurial::renumbered(const BuriedPart& part, std::uint32_t surface) const {
-  const Surface &from = before_.surfaces[surface_before_[surface]], &to = after_.surfaces[surface];
+BuriedPart FormerBurial::renumbered(const BurialRecord::Found& found, std::uint32_t surface) const {
+  const Surface& to = after_.surfaces[surface];
   const auto number = [&](std::uint32_t& triangle) {
-    if (triangle != kNone) triangle = triangle - from.first_triangle + to.first_triangle;
+    if (triangle != kNone) triangle = triangle - found.first_triangle + to.first_triangle;
   };
-  BuriedPart after = part;
-  after.leaf = part.leaf - from.first_leaf + to.first_leaf;
+  BuriedPart after = *found.buried;
+  after.leaf = after.leaf - found.first_leaf + to.first_leaf;
   number(after.point.triangle);
   for (auto& triangle : after.visible.triangles) number(triangle);
   return after;

@@ -78,11 +78,16 @@ class BurialRecord {
  public:
   /// As some of the places on a leaf tell, or all that are ever looked at.
   enum class Pass : std::uint8_t { kFew, kMany };
+  /// Of a leaf. The record of an edited scene shares what it is still true of.
+  struct Found {
+    std::vector<RayFan> fans;
+    std::optional<BuriedPart> buried;          ///< none: all of it is visible
+    std::uint32_t first_leaf, first_triangle;  ///< of the surface, in the numbers of `buried`
+  };
   struct Leaf {
     std::uint32_t leaf, side;
     Pass pass;
-    std::vector<RayFan> fans;
-    std::optional<BuriedPart> buried;  ///< none: all of it is visible
+    std::shared_ptr<const Found> found;
   };
 
   BurialPlaces places;        ///< that were looked at
@@ -107,8 +112,8 @@ class FormerBurial {
   /// surface. A few ray and box tests.
   [[nodiscard]] const BurialRecord::Leaf* find(std::uint32_t surface, std::uint32_t leaf, std::uint32_t side,
                                                BurialRecord::Pass pass, const BurialPlaces& places) const;
-  /// In the numbers of `after`.
-  [[nodiscard]] BuriedPart renumbered(const BuriedPart& part, std::uint32_t surface) const;
+  /// What is buried of a leaf of that surface, in the numbers of `after`.
+  [[nodiscard]] BuriedPart renumbered(const BurialRecord::Found& found, std::uint32_t surface) const;
 
  private:
   void findChanged(const std::vector<Hides>& hides);

@@ -103,8 +103,8 @@ class Burial {
 
  private:
   struct Measured {
-    std::optional<BuriedPart> buried;  ///< none: all of it is visible
-    std::optional<std::vector<RayFan>> fans;
+    std::optional<BuriedPart> buried;                 ///< none: all of it is visible
+    std::shared_ptr<const BurialRecord::Found> kept;  ///< null: it is not worth keeping
   };
 
   /// Of one surface: leaves in contact, and what is buried beside them.
@@ -210,7 +210,7 @@ class Burial {
       for (auto i = first; i < end; ++i) {
         auto& found = measured[i - first];
         const auto& contact = contacts[i];
-        if (found.fans) record(contact, pass, found);
+        if (found.kept) record(contact, pass, std::move(found.kept));
         if (!found.buried) continue;
         patches_.node_area[leaves_.nodeOf(contact)] = found.buried->visible_area;
         changes_.push_back(std::move(*found.buried));
@@ -226,27 +226,30 @@ class Burial {
     if (by_rays && former_ != nullptr) {
       const auto leaf = leaves_.leafOf(contact) - patches_.surfaces[contact.surface].first_leaf;
       if (const auto* known = former_->find(contact.surface, leaf, contact.side, pass, places_)) {
-        Measured same{{}, known->fans};
-        if (known->buried) same.buried = former_->renumbered(*known->buried, contact.surface);
+        Measured same{{}, known->found};
+        if (same.kept->buried) same.buried = former_->renumbered(*same.kept, contact.surface);
         return same;
       }
     }
     scratch.notes.clear();
     Measured found{leaves_.measure(contact, count, places_, scratch), {}};
     const auto& fans = scratch.notes.fans();
-    if (by_rays && !fans.empty() && fans.size() <= kMostFans) found.fans = fans;
+    if (!by_rays || fans.empty() || fans.size() > kMostFans) return found;
+    const Surface& surface = patches_.surfaces[contact.surface];
+    found.kept = std::make_shared<const BurialRecord::Found>(
+        BurialRecord::Found{fans, found.buried, surface.first_leaf, surface.first_triangle});
     return found;
   }
 
-  void record(const Contact& contact, BurialRecord::Pass pass, Measured& found) {
+  void record(const Contact& contact, BurialRecord::Pass pass, std::shared_ptr<const BurialRecord::Found> found) {
     if (is_too_much_) return;
-    recorded_bytes_ += sizeof(BurialRecord::Leaf) + found.fans->size() * sizeof(RayFan) +
-                       (found.buried ? found.buried->visible.bytes() : 0);
+    recorded_bytes_ += sizeof(BurialRecord::Leaf) + sizeof(BurialRecord::Found) + found->fans.size() * sizeof(RayFan) +
+                       (found->buried ? found->buried->visible.bytes() : 0);
     is_too_much_ = recorded_bytes_ > kMostRecordedBytes || record_.leaves.size() >= kMostRecorded;
     if (is_too_much_) {
       giveBack(record_.leaves);
     } else {
-      record_.leaves.push_back({leaves_.leafOf(contact), contact.side, pass, std::move(*found.fans), found.buried});
+      record_.leaves.push_back({leaves_.leafOf(contact), contact.side, pass, std::move(found)});
     }
   }
 

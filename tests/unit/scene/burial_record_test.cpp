@@ -143,7 +143,8 @@ class BurialRecords : public testing::Test {
     for (std::size_t i = 0; i < a.leaves.size(); ++i) {
       const auto &one = a.leaves[i], &other = b.leaves[i];
       ASSERT_TRUE(one.leaf == other.leaf && one.side == other.side && one.pass == other.pass);
-      ASSERT_TRUE(std::ranges::equal(one.fans, other.fans, {}, &RayFan::ways, &RayFan::ways)) << "leaf " << one.leaf;
+      ASSERT_TRUE(std::ranges::equal(one.found->fans, other.found->fans, {}, &RayFan::ways, &RayFan::ways))
+          << "leaf " << one.leaf;
     }
   }
 
@@ -174,7 +175,7 @@ TEST_F(BurialRecords, RandomEditsGiveTheBitsOfLookingAtAllLeavesAgain) {
     editAtRandom();
     ASSERT_NO_FATAL_FAILURE(takeEdit(before, built)) << "edit " << i;
     for (std::size_t k = 0; built.burial && k < built.burial->leaves.size(); ++k)
-      buried += built.burial->leaves[k].buried ? 1 : 0;
+      buried += built.burial->leaves[k].found->buried ? 1 : 0;
   }
   EXPECT_GT(buried, 2000U);
 }
@@ -253,7 +254,10 @@ TEST_F(BurialRecords, LeavesThatNoRayOfAnEditTouchesAreNotLookedAtAgain) {
   auto built = buildWithRecord(scene_, options_).value();
   auto record = *built.burial;
   for (auto& leaf : record.leaves) {
-    if (leaf.buried) leaf.buried->visible_area = 0.125F;
+    if (!leaf.found->buried) continue;
+    auto found = *leaf.found;
+    found.buried->visible_area = 0.125F;
+    leaf.found = std::make_shared<const BurialRecord::Found>(std::move(found));
   }
   built.burial = std::make_shared<const BurialRecord>(std::move(record));
   scene_.instances[5].world = glm::scale(  // half in the floor
@@ -261,9 +265,9 @@ TEST_F(BurialRecords, LeavesThatNoRayOfAnEditTouchesAreNotLookedAtAgain) {
   const auto after = build(before, built);
   std::size_t remembered = 0, all = 0;
   for (const auto& leaf : after.burial->leaves) {
-    if (!leaf.buried) continue;
+    if (!leaf.found->buried) continue;
     ++all;
-    remembered += leaf.buried->visible_area == 0.125F ? 1 : 0;
+    remembered += leaf.found->buried->visible_area == 0.125F ? 1 : 0;
   }
   EXPECT_GT(all, 100U);
   EXPECT_GT(remembered, all / 4);
