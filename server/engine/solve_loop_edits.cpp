@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "common/log.h"
+#include "common/parallel.h"
 #include "server/engine/solve_loop_class.h"
 
 namespace radiosity::engine {
@@ -35,10 +36,15 @@ Result<LitScene::Affected> SolveLoop::relight(Result<std::unique_ptr<LitScene>> 
 
 Result<LitScene::Affected> SolveLoop::tryOut(LitScene& made, LitScene* former, bool solve_anew, const KeepMade& keep,
                                              bool& keeps_layout) {
-  if (auto begun = made.beginUpload(); !begun) return tl::unexpected<Error>(begun.error());
+  Result<void> begun;
   LitScene::Affected affected;
+  const auto begin = [&](std::size_t part) {  // the transport is this thread's alone
+    if (part == 0) begun = made.beginUpload();
+    if (part == 1 && former != nullptr) affected = made.succeed(*former);
+  };
+  doShares(2, ShareOfWork(begin));
+  if (!begun) return tl::unexpected<Error>(begun.error());
   if (former != nullptr) {
-    affected = made.succeed(*former);
     keeps_layout = made.keepsLayoutOf(*former);
     made.fadeFrom(*former, keeps_layout);
   }

@@ -1,4 +1,5 @@
 #include "server/scene/charts.h"
+#include "common/parallel.h"
 
 #include <fmt/format.h>
 
@@ -64,7 +65,14 @@ class Builder {
     patches_.warnings.insert(patches_.warnings.end(), atlas_.warnings.begin(), atlas_.warnings.end());
     for (std::uint32_t c = 0; c < charts_.size(); ++c) addSurface(c);
     if (auto sized = numberNodes(); !sized) return tl::unexpected(sized.error());
-    const std::vector<LeafPiece> pieces = measureCoverage(patches_);
+    std::vector<LeafPiece> pieces;
+    ClosedSolids solids;
+    const auto measure = [&](std::size_t part) {  // each reads what the other does not write
+      if (part == 0) pieces = measureCoverage(patches_);
+      if (part == 1) solids = findClosedSolids(patches_);
+    };
+    doShares(2, ShareOfWork(measure));
+    patches_.solids = std::move(solids);
     setTexelAreas();
     std::vector<Hides> hides;
     for (Surface& surface : patches_.surfaces) {
@@ -72,7 +80,6 @@ class Builder {
       surface.see_through = isSeeThrough(material);
       hides.push_back(surface.see_through ? Hides::kNothing : material.double_sided ? Hides::kSheet : Hides::kSolid);
     }
-    patches_.solids = findClosedSolids(patches_);
     burial_ = removeBuried(patches_, pieces, hides, [&]() -> std::unique_ptr<const FormerBurial> {
       if (former_ == nullptr || record_ == nullptr) return nullptr;
       auto same = matchSurfaces(former_->scene, former_->patches, scene_, patches_);
