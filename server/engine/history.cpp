@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "common/check.h"
-#include "common/parallel.h"
 #include "server/scene/json_patch.h"
 
 namespace radiosity::engine {
@@ -72,15 +71,10 @@ History::Next History::nextEdit(std::uint64_t revision, const std::string& by, c
                                 const scene::Document& before, const scene::Document& after) const {
   Next next;
   next.entry = {revision, PastRevision::Kind::kPatch, by, summaryOf(patch), now()};
-  std::string back;
-  const auto walk = [&](std::size_t backwards) {  // each through all of both
-    if (backwards == 0) next.patch = textOf(scene::diffJson(before.gltf, after.gltf));
-    if (backwards == 1) back = textOf(scene::diffJson(after.gltf, before.gltf));
-  };
-  doShares(2, ShareOfWork(walk));
+  next.patch = textOf(scene::diffJson(before.gltf, after.gltf));
   next.appended = {before.buffers.size(), before.images.size(), appended(before.buffers, after.buffers),
                    appended(before.images, after.images)};
-  next.edit = state::Edit{revision, next.patch, std::move(back), next.appended};
+  next.edit = state::Edit{revision, next.patch, textOf(scene::diffJson(after.gltf, before.gltf)), next.appended};
   for (auto n = done_; n < edits_.size(); ++n) next.forgotten.push_back(edits_[n].revision);
   std::size_t count = done_ + 1, bytes = bytesOf(*next.edit);
   for (std::size_t n = 0; n < done_; ++n) bytes += bytesOf(edits_[n]);

@@ -25,6 +25,10 @@ struct EngineOptions {
   /// the fifth ends it. Drivers take seconds to reset a card.
   std::chrono::milliseconds recovery_wait{500};
 
+  /// After an edit of geometry that took no longer than this to make its light is waited for as long, before the light
+  /// that there was is shown where things lie now.
+  std::chrono::milliseconds solved_soon{30};
+
   /// Scenes of more texels than this are lit at `first_texels` first, while the others are being made; 0: none are.
   std::uint64_t first_light_above = 1'000'000;
   std::uint64_t first_texels = 100'000;

@@ -119,6 +119,7 @@ class SolveLoop final : public Engine {
   /// What is watched and not published yet; `final`: as a new version in any case.
   void publishLightmaps(bool final);
   [[nodiscard]] bool showsNothingNew() const;
+  [[nodiscard]] bool watchesIrradianceAlone() const;
   void showEdit();
   [[nodiscard]] QuantityPages pagesToShow(Quantity quantity);
   void publishQuantity(Quantity quantity);

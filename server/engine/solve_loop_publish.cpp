@@ -13,8 +13,6 @@ namespace {
 
 /// Oftener than anyone can see a difference.
 constexpr auto kPublishInterval = std::chrono::milliseconds(50);
-/// Of edits of geometry; and how long their light may be waited for.
-constexpr auto kShortEdit = std::chrono::milliseconds(25), kSolvedSoon = std::chrono::milliseconds(30);
 /// Making pages takes no more than one part in so many of the solve thread's time, however large they are; ...
 constexpr int kPublishShare = 20;
 /// ... but while a solve is young, and every version shows much that is new, up to one part in so many.
@@ -62,7 +60,10 @@ bool SolveLoop::showsNothingNew() const {
   if (!lit_ || !shown_is_own_ || state_ != SolveState::kSolving || !publisher_.latest(Quantity::kIrradiance))
     return false;
   const bool is_own = lit_->showsOwnLight() && lit_->solver().isUnsettled() && !lit_->solver().isRepairing();
-  if (!is_own && !lit_->showsFormerLight()) return false;
+  return (is_own || lit_->showsFormerLight()) && watchesIrradianceAlone();
+}
+
+bool SolveLoop::watchesIrradianceAlone() const {
   return std::ranges::none_of(kQuantities, [&](auto q) { return q != Quantity::kIrradiance && watches_.wants(q); });
 }
 
@@ -72,8 +73,9 @@ bool SolveLoop::showsNothingNew() const {
 void SolveLoop::showEdit() {
   if (showsNothingNew()) return;
   const auto now = Clock::now();
-  if (state_ == SolveState::kSolving && !owes_pages_ && now - edit_began_ < kShortEdit) {
-    owes_pages_ = now + kSolvedSoon;
+  const bool is_short = now - edit_began_ < options_.solved_soon;
+  if (state_ == SolveState::kSolving && !owes_pages_ && is_short && watchesIrradianceAlone()) {
+    owes_pages_ = now + options_.solved_soon;
   } else {
     publishLightmaps(false);
   }

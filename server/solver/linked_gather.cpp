@@ -27,7 +27,7 @@ constexpr double kLightShot = 2.0;
 constexpr double kBright = 8.0, kBrightBesideUsual = 3.3;
 /// The equation on leaves is solved to so much of the asked error, within these bounds: far below any sampling error,
 /// and the level of light is right anyway. Rounding leaves 3e-8 over what is not reflected.
-constexpr double kResidual = 0.2, kLeastResidual = 1e-4, kMostResidual = 4e-3;
+constexpr double kResidual = 0.05, kLeastResidual = 1e-4, kMostResidual = 1e-3;
 /// A side has light over links that is worth the name: of the mean of all.
 constexpr double kLit = 0.5;
 /// A round ends where it is likely to bring the error to this part of the target: what it goes by is uncertain.

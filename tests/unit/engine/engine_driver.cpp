@@ -1,6 +1,7 @@
 #include "tests/unit/engine/engine_driver.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cstdlib>
 
 #include "tests/scenes/glb_writer.h"
@@ -33,6 +34,7 @@ class ScriptedTransport final : public solver::Transport {
     if (script_->runs_until_failure > 0 && --script_->runs_until_failure == 0)
       return fail(ErrorCode::kUnavailable, "the driver reset the card");
     if (script_->runs_out_of_memory) throw std::bad_alloc();
+    std::this_thread::sleep_for(std::chrono::milliseconds(script_->pause_ms));
     return rays_.run(batch, into);
   }
   [[nodiscard]] Losses losses() const override {
@@ -117,6 +119,7 @@ engine::EngineOptions rayOptions(std::shared_ptr<TransportScript> script) {
   options.settings.target_error = kEasy;
   options.settings.texels = 150;
   options.recovery_wait = std::chrono::milliseconds(2);
+  options.solved_soon = {};  // what is shown between is looked at
   options.make_transport = [script = std::move(script)]() -> Result<std::unique_ptr<solver::Transport>> {
     return std::make_unique<ScriptedTransport>(script);
   };

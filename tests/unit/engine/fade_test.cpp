@@ -153,5 +153,72 @@ TEST_F(Fade, WhatIsNewIsNotBlackEither) {
   ASSERT_TRUE(reaches(SolveState::kConverged));
 }
 
+/// As the server is: pages of the light before an edit are left out where its own follows soon.
+class SolvedSoon : public EngineTest {
+ protected:
+  void startWith(std::chrono::milliseconds soon) {
+    auto options = rayOptions(script_);
+    options.solved_soon = soon;
+    watching_.reset();
+    engine_ = engine::makeEngine(std::move(options)).value();
+    engine_->addListener(recorder_);
+    watching_ = engine_->watch(engine::Quantity::kIrradiance);
+    solve(lumpedCube(0.5));
+    recorder_->forget();
+  }
+  /// Another cube, seen by nobody, with charts of its own.
+  bool addCube(int node) {
+    const auto name = std::to_string(node);
+    return patch(R"([{"op":"add","path":"/nodes/-","value":{"mesh":0,"scale":[0.1,0.1,0.1]}},
+                     {"op":"add","path":"/scenes/0/nodes/-","value":)" +
+                 name + "}]")
+        .has_value();
+  }
+};
+
+TEST_F(SolvedSoon, ItsOwnLightAloneIsShown) {
+  startWith(std::chrono::minutes(1));
+  ASSERT_TRUE(addCube(2));
+  ASSERT_TRUE(reaches(SolveState::kConverged));
+  (void)sceneText();  // all that was told is told
+  const auto published = recorder_->lightmaps();
+  ASSERT_EQ(published.size(), 1U);
+  EXPECT_TRUE(published.front()->final);
+  EXPECT_EQ(published.front()->revision, status().revision);
+}
+
+TEST_F(SolvedSoon, WhatIsNotIsShownAsItWasMeanwhile) {
+  startWith(std::chrono::milliseconds(20));
+  script_->pause_ms = 60;
+  ASSERT_TRUE(addCube(2));
+  ASSERT_TRUE(reaches(SolveState::kConverged));
+  (void)sceneText();
+  const auto published = recorder_->lightmaps();
+  ASSERT_GT(published.size(), 1U);
+  EXPECT_FALSE(published.front()->final);
+  EXPECT_GT(meanIrradiance(*published.front()), 0.0);
+}
+
+// Whoever drags something about sees all of it, though no edit is solved before the next.
+TEST_F(SolvedSoon, TheNextEditShowsWhatTheOneBeforeOwes) {
+  startWith(std::chrono::minutes(1));
+  script_->pause_ms = 200;
+  ASSERT_TRUE(addCube(2));
+  EXPECT_TRUE(recorder_->lightmaps().empty());
+  ASSERT_TRUE(addCube(3));
+  (void)sceneText();
+  EXPECT_FALSE(recorder_->lightmaps().empty());
+  EXPECT_FALSE(recorder_->lightmaps().front()->final);
+}
+
+// Nothing else would show it.
+TEST_F(SolvedSoon, APauseShowsWhatIsOwed) {
+  startWith(std::chrono::minutes(1));
+  script_->pause_ms = 200;
+  ASSERT_TRUE(addCube(2));
+  ASSERT_TRUE(pause());
+  EXPECT_FALSE(recorder_->lightmaps().empty());
+}
+
 }  // namespace
 }  // namespace radiosity::test
