@@ -137,6 +137,7 @@ void SolveLoop::takeTurn() {
     log::error("solve stopped: {}", failure_);
     state_ = SolveState::kFailed;
     unpublished_ = false;
+    if (owes_pages_) (void)fitsMemory([&] { publishLightmaps(false); });
     next_checkpoint_ = Clock::now() + options_.checkpoint_interval;
     updateStatus(true);
   }

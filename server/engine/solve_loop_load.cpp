@@ -196,6 +196,7 @@ void SolveLoop::unload(SolveState state) {
   lit_.reset();
   as_restored_ = false;
   state_ = state;
+  owes_pages_.reset();
   publisher_.reset();
   publisher_.startVersion();
   for (std::size_t q = 0; q < kQuantityCount; ++q) {

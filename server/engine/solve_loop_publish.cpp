@@ -26,6 +26,7 @@ static_assert(kQuantities.size() == kQuantityCount);
 
 void SolveLoop::publishLightmaps(bool final) {
   const bool watched = std::any_of(kQuantities.begin(), kQuantities.end(), [&](auto q) { return watches_.wants(q); });
+  owes_pages_.reset();
   if (!lit_) return;
   if (!watched) {
     if (unpublished_ || final) ++unwatched_;
@@ -37,7 +38,6 @@ void SolveLoop::publishLightmaps(bool final) {
     stepped_ = false;
   }
   unpublished_ = false;
-  owes_pages_.reset();
   shown_is_own_ = true;
   updateStatus(false);
   for (const auto quantity : kQuantities) publishQuantity(quantity);

@@ -25,6 +25,7 @@ bool SolveLoop::willRecover(const Error& error) {
   const LogScope about({.revision = revision_});
   log::warn("no renderer is left: {}; the solve starts over in {} ms", failure_, wait.count());
   updateStatus(true);
+  if (owes_pages_) publishLightmaps(false);
   return true;
 }
 

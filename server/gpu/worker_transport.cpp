@@ -94,9 +94,9 @@ class WorkerTransport final : public solver::Transport {
     deaths_ = 0;
     for (auto& slot : slots_) {
       if (!slot.process) continue;
-      slot.takes_scene = true;
-      if (auto sent = slot.process->sendScene(packed_, nodes_, hands_, scenePatience()); !sent)
-        lose(slot, sent.error());
+      auto sent = slot.process->sendScene(packed_, nodes_, hands_, scenePatience());
+      slot.takes_scene = sent.has_value();
+      if (!sent) lose(slot, sent.error());
     }
     return {};
   }
@@ -148,7 +148,8 @@ class WorkerTransport final : public solver::Transport {
  private:
   Result<void> carryOut(const solver::ShotBatch& batch) {
     if (!has_scene_) return fail(ErrorCode::kInternal, "setScene must come before run");
-    RAD_CHECK(std::ranges::none_of(slots_, &Slot::takes_scene));
+    if (std::ranges::any_of(slots_, &Slot::takes_scene))
+      return fail(ErrorCode::kInternal, "finishScene must come after beginScene");
     const ShotSpan shots = spanOf(batch);
     if (auto good = checkShots(shots); !good) return good;
     if (batch.mode == solver::LinkMode::kPaperMipmap && !paper_fits_) return tl::unexpected(paper_error_);

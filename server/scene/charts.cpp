@@ -65,6 +65,12 @@ class Builder {
     patches_.warnings.insert(patches_.warnings.end(), atlas_.warnings.begin(), atlas_.warnings.end());
     for (std::uint32_t c = 0; c < charts_.size(); ++c) addSurface(c);
     if (auto sized = numberNodes(); !sized) return tl::unexpected(sized.error());
+    std::vector<Hides> hides;
+    for (Surface& surface : patches_.surfaces) {
+      const Material& material = materialOf(scene_, surface.instance);
+      surface.see_through = isSeeThrough(material);
+      hides.push_back(surface.see_through ? Hides::kNothing : material.double_sided ? Hides::kSheet : Hides::kSolid);
+    }
     std::vector<LeafPiece> pieces;
     ClosedSolids solids;
     const auto measure = [&](std::size_t part) {  // each reads what the other does not write
@@ -74,12 +80,6 @@ class Builder {
     doShares(2, ShareOfWork(measure));
     patches_.solids = std::move(solids);
     setTexelAreas();
-    std::vector<Hides> hides;
-    for (Surface& surface : patches_.surfaces) {
-      const Material& material = materialOf(scene_, surface.instance);
-      surface.see_through = isSeeThrough(material);
-      hides.push_back(surface.see_through ? Hides::kNothing : material.double_sided ? Hides::kSheet : Hides::kSolid);
-    }
     burial_ = removeBuried(patches_, pieces, hides, [&]() -> std::unique_ptr<const FormerBurial> {
       if (former_ == nullptr || record_ == nullptr) return nullptr;
       auto same = matchSurfaces(former_->scene, former_->patches, scene_, patches_);

@@ -86,7 +86,10 @@ Shaft::Shaft(const glm::vec3& place, const glm::vec3& normal, std::span<const gl
     plane[count++] = glm::vec4(inwards, offset - glm::dot(inwards, on));
   };
   glm::vec3 middle(0.0F);
-  for (const auto& corner : corners) middle += corner / static_cast<float>(corners.size());
+  for (const auto& corner : corners) {
+    middle += corner / static_cast<float>(corners.size());
+    length = larger(length, glm::distance(from, corner));
+  }
   for (std::size_t i = 0; i < std::min(corners.size(), kMostSides); ++i) {
     const auto across = glm::cross(corners[i] - from, corners[(i + 1) % corners.size()] - from);
     const float length = glm::length(across);
@@ -126,7 +129,7 @@ RADIOSITY_CLONES bool RayTree::hide(const Shaft& shaft, const ShaftPoints& point
       if (++triangles > most) return false;
       const Facet facet{{sign * glm::cross(a, b), sign * glm::cross(b, c), sign * glm::cross(c, a)},
                         sign * plane,
-                        block.slack[k],
+                        block.slack[k] * shaft.length,  // as much for each unit of the way
                         sign * height};
       hideBehind(facet, shaft.from, count, points.x.data(), points.y.data(), points.z.data(), hidden);
     }

@@ -20,6 +20,7 @@ struct Shaft {
         float spare);
 
   glm::vec3 from;
+  float length = 0.0F;                          ///< of its longest edge
   std::array<glm::vec4, kMostSides + 2> plane;  ///< inside: dot(normal, x) + w > 0; unit normals
   std::size_t count = 0;
 };

@@ -249,10 +249,10 @@ LeafRays::Sight LeafRays::look(const Place& from, const glm::dvec3& direction) c
 
 bool LeafRays::isOpen(const Place& from, const glm::dvec3& to) const {
   const glm::dvec3 origin = lifted(from), way = to - origin;
-  const double part = 1.0 - kNearEnd / glm::length(way);
+  const double length = glm::length(way);
   scene::RayHit hit{};
-  return part > 0.0 &&
-         !wide_.nearestHit(glm::vec3(origin), glm::vec3(way), static_cast<float>(part), hit, {}, from.triangle);
+  return length > kNearEnd && !wide_.nearestHit(glm::vec3(origin), glm::vec3(way / length),
+                                                static_cast<float>(length - kNearEnd), hit, {}, from.triangle);
 }
 
 glm::vec3 LeafRays::startOf(const Place& place) { return glm::vec3(lifted(place)); }

@@ -1,6 +1,7 @@
 // LeafSights after an edit of geometry: rays that pass nothing that changed see what they saw.
 #include <algorithm>
 #include <numeric>
+#include <optional>
 
 #include "server/solver/halves.h"
 #include "server/solver/leaf_sights.h"
@@ -120,6 +121,7 @@ void LeafSights::inheritLeaf(std::uint32_t value, std::size_t half, std::size_t 
                              const PackedNumbers::Run& old, const Inheritance& from, const FirstMet& met) {
   const auto& former = from.former;
   const auto& change = from.change.change();
+  std::optional<Sobol4> draw;  // few leaves need it
   for (std::uint32_t k = 0; k < old.size(); ++k) {
     const auto first = met.end[k];
     if (first == kUntraced) continue;  // it saw what is gone, or moved
@@ -127,8 +129,8 @@ void LeafSights::inheritLeaf(std::uint32_t value, std::size_t half, std::size_t 
     const bool is_known = first < leaf_count_ || first >= skyAbove();
     const bool may_pass =
         first >= leaf_count_ || from.stands_in[first] || (met.may_hide[k] != 0 && from.change.mayHide(value, first));
-    if (may_pass && passes(is_known ? change.came : change.boxes, value, draws(value, rays_->sideOf(value), half)(k)))
-      continue;
+    if (may_pass && !draw) draw.emplace(draws(value, rays_->sideOf(value), half));
+    if (may_pass && passes(is_known ? change.came : change.boxes, value, (*draw)(k))) continue;
     const auto end = old[k] >= former.endCount() ? inheritStep(half, old[k], from) : first;
     if (end != kUntraced) seen_[half].set(first_ray + k, end);
   }

@@ -45,10 +45,8 @@ void LeafVariation::askWays(std::size_t half, std::span<const Tells> tells, cons
   for (const auto receiver : receivers_) {
     if (tells[receiver] != Tells::kByWay || known_[receiver] == 0) continue;
     const auto middle = rays_->placeOn(receiver, glm::dvec2(0.5));
-    const auto reach = nearest() + rays_->widthOf(receiver);
-    if (rays_->isEven(receiver) &&
-        !change.changesBefore(glm::vec3(middle.position), glm::vec3(middle.normal), static_cast<float>(reach)))
-      continue;
+    const glm::vec3 normal(middle.normal);
+    if (rays_->isEven(receiver) && !change.changesBefore(receiver, normal, static_cast<float>(nearest()))) continue;
     for (std::uint32_t k = 0; k < known_[receiver]; ++k) {
       const auto way = firstWay(receiver, keyOf(receiver, k, half));
       if (change.changesAlong(glm::vec3(way.from.position), glm::vec3(way.from.position + nearest() * way.direction)))

@@ -51,12 +51,13 @@ LightSight::LightSight(std::shared_ptr<const LeafRays> rays, const LightPolygon&
     : rays_(std::move(rays)), light_(light), seed_(mixKeys(mixKeys(seed, 0x4c414d50ULL), light.key)) {
   for (std::size_t half = 0; half < 2; ++half) {
     const Sobol4 draws(mixKeys(seed_, half));
-    for (std::uint32_t i = 0; i < kPoints; ++i) {
+    for (std::uint32_t i = 0; i < kSets * kPoints; ++i) {
       const auto draw = draws(i);
       const auto point = light.point(draw.x, draw.y);
-      points_[half].x.push_back(point.x);
-      points_[half].y.push_back(point.y);
-      points_[half].z.push_back(point.z);
+      auto& set = points_[half][i / kPoints];  // each spread evenly, and all together
+      set.x.push_back(point.x);
+      set.y.push_back(point.y);
+      set.z.push_back(point.z);
     }
   }
 }
@@ -77,8 +78,9 @@ std::optional<float> LightSight::link(std::uint32_t value, std::size_t half, std
     if (!before || form_factor.front < 1.0) return std::nullopt;
     const auto from = rays_->startOf(place), normal = glm::vec3(place.normal);
     const scene::Shaft shaft(from, normal, corners, light_.normal, kSpare);
-    if (!rays_->hide(shaft, points_[half], kMostTriangles, hidden.data())) return std::nullopt;
-    const auto [all, seen] = bringAll(points_[half], from, normal, light_.normal, hidden.data());
+    const auto& points = points_[half][i % kSets];
+    if (!rays_->hide(shaft, points, kMostTriangles, hidden.data())) return std::nullopt;
+    const auto [all, seen] = bringAll(points, from, normal, light_.normal, hidden.data());
     if (!(all > 0.0F)) return std::nullopt;
     sum += form_factor.value * static_cast<double>(seen / all);
   }

@@ -136,6 +136,7 @@ LinkCounters LinkedSolver::linkCounters() const {
   counters.repaired = edits_.repaired;
   counters.repaired_links = edits_.repaired_links;
   counters.retaken = edits_.retaken;
+  counters.own_looks = edits_.own_looks;
   if (gather_) {
     counters.bytes += gather_->sights().bytes();
     counters.rays = gather_->rays();

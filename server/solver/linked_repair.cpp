@@ -25,18 +25,23 @@ constexpr double kLittleLost = 0.01, kMostPresumed = 2e-4;
 constexpr std::size_t kMostAtOnce = 1024;
 
 /// Adds to sums of links times points, over so many of them, what is there already, the mean of so many others, and
-/// makes means of all. Of leaves that looked for themselves (ascending) what is there stays.
-void addEarlierLooks(const LinkColumn& column, std::uint32_t earlier, std::uint32_t points,
-                     const LinkColumn::ValueRun& run, std::span<const std::uint32_t> by_themselves,
-                     std::span<float> sums, std::vector<float>& links) {
+/// makes means of all. `by_points`: ascending, that mean of leaves that looked for themselves as well. It becomes that
+/// of all, and what they found stays, unless all points there are have looked by now.
+template <typename LeafLink>
+void addEarlierLooks(const LinkColumn& column, std::uint32_t earlier, std::uint32_t points, bool all_looked,
+                     const LinkColumn::ValueRun& run, std::span<LeafLink> by_points, std::span<float> sums,
+                     std::vector<float>& links) {
   links.assign(run.count, 0.0F);
   (void)column.decode(run.first, links);
   for (auto& link : links) link /= static_cast<float>(column.gain());
+  const auto first = std::ranges::lower_bound(by_points, run.first, {}, &LeafLink::value);
+  const auto end = std::ranges::lower_bound(first, by_points.end(), run.first + run.count, {}, &LeafLink::value);
+  const std::span own(first, end);
+  for (auto& leaf : own) std::swap(links[leaf.value - run.first], leaf.link);
   const float weight = 1.0F / static_cast<float>(earlier + points);
   for (std::uint32_t i = 0; i < run.count; ++i) sums[i] = weight * (sums[i] + static_cast<float>(earlier) * links[i]);
-  for (auto leaf = std::ranges::lower_bound(by_themselves, run.first);
-       leaf != by_themselves.end() && *leaf < run.first + run.count; ++leaf)
-    sums[*leaf - run.first] = links[*leaf - run.first];
+  if (all_looked) return;
+  for (auto& leaf : own) std::swap(sums[leaf.value - run.first], leaf.link);
 }
 
 }  // namespace
@@ -308,7 +313,7 @@ void LinkedSolver::takePart(RepairBatch& repairs, std::size_t shot, LinkSample& 
 
 /// All samples of a repair have come: their mean takes the place of what was there.
 void LinkedSolver::replacePart(RepairBatch& repairs, std::uint32_t index) {
-  const auto& repair = repairs.repairs[index];
+  auto& repair = repairs.repairs[index];
   const auto& leaves = repairs.leaves[index];
   const auto& column = system_.shooters()[repair.shooter].column[repair.half];
   const double part = 1.0 / repairs.points;
@@ -316,7 +321,8 @@ void LinkedSolver::replacePart(RepairBatch& repairs, std::uint32_t index) {
   for (const auto& run : leaves) {
     const auto sum = std::span(repairs.sum).subspan(run.first, run.count);
     if (repair.looked > 0) {
-      addEarlierLooks(column, repair.looked, repairs.points - repair.looked, run, repair.by_themselves, sum, before);
+      addEarlierLooks(column, repair.looked, repairs.points - repair.looked, repairs.points >= repair.samples, run,
+                      std::span(repair.by_points), sum, before);
     } else {
       for (auto& value : sum) value *= static_cast<float>(part);
     }

@@ -21,7 +21,7 @@ constexpr double kFalls = 1.5;
 /// Of what shall be left this part may be that of leaves that do not look for themselves, which those that do do from
 /// so many places.
 constexpr double kUnsure = 0.5;
-constexpr std::uint32_t kPlaces = 4;
+constexpr std::uint32_t kPlaces = 16;
 /// Leaves that a thread takes at a time.
 constexpr std::size_t kLooksAtOnce = 16;
 
@@ -46,9 +46,11 @@ float meanAround(const Side& side, std::uint32_t leaf, std::span<const float> va
 /// done one looks after the other, so that no edit waits for all of them.
 LinkedSolver::ShotRange LinkedSolver::shotsOfLight(const Repair& repair) const {
   const auto all = shotsFor(repair.samples), first = shotsFor(repair.looked);
-  const auto next = repair.first_shots > 0 ? repair.first_shots : mayLookFromLeaves() ? kFirstOfFew : kFirst;
+  // The first shot has the rest of a division, which may be two points.
+  const auto few = repair.samples % kLightPoints == 0 ? kFirstOfFew : kFirstOfFew + 1;
+  const auto next = repair.first_shots > 0 ? repair.first_shots : mayLookFromLeaves() ? few : kFirst;
   if (repair.whole || !lights_may_be_rough_) return {first, all};
-  if (phase_ == Phase::kDone) return {first, std::min(all, first + 1)};
+  if (phase_ == Phase::kDone && from_links_ == FromLinks::kNo) return {first, std::min(all, first + 1)};
   return {first, next <= first ? all : std::min(all, next)};
 }
 
@@ -95,8 +97,9 @@ void LinkedSolver::lookFromLeaves(std::array<Repair*, 2> halves, std::span<const
   if (!lights_may_be_rough_ || !mayLookFromLeaves() || sum * (1.0 - share) <= most) return;
   const double by_all = std::pow(share, kFalls) * sum;
   auto looks = chooseUnsure(leaves, noise, kUnsure * (by_all + most), room);
-  std::erase_if(looks,
-                [&](const LeafLook& look) { return std::ranges::binary_search(repair.by_themselves, look.value); });
+  std::erase_if(looks, [&](const LeafLook& look) {
+    return std::ranges::binary_search(repair.by_points, look.value, {}, &LeafLink::value);
+  });
   const LightSight sight(leafRays(), lights_[system_.shooters()[repair.shooter].light], settings_.seed);
   const auto lookFrom = [&](std::size_t part) {
     const auto first = part * kLooksAtOnce, count = std::min(kLooksAtOnce, looks.size() - first);
@@ -150,11 +153,10 @@ void LinkedSolver::takeLeafLooks(Repair& repair, std::span<const LinkColumn::Val
     if (!column.decode(run.first, links)) continue;
     for (auto& link : links) link /= static_cast<float>(column.gain());
   }
-  for (const auto& look : looks) {
-    room[look.value] = *look.link[repair.half];
-    repair.by_themselves.push_back(look.value);
-  }
-  std::ranges::sort(repair.by_themselves);
+  for (const auto& look : looks)
+    repair.by_points.push_back({look.value, std::exchange(room[look.value], *look.link[repair.half])});
+  std::ranges::sort(repair.by_points, {}, &LeafLink::value);
+  edits_.own_looks += looks.size();
   system_.replaceLinks(repair.shooter, repair.half, leaves, room, column.totals());
   for (const auto& run : leaves) std::fill_n(&room[run.first], run.count, 0.0F);
 }

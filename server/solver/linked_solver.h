@@ -98,6 +98,10 @@ class LinkedSolver final : public Solver {
   template <typename Archive, typename Self>
   static void visit(Archive& archive, Self& self);
   /// Samples of a column that are to be taken again.
+  struct LeafLink {
+    std::uint32_t value;
+    float link;
+  };
   struct Repair {
     std::uint32_t shooter = 0, old_shooter = 0;
     std::size_t half = 0;
@@ -111,15 +115,15 @@ class LinkedSolver final : public Solver {
     LinkColumn::Totals found = {};  ///< by them, times points
     double noise = 0.0;             ///< square of the error of irradiance times area, where both halves have as many;
                                     ///< what all points would leave of it counts by what share of them has looked
-    std::vector<std::uint32_t> by_themselves = {};  ///< leaves that looked at it so, by ascending value
-    bool past_losses = false;  ///< its looks see where the change is alone, whatever is lost elsewhere
+    std::vector<LeafLink> by_points = {};  ///< ascending: of leaves that looked at it for themselves, by points alone
+    bool past_losses = false;              ///< its looks see where the change is alone, whatever is lost elsewhere
 
     /// As if none had looked.
     void lookAnew() {
       looked = 0;
       found = {};
       past_losses = false;
-      by_themselves.clear();
+      by_points.clear();
     }
   };
   /// Where the sides of the scene before are now.

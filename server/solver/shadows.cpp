@@ -27,6 +27,8 @@ constexpr float kHalfDiagonal = 0.7072F;
 constexpr float kMissed = -1.0F;
 /// Boxes are larger by this (unit box) than they are, where numbers are rounded that are of its size.
 constexpr float kRounding = 1e-6F;
+/// Charts of a file count as flat though they leave their plane by so much (unit box).
+constexpr float kOfChart = 2e-5F;
 /// Rays start a little before a place (unit box).
 constexpr float kOfPlace = 1e-5F;
 /// Squares of distances are known to this factor, and well below it.
@@ -187,7 +189,7 @@ scene::ChangedBox Shadows::aroundAltered(const std::vector<Side>& sides) const {
       const auto triangle = patches_.leaves[surface.first_leaf + leaf].triangle;
       if (!change_.altered[value] || triangle == scene::kNone) continue;
       const auto& frame = patches_.triangles[triangle];
-      const glm::vec3 centre(ball_[value]), half = 0.5F * (glm::abs(frame.du) + glm::abs(frame.dv)) + kRounding;
+      const glm::vec3 centre(ball_[value]), half = 0.5F * (glm::abs(frame.du) + glm::abs(frame.dv)) + kOfChart;
       box.low = glm::min(box.low, centre - (surface.planar ? half : glm::vec3(ball_[value].w)));
       box.high = glm::max(box.high, centre + (surface.planar ? half : glm::vec3(ball_[value].w)));
     }
@@ -247,11 +249,16 @@ bool Shadows::changesAlong(const glm::vec3& from, const glm::vec3& to) const {
   return std::ranges::any_of(all_, [&](const scene::ChangedBox& box) { return way.mayMeet(box); });
 }
 
-bool Shadows::changesBefore(const glm::vec3& point, const glm::vec3& normal, float distance) const {
-  return std::ranges::any_of(all_, [&](const scene::ChangedBox& box) {
-    return glm::dot(normal, farthest(box, normal) - point) > kOfPlace &&
-           glm::distance(point, glm::clamp(point, box.low, box.high)) <= distance;
-  });
+bool Shadows::changesBefore(std::uint32_t value, const glm::vec3& normal, float distance) const {
+  const auto& ball = ball_[value];
+  const glm::vec3 centre(ball);
+  const auto lies = [&](const scene::ChangedBox& box, float least) {
+    return glm::dot(normal, farthest(box, normal) - centre) > least &&
+           glm::distance(centre, glm::clamp(centre, box.low, box.high)) <= distance + ball.w;
+  };
+  const bool has_altered = all_.size() > change_.boxes.size();
+  return std::ranges::any_of(change_.boxes, [&](const auto& box) { return lies(box, kInFront); }) ||
+         (has_altered && lies(all_.back(), 2.0F * kOfChart));
 }
 
 bool Shadows::passesWithin(const glm::vec3& middle, float radius) const {
@@ -296,6 +303,7 @@ bool Shadows::Look::mayHide(std::uint32_t to) const {
 }
 
 void Shadows::Look::screen(std::span<const std::int32_t> to, std::int32_t* may) const {
+  if (shadows->change_.came.empty()) return (void)std::fill_n(may, to.size(), 0);
   if (to.empty()) return;
   screenBalls(from, past, to.size(), to.data(), &shadows->ball_.front().x, may);
 }

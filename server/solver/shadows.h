@@ -35,8 +35,9 @@ class Shadows {
   [[nodiscard]] bool changesWithin(std::uint32_t value, float distance) const;
   /// Whether something of it may be on the way from a place to another.
   [[nodiscard]] bool changesAlong(const glm::vec3& from, const glm::vec3& to) const;
-  /// Whether something of it lies before a plane, so near to a point.
-  [[nodiscard]] bool changesBefore(const glm::vec3& point, const glm::vec3& normal, float distance) const;
+  /// Whether something of it lies before the plane of a flat leaf of this normal, so near to some place on it. Leaves
+  /// that were altered and lie in that plane do not.
+  [[nodiscard]] bool changesBefore(std::uint32_t value, const glm::vec3& normal, float distance) const;
   /// Whether ways within a ball may pass a box.
   [[nodiscard]] bool passesWithin(const glm::vec3& middle, float radius) const;
   /// Whether some way from a place on a leaf to one within `radius` of a point may pass a box. The second: to one on

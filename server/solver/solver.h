@@ -72,6 +72,7 @@ struct LinkCounters {
   // Of edits of geometry, in all: samples that no change was seen from; that were taken again for the leaves whose
   // links may have changed, and how many these were; that were taken again. And those that still wait for that.
   std::uint64_t kept = 0, repaired = 0, repaired_links = 0, retaken = 0, waiting = 0;
+  std::uint64_t own_looks = 0;  ///< of leaves at lamps, for themselves
   std::uint64_t rays = 0;       ///< that leaves gather by
   std::uint64_t rays_kept = 0;  ///< of these, that an edit of geometry left as they were
 };

@@ -88,8 +88,8 @@ class Watcher final : public engine::Listener {
   void onLightmaps(const std::shared_ptr<const engine::Lightmaps>& lightmaps) override {
     const std::scoped_lock lock(mutex_);
     if (lightmaps->revision < revision_ || first_tile_) return;
-    // The first publication on new pages shows the light that was there before.
-    if (!std::exchange(published_, true) && lightmaps->layout != layout_) {
+    // The first publication on new pages shows the light that was there before, unless the new light was waited for.
+    if (!std::exchange(published_, true) && lightmaps->layout != layout_ && !lightmaps->final) {
       layout_ = lightmaps->layout;
       return;
     }

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "tests/unit/scene/shapes.h"
 
 namespace radiosity::scene::test {
@@ -106,6 +108,8 @@ TEST(Opacity, AGlassBoxBuriesNothing) {
         patches.node_area[s.first_node[0] + levelGrid(s.width, s.height, s.level_count - 1).offset]);
   }
   EXPECT_NEAR(floor_area * patches.scale * patches.scale, 1.0, 1e-4);
+  // Nor is it a closed solid, whose backs would not be drawn: light crosses two panes of it.
+  EXPECT_EQ(std::ranges::count(patches.solids.solid_of, kNone), static_cast<std::ptrdiff_t>(patches.triangles.size()));
 }
 
 }  // namespace
