@@ -223,7 +223,12 @@ class LeafGather {
   std::optional<LeafSmoother> smoother_;
   bool has_parted_ = false;                                        ///< leaves, as of LeafSights
   std::array<std::vector<std::array<double, 3>>, 2> parted_loss_;  ///< by half, part and channel: see there
-  std::array<LostRays, 2> lost_;                                   ///< by half; empty: none
+  struct Arrival {
+    std::uint32_t value, end;
+  };
+  /// By half: rays of leaves that end on parted leaves that lose some light; of these rays, none: not known, or many.
+  std::array<std::optional<std::vector<Arrival>>, 2> from_parted_;
+  std::array<LostRays, 2> lost_;     ///< by half; empty: none
   std::vector<std::uint32_t> part_;  ///< by side: which part of the scene, whose number is that of a side
   LeftLight light_;
   Stage stage_ = Stage::kDone;

@@ -16,6 +16,8 @@ namespace {
 constexpr double kMostLevel = 4.0, kMostOff = 0.5;
 /// Light that both halves lack by more than so many times what they differ by is not lacking by chance.
 constexpr double kByChance = 2.0;
+/// Of rays that end on such leaves no more are kept in mind than one for so many leaves.
+constexpr std::uint32_t kLeavesAnArrival = 2;
 /// Parted leaves lose no more than so many times what they would if they shone evenly: of one of which a quarter
 /// shines, and loses all that is lost.
 constexpr double kMostLoss = 4.0;
@@ -25,6 +27,7 @@ constexpr double kMostLoss = 4.0;
 /// How much of their light leaves lose, and which sides are of one part.
 void LeafGather::weighRays() {
   has_parted_ = false;
+  from_parted_ = {};
   for (std::uint32_t v = 0; v < sights_.leafCount() && !has_parted_; ++v)
     has_parted_ = areaOf(v) > 0.0 && sights_.isParted(v);
   // Sides that see each other, if over others, are of one part, which has the number of the first of them.
@@ -114,14 +117,25 @@ void LeafGather::weighPartedLoss(std::size_t h) {
     for (std::size_t c = 0; c < 3; ++c) radiosity[end][c] = static_cast<float>(halves_[h].source[end][c]);
   }
   followSteps(h, &halves_[h].source);
-  for (std::uint32_t v = 0; v < leaves; ++v) {
-    for (const auto end : sights_.seen(h, v)) {
-      if (loses[end] == 0) continue;
-      const auto by = end < sights_.endCount() ? end : steps[end - sights_.endCount()].by;
-      const double share = areaOf(v) / sights_.counts()[v];
-      for (std::size_t c = 0; c < 3; ++c)
-        fluxes[part_[sights_.sideOf(by)]][c].arrives += share * static_cast<double>(radiosity[end][c]);
+  const auto arrive = [&](const Arrival& ray) {
+    const auto by = ray.end < sights_.endCount() ? ray.end : steps[ray.end - sights_.endCount()].by;
+    const double share = areaOf(ray.value) / sights_.counts()[ray.value];
+    for (std::size_t c = 0; c < 3; ++c)
+      fluxes[part_[sights_.sideOf(by)]][c].arrives += share * static_cast<double>(radiosity[ray.end][c]);
+  };
+  if (from_parted_[h]) {
+    std::ranges::for_each(*from_parted_[h], arrive);
+  } else {
+    std::vector<Arrival> found;
+    const std::size_t most = leaves / kLeavesAnArrival;
+    for (std::uint32_t v = 0; v < leaves; ++v) {
+      for (const auto end : sights_.seen(h, v)) {
+        if (loses[end] == 0) continue;
+        arrive({v, end});
+        if (found.size() <= most) found.push_back({v, end});
+      }
     }
+    if (found.size() <= most) from_parted_[h] = std::move(found);
   }
   for (std::size_t p = 0; p < fluxes.size(); ++p) {
     for (std::size_t c = 0; c < 3; ++c) {
