@@ -84,7 +84,7 @@ bool LinkedSolver::mayLookFromLeaves() const {
 }
 
 /// Of a light of which some points have looked, both halves: how unsure that leaves it. Most of that is a few leaves,
-/// at the edges of shadows (at 8 points half of it 40, nine tenths 200 of the 2,900 behind a table). These look for
+/// at the edges of shadows (behind a table, at 8 points, 74 of 436 hold 85 % of it). These look for
 /// themselves, at all of the light.
 void LinkedSolver::lookFromLeaves(std::array<Repair*, 2> halves, std::span<const LinkColumn::ValueRun> leaves,
                                   std::span<float> room) {
