@@ -53,24 +53,6 @@ const std::array<Turn, kBurialWays>& turns() {
   return all;
 }
 
-/// Whether a ray of such a length from somewhere in a box of this half size about `from` meets the other box.
-bool sweeps(const glm::dvec3& from, const glm::dvec3& half, const glm::dvec3& way, double length,
-            const ChangedBox& box) {
-  double near = 0.0, far = length;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double low = static_cast<double>(box.low[axis]) - half[axis] - from[axis];
-    const double high = static_cast<double>(box.high[axis]) + half[axis] - from[axis];
-    if (std::abs(way[axis]) < 1e-12) {
-      if (low > 0.0 || high < 0.0) return false;
-      continue;
-    }
-    const double one = low / way[axis], other = high / way[axis];
-    near = std::max(near, std::min(one, other));
-    far = std::min(far, std::max(one, other));
-  }
-  return near <= far;
-}
-
 /// Those of which some surface is marked. `part_of`: by triangle, one of `count`, or kNone.
 std::vector<bool> partsWithMarked(const PatchScene& patches, std::span<const std::uint32_t> part_of, std::size_t count,
                                   const std::vector<bool>& marked) {

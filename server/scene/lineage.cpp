@@ -1,6 +1,7 @@
 #include "server/scene/lineage.h"
 
 #include <algorithm>
+#include <cmath>
 #include <glm/common.hpp>
 #include <limits>
 #include <map>
@@ -222,6 +223,23 @@ std::vector<std::uint32_t> matchInstances(const Scene& before, const Scene& afte
     source.push_back(found == known.end() ? kNone : found->second);
   }
   return source;
+}
+
+bool sweeps(const glm::dvec3& from, const glm::dvec3& half, const glm::dvec3& direction, double length,
+            const ChangedBox& box) {
+  double near = 0.0, far = length;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double low = static_cast<double>(box.low[axis]) - half[axis] - from[axis];
+    const double high = static_cast<double>(box.high[axis]) + half[axis] - from[axis];
+    if (std::abs(direction[axis]) < 1e-12) {
+      if (low > 0.0 || high < 0.0) return false;
+      continue;
+    }
+    const double one = low / direction[axis], other = high / direction[axis];
+    near = std::max(near, std::min(one, other));
+    far = std::min(far, std::max(one, other));
+  }
+  return near <= far;
 }
 
 void joinBoxes(std::vector<ChangedBox>& boxes) {

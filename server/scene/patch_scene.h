@@ -196,6 +196,10 @@ struct LevelGrid {
 struct ChangedBox {
   glm::vec3 low, high;
 };
+/// Whether a ray of such a length, in lengths of its direction, from somewhere in a box of this half size about `from`
+/// meets the other box.
+[[nodiscard]] bool sweeps(const glm::dvec3& from, const glm::dvec3& half, const glm::dvec3& direction, double length,
+                          const ChangedBox& box);
 
 /// Charts keep their identity where they have the same grid on the same instance.
 struct PatchMap {

@@ -92,9 +92,9 @@ Shaft::Shaft(const glm::vec3& place, const glm::vec3& normal, std::span<const gl
   }
   for (std::size_t i = 0; i < std::min(corners.size(), kMostSides); ++i) {
     const auto across = glm::cross(corners[i] - from, corners[(i + 1) % corners.size()] - from);
-    const float length = glm::length(across);
-    if (!(length > 0.0F)) continue;
-    add((glm::dot(across, middle - from) < 0.0F ? -1.0F : 1.0F) / length * across, from, spare);
+    const float size = glm::length(across);
+    if (!(size > 0.0F)) continue;
+    add((glm::dot(across, middle - from) < 0.0F ? -1.0F : 1.0F) / size * across, from, spare);
   }
   add(normal, from, -spare);
   add(of_end, corners[0], -spare);

@@ -11,35 +11,21 @@ namespace {
 
 /// Rays and boxes are held against each other with so much to spare (unit box).
 constexpr double kMargin = 1e-5;
+/// Farther than the unit box is wide.
+constexpr double kFar = 4.0;
 /// After an edit new leaves never have more rays of a half than these where all new ones together would have more than
 /// the scene had, or than these.
 constexpr std::uint16_t kMostOfNew = 32;
 constexpr std::size_t kFewForNew = 65'536;
-
-/// Whether a ray meets a box.
-bool meetsBox(const scene::ChangedBox& box, const glm::dvec3& from, const glm::dvec3& direction) {
-  double first = 0.0, last = 1e9;
-  for (int axis = 0; axis < 3; ++axis) {
-    const double low = static_cast<double>(box.low[axis]) - kMargin - from[axis];
-    const double high = static_cast<double>(box.high[axis]) + kMargin - from[axis];
-    if (direction[axis] == 0.0) {
-      if (low > 0.0 || high < 0.0) return false;
-      continue;
-    }
-    const double a = low / direction[axis], b = high / direction[axis];
-    first = std::max(first, std::min(a, b));
-    last = std::min(last, std::max(a, b));
-  }
-  return first <= last;
-}
 
 }  // namespace
 
 bool LeafSights::passes(std::span<const scene::ChangedBox> boxes, std::uint32_t value, const glm::dvec4& draw) const {
   const auto place = rays_->placeOn(value, {draw.z, draw.w});
   const auto direction = cosineDirection(place.normal, draw.x, draw.y);
-  return std::ranges::any_of(boxes,
-                             [&](const scene::ChangedBox& box) { return meetsBox(box, place.position, direction); });
+  return std::ranges::any_of(boxes, [&](const scene::ChangedBox& box) {
+    return scene::sweeps(place.position, glm::dvec3(kMargin), direction, kFar, box);
+  });
 }
 
 /// Whether something lies in the box around two leaves, so that a ray from one to the other may pass it.

@@ -79,9 +79,7 @@ std::vector<float> LinkedSolver::noiseOfLeaves(std::uint32_t light,
 }
 
 /// Surfaces that one can see through hide nothing for sure.
-bool LinkedSolver::mayLookFromLeaves() const {
-  return by_rays_ && std::ranges::none_of(patches_->surfaces, [](const auto& surface) { return surface.see_through; });
-}
+bool LinkedSolver::mayLookFromLeaves() const { return by_rays_ && patches_->opacity.empty(); }
 
 /// Of a light of which some points have looked, both halves: how unsure that leaves it. Most of that is a few leaves,
 /// at the edges of shadows (behind a table, at 8 points, 74 of 436 hold 85 % of it). These look for
@@ -92,7 +90,7 @@ void LinkedSolver::lookFromLeaves(std::array<Repair*, 2> halves, std::span<const
   const auto noise = noiseOfLeaves(repair.shooter, leaves);
   const double sum = std::reduce(noise.begin(), noise.end(), 0.0);
   const double share = static_cast<double>(repair.looked) / repair.samples;
-  const double most = std::pow(roughness_ * settings_.target_error * norm_before_, 2.0);
+  const double most = mostRoughness();
   repair.noise = sum;
   if (!lights_may_be_rough_ || !mayLookFromLeaves() || sum * (1.0 - share) <= most) return;
   const double by_all = std::pow(share, kFalls) * sum;
@@ -161,6 +159,9 @@ void LinkedSolver::takeLeafLooks(Repair& repair, std::span<const LinkColumn::Val
   for (const auto& run : leaves) std::fill_n(&room[run.first], run.count, 0.0F);
 }
 
+/// What few points of all lights may cause: square of the error of irradiance times area.
+double LinkedSolver::mostRoughness() const { return std::pow(roughness_ * settings_.target_error * norm_before_, 2.0); }
+
 /// What few points find is noisier than what all would: then the lights whose shadows are the noisiest look with more
 /// before light is solved for. Of independent points n times as many leave an nth of the square; these are spread
 /// better than that, but texels of which a shadow's edge hides a part are not.
@@ -173,7 +174,7 @@ bool LinkedSolver::lightsAreTooRough() {
     squares += roughness(repair);
     lights += roughness(repair) > 0.0 ? 1.0 : 0.0;
   }
-  const double most = std::pow(roughness_ * settings_.target_error * norm_before_, 2.0);
+  const double most = mostRoughness();
   if (squares <= most) return false;
   std::vector<bool> rough(system_.shooters().size(), false);
   for (const auto& repair : waiting) {

@@ -186,6 +186,7 @@ class LinkedSolver final : public Solver {
                                                    std::span<float> room) const;
   void takeLeafLooks(Repair& repair, std::span<const LinkColumn::ValueRun> leaves, std::span<const LeafLook> looks,
                      std::span<float> room);
+  [[nodiscard]] double mostRoughness() const;
   [[nodiscard]] bool lightsAreTooRough();
   [[nodiscard]] Result<StepOutcome> catchUp();
   [[nodiscard]] std::uint32_t shotsOf(const Repair& repair) const;

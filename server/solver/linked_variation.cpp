@@ -30,7 +30,7 @@ bool LinkedSolver::wantsVariation() const {
     return false;
   if (lights_.size() + sources_.size() > kMostLights) return false;
   // There rays find most lamps, too, and where something cuts a leaf they know what varies.
-  return std::ranges::none_of(patches_->surfaces, [](const scene::Surface& surface) { return surface.see_through; });
+  return patches_->opacity.empty();
 }
 
 /// assess() at an end of what the solver does, and not when somebody looks: then alone paths are traced first, so that

@@ -57,7 +57,8 @@ Squares squares(const LinkedSolver& few, const LinkedSolver& all, const LinkedSo
   return sum;
 }
 
-// Without the leaves' own looks few points leave three times the square that all of them do.
+// Without the leaves' own looks few points leave 2.2 times the square that all of them do, with them 0.99 times; were
+// these from two places, 7 times.
 TEST_F(AddedTable, IsLitByFewPointsAndTheLeavesThemselvesAsByAllPoints) {
   const auto after = edited(before_, add_);
   const auto map = mapOf(before_, after);
@@ -74,7 +75,7 @@ TEST_F(AddedTable, IsLitByFewPointsAndTheLeavesThemselvesAsByAllPoints) {
   LinkedSolver truth(after.patches, after.materials, *transport_, of_truth);
   while (truth.directIrradiance().empty()) ASSERT_TRUE(truth.step());
   const auto [few, all] = squares(*early, *exact, truth, *after.patches);
-  EXPECT_LT(few, 1.8 * all);
+  EXPECT_LT(few, 1.4 * all);
   // Whatever looked for itself meanwhile, in the end the links are those of all points.
   finish(*early);
   for (int i = 0; i < 1000 && early->isBehind(); ++i) ASSERT_TRUE(early->step());

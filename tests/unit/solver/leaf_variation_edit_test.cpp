@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <memory>
 #include <utility>
 
 #include "server/solver/leaf_variation.h"
@@ -53,6 +54,14 @@ class MovedScreenTest : public testing::Test {
     lamp.key = key;
     return lamp;
   }
+  /// Of the scene before, with more paths where they help.
+  [[nodiscard]] std::unique_ptr<LeafVariation> refined() const {
+    auto former = std::make_unique<LeafVariation>(*before_.patches, sides_, 1);
+    former->update(light(), kAlways);
+    for (int round = 0; round < 3 && former->refine(); ++round) former->update(light(), kAlways);
+    EXPECT_TRUE(former->corrects());
+    return former;
+  }
   [[nodiscard]] LeafLight light() const { return {emission_, reflectance_, {irradiance_, irradiance_}, lamps_, {}}; }
 
   /// Whether what was taken over by this change is what is found anew by as many paths.
@@ -84,10 +93,8 @@ class MovedScreenTest : public testing::Test {
 };
 
 TEST_F(MovedScreenTest, PathsThatPassNothingThatChangedAreKeptAndOthersAreNot) {
-  LeafVariation former(*before_.patches, sides_, 1);
-  former.update(light(), kAlways);
-  for (int round = 0; round < 3 && former.refine(); ++round) former.update(light(), kAlways);
-  ASSERT_TRUE(former.corrects());
+  const auto refined = this->refined();
+  const auto& former = *refined;
   const Shadows change(*after_.patches, sides_, change_);
   for (const auto value : same_)
     ASSERT_TRUE(value == scene::kNone || !change.changesWithin(value, static_cast<float>(former.nearest())));
@@ -109,10 +116,8 @@ class ScreenNearTheFloorTest : public MovedScreenTest {
 };
 
 TEST_F(ScreenNearTheFloorTest, PathsWhoseWaysPassNothingThatChangedAreKeptAndOthersAreNot) {
-  LeafVariation former(*before_.patches, sides_, 1);
-  former.update(light(), kAlways);
-  for (int round = 0; round < 3 && former.refine(); ++round) former.update(light(), kAlways);
-  ASSERT_TRUE(former.corrects());
+  const auto refined = this->refined();
+  const auto& former = *refined;
   const Shadows change(*after_.patches, sides_, change_);
   const auto reach = static_cast<float>(former.nearest());
   ASSERT_TRUE(std::ranges::any_of(
