@@ -96,7 +96,7 @@ Result<History::Step> History::step(bool redo, const scene::Document& now) const
   const auto& edit = edits_[redo ? done_ : done_ - 1];
   Step step{now, redo ? edit.forth : edit.back, edit.revision};
   step.document.gltf.patch_inplace(json::parse(step.patch));  // our own, of just this document
-  step.document.parsed.reset();
+  step.document.imported.reset();
   auto &buffers = step.document.buffers, &images = step.document.images;
   buffers.resize(edit.appended.buffers_before);
   images.resize(edit.appended.images_before);

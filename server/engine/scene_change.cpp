@@ -16,7 +16,8 @@ using scene::TextureUse;
 bool sameTexture(const Scene& a, TextureUse use_a, const Scene& b, TextureUse use_b) {
   const bool none_a = use_a.texture == scene::kNone, none_b = use_b.texture == scene::kNone;
   if (none_a || none_b) return none_a == none_b;
-  if (a.textures[use_a.texture] != b.textures[use_b.texture]) return false;
+  const auto &in_a = a.textures.element(use_a.texture), &in_b = b.textures.element(use_b.texture);
+  if (in_a != in_b && *in_a != *in_b) return false;
   use_a.texture = use_b.texture = 0;
   return use_a == use_b;
 }

@@ -166,7 +166,7 @@ Result<std::unique_ptr<LitScene>> SolveLoop::resumedScene(const scene::Document&
   const bool is_newest = head.gltf == textOf(document.gltf);
   if (!is_newest) {
     then.gltf = json::parse(head.gltf, nullptr, false);
-    then.parsed.reset();
+    then.imported.reset();
   }
   if (then.gltf.is_discarded()) return fail(ErrorCode::kBadInput, "its document is no JSON");
   auto settings = settings_;

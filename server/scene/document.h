@@ -28,7 +28,7 @@ struct ImportLimits {
   std::size_t max_nodes = std::size_t{1} << 20;
 };
 
-struct ParsedModel;  // import_model.h
+struct ImportRecord;  // import_record.h
 
 struct Document {
   std::string name;                  ///< for messages: "room.glb"
@@ -36,7 +36,7 @@ struct Document {
   std::vector<SharedBytes> buffers;  ///< one for each /buffers entry
   std::vector<SharedBytes> images;   ///< encoded bytes (PNG, JPEG), one for each /images entry
   /// Of `gltf` as it is, by importEdited(); null: not known, or too large. Whoever changes `gltf` lets it go.
-  std::shared_ptr<const ParsedModel> parsed = {};
+  std::shared_ptr<const ImportRecord> imported = {};
 };
 
 /// Reads .glb or .gltf. External buffers and images are read from the file's own folder and nowhere above it.
@@ -66,7 +66,8 @@ struct EditedDocument {
 };
 
 /// importScene on a document that was made from `former`, if from any: what of its JSON is as it was there is not
-/// parsed again, which is most of what importing takes. The same scene, or the same error.
+/// parsed again, no image is decoded twice, and where nothing but materials differs the rest of the scene is that of
+/// before, not a copy. The same scene, or the same error, where `limits` are those of before.
 [[nodiscard]] Result<EditedDocument> importEdited(Document document, const Document* former,
                                                   const ImportLimits& limits = {});
 

@@ -7,6 +7,7 @@
 
 #include "server/scene/document.h"
 #include "server/scene/import_model.h"
+#include "server/scene/import_record.h"
 #include "server/scene/json_text.h"
 #include "server/scene/scene.h"
 
@@ -15,7 +16,10 @@ namespace radiosity::scene {
 struct ImportContext {
   const Document& document;
   const ImportLimits& limits;
-  const tinygltf::Model& model;
+  const tinygltf::Model& model;  ///< but for its materials
+  const std::vector<tinygltf::Material>& materials;
+  const ImportRecord* before;  ///< of the document before an edit; null: none, or not known
+  DecodedImages& images;       ///< gets those that are used
   Scene& scene;
 
   void warn(std::string_view pointer, std::string_view what) {

@@ -25,7 +25,7 @@ class MaterialImporter {
 
   Result<void> add(std::size_t index) {
     pointer_ = "/materials/" + std::to_string(index);
-    const auto& source = context_.model.materials[index];
+    const auto& source = context_.materials[index];
     const auto& json = context_.document.gltf["materials"][index];
     Material out;
     out.name = source.name;
@@ -165,33 +165,60 @@ class MaterialImporter {
     return {};
   }
 
-  Result<Texture> decode(std::size_t image) {
-    const auto limit = std::min(context_.limits.max_image_pixels, pixels_left_);
-    auto texture = decodeImage(*context_.document.images[image], limit,
-                               place(context_.document.name, "/images/" + std::to_string(image)));
-    if (texture) pixels_left_ -= texture->rgba.size() / 4;
-    return texture;
+  [[nodiscard]] std::size_t limit() const { return std::min(context_.limits.max_image_pixels, pixels_left_); }
+
+  Result<Texture> decode(std::size_t image) const {
+    return decodeImage(*context_.document.images[image], limit(),
+                       place(context_.document.name, "/images/" + std::to_string(image)));
+  }
+
+  /// What the document before had of the same bytes, if it still fits.
+  [[nodiscard]] const DecodedImage* known(std::size_t image) const {
+    if (context_.before == nullptr) return nullptr;
+    const auto found = context_.before->images.find(context_.document.images[image]);
+    return found != context_.before->images.end() && found->second.pixels <= limit() ? &found->second : nullptr;
+  }
+
+  /// Where it is kept for the next edit, of so many pixels.
+  DecodedImage& keep(std::size_t image, std::size_t pixels) {
+    pixels_left_ -= pixels;
+    auto& kept = context_.images[context_.document.images[image]];
+    kept.pixels = pixels;
+    return kept;
   }
 
   Result<std::uint32_t> colorTexture(std::size_t image) {
     if (const auto found = color_textures_.find(image); found != color_textures_.end()) return found->second;
-    auto texture = decode(image);
-    if (!texture) return tl::unexpected(texture.error());
+    const auto* before = known(image);
+    auto color = before != nullptr ? before->color : nullptr;
+    if (!color) {
+      auto texture = decode(image);
+      if (!texture) return tl::unexpected(texture.error());
+      color = std::make_shared<const Texture>(std::move(*texture));
+    }
+    keep(image, color->rgba.size() / 4).color = color;
     const auto index = static_cast<std::uint32_t>(context_.scene.textures.size());
-    context_.scene.textures.push_back(std::move(*texture));
+    context_.scene.textures.push_back(std::move(color));
     color_textures_[image] = index;
     return index;
   }
 
   Result<float> meanBlue(std::size_t image) {
     if (const auto found = mean_blue_.find(image); found != mean_blue_.end()) return found->second;
-    const auto texture = decode(image);
-    if (!texture) return tl::unexpected(texture.error());
-    double sum = 0.0;
-    for (std::size_t i = 2; i < texture->rgba.size(); i += 4) sum += texture->rgba[i];
-    const auto mean = static_cast<float>(sum / 255.0 / (static_cast<double>(texture->rgba.size()) / 4.0));
-    mean_blue_[image] = mean;
-    return mean;
+    const auto* before = known(image);
+    auto mean = before != nullptr ? before->mean_blue : std::nullopt;
+    auto pixels = before != nullptr ? before->pixels : 0;
+    if (!mean) {
+      const auto texture = decode(image);
+      if (!texture) return tl::unexpected(texture.error());
+      double sum = 0.0;
+      for (std::size_t i = 2; i < texture->rgba.size(); i += 4) sum += texture->rgba[i];
+      pixels = texture->rgba.size() / 4;
+      mean = static_cast<float>(sum / 255.0 / static_cast<double>(pixels));
+    }
+    keep(image, pixels).mean_blue = mean;
+    mean_blue_[image] = *mean;
+    return *mean;
   }
 
   ImportContext& context_;
@@ -205,7 +232,7 @@ class MaterialImporter {
 
 Result<void> importMaterials(ImportContext& context) {
   MaterialImporter importer(context);
-  for (std::size_t i = 0; i < context.model.materials.size(); ++i) {
+  for (std::size_t i = 0; i < context.materials.size(); ++i) {
     if (auto ok = importer.add(i); !ok) return ok;
   }
   return {};

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "server/scene/json_text.h"
+#include "server/scene/import_record.h"
 
 namespace radiosity::scene {
 namespace {
@@ -14,19 +14,20 @@ namespace {
 /// Members of a document that are parsed together, or not at all, and what they become.
 struct Part {
   std::array<const char*, 3> members;
-  void (*take)(const tinygltf::Model& from, tinygltf::Model& to);
+  void (*take)(const ImportRecord& from, tinygltf::Model& to);
 };
 /// tinygltf looks from meshes to their accessors and views.
 const std::array kParts = {
     Part{{"accessors", "bufferViews", "meshes"},
-         [](const tinygltf::Model& from, tinygltf::Model& to) {
-           to.accessors = from.accessors;
-           to.bufferViews = from.bufferViews;
-           to.meshes = from.meshes;
+         [](const ImportRecord& from, tinygltf::Model& to) {
+           to.accessors = from.model->accessors;
+           to.bufferViews = from.model->bufferViews;
+           to.meshes = from.model->meshes;
          }},
-    Part{{"nodes"}, [](const tinygltf::Model& from, tinygltf::Model& to) { to.nodes = from.nodes; }},
-    Part{{"materials"}, [](const tinygltf::Model& from, tinygltf::Model& to) { to.materials = from.materials; }},
+    Part{{"nodes"}, [](const ImportRecord& from, tinygltf::Model& to) { to.nodes = from.model->nodes; }},
+    Part{{"materials"}, [](const ImportRecord& from, tinygltf::Model& to) { to.materials = from.materials; }},
 };
+constexpr std::size_t kMaterials = 2;
 /// These are small.
 constexpr std::array kAlways = {"asset", "cameras", "extensionsUsed", "samplers", "scene", "scenes", "textures"};
 
@@ -112,13 +113,7 @@ bool refuseImage(tinygltf::Image*, int, std::string*, std::string*, int, int, co
   return false;
 }
 
-}  // namespace
-
-Result<tinygltf::Model> parseModel(const Document& document, const Document* former) {
-  const bool is_known = former != nullptr && former->parsed != nullptr;
-  std::vector<const Part*> parsed, taken;
-  for (const auto& part : kParts)
-    (is_known && isSame(part, document.gltf, former->gltf) ? taken : parsed).push_back(&part);
+Result<tinygltf::Model> parse(const Document& document, std::span<const Part* const> parsed) {
   auto json = reduced(document.gltf, parsed);
   if (std::ranges::find(parsed, &kParts[0]) != parsed.end()) addZeroView(json);
   const auto text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
@@ -136,8 +131,26 @@ Result<tinygltf::Model> parseModel(const Document& document, const Document* for
   if (!ok || !sameShape(model, json)) {
     return fail(ErrorCode::kInvalidScene, "tinygltf cannot read it: " + error, place(document.name, "/"));
   }
-  for (const auto* part : taken) part->take(former->parsed->model, model);
   return model;
+}
+
+}  // namespace
+
+Result<tinygltf::Model> parseModel(const Document& document, const Json* former, const ImportRecord* before) {
+  std::vector<const Part*> parsed, taken;
+  for (const auto& part : kParts)
+    (before != nullptr && isSame(part, document.gltf, *former) ? taken : parsed).push_back(&part);
+  auto model = parse(document, parsed);
+  if (!model) return model;
+  for (const auto* part : taken) part->take(*before, *model);
+  return model;
+}
+
+Result<std::vector<tinygltf::Material>> parseMaterials(const Document& document) {
+  const std::array parts{&kParts[kMaterials]};
+  auto model = parse(document, parts);
+  if (!model) return tl::unexpected(model.error());
+  return std::move(model->materials);
 }
 
 const tinygltf::BufferView* viewOf(const tinygltf::Model& model, int view) {

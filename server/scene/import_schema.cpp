@@ -398,6 +398,11 @@ Result<void> checkSchema(const Json& gltf, const std::string& name, std::vector<
   return checkVersion(gltf["asset"], name);
 }
 
+Result<void> checkMaterials(const Json& gltf, const std::string& name, std::vector<std::string>& warnings) {
+  static constexpr Member kAlone[] = {objects("materials", kMaterial)};
+  return Checker(gltf, name, warnings).objectAt(gltf, kAlone, "");
+}
+
 Result<void> checkExtensions(const Json& gltf, const std::string& name, std::vector<std::string>& warnings) {
   const auto list = [&](const char* member) { return gltf.contains(member) ? gltf[member] : Json::array(); };
   const auto required = list("extensionsRequired");

@@ -15,6 +15,10 @@ namespace radiosity::scene {
 /// that do no harm go to `warnings`.
 [[nodiscard]] Result<void> checkSchema(const Json& gltf, const std::string& name, std::vector<std::string>& warnings);
 
+/// The same of its materials alone, where all else is known to be in order.
+[[nodiscard]] Result<void> checkMaterials(const Json& gltf, const std::string& name,
+                                          std::vector<std::string>& warnings);
+
 /// Refuses by name what is in extensionsRequired and not supported; warns about the rest of extensionsUsed.
 [[nodiscard]] Result<void> checkExtensions(const Json& gltf, const std::string& name,
                                            std::vector<std::string>& warnings);

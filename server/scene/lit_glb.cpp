@@ -199,7 +199,7 @@ Result<Document> withLightmapUvs(const Document& document, const Scene& scene, c
   const auto model = parseModel(document);
   if (!model) return tl::unexpected(model.error());
   Document out = document;
-  out.parsed.reset();
+  out.imported.reset();
   freeTexcoord1(out.gltf);
   dropOldPages(out.gltf);
   if (auto ok = Exporter(document, *model, out).run(placements(scene, patches)); !ok) return tl::unexpected(ok.error());

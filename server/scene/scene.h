@@ -13,6 +13,8 @@
 #include <string>
 #include <vector>
 
+#include "common/shared_list.h"
+
 namespace radiosity::scene {
 
 inline constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
@@ -113,9 +115,9 @@ struct Sky {
 };
 
 struct Scene {
-  std::vector<Texture> textures;
+  SharedList<Texture> textures;
   std::vector<Material> materials;
-  std::vector<Primitive> primitives;
+  SharedList<Primitive> primitives;
   std::vector<Instance> instances;
   std::vector<Camera> cameras;
   std::vector<PunctualLight> lights;

@@ -78,8 +78,7 @@ class BurialRecords : public testing::Test {
     scene_.materials.resize(2);
     scene_.materials[1].double_sided = true;
     scene_.primitives = {cube(kBox), cube(kLidless), cube(kRoom), cube(kBox), cube(kLid)};
-    scene_.primitives[3].mesh = 3;
-    scene_.primitives[3].material = 1;
+    scene_.primitives.edit(3, [](Primitive& box) { box.mesh = 3, box.material = 1; });
     scene_.instances.push_back({.node = 0, .primitive = kRoom, .world = glm::scale(glm::dmat4(1.0), glm::dvec3(4.0))});
     for (std::uint32_t i = 1; i < 12; ++i) scene_.instances.push_back(placedAtRandom(i));
   }
@@ -207,7 +206,7 @@ TEST_F(BurialRecords, SolidsOfTwoMaterialsAndCavitiesGiveTheBitsOfLookingAtAllLe
   lid.material = 1;
   walls.primitive = 0, lid.primitive = 1;
   walls.mesh = lid.mesh = inner.mesh = 9;
-  scene_.primitives.insert(scene_.primitives.end(), {walls, lid, inner});
+  for (const auto& primitive : {walls, lid, inner}) scene_.primitives.push_back(primitive);
   auto before = scene_;
   auto built = buildWithRecord(scene_, options_).value();
   for (std::uint32_t i = 0; i < 16; ++i) {
@@ -229,7 +228,7 @@ TEST_F(BurialRecords, SolidsOfTwoMaterialsAndCavitiesGiveTheBitsOfLookingAtAllLe
 
 /// Beside its inner corner a place lies in its bounds, but before none of its faces.
 TEST_F(BurialRecords, AnAngleClosedByASheetGivesTheBitsOfLookingAtAllLeavesAgain) {
-  scene_.primitives.insert(scene_.primitives.end(), {angle(false), angle(true)});
+  for (const bool closes : {false, true}) scene_.primitives.push_back(angle(closes));
   auto before = scene_;
   auto built = buildWithRecord(scene_, options_).value();
   const auto closed = built.patches.solids.bounds.size();

@@ -473,11 +473,11 @@ TEST(Charts, InstancesOfOneLightmappedMeshGetTheirOwnRegions) {
 
 TEST(Charts, ATexelScaleMakesOneInstanceFinerAndLeavesTheOthers) {
   Scene scene = sceneOf(quadWithLightmapUv(0.0, 0.5));
-  scene.primitives[0].texcoord1.clear();
+  scene.primitives.edit(0, [](Primitive& quad) { quad.texcoord1.clear(); });
   scene.instances.push_back(scene.instances[0]);
   scene.instances[1].world = glm::translate(glm::dmat4(1.0), glm::dvec3(2, 0, 0));
   for (const bool uvs : {false, true}) {
-    if (uvs) scene.primitives[0] = quadWithLightmapUv(0.0, 0.5);
+    if (uvs) scene.primitives.edit(0, [](Primitive& quad) { quad = quadWithLightmapUv(0.0, 0.5); });
     scene.instances[1].texel_scale = 1.0F;
     const PatchScene plain = build(scene, 400);
     scene.instances[1].texel_scale = 2.0F;

@@ -1,9 +1,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <utility>
 
 #include "server/scene/json_patch.h"
 #include "tests/unit/scene/gltf_builder.h"
@@ -294,24 +296,84 @@ TEST_F(ScenePatch, aChainOfEditsImportsAsEachDocumentWouldByItself) {
         R"([{"op":"add","path":"/extensions","value":{"KHR_lights_punctual":{"lights":[{"type":"point"}]}}},
             {"op":"add","path":"/nodes/@lamp/extensions/KHR_lights_punctual","value":{"light":0}}])",
         R"([{"op":"remove","path":"/nodes/@more/mesh"}])",
-        R"([{"op":"replace","path":"/materials/0/alphaMode","value":"BLEND"}])"}) {
+        R"([{"op":"replace","path":"/materials/0/alphaMode","value":"BLEND"}])",
+        R"([{"op":"add","path":"/extras","value":{"radiositySky":{"upper":[1,2,3]}}}])",
+        R"([{"op":"replace","path":"/materials/0/pbrMetallicRoughness/metallicFactor","value":1},
+            {"op":"add","path":"/materials/1/extensions/KHR_materials_unlit","value":{}},
+            {"op":"replace","path":"/materials/1/emissiveFactor","value":[0,0,7]}])",
+        R"([{"op":"remove","path":"/materials/1/extensions/KHR_materials_unlit"}])",
+        R"([{"op":"remove","path":"/meshes/0/primitives/0/material"}])",
+        R"([{"op":"replace","path":"/materials/0/emissiveFactor","value":[0,1,0]}])",
+        R"([{"op":"test","path":"/materials/0/emissiveFactor","value":[0,1,0]}])"}) {
     const auto edited = editDocument(now, Json::parse(patch));
     ASSERT_TRUE(edited) << patch << edited.error().text();
-    ASSERT_TRUE(edited->document.parsed);
+    ASSERT_TRUE(edited->document.imported);
     now = edited->document;
     auto alone = now;
-    alone.parsed.reset();
+    alone.imported.reset();
     const auto fresh = importScene(alone);
     ASSERT_TRUE(fresh) << patch;
     EXPECT_EQ(edited->scene.materials, fresh->materials) << patch;
     EXPECT_EQ(edited->scene.primitives, fresh->primitives) << patch;
     EXPECT_EQ(edited->scene.instances, fresh->instances) << patch;
     EXPECT_EQ(edited->scene.lights, fresh->lights) << patch;
+    EXPECT_EQ(edited->scene.sky, fresh->sky) << patch;
     EXPECT_EQ(edited->scene.warnings, fresh->warnings) << patch;
   }
-  const auto refused = editDocument(now, R"([{"op":"replace","path":"/nodes/0/mesh","value":9}])"_json);
+  for (const auto& [patch, where] :
+       {std::pair{R"([{"op":"replace","path":"/nodes/0/mesh","value":9}])", "/nodes/0/mesh"},
+        std::pair{R"([{"op":"replace","path":"/materials/1/alphaMode","value":"GLASS"}])", "/materials/1/alphaMode"},
+        std::pair{R"([{"op":"replace","path":"/materials/0/emissiveFactor","value":[]}])",
+                  "/materials/0/emissiveFactor"},
+        std::pair{R"([{"op":"add","path":"/materials/0/emissiveTexture","value":{"index":0}}])",
+                  "/materials/0/emissiveTexture/index"}}) {
+    const auto refused = editDocument(now, Json::parse(patch));
+    ASSERT_FALSE(refused) << patch;
+    EXPECT_EQ(refused.error().where, where);
+  }
+}
+
+/// PNG of 2 x 1 pixels: red, then blue.
+constexpr std::array<std::uint8_t, 72> kRedAndBlue = {
+    0x89, 0x50, 0x4E, 0x47, 0x0D, 0x0A, 0x1A, 0x0A, 0x00, 0x00, 0x00, 0x0D, 0x49, 0x48, 0x44, 0x52, 0x00, 0x00,
+    0x00, 0x02, 0x00, 0x00, 0x00, 0x01, 0x08, 0x02, 0x00, 0x00, 0x00, 0x7B, 0x40, 0xE8, 0xDD, 0x00, 0x00, 0x00,
+    0x0F, 0x49, 0x44, 0x41, 0x54, 0x78, 0x9C, 0x63, 0xF8, 0xCF, 0xC0, 0xC0, 0xC0, 0xF0, 0x1F, 0x00, 0x07, 0x00,
+    0x01, 0xFF, 0x52, 0xB3, 0x73, 0x8B, 0x00, 0x00, 0x00, 0x00, 0x49, 0x45, 0x4E, 0x44, 0xAE, 0x42, 0x60, 0x82};
+
+/// Nor is a mesh read, or an image decoded, for an edit of a material.
+TEST_F(ScenePatch, whatAnEditLeavesAloneIsSharedWithTheSceneBefore) {
+  auto textured = document_;
+  textured.gltf["images"] = Json::array({{{"mimeType", "image/png"}}});
+  textured.images = {std::make_shared<const Bytes>(kRedAndBlue.begin(), kRedAndBlue.end())};
+  textured.gltf["textures"] = Json::array({{{"source", 0}}});
+  auto& surface = textured.gltf["materials"][0]["pbrMetallicRoughness"];
+  surface["baseColorTexture"] = surface["metallicRoughnessTexture"] = {{"index", 0}};
+  const auto before = importEdited(textured, nullptr);
+  ASSERT_TRUE(before) << before.error().text();
+  ASSERT_EQ(before->scene.textures.size(), 1U);
+  const auto editOf = [](const EditedDocument& from, const char* patch) {
+    return editDocument(from.document, Json::parse(patch)).value();
+  };
+
+  const auto lit = editOf(*before, R"([{"op":"replace","path":"/materials/0/emissiveFactor","value":[1,0,0]}])");
+  EXPECT_EQ(lit.scene.textures.element(0), before->scene.textures.element(0));
+  EXPECT_EQ(lit.scene.primitives.element(0), before->scene.primitives.element(0));
+  EXPECT_EQ(lit.scene.materials[0].metallic, before->scene.materials[0].metallic);
+  const auto moved = editOf(lit, R"([{"op":"replace","path":"/nodes/@wall/translation","value":[1,2,3]}])");
+  EXPECT_EQ(moved.scene.textures.element(0), before->scene.textures.element(0));
+
+  const auto bare = editOf(moved, R"([{"op":"remove","path":"/materials/0/pbrMetallicRoughness/baseColorTexture"}])");
+  EXPECT_TRUE(bare.scene.textures.empty());
+  const auto again =
+      editOf(bare, R"([{"op":"add","path":"/materials/0/pbrMetallicRoughness/baseColorTexture","value":{"index":0}}])");
+  EXPECT_EQ(again.scene.textures, before->scene.textures);
+
+  ImportLimits small;
+  small.max_image_pixels = 1;
+  const auto refused = editDocument(
+      lit.document, R"([{"op":"replace","path":"/materials/0/emissiveFactor","value":[0,0,0]}])"_json, {}, small);
   ASSERT_FALSE(refused);
-  EXPECT_EQ(refused.error().where, "/nodes/0/mesh");
+  EXPECT_EQ(refused.error().code, ErrorCode::kTooLarge);
 }
 
 Json accessorPatch(const std::string& uri) {

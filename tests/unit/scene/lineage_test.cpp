@@ -115,10 +115,11 @@ TEST(Lineage, WhatComesTakesWhatIsFreeAndWhatWentLeavesItsPlace) {
 
 TEST(Lineage, BoxesLieAroundPartsAndNotAroundWhatIsBetweenThem) {
   auto before = squares();
-  auto& pair = before.primitives.emplace_back(square());  // two of them, far apart, in one
+  auto pair = square();  // two of them, far apart, in one
   pair.mesh = 1;
   for (std::size_t i = 0; i < 4; ++i) pair.positions.push_back(pair.positions[i] + glm::dvec3(3, 0, 0));
   pair.indices.insert(pair.indices.end(), {4, 5, 6, 4, 6, 7});
+  before.primitives.push_back(pair);
   auto instance = placed(4, {0, 2, 0}, 0.5);
   instance.primitive = 1;
   before.instances.push_back(instance);

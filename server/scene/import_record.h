@@ -1,0 +1,36 @@
+// What importing a document leaves for importing it after an edit. Immutable once there; any thread.
+#pragma once
+
+#include <tiny_gltf.h>
+
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "common/bytes.h"
+#include "server/scene/scene.h"
+
+namespace radiosity::scene {
+
+struct DecodedImage {
+  SharedList<Texture>::Element color;  ///< null: no colour was asked of it
+  std::optional<float> mean_blue;      ///< 0 to 1, as it is encoded; none: not asked for
+  std::size_t pixels = 0;
+};
+/// By the bytes that they are decoded from, which so stay those of that image.
+using DecodedImages = std::map<SharedBytes, DecodedImage>;
+
+struct ImportRecord {
+  std::shared_ptr<const tinygltf::Model> model;  ///< but for its materials, which change most often
+  std::vector<tinygltf::Material> materials;
+  DecodedImages images;  ///< that the materials use
+  Scene scene;           ///< shares what is large with the one that was imported
+  /// Of its warnings, how many there were after each step.
+  struct Warnings {
+    std::size_t checks = 0, materials = 0, nodes = 0;
+  } warnings;
+};
+
+}  // namespace radiosity::scene
