@@ -29,8 +29,6 @@ constexpr double kWithin = 0.2;
 /// there is of its light.
 constexpr std::size_t kVectors = 3 * (Gmres<float>::kRestart + 3) + 4 * 4, kLights = 5 * 3 + 4;
 
-using Light = std::array<double, 4>;
-
 using Light32 = std::array<float, 4>;
 
 __attribute__((always_inline)) inline void add(Light32& sum, const Light32& light) {
@@ -56,7 +54,7 @@ RADIOSITY_CLONES void averageSeen(const LeafSights& sights, std::size_t half, co
   }
 }
 
-Light32 rounded(const Light& light) {
+Light32 rounded(const std::array<double, 4>& light) {
   return {static_cast<float>(light[0]), static_cast<float>(light[1]), static_cast<float>(light[2]), 0.0F};
 }
 
@@ -206,30 +204,20 @@ void LeafGather::takeLight(std::size_t h) {
     half.source[sights_.skyBelow()][c] = light_.sky[1][static_cast<int>(c)];
   }
   half.arriving.assign(leaves, {});
-  half.shining = 0.0;
-  std::array<double, 3> shining{};
+  const auto sums = takeSources(h);
+  Light shining{};
   double area = 0.0;
-  for (std::size_t v = 0; v < leaves; ++v) {
-    if (areaOf(v) <= 0.0) continue;
-    area += areaOf(v);
-    const auto lost = lostOf(h, v);
-    for (std::size_t c = 0; c < 3; ++c) {
-      const auto i = static_cast<int>(c);
-      const double left =
-          static_cast<double>(light_.emission[v][i]) +
-          static_cast<double>(light_.reflectance[v][i]) * static_cast<double>(light_.irradiance[h][v][i]) -
-          static_cast<double>(light_.shot[h][v][i]);
-      half.source[v][c] = left;
-      shining[c] += areaOf(v) * (std::abs(left) + skyAt(lost, c));
-    }
+  for (const auto& sum : sums) {
+    addTo(shining, sum.shining);
+    area += sum.area;
   }
+  half.shining = shining[0] + shining[1] + shining[2];
   std::array<double, 3> tolerance{};
   for (std::size_t c = 0; c < 3; ++c) {
-    half.shining += shining[c];
     // A norm over areas bounds the sum over them (Cauchy and Schwarz).
     if (area > 0.0) tolerance[c] = light_.residual * shining[c] / std::sqrt(area);
   }
-  half.gmres.begin(evenLight(h), {area_.begin(), area_.end()}, tolerance, kMaxSweeps, true);
+  half.gmres.begin(evenLight(sums), {area_.begin(), area_.end()}, tolerance, kMaxSweeps, true);
   half.done = false;
 }
 
@@ -272,24 +260,6 @@ void LeafGather::sweep(std::size_t h, RayGmres::Vectors& x, bool affine) {
 
 void LeafGather::takeSolutions() {
   for (std::size_t h = 0; h < 2; ++h) solved_[h] = halves_[h].gmres.solution();
-}
-
-void LeafGather::take(std::size_t h, const Levels& levels) {
-  auto& gathered = gathered_[h];
-  gathered.assign(sights_.leafCount(), glm::vec3(0.0F));
-  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
-    for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
-      for (std::size_t c = 0; c < 3; ++c) {
-        const auto i = static_cast<int>(c);
-        const auto& level = levels[part_[s]][c];
-        const double arrives =
-            level.gathered * solved(h, c, v) + level.over_links * static_cast<double>(light_.irradiance[h][v][i]);
-        gathered[v][i] = static_cast<float>(arrives);
-        halves_[h].radiosity[v][c] =
-            static_cast<float>(halves_[h].source[v][c] + static_cast<double>(light_.reflectance[v][i]) * arrives);
-      }
-    }
-  }
 }
 
 /// What the rays of both halves make of the same light: light that differs is not theirs.

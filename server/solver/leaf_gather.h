@@ -135,6 +135,12 @@ class LeafGather {
   static constexpr std::uint32_t kWide = 150;
   /// Four, so that a leaf's are one vector; the last is 0.
   using Light = std::array<double, 4>;
+  [[nodiscard]] static Light lightOf(const glm::vec3& light) {
+    return {static_cast<double>(light.x), static_cast<double>(light.y), static_cast<double>(light.z), 0.0};
+  }
+  static void addTo(Light& sum, const Light& light) {
+    for (std::size_t c = 0; c < sum.size(); ++c) sum[c] += light[c];
+  }
   /// What rays read at random, for each of their ends: half of it lies in the caches.
   using Light32 = std::array<float, 4>;
   using RayGmres = Gmres<float>;
@@ -153,8 +159,15 @@ class LeafGather {
   };
   using Levels = std::vector<std::array<Level, 3>>;
   enum class Stage { kDone, kTracing, kSolving };
+  /// Of a part of the scene: what shines there, all together and what of it arrives somewhere, with the sky's, and what
+  /// is taken of light that is 1 all over. Times area.
+  struct SourceSum {
+    Light shining{}, arrives{}, takes{};
+    double area = 0.0;
+  };
   void takeLight(std::size_t half);
-  [[nodiscard]] RayGmres::Vectors evenLight(std::size_t half) const;
+  [[nodiscard]] std::vector<SourceSum> takeSources(std::size_t half);
+  [[nodiscard]] RayGmres::Vectors evenLight(const std::vector<SourceSum>& sums) const;
   void average(std::size_t half);
   void followSteps(std::size_t half, const std::vector<Light>* source);
   void sweep(std::size_t half, RayGmres::Vectors& x, bool affine);
@@ -163,15 +176,20 @@ class LeafGather {
   void weighRays();
   void weighRays(std::size_t half, UnionFind& parts);
   void joinSteps(std::size_t half, std::uint32_t end, UnionFind& parts) const;
-  [[nodiscard]] double solved(std::size_t half, std::size_t channel, std::size_t value) const;
+  [[nodiscard]] Light solved(std::size_t half, std::size_t value) const;
   /// What the level of a part of the scene follows from.
   struct LevelSum {
-    double left = 0.0, kept = 0.0, size = 0.0, all = 0.0, area = 0.0, stays = 0.0;
-    double least = 0.0;  ///< x, where it is below 0, of what came over links there
+    Light left{}, kept{}, size{}, all{}, stays{};
+    Light least{};  ///< x, where it is below 0, of what came over links there
+    double area = 0.0;
+    void add(const LevelSum& other);
   };
   [[nodiscard]] Levels levels(std::size_t half);
-  [[nodiscard]] std::vector<std::array<LevelSum, 3>> levelSums(std::size_t half);
+  [[nodiscard]] std::vector<LevelSum> levelSums(std::size_t half) const;
+  template <typename Visit>
+  void visitParted(std::size_t half, std::span<const std::uint32_t> leaves, const Visit& visit) const;
   void weighPartedLoss(std::size_t half);
+  [[nodiscard]] Light sentFrom(std::size_t half, std::uint32_t end) const;
   /// It is parted, and some of its rays are lost.
   [[nodiscard]] bool losesApart(std::size_t half, std::uint32_t value) const {
     return has_parted_ && sights_.isParted(value) && lostOf(half, value).all() > 0.0;
@@ -212,22 +230,27 @@ class LeafGather {
   };
   [[nodiscard]] Lost lostOf(std::size_t half, std::size_t value) const {
     const auto count = sights_.counts()[value];
-    if (lost_[half].empty() || count == 0) return {};
+    if (count == 0 || !lost_[half].hasAny(value)) return {};
     const auto part = [one = 1.0F / static_cast<float>(count)](std::uint16_t rays) { return rays * one; };
     const auto rays = lost_[half].at(value);
     return {part(rays.above), part(rays.below), part(rays.absorbed), part(rays.doubtful)};
   }
-  [[nodiscard]] double skyAt(const Lost& lost, std::size_t channel) const;
-  [[nodiscard]] const std::array<double, 3>& lossOf(std::size_t half, std::uint32_t value) const;
+  [[nodiscard]] Light skyAt(const Lost& lost) const;
+  [[nodiscard]] const Light& lossOf(std::size_t half, std::uint32_t value) const;
   bool is_weighed_ = false;  ///< the following are known
   std::optional<LeafSmoother> smoother_;
-  bool has_parted_ = false;                                        ///< leaves, as of LeafSights
-  std::array<std::vector<std::array<double, 3>>, 2> parted_loss_;  ///< by half, part and channel: see there
+  bool has_parted_ = false;                        ///< leaves, as of LeafSights
+  std::array<std::vector<Light>, 2> parted_loss_;  ///< by half and part: see there
   struct Arrival {
     std::uint32_t value, end;
   };
-  /// By half: rays of leaves that end on parted leaves that lose some light; of these rays, none: not known, or many.
-  std::array<std::optional<std::vector<Arrival>>, 2> from_parted_;
+  /// Parted leaves that lose some light, and rays that end on them.
+  struct Parted {
+    std::vector<std::uint32_t> leaves;
+    std::vector<Arrival> arrivals;
+  };
+  /// By half; none: not known, or these are many.
+  std::array<std::optional<Parted>, 2> parted_;
   std::array<LostRays, 2> lost_;     ///< by half; empty: none
   std::vector<std::uint32_t> part_;  ///< by side: which part of the scene, whose number is that of a side
   LeftLight light_;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "common/clones.h"
 #include "common/give_back.h"
 #include "server/solver/halves.h"
 #include "server/solver/leaf_gather.h"
@@ -21,13 +22,15 @@ constexpr std::uint32_t kLeavesAnArrival = 2;
 /// Parted leaves lose no more than so many times what they would if they shone evenly: of one of which a quarter
 /// shines, and loses all that is lost.
 constexpr double kMostLoss = 4.0;
+/// Of other leaves what rays say.
+constexpr std::array<double, 4> kAsRays{1.0, 1.0, 1.0, 1.0};
 
 }  // namespace
 
 /// How much of their light leaves lose, and which sides are of one part.
 void LeafGather::weighRays() {
   has_parted_ = false;
-  from_parted_ = {};
+  parted_ = {};
   for (std::uint32_t v = 0; v < sights_.leafCount() && !has_parted_; ++v)
     has_parted_ = areaOf(v) > 0.0 && sights_.isParted(v);
   // Sides that see each other, if over others, are of one part, which has the number of the first of them.
@@ -75,14 +78,54 @@ void LeafGather::joinSteps(std::size_t half, std::uint32_t end, UnionFind& parts
 }
 
 /// x, but for what few rays find too much missing of: with what came over links no leaf gets less than no light.
-double LeafGather::solved(std::size_t h, std::size_t c, std::size_t v) const {
-  return static_cast<double>(std::max(solved_[h][c][v], -light_.irradiance[h][v][static_cast<int>(c)]));
+inline __attribute__((always_inline)) LeafGather::Light LeafGather::solved(std::size_t h, std::size_t v) const {
+  const auto& x = solved_[h];
+  const auto& over_links = light_.irradiance[h][v];
+  return lightOf(
+      {std::max(x[0][v], -over_links.x), std::max(x[1][v], -over_links.y), std::max(x[2][v], -over_links.z)});
 }
 
 /// What comes straight from the sky, by rays as they are.
-double LeafGather::skyAt(const Lost& lost, std::size_t c) const {
-  const auto i = static_cast<int>(c);
-  return static_cast<double>(lost.above) * light_.sky[0][i] + static_cast<double>(lost.below) * light_.sky[1][i];
+inline __attribute__((always_inline)) LeafGather::Light LeafGather::skyAt(const Lost& lost) const {
+  Light light{};
+  const auto above = static_cast<double>(lost.above), below = static_cast<double>(lost.below);
+  if (above + below <= 0.0) return light;
+  for (std::size_t c = 0; c < 3; ++c)
+    light[c] = above * light_.sky[0][static_cast<int>(c)] + below * light_.sky[1][static_cast<int>(c)];
+  return light;
+}
+
+/// Calls visit() with each ray that ends on such a leaf.
+template <typename Visit>
+void LeafGather::visitParted(std::size_t h, std::span<const std::uint32_t> leaves, const Visit& visit) const {
+  if (leaves.empty()) return;
+  const auto steps = sights_.steps(h);
+  std::vector<bool> is_parted(sights_.endCount() + steps.size());  // by end of a ray
+  for (const auto v : leaves) is_parted[v] = true;
+  for (std::size_t i = 0; i < steps.size(); ++i) is_parted[sights_.endCount() + i] = is_parted[steps[i].by];
+  for (std::uint32_t v = 0; v < sights_.leafCount(); ++v) {
+    for (const auto end : sights_.seen(h, v))
+      if (is_parted[end]) visit(Arrival{v, end});
+  }
+}
+
+/// Where a ray ends, or goes on: what the leaf there has but for what comes by rays, and what the ray finds of that.
+LeafGather::Light LeafGather::sentFrom(std::size_t h, std::uint32_t end) const {
+  const auto& source = halves_[h].source;
+  Light sent{}, part{1.0, 1.0, 1.0, 0.0};
+  for (; end >= sights_.endCount(); end = sights_.steps(h)[end - sights_.endCount()].next) {
+    const auto by = sights_.steps(h)[end - sights_.endCount()].by;
+    const auto reflectance = lightOf(light_.reflectance[by]);
+    for (std::size_t c = 0; c < 3; ++c) {
+      sent[c] += part[c] * source[by][c];
+      part[c] *= reflectance[c];
+    }
+  }
+  const bool is_leaf = end < sights_.leafCount();
+  const auto x = is_leaf ? solved(h, end) : Light{};
+  const auto reflectance = is_leaf ? lightOf(light_.reflectance[end]) : Light{};
+  for (std::size_t c = 0; c < 3; ++c) sent[c] += part[c] * (source[end][c] + reflectance[c] * x[c]);
+  return sent;
 }
 
 /// Of a leaf that is parted rays may be lost in a dark strip of it, under a floor that it reaches through, which sends
@@ -90,64 +133,52 @@ double LeafGather::skyAt(const Lost& lost, std::size_t c) const {
 /// shone evenly: none of it, or several times as much where the other part is dark. They send, and where rays of others
 /// end on them that much arrives; the rest is lost.
 void LeafGather::weighPartedLoss(std::size_t h) {
+  parted_loss_[h].assign(sides_.size(), kAsRays);
+  auto& kept = parted_[h];
+  Parted found;
+  for (std::uint32_t v = 0; v < sights_.leafCount() && !kept; ++v)
+    if (losesApart(h, v)) found.leaves.push_back(v);
+  const auto& leaves = kept ? kept->leaves : found.leaves;
   struct Flux {
-    double sent = 0.0, even = 0.0, arrives = 0.0;  // `even`: lost by leaves that shine evenly
+    Light sent{}, even{}, arrives{};  // `even`: lost by leaves that shine evenly
   };
-  parted_loss_[h].assign(sides_.size(), {1.0, 1.0, 1.0});
-  const auto leaves = sights_.leafCount();
-  const auto steps = sights_.steps(h);
-  std::vector<std::uint8_t> loses(sights_.endCount() + steps.size(), 0);  // by end of a ray
-  for (std::uint32_t v = 0; v < leaves; ++v) loses[v] = losesApart(h, v) ? 1 : 0;
-  if (std::ranges::count(loses, 1) == 0) return;
-  for (std::size_t i = 0; i < steps.size(); ++i) loses[sights_.endCount() + i] = loses[steps[i].by];
-  auto& radiosity = halves_[h].radiosity;
-  std::vector<std::array<Flux, 3>> fluxes(sides_.size());
-  for (std::uint32_t v = 0; v < leaves; ++v) {
+  std::vector<Flux> fluxes(leaves.empty() ? 0 : sides_.size());
+  for (const auto v : leaves) {
+    auto& flux = fluxes[part_[sights_.sideOf(v)]];
+    const auto sent = sentFrom(h, v);
     for (std::size_t c = 0; c < 3; ++c) {
-      const double sent =
-          halves_[h].source[v][c] + static_cast<double>(light_.reflectance[v][static_cast<int>(c)]) * solved(h, c, v);
-      radiosity[v][c] = static_cast<float>(sent);
-      if (loses[v] == 0) continue;
-      auto& flux = fluxes[part_[sights_.sideOf(v)]][c];
-      flux.sent += areaOf(v) * sent;
-      flux.even += areaOf(v) * sent * lostOf(h, v).all();
+      flux.sent[c] += areaOf(v) * sent[c];
+      flux.even[c] += areaOf(v) * sent[c] * lostOf(h, v).all();
     }
   }
-  for (auto end = leaves; end < sights_.endCount(); ++end) {
-    for (std::size_t c = 0; c < 3; ++c) radiosity[end][c] = static_cast<float>(halves_[h].source[end][c]);
-  }
-  followSteps(h, &halves_[h].source);
   const auto arrive = [&](const Arrival& ray) {
-    const auto by = ray.end < sights_.endCount() ? ray.end : steps[ray.end - sights_.endCount()].by;
+    const auto by = ray.end < sights_.endCount() ? ray.end : sights_.steps(h)[ray.end - sights_.endCount()].by;
     const double share = areaOf(ray.value) / sights_.counts()[ray.value];
-    for (std::size_t c = 0; c < 3; ++c)
-      fluxes[part_[sights_.sideOf(by)]][c].arrives += share * static_cast<double>(radiosity[ray.end][c]);
+    auto& arrives = fluxes[part_[sights_.sideOf(by)]].arrives;
+    const auto sent = sentFrom(h, ray.end);
+    for (std::size_t c = 0; c < 3; ++c) arrives[c] += share * sent[c];
   };
-  if (from_parted_[h]) {
-    std::ranges::for_each(*from_parted_[h], arrive);
+  const std::size_t most = sights_.leafCount() / kLeavesAnArrival;
+  if (kept) {
+    std::ranges::for_each(kept->arrivals, arrive);
   } else {
-    std::vector<Arrival> found;
-    const std::size_t most = leaves / kLeavesAnArrival;
-    for (std::uint32_t v = 0; v < leaves; ++v) {
-      for (const auto end : sights_.seen(h, v)) {
-        if (loses[end] == 0) continue;
-        arrive({v, end});
-        if (found.size() <= most) found.push_back({v, end});
-      }
-    }
-    if (found.size() <= most) from_parted_[h] = std::move(found);
+    visitParted(h, leaves, [&](const Arrival& ray) {
+      arrive(ray);
+      if (found.arrivals.size() <= most) found.arrivals.push_back(ray);
+    });
   }
   for (std::size_t p = 0; p < fluxes.size(); ++p) {
     for (std::size_t c = 0; c < 3; ++c) {
-      const auto& flux = fluxes[p][c];
-      if (flux.even > 0.0) parted_loss_[h][p][c] = std::clamp((flux.sent - flux.arrives) / flux.even, 0.0, kMostLoss);
+      const auto& flux = fluxes[p];
+      if (flux.even[c] > 0.0)
+        parted_loss_[h][p][c] = std::clamp((flux.sent[c] - flux.arrives[c]) / flux.even[c], 0.0, kMostLoss);
     }
   }
+  if (!kept && found.arrivals.size() <= most) kept = std::move(found);
 }
 
 /// Part of a leaf's light that is lost, of what rays of it are; by channel.
-const std::array<double, 3>& LeafGather::lossOf(std::size_t h, std::uint32_t v) const {
-  static constexpr std::array<double, 3> kAsRays{1.0, 1.0, 1.0};
+const LeafGather::Light& LeafGather::lossOf(std::size_t h, std::uint32_t v) const {
   return losesApart(h, v) ? parted_loss_[h][part_[sights_.sideOf(v)]] : kAsRays;
 }
 
@@ -162,46 +193,63 @@ LeafGather::Levels LeafGather::levels(std::size_t h) {
   Levels levels(sides_.size());
   for (std::size_t p = 0; p < sums.size(); ++p) {
     for (std::size_t c = 0; c < 3; ++c) {
-      const auto& sum = sums[p][c];
-      const double level = sum.left / sum.kept, part = (sum.left - sum.kept) / sum.all;
-      levels[p][c].missed = sum.left - sum.kept;
-      if (2.0 * sum.kept > sum.size && level * sum.least >= -1.0 && level > 1.0 / kMostLevel && level < kMostLevel) {
+      const auto& sum = sums[p];
+      const double left = sum.left[c], kept = sum.kept[c];
+      const double level = left / kept, part = (left - kept) / sum.all[c];
+      levels[p][c].missed = left - kept;
+      if (2.0 * kept > sum.size[c] && level * sum.least[c] >= -1.0 && level > 1.0 / kMostLevel && level < kMostLevel) {
         levels[p][c].gathered = level;
-      } else if (sum.all > 0.0 && std::abs(part) < kMostOff) {
+      } else if (sum.all[c] > 0.0 && std::abs(part) < kMostOff) {
         levels[p][c].gathered = 1.0 + part;
         levels[p][c].over_links = part;
-      } else if (sum.stays > 0.0) {
-        levels[p][c].missed *= sum.area / sum.stays;  // nothing makes up for it: all its bounces are missing, too
+      } else if (sum.stays[c] > 0.0) {
+        levels[p][c].missed *= sum.area / sum.stays[c];  // nothing makes up for it: all its bounces are missing, too
       }
     }
   }
   return levels;
 }
 
+/// What shooters leave to each leaf.
+RADIOSITY_CLONES auto LeafGather::takeSources(std::size_t h) -> std::vector<SourceSum> {
+  std::vector<SourceSum> sums(sides_.size());
+  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
+    SourceSum sum;
+    for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
+      const double area = areaOf(v);
+      if (area <= 0.0) continue;
+      const auto emission = lightOf(light_.emission[v]), reflectance = lightOf(light_.reflectance[v]);
+      const auto over_links = lightOf(light_.irradiance[h][v]), shot = lightOf(light_.shot[h][v]);
+      const auto lost = lostOf(h, v);
+      const auto sky = skyAt(lost);
+      const double sends = 1.0 - lost.all();
+      auto& source = halves_[h].source[v];
+      for (std::size_t c = 0; c < 4; ++c) {
+        source[c] = emission[c] + reflectance[c] * over_links[c] - shot[c];
+        sum.shining[c] += area * (std::abs(source[c]) + sky[c]);
+        sum.arrives[c] += area * (sends * source[c] + sky[c]);
+        sum.takes[c] += area * (1.0 - sends * reflectance[c]);
+      }
+      sum.area += area;
+    }
+    auto& of_part = sums[part_[s]];
+    addTo(of_part.shining, sum.shining);
+    addTo(of_part.arrives, sum.arrives);
+    addTo(of_part.takes, sum.takes);
+    of_part.area += sum.area;
+  }
+  return sums;
+}
+
 /// If all leaves of a part of the scene had the same light: what they take of it, and lose, is what shines there. That
 /// is most of what is solved for, and the sweeps that would find it last.
-Gmres<float>::Vectors LeafGather::evenLight(std::size_t h) const {
-  struct Sum {
-    double shines = 0.0, takes = 0.0;
-  };
-  std::vector<std::array<Sum, 3>> sums(sides_.size());
+Gmres<float>::Vectors LeafGather::evenLight(const std::vector<SourceSum>& sums) const {
   RayGmres::Vectors light;
-  for (auto& channel : light) channel.assign(sights_.leafCount(), 0.0F);
-  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
-    auto& sum = sums[part_[s]];
-    for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
-      const auto lost = lostOf(h, v);
-      const double area = areaOf(v), sends = 1.0 - lost.all();
-      for (std::size_t c = 0; c < 3; ++c) {
-        sum[c].shines += area * (sends * halves_[h].source[v][c] + skyAt(lost, c));
-        sum[c].takes += area * (1.0 - sends * static_cast<double>(light_.reflectance[v][static_cast<int>(c)]));
-      }
-    }
-  }
-  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
-    for (std::size_t c = 0; c < 3; ++c) {
-      const auto& sum = sums[part_[s]][c];
-      const auto level = sum.takes > 0.0 ? static_cast<float>(sum.shines / sum.takes) : 0.0F;
+  for (std::size_t c = 0; c < 3; ++c) {
+    light[c].resize(sights_.leafCount());
+    for (std::uint32_t s = 0; s < sides_.size(); ++s) {
+      const auto& sum = sums[part_[s]];
+      const auto level = sum.takes[c] > 0.0 ? static_cast<float>(sum.arrives[c] / sum.takes[c]) : 0.0F;
       for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v)
         light[c][v] = area_[v] > 0.0F ? level : 0.0F;
     }
@@ -209,32 +257,72 @@ Gmres<float>::Vectors LeafGather::evenLight(std::size_t h) const {
   return light;
 }
 
-/// By part of the scene and channel.
-std::vector<std::array<LeafGather::LevelSum, 3>> LeafGather::levelSums(std::size_t h) {
-  std::vector<std::array<LevelSum, 3>> sums(sides_.size());
+void LeafGather::LevelSum::add(const LevelSum& other) {
+  for (std::size_t c = 0; c < 4; ++c) {
+    left[c] += other.left[c];
+    kept[c] += other.kept[c];
+    size[c] += other.size[c];
+    all[c] += other.all[c];
+    stays[c] += other.stays[c];
+    least[c] = std::min(least[c], other.least[c]);
+  }
+  area += other.area;
+}
+
+/// By part of the scene.
+RADIOSITY_CLONES auto LeafGather::levelSums(std::size_t h) const -> std::vector<LevelSum> {
+  std::vector<LevelSum> sums(sides_.size());
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
-    auto& sum = sums[part_[s]];
+    LevelSum sum;
     for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
       const double area = areaOf(v);
       if (area <= 0.0) continue;
+      const auto x = solved(h, v), reflectance = lightOf(light_.reflectance[v]);
+      const auto over_links = lightOf(light_.irradiance[h][v]);
+      const auto& source = halves_[h].source[v];
       const auto lost = lostOf(h, v);
+      const auto sky = skyAt(lost);
       const auto& loss = lossOf(h, v);
-      for (std::size_t c = 0; c < 3; ++c) {
-        const auto i = static_cast<int>(c);
-        const double x = solved(h, c, v), over_links = static_cast<double>(light_.irradiance[h][v][i]);
+      for (std::size_t c = 0; c < 4; ++c) {
         const double sends = 1.0 - loss[c] * lost.all();
-        const double stays = 1.0 - sends * static_cast<double>(light_.reflectance[v][i]);
-        sum[c].left += area * (sends * halves_[h].source[v][c] + skyAt(lost, c));
-        sum[c].kept += area * stays * x;
-        sum[c].size += area * stays * std::abs(x);
-        sum[c].all += area * stays * (x + over_links);
-        sum[c].area += area;
-        sum[c].stays += area * stays;
-        if (x < 0.0) sum[c].least = std::min(sum[c].least, x / over_links);
+        const double stays = area * (1.0 - sends * reflectance[c]);
+        sum.left[c] += area * (sends * source[c] + sky[c]);
+        sum.kept[c] += stays * x[c];
+        sum.size[c] += stays * std::abs(x[c]);
+        sum.all[c] += stays * (x[c] + over_links[c]);
+        sum.stays[c] += stays;
       }
+      sum.area += area;
+      for (std::size_t c = 0; c < 3; ++c)
+        if (x[c] < 0.0) sum.least[c] = std::min(sum.least[c], x[c] / over_links[c]);
     }
+    sums[part_[s]].add(sum);
   }
   return sums;
+}
+
+/// As `levels` have it.
+RADIOSITY_CLONES void LeafGather::take(std::size_t h, const Levels& levels) {
+  auto& gathered = gathered_[h];
+  gathered.assign(sights_.leafCount(), glm::vec3(0.0F));
+  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
+    Light of_gathered{}, of_links{};
+    for (std::size_t c = 0; c < 3; ++c) {
+      of_gathered[c] = levels[part_[s]][c].gathered;
+      of_links[c] = levels[part_[s]][c].over_links;
+    }
+    for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
+      const auto x = solved(h, v), over_links = lightOf(light_.irradiance[h][v]);
+      const auto reflectance = lightOf(light_.reflectance[v]);
+      Light32 arrives{};
+      for (std::size_t c = 0; c < 4; ++c) {
+        const double light = of_gathered[c] * x[c] + of_links[c] * over_links[c];
+        arrives[c] = static_cast<float>(light);
+        halves_[h].radiosity[v][c] = static_cast<float>(halves_[h].source[v][c] + reflectance[c] * light);
+      }
+      gathered[v] = glm::vec3(arrives[0], arrives[1], arrives[2]);
+    }
+  }
 }
 
 /// What is small, and shines, neither half may have seen: its light is sent and does not arrive, in both alike, and the
@@ -273,11 +361,12 @@ void LeafGather::weighLost() {
       const auto lost = lostOf(half, v);
       if (lost.all() <= 0.0) continue;
       const auto& loss = lossOf(half, v);
+      const auto sky = skyAt(lost);
       for (std::size_t c = 0; c < 3; ++c) {
         const double flux = 0.5 * areaOf(v) * static_cast<double>(halves_[half].radiosity[v][c]) * loss[c];
         escaped_[c] += flux * lost.escaped();
         absorbed_[c] += flux * static_cast<double>(lost.absorbed);
-        from_sky_[c] += 0.5 * areaOf(v) * skyAt(lost, c);
+        from_sky_[c] += 0.5 * areaOf(v) * sky[c];
       }
     }
   }

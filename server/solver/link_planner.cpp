@@ -44,6 +44,8 @@ constexpr double kSurelyBelow = 0.85;
 constexpr double kResolved = 0.75;
 /// So much of a wave is worth solving all bounces for.
 constexpr std::size_t kLeastPartOfWave = 8;
+/// Sums of so many single numbers are that near.
+constexpr float kRounded = 0.999F;
 
 /// What a wave of improvement is likely to do to the error.
 class Forecast {
@@ -198,6 +200,20 @@ void LinkPlanner::wantFirst(std::uint32_t index, std::size_t half, const LinkSys
   for (std::uint32_t k = 0; k < samples; ++k) wanted.push_back({index, half, 1, k});
 }
 
+/// It has shooters, or may get some: no node is brighter than all of its leaves.
+bool LinkPlanner::mayShoot(std::uint32_t s, const LinkSystem& system, const UnshotPyramid& unshot,
+                           const scene::PatchScene& patches) const {
+  const Side& side = sides_[s];
+  const auto root = side.first_node + side.node_count - 1;
+  if (least_radiosity_.empty() || system.hasBelow(s, root) || system.at(s, root) != scene::kNone) return true;
+  const auto least = static_cast<float>(least_radiosity_[s]);
+  bool is_bright = false;
+  for (auto node = side.first_node; node < side.first_node + side.leaf_count; ++node)
+    is_bright = is_bright ||
+                (patches.node_area[node] > 0.0F && unshot.rough(node) >= kRounded * least * patches.node_area[node]);
+  return is_bright;
+}
+
 std::vector<Measurement> LinkPlanner::grow(LinkSystem& system, const UnshotPyramid& unshot,
                                            const scene::PatchScene& patches, std::size_t limit, LinkMemory& memory) {
   const auto weaker = [](const Node& a, const Node& b) {
@@ -212,7 +228,9 @@ std::vector<Measurement> LinkPlanner::grow(LinkSystem& system, const UnshotPyram
     node.beside_edge = beside_edge;
     if (node.power > 0.0) queue.push(node);
   };
-  for (std::uint32_t s = 0; s < sides_.size(); ++s) push({s, sides_[s].level_count - 1, 0, 0}, false);
+  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
+    if (mayShoot(s, system, unshot, patches)) push({s, sides_[s].level_count - 1, 0, 0}, false);
+  }
   std::vector<Measurement> wanted;
   while (!queue.empty() && wanted.size() < 2 * limit) {
     const Node node = queue.top();

@@ -125,6 +125,8 @@ class LinkPlanner {
     bool beside_edge = false;  ///< of the node above, a part is empty or buried
   };
   [[nodiscard]] Node nodeAt(const NodePlace& place, const UnshotPyramid& unshot) const;
+  [[nodiscard]] bool mayShoot(std::uint32_t side, const LinkSystem& system, const UnshotPyramid& unshot,
+                              const scene::PatchScene& patches) const;
   [[nodiscard]] bool mustSplit(const Node& node, const LinkSystem& system) const;
   [[nodiscard]] bool isPartial(const Node& node) const;
   struct FurtherSample {

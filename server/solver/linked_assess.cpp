@@ -175,6 +175,7 @@ double LinkedSolver::powerToShoot() const {
   for (const auto& shooter : system_.shooters()) {
     if (!shooter.isLight() && shooter.parent == scene::kNone) shot += shooter.power();
   }
+  if (gathers()) return shot + net_unshot_;
   for (const auto& side : sides_) {
     const auto reflectance = system_.reflectance().side(side.number);
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
@@ -184,7 +185,7 @@ double LinkedSolver::powerToShoot() const {
     }
   }
   const double kept = received > 0.0 ? std::min(0.95, (1.0 - lostPart()) * reflected / received) : 0.5;
-  return shot + (gathers() ? net_unshot_ : net_unshot_ / (1.0 - kept));
+  return shot + net_unshot_ / (1.0 - kept);
 }
 
 EnergyParts LinkedSolver::energy() const {

@@ -1,6 +1,8 @@
 // LinkedSolver where rays bring reflected light: whether they do, which of rays and samples of links comes next.
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <numbers>
 #include <numeric>
@@ -68,8 +70,9 @@ bool LinkedSolver::mayGather(std::size_t leaves, const SolverSettings& settings)
 /// Half of the light that is reflected comes from what is no brighter than this, about; all channels. In a building
 /// whose rooms are lit and whose outside is dark that is far more than the mean.
 double LinkedSolver::usualRadiosity() const {
-  constexpr int kSteps = 8, kOctaves = 64;  // steps of an octave
-  std::array<double, std::size_t{kSteps} * kOctaves> flux{};
+  // Eight steps an octave, by the first bits of a float, from 2^-64 to 2^64.
+  constexpr std::uint32_t kBits = 20, kFirst = (127 - 64) << 3U, kSteps = 128 << 3U;
+  std::vector<double> flux(kSteps);
   double all = 0.0;
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
     if (sides_[s].gathered || sideShines(s)) continue;
@@ -77,14 +80,15 @@ double LinkedSolver::usualRadiosity() const {
       const auto area = static_cast<double>(patches_->node_area[node]),
                  of_leaf = static_cast<double>(unshot_.rough(node));
       if (area <= 0.0 || of_leaf <= 0.0) continue;
-      const double step = kSteps * (std::log2(of_leaf / area) + kOctaves / 2.0);
-      flux[static_cast<std::size_t>(std::clamp(step, 0.0, kSteps * kOctaves - 1.0))] += of_leaf;
+      const auto bits = std::bit_cast<std::uint32_t>(static_cast<float>(of_leaf / area)) >> kBits;
+      flux[std::clamp(bits, kFirst, kFirst + kSteps - 1) - kFirst] += of_leaf;
       all += of_leaf;
     }
   }
-  std::size_t step = 0;
+  std::uint32_t step = 0;
   for (double below = flux[0]; below < 0.5 * all && step + 1 < flux.size(); below += flux[step]) ++step;
-  return all > 0.0 ? std::exp2((static_cast<double>(step) + 0.5) / kSteps - kOctaves / 2.0) : 0.0;
+  const auto middle = std::bit_cast<float>(((step + kFirst) << kBits) + (1U << (kBits - 1)));
+  return all > 0.0 ? static_cast<double>(middle) : 0.0;
 }
 
 /// By side: of nodes that are worth links, all channels. Where there is something to see through only lamps are: links

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <utility>
@@ -33,6 +34,9 @@ class LostRays {
     const auto& few = few_[value];
     if (few[0] != kMany) return {few[0], few[1], few[2], few[3]};
     return std::ranges::lower_bound(many_, value, {}, [](const auto& of) { return std::size_t{of.first}; })->second;
+  }
+  [[nodiscard]] bool hasAny(std::size_t value) const {
+    return !few_.empty() && std::bit_cast<std::uint32_t>(few_[value]) != 0;
   }
   [[nodiscard]] bool empty() const { return few_.empty(); }
   [[nodiscard]] bool isNothing() const {
