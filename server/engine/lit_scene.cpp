@@ -167,8 +167,9 @@ std::uint64_t LitScene::affectedBy(const SceneChange& change, const scene::Scene
   }));
 }
 
-void LitScene::reshade(scene::Document document, std::shared_ptr<const scene::Scene> next, const SceneChange& change) {
-  document_ = std::move(document);
+scene::Document LitScene::reshade(scene::Document document, std::shared_ptr<const scene::Scene> next,
+                                  const SceneChange& change) {
+  auto before = std::exchange(document_, std::move(document));
   scene_ = std::move(next);
   const bool was_stale = std::exchange(stale_, true);
   for (const auto material : change.materials) {
@@ -181,6 +182,7 @@ void LitScene::reshade(scene::Document document, std::shared_ptr<const scene::Sc
   // A solver of which only a part knows of an edit is told of no other: it will be made anew.
   if (!was_stale && affectedBy(change, *scene_) > 0) updateSolver(!change.materials.empty(), other_lights);
   stale_ = was_stale;
+  return before;
 }
 
 void LitScene::fadeFrom(LitScene& before, bool same_layout) {

@@ -127,6 +127,7 @@ void SolveLoop::takeTurn() {
     checkpointIfDue();
   } catch (const std::bad_alloc&) {
     texels_.forget();
+    retired_.reset();
     if (std::exchange(former_, nullptr)) return log::warn("out of memory: the scene before the last edit is forgotten");
     if (first_light_) {  // the whole may still be had
       first_light_->goes_on = unpublished_ = false;
@@ -169,6 +170,7 @@ void SolveLoop::solveSlice() {
     } else if (owes_pages_ && Clock::now() >= *owes_pages_) {
       publishLightmaps(false);
     }
+    retired_.reset();
     return tellProgress(false);
   }
   unpublished_ = true;
@@ -235,14 +237,15 @@ void SolveLoop::endSolve(SolveState state) {
     if (state != SolveState::kConverged) lit_->solver().assess();  // that it says of what it knows now
     if (state != SolveState::kFailed) lit_->endFade();
   }
-  publishLightmaps(true);
-  updateStatus(true);
+  const bool reported = publishLightmaps(true);
+  updateStatus(true, reported);
+  retired_.reset();
   // Of the short solves of a drag the next periodic one will do: thirty a second would stand in the way of the edits.
   if (seconds_ > kLongSolveSeconds) next_checkpoint_ = Clock::now();
 }
 
-void SolveLoop::updateStatus(bool announce) {
-  Status status = lit_ && !first_light_ ? reportStatus(*lit_, seconds_) : Status{};
+void SolveLoop::updateStatus(bool announce, bool as_reported) {
+  Status status = as_reported ? status_ : lit_ && !first_light_ ? reportStatus(*lit_, seconds_) : Status{};
   status.state = state_;
   status.revision = revision_;
   status.tile_version = publisher_.version();

@@ -48,7 +48,7 @@ Result<PatchOutcome> SolveLoop::goBack(scene::EditedDocument edited, const Scene
   renderer_lost_ = false;
   if (state_ == SolveState::kFailed) state_ = SolveState::kSolving;  // that was the other's solve
   const bool taken = takeInLight([&] {
-    lit_->reshade(std::move(edited.document), std::move(scene), change);
+    retired_ = lit_->reshade(std::move(edited.document), std::move(scene), change);
     return relit > 0;
   });
   if (!taken) outcome.affected_surfaces = std::max<std::uint64_t>(outcome.affected_surfaces, 1);

@@ -116,8 +116,9 @@ class SolveLoop final : public Engine {
   void tellLosses();  ///< of renderers that were replaced
   void beat();        ///< the thread is alive and has finished something
 
-  /// What is watched and not published yet; `final`: as a new version in any case.
-  void publishLightmaps(bool final);
+  /// What is watched and not published yet; `final`: as a new version in any case. True: and the status is that of now
+  /// but for what this itself changed.
+  bool publishLightmaps(bool final);
   [[nodiscard]] bool showsNothingNew() const;
   [[nodiscard]] bool watchesIrradianceAlone() const;
   void showEdit();
@@ -127,7 +128,8 @@ class SolveLoop final : public Engine {
   /// Those who came while nothing changes are told what there is.
   void welcomeWatchers();
   [[nodiscard]] bool lacksPages() const;
-  void updateStatus(bool announce);
+  /// `as_reported`: of the solve nothing has changed since the last time.
+  void updateStatus(bool announce, bool as_reported = false);
 
   [[nodiscard]] LoadBegun install(Result<scene::Document> document, const std::string& by);
   /// A load of many texels: what is shown while they are being made, and who waits for them.
@@ -234,6 +236,7 @@ class SolveLoop final : public Engine {
   };
   std::vector<AwaitedTexel> awaited_texels_;  ///< of which pages are to be made
   History history_;
+  std::optional<scene::Document> retired_;  ///< by the last edit of light: it goes when that is done
   SolveState state_ = SolveState::kEmpty;
   std::string failure_;
   std::uint64_t revision_ = 0;

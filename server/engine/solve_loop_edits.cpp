@@ -192,7 +192,7 @@ Result<PatchOutcome> SolveLoop::adopt(scene::EditedDocument edited, const Keep& 
     auto scene = std::make_shared<const scene::Scene>(std::move(edited.scene));
     if (auto kept = keep(outcome); !kept) return tl::unexpected<Error>(kept.error());
     const bool taken = takeInLight([&] {
-      lit_->reshade(std::move(edited.document), std::move(scene), change);
+      retired_ = lit_->reshade(std::move(edited.document), std::move(scene), change);
       return outcome.affected_surfaces > 0;
     });
     if (!taken) outcome.affected_surfaces = std::max<std::uint64_t>(outcome.affected_surfaces, 1);  // all, in truth
@@ -288,7 +288,8 @@ void SolveLoop::takeSettings(const SolveSettings& before, bool resized, bool ane
   if (resized) {
     beginSolve();
     listeners_.tell([this](Listener& listener) { listener.onSceneLoaded(revision_); });
-    return publishLightmaps(false);
+    (void)publishLightmaps(false);
+    return;
   }
   if (anew) {
     lit_->invalidate();
@@ -300,7 +301,8 @@ void SolveLoop::takeSettings(const SolveSettings& before, bool resized, bool ane
   if (other_light && !takeInLight([&] { return other_light = lit_->setSky(settings_); })) other_light = true;
   if (other_light) {
     beginSolve();
-    return publishLightmaps(false);
+    (void)publishLightmaps(false);
+    return;
   }
   reconsiderStop();
   updateStatus(true);

@@ -24,13 +24,13 @@ static_assert(kQuantities.size() == kQuantityCount);
 
 }  // namespace
 
-void SolveLoop::publishLightmaps(bool final) {
+bool SolveLoop::publishLightmaps(bool final) {
   const bool watched = std::any_of(kQuantities.begin(), kQuantities.end(), [&](auto q) { return watches_.wants(q); });
   owes_pages_.reset();
-  if (!lit_) return;
+  if (!lit_) return false;
   if (!watched) {
     if (unpublished_ || final) ++unwatched_;
-    return;
+    return false;
   }
   const auto begin = threadTime();
   if (unpublished_ || final || (stepped_ && lacksPages())) {
@@ -42,6 +42,7 @@ void SolveLoop::publishLightmaps(bool final) {
   updateStatus(false);
   for (const auto quantity : kQuantities) publishQuantity(quantity);
   next_publish_ = Clock::now() + publishPause(threadTime() - begin);
+  return true;
 }
 
 /// Someone watches what the present version has no pages of: it was not asked for, or forgotten since. What was made of
