@@ -5,6 +5,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <new>
 #include <tuple>
 
 #include "common/clones.h"
@@ -32,11 +33,19 @@ class SolidTree::Walk {
  public:
   explicit Walk(std::vector<RayHit>& hits) : hits_(hits) { hits_.clear(); }
 
-  /// They come nearly in order.
-  void add(const RayHit& hit) {
+  /// They come nearly in order. Out of follow() nothing may be thrown: check() says that one was lost.
+  void add(const RayHit& hit) noexcept {
     const auto key = [](const RayHit& of) { return std::tuple(of.t, of.front, of.tree, of.triangle); };
     const bool in_order = hits_.empty() || key(hits_.back()) < key(hit);
-    hits_.insert(in_order ? hits_.end() : std::ranges::upper_bound(hits_, key(hit), {}, key), hit);
+    try {
+      hits_.insert(in_order ? hits_.end() : std::ranges::upper_bound(hits_, key(hit), {}, key), hit);
+    } catch (const std::bad_alloc&) {
+      is_short_ = true;
+    }
+  }
+  /// Throws std::bad_alloc.
+  void check() const {
+    if (is_short_) throw std::bad_alloc();
   }
 
   /// Goes on to `end`, before which no more hits will come.
@@ -56,6 +65,7 @@ class SolidTree::Walk {
   std::vector<RayHit>& hits_;
   std::size_t next_ = 0;
   int depth_ = 0;
+  bool is_short_ = false;
   RayHit last_{-1.0, 0, false};
 };
 
@@ -107,18 +117,24 @@ std::optional<double> SolidTree::endOfSolid(std::span<const SolidTree* const> tr
                                             std::uint64_t& work) {
   Walk walk(hits);
   const Ray ray{origin, direction, t_max};
-  if (trees.size() <= kTreesAtOnce) return follow(trees, 0, ray, true, walk, work);
+  if (trees.size() <= kTreesAtOnce) {
+    const auto end = follow(trees, 0, ray, true, walk, work);
+    walk.check();
+    return end;
+  }
   for (std::size_t first = 0; first < trees.size(); first += kTreesAtOnce) {
     const auto some = trees.subspan(first, std::min(trees.size() - first, kTreesAtOnce));
     (void)follow(some, static_cast<std::uint16_t>(first), ray, false, walk, work);
   }
+  walk.check();
   return walk.leaveBefore(std::numeric_limits<double>::infinity());
 }
 
 /// Nearer children first; what waits bounds from below what is still to come. `all`: no other trees follow, and where
 /// the ray leaves the solid is the end. `first`: number of the first.
 RADIOSITY_CLONES std::optional<double> SolidTree::follow(std::span<const SolidTree* const> trees, std::uint16_t first,
-                                                         const Ray& from, bool all, Walk& walk, std::uint64_t& work) {
+                                                         const Ray& from, bool all, Walk& walk,
+                                                         std::uint64_t& work) noexcept {
   constexpr float kNever = std::numeric_limits<float>::infinity();
   const WideNodes::Ray ray{glm::vec3(from.origin), glm::vec3(from.direction)};
   const auto reach = static_cast<float>(from.t_max) * (1.0F + 1e-6F);

@@ -40,7 +40,7 @@ class SolidTree {
   class Walk;
   struct Ray;
   static std::optional<double> follow(std::span<const SolidTree* const> trees, std::uint16_t first, const Ray& from,
-                                      bool all, Walk& walk, std::uint64_t& work);
+                                      bool all, Walk& walk, std::uint64_t& work) noexcept;
   [[nodiscard]] static std::uint32_t mayMeet(const Block& block, const WideNodes::Ray& ray);
 
   const Bvh* tree_ = nullptr;

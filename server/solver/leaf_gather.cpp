@@ -167,6 +167,7 @@ void LeafGather::finish() {
   std::array<Levels, 2> levels;
   inBothHalves([&](std::size_t half) {
     levels[half] = this->levels(half);
+    gathered_[half].assign(sights_.leafCount(), glm::vec3(0.0F));
     take(half, levels[half]);
   });
   solved_ = {};
@@ -204,7 +205,8 @@ void LeafGather::takeLight(std::size_t h) {
     half.source[sights_.skyBelow()][c] = light_.sky[1][static_cast<int>(c)];
   }
   half.arriving.assign(leaves, {});
-  const auto sums = takeSources(h);
+  std::vector<SourceSum> sums(sides_.size());
+  takeSources(h, sums);
   Light shining{};
   double area = 0.0;
   for (const auto& sum : sums) {

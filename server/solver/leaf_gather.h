@@ -166,12 +166,12 @@ class LeafGather {
     double area = 0.0;
   };
   void takeLight(std::size_t half);
-  [[nodiscard]] std::vector<SourceSum> takeSources(std::size_t half);
+  void takeSources(std::size_t half, std::span<SourceSum> sums) noexcept;
   [[nodiscard]] RayGmres::Vectors evenLight(const std::vector<SourceSum>& sums) const;
   void average(std::size_t half);
   void followSteps(std::size_t half, const std::vector<Light>* source);
   void sweep(std::size_t half, RayGmres::Vectors& x, bool affine);
-  void take(std::size_t half, const Levels& levels);
+  void take(std::size_t half, const Levels& levels) noexcept;
   void takeSolutions();
   void weighRays();
   void weighRays(std::size_t half, UnionFind& parts);
@@ -185,7 +185,7 @@ class LeafGather {
     void add(const LevelSum& other);
   };
   [[nodiscard]] Levels levels(std::size_t half);
-  [[nodiscard]] std::vector<LevelSum> levelSums(std::size_t half) const;
+  void addLevels(std::size_t half, std::span<LevelSum> sums) const noexcept;
   template <typename Visit>
   void visitParted(std::size_t half, std::span<const std::uint32_t> leaves, const Visit& visit) const;
   void weighPartedLoss(std::size_t half);

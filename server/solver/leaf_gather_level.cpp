@@ -45,20 +45,29 @@ void LeafGather::weighRays(std::size_t half, UnionFind& parts) {
   lost_[half] = LostRays(sights_.leafCount());
   const auto steps = sights_.steps(half);
   std::vector<std::uint32_t> joined(sides_.size(), scene::kNone);  // by side: the last that it was joined to
+  const auto leaves = sights_.leafCount();
   std::size_t first = 0;
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
+    const auto join = [&](std::uint32_t seen) {
+      if (joined[seen] == s) return;
+      joined[seen] = s;
+      parts.join(s, seen);
+    };
     for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count;
          first += sights_.counts()[v++]) {
       LostRays::Counts lost;
       for (const auto end : sights_.ends(half, first, sights_.counts()[v])) {
-        if (end == sights_.skyAbove()) ++lost.above;
-        if (end == sights_.skyBelow()) ++lost.below;
-        if (sights_.isAbsorbed(end)) ++lost.absorbed;
         if (sights_.isDoubtful(half, end)) ++lost.doubtful;
-        if (end >= sights_.leafCount() && end < sights_.endCount()) continue;
-        const auto seen = sights_.sideOf(end < sights_.endCount() ? end : steps[end - sights_.endCount()].by);
-        if (std::exchange(joined[seen], s) != s) parts.join(s, seen);
-        if (end >= sights_.endCount()) joinSteps(half, end, parts);
+        if (end < leaves) {  // most
+          join(sights_.sideOf(end));
+        } else if (end >= sights_.endCount()) {
+          join(sights_.sideOf(steps[end - sights_.endCount()].by));
+          joinSteps(half, end, parts);
+        } else {
+          if (end == sights_.skyAbove()) ++lost.above;
+          if (end == sights_.skyBelow()) ++lost.below;
+          if (sights_.isAbsorbed(end)) ++lost.absorbed;
+        }
       }
       lost_[half].add(v, lost);
     }
@@ -189,7 +198,8 @@ const LeafGather::Light& LeafGather::lossOf(std::size_t h, std::uint32_t v) cons
 /// for what little is off then.
 LeafGather::Levels LeafGather::levels(std::size_t h) {
   if (has_parted_) weighPartedLoss(h);
-  const auto sums = levelSums(h);
+  std::vector<LevelSum> sums(sides_.size());
+  addLevels(h, sums);
   Levels levels(sides_.size());
   for (std::size_t p = 0; p < sums.size(); ++p) {
     for (std::size_t c = 0; c < 3; ++c) {
@@ -211,8 +221,7 @@ LeafGather::Levels LeafGather::levels(std::size_t h) {
 }
 
 /// What shooters leave to each leaf.
-RADIOSITY_CLONES auto LeafGather::takeSources(std::size_t h) -> std::vector<SourceSum> {
-  std::vector<SourceSum> sums(sides_.size());
+RADIOSITY_CLONES void LeafGather::takeSources(std::size_t h, std::span<SourceSum> sums) noexcept {
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
     SourceSum sum;
     for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
@@ -238,7 +247,6 @@ RADIOSITY_CLONES auto LeafGather::takeSources(std::size_t h) -> std::vector<Sour
     addTo(of_part.takes, sum.takes);
     of_part.area += sum.area;
   }
-  return sums;
 }
 
 /// If all leaves of a part of the scene had the same light: what they take of it, and lose, is what shines there. That
@@ -270,8 +278,7 @@ void LeafGather::LevelSum::add(const LevelSum& other) {
 }
 
 /// By part of the scene.
-RADIOSITY_CLONES auto LeafGather::levelSums(std::size_t h) const -> std::vector<LevelSum> {
-  std::vector<LevelSum> sums(sides_.size());
+RADIOSITY_CLONES void LeafGather::addLevels(std::size_t h, std::span<LevelSum> sums) const noexcept {
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
     LevelSum sum;
     for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v) {
@@ -298,13 +305,11 @@ RADIOSITY_CLONES auto LeafGather::levelSums(std::size_t h) const -> std::vector<
     }
     sums[part_[s]].add(sum);
   }
-  return sums;
 }
 
 /// As `levels` have it.
-RADIOSITY_CLONES void LeafGather::take(std::size_t h, const Levels& levels) {
+RADIOSITY_CLONES void LeafGather::take(std::size_t h, const Levels& levels) noexcept {
   auto& gathered = gathered_[h];
-  gathered.assign(sights_.leafCount(), glm::vec3(0.0F));
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
     Light of_gathered{}, of_links{};
     for (std::size_t c = 0; c < 3; ++c) {

@@ -2,9 +2,13 @@
 #include <gmock/gmock.h>
 
 #include <future>
+#include <new>
 #include <optional>
 #include <set>
+#include <vector>
 
+#include "server/scene/bvh.h"
+#include "server/scene/solid_tree.h"
 #include "tests/scenes/scenes.h"
 #include "tests/unit/client/temporary_folder.h"
 #include "tests/unit/engine/engine_driver.h"
@@ -15,6 +19,27 @@ namespace {
 
 using engine::PatchOutcome;
 using test_scenes::lumpedCube;
+
+/// In a function of which there are two clones, and out of which nothing may be thrown.
+TEST(RayMemory, ARayThatMeetsMoreThanThereIsRoomForIsNotTakenForOneThatMeetsLess) {
+  std::vector<scene::Bvh::Triangle> sheets;
+  for (int i = 1; i <= 40; ++i) {
+    const float x = 0.01F * static_cast<float>(i);
+    sheets.push_back({glm::vec3(x, 0, 0), {x, 0, 1}, {x, 1, 0}});
+  }
+  const scene::Bvh tree(std::move(sheets));
+  const scene::SolidTree solids(tree);
+  std::vector<scene::RayHit> hits;
+  std::uint64_t work = 0;
+  const auto ask = [&] {
+    return scene::SolidTree::endOfSolid(std::array{&solids}, glm::dvec3(0, 0.2, 0.3), {1, 0, 0}, 2.0, hits, work);
+  };
+  failAllocation(1, sizeof(scene::RayHit), Shortage::kOnce);
+  EXPECT_THROW((void)ask(), std::bad_alloc);
+  (void)letAllocate();
+  EXPECT_FALSE(ask());
+  EXPECT_EQ(hits.size(), 40U);
+}
 
 /// Smaller ones are not let fail: the JSON library makes some in destructors, which end the program where they throw.
 constexpr std::size_t kLeastBytes = 512;
