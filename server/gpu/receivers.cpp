@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numeric>
+#include <span>
 
 #include "common/union_find.h"
 
@@ -112,20 +113,40 @@ void Receivers::findBlocks(Group& group) {
     const bool goes_on = i > group.first && blocks_.back().count < kBlock && blocks_.back().plain == plain &&
                          (!plain || sameFrame(receiver, receivers_[i - 1]));
     if (!goes_on) blocks_.push_back({i, 0, glm::vec3(1e30F), glm::vec3(-1e30F), plain});
-    auto& block = blocks_.back();
-    ++block.count;
-    const auto hold = [&block](const glm::vec3& point) {
-      block.low = glm::min(block.low, point);
-      block.high = glm::max(block.high, point);
-    };
-    if (receiver.hasSpots() && !receiver.full) {
-      const auto of_receiver = spots(receiver);
-      for (std::uint32_t k = 0; k < of_receiver.count; ++k) hold(of_receiver.at(k).point);
-    }
-    for (int corner = 0; corner < 4; ++corner) hold(place(receiver, {corner % 2, corner / 2}).point);
+    ++blocks_.back().count;
     texel_x_.push_back(receiver.texel.x);
     texel_y_.push_back(receiver.texel.y);
     nodes_.push_back(receiver.node);
+  }
+  for (auto block = group.first_block; block < blocks_.size(); ++block) setBounds(blocks_[block]);
+}
+
+/// Around the box of all texels, or those of each, where they are of one frame.
+void Receivers::setBounds(Block& block) const {
+  const auto hold = [&block](const glm::vec3& point) {
+    block.low = glm::min(block.low, point);
+    block.high = glm::max(block.high, point);
+  };
+  const auto holdBox = [&](const glm::vec2& low, const glm::vec2& high, std::uint32_t triangle) {
+    for (const float x : {low.x, high.x})
+      for (const float y : {low.y, high.y}) hold(placeOf({{x, y}, triangle}).point);
+  };
+  if (block.plain) {
+    const auto first = static_cast<std::ptrdiff_t>(block.first), end = first + static_cast<std::ptrdiff_t>(block.count);
+    const auto [left, right] = std::minmax_element(texel_x_.begin() + first, texel_x_.begin() + end);
+    const auto [top, bottom] = std::minmax_element(texel_y_.begin() + first, texel_y_.begin() + end);
+    return holdBox({*left, *top}, {*right + 1.0F, *bottom + 1.0F}, receivers_[block.first].triangle);
+  }
+  for (const auto& receiver : std::span(receivers_).subspan(block.first, block.count)) {
+    if (receiver.full) {
+      holdBox(receiver.texel, receiver.texel + 1.0F, receiver.triangle);
+    } else if (!receiver.hasSpots()) {
+      hold(placeOf({receiver.texel, receiver.triangle}).point);
+    } else if (const auto of = spots(receiver); of.list.triangles == nullptr) {
+      holdBox(of.list.lattice.low, of.list.lattice.low + of.list.lattice.size, receiver.triangle);
+    } else {
+      for (std::uint32_t k = 0; k < of.count; ++k) hold(of.at(k).point);
+    }
   }
 }
 

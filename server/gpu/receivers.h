@@ -202,6 +202,7 @@ class Receivers {
     return {frame.origin + spot.texel.x * frame.du + spot.texel.y * frame.dv, &frame};
   }
   void findBlocks(Group& group);
+  void setBounds(Block& block) const;
   void findFacets();
   [[nodiscard]] bool findConvex() const;
   void measure(Facet& facet);

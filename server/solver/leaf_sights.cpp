@@ -151,7 +151,7 @@ std::uint32_t LeafSights::endOfRay(LeafRays::Place place, glm::dvec3 direction, 
   return end;
 }
 
-bool LeafSights::isDoubtful(std::size_t half, std::uint32_t end) const {
+bool LeafSights::endsInDoubt(std::size_t half, std::uint32_t end) const {
   std::size_t count = 0;
   for (; end >= endCount(); ++count) end = steps_[half][end - endCount()].next;
   return (count == kMostSteps || is_short_) && end < leaf_count_ && isParted(end);

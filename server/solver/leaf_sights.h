@@ -56,7 +56,9 @@ class LeafSights {
   [[nodiscard]] std::span<const Step> steps(std::size_t half) const { return steps_[half]; }
   /// The ray went on as often as a ray may, or there is no memory for more of that, and ends on another leaf that is
   /// parted.
-  [[nodiscard]] bool isDoubtful(std::size_t half, std::uint32_t end) const;
+  [[nodiscard]] bool isDoubtful(std::size_t half, std::uint32_t end) const {
+    return (is_short_ || end >= endCount()) && endsInDoubt(half, end);
+  }
 
   /// Index of the side of a leaf.
   [[nodiscard]] std::uint32_t sideOf(std::uint32_t value) const { return rays_->indexOfSide(value); }
@@ -122,6 +124,7 @@ class LeafSights {
     const auto end = seen_[half][ray];
     return end == seen_[half].most() ? kUntraced : end;
   }
+  [[nodiscard]] bool endsInDoubt(std::size_t half, std::uint32_t end) const;
   [[nodiscard]] std::uint32_t untracedOf(std::size_t half, std::uint32_t value) const;
   /// For rays, of which none is traced, that may end anywhere, or go on over so many steps.
   [[nodiscard]] PackedNumbers roomFor(std::size_t rays, std::size_t steps) const;
