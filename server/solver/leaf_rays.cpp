@@ -126,20 +126,6 @@ double LeafRays::widthOf(std::uint32_t value) const {
   return std::sqrt(static_cast<double>(patches_.surfaces[sideOf(value).surface].texel_area));
 }
 
-bool LeafRays::addTo(scene::Bounds& box, std::uint32_t value) const {
-  const Side& side = sideOf(value);
-  const auto& surface = patches_.surfaces[side.surface];
-  const auto leaf = value - side.first_value;
-  const auto triangle = patches_.leaves[surface.first_leaf + leaf].triangle;
-  if (!surface.planar || triangle == scene::kNone) return false;
-  const auto& frame = patches_.triangles[triangle];
-  const auto x = static_cast<float>(leaf % side.width), y = static_cast<float>(leaf / side.width);
-  for (const float u : {x - 1.0F, x + 2.0F}) {
-    for (const float v : {y - 1.0F, y + 2.0F}) box.add(frame.origin + u * frame.du + v * frame.dv);
-  }
-  return true;
-}
-
 LeafRays::Place LeafRays::placeOn(std::uint32_t value, const glm::dvec2& at) const {
   const Side& side = sideOf(value);
   const auto leaf = value - side.first_value;

@@ -46,9 +46,6 @@ class LeafRays {
   [[nodiscard]] double widthOf(std::uint32_t value) const;
   [[nodiscard]] double greatestWidth() const { return greatest_width_; }
 
-  /// Adds the texel and those around it, for some of which it may stand, to the box. False: it is not known where all
-  /// of them lie, since its chart is not flat.
-  [[nodiscard]] bool addTo(scene::Bounds& box, std::uint32_t value) const;
   /// The place at (u, v) in [0, 1)^2, uniform over what is left of a leaf that has area.
   [[nodiscard]] Place placeOn(std::uint32_t value, const glm::dvec2& at) const;
   /// What lies that way within `reach` (unit box), in single precision; `value` is kNothing where nothing does, and

@@ -163,7 +163,6 @@ class LeafSights {
   void forgetStandIns(const LeafSights& former, std::vector<std::uint32_t>& value_after) const;
   [[nodiscard]] bool passes(std::span<const scene::ChangedBox> boxes, std::uint32_t value,
                             const glm::dvec4& draw) const;
-  [[nodiscard]] bool isBetween(std::span<const scene::ChangedBox> boxes, std::uint32_t one, std::uint32_t other) const;
   /// What is taken over after an edit of geometry.
   struct Inheritance {
     const LeafSights& former;
@@ -181,11 +180,16 @@ class LeafSights {
       may_hide.resize(rays);
     }
   };
-  void inheritHalf(std::size_t half, const Inheritance& from);
-  void findFirstMet(std::uint32_t value, std::size_t half, const PackedNumbers::Run& old, const Inheritance& from,
+  /// Rays of one half of a leaf, which lie together.
+  struct LeafRun {
+    std::uint32_t value;
+    std::size_t half, first_ray;
+  };
+  [[nodiscard]] std::uint64_t inheritHalf(std::size_t half, const Inheritance& from);
+  void findFirstMet(std::size_t half, const PackedNumbers::Run& old, const Shadows::Look& look, const Inheritance& from,
                     FirstMet& met) const;
-  void inheritLeaf(std::uint32_t value, std::size_t half, std::size_t first_ray, const PackedNumbers::Run& old,
-                   const Inheritance& from, const FirstMet& met);
+  [[nodiscard]] std::uint64_t inheritLeaf(const LeafRun& leaf, const PackedNumbers::Run& old, const Shadows::Look& look,
+                                          const Inheritance& from, const FirstMet& met);
   std::uint32_t inheritStep(std::size_t half, std::uint32_t end, const Inheritance& from);
 
   const std::vector<Side>& sides_;

@@ -1,5 +1,6 @@
 // LeafSights after an edit of geometry: rays that pass nothing that changed see what they saw.
 #include <algorithm>
+#include <array>
 #include <numeric>
 #include <optional>
 
@@ -28,20 +29,6 @@ bool LeafSights::passes(std::span<const scene::ChangedBox> boxes, std::uint32_t 
   });
 }
 
-/// Whether something lies in the box around two leaves, so that a ray from one to the other may pass it.
-bool LeafSights::isBetween(std::span<const scene::ChangedBox> boxes, std::uint32_t one, std::uint32_t other) const {
-  scene::Bounds around;
-  if (!rays_->addTo(around, one) || !rays_->addTo(around, other)) return true;
-  return std::ranges::any_of(boxes, [&](const scene::ChangedBox& box) {
-    for (int axis = 0; axis < 3; ++axis) {
-      if (static_cast<double>(box.low[axis]) - kMargin > static_cast<double>(around.max[axis]) ||
-          static_cast<double>(box.high[axis]) + kMargin < static_cast<double>(around.min[axis]))
-        return false;
-    }
-    return true;
-  });
-}
-
 /// A step of the scene before and those that it goes on to; kUntraced: where it passes may have changed, or is not
 /// known. Where a ray into the sky passes never is.
 std::uint32_t LeafSights::inheritStep(std::size_t half, std::uint32_t end, const Inheritance& from) {
@@ -50,8 +37,8 @@ std::uint32_t LeafSights::inheritStep(std::size_t half, std::uint32_t end, const
   const bool is_last = step.next < former.endCount();
   const auto then = is_last ? step.next : former.steps_[half][step.next - former.endCount()].by;
   const auto by = from.value_after[step.by], to = from.value_after[then];
-  if (by == kUntraced || to == kUntraced || to >= leaf_count_ || isBetween(from.change.change().came, by, to))
-    return kUntraced;
+  if (by == kUntraced || to == kUntraced || to >= leaf_count_) return kUntraced;
+  if (from.stands_in[by] || from.stands_in[to] || from.change.mayHide(by, to)) return kUntraced;
   const auto next = is_last ? to : inheritStep(half, step.next, from);
   if (next == kUntraced) return kUntraced;
   steps_[half].push_back({by, next});
@@ -73,8 +60,10 @@ void LeafSights::forgetStandIns(const LeafSights& former, std::vector<std::uint3
   }
 }
 
-void LeafSights::inheritHalf(std::size_t half, const Inheritance& from) {
+/// How many rays of it are known.
+std::uint64_t LeafSights::inheritHalf(std::size_t half, const Inheritance& from) {
   const auto& former = from.former;
+  std::uint64_t known = 0;
   widen(half, former.steps_[half].size());
   FirstMet met;
   std::size_t first_ray = 0;
@@ -82,12 +71,14 @@ void LeafSights::inheritHalf(std::size_t half, const Inheritance& from) {
     const auto before = from.value_before[value];
     if (count_[value] == 0 || before == scene::kNone || former.count_[before] == 0) continue;
     const auto old = former.ends(half, former.firstOf(before), std::min(former.count_[before], count_[value]));
-    findFirstMet(value, half, old, from, met);
-    inheritLeaf(value, half, first_ray, old, from, met);
+    const auto look = from.change.lookFrom(value);
+    findFirstMet(half, old, look, from, met);
+    known += inheritLeaf({value, half, first_ray}, old, look, from, met);
   }
+  return known;
 }
 
-void LeafSights::findFirstMet(std::uint32_t value, std::size_t half, const PackedNumbers::Run& old,
+void LeafSights::findFirstMet(std::size_t half, const PackedNumbers::Run& old, const Shadows::Look& look,
                               const Inheritance& from, FirstMet& met) const {
   const auto& former = from.former;
   const auto untraced = former.seen_[half].most(), ends = former.endCount();
@@ -100,12 +91,14 @@ void LeafSights::findFirstMet(std::uint32_t value, std::size_t half, const Packe
     met.end[k] = after;
     met.leaf[k++] = after < leaf_count_ ? static_cast<std::int32_t>(after) : 0;
   }
-  from.change.lookFrom(value).screen(met.leaf, met.may_hide.data());
+  look.screen(met.leaf, met.may_hide.data());
 }
 
-void LeafSights::inheritLeaf(std::uint32_t value, std::size_t half, std::size_t first_ray,
-                             const PackedNumbers::Run& old, const Inheritance& from, const FirstMet& met) {
+std::uint64_t LeafSights::inheritLeaf(const LeafRun& leaf, const PackedNumbers::Run& old, const Shadows::Look& look,
+                                      const Inheritance& from, const FirstMet& met) {
   const auto& former = from.former;
+  const auto [value, half, first_ray] = leaf;
+  std::uint64_t known = 0;
   const auto& change = from.change.change();
   std::optional<Sobol4> draw;  // few leaves need it
   for (std::uint32_t k = 0; k < old.size(); ++k) {
@@ -114,12 +107,15 @@ void LeafSights::inheritLeaf(std::uint32_t value, std::size_t half, std::size_t 
     // What is gone had hidden nothing from a ray whose end is known, and may be what another ended on.
     const bool is_known = first < leaf_count_ || first >= skyAbove();
     const bool may_pass =
-        first >= leaf_count_ || from.stands_in[first] || (met.may_hide[k] != 0 && from.change.mayHide(value, first));
+        first >= leaf_count_ || from.stands_in[first] || (met.may_hide[k] != 0 && look.mayHideScreened(first));
     if (may_pass && !draw) draw.emplace(draws(value, rays_->sideOf(value), half));
     if (may_pass && passes(is_known ? change.came : change.boxes, value, (*draw)(k))) continue;
     const auto end = old[k] >= former.endCount() ? inheritStep(half, old[k], from) : first;
-    if (end != kUntraced) seen_[half].set(first_ray + k, end);
+    if (end == kUntraced) continue;
+    seen_[half].set(first_ray + k, end);
+    ++known;
   }
+  return known;
 }
 
 void LeafSights::inherit(const LeafSights& former, std::span<const std::uint32_t> value_before, const Shadows& change,
@@ -158,12 +154,11 @@ void LeafSights::inherit(const LeafSights& former, std::span<const std::uint32_t
     if (seen != value && seen < leaf_count_) stands_in[seen] = true;
   }
   const Inheritance from{former, value_before, value_after, stands_in, change};
-  inBothHalves([&](std::size_t half) { inheritHalf(half, from); });
+  std::array<std::uint64_t, 2> known{};
+  inBothHalves([&](std::size_t half) { known[half] = inheritHalf(half, from); });
   is_short_ = former.is_short_;
-  kept_ = former.kept_;
+  kept_ = former.kept_ + known[0] + known[1];
   traced_ = former.traced_;
-  for (const auto& half : seen_)
-    kept_ += half.size() - static_cast<std::uint64_t>(std::ranges::count(half.all(), half.most()));
 }
 
 }  // namespace radiosity::solver

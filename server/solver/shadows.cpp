@@ -299,7 +299,11 @@ bool Shadows::Look::mayHide(std::uint32_t to) const {
   const auto index = static_cast<std::int32_t>(to);
   std::int32_t may = 0;
   screen({&index, 1}, &may);
-  return may != 0 && isPassed(Boxes{shadows->change_.came, shadows->around_came_}, from, shadows->ball_[to]);
+  return may != 0 && mayHideScreened(to);
+}
+
+bool Shadows::Look::mayHideScreened(std::uint32_t to) const {
+  return isPassed(Boxes{shadows->change_.came, shadows->around_came_}, from, shadows->ball_[to]);
 }
 
 void Shadows::Look::screen(std::span<const std::int32_t> to, std::int32_t* may) const {

@@ -52,6 +52,8 @@ class Shadows {
   class Look {
    public:
     [[nodiscard]] bool mayHide(std::uint32_t to) const;
+    /// The same of one of which screen() does not say that it surely hides nothing.
+    [[nodiscard]] bool mayHideScreened(std::uint32_t to) const;
     /// Of many leaves, those that it surely hides no places of: 0; mayHide() is to tell of the others.
     void screen(std::span<const std::int32_t> to, std::int32_t* may) const;
 
