@@ -179,10 +179,8 @@ void LinkedSolver::findCutLinks(RepairBatch& repairs) const {
   });
 }
 
-/// Short, as measureSlice().
-Result<void> LinkedSolver::repairSlice() {
-  const auto start = std::chrono::steady_clock::now();
-  RepairBatch batch;
+/// Takes the next repairs, and finds what links are cut.
+void LinkedSolver::takeRepairs(RepairBatch& batch) {
   const auto count = std::min(slice_, due_ - repaired_);
   for (auto& repair : std::span(repairs_).subspan(repaired_, count)) {
     // Of one that waited there may be more by now.
@@ -196,6 +194,9 @@ Result<void> LinkedSolver::repairSlice() {
   batch.repairs = std::span(repairs_).subspan(repaired_, count);
   batch.sum.resize(system_.leafAreas().size());
   findCutLinks(batch);
+}
+
+void LinkedSolver::addShots(RepairBatch& batch) {
   auto& shots = batch.shots;
   const auto& boxes = shadows_->change().boxes;
   shots.boxes = boxes;
@@ -234,8 +235,16 @@ Result<void> LinkedSolver::repairSlice() {
     (repair.whole ? edits_.retaken : edits_.repaired) +=
         shots.gather.size() - gathered + shots.scatter.size() - scattered;
   }
+}
+
+/// Short, as measureSlice().
+Result<void> LinkedSolver::repairSlice() {
+  const auto start = std::chrono::steady_clock::now();
+  RepairBatch batch;
+  takeRepairs(batch);
+  addShots(batch);
   const auto take = [&](std::size_t i, LinkSample&& links) { takePart(batch, i, links); };
-  const auto done = transport_.measure(shots, take);
+  const auto done = transport_.measure(batch.shots, take);
   if (!done) return tl::unexpected<Error>(done.error());
   counters_ += *done;
   weighRough(batch);

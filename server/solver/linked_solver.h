@@ -197,6 +197,8 @@ class LinkedSolver final : public Solver {
   void takePart(RepairBatch& repairs, std::size_t shot, LinkSample& links);
   void replacePart(RepairBatch& repairs, std::uint32_t index);
   [[nodiscard]] Result<void> repairSlice();
+  void takeRepairs(RepairBatch& batch);
+  void addShots(RepairBatch& batch);
   [[nodiscard]] bool isFull() const;
   /// Rounds are counted on from edit to edit, and no number of edits takes them away from those that follow.
   [[nodiscard]] bool hasRounds() const { return rounds_ - rounds_before_edit_ < settings_.max_rounds; }
