@@ -1,5 +1,4 @@
 #include "server/scene/charts.h"
-#include "common/parallel.h"
 
 #include <fmt/format.h>
 
@@ -10,6 +9,7 @@
 #include <optional>
 #include <unordered_map>
 
+#include "common/parallel.h"
 #include "server/scene/atlas.h"
 #include "server/scene/burial_record.h"
 #include "server/scene/coverage.h"
@@ -81,12 +81,17 @@ class Builder {
     patches_.solids = std::move(solids);
     setTexelAreas();
     burial_ = removeBuried(patches_, pieces, hides, [&]() -> std::unique_ptr<const FormerBurial> {
-      if (former_ == nullptr || record_ == nullptr) return nullptr;
-      auto same = matchSurfaces(former_->scene, former_->patches, scene_, patches_);
-      return std::make_unique<const FormerBurial>(former_->patches, *record_, patches_, std::move(same), hides);
+      if (former_ == nullptr) return nullptr;
+      surface_before_ = matchSurfaces(former_->scene, former_->patches, scene_, patches_);
+      if (record_ == nullptr) return nullptr;
+      return std::make_unique<const FormerBurial>(former_->patches, *record_, patches_, surface_before_, hides);
     });
     placeSpots(patches_, pieces);
-    placeSpotsInGaps(patches_);
+    if (former_ != nullptr) {
+      placeSpotsInGaps(patches_, former_->patches, surface_before_);
+    } else {
+      placeSpotsInGaps(patches_);
+    }
     patches_.spots.shrinkToFit();
     measureOpacity(scene_, patches_);
     applyOpacity(patches_);
@@ -295,6 +300,7 @@ class Builder {
   const BurialRecord* record_;
   PatchScene patches_;
   std::shared_ptr<const BurialRecord> burial_;
+  std::vector<std::uint32_t> surface_before_;  ///< after an edit, as of matchSurfaces()
   FlatScene flat_;
   std::vector<std::uint32_t> neighbours_;
   std::vector<Chart> charts_;

@@ -65,6 +65,9 @@ void placeSpots(PatchScene& patches, const std::vector<LeafPiece>& pieces);
 /// The same for full leaves of planes right before which something else stands (a lamp close under a ceiling): there,
 /// light changes within a leaf. Both sides.
 void placeSpotsInGaps(PatchScene& patches);
+/// The same after an edit of `before`, with the same result: of surfaces that it left alone only what is near to others
+/// is looked at. `surface_before`: as of matchSurfaces().
+void placeSpotsInGaps(PatchScene& patches, const PatchScene& before, std::span<const std::uint32_t> surface_before);
 
 /// Sums level 0 of node_area up all pyramids.
 void sumAncestors(PatchScene& patches);

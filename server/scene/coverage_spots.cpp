@@ -2,7 +2,9 @@
 // it.
 #include <algorithm>
 #include <array>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
 #include <utility>
 #include <vector>
 
@@ -121,16 +123,21 @@ constexpr float kLift = 2e-5F, kInterior = 0.9F;
 /// What hovers beside a leaf counts so many leaf widths away, a pixel or two of an item buffer: a lamp in front of a
 /// hole in the ceiling, whose shadow there falls on nothing that could make up for what pixels give it of the rim.
 constexpr float kBeside = 2.0F;
+/// What changed counts as so much larger (unit box): well above the rounding of boxes.
+constexpr float kAround = 1e-4F;
 /// Surfaces: fewer are not worth a thread.
 constexpr std::size_t kFewestAShare = 32;
 
 class Gaps {
  public:
-  explicit Gaps(PatchScene& patches) : patches_(patches) {
+  explicit Gaps(PatchScene& patches, const PatchScene* before = nullptr,
+                std::span<const std::uint32_t> surface_before = {})
+      : patches_(patches), before_(before), surface_before_(surface_before) {
     std::vector<Bvh::Triangle> triangles(patches.triangles.size());
     for (std::size_t i = 0; i < patches.indices.size(); ++i)
       triangles[i / 3][i % 3] = patches.vertices[patches.indices[i]].position;
     tree_ = Bvh(std::move(triangles));
+    if (before_ != nullptr) findChanged();
   }
 
   /// Found side by side, kept in the order of the surfaces.
@@ -155,6 +162,7 @@ class Gaps {
     glm::uvec2 at;
     bool cut;
   };
+  [[nodiscard]] static bool mayHave(const LeafPoint& leaf) { return leaf.full && !leaf.hasSpots(); }
   /// Space right before a node, on one side, wider than the node by so many leaf widths.
   [[nodiscard]] Bvh::OrientedBox boxBefore(std::uint32_t s, float side, std::uint32_t level, glm::uvec2 at, float wider,
                                            float gap = kGap) const {
@@ -172,7 +180,73 @@ class Gaps {
     return box;
   }
 
+  /// Around surfaces that are not where they were, in either scene.
+  void findChanged() {
+    std::vector<bool> stayed(before_->surfaces.size(), false);
+    const auto add = [&](const Surface& surface) {
+      changed_.push_back({surface.bounds_min - kAround, surface.bounds_max + kAround});
+    };
+    for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
+      if (surface_before_[s] == kNone) {
+        add(patches_.surfaces[s]);
+      } else {
+        stayed[surface_before_[s]] = true;
+      }
+    }
+    for (std::uint32_t s = 0; s < stayed.size(); ++s)
+      if (!stayed[s]) add(before_->surfaces[s]);
+    joinBoxes(changed_);
+  }
+
+  /// What is asked of a node may have another answer than before the edit, on one of its sides: of both it is kept
+  /// together.
+  [[nodiscard]] bool mayDiffer(std::uint32_t s, std::uint32_t level, glm::uvec2 at) const {
+    if (before_ == nullptr || surface_before_[s] == kNone) return true;
+    const auto &sides = patches_.surfaces[s].first_node, &former = before_->surfaces[surface_before_[s]].first_node;
+    for (std::size_t side = 0; side < 2; ++side) {
+      if ((sides[side] == kNone) != (former[side] == kNone)) return true;
+      if (sides[side] != kNone && isNearChanged(boxBefore(s, side == 0 ? 1.0F : -1.0F, level, at, 2.0F * kBeside)))
+        return true;
+    }
+    return false;
+  }
+
+  [[nodiscard]] bool isNearChanged(const Bvh::OrientedBox& box) const {
+    const glm::vec3 half =
+        glm::abs(box.axes[0]) * box.half.x + glm::abs(box.axes[1]) * box.half.y + glm::abs(box.axes[2]) * box.half.z;
+    return std::ranges::any_of(changed_, [&](const ChangedBox& changed) {
+      return glm::all(glm::lessThanEqual(box.centre - half, changed.high)) &&
+             glm::all(glm::lessThanEqual(changed.low, box.centre + half));
+    });
+  }
+
+  /// Of a node that nothing changed near to. Of leaves that were not full it is not known.
+  void inherit(std::uint32_t s, float side, std::uint32_t level, glm::uvec2 at, std::vector<Found>& found) const {
+    const Surface &surface = patches_.surfaces[s], &former = before_->surfaces[surface_before_[s]];
+    const glm::uvec2 end = glm::min((at + 1U) << level, glm::uvec2(surface.width, surface.height));
+    for (auto y = at.y << level; y < end.y; ++y) {
+      for (auto x = at.x << level; x < end.x; ++x) {
+        const auto leaf = y * surface.width + x;
+        if (!mayHave(patches_.leaves[surface.first_leaf + leaf])) continue;
+        const auto& was = before_->leaves[former.first_leaf + leaf];
+        if (!was.full) {
+          ask(s, side, 0, {x, y}, found);
+        } else if (was.spot_list == kFullSpots) {
+          found.push_back({{x, y}, was.cut});
+        }
+      }
+    }
+  }
+
   void descend(std::uint32_t s, float side, std::uint32_t level, glm::uvec2 at, std::vector<Found>& found) const {
+    if (mayDiffer(s, level, at)) {
+      ask(s, side, level, at, found);
+    } else {
+      inherit(s, side, level, at, found);
+    }
+  }
+
+  void ask(std::uint32_t s, float side, std::uint32_t level, glm::uvec2 at, std::vector<Found>& found) const {
     const Surface& surface = patches_.surfaces[s];
     if (!tree_.touches(boxBefore(s, side, level, at, kInterior - 1.0F), patches_.triangle_surface, s) &&
         !tree_.hoversIn(boxBefore(s, side, level, at, 2.0F * kBeside), patches_.triangle_surface, s))
@@ -191,17 +265,24 @@ class Gaps {
   void place(const Surface& surface, const Found& found) {
     const auto at = found.at;
     auto& leaf = patches_.leaves[surface.first_leaf + at.y * surface.width + at.x];
-    if (!leaf.full || leaf.spot_list != kNone) return;
+    if (!mayHave(leaf)) return;
     leaf.spot_list = kFullSpots;
     leaf.cut = found.cut;
   }
 
   PatchScene& patches_;
+  const PatchScene* before_;  ///< null: no edit
+  std::span<const std::uint32_t> surface_before_;
+  std::vector<ChangedBox> changed_;
   Bvh tree_;
 };
 
 }  // namespace
 
 void placeSpotsInGaps(PatchScene& patches) { Gaps(patches).run(); }
+
+void placeSpotsInGaps(PatchScene& patches, const PatchScene& before, std::span<const std::uint32_t> surface_before) {
+  Gaps(patches, &before, surface_before).run();
+}
 
 }  // namespace radiosity::scene

@@ -70,8 +70,8 @@ bool LinkedSolver::mayGather(std::size_t leaves, const SolverSettings& settings)
 /// Half of the light that is reflected comes from what is no brighter than this, about; all channels. In a building
 /// whose rooms are lit and whose outside is dark that is far more than the mean.
 double LinkedSolver::usualRadiosity() const {
-  // Eight steps an octave, by the first bits of a float, from 2^-64 to 2^64.
-  constexpr std::uint32_t kBits = 20, kFirst = (127 - 64) << 3U, kSteps = 128 << 3U;
+  // 32 steps an octave, by the first bits of a float, from 2^-64 to 2^64.
+  constexpr std::uint32_t kBits = 18, kFirst = (127 - 64) << 5U, kSteps = 128 << 5U;
   std::vector<double> flux(kSteps);
   double all = 0.0;
   for (std::uint32_t s = 0; s < sides_.size(); ++s) {
