@@ -246,6 +246,7 @@ void SolveLoop::announceEdit(const PatchOutcome& outcome, const std::string& pat
     }
     showEdit();
   });
+  if (state_ != SolveState::kSolving) retired_.reset();  // no slice follows
   if (shown) return;
   unpublished_ = true;
   log::warn("out of memory: an edit will be shown later");

@@ -194,6 +194,7 @@ void SolveLoop::unload(SolveState state) {
   first_light_.reset();
   former_.reset();
   lit_.reset();
+  retired_.reset();
   as_restored_ = false;
   state_ = state;
   owes_pages_.reset();

@@ -1,4 +1,5 @@
 // importScene: checks, then materials, then a walk over the node tree. After an edit, of that only what it may change.
+#include <algorithm>
 #include <memory>
 #include <utility>
 
@@ -14,7 +15,8 @@
 namespace radiosity::scene {
 namespace {
 
-/// Of more nodes, meshes and accessors, about a kilobyte each, nothing is kept for the next edit.
+/// Of more nodes, meshes, materials, accessors and instances, a kilobyte each at most, nothing is kept for the next
+/// edit.
 constexpr std::size_t kMostParsed = 20'000;
 
 /// `former`: null for none.
@@ -39,6 +41,17 @@ Result<Scene> importAll(const Document& document, const Document* former, const 
   return scene;
 }
 
+/// Also in what kind of number stands there: 1.0 equals 1, but is no index.
+bool isIdentical(const Json& a, const Json& b) {
+  if (a.type() != b.type()) return false;
+  if (a.is_array()) return std::equal(a.begin(), a.end(), b.begin(), b.end(), isIdentical);
+  if (!a.is_object()) return a == b;
+  const auto& of_b = b.get_ref<const Json::object_t&>();
+  return std::ranges::equal(a.get_ref<const Json::object_t&>(), of_b, [](const auto& one, const auto& other) {
+    return one.first == other.first && isIdentical(one.second, other.second);
+  });
+}
+
 /// But for materials, of which there are as many, `a` and `b` are the same.
 bool differInMaterialsAlone(const Document& a, const Document& b) {
   if (a.name != b.name || a.buffers != b.buffers || a.images != b.images || a.gltf.size() != b.gltf.size())
@@ -46,7 +59,8 @@ bool differInMaterialsAlone(const Document& a, const Document& b) {
   for (const auto& [member, value] : a.gltf.items()) {
     const auto found = b.gltf.find(member);
     if (found == b.gltf.end()) return false;
-    if (member == "materials" ? value.size() != found->size() || !value.is_array() : value != *found) return false;
+    const bool may_differ = member == "materials" && value.is_array() && value.size() == found->size();
+    if (!may_differ && !isIdentical(value, *found)) return false;
   }
   return true;
 }
@@ -95,7 +109,9 @@ Result<EditedDocument> importEdited(Document document, const Document* former, c
   if (!scene) return tl::unexpected(scene.error());
   const auto& model = *record->model;
   document.imported.reset();
-  if (model.nodes.size() + model.meshes.size() + model.accessors.size() <= kMostParsed) {
+  if (model.nodes.size() + model.meshes.size() + model.accessors.size() + record->materials.size() +
+          scene->instances.size() <=
+      kMostParsed) {
     record->scene = *scene;
     document.imported = std::move(record);
   }

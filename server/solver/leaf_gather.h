@@ -249,6 +249,12 @@ class LeafGather {
     std::vector<std::uint32_t> leaves;
     std::vector<Arrival> arrivals;
   };
+  /// Of a part of the scene: what such leaves send, what they would lose if they shone evenly, and what arrives from
+  /// them.
+  struct PartedFlux {
+    Light sent{}, even{}, arrives{};
+  };
+  void addArrival(std::size_t half, const Arrival& ray, std::span<PartedFlux> fluxes) const;
   /// By half; none: not known, or these are many.
   std::array<std::optional<Parted>, 2> parted_;
   std::array<LostRays, 2> lost_;     ///< by half; empty: none

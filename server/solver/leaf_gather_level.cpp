@@ -137,6 +137,14 @@ LeafGather::Light LeafGather::sentFrom(std::size_t h, std::uint32_t end) const {
   return sent;
 }
 
+void LeafGather::addArrival(std::size_t h, const Arrival& ray, std::span<PartedFlux> fluxes) const {
+  const auto by = ray.end < sights_.endCount() ? ray.end : sights_.steps(h)[ray.end - sights_.endCount()].by;
+  const double share = areaOf(ray.value) / sights_.counts()[ray.value];
+  auto& arrives = fluxes[part_[sights_.sideOf(by)]].arrives;
+  const auto sent = sentFrom(h, ray.end);
+  for (std::size_t c = 0; c < 3; ++c) arrives[c] += share * sent[c];
+}
+
 /// Of a leaf that is parted rays may be lost in a dark strip of it, under a floor that it reaches through, which sends
 /// nothing. By part of the scene and channel: how much of its light such leaves lose, of what they would lose if they
 /// shone evenly: none of it, or several times as much where the other part is dark. They send, and where rays of others
@@ -148,10 +156,7 @@ void LeafGather::weighPartedLoss(std::size_t h) {
   for (std::uint32_t v = 0; v < sights_.leafCount() && !kept; ++v)
     if (losesApart(h, v)) found.leaves.push_back(v);
   const auto& leaves = kept ? kept->leaves : found.leaves;
-  struct Flux {
-    Light sent{}, even{}, arrives{};  // `even`: lost by leaves that shine evenly
-  };
-  std::vector<Flux> fluxes(leaves.empty() ? 0 : sides_.size());
+  std::vector<PartedFlux> fluxes(leaves.empty() ? 0 : sides_.size());
   for (const auto v : leaves) {
     auto& flux = fluxes[part_[sights_.sideOf(v)]];
     const auto sent = sentFrom(h, v);
@@ -160,19 +165,12 @@ void LeafGather::weighPartedLoss(std::size_t h) {
       flux.even[c] += areaOf(v) * sent[c] * lostOf(h, v).all();
     }
   }
-  const auto arrive = [&](const Arrival& ray) {
-    const auto by = ray.end < sights_.endCount() ? ray.end : sights_.steps(h)[ray.end - sights_.endCount()].by;
-    const double share = areaOf(ray.value) / sights_.counts()[ray.value];
-    auto& arrives = fluxes[part_[sights_.sideOf(by)]].arrives;
-    const auto sent = sentFrom(h, ray.end);
-    for (std::size_t c = 0; c < 3; ++c) arrives[c] += share * sent[c];
-  };
   const std::size_t most = sights_.leafCount() / kLeavesAnArrival;
   if (kept) {
-    std::ranges::for_each(kept->arrivals, arrive);
+    for (const auto& ray : kept->arrivals) addArrival(h, ray, fluxes);
   } else {
     visitParted(h, leaves, [&](const Arrival& ray) {
-      arrive(ray);
+      addArrival(h, ray, fluxes);
       if (found.arrivals.size() <= most) found.arrivals.push_back(ray);
     });
   }

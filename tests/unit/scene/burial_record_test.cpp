@@ -195,6 +195,36 @@ TEST_F(BurialRecords, RandomEditsGiveTheBitsOfLookingAtAllLeavesAgain) {
   EXPECT_GT(buried, 2000U);
 }
 
+/// A leaf that was buried and comes free, far from the lid that was taken off: before it hovers something all along.
+TEST_F(BurialRecords, ALeafThatComesFreeInAGapIsToldFromThoseThatWereFull) {
+  scene_.instances.resize(1);
+  const auto put = [&](std::uint32_t node, std::uint32_t kind, const glm::dvec3& at, double size) {
+    scene_.instances.push_back(
+        {.node = node, .primitive = kind, .world = glm::scale(glm::translate(glm::dmat4(1.0), at), glm::dvec3(size))});
+  };
+  put(1, kLidless, glm::dvec3(0.0), 2.4);
+  put(2, kBox, {0.0, -0.8, 0.0}, 0.6);
+  put(3, kBox, {0.63, -0.8, 0.0}, 0.6);  // 3 cm beside it
+  put(4, kLid, glm::dvec3(0.0), 2.4);
+  auto before = scene_;
+  auto built = buildWithRecord(scene_, options_).value();
+  const auto gapsBetween = [&] {  // on the first box
+    std::size_t gaps = 0;
+    for (const auto& surface : built.patches.surfaces) {
+      for (std::uint32_t i = 0; surface.instance == 2 && i < surface.width * surface.height; ++i) {
+        const auto& leaf = built.patches.leaves[surface.first_leaf + i];
+        gaps +=
+            leaf.full && leaf.spot_list == kFullSpots && built.patches.triangles[leaf.triangle].normal.x > 0.9F ? 1 : 0;
+      }
+    }
+    return gaps;
+  };
+  EXPECT_EQ(gapsBetween(), 0U) << "all of it is buried";
+  scene_.instances.pop_back();
+  ASSERT_NO_FATAL_FAILURE(takeEdit(before, built));
+  EXPECT_GT(gapsBetween(), 3U);
+}
+
 /// A lid that is taken off, and put back: what was a closed solid is open then, and its walls count for other places.
 TEST_F(BurialRecords, ALidThatComesAndGoesGivesTheBitsOfLookingAtAllLeavesAgain) {
   constexpr std::size_t kLids = 5;

@@ -322,6 +322,10 @@ TEST_F(ScenePatch, aChainOfEditsImportsAsEachDocumentWouldByItself) {
   }
   for (const auto& [patch, where] :
        {std::pair{R"([{"op":"replace","path":"/nodes/0/mesh","value":9}])", "/nodes/0/mesh"},
+        std::pair{R"([{"op":"replace","path":"/nodes/0/mesh","value":0.0}])", "/nodes/0/mesh"},
+        std::pair{R"([{"op":"replace","path":"/accessors/0/count","value":3.0},
+                      {"op":"replace","path":"/materials/0/emissiveFactor","value":[0,0,0]}])",
+                  "/accessors/0/count"},
         std::pair{R"([{"op":"replace","path":"/materials/1/alphaMode","value":"GLASS"}])", "/materials/1/alphaMode"},
         std::pair{R"([{"op":"replace","path":"/materials/0/emissiveFactor","value":[]}])",
                   "/materials/0/emissiveFactor"},
