@@ -152,6 +152,12 @@ void BurialRecord::sort() {
   std::ranges::sort(leaves, {}, [](const Leaf& leaf) { return std::tuple(leaf.leaf, leaf.side, leaf.pass); });
 }
 
+const BurialRecord::Leaf* BurialRecord::find(std::uint32_t leaf, std::uint32_t side, Pass pass) const {
+  const auto key = [](const Leaf& entry) { return std::tuple(entry.leaf, entry.side, entry.pass); };
+  const auto found = std::ranges::lower_bound(leaves, std::tuple(leaf, side, pass), {}, key);
+  return found == leaves.end() || key(*found) != std::tuple(leaf, side, pass) ? nullptr : &*found;
+}
+
 FormerBurial::FormerBurial(const PatchScene& before, const BurialRecord& record, const PatchScene& after,
                            std::vector<std::uint32_t> surface_before, const std::vector<Hides>& hides)
     : before_(before), record_(record), after_(after), surface_before_(std::move(surface_before)) {
@@ -179,9 +185,6 @@ FormerBurial::FormerBurial(const PatchScene& before, const BurialRecord& record,
     all.add(box.high);
   }
   if (!boxes_.empty()) around_.push_back({all.min, all.max});
-  first_of_.assign(before.leaves.size() + 1, static_cast<std::uint32_t>(record.leaves.size()));
-  for (auto i = record.leaves.size(); i-- > 0;) first_of_[record.leaves[i].leaf] = static_cast<std::uint32_t>(i);
-  for (auto leaf = before.leaves.size(); leaf-- > 0;) first_of_[leaf] = std::min(first_of_[leaf], first_of_[leaf + 1]);
 }
 
 /// What is a part of a closed solid that has changed counts as changed itself: the solid may be closed no longer, or
@@ -237,14 +240,11 @@ const BurialRecord::Leaf* FormerBurial::find(std::uint32_t surface, std::uint32_
                                              BurialRecord::Pass pass, const BurialPlaces& places) const {
   const auto former = surface_before_[surface];
   if (former == kNone || record_.covered[former] || !sameOf(pass, record_.places, places)) return nullptr;
-  const auto number = before_.surfaces[former].first_leaf + leaf;
-  const auto of_leaf = std::span(record_.leaves).subspan(first_of_[number], first_of_[number + 1] - first_of_[number]);
-  const auto found = std::ranges::find_if(
-      of_leaf, [&](const BurialRecord::Leaf& known) { return known.side == side && known.pass == pass; });
+  const auto* found = record_.find(before_.surfaces[former].first_leaf + leaf, side, pass);
   const auto meets = [&](const RayFan& fan) {
     return fan.mayMeet(around_) && fan.mayMeet(boxes_) && (parts_.empty() || fan.mayMeet(parts_));
   };
-  return found == of_leaf.end() || std::ranges::any_of(found->found->fans, meets) ? nullptr : &*found;
+  return found == nullptr || std::ranges::any_of(found->found->fans, meets) ? nullptr : found;
 }
 
 BuriedPart FormerBurial::renumbered(const BurialRecord::Found& found, std::uint32_t surface) const {

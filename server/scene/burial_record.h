@@ -96,6 +96,8 @@ class BurialRecord {
   std::vector<Leaf> leaves;   ///< by leaf, side and pass once sort() was called
 
   void sort();
+  /// Null: it was not measured by rays.
+  [[nodiscard]] const Leaf* find(std::uint32_t leaf, std::uint32_t side, Pass pass) const;
 };
 
 /// The scene before an edit, for burial: which of its surfaces are where they were.
@@ -121,10 +123,9 @@ class FormerBurial {
   const BurialRecord& record_;
   const PatchScene& after_;
   std::vector<std::uint32_t> surface_before_;
-  std::vector<ChangedBox> boxes_;        ///< where something opaque was or is that is not the same
-  std::vector<ChangedBox> around_;       ///< one around all of these: most rays miss it
-  std::vector<ChangedBox> parts_;        ///< as boxes_, each surface by itself; empty: too many
-  std::vector<std::uint32_t> first_of_;  ///< by leaf of `before`, and one more: where it is in the record
+  std::vector<ChangedBox> boxes_;   ///< where something opaque was or is that is not the same
+  std::vector<ChangedBox> around_;  ///< one around all of these: most rays miss it
+  std::vector<ChangedBox> parts_;   ///< as boxes_, each surface by itself; empty: too many
 };
 
 /// As buildPatchScene(), and how burial was found, for edits. `record`: that of the former scene, if it was kept: what
