@@ -38,6 +38,7 @@ struct TextureUse {
   float rotation = 0.0F;
   bool repeat_u = true, repeat_v = true;  ///< false: clamp (mirror is treated as repeat with mirrored flag)
   bool mirror_u = false, mirror_v = false;
+  bool nearest = false;  ///< magFilter NEAREST: a texel's colour holds over the whole texel
 
   bool operator==(const TextureUse&) const = default;
 };
@@ -49,12 +50,15 @@ struct Material {
   glm::vec3 base_color{1.0F};  ///< linear sRGB factor
   float alpha = 1.0F;
   float alpha_cutoff = 0.5F;
-  float metallic = 0.0F;      ///< factor x mean of the metallic texture; reflectance = base_color x (1 - metallic)
+  float metallic = 0.0F;      ///< reflectance = base_color x (1 - metallic) x (1 - the largest channel of specular)
+  glm::vec3 specular{0.0F};   ///< KHR_materials_pbrSpecularGlossiness, linear; 0 elsewhere
   float transmission = 0.0F;  ///< KHR_materials_transmission factor
   glm::vec3 emission{0.0F};   ///< L_e in nits: emissiveFactor x emissiveStrength
   AlphaMode alpha_mode = AlphaMode::kOpaque;
   bool double_sided = false;
   TextureUse base_color_texture, emissive_texture;
+  TextureUse metallic_texture;  ///< its blue channel multiplies `metallic`
+  TextureUse specular_texture;  ///< RGB multiplies `specular`
 
   bool operator==(const Material&) const = default;
 };
@@ -65,6 +69,7 @@ struct Primitive {
   std::uint32_t primitive = kNone;  ///< index into /meshes/<mesh>/primitives
   std::uint32_t material = 0;  ///< index into Scene::materials (a default material is appended where none is named)
   std::vector<glm::dvec3> positions;
+  std::vector<glm::vec3> normals;  ///< unit length, or 0 where the file's is unusable; empty: flat, as glTF says
   std::vector<glm::vec2> texcoord0, texcoord1;
   std::vector<glm::vec4> color0;       ///< linear
   std::vector<std::uint32_t> indices;  ///< 3 a triangle, counter-clockwise = front, all < positions.size()
