@@ -64,10 +64,10 @@ class Carrier {
     std::vector<glm::vec3> values(patches_.nodeCount(), mean_);
     for (const auto& surface : patches_.surfaces) {
       for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf) {
-        const auto value = carried(surface, leaf);
-        if (!value) continue;
-        for (const auto first : surface.first_node) {
-          if (first != kNone) values[first + leaf] = *value;
+        for (std::size_t side = 0; side < 2; ++side) {
+          const auto first = surface.first_node[side];
+          if (first == kNone) continue;
+          if (const auto value = carried(surface, leaf, side)) values[first + leaf] = *value;
         }
       }
     }
@@ -75,17 +75,19 @@ class Carrier {
   }
 
  private:
-  [[nodiscard]] std::optional<glm::vec3> carried(const scene::Surface& surface, std::uint32_t leaf) const {
+  [[nodiscard]] std::optional<glm::vec3> carried(const scene::Surface& surface, std::uint32_t leaf,
+                                                 std::size_t side) const {
     const auto& place = patches_.leaves[surface.first_leaf + leaf];
     const auto instance = source_[surface.instance];
     if (place.triangle == kNone || instance == kNone) return std::nullopt;
     const auto triangle = patches_.triangle_source[place.triangle];
-    const auto& old_uvs = before_.patches.instance_uvs[instance];
-    if (triangle >= old_uvs.page.size() || old_uvs.page[triangle] == kNone) return std::nullopt;
-    const auto& page = patches_.pages[surface.page];
-    const glm::dvec2 uv =
-        (glm::dvec2(place.texel) + glm::dvec2(surface.page_x, surface.page_y)) / glm::dvec2(page.width, page.height);
-    const auto& uvs = patches_.instance_uvs[surface.instance];
+    const std::size_t of_file = surface.flipped ? 1 - side : side;
+    const auto& old_uvs = before_.patches.instance_uvs[instance].side[of_file];
+    if (!old_uvs.shows(triangle)) return std::nullopt;
+    const auto& at = surface.place[side];
+    const auto& page = patches_.pages[at.page];
+    const glm::dvec2 uv = (glm::dvec2(place.texel) + glm::dvec2(at.x, at.y)) / glm::dvec2(page.width, page.height);
+    const auto& uvs = patches_.instance_uvs[surface.instance].side[of_file];
     const auto old_uv = carryPoint(uv, uvs.corners[triangle], old_uvs.corners[triangle]);
     if (!old_uv) return std::nullopt;
     return lookUp(before_.pages[old_uvs.page[triangle]].irradiance, *old_uv);

@@ -76,18 +76,19 @@ class Scout {
  private:
   /// A point that stands for an equal share of the scene's light.
   struct Landmark {
-    glm::dvec3 position, normal;
-    bool double_sided;
+    glm::dvec3 position, normal;  ///< of the side that is lit
   };
   /// What a ray sees first that is drawn.
   struct Sight {
     double distance = 0.0;
     std::uint32_t triangle = scene::kNone;
+    std::size_t side = 0;
     bool through_back = false;  ///< an undrawn back face came first
   };
   [[nodiscard]] Sight cast(const glm::dvec3& eye, const glm::dvec3& direction);
-  [[nodiscard]] double irradianceAt(std::uint32_t triangle, const glm::dvec3& point) const;
-  [[nodiscard]] double pageValue(const scene::Surface& surface, glm::vec2 texel) const;
+  [[nodiscard]] double irradianceAt(const Sight& sight, const glm::dvec3& point) const;
+  /// 0 where that side has no texels: it is dark.
+  [[nodiscard]] double pageValue(const scene::Surface& surface, std::size_t side, glm::vec2 texel) const;
   void measureLight();
   [[nodiscard]] double overview(const View& view);
 
@@ -117,11 +118,12 @@ Scout::Scout(const scene::Scene& scene, const scene::PatchScene& patches, std::s
   measureLight();
 }
 
-double Scout::pageValue(const scene::Surface& surface, glm::vec2 texel) const {
-  if (surface.page >= pages_.size()) return 0.0;
-  const auto& page = pages_[surface.page];
-  const int x = static_cast<int>(surface.page_x) + static_cast<int>(texel.x);
-  const int y = static_cast<int>(surface.page_y) + static_cast<int>(texel.y);
+double Scout::pageValue(const scene::Surface& surface, std::size_t side, glm::vec2 texel) const {
+  const auto& place = surface.place[side];
+  if (place.page >= pages_.size()) return 0.0;
+  const auto& page = pages_[place.page];
+  const int x = static_cast<int>(place.x) + static_cast<int>(texel.x);
+  const int y = static_cast<int>(place.y) + static_cast<int>(texel.y);
   if (x < 0 || y < 0 || x >= page.width || y >= page.height) return 0.0;
   return std::max(luminance(page.at(x, y)), 0.0);
 }
@@ -130,6 +132,7 @@ void Scout::measureLight() {
   struct Sample {
     glm::dvec3 position;
     std::uint32_t triangle;
+    std::size_t side;
     double area, irradiance;
   };
   std::vector<Sample> samples;
@@ -139,8 +142,11 @@ void Scout::measureLight() {
       if (leaf.triangle == scene::kNone) continue;
       const auto& frame = patches_.triangles[leaf.triangle];
       const glm::dvec3 position(frame.origin + leaf.texel.x * frame.du + leaf.texel.y * frame.dv);
-      samples.push_back(
-          {position, leaf.triangle, static_cast<double>(surface.texel_area), pageValue(surface, leaf.texel)});
+      for (std::size_t side = 0; side < 2; ++side) {
+        if (surface.first_node[side] == scene::kNone) continue;
+        samples.push_back({position, leaf.triangle, side, static_cast<double>(surface.texel_area),
+                           pageValue(surface, side, leaf.texel)});
+      }
     }
   }
   const auto quantile = [&samples](const auto& value, const auto& weight, double share) {
@@ -171,9 +177,8 @@ void Scout::measureLight() {
   for (const auto& sample : samples) {
     sum += weight(sample);
     if (sum * kLandmarks < total * (static_cast<double>(landmarks_.size()) + 0.5)) continue;
-    const auto& material = scene_.materials[patches_.surfaces[patches_.triangle_surface[sample.triangle]].material];
-    landmarks_.push_back(
-        {sample.position, glm::dvec3(patches_.triangles[sample.triangle].normal), material.double_sided});
+    const glm::dvec3 front(patches_.triangles[sample.triangle].normal);
+    landmarks_.push_back({sample.position, sample.side == 0 ? front : -front});
   }
 }
 
@@ -185,7 +190,7 @@ double Scout::overview(const View& view) {
     const double depth = -glm::dot(to, view.back);
     if (depth <= 0.0 || std::abs(glm::dot(to, view.right)) > depth * view.tan_x) continue;
     if (std::abs(glm::dot(to, view.up)) > depth * view.tan_y) continue;
-    if (!landmark.double_sided && glm::dot(to, landmark.normal) >= 0.0) continue;
+    if (glm::dot(to, landmark.normal) >= 0.0) continue;
     if (cast(view.eye, to).distance > 0.998) seen += 1.0;
   }
   return seen / std::max(1.0, static_cast<double>(landmarks_.size()));
@@ -198,11 +203,12 @@ Scout::Sight Scout::cast(const glm::dvec3& eye, const glm::dvec3& direction) {
   double back = 1e30, drawn = 1e30;
   for (const auto& hit : hits_) {
     const auto& surface = patches_.surfaces[patches_.triangle_surface[hit.triangle]];
-    if (!hit.front && !scene_.materials[surface.material].double_sided) {
+    if (!hit.front && !surface.shows_back) {
       back = std::min(back, hit.t);
     } else if (hit.t < drawn) {
       drawn = hit.t;
       sight.triangle = hit.triangle;
+      sight.side = hit.front ? 0 : 1;
     }
   }
   sight.distance = drawn;
@@ -210,11 +216,11 @@ Scout::Sight Scout::cast(const glm::dvec3& eye, const glm::dvec3& direction) {
   return sight;
 }
 
-double Scout::irradianceAt(std::uint32_t triangle, const glm::dvec3& point) const {
+double Scout::irradianceAt(const Sight& sight, const glm::dvec3& point) const {
   std::array<glm::dvec3, 3> p{};
   std::array<glm::vec2, 3> texel{};
   for (std::size_t c = 0; c < 3; ++c) {
-    const auto& vertex = patches_.vertices[patches_.indices[std::size_t{3} * triangle + c]];
+    const auto& vertex = patches_.vertices[patches_.indices[std::size_t{3} * sight.triangle + c]];
     p[c] = glm::dvec3(vertex.position);
     texel[c] = vertex.texel;
   }
@@ -222,7 +228,7 @@ double Scout::irradianceAt(std::uint32_t triangle, const glm::dvec3& point) cons
   const double area = std::max(glm::dot(normal, normal), 1e-300);
   const auto u = static_cast<float>(glm::dot(glm::cross(point - p[0], p[2] - p[0]), normal) / area);
   const auto v = static_cast<float>(glm::dot(glm::cross(p[1] - p[0], point - p[0]), normal) / area);
-  return pageValue(patches_.surfaces[patches_.triangle_surface[triangle]],
+  return pageValue(patches_.surfaces[patches_.triangle_surface[sight.triangle]], sight.side,
                    texel[0] + u * (texel[1] - texel[0]) + v * (texel[2] - texel[0]));
 }
 
@@ -240,7 +246,7 @@ double Scout::score(const View& view, int columns) {
       if (sight.triangle == scene::kNone) continue;
       seen += 1.0;
       close += std::max(0.0, 1.0 - sight.distance / near);
-      const double irradiance = irradianceAt(sight.triangle, view.eye + sight.distance * ray);
+      const double irradiance = irradianceAt(sight, view.eye + sight.distance * ray);
       const double light = typical_ > 0.0 ? irradiance / (irradiance + 0.25 * typical_) : 1.0;
       lit += light;
       light_of[patches_.triangle_surface[sight.triangle]] += light;

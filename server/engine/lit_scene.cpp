@@ -8,6 +8,7 @@
 #include "common/give_back.h"
 #include "server/engine/carried_light.h"
 #include "server/scene/burial_record.h"
+#include "server/scene/lit_sides.h"
 
 namespace radiosity::engine {
 namespace {
@@ -40,6 +41,7 @@ Result<std::unique_ptr<LitScene>> LitScene::make(scene::EditedDocument edited, c
   scene::ChartOptions charts;
   charts.texel_budget = settings.texels;
   charts.texel_size_m = settings.texel_size_m;
+  charts.sky = lit->skyOf(*lit->scene_);
   std::optional<scene::FormerScene> before;
   if (former != nullptr) before.emplace(scene::FormerScene{*former->scene_, *former->patches_});
   lit->reproducible_ = former == nullptr;
@@ -51,6 +53,25 @@ Result<std::unique_ptr<LitScene>> LitScene::make(scene::EditedDocument edited, c
   lit->patch_count_ = leavesWithArea(*lit->patches_);
   lit->materials_ = scene::shadePatches(*lit->scene_, *lit->patches_);
   return lit;
+}
+
+SceneChange LitScene::changeTo(const scene::Scene& next) const {
+  auto change = changeBetween(*scene_, next);
+  if (!change.geometry && scene::reachesDarkSides(*patches_, *scene_, sources_.sky, next, skyOf(next)))
+    change.geometry = true;
+  return change;
+}
+
+bool LitScene::outgrows(const SolveSettings& settings) const {
+  if (scene_->sky) return false;
+  const auto sky = settings.sky.value_or(SkySetting{});
+  return scene::reachesDarkSides(*patches_, *scene_, sources_.sky, *scene_, {sky.upper, sky.lower});
+}
+
+bool LitScene::hasDoubleSided() const {
+  return std::ranges::any_of(patches_->surfaces, [&](const scene::Surface& surface) {
+    return scene_->materials[surface.material].double_sided;
+  });
 }
 
 /// Nothing where all was laid out anew.
@@ -74,11 +95,9 @@ bool LitScene::keepsLayoutOf(const LitScene& former) const {
   const auto samePage = [](const scene::Page& a, const scene::Page& b) {
     return a.width == b.width && a.height == b.height;
   };
-  const auto sameUv = [](const auto& a, const auto& b) { return a.page == b.page && a.corners == b.corners; };
   return former.patches_->centre == patches_->centre && former.patches_->scale == patches_->scale &&
          std::ranges::equal(former.patches_->pages, patches_->pages, samePage) &&
-         std::ranges::equal(former.patches_->instance_uvs, patches_->instance_uvs, sameUv) &&
-         onlyNodesMoved(*former.scene_, *scene_);
+         former.patches_->instance_uvs == patches_->instance_uvs && onlyNodesMoved(*former.scene_, *scene_);
 }
 
 std::uint64_t LitScene::startSolve(LitScene* former, bool keep_former) {
@@ -170,6 +189,8 @@ std::uint64_t LitScene::affectedBy(const SceneChange& change, const scene::Scene
 scene::Document LitScene::reshade(scene::Document document, std::shared_ptr<const scene::Scene> next,
                                   const SceneChange& change) {
   auto before = std::exchange(document_, std::move(document));
+  // Which sides have texels goes by the lamps that there were when the scene was laid out.
+  if (hasDoubleSided() && scene::shineElsewhere(*scene_, sources_.sky, *next, skyOf(*next))) reproducible_ = false;
   scene_ = std::move(next);
   const bool was_stale = std::exchange(stale_, true);
   for (const auto material : change.materials) {
@@ -293,6 +314,7 @@ void LitScene::showLightsFirst(const std::vector<glm::vec3>& direct_before) {
 bool LitScene::setSky(const SolveSettings& settings) {
   settings_ = settings;
   if (sources_ == lightSources(*scene_)) return false;
+  if (hasDoubleSided()) reproducible_ = false;
   const bool was_stale = std::exchange(stale_, true);
   if (!was_stale) updateSolver(false, true);
   stale_ = was_stale;

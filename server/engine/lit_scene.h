@@ -46,7 +46,10 @@ class LitScene {
   [[nodiscard]] Result<void> beginUpload() const { return transport_.beginScene(patches_); }
   [[nodiscard]] Result<void> finishUpload() const { return transport_.finishScene(); }
 
-  [[nodiscard]] SceneChange changeTo(const scene::Scene& next) const { return changeBetween(*scene_, next); }
+  /// Light that reaches sides which had none, and so no texels, counts as a change of geometry: they get some.
+  [[nodiscard]] SceneChange changeTo(const scene::Scene& next) const;
+  /// Whether the sky of these settings reaches sides that had no light, and so no texels: then setSky() is not enough.
+  [[nodiscard]] bool outgrows(const SolveSettings& settings) const;
 
   /// Whether pages and UVs are those of `former`, and who has its GLB needs no other: tiles stay valid.
   [[nodiscard]] bool keepsLayoutOf(const LitScene& former) const;
@@ -163,6 +166,8 @@ class LitScene {
   [[nodiscard]] std::uint64_t touchedSurfaces(std::size_t before, const std::optional<scene::PatchMap>& matched) const;
   [[nodiscard]] double emittedPower() const;
   [[nodiscard]] solver::LightSources lightSources(const scene::Scene& scene) const;
+  [[nodiscard]] scene::Sky skyOf(const scene::Scene& scene) const { return lightSources(scene).sky; }
+  [[nodiscard]] bool hasDoubleSided() const;
 
   scene::Document document_;
   SolveSettings settings_;

@@ -35,7 +35,7 @@ std::vector<glm::vec3> errorSquared(const LitScene& lit) {
                                    solver.commonErrorSquared());
 }
 
-/// Of the front, for both sides: their mean would be nothing.
+/// Of each side, away from the surface.
 std::vector<glm::vec3> normals(const LitScene& lit) {
   const auto& patches = lit.patches();
   std::vector<glm::vec3> values(patches.nodeCount(), glm::vec3(0.5F));
@@ -43,16 +43,16 @@ std::vector<glm::vec3> normals(const LitScene& lit) {
     for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf) {
       const auto triangle = patches.leaves[surface.first_leaf + leaf].triangle;
       if (triangle == scene::kNone) continue;
-      for (const auto first : surface.first_node) {
-        if (first != scene::kNone) values[first + leaf] = 0.5F + 0.5F * patches.triangles[triangle].normal;
-      }
+      const glm::vec3 half = 0.5F * patches.triangles[triangle].normal;
+      const auto& [front, back] = surface.first_node;
+      if (front != scene::kNone) values[front + leaf] = 0.5F + half;
+      if (back != scene::kNone) values[back + leaf] = 0.5F - half;
     }
   }
   return values;
 }
 
-/// `idOf(node)` of each leaf with area, front first, at its texel. Where a file's own charts overlap, the first is
-/// shown.
+/// `idOf(node)` of each leaf with area, at its texel. Where a file's own charts overlap, the first is shown.
 template <typename IdOf>
 std::vector<IdImage> placeIds(const scene::PatchScene& patches, const IdOf& idOf) {
   std::vector<IdImage> pages;
@@ -60,12 +60,15 @@ std::vector<IdImage> placeIds(const scene::PatchScene& patches, const IdOf& idOf
     pages.push_back({static_cast<int>(page.width), static_cast<int>(page.height),
                      std::vector<std::uint32_t>(std::size_t{page.width} * page.height, kNoId)});
   for (const auto& surface : patches.surfaces) {
-    auto& page = pages[surface.page];
-    for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf) {
-      const std::size_t x = surface.page_x + leaf % surface.width, y = surface.page_y + leaf / surface.width;
-      auto& id = page.ids[y * static_cast<std::size_t>(page.width) + x];
-      for (const auto first : surface.first_node) {
-        if (id == kNoId && first != scene::kNone && patches.node_area[first + leaf] > 0.0F) id = idOf(first + leaf);
+    for (std::size_t side = 0; side < 2; ++side) {
+      const auto first = surface.first_node[side];
+      if (first == scene::kNone) continue;
+      const auto& place = surface.place[side];
+      auto& page = pages[place.page];
+      for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf) {
+        const std::size_t x = place.x + leaf % surface.width, y = place.y + leaf / surface.width;
+        auto& id = page.ids[y * static_cast<std::size_t>(page.width) + x];
+        if (id == kNoId && patches.node_area[first + leaf] > 0.0F) id = idOf(first + leaf);
       }
     }
   }

@@ -260,7 +260,8 @@ void SolveLoop::configure(ChangeSettings change, Callback<SolveSettings> done) {
 Result<SolveSettings> SolveLoop::applySettings(const SolveSettings& settings) {
   if (settings == settings_) return settings_;  // who asks what they are changes nothing
   const SolveSettings before = settings_;
-  const bool resized = before.texels != settings.texels || before.texel_size_m != settings.texel_size_m;
+  const bool resized = before.texels != settings.texels || before.texel_size_m != settings.texel_size_m ||
+                       (lit_ && before.sky != settings.sky && lit_->outgrows(settings));
   const bool anew = before.seed != settings.seed || before.paper_mode != settings.paper_mode ||
                     before.link_memory_bytes != settings.link_memory_bytes;
   if (lit_ && resized) {  // which may fail: only what can be lit is kept

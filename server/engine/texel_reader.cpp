@@ -29,14 +29,16 @@ std::vector<std::shared_ptr<const Image>> imagesOf(const LitScene& lit, Quantity
 
 /// Whether a leaf with area lies there, as the quantity patchId has it.
 bool hasSurface(const scene::PatchScene& patches, const TexelRequest& at) {
-  return std::ranges::any_of(patches.surfaces, [&](const scene::Surface& surface) {
-    if (surface.page != at.page || at.x < surface.page_x || at.y < surface.page_y) return false;
-    const auto x = at.x - surface.page_x, y = at.y - surface.page_y;
-    if (x >= surface.width || y >= surface.height) return false;
-    return std::ranges::any_of(surface.first_node, [&](std::uint32_t first) {
-      return first != scene::kNone && patches.node_area[first + y * surface.width + x] > 0.0F;
-    });
-  });
+  const auto lies = [&](const scene::Surface& surface, std::size_t side) {
+    const auto& place = surface.place[side];
+    if (surface.first_node[side] == scene::kNone || place.page != at.page || at.x < place.x || at.y < place.y)
+      return false;
+    const auto x = at.x - place.x, y = at.y - place.y;
+    return x < surface.width && y < surface.height &&
+           patches.node_area[surface.first_node[side] + y * surface.width + x] > 0.0F;
+  };
+  return std::ranges::any_of(patches.surfaces,
+                             [&](const scene::Surface& surface) { return lies(surface, 0) || lies(surface, 1); });
 }
 
 Result<void> check(const scene::PatchScene& patches, const TexelRequest& at) {

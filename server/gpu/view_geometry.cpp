@@ -21,29 +21,35 @@ glm::vec2 textureUv(const scene::Primitive& primitive, const scene::TextureUse& 
   return transformed(use, vertex < coordinates.size() ? coordinates[vertex] : glm::vec2(0.0F));
 }
 
-void addTriangle(const scene::Scene& scene, const scene::Instance& instance, std::size_t triangle,
-                 const std::array<glm::vec2, 3>& lightmap_uv, const glm::dvec3& eye, std::vector<ViewVertex>& into) {
+/// One side of a triangle of the file.
+struct DrawnSide {
+  std::size_t triangle, side;
+  const std::array<glm::vec2, 3>& lightmap_uv;
+};
+
+void addTriangle(const scene::Scene& scene, const scene::Instance& instance, const DrawnSide& drawn,
+                 const glm::dvec3& eye, std::vector<ViewVertex>& into) {
   const auto& primitive = scene.primitives[instance.primitive];
   const auto& material = scene.materials[primitive.material];
   std::array<glm::dvec3, 3> position{};
   for (std::size_t c = 0; c < 3; ++c) {
-    const auto& local = primitive.positions[primitive.indices[3 * triangle + c]];
+    const auto& local = primitive.positions[primitive.indices[3 * drawn.triangle + c]];
     position[c] = glm::dvec3(instance.world * glm::dvec4(local, 1.0)) - eye;
   }
-  const bool mirrored = glm::determinant(glm::dmat3(instance.world)) < 0.0;
+  const bool reversed = (glm::determinant(glm::dmat3(instance.world)) < 0.0) != (drawn.side == 1);
   auto normal = glm::cross(position[1] - position[0], position[2] - position[0]);
   const double length = glm::length(normal);
-  if (length > 0.0) normal *= (mirrored ? -1.0 : 1.0) / length;
-  const std::array<std::size_t, 3> order{0, mirrored ? 2U : 1U, mirrored ? 1U : 2U};
+  if (length > 0.0) normal *= (reversed ? -1.0 : 1.0) / length;
+  const std::array<std::size_t, 3> order{0, reversed ? 2U : 1U, reversed ? 1U : 2U};
   for (const auto c : order) {
-    const auto vertex = primitive.indices[3 * triangle + c];
+    const auto vertex = primitive.indices[3 * drawn.triangle + c];
     const auto color = vertex < primitive.color0.size() ? primitive.color0[vertex] : glm::vec4(1.0F);
     const auto factor = material.base_color * (1.0F - material.metallic);
     into.push_back({glm::vec3(position[c]), glm::vec3(normal),
                     glm::vec4(glm::vec3(color) * factor, color.a * material.alpha),
                     glm::vec4(textureUv(primitive, material.base_color_texture, vertex),
                               textureUv(primitive, material.emissive_texture, vertex)),
-                    lightmap_uv[c], material.emission});
+                    drawn.lightmap_uv[c], material.emission});
   }
 }
 
@@ -55,17 +61,18 @@ ViewGeometry makeViewGeometry(const scene::Scene& scene, const scene::PatchScene
     const auto& instance = scene.instances[i];
     if (!instance.visible) continue;
     const auto& primitive = scene.primitives[instance.primitive];
-    const auto& uvs = patches.instance_uvs[i];
-    for (std::size_t triangle = 0; triangle < primitive.indices.size() / 3; ++triangle) {
-      const bool placed = triangle < uvs.page.size() && triangle < uvs.corners.size();
-      if (!placed || uvs.page[triangle] == scene::kNone) continue;  // dropped: degenerate
-      const auto page = uvs.page[triangle];
-      if (geometry.draws.empty() || geometry.draws.back().material != primitive.material ||
-          geometry.draws.back().page != page) {
-        geometry.draws.push_back({primitive.material, page, static_cast<std::uint32_t>(geometry.vertices.size()), 0});
+    for (std::size_t side = 0; side < 2; ++side) {
+      const auto& uvs = patches.instance_uvs[i].side[side];
+      for (std::size_t triangle = 0; triangle < uvs.page.size(); ++triangle) {
+        if (!uvs.shows(triangle)) continue;  // dropped as degenerate, or nobody sees that side
+        const auto page = uvs.page[triangle];
+        if (geometry.draws.empty() || geometry.draws.back().material != primitive.material ||
+            geometry.draws.back().page != page) {
+          geometry.draws.push_back({primitive.material, page, static_cast<std::uint32_t>(geometry.vertices.size()), 0});
+        }
+        addTriangle(scene, instance, {triangle, side, uvs.corners[triangle]}, eye, geometry.vertices);
+        geometry.draws.back().count += 3;
       }
-      addTriangle(scene, instance, triangle, uvs.corners[triangle], eye, geometry.vertices);
-      geometry.draws.back().count += 3;
     }
   }
   return geometry;

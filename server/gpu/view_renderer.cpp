@@ -109,6 +109,7 @@ class GlViewRenderer final : public ViewRenderer {
     glEnable(GL_DEPTH_TEST);
     glDepthFunc(GL_GREATER);
     glEnable(GL_MULTISAMPLE);
+    glEnable(GL_CULL_FACE);  // each side that is seen is there by itself
     glCullFace(GL_BACK);
     glBindFramebuffer(GL_FRAMEBUFFER, target.framebuffer.name());
     const std::array<float, 4> black{};
@@ -132,11 +133,6 @@ class GlViewRenderer final : public ViewRenderer {
     std::map<std::uint32_t, Texture> textures;
     for (const auto& draw : geometry.draws) {
       const auto& material = scene.materials[draw.material];
-      if (material.double_sided) {
-        glDisable(GL_CULL_FACE);
-      } else {
-        glEnable(GL_CULL_FACE);
-      }
       bindTexture(0, scene, material.base_color_texture, textures);
       bindTexture(1, scene, material.emissive_texture, textures);
       glBindTextureUnit(2, draw.page < lightmaps.size() ? lightmaps[draw.page].name() : black());

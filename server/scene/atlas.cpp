@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <iterator>
 #include <map>
 #include <numeric>
 #include <optional>
@@ -110,10 +111,12 @@ std::unordered_map<std::uint32_t, double> uvDensities(const std::vector<Chart>& 
   return densities;
 }
 
-/// One rectangle to pack: a chart of our own, or all charts of an instance that keeps its TEXCOORD_1 layout.
+/// One rectangle to pack: one side of a chart of our own, or of all charts of an instance that keeps its TEXCOORD_1
+/// layout. Without charts: the black texels.
 struct Block {
   std::uint32_t width = 1, height = 1;
   std::vector<std::uint32_t> charts;
+  std::size_t side = 0;
   std::uint32_t page = 0, x = 0, y = 0;
 };
 
@@ -177,8 +180,12 @@ class LayoutMaker {
         addChart(c++);
       }
     }
+    addBlack();
     std::uint64_t leaves = 0;
-    for (const ChartGrid& grid : atlas_.grids) leaves += std::uint64_t{grid.width} * grid.height;
+    for (std::size_t c = 0; c < charts_.size(); ++c) {
+      const std::uint64_t sides = charts_[c].back_lit ? 2 : 1;
+      leaves += sides * atlas_.grids[c].width * atlas_.grids[c].height;
+    }
     if (leaves > mostLeaves())
       return fail(ErrorCode::kTooLarge,
                   fmt::format("{} leaf patches, more than the {} that there is memory for: ask for "
@@ -191,12 +198,13 @@ class LayoutMaker {
                       "or split the mesh",
                       clamped_, max_page_, first_clamped_));
     if (auto packed = packAll(); !packed) return tl::unexpected(packed.error());
-    for (const Block& block : blocks_)
+    for (const Block& block : blocks_) {
+      if (block.charts.empty()) atlas_.black = {block.page, block.x, block.y};
       for (const std::uint32_t c : block.charts) {
-        atlas_.grids[c].page = block.page;
-        atlas_.grids[c].page_x += block.x;
-        atlas_.grids[c].page_y += block.y;
+        auto& place = atlas_.grids[c].place[block.side];
+        place = {block.page, place.x + block.x, place.y + block.y};
       }
+    }
     return std::move(atlas_);
   }
 
@@ -223,6 +231,13 @@ class LayoutMaker {
     }
     grid.texels_per_unit = glm::dvec2(grid.width, grid.height) / chart.size;
     blocks_.push_back({grid.width, grid.height, {c}});
+    if (chart.back_lit) blocks_.push_back({grid.width, grid.height, {c}, 1});
+  }
+
+  void addBlack() {
+    const auto needsBlack = [](const Chart& chart) { return chart.shows_back && !chart.back_lit; };
+    if (std::ranges::any_of(charts_, needsBlack))
+      blocks_.push_back({PatchScene::kBlackSide, PatchScene::kBlackSide, {}});
   }
 
   struct Bounds {
@@ -262,12 +277,18 @@ class LayoutMaker {
       grid.height = static_cast<std::uint32_t>(high.y - low.y);
       grid.texels_per_unit = glm::dvec2(resolution);
       grid.offset = low;
-      grid.page_x = static_cast<std::uint32_t>(low.x - origin.x);
-      grid.page_y = static_cast<std::uint32_t>(low.y - origin.y);
-      block.width = std::max(block.width, grid.page_x + grid.width);
-      block.height = std::max(block.height, grid.page_y + grid.height);
+      for (auto& place : grid.place) {
+        place.x = static_cast<std::uint32_t>(low.x - origin.x);
+        place.y = static_cast<std::uint32_t>(low.y - origin.y);
+      }
+      block.width = std::max(block.width, grid.place[0].x + grid.width);
+      block.height = std::max(block.height, grid.place[0].y + grid.height);
     }
+    Block backs{block.width, block.height, {}, 1};
+    std::ranges::copy_if(block.charts, std::back_inserter(backs.charts),
+                         [&](std::uint32_t c) { return charts_[c].back_lit; });
     blocks_.push_back(std::move(block));
+    if (!backs.charts.empty()) blocks_.push_back(std::move(backs));
     return end;
   }
 
@@ -330,22 +351,29 @@ class LayoutMaker {
 
   /// All its charts have the size they had, and lie to each other as they lay.
   bool takeFormer(Block& block) const {
+    if (block.charts.empty() && !moveTo(former_.black, block)) return false;
     for (const std::uint32_t c : block.charts) {
-      const auto& place = former_.of_chart[c];
+      const auto& former = former_.of_chart[c];
       const ChartGrid& grid = atlas_.grids[c];
-      if (place.width != grid.width || place.height != grid.height || place.x < grid.page_x + gutter_ / 2 ||
-          place.y < grid.page_y + gutter_ / 2)
+      const PagePlace &place = former.side[block.side], &inside = grid.place[block.side];
+      if (former.width != grid.width || former.height != grid.height || place.page == kNone || place.x < inside.x ||
+          place.y < inside.y)
         return false;
-      const Block here{block.width, block.height, {}, place.page, place.x - grid.page_x, place.y - grid.page_y};
-      if (c != block.charts.front() && (here.page != block.page || here.x != block.x || here.y != block.y))
-        return false;
-      block.page = here.page;
-      block.x = here.x;
-      block.y = here.y;
+      const PagePlace here{place.page, place.x - inside.x, place.y - inside.y};
+      const bool agrees = here == PagePlace{block.page, block.x, block.y};
+      if ((c != block.charts.front() && !agrees) || !moveTo(here, block)) return false;
     }
     const TexelRect rect = outer(block);
     const Page& page = atlas_.pages[block.page];
     return rect.x + rect.width <= page.width && rect.y + rect.height <= page.height;
+  }
+
+  [[nodiscard]] bool moveTo(const PagePlace& place, Block& block) const {
+    if (place.page == kNone || place.x < gutter_ / 2 || place.y < gutter_ / 2) return false;
+    block.page = place.page;
+    block.x = place.x;
+    block.y = place.y;
+    return true;
   }
 
   void dropEmptyPages() {
@@ -441,7 +469,8 @@ double texelSizeFor(const std::vector<Chart>& charts, std::uint64_t texel_budget
   }
   const auto leavesAt = [&](double texel) {
     double sum = 0.0;
-    for (std::size_t i = 0; i < charts.size(); ++i) sum += predictedLeaves(measures[i], charts[i].from_file, texel);
+    for (std::size_t i = 0; i < charts.size(); ++i)
+      sum += (charts[i].back_lit ? 2.0 : 1.0) * predictedLeaves(measures[i], charts[i].from_file, texel);
     return sum;
   };
   const auto budget = static_cast<double>(std::max<std::uint64_t>(texel_budget, 1));

@@ -1,6 +1,7 @@
 // Texel grids of charts and their places on lightmap pages. Third step of buildPatchScene (charts.h).
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <glm/vec2.hpp>
 #include <string>
@@ -16,22 +17,25 @@ struct ChartGrid {
   std::uint32_t width = 1, height = 1;
   glm::dvec2 texels_per_unit{1.0};
   glm::dvec2 offset{0.0};
-  std::uint32_t page = 0, page_x = 0, page_y = 0;
+  std::array<PagePlace, 2> place;  ///< front, back
 };
 
 struct Atlas {
   std::vector<ChartGrid> grids;  ///< one for each chart
   std::vector<Page> pages;
+  PagePlace black;  ///< PatchScene::black
   std::vector<std::string> warnings;
 };
 
 /// Where charts were before an edit.
 struct FormerPlaces {
   struct Place {
-    std::uint32_t page = 0, x = 0, y = 0, width = 0, height = 0;  ///< width 0: it was not there
+    std::array<PagePlace, 2> side;
+    std::uint32_t width = 0, height = 0;  ///< width 0: it was not there
   };
   std::vector<Place> of_chart;  ///< empty: there was no scene before
   std::vector<Page> pages;
+  PagePlace black;
 };
 
 /// The texel edge (unit box) at which about `texel_budget` leaves are covered.

@@ -30,11 +30,12 @@ struct ChartCorners {
 [[nodiscard]] inline ChartCorners cornersOf(const PatchScene& patches, std::uint32_t triangle, const Instance& instance,
                                             const Primitive& primitive) {
   ChartCorners corners{};
-  const bool mirrored = glm::determinant(glm::dmat3(instance.world)) < 0.0;
+  const bool flipped = patches.surfaces[patches.triangle_surface[triangle]].flipped;
+  const bool reversed = (glm::determinant(glm::dmat3(instance.world)) < 0.0) != flipped;
   const std::size_t source = std::size_t{3} * patches.triangle_source[triangle];
   for (std::size_t k = 0; k < 3; ++k) {
     corners.texel[k] = glm::dvec2(patches.vertices[patches.indices[std::size_t{3} * triangle + k]].texel);
-    corners.vertex[k] = primitive.indices[source + (mirrored ? (3 - k) % 3 : k)];
+    corners.vertex[k] = primitive.indices[source + (reversed ? (3 - k) % 3 : k)];
   }
   const glm::dvec2 a = corners.texel[1] - corners.texel[0], b = corners.texel[2] - corners.texel[0];
   const double twice = a.x * b.y - a.y * b.x;

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <glm/vector_relational.hpp>
+#include <numeric>
 #include <optional>
 #include <unordered_map>
 
@@ -14,6 +16,7 @@
 #include "server/scene/burial_record.h"
 #include "server/scene/coverage.h"
 #include "server/scene/lineage.h"
+#include "server/scene/lit_sides.h"
 #include "server/scene/opacity.h"
 
 namespace radiosity::scene {
@@ -52,6 +55,7 @@ class Builder {
     patches_.warnings = flat_.warnings;
     neighbours_ = edgeNeighbours(flat_);
     makeCharts();
+    chooseSides();
     patches_.texel = texelSize();
     if (former_ != nullptr && options_.texel_size_m <= 0.0) {
       const double ratio = former_->patches.texel / patches_.texel;
@@ -62,6 +66,7 @@ class Builder {
     if (!atlas) return tl::unexpected(atlas.error());
     atlas_ = std::move(*atlas);
     patches_.pages = atlas_.pages;
+    patches_.black = atlas_.black;
     patches_.warnings.insert(patches_.warnings.end(), atlas_.warnings.begin(), atlas_.warnings.end());
     for (std::uint32_t c = 0; c < charts_.size(); ++c) addSurface(c);
     if (auto sized = numberNodes(); !sized) return tl::unexpected(sized.error());
@@ -69,7 +74,8 @@ class Builder {
     for (Surface& surface : patches_.surfaces) {
       const Material& material = materialOf(scene_, surface.instance);
       surface.see_through = isSeeThrough(material);
-      hides.push_back(surface.see_through ? Hides::kNothing : material.double_sided ? Hides::kSheet : Hides::kSolid);
+      const bool two_sided = surface.first_node[1] != kNone;
+      hides.push_back(surface.see_through ? Hides::kNothing : two_sided ? Hides::kSheet : Hides::kSolid);
     }
     std::vector<LeafPiece> pieces;
     ClosedSolids solids;
@@ -127,6 +133,87 @@ class Builder {
     std::ranges::stable_sort(charts_, {}, &Chart::instance);
   }
 
+  /// Which sides of double-sided charts get patches. Where light, or else a look, comes to the back alone, the chart is
+  /// turned around.
+  void chooseSides() {
+    const auto isDoubleSided = [&](const Chart& chart) { return materialOf(scene_, chart.instance).double_sided; };
+    if (std::ranges::none_of(charts_, isDoubleSided)) return;
+    std::vector<std::array<bool, 2>> asked;
+    for (const Chart& chart : charts_) asked.push_back({isDoubleSided(chart), isDoubleSided(chart)});
+    const auto light = lightOnSides(sideScene(), asked);
+    bool any_flipped = false;
+    for (std::size_t c = 0; c < charts_.size(); ++c) {
+      if (!asked[c][0]) continue;
+      auto [front, back] = light[c];
+      if (back > front) {
+        flip(charts_[c]);
+        std::swap(front, back);
+        any_flipped = true;
+      }
+      charts_[c].back_lit = back == SideLight::kLit;
+      charts_[c].shows_back = back != SideLight::kSealed;
+    }
+    if (any_flipped) neighbours_ = edgeNeighbours(flat_);
+  }
+
+  [[nodiscard]] SideScene sideScene() const {
+    SideScene sides;
+    sides.lights = lightsInUnitBox(scene_, flat_.centre, flat_.scale);
+    sides.sky = scene_.sky.value_or(options_.sky);
+    const auto part = connectedParts();
+    const double texel = patches_.rough_texel;
+    for (const Chart& chart : charts_) {
+      const Material& material = materialOf(scene_, chart.instance);
+      const auto first = static_cast<std::uint32_t>(sides.triangles.size());
+      for (const auto t : chart.triangles) {
+        auto& corners = sides.triangles.emplace_back();
+        for (std::size_t k = 0; k < 3; ++k) corners[k] = glm::vec3(flat_.points[flat_.triangles[t].points[k]]);
+      }
+      const bool emits = glm::any(glm::greaterThan(material.emission, glm::vec3(0.0F)));
+      const auto of = flat_.triangles[chart.triangles.front()].points[0];
+      sides.groups.push_back({first, static_cast<std::uint32_t>(chart.triangles.size()), part[of],
+                              material.double_sided, isSeeThrough(material), emits, chart.area / (texel * texel)});
+    }
+    return sides;
+  }
+
+  /// By welded point: which of the pieces that hang together it is of, counted from 0.
+  [[nodiscard]] std::vector<std::uint32_t> connectedParts() const {
+    std::vector<std::uint32_t> above(flat_.points.size());
+    std::iota(above.begin(), above.end(), 0U);
+    const auto top = [&](std::uint32_t point) {
+      while (above[point] != point) point = above[point] = above[above[point]];
+      return point;
+    };
+    for (const FlatTriangle& triangle : flat_.triangles)
+      for (std::size_t k = 1; k < 3; ++k) above[top(triangle.points[k])] = top(triangle.points[0]);
+    std::vector<std::uint32_t> part(above.size(), kNone);
+    std::uint32_t parts = 0;
+    for (std::uint32_t point = 0; point < above.size(); ++point) {
+      auto& of_top = part[top(point)];
+      if (of_top == kNone) of_top = parts++;
+      part[point] = of_top;
+    }
+    return part;
+  }
+
+  void flip(Chart& chart) {
+    chart.flipped = true;
+    for (const auto t : chart.triangles) {
+      FlatTriangle& triangle = flat_.triangles[t];
+      std::swap(triangle.points[1], triangle.points[2]);
+      std::swap(triangle.source_corner[1], triangle.source_corner[2]);
+      triangle.normal = -triangle.normal;
+    }
+    for (auto& corners : chart.corners) {
+      std::swap(corners[1], corners[2]);
+      if (chart.from_file) continue;
+      for (auto& corner : corners) corner.x = chart.size.x - corner.x;
+    }
+    chart.axis_u = -chart.axis_u;
+    chart.normal = -chart.normal;
+  }
+
   /// Before there are charts: as if all area were covered by whole texels.
   [[nodiscard]] double roughTexelSize() const {
     if (options_.texel_size_m > 0.0) return options_.texel_size_m / flat_.scale;
@@ -145,6 +232,7 @@ class Builder {
     FormerPlaces places;
     if (former_ == nullptr) return places;
     places.pages = former_->patches.pages;
+    places.black = former_->patches.black;
     std::vector<std::vector<std::uint32_t>> surfaces(former_->scene.instances.size());
     const auto& old_ones = former_->patches.surfaces;
     for (std::uint32_t s = 0; s < old_ones.size(); ++s) surfaces[old_ones[s].instance].push_back(s);
@@ -158,7 +246,7 @@ class Builder {
       places.of_chart.emplace_back();
       if (source[instance] == kNone || surfaces[source[instance]].size() != count[instance]) continue;
       const Surface& old_one = old_ones[surfaces[source[instance]][order]];
-      places.of_chart.back() = {old_one.page, old_one.page_x, old_one.page_y, old_one.width, old_one.height};
+      places.of_chart.back() = {old_one.place, old_one.width, old_one.height};
     }
     return places;
   }
@@ -173,9 +261,9 @@ class Builder {
     surface.width = grid.width;
     surface.height = grid.height;
     surface.level_count = levelCount(grid.width, grid.height);
-    surface.page = grid.page;
-    surface.page_x = grid.page_x;
-    surface.page_y = grid.page_y;
+    surface.place = grid.place;
+    surface.flipped = chart.flipped;
+    surface.shows_back = chart.shows_back;
     surface.first_triangle = static_cast<std::uint32_t>(patches_.triangles.size());
     surface.triangle_count = static_cast<std::uint32_t>(chart.triangles.size());
     surface.planar = chart.planar;
@@ -237,12 +325,13 @@ class Builder {
 
   Result<void> numberNodes() {
     std::uint64_t leaves = 0, nodes = 0;
-    for (Surface& surface : patches_.surfaces) {
+    for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
+      Surface& surface = patches_.surfaces[s];
       const LevelGrid last = levelGrid(surface.width, surface.height, surface.level_count - 1);
       const std::uint64_t per_side = std::uint64_t{last.offset} + 1;
       surface.first_leaf = static_cast<std::uint32_t>(leaves);
       leaves += std::uint64_t{surface.width} * surface.height;
-      const int sides = materialOf(scene_, surface.instance).double_sided ? 2 : 1;
+      const int sides = charts_[s].back_lit ? 2 : 1;
       for (int side = 0; side < sides; ++side) {
         surface.first_node[static_cast<std::size_t>(side)] = static_cast<std::uint32_t>(nodes);
         nodes += per_side;
@@ -273,24 +362,39 @@ class Builder {
 
   void writeInstanceUvs() {
     patches_.instance_uvs.resize(scene_.instances.size());
-    for (std::size_t i = 0; i < scene_.instances.size(); ++i) {
-      const std::uint32_t primitive = scene_.instances[i].primitive;
-      const std::size_t count =
-          primitive < scene_.primitives.size() ? scene_.primitives[primitive].indices.size() / 3 : 0;
-      patches_.instance_uvs[i].corners.resize(count);
-      patches_.instance_uvs[i].page.assign(count, kNone);
-    }
     for (std::uint32_t t = 0; t < patches_.triangles.size(); ++t) {
-      const FlatTriangle& source = flat_.triangles[sources_[t]];
       const Surface& surface = patches_.surfaces[patches_.triangle_surface[t]];
-      const Page& page = patches_.pages[surface.page];
-      PatchScene::InstanceUv& uvs = patches_.instance_uvs[source.instance];
-      uvs.page[source.source] = surface.page;
-      for (std::size_t k = 0; k < 3; ++k) {
-        const glm::vec2 texel = patches_.vertices[patches_.indices[std::size_t{3} * t + k]].texel;
-        uvs.corners[source.source][source.source_corner[k]] =
-            (texel + glm::vec2(surface.page_x, surface.page_y)) / glm::vec2(page.width, page.height);
+      for (std::size_t side = 0; side < 2; ++side) {
+        if (side == 1 && !surface.shows_back) continue;
+        const bool black = surface.place[side].page == kNone;
+        writeUv(t, surface.flipped ? 1 - side : side, black ? patches_.black : surface.place[side], black);
       }
+    }
+    // Of an instance that is charted every triangle has an entry in front.
+    for (std::size_t i = 0; i < scene_.instances.size(); ++i) reserveUvs(static_cast<std::uint32_t>(i), 0);
+  }
+
+  PatchScene::SideUv& reserveUvs(std::uint32_t instance, std::size_t side) {
+    auto& uvs = patches_.instance_uvs[instance].side[side];
+    const std::uint32_t primitive = scene_.instances[instance].primitive;
+    const std::size_t count =
+        primitive < scene_.primitives.size() ? scene_.primitives[primitive].indices.size() / 3 : 0;
+    uvs.corners.resize(count);
+    uvs.page.resize(count, kNone);
+    return uvs;
+  }
+
+  /// `black`: the place is that of the black texels, and all of the triangle lies in their middle.
+  void writeUv(std::uint32_t t, std::size_t side, const PagePlace& place, bool black) {
+    const FlatTriangle& source = flat_.triangles[sources_[t]];
+    const Page& page = patches_.pages[place.page];
+    PatchScene::SideUv& uvs = reserveUvs(source.instance, side);
+    uvs.page[source.source] = place.page;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const glm::vec2 texel = black ? glm::vec2(0.5F * PatchScene::kBlackSide)
+                                    : patches_.vertices[patches_.indices[std::size_t{3} * t + k]].texel;
+      uvs.corners[source.source][source.source_corner[k]] =
+          (texel + glm::vec2(place.x, place.y)) / glm::vec2(page.width, page.height);
     }
   }
 

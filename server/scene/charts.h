@@ -7,6 +7,7 @@
 //                  charts_uv.cpp       the file's own TEXCOORD_1 where it is a valid lightmap layout
 //                  charts_fit.cpp      plane maps, minimum-area rectangles, no overlap inside a chart
 //                  charts_seams.cpp    edges shared by charts, for stitching
+//   lit_sides.h  which sides of double-sided charts light can reach
 //   atlas.h      texel size from the budget, grid of each chart, packing into pages
 //   coverage.h   exact clipped area of every leaf, points on leaves, burial inside other solids
 //   charts.cpp   puts it together
@@ -40,6 +41,9 @@ struct Chart {
   glm::dvec3 axis_u{0.0}, axis_v{0.0}, normal{0.0};  ///< own charts: the plane's frame, right-handed
   glm::dvec2 size{0.0};                              ///< own charts: the rectangle's sides
   double area = 0.0;                                 ///< of the triangles, unit box squared
+  bool flipped = false;                              ///< Surface::flipped
+  bool back_lit = false;                             ///< the back has patches, too
+  bool shows_back = false;                           ///< Surface::shows_back
 };
 
 /// Facet (coplanar connected triangles of one instance) of each triangle.

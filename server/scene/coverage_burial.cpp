@@ -292,7 +292,8 @@ class Burial {
       BuriedPart& change = changes_[i];
       const bool both = i + 1 < changes_.size() && changes_[i + 1].leaf == change.leaf;
       const auto surface = surfaceOf(change.leaf);
-      const bool two_sided = patches_.surfaces[surface].first_node[1] != kNone;
+      const auto& sides = patches_.surfaces[surface].first_node;
+      const bool two_sided = sides[0] != kNone && sides[1] != kNone;
       LeafPoint& point = patches_.leaves[change.leaf];
       // Of a side that has lost all nobody asks where it is: the other keeps its places.
       if (!both && two_sided && change.point.triangle == kNone) continue;

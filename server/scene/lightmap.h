@@ -22,10 +22,9 @@ struct LightmapPage {
 
 enum class Seams { kStitched, kLeft };
 
-/// `node_values`: by node of level 0 (index = node id; other levels ignored). Double-sided surfaces put the mean of the
-/// two sides' values, weighted by visible area, on the page (a lightmap has one value a texel). Texels less than a
-/// quarter visible are filled from neighbours of the same chart; seams between charts that share an edge are stitched
-/// (irradiance is continuous there; other values need not be: kLeft); gutters are dilated.
+/// `node_values`: by node of level 0 (index = node id; other levels ignored). Each side of a surface fills texels of
+/// its own. Texels less than a quarter visible are filled from neighbours of the same chart; seams between charts that
+/// share an edge are stitched (irradiance is continuous there; other values need not be: kLeft); gutters are dilated.
 [[nodiscard]] std::vector<LightmapPage> assemblePages(const PatchScene& patches, std::span<const glm::vec3> node_values,
                                                       Seams seams = Seams::kStitched);
 
@@ -33,7 +32,9 @@ enum class Seams { kStitched, kLeft };
 [[nodiscard]] LightmapPage coarserMip(const LightmapPage& page);
 
 /// The input document plus TEXCOORD_1 on every lit primitive and "lightmap": page in its extras. Primitives whose
-/// instances need different UVs are split (a mesh per instance); vertices are split along chart borders.
+/// instances need different UVs are split (a mesh per instance); vertices are split along chart borders. A double-sided
+/// primitive becomes its front and, where one can see its back, a flipped copy ("lightmapSide": "back"), both
+/// single-sided, with texels of their own.
 [[nodiscard]] Result<Document> withLightmapUvs(const Document& document, const Scene& scene, const PatchScene& patches);
 
 /// A GLB for any glTF viewer: withLightmapUvs plus KHR_materials_unlit materials whose base colour texture is the

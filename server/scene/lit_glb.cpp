@@ -36,7 +36,7 @@ std::vector<Placement> placements(const Scene& scene, const PatchScene& patches)
     }
     seen.insert(primitive.primitive);
     const auto& uv = patches.instance_uvs[i];
-    if (!uv.page.empty()) out.back().lit[primitive.primitive] = {&primitive, &uv};  // empty: hidden, so not charted
+    if (!uv.side[0].page.empty()) out.back().lit[primitive.primitive] = {&primitive, &uv};  // empty: not charted
   }
   return out;
 }
@@ -86,7 +86,8 @@ void dropOldPages(Json& gltf) {
   if (!gltf.contains("meshes")) return;
   for (auto& mesh : gltf["meshes"]) {
     for (auto& primitive : mesh["primitives"]) {
-      if (primitive.contains("extras") && primitive["extras"].is_object()) primitive["extras"].erase("lightmap");
+      if (!primitive.contains("extras") || !primitive["extras"].is_object()) continue;
+      for (const auto* member : {"lightmap", "lightmapSide"}) primitive["extras"].erase(member);
     }
   }
 }
@@ -114,6 +115,7 @@ class Exporter {
       out_.buffers.push_back(std::make_shared<const Bytes>(std::move(bytes)));
     }
     dropUnusedInstancing();
+    makeSingleSided();
     return {};
   }
 
@@ -169,6 +171,46 @@ class Exporter {
     }
     out_.gltf["meshes"].push_back(std::move(*built));
     return out_.gltf["meshes"].size() - 1;
+  }
+
+  /// Each side of what is lit is there by itself. What is not lit, because it is hidden say, keeps its material as it
+  /// was, as a copy where both use it.
+  void makeSingleSided() {
+    if (!out_.gltf.contains("materials") || !out_.gltf.contains("meshes")) return;
+    auto& materials = out_.gltf["materials"];
+    std::set<std::size_t> of_lit;
+    std::map<std::size_t, std::vector<Json*>> of_others;  // their places
+    for (auto& mesh : out_.gltf["meshes"])
+      for (auto& primitive : mesh["primitives"]) {
+        const bool lit = primitive.contains("extras") && primitive["extras"].contains("lightmap");
+        forEachMaterial(primitive, [&](Json& material) {
+          const auto index = material.get<std::size_t>();
+          if (!materials[index].value("doubleSided", false)) return;
+          if (lit) {
+            of_lit.insert(index);
+          } else {
+            of_others[index].push_back(&material);
+          }
+        });
+      }
+    for (const auto index : of_lit) {
+      if (const auto others = of_others.find(index); others != of_others.end()) {
+        const auto copy = materials.size();
+        materials.push_back(materials[index]);
+        for (auto* place : others->second) *place = copy;
+      }
+      materials[index].erase("doubleSided");
+    }
+  }
+
+  /// Calls `visit(index)` for each material that a primitive may have (KHR_materials_variants).
+  template <typename Visit>
+  static void forEachMaterial(Json& primitive, const Visit& visit) {
+    if (primitive.contains("material")) visit(primitive["material"]);
+    const auto* variants = extensionOf(primitive, "KHR_materials_variants");
+    if (variants == nullptr || !variants->contains("mappings")) return;
+    for (auto& mapping : primitive["extensions"]["KHR_materials_variants"]["mappings"])
+      if (mapping.contains("material")) visit(mapping["material"]);
   }
 
   /// Takes the extension off the lists when its last user is gone.

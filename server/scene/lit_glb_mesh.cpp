@@ -1,8 +1,12 @@
 #include "server/scene/lit_glb_mesh.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <cstring>
+#include <limits>
 #include <set>
+#include <type_traits>
 #include <unordered_map>
 
 #include "common/check.h"
@@ -28,6 +32,25 @@ struct CornerHash {
            std::bit_cast<std::uint32_t>(key.uv.y) * 0x165667B19E3779F9U;
   }
 };
+
+template <typename Component>
+void negateComponents(std::uint8_t* bytes, std::size_t size) {
+  for (std::size_t at = 0; at + sizeof(Component) <= size; at += sizeof(Component)) {
+    Component value;
+    std::memcpy(&value, bytes + at, sizeof value);
+    // The least whole number has no opposite; glTF takes it for -1 as it does the next.
+    if (std::is_integral_v<Component>) value = std::max<Component>(value, -std::numeric_limits<Component>::max());
+    value = static_cast<Component>(-value);
+    std::memcpy(bytes + at, &value, sizeof value);
+  }
+}
+
+/// A vector of any type that glTF allows for normals and tangents.
+void negate(std::uint8_t* bytes, std::size_t size, int component_type) {
+  if (component_type == TINYGLTF_COMPONENT_TYPE_FLOAT) negateComponents<float>(bytes, size);
+  if (component_type == TINYGLTF_COMPONENT_TYPE_BYTE) negateComponents<std::int8_t>(bytes, size);
+  if (component_type == TINYGLTF_COMPONENT_TYPE_SHORT) negateComponents<std::int16_t>(bytes, size);
+}
 
 std::size_t textBytes(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace).size(); }
 
@@ -82,7 +105,7 @@ tl::unexpected<Error> LitMeshBuilder::tooMuchJson() const {
 }
 
 Result<std::size_t> LitMeshBuilder::copyAccessor(std::size_t accessor, const std::vector<std::uint32_t>& elements,
-                                                 bool with_bounds) {
+                                                 const Copy& how) {
   const auto reader = AccessorReader::open(document_, model_, accessor);
   if (!reader) return tl::unexpected(reader.error());
   const auto size = elementBytes(model_.accessors[accessor]);
@@ -94,12 +117,13 @@ Result<std::size_t> LitMeshBuilder::copyAccessor(std::size_t accessor, const std
     const auto next = bytes_.size() + stride;
     if (const auto* data = reader->bytesAt(element)) append(data, size);
     bytes_.resize(next, 0);
+    if (how.negated) negate(bytes_.data() + next - stride, size, model_.accessors[accessor].componentType);
   }
   auto json = document_.gltf["accessors"][accessor];
   for (const auto* member : {"sparse", "byteOffset", "min", "max", "name", "extras", "extensions"}) json.erase(member);
   json["bufferView"] = addView(first, stride);
   json["count"] = elements.size();
-  if (with_bounds) {
+  if (how.with_bounds) {
     const auto unscaled = reader->unnormalized();
     glm::dvec3 low(std::numeric_limits<double>::max());
     glm::dvec3 high(std::numeric_limits<double>::lowest());
@@ -114,24 +138,42 @@ Result<std::size_t> LitMeshBuilder::copyAccessor(std::size_t accessor, const std
   return addAccessor(std::move(json));
 }
 
-Result<Json> LitMeshBuilder::copyAttributes(const Json& attributes, const std::vector<std::uint32_t>& elements) {
+/// `turned`: seen from behind, where glTF turns normals and tangents around (Khronos' sample viewer: both, and the
+/// bitangent).
+Result<Json> LitMeshBuilder::copyAttributes(const Json& attributes, const std::vector<std::uint32_t>& elements,
+                                            bool turned) {
   Json out = Json::object();
   for (const auto& [name, accessor] : attributes.items()) {
-    const auto copied = copyAccessor(accessor.get<std::size_t>(), elements, name == "POSITION");
+    const bool negated = turned && (name == "NORMAL" || name == "TANGENT");
+    const auto copied = copyAccessor(accessor.get<std::size_t>(), elements, {name == "POSITION", negated});
     if (!copied) return tl::unexpected(copied.error());
     out[name] = *copied;
   }
   return out;
 }
 
-LitMeshBuilder::Vertices LitMeshBuilder::collect(const LitPrimitive& lit, std::uint32_t page) {
+std::vector<LitMeshBuilder::Part> LitMeshBuilder::partsOf(const LitPrimitive& lit) {
+  std::vector<Part> parts;
+  for (std::size_t side = 0; side < 2; ++side) {
+    const auto& of_triangles = lit.uv->side[side].page;
+    std::set<std::uint32_t> pages(of_triangles.begin(), of_triangles.end());
+    pages.erase(kNone);
+    for (const auto page : pages) parts.push_back({side, page});
+  }
+  return parts;
+}
+
+LitMeshBuilder::Vertices LitMeshBuilder::collect(const LitPrimitive& lit, const Part& part) {
   Vertices out;
   std::unordered_map<CornerKey, std::uint32_t, CornerHash> ids;
   const auto& indices = lit.primitive->indices;
-  for (std::size_t t = 0; t < lit.uv->page.size(); ++t) {
-    if (lit.uv->page[t] != page) continue;
-    for (std::size_t c = 0; c < 3; ++c) {
-      const CornerKey key{indices[3 * t + c], lit.uv->corners[t][c]};
+  const auto& uv = lit.uv->side[part.side];
+  const std::array<std::size_t, 3> order =
+      part.side == 0 ? std::array<std::size_t, 3>{0, 1, 2} : std::array<std::size_t, 3>{0, 2, 1};
+  for (std::size_t t = 0; t < uv.page.size(); ++t) {
+    if (uv.page[t] != part.page) continue;
+    for (const auto c : order) {
+      const CornerKey key{indices[3 * t + c], uv.corners[t][c]};
       const auto [found, added] = ids.try_emplace(key, static_cast<std::uint32_t>(out.source.size()));
       if (added) {
         out.source.push_back(key.vertex);
@@ -143,20 +185,21 @@ LitMeshBuilder::Vertices LitMeshBuilder::collect(const LitPrimitive& lit, std::u
   return out;
 }
 
-Result<Json> LitMeshBuilder::pagePrimitive(const Json& source, const LitPrimitive& lit, std::uint32_t page) {
-  const auto vertices = collect(lit, page);
+Result<Json> LitMeshBuilder::partPrimitive(const Json& source, const LitPrimitive& lit, const Part& part) {
+  const bool turned = part.side == 1;
+  const auto vertices = collect(lit, part);
   const auto more = vertices.uv.size() * sizeof(glm::vec2) + vertices.indices.size() * sizeof(std::uint32_t);
   if (const auto room = checkRoom(more); !room) return tl::unexpected(room.error());
   auto primitive = source;
   auto attributes = source["attributes"];
   attributes.erase("TEXCOORD_1");
-  auto copied = copyAttributes(attributes, vertices.source);
+  auto copied = copyAttributes(attributes, vertices.source, turned);
   if (!copied) return copied;
   primitive["attributes"] = std::move(*copied);
   primitive["attributes"]["TEXCOORD_1"] = addUvs(vertices.uv);
   if (primitive.contains("targets")) {
     for (auto& target : primitive["targets"]) {
-      auto morph = copyAttributes(target, vertices.source);
+      auto morph = copyAttributes(target, vertices.source, turned);
       if (!morph) return morph;
       target = std::move(*morph);
     }
@@ -168,7 +211,8 @@ Result<Json> LitMeshBuilder::pagePrimitive(const Json& source, const LitPrimitiv
     if (primitive["extensions"].empty()) primitive.erase("extensions");
   }
   if (!primitive.contains("extras") || !primitive["extras"].is_object()) primitive["extras"] = Json::object();
-  primitive["extras"]["lightmap"] = page;
+  primitive["extras"]["lightmap"] = part.page;
+  if (turned) primitive["extras"]["lightmapSide"] = "back";
   return primitive;
 }
 
@@ -191,14 +235,13 @@ Result<Json> LitMeshBuilder::build(const Json& mesh, const std::map<std::uint32_
       continue;
     }
     const auto& use = found->second;
-    RAD_CHECK_EQ(use.uv->page.size() * 3, use.primitive->indices.size());
-    RAD_CHECK_EQ(use.uv->page.size(), use.uv->corners.size());
-    std::set<std::uint32_t> pages(use.uv->page.begin(), use.uv->page.end());
-    pages.erase(kNone);
-    if (pages.empty()) out["primitives"].push_back(source);
-    if (pages.size() > 1 && !takeJson((pages.size() - 1) * textBytes(source))) return tooMuchJson();
-    for (const auto page : pages) {
-      auto primitive = pagePrimitive(source, use, page);
+    RAD_CHECK_EQ(use.uv->side[0].page.size() * 3, use.primitive->indices.size());
+    RAD_CHECK_EQ(use.uv->side[0].page.size(), use.uv->side[0].corners.size());
+    const auto parts = partsOf(use);
+    if (parts.empty()) out["primitives"].push_back(source);
+    if (parts.size() > 1 && !takeJson((parts.size() - 1) * textBytes(source))) return tooMuchJson();
+    for (const auto& part : parts) {
+      auto primitive = partPrimitive(source, use, part);
       if (!primitive) return primitive;
       out["primitives"].push_back(std::move(*primitive));
     }

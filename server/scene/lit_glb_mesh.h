@@ -11,7 +11,7 @@
 
 namespace radiosity::scene {
 
-/// A primitive as imported and where its triangles lie in the lightmap.
+/// A primitive as imported and where both sides of its triangles lie in the lightmap.
 struct LitPrimitive {
   const Primitive* primitive = nullptr;
   const PatchScene::InstanceUv* uv = nullptr;
@@ -23,8 +23,9 @@ class LitMeshBuilder {
   LitMeshBuilder(const Document& document, const tinygltf::Model& model, Json& gltf, std::size_t buffer)
       : document_(document), model_(model), gltf_(gltf), buffer_(buffer) {}
 
-  /// `mesh` with each primitive in `lit` (by index in the file's mesh) turned into one triangle list a page, vertices
-  /// split where lightmap UVs differ, all other attributes copied byte by byte. kTooLarge past 1 GiB of new data, or
+  /// `mesh` with each primitive in `lit` (by index in the file's mesh) turned into one triangle list a side and page,
+  /// vertices split where lightmap UVs differ, all other attributes copied byte by byte; backs are turned around, with
+  /// their normals and tangents negated. kTooLarge past 1 GiB of new data, or
   /// 64 MiB of JSON that is there again. `again`: the mesh was built before; what is the file's own alone (`extras`,
   /// which may be as large as the file) stays with the first.
   [[nodiscard]] Result<Json> build(const Json& mesh, const std::map<std::uint32_t, LitPrimitive>& lit, bool again);
@@ -43,12 +44,24 @@ class LitMeshBuilder {
     std::vector<std::uint32_t> indices;  ///< 3 a triangle
   };
 
-  static Vertices collect(const LitPrimitive& lit, std::uint32_t page);
-  [[nodiscard]] Result<Json> pagePrimitive(const Json& source, const LitPrimitive& lit, std::uint32_t page);
+  /// One page of one side of a primitive: 0 front, 1 back.
+  struct Part {
+    std::size_t side;
+    std::uint32_t page;
+  };
+  struct Copy {
+    bool with_bounds = false;  ///< POSITION wants them
+    bool negated = false;
+  };
+
+  static std::vector<Part> partsOf(const LitPrimitive& lit);
+  static Vertices collect(const LitPrimitive& lit, const Part& part);
+  [[nodiscard]] Result<Json> partPrimitive(const Json& source, const LitPrimitive& lit, const Part& part);
   [[nodiscard]] Result<std::size_t> copyAccessor(std::size_t accessor, const std::vector<std::uint32_t>& elements,
-                                                 bool with_bounds);
+                                                 const Copy& how);
   [[nodiscard]] Result<void> checkRoom(std::size_t more) const;
-  [[nodiscard]] Result<Json> copyAttributes(const Json& attributes, const std::vector<std::uint32_t>& elements);
+  [[nodiscard]] Result<Json> copyAttributes(const Json& attributes, const std::vector<std::uint32_t>& elements,
+                                            bool turned);
   [[nodiscard]] std::size_t addView(std::size_t first_byte, std::size_t stride);
   [[nodiscard]] std::size_t addAccessor(Json accessor);
   [[nodiscard]] std::size_t addIndices(const std::vector<std::uint32_t>& indices);

@@ -41,7 +41,7 @@ Json unlitMaterial(const Scene& scene, std::size_t material, std::uint32_t page)
   const Material& source = scene.materials[material];
   const float alpha = source.alpha_mode == AlphaMode::kBlend ? source.alpha : 1.0F;
   const float opacity = alpha * (1.0F - source.transmission);
-  Json out = {{"name", source.name + " lit " + std::to_string(page)}, {"doubleSided", source.double_sided}};
+  Json out = {{"name", source.name + " lit " + std::to_string(page)}};
   out["pbrMetallicRoughness"] = {{"baseColorFactor", {1.0, 1.0, 1.0, opacity}}, {"metallicFactor", 0.0}};
   out["pbrMetallicRoughness"]["baseColorTexture"] = {{"index", page}, {"texCoord", 1}};
   out["alphaMode"] = opacity < 1.0F ? "BLEND" : "OPAQUE";

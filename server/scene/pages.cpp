@@ -16,7 +16,7 @@ constexpr std::uint8_t kMaxRing = 250;
 /// Texels of surfaces that are made side by side before they take their places, and that a thread is worth.
 constexpr std::size_t kTexelsAtOnce = std::size_t{1} << 18U, kTexelsAThread = 4096;
 
-/// A surface's texels with a margin of gutter around them.
+/// The texels of one side of a surface with a margin of gutter around them.
 struct Patchwork {
   std::int64_t x0 = 0, y0 = 0;  ///< page texel of the buffer's first
   std::int64_t width = 0, height = 0;
@@ -37,13 +37,15 @@ std::size_t texelsOf(const Surface& surface) {
   return (std::size_t{surface.width} + 2 * kMargin) * (surface.height + 2 * kMargin);
 }
 
-Patchwork gather(const PatchScene& patches, const Surface& surface, std::span<const glm::vec3> values) {
-  const Page& page = patches.pages[surface.page];
+Patchwork gather(const PatchScene& patches, const Surface& surface, std::size_t side,
+                 std::span<const glm::vec3> values) {
+  const PagePlace& place = surface.place[side];
+  const Page& page = patches.pages[place.page];
   Patchwork p;
-  p.x0 = std::max<std::int64_t>(0, std::int64_t{surface.page_x} - kMargin);
-  p.y0 = std::max<std::int64_t>(0, std::int64_t{surface.page_y} - kMargin);
-  p.width = std::min<std::int64_t>(page.width, std::int64_t{surface.page_x} + surface.width + kMargin) - p.x0;
-  p.height = std::min<std::int64_t>(page.height, std::int64_t{surface.page_y} + surface.height + kMargin) - p.y0;
+  p.x0 = std::max<std::int64_t>(0, std::int64_t{place.x} - kMargin);
+  p.y0 = std::max<std::int64_t>(0, std::int64_t{place.y} - kMargin);
+  p.width = std::min<std::int64_t>(page.width, std::int64_t{place.x} + surface.width + kMargin) - p.x0;
+  p.height = std::min<std::int64_t>(page.height, std::int64_t{place.y} + surface.height + kMargin) - p.y0;
   const auto count = static_cast<std::size_t>(p.width * p.height);
   p.value.assign(count, glm::vec3(0.0F));
   p.visible.assign(count, 0.0F);
@@ -51,22 +53,14 @@ Patchwork gather(const PatchScene& patches, const Surface& surface, std::span<co
   float most = 0.0F;
   for (std::uint32_t y = 0; y < surface.height; ++y)
     for (std::uint32_t x = 0; x < surface.width; ++x) {
-      glm::dvec3 sum(0.0);
-      double area = 0.0, largest = 0.0;
-      for (const std::uint32_t first : surface.first_node) {
-        if (first == kNone) continue;
-        const std::uint32_t node = first + y * surface.width + x;
-        const double side = patches.node_area[node];
-        sum += glm::dvec3(values[node]) * side;
-        area += side;
-        largest = std::max(largest, side);
-      }
-      if (area <= 0.0) continue;
-      const std::size_t i = p.at(surface.page_x + x - p.x0, surface.page_y + y - p.y0);
-      p.value[i] = glm::vec3(sum / area);
+      const std::uint32_t node = surface.first_node[side] + y * surface.width + x;
+      const float area = patches.node_area[node];
+      if (area <= 0.0F) continue;
+      const std::size_t i = p.at(place.x + x - p.x0, place.y + y - p.y0);
+      p.value[i] = values[node];
       // What is thin to the eye is no less well known.
       const bool whole = surface.see_through || surface.texel_area <= 0.0F;
-      p.visible[i] = whole ? 1.0F : std::min(1.0F, static_cast<float>(largest / surface.texel_area));
+      p.visible[i] = whole ? 1.0F : std::min(1.0F, area / surface.texel_area);
       most = std::max(most, p.visible[i]);
     }
   // A chart of slivers has nothing better than what it has.
@@ -153,27 +147,50 @@ class PageMaker {
   }
 
   std::vector<LightmapPage> make(Seams seams) {
-    const auto all = static_cast<std::uint32_t>(patches_.surfaces.size());
-    for (std::uint32_t first = 0, last = 0; first < all; first = last) {
+    for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s)
+      for (std::size_t side = 0; side < 2; ++side)
+        if (patches_.surfaces[s].first_node[side] != kNone) sides_.push_back({s, side});
+    for (std::size_t first = 0, last = 0; first < sides_.size(); first = last) {
       std::size_t texels = 0;
-      while (last < all && texels < kTexelsAtOnce) texels += texelsOf(patches_.surfaces[last++]);
+      while (last < sides_.size() && texels < kTexelsAtOnce) texels += texelsOf(surfaceOf(sides_[last++]));
       placeAll(first, last, texels);
     }
     // Surfaces may cover each other here and there: once all have their places.
-    for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
-      const auto covered = coveredOf(patches_.surfaces[s]);
-      if (covered.empty()) continue;
-      Patchwork p = gather(patches_, patches_.surfaces[s], values_);
-      takeFromCovers(patches_.surfaces[s], covered, p);
+    for (const SideRef& of : sides_) {
+      const auto covered = coveredOf(surfaceOf(of));
+      if (std::ranges::none_of(covered, [&](const auto& one) { return one.side == of.side; })) continue;
+      Patchwork p = gather(patches_, surfaceOf(of), of.side, values_);
+      takeFromCovers(of, covered, p);
       fillUnknown(p);
-      place(s, p);
+      place(of, p);
     }
+    placeBlack();
     if (seams == Seams::kStitched) stitchSeams(patches_, owners_, pages_);
     for (std::size_t page = 0; page < pages_.size(); ++page) dilate(pages_[page], owners_[page]);
     return std::move(pages_);
   }
 
  private:
+  struct SideRef {
+    std::uint32_t surface;
+    std::size_t side;
+  };
+  [[nodiscard]] const Surface& surfaceOf(const SideRef& of) const { return patches_.surfaces[of.surface]; }
+
+  /// Texels of their own, which no neighbour is spread into.
+  void placeBlack() {
+    const PagePlace& black = patches_.black;
+    if (black.page == kNone) return;
+    const auto owner = static_cast<std::uint32_t>(2 * patches_.surfaces.size());
+    for (std::uint32_t y = 0; y < PatchScene::kBlackSide; ++y)
+      for (std::uint32_t x = 0; x < PatchScene::kBlackSide; ++x) {
+        const auto at =
+            pages_[black.page].irradiance.index(static_cast<int>(black.x + x), static_cast<int>(black.y + y));
+        owners_[black.page].owner[at] = owner;
+        pages_[black.page].coverage[at] = 1.0F;  // so that coarser mips stay black where they are
+      }
+  }
+
   [[nodiscard]] std::span<const PatchScene::Covered> coveredOf(const Surface& surface) const {
     const auto from = [&](std::uint32_t leaf) {
       return std::ranges::lower_bound(patches_.covered, leaf, {}, &PatchScene::Covered::leaf);
@@ -182,44 +199,49 @@ class PageMaker {
   }
 
   /// Of surfaces of so many texels in all: one after the other takes its place, so that all cores come to the same.
-  void placeAll(std::uint32_t first, std::uint32_t last, std::size_t texels) {
+  void placeAll(std::size_t first, std::size_t last, std::size_t texels) {
     std::vector<Patchwork> made(last - first);
     const auto make = [&](std::size_t i) {
-      made[i] = gather(patches_, patches_.surfaces[first + i], values_);
+      const SideRef& of = sides_[first + i];
+      made[i] = gather(patches_, surfaceOf(of), of.side, values_);
       fillUnknown(made[i]);
     };
     inTurns(made.size(), make, texels / kTexelsAThread);
-    for (auto s = first; s < last; ++s) place(s, made[s - first]);
+    for (auto i = first; i < last; ++i) place(sides_[i], made[i - first]);
   }
 
   /// The light of leaves that other surfaces cover, whose charts have their places already.
-  void takeFromCovers(const Surface& surface, std::span<const PatchScene::Covered> all, Patchwork& p) const {
+  void takeFromCovers(const SideRef& of, std::span<const PatchScene::Covered> all, Patchwork& p) const {
+    const Surface& surface = surfaceOf(of);
+    const PagePlace& place = surface.place[of.side];
     for (const auto& covered : all) {
+      if (covered.side != of.side) continue;
       const auto i = covered.leaf - surface.first_leaf;
-      const auto to = p.at(surface.page_x + i % surface.width - p.x0, surface.page_y + i / surface.width - p.y0);
-      if (covered.side != 0 && p.ring[to] == 0) continue;  // the front is what is looked at
-      p.value[to] = lookUp(patches_.surfaces[covered.surface], covered.texel);
+      const auto to = p.at(place.x + i % surface.width - p.x0, place.y + i / surface.width - p.y0);
+      p.value[to] = lookUp({covered.surface, covered.surface_side}, covered.texel);
       p.ring[to] = 0;
     }
   }
 
   /// Bilinear, within the chart.
-  [[nodiscard]] glm::vec3 lookUp(const Surface& surface, const glm::vec2& texel) const {
-    const Image& page = pages_[surface.page].irradiance;
+  [[nodiscard]] glm::vec3 lookUp(const SideRef& of, const glm::vec2& texel) const {
+    const Surface& surface = surfaceOf(of);
+    const PagePlace& place = surface.place[of.side];
+    const Image& page = pages_[place.page].irradiance;
     const glm::vec2 most(surface.width - 1, surface.height - 1);
     const glm::vec2 at = glm::clamp(texel - 0.5F, glm::vec2(0.0F), most);
     const glm::vec2 low = glm::floor(at), high = glm::min(low + 1.0F, most), part = at - low;
     const auto pixel = [&](float x, float y) {
-      return page.pixels[page.index(static_cast<int>(surface.page_x) + static_cast<int>(x),
-                                    static_cast<int>(surface.page_y) + static_cast<int>(y))];
+      return page.pixels[page.index(static_cast<int>(place.x) + static_cast<int>(x),
+                                    static_cast<int>(place.y) + static_cast<int>(y))];
     };
     return glm::mix(glm::mix(pixel(low.x, low.y), pixel(high.x, low.y), part.x),
                     glm::mix(pixel(low.x, high.y), pixel(high.x, high.y), part.x), part.y);
   }
 
   /// Where charts of a file's own layout share texels: the one that sees more of it wins, then the nearer.
-  void place(std::uint32_t s, const Patchwork& p) {
-    const std::uint32_t page_id = patches_.surfaces[s].page;
+  void place(const SideRef& of, const Patchwork& p) {
+    const std::uint32_t page_id = surfaceOf(of).place[of.side].page, owner = ownerOf(of.surface, of.side);
     LightmapPage& page = pages_[page_id];
     PageOwners& owners = owners_[page_id];
     for (std::int64_t y = 0; y < p.height; ++y)
@@ -227,13 +249,13 @@ class PageMaker {
         const std::size_t from = p.at(x, y);
         if (p.ring[from] == kMaxRing) continue;
         const std::size_t to = page.irradiance.index(static_cast<int>(p.x0 + x), static_cast<int>(p.y0 + y));
-        const bool better = owners.surface[to] == kNone || owners.surface[to] == s ||
+        const bool better = owners.owner[to] == kNone || owners.owner[to] == owner ||
                             p.visible[from] > page.coverage[to] ||
                             (p.visible[from] == page.coverage[to] && p.ring[from] < owners.ring[to]);
         if (!better) continue;
         page.irradiance.pixels[to] = p.value[from];
         page.coverage[to] = p.visible[from];
-        owners.surface[to] = s;
+        owners.owner[to] = owner;
         owners.ring[to] = p.ring[from];
       }
   }
@@ -243,15 +265,15 @@ class PageMaker {
   void dilate(LightmapPage& page, PageOwners& owners) const {
     constexpr int kRounds = 4;
     std::vector<std::size_t> empty;
-    for (std::size_t i = 0; i < owners.surface.size(); ++i)
-      if (owners.surface[i] == kNone) empty.push_back(i);
+    for (std::size_t i = 0; i < owners.owner.size(); ++i)
+      if (owners.owner[i] == kNone) empty.push_back(i);
     for (int round = 0; round < kRounds && !empty.empty(); ++round) {
       std::vector<std::pair<std::size_t, glm::vec3>> found;
       for (const auto i : empty) {
         glm::vec3 sum(0.0F);
         float weight = 0.0F;
         aroundTexel(page.irradiance, i, [&](std::size_t n) {
-          if (owners.surface[n] == kNone) return;
+          if (owners.owner[n] == kNone) return;
           sum += page.irradiance.pixels[n];
           weight += 1.0F;
         });
@@ -260,11 +282,11 @@ class PageMaker {
       empty.clear();
       for (const auto& [i, value] : found) {
         page.irradiance.pixels[i] = value;
-        owners.surface[i] = kNone - 1;
+        owners.owner[i] = kNone - 1;
       }
       for (const auto& [i, value] : found)
         aroundTexel(page.irradiance, i, [&](std::size_t n) {
-          if (owners.surface[n] == kNone) empty.push_back(n);
+          if (owners.owner[n] == kNone) empty.push_back(n);
         });
       std::ranges::sort(empty);
       empty.erase(std::unique(empty.begin(), empty.end()), empty.end());
@@ -283,6 +305,7 @@ class PageMaker {
   std::span<const glm::vec3> values_;
   std::vector<LightmapPage> pages_;
   std::vector<PageOwners> owners_;
+  std::vector<SideRef> sides_;  ///< that have texels
 };
 
 }  // namespace

@@ -10,10 +10,16 @@
 
 namespace radiosity::scene {
 
-/// Which surface a page texel belongs to, gutters included, and how far it is from that surface's own texels.
+/// A side of a surface, as PageOwners name it.
+[[nodiscard]] inline std::uint32_t ownerOf(std::uint32_t surface, std::size_t side) {
+  return 2 * surface + static_cast<std::uint32_t>(side);
+}
+
+/// Which side of which surface a page texel belongs to, gutters included, and how far it is from that side's own
+/// texels.
 struct PageOwners {
-  std::vector<std::uint32_t> surface;  ///< kNone: nobody's
-  std::vector<std::uint8_t> ring;      ///< 0: a value of its own; 1, 2, ...: filled from neighbours, that far away
+  std::vector<std::uint32_t> owner;  ///< kNone: nobody's
+  std::vector<std::uint8_t> ring;    ///< 0: a value of its own; 1, 2, ...: filled from neighbours, that far away
 };
 
 /// Changes texels as little as possible so that bilinear lookups on both sides of each seam agree. Least-norm

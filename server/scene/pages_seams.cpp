@@ -36,40 +36,45 @@ class Stitcher {
       : patches_(patches), owners_(owners), pages_(pages) {}
 
   void run() {
-    for (const PatchScene::Seam& seam : patches_.seams) addTies(seam);
+    for (const PatchScene::Seam& seam : patches_.seams)
+      for (std::size_t side = 0; side < 2; ++side) {
+        const auto hasTexels = [&](std::uint32_t s) { return patches_.surfaces[s].first_node[side] != kNone; };
+        if (std::ranges::all_of(seam.surface, hasTexels)) addTies(seam, side);
+      }
     for (int sweep = 0; sweep < kSweeps; ++sweep)
       for (const Tie& tie : ties_) project(tie);
   }
 
  private:
   /// Of a texel on one side of a seam; `larger`: the texel's area on the side where they are larger.
-  [[nodiscard]] float mobility(const Surface& surface, std::uint32_t texel, float larger) const {
-    const bool visible = owners_[surface.page].ring[texel] == 0;
-    const float coverage = visible ? pages_[surface.page].coverage[texel] : 1.0F, area = surface.texel_area * coverage;
+  [[nodiscard]] float mobility(const Surface& surface, std::uint32_t page, std::uint32_t texel, float larger) const {
+    const bool visible = owners_[page].ring[texel] == 0;
+    const float coverage = visible ? pages_[page].coverage[texel] : 1.0F, area = surface.texel_area * coverage;
     const float smaller = area > 0.0F ? std::clamp(larger / area, 1.0F, kMostMobile) : 1.0F;
     return smaller * (visible ? kMobileVisible : kMobile);
   }
 
   /// False when the lookup would touch texels of another chart: those must not be pulled.
-  bool lookUp(std::uint32_t surface_id, const glm::vec2& texel, Lookup& lookup) const {
-    const Surface& surface = patches_.surfaces[surface_id];
-    const Image& image = pages_[surface.page].irradiance;
-    const glm::vec2 place = texel + glm::vec2(surface.page_x, surface.page_y) - 0.5F;
-    const glm::vec2 base = glm::floor(place);
-    const glm::vec2 f = place - base;
-    lookup.page = surface.page;
+  bool lookUp(std::uint32_t surface, std::size_t side, const glm::vec2& texel, Lookup& lookup) const {
+    const PagePlace& place = patches_.surfaces[surface].place[side];
+    const Image& image = pages_[place.page].irradiance;
+    const glm::vec2 at = texel + glm::vec2(place.x, place.y) - 0.5F;
+    const glm::vec2 base = glm::floor(at);
+    const glm::vec2 f = at - base;
+    lookup.page = place.page;
     for (std::size_t k = 0; k < 4; ++k) {
       const int dx = static_cast<int>(k & 1U), dy = static_cast<int>(k >> 1U);
       const int x = std::clamp(static_cast<int>(base.x) + dx, 0, image.width - 1);
       const int y = std::clamp(static_cast<int>(base.y) + dy, 0, image.height - 1);
       lookup.weight[k] = (dx == 1 ? f.x : 1.0F - f.x) * (dy == 1 ? f.y : 1.0F - f.y);
       lookup.texel[k] = static_cast<std::uint32_t>(image.index(x, y));
-      if (lookup.weight[k] > 1e-4F && owners_[surface.page].surface[lookup.texel[k]] != surface_id) return false;
+      if (lookup.weight[k] > 1e-4F && owners_[place.page].owner[lookup.texel[k]] != ownerOf(surface, side))
+        return false;
     }
     return true;
   }
 
-  void addTies(const PatchScene::Seam& seam) {
+  void addTies(const PatchScene::Seam& seam, std::size_t face) {
     const float length =
         std::max(glm::distance(seam.texel[0][0], seam.texel[0][1]), glm::distance(seam.texel[1][0], seam.texel[1][1]));
     const int count = std::max(1, static_cast<int>(std::ceil(length * kPointsATexel)));
@@ -81,10 +86,11 @@ class Stitcher {
       float norm = 0.0F;
       bool usable = true;
       for (std::size_t s = 0; s < 2 && usable; ++s) {
-        usable = lookUp(seam.surface[s], glm::mix(seam.texel[s][0], seam.texel[s][1], where), tie.side[s]);
+        usable = lookUp(seam.surface[s], face, glm::mix(seam.texel[s][0], seam.texel[s][1], where), tie.side[s]);
         for (std::size_t k = 0; k < 4; ++k) {
           auto& lookup = tie.side[s];
-          lookup.reach[k] = lookup.weight[k] * mobility(patches_.surfaces[seam.surface[s]], lookup.texel[k], larger);
+          lookup.reach[k] =
+              lookup.weight[k] * mobility(patches_.surfaces[seam.surface[s]], lookup.page, lookup.texel[k], larger);
           norm += lookup.weight[k] * lookup.reach[k];
         }
       }

@@ -4,7 +4,8 @@
 // Leaf patch == lightmap texel. A chart ("surface") is a width x height grid of leaves. Level l has
 // ceil(width / 2^l) x ceil(height / 2^l) nodes; node (x, y) of level l covers leaves [x 2^l, (x+1) 2^l) x [y 2^l, ...),
 // so the ancestor of leaf (x, y) at level l is (x >> l, y >> l). The last level is 1 x 1. A surface side's nodes lie
-// consecutively, level 0 first, row-major. A double-sided surface has a second set of nodes for its back.
+// consecutively, level 0 first, row-major. Front and back of a double-sided surface are two surfaces in all but their
+// geometry: each has nodes and texels of its own wherever light may reach it (lit_sides.h).
 #pragma once
 
 #include <array>
@@ -55,13 +56,24 @@ struct LeafPoint {
   [[nodiscard]] bool hasSpots() const { return spot_list != kNone; }
 };
 
+/// Where texel (0, 0) of something lies on the lightmap pages.
+struct PagePlace {
+  std::uint32_t page = kNone;  ///< kNone: it has no texels
+  std::uint32_t x = 0, y = 0;
+
+  bool operator==(const PagePlace&) const = default;
+};
+
 struct Surface {
   std::uint32_t instance = kNone;
   std::uint32_t material = kNone;
   std::uint32_t width = 0, height = 0, level_count = 0;
   std::array<std::uint32_t, 2> first_node{kNone, kNone};  ///< front, back; kNone: that side only absorbs
   std::uint32_t first_leaf = 0;                           ///< into PatchScene::leaves; shared by both sides
-  std::uint32_t page = 0, page_x = 0, page_y = 0;         ///< leaf (0, 0) is page texel (page_x, page_y)
+  std::array<PagePlace, 2> place;                         ///< of leaf (0, 0); front, back: each side with nodes has one
+  /// The front is the back of the file's triangles, where light reaches only that side of a double-sided surface.
+  bool flipped = false;
+  bool shows_back = false;  ///< one can see the back: it has texels, or else is dark (PatchScene::black)
   std::uint32_t first_triangle = 0, triangle_count = 0;
   glm::vec3 bounds_min{0.0F}, bounds_max{0.0F};
   bool planar = false;
@@ -98,11 +110,24 @@ struct PatchScene {
   std::vector<std::uint8_t> opacity;  ///< grids of the surfaces that one can see through; 255: lets nothing through
   std::vector<Page> pages;
 
-  /// Lightmap coordinates of the imported vertices: one for each corner of each instance's triangles, in page UV [0, 1]
-  /// (v down, row 0 = v 0), and the page of each triangle (kNone: dropped). For the exporter and the viewer.
-  struct InstanceUv {
-    std::vector<std::array<glm::vec2, 3>> corners;  ///< by triangle of the primitive
+  /// A few black texels, which all sides share that are seen and never lit. page kNone: there is no such side.
+  PagePlace black;
+  static constexpr std::uint32_t kBlackSide = 4;  ///< so many by so many, for mips and bilinear lookups
+
+  /// Lightmap coordinates of the imported vertices, for each side of the file's triangles: one for each corner of each
+  /// instance's triangles, in page UV [0, 1] (v down, row 0 = v 0), and the page of each triangle (kNone: it is
+  /// dropped, or nobody sees that side). For the exporter and the viewer.
+  struct SideUv {
+    std::vector<std::array<glm::vec2, 3>> corners;  ///< by triangle of the primitive; empty: as if all pages were kNone
     std::vector<std::uint32_t> page;                ///< by triangle of the primitive
+
+    [[nodiscard]] bool shows(std::size_t triangle) const { return triangle < page.size() && page[triangle] != kNone; }
+    bool operator==(const SideUv&) const = default;
+  };
+  struct InstanceUv {
+    std::array<SideUv, 2> side;  ///< front and back of the triangle in the file
+
+    bool operator==(const InstanceUv&) const = default;
   };
   std::vector<InstanceUv> instance_uvs;  ///< one for each Scene::instances entry
 
@@ -222,6 +247,7 @@ struct ChartOptions {
   double texel_size_m = 0.0;
   std::uint32_t max_page_size = 4096;
   std::uint32_t gutter = 2;       ///< empty texels between charts
+  Sky sky;                        ///< of a scene that names none
   double curve_angle_deg = 15.0;  ///< normal spread of a curved chart
 };
 

@@ -34,10 +34,10 @@ struct SquareScene {
     scene::Instance instance;
     instance.primitive = 0;
     scene.instances = {instance};
-    scene::PatchScene::InstanceUv uvs;
+    scene::PatchScene::SideUv uvs;
     uvs.corners = {{glm::vec2(0, 0), {1, 0}, {1, 1}}, {glm::vec2(0, 0), {1, 1}, {0, 1}}};
     uvs.page = {0, 0};
-    patches.instance_uvs = {uvs};
+    patches.instance_uvs = {{{uvs, {}}}};
     patches.pages = {{4, 4}};
     pages = {Image(4, 4, glm::vec3(kPi))};
     request.camera.yfov_rad = 2.0 * std::atan(0.5);
@@ -94,12 +94,18 @@ TEST_F(View, TheLightmapIsLookedUpBilinearlyAtTexelCentres) {
   }
 }
 
-TEST_F(View, BackFacesOfSingleSidedSurfacesAreNotDrawn) {
+TEST_F(View, ABackIsDrawnWithItsOwnTexelsOrNotAtAll) {
   SquareScene square;
   square.request.camera.world =
       glm::rotate(glm::dmat4(1.0), std::numbers::pi, glm::dvec3(0, 1, 0)) * square.request.camera.world;
   expectNear(picture(square).at(16, 16), glm::vec3(0.0F));
-  square.scene.materials[0].double_sided = true;
+  auto& uvs = square.patches.instance_uvs[0];
+  uvs.side[1] = uvs.side[0];
+  uvs.side[1].page = {1, 1};
+  square.patches.pages.push_back({4, 4});
+  square.pages.emplace_back(4, 4, glm::vec3(2.0F * kPi));
+  expectNear(picture(square).at(16, 16), {0.5F, 2.25F, 1.0F});
+  square.request.camera.world = glm::translate(glm::dmat4(1.0), glm::dvec3(0, 0, 1));
   expectNear(picture(square).at(16, 16), {0.25F, 2.125F, 0.5F});
 }
 

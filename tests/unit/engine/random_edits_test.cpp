@@ -143,12 +143,14 @@ std::vector<std::vector<double>> texelAreas(const scene::PatchScene& patches) {
   std::vector<std::vector<double>> areas;
   for (const auto& page : patches.pages) areas.emplace_back(std::size_t{page.width} * page.height, 0.0);
   for (const auto& surface : patches.surfaces) {
-    const auto& page = patches.pages[surface.page];
-    for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf) {
-      const auto x = surface.page_x + leaf % surface.width, y = surface.page_y + leaf / surface.width;
-      for (const auto first : surface.first_node) {
-        if (first != scene::kNone)
-          areas[surface.page][std::size_t{y} * page.width + x] += static_cast<double>(patches.node_area[first + leaf]);
+    for (std::size_t side = 0; side < 2; ++side) {
+      const auto first = surface.first_node[side];
+      if (first == scene::kNone) continue;
+      const auto& place = surface.place[side];
+      for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf) {
+        const auto x = place.x + leaf % surface.width, y = place.y + leaf / surface.width;
+        areas[place.page][std::size_t{y} * patches.pages[place.page].width + x] +=
+            static_cast<double>(patches.node_area[first + leaf]);
       }
     }
   }

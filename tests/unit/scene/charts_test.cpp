@@ -300,8 +300,8 @@ TEST(Charts, DegenerateTrianglesAreDroppedAndCounted) {
   expectSound(patches);
   EXPECT_EQ(patches.triangles_dropped, 4U);
   EXPECT_NEAR(leafArea(patches), 1.0, 1e-6);
-  EXPECT_EQ(patches.instance_uvs[0].page[2], kNone);
-  EXPECT_EQ(patches.instance_uvs[0].page[0], 0U);
+  EXPECT_EQ(patches.instance_uvs[0].side[0].page[2], kNone);
+  EXPECT_EQ(patches.instance_uvs[0].side[0].page[0], 0U);
 }
 
 TEST(Charts, SliverOfAMillionToOneKeepsItsArea) {
@@ -390,13 +390,14 @@ TEST(Charts, ChartsOnAPageKeepTheirDistance) {
     }
     for (std::size_t a = 0; a < patches.surfaces.size(); ++a) {
       const Surface& s = patches.surfaces[a];
-      EXPECT_LE(s.page_x + s.width, patches.pages[s.page].width);
-      EXPECT_LE(s.page_y + s.height, patches.pages[s.page].height);
+      EXPECT_LE(s.place[0].x + s.width, patches.pages[s.place[0].page].width);
+      EXPECT_LE(s.place[0].y + s.height, patches.pages[s.place[0].page].height);
       for (std::size_t b = a + 1; b < patches.surfaces.size(); ++b) {
         const Surface& t = patches.surfaces[b];
-        if (s.page != t.page) continue;
-        const bool apart = s.page_x + s.width + gutter <= t.page_x || t.page_x + t.width + gutter <= s.page_x ||
-                           s.page_y + s.height + gutter <= t.page_y || t.page_y + t.height + gutter <= s.page_y;
+        if (s.place[0].page != t.place[0].page) continue;
+        const bool apart =
+            s.place[0].x + s.width + gutter <= t.place[0].x || t.place[0].x + t.width + gutter <= s.place[0].x ||
+            s.place[0].y + s.height + gutter <= t.place[0].y || t.place[0].y + t.height + gutter <= s.place[0].y;
         EXPECT_TRUE(apart) << a << " and " << b;
       }
     }
@@ -438,7 +439,7 @@ TEST(Charts, ValidLightmapUvsAreUsedAsTheyAre) {
   EXPECT_NEAR(leafArea(patches), 1.0, 1e-6);
   EXPECT_NEAR(static_cast<double>(coveredLeaves(patches)), 400.0, 41.0);
   // Affine to the file's own: equal edges stay equal and aligned.
-  const auto& uv = patches.instance_uvs[0].corners[0];
+  const auto& uv = patches.instance_uvs[0].side[0].corners[0];
   EXPECT_FLOAT_EQ(uv[0].x, uv[1].x);
   EXPECT_FLOAT_EQ(uv[1].y, uv[2].y);
 }
@@ -467,8 +468,8 @@ TEST(Charts, InstancesOfOneLightmappedMeshGetTheirOwnRegions) {
   const PatchScene patches = build(scene, 400);
   ASSERT_EQ(patches.surfaces.size(), 2U);
   const Surface &a = patches.surfaces[0], &b = patches.surfaces[1];
-  EXPECT_TRUE(a.page_x + a.width <= b.page_x || b.page_x + b.width <= a.page_x || a.page_y + a.height <= b.page_y ||
-              b.page_y + b.height <= a.page_y);
+  EXPECT_TRUE(a.place[0].x + a.width <= b.place[0].x || b.place[0].x + b.width <= a.place[0].x ||
+              a.place[0].y + a.height <= b.place[0].y || b.place[0].y + b.height <= a.place[0].y);
 }
 
 TEST(Charts, ATexelScaleMakesOneInstanceFinerAndLeavesTheOthers) {

@@ -48,15 +48,16 @@ PatchScene successor(const Scene& before, const PatchScene& patches, const Scene
 }
 
 bool overlap(const Surface& a, const Surface& b) {
-  return a.page == b.page && a.page_x < b.page_x + b.width && b.page_x < a.page_x + a.width &&
-         a.page_y < b.page_y + b.height && b.page_y < a.page_y + a.height;
+  return a.place[0].page == b.place[0].page && a.place[0].x < b.place[0].x + b.width &&
+         b.place[0].x < a.place[0].x + a.width && a.place[0].y < b.place[0].y + b.height &&
+         b.place[0].y < a.place[0].y + a.height;
 }
 
 void expectDisjoint(const PatchScene& patches) {
   for (std::size_t a = 0; a < patches.surfaces.size(); ++a) {
     const auto& surface = patches.surfaces[a];
-    EXPECT_LE(surface.page_x + surface.width, patches.pages[surface.page].width);
-    EXPECT_LE(surface.page_y + surface.height, patches.pages[surface.page].height);
+    EXPECT_LE(surface.place[0].x + surface.width, patches.pages[surface.place[0].page].width);
+    EXPECT_LE(surface.place[0].y + surface.height, patches.pages[surface.place[0].page].height);
     for (std::size_t b = a + 1; b < patches.surfaces.size(); ++b) EXPECT_FALSE(overlap(surface, patches.surfaces[b]));
   }
 }
@@ -72,8 +73,8 @@ TEST(Lineage, WhatMovesKeepsItsPlaceOnThePageAndAllElseIsTheSame) {
   for (std::uint32_t s = 0; s < 4; ++s) {
     EXPECT_EQ(map.surface_before[s], s);
     EXPECT_EQ(map.moved[s], s == 2);
-    EXPECT_EQ(moved.surfaces[s].page_x, patches.surfaces[s].page_x);
-    EXPECT_EQ(moved.surfaces[s].page_y, patches.surfaces[s].page_y);
+    EXPECT_EQ(moved.surfaces[s].place[0].x, patches.surfaces[s].place[0].x);
+    EXPECT_EQ(moved.surfaces[s].place[0].y, patches.surfaces[s].place[0].y);
   }
   ASSERT_FALSE(map.boxes.empty());
   for (const auto* scene : {&patches, &moved}) {
@@ -156,7 +157,7 @@ TEST(Lineage, ThereAndBackGivesTheSamePlaces) {
   const auto away = successor(before, patches, after);
   const auto back = successor(after, away, before);
   ASSERT_EQ(back.node_area, patches.node_area);
-  for (std::size_t s = 0; s < 4; ++s) EXPECT_EQ(back.surfaces[s].page_x, patches.surfaces[s].page_x);
+  for (std::size_t s = 0; s < 4; ++s) EXPECT_EQ(back.surfaces[s].place[0].x, patches.surfaces[s].place[0].x);
 }
 
 TEST(Lineage, PagesAreLaidOutAnewWhenHalfOfThemLiesIdleAndTexelsWhenTheyDoNotSuit) {

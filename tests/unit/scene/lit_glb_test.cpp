@@ -28,8 +28,8 @@ PatchScene patchesFor(const Scene& scene, std::uint32_t page_count) {
     PatchScene::InstanceUv uv;
     const auto triangles = scene.primitives[scene.instances[i].primitive].indices.size() / 3;
     for (std::size_t t = 0; t < triangles; ++t) {
-      uv.page.push_back(static_cast<std::uint32_t>(t) % page_count);
-      uv.corners.push_back({uvOf(i, t, 0), uvOf(i, t, 1), uvOf(i, t, 2)});
+      uv.side[0].page.push_back(static_cast<std::uint32_t>(t) % page_count);
+      uv.side[0].corners.push_back({uvOf(i, t, 0), uvOf(i, t, 1), uvOf(i, t, 2)});
     }
     patches.instance_uvs.push_back(std::move(uv));
   }
@@ -59,7 +59,7 @@ std::multiset<Corner> expected(const Scene& scene, const PatchScene& patches) {
     const auto& primitive = scene.primitives[scene.instances[i].primitive];
     for (std::size_t k = 0; k < primitive.indices.size(); ++k) {
       const auto position = scene.instances[i].world * glm::dvec4(primitive.positions[primitive.indices[k]], 1.0);
-      const auto& uv = patches.instance_uvs[i];
+      const auto& uv = patches.instance_uvs[i].side[0];
       out.insert({rounded(position), uv.corners[k / 3][k % 3], uv.page[k / 3]});
     }
   }
@@ -190,9 +190,10 @@ TEST(LitGlb, verticesAreSplitOnlyWhereUvsDiffer) {
   const auto scene = importScene(document).value();
   PatchScene patches;
   patches.pages.resize(1, {2, 2});
-  patches.instance_uvs.push_back(
-      {{{glm::vec2(0, 0), glm::vec2(1, 0), glm::vec2(1, 1)}, {glm::vec2(0, 0), glm::vec2(1, 1), glm::vec2(0, 1)}},
-       {0, 0}});
+  const PatchScene::SideUv uv{
+      {{glm::vec2(0, 0), glm::vec2(1, 0), glm::vec2(1, 1)}, {glm::vec2(0, 0), glm::vec2(1, 1), glm::vec2(0, 1)}},
+      {0, 0}};
+  patches.instance_uvs.push_back({{uv, {}}});
   const auto lit = withLightmapUvs(document, scene, patches);
   EXPECT_EQ(importScene(*lit)->primitives.at(0).positions.size(), 4U);
 }
@@ -241,7 +242,7 @@ TEST(LitGlb, unlitShowsThePages) {
   const auto shown = importScene(*read);
   ASSERT_TRUE(shown) << shown.error().text();
   const auto& material = shown->materials.at(shown->primitives.at(0).material);
-  EXPECT_TRUE(material.double_sided);
+  EXPECT_FALSE(material.double_sided) << "each side that is seen is there by itself";
   EXPECT_EQ(material.base_color_texture.texcoord, 1);
   const auto& texture = shown->textures.at(material.base_color_texture.texture);
   EXPECT_EQ(texture.rgba[0], 255);

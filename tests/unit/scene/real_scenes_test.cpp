@@ -32,8 +32,8 @@ void expectUsable(const Scene& scene, const PatchScene& patches) {
   EXPECT_GE(front, area * 0.5) << "more than half of the scene is buried";
   for (const float a : patches.node_area) ASSERT_TRUE(std::isfinite(a) && a >= 0.0F);
   for (const Surface& s : patches.surfaces) {
-    ASSERT_LE(s.page_x + s.width, patches.pages[s.page].width);
-    ASSERT_LE(s.page_y + s.height, patches.pages[s.page].height);
+    ASSERT_LE(s.place[0].x + s.width, patches.pages[s.place[0].page].width);
+    ASSERT_LE(s.place[0].y + s.height, patches.pages[s.place[0].page].height);
   }
   const PatchMaterials materials = shadePatches(scene, patches);
   for (std::uint32_t n = 0; n < patches.nodeCount(); ++n) {

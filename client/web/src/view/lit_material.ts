@@ -152,7 +152,8 @@ export class LitMaterial extends MeshLambertMaterial {
     this.own.diffuseScale.value = 1 - (pbr.metallicFactor ?? 1) * this.meanMetal;
     this.emissive.setRGB(...(gltf.emissiveFactor ?? [0, 0, 0]));
     this.emissiveIntensity = gltf.extensions?.KHR_materials_emissive_strength?.emissiveStrength ?? 1;
-    const side = gltf.doubleSided ? DoubleSide : FrontSide;
+    // What has a page is there once for each side that is seen; another choice of sides comes with geometry of its own.
+    const side = gltf.doubleSided && !this.page ? DoubleSide : FrontSide;
     if (side !== this.side) {
       this.side = side;
       this.needsUpdate = true;

@@ -1,0 +1,398 @@
+#include "server/scene/lit_sides.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numeric>
+
+#include "common/parallel.h"
+#include "server/scene/opacity.h"
+#include "server/scene/ray_tree.h"
+
+namespace radiosity::scene {
+namespace {
+
+constexpr float kFar = 4.0F;      ///< unit box; longer than its diagonal
+constexpr double kLift = 1.0e-5;  ///< unit box; rays start so far before their surface, well above rounding
+constexpr int kPhotons = 4096, kPhotonHops = 6;
+/// After eight diffuse bounces little light is left in any scene.
+constexpr int kHops = 8;
+constexpr int kMostSheets = 16;  ///< that a ray passes where one can see through
+constexpr std::uint32_t kFewestWalks = 12, kMostWalks = 1024;
+constexpr double kLeavesAWalk = 4.0;
+constexpr int kSealRays = 128;  ///< a part, at least, and two a group
+
+/// splitmix64 (Steele, Lea and Flood 2014).
+class Random {
+ public:
+  explicit Random(std::uint64_t seed) : state_(seed * 0x9E3779B97F4A7C15U) {}
+  double operator()() {
+    std::uint64_t z = state_ += 0x9E3779B97F4A7C15U;
+    z = (z ^ z >> 30U) * 0xBF58476D1CE4E5B9U;
+    z = (z ^ z >> 27U) * 0x94D049BB133111EBU;
+    return static_cast<double>((z ^ z >> 31U) >> 11U) * 0x1.0p-53;
+  }
+
+ private:
+  std::uint64_t state_;
+};
+
+glm::dvec3 perpendicular(const glm::dvec3& n) {
+  return glm::normalize(std::abs(n.x) < 0.6 ? glm::cross(n, glm::dvec3(1, 0, 0)) : glm::cross(n, glm::dvec3(0, 1, 0)));
+}
+
+/// About `axis`, by the cosine of the angle between the two.
+glm::dvec3 around(const glm::dvec3& axis, double cosine, double turn) {
+  const glm::dvec3 u = perpendicular(axis), v = glm::cross(axis, u);
+  const double sine = std::sqrt(std::max(0.0, 1.0 - cosine * cosine)), phi = 2.0 * M_PI * turn;
+  return axis * cosine + sine * (std::cos(phi) * u + std::sin(phi) * v);
+}
+
+bool isBright(const glm::vec3& light) { return light.r > 0.0F || light.g > 0.0F || light.b > 0.0F; }
+
+/// A place right before a side of a triangle.
+struct Place {
+  glm::dvec3 point, normal;
+  std::uint32_t triangle;
+};
+
+class Probe {
+ public:
+  Probe(const SideScene& scene, const std::vector<std::array<bool, 2>>& asked)
+      : scene_(scene), asked_(asked), tree_(Bvh(scene.triangles)), light_(scene.groups.size()) {
+    group_of_.resize(scene.triangles.size());
+    areas_.resize(scene.triangles.size());
+    for (std::uint32_t g = 0; g < scene.groups.size(); ++g) {
+      const auto& group = scene.groups[g];
+      double sum = 0.0;
+      for (auto t = group.first; t < group.first + group.count; ++t) {
+        group_of_[t] = g;
+        sum += areaOf(t);
+        areas_[t] = sum;
+        if (group.emits) lamps_.push_back(t);
+      }
+    }
+    double sum = 0.0;
+    for (const auto t : lamps_) lamp_areas_.push_back(sum += areaOf(t));
+  }
+
+  std::vector<std::array<SideLight, 2>> run() {
+    findSealed();
+    sendPhotons();
+    inTurns(scene_.groups.size(), [&](std::size_t g) {
+      for (std::uint32_t side = 0; side < 2; ++side) look(static_cast<std::uint32_t>(g), side);
+    });
+    std::vector<std::array<SideLight, 2>> result(scene_.groups.size(), {SideLight::kLit, SideLight::kLit});
+    for (std::size_t g = 0; g < result.size(); ++g)
+      for (std::size_t side = 0; side < 2; ++side)
+        if (asked_[g][side]) result[g][side] = light_[g][side];
+    return result;
+  }
+
+ private:
+  [[nodiscard]] double areaOf(std::uint32_t t) const {
+    const auto& c = scene_.triangles[t];
+    return 0.5 * static_cast<double>(glm::length(glm::cross(c[1] - c[0], c[2] - c[0])));
+  }
+  [[nodiscard]] glm::dvec3 normalOf(std::uint32_t t) const {
+    const auto& c = scene_.triangles[t];
+    const glm::dvec3 a(c[0]), n = glm::cross(glm::dvec3(c[1]) - a, glm::dvec3(c[2]) - a);
+    const double length = glm::length(n);
+    return length > 0.0 ? n / length : glm::dvec3(0.0, 1.0, 0.0);
+  }
+  [[nodiscard]] const SideScene::Group& groupOf(std::uint32_t t) const { return scene_.groups[group_of_[t]]; }
+
+  [[nodiscard]] Place placeOn(std::uint32_t triangle, std::uint32_t side, Random& random) const {
+    const auto& c = scene_.triangles[triangle];
+    const double root = std::sqrt(random()), v = random();
+    const glm::dvec3 point =
+        (1.0 - root) * glm::dvec3(c[0]) + root * (1.0 - v) * glm::dvec3(c[1]) + root * v * glm::dvec3(c[2]);
+    const glm::dvec3 normal = side == 0 ? normalOf(triangle) : -normalOf(triangle);
+    return {point + kLift * normal, normal, triangle};
+  }
+
+  [[nodiscard]] Place placeIn(const SideScene::Group& group, std::uint32_t side, Random& random) const {
+    const auto first = areas_.begin() + group.first, end = first + group.count;
+    const auto at = std::min(std::lower_bound(first, end, random() * *(end - 1)), end - 1);
+    return placeOn(static_cast<std::uint32_t>(at - areas_.begin()), side, random);
+  }
+
+  /// Past what one can see through by chance, one time in two.
+  [[nodiscard]] bool trace(const Place& from, const glm::dvec3& direction, Random& random, RayHit& hit) const {
+    glm::vec3 origin(from.point);
+    auto own = from.triangle;
+    for (int sheet = 0; sheet < kMostSheets; ++sheet) {
+      if (!tree_.nearestHit(origin, glm::vec3(direction), kFar, hit, {}, own)) return false;
+      if (!groupOf(hit.triangle).see_through || random() < 0.5) return true;
+      origin += static_cast<float>(hit.t) * glm::vec3(direction);
+      own = hit.triangle;
+    }
+    return true;
+  }
+
+  /// What one can see through hides nothing.
+  [[nodiscard]] bool isFree(const Place& from, const glm::dvec3& way, float reach) const {
+    glm::vec3 origin(from.point);
+    auto own = from.triangle;
+    RayHit hit{};
+    for (int sheet = 0; sheet < kMostSheets; ++sheet) {
+      if (!tree_.nearestHit(origin, glm::vec3(way), reach, hit, {}, own)) return true;
+      if (!groupOf(hit.triangle).see_through) return false;
+      origin += static_cast<float>(hit.t) * glm::vec3(way);
+      reach -= static_cast<float>(hit.t);
+      own = hit.triangle;
+    }
+    return false;
+  }
+
+  [[nodiscard]] std::uint32_t drawLamp(Random& random) const {
+    const auto at = std::ranges::lower_bound(lamp_areas_, random() * lamp_areas_.back());
+    return lamps_[std::min<std::size_t>(static_cast<std::size_t>(at - lamp_areas_.begin()), lamps_.size() - 1)];
+  }
+  [[nodiscard]] std::uint32_t drawLampSide(std::uint32_t lamp, Random& random) const {
+    return groupOf(lamp).double_sided && random() < 0.5 ? 1 : 0;
+  }
+
+  [[nodiscard]] bool seesLamp(const Place& at, Random& random) const {
+    const auto lamp = drawLamp(random);
+    const Place there = placeOn(lamp, drawLampSide(lamp, random), random);
+    const glm::dvec3 way = there.point - at.point;
+    if (glm::dot(way, at.normal) <= 0.0 || glm::dot(way, there.normal) >= 0.0) return false;
+    const double length = glm::length(way);
+    return length > 0.0 && isFree(at, way / length, static_cast<float>(length - kLift));
+  }
+
+  [[nodiscard]] bool seesLight(const Place& at, Random& random) const {
+    const auto& lights = scene_.lights;
+    const auto& light =
+        lights[std::min(static_cast<std::size_t>(random() * static_cast<double>(lights.size())), lights.size() - 1)];
+    if (light.kind == LightKind::kDirectional)
+      return glm::dot(light.direction, at.normal) < 0.0 && isFree(at, -light.direction, kFar);
+    const glm::dvec3 way = light.position - at.point;
+    const double length = glm::length(way);
+    if (!(length > 0.0) || glm::dot(way, at.normal) <= 0.0 || (light.range > 0.0 && length >= light.range))
+      return false;
+    if (light.kind == LightKind::kSpot && -glm::dot(way, light.direction) < length * std::cos(light.outer_cone_rad))
+      return false;
+    return isFree(at, way / length, static_cast<float>(length));
+  }
+
+  [[nodiscard]] bool skyShines(const glm::dvec3& direction) const {
+    return isBright(direction.y > 0.0 ? scene_.sky.upper : scene_.sky.lower);
+  }
+
+  /// Where a path that met a surface goes on: before the side that it came from. False: that side absorbs.
+  [[nodiscard]] bool goOn(const glm::dvec3& direction, const RayHit& hit, Place& at) const {
+    if (!hit.front && !groupOf(hit.triangle).double_sided) return false;
+    const glm::dvec3 normal = hit.front ? normalOf(hit.triangle) : -normalOf(hit.triangle);
+    at = {at.point + hit.t * direction + kLift * normal, normal, hit.triangle};
+    return true;
+  }
+
+  /// Whether a path from there comes to light. `open`: set where it leaves the scene.
+  [[nodiscard]] bool findsLight(Place at, Random& random, bool& open) const {
+    for (int hop = 0; hop < kHops; ++hop) {
+      if (!lamps_.empty() && seesLamp(at, random)) return true;
+      if (!scene_.lights.empty() && seesLight(at, random)) return true;
+      const auto direction = around(at.normal, std::sqrt(random()), random());
+      RayHit hit{};
+      if (!trace(at, direction, random, hit)) {
+        open = true;
+        return skyShines(direction);
+      }
+      const auto& group = groupOf(hit.triangle);
+      if (group.emits && (hit.front || group.double_sided)) return true;
+      if (!goOn(direction, hit, at)) return false;
+    }
+    return false;
+  }
+
+  /// Sides of parts from which one sees nothing but the same side of the same part: the inside of a closed solid.
+  void findSealed() {
+    std::uint32_t parts = 0;
+    for (const auto& group : scene_.groups) parts = std::max(parts, group.part + 1);
+    std::vector<std::vector<std::uint32_t>> groups(parts);
+    for (std::uint32_t g = 0; g < scene_.groups.size(); ++g) groups[scene_.groups[g].part].push_back(g);
+    sealed_.assign(parts, {false, false});
+    inTurns(parts, [&](std::size_t part) {
+      for (std::uint32_t side = 0; side < 2; ++side)
+        sealed_[part][side] = isSealed(static_cast<std::uint32_t>(part), groups[part], side);
+    });
+  }
+
+  [[nodiscard]] bool isSealed(std::uint32_t part, const std::vector<std::uint32_t>& groups, std::uint32_t side) const {
+    Random random(2 * std::uint64_t{part} + side + 1);
+    const auto rays = std::max<std::size_t>(2, kSealRays / std::max<std::size_t>(groups.size(), 1));
+    for (const auto g : groups) {
+      const auto& group = scene_.groups[g];
+      // Of a closed shell that shines all over the front is taken for the side that one sees.
+      if (!group.double_sided || group.see_through || (group.emits && side == 0)) return false;
+      for (std::size_t ray = 0; ray < rays; ++ray) {
+        const Place at = placeIn(group, side, random);
+        RayHit hit{};
+        const auto direction = around(at.normal, std::sqrt(random()), random());
+        if (!tree_.nearestHit(glm::vec3(at.point), glm::vec3(direction), kFar, hit, {}, at.triangle)) return false;
+        if (groupOf(hit.triangle).part != part || hit.front != (side == 0)) return false;
+      }
+    }
+    return !groups.empty();
+  }
+
+  void sendPhotons() {
+    const auto sources = (lamps_.empty() ? 0 : 1) + (scene_.lights.empty() ? 0 : 1);
+    if (sources == 0) return;
+    Random random(0x50A0);
+    for (int photon = 0; photon < kPhotons; ++photon) {
+      const bool from_lamp = !lamps_.empty() && (scene_.lights.empty() || photon % 2 == 0);
+      from_lamp ? sendFromLamp(random) : sendFromLight(random);
+    }
+  }
+
+  void sendFromLamp(Random& random) {
+    const auto lamp = drawLamp(random);
+    const auto side = drawLampSide(lamp, random);
+    if (sealed_[groupOf(lamp).part][side]) return;
+    const Place at = placeOn(lamp, side, random);
+    follow(at, around(at.normal, std::sqrt(random()), random()), random);
+  }
+
+  void sendFromLight(Random& random) {
+    const auto& lights = scene_.lights;
+    const auto& light =
+        lights[std::min(static_cast<std::size_t>(random() * static_cast<double>(lights.size())), lights.size() - 1)];
+    if (light.kind == LightKind::kDirectional) return;  // the paths that look for it find it
+    const bool spot = light.kind == LightKind::kSpot;
+    const double least = spot ? std::cos(std::min(light.outer_cone_rad, M_PI)) : -1.0;
+    const auto direction =
+        around(spot ? light.direction : glm::dvec3(0, 1, 0), 1.0 - random() * (1.0 - least), random());
+    follow({light.position, direction, kNone}, direction, random);
+  }
+
+  void follow(Place at, glm::dvec3 direction, Random& random) {
+    for (int hop = 0; hop < kPhotonHops; ++hop) {
+      RayHit hit{};
+      if (!trace(at, direction, random, hit) || !goOn(direction, hit, at)) return;
+      light_[group_of_[hit.triangle]][hit.front ? 0 : 1] = SideLight::kLit;
+      direction = around(at.normal, std::sqrt(random()), random());
+    }
+  }
+
+  void look(std::uint32_t g, std::uint32_t side) {
+    const auto& group = scene_.groups[g];
+    auto& light = light_[g][side];
+    if (!asked_[g][side] || light == SideLight::kLit || group.count == 0) return;
+    if (sealed_[group.part][side]) return;
+    if (group.emits) {
+      light = SideLight::kLit;
+      return;
+    }
+    const auto walks =
+        std::clamp(static_cast<std::uint32_t>(std::min(group.leaves, 1e6) / kLeavesAWalk), kFewestWalks, kMostWalks);
+    Random random((2 * std::uint64_t{g} + side + 1) << 20U);
+    bool open = false;
+    for (std::uint32_t walk = 0; walk < walks; ++walk) {
+      if (!findsLight(placeIn(group, side, random), random, open)) continue;
+      light = SideLight::kLit;
+      return;
+    }
+    light = open ? SideLight::kDark : SideLight::kSealed;
+  }
+
+  const SideScene& scene_;
+  const std::vector<std::array<bool, 2>>& asked_;
+  RayTree tree_;
+  std::vector<std::array<SideLight, 2>> light_;  ///< by group and side; first kSealed
+  std::vector<std::array<bool, 2>> sealed_;      ///< by part and side
+  std::vector<std::uint32_t> group_of_;          ///< by triangle
+  std::vector<double> areas_;                    ///< by triangle: of its group's up to and with it
+  std::vector<std::uint32_t> lamps_;             ///< triangles that shine
+  std::vector<double> lamp_areas_;               ///< likewise, summed up
+};
+
+const Material& materialOf(const Scene& scene, const Surface& surface) {
+  static const Material kDefault;
+  return surface.material < scene.materials.size() ? scene.materials[surface.material] : kDefault;
+}
+
+/// The surfaces of `patches` under the light of `scene`.
+SideScene sideSceneOf(const PatchScene& patches, const Scene& scene, const Sky& sky) {
+  SideScene sides;
+  sides.lights = lightsInUnitBox(scene, patches.centre, patches.scale);
+  sides.sky = sky;
+  sides.triangles.resize(patches.triangles.size());
+  for (std::size_t i = 0; i < patches.indices.size(); ++i)
+    sides.triangles[i / 3][i % 3] = patches.vertices[patches.indices[i]].position;
+  for (std::uint32_t s = 0; s < patches.surfaces.size(); ++s) {
+    const Surface& surface = patches.surfaces[s];
+    const Material& material = materialOf(scene, surface);
+    sides.groups.push_back({surface.first_triangle, surface.triangle_count, s, material.double_sided,
+                            surface.see_through, isBright(material.emission),
+                            static_cast<double>(surface.width) * surface.height});
+  }
+  return sides;
+}
+
+/// Whether `next` has a lamp, a light or a sky where `before` had none.
+bool shinesAnew(const Scene& before, const Sky& sky_before, const Scene& next, const Sky& sky_next) {
+  const auto kindled = [](const glm::vec3& was, const glm::vec3& is) { return !isBright(was) && isBright(is); };
+  if (kindled(sky_before.upper, sky_next.upper) || kindled(sky_before.lower, sky_next.lower)) return true;
+  for (std::size_t m = 0; m < next.materials.size(); ++m) {
+    const auto was = m < before.materials.size() ? before.materials[m].emission : glm::vec3(0.0F);
+    if (kindled(was, next.materials[m].emission)) return true;
+  }
+  return std::ranges::any_of(next.lights, [&](const PunctualLight& light) {
+    return isBright(light.intensity) && std::ranges::none_of(before.lights, [&](PunctualLight old) {
+             const bool shone = isBright(old.intensity);
+             old.intensity = light.intensity;
+             return shone && old == light;
+           });
+  });
+}
+
+}  // namespace
+
+bool shineElsewhere(const Scene& before, const Sky& sky_before, const Scene& next, const Sky& sky_next) {
+  return shinesAnew(before, sky_before, next, sky_next) || shinesAnew(next, sky_next, before, sky_before);
+}
+
+bool SideScene::shines() const {
+  return isBright(sky.upper) || isBright(sky.lower) || !lights.empty() ||
+         std::ranges::any_of(groups, [](const Group& group) { return group.emits; });
+}
+
+std::vector<std::array<SideLight, 2>> lightOnSides(const SideScene& scene,
+                                                   const std::vector<std::array<bool, 2>>& asked) {
+  if (!scene.shines()) return {scene.groups.size(), {SideLight::kLit, SideLight::kLit}};
+  return Probe(scene, asked).run();
+}
+
+std::vector<PunctualLight> lightsInUnitBox(const Scene& scene, const glm::dvec3& centre, double scale) {
+  std::vector<PunctualLight> lights;
+  for (PunctualLight light : scene.lights) {
+    if (!isBright(light.intensity)) continue;
+    light.position = (light.position - centre) / scale;
+    light.range /= scale;
+    lights.push_back(light);
+  }
+  return lights;
+}
+
+bool reachesDarkSides(const PatchScene& patches, const Scene& before, const Sky& sky_before, const Scene& next,
+                      const Sky& sky_next) {
+  std::vector<std::array<bool, 2>> asked(patches.surfaces.size(), {false, false});
+  bool any = false;
+  for (std::size_t s = 0; s < asked.size(); ++s) {
+    const Surface& surface = patches.surfaces[s];
+    if (!materialOf(next, surface).double_sided) continue;
+    asked[s][1] = surface.first_node[1] == kNone;
+    any |= asked[s][1];
+  }
+  if (!any || !shinesAnew(before, sky_before, next, sky_next)) return false;
+  const auto sides = sideSceneOf(patches, next, sky_next);
+  const auto light = lightOnSides(sides, asked);
+  for (std::size_t s = 0; s < asked.size(); ++s)
+    if (asked[s][1] && light[s][1] == SideLight::kLit) return true;
+  return false;
+}
+
+}  // namespace radiosity::scene

@@ -1,0 +1,59 @@
+// Which sides of double-sided surfaces light can reach: only those get patches and texels. Exporters mark every wall
+// double-sided, although one side of it faces the room and the other the void; without this, such a room would cost
+// twice the texels of its single-sided twin. A step of buildPatchScene (charts.h). Plain values, any thread.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "server/scene/bvh.h"
+#include "server/scene/patch_scene.h"
+
+namespace radiosity::scene {
+
+/// What a side of a surface can hope for.
+enum class SideLight : std::uint8_t {
+  kSealed,  ///< inside a closed solid: no light, and nobody looks at it
+  kDark,    ///< no light, but one sees it, such as the outside of a lit room
+  kLit,     ///< light may reach some of it
+};
+
+/// The scene as this test sees it: triangles in groups, which are charts, or surfaces.
+struct SideScene {
+  struct Group {
+    std::uint32_t first = 0, count = 0;  ///< triangles
+    std::uint32_t part = 0;              ///< groups with the same number hang together
+    bool double_sided = false, see_through = false, emits = false;
+    double leaves = 0.0;  ///< about; larger sides are looked at from more places
+  };
+  std::vector<Bvh::Triangle> triangles;  ///< unit box, counter-clockwise seen from the front; group after group
+  std::vector<Group> groups;
+  std::vector<PunctualLight> lights;  ///< positions and ranges in the unit box
+  Sky sky;
+
+  [[nodiscard]] bool shines() const;
+};
+
+/// By group and side; kLit for what is not asked, and everywhere in a scene without light. `asked`: by group and side.
+///
+/// Photons from the lamps mark what they meet. A side that none meets is looked at from random places: paths go from
+/// there through the open space, as light would come, until they see a lamp, the sun or the sky. Paths never cross a
+/// surface, so that a box that is sunk into a lit floor has a dark inside. A random test: what only a thousandth of a
+/// side receives may be missed. The same scene gives the same answer. Some milliseconds for a furnished room.
+[[nodiscard]] std::vector<std::array<SideLight, 2>> lightOnSides(const SideScene& scene,
+                                                                 const std::vector<std::array<bool, 2>>& asked);
+
+/// Whether light of `next`, or of the sky, reaches a side of `patches` that was left without patches because light of
+/// `before` did not. Both scenes have the geometry of `patches`. Nothing is traced unless `next` has a lamp or a sky
+/// that `before` has not.
+[[nodiscard]] bool reachesDarkSides(const PatchScene& patches, const Scene& before, const Sky& sky_before,
+                                    const Scene& next, const Sky& sky_next);
+
+/// Whether one of two scenes has a lamp, a light or a sky where the other has none.
+[[nodiscard]] bool shineElsewhere(const Scene& before, const Sky& sky_before, const Scene& next, const Sky& sky_next);
+
+/// The lights of a scene in the unit box of `centre` and `scale`.
+[[nodiscard]] std::vector<PunctualLight> lightsInUnitBox(const Scene& scene, const glm::dvec3& centre, double scale);
+
+}  // namespace radiosity::scene

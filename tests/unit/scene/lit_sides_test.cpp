@@ -1,0 +1,266 @@
+// Which sides of double-sided surfaces get texels, and what files and pages make of them.
+#include "server/scene/lit_sides.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <glm/gtc/matrix_transform.hpp>
+
+#include "server/scene/lightmap.h"
+#include "tests/unit/scene/built_scene.h"
+#include "tests/unit/scene/gltf_builder.h"
+#include "tests/unit/scene/shapes.h"
+
+namespace radiosity::scene {
+namespace {
+
+using test::addQuad;
+using test::build;
+
+Material sheet() {
+  Material material;
+  material.double_sided = true;
+  return material;
+}
+
+/// A room of 4 x 3 x 5 m with a lamp below its ceiling. Instance 0 is the room, 1 the lamp.
+Scene litRoom(bool inward) {
+  Scene scene;
+  test::place(scene, test::box({0, 0, 0}, {4, 3, 5}, inward), glm::dmat4(1.0), sheet());
+  Primitive lamp;
+  addQuad(lamp, {1.5, 2.9, 2}, {2.5, 2.9, 2}, {2.5, 2.9, 3}, {1.5, 2.9, 3});
+  Material glow;
+  glow.emission = glm::vec3(100.0F);
+  test::place(scene, std::move(lamp), glm::dmat4(1.0), glow);
+  return scene;
+}
+
+std::vector<const Surface*> surfacesOf(const PatchScene& patches, std::uint32_t instance) {
+  std::vector<const Surface*> some;
+  for (const Surface& surface : patches.surfaces)
+    if (surface.instance == instance) some.push_back(&surface);
+  return some;
+}
+
+glm::vec3 normalOf(const PatchScene& patches, const Surface& surface) {
+  return patches.triangles[surface.first_triangle].normal;
+}
+
+glm::vec3 middleOf(const Surface& surface) { return 0.5F * (surface.bounds_min + surface.bounds_max); }
+
+/// Of the unit box, which is around the room.
+bool facesInward(const PatchScene& patches, const Surface& surface) {
+  return glm::dot(normalOf(patches, surface), middleOf(surface)) < 0.0F;
+}
+
+TEST(LitSides, outsideOfALitRoomSharesBlackTexels) {
+  const PatchScene patches = build(litRoom(true), 1000);
+  ASSERT_NE(patches.black.page, kNone);
+  for (const Surface* wall : surfacesOf(patches, 0)) {
+    EXPECT_FALSE(wall->flipped);
+    EXPECT_NE(wall->first_node[0], kNone);
+    EXPECT_EQ(wall->first_node[1], kNone);
+    EXPECT_EQ(wall->place[1].page, kNone);
+    EXPECT_TRUE(wall->shows_back);
+  }
+  const Page& page = patches.pages[patches.black.page];
+  const glm::vec2 black = (glm::vec2(patches.black.x, patches.black.y) + 0.5F * PatchScene::kBlackSide) /
+                          glm::vec2(page.width, page.height);
+  const auto& outside = patches.instance_uvs[0].side[1];
+  ASSERT_EQ(outside.page.size(), 12U);
+  for (std::size_t t = 0; t < 12; ++t) {
+    EXPECT_EQ(outside.page[t], patches.black.page);
+    for (const auto& uv : outside.corners[t]) EXPECT_EQ(uv, black);
+  }
+}
+
+TEST(LitSides, aRoomTurnedInsideOutHasItsTexelsInside) {
+  const PatchScene twin = build(litRoom(true), 1000), patches = build(litRoom(false), 1000);
+  ASSERT_EQ(surfacesOf(patches, 0).size(), 6U);
+  for (const Surface* wall : surfacesOf(patches, 0)) {
+    EXPECT_TRUE(wall->flipped);
+    EXPECT_TRUE(facesInward(patches, *wall));
+    EXPECT_EQ(wall->first_node[1], kNone);
+  }
+  EXPECT_NEAR(test::areaOf(patches, 0, 0), test::areaOf(twin, 0, 0), 1e-3);
+  // The back of the file's triangles has the texels, their front is black.
+  const auto& uvs = patches.instance_uvs[0];
+  for (std::size_t t = 0; t < 12; ++t) {
+    EXPECT_EQ(uvs.side[0].corners[t][0], uvs.side[0].corners[t][1]);
+    EXPECT_NE(uvs.side[1].corners[t][0], uvs.side[1].corners[t][1]);
+  }
+}
+
+TEST(LitSides, nobodySeesTheInsideOfABox) {
+  for (const double sunk : {0.0, 0.3}) {  // into the floor
+    Scene scene = litRoom(true);
+    test::place(scene, test::box({1, -sunk, 1}, {2, 1 - sunk, 2}), glm::dmat4(1.0), sheet());
+    const PatchScene patches = build(scene, 1000);
+    for (const Surface* face : surfacesOf(patches, 2)) {
+      EXPECT_EQ(face->first_node[1], kNone) << sunk;
+      EXPECT_FALSE(facesInward(patches, *face) && face->flipped) << sunk;
+    }
+    const auto& inside = patches.instance_uvs[2].side[1];
+    const auto shown = std::ranges::count_if(inside.page, [](std::uint32_t page) { return page != kNone; });
+    // The underside of a box that reaches through the floor is seen from below it.
+    EXPECT_LE(shown, sunk > 0.0 ? 10 : 2);
+  }
+}
+
+TEST(LitSides, aPartitionHasTexelsOnBothSides) {
+  Scene scene = litRoom(true);
+  Primitive screen;
+  addQuad(screen, {1, 0, 1}, {3, 0, 1}, {3, 2, 1}, {1, 2, 1});
+  test::place(scene, std::move(screen), glm::dmat4(1.0), sheet());
+  const PatchScene patches = build(scene, 1000);
+  const auto sides = surfacesOf(patches, 2);
+  ASSERT_EQ(sides.size(), 1U);
+  EXPECT_NE(sides[0]->first_node[1], kNone);
+  EXPECT_NE(sides[0]->place[0], sides[0]->place[1]);
+  EXPECT_EQ(patches.instance_uvs[2].side[1].page.size(), 2U);
+}
+
+TEST(LitSides, aShiningBoxKeepsItsFronts) {
+  for (const bool inward : {true, false}) {
+    Scene scene;
+    Material glow = sheet();
+    glow.emission = glm::vec3(1.0F);
+    test::place(scene, test::box({0, 0, 0}, {1, 1, 1}, inward), glm::dmat4(1.0), glow);
+    for (const Surface& face : build(scene, 100).surfaces) {
+      EXPECT_FALSE(face.flipped);
+      EXPECT_NE(face.first_node[0], kNone);
+    }
+  }
+}
+
+TEST(LitSides, singleSidedScenesAreLeftAlone) {
+  Scene scene = litRoom(true);
+  scene.materials[0].double_sided = false;
+  const PatchScene patches = build(scene, 1000);
+  EXPECT_EQ(patches.black.page, kNone);
+  for (const Surface& surface : patches.surfaces) EXPECT_FALSE(surface.shows_back || surface.flipped);
+  EXPECT_TRUE(patches.instance_uvs[0].side[1].page.empty());
+}
+
+/// The double-sided room is, patch by patch, the single-sided one: it costs as much.
+TEST(LitSides, aDoubleSidedRoomHasThePatchesOfItsTwin) {
+  Scene twin = litRoom(true);
+  twin.materials[0].double_sided = false;
+  EXPECT_EQ(build(litRoom(true), 1000).nodeCount(), build(twin, 1000).nodeCount());
+}
+
+TEST(LitSides, lightThatComesLaterNeedsNewTexels) {
+  const Scene scene = litRoom(true);
+  const PatchScene patches = build(scene, 1000);
+  const auto reaches = [&](const Scene& next, const Sky& sky = {}) {
+    return reachesDarkSides(patches, scene, {}, next, sky);
+  };
+  EXPECT_FALSE(reaches(scene));
+  Scene brighter = scene;
+  brighter.materials[1].emission = glm::vec3(500.0F, 1.0F, 1.0F);
+  EXPECT_FALSE(reaches(brighter));
+  Scene inside = scene;
+  inside.lights.push_back({});
+  inside.lights[0].position = {2, 1, 2};
+  inside.lights[0].intensity = glm::vec3(10.0F);
+  EXPECT_FALSE(reaches(inside));
+  Scene outside = inside;
+  outside.lights[0].position = {2, 4, 2};
+  EXPECT_TRUE(reaches(outside));
+  EXPECT_TRUE(reaches(scene, {glm::vec3(1.0F), glm::vec3(0.0F)}));
+  Scene glowing = scene;
+  glowing.materials[0].emission = glm::vec3(1.0F);
+  EXPECT_TRUE(reaches(glowing));
+}
+
+TEST(LitSides, skyAndSunReachTheOutside) {
+  Scene sky = litRoom(true);
+  sky.sky = Sky{glm::vec3(100.0F), glm::vec3(0.0F)};
+  Scene sun = litRoom(true);
+  PunctualLight light;
+  light.kind = LightKind::kDirectional;
+  light.direction = glm::normalize(glm::dvec3(0.2, -1.0, 0.1));
+  light.intensity = glm::vec3(1000.0F);
+  sun.lights.push_back(light);
+  for (const Scene* scene : {&sky, &sun}) {
+    const PatchScene patches = build(*scene, 1000);
+    const auto walls = surfacesOf(patches, 0);
+    const auto top = std::ranges::find_if(walls, [](const Surface* s) { return middleOf(*s).y > 0.2F; });
+    ASSERT_NE(top, walls.end());
+    EXPECT_NE((*top)->first_node[1], kNone);
+  }
+}
+
+/// A square with everything a vertex can have, double-sided, under a light above and one below.
+Document squareBetweenLights(test::GltfBuilder& builder) {
+  using nlohmann::json;
+  const auto mesh = builder.square();
+  auto& primitive = builder.gltf["meshes"][mesh]["primitives"][0];
+  primitive["attributes"]["NORMAL"] = builder.vec3({0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1});
+  primitive["material"] = 0;
+  builder.gltf["materials"] = json::array({{{"doubleSided", true}}});
+  builder.gltf["extensionsUsed"] = json::array({"KHR_lights_punctual"});
+  builder.gltf["extensions"]["KHR_lights_punctual"]["lights"] =
+      json::array({{{"type", "point"}, {"intensity", 10.0}}});
+  builder.node({{"mesh", mesh}});
+  for (const double z : {1.0, -1.0})
+    builder.node({{"translation", {0.5, 0.5, z}}, {"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}});
+  return *builder.document();
+}
+
+TEST(LitSides, theLitFileHasAFrontAndAFlippedCopy) {
+  test::GltfBuilder builder;
+  const Document document = squareBetweenLights(builder);
+  const Scene scene = importScene(document).value();
+  const PatchScene patches = build(scene, 64);
+  const auto lit = withLightmapUvs(document, scene, patches);
+  ASSERT_TRUE(lit) << lit.error().text();
+  const auto& primitives = lit->gltf["meshes"][0]["primitives"];
+  ASSERT_EQ(primitives.size(), 2U);
+  EXPECT_FALSE(primitives[0]["extras"].contains("lightmapSide"));
+  EXPECT_EQ(primitives[1]["extras"]["lightmapSide"], "back");
+  EXPECT_FALSE(lit->gltf["materials"][0].value("doubleSided", false));
+  EXPECT_TRUE(document.gltf["materials"][0]["doubleSided"].get<bool>()) << "what clients edit stays as it is";
+  const Scene read = importScene(*lit).value();
+  ASSERT_EQ(read.primitives.size(), 2U);
+  const auto facing = [&](std::size_t p) {
+    const Primitive& primitive = read.primitives[p];
+    const auto at = [&](std::size_t k) { return primitive.positions[primitive.indices[k]]; };
+    return glm::cross(at(1) - at(0), at(2) - at(0)).z;
+  };
+  EXPECT_GT(facing(0), 0.0);
+  EXPECT_LT(facing(1), 0.0);
+  const auto normals = read.primitives[1].normals;
+  for (const auto& normal : normals) EXPECT_EQ(normal, glm::vec3(0, 0, -1));
+  EXPECT_NE(read.primitives[0].texcoord1, read.primitives[1].texcoord1);
+}
+
+TEST(LitSides, whatIsHiddenKeepsItsDoubleSidedMaterial) {
+  test::GltfBuilder builder;
+  squareBetweenLights(builder);
+  const auto other = builder.square();
+  builder.gltf["meshes"][other]["primitives"][0]["material"] = 0;
+  const auto node = builder.node({{"mesh", other}});
+  builder.gltf["nodes"][node]["extensions"]["KHR_node_visibility"]["visible"] = false;
+  builder.gltf["extensionsUsed"].push_back("KHR_node_visibility");
+  const Document document = *builder.document();
+  const Scene scene = importScene(document).value();
+  const auto lit = withLightmapUvs(document, scene, build(scene, 64)).value();
+  const auto material = lit.gltf["meshes"][other]["primitives"][0]["material"].get<std::size_t>();
+  EXPECT_NE(material, 0U);
+  EXPECT_TRUE(lit.gltf["materials"][material]["doubleSided"].get<bool>());
+}
+
+TEST(LitSides, blackTexelsStayBlackInCoarserMips) {
+  const PatchScene patches = build(litRoom(true), 1000);
+  std::vector<glm::vec3> values(patches.nodeCount(), glm::vec3(100.0F));
+  auto page = assemblePages(patches, values).at(patches.black.page);
+  for (int mip = 0; mip < 2; ++mip) {
+    const auto at = [&](std::uint32_t from) { return static_cast<int>((from + PatchScene::kBlackSide / 2) >> mip); };
+    EXPECT_EQ(page.irradiance.at(at(patches.black.x), at(patches.black.y)), glm::vec3(0.0F)) << mip;
+    page = coarserMip(page);
+  }
+}
+
+}  // namespace
+}  // namespace radiosity::scene
