@@ -20,6 +20,9 @@ constexpr int kHops = 8;
 constexpr int kMostSheets = 16;  ///< that a ray passes where one can see through
 constexpr std::uint32_t kFewestWalks = 12, kMostWalks = 1024;
 constexpr double kLeavesAWalk = 4.0;
+/// In all, about: a scene of a million loose double-sided faces takes seconds, and its sides are looked at from two
+/// places each.
+constexpr double kMostRays = 8e6;
 constexpr int kSealRays = 128;  ///< a part, at least, and two a group
 
 /// splitmix64 (Steele, Lea and Flood 2014).
@@ -72,6 +75,8 @@ class Probe {
         if (group.emits) lamps_.push_back(t);
       }
     }
+    const double sides = 2.0 * static_cast<double>(scene.groups.size()), rays_a_walk = 2.0 * kHops;
+    walks_allowed_ = static_cast<std::uint32_t>(std::clamp(kMostRays / rays_a_walk / std::max(sides, 1.0), 2.0, 1e6));
     double sum = 0.0;
     for (const auto t : lamps_) lamp_areas_.push_back(sum += areaOf(t));
   }
@@ -286,8 +291,9 @@ class Probe {
       light = SideLight::kLit;
       return;
     }
-    const auto walks =
-        std::clamp(static_cast<std::uint32_t>(std::min(group.leaves, 1e6) / kLeavesAWalk), kFewestWalks, kMostWalks);
+    const auto walks = std::min(
+        walks_allowed_,
+        std::clamp(static_cast<std::uint32_t>(std::min(group.leaves, 1e6) / kLeavesAWalk), kFewestWalks, kMostWalks));
     Random random((2 * std::uint64_t{g} + side + 1) << 20U);
     bool open = false;
     for (std::uint32_t walk = 0; walk < walks; ++walk) {
@@ -307,6 +313,7 @@ class Probe {
   std::vector<double> areas_;                    ///< by triangle: of its group's up to and with it
   std::vector<std::uint32_t> lamps_;             ///< triangles that shine
   std::vector<double> lamp_areas_;               ///< likewise, summed up
+  std::uint32_t walks_allowed_ = kMostWalks;     ///< from a side
 };
 
 const Material& materialOf(const Scene& scene, const Surface& surface) {
