@@ -264,7 +264,9 @@ class Reader {
       triangle.reflectance *= glm::dvec3(colour[0]);
       if (triangle.see_through) triangle.alpha *= colour[0].w;
     }
-    triangle.reflectance = glm::min(triangle.reflectance, glm::dvec3(kMostReflectance));
+    // What varies is bounded where it is read.
+    if (!triangle.coloured && triangle.base_colour.texture < 0)
+      triangle.reflectance = glm::min(triangle.reflectance, glm::dvec3(kMostReflectance));
     scene_.triangles.push_back(triangle);
   }
 
