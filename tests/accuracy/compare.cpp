@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
-#include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
@@ -20,8 +18,16 @@ constexpr double kWholeTexel = 0.999;
 /// Dividing reflected light by less than this would amplify rounding.
 constexpr double kLeastReflectance = 0.01;
 
-std::vector<Texel> chooseTexels(const LitScene& lit, const ReferenceOptions& options) {
+/// Whole ones, drawn at random; `cut_area`: the share of all texels' area that lies in others.
+std::vector<Texel> chooseTexels(const LitScene& lit, const ReferenceOptions& options, double& cut_area) {
   auto texels = findTexels(lit);
+  double all = 0.0, cut = 0.0;
+  for (const auto& texel : texels) {
+    const double area = texel.footprint.area();
+    all += area;
+    if (texel.coverage < kWholeTexel) cut += area;
+  }
+  cut_area = all > 0.0 ? cut / all : 0.0;
   std::erase_if(texels, [](const Texel& texel) { return texel.coverage < kWholeTexel; });
   if (options.texels == 0 || texels.size() <= options.texels) return texels;
   oracle::Random random(options.seed);
@@ -33,86 +39,67 @@ std::vector<Texel> chooseTexels(const LitScene& lit, const ReferenceOptions& opt
   return texels;
 }
 
-struct SurfacePoint {
-  Reference::Point where;
-  oracle::Footprint footprint;
-};
-
-/// Points spread evenly over the area of all lit triangles.
-std::vector<SurfacePoint> choosePoints(const LitScene& lit, const ReferenceOptions& options) {
-  std::vector<double> cumulative;
-  double sum = 0.0;
-  for (const auto& triangle : lit.scene.triangles) {
-    cumulative.push_back(sum += triangle.lightmap_page >= 0 ? oracle::area(triangle) : 0.0);
-  }
-  oracle::Random random(options.seed + 1);
-  std::vector<SurfacePoint> points;
-  for (std::size_t i = 0; i < options.points && sum > 0.0; ++i) {
-    const double target = (static_cast<double>(i) + random.uniform()) / static_cast<double>(options.points) * sum;
-    const auto found = std::upper_bound(cumulative.begin(), cumulative.end() - 1, target);
-    const auto index = static_cast<std::uint32_t>(found - cumulative.begin());
-    const auto& triangle = lit.scene.triangles[index];
-    const double root = std::sqrt(random.uniform());
-    const double v = random.uniform();
-    const auto mix = [&](const auto& c) { return c[0] * (1.0 - root) + c[1] * (root * (1.0 - v)) + c[2] * (root * v); };
-    SurfacePoint point{{triangle.lightmap_page, mix(triangle.lightmap_uv), {}}, {}};
-    point.footprint = oracle::Footprint::at(mix(triangle.corners), triangle.normal);
-    point.footprint.pieces[0].triangle = index;
-    if (triangle.double_sided) {
-      auto back = point.footprint.pieces[0];
-      back.normal = -back.normal;
-      point.footprint.pieces.push_back(back);
-    }
-    points.push_back(std::move(point));
-  }
-  return points;
-}
-
-template <typename Item>
-std::vector<oracle::Irradiance> trace(const oracle::PathTracer& tracer, const std::vector<Item>& items,
-                                      std::uint32_t samples, std::uint64_t seed) {
+void addTexels(const LitScene& lit, const ReferenceOptions& options, Reference& reference) {
+  const auto texels = chooseTexels(lit, options, reference.cut_area);
   std::vector<oracle::Footprint> footprints;
-  footprints.reserve(items.size());
-  for (const auto& item : items) footprints.push_back(item.footprint);
-  return tracer.irradiance(footprints, {.samples = samples, .seed = seed});
+  footprints.reserve(texels.size());
+  for (const auto& texel : texels) footprints.push_back(texel.footprint);
+  const auto means = oracle::PathTracer(lit.traced())
+                         .irradiance(footprints, {.samples = options.texel_samples, .seed = options.seed + 2});
+  double hidden = 0.0, all = 0.0;
+  for (std::size_t i = 0; i < texels.size(); ++i) {
+    const auto& texel = texels[i];
+    const double whole = texel.footprint.area(), area = whole * means[i].visible_fraction;
+    all += whole;
+    if (means[i].visible_fraction < kLeastVisible) {
+      hidden += whole;
+      continue;
+    }
+    const bool plain =
+        means[i].visible_fraction > kWholeTexel && !texel.two_sided && texel.least_reflectance >= kLeastReflectance;
+    reference.texels.push_back({texel.page, texel.x, texel.y, texel.back, area, plain, means[i]});
+  }
+  reference.hidden_area = all > 0.0 ? (1.0 - reference.cut_area) * hidden / all : 0.0;
 }
 
 /// Puts the exact value in place of every mean. What is buried or covered was found by tracing a few paths.
 void makeExact(const glm::dvec3& irradiance, Reference& reference) {
-  for (auto& texel : reference.texels) texel.irradiance = {irradiance, {}, texel.irradiance.visible_fraction};
-  for (auto& point : reference.points) point.irradiance = {irradiance, {}, point.irradiance.visible_fraction};
+  const auto set = [&](oracle::Irradiance& mean) {
+    mean.mean_lux = irradiance;
+    mean.standard_error = glm::dvec3(0.0);
+  };
+  for (auto& texel : reference.texels) set(texel.irradiance);
+  for (auto& point : reference.points) set(point.irradiance);
   reference.exact = true;
 }
 
 }  // namespace
 
-Reference makeReference(const LitScene& lit, const ReferenceOptions& wanted) {
+Reference makePart(const LitScene& lit, const ReferenceOptions& wanted, ReferencePart part) {
   constexpr std::uint32_t kFewSamples = 64;
   auto options = wanted;
-  const auto exact = options.closed_form ? cavityIrradiance(lit.scene) : std::nullopt;
+  const auto exact = options.closed_form ? cavityIrradiance(lit.traced()) : std::nullopt;
   if (exact) options.texel_samples = options.point_samples = kFewSamples;
   const auto start = std::chrono::steady_clock::now();
-  const oracle::PathTracer tracer(lit.scene);
   Reference reference;
-  const auto texels = chooseTexels(lit, options);
-  const auto texel_means = trace(tracer, texels, options.texel_samples, options.seed + 2);
-  for (std::size_t i = 0; i < texels.size(); ++i) {
-    const auto& texel = texels[i];
-    if (texel_means[i].visible_fraction < kLeastVisible) continue;
-    const double area = texel.footprint.area() * texel_means[i].visible_fraction;
-    const bool plain = texel_means[i].visible_fraction > kWholeTexel && !texel.two_sided &&
-                       texel.least_reflectance >= kLeastReflectance;
-    reference.texels.push_back({texel.page, texel.x, texel.y, area, plain, texel_means[i]});
-  }
-  const auto points = choosePoints(lit, options);
-  const auto point_values = trace(tracer, points, options.point_samples, options.seed + 3);
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (!(point_values[i].visible_fraction > 0.0)) continue;
-    reference.points.push_back({points[i].where.page, points[i].where.uv, point_values[i]});
+  if (part == ReferencePart::kTexels) {
+    addTexels(lit, options, reference);
+  } else {
+    reference.points = makePoints(lit.traced(), options.points, options.point_samples, options.seed + 1);
   }
   if (exact) makeExact(*exact, reference);
   reference.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return reference;
+}
+
+Reference join(Reference texels, Reference points) {
+  texels.points = std::move(points.points);
+  texels.seconds += points.seconds;
+  return texels;
+}
+
+Reference makeReference(const LitScene& lit, const ReferenceOptions& options) {
+  return join(makePart(lit, options, ReferencePart::kTexels), makePart(lit, options, ReferencePart::kPoints));
 }
 
 oracle::ErrorMetrics measureTexels(const std::vector<Page>& pages, const Reference& reference, TexelChoice choice) {
@@ -127,12 +114,8 @@ oracle::ErrorMetrics measureTexels(const std::vector<Page>& pages, const Referen
 }
 
 Accuracy measure(const LitScene& lit, const Reference& reference) {
-  std::vector<oracle::Comparison> points;
-  for (const auto& point : reference.points) {
-    points.push_back({lit.pages.at(static_cast<std::size_t>(point.page)).bilinear(point.uv), point.irradiance.mean_lux,
-                      point.irradiance.standard_error, 1.0});
-  }
-  return {measureTexels(lit.pages, reference, TexelChoice::kAll), oracle::measureError(points)};
+  const auto surface = compareSurface(lit, reference.points);
+  return {surface.error, measureTexels(lit.pages, reference, TexelChoice::kAll), surface.total};
 }
 
 double undecidedArea(const Reference& reference) {

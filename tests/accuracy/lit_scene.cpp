@@ -16,14 +16,15 @@
 #include <stdexcept>
 #include <string>
 #include <tuple>
+#include <utility>
 
 namespace radiosity::accuracy {
 namespace {
 
-/// A corner of a clipped triangle: where on the page (texels) and where in the world.
+/// A corner of a clipped triangle: where on the page (texels), where in the world, and its shading normal.
 struct Corner {
   glm::dvec2 texel;
-  glm::dvec3 world;
+  glm::dvec3 world, shading;
 };
 using Polygon = std::vector<Corner>;
 
@@ -38,7 +39,7 @@ Polygon clip(const Polygon& polygon, int axis, double limit, double sign) {
     if (da >= 0.0) kept.push_back(a);
     if ((da > 0.0 && db < 0.0) || (da < 0.0 && db > 0.0)) {
       const double t = da / (da - db);
-      kept.push_back({glm::mix(a.texel, b.texel, t), glm::mix(a.world, b.world, t)});
+      kept.push_back({glm::mix(a.texel, b.texel, t), glm::mix(a.world, b.world, t), glm::mix(a.shading, b.shading, t)});
     }
   }
   return kept;
@@ -54,27 +55,39 @@ double texelArea(const Polygon& polygon) {
   return 0.5 * std::abs(twice);
 }
 
-void addPieces(Texel& texel, const Polygon& polygon, const oracle::Triangle& triangle, std::uint32_t index) {
+/// One side of a triangle of the lit file.
+struct Side {
+  const oracle::Triangle& triangle;
+  std::uint32_t traced;  ///< its place in the scene that light is traced in
+  bool back;
+};
+
+void addPieces(Texel& texel, const Polygon& polygon, const Side& side) {
   texel.coverage += texelArea(polygon);
-  const auto& rho = triangle.reflectance;
+  const auto& rho = side.triangle.reflectance;
   texel.least_reflectance = std::min({texel.least_reflectance, rho.x, rho.y, rho.z});
-  texel.node = triangle.node;
-  texel.two_sided = texel.two_sided || triangle.double_sided;
+  texel.node = side.triangle.node;
+  texel.two_sided = texel.two_sided || side.triangle.double_sided;
+  const double sign = side.back ? -1.0 : 1.0;
   for (std::size_t i = 1; i + 1 < polygon.size(); ++i) {
-    const std::array<glm::dvec3, 3> corners{polygon[0].world, polygon[i].world, polygon[i + 1].world};
-    texel.footprint.pieces.push_back({corners, triangle.normal, index});
-    if (triangle.double_sided) texel.footprint.pieces.push_back({corners, -triangle.normal, index});
+    texel.footprint.pieces.push_back(
+        {{polygon[0].world, polygon[i].world, polygon[i + 1].world},
+         sign * side.triangle.normal,
+         side.traced,
+         {sign * polygon[0].shading, sign * polygon[i].shading, sign * polygon[i + 1].shading}});
   }
 }
 
-using TexelMap = std::map<std::tuple<int, int, int>, Texel>;  // page, y, x
+using TexelMap = std::map<std::tuple<int, int, int, bool>, Texel>;  // page, y, x, back
 
-void rasterize(const oracle::Triangle& triangle, std::uint32_t index, const Page& page, TexelMap& texels) {
+void rasterize(const Side& side, const Page& page, TexelMap& texels) {
+  const auto& triangle = side.triangle;
   Polygon whole;
   glm::dvec2 low(1e300);
   glm::dvec2 high(-1e300);
   for (std::size_t k = 0; k < 3; ++k) {
-    whole.push_back({triangle.lightmap_uv[k] * glm::dvec2(page.width, page.height), triangle.corners[k]});
+    whole.push_back(
+        {triangle.lightmap_uv[k] * glm::dvec2(page.width, page.height), triangle.corners[k], triangle.shading[k]});
     low = glm::min(low, whole.back().texel);
     high = glm::max(high, whole.back().texel);
   }
@@ -83,11 +96,12 @@ void rasterize(const oracle::Triangle& triangle, std::uint32_t index, const Page
     for (int x = static_cast<int>(std::floor(low.x)); x < high.x; ++x) {
       const auto cell = clip(clip(row, 0, x, 1.0), 0, x + 1, -1.0);
       if (cell.size() < 3 || texelArea(cell) < 1e-9) continue;
-      auto& texel = texels[{triangle.lightmap_page, y, x}];
+      auto& texel = texels[{triangle.lightmap_page, y, x, side.back}];
       texel.page = triangle.lightmap_page;
       texel.x = x;
       texel.y = y;
-      addPieces(texel, cell, triangle, index);
+      texel.back = side.back;
+      addPieces(texel, cell, side);
     }
   }
 }
@@ -168,8 +182,10 @@ Page readPfm(const std::filesystem::path& file) {
   return page;
 }
 
-LitScene readLitScene(const std::filesystem::path& glb) {
-  LitScene lit{oracle::readGlb(glb), {}};
+namespace {
+
+LitScene withPages(oracle::TriangleScene scene, const std::filesystem::path& glb) {
+  LitScene lit{std::move(scene), {}};
   int last = -1;
   for (const auto& triangle : lit.scene.triangles) last = std::max(last, triangle.lightmap_page);
   if (last < 0) throw std::runtime_error(glb.string() + ": no primitive names a lightmap page in its extras");
@@ -180,12 +196,31 @@ LitScene readLitScene(const std::filesystem::path& glb) {
   return lit;
 }
 
+}  // namespace
+
+LitScene readLitScene(const std::filesystem::path& glb) {
+  auto lit = withPages(oracle::readGlb(glb), glb);
+  auto joined = oracle::joinSides(lit.scene);
+  if (joined.triangles.size() < lit.scene.triangles.size()) lit.unlit = std::move(joined);
+  return lit;
+}
+
+LitScene readLitScene(const std::filesystem::path& glb, const std::filesystem::path& unlit) {
+  auto lit = withPages(oracle::readGlb(glb), glb);
+  lit.unlit = oracle::joinSides(oracle::readGlb(unlit));
+  return lit;
+}
+
 std::vector<Texel> findTexels(const LitScene& lit) {
   TexelMap texels;
+  const auto matches = lit.unlit ? oracle::matchTriangles(lit.scene, *lit.unlit) : std::vector<std::uint32_t>();
   for (std::uint32_t i = 0; i < lit.scene.triangles.size(); ++i) {
     const auto& triangle = lit.scene.triangles[i];
     if (triangle.lightmap_page < 0) continue;
-    rasterize(triangle, i, lit.pages.at(static_cast<std::size_t>(triangle.lightmap_page)), texels);
+    const auto& page = lit.pages.at(static_cast<std::size_t>(triangle.lightmap_page));
+    const auto traced = lit.unlit ? matches[i] : i;
+    rasterize({triangle, traced, false}, page, texels);
+    if (triangle.double_sided) rasterize({triangle, traced, true}, page, texels);
   }
   std::vector<Texel> result;
   result.reserve(texels.size());
@@ -196,7 +231,8 @@ std::vector<Texel> findTexels(const LitScene& lit) {
 bool sameLayout(const LitScene& a, const LitScene& b) {
   const auto same_page = [](const Page& p, const Page& q) { return p.width == q.width && p.height == q.height; };
   const auto same_triangle = [](const oracle::Triangle& s, const oracle::Triangle& t) {
-    return s.corners == t.corners && s.lightmap_uv == t.lightmap_uv && s.lightmap_page == t.lightmap_page;
+    return s.corners == t.corners && s.lightmap_uv == t.lightmap_uv && s.lightmap_page == t.lightmap_page &&
+           s.double_sided == t.double_sided;
   };
   return std::equal(a.pages.begin(), a.pages.end(), b.pages.begin(), b.pages.end(), same_page) &&
          std::equal(a.scene.triangles.begin(), a.scene.triangles.end(), b.scene.triangles.begin(),

@@ -5,11 +5,12 @@
 #include <fstream>
 #include <stdexcept>
 #include <type_traits>
+#include <utility>
 
 namespace radiosity::accuracy {
 namespace {
 
-constexpr char kMagic[8] = {'R', 'A', 'D', 'R', 'E', 'F', '0', '4'};
+constexpr char kMagic[8] = {'R', 'A', 'D', 'R', 'E', 'F', '0', '5'};
 constexpr std::size_t kMaxRecords = 1 << 26;
 constexpr std::size_t kProbes = 16;
 constexpr std::uint32_t kProbeSamples = 64;
@@ -39,19 +40,49 @@ void addLights(const oracle::TriangleScene& scene, Hash& hash) {
   }
   hash.add(scene.sky_upper), hash.add(scene.sky_lower);
   for (const auto& texture : scene.textures) {
-    hash.add(texture.width), hash.add(texture.height);
-    for (const auto byte : texture.rgba) hash.add(byte);
+    hash.add(static_cast<int>(texture.wrap_u)), hash.add(static_cast<int>(texture.wrap_v)), hash.add(texture.nearest);
+    hash.add(texture.image->width), hash.add(texture.image->height);
+    for (const auto byte : texture.image->rgba) hash.add(byte);
   }
 }
 
-void addProbe(const LitScene& lit, Hash& hash) {
+void addUse(const oracle::TextureUse& use, Hash& hash) {
+  hash.add(use.texture);
+  for (const auto& uv : use.uv) hash.add(uv);
+}
+
+/// What light is traced in.
+void addTriangles(const oracle::TriangleScene& scene, Hash& hash) {
+  for (const auto& triangle : scene.triangles) {
+    for (std::size_t k = 0; k < 3; ++k) hash.add(triangle.corners[k]), hash.add(triangle.shading[k]);
+    hash.add(triangle.reflectance), hash.add(triangle.emission_lux), hash.add(triangle.double_sided);
+    for (const auto* use : {&triangle.base_colour, &triangle.emissive, &triangle.metal, &triangle.specular_texture}) {
+      addUse(*use, hash);
+    }
+    hash.add(triangle.metallic), hash.add(triangle.specular);
+    for (const auto& colour : triangle.colours) hash.add(glm::dvec3(colour)), hash.add(colour.w);
+    hash.add(triangle.see_through), hash.add(triangle.alpha), hash.add(triangle.cutoff),
+        hash.add(triangle.transmission);
+  }
+}
+
+/// Where texels lie.
+void addLayout(const LitScene& lit, Hash& hash) {
+  for (const auto& triangle : lit.scene.triangles) {
+    for (std::size_t k = 0; k < 3; ++k) hash.add(triangle.corners[k]), hash.add(triangle.lightmap_uv[k]);
+    hash.add(triangle.lightmap_page), hash.add(triangle.double_sided);
+  }
+  for (const auto& page : lit.pages) hash.add(page.width), hash.add(page.height);
+}
+
+void addProbe(const oracle::TriangleScene& scene, Hash& hash) {
   std::vector<oracle::Footprint> probes;
-  const auto& triangles = lit.scene.triangles;
+  const auto& triangles = scene.triangles;
   for (std::size_t i = 0; i < kProbes && !triangles.empty(); ++i) {
     const auto& triangle = triangles[i * (triangles.size() - 1) / kProbes];
-    probes.push_back({{{triangle.corners, triangle.normal}}});
+    probes.push_back({{{triangle.corners, triangle.normal, oracle::kNoTriangle, triangle.shading}}});
   }
-  for (const auto& answer : oracle::PathTracer(lit.scene).irradiance(probes, {.samples = kProbeSamples})) {
+  for (const auto& answer : oracle::PathTracer(scene).irradiance(probes, {.samples = kProbeSamples})) {
     hash.add(answer.mean_lux);
     hash.add(answer.visible_fraction);
   }
@@ -59,48 +90,40 @@ void addProbe(const LitScene& lit, Hash& hash) {
 
 /// One way for both directions: `visit` is called for each number of a reference, in the file's order.
 template <typename Visit>
-void visitTexel(Reference::TexelMean& texel, Visit visit) {
-  visit(texel.page), visit(texel.x), visit(texel.y), visit(texel.area), visit(texel.plain);
-  visit(texel.irradiance.mean_lux), visit(texel.irradiance.standard_error), visit(texel.irradiance.visible_fraction),
-      visit(texel.irradiance.undecided_fraction);
-}
-template <typename Visit>
-void visitPoint(Reference::Point& point, Visit visit) {
-  visit(point.page), visit(point.uv);
-  visit(point.irradiance.mean_lux), visit(point.irradiance.standard_error), visit(point.irradiance.visible_fraction),
-      visit(point.irradiance.undecided_fraction);
+void visitIrradiance(oracle::Irradiance& irradiance, Visit visit) {
+  visit(irradiance.mean_lux), visit(irradiance.standard_error), visit(irradiance.visible_fraction);
+  visit(irradiance.undecided_fraction), visit(irradiance.back_fraction), visit(irradiance.open_fraction);
 }
 
 template <typename Visit>
 void visitReference(Reference& reference, Visit visit) {
-  visit(reference.seconds), visit(reference.exact);
-  for (auto& texel : reference.texels) visitTexel(texel, visit);
-  for (auto& point : reference.points) visitPoint(point, visit);
+  visit(reference.seconds), visit(reference.exact), visit(reference.cut_area), visit(reference.hidden_area);
+  for (auto& texel : reference.texels) {
+    visit(texel.page), visit(texel.x), visit(texel.y), visit(texel.back), visit(texel.area), visit(texel.plain);
+    visitIrradiance(texel.irradiance, visit);
+  }
+  for (auto& point : reference.points) {
+    visit(point.position), visit(point.normal);
+    visitIrradiance(point.irradiance, visit);
+  }
 }
 
 }  // namespace
 
-std::string referenceKey(const LitScene& lit, const ReferenceOptions& options) {
+std::string referenceKey(const LitScene& lit, const ReferenceOptions& options, ReferencePart part) {
   Hash hash;
-  for (const auto& triangle : lit.scene.triangles) {
-    for (std::size_t k = 0; k < 3; ++k) hash.add(triangle.corners[k]), hash.add(triangle.lightmap_uv[k]);
-    hash.add(triangle.reflectance);
-    hash.add(triangle.emission_lux);
-    hash.add(triangle.double_sided);
-    hash.add(triangle.lightmap_page);
-    for (const auto& uv : triangle.texture_uv) hash.add(uv);
-    hash.add(triangle.texture), hash.add(triangle.see_through), hash.add(triangle.alpha), hash.add(triangle.cutoff);
-    hash.add(triangle.transmission);
+  addTriangles(lit.traced(), hash);
+  addLights(lit.traced(), hash);
+  if (part == ReferencePart::kTexels) {
+    addLayout(lit, hash);
+    hash.add(options.texel_samples), hash.add(options.texels);
+  } else {
+    hash.add(options.point_samples), hash.add(options.points);
   }
-  addLights(lit.scene, hash);
-  for (const auto& page : lit.pages) hash.add(page.width), hash.add(page.height);
-  hash.add(options.texel_samples);
-  hash.add(options.point_samples);
-  hash.add(options.texels);
-  hash.add(options.points);
+  hash.add(static_cast<int>(part));
   hash.add(options.seed);
   hash.add(options.closed_form);
-  addProbe(lit, hash);
+  addProbe(lit.traced(), hash);
   char text[17];
   std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(hash.value()));
   return text;
@@ -140,14 +163,21 @@ std::optional<Reference> loadReference(const std::filesystem::path& file) {
   return reference;
 }
 
-StoredReference findReference(const LitScene& lit, const ReferenceOptions& options,
-                              const std::filesystem::path& folder) {
-  const auto file = folder / (referenceKey(lit, options) + ".reference");
+StoredReference findPart(const LitScene& lit, const ReferenceOptions& options, ReferencePart part,
+                         const std::filesystem::path& folder) {
+  const auto file = folder / (referenceKey(lit, options, part) + ".reference");
   if (auto found = loadReference(file)) return {std::move(*found), true};
   std::filesystem::create_directories(folder);
-  StoredReference made{makeReference(lit, options), false};
+  StoredReference made{makePart(lit, options, part), false};
   saveReference(made.reference, file);
   return made;
+}
+
+StoredReference findReference(const LitScene& lit, const ReferenceOptions& options,
+                              const std::filesystem::path& folder) {
+  auto texels = findPart(lit, options, ReferencePart::kTexels, folder);
+  auto points = findPart(lit, options, ReferencePart::kPoints, folder);
+  return {join(std::move(texels.reference), std::move(points.reference)), texels.from_disk && points.from_disk};
 }
 
 }  // namespace radiosity::accuracy

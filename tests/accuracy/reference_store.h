@@ -1,6 +1,7 @@
-// References kept on disk, because path tracing one takes longer than all that is measured against it. A file is named
-// by a hash of everything its values depend on: triangles, materials, the texels' layout, the options, and what the
-// path tracer of today answers to a small probe, so that a change of the tracer makes old files unused. Any thread.
+// References kept on disk, because path tracing one takes longer than all that is measured against it: texels and
+// points each in a file of their own, since points outlive a change of the texels' layout. A file is named by a hash of
+// everything its values depend on: triangles, materials, for texels their layout, the options, and what the path tracer
+// of today answers to a small probe, so that a change of the tracer makes old files unused. Any thread.
 #pragma once
 
 #include <filesystem>
@@ -12,7 +13,7 @@
 namespace radiosity::accuracy {
 
 /// 16 hexadecimal digits. Costs some thousand paths.
-[[nodiscard]] std::string referenceKey(const LitScene& lit, const ReferenceOptions& options);
+[[nodiscard]] std::string referenceKey(const LitScene& lit, const ReferenceOptions& options, ReferencePart part);
 
 /// Whole or not at all: written beside its place, then renamed. Throws std::runtime_error.
 void saveReference(const Reference& reference, const std::filesystem::path& file);
@@ -24,7 +25,10 @@ struct StoredReference {
   Reference reference;
   bool from_disk = false;
 };
-/// Loads it from `folder`, or makes it and saves it there.
+/// Loads a part from `folder`, or makes it and saves it there.
+[[nodiscard]] StoredReference findPart(const LitScene& lit, const ReferenceOptions& options, ReferencePart part,
+                                       const std::filesystem::path& folder);
+/// Both parts; from disk where both are.
 [[nodiscard]] StoredReference findReference(const LitScene& lit, const ReferenceOptions& options,
                                             const std::filesystem::path& folder);
 

@@ -71,11 +71,14 @@ SolveRun runSolve(const std::filesystem::path& client, const std::filesystem::pa
 void setSky(const std::string& option, LitScene& lit) {
   const auto sky = protocol::parseSky(option);
   if (!sky) throw std::invalid_argument(sky.error().text());
-  if (lit.scene.has_sky) return;
+  if (lit.traced().has_sky) return;
   const auto& [upper, lower] = *sky;
-  lit.scene.sky_upper = {upper[0], upper[1], upper[2]};
-  lit.scene.sky_lower = {lower[0], lower[1], lower[2]};
-  lit.scene.has_sky = true;
+  for (auto* scene : {&lit.scene, lit.unlit ? &*lit.unlit : nullptr}) {
+    if (scene == nullptr) continue;
+    scene->sky_upper = {upper[0], upper[1], upper[2]};
+    scene->sky_lower = {lower[0], lower[1], lower[2]};
+    scene->has_sky = true;
+  }
 }
 
 }  // namespace radiosity::accuracy

@@ -49,6 +49,31 @@ std::string slopes(const Summary& summary) {
   return fmt::format("{}, {}; {}", orDash(summary.slope_to_limit), from, orDash(summary.late_slope));
 }
 
+const char* const kSurfaceColumns = "RMS % | median % | p95 % | p99 % | mean ratio | leaks";
+
+/// As many leaks as lie where rays leave the scene are leaks for certain; others may lie in solids.
+std::string surfaceCells(const accuracy::SurfaceError& error) {
+  const auto leaks = error.leaks == 0 ? std::string("0") : fmt::format("{} ({} open)", error.leaks, error.open_leaks);
+  return fmt::format("{} | {} | {} | {} | {:.4f} | {}", percent(error.rms()), percent(error.median), percent(error.p95),
+                     percent(error.p99), error.mean_ratio, leaks);
+}
+
+std::string surfaceTable(const std::vector<SceneSeries>& scenes) {
+  std::string out = fmt::format(
+      "\nAt the surface, asked for 2 %:\n\n| scene | stated % | {} | points compared | not in these figures, of the "
+      "area "
+      "|\n|---|---:|---:|---:|---:|---:|---:|---:|---:|---|\n",
+      kSurfaceColumns);
+  for (const auto& series : scenes) {
+    if (!series.unmeasured.empty() || series.rows.empty()) continue;
+    const auto& row = series.asked ? *series.asked : series.rows.back();
+    out += fmt::format("| {} | {} | {} | {} of {} | {} |\n", series.name, percent(row.stated.total),
+                       surfaceCells(row.surface), row.surface.compared, row.surface.points,
+                       accuracy::leftOutText(row.surface));
+  }
+  return out;
+}
+
 std::string summaryTable(const std::vector<SceneSeries>& scenes) {
   std::string out =
       "| scene | polygons | patches | s to 2 % | asked for 2 %: s, true % | last row: s, true % | stated / true | "
@@ -71,14 +96,17 @@ std::string summaryTable(const std::vector<SceneSeries>& scenes) {
 }
 
 std::string solveTable(const SceneSeries& series) {
-  std::string out =
-      "| solve s | wall s | solver RMS % | median % | p99 % | bias % | total RMS % | stated % | stated / true | "
-      "discretization stated % | shots |\n|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n";
+  std::string out = fmt::format(
+      "| solve s | wall s | at the surface: {} | solver RMS % | median % | p99 % | bias % | total RMS % | stated % | "
+      "stated / true | discretization stated % | shots "
+      "|\n|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n",
+      kSurfaceColumns);
   for (const auto& row : series.rows) {
     if (!row.measured) continue;
-    out += fmt::format("| {:.2f} | {:.2f} | {} | {} | {} | {:+.2f} | {} | {} | {} | {} | {} |\n", row.seconds,
-                       row.wall_seconds, truth(row), percent(row.solver.median), percent(row.solver.p99),
-                       100.0 * row.solver.bias, percent(row.total.solverRms()), percent(row.stated.total),
+    out += fmt::format("| {:.2f} | {:.2f} | {} | {} | {} | {} | {:+.2f} | {} | {} | {} | {} | {} |\n", row.seconds,
+                       row.wall_seconds, surfaceCells(row.surface), truth(row), percent(row.solver.median),
+                       percent(row.solver.p99), 100.0 * row.solver.bias, percent(row.total.solverRms()),
+                       percent(row.stated.total),
                        row.resolved() ? fmt::format("{:.2f}", row.stated.total / row.solver.solverRms()) : "-",
                        percent(row.stated.discretization), row.shots);
   }
@@ -118,6 +146,9 @@ std::string referenceText(const SceneSeries& series) {
       "Reference: path traced, {} texels with noise {} % (subtracted), {} points with {} %; {:.0f} s to trace{}.",
       series.reference_texels, percent(series.texel_noise), series.reference_points, percent(series.point_noise),
       series.reference_seconds, series.reference_from_disk ? ", kept from an earlier run" : "");
+  if (!series.reference_note.empty()) text += " It was traced " + series.reference_note + ".";
+  text += fmt::format(" Not in the solver error, of the texels' area: cut by an edge {} %, hidden {} %.",
+                      percent(series.cut), percent(series.hidden));
   if (series.undecided > 0.0)
     text += fmt::format(
         " {} % of the area is left out of the solver error: models are so open there that it has no answer what of a "
@@ -146,8 +177,13 @@ std::string sceneSection(const SceneSeries& series) {
   out += solveTable(series);
   if (series.asked) {
     const auto& row = *series.asked;
-    out += fmt::format("\nAsked for a stated 2 %: {:.2f} s of solving, {:.2f} s in all; stated {} %, true {} %.\n",
-                       row.seconds, row.wall_seconds, percent(row.stated.total), truth(row));
+    out += fmt::format(
+        "\nAsked for a stated 2 %: {:.2f} s of solving, {:.2f} s in all; stated {} %, true {} %. At the surface ({}): "
+        "{}.\n",
+        row.seconds, row.wall_seconds, percent(row.stated.total), truth(row), kSurfaceColumns,
+        surfaceCells(row.surface));
+    if (const auto text = accuracy::leftOutText(row.surface); !text.empty())
+      out += "Not in these figures, of the area: " + text + ".\n";
   }
   out += fmt::format("\nSlope of solver RMS in log-log: {}; over the last decade of time {}. {}\n",
                      orDash(summary.slope), orDash(summary.late_slope), limitText(summary));
@@ -160,14 +196,21 @@ std::string sceneSection(const SceneSeries& series) {
 std::string toMarkdown(const RunDescription& run, const std::vector<SceneSeries>& scenes) {
   std::string out = fmt::format(
       "# Error against time\n\n{} run on {} cores of {}; load when it began {:.1f} (0: the machine was ours alone).\n\n"
-      "Solver error: means of whole texels over their visible part. Total error: bilinear lookups at random surface "
-      "points. Both are relative RMS of irradiance over area against the path tracer, with its noise subtracted "
-      "(medians "
-      "and p99 contain it). Stated: what the server says itself. Each row is a fresh `radiosity solve`. `<=`: the "
+      "At the surface: bilinear lookups in the lit file at points spread evenly over all surfaces and both sides, as "
+      "an "
+      "engine does it, of the mean of red, green and blue, RMS over the mean of the truth. Leaks: lit in the file "
+      "above "
+      "a twentieth of the mean where the truth is below a hundredth of it; open ones can be seen for certain. Total: "
+      "the "
+      "same points, dark ones too, over the RMS of the light, as the server states it. Solver error, to find causes: "
+      "means of whole texels over their visible part, likewise. All are against the path tracer, RMS with its noise "
+      "subtracted (medians, p95 and p99 contain it). Stated: what the server says itself. Each row is a fresh "
+      "`radiosity solve`. `<=`: the "
       "first "
       "row was below already; `~`: extrapolated as time^-0.5; `<`: lost in the reference's noise.\n\n",
       run.mode, run.cores, run.processor, run.load);
   out += summaryTable(scenes);
+  out += surfaceTable(scenes);
   for (const auto& series : scenes) out += sceneSection(series);
   return out;
 }

@@ -93,6 +93,7 @@ json toJson(const SolveRow& row) {
                    {"sampling", row.stated.sampling},
                    {"variation", row.stated.variation},
                    {"discretization", row.stated.discretization}};
+  out["surface"] = accuracy::toJson(row.surface);
   out["solver"] = accuracy::toJson(row.solver);
   out["total"] = accuracy::toJson(row.total);
   out["plain"] = accuracy::toJson(row.plain);
@@ -127,6 +128,9 @@ json toJson(const SceneSeries& series) {
             {"points", series.reference_points},
             {"texel_noise", series.texel_noise},
             {"undecided_area", series.undecided},
+            {"cut_area", series.cut},
+            {"hidden_area", series.hidden},
+            {"note", series.reference_note},
             {"point_noise", series.point_noise},
             {"seconds", series.reference_seconds},
             {"from_disk", series.reference_from_disk},
@@ -189,13 +193,14 @@ json toJson(const RunDescription& run, const std::vector<SceneSeries>& scenes) {
 }
 
 ErrorPlot plotOf(const SceneSeries& series) {
-  ErrorPlot plot{
-      series.name,
-      {{"solver error", "#1f5fa8", {}, false}, {"total error", "#b0492c", {}, false}, {"stated", "#777777", {}, false}},
-      kGoal};
+  ErrorPlot plot{series.name,
+                 {{"solver error", "#1f5fa8", {}, false},
+                  {"at the surface", "#b0492c", {}, false},
+                  {"stated", "#777777", {}, false}},
+                 kGoal};
   for (const auto& row : measuredRows(series)) {
     if (row.resolved()) plot.curves[0].points.emplace_back(row.seconds, row.solver.solverRms());
-    plot.curves[1].points.emplace_back(row.seconds, row.total.solverRms());
+    plot.curves[1].points.emplace_back(row.seconds, row.surface.rms());
     plot.curves[2].points.emplace_back(row.seconds, row.stated.total);
   }
   const auto summary = summarize(series);

@@ -12,7 +12,7 @@
 
 namespace radiosity::benchmark {
 
-/// The error whose time is compared: relative RMS of whole, visible texels.
+/// The error whose time is compared: relative RMS of whole, visible texels, of which other bakers say the same.
 inline constexpr double kGoal = 0.02;
 
 /// What is drawn from a scene's rows.

@@ -34,6 +34,9 @@ struct Judge {
     series.reference_seconds = reference.seconds;
     series.reference_texels = reference.texels.size();
     series.reference_points = reference.points.size();
+    series.cut = reference.cut_area;
+    series.hidden = reference.hidden_area;
+    series.plain_texels = 0;
     for (const auto& texel : reference.texels) series.plain_texels += texel.plain ? 1U : 0U;
   }
 };
@@ -48,10 +51,22 @@ StatedError statedOf(const json& report) {
 std::string whyNotJudged(const json& report, const accuracy::LitScene& lit) {
   if (!(report.value("energy", json::object()).value("emitted", 0.0) > 0.0)) return kDark;
   std::string text;
-  for (const auto& warning : lit.scene.warnings) {
+  for (const auto& warning : lit.traced().warnings) {
     if (warning.find("not modelled") != std::string::npos) text += (text.empty() ? "" : "; ") + warning;
   }
   return text.empty() ? text : "by the reference, " + text;
+}
+
+/// Judged in the scene as it was before, where the reference's reader knows all that is in it.
+accuracy::LitScene readJudged(const std::filesystem::path& output, const std::filesystem::path& scene,
+                              SceneSeries& series) {
+  try {
+    series.reference_note.clear();
+    return accuracy::readLitScene(output, scene);
+  } catch (const std::exception& error) {
+    series.reference_note = fmt::format("in the lit file, since the scene could not be read ({})", error.what());
+    return accuracy::readLitScene(output);
+  }
 }
 
 SolveRow solveOnce(const std::filesystem::path& scene, double time, double error, const SeriesOptions& options,
@@ -75,7 +90,7 @@ SolveRow solveOnce(const std::filesystem::path& scene, double time, double error
   series.patches = run.report.value("patches", std::uint64_t{0});
   series.polygons = run.report.value("polygons", std::uint64_t{0});
   series.renderer = run.report.value("gl_renderer", "");
-  auto lit = accuracy::readLitScene(run.output);
+  auto lit = readJudged(run.output, scene, series);
   if (!series.sky.empty()) accuracy::setSky(series.sky, lit);
   if (series.unmeasured = whyNotJudged(run.report, lit); !series.unmeasured.empty()) return row;
   judge.prepare(std::move(lit), options, series);
@@ -83,10 +98,11 @@ SolveRow solveOnce(const std::filesystem::path& scene, double time, double error
   row.solver = accuracy::measureTexels(judge.lit->pages, judge.reference, accuracy::TexelChoice::kDecided);
   series.undecided = accuracy::undecidedArea(judge.reference);
   row.total = measured.total;
+  row.surface = measured.surface;
   row.plain = accuracy::measureTexels(judge.lit->pages, judge.reference, accuracy::TexelChoice::kPlain);
   row.measured = true;
   series.texel_noise = row.solver.reference_noise;
-  series.point_noise = row.total.reference_noise;
+  series.point_noise = row.surface.reference_noise;
   return row;
 }
 
@@ -99,8 +115,12 @@ bool solveAll(const std::filesystem::path& scene, const SeriesOptions& options, 
       std::fprintf(stderr, "%s: not judged: %s\n", series.name.c_str(), series.unmeasured.c_str());
       return false;
     }
-    std::fprintf(stderr, "%s %g s: solver error %.2f %%, total %.2f %%, stated %.2f %%\n", series.name.c_str(), time,
-                 100 * row.solver.solverRms(), 100 * row.total.solverRms(), 100 * row.stated.total);
+    std::fprintf(
+        stderr,
+        "%s %g s: at the surface RMS %.2f %%, median %.2f %%, mean ratio %.4f, leaks %zu; solver error %.2f %%, "
+        "stated %.2f %%\n",
+        series.name.c_str(), time, 100 * row.surface.rms(), 100 * row.surface.median, row.surface.mean_ratio,
+        row.surface.leaks, 100 * row.solver.solverRms(), 100 * row.stated.total);
     if (row.exit_code == kReached) break;  // a longer run would stop at the same place
   }
   series.asked = solveOnce(scene, std::max(kPatience, options.times.back()), options.goal, options, judge, series);

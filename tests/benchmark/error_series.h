@@ -40,6 +40,7 @@ struct SolveRow {
   std::uint64_t shots = 0;
   bool measured = false;  ///< the rest holds
   StatedError stated;
+  accuracy::SurfaceError surface;             ///< what people see
   oracle::ErrorMetrics solver, total, plain;  ///< plain: solver error of the texels that Cycles can be judged on
 
   /// The truth is known: not lost in the reference's own noise.
@@ -69,6 +70,8 @@ struct SceneSeries {
   std::string renderer;
   std::size_t reference_texels = 0, plain_texels = 0, reference_points = 0;
   double texel_noise = 0.0, point_noise = 0.0, reference_seconds = 0.0;
+  double cut = 0.0, hidden = 0.0;  ///< parts of the texels' area without solver error (accuracy::Reference)
+  std::string reference_note;      ///< what the reference could not be made of
   double undecided = 0.0;  ///< part of the texels' area, left out: models are open there (accuracy::undecidedArea)
   bool reference_from_disk = false, reference_exact = false;
   std::vector<SolveRow> rows;

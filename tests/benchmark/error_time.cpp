@@ -66,7 +66,8 @@ std::vector<fs::path> chosenScenes(const Options& options) {
   for (const auto* name : {"cornell", "room_small", "furnace_90"})
     chosen.push_back(kBuiltIn / (std::string(name) + ".glb"));
   if (!options.full) return chosen;
-  for (const auto* name : {"room_seminar", "furnace"}) chosen.push_back(kBuiltIn / (std::string(name) + ".glb"));
+  for (const auto* name : {"room_seminar", "furnace", "cornell_double", "room_small_double", "room_seminar_double"})
+    chosen.push_back(kBuiltIn / (std::string(name) + ".glb"));
   const auto shared = sharedScenes();
   chosen.insert(chosen.end(), shared.begin(), shared.end());
   return chosen;
@@ -77,8 +78,9 @@ std::vector<std::string> argumentsFor(const fs::path& scene, const std::vector<s
   const bool chosen = std::any_of(asked.begin(), asked.end(), [](const auto& a) { return a.rfind("--texel", 0) == 0; });
   auto arguments = asked;
   if (chosen || scene.parent_path() != kBuiltIn) return arguments;
-  if (scene.stem() == "room_small") arguments.insert(arguments.end(), {"--texels", "13742"});
-  if (scene.stem() == "room_seminar") arguments.insert(arguments.end(), {"--texels", "27382"});
+  const auto name = scene.stem().string();
+  if (name.rfind("room_small", 0) == 0) arguments.insert(arguments.end(), {"--texels", "13742"});
+  if (name.rfind("room_seminar", 0) == 0) arguments.insert(arguments.end(), {"--texels", "27382"});
   return arguments;
 }
 

@@ -9,6 +9,19 @@
 namespace radiosity::oracle {
 namespace {
 
+/// A relative error needs something to relate to: this part of the mean.
+constexpr double kLeastToRelateTo = 0.01;
+
+double meanLuminance(std::span<const Comparison> comparisons) {
+  double sum = 0.0, weight = 0.0;
+  for (const auto& c : comparisons) {
+    if (!(c.weight > 0.0)) continue;
+    sum += c.weight * luminance(c.reference);
+    weight += c.weight;
+  }
+  return weight > 0.0 ? sum / weight : 0.0;
+}
+
 /// Smallest error below which `share` of the weight lies.
 double quantile(const std::vector<std::pair<double, double>>& sorted, double total_weight, double share) {
   double below = 0.0;
@@ -34,6 +47,7 @@ std::array<double, 2> ErrorMetrics::solverRange() const {
 
 ErrorMetrics measureError(std::span<const Comparison> comparisons) {
   ErrorMetrics metrics;
+  const double least = kLeastToRelateTo * meanLuminance(comparisons);
   double square = 0.0, noise = 0.0, uncertainty = 0.0, reference_square = 0.0, sum = 0.0, reference_sum = 0.0,
          weight_sum = 0.0;
   std::vector<std::pair<double, double>> errors;
@@ -50,7 +64,7 @@ ErrorMetrics measureError(std::span<const Comparison> comparisons) {
     const double y_reference = luminance(c.reference);
     sum += c.weight * y;
     reference_sum += c.weight * y_reference;
-    if (!(y_reference > 0.0)) continue;  // a relative error needs something to relate to
+    if (!(y_reference > least)) continue;
     weight_sum += c.weight;
     errors.emplace_back(std::abs(y - y_reference) / y_reference, c.weight);
     metrics.mean += c.weight * errors.back().first;

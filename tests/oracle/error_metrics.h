@@ -10,7 +10,7 @@ namespace radiosity::oracle {
 
 struct ErrorMetrics {
   double relative_rms = 0.0;  ///< sqrt(sum a |H - Href|^2 / sum a |Href|^2), over RGB
-  double mean = 0.0;          ///< of the relative error of luminance, area-weighted
+  double mean = 0.0;          ///< of the relative error of luminance, area-weighted; not of what is nearly black
   double median = 0.0;
   double p99 = 0.0;
   double bias = 0.0;             ///< sum a Y / sum a Yref - 1

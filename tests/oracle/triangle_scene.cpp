@@ -1,30 +1,14 @@
 #include "tests/oracle/triangle_scene.h"
 
 #include <algorithm>
-#include <cmath>
+#include <array>
 #include <glm/geometric.hpp>
+#include <map>
 #include <numbers>
+#include <tuple>
+#include <utility>
 
 namespace radiosity::oracle {
-
-namespace {
-
-double toLinear(std::uint8_t value) {
-  const double v = value / 255.0;
-  return v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
-}
-
-}  // namespace
-
-glm::dvec4 Texture::at(const glm::dvec2& uv) const {
-  const auto place = [](double t, int size) {
-    return std::min(size - 1, static_cast<int>((t - std::floor(t)) * size));
-  };
-  const auto pixel = static_cast<std::size_t>(place(uv.y, height)) * static_cast<std::size_t>(width) +
-                     static_cast<std::size_t>(place(uv.x, width));
-  const auto* p = &rgba[4 * pixel];
-  return {toLinear(p[0]), toLinear(p[1]), toLinear(p[2]), p[3] / 255.0};
-}
 
 double area(const Triangle& triangle) {
   const auto& [a, b, c] = triangle.corners;
@@ -71,6 +55,75 @@ TriangleScene triangulate(const test_scenes::TestScene& scene) {
   result.sky_lower = scene.sky_lower_nits;
   result.has_sky = scene.sky_upper_nits != glm::dvec3(0.0) || scene.sky_lower_nits != glm::dvec3(0.0);
   return result;
+}
+
+namespace {
+
+using Position = std::tuple<double, double, double>;
+
+/// Corners from the smallest on, in the triangle's own sense of turning or against it.
+std::array<Position, 3> cycle(const Triangle& triangle, bool flipped) {
+  std::array<Position, 3> corners;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto& p = triangle.corners[flipped ? 2 - k : k];
+    corners[k] = {p.x, p.y, p.z};
+  }
+  std::rotate(corners.begin(), std::min_element(corners.begin(), corners.end()), corners.end());
+  return corners;
+}
+
+bool sameMaterial(const Triangle& a, const Triangle& b) {
+  return a.reflectance == b.reflectance && a.emission_lux == b.emission_lux && a.metallic == b.metallic &&
+         a.specular == b.specular && a.base_colour.texture == b.base_colour.texture &&
+         a.emissive.texture == b.emissive.texture && a.metal.texture == b.metal.texture &&
+         a.specular_texture.texture == b.specular_texture.texture && a.see_through == b.see_through &&
+         a.alpha == b.alpha && a.cutoff == b.cutoff && a.transmission == b.transmission;
+}
+
+}  // namespace
+
+TriangleScene joinSides(const TriangleScene& scene) {
+  auto joined = scene;
+  std::multimap<std::array<Position, 3>, std::size_t> fronts;
+  std::vector<bool> gone(scene.triangles.size(), false);
+  for (std::size_t t = 0; t < scene.triangles.size(); ++t) {
+    const auto& triangle = scene.triangles[t];
+    if (triangle.double_sided) continue;
+    const auto [begin, end] = fronts.equal_range(cycle(triangle, true));
+    const auto twin = std::find_if(
+        begin, end, [&](const auto& front) { return sameMaterial(scene.triangles[front.second], triangle); });
+    if (twin == end) {
+      fronts.emplace(cycle(triangle, false), t);
+      continue;
+    }
+    joined.triangles[twin->second].double_sided = true;
+    gone[t] = true;
+    fronts.erase(twin);
+  }
+  std::size_t kept = 0;
+  for (std::size_t t = 0; t < gone.size(); ++t) {
+    if (!gone[t]) joined.triangles[kept++] = joined.triangles[t];
+  }
+  joined.triangles.resize(kept);
+  return joined;
+}
+
+std::vector<std::uint32_t> matchTriangles(const TriangleScene& of, const TriangleScene& in) {
+  std::map<std::array<Position, 3>, std::vector<std::uint32_t>> places;
+  for (std::uint32_t t = 0; t < in.triangles.size(); ++t) {
+    places[cycle(in.triangles[t], false)].push_back(t);
+    if (in.triangles[t].double_sided) places[cycle(in.triangles[t], true)].push_back(t);
+  }
+  std::map<std::array<Position, 3>, std::size_t> used;
+  std::vector<std::uint32_t> matches;
+  for (const auto& triangle : of.triangles) {
+    const auto key = cycle(triangle, false);
+    const auto found = places.find(key);
+    const auto index = used[key]++;
+    const bool known = found != places.end() && index < found->second.size();
+    matches.push_back(known ? found->second[index] : kNoTriangle);
+  }
+  return matches;
 }
 
 }  // namespace radiosity::oracle

@@ -1,5 +1,5 @@
-// What the path tracer and the lightmap comparison work on: world-space triangles with constant reflectance. Read from
-// a GLB by a reader of our own, or taken straight from a generated scene. A value; any thread.
+// What the path tracer and the lightmap comparison work on: world-space triangles with what they reflect and emit. Read
+// from a glTF file by a reader of our own, or taken straight from a generated scene. A value; any thread.
 #pragma once
 
 #include <array>
@@ -11,17 +11,12 @@
 #include <string>
 #include <vector>
 
+#include "tests/oracle/texture.h"
 #include "tests/scenes/scene.h"
 
 namespace radiosity::oracle {
 
-/// Base colour and alpha, nearest pixel, repeated.
-struct Texture {
-  int width = 0, height = 0;
-  std::vector<std::uint8_t> rgba;  ///< sRGB, row 0 = v 0
-
-  [[nodiscard]] glm::dvec4 at(const glm::dvec2& uv) const;  ///< linear, alpha in w
-};
+inline constexpr std::uint32_t kNoTriangle = ~std::uint32_t{0};
 
 /// A light without extent, world space.
 struct Lamp {
@@ -33,17 +28,30 @@ struct Lamp {
   double inner_rad = 0.0, outer_rad = 0.7853981633974483;
 };
 
+/// A texture where one triangle uses it.
+struct TextureUse {
+  int texture = -1;  ///< into TriangleScene::textures; -1: none, which stands for white
+  std::array<glm::dvec2, 3> uv{};
+};
+
 struct Triangle {
   std::array<glm::dvec3, 3> corners{};  ///< metres, counter-clockwise = front
   glm::dvec3 normal{0.0};               ///< unit, front
-  glm::dvec3 reflectance{0.0};
-  glm::dvec3 emission_lux{0.0};  ///< radiosity E = pi x luminance
+  std::array<glm::dvec3, 3> shading{};  ///< unit: NORMAL; 0 where it is absent or unusable: as `normal`
+  glm::dvec3 reflectance{0.0};          ///< what textures, varying colours and metal by place multiply
+  glm::dvec3 emission_lux{0.0};         ///< radiosity E = pi x luminance; its texture multiplies it
   bool double_sided = false;
   std::array<glm::dvec2, 3> lightmap_uv{};  ///< TEXCOORD_1
   int lightmap_page = -1;                   ///< extras.lightmap of the primitive; -1: none
-  int texture = -1;                         ///< into TriangleScene::textures; -1: none
-  std::array<glm::dvec2, 3> texture_uv{};   ///< of the texture, which multiplies reflectance and alpha
-  bool see_through = false;                 ///< masked, blended or transmitting
+  TextureUse base_colour;                   ///< multiplies reflectance and alpha
+  TextureUse emissive;
+  double metallic = 0.0;     ///< reflectance loses this part times the blue of `metal`; 0 where `reflectance` has it
+  TextureUse metal;          ///< metallicRoughness
+  glm::dvec3 specular{0.0};  ///< reflectance loses the largest channel of this times `specular_texture`; 0: likewise
+  TextureUse specular_texture;
+  bool coloured = false;                ///< its corners differ in COLOR_0
+  std::array<glm::dvec4, 3> colours{};  ///< where they do
+  bool see_through = false;             ///< masked, blended or transmitting
   double alpha = 1.0;
   double cutoff = -1.0;  ///< alpha mask; below 0: blended
   double transmission = 0.0;
@@ -57,14 +65,22 @@ struct TriangleScene {
   glm::dvec3 sky_upper{0.0}, sky_lower{0.0};  ///< radiance from above and from below the horizon (+Y), nits
   bool has_sky = false;                       ///< the file names one, be it black
   std::vector<std::string> node_names;
-  std::vector<std::string> warnings;  ///< what the reader does not model (textures, blending), named
+  std::vector<std::string> warnings;  ///< what the reader does not model, named
 };
 
 [[nodiscard]] double area(const Triangle& triangle);
 
 [[nodiscard]] TriangleScene triangulate(const test_scenes::TestScene& scene);
 
-/// Reads a GLB (one BIN chunk). Throws std::runtime_error with the reason.
+/// Reads a .glb or .gltf with the files that it names. Throws std::runtime_error with the reason.
 [[nodiscard]] TriangleScene readGlb(const std::filesystem::path& file);
+
+/// A front and a flipped copy of it, both single-sided and of one material's values, become the double-sided surface
+/// that they stand for: in one place a ray would meet either by chance. What has no such twin stays as it is.
+[[nodiscard]] TriangleScene joinSides(const TriangleScene& scene);
+
+/// For each triangle of one scene that of another with the same corners: turned the same way, or else double-sided. Of
+/// several in one place the n-th has the n-th. kNoTriangle where there is none.
+[[nodiscard]] std::vector<std::uint32_t> matchTriangles(const TriangleScene& of, const TriangleScene& in);
 
 }  // namespace radiosity::oracle

@@ -108,6 +108,12 @@ TestScene seminarRoom() {
   return scene;
 }
 
+TestScene doubleSidedTwin(TestScene scene) {
+  scene.name += "_double";
+  for (auto& material : scene.materials) material.double_sided = material.emission_nits == glm::dvec3(0.0);
+  return scene;
+}
+
 std::vector<std::pair<std::string, std::function<TestScene()>>> allScenes() {
   const auto grey = [](double rho) { return [rho] { return furnace(glm::dvec3(rho), glm::dvec3(1.0)); }; };
   return {{"cornell", cornell},
@@ -121,7 +127,10 @@ std::vector<std::pair<std::string, std::function<TestScene()>>> allScenes() {
              return concentricSpheres({0.5, 0.5, 1.0}, {1.0, 0.6, 0.0});
            }},
           {"room_small", smallRoom},
-          {"room_seminar", seminarRoom}};
+          {"room_seminar", seminarRoom},
+          {"cornell_double", [] { return doubleSidedTwin(cornell()); }},
+          {"room_small_double", [] { return doubleSidedTwin(smallRoom()); }},
+          {"room_seminar_double", [] { return doubleSidedTwin(seminarRoom()); }}};
 }
 
 }  // namespace radiosity::test_scenes

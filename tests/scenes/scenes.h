@@ -45,6 +45,10 @@ struct SphereSpec {
 /// Closed seminar room of 3,138 polygons like their figure 2: 42 tables, 80 chairs, eight ceiling lamps.
 [[nodiscard]] TestScene seminarRoom();
 
+/// The same scene as many modellers export it: every surface double-sided, but for those that shine. These stay as they
+/// are, since a lamp whose other side shone too would be another lamp. What can be seen from within is as bright.
+[[nodiscard]] TestScene doubleSidedTwin(TestScene scene);
+
 /// Everything that make_scenes writes, by file name without extension.
 [[nodiscard]] std::vector<std::pair<std::string, std::function<TestScene()>>> allScenes();
 

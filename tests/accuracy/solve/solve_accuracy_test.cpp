@@ -27,7 +27,7 @@ LitScene solve(const test_scenes::TestScene& scene, const std::vector<std::strin
   const auto run = runSolve(RADIOSITY_CLIENT, file, folder, arguments);
   EXPECT_TRUE(run.exit_code == 0 || run.exit_code == 3) << "exit code " << run.exit_code;
   if (report != nullptr) *report = run.report;
-  return readLitScene(run.output);
+  return readLitScene(run.output, file);
 }
 
 /// The largest relative distance of any whole texel from the one value they all should have, any channel.
@@ -92,6 +92,11 @@ TEST(SolvedScene, CornellBoxIsWithinFivePercentOfThePathTracer) {
   const auto accuracy = measure(lit, reference);
   RecordProperty("solver_error", std::to_string(accuracy.solver.solverRms()));
   RecordProperty("total_error", std::to_string(accuracy.total.solverRms()));
+  RecordProperty("surface_median", std::to_string(accuracy.surface.median));
+  EXPECT_NEAR(accuracy.surface.mean_ratio, 1.0, 0.01);
+  EXPECT_LT(accuracy.surface.median, 0.025);  // of which the reference's own noise is 1.2 % by itself
+  EXPECT_EQ(accuracy.surface.leaks, 0U);
+  EXPECT_EQ(accuracy.surface.missed_lit, 0U);
   EXPECT_LT(accuracy.solver.solverRms(), 0.05);
   EXPECT_LT(accuracy.total.solverRms(), 0.05);
   EXPECT_LT(std::abs(accuracy.solver.bias), 0.01);
@@ -128,7 +133,7 @@ TEST(SolvedScene, LightThatVariesWithinTexelsIsCorrectedAndStated) {
     footprints.push_back(texel.footprint);
   }
   ASSERT_GT(rim.size(), 20U);
-  const auto truth = oracle::PathTracer(lit.scene).irradiance(footprints, {.samples = 4096});
+  const auto truth = oracle::PathTracer(lit.traced()).irradiance(footprints, {.samples = 4096});
   double found = 0.0, expected = 0.0;
   for (std::size_t i = 0; i < rim.size(); ++i) {
     found += lit.pages.at(static_cast<std::size_t>(rim[i].page)).at(rim[i].x, rim[i].y).y;

@@ -1,14 +1,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstring>
-#include <fstream>
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "tests/accuracy/compare.h"
 #include "tests/accuracy/lit_scene.h"
+#include "tests/accuracy/unit/glb_file.h"
 #include "tests/scenes/scenes.h"
 
 namespace radiosity::accuracy {
@@ -49,21 +48,6 @@ TEST(LitScene, ExrSurvivesTheRoundTripWithRowZeroFirst) {
   ASSERT_EQ(read.width, 3);
   ASSERT_EQ(read.height, 2);
   EXPECT_EQ(read.pixels, page.pixels);
-}
-
-/// A GLB of `gltf`, whose only buffer is `bin`.
-void writeGlb(const nlohmann::json& gltf, const std::string& bin, const std::filesystem::path& file) {
-  std::string text = gltf.dump();
-  text.resize((text.size() + 3) / 4 * 4, ' ');
-  std::string bytes = "glTF";
-  const auto put = [&](std::size_t v) { bytes.append(reinterpret_cast<const char*>(&v), 4); };
-  put(2);
-  put(28 + text.size() + bin.size());
-  put(text.size());
-  bytes += "JSON" + text;
-  put(bin.size());
-  bytes.append("BIN\0", 4);
-  std::ofstream(file, std::ios::binary) << bytes << bin;
 }
 
 TEST(LitScene, GlbAndPagesAreReadAsWritten) {
@@ -147,7 +131,7 @@ TEST(LitScene, TexturesAreMovedTurnedAndScaled) {
   writeGlb(gltf, std::string(reinterpret_cast<const char*>(numbers.data()), 60), glb);
   const auto scene = oracle::readGlb(glb);
   ASSERT_EQ(scene.triangles.size(), 1U);
-  const auto& uv = scene.triangles[0].texture_uv;
+  const auto& uv = scene.triangles[0].base_colour.uv;
   const double c = std::cos(turn), s = std::sin(turn);
   const std::array<glm::dvec2, 3> expected{
       glm::dvec2(0.25, 0.5), {0.25 + 2 * c, 0.5 - 2 * s}, {0.25 + 4 * s, 0.5 + 4 * c}};
@@ -174,6 +158,22 @@ TEST(FindTexels, EveryTexelOfAFaceIsWholeAndAreasAddUp) {
   EXPECT_NEAR(area, 6.0, 1e-9);
 }
 
+// The page holds one value for both; each is held against the truth of its own side.
+TEST(FindTexels, TheSidesOfADoubleSidedSurfaceAreTexelsOfTheirOwn) {
+  auto lit = litFurnace(0.5, 1.0F);
+  for (auto& triangle : lit.scene.triangles) triangle.double_sided = triangle.normal.x > 0.5;  // one wall
+  const auto texels = findTexels(lit);
+  ASSERT_EQ(texels.size(), 7U * 64U);
+  std::size_t backs = 0;
+  for (const auto& texel : texels) {
+    for (const auto& piece : texel.footprint.pieces) {
+      EXPECT_EQ(piece.normal, (texel.back ? -1.0 : 1.0) * lit.scene.triangles[piece.triangle].normal);
+    }
+    backs += texel.back ? 1 : 0;
+  }
+  EXPECT_EQ(backs, 64U);
+}
+
 TEST(Compare, ExactFurnaceHasNoErrorAndAScaledOneItsScale) {
   const double exact = 2.0 * std::numbers::pi;
   const auto lit = litFurnace(0.5, static_cast<float>(exact));
@@ -183,9 +183,13 @@ TEST(Compare, ExactFurnaceHasNoErrorAndAScaledOneItsScale) {
   EXPECT_EQ(good.solver.count, 50U);
   EXPECT_LT(good.solver.relative_rms, 1.5 * good.solver.reference_noise + 1e-6);
   EXPECT_LT(std::abs(good.total.bias), 0.01);
+  EXPECT_NEAR(good.surface.mean_ratio, 1.0, 0.01);
+  EXPECT_EQ(good.surface.compared, 50U);
   const auto bad = measure(litFurnace(0.5, static_cast<float>(1.1 * exact)), reference);
   EXPECT_NEAR(bad.solver.solverRms(), 0.1, 0.01);
   EXPECT_NEAR(bad.total.bias, 0.1, 0.01);
+  EXPECT_NEAR(bad.surface.mean_ratio, 1.1, 0.01);
+  EXPECT_NEAR(bad.surface.rms(), 0.1, 0.01);
 }
 
 TEST(Compare, LayoutsAreTheSameOnlyWhenUvsAre) {

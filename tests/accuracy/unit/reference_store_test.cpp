@@ -37,22 +37,42 @@ TEST(ReferenceStore, WhatIsSavedIsReadBackBitForBit) {
     EXPECT_EQ(made.reference.texels[i].x, again.reference.texels[i].x);
     EXPECT_EQ(made.reference.texels[i].plain, again.reference.texels[i].plain);
   }
-  EXPECT_EQ(made.reference.points[4].uv, again.reference.points[4].uv);
+  EXPECT_EQ(made.reference.points[4].position, again.reference.points[4].position);
+  EXPECT_EQ(made.reference.points[4].irradiance.mean_lux, again.reference.points[4].irradiance.mean_lux);
+  EXPECT_EQ(made.reference.cut_area, again.reference.cut_area);
 }
 
 TEST(ReferenceStore, TheKeyDependsOnAllThatTheValuesDependOn) {
-  const auto key = referenceKey(furnaceWithOnePage(0.5), kSmall);
-  EXPECT_EQ(key, referenceKey(furnaceWithOnePage(0.5), kSmall));
-  EXPECT_NE(key, referenceKey(furnaceWithOnePage(0.6), kSmall));
+  const auto key = [](const LitScene& lit, const ReferenceOptions& options = kSmall) {
+    return referenceKey(lit, options, ReferencePart::kTexels);
+  };
+  const auto of_half = key(furnaceWithOnePage(0.5));
+  EXPECT_EQ(of_half, key(furnaceWithOnePage(0.5)));
+  EXPECT_NE(of_half, key(furnaceWithOnePage(0.6)));
   auto moved = furnaceWithOnePage(0.5);
   moved.scene.triangles[0].lightmap_uv[1].x = 0.5;
-  EXPECT_NE(key, referenceKey(moved, kSmall));
+  EXPECT_NE(of_half, key(moved));
   auto finer = furnaceWithOnePage(0.5);
   finer.pages[0].width = 8;
-  EXPECT_NE(key, referenceKey(finer, kSmall));
+  EXPECT_NE(of_half, key(finer));
   auto more = kSmall;
   more.texel_samples = 128;
-  EXPECT_NE(key, referenceKey(furnaceWithOnePage(0.5), more));
+  EXPECT_NE(of_half, key(furnaceWithOnePage(0.5), more));
+  auto smooth = furnaceWithOnePage(0.5);
+  smooth.scene.triangles[0].shading[1] = {0, 0, 1};
+  EXPECT_NE(of_half, key(smooth));
+}
+
+TEST(ReferenceStore, PointsOutliveAChangeOfTheLayoutButNotOfTheScene) {
+  const auto key = [](const LitScene& lit) { return referenceKey(lit, kSmall, ReferencePart::kPoints); };
+  auto moved = furnaceWithOnePage(0.5);
+  moved.scene.triangles[0].lightmap_uv[1].x = 0.5;
+  moved.pages[0].width = 8;
+  EXPECT_EQ(key(furnaceWithOnePage(0.5)), key(moved));
+  EXPECT_NE(key(furnaceWithOnePage(0.5)), key(furnaceWithOnePage(0.6)));
+  auto unlit = furnaceWithOnePage(0.5);
+  unlit.unlit = furnaceWithOnePage(0.6).scene;
+  EXPECT_EQ(key(unlit), key(furnaceWithOnePage(0.6)));
 }
 
 TEST(ReferenceStore, AFileCutShortOrLengthenedOrForeignIsNotRead) {

@@ -20,6 +20,14 @@ TEST(SkyOption, IsThatOfTheSolve) {
   EXPECT_EQ(coloured.scene.sky_lower, glm::dvec3(9, 10, 12));
 }
 
+TEST(SkyOption, LightsWhatIsTracedWhereThatIsAnotherFile) {
+  LitScene lit;
+  lit.unlit.emplace();
+  setSky("1000/300", lit);
+  EXPECT_EQ(lit.traced().sky_upper, glm::dvec3(1000.0));
+  EXPECT_EQ(lit.traced().sky_lower, glm::dvec3(300.0));
+}
+
 TEST(SkyOption, YieldsToASkyOfTheScenesOwn) {
   auto scene = test_scenes::furnace(glm::dvec3(0.5), glm::dvec3(1.0));
   scene.sky_upper_nits = glm::dvec3(80.0);

@@ -27,6 +27,10 @@ SolveRow rowAt(double seconds, double truth, double stated) {
   row.measured = true;
   row.stated.total = stated;
   row.solver = row.total = row.plain = metrics(truth, 0.003);
+  row.surface.rms_with_noise = row.surface.p95 = truth;
+  row.surface.mean_ratio = 0.97;
+  row.surface.points = 200, row.surface.compared = 150, row.surface.dark = 40, row.surface.buried = 10;
+  row.surface.leaks = 7, row.surface.open_leaks = 3;
   return row;
 }
 
@@ -132,6 +136,11 @@ TEST(Report, JsonHoldsRowsAndSummaryAndMarkdownHasATableRow) {
   const auto text = toMarkdown(run, {series()});
   EXPECT_THAT(text, HasSubstr("| a<b | 0 | 0 | 1.00 |"));
   EXPECT_THAT(text, HasSubstr("Cycles 3.4.1"));
+  EXPECT_EQ(json["scenes"][0]["rows"][1]["surface"]["leaks"], 7);
+  EXPECT_NEAR(json["scenes"][0]["rows"][1]["surface"]["p95"].get<double>(), 0.01, 1e-9);
+  EXPECT_THAT(text,
+              HasSubstr("| a<b | 1.50 | 1.00 | 0.00 | 1.00 | 0.00 | 0.9700 | 7 (3 open) | 150 of 200 | dark in truth "
+                        "20.0 %, buried in solids 5.0 % |"));
   const auto bars = [&text](const char* from) {
     const auto line = text.substr(text.find(from), text.find('\n', text.find(from)) - text.find(from));
     return std::count(line.begin(), line.end(), '|');

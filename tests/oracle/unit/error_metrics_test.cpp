@@ -39,6 +39,14 @@ TEST(ErrorMetrics, WeightlessAndDarkEntriesDoNotSpoilTheRest) {
   EXPECT_EQ(metrics.p99, 0.0);
 }
 
+// A hundredth of the mean and less is dark: a leak there is an error of RMS, not one of so many thousand percent.
+TEST(ErrorMetrics, WhatIsNearlyBlackHasNoRelativeError) {
+  const glm::dvec3 one(1.0);
+  const auto metrics = measureError(std::vector<Comparison>{{one, one, {}, 1.0}, {0.5 * one, 1e-9 * one, {}, 1.0}});
+  EXPECT_EQ(metrics.p99, 0.0);
+  EXPECT_NEAR(metrics.relative_rms, 0.5, 1e-6);
+}
+
 TEST(ErrorMetrics, ReferenceNoiseIsTakenOutInSquares) {
   const glm::dvec3 one(1.0);
   const auto metrics = measureError(std::vector<Comparison>{{1.05 * one, one, 0.03 * one, 1.0}});

@@ -74,6 +74,18 @@ TEST(Scenes, ReflectancesAreBelowOne) {
   }
 }
 
+TEST(Scenes, ADoubleSidedTwinDiffersInTheSidesOfWhatDoesNotShineAlone) {
+  const auto single = cornell(), twin = doubleSidedTwin(single);
+  EXPECT_EQ(twin.name, "cornell_double");
+  EXPECT_EQ(twin.polygonCount(), single.polygonCount());
+  ASSERT_EQ(twin.materials.size(), single.materials.size());
+  for (std::size_t i = 0; i < twin.materials.size(); ++i) {
+    EXPECT_FALSE(single.materials[i].double_sided);
+    EXPECT_EQ(twin.materials[i].double_sided, single.materials[i].name != "light");
+    EXPECT_EQ(twin.materials[i].reflectance, single.materials[i].reflectance);
+  }
+}
+
 TEST(Scenes, BoxFacesOutwardsAndEnclosesItsVolume) {
   Object box;
   appendBox(box, {1, 2, 3}, {2, 4, 6}, allFaces(0));

@@ -1,0 +1,73 @@
+#include "tests/oracle/shading.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/vec4.hpp>
+
+namespace radiosity::oracle {
+namespace {
+
+template <typename T>
+T between(const std::array<T, 3>& corners, double u, double v) {
+  return corners[0] * (1.0 - u - v) + corners[1] * u + corners[2] * v;
+}
+
+}  // namespace
+
+std::pair<double, double> Shading::weights(const Triangle& triangle, const glm::dvec3& position) {
+  const auto& [a, b, c] = triangle.corners;
+  const auto normal = glm::cross(b - a, c - a);
+  const double square = glm::dot(normal, normal);
+  return {glm::dot(glm::cross(position - a, c - a), normal) / square,
+          glm::dot(glm::cross(b - a, position - a), normal) / square};
+}
+
+glm::dvec4 Shading::colour(const TextureUse& use, double u, double v) const {
+  const auto* texture = textureOf(use);
+  return texture == nullptr ? glm::dvec4(1.0) : texture->colour(between(use.uv, u, v));
+}
+
+glm::dvec3 Shading::reflectance(const Triangle& triangle, double u, double v) const {
+  auto result = triangle.reflectance * glm::dvec3(colour(triangle.base_colour, u, v));
+  if (triangle.coloured) result *= glm::dvec3(between(triangle.colours, u, v));
+  if (triangle.metallic > 0.0) {
+    const auto* texture = textureOf(triangle.metal);
+    const double blue = texture == nullptr ? 1.0 : texture->value(between(triangle.metal.uv, u, v)).z;
+    result *= 1.0 - triangle.metallic * blue;
+  }
+  if (triangle.specular != glm::dvec3(0.0)) {
+    const auto specular = triangle.specular * glm::dvec3(colour(triangle.specular_texture, u, v));
+    result *= 1.0 - std::max({specular.x, specular.y, specular.z});
+  }
+  return glm::clamp(result, glm::dvec3(0.0), glm::dvec3(kMostReflectance));
+}
+
+glm::dvec3 Shading::emission(const Triangle& triangle, double u, double v) const {
+  return triangle.emission_lux * glm::dvec3(colour(triangle.emissive, u, v));
+}
+
+double Shading::opacity(const Triangle& triangle, double u, double v) const {
+  if (!triangle.see_through) return 1.0;
+  double alpha = triangle.alpha * colour(triangle.base_colour, u, v).w;
+  if (triangle.coloured) alpha *= between(triangle.colours, u, v).w;
+  if (triangle.cutoff >= 0.0) alpha = alpha >= triangle.cutoff ? 1.0 : 0.0;
+  return alpha * (1.0 - triangle.transmission);
+}
+
+glm::dvec3 Shading::meanEmission(const Triangle& triangle) const {
+  if (triangle.emissive.texture < 0) return triangle.emission_lux;
+  constexpr int kSide = 16;
+  constexpr double kLeast = 0.01;  // what shines between the places counts too
+  glm::dvec3 sum(0.0);
+  for (int i = 0; i < kSide; ++i) {
+    for (int k = 0; k < kSide; ++k) {
+      const double root = std::sqrt((i + 0.5) / kSide), w = (k + 0.5) / kSide;
+      sum += emission(triangle, root * (1.0 - w), root * w);
+    }
+  }
+  return sum / static_cast<double>(kSide * kSide) + kLeast * triangle.emission_lux;
+}
+
+}  // namespace radiosity::oracle

@@ -1,0 +1,43 @@
+// What a surface reflects, emits and lets through at a place: factors, textures and colours of its corners together.
+// Immutable; any thread.
+#pragma once
+
+#include <glm/vec3.hpp>
+#include <utility>
+#include <vector>
+
+#include "tests/oracle/triangle_scene.h"
+
+namespace radiosity::oracle {
+
+/// Nothing reflects more: paths would not end.
+inline constexpr double kMostReflectance = 0.999;
+
+class Shading {
+ public:
+  /// Keeps its own copy of the triangles.
+  explicit Shading(const TriangleScene& scene) : triangles_(scene.triangles), textures_(scene.textures) {}
+
+  [[nodiscard]] const std::vector<Triangle>& triangles() const { return triangles_; }
+
+  /// (u, v): weights of the triangle's second and third corner, here and below.
+  [[nodiscard]] static std::pair<double, double> weights(const Triangle& triangle, const glm::dvec3& position);
+
+  [[nodiscard]] glm::dvec3 reflectance(const Triangle& triangle, double u, double v) const;
+  [[nodiscard]] glm::dvec3 emission(const Triangle& triangle, double u, double v) const;  ///< lux
+  [[nodiscard]] double opacity(const Triangle& triangle, double u, double v) const;
+
+  /// Over the triangle, estimated at some places; above 0 where the triangle can shine at all.
+  [[nodiscard]] glm::dvec3 meanEmission(const Triangle& triangle) const;
+
+ private:
+  [[nodiscard]] const Texture* textureOf(const TextureUse& use) const {
+    return use.texture < 0 ? nullptr : &textures_[static_cast<std::size_t>(use.texture)];
+  }
+  [[nodiscard]] glm::dvec4 colour(const TextureUse& use, double u, double v) const;
+
+  std::vector<Triangle> triangles_;
+  std::vector<Texture> textures_;
+};
+
+}  // namespace radiosity::oracle

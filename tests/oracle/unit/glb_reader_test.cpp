@@ -1,0 +1,136 @@
+// Materials by place, as a file states them: pictures are PPMs in the file itself.
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "tests/oracle/shading.h"
+#include "tests/oracle/triangle_scene.h"
+#include "tests/unit/client/temporary_folder.h"
+
+namespace radiosity::oracle {
+namespace {
+
+using nlohmann::json;
+
+/// A triangle (0,0) (1,0) (0,1) with its own coordinates as texture coordinates, under `material`, whose texture 0 has
+/// a left pixel of `left` and a right one of `right`, nearest. As .gltf with all of its data in URIs beside it.
+TriangleScene readTriangle(const json& material, const std::string& left, const std::string& right,
+                           const json& more_attributes = json::object()) {
+  const TemporaryFolder folder;
+  const std::vector<float> numbers{0,
+                                   0,
+                                   0,
+                                   1,
+                                   0,
+                                   0,
+                                   0,
+                                   1,
+                                   0,
+                                   /* uv */ 0,
+                                   0,
+                                   1,
+                                   0,
+                                   0,
+                                   1,
+                                   /* normals */ 0,
+                                   0,
+                                   1,
+                                   0,
+                                   0,
+                                   0,
+                                   0,
+                                   0,
+                                   2,
+                                   /* colours */ 1,
+                                   1,
+                                   1,
+                                   0,
+                                   0,
+                                   0,
+                                   1,
+                                   1,
+                                   1};
+  folder.write("data.bin", std::string(reinterpret_cast<const char*>(numbers.data()), 4 * numbers.size()));
+  folder.write("a b.ppm", "P6\n2 1\n255\n" + left + right);
+  json attributes{{"POSITION", 0}, {"TEXCOORD_0", 1}};
+  attributes.update(more_attributes);
+  json gltf{{"asset", {{"version", "2.0"}}},
+            {"scenes", {{{"nodes", {0}}}}},
+            {"nodes", {{{"mesh", 0}}}},
+            {"images", {{{"uri", "a%20b.ppm"}}}},
+            {"samplers", {{{"magFilter", 9728}}}},
+            {"textures", {{{"source", 0}, {"sampler", 0}}}},
+            {"materials", {material}},
+            {"meshes", {{{"primitives", {{{"attributes", attributes}, {"material", 0}}}}}}},
+            {"buffers", {{{"byteLength", 132}, {"uri", "data.bin"}}}},
+            {"bufferViews", {{{"buffer", 0}, {"byteLength", 132}}}}};
+  for (const auto& [offset, type] : {std::pair{0, "VEC3"}, {36, "VEC2"}, {60, "VEC3"}, {96, "VEC3"}})
+    gltf["accessors"].push_back(
+        {{"bufferView", 0}, {"byteOffset", offset}, {"componentType", 5126}, {"count", 3}, {"type", type}});
+  folder.write("a.gltf", gltf.dump());
+  return readGlb(folder.file("a.gltf"));
+}
+
+const json kTexture{{"index", 0}};
+
+TEST(GlbReader, MetalIsReadWhereTheTexturesUvsAre) {
+  const auto scene = readTriangle(
+      {{"pbrMetallicRoughness", {{"baseColorFactor", {0.8, 0.4, 0.2, 1}}, {"metallicRoughnessTexture", kTexture}}}},
+      std::string("\0\0\0", 3), "\xFF\xFF\xFF");
+  const Shading shading(scene);
+  const auto& triangle = shading.triangles().at(0);
+  EXPECT_NEAR(shading.reflectance(triangle, 0.25, 0.1).x, 0.8, 1e-9);  // u = 0.25: no metal
+  EXPECT_EQ(shading.reflectance(triangle, 0.75, 0.1).x, 0.0);
+}
+
+TEST(GlbReader, SpecularGlossinessLeavesWhatTheLargestSpecularChannelDoesNotTake) {
+  const json gloss{{"diffuseFactor", {0.8, 0.4, 0.2, 1}}, {"specularFactor", {0.25, 0.5, 0.1}}};
+  const auto plain = readTriangle({{"extensions", {{"KHR_materials_pbrSpecularGlossiness", gloss}}}}, "abc", "abc");
+  EXPECT_NEAR(plain.triangles.at(0).reflectance.x, 0.4, 1e-9);
+  auto textured = gloss;
+  textured["specularGlossinessTexture"] = kTexture;
+  const auto scene = readTriangle({{"extensions", {{"KHR_materials_pbrSpecularGlossiness", textured}}}},
+                                  std::string("\xFF\0\0", 3), std::string("\0\0\0", 3));
+  const Shading shading(scene);
+  EXPECT_NEAR(shading.reflectance(shading.triangles()[0], 0.25, 0.1).y, 0.4 * 0.75, 1e-9);
+  EXPECT_NEAR(shading.reflectance(shading.triangles()[0], 0.75, 0.1).y, 0.4, 1e-9);
+}
+
+TEST(GlbReader, EmissionIsThePictureTimesFactorAndStrength) {
+  const auto scene = readTriangle({{"emissiveFactor", {1, 0.5, 0}},
+                                   {"emissiveTexture", kTexture},
+                                   {"extensions", {{"KHR_materials_emissive_strength", {{"emissiveStrength", 4.0}}}}}},
+                                  std::string("\0\0\0", 3), std::string("\x80\xFF\xFF", 3));
+  const Shading shading(scene);
+  EXPECT_EQ(shading.emission(shading.triangles()[0], 0.25, 0.1), glm::dvec3(0.0));
+  const auto bright = shading.emission(shading.triangles()[0], 0.75, 0.1);
+  EXPECT_NEAR(bright.x, std::numbers::pi * 4.0 * 0.21586, 1e-3);
+  EXPECT_NEAR(bright.y, std::numbers::pi * 2.0, 1e-9);
+  EXPECT_TRUE(scene.warnings.empty());
+}
+
+TEST(GlbReader, NormalsAreOfUnitLengthOrNone) {
+  const auto scene = readTriangle(json::object(), "abc", "abc", {{"NORMAL", 2}});
+  EXPECT_EQ(scene.triangles.at(0).shading[0], glm::dvec3(0, 0, 1));
+  EXPECT_EQ(scene.triangles.at(0).shading[1], glm::dvec3(0.0));
+  EXPECT_EQ(scene.triangles.at(0).shading[2], glm::dvec3(0, 0, 1));
+}
+
+TEST(GlbReader, ColoursOfVerticesVaryOverTheTriangle) {
+  const auto scene = readTriangle({{"pbrMetallicRoughness", {{"metallicFactor", 0}}}}, "abc", "abc", {{"COLOR_0", 3}});
+  const Shading shading(scene);
+  EXPECT_NEAR(shading.reflectance(shading.triangles().at(0), 0.5, 0.25).x, 0.5, 1e-9);
+}
+
+TEST(GlbReader, ATextureThatIsNotThereCostsTheTextureAndIsNamed) {
+  const auto scene = readTriangle(
+      {{"pbrMetallicRoughness", {{"metallicFactor", 0}, {"baseColorTexture", {{"index", 7}}}}}}, "abc", "abc");
+  EXPECT_EQ(scene.triangles.at(0).base_colour.texture, -1);
+  ASSERT_EQ(scene.warnings.size(), 1U);
+  EXPECT_NE(scene.warnings[0].find("baseColorTexture"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace radiosity::oracle
