@@ -95,6 +95,36 @@ class SolveTest(ServiceCase):
         self.assertGreater(report["error"]["total"], 1e-6)
         self.assertFalse(report["reached"])
 
+    def test_aSceneWhoseLampIsTurnedAwayStatesNoError(self):
+        scene = plates.lit_document()
+        scene["nodes"][1]["rotation"] = [1, 0, 0, 0]  # about x: it faces up, now at y = -1 and so below the floor
+        scene["nodes"][1]["translation"] = [0, 2, 0]
+        plates.write_glb(self.folder / "turned.glb", scene)
+        _, errors = self.client("solve", "turned.glb", "-o", "lit.glb", "--report", "r.json", *QUICK)
+        self.assertIn("no light arrives: all of it leaves the scene; found in", errors)
+        self.assertIn("lamp /nodes/1 'lamp', material 'lamp' lights nothing", errors)
+        self.assertNotIn("error 0 %", errors)
+        report = json.loads((self.folder / "r.json").read_text())
+        self.assertEqual(report["unlit"], "all of it leaves the scene")
+        self.assertTrue(report["reached"])
+
+    def test_doubleSidedLightsWhatIsTurnedAway(self):
+        scene = plates.lit_document()
+        scene["nodes"][0]["rotation"] = [1, 0, 0, 0]  # the floor faces down: the lamp sees its back
+        plates.write_glb(self.folder / "turned.glb", scene)
+        _, errors = self.client("solve", "turned.glb", "-o", "dark.glb", "--report", "dark.json", *QUICK)
+        self.assertRegex(errors, r"% of the light ends on backs of single-sided faces: /nodes/0 'floor', material 'floor'")
+        self.assertIn("--double-sided", errors)
+        self.assertIsNotNone(json.loads((self.folder / "dark.json").read_text())["unlit"])
+        _, errors = self.client("solve", "turned.glb", "-o", "lit.glb", "--report", "r.json", "--double-sided", *QUICK)
+        self.assertNotIn("backs", errors)
+        report = json.loads((self.folder / "r.json").read_text())
+        self.assertTrue(report["settings"]["double_sided"])
+        self.assertIsNone(report["unlit"])
+        self.assertGreater(report["energy"]["absorbed"], 1)
+        for material in plates.Glb((self.folder / "lit.glb").read_bytes()).json["materials"]:
+            self.assertTrue(material["doubleSided"], material["name"])
+
     def test_memoryForLinksThatIsNoSizeIsRefused(self):
         _, errors = self.client("solve", self.scene, "-o", "lit.glb", "--link-memory", "much", expect=2)
         self.assertIn("--link-memory", errors)
