@@ -1,10 +1,12 @@
 """`radiosity solve` with a private server: files, report, exit codes, and nothing left behind."""
+import base64
 import json
 import os
 import signal
 import struct
 import time
 import unittest
+import zlib
 
 import plates
 from harness import ServiceCase, marked_processes, program, waitForLine
@@ -107,6 +109,21 @@ class SolveTest(ServiceCase):
         report = json.loads((self.folder / "r.json").read_text())
         self.assertEqual(report["unlit"], "all of it leaves the scene")
         self.assertTrue(report["reached"])
+
+    def test_aLampWhoseEmissiveTextureIsBlackIsNamed(self):
+        def chunk(kind, data):
+            return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+        png = b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">2I5B", 1, 1, 8, 2, 0, 0, 0)) + \
+            chunk(b"IDAT", zlib.compress(bytes(4))) + chunk(b"IEND", b"")
+        scene = plates.lit_document()
+        scene["images"] = [{"uri": "data:image/png;base64," + base64.b64encode(png).decode()}]
+        scene["textures"] = [{"source": 0}]
+        scene["materials"][plates.LAMP_MATERIAL]["emissiveTexture"] = {"index": 0}
+        plates.write_glb(self.folder / "black.glb", scene)
+        _, errors = self.client("solve", "black.glb", "-o", "lit.glb", *QUICK)
+        self.assertIn("lamp /nodes/1 'lamp', material 'lamp' shines with nothing: its emissive texture is black", errors)
+        self.assertIn("no light arrives: the only lamp shines with nothing", errors)
 
     def test_doubleSidedLightsWhatIsTurnedAway(self):
         scene = plates.lit_document()
