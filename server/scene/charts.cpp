@@ -15,6 +15,7 @@
 #include "server/scene/atlas.h"
 #include "server/scene/burial_record.h"
 #include "server/scene/coverage.h"
+#include "server/scene/emitters.h"
 #include "server/scene/lineage.h"
 #include "server/scene/lit_sides.h"
 #include "server/scene/opacity.h"
@@ -77,6 +78,7 @@ class Builder {
       const bool two_sided = surface.first_node[1] != kNone;
       hides.push_back(surface.see_through ? Hides::kNothing : two_sided ? Hides::kSheet : Hides::kSolid);
     }
+    findEmitters(scene_, patches_);
     std::vector<LeafPiece> pieces;
     ClosedSolids solids;
     const auto measure = [&](std::size_t part) {  // each reads what the other does not write
