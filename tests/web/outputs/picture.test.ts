@@ -13,7 +13,7 @@ const WIDTH = 480;
 const HEIGHT = 360;
 /** Side of the squares of pixels that are compared: wider than texels are in the picture, so that their blur is not. */
 const BLOCK = 24;
-const PATHS = 32; // a pixel; 18,432 a block, whose mean they know to some 0.5 %
+const PATHS = 16; // a pixel; 9,216 a block, whose mean they know to some 0.7 %
 
 const out = folder();
 const pages = new Pages();
@@ -129,10 +129,14 @@ async function differenceOf(name: string, scene?: string): Promise<Difference> {
   return difference;
 }
 
-/** TOLERANCES */
+/**
+ * The light in all is known to 0.1 % and solved to 1 %. Blocks differ by 1.3 to 2.2 %: by the paths' noise, by shadows and
+ * contacts narrower than texels, and by the mip levels of textures. A lightmap that is upside down is off by 30 % and
+ * more, pi in the wrong place by a factor of three.
+ */
 function expectTheSame({ ratio, rms }: Difference): void {
   expect(Math.abs(ratio - 1)).toBeLessThan(0.01);
-  expect(rms).toBeLessThan(0.04);
+  expect(rms).toBeLessThan(0.03);
 }
 
 it('the Cornell box', async () => expectTheSame(await differenceOf('cornell')));

@@ -36,8 +36,10 @@ async function faultsOfAll(scenes: readonly string[]): Promise<Record<string, Fa
   ]);
   await inTurns(wanted, 2, async ({ scene, name, options }) => {
     const file = join(out, name.replace(/\.gltf$/, '.glb'));
-    await solve(scene, file, ...QUICK, ...options);
-    const faults = await faultsOf(file);
+    const faults = await solve(scene, file, ...QUICK, ...options).then(
+      () => faultsOf(file),
+      (failure: Error) => ({ errors: [failure.message], cutoffs: [] }),
+    );
     if (faults.errors.length + faults.cutoffs.length > 0) all[name] = faults;
   });
   return all;
