@@ -9,6 +9,7 @@
 #include "server/scene/import_instancing.h"
 #include "server/scene/lightmap.h"
 #include "server/scene/lit_glb_mesh.h"
+#include "server/scene/lit_glb_rules.h"
 
 namespace radiosity::scene {
 namespace {
@@ -92,26 +93,6 @@ void dropOldPages(Json& gltf) {
   }
 }
 
-/// What is lit on both sides is drawn from both, also where settings say so and not the file.
-void showBothSides(const Scene& scene, Json& gltf) {
-  auto& materials = gltf["materials"];
-  if (materials.is_null()) materials = Json::array();
-  const auto own = materials.size();
-  for (std::size_t m = 0; m < std::min(own, scene.materials.size()); ++m) {
-    if (scene.materials[m].double_sided) materials[m]["doubleSided"] = true;
-  }
-  if (scene.materials.size() > own && scene.materials[own].double_sided && gltf.contains("meshes")) {
-    for (auto& mesh : gltf["meshes"]) {
-      for (auto& primitive : mesh["primitives"]) {
-        if (primitive.contains("material")) continue;
-        primitive["material"] = own;
-        if (materials.size() == own) materials.push_back({{"doubleSided", true}});
-      }
-    }
-  }
-  if (materials.empty()) gltf.erase("materials");
-}
-
 class Exporter {
  public:
   Exporter(const Document& document, const tinygltf::Model& model, Document& out)
@@ -130,6 +111,7 @@ class Exporter {
       i = end;
     }
     auto bytes = builder_.takeBytes();
+    if (auto filled = fillTexcoordGaps(out_.gltf, document_.buffers.size(), bytes); !filled) return filled;
     if (!bytes.empty()) {
       out_.gltf["buffers"].push_back({{"byteLength", bytes.size()}});
       out_.buffers.push_back(std::make_shared<const Bytes>(std::move(bytes)));
@@ -264,7 +246,8 @@ Result<Document> withLightmapUvs(const Document& document, const Scene& scene, c
   out.imported.reset();
   freeTexcoord1(out.gltf);
   dropOldPages(out.gltf);
-  showBothSides(scene, out.gltf);
+  dropIdleCutoffs(out.gltf);
+  separateCones(out.gltf);
   if (auto ok = Exporter(document, *model, out).run(placements(scene, patches)); !ok) return tl::unexpected(ok.error());
   return out;
 }
