@@ -34,6 +34,12 @@ bool hasTooFewNormals(const tinygltf::Model& model, const Json& attributes) {
   return attributes.contains("NORMAL") && count("NORMAL") < count("POSITION");
 }
 
+/// None: an empty array.
+Json& targetsOf(Json& primitive) {
+  static Json none = Json::array();
+  return primitive.contains("targets") ? primitive["targets"] : none;
+}
+
 std::size_t textBytes(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace).size(); }
 
 }  // namespace
@@ -156,7 +162,10 @@ Result<Json> LitMeshBuilder::pagePrimitive(const Json& source, const LitPrimitiv
   auto attributes = source["attributes"];
   attributes.erase("TEXCOORD_1");
   if (hasTooFewNormals(model_, attributes)) {  // no file may have them
-    for (const auto* member : {"NORMAL", "TANGENT"}) attributes.erase(member);
+    for (const auto* member : {"NORMAL", "TANGENT"}) {
+      attributes.erase(member);
+      for (auto& target : targetsOf(primitive)) target.erase(member);
+    }
   }
   auto copied = copyAttributes(attributes, vertices.source);
   if (!copied) return copied;
