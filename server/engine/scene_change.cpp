@@ -37,8 +37,10 @@ bool sameShape(const Scene& a, const Material& m, const Scene& b, const Material
 }
 
 bool sameShading(const Scene& a, const Material& m, const Scene& b, const Material& n) {
-  return m.base_color == n.base_color && m.metallic == n.metallic && m.emission == n.emission &&
-         sameTexture(a, m.base_color_texture, b, n.base_color_texture) &&
+  return m.base_color == n.base_color && m.metallic == n.metallic && m.specular == n.specular &&
+         m.emission == n.emission && sameTexture(a, m.base_color_texture, b, n.base_color_texture) &&
+         sameTexture(a, m.metallic_texture, b, n.metallic_texture) &&
+         sameTexture(a, m.specular_texture, b, n.specular_texture) &&
          sameTexture(a, m.emissive_texture, b, n.emissive_texture);
 }
 

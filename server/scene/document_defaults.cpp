@@ -13,6 +13,7 @@ namespace {
 
 constexpr const char* kLights = "KHR_lights_punctual";
 constexpr const char* kVisibility = "KHR_node_visibility";
+constexpr const char* kSpecularGlossiness = "KHR_materials_pbrSpecularGlossiness";
 constexpr const char* kEmissiveStrength = "KHR_materials_emissive_strength";
 
 void setDefault(Json& object, const char* member, Json value) {
@@ -117,6 +118,11 @@ bool materialiseMaterial(Json& material) {
   setDefault(extensions, kEmissiveStrength, Json::object());
   auto& strength = extensions[kEmissiveStrength];
   if (strength.is_object()) setDefault(strength, "emissiveStrength", 1.0);
+  if (const auto found = extensions.find(kSpecularGlossiness); found != extensions.end() && found->is_object()) {
+    setDefault(*found, "diffuseFactor", Json::array({1.0, 1.0, 1.0, 1.0}));
+    setDefault(*found, "specularFactor", Json::array({1.0, 1.0, 1.0}));
+    setDefault(*found, "glossinessFactor", 1.0);
+  }
   return true;
 }
 

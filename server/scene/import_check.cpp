@@ -49,6 +49,7 @@ struct AttributeRule {
 };
 
 constexpr AttributeRule kAttributes[] = {{"POSITION", false, false, true, false},
+                                         {"NORMAL", false, false, true, false},
                                          {"TEXCOORD_0", false, true, false, false},
                                          {"TEXCOORD_1", false, true, false, false},
                                          {"COLOR_0", false, false, true, true}};
@@ -64,14 +65,47 @@ Result<void> checkAttributes(const ImportContext& context, const tinygltf::Primi
   for (const auto& [name, index] : primitive.attributes) {
     const auto& accessor = context.model.accessors[static_cast<std::size_t>(index)];
     const auto where = pointer + "/attributes/" + escapeToken(name);
-    if (count != 0 && accessor.count != count) return context.bad(where, "attributes differ in count");
-    count = accessor.count;
     for (const auto& rule : kAttributes) {
       if (name == rule.name && !allowed(rule, accessor.type)) return context.bad(where, "accessor has the wrong type");
     }
+    if (name == "NORMAL") continue;  // vertices without one are shaded flat (import_normals.h)
+    if (count != 0 && accessor.count != count) return context.bad(where, "attributes differ in count");
+    count = accessor.count;
     if (name == "POSITION" && accessor.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT) {
       return context.bad(where, "accessor has the wrong component type");
     }
+  }
+  return {};
+}
+
+/// Morph targets move what the primitive has, and are copied with it.
+Result<void> checkTargets(const ImportContext& context, const tinygltf::Primitive& primitive,
+                          const std::string& pointer) {
+  const auto positions = primitive.attributes.find("POSITION");
+  if (positions == primitive.attributes.end()) return {};
+  const auto count = context.model.accessors[static_cast<std::size_t>(positions->second)].count;
+  for (std::size_t t = 0; t < primitive.targets.size(); ++t) {
+    for (const auto& [name, index] : primitive.targets[t]) {
+      const auto& accessor = context.model.accessors[static_cast<std::size_t>(index)];
+      const auto where = pointer + "/targets/" + std::to_string(t) + "/" + escapeToken(name);
+      if (accessor.count != count) return context.bad(where, "has not as many elements as the primitive has vertices");
+      if ((name == "POSITION" || name == "NORMAL") && accessor.type != TINYGLTF_TYPE_VEC3)
+        return context.bad(where, "accessor has the wrong type");
+    }
+  }
+  return {};
+}
+
+Result<void> checkSkins(const ImportContext& context) {
+  if (!context.document.gltf.contains("skins")) return {};
+  const auto& skins = context.document.gltf["skins"];
+  for (std::size_t s = 0; s < skins.size(); ++s) {
+    if (!skins[s].contains("inverseBindMatrices")) continue;
+    const auto& accessor = context.model.accessors[skins[s]["inverseBindMatrices"].get<std::size_t>()];
+    const auto where = "/skins/" + std::to_string(s) + "/inverseBindMatrices";
+    if (accessor.type != TINYGLTF_TYPE_MAT4 || accessor.componentType != TINYGLTF_COMPONENT_TYPE_FLOAT)
+      return context.bad(where, "accessor must be MAT4 of floats");
+    if (accessor.count < skins[s]["joints"].size()) return context.bad(where, "are fewer than the joints");
   }
   return {};
 }
@@ -111,6 +145,7 @@ Result<void> checkMeshes(const ImportContext& context) {
       const auto& json = context.document.gltf["meshes"][m]["primitives"][p];
       if (auto ok = checkCompression(context, primitives[p], json, pointer); !ok) return ok;
       if (auto ok = checkAttributes(context, primitives[p], pointer); !ok) return ok;
+      if (auto ok = checkTargets(context, primitives[p], pointer); !ok) return ok;
       if (auto ok = checkIndices(context, primitives[p], pointer); !ok) return ok;
     }
   }
@@ -184,6 +219,7 @@ Result<void> checkModel(ImportContext& context) {
   if (auto ok = checkBuffers(context); !ok) return ok;
   if (auto ok = checkAccessors(context); !ok) return ok;
   if (auto ok = checkMeshes(context); !ok) return ok;
+  if (auto ok = checkSkins(context); !ok) return ok;
   if (auto ok = checkTree(context); !ok) return ok;
   return checkTransforms(context);
 }

@@ -90,9 +90,12 @@ void warnCameras(ImportContext& context) {
 void warnLights(ImportContext& context) {
   for (std::size_t i = 0; i < context.model.lights.size(); ++i) {
     const auto& light = context.model.lights[i];
-    const bool narrow = light.spot.innerConeAngle >= light.spot.outerConeAngle;
-    if (light.type != "spot" || (!narrow && light.spot.outerConeAngle <= std::numbers::pi / 2 + 1e-6)) continue;
-    context.warn("/extensions/KHR_lights_punctual/lights/" + std::to_string(i), "needs inner < outer <= pi/2");
+    if (light.type != "spot") continue;
+    const auto pointer = "/extensions/KHR_lights_punctual/lights/" + std::to_string(i) + "/spot/";
+    if (light.spot.outerConeAngle > std::numbers::pi / 2 + 1e-6)
+      context.warn(pointer + "outerConeAngle", "is above pi/2; lit as pi/2");
+    if (light.spot.innerConeAngle >= light.spot.outerConeAngle)
+      context.warn(pointer + "innerConeAngle", "is not below outerConeAngle; lit with a hard edge");
   }
 }
 
@@ -128,7 +131,6 @@ void warnAboutOddities(ImportContext& context) {
   warnImages(context);
   const auto& gltf = context.document.gltf;
   if (gltf.contains("animations")) context.warn("/animations", "are ignored; the scene is lit at rest");
-  if (gltf.contains("skins")) context.warn("/skins", "are ignored; meshes are lit in the pose they were modelled in");
 }
 
 }  // namespace radiosity::scene

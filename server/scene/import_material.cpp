@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
+#include <set>
 #include <string>
 
 #include "server/scene/image_decode.h"
@@ -13,6 +15,8 @@ namespace {
 constexpr int kRepeat = 10497;
 constexpr int kClamp = 33071;
 constexpr int kMirror = 33648;
+constexpr int kNearest = 9728;
+constexpr const char* kSpecularGlossiness = "KHR_materials_pbrSpecularGlossiness";
 // All images together; one image may have max_image_pixels.
 constexpr std::size_t kTotalImageBudget = 8;
 
@@ -27,20 +31,16 @@ class MaterialImporter {
     pointer_ = "/materials/" + std::to_string(index);
     const auto& source = context_.materials[index];
     const auto& json = context_.document.gltf["materials"][index];
+    warnDangling(json, pointer_, "");
     Material out;
     out.name = source.name;
-    const auto& color = source.pbrMetallicRoughness.baseColorFactor;
-    out.base_color = {unit(color[0]), unit(color[1]), unit(color[2])};
-    out.alpha = unit(color[3]);
     out.double_sided = source.doubleSided;
     out.alpha_cutoff = static_cast<float>(source.alphaCutoff);
     if (auto ok = readAlphaMode(source, out); !ok) return ok;
     if (auto ok = readEmission(source, json, out); !ok) return ok;
-    if (auto ok = readMetallic(source, out); !ok) return ok;
-    auto base =
-        readTexture(source.pbrMetallicRoughness.baseColorTexture, json, "/pbrMetallicRoughness/baseColorTexture");
-    if (!base) return tl::unexpected(base.error());
-    out.base_color_texture = *base;
+    const auto* specular = extensionOf(json, kSpecularGlossiness);
+    if (auto ok = specular != nullptr ? readSpecular(*specular, json, out) : readMetallic(source, json, out); !ok)
+      return ok;
     readOthers(json, out);
     context_.scene.materials.push_back(std::move(out));
     return {};
@@ -74,24 +74,52 @@ class MaterialImporter {
                     "is above 1, which glTF leaves to KHR_materials_emissive_strength; taken as it is");
     }
     if (out.emission == glm::vec3(0.0F)) return {};  // its texture changes nothing
-    auto texture = readTexture(source.emissiveTexture, json, "/emissiveTexture");
-    if (!texture) return tl::unexpected(texture.error());
-    out.emissive_texture = *texture;
+    return readTexture(json, "/emissiveTexture", Coding::kSrgb, out.emissive_texture);
+  }
+
+  Result<void> readMetallic(const tinygltf::Material& source, const Json& json, Material& out) {
+    const auto& color = source.pbrMetallicRoughness.baseColorFactor;
+    out.base_color = {unit(color[0]), unit(color[1]), unit(color[2])};
+    out.alpha = unit(color[3]);
+    const auto* base = "/pbrMetallicRoughness/baseColorTexture";
+    if (auto ok = readTexture(json, base, Coding::kSrgb, out.base_color_texture); !ok) return ok;
+    out.metallic = unit(source.pbrMetallicRoughness.metallicFactor);
+    if (out.metallic == 0.0F) return {};
+    const auto* member = "/pbrMetallicRoughness/metallicRoughnessTexture";
+    if (auto ok = readTexture(json, member, Coding::kLinear, out.metallic_texture); !ok) return ok;
+    foldMetallic(out);
+    if (out.metallic >= 0.999F && out.metallic_texture.texture == kNone) {
+      context_.warn(pointer_, "'" + source.name + "' is wholly metallic and so reflects nothing diffusely");
+    }
     return {};
   }
 
-  /// Scene has one metallic value a material: factor x mean of the blue channel (linear).
-  Result<void> readMetallic(const tinygltf::Material& source, Material& out) {
-    out.metallic = unit(source.pbrMetallicRoughness.metallicFactor);
-    const auto texture = source.pbrMetallicRoughness.metallicRoughnessTexture.index;
-    const auto image = texture < 0 ? -1 : context_.model.textures[static_cast<std::size_t>(texture)].source;
-    if (image >= 0 && out.metallic > 0.0F) {
-      const auto mean = meanBlue(static_cast<std::size_t>(image));
-      if (!mean) return tl::unexpected(mean.error());
-      out.metallic *= *mean;
+  /// Most textures say the same of all the surface, and need not be kept.
+  void foldMetallic(Material& out) {
+    if (!uniform_blue_) return;
+    out.metallic *= *uniform_blue_;
+    out.metallic_texture = {};
+  }
+
+  /// KHR_materials_pbrSpecularGlossiness, which comes before pbrMetallicRoughness where a material has both.
+  Result<void> readSpecular(const Json& extension, const Json& material, Material& out) {
+    const auto factor = [&](const char* member, std::size_t c) {
+      return extension.contains(member) ? unit(extension[member][c].get<double>()) : 1.0F;
+    };
+    for (std::size_t c = 0; c < 3; ++c) {
+      out.base_color[static_cast<int>(c)] = factor("diffuseFactor", c);
+      out.specular[static_cast<int>(c)] = factor("specularFactor", c);
     }
-    if (out.metallic >= 0.999F) {
-      context_.warn(pointer_, "'" + source.name + "' is wholly metallic and so reflects nothing diffusely");
+    out.alpha = factor("diffuseFactor", 3);
+    const std::string prefix = std::string("/extensions/") + kSpecularGlossiness;
+    if (auto ok = readTexture(material, prefix + "/diffuseTexture", Coding::kSrgb, out.base_color_texture); !ok)
+      return ok;
+    if (out.specular == glm::vec3(0.0F)) return {};
+    const auto texture = prefix + "/specularGlossinessTexture";
+    if (auto ok = readTexture(material, texture, Coding::kSrgb, out.specular_texture); !ok) return ok;
+    const bool mirror = std::max({out.specular.r, out.specular.g, out.specular.b}) >= 0.999F;
+    if (mirror && out.specular_texture.texture == kNone) {
+      context_.warn(pointer_, "'" + out.name + "' is wholly specular and so reflects nothing diffusely");
     }
     return {};
   }
@@ -108,31 +136,75 @@ class MaterialImporter {
     }
   }
 
-  [[nodiscard]] const Json* textureJson(const Json& material, const char* member) const {
-    const Json::json_pointer pointer(member);
-    return material.contains(pointer) ? &material.at(pointer) : nullptr;
+  [[nodiscard]] std::size_t countOf(const char* list) const {
+    const auto found = context_.document.gltf.find(list);
+    return found == context_.document.gltf.end() ? 0 : found->size();
   }
 
-  Result<TextureUse> readTexture(const tinygltf::TextureInfo& info, const Json& material, const char* member) {
-    TextureUse use;
-    const auto where = pointer_ + member;
-    if (info.index < 0) return use;
-    const auto& texture = context_.model.textures[static_cast<std::size_t>(info.index)];
-    if (texture.source < 0) {
-      context_.warn("/textures/" + std::to_string(info.index), "has no source that we can read; white is used");
-      return use;
+  /// What an optional member refers to, of a list that has `count` entries; none, too, where it has no such entry.
+  static std::optional<std::size_t> referenceOf(const Json& object, const char* member, std::size_t count) {
+    const auto found = object.find(member);
+    if (found == object.end() || !found->is_number_integer()) return std::nullopt;
+    const auto index = found->get<std::uint64_t>();  // what is negative is more than any count
+    return index < count ? std::optional<std::size_t>(index) : std::nullopt;
+  }
+
+  /// A reference that the schema lets pass although nothing is there.
+  void warnDanglingReference(const Json& object, const char* member, const char* list, const std::string& where,
+                             const char* what) {
+    const auto count = countOf(list);
+    if (!object.contains(member) || referenceOf(object, member, count)) return;
+    context_.warn(where + "/" + member, "is " + object[member].dump() + ", but /" + list + " has " +
+                                            std::to_string(count) + " entries; " + what);
+  }
+
+  /// In a material and its extensions, also of textures that light does not need. Values nest at most 64 deep.
+  void warnDangling(const Json& value, const std::string& where, const std::string& key) {
+    if (!value.is_object()) return;
+    if (key.ends_with("Texture") && value.contains("index") && value["index"].is_number_integer())
+      warnDanglingReference(value, "index", "textures", where, "the texture is left out");
+    for (const auto& [name, child] : value.items()) {
+      if (name != "extras") warnDangling(child, where + "/" + escapeToken(name), name);
     }
-    use.texcoord = info.texCoord;
-    if (const auto* json = textureJson(material, member)) readTransform(*json, use);
-    if (use.texcoord > 1) {
-      context_.warn(where + "/texCoord", "only TEXCOORD_0 and TEXCOORD_1 are read; 0 is used");
-      use.texcoord = 0;
+  }
+
+  enum class Coding { kSrgb, kLinear };
+
+  /// `member`: a JSON pointer into the material. Without such a texture, or with one that cannot be had, `use` stays as
+  /// it is.
+  Result<void> readTexture(const Json& material, const std::string& member, Coding coding, TextureUse& use) {
+    uniform_blue_.reset();
+    const Json::json_pointer pointer(member);
+    if (!material.contains(pointer)) return {};
+    const auto& info = material.at(pointer);
+    const auto index = referenceOf(info, "index", countOf("textures"));
+    if (!index) return {};
+    const auto& texture = context_.document.gltf["textures"][*index];
+    const auto image = imageOf(texture, "/textures/" + std::to_string(*index));
+    if (!image) return {};
+    TextureUse read;
+    read.texcoord = static_cast<int>(info.value("texCoord", 0));
+    readTransform(info, read);
+    if (read.texcoord > 1) {
+      context_.warn(pointer_ + member + "/texCoord", "only TEXCOORD_0 and TEXCOORD_1 are read; 0 is used");
+      read.texcoord = 0;
     }
-    if (auto ok = readWrap(texture, use); !ok) return tl::unexpected(ok.error());
-    const auto loaded = colorTexture(static_cast<std::size_t>(texture.source));
+    if (auto ok = readSampler(texture, read); !ok) return ok;
+    const auto loaded = coding == Coding::kSrgb ? colorTexture(*image) : dataTexture(*image);
     if (!loaded) return tl::unexpected(loaded.error());
-    use.texture = *loaded;
-    return use;
+    read.texture = *loaded;
+    use = read;
+    return {};
+  }
+
+  /// The image of a texture that is used; without one there is no texture, with a warning.
+  std::optional<std::size_t> imageOf(const Json& texture, const std::string& where) {
+    const auto image = referenceOf(texture, "source", context_.document.images.size());
+    if (!warned_.insert(where).second) return image;
+    if (!texture.contains("source")) context_.warn(where, "has no source that we can read; white is used");
+    warnDanglingReference(texture, "source", "images", where, "the texture is left out");
+    warnDanglingReference(texture, "sampler", "samplers", where, "the texture repeats and is filtered linearly");
+    return image;
   }
 
   static void readTransform(const Json& info, TextureUse& use) {
@@ -149,19 +221,20 @@ class MaterialImporter {
     use.texcoord = transform->value("texCoord", use.texcoord);
   }
 
-  Result<void> readWrap(const tinygltf::Texture& texture, TextureUse& use) {
-    if (texture.sampler < 0) return {};
-    const auto& sampler = context_.model.samplers[static_cast<std::size_t>(texture.sampler)];
-    for (const auto wrap : {sampler.wrapS, sampler.wrapT}) {
-      if (wrap != kRepeat && wrap != kClamp && wrap != kMirror) {
-        return context_.bad("/samplers/" + std::to_string(texture.sampler),
-                            "unknown wrap mode " + std::to_string(wrap));
-      }
+  Result<void> readSampler(const Json& texture, TextureUse& use) {
+    const auto index = referenceOf(texture, "sampler", countOf("samplers"));
+    if (!index) return {};
+    const auto& sampler = context_.document.gltf["samplers"][*index];
+    const int wrap_s = sampler.value("wrapS", kRepeat), wrap_t = sampler.value("wrapT", kRepeat);
+    for (const auto wrap : {wrap_s, wrap_t}) {
+      if (wrap != kRepeat && wrap != kClamp && wrap != kMirror)
+        return context_.bad("/samplers/" + std::to_string(*index), "unknown wrap mode " + std::to_string(wrap));
     }
-    use.repeat_u = sampler.wrapS != kClamp;
-    use.repeat_v = sampler.wrapT != kClamp;
-    use.mirror_u = sampler.wrapS == kMirror;
-    use.mirror_v = sampler.wrapT == kMirror;
+    use.repeat_u = wrap_s != kClamp;
+    use.repeat_v = wrap_t != kClamp;
+    use.mirror_u = wrap_s == kMirror;
+    use.mirror_v = wrap_t == kMirror;
+    use.nearest = sampler.value("magFilter", 0) == kNearest;
     return {};
   }
 
@@ -203,29 +276,58 @@ class MaterialImporter {
     return index;
   }
 
-  Result<float> meanBlue(std::size_t image) {
-    if (const auto found = mean_blue_.find(image); found != mean_blue_.end()) return found->second;
-    const auto* before = known(image);
-    auto mean = before != nullptr ? before->mean_blue : std::nullopt;
-    auto pixels = before != nullptr ? before->pixels : 0;
-    if (!mean) {
-      const auto texture = decode(image);
-      if (!texture) return tl::unexpected(texture.error());
-      double sum = 0.0;
-      for (std::size_t i = 2; i < texture->rgba.size(); i += 4) sum += texture->rgba[i];
-      pixels = texture->rgba.size() / 4;
-      mean = static_cast<float>(sum / 255.0 / static_cast<double>(pixels));
+  /// kNone where blue is the same all over: `uniform_blue_` then is that.
+  Result<std::uint32_t> dataTexture(std::size_t image) {
+    auto found = data_textures_.find(image);
+    if (found == data_textures_.end()) {
+      const auto loaded = loadData(image);
+      if (!loaded) return tl::unexpected(loaded.error());
+      found = data_textures_.emplace(image, *loaded).first;
     }
-    keep(image, pixels).mean_blue = mean;
-    mean_blue_[image] = *mean;
-    return *mean;
+    uniform_blue_ = found->second.blue;
+    return found->second.texture;
+  }
+
+  struct DataTexture {
+    std::uint32_t texture = kNone;
+    std::optional<float> blue;
+  };
+
+  Result<DataTexture> loadData(std::size_t image) {
+    const auto* before = known(image);
+    auto data = before != nullptr ? before->data : nullptr;
+    auto blue = before != nullptr ? before->blue : std::nullopt;
+    auto pixels = before != nullptr ? before->pixels : 0;
+    if (!data && !blue) {
+      auto texture = decode(image);
+      if (!texture) return tl::unexpected(texture.error());
+      texture->srgb = false;
+      pixels = texture->rgba.size() / 4;
+      blue = sameBlue(*texture);
+      if (!blue) data = std::make_shared<const Texture>(std::move(*texture));
+    }
+    auto& kept = keep(image, pixels);
+    kept.data = data;
+    kept.blue = blue;
+    if (blue) return DataTexture{kNone, blue};
+    context_.scene.textures.push_back(std::move(data));
+    return DataTexture{static_cast<std::uint32_t>(context_.scene.textures.size() - 1), std::nullopt};
+  }
+
+  static std::optional<float> sameBlue(const Texture& texture) {
+    for (std::size_t i = 2; i < texture.rgba.size(); i += 4) {
+      if (texture.rgba[i] != texture.rgba[2]) return std::nullopt;
+    }
+    return texture.rgba.size() > 2 ? static_cast<float>(texture.rgba[2]) / 255.0F : 1.0F;
   }
 
   ImportContext& context_;
   std::size_t pixels_left_;
   std::string pointer_;
   std::map<std::size_t, std::uint32_t> color_textures_;  ///< by image
-  std::map<std::size_t, float> mean_blue_;               ///< by image
+  std::map<std::size_t, DataTexture> data_textures_;     ///< by image
+  std::optional<float> uniform_blue_;                    ///< of the last data texture that was asked for
+  std::set<std::string> warned_;                         ///< textures whose references were looked at
 };
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <unordered_set>
 
 #include "server/scene/accessor.h"
+#include "server/scene/import_normals.h"
 
 namespace radiosity::scene {
 namespace {
@@ -85,19 +86,33 @@ float finiteOr(double value, float otherwise) {
 
 }  // namespace
 
-Result<const std::vector<std::uint32_t>*> MeshImporter::primitivesOf(std::size_t mesh) {
-  auto& done = done_[mesh];
-  if (done) return &*done;
-  done.emplace();
-  for (std::size_t p = 0; p < context_.model.meshes[mesh].primitives.size(); ++p) {
-    const auto imported = importPrimitive(mesh, p);
-    if (!imported) return tl::unexpected(imported.error());
-    if (*imported) done->push_back(**imported);
+Result<std::vector<MeshImporter::Posed>> MeshImporter::primitivesOf(const tinygltf::Node& node, const glm::dmat4& world,
+                                                                    const std::string& pointer, bool skinned) {
+  auto pose = poses_.poseOf(node, world, pointer);
+  if (!skinned) {
+    pose.skin = -1;
+    pose.mirrored = false;
   }
-  return &*done;
+  auto found = done_.find({node.mesh, pose});
+  if (found == done_.end()) {
+    std::vector<Imported> all;
+    const auto mesh = static_cast<std::size_t>(node.mesh);
+    for (std::size_t p = 0; p < context_.model.meshes[mesh].primitives.size(); ++p) {
+      const auto imported = importPrimitive(mesh, p, pose);
+      if (!imported) return tl::unexpected(imported.error());
+      if (*imported) all.push_back(**imported);
+    }
+    found = done_.emplace(std::pair{node.mesh, pose}, std::move(all)).first;
+  }
+  std::vector<Posed> out;
+  glm::dmat4 joined(1.0);
+  if (pose.mirrored) joined[0][0] = -1.0;
+  for (const auto& one : found->second) out.push_back({one.primitive, one.skinned ? joined : world});
+  return out;
 }
 
-Result<std::optional<std::uint32_t>> MeshImporter::importPrimitive(std::size_t mesh, std::size_t index) {
+Result<std::optional<MeshImporter::Imported>> MeshImporter::importPrimitive(std::size_t mesh, std::size_t index,
+                                                                            const Pose& pose) {
   const auto pointer = "/meshes/" + std::to_string(mesh) + "/primitives/" + std::to_string(index);
   const auto& source = context_.model.meshes[mesh].primitives[index];
   if (source.mode < TINYGLTF_MODE_TRIANGLES) {
@@ -108,19 +123,22 @@ Result<std::optional<std::uint32_t>> MeshImporter::importPrimitive(std::size_t m
     context_.warn(pointer, "has no POSITION; skipped");
     return std::nullopt;
   }
-  if (!source.targets.empty()) context_.warn(pointer, "morph targets are ignored; the base shape is lit");
   Primitive primitive;
   primitive.mesh = static_cast<std::uint32_t>(mesh);
   primitive.primitive = static_cast<std::uint32_t>(index);
   if (auto ok = readVertices(source, primitive, pointer); !ok) return tl::unexpected(ok.error());
+  const auto skinned = poses_.apply(pose, source, pointer, primitive);
+  if (!skinned) return tl::unexpected(skinned.error());
   if (auto ok = readTriangles(source, primitive, pointer); !ok) return tl::unexpected(ok.error());
   if (primitive.indices.empty()) {
     context_.warn(pointer, "has no triangles with area; skipped");
     return std::nullopt;
   }
+  if (const auto faults = settleNormals(primitive); faults.count() != 0)
+    context_.warn(pointer + "/attributes/NORMAL", faults.text(primitive.positions.size()));
   primitive.material = materialOf(source);
   context_.scene.primitives.push_back(std::move(primitive));
-  return static_cast<std::uint32_t>(context_.scene.primitives.size() - 1);
+  return Imported{static_cast<std::uint32_t>(context_.scene.primitives.size() - 1), *skinned};
 }
 
 Result<void> MeshImporter::readVertices(const tinygltf::Primitive& source, Primitive& primitive,
@@ -145,6 +163,21 @@ Result<void> MeshImporter::readVertices(const tinygltf::Primitive& source, Primi
       primitive.color0.emplace_back(std::max(finiteOr(v[0], 1), 0.0F), std::max(finiteOr(v[1], 1), 0.0F),
                                     std::max(finiteOr(v[2], 1), 0.0F), std::clamp(alpha, 0.0F, 1.0F));
     }
+  }
+  return readNormals(source, primitive);
+}
+
+/// As they stand in the file: of them there may be more or fewer than vertices.
+Result<void> MeshImporter::readNormals(const tinygltf::Primitive& source, Primitive& primitive) {
+  const auto found = source.attributes.find("NORMAL");
+  if (found == source.attributes.end()) return {};
+  const auto reader = AccessorReader::open(context_.document, context_.model, static_cast<std::size_t>(found->second));
+  if (!reader) return tl::unexpected(reader.error());
+  const auto count = std::min(reader->size(), primitive.positions.size());
+  primitive.normals.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto v = reader->at(i);
+    primitive.normals.emplace_back(v[0], v[1], v[2]);
   }
   return {};
 }

@@ -2,30 +2,47 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "server/scene/import_context.h"
+#include "server/scene/import_pose.h"
 
 namespace radiosity::scene {
 
 class MeshImporter {
  public:
-  explicit MeshImporter(ImportContext& context) : context_(context), done_(context.model.meshes.size()) {}
+  explicit MeshImporter(ImportContext& context) : context_(context), poses_(context) {}
 
-  /// Indices into Scene::primitives of the mesh's primitives that have triangles; imported on first use.
-  [[nodiscard]] Result<const std::vector<std::uint32_t>*> primitivesOf(std::size_t mesh);
+  struct Posed {
+    std::uint32_t primitive;  ///< index into Scene::primitives
+    glm::dmat4 world;         ///< the node's, unless a skin places the vertices
+  };
+  /// The primitives of a node's mesh that have triangles, as the node poses them; imported on first use. Nodes that
+  /// pose a mesh alike share them. `world` is the node's, `pointer` names it. Skins are left aside where `skinned` is
+  /// false.
+  [[nodiscard]] Result<std::vector<Posed>> primitivesOf(const tinygltf::Node& node, const glm::dmat4& world,
+                                                        const std::string& pointer, bool skinned);
 
  private:
-  [[nodiscard]] Result<std::optional<std::uint32_t>> importPrimitive(std::size_t mesh, std::size_t index);
+  struct Imported {
+    std::uint32_t primitive;
+    bool skinned;  ///< its vertices are where the joints put them
+  };
+  [[nodiscard]] Result<std::optional<Imported>> importPrimitive(std::size_t mesh, std::size_t index, const Pose& pose);
   [[nodiscard]] Result<void> readVertices(const tinygltf::Primitive& source, Primitive& primitive,
                                           const std::string& pointer);
+  [[nodiscard]] Result<void> readNormals(const tinygltf::Primitive& source, Primitive& primitive);
   [[nodiscard]] Result<void> readTriangles(const tinygltf::Primitive& source, Primitive& primitive,
                                            const std::string& pointer);
   [[nodiscard]] std::uint32_t materialOf(const tinygltf::Primitive& source);
 
   ImportContext& context_;
-  std::vector<std::optional<std::vector<std::uint32_t>>> done_;
+  PoseImporter poses_;
+  std::map<std::pair<int, Pose>, std::vector<Imported>> done_;  ///< by mesh, and how it is posed
   std::size_t vertices_ = 0;
   std::uint32_t default_material_ = kNone;
 };

@@ -3,38 +3,19 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <glm/gtc/quaternion.hpp>
-#include <glm/gtc/type_ptr.hpp>
 #include <numbers>
 #include <utility>
 
 #include "server/scene/import_instancing.h"
 #include "server/scene/import_mesh.h"
+#include "server/scene/node_transform.h"
 
 namespace radiosity::scene {
 namespace {
 
 constexpr double kMaxSkyNits = 1e12;
+constexpr double kMaxConeRad = std::numbers::pi / 2;
 constexpr double kMinTexelScale = 1.0 / 64.0, kMaxTexelScale = 64.0;
-
-glm::dmat4 localMatrix(const tinygltf::Node& node) {
-  if (!node.matrix.empty()) return glm::make_mat4(node.matrix.data());
-  const auto vec3 = [](const std::vector<double>& v, double otherwise) {
-    return v.empty() ? glm::dvec3(otherwise) : glm::dvec3(v[0], v[1], v[2]);
-  };
-  const auto& q = node.rotation;
-  const auto rotation = q.empty() ? glm::dquat(1.0, 0.0, 0.0, 0.0) : glm::dquat(q[3], q[0], q[1], q[2]);
-  return Trs{vec3(node.translation, 0.0), glm::normalize(rotation), vec3(node.scale, 1.0)}.matrix();
-}
-
-bool isFinite(const glm::dmat4& m) {
-  for (int c = 0; c < 4; ++c) {
-    for (int r = 0; r < 4; ++r) {
-      if (!std::isfinite(m[c][r])) return false;
-    }
-  }
-  return true;
-}
 
 class NodeWalk {
  public:
@@ -96,7 +77,7 @@ class NodeWalk {
         return ok;
     }
     if (node.camera >= 0) {
-      if (auto ok = placeCamera(static_cast<std::size_t>(node.camera), world); !ok) return ok;
+      if (auto ok = placeCamera(static_cast<std::size_t>(node.camera), cameraPose(at.parent, node)); !ok) return ok;
     }
     if (const auto* light = extensionOf(json, "KHR_lights_punctual"); light != nullptr && visible) {
       if (auto ok = placeLight((*light)["light"].get<std::size_t>(), world); !ok) return ok;
@@ -120,23 +101,35 @@ class NodeWalk {
 
   /// `placed`: all but the primitive.
   Result<void> placeMesh(const tinygltf::Node& node, const Json& json, Instance placed) {
-    if (node.skin >= 0) context_.warn(pointer_, "skin is ignored; the mesh is lit in the pose it was modelled in");
-    const auto primitives = meshes_.primitivesOf(static_cast<std::size_t>(node.mesh));
-    if (!primitives) return tl::unexpected(primitives.error());
+    const auto* instancing = extensionOf(json, "EXT_mesh_gpu_instancing");
+    if (instancing != nullptr && node.skin >= 0)
+      context_.warn(pointer_ + "/skin", "is ignored beside EXT_mesh_gpu_instancing, whose elements it cannot place");
     const auto world = placed.world;
-    std::vector<glm::dmat4> worlds{world};
-    if (const auto* instancing = extensionOf(json, "EXT_mesh_gpu_instancing")) {
-      const auto locals = readInstancing(context_.document, context_.model, (*instancing)["attributes"],
-                                         pointer_ + "/extensions/EXT_mesh_gpu_instancing/attributes");
-      if (!locals) return tl::unexpected(locals.error());
-      worlds.clear();
-      for (const auto& local : *locals) worlds.push_back(world * local.matrix());
+    const auto primitives = meshes_.primitivesOf(node, world, pointer_, instancing == nullptr);
+    if (!primitives) return tl::unexpected(primitives.error());
+    if (instancing == nullptr) {
+      for (const auto& posed : *primitives) {
+        placed.primitive = posed.primitive;
+        placed.world = posed.world;
+        if (auto ok = addInstance(placed); !ok) return ok;
+      }
+      return {};
     }
-    for (const auto& instance_world : worlds) {
-      if (!isFinite(instance_world)) return context_.bad(pointer_, "world transform is not finite");
-      for (const auto primitive : **primitives) {
-        placed.primitive = primitive;
-        placed.world = instance_world;
+    return placeElements(*primitives, (*instancing)["attributes"], placed);
+  }
+
+  /// Of EXT_mesh_gpu_instancing.
+  Result<void> placeElements(const std::vector<MeshImporter::Posed>& primitives, const Json& attributes,
+                             Instance placed) {
+    const auto world = placed.world;
+    const auto pointer = pointer_ + "/extensions/EXT_mesh_gpu_instancing/attributes";
+    const auto locals = readInstancing(context_.document, context_.model, attributes, pointer);
+    if (!locals) return tl::unexpected(locals.error());
+    for (const auto& local : *locals) {
+      placed.world = world * local.matrix();
+      if (!isFinite(placed.world)) return context_.bad(pointer_, "world transform is not finite");
+      for (const auto& posed : primitives) {
+        placed.primitive = posed.primitive;
         if (auto ok = addInstance(placed); !ok) return ok;
       }
     }
@@ -198,10 +191,11 @@ class NodeWalk {
     light.range = source.range;
     light.inner_cone_rad = source.spot.innerConeAngle;
     light.outer_cone_rad = source.spot.outerConeAngle;
-    const bool cone =
-        light.inner_cone_rad < light.outer_cone_rad && light.outer_cone_rad <= std::numbers::pi / 2 + 1e-6;
-    if (light.kind == LightKind::kSpot && !cone) {
-      return context_.bad(pointer + "/spot", "needs innerConeAngle < outerConeAngle <= pi/2");
+    if (light.kind == LightKind::kSpot) {
+      if (!(light.outer_cone_rad > 0)) return context_.bad(pointer + "/spot/outerConeAngle", "must be above 0");
+      // What is odd about them is said once a light (import_lint.h).
+      light.outer_cone_rad = std::min(light.outer_cone_rad, kMaxConeRad);
+      light.inner_cone_rad = std::min(light.inner_cone_rad, light.outer_cone_rad);
     }
     if (context_.scene.lights.size() >= context_.limits.max_nodes) {
       return context_.tooLarge(pointer_, "more than " + std::to_string(context_.limits.max_nodes) + " lights");

@@ -15,8 +15,9 @@
 namespace radiosity::scene {
 
 struct DecodedImage {
-  SharedList<Texture>::Element color;  ///< null: no colour was asked of it
-  std::optional<float> mean_blue;      ///< 0 to 1, as it is encoded; none: not asked for
+  SharedList<Texture>::Element color;  ///< sRGB; null: not asked for
+  SharedList<Texture>::Element data;   ///< linear; null: not asked for, or blue is the same all over
+  std::optional<float> blue;           ///< 0 to 1: that which is the same all over
   std::size_t pixels = 0;
 };
 /// By the bytes that they are decoded from, which so stay those of that image.

@@ -53,6 +53,8 @@ constexpr std::array<const char*, static_cast<std::size_t>(Ref::kCount)> kRefPoi
 constexpr double kBig = std::numeric_limits<float>::max();
 // Exporters that compute in float write 1.0000001; the importer clamps.
 constexpr double kSlack = 1e-4;
+// Of a morph target: what is far beyond any shape that one models.
+constexpr double kMostWeight = 1e6;
 // All integers must fit the `int` that tinygltf casts them to.
 constexpr double kMaxInt = std::numeric_limits<std::int32_t>::max();
 
@@ -66,6 +68,7 @@ struct Member {
   double max = kBig;
   bool required = false;
   std::span<const std::string_view> choices = {};  ///< of kString; empty: any
+  bool may_dangle = false;                         ///< of kIndex: costs what refers to it, not the scene
 };
 
 constexpr Member req(Member m) {
@@ -88,6 +91,9 @@ constexpr Member uint(const char* name, double min = 0, double max = kMaxInt) {
   return {.name = name, .kind = Kind::kUint, .min = min, .max = max};
 }
 constexpr Member index(const char* name, Ref ref) { return {.name = name, .kind = Kind::kIndex, .ref = ref}; }
+constexpr Member looseIndex(const char* name, Ref ref) {
+  return {.name = name, .kind = Kind::kIndex, .ref = ref, .may_dangle = true};
+}
 constexpr Member indices(const char* name, Ref ref) { return {.name = name, .kind = Kind::kIndices, .ref = ref}; }
 constexpr Member indexMap(const char* name, Ref ref) { return {.name = name, .kind = Kind::kIndexMap, .ref = ref}; }
 constexpr Member indexMaps(const char* name, Ref ref) { return {.name = name, .kind = Kind::kIndexMaps, .ref = ref}; }
@@ -129,7 +135,8 @@ constexpr Member kAccessor[] = {string("name"),
 constexpr Member kPrimitive[] = {req(indexMap("attributes", Ref::kAccessors)), index("indices", Ref::kAccessors),
                                  index("material", Ref::kMaterials), uint("mode", 0, 6),
                                  indexMaps("targets", Ref::kAccessors)};
-constexpr Member kMesh[] = {string("name"), req(objects("primitives", kPrimitive)), numbers("weights", 0)};
+constexpr Member kMesh[] = {string("name"), req(objects("primitives", kPrimitive)),
+                            numbers("weights", 0, -kMostWeight, kMostWeight)};
 
 constexpr Member kNodeLight[] = {req(index("light", Ref::kLights))};
 constexpr Member kNodeVisibility[] = {boolean("visible")};
@@ -146,13 +153,13 @@ constexpr Member kNode[] = {string("name"),
                             numbers("rotation", 4),
                             numbers("scale", 3),
                             numbers("translation", 3),
-                            numbers("weights", 0),
+                            numbers("weights", 0, -kMostWeight, kMostWeight),
                             object("extensions", kNodeExtensions)};
 
 constexpr Member kTextureTransform[] = {numbers("offset", 2), number("rotation"), numbers("scale", 2),
                                         uint("texCoord")};
 constexpr Member kTextureInfoExtensions[] = {object("KHR_texture_transform", kTextureTransform)};
-constexpr Member kTextureInfo[] = {req(index("index", Ref::kTextures)), uint("texCoord"), number("scale"),
+constexpr Member kTextureInfo[] = {req(looseIndex("index", Ref::kTextures)), uint("texCoord"), number("scale"),
                                    number("strength"), object("extensions", kTextureInfoExtensions)};
 constexpr Member kPbr[] = {numbers("baseColorFactor", 4, -kSlack, 1 + kSlack), object("baseColorTexture", kTextureInfo),
                            number("metallicFactor", -kSlack, 1 + kSlack),
@@ -161,10 +168,14 @@ constexpr Member kPbr[] = {numbers("baseColorFactor", 4, -kSlack, 1 + kSlack), o
 constexpr Member kEmissiveStrength[] = {number("emissiveStrength", 0)};
 constexpr Member kTransmission[] = {number("transmissionFactor", -kSlack, 1 + kSlack),
                                     object("transmissionTexture", kTextureInfo)};
+constexpr Member kSpecularGlossiness[] = {
+    numbers("diffuseFactor", 4, -kSlack, 1 + kSlack), object("diffuseTexture", kTextureInfo),
+    numbers("specularFactor", 3, -kSlack, 1 + kSlack), number("glossinessFactor", -kSlack, 1 + kSlack),
+    object("specularGlossinessTexture", kTextureInfo)};
 constexpr Member kNoMembers[] = {string("name")};
-constexpr Member kMaterialExtensions[] = {object("KHR_materials_emissive_strength", kEmissiveStrength),
-                                          object("KHR_materials_transmission", kTransmission),
-                                          object("KHR_materials_unlit", kNoMembers)};
+constexpr Member kMaterialExtensions[] = {
+    object("KHR_materials_emissive_strength", kEmissiveStrength), object("KHR_materials_transmission", kTransmission),
+    object("KHR_materials_pbrSpecularGlossiness", kSpecularGlossiness), object("KHR_materials_unlit", kNoMembers)};
 constexpr Member kMaterial[] = {string("name"),
                                 object("pbrMetallicRoughness", kPbr),
                                 object("normalTexture", kTextureInfo),
@@ -177,7 +188,8 @@ constexpr Member kMaterial[] = {string("name"),
                                 object("extensions", kMaterialExtensions)};
 
 constexpr Member kImage[] = {string("name"), string("uri"), string("mimeType"), index("bufferView", Ref::kBufferViews)};
-constexpr Member kTexture[] = {string("name"), index("sampler", Ref::kSamplers), index("source", Ref::kImages)};
+constexpr Member kTexture[] = {string("name"), looseIndex("sampler", Ref::kSamplers),
+                               looseIndex("source", Ref::kImages)};
 constexpr Member kSampler[] = {string("name"), uint("magFilter"), uint("minFilter"), uint("wrapS"), uint("wrapT")};
 constexpr Member kPerspective[] = {number("aspectRatio", 0), req(number("yfov", 0)), number("zfar", 0),
                                    req(number("znear", 0))};
@@ -319,6 +331,7 @@ class Checker {
   }
 
   Result<void> integerAt(const Json& value, const Member& member, const std::string& pointer) {
+    if (member.may_dangle && value.is_number_integer()) return {};
     const bool negative = value.is_number_integer() && !value.is_number_unsigned() && value.get<std::int64_t>() < 0;
     if (!value.is_number_integer() || negative) return bad(pointer, "must be an integer of 0 or more");
     const auto x = value.get<std::uint64_t>();
@@ -380,10 +393,15 @@ Result<void> checkVersion(const Json& asset, const std::string& name) {
   return {};
 }
 
-constexpr std::array<std::string_view, 8> kSupported = {
-    "EXT_mesh_gpu_instancing",    "KHR_lights_punctual",  "KHR_materials_emissive_strength",
-    "KHR_materials_transmission", "KHR_materials_unlit",  "KHR_mesh_quantization",
-    "KHR_node_visibility",        "KHR_texture_transform"};
+constexpr std::array<std::string_view, 9> kSupported = {"EXT_mesh_gpu_instancing",
+                                                        "KHR_lights_punctual",
+                                                        "KHR_materials_emissive_strength",
+                                                        "KHR_materials_pbrSpecularGlossiness",
+                                                        "KHR_materials_transmission",
+                                                        "KHR_materials_unlit",
+                                                        "KHR_mesh_quantization",
+                                                        "KHR_node_visibility",
+                                                        "KHR_texture_transform"};
 
 bool isSupported(const std::string& extension) {
   return std::find(kSupported.begin(), kSupported.end(), extension) != kSupported.end();

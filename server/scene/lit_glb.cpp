@@ -151,6 +151,8 @@ class Exporter {
       child["translation"] = {t.x, t.y, t.z};
       child["rotation"] = {q.x, q.y, q.z, q.w};
       child["scale"] = {s.x, s.y, s.z};
+      if (document_.gltf["nodes"][node].contains("weights"))
+        child["weights"] = document_.gltf["nodes"][node]["weights"];
       children.push_back(out_.gltf["nodes"].size());
       out_.gltf["nodes"].push_back(std::move(child));
     }

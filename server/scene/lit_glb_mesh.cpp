@@ -52,6 +52,17 @@ void negate(std::uint8_t* bytes, std::size_t size, int component_type) {
   if (component_type == TINYGLTF_COMPONENT_TYPE_SHORT) negateComponents<std::int16_t>(bytes, size);
 }
 
+bool hasTooFewNormals(const tinygltf::Model& model, const Json& attributes) {
+  const auto count = [&](const char* name) { return model.accessors[attributes[name].get<std::size_t>()].count; };
+  return attributes.contains("NORMAL") && count("NORMAL") < count("POSITION");
+}
+
+/// None: an empty array.
+Json& targetsOf(Json& primitive) {
+  static Json none = Json::array();
+  return primitive.contains("targets") ? primitive["targets"] : none;
+}
+
 std::size_t textBytes(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace).size(); }
 
 }  // namespace
@@ -193,6 +204,12 @@ Result<Json> LitMeshBuilder::partPrimitive(const Json& source, const LitPrimitiv
   auto primitive = source;
   auto attributes = source["attributes"];
   attributes.erase("TEXCOORD_1");
+  if (hasTooFewNormals(model_, attributes)) {  // no file may have them
+    for (const auto* member : {"NORMAL", "TANGENT"}) {
+      attributes.erase(member);
+      for (auto& target : targetsOf(primitive)) target.erase(member);
+    }
+  }
   auto copied = copyAttributes(attributes, vertices.source, turned);
   if (!copied) return copied;
   primitive["attributes"] = std::move(*copied);

@@ -6,11 +6,11 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
-#include <optional>
+#include <string>
 
 #include "server/scene/chart_corners.h"
 #include "server/scene/patch_scene.h"
-#include "server/scene/shade_texture.h"
+#include "server/scene/shade_layers.h"
 
 namespace radiosity::scene {
 namespace {
@@ -18,30 +18,33 @@ namespace {
 constexpr float kMaxReflectance = 0.999F;
 constexpr int kSide = 4;  ///< kSide^2 samples a leaf
 
-struct Value {
-  glm::vec3 emission{0.0F}, reflectance{0.0F};
-};
+using Value = MaterialLayers::Value;
 
-/// Of a leaf's samples: the mean of what is everywhere the same is just that.
+/// Of a leaf's samples, by how much of the surface is there: the mean of what is everywhere the same is just that.
 struct Sum {
   glm::dvec3 emission{0.0}, reflectance{0.0};
+  double weight = 0.0;
 };
+
+Material materialOf(const Scene& scene, std::uint32_t material) {
+  return material < scene.materials.size() ? scene.materials[material] : Material{};
+}
 
 class MaterialShader {
  public:
   MaterialShader(const Scene& scene, const PatchScene& patches, std::uint32_t material, PatchMaterials& out)
-      : scene_(scene), patches_(patches), out_(out) {
-    if (material < scene.materials.size()) material_ = scene.materials[material];
-    base_ = pyramidFor(material_.base_color_texture);
-    emissive_ = pyramidFor(material_.emissive_texture);
-  }
+      : scene_(scene),
+        patches_(patches),
+        out_(out),
+        name_(materialOf(scene, material).name),
+        layers_(scene, materialOf(scene, material)) {}
 
   void shade(std::uint32_t id) {
     surface_ = patches_.surfaces[id];
     instance_ = &scene_.instances[surface_.instance];
     primitive_ = &scene_.primitives[instance_->primitive];
-    if (!base_ && !emissive_ && primitive_->color0.empty()) {
-      fill(clamped(constant()));
+    if (!layers_.hasTextures() && primitive_->color0.empty()) {
+      fill(clamped(layers_.at([](const TextureUse&) { return MaterialLayers::Place{}; }, glm::vec4(1.0F))));
       return;
     }
     shadeLeaves();
@@ -55,22 +58,9 @@ class MaterialShader {
   }
 
   [[nodiscard]] bool wasClamped() const { return was_clamped_; }
-  [[nodiscard]] const std::string& name() const { return material_.name; }
+  [[nodiscard]] const std::string& name() const { return name_; }
 
  private:
-  [[nodiscard]] std::optional<TexturePyramid> pyramidFor(const TextureUse& use) const {
-    if (use.texture >= scene_.textures.size()) return std::nullopt;
-    const Texture& texture = scene_.textures[use.texture];
-    const auto bytes = static_cast<std::size_t>(std::max(0, texture.width)) *
-                       static_cast<std::size_t>(std::max(0, texture.height)) * 4;
-    if (bytes == 0 || texture.rgba.size() < bytes) return std::nullopt;
-    return std::optional<TexturePyramid>(std::in_place, texture);
-  }
-
-  [[nodiscard]] Value constant() const {
-    return {material_.emission * static_cast<float>(M_PI), material_.base_color * (1.0F - material_.metallic)};
-  }
-
   Value clamped(Value value) {
     for (int c = 0; c < 3; ++c) {
       float& rho = value.reflectance[c];
@@ -99,33 +89,29 @@ class MaterialShader {
     return set[c.vertex[0]] * w[0] + set[c.vertex[1]] * w[1] + set[c.vertex[2]] * w[2];
   }
 
-  [[nodiscard]] glm::vec3 textureAt(const std::optional<TexturePyramid>& texture, const TextureUse& use,
-                                    const ChartCorners& c, const glm::dvec2& p) const {
-    if (!texture) return glm::vec3(1.0F);
+  /// Of a texture, over the part of a leaf that a sample stands for.
+  [[nodiscard]] MaterialLayers::Place placeOf(const TextureUse& use, const ChartCorners& c, const glm::dvec2& p) const {
     const double step = 1.0 / kSide;
     const glm::vec2 uv = uvAt(use, c, c.weightsAt(p));
     const glm::vec2 right = uvAt(use, c, c.weightsAt(p + glm::dvec2(step, 0.0))) - uv;
     const glm::vec2 down = uvAt(use, c, c.weightsAt(p + glm::dvec2(0.0, step))) - uv;
-    return texture->sample(use, uv, glm::max(glm::abs(right), glm::abs(down)));
+    return {uv, glm::max(glm::abs(right), glm::abs(down))};
   }
 
   Value valueAt(const ChartCorners& c, const glm::dvec2& p) {
-    Value value = constant();
+    glm::vec4 vertex(1.0F);
     if (!primitive_->color0.empty()) {
       const glm::vec3 w = glm::clamp(c.weightsAt(p), 0.0F, 1.0F);
       const auto& color = primitive_->color0;
-      value.reflectance *= glm::vec3(color[c.vertex[0]] * w[0] + color[c.vertex[1]] * w[1] + color[c.vertex[2]] * w[2]);
+      vertex = color[c.vertex[0]] * w[0] + color[c.vertex[1]] * w[1] + color[c.vertex[2]] * w[2];
     }
-    value.reflectance *= textureAt(base_, material_.base_color_texture, c, p);
-    value.emission *= textureAt(emissive_, material_.emissive_texture, c, p);
-    return clamped(value);
+    return layers_.at([&](const TextureUse& use) { return placeOf(use, c, p); }, vertex);
   }
 
   /// Triangle by triangle, each sample point of the leaf grid that lies in it.
   void shadeLeaves() {
     const std::size_t count = std::size_t{surface_.width} * surface_.height;
     sums_.assign(count, Sum{});
-    samples_.assign(count, 0);
     const std::size_t nodes = levelGrid(surface_.width, surface_.height, surface_.level_count).offset;
     emission_.resize(nodes);
     reflectance_.resize(nodes);
@@ -134,11 +120,10 @@ class MaterialShader {
     for (std::size_t i = 0; i < count; ++i) {
       const LeafPoint& point = patches_.leaves[surface_.first_leaf + i];
       Value value;
-      if (samples_[i] > 0) {
-        const auto samples = static_cast<double>(samples_[i]);
-        value = {sums_[i].emission / samples, sums_[i].reflectance / samples};
+      if (sums_[i].weight > 0.0) {
+        value = {sums_[i].emission / sums_[i].weight, sums_[i].reflectance / sums_[i].weight};
       } else if (point.triangle != kNone) {
-        value = valueAt(cornersOf(patches_, point.triangle, *instance_, *primitive_), glm::dvec2(point.texel));
+        value = clamped(valueAt(cornersOf(patches_, point.triangle, *instance_, *primitive_), glm::dvec2(point.texel)));
       }
       emission_[i] = value.emission;
       reflectance_[i] = value.reflectance;
@@ -157,10 +142,13 @@ class MaterialShader {
         if (std::min({w.x, w.y, w.z}) < -1e-6F) continue;
         const std::size_t leaf =
             static_cast<std::size_t>(y / kSide) * surface_.width + static_cast<std::size_t>(x / kSide);
-        const Value value = valueAt(c, p);
-        sums_[leaf].emission += glm::dvec3(value.emission);
-        sums_[leaf].reflectance += glm::dvec3(value.reflectance);
-        ++samples_[leaf];
+        const Value found = valueAt(c, p);
+        if (!(found.weight > 0.0F)) continue;  // nothing is there
+        const Value value = clamped(found);
+        const double weight = value.weight;
+        sums_[leaf].emission += glm::dvec3(value.emission) * weight;
+        sums_[leaf].reflectance += glm::dvec3(value.reflectance) * weight;
+        sums_[leaf].weight += weight;
       }
   }
 
@@ -192,13 +180,12 @@ class MaterialShader {
   const Scene& scene_;
   const PatchScene& patches_;
   PatchMaterials& out_;
-  Material material_;
-  std::optional<TexturePyramid> base_, emissive_;
+  std::string name_;
+  MaterialLayers layers_;
   Surface surface_;
   const Instance* instance_ = nullptr;
   const Primitive* primitive_ = nullptr;
   std::vector<Sum> sums_;
-  std::vector<std::uint32_t> samples_;
   std::vector<glm::vec3> emission_, reflectance_;  ///< by node of a side
   bool was_clamped_ = false;
 };

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <glm/common.hpp>
+#include <utility>
 
 namespace radiosity::scene {
 namespace {
@@ -43,11 +44,11 @@ struct Lookup {
   int x, y;
   glm::vec2 next;
 };
-Lookup lookupAt(const TextureUse& use, const glm::vec2& uv, int width, int height) {
-  const glm::vec2 place =
-      glm::vec2(fold(uv.x, use.repeat_u), fold(uv.y, use.repeat_v)) * glm::vec2(width, height) - 0.5F;
+Lookup lookupAt(const TextureUse& use, const glm::vec2& uv, int width, int height, bool nearest) {
+  const glm::vec2 place = glm::vec2(fold(uv.x, use.repeat_u), fold(uv.y, use.repeat_v)) * glm::vec2(width, height) -
+                          (nearest ? 0.0F : 0.5F);
   const glm::vec2 base = glm::floor(place);
-  return {static_cast<int>(base.x), static_cast<int>(base.y), place - base};
+  return {static_cast<int>(base.x), static_cast<int>(base.y), nearest ? glm::vec2(0.0F) : place - base};
 }
 
 /// Source pixels and weights of target pixel `i` when `from` pixels become `to`: exact overlap, so the mean is kept for
@@ -68,16 +69,28 @@ Taps tapsOf(int i, int from, int to) {
 
 }  // namespace
 
+bool hasPixels(const Texture& texture) {
+  const auto pixels =
+      static_cast<std::size_t>(std::max(0, texture.width)) * static_cast<std::size_t>(std::max(0, texture.height));
+  return pixels > 0 && texture.rgba.size() >= 4 * pixels;
+}
+
+glm::vec4 pixelOf(const Texture& texture, int x, int y) {
+  const auto index =
+      static_cast<std::size_t>(y) * static_cast<std::size_t>(texture.width) + static_cast<std::size_t>(x);
+  const std::uint8_t* p = &texture.rgba[index * 4];
+  if (!texture.srgb) return glm::vec4(p[0], p[1], p[2], p[3]) / 255.0F;
+  return {srgbTable()[p[0]], srgbTable()[p[1]], srgbTable()[p[2]], static_cast<float>(p[3]) / 255.0F};
+}
+
 glm::vec2 transformUv(const TextureUse& use, const glm::vec2& uv) {
   const glm::vec2 s = uv * use.scale;
   const float c = std::cos(use.rotation), d = std::sin(use.rotation);
   return use.offset + glm::vec2(c * s.x + d * s.y, -d * s.x + c * s.y);
 }
 
-AlphaTexture::AlphaTexture(const Texture& texture, const TextureUse& use) : texture_(texture), use_(use) {
-  const auto pixels =
-      static_cast<std::size_t>(std::max(0, texture.width)) * static_cast<std::size_t>(std::max(0, texture.height));
-  has_pixels_ = pixels > 0 && texture.rgba.size() >= 4 * pixels;
+AlphaTexture::AlphaTexture(const Texture& texture, const TextureUse& use)
+    : texture_(texture), use_(use), has_pixels_(hasPixels(texture)) {
   const float c = std::cos(use.rotation), d = std::sin(use.rotation);
   turn_ = {c * use.scale.x, -d * use.scale.x, d * use.scale.y, c * use.scale.y};
 }
@@ -85,7 +98,7 @@ AlphaTexture::AlphaTexture(const Texture& texture, const TextureUse& use) : text
 float AlphaTexture::at(const glm::vec2& uv) const {
   const glm::vec2 turned = use_.offset + turn_ * uv;
   if (!has_pixels_ || !std::isfinite(turned.x) || !std::isfinite(turned.y)) return 1.0F;
-  const Lookup lookup = lookupAt(use_, turned, texture_.width, texture_.height);
+  const Lookup lookup = lookupAt(use_, turned, texture_.width, texture_.height, use_.nearest);
   const auto at = [&](int dx, int dy) {
     const int x = wrap(lookup.x + dx, texture_.width, use_.repeat_u, use_.mirror_u);
     const int y = wrap(lookup.y + dy, texture_.height, use_.repeat_v, use_.mirror_v);
@@ -93,12 +106,23 @@ float AlphaTexture::at(const glm::vec2& uv) const {
         static_cast<std::size_t>(y) * static_cast<std::size_t>(texture_.width) + static_cast<std::size_t>(x);
     return static_cast<float>(texture_.rgba[4 * index + 3]) / 255.0F;
   };
+  if (use_.nearest) return at(0, 0);
   return glm::mix(glm::mix(at(0, 0), at(1, 0), lookup.next.x), glm::mix(at(0, 1), at(1, 1), lookup.next.x),
                   lookup.next.y);
 }
 
-TexturePyramid::TexturePyramid(const Texture& texture) : texture_(&texture) {
-  int width = texture.width, height = texture.height;
+TexturePyramid::TexturePyramid(const Texture& texture)
+    : TexturePyramid(
+          texture.width, texture.height,
+          [&texture](int x, int y) { return glm::vec4(glm::vec3(pixelOf(texture, x, y)), 1.0F); }, true) {}
+
+TexturePyramid::TexturePyramid(int width, int height, Pixels pixels, bool all_count)
+    : width_(width), height_(height), pixels_(std::move(pixels)), all_count_(all_count) {
+  buildLevels();
+}
+
+void TexturePyramid::buildLevels() {
+  int width = width_, height = height_;
   for (std::size_t level = 0; width > 1 || height > 1; ++level) {
     Level next{std::max(1, width / 2), std::max(1, height / 2), {}};
     next.pixels.resize(static_cast<std::size_t>(next.width) * static_cast<std::size_t>(next.height));
@@ -106,7 +130,7 @@ TexturePyramid::TexturePyramid(const Texture& texture) : texture_(&texture) {
       const Taps rows = tapsOf(y, height, next.height);
       for (int x = 0; x < next.width; ++x) {
         const Taps columns = tapsOf(x, width, next.width);
-        glm::vec3 sum(0.0F);
+        glm::vec4 sum(0.0F);
         for (int j = 0; j < rows.count; ++j)
           for (int i = 0; i < columns.count; ++i)
             sum += pixel(level, columns.first + i, rows.first + j) * columns.weight[static_cast<std::size_t>(i)] *
@@ -121,32 +145,43 @@ TexturePyramid::TexturePyramid(const Texture& texture) : texture_(&texture) {
   }
 }
 
-glm::vec3 TexturePyramid::pixel(std::size_t level, int x, int y) const {
-  const auto index =
-      static_cast<std::size_t>(y) * static_cast<std::size_t>(widthOf(level)) + static_cast<std::size_t>(x);
-  if (level > 0) return levels_[level - 1].pixels[index];
-  const std::uint8_t* p = &texture_->rgba[index * 4];
-  if (!texture_->srgb) return glm::vec3(p[0], p[1], p[2]) / 255.0F;
-  return {srgbTable()[p[0]], srgbTable()[p[1]], srgbTable()[p[2]]};
+glm::vec4 TexturePyramid::pixel(std::size_t level, int x, int y) const {
+  if (level == 0) {
+    const auto plain = pixels_(x, y);
+    return {glm::vec3(plain) * plain.a, plain.a};
+  }
+  const auto& in = levels_[level - 1];
+  return in.pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(in.width) + static_cast<std::size_t>(x)];
 }
 
-glm::vec3 TexturePyramid::bilinear(std::size_t level, const TextureUse& use, const glm::vec2& uv) const {
-  const int width = widthOf(level), height = heightOf(level);
-  const auto [x0, y0, f] = lookupAt(use, uv, width, height);
+/// What NEAREST looks up, too, is mixed above level 0, whose pixels are the only ones with borders of their own.
+glm::vec4 TexturePyramid::mixed(std::size_t level, const TextureUse& use, const glm::vec2& uv) const {
+  const int width = level == 0 ? width_ : levels_[level - 1].width;
+  const int height = level == 0 ? height_ : levels_[level - 1].height;
+  const bool nearest = use.nearest && level == 0;
+  const auto [x0, y0, f] = lookupAt(use, uv, width, height, nearest);
   const auto at = [&](int x, int y) {
     return pixel(level, wrap(x, width, use.repeat_u, use.mirror_u), wrap(y, height, use.repeat_v, use.mirror_v));
   };
+  if (nearest) return at(x0, y0);
   return glm::mix(glm::mix(at(x0, y0), at(x0 + 1, y0), f.x), glm::mix(at(x0, y0 + 1), at(x0 + 1, y0 + 1), f.x), f.y);
 }
 
-glm::vec3 TexturePyramid::sample(const TextureUse& use, const glm::vec2& uv, const glm::vec2& footprint) const {
-  if (texture_->width <= 0 || texture_->height <= 0) return glm::vec3(1.0F);
+TexturePyramid::Look TexturePyramid::look(const TextureUse& use, const glm::vec2& uv,
+                                          const glm::vec2& footprint) const {
+  constexpr Look kWhite{glm::vec3(1.0F), 1.0F};
+  if (width_ <= 0 || height_ <= 0) return kWhite;
   const glm::vec2 place = transformUv(use, uv);
-  if (!std::isfinite(place.x) || !std::isfinite(place.y)) return glm::vec3(1.0F);
-  const glm::vec2 extent = glm::abs(footprint * use.scale) * glm::vec2(texture_->width, texture_->height);
+  if (!std::isfinite(place.x) || !std::isfinite(place.y)) return kWhite;
+  const glm::vec2 extent = glm::abs(footprint * use.scale) * glm::vec2(width_, height_);
   const float pixels = std::max({1.0F, extent.x, extent.y});  // 1 comes first: what is no number is then passed over
   const auto level = std::min(levels_.size(), static_cast<std::size_t>(std::lround(std::log2(std::min(pixels, 1e6F)))));
-  return bilinear(level, use, place);
+  auto found = mixed(level, use, place);
+  if (all_count_) return {glm::vec3(found), 1.0F};
+  const float coverage = found.a;
+  for (auto coarser = level + 1; !(found.a > 0.0F) && coarser <= levels_.size(); ++coarser)
+    found = mixed(coarser, use, place);
+  return found.a > 0.0F ? Look{glm::vec3(found) / found.a, coverage} : Look{glm::vec3(1.0F), 0.0F};
 }
 
 }  // namespace radiosity::scene

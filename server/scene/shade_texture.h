@@ -2,37 +2,59 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <glm/mat2x2.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
 #include <vector>
 
 #include "server/scene/scene.h"
 
 namespace radiosity::scene {
 
-/// Refers to the texture, which must outlive it.
+/// Whether there are as many pixels as it says, and at least one.
+[[nodiscard]] bool hasPixels(const Texture& texture);
+
+/// One pixel of a texture, linear; alpha last.
+[[nodiscard]] glm::vec4 pixelOf(const Texture& texture, int x, int y);
+
+/// Mip levels of RGB, of which some pixels may count for less than others, or not at all: RGB behind a cut-out says
+/// nothing of the surface, so lookups and levels mix pixels by their coverage.
 class TexturePyramid {
  public:
-  explicit TexturePyramid(const Texture& texture);
+  /// RGB of a pixel, linear, and how much it counts, 0 to 1.
+  using Pixels = std::function<glm::vec4(int x, int y)>;
+  struct Look {
+    glm::vec3 rgb;
+    float coverage;
+  };
 
-  /// Linear RGB around `uv` (after TextureUse's transform and wrapping), averaged over about `footprint` (in UV units).
-  [[nodiscard]] glm::vec3 sample(const TextureUse& use, const glm::vec2& uv, const glm::vec2& footprint) const;
+  /// Refers to the texture, which must outlive it. All pixels count.
+  explicit TexturePyramid(const Texture& texture);
+  /// `all_count`: coverage is 1 everywhere.
+  TexturePyramid(int width, int height, Pixels pixels, bool all_count);
+
+  /// RGB around `uv` (after TextureUse's transform and wrapping), averaged over about `footprint` (in UV units), and
+  /// the coverage there. Where that is 0, RGB is of the nearest pixels that count, if any.
+  [[nodiscard]] Look look(const TextureUse& use, const glm::vec2& uv, const glm::vec2& footprint) const;
+  [[nodiscard]] glm::vec3 sample(const TextureUse& use, const glm::vec2& uv, const glm::vec2& footprint) const {
+    return look(use, uv, footprint).rgb;
+  }
 
  private:
   struct Level {
     int width, height;
-    std::vector<glm::vec3> pixels;
+    std::vector<glm::vec4> pixels;  ///< RGB times coverage, and coverage
   };
-  [[nodiscard]] glm::vec3 pixel(std::size_t level, int x, int y) const;
-  [[nodiscard]] glm::vec3 bilinear(std::size_t level, const TextureUse& use, const glm::vec2& uv) const;
-  [[nodiscard]] int widthOf(std::size_t level) const { return level == 0 ? texture_->width : levels_[level - 1].width; }
-  [[nodiscard]] int heightOf(std::size_t level) const {
-    return level == 0 ? texture_->height : levels_[level - 1].height;
-  }
+  [[nodiscard]] glm::vec4 pixel(std::size_t level, int x, int y) const;
+  [[nodiscard]] glm::vec4 mixed(std::size_t level, const TextureUse& use, const glm::vec2& uv) const;
+  void buildLevels();
 
-  const Texture* texture_;
-  std::vector<Level> levels_;  ///< from level 1; level 0 stays 8-bit
+  int width_, height_;
+  Pixels pixels_;
+  bool all_count_;
+  std::vector<Level> levels_;  ///< from level 1; level 0 is read from `pixels_`
 };
 
 /// uv -> offset + rotate(scale * uv), KHR_texture_transform.
@@ -43,7 +65,7 @@ class AlphaTexture {
  public:
   AlphaTexture(const Texture& texture, const TextureUse& use);
 
-  /// Around `uv` (after TextureUse's transform and wrapping), bilinear, in [0, 1]; 1 where it has no pixels.
+  /// Around `uv` (after TextureUse's transform and wrapping), as it is filtered, in [0, 1]; 1 where it has no pixels.
   [[nodiscard]] float at(const glm::vec2& uv) const;
 
  private:

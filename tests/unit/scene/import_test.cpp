@@ -224,9 +224,128 @@ TEST(Import, texturesAreDecodedWithTheirTransformAndWrap) {
   EXPECT_EQ(use.rotation, 1.5F);
   EXPECT_FALSE(use.repeat_u);
   EXPECT_TRUE(use.mirror_v);
-  ASSERT_EQ(scene.textures.size(), 1U);
+  EXPECT_FALSE(use.nearest);
+  ASSERT_EQ(scene.textures.size(), 2U);
   EXPECT_THAT(scene.textures[0].rgba, ElementsAre(255, 0, 0, 255, 0, 0, 255, 255));
-  EXPECT_FLOAT_EQ(scene.materials[0].metallic, 0.5F);  // mean of the blue channel
+  EXPECT_TRUE(scene.textures[0].srgb);
+  EXPECT_EQ(scene.materials[0].metallic, 1.0F);
+  ASSERT_EQ(scene.materials[0].metallic_texture.texture, 1U);  // the same picture, read as plain numbers
+  EXPECT_FALSE(scene.textures[1].srgb);
+  builder.gltf["samplers"][0]["magFilter"] = 9728;
+  EXPECT_TRUE(imported(builder).materials[0].base_color_texture.nearest);
+}
+
+// 1 pixel, whose blue is 51 of 255.
+constexpr const char* kBlue51 =
+    "data:image/"
+    "png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR4nGNg+G8MAAI1ATPVlABuAAAAAElFTkSuQmCC";
+
+TEST(Import, aMetallicTextureThatIsTheSameAllOverIsPartOfTheFactor) {
+  GltfBuilder builder;
+  builder.gltf["images"] = Json::array({{{"uri", kBlue51}}});
+  builder.gltf["textures"] = Json::array({{{"source", 0}}});
+  builder.gltf["materials"] = Json::array(
+      {{{"pbrMetallicRoughness", {{"metallicFactor", 0.5}, {"metallicRoughnessTexture", {{"index", 0}}}}}}});
+  const auto scene = imported(builder);
+  EXPECT_FLOAT_EQ(scene.materials[0].metallic, 0.1F);
+  EXPECT_EQ(scene.materials[0].metallic_texture.texture, kNone);
+  EXPECT_TRUE(scene.textures.empty());
+}
+
+TEST(Import, specularGlossinessComesBeforeMetallicRoughness) {
+  GltfBuilder builder;
+  builder.gltf["images"] = Json::array({{{"uri", kPng}}});
+  builder.gltf["textures"] = Json::array({{{"source", 0}}});
+  builder.gltf["extensionsRequired"] = builder.gltf["extensionsUsed"] = {"KHR_materials_pbrSpecularGlossiness"};
+  Json extension = {{"diffuseFactor", {0.1, 0.2, 0.3, 0.4}},
+                    {"diffuseTexture", {{"index", 0}}},
+                    {"specularFactor", {0.5, 0.25, 0}},
+                    {"specularGlossinessTexture", {{"index", 0}}}};
+  builder.gltf["materials"] = Json::array({{{"pbrMetallicRoughness", {{"baseColorFactor", {1, 1, 1, 1}}}},
+                                            {"extensions", {{"KHR_materials_pbrSpecularGlossiness", extension}}}}});
+  const auto scene = imported(builder);
+  const auto& material = scene.materials.at(0);
+  EXPECT_EQ(material.base_color, glm::vec3(0.1F, 0.2F, 0.3F));
+  EXPECT_EQ(material.alpha, 0.4F);
+  EXPECT_EQ(material.metallic, 0.0F);
+  EXPECT_EQ(material.specular, glm::vec3(0.5F, 0.25F, 0.0F));
+  EXPECT_EQ(material.base_color_texture.texture, 0U);
+  EXPECT_EQ(material.specular_texture.texture, 0U);  // both are sRGB
+  EXPECT_THAT(scene.warnings, testing::IsEmpty());
+  builder.gltf["materials"][0]["extensions"]["KHR_materials_pbrSpecularGlossiness"] = Json::object();
+  EXPECT_EQ(imported(builder).materials[0].specular, glm::vec3(1.0F)) << "the extension's own default";
+  EXPECT_THAT(imported(builder).warnings, Contains(HasSubstr("wholly specular")));
+}
+
+TEST(Import, danglingTextureReferencesCostTheTextureAndNotTheScene) {
+  GltfBuilder builder;
+  builder.gltf["images"] = Json::array({{{"uri", kPng}}});
+  builder.gltf["textures"] =
+      Json::array({{{"source", 7}}, {{"source", 0}, {"sampler", 3}}, {{"source", 0}, {"sampler", -1}}});
+  builder.gltf["materials"] =
+      Json::array({{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 9}}}, {"metallicFactor", 0}}},
+                    {"normalTexture", {{"index", 4294967296}}}},
+                   {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}, {"metallicFactor", 0}}}},
+                   {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 1}}}, {"metallicFactor", 0}}}},
+                   {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 2}}}, {"metallicFactor", 0}}}}});
+  const auto scene = imported(builder);
+  ASSERT_EQ(scene.materials.size(), 4U);
+  EXPECT_EQ(scene.materials[0].base_color_texture.texture, kNone);
+  EXPECT_EQ(scene.materials[1].base_color_texture.texture, kNone);
+  EXPECT_EQ(scene.materials[2].base_color_texture.texture, 0U);
+  EXPECT_TRUE(scene.materials[2].base_color_texture.repeat_u);
+  EXPECT_THAT(
+      scene.warnings,
+      ElementsAre(HasSubstr("/materials/0/normalTexture/index: is 4294967296, but /textures has 3 entries"),
+                  HasSubstr("/materials/0/pbrMetallicRoughness/baseColorTexture/index: is 9, but /textures has 3"),
+                  HasSubstr("/textures/0/source: is 7, but /images has 1 entries; the texture is left out"),
+                  HasSubstr("/textures/1/sampler: is 3, but /samplers has 0 entries"),
+                  HasSubstr("/textures/2/sampler: is -1, but /samplers has 0 entries")));
+}
+
+Json spotOf(double inner, double outer) {
+  return {{"type", "spot"}, {"spot", {{"innerConeAngle", inner}, {"outerConeAngle", outer}}}};
+}
+
+TEST(Import, oddConesOfSpotsAreLitWithAWarning) {
+  GltfBuilder builder;
+  builder.gltf["extensionsUsed"] = {"KHR_lights_punctual"};
+  const std::string lights = "/extensions/KHR_lights_punctual/lights";
+  builder.gltf[Json::json_pointer(lights)] =
+      Json::array({spotOf(0.5, 0.5), spotOf(0.7, 0.5), spotOf(0.1, 2.0), spotOf(0.1, 0.5)});
+  for (std::size_t i = 0; i < 4; ++i) builder.node({{"extensions", {{"KHR_lights_punctual", {{"light", i}}}}}});
+  const auto scene = imported(builder);
+  ASSERT_EQ(scene.lights.size(), 4U);
+  EXPECT_EQ(scene.lights[0].inner_cone_rad, 0.5);
+  EXPECT_EQ(scene.lights[1].inner_cone_rad, 0.5);
+  EXPECT_EQ(scene.lights[1].outer_cone_rad, 0.5);
+  EXPECT_DOUBLE_EQ(scene.lights[2].outer_cone_rad, std::numbers::pi / 2);
+  EXPECT_THAT(scene.warnings,
+              ElementsAre(HasSubstr(lights + "/0/spot/innerConeAngle"), HasSubstr(lights + "/1/spot/innerConeAngle"),
+                          HasSubstr(lights + "/2/spot/outerConeAngle: is above pi/2")));
+  builder.gltf[Json::json_pointer(lights + "/3/spot/outerConeAngle")] = 0.0;
+  EXPECT_EQ(refusedAt(builder), "test.glb: " + lights + "/3/spot/outerConeAngle");
+}
+
+TEST(Import, camerasIgnoreScale) {
+  const auto poseWith = [](const Json& scale, const Json& above) {
+    GltfBuilder builder;
+    builder.gltf["cameras"] =
+        Json::array({{{"type", "perspective"}, {"perspective", {{"yfov", 0.7}, {"znear", 0.1}}}}});
+    builder.node({{"scale", above}, {"children", {1}}});
+    builder.node({{"camera", 0}, {"translation", {1, 2, 3}}, {"rotation", {0.5, 0.5, 0.5, 0.5}}, {"scale", scale}});
+    return imported(builder).cameras.at(0).world;
+  };
+  const auto plain = poseWith({1, 1, 1}, {1, 1, 1});
+  EXPECT_EQ(plain[3], glm::dvec4(1, 2, 3, 1));
+  for (const Json& scale : {Json{-1, 1, 1}, Json{1, 1, -1}, Json{-2, -3, -4}, Json{0.1, 7, 2}, Json{0, 0, 0}})
+    EXPECT_EQ(poseWith(scale, {1, 1, 1}), plain) << scale;
+  // Nodes above it move it and turn its view, as they do the room that hangs there, too.
+  const auto mirrored = poseWith({1, 1, 1}, {-2, 2, 2});
+  EXPECT_EQ(mirrored[3], glm::dvec4(-2, 4, 6, 1));
+  EXPECT_LT(glm::distance(mirrored[2], plain[2] * glm::dvec4(-1, 1, 1, 1)), 1e-12);
+  EXPECT_LT(glm::distance(mirrored[1], plain[1] * glm::dvec4(-1, 1, 1, 1)), 1e-12);
+  EXPECT_NEAR(glm::determinant(mirrored), 1.0, 1e-12);
 }
 
 TEST(Import, imagesOverThePixelBudgetAreRefusedBeforeDecoding) {
@@ -322,6 +441,13 @@ TEST(Import, everyFaultIsRefusedAtItsPlace) {
   EXPECT_EQ(faulty("/meshes/0/primitives/0/mode", 7), "test.glb: /meshes/0/primitives/0/mode");
   EXPECT_EQ(faulty("/extensionsRequired", {"EXT_magic"}), "test.glb: /extensionsRequired/0");
   EXPECT_EQ(faulty("/asset/version", "1.0"), "test.glb: /asset/version");
+  EXPECT_EQ(faulty("/meshes/0/weights", {0, 1e30}), "test.glb: /meshes/0/weights/1");
+  EXPECT_EQ(faulty("/nodes/0/weights", {-1e30}), "test.glb: /nodes/0/weights/0");
+  EXPECT_EQ(faulty("/nodes/0/skin", 0), "test.glb: /nodes/0/skin");
+  EXPECT_EQ(faulty("/meshes/0/primitives/0/targets", Json::array({{{"POSITION", 9}}})),
+            "test.glb: /meshes/0/primitives/0/targets/0/POSITION");
+  EXPECT_EQ(faulty("/meshes/0/primitives/0/targets", Json::array({{{"POSITION", 1}}})),
+            "test.glb: /meshes/0/primitives/0/targets/0/POSITION");  // as many as indices, not as vertices
 }
 
 TEST(Import, countsAreBounded) {

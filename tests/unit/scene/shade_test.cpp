@@ -1,6 +1,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
+#include <utility>
+
 #include "server/scene/patch_scene.h"
 #include "tests/unit/scene/shapes.h"
 
@@ -92,6 +96,121 @@ TEST(Shade, MeanOfAnOddSizedTextureIsKeptAtAnyResolution) {
     const PatchScene patches = build(scene, budget);
     EXPECT_NEAR(meanReflectance(patches, shadePatches(scene, patches)), mean, 0.01 * mean) << budget;
   }
+}
+
+/// A floor whose left half (u < 1/2) and right half have colours of their own.
+Scene twoHalves(const std::array<std::uint8_t, 4>& left, const std::array<std::uint8_t, 4>& right, AlphaMode mode) {
+  Scene scene;
+  Texture texture;
+  texture.width = 2;
+  texture.height = 1;
+  texture.srgb = false;
+  for (const auto& half : {left, right}) texture.rgba.insert(texture.rgba.end(), half.begin(), half.end());
+  scene.textures.push_back(std::move(texture));
+  Primitive p = floorQuad(1.0);
+  p.texcoord0 = {{0, 0}, {0, 1}, {1, 1}, {1, 0}};
+  Material material;
+  material.base_color = glm::vec3(0.5F);
+  material.alpha_mode = mode;
+  material.base_color_texture.texture = 0;
+  place(scene, p, glm::dmat4(1.0), material);
+  return scene;
+}
+
+std::pair<float, float> reflectanceRange(const Scene& scene, std::uint64_t budget) {
+  const PatchScene patches = build(scene, budget);
+  const PatchMaterials materials = shadePatches(scene, patches);
+  std::pair<float, float> range{1.0F, 0.0F};
+  for (const Surface& s : patches.surfaces) {
+    for (std::uint32_t n = s.first_node[0]; n < s.first_node[0] + s.width * s.height; ++n) {
+      if (!(patches.node_area[n] > 0.0F)) continue;
+      range = {std::min(range.first, materials.reflectance[n].x), std::max(range.second, materials.reflectance[n].x)};
+    }
+  }
+  return range;
+}
+
+TEST(Shade, WhatIsCutOutOrClearLendsNoColourToWhatIsThere) {
+  for (const auto mode : {AlphaMode::kMask, AlphaMode::kBlend}) {
+    for (const std::uint8_t hidden : {0, 255}) {
+      for (const bool nearest : {false, true}) {
+        auto scene = twoHalves({204, 204, 204, 255}, {hidden, hidden, hidden, 0}, mode);
+        scene.materials[0].base_color_texture.nearest = nearest;
+        for (const std::uint64_t budget : {1U, 9U, 400U}) {
+          const auto [low, high] = reflectanceRange(scene, budget);
+          EXPECT_NEAR(low, 0.4F, 1e-5) << budget;
+          EXPECT_NEAR(high, 0.4F, 1e-5) << budget;
+        }
+      }
+    }
+  }
+}
+
+TEST(Shade, BlendedColoursCountByTheirAlpha) {
+  const auto scene = twoHalves({255, 255, 255, 51}, {0, 0, 0, 204}, AlphaMode::kBlend);
+  const auto [low, high] = reflectanceRange(scene, 1);
+  EXPECT_NEAR(low, 0.5F * 0.2F, 1e-3);  // a fifth of what is there is white
+  EXPECT_EQ(low, high);
+}
+
+TEST(Shade, NearestKeepsTexelsApart) {
+  auto scene = twoHalves({0, 0, 0, 255}, {255, 255, 255, 255}, AlphaMode::kOpaque);
+  const PatchScene patches = build(scene, 400);
+  const auto between = [&] {
+    const PatchMaterials materials = shadePatches(scene, patches);
+    std::uint32_t count = 0;
+    for (std::uint32_t n = 0; n < patches.surfaces[0].width * patches.surfaces[0].height; ++n)
+      count += materials.reflectance[n].x > 0.01F && materials.reflectance[n].x < 0.49F;
+    return count;
+  };
+  EXPECT_GT(between(), 100U);  // half of the way from texel to texel, twice since it repeats
+  scene.materials[0].base_color_texture.nearest = true;
+  EXPECT_EQ(between(), 0U);  // the border is one of leaves, too
+}
+
+TEST(Shade, MetalIsReadWhereItsCoordinatesAre) {
+  auto scene = twoHalves({255, 255, 0, 255}, {255, 255, 255, 255}, AlphaMode::kOpaque);
+  auto& material = scene.materials[0];
+  material.metallic_texture = std::exchange(material.base_color_texture, {});
+  material.metallic_texture.nearest = true;
+  material.metallic = 0.5F;
+  const auto [low, high] = reflectanceRange(scene, 400);
+  EXPECT_NEAR(low, 0.25F, 1e-6);
+  EXPECT_NEAR(high, 0.5F, 1e-6);
+  // Coordinates on the dielectric half alone.
+  scene.primitives.edit(0, [](Primitive& p) { p.texcoord0 = {{0.1, 0}, {0.1, 1}, {0.4, 1}, {0.4, 0}}; });
+  EXPECT_NEAR(reflectanceRange(scene, 400).first, 0.5F, 1e-6);
+}
+
+TEST(Shade, WhereWhiteIsMetalAndDielectricIsBlackNothingIsReflected) {
+  std::vector<std::uint8_t> checker;
+  for (int i = 0; i < 64 * 64; ++i) checker.push_back((i + i / 64) % 2 == 0 ? 255 : 0);
+  auto scene = texturedFloor(textureOf(64, 64, checker, false));
+  scene.materials[0].metallic = 1.0F;
+  scene.materials[0].metallic_texture = scene.materials[0].base_color_texture;
+  EXPECT_EQ(reflectanceRange(scene, 4).second, 0.0F) << "the product of two means would be a quarter";
+}
+
+TEST(Shade, SpecularTakesItsLargestChannelFromDiffuse) {
+  auto scene = twoHalves({0, 51, 102, 255}, {255, 0, 0, 255}, AlphaMode::kOpaque);
+  auto& material = scene.materials[0];
+  material.specular_texture = std::exchange(material.base_color_texture, {});
+  material.specular_texture.nearest = true;
+  material.specular = {0.5F, 1.0F, 0.5F};
+  const auto [low, high] = reflectanceRange(scene, 400);
+  EXPECT_NEAR(low, 0.5F * 0.5F, 1e-6);
+  EXPECT_NEAR(high, 0.5F * 0.8F, 1e-6);
+}
+
+TEST(Shade, ALampBehindACutOutShinesWithWhatIsLeftOfIt) {
+  auto scene = twoHalves({255, 255, 255, 255}, {0, 0, 0, 0}, AlphaMode::kMask);
+  auto& material = scene.materials[0];
+  scene.textures.push_back(textureOf(2, 1, {102, 255}, false));  // bright where it is cut out
+  material.emission = glm::vec3(1.0F);
+  material.emissive_texture = material.base_color_texture;
+  material.emissive_texture.texture = 1;
+  const PatchScene patches = build(scene, 1);
+  EXPECT_NEAR(shadePatches(scene, patches).emission[0].x, 0.4 * M_PI, 1e-5);
 }
 
 TEST(Shade, EmissiveTextureLightsOnlyItsPart) {
