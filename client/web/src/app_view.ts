@@ -133,9 +133,9 @@ export class ViewSession {
   }
 
   private lookAtAll(scene: LitScene): void {
-    const { rig } = this.app.viewer;
+    const { background, rig } = this.app.viewer;
     rig.overview(scene.bounds);
-    const inside = insideView(scene, rig.camera);
+    const inside = insideView(scene, rig.camera, background.sky !== undefined);
     if (inside) rig.stand(inside.eye, inside.target);
   }
 
