@@ -15,6 +15,11 @@ export function skyOf({ extras }: Gltf): Sky | undefined {
   return isRadiance(lower) ? { upper, lower } : undefined;
 }
 
+/** Undefined: there is none, or a black one. */
+export function shining(sky: Sky | undefined): Sky | undefined {
+  return sky && Math.max(...sky.upper, ...sky.lower) > 0 ? sky : undefined;
+}
+
 function isObject(value: unknown): value is Record<string, unknown> {
   return typeof value === 'object' && value !== null && !Array.isArray(value);
 }
@@ -48,10 +53,8 @@ export class SkyBackground {
     this.mesh.visible = false;
   }
 
-  /** Undefined: there is none, or a black one. */
   get sky(): Sky | undefined {
-    const sky = this.ofScene ?? this.ofSettings;
-    return sky && Math.max(...sky.upper, ...sky.lower) > 0 ? sky : undefined;
+    return shining(this.ofScene ?? this.ofSettings);
   }
 
   /** Before each frame. `isShown`: the view shows light that leaves surfaces, in its own colours, and there is some. */
