@@ -76,13 +76,13 @@ class Scout {
  private:
   /// A point that stands for an equal share of the scene's light.
   struct Landmark {
-    glm::dvec3 position, normal;  ///< of the side that is lit
+    glm::dvec3 position, normal;  ///< of the side that the light falls on
   };
   /// What a ray sees first that is drawn.
   struct Sight {
     double distance = 0.0;
     std::uint32_t triangle = scene::kNone;
-    std::size_t side = 0;
+    std::size_t side = 0;       ///< of the triangle, that one looks at; 1: its back
     bool through_back = false;  ///< an undrawn back face came first
   };
   [[nodiscard]] Sight cast(const glm::dvec3& eye, const glm::dvec3& direction);
@@ -131,8 +131,7 @@ double Scout::pageValue(const scene::Surface& surface, std::size_t side, glm::ve
 void Scout::measureLight() {
   struct Sample {
     glm::dvec3 position;
-    std::uint32_t triangle;
-    std::size_t side;
+    glm::vec3 normal;
     double area, irradiance;
   };
   std::vector<Sample> samples;
@@ -144,7 +143,7 @@ void Scout::measureLight() {
       const glm::dvec3 position(frame.origin + leaf.texel.x * frame.du + leaf.texel.y * frame.dv);
       for (std::size_t side = 0; side < 2; ++side) {
         if (surface.first_node[side] == scene::kNone) continue;
-        samples.push_back({position, leaf.triangle, side, static_cast<double>(surface.texel_area),
+        samples.push_back({position, side == 0 ? frame.normal : -frame.normal, static_cast<double>(surface.texel_area),
                            pageValue(surface, side, leaf.texel)});
       }
     }
@@ -177,8 +176,7 @@ void Scout::measureLight() {
   for (const auto& sample : samples) {
     sum += weight(sample);
     if (sum * kLandmarks < total * (static_cast<double>(landmarks_.size()) + 0.5)) continue;
-    const glm::dvec3 front(patches_.triangles[sample.triangle].normal);
-    landmarks_.push_back({sample.position, sample.side == 0 ? front : -front});
+    landmarks_.push_back({sample.position, glm::dvec3(sample.normal)});
   }
 }
 
@@ -361,7 +359,7 @@ Result<scene::Camera> chooseCamera(const LitScene& lit, const std::string& wante
               "the scene has no camera \"" + wanted + "\" (it has " + std::to_string(cameras.size()) + ")");
 }
 
-float autoExposure(const Image& radiance) {
+std::optional<float> exposureOf(const Image& radiance) {
   std::vector<std::pair<double, double>> lit;
   for (const auto& pixel : radiance.pixels) {
     const double value = luminance(pixel);
@@ -379,7 +377,10 @@ float autoExposure(const Image& radiance) {
     ++count;
   }
   constexpr double kMost = 9.9e29;  // a picture of next to nothing: what may be asked for
-  return count == 0 ? 1.0F : static_cast<float>(std::min(kMost, 0.18 / std::exp(sum / static_cast<double>(count))));
+  if (count == 0) return std::nullopt;
+  return static_cast<float>(std::min(kMost, 0.18 / std::exp(sum / static_cast<double>(count))));
 }
+
+float autoExposure(const Image& radiance) { return exposureOf(radiance).value_or(1.0F); }
 
 }  // namespace radiosity::engine

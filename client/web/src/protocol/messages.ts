@@ -72,6 +72,12 @@ export interface SolveHistory {
   samples: ErrorSample[];
 }
 
+/** Radiance of everything outside the scene above and below the horizon, nits. */
+export interface Sky {
+  upper: [number, number, number];
+  lower: [number, number, number];
+}
+
 export interface Settings {
   targetError: number;
   timeLimitMs: number | null;
@@ -79,6 +85,8 @@ export interface Settings {
   texelSize: number;
   seed: number;
   doubleSided: boolean;
+  /** For scenes that have none of their own. */
+  sky?: Sky | null;
 }
 
 export interface Status extends Progress {
