@@ -45,6 +45,9 @@ struct SphereSpec {
 /// Closed seminar room of 3,138 polygons like their figure 2: 42 tables, 80 chairs, eight ceiling lamps.
 [[nodiscard]] TestScene seminarRoom();
 
+/// Closed room with a lamp, a ball of 80 facets that hovers and a barrel of twelve sides, both with smooth normals.
+[[nodiscard]] TestScene smoothRoom();
+
 /// Everything that make_scenes writes, by file name without extension.
 [[nodiscard]] std::vector<std::pair<std::string, std::function<TestScene()>>> allScenes();
 
