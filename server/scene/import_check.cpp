@@ -49,6 +49,7 @@ struct AttributeRule {
 };
 
 constexpr AttributeRule kAttributes[] = {{"POSITION", false, false, true, false},
+                                         {"NORMAL", false, false, true, false},
                                          {"TEXCOORD_0", false, true, false, false},
                                          {"TEXCOORD_1", false, true, false, false},
                                          {"COLOR_0", false, false, true, true}};
@@ -64,11 +65,12 @@ Result<void> checkAttributes(const ImportContext& context, const tinygltf::Primi
   for (const auto& [name, index] : primitive.attributes) {
     const auto& accessor = context.model.accessors[static_cast<std::size_t>(index)];
     const auto where = pointer + "/attributes/" + escapeToken(name);
-    if (count != 0 && accessor.count != count) return context.bad(where, "attributes differ in count");
-    count = accessor.count;
     for (const auto& rule : kAttributes) {
       if (name == rule.name && !allowed(rule, accessor.type)) return context.bad(where, "accessor has the wrong type");
     }
+    if (name == "NORMAL") continue;  // vertices without one are shaded flat (import_normals.h)
+    if (count != 0 && accessor.count != count) return context.bad(where, "attributes differ in count");
+    count = accessor.count;
     if (name == "POSITION" && accessor.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT) {
       return context.bad(where, "accessor has the wrong component type");
     }

@@ -10,6 +10,7 @@
 #include <unordered_set>
 
 #include "server/scene/accessor.h"
+#include "server/scene/import_normals.h"
 
 namespace radiosity::scene {
 namespace {
@@ -118,6 +119,8 @@ Result<std::optional<std::uint32_t>> MeshImporter::importPrimitive(std::size_t m
     context_.warn(pointer, "has no triangles with area; skipped");
     return std::nullopt;
   }
+  if (const auto faults = settleNormals(primitive); faults.count() != 0)
+    context_.warn(pointer + "/attributes/NORMAL", faults.text(primitive.positions.size()));
   primitive.material = materialOf(source);
   context_.scene.primitives.push_back(std::move(primitive));
   return static_cast<std::uint32_t>(context_.scene.primitives.size() - 1);
@@ -145,6 +148,21 @@ Result<void> MeshImporter::readVertices(const tinygltf::Primitive& source, Primi
       primitive.color0.emplace_back(std::max(finiteOr(v[0], 1), 0.0F), std::max(finiteOr(v[1], 1), 0.0F),
                                     std::max(finiteOr(v[2], 1), 0.0F), std::clamp(alpha, 0.0F, 1.0F));
     }
+  }
+  return readNormals(source, primitive);
+}
+
+/// As they stand in the file: of them there may be more or fewer than vertices.
+Result<void> MeshImporter::readNormals(const tinygltf::Primitive& source, Primitive& primitive) {
+  const auto found = source.attributes.find("NORMAL");
+  if (found == source.attributes.end()) return {};
+  const auto reader = AccessorReader::open(context_.document, context_.model, static_cast<std::size_t>(found->second));
+  if (!reader) return tl::unexpected(reader.error());
+  const auto count = std::min(reader->size(), primitive.positions.size());
+  primitive.normals.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto v = reader->at(i);
+    primitive.normals.emplace_back(v[0], v[1], v[2]);
   }
   return {};
 }

@@ -20,6 +20,7 @@ class MeshImporter {
   [[nodiscard]] Result<std::optional<std::uint32_t>> importPrimitive(std::size_t mesh, std::size_t index);
   [[nodiscard]] Result<void> readVertices(const tinygltf::Primitive& source, Primitive& primitive,
                                           const std::string& pointer);
+  [[nodiscard]] Result<void> readNormals(const tinygltf::Primitive& source, Primitive& primitive);
   [[nodiscard]] Result<void> readTriangles(const tinygltf::Primitive& source, Primitive& primitive,
                                            const std::string& pointer);
   [[nodiscard]] std::uint32_t materialOf(const tinygltf::Primitive& source);

@@ -29,6 +29,11 @@ struct CornerHash {
   }
 };
 
+bool hasTooFewNormals(const tinygltf::Model& model, const Json& attributes) {
+  const auto count = [&](const char* name) { return model.accessors[attributes[name].get<std::size_t>()].count; };
+  return attributes.contains("NORMAL") && count("NORMAL") < count("POSITION");
+}
+
 std::size_t textBytes(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace).size(); }
 
 }  // namespace
@@ -150,6 +155,9 @@ Result<Json> LitMeshBuilder::pagePrimitive(const Json& source, const LitPrimitiv
   auto primitive = source;
   auto attributes = source["attributes"];
   attributes.erase("TEXCOORD_1");
+  if (hasTooFewNormals(model_, attributes)) {  // no file may have them
+    for (const auto* member : {"NORMAL", "TANGENT"}) attributes.erase(member);
+  }
   auto copied = copyAttributes(attributes, vertices.source);
   if (!copied) return copied;
   primitive["attributes"] = std::move(*copied);

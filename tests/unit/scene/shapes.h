@@ -14,7 +14,7 @@ namespace radiosity::scene::test {
 
 inline void addQuad(Primitive& p, glm::dvec3 a, glm::dvec3 b, glm::dvec3 c, glm::dvec3 d) {
   const auto base = static_cast<std::uint32_t>(p.positions.size());
-  p.positions.insert(p.positions.end(), {a, b, c, d});
+  for (const auto& corner : {a, b, c, d}) p.positions.push_back(corner);  // GCC 12 misreads insert() at -O2
   p.indices.insert(p.indices.end(), {base, base + 1, base + 2, base, base + 2, base + 3});
 }
 
