@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
+#include <glm/mat4x4.hpp>
 #include <glm/matrix.hpp>
 
 namespace radiosity::scene {
@@ -23,21 +24,38 @@ glm::dvec3 unitOr(const glm::dvec3& normal, const glm::dvec3& otherwise) {
 /// Normals of an instance in world space.
 class InstanceNormals {
  public:
-  InstanceNormals(const Primitive& primitive, const glm::dmat4& world)
+  InstanceNormals(const Primitive& primitive, const glm::dmat4& world, const PatchScene& patches)
       : primitive_(primitive),
-        mirrored_(glm::determinant(glm::dmat3(world)) < 0.0),
+        world_(world),
+        patches_(patches),
+        facing_(glm::determinant(glm::dmat3(world)) < 0.0 ? -1.0 : 1.0),
         to_world_(glm::transpose(glm::inverse(glm::dmat3(world)))) {}
 
-  /// Of a corner of a triangle as the patch scene has it, whose corners run the other way round where it is mirrored.
-  [[nodiscard]] glm::dvec3 at(std::uint32_t triangle, std::uint32_t corner, const glm::dvec3& geometric) const {
-    const std::uint32_t from = mirrored_ ? (3 - corner) % 3 : corner;
-    const glm::dvec3 normal(primitive_.normals[primitive_.indices[std::size_t{3} * triangle + from]]);
-    return normal == glm::dvec3(0.0) ? geometric : unitOr(to_world_ * normal, geometric);
+  /// Of the corners of a triangle of the patch scene, on its front: it may be the back of the file's, and its corners
+  /// run the other way round then, or where the instance is mirrored.
+  [[nodiscard]] std::array<glm::dvec3, 3> of(std::uint32_t triangle, const glm::dvec3& geometric) const {
+    const auto* index = &primitive_.indices[std::size_t{3} * patches_.triangle_source[triangle]];
+    std::array<glm::dvec3, 3> position{}, corner{};
+    for (std::size_t k = 0; k < 3; ++k)
+      position[k] =
+          (glm::dvec3(world_ * glm::dvec4(primitive_.positions[index[k]], 1.0)) - patches_.centre) / patches_.scale;
+    const auto front = facing_ * glm::cross(position[1] - position[0], position[2] - position[0]);
+    const double side = glm::dot(front, geometric) < 0.0 ? -1.0 : 1.0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const glm::dvec3 at(patches_.vertices[patches_.indices[std::size_t{3} * triangle + k]].position);
+      const auto apart = [&](const glm::dvec3& p) { return glm::distance(p, at); };
+      const auto from = std::ranges::min_element(position, {}, apart) - position.begin();
+      const glm::dvec3 normal(primitive_.normals[index[from]]);
+      corner[k] = normal == glm::dvec3(0.0) ? geometric : unitOr(side * (to_world_ * normal), geometric);
+    }
+    return corner;
   }
 
  private:
   const Primitive& primitive_;
-  bool mirrored_;
+  const glm::dmat4& world_;
+  const PatchScene& patches_;
+  double facing_;
   glm::dmat3 to_world_;
 };
 
@@ -48,17 +66,13 @@ ShadingNormals::ShadingNormals(const Scene& scene, const PatchScene& patches) {
     const auto& instance = scene.instances[surface.instance];
     const auto& primitive = scene.primitives[instance.primitive];
     if (primitive.normals.size() != primitive.positions.size()) continue;
-    const InstanceNormals normals(primitive, instance.world);
+    const InstanceNormals normals(primitive, instance.world, patches);
     for (auto t = surface.first_triangle; t < surface.first_triangle + surface.triangle_count; ++t) {
       const glm::dvec3 geometric(patches.triangles[t].normal);
-      std::array<glm::dvec3, 3> corner{};
-      for (std::uint32_t k = 0; k < 3; ++k) corner[k] = normals.at(patches.triangle_source[t], k, geometric);
+      const auto corner = normals.of(t, geometric);
       const auto faces = [&](const glm::dvec3& normal) { return glm::dot(normal, geometric); };
       if (std::ranges::all_of(corner, [&](const auto& n) { return faces(n) >= kSameNormal; })) continue;
-      if (std::ranges::all_of(corner, [&](const auto& n) { return faces(n) <= 0.0; })) {
-        ++opposite_;
-        continue;
-      }
+      if (std::ranges::all_of(corner, [&](const auto& n) { return faces(n) <= 0.0; })) continue;
       const auto texelOf = [&](std::uint32_t k) {
         return glm::dvec2(patches.vertices[patches.indices[std::size_t{3} * t + k]].texel);
       };

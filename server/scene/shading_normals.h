@@ -28,8 +28,6 @@ class ShadingNormals {
   /// Of the front, unit length, at texel coordinates of its chart; beside the triangle that of its nearest edge.
   /// `geometric`: the triangle's own, which it is wherever the interpolated one points to the other side.
   [[nodiscard]] glm::dvec3 at(std::uint32_t triangle, const glm::vec2& texel, const glm::dvec3& geometric) const;
-  /// Triangles whose normals point to their back at all three corners: they count as flat.
-  [[nodiscard]] std::uint64_t opposite() const { return opposite_; }
 
  private:
   /// Weights of the second and third corner are (texel - origin) dot these.
@@ -39,7 +37,6 @@ class ShadingNormals {
   };
   std::vector<std::uint32_t> of_triangle_;  ///< into corners_, or kNone; empty: all are flat
   std::vector<Corners> corners_;
-  std::uint64_t opposite_ = 0;
 };
 
 }  // namespace radiosity::scene

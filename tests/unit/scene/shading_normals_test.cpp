@@ -66,7 +66,7 @@ TEST(ShadingNormals, AreThoseOfTheFileAtEveryCornerHoweverItIsPlaced) {
 }
 
 TEST(ShadingNormals, AreInterpolatedWithinATriangle) {
-  Primitive floor = floorQuad(2.0);
+  Primitive floor = floorQuad(2.0, -1.0, -1.0);
   for (const auto& p : floor.positions) floor.normals.emplace_back(glm::normalize(glm::dvec3(0.4 * p.x, 1.0, 0.0)));
   const auto scene = sceneOf(floor);
   const auto patches = build(scene);
@@ -105,9 +105,13 @@ TEST(ShadingNormals, ThatPointToTheBackCountAsFlat) {
   for (auto& normal : ball.normals) normal = -normal;
   const auto scene = sceneOf(ball);
   const auto patches = build(scene);
-  const ShadingNormals normals(scene, patches);
-  EXPECT_TRUE(normals.empty());
-  EXPECT_EQ(normals.opposite(), patches.triangles.size());
+  EXPECT_TRUE(ShadingNormals(scene, patches).empty());
+}
+
+TEST(ShadingNormals, ChartsOfASmoothBallAreStitchedHoweverSteepItsFacets) {
+  const auto seamsOf = [](const Primitive& ball) { return build(sceneOf(ball)).seams.size(); };
+  EXPECT_EQ(seamsOf(icoSphere(1.0, 0)), 0U) << "42 degrees";
+  EXPECT_EQ(seamsOf(smoothBall(0)), 30U);
 }
 
 TEST(ShadingNormals, WhereOneCornerPointsToTheBackTheOthersStillCount) {
