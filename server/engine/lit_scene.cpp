@@ -51,6 +51,7 @@ Result<std::unique_ptr<LitScene>> LitScene::make(scene::EditedDocument edited, c
   if (!built) return tl::unexpected<Error>(built.error());
   lit->patches_ = std::make_shared<const scene::PatchScene>(std::move(built->patches));
   lit->burial_ = std::move(built->burial);
+  lit->normals_ = std::make_shared<const scene::ShadingNormals>(*lit->scene_, *lit->patches_);
   lit->patch_count_ = leavesWithArea(*lit->patches_);
   lit->materials_ = scene::shadePatches(*lit->scene_, *lit->patches_);
   lit->light_report_.findDark(lit->litParts());
@@ -176,7 +177,7 @@ void LitScene::makeSolver(const solver::FormerSolver* former) {
   settings.link_memory = settings_.link_memory_bytes;
   sources_ = lightSources(*scene_);
   light_report_.forgetLost();
-  solver_ = solver::makeSolver(patches_, materials_, transport_, settings, sources_, former);
+  solver_ = solver::makeSolver(patches_, materials_, transport_, settings, sources_, former, normals_);
   solver_power_ = power_ = emittedPower();
 }
 

@@ -192,6 +192,7 @@ class LitScene {
   solver::Transport& transport_;
   std::shared_ptr<const scene::Scene> scene_;
   std::shared_ptr<const scene::PatchScene> patches_;
+  std::shared_ptr<const scene::ShadingNormals> normals_;
   std::shared_ptr<const scene::BurialRecord> burial_;  // of these, for edits; null: not kept
   std::uint64_t patch_count_ = 0;
   scene::PatchMaterials materials_;

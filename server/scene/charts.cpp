@@ -106,7 +106,7 @@ class Builder {
     applyOpacity(patches_);
     sumAncestors(patches_);
     writeInstanceUvs();
-    findSeams(flat_, neighbours_, sources_, 2.0 * options_.curve_angle_deg, patches_);
+    findSeams(flat_, neighbours_, sources_, 2.0 * options_.curve_angle_deg, ShadingNormals(scene_, patches_), patches_);
     return BuiltScene{std::move(patches_), std::move(burial_)};
   }
 

@@ -28,6 +28,7 @@
 
 #include "server/scene/flatten.h"
 #include "server/scene/patch_scene.h"
+#include "server/scene/shading_normals.h"
 
 namespace radiosity::scene {
 
@@ -100,8 +101,10 @@ struct Facets {
                                                          const ChartOptions& options);
 
 /// Fills patches.seams. `sources`: flat triangle of each patch triangle. Edges are matched by position, so also between
-/// instances (tiles of a floor), where the angle between the faces is below `smooth_deg`.
+/// instances (tiles of a floor), where the angle between the faces is below `smooth_deg`, or both have normals from the
+/// file that are the same along the edge.
 void findSeams(const FlatScene& flat, const std::vector<std::uint32_t>& neighbours,
-               const std::vector<std::uint32_t>& sources, double smooth_deg, PatchScene& patches);
+               const std::vector<std::uint32_t>& sources, double smooth_deg, const ShadingNormals& normals,
+               PatchScene& patches);
 
 }  // namespace radiosity::scene

@@ -7,7 +7,8 @@
 namespace radiosity::scene {
 namespace {
 
-constexpr double kSamePlace = 1e-6;  // unit box; wider than rounding between instances, far below a texel
+constexpr double kSameNormal = 0.9999;  // 0.8 degrees, as coarse as normals of 8 bits are
+constexpr double kSamePlace = 1e-6;     // unit box; wider than rounding between instances, far below a texel
 
 struct BorderEdge {
   std::uint32_t low = 0, high = 0;  ///< welded ends
@@ -64,11 +65,21 @@ std::vector<BorderEdge> borderEdges(const FlatScene& flat, const std::vector<std
 }  // namespace
 
 void findSeams(const FlatScene& flat, const std::vector<std::uint32_t>& neighbours,
-               const std::vector<std::uint32_t>& sources, double smooth_deg, PatchScene& patches) {
+               const std::vector<std::uint32_t>& sources, double smooth_deg, const ShadingNormals& normals,
+               PatchScene& patches) {
   const std::vector<BorderEdge> edges = borderEdges(flat, neighbours, sources, patches);
   const auto smooth = static_cast<float>(std::cos(smooth_deg * M_PI / 180.0));
   const auto texelOf = [&](std::uint32_t t, std::uint32_t corner) {
     return patches.vertices[patches.indices[std::size_t{3} * t + corner]].texel;
+  };
+  const auto normalAt = [&](const BorderEdge& edge, std::uint32_t corner) {
+    return normals.at(edge.triangle, texelOf(edge.triangle, corner),
+                      glm::dvec3(patches.triangles[edge.triangle].normal));
+  };
+  const auto looksSmooth = [&](const BorderEdge& x, const BorderEdge& y) {
+    return normals.has(x.triangle) && normals.has(y.triangle) &&
+           glm::dot(normalAt(x, x.corner_low), normalAt(y, y.corner_low)) > kSameNormal &&
+           glm::dot(normalAt(x, x.corner_high), normalAt(y, y.corner_high)) > kSameNormal;
   };
   for (std::size_t i = 0; i < edges.size();) {
     std::size_t end = i + 1;
@@ -80,7 +91,9 @@ void findSeams(const FlatScene& flat, const std::vector<std::uint32_t>& neighbou
         // Neighbours run along their edge in opposite directions; the same direction means back to back or doubled.
         const bool opposite = ((x.corner_low + 1) % 3 == x.corner_high) != ((y.corner_low + 1) % 3 == y.corner_high);
         if (!opposite) continue;
-        if (glm::dot(patches.triangles[x.triangle].normal, patches.triangles[y.triangle].normal) < smooth) continue;
+        if (glm::dot(patches.triangles[x.triangle].normal, patches.triangles[y.triangle].normal) < smooth &&
+            !looksSmooth(x, y))
+          continue;
         PatchScene::Seam seam{};
         seam.surface = {patches.triangle_surface[x.triangle], patches.triangle_surface[y.triangle]};
         seam.texel[0] = {texelOf(x.triangle, x.corner_low), texelOf(x.triangle, x.corner_high)};

@@ -175,6 +175,7 @@ void LeafGather::finish() {
   leaf_bias_ = smoother_->biasOfLeaves();
   weighLost();
   weighNoise();
+  weighShading();
   smoother_->forget();
   weighMissed(levels);
   weighDoubt();

@@ -29,6 +29,7 @@
 
 #include "common/union_find.h"
 #include "server/solver/gmres.h"
+#include "server/solver/leaf_shading.h"
 #include "server/solver/leaf_sights.h"
 #include "server/solver/leaf_smoother.h"
 #include "server/solver/lost_rays.h"
@@ -57,6 +58,11 @@ class LeafGather {
   /// What the equation takes at most, without rays, and with those that a solve begins with.
   [[nodiscard]] static std::size_t leastBytes(std::size_t leaves);
 
+  /// What rays bring is told for these normals, too; null: for none. It is to outlive this.
+  void shadeFor(const LeafShading* shading) { shading_ = shading; }
+  /// By number of LeafShading: what of irradiance(half) counts for the shading normal. Empty: there are none.
+  [[nodiscard]] std::span<const glm::vec3> shadedParts(std::size_t half) const { return shaded_part_[half]; }
+
   /// After an edit of geometry (LeafSights::inherit).
   void inherit(const LeafGather& former, std::span<const std::uint32_t> value_before, const Shadows& change);
   /// Light was brought, once at least.
@@ -82,7 +88,10 @@ class LeafGather {
 
   /// x, to be added to what came over links. Until it is forgotten.
   [[nodiscard]] std::span<const glm::vec3> irradiance(std::size_t half) const { return gathered_[half]; }
-  void forgetIrradiance() { gathered_ = {}; }
+  void forgetIrradiance() {
+    gathered_ = {};
+    shaded_part_ = {};
+  }
   /// Square of the error that rays leave in the mean of the halves: sum over leaves and channels, times area.
   [[nodiscard]] double noise() const { return noise_; }
   /// Of it, but for what smoothing took: more rays lower this part.
@@ -197,6 +206,16 @@ class LeafGather {
   void weighMissed(const std::array<Levels, 2>& levels);
   void weighNoise();
   void weighLost();
+  void weighShading();
+  /// Of a side, by channel and leaf: the mean of what rays see; what arrives, as a vector of which the product with a
+  /// normal is irradiance; and what of that product is not there, since it is below the horizon of the shading normal.
+  struct ShadedLight {
+    static constexpr std::size_t kParts = 5, kBelow = 4;
+    std::array<std::array<std::vector<float>, 3>, kParts> part;
+  };
+  void sumShaded(std::size_t half, std::uint32_t value, std::uint32_t leaf, const glm::dvec3& normal,
+                 ShadedLight& light) const;
+  void weighShading(std::size_t half, const LeafShading::ShadedSide& shaded);
   void weighDoubt();
   [[nodiscard]] glm::dvec3 doubtOf(std::size_t half, std::uint32_t end) const;
   [[nodiscard]] glm::dvec3 changeAcross(std::uint32_t value) const;
@@ -264,6 +283,8 @@ class LeafGather {
   std::array<Half, 2> halves_;
   std::array<LeafSmoother::Light, 2> solved_;  ///< by half: x, smoothed; while taking it
   std::array<std::vector<glm::vec3>, 2> gathered_;
+  const LeafShading* shading_ = nullptr;
+  std::array<std::vector<glm::vec3>, 2> shaded_part_;
   double noise_ = 0.0, smoothed_ = 0.0, bias_ = 0.0, doubt_ = 0.0, unsolved_ = 0.0, unsolved_square_ = 0.0;
   std::vector<double> block_noise_;  ///< parts of it but for smoothed_, what smoothing took, by kBlock leaves
   std::vector<double> block_light_;  ///< likewise, of all irradiance

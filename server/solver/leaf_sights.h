@@ -90,6 +90,18 @@ class LeafSights {
     return seen_[half].run(first, count);
   }
 
+  /// The rays of a leaf, as they were traced: calls visit(place, direction, end) for each.
+  template <typename Visit>
+  void visitRays(std::size_t half, std::uint32_t value, const Visit& visit) const {
+    const auto draw = draws(value, rays_->sideOf(value), half);
+    std::uint32_t k = 0;
+    for (const auto end : seen(half, value)) {
+      const auto at = draw(k++);
+      const auto place = rays_->placeOn(value, {at.z, at.w});
+      visit(place, cosineDirection(place.normal, at.x, at.y), end);
+    }
+  }
+
   /// After an edit of geometry, at first: rays of the scene before that pass nothing that changed see what they saw.
   /// `value_before`: by leaf value, what it was there, or kNone where it is new, moved or altered. All others are
   /// traced with the next trace(), so that all see what they would without it. No half of a leaf gets more than `most`.

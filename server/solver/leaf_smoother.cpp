@@ -452,18 +452,28 @@ void LeafSmoother::chooseParts(const Side& side, Room& room, float* parts) const
   }
 }
 
+void LeafSmoother::apply(const Side& side, const std::array<float*, 3>& values, Room& room) const {
+  for (std::size_t pass = 0; pass < towards_.size(); ++pass) {
+    if (!isFor(kPasses[pass], side)) continue;
+    weigh(side, kPasses[pass], room);
+    room.means.resize(side.leaf_count);
+    for (auto* channel : values) {
+      average(side, kPasses[pass], channel, room.means.data(), room);
+      moveTowards(side.leaf_count, room.means.data(), &towards_[pass][side.first_value], channel);
+    }
+  }
+}
+
+void LeafSmoother::apply(std::size_t side, const std::array<float*, 3>& values) const {
+  Room room;
+  apply(sides_[side], values, room);
+}
+
 void LeafSmoother::apply(Light& values) const {
   Room room;
   for (const auto& side : sides_) {
-    for (std::size_t pass = 0; pass < towards_.size(); ++pass) {
-      if (!isFor(kPasses[pass], side)) continue;
-      weigh(side, kPasses[pass], room);
-      room.means.resize(side.leaf_count);
-      for (auto& channel : values) {
-        average(side, kPasses[pass], &channel[side.first_value], room.means.data(), room);
-        moveTowards(side.leaf_count, room.means.data(), &towards_[pass][side.first_value], &channel[side.first_value]);
-      }
-    }
+    const auto first = side.first_value;
+    apply(side, {values[0].data() + first, values[1].data() + first, values[2].data() + first}, room);
   }
 }
 

@@ -30,6 +30,8 @@ class LeafSmoother {
   void smooth(std::array<Light, 2>& halves);
   /// Does the same to other values.
   void apply(Light& values) const;
+  /// The same to those of one side, by channel and leaf.
+  void apply(std::size_t side, const std::array<float*, 3>& values) const;
   /// What it took of the light itself, or put where there was less, and what was gained by chance: squares of it, times
   /// area, all leaves and channels. An estimate, of which what was taken is not below zero.
   [[nodiscard]] double bias() const { return bias_; }
@@ -58,6 +60,7 @@ class LeafSmoother {
   void chooseParts(const Side& side, Room& room, float* parts) const;
   static void sumAround(const Side& side, const Pass& pass, std::vector<float>& values, std::vector<float>& rows);
   void average(const Side& side, const Pass& pass, const float* from, float* means, Room& room) const;
+  void apply(const Side& side, const std::array<float*, 3>& values, Room& room) const;
   /// A leaf of a side, and by step which of the nine around it, as bits, it may be averaged with.
   struct Beside {
     std::uint32_t leaf;

@@ -22,10 +22,12 @@ std::vector<glm::vec3> LinkedSolver::irradiance() const {
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
       values[side.first_node + leaf] = lightOf(side.first_value + leaf);
   }
+  addShaded(shaded_, kBothHalves, values);
   if (!variation_) return values;
   for (const auto& [value, lacks] : variation_->corrections()) {
     auto& light = values[nodeOf(value)];
-    light = glm::max(light + 0.5F * (lacks[0] + lacks[1]), glm::vec3(0.0F));  // by noise it might be less
+    const auto more = shadedCorrection(value, 0.5F * (lacks[0] + lacks[1]));
+    light = glm::max(light + more, glm::vec3(0.0F));  // by noise it might be less
   }
   return values;
 }
@@ -40,8 +42,10 @@ std::vector<glm::vec3> LinkedSolver::halfIrradiance(std::uint32_t half) const {
   std::vector<glm::vec3> values(patches_->nodeCount(), glm::vec3(0.0F));
   for (const auto& side : sides_)
     std::copy_n(half_[half].begin() + side.first_value, side.leaf_count, values.begin() + side.first_node);
+  addShaded(shaded_, half, values);
   if (!variation_) return values;
-  for (const auto& correction : variation_->corrections()) values[nodeOf(correction.value)] += correction.lacks[half];
+  for (const auto& correction : variation_->corrections())
+    values[nodeOf(correction.value)] += shadedCorrection(correction.value, correction.lacks[half]);
   return values;
 }
 

@@ -7,7 +7,7 @@
 namespace radiosity::solver {
 namespace {
 
-constexpr std::uint32_t kKind = 0x354b4e4cU;  // "LNK5": what there is below, and in which order
+constexpr std::uint32_t kKind = 0x364b4e4cU;  // "LNK6": what there is below, and in which order
 
 /// All of a shooter but its links.
 template <typename Archive, typename Self>
@@ -84,7 +84,7 @@ void LinkedSolver::visit(Archive& archive, Self& self) {
           self.edit_lights_planned_, self.settling_, self.wanted_, self.measured_, self.growing_, self.share_part_,
           self.left_out_, self.rounds_, self.solutions_, self.sweeps_, self.replayed_, self.varying_share_, self.half_,
           self.refined_, self.by_links_, self.error_, self.counters_, self.by_rays_, self.sample_goal_, self.aim_,
-          self.sampled_alone_);
+          self.sampled_alone_, self.shaded_);
   LinkPlanner::visit(archive, self.planner_);
   LinkMemory::visit(archive, self.memory_);
 }
@@ -117,7 +117,8 @@ bool LinkedSolver::restore(ArchiveReader& from) {
            (shooter.source == scene::kNone || shooter.source < sources_.size());
   };
   const auto exists = [&](const Measurement& want) { return want.shooter < shooters.size() && want.half < 2; };
-  if (half_[0].size() != values || half_[1].size() != values || measured_ > wanted_.size() ||
+  if (half_[0].size() != values || half_[1].size() != values || shaded_[0].size() != shading_.size() ||
+      shaded_[1].size() != shading_.size() || measured_ > wanted_.size() ||
       !std::all_of(shooters.begin(), shooters.end(), known) || !std::all_of(wanted_.begin(), wanted_.end(), exists))
     return false;
   bool gathers = false;

@@ -63,8 +63,9 @@ bool LinkedSolver::lightLeaves() {
     inBothHalves([&](std::size_t half) {
       for (std::size_t v = 0; v < half_[half].size(); ++v) half_[half][v] += gather_->irradiance(half)[v];
     });
-    gather_->forgetIrradiance();
   }
+  shadeLeaves();
+  if (gather_) gather_->forgetIrradiance();
   pass_ = Pass::kNone;
   findUnshot();
   if (variation_) updateVariation();

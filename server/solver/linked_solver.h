@@ -16,6 +16,7 @@
 #include "server/solver/change_reach.h"
 #include "server/solver/field_error.h"
 #include "server/solver/leaf_gather.h"
+#include "server/solver/leaf_shading.h"
 #include "server/solver/leaf_variation.h"
 #include "server/solver/lights.h"
 #include "server/solver/link_memory.h"
@@ -41,6 +42,9 @@ class LinkedSolver final : public Solver {
   LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
                Transport& transport, const SolverSettings& settings, const LightSources& sources, LinkedSolver& former,
                const scene::PatchMap& map, bool keep_former = false);
+
+  /// Light is told for these normals; all else, and error(), is for geometric ones. Before the first step.
+  void shadeFor(std::shared_ptr<const scene::ShadingNormals> normals);
 
   [[nodiscard]] Result<StepOutcome> step() override;
   void setMaterials(const scene::PatchMaterials& materials) override;
@@ -220,6 +224,15 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] bool finishEdit();
   [[nodiscard]] bool mayGoWithout();
   [[nodiscard]] bool lightLeaves();
+  void shadeLeaves();
+  /// By half and number of LeafShading: what counts for the shading normal less what does for the geometric one.
+  using ShadedLight = std::array<std::vector<glm::vec3>, 2>;
+  void addShadedLinks(LinkSystem::From from, ShadedLight& light) const;
+  [[nodiscard]] std::vector<ShadingEmitter> shadingEmitters(LinkSystem::From from) const;
+  [[nodiscard]] ShadingEmitter emitterOf(const Shooter& shooter) const;
+  [[nodiscard]] ShadingEmitter emitterOf(const NodePlace& node) const;
+  [[nodiscard]] glm::vec3 shadedCorrection(std::uint32_t value, const glm::vec3& lacks) const;
+  void addShaded(const ShadedLight& light, std::uint32_t first_half, std::vector<glm::vec3>& nodes) const;
   void takeMaterials(const scene::PatchMaterials& materials);
   void takeLights();
   [[nodiscard]] bool settle();
@@ -351,10 +364,12 @@ class LinkedSolver final : public Solver {
   double left_out_ = 0.0;             // relative error by nodes too weak to play roulette
   std::uint32_t rounds_ = 0, rounds_before_edit_ = 0;
   std::uint64_t solutions_ = 0, sweeps_ = 0, replayed_ = 0;
-  double varying_ = 0.0, net_unshot_ = 0.0;           // flux, all channels
-  bool all_unshot_ = false;                           // an AllUnshot lives
-  double varying_share_ = 0.0;                        // of the residual, what light that varies inside shooters causes
-  std::array<std::vector<glm::vec3>, 2> half_;        // irradiance by leaf value
+  double varying_ = 0.0, net_unshot_ = 0.0;     // flux, all channels
+  bool all_unshot_ = false;                     // an AllUnshot lives
+  double varying_share_ = 0.0;                  // of the residual, what light that varies inside shooters causes
+  std::array<std::vector<glm::vec3>, 2> half_;  // irradiance by leaf value
+  LeafShading shading_;
+  ShadedLight shaded_;                                // to be added to half_ where it is told
   std::array<std::vector<glm::vec3>, 2> over_links_;  // of a new solution, while what rays bring is solved for
   std::unique_ptr<LeafVariation> variation_;          // once little else is in error
   std::unique_ptr<LeafVariation> next_variation_;     // after an edit of geometry, until then

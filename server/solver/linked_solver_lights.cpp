@@ -112,6 +112,11 @@ std::vector<glm::vec3> LinkedSolver::directIrradiance() const {
       irradiance[side.first_node + leaf] = 0.5F * (halves[0][v] + halves[1][v]);
     }
   }
+  if (shading_.empty()) return irradiance;
+  ShadedLight shaded;
+  for (auto& half : shaded) half.assign(shading_.size(), glm::vec3(0.0F));
+  addShadedLinks(LinkSystem::From::kLights, shaded);
+  addShaded(shaded, kBothHalves, irradiance);
   return irradiance;
 }
 

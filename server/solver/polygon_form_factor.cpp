@@ -17,11 +17,12 @@ struct Polygon {
   std::size_t count = 0;
 };
 
-Polygon clipToHorizon(const glm::dvec3& point, const glm::dvec3& normal, std::span<const glm::vec3> corners) {
+template <typename Corners>
+Polygon clipToHorizon(const glm::dvec3& point, const glm::dvec3& normal, const Corners& corners, std::size_t count) {
   Polygon clipped;
-  for (std::size_t i = 0; i < corners.size(); ++i) {
+  for (std::size_t i = 0; i < count; ++i) {
     const auto a = glm::dvec3(corners[i]) - point;
-    const auto b = glm::dvec3(corners[(i + 1) % corners.size()]) - point;
+    const auto b = glm::dvec3(corners[(i + 1) % count]) - point;
     const double height_a = glm::dot(a, normal);
     const double height_b = glm::dot(b, normal);
     if (height_a >= 0.0) clipped.corner[clipped.count++] = a;
@@ -30,6 +31,19 @@ Polygon clipToHorizon(const glm::dvec3& point, const glm::dvec3& normal, std::sp
     }
   }
   return clipped;
+}
+
+/// Whose product with a normal is 2 pi times the form factor, but for its sign (Lambert 1760).
+glm::dvec3 edgeSum(const Polygon& polygon) {
+  glm::dvec3 sum(0.0);
+  for (std::size_t i = 0; i < polygon.count; ++i) {
+    const auto& a = polygon.corner[i];
+    const auto& b = polygon.corner[(i + 1) % polygon.count];
+    const auto normal_of_edge = glm::cross(a, b);
+    const double sine = glm::length(normal_of_edge);
+    if (sine > 0.0) sum += (std::atan2(sine, glm::dot(a, b)) / sine) * normal_of_edge;
+  }
+  return sum;
 }
 
 /// Fan of triangles from the first corner: exact for convex ones.
@@ -49,7 +63,7 @@ double polygonArea(std::span<const glm::vec3> corners) { return areaOf(corners, 
 
 FormFactor formFactorInFront(const glm::dvec3& point, const glm::dvec3& normal, std::span<const glm::vec3> corners) {
   RAD_CHECK_LE(corners.size(), std::size_t{8});
-  const auto polygon = clipToHorizon(point, normal, corners);
+  const auto polygon = clipToHorizon(point, normal, corners, corners.size());
   if (polygon.count < 3) return {};
   double sum = 0.0;
   for (std::size_t i = 0; i < polygon.count; ++i) {
@@ -64,6 +78,18 @@ FormFactor formFactorInFront(const glm::dvec3& point, const glm::dvec3& normal, 
   const double all = std::all_of(corners.begin(), corners.end(), above) ? 0.0 : polygonArea(corners);
   const double front = all > 0.0 ? std::min(1.0, areaOf(polygon.corner, polygon.count) / all) : 1.0;
   return {std::abs(sum) / (2.0 * std::numbers::pi), front};
+}
+
+FormFactorsAboveBoth formFactorsAboveBoth(const glm::dvec3& point, const glm::dvec3& geometric,
+                                          const glm::dvec3& shading, std::span<const glm::vec3> corners) {
+  RAD_CHECK_LE(corners.size(), std::size_t{8});
+  const auto above = clipToHorizon(point, geometric, corners, corners.size());
+  if (above.count < 3) return {};
+  const auto of_above = edgeSum(above);
+  const auto both = clipToHorizon(glm::dvec3(0.0), shading, above.corner, above.count);
+  const auto of_both = both.count < 3 ? glm::dvec3(0.0) : edgeSum(both);
+  const double one = 1.0 / (2.0 * std::numbers::pi);
+  return {one * std::abs(glm::dot(of_above, geometric)), one * std::abs(glm::dot(of_both, shading))};
 }
 
 double polygonFormFactor(const glm::dvec3& point, const glm::dvec3& normal, std::span<const glm::vec3> corners) {

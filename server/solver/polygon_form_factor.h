@@ -17,6 +17,13 @@ struct FormFactor {
 /// Rushmeier and Winget 1989). At most 8 corners. The polygon must face the point; 0 when it is below the horizon.
 [[nodiscard]] FormFactor formFactorInFront(const glm::dvec3& point, const glm::dvec3& normal,
                                            std::span<const glm::vec3> corners);
+/// Of the part of the polygon above the plane of `geometric`: its form factor, and what of it is above that of
+/// `shading` too, weighed by the cosine with that one.
+struct FormFactorsAboveBoth {
+  double geometric = 0.0, shading = 0.0;
+};
+[[nodiscard]] FormFactorsAboveBoth formFactorsAboveBoth(const glm::dvec3& point, const glm::dvec3& geometric,
+                                                        const glm::dvec3& shading, std::span<const glm::vec3> corners);
 [[nodiscard]] double polygonFormFactor(const glm::dvec3& point, const glm::dvec3& normal,
                                        std::span<const glm::vec3> corners);
 

@@ -16,7 +16,7 @@ constexpr std::size_t kLeafBytes = 2;
 std::unique_ptr<Solver> makeSolver(std::shared_ptr<const scene::PatchScene> patches,
                                    const scene::PatchMaterials& materials, Transport& transport,
                                    const SolverSettings& settings, const LightSources& sources,
-                                   const FormerSolver* former) {
+                                   const FormerSolver* former, std::shared_ptr<const scene::ShadingNormals> normals) {
   // Coverage by chance, pixel by pixel, makes links to what one can see through too uncertain to solve over: light
   // between sheets that all but touch would grow from bounce to bounce. Rays bring no more than there is.
   const bool see_through = !patches->opacity.empty();
@@ -33,6 +33,7 @@ std::unique_ptr<Solver> makeSolver(std::shared_ptr<const scene::PatchScene> patc
   } else {
     linked = std::make_unique<LinkedSolver>(patches, materials, transport, settings, sources);
   }
+  linked->shadeFor(std::move(normals));
   if (linked->lightBytes() <= settings.link_memory / 2) return linked;
   return std::make_unique<ShootingSolver>(std::move(patches), materials, transport, settings, sources);
 }

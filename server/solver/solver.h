@@ -10,6 +10,7 @@
 #include "common/archive.h"
 #include "common/result.h"
 #include "server/scene/patch_scene.h"
+#include "server/scene/shading_normals.h"
 #include "server/solver/error_parts.h"
 #include "server/solver/planner.h"
 #include "server/solver/punctual_lights.h"
@@ -100,7 +101,8 @@ class Solver {
   /// Brings irradiance() and error() up to date when the solve is stopped before its first round ended.
   virtual void assess() = 0;
 
-  /// Irradiance (lux) by node, level 0. Grows with every wave at first; later it changes from round to round. Summed up
+  /// Irradiance (lux) by node, level 0; for the shading normal where there is one (makeSolver), as are its halves and
+  /// its direct part. Grows with every wave at first; later it changes from round to round. Summed up
   /// at each call, O(nodes).
   [[nodiscard]] virtual std::vector<glm::vec3> irradiance() const = 0;
   /// The same from one of the two independent halves of the samples.
@@ -165,10 +167,12 @@ struct FormerSolver {
 };
 
 /// With a former solver of the same settings: the links that the edit left alone stay, others are measured again with
-/// the next steps.
+/// the next steps. `normals`: that light is told for; it is carried by geometric ones, which error() is about. Where
+/// links are forgotten it is told for these, too.
 [[nodiscard]] std::unique_ptr<Solver> makeSolver(std::shared_ptr<const scene::PatchScene> patches,
                                                  const scene::PatchMaterials& materials, Transport& transport,
                                                  const SolverSettings& settings, const LightSources& sources = {},
-                                                 const FormerSolver* former = nullptr);
+                                                 const FormerSolver* former = nullptr,
+                                                 std::shared_ptr<const scene::ShadingNormals> normals = nullptr);
 
 }  // namespace radiosity::solver

@@ -20,7 +20,7 @@ OWN_INCLUDES = [
     ("common/", ["common/"]),
     ("protocol/", ["common/", "protocol/"]),
     ("server/scene/", ["common/", "server/scene/"]),
-    ("server/solver/", ["common/", "server/solver/", r"server/scene/(scene|patch_scene|bounds|bvh|ray_tree)\.h"]),
+    ("server/solver/", ["common/", "server/solver/", r"server/scene/(scene|patch_scene|bounds|bvh|ray_tree|shading_normals)\.h"]),
     ("server/gpu/", ["common/", "server/gpu/", "server/solver/", r"server/scene/(scene|patch_scene|bvh)\.h"]),
     ("server/engine/", ["common/", "server/engine/", "server/scene/", "server/solver/", "server/gpu/", "server/state/"]),
     ("server/state/", ["common/", "server/state/"]),

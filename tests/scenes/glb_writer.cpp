@@ -91,8 +91,9 @@ struct Writer {
       const glm::vec3 normal(glm::normalize(polygonNormal(polygon)));
       for (const auto& corner : polygon.corners) {
         positions.emplace_back(corner - object.origin);
-        normals.push_back(normal);
+        if (polygon.normals.empty()) normals.push_back(normal);
       }
+      for (const auto& corner : polygon.normals) normals.emplace_back(corner);
       for (std::uint32_t i = 1; i + 1 < polygon.corners.size(); ++i) {
         triangles.insert(triangles.end(), {first, first + i, first + i + 1});
       }

@@ -133,6 +133,30 @@ TestScene seminarRoom() {
   return scene;
 }
 
+TestScene smoothRoom() {
+  TestScene scene;
+  scene.name = "room_smooth";
+  const auto white = scene.add({"white", glm::dvec3(0.75), glm::dvec3(0.0)});
+  const auto red = scene.add({"red_wall", {0.65, 0.20, 0.15}, glm::dvec3(0.0)});
+  const auto floor = scene.add({"floor", {0.45, 0.42, 0.38}, glm::dvec3(0.0)});
+  const auto ball = scene.add({"ball", glm::dvec3(0.6), glm::dvec3(0.0)});
+  const auto barrel = scene.add({"barrel", {0.5, 0.35, 0.2}, glm::dvec3(0.0)});
+  const auto light = scene.add({"lamp_light", glm::dvec3(0.5), {60.0, 57.0, 50.0}});
+  constexpr double kHeight = 2.4;
+  Object room{"room", {}, {}};
+  appendBox(room, {-1.5, 0.0, -1.5}, {1.5, kHeight, 1.5}, {red, white, floor, white, white, white}, kNoFace, true);
+  scene.objects.push_back(std::move(room));
+  scene.objects.push_back(makeCeilingLamp("lamp", {0.3, kHeight - 0.15, 0.0}, 0.8, 0.5, white, light));
+  Object sphere{"ball", {-0.6, 1.0, 0.2}, {}};
+  appendSphere(sphere, sphere.origin, 0.4, 1, ball, false, true);
+  scene.objects.push_back(std::move(sphere));
+  Object cylinder{"barrel", {0.6, 0.1, -0.4}, {}};
+  appendCylinder(cylinder, cylinder.origin, 0.35, 0.9, 12, barrel);
+  scene.objects.push_back(std::move(cylinder));
+  scene.camera = {{1.2, 1.5, 1.4}, {-0.2, 0.8, -0.2}, 1.0, 0.0};
+  return scene;
+}
+
 TestScene doubleSidedTwin(TestScene scene) {
   scene.name += "_double";
   for (auto& material : scene.materials) material.double_sided = material.emission_nits == glm::dvec3(0.0);
@@ -155,6 +179,7 @@ std::vector<std::pair<std::string, std::function<TestScene()>>> allScenes() {
           {"room_seminar", seminarRoom},
           {"room_double", doubleRoom},
           {"room_lights", lightsRoom},
+          {"room_smooth", smoothRoom},
           {"cornell_double", [] { return doubleSidedTwin(cornell()); }},
           {"room_small_double", [] { return doubleSidedTwin(smallRoom()); }},
           {"room_seminar_double", [] { return doubleSidedTwin(seminarRoom()); }}};

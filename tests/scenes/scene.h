@@ -21,6 +21,7 @@ struct Material {
 struct Polygon {
   std::vector<glm::dvec3> corners;  ///< world space, metres
   std::uint32_t material = 0;
+  std::vector<glm::dvec3> normals = {};  ///< of the corners, unit length; empty: flat
 };
 
 /// Becomes one glTF node and mesh; `origin` is the node's translation, so that moving the node moves the thing.

@@ -55,6 +55,9 @@ struct SphereSpec {
 /// are, since a lamp whose other side shone too would be another lamp. What can be seen from within is as bright.
 [[nodiscard]] TestScene doubleSidedTwin(TestScene scene);
 
+/// Closed room with a lamp, a ball of 80 facets that hovers and a barrel of twelve sides, both with smooth normals.
+[[nodiscard]] TestScene smoothRoom();
+
 /// Everything that make_scenes writes, by file name without extension.
 [[nodiscard]] std::vector<std::pair<std::string, std::function<TestScene()>>> allScenes();
 

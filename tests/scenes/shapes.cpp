@@ -106,15 +106,36 @@ void appendBox(Object& object, glm::dvec3 low, glm::dvec3 high, const BoxMateria
 }
 
 void appendSphere(Object& object, glm::dvec3 centre, double radius, unsigned subdivisions, std::uint32_t material,
-                  bool inwards) {
+                  bool inwards, bool smooth) {
   auto triangles = icosahedron();
   for (unsigned i = 0; i < subdivisions; ++i) triangles = subdivide(triangles);
   const double blown_up = radius * std::sqrt(4.0 * std::numbers::pi / totalArea(triangles));
   for (const auto& [a, b, c] : triangles) {
     Polygon polygon{{centre + blown_up * a, centre + blown_up * b, centre + blown_up * c}, material};
+    if (smooth) polygon.normals = {glm::normalize(a), glm::normalize(b), glm::normalize(c)};
     if (inwards) std::swap(polygon.corners[1], polygon.corners[2]);
+    if (inwards && smooth) polygon.normals = {-polygon.normals[0], -polygon.normals[2], -polygon.normals[1]};
     object.polygons.push_back(std::move(polygon));
   }
+}
+
+void appendCylinder(Object& object, glm::dvec3 foot, double radius, double height, unsigned sides,
+                    std::uint32_t material) {
+  const glm::dvec3 up(0.0, height, 0.0);
+  const auto outwards = [&](unsigned side) {
+    const double angle = 2.0 * std::numbers::pi * side / sides;
+    return glm::dvec3(std::sin(angle), 0.0, std::cos(angle));
+  };
+  Polygon top{{}, material}, bottom{{}, material};
+  for (unsigned side = 0; side < sides; ++side) {
+    const auto a = outwards(side), b = outwards(side + 1);
+    const auto low = foot + radius * a, next = foot + radius * b;
+    object.polygons.push_back({{low, next, next + up, low + up}, material, {a, b, b, a}});
+    top.corners.push_back(low + up);
+    bottom.corners.insert(bottom.corners.begin(), low);
+  }
+  object.polygons.push_back(std::move(top));
+  object.polygons.push_back(std::move(bottom));
 }
 
 void turn(Object& object, double angle_rad) {
@@ -125,6 +146,7 @@ void turn(Object& object, double angle_rad) {
       const auto d = corner - object.origin;
       corner = object.origin + glm::dvec3(c * d.x + s * d.z, d.y, -s * d.x + c * d.z);
     }
+    for (auto& n : polygon.normals) n = glm::dvec3(c * n.x + s * n.z, n.y, -s * n.x + c * n.z);
   }
 }
 

@@ -22,9 +22,14 @@ void appendBox(Object& object, glm::dvec3 low, glm::dvec3 high, const BoxMateria
                unsigned left_out = kNoFace, bool inwards = false);
 
 /// A sphere of triangles: an icosahedron subdivided `subdivisions` times, blown up a little so that its area is exactly
-/// 4 pi radius^2. Faces outwards unless `inwards`.
+/// 4 pi radius^2. Faces outwards unless `inwards`. `smooth`: with the sphere's normals.
 void appendSphere(Object& object, glm::dvec3 centre, double radius, unsigned subdivisions, std::uint32_t material,
-                  bool inwards);
+                  bool inwards, bool smooth = false);
+
+/// An upright prism of so many sides whose corners lie on a circle, with flat ends; its sides have the normals of a
+/// cylinder. Faces outwards; stands on `foot`.
+void appendCylinder(Object& object, glm::dvec3 foot, double radius, double height, unsigned sides,
+                    std::uint32_t material);
 
 /// Turns the object about the vertical through its origin.
 void turn(Object& object, double angle_rad);
