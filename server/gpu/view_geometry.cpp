@@ -45,11 +45,12 @@ void addTriangle(const scene::Scene& scene, const scene::Instance& instance, con
   for (const auto c : order) {
     const auto vertex = primitive.indices[3 * drawn.triangle + c];
     const auto color = vertex < primitive.color0.size() ? primitive.color0[vertex] : glm::vec4(1.0F);
-    const auto factor = material.base_color * (1.0F - material.metallic);
     into.push_back({glm::vec3(position[c]), glm::vec3(normal),
-                    glm::vec4(glm::vec3(color) * factor, color.a * material.alpha),
+                    glm::vec4(glm::vec3(color) * material.base_color, color.a * material.alpha),
                     glm::vec4(textureUv(primitive, material.base_color_texture, vertex),
                               textureUv(primitive, material.emissive_texture, vertex)),
+                    glm::vec4(textureUv(primitive, material.metallic_texture, vertex),
+                              textureUv(primitive, material.specular_texture, vertex)),
                     drawn.lightmap_uv[c], material.emission});
   }
 }

@@ -18,7 +18,8 @@ struct ViewVertex {
   glm::vec3 position;  ///< metres, relative to the camera
   glm::vec3 normal;
   glm::vec4 color;
-  glm::vec4 uv;
+  glm::vec4 uv;        ///< of the base colour's texture, and of the emissive one
+  glm::vec4 shine_uv;  ///< of the metallic texture, and of the specular one
   glm::vec2 lightmap_uv;
   glm::vec3 emission;
 };

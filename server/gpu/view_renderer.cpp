@@ -18,7 +18,15 @@ constexpr int kMaxPicture = 8192;  ///< pixels a side
 constexpr int kSamples = 4;
 
 // Locations in view.vert and view.frag.
-enum Uniform : GLint { kClipFromView = 0, kQuantity = 1, kAlphaCutoff = 2, kBaseAlpha = 3, kDataScale = 4 };
+enum Uniform : GLint {
+  kClipFromView = 0,
+  kQuantity = 1,
+  kAlphaCutoff = 2,
+  kBaseAlpha = 3,
+  kDataScale = 4,
+  kMetallic = 5,
+  kSpecular = 6
+};
 
 /// Infinite, reversed depth: 1 at the near plane, 0 far away.
 glm::mat4 projection(const scene::Camera& camera, int width, int height) {
@@ -80,6 +88,7 @@ class GlViewRenderer final : public ViewRenderer {
     attribute(2, 4, offsetof(ViewVertex, color));
     attribute(3, 4, offsetof(ViewVertex, uv));
     attribute(4, 2, offsetof(ViewVertex, lightmap_uv));
+    attribute(6, 4, offsetof(ViewVertex, shine_uv));
     attribute(5, 3, offsetof(ViewVertex, emission));
     const std::array<float, 4> one{1.0F, 1.0F, 1.0F, 1.0F};
     glTextureStorage2D(white_.name(), 1, GL_RGBA8, 1, 1);
@@ -132,6 +141,10 @@ class GlViewRenderer final : public ViewRenderer {
       const auto& material = scene.materials[draw.material];
       bindTexture(0, scene, material.base_color_texture, textures);
       bindTexture(1, scene, material.emissive_texture, textures);
+      bindTexture(3, scene, material.metallic_texture, textures);
+      bindTexture(4, scene, material.specular_texture, textures);
+      glProgramUniform1f(program_.name(), kMetallic, material.metallic);
+      glProgramUniform3fv(program_.name(), kSpecular, 1, glm::value_ptr(material.specular));
       glBindTextureUnit(2, draw.page < lightmaps.size() ? lightmaps[draw.page].name() : black());
       const bool masked = material.alpha_mode == scene::AlphaMode::kMask;
       const bool blended = material.alpha_mode == scene::AlphaMode::kBlend;
@@ -181,7 +194,7 @@ class GlViewRenderer final : public ViewRenderer {
     };
     // One texture may be used with several wrappings, one draw at a time.
     setSampling(found->second.name(), GL_LINEAR_MIPMAP_LINEAR, wrap(use.repeat_u, use.mirror_u),
-                wrap(use.repeat_v, use.mirror_v));
+                wrap(use.repeat_v, use.mirror_v), use.nearest ? GL_NEAREST : GL_LINEAR);
     glBindTextureUnit(unit, found->second.name());
   }
 
@@ -194,9 +207,9 @@ class GlViewRenderer final : public ViewRenderer {
     return texture;
   }
 
-  static void setSampling(GLuint texture, GLenum minify, GLenum wrap_u, GLenum wrap_v) {
+  static void setSampling(GLuint texture, GLenum minify, GLenum wrap_u, GLenum wrap_v, GLenum magnify = GL_LINEAR) {
     glTextureParameteri(texture, GL_TEXTURE_MIN_FILTER, static_cast<GLint>(minify));
-    glTextureParameteri(texture, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+    glTextureParameteri(texture, GL_TEXTURE_MAG_FILTER, static_cast<GLint>(magnify));
     glTextureParameteri(texture, GL_TEXTURE_WRAP_S, static_cast<GLint>(wrap_u));
     glTextureParameteri(texture, GL_TEXTURE_WRAP_T, static_cast<GLint>(wrap_v));
   }

@@ -2,6 +2,7 @@
 in vec3 view_normal;
 in vec3 albedo_factor;
 in vec4 texture_uv;
+in vec4 shine_texture_uv;
 in vec2 page_uv;
 flat in vec3 emission_factor;
 layout(location = 0) out vec4 shade;
@@ -9,9 +10,13 @@ layout(location = 0) out vec4 shade;
 layout(binding = 0) uniform sampler2D base_color;
 layout(binding = 1) uniform sampler2D emissive;
 layout(binding = 2) uniform sampler2D page;
+layout(binding = 3) uniform sampler2D metallic_texture;
+layout(binding = 4) uniform sampler2D specular_texture;
 layout(location = 1) uniform int quantity;
 layout(location = 2) uniform float alpha_cutoff;  // -1: no test; -2: alpha covers so many of the samples
 layout(location = 3) uniform float base_alpha;
+layout(location = 5) uniform float metallic;
+layout(location = 6) uniform vec3 specular;
 layout(location = 4) uniform float data_scale;    // brings the data of kError and kMipLevel to 0..1
 
 const float kPi = 3.14159265358979;
@@ -53,7 +58,11 @@ void main() {
   float alpha = base.a * base_alpha;
   if (alpha < alpha_cutoff) discard;
   if (alpha_cutoff < -1.5) coverSamples(alpha);
-  vec3 albedo = min(base.rgb * albedo_factor, vec3(0.999));
+  // What metal and the specular part take is not reflected diffusely.
+  vec3 mirrored = specular * texture(specular_texture, shine_texture_uv.zw).rgb;
+  float diffuse = (1.0 - metallic * texture(metallic_texture, shine_texture_uv.xy).b)
+      * (1.0 - max(max(mirrored.r, mirrored.g), mirrored.b));
+  vec3 albedo = min(base.rgb * albedo_factor * diffuse, vec3(0.999));
   vec3 emission = texture(emissive, texture_uv.zw).rgb * emission_factor;
   vec3 irradiance = max(texture(page, page_uv).rgb, vec3(0.0));
   vec3 result = irradiance;

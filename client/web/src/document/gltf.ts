@@ -21,12 +21,30 @@ export interface GltfNode {
   };
 }
 
+export interface GltfTextureInfo {
+  index: number;
+  texCoord?: number;
+  extensions?: Record<string, unknown>;
+}
+
+/** KHR_materials_pbrSpecularGlossiness. */
+export interface SpecularGlossiness {
+  diffuseFactor?: Vec4;
+  diffuseTexture?: GltfTextureInfo;
+  specularFactor?: Vec3;
+  specularGlossinessTexture?: GltfTextureInfo;
+}
+
 export interface GltfMaterial {
   name?: string;
   emissiveFactor?: Vec3;
   pbrMetallicRoughness?: { baseColorFactor?: Vec4; metallicFactor?: number; [member: string]: unknown };
   doubleSided?: boolean;
-  extensions?: { KHR_materials_emissive_strength?: { emissiveStrength?: number }; [name: string]: unknown };
+  extensions?: {
+    KHR_materials_emissive_strength?: { emissiveStrength?: number };
+    KHR_materials_pbrSpecularGlossiness?: SpecularGlossiness;
+    [name: string]: unknown;
+  };
 }
 
 export interface GltfLight {

@@ -11,8 +11,9 @@ import {
   type MeshStandardMaterial,
   type Texture,
   Vector2,
+  Vector3,
 } from 'three';
-import type { GltfMaterial } from '../document/gltf';
+import type { GltfMaterial, GltfTextureInfo, SpecularGlossiness } from '../document/gltf';
 import type { LightmapPage } from './lightmap_page';
 import { FRAGMENT_PARS, LIGHT_FRAGMENT, OUTPUT_FRAGMENT } from './lit_shader';
 
@@ -52,13 +53,12 @@ export function specialise(material: Material, defines: Defines): boolean {
 
 export class LitMaterial extends MeshLambertMaterial {
   readonly own = {
-    diffuseScale: { value: 1 },
+    mirrored: { value: new Vector3() },
     dataPage: { value: null as Texture | null },
     dataScale: { value: 1 },
   };
   page: LightmapPage | undefined;
   dataPage: LightmapPage | undefined;
-  private meanMetal = 1;
   /** The server lights both, be it that a setting says so and not the document. An edit brings another file. */
   private readonly bothSides: boolean;
 
@@ -88,8 +88,9 @@ export class LitMaterial extends MeshLambertMaterial {
     }
     this.comeBefore();
     this.applyTransmission(from);
-    this.meanMetal = from.metalnessMap ? meanBlue(from.metalnessMap) : 1;
-    this.own.diffuseScale.value = 1 - (from.metalness ?? 0) * this.meanMetal;
+    const specular = from.userData[SPECULAR] as Specular | undefined;
+    this.specularMap = specular ? specular.map : from.metalnessMap;
+    this.own.mirrored.value.set(...(specular?.factor ?? ([0, 0, from.metalness ?? 0] as const)));
     this.setPage(page);
     this.onBeforeCompile = (shader) => {
       Object.assign(shader.uniforms, view.all, this.own, this.page?.uniforms ?? noPage());
@@ -126,19 +127,27 @@ export class LitMaterial extends MeshLambertMaterial {
 
   /** All of a surface looks the same but for its light. */
   get isPlain(): boolean {
-    return !this.map && !this.emissiveMap && !this.vertexColors && !this.transparent && this.alphaTest === 0;
+    return (
+      !this.map &&
+      !this.emissiveMap &&
+      !this.specularMap &&
+      !this.vertexColors &&
+      !this.transparent &&
+      this.alphaTest === 0
+    );
   }
 
   /** It neither reflects nor emits light, as a metal that is seen by its mirror images alone. */
   get isBlack(): boolean {
     const { color, emissive, emissiveIntensity: strength } = this;
     const most = (c: Color) => Math.max(c.r, c.g, c.b);
-    return most(color) * this.own.diffuseScale.value < 1e-4 && most(emissive) * strength === 0;
+    const diffuse = this.specularMap ? 1 : this.diffuseShare;
+    return most(color) * diffuse < 1e-4 && most(emissive) * strength === 0;
   }
 
   /** Of a plain surface, in nits, as the program has it; irradiance in lux. */
   radianceOf(irradiance: readonly [number, number, number]): [number, number, number] {
-    const rho = (c: number) => Math.min(0.999, c * this.own.diffuseScale.value) / Math.PI;
+    const rho = (c: number) => Math.min(0.999, c * this.diffuseShare) / Math.PI;
     const { color, emissive, emissiveIntensity: strength } = this;
     return [
       emissive.r * strength + rho(color.r) * irradiance[0],
@@ -150,10 +159,14 @@ export class LitMaterial extends MeshLambertMaterial {
   /** Takes on what an edit may change. */
   edit(gltf: GltfMaterial): void {
     const pbr = gltf.pbrMetallicRoughness ?? {};
-    const [r = 1, g = 1, b = 1, a = 1] = pbr.baseColorFactor ?? [];
+    const gloss = gltf.extensions?.KHR_materials_pbrSpecularGlossiness;
+    const [r = 1, g = 1, b = 1, a = 1] = (gloss ? gloss.diffuseFactor : pbr.baseColorFactor) ?? [];
     this.color.setRGB(r, g, b);
     if (this.transparent) this.opacity = a;
-    this.own.diffuseScale.value = 1 - (pbr.metallicFactor ?? 1) * this.meanMetal;
+    const mirrored: readonly [number, number, number] = gloss
+      ? (gloss.specularFactor ?? [1, 1, 1])
+      : [0, 0, pbr.metallicFactor ?? 1];
+    this.own.mirrored.value.set(...mirrored);
     this.emissive.setRGB(...(gltf.emissiveFactor ?? [0, 0, 0]));
     this.emissiveIntensity = gltf.extensions?.KHR_materials_emissive_strength?.emissiveStrength ?? 1;
     this.comeBefore();
@@ -172,6 +185,11 @@ export class LitMaterial extends MeshLambertMaterial {
     this.polygonOffsetFactor = this.polygonOffsetUnits = -1;
   }
 
+  /** Where no texture says otherwise. */
+  private get diffuseShare(): number {
+    return 1 - Math.max(...this.own.mirrored.value.toArray());
+  }
+
   private setPage(page: LightmapPage | undefined): void {
     this.page = page;
     this.lightMap = page?.texture ?? null;
@@ -187,8 +205,13 @@ export class LitMaterial extends MeshLambertMaterial {
   }
 }
 
+/** The texture that three.js takes for the strength of reflections is the metallic one here, or the specular one. */
 const REFLECTANCE = `
-  diffuseColor.rgb = min(diffuseColor.rgb * diffuseScale, vec3(0.999));
+  vec3 mirror = mirrored;
+  #ifdef USE_SPECULARMAP
+    mirror *= texelSpecular.rgb;
+  #endif
+  diffuseColor.rgb = min(diffuseColor.rgb * (1.0 - max(max(mirror.r, mirror.g), mirror.b)), vec3(0.999));
 `;
 
 function noPage() {
@@ -201,19 +224,25 @@ function noPage() {
   };
 }
 
-/** The server has one metallic value a material: factor x mean of the texture's blue channel. */
-function meanBlue(texture: Texture): number {
-  const image = texture.image as CanvasImageSource | undefined;
-  if (!image) return 1;
-  const side = 64;
-  const context = new OffscreenCanvas(side, side).getContext('2d', { colorSpace: 'srgb', willReadFrequently: true });
-  if (!context) return 1;
-  context.imageSmoothingQuality = 'high';
-  context.drawImage(image, 0, 0, side, side);
-  const { data } = context.getImageData(0, 0, side, side);
-  let sum = 0;
-  for (let i = 2; i < data.length; i += 4) sum += data[i]!;
-  return sum / (255 * side * side);
+/** In a material's userData: what KHR_materials_pbrSpecularGlossiness says of it, which three.js does not read. */
+const SPECULAR = 'specular';
+interface Specular {
+  factor: readonly [number, number, number];
+  map: Texture | null;
+}
+
+/** Gives a material that three.js read without the extension the colours that it has by it. */
+export async function readSpecularGlossiness(
+  material: MeshStandardMaterial,
+  gloss: SpecularGlossiness,
+  textureOf: (info: GltfTextureInfo) => Promise<Texture | null>,
+): Promise<void> {
+  const [r = 1, g = 1, b = 1, a = 1] = gloss.diffuseFactor ?? [];
+  material.color.setRGB(r, g, b);
+  material.opacity = a;
+  material.map = gloss.diffuseTexture ? await textureOf(gloss.diffuseTexture) : null;
+  const map = gloss.specularGlossinessTexture ? await textureOf(gloss.specularGlossinessTexture) : null;
+  material.userData[SPECULAR] = { factor: gloss.specularFactor ?? [1, 1, 1], map } satisfies Specular;
 }
 
 /** Albedo pictures stay sharp at a slant. */

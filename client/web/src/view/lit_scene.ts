@@ -7,16 +7,18 @@ import {
   Group,
   Mesh,
   type MeshLambertMaterial,
+  type MeshStandardMaterial,
   type Object3D,
   PerspectiveCamera,
+  SRGBColorSpace,
   type Texture,
   Vector3,
 } from 'three';
 import { GLTFLoader, type GLTF } from 'three/addons/loaders/GLTFLoader.js';
 import { isVisible } from '../document/edits';
-import { lightOf, type Gltf, type GltfNode } from '../document/gltf';
+import { lightOf, type Gltf, type GltfNode, type GltfTextureInfo, type SpecularGlossiness } from '../document/gltf';
 import { LampMarker } from './lamp_marker';
-import { LitMaterial, sharpen, type ViewUniforms } from './lit_material';
+import { LitMaterial, readSpecularGlossiness, sharpen, type ViewUniforms } from './lit_material';
 import type { LightmapSet } from './lightmap_set';
 
 interface Association {
@@ -43,6 +45,7 @@ export class LitScene {
   /** Reads a GLB from /scene.glb. Rejects when it cannot be drawn. */
   static async load(glb: ArrayBuffer, set: LightmapSet, view: ViewUniforms, anisotropy: number): Promise<LitScene> {
     const gltf = await new GLTFLoader().parseAsync(glb, '');
+    await readAllSpecularGlossiness(gltf);
     return new LitScene(gltf, set, view, anisotropy);
   }
 
@@ -172,7 +175,7 @@ export class LitScene {
       sharpen(source, anisotropy);
       lit = new LitMaterial(source, view, page);
       this.made.set(key, lit);
-      for (const texture of [lit.map, lit.emissiveMap]) if (texture) this.textures.add(texture);
+      for (const texture of [lit.map, lit.emissiveMap, lit.specularMap]) if (texture) this.textures.add(texture);
       if (index !== undefined) this.materials.set(index, [...(this.materials.get(index) ?? []), lit]);
     }
     mesh.material = lit;
@@ -228,6 +231,21 @@ export class LitScene {
     for (const root of gltf.scenes?.[gltf.scene ?? 0]?.nodes ?? []) visit(root, 0);
     return out;
   }
+}
+
+async function readAllSpecularGlossiness(gltf: GLTF): Promise<void> {
+  const json = gltf.parser.json as Gltf;
+  const associations = gltf.parser.associations as unknown as Map<object, Association>;
+  const materials = new Map<MeshStandardMaterial, SpecularGlossiness>();
+  gltf.scene.traverse((object) => {
+    if (!(object instanceof Mesh)) return;
+    const material = object.material as MeshStandardMaterial;
+    const index = associations.get(material)?.materials;
+    const gloss = json.materials?.[index ?? -1]?.extensions?.KHR_materials_pbrSpecularGlossiness;
+    if (gloss) materials.set(material, gloss);
+  });
+  const textureOf = (info: GltfTextureInfo) => gltf.parser.assignTexture({}, 'map', info, SRGBColorSpace);
+  await Promise.all([...materials].map(([material, gloss]) => readSpecularGlossiness(material, gloss, textureOf)));
 }
 
 function place(object: Object3D, node: GltfNode): void {

@@ -110,7 +110,7 @@ export const FRAGMENT_PARS = `
   uniform sampler2D dataPage;
   uniform float dataScale;
 #endif
-uniform float diffuseScale;  // 1 - metallic
+uniform vec3 mirrored;  // what is not reflected diffusely: (0, 0, metallic), or the specular factor
 ${PAGE_PARS}
 ${VIEW_PARS}
 `;
