@@ -163,11 +163,12 @@ Result<Bytes> encodePng(const Image& display) {
 
 Image toneMap(const Image& radiance, float exposure) {
   Image display(radiance.width, radiance.height);
-  std::transform(radiance.pixels.begin(), radiance.pixels.end(), display.pixels.begin(),
-                 [exposure](const glm::vec3& pixel) {
-                   const glm::vec3 mapped = neutralCurve(glm::max(pixel, glm::vec3(0.0F)) * exposure);
-                   return glm::vec3(encodeSrgb(mapped.r), encodeSrgb(mapped.g), encodeSrgb(mapped.b));
-                 });
+  std::transform(
+      radiance.pixels.begin(), radiance.pixels.end(), display.pixels.begin(), [exposure](const glm::vec3& pixel) {
+        constexpr float kMost = 1e30F;  // white, and no number that overflows on the way
+        const glm::vec3 mapped = neutralCurve(glm::clamp(pixel * exposure, glm::vec3(0.0F), glm::vec3(kMost)));
+        return glm::vec3(encodeSrgb(mapped.r), encodeSrgb(mapped.g), encodeSrgb(mapped.b));
+      });
   return display;
 }
 

@@ -76,18 +76,18 @@ class Scout {
  private:
   /// A point that stands for an equal share of the scene's light.
   struct Landmark {
-    glm::dvec3 position, normal;
-    bool double_sided;
+    glm::dvec3 position, normal;  ///< of the side that the light falls on
   };
   /// What a ray sees first that is drawn.
   struct Sight {
     double distance = 0.0;
     std::uint32_t triangle = scene::kNone;
+    std::size_t side = 0;       ///< of the triangle, that one looks at; 1: its back
     bool through_back = false;  ///< an undrawn back face came first
   };
   [[nodiscard]] Sight cast(const glm::dvec3& eye, const glm::dvec3& direction);
-  [[nodiscard]] double irradianceAt(std::uint32_t triangle, const glm::dvec3& point) const;
-  [[nodiscard]] double pageValue(const scene::Surface& surface, glm::vec2 texel) const;
+  [[nodiscard]] double irradianceAt(const Sight& sight, const glm::dvec3& point) const;
+  [[nodiscard]] double pageValue(const scene::Surface& surface, std::size_t side, glm::vec2 texel) const;
   void measureLight();
   [[nodiscard]] double overview(const View& view);
 
@@ -117,7 +117,8 @@ Scout::Scout(const scene::Scene& scene, const scene::PatchScene& patches, std::s
   measureLight();
 }
 
-double Scout::pageValue(const scene::Surface& surface, glm::vec2 texel) const {
+/// Of the side's texels; both sides share theirs.
+double Scout::pageValue(const scene::Surface& surface, [[maybe_unused]] std::size_t side, glm::vec2 texel) const {
   if (surface.page >= pages_.size()) return 0.0;
   const auto& page = pages_[surface.page];
   const int x = static_cast<int>(surface.page_x) + static_cast<int>(texel.x);
@@ -129,7 +130,7 @@ double Scout::pageValue(const scene::Surface& surface, glm::vec2 texel) const {
 void Scout::measureLight() {
   struct Sample {
     glm::dvec3 position;
-    std::uint32_t triangle;
+    glm::vec3 normal;
     double area, irradiance;
   };
   std::vector<Sample> samples;
@@ -139,8 +140,11 @@ void Scout::measureLight() {
       if (leaf.triangle == scene::kNone) continue;
       const auto& frame = patches_.triangles[leaf.triangle];
       const glm::dvec3 position(frame.origin + leaf.texel.x * frame.du + leaf.texel.y * frame.dv);
-      samples.push_back(
-          {position, leaf.triangle, static_cast<double>(surface.texel_area), pageValue(surface, leaf.texel)});
+      for (std::size_t side = 0; side < 2; ++side) {
+        if (surface.first_node[side] == scene::kNone) continue;
+        samples.push_back({position, side == 0 ? frame.normal : -frame.normal, static_cast<double>(surface.texel_area),
+                           pageValue(surface, side, leaf.texel)});
+      }
     }
   }
   const auto quantile = [&samples](const auto& value, const auto& weight, double share) {
@@ -171,9 +175,7 @@ void Scout::measureLight() {
   for (const auto& sample : samples) {
     sum += weight(sample);
     if (sum * kLandmarks < total * (static_cast<double>(landmarks_.size()) + 0.5)) continue;
-    const auto& material = scene_.materials[patches_.surfaces[patches_.triangle_surface[sample.triangle]].material];
-    landmarks_.push_back(
-        {sample.position, glm::dvec3(patches_.triangles[sample.triangle].normal), material.double_sided});
+    landmarks_.push_back({sample.position, glm::dvec3(sample.normal)});
   }
 }
 
@@ -185,7 +187,7 @@ double Scout::overview(const View& view) {
     const double depth = -glm::dot(to, view.back);
     if (depth <= 0.0 || std::abs(glm::dot(to, view.right)) > depth * view.tan_x) continue;
     if (std::abs(glm::dot(to, view.up)) > depth * view.tan_y) continue;
-    if (!landmark.double_sided && glm::dot(to, landmark.normal) >= 0.0) continue;
+    if (glm::dot(to, landmark.normal) >= 0.0) continue;
     if (cast(view.eye, to).distance > 0.998) seen += 1.0;
   }
   return seen / std::max(1.0, static_cast<double>(landmarks_.size()));
@@ -203,6 +205,7 @@ Scout::Sight Scout::cast(const glm::dvec3& eye, const glm::dvec3& direction) {
     } else if (hit.t < drawn) {
       drawn = hit.t;
       sight.triangle = hit.triangle;
+      sight.side = hit.front ? 0 : 1;
     }
   }
   sight.distance = drawn;
@@ -210,11 +213,11 @@ Scout::Sight Scout::cast(const glm::dvec3& eye, const glm::dvec3& direction) {
   return sight;
 }
 
-double Scout::irradianceAt(std::uint32_t triangle, const glm::dvec3& point) const {
+double Scout::irradianceAt(const Sight& sight, const glm::dvec3& point) const {
   std::array<glm::dvec3, 3> p{};
   std::array<glm::vec2, 3> texel{};
   for (std::size_t c = 0; c < 3; ++c) {
-    const auto& vertex = patches_.vertices[patches_.indices[std::size_t{3} * triangle + c]];
+    const auto& vertex = patches_.vertices[patches_.indices[std::size_t{3} * sight.triangle + c]];
     p[c] = glm::dvec3(vertex.position);
     texel[c] = vertex.texel;
   }
@@ -222,7 +225,7 @@ double Scout::irradianceAt(std::uint32_t triangle, const glm::dvec3& point) cons
   const double area = std::max(glm::dot(normal, normal), 1e-300);
   const auto u = static_cast<float>(glm::dot(glm::cross(point - p[0], p[2] - p[0]), normal) / area);
   const auto v = static_cast<float>(glm::dot(glm::cross(p[1] - p[0], point - p[0]), normal) / area);
-  return pageValue(patches_.surfaces[patches_.triangle_surface[triangle]],
+  return pageValue(patches_.surfaces[patches_.triangle_surface[sight.triangle]], sight.side,
                    texel[0] + u * (texel[1] - texel[0]) + v * (texel[2] - texel[0]));
 }
 
@@ -240,7 +243,7 @@ double Scout::score(const View& view, int columns) {
       if (sight.triangle == scene::kNone) continue;
       seen += 1.0;
       close += std::max(0.0, 1.0 - sight.distance / near);
-      const double irradiance = irradianceAt(sight.triangle, view.eye + sight.distance * ray);
+      const double irradiance = irradianceAt(sight, view.eye + sight.distance * ray);
       const double light = typical_ > 0.0 ? irradiance / (irradiance + 0.25 * typical_) : 1.0;
       lit += light;
       light_of[patches_.triangle_surface[sight.triangle]] += light;
@@ -355,7 +358,7 @@ Result<scene::Camera> chooseCamera(const LitScene& lit, const std::string& wante
               "the scene has no camera \"" + wanted + "\" (it has " + std::to_string(cameras.size()) + ")");
 }
 
-float autoExposure(const Image& radiance) {
+std::optional<float> exposureOf(const Image& radiance) {
   std::vector<std::pair<double, double>> lit;
   for (const auto& pixel : radiance.pixels) {
     const double value = luminance(pixel);
@@ -373,7 +376,10 @@ float autoExposure(const Image& radiance) {
     ++count;
   }
   constexpr double kMost = 9.9e29;  // a picture of next to nothing: what may be asked for
-  return count == 0 ? 1.0F : static_cast<float>(std::min(kMost, 0.18 / std::exp(sum / static_cast<double>(count))));
+  if (count == 0) return std::nullopt;
+  return static_cast<float>(std::min(kMost, 0.18 / std::exp(sum / static_cast<double>(count))));
 }
+
+float autoExposure(const Image& radiance) { return exposureOf(radiance).value_or(1.0F); }
 
 }  // namespace radiosity::engine

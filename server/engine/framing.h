@@ -2,6 +2,7 @@
 // called on the solve thread.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
 
@@ -24,8 +25,10 @@ namespace radiosity::engine {
 [[nodiscard]] scene::Camera frameScene(const scene::Scene& scene, const scene::PatchScene& patches,
                                        std::span<const Image> pages, double aspect);
 
-/// The factor that brings the lit part's logarithmic mean to middle grey (0.18); 1 when nothing is lit. Pixels far
+/// The factor that brings the lit part's logarithmic mean to middle grey (0.18); none when nothing is lit. Pixels far
 /// darker or brighter than the rest of the light in the picture (a dark outside, a lamp) do not count.
+[[nodiscard]] std::optional<float> exposureOf(const Image& radiance);
+/// The same; 1 when nothing is lit.
 [[nodiscard]] float autoExposure(const Image& radiance);
 
 }  // namespace radiosity::engine

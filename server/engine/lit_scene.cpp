@@ -112,11 +112,13 @@ std::uint64_t LitScene::touchedSurfaces(std::size_t before, const std::optional<
   return touched + before - found;
 }
 
-solver::LightSources LitScene::lightSources(const scene::Scene& scene) const {
-  if (scene.sky) return {scene.lights, *scene.sky};
+scene::Sky LitScene::skyOf(const scene::Scene& scene) const {
+  if (scene.sky) return *scene.sky;
   const auto sky = settings_.sky.value_or(SkySetting{});
-  return {scene.lights, {sky.upper, sky.lower}};
+  return {sky.upper, sky.lower};
 }
+
+solver::LightSources LitScene::lightSources(const scene::Scene& scene) const { return {scene.lights, skyOf(scene)}; }
 
 double LitScene::emittedPower() const {
   double power = solver::totalFlux(*patches_, sources_);

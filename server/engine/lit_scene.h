@@ -83,6 +83,8 @@ class LitScene {
   [[nodiscard]] solver::Solver& solver() { return *solver_; }
   [[nodiscard]] const solver::Solver& solver() const { return *solver_; }
   [[nodiscard]] const SolveSettings& settings() const { return settings_; }
+  /// The scene's own, or else that of the settings; black: none.
+  [[nodiscard]] scene::Sky sky() const { return skyOf(*scene_); }
   /// What is odd about the scene; the first so many.
   [[nodiscard]] std::vector<std::string> warnings(std::size_t most = std::numeric_limits<std::size_t>::max()) const;
   [[nodiscard]] std::size_t warningCount() const;
@@ -162,6 +164,7 @@ class LitScene {
   [[nodiscard]] std::optional<scene::PatchMap> mapFrom(const LitScene& former) const;
   [[nodiscard]] std::uint64_t touchedSurfaces(std::size_t before, const std::optional<scene::PatchMap>& matched) const;
   [[nodiscard]] double emittedPower() const;
+  [[nodiscard]] scene::Sky skyOf(const scene::Scene& scene) const;
   [[nodiscard]] solver::LightSources lightSources(const scene::Scene& scene) const;
 
   scene::Document document_;

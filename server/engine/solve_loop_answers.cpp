@@ -9,6 +9,7 @@
 #include "server/engine/framing.h"
 #include "server/engine/quantity_pages.h"
 #include "server/engine/solve_loop_class.h"
+#include "server/gpu/view_sky.h"
 #include "server/scene/lightmap.h"
 
 namespace radiosity::engine {
@@ -128,19 +129,19 @@ std::vector<Image> pageImages(QuantityPages pages) {
 }
 
 /// A driver that resets the card takes the context away at any time: then once more, on a new one.
-Result<Image> draw(std::unique_ptr<gpu::ViewRenderer>& renderer, const LitScene& lit, const std::vector<Image>& pages,
-                   const gpu::ViewRequest& view) {
+Result<gpu::ViewPicture> draw(std::unique_ptr<gpu::ViewRenderer>& renderer, const LitScene& lit,
+                              const std::vector<Image>& pages, const gpu::ViewRequest& view) {
   const bool fresh = renderer == nullptr;
   if (fresh) {
     auto made = gpu::makeViewRenderer();
     if (!made) return tl::unexpected<Error>(made.error());
     renderer = std::move(*made);
   }
-  auto image = renderer->render(lit.scene(), lit.patches(), pages, view);
-  if (image) return image;
+  auto picture = renderer->render(lit.scene(), lit.patches(), pages, view);
+  if (picture) return picture;
   renderer.reset();
-  const bool lost = image.error().code == ErrorCode::kUnavailable;
-  return lost && !fresh ? draw(renderer, lit, pages, view) : image;
+  const bool lost = picture.error().code == ErrorCode::kUnavailable;
+  return lost && !fresh ? draw(renderer, lit, pages, view) : picture;
 }
 
 }  // namespace
@@ -161,11 +162,17 @@ Result<Snapshot> SolveLoop::renderSnapshot(const SnapshotRequest& request) {
   const bool dark = quantity.pages == Quantity::kIrradiance && lit_->solver().error().total > kPresentable;
   const auto pages =
       dark ? pageImages({quantity.pages, lit_->shownPages(), {}, false}) : pageImages(makePages(*lit_, quantity.pages));
-  const auto image = draw(view_, *lit_, pages, view);
-  if (!image) return tl::unexpected<Error>(image.error());
+  auto picture = draw(view_, *lit_, pages, view);
+  if (!picture) return tl::unexpected<Error>(picture.error());
+  // By the surfaces alone: a sky behind a small window is brighter than all of the room.
+  std::optional<float> of_surfaces;
+  if (quantity.photometric) of_surfaces = exposureOf(picture->image);
+  if (quantity.view == gpu::ViewQuantity::kLit) gpu::addSky(*picture, view.camera, lit_->sky());
   std::optional<double> exposure;
-  if (quantity.photometric) exposure = request.exposure ? *request.exposure : autoExposure(*image);
-  auto png = encodePng(exposure ? dithered(toneMap(*image, static_cast<float>(*exposure))) : *image);
+  if (quantity.photometric)
+    exposure = request.exposure ? *request.exposure : of_surfaces ? *of_surfaces : autoExposure(picture->image);
+  const auto& image = picture->image;
+  auto png = encodePng(exposure ? dithered(toneMap(image, static_cast<float>(*exposure))) : image);
   if (!png) return tl::unexpected<Error>(png.error());
   return Snapshot{std::make_shared<const Bytes>(std::move(*png)), exposure};
 }

@@ -49,6 +49,13 @@ void addTriangle(const scene::Scene& scene, const scene::Instance& instance, std
 
 }  // namespace
 
+glm::dvec2 halfView(const scene::Camera& camera, int width, int height) {
+  const double aspect = static_cast<double>(width) / height;
+  double half_height = std::tan(camera.yfov_rad / 2.0);
+  if (camera.aspect > 0.0 && aspect < camera.aspect) half_height *= camera.aspect / aspect;
+  return {half_height * aspect, half_height};
+}
+
 ViewGeometry makeViewGeometry(const scene::Scene& scene, const scene::PatchScene& patches, const glm::dvec3& eye) {
   ViewGeometry geometry;
   for (std::size_t i = 0; i < scene.instances.size() && i < patches.instance_uvs.size(); ++i) {

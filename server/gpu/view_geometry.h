@@ -34,6 +34,10 @@ struct ViewGeometry {
   std::vector<ViewDraw> draws;
 };
 
+/// Tangents of half the horizontal and the vertical field of view. A picture narrower than the camera's own view keeps
+/// the view's width.
+[[nodiscard]] glm::dvec2 halfView(const scene::Camera& camera, int width, int height);
+
 /// `eye`: subtracted in double, so that scenes far from the origin keep their precision.
 [[nodiscard]] ViewGeometry makeViewGeometry(const scene::Scene& scene, const scene::PatchScene& patches,
                                             const glm::dvec3& eye);

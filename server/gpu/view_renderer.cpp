@@ -22,13 +22,10 @@ enum Uniform : GLint { kClipFromView = 0, kQuantity = 1, kAlphaCutoff = 2, kBase
 
 /// Infinite, reversed depth: 1 at the near plane, 0 far away.
 glm::mat4 projection(const scene::Camera& camera, int width, int height) {
-  const double aspect = static_cast<double>(width) / height;
-  double half_height = std::tan(camera.yfov_rad / 2.0);
-  // A picture narrower than the camera's own view keeps the view's width.
-  if (camera.aspect > 0.0 && aspect < camera.aspect) half_height *= camera.aspect / aspect;
+  const auto half = halfView(camera, width, height);
   glm::mat4 matrix(0.0F);
-  matrix[0][0] = static_cast<float>(1.0 / (half_height * aspect));
-  matrix[1][1] = static_cast<float>(1.0 / half_height);
+  matrix[0][0] = static_cast<float>(1.0 / half.x);
+  matrix[1][1] = static_cast<float>(1.0 / half.y);
   matrix[2][3] = -1.0F;
   matrix[3][2] = static_cast<float>(std::max(camera.znear, 1.0e-6));
   return matrix;
@@ -44,8 +41,8 @@ class GlViewRenderer final : public ViewRenderer {
     return std::unique_ptr<ViewRenderer>(new GlViewRenderer(std::move(*context), std::move(*program)));
   }
 
-  Result<Image> render(const scene::Scene& scene, const scene::PatchScene& patches, std::span<const Image> pages,
-                       const ViewRequest& request) override {
+  Result<ViewPicture> render(const scene::Scene& scene, const scene::PatchScene& patches, std::span<const Image> pages,
+                             const ViewRequest& request) override {
     if (request.width < 1 || request.height < 1 || request.width > kMaxPicture || request.height > kMaxPicture) {
       return fail(ErrorCode::kBadUsage, "a picture is 1 to 8192 pixels wide and high");
     }
@@ -219,17 +216,22 @@ class GlViewRenderer final : public ViewRenderer {
     return black_.name();
   }
 
-  static Image read(const ViewRequest& request, const Target& target) {
+  static ViewPicture read(const ViewRequest& request, const Target& target) {
     const int w = request.width;
     const int h = request.height;
     glBlitNamedFramebuffer(target.framebuffer.name(), target.resolve.name(), 0, 0, w, h, 0, 0, w, h,
                            GL_COLOR_BUFFER_BIT, GL_NEAREST);
-    Image flipped(w, h);
+    const auto row = static_cast<std::size_t>(w);
+    ViewPicture picture{Image(w, h), std::vector<float>(row * static_cast<std::size_t>(h))};
+    std::vector<glm::vec4> samples(picture.cover.size());
     glPixelStorei(GL_PACK_ALIGNMENT, 4);
-    glGetTextureImage(target.resolved.name(), 0, GL_RGB, GL_FLOAT,
-                      static_cast<GLsizei>(flipped.pixels.size() * sizeof(glm::vec3)), flipped.pixels.data());
-    Image picture(w, h);  // GL's rows start at the bottom
-    for (int y = 0; y < h; ++y) std::copy_n(&flipped.at(0, h - 1 - y), w, &picture.at(0, y));
+    glGetTextureImage(target.resolved.name(), 0, GL_RGBA, GL_FLOAT,
+                      static_cast<GLsizei>(samples.size() * sizeof(glm::vec4)), samples.data());
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      const auto& sample = samples[samples.size() - row - i / row * row + i % row];  // GL's rows start at the bottom
+      picture.image.pixels[i] = glm::vec3(sample);
+      picture.cover[i] = sample.w;
+    }
     return picture;
   }
 

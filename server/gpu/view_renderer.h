@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "common/image.h"
 #include "common/result.h"
@@ -20,13 +21,19 @@ struct ViewRequest {
   ViewQuantity quantity = ViewQuantity::kLit;
 };
 
+struct ViewPicture {
+  Image image;
+  std::vector<float> cover;  ///< share of each pixel that surfaces cover
+};
+
 class ViewRenderer {
  public:
   virtual ~ViewRenderer() = default;
   /// Linear RGB radiance (nits) for kLit: albedo H / pi + L_e, 4x multisampled, back faces of single-sided surfaces not
-  /// drawn (so that one sees into a room); other quantities in their own unit. `pages`: irradiance, lux.
-  [[nodiscard]] virtual Result<Image> render(const scene::Scene& scene, const scene::PatchScene& patches,
-                                             std::span<const Image> pages, const ViewRequest& request) = 0;
+  /// drawn (so that one sees into a room); other quantities in their own unit. Black where nothing covers a pixel.
+  /// `pages`: irradiance, lux.
+  [[nodiscard]] virtual Result<ViewPicture> render(const scene::Scene& scene, const scene::PatchScene& patches,
+                                                   std::span<const Image> pages, const ViewRequest& request) = 0;
 };
 
 [[nodiscard]] Result<std::unique_ptr<ViewRenderer>> makeViewRenderer();

@@ -1,4 +1,4 @@
-// Pictures: radiance of a textured, emitting, lit square, half-texel exact lightmap look-ups, back faces.
+// Pictures: radiance of a textured, emitting, lit square, half-texel exact lightmap look-ups, back faces, the sky.
 #include "server/gpu/view_renderer.h"
 
 #include <gtest/gtest.h>
@@ -7,6 +7,8 @@
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 #include <numbers>
+
+#include "server/gpu/view_sky.h"
 
 namespace radiosity::gpu {
 namespace {
@@ -53,14 +55,21 @@ class View : public ::testing::Test {
     if (!made) GTEST_SKIP() << made.error().text();
     renderer_ = std::move(*made);
   }
-  Image picture(const SquareScene& square) {
-    auto image = renderer_->render(square.scene, square.patches, square.pages, square.request);
-    EXPECT_TRUE(image.has_value()) << image.error().text();
-    return image ? *image : Image(1, 1);
+  ViewPicture render(const SquareScene& square) {
+    auto picture = renderer_->render(square.scene, square.patches, square.pages, square.request);
+    EXPECT_TRUE(picture.has_value()) << picture.error().text();
+    return picture ? *picture : ViewPicture{Image(1, 1), {0.0F}};
+  }
+  Image picture(const SquareScene& square) { return render(square).image; }
+  Image pictureBeforeSky(const SquareScene& square) {
+    auto picture = render(square);
+    addSky(picture, square.request.camera, kSky);
+    return picture.image;
   }
   static void expectNear(glm::vec3 actual, glm::vec3 expected, float tolerance = 1e-4F) {
     for (int channel = 0; channel < 3; ++channel) EXPECT_NEAR(actual[channel], expected[channel], tolerance);
   }
+  static constexpr scene::Sky kSky{{3.0F, 4.0F, 6.0F}, {0.5F, 0.25F, 0.125F}};
   std::unique_ptr<ViewRenderer> renderer_;
 };
 
@@ -162,6 +171,83 @@ TEST_F(View, ASceneFarFromTheOriginKeepsItsEdges) {
   square.scene.instances[0].world = away;
   square.request.camera.world = away * square.request.camera.world;
   EXPECT_EQ(picture(square).pixels, near_picture.pixels);
+}
+
+TEST_F(View, WhereNothingIsHitTheSkyIsSeenByTheDirectionOfEachPixel) {
+  SquareScene square;
+  auto turn = glm::rotate(glm::dmat4(1.0), 2.4, glm::dvec3(0, 1, 0));  // away from the square, nodding and leaning
+  turn = glm::rotate(glm::rotate(turn, 0.2, glm::dvec3(1, 0, 0)), 0.4, glm::dvec3(0, 0, 1));
+  square.request.camera.world = glm::translate(glm::dmat4(1.0), glm::dvec3(0, 0, 1)) * turn;
+  square.request.camera.yfov_rad = 1.2;
+  square.request.width = 40;
+  const auto image = pictureBeforeSky(square);
+  int above = 0, below = 0, mixed = 0;
+  for (int y = 0; y < 32; ++y) {
+    for (int x = 0; x < 40; ++x) {
+      const double half = std::tan(0.6);
+      const auto height = [&](double right, double down) {
+        const glm::dvec3 ray((right / 20.0 - 1.0) * half * 1.25, (1.0 - down / 16.0) * half, -1.0);
+        return (glm::dmat3(turn) * ray).y;
+      };
+      const auto corners = {height(x, y), height(x + 1, y), height(x, y + 1), height(x + 1, y + 1)};
+      const auto& seen = image.at(x, y);
+      if (std::min(corners) > 0.0) {
+        ++above;
+        expectNear(seen, kSky.upper);
+      } else if (std::max(corners) < 0.0) {
+        ++below;
+        expectNear(seen, kSky.lower);
+      } else {  // the horizon crosses it
+        ++mixed;
+        EXPECT_GE(seen.y, kSky.lower.y);
+        EXPECT_LE(seen.y, kSky.upper.y);
+      }
+    }
+  }
+  EXPECT_GT(above, 300);
+  EXPECT_GT(below, 300);
+  EXPECT_GT(mixed, 20);
+}
+
+TEST_F(View, OfTheSkyIsSeenWhatAMaskCutsOutAndABlendLetsThrough) {
+  SquareScene square;
+  square.request.camera.world = glm::translate(glm::dmat4(1.0), glm::dvec3(0, 0, 1));
+  scene::Texture texture;
+  texture.width = 2;
+  texture.height = 1;
+  texture.rgba = {255, 255, 255, 0, 255, 255, 255, 255};
+  square.scene.textures = {texture};
+  auto& material = square.scene.materials[0];
+  material.base_color_texture.texture = 0;
+  material.alpha_mode = scene::AlphaMode::kMask;
+  const auto cut = pictureBeforeSky(square);
+  expectNear(cut.at(8, 4), kSky.upper);
+  expectNear(cut.at(8, 28), kSky.lower);
+  expectNear(cut.at(24, 4), {0.25F, 2.125F, 0.5F});
+  material.base_color_texture.texture = scene::kNone;
+  material.alpha_mode = scene::AlphaMode::kBlend;
+  material.alpha = 0.6F;
+  const auto image = pictureBeforeSky(square);
+  glm::vec3 mean(0.0F);
+  for (int i = 0; i < 256; ++i) mean += image.at(i % 32, i / 32) / 256.0F;  // the upper quarter
+  // 2 or 3 of 4 samples, by chance: sigma 0.12 / sqrt(256), of what square and sky differ by
+  expectNear(mean, 0.6F * glm::vec3(0.25F, 2.125F, 0.5F) + 0.4F * kSky.upper, 0.15F);
+}
+
+TEST_F(View, ASurfaceHidesTheSkyAndItsEdgeSharesThePixel) {
+  SquareScene square;
+  for (const auto& pixel : pictureBeforeSky(square).pixels) expectNear(pixel, {0.25F, 2.125F, 0.5F});
+  square.request.camera.world =
+      glm::rotate(glm::dmat4(1.0), 0.3, glm::dvec3(0, 0, 1)) * glm::translate(glm::dmat4(1.0), glm::dvec3(0, 0, 1.7));
+  const auto picture = render(square);
+  const auto image = pictureBeforeSky(square);
+  int shared = 0;
+  for (std::size_t i = 0; i < 8 * 32; ++i) {  // well above the horizon
+    const float cover = picture.cover[i];
+    if (cover > 0.0F && cover < 1.0F) ++shared;
+    expectNear(image.pixels[i], cover * glm::vec3(0.25F, 2.125F, 0.5F) + (1.0F - cover) * kSky.upper, 1e-3F);
+  }
+  EXPECT_GT(shared, 3);
 }
 
 TEST_F(View, AnAbsurdSizeIsRefused) {

@@ -301,9 +301,14 @@ export class App {
   }
 
   private onStatus(status: Status): void {
-    this.solve.setSettings(status.settings);
+    this.onSettings(status.settings);
     this.solve.setWarnings(status.warnings, status.warningCount);
     this.onProgress(status);
+  }
+
+  private onSettings(settings: Settings): void {
+    this.solve.setSettings(settings);
+    this.viewer.setSky(settings.sky ?? undefined);
   }
 
   private onNotification<K extends keyof Notifications>(method: K, params: Notifications[K]): void {
@@ -320,7 +325,7 @@ export class App {
       cameras: (note) => this.people.onCameras(note.cameras),
       draining: () => this.frame.toasts.show('The server is stopping'),
       notice: (note) => this.frame.toasts.show(note.text),
-      'solve.configured': (settings) => this.solve.setSettings(settings),
+      'solve.configured': (settings) => this.onSettings(settings),
     };
     handlers[method]?.(params);
   }
@@ -396,7 +401,7 @@ export class App {
 
   private async configure(settings: Partial<Settings>): Promise<void> {
     const all = await this.ask<Settings>('solve.configure', settings);
-    if (all) this.solve.setSettings(all);
+    if (all) this.onSettings(all);
     else this.solve.showSettings();
   }
 

@@ -8,6 +8,7 @@ import { ViewPanel } from './ui/view_panel';
 import { insideView } from './view/first_view';
 import { fromLink, MOST_STOPS, toLink, type ShownAs } from './view/link';
 import type { LitScene } from './view/lit_scene';
+import { shining, skyOf } from './view/sky';
 import { TONE_CURVES, viewMode, type ViewMode } from './view/view_modes';
 
 /** Whether one has found a place in the scene to look from, and the number of its camera. */
@@ -133,9 +134,10 @@ export class ViewSession {
   }
 
   private lookAtAll(scene: LitScene): void {
-    const { rig } = this.app.viewer;
+    const { background, rig } = this.app.viewer;
     rig.overview(scene.bounds);
-    const inside = insideView(scene, rig.camera);
+    const sky = shining(skyOf(scene.source) ?? background.ofSettings); // its document may be still on its way
+    const inside = insideView(scene, rig.camera, sky !== undefined);
     if (inside) rig.stand(inside.eye, inside.target);
   }
 

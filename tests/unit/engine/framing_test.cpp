@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cmath>
+#include <functional>
 #include <glm/gtc/matrix_inverse.hpp>
 
 #include "server/engine/exports.h"
@@ -41,7 +42,24 @@ struct Framed {
   glm::dvec3 eye{0.0};
 };
 
-Framed frame(const scene::Scene& scene, double aspect = 4.0 / 3.0) {
+/// Irradiance of a point on the side that faces along `normal`, both in the scene's space.
+using LightAt = std::function<float(const glm::dvec3& position, const glm::dvec3& normal)>;
+
+void light(const scene::PatchScene& patches, const LightAt& light_at, std::vector<Image>& pages) {
+  for (const auto& surface : patches.surfaces) {
+    for (std::uint32_t i = 0; i < surface.width * surface.height; ++i) {
+      const auto& leaf = patches.leaves[surface.first_leaf + i];
+      if (leaf.triangle == scene::kNone) continue;
+      const auto& frame = patches.triangles[leaf.triangle];
+      const glm::dvec3 at(frame.origin + leaf.texel.x * frame.du + leaf.texel.y * frame.dv);
+      const float value = light_at(at * patches.scale + patches.centre, glm::dvec3(frame.normal));
+      pages[surface.page].at(static_cast<int>(surface.page_x + i % surface.width),
+                             static_cast<int>(surface.page_y + i / surface.width)) = glm::vec3(value);
+    }
+  }
+}
+
+Framed frame(const scene::Scene& scene, double aspect = 4.0 / 3.0, const LightAt& light_at = {}) {
   Framed framed;
   scene::ChartOptions options;
   options.texel_budget = 600;
@@ -50,8 +68,9 @@ Framed frame(const scene::Scene& scene, double aspect = 4.0 / 3.0) {
   framed.patches = std::move(*patches);
   std::vector<Image> pages;
   for (const auto& page : framed.patches.pages) {
-    pages.emplace_back(static_cast<int>(page.width), static_cast<int>(page.height), glm::vec3(1.0F));
+    pages.emplace_back(static_cast<int>(page.width), static_cast<int>(page.height), glm::vec3(light_at ? 0.0F : 1.0F));
   }
+  if (light_at) light(framed.patches, light_at, pages);
   framed.camera = frameScene(scene, framed.patches, pages, aspect);
   framed.eye = glm::dvec3(framed.camera.world[3]);
   return framed;
@@ -102,6 +121,52 @@ TEST(Framing, AnEyeInsideASolidIsNotTaken) {
   EXPECT_FALSE(within(framed.eye, {0.1, 0.1, 0.1}, {3, 2.9, 5.9}));
 }
 
+/// A house, closed all around, on a lawn 60 m wide, with two rooms, of which the first has a table.
+scene::Scene house() {
+  auto scene = boxScene({0, 0.1, 0}, {3, 2.6, 4}, true);
+  const auto add = [&](const glm::dvec3& low, const glm::dvec3& high, bool inward) {
+    scene.primitives.push_back(boxScene(low, high, inward).primitives[0]);
+    scene.instances.push_back(scene.instances[0]);
+    scene.instances.back().primitive = static_cast<std::uint32_t>(scene.primitives.size() - 1);
+  };
+  add({3.2, 0.1, 0}, {8, 2.6, 4}, true);
+  add({-0.3, 0, -0.3}, {8.3, 4, 4.3}, false);
+  add({1, 0.8, 1.5}, {2, 0.9, 2.5}, false);
+  add({-26, -0.1, -28}, {34, -0.02, 32}, false);
+  return scene;
+}
+
+bool isOfFirstRoom(const glm::dvec3& p) { return within(p, {-0.1, 0, -0.1}, {3.1, 2.7, 4.1}); }
+
+TEST(Framing, ALitRoomInAClosedHouseIsSeenFromInsideAtTheHeightOfEyes) {
+  const auto framed = frame(house(), 4.0 / 3.0,
+                            [](const glm::dvec3& p, const glm::dvec3&) { return isOfFirstRoom(p) ? 300.0F : 0.0F; });
+  EXPECT_TRUE(within(framed.eye, {0, 0.1, 0}, {3, 2.6, 4}))
+      << framed.eye.x << ' ' << framed.eye.y << ' ' << framed.eye.z;
+  EXPECT_GT(framed.eye.y, 0.9);
+  EXPECT_LT(framed.eye.y, 2.2);
+}
+
+TEST(Framing, LightThatFallsOutOfAWindowDoesNotDrawOneOutOfTheRoom) {
+  const auto framed = frame(house(), 4.0 / 3.0, [](const glm::dvec3& p, const glm::dvec3&) {
+    if (p.y < 0.0 && glm::length(p - glm::dvec3(-3, 0, 2)) < 3.0) return 20.0F;
+    return isOfFirstRoom(p) ? 300.0F : 0.0F;
+  });
+  EXPECT_TRUE(within(framed.eye, {0, 0.1, 0}, {3, 2.6, 4}));
+}
+
+TEST(Framing, AHouseLitFromOutsideIsSeenFromOutside) {
+  const auto framed = frame(house(), 4.0 / 3.0, [](const glm::dvec3& p, const glm::dvec3& normal) {
+    return within(p, {-0.2, 0.05, -0.2}, {8.2, 3.9, 4.2}) || normal.y < 0.0 ? 0.0F : 300.0F;
+  });
+  EXPECT_FALSE(within(framed.eye, {-0.3, -0.1, -0.3}, {8.3, 4, 4.3}));
+}
+
+TEST(Framing, AHouseInWhichNothingIsLitHasAFiniteCamera) {
+  const auto framed = frame(house(), 4.0 / 3.0, [](const glm::dvec3&, const glm::dvec3&) { return 0.0F; });
+  EXPECT_TRUE(std::isfinite(framed.eye.x) && std::isfinite(framed.eye.y) && std::isfinite(framed.eye.z));
+}
+
 TEST(Framing, TheSameSceneGivesTheSameCamera) {
   const auto scene = boxScene({0, 0, 0}, {4, 3, 5}, true);
   EXPECT_EQ(frame(scene).camera.world, frame(scene).camera.world);
@@ -142,7 +207,10 @@ TEST(AutoExposure, IsTheLogarithmicMeanWhereContrastIsModest) {
   EXPECT_NEAR(autoExposure(picture), 0.09F, 1e-4F);
 }
 
-TEST(AutoExposure, ABlackPictureStaysAsItIs) { EXPECT_EQ(autoExposure(Image(4, 4)), 1.0F); }
+TEST(AutoExposure, ABlackPictureStaysAsItIs) {
+  EXPECT_EQ(autoExposure(Image(4, 4)), 1.0F);
+  EXPECT_FALSE(exposureOf(Image(4, 4)));
+}
 
 TEST(Dithered, LightBetweenTwoStepsIsThatInTheMeanAndOnAStepStaysThere) {
   constexpr float kStep = 1.0F / 255.0F;

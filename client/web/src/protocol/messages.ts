@@ -70,12 +70,20 @@ export interface SolveHistory {
   samples: ErrorSample[];
 }
 
+/** Radiance of everything outside the scene above and below the horizon, nits. */
+export interface Sky {
+  upper: [number, number, number];
+  lower: [number, number, number];
+}
+
 export interface Settings {
   targetError: number;
   timeLimitMs: number | null;
   texels: number;
   texelSize: number;
   seed: number;
+  /** For scenes that have none of their own. */
+  sky?: Sky | null;
 }
 
 export interface Status extends Progress {

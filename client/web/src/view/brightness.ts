@@ -7,6 +7,7 @@ import type { Layouts } from './layouts';
 import { LightGate } from './light_gate';
 import type { ViewUniforms } from './lit_material';
 import { exposureByRays } from './ray_exposure';
+import type { SkyBackground } from './sky';
 import { shownLight, type ViewMode } from './view_modes';
 
 const MEASURE_EVERY_MS = 250;
@@ -27,6 +28,7 @@ export interface Picture {
   readonly layouts: Layouts;
   readonly world: Scene;
   readonly camera: PerspectiveCamera;
+  readonly background: SkyBackground;
   mode(): ViewMode | undefined;
   /** Signs and handles are no part of the scene's light. */
   withoutSigns<T>(draw: () => T): T;
@@ -170,12 +172,12 @@ export class Brightness {
   }
 
   private async measureNow(): Promise<void> {
-    const { world, camera } = this.picture;
+    const { world, camera, background } = this.picture;
     if (this.picture.mode()?.flat) {
       const found = this.exposureOfPages();
       if (found !== undefined) this.exposure.found(found);
       return;
     }
-    return this.picture.withoutSigns(() => this.exposure.measure(world, camera));
+    return this.picture.withoutSigns(() => this.exposure.measure(world, camera, background));
   }
 }

@@ -1,10 +1,18 @@
 // How bright the picture is shown. Automatic: the lit part's logarithmic mean becomes middle grey, as the server does it
 // for its own pictures, from a small picture read back without waiting.
 
-import { FloatType, HalfFloatType, WebGLRenderTarget, type Camera, type Scene, type WebGLRenderer } from 'three';
+import {
+  FloatType,
+  HalfFloatType,
+  WebGLRenderTarget,
+  type PerspectiveCamera,
+  type Scene,
+  type WebGLRenderer,
+} from 'three';
 import { decodeHalf } from '../protocol/rgb9e5';
 import type { ViewUniforms } from './lit_material';
 import { Readback } from './readback';
+import type { SkyBackground } from './sky';
 import type { ShownLight } from './view_modes';
 
 const WIDTH = 64;
@@ -142,15 +150,15 @@ export class ExposureMeter {
   }
 
   /** Ends when there is a new value; the one that is on its way counts. */
-  measure(scene: Scene, camera: Camera): Promise<void> {
+  measure(scene: Scene, camera: PerspectiveCamera, sky: SkyBackground): Promise<void> {
     if (this.running) return this.running;
-    const running = this.read(scene, camera).finally(() => {
+    const running = this.read(scene, camera, sky).finally(() => {
       if (this.running === running) this.running = undefined;
     });
     return (this.running = running);
   }
 
-  private async read(scene: Scene, camera: Camera): Promise<void> {
+  private async read(scene: Scene, camera: PerspectiveCamera, sky: SkyBackground): Promise<void> {
     const { renderer, target, view } = this;
     const of = this.scene;
     const pixels = this.half ? new Uint16Array(4 * WIDTH * HEIGHT) : new Float32Array(4 * WIDTH * HEIGHT);
@@ -162,11 +170,13 @@ export class ExposureMeter {
     const reading = this.readback.read(pixels);
     renderer.setRenderTarget(null);
     view.all.measuring.value = false;
+    const from = camera.clone();
     try {
       await reading;
       this.tookMs = performance.now() - begin;
       if (of !== this.scene) return;
-      const value = exposureOf(this.luminances(pixels));
+      // A sky behind a small window is brighter than all of the room: it counts where nothing else has light.
+      const value = exposureOf(this.luminances(pixels)) ?? (this.light === 'leaving' ? ofSky(sky, from) : undefined);
       if (value !== undefined) this.take(value);
     } catch {
       return; // The context was lost on the way; it is measured again when it is back.
@@ -190,4 +200,14 @@ export class ExposureMeter {
     }
     return out;
   }
+}
+
+/** Of a picture that shows nothing else which has light. */
+function ofSky(sky: SkyBackground, camera: PerspectiveCamera): number | undefined {
+  return exposureOf(
+    Array.from({ length: WIDTH * HEIGHT }, (_, i) => {
+      const [x, y] = [((i % WIDTH) + 0.5) / WIDTH, (Math.floor(i / WIDTH) + 0.5) / HEIGHT];
+      return sky.luminanceAt(camera, 2 * x - 1, 2 * y - 1);
+    }),
+  );
 }

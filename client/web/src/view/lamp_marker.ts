@@ -28,6 +28,8 @@ export class LampMarker extends Object3D {
   private readonly ball = new Mesh(BALL, new MeshBasicMaterial({ toneMapped: false }));
   private readonly line = new LineBasicMaterial({ toneMapped: false });
   private readonly ray = new Line(RAY, this.line);
+  /** It shines from far away, in the direction of the negative Z axis. */
+  isSun = false;
 
   constructor(readonly node: number) {
     super();
@@ -41,6 +43,7 @@ export class LampMarker extends Object3D {
     const top = Math.max(r, g, b, 1e-6);
     this.ball.material.color.setRGB(r / top, g / top, b / top, LinearSRGBColorSpace);
     this.ray.visible = light.type !== 'point';
+    this.isSun = light.type === 'directional';
     const above = this.parent?.matrixWorld.getMaxScaleOnAxis() ?? 1;
     this.scale.setScalar(size / Math.max(above, 1e-9));
     this.updateMatrixWorld(true);

@@ -38,13 +38,9 @@ float lookupMip(vec2 uv, out float resident) {
   return max(wanted, resident);
 }`;
 
-const VIEW_PARS = `
-// VIEW_MODE: ViewMode.number; TONE_CURVE: 0 neutral, 1 ACES, 2 AgX, 3 none; FALSE_COLOUR: 0 or 1
-uniform vec2 falseRange;     // lowest and highest value of the legend, on a logarithmic scale
-uniform float previewLight;  // irradiance of surfaces that no light has been heard of yet
-${paletteGlsl()}
-
-float luminanceOf(vec3 c) { return dot(c, vec3(0.2126, 0.7152, 0.0722)); }
+/** From radiance to the screen. TONE_CURVE: 0 neutral, 1 ACES, 2 AgX, 3 none. */
+const DISPLAY_PARS = `
+${ShaderChunk.tonemapping_pars_fragment}
 
 vec3 encodeSrgb(vec3 c) {
   c = clamp(c, 0.0, 1.0);
@@ -70,7 +66,16 @@ vec3 dither() {
   return (fract(noise + vec3(0.0, 1.0, 2.0) / 3.0) - 0.5) / 255.0;
 }
 
-vec3 displayed(vec3 radiance) { return encodeSrgb(toneMapped(radiance)) + dither(); }
+vec3 displayed(vec3 radiance) { return encodeSrgb(toneMapped(radiance)) + dither(); }`;
+
+const VIEW_PARS = `
+// VIEW_MODE: ViewMode.number; FALSE_COLOUR: 0 or 1
+uniform vec2 falseRange;     // lowest and highest value of the legend, on a logarithmic scale
+uniform float previewLight;  // irradiance of surfaces that no light has been heard of yet
+${paletteGlsl()}
+${DISPLAY_PARS}
+
+float luminanceOf(vec3 c) { return dot(c, vec3(0.2126, 0.7152, 0.0722)); }
 
 vec3 measured(float value) {
   if (!(value > 0.0)) return kStops[0] * 0.5;  // NOTHING of palette.ts
@@ -106,7 +111,6 @@ export const FRAGMENT_PARS = `
   uniform float dataScale;
 #endif
 uniform float diffuseScale;  // 1 - metallic
-${ShaderChunk.tonemapping_pars_fragment}
 ${PAGE_PARS}
 ${VIEW_PARS}
 `;
@@ -180,7 +184,6 @@ export const FLAT_FRAGMENT = `
 varying vec2 vUv;
 uniform sampler2D lightMap;
 uniform float lightMapIntensity;
-${ShaderChunk.tonemapping_pars_fragment}
 ${PAGE_PARS}
 ${VIEW_PARS}
 void main() {
@@ -194,4 +197,25 @@ void main() {
     vec3 shade = displayed(irradiance * RECIPROCAL_PI);
   #endif
   gl_FragColor = vec4(resident > kNothing ? vec3(0.25) : shade, 1.0);
+}`;
+
+/** Of a triangle that covers the picture: how steeply one looks up there, or down. */
+export const SKY_VERTEX = `
+varying float rise;
+void main() {
+  vec3 ray = vec3(position.x / projectionMatrix[0][0], position.y / projectionMatrix[1][1], -1.0);
+  rise = (transpose(mat3(viewMatrix)) * ray).y;
+  gl_Position = vec4(position.xy, 0.0, 1.0);
+}`;
+
+/** Pixels on the horizon show both parts of the sky, as in the server's pictures. */
+export const SKY_FRAGMENT = `
+#include <common>
+varying float rise;
+uniform vec3 skyUpper, skyLower;  // nits
+uniform bool measuring;           // the sky is no part of what the picture is exposed for
+${DISPLAY_PARS}
+void main() {
+  float above = clamp(0.5 + rise / max(length(vec2(dFdx(rise), dFdy(rise))), 1e-9), 0.0, 1.0);
+  gl_FragColor = measuring ? vec4(0.0) : vec4(displayed(mix(skyLower, skyUpper, above)), 1.0);
 }`;

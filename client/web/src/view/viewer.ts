@@ -12,6 +12,7 @@ import {
   WebGLRenderer,
 } from 'three';
 import type { Gltf } from '../document/gltf';
+import type { Sky } from '../protocol/messages';
 import { Brightness } from './brightness';
 import { CameraRig } from './camera_rig';
 import type { ExposureMeter } from './exposure';
@@ -28,6 +29,7 @@ import { PagesView } from './pages_view';
 import { pick, pickSurface, readingAt, type Reading } from './picker';
 import { release } from './release';
 import { Screen } from './screen';
+import { SkyBackground, skyOf } from './sky';
 import type { ViewMode } from './view_modes';
 import { WholePrograms } from './whole_programs';
 
@@ -57,6 +59,7 @@ export interface ViewerEvents {
 export class Viewer {
   readonly renderer: WebGLRenderer;
   readonly uniforms = new ViewUniforms();
+  readonly background = new SkyBackground(this.uniforms);
   readonly rig: CameraRig;
   readonly exposure: ExposureMeter;
   readonly gizmo: Gizmo;
@@ -103,6 +106,7 @@ export class Viewer {
     this.brightness = this.makeBrightness();
     this.exposure = this.brightness.exposure;
     this.pagesView = new PagesView(canvas, this.uniforms, () => this.moved());
+    this.world.add(this.background.mesh);
     this.gizmo = new Gizmo(this.world, this.rig.camera, canvas, {
       dragging: (active) => {
         this.rig.enabled = !active;
@@ -195,8 +199,15 @@ export class Viewer {
     this.setDataQuantity(undefined);
   }
 
+  /** Of the settings of the solve. */
+  setSky(sky: Sky | undefined): void {
+    this.background.ofSettings = sky;
+    this.invalidate();
+  }
+
   applyDocument(document: Gltf, pointers: string[]): void {
     this.document = document;
+    this.background.ofScene = skyOf(document);
     this.shown?.applyPointers(document, pointers);
     this.layouts.stagedScene?.applyPointers(document, pointers);
     this.gizmo.refresh();
@@ -324,6 +335,7 @@ export class Viewer {
     this.shown?.eachMaterial((material) => material.refresh());
     this.pagesView.refresh();
     this.people?.leaveOut(this.rig.camera);
+    this.background.refresh(this.mode?.id === 'lit' && this.shown?.set.showsLight === true);
     const flat = this.mode?.flat;
     const [scene, camera] = flat ? [this.pagesView.scene, this.pagesView.camera] : [this.world, this.rig.camera];
     this.screen.draw(scale, () => this.renderer.render(scene, camera));
@@ -334,13 +346,14 @@ export class Viewer {
   }
 
   private makeBrightness(): Brightness {
-    const { renderer, uniforms, layouts, world, rig } = this;
+    const { renderer, uniforms, layouts, world, rig, background } = this;
     return new Brightness({
       renderer,
       uniforms,
       layouts,
       world,
       camera: rig.camera,
+      background,
       mode: () => this.mode,
       withoutSigns: (draw) => this.withoutSigns(draw),
       isCardQuiet: () => this.pace.isQuiet,
