@@ -2,6 +2,7 @@
 import base64
 import json
 import os
+import pathlib
 import signal
 import struct
 import time
@@ -124,6 +125,19 @@ class SolveTest(ServiceCase):
         _, errors = self.client("solve", "black.glb", "-o", "lit.glb", *QUICK)
         self.assertIn("lamp /nodes/1 'lamp', material 'lamp' shines with nothing: its emissive texture is black", errors)
         self.assertIn("no light arrives: the only lamp shines with nothing", errors)
+
+    def test_aLampInThePlaneOfTheCeilingLightsTheRoomAsOneRightBelowIt(self):
+        cases = pathlib.Path(__file__).resolve().parents[4] / "shared" / "cases"
+        if not cases.is_dir():
+            self.skipTest("no shared cases here")
+        absorbed = {}
+        for name in ("lamp-in-plane", "lamp-just-below"):
+            self.client("solve", cases / f"{name}.glb", "-o", "lit.glb", "--report", "r.json", *QUICK)
+            report = json.loads((self.folder / "r.json").read_text())
+            self.assertIsNone(report["unlit"])
+            absorbed[name] = report["energy"]["absorbed"]
+        self.assertGreater(absorbed["lamp-just-below"], 0)
+        self.assertAlmostEqual(absorbed["lamp-in-plane"] / absorbed["lamp-just-below"], 1, delta=0.01)  # closed: all of it
 
     def test_doubleSidedLightsWhatIsTurnedAway(self):
         scene = plates.lit_document()
