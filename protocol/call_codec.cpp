@@ -57,6 +57,7 @@ json params(const SolveConfigureCall& c) {
   if (c.seed) out["seed"] = *c.seed;
   if (c.sky) out["sky"] = toJson(*c.sky);
   if (c.no_sky) out["sky"] = nullptr;
+  if (c.double_sided) out["doubleSided"] = *c.double_sided;
   return out;
 }
 json params(const SolveWaitCall& c) {
@@ -153,6 +154,10 @@ void read(Reader& r, SolveConfigureCall& c) {
   const auto* sky = r.find("sky");
   c.no_sky = sky != nullptr && sky->is_null();
   readSky(r, c.sky);
+  if (bool given = false; r.find("doubleSided") != nullptr) {
+    r.boolean("doubleSided", given, Need::kOptional);
+    c.double_sided = given;
+  }
 }
 void read(Reader& r, SolveWaitCall& c) {
   r.optionalNumber("error", c.error, kErrorRange);

@@ -13,7 +13,8 @@ json toJson(const Settings& s) {
           {"texels", s.texels},
           {"texelSize", s.texel_size_m},
           {"seed", s.seed},
-          {"sky", s.sky ? toJson(*s.sky) : json(nullptr)}};
+          {"sky", s.sky ? toJson(*s.sky) : json(nullptr)},
+          {"doubleSided", s.double_sided}};
 }
 
 json toJson(const Sky& sky) { return {{"upper", sky.upper}, {"lower", sky.lower}}; }
@@ -58,6 +59,7 @@ void read(Reader& r, Settings& s) {
   r.number("texelSize", s.texel_size_m, Need::kOptional, {});
   r.integer("seed", s.seed, Need::kOptional, 0, std::numeric_limits<std::uint64_t>::max());
   readSky(r, s.sky);
+  r.boolean("doubleSided", s.double_sided, Need::kOptional);
 }
 
 json toJson(const Progress& p) {
@@ -86,6 +88,7 @@ json toJson(const Progress& p) {
               {"polygons", p.polygons}};
   if (p.seconds_left) out["secondsLeft"] = *p.seconds_left;
   if (!p.failure.empty()) out["failure"] = p.failure;
+  if (!p.unlit.empty()) out["unlit"] = p.unlit;
   return out;
 }
 
@@ -118,6 +121,7 @@ void read(Reader& r, Progress& p) {
   r.integer("surfaces", p.surfaces, Need::kOptional, 0, kAnyInteger);
   r.integer("polygons", p.polygons, Need::kOptional, 0, kAnyInteger);
   r.text("failure", p.failure, Need::kOptional, kAnyText);
+  r.text("unlit", p.unlit, Need::kOptional, kAnyText);
 }
 
 void readStrings(Reader& r, const char* key, Need need, std::size_t max, std::vector<std::string>& out) {

@@ -61,6 +61,7 @@ struct Settings {
   double texel_size_m = 0.0;
   std::uint64_t seed = 1;
   std::optional<Sky> sky;  ///< none: JSON null
+  bool double_sided = false;
 };
 
 struct PageInfo {
@@ -80,6 +81,7 @@ struct Progress {
   EnergyParts energy;
   std::uint64_t patches = 0, nodes = 0, surfaces = 0, polygons = 0;
   std::string failure;  ///< why, when state is "failed"
+  std::string unlit;    ///< why no light arrives anywhere; empty: some does
 };
 
 /// Where somebody looks from: eye and the point looked at, metres, in the scene's space.
@@ -244,6 +246,7 @@ struct SolveConfigureCall {
   std::optional<std::uint64_t> seed = {};
   std::optional<Sky> sky = {};
   bool no_sky = false;  ///< "sky": null
+  std::optional<bool> double_sided = {};
 };
 struct SolvePauseCall {
   static constexpr std::string_view kMethod = "solve.pause";

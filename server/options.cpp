@@ -72,6 +72,9 @@ void addSolveOptions(CLI::App& app, Options& o, Raw& raw) {
                  "Radiance of everything outside the scene, nits: 1000, or R,G,B, or R,G,B/R,G,B (above / below the "
                  "horizon); for scenes without a sky of their own")
       ->type_name("NITS");
+  app.add_flag(
+      "--double-sided", o.solve.double_sided,
+      "Light both sides of all surfaces, whatever their materials say: for rooms whose faces are turned outward");
   app.add_option(
          "--link-memory", o.solve.link_memory_bytes,
          "Memory for remembered links, bytes (suffixes KiB, MiB, GiB); a solve that has used it up ends above its "
@@ -108,6 +111,7 @@ std::set<std::string> namedSettings(const CLI::App& app) {
   note("--texel-size", "texels");
   note("--seed", "seed");
   note("--sky", "sky");
+  note("--double-sided", "doubleSided");
   return named;
 }
 

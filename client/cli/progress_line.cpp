@@ -74,8 +74,9 @@ std::string durationText(double seconds) {
 std::string progressLine(const ProgressView& view, int columns) {
   std::string line = view.state + " ";
   if (columns >= kMinColumnsForBar) line += bar(progressFraction(view.error, view.target_error));
-  line += fmt::format("error {} of {}", percentText(view.error), percentText(view.target_error));
-  if (view.show_parts)
+  line += view.unlit.empty() ? fmt::format("error {} of {}", percentText(view.error), percentText(view.target_error))
+                             : oneLine(view.unlit);
+  if (view.show_parts && view.unlit.empty())
     line += fmt::format(" (residual {}, sampling {}, variation {}, discretization {})", percentText(view.residual),
                         percentText(view.sampling), percentText(view.variation), percentText(view.discretization));
   constexpr double kFastest = 1e18;  // a server may say anything

@@ -18,6 +18,7 @@ struct ProgressView {
   double seconds = 0.0;  ///< of solving
   std::optional<double> seconds_left = {};
   bool show_parts = false;  ///< the three parts of the error too
+  std::string unlit = {};   ///< to be told in the place of an error that means nothing; empty: it does
 };
 
 /// Share of the way from an error of 1 to the target, on a log scale, in [0, 1].

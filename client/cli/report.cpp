@@ -23,7 +23,8 @@ json settingsJson(const protocol::Settings& settings) {
           {"texels", settings.texels},
           {"texel_size_m", settings.texel_size_m},
           {"seed", settings.seed},
-          {"sky", settings.sky ? json{{"upper", settings.sky->upper}, {"lower", settings.sky->lower}} : json(nullptr)}};
+          {"sky", settings.sky ? json{{"upper", settings.sky->upper}, {"lower", settings.sky->lower}} : json(nullptr)},
+          {"double_sided", settings.double_sided}};
 }
 
 std::string stateWord(const std::string& state) { return state == "timeLimit" ? "time limit" : state; }
@@ -55,6 +56,7 @@ std::string reportJson(const protocol::StatusReply& status, bool reached) {
               {"gl_renderer", status.gl_renderer},
               {"reached", reached},
               {"state", progress.state},
+              {"unlit", progress.unlit.empty() ? json(nullptr) : json(progress.unlit)},
               {"limit", progress.state == "limited" ? json(progress.failure) : json(nullptr)},
               {"settings", settingsJson(status.settings)},
               {"warnings", status.warnings},
@@ -77,10 +79,11 @@ std::string statusText(const protocol::StatusReply& status) {
   };
   row("state", stateWord(p.state) + (p.failure.empty() ? "" : ": " + p.failure));
   row("revision", std::to_string(p.revision));
-  row("error",
-      fmt::format("{} of {} (residual {}, sampling {}, variation {}, discretization {})", percentText(p.error.total),
-                  percentText(s.target_error), percentText(p.error.residual), percentText(p.error.sampling),
-                  percentText(p.error.variation), percentText(p.error.discretization)));
+  row("error", !p.unlit.empty() ? unlitText(p)
+                                : fmt::format("{} of {} (residual {}, sampling {}, variation {}, discretization {})",
+                                              percentText(p.error.total), percentText(s.target_error),
+                                              percentText(p.error.residual), percentText(p.error.sampling),
+                                              percentText(p.error.variation), percentText(p.error.discretization)));
   row("shots", fmt::format("{}, {:.0f}/s", countText(p.shots), p.shots_per_second));
   row("time", durationText(p.seconds) + (p.seconds_left ? ", " + durationText(*p.seconds_left) + " left" : "") +
                   (s.time_limit_ms ? ", limit " + durationText(static_cast<double>(*s.time_limit_ms) / 1000.0) : ""));
@@ -92,6 +95,7 @@ std::string statusText(const protocol::StatusReply& status) {
                             p.energy.imbalance));
   row("texels", s.texel_size_m > 0.0 ? fmt::format("{:g} m each", s.texel_size_m) : "about " + countText(s.texels));
   row("seed", std::to_string(s.seed));
+  if (s.double_sided) row("sides", "both of all surfaces");
   row("OpenGL", status.gl_renderer);
   row("warnings", countText(status.warning_count));
   for (const auto& warning : status.warnings) out += "  " + oneLine(warning) + "\n";
@@ -110,13 +114,17 @@ ProgressView viewOf(const protocol::Progress& progress, double target_error) {
           .shots_per_second = progress.shots_per_second,
           .seconds = progress.seconds,
           .seconds_left = progress.seconds_left,
-          .show_parts = false};
+          .show_parts = false,
+          .unlit = progress.unlit.empty() ? "" : unlitText(progress)};
 }
 
+std::string unlitText(const protocol::Progress& progress) { return "no light arrives: " + progress.unlit; }
+
 std::string outcomeText(const protocol::Progress& progress) {
-  return fmt::format("error {} after {}, {} shots, {} patches, revision {}", percentText(progress.error.total),
-                     durationText(progress.seconds), countText(progress.shots), countText(progress.patches),
-                     progress.revision);
+  const auto outcome = progress.unlit.empty() ? "error " + percentText(progress.error.total) + " after"
+                                              : oneLine(unlitText(progress)) + "; found in";
+  return fmt::format("{} {}, {} shots, {} patches, revision {}", outcome, durationText(progress.seconds),
+                     countText(progress.shots), countText(progress.patches), progress.revision);
 }
 
 std::string finerTexelsText(const protocol::ErrorParts& error) {

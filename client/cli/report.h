@@ -19,6 +19,10 @@ namespace radiosity::cli {
 
 [[nodiscard]] ProgressView viewOf(const protocol::Progress& progress, double target_error);
 
+/// "no light arrives: all of it leaves the scene": what is said in the place of an error where Progress::unlit tells
+/// why.
+[[nodiscard]] std::string unlitText(const protocol::Progress& progress);
+
 /// "error 1.98 % after 3.2 s, 12,345 shots, 14,002 patches, revision 1"
 [[nodiscard]] std::string outcomeText(const protocol::Progress& progress);
 

@@ -38,6 +38,7 @@ struct SolveOptions {
   std::uint64_t seed = 1;
   unsigned workers = 0;     ///< 0: the server's choice
   std::string link_memory;  ///< as radiosityd takes it; empty: the server's choice
+  bool double_sided = false;
   bool unlit = false, error_map = false, quiet = false;
 };
 
@@ -137,7 +138,8 @@ class Solve {
                                       .texel_size_m = options_.texel_size_m,
                                       .seed = options_.seed,
                                       .sky = sky_,
-                                      .no_sky = !sky_};
+                                      .no_sky = !sky_,
+                                      .double_sided = options_.double_sided};
     constexpr double kMillisecondsPerSecond = 1000.0;
     if (!call.no_time_limit)
       call.time_limit_ms = static_cast<std::uint64_t>(std::llround(options_.time_limit_s * kMillisecondsPerSecond));
@@ -325,6 +327,9 @@ void addSolve(CLI::App& app, Run& run) {
   command.add_option("--seed", options->seed, "the same seed gives the same bits")
       ->type_name("N")
       ->capture_default_str();
+  command.add_flag("--double-sided", options->double_sided,
+                   "light both sides of all surfaces, whatever their materials say: for rooms whose faces are turned "
+                   "outward");
   command
       .add_option("--sky", options->sky,
                   "light from outside, in nits: 1000, or R,G,B, or R,G,B/R,G,B (above / below the horizon); for scenes "

@@ -19,14 +19,14 @@ struct CheckpointHead {
   std::uint64_t revision = 0;
   std::uint64_t texels = 0, seed = 0, link_memory = 0;
   double texel_size_m = 0.0, target_error = 0.0, seconds = 0.0;
-  bool paper_mode = false, has_sky = false;
+  bool paper_mode = false, has_sky = false, double_sided = false;
   SkySetting sky;
   std::string gltf, assets;  ///< JSON, and a digest of buffers and images
 
   template <typename Archive, typename Self>
   static void visit(Archive& archive, Self& self) {
     archive(self.epoch, self.revision, self.texels, self.seed, self.link_memory, self.texel_size_m, self.target_error,
-            self.seconds, self.paper_mode, self.has_sky, self.sky, self.gltf, self.assets);
+            self.seconds, self.paper_mode, self.has_sky, self.sky, self.double_sided, self.gltf, self.assets);
   }
 };
 

@@ -78,6 +78,7 @@ struct SolveSettings {
   double texel_size_m = 0.0;
   std::uint64_t seed = 1;
   std::optional<SkySetting> sky;  ///< for scenes that have none of their own
+  bool double_sided = false;      ///< all materials are, whatever the scene says
   bool paper_mode = false;        ///< Lum, Ma and Max 2002 to the letter (server option, comparisons)
   std::uint64_t link_memory_bytes = std::uint64_t{1} << 30;  ///< that remembered links never exceed (server option)
 
@@ -105,6 +106,7 @@ struct Status {
   std::vector<std::string> warnings;  ///< the first kStatusWarnings
   std::uint64_t warning_count = 0;    ///< of all
   std::string failure;                ///< why, when kFailed or kLimited
+  std::string unlit;  ///< why no light arrives anywhere, so that `error` means nothing; empty: some does
   /// Nothing can be drawn at present (a driver is gone, all renderers died); the solve starts over when it can.
   bool renderer_lost = false;
   std::uint64_t renderers_replaced = 0, solve_restarts = 0;  ///< since the start of the program

@@ -13,7 +13,7 @@ namespace radiosity::engine {
 [[nodiscard]] std::map<std::string, std::string> keptSettings(const SolveSettings& settings);
 
 /// `settings` with what was kept, except for those that are `named`: "targetError", "timeLimit", "texels" (both sizes),
-/// "seed", "sky". What makes no sense is passed over.
+/// "seed", "sky", "doubleSided". What makes no sense is passed over.
 [[nodiscard]] SolveSettings withKept(SolveSettings settings, const std::map<std::string, std::string>& kept,
                                      const std::set<std::string>& named);
 

@@ -36,6 +36,7 @@ Result<std::unique_ptr<LitScene>> LitScene::make(scene::Document document, const
 
 Result<std::unique_ptr<LitScene>> LitScene::make(scene::EditedDocument edited, const SolveSettings& settings,
                                                  solver::Transport& transport, const LitScene* former) {
+  configureScene(edited.scene, settings);
   auto lit = std::unique_ptr<LitScene>(new LitScene(std::move(edited), settings, transport));
   scene::ChartOptions charts;
   charts.texel_budget = settings.texels;
@@ -50,7 +51,28 @@ Result<std::unique_ptr<LitScene>> LitScene::make(scene::EditedDocument edited, c
   lit->burial_ = std::move(built->burial);
   lit->patch_count_ = leavesWithArea(*lit->patches_);
   lit->materials_ = scene::shadePatches(*lit->scene_, *lit->patches_);
+  lit->light_report_.findDark(lit->litParts());
   return lit;
+}
+
+void configureScene(scene::Scene& scene, const SolveSettings& settings) {
+  if (!settings.double_sided) return;
+  for (auto& material : scene.materials) material.double_sided = true;
+}
+
+SceneChange LitScene::changeTo(const scene::Scene& next) const {
+  auto change = changeBetween(*scene_, next);
+  change.geometry = change.geometry || mayUncover(*patches_, change.switched);
+  return change;
+}
+
+LitParts LitScene::litParts() const { return {document_, *scene_, *patches_, materials_, sources_}; }
+
+void LitScene::reportLight() { light_report_.findLost(litParts(), *solver_); }
+
+std::string LitScene::unlit(const solver::EnergyParts& energy) const {
+  if (patches_->surfaces.empty()) return {};
+  return light_report_.unlit(power_, energy, solver_->error().total <= settings_.target_error);
 }
 
 /// Nothing where all was laid out anew.
@@ -138,6 +160,7 @@ void LitScene::makeSolver(const solver::FormerSolver* former) {
   settings.paper_mode = settings_.paper_mode;
   settings.link_memory = settings_.link_memory_bytes;
   sources_ = lightSources(*scene_);
+  light_report_.forgetLost();
   solver_ = solver::makeSolver(patches_, materials_, transport_, settings, sources_, former);
   solver_power_ = power_ = emittedPower();
 }
@@ -177,6 +200,7 @@ scene::Document LitScene::reshade(scene::Document document, std::shared_ptr<cons
     std::erase_if(materials_.warnings, [&](const auto& warning) { return warning.starts_with(place); });
     (void)scene::reshadeMaterial(*scene_, *patches_, material, materials_);
   }
+  if (!change.materials.empty()) light_report_.findDark(litParts());
   const bool other_lights = sources_ != lightSources(*scene_);
   // A material that no lit surface has leaves the light, and what is known of its error, as they are.
   // A solver of which only a part knows of an edit is told of no other: it will be made anew.
@@ -301,18 +325,20 @@ bool LitScene::setSky(const SolveSettings& settings) {
 
 std::vector<std::string> LitScene::warnings(std::size_t most) const {
   std::vector<std::string> first;
-  for (const auto* some : {&scene_->warnings, &patches_->warnings, &materials_.warnings}) {
+  for (const auto* some :
+       {&light_report_.dark(), &light_report_.lost(), &scene_->warnings, &patches_->warnings, &materials_.warnings}) {
     const auto count = static_cast<std::ptrdiff_t>(std::min(some->size(), most - first.size()));
     first.insert(first.end(), some->begin(), some->begin() + count);
   }
-  if (nothingShines() && first.size() < most) {
+  if (hasNoLamp() && first.size() < most) {
     first.emplace_back("nothing shines: the scene has no emissive surface, no light and no sky; --sky 1000 adds one");
   }
   return first;
 }
 
 std::size_t LitScene::warningCount() const {
-  return scene_->warnings.size() + patches_->warnings.size() + materials_.warnings.size() + (nothingShines() ? 1 : 0);
+  return light_report_.dark().size() + light_report_.lost().size() + scene_->warnings.size() +
+         patches_->warnings.size() + materials_.warnings.size() + (hasNoLamp() ? 1 : 0);
 }
 
 /// Children shoot how they differ from their parents, so noise leaves single leaves a little darker than black. Nothing

@@ -11,6 +11,7 @@
 
 #include "common/result.h"
 #include "server/engine/engine.h"
+#include "server/engine/light_report.h"
 #include "server/engine/scene_change.h"
 #include "server/scene/document.h"
 #include "server/scene/lightmap.h"
@@ -23,6 +24,9 @@ class BurialRecord;
 }
 
 namespace radiosity::engine {
+
+/// What settings make of an imported scene: SolveSettings::double_sided.
+void configureScene(scene::Scene& scene, const SolveSettings& settings);
 
 class LitScene {
  public:
@@ -46,7 +50,9 @@ class LitScene {
   [[nodiscard]] Result<void> beginUpload() const { return transport_.beginScene(patches_); }
   [[nodiscard]] Result<void> finishUpload() const { return transport_.finishScene(); }
 
-  [[nodiscard]] SceneChange changeTo(const scene::Scene& next) const { return changeBetween(*scene_, next); }
+  /// `next`: after configureScene(). What switches a lamp that lies on another face, or under one, changes geometry:
+  /// another of them is seen then.
+  [[nodiscard]] SceneChange changeTo(const scene::Scene& next) const;
 
   /// Whether pages and UVs are those of `former`, and who has its GLB needs no other: tiles stay valid.
   [[nodiscard]] bool keepsLayoutOf(const LitScene& former) const;
@@ -105,6 +111,13 @@ class LitScene {
     solver_->setTargetError(settings.target_error);
   }
 
+  /// Finds out where light is lost, once a solve has come to its end: warnings() names it. Costs nothing where little
+  /// is.
+  void reportLight();
+  [[nodiscard]] const std::vector<std::string>& lostLight() const { return light_report_.lost(); }
+  /// As Status::unlit.
+  [[nodiscard]] std::string unlit(const solver::EnergyParts& energy) const;
+
   /// Another sky for scenes that have none of their own. True: it changes the light.
   bool setSky(const SolveSettings& settings);
 
@@ -149,7 +162,10 @@ class LitScene {
 
     [[nodiscard]] std::vector<scene::LightmapPage> pages(const std::vector<glm::vec3>& light, const LitScene& to) const;
   };
-  [[nodiscard]] bool nothingShines() const { return power_ <= 0.0 && !patches_->surfaces.empty(); }
+  [[nodiscard]] bool hasNoLamp() const {
+    return power_ <= 0.0 && !patches_->surfaces.empty() && light_report_.dark().empty();
+  }
+  [[nodiscard]] LitParts litParts() const;
   void makeSolver(const solver::FormerSolver* former = nullptr);
   void updateSolver(bool materials, bool lights);
   [[nodiscard]] std::vector<glm::vec3> ownLight() const;
@@ -172,6 +188,7 @@ class LitScene {
   std::shared_ptr<const scene::BurialRecord> burial_;  // of these, for edits; null: not kept
   std::uint64_t patch_count_ = 0;
   scene::PatchMaterials materials_;
+  LightReport light_report_;
   bool stale_ = false;
   bool reproducible_ = true;
   std::optional<scene::PatchMap> former_map_;  // from succeed() to startSolve()

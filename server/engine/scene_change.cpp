@@ -1,8 +1,13 @@
 #include "server/engine/scene_change.h"
 
 #include <algorithm>
+#include <glm/common.hpp>
+#include <glm/vector_relational.hpp>
 #include <map>
+#include <span>
 #include <utility>
+
+#include "server/scene/emitters.h"
 
 namespace radiosity::engine {
 namespace {
@@ -35,6 +40,12 @@ bool sameShading(const Scene& a, const Material& m, const Scene& b, const Materi
   return m.base_color == n.base_color && m.metallic == n.metallic && m.emission == n.emission &&
          sameTexture(a, m.base_color_texture, b, n.base_color_texture) &&
          sameTexture(a, m.emissive_texture, b, n.emissive_texture);
+}
+
+/// Whether surfaces may begin or cease to emit; which pixels they show of another texture is not looked at.
+bool maySwitch(const Scene& a, const Material& m, const Scene& b, const Material& n) {
+  if (mayEmit(m) != mayEmit(n)) return true;
+  return mayEmit(m) && !sameTexture(a, m.emissive_texture, b, n.emissive_texture);
 }
 
 /// Where they both are hidden it does not matter where they are.
@@ -70,8 +81,38 @@ SceneChange changeBetween(const Scene& before, const Scene& after) {
       return change;
     }
     if (!sameShading(before, old_one, after, new_one)) change.materials.push_back(m);
+    if (maySwitch(before, old_one, after, new_one)) change.switched.push_back(m);
   }
   return change;
+}
+
+/// Of what a switched surface lies on, or under, one of the two is covered somewhere, and their bounds meet.
+bool mayUncover(const scene::PatchScene& patches, const std::vector<std::uint32_t>& switched) {
+  if (switched.empty()) return false;
+  std::vector<bool> is_covered(patches.surfaces.size(), false);
+  const auto surfaceOf = [&](std::uint32_t leaf) {
+    const auto after = std::ranges::upper_bound(patches.surfaces, leaf, {}, &scene::Surface::first_leaf);
+    return static_cast<std::size_t>(after - patches.surfaces.begin() - 1);
+  };
+  for (const auto& covered : patches.covered) is_covered[surfaceOf(covered.leaf)] = true;
+  for (std::size_t s = 0; s < patches.surfaces.size(); ++s) {
+    const auto& surface = patches.surfaces[s];
+    const auto leaves = std::span(patches.leaves).subspan(surface.first_leaf, surface.width * surface.height);
+    if (std::ranges::any_of(leaves, &scene::LeafPoint::beneath)) is_covered[s] = true;
+  }
+  const auto meet = [](const scene::Surface& a, const scene::Surface& b) {
+    constexpr float kMargin = 1e-5F;  // unit box: faces no farther apart lie on each other
+    return glm::all(glm::lessThanEqual(a.bounds_min, b.bounds_max + kMargin)) &&
+           glm::all(glm::lessThanEqual(b.bounds_min, a.bounds_max + kMargin));
+  };
+  for (std::size_t s = 0; s < patches.surfaces.size(); ++s) {
+    const auto& surface = patches.surfaces[s];
+    if (std::ranges::find(switched, surface.material) == switched.end()) continue;
+    for (std::size_t t = 0; t < patches.surfaces.size(); ++t) {
+      if (is_covered[t] && (s == t || meet(surface, patches.surfaces[t]))) return true;
+    }
+  }
+  return false;
 }
 
 bool onlyNodesMoved(const Scene& before, const Scene& after) {

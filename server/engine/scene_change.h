@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "server/scene/patch_scene.h"
 #include "server/scene/scene.h"
 
 namespace radiosity::engine {
@@ -14,6 +15,8 @@ struct SceneChange {
   bool geometry = false;
   /// Otherwise: the materials whose emission or reflectance differs (indices into both scenes' materials).
   std::vector<std::uint32_t> materials;
+  /// Of these, those whose surfaces may begin or cease to emit: where faces lie on each other, another is seen then.
+  std::vector<std::uint32_t> switched;
 
   [[nodiscard]] bool nothing() const { return !geometry && materials.empty(); }
 };
@@ -21,6 +24,10 @@ struct SceneChange {
 /// Lights without extent and the sky are not looked at: what they deliver is compared by the solver's sources. Cost: a
 /// comparison of all vertices and decoded textures.
 [[nodiscard]] SceneChange changeBetween(const scene::Scene& before, const scene::Scene& after);
+
+/// Whether another of the faces that lie on each other may be seen where surfaces of these materials begin or cease to
+/// emit. Cost: a pass over the leaves, where there are such materials.
+[[nodiscard]] bool mayUncover(const scene::PatchScene& patches, const std::vector<std::uint32_t>& switched);
 
 /// Whether nothing but places of nodes, and what materials emit and reflect, differs, so that one who has the file of
 /// `before` can bring it up to date by the nodes' transforms alone. Cost: as changeBetween().

@@ -236,12 +236,21 @@ void SolveLoop::endSolve(SolveState state) {
   if (lit_) {
     if (state != SolveState::kConverged) lit_->solver().assess();  // that it says of what it knows now
     if (state != SolveState::kFailed) lit_->endFade();
+    if (state != SolveState::kFailed) tellLostLight();
   }
   const bool reported = publishLightmaps(true);
   updateStatus(true, reported);
   retired_.reset();
   // Of the short solves of a drag the next periodic one will do: thirty a second would stand in the way of the edits.
   if (seconds_ > kLongSolveSeconds) next_checkpoint_ = Clock::now();
+}
+
+void SolveLoop::tellLostLight() {
+  lit_->reportLight();
+  const auto told = std::exchange(lost_told_, std::max(lost_told_, lit_->lostLight().size()));
+  if (lost_told_ == told) return;
+  const LogScope about({.revision = revision_});
+  for (const auto& warning : lit_->lostLight()) log::warn("{}", warning);
 }
 
 void SolveLoop::updateStatus(bool announce, bool as_reported) {

@@ -113,8 +113,9 @@ class SolveLoop final : public Engine {
   [[nodiscard]] bool willRecover(const Error& error);
   /// Whether there is a transport that works; tries to get one when it is time to.
   [[nodiscard]] bool rendererIsBack();
-  void tellLosses();  ///< of renderers that were replaced
-  void beat();        ///< the thread is alive and has finished something
+  void tellLostLight();  ///< of the scene, once it is solved
+  void tellLosses();     ///< of renderers that were replaced
+  void beat();           ///< the thread is alive and has finished something
 
   /// What is watched and not published yet; `final`: as a new version in any case. True: and the status is that of now
   /// but for what this itself changed.
@@ -184,7 +185,7 @@ class SolveLoop final : public Engine {
   /// Tells everyone of the new revision and solves on.
   void announceEdit(const PatchOutcome& outcome, const std::string& patch, const std::string& by);
   [[nodiscard]] Result<SolveSettings> applySettings(const SolveSettings& settings);
-  void takeSettings(const SolveSettings& before, bool resized, bool anew);
+  void takeSettings(const SolveSettings& before, bool reshaped, bool anew);
   /// A solve that has stopped goes on when the settings now ask for more, and is done when they ask for less.
   void reconsiderStop();
 
@@ -253,6 +254,7 @@ class SolveLoop final : public Engine {
   unsigned recoveries_ = 0;  // of this solve
   Clock::time_point retry_at_{};
   std::uint64_t losses_told_ = 0, solve_restarts_ = 0;
+  std::size_t lost_told_ = 0;  // warnings of lost light that were logged since the load: edits log no others
 
   std::atomic<Clock::rep> last_beat_{0};  // since the clock's epoch; any thread may read both
   std::atomic<bool> waiting_{true};

@@ -129,6 +129,7 @@ Result<PatchOutcome> SolveLoop::applyRequest(const PatchRequest& request) {
   if (patch.is_discarded()) return fail(ErrorCode::kBadInput, "the patch is not JSON");
   auto edited = scene::editDocument(lit_->document(), patch, request.find_upload);
   if (!edited) return tl::unexpected<Error>(edited.error());
+  configureScene(edited->scene, settings_);
   if (request.dry_run) {
     const auto change = lit_->changeTo(edited->scene);
     return PatchOutcome{revision_, lit_->affectedBy(change, edited->scene),
@@ -150,6 +151,7 @@ Result<PatchOutcome> SolveLoop::applyStep(const StepRequest& request) {
   if (!step) return tl::unexpected<Error>(step.error());
   auto edited = scene::importEdited(std::move(step->document), &lit_->document());
   if (!edited) return tl::unexpected<Error>(edited.error());
+  configureScene(edited->scene, settings_);
   auto next = history_.nextStep(revision_ + 1, request.by, request.redo);
   const auto keep = keepEdit(next, request.receipt, edited->document);
   auto outcome = adopt(std::move(*edited), keep);
@@ -260,10 +262,11 @@ void SolveLoop::configure(ChangeSettings change, Callback<SolveSettings> done) {
 Result<SolveSettings> SolveLoop::applySettings(const SolveSettings& settings) {
   if (settings == settings_) return settings_;  // who asks what they are changes nothing
   const SolveSettings before = settings_;
-  const bool resized = before.texels != settings.texels || before.texel_size_m != settings.texel_size_m;
+  const bool reshaped = before.texels != settings.texels || before.texel_size_m != settings.texel_size_m ||
+                        before.double_sided != settings.double_sided;
   const bool anew = before.seed != settings.seed || before.paper_mode != settings.paper_mode ||
                     before.link_memory_bytes != settings.link_memory_bytes;
-  if (lit_ && resized) {  // which may fail: only what can be lit is kept
+  if (lit_ && reshaped) {  // which may fail: only what can be lit is kept
     const auto keep = [&](const LitScene&, const LitScene::Affected&) { return keepSettings(settings); };
     auto made = withinMemory([&] { return LitScene::make(lit_->document(), settings, *transport_); });
     const auto relation = anew ? Relation::kSolvedAnew : Relation::kEdited;
@@ -275,7 +278,7 @@ Result<SolveSettings> SolveLoop::applySettings(const SolveSettings& settings) {
     return tl::unexpected<Error>(kept.error());
   }
   settings_ = settings;
-  if (!fitsMemory([&] { takeSettings(before, resized, anew); })) {
+  if (!fitsMemory([&] { takeSettings(before, reshaped, anew); })) {
     unpublished_ = true;
     log::warn("out of memory: settings are told of later");
   }
@@ -283,10 +286,10 @@ Result<SolveSettings> SolveLoop::applySettings(const SolveSettings& settings) {
 }
 
 /// They are kept: nothing can be refused any more.
-void SolveLoop::takeSettings(const SolveSettings& before, bool resized, bool anew) {
+void SolveLoop::takeSettings(const SolveSettings& before, bool reshaped, bool anew) {
   former_.reset();                       // its solve is one by other settings
   if (!lit_) return updateStatus(true);  // they wait for a scene
-  if (resized) {
+  if (reshaped) {
     beginSolve();
     listeners_.tell([this](Listener& listener) { listener.onSceneLoaded(revision_); });
     (void)publishLightmaps(false);

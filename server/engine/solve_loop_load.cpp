@@ -83,6 +83,7 @@ Result<LoadOutcome> SolveLoop::settleIn(Result<std::unique_ptr<LitScene>> made, 
   if (const auto lit = relight(std::move(made), relation, keep); !lit) return tl::unexpected<Error>(lit.error());
   first_light_.reset();
   revision_ = revision;
+  lost_told_ = 0;
   history_.take(std::move(next));
   LoadOutcome outcome{revision_, {}};
   const bool begun = fitsMemory([&] { beginSolve(); });

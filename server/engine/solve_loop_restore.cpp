@@ -178,6 +178,7 @@ Result<std::unique_ptr<LitScene>> SolveLoop::resumedScene(const scene::Document&
   if (!is_newest) {  // the solve can take in whatever has changed of light and colour since
     auto scene = scene::importScene(document);
     if (!scene) return tl::unexpected<Error>(scene.error());
+    configureScene(*scene, settings);
     const auto change = (*lit)->changeTo(*scene);
     if (change.geometry)
       return fail(ErrorCode::kBadInput, fmt::format("it is of revision {}, whose geometry is not that of revision {}",

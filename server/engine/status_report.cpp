@@ -97,6 +97,7 @@ Status reportStatus(const LitScene& lit, double seconds) {
   status.patches = lit.patchCount();
   status.warnings = lit.warnings(kStatusWarnings);
   status.warning_count = lit.warningCount();
+  status.unlit = lit.unlit(energy);
   addCounters(lit, status);
   return status;
 }

@@ -27,6 +27,9 @@ TriangleClusters makeClusters(const scene::PatchScene& patches, std::uint32_t mo
     return patches.vertices[patches.indices[3 * std::size_t{triangle} + k]].position;
   };
   TriangleClusters made;
+  // What is drawn first stays where two are equally near.
+  const bool coincide = !patches.covered.empty();
+  const auto emits = [&](std::uint32_t t) { return patches.surfaces[patches.triangle_surface[t]].emits; };
   auto& order = made.order;
   order.resize(patches.indices.size() / 3);
   std::iota(order.begin(), order.end(), 0U);
@@ -42,6 +45,7 @@ TriangleClusters makeClusters(const scene::PatchScene& patches, std::uint32_t mo
     const auto begin = order.begin() + first, end = begin + count;
     if (count <= most) {
       std::sort(begin, end);
+      if (coincide) std::stable_partition(begin, end, emits);
       Box box;
       for (auto t = begin; t != end; ++t) {
         for (std::size_t k = 0; k < 3; ++k) box.add(corner(*t, k));

@@ -15,7 +15,9 @@ struct TriangleClusters {
     std::uint32_t first, count;  ///< into `order`
     glm::vec3 centre, extent;    ///< of the box around them; extent: half its sides
   };
-  std::vector<std::uint32_t> order;  ///< triangles, cluster by cluster; in scene order inside of each
+  /// Triangles, cluster by cluster; in scene order inside of each, but where faces lie on each other those that emit
+  /// come first.
+  std::vector<std::uint32_t> order;
   std::vector<Cluster> clusters;
 };
 

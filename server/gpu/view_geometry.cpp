@@ -1,5 +1,6 @@
 #include "server/gpu/view_geometry.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -67,6 +68,11 @@ ViewGeometry makeViewGeometry(const scene::Scene& scene, const scene::PatchScene
       addTriangle(scene, instance, triangle, uvs.corners[triangle], eye, geometry.vertices);
       geometry.draws.back().count += 3;
     }
+  }
+  // What is drawn first stays where two are equally near: lamps, where faces lie on each other.
+  if (!patches.covered.empty()) {
+    const auto emits = [&](const auto& draw) { return scene.materials[draw.material].emission != glm::vec3(0.0F); };
+    std::stable_partition(geometry.draws.begin(), geometry.draws.end(), emits);
   }
   return geometry;
 }

@@ -62,6 +62,7 @@ protocol::Progress toProgress(const engine::Status& s) {
   p.surfaces = s.surfaces;
   p.polygons = s.polygons;
   p.failure = s.failure;
+  p.unlit = s.unlit;
   return p;
 }
 
@@ -84,6 +85,7 @@ protocol::Settings toSettings(const engine::SolveSettings& s) {
     };
     out.sky = {color(s.sky->upper), color(s.sky->lower)};
   }
+  out.double_sided = s.double_sided;
   return out;
 }
 
@@ -99,6 +101,7 @@ engine::SolveSettings merged(engine::SolveSettings s, const protocol::SolveConfi
   if (call.seed) s.seed = *call.seed;
   if (call.no_sky) s.sky.reset();
   if (call.sky) s.sky = toSetting(*call.sky);
+  if (call.double_sided) s.double_sided = *call.double_sided;
   return s;
 }
 

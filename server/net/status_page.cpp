@@ -65,8 +65,9 @@ std::string statusPage(const engine::Status& s, std::size_t viewers, std::string
   page += row("State", s.failure.empty() ? std::string(stateName(s.state))
                                          : fmt::format("{}: {}", stateName(s.state), s.failure));
   page += row("Scene revision", std::to_string(s.revision));
-  page += row("Estimated error",
-              fmt::format("{:.2f} % (target {:.2f} %)", 100 * s.error.total, 100 * s.settings.target_error));
+  page += row("Estimated error", s.unlit.empty() ? fmt::format("{:.2f} % (target {:.2f} %)", 100 * s.error.total,
+                                                               100 * s.settings.target_error)
+                                                 : "no light arrives: " + s.unlit);
   page += row("Solve time", fmt::format("{:.2f} s", s.seconds));
   if (s.seconds_left) page += row("Time left, about", fmt::format("{:.0f} s", *s.seconds_left));
   page += row("Shots", fmt::format("{} ({:.0f} a second)", s.shots, s.shots_per_second));

@@ -13,6 +13,7 @@
 #include "server/scene/atlas.h"
 #include "server/scene/burial_record.h"
 #include "server/scene/coverage.h"
+#include "server/scene/emitters.h"
 #include "server/scene/lineage.h"
 #include "server/scene/opacity.h"
 
@@ -71,6 +72,7 @@ class Builder {
       surface.see_through = isSeeThrough(material);
       hides.push_back(surface.see_through ? Hides::kNothing : material.double_sided ? Hides::kSheet : Hides::kSolid);
     }
+    findEmitters(scene_, patches_);
     std::vector<LeafPiece> pieces;
     ClosedSolids solids;
     const auto measure = [&](std::size_t part) {  // each reads what the other does not write

@@ -37,7 +37,7 @@ struct LeafPiece {
 
 using FindFormerBurial = std::function<std::unique_ptr<const FormerBurial>()>;
 /// Takes the part of each leaf that lies inside another solid out of node_area and moves leaf points to what is left.
-/// `hides`: by surface. Adds warnings about coincident faces.
+/// `hides`: by surface. Needs Surface::see_through and emits. Adds warnings about coincident faces.
 /// Returns how it was found, or null where that is too much to keep. `find_former`: makes what is known of the scene
 /// before an edit, if anything, while other things are made; leaves that it answers for are not looked at again, and
 /// get the same bits.

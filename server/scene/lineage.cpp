@@ -87,6 +87,7 @@ class Matcher {
 
   [[nodiscard]] bool samePlace(const Surface& a, const Surface& b) const {
     if (a.triangle_count != b.triangle_count || a.planar != b.planar || a.see_through || b.see_through) return false;
+    if (a.emits != b.emits) return false;  // another may be seen where they lie
     for (std::uint32_t i = 0; i < 3 * a.triangle_count; ++i) {
       const auto& v = before_.vertices[before_.indices[std::size_t{3} * a.first_triangle + i]];
       const auto& w = after_.vertices[after_.indices[std::size_t{3} * b.first_triangle + i]];

@@ -91,6 +91,26 @@ void dropOldPages(Json& gltf) {
   }
 }
 
+/// What is lit on both sides is drawn from both, also where settings say so and not the file.
+void showBothSides(const Scene& scene, Json& gltf) {
+  auto& materials = gltf["materials"];
+  if (materials.is_null()) materials = Json::array();
+  const auto own = materials.size();
+  for (std::size_t m = 0; m < std::min(own, scene.materials.size()); ++m) {
+    if (scene.materials[m].double_sided) materials[m]["doubleSided"] = true;
+  }
+  if (scene.materials.size() > own && scene.materials[own].double_sided && gltf.contains("meshes")) {
+    for (auto& mesh : gltf["meshes"]) {
+      for (auto& primitive : mesh["primitives"]) {
+        if (primitive.contains("material")) continue;
+        primitive["material"] = own;
+        if (materials.size() == own) materials.push_back({{"doubleSided", true}});
+      }
+    }
+  }
+  if (materials.empty()) gltf.erase("materials");
+}
+
 class Exporter {
  public:
   Exporter(const Document& document, const tinygltf::Model& model, Document& out)
@@ -202,6 +222,7 @@ Result<Document> withLightmapUvs(const Document& document, const Scene& scene, c
   out.imported.reset();
   freeTexcoord1(out.gltf);
   dropOldPages(out.gltf);
+  showBothSides(scene, out.gltf);
   if (auto ok = Exporter(document, *model, out).run(placements(scene, patches)); !ok) return tl::unexpected(ok.error());
   return out;
 }

@@ -66,7 +66,8 @@ struct Surface {
   glm::vec3 bounds_min{0.0F}, bounds_max{0.0F};
   bool planar = false;
   bool see_through =
-      false;  ///< some of it is cut out, blends or transmits: PatchScene::opacity says where and how much
+      false;           ///< some of it is cut out, blends or transmits: PatchScene::opacity says where and how much
+  bool emits = false;  ///< some of it does (emitters.h): of surfaces in one place it is seen
   std::uint32_t opacity_scale = 1;  ///< cells of the opacity grid across a leaf
   std::uint32_t first_opacity = 0;  ///< of width x opacity_scale by height x opacity_scale cells, row-major
   float texel_area = 0.0F;          ///< area of a full leaf, unit box squared
@@ -115,8 +116,8 @@ struct PatchScene {
   std::vector<Seam> seams;
 
   /// A side of a leaf right behind that of another surface which faces the same way and is lit in its place, and where
-  /// on that: an earlier surface, or one that is opaque where this is not. Lightmaps
-  /// show that light in both: who draws them sees now one, now the other.
+  /// on that: what comes first by seenOrder(). Lightmaps show that light in both: who draws them sees now one, now the
+  /// other.
   struct Covered {
     std::uint32_t leaf, side;
     std::uint32_t surface, surface_side;  ///< that covers it
@@ -143,11 +144,12 @@ struct PatchScene {
     return opacity[surface.first_opacity + row + cell(texel.x, surface.width)];
   }
 
-  /// Of triangles that lie in one place and face the same way that of least order is seen: what is opaque first, and
-  /// then as in the file, since charts of a mesh lie in any order. Once Surface::see_through is known.
+  /// Of triangles that lie in one place and face the same way that of least order is seen: what emits first, so that no
+  /// lamp is lost, then what is opaque, and then as in the file, since charts of a mesh lie in any order. Once
+  /// Surface::see_through and Surface::emits are known.
   [[nodiscard]] auto seenOrder(std::uint32_t triangle) const {
     const Surface& surface = surfaces[triangle_surface[triangle]];
-    return std::tuple(surface.see_through, surface.instance, triangle_source[triangle], triangle);
+    return std::tuple(!surface.emits, surface.see_through, surface.instance, triangle_source[triangle], triangle);
   }
 
   [[nodiscard]] std::size_t nodeCount() const { return node_area.size(); }

@@ -280,8 +280,8 @@ void Coincidence::run() {
   }
   if (count == 0) return;
   patches_.warnings.push_back(
-      fmt::format("{} surfaces lie exactly on an earlier one that faces the same way and is seen instead (the first: "
-                  "surface {} of instance {} on surface {} of instance {})",
+      fmt::format("{} surfaces lie exactly on another one that faces the same way and is seen instead, since it emits, "
+                  "is opaque or is earlier (the first: surface {} of instance {} on surface {} of instance {})",
                   count, first.second, patches_.surfaces[first.second].instance, first.first,
                   patches_.surfaces[first.first].instance));
 }

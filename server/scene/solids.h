@@ -91,7 +91,8 @@ class Solids {
 };
 
 /// Sides of surfaces that lie on each other and face the same way: the earlier is seen, the later gets no light. What
-/// one can see through comes after all that is opaque: a decal does not hide the wall.
+/// one can see through comes after all that is opaque: a decal does not hide the wall. What emits comes before all: no
+/// lamp is lost.
 class Coincidence {
  public:
   explicit Coincidence(PatchScene& patches);

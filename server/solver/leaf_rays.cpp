@@ -192,7 +192,7 @@ std::uint32_t LeafRays::see(const Place& from, const glm::dvec3& direction, std:
       continue;
     }
     auto s = side_of_[patches_.triangle_surface[hit.triangle]][hit.front ? 0 : 1];
-    end = {at, {}, kNothing};
+    end = {at, {}, kNothing, hit.triangle};
     if (s == scene::kNone) return kNothing;
     auto texel = texelAt(patches_.triangles[hit.triangle], at);
     auto value = leafAt(sides_[s], texel);

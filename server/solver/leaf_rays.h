@@ -60,8 +60,8 @@ class LeafRays {
   /// The leaf value that is seen that way, kNothing or one of the sky's. Where a leaf has no area of its own (buried
   /// right behind another, or so little of it that its neighbours took it) it is theirs. What one can see through stops
   /// the ray or not, by chance from `key`.
-  /// `end`: where the ray ends, and on which leaf, be it that another's value is told; kNothing: on an unlit side. As
-  /// it was where it ends in the sky.
+  /// `end`: where the ray ends, and on which leaf, be it that another's value is told; kNothing: on an unlit side, of
+  /// `end.triangle`. As it was where it ends in the sky.
   [[nodiscard]] std::uint32_t see(const Place& from, const glm::dvec3& direction, std::uint64_t key, Place& end) const;
   /// Light may change within the leaf from one place to the next: something passes through it or right before it.
   [[nodiscard]] bool isCut(std::uint32_t value) const { return is_cut_[value]; }

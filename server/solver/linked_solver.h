@@ -64,6 +64,7 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] std::vector<glm::vec3> commonErrorSquared() const override;
   [[nodiscard]] const ErrorParts& error() const override { return error_; }
   [[nodiscard]] EnergyParts energy() const override;
+  [[nodiscard]] std::shared_ptr<const LeafRays> rays() override { return leafRays(); }
   [[nodiscard]] const TransportCounters& transportCounters() const override { return counters_; }
   [[nodiscard]] const PlannerCounters& plannerCounters() const override { return planner_.counters(); }
   [[nodiscard]] std::uint32_t rounds() const override { return rounds_; }

@@ -17,6 +17,8 @@
 
 namespace radiosity::solver {
 
+class LeafRays;
+
 struct SolverSettings {
   double target_error = 0.02;
   std::uint64_t seed = 1;
@@ -127,6 +129,8 @@ class Solver {
   [[nodiscard]] virtual std::vector<glm::vec3> commonErrorSquared() const { return {}; }
   [[nodiscard]] virtual const ErrorParts& error() const = 0;
   [[nodiscard]] virtual EnergyParts energy() const = 0;
+  /// What leaves are asked by that see by rays, made now where it is not there yet; null: this solver has none.
+  [[nodiscard]] virtual std::shared_ptr<const LeafRays> rays() { return nullptr; }
   [[nodiscard]] virtual const TransportCounters& transportCounters() const = 0;
   [[nodiscard]] virtual const PlannerCounters& plannerCounters() const = 0;
   [[nodiscard]] virtual std::uint32_t rounds() const = 0;

@@ -26,6 +26,8 @@ constexpr int kFew = 3;
 /// depth.
 constexpr double kGrazing = 2e-4;
 
+bool emits(const Triangle& triangle) { return triangle.emission_lux != glm::dvec3(0.0); }
+
 }  // namespace
 
 /// Embree hands the context to the filter; what was met goes behind it.
@@ -156,8 +158,10 @@ bool Burial::underEarlier(const glm::dvec3& point, const glm::dvec3& normal, std
   return std::any_of(met.begin(), met.end(), [&](const Crossing& crossing) {
     const auto& other = triangles_[crossing.triangle];
     const double same = glm::dot(other.normal, normal);
-    const bool through = triangles_[triangle].see_through;
-    const bool before = through == other.see_through ? crossing.triangle < triangle : through;
+    const bool through = triangles_[triangle].see_through, shines = emits(triangles_[triangle]);
+    const bool before = shines != emits(other)         ? emits(other)
+                        : through != other.see_through ? through
+                                                       : crossing.triangle < triangle;
     return before && (same > kSameFacing || (other.double_sided && same < -kSameFacing));
   });
 }

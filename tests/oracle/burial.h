@@ -36,7 +36,8 @@ class Burial {
   [[nodiscard]] bool leavesSolid(const glm::dvec3& point, const glm::dvec3& direction) const;
 
   /// Whether a triangle lies in the plane of `triangle`, faces the same way and holds the point (of the box), and comes
-  /// before it in the file, or is opaque where one can see through this one: that one is lit.
+  /// before it in the file, or is opaque where one can see through this one, or emits where this one does not: that one
+  /// is lit.
   [[nodiscard]] bool underEarlier(const glm::dvec3& point, const glm::dvec3& normal, std::uint32_t triangle) const;
 
  private:

@@ -37,7 +37,7 @@ export class StateSession {
     const bad = progress.state === 'failed';
     const isBusy = isOver || progress.state === 'solving';
     const stated = hasScene(progress) && progress.state !== 'loading';
-    const error = stated ? `${percent(progress.error.total)} error` : '';
+    const error = !stated ? '' : progress.unlit ? 'no light arrives' : `${percent(progress.error.total)} error`;
     const rate = progress.state === 'solving' ? `${readable(progress.shotsPerSecond, 2)} shots/s` : '';
     frame.setState(
       isOver && !done

@@ -134,7 +134,7 @@ TEST(CoincidentFaces, TheEarlierIsSeenWhateverTheSeedAndItIsReported) {
     settings.seed = seed;
     for (const bool red_first : {true, false}) {
       const auto loaded = load(red_first ? twoFloors(red, green) : twoFloors(green, red), 600);
-      EXPECT_THAT(loaded.patches->warnings, Contains(HasSubstr("1 surfaces lie exactly on an earlier one")));
+      EXPECT_THAT(loaded.patches->warnings, Contains(HasSubstr("1 surfaces lie exactly on another one")));
       Solve both(loaded, settings);
       EXPECT_TRUE(both.run());
       expectSound(both);

@@ -1,10 +1,13 @@
 """`radiosity solve` with a private server: files, report, exit codes, and nothing left behind."""
+import base64
 import json
 import os
+import pathlib
 import signal
 import struct
 import time
 import unittest
+import zlib
 
 import plates
 from harness import ServiceCase, marked_processes, program, waitForLine
@@ -94,6 +97,64 @@ class SolveTest(ServiceCase):
         report = json.loads((self.folder / "r.json").read_text())
         self.assertGreater(report["error"]["total"], 1e-6)
         self.assertFalse(report["reached"])
+
+    def test_aSceneWhoseLampIsTurnedAwayStatesNoError(self):
+        scene = plates.lit_document()
+        scene["nodes"][1]["rotation"] = [1, 0, 0, 0]  # about x: it faces up, now at y = -1 and so below the floor
+        scene["nodes"][1]["translation"] = [0, 2, 0]
+        plates.write_glb(self.folder / "turned.glb", scene)
+        _, errors = self.client("solve", "turned.glb", "-o", "lit.glb", "--report", "r.json", *QUICK)
+        self.assertIn("no light arrives: all of it leaves the scene; found in", errors)
+        self.assertIn("lamp /nodes/1 'lamp', material 'lamp' lights nothing", errors)
+        self.assertNotIn("error 0 %", errors)
+        report = json.loads((self.folder / "r.json").read_text())
+        self.assertEqual(report["unlit"], "all of it leaves the scene")
+        self.assertTrue(report["reached"])
+
+    def test_aLampWhoseEmissiveTextureIsBlackIsNamed(self):
+        def chunk(kind, data):
+            return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+        png = b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">2I5B", 1, 1, 8, 2, 0, 0, 0)) + \
+            chunk(b"IDAT", zlib.compress(bytes(4))) + chunk(b"IEND", b"")
+        scene = plates.lit_document()
+        scene["images"] = [{"uri": "data:image/png;base64," + base64.b64encode(png).decode()}]
+        scene["textures"] = [{"source": 0}]
+        scene["materials"][plates.LAMP_MATERIAL]["emissiveTexture"] = {"index": 0}
+        plates.write_glb(self.folder / "black.glb", scene)
+        _, errors = self.client("solve", "black.glb", "-o", "lit.glb", *QUICK)
+        self.assertIn("lamp /nodes/1 'lamp', material 'lamp' shines with nothing: its emissive texture is black", errors)
+        self.assertIn("no light arrives: the only lamp shines with nothing", errors)
+
+    def test_aLampInThePlaneOfTheCeilingLightsTheRoomAsOneRightBelowIt(self):
+        cases = pathlib.Path(__file__).resolve().parents[4] / "shared" / "cases"
+        if not cases.is_dir():
+            self.skipTest("no shared cases here")
+        absorbed = {}
+        for name in ("lamp-in-plane", "lamp-just-below"):
+            self.client("solve", cases / f"{name}.glb", "-o", "lit.glb", "--report", "r.json", *QUICK)
+            report = json.loads((self.folder / "r.json").read_text())
+            self.assertIsNone(report["unlit"])
+            absorbed[name] = report["energy"]["absorbed"]
+        self.assertGreater(absorbed["lamp-just-below"], 0)
+        self.assertAlmostEqual(absorbed["lamp-in-plane"] / absorbed["lamp-just-below"], 1, delta=0.01)  # closed: all of it
+
+    def test_doubleSidedLightsWhatIsTurnedAway(self):
+        scene = plates.lit_document()
+        scene["nodes"][0]["rotation"] = [1, 0, 0, 0]  # the floor faces down: the lamp sees its back
+        plates.write_glb(self.folder / "turned.glb", scene)
+        _, errors = self.client("solve", "turned.glb", "-o", "dark.glb", "--report", "dark.json", *QUICK)
+        self.assertRegex(errors, r"% of the light ends on backs of single-sided faces: /nodes/0 'floor', material 'floor'")
+        self.assertIn("--double-sided", errors)
+        self.assertIsNotNone(json.loads((self.folder / "dark.json").read_text())["unlit"])
+        _, errors = self.client("solve", "turned.glb", "-o", "lit.glb", "--report", "r.json", "--double-sided", *QUICK)
+        self.assertNotIn("backs", errors)
+        report = json.loads((self.folder / "r.json").read_text())
+        self.assertTrue(report["settings"]["double_sided"])
+        self.assertIsNone(report["unlit"])
+        self.assertGreater(report["energy"]["absorbed"], 1)
+        for material in plates.Glb((self.folder / "lit.glb").read_bytes()).json["materials"]:
+            self.assertTrue(material["doubleSided"], material["name"])
 
     def test_memoryForLinksThatIsNoSizeIsRefused(self):
         _, errors = self.client("solve", self.scene, "-o", "lit.glb", "--link-memory", "much", expect=2)

@@ -162,7 +162,8 @@ class KilledTest(StateCase):
 
         async def configure():
             session = await Session.open(server.url)
-            return await session.call("solve.configure", seed=5, sky={"upper": [1, 2, 3]}, texels=400)
+            return await session.call("solve.configure", seed=5, sky={"upper": [1, 2, 3]}, texels=400,
+                                          doubleSided=True)
 
         settings = self.run_async(configure())
         server.kill()

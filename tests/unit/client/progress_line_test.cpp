@@ -66,6 +66,13 @@ TEST(ProgressLine, saysNoTimeLeftOnceThere) {
   EXPECT_THAT(progressLine(view, 200), Not(HasSubstr("left")));
 }
 
+TEST(ProgressLine, statesNoErrorWhereNoLightArrives) {
+  const ProgressView view{
+      .state = "converged", .error = 0.0, .show_parts = true, .unlit = "no light arrives: \x1b[31m"};
+  EXPECT_THAT(progressLine(view, 300), HasSubstr("converged [########################] no light arrives:  [31m"));
+  EXPECT_THAT(progressLine(view, 300), Not(HasSubstr("error")));
+}
+
 TEST(ProgressLine, takesAnyRateThatAServerMayState) {
   for (const auto& [rate, text] :
        {std::pair(1e300, " 1,000,000,000,000,000,000/s"), std::pair(-1.0, " 0/s"), std::pair(kNan, " 0/s")}) {

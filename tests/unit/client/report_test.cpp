@@ -49,6 +49,16 @@ TEST(OutcomeText, saysThatTexelsAreTooLargeOnlyWhereTheyAreWhatLimits) {
   EXPECT_EQ(finerTexelsText({0.018, 0.001, 0.017, 0.0, std::nan("")}), "");
 }
 
+TEST(OutcomeText, statesNoErrorWhereNoLightArrives) {
+  auto status = someStatus();
+  EXPECT_THAT(outcomeText(status.progress), testing::StartsWith("error 1.8 % after 1.5 s"));
+  status.progress.unlit = "nothing shines";
+  EXPECT_THAT(outcomeText(status.progress), testing::StartsWith("no light arrives: nothing shines; found in 1.5 s"));
+  EXPECT_THAT(statusText(status), testing::HasSubstr("error      no light arrives: nothing shines\n"));
+  EXPECT_EQ(nlohmann::json::parse(reportJson(status, true))["unlit"], "nothing shines");
+  EXPECT_TRUE(nlohmann::json::parse(reportJson(someStatus(), true))["unlit"].is_null());
+}
+
 TEST(StatusText, tellsStateErrorAndWarnings) {
   const auto text = statusText(someStatus());
   EXPECT_THAT(text, testing::HasSubstr("state      converged\n"));

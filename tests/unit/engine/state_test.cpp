@@ -193,6 +193,7 @@ TEST_F(Kept, SettingsComeBackUnlessTheCommandLineNamesThem) {
     settings.seed = 7;
     settings.time_limit_s = 3.5;
     settings.sky = engine::SkySetting{{1.1F, 2.0F, 3.0F}, {0.1F, 0.0F, 0.0F}};
+    settings.double_sided = true;
   }));
   named_ = {};
   restart();
@@ -202,11 +203,13 @@ TEST_F(Kept, SettingsComeBackUnlessTheCommandLineNamesThem) {
   EXPECT_EQ(settings.seed, 7U);
   EXPECT_EQ(settings.time_limit_s, 3.5);
   EXPECT_EQ(settings.sky, (engine::SkySetting{{1.1F, 2.0F, 3.0F}, {0.1F, 0.0F, 0.0F}}));
-  named_ = {"targetError", "seed"};
+  EXPECT_TRUE(settings.double_sided);
+  named_ = {"targetError", "seed", "doubleSided"};
   restart();
   EXPECT_EQ(status().settings.target_error, kEasy);
   EXPECT_EQ(status().settings.seed, 1U);
   EXPECT_EQ(status().settings.texels, 123U);
+  EXPECT_FALSE(status().settings.double_sided);
 }
 
 TEST_F(Kept, SettingsThatCannotBeLitAreNotKept) {

@@ -53,6 +53,8 @@ export interface Progress {
   surfaces: number;
   polygons: number;
   failure?: string;
+  /** Why no light arrives anywhere, so that the error means nothing. */
+  unlit?: string;
 }
 
 /** Errors as those of `progress`, at so many seconds of solve time. */
@@ -76,6 +78,7 @@ export interface Settings {
   texels: number;
   texelSize: number;
   seed: number;
+  doubleSided: boolean;
 }
 
 export interface Status extends Progress {

@@ -1,7 +1,7 @@
 // The panel "Solve": how far the light is, and how far it shall go.
 
 import type { ErrorSample, Progress, Settings } from '../protocol/messages';
-import { button, field, h, inField, parseNumber, percent, readable, section } from './dom';
+import { button, checkbox, field, h, inField, parseNumber, percent, readable, section } from './dom';
 import { ErrorPlot } from './error_plot';
 import { Spaced } from './spaced';
 
@@ -47,6 +47,7 @@ export class SolvePanel {
   private readonly bar = h('progress', { max: 1, value: 0, 'aria-label': 'Progress towards the target error' });
   private readonly target: HTMLInputElement;
   private readonly texels: HTMLInputElement;
+  private readonly bothSides: HTMLInputElement;
   private settings: Settings | undefined;
   private progress: Progress | undefined;
   private readonly spaced = new Spaced(() => this.showProgress());
@@ -71,6 +72,7 @@ export class SolvePanel {
       actions.notAccepted(this.texels.value, 'a number, 1 or more');
       this.showSettings();
     };
+    this.bothSides = checkbox(false, (on) => actions.configure({ doubleSided: on }));
     for (const input of [this.target, this.texels]) {
       input.oninput = () => (this.typing = input);
       input.onblur = () => (this.typing = undefined);
@@ -90,7 +92,12 @@ export class SolvePanel {
         ),
       ),
       section('Error against time', this.plot.element, legendLine()),
-      section('Target', field('Error, %', this.target), field('Texels, approx.', this.texels)),
+      section(
+        'Target',
+        field('Error, %', this.target),
+        field('Texels, approx.', this.texels),
+        field('Light both sides of all surfaces', this.bothSides),
+      ),
       this.warnings,
     );
   }
@@ -123,7 +130,10 @@ export class SolvePanel {
     this.pause.disabled = progress.state !== 'paused' && progress.state !== 'solving';
     this.showFacts([
       ['State', progress.failure ? `${stateName(progress.state)}: ${progress.failure}` : stateName(progress.state)],
-      ['Error', `${percent(error.total)} (target ${percent(target)})`],
+      [
+        'Error',
+        progress.unlit ? `no light arrives: ${progress.unlit}` : `${percent(error.total)} (target ${percent(target)})`,
+      ],
       ['Residual', percent(error.residual)],
       ['Sampling', percent(error.sampling)],
       ['Within texels', percent(error.variation ?? 0)],
@@ -160,6 +170,7 @@ export class SolvePanel {
     if (!this.settings) return;
     if (this.typing !== this.target) this.target.value = inField(100 * this.settings.targetError);
     if (this.typing !== this.texels) this.texels.value = String(this.settings.texels);
+    this.bothSides.checked = this.settings.doubleSided;
   }
 
   private showFacts(facts: [string, string][]): void {

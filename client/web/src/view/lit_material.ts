@@ -59,6 +59,8 @@ export class LitMaterial extends MeshLambertMaterial {
   page: LightmapPage | undefined;
   dataPage: LightmapPage | undefined;
   private meanMetal = 1;
+  /** The server lights both, be it that a setting says so and not the document. An edit brings another file. */
+  private readonly bothSides: boolean;
 
   constructor(
     source: Material,
@@ -74,6 +76,7 @@ export class LitMaterial extends MeshLambertMaterial {
     this.vertexColors = from.vertexColors;
     this.flatShading = from.flatShading;
     this.side = from.side === DoubleSide ? DoubleSide : FrontSide;
+    this.bothSides = this.side === DoubleSide;
     this.alphaTest = from.alphaTest;
     this.transparent = from.transparent;
     this.depthWrite = from.depthWrite;
@@ -83,6 +86,7 @@ export class LitMaterial extends MeshLambertMaterial {
       this.emissiveIntensity = from.emissiveIntensity;
       this.emissiveMap = from.emissiveMap;
     }
+    this.comeBefore();
     this.applyTransmission(from);
     this.meanMetal = from.metalnessMap ? meanBlue(from.metalnessMap) : 1;
     this.own.diffuseScale.value = 1 - (from.metalness ?? 0) * this.meanMetal;
@@ -152,11 +156,19 @@ export class LitMaterial extends MeshLambertMaterial {
     this.own.diffuseScale.value = 1 - (pbr.metallicFactor ?? 1) * this.meanMetal;
     this.emissive.setRGB(...(gltf.emissiveFactor ?? [0, 0, 0]));
     this.emissiveIntensity = gltf.extensions?.KHR_materials_emissive_strength?.emissiveStrength ?? 1;
-    const side = gltf.doubleSided ? DoubleSide : FrontSide;
+    this.comeBefore();
+    const side = gltf.doubleSided || this.bothSides ? DoubleSide : FrontSide;
     if (side !== this.side) {
       this.side = side;
       this.needsUpdate = true;
     }
+  }
+
+  /** Of faces that lie on each other the one that emits is seen, as the server lights them. */
+  private comeBefore(): void {
+    const { emissive, emissiveIntensity } = this;
+    this.polygonOffset = Math.max(emissive.r, emissive.g, emissive.b) * emissiveIntensity > 0;
+    this.polygonOffsetFactor = this.polygonOffsetUnits = -1;
   }
 
   private setPage(page: LightmapPage | undefined): void {
