@@ -127,8 +127,8 @@ class Reader {
     const auto world = parent * localMatrix(node);
     if (node.contains("mesh")) {
       const auto& mesh = file_.member("meshes").at(node["mesh"].get<std::size_t>());
-      if (node.contains("skin") || node.contains("weights") || mesh.contains("weights"))
-        warn("skins and morph targets are not modelled");
+      if (node.contains("skin")) warn("skins are not modelled");
+      weights_ = node.value("weights", mesh.value("weights", std::vector<double>()));
       for (const auto& primitive : mesh.at("primitives")) readPrimitive(primitive, world, index);
     }
     const auto extensions = node.value("extensions", json::object());
@@ -157,12 +157,24 @@ class Reader {
     return uvs;
   }
 
-  Vertices readVertices(const json& attributes, const MaterialValues& material, const glm::dmat4& world) const {
+  /// The attribute in the pose of the weights: each morph target adds its part.
+  std::vector<glm::dvec3> posed(const json& primitive, const std::string& name, std::size_t vertices) const {
+    auto values = attribute<glm::dvec3>(primitive.at("attributes"), name, vertices);
+    const auto targets = primitive.value("targets", json::array());
+    for (std::size_t t = 0; t < std::min(targets.size(), weights_.size()); ++t) {
+      const auto moved = attribute<glm::dvec3>(targets[t], name, vertices);
+      for (std::size_t i = 0; i < vertices; ++i) values[i] += weights_[t] * moved[i];
+    }
+    return values;
+  }
+
+  Vertices readVertices(const json& primitive, const MaterialValues& material, const glm::dmat4& world) const {
+    const auto& attributes = primitive.at("attributes");
     Vertices made;
     const auto count = file_.count(attributes.at("POSITION").get<std::size_t>());
-    made.positions = attribute<glm::dvec3>(attributes, "POSITION", count);
+    made.positions = posed(primitive, "POSITION", count);
     for (auto& p : made.positions) p = glm::dvec3(world * glm::dvec4(p, 1.0));
-    made.normals = attribute<glm::dvec3>(attributes, "NORMAL", count);
+    made.normals = posed(primitive, "NORMAL", count);
     const auto turned = glm::transpose(glm::inverse(glm::dmat3(world)));
     for (auto& n : made.normals) {
       n = turned * n;
@@ -213,7 +225,7 @@ class Reader {
     if (primitive.contains("material")) like.material = primitive["material"].get<std::uint32_t>();
     const auto extras = primitive.value("extras", json::object());
     if (extras.is_object() && attributes.contains("TEXCOORD_1")) like.lightmap_page = extras.value("lightmap", -1);
-    const auto vertices = readVertices(attributes, material, world);
+    const auto vertices = readVertices(primitive, material, world);
     const auto indices = readIndices(primitive, vertices.positions.size());
     const bool flipped = glm::determinant(world) < 0.0;
     for (std::size_t i = 0; i + 2 < indices.size(); i += 3) {
@@ -272,6 +284,7 @@ class Reader {
 
   GltfFile file_;
   std::vector<MaterialValues> materials_;
+  std::vector<double> weights_;  ///< of the morph targets of the mesh that is being read
   TriangleScene scene_;
 };
 

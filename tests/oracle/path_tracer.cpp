@@ -77,6 +77,7 @@ class PathTracer::Scene {
       : shading_(scene),
         rays_(triangles()),
         burial_(rays_.handle(), triangles()),
+        twins_(flippedTwins(triangles())),
         lamps_(scene.lamps),
         sky_upper_(scene.sky_upper),
         sky_lower_(scene.sky_lower) {
@@ -169,7 +170,12 @@ class PathTracer::Scene {
     const double v = query.hit.v;
     hit.point.position = triangle.corners[0] * (1.0 - u - v) + triangle.corners[1] * u + triangle.corners[2] * v;
     hit.back = glm::dot(direction, triangle.normal) >= 0.0;
+    const bool other_side = hit.back && twins_[hit.triangle] != kNoTriangle;  // met by chance: both lie there
     hit.point.normal = hit.point.shading = hit.back ? -triangle.normal : triangle.normal;
+    if (other_side) {
+      hit.triangle = twins_[hit.triangle];
+      hit.back = false;
+    }
     hit.distance = glm::length(hit.point.position - from.position);
     return hit;
   }
@@ -390,6 +396,7 @@ class PathTracer::Scene {
   Shading shading_;
   RayScene rays_;
   Burial burial_;
+  std::vector<std::uint32_t> twins_;  // by triangle: what shows its front where this one turns its back
   std::vector<Lamp> lamps_;
   glm::dvec3 sky_upper_, sky_lower_;
   bool see_through_ = false;  // anything

@@ -108,6 +108,19 @@ TriangleScene joinSides(const TriangleScene& scene) {
   return joined;
 }
 
+std::vector<std::uint32_t> flippedTwins(const std::vector<Triangle>& triangles) {
+  std::map<std::array<Position, 3>, std::uint32_t> places;
+  for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+    if (!triangles[t].double_sided) places.emplace(cycle(triangles[t], false), t);
+  }
+  std::vector<std::uint32_t> twins;
+  for (const auto& triangle : triangles) {
+    const auto found = triangle.double_sided ? places.end() : places.find(cycle(triangle, true));
+    twins.push_back(found == places.end() ? kNoTriangle : found->second);
+  }
+  return twins;
+}
+
 std::vector<std::uint32_t> matchTriangles(const TriangleScene& of, const TriangleScene& in) {
   std::map<std::array<Position, 3>, std::vector<std::uint32_t>> places;
   for (std::uint32_t t = 0; t < in.triangles.size(); ++t) {

@@ -79,6 +79,9 @@ struct TriangleScene {
 /// that they stand for: in one place a ray would meet either by chance. What has no such twin stays as it is.
 [[nodiscard]] TriangleScene joinSides(const TriangleScene& scene);
 
+/// For each single-sided triangle another in the same place that faces the other way; kNoTriangle where there is none.
+[[nodiscard]] std::vector<std::uint32_t> flippedTwins(const std::vector<Triangle>& triangles);
+
 /// For each triangle of one scene that of another with the same corners: turned the same way, or else double-sided. Of
 /// several in one place the n-th has the n-th. kNoTriangle where there is none.
 [[nodiscard]] std::vector<std::uint32_t> matchTriangles(const TriangleScene& of, const TriangleScene& in);

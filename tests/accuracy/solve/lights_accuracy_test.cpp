@@ -228,7 +228,7 @@ TEST(SolvedLights, AlphaBlendModeTestUnderASkyMatchesThePathTracer) {
   // Labels lie on the sloping front of the bed, one on another, closer than single precision tells apart: what is below
   // them is not seen and not compared. They stay in the scene.
   for (auto& triangle : compared.lit.scene.triangles) {
-    if (std::abs(triangle.normal.y - 0.83) < 0.01) triangle.lightmap_page = -1;
+    if (std::abs(std::abs(triangle.normal.y) - 0.83) < 0.01) triangle.lightmap_page = -1;
   }
   const auto accuracy = compare(compared);
   EXPECT_LT(accuracy.solver.solverRms(), 0.05);

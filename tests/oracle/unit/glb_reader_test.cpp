@@ -17,7 +17,7 @@ using nlohmann::json;
 /// A triangle (0,0) (1,0) (0,1) with its own coordinates as texture coordinates, under `material`, whose texture 0 has
 /// a left pixel of `left` and a right one of `right`, nearest. As .gltf with all of its data in URIs beside it.
 TriangleScene readTriangle(const json& material, const std::string& left, const std::string& right,
-                           const json& more_attributes = json::object()) {
+                           const json& more_attributes = json::object(), const json& more_of_mesh = json::object()) {
   const TemporaryFolder folder;
   const std::vector<float> numbers{0,
                                    0,
@@ -56,6 +56,9 @@ TriangleScene readTriangle(const json& material, const std::string& left, const 
   folder.write("a b.ppm", "P6\n2 1\n255\n" + left + right);
   json attributes{{"POSITION", 0}, {"TEXCOORD_0", 1}};
   attributes.update(more_attributes);
+  json mesh{{"primitives", {{{"attributes", attributes}, {"material", 0}}}}};
+  mesh.merge_patch(more_of_mesh);
+  if (mesh.contains("targets")) mesh["primitives"][0]["targets"] = mesh["targets"];
   json gltf{{"asset", {{"version", "2.0"}}},
             {"scenes", {{{"nodes", {0}}}}},
             {"nodes", {{{"mesh", 0}}}},
@@ -63,7 +66,7 @@ TriangleScene readTriangle(const json& material, const std::string& left, const 
             {"samplers", {{{"magFilter", 9728}}}},
             {"textures", {{{"source", 0}, {"sampler", 0}}}},
             {"materials", {material}},
-            {"meshes", {{{"primitives", {{{"attributes", attributes}, {"material", 0}}}}}}},
+            {"meshes", json::array({mesh})},
             {"buffers", {{{"byteLength", 132}, {"uri", "data.bin"}}}},
             {"bufferViews", {{{"buffer", 0}, {"byteLength", 132}}}}};
   for (const auto& [offset, type] : {std::pair{0, "VEC3"}, {36, "VEC2"}, {60, "VEC3"}, {96, "VEC3"}})
@@ -122,6 +125,15 @@ TEST(GlbReader, ColoursOfVerticesVaryOverTheTriangle) {
   const auto scene = readTriangle({{"pbrMetallicRoughness", {{"metallicFactor", 0}}}}, "abc", "abc", {{"COLOR_0", 3}});
   const Shading shading(scene);
   EXPECT_NEAR(shading.reflectance(shading.triangles().at(0), 0.5, 0.25).x, 0.5, 1e-9);
+}
+
+// Two targets, each of which moves the corners by their own positions.
+TEST(GlbReader, MorphTargetsAddTheirWeights) {
+  const json two{{{"POSITION", 0}}, {{"POSITION", 0}}};
+  const auto scene =
+      readTriangle(json::object(), "abc", "abc", json::object(), {{"targets", two}, {"weights", {0.5, 0.25}}});
+  EXPECT_EQ(scene.triangles.at(0).corners[1], glm::dvec3(1.75, 0, 0));
+  EXPECT_EQ(scene.triangles.at(0).corners[2], glm::dvec3(0, 1.75, 0));
 }
 
 TEST(GlbReader, ATextureThatIsNotThereCostsTheTextureAndIsNamed) {

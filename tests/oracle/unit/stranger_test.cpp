@@ -62,6 +62,31 @@ TEST(BothSides, OfAPartitionLitOnOneSideAreBrightAndBlack) {
   EXPECT_EQ(sides[1].mean_lux, glm::dvec3(0.0));
 }
 
+// The front of a wall and a flipped copy of another material in one place: a ray meets one of them by chance, and has
+// met the one that faces it. Under a sky of 1 nit: pi on the floor, where the wall beside it is white and shines as
+// much.
+TEST(BothSides, OfTwoFacesInOnePlaceThatOneIsMetThatFacesTheRay) {
+  test_scenes::TestScene made;
+  const auto shining = made.add({"shining", glm::dvec3(0.0), glm::dvec3(1.0)});
+  const auto black = made.add({"black", glm::dvec3(0.0), glm::dvec3(0.0)});
+  test_scenes::Object wall{"wall", {}, {}};
+  wall.polygons = {{{{0, 0, -9}, {0, 9, -9}, {0, 9, 9}, {0, 0, 9}}, shining},
+                   {{{0, 9, 9}, {0, 9, -9}, {0, 0, -9}, {0, 0, 9}}, black}};
+  made.objects.push_back(wall);
+  made.sky_upper_nits = glm::dvec3(1.0);
+  for (const bool late : {false, true}) {
+    if (late) std::swap(made.objects[0].polygons[0], made.objects[0].polygons[1]);
+    const auto scene = triangulate(made);
+    const double side = scene.triangles[late ? 2 : 0].normal.x;  // which the shining front looks at
+    const auto lux = PathTracer(scene).irradiance(std::vector{Footprint::at({0.5 * side, 0.0, 0.0}, {0, 1, 0}),
+                                                              Footprint::at({-0.5 * side, 0.0, 0.0}, {0, 1, 0})},
+                                                  {.samples = 4096, .leave_out_buried = false});
+    EXPECT_NEAR(lux[0].mean_lux.x, pi, 4.0 * lux[0].standard_error.x + 1e-6);
+    // The wall hides nearly half of the sky: all but what passes beside and above it.
+    EXPECT_NEAR(lux[1].mean_lux.x, 0.5 * pi, 0.05 * pi);
+  }
+}
+
 TriangleScene planeUnder(const Lamp& lamp) {
   TriangleScene scene;
   Triangle triangle;
