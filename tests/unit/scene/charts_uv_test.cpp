@@ -2,10 +2,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <glm/common.hpp>
 #include <string>
 #include <vector>
 
-#include "server/scene/patch_scene.h"
+#include "server/scene/lightmap.h"
 #include "tests/unit/scene/shapes.h"
 
 namespace radiosity::scene::test {
@@ -107,6 +109,50 @@ TEST(ChartsUv, OneOfManyObjectsIsChartedAnewAloneAndNamed) {
   ASSERT_EQ(patches.warnings.size(), 1U);
   EXPECT_THAT(patches.warnings[0], testing::HasSubstr("/nodes/1"));
   EXPECT_EQ(patches.surfaces.size(), 3U);
+}
+
+float lookUp(const Image& page, const glm::vec2& uv) {
+  const glm::vec2 most(page.width - 1, page.height - 1);
+  const glm::vec2 at = glm::clamp(uv * glm::vec2(page.width, page.height) - 0.5F, glm::vec2(0.0F), most);
+  const glm::ivec2 low(at), high = glm::min(low + 1, glm::ivec2(most));
+  const glm::vec2 part = at - glm::vec2(low);
+  return glm::mix(glm::mix(page.at(low.x, low.y).x, page.at(high.x, low.y).x, part.x),
+                  glm::mix(page.at(low.x, high.y).x, page.at(high.x, high.y).x, part.x), part.y);
+}
+
+/// The most that lookups along the edges of the dark square find, where the other one has the light 1.
+float mostInTheDark(const PatchScene& patches) {
+  std::vector<glm::vec3> values(patches.nodeCount(), glm::vec3(0.0F));
+  const auto& lit = patches.surfaces.at(1);
+  for (std::uint32_t leaf = 0; leaf < lit.width * lit.height; ++leaf)
+    values[lit.first_node[0] + leaf] = glm::vec3(1.0F);
+  const auto pages = assemblePages(patches, values);
+  const auto& uvs = patches.instance_uvs.at(0);
+  float most = 0.0F;
+  for (std::size_t t = 0; t < 2; ++t)  // of the dark square
+    for (int step = 0; step <= 40; ++step)
+      for (std::size_t edge = 0; edge < 3; ++edge) {
+        const auto uv =
+            glm::mix(uvs.corners[t][edge], uvs.corners[t][(edge + 1) % 3], static_cast<float>(step) / 40.0F);
+        most = std::max(most, lookUp(pages.at(uvs.page[t]).irradiance, uv));
+      }
+  return most;
+}
+
+TEST(ChartsUv, WhereTheLayoutStaysNoLightBleeds) {
+  int kept = 0, replaced = 0;
+  for (int i = 0; i < 200; ++i) {
+    const double gap = 0.01 + 0.0001 * ((i * 37) % 130);  // 1 to 2.3 texels
+    const double u = 0.1 + 0.0001 * ((i * 61) % 100), v = 0.1 + 0.0001 * ((i * 17) % 100);
+    Primitive p;
+    addSquare(p, 0, u, v, 0.1);
+    addSquare(p, 5, u + 0.1 + gap, v + 0.003, 0.1);
+    const auto patches = atTenTexels(p);
+    (keepsItsLayout(patches) ? kept : replaced) += 1;
+    EXPECT_LT(mostInTheDark(patches), 2e-3F) << gap << " at " << u << ", " << v;
+  }
+  EXPECT_GT(kept, 50);  // or nothing was tested
+  EXPECT_GT(replaced, 50);
 }
 
 TEST(ChartsUv, AnEditKeepsWhatWasDecided) {

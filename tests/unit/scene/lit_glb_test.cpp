@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "server/scene/lightmap.h"
+#include "server/scene/lit_glb_rules.h"
 #include "tests/unit/scene/gltf_builder.h"
 
 namespace radiosity::scene {
@@ -301,6 +302,21 @@ TEST(LitGlb, aCutoffStaysBesideMaskAlone) {
   EXPECT_FALSE(lit.gltf["materials"][0].contains("alphaCutoff"));
   EXPECT_FALSE(lit.gltf["materials"][1].contains("alphaCutoff"));
   EXPECT_EQ(lit.gltf["materials"][2]["alphaCutoff"], 0.25);
+}
+
+TEST(LitGlb, conesOfASpotAreApartInWhatIsWritten) {
+  auto gltf = R"({"extensions":{"KHR_lights_punctual":{"lights":[
+      {"type":"spot","spot":{"innerConeAngle":0.5,"outerConeAngle":0.5}},
+      {"type":"spot","spot":{"innerConeAngle":0.2,"outerConeAngle":0.5}},
+      {"type":"spot","spot":{"innerConeAngle":1}},
+      {"type":"point"}]}}})"_json;
+  separateCones(gltf);
+  const auto& lights = gltf["extensions"]["KHR_lights_punctual"]["lights"];
+  EXPECT_LT(lights[0]["spot"]["innerConeAngle"].get<double>(), 0.5);
+  EXPECT_NEAR(lights[0]["spot"]["innerConeAngle"].get<double>(), 0.5, 1e-6);
+  EXPECT_EQ(lights[1]["spot"]["innerConeAngle"], 0.2);
+  EXPECT_LT(lights[2]["spot"]["innerConeAngle"].get<double>(), 0.7853981634);  // the outer's default
+  EXPECT_FALSE(lights[3].contains("spot"));
 }
 
 /// A square of 4 x 4 texels whose alpha is 1 left of 3/8, and 0 right of it: within the second column.

@@ -46,9 +46,9 @@ afterAll(async () => {
   server.close();
 });
 
-/** R, G, B of each pixel, rows from the top. */
-async function drawn(name: string, kind: string): Promise<Float32Array> {
-  const maps = filesBelow(out, new RegExp(`^${name}-lit\\.lightmap\\.\\d+\\.exr$`));
+/** R, G, B of each pixel, rows from the top. Without a kind of material: the file alone, as it is. */
+async function drawn(name: string, kind?: string): Promise<Float32Array> {
+  const maps = kind ? filesBelow(out, new RegExp(`^${name}-lit\\.lightmap\\.\\d+\\.exr$`)) : [];
   const page = await pages.open(`http://127.0.0.1:${(server.address() as AddressInfo).port}/`);
   await page.waitForFunction(() => 'draw' in window);
   const what = {
@@ -158,4 +158,17 @@ it('is a little darker in MeshStandardMaterial, which keeps light for a gloss th
   const { ratio } = compare(await drawn('cornell', 'MeshStandardMaterial'), lambert);
   expect(ratio).toBeGreaterThan(0.9);
   expect(ratio).toBeLessThan(0.99);
+});
+
+it('shows colours and lamps in the unlit file by itself, exposed and mapped', async () => {
+  await solve(join(SCENES, 'cornell.glb'), join(out, 'unlit-lit.glb'), ...QUALITY, '--unlit');
+  const picture = await drawn('unlit');
+  const of = (x: number, y: number) => Array.from(picture.subarray(3 * (y * WIDTH + x), 3 * (y * WIDTH + x) + 3));
+  const [left, right] = [of(WIDTH / 5, HEIGHT / 2), of((4 * WIDTH) / 5, HEIGHT / 2)];
+  expect(left[0]! / left[1]!).toBeGreaterThan(3); // red
+  expect(right[1]! / right[0]!).toBeGreaterThan(1.5); // green
+  expect(picture.reduce((most, value) => Math.max(most, value), 0)).toBeGreaterThan(0.9); // the lamp
+  const mean = picture.reduce((sum, value) => sum + value, 0) / picture.length;
+  expect(mean).toBeGreaterThan(0.03);
+  expect(mean).toBeLessThan(0.5);
 });
