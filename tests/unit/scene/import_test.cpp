@@ -225,6 +225,7 @@ TEST(Import, texturesAreDecodedWithTheirTransformAndWrap) {
   EXPECT_FALSE(use.repeat_u);
   EXPECT_TRUE(use.mirror_v);
   EXPECT_FALSE(use.nearest);
+  EXPECT_TRUE(scene.materials[0].metallic_texture.nearest) << "no filter is named: texels of metal keep apart";
   ASSERT_EQ(scene.textures.size(), 2U);
   EXPECT_THAT(scene.textures[0].rgba, ElementsAre(255, 0, 0, 255, 0, 0, 255, 255));
   EXPECT_TRUE(scene.textures[0].srgb);
@@ -233,6 +234,8 @@ TEST(Import, texturesAreDecodedWithTheirTransformAndWrap) {
   EXPECT_FALSE(scene.textures[1].srgb);
   builder.gltf["samplers"][0]["magFilter"] = 9728;
   EXPECT_TRUE(imported(builder).materials[0].base_color_texture.nearest);
+  builder.gltf["samplers"][0]["magFilter"] = 9729;
+  EXPECT_FALSE(imported(builder).materials[0].metallic_texture.nearest);
 }
 
 // 1 pixel, whose blue is 51 of 255.
