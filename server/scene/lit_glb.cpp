@@ -8,6 +8,7 @@
 #include "server/scene/import_context.h"
 #include "server/scene/import_instancing.h"
 #include "server/scene/lightmap.h"
+#include "server/scene/lit_glb_dangling.h"
 #include "server/scene/lit_glb_mesh.h"
 
 namespace radiosity::scene {
@@ -202,6 +203,7 @@ Result<Document> withLightmapUvs(const Document& document, const Scene& scene, c
   if (!model) return tl::unexpected(model.error());
   Document out = document;
   out.imported.reset();
+  dropDanglingTextures(out.gltf);
   freeTexcoord1(out.gltf);
   dropOldPages(out.gltf);
   if (auto ok = Exporter(document, *model, out).run(placements(scene, patches)); !ok) return tl::unexpected(ok.error());

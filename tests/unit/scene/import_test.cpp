@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "server/scene/lightmap.h"
 #include "tests/unit/scene/gltf_builder.h"
 
 namespace radiosity::scene {
@@ -304,6 +305,29 @@ TEST(Import, danglingTextureReferencesCostTheTextureAndNotTheScene) {
                   HasSubstr("/textures/0/source: is 7, but /images has 1 entries; the texture is left out"),
                   HasSubstr("/textures/1/sampler: is 3, but /samplers has 0 entries"),
                   HasSubstr("/textures/2/sampler: is -1, but /samplers has 0 entries")));
+}
+
+TEST(Import, theLitSceneHasNoDanglingTextureReferences) {
+  GltfBuilder builder;
+  builder.gltf["images"] = Json::array({{{"uri", kPng}}});
+  builder.gltf["textures"] = Json::array({{{"source", 7}}, {{"source", 0}, {"sampler", 3}}});
+  const Json sheen = {{"sheenColorTexture", {{"index", 2}}}, {"sheenRoughnessFactor", 0.5}};
+  builder.gltf["materials"] = Json::array({{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}},
+                                            {"emissiveTexture", {{"index", 1}}},
+                                            {"normalTexture", {{"index", 9}}},
+                                            {"extensions", {{"KHR_materials_sheen", sheen}}}}});
+  const auto document = builder.document();
+  ASSERT_TRUE(document);
+  const auto lit = withLightmapUvs(*document, Scene{}, PatchScene{});
+  ASSERT_TRUE(lit) << lit.error().text();
+  const auto& material = lit->gltf["materials"][0];
+  EXPECT_FALSE(material["pbrMetallicRoughness"].contains("baseColorTexture"));
+  EXPECT_FALSE(material.contains("normalTexture"));
+  EXPECT_EQ(material["emissiveTexture"]["index"], 1);
+  EXPECT_FALSE(material["extensions"]["KHR_materials_sheen"].contains("sheenColorTexture"));
+  EXPECT_EQ(material["extensions"]["KHR_materials_sheen"]["sheenRoughnessFactor"], 0.5);
+  EXPECT_FALSE(lit->gltf["textures"][0].contains("source"));
+  EXPECT_FALSE(lit->gltf["textures"][1].contains("sampler"));
 }
 
 Json spotOf(double inner, double outer) {
