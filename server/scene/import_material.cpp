@@ -189,6 +189,9 @@ class MaterialImporter {
       context_.warn(pointer_ + member + "/texCoord", "only TEXCOORD_0 and TEXCOORD_1 are read; 0 is used");
       read.texcoord = 0;
     }
+    // Where a file names no filter the choice is ours. Charts of an atlas lie side by side, and metal is a matter of
+    // yes or no: a texel of it does not shade off into the next.
+    read.nearest = coding == Coding::kLinear;
     if (auto ok = readSampler(texture, read); !ok) return ok;
     const auto loaded = coding == Coding::kSrgb ? colorTexture(*image) : dataTexture(*image);
     if (!loaded) return tl::unexpected(loaded.error());
@@ -234,7 +237,7 @@ class MaterialImporter {
     use.repeat_v = wrap_t != kClamp;
     use.mirror_u = wrap_s == kMirror;
     use.mirror_v = wrap_t == kMirror;
-    use.nearest = sampler.value("magFilter", 0) == kNearest;
+    if (sampler.contains("magFilter")) use.nearest = sampler["magFilter"] == kNearest;
     return {};
   }
 

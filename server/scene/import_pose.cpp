@@ -113,20 +113,36 @@ class VertexSkin {
 
 }  // namespace
 
+/// As many as there are targets at most, without zeros at the end.
+std::vector<double> PoseImporter::fitted(const std::vector<double>& weights, std::size_t count,
+                                         const std::string& pointer) {
+  if (count != 0 && !weights.empty() && weights.size() != count) {
+    context_.warn(pointer + "/weights", "are " + std::to_string(weights.size()) + " for " + std::to_string(count) +
+                                            " morph targets; those that are missing are 0");
+  }
+  std::vector<double> out(weights.begin(),
+                          weights.begin() + static_cast<std::ptrdiff_t>(std::min(count, weights.size())));
+  while (!out.empty() && out.back() == 0.0) out.pop_back();
+  return out;
+}
+
+const PoseImporter::Targets& PoseImporter::targetsOf(std::size_t mesh) {
+  auto& known = targets_[mesh];
+  if (known) return *known;
+  known.emplace();
+  const auto& source = context_.model.meshes[mesh];
+  for (const auto& primitive : source.primitives) known->count = std::max(known->count, primitive.targets.size());
+  known->weights = fitted(source.weights, known->count, "/meshes/" + std::to_string(mesh));
+  return *known;
+}
+
 Pose PoseImporter::poseOf(const tinygltf::Node& node, const glm::dmat4& world, const std::string& pointer) {
   Pose pose;
-  const auto& mesh = context_.model.meshes[static_cast<std::size_t>(node.mesh)];
-  std::size_t targets = 0;
-  for (const auto& primitive : mesh.primitives) targets = std::max(targets, primitive.targets.size());
-  const auto& weights = node.weights.empty() ? mesh.weights : node.weights;
-  if (targets != 0 && !weights.empty() && weights.size() != targets) {
-    const auto where = node.weights.empty() ? "/meshes/" + std::to_string(node.mesh) : pointer;
-    context_.warn(where + "/weights", "are " + std::to_string(weights.size()) + " for " + std::to_string(targets) +
-                                          " morph targets; those that are missing are 0");
+  const auto& targets = targetsOf(static_cast<std::size_t>(node.mesh));
+  if (targets.count != 0 && !node.weights.empty()) {
+    auto weights = fitted(node.weights, targets.count, pointer);
+    if (weights != targets.weights) pose.weights = std::move(weights);
   }
-  pose.weights.assign(weights.begin(),
-                      weights.begin() + static_cast<std::ptrdiff_t>(std::min(targets, weights.size())));
-  while (!pose.weights.empty() && pose.weights.back() == 0.0) pose.weights.pop_back();
   pose.skin = node.skin;
   pose.mirrored = pose.skin >= 0 && glm::determinant(glm::dmat3(world)) < 0.0;
   return pose;
@@ -134,8 +150,9 @@ Pose PoseImporter::poseOf(const tinygltf::Node& node, const glm::dmat4& world, c
 
 Result<bool> PoseImporter::apply(const Pose& pose, const tinygltf::Primitive& source, const std::string& pointer,
                                  Primitive& primitive) {
-  if (!pose.weights.empty() && !source.targets.empty()) {
-    if (auto ok = morph(pose, source, pointer, primitive); !ok) return tl::unexpected(ok.error());
+  const auto& weights = pose.weights ? *pose.weights : targetsOf(primitive.mesh).weights;
+  if (!weights.empty() && !source.targets.empty()) {
+    if (auto ok = morph(weights, source, pointer, primitive); !ok) return tl::unexpected(ok.error());
   }
   if (pose.skin < 0) return false;
   if (source.attributes.count("JOINTS_0") == 0 || source.attributes.count("WEIGHTS_0") == 0) {
@@ -178,15 +195,15 @@ Result<void> PoseImporter::checkReach(const std::vector<glm::dvec3>& before, con
   return {};
 }
 
-Result<void> PoseImporter::morph(const Pose& pose, const tinygltf::Primitive& source, const std::string& pointer,
-                                 Primitive& primitive) {
+Result<void> PoseImporter::morph(const std::vector<double>& weights, const tinygltf::Primitive& source,
+                                 const std::string& pointer, Primitive& primitive) {
   const auto before = primitive.positions;
-  for (std::size_t t = 0; t < std::min(pose.weights.size(), source.targets.size()); ++t) {
-    if (pose.weights[t] == 0.0) continue;
+  for (std::size_t t = 0; t < std::min(weights.size(), source.targets.size()); ++t) {
+    if (weights[t] == 0.0) continue;
     for (const auto& [name, accessor] : source.targets[t]) {
       if (name != "POSITION" && name != "NORMAL") continue;
       const auto where = pointer + "/targets/" + std::to_string(t) + "/" + name;
-      auto ok = addTarget(static_cast<std::size_t>(accessor), pose.weights[t], where, primitive, name == "NORMAL");
+      auto ok = addTarget(static_cast<std::size_t>(accessor), weights[t], where, primitive, name == "NORMAL");
       if (!ok) return ok;
     }
     const auto where = pointer + "/targets/" + std::to_string(t);

@@ -8,6 +8,7 @@
 #include "server/scene/import_context.h"
 #include "server/scene/import_instancing.h"
 #include "server/scene/lightmap.h"
+#include "server/scene/lit_glb_dangling.h"
 #include "server/scene/lit_glb_mesh.h"
 #include "server/scene/lit_glb_rules.h"
 
@@ -246,6 +247,7 @@ Result<Document> withLightmapUvs(const Document& document, const Scene& scene, c
   if (!model) return tl::unexpected(model.error());
   Document out = document;
   out.imported.reset();
+  dropDanglingTextures(out.gltf);
   freeTexcoord1(out.gltf);
   dropOldPages(out.gltf);
   dropIdleCutoffs(out.gltf);

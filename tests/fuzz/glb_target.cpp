@@ -23,7 +23,10 @@ std::vector<Seed> seeds() {
   return {
       test_scenes::encodeGlb(test_scenes::lumpedCube(0.5)), test_scenes::encodeGlb(test_scenes::cornell()),
       seedOf(
-          R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"accessors":[{"bufferView":0,"count":3,"componentType":5126,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}],"bufferViews":[{"buffer":0,"byteLength":36}],"buffers":[{"byteLength":36,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]})")};
+          R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"accessors":[{"bufferView":0,"count":3,"componentType":5126,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}],"bufferViews":[{"buffer":0,"byteLength":36}],"buffers":[{"byteLength":36,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]})"),
+      // The same in a pose, of a material of textures that are not there.
+      seedOf(
+          R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0,1]}],"nodes":[{"mesh":0,"skin":0,"weights":[0.5]},{"translation":[0,1,0]}],"skins":[{"joints":[1,0]}],"meshes":[{"weights":[1],"primitives":[{"material":0,"attributes":{"POSITION":0,"NORMAL":0,"JOINTS_0":1,"WEIGHTS_0":2},"targets":[{"POSITION":0,"NORMAL":0}]}]}],"materials":[{"alphaMode":"MASK","pbrMetallicRoughness":{"metallicRoughnessTexture":{"index":0}},"extensions":{"KHR_materials_pbrSpecularGlossiness":{"specularFactor":[0,0.5,0],"diffuseTexture":{"index":0}}}}],"textures":[{"source":0,"sampler":0}],"samplers":[{"magFilter":9728}],"accessors":[{"bufferView":0,"count":3,"componentType":5126,"type":"VEC3","min":[0,0,0],"max":[1,1,0]},{"count":3,"componentType":5121,"type":"VEC4"},{"bufferView":0,"count":3,"componentType":5126,"type":"VEC4","sparse":{"count":1,"indices":{"bufferView":1,"componentType":5121},"values":{"bufferView":0}}}],"bufferViews":[{"buffer":0,"byteLength":48},{"buffer":0,"byteLength":1}],"buffers":[{"byteLength":48,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAAAAAAAAIA/"}]})")};
 }
 
 }  // namespace radiosity::fuzz
