@@ -1,5 +1,5 @@
-// Writes a test scene as one GLB file: float positions and normals, flat where polygons have none of their own, one node,
-// mesh and material each.
+// Writes a test scene as one GLB file: float positions and normals, flat where polygons have none of their own, one
+// node, mesh and material each.
 #pragma once
 
 #include <cstdint>
