@@ -126,6 +126,19 @@ TEST(ShadedLeaves, TheSunCountsByTheCosineWithTheShadingNormal) {
   EXPECT_EQ(light(glm::vec3(-1.0F, 0.5F, 0.0F)), 0.0) << "behind the shading normal";
 }
 
+TEST(ShadedLeaves, APointCountsByTheCosineWithTheShadingNormal) {
+  LightSources lamp;
+  lamp.lights.push_back({.position = {0.2, 0.7, -0.1}, .intensity = glm::vec3(10.0F)});
+  const Solve solved(makeQuadScene({{{-0.5F, 0, -0.5F}, {0, 0, 1}, {1, 0, 0}, 8, 8}}), {{0.4F, 1.0F, -0.3F}}, 0.01,
+                     lamp);
+  const auto normal = glm::normalize(glm::dvec3(0.4, 1.0, -0.3));
+  for (const auto& [x, y] : {std::pair{0U, 0U}, {7U, 2U}, {4U, 4U}}) {
+    const auto way = glm::dvec3(0.2, 0.7, -0.1) - glm::dvec3((y + 0.5) / 8.0 - 0.5, 0.0, (x + 0.5) / 8.0 - 0.5);
+    const double exact = 10.0 * glm::dot(normal, way) / std::pow(glm::length(way), 3.0);
+    EXPECT_NEAR(solved.at(0, x, y), exact, 0.002 * exact);
+  }
+}
+
 /// All around is as bright as all else: of it so much as lies above both horizons arrives.
 TEST(ShadedLeaves, ReflectedLightCountsByTheCosineWithTheShadingNormal) {
   std::array<float, 6> shines{}, reflects{};
@@ -146,6 +159,21 @@ TEST(ShadedLeaves, ReflectedLightCountsByTheCosineWithTheShadingNormal) {
     EXPECT_NEAR(solved.mean(2), whole, 0.002 * whole);
     for (const std::size_t s : {0U, 1U, 3U, 4U, 5U}) EXPECT_NEAR(solved.mean(s), both * whole, 0.004 * whole) << tilt;
   }
+}
+
+/// Where there are no rays nodes count by some of their points, which near by are a coarse picture of them.
+TEST(ShadedLeaves, ReflectedLightOverLinksCountsByTheCosineWithTheShadingNormal) {
+  std::array<float, 6> shines{}, reflects{};
+  shines.fill(1.0F);
+  reflects.fill(0.5F);
+  const auto made = makeQuadScene(cubeQuads(6, shines, reflects));
+  std::vector<glm::vec3> normals(6, glm::vec3(0.0F));
+  const auto& frame = made.patches->triangles[made.patches->surfaces[0].first_triangle];
+  normals[0] =
+      glm::vec3(std::cos(0.5) * glm::dvec3(frame.normal) + std::sin(0.5) * glm::dvec3(glm::normalize(frame.du)));
+  const Solve solved(made, normals, 0.01, {}, test::overLinks());
+  EXPECT_EQ(solved.solver->gathered(), nullptr);
+  EXPECT_NEAR(solved.mean(0), 1.0 + std::cos(0.5), 0.03 * (1.0 + std::cos(0.5)));
 }
 
 /// A wall under a sky that shines above the horizon alone: the quarter of all directions that it sees is as far from
