@@ -47,9 +47,10 @@ std::uint32_t directionCell(const glm::vec3& direction) {
   return cell;
 }
 
-/// Where a ray meets the plane of a triangle, in double precision, and how far outside of the triangle.
+/// Where a ray meets the plane of a triangle, in double precision, how far outside of the triangle, and on which side.
 struct Meeting {
   double t, outside, tolerance;
+  bool front;
 };
 std::optional<Meeting> meet(const scene::Bvh::Triangle& triangle, const CastRay& ray) {
   const std::array<glm::dvec3, 3> c{glm::dvec3(triangle[0]), glm::dvec3(triangle[1]), glm::dvec3(triangle[2])};
@@ -59,7 +60,7 @@ std::optional<Meeting> meet(const scene::Bvh::Triangle& triangle, const CastRay&
   const glm::dvec3 normal = cross / area;
   const double slope = glm::dot(normal, way);
   if (slope == 0.0) return std::nullopt;
-  Meeting meeting{glm::dot(normal, c[0] - origin) / slope, -HUGE_VAL, 0.0};
+  Meeting meeting{glm::dot(normal, c[0] - origin) / slope, -HUGE_VAL, 0.0, slope < 0.0};
   const glm::dvec3 point = origin + meeting.t * way;
   double longest = 0.0, shortest = HUGE_VAL;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -81,6 +82,7 @@ bool isTrue(const std::vector<scene::Bvh::Triangle>& triangles, const CastRay& r
     if ((told & ~kFront) >= triangles.size()) return false;
     const auto meeting = meet(triangles[told & ~kFront], ray);
     if (!meeting || meeting->outside > meeting->tolerance || meeting->t < -meeting->tolerance) return false;
+    if (meeting->front != ((told & kFront) != 0)) return false;
     nearest = std::min(nearest, meeting->t);
     tolerance = meeting->tolerance;
   }

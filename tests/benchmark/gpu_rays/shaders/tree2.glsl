@@ -5,7 +5,8 @@ const float kMissed = 1e30;
 uint current;
 
 float entryOf(uvec4 low, uvec4 high) {
-  const vec3 one = (uintBitsToFloat(low.xyz) - origin) * inverse, other = (uintBitsToFloat(high.xyz) - origin) * inverse;
+  const vec3 one = (uintBitsToFloat(low.xyz) - origin) * inverse;
+  const vec3 other = (uintBitsToFloat(high.xyz) - origin) * inverse;
   const vec3 near = min(one, other), far = max(one, other);
   const float into = max(max(near.x, near.y), max(near.z, 0.0));
   const float out_of = min(min(far.x, far.y), min(far.z, reach));

@@ -1,7 +1,7 @@
 // Eight boxes a node in 80 bytes (Ylitie, Karras and Laine 2017, "Efficient incoherent ray traversal on GPUs through
 // compressed wide BVHs"): corner, exponents of the grid and which children are inner ones; first child, first triangle
-// and a byte for each child; grid planes, a byte each. A child's byte: empty 0; inner 1 in the upper three bits and 24 +
-// slot below; leaf, as many ones as it has triangles, and which is its first.
+// and a byte for each child; grid planes, a byte each. A child's byte: empty 0; inner 1 in the upper three bits and
+// 24 + slot below; leaf, as many ones as it has triangles, and which is its first.
 //
 // A group of nodes: first child; met ones in the upper eight bits in the order of the ray's octant, inner ones in the
 // lower eight. On the stack: such groups.
