@@ -184,7 +184,6 @@ class LitScene {
   [[nodiscard]] double emittedPower() const;
   [[nodiscard]] scene::Sky skyOf(const scene::Scene& scene) const;
   [[nodiscard]] solver::LightSources lightSources(const scene::Scene& scene) const;
-  [[nodiscard]] scene::Sky skyOf(const scene::Scene& scene) const { return lightSources(scene).sky; }
   [[nodiscard]] bool hasDoubleSided() const;
 
   scene::Document document_;

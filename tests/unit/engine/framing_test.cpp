@@ -52,9 +52,14 @@ void light(const scene::PatchScene& patches, const LightAt& light_at, std::vecto
       if (leaf.triangle == scene::kNone) continue;
       const auto& frame = patches.triangles[leaf.triangle];
       const glm::dvec3 at(frame.origin + leaf.texel.x * frame.du + leaf.texel.y * frame.dv);
-      const float value = light_at(at * patches.scale + patches.centre, glm::dvec3(frame.normal));
-      pages[surface.page].at(static_cast<int>(surface.page_x + i % surface.width),
-                             static_cast<int>(surface.page_y + i / surface.width)) = glm::vec3(value);
+      for (std::size_t side = 0; side < 2; ++side) {
+        if (surface.first_node[side] == scene::kNone) continue;
+        const auto& place = surface.place[side];
+        const float value =
+            light_at(at * patches.scale + patches.centre, glm::dvec3(side == 0 ? frame.normal : -frame.normal));
+        pages[place.page].at(static_cast<int>(place.x + i % surface.width),
+                             static_cast<int>(place.y + i / surface.width)) = glm::vec3(value);
+      }
     }
   }
 }
@@ -224,6 +229,16 @@ TEST(Dithered, LightBetweenTwoStepsIsThatInTheMeanAndOnAStepStaysThere) {
       }
     }
   }
+}
+
+TEST(Framing, AClosedRoomOfDoubleSidedWallsIsSeenFromInside) {
+  const glm::dvec3 low(0, 0, 0), high(5, 2.6, 4);
+  auto scene = boxScene(low, high, true);
+  scene.materials[0].double_sided = true;
+  const auto framed = frame(scene, 4.0 / 3.0, [&](const glm::dvec3& p, const glm::dvec3& normal) {
+    return glm::dot(normal, 0.5 * (low + high) - p) > 0.0 ? 300.0F : 0.0F;
+  });
+  EXPECT_TRUE(within(framed.eye, low, high));
 }
 
 }  // namespace
