@@ -121,6 +121,14 @@ struct TexelRect {
   std::uint32_t x = 0, y = 0, width = 0, height = 0;
 };
 
+std::uint32_t mostPageTexels(const ChartOptions& options) {
+  return std::clamp(options.max_page_size, 16U, 32768U) & ~3U;
+}
+std::uint32_t mostChartTexels(const ChartOptions& options) {
+  const auto page = mostPageTexels(options);
+  return page - std::min(options.gutter, page / 2);
+}
+
 /// Which texels of a page are taken.
 class PageSpace {
  public:
@@ -162,10 +170,14 @@ class LayoutMaker {
  public:
   LayoutMaker(const Scene& scene, const std::vector<Chart>& charts, double texel, const ChartOptions& options,
               const FormerPlaces& former)
-      : scene_(scene), charts_(charts), former_(former), texel_(texel), gutter_(options.gutter) {
-    max_page_ = std::clamp(options.max_page_size, 16U, 32768U) & ~3U;
-    max_chart_ = max_page_ - std::min(gutter_, max_page_ / 2);
-  }
+      : scene_(scene),
+        charts_(charts),
+        former_(former),
+        options_(options),
+        texel_(texel),
+        gutter_(options.gutter),
+        max_page_(mostPageTexels(options)),
+        max_chart_(mostChartTexels(options)) {}
 
   Result<Atlas> make() {
     atlas_.grids.resize(charts_.size());
@@ -245,12 +257,9 @@ class LayoutMaker {
       all.add(charts_[end]);
       block.charts.push_back(end);
     }
-    double resolution = 1.0 / (texelOf(charts_[first]) * density);  // texels a unit of UV
-    const glm::dvec2 extent = all.high - all.low;
-    if (std::max(extent.x, extent.y) * resolution > max_chart_ - 1.0) {
-      noteClamped(first);
-      resolution = (max_chart_ - 1.0) / std::max(extent.x, extent.y);
-    }
+    const double texel = texelOf(charts_[first]);
+    const double resolution = uvResolution(all.high - all.low, texel, density, options_);
+    if (resolution < 1.0 / (texel * density)) noteClamped(first);
     const glm::dvec2 origin = glm::floor(all.low * resolution + 1e-6);
     for (std::uint32_t c = first; c < end; ++c) {
       Bounds bounds;
@@ -420,6 +429,7 @@ class LayoutMaker {
   const Scene& scene_;
   const std::vector<Chart>& charts_;
   const FormerPlaces& former_;
+  const ChartOptions& options_;
   double texel_;
   std::uint32_t gutter_, max_page_, max_chart_;
   Atlas atlas_;
@@ -451,6 +461,10 @@ double texelSizeFor(const std::vector<Chart>& charts, std::uint64_t texel_budget
     (leavesAt(middle) > budget ? fine : coarse) = middle;
   }
   return std::abs(leavesAt(fine) - budget) < std::abs(leavesAt(coarse) - budget) ? fine : coarse;
+}
+
+double uvResolution(const glm::dvec2& extent, double texel, double density, const ChartOptions& options) {
+  return std::min(1.0 / (texel * density), (mostChartTexels(options) - 1.0) / std::max(extent.x, extent.y));
 }
 
 Result<Atlas> layOut(const Scene& scene, const std::vector<Chart>& charts, double texel_size,

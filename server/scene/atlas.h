@@ -37,6 +37,10 @@ struct FormerPlaces {
 /// The texel edge (unit box) at which about `texel_budget` leaves are covered.
 [[nodiscard]] double texelSizeFor(const std::vector<Chart>& charts, std::uint64_t texel_budget);
 
+/// Texels a unit of UV that a file's own layout of this extent gets. `texel`: of its instance, unit box; `density`: UV
+/// lengths a unit-box length.
+[[nodiscard]] double uvResolution(const glm::dvec2& extent, double texel, double density, const ChartOptions& options);
+
 /// Grids for texels of about `texel_size`, packed with `options.gutter` empty texels between. Charts whose
 /// grid is as it was keep their places, as long as half of the pages is in use. Charts that would not fit
 /// a page get coarser texels, with a warning. kTooLarge: more than kMaxPages pages or mostLeaves()

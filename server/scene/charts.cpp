@@ -51,6 +51,7 @@ class Builder {
     patches_.triangles_dropped = flat_.dropped;
     patches_.warnings = flat_.warnings;
     neighbours_ = edgeNeighbours(flat_);
+    checkOwnLayouts();
     makeCharts();
     patches_.texel = texelSize();
     if (former_ != nullptr && options_.texel_size_m <= 0.0) {
@@ -102,18 +103,60 @@ class Builder {
   }
 
  private:
+  /// Whether an instance's TEXCOORD_1 may be its layout, as far as it says itself.
+  void checkOwnLayouts() {
+    own_layout_.assign(scene_.instances.size(), false);
+    for (std::uint32_t i = 0; i < scene_.instances.size(); ++i) {
+      if (flat_.first_triangle[i] == flat_.first_triangle[i + 1]) continue;
+      if (scene_.primitives[scene_.instances[i].primitive].texcoord1.empty()) continue;
+      const std::string fault = lightmapUvFault(scene_, flat_, i);
+      own_layout_[i] = fault.empty();
+      if (!fault.empty())
+        patches_.warnings.push_back(fmt::format("{}: TEXCOORD_1 is no lightmap layout ({}); charts were made instead",
+                                                describeInstance(scene_, i), fault));
+    }
+  }
+
+  /// Charts of our own change the size of texels a little, and with it how far lookups reach: until none bleeds.
   void makeCharts() {
+    constexpr int kMostRounds = 8;
+    std::vector<std::uint32_t> replaced;
+    for (int round = 1;; ++round) {
+      chartAll();
+      auto bleeding = round < kMostRounds ? bleedingNow() : allOwnLayouts();
+      if (bleeding.empty()) break;
+      for (const auto instance : bleeding) own_layout_[instance] = false;
+      replaced.insert(replaced.end(), bleeding.begin(), bleeding.end());
+    }
+    if (replaced.empty()) return;
+    const auto others = replaced.size() - 1;
+    patches_.warnings.push_back(
+        fmt::format("{}{}: islands of TEXCOORD_1 are so close that light would bleed between them at these texels; "
+                    "charts were made "
+                    "instead",
+                    describeInstance(scene_, *std::ranges::min_element(replaced)),
+                    others == 0 ? "" : fmt::format(" and {} other{}", others, others == 1 ? "" : "s")));
+  }
+
+  [[nodiscard]] std::vector<std::uint32_t> allOwnLayouts() const {
+    std::vector<std::uint32_t> all;
+    for (std::uint32_t i = 0; i < own_layout_.size(); ++i)
+      if (own_layout_[i]) all.push_back(i);
+    return all;
+  }
+
+  [[nodiscard]] std::vector<std::uint32_t> bleedingNow() const {
+    if (allOwnLayouts().empty()) return {};
+    const bool keeps_texel = former_ != nullptr && options_.texel_size_m <= 0.0;
+    return bleedingLayouts(scene_, flat_, charts_, keeps_texel ? former_->patches.texel : texelSize(), options_);
+  }
+
+  void chartAll() {
     std::vector<bool> own(flat_.triangles.size(), true);
     std::vector<Chart> from_file;
     for (std::uint32_t i = 0; i < scene_.instances.size(); ++i) {
-      const std::uint32_t first = flat_.first_triangle[i], end = flat_.first_triangle[i + 1];
-      if (first == end || scene_.primitives[scene_.instances[i].primitive].texcoord1.empty()) continue;
-      if (const std::string fault = lightmapUvFault(scene_, flat_, i); !fault.empty()) {
-        patches_.warnings.push_back(fmt::format("{}: TEXCOORD_1 is no lightmap layout ({}); charts were made instead",
-                                                describeInstance(scene_, i), fault));
-        continue;
-      }
-      std::fill(own.begin() + first, own.begin() + end, false);
+      if (!own_layout_[i]) continue;
+      std::fill(own.begin() + flat_.first_triangle[i], own.begin() + flat_.first_triangle[i + 1], false);
       for (Chart& chart : uvCharts(scene_, flat_, neighbours_, i)) from_file.push_back(std::move(chart));
     }
     const Facets facets = findFacets(flat_, neighbours_, own);
@@ -303,6 +346,7 @@ class Builder {
   std::vector<std::uint32_t> surface_before_;  ///< after an edit, as of matchSurfaces()
   FlatScene flat_;
   std::vector<std::uint32_t> neighbours_;
+  std::vector<bool> own_layout_;  ///< by instance: TEXCOORD_1 is its layout
   std::vector<Chart> charts_;
   Atlas atlas_;
   std::vector<std::uint32_t> sources_;  ///< flat triangle of each patch triangle

@@ -5,6 +5,7 @@
 //                  charts_facets.cpp   coplanar connected triangles = facets ("polygons"); large ones are charts
 //                  charts_curved.cpp   small facets grown into curved charts by normal spread
 //                  charts_uv.cpp       the file's own TEXCOORD_1 where it is a valid lightmap layout
+//                  charts_uv_gutters.cpp  whether its islands keep apart
 //                  charts_fit.cpp      plane maps, minimum-area rectangles, no overlap inside a chart
 //                  charts_seams.cpp    edges shared by charts, for stitching
 //   atlas.h      texel size from the budget, grid of each chart, packing into pages
@@ -86,6 +87,13 @@ struct Facets {
 /// Islands of an instance's TEXCOORD_1.
 [[nodiscard]] std::vector<Chart> uvCharts(const Scene& scene, const FlatScene& flat,
                                           const std::vector<std::uint32_t>& neighbours, std::uint32_t instance);
+
+/// Instances whose TEXCOORD_1 has islands so close that bilinear lookups on one read texels of another, at the texels
+/// (of edge `texel`, unit box) that the layout will have. Islands that continue each other, in UV as in space, may
+/// meet.
+[[nodiscard]] std::vector<std::uint32_t> bleedingLayouts(const Scene& scene, const FlatScene& flat,
+                                                         const std::vector<Chart>& charts, double texel,
+                                                         const ChartOptions& options);
 
 /// Fills patches.seams. `sources`: flat triangle of each patch triangle. Edges are matched by position, so also between
 /// instances (tiles of a floor), where the angle between the faces is below `smooth_deg`.
