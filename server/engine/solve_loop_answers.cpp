@@ -58,9 +58,11 @@ void SolveLoop::sceneGlb(std::optional<std::uint64_t> layout, Callback<SharedByt
 }
 
 Result<SharedBytes> SolveLoop::makeUnlit() {
-  // One exposure for all pages, from the radiance that the eye would see.
+  // What the eye would see: colours and lamps are on the pages, since the materials that showed them are gone. One
+  // exposure for all pages.
   std::vector<Image> display;
-  for (const auto& page : lit_->pages()) display.push_back(page.irradiance);
+  auto radiosity = makePages(*lit_, Quantity::kRadiosity);
+  for (auto& page : radiosity.values) display.push_back(std::move(page.irradiance));
   for (auto& image : display) {
     for (auto& pixel : image.pixels) pixel *= static_cast<float>(1.0 / 3.14159265358979);
   }

@@ -37,7 +37,8 @@ enum class Seams { kStitched, kLeft };
 [[nodiscard]] Result<Document> withLightmapUvs(const Document& document, const Scene& scene, const PatchScene& patches);
 
 /// A GLB for any glTF viewer: withLightmapUvs plus KHR_materials_unlit materials whose base colour texture is the
-/// tone-mapped result (one PNG a page, `display` in [0, 1] already encoded as sRGB by the caller).
+/// tone-mapped result (one PNG a page, `display` in [0, 1] already encoded as sRGB by the caller), with alpha where one
+/// can see through what lies on the page: MASK and BLEND stay what they are.
 [[nodiscard]] Result<Bytes> writeUnlitGlb(const Document& document, const Scene& scene, const PatchScene& patches,
                                           std::span<const Image> display_pages);
 

@@ -9,6 +9,7 @@
 #include "server/scene/import_instancing.h"
 #include "server/scene/lightmap.h"
 #include "server/scene/lit_glb_mesh.h"
+#include "server/scene/lit_glb_rules.h"
 
 namespace radiosity::scene {
 namespace {
@@ -109,6 +110,7 @@ class Exporter {
       i = end;
     }
     auto bytes = builder_.takeBytes();
+    if (auto filled = fillTexcoordGaps(out_.gltf, document_.buffers.size(), bytes); !filled) return filled;
     if (!bytes.empty()) {
       out_.gltf["buffers"].push_back({{"byteLength", bytes.size()}});
       out_.buffers.push_back(std::make_shared<const Bytes>(std::move(bytes)));
@@ -202,6 +204,8 @@ Result<Document> withLightmapUvs(const Document& document, const Scene& scene, c
   out.imported.reset();
   freeTexcoord1(out.gltf);
   dropOldPages(out.gltf);
+  dropIdleCutoffs(out.gltf);
+  separateCones(out.gltf);
   if (auto ok = Exporter(document, *model, out).run(placements(scene, patches)); !ok) return tl::unexpected(ok.error());
   return out;
 }

@@ -1,14 +1,14 @@
 // writeUnlitGlb: the lit scene as pictures on unlit materials, for viewers that know nothing of lightmaps.
-#include <stb_image_write.h>
-
-#include <algorithm>
-#include <cmath>
 #include <map>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "common/check.h"
 #include "server/scene/json_text.h"
 #include "server/scene/lightmap.h"
+#include "server/scene/lit_glb_picture.h"
+#include "server/scene/opacity.h"
 
 namespace radiosity::scene {
 namespace {
@@ -17,39 +17,34 @@ constexpr const char* kUnlit = "KHR_materials_unlit";
 constexpr int kLinear = 9729;
 constexpr int kClampToEdge = 33071;
 
-Bytes encodePng(const Image& image) {
-  std::vector<std::uint8_t> rgb;
-  rgb.reserve(image.pixels.size() * 3);
-  for (const auto& pixel : image.pixels) {
-    for (int c = 0; c < 3; ++c) {
-      const auto value = std::isfinite(pixel[c]) ? std::clamp(pixel[c], 0.0F, 1.0F) : 0.0F;
-      rgb.push_back(static_cast<std::uint8_t>(std::lround(value * 255.0F)));
-    }
-  }
-  Bytes png;
-  const auto write = [](void* context, void* data, int size) {
-    auto& out = *static_cast<Bytes*>(context);
-    const auto* bytes = static_cast<const std::uint8_t*>(data);
-    out.insert(out.end(), bytes, bytes + size);
-  };
-  stbi_write_png_to_func(write, &png, image.width, image.height, 3, rgb.data(), image.width * 3);
-  return png;
-}
-
-/// An unlit stand-in for `material` that shows a page. What lets light through stays see-through.
+/// An unlit stand-in for `material` that shows a page. The page's alpha is what the surface stops of the light, so
+/// there is nothing left to multiply it with. Of a cell that MASK cuts out in part the page has the part that stays.
 Json unlitMaterial(const Scene& scene, std::size_t material, std::uint32_t page) {
   const Material& source = scene.materials[material];
-  const float alpha = source.alpha_mode == AlphaMode::kBlend ? source.alpha : 1.0F;
-  const float opacity = alpha * (1.0F - source.transmission);
   Json out = {{"name", source.name + " lit " + std::to_string(page)}, {"doubleSided", source.double_sided}};
-  out["pbrMetallicRoughness"] = {{"baseColorFactor", {1.0, 1.0, 1.0, opacity}}, {"metallicFactor", 0.0}};
+  out["pbrMetallicRoughness"] = {{"baseColorFactor", {1.0, 1.0, 1.0, 1.0}}, {"metallicFactor", 0.0}};
   out["pbrMetallicRoughness"]["baseColorTexture"] = {{"index", page}, {"texCoord", 1}};
-  out["alphaMode"] = opacity < 1.0F ? "BLEND" : "OPAQUE";
+  const bool cut_out = source.alpha_mode == AlphaMode::kMask && source.transmission <= 0.0F;
+  out["alphaMode"] = cut_out ? "MASK" : isSeeThrough(source) ? "BLEND" : "OPAQUE";
+  if (cut_out) out["alphaCutoff"] = 0.5;
   out["extensions"][kUnlit] = Json::object();
   return out;
 }
 
-void setPages(Document& out, std::span<const Image> pages) {
+/// Vertex colours multiply the page, which has them already.
+void dropColours(Json& primitive) {
+  const auto drop = [](Json& attributes) {
+    std::vector<std::string> names;
+    for (const auto& [name, accessor] : attributes.items())
+      if (name.rfind("COLOR_", 0) == 0) names.push_back(name);
+    for (const auto& name : names) attributes.erase(name);
+  };
+  drop(primitive["attributes"]);
+  if (!primitive.contains("targets")) return;
+  for (auto& target : primitive["targets"]) drop(target);
+}
+
+void setPages(Document& out, const PatchScene& patches, std::span<const Image> pages) {
   auto& gltf = out.gltf;
   for (const auto* list : {"materials", "textures", "images", "samplers"}) gltf.erase(list);
   out.images.clear();
@@ -57,7 +52,8 @@ void setPages(Document& out, std::span<const Image> pages) {
   gltf["samplers"] =
       Json::array({{{"magFilter", kLinear}, {"minFilter", kLinear}, {"wrapS", kClampToEdge}, {"wrapT", kClampToEdge}}});
   for (std::size_t i = 0; i < pages.size(); ++i) {
-    out.images.push_back(std::make_shared<const Bytes>(encodePng(pages[i])));
+    out.images.push_back(
+        std::make_shared<const Bytes>(encodePagePng(patches, static_cast<std::uint32_t>(i), pages[i])));
     gltf["images"].push_back({{"name", "lightmap " + std::to_string(i)}, {"mimeType", "image/png"}});
     gltf["textures"].push_back({{"source", i}, {"sampler", 0}});
   }
@@ -82,7 +78,7 @@ Result<Bytes> writeUnlitGlb(const Document& document, const Scene& scene, const 
   RAD_CHECK_EQ(display_pages.size(), patches.pages.size());
   auto lit = withLightmapUvs(document, scene, patches);
   if (!lit) return tl::unexpected(lit.error());
-  setPages(*lit, display_pages);
+  setPages(*lit, patches, display_pages);
   auto& gltf = lit->gltf;
   std::map<std::pair<std::size_t, std::uint32_t>, std::size_t> materials;
   if (!gltf.contains("meshes")) return writeGlb(*lit);
@@ -98,6 +94,7 @@ Result<Bytes> writeUnlitGlb(const Document& document, const Scene& scene, const 
       const auto [found, added] = materials.try_emplace({material, page}, materials.size());
       if (added) gltf["materials"].push_back(unlitMaterial(scene, material, page));
       primitive["material"] = found->second;
+      dropColours(primitive);
     }
   }
   dropMaterialExtensions(gltf, "extensionsUsed");

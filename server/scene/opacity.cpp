@@ -140,7 +140,8 @@ class SurfaceOpacity {
     float alpha = material_.alpha;
     if (texture_) alpha *= texture_->at(uv.at(p));
     if (!primitive_.color0.empty()) {
-      const glm::vec3 w = glm::clamp(c.weightsAt(p), 0.0F, 1.0F);
+      glm::vec3 w = glm::clamp(c.weightsAt(p), 0.0F, 1.0F);
+      w /= w.x + w.y + w.z;  // beyond an edge the rest would be more than all
       const auto& color = primitive_.color0;
       alpha *= color[c.vertex[0]].a * w[0] + color[c.vertex[1]].a * w[1] + color[c.vertex[2]].a * w[2];
     }

@@ -5,8 +5,11 @@
 #include <filesystem>
 #include <glm/common.hpp>
 #include <set>
+#include <string>
+#include <vector>
 
 #include "server/scene/lightmap.h"
+#include "server/scene/lit_glb_rules.h"
 #include "tests/unit/scene/gltf_builder.h"
 
 namespace radiosity::scene {
@@ -246,6 +249,142 @@ TEST(LitGlb, unlitShowsThePages) {
   const auto& texture = shown->textures.at(material.base_color_texture.texture);
   EXPECT_EQ(texture.rgba[0], 255);
   EXPECT_EQ(texture.rgba[2], 128);
+}
+
+TEST(LitGlb, texcoordsHaveNoGapsAndTheirZerosAreSharedByAll) {
+  GltfBuilder builder;
+  for (int i = 0; i < 3; ++i) builder.node({{"mesh", builder.square()}});
+  const auto lit = roundTrip(*builder.document(), 1);
+  std::set<std::size_t> views;
+  for (const auto& mesh : lit.gltf["meshes"]) {
+    const auto& attributes = mesh["primitives"][0]["attributes"];
+    ASSERT_TRUE(attributes.contains("TEXCOORD_0") && attributes.contains("TEXCOORD_1"));
+    const auto& zeros = lit.gltf["accessors"][attributes["TEXCOORD_0"].get<std::size_t>()];
+    EXPECT_EQ(zeros["count"], 6);
+    views.insert(zeros["bufferView"].get<std::size_t>());
+  }
+  EXPECT_EQ(views.size(), 1U);
+  const auto scene = importScene(lit).value();
+  EXPECT_THAT(scene.primitives.at(0).texcoord0, testing::Each(glm::vec2(0.0F)));
+}
+
+TEST(LitGlb, aSetThatMovedLeavesNoGapInOtherMeshes) {
+  GltfBuilder builder;
+  for (int i = 0; i < 2; ++i) {
+    const auto mesh = builder.square();
+    auto& primitive = builder.gltf["meshes"][mesh]["primitives"][0];
+    for (const auto* name : {"TEXCOORD_0", "TEXCOORD_1", "TEXCOORD_2"}) {
+      if (i == 0 && std::string(name) == "TEXCOORD_2") continue;
+      primitive["attributes"][name] = builder.vec2({0, 0, 1, 0, 1, 1, 0, 1});
+    }
+    primitive["material"] = 0;
+    builder.node({{"mesh", mesh}});
+  }
+  builder.gltf["textures"] = Json::array({Json::object()});
+  builder.gltf["materials"] = Json::array({{{"emissiveTexture", {{"index", 0}, {"texCoord", 1}}}}});
+  const auto lit = roundTrip(*builder.document(), 1);
+  EXPECT_EQ(lit.gltf["materials"][0]["emissiveTexture"]["texCoord"], 3);
+  for (const auto& mesh : lit.gltf["meshes"])
+    for (const auto* name : {"TEXCOORD_0", "TEXCOORD_1", "TEXCOORD_2", "TEXCOORD_3"})
+      EXPECT_TRUE(mesh["primitives"][0]["attributes"].contains(name)) << name;
+}
+
+TEST(LitGlb, aCutoffStaysBesideMaskAlone) {
+  GltfBuilder builder;
+  builder.node({{"mesh", builder.square()}});
+  builder.gltf["materials"] =
+      Json::array({{{"name", "wall"}}, {{"alphaMode", "BLEND"}}, {{"alphaMode", "MASK"}, {"alphaCutoff", 0.25}}});
+  const auto document = *builder.document();
+  const auto scene = importScene(document).value();
+  const auto lit =
+      withLightmapUvs(document, scene, patchesFor(scene, 1)).value();  // not read again: that adds defaults
+  EXPECT_FALSE(lit.gltf["materials"][0].contains("alphaCutoff"));
+  EXPECT_FALSE(lit.gltf["materials"][1].contains("alphaCutoff"));
+  EXPECT_EQ(lit.gltf["materials"][2]["alphaCutoff"], 0.25);
+}
+
+TEST(LitGlb, conesOfASpotAreApartInWhatIsWritten) {
+  auto gltf = R"({"extensions":{"KHR_lights_punctual":{"lights":[
+      {"type":"spot","spot":{"innerConeAngle":0.5,"outerConeAngle":0.5}},
+      {"type":"spot","spot":{"innerConeAngle":0.2,"outerConeAngle":0.5}},
+      {"type":"spot","spot":{"innerConeAngle":1}},
+      {"type":"point"}]}}})"_json;
+  separateCones(gltf);
+  const auto& lights = gltf["extensions"]["KHR_lights_punctual"]["lights"];
+  EXPECT_LT(lights[0]["spot"]["innerConeAngle"].get<double>(), 0.5);
+  EXPECT_NEAR(lights[0]["spot"]["innerConeAngle"].get<double>(), 0.5, 1e-6);
+  EXPECT_EQ(lights[1]["spot"]["innerConeAngle"], 0.2);
+  EXPECT_LT(lights[2]["spot"]["innerConeAngle"].get<double>(), 0.7853981634);  // the outer's default
+  EXPECT_FALSE(lights[3].contains("spot"));
+}
+
+/// A square of 4 x 4 texels whose alpha is 1 left of 3/8, and 0 right of it: within the second column.
+struct CutSquare {
+  Document document;
+  Scene scene;
+  PatchScene patches;
+
+  explicit CutSquare(AlphaMode mode) {
+    GltfBuilder builder;
+    const auto mesh = builder.square();
+    auto& attributes = builder.gltf["meshes"][mesh]["primitives"][0]["attributes"];
+    attributes["TEXCOORD_0"] = builder.vec2({0, 0, 1, 0, 1, 1, 0, 1});
+    attributes["COLOR_0"] = builder.accessor<float>(std::vector<float>(12, 0.5F), 5126, "VEC3", 3);
+    builder.gltf["materials"] = Json::array({{{"name", "leaf"}}});
+    builder.gltf["meshes"][mesh]["primitives"][0]["material"] = 0;
+    builder.node({{"mesh", mesh}});
+    document = *builder.document();
+    scene = importScene(document).value();
+    Texture texture{8, 1, true, {}};
+    for (int x = 0; x < 8; ++x)
+      texture.rgba.insert(texture.rgba.end(), {9, 9, 9, x < 3 ? std::uint8_t{255} : std::uint8_t{0}});
+    scene.textures.push_back(std::move(texture));
+    auto& material = scene.materials[0];
+    material.alpha_mode = mode;
+    material.base_color_texture = {.texture = 0, .repeat_u = false, .repeat_v = false};
+    patches = buildPatchScene(scene, {.texel_budget = 16}).value();
+  }
+
+  [[nodiscard]] Scene unlit() const {
+    const Image page(static_cast<int>(patches.pages.at(0).width), static_cast<int>(patches.pages.at(0).height),
+                     glm::vec3(0.25F, 0.5F, 1.0F));
+    const auto glb = writeUnlitGlb(document, scene, patches, std::vector<Image>{page});
+    return importScene(parseDocument("unlit.glb", glb.value()).value()).value();
+  }
+
+  /// The unlit picture's pixel at a place of the square.
+  [[nodiscard]] glm::ivec4 pixelAt(const Scene& unlit, const glm::vec2& place) const {
+    const auto& texture = unlit.textures.at(unlit.materials.at(0).base_color_texture.texture);
+    const auto& uv = patches.instance_uvs[0].corners[0];
+    const auto at =
+        (uv[0] + (uv[1] - uv[0]) * place.x + (uv[2] - uv[1]) * place.y) * glm::vec2(texture.width, texture.height);
+    const auto* rgba =
+        &texture.rgba[4 * static_cast<std::size_t>(static_cast<int>(at.y) * texture.width + static_cast<int>(at.x))];
+    return {rgba[0], rgba[1], rgba[2], rgba[3]};
+  }
+};
+
+TEST(LitGlb, unlitCutsOutWhatMaskCutsOutFinerThanItsTexels) {
+  const CutSquare square(AlphaMode::kMask);
+  ASSERT_EQ(square.patches.surfaces.at(0).width, 4U);
+  const auto unlit = square.unlit();
+  EXPECT_EQ(unlit.materials.at(0).alpha_mode, AlphaMode::kMask);
+  EXPECT_EQ(square.pixelAt(unlit, {0.10F, 0.5F}), glm::ivec4(64, 128, 255, 255));
+  EXPECT_EQ(square.pixelAt(unlit, {0.30F, 0.5F}).a, 255);  // of one texel
+  EXPECT_EQ(square.pixelAt(unlit, {0.45F, 0.5F}).a, 0);
+  EXPECT_EQ(square.pixelAt(unlit, {0.90F, 0.5F}).a, 0);
+  EXPECT_TRUE(unlit.primitives.at(0).color0.empty());  // colours are on the page
+}
+
+TEST(LitGlb, unlitBlendsAsTheSurfaceDoes) {
+  CutSquare square(AlphaMode::kBlend);
+  square.scene.materials[0].base_color_texture = {};
+  square.scene.materials[0].alpha = 0.4F;
+  square.patches = buildPatchScene(square.scene, {.texel_budget = 16}).value();
+  const auto unlit = square.unlit();
+  EXPECT_EQ(unlit.materials.at(0).alpha_mode, AlphaMode::kBlend);
+  EXPECT_EQ(unlit.materials.at(0).alpha, 1.0F);
+  EXPECT_EQ(square.pixelAt(unlit, {0.5F, 0.5F}).a, 102);
 }
 
 }  // namespace
