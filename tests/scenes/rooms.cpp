@@ -70,6 +70,31 @@ TestScene smallRoom() {
   return scene;
 }
 
+TestScene doubleRoom() {
+  auto scene = smallRoom();
+  scene.name = "room_double";
+  for (auto& material : scene.materials) material.double_sided = material.emission_nits == glm::dvec3(0.0);
+  return scene;
+}
+
+TestScene lightsRoom() {
+  auto scene = smallRoom();
+  scene.name = "room_lights";
+  for (auto& material : scene.materials) material.emission_nits = glm::dvec3(0.0);
+  Light bulb;
+  bulb.position = {-1.6, 1.9, 0.9};
+  bulb.intensity = {60.0, 50.0, 40.0};
+  Light spot;
+  spot.kind = Light::Kind::kSpot;
+  spot.position = {1.2, 2.3, -0.6};
+  spot.target = {0.4, 0.0, -1.2};
+  spot.intensity = glm::dvec3(200.0);
+  spot.inner_cone_rad = 0.3;
+  spot.outer_cone_rad = 0.7;
+  scene.lights = {bulb, spot};
+  return scene;
+}
+
 TestScene seminarRoom() {
   TestScene scene;
   scene.name = "room_seminar";
@@ -121,6 +146,8 @@ std::vector<std::pair<std::string, std::function<TestScene()>>> allScenes() {
              return concentricSpheres({0.5, 0.5, 1.0}, {1.0, 0.6, 0.0});
            }},
           {"room_small", smallRoom},
+          {"room_double", doubleRoom},
+          {"room_lights", lightsRoom},
           {"room_seminar", seminarRoom}};
 }
 
