@@ -20,6 +20,7 @@
 
 #include "tests/oracle/embree_ray.h"
 #include "tests/oracle/path_tracer.h"
+#include "tests/oracle/shading.h"
 #include "tests/oracle/triangle_scene.h"
 
 namespace radiosity::oracle {
@@ -39,18 +40,6 @@ struct Seen {
   double u = 0.0, v = 0.0;  ///< weights of its second and third corner
   bool back = false;
 };
-
-glm::dvec3 reflectanceAt(const TriangleScene& scene, const Triangle& triangle, const Seen& seen) {
-  if (triangle.texture < 0) return triangle.reflectance;
-  const auto& uv = triangle.texture_uv;
-  const auto& texture = scene.textures[static_cast<std::size_t>(triangle.texture)];
-  const auto place = uv[0] * (1.0 - seen.u - seen.v) + uv[1] * seen.u + uv[2] * seen.v;
-  return triangle.reflectance * glm::dvec3(texture.at(place));
-}
-
-glm::dvec3 emissionAt(const TriangleScene& /*scene*/, const Triangle& triangle, const Seen& /*seen*/) {
-  return triangle.emission_lux;
-}
 
 /// What the rays of a picture meet first.
 class FirstHits {
@@ -124,6 +113,7 @@ std::vector<float> trace(const TriangleScene& scene, const Options& options) {
   const glm::dvec3 eye(options.eye[0], options.eye[1], options.eye[2]);
   const auto rays = directions(options, eye, {options.at[0], options.at[1], options.at[2]});
   const FirstHits hits(scene);
+  const Shading shading(scene);
   std::vector<glm::dvec3> emitted(rays.size()), reflectance(rays.size(), glm::dvec3(0.0));
   std::vector<Footprint> footprints(rays.size());  // without pieces where nothing reflects
   for (std::size_t i = 0; i < rays.size(); ++i) {
@@ -133,11 +123,16 @@ std::vector<float> trace(const TriangleScene& scene, const Options& options) {
       continue;
     }
     const auto& triangle = scene.triangles[seen->triangle];
-    emitted[i] = emissionAt(scene, triangle, *seen);
-    reflectance[i] = reflectanceAt(scene, triangle, *seen);
+    // Of two-sided lamps both sides shine; the backs of others are not seen.
+    emitted[i] = shading.emission(triangle, seen->u, seen->v);
+    reflectance[i] = shading.reflectance(triangle, seen->u, seen->v);
     const auto& c = triangle.corners;
     const auto place = c[0] * (1.0 - seen->u - seen->v) + c[1] * seen->u + c[2] * seen->v;
-    footprints[i] = Footprint::at(place, seen->back ? -triangle.normal : triangle.normal);
+    const double side = seen->back ? -1.0 : 1.0;
+    footprints[i] = Footprint::at(place, side * triangle.normal);
+    const auto& n = triangle.shading;
+    const auto normal = n[0] * (1.0 - seen->u - seen->v) + n[1] * seen->u + n[2] * seen->v;
+    for (auto& piece : footprints[i].pieces) piece.shading.fill(side * normal);
   }
   const PathOptions how{.samples = options.paths, .seed = options.seed, .threads = 0, .leave_out_buried = false};
   const auto light = PathTracer(scene).irradiance(footprints, how);
