@@ -56,8 +56,8 @@ TEST(ChartsUv, IslandsThatTouchOrAreATexelApartAreChartedAnew) {
     EXPECT_FALSE(keepsItsLayout(patches)) << gap;
     ASSERT_EQ(patches.surfaces.size(), 2U);
     const auto &a = patches.surfaces[0], &b = patches.surfaces[1];
-    EXPECT_TRUE(a.page_x + a.width + 2 <= b.page_x || b.page_x + b.width + 2 <= a.page_x ||
-                a.page_y + a.height + 2 <= b.page_y || b.page_y + b.height + 2 <= a.page_y);
+    EXPECT_TRUE(a.place[0].x + a.width + 2 <= b.place[0].x || b.place[0].x + b.width + 2 <= a.place[0].x ||
+                a.place[0].y + a.height + 2 <= b.place[0].y || b.place[0].y + b.height + 2 <= a.place[0].y);
   }
 }
 
@@ -127,7 +127,7 @@ float mostInTheDark(const PatchScene& patches) {
   for (std::uint32_t leaf = 0; leaf < lit.width * lit.height; ++leaf)
     values[lit.first_node[0] + leaf] = glm::vec3(1.0F);
   const auto pages = assemblePages(patches, values);
-  const auto& uvs = patches.instance_uvs.at(0);
+  const auto& uvs = patches.instance_uvs.at(0).side[0];
   float most = 0.0F;
   for (std::size_t t = 0; t < 2; ++t)  // of the dark square
     for (int step = 0; step <= 40; ++step)
@@ -166,7 +166,7 @@ TEST(ChartsUv, AnEditKeepsWhatWasDecided) {
   EXPECT_EQ(before.warnings, after.warnings);
   ASSERT_EQ(before.surfaces.size(), after.surfaces.size());
   for (std::size_t i = 0; i < before.surfaces.size(); ++i)
-    EXPECT_EQ(before.surfaces[i].page_x, after.surfaces[i].page_x);
+    EXPECT_EQ(before.surfaces[i].place[0].x, after.surfaces[i].place[0].x);
 }
 
 }  // namespace

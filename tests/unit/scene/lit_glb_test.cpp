@@ -343,7 +343,7 @@ struct CutSquare {
     auto& material = scene.materials[0];
     material.alpha_mode = mode;
     material.base_color_texture = {.texture = 0, .repeat_u = false, .repeat_v = false};
-    patches = buildPatchScene(scene, {.texel_budget = 16}).value();
+    patches = buildPatchScene(scene, {.texel_budget = 16, .sky = {}}).value();
   }
 
   [[nodiscard]] Scene unlit() const {
@@ -356,7 +356,7 @@ struct CutSquare {
   /// The unlit picture's pixel at a place of the square.
   [[nodiscard]] glm::ivec4 pixelAt(const Scene& unlit, const glm::vec2& place) const {
     const auto& texture = unlit.textures.at(unlit.materials.at(0).base_color_texture.texture);
-    const auto& uv = patches.instance_uvs[0].corners[0];
+    const auto& uv = patches.instance_uvs[0].side[0].corners[0];
     const auto at =
         (uv[0] + (uv[1] - uv[0]) * place.x + (uv[2] - uv[1]) * place.y) * glm::vec2(texture.width, texture.height);
     const auto* rgba =
@@ -381,7 +381,7 @@ TEST(LitGlb, unlitBlendsAsTheSurfaceDoes) {
   CutSquare square(AlphaMode::kBlend);
   square.scene.materials[0].base_color_texture = {};
   square.scene.materials[0].alpha = 0.4F;
-  square.patches = buildPatchScene(square.scene, {.texel_budget = 16}).value();
+  square.patches = buildPatchScene(square.scene, {.texel_budget = 16, .sky = {}}).value();
   const auto unlit = square.unlit();
   EXPECT_EQ(unlit.materials.at(0).alpha_mode, AlphaMode::kBlend);
   EXPECT_EQ(unlit.materials.at(0).alpha, 1.0F);

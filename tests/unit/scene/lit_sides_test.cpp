@@ -200,8 +200,7 @@ Document squareBetweenLights(test::GltfBuilder& builder) {
   primitive["material"] = 0;
   builder.gltf["materials"] = json::array({{{"doubleSided", true}}});
   builder.gltf["extensionsUsed"] = json::array({"KHR_lights_punctual"});
-  builder.gltf["extensions"]["KHR_lights_punctual"]["lights"] =
-      json::array({{{"type", "point"}, {"intensity", 10.0}}});
+  builder.gltf["extensions"]["KHR_lights_punctual"]["lights"] = json::array({{{"type", "point"}, {"intensity", 10.0}}});
   builder.node({{"mesh", mesh}});
   for (const double z : {1.0, -1.0})
     builder.node({{"translation", {0.5, 0.5, z}}, {"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}});
