@@ -239,10 +239,10 @@ PatchScene patchesOf(const Scene& scene) {
   PatchScene patches;
   patches.pages.resize(1, {2, 2});
   for (const auto& instance : scene.instances) {
-    PatchScene::InstanceUv uv;
+    PatchScene::SideUv uv;
     uv.page.assign(scene.primitives[instance.primitive].indices.size() / 3, 0);
     uv.corners.assign(uv.page.size(), {glm::vec2(0), glm::vec2(1, 0), glm::vec2(0, 1)});
-    patches.instance_uvs.push_back(std::move(uv));
+    patches.instance_uvs.push_back({{std::move(uv), {}}});
   }
   return patches;
 }
