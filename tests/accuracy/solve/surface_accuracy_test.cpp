@@ -2,7 +2,9 @@
 // double-sided walls each by itself. Exit code 3 (time limit) is allowed: the claim is about the result.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <string>
 
 #include "tests/accuracy/compare.h"
 #include "tests/accuracy/reference_store.h"
@@ -17,7 +19,8 @@ class SolvedSurface : public testing::TestWithParam<const char*> {};
 
 fs::path fileOf(const std::string& name) {
   const auto built = fs::path(RADIOSITY_BINARY_DIR) / "scenes" / (name + ".glb");
-  return fs::exists(built) ? built : fs::path(RADIOSITY_SHARED_DIR) / "scenes" / (name + ".glb");
+  const auto shared = fs::path(RADIOSITY_SHARED_DIR), scene = shared / "scenes" / (name + ".glb");
+  return fs::exists(built) ? built : fs::exists(scene) ? scene : shared / "cases" / (name + ".glb");
 }
 
 TEST_P(SolvedSurface, IsAsBrightAsTheTruthAndDarkWhereItIsDark) {
@@ -48,6 +51,15 @@ INSTANTIATE_TEST_SUITE_P(Scenes, SolvedSurface,
                                          "cornell_measured_open", "cornell_measured_closed",
                                          "godot_living_room_panels"),
                          [](const auto& info) { return std::string(info.param); });
+
+INSTANTIATE_TEST_SUITE_P(Cases, SolvedSurface,
+                         testing::Values("sides-floor-double", "sides-room-double", "lamp-in-plane",
+                                         "metal-atlas-dielectric-half", "output-no-uv0", "uv1-islands-touch"),
+                         [](const auto& info) {
+                           std::string name = info.param;
+                           std::ranges::replace(name, '-', '_');
+                           return name;
+                         });
 
 }  // namespace
 }  // namespace radiosity::accuracy

@@ -147,6 +147,9 @@ it('the same room with double-sided walls and furniture', async () => expectTheS
 
 it('a room lit by a bulb and a spot light', async () => expectTheSame(await differenceOf('room_lights')));
 
+it('a ball and a barrel of few facets, smooth by their normals', async () =>
+  expectTheSame(await differenceOf('room_smooth')));
+
 it('a room with textures', async () => {
   const scene = join(out, 'room_textured.glb');
   withTexture(join(SCENES, 'room_small.glb'), scene, ['floor', 'red_wall']);
