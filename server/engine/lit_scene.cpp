@@ -296,6 +296,7 @@ bool LitScene::showDirectLight() {
 /// Goes on with what changed: materials_, or the sources of light that are no surfaces.
 void LitScene::updateSolver(bool materials, bool lights) {
   sources_ = lightSources(*scene_);
+  light_report_.forgetLost();
   const double power_before = std::exchange(power_, emittedPower());
   // Integers have a scale that was chosen for the power at the start. Far outside it they could overflow or lose the
   // small lights.

@@ -107,11 +107,15 @@ bool mayUncover(const scene::PatchScene& patches, const std::vector<std::uint32_
     return glm::all(glm::lessThanEqual(a.bounds_min, b.bounds_max + kMargin)) &&
            glm::all(glm::lessThanEqual(b.bounds_min, a.bounds_max + kMargin));
   };
+  std::vector<std::size_t> covered;
+  for (std::size_t s = 0; s < is_covered.size(); ++s)
+    if (is_covered[s]) covered.push_back(s);
+  if (covered.empty()) return false;
   for (std::size_t s = 0; s < patches.surfaces.size(); ++s) {
     const auto& surface = patches.surfaces[s];
     if (std::ranges::find(switched, surface.material) == switched.end()) continue;
-    for (std::size_t t = 0; t < patches.surfaces.size(); ++t) {
-      if (is_covered[t] && (s == t || meet(surface, patches.surfaces[t]))) return true;
+    for (const auto t : covered) {
+      if (s == t || meet(surface, patches.surfaces[t])) return true;
     }
   }
   return false;

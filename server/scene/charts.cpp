@@ -6,8 +6,6 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
-#include <glm/vector_relational.hpp>
-#include <numeric>
 #include <optional>
 #include <unordered_map>
 
@@ -156,7 +154,12 @@ class Builder {
   [[nodiscard]] std::vector<std::uint32_t> bleedingNow() const {
     if (allOwnLayouts().empty()) return {};
     const bool keeps_texel = former_ != nullptr && options_.texel_size_m <= 0.0;
-    return bleedingLayouts(scene_, flat_, charts_, keeps_texel ? former_->patches.texel : texelSize(), options_);
+    if (keeps_texel) return bleedingLayouts(scene_, flat_, charts_, former_->patches.texel, options_);
+    // Texels are widest where both sides of all that is double-sided turn out to be lit.
+    auto charts = charts_;
+    for (Chart& chart : charts) chart.back_lit = materialOf(scene_, chart.instance).double_sided;
+    const double texel = options_.texel_size_m > 0.0 ? texelSize() : texelSizeFor(charts, options_.texel_budget);
+    return bleedingLayouts(scene_, flat_, charts_, texel, options_);
   }
 
   void chartAll() {
@@ -185,12 +188,23 @@ class Builder {
     if (std::ranges::none_of(charts_, isDoubleSided)) return;
     std::vector<std::array<bool, 2>> asked;
     for (const Chart& chart : charts_) asked.push_back({isDoubleSided(chart), isDoubleSided(chart)});
-    const auto light = lightOnSides(sideScene(), asked);
+    const auto sides = sideScene();
+    const bool shines = sides.shines();
+    const auto light = lightOnSides(sides, asked);
+    const auto former = formerSurfaces();
     bool any_flipped = false;
     for (std::size_t c = 0; c < charts_.size(); ++c) {
       if (!asked[c][0]) continue;
       auto [front, back] = light[c];
-      if (back > front) {
+      bool turn = back > front;
+      if (former[c] != nullptr) {
+        // What had texels before an edit keeps them, so that an edit elsewhere, or without light, moves nothing here.
+        const auto [front_before, back_before] = lightBefore(*former[c]);
+        front = shines ? std::max(front, front_before) : front_before;
+        back = shines ? std::max(back, back_before) : back_before;
+        turn = back > front || (back == front && former[c]->flipped);
+      }
+      if (turn) {
         flip(charts_[c]);
         std::swap(front, back);
         any_flipped = true;
@@ -207,7 +221,7 @@ class Builder {
     SideScene sides;
     sides.lights = lightsInUnitBox(scene_, flat_.centre, flat_.scale);
     sides.sky = scene_.sky.value_or(options_.sky);
-    const auto part = connectedParts();
+    const Emitters emitters(scene_);
     const double texel = patches_.rough_texel;
     for (const Chart& chart : charts_) {
       const Material& material = materialOf(scene_, chart.instance);
@@ -215,33 +229,12 @@ class Builder {
       for (const auto t : chart.triangles) {
         auto& corners = sides.triangles.emplace_back();
         for (std::size_t k = 0; k < 3; ++k) corners[k] = glm::vec3(flat_.points[flat_.triangles[t].points[k]]);
+        sides.emits.push_back(emitters.shines(chart.instance, flat_.triangles[t].source));
       }
-      const bool emits = glm::any(glm::greaterThan(material.emission, glm::vec3(0.0F)));
-      const auto of = flat_.triangles[chart.triangles.front()].points[0];
-      sides.groups.push_back({first, static_cast<std::uint32_t>(chart.triangles.size()), part[of],
-                              material.double_sided, isSeeThrough(material), emits, chart.area / (texel * texel)});
+      sides.groups.push_back({first, static_cast<std::uint32_t>(chart.triangles.size()), chart.instance,
+                              material.double_sided, isSeeThrough(material), chart.area / (texel * texel)});
     }
     return sides;
-  }
-
-  /// By welded point: which of the pieces that hang together it is of, counted from 0.
-  [[nodiscard]] std::vector<std::uint32_t> connectedParts() const {
-    std::vector<std::uint32_t> above(flat_.points.size());
-    std::iota(above.begin(), above.end(), 0U);
-    const auto top = [&](std::uint32_t point) {
-      while (above[point] != point) point = above[point] = above[above[point]];
-      return point;
-    };
-    for (const FlatTriangle& triangle : flat_.triangles)
-      for (std::size_t k = 1; k < 3; ++k) above[top(triangle.points[k])] = top(triangle.points[0]);
-    std::vector<std::uint32_t> part(above.size(), kNone);
-    std::uint32_t parts = 0;
-    for (std::uint32_t point = 0; point < above.size(); ++point) {
-      auto& of_top = part[top(point)];
-      if (of_top == kNone) of_top = parts++;
-      part[point] = of_top;
-    }
-    return part;
   }
 
   void flip(Chart& chart) {
@@ -274,12 +267,11 @@ class Builder {
     return texelSizeFor(charts_, options_.texel_budget);
   }
 
-  /// Charts are known again by their instance, their order on it and the size of their grid.
-  [[nodiscard]] FormerPlaces formerPlaces() const {
-    FormerPlaces places;
-    if (former_ == nullptr) return places;
-    places.pages = former_->patches.pages;
-    places.black = former_->patches.black;
+  /// By chart: the surface that it was before an edit, or null. Charts are known again by their instance and their
+  /// order on it.
+  [[nodiscard]] std::vector<const Surface*> formerSurfaces() const {
+    std::vector<const Surface*> former(charts_.size(), nullptr);
+    if (former_ == nullptr) return former;
     std::vector<std::vector<std::uint32_t>> surfaces(former_->scene.instances.size());
     const auto& old_ones = former_->patches.surfaces;
     for (std::uint32_t s = 0; s < old_ones.size(); ++s) surfaces[old_ones[s].instance].push_back(s);
@@ -290,10 +282,28 @@ class Builder {
     for (std::size_t c = 0; c < charts_.size(); ++c) {
       const std::uint32_t instance = charts_[c].instance;
       order = c > 0 && charts_[c - 1].instance == instance ? order + 1 : 0;
-      places.of_chart.emplace_back();
       if (source[instance] == kNone || surfaces[source[instance]].size() != count[instance]) continue;
-      const Surface& old_one = old_ones[surfaces[source[instance]][order]];
-      places.of_chart.back() = {old_one.place, old_one.width, old_one.height};
+      former[c] = &old_ones[surfaces[source[instance]][order]];
+    }
+    return former;
+  }
+
+  /// Of the front and the back of the file's triangles.
+  [[nodiscard]] static std::array<SideLight, 2> lightBefore(const Surface& surface) {
+    std::array<SideLight, 2> light{SideLight::kLit, surface.shows_back ? SideLight::kDark : SideLight::kSealed};
+    if (surface.first_node[1] != kNone) light[1] = SideLight::kLit;
+    if (surface.flipped) std::swap(light[0], light[1]);
+    return light;
+  }
+
+  [[nodiscard]] FormerPlaces formerPlaces() const {
+    FormerPlaces places;
+    if (former_ == nullptr) return places;
+    places.pages = former_->patches.pages;
+    places.black = former_->patches.black;
+    for (const Surface* old_one : formerSurfaces()) {
+      places.of_chart.emplace_back();
+      if (old_one != nullptr) places.of_chart.back() = {old_one->place, old_one->width, old_one->height};
     }
     return places;
   }

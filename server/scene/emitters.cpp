@@ -1,12 +1,9 @@
 #include "server/scene/emitters.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <glm/common.hpp>
-#include <map>
-#include <optional>
 #include <vector>
 
 #include "server/scene/shade_texture.h"
@@ -41,74 +38,81 @@ PixelRange pixelsBetween(float low, float high, int size, bool repeat, bool mirr
   return {pixel(low - 0.5F / static_cast<float>(size)), pixel(high + 0.5F / static_cast<float>(size))};
 }
 
-/// One material's emissive texture.
-class EmissiveTexture {
- public:
-  EmissiveTexture(const Texture& texture, const TextureUse& use) : texture_(texture), use_(use) {}
+}  // namespace
 
-  /// Whether a pixel is not black that the triangle may show. By the box around its corners: a little more than it
-  /// shows.
-  [[nodiscard]] bool shines(const Primitive& primitive, std::uint32_t triangle) {
-    auto& known = known_[&primitive];
-    known.resize(primitive.indices.size() / 3);
-    auto& answer = known[triangle];
-    if (!answer) answer = looksBright(primitive, triangle);
-    return *answer;
+/// How many pixels of a texture are not black, by rectangle: a summed-area table (Crow 1984).
+class Emitters::BrightPixels {
+ public:
+  explicit BrightPixels(const Texture& texture) : width_(texture.width), height_(texture.height) {
+    const auto row = static_cast<std::size_t>(width_) + 1;
+    sums_.assign(row * (static_cast<std::size_t>(height_) + 1), 0);
+    for (std::size_t y = 0; y < static_cast<std::size_t>(height_); ++y) {
+      std::uint32_t in_row = 0;
+      for (std::size_t x = 0; x < static_cast<std::size_t>(width_); ++x) {
+        const auto* p = &texture.rgba[4 * (y * static_cast<std::size_t>(width_) + x)];
+        in_row += p[0] != 0 || p[1] != 0 || p[2] != 0 ? 1 : 0;
+        sums_[(y + 1) * row + x + 1] = sums_[y * row + x + 1] + in_row;
+      }
+    }
+  }
+
+  [[nodiscard]] bool anyIn(const glm::vec2& low, const glm::vec2& high, const TextureUse& use) const {
+    const auto columns = pixelsBetween(low.x, high.x, width_, use.repeat_u, use.mirror_u);
+    const auto rows = pixelsBetween(low.y, high.y, height_, use.repeat_v, use.mirror_v);
+    const auto sum = [&](int x, int y) {
+      return sums_[static_cast<std::size_t>(y) * (static_cast<std::size_t>(width_) + 1) + static_cast<std::size_t>(x)];
+    };
+    return sum(columns.last + 1, rows.last + 1) - sum(columns.first, rows.last + 1) -
+               sum(columns.last + 1, rows.first) + sum(columns.first, rows.first) !=
+           0;
   }
 
  private:
-  [[nodiscard]] bool looksBright(const Primitive& primitive, std::uint32_t triangle) const {
-    const auto& set = use_.texcoord == 1 ? primitive.texcoord1 : primitive.texcoord0;
-    const auto corner = [&](std::size_t k) {
-      return transformUv(use_, set.empty() ? glm::vec2(0.0F) : set[primitive.indices[std::size_t{3} * triangle + k]]);
-    };
-    const auto a = corner(0), b = corner(1), c = corner(2);
-    const auto low = glm::min(a, glm::min(b, c)), high = glm::max(a, glm::max(b, c));
-    const auto columns = pixelsBetween(low.x, high.x, texture_.width, use_.repeat_u, use_.mirror_u);
-    const auto rows = pixelsBetween(low.y, high.y, texture_.height, use_.repeat_v, use_.mirror_v);
-    for (int y = rows.first; y <= rows.last; ++y) {
-      for (int x = columns.first; x <= columns.last; ++x) {
-        const auto pixel =
-            static_cast<std::size_t>(y) * static_cast<std::size_t>(texture_.width) + static_cast<std::size_t>(x);
-        const auto* p = &texture_.rgba[4 * pixel];
-        if (p[0] != 0 || p[1] != 0 || p[2] != 0) return true;
-      }
-    }
-    return false;
-  }
-
-  const Texture& texture_;
-  const TextureUse& use_;
-  /// Of many instances of one mesh each triangle is looked at once.
-  std::map<const Primitive*, std::vector<std::optional<bool>>> known_;
+  int width_, height_;
+  std::vector<std::uint32_t> sums_;
 };
 
-/// Nothing: without one, or without its pixels, a material emits all over.
-std::optional<EmissiveTexture> textureOf(const Scene& scene, const Material& material) {
-  const auto& use = material.emissive_texture;
-  if (use.texture >= scene.textures.size()) return std::nullopt;
-  const Texture& texture = scene.textures[use.texture];
-  const auto bytes =
-      static_cast<std::size_t>(std::max(0, texture.width)) * static_cast<std::size_t>(std::max(0, texture.height)) * 4;
-  if (bytes == 0 || texture.rgba.size() < bytes) return std::nullopt;
-  return EmissiveTexture(texture, use);
+Emitters::Emitters(const Scene& scene) : scene_(scene), of_texture_(scene.textures.size()) {
+  for (const Material& material : scene.materials) {
+    const auto index = material.emissive_texture.texture;
+    if (!mayEmit(material) || index >= scene.textures.size() || of_texture_[index]) continue;
+    const Texture& texture = scene.textures[index];
+    const auto bytes = static_cast<std::size_t>(std::max(0, texture.width)) *
+                       static_cast<std::size_t>(std::max(0, texture.height)) * 4;
+    if (bytes > 0 && texture.rgba.size() >= bytes) of_texture_[index] = std::make_unique<const BrightPixels>(texture);
+  }
 }
 
-}  // namespace
+Emitters::~Emitters() = default;
+
+/// Null: without a texture, or without its pixels, a material emits all over.
+const Emitters::BrightPixels* Emitters::pixelsOf(const Material& material) const {
+  const auto index = material.emissive_texture.texture;
+  return index < of_texture_.size() ? of_texture_[index].get() : nullptr;
+}
+
+bool Emitters::shines(std::uint32_t instance, std::uint32_t triangle) const {
+  const Primitive& primitive = scene_.primitives[scene_.instances[instance].primitive];
+  if (primitive.material >= scene_.materials.size()) return false;
+  const Material& material = scene_.materials[primitive.material];
+  if (!mayEmit(material)) return false;
+  const auto* pixels = pixelsOf(material);
+  if (pixels == nullptr) return true;
+  const auto& use = material.emissive_texture;
+  const auto& set = use.texcoord == 1 ? primitive.texcoord1 : primitive.texcoord0;
+  const auto corner = [&](std::size_t k) {
+    return transformUv(use, set.empty() ? glm::vec2(0.0F) : set[primitive.indices[std::size_t{3} * triangle + k]]);
+  };
+  const auto a = corner(0), b = corner(1), c = corner(2);
+  return pixels->anyIn(glm::min(a, glm::min(b, c)), glm::max(a, glm::max(b, c)), use);
+}
 
 void findEmitters(const Scene& scene, PatchScene& patches) {
-  std::map<std::uint32_t, std::optional<EmissiveTexture>> textures;  // by material
+  const Emitters emitters(scene);
   for (Surface& surface : patches.surfaces) {
-    surface.emits = surface.material < scene.materials.size() && mayEmit(scene.materials[surface.material]);
-    if (!surface.emits) continue;
-    auto known = textures.find(surface.material);
-    if (known == textures.end())
-      known = textures.emplace(surface.material, textureOf(scene, scene.materials[surface.material])).first;
-    if (!known->second) continue;
-    const Primitive& primitive = scene.primitives[scene.instances[surface.instance].primitive];
     surface.emits = false;
     for (auto t = surface.first_triangle; t < surface.first_triangle + surface.triangle_count && !surface.emits; ++t)
-      surface.emits = known->second->shines(primitive, patches.triangle_source[t]);
+      surface.emits = emitters.shines(surface.instance, patches.triangle_source[t]);
   }
 }
 

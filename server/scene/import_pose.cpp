@@ -26,14 +26,6 @@ bool isFinite(const glm::dvec3& p) {
   return std::abs(p.x) <= kMost && std::abs(p.y) <= kMost && std::abs(p.z) <= kMost;
 }
 
-/// Turns normals as `m` turns the planes that they stand on, but for their length: its inverse transpose without a
-/// division, so that it holds for what is flat, too.
-glm::dmat3 normalMatrix(const glm::dmat4& m) {
-  const glm::dvec3 x(m[0]), y(m[1]), z(m[2]);
-  const double sign = glm::dot(x, glm::cross(y, z)) < 0.0 ? -1.0 : 1.0;
-  return sign * glm::dmat3(glm::cross(y, z), glm::cross(z, x), glm::cross(x, y));
-}
-
 /// JOINTS_n and WEIGHTS_n.
 struct Influences {
   AccessorReader joints, weights;

@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <numeric>
+#include <utility>
 
 #include "common/parallel.h"
-#include "server/scene/opacity.h"
+#include "server/scene/emitters.h"
+#include "server/scene/mesh_parts.h"
 #include "server/scene/ray_tree.h"
 
 namespace radiosity::scene {
@@ -14,7 +15,13 @@ namespace {
 
 constexpr float kFar = 4.0F;      ///< unit box; longer than its diagonal
 constexpr double kLift = 1.0e-5;  ///< unit box; rays start so far before their surface, well above rounding
-constexpr int kPhotons = 4096, kPhotonHops = 6;
+/// Each lamp gets some, however many there are.
+constexpr std::size_t kFewestPhotons = 4096, kPhotonsALamp = 64, kMostPhotons = 65536;
+constexpr int kPhotonHops = 6;
+/// Half of the lamps that paths ask are among the nearest to where the path began: in a building most are elsewhere.
+constexpr std::size_t kNearest = 4;
+/// Groups times lamps for which the nearest are looked for.
+constexpr double kMostPairs = 2e7;
 /// After eight diffuse bounces little light is left in any scene.
 constexpr int kHops = 8;
 constexpr int kMostSheets = 16;  ///< that a ray passes where one can see through
@@ -62,7 +69,11 @@ struct Place {
 class Probe {
  public:
   Probe(const SideScene& scene, const std::vector<std::array<bool, 2>>& asked)
-      : scene_(scene), asked_(asked), tree_(Bvh(scene.triangles)), light_(scene.groups.size()) {
+      : scene_(scene),
+        asked_(asked),
+        tree_(Bvh(scene.triangles)),
+        light_(scene.groups.size()),
+        shines_(scene.groups.size(), false) {
     group_of_.resize(scene.triangles.size());
     areas_.resize(scene.triangles.size());
     for (std::uint32_t g = 0; g < scene.groups.size(); ++g) {
@@ -72,7 +83,9 @@ class Probe {
         group_of_[t] = g;
         sum += areaOf(t);
         areas_[t] = sum;
-        if (group.emits) lamps_.push_back(t);
+        if (!scene.emits[t]) continue;
+        lamps_.push_back(t);
+        shines_[g] = true;
       }
     }
     const double sides = 2.0 * static_cast<double>(scene.groups.size()), rays_a_walk = 2.0 * kHops;
@@ -81,12 +94,15 @@ class Probe {
     for (const auto t : lamps_) lamp_areas_.push_back(sum += areaOf(t));
   }
 
-  std::vector<std::array<SideLight, 2>> run() {
+  std::vector<std::array<SideLight, 2>> run(LookFor how) {
+    findParts();
     findSealed();
     sendPhotons();
-    inTurns(scene_.groups.size(), [&](std::size_t g) {
-      for (std::uint32_t side = 0; side < 2; ++side) look(static_cast<std::uint32_t>(g), side);
-    });
+    if (how == LookFor::kPhotonsAndPaths) {
+      inTurns(scene_.groups.size(), [&](std::size_t g) {
+        for (std::uint32_t side = 0; side < 2; ++side) look(static_cast<std::uint32_t>(g), side);
+      });
+    }
     std::vector<std::array<SideLight, 2>> result(scene_.groups.size(), {SideLight::kLit, SideLight::kLit});
     for (std::size_t g = 0; g < result.size(); ++g)
       for (std::size_t side = 0; side < 2; ++side)
@@ -126,10 +142,12 @@ class Probe {
   [[nodiscard]] bool trace(const Place& from, const glm::dvec3& direction, Random& random, RayHit& hit) const {
     glm::vec3 origin(from.point);
     auto own = from.triangle;
+    double passed = 0.0;
     for (int sheet = 0; sheet < kMostSheets; ++sheet) {
       if (!tree_.nearestHit(origin, glm::vec3(direction), kFar, hit, {}, own)) return false;
-      if (!groupOf(hit.triangle).see_through || random() < 0.5) return true;
       origin += static_cast<float>(hit.t) * glm::vec3(direction);
+      hit.t = passed += hit.t;
+      if (!groupOf(hit.triangle).see_through || random() < 0.5) return true;
       own = hit.triangle;
     }
     return true;
@@ -150,6 +168,40 @@ class Probe {
     return false;
   }
 
+  template <typename List>
+  [[nodiscard]] static std::size_t drawIndex(const List& list, Random& random) {
+    return std::min(static_cast<std::size_t>(random() * static_cast<double>(list.size())), list.size() - 1);
+  }
+
+  /// Lamps and lights about where a path begins.
+  struct Near {
+    std::vector<std::uint32_t> lamps, lights;
+  };
+
+  [[nodiscard]] Near nearTo(const glm::dvec3& place) const {
+    Near near;
+    const auto sources = static_cast<double>(lamps_.size() + scene_.lights.size());
+    if (static_cast<double>(scene_.groups.size()) * sources > kMostPairs) return near;
+    const auto take = [](std::vector<std::pair<double, std::uint32_t>>& all, std::vector<std::uint32_t>& into) {
+      const auto few = std::min(kNearest, all.size());
+      std::partial_sort(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(few), all.end());
+      for (std::size_t i = 0; i < few; ++i) into.push_back(all[i].second);
+    };
+    std::vector<std::pair<double, std::uint32_t>> lamps, lights;
+    for (const auto t : lamps_) lamps.emplace_back(glm::distance(place, middleOf(t)), t);
+    for (std::uint32_t i = 0; i < scene_.lights.size(); ++i) {
+      if (scene_.lights[i].kind != LightKind::kDirectional)
+        lights.emplace_back(glm::distance(place, scene_.lights[i].position), i);
+    }
+    take(lamps, near.lamps);
+    take(lights, near.lights);
+    return near;
+  }
+  [[nodiscard]] glm::dvec3 middleOf(std::uint32_t t) const {
+    const auto& c = scene_.triangles[t];
+    return glm::dvec3(c[0] + c[1] + c[2]) / 3.0;
+  }
+
   [[nodiscard]] std::uint32_t drawLamp(Random& random) const {
     const auto at = std::ranges::lower_bound(lamp_areas_, random() * lamp_areas_.back());
     return lamps_[std::min<std::size_t>(static_cast<std::size_t>(at - lamp_areas_.begin()), lamps_.size() - 1)];
@@ -158,8 +210,9 @@ class Probe {
     return groupOf(lamp).double_sided && random() < 0.5 ? 1 : 0;
   }
 
-  [[nodiscard]] bool seesLamp(const Place& at, Random& random) const {
-    const auto lamp = drawLamp(random);
+  [[nodiscard]] bool seesLamp(const Place& at, const Near& near, Random& random) const {
+    const auto lamp =
+        near.lamps.empty() || random() < 0.5 ? drawLamp(random) : near.lamps[drawIndex(near.lamps, random)];
     const Place there = placeOn(lamp, drawLampSide(lamp, random), random);
     const glm::dvec3 way = there.point - at.point;
     if (glm::dot(way, at.normal) <= 0.0 || glm::dot(way, there.normal) >= 0.0) return false;
@@ -167,10 +220,10 @@ class Probe {
     return length > 0.0 && isFree(at, way / length, static_cast<float>(length - kLift));
   }
 
-  [[nodiscard]] bool seesLight(const Place& at, Random& random) const {
-    const auto& lights = scene_.lights;
+  [[nodiscard]] bool seesLight(const Place& at, const Near& near, Random& random) const {
+    const bool any = near.lights.empty() || random() < 0.5;
     const auto& light =
-        lights[std::min(static_cast<std::size_t>(random() * static_cast<double>(lights.size())), lights.size() - 1)];
+        scene_.lights[any ? drawIndex(scene_.lights, random) : near.lights[drawIndex(near.lights, random)]];
     if (light.kind == LightKind::kDirectional)
       return glm::dot(light.direction, at.normal) < 0.0 && isFree(at, -light.direction, kFar);
     const glm::dvec3 way = light.position - at.point;
@@ -195,31 +248,38 @@ class Probe {
   }
 
   /// Whether a path from there comes to light. `open`: set where it leaves the scene.
-  [[nodiscard]] bool findsLight(Place at, Random& random, bool& open) const {
+  [[nodiscard]] bool findsLight(Place at, const Near& near, Random& random, bool& open) const {
     for (int hop = 0; hop < kHops; ++hop) {
-      if (!lamps_.empty() && seesLamp(at, random)) return true;
-      if (!scene_.lights.empty() && seesLight(at, random)) return true;
+      if (!lamps_.empty() && seesLamp(at, near, random)) return true;
+      if (!scene_.lights.empty() && seesLight(at, near, random)) return true;
       const auto direction = around(at.normal, std::sqrt(random()), random());
       RayHit hit{};
       if (!trace(at, direction, random, hit)) {
         open = true;
         return skyShines(direction);
       }
-      const auto& group = groupOf(hit.triangle);
-      if (group.emits && (hit.front || group.double_sided)) return true;
+      if (scene_.emits[hit.triangle] && (hit.front || groupOf(hit.triangle).double_sided)) return true;
       if (!goOn(direction, hit, at)) return false;
     }
     return false;
   }
 
+  void findParts() {
+    std::vector<std::uint32_t> instances;
+    for (const auto& group : scene_.groups) instances.push_back(group.instance);
+    parts_ = findMeshParts(scene_.triangles, group_of_, instances);
+    // A group without triangles is of no part.
+    std::ranges::replace(parts_.of_group, kNone, 0U);
+  }
+
   /// Sides of parts from which one sees nothing but the same side of the same part: the inside of a closed solid.
   void findSealed() {
-    std::uint32_t parts = 0;
-    for (const auto& group : scene_.groups) parts = std::max(parts, group.part + 1);
+    const auto parts = parts_.closed.size();
     std::vector<std::vector<std::uint32_t>> groups(parts);
-    for (std::uint32_t g = 0; g < scene_.groups.size(); ++g) groups[scene_.groups[g].part].push_back(g);
+    for (std::uint32_t g = 0; g < scene_.groups.size(); ++g) groups[parts_.of_group[g]].push_back(g);
     sealed_.assign(parts, {false, false});
     inTurns(parts, [&](std::size_t part) {
+      if (!parts_.closed[part]) return;
       for (std::uint32_t side = 0; side < 2; ++side)
         sealed_[part][side] = isSealed(static_cast<std::uint32_t>(part), groups[part], side);
     });
@@ -231,13 +291,13 @@ class Probe {
     for (const auto g : groups) {
       const auto& group = scene_.groups[g];
       // Of a closed shell that shines all over the front is taken for the side that one sees.
-      if (!group.double_sided || group.see_through || (group.emits && side == 0)) return false;
+      if (!group.double_sided || group.see_through || (shines_[g] && side == 0)) return false;
       for (std::size_t ray = 0; ray < rays; ++ray) {
         const Place at = placeIn(group, side, random);
         RayHit hit{};
         const auto direction = around(at.normal, std::sqrt(random()), random());
         if (!tree_.nearestHit(glm::vec3(at.point), glm::vec3(direction), kFar, hit, {}, at.triangle)) return false;
-        if (groupOf(hit.triangle).part != part || hit.front != (side == 0)) return false;
+        if (parts_.of_group[group_of_[hit.triangle]] != part || hit.front != (side == 0)) return false;
       }
     }
     return !groups.empty();
@@ -247,7 +307,9 @@ class Probe {
     const auto sources = (lamps_.empty() ? 0 : 1) + (scene_.lights.empty() ? 0 : 1);
     if (sources == 0) return;
     Random random(0x50A0);
-    for (int photon = 0; photon < kPhotons; ++photon) {
+    const auto lamps = static_cast<std::size_t>(std::ranges::count(shines_, true)) + scene_.lights.size();
+    const auto photons = std::clamp(kPhotonsALamp * lamps, kFewestPhotons, kMostPhotons);
+    for (std::size_t photon = 0; photon < photons; ++photon) {
       const bool from_lamp = !lamps_.empty() && (scene_.lights.empty() || photon % 2 == 0);
       from_lamp ? sendFromLamp(random) : sendFromLight(random);
     }
@@ -256,15 +318,13 @@ class Probe {
   void sendFromLamp(Random& random) {
     const auto lamp = drawLamp(random);
     const auto side = drawLampSide(lamp, random);
-    if (sealed_[groupOf(lamp).part][side]) return;
+    if (sealed_[parts_.of_group[group_of_[lamp]]][side]) return;
     const Place at = placeOn(lamp, side, random);
     follow(at, around(at.normal, std::sqrt(random()), random()), random);
   }
 
   void sendFromLight(Random& random) {
-    const auto& lights = scene_.lights;
-    const auto& light =
-        lights[std::min(static_cast<std::size_t>(random() * static_cast<double>(lights.size())), lights.size() - 1)];
+    const auto& light = scene_.lights[drawIndex(scene_.lights, random)];
     if (light.kind == LightKind::kDirectional) return;  // the paths that look for it find it
     const bool spot = light.kind == LightKind::kSpot;
     const double least = spot ? std::cos(std::min(light.outer_cone_rad, M_PI)) : -1.0;
@@ -286,8 +346,8 @@ class Probe {
     const auto& group = scene_.groups[g];
     auto& light = light_[g][side];
     if (!asked_[g][side] || light == SideLight::kLit || group.count == 0) return;
-    if (sealed_[group.part][side]) return;
-    if (group.emits) {
+    if (sealed_[parts_.of_group[g]][side]) return;
+    if (shines_[g]) {
       light = SideLight::kLit;
       return;
     }
@@ -295,9 +355,10 @@ class Probe {
         walks_allowed_,
         std::clamp(static_cast<std::uint32_t>(std::min(group.leaves, 1e6) / kLeavesAWalk), kFewestWalks, kMostWalks));
     Random random((2 * std::uint64_t{g} + side + 1) << 20U);
-    bool open = false;
+    const Near near = nearTo(middleOf(group.first));
+    bool open = !parts_.closed[parts_.of_group[g]];
     for (std::uint32_t walk = 0; walk < walks; ++walk) {
-      if (!findsLight(placeIn(group, side, random), random, open)) continue;
+      if (!findsLight(placeIn(group, side, random), near, random, open)) continue;
       light = SideLight::kLit;
       return;
     }
@@ -308,12 +369,14 @@ class Probe {
   const std::vector<std::array<bool, 2>>& asked_;
   RayTree tree_;
   std::vector<std::array<SideLight, 2>> light_;  ///< by group and side; first kSealed
-  std::vector<std::array<bool, 2>> sealed_;      ///< by part and side
-  std::vector<std::uint32_t> group_of_;          ///< by triangle
-  std::vector<double> areas_;                    ///< by triangle: of its group's up to and with it
-  std::vector<std::uint32_t> lamps_;             ///< triangles that shine
-  std::vector<double> lamp_areas_;               ///< likewise, summed up
-  std::uint32_t walks_allowed_ = kMostWalks;     ///< from a side
+  std::vector<bool> shines_;                     ///< by group: some of its triangles do
+  MeshParts parts_;
+  std::vector<std::array<bool, 2>> sealed_;   ///< by part and side
+  std::vector<std::uint32_t> group_of_;       ///< by triangle
+  std::vector<double> areas_;                 ///< by triangle: of its group's up to and with it
+  std::vector<std::uint32_t> lamps_;          ///< triangles that shine
+  std::vector<double> lamp_areas_;            ///< likewise, summed up
+  std::uint32_t walks_allowed_ = kMostWalks;  ///< from a side
 };
 
 const Material& materialOf(const Scene& scene, const Surface& surface) {
@@ -329,12 +392,14 @@ SideScene sideSceneOf(const PatchScene& patches, const Scene& scene, const Sky& 
   sides.triangles.resize(patches.triangles.size());
   for (std::size_t i = 0; i < patches.indices.size(); ++i)
     sides.triangles[i / 3][i % 3] = patches.vertices[patches.indices[i]].position;
-  for (std::uint32_t s = 0; s < patches.surfaces.size(); ++s) {
-    const Surface& surface = patches.surfaces[s];
-    const Material& material = materialOf(scene, surface);
-    sides.groups.push_back({surface.first_triangle, surface.triangle_count, s, material.double_sided,
-                            surface.see_through, isBright(material.emission),
+  const Emitters emitters(scene);
+  sides.emits.resize(patches.triangles.size());
+  for (const Surface& surface : patches.surfaces) {
+    sides.groups.push_back({surface.first_triangle, surface.triangle_count, surface.instance,
+                            materialOf(scene, surface).double_sided, surface.see_through,
                             static_cast<double>(surface.width) * surface.height});
+    for (auto t = surface.first_triangle; t < surface.first_triangle + surface.triangle_count; ++t)
+      sides.emits[t] = emitters.shines(surface.instance, patches.triangle_source[t]);
   }
   return sides;
 }
@@ -363,14 +428,13 @@ bool shineElsewhere(const Scene& before, const Sky& sky_before, const Scene& nex
 }
 
 bool SideScene::shines() const {
-  return isBright(sky.upper) || isBright(sky.lower) || !lights.empty() ||
-         std::ranges::any_of(groups, [](const Group& group) { return group.emits; });
+  return isBright(sky.upper) || isBright(sky.lower) || !lights.empty() || std::ranges::find(emits, true) != emits.end();
 }
 
 std::vector<std::array<SideLight, 2>> lightOnSides(const SideScene& scene,
-                                                   const std::vector<std::array<bool, 2>>& asked) {
+                                                   const std::vector<std::array<bool, 2>>& asked, LookFor how) {
   if (!scene.shines()) return {scene.groups.size(), {SideLight::kLit, SideLight::kLit}};
-  return Probe(scene, asked).run();
+  return Probe(scene, asked).run(how);
 }
 
 std::vector<PunctualLight> lightsInUnitBox(const Scene& scene, const glm::dvec3& centre, double scale) {
@@ -391,12 +455,15 @@ bool reachesDarkSides(const PatchScene& patches, const Scene& before, const Sky&
   for (std::size_t s = 0; s < asked.size(); ++s) {
     const Surface& surface = patches.surfaces[s];
     if (!materialOf(next, surface).double_sided) continue;
-    asked[s][1] = surface.first_node[1] == kNone;
+    asked[s][1] = surface.shows_back && surface.first_node[1] == kNone;  // nobody sees what is sealed
     any |= asked[s][1];
   }
   if (!any || !shinesAnew(before, sky_before, next, sky_next)) return false;
   const auto sides = sideSceneOf(patches, next, sky_next);
-  const auto light = lightOnSides(sides, asked);
+  // Photons find what a lamp lights; only the sky and the sun send none.
+  const auto isSun = [](const PunctualLight& light) { return light.kind == LightKind::kDirectional; };
+  const bool far = isBright(sky_next.upper) || isBright(sky_next.lower) || std::ranges::any_of(next.lights, isSun);
+  const auto light = lightOnSides(sides, asked, far ? LookFor::kPhotonsAndPaths : LookFor::kPhotonsAlone);
   for (std::size_t s = 0; s < asked.size(); ++s)
     if (asked[s][1] && light[s][1] == SideLight::kLit) return true;
   return false;

@@ -23,11 +23,12 @@ enum class SideLight : std::uint8_t {
 struct SideScene {
   struct Group {
     std::uint32_t first = 0, count = 0;  ///< triangles
-    std::uint32_t part = 0;              ///< groups with the same number hang together
-    bool double_sided = false, see_through = false, emits = false;
+    std::uint32_t instance = 0;          ///< only triangles of one instance hang together
+    bool double_sided = false, see_through = false;
     double leaves = 0.0;  ///< about; larger sides are looked at from more places
   };
   std::vector<Bvh::Triangle> triangles;  ///< unit box, counter-clockwise seen from the front; group after group
+  std::vector<bool> emits;               ///< by triangle
   std::vector<Group> groups;
   std::vector<PunctualLight> lights;  ///< positions and ranges in the unit box
   Sky sky;
@@ -39,10 +40,13 @@ struct SideScene {
 ///
 /// Photons from the lamps mark what they meet. A side that none meets is looked at from random places: paths go from
 /// there through the open space, as light would come, until they see a lamp, the sun or the sky. Paths never cross a
-/// surface, so that a box that is sunk into a lit floor has a dark inside. A random test: what only a thousandth of a
-/// side receives may be missed. The same scene gives the same answer. Some milliseconds for a furnished room.
+/// surface, so that a box that is sunk into a lit floor has a dark inside. Only what is closed all around can be
+/// sealed. A random test: what little of a side receives light may be missed. The same scene gives the same answer.
+/// Some milliseconds for a furnished room.
+enum class LookFor { kPhotonsAndPaths, kPhotonsAlone };
 [[nodiscard]] std::vector<std::array<SideLight, 2>> lightOnSides(const SideScene& scene,
-                                                                 const std::vector<std::array<bool, 2>>& asked);
+                                                                 const std::vector<std::array<bool, 2>>& asked,
+                                                                 LookFor how = LookFor::kPhotonsAndPaths);
 
 /// Whether light of `next`, or of the sky, reaches a side of `patches` that was left without patches because light of
 /// `before` did not. Both scenes have the geometry of `patches`. Nothing is traced unless `next` has a lamp or a sky

@@ -7,6 +7,8 @@
 #include <glm/mat4x4.hpp>
 #include <glm/matrix.hpp>
 
+#include "server/scene/node_transform.h"
+
 namespace radiosity::scene {
 namespace {
 
@@ -29,7 +31,7 @@ class InstanceNormals {
         world_(world),
         patches_(patches),
         facing_(glm::determinant(glm::dmat3(world)) < 0.0 ? -1.0 : 1.0),
-        to_world_(glm::transpose(glm::inverse(glm::dmat3(world)))) {}
+        to_world_(normalMatrix(world)) {}
 
   /// Of the corners of a triangle of the patch scene, on its front: it may be the back of the file's, and its corners
   /// run the other way round then, or where the instance is mirrored.

@@ -228,11 +228,10 @@ class LinkedSolver final : public Solver {
   /// By half and number of LeafShading: what counts for the shading normal less what does for the geometric one.
   using ShadedLight = std::array<std::vector<glm::vec3>, 2>;
   void addShadedLinks(LinkSystem::From from, ShadedLight& light) const;
-  [[nodiscard]] std::vector<ShadingEmitter> shadingEmitters(LinkSystem::From from) const;
   [[nodiscard]] ShadingEmitter emitterOf(const Shooter& shooter) const;
   [[nodiscard]] ShadingEmitter emitterOf(const NodePlace& node) const;
   [[nodiscard]] glm::vec3 shadedCorrection(std::uint32_t value, const glm::vec3& lacks) const;
-  void addShaded(const ShadedLight& light, std::uint32_t first_half, std::vector<glm::vec3>& nodes) const;
+  void addShaded(const ShadedLight& light, std::uint32_t half, std::vector<glm::vec3>& nodes) const;
   void takeMaterials(const scene::PatchMaterials& materials);
   void takeLights();
   [[nodiscard]] bool settle();

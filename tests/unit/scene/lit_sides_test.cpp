@@ -173,6 +173,95 @@ TEST(LitSides, lightThatComesLaterNeedsNewTexels) {
   EXPECT_TRUE(reaches(glowing));
 }
 
+/// Closed rooms in a row, each with a lamp and a small screen.
+TEST(LitSides, smallThingsAreLitInABuildingOfManyLamps) {
+  Scene scene;
+  std::vector<std::uint32_t> screens;
+  for (int i = 0; i < 60; ++i) {
+    const double x = 5.0 * i;
+    test::place(scene, test::box({x, 0, 0}, {x + 4, 3, 5}, true), glm::dmat4(1.0), sheet());
+    Primitive screen;
+    addQuad(screen, {x + 1, 0.5, 1}, {x + 1.2, 0.5, 1}, {x + 1.2, 0.7, 1}, {x + 1, 0.7, 1});
+    screens.push_back(test::place(scene, std::move(screen), glm::dmat4(1.0), sheet()));
+    PunctualLight light;
+    light.position = {x + 2, 2.5, 2.5};
+    light.intensity = glm::vec3(10.0F);
+    scene.lights.push_back(light);
+  }
+  const PatchScene patches = build(scene, 6000);
+  for (const auto screen : screens)
+    for (const Surface* surface : surfacesOf(patches, screen)) EXPECT_NE(surface->first_node[1], kNone) << screen;
+}
+
+/// An empty room of one mesh, with a window of a hundredth of its walls.
+TEST(LitSides, daylightComesThroughASmallWindow) {
+  Scene scene;
+  Primitive room = test::box({0, 0, 0}, {4, 3, 5}, false);  // turned inside out, as some exporters leave it
+  room.indices.resize(room.indices.size() - 6);             // without its right wall, which has a window
+  addQuad(room, {4, 0, 0}, {4, 3, 0}, {4, 3, 5}, {4, 0, 5});
+  room.indices.resize(room.indices.size() - 6);
+  const auto strip = [&](double y0, double y1, double z0, double z1) {
+    addQuad(room, {4, y0, z0}, {4, y1, z0}, {4, y1, z1}, {4, y0, z1});
+  };
+  strip(0, 1, 0, 5);
+  strip(2, 3, 0, 5);
+  strip(1, 2, 0, 2);
+  strip(1, 2, 2.9, 5);
+  test::place(scene, std::move(room), glm::dmat4(1.0), sheet());
+  scene.sky = Sky{glm::vec3(100.0F), glm::vec3(100.0F)};
+  for (const Surface& wall : build(scene, 2000).surfaces) EXPECT_NE(wall.first_node[1], kNone);
+}
+
+/// One material for all, as of a texture atlas: it is bright where the lamp's coordinates are alone.
+TEST(LitSides, onlyWhatItsTextureMakesShineIsALamp) {
+  Scene scene = litRoom(true);
+  Texture atlas;
+  atlas.width = 2;
+  atlas.height = 1;
+  atlas.rgba = {0, 0, 0, 255, 255, 255, 255, 255};
+  scene.textures = {atlas};
+  scene.materials[0].emission = scene.materials[1].emission;
+  for (auto& material : scene.materials) material.emissive_texture.texture = 0;
+  auto room = scene.primitives[0], lamp = scene.primitives[1];
+  room.texcoord0.assign(room.positions.size(), glm::vec2(0.2F, 0.5F));
+  lamp.texcoord0.assign(lamp.positions.size(), glm::vec2(0.8F, 0.5F));
+  scene.primitives = {room, lamp};
+  for (auto& material : scene.materials) material.emissive_texture.nearest = true;
+  const PatchScene patches = build(scene, 1000);
+  for (const Surface* wall : surfacesOf(patches, 0)) EXPECT_EQ(wall->first_node[1], kNone);
+}
+
+TEST(LitSides, aClosedLampIsSwitchedWithoutNewTexels) {
+  Scene scene = litRoom(true);
+  Material glow = sheet();
+  glow.emission = glm::vec3(50.0F);
+  const auto bulb = test::place(scene, test::box({1, 1, 1}, {1.2, 1.2, 1.2}), glm::dmat4(1.0), glow);
+  Scene off = scene;
+  off.materials[bulb].emission = glm::vec3(0.0F);
+  EXPECT_FALSE(reachesDarkSides(build(off, 1000), off, {}, scene, {}));
+  for (const Surface* face : surfacesOf(build(scene, 1000), bulb)) EXPECT_EQ(face->first_node[1], kNone);
+}
+
+TEST(LitSides, anEditElsewhereOrInTheDarkTurnsNothing) {
+  Scene scene = litRoom(false);
+  const auto chair = test::place(scene, test::box({1, 0, 1}, {1.5, 0.5, 1.5}), glm::dmat4(1.0), sheet());
+  const PatchScene before = build(scene, 1000);
+  for (const bool dark : {false, true}) {
+    Scene after = scene;
+    after.instances[chair].world = glm::translate(glm::dmat4(1.0), glm::dvec3(0.5, 0, 0.3));
+    if (dark) after.materials[1].emission = glm::vec3(0.0F);
+    ChartOptions options;
+    options.texel_budget = 1000;
+    const FormerScene former{scene, before};
+    const PatchScene patches = buildPatchScene(after, options, &former).value();
+    ASSERT_EQ(patches.surfaces.size(), before.surfaces.size());
+    for (std::size_t s = 0; s < patches.surfaces.size(); ++s) {
+      EXPECT_EQ(patches.surfaces[s].flipped, before.surfaces[s].flipped) << dark;
+      EXPECT_EQ(patches.surfaces[s].place, before.surfaces[s].place) << dark;
+    }
+  }
+}
+
 TEST(LitSides, skyAndSunReachTheOutside) {
   Scene sky = litRoom(true);
   sky.sky = Sky{glm::vec3(100.0F), glm::vec3(0.0F)};

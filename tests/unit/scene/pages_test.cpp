@@ -196,9 +196,9 @@ TEST(Pages, EachSideHasTexelsOfItsOwn) {
   const PatchScene patches = build(scene, 16);
   std::vector<glm::vec3> values(patches.nodeCount(), glm::vec3(0.0F));
   const Surface& s = patches.surfaces[0];
-  for (std::uint32_t i = 0; i < 16; ++i) {
-    values[s.first_node[0] + i] = glm::vec3(2.0F);
-    values[s.first_node[1] + i] = glm::vec3(4.0F);
+  for (std::uint32_t i = 0; i < s.width * s.height; ++i) {
+    values.at(s.first_node[0] + i) = glm::vec3(2.0F);
+    values.at(s.first_node[1] + i) = glm::vec3(4.0F);
   }
   const auto pages = assemblePages(patches, values);
   const auto valueOn = [&](std::size_t side) {
