@@ -181,7 +181,7 @@ TEST_F(LostLight, LightThatEndsOnBacksIsToldOfWithWhatHelps) {
   EXPECT_NE(status().unlit, "");
 }
 
-TEST_F(LostLight, WithBothSidesLitNoFaceHasABackThatLightEndsOn) {
+TEST_F(LostLight, WithBothSidesLitARoomCostsHardlyMorePatches) {
   ASSERT_TRUE(configure([](auto& settings) { settings.double_sided = true; }));
   solve(with(room(), panel("lamp", 1.5)));
   EXPECT_TRUE(status().settings.double_sided);
@@ -189,7 +189,8 @@ TEST_F(LostLight, WithBothSidesLitNoFaceHasABackThatLightEndsOn) {
   ASSERT_TRUE(configure([](auto& settings) { settings.double_sided = false; }));
   ASSERT_TRUE(reaches(SolveState::kConverged));
   EXPECT_FALSE(status().settings.double_sided);
-  EXPECT_EQ(nodes, 2 * status().nodes);  // every side has patches of its own
+  // The outside of the room, which no light reaches, has none; the lamp, which shines on both sides, has some on both.
+  EXPECT_LT(static_cast<double>(nodes), 1.3 * static_cast<double>(status().nodes));
 }
 
 TEST_F(LostLight, ARoomWhoseLightArrivesIsToldNothing) {
