@@ -25,7 +25,7 @@ constexpr double kMostPairs = 2e7;
 /// After eight diffuse bounces little light is left in any scene.
 constexpr int kHops = 8;
 constexpr int kMostSheets = 16;  ///< that a ray passes where one can see through
-constexpr std::uint32_t kFewestWalks = 12, kMostWalks = 1024;
+constexpr std::uint32_t kFewestWalks = 12, kWalksAgain = 256, kMostWalks = 1024;
 constexpr double kLeavesAWalk = 4.0;
 /// In all, about: a scene of a million loose double-sided faces takes seconds, and its sides are looked at from two
 /// places each.
@@ -97,11 +97,11 @@ class Probe {
   std::vector<std::array<SideLight, 2>> run(LookFor how) {
     findParts();
     findSealed();
+    markLamps();
     sendPhotons();
     if (how == LookFor::kPhotonsAndPaths) {
-      inTurns(scene_.groups.size(), [&](std::size_t g) {
-        for (std::uint32_t side = 0; side < 2; ++side) look(static_cast<std::uint32_t>(g), side);
-      });
+      lookAll(kFewestWalks);
+      lookAgain();
     }
     std::vector<std::array<SideLight, 2>> result(scene_.groups.size(), {SideLight::kLit, SideLight::kLit});
     for (std::size_t g = 0; g < result.size(); ++g)
@@ -342,21 +342,42 @@ class Probe {
     }
   }
 
-  void look(std::uint32_t g, std::uint32_t side) {
+  void markLamps() {
+    for (std::uint32_t g = 0; g < scene_.groups.size(); ++g)
+      for (std::size_t side = 0; side < 2; ++side)
+        if (shines_[g] && !sealed_[parts_.of_group[g]][side]) light_[g][side] = SideLight::kLit;
+  }
+
+  /// From at least so many places.
+  void lookAll(std::uint32_t fewest) {
+    inTurns(scene_.groups.size(), [&](std::size_t g) {
+      for (std::uint32_t side = 0; side < 2; ++side) look(static_cast<std::uint32_t>(g), side, fewest);
+    });
+  }
+
+  /// Where light reaches one side of a part it is likely to reach the others: these are looked at from more places.
+  void lookAgain() {
+    std::vector<std::array<bool, 2>> lit(parts_.closed.size(), {false, false});
+    for (std::size_t g = 0; g < light_.size(); ++g)
+      for (std::size_t side = 0; side < 2; ++side)
+        if (light_[g][side] == SideLight::kLit) lit[parts_.of_group[g]][side] = true;
+    inTurns(scene_.groups.size(), [&](std::size_t g) {
+      for (std::uint32_t side = 0; side < 2; ++side)
+        if (lit[parts_.of_group[g]][side]) look(static_cast<std::uint32_t>(g), side, kWalksAgain);
+    });
+  }
+
+  void look(std::uint32_t g, std::uint32_t side, std::uint32_t fewest) {
     const auto& group = scene_.groups[g];
     auto& light = light_[g][side];
     if (!asked_[g][side] || light == SideLight::kLit || group.count == 0) return;
     if (sealed_[parts_.of_group[g]][side]) return;
-    if (shines_[g]) {
-      light = SideLight::kLit;
-      return;
-    }
     const auto walks = std::min(
         walks_allowed_,
-        std::clamp(static_cast<std::uint32_t>(std::min(group.leaves, 1e6) / kLeavesAWalk), kFewestWalks, kMostWalks));
-    Random random((2 * std::uint64_t{g} + side + 1) << 20U);
+        std::clamp(static_cast<std::uint32_t>(std::min(group.leaves, 1e6) / kLeavesAWalk), fewest, kMostWalks));
+    Random random((2 * std::uint64_t{g} + side + 1) << 20U | fewest);
     const Near near = nearTo(middleOf(group.first));
-    bool open = !parts_.closed[parts_.of_group[g]];
+    bool open = light == SideLight::kDark || !parts_.closed[parts_.of_group[g]];
     for (std::uint32_t walk = 0; walk < walks; ++walk) {
       if (!findsLight(placeIn(group, side, random), near, random, open)) continue;
       light = SideLight::kLit;

@@ -44,10 +44,19 @@ void expectUsable(const Scene& scene, const PatchScene& patches) {
     }
   }
   const auto pages = assemblePages(patches, std::vector<glm::vec3>(patches.nodeCount(), glm::vec3(1.0F)));
-  for (const LightmapPage& page : pages)
-    for (std::size_t i = 0; i < page.coverage.size(); ++i)
-      if (page.coverage[i] > 0.0F) {
-        ASSERT_NEAR(page.irradiance.pixels[i].x, 1.0F, 1e-4F);
+  const auto isBlack = [&](std::size_t page, int x, int y) {
+    const auto inside = [](std::uint32_t at, int from) {
+      return from >= static_cast<int>(at) && from < static_cast<int>(at + PatchScene::kBlackSide);
+    };
+    return page == patches.black.page && inside(patches.black.x, x) && inside(patches.black.y, y);
+  };
+  for (std::size_t p = 0; p < pages.size(); ++p)
+    for (int y = 0; y < pages[p].irradiance.height; ++y)
+      for (int x = 0; x < pages[p].irradiance.width; ++x) {
+        const auto i = pages[p].irradiance.index(x, y);
+        if (pages[p].coverage[i] > 0.0F) {
+          ASSERT_NEAR(pages[p].irradiance.pixels[i].x, isBlack(p, x, y) ? 0.0F : 1.0F, 1e-4F);
+        }
       }
 }
 
