@@ -14,6 +14,7 @@
 
 #include "common/check.h"
 #include "common/memory_limit.h"
+#include "server/scene/lit_sides.h"
 #include "server/scene/page_space.h"
 
 namespace radiosity::scene {
@@ -186,8 +187,10 @@ class LayoutMaker {
     const Chart& chart = charts_[c];
     ChartGrid& grid = atlas_.grids[c];
     const double texel = texelOf(chart);
-    grid.width = texelsAlong(chart.size.x, texel);
-    grid.height = texelsAlong(chart.size.y, texel);
+    if (!chart.dark || chart.size.x * chart.size.y <= kCoarse * texel * texel) {
+      grid.width = texelsAlong(chart.size.x, texel);
+      grid.height = texelsAlong(chart.size.y, texel);
+    }
     if (grid.width > max_chart_ || grid.height > max_chart_) {
       noteClamped(c);
       grid.width = std::min(grid.width, max_chart_);
@@ -432,7 +435,9 @@ double texelSizeFor(const std::vector<Chart>& charts, std::uint64_t texel_budget
   const auto leavesAt = [&](double texel) {
     double sum = 0.0;
     for (std::size_t i = 0; i < charts.size(); ++i)
-      sum += (charts[i].back_lit ? 2.0 : 1.0) * predictedLeaves(measures[i], charts[i].from_file, texel);
+      sum += charts[i].dark
+                 ? 1.0
+                 : (charts[i].back_lit ? 2.0 : 1.0) * predictedLeaves(measures[i], charts[i].from_file, texel);
     return sum;
   };
   const auto budget = static_cast<double>(std::max<std::uint64_t>(texel_budget, 1));

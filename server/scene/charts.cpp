@@ -213,6 +213,7 @@ class Builder {
       const bool see_through = isSeeThrough(materialOf(scene_, charts_[c].instance));
       charts_[c].back_lit = back == SideLight::kLit || (see_through && back == SideLight::kDark);
       charts_[c].shows_back = back != SideLight::kSealed;
+      charts_[c].dark = front != SideLight::kLit && !see_through && !charts_[c].from_file;
     }
     if (any_flipped) neighbours_ = edgeNeighbours(flat_);
   }
@@ -289,8 +290,10 @@ class Builder {
   }
 
   /// Of the front and the back of the file's triangles.
-  [[nodiscard]] static std::array<SideLight, 2> lightBefore(const Surface& surface) {
-    std::array<SideLight, 2> light{SideLight::kLit, surface.shows_back ? SideLight::kDark : SideLight::kSealed};
+  [[nodiscard]] std::array<SideLight, 2> lightBefore(const Surface& surface) const {
+    const bool dark = isLeftCoarse(former_->scene, former_->patches, surface);
+    std::array<SideLight, 2> light{dark ? SideLight::kDark : SideLight::kLit,
+                                   surface.shows_back ? SideLight::kDark : SideLight::kSealed};
     if (surface.first_node[1] != kNone) light[1] = SideLight::kLit;
     if (surface.flipped) std::swap(light[0], light[1]);
     return light;

@@ -46,6 +46,7 @@ struct Chart {
   bool flipped = false;                              ///< Surface::flipped
   bool back_lit = false;                             ///< the back has patches, too
   bool shows_back = false;                           ///< Surface::shows_back
+  bool dark = false;  ///< no light reaches either side: one texel is enough (isLeftCoarse)
 };
 
 /// Facet (coplanar connected triangles of one instance) of each triangle.

@@ -10,6 +10,10 @@
 
 namespace radiosity::scene {
 
+[[nodiscard]] inline bool isBright(const glm::vec3& light) {
+  return light.r > 0.0F || light.g > 0.0F || light.b > 0.0F;
+}
+
 /// Whether a material emits anywhere, as far as its factors tell.
 [[nodiscard]] inline bool mayEmit(const Material& material) { return material.emission != glm::vec3(0.0F); }
 

@@ -58,8 +58,6 @@ glm::dvec3 around(const glm::dvec3& axis, double cosine, double turn) {
   return axis * cosine + sine * (std::cos(phi) * u + std::sin(phi) * v);
 }
 
-bool isBright(const glm::vec3& light) { return light.r > 0.0F || light.g > 0.0F || light.b > 0.0F; }
-
 /// A place right before a side of a triangle.
 struct Place {
   glm::dvec3 point, normal;
@@ -400,53 +398,7 @@ class Probe {
   std::uint32_t walks_allowed_ = kMostWalks;  ///< from a side
 };
 
-const Material& materialOf(const Scene& scene, const Surface& surface) {
-  static const Material kDefault;
-  return surface.material < scene.materials.size() ? scene.materials[surface.material] : kDefault;
-}
-
-/// The surfaces of `patches` under the light of `scene`.
-SideScene sideSceneOf(const PatchScene& patches, const Scene& scene, const Sky& sky) {
-  SideScene sides;
-  sides.lights = lightsInUnitBox(scene, patches.centre, patches.scale);
-  sides.sky = sky;
-  sides.triangles.resize(patches.triangles.size());
-  for (std::size_t i = 0; i < patches.indices.size(); ++i)
-    sides.triangles[i / 3][i % 3] = patches.vertices[patches.indices[i]].position;
-  const Emitters emitters(scene);
-  sides.emits.resize(patches.triangles.size());
-  for (const Surface& surface : patches.surfaces) {
-    sides.groups.push_back({surface.first_triangle, surface.triangle_count, surface.instance,
-                            materialOf(scene, surface).double_sided, surface.see_through,
-                            static_cast<double>(surface.width) * surface.height});
-    for (auto t = surface.first_triangle; t < surface.first_triangle + surface.triangle_count; ++t)
-      sides.emits[t] = emitters.shines(surface.instance, patches.triangle_source[t]);
-  }
-  return sides;
-}
-
-/// Whether `next` has a lamp, a light or a sky where `before` had none.
-bool shinesAnew(const Scene& before, const Sky& sky_before, const Scene& next, const Sky& sky_next) {
-  const auto kindled = [](const glm::vec3& was, const glm::vec3& is) { return !isBright(was) && isBright(is); };
-  if (kindled(sky_before.upper, sky_next.upper) || kindled(sky_before.lower, sky_next.lower)) return true;
-  for (std::size_t m = 0; m < next.materials.size(); ++m) {
-    const auto was = m < before.materials.size() ? before.materials[m].emission : glm::vec3(0.0F);
-    if (kindled(was, next.materials[m].emission)) return true;
-  }
-  return std::ranges::any_of(next.lights, [&](const PunctualLight& light) {
-    return isBright(light.intensity) && std::ranges::none_of(before.lights, [&](PunctualLight old) {
-             const bool shone = isBright(old.intensity);
-             old.intensity = light.intensity;
-             return shone && old == light;
-           });
-  });
-}
-
 }  // namespace
-
-bool shineElsewhere(const Scene& before, const Sky& sky_before, const Scene& next, const Sky& sky_next) {
-  return shinesAnew(before, sky_before, next, sky_next) || shinesAnew(next, sky_next, before, sky_before);
-}
 
 bool SideScene::shines() const {
   return isBright(sky.upper) || isBright(sky.lower) || !lights.empty() || std::ranges::find(emits, true) != emits.end();
@@ -467,27 +419,6 @@ std::vector<PunctualLight> lightsInUnitBox(const Scene& scene, const glm::dvec3&
     lights.push_back(light);
   }
   return lights;
-}
-
-bool reachesDarkSides(const PatchScene& patches, const Scene& before, const Sky& sky_before, const Scene& next,
-                      const Sky& sky_next) {
-  std::vector<std::array<bool, 2>> asked(patches.surfaces.size(), {false, false});
-  bool any = false;
-  for (std::size_t s = 0; s < asked.size(); ++s) {
-    const Surface& surface = patches.surfaces[s];
-    if (!materialOf(next, surface).double_sided) continue;
-    asked[s][1] = surface.shows_back && surface.first_node[1] == kNone;  // nobody sees what is sealed
-    any |= asked[s][1];
-  }
-  if (!any || !shinesAnew(before, sky_before, next, sky_next)) return false;
-  const auto sides = sideSceneOf(patches, next, sky_next);
-  // Photons find what a lamp lights; only the sky and the sun send none.
-  const auto isSun = [](const PunctualLight& light) { return light.kind == LightKind::kDirectional; };
-  const bool far = isBright(sky_next.upper) || isBright(sky_next.lower) || std::ranges::any_of(next.lights, isSun);
-  const auto light = lightOnSides(sides, asked, far ? LookFor::kPhotonsAndPaths : LookFor::kPhotonsAlone);
-  for (std::size_t s = 0; s < asked.size(); ++s)
-    if (asked[s][1] && light[s][1] == SideLight::kLit) return true;
-  return false;
 }
 
 }  // namespace radiosity::scene

@@ -48,6 +48,12 @@ enum class LookFor { kPhotonsAndPaths, kPhotonsAlone };
                                                                  const std::vector<std::array<bool, 2>>& asked,
                                                                  LookFor how = LookFor::kPhotonsAndPaths);
 
+/// Texels of area above which a chart has more than one unless it is left coarse: of those without, both sides are
+/// below one and a half.
+inline constexpr double kCoarse = 2.25;
+/// Whether a surface that is wider than a texel has one for all of it, since no light reaches its sides.
+[[nodiscard]] bool isLeftCoarse(const Scene& scene, const PatchScene& patches, const Surface& surface);
+
 /// Whether light of `next`, or of the sky, reaches a side of `patches` that was left without patches because light of
 /// `before` did not. Both scenes have the geometry of `patches`. Nothing is traced unless `next` has a lamp or a sky
 /// that `before` has not.
