@@ -70,13 +70,6 @@ TestScene smallRoom() {
   return scene;
 }
 
-TestScene doubleRoom() {
-  auto scene = smallRoom();
-  scene.name = "room_double";
-  for (auto& material : scene.materials) material.double_sided = material.emission_nits == glm::dvec3(0.0);
-  return scene;
-}
-
 TestScene lightsRoom() {
   auto scene = smallRoom();
   scene.name = "room_lights";
@@ -177,7 +170,6 @@ std::vector<std::pair<std::string, std::function<TestScene()>>> allScenes() {
            }},
           {"room_small", smallRoom},
           {"room_seminar", seminarRoom},
-          {"room_double", doubleRoom},
           {"room_lights", lightsRoom},
           {"room_smooth", smoothRoom},
           {"cornell_double", [] { return doubleSidedTwin(cornell()); }},

@@ -42,9 +42,6 @@ struct SphereSpec {
 /// Closed room of 402 polygons like figure 1 of Lum, Ma and Max 2002: three tables, twelve chairs, a ceiling lamp.
 [[nodiscard]] TestScene smallRoom();
 
-/// The small room as Blender would write it: all but its lamp is double-sided. The light is the same.
-[[nodiscard]] TestScene doubleRoom();
-
 /// The small room with a bulb and a spot light (KHR_lights_punctual) in place of its lamp.
 [[nodiscard]] TestScene lightsRoom();
 

@@ -143,7 +143,8 @@ it('the Cornell box', async () => expectTheSame(await differenceOf('cornell')));
 
 it('a furnished room', async () => expectTheSame(await differenceOf('room_small')));
 
-it('the same room with double-sided walls and furniture', async () => expectTheSame(await differenceOf('room_double')));
+it('the same room with double-sided walls and furniture', async () =>
+  expectTheSame(await differenceOf('room_small_double')));
 
 it('a room lit by a bulb and a spot light', async () => expectTheSame(await differenceOf('room_lights')));
 
