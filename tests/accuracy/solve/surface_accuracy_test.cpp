@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 
@@ -23,6 +24,10 @@ fs::path fileOf(const std::string& name) {
   return fs::exists(built) ? built : fs::exists(scene) ? scene : shared / "cases" / (name + ".glb");
 }
 
+/// The reference's noise is in the median. In the living room, where most light comes by way of other surfaces, the
+/// median is 2.1 % by 4,096 paths a point and 1.3 % by eight times as many.
+std::uint32_t pathsFor(const std::string& name) { return name == "godot_living_room_panels" ? 32768 : 4096; }
+
 bool hasDoubleSided(const fs::path& file) {
   const auto scene = oracle::readGlb(file);
   return std::ranges::any_of(scene.triangles, &oracle::Triangle::double_sided);
@@ -35,7 +40,7 @@ TEST_P(SolvedSurface, IsAsBrightAsTheTruthAndDarkWhereItIsDark) {
   const auto run = runSolve(RADIOSITY_CLIENT, file, folder, {"--error", "0.02", "--time-limit", "60"});
   ASSERT_TRUE(run.exit_code == 0 || run.exit_code == 3) << run.last_line;
   const auto lit = readLitScene(run.output, file);
-  const auto points = findPart(lit, {.point_samples = 4096, .points = 2000}, ReferencePart::kPoints,
+  const auto points = findPart(lit, {.point_samples = pathsFor(GetParam()), .points = 2000}, ReferencePart::kPoints,
                                fs::path(RADIOSITY_BINARY_DIR) / "references")
                           .reference.points;
   const auto error = compareSurface(lit, points).error;
