@@ -59,9 +59,9 @@ void MaterialLayers::addSurface() {
   metallic_inside_ = metallic != nullptr && laidAlike(material_.metallic_texture, use);
   specular_inside_ = specular != nullptr && laidAlike(material_.specular_texture, use);
   if (metallic != nullptr && !metallic_inside_)
-    metallic_.emplace(material_.metallic_texture, TexturePyramid(*metallic));
+    metallic_.emplace(Layer{material_.metallic_texture, TexturePyramid(*metallic)});
   if (specular != nullptr && !specular_inside_)
-    specular_.emplace(material_.specular_texture, TexturePyramid(*specular));
+    specular_.emplace(Layer{material_.specular_texture, TexturePyramid(*specular)});
   if (base == nullptr && !metallic_inside_ && !specular_inside_) return;
   int width = 1, height = 1;
   for (const auto* texture : {base, metallic_inside_ ? metallic : nullptr, specular_inside_ ? specular : nullptr}) {
@@ -85,7 +85,7 @@ void MaterialLayers::addSurface() {
     }
     return glm::vec4(rgb, opaque ? 1.0F : coverageOf(texel.a));
   };
-  surface_.emplace(use, TexturePyramid(width, height, pixels, opaque));
+  surface_.emplace(Layer{use, TexturePyramid(width, height, pixels, opaque)});
 }
 
 void MaterialLayers::addEmissive() {
@@ -95,7 +95,7 @@ void MaterialLayers::addEmissive() {
   const bool covered = base != nullptr && material_.alpha_mode != AlphaMode::kOpaque &&
                        laidAlike(material_.base_color_texture, material_.emissive_texture);
   if (!covered) {
-    emissive_.emplace(material_.emissive_texture, TexturePyramid(*light));
+    emissive_.emplace(Layer{material_.emissive_texture, TexturePyramid(*light)});
     return;
   }
   const int width = std::max(light->width, base->width), height = std::max(light->height, base->height);
@@ -103,7 +103,7 @@ void MaterialLayers::addEmissive() {
   const auto pixels = [this, colour, alpha](int x, int y) {
     return glm::vec4(glm::vec3(colour.at(x, y)), coverageOf(alpha.at(x, y).a));
   };
-  emissive_.emplace(material_.emissive_texture, TexturePyramid(width, height, pixels, false));
+  emissive_.emplace(Layer{material_.emissive_texture, TexturePyramid(width, height, pixels, false)});
 }
 
 }  // namespace radiosity::scene
