@@ -113,12 +113,7 @@ void LightGatherer::gather(const solver::GatherShot& shot, std::span<const solve
   const double waited_before = source.seconds();
   findLit(shot);
   const bool both = shot.half == solver::kBothHalves && points.size() > 1;
-  for (std::size_t half = 0; half < 2; ++half) {
-    for (auto* sum : {&lit_.weight[half], &lit_.visible_weight[half]}) {
-      std::fill_n(sum->begin(), lit_count_, 0.0F);
-    }
-  }
-  beginEdges();
+  beginSums();
   std::array<Lost, 2> lost{};
   const auto capacity = source.hemicubeCapacity(shot.resolution);
   std::vector<HemicubeView> views;
@@ -135,11 +130,46 @@ void LightGatherer::gather(const solver::GatherShot& shot, std::span<const solve
                 lost[half]);
     }
   }
+  deliverSums(shot, points.size(), lost, flux_scale, sink, counters);
+  counters.gather_seconds +=
+      std::chrono::duration<double>(Clock::now() - start).count() - (source.seconds() - waited_before);
+}
+
+void LightGatherer::gather(const solver::GatherShot& shot, std::span<const solver::HemicubeFrame> points,
+                           double flux_scale, const FluxSink& sink, solver::TransportCounters& counters) {
+  if (points.empty()) return;
+  const auto start = std::chrono::steady_clock::now();
+  findLit(shot);
+  const bool both = shot.half == solver::kBothHalves && points.size() > 1;
+  beginSums();
+  std::array<Lost, 2> lost{};
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const std::size_t half = both && 2 * i >= points.size() ? 1 : 0;
+    askRays(shot, points[i], half);
+    loseByRays(points[i], lost[half]);
+  }
+  deliverSums(shot, points.size(), lost, flux_scale, sink, counters);
+  counters.gather_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+void LightGatherer::beginSums() {
+  for (std::size_t half = 0; half < 2; ++half) {
+    for (auto* sum : {&lit_.weight[half], &lit_.visible_weight[half]}) {
+      std::fill_n(sum->begin(), lit_count_, 0.0F);
+    }
+  }
+  beginEdges();
+}
+
+/// What was found from so many points, of which each half has its part where the shot is of both.
+void LightGatherer::deliverSums(const solver::GatherShot& shot, std::size_t points, const std::array<Lost, 2>& lost,
+                                double flux_scale, const FluxSink& sink, solver::TransportCounters& counters) {
+  const bool both = shot.half == solver::kBothHalves && points > 1;
   const double area =
       static_cast<double>(shot.fill) * solver::polygonArea(std::span(shot.corners.data(), shot.corner_count));
-  const std::size_t first_half = both ? (points.size() + 1) / 2 : points.size();
+  const std::size_t first_half = both ? (points + 1) / 2 : points;
   for (std::size_t sums = 0; sums < (both ? 2U : 1U); ++sums) {
-    const std::size_t count = sums == 0 ? first_half : points.size() - first_half;
+    const std::size_t count = sums == 0 ? first_half : points - first_half;
     const double share = (both ? 0.5 : 1.0) * flux_scale, one = static_cast<double>(count) * solver::kWeightOne;
     const double escaped = static_cast<double>(lost[sums].escaped) / one;
     const double absorbed = static_cast<double>(lost[sums].absorbed) / one;
@@ -152,10 +182,8 @@ void LightGatherer::gather(const solver::GatherShot& shot, std::span<const solve
       sink.totals->backface[channel] += std::lrint(flux * absorbed);
     }
   }
-  counters.gather_points += points.size();
+  counters.gather_points += points;
   ++counters.gather_shots;
-  counters.gather_seconds +=
-      std::chrono::duration<double>(Clock::now() - start).count() - (source.seconds() - waited_before);
 }
 
 }  // namespace radiosity::gpu

@@ -29,6 +29,9 @@ class LightGatherer {
 
   void gather(const solver::GatherShot& shot, std::span<const solver::HemicubeFrame> points, double flux_scale,
               ImageSource& source, WeightCache& weights, const FluxSink& sink, solver::TransportCounters& counters);
+  /// The same by rays.
+  void gather(const solver::GatherShot& shot, std::span<const solver::HemicubeFrame> points, double flux_scale,
+              const FluxSink& sink, solver::TransportCounters& counters);
 
   /// Links of one shot, in steps, so that item buffers of several shots can be drawn at once: begin, one look for each
   /// point, finish.
@@ -36,6 +39,8 @@ class LightGatherer {
   void beginLinks(const solver::GatherShot& shot, std::span<const solver::NodeRun> named = {});
   void look(const solver::GatherShot& shot, const solver::HemicubeFrame& point, std::span<const std::uint32_t> items,
             const HemicubeWeights& weights, const ViewWindow* window = nullptr);
+  /// The same by rays: what the light loses on all sides is found, whichever links are wanted.
+  void look(const solver::GatherShot& shot, const solver::HemicubeFrame& point);
   /// Finds the places of some receivers, for windowOf() at all points of the shot.
   void findWanted(const solver::GatherShot& shot, std::span<const solver::NodeRun> named);
   /// What a look at these, and at boxes, can show; nothing where that is nearly all.
@@ -112,6 +117,11 @@ class LightGatherer {
                                         std::size_t size) const;
   void weighLost(const solver::HemicubeFrame& point, std::span<const std::uint32_t> items, std::uint32_t resolution,
                  const HemicubeWeights& weights, Lost& lost);
+  void beginSums();
+  void askRays(const solver::GatherShot& shot, const solver::HemicubeFrame& point, std::size_t half);
+  void loseByRays(const solver::HemicubeFrame& point, Lost& lost) const;
+  void deliverSums(const solver::GatherShot& shot, std::size_t points, const std::array<Lost, 2>& lost,
+                   double flux_scale, const FluxSink& sink, solver::TransportCounters& counters);
   void findVisibility(std::size_t sums, std::size_t points);
   [[nodiscard]] double delivered() const;
   [[nodiscard]] double conserve(double area, double kept) const;

@@ -22,9 +22,6 @@ constexpr std::size_t kMostCorners = 8;
 /// Triangles are widened by this part of their size, so that a ray cannot pass between two that share an edge.
 constexpr float kSeal = 1.0e-5F;
 
-/// Rays start so far from a surface, and end so far before another (unit box): well above the rounding of positions.
-constexpr double kLift = 2.0e-6;
-
 bool receives(const scene::LeafPoint& leaf, float area) { return leaf.triangle != scene::kNone && area > 0.0F; }
 
 std::size_t countReceivers(const scene::PatchScene& patches) {
@@ -41,7 +38,7 @@ std::size_t countReceivers(const scene::PatchScene& patches) {
 }  // namespace
 
 Receivers::Receivers(std::shared_ptr<const scene::PatchScene> patches)
-    : patches_(std::move(patches)), opaque_(std::make_unique<Opaque>()) {
+    : patches_(std::move(patches)), rays_(std::make_unique<Rays>()) {
   const auto count = countReceivers(*patches_);
   receivers_.reserve(count);
   for (auto* texels : {&texel_x_, &texel_y_}) texels->reserve(count);
@@ -83,21 +80,6 @@ bool Receivers::findConvex() const {
       return std::ranges::all_of(corners, [&](const glm::vec3& corner) { return plane.height(corner) >= -kInPlane; });
     });
   });
-}
-
-scene::Bvh Receivers::treeOfOpaque() const {
-  std::vector<scene::Bvh::Triangle> opaque;
-  for (std::size_t i = 0; i < corners_.size(); ++i) {
-    if (!patches_->surfaces[patches_->triangle_surface[i]].see_through) opaque.push_back(corners_[i]);
-  }
-  return scene::Bvh(std::move(opaque));
-}
-
-bool Receivers::isBlocked(const Ray& ray) const {
-  std::call_once(opaque_->made, [this] { opaque_->tree = treeOfOpaque(); });
-  const auto from = glm::dvec3(ray.at) + kLift * glm::dvec3(ray.normal);
-  const auto way = glm::dvec3(ray.at) + static_cast<double>(ray.reach) * glm::dvec3(ray.way) - from;
-  return opaque_->tree.meets(from, way, 0.0, 1.0 - 2.0 * kLift / glm::length(way));
 }
 
 void Receivers::findBlocks(Group& group) {

@@ -13,7 +13,7 @@
 #include <span>
 #include <vector>
 
-#include "server/scene/bvh.h"
+#include "server/geometry/ray_scene.h"
 #include "server/scene/patch_scene.h"
 
 namespace radiosity::gpu {
@@ -172,9 +172,26 @@ class Receivers {
   /// one of them is narrow, or lets light through in part, and the receiver's own pixel is right in the mean.
   [[nodiscard]] std::optional<bool> hiddenAmong(std::span<const std::uint32_t> items, const Ray& ray) const;
 
-  /// Whether anything opaque stands between, by intersection with all there is: dear, and asked where pixels cannot
-  /// tell.
+  /// Whether anything opaque stands between, by intersection with all there is.
   [[nodiscard]] bool isBlocked(const Ray& ray) const;
+
+  /// All triangles, for rays: made when first asked for, since many scenes never are. Throws std::bad_alloc. Ways pass
+  /// what one can see through by chance, from wayKey().
+  [[nodiscard]] const geometry::RayScene& rays() const;
+  /// Of a way from a receiver to a light; 0 where there is nothing to see through.
+  [[nodiscard]] std::uint64_t wayKey(std::uint32_t node, const glm::vec3& light) const;
+  /// Of a place.
+  [[nodiscard]] static std::uint64_t placeKey(const glm::vec3& place);
+  /// What light that leaves a place meets: nothing, or an unlit side of something, or a lit one. `key`: of the chance
+  /// by which it passes what one can see through.
+  enum class End { kNothing, kUnlit, kLit };
+  [[nodiscard]] End endOf(const geometry::Ray& ray, std::uint64_t key) const;
+  /// The same of geometry::kPacket rays at most.
+  void endsOf(std::span<const geometry::Ray> rays, std::uint64_t key, std::span<End> ends) const;
+  /// Where ways begin at a place, and end at a light: so far before it (unit box).
+  static constexpr float kLift = 2.0e-6F;
+  /// Farther than the unit box is wide.
+  static constexpr float kFar = 4.0F;
 
   /// Whether the item is of a surface that lets light through somewhere.
   [[nodiscard]] bool isSeeThrough(std::uint32_t item) const {
@@ -185,11 +202,10 @@ class Receivers {
   [[nodiscard]] bool anyMeets(std::span<const std::uint32_t> items, const Ray& ray) const;
 
  private:
-  /// The opaque triangles, from when they are first asked for: many scenes never do.
   bool is_convex_ = false;
-  struct Opaque {
+  struct Rays {
     std::once_flag made;
-    scene::Bvh tree;
+    geometry::RayScene scene;
   };
   /// Coplanar triangles of one chart that share corners.
   struct Facet {
@@ -206,7 +222,8 @@ class Receivers {
   void findFacets();
   [[nodiscard]] bool findConvex() const;
   void measure(Facet& facet);
-  [[nodiscard]] scene::Bvh treeOfOpaque() const;
+  [[nodiscard]] geometry::RayScene makeRays() const;
+  [[nodiscard]] End endAt(const geometry::Hit& first, const geometry::Ray& ray, std::uint64_t key) const;
   [[nodiscard]] static bool anyRises(std::span<const glm::vec3> corners, const glm::vec3& point,
                                      const glm::vec3& normal) {
     for (const auto& corner : corners) {
@@ -241,7 +258,7 @@ class Receivers {
   std::vector<Plane> planes_;                      ///< by triangle
   std::vector<std::array<glm::vec3, 3>> corners_;  ///< by triangle
   std::vector<std::array<bool, 2>> absorbs_;       ///< by triangle: front, back
-  std::unique_ptr<Opaque> opaque_;
+  std::unique_ptr<Rays> rays_;
   std::vector<Facet> facets_;
   std::vector<std::uint32_t> facet_of_;  ///< by triangle
   std::vector<std::uint32_t> facet_triangles_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <new>
 #include <numbers>
 #include <span>
 #include <utility>
@@ -50,10 +51,12 @@ glm::dvec3 cosineDirection(const glm::dvec3& normal, double u, double v) {
 
 LeafRays::LeafRays(const scene::PatchScene& patches, const std::vector<Side>& sides)
     : patches_(patches), sides_(sides), side_of_(patches.surfaces.size(), {scene::kNone, scene::kNone}) {
-  std::vector<scene::Bvh::Triangle> triangles(patches.triangles.size());
+  std::vector<geometry::Triangle> triangles(patches.triangles.size());
   for (std::size_t i = 0; i < patches.indices.size(); ++i)
     triangles[i / 3][i % 3] = patches.vertices[patches.indices[i]].position;
-  wide_ = scene::RayTree(scene::Bvh(std::move(triangles)));
+  auto built = geometry::RayScene::build(triangles);
+  if (!built) throw std::bad_alloc();
+  rays_ = std::move(*built);
   std::size_t leaves = 0;
   for (const auto& side : sides) leaves += side.leaf_count;
   side_of_value_.reserve(leaves);
@@ -140,14 +143,15 @@ LeafRays::Sight LeafRays::look(const Place& from, const glm::dvec3& direction, d
   Sight sight;
   sight.distance = reach;
   const auto origin = lifted(from);
-  scene::RayHit hit{};
-  if (!wide_.nearestHit(glm::vec3(origin), glm::vec3(direction), static_cast<float>(reach), hit, {}, from.triangle))
-    return sight;
-  sight.distance = hit.t;
+  const auto hit =
+      rays_.nearest({glm::vec3(origin), glm::vec3(direction), static_cast<float>(reach), from.triangle});
+  if (!hit.found()) return sight;
+  const auto t = static_cast<double>(hit.t);
+  sight.distance = t;
   const auto s = side_of_[patches_.triangle_surface[hit.triangle]][hit.front ? 0 : 1];
   if (s == scene::kNone) return sight;
   const auto& frame = patches_.triangles[hit.triangle];
-  const auto texel = texelAt(frame, origin + hit.t * direction);
+  const auto texel = texelAt(frame, origin + t * direction);
   const auto value = leafAt(sides_[s], texel);
   sight.end = {positionAt(frame, texel), glm::dvec3(hit.front ? frame.normal : -frame.normal), kNothing, hit.triangle};
   if (!has_stand_in_[value]) sight.end.value = value;
@@ -161,24 +165,34 @@ std::uint32_t LeafRays::leafAt(const Side& side, const glm::dvec2& texel) {
 }
 
 /// Whether a ray goes on through what it met.
-bool LeafRays::passes(const scene::RayHit& hit, const glm::dvec3& at, std::uint64_t key) const {
+bool LeafRays::passes(const geometry::Hit& hit, const glm::dvec3& at, std::uint64_t key) const {
   const auto& surface = patches_.surfaces[patches_.triangle_surface[hit.triangle]];
   if (!surface.see_through) return false;
   const double opacity = patches_.opacityAt(surface, glm::vec2(texelAt(patches_.triangles[hit.triangle], at))) / 255.0;
   return uniformFromKey(mixKeys(key, hit.triangle)) >= opacity;
 }
 
-std::uint32_t LeafRays::see(const Place& from, const glm::dvec3& direction, std::uint64_t key, Place& end) const {
+void LeafRays::meetFirst(std::span<const Place> from, std::span<const glm::dvec3> directions,
+                         std::span<geometry::Hit> hits) const {
+  std::array<geometry::Ray, geometry::kPacket> rays;
+  for (std::size_t i = 0; i < from.size(); ++i)
+    rays[i] = {glm::vec3(lifted(from[i])), glm::vec3(directions[i]), static_cast<float>(kFar), from[i].triangle};
+  rays_.nearest(std::span(rays).first(from.size()), hits);
+}
+
+std::uint32_t LeafRays::see(const Place& from, const glm::dvec3& direction, std::uint64_t key, Place& end,
+                            const geometry::Hit* first) const {
   auto origin = lifted(from);
   std::array<std::uint32_t, kMostSheets> passed;
   std::array<float, kMostSheets> distance;
   std::size_t sheets = 0, starts = 0;
   while (true) {
-    scene::RayHit hit{};
-    if (!wide_.nearestHit(glm::vec3(origin), glm::vec3(direction), static_cast<float>(kFar), hit,
-                          std::span(passed).first(sheets), from.triangle))
-      return direction.y >= 0.0 ? kSkyAbove : kSkyBelow;
-    const auto at = origin + hit.t * direction;
+    auto hit = first != nullptr
+                   ? *std::exchange(first, nullptr)
+                   : rays_.nearest({glm::vec3(origin), glm::vec3(direction), static_cast<float>(kFar), from.triangle},
+                                   std::span(passed).first(sheets));
+    if (!hit.found()) return direction.y >= 0.0 ? kSkyAbove : kSkyBelow;
+    const auto at = origin + static_cast<double>(hit.t) * direction;
     if (starts < kMostStarts && passes(hit, at, key)) {
       passed[sheets] = hit.triangle;  // those that lie in the same place count, too
       distance[sheets++] = hit.t;
@@ -214,13 +228,14 @@ bool LeafRays::isBeneath(const Side& side, std::uint32_t value) const {
 }
 
 /// What lies in the same place as the hit and is seen there instead, if that is something: then the hit is that.
-bool LeafRays::uncover(scene::RayHit& hit, const glm::dvec3& origin, const glm::dvec3& direction,
+bool LeafRays::uncover(geometry::Hit& hit, const glm::dvec3& origin, const glm::dvec3& direction,
                        std::span<std::uint32_t> passed, std::size_t sheets) const {
-  const auto reach = static_cast<float>(hit.t) + kSame;
+  const geometry::Ray again{glm::vec3(origin), glm::vec3(direction), hit.t + kSame};
   auto seen = hit;
   auto met = hit;
   for (passed[sheets++] = met.triangle; sheets < passed.size(); passed[sheets++] = met.triangle) {
-    if (!wide_.nearestHit(glm::vec3(origin), glm::vec3(direction), reach, met, passed.first(sheets))) break;
+    met = rays_.nearest(again, passed.first(sheets));
+    if (!met.found()) break;
     const auto s = side_of_[patches_.triangle_surface[met.triangle]][met.front ? 0 : 1];
     if (s != scene::kNone && patches_.seenOrder(met.triangle) < patches_.seenOrder(seen.triangle)) seen = met;
   }
@@ -236,12 +251,25 @@ LeafRays::Sight LeafRays::look(const Place& from, const glm::dvec3& direction) c
 bool LeafRays::isOpen(const Place& from, const glm::dvec3& to) const {
   const glm::dvec3 origin = lifted(from), way = to - origin;
   const double length = glm::length(way);
-  scene::RayHit hit{};
-  return length > kNearEnd && !wide_.nearestHit(glm::vec3(origin), glm::vec3(way / length),
-                                                static_cast<float>(length - kNearEnd), hit, {}, from.triangle);
+  return length > kNearEnd &&
+         rays_.open({glm::vec3(origin), glm::vec3(way / length), static_cast<float>(length - kNearEnd)});
 }
 
 glm::vec3 LeafRays::startOf(const Place& place) { return glm::vec3(lifted(place)); }
+
+void LeafRays::hide(const glm::vec3& from, const Points& points, std::int32_t* hidden) const {
+  geometry::Ways ways{};
+  for (std::size_t axis = 0; axis < 3; ++axis) ways.origin[axis].fill(from[static_cast<int>(axis)]);
+  for (std::size_t first = 0; first < points.x.size(); first += geometry::kPacket) {
+    for (std::size_t k = 0; k < geometry::kPacket; ++k) {
+      ways.direction[0][k] = points.x[first + k] - from.x;
+      ways.direction[1][k] = points.y[first + k] - from.y;
+      ways.direction[2][k] = points.z[first + k] - from.z;
+    }
+    const auto open = rays_.open(ways);
+    for (std::size_t k = 0; k < geometry::kPacket; ++k) hidden[first + k] = (open >> k & 1U) != 0 ? 0 : 1;
+  }
+}
 
 std::optional<LeafRays::Place> LeafRays::endOn(std::uint32_t value, const Place& from,
                                                const glm::dvec3& direction) const {

@@ -11,10 +11,9 @@
 #include <utility>
 #include <vector>
 
+#include "server/geometry/ray_scene.h"
 #include "server/scene/bounds.h"
-#include "server/scene/bvh.h"
 #include "server/scene/patch_scene.h"
-#include "server/scene/ray_tree.h"
 #include "server/solver/side.h"
 
 namespace radiosity::solver {
@@ -33,7 +32,7 @@ class LeafRays {
                                             ///< one in the same plane and frame
   };
 
-  /// O(n log n) in triangles. Both are to outlive it.
+  /// O(n log n) in triangles, on all cores. Both are to outlive it. Throws std::bad_alloc.
   LeafRays(const scene::PatchScene& patches, const std::vector<Side>& sides);
 
   [[nodiscard]] std::uint32_t indexOfSide(std::uint32_t value) const { return side_of_value_[value]; }
@@ -62,7 +61,12 @@ class LeafRays {
   /// the ray or not, by chance from `key`.
   /// `end`: where the ray ends, and on which leaf, be it that another's value is told; kNothing: on an unlit side, of
   /// `end.triangle`. As it was where it ends in the sky.
-  [[nodiscard]] std::uint32_t see(const Place& from, const glm::dvec3& direction, std::uint64_t key, Place& end) const;
+  /// `first`: what the ray meets, of meetFirst(); null: that is looked for.
+  [[nodiscard]] std::uint32_t see(const Place& from, const glm::dvec3& direction, std::uint64_t key, Place& end,
+                                  const geometry::Hit* first = nullptr) const;
+  /// What rays of see() meet first, geometry::kPacket of them at most: asked together they cost half.
+  void meetFirst(std::span<const Place> from, std::span<const glm::dvec3> directions,
+                 std::span<geometry::Hit> hits) const;
   /// Light may change within the leaf from one place to the next: something passes through it or right before it.
   [[nodiscard]] bool isCut(std::uint32_t value) const { return is_cut_[value]; }
   /// Who is seen where a leaf lies: itself, unless it has no area.
@@ -73,11 +77,12 @@ class LeafRays {
   [[nodiscard]] bool isOpen(const Place& from, const glm::dvec3& to) const;
   /// Where ways from a place begin: a little before it.
   [[nodiscard]] static glm::vec3 startOf(const Place& place);
-  /// scene::RayTree::hide().
-  [[nodiscard]] bool hide(const scene::Shaft& shaft, const scene::ShaftPoints& points, std::size_t most,
-                          std::int32_t* hidden) const {
-    return wide_.hide(shaft, points, most, hidden);
-  }
+  /// Points of a light, structure of arrays: geometry::kPacket after geometry::kPacket of them.
+  struct Points {
+    std::vector<float> x, y, z;
+  };
+  /// By point, whether something hides it from where ways from a place begin: 1, or 0.
+  void hide(const glm::vec3& from, const Points& points, std::int32_t* hidden) const;
   /// Where a ray of look() that ends on a leaf ends, without looking what lies before, to a few millionths. Nothing:
   /// the triangles of its surface have not all the same normal, or it is met at too flat an angle.
   [[nodiscard]] std::optional<Place> endOn(std::uint32_t value, const Place& from, const glm::dvec3& direction) const;
@@ -90,13 +95,13 @@ class LeafRays {
   [[nodiscard]] std::uint32_t foundStandIn(std::uint32_t value) const;
   [[nodiscard]] std::uint32_t neighbourOf(const Side& side, std::uint32_t leaf) const;
   [[nodiscard]] bool isBeneath(const Side& side, std::uint32_t value) const;
-  bool uncover(scene::RayHit& hit, const glm::dvec3& origin, const glm::dvec3& direction,
+  bool uncover(geometry::Hit& hit, const glm::dvec3& origin, const glm::dvec3& direction,
                std::span<std::uint32_t> passed, std::size_t sheets) const;
-  [[nodiscard]] bool passes(const scene::RayHit& hit, const glm::dvec3& at, std::uint64_t key) const;
+  [[nodiscard]] bool passes(const geometry::Hit& hit, const glm::dvec3& at, std::uint64_t key) const;
   /// The leaf of a side that a texel lies on, or the nearest, by value.
   [[nodiscard]] static std::uint32_t leafAt(const Side& side, const glm::dvec2& texel);
 
-  scene::RayTree wide_;
+  geometry::RayScene rays_;
   std::vector<std::array<std::uint32_t, 2>> side_of_;  ///< by surface
   std::vector<std::uint32_t> side_of_value_;
   std::vector<bool> has_stand_in_;  ///< by leaf value: it has no area

@@ -124,12 +124,12 @@ std::uint64_t LeafSights::keyOf(std::uint32_t value, const Side& side, std::size
 }
 
 /// Its steps are made from the last to the first.
-std::uint32_t LeafSights::endOfRay(LeafRays::Place place, glm::dvec3 direction, std::uint64_t key,
-                                   std::vector<Step>& steps) const {
+std::uint32_t LeafSights::endOfRay(LeafRays::Place place, const glm::dvec3& direction, std::uint64_t key,
+                                   const geometry::Hit& first, std::vector<Step>& steps) const {
   std::array<std::uint32_t, kMostSteps> by{};
   std::size_t count = 0;
   LeafRays::Place there;
-  auto seen = rays_->see(place, direction, key, there);
+  auto seen = rays_->see(place, direction, key, there, &first);
   const bool at_once = seen == LeafRays::kNothing && there.value == LeafRays::kNothing &&
                        glm::distance(place.position, there.position) < rays_->widthOf(place.value);
   while (goes_on_ && count < kMostSteps && seen < leaf_count_ && seen == there.value && isParted(seen)) {
@@ -163,15 +163,30 @@ std::uint32_t LeafSights::traceLeaf(std::uint32_t value, const Side& side, std::
   const auto draw = draws(value, side, half);
   const auto chance = mixKeys(keyOf(value, side, half), 1);
   const auto first = firstOf(value);
-  for (std::uint32_t k = 0; k < count_[value]; ++k) {
-    if (endAt(half, first + k) != kUntraced) continue;
-    const auto at = draw(k);
-    const auto place = rays_->placeOn(value, {at.z, at.w});
-    const auto end = endOfRay(place, cosineDirection(place.normal, at.x, at.y), mixKeys(chance, k), made.steps);
-    if (end < endCount()) {
-      seen_[half].set(first + k, end);
-    } else {
-      made.rays.push_back({first + k, end});
+  std::array<std::uint32_t, geometry::kPacket> number;
+  std::array<LeafRays::Place, geometry::kPacket> place;
+  std::array<glm::dvec3, geometry::kPacket> direction;
+  std::array<geometry::Hit, geometry::kPacket> hit;
+  for (std::uint32_t k = 0; k < count_[value];) {
+    std::size_t together = 0;
+    for (; k < count_[value] && together < geometry::kPacket; ++k) {
+      if (endAt(half, first + k) != kUntraced) continue;
+      const auto at = draw(k);
+      number[together] = k;
+      place[together] = rays_->placeOn(value, {at.z, at.w});
+      direction[together] = cosineDirection(place[together].normal, at.x, at.y);
+      ++together;
+    }
+    rays_->meetFirst(std::span(place).first(together), std::span(direction).first(together),
+                     std::span(hit).first(together));
+    for (std::size_t i = 0; i < together; ++i) {
+      const auto ray = first + number[i];
+      const auto end = endOfRay(place[i], direction[i], mixKeys(chance, number[i]), hit[i], made.steps);
+      if (end < endCount()) {
+        seen_[half].set(ray, end);
+      } else {
+        made.rays.push_back({ray, end});
+      }
     }
   }
   return wanted;

@@ -158,8 +158,8 @@ class LeafSights {
   void layOut(std::span<const std::uint16_t> counts);
   /// Returns how many rays.
   std::uint32_t traceLeaf(std::uint32_t value, const Side& side, std::size_t half, NewSteps& made);
-  [[nodiscard]] std::uint32_t endOfRay(LeafRays::Place place, glm::dvec3 direction, std::uint64_t key,
-                                       std::vector<Step>& steps) const;
+  [[nodiscard]] std::uint32_t endOfRay(LeafRays::Place place, const glm::dvec3& direction, std::uint64_t key,
+                                       const geometry::Hit& first, std::vector<Step>& steps) const;
   [[nodiscard]] std::uint32_t withSteps(std::uint32_t end, std::size_t half, std::vector<Step>& steps) const;
   [[nodiscard]] std::uint32_t beginSlice();
   void traceSlice(std::uint32_t end);

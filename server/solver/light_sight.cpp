@@ -13,15 +13,13 @@ namespace {
 
 /// Ways end so far before the light (unit box): what it lies on is no nearer.
 constexpr float kSpare = 2e-6F;
-/// More triangles than these are not looked through: rays would be no slower.
-constexpr std::size_t kMostTriangles = 512;
 
 /// What all points would bring to a place, and those that are seen: cosines over squares of distances, all alike
 /// scaled.
 struct Brought {
   float all, seen;
 };
-RADIOSITY_CLONES Brought bringAll(const scene::ShaftPoints& points, const glm::vec3& from, const glm::vec3& normal,
+RADIOSITY_CLONES Brought bringAll(const LeafRays::Points& points, const glm::vec3& from, const glm::vec3& normal,
                                   const glm::vec3& of_light, const std::int32_t* hidden) {
   constexpr std::size_t kLanes = 8;
   const float *px = points.x.data(), *py = points.y.data(), *pz = points.z.data();
@@ -53,7 +51,7 @@ LightSight::LightSight(std::shared_ptr<const LeafRays> rays, const LightPolygon&
     const Sobol4 draws(mixKeys(seed_, half));
     for (std::uint32_t i = 0; i < kSets * kPoints; ++i) {
       const auto draw = draws(i);
-      const auto point = light.point(draw.x, draw.y);
+      const auto point = light.point(draw.x, draw.y) + kSpare * light.normal;
       auto& set = points_[half][i / kPoints];  // each spread evenly, and all together
       set.x.push_back(point.x);
       set.y.push_back(point.y);
@@ -77,9 +75,8 @@ std::optional<float> LightSight::link(std::uint32_t value, std::size_t half, std
     const bool before = glm::dot(place.position - glm::dvec3(corners[0]), glm::dvec3(light_.normal)) > 0.0;
     if (!before || form_factor.front < 1.0) return std::nullopt;
     const auto from = rays_->startOf(place), normal = glm::vec3(place.normal);
-    const scene::Shaft shaft(from, normal, corners, light_.normal, kSpare);
     const auto& points = points_[half][i % kSets];
-    if (!rays_->hide(shaft, points, kMostTriangles, hidden.data())) return std::nullopt;
+    rays_->hide(from, points, hidden.data());
     const auto [all, seen] = bringAll(points, from, normal, light_.normal, hidden.data());
     if (!(all > 0.0F)) return std::nullopt;
     sum += form_factor.value * static_cast<double>(seen / all);

@@ -23,15 +23,15 @@ class LightSight {
 
   /// Irradiance for a radiosity of one, as a link is: mean over a leaf that has area, from so many places of it. Places
   /// and points are Sobol's, scrambled half by half, and leaf by leaf. Nothing where the plane of the leaf cuts the
-  /// light, or that of the light the leaf, and where very many triangles lie between. Surfaces that one can see through
-  /// hide all. Single precision; a microsecond or two a place.
+  /// light, or that of the light the leaf. Surfaces that one can see through hide all. Single precision; a few
+  /// microseconds a place.
   [[nodiscard]] std::optional<float> link(std::uint32_t value, std::size_t half, std::uint32_t places) const;
 
  private:
   std::shared_ptr<const LeafRays> rays_;
   const LightPolygon light_;
   std::uint64_t seed_;
-  std::array<std::array<scene::ShaftPoints, kSets>, 2> points_;  ///< by half
+  std::array<std::array<LeafRays::Points, kSets>, 2> points_;  ///< by half
 };
 
 }  // namespace radiosity::solver

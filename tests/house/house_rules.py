@@ -19,9 +19,10 @@ OWN_INCLUDES = [
     ("tests/", ["common/", "protocol/", "server/", "client/", "tests/"]),
     ("common/", ["common/"]),
     ("protocol/", ["common/", "protocol/"]),
-    ("server/scene/", ["common/", "server/scene/"]),
-    ("server/solver/", ["common/", "server/solver/", r"server/scene/(scene|patch_scene|bounds|bvh|ray_tree|shading_normals)\.h"]),
-    ("server/gpu/", ["common/", "server/gpu/", "server/solver/", r"server/scene/(scene|patch_scene|bvh)\.h"]),
+    ("server/geometry/", ["common/", "server/geometry/"]),
+    ("server/scene/", ["common/", "server/geometry/", "server/scene/"]),
+    ("server/solver/", ["common/", "server/geometry/", "server/solver/", r"server/scene/(scene|patch_scene|bounds|bvh|ray_tree|shading_normals)\.h"]),
+    ("server/gpu/", ["common/", "server/geometry/", "server/gpu/", "server/solver/", r"server/scene/(scene|patch_scene|bvh)\.h"]),
     ("server/engine/", ["common/", "server/engine/", "server/scene/", "server/solver/", "server/gpu/", "server/state/"]),
     ("server/state/", ["common/", "server/state/"]),
     ("server/net/", ["common/", "protocol/", "server/net/", r"server/engine/engine\.h", r"server/state/uploads\.h"]),
@@ -38,7 +39,8 @@ LIBRARY_HOMES = [
     (r"openssl/(evp|sha)", "OpenSSL's digests", ["common/"]),
     (r"nlohmann/", "the JSON library", ["protocol/", "server/scene/", "client/cli/", "client/lib/", "tests/"]),
     (r"tiny_gltf", "the glTF reader", ["server/scene/", "tests/"]),
-    (r"(gtest|gmock|benchmark|embree\d)/", "test libraries", ["tests/"]),
+    (r"(gtest|gmock|benchmark)/", "test libraries", ["tests/"]),
+    (r"embree\d/", "the ray tracer", ["server/geometry/", "tests/"]),
 ]
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')

@@ -1,0 +1,105 @@
+// What Receivers ask rays.
+#include <bit>
+#include <glm/geometric.hpp>
+#include <new>
+
+#include "server/gpu/receivers.h"
+#include "server/solver/sampling.h"
+
+namespace radiosity::gpu {
+namespace {
+
+/// So many sheets that one can see through a ray passes; the next counts as one that it does not.
+constexpr std::size_t kMostSheets = 256;
+
+/// Partial opacity stops a way or not, by chance.
+class Opacity final : public geometry::SeeThrough {
+ public:
+  explicit Opacity(std::shared_ptr<const scene::PatchScene> patches) : patches_(std::move(patches)) {}
+
+  [[nodiscard]] bool passes(std::uint32_t triangle, float u, float v, std::uint64_t key) const override {
+    const auto texelOf = [&](std::size_t k) {
+      return patches_->vertices[patches_->indices[3 * std::size_t{triangle} + k]].texel;
+    };
+    const auto texel = texelOf(0) + u * (texelOf(1) - texelOf(0)) + v * (texelOf(2) - texelOf(0));
+    return passesAt(*patches_, triangle, texel, key);
+  }
+
+  [[nodiscard]] static bool passesAt(const scene::PatchScene& patches, std::uint32_t triangle, const glm::vec2& texel,
+                                     std::uint64_t key) {
+    const auto& surface = patches.surfaces[patches.triangle_surface[triangle]];
+    const double opacity = patches.opacityAt(surface, texel) / 255.0;
+    return solver::uniformFromKey(solver::mixKeys(key, triangle)) >= opacity;
+  }
+
+ private:
+  std::shared_ptr<const scene::PatchScene> patches_;
+};
+
+/// Where in its triangle's frame a point of its plane lies.
+glm::vec2 texelAt(const scene::TriangleFrame& frame, const glm::vec3& point) {
+  const glm::dvec3 du(frame.du), dv(frame.dv), way = glm::dvec3(point) - glm::dvec3(frame.origin);
+  const double uu = glm::dot(du, du), uv = glm::dot(du, dv), vv = glm::dot(dv, dv);
+  const double u = glm::dot(way, du), v = glm::dot(way, dv), under = uu * vv - uv * uv;
+  return {(u * vv - v * uv) / under, (v * uu - u * uv) / under};
+}
+
+}  // namespace
+
+const geometry::RayScene& Receivers::rays() const {
+  std::call_once(rays_->made, [this] { rays_->scene = makeRays(); });
+  return rays_->scene;
+}
+
+geometry::RayScene Receivers::makeRays() const {
+  std::vector<bool> see_through;
+  if (!patches_->opacity.empty()) {
+    for (const auto surface : patches_->triangle_surface)
+      see_through.push_back(patches_->surfaces[surface].see_through);
+  }
+  // One thread: workers are as many as there are cores.
+  auto built = geometry::RayScene::build(corners_, 1, see_through, std::make_shared<Opacity>(patches_));
+  if (!built) throw std::bad_alloc();
+  return std::move(*built);
+}
+
+std::uint64_t Receivers::wayKey(std::uint32_t node, const glm::vec3& light) const {
+  return patches_->opacity.empty() ? 0 : solver::mixKeys(placeKey(light), node);
+}
+
+std::uint64_t Receivers::placeKey(const glm::vec3& place) {
+  const auto bits = [](float value) { return std::uint64_t{std::bit_cast<std::uint32_t>(value)}; };
+  return solver::mixKeys(bits(place.x) << 32U | bits(place.y), bits(place.z));
+}
+
+bool Receivers::isBlocked(const Ray& ray) const {
+  const auto from = ray.at + kLift * ray.normal, way = ray.at + ray.reach * ray.way - from;
+  return !rays().open({from, way, 1.0F - 2.0F * kLift / glm::length(way)});
+}
+
+Receivers::End Receivers::endOf(const geometry::Ray& ray, std::uint64_t key) const {
+  return endAt(rays().nearest(ray), ray, key);
+}
+
+void Receivers::endsOf(std::span<const geometry::Ray> rays, std::uint64_t key, std::span<End> ends) const {
+  std::array<geometry::Hit, geometry::kPacket> hits;
+  this->rays().nearest(rays, std::span(hits).first(rays.size()));
+  for (std::size_t i = 0; i < rays.size(); ++i) ends[i] = endAt(hits[i], rays[i], solver::mixKeys(key, i));
+}
+
+Receivers::End Receivers::endAt(const geometry::Hit& first, const geometry::Ray& ray, std::uint64_t key) const {
+  std::vector<std::uint32_t> passed;
+  for (auto hit = first; hit.found(); hit = rays().nearest(ray, passed)) {
+    const auto& surface = patches_->surfaces[patches_->triangle_surface[hit.triangle]];
+    const auto texel = [&] {
+      return texelAt(patches_->triangles[hit.triangle], ray.origin + hit.t * ray.direction);
+    };
+    const bool passes = surface.see_through && passed.size() < kMostSheets &&
+                        Opacity::passesAt(*patches_, hit.triangle, texel(), key);
+    if (!passes) return absorbs(hit.triangle, !hit.front) ? End::kUnlit : End::kLit;
+    passed.push_back(hit.triangle);
+  }
+  return End::kNothing;
+}
+
+}  // namespace radiosity::gpu
