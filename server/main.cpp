@@ -87,8 +87,8 @@ int serve(Options options) {
   const auto uploads = options.server.uploads;
   engine_options.settings = options.solve;
   engine_options.first_texels = options.first_texels;
-  engine_options.make_transport = [workers = options.workers] {
-    return gpu::makeWorkerTransport({workers, "/proc/self/exe"});
+  engine_options.make_transport = [workers = options.workers, sight = options.sight] {
+    return gpu::makeWorkerTransport({.workers = workers, .executable = "/proc/self/exe", .sight = sight});
   };
   const auto engine = engine::makeEngine(std::move(engine_options));
   if (!engine) return report(engine.error());

@@ -68,6 +68,15 @@ void addSolveOptions(CLI::App& app, Options& o, Raw& raw) {
                  "Renderer processes; 0: one for each core in software, one on a GPU, with a thread for each core")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
+  app.add_option(
+         "--visibility", o.sight,
+         "How it is found out what a light sees: by rays, by images, or auto: by rays where the processor draws, "
+         "by images on a GPU")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, gpu::Sight>{{"auto", gpu::Sight::kAuto},
+                                                                            {"rays", gpu::Sight::kRays},
+                                                                            {"images", gpu::Sight::kImages}})
+                      .description("{auto,rays,images}"))
+      ->default_str("auto");
   app.add_option("--sky", raw.sky,
                  "Radiance of everything outside the scene, nits: 1000, or R,G,B, or R,G,B/R,G,B (above / below the "
                  "horizon); for scenes without a sky of their own")

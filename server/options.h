@@ -9,6 +9,7 @@
 #include "common/log.h"
 #include "common/result.h"
 #include "server/engine/engine.h"
+#include "server/gpu/sight.h"
 #include "server/net/server_options.h"
 
 namespace radiosity {
@@ -23,6 +24,7 @@ struct Options {
   engine::SolveSettings solve;
   std::uint64_t first_texels = 100'000;  ///< EngineOptions::first_texels
   int workers = 0;                       ///< 0: one for each core with a software renderer, one on a GPU
+  gpu::Sight sight = gpu::Sight::kAuto;
   std::string log_level = "info";
   LogFormat log_format = LogFormat::kText;
 };

@@ -37,6 +37,7 @@ struct SolveOptions {
   double texel_size_m = 0.0;  ///< 0: by number
   std::uint64_t seed = 1;
   unsigned workers = 0;     ///< 0: the server's choice
+  std::string visibility;   ///< empty: the server's choice
   std::string link_memory;  ///< as radiosityd takes it; empty: the server's choice
   bool double_sided = false;
   bool unlit = false, error_map = false, quiet = false;
@@ -110,6 +111,8 @@ class Solve {
         .program = *program, .arguments = {"--first-texels", "0"}, .keep_going = [] { return !interrupted(); }};
     if (options_.workers > 0)
       start.arguments.insert(start.arguments.end(), {"--workers", std::to_string(options_.workers)});
+    if (!options_.visibility.empty())
+      start.arguments.insert(start.arguments.end(), {"--visibility", options_.visibility});
     if (!options_.link_memory.empty())
       start.arguments.insert(start.arguments.end(), {"--link-memory", options_.link_memory});
     if (!options_.state.empty())
@@ -339,6 +342,12 @@ void addSolve(CLI::App& app, Run& run) {
       command.add_option("--workers", options->workers, "render processes of the private server (default: one a core)")
           ->check(CLI::Range(1U, 256U).description(""))
           ->type_name("N");
+  auto* visibility = command
+                         .add_option("--visibility", options->visibility,
+                                     "how the private server finds out what a light sees: rays, images or auto "
+                                     "(default: rays where the processor draws, images on a GPU)")
+                         ->check(CLI::IsMember({"rays", "images", "auto"}).description(""))
+                         ->type_name("HOW");
   auto* memory = command
                      .add_option("--link-memory", options->link_memory,
                                  "memory for links of the private server, such as 256MiB (default: 1GiB); when it is "
@@ -354,6 +363,7 @@ void addSolve(CLI::App& app, Run& run) {
   command.add_option("--server", options->server.url, "solve there rather than on a private radiosityd")
       ->type_name("URL")
       ->excludes(workers)
+      ->excludes(visibility)
       ->excludes(memory)
       ->excludes(state);
   addAccessOptions(command, options->server);

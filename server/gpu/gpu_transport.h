@@ -8,6 +8,7 @@
 
 #include "common/result.h"
 #include "server/gpu/drawing.h"
+#include "server/gpu/sight.h"
 #include "server/solver/transport.h"
 
 namespace radiosity::gpu {
@@ -16,7 +17,7 @@ namespace radiosity::gpu {
 /// kUnavailable, naming every platform tried and why it failed, when there is no OpenGL 4.5 core. `hands`: threads that
 /// look at images (see ShotCrew); 0: as many as suit the context. `drawing`: as suits it, but for tests.
 [[nodiscard]] Result<std::unique_ptr<solver::Transport>> makeInProcessTransport(
-    std::size_t hands = 0, std::optional<Drawing> drawing = std::nullopt);
+    std::size_t hands = 0, std::optional<Drawing> drawing = std::nullopt, Sight sight = Sight::kAuto);
 
 /// How many hands each of so many contexts shall have: with a card, one a core together, up to 32 each; one where
 /// processors draw.
@@ -28,6 +29,7 @@ struct WorkerOptions {
   /// A worker that owes an answer for longer than this, and 2 us for each pixel it has to draw (50 times what llvmpipe
   /// takes), counts as hung, unless it was hardly let run. Long, because to be wrong costs its work twice.
   std::chrono::milliseconds patience{30'000};
+  Sight sight = Sight::kAuto;
   std::size_t hands = 0;  ///< of each worker (ShotCrew); 0: as many as suit the driver
 };
 

@@ -57,9 +57,11 @@ std::size_t handsFor(bool software, std::size_t contexts) {
   return std::clamp<std::size_t>(std::thread::hardware_concurrency() / contexts, 1, kMostHands);
 }
 
-Result<std::unique_ptr<solver::Transport>> makeInProcessTransport(std::size_t hands, std::optional<Drawing> drawing) {
+Result<std::unique_ptr<solver::Transport>> makeInProcessTransport(std::size_t hands, std::optional<Drawing> drawing,
+                                                                  Sight sight) {
   auto crew = ShotCrew::create(drawing);
   if (!crew) return tl::unexpected(crew.error());
+  (*crew)->setSight(sight);
   (*crew)->setHands(hands > 0 ? hands : handsFor((*crew)->context().software(), 1));
   return std::make_unique<InProcessTransport>(std::move(*crew));
 }

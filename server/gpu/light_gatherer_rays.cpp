@@ -11,9 +11,12 @@
 namespace radiosity::gpu {
 namespace {
 
-/// From each point so many rays find out what of its light is lost.
-constexpr std::uint32_t kLostRays = 64;
-static_assert(kLostRays % geometry::kPacket == 0 && solver::kWeightOne % kLostRays == 0);
+/// From each point so many rays find out whether some of its light is lost, and so many how much: with 64 of them the
+/// light of the Cornell box, of which a quarter leaves by its open side, is 0.6 % off. What is lost by less than a part
+/// in the first number is missed in part, a seventh of a hundredth of the light at most.
+constexpr std::uint32_t kFirstRays = 256, kAllRays = 1024;
+static_assert(kFirstRays % geometry::kPacket == 0 && kAllRays % geometry::kPacket == 0);
+static_assert(solver::kWeightOne % kFirstRays == 0 && solver::kWeightOne % kAllRays == 0);
 
 /// cos cos / r^2 for every receiver; 0 of what lies behind the light. Branch-free, so that it vectorises.
 RADIOSITY_CLONES void weighReceivers(const glm::vec3& o, const glm::vec3& n, std::size_t count, const float* x,
@@ -59,23 +62,27 @@ void LightGatherer::askRays(const solver::GatherShot& shot, const solver::Hemicu
 
 /// The same rays from the same point, whenever: what is lost there changes only where the scene does.
 void LightGatherer::loseByRays(const solver::HemicubeFrame& point, Lost& lost) const {
-  constexpr std::uint64_t kWeight = solver::kWeightOne / kLostRays;
   const auto key = receivers_->placeKey(point.origin);
   const solver::Sobol4 draws(key);
   const glm::vec3 from = point.origin + Receivers::kLift * point.normal;
-  for (std::uint32_t first = 0; first < kLostRays; first += geometry::kPacket) {
+  std::uint64_t escaped = 0, absorbed = 0;
+  std::uint32_t cast = 0;
+  while (cast < kFirstRays || (cast < kAllRays && escaped + absorbed > 0)) {
     std::array<geometry::Ray, geometry::kPacket> rays;
+    std::array<geometry::Hit, geometry::kPacket> hits;
     for (std::uint32_t i = 0; i < geometry::kPacket; ++i) {
-      const auto draw = draws(first + i);
+      const auto draw = draws(cast + i);
       rays[i] = {from, glm::vec3(solver::cosineDirection(glm::dvec3(point.normal), draw.x, draw.y)), Receivers::kFar};
     }
-    std::array<Receivers::End, geometry::kPacket> ends;
-    receivers_->endsOf(rays, solver::mixKeys(key, first), ends);
-    for (const auto end : ends) {
-      lost.escaped += end == Receivers::End::kNothing ? kWeight : 0;
-      lost.absorbed += end == Receivers::End::kUnlit ? kWeight : 0;
+    receivers_->nearest(rays, solver::mixKeys(key, cast), hits);
+    for (const auto& hit : hits) {
+      escaped += hit.found() ? 0 : 1;
+      absorbed += hit.found() && receivers_->absorbs(hit.triangle, !hit.front) ? 1 : 0;
     }
+    cast += geometry::kPacket;
   }
+  lost.escaped += escaped * (solver::kWeightOne / cast);
+  lost.absorbed += absorbed * (solver::kWeightOne / cast);
 }
 
 }  // namespace radiosity::gpu

@@ -6,7 +6,9 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "server/geometry/way_queue.h"
 #include "server/gpu/hemicube_views.h"
+#include "server/solver/sampling.h"
 
 namespace radiosity::gpu {
 namespace {
@@ -16,6 +18,9 @@ using Clock = std::chrono::steady_clock;
 /// A leaf whose size is more than this part of its distance from the light takes its mean irradiance from its solid
 /// angle: points of it would differ too much.
 constexpr float kNear = 0.3F;
+
+/// So many rays find out what of a light is lost.
+constexpr std::uint32_t kLostRays = 1024;
 
 /// Cone falloff of KHR_lights_punctual. `cosine`: of the angle from the axis.
 float coneFalloff(const solver::PointShot& shot, float cosine) {
@@ -118,15 +123,14 @@ bool beyondRange(const solver::PointShot& shot, const scene::Surface& surface) {
 
 }  // namespace
 
-void PunctualGatherer::lightGroup(const solver::PointShot& shot, const Receivers::Group& group,
-                                  std::span<const std::uint32_t> items) {
+template <typename Take>
+void PunctualGatherer::arriveAtGroup(const solver::PointShot& shot, const Receivers::Group& group,
+                                     const Take& take) const {
   const auto& patches = receivers_->patches();
   const auto& surface = patches.surfaces[group.surface];
-  const auto [o, t, b, n] = hemicubeAxes(shot.frame);
-  const HemicubeItems image(items, shot.resolution, shot.frame.lattice);
+  const auto& o = shot.frame.origin;
   for (std::size_t i = group.first; i < group.first + group.count; ++i) {
     const auto& receiver = receivers_->all()[i];
-    const bool two_sided = (receivers_->careOf(receiver) & Receivers::kTwoSided) != 0;
     const auto& frame = patches.triangles[receiver.triangle];
     if (surface.planar && group.side * glm::dot(frame.normal, o - frame.origin) <= 0.0F) return;  // all turns away
     const auto middle = receivers_->point(receiver, glm::vec2(0.5F)) - o;
@@ -139,21 +143,29 @@ void PunctualGatherer::lightGroup(const solver::PointShot& shot, const Receivers
       near_mean = static_cast<float>(angle / glm::length(glm::cross(du, dv)));
     }
     const std::uint32_t count = (receiver.full || receiver.hasSpots()) ? shot.receivers.count : 1;
-    float sum = 0.0F;
     for (std::uint32_t p = 0; p < count; ++p) {
       const auto [at, place] = receivers_->place(receiver, shot.receivers.at[p]);
       const auto normal = group.side * place->normal;
       const auto d = at - o;
-      const glm::vec3 local(glm::dot(d, t), glm::dot(d, b), glm::dot(d, n));
       const float square = glm::dot(d, d), distance = std::sqrt(square), cosine = -glm::dot(d, normal) / distance;
-      if (local.z <= 0.0F || cosine <= 0.0F) continue;
-      const float strength = coneFalloff(shot, local.z / distance) * rangeFade(shot, distance);
+      const float before = glm::dot(d, shot.frame.normal);
+      if (before <= 0.0F || cosine <= 0.0F) continue;
+      const float strength = coneFalloff(shot, before / distance) * rangeFade(shot, distance);
       if (strength <= 0.0F) continue;
       const float pixel_size = 2.0F * distance / static_cast<float>(shot.resolution);
-      if (isHidden(*receivers_, image.at(local), {at, normal, -d, 1.0F, pixel_size}, two_sided)) continue;
-      sum += strength * (near_mean >= 0.0F ? near_mean : cosine / square);
+      const float value = strength * (near_mean >= 0.0F ? near_mean : cosine / square);
+      take(Arrival{
+          i, value / static_cast<float>(count), {at, normal, -d, 1.0F, pixel_size}, receivers_->careOf(receiver)});
     }
-    sum_[i] += sum / static_cast<float>(count);
+  }
+}
+
+template <typename Take>
+void PunctualGatherer::forEachArrival(const solver::PointShot& shot, const Take& take) const {
+  for (const auto& group : receivers_->groups()) {
+    const auto& surface = receivers_->patches().surfaces[group.surface];
+    const bool behind = glm::dot(shot.frame.normal, farthest(surface, shot.frame.normal) - shot.frame.origin) <= 0.0F;
+    if (!behind && !beyondRange(shot, surface)) arriveAtGroup(shot, group, take);
   }
 }
 
@@ -208,47 +220,44 @@ void PunctualGatherer::gather(const solver::PointShot& shot, double flux_scale, 
   const HemicubeView view{shot.frame, 0.0F};
   const auto items = source.hemicubes(HemicubePass::kItems, shot.resolution, std::span(&view, 1), counters);
   sum_.assign(receivers_->all().size(), 0.0F);
-  for (const auto& group : receivers_->groups()) {
-    const auto& surface = receivers_->patches().surfaces[group.surface];
-    const bool behind = glm::dot(shot.frame.normal, farthest(surface, shot.frame.normal) - shot.frame.origin) <= 0.0F;
-    if (!behind && !beyondRange(shot, surface)) lightGroup(shot, group, items);
-  }
+  const auto [o, t, b, n] = hemicubeAxes(shot.frame);
+  const HemicubeItems image(items, shot.resolution, shot.frame.lattice);
+  forEachArrival(shot, [&](const Arrival& arrival) {
+    const auto d = -arrival.ray.way;
+    const glm::vec3 local(glm::dot(d, t), glm::dot(d, b), glm::dot(d, n));
+    const bool two_sided = (arrival.care & Receivers::kTwoSided) != 0;
+    if (!isHidden(*receivers_, image.at(local), arrival.ray, two_sided)) sum_[arrival.receiver] += arrival.value;
+  });
   deliver(shot.intensity, shot.emitted, weighLost(shot, items), shot.half, flux_scale, sink, counters);
   ++counters.point_images;
   counters.gather_seconds +=
       std::chrono::duration<double>(Clock::now() - start).count() - (source.seconds() - waited_before);
 }
 
-void PunctualGatherer::lightGroup(const solver::ParallelShot& shot, const ParallelAxes& axes,
-                                  const solver::ParallelView& view, std::size_t view_index,
-                                  const Receivers::Group& group, std::span<const std::uint32_t> items) {
+template <typename Take>
+void PunctualGatherer::forEachArrival(const solver::ParallelShot& shot, const solver::ParallelView& view,
+                                      std::size_t view_index, const Take& take) const {
   const auto& patches = receivers_->patches();
-  const auto& surface = patches.surfaces[group.surface];
-  const auto size = static_cast<int>(shot.resolution);
   const bool sky = shot.sky_count > 0;  // one point for each direction, all for a single one
-  const auto pixel_size = static_cast<float>(std::sqrt(axes.pixel_area));
   const auto sky_point = static_cast<std::uint32_t>(view_index) % shot.receivers.count;
-  for (std::size_t i = group.first; i < group.first + group.count; ++i) {
-    const auto& receiver = receivers_->all()[i];
-    const bool two_sided = (receivers_->careOf(receiver) & Receivers::kTwoSided) != 0;
-    if (surface.planar && group.side * glm::dot(patches.triangles[receiver.triangle].normal, view.direction) <= 0.0F)
-      return;
-    const std::uint32_t first = sky ? sky_point : 0;
-    const std::uint32_t count = sky || !(receiver.full || receiver.hasSpots()) ? 1 : shot.receivers.count;
-    float visible = 0.0F;
-    for (std::uint32_t p = first; p < first + count; ++p) {
-      const auto [at, frame] = receivers_->place(receiver, shot.receivers.at[p]);
-      const auto normal = group.side * frame->normal;
-      const float cosine = glm::dot(normal, view.direction);
-      if (cosine <= 0.0F) continue;
-      const auto d = at - axes.centre;
-      const PixelPlace place{items.data(), size, size, glm::dot(axes.right, d) + axes.shift.x,
-                             glm::dot(axes.up, d) + axes.shift.y};
-      // Far enough to be beyond everything: the scene fits a box of side 1 or so.
-      const bool hidden = isHidden(*receivers_, place, {at, normal, view.direction, 4.0F, pixel_size}, two_sided);
-      visible += hidden ? 0.0F : cosine;
+  for (const auto& group : receivers_->groups()) {
+    const bool planar = patches.surfaces[group.surface].planar;
+    for (std::size_t i = group.first; i < group.first + group.count; ++i) {
+      const auto& receiver = receivers_->all()[i];
+      if (planar && group.side * glm::dot(patches.triangles[receiver.triangle].normal, view.direction) <= 0.0F) break;
+      const std::uint32_t first = sky ? sky_point : 0;
+      const std::uint32_t count = sky || !(receiver.full || receiver.hasSpots()) ? 1 : shot.receivers.count;
+      for (std::uint32_t p = first; p < first + count; ++p) {
+        const auto [at, frame] = receivers_->place(receiver, shot.receivers.at[p]);
+        const auto normal = group.side * frame->normal;
+        const float cosine = glm::dot(normal, view.direction);
+        if (cosine <= 0.0F) continue;
+        take(Arrival{i,
+                     cosine / static_cast<float>(count),
+                     {at, normal, view.direction, Receivers::kFar, 0.0F},
+                     receivers_->careOf(receiver)});
+      }
     }
-    sum_[i] += visible / static_cast<float>(count);
   }
 }
 
@@ -318,7 +327,17 @@ void PunctualGatherer::gather(const solver::ParallelShot& shot, std::span<const 
     for (std::size_t i = 0; i < some.size(); ++i) {
       const auto items = images.subspan(i * pixels, pixels);
       const auto axes = source.axes(some[i], shot.resolution);
-      for (const auto& group : receivers_->groups()) lightGroup(shot, axes, some[i], first + i, group, items);
+      const auto size = static_cast<int>(shot.resolution);
+      const auto pixel_size = static_cast<float>(std::sqrt(axes.pixel_area));
+      forEachArrival(shot, some[i], first + i, [&](const Arrival& arrival) {
+        const auto d = arrival.ray.at - axes.centre;
+        const PixelPlace place{items.data(), size, size, glm::dot(axes.right, d) + axes.shift.x,
+                               glm::dot(axes.up, d) + axes.shift.y};
+        auto ray = arrival.ray;
+        ray.pixel_size = pixel_size;
+        const bool two_sided = (arrival.care & Receivers::kTwoSided) != 0;
+        if (!isHidden(*receivers_, place, ray, two_sided)) sum_[arrival.receiver] += arrival.value;
+      });
       const auto of_view = weighLost(some[i], axes.pixel_area, items);
       lost.all += of_view.all;
       lost.escaped += of_view.escaped;
@@ -354,6 +373,115 @@ void PunctualGatherer::deliver(const std::array<double, 3>& unit, const std::arr
     sink.totals->escaped[channel] += std::lrint(flux * lost.escaped);
     sink.totals->backface[channel] += std::lrint(flux * lost.absorbed);
   }
+}
+
+template <typename Each>
+void PunctualGatherer::askRays(const glm::vec3& light, const Each& each) {
+  struct Asked {
+    std::size_t receiver = 0;
+    float value = 0.0F;
+  };
+  geometry::WayQueue<Asked> ways(receivers_->rays());
+  const auto tell = [this](const Asked& asked) { sum_[asked.receiver] += asked.value; };
+  each([&](const Arrival& arrival) {
+    const auto& ray = arrival.ray;
+    const auto from = ray.at + Receivers::kLift * ray.normal;
+    const auto key = receivers_->wayKey(static_cast<std::uint32_t>(arrival.receiver), light);
+    ways.add(from, ray.at + ray.reach * ray.way - from, key, {arrival.receiver, arrival.value}, tell);
+  });
+  ways.flush(tell);
+}
+
+void PunctualGatherer::gather(const solver::PointShot& shot, double flux_scale, const FluxSink& sink,
+                              solver::TransportCounters& counters) {
+  const auto start = Clock::now();
+  sum_.assign(receivers_->all().size(), 0.0F);
+  askRays(shot.frame.origin, [&](const auto& take) { forEachArrival(shot, take); });
+  deliver(shot.intensity, shot.emitted, loseByRays(shot), shot.half, flux_scale, sink, counters);
+  ++counters.point_images;  // a look is counted as one, whichever way
+  counters.gather_seconds += std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+void PunctualGatherer::gather(const solver::ParallelShot& shot, std::span<const solver::ParallelView> views,
+                              double flux_scale, const FluxSink& sink, solver::TransportCounters& counters) {
+  const auto start = Clock::now();
+  const auto mine = views.subspan(shot.first_view, shot.view_count);
+  sum_.assign(receivers_->all().size(), 0.0F);
+  Lost lost;
+  for (std::size_t i = 0; i < mine.size(); ++i) {
+    askRays(mine[i].direction, [&](const auto& take) { forEachArrival(shot, mine[i], i, take); });
+    const auto of_view = loseByRays(mine[i]);
+    lost.all += of_view.all;
+    lost.escaped += of_view.escaped;
+    lost.absorbed += of_view.absorbed;
+  }
+  if (shot.sky_count > 0) scaleToSky(shot, views.subspan(shot.first_of_sky, shot.sky_count));
+  deliver(shot.irradiance, shot.emitted, lost, shot.half, flux_scale, sink, counters);
+  counters.parallel_images += mine.size();
+  counters.gather_seconds += std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+/// Rays spread evenly over the solid angle into which the light shines.
+PunctualGatherer::Lost PunctualGatherer::loseByRays(const solver::PointShot& shot) const {
+  const auto [o, t, b, n] = hemicubeAxes(shot.frame);
+  const float least = shot.cone_scale > 0.0F ? std::clamp(-shot.cone_offset / shot.cone_scale, 0.0F, 1.0F) : 0.0F;
+  const auto key = receivers_->placeKey(o);
+  const solver::Sobol4 draws(key);
+  Lost lost;
+  for (std::uint32_t first = 0; first < kLostRays; first += geometry::kPacket) {
+    std::array<geometry::Ray, geometry::kPacket> rays;
+    std::array<double, geometry::kPacket> weights;
+    std::array<geometry::Hit, geometry::kPacket> hits;
+    for (std::uint32_t i = 0; i < geometry::kPacket; ++i) {
+      const auto draw = draws(first + i);
+      const auto cosine = 1.0F - static_cast<float>(draw.x) * (1.0F - least);
+      const float sine = std::sqrt(std::max(0.0F, 1.0F - cosine * cosine));
+      const auto angle = static_cast<float>(2.0 * std::numbers::pi * draw.y);
+      const auto direction = cosine * n + sine * (std::cos(angle) * t + std::sin(angle) * b);
+      rays[i] = {o, direction, Receivers::kFar};
+      weights[i] = static_cast<double>(coneFalloff(shot, cosine));
+    }
+    receivers_->nearest(rays, solver::mixKeys(key, first), hits);
+    for (std::size_t i = 0; i < hits.size(); ++i) {
+      lost.all += weights[i];
+      const double reached = hits[i].found() ? weights[i] * static_cast<double>(rangeFade(shot, hits[i].t)) : 0.0;
+      lost.escaped += weights[i] - reached;  // what fades on its way arrives nowhere
+      if (hits[i].found() && receivers_->absorbs(hits[i].triangle, !hits[i].front)) lost.absorbed += reached;
+    }
+  }
+  return lost;
+}
+
+/// Rays spread evenly over a disk around the box, which the light crosses.
+PunctualGatherer::Lost PunctualGatherer::loseByRays(const solver::ParallelView& view) const {
+  const auto centre = 0.5F * (box_[0] + box_[1]);
+  const float radius = 0.5F * glm::distance(box_[0], box_[1]);
+  const auto up = glm::cross(view.direction, view.right);
+  const auto key = receivers_->placeKey(view.direction);
+  const solver::Sobol4 draws(key);
+  std::size_t hit = 0, absorbed = 0;
+  for (std::uint32_t first = 0; first < kLostRays; first += geometry::kPacket) {
+    std::array<geometry::Ray, geometry::kPacket> rays;
+    std::array<geometry::Hit, geometry::kPacket> hits;
+    for (std::uint32_t i = 0; i < geometry::kPacket; ++i) {
+      const auto draw = draws(first + i);
+      const auto far = radius * static_cast<float>(std::sqrt(draw.x));
+      const auto angle = static_cast<float>(2.0 * std::numbers::pi * draw.y);
+      const auto across = far * (std::cos(angle) * view.right + std::sin(angle) * up);
+      rays[i] = {centre + across + 1.1F * radius * view.direction, -view.direction, Receivers::kFar};
+    }
+    receivers_->nearest(rays, solver::mixKeys(key, first), hits);
+    for (const auto& found : hits) {
+      hit += found.found() ? 1 : 0;
+      absorbed += found.found() && receivers_->absorbs(found.triangle, !found.front) ? 1 : 0;
+    }
+  }
+  const double ray_area = std::numbers::pi * static_cast<double>(radius * radius) / kLostRays;
+  Lost lost;
+  lost.all = solver::boxSilhouette(box_, view.direction);
+  lost.escaped = lost.all - static_cast<double>(hit) * ray_area;
+  lost.absorbed = static_cast<double>(absorbed) * ray_area;
+  return lost;
 }
 
 }  // namespace radiosity::gpu

@@ -1,5 +1,5 @@
 // Light without extent (point, spot, directional, sky) at every leaf: exact irradiance at receiving points times
-// visibility, which item buffers decide. One thread.
+// visibility, which item buffers or rays decide. One thread.
 #pragma once
 
 #include <memory>
@@ -24,18 +24,39 @@ class PunctualGatherer {
   void gather(const solver::ParallelShot& shot, std::span<const solver::ParallelView> views, double flux_scale,
               ImageSource& source, const FluxSink& sink, solver::TransportCounters& counters);
 
+  /// The same by rays.
+  void gather(const solver::PointShot& shot, double flux_scale, const FluxSink& sink,
+              solver::TransportCounters& counters);
+  void gather(const solver::ParallelShot& shot, std::span<const solver::ParallelView> views, double flux_scale,
+              const FluxSink& sink, solver::TransportCounters& counters);
+
  private:
   /// Shares of a shot's flux that left the scene, and that fell on unlit sides.
   struct Lost {
     double all = 0.0, escaped = 0.0, absorbed = 0.0;
   };
 
-  void lightGroup(const solver::PointShot& shot, const Receivers::Group& group, std::span<const std::uint32_t> items);
-  void lightGroup(const solver::ParallelShot& shot, const ParallelAxes& axes, const solver::ParallelView& view,
-                  std::size_t view_index, const Receivers::Group& group, std::span<const std::uint32_t> items);
+  /// What a light brings to a place, should nothing hide it, and the way to the light.
+  struct Arrival {
+    std::size_t receiver;
+    float value;
+    Receivers::Ray ray;
+    std::uint32_t care;  ///< Receivers::careOf
+  };
+  template <typename Take>
+  void forEachArrival(const solver::PointShot& shot, const Take& take) const;
+  template <typename Take>
+  void forEachArrival(const solver::ParallelShot& shot, const solver::ParallelView& view, std::size_t view_index,
+                      const Take& take) const;
+  template <typename Take>
+  void arriveAtGroup(const solver::PointShot& shot, const Receivers::Group& group, const Take& take) const;
+  template <typename Each>
+  void askRays(const glm::vec3& light, const Each& each);
   [[nodiscard]] Lost weighLost(const solver::PointShot& shot, std::span<const std::uint32_t> items) const;
   [[nodiscard]] Lost weighLost(const solver::ParallelView& view, double pixel_area,
                                std::span<const std::uint32_t> items) const;
+  [[nodiscard]] Lost loseByRays(const solver::PointShot& shot) const;
+  [[nodiscard]] Lost loseByRays(const solver::ParallelView& view) const;
   [[nodiscard]] static float skyScale(std::span<const glm::vec3> normals, const glm::vec3& axis,
                                       std::span<const solver::ParallelView> sky);
   void scaleToSky(const solver::ParallelShot& shot, std::span<const solver::ParallelView> sky);

@@ -182,12 +182,8 @@ class Receivers {
   [[nodiscard]] std::uint64_t wayKey(std::uint32_t node, const glm::vec3& light) const;
   /// Of a place.
   [[nodiscard]] static std::uint64_t placeKey(const glm::vec3& place);
-  /// What light that leaves a place meets: nothing, or an unlit side of something, or a lit one. `key`: of the chance
-  /// by which it passes what one can see through.
-  enum class End { kNothing, kUnlit, kLit };
-  [[nodiscard]] End endOf(const geometry::Ray& ray, std::uint64_t key) const;
-  /// The same of geometry::kPacket rays at most.
-  void endsOf(std::span<const geometry::Ray> rays, std::uint64_t key, std::span<End> ends) const;
+  /// What geometry::kPacket rays at most meet that does not let them pass; `key`: of the chance by which it does.
+  void nearest(std::span<const geometry::Ray> rays, std::uint64_t key, std::span<geometry::Hit> hits) const;
   /// Where ways begin at a place, and end at a light: so far before it (unit box).
   static constexpr float kLift = 2.0e-6F;
   /// Farther than the unit box is wide.
@@ -223,7 +219,7 @@ class Receivers {
   [[nodiscard]] bool findConvex() const;
   void measure(Facet& facet);
   [[nodiscard]] geometry::RayScene makeRays() const;
-  [[nodiscard]] End endAt(const geometry::Hit& first, const geometry::Ray& ray, std::uint64_t key) const;
+  [[nodiscard]] geometry::Hit goOn(const geometry::Hit& first, const geometry::Ray& ray, std::uint64_t key) const;
   [[nodiscard]] static bool anyRises(std::span<const glm::vec3> corners, const glm::vec3& point,
                                      const glm::vec3& normal) {
     for (const auto& corner : corners) {

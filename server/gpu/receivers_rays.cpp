@@ -77,29 +77,22 @@ bool Receivers::isBlocked(const Ray& ray) const {
   return !rays().open({from, way, 1.0F - 2.0F * kLift / glm::length(way)});
 }
 
-Receivers::End Receivers::endOf(const geometry::Ray& ray, std::uint64_t key) const {
-  return endAt(rays().nearest(ray), ray, key);
+void Receivers::nearest(std::span<const geometry::Ray> rays, std::uint64_t key, std::span<geometry::Hit> hits) const {
+  this->rays().nearest(rays, hits);
+  if (patches_->opacity.empty()) return;
+  for (std::size_t i = 0; i < rays.size(); ++i) hits[i] = goOn(hits[i], rays[i], solver::mixKeys(key, i));
 }
 
-void Receivers::endsOf(std::span<const geometry::Ray> rays, std::uint64_t key, std::span<End> ends) const {
-  std::array<geometry::Hit, geometry::kPacket> hits;
-  this->rays().nearest(rays, std::span(hits).first(rays.size()));
-  for (std::size_t i = 0; i < rays.size(); ++i) ends[i] = endAt(hits[i], rays[i], solver::mixKeys(key, i));
-}
-
-Receivers::End Receivers::endAt(const geometry::Hit& first, const geometry::Ray& ray, std::uint64_t key) const {
+geometry::Hit Receivers::goOn(const geometry::Hit& first, const geometry::Ray& ray, std::uint64_t key) const {
   std::vector<std::uint32_t> passed;
-  for (auto hit = first; hit.found(); hit = rays().nearest(ray, passed)) {
-    const auto& surface = patches_->surfaces[patches_->triangle_surface[hit.triangle]];
-    const auto texel = [&] {
-      return texelAt(patches_->triangles[hit.triangle], ray.origin + hit.t * ray.direction);
-    };
-    const bool passes = surface.see_through && passed.size() < kMostSheets &&
-                        Opacity::passesAt(*patches_, hit.triangle, texel(), key);
-    if (!passes) return absorbs(hit.triangle, !hit.front) ? End::kUnlit : End::kLit;
+  auto hit = first;
+  for (; hit.found() && passed.size() < kMostSheets; hit = rays().nearest(ray, passed)) {
+    if (!patches_->surfaces[patches_->triangle_surface[hit.triangle]].see_through) break;
+    const auto texel = texelAt(patches_->triangles[hit.triangle], ray.origin + hit.t * ray.direction);
+    if (!Opacity::passesAt(*patches_, hit.triangle, texel, key)) break;
     passed.push_back(hit.triangle);
   }
-  return End::kNothing;
+  return hit;
 }
 
 }  // namespace radiosity::gpu

@@ -21,6 +21,8 @@ class ShotCrew {
   /// From the next scene on, at least 1; fewer in scenes so large that so many would take more than 1 GiB.
   void setHands(std::size_t hands) { wanted_ = hands; }
   [[nodiscard]] std::size_t hands() const { return hands_.size(); }
+  /// From the next scene on; kAuto at first.
+  void setSight(Sight sight) { sight_ = sight; }
   /// After an error there is no scene.
   [[nodiscard]] Result<void> setScene(std::shared_ptr<const scene::PatchScene> patches);
   /// As ShotRunner's. What a hand, or `take`, throws is thrown here, when all hands have stopped.
@@ -52,6 +54,7 @@ class ShotCrew {
   RenderDesk desk_;
   std::vector<std::unique_ptr<Hand>> hands_;  ///< none: there is no scene
   std::size_t wanted_ = 1;
+  Sight sight_ = Sight::kAuto;
 };
 
 }  // namespace radiosity::gpu

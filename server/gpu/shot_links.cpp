@@ -11,7 +11,11 @@ Result<solver::TransportCounters> ShotRunner::measure(const ShotSpan& shots, con
   if (!receivers_) return fail(ErrorCode::kInternal, "setScene must come before measure");
   if (const auto good = checkShots(shots); !good) return tl::unexpected(good.error());
   solver::TransportCounters counters;
-  measureGather(shots, take, counters);
+  if (sight_ == Sight::kRays && shots.mode != solver::LinkMode::kPaperMipmap) {
+    measureByRays(shots, take, counters);
+  } else {
+    measureGather(shots, take, counters);
+  }
   measureScatter(shots, take, counters);
   if (const auto good = images_.check(); !good) return tl::unexpected(good.error());
   return counters;
@@ -44,6 +48,21 @@ void ShotRunner::measureScatter(const ShotSpan& shots, const solver::Transport::
     sink.clear();
     take(shots.gather.size() + i, std::move(links));
   }
+}
+
+void ShotRunner::measureByRays(const ShotSpan& shots, const solver::Transport::TakeLinks& take,
+                               solver::TransportCounters& counters) {
+  const auto start = std::chrono::steady_clock::now();
+  for (std::size_t i = 0; i < shots.gather.size(); ++i) {
+    const auto& shot = shots.gather[i];
+    if (shot.point_count == 0) continue;
+    gatherer_.beginLinks(shot, shots.receivers.subspan(shot.first_run, shot.run_count));
+    for (const auto& point : shots.points.subspan(shot.first_point, shot.point_count)) gatherer_.look(shot, point);
+    solver::LinkSample links;
+    gatherer_.finishLinks(shot, links, counters);
+    take(i, std::move(links));
+  }
+  counters.gather_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 void ShotRunner::measureGather(const ShotSpan& shots, const solver::Transport::TakeLinks& take,

@@ -88,8 +88,9 @@ Result<void> checkShots(const ShotSpan& shots) {
   return {};
 }
 
-void ShotRunner::setScene(const std::shared_ptr<const Receivers>& receivers) {
+void ShotRunner::setScene(const std::shared_ptr<const Receivers>& receivers, Sight sight) {
   receivers_ = receivers;
+  sight_ = sight;
   punctual_ = PunctualGatherer(receivers);
   accumulator_ = ScatterAccumulator(receivers->patches().nodeCount());
   gatherer_ = LightGatherer(receivers);
@@ -104,6 +105,11 @@ Result<solver::TransportCounters> ShotRunner::run(const ShotSpan& shots, const F
   }
   solver::TransportCounters counters;
   scatter(shots, sink, counters);
+  if (sight_ == Sight::kRays && shots.mode != solver::LinkMode::kPaperMipmap) {
+    gatherByRays(shots, sink, counters);
+    if (const auto good = images_.check(); !good) return tl::unexpected(good.error());
+    return counters;
+  }
   for (const auto& shot : shots.gather) {
     gatherer_.gather(shot, shots.points.subspan(shot.first_point, shot.point_count), shots.flux_scale, images_,
                      *weights_, sink, counters);
@@ -114,6 +120,13 @@ Result<solver::TransportCounters> ShotRunner::run(const ShotSpan& shots, const F
   }
   if (const auto good = images_.check(); !good) return tl::unexpected(good.error());
   return counters;
+}
+
+void ShotRunner::gatherByRays(const ShotSpan& shots, const FluxSink& sink, solver::TransportCounters& counters) {
+  for (const auto& shot : shots.gather)
+    gatherer_.gather(shot, shots.points.subspan(shot.first_point, shot.point_count), shots.flux_scale, sink, counters);
+  for (const auto& shot : shots.point_lights) punctual_.gather(shot, shots.flux_scale, sink, counters);
+  for (const auto& shot : shots.parallel) punctual_.gather(shot, shots.views, shots.flux_scale, sink, counters);
 }
 
 void ShotRunner::scatter(const ShotSpan& shots, const FluxSink& sink, solver::TransportCounters& counters) {

@@ -11,6 +11,7 @@
 #include "server/gpu/light_gatherer.h"
 #include "server/gpu/punctual_gatherer.h"
 #include "server/gpu/scatter_accumulator.h"
+#include "server/gpu/sight.h"
 
 namespace radiosity::gpu {
 
@@ -35,7 +36,7 @@ class ShotRunner {
   ShotRunner(ImageSource images, WeightCache& weights) : images_(std::move(images)), weights_(&weights) {}
 
   /// After the scene of the renderers.
-  void setScene(const std::shared_ptr<const Receivers>& receivers);
+  void setScene(const std::shared_ptr<const Receivers>& receivers, Sight sight);
   [[nodiscard]] Result<solver::TransportCounters> run(const ShotSpan& shots, const FluxSink& sink);
   /// Links of every gather shot, then of every scatter shot, each by itself (Transport::measure).
   [[nodiscard]] Result<solver::TransportCounters> measure(const ShotSpan& shots,
@@ -48,8 +49,13 @@ class ShotRunner {
   void measureScatter(const ShotSpan& shots, const solver::Transport::TakeLinks& take,
                       solver::TransportCounters& counters);
 
+  void measureByRays(const ShotSpan& shots, const solver::Transport::TakeLinks& take,
+                     solver::TransportCounters& counters);
+  void gatherByRays(const ShotSpan& shots, const FluxSink& sink, solver::TransportCounters& counters);
+
   ImageSource images_;
   WeightCache* weights_;
+  Sight sight_ = Sight::kImages;
   ScatterAccumulator accumulator_;
   LightGatherer gatherer_;
   std::shared_ptr<const Receivers> receivers_;

@@ -44,7 +44,7 @@ class Worker {
 
  private:
   Result<void> takeScene(Message& message) {
-    const auto [nodes, hands] = BodyReader(message.body).value<SceneBody>();
+    const auto [nodes, hands, sight] = BodyReader(message.body).value<SceneBody>();
     auto packed = SharedMemory::map(std::move(message.fds[0]));
     if (!packed) return tl::unexpected(packed.error());
     auto flux = SharedMemory::map(std::move(message.fds[1]));
@@ -55,6 +55,7 @@ class Worker {
       return fail(ErrorCode::kInternal, "accumulators do not fit the scene");
     }
     crew_->setHands(std::max<std::size_t>(hands, 1));
+    crew_->setSight(static_cast<Sight>(sight));
     if (auto set = crew_->setScene(std::move(*scene)); !set) return set;
     flux_ = std::move(*flux);
     sink_ = fluxRegionSink(flux_.bytes(), nodes);

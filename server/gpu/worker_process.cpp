@@ -180,13 +180,11 @@ Result<void> WorkerProcess::awaitReady(const Patience& patience) {
   return {};
 }
 
-Result<void> WorkerProcess::sendScene(const SharedMemory& packed, std::size_t nodes, std::size_t hands,
-                                      const Patience& patience) {
-  auto flux = SharedMemory::create("radiosity flux", fluxRegionBytes(nodes));
+Result<void> WorkerProcess::sendScene(const SharedMemory& packed, const SceneBody& body, const Patience& patience) {
+  auto flux = SharedMemory::create("radiosity flux", fluxRegionBytes(body.nodes));
   if (!flux) return tl::unexpected(flux.error());
   flux_ = std::move(*flux);
-  nodes_ = nodes;
-  const SceneBody body{nodes, hands};
+  nodes_ = body.nodes;
   const std::array<int, 2> fds{packed.fd(), flux_.fd()};
   const auto bytes = std::as_bytes(std::span(&body, 1));
   if (const auto sent = sendMessage(socket_.get(), MessageKind::kScene, bytes, fds, patience); !sent) {

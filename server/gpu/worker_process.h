@@ -28,9 +28,8 @@ class WorkerProcess {
 
   /// Until the worker has a context.
   [[nodiscard]] Result<void> awaitReady(const Patience& patience);
-  /// Gives it the scene and fresh accumulators, and so many hands (ShotCrew); answer with awaitScene().
-  [[nodiscard]] Result<void> sendScene(const SharedMemory& packed, std::size_t nodes, std::size_t hands,
-                                       const Patience& patience);
+  /// Gives it the scene, fresh accumulators for its nodes, and what else goes with it; answer with awaitScene().
+  [[nodiscard]] Result<void> sendScene(const SharedMemory& packed, const SceneBody& body, const Patience& patience);
   [[nodiscard]] Result<void> awaitScene(const Patience& patience);
   [[nodiscard]] Result<void> send(MessageKind kind, std::span<const std::byte> body, const Patience& patience) const;
   /// Its next message, which must be of this kind.

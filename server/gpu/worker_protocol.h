@@ -36,6 +36,7 @@ struct ReadyBody {
 };
 struct SceneBody {
   std::uint64_t nodes = 0, hands = 1;
+  std::uint64_t sight = 0;  ///< Sight
 };
 struct ChunkBody {
   std::uint64_t chunk = 0;

@@ -94,7 +94,7 @@ class WorkerTransport final : public solver::Transport {
     deaths_ = 0;
     for (auto& slot : slots_) {
       if (!slot.process) continue;
-      auto sent = slot.process->sendScene(packed_, nodes_, hands_, scenePatience());
+      auto sent = slot.process->sendScene(packed_, sceneBody(), scenePatience());
       slot.takes_scene = sent.has_value();
       if (!sent) lose(slot, sent.error());
     }
@@ -341,12 +341,14 @@ class WorkerTransport final : public solver::Transport {
     return {};
   }
 
+  [[nodiscard]] SceneBody sceneBody() const { return {nodes_, hands_, static_cast<std::uint64_t>(options_.sight)}; }
+
   Result<WorkerProcess> startOne() {
     auto process = WorkerProcess::start(options_.executable);
     if (!process) return process;
     if (auto ready = process->awaitReady(startPatience()); !ready) return tl::unexpected(ready.error());
     if (!has_scene_) return process;
-    if (auto sent = process->sendScene(packed_, nodes_, hands_, scenePatience()); !sent)
+    if (auto sent = process->sendScene(packed_, sceneBody(), scenePatience()); !sent)
       return tl::unexpected(sent.error());
     if (auto taken = process->awaitScene(scenePatience()); !taken) return tl::unexpected(taken.error());
     return process;

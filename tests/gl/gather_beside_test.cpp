@@ -90,7 +90,7 @@ constexpr float kFloorX = -0.02F, kFloorWidth = 0.4F;
 /// Upright, parallel to the wall, standing on the light.
 Quad board(float x) { return {{x, -0.5F, 0.0F}, {0, 1, 0}, {0, 0, 0.5F}, 1, 1}; }
 
-TEST_F(GatherBeside, OnePointTellsWhereverItLies) {
+TEST_P(GatherBeside, OnePointTellsWhereverItLies) {
   const Room room{0.001F, 0.1F, 2, kFloorX, kFloorWidth};
   build(room);
   std::mt19937 random(5);
@@ -110,7 +110,7 @@ TEST_F(GatherBeside, OnePointTellsWhereverItLies) {
 }
 
 // 1,600 rays of which one in sixteen or nine in twenty arrive: standard error 0.6 % and 1.3 % of the form factor.
-TEST_F(GatherBeside, OnePointLooksPastASkirtingBoard) {
+TEST_P(GatherBeside, OnePointLooksPastASkirtingBoard) {
   for (const auto& [x, tolerance] : {std::pair{-0.004F, 0.02}, {-0.012F, 0.04}}) {
     Room room{0.001F, 0.1F, 2, kFloorX, kFloorWidth};
     build(room);
@@ -126,7 +126,7 @@ TEST_F(GatherBeside, OnePointLooksPastASkirtingBoard) {
 
 // A lamp of 256 points, of which a twentieth lies behind the wall's plane. Those next to the wall would tell of all.
 // The standard error of 4 * 8 * 256 rays of which one in twelve or nine in ten arrive is 4 % and 0.4 % of what arrives.
-TEST_F(GatherBeside, ManyPointsTellHowMuchIsSeen) {
+TEST_P(GatherBeside, ManyPointsTellHowMuchIsSeen) {
   Room room{0.0F, 0.02F, 1, -0.38F, 0.4F, board(-0.04F)};
   build(room);
   const auto past_board = expected(room, [](const auto&, const auto& to) { return to.x > -0.04; });
@@ -179,25 +179,25 @@ class GatherBesideHoles : public GatherBeside {
   }
 };
 
-TEST_F(GatherBesideHoles, AHoleInAFloorShinesAtNothing) {
+TEST_P(GatherBesideHoles, AHoleInAFloorShinesAtNothing) {
   makeHoles({0.001F, 0.1F, 2, -0.2F, 0.5F, {}, 5}, 2, 0.0F);
   EXPECT_EQ(arrives(10, 0.6F), 0.0);
 }
 
 // 20 * 4 * 12 rays of which half find the floor: standard error 1.6 %.
-TEST_F(GatherBesideHoles, LeavesThatAreThereByHalfShineByHalf) {
+TEST_P(GatherBesideHoles, LeavesThatAreThereByHalfShineByHalf) {
   makeHoles({0.001F, 0.1F, 2, -0.2F, 0.5F, {}, 5}, 2, 0.5F);
   EXPECT_NEAR(arrives(20, 0.8F), 0.5, 0.05);
 }
 
-TEST_F(GatherBesideHoles, OfALeafThatAWallStandsOnTheWallSeesWhatIsLeft) {
+TEST_P(GatherBesideHoles, OfALeafThatAWallStandsOnTheWallSeesWhatIsLeft) {
   makeHoles({0.001F, 0.1F, 2, kFloorX, kFloorWidth}, 1, 0.05F);
   EXPECT_NEAR(arrives(10, 0.05F), 1.0, 1e-3);
 }
 
 // A closed block stands on the farther half of the leaf before the wall. The standard error of 40 * 12 * 4 rays of
 // which two in three arrive is 2 %.
-TEST_F(GatherBesideHoles, WhatASolidHidesOfALeafIsMissedOnce) {
+TEST_P(GatherBesideHoles, WhatASolidHidesOfALeafIsMissedOnce) {
   const Room room{0.001F, 0.1F, 2, -0.2F, 0.5F, board(-0.05F), 5};
   makeHoles(room, 2, 0.5F);
   auto made = std::make_shared<scene::PatchScene>(*scene_);
@@ -219,7 +219,7 @@ TEST_F(GatherBesideHoles, WhatASolidHidesOfALeafIsMissedOnce) {
   EXPECT_NEAR(arrives(40, 0.8F), seen / open, 0.05);
 }
 
-TEST_F(GatherBeside, WhatIsMaskedHidesAsWhatIsOpaque) {
+TEST_P(GatherBeside, WhatIsMaskedHidesAsWhatIsOpaque) {
   const Room room{0.001F, 0.1F, 2, kFloorX, kFloorWidth, board(-0.002F)};
   build(room);
   const auto past = expected(room, [](const auto&, const auto& to) { return to.x > -0.002; });
@@ -231,6 +231,9 @@ TEST_F(GatherBeside, WhatIsMaskedHidesAsWhatIsOpaque) {
   // One point of 200 in the strip that is seen; each counts for its share of the floor.
   EXPECT_NEAR(received(400, 1), past, 0.01);
 }
+
+INSTANTIATE_TEST_SUITE_P(Sight, GatherBeside, kBothSights, nameOfSight);
+INSTANTIATE_TEST_SUITE_P(Sight, GatherBesideHoles, kBothSights, nameOfSight);
 
 }  // namespace
 }  // namespace radiosity::test

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "server/gpu/gpu_transport.h"
+#include "tests/gl/both_sights.h"
 #include "tests/gl/scene_builder.h"
 
 namespace radiosity::test {
@@ -19,10 +20,10 @@ namespace radiosity::test {
 [[nodiscard]] double irradiance(const scene::PatchScene& scene, const solver::FluxAccumulators& flux,
                                 std::uint32_t surface, std::uint32_t x, std::uint32_t y);
 
-class Gather : public ::testing::Test {
+class Gather : public ::testing::TestWithParam<gpu::Sight> {
  protected:
   void SetUp() override {
-    auto made = gpu::makeInProcessTransport();
+    auto made = gpu::makeInProcessTransport(0, std::nullopt, GetParam());
     if (!made) GTEST_SKIP() << made.error().text();
     transport_ = std::move(*made);
   }

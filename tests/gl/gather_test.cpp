@@ -37,7 +37,7 @@ TEST(PolygonFormFactor, ClipsAtTheHorizon) {
   EXPECT_EQ(solver::polygonFormFactor({0, 0, 1}, {0, 0, 1}, half), 0.0);
 }
 
-TEST_F(Gather, UnoccludedIrradianceIsLambertsFormula) {
+TEST_P(Gather, UnoccludedIrradianceIsLambertsFormula) {
   SceneBuilder builder;
   const auto floor = builder.add({{-0.5F, -0.5F, -0.5F}, {1, 0, 0}, {0, 1, 0}, 16, 16});
   const auto lamp = builder.add({{-0.1F, -0.2F, 0.4F}, {0, 0.3F, 0}, {0.2F, 0, 0}, 1, 1});
@@ -57,7 +57,7 @@ TEST_F(Gather, UnoccludedIrradianceIsLambertsFormula) {
 
 // Two fifths of the lamp lie behind the wall's plane. Single points on it, which lie in front or behind by chance, must
 // give the form factor of the part in front in the mean.
-TEST_F(Gather, OfALampThatAWallsPlaneCutsThePartInFrontIsReceived) {
+TEST_P(Gather, OfALampThatAWallsPlaneCutsThePartInFrontIsReceived) {
   SceneBuilder builder;
   const auto wall = builder.add({{0.0F, -0.3F, -0.5F}, {0, 0, 0.6F}, {0, 0.6F, 0}, 6, 6});  // faces -x
   const auto lamp = builder.add({{-0.3F, -0.4F, 0.45F}, {0, 0.8F, 0}, {0.5F, 0, 0}, 1, 1});
@@ -90,7 +90,7 @@ TEST_F(Gather, OfALampThatAWallsPlaneCutsThePartInFrontIsReceived) {
 // Many texels away: what is near looks from two places.
 // Where nothing hides anything a half keeps 0.15 of what the two opposite places differ by; elsewhere all, since which
 // of them is hidden goes with how much they get.
-TEST_F(Gather, TheReceiverJitterMovesTheReceivingPoint) {
+TEST_P(Gather, TheReceiverJitterMovesTheReceivingPoint) {
   for (const bool has_wall : {false, true}) {
     SCOPED_TRACE(has_wall);
     SceneBuilder builder;
@@ -118,7 +118,7 @@ TEST_F(Gather, TheReceiverJitterMovesTheReceivingPoint) {
 double visibleShare(double x) { return std::clamp((x + 0.1) / 0.2, 0.0, 1.0); }
 
 // A lamp as large as a texel, and the texel at its foot: across it the form factor falls from 0.5 to 0.07.
-TEST_F(Gather, AReceiverCloseByLooksFromOppositePlacesAndTheHalvesFromFour) {
+TEST_P(Gather, AReceiverCloseByLooksFromOppositePlacesAndTheHalvesFromFour) {
   constexpr float kTexel = 1.0F / 16.0F;
   SceneBuilder builder;
   const auto floor = builder.add({{-0.5F, -0.5F, -0.5F}, {1, 0, 0}, {0, 1, 0}, 16, 16});
@@ -156,7 +156,7 @@ TEST_F(Gather, AReceiverCloseByLooksFromOppositePlacesAndTheHalvesFromFour) {
   EXPECT_GT(2.25 * all, 0.25 * halves);
 }
 
-TEST_F(Gather, AHalfPlaneCastsAnExactUmbraAndPenumbra) {
+TEST_P(Gather, AHalfPlaneCastsAnExactUmbraAndPenumbra) {
   SceneBuilder builder;
   const auto floor = builder.add({{-0.5F, -0.5F, -0.5F}, {1, 0, 0}, {0, 1, 0}, 64, 2});
   const auto lamp = builder.add({{-0.1F, -0.01F, 0.5F}, {0, 0.02F, 0}, {0.2F, 0, 0}, 1, 1});
@@ -183,7 +183,7 @@ TEST_F(Gather, AHalfPlaneCastsAnExactUmbraAndPenumbra) {
 
 // A panel hangs half a thousandth before a ceiling. Pixels are wider than the leaves along its rim, and those under it
 // are dark: what pixels took from the leaves beside it, none would gain.
-TEST_F(Gather, LeavesBesideAPanelThatHangsBeforeThemLoseNothingToIt) {
+TEST_P(Gather, LeavesBesideAPanelThatHangsBeforeThemLoseNothingToIt) {
   SceneBuilder builder;
   const auto ceiling = builder.add({{-0.5F, 0.5F, 0.5F}, {1, 0, 0}, {0, -1, 0}, 40, 40});
   builder.add({{0.0F, 0.25F, 0.4995F}, {0.3F, 0, 0}, {0, -0.5F, 0}, 1, 1});
@@ -208,7 +208,7 @@ TEST_F(Gather, LeavesBesideAPanelThatHangsBeforeThemLoseNothingToIt) {
 
 // An item names one triangle of the panel, of which all may lie farther from the lamp than the leaf that the other one
 // hides.
-TEST_F(Gather, LeavesUnderAPanelAreDarkForLampsOnAllSides) {
+TEST_P(Gather, LeavesUnderAPanelAreDarkForLampsOnAllSides) {
   for (const auto& way : {glm::vec2(1, 0), glm::vec2(0, 1), glm::vec2(-1, 0), glm::vec2(0, -1), glm::vec2(1, 1)}) {
     SceneBuilder builder;
     const auto ceiling = builder.add({{-0.5F, 0.5F, 0.5F}, {1, 0, 0}, {0, -1, 0}, 40, 40});
@@ -231,7 +231,7 @@ TEST_F(Gather, LeavesUnderAPanelAreDarkForLampsOnAllSides) {
 
 // Pixels along its rim show the cap, behind whose plane the topmost leaves of the side lie. It cannot hide a light from
 // them: none of it lies before their horizon, though a box around it does.
-TEST_F(Gather, TheCapOfAColumnHidesNothingFromItsSide) {
+TEST_P(Gather, TheCapOfAColumnHidesNothingFromItsSide) {
   constexpr int kSides = 24;
   constexpr double kRadius = 0.5, kHeight = 1.0;
   scene::Primitive cap, side;
@@ -298,7 +298,7 @@ TEST_F(Gather, TheCapOfAColumnHidesNothingFromItsSide) {
 
 // Seen from the lamp, pixels along the silhouette of a box show the floor beyond it, and what lies inside, where both
 // sides of a wall are surfaces, lies before that.
-TEST_F(Gather, TheInsideOfAClosedBoxOfTwoSidedWallsStaysDark) {
+TEST_P(Gather, TheInsideOfAClosedBoxOfTwoSidedWallsStaysDark) {
   SceneBuilder builder;
   builder.add({{-1.0F, -1.0F, -0.5F}, {2, 0, 0}, {0, 2, 0}, 20, 20});
   const std::uint32_t first = builder.add({{-0.2F, -0.2F, -0.3F}, {0.4F, 0, 0}, {0, 0.4F, 0}, 16, 16, true});
@@ -322,7 +322,7 @@ TEST_F(Gather, TheInsideOfAClosedBoxOfTwoSidedWallsStaysDark) {
 }
 
 // A table top: pixels are wider than its rim and its bevel together, so that most show what lies beyond.
-TEST_F(Gather, TheInsideOfAThinBevelledPlateOfTwoSidedFacesStaysDark) {
+TEST_P(Gather, TheInsideOfAThinBevelledPlateOfTwoSidedFacesStaysDark) {
   SceneBuilder builder;
   builder.add({{-1.0F, -1.0F, -0.5F}, {2, 0, 0}, {0, 2, 0}, 20, 20});
   const auto plate = builder.addBevelledPlate();
@@ -335,7 +335,7 @@ TEST_F(Gather, TheInsideOfAThinBevelledPlateOfTwoSidedFacesStaysDark) {
   EXPECT_LT(shareInside(*scene, flux, plate), 1e-5);
 }
 
-TEST_F(Gather, AClosedBoxReceivesWhatTheLampEmits) {
+TEST_P(Gather, AClosedBoxReceivesWhatTheLampEmits) {
   SceneBuilder builder;
   builder.addBox(glm::vec3(-0.5F), glm::vec3(0.5F), 48, true);
   const auto lamp = builder.add({{-0.1F, -0.1F, 0.3F}, {0, 0.2F, 0}, {0.2F, 0, 0}, 1, 1});
@@ -350,7 +350,7 @@ TEST_F(Gather, AClosedBoxReceivesWhatTheLampEmits) {
   EXPECT_EQ(flux.backface[0], 0);
 }
 
-TEST_F(Gather, LightLeavingTheSceneIsCountedByHowItIsLost) {
+TEST_P(Gather, LightLeavingTheSceneIsCountedByHowItIsLost) {
   SceneBuilder builder;
   const auto lamp = builder.add({{-0.5F, -0.5F, -0.5F}, {1, 0, 0}, {0, 1, 0}, 1, 1});
   builder.add({{-0.5F, -0.5F, 0.5F}, {1, 0, 0}, {0, 1, 0}, 8, 8});  // shows its back
@@ -363,7 +363,7 @@ TEST_F(Gather, LightLeavingTheSceneIsCountedByHowItIsLost) {
   EXPECT_NEAR(static_cast<double>(flux.backface[0] + flux.escaped[0]) / kFluxScale, 1.0, 1e-9);
 }
 
-TEST_F(Gather, OppositeShotsCancelToExactlyNothing) {
+TEST_P(Gather, OppositeShotsCancelToExactlyNothing) {
   const auto scene = randomRoom(60, 4000, 1);
   std::mt19937 random(9);
   auto batch = gatherFrom(*scene, 5, 4, random);
@@ -378,7 +378,7 @@ TEST_F(Gather, OppositeShotsCancelToExactlyNothing) {
 
 // A look that comes alone is drawn around its window and no further; of several in one image faces are filled. How many
 // come at once follows from how many workers there are.
-TEST_F(Gather, ThroughAWindowLinksAreTheSameBitsAloneAndAmongOthers) {
+TEST_P(Gather, ThroughAWindowLinksAreTheSameBitsAloneAndAmongOthers) {
   std::mt19937 random(3);
   std::uniform_real_distribution<float> place(-0.45F, 0.35F), size(0.02F, 0.1F);
   SceneBuilder builder;
@@ -424,6 +424,8 @@ TEST_F(Gather, ThroughAWindowLinksAreTheSameBitsAloneAndAmongOthers) {
   EXPECT_GT(lit, 10U);
   EXPECT_GT(lost, 10U);
 }
+
+INSTANTIATE_TEST_SUITE_P(Sight, Gather, kBothSights, nameOfSight);
 
 }  // namespace
 }  // namespace radiosity::test

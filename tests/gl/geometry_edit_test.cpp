@@ -84,7 +84,8 @@ class ChairEdit : public test::ChairRoom {
     return differ;
   }
 
-  /// In software lamps lose a pixel here and there, of which some tests tell. A graphics card need not.
+  /// By images lamps lose a pixel here and there, of which some tests tell. Those of a graphics card need not.
+  void lookByImages() { transport_ = gpu::makeInProcessTransport(0, std::nullopt, gpu::Sight::kImages).value(); }
   bool lampsLoseNothing(const LinkedSolver& solver) const {
     double lost = 0.0;
     for (const auto& shooter : solver.system().shooters()) {
@@ -140,6 +141,7 @@ TEST_F(ChairEdit, ShowsLightBeforeItHasWhatMattersLittleAndHasAllInTheEnd) {
 // of it, and need not while it is little beside the asked error: it counts as lost still, so that what is lost is never
 // taken for less than it is.
 TEST_F(ChairEdit, LooksPastWhatLittleIsLostElsewhere) {
+  lookByImages();
   settings_.target_error = 0.1;
   const auto after = edited(before_, move_);
   const auto map = mapOf(before_, after);
@@ -185,6 +187,7 @@ TEST_F(ChairEdit, LooksAgainAtWhatManyEditsMadeNoLongerLittle) {
     }
     return most;
   };
+  lookByImages();
   auto solver = solved(before_);
   if (lampsLoseNothing(*solver)) GTEST_SKIP() << transport_->description() << ": nothing is lost";
   auto now = before_;

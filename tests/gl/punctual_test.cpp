@@ -10,6 +10,7 @@
 #include "server/gpu/gpu_transport.h"
 #include "server/scene/coverage.h"
 #include "server/solver/punctual_lights.h"
+#include "tests/gl/both_sights.h"
 #include "tests/gl/scene_builder.h"
 
 namespace radiosity::test {
@@ -40,10 +41,10 @@ std::uint32_t addFloor(SceneBuilder& builder, std::uint32_t texels = 16) {
   return builder.add({{-0.5F, -0.5F, -0.5F}, {1, 0, 0}, {0, 1, 0}, texels, texels});
 }
 
-class Punctual : public ::testing::Test {
+class Punctual : public ::testing::TestWithParam<gpu::Sight> {
  protected:
   void SetUp() override {
-    auto made = gpu::makeInProcessTransport();
+    auto made = gpu::makeInProcessTransport(0, std::nullopt, GetParam());
     if (!made) GTEST_SKIP() << made.error().text();
     transport_ = std::move(*made);
   }
@@ -97,7 +98,7 @@ double total(const solver::FluxAccumulators& flux) {
   return static_cast<double>(flux.gathered[0] + flux.escaped[0] + flux.backface[0]) / kFluxScale;
 }
 
-TEST_F(Punctual, APointLightOverAPlaneGivesICosOverSquaredDistance) {
+TEST_P(Punctual, APointLightOverAPlaneGivesICosOverSquaredDistance) {
   SceneBuilder builder;
   const auto floor = addFloor(builder);
   const auto scene = builder.build();
@@ -113,7 +114,7 @@ TEST_F(Punctual, APointLightOverAPlaneGivesICosOverSquaredDistance) {
   }
 }
 
-TEST_F(Punctual, ASpotFadesBetweenItsConesAsTheExtensionSays) {
+TEST_P(Punctual, ASpotFadesBetweenItsConesAsTheExtensionSays) {
   SceneBuilder builder;
   const auto floor = addFloor(builder);
   const auto scene = builder.build();
@@ -136,7 +137,7 @@ TEST_F(Punctual, ASpotFadesBetweenItsConesAsTheExtensionSays) {
   }
 }
 
-TEST_F(Punctual, RangeFadesTheLightAndNothingArrivesBeyondIt) {
+TEST_P(Punctual, RangeFadesTheLightAndNothingArrivesBeyondIt) {
   SceneBuilder builder;
   const auto floor = addFloor(builder);
   const auto scene = builder.build();
@@ -156,7 +157,7 @@ TEST_F(Punctual, RangeFadesTheLightAndNothingArrivesBeyondIt) {
   EXPECT_NEAR(total(flux) / shot.emitted[0], 1.0, 0.01);
 }
 
-TEST_F(Punctual, ALeafCloseToALightReceivesItsSolidAngle) {
+TEST_P(Punctual, ALeafCloseToALightReceivesItsSolidAngle) {
   SceneBuilder builder;
   const auto floor = addFloor(builder, 4);
   const auto scene = builder.build();
@@ -171,7 +172,7 @@ TEST_F(Punctual, ALeafCloseToALightReceivesItsSolidAngle) {
   EXPECT_NEAR(irradiance(*scene, flux, floor, 2, 2), exact, 1e-3 * exact);
 }
 
-TEST_F(Punctual, AClosedBoxReceivesAllThatAPointLightEmits) {
+TEST_P(Punctual, AClosedBoxReceivesAllThatAPointLightEmits) {
   SceneBuilder builder;
   builder.addBox(glm::vec3(-0.5F), glm::vec3(0.5F), 16, true);
   const auto scene = builder.build();
@@ -184,7 +185,7 @@ TEST_F(Punctual, AClosedBoxReceivesAllThatAPointLightEmits) {
   EXPECT_EQ(flux.backface[0], 0);
 }
 
-TEST_F(Punctual, ADirectionalLightGivesECosAndItsEnergyIsAccountedFor) {
+TEST_P(Punctual, ADirectionalLightGivesECosAndItsEnergyIsAccountedFor) {
   SceneBuilder builder;
   const auto floor = addFloor(builder);
   builder.add({{-0.1F, -0.1F, 0.0F}, {0, 0.2F, 0}, {0.2F, 0, 0}, 4, 4});  // looks down: its back absorbs
@@ -203,7 +204,7 @@ TEST_F(Punctual, ADirectionalLightGivesECosAndItsEnergyIsAccountedFor) {
   EXPECT_NEAR(total(flux), entered, 0.002 * entered);
 }
 
-TEST_F(Punctual, AnOpenPlaneUnderTheSkyReceivesPiTimesItsRadiance) {
+TEST_P(Punctual, AnOpenPlaneUnderTheSkyReceivesPiTimesItsRadiance) {
   SceneBuilder builder;
   const auto floor = builder.add({{-0.5F, -0.5F, 0.0F}, {0, 0, 0.5F}, {0.5F, 0, 0}, 4, 4});  // normal +Y
   const auto wall = builder.add({{0.4F, -0.5F, -0.5F}, {0, 0.2F, 0}, {0, 0, -0.2F}, 4, 4});  // normal -X: sees half
@@ -217,7 +218,7 @@ TEST_F(Punctual, AnOpenPlaneUnderTheSkyReceivesPiTimesItsRadiance) {
   EXPECT_NEAR(irradiance(*scene, flux, wall, 0, 3), (2.0 + 0.5) * kPi / 2.0, 0.02 * 2.5 * kPi / 2.0);
 }
 
-TEST_F(Punctual, AConvexSolidUnderATwoColouredSkyReceivesTheHemisphereFormulaExactly) {
+TEST_P(Punctual, AConvexSolidUnderATwoColouredSkyReceivesTheHemisphereFormulaExactly) {
   SceneBuilder builder;
   const auto first = builder.addBox(glm::vec3(-0.3F), glm::vec3(0.3F), 4, false);
   const auto scene = builder.build();
@@ -238,7 +239,7 @@ TEST_F(Punctual, AConvexSolidUnderATwoColouredSkyReceivesTheHemisphereFormulaExa
 
 // Its own triangle sees nothing of the upper sky, and none of the directions that stand for it: 0 / 0, the light of one
 // leaf was no number, and that of the whole scene neither.
-TEST_F(Punctual, ALeafThatTurnsAwayFromTheSkyTakesWhatAnotherOfItsTrianglesSees) {
+TEST_P(Punctual, ALeafThatTurnsAwayFromTheSkyTakesWhatAnotherOfItsTrianglesSees) {
   SceneBuilder builder;
   const auto below = builder.add({{-0.1F, 0.0F, -0.1F}, {0.2F, 0, 0}, {0, 0, 0.2F}, 1, 1});
   const auto beside = builder.add({{0.1F, 0.0F, -0.1F}, {0, 0.2F, 0}, {0, 0, 0.2F}, 1, 1});
@@ -261,7 +262,7 @@ TEST_F(Punctual, ALeafThatTurnsAwayFromTheSkyTakesWhatAnotherOfItsTrianglesSees)
   EXPECT_NEAR(irradiance(*scene, flux, below, 0, 0), 0.5 * kPi / 2.0, 0.25 * kPi / 2.0);
 }
 
-TEST_F(Punctual, NothingLeaksIntoAClosedRoomAlongItsEdges) {
+TEST_P(Punctual, NothingLeaksIntoAClosedRoomAlongItsEdges) {
   SceneBuilder builder;
   builder.addBox(glm::vec3(-0.4F), glm::vec3(0.4F), 8, true);
   builder.add({{-1.0F, -0.401F, -1.0F}, {0, 0, 2}, {2, 0, 0}, 4, 4});  // the ground outside
@@ -281,7 +282,7 @@ TEST_F(Punctual, NothingLeaksIntoAClosedRoomAlongItsEdges) {
 
 // A plate with a rim of facets narrower than pixels. Pixels blur the rim's shadow alike to both sides, but what falls
 // inside is dark as it is, and the shadow was too small.
-TEST_F(Punctual, TheShadowOfAPlateWithANarrowRimIsAsLargeAsBoth) {
+TEST_P(Punctual, TheShadowOfAPlateWithANarrowRimIsAsLargeAsBoth) {
   constexpr std::uint32_t kTexels = 64, kViews = 16;
   SceneBuilder builder;
   const auto floor = addFloor(builder, kTexels);
@@ -318,7 +319,7 @@ TEST_F(Punctual, TheShadowOfAPlateWithANarrowRimIsAsLargeAsBoth) {
   EXPECT_NEAR(dark / 0.16, 1.0, 0.01);  // 512 receiving points along each edge
 }
 
-TEST_F(Punctual, TheInsideOfAThinPlateOfTwoSidedFacesStaysDark) {
+TEST_P(Punctual, TheInsideOfAThinPlateOfTwoSidedFacesStaysDark) {
   SceneBuilder builder;
   const auto plate = builder.addBevelledPlate();
   builder.add({{-1.0F, -1.0F, -0.5F}, {2, 0, 0}, {0, 2, 0}, 20, 20});
@@ -331,7 +332,7 @@ TEST_F(Punctual, TheInsideOfAThinPlateOfTwoSidedFacesStaysDark) {
     EXPECT_LT(shareInside(*scene, runRound(scene, sources), plate), 3e-5);  // of the sky's light the rim has more
 }
 
-TEST_F(Punctual, AHalfPlaneHidesAPointLightBehindAStraightEdge) {
+TEST_P(Punctual, AHalfPlaneHidesAPointLightBehindAStraightEdge) {
   SceneBuilder builder;
   const auto floor = builder.add({{-0.5F, -0.5F, -0.5F}, {1, 0, 0}, {0, 1, 0}, 64, 16});
   builder.add({{-2.0F, -2.0F, 0.0F}, {2, 0, 0}, {0, 4, 0}, 4, 4, true});  // covers x < 0 half-way up
@@ -350,7 +351,7 @@ TEST_F(Punctual, AHalfPlaneHidesAPointLightBehindAStraightEdge) {
   }
 }
 
-TEST_F(Punctual, AnEditReplaysAndCancelsToTheLastBit) {
+TEST_P(Punctual, AnEditReplaysAndCancelsToTheLastBit) {
   const auto scene = randomRoom(60, 4000, 1);
   solver::LightSources on;
   on.lights = {{.position = {0.1, 0.3, 0.2}, .intensity = {0.3F, 1.0F / 3.0F, 7e-4F}},
@@ -380,7 +381,7 @@ TEST_F(Punctual, AnEditReplaysAndCancelsToTheLastBit) {
   EXPECT_EQ(flux.backface, solver::Flux3{});
 }
 
-TEST_F(Punctual, AMovedAndDimmedLightEqualsTheSameLightFromTheStart) {
+TEST_P(Punctual, AMovedAndDimmedLightEqualsTheSameLightFromTheStart) {
   const auto scene = randomRoom(60, 2000, 3);
   const auto at = [](double x, float strength) {
     return solver::LightSources{{{.position = {x, 0.2, 0.1}, .intensity = glm::vec3(strength)}}, {}};
@@ -403,14 +404,14 @@ TEST_F(Punctual, AMovedAndDimmedLightEqualsTheSameLightFromTheStart) {
   EXPECT_EQ(by_edit.node, by_start.node);
 }
 
-TEST_F(Punctual, WorkersDeliverTheSameBitsAsOneProcess) {
+TEST_P(Punctual, WorkersDeliverTheSameBitsAsOneProcess) {
   const auto scene = randomRoom(100, 4000, 5);
   solver::LightSources sources;
   sources.lights = {{.position = {0.1, 0.3, 0.2}, .intensity = {1.0F, 2.0F, 3.0F}},
                     {.kind = scene::LightKind::kDirectional, .intensity = {1.0F, 1.0F, 1.0F}}};
   sources.sky = {glm::vec3(0.7F), glm::vec3(0.1F)};
   const auto alone = runRound(scene, sources);
-  auto workers = gpu::makeWorkerTransport({3, RADIOSITY_GL_WORKER});
+  auto workers = gpu::makeWorkerTransport({.workers = 3, .executable = RADIOSITY_GL_WORKER, .sight = GetParam()});
   ASSERT_TRUE(workers.has_value()) << workers.error().text();
   transport_ = std::move(*workers);
   const auto shared = runRound(scene, sources);
@@ -419,7 +420,7 @@ TEST_F(Punctual, WorkersDeliverTheSameBitsAsOneProcess) {
   EXPECT_EQ(alone.backface, shared.backface);
 }
 
-TEST_F(Punctual, ASheetOfOpacityAThirdLetsTwoThirdsThrough) {
+TEST_P(Punctual, ASheetOfOpacityAThirdLetsTwoThirdsThrough) {
   SceneBuilder builder;
   const auto floor = addFloor(builder);
   const auto sheet = builder.add({{-1.0F, -1.0F, 0.0F}, {2, 0, 0}, {0, 2, 0}, 8, 8, true});
@@ -439,7 +440,7 @@ TEST_F(Punctual, ASheetOfOpacityAThirdLetsTwoThirdsThrough) {
   EXPECT_NEAR(irradiance(*scene, flux, sheet, 3, 4), 1.0, 1e-5) << "irradiance on the sheet itself is whole";
 }
 
-TEST_F(Punctual, AHoleInASheetLetsALightThroughAndNothingElseDoes) {
+TEST_P(Punctual, AHoleInASheetLetsALightThroughAndNothingElseDoes) {
   SceneBuilder builder;
   const auto floor = addFloor(builder);
   const auto sheet = builder.add({{-0.5F, -0.5F, 0.0F}, {1, 0, 0}, {0, 1, 0}, 4, 4, true});
@@ -460,7 +461,7 @@ TEST_F(Punctual, AHoleInASheetLetsALightThroughAndNothingElseDoes) {
   }
 }
 
-TEST_F(Punctual, AShotOutsideTheContractIsRefused) {
+TEST_P(Punctual, AShotOutsideTheContractIsRefused) {
   SceneBuilder builder;
   addFloor(builder);
   const auto scene = builder.build();
@@ -474,6 +475,43 @@ TEST_F(Punctual, AShotOutsideTheContractIsRefused) {
   batch.parallel.resize(1);  // whose view is missing
   EXPECT_FALSE(transport_->run(batch, flux).has_value());
 }
+
+// A closed house of walls of no thickness, a thousandth as wide as the ground around it: by images, whose pixels are
+// wider than its roof, the sun lights it within.
+TEST(PunctualByRays, NoLightGetsIntoAClosedHouseOnWideGround) {
+  auto made = gpu::makeInProcessTransport(0, std::nullopt, gpu::Sight::kRays);
+  if (!made) GTEST_SKIP() << made.error().text();
+  SceneBuilder builder;
+  const auto ground = builder.add({{-0.5F, 0.0F, -0.5F}, {0, 0, 1}, {1, 0, 0}, 64, 64});
+  const glm::vec3 low(0.1001F, 0.0F, 0.2003F), high = low + glm::vec3(0.001F, 0.0005F, 0.001F);
+  const auto inside = builder.addBox(low, high, 4, true);
+  (void)builder.addBox(low, high, 4, false);
+  const auto scene = builder.build();
+  ASSERT_TRUE((*made)->setScene(scene));
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const float turn = 0.05F * static_cast<float>(seed);
+    solver::LightSources sources;
+    sources.lights = {
+        {.kind = scene::LightKind::kDirectional, .direction = {0.3F + turn, -0.8F, 0.2F}, .intensity = glm::vec3(1e5F)},
+        {.kind = scene::LightKind::kPoint,
+         .position = {0.1F, 0.3F + 0.1F * turn, 0.2F},
+         .intensity = glm::vec3(100.0F)}};
+    sources.sky = {glm::vec3(1000.0F), glm::vec3(0.0F)};
+    solver::PunctualLights lights(*scene, sources, {.seed = seed});
+    auto flux = accumulators(*scene);
+    while (lights.hasSlice(1)) {
+      solver::ShotBatch slice;
+      lights.addSlice(1, slice);
+      slice.flux_scale = kFluxScale;
+      ASSERT_TRUE((*made)->run(slice, flux));
+    }
+    EXPECT_GT(fluxAt(*scene, flux, ground, kFluxScale), 0.0);
+    for (std::uint32_t face = 0; face < 6; ++face)
+      EXPECT_EQ(fluxAt(*scene, flux, inside + face, kFluxScale), 0.0) << "face " << face << ", seed " << seed;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Sight, Punctual, kBothSights, nameOfSight);
 
 }  // namespace
 }  // namespace radiosity::test
