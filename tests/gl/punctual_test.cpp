@@ -476,41 +476,6 @@ TEST_P(Punctual, AShotOutsideTheContractIsRefused) {
   EXPECT_FALSE(transport_->run(batch, flux).has_value());
 }
 
-// A closed house of walls of no thickness, a thousandth as wide as the ground around it: by images, whose pixels are
-// wider than its roof, the sun lights it within.
-TEST(PunctualByRays, NoLightGetsIntoAClosedHouseOnWideGround) {
-  auto made = gpu::makeInProcessTransport(0, std::nullopt, gpu::Sight::kRays);
-  if (!made) GTEST_SKIP() << made.error().text();
-  SceneBuilder builder;
-  const auto ground = builder.add({{-0.5F, 0.0F, -0.5F}, {0, 0, 1}, {1, 0, 0}, 64, 64});
-  const glm::vec3 low(0.1001F, 0.0F, 0.2003F), high = low + glm::vec3(0.001F, 0.0005F, 0.001F);
-  const auto inside = builder.addBox(low, high, 4, true);
-  (void)builder.addBox(low, high, 4, false);
-  const auto scene = builder.build();
-  ASSERT_TRUE((*made)->setScene(scene));
-  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
-    const float turn = 0.05F * static_cast<float>(seed);
-    solver::LightSources sources;
-    sources.lights = {
-        {.kind = scene::LightKind::kDirectional, .direction = {0.3F + turn, -0.8F, 0.2F}, .intensity = glm::vec3(1e5F)},
-        {.kind = scene::LightKind::kPoint,
-         .position = {0.1F, 0.3F + 0.1F * turn, 0.2F},
-         .intensity = glm::vec3(100.0F)}};
-    sources.sky = {glm::vec3(1000.0F), glm::vec3(0.0F)};
-    solver::PunctualLights lights(*scene, sources, {.seed = seed});
-    auto flux = accumulators(*scene);
-    while (lights.hasSlice(1)) {
-      solver::ShotBatch slice;
-      lights.addSlice(1, slice);
-      slice.flux_scale = kFluxScale;
-      ASSERT_TRUE((*made)->run(slice, flux));
-    }
-    EXPECT_GT(fluxAt(*scene, flux, ground, kFluxScale), 0.0);
-    for (std::uint32_t face = 0; face < 6; ++face)
-      EXPECT_EQ(fluxAt(*scene, flux, inside + face, kFluxScale), 0.0) << "face " << face << ", seed " << seed;
-  }
-}
-
 INSTANTIATE_TEST_SUITE_P(Sight, Punctual, kBothSights, nameOfSight);
 
 }  // namespace
