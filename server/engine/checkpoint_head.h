@@ -6,6 +6,7 @@
 
 #include "server/engine/engine.h"
 #include "server/scene/document.h"
+#include "server/scene/lit_sides.h"
 #include "server/state/store.h"
 
 namespace radiosity::engine {
@@ -22,11 +23,13 @@ struct CheckpointHead {
   bool paper_mode = false, has_sky = false, double_sided = false;
   SkySetting sky;
   std::string gltf, assets;  ///< JSON, and a digest of buffers and images
+  scene::SideBits sides;     ///< LitScene::sides()
 
   template <typename Archive, typename Self>
   static void visit(Archive& archive, Self& self) {
     archive(self.epoch, self.revision, self.texels, self.seed, self.link_memory, self.texel_size_m, self.target_error,
-            self.seconds, self.paper_mode, self.has_sky, self.sky, self.double_sided, self.gltf, self.assets);
+            self.seconds, self.paper_mode, self.has_sky, self.sky, self.double_sided, self.gltf, self.assets,
+            self.sides);
   }
 };
 

@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "server/scene/emitters.h"
+#include "server/scene/material_of.h"
 #include "server/solver/lost_light.h"
 
 namespace radiosity::engine {
@@ -23,6 +24,9 @@ constexpr std::size_t kMostNamed = 20, kMostSurfaces = 3;
 constexpr double kMuchOnBacks = 0.05, kNothing = 1e-12;
 /// Chance may make a lamp's light look stronger than what is lost, of which it is a part.
 constexpr double kMargin = 1.1;
+constexpr const char* kOnSingle = "on backs of single-sided faces";
+constexpr const char* kOnDark = "on sides of double-sided faces that were taken for dark";
+constexpr const char* kLookCloser = "with more texels (--texels) such sides are searched for light from more places";
 constexpr const char* kTurnRound =
     "where a room's faces are turned outward, --double-sided (doubleSided of solve.configure) lights both sides";
 
@@ -144,10 +148,15 @@ class Names {
   std::size_t count_ = 0;
 };
 
+/// Its back is there in the file, and was left without patches since no light was found to reach it.
+bool isDoubleSided(const LitParts& parts, std::uint32_t instance) {
+  return scene::materialOf(parts.scene, parts.scene.instances[instance]).double_sided;
+}
+
 std::string backsOf(const LitParts& parts, const solver::LostLight::Fate& fate) {
-  return "on backs of single-sided faces" +
-         (fate.back_of == kNone ? std::string()
-                                : ", those of " + nameOf(parts, parts.patches.surfaces[fate.back_of].instance));
+  if (fate.back_of == kNone) return "on backs of faces";
+  const auto instance = parts.patches.surfaces[fate.back_of].instance;
+  return std::string(isDoubleSided(parts, instance) ? kOnDark : kOnSingle) + ", those of " + nameOf(parts, instance);
 }
 
 /// Of what no ray of a lamp reaches.
@@ -183,6 +192,27 @@ std::vector<std::size_t> lightNodes(const nlohmann::json& gltf) {
     push(nodes.at(at).value("children", json::array()));
   }
   return found;
+}
+
+/// `part`: of the light, that ends on backs; `shares` of it.
+void tellBacks(const LitParts& parts, const std::vector<solver::LostLight::Share>& shares, double part,
+               std::vector<std::string>& into) {
+  for (const bool is_double : {false, true}) {
+    std::string surfaces;
+    std::size_t count = 0;
+    double of_these = shares.empty() && !is_double ? 1.0 : 0.0;
+    for (const auto& share : shares) {
+      if (isDoubleSided(parts, share.instance) != is_double) continue;
+      of_these += share.part;
+      if (count++ < kMostSurfaces)
+        surfaces += fmt::format("{}{} ({:.0f} % of it)", count > 1 ? ", " : ": ", nameOf(parts, share.instance),
+                                100.0 * share.part);
+    }
+    if (!(of_these >= 0.5) && !(of_these * part > kMuchOnBacks)) continue;  // of the light on backs, or of all
+    if (count > kMostSurfaces) surfaces += fmt::format(" and {} more", count - kMostSurfaces);
+    into.push_back(fmt::format("{:.0f} % of the light ends {}{}; {}", 100.0 * part * of_these,
+                               is_double ? kOnDark : kOnSingle, surfaces, is_double ? kLookCloser : kTurnRound));
+  }
 }
 
 std::string lightName(const LitParts& parts, std::size_t number) {
@@ -233,25 +263,16 @@ void LightReport::findLost(const LitParts& parts, solver::Solver& solver) {
     if (fate.arrives) continue;
     names.add([&] { return fmt::format("lamp {} lights nothing: {}", nameOf(parts, i), endOf(parts, fate, false)); });
   }
+  const auto powers = solver::fluxes(parts.patches, parts.sources);
   for (std::size_t i = 0; i < parts.sources.lights.size(); ++i) {
-    const auto& light = parts.sources.lights[i];
-    const double power = solver::totalFlux(parts.patches, {{light}, {}});
-    if (!(power > 0.0) || power > kMargin * lost) continue;
-    const auto fate = ask().ofLight(light);
+    if (!(powers[i] > 0.0) || powers[i] > kMargin * lost) continue;
+    const auto fate = ask().ofLight(parts.sources.lights[i]);
     if (fate.arrives) continue;
     names.add([&] { return fmt::format("{} lights nothing: {}", lightName(parts, i), endOf(parts, fate, true)); });
   }
   names.finish();
-  if (on_backs > kMuchOnBacks * emitted) {
-    std::string surfaces;
-    const auto shares = ask().backs(solver.irradiance(), parts.sources);
-    for (std::size_t i = 0; i < std::min(shares.size(), kMostSurfaces); ++i)
-      surfaces += fmt::format("{}{} ({:.0f} % of it)", i > 0 ? ", " : ": ", nameOf(parts, shares[i].instance),
-                              100.0 * shares[i].part);
-    if (shares.size() > kMostSurfaces) surfaces += fmt::format(" and {} more", shares.size() - kMostSurfaces);
-    lost_.push_back(fmt::format("{:.0f} % of the light ends on backs of single-sided faces{}; {}",
-                                100.0 * on_backs / emitted, surfaces, kTurnRound));
-  }
+  if (on_backs > kMuchOnBacks * emitted)
+    tellBacks(parts, ask().backs(solver.irradiance(), parts.sources), on_backs / emitted, lost_);
 }
 
 std::string LightReport::unlit(double power, const solver::EnergyParts& energy, bool is_solved) const {
@@ -262,7 +283,7 @@ std::string LightReport::unlit(double power, const solver::EnergyParts& energy, 
   }
   if (!is_solved || channelSum(energy.absorbed) > kNothing * channelSum(energy.emitted)) return {};
   const bool on_backs = channelSum(energy.backface) > channelSum(energy.escaped);
-  return on_backs ? "all of it ends on backs of single-sided faces" : "all of it leaves the scene";
+  return on_backs ? "all of it ends on backs of faces, which are not lit" : "all of it leaves the scene";
 }
 
 }  // namespace radiosity::engine

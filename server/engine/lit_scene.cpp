@@ -8,7 +8,7 @@
 #include "common/give_back.h"
 #include "server/engine/carried_light.h"
 #include "server/scene/burial_record.h"
-#include "server/scene/lit_sides.h"
+#include "server/scene/emitters.h"
 
 namespace radiosity::engine {
 namespace {
@@ -39,23 +39,43 @@ Result<std::unique_ptr<LitScene>> LitScene::make(scene::EditedDocument edited, c
                                                  solver::Transport& transport, const LitScene* former) {
   configureScene(edited.scene, settings);
   auto lit = std::unique_ptr<LitScene>(new LitScene(std::move(edited), settings, transport));
-  scene::ChartOptions charts;
-  charts.texel_budget = settings.texels;
-  charts.texel_size_m = settings.texel_size_m;
-  charts.sky = lit->skyOf(*lit->scene_);
   std::optional<scene::FormerScene> before;
   if (former != nullptr) before.emplace(scene::FormerScene{*former->scene_, *former->patches_});
   lit->reproducible_ = former == nullptr;
-  auto built = scene::buildWithRecord(*lit->scene_, charts, before ? &*before : nullptr,
+  auto built = scene::buildWithRecord(*lit->scene_, lit->chartOptions(), before ? &*before : nullptr,
                                       former != nullptr ? former->burial_.get() : nullptr);
   if (!built) return tl::unexpected<Error>(built.error());
-  lit->patches_ = std::make_shared<const scene::PatchScene>(std::move(built->patches));
-  lit->burial_ = std::move(built->burial);
-  lit->normals_ = std::make_shared<const scene::ShadingNormals>(*lit->scene_, *lit->patches_);
-  lit->patch_count_ = leavesWithArea(*lit->patches_);
-  lit->materials_ = scene::shadePatches(*lit->scene_, *lit->patches_);
-  lit->light_report_.findDark(lit->litParts());
+  lit->take(std::move(*built));
   return lit;
+}
+
+Result<std::unique_ptr<LitScene>> LitScene::makeAgain(scene::Document document, const SolveSettings& settings,
+                                                      solver::Transport& transport, const scene::SideBits& sides) {
+  auto imported = scene::importScene(document);
+  if (!imported) return tl::unexpected<Error>(imported.error());
+  configureScene(*imported, settings);
+  auto lit = std::unique_ptr<LitScene>(new LitScene({std::move(document), std::move(*imported)}, settings, transport));
+  auto built = scene::buildAgain(*lit->scene_, lit->chartOptions(), sides);
+  if (!built) return tl::unexpected<Error>(built.error());
+  lit->take(std::move(*built));
+  return lit;
+}
+
+scene::ChartOptions LitScene::chartOptions() const {
+  scene::ChartOptions charts;
+  charts.texel_budget = settings_.texels;
+  charts.texel_size_m = settings_.texel_size_m;
+  charts.sky = skyOf(*scene_);
+  return charts;
+}
+
+void LitScene::take(scene::BuiltScene built) {
+  patches_ = std::make_shared<const scene::PatchScene>(std::move(built.patches));
+  burial_ = std::move(built.burial);
+  normals_ = std::move(built.normals);
+  patch_count_ = leavesWithArea(*patches_);
+  materials_ = scene::shadePatches(*scene_, *patches_);
+  light_report_.findDark(litParts());
 }
 
 void configureScene(scene::Scene& scene, const SolveSettings& settings) {
@@ -65,22 +85,25 @@ void configureScene(scene::Scene& scene, const SolveSettings& settings) {
 
 SceneChange LitScene::changeTo(const scene::Scene& next) const {
   auto change = changeBetween(*scene_, next);
-  change.geometry = change.geometry || mayUncover(*patches_, change.switched) ||
-                    scene::reachesDarkSides(*patches_, *scene_, sources_.sky, next, skyOf(next));
+  change.geometry = change.geometry || mayUncover(*patches_, change.switched) || reachesDarkSides(next, skyOf(next));
   return change;
+}
+
+bool LitScene::reachesDarkSides(const scene::Scene& next, const scene::Sky& sky) const {
+  const auto tree = [this] {
+    if (!tree_) tree_ = std::make_shared<const scene::RayTree>(scene::rayTreeOf(*patches_));
+    return tree_;
+  };
+  return scene::reachesDarkSides(*patches_, *scene_, sources_.sky, next, sky, tree);
 }
 
 bool LitScene::outgrows(const SolveSettings& settings) const {
   if (scene_->sky) return false;
   const auto sky = settings.sky.value_or(SkySetting{});
-  return scene::reachesDarkSides(*patches_, *scene_, sources_.sky, *scene_, {sky.upper, sky.lower});
+  return reachesDarkSides(*scene_, {sky.upper, sky.lower});
 }
 
-bool LitScene::hasDoubleSided() const {
-  return std::ranges::any_of(patches_->surfaces, [&](const scene::Surface& surface) {
-    return scene_->materials[surface.material].double_sided;
-  });
-}
+scene::SideBits LitScene::sides() const { return scene::sidesOf(*scene_, *patches_); }
 
 LitParts LitScene::litParts() const { return {document_, *scene_, *patches_, materials_, sources_}; }
 
@@ -114,7 +137,8 @@ bool LitScene::keepsLayoutOf(const LitScene& former) const {
   };
   return former.patches_->centre == patches_->centre && former.patches_->scale == patches_->scale &&
          std::ranges::equal(former.patches_->pages, patches_->pages, samePage) &&
-         former.patches_->instance_uvs == patches_->instance_uvs && onlyNodesMoved(*former.scene_, *scene_);
+         former.patches_->instance_uvs == patches_->instance_uvs && onlyNodesMoved(*former.scene_, *scene_) &&
+         scene::DarkOfEmitters(*former.scene_, *former.patches_) == scene::DarkOfEmitters(*scene_, *patches_);
 }
 
 std::uint64_t LitScene::startSolve(LitScene* former, bool keep_former) {
@@ -209,8 +233,6 @@ std::uint64_t LitScene::affectedBy(const SceneChange& change, const scene::Scene
 scene::Document LitScene::reshade(scene::Document document, std::shared_ptr<const scene::Scene> next,
                                   const SceneChange& change) {
   auto before = std::exchange(document_, std::move(document));
-  // Which sides have texels goes by the lamps that there were when the scene was laid out.
-  if (hasDoubleSided() && scene::shineElsewhere(*scene_, sources_.sky, *next, skyOf(*next))) reproducible_ = false;
   scene_ = std::move(next);
   const bool was_stale = std::exchange(stale_, true);
   for (const auto material : change.materials) {
@@ -336,7 +358,6 @@ void LitScene::showLightsFirst(const std::vector<glm::vec3>& direct_before) {
 bool LitScene::setSky(const SolveSettings& settings) {
   settings_ = settings;
   if (sources_ == lightSources(*scene_)) return false;
-  if (hasDoubleSided()) reproducible_ = false;
   const bool was_stale = std::exchange(stale_, true);
   if (!was_stale) updateSolver(false, true);
   stale_ = was_stale;

@@ -16,12 +16,14 @@
 #include "server/scene/document.h"
 #include "server/scene/lightmap.h"
 #include "server/scene/lineage.h"
+#include "server/scene/lit_sides.h"
 #include "server/scene/patch_scene.h"
 #include "server/solver/solver.h"
 
 namespace radiosity::scene {
 class BurialRecord;
-}
+struct BuiltScene;
+}  // namespace radiosity::scene
 
 namespace radiosity::engine {
 
@@ -40,9 +42,18 @@ class LitScene {
                                                               solver::Transport& transport,
                                                               const LitScene* former = nullptr);
 
-  /// Whether a scene made of the same document by another process has the same charts, so that a saved solve fits it.
-  /// One whose charts stayed where a former scene had them is its own.
+  /// As another process made it of this document, to restore() its solve: with these sides(), whatever its lamps were
+  /// when it was laid out. kBadInput: the scene cannot have had them.
+  [[nodiscard]] static Result<std::unique_ptr<LitScene>> makeAgain(scene::Document document,
+                                                                   const SolveSettings& settings,
+                                                                   solver::Transport& transport,
+                                                                   const scene::SideBits& sides);
+
+  /// Whether makeAgain() gives the same charts, so that a saved solve fits them. One whose charts stayed where a former
+  /// scene had them is its own.
   [[nodiscard]] bool isReproducible() const { return reproducible_; }
+  /// For makeAgain(). A pass over the surfaces.
+  [[nodiscard]] scene::SideBits sides() const;
 
   /// Gives the geometry to the transport; must come before the solver's first step.
   [[nodiscard]] Result<void> upload() const { return transport_.setScene(patches_); }
@@ -184,7 +195,10 @@ class LitScene {
   [[nodiscard]] double emittedPower() const;
   [[nodiscard]] scene::Sky skyOf(const scene::Scene& scene) const;
   [[nodiscard]] solver::LightSources lightSources(const scene::Scene& scene) const;
-  [[nodiscard]] bool hasDoubleSided() const;
+  [[nodiscard]] bool reachesDarkSides(const scene::Scene& next, const scene::Sky& sky) const;
+  [[nodiscard]] scene::ChartOptions chartOptions() const;
+  /// What was built of scene_.
+  void take(scene::BuiltScene built);
 
   scene::Document document_;
   SolveSettings settings_;
@@ -193,6 +207,8 @@ class LitScene {
   std::shared_ptr<const scene::PatchScene> patches_;
   std::shared_ptr<const scene::ShadingNormals> normals_;
   std::shared_ptr<const scene::BurialRecord> burial_;  // of these, for edits; null: not kept
+  mutable std::shared_ptr<const scene::RayTree>
+      tree_;  // of these, once an edit of light asked for it: the next ones do
   std::uint64_t patch_count_ = 0;
   scene::PatchMaterials materials_;
   LightReport light_report_;

@@ -55,6 +55,20 @@ void addTriangle(const scene::Scene& scene, const scene::Instance& instance, con
   }
 }
 
+/// By instance, by triangle of its primitive, where faces lie on each other; empty: none of the instance's emits.
+std::vector<std::vector<bool>> emittingTriangles(const scene::Scene& scene, const scene::PatchScene& patches) {
+  std::vector<std::vector<bool>> emitting(scene.instances.size());
+  if (patches.covered.empty()) return emitting;
+  for (const auto& surface : patches.surfaces) {
+    if (!surface.emits) continue;
+    auto& triangles = emitting[surface.instance];
+    triangles.resize(scene.primitives[scene.instances[surface.instance].primitive].indices.size() / 3, false);
+    for (auto t = surface.first_triangle; t < surface.first_triangle + surface.triangle_count; ++t)
+      triangles[patches.triangle_source[t]] = true;
+  }
+  return emitting;
+}
+
 }  // namespace
 
 glm::dvec2 halfView(const scene::Camera& camera, int width, int height) {
@@ -66,6 +80,7 @@ glm::dvec2 halfView(const scene::Camera& camera, int width, int height) {
 
 ViewGeometry makeViewGeometry(const scene::Scene& scene, const scene::PatchScene& patches, const glm::dvec3& eye) {
   ViewGeometry geometry;
+  const auto emitting = emittingTriangles(scene, patches);
   for (std::size_t i = 0; i < scene.instances.size() && i < patches.instance_uvs.size(); ++i) {
     const auto& instance = scene.instances[i];
     if (!instance.visible) continue;
@@ -75,9 +90,11 @@ ViewGeometry makeViewGeometry(const scene::Scene& scene, const scene::PatchScene
       for (std::size_t triangle = 0; triangle < uvs.page.size(); ++triangle) {
         if (!uvs.shows(triangle)) continue;  // dropped as degenerate, or nobody sees that side
         const auto page = uvs.page[triangle];
+        const bool emits = !emitting[i].empty() && emitting[i][triangle];
         if (geometry.draws.empty() || geometry.draws.back().material != primitive.material ||
-            geometry.draws.back().page != page) {
-          geometry.draws.push_back({primitive.material, page, static_cast<std::uint32_t>(geometry.vertices.size()), 0});
+            geometry.draws.back().page != page || geometry.draws.back().emits != emits) {
+          geometry.draws.push_back(
+              {primitive.material, page, static_cast<std::uint32_t>(geometry.vertices.size()), 0, emits});
         }
         addTriangle(scene, instance, {triangle, side, uvs.corners[triangle]}, eye, geometry.vertices);
         geometry.draws.back().count += 3;
@@ -85,10 +102,8 @@ ViewGeometry makeViewGeometry(const scene::Scene& scene, const scene::PatchScene
     }
   }
   // What is drawn first stays where two are equally near: lamps, where faces lie on each other.
-  if (!patches.covered.empty()) {
-    const auto emits = [&](const auto& draw) { return scene.materials[draw.material].emission != glm::vec3(0.0F); };
-    std::stable_partition(geometry.draws.begin(), geometry.draws.end(), emits);
-  }
+  if (!patches.covered.empty())
+    std::stable_partition(geometry.draws.begin(), geometry.draws.end(), [](const auto& draw) { return draw.emits; });
   return geometry;
 }
 

@@ -28,6 +28,7 @@ struct ViewVertex {
 struct ViewDraw {
   std::uint32_t material = 0, page = scene::kNone;
   std::uint32_t first = 0, count = 0;
+  bool emits = false;  ///< where faces lie on each other: it is the one that is seen
 };
 
 struct ViewGeometry {

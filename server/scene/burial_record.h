@@ -12,7 +12,9 @@
 #include "server/scene/bounds.h"
 #include "server/scene/burial_budget.h"
 #include "server/scene/coverage.h"
+#include "server/scene/lit_sides.h"
 #include "server/scene/patch_scene.h"
+#include "server/scene/shading_normals.h"
 
 namespace radiosity::scene {
 
@@ -133,9 +135,13 @@ class FormerBurial {
 struct BuiltScene {
   PatchScene patches;
   std::shared_ptr<const BurialRecord> burial;  ///< null: not kept
+  std::shared_ptr<const ShadingNormals> normals;
 };
 [[nodiscard]] Result<BuiltScene> buildWithRecord(const Scene& scene, const ChartOptions& options,
                                                  const FormerScene* former = nullptr,
                                                  const BurialRecord* record = nullptr);
+/// As the scene was built once, whatever its lamps were then. `sides`: sidesOf() it; kBadInput where it cannot have had
+/// them.
+[[nodiscard]] Result<BuiltScene> buildAgain(const Scene& scene, const ChartOptions& options, const SideBits& sides);
 
 }  // namespace radiosity::scene

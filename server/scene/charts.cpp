@@ -16,6 +16,7 @@
 #include "server/scene/emitters.h"
 #include "server/scene/lineage.h"
 #include "server/scene/lit_sides.h"
+#include "server/scene/material_of.h"
 #include "server/scene/opacity.h"
 
 namespace radiosity::scene {
@@ -28,16 +29,11 @@ constexpr double kSmallTexels = 4.0;
 /// Texels of the former scene are kept unless they are so many times too coarse, or too fine, for the budget.
 constexpr double kCoarsest = 1.25;
 
-const Material& materialOf(const Scene& scene, std::uint32_t instance) {
-  static const Material kDefault;
-  const std::uint32_t material = scene.primitives[scene.instances[instance].primitive].material;
-  return material < scene.materials.size() ? scene.materials[material] : kDefault;
-}
-
 class Builder {
  public:
-  Builder(const Scene& scene, const ChartOptions& options, const FormerScene* former, const BurialRecord* record)
-      : scene_(scene), options_(options), former_(former), record_(record) {}
+  Builder(const Scene& scene, const ChartOptions& options, const FormerScene* former, const BurialRecord* record,
+          const SideBits* sides = nullptr)
+      : scene_(scene), options_(options), former_(former), record_(record), sides_(sides) {}
 
   /// Nothing: the former scene's unit box or texels do not suit.
   Result<std::optional<BuiltScene>> build() {
@@ -55,7 +51,7 @@ class Builder {
     neighbours_ = edgeNeighbours(flat_);
     checkOwnLayouts();
     makeCharts();
-    chooseSides();
+    if (auto chosen = chooseSides(); !chosen) return tl::unexpected(chosen.error());
     patches_.texel = texelSize();
     if (former_ != nullptr && options_.texel_size_m <= 0.0) {
       const double ratio = former_->patches.texel / patches_.texel;
@@ -72,7 +68,7 @@ class Builder {
     if (auto sized = numberNodes(); !sized) return tl::unexpected(sized.error());
     std::vector<Hides> hides;
     for (Surface& surface : patches_.surfaces) {
-      const Material& material = materialOf(scene_, surface.instance);
+      const Material& material = materialOf(scene_, surface);
       surface.see_through = isSeeThrough(material);
       const bool two_sided = surface.first_node[1] != kNone;
       hides.push_back(surface.see_through ? Hides::kNothing : two_sided ? Hides::kSheet : Hides::kSolid);
@@ -104,8 +100,9 @@ class Builder {
     applyOpacity(patches_);
     sumAncestors(patches_);
     writeInstanceUvs();
-    findSeams(flat_, neighbours_, sources_, 2.0 * options_.curve_angle_deg, ShadingNormals(scene_, patches_), patches_);
-    return BuiltScene{std::move(patches_), std::move(burial_)};
+    auto normals = std::make_shared<const ShadingNormals>(scene_, patches_);
+    findSeams(flat_, neighbours_, sources_, 2.0 * options_.curve_angle_deg, *normals, patches_);
+    return BuiltScene{std::move(patches_), std::move(burial_), std::move(normals)};
   }
 
  private:
@@ -157,7 +154,7 @@ class Builder {
     if (keeps_texel) return bleedingLayouts(scene_, flat_, charts_, former_->patches.texel, options_);
     // Texels are widest where both sides of all that is double-sided turn out to be lit.
     auto charts = charts_;
-    for (Chart& chart : charts) chart.back_lit = materialOf(scene_, chart.instance).double_sided;
+    for (Chart& chart : charts) chart.back_lit = materialOf(scene_, scene_.instances[chart.instance]).double_sided;
     const double texel = options_.texel_size_m > 0.0 ? texelSize() : texelSizeFor(charts, options_.texel_budget);
     return bleedingLayouts(scene_, flat_, charts_, texel, options_);
   }
@@ -181,78 +178,17 @@ class Builder {
     std::ranges::stable_sort(charts_, {}, &Chart::instance);
   }
 
-  /// Which sides of double-sided charts get patches. Where light, or else a look, comes to the back alone, the chart is
-  /// turned around.
-  void chooseSides() {
-    const auto isDoubleSided = [&](const Chart& chart) { return materialOf(scene_, chart.instance).double_sided; };
-    if (std::ranges::none_of(charts_, isDoubleSided)) return;
-    std::vector<std::array<bool, 2>> asked;
-    for (const Chart& chart : charts_) asked.push_back({isDoubleSided(chart), isDoubleSided(chart)});
-    const auto sides = sideScene();
-    const bool shines = sides.shines();
-    const auto light = lightOnSides(sides, asked);
-    const auto former = formerSurfaces();
-    bool any_flipped = false;
-    for (std::size_t c = 0; c < charts_.size(); ++c) {
-      if (!asked[c][0]) continue;
-      auto [front, back] = light[c];
-      bool turn = back > front;
-      if (former[c] != nullptr) {
-        // What had texels before an edit keeps them, so that an edit elsewhere, or without light, moves nothing here.
-        const auto [front_before, back_before] = lightBefore(*former[c]);
-        front = shines ? std::max(front, front_before) : front_before;
-        back = shines ? std::max(back, back_before) : back_before;
-        turn = back > front || (back == front && former[c]->flipped);
-      }
-      if (turn) {
-        flip(charts_[c]);
-        std::swap(front, back);
-        any_flipped = true;
-      }
-      // The black texels of all have no alpha: what one can see through keeps its own.
-      const bool see_through = isSeeThrough(materialOf(scene_, charts_[c].instance));
-      charts_[c].back_lit = back == SideLight::kLit || (see_through && back == SideLight::kDark);
-      charts_[c].shows_back = back != SideLight::kSealed;
-      charts_[c].dark = front != SideLight::kLit && !see_through && !charts_[c].from_file;
+  /// Which sides of double-sided charts get patches: those that light can reach, or those that had some in another
+  /// process.
+  Result<void> chooseSides() {
+    const SidedCharts sided{scene_, scene_.sky.value_or(options_.sky), patches_.rough_texel, flat_, charts_};
+    if (sides_ != nullptr) {
+      if (auto taken = takeSides(sided, *sides_); !taken) return taken;
+    } else {
+      litSides(sided, former_, former_ != nullptr ? formerSurfaces() : std::vector<const Surface*>());
     }
-    if (any_flipped) neighbours_ = edgeNeighbours(flat_);
-  }
-
-  [[nodiscard]] SideScene sideScene() const {
-    SideScene sides;
-    sides.lights = lightsInUnitBox(scene_, flat_.centre, flat_.scale);
-    sides.sky = scene_.sky.value_or(options_.sky);
-    const Emitters emitters(scene_);
-    const double texel = patches_.rough_texel;
-    for (const Chart& chart : charts_) {
-      const Material& material = materialOf(scene_, chart.instance);
-      const auto first = static_cast<std::uint32_t>(sides.triangles.size());
-      for (const auto t : chart.triangles) {
-        auto& corners = sides.triangles.emplace_back();
-        for (std::size_t k = 0; k < 3; ++k) corners[k] = glm::vec3(flat_.points[flat_.triangles[t].points[k]]);
-        sides.emits.push_back(emitters.shines(chart.instance, flat_.triangles[t].source));
-      }
-      sides.groups.push_back({first, static_cast<std::uint32_t>(chart.triangles.size()), chart.instance,
-                              material.double_sided, isSeeThrough(material), chart.area / (texel * texel)});
-    }
-    return sides;
-  }
-
-  void flip(Chart& chart) {
-    chart.flipped = true;
-    for (const auto t : chart.triangles) {
-      FlatTriangle& triangle = flat_.triangles[t];
-      std::swap(triangle.points[1], triangle.points[2]);
-      std::swap(triangle.source_corner[1], triangle.source_corner[2]);
-      triangle.normal = -triangle.normal;
-    }
-    for (auto& corners : chart.corners) {
-      std::swap(corners[1], corners[2]);
-      if (chart.from_file) continue;
-      for (auto& corner : corners) corner.x = chart.size.x - corner.x;
-    }
-    chart.axis_u = -chart.axis_u;
-    chart.normal = -chart.normal;
+    if (std::ranges::any_of(charts_, &Chart::flipped)) neighbours_ = edgeNeighbours(flat_);
+    return {};
   }
 
   /// Before there are charts: as if all area were covered by whole texels.
@@ -287,16 +223,6 @@ class Builder {
       former[c] = &old_ones[surfaces[source[instance]][order]];
     }
     return former;
-  }
-
-  /// Of the front and the back of the file's triangles.
-  [[nodiscard]] std::array<SideLight, 2> lightBefore(const Surface& surface) const {
-    const bool dark = isLeftCoarse(former_->scene, former_->patches, surface);
-    std::array<SideLight, 2> light{dark ? SideLight::kDark : SideLight::kLit,
-                                   surface.shows_back ? SideLight::kDark : SideLight::kSealed};
-    if (surface.first_node[1] != kNone) light[1] = SideLight::kLit;
-    if (surface.flipped) std::swap(light[0], light[1]);
-    return light;
   }
 
   [[nodiscard]] FormerPlaces formerPlaces() const {
@@ -462,6 +388,7 @@ class Builder {
   const ChartOptions& options_;
   const FormerScene* former_;
   const BurialRecord* record_;
+  const SideBits* sides_;  ///< null: light decides
   PatchScene patches_;
   std::shared_ptr<const BurialRecord> burial_;
   std::vector<std::uint32_t> surface_before_;  ///< after an edit, as of matchSurfaces()
@@ -483,6 +410,12 @@ Result<BuiltScene> buildWithRecord(const Scene& scene, const ChartOptions& optio
     if (*built) return std::move(**built);
   }
   auto built = Builder(scene, options, nullptr, nullptr).build();
+  if (!built) return tl::unexpected(built.error());
+  return std::move(**built);
+}
+
+Result<BuiltScene> buildAgain(const Scene& scene, const ChartOptions& options, const SideBits& sides) {
+  auto built = Builder(scene, options, nullptr, nullptr, &sides).build();
   if (!built) return tl::unexpected(built.error());
   return std::move(**built);
 }

@@ -9,6 +9,7 @@
 //                  charts_fit.cpp      plane maps, minimum-area rectangles, no overlap inside a chart
 //                  charts_seams.cpp    edges shared by charts, for stitching
 //   lit_sides.h  which sides of double-sided charts light can reach
+//                  charts_sides.cpp    what that makes of the charts
 //   atlas.h      texel size from the budget, grid of each chart, packing into pages
 //   coverage.h   exact clipped area of every leaf, points on leaves, burial inside other solids
 //   charts.cpp   puts it together
@@ -26,7 +27,9 @@
 #include <string>
 #include <vector>
 
+#include "common/result.h"
 #include "server/scene/flatten.h"
+#include "server/scene/lit_sides.h"
 #include "server/scene/patch_scene.h"
 #include "server/scene/shading_normals.h"
 
@@ -100,6 +103,24 @@ struct Facets {
 [[nodiscard]] std::vector<std::uint32_t> bleedingLayouts(const Scene& scene, const FlatScene& flat,
                                                          const std::vector<Chart>& charts, double texel,
                                                          const ChartOptions& options);
+
+/// Charts whose sides are chosen, and what they are made of. Refers to its parts; those that are turned around are
+/// turned in `flat`, too.
+struct SidedCharts {
+  const Scene& scene;
+  Sky sky;       ///< black: none
+  double texel;  ///< edge, unit box
+  FlatScene& flat;
+  std::vector<Chart>& charts;
+};
+
+/// Gives the sides of double-sided charts patches where light can reach them. Where light, or else a look, comes to the
+/// back alone, the chart is turned around. `before`: null, or the scene before an edit, and `former` by chart its
+/// surface there, or null: what had patches keeps them. Cost: lightOnSides().
+void litSides(const SidedCharts& of, const FormerScene* before, const std::vector<const Surface*>& former);
+
+/// The same as it was decided before. kBadInput: `sides` are none of these charts; these are of no use then.
+[[nodiscard]] Result<void> takeSides(const SidedCharts& of, const SideBits& sides);
 
 /// Fills patches.seams. `sources`: flat triangle of each patch triangle. Edges are matched by position, so also between
 /// instances (tiles of a floor), where the angle between the faces is below `smooth_deg`, or both have normals from the

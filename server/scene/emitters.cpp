@@ -38,19 +38,25 @@ PixelRange pixelsBetween(float low, float high, int size, bool repeat, bool mirr
   return {pixel(low - 0.5F / static_cast<float>(size)), pixel(high + 0.5F / static_cast<float>(size))};
 }
 
+/// Bits of those in which there is any light.
+unsigned channelsOf(const glm::vec3& light) {
+  return (light.r > 0.0F ? 1U : 0U) | (light.g > 0.0F ? 2U : 0U) | (light.b > 0.0F ? 4U : 0U);
+}
+
 }  // namespace
 
-/// How many pixels of a texture are not black, by rectangle: a summed-area table (Crow 1984).
+/// How many pixels of a texture are not black in all of some channels, by rectangle: a summed-area table (Crow 1984).
 class Emitters::BrightPixels {
  public:
-  explicit BrightPixels(const Texture& texture) : width_(texture.width), height_(texture.height) {
+  BrightPixels(const Texture& texture, unsigned channels) : width_(texture.width), height_(texture.height) {
     const auto row = static_cast<std::size_t>(width_) + 1;
     sums_.assign(row * (static_cast<std::size_t>(height_) + 1), 0);
     for (std::size_t y = 0; y < static_cast<std::size_t>(height_); ++y) {
       std::uint32_t in_row = 0;
       for (std::size_t x = 0; x < static_cast<std::size_t>(width_); ++x) {
         const auto* p = &texture.rgba[4 * (y * static_cast<std::size_t>(width_) + x)];
-        in_row += p[0] != 0 || p[1] != 0 || p[2] != 0 ? 1 : 0;
+        const unsigned bright = (p[0] != 0 ? 1U : 0U) | (p[1] != 0 ? 2U : 0U) | (p[2] != 0 ? 4U : 0U);
+        in_row += (bright & channels) != 0U ? 1 : 0;
         sums_[(y + 1) * row + x + 1] = sums_[y * row + x + 1] + in_row;
       }
     }
@@ -72,14 +78,16 @@ class Emitters::BrightPixels {
   std::vector<std::uint32_t> sums_;
 };
 
-Emitters::Emitters(const Scene& scene) : scene_(scene), of_texture_(scene.textures.size()) {
+Emitters::Emitters(const Scene& scene) : scene_(scene) {
   for (const Material& material : scene.materials) {
     const auto index = material.emissive_texture.texture;
-    if (!mayEmit(material) || index >= scene.textures.size() || of_texture_[index]) continue;
+    const auto channels = channelsOf(material.emission);
+    if (!mayEmit(material) || index >= scene.textures.size() || bright_.contains({index, channels})) continue;
     const Texture& texture = scene.textures[index];
     const auto bytes = static_cast<std::size_t>(std::max(0, texture.width)) *
                        static_cast<std::size_t>(std::max(0, texture.height)) * 4;
-    if (bytes > 0 && texture.rgba.size() >= bytes) of_texture_[index] = std::make_unique<const BrightPixels>(texture);
+    if (bytes > 0 && texture.rgba.size() >= bytes)
+      bright_.emplace(std::pair{index, channels}, std::make_unique<const BrightPixels>(texture, channels));
   }
 }
 
@@ -87,8 +95,8 @@ Emitters::~Emitters() = default;
 
 /// Null: without a texture, or without its pixels, a material emits all over.
 const Emitters::BrightPixels* Emitters::pixelsOf(const Material& material) const {
-  const auto index = material.emissive_texture.texture;
-  return index < of_texture_.size() ? of_texture_[index].get() : nullptr;
+  const auto found = bright_.find({material.emissive_texture.texture, channelsOf(material.emission)});
+  return found != bright_.end() ? found->second.get() : nullptr;
 }
 
 bool Emitters::shines(std::uint32_t instance, std::uint32_t triangle) const {
@@ -105,6 +113,19 @@ bool Emitters::shines(std::uint32_t instance, std::uint32_t triangle) const {
   };
   const auto a = corner(0), b = corner(1), c = corner(2);
   return pixels->anyIn(glm::min(a, glm::min(b, c)), glm::max(a, glm::max(b, c)), use);
+}
+
+DarkOfEmitters::DarkOfEmitters(const Scene& scene, const PatchScene& patches) {
+  if (patches.covered.empty()) return;
+  for (const Surface& surface : patches.surfaces) {
+    if (surface.emits || surface.material >= scene.materials.size() || !mayEmit(scene.materials[surface.material]))
+      continue;
+    of_instance_.resize(scene.instances.size());
+    auto& triangles = of_instance_[surface.instance];
+    triangles.resize(scene.primitives[scene.instances[surface.instance].primitive].indices.size() / 3, false);
+    for (auto t = surface.first_triangle; t < surface.first_triangle + surface.triangle_count; ++t)
+      triangles[patches.triangle_source[t]] = true;
+  }
 }
 
 void findEmitters(const Scene& scene, PatchScene& patches) {

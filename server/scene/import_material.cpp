@@ -8,6 +8,7 @@
 #include <string>
 
 #include "server/scene/image_decode.h"
+#include "server/scene/texture_references.h"
 
 namespace radiosity::scene {
 namespace {
@@ -31,7 +32,9 @@ class MaterialImporter {
     pointer_ = "/materials/" + std::to_string(index);
     const auto& source = context_.materials[index];
     const auto& json = context_.document.gltf["materials"][index];
-    warnDangling(json, pointer_, "");
+    forEachTextureInfo(json, pointer_, [&](const Json& owner, const std::string& key, const std::string& where) {
+      warnDanglingReference(owner[key], "index", "textures", where, "the texture is left out");
+    });
     Material out;
     out.name = source.name;
     out.double_sided = source.doubleSided;
@@ -136,36 +139,13 @@ class MaterialImporter {
     }
   }
 
-  [[nodiscard]] std::size_t countOf(const char* list) const {
-    const auto found = context_.document.gltf.find(list);
-    return found == context_.document.gltf.end() ? 0 : found->size();
-  }
-
-  /// What an optional member refers to, of a list that has `count` entries; none, too, where it has no such entry.
-  static std::optional<std::size_t> referenceOf(const Json& object, const char* member, std::size_t count) {
-    const auto found = object.find(member);
-    if (found == object.end() || !found->is_number_integer()) return std::nullopt;
-    const auto index = found->get<std::uint64_t>();  // what is negative is more than any count
-    return index < count ? std::optional<std::size_t>(index) : std::nullopt;
-  }
-
   /// A reference that the schema lets pass although nothing is there.
   void warnDanglingReference(const Json& object, const char* member, const char* list, const std::string& where,
                              const char* what) {
-    const auto count = countOf(list);
+    const auto count = countOf(context_.document.gltf, list);
     if (!object.contains(member) || referenceOf(object, member, count)) return;
     context_.warn(where + "/" + member, "is " + object[member].dump() + ", but /" + list + " has " +
                                             std::to_string(count) + " entries; " + what);
-  }
-
-  /// In a material and its extensions, also of textures that light does not need. Values nest at most 64 deep.
-  void warnDangling(const Json& value, const std::string& where, const std::string& key) {
-    if (!value.is_object()) return;
-    if (key.ends_with("Texture") && value.contains("index") && value["index"].is_number_integer())
-      warnDanglingReference(value, "index", "textures", where, "the texture is left out");
-    for (const auto& [name, child] : value.items()) {
-      if (name != "extras") warnDangling(child, where + "/" + escapeToken(name), name);
-    }
   }
 
   enum class Coding { kSrgb, kLinear };
@@ -177,7 +157,7 @@ class MaterialImporter {
     const Json::json_pointer pointer(member);
     if (!material.contains(pointer)) return {};
     const auto& info = material.at(pointer);
-    const auto index = referenceOf(info, "index", countOf("textures"));
+    const auto index = referenceOf(info, "index", countOf(context_.document.gltf, "textures"));
     if (!index) return {};
     const auto& texture = context_.document.gltf["textures"][*index];
     const auto image = imageOf(texture, "/textures/" + std::to_string(*index));
@@ -225,7 +205,7 @@ class MaterialImporter {
   }
 
   Result<void> readSampler(const Json& texture, TextureUse& use) {
-    const auto index = referenceOf(texture, "sampler", countOf("samplers"));
+    const auto index = referenceOf(texture, "sampler", countOf(context_.document.gltf, "samplers"));
     if (!index) return {};
     const auto& sampler = context_.document.gltf["samplers"][*index];
     const int wrap_s = sampler.value("wrapS", kRepeat), wrap_t = sampler.value("wrapT", kRepeat);

@@ -34,7 +34,8 @@ enum class Seams { kStitched, kLeft };
 /// The input document plus TEXCOORD_1 on every lit primitive and "lightmap": page in its extras. Primitives whose
 /// instances need different UVs are split (a mesh per instance); vertices are split along chart borders. A double-sided
 /// primitive becomes its front and, where one can see its back, a flipped copy ("lightmapSide": "back"), both
-/// single-sided, with texels of their own.
+/// single-sided, with texels of their own. Where faces lie on each other, what its emissive texture leaves dark is
+/// split off and has "lightmapEmits": false: of such faces those that emit are seen.
 [[nodiscard]] Result<Document> withLightmapUvs(const Document& document, const Scene& scene, const PatchScene& patches);
 
 /// A GLB for any glTF viewer: withLightmapUvs plus KHR_materials_unlit materials whose base colour texture is the

@@ -5,9 +5,11 @@
 #include <string>
 
 #include "common/check.h"
+#include "server/scene/emitters.h"
 #include "server/scene/import_context.h"
 #include "server/scene/import_instancing.h"
 #include "server/scene/lightmap.h"
+#include "server/scene/lit_glb_animation.h"
 #include "server/scene/lit_glb_dangling.h"
 #include "server/scene/lit_glb_mesh.h"
 #include "server/scene/lit_glb_rules.h"
@@ -24,8 +26,8 @@ struct Placement {
 };
 
 /// The importer places a node's primitives behind each other, element by element: a primitive seen again starts the
-/// next element.
-std::vector<Placement> placements(const Scene& scene, const PatchScene& patches) {
+/// next element. Refers to all that it is given.
+std::vector<Placement> placements(const Scene& scene, const PatchScene& patches, const DarkOfEmitters& dark) {
   RAD_CHECK_EQ(scene.instances.size(), patches.instance_uvs.size());
   std::vector<Placement> out;
   std::set<std::uint32_t> seen;
@@ -38,7 +40,8 @@ std::vector<Placement> placements(const Scene& scene, const PatchScene& patches)
     }
     seen.insert(primitive.primitive);
     const auto& uv = patches.instance_uvs[i];
-    if (!uv.side[0].page.empty()) out.back().lit[primitive.primitive] = {&primitive, &uv};  // empty: not charted
+    if (uv.side[0].page.empty()) continue;  // not charted
+    out.back().lit[primitive.primitive] = {&primitive, &uv, &dark, i};
   }
   return out;
 }
@@ -89,7 +92,7 @@ void dropOldPages(Json& gltf) {
   for (auto& mesh : gltf["meshes"]) {
     for (auto& primitive : mesh["primitives"]) {
       if (!primitive.contains("extras") || !primitive["extras"].is_object()) continue;
-      for (const auto* member : {"lightmap", "lightmapSide"}) primitive["extras"].erase(member);
+      for (const auto* member : {"lightmap", "lightmapSide", "lightmapEmits"}) primitive["extras"].erase(member);
     }
   }
 }
@@ -118,6 +121,8 @@ class Exporter {
       out_.buffers.push_back(std::make_shared<const Bytes>(std::move(bytes)));
     }
     dropUnusedInstancing();
+    if (!moveWeightChannels(out_.gltf, children_, [&](std::size_t bytes) { return builder_.takeJson(bytes); }))
+      return builder_.tooMuchJson();
     makeSingleSided();
     return {};
   }
@@ -155,6 +160,7 @@ class Exporter {
       if (document_.gltf["nodes"][node].contains("weights"))
         child["weights"] = document_.gltf["nodes"][node]["weights"];
       children.push_back(out_.gltf["nodes"].size());
+      children_[node].push_back(out_.gltf["nodes"].size());
       out_.gltf["nodes"].push_back(std::move(child));
     }
     auto& parent = out_.gltf["nodes"][node];
@@ -238,6 +244,7 @@ class Exporter {
   LitMeshBuilder builder_;
   Json source_meshes_;
   std::set<std::size_t> taken_;
+  std::map<std::size_t, std::vector<std::size_t>> children_;  ///< by instanced node: one for each of its elements
 };
 
 }  // namespace
@@ -252,7 +259,9 @@ Result<Document> withLightmapUvs(const Document& document, const Scene& scene, c
   dropOldPages(out.gltf);
   dropIdleCutoffs(out.gltf);
   separateCones(out.gltf);
-  if (auto ok = Exporter(document, *model, out).run(placements(scene, patches)); !ok) return tl::unexpected(ok.error());
+  const DarkOfEmitters dark(scene, patches);
+  const auto placed = placements(scene, patches, dark);
+  if (auto ok = Exporter(document, *model, out).run(placed); !ok) return tl::unexpected(ok.error());
   return out;
 }
 

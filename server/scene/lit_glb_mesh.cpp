@@ -164,14 +164,13 @@ Result<Json> LitMeshBuilder::copyAttributes(const Json& attributes, const std::v
 }
 
 std::vector<LitMeshBuilder::Part> LitMeshBuilder::partsOf(const LitPrimitive& lit) {
-  std::vector<Part> parts;
+  std::set<Part> parts;
   for (std::size_t side = 0; side < 2; ++side) {
-    const auto& of_triangles = lit.uv->side[side].page;
-    std::set<std::uint32_t> pages(of_triangles.begin(), of_triangles.end());
-    pages.erase(kNone);
-    for (const auto page : pages) parts.push_back({side, page});
+    const auto& pages = lit.uv->side[side].page;
+    for (std::size_t t = 0; t < pages.size(); ++t)
+      if (pages[t] != kNone) parts.insert({side, pages[t], lit.isDark(t)});
   }
-  return parts;
+  return {parts.begin(), parts.end()};
 }
 
 LitMeshBuilder::Vertices LitMeshBuilder::collect(const LitPrimitive& lit, const Part& part) {
@@ -182,7 +181,7 @@ LitMeshBuilder::Vertices LitMeshBuilder::collect(const LitPrimitive& lit, const 
   const std::array<std::size_t, 3> order =
       part.side == 0 ? std::array<std::size_t, 3>{0, 1, 2} : std::array<std::size_t, 3>{0, 2, 1};
   for (std::size_t t = 0; t < uv.page.size(); ++t) {
-    if (uv.page[t] != part.page) continue;
+    if (uv.page[t] != part.page || lit.isDark(t) != part.dark) continue;
     for (const auto c : order) {
       const CornerKey key{indices[3 * t + c], uv.corners[t][c]};
       const auto [found, added] = ids.try_emplace(key, static_cast<std::uint32_t>(out.source.size()));
@@ -230,6 +229,7 @@ Result<Json> LitMeshBuilder::partPrimitive(const Json& source, const LitPrimitiv
   if (!primitive.contains("extras") || !primitive["extras"].is_object()) primitive["extras"] = Json::object();
   primitive["extras"]["lightmap"] = part.page;
   if (turned) primitive["extras"]["lightmapSide"] = "back";
+  if (part.dark) primitive["extras"]["lightmapEmits"] = false;
   return primitive;
 }
 

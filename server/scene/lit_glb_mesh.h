@@ -5,6 +5,7 @@
 #include <map>
 #include <vector>
 
+#include "server/scene/emitters.h"
 #include "server/scene/import_model.h"
 #include "server/scene/json_text.h"
 #include "server/scene/patch_scene.h"
@@ -15,6 +16,11 @@ namespace radiosity::scene {
 struct LitPrimitive {
   const Primitive* primitive = nullptr;
   const PatchScene::InstanceUv* uv = nullptr;
+  const DarkOfEmitters* dark = nullptr;
+  std::size_t instance = 0;
+
+  /// Such triangles are marked with "lightmapEmits": false.
+  [[nodiscard]] bool isDark(std::size_t triangle) const { return dark->has(instance, triangle); }
 };
 
 /// Appends accessors, buffer views and bytes to `gltf`; the bytes become buffer `buffer`.
@@ -24,10 +30,10 @@ class LitMeshBuilder {
       : document_(document), model_(model), gltf_(gltf), buffer_(buffer) {}
 
   /// `mesh` with each primitive in `lit` (by index in the file's mesh) turned into one triangle list a side and page,
-  /// vertices split where lightmap UVs differ, all other attributes copied byte by byte; backs are turned around, with
-  /// their normals and tangents negated. kTooLarge past 1 GiB of new data, or
-  /// 64 MiB of JSON that is there again. `again`: the mesh was built before; what is the file's own alone (`extras`,
-  /// which may be as large as the file) stays with the first.
+  /// or two where some of it is dark, vertices split where lightmap UVs differ, all other attributes copied byte by
+  /// byte; backs are turned around, with their normals and tangents negated. kTooLarge past 1 GiB of new data, or 64
+  /// MiB of JSON that is there again. `again`: the mesh was built before; what is the file's own alone (`extras`, which
+  /// may be as large as the file) stays with the first.
   [[nodiscard]] Result<Json> build(const Json& mesh, const std::map<std::uint32_t, LitPrimitive>& lit, bool again);
   /// Counts JSON that is there again. False: it is too much.
   [[nodiscard]] bool takeJson(std::size_t bytes) { return (json_bytes_ += bytes) <= kMaxJsonAgain; }
@@ -48,6 +54,9 @@ class LitMeshBuilder {
   struct Part {
     std::size_t side;
     std::uint32_t page;
+    bool dark;  ///< LitPrimitive::isDark()
+
+    auto operator<=>(const Part&) const = default;
   };
   struct Copy {
     bool with_bounds = false;  ///< POSITION wants them

@@ -66,10 +66,11 @@ struct Place {
 
 class Probe {
  public:
-  Probe(const SideScene& scene, const std::vector<std::array<bool, 2>>& asked)
+  Probe(const SideScene& scene, const std::vector<std::array<bool, 2>>& asked, const RayTree* tree)
       : scene_(scene),
         asked_(asked),
-        tree_(Bvh(scene.triangles)),
+        own_tree_(tree != nullptr ? RayTree() : RayTree(Bvh(scene.triangles))),
+        tree_(tree != nullptr ? *tree : own_tree_),
         light_(scene.groups.size()),
         shines_(scene.groups.size(), false) {
     group_of_.resize(scene.triangles.size());
@@ -386,7 +387,8 @@ class Probe {
 
   const SideScene& scene_;
   const std::vector<std::array<bool, 2>>& asked_;
-  RayTree tree_;
+  RayTree own_tree_;  ///< where none was at hand
+  const RayTree& tree_;
   std::vector<std::array<SideLight, 2>> light_;  ///< by group and side; first kSealed
   std::vector<bool> shines_;                     ///< by group: some of its triangles do
   MeshParts parts_;
@@ -405,9 +407,10 @@ bool SideScene::shines() const {
 }
 
 std::vector<std::array<SideLight, 2>> lightOnSides(const SideScene& scene,
-                                                   const std::vector<std::array<bool, 2>>& asked, LookFor how) {
+                                                   const std::vector<std::array<bool, 2>>& asked, LookFor how,
+                                                   const RayTree* tree) {
   if (!scene.shines()) return {scene.groups.size(), {SideLight::kLit, SideLight::kLit}};
-  return Probe(scene, asked).run(how);
+  return Probe(scene, asked, tree).run(how);
 }
 
 std::vector<PunctualLight> lightsInUnitBox(const Scene& scene, const glm::dvec3& centre, double scale) {

@@ -5,10 +5,13 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <vector>
 
 #include "server/scene/bvh.h"
 #include "server/scene/patch_scene.h"
+#include "server/scene/ray_tree.h"
 
 namespace radiosity::scene {
 
@@ -42,11 +45,20 @@ struct SideScene {
 /// there through the open space, as light would come, until they see a lamp, the sun or the sky. Paths never cross a
 /// surface, so that a box that is sunk into a lit floor has a dark inside. Only what is closed all around can be
 /// sealed. A random test: what little of a side receives light may be missed. The same scene gives the same answer.
-/// Some milliseconds for a furnished room.
+/// Some milliseconds for a furnished room. `tree`: of the scene's triangles; null: one is built, O(n log n).
 enum class LookFor { kPhotonsAndPaths, kPhotonsAlone };
 [[nodiscard]] std::vector<std::array<SideLight, 2>> lightOnSides(const SideScene& scene,
                                                                  const std::vector<std::array<bool, 2>>& asked,
-                                                                 LookFor how = LookFor::kPhotonsAndPaths);
+                                                                 LookFor how = LookFor::kPhotonsAndPaths,
+                                                                 const RayTree* tree = nullptr);
+
+/// What was decided about the sides of a surface. A scene is laid out alike by whoever decides the same, whatever its
+/// lamps are then (buildAgain(), burial_record.h).
+inline constexpr unsigned kFlipped = 1, kBackLit = 2, kShowsBack = 4, kLeftCoarse = 8;
+/// By surface; empty: none is double-sided.
+using SideBits = std::vector<std::uint8_t>;
+/// `patches`: built from `scene`, or from one that has the same geometry.
+[[nodiscard]] SideBits sidesOf(const Scene& scene, const PatchScene& patches);
 
 /// Texels of area above which a chart has more than one unless it is left coarse: of those without, both sides are
 /// below one and a half.
@@ -54,14 +66,16 @@ inline constexpr double kCoarse = 2.25;
 /// Whether a surface that is wider than a texel has one for all of it, since no light reaches its sides.
 [[nodiscard]] bool isLeftCoarse(const Scene& scene, const PatchScene& patches, const Surface& surface);
 
+/// Of the triangles of `patches`. O(n log n).
+[[nodiscard]] RayTree rayTreeOf(const PatchScene& patches);
+
 /// Whether light of `next`, or of the sky, reaches a side of `patches` that was left without patches because light of
 /// `before` did not. Both scenes have the geometry of `patches`. Nothing is traced unless `next` has a lamp or a sky
-/// that `before` has not.
+/// that `before` has not. `tree`: of the triangles of `patches`, asked for where something is to be traced; one is
+/// built where there is none.
+using TreeAtHand = std::function<std::shared_ptr<const RayTree>()>;
 [[nodiscard]] bool reachesDarkSides(const PatchScene& patches, const Scene& before, const Sky& sky_before,
-                                    const Scene& next, const Sky& sky_next);
-
-/// Whether one of two scenes has a lamp, a light or a sky where the other has none.
-[[nodiscard]] bool shineElsewhere(const Scene& before, const Sky& sky_before, const Scene& next, const Sky& sky_next);
+                                    const Scene& next, const Sky& sky_next, const TreeAtHand& tree = {});
 
 /// The lights of a scene in the unit box of `centre` and `scale`.
 [[nodiscard]] std::vector<PunctualLight> lightsInUnitBox(const Scene& scene, const glm::dvec3& centre, double scale);

@@ -3,13 +3,16 @@
 
 #include "server/scene/emitters.h"
 #include "server/scene/lit_sides.h"
+#include "server/scene/material_of.h"
 
 namespace radiosity::scene {
 namespace {
 
-const Material& materialOf(const Scene& scene, const Surface& surface) {
-  static const Material kDefault;
-  return surface.material < scene.materials.size() ? scene.materials[surface.material] : kDefault;
+std::vector<Bvh::Triangle> trianglesOf(const PatchScene& patches) {
+  std::vector<Bvh::Triangle> triangles(patches.triangles.size());
+  for (std::size_t i = 0; i < patches.indices.size(); ++i)
+    triangles[i / 3][i % 3] = patches.vertices[patches.indices[i]].position;
+  return triangles;
 }
 
 /// The surfaces of `patches` under the light of `scene`.
@@ -17,9 +20,7 @@ SideScene sideSceneOf(const PatchScene& patches, const Scene& scene, const Sky& 
   SideScene sides;
   sides.lights = lightsInUnitBox(scene, patches.centre, patches.scale);
   sides.sky = sky;
-  sides.triangles.resize(patches.triangles.size());
-  for (std::size_t i = 0; i < patches.indices.size(); ++i)
-    sides.triangles[i / 3][i % 3] = patches.vertices[patches.indices[i]].position;
+  sides.triangles = trianglesOf(patches);
   const Emitters emitters(scene);
   sides.emits.resize(patches.triangles.size());
   for (const Surface& surface : patches.surfaces) {
@@ -51,9 +52,7 @@ bool shinesAnew(const Scene& before, const Sky& sky_before, const Scene& next, c
 
 }  // namespace
 
-bool shineElsewhere(const Scene& before, const Sky& sky_before, const Scene& next, const Sky& sky_next) {
-  return shinesAnew(before, sky_before, next, sky_next) || shinesAnew(next, sky_next, before, sky_before);
-}
+RayTree rayTreeOf(const PatchScene& patches) { return RayTree(Bvh(trianglesOf(patches))); }
 
 bool isLeftCoarse(const Scene& scene, const PatchScene& patches, const Surface& surface) {
   const double texel = patches.texel / static_cast<double>(scene.instances[surface.instance].texel_scale);
@@ -62,7 +61,7 @@ bool isLeftCoarse(const Scene& scene, const PatchScene& patches, const Surface& 
 }
 
 bool reachesDarkSides(const PatchScene& patches, const Scene& before, const Sky& sky_before, const Scene& next,
-                      const Sky& sky_next) {
+                      const Sky& sky_next, const TreeAtHand& tree) {
   std::vector<std::array<bool, 2>> asked(patches.surfaces.size(), {false, false});
   bool any = false;
   for (std::size_t s = 0; s < asked.size(); ++s) {
@@ -77,7 +76,9 @@ bool reachesDarkSides(const PatchScene& patches, const Scene& before, const Sky&
   // Photons find what a lamp lights; only the sky and the sun send none.
   const auto isSun = [](const PunctualLight& light) { return light.kind == LightKind::kDirectional; };
   const bool far = isBright(sky_next.upper) || isBright(sky_next.lower) || std::ranges::any_of(next.lights, isSun);
-  const auto light = lightOnSides(sides, asked, far ? LookFor::kPhotonsAndPaths : LookFor::kPhotonsAlone);
+  const auto at_hand = tree ? tree() : nullptr;
+  const auto light =
+      lightOnSides(sides, asked, far ? LookFor::kPhotonsAndPaths : LookFor::kPhotonsAlone, at_hand.get());
   for (std::size_t s = 0; s < asked.size(); ++s)
     for (std::size_t side = 0; side < 2; ++side)
       if (asked[s][side] && light[s][side] == SideLight::kLit) return true;

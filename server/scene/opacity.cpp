@@ -10,6 +10,7 @@
 #include "common/give_back.h"
 #include "common/parallel.h"
 #include "server/scene/chart_corners.h"
+#include "server/scene/material_of.h"
 #include "server/scene/shade_texture.h"
 
 namespace radiosity::scene {
@@ -19,11 +20,6 @@ constexpr std::uint64_t kMaxCells = std::uint64_t{1} << 26;
 constexpr std::uint32_t kMaxScale = 64;        ///< cells across a leaf
 constexpr int kSamples = 3;                    ///< kSamples^2 looks at the texture in each cell
 constexpr std::uint32_t kCellsAtOnce = 16384;  ///< of one thread, about
-
-const Material& materialOf(const Scene& scene, const Surface& surface) {
-  static const Material kDefault;
-  return surface.material < scene.materials.size() ? scene.materials[surface.material] : kDefault;
-}
 
 /// In steps of 1/255; what is no number is 0.
 std::uint8_t byteOf(float opacity) {

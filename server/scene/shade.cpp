@@ -9,6 +9,7 @@
 #include <string>
 
 #include "server/scene/chart_corners.h"
+#include "server/scene/material_of.h"
 #include "server/scene/patch_scene.h"
 #include "server/scene/shade_layers.h"
 
@@ -25,10 +26,6 @@ struct Sum {
   glm::dvec3 emission{0.0}, reflectance{0.0};
   double weight = 0.0;
 };
-
-Material materialOf(const Scene& scene, std::uint32_t material) {
-  return material < scene.materials.size() ? scene.materials[material] : Material{};
-}
 
 class MaterialShader {
  public:

@@ -138,7 +138,10 @@ bool LeafGather::advance(double seconds) {
   const auto start = std::chrono::steady_clock::now();
   const auto spent = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); };
   if (stage_ == Stage::kTracing) {
-    if (!sights_.isTraced()) is_weighed_ = false;  // nor is it where memory ends in between
+    if (!sights_.isTraced()) {
+      is_weighed_ = false;  // nor is it where memory ends in between
+      forgetShadedRays();
+    }
     if (!sights_.trace(seconds)) return false;
     if (!is_weighed_) {
       weighRays();

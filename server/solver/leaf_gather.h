@@ -33,6 +33,7 @@
 #include "server/solver/leaf_sights.h"
 #include "server/solver/leaf_smoother.h"
 #include "server/solver/lost_rays.h"
+#include "server/solver/shaded_rays.h"
 
 namespace radiosity::solver {
 
@@ -213,9 +214,13 @@ class LeafGather {
     static constexpr std::size_t kParts = 5, kBelow = 4;
     std::array<std::array<std::vector<float>, 3>, kParts> part;
   };
-  void sumShaded(std::size_t half, std::uint32_t value, std::uint32_t leaf, const glm::dvec3& normal,
-                 ShadedLight& light) const;
-  void weighShading(std::size_t half, const LeafShading::ShadedSide& shaded);
+  void addShadedRays(std::size_t half, std::uint32_t value, std::uint32_t number, ShadedRays& rays) const;
+  void sumShaded(std::size_t half, std::uint32_t value, std::uint32_t leaf, const ShadedRays::Leaf& of,
+                 std::span<const ShadedRays::Weights> weights, ShadedLight& light) const;
+  void weighShading(std::size_t half, std::size_t number);
+  void keepShadedRays();
+  /// There will be others.
+  void forgetShadedRays();
   void weighDoubt();
   [[nodiscard]] glm::dvec3 doubtOf(std::size_t half, std::uint32_t end) const;
   [[nodiscard]] glm::dvec3 changeAcross(std::uint32_t value) const;
@@ -285,6 +290,9 @@ class LeafGather {
   std::array<std::vector<glm::vec3>, 2> gathered_;
   const LeafShading* shading_ = nullptr;
   std::array<std::vector<glm::vec3>, 2> shaded_part_;
+  /// Of the rays that there are light was weighed for shading normals; what they count for that is kept.
+  bool has_shaded_ = false, keeps_shaded_rays_ = false;
+  std::array<std::vector<ShadedRays>, 2> shaded_rays_;  ///< by half, by side of LeafShading::sides()
   double noise_ = 0.0, smoothed_ = 0.0, bias_ = 0.0, doubt_ = 0.0, unsolved_ = 0.0, unsolved_square_ = 0.0;
   std::vector<double> block_noise_;  ///< parts of it but for smoothed_, what smoothing took, by kBlock leaves
   std::vector<double> block_light_;  ///< likewise, of all irradiance

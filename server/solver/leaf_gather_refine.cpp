@@ -128,6 +128,7 @@ bool LeafGather::refine(double goal, const BesideLight& beside) {
   std::vector<std::uint16_t> asked(counts.begin(), counts.end());
   for (std::uint32_t v = 0; v < asked.size(); ++v)
     asked[v] = static_cast<std::uint16_t>(asked[v] * blocks[v / kBlock].times);
+  forgetShadedRays();  // they will take the room
   sights_.ask(asked);
   return true;
 }

@@ -35,6 +35,21 @@ glm::dvec3 inCap(const glm::dvec3& axis, double least, double u, double v) {
 
 }  // namespace
 
+std::vector<double> fluxes(const scene::PatchScene& patches, const LightSources& sources) {
+  const PunctualLights none(patches, {}, {});
+  std::vector<double> each;
+  const auto add = [&](const LightSources& one) {
+    double flux = 0.0;
+    for (const auto& source : none.makeSources(patches, one))
+      flux += source.flux_per_intensity * (source.intensity.x + source.intensity.y + source.intensity.z);
+    each.push_back(flux);
+  };
+  for (const auto& light : sources.lights) add({{light}, {}});
+  add({{}, {sources.sky.upper, glm::vec3(0.0F)}});
+  add({{}, {glm::vec3(0.0F), sources.sky.lower}});
+  return each;
+}
+
 /// Cumulative flux, so that a number in [0, 1) draws one in proportion.
 class LostLight::Senders {
  public:
@@ -59,6 +74,11 @@ LostLight::LostLight(const scene::PatchScene& patches, const scene::PatchMateria
                      std::shared_ptr<const LeafRays> rays)
     : patches_(patches), materials_(materials), sides_(makeSides(patches)), rays_(std::move(rays)) {
   if (!rays_) rays_ = std::make_shared<const LeafRays>(patches_, sides_);
+  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
+    const auto instance = patches_.surfaces[sides_[s].surface].instance;
+    if (instance >= sides_of_.size()) sides_of_.resize(instance + std::size_t{1});
+    sides_of_[instance].push_back(s);
+  }
   const auto box = sceneBox(patches);
   middle_ = 0.5 * (glm::dvec3(box[0]) + glm::dvec3(box[1]));
   radius_ = 0.5 * glm::distance(glm::dvec3(box[0]), glm::dvec3(box[1]));
@@ -104,15 +124,16 @@ bool LostLight::follow(const Ray& ray, std::uint64_t key, double range, Fate& fa
 }
 
 LostLight::Fate LostLight::ofInstance(std::uint32_t instance) const {
+  Fate fate;
+  if (instance >= sides_of_.size()) return fate;
   Senders leaves;
-  for (const auto& side : sides_) {
-    if (patches_.surfaces[side.surface].instance != instance) continue;
+  for (const auto s : sides_of_[instance]) {
+    const auto& side = sides_[s];
     const auto emission = materials_.emission.side(side.number);
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
       leaves.add(side.first_value + leaf,
                  channelSum(emission[leaf]) * static_cast<double>(patches_.node_area[side.first_node + leaf]));
   }
-  Fate fate;
   if (leaves.empty()) return fate;
   const auto key = mixKeys(kKey, instance);
   for (std::uint32_t i = 0; i < kRays; ++i) {
@@ -143,10 +164,8 @@ std::vector<LostLight::Share> LostLight::backs(std::span<const glm::vec3> irradi
     }
   }
   const auto first_light = number;
-  for (const auto& light : sources.lights) senders.add(number++, totalFlux(patches_, {{light}, {}}));
-  const auto first_sky = number;
-  senders.add(number++, totalFlux(patches_, {{}, {sources.sky.upper, glm::vec3(0.0F)}}));
-  senders.add(number++, totalFlux(patches_, {{}, {glm::vec3(0.0F), sources.sky.lower}}));
+  const auto first_sky = first_light + static_cast<std::uint32_t>(sources.lights.size());
+  for (const double flux : fluxes(patches_, sources)) senders.add(number++, flux);
   std::map<std::uint32_t, std::uint32_t> met;  // by instance
   std::uint32_t all = 0;
   for (std::uint32_t i = 0; i < kBackRays && !senders.empty(); ++i) {

@@ -15,9 +15,14 @@
 
 namespace radiosity::solver {
 
+/// Flux of each light, and then of the upper and the lower half of the sky, all channels, lux unit^2. A pass over the
+/// vertices, and O(1) a light.
+[[nodiscard]] std::vector<double> fluxes(const scene::PatchScene& patches, const LightSources& sources);
+
 class LostLight {
  public:
-  /// Keeps the first two. `rays`: Solver::rays(); null: makes its own, O(n log n) in triangles.
+  /// Keeps the first two. `rays`: Solver::rays(); null: makes its own, O(n log n) in triangles. Else a pass over the
+  /// sides.
   LostLight(const scene::PatchScene& patches, const scene::PatchMaterials& materials,
             std::shared_ptr<const LeafRays> rays);
 
@@ -25,7 +30,7 @@ class LostLight {
   struct Fate {
     bool arrives = false;                  ///< one at least ends on a lit side
     std::uint32_t sky = 0;                 ///< so many leave the scene
-    std::uint32_t back = 0;                ///< end on backs of single-sided surfaces
+    std::uint32_t back = 0;                ///< end on backs, of single-sided surfaces or without patches
     std::uint32_t beyond = 0;              ///< end beyond the light's range
     std::uint32_t back_of = scene::kNone;  ///< the surface whose back one of them meets
   };
@@ -60,6 +65,7 @@ class LostLight {
   const scene::PatchScene& patches_;
   const scene::PatchMaterials& materials_;
   std::vector<Side> sides_;
+  std::vector<std::vector<std::uint32_t>> sides_of_;  ///< by instance: into sides_
   std::shared_ptr<const LeafRays> rays_;
   glm::dvec3 middle_{0.0};
   double radius_ = 0.0;

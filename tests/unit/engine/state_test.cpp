@@ -3,6 +3,9 @@
 
 #include <filesystem>
 
+#include "common/archive.h"
+#include "server/engine/checkpoint_head.h"
+#include "server/state/checkpoint.h"
 #include "tests/scenes/glb_writer.h"
 #include "tests/scenes/scenes.h"
 #include "tests/unit/client/temporary_folder.h"
@@ -322,6 +325,87 @@ TEST_F(Kept, ASolveOfEditedGeometryBeginsAnewAfterARestart) {
   EXPECT_EQ(status().revision, 2U);
   EXPECT_EQ(counter("state.resumedShots"), 0.0);
   EXPECT_TRUE(reaches(State::kConverged));
+}
+
+/// A double-sided room, a lamp at its ceiling and a light in the block on its floor, whose inside has texels for that.
+test_scenes::TestScene lightInTheBlock() {
+  auto scene = blockRoom();
+  for (auto& material : scene.materials) material.double_sided = material.emission_nits == glm::dvec3(0.0);
+  scene.lights.push_back({.position = {0.6, 0.4, 0.6}, .intensity = glm::dvec3(5.0)});
+  return scene;
+}
+constexpr const char* kLightOut = R"([{"op":"replace","path":"/nodes/3/translation","value":[1.6,1.0,1.6]}])";
+
+// Laid out anew, by the lamps that it has now, the scene would have no texels there.
+TEST_F(Kept, ALightThatMovesAmongDoubleSidedSurfacesLeavesTheLayoutAndItsCheckpoint) {
+  auto scene = lightInTheBlock();
+  solve(scene);
+  const auto nodes = status().nodes;
+  const auto moved = patch(kLightOut);
+  ASSERT_TRUE(moved) << moved.error().text();
+  ASSERT_EQ(moved->affected_shots, 0U) << "it is no edit of geometry";
+  ASSERT_TRUE(reaches(State::kConverged));
+  const auto before = light();
+  const auto shots = status().shots;
+  engine().keepSolve(kPatienceForCheckpoint);
+  restart();
+  ASSERT_TRUE(reaches(State::kConverged));
+  EXPECT_EQ(counter("state.resumedShots"), static_cast<double>(shots));
+  EXPECT_EQ(status().nodes, nodes);
+  EXPECT_TRUE(light() == before);
+  scene.lights[0].position = {1.6, 1.0, 1.6};
+  solve(scene);
+  EXPECT_NE(status().nodes, nodes);
+}
+
+TEST_F(Kept, AFurnishedDoubleSidedRoomGoesOnWithTheSameBitsAfterALightMoved) {
+  auto scene = test_scenes::doubleSidedTwin(test_scenes::smallRoom());
+  const auto node = std::to_string(scene.objects.size());
+  scene.lights.push_back({.position = {0.3, 0.3, 0.2}, .intensity = glm::dvec3(5.0)});
+  ASSERT_TRUE(configure([](auto& settings) { settings.texels = 2000; }));
+  solve(scene);
+  ASSERT_TRUE(patch(R"([{"op":"replace","path":"/nodes/)" + node + R"(/translation","value":[0.1,1.9,0.4]}])"));
+  ASSERT_TRUE(reaches(State::kConverged));
+  const auto before = light();
+  const auto shots = status().shots;
+  engine().keepSolve(kPatienceForCheckpoint);
+  restart();
+  ASSERT_TRUE(reaches(State::kConverged));
+  EXPECT_EQ(counter("state.resumedShots"), static_cast<double>(shots));
+  EXPECT_TRUE(light() == before);
+}
+
+TEST_F(Kept, ACheckpointWhoseSidesNoSurfaceCanHaveIsOfNoUse) {
+  solve(lightInTheBlock());
+  ASSERT_TRUE(patch(kLightOut));
+  ASSERT_TRUE(reaches(State::kConverged));
+  engine().keepSolve(kPatienceForCheckpoint);
+  watching_.reset();
+  engine_.reset();
+  const auto file = std::filesystem::path(folder_.file("state/checkpoint"));
+  const auto body = state::readCheckpoint(file).value().value();
+  ArchiveReader from(body);
+  engine::CheckpointHead head;
+  engine::CheckpointHead::visit(from, head);
+  const auto bytesOf = [](const engine::CheckpointHead& of) {
+    ArchiveWriter to(std::size_t{1} << 30);
+    engine::CheckpointHead::visit(to, of);
+    return to.take();
+  };
+  const auto head_bytes = static_cast<std::ptrdiff_t>(bytesOf(head).size());
+  for (const unsigned bits : {scene::kLeftCoarse << 1U, scene::kBackLit}) {
+    auto damaged = head;
+    damaged.sides[0] = static_cast<std::uint8_t>(bits);
+    auto bytes = bytesOf(damaged);
+    bytes.insert(bytes.end(), body.begin() + head_bytes, body.end());
+    ASSERT_TRUE(state::writeCheckpoint(file, bytes));
+    start();
+    EXPECT_EQ(counter("state.resumedShots"), 0.0) << bits;
+    EXPECT_TRUE(reaches(State::kConverged)) << bits;
+    watching_.reset();
+    engine_.reset();
+  }
+  start();
 }
 
 // What was measured of the wave that failed would count twice.

@@ -123,5 +123,46 @@ TEST(Emitters, UvsThatAreNoNumbersCountAsTheWholeTexture) {
   EXPECT_TRUE(patches.surfaces.at(0).emits);
 }
 
+TEST(Emitters, WhatTheFactorTakesFromTheTextureDoesNotEmit) {
+  Scene scene;
+  Texture red;
+  red.width = red.height = 1;
+  red.rgba = {255, 0, 0, 255};
+  scene.textures.push_back(std::make_shared<const Texture>(red));
+  auto material = glowing();
+  material.emissive_texture.texture = 0;
+  for (const auto& factor : {glm::vec3(0.0F, 5.0F, 5.0F), glm::vec3(1.0F, 0.0F, 0.0F)}) {
+    material.emission = factor;
+    place(scene, withUvs(0.0F, 1.0F), at(scene.instances.size() * 2.0, 0.0), material);
+  }
+  const PatchScene patches = build(scene, 400);
+  for (const Surface& surface : patches.surfaces) EXPECT_EQ(surface.emits, surface.instance == 1);
+}
+
+/// A floor under a poster that is black and one that glows, both of one material. Instances 0 to 2.
+Scene posters(bool apart) {
+  Scene scene;
+  scene.textures.push_back(std::make_shared<const Texture>(halfWhite()));
+  auto material = glowing();
+  material.emissive_texture.texture = 0;
+  place(scene, floorQuad(4.0));
+  auto both = withUvs(0.05F, 0.4F);
+  const auto height = apart ? 0.5 : 0.0;
+  addQuad(both, {2, height, 2}, {2, height, 3}, {3, height, 3}, {3, height, 2});
+  both.texcoord0.insert(both.texcoord0.end(), {{0.6F, 0.0F}, {0.6F, 1.0F}, {0.9F, 1.0F}, {0.9F, 0.0F}});
+  place(scene, std::move(both), glm::translate(glm::dmat4(1.0), glm::dvec3(0, height, 0)), material);
+  return scene;
+}
+
+TEST(Emitters, WhoDrawsFacesThatLieOnEachOtherIsToldWhichOfAMaterialAreDark) {
+  const auto scene = posters(false);
+  const DarkOfEmitters dark(scene, build(scene, 1'600));
+  for (std::size_t t = 0; t < 4; ++t) EXPECT_EQ(dark.has(1, t), t < 2) << t;
+  EXPECT_FALSE(dark.has(0, 0)) << "its material does not emit anywhere";
+  EXPECT_FALSE(dark.has(7, 0));
+  const auto hovering = posters(true);
+  EXPECT_EQ(DarkOfEmitters(hovering, build(hovering, 1'600)), DarkOfEmitters());
+}
+
 }  // namespace
 }  // namespace radiosity::scene::test

@@ -278,5 +278,42 @@ TEST(ImportPose, theLitSceneKeepsSkinsTargetsAndWeights) {
   }
 }
 
+// Which becomes a node for each element: one without a mesh has no weights.
+TEST(ImportPose, theLitSceneAnimatesTheWeightsOfEachElement) {
+  auto builder = morphing();
+  const auto places = builder.vec3({0, 0, 0, 0, 5, 0});
+  builder.gltf["extensionsUsed"] = {"EXT_mesh_gpu_instancing", "KHR_animation_pointer"};
+  builder.node({{"mesh", 0}});
+  builder.node({{"mesh", 0},
+                {"weights", {0.5}},
+                {"extensions", {{"EXT_mesh_gpu_instancing", {{"attributes", {{"TRANSLATION", places}}}}}}}});
+  const auto channel = [](std::size_t node, const char* path) {
+    return Json{{"sampler", 0}, {"target", {{"node", node}, {"path", path}}}};
+  };
+  const auto pointing = [](const char* pointer) {
+    return Json{{"sampler", 0},
+                {"target", {{"path", "pointer"}, {"extensions", {{"KHR_animation_pointer", {{"pointer", pointer}}}}}}}};
+  };
+  const auto time = builder.accessor(std::vector<float>{0, 1}, 5126, "SCALAR", 1);
+  const auto weight = builder.accessor(std::vector<float>{0, 1}, 5126, "SCALAR", 1);
+  builder.gltf["animations"] = {{{"samplers", {{{"input", time}, {"output", weight}}}},
+                                 {"channels",
+                                  {channel(0, "weights"), channel(1, "weights"), channel(1, "translation"),
+                                   pointing("/nodes/1/weights/0"), pointing("/nodes/1/weightsome"), 7}}}};
+  const auto document = builder.document();
+  ASSERT_TRUE(document) << document.error().text();
+  const auto scene = importScene(*document);
+  ASSERT_TRUE(scene) << scene.error().text();
+  EXPECT_EQ(placed(*scene, 2, 2), glm::dvec3(1, 6, 1));
+  const auto lit = withLightmapUvs(*document, *scene, patchesOf(*scene));
+  ASSERT_TRUE(lit) << lit.error().text();
+  const auto channels = lit->gltf["animations"][0]["channels"];
+  const auto expected =
+      Json::array({channel(0, "weights"), channel(2, "weights"), channel(3, "weights"), channel(1, "translation"),
+                   pointing("/nodes/2/weights/0"), pointing("/nodes/3/weights/0"), pointing("/nodes/1/weightsome"), 7});
+  EXPECT_EQ(channels, expected) << channels.dump(1);
+  EXPECT_EQ(lit->gltf["nodes"][2]["weights"], Json::array({0.5}));
+}
+
 }  // namespace
 }  // namespace radiosity::scene

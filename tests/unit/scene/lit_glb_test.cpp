@@ -228,6 +228,44 @@ TEST(LitGlb, everySharedSceneRoundTrips) {
   }
 }
 
+// Of one mesh and material, as of an atlas; which of them emits decides what is seen of the floor.
+TEST(LitGlb, whatItsEmissiveTextureLeavesDarkIsSplitOffAndMarkedWhereFacesLieOnEachOther) {
+  for (const double height : {0.0, 0.5}) {
+    GltfBuilder builder;
+    const auto floor = builder.square();
+    const auto up = static_cast<float>(height);
+    const auto corners = builder.vec3({.1F, .1F, up, .4F, .1F, up, .4F, .4F, up, .1F, .4F, up,  //
+                                       .6F, .6F, up, .9F, .6F, up, .9F, .9F, up, .6F, .9F, up});
+    const auto uvs = builder.vec2({.2F, 0, .2F, 1, .2F, 1, .2F, 0, .8F, 0, .8F, 1, .8F, 1, .8F, 0});
+    builder.gltf["meshes"].push_back({{"primitives",
+                                       {{{"attributes", {{"POSITION", corners}, {"TEXCOORD_0", uvs}}},
+                                         {"indices", builder.indices({0, 1, 2, 0, 2, 3, 4, 5, 6, 4, 6, 7})},
+                                         {"material", 0}}}}});
+    builder.gltf["materials"] = Json::array({{{"emissiveFactor", {1, 1, 1}}}});
+    builder.node({{"mesh", floor}});
+    builder.node({{"mesh", 1}});
+    const auto document = *builder.document();
+    auto scene = importScene(document).value();
+    Texture halves;  // black, and white
+    halves.width = 2;
+    halves.height = 1;
+    halves.rgba = {0, 0, 0, 255, 255, 255, 255, 255};
+    scene.textures.push_back(std::make_shared<const Texture>(halves));
+    scene.materials[0].emissive_texture.texture = 0;
+    const auto patches = buildPatchScene(scene, {.texel_budget = 400, .sky = {}}).value();
+    const auto lit = withLightmapUvs(document, scene, patches);
+    ASSERT_TRUE(lit) << lit.error().text();
+    EXPECT_FALSE(lit->gltf["meshes"][floor]["primitives"][0]["extras"].contains("lightmapEmits"));
+    const auto& primitives = lit->gltf["meshes"][1]["primitives"];
+    EXPECT_FALSE(primitives[0]["extras"].contains("lightmapEmits"));
+    ASSERT_EQ(primitives.size(), height > 0.0 ? 1U : 2U);
+    if (height > 0.0) continue;
+    EXPECT_EQ(primitives[1]["extras"]["lightmapEmits"], false);
+    const auto read = importScene(*lit).value();
+    EXPECT_LT(read.primitives.at(2).positions[0].x, 0.5) << "the one that is black";
+  }
+}
+
 TEST(LitGlb, unlitShowsThePages) {
   GltfBuilder builder;
   const auto mesh = builder.square();

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "server/scene/burial_record.h"
 #include "server/scene/lightmap.h"
 #include "tests/unit/scene/built_scene.h"
 #include "tests/unit/scene/gltf_builder.h"
@@ -260,6 +261,88 @@ TEST(LitSides, anEditElsewhereOrInTheDarkTurnsNothing) {
       EXPECT_EQ(patches.surfaces[s].place, before.surfaces[s].place) << dark;
     }
   }
+}
+
+void expectTheSameLayout(const PatchScene& a, const PatchScene& b) {
+  ASSERT_EQ(a.surfaces.size(), b.surfaces.size());
+  for (std::size_t s = 0; s < a.surfaces.size(); ++s) {
+    EXPECT_EQ(a.surfaces[s].flipped, b.surfaces[s].flipped) << s;
+    EXPECT_EQ(a.surfaces[s].place, b.surfaces[s].place) << s;
+    EXPECT_EQ(a.surfaces[s].first_node, b.surfaces[s].first_node) << s;
+  }
+  EXPECT_EQ(a.instance_uvs, b.instance_uvs);
+  EXPECT_EQ(a.node_area, b.node_area);
+}
+
+/// A room that is turned inside out, an open box in it, and in that a light.
+Scene lightInABox() {
+  Scene scene = litRoom(false);
+  auto box = test::box({1, 1, 1}, {2, 2, 2});
+  box.indices.erase(box.indices.begin(), box.indices.begin() + 6);  // its bottom
+  test::place(scene, std::move(box), glm::translate(glm::dmat4(1.0), glm::dvec3(0, -1, 0)), sheet());
+  scene.lights.push_back({.position = {1.5, 0.5, 1.5}, .intensity = glm::vec3(10.0F)});
+  return scene;
+}
+
+TEST(LitSides, asItWasOnceASceneIsLaidOutAgainWhateverItsLampsAreNow) {
+  ChartOptions options;
+  options.texel_budget = 1000;
+  const Scene scene = lightInABox();
+  const PatchScene patches = build(scene, 1000);
+  const auto sides = sidesOf(scene, patches);
+  const auto has = [&](unsigned bit) { return std::ranges::any_of(sides, [&](auto of) { return (of & bit) != 0; }); };
+  EXPECT_TRUE(has(kFlipped) && has(kBackLit) && has(kShowsBack));
+  Scene after = scene;
+  after.lights[0].position = {3, 1, 3};
+  EXPECT_NE(build(after, 1000).nodeCount(), patches.nodeCount());
+  expectTheSameLayout(buildAgain(after, options, sides).value().patches, patches);
+  Scene dark = scene;  // its outside, which no light reaches, has a texel a face
+  test::place(dark, test::box({10, 0, 0}, {14, 3, 5}, true), glm::dmat4(1.0), sheet());
+  const PatchScene coarse = build(dark, 1000);
+  const auto of_dark = sidesOf(dark, coarse);
+  EXPECT_TRUE(std::ranges::any_of(of_dark, [](auto of) { return (of & kLeftCoarse) != 0; }));
+  dark.lights.push_back({.position = {12, 1, 2}, .intensity = glm::vec3(10.0F)});
+  expectTheSameLayout(buildAgain(dark, options, of_dark).value().patches, coarse);
+}
+
+TEST(LitSides, sidesThatASceneCannotHaveAreRefused) {
+  const Scene scene = litRoom(true);
+  const auto sides = sidesOf(scene, build(scene, 1000));
+  const auto isRefused = [&](const SideBits& bits) {
+    const auto built = buildAgain(scene, {.texel_budget = 1000, .sky = {}}, bits);
+    return !built && built.error().code == ErrorCode::kBadInput;
+  };
+  EXPECT_FALSE(isRefused(sides));
+  EXPECT_TRUE(isRefused({}));
+  EXPECT_TRUE(isRefused(SideBits(sides.begin() + 1, sides.end())));
+  const auto with = [&](std::size_t surface, unsigned bits) {
+    auto others = sides;
+    others[surface] = static_cast<std::uint8_t>(bits);
+    return others;
+  };
+  EXPECT_TRUE(isRefused(with(0, 16)));
+  EXPECT_TRUE(isRefused(with(0, kBackLit))) << "one sees what is lit";
+  EXPECT_TRUE(isRefused(with(sides.size() - 1, kShowsBack))) << "the lamp is single-sided";
+  Scene single = scene;
+  single.materials[0].double_sided = false;
+  EXPECT_TRUE(sidesOf(single, build(single, 1000)).empty());
+}
+
+TEST(LitSides, theTreeAtHandIsAskedForOnlyWhereSomethingIsToBeTracedAndAnswersAlike) {
+  const Scene scene = litRoom(true);
+  const PatchScene patches = build(scene, 1000);
+  const auto own = std::make_shared<const RayTree>(rayTreeOf(patches));
+  int asked = 0;
+  const auto reaches = [&](const glm::dvec3& place) {
+    Scene next = scene;
+    next.lights.push_back({.position = place, .intensity = glm::vec3(10.0F)});
+    return reachesDarkSides(patches, scene, {}, next, {}, [&] { return ++asked, own; });
+  };
+  EXPECT_FALSE(reachesDarkSides(patches, scene, {}, scene, {}, [&] { return ++asked, own; }));
+  EXPECT_EQ(asked, 0);
+  EXPECT_FALSE(reaches({2, 1, 2}));
+  EXPECT_TRUE(reaches({2, 4, 2}));
+  EXPECT_EQ(asked, 2);
 }
 
 TEST(LitSides, skyAndSunReachTheOutside) {

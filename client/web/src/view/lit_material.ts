@@ -66,6 +66,8 @@ export class LitMaterial extends MeshLambertMaterial {
     source: Material,
     private readonly view: ViewUniforms,
     page: LightmapPage | undefined,
+    /** False: its emissive texture is black wherever it is on these faces. */
+    private readonly emits = true,
   ) {
     super();
     this.defines = view.defines;
@@ -181,7 +183,7 @@ export class LitMaterial extends MeshLambertMaterial {
   /** Of faces that lie on each other the one that emits is seen, as the server lights them. */
   private comeBefore(): void {
     const { emissive, emissiveIntensity } = this;
-    this.polygonOffset = Math.max(emissive.r, emissive.g, emissive.b) * emissiveIntensity > 0;
+    this.polygonOffset = this.emits && Math.max(emissive.r, emissive.g, emissive.b) * emissiveIntensity > 0;
     this.polygonOffsetFactor = this.polygonOffsetUnits = -1;
   }
 

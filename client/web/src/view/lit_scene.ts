@@ -166,14 +166,15 @@ export class LitScene {
   private light(mesh: Mesh, associations: Map<object, Association>, view: ViewUniforms, anisotropy: number): void {
     const geometry = mesh.geometry as BufferGeometry;
     const source = mesh.material as MeshLambertMaterial;
-    const extras = geometry.userData as { lightmap?: number };
+    const extras = geometry.userData as { lightmap?: number; lightmapEmits?: boolean };
+    const emits = extras.lightmapEmits ?? true;
     const page = geometry.getAttribute('uv1') ? this.set.pages[extras.lightmap ?? -1] : undefined;
     const index = associations.get(source)?.materials;
-    const key = `${source.uuid}/${page ? extras.lightmap : ''}`;
+    const key = `${source.uuid}/${page ? extras.lightmap : ''}/${emits}`;
     let lit = this.made.get(key);
     if (!lit) {
       sharpen(source, anisotropy);
-      lit = new LitMaterial(source, view, page);
+      lit = new LitMaterial(source, view, page, emits);
       this.made.set(key, lit);
       for (const texture of [lit.map, lit.emissiveMap, lit.specularMap]) if (texture) this.textures.add(texture);
       if (index !== undefined) this.materials.set(index, [...(this.materials.get(index) ?? []), lit]);
