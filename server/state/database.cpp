@@ -4,6 +4,7 @@
 #include <sqlite3.h>
 
 #include <array>
+#include <cstring>
 #include <utility>
 
 #include "common/sha256.h"
@@ -59,6 +60,9 @@ tl::unexpected<Error> Database::failure(int code) const {
     return fail(ErrorCode::kBadInput,
                 why + "; put a backup of the whole folder in its place, or move the folder away to start anew",
                 file_.string());
+  // "disk I/O error" alone does not tell a limit on the size of files from a disk that fails.
+  const int number = (code & 0xff) == SQLITE_IOERR && handle_ ? sqlite3_system_errno(handle_.get()) : 0;
+  if (number != 0) return fail(ErrorCode::kUnavailable, why + ": " + std::strerror(number), file_.string());
   const bool busy = (code & 0xff) == SQLITE_BUSY || (code & 0xff) == SQLITE_LOCKED;
   return fail(ErrorCode::kUnavailable, busy ? "another program has it open (" + why + ")" : why, file_.string());
 }
@@ -80,6 +84,16 @@ Result<Database> Database::open(const std::filesystem::path& file) {
   }
   return database;
 }
+
+Result<FileIdentity> Database::identity() const {
+  const auto there = identityOf(file_);
+  int moved = 0;
+  (void)sqlite3_file_control(handle_.get(), "main", SQLITE_FCNTL_HAS_MOVED, &moved);
+  if (there && moved != 0) return fail(ErrorCode::kUnavailable, "was replaced while it was opened", file_.string());
+  return there;
+}
+
+void Database::keepLog() { (void)sqlite3_db_config(handle_.get(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr); }
 
 Result<std::vector<Row>> Database::rows(const std::string& sql, std::span<const Value> values) {
   sqlite3_stmt* made = nullptr;
