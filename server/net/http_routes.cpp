@@ -261,6 +261,11 @@ bool namedByContent(const HttpRequest& request) {
 }
 
 std::optional<HttpResponse> refusal(const HttpRequest& request) {
+  if (request.path == "*") {  // with OPTIONS: of the whole server
+    auto response = plain(204, "");
+    response.headers.emplace_back("Allow", "GET, HEAD, PUT, OPTIONS");
+    return response;
+  }
   const auto* route = routeOf(request);
   if (route == nullptr) return errorResponse({ErrorCode::kNotFound, "there is nothing at this path", request.path});
   const auto allow = route->method == "GET" ? "GET, HEAD, OPTIONS" : fmt::format("{}, OPTIONS", route->method);
