@@ -40,6 +40,18 @@ Value column(sqlite3_stmt* statement, int place) {
 
 bool isDamage(int code) { return (code & 0xff) == SQLITE_CORRUPT || (code & 0xff) == SQLITE_NOTADB; }
 
+/// The system's reason for the last write to the log or to the database that failed; 0: there was none. (SQLite passes
+/// it on for files that it cannot open alone.)
+int lastErrno(sqlite3* handle) {
+  int number = 0;
+  sqlite3_file* log = nullptr;
+  (void)sqlite3_file_control(handle, "main", SQLITE_FCNTL_JOURNAL_POINTER, &log);
+  if (log != nullptr && log->pMethods != nullptr)
+    (void)log->pMethods->xFileControl(log, SQLITE_FCNTL_LAST_ERRNO, &number);
+  if (number == 0) (void)sqlite3_file_control(handle, "main", SQLITE_FCNTL_LAST_ERRNO, &number);
+  return number;
+}
+
 std::string digestOf(const std::string& table, std::span<const Value> row) {
   std::string all = table;
   for (const auto& value : row) {
@@ -61,7 +73,7 @@ tl::unexpected<Error> Database::failure(int code) const {
                 why + "; put a backup of the whole folder in its place, or move the folder away to start anew",
                 file_.string());
   // "disk I/O error" alone does not tell a limit on the size of files from a disk that fails.
-  const int number = (code & 0xff) == SQLITE_IOERR && handle_ ? sqlite3_system_errno(handle_.get()) : 0;
+  const int number = (code & 0xff) == SQLITE_IOERR && handle_ ? lastErrno(handle_.get()) : 0;
   if (number != 0) return fail(ErrorCode::kUnavailable, why + ": " + std::strerror(number), file_.string());
   const bool busy = (code & 0xff) == SQLITE_BUSY || (code & 0xff) == SQLITE_LOCKED;
   return fail(ErrorCode::kUnavailable, busy ? "another program has it open (" + why + ")" : why, file_.string());
