@@ -5,49 +5,25 @@
 #include <spdlog/sinks/stdout_sinks.h>
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <iterator>
 #include <memory>
 #include <string>
 #include <utility>
 
+#include "common/printable.h"
+
 namespace radiosity {
 namespace {
 
 thread_local const LogFields* current_fields = nullptr;
-
-/// Length of the UTF-8 sequence at the front of `text` (RFC 3629); 0: it is none.
-std::size_t sequenceLength(std::string_view text) {
-  struct Form {
-    unsigned char first, last;    ///< of the first byte
-    unsigned char second, until;  ///< of the second byte; those after it: 0x80..0xbf
-    std::size_t length;
-  };
-  static constexpr std::array kForms = {
-      Form{0x00, 0x7f, 0, 0, 1},       Form{0xc2, 0xdf, 0x80, 0xbf, 2}, Form{0xe0, 0xe0, 0xa0, 0xbf, 3},
-      Form{0xe1, 0xec, 0x80, 0xbf, 3}, Form{0xed, 0xed, 0x80, 0x9f, 3}, Form{0xee, 0xef, 0x80, 0xbf, 3},
-      Form{0xf0, 0xf0, 0x90, 0xbf, 4}, Form{0xf1, 0xf3, 0x80, 0xbf, 4}, Form{0xf4, 0xf4, 0x80, 0x8f, 4}};
-  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
-  for (const auto& form : kForms) {
-    if (byte(0) < form.first || byte(0) > form.last) continue;
-    if (text.size() < form.length) return 0;
-    for (std::size_t i = 1; i < form.length; ++i) {
-      const auto low = i == 1 ? form.second : std::uint8_t{0x80};
-      const auto high = i == 1 ? form.until : std::uint8_t{0xbf};
-      if (byte(i) < low || byte(i) > high) return 0;
-    }
-    return form.length;
-  }
-  return 0;
-}
 
 /// As a JSON string. A file's name may be any bytes; those that are not UTF-8 become U+FFFD.
 void appendString(spdlog::memory_buf_t& out, std::string_view text) {
   auto to = std::back_inserter(out);
   out.push_back('"');
   while (!text.empty()) {
-    const auto length = sequenceLength(text);
+    const auto length = characterLength(text);
     const auto c = static_cast<unsigned char>(text.front());
     if (length == 0) {
       fmt::format_to(to, "\\ufffd");
@@ -63,7 +39,7 @@ void appendString(spdlog::memory_buf_t& out, std::string_view text) {
   out.push_back('"');
 }
 
-/// Nothing that a peer named can begin a line of its own.
+/// Valid UTF-8, and nothing that a peer named can begin a line of its own.
 class TextFormatter final : public spdlog::formatter {
  public:
   void format(const spdlog::details::log_msg& line, spdlog::memory_buf_t& out) override {
@@ -71,13 +47,8 @@ class TextFormatter final : public spdlog::formatter {
     pattern_.format(line, text);
     std::string_view rest(text.data(), text.size());
     if (rest.ends_with('\n')) rest.remove_suffix(1);
-    for (const char c : rest) {
-      if (static_cast<unsigned char>(c) < 0x20 && c != '\t') {
-        fmt::format_to(std::back_inserter(out), "\\x{:02x}", static_cast<unsigned>(c));
-      } else {
-        out.push_back(c);
-      }
-    }
+    const auto shown = printable(rest);
+    out.append(shown.data(), shown.data() + shown.size());
     out.push_back('\n');
   }
   [[nodiscard]] std::unique_ptr<spdlog::formatter> clone() const override { return std::make_unique<TextFormatter>(); }

@@ -10,7 +10,8 @@
 
 namespace radiosity {
 
-/// kText: "2026-01-01T00:00:00.000 warning [radiosityd] text", local time. kJson: one object a line, {"time" (RFC 3339,
+/// Lines are valid UTF-8, whatever their text holds. kText: "2026-01-01T00:00:00.000 warning [radiosityd] text", local
+/// time; what cannot be printed is escaped (common/printable.h). kJson: one object a line, {"time" (RFC 3339,
 /// UTC), "level", "program", "message"} and where they apply "revision" and "requestId"; always valid UTF-8.
 enum class LogFormat { kText, kJson };
 

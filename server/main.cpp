@@ -10,6 +10,7 @@
 
 #include "common/freed_memory.h"
 #include "common/log.h"
+#include "common/printable.h"
 #include "server/engine/solve_loop.h"
 #include "server/gpu/gpu_transport.h"
 #include "server/net/server.h"
@@ -29,7 +30,7 @@ namespace {
 constexpr const char* kLogFormatVariable = "RADIOSITY_LOG_FORMAT";
 
 int report(const Error& error) {
-  std::fprintf(stderr, "radiosityd: %s\n", error.text().c_str());
+  std::fprintf(stderr, "radiosityd: %s\n", printable(error.text()).c_str());
   return exitCodeOf(error);
 }
 
@@ -114,6 +115,8 @@ int serve(Options options) {
 
 int run(int argc, char** argv) {
   keepFreedMemory();
+  (void)std::signal(SIGXFSZ,
+                    SIG_IGN);  // a file that reached `ulimit -f` is an error of its write; workers inherit this
   if (argc > 1 && std::string_view(argv[1]) == "--worker") {
     const char* format = std::getenv(kLogFormatVariable);
     const bool json = format != nullptr && std::string_view(format) == "json";
@@ -136,7 +139,7 @@ int main(int argc, char** argv) {
   try {
     return radiosity::run(argc, argv);
   } catch (const std::exception& e) {
-    std::fprintf(stderr, "radiosityd: %s\n", e.what());
+    std::fprintf(stderr, "radiosityd: %s\n", radiosity::printable(e.what()).c_str());
     return radiosity::kExitFailed;
   }
 }

@@ -97,8 +97,8 @@ void addStateOptions(CLI::App& app, Options& o) {
   app.add_option(
          "--state", o.state,
          "Folder of what outlives the server: scene, edits, settings, uploads, checkpoints of the solve. An edit "
-         "is answered once it is on the disk. Made if it is missing; one server at a time. The scene in it goes "
-         "before SCENE, unless --reload")
+         "is answered once it is on the disk, and refused while the folder is not where it was opened. Made if it is "
+         "missing; one server at a time. The scene in it goes before SCENE, unless --reload")
       ->type_name("DIR");
   app.add_flag("--reload", o.reload, "Take SCENE though --state holds a scene; that one and its edits are forgotten");
   app.add_option("--checkpoint-size", o.checkpoint_bytes,

@@ -3,7 +3,8 @@
 
 namespace radiosity::cli {
 
-/// Call once, first thing in main. Also ignores SIGPIPE: a closed pipe is an error code to us.
+/// Call once, first thing in main. Also ignores SIGPIPE and SIGXFSZ: a closed pipe, and a file that
+/// reached `ulimit -f`, are error codes to us.
 void catchSignals();
 [[nodiscard]] bool interrupted();
 

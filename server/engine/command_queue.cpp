@@ -18,9 +18,15 @@ bool CommandQueue::push(Command command, Kind kind) {
   return true;
 }
 
-std::optional<std::vector<CommandQueue::Command>> CommandQueue::take(bool wait) {
+std::optional<std::vector<CommandQueue::Command>> CommandQueue::take(bool wait,
+                                                                     std::optional<std::chrono::nanoseconds> longest) {
   std::unique_lock lock(mutex_);
-  if (wait) wake_.wait(lock, [this] { return closed_ || !prompt_.empty() || !long_.empty(); });
+  const auto has_some = [this] { return closed_ || !prompt_.empty() || !long_.empty(); };
+  if (wait && longest) {
+    (void)wake_.wait_for(lock, *longest, has_some);
+  } else if (wait) {
+    wake_.wait(lock, has_some);
+  }
   if (closed_) return std::nullopt;
   const bool is_overdue = gave_prompt_ && !long_.empty() && Clock::now() - long_.front().since >= patience_;
   gave_prompt_ = !prompt_.empty() && !is_overdue;

@@ -28,8 +28,10 @@ class CommandQueue {
   [[nodiscard]] bool push(Command command, Kind kind = Kind::kPrompt);
 
   /// All prompt ones that are due, oldest first; where there are none, or the last call gave some and the oldest long
-  /// one has waited long enough, that. `wait`: sleeps until there is something. Nothing: the queue was closed.
-  [[nodiscard]] std::optional<std::vector<Command>> take(bool wait);
+  /// one has waited long enough, that. `wait`: sleeps until there is something, or for `longest`. Nothing: the queue
+  /// was closed.
+  [[nodiscard]] std::optional<std::vector<Command>> take(bool wait,
+                                                         std::optional<std::chrono::nanoseconds> longest = {});
 
   [[nodiscard]] bool closed() const;
 

@@ -110,6 +110,10 @@ struct Status {
   /// Nothing can be drawn at present (a driver is gone, all renderers died); the solve starts over when it can.
   bool renderer_lost = false;
   std::uint64_t renderers_replaced = 0, solve_restarts = 0;  ///< since the start of the program
+  /// Of so many renderers so many died while idle and are being replaced; why the last one did.
+  std::uint64_t renderers = 0, renderers_missing = 0;
+  std::string renderer_trouble;
+  std::string state_trouble;  ///< why no edit can be kept: the state's folder is gone; empty: it is where it was
   SolveSettings settings;
 };
 

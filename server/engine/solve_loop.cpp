@@ -42,7 +42,7 @@ std::string limitText(solver::SolveLimit limit, std::uint64_t link_memory_bytes)
 }  // namespace
 
 SolveLoop::SolveLoop(EngineOptions options)
-    : options_(std::move(options)), queue_(kMaxQueue), settings_(options_.settings) {}
+    : options_(std::move(options)), queue_(kMaxQueue), settings_(options_.settings), upkeep_(options_.store) {}
 
 SolveLoop::~SolveLoop() {
   queue_.close();
@@ -79,6 +79,7 @@ void SolveLoop::threadMain(std::promise<Result<void>> started) {
     started.set_value(tl::unexpected<Error>(restored.error()));
     return;
   }
+  (void)upkeep_.wantsRenderers(*transport_);
   updateStatus(false);
   started.set_value({});
   while (runCommands()) {
@@ -96,11 +97,15 @@ void SolveLoop::threadMain(std::promise<Result<void>> started) {
 
 /// Sleeps while there is nothing to solve, then does all commands that are due. False: the engine is being destroyed.
 bool SolveLoop::runCommands() {
-  waiting_ = first_light_ ? !first_light_->goes_on : state_ != SolveState::kSolving && !isBehind();
-  const auto due = queue_.take(waiting_);
-  beat();
-  waiting_ = false;
-  if (!due) return false;
+  std::optional<std::vector<CommandQueue::Command>> due;
+  do {
+    waiting_ = hasNothingToDo();
+    due = queue_.take(waiting_, Upkeep::kInterval);
+    beat();
+    waiting_ = false;
+    if (!due) return false;
+    lookAfter();
+  } while (due->empty() && hasNothingToDo());
   for (const auto& command : *due) {
     if (queue_.closed()) return false;
     try {
@@ -111,6 +116,10 @@ bool SolveLoop::runCommands() {
     beat();
   }
   return true;
+}
+
+bool SolveLoop::hasNothingToDo() const {
+  return first_light_ ? !first_light_->goes_on : state_ != SolveState::kSolving && !isBehind();
 }
 
 /// Where memory runs out in it the solve has failed: whatever frees some, an edit or a smaller scene, starts another.
@@ -265,6 +274,7 @@ void SolveLoop::updateStatus(bool announce, bool as_reported) {
   status.renderer_lost = renderer_lost_;
   status.renderers_replaced = losses_told_;
   status.solve_restarts = solve_restarts_;
+  upkeep_.addTo(status);
   if (lit_) {
     const auto& tiles = publisher_.tileCounters();
     status.counters["tiles.changed"] = static_cast<double>(tiles.changed);

@@ -28,6 +28,7 @@
 #include "server/engine/publisher.h"
 #include "server/engine/solve_loop.h"
 #include "server/engine/texel_reader.h"
+#include "server/engine/upkeep.h"
 #include "server/engine/watches.h"
 #include "server/gpu/view_renderer.h"
 #include "server/scene/document.h"
@@ -100,6 +101,9 @@ class SolveLoop final : public Engine {
   void threadMain(std::promise<Result<void>> started);
   [[nodiscard]] bool runCommands();
   void takeTurn();  ///< what is done between commands
+  [[nodiscard]] bool hasNothingToDo() const;
+  void lookAfter();           ///< what may break while nobody asks for anything
+  void lookAfterRenderers();  ///< of a solve that needs none at present
   void solveSlice();
   [[nodiscard]] Result<solver::StepOutcome> stepSolver();
   /// Solved and told; what was left for later since it matters little is done between commands.
@@ -254,6 +258,7 @@ class SolveLoop final : public Engine {
   unsigned recoveries_ = 0;  // of this solve
   Clock::time_point retry_at_{};
   std::uint64_t losses_told_ = 0, solve_restarts_ = 0;
+  Upkeep upkeep_;
   std::size_t lost_told_ = 0;  // warnings of lost light that were logged since the load: edits log no others
 
   std::atomic<Clock::rep> last_beat_{0};  // since the clock's epoch; any thread may read both

@@ -64,6 +64,28 @@ void SolveLoop::tellLosses() {
   listeners_.tell([&](Listener& listener) { listener.onNotice(notice); });
 }
 
+void SolveLoop::lookAfter() {
+  if (!upkeep_.isDue()) return;
+  const bool looked = fitsMemory([&] {
+    if (upkeep_.checkState()) updateStatus(true);
+    lookAfterRenderers();
+  });
+  if (!looked) log::warn("out of memory: what may break by itself is looked after later");
+}
+
+/// A solve that is under way replaces its renderers itself, and so does one that lost them all.
+void SolveLoop::lookAfterRenderers() {
+  if (state_ == SolveState::kSolving || first_light_ || renderer_lost_) return;
+  const auto missing = upkeep_.renderers().missing;
+  const bool wanted = upkeep_.wantsRenderers(*transport_);
+  if (wanted || upkeep_.renderers().missing != missing) updateStatus(true);
+  if (!wanted) return;
+  upkeep_.replaceRenderers(*transport_);
+  if (queue_.closed()) return;
+  tellLosses();
+  updateStatus(true);
+}
+
 void SolveLoop::beat() { last_beat_ = Clock::now().time_since_epoch().count(); }
 
 double SolveLoop::busySeconds() const {

@@ -79,7 +79,8 @@ Result<void> SolveLoop::restoreState() {
   if (!options_.store) return {};
   auto& store = *options_.store;
   if (!state::programId().empty() && options_.checkpoint_bytes > 0)
-    checkpoints_ = std::make_unique<state::CheckpointWriter>(store.folder() / "checkpoint");
+    checkpoints_ = std::make_unique<state::CheckpointWriter>(store.folder() / "checkpoint",
+                                                             [kept = options_.store] { return kept->check(); });
   auto kept = store.takeKept();
   settings_ = withKept(settings_, kept.settings, options_.named_settings);
   past_ = pastOf(kept, store);

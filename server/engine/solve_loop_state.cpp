@@ -26,7 +26,8 @@ state::Revision plainRevision(const History::Next& next) {
 }
 
 /// What a client is told: the file is no place in its message.
-tl::unexpected<Error> refused(const Error& error) {
+tl::unexpected<Error> refused(const Error& error, Upkeep& upkeep) {
+  upkeep.hurry();  // that /readyz says so, too
   log::error("a change is refused, it cannot be kept: {}", error.text());
   // A file that is damaged is bad input to this program, and no fault of the client's, who may try again.
   const auto code = error.code == ErrorCode::kBadInput ? ErrorCode::kUnavailable : error.code;
@@ -41,7 +42,7 @@ Result<void> SolveLoop::keepLoad(const History::Next& next, const scene::Documen
   if (!options_.store) return {};
   const auto plain = plainDocument(document);
   const auto kept = options_.store->load(plainRevision(next), plain, options_.store->digestOf(plain));
-  if (!kept) return refused(kept.error());
+  if (!kept) return refused(kept.error(), upkeep_);
   as_restored_ = false;
   return {};
 }
@@ -57,7 +58,7 @@ SolveLoop::Keep SolveLoop::keepEdit(const History::Next& next, const Receipt& re
       change.answer = state::Answer{receipt.request_id,        receipt.fingerprint,    outcome.revision,
                                     outcome.affected_surfaces, outcome.affected_shots, stepped};
     const auto kept = options_.store->edit(change);
-    if (!kept) return refused(kept.error());
+    if (!kept) return refused(kept.error(), upkeep_);
     kept_answer_ = std::move(change.answer);  // no copy: nothing may fail any more
     as_restored_ = false;
     // Not in the middle of a drag where checkpoints are work.
@@ -85,7 +86,7 @@ void SolveLoop::correctAnswer(PatchOutcome& outcome) {
 Result<void> SolveLoop::keepSettings(const SolveSettings& settings) {
   if (!options_.store || keptSettings(settings) == keptSettings(settings_)) return {};
   const auto kept = options_.store->setSettings(keptSettings(settings));
-  if (!kept) return refused(kept.error());
+  if (!kept) return refused(kept.error(), upkeep_);
   return {};
 }
 

@@ -123,19 +123,25 @@ std::chrono::nanoseconds WorkerProcess::processorTime() const {
   return std::chrono::seconds(used.tv_sec) + std::chrono::nanoseconds(used.tv_nsec);
 }
 
-std::string WorkerProcess::epitaph() const {
+std::optional<Error> WorkerProcess::ending() const {
   siginfo_t info{};
-  // WNOWAIT: stop() still reaps it. A closed socket means that it is ending; one that could not be used does not.
+  // WNOWAIT: stop() still reaps it.
+  if (waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOWAIT | WNOHANG) != 0)
+    return Error{ErrorCode::kUnavailable, "a worker process is gone", {}};
+  if (info.si_pid == 0) return std::nullopt;
+  const auto* how = info.si_code == CLD_EXITED ? " ended with status " : " was killed by signal ";
+  return Error{
+      ErrorCode::kUnavailable, "worker process " + std::to_string(pid_) + how + std::to_string(info.si_status), {}};
+}
+
+std::string WorkerProcess::epitaph() const {
+  // A closed socket means that it is ending; one that could not be used does not.
   constexpr int kTries = 50;
-  for (int i = 0; i < kTries && info.si_pid == 0; ++i) {
+  for (int i = 0; i < kTries; ++i) {
     if (i > 0) std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    if (waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOWAIT | WNOHANG) != 0)
-      return "a worker process is gone";
+    if (const auto ended = ending()) return ended->message;
   }
-  const std::string name = "worker process " + std::to_string(pid_);
-  if (info.si_pid == 0) return name + " cannot be spoken to";
-  return name + (info.si_code == CLD_EXITED ? " ended with status " : " was killed by signal ") +
-         std::to_string(info.si_status);
+  return "worker process " + std::to_string(pid_) + " cannot be spoken to";
 }
 
 Error WorkerProcess::errorOf(Lapse lapse) const {

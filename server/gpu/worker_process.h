@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "server/gpu/worker_protocol.h"
@@ -34,6 +35,9 @@ class WorkerProcess {
   [[nodiscard]] Result<void> send(MessageKind kind, std::span<const std::byte> body, const Patience& patience) const;
   /// Its next message, which must be of this kind.
   [[nodiscard]] Result<Message> receive(MessageKind kind, const Patience& patience) const;
+
+  /// How the process ended; nothing while it runs. Does not wait.
+  [[nodiscard]] std::optional<Error> ending() const;
 
   /// Starts its end; the destructor waits for it. For several to end at the same time.
   void kill() const;

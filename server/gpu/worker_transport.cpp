@@ -136,6 +136,19 @@ class WorkerTransport final : public solver::Transport {
 
   [[nodiscard]] Losses losses() const override { return {losses_, last_death_}; }
 
+  [[nodiscard]] Renderers look() override {
+    for (auto& slot : slots_) {
+      if (const auto ended = slot.process ? slot.process->ending() : std::nullopt) bury(slot, *ended);
+    }
+    const auto missing = std::count_if(slots_.begin(), slots_.end(), [](const Slot& slot) { return !slot.process; });
+    return {slots_.size(), static_cast<std::size_t>(missing), missing > 0 ? last_death_ : std::string()};
+  }
+
+  [[nodiscard]] Result<void> replaceMissing() override {
+    deaths_ = 0;
+    return replaceDead();
+  }
+
   [[nodiscard]] std::string description() const override {
     auto text = fmt::format("{}, {} worker{}", renderer_, slots_.size(), slots_.size() == 1 ? "" : "s");
     if (hands_ > 1) text += fmt::format(" of {} threads", hands_);
@@ -164,7 +177,8 @@ class WorkerTransport final : public solver::Transport {
       slot.counters = {};
     }
     auto done = work(batch);
-    if (!done) killAll();  // what the workers have of this batch is void; so are they
+    if (!done) killAll();                         // what the workers have of this batch is void; so are they
+    for (auto& slot : slots_) slot.done.clear();  // who dies from here on takes nothing of it into the grave
     return done;
   }
 

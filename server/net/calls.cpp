@@ -130,6 +130,15 @@ bool Calls::admit(const protocol::Call& call, Slot& slot) {
   return false;
 }
 
+namespace {
+
+/// Where a name ends before its end: at a NUL, as it is or percent-encoded.
+bool hasNul(std::string_view name) {
+  return name.find('\0') != std::string_view::npos || name.find("%00") != std::string_view::npos;
+}
+
+}  // namespace
+
 RpcError Calls::helloFirst() { return {RpcCode::kUnauthenticated, "the first request must be hello", "/method"}; }
 
 /// Answers, and closes: who cannot say hello has no business here.
@@ -196,6 +205,7 @@ void Calls::run(const protocol::SceneLoadCall& call, const Slot& slot) {
     return slot.error({RpcCode::kInvalidParams, "/params/url must be /uploads/<id> or file:<name>", "/params/url"});
   if (hub_.options().scene_root.empty())
     return slot.error({RpcCode::kForbidden, "this server reads no files of its own (--scene-root)", "/params/url"});
+  if (hasNul(call.url)) return slot.error({RpcCode::kInvalidParams, "a file's name has no NUL", "/params/url"});
   auto path = fileBelow(hub_.options().scene_root, std::string_view(call.url).substr(kFile.size()));
   if (!path) return slot.error({RpcCode::kNotFound, path.error().message, "/params/url"});
   hub_.engine().loadFile(std::move(*path), client_, std::move(done));

@@ -1,5 +1,7 @@
 #include "server/net/http_message.h"
 
+#include <algorithm>
+#include <cctype>
 #include <optional>
 
 #include "protocol/http_bodies.h"
@@ -25,11 +27,18 @@ std::optional<std::string> percentDecoded(std::string_view text, bool plus_is_sp
       if (high < 0 || low < 0 || high + low == 0) return std::nullopt;
       out += static_cast<char>(high * 16 + low);
       i += 2;
+    } else if (text[i] == '\0') {
+      return std::nullopt;
     } else {
       out += plus_is_space && text[i] == '+' ? ' ' : text[i];
     }
   }
   return out;
+}
+
+bool sameIgnoringCase(std::string_view a, std::string_view b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
 }
 
 int statusOf(ErrorCode code) {
@@ -55,14 +64,37 @@ int statusOf(ErrorCode code) {
   return 500;
 }
 
+/// Takes "http://host:port" off the front of a target. False: it is no URI that a server is asked for.
+bool takeAuthority(std::string_view& target, std::string& authority) {
+  const auto colon = target.find("://");
+  const auto scheme = target.substr(0, colon);
+  if (!sameIgnoringCase(scheme, "http") && !sameIgnoringCase(scheme, "https")) return false;
+  target.remove_prefix(colon + 3);
+  authority = target.substr(0, target.find_first_of("/?#"));
+  target.remove_prefix(authority.size());
+  // A user before the host is how a link pretends to lead elsewhere (RFC 9110, section 4.2.4).
+  return !authority.empty() && authority.front() != ':' && authority.find('@') == std::string::npos;
+}
+
 }  // namespace
 
 Result<HttpRequest> parseTarget(std::string_view method, std::string_view target) {
   HttpRequest request;
   request.method = method == "HEAD" ? "GET" : method;
+  const auto bad = [] { return fail(ErrorCode::kBadInput, "bad request target"); };
+  if (!target.starts_with('/') && target.find("://") != std::string_view::npos) {
+    if (!takeAuthority(target, request.authority)) return bad();
+    // What a proxy makes of it that is asked for the server itself, and of a URI without a path.
+    if (target.empty()) target = method == "OPTIONS" ? "*" : "/";
+  }
+  if (target == "*" && method == "OPTIONS") {
+    request.path = target;
+    return request;
+  }
   const auto question = target.find('?');
-  const auto path = percentDecoded(target.substr(0, question), false);
-  if (!path || path->empty() || path->front() != '/') return fail(ErrorCode::kBadInput, "bad request target");
+  auto path = percentDecoded(target.substr(0, question), false);
+  if (path && path->empty() && !request.authority.empty()) path = "/";
+  if (!path || path->empty() || path->front() != '/') return bad();
   request.path = *path;
   auto rest = question == std::string_view::npos ? std::string_view() : target.substr(question + 1);
   while (!rest.empty()) {

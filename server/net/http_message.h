@@ -15,7 +15,8 @@ namespace radiosity::net {
 
 struct HttpRequest {
   std::string method;                        ///< "GET"; HEAD comes as GET
-  std::string path;                          ///< "/scene.glb", percent-decoded
+  std::string path;                          ///< "/scene.glb", percent-decoded; "*" with OPTIONS: the whole server
+  std::string authority;                     ///< "host:port" of a target in absolute form, which goes before Host
   std::map<std::string, std::string> query;  ///< percent-decoded
   std::string content_type, name;            ///< name: header X-Name, or ?name=
   std::string client;                        ///< who: header X-Client, or ?client=, or else User-Agent
@@ -32,7 +33,8 @@ struct HttpResponse {
   std::vector<std::pair<std::string, std::string>> headers;
 };
 
-/// Path and query of a request target; kBadInput for a bad escape, a NUL or too many members.
+/// Authority, path and query of a request target in origin, absolute or asterisk form (RFC 9112, section 3.2);
+/// kBadInput for another form, a bad escape, a NUL or too many members.
 [[nodiscard]] Result<HttpRequest> parseTarget(std::string_view method, std::string_view target);
 
 /// {"error": {"code", "message", "where"}} with the status that suits the code.

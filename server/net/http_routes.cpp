@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/log.h"
+#include "common/printable.h"
 #include "protocol/http_bodies.h"
 #include "protocol/messages.h"
 #include "server/net/convert.h"
@@ -191,9 +192,17 @@ void getReady(const std::shared_ptr<Hub>& hub, HttpRequest& /*request*/, const R
   const auto status = hub->engine().status();
   if (hub->draining()) return done(plain(503, "draining\n"));
   if (status.state == engine::SolveState::kLoading) return done(plain(503, "loading\n"));
-  if (status.renderer_lost) return done(plain(503, "no renderer: " + status.failure + "\n"));
-  if (status.state == engine::SolveState::kFailed) return done(plain(503, "failed: " + status.failure + "\n"));
-  done(plain(200, "ready\n"));
+  const auto unready = [&](std::string_view what, std::string_view why) {
+    done(plain(503, fmt::format("{}: {}\n", what, printable(why))));
+  };
+  if (!status.state_trouble.empty()) return unready("edits are refused", status.state_trouble);
+  if (status.renderer_lost) return unready("no renderer", status.failure);
+  if (status.renderers_missing > 0 && status.renderers_missing == status.renderers)
+    return unready("no renderer", status.renderer_trouble);
+  if (status.state == engine::SolveState::kFailed) return unready("failed", status.failure);
+  if (status.renderers_missing == 0) return done(plain(200, "ready\n"));
+  done(plain(200, fmt::format("ready; {} of {} renderers are being replaced: {}\n", status.renderers_missing,
+                              status.renderers, printable(status.renderer_trouble))));
 }
 
 void getMetrics(const std::shared_ptr<Hub>& hub, HttpRequest& /*request*/, const Respond& done) {
@@ -261,6 +270,11 @@ bool namedByContent(const HttpRequest& request) {
 }
 
 std::optional<HttpResponse> refusal(const HttpRequest& request) {
+  if (request.path == "*") {  // with OPTIONS: of the whole server
+    auto response = plain(204, "");
+    response.headers.emplace_back("Allow", "GET, HEAD, PUT, OPTIONS");
+    return response;
+  }
   const auto* route = routeOf(request);
   if (route == nullptr) return errorResponse({ErrorCode::kNotFound, "there is nothing at this path", request.path});
   const auto allow = route->method == "GET" ? "GET, HEAD, OPTIONS" : fmt::format("{}, OPTIONS", route->method);

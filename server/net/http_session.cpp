@@ -6,6 +6,7 @@
 #include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/write.hpp>
+#include <boost/beast/core/read_size.hpp>
 #include <boost/beast/http/parser.hpp>
 #include <boost/beast/http/read.hpp>
 #include <boost/beast/http/serializer.hpp>
@@ -20,6 +21,7 @@
 #include "common/one_line.h"
 #include "common/sha256.h"
 #include "server/net/access.h"
+#include "server/net/http_framing.h"
 #include "server/net/http_routes.h"
 #include "server/net/pace.h"
 #include "server/net/websocket_session.h"
@@ -40,6 +42,19 @@ using Serializer = http::response_serializer<http::span_body<const char>>;
 std::string_view view(boost::core::string_view text) { return {text.data(), text.size()}; }
 
 std::string_view firstWord(std::string_view text) { return text.substr(0, text.find(' ')); }
+
+FramingFields framingOf(const Parser& parser) {
+  const auto& header = parser.get();
+  FramingFields fields{header.version(), header.count(http::field::content_length) > 0, {}, parser.chunked()};
+  const auto [first, end] = header.equal_range(http::field::transfer_encoding);
+  for (auto line = first; line != end; ++line) fields.transfer_encodings.push_back(view(line->value()));
+  return fields;
+}
+
+/// What the peer sent is not HTTP, and can be answered; but for a connection that ended or timed out.
+bool isMalformed(BoostError error) {
+  return error.category() == http::make_error_code(http::error::bad_method).category();
+}
 
 /// RFC 9110 section 5.6.7.
 std::string httpDate() {
@@ -106,6 +121,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   void upgrade();
   bool refuseEarly();
   void readBody();
+  [[nodiscard]] BoostError parseBody();
   void onBody(BoostError error);
   void onWhole();
   void send(HttpResponse response, bool close);
@@ -168,8 +184,7 @@ void HttpSession::onHeader(BoostError error) {
   if (error == http::error::header_limit || error == http::error::buffer_overflow)
     return send(errorResponse(431, "tooLarge", fmt::format("a header may have at most {} bytes", kHeaderLimit)), true);
   if (error == beast::error::timeout || error == http::error::end_of_stream) return stream_.close();
-  if (error.category() == http::make_error_code(http::error::bad_method).category())
-    return send(errorResponse(400, "badInput", "not HTTP/1.1: " + error.message()), true);
+  if (isMalformed(error)) return send(errorResponse(400, "badInput", "not HTTP/1.1: " + error.message()), true);
   if (error) return stream_.close();
   const auto& message = parser_->get();
   head_ = message.method() == http::verb::head;
@@ -199,15 +214,21 @@ bool HttpSession::refuseEarly() {
     send(std::move(response), !no_body);
     return true;
   };
+  if (auto fault = framingFault(framingOf(*parser_))) {
+    send(std::move(*fault), true);  // what follows may be a body, or may not
+    return true;
+  }
   const auto hosts = parser_->get().count(http::field::host);
   if (hosts > 1 || (hosts == 0 && parser_->get().version() >= 11))  // RFC 9112 section 3.2: whom it is for is not clear
     return refuse(errorResponse(400, "badInput", "a request of HTTP/1.1 needs one Host"));
-  if (!hostAllowed(field(http::field::host), options))
+  const auto host = request_.authority.empty() ? field(http::field::host) : std::string_view(request_.authority);
+  if (!hostAllowed(host, options))
     return refuse(errorResponse(403, "forbidden",
                                 "this name is not served (Host); use localhost or an IP address, or --allow-origin"));
-  if (!originAllowed(origin_, field(http::field::host), options))
+  if (!originAllowed(origin_, host, options))
     return refuse(errorResponse(403, "forbidden", "this Origin may not use the server; see --allow-origin"));
   const bool ours = request_.path == protocol::kWebSocketPath && boost::beast::websocket::is_upgrade(parser_->get());
+  if (ours && !no_body) return refuse(errorResponse(400, "badInput", "a request for an upgrade has no body"));
   if (ours) {
     upgrade();
     return true;
@@ -263,9 +284,26 @@ void HttpSession::readBody() {
                     [self = shared_from_this()](BoostError error, std::size_t) { self->onBody(error); });
 }
 
+/// All that is here of it. What is left is the beginning of a line of a chunk, or of a trailer.
+BoostError HttpSession::parseBody() {
+  BoostError error;
+  while (!error && !parser_->is_done() && buffer_.size() > 0) {
+    const auto used = parser_->put(buffer_.data(), error);
+    buffer_.consume(used);
+  }
+  if (error != http::error::need_more) return error;
+  const auto left = buffer_.cdata();
+  // The parser would wait for a carriage return until the peer's time is up.
+  if (hasBareLineFeed({static_cast<const char*>(left.data()), left.size()})) return http::error::bad_line_ending;
+  return {};
+}
+
 void HttpSession::onBody(BoostError error) {
+  if (!error) error = parseBody();
   if (error == http::error::body_limit)
     return send(errorResponse(413, "tooLarge", "the body is larger than this path accepts (--max-upload)"), true);
+  if (isMalformed(error))
+    return send(errorResponse(400, "badInput", "the body is not what its header says: " + error.message()), true);
   if (error) return stream_.close();
   // The hash is taken part by part: of a GiB it takes a second, in which nobody else would be served.
   const auto& body = parser_->get().body();
@@ -275,10 +313,13 @@ void HttpSession::onBody(BoostError error) {
   if (!room_.hold(body.size()))
     return send(errorResponse({ErrorCode::kBusy, "other uploads take all the room there is; try again", {}}), true);
   if (parser_->is_done()) return onWhole();
+  const auto room = beast::read_size(buffer_, kBufferLimit);
+  if (room == 0) return onBody(http::error::buffer_overflow);
   stream_.expires_after(pace_.moved(came.size()));
-  http::async_read_some(stream_, buffer_, *parser_, [self = shared_from_this()](BoostError e, std::size_t n) {
+  stream_.async_read_some(buffer_.prepare(room), [self = shared_from_this()](BoostError e, std::size_t n) {
+    self->buffer_.commit(n);
     self->moved_bytes_ += n;
-    self->onBody(e);
+    self->onBody(e == asio::error::eof ? BoostError(http::error::partial_message) : e);
   });
 }
 

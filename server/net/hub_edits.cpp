@@ -87,7 +87,9 @@ SharedBytes Hub::upload(const std::string& uri) {
 void Hub::patch(const protocol::ScenePatchCall& call, const std::string& by, EditAnswer done) {
   auto text = fmt::format("{}|{}|{}", call.base_revision.value_or(0), call.dry_run, call.patch);
   if (call.same_scene_as) text += fmt::format("|{}", *call.same_scene_as);  // others' are kept over a restart
-  const engine::Receipt receipt{call.request_id, call.request_id.empty() ? 0 : fingerprintOf(text)};
+  // A dry run changes nothing: the edit itself may come with the same id.
+  const bool once = !call.dry_run && !call.request_id.empty();
+  const auto receipt = once ? engine::Receipt{call.request_id, fingerprintOf(text)} : engine::Receipt{};
   engine::PatchRequest request{
       .patch = call.patch,
       .base_revision = call.base_revision,

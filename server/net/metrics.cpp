@@ -73,7 +73,12 @@ void solveMetrics(Text& text, const engine::Status& status) {
   text.counter("renderers_replaced_total", "Renderer processes that died or hung and were replaced.",
                status.renderers_replaced);
   text.counter("solve_restarts_total", "Solves that started over since no renderer was left.", status.solve_restarts);
-  text.gauge("renderer_lost", "1 while nothing can be drawn.", status.renderer_lost ? 1 : 0);
+  const bool none_left = status.renderers_missing > 0 && status.renderers_missing == status.renderers;
+  text.gauge("renderer_lost", "1 while nothing can be drawn.", status.renderer_lost || none_left ? 1 : 0);
+  text.gauge("renderers_missing", "Idle renderer processes that died and are being replaced.",
+             status.renderers_missing);
+  text.gauge("state_lost", "1 while edits are refused since the state's folder is not where it was opened.",
+             status.state_trouble.empty() ? 0 : 1);
   text.gauge("patches", "Leaf patches with area.", status.patches);
   text.gauge("surfaces", "Charts.", status.surfaces);
   text.gauge("polygons", "Coplanar facets.", status.polygons);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "common/printable.h"
 #include "server/net/convert.h"
 
 namespace radiosity::net {
@@ -64,6 +65,7 @@ std::string statusPage(const engine::Status& s, std::size_t viewers, std::string
   page += "<table>\n";
   page += row("State", s.failure.empty() ? std::string(stateName(s.state))
                                          : fmt::format("{}: {}", stateName(s.state), s.failure));
+  if (!s.state_trouble.empty()) page += row("Edits are refused", printable(s.state_trouble));
   page += row("Scene revision", std::to_string(s.revision));
   page += row("Estimated error", s.unlit.empty() ? fmt::format("{:.2f} % (target {:.2f} %)", 100 * s.error.total,
                                                                100 * s.settings.target_error)

@@ -152,27 +152,35 @@ Result<void> checkMeshes(const ImportContext& context) {
   return {};
 }
 
+/// Edits make children of root nodes: then two places must change at a time.
+std::string notRoot(std::size_t node, std::size_t parent, const std::string& pointer) {
+  const auto list = pointer.substr(0, pointer.rfind('/'));
+  return "node " + std::to_string(node) + " is no root node: /nodes/" + std::to_string(parent) +
+         "/children lists it; take it out of " + list + " in the same patch, or out of those children";
+}
+
 /// One parent at most, no cycles.
 Result<void> checkTree(const ImportContext& context) {
   const auto& nodes = context.model.nodes;
   if (nodes.size() > context.limits.max_nodes) {
     return context.tooLarge("/nodes", "has more than " + std::to_string(context.limits.max_nodes) + " entries");
   }
-  std::vector<bool> has_parent(nodes.size(), false);
+  constexpr auto kNoParent = static_cast<std::size_t>(-1);
+  std::vector<std::size_t> parents(nodes.size(), kNoParent);
   for (std::size_t n = 0; n < nodes.size(); ++n) {
     for (std::size_t c = 0; c < nodes[n].children.size(); ++c) {
       const auto child = static_cast<std::size_t>(nodes[n].children[c]);
-      if (has_parent[child]) {
+      if (parents[child] != kNoParent) {
         return context.bad("/nodes/" + std::to_string(n) + "/children/" + std::to_string(c),
                            "node " + std::to_string(child) + " has two parents");
       }
-      has_parent[child] = true;
+      parents[child] = n;
     }
   }
   std::vector<std::size_t> stack;
   std::vector<bool> reached(nodes.size(), false);
   for (std::size_t n = 0; n < nodes.size(); ++n) {
-    if (!has_parent[n]) stack.push_back(n);
+    if (parents[n] == kNoParent) stack.push_back(n);
   }
   while (!stack.empty()) {
     const auto node = stack.back();
@@ -189,7 +197,7 @@ Result<void> checkTree(const ImportContext& context) {
     for (std::size_t i = 0; i < context.model.scenes[s].nodes.size(); ++i) {
       const auto node = static_cast<std::size_t>(context.model.scenes[s].nodes[i]);
       const auto pointer = "/scenes/" + std::to_string(s) + "/nodes/" + std::to_string(i);
-      if (has_parent[node]) return context.bad(pointer, "is not a root node");
+      if (parents[node] != kNoParent) return context.bad(pointer, notRoot(node, parents[node], pointer));
       if (listed[node]) return context.bad(pointer, "is listed twice");
       listed[node] = true;
     }

@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <array>
+#include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
 #include <numbers>
 #include <set>
 #include <string>
 
 #include "server/scene/image_decode.h"
+#include "server/scene/node_transform.h"
 
 namespace radiosity::scene {
 namespace {
@@ -66,6 +69,49 @@ void warnMeshes(ImportContext& context) {
   }
 }
 
+constexpr double kFarthest = 1e12;  ///< metres
+
+/// Of many places with the same oddity one warning, at the first.
+class OddPlaces {
+ public:
+  explicit OddPlaces(const char* what) : what_(what) {}
+  void add(const std::string& pointer) {
+    if (count_++ == 0) first_ = pointer;
+  }
+  void tell(ImportContext& context, const char* others) const {
+    if (count_ == 0) return;
+    context.warn(first_, count_ == 1 ? what_ : what_ + "; so it is in " + std::to_string(count_ - 1) + others);
+  }
+
+ private:
+  std::string what_, first_;
+  std::size_t count_ = 0;
+};
+
+OddPlaces flatPlaces() { return OddPlaces("is 0; triangles below have no area and are dropped"); }
+OddPlaces farPlaces() { return OddPlaces("is beyond 1e12 m, where numbers are too coarse for the shape of a thing"); }
+
+bool isFar(const glm::dvec3& translation) {
+  return glm::any(glm::greaterThan(glm::abs(translation), glm::dvec3(kFarthest)));
+}
+bool isFlat(const glm::dvec3& scale) { return glm::any(glm::equal(scale, glm::dvec3(0.0))); }
+
+void warnTransforms(ImportContext& context) {
+  auto flat = flatPlaces(), far = farPlaces();
+  for (std::size_t n = 0; n < context.model.nodes.size(); ++n) {
+    const auto& node = context.model.nodes[n];
+    const auto pointer = "/nodes/" + std::to_string(n);
+    const bool has_matrix = !node.matrix.empty();
+    const auto local = localMatrix(node);
+    const glm::dvec3 sides(glm::length(glm::dvec3(local[0])), glm::length(glm::dvec3(local[1])),
+                           glm::length(glm::dvec3(local[2])));
+    if (isFlat(sides)) flat.add(pointer + (has_matrix ? "/matrix" : "/scale"));
+    if (isFar(glm::dvec3(local[3]))) far.add(pointer + (has_matrix ? "/matrix" : "/translation"));
+  }
+  flat.tell(context, " other nodes");
+  far.tell(context, " other nodes");
+}
+
 void warnNodes(ImportContext& context) {
   for (std::size_t n = 0; n < context.model.nodes.size(); ++n) {
     const auto& node = context.model.nodes[n];
@@ -120,11 +166,22 @@ void warnImages(ImportContext& context) {
 
 }  // namespace
 
+void warnAboutElements(ImportContext& context, const std::vector<Trs>& elements, const std::string& pointer) {
+  auto flat = flatPlaces(), far = farPlaces();
+  for (const auto& element : elements) {
+    if (isFlat(element.scale)) flat.add(pointer + "/SCALE");
+    if (isFar(element.translation)) far.add(pointer + "/TRANSLATION");
+  }
+  flat.tell(context, " other elements");
+  far.tell(context, " other elements");
+}
+
 void warnAboutOddities(ImportContext& context) {
   warnUndeclared(context);
   warnAccessors(context);
   warnMeshes(context);
   warnNodes(context);
+  warnTransforms(context);
   warnCameras(context);
   warnLights(context);
   warnBuffers(context);

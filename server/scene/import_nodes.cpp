@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "server/scene/import_instancing.h"
+#include "server/scene/import_lint.h"
 #include "server/scene/import_mesh.h"
 #include "server/scene/node_transform.h"
 
@@ -125,6 +126,7 @@ class NodeWalk {
     const auto pointer = pointer_ + "/extensions/EXT_mesh_gpu_instancing/attributes";
     const auto locals = readInstancing(context_.document, context_.model, attributes, pointer);
     if (!locals) return tl::unexpected(locals.error());
+    warnAboutElements(context_, *locals, pointer);
     for (const auto& local : *locals) {
       placed.world = world * local.matrix();
       if (!isFinite(placed.world)) return context_.bad(pointer_, "world transform is not finite");

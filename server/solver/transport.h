@@ -268,6 +268,17 @@ class Transport {
   };
   [[nodiscard]] virtual Losses losses() const { return {}; }
 
+  struct Renderers {
+    std::size_t wanted = 1, missing = 0;
+    std::string why;  ///< the last one ended; empty: none is missing
+  };
+  /// Looks which renderers have ended while nothing was asked of them; what runs does so by itself. Those it finds
+  /// count as lost. Does not wait. For the thread that uses the transport, between its calls.
+  [[nodiscard]] virtual Renderers look() { return {}; }
+  /// Replaces those that are missing, which then have the present scene. Blocks while they start, under a second each
+  /// where the driver's shaders are compiled already. On error some are still missing.
+  [[nodiscard]] virtual Result<void> replaceMissing() { return {}; }
+
   /// "llvmpipe (LLVM 15.0.6, 256 bits), 2 workers"
   [[nodiscard]] virtual std::string description() const = 0;
 

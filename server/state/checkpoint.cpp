@@ -63,7 +63,8 @@ Result<void> writeCheckpoint(const fs::path& file, const Bytes& body) {
   return writeWhole(file, parts);
 }
 
-CheckpointWriter::CheckpointWriter(fs::path file) : file_(std::move(file)), thread_([this] { work(); }) {}
+CheckpointWriter::CheckpointWriter(fs::path file, std::function<Result<void>()> check)
+    : file_(std::move(file)), check_(std::move(check)), thread_([this] { work(); }) {}
 
 CheckpointWriter::~CheckpointWriter() {
   {
@@ -106,7 +107,8 @@ void CheckpointWriter::work() {
     writing_ = true;
     lock.unlock();
     const auto begin = std::chrono::steady_clock::now();
-    const auto written = writeCheckpoint(file_, body);
+    auto written = check_ ? check_() : Result<void>();
+    if (written) written = writeCheckpoint(file_, body);
     if (!written) log::warn("no checkpoint of the solve: {}", written.error().text());
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     lock.lock();

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <filesystem>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -26,7 +27,8 @@ namespace radiosity::state {
 /// Writes checkpoints in a thread of its own. Called from one thread.
 class CheckpointWriter {
  public:
-  explicit CheckpointWriter(std::filesystem::path file);
+  /// `check` is asked before each is written, in that thread: where it fails, so does the checkpoint.
+  explicit CheckpointWriter(std::filesystem::path file, std::function<Result<void>()> check = {});
   /// Ends once what is being written is on the disk; what still waits is dropped.
   ~CheckpointWriter();
   CheckpointWriter(const CheckpointWriter&) = delete;
@@ -49,6 +51,7 @@ class CheckpointWriter {
   void work();
 
   std::filesystem::path file_;
+  std::function<Result<void>()> check_;
   mutable std::mutex mutex_;
   mutable std::condition_variable changed_;
   std::optional<Bytes> waiting_;

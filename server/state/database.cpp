@@ -4,6 +4,7 @@
 #include <sqlite3.h>
 
 #include <array>
+#include <cstring>
 #include <utility>
 
 #include "common/sha256.h"
@@ -39,6 +40,18 @@ Value column(sqlite3_stmt* statement, int place) {
 
 bool isDamage(int code) { return (code & 0xff) == SQLITE_CORRUPT || (code & 0xff) == SQLITE_NOTADB; }
 
+/// The system's reason for the last write to the log or to the database that failed; 0: there was none. (SQLite passes
+/// it on for files that it cannot open alone.)
+int lastErrno(sqlite3* handle) {
+  int number = 0;
+  sqlite3_file* log = nullptr;
+  (void)sqlite3_file_control(handle, "main", SQLITE_FCNTL_JOURNAL_POINTER, &log);
+  if (log != nullptr && log->pMethods != nullptr)
+    (void)log->pMethods->xFileControl(log, SQLITE_FCNTL_LAST_ERRNO, &number);
+  if (number == 0) (void)sqlite3_file_control(handle, "main", SQLITE_FCNTL_LAST_ERRNO, &number);
+  return number;
+}
+
 std::string digestOf(const std::string& table, std::span<const Value> row) {
   std::string all = table;
   for (const auto& value : row) {
@@ -59,6 +72,9 @@ tl::unexpected<Error> Database::failure(int code) const {
     return fail(ErrorCode::kBadInput,
                 why + "; put a backup of the whole folder in its place, or move the folder away to start anew",
                 file_.string());
+  // "disk I/O error" alone does not tell a limit on the size of files from a disk that fails.
+  const int number = (code & 0xff) == SQLITE_IOERR && handle_ ? lastErrno(handle_.get()) : 0;
+  if (number != 0) return fail(ErrorCode::kUnavailable, why + ": " + std::strerror(number), file_.string());
   const bool busy = (code & 0xff) == SQLITE_BUSY || (code & 0xff) == SQLITE_LOCKED;
   return fail(ErrorCode::kUnavailable, busy ? "another program has it open (" + why + ")" : why, file_.string());
 }
@@ -80,6 +96,16 @@ Result<Database> Database::open(const std::filesystem::path& file) {
   }
   return database;
 }
+
+Result<FileIdentity> Database::identity() const {
+  const auto there = identityOf(file_);
+  int moved = 0;
+  (void)sqlite3_file_control(handle_.get(), "main", SQLITE_FCNTL_HAS_MOVED, &moved);
+  if (there && moved != 0) return fail(ErrorCode::kUnavailable, "was replaced while it was opened", file_.string());
+  return there;
+}
+
+void Database::keepLog() { (void)sqlite3_db_config(handle_.get(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr); }
 
 Result<std::vector<Row>> Database::rows(const std::string& sql, std::span<const Value> values) {
   sqlite3_stmt* made = nullptr;

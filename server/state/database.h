@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "common/result.h"
+#include "server/state/known_files.h"
 
 struct sqlite3;
 
@@ -36,6 +37,11 @@ class Database {
   [[nodiscard]] Result<void> checkPages();
 
   [[nodiscard]] const std::filesystem::path& file() const { return file_; }
+  /// Of the open file; kUnavailable where it was removed or replaced since, as far as SQLite can tell.
+  [[nodiscard]] Result<FileIdentity> identity() const;
+  /// Closing leaves the write-ahead log as it is. Else SQLite removes the file of that name, which may be the log of
+  /// another database by then.
+  void keepLog();
 
  private:
   struct Close {

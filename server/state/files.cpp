@@ -127,20 +127,32 @@ Result<FolderLock> FolderLock::take(const fs::path& folder) {
   fs::create_directories(folder, error);
   if (error) return fail(ErrorCode::kUnavailable, "cannot be made: " + error.message(), folder.string());
   const auto file = folder / "lock";
-  FolderLock lock(open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666));
-  if (lock.descriptor_ < 0) return failErrno("cannot be opened for writing", file, errno);
   const auto deadline = std::chrono::steady_clock::now() + kLockPatience;
-  while (flock(lock.descriptor_, LOCK_EX | LOCK_NB) != 0) {
-    if (errno != EWOULDBLOCK && errno != EINTR) return failErrno("cannot be locked", file, errno);
+  for (;;) {
+    FolderLock lock(open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666));
+    if (lock.descriptor_ < 0) return failErrno("cannot be opened for writing", file, errno);
+    if (flock(lock.descriptor_, LOCK_EX | LOCK_NB) == 0) {
+      if (lock.isAt(file)) return lock;
+    } else if (errno != EWOULDBLOCK && errno != EINTR) {
+      return failErrno("cannot be locked", file, errno);
+    }
     if (std::chrono::steady_clock::now() > deadline)
       return fail(ErrorCode::kUnavailable,
                   "another radiosityd uses this folder; end it, or give this one another --state", file.string());
     std::this_thread::sleep_for(10ms);
   }
-  return lock;
 }
 
-FolderLock::FolderLock(FolderLock&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
+bool FolderLock::isAt(const fs::path& file) {
+  const auto locked = identityOf(descriptor_);
+  const auto there = identityOf(file);
+  if (!locked || !there || *there != *locked) return false;
+  identity_ = *locked;
+  return true;
+}
+
+FolderLock::FolderLock(FolderLock&& other) noexcept
+    : descriptor_(std::exchange(other.descriptor_, -1)), identity_(other.identity_) {}
 
 FolderLock::~FolderLock() {
   if (descriptor_ >= 0) close(descriptor_);

@@ -8,6 +8,7 @@
 
 #include "common/bytes.h"
 #include "common/result.h"
+#include "server/state/known_files.h"
 
 namespace radiosity::state {
 
@@ -36,6 +37,8 @@ class FolderLock {
   FolderLock& operator=(const FolderLock&) = delete;
   ~FolderLock();
 
+  /// Of the file `lock` that is locked.
+  [[nodiscard]] FileIdentity identity() const { return identity_; }
   /// 0 where none was noted.
   [[nodiscard]] std::uint64_t notedRevision() const;
   /// Outlives this process, not a power failure: it is not waited for.
@@ -43,7 +46,11 @@ class FolderLock {
 
  private:
   explicit FolderLock(int descriptor) : descriptor_(descriptor) {}
+  /// Whether the file that was locked still is the one at its path: whoever removes a folder may do so between opening
+  /// and locking.
+  [[nodiscard]] bool isAt(const std::filesystem::path& file);
   int descriptor_ = -1;
+  FileIdentity identity_;
 };
 
 }  // namespace radiosity::state

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <utility>
 
+#include "common/log.h"
 #include "common/sha256.h"
 #include "server/state/store_rows.h"
 
@@ -44,8 +45,38 @@ Result<std::unique_ptr<Store>> Store::open(const std::filesystem::path& folder) 
   if (auto ready = store->prepareTables(); !ready) return tl::unexpected(ready.error());
   if (auto read = store->readAll(); !read) return tl::unexpected(read.error());
   if (auto begun = store->beginRun(); !begun) return tl::unexpected(begun.error());
+  if (auto known = store->knowFiles(); !known) return tl::unexpected(known.error());
   store->sweepBlobs();
+  if (const auto& other = store->claim_.other())
+    log::warn(
+        "{}: another radiosityd (process {}) was started with this path and still runs; the folder that it opened was "
+        "removed or moved away, and it refuses edits until that folder is back: end it, or give one of the two another "
+        "--state",
+        folder.string(), *other);
   return store;
+}
+
+Store::~Store() {
+  if (!check()) database_.keepLog();
+}
+
+/// Called once the database was written, so that its log is there.
+Result<void> Store::knowFiles() {
+  const auto database = database_.identity();
+  if (!database) return tl::unexpected(database.error());
+  known_.add(folder_ / "lock", lock_.identity());
+  known_.add(database_.file(), *database);
+  if (auto known = known_.add(database_.file().string() + "-wal"); !known) return known;
+  if (auto known = known_.add(folder_ / "blobs"); !known) return known;
+  return check();
+}
+
+Result<void> Store::keep(const std::function<Result<void>()>& work) {
+  if (auto here = check(); !here) return here;
+  return database_.atomically([&]() -> Result<void> {
+    if (auto done = work(); !done) return done;
+    return check();
+  });
 }
 
 Result<void> Store::prepareTables() {
@@ -150,7 +181,7 @@ Result<void> Store::forgetOld(std::uint64_t newest) {
 Result<void> Store::load(const Revision& revision, const Document& document, const std::string& digest) {
   const std::scoped_lock lock(mutex_);
   auto new_digest = digest;  // after it is kept nothing may fail
-  auto kept = database_.atomically([&]() -> Result<void> {
+  auto kept = keep([&]() -> Result<void> {
     for (const auto* table : {"revisions", "edits"}) {
       if (auto gone = database_.run(fmt::format("DELETE FROM {}", table)); !gone) return gone;
     }
@@ -170,7 +201,7 @@ Result<void> Store::load(const Revision& revision, const Document& document, con
 Result<void> Store::edit(const Change& change) {
   const std::scoped_lock lock(mutex_);
   const auto newest = change.revision.revision;
-  auto kept = database_.atomically([&]() -> Result<void> {
+  auto kept = keep([&]() -> Result<void> {
     if (auto put = putRevision(change.revision); !put) return put;
     for (const auto revision : change.forgotten) {
       const std::array<Value, 1> which = {signedOf(revision)};
@@ -202,12 +233,12 @@ Result<void> Store::edit(const Change& change) {
 
 Result<void> Store::correct(const Answer& answer) {
   const std::scoped_lock lock(mutex_);
-  return database_.atomically([&] { return putAnswer(answer); });
+  return keep([&] { return putAnswer(answer); });
 }
 
 Result<void> Store::setSettings(const std::map<std::string, std::string>& settings) {
   const std::scoped_lock lock(mutex_);
-  return database_.atomically([&]() -> Result<void> {
+  return keep([&]() -> Result<void> {
     for (const auto& [key, value] : settings) {
       if (auto put = putMeta(std::string(kSettingPrefix) + key, value); !put) return put;
     }
@@ -217,9 +248,10 @@ Result<void> Store::setSettings(const std::map<std::string, std::string>& settin
 
 Result<void> Store::keepUpload(const Upload& upload, const SharedBytes& bytes,
                                const std::vector<std::string>& dropped) {
+  if (auto here = check(); !here) return here;
   if (auto put = blobs_.putAs(upload.id, bytes); !put) return put;
   const std::scoped_lock lock(mutex_);
-  auto kept = database_.atomically([&]() -> Result<void> {
+  auto kept = keep([&]() -> Result<void> {
     const auto last = database_.rows("SELECT COALESCE(MAX(place), 0) FROM uploads");
     if (!last) return tl::unexpected(last.error());
     for (const auto& id : dropped) {
@@ -249,6 +281,7 @@ void Store::sweepBlobs() {
 }
 
 void Store::sweepUnwanted() {
+  if (!check()) return;  // the blobs there are another server's
   std::set<std::string> wanted;
   constexpr std::array kNames = {"SELECT buffers || ',' || images FROM scene",
                                  "SELECT buffers || ',' || images FROM revisions",

@@ -1,11 +1,13 @@
 // What outlives the server: the scene with its revisions, the edits that can be taken back, answers of edits that were
 // acknowledged, settings, uploads. In a folder: state.sqlite (write-ahead log, synchronous FULL), blobs/ (buffers,
 // images and uploads by SHA-256), checkpoint (checkpoint.h), lock. What a method has returned without an error is on
-// the disk. The solve thread calls all but the uploads' methods, which are thread-safe with everything.
+// the disk, in the folder that was opened: where that is no longer at its path, nothing is kept. The solve thread calls
+// all but check() and the uploads' methods, which are thread-safe with everything.
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -18,6 +20,8 @@
 #include "server/state/blobs.h"
 #include "server/state/database.h"
 #include "server/state/files.h"
+#include "server/state/known_files.h"
+#include "server/state/path_claim.h"
 
 namespace radiosity::state {
 
@@ -80,7 +84,14 @@ class Store {
   /// Opens the folder, or makes it. Reads and checks everything: kBadInput names the file that is damaged;
   /// kUnavailable: in use, or cannot be written.
   [[nodiscard]] static Result<std::unique_ptr<Store>> open(const std::filesystem::path& folder);
+  ~Store();
+  Store(const Store&) = delete;
+  Store& operator=(const Store&) = delete;
 
+  /// Whether what is written now will be found at the path at the next start: kUnavailable names the database, its log,
+  /// the lock or the blobs' folder where it was removed, moved or replaced. Every method that keeps something asks this
+  /// first and again before it commits. Any thread. Cost: four times stat().
+  [[nodiscard]] Result<void> check() const { return known_.check(); }
   [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
   /// Random text, the same as long as the folder lives.
   [[nodiscard]] const std::string& epoch() const { return epoch_; }
@@ -125,7 +136,14 @@ class Store {
   static constexpr std::uint64_t kRevisionsKept = 256, kPatchBytes = std::uint64_t{4} << 20;
 
   Store(std::filesystem::path folder, FolderLock lock, Database database)
-      : folder_(std::move(folder)), lock_(std::move(lock)), database_(std::move(database)), blobs_(folder_ / "blobs") {}
+      : folder_(std::move(folder)),
+        lock_(std::move(lock)),
+        claim_(PathClaim::take(folder_)),
+        database_(std::move(database)),
+        blobs_(folder_ / "blobs") {}
+  [[nodiscard]] Result<void> knowFiles();
+  /// All of `work` or nothing, in the files that lie at their paths.
+  [[nodiscard]] Result<void> keep(const std::function<Result<void>()>& work);
   [[nodiscard]] Result<void> prepareTables();
   [[nodiscard]] Result<void> beginRun();
   [[nodiscard]] Result<void> readAll();
@@ -148,6 +166,8 @@ class Store {
 
   std::filesystem::path folder_;
   FolderLock lock_;
+  PathClaim claim_;
+  KnownFiles known_;  ///< constant once open() has returned
   std::mutex mutex_;  ///< of database_: uploads come from another thread
   Database database_;
   Blobs blobs_;

@@ -137,6 +137,10 @@ std::vector<Seed> seeds() {
       of(kHttp, "PUT /uploads?name=a.glb HTTP/1.1\r\nHost: localhost\r\nContent-Length: 4\r\n\r\nglTF"),
       of(kHttp, "GET /lightmaps/0.exr?quantity=error HTTP/1.1\r\nHost: localhost\r\n\r\n"),
       of(kHttp, "PUT /scene HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\n4\r\nglTF\r\n0\r\n\r\n"),
+      of(kHttp,
+         "PUT /scene HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: gzip, chunked\r\n\r\n4;a=\"b\"\r\nglTF\r\n0\r\n"
+         "X-Trailer: 1\r\n\r\n"),
+      of(kHttp, "OPTIONS * HTTP/1.1\r\nHost: localhost\r\n\r\nGET http://localhost/ HTTP/1.1\r\nHost: x\r\n\r\n"),
       of(kHttp, kUpgrade),
       of(kSocket, textFrame(kHello) + textFrame(kSubscribe)),
       of(kViewer, textFrame(kSubscribe)),

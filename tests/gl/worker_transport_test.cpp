@@ -215,6 +215,31 @@ TEST_F(Workers, KilledWorkersAreReplacedAndChangeNoBit) {
   }
 }
 
+TEST_F(Workers, IdleWorkersThatWereKilledAreFoundReplacedAndChangeNoBit) {
+  const auto scene = randomRoom(60, 2000, 1);
+  const auto batch = mixedBatch(*scene, 40);
+  ASSERT_TRUE(in_process_->setScene(scene).has_value());
+  const auto expected = run(*in_process_, *scene, batch);
+  const auto transport = make(2);
+  ASSERT_TRUE(transport);
+  ASSERT_TRUE(transport->setScene(scene).has_value());
+  expectSame(run(*transport, *scene, batch), expected);
+  EXPECT_EQ(transport->look().missing, 0U);
+  for (const auto worker : childWorkers()) kill(worker, SIGKILL);
+  solver::Transport::Renderers found;
+  for (int i = 0; i < 1000 && (found = transport->look()).missing < 2; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  EXPECT_EQ(found.missing, 2U);
+  EXPECT_EQ(found.wanted, 2U);
+  EXPECT_NE(found.why.find("killed by signal 9"), std::string::npos) << found.why;
+  ASSERT_TRUE(transport->replaceMissing().has_value());
+  EXPECT_EQ(transport->look().missing, 0U);
+  EXPECT_EQ(transport->look().why, "");
+  EXPECT_EQ(transport->losses().count, 2U);
+  EXPECT_EQ(childWorkers().size(), 2U);
+  expectSame(run(*transport, *scene, batch), expected);
+}
+
 TEST_F(Workers, HungWorkersAreReplacedAndChangeNoBit) {
   const auto scene = randomRoom(402, 13742, 2);
   const auto batch = mixedBatch(*scene, 600);

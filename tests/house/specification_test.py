@@ -159,7 +159,7 @@ class Specification(unittest.TestCase):
         self.assertEqual(told, set(routes))
 
     def test_http_statuses_and_codes_are_those_of_the_server(self):
-        net = "".join(read("server", "net", f"http_{part}.cpp") for part in ("message", "routes", "session"))
+        net = "".join(read("server", "net", f"http_{part}.cpp") for part in ("message", "framing", "routes", "session"))
         answered = set(re.findall(r"return (\d{3});", net)) | set(re.findall(r"errorResponse\((\d{3}),", net))
         statuses = re.search(r"^Statuses: (.*?)Every error", section("HTTP"), re.MULTILINE | re.DOTALL).group(1)
         self.assertEqual(set(re.findall(r"\b([45]\d\d)\b", statuses)), answered)
@@ -170,7 +170,7 @@ class Specification(unittest.TestCase):
         self.assertEqual(set(re.search(r"`code` one of\n`([^`]+)`", section("HTTP")).group(1).split()), codes)
 
     def test_headers_that_the_server_sets_or_reads_are_told(self):
-        sources = "".join(read("server", "net", f"http_{part}.cpp") for part in ("message", "routes", "session"))
+        sources = "".join(read("server", "net", f"http_{part}.cpp") for part in ("message", "framing", "routes", "session"))
         named = set(re.findall(r'(?:emplace_back|message|m\.set)[(\[]"([A-Z][\w-]+)"', sources))
         named |= {"-".join(word.capitalize() for word in field.split("_")) for field in re.findall(r"http::field::(\w+)", sources)}
         usual = {"Content-Type", "Host", "Date", "Server", "Cache-Control", "Vary", "X-Content-Type-Options",

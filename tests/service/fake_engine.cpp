@@ -166,6 +166,18 @@ void FakeEngine::loseRenderer(bool lost) {
   status_.failure = lost ? "the driver is gone" : "";
 }
 
+void FakeEngine::loseIdle(std::uint64_t missing, std::uint64_t renderers, std::string why) {
+  const std::lock_guard lock(mutex_);
+  status_.renderers_missing = missing;
+  status_.renderers = renderers;
+  status_.renderer_trouble = std::move(why);
+}
+
+void FakeEngine::loseState(std::string why) {
+  const std::lock_guard lock(mutex_);
+  status_.state_trouble = std::move(why);
+}
+
 void FakeEngine::holdAnswers() {
   const std::lock_guard lock(mutex_);
   holding_ = true;

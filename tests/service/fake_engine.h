@@ -39,6 +39,8 @@ class FakeEngine : public engine::Engine {
   [[nodiscard]] std::uint64_t patchesSeen() const;
   void notice(const engine::Notice& notice);
   void loseRenderer(bool lost);
+  void loseIdle(std::uint64_t missing, std::uint64_t renderers, std::string why);
+  void loseState(std::string why);
   std::atomic<double> busy_seconds{0.0};
   /// Once: `meanwhile` happens after status() was taken, and before whoever asked for it has it.
   void overtakeStatus(std::function<void()> meanwhile);

@@ -112,6 +112,24 @@ class Renderers(ServiceCase):
         self.assertEqual(self.metric(server, "renderers_replaced_total"), 1)
         self.assertEqual(len(server.workers()), 2)
 
+    def test_idle_renderers_that_are_killed_are_replaced_at_once_and_told_of_meanwhile(self):
+        server = self.server(self.room, "--error", "0.5", "--texels", "500", "--workers", "2")
+        self.until(lambda: self.metric(server, 'solve_state{state="converged"}') == 1)
+        before, light, said = server.workers(), self.light(server), set()
+        for worker in before:
+            os.kill(worker, signal.SIGKILL)
+        killed = time.monotonic()
+        while self.metric(server, "renderers_replaced_total") < 2:
+            said.add(self.readiness(server))
+            self.assertLess(time.monotonic() - killed, SECONDS, "they were never replaced")
+        if PATIENCE == 1:
+            self.assertLess(time.monotonic() - killed, 10)  # a second where nothing else runs
+        self.assertTrue(any("no renderer" in text and "signal 9" in text for text in said), said)
+        self.assertEqual(self.readiness(server), "ready\n")
+        self.assertEqual(self.metric(server, "renderers_missing"), 0)
+        self.assertEqual(len(set(server.workers()) - set(before)), 2)
+        self.assertEqual(self.light(server), light)
+
     def test_a_renderer_that_hangs_is_given_up_and_replaced(self):
         async def stop(server, session):
             stopped = server.workers()[1]

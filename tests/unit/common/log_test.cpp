@@ -73,6 +73,15 @@ TEST(TextLog, aPeersTextCannotBeginALineOfItsOwn) {
   EXPECT_EQ(text.find('\x1b'), std::string::npos) << text;
 }
 
+TEST(TextLog, anyBytesBecomeUtf8) {
+  startLog("tester", "info");
+  ::testing::internal::CaptureStderr();
+  log::info("{}", "r\xf6ll \xc3\xa9 \xc2\x9b cut \xe2\x82");
+  const auto text = ::testing::internal::GetCapturedStderr();
+  startLog("tester", "off");
+  EXPECT_NE(text.find("r\\xf6ll \xc3\xa9 \\u009b cut \\xe2\\x82\n"), std::string::npos) << text;
+}
+
 TEST_F(JsonLog, scopesAddTheirFieldsAndTakeThemAwayAgain) {
   const auto lines = linesOf([] {
     const LogScope outer({.revision = 7, .request_id = "outer"});

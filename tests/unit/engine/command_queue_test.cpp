@@ -19,6 +19,15 @@ TEST(CommandQueue, CommandsComeOutInTheOrderTheyWentIn) {
   EXPECT_TRUE(queue.take(false)->empty());
 }
 
+TEST(CommandQueue, WhoWaitsMayWantToLookUpNowAndThen) {
+  CommandQueue queue(8);
+  const auto none = queue.take(true, std::chrono::milliseconds(1));
+  ASSERT_TRUE(none) << "it is not closed";
+  EXPECT_TRUE(none->empty());
+  ASSERT_TRUE(queue.push([] {}));
+  EXPECT_EQ(queue.take(true, std::chrono::hours(1))->size(), 1U);
+}
+
 TEST(CommandQueue, LongCommandsWaitForAllElseAndComeOutOneByOne) {
   CommandQueue queue(8);
   std::vector<int> done;

@@ -40,6 +40,17 @@ class ScriptedTransport final : public solver::Transport {
   [[nodiscard]] Losses losses() const override {
     return {static_cast<std::uint64_t>(script_->losses.load()), "worker 7 hangs"};
   }
+  [[nodiscard]] Renderers look() override {
+    const auto missing = static_cast<std::size_t>(script_->idle_missing.load());
+    return {2, missing, missing > 0 ? "worker 8 was killed by signal 9" : ""};
+  }
+  [[nodiscard]] Result<void> replaceMissing() override {
+    ++script_->replacements;
+    if (script_->replacements_to_fail > 0 && script_->replacements_to_fail-- > 0)
+      return fail(ErrorCode::kUnavailable, "no processes can be started");
+    script_->losses += script_->idle_missing.exchange(0);
+    return {};
+  }
   [[nodiscard]] std::string description() const override { return "rays"; }
 
  protected:

@@ -24,6 +24,9 @@ struct TransportScript {
   std::atomic<bool> run_fails{false};
   std::atomic<int> runs_until_failure{0};  ///< the run that brings it from 1 to 0 fails
   std::atomic<int> losses{0};
+  std::atomic<int> idle_missing{0};  ///< of two renderers
+  std::atomic<int> replacements_to_fail{0};
+  std::atomic<int> replacements{0};           ///< tried
   std::atomic<int> uploads_until_failure{0};  ///< likewise
   std::atomic<int> uploads_to_fail{0}, uploads_to_run_out{0};
   std::atomic<bool> runs_out_of_memory{false};

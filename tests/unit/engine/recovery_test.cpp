@@ -102,6 +102,34 @@ TEST_F(Recovery, ReplacedRenderersAreTold) {
   EXPECT_EQ(status().renderers_replaced, 2U);
 }
 
+// While nobody asks for anything.
+TEST_F(Recovery, IdleRenderersThatDiedAreToldOfAndReplaced) {
+  solve(lumpedCube(0.5));
+  EXPECT_EQ(status().renderers, 2U);
+  EXPECT_EQ(status().renderers_missing, 0U);
+  recorder_->forget();
+  script_->idle_missing = 2;
+  ASSERT_TRUE(eventually([&] { return status().renderers_replaced == 2; }));
+  EXPECT_TRUE(eventually([&] { return status().renderers_missing == 0; }));
+  EXPECT_EQ(status().renderer_trouble, "");
+  EXPECT_EQ(status().state, SolveState::kConverged);
+  EXPECT_TRUE(std::ranges::any_of(recorder_->progress(), [](const auto& told) {
+    return told.renderers_missing == 2 && told.renderer_trouble == "worker 8 was killed by signal 9";
+  }));
+  const auto notices = recorder_->notices();
+  ASSERT_EQ(notices.size(), 1U);
+  EXPECT_EQ(notices[0].kind, Notice::Kind::kRendererReplaced);
+}
+
+TEST_F(Recovery, IdleRenderersThatCannotBeReplacedAreTriedAgain) {
+  solve(lumpedCube(0.5));
+  script_->replacements_to_fail = 1;
+  script_->idle_missing = 1;
+  EXPECT_TRUE(eventually([&] { return status().renderers_replaced == 1; }));
+  EXPECT_EQ(script_->replacements, 2);
+  EXPECT_TRUE(eventually([&] { return status().renderers_missing == 0; }));
+}
+
 TEST_F(Recovery, AnIdleEngineIsNotBusy) {
   solve(lumpedCube(0.5));
   (void)sceneText();

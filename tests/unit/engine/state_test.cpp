@@ -312,6 +312,26 @@ TEST_F(Kept, WhatCannotBeKeptIsRefusedAndAllStaysAsItWas) {
 }
 
 // Its charts lie where the edit found them; a scene that is built anew from the same document has others.
+// As on a full disk: nothing is made that the next start would not find.
+TEST_F(Kept, WithoutItsFolderNothingIsMadeUntilThatIsBack) {
+  solve(lumpedCube(0.5));
+  std::filesystem::rename(folder_.file("state"), folder_.file("away"));
+  const auto edited = patch(emissionPatch(0, 2.0));
+  ASSERT_FALSE(edited);
+  EXPECT_EQ(edited.error().code, ErrorCode::kUnavailable);
+  EXPECT_THAT(edited.error().message, testing::HasSubstr(folder_.file("state/lock") + ": was removed or moved away"));
+  EXPECT_FALSE(configure([](auto& settings) { settings.seed = 5; }));
+  EXPECT_FALSE(load(lumpedCube(0.25)));
+  EXPECT_TRUE(eventually([&] { return status().state_trouble.find("state/lock") != std::string::npos; }));
+  EXPECT_EQ(status().revision, 1U);
+  std::filesystem::rename(folder_.file("away"), folder_.file("state"));
+  EXPECT_TRUE(eventually([&] { return status().state_trouble.empty(); }));
+  const auto again = patch(emissionPatch(0, 2.0));
+  ASSERT_TRUE(again) << again.error().text();
+  restart();
+  EXPECT_EQ(status().revision, 2U);
+}
+
 TEST_F(Kept, ASolveOfEditedGeometryBeginsAnewAfterARestart) {
   solve(lumpedCube(0.5));
   engine().keepSolve(kPatienceForCheckpoint);
