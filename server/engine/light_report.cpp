@@ -233,9 +233,10 @@ void LightReport::findLost(const LitParts& parts, solver::Solver& solver) {
     if (fate.arrives) continue;
     names.add([&] { return fmt::format("lamp {} lights nothing: {}", nameOf(parts, i), endOf(parts, fate, false)); });
   }
+  const solver::LightFlux flux(parts.patches);
   for (std::size_t i = 0; i < parts.sources.lights.size(); ++i) {
     const auto& light = parts.sources.lights[i];
-    const double power = solver::totalFlux(parts.patches, {{light}, {}});
+    const double power = flux.of(light);
     if (!(power > 0.0) || power > kMargin * lost) continue;
     const auto fate = ask().ofLight(light);
     if (fate.arrives) continue;

@@ -32,7 +32,8 @@ class LitScene {
  public:
   /// Imports and charts. The transport stays as it is until upload().
   [[nodiscard]] static Result<std::unique_ptr<LitScene>> make(scene::Document document, const SolveSettings& settings,
-                                                              solver::Transport& transport);
+                                                              solver::Transport& transport,
+                                                              const scene::ImportLimits& limits = {});
   /// The same for a document that has been imported already. With a former scene that this one is an edit of, charts
   /// that the edit left alone stay as they are.
   [[nodiscard]] static Result<std::unique_ptr<LitScene>> make(scene::EditedDocument edited,

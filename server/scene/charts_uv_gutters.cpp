@@ -11,6 +11,7 @@
 
 #include "server/scene/atlas.h"
 #include "server/scene/charts.h"
+#include "server/scene/triangle_rows.h"
 
 namespace radiosity::scene {
 namespace {
@@ -28,20 +29,6 @@ struct Span {
   std::int32_t row, first, last;
   std::uint32_t chart, triangle;  ///< triangle: of its chart
 };
-
-/// Extent along x of the part of a triangle whose y is in [low, high]; empty where x > y.
-glm::dvec2 extentWithin(const Triangle2& t, double low, double high) {
-  glm::dvec2 extent(std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity());
-  const auto add = [&](double x) { extent = {std::min(extent.x, x), std::max(extent.y, x)}; };
-  for (std::size_t k = 0; k < 3; ++k) {
-    const auto &a = t[k], &b = t[(k + 1) % 3];
-    if (a.y >= low && a.y <= high) add(a.x);
-    for (const double y : {low, high})
-      if ((a.y < y) != (b.y < y))
-        add(std::clamp(a.x + (b.x - a.x) * (y - a.y) / (b.y - a.y), std::min(a.x, b.x), std::max(a.x, b.x)));
-  }
-  return extent;
-}
 
 std::int32_t firstIndex(double low) { return static_cast<std::int32_t>(std::ceil(low - kReach - 0.5)); }
 std::int32_t lastIndex(double high) { return static_cast<std::int32_t>(std::floor(high + kReach - 0.5)); }

@@ -35,6 +35,14 @@ glm::dvec3 inCap(const glm::dvec3& axis, double least, double u, double v) {
 
 }  // namespace
 
+double LightFlux::of(const scene::PunctualLight& light) const {
+  double sum = 0.0;
+  for (const auto& source : none_.makeSources(patches_, {{light}, {}}))
+    sum += source.flux_per_intensity *
+           (std::abs(source.intensity.x) + std::abs(source.intensity.y) + std::abs(source.intensity.z));
+  return sum;
+}
+
 /// Cumulative flux, so that a number in [0, 1) draws one in proportion.
 class LostLight::Senders {
  public:
@@ -59,6 +67,10 @@ LostLight::LostLight(const scene::PatchScene& patches, const scene::PatchMateria
                      std::shared_ptr<const LeafRays> rays)
     : patches_(patches), materials_(materials), sides_(makeSides(patches)), rays_(std::move(rays)) {
   if (!rays_) rays_ = std::make_shared<const LeafRays>(patches_, sides_);
+  by_instance_.resize(sides_.size());
+  std::iota(by_instance_.begin(), by_instance_.end(), 0U);
+  std::ranges::stable_sort(by_instance_, {},
+                           [&](std::uint32_t s) { return patches_.surfaces[sides_[s].surface].instance; });
   const auto box = sceneBox(patches);
   middle_ = 0.5 * (glm::dvec3(box[0]) + glm::dvec3(box[1]));
   radius_ = 0.5 * glm::distance(glm::dvec3(box[0]), glm::dvec3(box[1]));
@@ -105,8 +117,10 @@ bool LostLight::follow(const Ray& ray, std::uint64_t key, double range, Fate& fa
 
 LostLight::Fate LostLight::ofInstance(std::uint32_t instance) const {
   Senders leaves;
-  for (const auto& side : sides_) {
-    if (patches_.surfaces[side.surface].instance != instance) continue;
+  const auto instanceOf = [&](std::uint32_t s) { return patches_.surfaces[sides_[s].surface].instance; };
+  const auto end = std::ranges::upper_bound(by_instance_, instance, {}, instanceOf);
+  for (auto at = std::ranges::lower_bound(by_instance_, instance, {}, instanceOf); at != end; ++at) {
+    const auto& side = sides_[*at];
     const auto emission = materials_.emission.side(side.number);
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
       leaves.add(side.first_value + leaf,
@@ -143,7 +157,8 @@ std::vector<LostLight::Share> LostLight::backs(std::span<const glm::vec3> irradi
     }
   }
   const auto first_light = number;
-  for (const auto& light : sources.lights) senders.add(number++, totalFlux(patches_, {{light}, {}}));
+  const LightFlux flux(patches_);
+  for (const auto& light : sources.lights) senders.add(number++, flux.of(light));
   const auto first_sky = number;
   senders.add(number++, totalFlux(patches_, {{}, {sources.sky.upper, glm::vec3(0.0F)}}));
   senders.add(number++, totalFlux(patches_, {{}, {glm::vec3(0.0F), sources.sky.lower}}));

@@ -15,6 +15,19 @@
 
 namespace radiosity::solver {
 
+/// Flux of single lights, all channels, lux unit^2: as totalFlux(), without a pass over the scene for each.
+class LightFlux {
+ public:
+  /// O(vertices).
+  explicit LightFlux(const scene::PatchScene& patches) : patches_(patches), none_(patches, {}, {}) {}
+
+  [[nodiscard]] double of(const scene::PunctualLight& light) const;
+
+ private:
+  const scene::PatchScene& patches_;
+  PunctualLights none_;
+};
+
 class LostLight {
  public:
   /// Keeps the first two. `rays`: Solver::rays(); null: makes its own, O(n log n) in triangles.
@@ -60,6 +73,7 @@ class LostLight {
   const scene::PatchScene& patches_;
   const scene::PatchMaterials& materials_;
   std::vector<Side> sides_;
+  std::vector<std::uint32_t> by_instance_;  ///< sides, by the instance of their surface
   std::shared_ptr<const LeafRays> rays_;
   glm::dvec3 middle_{0.0};
   double radius_ = 0.0;
