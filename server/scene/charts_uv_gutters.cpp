@@ -24,6 +24,10 @@ constexpr double kReach = 0.999;
 /// Islands that continue each other put the same place of the surface at a texel to within so many texels.
 constexpr double kSamePlace = 1.0;
 
+/// Rows of triangles that are looked at, and pairs of these a row, in the mean: layouts of a million triangles have
+/// fewer. Slivers from end to end of a page would take gigabytes, and such a layout is of no use.
+constexpr std::size_t kMostSpans = std::size_t{1} << 23U, kPairsASpan = 32;
+
 /// Texels of a row that lookups on a triangle read.
 struct Span {
   std::int32_t row, first, last;
@@ -56,14 +60,18 @@ class Islands {
     texel_ = 1.0 / (resolution_ * density);
   }
 
-  /// O(n log n) for texels and triangles together.
+  /// O(n log n) for texels and triangles together. Also true where that would be too much to look at.
   [[nodiscard]] bool bleed() const {
     auto spans = allSpans();
+    if (spans.size() > kMostSpans) return true;
+    auto left = kPairsASpan * spans.size();
     std::ranges::sort(spans, [](const Span& a, const Span& b) {
       return std::tie(a.row, a.first, a.chart, a.triangle) < std::tie(b.row, b.first, b.chart, b.triangle);
     });
     std::vector<const Span*> open;  // of each chart the one that ends last
     for (const Span& span : spans) {
+      if (left < open.size()) return true;
+      left -= open.size();
       std::erase_if(open, [&](const Span* other) { return other->row != span.row || other->last < span.first; });
       bool own = false;
       for (const Span*& other : open) {
@@ -80,6 +88,7 @@ class Islands {
   }
 
  private:
+  /// Some of them where they are more than kMostSpans.
   [[nodiscard]] std::vector<Span> allSpans() const {
     std::vector<Span> spans;
     for (std::uint32_t c = 0; c < charts_.size(); ++c)
@@ -90,6 +99,7 @@ class Islands {
         for (auto row = firstIndex(low); row <= lastIndex(high); ++row) {
           const auto extent = extentWithin(t, row + 0.5 - kReach, row + 0.5 + kReach);
           if (extent.x > extent.y) continue;
+          if (spans.size() > kMostSpans) return spans;
           spans.push_back({row, firstIndex(extent.x), lastIndex(extent.y), c, i});
         }
       }

@@ -19,8 +19,8 @@ namespace {
 constexpr std::size_t kMeasuredAtOnce = 65536, kLeavesATurn = 16, kFewestTries = 16;
 /// Surfaces, likewise.
 constexpr std::size_t kFewestSurfaces = 32;
-/// Hits::work, some 6 s of one core, of leaves that nothing comes near: each surface has its share.
-constexpr std::uint64_t kUniformWork = 1'000'000'000;
+/// Hits::work, 2 or 3 s of one core, of leaves that nothing comes near: each surface has its share.
+constexpr std::uint64_t kUniformWork = 400'000'000;
 /// Of more leaves it is not kept how they were found, nor where that takes more, and from more places than these rays
 /// were cast for hardly any.
 constexpr std::size_t kMostRecorded = 80'000, kMostRecordedBytes = std::size_t{16} << 20, kMostFans = 64;
