@@ -88,6 +88,7 @@ int serve(Options options) {
   const auto uploads = options.server.uploads;
   engine_options.settings = options.solve;
   engine_options.first_texels = options.first_texels;
+  engine_options.max_scene_bytes = options.max_scene_bytes;
   engine_options.make_transport = [workers = options.workers, sight = options.sight] {
     return gpu::makeWorkerTransport({.workers = workers, .executable = "/proc/self/exe", .sight = sight});
   };

@@ -22,6 +22,7 @@ struct Options {
   std::size_t checkpoint_bytes = std::size_t{256} << 20;
   net::ServerOptions server;
   engine::SolveSettings solve;
+  std::uint64_t max_scene_bytes = 0;     ///< EngineOptions::max_scene_bytes
   std::uint64_t first_texels = 100'000;  ///< EngineOptions::first_texels
   int workers = 0;                       ///< 0: one for each core with a software renderer, one on a GPU
   gpu::Sight sight = gpu::Sight::kAuto;

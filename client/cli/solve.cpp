@@ -36,9 +36,10 @@ struct SolveOptions {
   std::uint64_t texels = 16'000;
   double texel_size_m = 0.0;  ///< 0: by number
   std::uint64_t seed = 1;
-  unsigned workers = 0;     ///< 0: the server's choice
-  std::string visibility;   ///< empty: the server's choice
-  std::string link_memory;  ///< as radiosityd takes it; empty: the server's choice
+  unsigned workers = 0;          ///< 0: the server's choice
+  std::string visibility;        ///< empty: the server's choice
+  std::string link_memory;       ///< as radiosityd takes it; empty: the server's choice
+  std::string max_scene_memory;  ///< likewise
   bool double_sided = false;
   bool unlit = false, error_map = false, quiet = false;
 };
@@ -115,6 +116,8 @@ class Solve {
       start.arguments.insert(start.arguments.end(), {"--visibility", options_.visibility});
     if (!options_.link_memory.empty())
       start.arguments.insert(start.arguments.end(), {"--link-memory", options_.link_memory});
+    if (!options_.max_scene_memory.empty())
+      start.arguments.insert(start.arguments.end(), {"--max-scene-memory", options_.max_scene_memory});
     if (!options_.state.empty())
       start.arguments.insert(start.arguments.end(), {"--state", std::filesystem::absolute(options_.state).string()});
     if (by_path_) {
@@ -354,6 +357,13 @@ void addSolve(CLI::App& app, Run& run) {
                                  "used up the solve ends above its error")
                      ->check(CLI::AsSizeValue(false).description(""))
                      ->type_name("SIZE");
+  auto* scene_memory =
+      command
+          .add_option("--max-scene-memory", options->max_scene_memory,
+                      "memory that the scene may claim, such as 2GiB (default: a quarter of what there is); a file "
+                      "that names more is refused before any of it is made")
+          ->check(CLI::AsSizeValue(false).description(""))
+          ->type_name("SIZE");
   auto* state = command
                     .add_option("--state", options->state,
                                 "folder (made if missing) that an interrupted solve is kept in: Ctrl-C, SIGTERM or "
@@ -365,6 +375,7 @@ void addSolve(CLI::App& app, Run& run) {
       ->excludes(workers)
       ->excludes(visibility)
       ->excludes(memory)
+      ->excludes(scene_memory)
       ->excludes(state);
   addAccessOptions(command, options->server);
   command.add_flag("-q,--quiet", options->quiet, "no progress on stderr");

@@ -29,8 +29,8 @@ std::uint64_t leavesWithArea(const scene::PatchScene& patches) {
 }  // namespace
 
 Result<std::unique_ptr<LitScene>> LitScene::make(scene::Document document, const SolveSettings& settings,
-                                                 solver::Transport& transport) {
-  auto imported = scene::importScene(document);
+                                                 solver::Transport& transport, const scene::ImportLimits& limits) {
+  auto imported = scene::importScene(document, limits);
   if (!imported) return tl::unexpected<Error>(imported.error());
   return make({std::move(document), std::move(*imported)}, settings, transport);
 }
@@ -50,8 +50,9 @@ Result<std::unique_ptr<LitScene>> LitScene::make(scene::EditedDocument edited, c
 }
 
 Result<std::unique_ptr<LitScene>> LitScene::makeAgain(scene::Document document, const SolveSettings& settings,
-                                                      solver::Transport& transport, const scene::SideBits& sides) {
-  auto imported = scene::importScene(document);
+                                                      solver::Transport& transport, const scene::SideBits& sides,
+                                                      const scene::ImportLimits& limits) {
+  auto imported = scene::importScene(document, limits);
   if (!imported) return tl::unexpected<Error>(imported.error());
   configureScene(*imported, settings);
   auto lit = std::unique_ptr<LitScene>(new LitScene({std::move(document), std::move(*imported)}, settings, transport));

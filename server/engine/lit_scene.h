@@ -34,7 +34,8 @@ class LitScene {
  public:
   /// Imports and charts. The transport stays as it is until upload().
   [[nodiscard]] static Result<std::unique_ptr<LitScene>> make(scene::Document document, const SolveSettings& settings,
-                                                              solver::Transport& transport);
+                                                              solver::Transport& transport,
+                                                              const scene::ImportLimits& limits = {});
   /// The same for a document that has been imported already. With a former scene that this one is an edit of, charts
   /// that the edit left alone stay as they are.
   [[nodiscard]] static Result<std::unique_ptr<LitScene>> make(scene::EditedDocument edited,
@@ -47,7 +48,8 @@ class LitScene {
   [[nodiscard]] static Result<std::unique_ptr<LitScene>> makeAgain(scene::Document document,
                                                                    const SolveSettings& settings,
                                                                    solver::Transport& transport,
-                                                                   const scene::SideBits& sides);
+                                                                   const scene::SideBits& sides,
+                                                                   const scene::ImportLimits& limits = {});
 
   /// Whether makeAgain() gives the same charts, so that a saved solve fits them. One whose charts stayed where a former
   /// scene had them is its own.

@@ -42,7 +42,9 @@ std::string limitText(solver::SolveLimit limit, std::uint64_t link_memory_bytes)
 }  // namespace
 
 SolveLoop::SolveLoop(EngineOptions options)
-    : options_(std::move(options)), queue_(kMaxQueue), settings_(options_.settings), upkeep_(options_.store) {}
+    : options_(std::move(options)), queue_(kMaxQueue), settings_(options_.settings), upkeep_(options_.store) {
+  limits_.max_scene_bytes = options_.max_scene_bytes;
+}
 
 SolveLoop::~SolveLoop() {
   queue_.close();

@@ -33,6 +33,10 @@ struct EngineOptions {
   std::uint64_t first_light_above = 1'000'000;
   std::uint64_t first_texels = 100'000;
 
+  /// What a scene may claim (scene::ImportLimits); 0: a quarter of the memory there is. Of scenes that clients load, of
+  /// edits, and of the kept scene.
+  std::uint64_t max_scene_bytes = 0;
+
   /// What outlives this process; null: nothing does. An edit is answered only when it is in there.
   std::shared_ptr<state::Store> store;
   std::set<std::string> named_settings;  ///< of `settings`, by their names in the store: these go before kept ones

@@ -220,6 +220,7 @@ class SolveLoop final : public Engine {
   [[nodiscard]] Result<SharedBytes> makeExr(std::uint32_t page, Quantity quantity);
 
   EngineOptions options_;
+  scene::ImportLimits limits_;
   CommandQueue queue_;
   Listeners listeners_;
   Watches watches_;

@@ -127,7 +127,7 @@ Result<PatchOutcome> SolveLoop::applyRequest(const PatchRequest& request) {
   if (auto ok = checkScene(request.same_scene_as); !ok) return tl::unexpected<Error>(ok.error());
   const auto patch = nlohmann::json::parse(request.patch, nullptr, false);
   if (patch.is_discarded()) return fail(ErrorCode::kBadInput, "the patch is not JSON");
-  auto edited = scene::editDocument(lit_->document(), patch, request.find_upload);
+  auto edited = scene::editDocument(lit_->document(), patch, request.find_upload, limits_);
   if (!edited) return tl::unexpected<Error>(edited.error());
   configureScene(edited->scene, settings_);
   if (request.dry_run) {
@@ -149,7 +149,7 @@ Result<PatchOutcome> SolveLoop::applyStep(const StepRequest& request) {
   if (auto ok = checkBase(request.base_revision); !ok) return tl::unexpected<Error>(ok.error());
   auto step = history_.step(request.redo, lit_->document());
   if (!step) return tl::unexpected<Error>(step.error());
-  auto edited = scene::importEdited(std::move(step->document), &lit_->document());
+  auto edited = scene::importEdited(std::move(step->document), &lit_->document(), limits_);
   if (!edited) return tl::unexpected<Error>(edited.error());
   configureScene(edited->scene, settings_);
   auto next = history_.nextStep(revision_ + 1, request.by, request.redo);
@@ -269,7 +269,7 @@ Result<SolveSettings> SolveLoop::applySettings(const SolveSettings& settings) {
                     before.link_memory_bytes != settings.link_memory_bytes;
   if (lit_ && reshaped) {  // which may fail: only what can be lit is kept
     const auto keep = [&](const LitScene&, const LitScene::Affected&) { return keepSettings(settings); };
-    auto made = withinMemory([&] { return LitScene::make(lit_->document(), settings, *transport_); });
+    auto made = withinMemory([&] { return LitScene::make(lit_->document(), settings, *transport_, limits_); });
     const auto relation = anew ? Relation::kSolvedAnew : Relation::kEdited;
     if (const auto lit = relight(std::move(made), relation, keep); !lit) {
       updateStatus(true);

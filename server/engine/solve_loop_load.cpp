@@ -41,13 +41,13 @@ void SolveLoop::load(Callback<LoadOutcome> done, std::function<LoadBegun()> begi
 
 void SolveLoop::loadBytes(std::string name, SharedBytes bytes, std::string by, Callback<LoadOutcome> done) {
   load(std::move(done), [this, name = std::move(name), bytes = std::move(bytes), by = std::move(by)] {
-    return install(scene::parseDocument(name, *bytes), by);
+    return install(scene::parseDocument(name, *bytes, limits_), by);
   });
 }
 
 void SolveLoop::loadFile(std::string path, std::string by, Callback<LoadOutcome> done) {
   load(std::move(done),
-       [this, path = std::move(path), by = std::move(by)] { return install(scene::loadDocument(path), by); });
+       [this, path = std::move(path), by = std::move(by)] { return install(scene::loadDocument(path, limits_), by); });
 }
 
 auto SolveLoop::install(Result<scene::Document> document, const std::string& by) -> LoadBegun {
@@ -60,7 +60,7 @@ auto SolveLoop::install(Result<scene::Document> document, const std::string& by)
     return tl::unexpected<Error>(error);
   };
   updateStatus(true);
-  auto edited = withinMemory([&] { return scene::importEdited(std::move(*document), nullptr); });
+  auto edited = withinMemory([&] { return scene::importEdited(std::move(*document), nullptr, limits_); });
   if (!edited) return refuse(edited.error());
   if (wantsFirstLight(edited->scene)) {
     if (withinMemory([&] { return showFirstLight(*edited, by); })) return std::nullopt;

@@ -138,7 +138,7 @@ Result<void> SolveLoop::restoreSolve(const scene::Document& document) {
 /// command line hold.
 Result<void> SolveLoop::lightKept(const scene::Document& document) {
   const auto light = [&](const SolveSettings& settings) {
-    auto made = withinMemory([&] { return LitScene::make(document, settings, *transport_); });
+    auto made = withinMemory([&] { return LitScene::make(document, settings, *transport_, limits_); });
     return relight(std::move(made), Relation::kOther);
   };
   auto lit = light(settings_);
@@ -172,12 +172,12 @@ Result<std::unique_ptr<LitScene>> SolveLoop::resumedScene(const scene::Document&
   if (then.gltf.is_discarded()) return fail(ErrorCode::kBadInput, "its document is no JSON");
   auto settings = settings_;
   settings.target_error = head.target_error;
-  auto lit = LitScene::makeAgain(std::move(then), settings, *transport_, head.sides);
+  auto lit = LitScene::makeAgain(std::move(then), settings, *transport_, head.sides, limits_);
   if (!lit) return lit;
   (void)(*lit)->startSolve();
   if (!(*lit)->restore(from)) return fail(ErrorCode::kBadInput, "it does not fit the scene");
   if (!is_newest) {  // the solve can take in whatever has changed of light and colour since
-    auto scene = scene::importScene(document);
+    auto scene = scene::importScene(document, limits_);
     if (!scene) return tl::unexpected<Error>(scene.error());
     configureScene(*scene, settings);
     const auto change = (*lit)->changeTo(*scene);
@@ -199,7 +199,7 @@ bool SolveLoop::goesOnWith(const scene::Document& document, bool with_edits) con
 /// What was kept was promised to those who made it: a restart with the same command must not take it from them.
 void SolveLoop::openFile(std::string path, bool anew, Callback<LoadOutcome> done) {
   load(std::move(done), [this, path = std::move(path), anew]() -> LoadBegun {
-    auto document = scene::loadDocument(path);
+    auto document = scene::loadDocument(path, limits_);
     if (!document || !as_restored_ || anew) return install(std::move(document), {});
     if (!goesOnWith(*document, true))
       log::warn(

@@ -206,23 +206,34 @@ std::optional<RayHit> Bvh::leastHit(const glm::dvec3& origin, const glm::dvec3& 
                                     std::uint32_t end, const std::function<bool(const RayHit&)>& counts) const {
   if (triangles_.empty()) return std::nullopt;
   const SlabRay ray(origin, direction, t_min, t_max);
-  std::array<std::uint32_t, kStackDepth> stack;
-  std::size_t depth = 0;
-  stack[depth++] = 0;
+  // Best first: boxes of many triangles in one place all hold it, also those of halves of squares that it is not in.
+  struct Waiting {
+    std::uint32_t least, node;
+  };
+  const auto isLater = [](const Waiting& a, const Waiting& b) {
+    return a.least != b.least ? a.least > b.least : a.node > b.node;
+  };
+  std::vector<Waiting> waiting;
+  const auto wait = [&](std::uint32_t node) {
+    if (least[node] > end || !ray.meets(nodes_[node].min, nodes_[node].max)) return;
+    waiting.push_back({least[node], node});
+    std::ranges::push_heap(waiting, isLater);
+  };
+  wait(0);
   std::optional<RayHit> found;
   std::uint32_t found_in = 0;  // collectHits() comes to later parts of the list first
   const auto isEarlier = [&](std::uint32_t tag, std::uint32_t part) {
     return found ? tag < tags[found->triangle] || (tag == tags[found->triangle] && part > found_in) : tag < end;
   };
-  while (depth > 0) {
-    const auto index = stack[--depth];
-    const Node& node = nodes_[index];
-    if ((found ? least[index] > tags[found->triangle] : least[index] >= end) || !ray.meets(node.min, node.max))
-      continue;
+  while (!waiting.empty()) {
+    std::ranges::pop_heap(waiting, isLater);
+    const auto next = waiting.back();
+    waiting.pop_back();
+    if (found ? next.least > tags[found->triangle] : next.least >= end) break;
+    const Node& node = nodes_[next.node];
     if (node.count == 0) {
-      const std::uint32_t later = least[node.first] < least[node.first + 1] ? 1 : 0;
-      stack[depth++] = node.first + later;
-      stack[depth++] = node.first + 1 - later;
+      wait(node.first);
+      wait(node.first + 1);
       continue;
     }
     for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
@@ -377,13 +388,15 @@ bool Bvh::holdsOne(const glm::vec3& box_min, const glm::vec3& box_max) const {
   });
 }
 
-void Bvh::collectNear(const glm::vec3& box_min, const glm::vec3& box_max, std::vector<std::uint32_t>& triangles) const {
-  (void)anyTriangle(box_min, box_max, [&](std::uint32_t i) {
+bool Bvh::collectNear(const glm::vec3& box_min, const glm::vec3& box_max, std::size_t most,
+                      std::vector<std::uint32_t>& triangles) const {
+  const auto room = triangles.size() + most;
+  return !anyTriangle(box_min, box_max, [&](std::uint32_t i) {
     const auto& [a, b, c] = triangles_[i];
     const auto low = glm::min(glm::min(a, b), c), high = glm::max(glm::max(a, b), c);
     if (glm::all(glm::lessThanEqual(low, box_max)) && glm::all(glm::lessThanEqual(box_min, high)))
       triangles.push_back(order_[i]);
-    return false;
+    return triangles.size() > room;
   });
 }
 

@@ -76,8 +76,10 @@ class Bvh {
   /// Whether a triangle lies wholly in the box.
   [[nodiscard]] bool holdsOne(const glm::vec3& box_min, const glm::vec3& box_max) const;
 
-  /// Numbers of the triangles whose bounds reach into the box.
-  void collectNear(const glm::vec3& box_min, const glm::vec3& box_max, std::vector<std::uint32_t>& triangles) const;
+  /// Numbers of the triangles whose bounds reach into the box. False: they are more than `most`, of which some are
+  /// told.
+  [[nodiscard]] bool collectNear(const glm::vec3& box_min, const glm::vec3& box_max, std::size_t most,
+                                 std::vector<std::uint32_t>& triangles) const;
 
   [[nodiscard]] bool empty() const { return triangles_.empty(); }
   [[nodiscard]] std::size_t size() const { return triangles_.size(); }

@@ -205,7 +205,8 @@ bool overlaps(const Triangle2& a, const Triangle2& b) {
 /// Uniform grid over triangles' bounds; about one triangle a cell.
 class OverlapGrid {
  public:
-  explicit OverlapGrid(const std::vector<Triangle2>& triangles) : triangles_(triangles), layer_(triangles.size(), 0) {
+  explicit OverlapGrid(const std::vector<Triangle2>& triangles)
+      : triangles_(triangles), layer_(triangles.size(), 0), left_(kStepsEach * triangles.size() + kStepsAtLeast) {
     glm::dvec2 low(std::numeric_limits<double>::infinity()), high(-std::numeric_limits<double>::infinity());
     for (const auto& t : triangles)
       for (const auto& p : t) {
@@ -223,10 +224,11 @@ class OverlapGrid {
     cells_.resize(static_cast<std::size_t>(count_[0]) * static_cast<std::size_t>(count_[1]));
   }
 
-  /// Puts triangle `t` into the first layer where it meets nothing.
+  /// Puts triangle `t` into the first layer where it meets nothing; once too much was looked at, into one of its own.
   void insert(std::uint32_t t) {
     std::vector<bool> blocked;
     forCells(triangles_[t], [&](std::vector<std::uint32_t>& cell) {
+      if (!spend(2 * (1 + cell.size()))) return;  // the triangle is put there, too
       for (const std::uint32_t other : cell) {
         if (layer_[other] < blocked.size() && blocked[layer_[other]]) continue;
         if (!overlaps(triangles_[t], triangles_[other])) continue;
@@ -234,13 +236,25 @@ class OverlapGrid {
         blocked[layer_[other]] = true;
       }
     });
+    if (left_ == 0) {
+      layer_[t] = layer_count_++;
+      return;
+    }
     layer_[t] = static_cast<std::uint32_t>(std::find(blocked.begin(), blocked.end(), false) - blocked.begin());
+    layer_count_ = std::max(layer_count_, layer_[t] + 1);
     forCells(triangles_[t], [&](std::vector<std::uint32_t>& cell) { cell.push_back(t); });
   }
 
   [[nodiscard]] const std::vector<std::uint32_t>& layers() const { return layer_; }
 
  private:
+  /// So many steps a triangle, and some whatever their number is. Most triangles take ten or so; discs of thousands
+  /// that meet in one corner, and slivers across the plane, would take the square of their number.
+  static constexpr std::size_t kStepsEach = 128, kStepsAtLeast = std::size_t{1} << 22U;
+  [[nodiscard]] bool spend(std::size_t steps) {
+    left_ -= std::min(left_, steps);
+    return left_ > 0;
+  }
   [[nodiscard]] int cellOf(double value, int axis) const {
     return std::clamp(static_cast<int>((value - low_[axis]) * inverse_[axis]), 0, count_[axis] - 1);
   }
@@ -248,7 +262,7 @@ class OverlapGrid {
   void forCells(const Triangle2& t, const Function& function) {
     const glm::dvec2 low = glm::min(glm::min(t[0], t[1]), t[2]);
     const glm::dvec2 high = glm::max(glm::max(t[0], t[1]), t[2]);
-    for (int y = cellOf(low.y, 1); y <= cellOf(high.y, 1); ++y)
+    for (int y = cellOf(low.y, 1); y <= cellOf(high.y, 1) && left_ > 0; ++y)
       for (int x = cellOf(low.x, 0); x <= cellOf(high.x, 0); ++x)
         function(
             cells_[static_cast<std::size_t>(y) * static_cast<std::size_t>(count_[0]) + static_cast<std::size_t>(x)]);
@@ -256,6 +270,8 @@ class OverlapGrid {
 
   const std::vector<Triangle2>& triangles_;
   std::vector<std::uint32_t> layer_;
+  std::uint32_t layer_count_ = 0;
+  std::size_t left_;  ///< steps that may still be taken
   glm::dvec2 low_{0.0};
   std::array<int, 2> count_{1, 1};
   std::array<double, 2> inverse_{1.0, 1.0};

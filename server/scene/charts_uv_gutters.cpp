@@ -11,6 +11,7 @@
 
 #include "server/scene/atlas.h"
 #include "server/scene/charts.h"
+#include "server/scene/triangle_rows.h"
 
 namespace radiosity::scene {
 namespace {
@@ -23,25 +24,15 @@ constexpr double kReach = 0.999;
 /// Islands that continue each other put the same place of the surface at a texel to within so many texels.
 constexpr double kSamePlace = 1.0;
 
+/// Rows of triangles that are looked at, and pairs of these a row, in the mean: layouts of a million triangles have
+/// fewer. Slivers from end to end of a page would take gigabytes, and such a layout is of no use.
+constexpr std::size_t kMostSpans = std::size_t{1} << 23U, kPairsASpan = 32;
+
 /// Texels of a row that lookups on a triangle read.
 struct Span {
   std::int32_t row, first, last;
   std::uint32_t chart, triangle;  ///< triangle: of its chart
 };
-
-/// Extent along x of the part of a triangle whose y is in [low, high]; empty where x > y.
-glm::dvec2 extentWithin(const Triangle2& t, double low, double high) {
-  glm::dvec2 extent(std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity());
-  const auto add = [&](double x) { extent = {std::min(extent.x, x), std::max(extent.y, x)}; };
-  for (std::size_t k = 0; k < 3; ++k) {
-    const auto &a = t[k], &b = t[(k + 1) % 3];
-    if (a.y >= low && a.y <= high) add(a.x);
-    for (const double y : {low, high})
-      if ((a.y < y) != (b.y < y))
-        add(std::clamp(a.x + (b.x - a.x) * (y - a.y) / (b.y - a.y), std::min(a.x, b.x), std::max(a.x, b.x)));
-  }
-  return extent;
-}
 
 std::int32_t firstIndex(double low) { return static_cast<std::int32_t>(std::ceil(low - kReach - 0.5)); }
 std::int32_t lastIndex(double high) { return static_cast<std::int32_t>(std::floor(high + kReach - 0.5)); }
@@ -69,14 +60,18 @@ class Islands {
     texel_ = 1.0 / (resolution_ * density);
   }
 
-  /// O(n log n) for texels and triangles together.
+  /// O(n log n) for texels and triangles together. Also true where that would be too much to look at.
   [[nodiscard]] bool bleed() const {
     auto spans = allSpans();
+    if (spans.size() > kMostSpans) return true;
+    auto left = kPairsASpan * spans.size();
     std::ranges::sort(spans, [](const Span& a, const Span& b) {
       return std::tie(a.row, a.first, a.chart, a.triangle) < std::tie(b.row, b.first, b.chart, b.triangle);
     });
     std::vector<const Span*> open;  // of each chart the one that ends last
     for (const Span& span : spans) {
+      if (left < open.size()) return true;
+      left -= open.size();
       std::erase_if(open, [&](const Span* other) { return other->row != span.row || other->last < span.first; });
       bool own = false;
       for (const Span*& other : open) {
@@ -93,6 +88,7 @@ class Islands {
   }
 
  private:
+  /// Some of them where they are more than kMostSpans.
   [[nodiscard]] std::vector<Span> allSpans() const {
     std::vector<Span> spans;
     for (std::uint32_t c = 0; c < charts_.size(); ++c)
@@ -103,6 +99,7 @@ class Islands {
         for (auto row = firstIndex(low); row <= lastIndex(high); ++row) {
           const auto extent = extentWithin(t, row + 0.5 - kReach, row + 0.5 + kReach);
           if (extent.x > extent.y) continue;
+          if (spans.size() > kMostSpans) return spans;
           spans.push_back({row, firstIndex(extent.x), lastIndex(extent.y), c, i});
         }
       }

@@ -19,6 +19,8 @@ namespace {
 constexpr std::size_t kMeasuredAtOnce = 65536, kLeavesATurn = 16, kFewestTries = 16;
 /// Surfaces, likewise.
 constexpr std::size_t kFewestSurfaces = 32;
+/// Hits::work, 2 or 3 s of one core, of leaves that nothing comes near: each surface has its share.
+constexpr std::uint64_t kUniformWork = 400'000'000;
 /// Of more leaves it is not kept how they were found, nor where that takes more, and from more places than these rays
 /// were cast for hardly any.
 constexpr std::size_t kMostRecorded = 80'000, kMostRecordedBytes = std::size_t{16} << 20, kMostFans = 64;
@@ -134,6 +136,7 @@ class Burial {
   /// Splits a surface into nodes that no other solid comes near (all visible or all buried: one test, if it is clear)
   /// and single leaves in contact with one, or with an earlier surface that covers some of them.
   void classify(std::uint32_t s, Hits& hits, Split& split) const {
+    hits.work = 0;
     const NodeBoxes boxes(patches_, s, pieces_, leaves_);
     const Surface& surface = patches_.surfaces[s];
     for (std::uint32_t side = 0; side < 2; ++side)
@@ -160,20 +163,25 @@ class Burial {
   }
 
   /// Nothing comes near: where one place is visible and no ray disagreed all are. What is buried is asked leaf by leaf,
-  /// since it loses all its light: models are open at their ends, and a chart may pass through itself.
+  /// since it loses all its light: models are open at their ends, and a chart may pass through itself. Where that takes
+  /// too long, thousands of solids one within the other, the others are as the last that was asked.
   void settleUniform(const Contact& node, std::uint32_t level, Hits& hits, Split& split) const {
     const Surface& surface = patches_.surfaces[node.surface];
     const std::uint32_t x_end = std::min((node.x + 1) << level, surface.width);
     const std::uint32_t y_end = std::min((node.y + 1) << level, surface.height);
-    bool is_first = true;
+    const auto most = kUniformWork / patches_.surfaces.size();
+    bool is_first = true, is_buried = false;
     for (std::uint32_t y = node.y << level; y < y_end; ++y)
       for (std::uint32_t x = node.x << level; x < x_end; ++x) {
         const Contact leaf{node.surface, node.side, x, y};
         const LeafPoint& point = patches_.leaves[leaves_.leafOf(leaf)];
         if (point.triangle == kNone) continue;
-        const auto answer = leaves_.ask(point.triangle, glm::dvec2(point.texel), node.side, hits);
-        if (std::exchange(is_first, false) && !answer.buried && answer.agreed) return;
-        if (answer.buried) split.buried.push_back({leaves_.leafOf(leaf), node.side, {}, {}, 0.0F});
+        if (is_first || hits.work < most) {
+          const auto answer = leaves_.ask(point.triangle, glm::dvec2(point.texel), node.side, hits);
+          if (std::exchange(is_first, false) && !answer.buried && answer.agreed) return;
+          is_buried = answer.buried;
+        }
+        if (is_buried) split.buried.push_back({leaves_.leafOf(leaf), node.side, {}, {}, 0.0F});
       }
   }
 

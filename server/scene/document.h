@@ -26,6 +26,8 @@ struct ImportLimits {
   std::size_t max_vertices = std::size_t{1} << 26;      ///< all accessors together
   std::size_t max_triangles = std::size_t{1} << 24;     ///< after instancing
   std::size_t max_nodes = std::size_t{1} << 20;
+  /// All that a scene claims, about, summed up before it is made; 0: a quarter of the memory there is.
+  std::uint64_t max_scene_bytes = 0;
 };
 
 struct ImportRecord;  // import_record.h

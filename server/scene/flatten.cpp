@@ -134,13 +134,28 @@ class InstanceFlattener {
 
  private:
   void transform() {
-    positions_.resize(primitive_.positions.size());
+    findUsed();
+    const auto count = used_.empty() ? primitive_.positions.size() : used_.size();
+    positions_.resize(count);
+    for (std::size_t i = 0; i < count; ++i)
+      positions_[i] =
+          (toWorld(instance_, primitive_.positions[used_.empty() ? i : used_[i]]) - flat_.centre) / flat_.scale;
     Box box;
-    for (std::size_t i = 0; i < positions_.size(); ++i)
-      positions_[i] = (toWorld(instance_, primitive_.positions[i]) - flat_.centre) / flat_.scale;
     for (const std::uint32_t index : primitive_.indices)
-      if (isFinite(positions_[index])) box.add(positions_[index]);
+      if (const auto& position = positions_[numberOf(index)]; isFinite(position)) box.add(position);
     extent_ = box.extent();
+  }
+
+  /// Many primitives may share one long list of vertices: an instance costs no more than its triangles.
+  void findUsed() {
+    if (primitive_.positions.size() <= primitive_.indices.size()) return;
+    used_ = primitive_.indices;
+    std::ranges::sort(used_);
+    used_.erase(std::unique(used_.begin(), used_.end()), used_.end());
+  }
+  [[nodiscard]] std::uint32_t numberOf(std::uint32_t vertex) const {
+    if (used_.empty()) return vertex;
+    return static_cast<std::uint32_t>(std::ranges::lower_bound(used_, vertex) - used_.begin());
   }
 
   void addTriangle(std::uint32_t source, Welder& welder, double tolerance) {
@@ -149,7 +164,7 @@ class InstanceFlattener {
     triangle.source = source;
     for (std::uint32_t corner = 0; corner < 3; ++corner) {
       const std::uint32_t from = mirrored_ ? (3 - corner) % 3 : corner;
-      const std::uint32_t index = primitive_.indices[std::size_t{3} * source + from];
+      const std::uint32_t index = numberOf(primitive_.indices[std::size_t{3} * source + from]);
       if (!isFinite(positions_[index])) {
         ++flat_.dropped;
         return;
@@ -198,8 +213,9 @@ class InstanceFlattener {
   const Primitive& primitive_;
   bool mirrored_;
   double extent_ = 0.0;
-  std::vector<glm::dvec3> positions_;
-  std::vector<std::uint32_t> welded_;
+  std::vector<std::uint32_t> used_;    ///< vertices that triangles have, ascending; empty: all
+  std::vector<glm::dvec3> positions_;  ///< of these
+  std::vector<std::uint32_t> welded_;  ///< likewise
 };
 
 struct HalfEdge {

@@ -192,14 +192,14 @@ Result<void> checkTree(const ImportContext& context) {
   if (lost != reached.end()) {
     return context.bad("/nodes/" + std::to_string(lost - reached.begin()) + "/children", "nodes form a cycle");
   }
+  std::vector<std::size_t> listed_by(nodes.size(), context.model.scenes.size());  // scenes, one after the other
   for (std::size_t s = 0; s < context.model.scenes.size(); ++s) {
-    std::vector<bool> listed(nodes.size(), false);
     for (std::size_t i = 0; i < context.model.scenes[s].nodes.size(); ++i) {
       const auto node = static_cast<std::size_t>(context.model.scenes[s].nodes[i]);
       const auto pointer = "/scenes/" + std::to_string(s) + "/nodes/" + std::to_string(i);
       if (parents[node] != kNoParent) return context.bad(pointer, notRoot(node, parents[node], pointer));
-      if (listed[node]) return context.bad(pointer, "is listed twice");
-      listed[node] = true;
+      if (listed_by[node] == s) return context.bad(pointer, "is listed twice");
+      listed_by[node] = s;
     }
   }
   return {};

@@ -21,6 +21,7 @@ struct ImportContext {
   const ImportRecord* before;  ///< of the document before an edit; null: none, or not known
   DecodedImages& images;       ///< gets those that are used
   Scene& scene;
+  std::uint64_t claimed_bytes = 0;  ///< of memory, by all but images (scene_memory.h)
 
   void warn(std::string_view pointer, std::string_view what) {
     scene.warnings.push_back(place(document.name, pointer) + ": " + std::string(what));

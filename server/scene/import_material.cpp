@@ -8,6 +8,7 @@
 #include <string>
 
 #include "server/scene/image_decode.h"
+#include "server/scene/image_plan.h"
 #include "server/scene/texture_references.h"
 
 namespace radiosity::scene {
@@ -18,15 +19,12 @@ constexpr int kClamp = 33071;
 constexpr int kMirror = 33648;
 constexpr int kNearest = 9728;
 constexpr const char* kSpecularGlossiness = "KHR_materials_pbrSpecularGlossiness";
-// All images together; one image may have max_image_pixels.
-constexpr std::size_t kTotalImageBudget = 8;
 
 float unit(double value) { return static_cast<float>(std::clamp(value, 0.0, 1.0)); }
 
 class MaterialImporter {
  public:
-  explicit MaterialImporter(ImportContext& context)
-      : context_(context), pixels_left_(context.limits.max_image_pixels * kTotalImageBudget) {}
+  MaterialImporter(ImportContext& context, const ImagePlan& plan) : context_(context), plan_(plan) {}
 
   Result<void> add(std::size_t index) {
     pointer_ = "/materials/" + std::to_string(index);
@@ -221,25 +219,28 @@ class MaterialImporter {
     return {};
   }
 
-  [[nodiscard]] std::size_t limit() const { return std::min(context_.limits.max_image_pixels, pixels_left_); }
-
-  Result<Texture> decode(std::size_t image) const {
-    return decodeImage(*context_.document.images[image], limit(),
-                       place(context_.document.name, "/images/" + std::to_string(image)));
+  /// As large as it is to be held.
+  Result<Texture> decode(std::size_t image, bool srgb) const {
+    auto texture = decodeImage(*context_.document.images[image], context_.limits.max_image_pixels,
+                               place(context_.document.name, "/images/" + std::to_string(image)));
+    if (!texture) return texture;
+    texture->srgb = srgb;
+    halve(*texture, plan_.halvings[image]);
+    return texture;
   }
 
-  /// What the document before had of the same bytes, if it still fits.
+  /// What the document before had of the same bytes, if it is as large.
   [[nodiscard]] const DecodedImage* known(std::size_t image) const {
     if (context_.before == nullptr) return nullptr;
     const auto found = context_.before->images.find(context_.document.images[image]);
-    return found != context_.before->images.end() && found->second.pixels <= limit() ? &found->second : nullptr;
+    if (found == context_.before->images.end() || found->second.halvings != plan_.halvings[image]) return nullptr;
+    return &found->second;
   }
 
-  /// Where it is kept for the next edit, of so many pixels.
-  DecodedImage& keep(std::size_t image, std::size_t pixels) {
-    pixels_left_ -= pixels;
+  /// Where it is kept for the next edit.
+  DecodedImage& keep(std::size_t image) {
     auto& kept = context_.images[context_.document.images[image]];
-    kept.pixels = pixels;
+    kept.halvings = plan_.halvings[image];
     return kept;
   }
 
@@ -248,11 +249,11 @@ class MaterialImporter {
     const auto* before = known(image);
     auto color = before != nullptr ? before->color : nullptr;
     if (!color) {
-      auto texture = decode(image);
+      auto texture = decode(image, true);
       if (!texture) return tl::unexpected(texture.error());
       color = std::make_shared<const Texture>(std::move(*texture));
     }
-    keep(image, color->rgba.size() / 4).color = color;
+    keep(image).color = color;
     const auto index = static_cast<std::uint32_t>(context_.scene.textures.size());
     context_.scene.textures.push_back(std::move(color));
     color_textures_[image] = index;
@@ -280,16 +281,13 @@ class MaterialImporter {
     const auto* before = known(image);
     auto data = before != nullptr ? before->data : nullptr;
     auto blue = before != nullptr ? before->blue : std::nullopt;
-    auto pixels = before != nullptr ? before->pixels : 0;
     if (!data && !blue) {
-      auto texture = decode(image);
+      auto texture = decode(image, false);
       if (!texture) return tl::unexpected(texture.error());
-      texture->srgb = false;
-      pixels = texture->rgba.size() / 4;
       blue = sameBlue(*texture);
       if (!blue) data = std::make_shared<const Texture>(std::move(*texture));
     }
-    auto& kept = keep(image, pixels);
+    auto& kept = keep(image);
     kept.data = data;
     kept.blue = blue;
     if (blue) return DataTexture{kNone, blue};
@@ -305,7 +303,7 @@ class MaterialImporter {
   }
 
   ImportContext& context_;
-  std::size_t pixels_left_;
+  const ImagePlan& plan_;
   std::string pointer_;
   std::map<std::size_t, std::uint32_t> color_textures_;  ///< by image
   std::map<std::size_t, DataTexture> data_textures_;     ///< by image
@@ -316,7 +314,12 @@ class MaterialImporter {
 }  // namespace
 
 Result<void> importMaterials(ImportContext& context) {
-  MaterialImporter importer(context);
+  const auto plan = planImages(context.document, context.claimed_bytes, context.limits);
+  if (!plan) return tl::unexpected(plan.error());
+  if (plan->halved > 0)
+    context.warn("/images", std::to_string(plan->halved) + " images are so large together that they are read at half " +
+                                "their width and height, or less");
+  MaterialImporter importer(context, *plan);
   for (std::size_t i = 0; i < context.materials.size(); ++i) {
     if (auto ok = importer.add(i); !ok) return ok;
   }

@@ -83,20 +83,31 @@ void addZeroView(Json& gltf) {
   }
 }
 
-/// `gltf`: as it was parsed.
-bool sameShape(const tinygltf::Model& model, const Json& gltf) {
+/// How many entries the lists of a model have, and how many primitives each of its meshes.
+struct Shape {
+  std::array<std::size_t, 9> lists{};
+  std::vector<std::size_t> primitives;
+
+  bool operator==(const Shape&) const = default;
+};
+
+Shape shapeOf(const Json& gltf) {
   const auto size = [&](const char* list) { return gltf.contains(list) ? gltf[list].size() : 0; };
-  if (model.nodes.size() != size("nodes") || model.meshes.size() != size("meshes") ||
-      model.materials.size() != size("materials") || model.accessors.size() != size("accessors") ||
-      model.textures.size() != size("textures") || model.cameras.size() != size("cameras") ||
-      model.bufferViews.size() != size("bufferViews") || model.samplers.size() != size("samplers") ||
-      model.scenes.size() != size("scenes")) {
-    return false;
-  }
-  for (std::size_t m = 0; m < model.meshes.size(); ++m) {
-    if (model.meshes[m].primitives.size() != gltf["meshes"][m]["primitives"].size()) return false;
-  }
-  return true;
+  Shape shape{{size("nodes"), size("meshes"), size("materials"), size("accessors"), size("textures"), size("cameras"),
+               size("bufferViews"), size("samplers"), size("scenes")},
+              {}};
+  if (!gltf.contains("meshes")) return shape;
+  for (const auto& mesh : gltf["meshes"]) shape.primitives.push_back(mesh["primitives"].size());
+  return shape;
+}
+
+Shape shapeOf(const tinygltf::Model& model) {
+  Shape shape{
+      {model.nodes.size(), model.meshes.size(), model.materials.size(), model.accessors.size(), model.textures.size(),
+       model.cameras.size(), model.bufferViews.size(), model.samplers.size(), model.scenes.size()},
+      {}};
+  for (const auto& mesh : model.meshes) shape.primitives.push_back(mesh.primitives.size());
+  return shape;
 }
 
 /// Nothing may be opened: everything that tinygltf needs is in the text.
@@ -116,10 +127,12 @@ bool refuseImage(tinygltf::Image*, int, std::string*, std::string*, int, int, co
 Result<tinygltf::Model> parse(const Document& document, std::span<const Part* const> parsed) {
   auto json = reduced(document.gltf, parsed);
   if (std::ranges::find(parsed, &kParts[0]) != parsed.end()) addZeroView(json);
+  const auto shape = shapeOf(json);
   const auto text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
   if (text.size() > std::numeric_limits<unsigned>::max()) {
     return fail(ErrorCode::kTooLarge, "JSON has more than 4 GiB", document.name);
   }
+  json = nullptr;  // of a million nodes it takes a gigabyte, and the parser makes another of its own
   tinygltf::TinyGLTF loader;
   loader.SetFsCallbacks(closedFileSystem());
   loader.SetImageLoader(refuseImage, nullptr);
@@ -128,7 +141,7 @@ Result<tinygltf::Model> parse(const Document& document, std::span<const Part* co
   std::string warning;
   const bool ok =
       loader.LoadASCIIFromString(&model, &error, &warning, text.c_str(), static_cast<unsigned>(text.size()), "");
-  if (!ok || !sameShape(model, json)) {
+  if (!ok || shapeOf(model) != shape) {
     return fail(ErrorCode::kInvalidScene, "tinygltf cannot read it: " + error, place(document.name, "/"));
   }
   return model;

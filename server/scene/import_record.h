@@ -4,6 +4,7 @@
 #include <tiny_gltf.h>
 
 #include <cstddef>
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <optional>
@@ -18,7 +19,7 @@ struct DecodedImage {
   SharedList<Texture>::Element color;  ///< sRGB; null: not asked for
   SharedList<Texture>::Element data;   ///< linear; null: not asked for, or blue is the same all over
   std::optional<float> blue;           ///< 0 to 1: that which is the same all over
-  std::size_t pixels = 0;
+  std::uint8_t halvings = 0;           ///< of width and height (ImagePlan)
 };
 /// By the bytes that they are decoded from, which so stay those of that image.
 using DecodedImages = std::map<SharedBytes, DecodedImage>;
@@ -26,8 +27,9 @@ using DecodedImages = std::map<SharedBytes, DecodedImage>;
 struct ImportRecord {
   std::shared_ptr<const tinygltf::Model> model;  ///< but for its materials, which change most often
   std::vector<tinygltf::Material> materials;
-  DecodedImages images;  ///< that the materials use
-  Scene scene;           ///< shares what is large with the one that was imported
+  DecodedImages images;             ///< that the materials use
+  std::uint64_t claimed_bytes = 0;  ///< of memory, by all but images
+  Scene scene;                      ///< shares what is large with the one that was imported
   /// Of its warnings, how many there were after each step.
   struct Warnings {
     std::size_t checks = 0, materials = 0, nodes = 0;

@@ -11,6 +11,7 @@
 #include "server/scene/import_nodes.h"
 #include "server/scene/import_record.h"
 #include "server/scene/import_schema.h"
+#include "server/scene/scene_memory.h"
 
 namespace radiosity::scene {
 namespace {
@@ -26,12 +27,17 @@ Result<Scene> importAll(const Document& document, const Document* former, const 
   Scene scene;
   if (auto ok = checkSchema(document.gltf, document.name, scene.warnings); !ok) return tl::unexpected(ok.error());
   if (auto ok = checkExtensions(document.gltf, document.name, scene.warnings); !ok) return tl::unexpected(ok.error());
+  const auto claimed = claimOfJson(document, limits);
+  if (!claimed) return tl::unexpected(claimed.error());
   auto parsed = parseModel(document, before != nullptr ? &former->gltf : nullptr, before);
   if (!parsed) return tl::unexpected(parsed.error());
   record.materials = std::move(parsed->materials);
   record.model = std::make_shared<const tinygltf::Model>(std::move(*parsed));
   ImportContext context{document, limits, *record.model, record.materials, before, record.images, scene};
   if (auto ok = checkModel(context); !ok) return tl::unexpected(ok.error());
+  const auto all = claimOfGeometry(document, *record.model, *claimed, limits);
+  if (!all) return tl::unexpected(all.error());
+  record.claimed_bytes = context.claimed_bytes = *all;
   record.warnings.checks = scene.warnings.size();
   if (auto ok = importMaterials(context); !ok) return tl::unexpected(ok.error());
   record.warnings.materials = scene.warnings.size();
@@ -75,6 +81,7 @@ Result<Scene> importWithOtherMaterials(const Document& document, const ImportRec
   if (!materials) return tl::unexpected(materials.error());
   record.materials = std::move(*materials);
   record.model = before.model;
+  record.claimed_bytes = before.claimed_bytes;
   record.warnings = before.warnings;
   const auto warned = [&, from = before.scene.warnings.begin()](std::size_t count) {
     return from + static_cast<std::ptrdiff_t>(count);
@@ -84,6 +91,7 @@ Result<Scene> importWithOtherMaterials(const Document& document, const ImportRec
   scene.textures = {};
   scene.warnings.assign(warned(0), warned(before.warnings.checks));
   ImportContext context{document, limits, *record.model, record.materials, &before, record.images, scene};
+  context.claimed_bytes = before.claimed_bytes;
   if (auto ok = importMaterials(context); !ok) return tl::unexpected(ok.error());
   if (scene.materials.size() < before.scene.materials.size())  // that of meshes which name none
     scene.materials.push_back(before.scene.materials.back());

@@ -18,14 +18,14 @@ LeafBurial::LeafBurial(const PatchScene& patches, const std::vector<LeafPiece>& 
 
 Solids::Answer LeafBurial::ask(std::uint32_t triangle, const glm::dvec2& texel, std::uint32_t side, Hits& hits) const {
   const auto position = positionAt(patches_.triangles[triangle], texel);
-  if (coincidence_.covers(triangle, side, position)) return {true, true};
+  if (coincidence_.covers(triangle, side, position, hits.work)) return {true, true};
   return solids_.ask(position, facing(triangle, side), hits);
 }
 
 /// The same of a place on the leaf that is measured.
 bool LeafBurial::isBuried(std::uint32_t triangle, const glm::dvec2& texel, std::uint32_t side, Scratch& scratch) const {
   const auto position = positionAt(patches_.triangles[triangle], texel);
-  if (coincidence_.covers(triangle, side, position)) return true;
+  if (coincidence_.covers(triangle, side, position, scratch.hits.work)) return true;
   return solids_.ask(position, facing(triangle, side), scratch.around, scratch.hits, &scratch.notes).buried;
 }
 

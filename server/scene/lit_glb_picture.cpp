@@ -9,6 +9,8 @@
 #include <glm/vec2.hpp>
 #include <vector>
 
+#include "server/scene/triangle_rows.h"
+
 namespace radiosity::scene {
 namespace {
 
@@ -130,14 +132,17 @@ class SeeThroughPage {
     const auto high = glm::ceil(glm::max(glm::max(corner[0], corner[1]), corner[2]));
     const auto rect =
         clipped({static_cast<int>(low.x), static_cast<int>(low.y), static_cast<int>(high.x), static_cast<int>(high.y)});
-    for (int y = rect.y0; y < rect.y1; ++y)
-      for (int x = rect.x0; x < rect.x1; ++x) {
+    const std::array<glm::dvec2, 3> precise{glm::dvec2(corner[0]), glm::dvec2(corner[1]), glm::dvec2(corner[2])};
+    for (int y = rect.y0; y < rect.y1; ++y) {
+      const auto columns = columnsOf(precise, y, width_);
+      for (int x = std::max(rect.x0, columns.first); x < std::min(rect.x1, columns.end); ++x) {
         const auto middle = glm::vec2(x, y) + 0.5F;
         const auto edge = [&](std::size_t k) {
           return cross(corner[(k + 1) % 3] - corner[k], middle - corner[k]) / twice;
         };
         if (std::min({edge(0), edge(1), edge(2)}) >= -1e-5F) pixel(x, y)[3] = opacityAt(side, x, y);
       }
+    }
   }
 
   const PatchScene& patches_;

@@ -1,6 +1,7 @@
 #include "server/scene/opacity.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -12,6 +13,7 @@
 #include "server/scene/chart_corners.h"
 #include "server/scene/material_of.h"
 #include "server/scene/shade_texture.h"
+#include "server/scene/triangle_rows.h"
 
 namespace radiosity::scene {
 namespace {
@@ -171,8 +173,13 @@ class SurfaceOpacity {
     const auto end_x = std::min(width_, static_cast<std::uint32_t>(std::ceil(std::max(high.x, 0.0))));
     const auto end_y = std::min(end_row, static_cast<std::uint32_t>(std::ceil(std::max(high.y, 0.0))));
     const UvMap uv(c, texcoords());
+    const std::array<glm::dvec2, 3> cells{c.texel[0] * scale, c.texel[1] * scale, c.texel[2] * scale};
     for (auto y = std::max(first_row, static_cast<std::uint32_t>(std::max(low.y, 0.0))); y < end_y; ++y) {
-      for (auto x = static_cast<std::uint32_t>(std::max(low.x, 0.0)); x < end_x; ++x) {
+      const auto columns = columnsOf(cells, static_cast<int>(y), static_cast<int>(width_));
+      const auto end = std::min(end_x, static_cast<std::uint32_t>(columns.end));
+      for (auto x =
+               std::max(static_cast<std::uint32_t>(std::max(low.x, 0.0)), static_cast<std::uint32_t>(columns.first));
+           x < end; ++x) {
         const glm::vec3 w = c.weightsAt((glm::dvec2(x, y) + 0.5) / scale);
         if (std::min({w.x, w.y, w.z}) < -1e-6F) continue;
         cell(x, y) = byteOf(opacityOf(c, uv, glm::dvec2(x, y)));

@@ -6,12 +6,15 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <numeric>
+#include <span>
 #include <string>
 
 #include "server/scene/chart_corners.h"
 #include "server/scene/material_of.h"
 #include "server/scene/patch_scene.h"
 #include "server/scene/shade_layers.h"
+#include "server/scene/triangle_rows.h"
 
 namespace radiosity::scene {
 namespace {
@@ -132,8 +135,12 @@ class MaterialShader {
     const glm::dvec2 high = glm::max(glm::max(c.texel[0], c.texel[1]), c.texel[2]) * double{kSide};
     const auto end_y = std::min(static_cast<int>(std::ceil(high.y)), static_cast<int>(surface_.height) * kSide);
     const auto end_x = std::min(static_cast<int>(std::ceil(high.x)), static_cast<int>(surface_.width) * kSide);
-    for (int y = std::max(0, static_cast<int>(std::floor(low.y))); y < end_y; ++y)
-      for (int x = std::max(0, static_cast<int>(std::floor(low.x))); x < end_x; ++x) {
+    const std::array<glm::dvec2, 3> scaled{c.texel[0] * double{kSide}, c.texel[1] * double{kSide},
+                                           c.texel[2] * double{kSide}};
+    for (int y = std::max(0, static_cast<int>(std::floor(low.y))); y < end_y; ++y) {
+      const auto columns = columnsOf(scaled, y, static_cast<int>(surface_.width) * kSide);
+      for (int x = std::max(columns.first, static_cast<int>(std::floor(low.x))); x < std::min(end_x, columns.end);
+           ++x) {
         const glm::dvec2 p((x + 0.5) / kSide, (y + 0.5) / kSide);
         const glm::vec3 w = c.weightsAt(p);
         if (std::min({w.x, w.y, w.z}) < -1e-6F) continue;
@@ -147,6 +154,7 @@ class MaterialShader {
         sums_[leaf].reflectance += glm::dvec3(value.reflectance) * weight;
         sums_[leaf].weight += weight;
       }
+    }
   }
 
   /// Of the levels above leaves, by what of them is there on the side that begins with node `first`.
@@ -189,28 +197,41 @@ class MaterialShader {
 
 }  // namespace
 
-std::vector<std::uint32_t> reshadeMaterial(const Scene& scene, const PatchScene& patches, std::uint32_t material,
-                                           PatchMaterials& materials) {
-  std::vector<std::uint32_t> surfaces;
-  for (std::uint32_t s = 0; s < patches.surfaces.size(); ++s)
-    if (patches.surfaces[s].material == material) surfaces.push_back(s);
-  if (surfaces.empty()) return surfaces;
+namespace {
+
+/// `surfaces`: those of the material, one at least.
+void shadeSurfaces(const Scene& scene, const PatchScene& patches, std::uint32_t material,
+                   std::span<const std::uint32_t> surfaces, PatchMaterials& materials) {
   MaterialShader shader(scene, patches, material, materials);
   for (const std::uint32_t s : surfaces) shader.shade(s);
   if (shader.wasClamped())
     materials.warnings.push_back(fmt::format("/materials/{} ({}): reflectance above {} was lowered to it", material,
                                              shader.name(), kMaxReflectance));
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> reshadeMaterial(const Scene& scene, const PatchScene& patches, std::uint32_t material,
+                                           PatchMaterials& materials) {
+  std::vector<std::uint32_t> surfaces;
+  for (std::uint32_t s = 0; s < patches.surfaces.size(); ++s)
+    if (patches.surfaces[s].material == material) surfaces.push_back(s);
+  if (!surfaces.empty()) shadeSurfaces(scene, patches, material, surfaces, materials);
   return surfaces;
 }
 
 PatchMaterials shadePatches(const Scene& scene, const PatchScene& patches) {
   PatchMaterials materials;
   materials.emission = materials.reflectance = SideColours(patches);
-  std::vector<std::uint32_t> used;
-  for (const Surface& surface : patches.surfaces) used.push_back(surface.material);
-  std::ranges::sort(used);
-  used.erase(std::unique(used.begin(), used.end()), used.end());
-  for (const std::uint32_t material : used) reshadeMaterial(scene, patches, material, materials);
+  std::vector<std::uint32_t> order(patches.surfaces.size());
+  std::iota(order.begin(), order.end(), 0U);
+  const auto materialOf = [&](std::uint32_t s) { return patches.surfaces[s].material; };
+  std::ranges::stable_sort(order, {}, materialOf);
+  for (auto first = order.begin(), end = first; first != order.end(); first = end) {
+    const auto material = materialOf(*first);
+    end = std::find_if(first, order.end(), [&](std::uint32_t s) { return materialOf(s) != material; });
+    shadeSurfaces(scene, patches, material, {first, end}, materials);
+  }
   return materials;
 }
 

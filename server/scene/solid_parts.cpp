@@ -42,22 +42,23 @@ void SolidParts::add(std::vector<Bvh::Triangle> triangles, bool is_hollow) {
   part->is_hollow = is_hollow;
 }
 
-void SolidParts::find(const Bounds& places, const std::optional<Plane>& plane, Around& around) const {
+bool SolidParts::find(const Bounds& places, const std::optional<Plane>& plane, Around& around) const {
   around.trees.clear();
   around.in_hollow = false;
-  if (parts_.empty()) return;
+  if (parts_.empty()) return true;
   const auto mayMeet = [&](const Part& part) {
     return plane ? part.tree.risesAbove(plane->normal, plane->height) : !part.tree.empty();
   };
   if (mayMeet(*parts_.front())) around.trees.push_back(&parts_.front()->ends);
   std::vector<std::uint32_t> near;
-  boxes_.collectNear(places.min, places.max, near);
+  if (!boxes_.collectNear(places.min, places.max, kMostAround, near)) return false;
   for (const auto k : near) {
     const Part& part = *parts_[std::size_t{k} + 1];
     if (!mayMeet(part)) continue;
     around.trees.push_back(&part.ends);
     around.in_hollow = around.in_hollow || part.is_hollow;
   }
+  return true;
 }
 
 }  // namespace radiosity::scene

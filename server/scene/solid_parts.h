@@ -38,8 +38,11 @@ class SolidParts {
     glm::vec3 normal;
     float height;
   };
-  /// Takes the place of what is in `around`. O(parts found + log n).
-  void find(const Bounds& places, const std::optional<Plane>& plane, Around& around) const;
+  /// So many parts are told of one by one.
+  static constexpr std::size_t kMostAround = 48;
+  /// Takes the place of what is in `around`. False: these are more than kMostAround parts, of which none is told.
+  /// O(kMostAround + log n).
+  [[nodiscard]] bool find(const Bounds& places, const std::optional<Plane>& plane, Around& around) const;
 
  private:
   struct Part {

@@ -16,11 +16,15 @@ namespace {
 
 /// Of a node with its boxes, or of a block with its triangles: what time it takes, in units of Hits::work.
 constexpr std::uint64_t kNodeWork = 4;
+constexpr std::size_t kMovedAtOnce = 8;  ///< hits that are moved in a unit of work
 /// By which a ray may seem to miss a triangle that it meets (unit box): twice what rounding makes of it.
 constexpr float kEdge = 1e-6F;
 
 /// Trees that are followed at once: one after the other, the first, which may be large, last.
 constexpr std::size_t kTreesAtOnce = 64;
+
+/// Of nodes that wait; beyond, the children of each are sorted among themselves alone, so that few more come to wait.
+constexpr std::size_t kSorted = 64;
 
 /// Hits so near to each other are one, on an edge.
 constexpr double kSameHit = 1e-9;
@@ -34,14 +38,18 @@ class SolidTree::Walk {
   explicit Walk(std::vector<RayHit>& hits) : hits_(hits) { hits_.clear(); }
 
   /// They come nearly in order. Out of follow() nothing may be thrown: check() says that one was lost.
-  void add(const RayHit& hit) noexcept {
+  /// Returns how many had to make way.
+  std::size_t add(const RayHit& hit) noexcept {
     const auto key = [](const RayHit& of) { return std::tuple(of.t, of.front, of.tree, of.triangle); };
     const bool in_order = hits_.empty() || key(hits_.back()) < key(hit);
+    const auto at = in_order ? hits_.end() : std::ranges::upper_bound(hits_, key(hit), {}, key);
+    const auto behind = static_cast<std::size_t>(hits_.end() - at);
     try {
-      hits_.insert(in_order ? hits_.end() : std::ranges::upper_bound(hits_, key(hit), {}, key), hit);
+      hits_.insert(at, hit);
     } catch (const std::bad_alloc&) {
       is_short_ = true;
     }
+    return behind;
   }
   /// Throws std::bad_alloc.
   void check() const {
@@ -157,14 +165,17 @@ RADIOSITY_CLONES std::optional<double> SolidTree::follow(std::span<const SolidTr
     work += kNodeWork;
     if ((child & WideNodes::kLeaf) == 0) {
       const auto& node = tree->nodes_[child];
-      const std::size_t base = depth;
+      // Nearest first of all trees, or else all that a ray meets in one of them is found before the others are asked.
+      const std::size_t base = depth < kSorted ? 0 : depth;
+      std::size_t lowest = depth;
       for (std::uint32_t mask = WideNodes::meet(node, ray, reach, entry); mask != 0; mask &= mask - 1) {
         const auto k = static_cast<std::size_t>(std::countr_zero(mask));
         std::size_t at = depth++;
         for (; at > base && stack[at - 1].entry < entry[k]; --at) stack[at] = stack[at - 1];
         stack[at] = {tree, number, node.child[k], entry[k], 0.0F};
+        lowest = std::min(lowest, at);
       }
-      for (auto at = base; at < depth; ++at)
+      for (auto at = lowest; at < depth; ++at)
         stack[at].soonest = std::min(stack[at].entry, at == 0 ? kNever : stack[at - 1].soonest);
       continue;
     }
@@ -174,7 +185,7 @@ RADIOSITY_CLONES std::optional<double> SolidTree::follow(std::span<const SolidTr
       const Bvh& of = *tree->tree_;
       RayHit hit{0.0, of.order_[i], false, number};
       if (meetsTriangle(of.triangles_[i], from.origin, from.direction, hit) && hit.t > 0.0 && hit.t < from.t_max)
-        walk.add(hit);
+        work += walk.add(hit) / kMovedAtOnce;
     }
     if (!all) continue;
     const float soonest = depth == 0 ? kNever : stack[depth - 1].soonest;

@@ -15,6 +15,8 @@
 
 #include "common/parallel.h"
 #include "server/scene/coverage.h"
+#include "server/scene/flat_sides.h"
+#include "server/scene/triangle_rows.h"
 
 namespace radiosity::scene {
 namespace {
@@ -23,6 +25,8 @@ namespace {
 /// the scene is (unit box) unless they meet at an angle.
 constexpr float kSameWay = 0.9999F;
 constexpr double kSamePlane = 2e-5;
+/// Before or behind a place, what covers it.
+constexpr double kReachOfCover = 1e-6;
 /// So many places of a leaf are looked at for what covers it.
 constexpr std::uint32_t kPlaces = 16;
 /// Surfaces that a thread is worth that looks for what covers them.
@@ -44,14 +48,19 @@ std::vector<std::uint32_t> trianglesOn(const PatchScene& patches, const Surface&
   const glm::uvec2 most(surface.width - 1, surface.height - 1);
   for (auto t = surface.first_triangle; t < surface.first_triangle + surface.triangle_count; ++t) {
     glm::vec2 low(most), high(0.0F);
+    std::array<glm::dvec2, 3> corners;
     for (std::size_t c = 0; c < 3; ++c) {
       const auto& texel = patches.vertices[patches.indices[std::size_t{3} * t + c]].texel;
+      corners[c] = glm::dvec2(texel);
       low = glm::min(low, texel);
       high = glm::max(high, texel);
     }
     const glm::uvec2 first(glm::max(low, 0.0F)), last = glm::min(glm::uvec2(high), most);
     for (auto y = first.y; y <= last.y; ++y) {
-      for (auto x = first.x; x <= last.x; ++x) {
+      const auto extent = extentWithin(corners, y, y + 1.0);
+      if (!(extent.x <= extent.y)) continue;
+      const auto end = static_cast<std::uint32_t>(std::clamp(extent.y, 0.0, static_cast<double>(most.x)));
+      for (auto x = std::max(first.x, static_cast<std::uint32_t>(std::max(extent.x, 0.0))); x <= end; ++x) {
         auto& triangle = on[std::size_t{y} * surface.width + x];
         for (std::uint32_t k = 0; k < kPlaces && triangle == kNone; ++k)
           if (triangleHolds(patches, t, glm::dvec2(x, y) + latticePoint(k, kPlaces), 0.0)) triangle = t;
@@ -123,6 +132,28 @@ RayHit firstOfTied(const Bvh& tree, const glm::dvec3& origin, const glm::dvec3& 
 
 }  // namespace
 
+/// Parted by the axis that they mostly face, and which way: in one tree walls across each other would lie in the same
+/// boxes, so that every ray had to look into most of them.
+struct Solids::Whole {
+  std::array<Bvh, 6> trees;
+  std::array<SolidTree, 6> ends;
+
+  Whole(const std::vector<Bvh::Triangle>& triangles, const std::vector<glm::vec3>& normals) {
+    std::array<std::vector<Bvh::Triangle>, 6> parts;
+    for (std::size_t t = 0; t < triangles.size(); ++t) {
+      const auto size = glm::abs(normals[t]);
+      const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+      parts[static_cast<std::size_t>(2 * axis + (normals[t][axis] < 0.0F ? 1 : 0))].push_back(triangles[t]);
+    }
+    for (std::size_t k = 0; k < parts.size(); ++k) {
+      trees[k] = Bvh(std::move(parts[k]));
+      ends[k] = SolidTree(trees[k]);
+    }
+  }
+};
+
+Solids::~Solids() = default;
+
 Solids::Solids(const PatchScene& patches, const std::vector<Hides>& hides) {
   std::vector<Bvh::Triangle> triangles, sheets;
   std::vector<std::uint32_t> part;
@@ -140,6 +171,7 @@ Solids::Solids(const PatchScene& patches, const std::vector<Hides>& hides) {
     part.push_back(part_of[t]);
   }
   parts_ = SolidParts(triangles, part);
+  corners_ = triangles;
   tree_ = Bvh(std::move(triangles));
   sheets_ = Bvh(std::move(sheets));
 }
@@ -168,7 +200,11 @@ void Solids::findAround(const Bounds& positions, const std::optional<Facing>& fa
   const glm::vec3 lift(static_cast<float>(kBurialLift));
   std::optional<SolidParts::Plane> plane;
   if (facing) plane = {facing->normal, facing->height + 0.5F * lift.x};
-  parts_.find({positions.min - lift, positions.max + lift}, plane, around);
+  if (parts_.find({positions.min - lift, positions.max + lift}, plane, around)) return;
+  std::call_once(whole_made_, [&] { whole_ = std::make_unique<const Whole>(corners_, normal_); });
+  around.trees.clear();
+  for (const auto& tree : whole_->ends) around.trees.push_back(&tree);
+  around.in_hollow = true;
 }
 
 bool Solids::mayBury(const Bounds& positions, const glm::vec3& normal, const SolidParts::Around& around) const {
@@ -254,8 +290,10 @@ Coincidence::Coincidence(PatchScene& patches) : patches_(patches), rank_(patches
     triangles.push_back({patches.vertices[patches.indices[3 * t]].position,
                          patches.vertices[patches.indices[3 * t + 1]].position,
                          patches.vertices[patches.indices[3 * t + 2]].position});
+  std::vector<glm::vec3> normals;
+  for (const auto& triangle : patches.triangles) normals.push_back(triangle.normal);
+  faces_ = CoveringFaces(triangles, normals, rank_);
   tree_ = Bvh(std::move(triangles));
-  least_ = tree_.leastTags(rank_);
 }
 
 void Coincidence::run() {
@@ -298,7 +336,8 @@ glm::vec3 Coincidence::facing(std::uint32_t triangle, std::uint32_t side) const 
 }
 
 /// The earliest that covers the triangle there.
-Coincidence::Over Coincidence::over(std::uint32_t triangle, std::uint32_t side, const glm::vec3& position) const {
+Coincidence::Over Coincidence::over(std::uint32_t triangle, std::uint32_t side, const glm::vec3& position,
+                                    std::uint64_t& work) const {
   const auto facing = this->facing(triangle, side);
   const auto own = patches_.triangle_surface[triangle];
   const auto sideOf = [&](const RayHit& hit) {
@@ -309,9 +348,7 @@ Coincidence::Over Coincidence::over(std::uint32_t triangle, std::uint32_t side, 
     return s != own && std::abs(glm::dot(patches_.triangles[hit.triangle].normal, facing)) > kSameWay &&
            isLit(s, sideOf(hit));
   };
-  const glm::dvec3 n(facing);
-  const auto first =
-      tree_.leastHit(glm::dvec3(position) + n * 1e-6, -n, 0.0, 2e-6, rank_, least_, rank_[triangle], counts);
+  const auto first = faces_.find({position, facing, kSameWay, kReachOfCover, rank_[triangle]}, counts, work);
   return first ? Over{first->triangle, sideOf(*first)} : Over{};
 }
 
@@ -332,8 +369,9 @@ void Coincidence::keepCovered(std::uint32_t s, std::uint32_t side) {
     // The middle of a texel that is wider than the surface may lie beside both.
     const glm::dvec2 corner(i % surface.width, i / surface.width);
     Over seen;
+    std::uint64_t work = 0;
     for (std::uint32_t k = 0; k < kPlaces && seen.triangle == kNone; ++k) {
-      seen = over(triangle_on[i], side, positionAt(frame, corner + latticePoint(k, kPlaces)));
+      seen = over(triangle_on[i], side, positionAt(frame, corner + latticePoint(k, kPlaces)), work);
     }
     if (seen.triangle == kNone) continue;
     const auto texel = texelAt(patches_.triangles[seen.triangle], positionAt(frame, corner + 0.5));
@@ -343,45 +381,43 @@ void Coincidence::keepCovered(std::uint32_t s, std::uint32_t side) {
 }
 
 /// By surface and side: planar, in one plane with another that reaches into its bounds, and facing the same way.
-/// Planes are sorted into cells of distance, and then swept along x; twice, so that no pair lies on both sides of a
-/// cell's end.
+/// Planes are sorted into cells of distance; twice, so that no pair lies on both sides of a cell's end.
 std::vector<bool> Coincidence::coplanarWithOthers() const {
   std::vector<bool> found(2 * patches_.surfaces.size(), false);
   for (const double shift : {0.0, 0.5}) {
-    std::vector<Plane> planes;
-    for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
-      const Surface& surface = patches_.surfaces[s];
-      for (std::uint32_t side = 0; side < 2; ++side) {
-        if (!surface.planar || !isLit(s, side)) continue;
-        const auto distance = static_cast<double>(
-            glm::dot(facing(surface.first_triangle, side), patches_.triangles[surface.first_triangle].origin));
-        const auto cell = static_cast<std::int64_t>(std::floor(distance / kSamePlane + shift));
-        planes.push_back({cell, surface.bounds_min.x, s, side});
+    auto planes = planesByDistance(shift);
+    std::vector<FlatSide> together;
+    for (auto first = planes.begin(), end = first; first != planes.end(); first = end) {
+      end = std::find_if(first, planes.end(), [&](const Plane& plane) { return plane.cell != first->cell; });
+      together.clear();
+      for (auto plane = first; plane != end; ++plane) {
+        const Surface& surface = patches_.surfaces[plane->surface];
+        together.push_back(
+            {surface.bounds_min, surface.bounds_max, facing(surface.first_triangle, plane->side), plane->surface});
       }
-    }
-    std::ranges::sort(planes, {},
-                      [](const Plane& plane) { return std::tuple(plane.cell, plane.low, plane.surface, plane.side); });
-    for (std::size_t i = 0; i < planes.size(); ++i) {
-      const Surface& a = patches_.surfaces[planes[i].surface];
-      for (auto k = i + 1; k < planes.size() && planes[k].cell == planes[i].cell &&
-                           planes[k].low <= a.bounds_max.x + static_cast<float>(kSamePlane);
-           ++k) {
-        const auto one = slot(planes[i].surface, planes[i].side), other = slot(planes[k].surface, planes[k].side);
-        if ((!found[one] || !found[other]) && lieTogether(planes[i], planes[k])) found[one] = found[other] = true;
-      }
+      const auto company = findCompany(together, {static_cast<float>(kSamePlane), kSameWay});
+      for (std::size_t i = 0; i < company.size(); ++i)
+        if (company[i])
+          found[slot(first[static_cast<std::ptrdiff_t>(i)].surface, first[static_cast<std::ptrdiff_t>(i)].side)] = true;
     }
   }
   return found;
 }
 
-/// Of two sides in one plane: they face the same way, and their bounds meet.
-bool Coincidence::lieTogether(const Plane& one, const Plane& other) const {
-  const Surface &a = patches_.surfaces[one.surface], &b = patches_.surfaces[other.surface];
-  const auto margin = static_cast<float>(kSamePlane);
-  return one.surface != other.surface &&
-         glm::dot(facing(a.first_triangle, one.side), facing(b.first_triangle, other.side)) > kSameWay &&
-         !glm::any(glm::greaterThan(a.bounds_min, b.bounds_max + margin)) &&
-         !glm::any(glm::greaterThan(b.bounds_min, a.bounds_max + margin));
+/// Of lit sides; cells are moved by `shift` of their width.
+std::vector<Coincidence::Plane> Coincidence::planesByDistance(double shift) const {
+  std::vector<Plane> planes;
+  for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
+    const Surface& surface = patches_.surfaces[s];
+    for (std::uint32_t side = 0; side < 2; ++side) {
+      if (!surface.planar || !isLit(s, side)) continue;
+      const auto distance = static_cast<double>(
+          glm::dot(facing(surface.first_triangle, side), patches_.triangles[surface.first_triangle].origin));
+      planes.push_back({static_cast<std::int64_t>(std::floor(distance / kSamePlane + shift)), s, side});
+    }
+  }
+  std::ranges::stable_sort(planes, {}, &Plane::cell);
+  return planes;
 }
 
 bool Coincidence::mayCover(std::uint32_t s, std::uint32_t side, const Bounds& box) const {
@@ -393,12 +429,13 @@ bool Coincidence::mayCover(std::uint32_t s, std::uint32_t side, const Bounds& bo
 std::uint32_t Coincidence::coveredBy(std::uint32_t s, std::uint32_t side, bool closely) const {
   const Surface& surface = patches_.surfaces[s];
   const std::uint32_t leaves = surface.width * surface.height;
+  std::uint64_t work = 0;
   const std::uint32_t step = closely ? 1U : std::max(1U, leaves / 16);
   for (std::uint32_t i = step / 2; i < leaves; i += step) {
     const LeafPoint& point = patches_.leaves[surface.first_leaf + i];
     if (point.triangle == kNone) continue;
     const auto position = positionAt(patches_.triangles[point.triangle], glm::dvec2(point.texel));
-    const auto seen = over(point.triangle, side, position);
+    const auto seen = over(point.triangle, side, position, work);
     if (seen.triangle != kNone) return patches_.triangle_surface[seen.triangle];
   }
   return kNone;

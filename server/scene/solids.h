@@ -8,12 +8,15 @@
 #include <glm/common.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <memory>
+#include <mutex>
 #include <optional>
 #include <vector>
 
 #include "server/scene/bounds.h"
 #include "server/scene/burial_record.h"
 #include "server/scene/bvh.h"
+#include "server/scene/covering_faces.h"
 #include "server/scene/patch_scene.h"
 #include "server/scene/solid_parts.h"
 
@@ -36,6 +39,7 @@ class Solids {
  public:
   /// `hides`: by surface.
   Solids(const PatchScene& patches, const std::vector<Hides>& hides);
+  ~Solids();
   Solids(const Solids&) = delete;  // a part refers to another
   Solids& operator=(const Solids&) = delete;
 
@@ -83,9 +87,15 @@ class Solids {
   [[nodiscard]] std::optional<Start> firstMet(const Start& start, const glm::dvec3& direction) const;
 
   Bvh tree_;
-  SolidParts parts_;                    ///< of the same
+  SolidParts parts_;  ///< of the same
+  /// All of it, for places in very many: what a ray enters of a solid that it starts outside of it leaves
+  /// again, so that it only costs more. Made when it is first asked for.
+  struct Whole;
+  mutable std::unique_ptr<const Whole> whole_;
+  mutable std::once_flag whole_made_;
   std::vector<std::uint32_t> surface_;  ///< by triangle of the tree
   std::vector<glm::vec3> normal_;       ///< likewise
+  std::vector<Bvh::Triangle> corners_;  ///< likewise
   Bvh sheets_;
   std::vector<glm::vec3> sheet_normal_;
 };
@@ -113,9 +123,11 @@ class Coincidence {
   [[nodiscard]] bool mayCover(std::uint32_t s, std::uint32_t side, const Bounds& box) const;
 
   /// Whether this side of a triangle is covered there.
-  [[nodiscard]] bool covers(std::uint32_t triangle, std::uint32_t side, const glm::vec3& position) const {
+  /// `work`: grows by what that took (Hits).
+  [[nodiscard]] bool covers(std::uint32_t triangle, std::uint32_t side, const glm::vec3& position,
+                            std::uint64_t& work) const {
     return covered_[slot(patches_.triangle_surface[triangle], side)] &&
-           over(triangle, side, position).triangle != kNone;
+           over(triangle, side, position, work).triangle != kNone;
   }
 
  private:
@@ -124,7 +136,8 @@ class Coincidence {
   struct Over {
     std::uint32_t triangle = kNone, side = 0;
   };
-  [[nodiscard]] Over over(std::uint32_t triangle, std::uint32_t side, const glm::vec3& position) const;
+  [[nodiscard]] Over over(std::uint32_t triangle, std::uint32_t side, const glm::vec3& position,
+                          std::uint64_t& work) const;
   [[nodiscard]] glm::vec3 facing(std::uint32_t triangle, std::uint32_t side) const;
   [[nodiscard]] bool isLit(std::uint32_t s, std::uint32_t side) const {
     return patches_.surfaces[s].first_node[side] != kNone;
@@ -133,18 +146,17 @@ class Coincidence {
   /// A side of a planar surface.
   struct Plane {
     std::int64_t cell;  ///< of distance
-    float low;          ///< along x
     std::uint32_t surface, side;
   };
-  [[nodiscard]] bool lieTogether(const Plane& one, const Plane& other) const;
+  [[nodiscard]] std::vector<Plane> planesByDistance(double shift) const;
   [[nodiscard]] std::uint32_t coveredBy(std::uint32_t s, std::uint32_t side, bool closely) const;
   void keepCovered(std::uint32_t s, std::uint32_t side);
 
   PatchScene& patches_;
   Bvh tree_;
-  /// By triangle: what is of less is seen; by node of the tree, the least there.
-  std::vector<std::uint32_t> rank_, least_;
-  std::vector<bool> covered_;  ///< by surface and side: somewhere
+  CoveringFaces faces_;              ///< of the same
+  std::vector<std::uint32_t> rank_;  ///< by triangle: what is of less is seen
+  std::vector<bool> covered_;        ///< by surface and side: somewhere
 };
 
 }  // namespace radiosity::scene

@@ -7,6 +7,8 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <numbers>
+#include <optional>
+#include <unordered_map>
 
 #include "server/solver/sampling.h"
 
@@ -76,6 +78,34 @@ double coneSolidAngle(double scale, double offset) {
 ParallelView parallelView(const glm::vec3& direction, double turn, double shift, std::uint64_t key) {
   return {direction, perpendicular(direction, turn), glm::vec2(shift, uniformFromKey(key))};
 }
+
+/// Finds sources of the same shape among very many.
+class Shapes {
+ public:
+  using Source = PunctualLights::Source;
+
+  /// Number of the first that was added of this shape; none.
+  [[nodiscard]] std::optional<std::size_t> find(const std::vector<Source>& sources, const Source& like) const {
+    const auto [first, end] = numbers_.equal_range(keyOf(like));
+    std::optional<std::size_t> found;
+    for (auto at = first; at != end; ++at)
+      if (sources[at->second].sameShape(like)) found = std::min(found.value_or(at->second), at->second);
+    return found;
+  }
+  void add(const Source& source, std::size_t number) { numbers_.emplace(keyOf(source), number); }
+
+ private:
+  /// Equal for equal shapes: -0 becomes 0.
+  static std::uint64_t keyOf(Source source) {
+    source.position += 0.0F;
+    source.direction += 0.0F;
+    source.cone_scale += 0.0F;
+    source.cone_offset += 0.0F;
+    source.range += 0.0F;
+    return source.shapeKey();
+  }
+  std::unordered_multimap<std::uint64_t, std::size_t> numbers_;
+};
 
 }  // namespace
 
@@ -176,14 +206,15 @@ PunctualLights::Source PunctualLights::makeSky(const glm::vec3& radiance, float 
 std::vector<PunctualLights::Source> PunctualLights::makeSources(const scene::PatchScene& patches,
                                                                 const LightSources& sources) const {
   std::vector<Source> made;
+  Shapes shapes;
   const auto add = [&](Source source) {
     if (channelSum(source.intensity) <= 0.0) return;
     source.key = mixKeys(settings_.seed, source.shapeKey());
-    const auto same = std::find_if(made.begin(), made.end(), [&](const auto& m) { return m.sameShape(source); });
-    if (same == made.end()) {
-      made.push_back(source);
+    if (const auto same = shapes.find(made, source)) {
+      made[*same].intensity += source.intensity;  // two lights in one place shine as one
     } else {
-      same->intensity += source.intensity;  // two lights in one place shine as one
+      shapes.add(source, made.size());
+      made.push_back(source);
     }
   };
   for (const auto& light : sources.lights) add(makeLight(patches, light));
@@ -195,14 +226,16 @@ std::vector<PunctualLights::Source> PunctualLights::makeSources(const scene::Pat
 void PunctualLights::setSources(const scene::PatchScene& patches, const LightSources& sources) {
   auto before = std::move(sources_);
   sources_ = makeSources(patches, sources);
+  Shapes shapes;
+  for (std::size_t i = 0; i < sources_.size(); ++i) shapes.add(sources_[i], i);
   for (auto& old : before) {
     if (old.sequences == 0 || channelSum(old.delivered) <= 0.0) continue;
-    const auto same = std::find_if(sources_.begin(), sources_.end(), [&](const auto& s) { return s.sameShape(old); });
-    if (same != sources_.end()) {
-      same->delivered = old.delivered;
-      same->sequences = old.sequences;
+    if (const auto same = shapes.find(sources_, old)) {
+      sources_[*same].delivered = old.delivered;
+      sources_[*same].sequences = old.sequences;
     } else {
       old.intensity = glm::dvec3(0.0);  // its light is to be taken back
+      shapes.add(old, sources_.size());
       sources_.push_back(old);
     }
   }

@@ -1,0 +1,100 @@
+#include "server/scene/image_plan.h"
+
+#include <algorithm>
+#include <array>
+#include <queue>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "server/scene/image_decode.h"
+#include "server/scene/json_text.h"
+#include "server/scene/scene_memory.h"
+
+namespace radiosity::scene {
+namespace {
+
+/// All images together may have so many times what one may, not counting what their data makes likely: pixels of a
+/// photograph take more than a bit, and what is smaller than that is mostly one colour.
+constexpr std::uint64_t kTotalImages = 4, kLikelyPixelsAByte = 64;
+/// While one is decoded: what the decoder holds, and its result.
+constexpr std::uint64_t kDecodedBytes = 4, kDecoderBytes = 12;
+
+/// Textures that light needs.
+constexpr std::array<std::string_view, 5> kUsed = {"baseColorTexture", "emissiveTexture", "metallicRoughnessTexture",
+                                                   "diffuseTexture", "specularGlossinessTexture"};
+
+/// Marks what a material uses. Values nest at most 64 deep.
+void markUsed(const Json& value, const Json& textures, std::vector<bool>& used) {
+  if (!value.is_object()) return;
+  for (const auto& [key, child] : value.items()) {
+    if (key == "extras") continue;
+    const auto index = child.is_object() ? child.find("index") : child.end();
+    if (std::ranges::find(kUsed, key) != kUsed.end() && child.is_object() && index != child.end()) {
+      const auto texture = index->is_number_unsigned() ? index->get<std::size_t>() : textures.size();
+      if (texture >= textures.size() || !textures[texture].contains("source")) continue;
+      const auto& source = textures[texture]["source"];
+      const auto image = source.is_number_unsigned() ? source.get<std::size_t>() : used.size();
+      if (image < used.size()) used[image] = true;
+    } else {
+      markUsed(child, textures, used);
+    }
+  }
+}
+
+std::vector<bool> usedImages(const Document& document) {
+  std::vector<bool> used(document.images.size(), false);
+  const auto& gltf = document.gltf;
+  if (!gltf.contains("materials") || !gltf.contains("textures")) return used;
+  for (const auto& material : gltf["materials"]) markUsed(material, gltf["textures"], used);
+  return used;
+}
+
+/// Halves the largest until all take no more than they may.
+void halveLargest(const std::vector<ImageSize>& sizes, std::uint64_t most, ImagePlan& plan) {
+  std::priority_queue<std::pair<std::uint64_t, std::size_t>> largest;
+  for (std::size_t i = 0; i < sizes.size(); ++i)
+    if (sizes[i].pixels() > 0) largest.emplace(sizes[i].pixels(), i);
+  while (plan.bytes > most && !largest.empty() && largest.top().first > 1) {
+    const auto [pixels, image] = largest.top();
+    largest.pop();
+    plan.halved += plan.halvings[image]++ == 0 ? 1 : 0;
+    const auto left = sizes[image].halved(plan.halvings[image]).pixels();
+    plan.bytes -= kDecodedBytes * (pixels - left);
+    largest.emplace(left, image);
+  }
+}
+
+}  // namespace
+
+Result<ImagePlan> planImages(const Document& document, std::uint64_t claimed, const ImportLimits& limits) {
+  ImagePlan plan;
+  plan.halvings.assign(document.images.size(), 0);
+  const auto used = usedImages(document);
+  std::vector<ImageSize> sizes(used.size());
+  std::uint64_t unlikely = 0;
+  for (std::size_t i = 0; i < used.size(); ++i) {
+    if (!used[i]) continue;
+    const auto where = place(document.name, "/images/" + std::to_string(i));
+    const auto size = sizeOfImage(*document.images[i], limits.max_image_pixels, where);
+    if (!size && size.error().code == ErrorCode::kTooLarge) return tl::unexpected(size.error());
+    if (!size) continue;  // whoever needs it says so
+    sizes[i] = *size;
+    const auto pixels = size->pixels(), likely = kLikelyPixelsAByte * document.images[i]->size();
+    unlikely += pixels > likely ? pixels - likely : 0;
+    if (unlikely > kTotalImages * limits.max_image_pixels)
+      return fail(ErrorCode::kTooLarge, "images have too many pixels for so few bytes", where);
+    plan.bytes += kDecodedBytes * pixels;
+    plan.largest_pixels = std::max<std::uint64_t>(plan.largest_pixels, pixels);
+  }
+  const auto limit = sceneMemoryLimit(limits);
+  const auto decoder = kDecoderBytes * plan.largest_pixels;
+  const auto room = claimed + decoder < limit ? limit - claimed - decoder : 0;
+  halveLargest(sizes, std::min(kMostImageBytes, room), plan);
+  if (plan.bytes > room)
+    return fail(ErrorCode::kTooLarge, sceneMemoryFault(claimed + decoder + plan.bytes, limit, "its decoded images"),
+                place(document.name, "/images"));
+  return plan;
+}
+
+}  // namespace radiosity::scene
