@@ -7,6 +7,7 @@
 #include <set>
 #include <string>
 
+#include "common/task.h"
 #include "server/scene/image_decode.h"
 
 namespace radiosity::scene {
@@ -338,6 +339,7 @@ class MaterialImporter {
 Result<void> importMaterials(ImportContext& context) {
   MaterialImporter importer(context);
   for (std::size_t i = 0; i < context.materials.size(); ++i) {
+    interruptionPoint();
     if (auto ok = importer.add(i); !ok) return ok;
   }
   return {};

@@ -110,6 +110,7 @@ class SurfaceOpacity {
   /// Cells that triangles only touch, without their middles, are as the next one. When all rows are filled.
   void fillBorders() {
     for (std::uint32_t y = 0; y < height_; ++y) {
+      interruptionPoint();
       for (std::uint32_t x = 0; x < width_; ++x) {
         if (known_[std::size_t{y} * width_ + x] == 0) cell(x, y) = neighbour(x, y);
       }
@@ -176,6 +177,7 @@ class SurfaceOpacity {
     const auto end_y = std::min(end_row, static_cast<std::uint32_t>(std::ceil(std::max(high.y, 0.0))));
     const UvMap uv(c, texcoords());
     for (auto y = std::max(first_row, static_cast<std::uint32_t>(std::max(low.y, 0.0))); y < end_y; ++y) {
+      interruptionPoint();
       for (auto x = static_cast<std::uint32_t>(std::max(low.x, 0.0)); x < end_x; ++x) {
         const glm::vec3 w = c.weightsAt((glm::dvec2(x, y) + 0.5) / scale);
         if (std::min({w.x, w.y, w.z}) < -1e-6F) continue;
@@ -279,6 +281,7 @@ void measureOpacity(const Scene& scene, PatchScene& patches) {
 
 void applyOpacity(PatchScene& patches) {
   for (const Surface& surface : patches.surfaces) {
+    interruptionPoint();
     if (!surface.see_through) continue;
     for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf) {
       const float opacity = leafOpacity(patches, surface, leaf);

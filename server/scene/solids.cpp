@@ -69,6 +69,7 @@ void dropThoseThatHoldOthers(const PatchScene& patches, const std::vector<Hides>
   std::vector<Bvh::Triangle> others;
   std::unordered_map<std::uint32_t, Bounds> bounds;
   for (std::size_t t = 0; t < part_of.size(); ++t) {
+    interruptionPoint();
     if (hides[patches.triangle_surface[t]] != Hides::kSolid) continue;
     Bvh::Triangle triangle;
     for (std::size_t c = 0; c < 3; ++c)
@@ -128,6 +129,7 @@ Solids::Solids(const PatchScene& patches, const std::vector<Hides>& hides) {
   std::vector<std::uint32_t> part;
   const auto part_of = partOf(patches, hides);
   for (std::uint32_t t = 0; t < patches.triangles.size(); ++t) {
+    interruptionPoint();
     const auto hiding = hides[patches.triangle_surface[t]];
     if (hiding == Hides::kNothing) continue;
     Bvh::Triangle triangle;
@@ -270,6 +272,7 @@ void Coincidence::run() {
   };
   inTurns(cover.size(), findCover, cover.size() / kSurfacesAThread);
   for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
+    interruptionPoint();
     auto by = kNone;
     for (const auto other : cover[s]) {
       covered_.push_back(other != kNone);
@@ -317,6 +320,7 @@ Coincidence::Over Coincidence::over(std::uint32_t triangle, std::uint32_t side, 
 
 void Coincidence::keepCovered() {
   for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
+    interruptionPoint();
     for (std::uint32_t side = 0; side < 2; ++side)
       if (covered_[slot(s, side)]) keepCovered(s, side);
   }
@@ -350,6 +354,7 @@ std::vector<bool> Coincidence::coplanarWithOthers() const {
   for (const double shift : {0.0, 0.5}) {
     std::vector<Plane> planes;
     for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
+      interruptionPoint();
       const Surface& surface = patches_.surfaces[s];
       for (std::uint32_t side = 0; side < 2; ++side) {
         if (!surface.planar || !isLit(s, side)) continue;
@@ -362,6 +367,7 @@ std::vector<bool> Coincidence::coplanarWithOthers() const {
     std::ranges::sort(planes, {},
                       [](const Plane& plane) { return std::tuple(plane.cell, plane.low, plane.surface, plane.side); });
     for (std::size_t i = 0; i < planes.size(); ++i) {
+      interruptionPoint();
       const Surface& a = patches_.surfaces[planes[i].surface];
       for (auto k = i + 1; k < planes.size() && planes[k].cell == planes[i].cell &&
                            planes[k].low <= a.bounds_max.x + static_cast<float>(kSamePlane);
