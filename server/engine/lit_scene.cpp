@@ -6,12 +6,15 @@
 #include <utility>
 
 #include "common/give_back.h"
+#include "common/task.h"
 #include "server/engine/carried_light.h"
 #include "server/scene/burial_record.h"
 #include "server/scene/lit_sides.h"
 
 namespace radiosity::engine {
 namespace {
+
+constexpr std::size_t kMakeSteps = 10;  ///< of the progress that is told
 
 std::uint64_t leavesWithArea(const scene::PatchScene& patches) {
   std::uint64_t count = 0;
@@ -49,6 +52,7 @@ Result<std::unique_ptr<LitScene>> LitScene::make(scene::EditedDocument edited, c
   auto built = scene::buildWithRecord(*lit->scene_, charts, before ? &*before : nullptr,
                                       former != nullptr ? former->burial_.get() : nullptr);
   if (!built) return tl::unexpected<Error>(built.error());
+  interruptionPoint(9, kMakeSteps);
   lit->patches_ = std::make_shared<const scene::PatchScene>(std::move(built->patches));
   lit->burial_ = std::move(built->burial);
   lit->normals_ = std::make_shared<const scene::ShadingNormals>(*lit->scene_, *lit->patches_);
@@ -82,7 +86,7 @@ bool LitScene::hasDoubleSided() const {
   });
 }
 
-LitParts LitScene::litParts() const { return {document_, *scene_, *patches_, materials_, sources_}; }
+LitParts LitScene::litParts() const { return {*document_, *scene_, *patches_, materials_, sources_}; }
 
 void LitScene::reportLight() { light_report_.findLost(litParts(), *solver_); }
 
@@ -206,9 +210,10 @@ std::uint64_t LitScene::affectedBy(const SceneChange& change, const scene::Scene
   }));
 }
 
-scene::Document LitScene::reshade(scene::Document document, std::shared_ptr<const scene::Scene> next,
-                                  const SceneChange& change) {
-  auto before = std::exchange(document_, std::move(document));
+std::shared_ptr<const scene::Document> LitScene::reshade(scene::Document document,
+                                                         std::shared_ptr<const scene::Scene> next,
+                                                         const SceneChange& change) {
+  auto before = std::exchange(document_, std::make_shared<const scene::Document>(std::move(document)));
   // Which sides have texels goes by the lamps that there were when the scene was laid out.
   if (hasDoubleSided() && scene::shineElsewhere(*scene_, sources_.sky, *next, skyOf(*next))) reproducible_ = false;
   scene_ = std::move(next);
