@@ -6,6 +6,8 @@
 #include <mutex>
 #include <thread>
 
+#include "common/task.h"
+
 namespace radiosity {
 namespace {
 
@@ -15,6 +17,7 @@ constexpr std::size_t kMostShares = 16;
 struct Job {
   const ShareOfWork& work;
   std::size_t shares;
+  Task* task;                 ///< of the thread whose job it is; null: none
   std::size_t next = 1;       ///< to be taken; 0 is its thread's own
   std::size_t under_way = 0;  ///< by helpers
   std::exception_ptr failed;
@@ -71,7 +74,9 @@ class Helpers {
   }
 
   void attempt(Job& job, std::size_t share) {
+    const TaskScope scope(job.task);
     try {
+      interruptionPoint();
       job.work(share);
     } catch (...) {
       const std::scoped_lock lock(mutex_);
@@ -112,7 +117,7 @@ std::size_t mostShares() {
 void doShares(std::size_t shares, const ShareOfWork& work) {
   if (shares == 0) return;
   if (shares == 1) return work(0);
-  Job job{work, shares, 1, 0, nullptr};
+  Job job{work, shares, currentTask(), 1, 0, nullptr};
   Helpers::all().carryOut(job);
   if (job.failed) std::rethrow_exception(job.failed);
 }

@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "common/task.h"
+
 namespace radiosity {
 
 /// What is called for a share of the work. It refers to the callable, which is to outlive it.
@@ -23,7 +25,8 @@ class ShareOfWork {
 
 /// Calls work(share) once for every share in [0, shares): 0 in this thread, the others in threads that wait for such
 /// work, one a core, or in this one where none of them is free. So shares must not wait for each other; they
-/// may be divided again. When all have ended, what one of them threw is thrown here.
+/// may be divided again. When all have ended, what one of them threw is thrown here. All of them have this thread's
+/// task (task.h).
 void doShares(std::size_t shares, const ShareOfWork& work);
 /// Shares that can be done at the same time, 16 at most.
 [[nodiscard]] std::size_t mostShares();
@@ -38,12 +41,16 @@ void inShares(std::size_t most, const Work& work) {
 }
 
 /// Calls work(part) once for every part in [0, parts), each by whichever thread of inShares() is free: where some parts
-/// take far longer than others, and nobody knows which. At most `most` threads. As doShares().
+/// take far longer than others, and nobody knows which. At most `most` threads. As doShares(). Every part begins with
+/// an interruption point.
 template <typename Work>
 void inTurns(std::size_t parts, const Work& work, std::size_t most = SIZE_MAX) {
   std::atomic<std::size_t> next{0};
   inShares(std::min(parts, most), [&](std::size_t, std::size_t) {
-    for (auto part = next++; part < parts; part = next++) work(part);
+    for (auto part = next++; part < parts; part = next++) {
+      interruptionPoint();
+      work(part);
+    }
   });
 }
 

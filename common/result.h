@@ -22,6 +22,7 @@ enum class ErrorCode {
   kBusy,           ///< try again later: queue full, draining
   kUnavailable,    ///< no driver, no connection, port in use
   kInternal,       ///< a bug that did not have to end the process
+  kCancelled,      ///< called off before its end: another load came, or the server stops (protocol -32049)
 };
 
 /// `message` says what was wrong and what to do; `where` names the place: "room.glb", "/materials/3/emissiveFactor",

@@ -13,7 +13,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::array<std::pair<ErrorCode, std::string_view>, 11> kCodes{{{ErrorCode::kBadUsage, "badUsage"},
+constexpr std::array<std::pair<ErrorCode, std::string_view>, 12> kCodes{{{ErrorCode::kBadUsage, "badUsage"},
                                                                          {ErrorCode::kBadInput, "badInput"},
                                                                          {ErrorCode::kInvalidScene, "invalidScene"},
                                                                          {ErrorCode::kUnsupported, "unsupported"},
@@ -23,6 +23,7 @@ constexpr std::array<std::pair<ErrorCode, std::string_view>, 11> kCodes{{{ErrorC
                                                                          {ErrorCode::kTestFailed, "testFailed"},
                                                                          {ErrorCode::kBusy, "busy"},
                                                                          {ErrorCode::kUnavailable, "unavailable"},
+                                                                         {ErrorCode::kCancelled, "cancelled"},
                                                                          {ErrorCode::kInternal, "internal"}}};
 
 std::string stringAt(const json& object, const char* key) {

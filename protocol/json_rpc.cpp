@@ -32,6 +32,7 @@ constexpr std::array kCodes = {
     CodePair{ErrorCode::kUnavailable, RpcCode::kUnavailable},
     CodePair{ErrorCode::kUnavailable, RpcCode::kUnauthenticated},
     CodePair{ErrorCode::kUnavailable, RpcCode::kForbidden},
+    CodePair{ErrorCode::kCancelled, RpcCode::kCancelled},
     CodePair{ErrorCode::kInternal, RpcCode::kInternalError},
 };
 

@@ -30,6 +30,7 @@ enum class RpcCode : int {
   kTooLarge = -32013,
   kInvalidScene = -32022,
   kRateLimited = -32029,
+  kCancelled = -32049,
   kUnavailable = -32050,
   kDraining = -32053,
 };

@@ -89,6 +89,7 @@ json toJson(const Progress& p) {
   if (p.seconds_left) out["secondsLeft"] = *p.seconds_left;
   if (!p.failure.empty()) out["failure"] = p.failure;
   if (!p.unlit.empty()) out["unlit"] = p.unlit;
+  if (p.fraction) out["fraction"] = *p.fraction;
   return out;
 }
 
@@ -122,6 +123,7 @@ void read(Reader& r, Progress& p) {
   r.integer("polygons", p.polygons, Need::kOptional, 0, kAnyInteger);
   r.text("failure", p.failure, Need::kOptional, kAnyText);
   r.text("unlit", p.unlit, Need::kOptional, kAnyText);
+  r.optionalNumber("fraction", p.fraction, {0.0, 1.0, false});
 }
 
 void readStrings(Reader& r, const char* key, Need need, std::size_t max, std::vector<std::string>& out) {

@@ -80,8 +80,9 @@ struct Progress {
   ErrorParts error;
   EnergyParts energy;
   std::uint64_t patches = 0, nodes = 0, surfaces = 0, polygons = 0;
-  std::string failure;  ///< why, when state is "failed"
-  std::string unlit;    ///< why no light arrives anywhere; empty: some does
+  std::string failure;             ///< why, when state is "failed"
+  std::string unlit;               ///< why no light arrives anywhere; empty: some does
+  std::optional<double> fraction;  ///< how much of the load is done, in [0, 1]; while state is "loading"
 };
 
 /// Where somebody looks from: eye and the point looked at, metres, in the scene's space.

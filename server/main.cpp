@@ -70,7 +70,7 @@ Vitals vitalsOf(const engine::Engine& engine, const net::Server& server) {
 constexpr auto kCheckpointPatience = std::chrono::milliseconds(3500);
 /// For what lies between the end's waits, which have bounds of their own: a disk that does not answer, say.
 constexpr auto kEndSlack = std::chrono::milliseconds(500);
-/// The engine ends between two steps of what it does, and a step of a load of a big scene takes seconds; nothing it has
+/// The engine ends between two steps of what it does, and putting a big scene in place takes seconds; nothing it has
 /// made since the checkpoint is worth keeping.
 constexpr auto kEnginePatience = std::chrono::milliseconds(200);
 

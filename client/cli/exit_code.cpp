@@ -26,6 +26,7 @@ ExitCode exitCodeOf(ErrorCode code) {
     case ErrorCode::kBusy:
     case ErrorCode::kUnavailable:
     case ErrorCode::kInternal:
+    case ErrorCode::kCancelled:
       break;
   }
   return ExitCode::kFailed;

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <tuple>
+#include <variant>
 
 #include "client/cli/commands.h"
 #include "client/cli/remote.h"
@@ -21,11 +22,27 @@ struct LoadOptions {
   bool quiet = false;
 };
 
+/// Uploads beside a connection that tells how far the load is. Where there is none to be had the upload says why.
+Result<Loaded> uploadWatched(const Remote& remote, const std::string& scene, ProgressDisplay& display) {
+  auto connection = remote.connect();
+  if (!connection) return uploadScene(remote, scene, display);
+  connection->onNotification([&display](const protocol::Notification& note) {
+    const auto* progress = std::get_if<protocol::ProgressNote>(&note);
+    if (progress != nullptr && progress->progress.state == "loading") display.show(viewOf(progress->progress, 1.0));
+  });
+  auto uploader = remote;
+  uploader.keep_going = [&connection, &remote] {
+    (void)connection->poll(std::chrono::milliseconds(0));  // one that broke tells nothing more
+    return remote.keep_going();
+  };
+  return uploadScene(uploader, scene, display);
+}
+
 ExitCode load(const LoadOptions& options) {
   const auto remote = remoteFrom(options.server);
   if (!remote) return complain(remote.error());
   ProgressDisplay display(options.quiet);
-  const auto loaded = uploadScene(*remote, options.scene, display);
+  const auto loaded = uploadWatched(*remote, options.scene, display);
   display.clear();
   if (!loaded) return complain(loaded.error());
   for (const auto& warning : loaded->warnings) warn(warning);

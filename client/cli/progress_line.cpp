@@ -71,8 +71,15 @@ std::string durationText(double seconds) {
   return fmt::format("{} h {:02} min", whole / 3600, whole % 3600 / 60);
 }
 
-std::string progressLine(const ProgressView& view, int columns) {
-  std::string line = view.state + " ";
+namespace {
+
+std::string loadLine(double fraction, int columns) {
+  const double done = std::isfinite(fraction) ? std::clamp(fraction, 0.0, 1.0) : 0.0;
+  return (columns >= kMinColumnsForBar ? bar(done) : "") + fmt::format("{:.0f} %", 100.0 * done);
+}
+
+std::string solveLine(const ProgressView& view, int columns) {
+  std::string line;
   if (columns >= kMinColumnsForBar) line += bar(progressFraction(view.error, view.target_error));
   line += view.unlit.empty() ? fmt::format("error {} of {}", percentText(view.error), percentText(view.target_error))
                              : oneLine(view.unlit);
@@ -84,6 +91,14 @@ std::string progressLine(const ProgressView& view, int columns) {
                       countText(static_cast<std::uint64_t>(std::min(std::max(0.0, view.shots_per_second), kFastest))));
   line += "  " + durationText(view.seconds);
   if (view.seconds_left && view.error > view.target_error) line += ", " + durationText(*view.seconds_left) + " left";
+  return line;
+}
+
+}  // namespace
+
+std::string progressLine(const ProgressView& view, int columns) {
+  auto line = view.state + " ";
+  line += view.load_fraction ? loadLine(*view.load_fraction, columns) : solveLine(view, columns);
   if (columns > 0 && line.size() > static_cast<std::size_t>(columns)) line.resize(static_cast<std::size_t>(columns));
   return line;
 }

@@ -17,8 +17,9 @@ struct ProgressView {
   double shots_per_second = 0.0;
   double seconds = 0.0;  ///< of solving
   std::optional<double> seconds_left = {};
-  bool show_parts = false;  ///< the three parts of the error too
-  std::string unlit = {};   ///< to be told in the place of an error that means nothing; empty: it does
+  bool show_parts = false;                   ///< the three parts of the error too
+  std::optional<double> load_fraction = {};  ///< of a load, in [0, 1]; while `state` is "loading"
+  std::string unlit = {};                    ///< to be told in the place of an error that means nothing; empty: it does
 };
 
 /// Share of the way from an error of 1 to the target, on a log scale, in [0, 1].

@@ -77,7 +77,8 @@ std::string statusText(const protocol::StatusReply& status) {
   const auto row = [&out](std::string_view name, const std::string& value) {
     out += fmt::format("{:<10} {}\n", name, oneLine(value));
   };
-  row("state", stateWord(p.state) + (p.failure.empty() ? "" : ": " + p.failure));
+  const auto loaded = p.fraction ? fmt::format(", {:.0f} % done", 100.0 * *p.fraction) : std::string();
+  row("state", stateWord(p.state) + loaded + (p.failure.empty() ? "" : ": " + p.failure));
   row("revision", std::to_string(p.revision));
   row("error", !p.unlit.empty() ? unlitText(p)
                                 : fmt::format("{} of {} (residual {}, sampling {}, variation {}, discretization {})",
@@ -115,6 +116,7 @@ ProgressView viewOf(const protocol::Progress& progress, double target_error) {
           .seconds = progress.seconds,
           .seconds_left = progress.seconds_left,
           .show_parts = false,
+          .load_fraction = progress.state == "loading" ? progress.fraction : std::nullopt,
           .unlit = progress.unlit.empty() ? "" : unlitText(progress)};
 }
 

@@ -110,7 +110,8 @@ class Watch {
   void onNotification(const protocol::Notification& note) {
     if (const auto* progress = std::get_if<protocol::ProgressNote>(&note)) {
       show(progress->progress);
-      ask_now_ = ask_now_ || (!options_.follow && progress->progress.state != "solving");
+      ask_now_ = ask_now_ ||
+                 (!options_.follow && progress->progress.state != "solving" && progress->progress.state != "loading");
     } else if (const auto* patched = std::get_if<protocol::ScenePatched>(&note)) {
       display_.message(fmt::format("revision {}: edited by {}", patched->revision,
                                    patched->by.empty() ? "somebody" : oneLine(patched->by)));

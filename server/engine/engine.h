@@ -1,5 +1,6 @@
-// The engine's face to the network: values in, values out. All methods are thread-safe. Callbacks and listener calls
-// come from the solve thread and must not block; a session posts them to its own strand.
+// The engine's face to the network: values in, values out. All methods are thread-safe. Listener calls come from the
+// solve thread, callbacks from whichever thread of the engine has the answer; neither may block: a session posts them
+// to its own strand.
 #pragma once
 
 #include <chrono>
@@ -10,7 +11,9 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/bytes.h"
@@ -103,9 +106,10 @@ struct Status {
   std::uint64_t nodes = 0, surfaces = 0, polygons = 0, pages = 0;
   std::map<std::string, double> counters;  ///< skips, culls, times: whatever the solver counts
   std::string gl_renderer;
-  std::vector<std::string> warnings;  ///< the first kStatusWarnings
-  std::uint64_t warning_count = 0;    ///< of all
-  std::string failure;                ///< why, when kFailed or kLimited
+  std::optional<double> load_fraction;  ///< how much of the load is done, in [0, 1]; while kLoading
+  std::vector<std::string> warnings;    ///< the first kStatusWarnings
+  std::uint64_t warning_count = 0;      ///< of all
+  std::string failure;                  ///< why, when kFailed or kLimited
   std::string unlit;  ///< why no light arrives anywhere, so that `error` means nothing; empty: some does
   /// Nothing can be drawn at present (a driver is gone, all renderers died); the solve starts over when it can.
   bool renderer_lost = false;
@@ -153,6 +157,19 @@ struct Lightmaps {
   std::vector<std::shared_ptr<const PageSnapshot>> pages;
 };
 
+/// Who asks for what takes long: a load, a picture, a file. Implicitly made of a name.
+struct Client {
+  Client() = default;
+  Client(std::string by) : name(std::move(by)) {}
+  Client(const char* by) : name(by) {}
+  Client(std::string by, std::uint64_t number, std::stop_token token)
+      : name(std::move(by)), session(number), gone(std::move(token)) {}
+
+  std::string name;           ///< for the history; empty where nobody asked
+  std::uint64_t session = 0;  ///< its connection, among which pictures and files are made in turn; 0: none
+  std::stop_token gone = {};  ///< stopped when it no longer waits: what is not answered by then is called off
+};
+
 struct LoadOutcome {
   std::uint64_t revision = 0;
   std::vector<std::string> warnings;
@@ -173,6 +190,7 @@ struct PatchRequest {
   /// The bytes of an upload that the patch refers to; null: there is no such upload. Called on the solve thread.
   std::function<SharedBytes(const std::string& uri)> find_upload = {};
   Receipt receipt = {};
+  std::uint64_t session = 0;  ///< as Client::session
 };
 
 /// One edit back, or forth again.
@@ -181,6 +199,7 @@ struct StepRequest {
   std::optional<std::uint64_t> base_revision;
   std::string by;
   Receipt receipt = {};
+  std::uint64_t session = 0;  ///< as Client::session
 };
 
 /// Errors of a patch: Error::where = JSON pointer; `operation` in PatchError is the index of the failing operation.
@@ -271,9 +290,12 @@ class Engine {
 
   virtual ~Engine() = default;
 
-  /// `name` is for messages and file names ("room.glb"); `by`: who, for the history, empty where nobody asked for it.
-  virtual void loadBytes(std::string name, SharedBytes bytes, std::string by, Callback<LoadOutcome> done) = 0;
-  virtual void loadFile(std::string path, std::string by, Callback<LoadOutcome> done) = 0;
+  /// `name` is for messages and file names ("room.glb"). The present scene stays, can be edited and is solved on until
+  /// the new one is ready to take its place. kCancelled: the client has gone, another load came, or the end
+  /// (callOff()); then the present scene stays for good. Edits by the client's own session wait for its load, and so
+  /// does everything else that needs a scene where none is there yet.
+  virtual void loadBytes(std::string name, SharedBytes bytes, Client client, Callback<LoadOutcome> done) = 0;
+  virtual void loadFile(std::string path, Client client, Callback<LoadOutcome> done) = 0;
   /// The scene to start with: goes on with the one that outlived the last process, edits included, if there is one,
   /// with a warning where that was not loaded from the very same file; unless it is to be taken anew.
   virtual void openFile(std::string path, bool /*anew*/, Callback<LoadOutcome> done) {
@@ -296,7 +318,7 @@ class Engine {
   /// evenly in the logarithm of time.
   [[nodiscard]] virtual SolveHistory solveHistory() const = 0;
   /// How long the solve thread has been at its present slice or command; 0 while it waits for one. Slices take less
-  /// than a second, loads of large scenes minutes.
+  /// than a second.
   [[nodiscard]] virtual double busySeconds() const = 0;
 
   /// Until the last of what this returns is let go, the quantity is published: now, and whenever it has changed. What
@@ -312,15 +334,18 @@ class Engine {
     std::string gltf;
   };
   virtual void sceneText(Callback<SceneText> done) = 0;
+
+  // Files and pictures show the moment at which their turn comes. They are made one at a time, those of sessions in
+  // turn, beside the solve and the edits. kCancelled: the client has gone, or the end is near (callOff()).
   /// GLB with TEXCOORD_1 and extras.lightmap on every lit primitive. `layout`: of that Lightmaps::layout, or
   /// kStaleRevision where pages are laid out otherwise by now (or not yet so, for a number of another process); none:
   /// as it is.
-  virtual void sceneGlb(std::optional<std::uint64_t> layout, Callback<SharedBytes> done) = 0;
+  virtual void sceneGlb(std::optional<std::uint64_t> layout, Client client, Callback<SharedBytes> done) = 0;
   /// GLB with KHR_materials_unlit textures, tone-mapped.
-  virtual void unlitGlb(Callback<SharedBytes> done) = 0;
+  virtual void unlitGlb(Client client, Callback<SharedBytes> done) = 0;
   /// OpenEXR, row 0 = v 0: 32-bit float RGB, or one channel "Y" of 32-bit whole numbers.
-  virtual void lightmapExr(std::uint32_t page, Quantity quantity, Callback<SharedBytes> done) = 0;
-  virtual void snapshot(SnapshotRequest request, Callback<Snapshot> done) = 0;
+  virtual void lightmapExr(std::uint32_t page, Quantity quantity, Client client, Callback<SharedBytes> done) = 0;
+  virtual void snapshot(SnapshotRequest request, Client client, Callback<Snapshot> done) = 0;
   /// kNotFound where there is no such texel, or it belongs to no surface: Error::where is "page", "x" or "y". May be
   /// asked often, by many: what it takes is made for all of them together, and seldom while the solve goes on; of a
   /// layout that has just come kBusy instead.
@@ -331,6 +356,8 @@ class Engine {
     static const Past kNothing;
     return kNothing;
   }
+  /// The end is near: calls off the load, the pictures and the files under way, and refuses others, with kCancelled.
+  virtual void callOff() {}
   /// The end is near: brings what was solved so far to the disk, where state is kept. Blocks, at most so long; then the
   /// last checkpoint stays.
   virtual void keepSolve(std::chrono::milliseconds /*patience*/) {}

@@ -6,7 +6,6 @@
 #include <ImfIO.h>
 #include <ImfOutputFile.h>
 #include <ImfStringAttribute.h>
-#include <stb_image_write.h>
 
 #include <algorithm>
 #include <cmath>
@@ -16,8 +15,16 @@
 #include <string>
 #include <vector>
 
+#include "common/parallel.h"
+#include "common/task.h"
+#include "server/scene/png.h"
+
 namespace radiosity::engine {
 namespace {
+
+/// That are compressed between two interruption points: whole blocks of 16, as ZIP_COMPRESSION has them.
+constexpr int kExrRows = 64;
+constexpr std::size_t kPixelsAThread = 20'000;
 
 /// OpenEXR writes into a growing buffer.
 class MemoryStream : public Imf::OStream {
@@ -99,18 +106,17 @@ Result<Bytes> writeExr(int width, int height, Quantity quantity, const std::vect
     {
       Imf::OutputFile file(stream, header);
       file.setFrameBuffer(frame);
-      file.writePixels(height);
+      for (int row = 0; row < height; row += kExrRows) {
+        interruptionPoint();
+        file.writePixels(std::min(kExrRows, height - row));
+      }
     }
     return std::move(stream.bytes);
+  } catch (const Interrupted&) {
+    throw;
   } catch (const std::exception& e) {
     return fail(ErrorCode::kInternal, std::string("OpenEXR: ") + e.what());
   }
-}
-
-void appendBytes(void* context, void* data, int size) {
-  auto& bytes = *static_cast<Bytes*>(context);
-  const auto* first = static_cast<const std::uint8_t*>(data);
-  bytes.insert(bytes.end(), first, first + size);
 }
 
 }  // namespace
@@ -136,6 +142,7 @@ Image dithered(Image display) {
     return order;
   };
   for (int row = 0; row < display.height; ++row) {
+    interruptionPoint();
     for (int column = 0; column < display.width; ++column) {
       const auto order = orderAt(static_cast<std::uint32_t>(column) % 8, static_cast<std::uint32_t>(row) % 8);
       const float move = ((static_cast<float>(order) + 0.5F) / 64.0F - 0.5F) / 255.0F;
@@ -145,30 +152,32 @@ Image dithered(Image display) {
   return display;
 }
 
-Result<Bytes> encodePng(const Image& display) {
+Bytes encodePng(const Image& display) {
   std::vector<std::uint8_t> rgb(display.pixels.size() * 3);
   for (std::size_t i = 0; i < display.pixels.size(); ++i) {
+    interruptionPoint();
     for (int c = 0; c < 3; ++c) {
       rgb[3 * i + static_cast<std::size_t>(c)] =
           static_cast<std::uint8_t>(std::lround(255.0F * std::clamp(display.pixels[i][c], 0.0F, 1.0F)));
     }
   }
-  Bytes bytes;
-  if (stbi_write_png_to_func(appendBytes, &bytes, display.width, display.height, 3, rgb.data(), display.width * 3) ==
-      0) {
-    return fail(ErrorCode::kInternal, "the PNG encoder ran out of memory");
-  }
-  return bytes;
+  return scene::encodePng(display.width, display.height, 3, rgb);
 }
 
 Image toneMap(const Image& radiance, float exposure) {
+  constexpr float kMost = 1e30F;  // white, and no number that overflows on the way
   Image display(radiance.width, radiance.height);
-  std::transform(
-      radiance.pixels.begin(), radiance.pixels.end(), display.pixels.begin(), [exposure](const glm::vec3& pixel) {
-        constexpr float kMost = 1e30F;  // white, and no number that overflows on the way
-        const glm::vec3 mapped = neutralCurve(glm::clamp(pixel * exposure, glm::vec3(0.0F), glm::vec3(kMost)));
-        return glm::vec3(encodeSrgb(mapped.r), encodeSrgb(mapped.g), encodeSrgb(mapped.b));
-      });
+  const auto width = static_cast<std::size_t>(radiance.width);
+  const auto mapRow = [&](std::size_t row) {
+    const auto first = radiance.pixels.begin() + static_cast<std::ptrdiff_t>(row * width);
+    std::transform(first, first + radiance.width, display.pixels.begin() + static_cast<std::ptrdiff_t>(row * width),
+                   [exposure](const glm::vec3& pixel) {
+                     const glm::vec3 mapped =
+                         neutralCurve(glm::clamp(pixel * exposure, glm::vec3(0.0F), glm::vec3(kMost)));
+                     return glm::vec3(encodeSrgb(mapped.r), encodeSrgb(mapped.g), encodeSrgb(mapped.b));
+                   });
+  };
+  inTurns(static_cast<std::size_t>(radiance.height), mapRow, radiance.pixels.size() / kPixelsAThread);
   return display;
 }
 

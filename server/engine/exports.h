@@ -21,6 +21,6 @@ namespace radiosity::engine {
 [[nodiscard]] Image dithered(Image display);
 
 /// 8-bit RGB PNG of an image already in [0, 1] and sRGB-encoded.
-[[nodiscard]] Result<Bytes> encodePng(const Image& display);
+[[nodiscard]] Bytes encodePng(const Image& display);
 
 }  // namespace radiosity::engine

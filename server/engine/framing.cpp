@@ -4,11 +4,13 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <functional>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <map>
 #include <vector>
 
+#include "common/task.h"
 #include "server/scene/bvh.h"
 
 namespace radiosity::engine {
@@ -25,7 +27,7 @@ double luminance(const glm::vec3& c) {
 
 /// The value below which the given share of the weight lies. Sorts; 0 when there is no weight.
 double weightedQuantile(std::vector<std::pair<double, double>>& value_weight, double share) {
-  std::sort(value_weight.begin(), value_weight.end());
+  std::sort(value_weight.begin(), value_weight.end(), interruptible(std::less<>()));
   double total = 0.0;
   for (const auto& entry : value_weight) total += entry.second;
   double sum = 0.0;
@@ -323,11 +325,17 @@ scene::Camera frameScene(const scene::Scene& scene, const scene::PatchScene& pat
   std::vector<View> views;
   addOutside(scout, aspect, views);
   addInside(scout, 1.0 / patches.scale, aspect, views);
-  for (auto& view : views) view.score = scout.score(view, 16);
+  for (auto& view : views) {
+    interruptionPoint();
+    view.score = scout.score(view, 16);
+  }
   const auto better = [](const View& a, const View& b) { return a.score > b.score; };
   std::stable_sort(views.begin(), views.end(), better);
   views.resize(std::min(views.size(), kFinalists));
-  for (auto& view : views) view.score = scout.score(view, 44);
+  for (auto& view : views) {
+    interruptionPoint();
+    view.score = scout.score(view, 44);
+  }
   std::stable_sort(views.begin(), views.end(), better);
   const View& best = views.front();
   scene::Camera camera;
@@ -339,14 +347,9 @@ scene::Camera frameScene(const scene::Scene& scene, const scene::PatchScene& pat
   return camera;
 }
 
-Result<scene::Camera> chooseCamera(const LitScene& lit, const std::string& wanted, double aspect) {
-  const auto& cameras = lit.scene().cameras;
-  if (wanted.empty()) {
-    if (!cameras.empty()) return cameras.front();
-    std::vector<Image> pages;
-    for (auto& page : lit.pages()) pages.push_back(std::move(page.irradiance));
-    return frameScene(lit.scene(), lit.patches(), pages, aspect);
-  }
+Result<std::optional<scene::Camera>> chooseCamera(const scene::Scene& scene, const std::string& wanted) {
+  const auto& cameras = scene.cameras;
+  if (wanted.empty()) return cameras.empty() ? std::nullopt : std::optional(cameras.front());
   for (const auto& camera : cameras) {
     if (camera.name == wanted) return camera;
   }
@@ -362,6 +365,7 @@ Result<scene::Camera> chooseCamera(const LitScene& lit, const std::string& wante
 std::optional<float> exposureOf(const Image& radiance) {
   std::vector<std::pair<double, double>> lit;
   for (const auto& pixel : radiance.pixels) {
+    interruptionPoint();
     const double value = luminance(pixel);
     // By its fourth root neither a large dark nor a small bright area outweighs what one wants to see: lamps of 2,000
     // times its light would have to cover an eighth of the picture, a dark of a thousandth 85 %.

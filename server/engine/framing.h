@@ -1,5 +1,5 @@
 // Which camera a picture is taken from when nobody placed one, and how bright it is shown. Pure functions of values;
-// called on the solve thread.
+// any thread.
 #pragma once
 
 #include <optional>
@@ -8,15 +8,14 @@
 
 #include "common/image.h"
 #include "common/result.h"
-#include "server/engine/lit_scene.h"
 #include "server/scene/patch_scene.h"
 #include "server/scene/scene.h"
 
 namespace radiosity::engine {
 
-/// The camera of that name or index; empty: the scene's first camera, or the one frameScene finds. `aspect`: the
-/// picture's width / height. kNotFound: no camera of that name.
-[[nodiscard]] Result<scene::Camera> chooseCamera(const LitScene& lit, const std::string& wanted, double aspect);
+/// The camera of that name or index; empty: the scene's first camera, nothing where it has none: frameScene() finds
+/// one. kNotFound: no camera of that name.
+[[nodiscard]] Result<std::optional<scene::Camera>> chooseCamera(const scene::Scene& scene, const std::string& wanted);
 
 /// Tries eyes inside the lit part of the scene (near its corners and sides, looking across) and outside it (the whole
 /// scene in view), casts a few hundred rays from each and takes the one that sees most lit surface and most different

@@ -9,6 +9,7 @@
 #include <numeric>
 #include <optional>
 
+#include "common/task.h"
 #include "server/scene/emitters.h"
 #include "server/scene/material_of.h"
 #include "server/solver/lost_light.h"
@@ -66,6 +67,7 @@ class Lamps {
   explicit Lamps(const LitParts& parts) : parts_(parts), of_(parts.scene.instances.size()) {
     std::size_t side = 0;
     for (const auto& surface : parts.patches.surfaces) {
+      interruptionPoint();
       for (std::uint32_t k = 0; k < 2; ++k) {
         if (surface.first_node[k] == kNone) continue;
         if (isLamp(surface.instance)) add(surface, k, parts.materials.emission.side(side));

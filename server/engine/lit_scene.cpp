@@ -6,12 +6,15 @@
 #include <utility>
 
 #include "common/give_back.h"
+#include "common/task.h"
 #include "server/engine/carried_light.h"
 #include "server/scene/burial_record.h"
 #include "server/scene/emitters.h"
 
 namespace radiosity::engine {
 namespace {
+
+constexpr std::size_t kMakeSteps = 10;  ///< of the progress that is told
 
 std::uint64_t leavesWithArea(const scene::PatchScene& patches) {
   std::uint64_t count = 0;
@@ -45,6 +48,7 @@ Result<std::unique_ptr<LitScene>> LitScene::make(scene::EditedDocument edited, c
   auto built = scene::buildWithRecord(*lit->scene_, lit->chartOptions(), before ? &*before : nullptr,
                                       former != nullptr ? former->burial_.get() : nullptr);
   if (!built) return tl::unexpected<Error>(built.error());
+  interruptionPoint(9, kMakeSteps);
   lit->take(std::move(*built));
   return lit;
 }
@@ -106,7 +110,7 @@ bool LitScene::outgrows(const SolveSettings& settings) const {
 
 scene::SideBits LitScene::sides() const { return scene::sidesOf(*scene_, *patches_); }
 
-LitParts LitScene::litParts() const { return {document_, *scene_, *patches_, materials_, sources_}; }
+LitParts LitScene::litParts() const { return {*document_, *scene_, *patches_, materials_, sources_}; }
 
 void LitScene::reportLight() { light_report_.findLost(litParts(), *solver_); }
 
@@ -231,9 +235,10 @@ std::uint64_t LitScene::affectedBy(const SceneChange& change, const scene::Scene
   }));
 }
 
-scene::Document LitScene::reshade(scene::Document document, std::shared_ptr<const scene::Scene> next,
-                                  const SceneChange& change) {
-  auto before = std::exchange(document_, std::move(document));
+std::shared_ptr<const scene::Document> LitScene::reshade(scene::Document document,
+                                                         std::shared_ptr<const scene::Scene> next,
+                                                         const SceneChange& change) {
+  auto before = std::exchange(document_, std::make_shared<const scene::Document>(std::move(document)));
   scene_ = std::move(next);
   const bool was_stale = std::exchange(stale_, true);
   for (const auto material : change.materials) {

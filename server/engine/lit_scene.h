@@ -90,16 +90,20 @@ class LitScene {
 
   /// Takes over what leaves the geometry as it is. Where memory runs out in it the scene is the edited one, and
   /// stale. Returns the document before: to destroy it takes a hundredth of the time that a small edit does.
-  scene::Document reshade(scene::Document document, std::shared_ptr<const scene::Scene> next,
-                          const SceneChange& change);
+  std::shared_ptr<const scene::Document> reshade(scene::Document document, std::shared_ptr<const scene::Scene> next,
+                                                 const SceneChange& change);
 
   /// Shows `before`'s light, on the charts that are still there, until this scene's own is as good. `same_layout`: of
   /// keepsLayoutOf(before); then all of it stays as it is.
   void fadeFrom(LitScene& before, bool same_layout);
 
-  [[nodiscard]] const scene::Document& document() const { return document_; }
+  [[nodiscard]] const scene::Document& document() const { return *document_; }
   [[nodiscard]] const scene::Scene& scene() const { return *scene_; }
   [[nodiscard]] const scene::PatchScene& patches() const { return *patches_; }
+  // The same for another thread, which may keep them after the next edit.
+  [[nodiscard]] const std::shared_ptr<const scene::Document>& sharedDocument() const { return document_; }
+  [[nodiscard]] const std::shared_ptr<const scene::Scene>& sharedScene() const { return scene_; }
+  [[nodiscard]] const std::shared_ptr<const scene::PatchScene>& sharedPatches() const { return patches_; }
   [[nodiscard]] const scene::PatchMaterials& materials() const { return materials_; }
   [[nodiscard]] solver::Solver& solver() { return *solver_; }
   [[nodiscard]] const solver::Solver& solver() const { return *solver_; }
@@ -138,7 +142,9 @@ class LitScene {
   /// Another sky for scenes that have none of their own. True: it changes the light.
   bool setSky(const SolveSettings& settings);
 
-  /// Finished pages of the solver's present irradiance (filled, stitched, dilated).
+  /// The solver's present irradiance by node, lux, nowhere below 0.
+  [[nodiscard]] std::vector<glm::vec3> ownLight() const;
+  /// Finished pages of it (filled, stitched, dilated).
   [[nodiscard]] std::vector<scene::LightmapPage> pages() const;
   /// What viewers see: after an edit the light that was there before fades into pages() as these become as good.
   [[nodiscard]] std::vector<scene::LightmapPage> shownPages();
@@ -165,7 +171,7 @@ class LitScene {
 
  private:
   LitScene(scene::EditedDocument edited, const SolveSettings& settings, solver::Transport& transport)
-      : document_(std::move(edited.document)),
+      : document_(std::make_shared<const scene::Document>(std::move(edited.document))),
         settings_(settings),
         transport_(transport),
         scene_(std::make_shared<const scene::Scene>(std::move(edited.scene))) {}
@@ -185,7 +191,6 @@ class LitScene {
   [[nodiscard]] LitParts litParts() const;
   void makeSolver(const solver::FormerSolver* former = nullptr);
   void updateSolver(bool materials, bool lights);
-  [[nodiscard]] std::vector<glm::vec3> ownLight() const;
   [[nodiscard]] std::vector<scene::LightmapPage> pagesOfNow();
   void makeOldPages();
   void makeOldDirectPages();
@@ -202,7 +207,7 @@ class LitScene {
   /// What was built of scene_.
   void take(scene::BuiltScene built);
 
-  scene::Document document_;
+  std::shared_ptr<const scene::Document> document_;
   SolveSettings settings_;
   solver::Transport& transport_;
   std::shared_ptr<const scene::Scene> scene_;

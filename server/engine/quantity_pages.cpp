@@ -85,24 +85,34 @@ std::vector<IdImage> idPages(const LitScene& lit, Quantity quantity) {
 
 }  // namespace
 
-QuantityPages makePages(const LitScene& lit, Quantity quantity) {
-  const auto& patches = lit.patches();
+QuantityValues readQuantity(const LitScene& lit, Quantity quantity) {
   switch (quantity) {
     case Quantity::kIrradiance:
-      return {quantity, lit.pages(), {}, false};
+      return {quantity, lit.ownLight(), {}, false};
     case Quantity::kRadiosity:
-      return {quantity, assemblePages(patches, radiosity(lit), Seams::kLeft), {}, false};
+      return {quantity, radiosity(lit), {}, false};
     case Quantity::kError:
-      return {quantity, assemblePages(patches, errorSquared(lit), Seams::kLeft), {}, true};
+      return {quantity, errorSquared(lit), {}, true};
     case Quantity::kUnshot:
-      return {quantity, assemblePages(patches, lit.solver().unshot(), Seams::kLeft), {}, false};
+      return {quantity, lit.solver().unshot(), {}, false};
     case Quantity::kNormal:
-      return {quantity, assemblePages(patches, normals(lit), Seams::kLeft), {}, false};
+      return {quantity, normals(lit), {}, false};
     case Quantity::kPatchId:
     case Quantity::kMipLevel:
       break;
   }
   return {quantity, {}, idPages(lit, quantity), false};
+}
+
+QuantityPages assemble(const scene::PatchScene& patches, QuantityValues values) {
+  QuantityPages pages{values.quantity, {}, std::move(values.ids), values.squared};
+  const auto seams = values.quantity == Quantity::kIrradiance ? Seams::kStitched : Seams::kLeft;
+  if (!holdsIds(values.quantity)) pages.values = assemblePages(patches, values.nodes, seams);
+  return pages;
+}
+
+QuantityPages makePages(const LitScene& lit, Quantity quantity) {
+  return assemble(lit.patches(), readQuantity(lit, quantity));
 }
 
 Image shown(const QuantityPages& pages, Image values) {

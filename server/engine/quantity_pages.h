@@ -1,4 +1,5 @@
-// The lit scene as lightmaps of any quantity. Pure functions of the solver's present state; solve thread.
+// The lit scene as lightmaps of any quantity. Reading the solver's present state is the solve thread's; pages can be
+// assembled of what was read anywhere.
 #pragma once
 
 #include <vector>
@@ -18,7 +19,19 @@ struct QuantityPages {
   [[nodiscard]] std::size_t size() const { return values.empty() ? ids.size() : values.size(); }
 };
 
-/// Costs a pass over all leaves and pages; irradiance also stitches seams.
+/// A quantity as the solver has it at one moment.
+struct QuantityValues {
+  Quantity quantity = Quantity::kIrradiance;
+  std::vector<glm::vec3> nodes;  ///< by node; empty where the quantity is whole numbers
+  std::vector<IdImage> ids;      ///< finished pages of those
+  bool squared = false;          ///< as QuantityPages::squared
+};
+
+/// Costs a pass over all leaves.
+[[nodiscard]] QuantityValues readQuantity(const LitScene& lit, Quantity quantity);
+/// Costs a pass over all pages; irradiance also stitches seams. `patches`: of the scene that was read. Any thread.
+[[nodiscard]] QuantityPages assemble(const scene::PatchScene& patches, QuantityValues values);
+/// Both.
 [[nodiscard]] QuantityPages makePages(const LitScene& lit, Quantity quantity);
 
 /// Root of each value, where `pages` holds squares; else as they are. What extrapolation made negative is 0.

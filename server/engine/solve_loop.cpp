@@ -48,14 +48,17 @@ SolveLoop::SolveLoop(EngineOptions options)
 
 SolveLoop::~SolveLoop() {
   queue_.close();
+  if (long_work_) callOff();
   {
     const std::scoped_lock lock(mutex_);
     if (transport_) transport_->interrupt();
   }
   if (thread_.joinable()) thread_.join();
+  long_work_.reset();
 }
 
 Result<void> SolveLoop::start() {
+  long_work_ = std::make_unique<LongWork>(kMaxQueue, [this] { view_.reset(); });
   // The thread owns the promise: here it would go while set_value() is still at work on it.
   std::promise<Result<void>> started;
   auto outcome = started.get_future();
@@ -88,11 +91,12 @@ void SolveLoop::threadMain(std::promise<Result<void>> started) {
     takeTurn();
   }
   checkpoints_.reset();
+  load_.reset();
+  former_load_.reset();
   first_light_.reset();
   texels_.forget();
   former_.reset();
   lit_.reset();
-  view_.reset();
   const std::scoped_lock lock(mutex_);
   transport_.reset();
 }
@@ -110,12 +114,7 @@ bool SolveLoop::runCommands() {
   } while (due->empty() && hasNothingToDo());
   for (const auto& command : *due) {
     if (queue_.closed()) return false;
-    try {
-      command();
-    } catch (const std::bad_alloc&) {  // of the answer: what was asked is done
-      log::error("out of memory: an answer was dropped");
-    }
-    beat();
+    runCommand(command);
   }
   return true;
 }
@@ -124,11 +123,21 @@ bool SolveLoop::hasNothingToDo() const {
   return first_light_ ? !first_light_->goes_on : state_ != SolveState::kSolving && !isBehind();
 }
 
+void SolveLoop::runCommand(const CommandQueue::Command& command) {
+  try {
+    command();
+  } catch (const std::bad_alloc&) {  // of the answer: what was asked is done
+    log::error("out of memory: an answer was dropped");
+  }
+  beat();
+}
+
 /// Where memory runs out in it the solve has failed: whatever frees some, an edit or a smaller scene, starts another.
 void SolveLoop::takeTurn() {
   texels_.keepOnly(publisher_.layout());
   try {
     welcomeWatchers();
+    if (load_) loadTurn();
     if (first_light_)
       firstLightSlice();
     else if (state_ == SolveState::kSolving)
@@ -266,7 +275,9 @@ void SolveLoop::tellLostLight() {
 
 void SolveLoop::updateStatus(bool announce, bool as_reported) {
   Status status = as_reported ? status_ : lit_ && !first_light_ ? reportStatus(*lit_, seconds_) : Status{};
-  status.state = state_;
+  status.state = load_ ? SolveState::kLoading : state_;
+  status.load_fraction.reset();
+  if (load_) status.load_fraction = load_->task()->fraction();
   status.revision = revision_;
   status.tile_version = publisher_.version();
   status.layout_since = publisher_.layoutSince();
@@ -295,6 +306,7 @@ void SolveLoop::updateStatus(bool announce, bool as_reported) {
   status.gl_renderer = transport_->description();
   {
     const std::scoped_lock lock(mutex_);
+    if (!load_) load_task_.reset();
     status_ = status;
     if (announce) error_history_.add(status.seconds, status.error);
   }
@@ -307,6 +319,7 @@ Status SolveLoop::status() const {
   const std::scoped_lock lock(mutex_);
   auto status = status_;
   if (loads_ > 0 && status.state == SolveState::kEmpty) status.state = SolveState::kLoading;
+  if (status.state == SolveState::kLoading) status.load_fraction = load_task_ ? load_task_->fraction() : 0.0;
   return status;
 }
 

@@ -1,186 +1,130 @@
-// What can be fetched from the solve thread: the document, files in memory, pictures, single texels.
+// What can be fetched: the document, files in memory, pictures, single texels. Files and pictures are made on the
+// thread of long work, of what is read here, on the solve thread, when their turn has come.
 #include <fmt/format.h>
-#include <map>
 #include <memory>
 #include <optional>
 #include <utility>
 
 #include "server/engine/exports.h"
 #include "server/engine/framing.h"
+#include "server/engine/picture.h"
 #include "server/engine/quantity_pages.h"
 #include "server/engine/solve_loop_class.h"
-#include "server/gpu/view_sky.h"
 #include "server/scene/lightmap.h"
 
 namespace radiosity::engine {
 namespace {
 
-/// Stated error from which on a snapshot shows the solver's own light after an edit.
-constexpr double kPresentable = 0.5;
 /// So many may wait for the pages that single texels are read from.
 constexpr std::size_t kMostAwaited = 1024;
+
+Result<SharedBytes> shared(Result<Bytes> bytes) {
+  if (!bytes) return tl::unexpected<Error>(bytes.error());
+  return std::make_shared<const Bytes>(std::move(*bytes));
+}
+
+/// The document, the scene and the charts that belong together, for another thread.
+struct GlbParts {
+  std::shared_ptr<const scene::Document> document;
+  std::shared_ptr<const scene::Scene> scene;
+  std::shared_ptr<const scene::PatchScene> patches;
+  std::pair<std::uint64_t, std::uint64_t> moment;  ///< layout and revision
+  QuantityValues values;                           ///< what is on its pages, where it has any
+};
+
+/// What the eye would see: colours and lamps are on the pages, since the materials that showed them are gone. One
+/// exposure for all pages.
+std::vector<Image> displayPages(QuantityPages radiosity) {
+  std::vector<Image> display;
+  for (auto& page : radiosity.values) display.push_back(std::move(page.irradiance));
+  Image all;
+  for (auto& image : display) {
+    interruptionPoint();
+    for (auto& pixel : image.pixels) pixel *= static_cast<float>(1.0 / 3.14159265358979);
+    all.pixels.insert(all.pixels.end(), image.pixels.begin(), image.pixels.end());
+  }
+  const float exposure = autoExposure(all);
+  for (auto& image : display) image = toneMap(image, exposure);
+  return display;
+}
 
 }  // namespace
 
 void SolveLoop::sceneText(Callback<SceneText> done) {
-  askLit<SceneText>(
-      std::move(done),
-      [this]() -> Result<SceneText> {
-        return SceneText{revision_,
-                         lit_->document().gltf.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)};
-      },
-      CommandQueue::Kind::kPrompt);
+  askOf<SceneText>(Needs::kScene, 0, std::move(done), [this]() -> Result<SceneText> {
+    if (!lit_) return noScene();
+    return SceneText{revision_, lit_->document().gltf.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)};
+  });
 }
 
 /// Who asks while others are still being sent the same shares it with them: a copy for everyone could fill the machine.
-Result<SharedBytes> SolveLoop::makeGlb() {
-  const std::pair here(publisher_.layout(), revision_);
-  if (auto known = glb_.lock(); known != nullptr && glb_of_ == here) return known;
-  const auto lit = scene::withLightmapUvs(lit_->document(), lit_->scene(), lit_->patches());
-  if (!lit) return tl::unexpected<Error>(lit.error());
-  auto glb = scene::writeGlb(*lit);
-  if (!glb) return tl::unexpected<Error>(glb.error());
-  auto made = std::make_shared<const Bytes>(std::move(*glb));
-  glb_ = made;
-  glb_of_ = here;
-  return made;
-}
-
-void SolveLoop::sceneGlb(std::optional<std::uint64_t> layout, Callback<SharedBytes> done) {
-  askLit<SharedBytes>(std::move(done), [this, layout]() -> Result<SharedBytes> {
+Result<SharedBytes> SolveLoop::makeGlb(std::optional<std::uint64_t> layout) {
+  const auto parts = fromSolveThread([this, layout]() -> Result<GlbParts> {
     if (layout && *layout != publisher_.layout())
       return fail(
           ErrorCode::kStaleRevision,
           fmt::format("the lightmaps have another layout, {}: what the newest `lightmaps` names is to be fetched",
                       publisher_.layout()),
           fmt::format("?layout={}", *layout));
-    return makeGlb();
+    return GlbParts{lit_->sharedDocument(),
+                    lit_->sharedScene(),
+                    lit_->sharedPatches(),
+                    std::pair(publisher_.layout(), revision_),
+                    {}};
   });
+  if (!parts) return tl::unexpected<Error>(parts.error());
+  if (auto known = glb_.lock(); known != nullptr && glb_of_ == parts->moment) return known;
+  const auto lit = scene::withLightmapUvs(*parts->document, *parts->scene, *parts->patches);
+  if (!lit) return tl::unexpected<Error>(lit.error());
+  auto made = shared(scene::writeGlb(*lit));
+  if (!made) return made;
+  glb_ = *made;
+  glb_of_ = parts->moment;
+  return made;
+}
+
+void SolveLoop::sceneGlb(std::optional<std::uint64_t> layout, Client client, Callback<SharedBytes> done) {
+  askLong<SharedBytes>(client, std::move(done), [this, layout] { return makeGlb(layout); });
 }
 
 Result<SharedBytes> SolveLoop::makeUnlit() {
-  // What the eye would see: colours and lamps are on the pages, since the materials that showed them are gone. One
-  // exposure for all pages.
-  std::vector<Image> display;
-  auto radiosity = makePages(*lit_, Quantity::kRadiosity);
-  for (auto& page : radiosity.values) display.push_back(std::move(page.irradiance));
-  for (auto& image : display) {
-    for (auto& pixel : image.pixels) pixel *= static_cast<float>(1.0 / 3.14159265358979);
-  }
-  Image all;
-  for (const auto& image : display) all.pixels.insert(all.pixels.end(), image.pixels.begin(), image.pixels.end());
-  const float exposure = autoExposure(all);
-  for (auto& image : display) image = toneMap(image, exposure);
-  auto bytes = scene::writeUnlitGlb(lit_->document(), lit_->scene(), lit_->patches(), display);
-  if (!bytes) return tl::unexpected<Error>(bytes.error());
-  return std::make_shared<const Bytes>(std::move(*bytes));
+  auto parts = fromSolveThread([this]() -> Result<GlbParts> {
+    return GlbParts{lit_->sharedDocument(), lit_->sharedScene(), lit_->sharedPatches(),
+                    std::pair(publisher_.layout(), revision_), readQuantity(*lit_, Quantity::kRadiosity)};
+  });
+  if (!parts) return tl::unexpected<Error>(parts.error());
+  const auto display = displayPages(assemble(*parts->patches, std::move(parts->values)));
+  return shared(scene::writeUnlitGlb(*parts->document, *parts->scene, *parts->patches, display));
 }
 
-void SolveLoop::unlitGlb(Callback<SharedBytes> done) {
-  askLit<SharedBytes>(std::move(done), [this] { return makeUnlit(); });
+void SolveLoop::unlitGlb(Client client, Callback<SharedBytes> done) {
+  askLong<SharedBytes>(client, std::move(done), [this] { return makeUnlit(); });
 }
 
 Result<SharedBytes> SolveLoop::makeExr(std::uint32_t page, Quantity quantity) {
-  const auto pages = makePages(*lit_, quantity);
-  if (page >= pages.size()) {
-    return fail(ErrorCode::kNotFound, "there is no lightmap page " + std::to_string(page) + " (there are " +
-                                          std::to_string(pages.size()) + ")");
-  }
-  auto bytes = holdsIds(quantity) ? encodeExr(pages.ids[page], quantity)
-                                  : encodeExr(shown(pages, pages.values[page].irradiance), quantity);
-  if (!bytes) return tl::unexpected<Error>(bytes.error());
-  return std::make_shared<const Bytes>(std::move(*bytes));
+  auto parts = fromSolveThread([this, page, quantity]() -> Result<GlbParts> {
+    const auto pages = lit_->patches().pages.size();
+    if (page >= pages)
+      return fail(ErrorCode::kNotFound,
+                  "there is no lightmap page " + std::to_string(page) + " (there are " + std::to_string(pages) + ")");
+    return GlbParts{nullptr, nullptr, lit_->sharedPatches(), {}, readQuantity(*lit_, quantity)};
+  });
+  if (!parts) return tl::unexpected<Error>(parts.error());
+  auto pages = assemble(*parts->patches, std::move(parts->values));
+  return shared(holdsIds(quantity) ? encodeExr(pages.ids[page], quantity)
+                                   : encodeExr(shown(pages, std::move(pages.values[page].irradiance)), quantity));
 }
 
-void SolveLoop::lightmapExr(std::uint32_t page, Quantity quantity, Callback<SharedBytes> done) {
-  askLit<SharedBytes>(std::move(done), [this, page, quantity] { return makeExr(page, quantity); });
+void SolveLoop::lightmapExr(std::uint32_t page, Quantity quantity, Client client, Callback<SharedBytes> done) {
+  askLong<SharedBytes>(client, std::move(done), [this, page, quantity] { return makeExr(page, quantity); });
 }
 
-namespace {
-
-struct SnapshotQuantity {
-  gpu::ViewQuantity view;
-  Quantity pages;
-  bool photometric;  ///< exposed and tone-mapped
-};
-
-/// Unshot radiosity is looked at as irradiance is: both are lumens per square metre on the page.
-const std::map<std::string, SnapshotQuantity>& snapshotQuantities() {
-  static const std::map<std::string, SnapshotQuantity> kAll = {
-      {"lit", {gpu::ViewQuantity::kLit, Quantity::kIrradiance, true}},
-      {"irradiance", {gpu::ViewQuantity::kIrradiance, Quantity::kIrradiance, true}},
-      {"radiosity", {gpu::ViewQuantity::kRadiosity, Quantity::kIrradiance, true}},
-      {"unshot", {gpu::ViewQuantity::kIrradiance, Quantity::kUnshot, true}},
-      {"error", {gpu::ViewQuantity::kError, Quantity::kError, false}},
-      {"patchId", {gpu::ViewQuantity::kPatchId, Quantity::kIrradiance, false}},
-      {"mipLevel", {gpu::ViewQuantity::kMipLevel, Quantity::kMipLevel, false}},
-      {"normal", {gpu::ViewQuantity::kNormal, Quantity::kIrradiance, false}}};
-  return kAll;
-}
-
-/// Pages as the view renderer takes them; where there is no number it draws 0.
-std::vector<Image> pageImages(QuantityPages pages) {
-  std::vector<Image> images;
-  for (auto& page : pages.values) images.push_back(shown(pages, std::move(page.irradiance)));
-  for (const auto& page : pages.ids) {
-    auto& image = images.emplace_back(page.width, page.height);
-    for (std::size_t i = 0; i < page.ids.size(); ++i)
-      image.pixels[i] = glm::vec3(page.ids[i] == kNoId ? 0.0F : static_cast<float>(page.ids[i]));
-  }
-  return images;
-}
-
-/// A driver that resets the card takes the context away at any time: then once more, on a new one.
-Result<gpu::ViewPicture> draw(std::unique_ptr<gpu::ViewRenderer>& renderer, const LitScene& lit,
-                              const std::vector<Image>& pages, const gpu::ViewRequest& view) {
-  const bool fresh = renderer == nullptr;
-  if (fresh) {
-    auto made = gpu::makeViewRenderer();
-    if (!made) return tl::unexpected<Error>(made.error());
-    renderer = std::move(*made);
-  }
-  auto picture = renderer->render(lit.scene(), lit.patches(), pages, view);
-  if (picture) return picture;
-  renderer.reset();
-  const bool lost = picture.error().code == ErrorCode::kUnavailable;
-  return lost && !fresh ? draw(renderer, lit, pages, view) : picture;
-}
-
-}  // namespace
-
-Result<Snapshot> SolveLoop::renderSnapshot(const SnapshotRequest& request) {
-  const auto found = snapshotQuantities().find(request.quantity);
-  if (found == snapshotQuantities().end())
-    return fail(ErrorCode::kBadUsage, "no quantity \"" + request.quantity + "\"", "quantity");
-  const auto& quantity = found->second;
-  gpu::ViewRequest view;
-  auto camera = chooseCamera(*lit_, request.camera, static_cast<double>(request.width) / request.height);
-  if (!camera) return tl::unexpected<Error>(camera.error());
-  view.camera = *camera;
-  view.width = request.width;
-  view.height = request.height;
-  view.quantity = quantity.view;
-  // Nobody wants a picture of the dark after an edit; but what was waited for must not have a ghost of the old light.
-  const bool dark = quantity.pages == Quantity::kIrradiance && lit_->solver().error().total > kPresentable;
-  const auto pages =
-      dark ? pageImages({quantity.pages, lit_->shownPages(), {}, false}) : pageImages(makePages(*lit_, quantity.pages));
-  auto picture = draw(view_, *lit_, pages, view);
-  if (!picture) return tl::unexpected<Error>(picture.error());
-  // By the surfaces alone: a sky behind a small window is brighter than all of the room.
-  std::optional<float> of_surfaces;
-  if (quantity.photometric) of_surfaces = exposureOf(picture->image);
-  if (quantity.view == gpu::ViewQuantity::kLit) gpu::addSky(*picture, view.camera, lit_->sky());
-  std::optional<double> exposure;
-  if (quantity.photometric)
-    exposure = request.exposure ? *request.exposure : of_surfaces ? *of_surfaces : autoExposure(picture->image);
-  const auto& image = picture->image;
-  auto png = encodePng(exposure ? dithered(toneMap(image, static_cast<float>(*exposure))) : image);
-  if (!png) return tl::unexpected<Error>(png.error());
-  return Snapshot{std::make_shared<const Bytes>(std::move(*png)), exposure};
-}
-
-void SolveLoop::snapshot(SnapshotRequest request, Callback<Snapshot> done) {
-  askLit<Snapshot>(std::move(done), [this, request = std::move(request)] { return renderSnapshot(request); });
+void SolveLoop::snapshot(SnapshotRequest request, Client client, Callback<Snapshot> done) {
+  askLong<Snapshot>(client, std::move(done), [this, request = std::move(request)]() -> Result<Snapshot> {
+    auto parts = fromSolveThread([this, request] { return readPicture(*lit_, request); });
+    if (!parts) return tl::unexpected<Error>(parts.error());
+    return makePicture(view_, std::move(*parts), request);
+  });
 }
 
 /// A version of irradiance that is published stands for all steps until the next. What nobody watches has no versions:
@@ -210,7 +154,8 @@ void SolveLoop::texel(TexelRequest request, Callback<Texel> done) {
       return awaited_texels_.push_back({request, answer});
     (*answer)(tooMany());
   };
-  if (!queue_.push(look)) (*answer)(tooMany());
+  const auto refuse = [answer] { (*answer)(tooMany()); };
+  if (!queue_.push([this, look, refuse] { whenLoaded(Needs::kScene, 0, look, refuse); })) refuse();
 }
 
 void SolveLoop::answerTexels() {

@@ -17,13 +17,18 @@
 #include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
+#include "common/log.h"
+#include "common/task.h"
 #include "server/engine/command_queue.h"
 #include "server/engine/engine.h"
 #include "server/engine/error_history.h"
 #include "server/engine/history.h"
 #include "server/engine/listeners.h"
 #include "server/engine/lit_scene.h"
+#include "server/engine/load_job.h"
+#include "server/engine/long_work.h"
 #include "server/engine/memory.h"
 #include "server/engine/publisher.h"
 #include "server/engine/solve_loop.h"
@@ -52,8 +57,8 @@ class SolveLoop final : public Engine {
   /// Starts the thread and the transport; returns when both are up.
   [[nodiscard]] Result<void> start();
 
-  void loadBytes(std::string name, SharedBytes bytes, std::string by, Callback<LoadOutcome> done) override;
-  void loadFile(std::string path, std::string by, Callback<LoadOutcome> done) override;
+  void loadBytes(std::string name, SharedBytes bytes, Client client, Callback<LoadOutcome> done) override;
+  void loadFile(std::string path, Client client, Callback<LoadOutcome> done) override;
   void openFile(std::string path, bool anew, Callback<LoadOutcome> done) override;
   void patch(PatchRequest request, Callback<PatchOutcome> done) override;
   void step(StepRequest request, Callback<PatchOutcome> done) override;
@@ -68,13 +73,14 @@ class SolveLoop final : public Engine {
   [[nodiscard]] std::shared_ptr<void> watch(Quantity quantity) override;
   [[nodiscard]] std::shared_ptr<const Lightmaps> lightmaps(Quantity quantity) const override;
   void sceneText(Callback<SceneText> done) override;
-  void sceneGlb(std::optional<std::uint64_t> layout, Callback<SharedBytes> done) override;
-  void unlitGlb(Callback<SharedBytes> done) override;
-  void lightmapExr(std::uint32_t page, Quantity quantity, Callback<SharedBytes> done) override;
-  void snapshot(SnapshotRequest request, Callback<Snapshot> done) override;
+  void sceneGlb(std::optional<std::uint64_t> layout, Client client, Callback<SharedBytes> done) override;
+  void unlitGlb(Client client, Callback<SharedBytes> done) override;
+  void lightmapExr(std::uint32_t page, Quantity quantity, Client client, Callback<SharedBytes> done) override;
+  void snapshot(SnapshotRequest request, Client client, Callback<Snapshot> done) override;
   void texel(TexelRequest request, Callback<Texel> done) override;
   void addListener(std::weak_ptr<Listener> listener) override;
   [[nodiscard]] const Past& past() const override { return past_; }
+  void callOff() override;
   void keepSolve(std::chrono::milliseconds patience) override;
 
  private:
@@ -82,20 +88,25 @@ class SolveLoop final : public Engine {
 
   /// Runs `work` on the solve thread and hands its Result to `done`; answers kBusy at once when the queue is full.
   template <typename T, typename Work>
-  void ask(Callback<T> done, Work work, CommandQueue::Kind kind = CommandQueue::Kind::kPrompt);
-  /// The same; answers kNotFound while no scene is loaded.
+  void ask(Callback<T> done, Work work);
+  /// What a request waits for while a scene is being loaded. kScene: a scene, if only its first light; kWhole: a scene
+  /// that can be edited; either waits for the load of its own session as well. kNoLoad: the end of any load.
+  enum class Needs { kScene, kWhole, kNoLoad };
+  /// As ask(), when what it needs is there.
   template <typename T, typename Work>
-  void askLit(Callback<T> done, Work work, CommandQueue::Kind kind = CommandQueue::Kind::kLong);
-  /// For what changes the scene or the solve: of a scene that is still being loaded the whole must be there.
-  template <typename T, typename Work>
-  void askToChange(Callback<T> done, Work work);
+  void askOf(Needs needs, std::uint64_t session, Callback<T> done, Work work);
+  /// Runs `make` on the thread of long work when there is a scene and it is the client's turn.
+  template <typename T, typename Make>
+  void askLong(const Client& client, Callback<T> done, Make make);
+  /// Thread of long work: what `look` returns, a Result, on the solve thread, which does all that is prompt before.
+  /// kNotFound where no scene is there. Waits, with interruption points.
+  template <typename Look>
+  [[nodiscard]] auto fromSolveThread(Look look) -> decltype(look());
 
-  /// A load counts as under way from here until it is answered: reading a large file takes its time. Any thread.
+  /// A load counts as under way from here until it is answered: its turn may take a while to come. Any thread.
   [[nodiscard]] Callback<LoadOutcome> countLoad(Callback<LoadOutcome> done);
-  /// Nothing: the scene's first light is being shown, and the answer comes when all of it is there.
-  using LoadBegun = Result<std::optional<LoadOutcome>>;
-  /// Runs `begin` on the solve thread. Any thread.
-  void load(Callback<LoadOutcome> done, std::function<LoadBegun()> begin);
+  /// Begins, on the solve thread, what `request` makes there. Any thread.
+  void load(Client client, Callback<LoadOutcome> done, std::function<void(LoadJob::Request&)> complete);
 
   // All below: solve thread only.
   void threadMain(std::promise<Result<void>> started);
@@ -136,21 +147,23 @@ class SolveLoop final : public Engine {
   /// `as_reported`: of the solve nothing has changed since the last time.
   void updateStatus(bool announce, bool as_reported = false);
 
-  [[nodiscard]] LoadBegun install(Result<scene::Document> document, const std::string& by);
-  /// A load of many texels: what is shown while they are being made, and who waits for them.
+  void beginLoad(LoadJob::Request request);
+  void callOffLoad(const std::string& why);  ///< and answers it, where one is under way
+  void loadTurn();                           ///< takes what the load has made, and tells how far it is
+  void endKnown(scene::Document document);
+  void endLoad(Result<std::unique_ptr<LitScene>> whole);
+  [[nodiscard]] bool awaitsLoad(Needs needs, std::uint64_t session) const;
+  /// Runs the command, or has it wait for the load; `refuse` where too many wait.
+  void whenLoaded(Needs needs, std::uint64_t session, CommandQueue::Command command,
+                  const std::function<void()>& refuse);
+  void runDeferred();  ///< what has waited for a load
+  void runCommand(const CommandQueue::Command& command);
+  /// A load of many texels: what is shown while they are being made.
   struct FirstLight {
-    std::future<Result<std::unique_ptr<LitScene>>> whole;
-    Callback<LoadOutcome> done;
-    std::string by;                           ///< who has loaded it
-    std::shared_ptr<std::atomic<bool>> made;  ///< `whole` is there, but for the moment that its thread takes to end
-    bool goes_on = true;                      ///< its solve
+    bool goes_on = true;  ///< its solve
   };
-  [[nodiscard]] bool wantsFirstLight(const scene::Scene& scene) const;
-  [[nodiscard]] Result<void> showFirstLight(const scene::EditedDocument& edited, const std::string& by);
-  [[nodiscard]] Result<void> makeWhole(const scene::EditedDocument& edited);
+  [[nodiscard]] Result<void> showFirstLight(std::unique_ptr<LitScene> few);
   void firstLightSlice();
-  /// Puts the whole scene in place of its first light; waits for it. Nothing to do where no first light is shown.
-  void endFirstLight();
   [[nodiscard]] Result<LoadOutcome> settleIn(Result<std::unique_ptr<LitScene>> made, const std::string& by);
   void unload(SolveState state);
   /// Called when nothing but the disk can fail any more: what is about to come is brought there.
@@ -200,8 +213,10 @@ class SolveLoop final : public Engine {
   [[nodiscard]] Result<void> lightKept(const scene::Document& document);
   [[nodiscard]] Result<std::unique_ptr<LitScene>> resumedScene(const scene::Document& document,
                                                                const Bytes& checkpoint);
-  /// The scene that outlived the last process was loaded from the same bytes, and nothing else has been loaded since.
-  [[nodiscard]] bool goesOnWith(const scene::Document& document, bool with_edits) const;
+  /// The scene that outlived the last process is there as it was loaded.
+  [[nodiscard]] bool isAsLoaded() const;
+  /// Whether a document has the bytes that this scene was loaded from. What is returned may be called on any thread.
+  [[nodiscard]] std::function<bool(const scene::Document&)> comparison() const;
   [[nodiscard]] Result<void> keepLoad(const History::Next& next, const scene::Document& document);
   /// How an edit is brought to the disk: `after` is the document that it leads to.
   void correctAnswer(PatchOutcome& outcome);
@@ -211,11 +226,11 @@ class SolveLoop final : public Engine {
   /// True: taken, or not to be had at all.
   [[nodiscard]] bool takeCheckpoint();
 
-  [[nodiscard]] Result<Snapshot> renderSnapshot(const SnapshotRequest& request);
   /// Nothing: pages must be made for it, and may not be.
   [[nodiscard]] std::optional<Result<Texel>> readTexel(const TexelRequest& request, bool may_make);
   void answerTexels();  ///< all that wait for pages
-  [[nodiscard]] Result<SharedBytes> makeGlb();
+  // Thread of long work.
+  [[nodiscard]] Result<SharedBytes> makeGlb(std::optional<std::uint64_t> layout);
   [[nodiscard]] Result<SharedBytes> makeUnlit();
   [[nodiscard]] Result<SharedBytes> makeExr(std::uint32_t page, Quantity quantity);
 
@@ -225,15 +240,21 @@ class SolveLoop final : public Engine {
   Listeners listeners_;
   Watches watches_;
 
-  // solve thread only
-  SolveSettings settings_;
-  std::unique_ptr<solver::Transport> transport_;  // made and ended under mutex_: the destructor interrupts it
+  // thread of long work only
   std::unique_ptr<gpu::ViewRenderer> view_;
   std::weak_ptr<const Bytes> glb_;                    ///< the last that was made, while it is being sent
   std::pair<std::uint64_t, std::uint64_t> glb_of_{};  ///< its layout and revision
+
+  // solve thread only
+  SolveSettings settings_;
+  std::unique_ptr<solver::Transport> transport_;  // made and ended under mutex_: the destructor interrupts it
   std::unique_ptr<LitScene> lit_;
   std::unique_ptr<LitScene> former_;       // before the last edit of geometry, solved, for the way back; null: not kept
   std::optional<FirstLight> first_light_;  // then lit_ is made of a few texels, in no history and on no disk
+  std::unique_ptr<LoadJob> load_;          // under way; null: none
+  std::unique_ptr<LoadJob> former_load_;   // called off; it may not have ended yet, which the next one waits for
+  double load_told_ = -1.0;                // how far it was when listeners were told
+  std::vector<CommandQueue::Command> deferred_;  // they wait for its end
   Publisher publisher_;
   TexelReader texels_;
   struct AwaitedTexel {
@@ -242,7 +263,7 @@ class SolveLoop final : public Engine {
   };
   std::vector<AwaitedTexel> awaited_texels_;  ///< of which pages are to be made
   History history_;
-  std::optional<scene::Document> retired_;  ///< by the last edit of light: it goes when that is done
+  std::shared_ptr<const scene::Document> retired_;  ///< by the last edit of light: it goes when that is done
   SolveState state_ = SolveState::kEmpty;
   std::string failure_;
   std::uint64_t revision_ = 0;
@@ -265,6 +286,7 @@ class SolveLoop final : public Engine {
   std::atomic<Clock::rep> last_beat_{0};  // since the clock's epoch; any thread may read both
   std::atomic<bool> waiting_{true};
   std::atomic<int> loads_{0};
+  std::atomic<bool> called_off_{false};
   std::unique_ptr<state::CheckpointWriter> checkpoints_;  // null: none are kept
   Clock::time_point next_checkpoint_{};
   std::uint64_t checkpoint_revision_ = 0, checkpoint_shots_ = 0;  // of the last that was taken
@@ -276,37 +298,66 @@ class SolveLoop final : public Engine {
   std::uint64_t went_back_ = 0;  // edits that led back to a solve that was kept
   Past past_;                    // constant once start() has returned
 
-  mutable std::mutex mutex_;  // for the three that any thread may read, and transport_ coming and going
+  mutable std::mutex mutex_;         // for the four that any thread may read, and transport_ coming and going
+  std::shared_ptr<Task> load_task_;  // until the status tells of no load any more
   Status status_;
   ErrorHistory error_history_;
   std::array<std::shared_ptr<const Lightmaps>, kQuantityCount> lightmaps_;
+  std::unique_ptr<LongWork> long_work_;
   std::thread thread_;
 };
 
 template <typename T, typename Work>
-void SolveLoop::ask(Callback<T> done, Work work, CommandQueue::Kind kind) {
+void SolveLoop::ask(Callback<T> done, Work work) {
   const auto answer = std::make_shared<Callback<T>>(std::move(done));
-  if (queue_.push([answer, work = std::move(work)]() mutable { (*answer)(withinMemory(work)); }, kind)) return;
+  if (queue_.push([answer, work = std::move(work)]() mutable { (*answer)(withinMemory(work)); })) return;
   (*answer)(tooMany());
 }
 
 template <typename T, typename Work>
-void SolveLoop::askToChange(Callback<T> done, Work work) {
-  ask<T>(std::move(done), [this, work = std::move(work)]() mutable -> Result<T> {
-    endFirstLight();
-    return work();
-  });
+void SolveLoop::askOf(Needs needs, std::uint64_t session, Callback<T> done, Work work) {
+  const auto answer = std::make_shared<Callback<T>>(std::move(done));
+  const auto refuse = [answer] { (*answer)(tooMany()); };
+  const auto command = [answer, work = std::move(work)]() mutable { (*answer)(withinMemory(work)); };
+  if (!queue_.push([this, needs, session, command, refuse] { whenLoaded(needs, session, command, refuse); })) refuse();
 }
 
-template <typename T, typename Work>
-void SolveLoop::askLit(Callback<T> done, Work work, CommandQueue::Kind kind) {
-  ask<T>(
-      std::move(done),
-      [this, work = std::move(work)]() mutable -> Result<T> {
-        if (!lit_) return noScene();
-        return work();
-      },
-      kind);
+template <typename T, typename Make>
+void SolveLoop::askLong(const Client& client, Callback<T> done, Make make) {
+  const auto answer = std::make_shared<Callback<T>>(std::move(done));
+  const auto refuse = [answer](const Error& error) { (*answer)(tl::unexpected<Error>(error)); };
+  const auto run = [answer, make = std::move(make)] {
+    auto made = make();
+    try {
+      (*answer)(std::move(made));
+    } catch (const std::bad_alloc&) {  // what was asked is done
+      log::error("out of memory: an answer was dropped");
+    }
+  };
+  const auto order = [this, client, run, refuse] {
+    if (!long_work_->push(client, run, refuse)) refuse(tooMany().value());
+  };
+  const auto tell_busy = [refuse] { refuse(tooMany().value()); };
+  const auto session = client.session;
+  if (!queue_.push([this, session, order, tell_busy] { whenLoaded(Needs::kScene, session, order, tell_busy); }))
+    tell_busy();
+}
+
+template <typename Look>
+auto SolveLoop::fromSolveThread(Look look) -> decltype(look()) {
+  using Found = decltype(look());
+  constexpr auto kNap = std::chrono::milliseconds(20);
+  const auto promise = std::make_shared<std::promise<Found>>();
+  auto found = promise->get_future();
+  // Weak: nothing is looked for once nobody waits.
+  const auto command = [this, waiting = std::weak_ptr(promise), look = std::move(look)]() mutable {
+    const auto heard = waiting.lock();
+    if (!heard) return;
+    heard->set_value(lit_ ? withinMemory(look) : Found(noScene()));
+  };
+  if (!queue_.push(command, CommandQueue::Kind::kLong)) return tooMany();
+  while (found.wait_for(kNap) != std::future_status::ready) interruptionPoint();
+  return found.get();
 }
 
 }  // namespace radiosity::engine

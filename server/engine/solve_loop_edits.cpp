@@ -91,17 +91,21 @@ void SolveLoop::putBack() {
 }
 
 void SolveLoop::patch(PatchRequest request, Callback<PatchOutcome> done) {
-  askToChange<PatchOutcome>(std::move(done), [this, request = std::move(request)]() -> Result<PatchOutcome> {
-    if (!lit_) return noScene();
-    return applyRequest(request);
-  });
+  const auto session = request.session;
+  askOf<PatchOutcome>(Needs::kWhole, session, std::move(done),
+                      [this, request = std::move(request)]() -> Result<PatchOutcome> {
+                        if (!lit_) return noScene();
+                        return applyRequest(request);
+                      });
 }
 
 void SolveLoop::step(StepRequest request, Callback<PatchOutcome> done) {
-  askToChange<PatchOutcome>(std::move(done), [this, request = std::move(request)]() -> Result<PatchOutcome> {
-    if (!lit_) return noScene();
-    return applyStep(request);
-  });
+  const auto session = request.session;
+  askOf<PatchOutcome>(Needs::kWhole, session, std::move(done),
+                      [this, request = std::move(request)]() -> Result<PatchOutcome> {
+                        if (!lit_) return noScene();
+                        return applyStep(request);
+                      });
 }
 
 void SolveLoop::history(Callback<HistoryReport> done) {
@@ -255,8 +259,8 @@ void SolveLoop::announceEdit(const PatchOutcome& outcome, const std::string& pat
 }
 
 void SolveLoop::configure(ChangeSettings change, Callback<SolveSettings> done) {
-  askToChange<SolveSettings>(std::move(done),
-                             [this, change = std::move(change)] { return applySettings(change(settings_)); });
+  askOf<SolveSettings>(Needs::kNoLoad, 0, std::move(done),
+                       [this, change = std::move(change)] { return applySettings(change(settings_)); });
 }
 
 Result<SolveSettings> SolveLoop::applySettings(const SolveSettings& settings) {
@@ -329,7 +333,7 @@ void SolveLoop::reconsiderStop() {
 }
 
 void SolveLoop::pause(Callback<SolveState> done) {
-  askToChange<SolveState>(std::move(done), [this]() -> Result<SolveState> {
+  askOf<SolveState>(Needs::kNoLoad, 0, std::move(done), [this]() -> Result<SolveState> {
     if (state_ == SolveState::kSolving) {
       state_ = SolveState::kPaused;
       if (unpublished_ && !fitsMemory([&] { publishLightmaps(false); })) unpublished_ = true;  // nothing else would
@@ -340,7 +344,7 @@ void SolveLoop::pause(Callback<SolveState> done) {
 }
 
 void SolveLoop::resume(Callback<SolveState> done) {
-  askToChange<SolveState>(std::move(done), [this]() -> Result<SolveState> {
+  askOf<SolveState>(Needs::kNoLoad, 0, std::move(done), [this]() -> Result<SolveState> {
     if (state_ == SolveState::kPaused) state_ = SolveState::kSolving;
     updateStatus(true);
     return state_;
@@ -348,7 +352,7 @@ void SolveLoop::resume(Callback<SolveState> done) {
 }
 
 void SolveLoop::restart(Callback<SolveState> done) {
-  askToChange<SolveState>(std::move(done), [this]() -> Result<SolveState> {
+  askOf<SolveState>(Needs::kNoLoad, 0, std::move(done), [this]() -> Result<SolveState> {
     if (!lit_) return noScene();
     lit_->restart(settings_);
     state_ = SolveState::kSolving;

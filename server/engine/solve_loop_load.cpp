@@ -1,7 +1,8 @@
-// Loading a scene. Making millions of texels takes many seconds, and their first light takes more: of such a scene
-// those who watch are shown its first light on few texels, while all are made in a thread of their own. Whatever is
-// promised (answers, stated errors, waits, checkpoints, the bits of the result) holds for the whole alone: until it is
-// there the state is kLoading, and whoever asks for a change waits for it.
+// Loading a scene. A thread of its own reads it and makes what the solver needs (load_job.h), while the scene before is
+// solved and edited. Making millions of texels takes many seconds, and their first light takes more: of such a scene
+// those who watch are shown its first light on few texels, while all are made. Whatever is promised (answers, stated
+// errors, waits, checkpoints, the bits of the result) holds for the whole alone: until it is there the state told is
+// kLoading, and whoever asks for a change of it waits for it.
 #include <algorithm>
 #include <string>
 #include <system_error>
@@ -13,8 +14,8 @@
 namespace radiosity::engine {
 namespace {
 
-/// Stated error from which on more shots make no visible difference on few texels.
-constexpr double kFirstLightError = 0.03;
+/// That wait for a load.
+constexpr std::size_t kMostDeferred = 1024;
 
 }  // namespace
 
@@ -26,50 +27,152 @@ Engine::Callback<LoadOutcome> SolveLoop::countLoad(Callback<LoadOutcome> done) {
   };
 }
 
-void SolveLoop::load(Callback<LoadOutcome> done, std::function<LoadBegun()> begin) {
+void SolveLoop::load(Client client, Callback<LoadOutcome> done, std::function<void(LoadJob::Request&)> complete) {
   const auto answer = std::make_shared<Callback<LoadOutcome>>(countLoad(std::move(done)));
-  const auto run = [this, answer, begin = std::move(begin)] {
-    endFirstLight();  // of a scene before
-    auto begun = withinMemory(begin);
-    if (!begun) return (*answer)(tl::unexpected<Error>(begun.error()));
-    if (*begun) return (*answer)(std::move(**begun));
-    first_light_->done = std::move(*answer);
+  const auto run = [this, client = std::move(client), answer, complete = std::move(complete)] {
+    LoadJob::Request request{{}, client, *answer};
+    complete(request);
+    beginLoad(std::move(request));
   };
   if (queue_.push(run)) return;
-  (*answer)(fail(ErrorCode::kBusy, "too many requests are waiting for the solver, try again"));
+  (*answer)(tooMany());
 }
 
-void SolveLoop::loadBytes(std::string name, SharedBytes bytes, std::string by, Callback<LoadOutcome> done) {
-  load(std::move(done), [this, name = std::move(name), bytes = std::move(bytes), by = std::move(by)] {
-    return install(scene::parseDocument(name, *bytes, limits_), by);
+void SolveLoop::loadBytes(std::string name, SharedBytes bytes, Client client, Callback<LoadOutcome> done) {
+  load(std::move(client), std::move(done),
+       [this, name = std::move(name), bytes = std::move(bytes)](LoadJob::Request& request) {
+         request.read = [name, bytes, limits = limits_] { return scene::parseDocument(name, *bytes, limits); };
+         if (isAsLoaded()) request.is_known = comparison();
+       });
+}
+
+void SolveLoop::loadFile(std::string path, Client client, Callback<LoadOutcome> done) {
+  load(std::move(client), std::move(done), [this, path = std::move(path)](LoadJob::Request& request) {
+    request.read = [path, limits = limits_] { return scene::loadDocument(path, limits); };
+    if (isAsLoaded()) request.is_known = comparison();
   });
 }
 
-void SolveLoop::loadFile(std::string path, std::string by, Callback<LoadOutcome> done) {
-  load(std::move(done),
-       [this, path = std::move(path), by = std::move(by)] { return install(scene::loadDocument(path, limits_), by); });
+void SolveLoop::beginLoad(LoadJob::Request request) {
+  callOffLoad("another scene is being loaded");
+  const auto done = request.done;
+  const auto refuse = [&](const Error& error) {
+    updateStatus(true);
+    done(tl::unexpected<Error>(error));
+    runDeferred();
+  };
+  if (called_off_) return refuse(cancelled("the server is shutting down"));
+  const LoadJob::Options options{settings_, options_.first_light_above, lit_ ? 0 : options_.first_texels, limits_};
+  const auto wake = [this] {
+    try {
+      (void)queue_.push([] {});  // a thread whose queue is full is awake
+    } catch (const std::bad_alloc&) {
+      log::warn("out of memory: the solve thread will see later what a load has made");
+    }
+  };
+  try {
+    load_ = std::make_unique<LoadJob>(std::move(request), options, *transport_, wake, std::move(former_load_));
+  } catch (const std::system_error& error) {
+    return refuse({ErrorCode::kUnavailable, std::string("no thread to load with: ") + error.what(), {}});
+  }
+  {
+    const std::scoped_lock lock(mutex_);
+    load_task_ = load_->task();
+    if (called_off_) load_->cancel();  // meanwhile
+  }
+  load_told_ = -1.0;
+  updateStatus(true);
 }
 
-auto SolveLoop::install(Result<scene::Document> document, const std::string& by) -> LoadBegun {
-  if (!document) return tl::unexpected<Error>(document.error());
-  if (goesOnWith(*document, false)) return LoadOutcome{revision_, lit_->warnings()};
-  const SolveState before = std::exchange(state_, SolveState::kLoading);
-  const auto refuse = [&](const Error& error) {
-    if (state_ == SolveState::kLoading) state_ = before;
-    updateStatus(true);
-    return tl::unexpected<Error>(error);
-  };
+void SolveLoop::callOffLoad(const std::string& why) {
+  if (!load_) return;
+  former_load_ = std::move(load_);  // the one before it was its own
+  former_load_->cancel();
+  if (first_light_) unload(SolveState::kEmpty);
   updateStatus(true);
-  auto edited = withinMemory([&] { return scene::importEdited(std::move(*document), nullptr, limits_); });
-  if (!edited) return refuse(edited.error());
-  if (wantsFirstLight(edited->scene)) {
-    if (withinMemory([&] { return showFirstLight(*edited, by); })) return std::nullopt;
+  former_load_->request().done(tl::unexpected<Error>(cancelled(why)));
+}
+
+void SolveLoop::callOff() {
+  called_off_ = true;
+  {
+    const std::scoped_lock lock(mutex_);
+    if (load_task_) load_task_->cancel();
+  }
+  (void)queue_.push([] {});  // for the solve thread to see it
+  long_work_->callOff();
+}
+
+/// One that is called off is answered at once: what its thread is at may take it a while yet to leave.
+void SolveLoop::loadTurn() {
+  if (load_->task()->isCancelled()) {
+    callOffLoad(called_off_ ? "the server is shutting down" : "its client has gone");
+    return runDeferred();
+  }
+  auto ready = load_->take();
+  if (ready.first_light && !lit_ && !withinMemory([&] { return showFirstLight(std::move(ready.first_light)); })) {
     first_light_.reset();  // then all at once, or the reason why not
     lit_.reset();
   }
-  auto settled = settleIn(withinMemory([&] { return LitScene::make(std::move(*edited), settings_, *transport_); }), by);
-  if (!settled) return refuse(settled.error());
-  return std::move(*settled);
+  if (ready.known) return endKnown(std::move(*ready.known));
+  if (ready.whole) return endLoad(std::move(*ready.whole));
+  const double fraction = load_->task()->fraction();
+  if (fraction == load_told_ || Clock::now() < next_progress_) return;
+  load_told_ = fraction;
+  updateStatus(true);
+}
+
+/// What came is what is there; unless that was edited meanwhile, and counts as another.
+void SolveLoop::endKnown(scene::Document document) {
+  auto& request = load_->request();
+  if (!request.goes_on_edited && !isAsLoaded()) {
+    LoadJob::Request anew{{}, request.client, request.done};
+    anew.read = [document = std::move(document)]() -> Result<scene::Document> { return document; };
+    request.done = [](const auto&) {};  // the new one answers
+    return beginLoad(std::move(anew));
+  }
+  const auto job = std::move(load_);
+  updateStatus(true);
+  job->request().done(LoadOutcome{revision_, lit_->warnings()});
+  runDeferred();
+}
+
+void SolveLoop::endLoad(Result<std::unique_ptr<LitScene>> whole) {
+  const auto job = std::move(load_);
+  const auto& request = job->request();
+  const auto outcome = withinMemory([&] { return settleIn(std::move(whole), request.client.name); });
+  if (!outcome && first_light_) unload(SolveState::kEmpty);
+  if (!outcome) updateStatus(true);
+  request.done(outcome);
+  runDeferred();
+}
+
+bool SolveLoop::awaitsLoad(Needs needs, std::uint64_t session) const {
+  if (!load_) return false;
+  const bool is_own = session != 0 && session == load_->request().client.session;
+  switch (needs) {
+    case Needs::kScene:
+      return !lit_ || (is_own && !first_light_);
+    case Needs::kWhole:
+      return !lit_ || first_light_ || is_own;
+    case Needs::kNoLoad:
+      break;
+  }
+  return true;
+}
+
+void SolveLoop::whenLoaded(Needs needs, std::uint64_t session, CommandQueue::Command command,
+                           const std::function<void()>& refuse) {
+  if (!awaitsLoad(needs, session)) return command();
+  if (deferred_.size() >= kMostDeferred) return refuse();
+  deferred_.push_back(std::move(command));
+}
+
+void SolveLoop::runDeferred() {
+  for (const auto& command : std::exchange(deferred_, {})) {
+    if (queue_.closed()) return;
+    runCommand(command);
+  }
 }
 
 Result<LoadOutcome> SolveLoop::settleIn(Result<std::unique_ptr<LitScene>> made, const std::string& by) {
@@ -108,27 +211,9 @@ Result<LoadOutcome> SolveLoop::settleIn(Result<std::unique_ptr<LitScene>> made, 
 
 /// Only where there was no scene: whoever watches one goes on with it until the next is there, and so does the server
 /// when that cannot be had.
-bool SolveLoop::wantsFirstLight(const scene::Scene& scene) const {
-  if (lit_ || options_.first_texels == 0) return false;
-  scene::ChartOptions charts;
-  charts.texel_budget = settings_.texels;
-  charts.texel_size_m = settings_.texel_size_m;
-  const auto leaves = scene::expectedLeaves(scene, charts);
-  return leaves > options_.first_light_above && leaves > options_.first_texels && leaves <= scene::kMaxLeaves;
-}
-
-Result<void> SolveLoop::showFirstLight(const scene::EditedDocument& edited, const std::string& by) {
-  auto settings = settings_;
-  settings.texels = options_.first_texels;
-  settings.texel_size_m = 0.0;
-  settings.target_error = std::max(kFirstLightError, settings.target_error);
-  auto shown = LitScene::make(edited, settings, *transport_);
-  if (const auto lit = relight(std::move(shown), Relation::kOther); !lit) return tl::unexpected<Error>(lit.error());
-  FirstLight first;
-  first.by = by;
-  first.made = std::make_shared<std::atomic<bool>>(false);
-  first_light_ = std::move(first);
-  if (auto begun = makeWhole(edited); !begun) return begun;
+Result<void> SolveLoop::showFirstLight(std::unique_ptr<LitScene> few) {
+  if (const auto lit = relight(std::move(few), Relation::kOther); !lit) return tl::unexpected<Error>(lit.error());
+  first_light_.emplace();
   ++revision_;
   updateStatus(true);
   listeners_.tell([this](Listener& listener) { listener.onSceneLoaded(revision_); });
@@ -138,33 +223,7 @@ Result<void> SolveLoop::showFirstLight(const scene::EditedDocument& edited, cons
   return {};
 }
 
-Result<void> SolveLoop::makeWhole(const scene::EditedDocument& edited) {
-  auto make = [this, edited, settings = settings_, &transport = *transport_, made = first_light_->made]() mutable {
-    struct Tell {  // also of what is thrown
-      CommandQueue& queue;
-      std::atomic<bool>& made;
-      ~Tell() {
-        made = true;
-        try {
-          (void)queue.push([] {});  // wakes the solve thread; one whose queue is full is awake
-        } catch (const std::bad_alloc&) {
-          log::warn("out of memory: the solve thread will see later that the scene is there");
-        }
-      }
-    };
-    const Tell tell{queue_, *made};
-    return withinMemory([&] { return LitScene::make(std::move(edited), settings, transport); });
-  };
-  try {
-    first_light_->whole = std::async(std::launch::async, std::move(make));
-  } catch (const std::system_error& error) {
-    return fail(ErrorCode::kUnavailable, std::string("no thread to load with: ") + error.what());
-  }
-  return {};
-}
-
 void SolveLoop::firstLightSlice() {
-  if (*first_light_->made) return endFirstLight();
   if (!first_light_->goes_on) return;
   const auto outcome = stepSolver();
   if (queue_.closed()) return;
@@ -173,21 +232,6 @@ void SolveLoop::firstLightSlice() {
       outcome && *outcome != solver::StepOutcome::kConverged && *outcome != solver::StepOutcome::kExhausted;
   unpublished_ |= outcome && *outcome != solver::StepOutcome::kSlice;
   if (unpublished_ && (Clock::now() >= next_publish_ || !first_light_->goes_on)) publishLightmaps(false);
-}
-
-void SolveLoop::endFirstLight() {
-  if (!first_light_) return;
-  const auto done = std::move(first_light_->done);
-  const auto by = std::move(first_light_->by);
-  const auto outcome = withinMemory([&]() -> Result<LoadOutcome> {
-    try {
-      return settleIn(first_light_->whole.get(), by);
-    } catch (const std::system_error& error) {
-      return fail(ErrorCode::kUnavailable, std::string("no thread to load with: ") + error.what());
-    }
-  });
-  if (first_light_) unload(SolveState::kEmpty);
-  done(outcome);
 }
 
 /// The whole of a scene cannot be had whose first light was shown: nothing is there, as before.

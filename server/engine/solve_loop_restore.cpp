@@ -191,22 +191,29 @@ Result<std::unique_ptr<LitScene>> SolveLoop::resumedScene(const scene::Document&
   return lit;
 }
 
-bool SolveLoop::goesOnWith(const scene::Document& document, bool with_edits) const {
-  if (!as_restored_ || (!with_edits && history_.report(revision_).revisions.size() != 1)) return false;
-  return options_.store->digestOf(plainDocument(document)) == loaded_digest_;
+bool SolveLoop::isAsLoaded() const { return as_restored_ && history_.report(revision_).revisions.size() == 1; }
+
+std::function<bool(const scene::Document&)> SolveLoop::comparison() const {
+  return [store = options_.store, digest = loaded_digest_](const scene::Document& document) {
+    return store->digestOf(plainDocument(document)) == digest;
+  };
 }
 
 /// What was kept was promised to those who made it: a restart with the same command must not take it from them.
 void SolveLoop::openFile(std::string path, bool anew, Callback<LoadOutcome> done) {
-  load(std::move(done), [this, path = std::move(path), anew]() -> LoadBegun {
-    auto document = scene::loadDocument(path, limits_);
-    if (!document || !as_restored_ || anew) return install(std::move(document), {});
-    if (!goesOnWith(*document, true))
-      log::warn(
-          "{} is not what the kept scene came from: it has changed, or a client loaded another. The kept scene goes on "
-          "at revision {}; --reload takes {} in its place",
-          path, revision_, path);
-    return LoadOutcome{revision_, lit_->warnings()};
+  load({}, std::move(done), [this, path = std::move(path), anew](LoadJob::Request& request) {
+    request.read = [path, limits = limits_] { return scene::loadDocument(path, limits); };
+    if (!as_restored_ || anew) return;
+    request.goes_on_edited = true;
+    request.is_known = [is_same = comparison(), path, revision = revision_](const scene::Document& document) {
+      if (!is_same(document))
+        log::warn(
+            "{} is not what the kept scene came from: it has changed, or a client loaded another. The kept scene goes "
+            "on "
+            "at revision {}; --reload takes {} in its place",
+            path, revision, path);
+      return true;
+    };
   });
 }
 

@@ -139,7 +139,7 @@ bool SolveLoop::takeCheckpoint() {
 }
 
 void SolveLoop::keepSolve(std::chrono::milliseconds patience) {
-  if (!checkpoints_ || status().state == SolveState::kLoading) return;
+  if (!checkpoints_) return;
   const auto deadline = Clock::now() + patience;
   const auto taken = std::make_shared<std::promise<void>>();
   auto done = taken->get_future();
@@ -148,7 +148,7 @@ void SolveLoop::keepSolve(std::chrono::milliseconds patience) {
     const auto isTaken = [&] {
       return (checkpoint_revision_ == revision_ && checkpoint_shots_ == lit_->solver().shots()) || takeCheckpoint();
     };
-    while (lit_ && !isTaken() && state_ == SolveState::kSolving && Clock::now() < deadline) {
+    while (lit_ && !first_light_ && !isTaken() && state_ == SolveState::kSolving && Clock::now() < deadline) {
       if (!stepSolver()) break;
     }
     state_ = SolveState::kPaused;  // what would be found from here on is lost

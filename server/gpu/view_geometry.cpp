@@ -6,6 +6,8 @@
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 
+#include "common/task.h"
+
 namespace radiosity::gpu {
 namespace {
 
@@ -88,6 +90,7 @@ ViewGeometry makeViewGeometry(const scene::Scene& scene, const scene::PatchScene
     for (std::size_t side = 0; side < 2; ++side) {
       const auto& uvs = patches.instance_uvs[i].side[side];
       for (std::size_t triangle = 0; triangle < uvs.page.size(); ++triangle) {
+        interruptionPoint();
         if (!uvs.shows(triangle)) continue;  // dropped as degenerate, or nobody sees that side
         const auto page = uvs.page[triangle];
         const bool emits = !emitting[i].empty() && emitting[i][triangle];

@@ -8,6 +8,7 @@
 #include <map>
 
 #include "common/check.h"
+#include "common/task.h"
 #include "server/gpu/gl_objects.h"
 #include "server/gpu/view_geometry.h"
 
@@ -16,6 +17,11 @@ namespace {
 
 constexpr int kMaxPicture = 8192;  ///< pixels a side
 constexpr int kSamples = 4;
+/// Pixels a side that are drawn at a time: a tile takes a software renderer a few hundredths of a second, and no
+/// picture needs a gigabyte of samples. Each tile costs a pass over all vertices, so that tiles of large scenes are
+/// larger.
+constexpr int kTile = 512, kLargeTile = 1024;
+constexpr std::size_t kManyVertices = 200'000;
 
 // Locations in view.vert and view.frag.
 enum Uniform : GLint {
@@ -55,16 +61,34 @@ class GlViewRenderer final : public ViewRenderer {
       return fail(ErrorCode::kBadUsage, "a picture is 1 to 8192 pixels wide and high");
     }
     context_->makeCurrent();
-    const auto target = makeTarget(request.width, request.height);
     const auto geometry = makeViewGeometry(scene, patches, glm::dvec3(request.camera.world[3]));
-    setState(request, target);
-    draw(scene, pages, request, geometry);
-    auto picture = read(request, target);
-    if (const auto good = context_->check(); !good) return tl::unexpected(good.error());
+    const int side = geometry.vertices.size() > kManyVertices ? kLargeTile : kTile;
+    const auto target = makeTarget(std::min(side, request.width), std::min(side, request.height));
+    fill(vertices_, std::span<const ViewVertex>(geometry.vertices), GL_STREAM_DRAW);
+    const auto lightmaps = uploadPages(pages);
+    glProgramUniform1f(program_.name(), kDataScale, dataScale(pages, request.quantity));
+    std::map<std::uint32_t, Texture> textures;
+    const auto row = static_cast<std::size_t>(request.width);
+    ViewPicture picture{Image(request.width, request.height),
+                        std::vector<float>(row * static_cast<std::size_t>(request.height))};
+    for (int y = 0; y < request.height; y += side) {
+      for (int x = 0; x < request.width; x += side) {
+        interruptionPoint();
+        const Tile tile{x, y, std::min(side, request.width - x), std::min(side, request.height - y)};
+        setState(request, tile, target);
+        draw(scene, lightmaps, geometry, textures);
+        read(tile, target, picture);
+        if (const auto good = context_->check(); !good) return tl::unexpected(good.error());
+      }
+    }
     return picture;
   }
 
  private:
+  /// Pixels of the picture as OpenGL counts them: rows from the bottom.
+  struct Tile {
+    int x, y, width, height;
+  };
   struct Target {
     Texture color, depth, resolved;
     Framebuffer framebuffer, resolve;
@@ -109,8 +133,8 @@ class GlViewRenderer final : public ViewRenderer {
     return target;
   }
 
-  void setState(const ViewRequest& request, const Target& target) const {
-    glViewport(0, 0, request.width, request.height);
+  void setState(const ViewRequest& request, const Tile& tile, const Target& target) const {
+    glViewport(-tile.x, -tile.y, request.width, request.height);
     glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
     glEnable(GL_DEPTH_TEST);
     glDepthFunc(GL_GREATER);
@@ -131,12 +155,8 @@ class GlViewRenderer final : public ViewRenderer {
     glProgramUniform1i(program_.name(), kQuantity, static_cast<GLint>(request.quantity));
   }
 
-  void draw(const scene::Scene& scene, std::span<const Image> pages, const ViewRequest& request,
-            const ViewGeometry& geometry) {
-    fill(vertices_, std::span<const ViewVertex>(geometry.vertices), GL_STREAM_DRAW);
-    const auto lightmaps = uploadPages(pages);
-    glProgramUniform1f(program_.name(), kDataScale, dataScale(pages, request.quantity));
-    std::map<std::uint32_t, Texture> textures;
+  void draw(const scene::Scene& scene, std::span<const Texture> lightmaps, const ViewGeometry& geometry,
+            std::map<std::uint32_t, Texture>& textures) {
     for (const auto& draw : geometry.draws) {
       const auto& material = scene.materials[draw.material];
       bindTexture(0, scene, material.base_color_texture, textures);
@@ -225,23 +245,23 @@ class GlViewRenderer final : public ViewRenderer {
     return black_.name();
   }
 
-  static ViewPicture read(const ViewRequest& request, const Target& target) {
-    const int w = request.width;
-    const int h = request.height;
+  static void read(const Tile& tile, const Target& target, ViewPicture& picture) {
+    const int w = tile.width;
+    const int h = tile.height;
     glBlitNamedFramebuffer(target.framebuffer.name(), target.resolve.name(), 0, 0, w, h, 0, 0, w, h,
                            GL_COLOR_BUFFER_BIT, GL_NEAREST);
     const auto row = static_cast<std::size_t>(w);
-    ViewPicture picture{Image(w, h), std::vector<float>(row * static_cast<std::size_t>(h))};
-    std::vector<glm::vec4> samples(picture.cover.size());
+    std::vector<glm::vec4> samples(row * static_cast<std::size_t>(h));
     glPixelStorei(GL_PACK_ALIGNMENT, 4);
-    glGetTextureImage(target.resolved.name(), 0, GL_RGBA, GL_FLOAT,
-                      static_cast<GLsizei>(samples.size() * sizeof(glm::vec4)), samples.data());
+    glGetTextureSubImage(target.resolved.name(), 0, 0, 0, 0, w, h, 1, GL_RGBA, GL_FLOAT,
+                         static_cast<GLsizei>(samples.size() * sizeof(glm::vec4)), samples.data());
+    const auto width = static_cast<std::size_t>(picture.image.width);
     for (std::size_t i = 0; i < samples.size(); ++i) {
-      const auto& sample = samples[samples.size() - row - i / row * row + i % row];  // GL's rows start at the bottom
-      picture.image.pixels[i] = glm::vec3(sample);
-      picture.cover[i] = sample.w;
+      const auto bottom = static_cast<std::size_t>(picture.image.height - 1 - tile.y);
+      const auto pixel = (bottom - i / row) * width + static_cast<std::size_t>(tile.x) + i % row;
+      picture.image.pixels[pixel] = glm::vec3(samples[i]);
+      picture.cover[pixel] = samples[i].w;
     }
-    return picture;
   }
 
   std::unique_ptr<EglContext> context_;

@@ -1,5 +1,5 @@
 // Pictures of the lit scene (snapshots): rasterises the scene from a camera with its lightmaps. Own EGL context; used
-// from the solve thread only.
+// from the thread that made it only.
 #pragma once
 
 #include <memory>
@@ -31,7 +31,7 @@ class ViewRenderer {
   virtual ~ViewRenderer() = default;
   /// Linear RGB radiance (nits) for kLit: albedo H / pi + L_e, 4x multisampled, back faces of single-sided surfaces not
   /// drawn (so that one sees into a room); other quantities in their own unit. Black where nothing covers a pixel.
-  /// `pages`: irradiance, lux.
+  /// `pages`: irradiance, lux. Large pictures are drawn in tiles, with an interruption point before each.
   [[nodiscard]] virtual Result<ViewPicture> render(const scene::Scene& scene, const scene::PatchScene& patches,
                                                    std::span<const Image> pages, const ViewRequest& request) = 0;
 };

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 
+#include "common/task.h"
 #include "server/gpu/view_geometry.h"
 
 namespace radiosity::gpu {
@@ -17,6 +18,7 @@ void addSky(ViewPicture& picture, const scene::Camera& camera, const scene::Sky&
   // Pixels on the horizon show both parts: edges of surfaces are smooth, too.
   const double step = std::max(std::hypot(right, down), 1e-12);
   for (int y = 0; y < height; ++y) {
+    interruptionPoint();
     for (int x = 0; x < width; ++x) {
       const auto i = static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
       if (picture.cover[i] >= 1.0F) continue;

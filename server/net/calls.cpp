@@ -84,7 +84,11 @@ struct Calls::Slot {
 };
 
 Calls::Calls(Hub& hub, std::weak_ptr<Peer> peer, TileLane& tiles, bool authenticated)
-    : hub_(hub), peer_(std::move(peer)), tiles_(tiles), authenticated_(authenticated) {}
+    : hub_(hub),
+      peer_(std::move(peer)),
+      tiles_(tiles),
+      authenticated_(authenticated),
+      client_({}, hub.nextSession(), gone_.get_token()) {}
 
 void Calls::handle(std::string_view text) {
   const auto message = protocol::parseRpc(text, protocol::kMaxMessageBytes);
@@ -164,7 +168,7 @@ void Calls::run(const protocol::HelloCall& call, const Slot& slot) {
   tiles_.setFormat(reply.tile_format, reply.codec);
   tiles_.setCredit(reply.credit_bytes);
   greeted_ = true;
-  client_ = call.client;
+  client_.name = call.client;
   hub_.join(peer, call.resume, [&](std::uint64_t revision, std::optional<std::vector<SharedText>> missed) {
     reply.revision = revision;
     reply.resumed = missed.has_value();
@@ -324,7 +328,7 @@ void Calls::run(const protocol::CreditCall& call, const Slot& slot) {
 
 void Calls::run(const protocol::SnapshotCall& call, const Slot& slot) {
   engine::SnapshotRequest request{call.camera, call.width, call.height, call.quantity, call.exposure};
-  hub_.engine().snapshot(std::move(request),
+  hub_.engine().snapshot(std::move(request), client_,
                          hub_.fromEngine<engine::Snapshot>([slot, hub = &hub_](const Result<engine::Snapshot>& made) {
                            if (!made) {
                              auto error = protocol::toRpcError(made.error());
@@ -371,7 +375,7 @@ void Calls::run(const protocol::CameraCall& call, const Slot& slot) {
   if (!takeCameraCall())
     return slot.error({RpcCode::kRateLimited,
                        fmt::format("a camera may be told {} times a second", protocol::kCameraCallsPerSecond)});
-  const auto number = hub_.shareCamera(*peer, client_, *call.pose);
+  const auto number = hub_.shareCamera(*peer, client_.name, *call.pose);
   if (!number)
     return slot.error({RpcCode::kTooLarge, fmt::format("{} cameras are shared already", protocol::kMaxCameras)});
   slot.reply(protocol::CameraReply{number});

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <stop_token>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -44,6 +45,8 @@ class Calls {
   void handle(std::string_view text);
   /// Whether an answer is still to come; Peer::answered() says when to ask again.
   [[nodiscard]] bool answersAwaited() const { return awaited_.use_count() > 1; }
+  /// Nobody reads answers any more: loads, pictures and files that were asked for are called off.
+  void end() { gone_.request_stop(); }
 
  private:
   class Answers;
@@ -81,7 +84,8 @@ class Calls {
   TileLane& tiles_;
   bool authenticated_;
   bool greeted_ = false;
-  std::string client_;
+  std::stop_source gone_;
+  engine::Client client_;                                  ///< named by hello
   double camera_calls_ = protocol::kCameraCallsPerSecond;  ///< that may be made now; they come back with time
   std::chrono::steady_clock::time_point camera_calls_at_ = std::chrono::steady_clock::now();
   std::shared_ptr<const int> awaited_ = std::make_shared<const int>(0);  ///< shared by what collects answers

@@ -63,6 +63,7 @@ protocol::Progress toProgress(const engine::Status& s) {
   p.polygons = s.polygons;
   p.failure = s.failure;
   p.unlit = s.unlit;
+  if (s.load_fraction) p.fraction = std::clamp(finite(*s.load_fraction, 0.0), 0.0, 1.0);
   return p;
 }
 

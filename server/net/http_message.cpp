@@ -54,6 +54,7 @@ int statusOf(ErrorCode code) {
       return 413;
     case ErrorCode::kStaleRevision:
     case ErrorCode::kTestFailed:
+    case ErrorCode::kCancelled:
       return 409;
     case ErrorCode::kBusy:
     case ErrorCode::kUnavailable:

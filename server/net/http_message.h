@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <map>
+#include <stop_token>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -22,7 +23,9 @@ struct HttpRequest {
   std::string client;                        ///< who: header X-Client, or ?client=, or else User-Agent
   std::string accept_encoding, if_none_match;
   Bytes body;
-  std::string body_sha256;  ///< of one that is named by it (PUT /uploads): taken while it came
+  std::string body_sha256;    ///< of one that is named by it (PUT /uploads): taken while it came
+  std::uint64_t session = 0;  ///< of the connection, as Hub::nextSession()
+  std::stop_token gone = {};  ///< stopped when the client no longer waits for the answer
 };
 
 struct HttpResponse {

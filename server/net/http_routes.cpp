@@ -34,6 +34,8 @@ HttpResponse plain(int status, std::string text) {
   return response;
 }
 
+engine::Client clientOf(const HttpRequest& request) { return {request.client, request.session, request.gone}; }
+
 engine::Engine::Callback<SharedBytes> fileAnswer(Hub& hub, const Respond& done, std::string_view type) {
   return hub.fromEngine<SharedBytes>([done, type](Result<SharedBytes> bytes) {
     done(bytes ? file(std::move(*bytes), type) : errorResponse(bytes.error()));
@@ -107,7 +109,7 @@ void putScene(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respo
     response.content_type = "application/json";
     done(std::move(response));
   };
-  hub->engine().loadBytes(request.name, std::move(bytes), request.client,
+  hub->engine().loadBytes(request.name, std::move(bytes), clientOf(request),
                           hub->fromEngine<engine::LoadOutcome>(std::move(answer)));
 }
 
@@ -135,14 +137,14 @@ void getSceneGlb(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Re
   const auto layout = queryLayout(request);
   if (!layout) return done(errorResponse(layout.error()));
   // Nobody's fault: the layout changed while the request was on its way.
-  hub->engine().sceneGlb(*layout, hub->fromEngine<SharedBytes>([done](Result<SharedBytes> glb) {
+  hub->engine().sceneGlb(*layout, clientOf(request), hub->fromEngine<SharedBytes>([done](Result<SharedBytes> glb) {
     const bool overtaken = !glb && glb.error().code == ErrorCode::kStaleRevision;
     done(glb ? file(std::move(*glb), "model/gltf-binary") : overtaken ? plain(204, "") : errorResponse(glb.error()));
   }));
 }
 
-void getUnlitGlb(const std::shared_ptr<Hub>& hub, HttpRequest& /*request*/, const Respond& done) {
-  hub->engine().unlitGlb(fileAnswer(*hub, done, "model/gltf-binary"));
+void getUnlitGlb(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond& done) {
+  hub->engine().unlitGlb(clientOf(request), fileAnswer(*hub, done, "model/gltf-binary"));
 }
 
 void getLightmap(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond& done) {
@@ -157,7 +159,7 @@ void getLightmap(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Re
     return done(
         errorResponse({ErrorCode::kBadInput,
                        "must be irradiance, radiosity, error, patchId, mipLevel, unshot or normal", "?quantity="}));
-  hub->engine().lightmapExr(page, toQuantity(*quantity), fileAnswer(*hub, done, "image/x-exr"));
+  hub->engine().lightmapExr(page, toQuantity(*quantity), clientOf(request), fileAnswer(*hub, done, "image/x-exr"));
 }
 
 void getSnapshot(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Respond& done) {
@@ -168,7 +170,7 @@ void getSnapshot(const std::shared_ptr<Hub>& hub, HttpRequest& request, const Re
   if (!exposure) return done(errorResponse(exposure.error()));
   hub->engine().snapshot(
       {queryText(request, "camera", ""), *width, *height, queryText(request, "quantity", "lit"), *exposure},
-      hub->fromEngine<engine::Snapshot>([done](Result<engine::Snapshot> made) {
+      clientOf(request), hub->fromEngine<engine::Snapshot>([done](Result<engine::Snapshot> made) {
         if (made) return done(file(std::move(made->png), "image/png"));
         auto error = made.error();
         if (error.code == ErrorCode::kBadUsage) error.where = fmt::format("?{}=", error.where);

@@ -1,6 +1,7 @@
 #include "server/net/http_session.h"
 
 #include <fmt/format.h>
+#include <poll.h>
 #include <array>
 #include <boost/asio/dispatch.hpp>
 #include <boost/asio/post.hpp>
@@ -16,6 +17,7 @@
 #include <ctime>
 #include <optional>
 #include <span>
+#include <stop_token>
 #include <utility>
 
 #include "common/one_line.h"
@@ -32,7 +34,9 @@ namespace {
 constexpr std::uint32_t kHeaderLimit = 16 * 1024;
 constexpr std::size_t kBufferLimit = std::size_t{64} * 1024;
 constexpr std::uint64_t kBodyOfGet = std::uint64_t{64} * 1024;
-constexpr std::size_t kSmallBody = std::size_t{64} * 1024;   ///< of a response: is sent whatever else waits
+constexpr std::size_t kSmallBody = std::size_t{64} * 1024;  ///< of a response: is sent whatever else waits
+/// How often it is looked whether the client still waits for an answer that takes long.
+constexpr auto kPresenceInterval = std::chrono::milliseconds(50);
 constexpr std::size_t kLingerBytes = std::size_t{64} << 20;  ///< read and dropped so that a refusal can be read
 
 using Parser = http::request_parser<http::vector_body<std::uint8_t>>;
@@ -40,6 +44,13 @@ using Response = http::response<http::span_body<const char>>;
 using Serializer = http::response_serializer<http::span_body<const char>>;
 
 std::string_view view(boost::core::string_view text) { return {text.data(), text.size()}; }
+
+/// The peer has closed its side, or the connection is broken; also behind bytes that are not read yet. Who sends no
+/// more does not wait for an answer either, as proxies see it.
+bool hasLeft(tcp::socket::native_handle_type socket) {
+  pollfd look{socket, POLLRDHUP, 0};
+  return poll(&look, 1, 0) > 0 && (look.revents & (POLLRDHUP | POLLHUP | POLLERR)) != 0;
+}
 
 std::string_view firstWord(std::string_view text) { return text.substr(0, text.find(' ')); }
 
@@ -100,6 +111,8 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
         buffer_(kBufferLimit),
         room_(*hub_),
         stall_(executor_),
+        presence_(executor_),
+        session_(hub_->nextSession()),
         pace_(hub_->options().least_bytes_per_second),
         going_(hub_->sendRoom()) {}
 
@@ -130,6 +143,7 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   void onWritten();
   void linger();
   void cutWhenStalled();
+  void watchPresence();
 
   [[nodiscard]] std::string_view field(http::field name) const { return view(parser_->get()[name]); }
   [[nodiscard]] std::string queryOr(const char* key, std::string_view otherwise) const {
@@ -147,7 +161,9 @@ class HttpSession : public Connection, public std::enable_shared_from_this<HttpS
   UploadRoom room_;
   bool head_ = false, keep_alive_ = false, idle_ = false;
   bool asked_ = false;  ///< the engine, which takes its time
-  asio::steady_timer stall_;
+  asio::steady_timer stall_, presence_;
+  const std::uint64_t session_;
+  std::stop_source gone_;              ///< of the request that is under way
   std::uint64_t moved_bytes_ = 0;      ///< either way
   Pace pace_;                          ///< of the body that comes or goes
   std::optional<Sha256> body_sha256_;  ///< of what has come of a body that is named by it
@@ -329,6 +345,10 @@ void HttpSession::onWhole() {
   hub_->counters().upload_bytes += request_.body.size();
   stream_.expires_never();
   asked_ = true;
+  gone_ = std::stop_source();
+  request_.session = session_;
+  request_.gone = gone_.get_token();
+  watchPresence();
   hub_->hold(shared_from_this());
   respond(hub_, std::move(request_), [weak = weak_from_this()](HttpResponse response) {
     const auto self = weak.lock();
@@ -342,6 +362,7 @@ void HttpSession::onWhole() {
 
 void HttpSession::send(HttpResponse response, bool close) {
   asked_ = false;
+  presence_.cancel();
   (void)room_.hold(0);
   response_ = std::move(response);
   const auto size = response_.bytes ? response_.bytes->size() : 0;
@@ -418,6 +439,17 @@ void HttpSession::linger() {
                                          if (error || self->lingered_ > kLingerBytes) return self->stream_.close();
                                          self->linger();
                                        });
+}
+
+/// While the engine makes the answer nothing is read, so that only this finds out that nobody waits for it any more.
+void HttpSession::watchPresence() {
+  presence_.expires_after(kPresenceInterval);
+  presence_.async_wait([weak = weak_from_this()](BoostError error) {
+    const auto self = weak.lock();
+    if (error || self == nullptr || !self->asked_) return;
+    if (hasLeft(self->stream_.socket().native_handle())) return (void)self->gone_.request_stop();
+    self->watchPresence();
+  });
 }
 
 /// While the server drains: a peer that neither sends nor takes anything is not waited for.

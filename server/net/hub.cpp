@@ -189,6 +189,7 @@ void Hub::broadcast(const protocol::Notification& notification) {
 
 void Hub::drain() {
   if (draining_.exchange(true)) return;
+  engine_.callOff();
   broadcast(protocol::Draining{static_cast<std::uint64_t>(options_.drain_grace.count())});
   std::vector<Waiter> waiters;
   std::vector<std::weak_ptr<Connection>> connections;

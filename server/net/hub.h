@@ -70,6 +70,8 @@ class Hub : public engine::Listener, public std::enable_shared_from_this<Hub> {
   void join(const std::weak_ptr<Viewer>& viewer, const std::optional<protocol::Resume>& resume, const Welcome& welcome);
   void leave(const Viewer& viewer);
   [[nodiscard]] std::size_t viewerCount() const;
+  /// Of a connection, among those that the engine serves in turn; never 0.
+  [[nodiscard]] std::uint64_t nextSession() { return ++sessions_; }
 
   /// Tells those who share theirs. Returns the camera's number; nothing when kMaxCameras are shared.
   [[nodiscard]] std::optional<std::uint64_t> shareCamera(const Viewer& viewer, const std::string& name,
@@ -88,10 +90,10 @@ class Hub : public engine::Listener, public std::enable_shared_from_this<Hub> {
   using EditResult = tl::expected<protocol::SceneStepReply, protocol::RpcError>;  ///< of a patch: `edit` is 0
   using EditAnswer = std::function<void(const EditResult&)>;
   /// The same requestId gets the same answer; the engine sees it once.
-  void patch(const protocol::ScenePatchCall& call, const std::string& by, EditAnswer done);
+  void patch(const protocol::ScenePatchCall& call, const engine::Client& by, EditAnswer done);
   /// Undo or redo; the same holds.
-  void step(bool redo, std::optional<std::uint64_t> base_revision, const std::string& request_id, const std::string& by,
-            EditAnswer done);
+  void step(bool redo, std::optional<std::uint64_t> base_revision, const std::string& request_id,
+            const engine::Client& by, EditAnswer done);
 
   /// `done` is called once: with reached = true or false (solve stopped), or nothing while draining. Forgotten when
   /// `owner` is gone.
@@ -170,6 +172,7 @@ class Hub : public engine::Listener, public std::enable_shared_from_this<Hub> {
   engine::Engine& engine_;
   std::string epoch_;
   std::atomic<bool> draining_{false};
+  std::atomic<std::uint64_t> sessions_{0};
   BlobStore uploads_, snapshots_;
   SendRoom send_room_;
   TileCache tiles_;

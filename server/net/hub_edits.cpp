@@ -84,7 +84,7 @@ SharedBytes Hub::upload(const std::string& uri) {
   return blob ? blob->bytes : nullptr;
 }
 
-void Hub::patch(const protocol::ScenePatchCall& call, const std::string& by, EditAnswer done) {
+void Hub::patch(const protocol::ScenePatchCall& call, const engine::Client& by, EditAnswer done) {
   auto text = fmt::format("{}|{}|{}", call.base_revision.value_or(0), call.dry_run, call.patch);
   if (call.same_scene_as) text += fmt::format("|{}", *call.same_scene_as);  // others' are kept over a restart
   // A dry run changes nothing: the edit itself may come with the same id.
@@ -95,18 +95,19 @@ void Hub::patch(const protocol::ScenePatchCall& call, const std::string& by, Edi
       .base_revision = call.base_revision,
       .same_scene_as = call.same_scene_as,
       .dry_run = call.dry_run,
-      .by = by,
+      .by = by.name,
       .find_upload = [self = shared_from_this()](const auto& uri) { return self->upload(uri); },
-      .receipt = receipt};
-  askOnce(receipt, by, std::move(done), [&](auto heard) { engine_.patch(std::move(request), std::move(heard)); });
+      .receipt = receipt,
+      .session = by.session};
+  askOnce(receipt, by.name, std::move(done), [&](auto heard) { engine_.patch(std::move(request), std::move(heard)); });
 }
 
 void Hub::step(bool redo, std::optional<std::uint64_t> base_revision, const std::string& request_id,
-               const std::string& by, EditAnswer done) {
+               const engine::Client& by, EditAnswer done) {
   const auto text = fmt::format("{}|{}", base_revision.value_or(0), redo ? "redo" : "undo");
   const engine::Receipt receipt{request_id, request_id.empty() ? 0 : fingerprintOf(text)};
-  askOnce(receipt, by, std::move(done), [&](auto heard) {
-    engine_.step({redo, base_revision, by, receipt}, std::move(heard));
+  askOnce(receipt, by.name, std::move(done), [&](auto heard) {
+    engine_.step({redo, base_revision, by.name, receipt, by.session}, std::move(heard));
   });
 }
 

@@ -378,6 +378,7 @@ void WebSocketSession::closeAfterWrites(CloseCode code, std::string reason) {
 void WebSocketSession::close(CloseCode code, const std::string& reason) {
   if (std::exchange(closing_, true)) return;
   hub_->leave(*this);
+  if (calls_) calls_->end();
   watching_.reset();
   control_.clear();
   if (!draining_) cutAfter(hub_->options().close_patience);
@@ -400,6 +401,7 @@ void WebSocketSession::cutAfter(std::chrono::milliseconds patience) {
 
 void WebSocketSession::cut() {
   closing_ = true;
+  if (calls_) calls_->end();
   watching_.reset();
   hub_->leave(*this);
   deadline_.cancel();

@@ -14,6 +14,7 @@
 
 #include "common/check.h"
 #include "common/memory_limit.h"
+#include "common/task.h"
 #include "server/scene/lit_sides.h"
 #include "server/scene/page_space.h"
 
@@ -103,6 +104,7 @@ double predictedLeaves(const ChartMeasure& m, bool from_file, double texel) {
 std::unordered_map<std::uint32_t, double> uvDensities(const std::vector<Chart>& charts) {
   std::unordered_map<std::uint32_t, std::pair<double, double>> sums;
   for (const Chart& chart : charts) {
+    interruptionPoint();
     if (!chart.from_file) continue;
     auto& [uv, world] = sums[chart.instance];
     for (const auto& t : chart.corners) uv += triangleArea(t);
@@ -292,6 +294,7 @@ class LayoutMaker {
     std::ranges::stable_sort(fresh, std::greater{}, [&](std::size_t i) { return blocks_[i].height; });
     std::uint64_t looks = 0;  // what looking everywhere costs is bounded; a new page is always free
     for (const std::size_t i : fresh) {
+      interruptionPoint();
       Block& block = blocks_[i];
       bool found = false;
       for (std::uint32_t p = 0; p < space.size() && !found; ++p) {
@@ -375,6 +378,7 @@ class LayoutMaker {
     double area = 0.0;
     std::uint32_t widest = 0;
     for (const auto& rect : rects) {
+      interruptionPoint();
       area += static_cast<double>(rect.w) * rect.h;
       widest = std::max({widest, static_cast<std::uint32_t>(rect.w), static_cast<std::uint32_t>(rect.h)});
     }
@@ -390,6 +394,7 @@ class LayoutMaker {
     Page size;
     std::vector<stbrp_rect> left;
     for (const auto& rect : rects) {
+      interruptionPoint();
       if (rect.was_packed == 0) {
         left.push_back(rect);
         continue;
@@ -429,6 +434,7 @@ double texelSizeFor(const std::vector<Chart>& charts, std::uint64_t texel_budget
   std::vector<ChartMeasure> measures;
   const auto densities = uvDensities(charts);
   for (const Chart& chart : charts) {
+    interruptionPoint();
     measures.push_back(measure(chart));
     if (chart.from_file) measures.back().units_per_length = densities.at(chart.instance);
   }

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "common/give_back.h"
+#include "common/task.h"
 #include "server/scene/bounds.h"
 #include "server/scene/triangle_hit.h"
 
@@ -103,6 +104,7 @@ void Bvh::build() {
   };
   std::vector<Task> pending{{0, 0}};
   while (!pending.empty()) {
+    interruptionPoint();
     const Task task = pending.back();
     pending.pop_back();
     const std::uint32_t first = nodes_[task.node].first, count = nodes_[task.node].count;

@@ -4,6 +4,7 @@
 #include <numeric>
 #include <queue>
 
+#include "common/task.h"
 #include "server/scene/charts.h"
 
 namespace radiosity::scene {
@@ -19,6 +20,7 @@ struct FacetGraph {
 FacetGraph facetGraph(const std::vector<std::uint32_t>& neighbours, const Facets& facets) {
   FacetGraph graph;
   for (std::uint32_t f = 0; f < facets.facets.size(); ++f) {
+    interruptionPoint();
     graph.first.push_back(static_cast<std::uint32_t>(graph.neighbour.size()));
     for (const std::uint32_t t : facets.facets[f].triangles)
       for (std::size_t e = 0; e < 3; ++e) {
@@ -103,6 +105,7 @@ std::vector<std::vector<std::uint32_t>> groupFacets(const FlatScene& flat, const
   std::vector<std::vector<std::uint32_t>> groups;
   std::vector<bool> taken(facets.facets.size(), false);
   for (std::uint32_t f = 0; f < facets.facets.size(); ++f) {
+    interruptionPoint();
     const Facets::Facet& facet = facets.facets[f];
     if (facet.area < planar_side * planar_side * 0.5) continue;  // cannot be wide enough, unless nearly hollow
     if (rectangleSides(flat, facet.triangles, facet.normal).y < planar_side) continue;

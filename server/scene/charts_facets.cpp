@@ -3,6 +3,7 @@
 #include <glm/geometric.hpp>
 #include <numeric>
 
+#include "common/task.h"
 #include "server/scene/charts.h"
 
 namespace radiosity::scene {
@@ -44,6 +45,7 @@ Facets findFacets(const FlatScene& flat, const std::vector<std::uint32_t>& neigh
     return std::ilogb(flat.triangles[a].area) > std::ilogb(flat.triangles[b].area);
   });
   for (const std::uint32_t seed : order) {
+    interruptionPoint();
     if (!wanted[seed] || result.of_triangle[seed] != kNone) continue;
     const auto id = static_cast<std::uint32_t>(result.facets.size());
     Facets::Facet facet;

@@ -5,6 +5,7 @@
 #include <numeric>
 #include <unordered_map>
 
+#include "common/task.h"
 #include "server/scene/charts.h"
 
 namespace radiosity::scene {
@@ -302,6 +303,7 @@ std::vector<Chart> fitCharts(const FlatScene& flat, const Facets& facets,
                              const std::vector<std::vector<std::uint32_t>>& groups) {
   std::vector<Chart> charts;
   for (const auto& group : groups) {
+    interruptionPoint();
     std::vector<std::uint32_t> triangles;
     for (const std::uint32_t f : group)
       triangles.insert(triangles.end(), facets.facets[f].triangles.begin(), facets.facets[f].triangles.end());

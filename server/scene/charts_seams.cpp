@@ -2,6 +2,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "common/task.h"
 #include "server/scene/charts.h"
 
 namespace radiosity::scene {
@@ -82,6 +83,7 @@ void findSeams(const FlatScene& flat, const std::vector<std::uint32_t>& neighbou
            glm::dot(normalAt(x, x.corner_high), normalAt(y, y.corner_high)) > kSameNormal;
   };
   for (std::size_t i = 0; i < edges.size();) {
+    interruptionPoint();
     std::size_t end = i + 1;
     while (end < edges.size() && edges[end].low == edges[i].low && edges[end].high == edges[i].high) ++end;
     end = std::min(end, i + 16);  // a book of pages; the rest of the group is looked at on its own

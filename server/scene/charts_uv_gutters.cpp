@@ -9,6 +9,7 @@
 #include <tuple>
 #include <vector>
 
+#include "common/task.h"
 #include "server/scene/atlas.h"
 #include "server/scene/charts.h"
 #include "server/scene/triangle_rows.h"
@@ -70,6 +71,7 @@ class Islands {
     });
     std::vector<const Span*> open;  // of each chart the one that ends last
     for (const Span& span : spans) {
+      interruptionPoint();
       if (left < open.size()) return true;
       left -= open.size();
       std::erase_if(open, [&](const Span* other) { return other->row != span.row || other->last < span.first; });
@@ -93,6 +95,7 @@ class Islands {
     std::vector<Span> spans;
     for (std::uint32_t c = 0; c < charts_.size(); ++c)
       for (std::uint32_t i = 0; i < charts_[c].corners.size(); ++i) {
+        interruptionPoint();
         Triangle2 t = charts_[c].corners[i];
         for (auto& corner : t) corner *= resolution_;
         const auto [low, high] = std::minmax({t[0].y, t[1].y, t[2].y});

@@ -8,6 +8,7 @@
 #include <span>
 #include <unordered_map>
 
+#include "common/task.h"
 #include "common/union_find.h"
 #include "server/scene/patch_scene.h"
 #include "server/scene/self_crossing.h"
@@ -83,6 +84,7 @@ Parts connectedParts(const PatchScene& patches) {
   std::vector<bool> open(triangles, false);
   const auto edges = sortedEdges(patches);
   for (std::size_t first = 0, last = 0; first < edges.size(); first = last) {
+    interruptionPoint();
     while (last < edges.size() && edges[last].key == edges[first].key) ++last;
     const bool closed = last - first == 2 && edges[first].forward != edges[first + 1].forward;
     for (auto i = first; i < last; ++i) {
@@ -139,6 +141,7 @@ ClosedSolids findClosedSolids(const PatchScene& patches) {
   };
   std::vector<Corners> triangles;
   for (auto begin = order.begin(), end = begin; begin != order.end(); begin = end) {
+    interruptionPoint();
     const auto& part = parts.all[parts.of[*begin]];
     end = std::find_if(begin, order.end(), [&](std::uint32_t i) { return first(i) != first(*begin); });
     triangles.clear();

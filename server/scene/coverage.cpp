@@ -135,6 +135,7 @@ class SurfaceCoverage {
     const auto first = std::max(static_cast<std::int64_t>(top_), static_cast<std::int64_t>(std::floor(low)));
     const auto end = std::min(static_cast<std::int64_t>(bottom_), static_cast<std::int64_t>(std::ceil(high)));
     for (std::int64_t y = first; y < end; ++y) {
+      interruptionPoint();
       const auto row = static_cast<double>(y);
       addRow(y, clip(clip(whole, 1, row, 1.0), 1, row + 1.0, -1.0));
     }

@@ -17,6 +17,8 @@ namespace {
 
 /// Leaves: what is found of so many is held at once; so many are measured in a turn; fewer are not tried in a thread.
 constexpr std::size_t kMeasuredAtOnce = 65536, kLeavesATurn = 16, kFewestTries = 16;
+/// Part of the time a scene takes to build that has passed before the leaves are measured, and after.
+constexpr double kMeasureBegins = 0.35, kMeasureEnds = 0.7;
 /// Surfaces, likewise.
 constexpr std::size_t kFewestSurfaces = 32;
 /// Hits::work, 2 or 3 s of one core, of leaves that nothing comes near: each surface has its share.
@@ -145,6 +147,7 @@ class Burial {
 
   /// `node`: its place in the grid of its level.
   void descend(const NodeBoxes& boxes, const Contact& node, std::uint32_t level, Hits& hits, Split& split) const {
+    interruptionPoint();
     const Surface& surface = patches_.surfaces[node.surface];
     const Bounds box = boxes.box(level, node.x, node.y);
     if (box.empty()) return;
@@ -173,6 +176,7 @@ class Burial {
     bool is_first = true, is_buried = false;
     for (std::uint32_t y = node.y << level; y < y_end; ++y)
       for (std::uint32_t x = node.x << level; x < x_end; ++x) {
+        interruptionPoint();
         const Contact leaf{node.surface, node.side, x, y};
         const LeafPoint& point = patches_.leaves[leaves_.leafOf(leaf)];
         if (point.triangle == kNone) continue;
@@ -207,6 +211,8 @@ class Burial {
     std::vector<Measured> measured;
     for (std::size_t first = 0; first < contacts.size(); first += kMeasuredAtOnce) {
       const auto end = std::min(contacts.size(), first + kMeasuredAtOnce);
+      if (pass == BurialRecord::Pass::kFew)
+        tellMeasured(static_cast<double>(first) / static_cast<double>(contacts.size()));
       measured.assign(end - first, {});
       // Most are remembered after an edit, and those that are not lie together.
       inTurns((end - first + kLeavesATurn - 1) / kLeavesATurn, [&](std::size_t part) {
@@ -227,9 +233,15 @@ class Burial {
     }
   }
 
+  /// `part`: of the few places of all leaves, in [0, 1].
+  static void tellMeasured(double part) {
+    if (auto* task = currentTask()) task->tellProgress(kMeasureBegins + (kMeasureEnds - kMeasureBegins) * part);
+  }
+
   /// As measure(), or from what was found before an edit.
   [[nodiscard]] Measured remember(const Contact& contact, std::uint32_t count, BurialRecord::Pass pass,
                                   LeafBurial::Scratch& scratch) const {
+    interruptionPoint();
     const bool by_rays = !record_.covered[contact.surface];
     if (by_rays && former_ != nullptr) {
       const auto leaf = leaves_.leafOf(contact) - patches_.surfaces[contact.surface].first_leaf;

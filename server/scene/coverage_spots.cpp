@@ -66,6 +66,7 @@ constexpr std::array<std::uint32_t, 3> kPlacesTried{64, 256, 1024};
 LeafSpots::Lattice boxAround(const PatchScene& patches, std::span<const LeafPiece> pieces, const glm::dvec2& corner) {
   glm::dvec2 low = corner + 1.0, high = corner;
   for (const auto& piece : pieces) {
+    interruptionPoint();
     const std::size_t first = 3 * std::size_t{piece.triangle};
     const auto texel = [&](std::size_t k) { return glm::dvec2(patches.vertices[patches.indices[first + k]].texel); };
     low = glm::min(low, glm::min(texel(0), glm::min(texel(1), texel(2))));
@@ -100,6 +101,7 @@ LeafPlaces findPlaces(const PatchScene& patches, std::span<const LeafPiece> piec
 void placeSpots(PatchScene& patches, const std::vector<LeafPiece>& pieces) {
   std::size_t surface = 0;
   for (std::size_t first = 0, end = 0; first < pieces.size(); first = end) {
+    interruptionPoint();
     const std::uint32_t index = pieces[first].leaf;
     while (end < pieces.size() && pieces[end].leaf == index) ++end;
     auto& leaf = patches.leaves[index];
@@ -145,6 +147,7 @@ class Gaps {
     std::vector<std::vector<Found>> found(patches_.surfaces.size());
     inShares(found.size() / kFewestAShare, [&](std::size_t share, std::size_t shares) {
       for (auto s = static_cast<std::uint32_t>(share); s < found.size(); s += static_cast<std::uint32_t>(shares)) {
+        interruptionPoint();
         const Surface& surface = patches_.surfaces[s];
         for (std::size_t side = 0; side < 2 && surface.planar; ++side) {
           if (surface.first_node[side] == kNone) continue;
@@ -225,6 +228,7 @@ class Gaps {
     const Surface &surface = patches_.surfaces[s], &former = before_->surfaces[surface_before_[s]];
     const glm::uvec2 end = glm::min((at + 1U) << level, glm::uvec2(surface.width, surface.height));
     for (auto y = at.y << level; y < end.y; ++y) {
+      interruptionPoint();
       for (auto x = at.x << level; x < end.x; ++x) {
         const auto leaf = y * surface.width + x;
         if (!mayHave(patches_.leaves[surface.first_leaf + leaf])) continue;

@@ -8,6 +8,8 @@
 #include <numbers>
 #include <vector>
 
+#include "common/task.h"
+
 namespace radiosity::scene {
 namespace {
 
@@ -154,6 +156,7 @@ void materialiseDefaults(Json& gltf) {
   if (const auto nodes = gltf.find("nodes"); nodes != gltf.end() && nodes->is_array()) {
     bool visibility = false;
     for (auto& node : *nodes) {
+      interruptionPoint();
       if (!node.is_object()) continue;
       materialiseTransform(node);
       visibility |= materialiseVisibility(node);

@@ -5,6 +5,8 @@
 #include <optional>
 #include <system_error>
 
+#include "common/task.h"
+
 namespace radiosity::scene {
 namespace {
 
@@ -49,6 +51,7 @@ std::optional<Bytes> base64Decode(std::string_view text) {
   std::uint32_t group = 0;
   int bits = 0;
   for (const char c : text) {
+    interruptionPoint();
     const auto digit = base64Digit(c);
     if (!digit) return std::nullopt;
     group = group << 6 | static_cast<std::uint32_t>(*digit);

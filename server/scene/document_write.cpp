@@ -1,5 +1,6 @@
 // writeGlb: one buffer, images embedded.
 #include "common/check.h"
+#include "common/task.h"
 #include "server/scene/document.h"
 #include "server/scene/glb.h"
 #include "server/scene/image_decode.h"
@@ -23,6 +24,7 @@ Bytes joinBuffers(const Document& document, Json& gltf) {
   Bytes bin;
   std::vector<std::size_t> first;
   for (const auto& buffer : document.buffers) {
+    interruptionPoint();
     first.push_back(bin.size());
     bin.insert(bin.end(), buffer->begin(), buffer->end());
     padTo4(bin);

@@ -6,6 +6,7 @@
 #include <glm/common.hpp>
 #include <vector>
 
+#include "common/task.h"
 #include "server/scene/shade_texture.h"
 
 namespace radiosity::scene {
@@ -52,6 +53,7 @@ class Emitters::BrightPixels {
     const auto row = static_cast<std::size_t>(width_) + 1;
     sums_.assign(row * (static_cast<std::size_t>(height_) + 1), 0);
     for (std::size_t y = 0; y < static_cast<std::size_t>(height_); ++y) {
+      interruptionPoint();
       std::uint32_t in_row = 0;
       for (std::size_t x = 0; x < static_cast<std::size_t>(width_); ++x) {
         const auto* p = &texture.rgba[4 * (y * static_cast<std::size_t>(width_) + x)];
@@ -131,6 +133,7 @@ DarkOfEmitters::DarkOfEmitters(const Scene& scene, const PatchScene& patches) {
 void findEmitters(const Scene& scene, PatchScene& patches) {
   const Emitters emitters(scene);
   for (Surface& surface : patches.surfaces) {
+    interruptionPoint();
     surface.emits = false;
     for (auto t = surface.first_triangle; t < surface.first_triangle + surface.triangle_count && !surface.emits; ++t)
       surface.emits = emitters.shines(surface.instance, patches.triangle_source[t]);

@@ -10,6 +10,8 @@
 #include <glm/vector_relational.hpp>
 #include <unordered_map>
 
+#include "common/task.h"
+
 namespace radiosity::scene {
 namespace {
 
@@ -47,6 +49,7 @@ glm::dvec3 toWorld(const Instance& instance, const glm::dvec3& p) {
 Box worldBounds(const Scene& scene) {
   Box box;
   for (const Instance& instance : scene.instances) {
+    interruptionPoint();
     if (!usable(scene, instance)) continue;
     const Primitive& primitive = scene.primitives[instance.primitive];
     for (const std::uint32_t index : primitive.indices) {
@@ -128,7 +131,10 @@ class InstanceFlattener {
     welded_.assign(positions_.size(), kNone);
     const auto count = static_cast<std::uint32_t>(primitive_.indices.size() / 3);
     const std::size_t first = flat_.triangles.size();
-    for (std::uint32_t t = 0; t < count; ++t) addTriangle(t, welder, tolerance);
+    for (std::uint32_t t = 0; t < count; ++t) {
+      interruptionPoint();
+      addTriangle(t, welder, tolerance);
+    }
     dropDuplicates(first);
   }
 
@@ -274,6 +280,7 @@ FlatScene flatten(const Scene& scene, const UnitFrame& frame) {
   flat.scale = frame.scale;
   flat.tolerance.assign(scene.instances.size(), 0.0);
   for (std::uint32_t i = 0; i < scene.instances.size(); ++i) {
+    interruptionPoint();
     flat.first_triangle.push_back(static_cast<std::uint32_t>(flat.triangles.size()));
     if (usable(scene, scene.instances[i])) InstanceFlattener(scene, flat, i).run();
   }
@@ -299,6 +306,7 @@ std::vector<std::uint32_t> edgeNeighbours(const FlatScene& flat) {
   });
   std::vector<std::uint32_t> neighbours(flat.triangles.size() * 3, kNone);
   for (std::size_t i = 0; i < edges.size();) {
+    interruptionPoint();
     std::size_t end = i + 1;
     while (end < edges.size() && edges[end].low == edges[i].low && edges[end].high == edges[i].high) ++end;
     if (end - i >= 2) pairHalfEdges(flat, &edges[i], end - i, neighbours);

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "common/task.h"
 #include "server/scene/accessor.h"
 
 namespace radiosity::scene {
@@ -32,6 +33,7 @@ Result<void> checkAccessors(const ImportContext& context) {
   }
   std::size_t total = 0;
   for (std::size_t i = 0; i < context.model.accessors.size(); ++i) {
+    interruptionPoint();
     const auto pointer = "/accessors/" + std::to_string(i);
     if (auto ok = checkAccessor(context.document, context.model, i); !ok) return ok;
     total += context.model.accessors[i].count;
@@ -141,6 +143,7 @@ Result<void> checkMeshes(const ImportContext& context) {
   for (std::size_t m = 0; m < context.model.meshes.size(); ++m) {
     const auto& primitives = context.model.meshes[m].primitives;
     for (std::size_t p = 0; p < primitives.size(); ++p) {
+      interruptionPoint();
       const auto pointer = "/meshes/" + std::to_string(m) + "/primitives/" + std::to_string(p);
       const auto& json = context.document.gltf["meshes"][m]["primitives"][p];
       if (auto ok = checkCompression(context, primitives[p], json, pointer); !ok) return ok;
@@ -168,6 +171,7 @@ Result<void> checkTree(const ImportContext& context) {
   constexpr auto kNoParent = static_cast<std::size_t>(-1);
   std::vector<std::size_t> parents(nodes.size(), kNoParent);
   for (std::size_t n = 0; n < nodes.size(); ++n) {
+    interruptionPoint();
     for (std::size_t c = 0; c < nodes[n].children.size(); ++c) {
       const auto child = static_cast<std::size_t>(nodes[n].children[c]);
       if (parents[child] != kNoParent) {
@@ -180,6 +184,7 @@ Result<void> checkTree(const ImportContext& context) {
   std::vector<std::size_t> stack;
   std::vector<bool> reached(nodes.size(), false);
   for (std::size_t n = 0; n < nodes.size(); ++n) {
+    interruptionPoint();
     if (parents[n] == kNoParent) stack.push_back(n);
   }
   while (!stack.empty()) {

@@ -4,6 +4,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <optional>
 
+#include "common/task.h"
 #include "server/scene/accessor.h"
 
 namespace radiosity::scene {
@@ -35,6 +36,7 @@ Result<std::vector<Trs>> readInstancing(const Document& document, const tinygltf
   }
   std::vector<Trs> out(*count);
   for (std::size_t i = 0; i < *count; ++i) {
+    interruptionPoint();
     const auto vec3 = [&](std::size_t k) {
       const auto v = readers[k]->at(i);
       return glm::dvec3(v[0], v[1], v[2]);

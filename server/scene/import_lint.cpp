@@ -8,6 +8,7 @@
 #include <set>
 #include <string>
 
+#include "common/task.h"
 #include "server/scene/image_decode.h"
 #include "server/scene/node_transform.h"
 
@@ -18,6 +19,7 @@ namespace {
 void collectExtensions(const Json& value, std::set<std::string>& names) {
   if (!value.is_structured()) return;
   for (const auto& [key, child] : value.items()) {
+    interruptionPoint();
     if (value.is_object() && key == "extras") continue;
     if (value.is_object() && key == "extensions" && child.is_object()) {
       for (const auto& extension : child.items()) names.insert(extension.key());
@@ -61,6 +63,7 @@ void warnMeshes(ImportContext& context) {
     const auto mesh = "/meshes/" + std::to_string(m);
     if (placed.count(static_cast<int>(m)) == 0) context.warn(mesh, "no node places it; not read");
     for (std::size_t p = 0; p < context.model.meshes[m].primitives.size(); ++p) {
+      interruptionPoint();
       const auto pointer = mesh + "/primitives/" + std::to_string(p) + "/attributes/";
       for (const auto& [name, accessor] : context.model.meshes[m].primitives[p].attributes) {
         if (!isKnownAttribute(name)) context.warn(pointer + escapeToken(name), "unknown attribute; ignored");

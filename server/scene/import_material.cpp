@@ -7,6 +7,7 @@
 #include <set>
 #include <string>
 
+#include "common/task.h"
 #include "server/scene/image_decode.h"
 #include "server/scene/image_plan.h"
 #include "server/scene/texture_references.h"
@@ -321,6 +322,7 @@ Result<void> importMaterials(ImportContext& context) {
                                 "their width and height, or less");
   MaterialImporter importer(context, *plan);
   for (std::size_t i = 0; i < context.materials.size(); ++i) {
+    interruptionPoint();
     if (auto ok = importer.add(i); !ok) return ok;
   }
   return {};

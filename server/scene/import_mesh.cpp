@@ -9,6 +9,7 @@
 #include <unordered_map>
 #include <unordered_set>
 
+#include "common/task.h"
 #include "server/scene/accessor.h"
 #include "server/scene/import_normals.h"
 
@@ -65,6 +66,7 @@ std::uint64_t dropBadTriangles(Primitive& primitive) {
     return ids.try_emplace(primitive.positions[vertex], static_cast<std::uint32_t>(ids.size())).first->second;
   };
   for (std::size_t i = 0; i < primitive.indices.size(); i += 3) {
+    interruptionPoint();
     const auto* t = &primitive.indices[i];
     const auto& a = primitive.positions[t[0]];
     const auto& b = primitive.positions[t[1]];
@@ -154,6 +156,7 @@ Result<void> MeshImporter::readVertices(const tinygltf::Primitive& source, Primi
       return context_.tooLarge(pointer, "more than " + std::to_string(context_.limits.max_vertices) + " vertices");
     }
     for (std::size_t i = 0; i < reader->size(); ++i) {
+      interruptionPoint();
       const auto v = reader->at(i);
       if (position) primitive.positions.emplace_back(v[0], v[1], v[2]);
       if (name == "TEXCOORD_0") primitive.texcoord0.emplace_back(finiteOr(v[0], 0), finiteOr(v[1], 0));
@@ -176,6 +179,7 @@ Result<void> MeshImporter::readNormals(const tinygltf::Primitive& source, Primit
   const auto count = std::min(reader->size(), primitive.positions.size());
   primitive.normals.reserve(count);
   for (std::size_t i = 0; i < count; ++i) {
+    interruptionPoint();
     const auto v = reader->at(i);
     primitive.normals.emplace_back(v[0], v[1], v[2]);
   }
@@ -193,6 +197,7 @@ Result<void> MeshImporter::readTriangles(const tinygltf::Primitive& source, Prim
     const auto reader = AccessorReader::open(context_.document, context_.model, accessor);
     if (!reader) return tl::unexpected(reader.error());
     for (std::size_t i = 0; i < reader->size(); ++i) {
+      interruptionPoint();
       indices.push_back(reader->indexAt(i));
       if (indices.back() < primitive.positions.size()) continue;
       return context_.bad("/accessors/" + std::to_string(accessor),

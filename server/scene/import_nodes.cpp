@@ -6,6 +6,7 @@
 #include <numbers>
 #include <utility>
 
+#include "common/task.h"
 #include "server/scene/import_instancing.h"
 #include "server/scene/import_lint.h"
 #include "server/scene/import_mesh.h"
@@ -110,6 +111,7 @@ class NodeWalk {
     if (!primitives) return tl::unexpected(primitives.error());
     if (instancing == nullptr) {
       for (const auto& posed : *primitives) {
+        interruptionPoint();
         placed.primitive = posed.primitive;
         placed.world = posed.world;
         if (auto ok = addInstance(placed); !ok) return ok;
@@ -128,6 +130,7 @@ class NodeWalk {
     if (!locals) return tl::unexpected(locals.error());
     warnAboutElements(context_, *locals, pointer);
     for (const auto& local : *locals) {
+      interruptionPoint();
       placed.world = world * local.matrix();
       if (!isFinite(placed.world)) return context_.bad(pointer_, "world transform is not finite");
       for (const auto& posed : primitives) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/give_back.h"
+#include "common/task.h"
 
 namespace radiosity::scene {
 namespace {
@@ -24,6 +25,7 @@ struct Faces {
 template <typename Visit>
 void forEachTriangle(const Primitive& primitive, const Visit& visit) {
   for (std::size_t i = 0; i + 2 < primitive.indices.size(); i += 3) {
+    interruptionPoint();
     const auto* t = &primitive.indices[i];
     const auto& a = primitive.positions[t[0]];
     const auto cross = glm::cross(primitive.positions[t[1]] - a, primitive.positions[t[2]] - a);

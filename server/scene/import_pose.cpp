@@ -11,6 +11,7 @@
 #include <optional>
 #include <utility>
 
+#include "common/task.h"
 #include "server/scene/accessor.h"
 #include "server/scene/node_transform.h"
 
@@ -212,6 +213,7 @@ Result<void> PoseImporter::addTarget(std::size_t accessor, double weight, const 
   if ((moved_ += count) / kMostTargets > context_.limits.max_vertices)
     return context_.tooLarge(pointer, "morph targets move too many vertices");
   for (std::size_t i = 0; i < count; ++i) {
+    interruptionPoint();
     const auto v = reader->at(i);
     const auto delta = weight * glm::dvec3(v[0], v[1], v[2]);
     if (normals) {

@@ -8,6 +8,8 @@
 #include <span>
 #include <string_view>
 
+#include "common/task.h"
+
 namespace radiosity::scene {
 namespace {
 
@@ -234,6 +236,7 @@ class Checker {
   Result<void> objectAt(const Json& value, std::span<const Member> members, const std::string& pointer) {
     if (!value.is_object()) return bad(pointer, "must be an object");
     for (const auto& member : members) {
+      interruptionPoint();
       const auto found = value.find(member.name);
       if (found == value.end()) {
         if (member.required) return bad(pointer, std::string("'") + member.name + "' is missing");
@@ -291,6 +294,7 @@ class Checker {
       return bad(pointer, "must have " + std::to_string(member.length) + " numbers");
     }
     for (std::size_t i = 0; i < value.size(); ++i) {
+      interruptionPoint();
       if (auto ok = elementAt(value[i], member, pointer + "/" + std::to_string(i)); !ok) return ok;
     }
     return {};

@@ -1,8 +1,12 @@
 #include "server/scene/json_text.h"
 
 #include <algorithm>
+#include <cstdint>
+#include <iterator>
 #include <utility>
 #include <vector>
+
+#include "common/task.h"
 
 namespace radiosity::scene {
 namespace {
@@ -18,6 +22,33 @@ std::string linePlace(const std::string& name, std::string_view text, std::size_
   const auto column = newline == std::string_view::npos ? before.size() : before.size() - newline - 1;
   return name + ": line " + std::to_string(line) + ", column " + std::to_string(column);
 }
+
+/// The characters of a text, with an interruption point each 64 KiB: the library takes seconds for the largest texts.
+class InterruptibleText {
+ public:
+  using iterator_category = std::forward_iterator_tag;
+  using value_type = char;
+  using difference_type = std::ptrdiff_t;
+  using pointer = const char*;
+  using reference = const char&;
+
+  explicit InterruptibleText(const char* at) : at_(at) {}
+  const char& operator*() const { return *at_; }
+  InterruptibleText& operator++() {
+    constexpr std::uintptr_t kBetween = 0xFFFF;
+    if ((reinterpret_cast<std::uintptr_t>(++at_) & kBetween) == 0) interruptionPoint();
+    return *this;
+  }
+  InterruptibleText operator++(int) {
+    auto before = *this;
+    ++*this;
+    return before;
+  }
+  bool operator==(const InterruptibleText&) const = default;
+
+ private:
+  const char* at_;
+};
 
 /// Checks depth and count without recursion. Strings are skipped; anything malformed is left to the parser.
 Result<void> scan(std::string_view text, const std::string& name, std::size_t max_depth) {
@@ -56,7 +87,7 @@ Result<Json> parseJson(std::string_view text, const std::string& name, std::size
   if (auto scanned = scan(text, name, max_depth); !scanned) return tl::unexpected(scanned.error());
   // The library reports errors by exception; it goes no further than here.
   try {
-    return Json::parse(text.begin(), text.end());
+    return Json::parse(InterruptibleText(text.data()), InterruptibleText(text.data() + text.size()));
   } catch (const Json::parse_error& e) {
     return fail(ErrorCode::kBadInput, std::string("not JSON: ") + e.what(), linePlace(name, text, e.byte));
   } catch (const Json::exception& e) {  // a number too big for a double

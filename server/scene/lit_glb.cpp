@@ -5,6 +5,7 @@
 #include <string>
 
 #include "common/check.h"
+#include "common/task.h"
 #include "server/scene/emitters.h"
 #include "server/scene/import_context.h"
 #include "server/scene/import_instancing.h"
@@ -50,6 +51,7 @@ std::vector<Placement> placements(const Scene& scene, const PatchScene& patches,
 template <typename Visit>
 void forEachTexcoord(Json& value, const Visit& visit) {
   for (auto& [key, child] : value.items()) {
+    interruptionPoint();
     if (key == "texCoord" && child.is_number_integer()) visit(child);
     if (child.is_structured()) forEachTexcoord(child, visit);
   }
@@ -105,6 +107,7 @@ class Exporter {
   Result<void> run(const std::vector<Placement>& all) {
     source_meshes_ = out_.gltf.value("meshes", Json::array());
     for (std::size_t i = 0; i < all.size();) {
+      interruptionPoint();
       auto end = i;
       while (end < all.size() && all[end].node == all[i].node) ++end;
       if (auto ok =

@@ -10,6 +10,7 @@
 #include <unordered_map>
 
 #include "common/check.h"
+#include "common/task.h"
 #include "server/scene/accessor.h"
 
 namespace radiosity::scene {
@@ -125,6 +126,7 @@ Result<std::size_t> LitMeshBuilder::copyAccessor(std::size_t accessor, const std
   if (const auto room = checkRoom(stride * elements.size()); !room) return tl::unexpected(room.error());
   bytes_.reserve(first + stride * elements.size());
   for (const auto element : elements) {
+    interruptionPoint();
     const auto next = bytes_.size() + stride;
     if (const auto* data = reader->bytesAt(element)) append(data, size);
     bytes_.resize(next, 0);
@@ -139,6 +141,8 @@ Result<std::size_t> LitMeshBuilder::copyAccessor(std::size_t accessor, const std
     glm::dvec3 low(std::numeric_limits<double>::max());
     glm::dvec3 high(std::numeric_limits<double>::lowest());
     for (const auto element : elements) {
+      interruptionPoint();
+      interruptionPoint();
       const auto v = unscaled.at(element);
       low = glm::min(low, glm::dvec3(v[0], v[1], v[2]));
       high = glm::max(high, glm::dvec3(v[0], v[1], v[2]));
@@ -181,6 +185,7 @@ LitMeshBuilder::Vertices LitMeshBuilder::collect(const LitPrimitive& lit, const 
   const std::array<std::size_t, 3> order =
       part.side == 0 ? std::array<std::size_t, 3>{0, 1, 2} : std::array<std::size_t, 3>{0, 2, 1};
   for (std::size_t t = 0; t < uv.page.size(); ++t) {
+    interruptionPoint();
     if (uv.page[t] != part.page || lit.isDark(t) != part.dark) continue;
     for (const auto c : order) {
       const CornerKey key{indices[3 * t + c], uv.corners[t][c]};

@@ -1,7 +1,5 @@
 #include "server/scene/lit_glb_picture.h"
 
-#include <stb_image_write.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,6 +7,8 @@
 #include <glm/vec2.hpp>
 #include <vector>
 
+#include "common/task.h"
+#include "server/scene/png.h"
 #include "server/scene/triangle_rows.h"
 
 namespace radiosity::scene {
@@ -16,17 +16,6 @@ namespace {
 
 std::uint8_t byteOf(float value) {
   return static_cast<std::uint8_t>(std::lround((std::isfinite(value) ? std::clamp(value, 0.0F, 1.0F) : 0.0F) * 255.0F));
-}
-
-Bytes encode(int width, int height, int channels, const std::vector<std::uint8_t>& pixels) {
-  Bytes png;
-  const auto write = [](void* context, void* data, int size) {
-    auto& out = *static_cast<Bytes*>(context);
-    const auto* bytes = static_cast<const std::uint8_t*>(data);
-    out.insert(out.end(), bytes, bytes + size);
-  };
-  stbi_write_png_to_func(write, &png, width, height, channels, pixels.data(), width * channels);
-  return png;
 }
 
 /// Half-open, in pixels.
@@ -59,7 +48,7 @@ class SeeThroughPage {
     for (const auto& side : sides_)
       for (std::uint32_t t = 0; t < side.surface->triangle_count; ++t)
         writeTriangle(side, side.surface->first_triangle + t);
-    return encode(width_, height_, 4, rgba_);
+    return encodePng(width_, height_, 4, rgba_);
   }
 
  private:
@@ -79,11 +68,13 @@ class SeeThroughPage {
   }
 
   void writeColours() {
-    for (int y = 0; y < height_; ++y)
+    for (int y = 0; y < height_; ++y) {
+      interruptionPoint();
       for (int x = 0; x < width_; ++x) {
         const auto colour = colourAt(x, y);
         for (int c = 0; c < 3; ++c) pixel(x, y)[c] = byteOf(colour[c]);
       }
+    }
   }
 
   /// Chart coordinates of a place on the picture, in pixels.
@@ -115,11 +106,13 @@ class SeeThroughPage {
     const auto x = static_cast<int>(side.place.x), y = static_cast<int>(side.place.y);
     const auto x1 = x + static_cast<int>(side.surface->width), y1 = y + static_cast<int>(side.surface->height);
     const auto rect = clipped({(x - 1) * scale_, (y - 1) * scale_, (x1 + 1) * scale_, (y1 + 1) * scale_});
+    interruptionPoint();
     for (int row = rect.y0; row < rect.y1; ++row)
       for (int column = rect.x0; column < rect.x1; ++column) pixel(column, row)[3] = opacityAt(side, column, row);
   }
 
   void writeTriangle(const PlacedSide& side, std::uint32_t triangle) {
+    interruptionPoint();
     std::array<glm::vec2, 3> corner;
     for (std::size_t k = 0; k < 3; ++k)
       corner[k] = (patches_.vertices[patches_.indices[std::size_t{3} * triangle + k]].texel +
@@ -164,7 +157,7 @@ Bytes encodePagePng(const PatchScene& patches, std::uint32_t page, const Image& 
   rgb.reserve(display.pixels.size() * 3);
   for (const auto& pixel : display.pixels)
     for (int c = 0; c < 3; ++c) rgb.push_back(byteOf(pixel[c]));
-  return encode(display.width, display.height, 3, rgb);
+  return encodePng(display.width, display.height, 3, rgb);
 }
 
 }  // namespace radiosity::scene

@@ -79,6 +79,7 @@ class Probe {
       const auto& group = scene.groups[g];
       double sum = 0.0;
       for (auto t = group.first; t < group.first + group.count; ++t) {
+        interruptionPoint();
         group_of_[t] = g;
         sum += areaOf(t);
         areas_[t] = sum;

@@ -5,6 +5,7 @@
 #include <tuple>
 #include <utility>
 
+#include "common/task.h"
 #include "server/scene/scene.h"
 
 namespace radiosity::scene {
@@ -67,6 +68,7 @@ MeshParts findMeshParts(std::span<const Bvh::Triangle> triangles, std::span<cons
   }
   std::ranges::sort(edges);
   for (std::size_t i = 0, end = 0; i < edges.size(); i = end) {
+    interruptionPoint();
     while (end < edges.size() && edges[end].first == edges[i].first) ++end;
     if ((end - i) % 2 != 0) parts.closed[edges[i].second] = false;
   }

@@ -108,6 +108,7 @@ class SurfaceOpacity {
   /// Cells that triangles only touch, without their middles, are as the next one. When all rows are filled.
   void fillBorders() {
     for (std::uint32_t y = 0; y < height_; ++y) {
+      interruptionPoint();
       for (std::uint32_t x = 0; x < width_; ++x) {
         if (known_[std::size_t{y} * width_ + x] == 0) cell(x, y) = neighbour(x, y);
       }
@@ -175,6 +176,7 @@ class SurfaceOpacity {
     const UvMap uv(c, texcoords());
     const std::array<glm::dvec2, 3> cells{c.texel[0] * scale, c.texel[1] * scale, c.texel[2] * scale};
     for (auto y = std::max(first_row, static_cast<std::uint32_t>(std::max(low.y, 0.0))); y < end_y; ++y) {
+      interruptionPoint();
       const auto columns = columnsOf(cells, static_cast<int>(y), static_cast<int>(width_));
       const auto end = std::min(end_x, static_cast<std::uint32_t>(columns.end));
       for (auto x =
@@ -282,6 +284,7 @@ void measureOpacity(const Scene& scene, PatchScene& patches) {
 
 void applyOpacity(PatchScene& patches) {
   for (const Surface& surface : patches.surfaces) {
+    interruptionPoint();
     if (!surface.see_through) continue;
     for (std::uint32_t leaf = 0; leaf < surface.width * surface.height; ++leaf) {
       const float opacity = leafOpacity(patches, surface, leaf);

@@ -129,6 +129,7 @@ void fillUnknown(Patchwork& p) {
   for (std::uint8_t ring = 1; ring < kMaxRing && !texels.empty(); ++ring) {
     texels = nextRing(p, texels, ring);
     for (const std::size_t i : texels) {
+      interruptionPoint();
       const auto x = static_cast<std::int64_t>(i) % p.width, y = static_cast<std::int64_t>(i) / p.width;
       p.value[i] = fromNeighbours(p, x, y, ring);
     }
@@ -270,6 +271,7 @@ class PageMaker {
     for (int round = 0; round < kRounds && !empty.empty(); ++round) {
       std::vector<std::pair<std::size_t, glm::vec3>> found;
       for (const auto i : empty) {
+        interruptionPoint();
         glm::vec3 sum(0.0F);
         float weight = 0.0F;
         aroundTexel(page.irradiance, i, [&](std::size_t n) {

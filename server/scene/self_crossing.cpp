@@ -7,6 +7,8 @@
 #include <iterator>
 #include <vector>
 
+#include "common/task.h"
+
 namespace radiosity::scene {
 namespace {
 
@@ -151,6 +153,7 @@ class Search {
     if (left_ < others.size()) return false;
     left_ -= others.size();
     for (const auto& other : others) {
+      interruptionPoint();
       if (!box.meets(other)) continue;
       if (left_ < kPairsOfATest) return false;
       left_ -= kPairsOfATest;

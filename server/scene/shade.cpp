@@ -10,6 +10,7 @@
 #include <span>
 #include <string>
 
+#include "common/task.h"
 #include "server/scene/chart_corners.h"
 #include "server/scene/material_of.h"
 #include "server/scene/patch_scene.h"
@@ -115,8 +116,10 @@ class MaterialShader {
     const std::size_t nodes = levelGrid(surface_.width, surface_.height, surface_.level_count).offset;
     emission_.resize(nodes);
     reflectance_.resize(nodes);
-    for (std::uint32_t t = surface_.first_triangle; t < surface_.first_triangle + surface_.triangle_count; ++t)
+    for (std::uint32_t t = surface_.first_triangle; t < surface_.first_triangle + surface_.triangle_count; ++t) {
+      interruptionPoint();
       sampleTriangle(cornersOf(patches_, t, *instance_, *primitive_));
+    }
     for (std::size_t i = 0; i < count; ++i) {
       const LeafPoint& point = patches_.leaves[surface_.first_leaf + i];
       Value value;

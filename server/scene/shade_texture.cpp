@@ -6,6 +6,8 @@
 #include <glm/common.hpp>
 #include <utility>
 
+#include "common/task.h"
+
 namespace radiosity::scene {
 namespace {
 
@@ -127,6 +129,7 @@ void TexturePyramid::buildLevels() {
     Level next{std::max(1, width / 2), std::max(1, height / 2), {}};
     next.pixels.resize(static_cast<std::size_t>(next.width) * static_cast<std::size_t>(next.height));
     for (int y = 0; y < next.height; ++y) {
+      interruptionPoint();
       const Taps rows = tapsOf(y, height, next.height);
       for (int x = 0; x < next.width; ++x) {
         const Taps columns = tapsOf(x, width, next.width);

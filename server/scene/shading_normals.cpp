@@ -7,6 +7,7 @@
 #include <glm/mat4x4.hpp>
 #include <glm/matrix.hpp>
 
+#include "common/task.h"
 #include "server/scene/node_transform.h"
 
 namespace radiosity::scene {
@@ -65,6 +66,7 @@ class InstanceNormals {
 
 ShadingNormals::ShadingNormals(const Scene& scene, const PatchScene& patches) {
   for (const auto& surface : patches.surfaces) {
+    interruptionPoint();
     const auto& instance = scene.instances[surface.instance];
     const auto& primitive = scene.primitives[instance.primitive];
     if (primitive.normals.size() != primitive.positions.size()) continue;

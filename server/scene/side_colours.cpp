@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "common/check.h"
+#include "common/task.h"
 #include "server/scene/patch_scene.h"
 
 namespace radiosity::scene {
@@ -16,6 +17,7 @@ SideColours::SideColours(const PatchScene& patches) {
   const Shared black = one(glm::vec3(0.0F));
   std::vector<std::uint32_t> first_nodes;
   for (const auto& surface : patches.surfaces) {
+    interruptionPoint();
     for (const auto first : surface.first_node)
       if (first != kNone) first_nodes.push_back(first);
   }

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "common/task.h"
+
 namespace radiosity::scene {
 namespace {
 
@@ -25,6 +27,7 @@ SolidParts::SolidParts(std::span<const Bvh::Triangle> triangles, std::span<const
   add(std::move(others), false);
   std::vector<Bvh::Triangle> boxes;
   for (std::size_t p = 0; p < parts.size(); ++p) {
+    interruptionPoint();
     if (parts[p].empty()) continue;
     Bounds box;
     for (const auto& triangle : parts[p])

@@ -78,6 +78,7 @@ void dropThoseThatHoldOthers(const PatchScene& patches, const std::vector<Hides>
   std::vector<Bvh::Triangle> others;
   std::unordered_map<std::uint32_t, Bounds> bounds;
   for (std::size_t t = 0; t < part_of.size(); ++t) {
+    interruptionPoint();
     if (hides[patches.triangle_surface[t]] != Hides::kSolid) continue;
     Bvh::Triangle triangle;
     for (std::size_t c = 0; c < 3; ++c)
@@ -159,6 +160,7 @@ Solids::Solids(const PatchScene& patches, const std::vector<Hides>& hides) {
   std::vector<std::uint32_t> part;
   const auto part_of = partOf(patches, hides);
   for (std::uint32_t t = 0; t < patches.triangles.size(); ++t) {
+    interruptionPoint();
     const auto hiding = hides[patches.triangle_surface[t]];
     if (hiding == Hides::kNothing) continue;
     Bvh::Triangle triangle;
@@ -308,6 +310,7 @@ void Coincidence::run() {
   };
   inTurns(cover.size(), findCover, cover.size() / kSurfacesAThread);
   for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
+    interruptionPoint();
     auto by = kNone;
     for (const auto other : cover[s]) {
       covered_.push_back(other != kNone);
@@ -354,6 +357,7 @@ Coincidence::Over Coincidence::over(std::uint32_t triangle, std::uint32_t side, 
 
 void Coincidence::keepCovered() {
   for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
+    interruptionPoint();
     for (std::uint32_t side = 0; side < 2; ++side)
       if (covered_[slot(s, side)]) keepCovered(s, side);
   }
@@ -390,6 +394,7 @@ std::vector<bool> Coincidence::coplanarWithOthers() const {
     for (auto first = planes.begin(), end = first; first != planes.end(); first = end) {
       end = std::find_if(first, planes.end(), [&](const Plane& plane) { return plane.cell != first->cell; });
       together.clear();
+      interruptionPoint();
       for (auto plane = first; plane != end; ++plane) {
         const Surface& surface = patches_.surfaces[plane->surface];
         together.push_back(

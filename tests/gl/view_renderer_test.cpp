@@ -8,6 +8,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <numbers>
 
+#include "common/task.h"
 #include "server/gpu/view_sky.h"
 
 namespace radiosity::gpu {
@@ -254,6 +255,29 @@ TEST_F(View, ASurfaceHidesTheSkyAndItsEdgeSharesThePixel) {
     expectNear(image.pixels[i], cover * glm::vec3(0.25F, 2.125F, 0.5F) + (1.0F - cover) * kSky.upper, 1e-3F);
   }
   EXPECT_GT(shared, 3);
+}
+
+TEST_F(View, ALargePictureIsTheSmallOneDrawnFiner) {
+  SquareScene square;
+  for (int y = 0; y < 4; ++y)
+    for (int x = 0; x < 4; ++x) square.pages[0].at(x, y) = kPi * glm::vec3(x, y, x * y);
+  square.request.width = square.request.height = 64;
+  const auto small = render(square);
+  constexpr int kFiner = 17;  // odd, so that each pixel has one in its middle; 1088 pixels: several tiles, and parts
+  square.request.width = square.request.height = kFiner * 64;
+  const auto large = render(square);
+  for (int y = 0; y < 64; ++y)
+    for (int x = 0; x < 64; ++x)
+      expectNear(large.image.at(kFiner * x + kFiner / 2, kFiner * y + kFiner / 2), small.image.at(x, y), 0.02F);
+  for (const float cover : large.cover) ASSERT_EQ(cover, 1.0F);
+}
+
+TEST_F(View, APictureThatIsCalledOffIsNotDrawn) {
+  const SquareScene square;
+  Task task;
+  const TaskScope scope(&task);
+  task.cancel();
+  EXPECT_THROW((void)renderer_->render(square.scene, square.patches, square.pages, square.request), Interrupted);
 }
 
 TEST_F(View, AnAbsurdSizeIsRefused) {

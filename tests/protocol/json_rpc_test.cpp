@@ -128,6 +128,7 @@ TEST(JsonRpc, EveryErrorOfTheServerHasItsCode) {
                                                  {ErrorCode::kTestFailed, RpcCode::kTestFailed},
                                                  {ErrorCode::kBusy, RpcCode::kRateLimited},
                                                  {ErrorCode::kUnavailable, RpcCode::kUnavailable},
+                                                 {ErrorCode::kCancelled, RpcCode::kCancelled},
                                                  {ErrorCode::kInternal, RpcCode::kInternalError}};
   for (const auto& [ours, wire] : codes) EXPECT_EQ(toRpcError({ours, "what was wrong", {}}).code, wire);
 }

@@ -151,6 +151,8 @@ void FakeEngine::progress(double error, engine::SolveState state) {
     status_.error.total = error;
     status_.shots += 100;
     status_.seconds += 0.1;
+    status_.load_fraction.reset();
+    if (state == engine::SolveState::kLoading) status_.load_fraction = 0.25;
   }
   const auto now = status();
   for (const auto& listener : listeners()) listener->onProgress(now);
@@ -201,6 +203,16 @@ void FakeEngine::answer(std::function<void()> call) {
   call();
 }
 
+void FakeEngine::ask(const engine::Client& client) {
+  const std::lock_guard lock(mutex_);
+  clients_.push_back(client);
+}
+
+std::vector<engine::Client> FakeEngine::clients() const {
+  const std::lock_guard lock(mutex_);
+  return clients_;
+}
+
 void FakeEngine::setSceneText(std::string gltf) {
   const std::lock_guard lock(mutex_);
   scene_text_ = std::move(gltf);
@@ -221,7 +233,8 @@ std::string FakeEngine::lastLoad() const {
   return last_load_;
 }
 
-void FakeEngine::loaded(std::string what, Callback<engine::LoadOutcome> done) {
+void FakeEngine::loaded(std::string what, const engine::Client& client, Callback<engine::LoadOutcome> done) {
+  ask(client);
   std::uint64_t revision = 0;
   {
     const std::lock_guard lock(mutex_);
@@ -237,16 +250,17 @@ void FakeEngine::loaded(std::string what, Callback<engine::LoadOutcome> done) {
   });
 }
 
-void FakeEngine::loadBytes(std::string name, SharedBytes bytes, std::string by, Callback<engine::LoadOutcome> done) {
+void FakeEngine::loadBytes(std::string name, SharedBytes bytes, engine::Client client,
+                           Callback<engine::LoadOutcome> done) {
   if (bytes->size() >= 3 && std::equal(bytes->begin(), bytes->begin() + 3, "bad"))
     return answer([done, name] {
       done(fail(ErrorCode::kInvalidScene, "count is larger than the buffer view", name + ": /accessors/4/count"));
     });
-  loaded(fmt::format("{}: {} bytes by {}", name, bytes->size(), by), std::move(done));
+  loaded(fmt::format("{}: {} bytes by {}", name, bytes->size(), client.name), client, std::move(done));
 }
 
-void FakeEngine::loadFile(std::string path, std::string by, Callback<engine::LoadOutcome> done) {
-  loaded("file " + path + " by " + by, std::move(done));
+void FakeEngine::loadFile(std::string path, engine::Client client, Callback<engine::LoadOutcome> done) {
+  loaded("file " + path + " by " + client.name, client, std::move(done));
 }
 
 void FakeEngine::patch(engine::PatchRequest request, Callback<engine::PatchOutcome> done) {
@@ -338,7 +352,8 @@ void FakeEngine::sceneText(Callback<SceneText> done) {
   }
   answer([done = std::move(done), text = std::move(text)] { done(text); });
 }
-void FakeEngine::sceneGlb(std::optional<std::uint64_t> layout, Callback<SharedBytes> done) {
+void FakeEngine::sceneGlb(std::optional<std::uint64_t> layout, engine::Client client, Callback<SharedBytes> done) {
+  ask(client);
   std::uint64_t here = 0;
   SharedBytes glb;
   {
@@ -351,17 +366,21 @@ void FakeEngine::sceneGlb(std::optional<std::uint64_t> layout, Callback<SharedBy
     done(glb);
   });
 }
-void FakeEngine::unlitGlb(Callback<SharedBytes> done) {
+void FakeEngine::unlitGlb(engine::Client client, Callback<SharedBytes> done) {
+  ask(client);
   answer([done] { done(bytesOf("glTF unlit")); });
 }
-void FakeEngine::lightmapExr(std::uint32_t page, engine::Quantity quantity, Callback<SharedBytes> done) {
+void FakeEngine::lightmapExr(std::uint32_t page, engine::Quantity quantity, engine::Client client,
+                             Callback<SharedBytes> done) {
+  ask(client);
   answer([done, page, quantity] {
     if (page > 0) return done(fail(ErrorCode::kNotFound, "there is one lightmap page", fmt::format("page {}", page)));
     done(
         bytesOf(quantity == engine::Quantity::kIrradiance ? "exr" : fmt::format("exr {}", static_cast<int>(quantity))));
   });
 }
-void FakeEngine::snapshot(engine::SnapshotRequest request, Callback<engine::Snapshot> done) {
+void FakeEngine::snapshot(engine::SnapshotRequest request, engine::Client client, Callback<engine::Snapshot> done) {
+  ask(client);
   answer([done, request] {
     if (request.quantity == "colour") return done(fail(ErrorCode::kBadUsage, "no quantity \"colour\"", "quantity"));
     if (request.camera == "nobody") return done(fail(ErrorCode::kNotFound, "there is no camera \"nobody\""));

@@ -44,11 +44,15 @@ class FakeEngine : public engine::Engine {
   std::atomic<double> busy_seconds{0.0};
   /// Once: `meanwhile` happens after status() was taken, and before whoever asked for it has it.
   void overtakeStatus(std::function<void()> meanwhile);
+  /// Who has asked for loads, pictures and files, in order.
+  [[nodiscard]] std::vector<engine::Client> clients() const;
+  [[nodiscard]] bool calledOff() const { return called_off_; }
   [[nodiscard]] std::string lastLoad() const;  ///< "name: 123 bytes by WHO" or "file PATH by WHO"
 
   // ---- engine::Engine ----
-  void loadBytes(std::string name, SharedBytes bytes, std::string by, Callback<engine::LoadOutcome> done) override;
-  void loadFile(std::string path, std::string by, Callback<engine::LoadOutcome> done) override;
+  void loadBytes(std::string name, SharedBytes bytes, engine::Client client,
+                 Callback<engine::LoadOutcome> done) override;
+  void loadFile(std::string path, engine::Client client, Callback<engine::LoadOutcome> done) override;
   void patch(engine::PatchRequest request, Callback<engine::PatchOutcome> done) override;
   void step(engine::StepRequest request, Callback<engine::PatchOutcome> done) override;
   void history(Callback<engine::HistoryReport> done) override;
@@ -63,11 +67,13 @@ class FakeEngine : public engine::Engine {
   [[nodiscard]] std::shared_ptr<void> watch(engine::Quantity quantity) override;
   [[nodiscard]] std::shared_ptr<const engine::Lightmaps> lightmaps(engine::Quantity quantity) const override;
   void sceneText(Callback<SceneText> done) override;
-  void sceneGlb(std::optional<std::uint64_t> layout, Callback<SharedBytes> done) override;
-  void unlitGlb(Callback<SharedBytes> done) override;
-  void lightmapExr(std::uint32_t page, engine::Quantity quantity, Callback<SharedBytes> done) override;
-  void snapshot(engine::SnapshotRequest request, Callback<engine::Snapshot> done) override;
+  void sceneGlb(std::optional<std::uint64_t> layout, engine::Client client, Callback<SharedBytes> done) override;
+  void unlitGlb(engine::Client client, Callback<SharedBytes> done) override;
+  void lightmapExr(std::uint32_t page, engine::Quantity quantity, engine::Client client,
+                   Callback<SharedBytes> done) override;
+  void snapshot(engine::SnapshotRequest request, engine::Client client, Callback<engine::Snapshot> done) override;
   void texel(engine::TexelRequest request, Callback<engine::Texel> done) override;
+  void callOff() override { called_off_ = true; }
   void addListener(std::weak_ptr<engine::Listener> listener) override;
 
   /// The value that publish() put at a texel: for tests to compare what arrives.
@@ -81,7 +87,8 @@ class FakeEngine : public engine::Engine {
  private:
   void answer(std::function<void()> call);
   void setState(engine::SolveState state, Callback<engine::SolveState> done);
-  void loaded(std::string what, Callback<engine::LoadOutcome> done);
+  void loaded(std::string what, const engine::Client& client, Callback<engine::LoadOutcome> done);
+  void ask(const engine::Client& client);
   [[nodiscard]] std::vector<std::shared_ptr<engine::Listener>> listeners() const;
   [[nodiscard]] std::shared_ptr<engine::PageSnapshot> emptyPage(engine::Quantity quantity) const;
   void announceLightmaps(engine::Quantity quantity);
@@ -93,6 +100,8 @@ class FakeEngine : public engine::Engine {
   using Watchers = std::array<std::atomic<int>, engine::kQuantityCount>;
   std::shared_ptr<Watchers> watchers_ = std::make_shared<Watchers>();
   std::uint64_t layout_number_ = 1, patches_ = 0;
+  std::vector<engine::Client> clients_;
+  std::atomic<bool> called_off_{false};
   std::string last_load_, scene_text_ = R"({"asset":{"version":"2.0"}})";
   std::vector<std::weak_ptr<engine::Listener>> listeners_;
   SharedBytes glb_ = std::make_shared<const Bytes>(Bytes{'g', 'l', 'T', 'F', ' ', 's', 'c', 'e', 'n', 'e'});

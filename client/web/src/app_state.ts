@@ -3,7 +3,7 @@
 import type { App } from './app';
 import type { Progress } from './protocol/messages';
 import { percent, readable } from './ui/dom';
-import { stateName } from './ui/solve_panel';
+import { stateText } from './ui/solve_panel';
 
 interface Trouble {
   text: string;
@@ -42,14 +42,14 @@ export class StateSession {
     frame.setState(
       isOver && !done
         ? 'Receiving light'
-        : progress.state === 'loading' && this.app.viewer.shown
+        : isFirstLight(progress) && this.app.viewer.shown
           ? 'First light'
-          : stateName(progress.state),
+          : stateText(progress),
       bad ? 'bad' : done ? (progress.state === 'converged' ? 'good' : 'short') : isBusy ? 'busy' : 'idle',
       error,
       rate,
     );
-    frame.setWelcome(hasScene(progress) && bad ? '' : progress.state, progress.failure);
+    frame.setWelcome(hasScene(progress) && bad ? '' : progress.state, progress.failure, progress.fraction);
     this.showTrouble(progress, isOver);
   }
 
@@ -103,6 +103,11 @@ export class StateSession {
       };
     return undefined;
   }
+}
+
+/** Nothing is stated of a scene that is not all there; while another is loaded, all that is stated is of the present one. */
+function isFirstLight({ state, surfaces }: Progress): boolean {
+  return state === 'loading' && surfaces === 0;
 }
 
 /** `failed` may mean both: that a scene is not solved further, and that there is none. */

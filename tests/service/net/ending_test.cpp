@@ -108,6 +108,81 @@ TEST(Drain, InTheMiddleOfUpgradesHarmsNobody) {
   }
 }
 
+TEST(Drain, CallsOffWhatTheEngineIsAt) {
+  RunningServer server;
+  EXPECT_FALSE(server.engine.calledOff());
+  server.stop();
+  EXPECT_TRUE(server.engine.calledOff());
+}
+
+/// The client of the newest load, picture or file that the engine was asked for; it does not answer.
+engine::Client clientOf(RunningServer& server, std::size_t asked) {
+  while (server.engine.clients().size() < asked) std::this_thread::sleep_for(milliseconds(1));
+  return server.engine.clients().back();
+}
+
+void expectGone(const engine::Client& client) {
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  while (!client.gone.stop_requested() && std::chrono::steady_clock::now() < deadline)
+    std::this_thread::sleep_for(milliseconds(1));
+  EXPECT_TRUE(client.gone.stop_requested());
+}
+
+TEST(Leaving, OfAWebSocketReachesWhatTheEngineIsAtForIt) {
+  RunningServer server;
+  server.engine.holdAnswers();
+  TestSocket stays(server.port());
+  stays.hello();
+  stays.sendText(encodeCall("7", SnapshotCall{}));
+  const auto other = clientOf(server, 1);
+  {
+    TestSocket leaves(server.port());
+    leaves.hello();
+    leaves.sendText(encodeCall("7", SnapshotCall{}));
+    const auto client = clientOf(server, 2);
+    EXPECT_NE(client.session, 0U);
+    EXPECT_NE(client.session, other.session);
+    EXPECT_FALSE(client.gone.stop_requested());
+    leaves.close();
+    expectGone(client);
+  }
+  EXPECT_FALSE(other.gone.stop_requested());
+  server.engine.release();
+}
+
+TEST(Leaving, OfAnHttpClientReachesWhatTheEngineIsAtForIt) {
+  RunningServer server;
+  server.engine.holdAnswers();
+  std::size_t asked = 0;
+  for (const auto* target : {"/scene.glb", "/scene-unlit.glb", "/lightmaps/0.exr", "/snapshot.png"}) {
+    auto leaves = std::make_unique<RawHttp>(server.port());
+    leaves->send(std::string("GET ") + target + " HTTP/1.1\r\nHost: localhost\r\n\r\n");
+    const auto client = clientOf(server, ++asked);
+    EXPECT_NE(client.session, 0U);
+    std::this_thread::sleep_for(milliseconds(150));
+    EXPECT_FALSE(client.gone.stop_requested()) << "it waits";
+    leaves.reset();
+    expectGone(client);
+  }
+  auto loads = std::make_unique<RawHttp>(server.port());
+  loads->send("PUT /scene HTTP/1.1\r\nHost: localhost\r\nContent-Length: 4\r\n\r\nroom");
+  const auto client = clientOf(server, ++asked);
+  loads->send("GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n");  // bytes that are not read yet hide nothing
+  loads.reset();
+  expectGone(client);
+  server.engine.release();
+}
+
+TEST(Leaving, IsNotWhatAnAnswerIsFollowedBy) {
+  RunningServer server;
+  RawHttp connection(server.port());
+  for (std::size_t asked = 1; asked < 4; ++asked) {
+    connection.send("GET /snapshot.png HTTP/1.1\r\nHost: localhost\r\n\r\n");
+    EXPECT_EQ(connection.receive().status, 200);
+    EXPECT_FALSE(clientOf(server, asked).gone.stop_requested());
+  }
+}
+
 TEST(Liveness, APeerThatDoesNotAnswerPingsIsGone) {
   net::ServerOptions options;
   options.idle_timeout = milliseconds(200);

@@ -113,7 +113,7 @@ TEST(Http, EveryErrorHasItsStatus) {
       {ErrorCode::kBadUsage, 400},      {ErrorCode::kBadInput, 400},   {ErrorCode::kInvalidScene, 400},
       {ErrorCode::kUnsupported, 400},   {ErrorCode::kNotFound, 404},   {ErrorCode::kTooLarge, 413},
       {ErrorCode::kStaleRevision, 409}, {ErrorCode::kTestFailed, 409}, {ErrorCode::kBusy, 503},
-      {ErrorCode::kUnavailable, 503},   {ErrorCode::kInternal, 500}};
+      {ErrorCode::kUnavailable, 503},   {ErrorCode::kCancelled, 409},  {ErrorCode::kInternal, 500}};
   for (const auto& [code, status] : statuses) {
     const auto response = net::errorResponse({code, "what was wrong", "where"});
     EXPECT_EQ(response.status, status);

@@ -73,6 +73,16 @@ TEST(ProgressLine, statesNoErrorWhereNoLightArrives) {
   EXPECT_THAT(progressLine(view, 300), Not(HasSubstr("error")));
 }
 
+TEST(ProgressLine, tellsOfALoadHowMuchOfItIsDone) {
+  ProgressView view{.state = "loading", .error = 0.02, .load_fraction = 0.5};
+  EXPECT_EQ(progressLine(view, 300), "loading [############............] 50 %");
+  EXPECT_EQ(progressLine(view, 40), "loading 50 %");
+  for (const auto& [fraction, text] : {std::pair(7.0, "100 %"), std::pair(-1.0, " 0 %"), std::pair(kNan, " 0 %")}) {
+    view.load_fraction = fraction;
+    EXPECT_THAT(progressLine(view, 300), HasSubstr(text));
+  }
+}
+
 TEST(ProgressLine, takesAnyRateThatAServerMayState) {
   for (const auto& [rate, text] :
        {std::pair(1e300, " 1,000,000,000,000,000,000/s"), std::pair(-1.0, " 0/s"), std::pair(kNan, " 0/s")}) {
@@ -81,9 +91,11 @@ TEST(ProgressLine, takesAnyRateThatAServerMayState) {
 }
 
 TEST(ProgressLine, neverExceedsTheTerminal) {
-  const ProgressView view{.state = "solving", .seconds_left = 1.0, .show_parts = true};
+  const ProgressView solving{.state = "solving", .seconds_left = 1.0, .show_parts = true};
+  const ProgressView loading{.state = "loading", .load_fraction = 0.5};
   for (int columns = 1; columns < 200; ++columns)
-    EXPECT_LE(progressLine(view, columns).size(), static_cast<std::size_t>(columns));
+    for (const auto& view : {solving, loading})
+      EXPECT_LE(progressLine(view, columns).size(), static_cast<std::size_t>(columns));
 }
 
 TEST(Text, ofDurations) {

@@ -201,7 +201,7 @@ Bytes EngineTest::light() {
   Bytes all;
   for (std::uint32_t page = 0;; ++page) {
     const auto exr = call<SharedBytes>(
-        [&](auto done) { engine_->lightmapExr(page, engine::Quantity::kIrradiance, std::move(done)); });
+        [&](auto done) { engine_->lightmapExr(page, engine::Quantity::kIrradiance, {}, std::move(done)); });
     if (!exr) break;  // no such page
     all.insert(all.end(), (*exr)->begin(), (*exr)->end());
   }

@@ -51,7 +51,7 @@ TEST_F(Lifecycle, ALoadedSceneIsSolvedToItsTarget) {
 TEST_F(Lifecycle, WhoFetchesTheSceneAtTheSameTimeSharesIt) {
   solve(lumpedCube(0.5));
   const auto fetch = [&] {
-    return call<SharedBytes>([&](auto done) { engine().sceneGlb({}, std::move(done)); }).value();
+    return call<SharedBytes>([&](auto done) { engine().sceneGlb({}, {}, std::move(done)); }).value();
   };
   const auto first = fetch();
   EXPECT_EQ(fetch(), first);

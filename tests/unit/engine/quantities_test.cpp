@@ -155,15 +155,16 @@ TEST_F(Quantities, EveryOneCanBeFetchedAsAnExr) {
   solve(lumpedCube(0.5));
   for (std::size_t q = 0; q < engine::kQuantityCount; ++q) {
     const auto exr =
-        call<SharedBytes>([&](auto done) { engine().lightmapExr(0, static_cast<Quantity>(q), std::move(done)); });
+        call<SharedBytes>([&](auto done) { engine().lightmapExr(0, static_cast<Quantity>(q), {}, std::move(done)); });
     ASSERT_TRUE(exr) << exr.error().text();
     const std::string text((*exr)->begin(), (*exr)->end());
     EXPECT_THAT(text, testing::HasSubstr("unit"));
     EXPECT_EQ(text.substr(0, 4), std::string("\x76\x2f\x31\x01"));
   }
-  EXPECT_EQ(
-      call<SharedBytes>([&](auto done) { engine().lightmapExr(9, Quantity::kError, std::move(done)); }).error().code,
-      ErrorCode::kNotFound);
+  EXPECT_EQ(call<SharedBytes>([&](auto done) { engine().lightmapExr(9, Quantity::kError, {}, std::move(done)); })
+                .error()
+                .code,
+            ErrorCode::kNotFound);
 }
 
 }  // namespace

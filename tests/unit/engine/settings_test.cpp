@@ -167,16 +167,16 @@ TEST_F(Settings, ARestartWithTheSameSeedGivesTheSameBits) {
   ASSERT_TRUE(reaches(SolveState::kConverged));
   (void)sceneText();
   EXPECT_EQ(status().shots, shots);
-  const auto pixels =
-      call<SharedBytes>([&](auto done) { engine().lightmapExr(0, engine::Quantity::kIrradiance, std::move(done)); });
+  const auto pixels = call<SharedBytes>(
+      [&](auto done) { engine().lightmapExr(0, engine::Quantity::kIrradiance, {}, std::move(done)); });
   ASSERT_TRUE(configure([](SolveSettings& s) { s.seed = 2; }));
   ASSERT_TRUE(reaches(SolveState::kConverged));
-  const auto others =
-      call<SharedBytes>([&](auto done) { engine().lightmapExr(0, engine::Quantity::kIrradiance, std::move(done)); });
+  const auto others = call<SharedBytes>(
+      [&](auto done) { engine().lightmapExr(0, engine::Quantity::kIrradiance, {}, std::move(done)); });
   ASSERT_TRUE(configure([](SolveSettings& s) { s.seed = 1; }));
   ASSERT_TRUE(reaches(SolveState::kConverged));
-  const auto again =
-      call<SharedBytes>([&](auto done) { engine().lightmapExr(0, engine::Quantity::kIrradiance, std::move(done)); });
+  const auto again = call<SharedBytes>(
+      [&](auto done) { engine().lightmapExr(0, engine::Quantity::kIrradiance, {}, std::move(done)); });
   EXPECT_EQ(**pixels, **again);
   EXPECT_NE(**pixels, **others);
 }

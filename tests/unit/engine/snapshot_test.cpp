@@ -23,7 +23,7 @@ class SnapshotTest : public EngineTest {
     request.width = 64;
     request.height = 48;
     request.quantity = std::move(quantity);
-    const auto picture = call<engine::Snapshot>([&](auto done) { engine().snapshot(request, done); });
+    const auto picture = call<engine::Snapshot>([&](auto done) { engine().snapshot(request, {}, done); });
     return picture && picture->exposure ? *picture->exposure : 0.0;
   }
 };

@@ -55,6 +55,8 @@ export interface Progress {
   failure?: string;
   /** Why no light arrives anywhere, so that the error means nothing. */
   unlit?: string;
+  /** How much of a load is done, in [0, 1]; while the state is `loading`. */
+  fraction?: number;
 }
 
 /** Errors as those of `progress`, at so many seconds of solve time. */

@@ -44,6 +44,7 @@ export class Frame {
   private readonly banners = new Map<(typeof BANNERS)[number], HTMLElement[]>();
   private readonly banner = h('div', { class: 'banner', role: 'alert', hidden: true });
   private readonly welcome = h('div', { class: 'welcome card', hidden: true });
+  private readonly loadBar = h('progress', { max: 1, value: 0, 'aria-label': 'How much of the scene is loaded' });
   /** There is a picture, which no message shall cover. */
   sceneShown = false;
   private readonly panelButton: HTMLButtonElement;
@@ -141,7 +142,8 @@ export class Frame {
   }
 
   /** Says what there is to do where there is no scene, and that one is coming. */
-  setWelcome(state: string, failure = ''): void {
+  setWelcome(state: string, failure = '', fraction = 0): void {
+    this.loadBar.value = fraction;
     this.welcome.hidden = !['empty', 'failed'].includes(state) && (state !== 'loading' || this.sceneShown);
     const shown = `${state} ${failure}`;
     if (this.welcome.hidden || this.welcome.dataset['state'] === shown) return;
@@ -149,6 +151,7 @@ export class Frame {
     if (state === 'loading')
       return this.welcome.replaceChildren(
         h('h2', {}, 'Loading the scene'),
+        this.loadBar,
         h('p', {}, 'Laying out its surfaces for lightmaps; a large scene takes a while.'),
       );
     this.welcome.replaceChildren(

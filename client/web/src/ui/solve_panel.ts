@@ -31,6 +31,20 @@ export function stateName(state: string): string {
   return STATES[state] ?? state;
 }
 
+/** The state for people, and of a load how much of it is done. */
+export function stateText({ state, fraction }: Pick<Progress, 'state' | 'fraction'>): string {
+  if (state !== 'loading' || fraction === undefined) return stateName(state);
+  return `${stateName(state)}, ${Math.round(100 * fraction)} %`;
+}
+
+/** How far the bar is, in [0, 1]: towards the target error on a logarithmic scale, or towards the end of a load. */
+export function barValue(progress: Progress, firstError: number, target: number): number {
+  if (progress.state === 'converged') return 1;
+  if (progress.state === 'loading') return progress.fraction ?? 0;
+  const way = Math.log(firstError / progress.error.total) / Math.log(firstError / target);
+  return Math.min(1, Math.max(0, Number.isFinite(way) ? way : 0));
+}
+
 export function duration(seconds: number): string {
   if (seconds < 10) return `${readable(seconds, 2)} s`;
   if (seconds < 120) return `${Math.round(seconds)} s`;
@@ -44,7 +58,11 @@ export class SolvePanel {
   private readonly facts = h('dl', { class: 'facts' });
   private readonly warnings = h('details', { hidden: true });
   private readonly pause: HTMLButtonElement;
-  private readonly bar = h('progress', { max: 1, value: 0, 'aria-label': 'Progress towards the target error' });
+  private readonly bar = h('progress', {
+    max: 1,
+    value: 0,
+    'aria-label': 'Progress of the load, or towards the target error',
+  });
   private readonly target: HTMLInputElement;
   private readonly texels: HTMLInputElement;
   private readonly bothSides: HTMLInputElement;
@@ -124,12 +142,11 @@ export class SolvePanel {
     if (!progress) return;
     const { error } = progress;
     const target = this.settings?.targetError ?? 0.02;
-    const way = Math.log(this.firstError / error.total) / Math.log(this.firstError / target);
-    this.bar.value = progress.state === 'converged' ? 1 : Math.min(1, Math.max(0, Number.isFinite(way) ? way : 0));
+    this.bar.value = barValue(progress, this.firstError, target);
     this.pause.textContent = progress.state === 'paused' ? 'Resume' : 'Pause';
     this.pause.disabled = progress.state !== 'paused' && progress.state !== 'solving';
     this.showFacts([
-      ['State', progress.failure ? `${stateName(progress.state)}: ${progress.failure}` : stateName(progress.state)],
+      ['State', progress.failure ? `${stateText(progress)}: ${progress.failure}` : stateText(progress)],
       [
         'Error',
         progress.unlit ? `no light arrives: ${progress.unlit}` : `${percent(error.total)} (target ${percent(target)})`,
