@@ -96,7 +96,7 @@ SceneChange LitScene::changeTo(const scene::Scene& next) const {
 
 bool LitScene::reachesDarkSides(const scene::Scene& next, const scene::Sky& sky) const {
   const auto tree = [this] {
-    if (!tree_) tree_ = std::make_shared<const scene::RayTree>(scene::rayTreeOf(*patches_));
+    if (!tree_) tree_ = std::make_shared<const geometry::RayScene>(scene::raySceneOf(*patches_));
     return tree_;
   };
   return scene::reachesDarkSides(*patches_, *scene_, sources_.sky, next, sky, tree);

@@ -214,8 +214,8 @@ class LitScene {
   std::shared_ptr<const scene::PatchScene> patches_;
   std::shared_ptr<const scene::ShadingNormals> normals_;
   std::shared_ptr<const scene::BurialRecord> burial_;  // of these, for edits; null: not kept
-  mutable std::shared_ptr<const scene::RayTree>
-      tree_;  // of these, once an edit of light asked for it: the next ones do
+  /// Of these, once an edit of light asked for it: the next ones do.
+  mutable std::shared_ptr<const geometry::RayScene> tree_;
   std::uint64_t patch_count_ = 0;
   scene::PatchMaterials materials_;
   LightReport light_report_;

@@ -127,10 +127,10 @@ Triangle grown(const Triangle& triangle) {
 bool attach(RTCDevice device, RTCScene scene, std::span<const Triangle> triangles,
             std::span<const std::uint32_t> numbers, std::size_t count, bool see_through) {
   const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  auto* corners = static_cast<glm::vec3*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0,
-                                                                  RTC_FORMAT_FLOAT3, sizeof(glm::vec3), 3 * count));
-  auto* indices = static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(
-      geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(std::uint32_t), count));
+  auto* corners = static_cast<glm::vec3*>(
+      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(glm::vec3), 3 * count));
+  auto* indices = static_cast<std::uint32_t*>(
+      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(std::uint32_t), count));
   const bool room = corners != nullptr && indices != nullptr;
   for (std::size_t i = 0; room && i < count; ++i) {
     const auto triangle = grown(triangles[numbers.empty() ? i : numbers[i]]);
@@ -179,8 +179,7 @@ Result<RayScene> RayScene::build(std::span<const Triangle> triangles, unsigned t
   rtcSetSceneFlags(tree->scene.get(), RTC_SCENE_FLAG_ROBUST);
   rtcSetSceneBuildQuality(tree->scene.get(), RTC_BUILD_QUALITY_MEDIUM);
   const bool mixed = std::ranges::find(see_through, true) != see_through.end();
-  for (std::uint32_t i = 0; mixed && i < triangles.size(); ++i)
-    tree->triangle_of[see_through[i] ? 1 : 0].push_back(i);
+  for (std::uint32_t i = 0; mixed && i < triangles.size(); ++i) tree->triangle_of[see_through[i] ? 1 : 0].push_back(i);
   tree->passes = std::move(passes);
   for (std::size_t kind = 0; kind < 2; ++kind) {
     const auto& numbers = tree->triangle_of[kind];

@@ -24,8 +24,8 @@ inline constexpr std::size_t kPacket = 8;
 
 struct Ray {
   glm::vec3 origin{0.0F}, direction{0.0F};
-  float reach = 0.0F;                 ///< in units of the direction's length; what lies farther is not met
-  std::uint32_t own = kNoTriangle;    ///< on which the ray starts, and which it does not meet
+  float reach = 0.0F;               ///< in units of the direction's length; what lies farther is not met
+  std::uint32_t own = kNoTriangle;  ///< on which the ray starts, and which it does not meet
 };
 
 struct Hit {

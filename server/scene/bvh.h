@@ -86,7 +86,6 @@ class Bvh {
 
  private:
   // Made of the same boxes and triangles:
-  friend class RayTree;
   friend class SolidTree;
   friend class WideNodes;
   struct Node {

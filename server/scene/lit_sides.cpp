@@ -8,7 +8,6 @@
 #include "common/parallel.h"
 #include "server/scene/emitters.h"
 #include "server/scene/mesh_parts.h"
-#include "server/scene/ray_tree.h"
 
 namespace radiosity::scene {
 namespace {
@@ -66,10 +65,10 @@ struct Place {
 
 class Probe {
  public:
-  Probe(const SideScene& scene, const std::vector<std::array<bool, 2>>& asked, const RayTree* tree)
+  Probe(const SideScene& scene, const std::vector<std::array<bool, 2>>& asked, const geometry::RayScene* tree)
       : scene_(scene),
         asked_(asked),
-        own_tree_(tree != nullptr ? RayTree() : RayTree(Bvh(scene.triangles))),
+        own_tree_(tree != nullptr ? geometry::RayScene() : raySceneOf(scene.triangles)),
         tree_(tree != nullptr ? *tree : own_tree_),
         light_(scene.groups.size()),
         shines_(scene.groups.size(), false) {
@@ -139,13 +138,14 @@ class Probe {
   }
 
   /// Past what one can see through by chance, one time in two.
-  [[nodiscard]] bool trace(const Place& from, const glm::dvec3& direction, Random& random, RayHit& hit) const {
+  [[nodiscard]] bool trace(const Place& from, const glm::dvec3& direction, Random& random, geometry::Hit& hit) const {
     glm::vec3 origin(from.point);
     auto own = from.triangle;
-    double passed = 0.0;
+    float passed = 0.0F;
     for (int sheet = 0; sheet < kMostSheets; ++sheet) {
-      if (!tree_.nearestHit(origin, glm::vec3(direction), kFar, hit, {}, own)) return false;
-      origin += static_cast<float>(hit.t) * glm::vec3(direction);
+      hit = tree_.nearest({origin, glm::vec3(direction), kFar, own});
+      if (!hit.found()) return false;
+      origin += hit.t * glm::vec3(direction);
       hit.t = passed += hit.t;
       if (!groupOf(hit.triangle).see_through || random() < 0.5) return true;
       own = hit.triangle;
@@ -157,12 +157,12 @@ class Probe {
   [[nodiscard]] bool isFree(const Place& from, const glm::dvec3& way, float reach) const {
     glm::vec3 origin(from.point);
     auto own = from.triangle;
-    RayHit hit{};
     for (int sheet = 0; sheet < kMostSheets; ++sheet) {
-      if (!tree_.nearestHit(origin, glm::vec3(way), reach, hit, {}, own)) return true;
+      const auto hit = tree_.nearest({origin, glm::vec3(way), reach, own});
+      if (!hit.found()) return true;
       if (!groupOf(hit.triangle).see_through) return false;
-      origin += static_cast<float>(hit.t) * glm::vec3(way);
-      reach -= static_cast<float>(hit.t);
+      origin += hit.t * glm::vec3(way);
+      reach -= hit.t;
       own = hit.triangle;
     }
     return false;
@@ -240,10 +240,10 @@ class Probe {
   }
 
   /// Where a path that met a surface goes on: before the side that it came from. False: that side absorbs.
-  [[nodiscard]] bool goOn(const glm::dvec3& direction, const RayHit& hit, Place& at) const {
+  [[nodiscard]] bool goOn(const glm::dvec3& direction, const geometry::Hit& hit, Place& at) const {
     if (!hit.front && !groupOf(hit.triangle).double_sided) return false;
     const glm::dvec3 normal = hit.front ? normalOf(hit.triangle) : -normalOf(hit.triangle);
-    at = {at.point + hit.t * direction + kLift * normal, normal, hit.triangle};
+    at = {at.point + static_cast<double>(hit.t) * direction + kLift * normal, normal, hit.triangle};
     return true;
   }
 
@@ -253,7 +253,7 @@ class Probe {
       if (!lamps_.empty() && seesLamp(at, near, random)) return true;
       if (!scene_.lights.empty() && seesLight(at, near, random)) return true;
       const auto direction = around(at.normal, std::sqrt(random()), random());
-      RayHit hit{};
+      geometry::Hit hit;
       if (!trace(at, direction, random, hit)) {
         open = true;
         return skyShines(direction);
@@ -294,9 +294,9 @@ class Probe {
       if (!group.double_sided || group.see_through || (shines_[g] && side == 0)) return false;
       for (std::size_t ray = 0; ray < rays; ++ray) {
         const Place at = placeIn(group, side, random);
-        RayHit hit{};
         const auto direction = around(at.normal, std::sqrt(random()), random());
-        if (!tree_.nearestHit(glm::vec3(at.point), glm::vec3(direction), kFar, hit, {}, at.triangle)) return false;
+        const auto hit = tree_.nearest({glm::vec3(at.point), glm::vec3(direction), kFar, at.triangle});
+        if (!hit.found()) return false;
         if (parts_.of_group[group_of_[hit.triangle]] != part || hit.front != (side == 0)) return false;
       }
     }
@@ -335,7 +335,7 @@ class Probe {
 
   void follow(Place at, glm::dvec3 direction, Random& random) {
     for (int hop = 0; hop < kPhotonHops; ++hop) {
-      RayHit hit{};
+      geometry::Hit hit;
       if (!trace(at, direction, random, hit) || !goOn(direction, hit, at)) return;
       light_[group_of_[hit.triangle]][hit.front ? 0 : 1] = SideLight::kLit;
       direction = around(at.normal, std::sqrt(random()), random());
@@ -388,8 +388,8 @@ class Probe {
 
   const SideScene& scene_;
   const std::vector<std::array<bool, 2>>& asked_;
-  RayTree own_tree_;  ///< where none was at hand
-  const RayTree& tree_;
+  geometry::RayScene own_tree_;  ///< where none was at hand
+  const geometry::RayScene& tree_;
   std::vector<std::array<SideLight, 2>> light_;  ///< by group and side; first kSealed
   std::vector<bool> shines_;                     ///< by group: some of its triangles do
   MeshParts parts_;
@@ -409,7 +409,7 @@ bool SideScene::shines() const {
 
 std::vector<std::array<SideLight, 2>> lightOnSides(const SideScene& scene,
                                                    const std::vector<std::array<bool, 2>>& asked, LookFor how,
-                                                   const RayTree* tree) {
+                                                   const geometry::RayScene* tree) {
   if (!scene.shines()) return {scene.groups.size(), {SideLight::kLit, SideLight::kLit}};
   return Probe(scene, asked, tree).run(how);
 }

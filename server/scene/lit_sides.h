@@ -7,11 +7,12 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <span>
 #include <vector>
 
+#include "server/geometry/ray_scene.h"
 #include "server/scene/bvh.h"
 #include "server/scene/patch_scene.h"
-#include "server/scene/ray_tree.h"
 
 namespace radiosity::scene {
 
@@ -50,7 +51,7 @@ enum class LookFor { kPhotonsAndPaths, kPhotonsAlone };
 [[nodiscard]] std::vector<std::array<SideLight, 2>> lightOnSides(const SideScene& scene,
                                                                  const std::vector<std::array<bool, 2>>& asked,
                                                                  LookFor how = LookFor::kPhotonsAndPaths,
-                                                                 const RayTree* tree = nullptr);
+                                                                 const geometry::RayScene* tree = nullptr);
 
 /// What was decided about the sides of a surface. A scene is laid out alike by whoever decides the same, whatever its
 /// lamps are then (buildAgain(), burial_record.h).
@@ -66,14 +67,15 @@ inline constexpr double kCoarse = 2.25;
 /// Whether a surface that is wider than a texel has one for all of it, since no light reaches its sides.
 [[nodiscard]] bool isLeftCoarse(const Scene& scene, const PatchScene& patches, const Surface& surface);
 
-/// Of the triangles of `patches`. O(n log n).
-[[nodiscard]] RayTree rayTreeOf(const PatchScene& patches);
+/// What rays meet of these, or of the triangles of `patches`. O(n log n). Throws std::bad_alloc.
+[[nodiscard]] geometry::RayScene raySceneOf(std::span<const geometry::Triangle> triangles);
+[[nodiscard]] geometry::RayScene raySceneOf(const PatchScene& patches);
 
 /// Whether light of `next`, or of the sky, reaches a side of `patches` that was left without patches because light of
 /// `before` did not. Both scenes have the geometry of `patches`. Nothing is traced unless `next` has a lamp or a sky
 /// that `before` has not. `tree`: of the triangles of `patches`, asked for where something is to be traced; one is
 /// built where there is none.
-using TreeAtHand = std::function<std::shared_ptr<const RayTree>()>;
+using TreeAtHand = std::function<std::shared_ptr<const geometry::RayScene>()>;
 [[nodiscard]] bool reachesDarkSides(const PatchScene& patches, const Scene& before, const Sky& sky_before,
                                     const Scene& next, const Sky& sky_next, const TreeAtHand& tree = {});
 

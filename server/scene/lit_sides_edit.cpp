@@ -1,5 +1,7 @@
 // What an edit of light does to the sides of double-sided surfaces (lit_sides.h).
 #include <algorithm>
+#include <new>
+#include <utility>
 
 #include "server/scene/emitters.h"
 #include "server/scene/lit_sides.h"
@@ -52,7 +54,13 @@ bool shinesAnew(const Scene& before, const Sky& sky_before, const Scene& next, c
 
 }  // namespace
 
-RayTree rayTreeOf(const PatchScene& patches) { return RayTree(Bvh(trianglesOf(patches))); }
+geometry::RayScene raySceneOf(std::span<const geometry::Triangle> triangles) {
+  auto built = geometry::RayScene::build(triangles);
+  if (!built) throw std::bad_alloc();
+  return std::move(*built);
+}
+
+geometry::RayScene raySceneOf(const PatchScene& patches) { return raySceneOf(trianglesOf(patches)); }
 
 bool isLeftCoarse(const Scene& scene, const PatchScene& patches, const Surface& surface) {
   const double texel = patches.texel / static_cast<double>(scene.instances[surface.instance].texel_scale);

@@ -1,5 +1,5 @@
 // A Bvh with eight boxes below each (Wald, Benthin and Boulos 2008, "Getting rid of packets"), which a ray is held
-// against together, in single precision. What lies in its leaves others decide (RayTree, SolidTree). Immutable once
+// against together, in single precision. What lies in its leaves SolidTree decides. Immutable once
 // built.
 #pragma once
 

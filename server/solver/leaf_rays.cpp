@@ -23,7 +23,7 @@ constexpr double kFar = 4.0;
 constexpr double kNearEnd = 1e-5;
 /// A ray keeps in mind so many that it went through; then it starts anew from the last of them, so often at most.
 constexpr std::size_t kMostSheets = 64, kMostStarts = 64;
-/// Sheets within this of the last may lie in the same place (scene::RayTree).
+/// Sheets within this of the last may lie in the same place (geometry::RayScene).
 constexpr float kSame = 4e-6F;
 
 /// Where in a frame a point of its plane lies.
@@ -143,8 +143,7 @@ LeafRays::Sight LeafRays::look(const Place& from, const glm::dvec3& direction, d
   Sight sight;
   sight.distance = reach;
   const auto origin = lifted(from);
-  const auto hit =
-      rays_.nearest({glm::vec3(origin), glm::vec3(direction), static_cast<float>(reach), from.triangle});
+  const auto hit = rays_.nearest({glm::vec3(origin), glm::vec3(direction), static_cast<float>(reach), from.triangle});
   if (!hit.found()) return sight;
   const auto t = static_cast<double>(hit.t);
   sight.distance = t;

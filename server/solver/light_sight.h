@@ -8,7 +8,6 @@
 #include <memory>
 #include <optional>
 
-#include "server/scene/ray_tree.h"
 #include "server/solver/leaf_rays.h"
 #include "server/solver/lights.h"
 

@@ -21,7 +21,7 @@ OWN_INCLUDES = [
     ("protocol/", ["common/", "protocol/"]),
     ("server/geometry/", ["common/", "server/geometry/"]),
     ("server/scene/", ["common/", "server/geometry/", "server/scene/"]),
-    ("server/solver/", ["common/", "server/geometry/", "server/solver/", r"server/scene/(scene|patch_scene|bounds|bvh|ray_tree|shading_normals)\.h"]),
+    ("server/solver/", ["common/", "server/geometry/", "server/solver/", r"server/scene/(scene|patch_scene|bounds|bvh|shading_normals)\.h"]),
     ("server/gpu/", ["common/", "server/geometry/", "server/gpu/", "server/solver/", r"server/scene/(scene|patch_scene|bvh)\.h"]),
     ("server/engine/", ["common/", "server/engine/", "server/scene/", "server/solver/", "server/gpu/", "server/state/"]),
     ("server/state/", ["common/", "server/state/"]),

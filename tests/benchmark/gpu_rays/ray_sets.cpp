@@ -8,8 +8,8 @@
 #include <optional>
 
 #include "common/parallel.h"
+#include "server/geometry/ray_scene.h"
 #include "server/scene/document.h"
-#include "server/scene/ray_tree.h"
 #include "server/solver/sampling.h"
 #include "tests/gl/scene_builder.h"
 
@@ -25,7 +25,7 @@ constexpr std::size_t kLeavesOfBlock = 64;   ///< that are put in order together
 /// What rounding moves (unit box); what lies within a millionth along a ray lies in one place.
 constexpr double kTolerance = 4e-6;
 /// How far triangles reach past their edges as a ray sees them, times the longest edge over that edge: twice what
-/// scene::RayTree has them do.
+/// geometry::RayScene has them do.
 constexpr double kReach = 1e-6;
 
 CastRay rayFrom(const solver::LeafRays::Place& place, const glm::dvec3& direction, double reach) {
@@ -218,7 +218,7 @@ RaySet inOrder(const RaySet& set, RayOrder order, std::uint32_t of_each) {
 }
 
 Answers askProcessor(const std::vector<scene::Bvh::Triangle>& triangles, const RaySet& set) {
-  const scene::RayTree tree{scene::Bvh(triangles)};
+  const auto tree = geometry::RayScene::build(triangles).value();
   Answers answers;
   answers.hits.resize(set.rays.size());
   constexpr std::size_t kAtOnce = 4096;
@@ -226,9 +226,8 @@ Answers askProcessor(const std::vector<scene::Bvh::Triangle>& triangles, const R
   inTurns((set.rays.size() + kAtOnce - 1) / kAtOnce, [&](std::size_t part) {
     for (std::size_t i = part * kAtOnce; i < std::min((part + 1) * kAtOnce, set.rays.size()); ++i) {
       const auto& ray = set.rays[i];
-      scene::RayHit hit{};
-      const bool met = tree.nearestHit(ray.origin, ray.direction, ray.reach, hit, {}, ray.own);
-      answers.hits[i] = set.any ? (met ? 1 : 0) : met ? hit.triangle | (hit.front ? kFront : 0) : scene::kNone;
+      const auto hit = tree.nearest({ray.origin, ray.direction, ray.reach, ray.own});
+      answers.hits[i] = set.any ? (hit.found() ? 1 : 0) : hit.found() ? hit.triangle | (hit.front ? kFront : 0) : scene::kNone;
     }
   });
   answers.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

@@ -37,7 +37,8 @@ struct Meeting {
 Meeting meet(const Triangle& triangle, const glm::dvec3& origin, const glm::dvec3& direction) {
   const glm::dvec3 a(triangle[0]), e1 = glm::dvec3(triangle[1]) - a, e2 = glm::dvec3(triangle[2]) - a;
   const auto p = glm::cross(direction, e2), s = origin - a, q = glm::cross(s, e1);
-  const double determinant = glm::dot(e1, p), u = glm::dot(s, p) / determinant, v = glm::dot(direction, q) / determinant;
+  const double determinant = glm::dot(e1, p), u = glm::dot(s, p) / determinant,
+               v = glm::dot(direction, q) / determinant;
   return {glm::dot(e2, q) / determinant, std::min({u, v, 1.0 - u - v}), determinant > 0.0};
 }
 
@@ -237,8 +238,7 @@ void expectClosed(const glm::vec3& middle, int rays) {
     }
     std::array<Hit, kPacket> hits;
     scene.nearest(packet, hits);
-    for (std::size_t i = 0; i < kPacket; ++i)
-      slipped += !hits[i].found() || !scene.nearest(packet[i]).found() ? 1 : 0;
+    for (std::size_t i = 0; i < kPacket; ++i) slipped += !hits[i].found() || !scene.nearest(packet[i]).found() ? 1 : 0;
     slipped += scene.open(ways) != 0 ? 1 : 0;
   }
   EXPECT_EQ(slipped, 0);

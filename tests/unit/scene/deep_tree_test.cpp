@@ -4,7 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "server/scene/ray_tree.h"
+#include "server/scene/bvh.h"
 
 namespace radiosity::scene {
 namespace {
@@ -21,15 +21,15 @@ TEST(DeepTree, OfTrianglesThatCrowdEverCloserToOnePointHasAllOfThem) {
           {middle + glm::vec3(-size, -size, 0), middle + glm::vec3(size, 0, size), middle + glm::vec3(0, size, -size)});
     }
   }
-  const RayTree wide{Bvh(triangles)};
-  RayHit hit{};
+  const Bvh tree(triangles);
   for (std::size_t i = 0; i < 30; ++i) {
     const auto& [a, b, c] = triangles[i];
     const glm::vec3 middle = (a + b + c) / 3.0F, normal = glm::normalize(glm::cross(b - a, c - a));
     const float near = 0.1F * glm::length(b - a);
-    ASSERT_TRUE(wide.nearestHit(middle + near * normal, -normal, 4.0F, hit)) << i;
-    EXPECT_EQ(hit.triangle, i);
-    EXPECT_TRUE(hit.front);
+    const auto hit = tree.nearestHit(glm::dvec3(middle + near * normal), glm::dvec3(-normal), 0.0, 4.0);
+    ASSERT_TRUE(hit) << i;
+    EXPECT_EQ(hit->triangle, i);
+    EXPECT_TRUE(hit->front);
   }
 }
 

@@ -331,7 +331,7 @@ TEST(LitSides, sidesThatASceneCannotHaveAreRefused) {
 TEST(LitSides, theTreeAtHandIsAskedForOnlyWhereSomethingIsToBeTracedAndAnswersAlike) {
   const Scene scene = litRoom(true);
   const PatchScene patches = build(scene, 1000);
-  const auto own = std::make_shared<const RayTree>(rayTreeOf(patches));
+  const auto own = std::make_shared<const geometry::RayScene>(raySceneOf(patches));
   int asked = 0;
   const auto reaches = [&](const glm::dvec3& place) {
     Scene next = scene;

@@ -2,7 +2,7 @@
 // (entries) and what else is chosen; behind it come the tree, treeWIDTH.glsl, and
 // for those of two and four walk.glsl.
 //
-// Of triangles that a ray meets in one place it hits the one that shows its front, then the first, as scene::RayTree.
+// Of triangles that a ray meets in one place it hits the one that shows its front, then the first, as geometry::RayScene.
 layout(local_size_x = GROUP) in;
 
 layout(std430, binding = 0) readonly buffer Rays { uvec4 rays[]; };  // origin, own triangle; direction, reach
