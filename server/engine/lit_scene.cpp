@@ -148,7 +148,7 @@ bool LitScene::keepsLayoutOf(const LitScene& former) const {
 
 std::uint64_t LitScene::startSolve(LitScene* former, bool keep_former) {
   if (former == nullptr || !former_map_ || former_map_->nothingKept()) {
-    makeSolver();
+    if (former != nullptr || solver_ == nullptr) makeSolver();
     former_map_.reset();
     return former == nullptr ? 0 : former->solver_->shots();
   }

@@ -80,9 +80,10 @@ class LitScene {
   [[nodiscard]] Affected succeed(const LitScene& former);
   /// Surfaces that differ between `former` and this scene, one of which is an edit of the other.
   [[nodiscard]] std::uint64_t surfacesTouchedSince(const LitScene& former) const;
-  /// Prepares the solve; must come after upload(). What stays of the links of `former`, after succeed(), is taken from
-  /// it: its solver is of no use afterwards, unless it is to be kept, which takes the memory of both. Returns the shots
-  /// that are to be taken again. May be called again where it threw and the former is whole.
+  /// Prepares the solve, whose first step must come after upload(); of what is prepared already, without a former,
+  /// nothing is done. What stays of the links of `former`, after succeed(), is taken from it: its solver is of no use
+  /// afterwards, unless it is to be kept, which takes the memory of both. Returns the shots that are to be taken again.
+  /// May be called again where it threw and the former is whole.
   std::uint64_t startSolve(LitScene* former = nullptr, bool keep_former = false);
 
   /// Surfaces that a change to `next` would touch; all of them where it changes geometry or lights.

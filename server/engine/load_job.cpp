@@ -89,7 +89,9 @@ Result<std::unique_ptr<LitScene>> LoadJob::makeWhole(scene::Document document) {
     showFirstLight(*edited);
   }
   beginStage(1.0);
-  return LitScene::make(std::move(*edited), options_.settings, transport_);
+  auto whole = LitScene::make(std::move(*edited), options_.settings, transport_);
+  if (whole) (void)(*whole)->startSolve();  // all that the solve thread need not do
+  return whole;
 }
 
 bool LoadJob::wantsFirstLight(const scene::Scene& scene) const {

@@ -213,7 +213,7 @@ Result<LoadOutcome> SolveLoop::settleIn(Result<std::unique_ptr<LitScene>> made, 
 /// when that cannot be had.
 Result<void> SolveLoop::showFirstLight(std::unique_ptr<LitScene> few) {
   if (const auto lit = relight(std::move(few), Relation::kOther); !lit) return tl::unexpected<Error>(lit.error());
-  first_light_.emplace();
+  first_light_ = FirstLight();
   ++revision_;
   updateStatus(true);
   listeners_.tell([this](Listener& listener) { listener.onSceneLoaded(revision_); });

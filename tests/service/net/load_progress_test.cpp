@@ -1,6 +1,9 @@
 // What clients hear of a load while it is under way.
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <nlohmann/json.hpp>
+
 #include "tests/service/net/replies.h"
 #include "tests/service/net/running_server.h"
 #include "tests/service/net/test_client.h"

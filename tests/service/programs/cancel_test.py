@@ -9,6 +9,8 @@ import time
 import unittest
 import urllib.request
 
+import websockets
+
 import plates
 from harness import ServiceCase
 from patience import PATIENCE
@@ -17,8 +19,8 @@ from wire import RpcError, Session
 
 LAMP = f"/materials/{plates.LAMP_MATERIAL}/emissiveFactor"
 CANCELLED = -32049
-# A load that ends by itself takes longer than this; one that is called off a fifth of a second on an idle machine.
-SOON = 4.0 * PATIENCE
+# What is called off ends within a fifth of a second on an idle machine; the pictures below would take minutes there.
+SOON = 30.0 * PATIENCE
 
 
 def cpu_seconds(process):
@@ -194,15 +196,17 @@ class CancelTest(ServiceCase):
         async def body():
             session, gone = await Session.open(server.url), await Session.open(server.url)
             await self.state_reached(session, "converged")
+            first = asyncio.ensure_future(gone.call("snapshot", width=4096, height=4096))
+            await asyncio.sleep(0.3)
             for request in range(100, 140):  # minutes of work
                 await gone.socket.send(json.dumps({"jsonrpc": "2.0", "id": request, "method": "snapshot",
                                                    "params": {"width": 4096, "height": 4096}}))
-            await asyncio.sleep(0.3)
-            begin = time.monotonic()
             edited = await session.call("scene.patch", patch=[{"op": "replace", "path": LAMP, "value": [0.5, 0, 0]}])
             self.assertEqual(edited["revision"], 2)
-            self.assertLess(time.monotonic() - begin, SOON, "an edit beside a picture")
+            self.assertFalse(first.done(), "the edit has waited for the picture")
             gone.socket.transport.abort()
+            await asyncio.wait({first})
+            first.exception()
             begin = time.monotonic()
             self.assertTrue((await session.call("snapshot", width=64, height=64))["url"])
             self.assertLess(time.monotonic() - begin, SOON, "a picture behind those of somebody who has left")
@@ -273,8 +277,10 @@ class CancelTest(ServiceCase):
             begin = time.monotonic()
             server.process.send_signal(signal.SIGTERM)
             await asyncio.wait({picture})
-            self.assertIsInstance(picture.exception(), RpcError)
-            self.assertEqual(picture.exception().code, CANCELLED)
+            error = picture.exception()
+            # Where the machine is slow the connection is closed before the picture has noticed.
+            self.assertIsInstance(error, (RpcError, websockets.ConnectionClosed))
+            self.assertEqual(getattr(error, "code", CANCELLED), CANCELLED if isinstance(error, RpcError) else 1001)
             return begin
 
         begin = self.run_async(body())
