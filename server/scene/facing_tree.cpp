@@ -24,15 +24,19 @@ FacingTree::FacingTree(std::span<const Item> items) : order_(items.size()) {
 void FacingTree::divide(std::size_t n, std::span<const Item> items) {
   const auto first = nodes_[n].first, count = nodes_[n].count;
   Reach reach, middles;
+  glm::vec3 sizes(0.0F);
   for (auto i = first; i < first + count; ++i) {
     const Item& item = items[order_[i]];
     const auto middle = 0.5F * (item.low + item.high);
     reach.add(item);
     middles.add({middle, middle, item.normal});
+    sizes += item.high - item.low;
   }
   nodes_[n].reach = reach;
   if (count <= kLeafSize) return;
-  const auto place = middles.high - middles.low, turn = middles.normal_high - middles.normal_low;
+  // Walls that lie through each other are parted across them: along them all halves would reach as far.
+  const auto place = middles.high - middles.low - sizes / static_cast<float>(count);
+  const auto turn = middles.normal_high - middles.normal_low;
   const std::array<float, 6> extent{place.x, place.y, place.z, turn.x, turn.y, turn.z};
   const auto axis = static_cast<int>(std::ranges::max_element(extent) - extent.begin());
   const auto along = [&](std::uint32_t i) {

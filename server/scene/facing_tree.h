@@ -48,7 +48,7 @@ class FacingTree {
   };
 
   FacingTree() = default;
-  /// Halves along what differs most. O(n log n).
+  /// Halves along what differs most, beside how large the items are. O(n log n).
   explicit FacingTree(std::span<const Item> items);
 
   /// The root first; empty without items.

@@ -238,7 +238,9 @@ TEST_P(Growth, ofAThingCostsAsMuchAsThereIsOfIt) {
                  " s and " + std::to_string(cost.mib) + " MiB, ten times fewer took " + std::to_string(before) + " s");
     std::printf("%-22s %6d: %6.2f s %7.1f MiB\n", GetParam().name, count, cost.seconds, cost.mib);
     const double n_log_n = 10.0 * std::log(count) / std::log(count / 10.0);
-    if (step > 0) EXPECT_LT(cost.seconds, kSlack * n_log_n * std::max(before, kLeastSeconds / n_log_n));
+    if (step > 0) {
+      EXPECT_LT(cost.seconds, kSlack * n_log_n * std::max(before, kLeastSeconds / n_log_n));
+    }
     EXPECT_LT(cost.seconds, kMostSeconds);
     EXPECT_LT(cost.mib, kMibAtAll + kMibEach * count);
     EXPECT_LT(cost.warnings, 30U) << "what is wrong with all is told in one warning";
