@@ -31,10 +31,10 @@ constexpr double kReachOfCover = 1e-6;
 constexpr std::uint32_t kPlaces = 16;
 /// Surfaces that a thread is worth that looks for what covers them.
 constexpr std::size_t kSurfacesAThread = 64;
-/// So many rays that say the same are enough. More where a place would be lost.
 /// Hits::work, some 0.2 ms, in which a way out along a surface is looked for: in a room it takes a tenth of that, among
 /// thousands of solids that lie through each other a hundred times as much. What the nearest face takes.
 constexpr std::uint64_t kMostWorkAlong = 30'000, kWorkOfFirst = 200;
+/// So many rays that say the same are enough. More where a place would be lost.
 constexpr std::uint32_t kAgreeOutside = 3, kAgreeInside = 6;
 
 /// Of a position in the triangle's plane.

@@ -161,6 +161,11 @@ class SolveTest(ServiceCase):
         _, errors = self.client("solve", self.scene, "-o", "lit.glb", "--link-memory", "much", expect=2)
         self.assertIn("--link-memory", errors)
 
+    def test_aSceneThatClaimsTooMuchMemoryIsRefused(self):
+        _, errors = self.client("solve", self.scene, "-o", "lit.glb", "--max-scene-memory", "1KiB", expect=2)
+        self.assertIn("--max-scene-memory allows", errors)
+        self.assertIn("/nodes", errors)
+
     def test_interruptionExits75AtOnceAndLeavesNothing(self):
         seconds = {signal.SIGINT: [], signal.SIGTERM: []}
         for number in 2 * (signal.SIGINT, signal.SIGTERM):
