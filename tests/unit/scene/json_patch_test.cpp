@@ -376,7 +376,7 @@ TEST_F(ScenePatch, whatAnEditLeavesAloneIsSharedWithTheSceneBefore) {
   EXPECT_EQ(again.scene.textures, before->scene.textures);
 
   ImportLimits small;
-  small.max_image_pixels = 1;
+  small.max_image_pixels = 0;
   const auto refused = editDocument(
       lit.document, R"([{"op":"replace","path":"/materials/0/emissiveFactor","value":[0,0,0]}])"_json, {}, small);
   ASSERT_FALSE(refused);
