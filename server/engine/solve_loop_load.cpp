@@ -57,7 +57,7 @@ void SolveLoop::beginLoad(LoadJob::Request request) {
   callOffLoad("another scene is being loaded");
   const auto done = request.done;
   const auto refuse = [&](const Error& error) {
-    updateStatus(true);
+    tellStatus();
     done(tl::unexpected<Error>(error));
     runDeferred();
   };
@@ -74,6 +74,8 @@ void SolveLoop::beginLoad(LoadJob::Request request) {
     load_ = std::make_unique<LoadJob>(std::move(request), options, *transport_, wake, std::move(former_load_));
   } catch (const std::system_error& error) {
     return refuse({ErrorCode::kUnavailable, std::string("no thread to load with: ") + error.what(), {}});
+  } catch (const std::bad_alloc&) {
+    return refuse({ErrorCode::kTooLarge, "the server has no memory to load with", {}});
   }
   {
     const std::scoped_lock lock(mutex_);
@@ -84,12 +86,18 @@ void SolveLoop::beginLoad(LoadJob::Request request) {
   updateStatus(true);
 }
 
+/// Whoever waits for the end of a load is answered, be there memory to tell the others of it or not.
+void SolveLoop::tellStatus() {
+  if (!fitsMemory([&] { updateStatus(true); })) log::warn("out of memory: the end of a load is told later");
+}
+
 void SolveLoop::callOffLoad(const std::string& why) {
   if (!load_) return;
   former_load_ = std::move(load_);  // the one before it was its own
   former_load_->cancel();
+  (void)former_load_->take();  // what it has made may be large
   if (first_light_) unload(SolveState::kEmpty);
-  updateStatus(true);
+  tellStatus();
   former_load_->request().done(tl::unexpected<Error>(cancelled(why)));
 }
 
@@ -125,14 +133,14 @@ void SolveLoop::loadTurn() {
 /// What came is what is there; unless that was edited meanwhile, and counts as another.
 void SolveLoop::endKnown(scene::Document document) {
   auto& request = load_->request();
-  if (!request.goes_on_edited && !isAsLoaded()) {
+  if (!lit_ || (!request.goes_on_edited && !isAsLoaded())) {
     LoadJob::Request anew{{}, request.client, request.done};
     anew.read = [document = std::move(document)]() -> Result<scene::Document> { return document; };
     request.done = [](const auto&) {};  // the new one answers
     return beginLoad(std::move(anew));
   }
   const auto job = std::move(load_);
-  updateStatus(true);
+  tellStatus();
   job->request().done(LoadOutcome{revision_, lit_->warnings()});
   runDeferred();
 }
@@ -142,7 +150,7 @@ void SolveLoop::endLoad(Result<std::unique_ptr<LitScene>> whole) {
   const auto& request = job->request();
   const auto outcome = withinMemory([&] { return settleIn(std::move(whole), request.client.name); });
   if (!outcome && first_light_) unload(SolveState::kEmpty);
-  if (!outcome) updateStatus(true);
+  if (!outcome) tellStatus();
   request.done(outcome);
   runDeferred();
 }

@@ -212,6 +212,7 @@ Hit RayScene::nearest(const Ray& ray, std::span<const std::uint32_t> passed) con
 }
 
 void RayScene::nearest(std::span<const Ray> rays, std::span<Hit> hits) const {
+  if (rays.empty()) return;
   if (!tree_) {
     std::ranges::fill(hits, Hit{});
     return;
@@ -249,6 +250,7 @@ bool RayScene::open(const Ray& ray) const {
   if (!tree_) return true;
   Open asked;
   rtcInitIntersectContext(&asked.context);
+  asked.triangle_of = &tree_->triangle_of;
   auto query = queryOf(ray);
   rtcOccluded1(tree_->scene.get(), &asked.context, &query);
   return query.tfar >= 0.0F;

@@ -36,7 +36,8 @@ struct Hit {
   [[nodiscard]] bool found() const { return triangle != kNoTriangle; }
 };
 
-/// Ways of which it is asked whether they are open, from `origin` to origin + direction, structure of arrays.
+/// Ways of which it is asked whether they are open, from a millionth behind `origin` to origin + direction, structure
+/// of arrays. None has no length.
 struct alignas(32) Ways {
   using Lanes = std::array<float, kPacket>;
   std::array<Lanes, 3> origin, direction;

@@ -45,6 +45,7 @@ void LightGatherer::askRays(const solver::GatherShot& shot, const solver::Hemicu
   weighReceivers(point.origin, point.normal, lit_count_, lit_.x.data(), lit_.y.data(), lit_.z.data(), lit_.nx.data(),
                  lit_.ny.data(), lit_.nz.data(), lit_.point_weight.data());
   const glm::vec3 light = point.origin + Receivers::kLift * point.normal;
+  const auto look = receivers_->placeKey(point.origin);
   float* weight = lit_.weight[half].data();
   float* visible_weight = lit_.visible_weight[half].data();
   geometry::WayQueue<std::uint32_t> ways(receivers_->rays());
@@ -54,7 +55,7 @@ void LightGatherer::askRays(const solver::GatherShot& shot, const solver::Hemicu
     weight[i] += lit_.point_weight[i];
     const glm::vec3 at(lit_.x[i], lit_.y[i], lit_.z[i]), normal(lit_.nx[i], lit_.ny[i], lit_.nz[i]);
     const auto from = at + Receivers::kLift * normal;
-    ways.add(from, light - from, receivers_->wayKey(lit_.node[i], point.origin), i, tell);
+    ways.add(from, light - from, receivers_->wayKey(look, at), i, tell);
   }
   ways.flush(tell);
   lookFromEdges(shot, point, half);

@@ -1,6 +1,7 @@
 #include "server/gpu/punctual_gatherer.h"
 
 #include <algorithm>
+#include <bit>
 #include <chrono>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -19,8 +20,8 @@ using Clock = std::chrono::steady_clock;
 /// angle: points of it would differ too much.
 constexpr float kNear = 0.3F;
 
-/// So many rays find out what of a light is lost.
-constexpr std::uint32_t kLostRays = 1024;
+/// So many rays find out what of a light is lost, and of one of the many directions of a sky.
+constexpr std::uint32_t kLostRays = 16384, kLostRaysOfSky = 1024;
 
 /// Cone falloff of KHR_lights_punctual. `cosine`: of the angle from the axis.
 float coneFalloff(const solver::PointShot& shot, float cosine) {
@@ -108,6 +109,11 @@ struct HemicubeItems {
             top ? size : size / 2, (across + depth) * scale + shift_x, up * scale + shift_y};
   }
 };
+
+/// A key of what is drawn anew for each look.
+std::uint64_t lookOf(const glm::vec3& turn, float shift, std::uint32_t half) {
+  return solver::mixKeys(solver::mixKeys(Receivers::placeKey(turn), std::bit_cast<std::uint32_t>(shift)), half);
+}
 
 /// The corner of the box that lies farthest along a direction.
 glm::vec3 farthest(const scene::Surface& surface, const glm::vec3& d) {
@@ -375,8 +381,10 @@ void PunctualGatherer::deliver(const std::array<double, 3>& unit, const std::arr
   }
 }
 
+/// `look`: the same for no two looks, so that what one can see through lets each pass by a chance of its own. Ways end
+/// a little before the light, which may lie in the plane of a face.
 template <typename Each>
-void PunctualGatherer::askRays(const glm::vec3& light, const Each& each) {
+void PunctualGatherer::askRays(std::uint64_t look, const Each& each) {
   struct Asked {
     std::size_t receiver = 0;
     float value = 0.0F;
@@ -386,8 +394,10 @@ void PunctualGatherer::askRays(const glm::vec3& light, const Each& each) {
   each([&](const Arrival& arrival) {
     const auto& ray = arrival.ray;
     const auto from = ray.at + Receivers::kLift * ray.normal;
-    const auto key = receivers_->wayKey(static_cast<std::uint32_t>(arrival.receiver), light);
-    ways.add(from, ray.at + ray.reach * ray.way - from, key, {arrival.receiver, arrival.value}, tell);
+    const auto way = ray.at + ray.reach * ray.way - from;
+    const float length = glm::length(way), open = length - 2.0F * Receivers::kLift;
+    if (open <= 0.0F) return tell({arrival.receiver, arrival.value});
+    ways.add(from, open / length * way, receivers_->wayKey(look, ray.at), {arrival.receiver, arrival.value}, tell);
   });
   ways.flush(tell);
 }
@@ -396,7 +406,8 @@ void PunctualGatherer::gather(const solver::PointShot& shot, double flux_scale, 
                               solver::TransportCounters& counters) {
   const auto start = Clock::now();
   sum_.assign(receivers_->all().size(), 0.0F);
-  askRays(shot.frame.origin, [&](const auto& take) { forEachArrival(shot, take); });
+  askRays(lookOf(shot.frame.tangent, static_cast<float>(shot.frame.lattice), shot.half),
+          [&](const auto& take) { forEachArrival(shot, take); });
   deliver(shot.intensity, shot.emitted, loseByRays(shot), shot.half, flux_scale, sink, counters);
   ++counters.point_images;  // a look is counted as one, whichever way
   counters.gather_seconds += std::chrono::duration<double>(Clock::now() - start).count();
@@ -409,8 +420,9 @@ void PunctualGatherer::gather(const solver::ParallelShot& shot, std::span<const 
   sum_.assign(receivers_->all().size(), 0.0F);
   Lost lost;
   for (std::size_t i = 0; i < mine.size(); ++i) {
-    askRays(mine[i].direction, [&](const auto& take) { forEachArrival(shot, mine[i], i, take); });
-    const auto of_view = loseByRays(mine[i]);
+    askRays(lookOf(mine[i].right, mine[i].shift.x, shot.half),
+            [&](const auto& take) { forEachArrival(shot, mine[i], i, take); });
+    const auto of_view = loseByRays(mine[i], shot.sky_count > 0 ? kLostRaysOfSky : kLostRays);
     lost.all += of_view.all;
     lost.escaped += of_view.escaped;
     lost.absorbed += of_view.absorbed;
@@ -425,8 +437,9 @@ void PunctualGatherer::gather(const solver::ParallelShot& shot, std::span<const 
 PunctualGatherer::Lost PunctualGatherer::loseByRays(const solver::PointShot& shot) const {
   const auto [o, t, b, n] = hemicubeAxes(shot.frame);
   const float least = shot.cone_scale > 0.0F ? std::clamp(-shot.cone_offset / shot.cone_scale, 0.0F, 1.0F) : 0.0F;
-  const auto key = receivers_->placeKey(o);
+  const auto key = lookOf(shot.frame.tangent, static_cast<float>(shot.frame.lattice), shot.half);
   const solver::Sobol4 draws(key);
+  const float reach = glm::distance(o, 0.5F * (box_[0] + box_[1])) + glm::distance(box_[0], box_[1]);
   Lost lost;
   for (std::uint32_t first = 0; first < kLostRays; first += geometry::kPacket) {
     std::array<geometry::Ray, geometry::kPacket> rays;
@@ -438,7 +451,7 @@ PunctualGatherer::Lost PunctualGatherer::loseByRays(const solver::PointShot& sho
       const float sine = std::sqrt(std::max(0.0F, 1.0F - cosine * cosine));
       const auto angle = static_cast<float>(2.0 * std::numbers::pi * draw.y);
       const auto direction = cosine * n + sine * (std::cos(angle) * t + std::sin(angle) * b);
-      rays[i] = {o, direction, Receivers::kFar};
+      rays[i] = {o, direction, reach};
       weights[i] = static_cast<double>(coneFalloff(shot, cosine));
     }
     receivers_->nearest(rays, solver::mixKeys(key, first), hits);
@@ -453,14 +466,14 @@ PunctualGatherer::Lost PunctualGatherer::loseByRays(const solver::PointShot& sho
 }
 
 /// Rays spread evenly over a disk around the box, which the light crosses.
-PunctualGatherer::Lost PunctualGatherer::loseByRays(const solver::ParallelView& view) const {
+PunctualGatherer::Lost PunctualGatherer::loseByRays(const solver::ParallelView& view, std::uint32_t count) const {
   const auto centre = 0.5F * (box_[0] + box_[1]);
   const float radius = 0.5F * glm::distance(box_[0], box_[1]);
   const auto up = glm::cross(view.direction, view.right);
-  const auto key = receivers_->placeKey(view.direction);
+  const auto key = lookOf(view.right, view.shift.x, 0);
   const solver::Sobol4 draws(key);
   std::size_t hit = 0, absorbed = 0;
-  for (std::uint32_t first = 0; first < kLostRays; first += geometry::kPacket) {
+  for (std::uint32_t first = 0; first < count; first += geometry::kPacket) {
     std::array<geometry::Ray, geometry::kPacket> rays;
     std::array<geometry::Hit, geometry::kPacket> hits;
     for (std::uint32_t i = 0; i < geometry::kPacket; ++i) {
@@ -476,7 +489,7 @@ PunctualGatherer::Lost PunctualGatherer::loseByRays(const solver::ParallelView& 
       absorbed += found.found() && receivers_->absorbs(found.triangle, !found.front) ? 1 : 0;
     }
   }
-  const double ray_area = std::numbers::pi * static_cast<double>(radius * radius) / kLostRays;
+  const double ray_area = std::numbers::pi * static_cast<double>(radius * radius) / count;
   Lost lost;
   lost.all = solver::boxSilhouette(box_, view.direction);
   lost.escaped = lost.all - static_cast<double>(hit) * ray_area;

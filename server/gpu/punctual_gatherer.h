@@ -51,12 +51,12 @@ class PunctualGatherer {
   template <typename Take>
   void arriveAtGroup(const solver::PointShot& shot, const Receivers::Group& group, const Take& take) const;
   template <typename Each>
-  void askRays(const glm::vec3& light, const Each& each);
+  void askRays(std::uint64_t look, const Each& each);
   [[nodiscard]] Lost weighLost(const solver::PointShot& shot, std::span<const std::uint32_t> items) const;
   [[nodiscard]] Lost weighLost(const solver::ParallelView& view, double pixel_area,
                                std::span<const std::uint32_t> items) const;
   [[nodiscard]] Lost loseByRays(const solver::PointShot& shot) const;
-  [[nodiscard]] Lost loseByRays(const solver::ParallelView& view) const;
+  [[nodiscard]] Lost loseByRays(const solver::ParallelView& view, std::uint32_t count) const;
   [[nodiscard]] static float skyScale(std::span<const glm::vec3> normals, const glm::vec3& axis,
                                       std::span<const solver::ParallelView> sky);
   void scaleToSky(const solver::ParallelShot& shot, std::span<const solver::ParallelView> sky);

@@ -178,8 +178,8 @@ class Receivers {
   /// All triangles, for rays: made when first asked for, since many scenes never are. Throws std::bad_alloc. Ways pass
   /// what one can see through by chance, from wayKey().
   [[nodiscard]] const geometry::RayScene& rays() const;
-  /// Of a way from a receiver to a light; 0 where there is nothing to see through.
-  [[nodiscard]] std::uint64_t wayKey(std::uint32_t node, const glm::vec3& light) const;
+  /// Of a way from a place on a receiver, in a look that no other is like; 0 where there is nothing to see through.
+  [[nodiscard]] std::uint64_t wayKey(std::uint64_t look, const glm::vec3& from) const;
   /// Of a place.
   [[nodiscard]] static std::uint64_t placeKey(const glm::vec3& place);
   /// What geometry::kPacket rays at most meet that does not let them pass; `key`: of the chance by which it does.

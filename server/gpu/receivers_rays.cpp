@@ -3,6 +3,7 @@
 #include <glm/geometric.hpp>
 #include <new>
 
+#include "common/log.h"
 #include "server/gpu/receivers.h"
 #include "server/solver/sampling.h"
 
@@ -59,12 +60,15 @@ geometry::RayScene Receivers::makeRays() const {
   }
   // One thread: workers are as many as there are cores.
   auto built = geometry::RayScene::build(corners_, 1, see_through, std::make_shared<Opacity>(patches_));
-  if (!built) throw std::bad_alloc();
+  if (!built) {
+    log::error("what lights see cannot be looked for: {}", built.error().text());
+    throw std::bad_alloc();
+  }
   return std::move(*built);
 }
 
-std::uint64_t Receivers::wayKey(std::uint32_t node, const glm::vec3& light) const {
-  return patches_->opacity.empty() ? 0 : solver::mixKeys(placeKey(light), node);
+std::uint64_t Receivers::wayKey(std::uint64_t look, const glm::vec3& from) const {
+  return patches_->opacity.empty() ? 0 : solver::mixKeys(look, placeKey(from));
 }
 
 std::uint64_t Receivers::placeKey(const glm::vec3& place) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <queue>
 #include <string>
 #include <string_view>
@@ -24,26 +25,35 @@ constexpr std::uint64_t kDecodedBytes = 4, kDecoderBytes = 12;
 constexpr std::array<std::string_view, 5> kUsed = {"baseColorTexture", "emissiveTexture", "metallicRoughnessTexture",
                                                    "diffuseTexture", "specularGlossinessTexture"};
 
+/// An index of that many things; `count` where it is none.
+std::size_t indexOf(const Json& value, std::size_t count) {
+  if (!value.is_number_integer() || value.get<std::int64_t>() < 0) return count;
+  return std::min(value.get<std::size_t>(), count);
+}
+
+/// How an image is used: as colours, as numbers; what is used both ways is held twice.
+constexpr std::uint8_t kAsColours = 1, kAsNumbers = 2;
+std::uint8_t useOf(std::string_view key) { return key == "metallicRoughnessTexture" ? kAsNumbers : kAsColours; }
+
 /// Marks what a material uses. Values nest at most 64 deep.
-void markUsed(const Json& value, const Json& textures, std::vector<bool>& used) {
+void markUsed(const Json& value, const Json& textures, std::vector<std::uint8_t>& used) {
   if (!value.is_object()) return;
   for (const auto& [key, child] : value.items()) {
     if (key == "extras") continue;
     const auto index = child.is_object() ? child.find("index") : child.end();
     if (std::ranges::find(kUsed, key) != kUsed.end() && child.is_object() && index != child.end()) {
-      const auto texture = index->is_number_unsigned() ? index->get<std::size_t>() : textures.size();
+      const auto texture = indexOf(*index, textures.size());
       if (texture >= textures.size() || !textures[texture].contains("source")) continue;
-      const auto& source = textures[texture]["source"];
-      const auto image = source.is_number_unsigned() ? source.get<std::size_t>() : used.size();
-      if (image < used.size()) used[image] = true;
+      const auto image = indexOf(textures[texture]["source"], used.size());
+      if (image < used.size()) used[image] |= useOf(key);
     } else {
       markUsed(child, textures, used);
     }
   }
 }
 
-std::vector<bool> usedImages(const Document& document) {
-  std::vector<bool> used(document.images.size(), false);
+std::vector<std::uint8_t> usedImages(const Document& document) {
+  std::vector<std::uint8_t> used(document.images.size(), 0);
   const auto& gltf = document.gltf;
   if (!gltf.contains("materials") || !gltf.contains("textures")) return used;
   for (const auto& material : gltf["materials"]) markUsed(material, gltf["textures"], used);
@@ -51,7 +61,8 @@ std::vector<bool> usedImages(const Document& document) {
 }
 
 /// Halves the largest until all take no more than they may.
-void halveLargest(const std::vector<ImageSize>& sizes, std::uint64_t most, ImagePlan& plan) {
+void halveLargest(const std::vector<ImageSize>& sizes, const std::vector<std::uint8_t>& used, std::uint64_t most,
+                  ImagePlan& plan) {
   std::priority_queue<std::pair<std::uint64_t, std::size_t>> largest;
   for (std::size_t i = 0; i < sizes.size(); ++i)
     if (sizes[i].pixels() > 0) largest.emplace(sizes[i].pixels(), i);
@@ -60,7 +71,7 @@ void halveLargest(const std::vector<ImageSize>& sizes, std::uint64_t most, Image
     largest.pop();
     plan.halved += plan.halvings[image]++ == 0 ? 1 : 0;
     const auto left = sizes[image].halved(plan.halvings[image]).pixels();
-    plan.bytes -= kDecodedBytes * (pixels - left);
+    plan.bytes -= kDecodedBytes * (pixels - left) * static_cast<std::uint64_t>(std::popcount(used[image]));
     largest.emplace(left, image);
   }
 }
@@ -74,7 +85,7 @@ Result<ImagePlan> planImages(const Document& document, std::uint64_t claimed, co
   std::vector<ImageSize> sizes(used.size());
   std::uint64_t unlikely = 0;
   for (std::size_t i = 0; i < used.size(); ++i) {
-    if (!used[i]) continue;
+    if (used[i] == 0) continue;
     const auto where = place(document.name, "/images/" + std::to_string(i));
     const auto size = sizeOfImage(*document.images[i], limits.max_image_pixels, where);
     if (!size && size.error().code == ErrorCode::kTooLarge) return tl::unexpected(size.error());
@@ -84,13 +95,13 @@ Result<ImagePlan> planImages(const Document& document, std::uint64_t claimed, co
     unlikely += pixels > likely ? pixels - likely : 0;
     if (unlikely > kTotalImages * limits.max_image_pixels)
       return fail(ErrorCode::kTooLarge, "images have too many pixels for so few bytes", where);
-    plan.bytes += kDecodedBytes * pixels;
+    plan.bytes += kDecodedBytes * pixels * static_cast<std::uint64_t>(std::popcount(used[i]));
     plan.largest_pixels = std::max<std::uint64_t>(plan.largest_pixels, pixels);
   }
   const auto limit = sceneMemoryLimit(limits);
   const auto decoder = kDecoderBytes * plan.largest_pixels;
   const auto room = claimed + decoder < limit ? limit - claimed - decoder : 0;
-  halveLargest(sizes, std::min(kMostImageBytes, room), plan);
+  halveLargest(sizes, used, std::min(kMostImageBytes, room), plan);
   if (plan.bytes > room)
     return fail(ErrorCode::kTooLarge, sceneMemoryFault(claimed + decoder + plan.bytes, limit, "its decoded images"),
                 place(document.name, "/images"));

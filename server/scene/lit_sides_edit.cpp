@@ -3,6 +3,7 @@
 #include <new>
 #include <utility>
 
+#include "common/log.h"
 #include "server/scene/emitters.h"
 #include "server/scene/lit_sides.h"
 #include "server/scene/material_of.h"
@@ -56,7 +57,10 @@ bool shinesAnew(const Scene& before, const Sky& sky_before, const Scene& next, c
 
 geometry::RayScene raySceneOf(std::span<const geometry::Triangle> triangles) {
   auto built = geometry::RayScene::build(triangles);
-  if (!built) throw std::bad_alloc();
+  if (!built) {
+    log::error("light on sides cannot be looked for: {}", built.error().text());
+    throw std::bad_alloc();
+  }
   return std::move(*built);
 }
 

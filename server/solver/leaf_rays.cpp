@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <new>
 #include <numbers>
 #include <span>
 #include <utility>
 
+#include "common/log.h"
 #include "server/solver/sampling.h"
 
 namespace radiosity::solver {
@@ -15,6 +17,9 @@ namespace {
 
 /// Rays start so far from a surface (unit box), well above the rounding of positions.
 constexpr double kLift = 2e-6;
+/// Places lie so far within the edges of whole leaves: on an edge rounding may place one behind another wall, whose
+/// back ends its rays, or which they pass by.
+constexpr double kWithin = 1e-6, kMostWithin = 0.01;
 /// Planes of triangles are known to some 1e-7: places on them, along a ray, to so many times less.
 constexpr double kLeastSlope = 0.05;
 /// Farther than the unit box is wide.
@@ -55,7 +60,10 @@ LeafRays::LeafRays(const scene::PatchScene& patches, const std::vector<Side>& si
   for (std::size_t i = 0; i < patches.indices.size(); ++i)
     triangles[i / 3][i % 3] = patches.vertices[patches.indices[i]].position;
   auto built = geometry::RayScene::build(triangles);
-  if (!built) throw std::bad_alloc();
+  if (!built) {
+    log::error("what leaves see cannot be looked for: {}", built.error().text());
+    throw std::bad_alloc();
+  }
   rays_ = std::move(*built);
   std::size_t leaves = 0;
   for (const auto& side : sides) leaves += side.leaf_count;
@@ -133,7 +141,9 @@ LeafRays::Place LeafRays::placeOn(std::uint32_t value, const glm::dvec2& at) con
   const Side& side = sideOf(value);
   const auto leaf = value - side.first_value;
   const auto& point = patches_.leaves[patches_.surfaces[side.surface].first_leaf + leaf];
-  const auto [texel, triangle] = patches_.spotAt(point, leaf % side.width, leaf / side.width, glm::vec2(at));
+  const double within = std::min(kWithin / widthOf(value), kMostWithin);
+  const auto inside = glm::clamp(at, within, 1.0 - within);
+  const auto [texel, triangle] = patches_.spotAt(point, leaf % side.width, leaf / side.width, glm::vec2(inside));
   const auto& frame = patches_.triangles[triangle];
   return {positionAt(frame, glm::dvec2(texel)), glm::dvec3(side.side == 0 ? frame.normal : -frame.normal), value,
           triangle};
@@ -247,8 +257,8 @@ LeafRays::Sight LeafRays::look(const Place& from, const glm::dvec3& direction) c
   return sight;
 }
 
-bool LeafRays::isOpen(const Place& from, const glm::dvec3& to) const {
-  const glm::dvec3 origin = lifted(from), way = to - origin;
+bool LeafRays::isOpen(const Place& from, const glm::dvec3& to, const glm::dvec3& normal) const {
+  const glm::dvec3 origin = lifted(from), way = to + kLift * normal - origin;
   const double length = glm::length(way);
   return length > kNearEnd &&
          rays_.open({glm::vec3(origin), glm::vec3(way / length), static_cast<float>(length - kNearEnd)});

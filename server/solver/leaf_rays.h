@@ -73,8 +73,9 @@ class LeafRays {
   [[nodiscard]] std::uint32_t standInOf(std::uint32_t value) const {
     return has_stand_in_[value] ? foundStandIn(value) : value;
   }
-  /// Whether nothing lies between, but for what is nearer than a hundred-thousandth to `to`.
-  [[nodiscard]] bool isOpen(const Place& from, const glm::dvec3& to) const;
+  /// Whether nothing lies between, but for what is nearer than a hundred-thousandth to `to`. `normal`: of the face on
+  /// which that lies, which a way that grazes it must not meet before; zero: it lies on none.
+  [[nodiscard]] bool isOpen(const Place& from, const glm::dvec3& to, const glm::dvec3& normal = glm::dvec3(0.0)) const;
   /// Where ways from a place begin: a little before it.
   [[nodiscard]] static glm::vec3 startOf(const Place& place);
   /// Points of a light, structure of arrays: geometry::kPacket after geometry::kPacket of them.

@@ -177,6 +177,7 @@ std::uint32_t LeafSights::traceLeaf(std::uint32_t value, const Side& side, std::
       direction[together] = cosineDirection(place[together].normal, at.x, at.y);
       ++together;
     }
+    if (together == 0) break;
     rays_->meetFirst(std::span(place).first(together), std::span(direction).first(together),
                      std::span(hit).first(together));
     for (std::size_t i = 0; i < together; ++i) {

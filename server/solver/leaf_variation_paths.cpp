@@ -116,7 +116,7 @@ void LeafVariation::followLight(const std::array<Place, 2>& places, std::uint64_
   for (std::size_t p = 0; p < 2; ++p) {
     // Of a lamp that the place's plane cuts only what lies before it is seen: points behind it stand for nothing.
     const bool before = glm::dot(point - places[p].position, places[p].normal) > 0.0;
-    if (drawn.unhidden[p] <= 0.0 || !before || !rays_->isOpen(places[p], point)) continue;
+    if (drawn.unhidden[p] <= 0.0 || !before || !rays_->isOpen(places[p], point, glm::dvec3(lamp.normal))) continue;
     const auto seen =
         formFactorInFront(places[p].position, places[p].normal, std::span(lamp.corners.data(), lamp.corner_count));
     if (seen.front > 0.0) factor += (p == 0 ? 1.0 : -1.0) * seen.value / seen.front;

@@ -106,7 +106,11 @@ class KilledTest(StateCase):
             await (await Session.open(url)).call("scene.load", url=upload)
 
         server = self.keeper()
-        self.assertEqual(self.run_async(loads(server.url)), [("load", None)])  # the command line's
+        deadline = time.monotonic() + 60 * PATIENCE
+        while not (known := self.run_async(loads(server.url))):  # the command line's is read while clients come
+            self.assertLess(time.monotonic(), deadline)
+            time.sleep(0.05)
+        self.assertEqual(known, [("load", None)])
         body = self.scene.read_bytes()
         self.put(server.url, "/scene?client=Ann", body)
         self.assertEqual(self.run_async(loads(server.url)), [("load", "Ann")])

@@ -188,6 +188,8 @@ TEST(RayScene, WhatOneCanSeeThroughIsAsked) {
   }
   EXPECT_EQ(scene.open(ways), 0b01010011U);
   EXPECT_EQ(scene.nearest(Ray{{-0.9F, 1, 0}, {0, -1, 0}, 4.0F}).triangle, 1U);  // it is met all the same
+  EXPECT_TRUE(scene.open(Ray{{0.9F, 1, 0}, {0, -1, 0}, 4.0F}));
+  EXPECT_FALSE(scene.open(Ray{{-0.9F, 1, 0}, {0, -1, 0}, 4.0F}));  // the wall
 }
 
 /// The walls of a room of 0.78 units around `middle`, whose corners are rounded there, as a scene in its unit box.

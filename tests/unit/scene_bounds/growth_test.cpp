@@ -79,7 +79,10 @@ Cost load(const Bytes& glb) {
 struct Thing {
   const char* name;
   std::function<void(GltfBuilder&, int)> add;
+  int steps = 3;  ///< each has ten times as many
 };
+
+void PrintTo(const Thing& thing, std::ostream* out) { *out << thing.name; }
 
 std::size_t meshOf(GltfBuilder& builder, const std::vector<float>& positions, const std::vector<std::uint16_t>& index) {
   Json primitive = {{"attributes", {{"POSITION", builder.vec3(positions)}}}};
@@ -214,7 +217,8 @@ std::vector<Thing> things() {
           {"tilesOnEachOther", placed(square, tiles)},
           {"cubesInOnePlace", placed(cube, nowhere)},
           {"cubesWithinCubes", placed(cube, within)},
-          {"cubesThroughCubes", placed(cube, anywhere)},
+          // Solids that all lie through each other are still dear: 10,000 of them take minutes.
+          {"cubesThroughCubes", placed(cube, anywhere), 2},
           {"nodesFarApart", placed(square, far)},
           {"nodesBesideALargeOne", placed(square, large)},
           {"materials", addMaterials},
@@ -230,7 +234,7 @@ class Growth : public testing::TestWithParam<Thing> {};
 TEST_P(Growth, ofAThingCostsAsMuchAsThereIsOfIt) {
   double before = 0.0;
   int count = kBase;
-  for (int step = 0; step < 3; ++step, count *= 10) {
+  for (int step = 0; step < GetParam().steps; ++step, count *= 10) {
     GltfBuilder builder;
     GetParam().add(builder, count);
     const auto cost = load(builder.glb());

@@ -161,6 +161,10 @@ it.each([
     async ({ count, side }) => {
       const { viewer } = window.viewer!;
       const gl = viewer.renderer.getContext() as WebGL2RenderingContext;
+      for (let frame = 0; frame < 2; ++frame) {
+        viewer.invalidate(); // what the scene itself has on the card is there by then
+        await new Promise((resolve) => requestAnimationFrame(resolve));
+      }
       let onCard = 0;
       const store = gl.texStorage2D.bind(gl);
       gl.texStorage2D = (target, levels, format, width, height) => {
