@@ -150,7 +150,7 @@ class SolveLoop final : public Engine {
   void beginLoad(LoadJob::Request request);
   void callOffLoad(const std::string& why);  ///< and answers it, where one is under way
   void tellStatus();
-  void loadTurn();                           ///< takes what the load has made, and tells how far it is
+  void loadTurn();  ///< takes what the load has made, and tells how far it is
   void endKnown(scene::Document document);
   void endLoad(Result<std::unique_ptr<LitScene>> whole);
   [[nodiscard]] bool awaitsLoad(Needs needs, std::uint64_t session) const;

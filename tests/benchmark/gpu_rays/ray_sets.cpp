@@ -227,7 +227,9 @@ Answers askProcessor(const std::vector<scene::Bvh::Triangle>& triangles, const R
     for (std::size_t i = part * kAtOnce; i < std::min((part + 1) * kAtOnce, set.rays.size()); ++i) {
       const auto& ray = set.rays[i];
       const auto hit = tree.nearest({ray.origin, ray.direction, ray.reach, ray.own});
-      answers.hits[i] = set.any ? (hit.found() ? 1 : 0) : hit.found() ? hit.triangle | (hit.front ? kFront : 0) : scene::kNone;
+      answers.hits[i] = set.any       ? (hit.found() ? 1 : 0)
+                        : hit.found() ? hit.triangle | (hit.front ? kFront : 0)
+                                      : scene::kNone;
     }
   });
   answers.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

@@ -9,8 +9,8 @@
 namespace radiosity::benchmarks {
 namespace {
 
-/// By which boxes grow (unit box), and triangles, times their longer edge: as scene::WideNodes and geometry::RayScene do
-/// it.
+/// By which boxes grow (unit box), and triangles, times their longer edge: as scene::WideNodes and geometry::RayScene
+/// do it.
 constexpr float kGrowth = 2e-6F, kEdge = 5e-7F;
 constexpr std::uint32_t kLeaf = 1U << 31U, kCountBits = 3;
 
