@@ -46,14 +46,6 @@ constexpr double kCutOff = 0.999;
 /// A leaf that shines so far shines everywhere: areas are in single precision.
 constexpr double kWhole = 0.998;
 
-/// In leaves from the origin of the frame, whose axes need not be at right angles.
-glm::vec2 texelAt(const scene::TriangleFrame& frame, const glm::vec3& place) {
-  const glm::dvec3 du(frame.du), dv(frame.dv), way = glm::dvec3(place) - glm::dvec3(frame.origin);
-  const double uu = glm::dot(du, du), uv = glm::dot(du, dv), vv = glm::dot(dv, dv);
-  const double u = glm::dot(way, du), v = glm::dot(way, dv), under = uu * vv - uv * uv;
-  return {(u * vv - v * uv) / under, (v * uu - u * uv) / under};
-}
-
 }  // namespace
 
 bool LightGatherer::isEdge(const solver::GatherShot& shot, std::size_t lit, double front) const {
@@ -69,7 +61,7 @@ double LightGatherer::shiningAt(const solver::GatherShot& shot, const glm::vec3&
   const auto& patches = receivers_->patches();
   const auto& frame = patches.triangles[shot.triangle];
   const auto& surface = patches.surfaces[patches.triangle_surface[shot.triangle]];
-  const auto here = texelAt(frame, place), texel = glm::floor(here);
+  const auto here = Receivers::texelAt(frame, place), texel = glm::floor(here);
   const auto width = static_cast<float>(surface.width), height = static_cast<float>(surface.height);
   if (!(texel.x >= 0.0F && texel.x < width && texel.y >= 0.0F && texel.y < height)) return 0.0;
   const auto leaf = static_cast<std::uint32_t>(texel.y) * surface.width + static_cast<std::uint32_t>(texel.x);

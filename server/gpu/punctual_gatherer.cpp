@@ -344,10 +344,7 @@ void PunctualGatherer::gather(const solver::ParallelShot& shot, std::span<const 
         const bool two_sided = (arrival.care & Receivers::kTwoSided) != 0;
         if (!isHidden(*receivers_, place, ray, two_sided)) sum_[arrival.receiver] += arrival.value;
       });
-      const auto of_view = weighLost(some[i], axes.pixel_area, items);
-      lost.all += of_view.all;
-      lost.escaped += of_view.escaped;
-      lost.absorbed += of_view.absorbed;
+      lost += weighLost(some[i], axes.pixel_area, items);
     }
   }
   if (shot.sky_count > 0) scaleToSky(shot, views.subspan(shot.first_of_sky, shot.sky_count));
@@ -422,10 +419,7 @@ void PunctualGatherer::gather(const solver::ParallelShot& shot, std::span<const 
   for (std::size_t i = 0; i < mine.size(); ++i) {
     askRays(lookOf(mine[i].right, mine[i].shift.x, shot.half),
             [&](const auto& take) { forEachArrival(shot, mine[i], i, take); });
-    const auto of_view = loseByRays(mine[i], shot.sky_count > 0 ? kLostRaysOfSky : kLostRays);
-    lost.all += of_view.all;
-    lost.escaped += of_view.escaped;
-    lost.absorbed += of_view.absorbed;
+    lost += loseByRays(mine[i], shot.sky_count > 0 ? kLostRaysOfSky : kLostRays);
   }
   if (shot.sky_count > 0) scaleToSky(shot, views.subspan(shot.first_of_sky, shot.sky_count));
   deliver(shot.irradiance, shot.emitted, lost, shot.half, flux_scale, sink, counters);

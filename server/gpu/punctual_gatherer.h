@@ -34,6 +34,13 @@ class PunctualGatherer {
   /// Shares of a shot's flux that left the scene, and that fell on unlit sides.
   struct Lost {
     double all = 0.0, escaped = 0.0, absorbed = 0.0;
+
+    Lost& operator+=(const Lost& other) {
+      all += other.all;
+      escaped += other.escaped;
+      absorbed += other.absorbed;
+      return *this;
+    }
   };
 
   /// What a light brings to a place, should nothing hide it, and the way to the light.

@@ -180,6 +180,8 @@ class Receivers {
   [[nodiscard]] const geometry::RayScene& rays() const;
   /// Of a way from a place on a receiver, in a look that no other is like; 0 where there is nothing to see through.
   [[nodiscard]] std::uint64_t wayKey(std::uint64_t look, const glm::vec3& from) const;
+  /// Where in a frame a point of its plane lies, in leaves from its origin; its axes need not be at right angles.
+  [[nodiscard]] static glm::vec2 texelAt(const scene::TriangleFrame& frame, const glm::vec3& point);
   /// Of a place.
   [[nodiscard]] static std::uint64_t placeKey(const glm::vec3& place);
   /// What geometry::kPacket rays at most meet that does not let them pass; `key`: of the chance by which it does.

@@ -37,14 +37,6 @@ class Opacity final : public geometry::SeeThrough {
   std::shared_ptr<const scene::PatchScene> patches_;
 };
 
-/// Where in its triangle's frame a point of its plane lies.
-glm::vec2 texelAt(const scene::TriangleFrame& frame, const glm::vec3& point) {
-  const glm::dvec3 du(frame.du), dv(frame.dv), way = glm::dvec3(point) - glm::dvec3(frame.origin);
-  const double uu = glm::dot(du, du), uv = glm::dot(du, dv), vv = glm::dot(dv, dv);
-  const double u = glm::dot(way, du), v = glm::dot(way, dv), under = uu * vv - uv * uv;
-  return {(u * vv - v * uv) / under, (v * uu - u * uv) / under};
-}
-
 }  // namespace
 
 const geometry::RayScene& Receivers::rays() const {
@@ -65,6 +57,13 @@ geometry::RayScene Receivers::makeRays() const {
     throw std::bad_alloc();
   }
   return std::move(*built);
+}
+
+glm::vec2 Receivers::texelAt(const scene::TriangleFrame& frame, const glm::vec3& point) {
+  const glm::dvec3 du(frame.du), dv(frame.dv), way = glm::dvec3(point) - glm::dvec3(frame.origin);
+  const double uu = glm::dot(du, du), uv = glm::dot(du, dv), vv = glm::dot(dv, dv);
+  const double u = glm::dot(way, du), v = glm::dot(way, dv), under = uu * vv - uv * uv;
+  return {(u * vv - v * uv) / under, (v * uu - u * uv) / under};
 }
 
 std::uint64_t Receivers::wayKey(std::uint64_t look, const glm::vec3& from) const {

@@ -437,6 +437,11 @@ TEST_P(Punctual, ASheetOfOpacityAThirdLetsTwoThirdsThrough) {
   for (std::uint32_t leaf = 0; leaf < 256; ++leaf) mean += irradiance(*scene, flux, floor, leaf % 16, leaf / 16) / 256;
   // 256 leaves x 32 looks, each seen or not: sigma 0.47 / sqrt(8192) = 0.5 %
   EXPECT_NEAR(mean, 2.0 / 3.0, 0.016);
+  // Each leaf by a chance of its own in each look: of 32 looks no leaf is left with all or none (1 in 4e5).
+  for (std::uint32_t leaf = 0; leaf < 256; ++leaf) {
+    EXPECT_GT(irradiance(*scene, flux, floor, leaf % 16, leaf / 16), 0.1) << leaf;
+    EXPECT_LT(irradiance(*scene, flux, floor, leaf % 16, leaf / 16), 0.999) << leaf;
+  }
   EXPECT_NEAR(irradiance(*scene, flux, sheet, 3, 4), 1.0, 1e-5) << "irradiance on the sheet itself is whole";
 }
 
