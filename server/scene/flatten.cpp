@@ -18,6 +18,10 @@ namespace {
 /// Distances below this fraction of an instance's extent are rounding of 32-bit file coordinates.
 constexpr double kWeldFraction = 2e-7;
 
+/// Heights of triangles below this part of the unit box are rounding too, however small their instance is: they are a
+/// few hundred steps of a double there, and a chart's plane is fitted to sums of such coordinates.
+constexpr double kLeastHeight = 1e-13;
+
 /// A scene keeps the unit box of its former self as long as it reaches no farther from its middle, ...
 constexpr double kMostReach = 0.75;
 /// ... and fills this part of it: 32-bit positions keep their digits.
@@ -185,7 +189,7 @@ class InstanceFlattener {
     const glm::dvec3 cross = glm::cross(b - a, c - a);
     const double twice_area = glm::length(cross);
     const double longest = std::max({glm::distance(a, b), glm::distance(b, c), glm::distance(c, a)});
-    if (!(twice_area > tolerance * longest)) {  // its height is rounding
+    if (!(twice_area > std::max(tolerance, kLeastHeight) * longest)) {  // its height is rounding
       ++flat_.dropped;
       return;
     }

@@ -119,5 +119,25 @@ TEST(WildValues, AFootprintThatIsNoNumberIsAPoint) {
   EXPECT_NEAR(pyramid.sample({}, pixel, glm::vec2(kInfinity, 0.0F)).x, 0.5F, 1e-6F);  // the mean of all
 }
 
+TEST(WildValues, ASpeckOfAnySizeHasAFrameOrIsLeftOut) {
+  // Beside a floor of a unit's width, around its middle; from half of it down to where doubles hold nothing of it.
+  ChartOptions options;
+  options.texel_budget = 16;
+  for (double size = 0.5; size > 1e-30; size *= 0.2) {
+    SCOPED_TRACE(size);
+    Scene scene;
+    place(scene, floorQuad(1.0, -0.5, -0.5));
+    Primitive speck;
+    speck.positions = {{-0.5, 0.0, 0.0}, {-0.5, -0.7 * size, 0.71 * size}, {-0.5, size, -0.2 * size}};
+    speck.indices = {0, 1, 2};
+    place(scene, speck);
+    const PatchScene patches = buildPatchScene(scene, options).value();
+    EXPECT_EQ(patches.triangles.size(), size > 2e-13 ? 3U : 2U);
+    for (const auto& frame : patches.triangles)
+      for (const auto& v : {frame.origin, frame.du, frame.dv, frame.normal})
+        ASSERT_TRUE(std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z));
+  }
+}
+
 }  // namespace
 }  // namespace radiosity::scene::test
