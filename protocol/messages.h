@@ -57,7 +57,7 @@ struct EnergyParts {
 struct Settings {
   double target_error = 0.02;
   std::optional<std::uint64_t> time_limit_ms;  ///< none: no limit (JSON null)
-  std::uint64_t texels = 16'000;               ///< used when texel_size_m is 0
+  std::uint64_t texels = 24'000;               ///< used when texel_size_m is 0
   double texel_size_m = 0.0;
   std::uint64_t seed = 1;
   std::optional<Sky> sky;  ///< none: JSON null

@@ -33,7 +33,7 @@ struct SolveOptions {
   RemoteOptions server;
   double error = 0.02;
   double time_limit_s = 0.0;  ///< 0: none
-  std::uint64_t texels = 16'000;
+  std::uint64_t texels = 24'000;
   double texel_size_m = 0.0;  ///< 0: by number
   std::uint64_t seed = 1;
   unsigned workers = 0;          ///< 0: the server's choice

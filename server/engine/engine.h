@@ -77,7 +77,7 @@ struct SkySetting {
 struct SolveSettings {
   double target_error = 0.02;          ///< relative; stops when the estimate reaches it
   std::optional<double> time_limit_s;  ///< solve time
-  std::uint64_t texels = 16'000;       ///< leaf patches in all, about; used when texel_size_m is 0
+  std::uint64_t texels = 24'000;       ///< leaf patches in all, about; used when texel_size_m is 0
   double texel_size_m = 0.0;
   std::uint64_t seed = 1;
   std::optional<SkySetting> sky;  ///< for scenes that have none of their own

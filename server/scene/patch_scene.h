@@ -245,7 +245,7 @@ struct PatchMap {
 void joinBoxes(std::vector<ChangedBox>& boxes);
 
 struct ChartOptions {
-  std::uint64_t texel_budget = 16'000;  ///< leaf patches in all, about; used when texel_size_m is 0
+  std::uint64_t texel_budget = 24'000;  ///< leaf patches in all, about; used when texel_size_m is 0
   double texel_size_m = 0.0;
   std::uint32_t max_page_size = 4096;
   std::uint32_t gutter = 2;       ///< empty texels between charts
