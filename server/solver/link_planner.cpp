@@ -34,8 +34,6 @@ constexpr double kPrior = 1.0;
 /// A short wave brings a light at most so many samples, and a node so many points; and one that doubles them. In the
 /// room of 402 polygons, where the equation takes six times as long as a short wave, 0.33 % take 5.7 s instead of 10.
 constexpr std::uint32_t kMostOfShortWave = 8, kMostOfWave = 512;
-/// So many times that of a node are the images of a light without extent (a sky has most).
-constexpr double kSourceCost = 60.0;
 
 /// A wave ends where it is likely to bring the error to this part of the target: the spreads that it goes by are
 /// uncertain themselves, and the largest are rather too large.
@@ -125,7 +123,7 @@ std::vector<Measurement> LinkPlanner::firstLight(const LinkSystem& system) const
   for (std::uint32_t n = 0; n < system.shooters().size(); ++n) {
     const auto& shooter = system.shooters()[n];
     if (!shooter.isLight() || shooter.power() <= 0.0) continue;
-    if (shooter.source != scene::kNone) {  // a sample of it is a whole sequence of images
+    if (shooter.light == scene::kNone) {  // a sample of it is a whole sequence of images, or of draws
       for (std::size_t half = 0; half < 2; ++half) {
         if (shooter.column[half].points() == 0.0) wanted.push_back({n, half, 1, 0});
       }
@@ -353,7 +351,7 @@ std::vector<LinkPlanner::FurtherSample> LinkPlanner::furtherSamples(const Shoote
   const auto taken = shooter.column[0].samples();
   const auto most_of_wave = wave == Wave::kShort ? kMostOfShortWave : kMostOfWave;
   const auto most = std::min(most_of_wave, std::max(1U, taken));
-  if (shooter.source != scene::kNone) return std::vector<FurtherSample>(most, {1, kSourceCost});
+  if (shooter.sample_cost > 0.0) return std::vector<FurtherSample>(most, {1, shooter.sample_cost});
   std::vector<FurtherSample> samples;
   for (std::uint32_t k = 0; shooter.isLight() && k < most; ++k)
     samples.push_back({kLightPoints, kLightCost * settings_.lightCost(taken + k) * kLightPoints});
@@ -440,7 +438,9 @@ std::vector<Measurement> LinkPlanner::improve(LinkSystem& system, const UnshotPy
           {gain.shooter, half, shooter.isLight() ? gain.points : shots_.pointsOf(shooter.place, index), index});
     }
     ++further[gain.shooter];
-    planned += 2 * (shooter.isLight() ? 1 : gain.points);
+    // A crowd's sample takes as long as many of others.
+    const auto worth = shooter.crowd != scene::kNone ? static_cast<std::size_t>(std::ceil(shooter.sample_cost)) : 1;
+    planned += 2 * (shooter.isLight() ? worth : gain.points);
   }
   return wanted;
 }

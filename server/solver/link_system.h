@@ -35,9 +35,10 @@
 namespace radiosity::solver {
 
 struct Shooter {
-  NodePlace place;                         ///< of a node; of a light only `light` or `source` counts
+  NodePlace place;                         ///< of a node; of a light only one of the following three counts
   std::uint32_t light = scene::kNone;      ///< index of the light polygon, or kNone
   std::uint32_t source = scene::kNone;     ///< index of the light without extent, or kNone; `area` is its flux for one
+  std::uint32_t crowd = scene::kNone;      ///< index of the crowd of lamps, or kNone; `area` is its flux for one
   std::uint32_t parent = scene::kNone;     ///< nearest shooter above
   bool certain = false;                    ///< never plays roulette
   std::uint32_t resolution = 0;            ///< N of a node's item buffers
@@ -49,9 +50,12 @@ struct Shooter {
   std::array<glm::vec3, 2> sent{};         ///< s, before the weight
 
   std::size_t most_bytes = 0;        ///< that a column can come to take
+  double sample_cost = 0.0;          ///< of a source or crowd, in a node's samples from one point
   std::array<double, 3> products{};  ///< sums over leaves of area T0 T0, T0 T1, T1 T1
 
-  [[nodiscard]] bool isLight() const { return light != scene::kNone || source != scene::kNone; }
+  [[nodiscard]] bool isLight() const {
+    return light != scene::kNone || source != scene::kNone || crowd != scene::kNone;
+  }
   /// A light whose links are still to be measured, in one half at least.
   [[nodiscard]] bool owes() const {
     return isLight() && power() > 0.0 && (column[0].points() == 0.0 || column[1].points() == 0.0);

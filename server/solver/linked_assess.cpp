@@ -206,7 +206,7 @@ EnergyParts LinkedSolver::energy() const {
         const double sent = 0.5 * shooter.carried(half) * static_cast<double>(shooter.sent[half][static_cast<int>(c)]);
         parts.escaped[c] += sent * column.escaped();
         parts.backface[c] += sent * column.absorbed();
-        if (shooter.light != scene::kNone) sent_for[c] += sent * shooter.area;
+        if (shooter.light != scene::kNone || shooter.crowd != scene::kNone) sent_for[c] += sent * shooter.area;
       }
     }
     if (gathers()) continue;  // rays make up for it

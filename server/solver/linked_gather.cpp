@@ -209,6 +209,10 @@ double LinkedSolver::samplesCost() const {
   double points = 0.0;
   for (const auto& shooter : system_.shooters()) {
     for (const auto& column : shooter.column) {
+      if (shooter.crowd != scene::kNone) {
+        points += shooter.sample_cost * column.points();
+        continue;
+      }
       const double first = shooter.isLight() ? std::min(column.points(), coarse) : column.points();
       points += (shooter.isLight() ? kLightShot : 1.0) * (first + fine * (column.points() - first));
     }

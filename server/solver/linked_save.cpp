@@ -1,19 +1,22 @@
 // LinkedSolver as bytes and back: links as they are kept, and what its choices depend on. All else is made again from
 // these: the matrix, unshot light, who lies below whom.
 #include <algorithm>
+#include <utility>
+#include <vector>
 
 #include "server/solver/linked_solver.h"
 
 namespace radiosity::solver {
 namespace {
 
-constexpr std::uint32_t kKind = 0x364b4e4cU;  // "LNK6": what there is below, and in which order
+constexpr std::uint32_t kKind = 0x374b4e4cU;  // "LNK7": what there is below, and in which order
 
 /// All of a shooter but its links.
 template <typename Archive, typename Self>
 void visitShooter(Archive& archive, Self& shooter) {
-  archive(shooter.place, shooter.light, shooter.source, shooter.certain, shooter.resolution, shooter.area,
-          shooter.weight, shooter.own, shooter.mean, shooter.sent, shooter.most_bytes, shooter.products);
+  archive(shooter.place, shooter.light, shooter.source, shooter.crowd, shooter.sample_cost, shooter.certain,
+          shooter.resolution, shooter.area, shooter.weight, shooter.own, shooter.mean, shooter.sent, shooter.most_bytes,
+          shooter.products);
 }
 
 }  // namespace
@@ -93,6 +96,7 @@ bool LinkedSolver::save(ArchiveWriter& to) const {
   if (pass_ != Pass::kNone || isBehind()) return false;
   to(kKind, static_cast<std::uint64_t>(system_.leafAreas().size()));
   visit(to, *this);
+  to(std::vector<CrowdLight>(crowds_.begin(), crowds_.end()));
   system_.save(to);
   to(gather_ != nullptr);
   if (gather_) gather_->save(to);
@@ -101,12 +105,26 @@ bool LinkedSolver::save(ArchiveWriter& to) const {
   return true;
 }
 
+/// Their lamps are those of the scene, where they shine.
+bool LinkedSolver::restoreCrowds(ArchiveReader& from) {
+  std::vector<CrowdLight> saved;
+  from(saved);
+  const auto here = std::exchange(crowds_, {});
+  for (const auto& light : saved) {
+    const auto known = std::ranges::find(here, light.key, &Crowd::key);
+    crowds_.push_back({light, known != here.end() ? known->lamps : nullptr});
+    if (!light.isDark() && !crowds_.back().lamps) return false;
+  }
+  return from.ok();
+}
+
 bool LinkedSolver::restore(ArchiveReader& from) {
   std::uint32_t kind = 0;
   std::uint64_t values = 0;
   from(kind, values);
   if (!from.ok() || kind != kKind || values != system_.leafAreas().size()) return false;
   visit(from, *this);
+  if (!restoreCrowds(from)) return false;
   if (!(aim_ > 0.0 && aim_ <= 1.0) || !planner_.fits() || !system_.restore(from)) return false;
   planner_.setTarget(aim_);
   rounds_before_edit_ = rounds_;
@@ -114,7 +132,8 @@ bool LinkedSolver::restore(ArchiveReader& from) {
   const auto& shooters = system_.shooters();
   const auto known = [&](const Shooter& shooter) {
     return (shooter.light == scene::kNone || shooter.light < lights_.size()) &&
-           (shooter.source == scene::kNone || shooter.source < sources_.size());
+           (shooter.source == scene::kNone || shooter.source < sources_.size()) &&
+           (shooter.crowd == scene::kNone || shooter.crowd < crowds_.size());
   };
   const auto exists = [&](const Measurement& want) { return want.shooter < shooters.size() && want.half < 2; };
   if (half_[0].size() != values || half_[1].size() != values || shaded_[0].size() != shading_.size() ||

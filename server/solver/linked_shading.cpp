@@ -12,6 +12,8 @@ namespace {
 
 /// A node shines from so many of its leaves.
 constexpr std::uint32_t kNodeLeaves = 16;
+/// A crowd from so many of its lamps.
+constexpr std::uint32_t kCrowdLamps = 64;
 /// What leaves lack is known so badly that a larger factor would be one of noise.
 constexpr float kMostFactor = 4.0F;
 
@@ -31,6 +33,18 @@ ShadingEmitter emitterOf(const PunctualLights::Source& source) {
                  : source.kind == Kind::kSky ? ShadingEmitter::Kind::kSky
                                              : ShadingEmitter::Kind::kDirection;
   emitter.at = glm::dvec3(is_point ? source.position : source.direction);
+  return emitter;
+}
+
+/// Some of its lamps, evenly by what they send. Of one without lamps, which is dark, nothing is asked.
+ShadingEmitter emitterOf(const Crowd& crowd) {
+  ShadingEmitter emitter;
+  emitter.kind = ShadingEmitter::Kind::kPatches;
+  for (std::uint32_t k = 0; crowd.lamps && k < kCrowdLamps; ++k) {
+    double u = (k + 0.5) / kCrowdLamps;
+    const auto& lamp = crowd.lamps->lights()[crowd.lamps->byFlux(u)];
+    emitter.patches.push_back({glm::dvec3(lamp.ball()), glm::dvec3(lamp.normal), crowd.area / kCrowdLamps});
+  }
   return emitter;
 }
 
@@ -65,6 +79,7 @@ ShadingEmitter LinkedSolver::emitterOf(const NodePlace& node) const {
 ShadingEmitter LinkedSolver::emitterOf(const Shooter& shooter) const {
   if (shooter.light != scene::kNone) return solver::emitterOf(lights_[shooter.light]);
   if (shooter.source != scene::kNone) return solver::emitterOf(sources_[shooter.source]);
+  if (shooter.crowd != scene::kNone) return solver::emitterOf(crowds_[shooter.crowd]);
   return emitterOf(shooter.place);
 }
 

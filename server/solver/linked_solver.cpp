@@ -94,10 +94,16 @@ void LinkedSolver::takeMaterials(const scene::PatchMaterials& materials) {
 /// Measures the next part of the wave: short, so that an edit, a pause or the end of the server need not wait for all.
 /// Where the cuts lie, which depends on time, changes no bit.
 Result<void> LinkedSolver::measureSlice() {
-  const auto isSource = [&](const Measurement& want) {
-    return system_.shooters()[want.shooter].source != scene::kNone;
-  };
-  if (isSource(wanted_[measured_])) return measureSource(wanted_[measured_++]);
+  const auto isSource = [&](const Measurement& want) { return system_.shooters()[want.shooter].sample_cost > 0.0; };
+  if (isSource(wanted_[measured_])) {
+    const auto& want = wanted_[measured_];
+    if (system_.shooters()[want.shooter].crowd != scene::kNone) {
+      if (measureCrowd(want)) ++measured_;
+      return {};
+    }
+    ++measured_;
+    return measureSource(want);
+  }
   const auto start = std::chrono::steady_clock::now();
   auto slice = std::span(wanted_).subspan(measured_, std::min(slice_, wanted_.size() - measured_));
   slice = slice.first(static_cast<std::size_t>(std::find_if(slice.begin(), slice.end(), isSource) - slice.begin()));

@@ -14,6 +14,7 @@
 
 #include "common/result.h"
 #include "server/solver/change_reach.h"
+#include "server/solver/crowd.h"
 #include "server/solver/field_error.h"
 #include "server/solver/leaf_gather.h"
 #include "server/solver/leaf_shading.h"
@@ -212,6 +213,11 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] bool forgetWeakest();
   [[nodiscard]] Result<void> measureSlice();
   [[nodiscard]] Result<void> measureSource(const Measurement& want);
+  [[nodiscard]] bool measureCrowd(const Measurement& want);
+  void takeCrowds(const std::vector<Crowd>& crowds);
+  void addCrowd(const Crowd& crowd);
+  [[nodiscard]] bool restoreCrowds(ArchiveReader& from);
+  [[nodiscard]] std::size_t lampCount() const;
   void takeSources(const LightSources& sources);
   void addSource(const PunctualLights::Source& source);
   [[nodiscard]] std::array<double, 3> skyFlux() const;
@@ -316,7 +322,9 @@ class LinkedSolver final : public Solver {
   Transport& transport_;
   SolverSettings settings_;
   std::vector<Side> sides_;
-  std::vector<LightPolygon> lights_;  // those switched off stay, dark: their links are still good
+  std::vector<LightPolygon> lights_;           // those switched off stay, dark: their links are still good
+  std::vector<Crowd> crowds_;                  // likewise
+  std::unique_ptr<CrowdSample> crowd_sample_;  // of the measurement under way; null: it has not begun
   PunctualLights punctual_;
   std::vector<PunctualLights::Source> sources_;  // those switched off stay, dark
   std::vector<PunctualLights::Source> sky_;      // its hemispheres, where rays bring their light

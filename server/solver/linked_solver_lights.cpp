@@ -13,15 +13,17 @@ namespace {
 
 /// So many lights that were moved away or switched off keep their links.
 constexpr std::ptrdiff_t kDarkSources = 8;
+/// So many times that of a node are the images of a light without extent (a sky has most).
+constexpr double kSourceCost = 60.0;
 
 }  // namespace
 
 /// Every light polygon that ever was is a shooter; its radiosity is what it emits now.
 void LinkedSolver::takeLights() {
   for (auto& light : lights_) light.emission = glm::vec3(0.0F);
-  for (const auto& light : findLightPolygons(*patches_, sides_, system_.emission())) {
-    const auto known =
-        std::find_if(lights_.begin(), lights_.end(), [&](const LightPolygon& old) { return old.key == light.key; });
+  const auto [lights, crowds] = divideLights(findLightPolygons(*patches_, sides_, system_.emission()));
+  for (const auto& light : lights) {
+    const auto known = std::ranges::find(lights_, light.key, &LightPolygon::key);
     if (known != lights_.end()) {
       known->emission = light.emission;
       continue;
@@ -33,9 +35,67 @@ void LinkedSolver::takeLights() {
     lights_.push_back(light);
     (void)system_.add(shooter);
   }
+  takeCrowds(crowds);
   for (auto& shooter : system_.shooters()) {
     if (shooter.light != scene::kNone) shooter.sent.fill(lights_[shooter.light].emission);
+    if (shooter.crowd != scene::kNone) shooter.sent.fill(crowds_[shooter.crowd].emission);
   }
+}
+
+/// Those that were there before keep their links, whatever their emission is now.
+void LinkedSolver::takeCrowds(const std::vector<Crowd>& crowds) {
+  for (auto& crowd : crowds_) crowd.emission = glm::vec3(0.0F);
+  for (const auto& crowd : crowds) {
+    const auto known =
+        std::ranges::find_if(crowds_, [&](const Crowd& old) { return old.key == crowd.key && old.isDark(); });
+    if (known == crowds_.end()) {
+      addCrowd(crowd);
+    } else {
+      *known = crowd;
+    }
+  }
+}
+
+/// In the place of one that is dark, once there are some.
+void LinkedSolver::addCrowd(const Crowd& crowd) {
+  auto& shooters = system_.shooters();
+  if (std::ranges::count_if(crowds_, &Crowd::isDark) >= kDarkSources) {
+    const auto old = std::ranges::find_if(crowds_, &Crowd::isDark);
+    const auto index = static_cast<std::uint32_t>(old - crowds_.begin());
+    const auto shooter = std::ranges::find(shooters, index, &Shooter::crowd);
+    system_.forget(static_cast<std::uint32_t>(shooter - shooters.begin()));
+    shooter->area = crowd.area;
+    *old = crowd;
+    return;
+  }
+  Shooter shooter;
+  shooter.crowd = static_cast<std::uint32_t>(crowds_.size());
+  shooter.area = crowd.area;
+  shooter.most_bytes = memory_.mostBytes();
+  shooter.sample_cost = CrowdSample::cost(system_.leafAreas().size()) / shotCost();
+  crowds_.push_back(crowd);
+  (void)system_.add(shooter);
+}
+
+std::size_t LinkedSolver::lampCount() const {
+  std::size_t count = lights_.size() + sources_.size();
+  for (const auto& crowd : crowds_) count += crowd.lamps ? crowd.lamps->lights().size() : 0;
+  return count;
+}
+
+/// False: there is more to do.
+bool LinkedSolver::measureCrowd(const Measurement& want) {
+  const auto& crowd = crowds_[system_.shooters()[want.shooter].crowd];
+  if (!crowd_sample_ || !crowd_sample_->isOf(crowd, want.half, want.index))
+    crowd_sample_ =
+        std::make_unique<CrowdSample>(*patches_, sides_, *leafRays(), settings_.seed, crowd, want.half, want.index);
+  if (!crowd_sample_->advance(kSliceSeconds)) return false;
+  counters_.gather_shots += 1;
+  counters_.gather_points += CrowdSample::kDraws;
+  const auto links = std::exchange(crowd_sample_, nullptr)->links();
+  expander_.expand(links);
+  system_.addSample(want.shooter, want.half, expander_, links, want.points);
+  return true;
 }
 
 std::size_t LinkedSolver::lightBytes() const {
@@ -92,6 +152,7 @@ void LinkedSolver::addSource(const PunctualLights::Source& source) {
   Shooter shooter;
   shooter.source = static_cast<std::uint32_t>(sources_.size());
   shooter.area = source.flux_per_intensity;
+  shooter.sample_cost = kSourceCost;
   shooter.most_bytes = memory_.mostBytes();
   sources_.push_back(source);
   (void)system_.add(shooter);

@@ -28,7 +28,7 @@ constexpr double kLeastByLinks = 0.5;
 bool LinkedSolver::wantsVariation() const {
   if (variation_ || growing_ || !settings_.within_leaves || error_.total > std::max(kSoon * aim_, kLittle))
     return false;
-  if (lights_.size() + sources_.size() > kMostLights) return false;
+  if (lampCount() > kMostLights) return false;
   // There rays find most lamps, too, and where something cuts a leaf they know what varies.
   return patches_->opacity.empty();
 }
@@ -46,7 +46,7 @@ void LinkedSolver::assessStep() {
 
 /// For the light that leaves have now.
 void LinkedSolver::updateVariation() {
-  if (lights_.size() + sources_.size() > kMostLights) {  // an edit lit them
+  if (lampCount() > kMostLights) {  // an edit lit them
     variation_.reset();
     return next_variation_.reset();
   }

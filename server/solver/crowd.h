@@ -1,0 +1,80 @@
+// Lamps that are too many for each to be a shooter: every leaf draws a few of them at a time (LightTree), and what all
+// of them bring to it is known in the mean, as the links of one shooter. Plain values; one thread outside of measure().
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "server/solver/leaf_rays.h"
+#include "server/solver/light_tree.h"
+#include "server/solver/lights.h"
+#include "server/solver/side.h"
+#include "server/solver/transport.h"
+
+namespace radiosity::solver {
+
+/// What a crowd sends.
+struct CrowdLight {
+  std::uint64_t key = 0;     ///< of its lamps and of the ratios of their strengths
+  glm::vec3 emission{0.0F};  ///< exitance of a lamp of strength 1, lm/m^2; 0: all are dark
+  double area = 0.0;         ///< sum of strengths times areas, unit box squared
+
+  [[nodiscard]] bool isDark() const { return emission == glm::vec3(0.0F); }
+};
+
+/// Lamps of one colour, whose strengths differ, or what many lamps emit in one channel.
+struct Crowd : CrowdLight {
+  std::shared_ptr<const LightTree> lamps;  ///< null: it has been dark since before the solver was restored
+};
+
+/// Which lamps are worth being shooters, in the order of `lights`, and the crowds of all others. Where there are few,
+/// all are. O(n log n).
+struct DividedLights {
+  std::vector<LightPolygon> shooters;
+  std::vector<Crowd> crowds;
+};
+[[nodiscard]] DividedLights divideLights(std::vector<LightPolygon> lights);
+
+/// A sample of the links of a crowd, taken in slices: what arrives at every leaf for an emission of 1.
+class CrowdSample {
+ public:
+  /// Lamps that a leaf draws for it, all from one place.
+  static constexpr std::uint32_t kDraws = geometry::kPacket;
+
+  /// Of a half, and which of its samples: together they are spread evenly. All are to outlive it.
+  CrowdSample(const scene::PatchScene& patches, const std::vector<Side>& sides, const LeafRays& rays,
+              std::uint64_t seed, Crowd crowd, std::size_t half, std::uint32_t index);
+
+  [[nodiscard]] bool isOf(const Crowd& crowd, std::size_t half, std::uint32_t index) const {
+    return crowd_.key == crowd.key && half_ == half && index_ == index;
+  }
+  /// Goes on for about `seconds`, on all cores. True: it is done. Where the cuts lie changes no bit.
+  [[nodiscard]] bool advance(double seconds);
+  /// When it is done; some thousand rays more.
+  [[nodiscard]] LinkSample links() const;
+
+  /// What all of it takes, in microseconds of one core; only ratios count.
+  [[nodiscard]] static double cost(std::size_t leaves) { return 1.0 * kDraws * static_cast<double>(leaves); }
+
+ private:
+  class Receiver;
+  [[nodiscard]] float arriving(std::uint32_t value) const;
+  void findLost(LinkSample& links) const;
+
+  const scene::PatchScene& patches_;
+  const std::vector<Side>& sides_;
+  const LeafRays& rays_;
+  Crowd crowd_;
+  std::size_t half_;
+  std::uint32_t index_;
+  std::uint64_t key_;
+  std::vector<float> values_;  ///< by leaf value
+  std::size_t done_ = 0;       ///< of these
+};
+
+}  // namespace radiosity::solver

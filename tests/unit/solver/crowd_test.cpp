@@ -1,0 +1,266 @@
+// Lamps too many to be shooters, against what one large lamp in their place brings, whose form factor is exact.
+#include "server/solver/crowd.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "server/solver/linked_solver.h"
+#include "server/solver/polygon_form_factor.h"
+#include "server/solver/sampling.h"
+#include "tests/unit/solver/quad_scene.h"
+#include "tests/unit/solver/solve.h"
+
+namespace radiosity::solver {
+namespace {
+
+using test::solve;
+
+constexpr float kFloor = -0.4F, kCeiling = 0.4F, kHalf = 0.2F;
+constexpr std::uint32_t kLeaves = 20, kTiles = 18;
+
+/// kTiles by kTiles lamps that make a square of side 2 kHalf, facing down.
+std::vector<test::Quad> tiles(const glm::vec3& emission) {
+  std::vector<test::Quad> quads;
+  constexpr float kSide = 2.0F * kHalf / kTiles;
+  for (std::uint32_t i = 0; i < kTiles * kTiles; ++i) {
+    const glm::vec3 corner(-kHalf + kSide * static_cast<float>(i % kTiles), kCeiling,
+                           -kHalf + kSide * static_cast<float>(i / kTiles));
+    test::Quad tile{corner, {kSide, 0.0F, 0.0F}, {0.0F, 0.0F, kSide}};
+    tile.width = tile.height = 1;
+    tile.emission = emission;
+    quads.push_back(tile);
+  }
+  return quads;
+}
+
+class CrowdTest : public testing::Test {
+ protected:
+  /// A floor of leaves 0.04 wide below them, and maybe a screen half way up from x = 0 on to one side.
+  void make(const std::vector<test::Quad>& lamps, bool has_screen = false) {
+    std::vector<test::Quad> quads{{{-0.4F, kFloor, -0.4F}, {0.0F, 0.0F, 0.8F}, {0.8F, 0.0F, 0.0F}}};
+    quads[0].width = quads[0].height = kLeaves;
+    quads.insert(quads.end(), lamps.begin(), lamps.end());
+    if (has_screen) quads.push_back({{0.0F, 0.0F, -0.49F}, {0.0F, 0.0F, 0.98F}, {0.49F, 0.0F, 0.0F}});
+    scene_ = test::makeQuadScene(quads);
+    sides_ = makeSides(*scene_.patches);
+    rays_.emplace(*scene_.patches, sides_);
+    divided_ = divideLights(findLightPolygons(*scene_.patches, sides_, scene_.materials.emission));
+  }
+  /// Of the leaves of the floor, from all samples of both halves.
+  [[nodiscard]] std::vector<double> arriving(const Crowd& crowd, std::uint32_t samples, LinkSample* last = nullptr) {
+    std::vector<double> mean(kLeaves * kLeaves, 0.0);
+    for (std::uint32_t k = 0; k < 2 * samples; ++k) {
+      CrowdSample sample(*scene_.patches, sides_, *rays_, 1, crowd, k % 2, k / 2);
+      while (!sample.advance(0.0)) continue;
+      const auto links = sample.links();
+      EXPECT_EQ(links.runs.front().first_node, 0U);
+      for (std::size_t leaf = 0; leaf < mean.size(); ++leaf)
+        mean[leaf] += static_cast<double>(links.irradiance[leaf]) / (2.0 * samples);
+      if (last != nullptr) *last = links;
+    }
+    return mean;
+  }
+  /// Mean over the leaf of the form factor of what the screen leaves of the square: as seen from x its edge is at -x
+  /// there, and what is farther in is hidden.
+  [[nodiscard]] double expected(std::uint32_t leaf, bool has_screen) const {
+    constexpr std::uint32_t kPlaces = 1024;
+    double sum = 0.0;
+    for (std::uint32_t i = 0; i < kPlaces; ++i) {
+      const auto at = sobol4(i, 5);
+      const auto place = rays_->placeOn(leaf, {at.x, at.y});
+      const auto edge = static_cast<float>(-place.position.x);
+      const float high = has_screen ? glm::clamp(edge, -kHalf, kHalf) : kHalf;
+      if (high + kHalf < 1e-6F) continue;
+      const std::array<glm::vec3, 4> corners{glm::vec3(-kHalf, kCeiling, -kHalf),
+                                             {high, kCeiling, -kHalf},
+                                             {high, kCeiling, kHalf},
+                                             {-kHalf, kCeiling, kHalf}};
+      sum += polygonFormFactor(place.position, place.normal, corners);
+    }
+    return sum / kPlaces;
+  }
+  void expectLight(bool has_screen, std::span<const double> light) {
+    double square = 0.0, error = 0.0, sum = 0.0, all = 0.0;
+    for (std::uint32_t leaf = 0; leaf < light.size(); ++leaf) {
+      const double truth = expected(leaf, has_screen);
+      square += truth * truth;
+      error += (light[leaf] - truth) * (light[leaf] - truth);
+      sum += light[leaf];
+      all += truth;
+    }
+    EXPECT_NEAR(sum / all, 1.0, 0.002);           // 400 leaves of 1,024 draws each
+    EXPECT_LT(std::sqrt(error / square), 0.015);  // one draw errs by 0.3 or so where nothing hides it, in steps of 1/18
+  }
+
+  test::QuadScene scene_;
+  std::vector<Side> sides_;
+  std::optional<LeafRays> rays_;
+  DividedLights divided_;
+};
+
+TEST_F(CrowdTest, FewLampsAreShootersAndSoAreStrongOnes) {
+  auto few = tiles(glm::vec3(1.0F));
+  few.resize(200);
+  make(few);
+  EXPECT_EQ(divided_.shooters.size(), 200U);
+  EXPECT_TRUE(divided_.crowds.empty());
+  auto lamps = tiles(glm::vec3(1.0F));
+  lamps[40].emission = glm::vec3(50.0F);
+  make(lamps);
+  ASSERT_EQ(divided_.shooters.size(), 1U);
+  EXPECT_EQ(divided_.shooters[0].emission, glm::vec3(50.0F));
+  ASSERT_EQ(divided_.crowds.size(), 1U);
+  EXPECT_EQ(divided_.crowds[0].lamps->lights().size(), lamps.size() - 1);
+  EXPECT_NEAR(divided_.crowds[0].area, 4.0 * kHalf * kHalf * 323.0 / 324.0, 1e-6);
+}
+
+TEST_F(CrowdTest, BringsWhatOneLampInItsPlaceBrings) {
+  make(tiles(glm::vec3(3.0F)));
+  ASSERT_EQ(divided_.crowds.size(), 1U);
+  EXPECT_EQ(divided_.crowds[0].emission, glm::vec3(3.0F));
+  LinkSample links;
+  expectLight(false, arriving(divided_.crowds[0], 64, &links));
+  // What does not fall on the floor leaves the scene, or falls on no lit side.
+  EXPECT_NEAR((links.delivered + links.escaped + links.absorbed) / divided_.crowds[0].area, 1.0, 0.02);
+  EXPECT_EQ(links.due, 0.0);
+}
+
+TEST_F(CrowdTest, AScreenHidesOfItWhatItHidesOfOneLamp) {
+  make(tiles(glm::vec3(1.0F)), true);
+  const auto light = arriving(divided_.crowds.at(0), 64);
+  expectLight(true, light);
+  // A leaf at x sees of the lamps what lies below -x: from x = 0.2 on nothing.
+  for (std::uint32_t leaf = 0; leaf < light.size(); ++leaf) {
+    const auto place = rays_->placeOn(leaf, {0.5, 0.5});
+    if (place.position.x > 0.2 + 0.04) {
+      EXPECT_EQ(light[leaf], 0.0) << leaf;
+    }
+  }
+}
+
+TEST_F(CrowdTest, ColoursAreThatOfEachLamp) {
+  auto lamps = tiles(glm::vec3(0.0F));
+  for (std::size_t i = 0; i < lamps.size(); ++i) {
+    lamps[i].emission.x = 1.0F;
+    lamps[i].emission.z = lamps[i].origin.x < -1e-3F ? 2.0F : 0.0F;  // half of them
+  }
+  make(lamps);
+  ASSERT_EQ(divided_.crowds.size(), 2U);
+  EXPECT_EQ(divided_.crowds[0].emission, glm::vec3(1.0F, 0.0F, 0.0F));
+  EXPECT_EQ(divided_.crowds[1].emission, glm::vec3(0.0F, 0.0F, 2.0F));
+  EXPECT_EQ(divided_.crowds[0].lamps->lights().size(), 324U);
+  EXPECT_EQ(divided_.crowds[1].lamps->lights().size(), 162U);
+  EXPECT_NEAR(divided_.crowds[1].area, 0.5 * divided_.crowds[0].area, 1e-6);
+}
+
+TEST_F(CrowdTest, NearLampsBringNoMoreThanTheyEmit) {
+  // Leaves a tenth of a tile below the lamps: points of these would bring up to 100 / pi, directions bring 1 at most.
+  auto lamps = tiles(glm::vec3(1.0F));
+  const float gap = 0.1F * lamps[0].du.x;
+  make(lamps);
+  std::vector<test::Quad> quads{{{-0.1F, kCeiling - gap, -0.1F}, {0.0F, 0.0F, 0.2F}, {0.2F, 0.0F, 0.0F}}};
+  quads[0].width = quads[0].height = kLeaves;
+  quads.insert(quads.end(), lamps.begin(), lamps.end());
+  scene_ = test::makeQuadScene(quads);
+  sides_ = makeSides(*scene_.patches);
+  rays_.emplace(*scene_.patches, sides_);
+  divided_ = divideLights(findLightPolygons(*scene_.patches, sides_, scene_.materials.emission));
+  const auto light = arriving(divided_.crowds.at(0), 64);
+  EXPECT_NEAR(std::reduce(light.begin(), light.end()) / static_cast<double>(light.size()), 0.9997, 0.01);
+  EXPECT_LT(std::ranges::max(light), 1.2);
+}
+
+class CrowdSolve : public testing::Test {
+ protected:
+  CrowdSolve() : quads_(test::cubeQuads(8, test::kDark, test::kGrey)) {
+    for (const auto& tile : tiles(glm::vec3(10.0F))) quads_.push_back(tile);
+    settings_.target_error = 0.02;
+    take();
+  }
+  void take() {
+    made_ = test::makeQuadScene(quads_);
+    EXPECT_TRUE(transport_.setScene(made_.patches));
+  }
+  [[nodiscard]] std::unique_ptr<LinkedSolver> make() {
+    return std::make_unique<LinkedSolver>(made_.patches, made_.materials, transport_, settings_);
+  }
+  [[nodiscard]] double meanOf(const LinkedSolver& solver) const {
+    double sum = 0.0, area = 0.0;
+    const auto light = solver.irradiance();
+    for (const auto& side : makeSides(*made_.patches)) {
+      for (auto node = side.first_node; node < side.first_node + side.leaf_count && side.surface < 6; ++node) {
+        sum += static_cast<double>(light[node].x * made_.patches->node_area[node]);
+        area += static_cast<double>(made_.patches->node_area[node]);
+      }
+    }
+    return sum / area;
+  }
+
+  std::vector<test::Quad> quads_;
+  test::QuadScene made_;
+  SolverSettings settings_;
+  test::RayTransport transport_{64};
+};
+
+TEST_F(CrowdSolve, EndsWhereOneLampInItsPlaceDoes) {
+  const auto many = make();
+  solve(*many);
+  const double light = meanOf(*many);
+  const auto energy = many->energy();
+  EXPECT_NEAR(energy.imbalance[0] / energy.emitted[0], 0.0, 1e-3);
+  EXPECT_LT(many->shots(), 400U);  // not the thousands of shots of so many shooters
+  quads_.resize(6);
+  quads_.push_back({{-kHalf, kCeiling, -kHalf}, {2.0F * kHalf, 0.0F, 0.0F}, {0.0F, 0.0F, 2.0F * kHalf}});
+  quads_.back().emission = glm::vec3(10.0F);
+  take();
+  const auto one = make();
+  solve(*one);
+  EXPECT_NEAR(light / meanOf(*one), 1.0, 0.02);
+}
+
+TEST_F(CrowdSolve, EditsOfItsLightAndBackGiveTheSameBitsOfDirectLight) {
+  const auto solver = make();
+  solve(*solver);
+  const auto before = solver->directIrradiance();
+  const auto samples = solver->linkCounters().samples;
+  auto dimmed = quads_;
+  for (auto& quad : dimmed) quad.emission *= 0.5F;
+  solver->setMaterials(test::makeQuadScene(dimmed).materials);  // the same crowd
+  solve(*solver);
+  EXPECT_EQ(solver->linkCounters().samples, samples);
+  EXPECT_NEAR(static_cast<double>(solver->directIrradiance()[3].x / before[3].x), 0.5, 1e-5);
+  dimmed.back().emission = glm::vec3(4.0F);  // another
+  solver->setMaterials(test::makeQuadScene(dimmed).materials);
+  solve(*solver);
+  EXPECT_GT(solver->linkCounters().samples, samples);
+  solver->setMaterials(made_.materials);
+  solve(*solver);
+  EXPECT_EQ(solver->directIrradiance(), before);
+}
+
+TEST_F(CrowdSolve, GoesOnFromBytesWhereverItWas) {
+  const auto whole = make();
+  solve(*whole);
+  auto interrupted = make();
+  int times = 0;
+  for (int i = 0; i < 100'000; ++i) {
+    const auto outcome = interrupted->step();
+    ASSERT_TRUE(outcome);
+    if (*outcome == StepOutcome::kConverged) break;
+    ArchiveWriter to(std::size_t{64} << 20U);
+    if (i % 2 != 0 || !interrupted->save(to)) continue;
+    auto next = make();
+    ArchiveReader from(to.bytes());
+    ASSERT_TRUE(next->restore(from));
+    interrupted = std::move(next);
+    ++times;
+  }
+  EXPECT_GT(times, 2);
+  EXPECT_EQ(interrupted->irradiance(), whole->irradiance());
+}
+
+}  // namespace
+}  // namespace radiosity::solver
