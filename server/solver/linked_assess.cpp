@@ -26,6 +26,7 @@ constexpr double kMostKept = 0.99999;
 
 void LinkedSolver::assess() {
   if (isRepairing()) return;  // nothing is known before all links are true
+  if (shown_) return;         // it says what it said
   if (from_links_ == FromLinks::kAfterEdit) {
     if (gather_ && gather_->raysBehind() > kRaysAtOnce) return;  // nor is it now: steps trace rays in slices
     // Somebody wants to know before the next step.

@@ -23,8 +23,7 @@ std::vector<glm::vec3> LinkedSolver::irradiance() const {
       values[side.first_node + leaf] = lightOf(side.first_value + leaf);
   }
   addShaded(shaded_, kBothHalves, values);
-  if (!variation_) return values;
-  for (const auto& [value, lacks] : variation_->corrections()) {
+  for (const auto& [value, lacks] : corrections()) {
     auto& light = values[nodeOf(value)];
     const auto more = shadedCorrection(value, 0.5F * (lacks[0] + lacks[1]));
     light = glm::max(light + more, glm::vec3(0.0F));  // by noise it might be less
@@ -43,8 +42,7 @@ std::vector<glm::vec3> LinkedSolver::halfIrradiance(std::uint32_t half) const {
   for (const auto& side : sides_)
     std::copy_n(half_[half].begin() + side.first_value, side.leaf_count, values.begin() + side.first_node);
   addShaded(shaded_, half, values);
-  if (!variation_) return values;
-  for (const auto& correction : variation_->corrections())
+  for (const auto& correction : corrections())
     values[nodeOf(correction.value)] += shadedCorrection(correction.value, correction.lacks[half]);
   return values;
 }

@@ -9,7 +9,7 @@
 namespace radiosity::solver {
 namespace {
 
-constexpr std::uint32_t kKind = 0x374b4e4cU;  // "LNK7": what there is below, and in which order
+constexpr std::uint32_t kKind = 0x384b4e4cU;  // "LNK8": what there is below, and in which order
 
 /// All of a shooter but its links.
 template <typename Archive, typename Self>
@@ -97,6 +97,8 @@ bool LinkedSolver::save(ArchiveWriter& to) const {
   to(kKind, static_cast<std::uint64_t>(system_.leafAreas().size()));
   visit(to, *this);
   to(std::vector<CrowdLight>(crowds_.begin(), crowds_.end()));
+  to(shown_ != nullptr);
+  if (shown_) to(shown_->corrections);
   system_.save(to);
   to(gather_ != nullptr);
   if (gather_) gather_->save(to);
@@ -118,6 +120,23 @@ bool LinkedSolver::restoreCrowds(ArchiveReader& from) {
   return from.ok();
 }
 
+/// What was told was an end that had come before: its halves are those that were saved.
+bool LinkedSolver::restoreShown(ArchiveReader& from) {
+  bool shows = false;
+  from(shows);
+  shown_ = nullptr;
+  if (!shows) return from.ok();
+  auto end = std::make_shared<KeptEnd>();
+  from(end->corrections);
+  end->key = lightKey();
+  end->half = half_;
+  end->shaded = shaded_;
+  end->error = error_;
+  shown_ = std::move(end);
+  const auto leaves = system_.leafAreas().size();
+  return from.ok() && std::ranges::all_of(shown_->corrections, [&](const auto& c) { return c.value < leaves; });
+}
+
 bool LinkedSolver::restore(ArchiveReader& from) {
   std::uint32_t kind = 0;
   std::uint64_t values = 0;
@@ -125,6 +144,7 @@ bool LinkedSolver::restore(ArchiveReader& from) {
   if (!from.ok() || kind != kKind || values != system_.leafAreas().size()) return false;
   visit(from, *this);
   if (!restoreCrowds(from)) return false;
+  if (!restoreShown(from)) return false;
   if (!(aim_ > 0.0 && aim_ <= 1.0) || !planner_.fits() || !system_.restore(from)) return false;
   planner_.setTarget(aim_);
   rounds_before_edit_ = rounds_;

@@ -117,6 +117,7 @@ void LinkedSolver::solveAnew() {
   refined_ = is_confirmed_ = false;
   edit_lights_planned_ = false;
   error_ = {};  // unknown
+  shown_ = nullptr;
 }
 
 /// All shooters but lights, because the equation alone would take the memory of their links: surfaces that had one
@@ -174,10 +175,11 @@ bool LinkedSolver::finishEdit() {
     from_links_ = FromLinks::kAfterEdit;
     return false;
   }
+  if (takeKeptEnd()) return true;
   const bool lacks_lamp = growing_ && wantsLamp();
   if (error_.total <= settings_.target_error && !lacks_lamp) {
     wanted_.clear();
-    phase_ = Phase::kDone;
+    endHere();
   } else if (!growing_) {
     ++rounds_;
     (void)chooseFurther();

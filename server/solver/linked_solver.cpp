@@ -34,6 +34,9 @@ constexpr std::size_t kFewestMeasurements = 8;
 /// for less.
 constexpr double kFirstAim = 0.02, kAimStep = 2.0;
 
+/// What solves ended with for other light takes so much at most, or a sixteenth of what links may.
+constexpr std::size_t kMostEndBytes = std::size_t{64} << 20U;
+
 PunctualSettings punctualSettings(const SolverSettings& settings) {
   PunctualSettings punctual;
   punctual.seed = settings.seed;
@@ -54,7 +57,8 @@ LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, Tra
       expander_(*patches_, sides_),
       memory_(*patches_, sides_, settings.link_memory),
       unshot_(*patches_),
-      planner_(*patches_, sides_, shots_, settings_.planner, settings_.seed) {
+      planner_(*patches_, sides_, shots_, settings_.planner, settings_.seed),
+      ends_(std::min(kMostEndBytes, settings_.link_memory / 16)) {
   slice_ = std::clamp<std::size_t>(kFirstTriangles / std::max<std::size_t>(1, patches_->triangles.size()), 2, 16);
   fewest_a_slice_ = std::min(slice_, kFewestMeasurements);
   aim_ = std::max(settings_.target_error, kFirstAim);
@@ -285,7 +289,7 @@ StepOutcome LinkedSolver::chooseNext() {
   if (error_.total > settings_.target_error) return chooseFurther();
   if (blotched) return StepOutcome::kRoundDone;
   if (is_confirmed) {
-    phase_ = Phase::kDone;
+    endHere();
     return StepOutcome::kConverged;
   }
   from_links_ = FromLinks::kToConfirm;
@@ -309,7 +313,7 @@ StepOutcome LinkedSolver::confirm() {
   from_links_ = FromLinks::kNo;
   assessStep();
   if (error_.total > settings_.target_error) return chooseFurther();
-  phase_ = Phase::kDone;
+  endHere();
   return StepOutcome::kConverged;
 }
 
@@ -348,6 +352,7 @@ StepOutcome LinkedSolver::chooseFurther() {
 
 void LinkedSolver::setTargetError(double target) {
   rounds_before_edit_ = rounds_;
+  shown_ = nullptr;
   settings_.target_error = target;
   aim_ = std::max(aim_, target);
   planner_.setTarget(aim_);

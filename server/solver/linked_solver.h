@@ -16,6 +16,7 @@
 #include "server/solver/change_reach.h"
 #include "server/solver/crowd.h"
 #include "server/solver/field_error.h"
+#include "server/solver/kept_ends.h"
 #include "server/solver/leaf_gather.h"
 #include "server/solver/leaf_shading.h"
 #include "server/solver/leaf_variation.h"
@@ -217,6 +218,7 @@ class LinkedSolver final : public Solver {
   void takeCrowds(const std::vector<Crowd>& crowds);
   void addCrowd(const Crowd& crowd);
   [[nodiscard]] bool restoreCrowds(ArchiveReader& from);
+  [[nodiscard]] bool restoreShown(ArchiveReader& from);
   [[nodiscard]] std::size_t lampCount() const;
   void takeSources(const LightSources& sources);
   void addSource(const PunctualLights::Source& source);
@@ -314,6 +316,10 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] StepOutcome chooseNext();
   [[nodiscard]] StepOutcome exhausted(SolveLimit limit);
   [[nodiscard]] StepOutcome ended() const;
+  [[nodiscard]] std::uint64_t lightKey() const;
+  [[nodiscard]] bool takeKeptEnd();
+  void endHere();
+  [[nodiscard]] std::span<const LeafVariation::Correction> corrections() const;
   [[nodiscard]] StepOutcome confirm();
   [[nodiscard]] StepOutcome chooseFurther();
   void tryNow(const std::function<void()>& work);
@@ -384,6 +390,8 @@ class LinkedSolver final : public Solver {
   double square_ = 0.0;                               // of the light that it was brought up to date with, times area
   double by_links_ = 0.0;                             // sampling error without the noise of that
   ErrorParts error_;
+  KeptEnds ends_;
+  std::shared_ptr<const KeptEnd> shown_;  // what is told is that; null: it is what was solved for last
   TransportCounters counters_;
 };
 

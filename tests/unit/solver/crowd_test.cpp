@@ -221,10 +221,10 @@ TEST_F(CrowdSolve, EndsWhereOneLampInItsPlaceDoes) {
   EXPECT_NEAR(light / meanOf(*one), 1.0, 0.02);
 }
 
-TEST_F(CrowdSolve, EditsOfItsLightAndBackGiveTheSameBitsOfDirectLight) {
+TEST_F(CrowdSolve, EditsOfItsLightAndBackGiveTheSameBits) {
   const auto solver = make();
   solve(*solver);
-  const auto before = solver->directIrradiance();
+  const auto before = solver->directIrradiance(), all = solver->irradiance();
   const auto samples = solver->linkCounters().samples;
   auto dimmed = quads_;
   for (auto& quad : dimmed) quad.emission *= 0.5F;
@@ -239,6 +239,7 @@ TEST_F(CrowdSolve, EditsOfItsLightAndBackGiveTheSameBitsOfDirectLight) {
   solver->setMaterials(made_.materials);
   solve(*solver);
   EXPECT_EQ(solver->directIrradiance(), before);
+  EXPECT_EQ(solver->irradiance(), all);
 }
 
 TEST_F(CrowdSolve, GoesOnFromBytesWhereverItWas) {
