@@ -76,9 +76,9 @@ void LightGatherer::loseByRays(const solver::HemicubeFrame& point, Lost& lost) c
       rays[i] = {from, glm::vec3(solver::cosineDirection(glm::dvec3(point.normal), draw.x, draw.y)), Receivers::kFar};
     }
     receivers_->nearest(rays, solver::mixKeys(key, cast), hits);
-    for (const auto& hit : hits) {
-      escaped += hit.found() ? 0 : 1;
-      absorbed += hit.found() && receivers_->absorbs(hit.triangle, !hit.front) ? 1 : 0;
+    for (std::size_t i = 0; i < hits.size(); ++i) {
+      escaped += hits[i].found() ? 0 : 1;
+      absorbed += hits[i].found() && receivers_->absorbs(rays[i], hits[i]) ? 1 : 0;
     }
     cast += geometry::kPacket;
   }

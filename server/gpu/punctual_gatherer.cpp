@@ -453,7 +453,7 @@ PunctualGatherer::Lost PunctualGatherer::loseByRays(const solver::PointShot& sho
       lost.all += weights[i];
       const double reached = hits[i].found() ? weights[i] * static_cast<double>(rangeFade(shot, hits[i].t)) : 0.0;
       lost.escaped += weights[i] - reached;  // what fades on its way arrives nowhere
-      if (hits[i].found() && receivers_->absorbs(hits[i].triangle, !hits[i].front)) lost.absorbed += reached;
+      if (hits[i].found() && receivers_->absorbs(rays[i], hits[i])) lost.absorbed += reached;
     }
   }
   return lost;
@@ -478,9 +478,9 @@ PunctualGatherer::Lost PunctualGatherer::loseByRays(const solver::ParallelView& 
       rays[i] = {centre + across + 1.1F * radius * view.direction, -view.direction, Receivers::kFar};
     }
     receivers_->nearest(rays, solver::mixKeys(key, first), hits);
-    for (const auto& found : hits) {
-      hit += found.found() ? 1 : 0;
-      absorbed += found.found() && receivers_->absorbs(found.triangle, !found.front) ? 1 : 0;
+    for (std::size_t i = 0; i < hits.size(); ++i) {
+      hit += hits[i].found() ? 1 : 0;
+      absorbed += hits[i].found() && receivers_->absorbs(rays[i], hits[i]) ? 1 : 0;
     }
   }
   const double ray_area = std::numbers::pi * static_cast<double>(radius * radius) / count;

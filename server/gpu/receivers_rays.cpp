@@ -1,4 +1,5 @@
 // What Receivers ask rays.
+#include <algorithm>
 #include <bit>
 #include <glm/geometric.hpp>
 #include <new>
@@ -64,6 +65,34 @@ glm::vec2 Receivers::texelAt(const scene::TriangleFrame& frame, const glm::vec3&
   const double uu = glm::dot(du, du), uv = glm::dot(du, dv), vv = glm::dot(dv, dv);
   const double u = glm::dot(way, du), v = glm::dot(way, dv), under = uu * vv - uv * uv;
   return {(u * vv - v * uv) / under, (v * uu - u * uv) / under};
+}
+
+bool Receivers::absorbs(const geometry::Ray& ray, const geometry::Hit& hit) const {
+  if (absorbs(hit.triangle, !hit.front)) return true;
+  const auto& surface = patches_->surfaces[patches_->triangle_surface[hit.triangle]];
+  const auto first = surface.first_node[hit.front ? 0 : 1];
+  const auto texel = texelAt(patches_->triangles[hit.triangle], ray.origin + hit.t * ray.direction);
+  const auto within = [](float at, std::uint32_t count) {
+    return static_cast<std::uint32_t>(std::clamp(at, 0.0F, static_cast<float>(count - 1)));
+  };
+  const auto x = within(texel.x, surface.width), y = within(texel.y, surface.height);
+  const auto areaOf = [&](std::uint32_t leaf) { return patches_->node_area[first + leaf]; };
+  const auto here = y * surface.width + x;
+  if (areaOf(here) > 0.0F) return false;
+  if (patches_->leaves[surface.first_leaf + here].beneath) return false;  // what covers it is lit
+  const auto lift = (hit.front ? kLift : -kLift) * patches_->triangles[hit.triangle].normal;
+  const auto from = ray.origin + hit.t * ray.direction + lift;
+  for (auto ny = y - std::min(y, 1U); ny < std::min(y + 2, surface.height); ++ny) {
+    for (auto nx = x - std::min(x, 1U); nx < std::min(x + 2, surface.width); ++nx) {
+      const auto beside = ny * surface.width + nx;
+      const auto& leaf = patches_->leaves[surface.first_leaf + beside];
+      if (areaOf(beside) <= 0.0F || leaf.triangle == scene::kNone) continue;
+      const auto& frame = patches_->triangles[leaf.triangle];
+      const auto to = frame.origin + leaf.texel.x * frame.du + leaf.texel.y * frame.dv + lift;
+      if (rays().open({from, to - from, 1.0F})) return false;
+    }
+  }
+  return true;
 }
 
 std::uint64_t Receivers::wayKey(std::uint64_t look, const glm::vec3& from) const {

@@ -43,5 +43,31 @@ TEST(ShadowRays, NoLightGetsIntoAClosedHouseOnWideGround) {
   }
 }
 
+// A box stands on a floor, which has no leaves within it: what shines there ends on the backs of five faces, and on
+// that part of the floor, whose front faces it.
+TEST(ShadowRays, WhatShinesWithinASolidIsAbsorbedThere) {
+  auto made = gpu::makeInProcessTransport(0, std::nullopt, gpu::Sight::kRays);
+  if (!made) GTEST_SKIP() << made.error().text();
+  SceneBuilder builder;
+  (void)builder.add({{-0.5F, 0.0F, -0.5F}, {0, 0, 1}, {1, 0, 0}, 20, 20});
+  (void)builder.addBox({-0.2F, 0.0F, -0.2F}, {0.2F, 0.3F, 0.2F}, 4, false);
+  auto scene = std::make_shared<scene::PatchScene>(*builder.build());
+  for (std::uint32_t y = 6; y < 14; ++y)
+    for (std::uint32_t x = 6; x < 14; ++x) scene->node_area[20 * y + x] = 0.0F;
+  ASSERT_TRUE((*made)->setScene(scene));
+  solver::LightSources sources;
+  sources.lights = {{.kind = scene::LightKind::kPoint, .position = {0.0F, 0.1F, 0.0F}, .intensity = glm::vec3(1.0F)}};
+  solver::PunctualLights lights(*scene, sources, {.seed = 1});
+  auto flux = accumulators(*scene);
+  while (lights.hasSlice(1)) {
+    solver::ShotBatch slice;
+    lights.addSlice(1, slice);
+    slice.flux_scale = kFluxScale;
+    ASSERT_TRUE((*made)->run(slice, flux));
+  }
+  EXPECT_EQ(flux.escaped[0], 0);
+  EXPECT_NEAR(static_cast<double>(flux.backface[0]) / kFluxScale, lights.flux()[0], 1e-6 * lights.flux()[0]);
+}
+
 }  // namespace
 }  // namespace radiosity::test
