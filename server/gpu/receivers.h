@@ -80,8 +80,8 @@ class Receivers {
   [[nodiscard]] bool absorbs(std::uint32_t triangle, bool back) const {
     return absorbs_[triangle][static_cast<std::size_t>(back)];
   }
-  /// Whether what a ray meets only absorbs: such a side, or a part of a lit one that lies in a solid, so that no leaf is
-  /// there, nor beside it with nothing in between.
+  /// Whether what a ray meets only absorbs: such a side, or a part of a lit one that lies in a solid, so that no leaf
+  /// is there, nor beside it with nothing in between.
   [[nodiscard]] bool absorbs(const geometry::Ray& ray, const geometry::Hit& hit) const;
   /// Where a receiver's own pixel does not decide alone: in a gap; on a surface with two sides, of which one may be the
   /// inside of something.
