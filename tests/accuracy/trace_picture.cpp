@@ -1,7 +1,5 @@
 // trace_picture SCENE.glb OUT: the radiance that a camera sees, by path tracing. OUT gets 32-bit floats, little-endian:
 // R, G, B of each pixel in nits, rows from the top; one ray goes through the middle of each pixel.
-#include <embree3/rtcore.h>
-
 #include <CLI/CLI.hpp>
 #include <array>
 #include <cmath>
@@ -18,8 +16,8 @@
 #include <utility>
 #include <vector>
 
-#include "tests/oracle/embree_ray.h"
 #include "tests/oracle/path_tracer.h"
+#include "tests/oracle/ray_scene.h"
 #include "tests/oracle/shading.h"
 #include "tests/oracle/triangle_scene.h"
 
@@ -44,53 +42,23 @@ struct Seen {
 /// What the rays of a picture meet first.
 class FirstHits {
  public:
-  explicit FirstHits(const TriangleScene& scene) : triangles_(scene.triangles) {
-    device_ = rtcNewDevice(nullptr);
-    if (device_ == nullptr) throw std::runtime_error("Embree did not start");
-    scene_ = rtcNewScene(device_);
-    rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_ROBUST);
-    const RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
-    auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                                                 3 * sizeof(float), triangles_.size() * 3));
-    auto* indices = static_cast<unsigned*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                                                   3 * sizeof(unsigned), triangles_.size()));
-    for (std::size_t i = 0; i < 3 * triangles_.size(); ++i) {
-      const auto& corner = triangles_[i / 3].corners[i % 3];
-      for (int axis = 0; axis < 3; ++axis) *vertices++ = static_cast<float>(corner[axis]);
-      *indices++ = static_cast<unsigned>(i);
-    }
-    rtcCommitGeometry(geometry);
-    rtcAttachGeometry(scene_, geometry);
-    rtcReleaseGeometry(geometry);
-    rtcCommitScene(scene_);
-  }
-  ~FirstHits() {
-    rtcReleaseScene(scene_);
-    rtcReleaseDevice(device_);
-  }
-  FirstHits(const FirstHits&) = delete;
-  FirstHits& operator=(const FirstHits&) = delete;
+  explicit FirstHits(const TriangleScene& scene) : triangles_(scene.triangles), rays_(scene.triangles) {}
 
   /// Engines do not draw backs of single-sided triangles: the ray passes.
   [[nodiscard]] std::optional<Seen> along(const glm::dvec3& from, const glm::dvec3& direction) const {
-    auto start = from;
-    for (;;) {
-      RTCIntersectContext context;
-      rtcInitIntersectContext(&context);
-      auto query = embreeRay(start, direction, std::numeric_limits<double>::infinity());
-      rtcIntersect1(scene_, &context, &query);
-      if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
-      const Seen seen{query.hit.primID, query.hit.u, query.hit.v,
-                      glm::dot(direction, triangles_[query.hit.primID].normal) >= 0.0};
-      if (!seen.back || triangles_[seen.triangle].double_sided) return seen;
-      start += direction * (query.ray.tfar * (1.0 + 1e-5) + 1e-6);
-    }
+    const auto is_back = [&](std::uint32_t triangle) {
+      return glm::dot(direction, triangles_[triangle].normal) >= 0.0;
+    };
+    const auto met = rays_.first(
+        rays_.toUnit(from), direction, std::numeric_limits<double>::infinity(),
+        [&](const RayScene::Met& one) { return !is_back(one.triangle) || triangles_[one.triangle].double_sided; });
+    if (!met) return std::nullopt;
+    return Seen{met->triangle, met->u, met->v, is_back(met->triangle)};
   }
 
  private:
   const std::vector<Triangle>& triangles_;
-  RTCDevice device_ = nullptr;
-  RTCScene scene_ = nullptr;
+  RayScene rays_;
 };
 
 /// Directions through the middles of the pixels; +Y is up.

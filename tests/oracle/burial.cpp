@@ -7,7 +7,6 @@
 #include <numbers>
 
 #include "tests/oracle/directions.h"
-#include "tests/oracle/embree_ray.h"
 
 namespace radiosity::oracle {
 namespace {
@@ -30,39 +29,19 @@ bool emits(const Triangle& triangle) { return triangle.emission_lux != glm::dvec
 
 }  // namespace
 
-/// Embree hands the context to the filter; what was met goes behind it.
-struct Burial::Query {
-  RTCIntersectContext context;
-  std::vector<Crossing> crossings;
-};
+Burial::Burial(const RayScene& scene, std::span<const Triangle> triangles) : scene_(scene), triangles_(triangles) {}
 
-Burial::Burial(RTCScene scene, std::span<const Triangle> triangles) : scene_(scene), triangles_(triangles) {}
-
-void Burial::keep(const RTCFilterFunctionNArguments* arguments) {
-  auto& query = *reinterpret_cast<Query*>(arguments->context);
-  for (unsigned i = 0; i < arguments->N; ++i) {
-    if (arguments->valid[i] != -1) continue;
-    arguments->valid[i] = 0;  // goes on to the next
-    query.crossings.push_back({static_cast<double>(RTCRayN_tfar(arguments->ray, arguments->N, i)),
-                               RTCHitN_primID(arguments->hit, arguments->N, i)});
-  }
-}
-
-/// In order, each triangle once: Embree may split one and meet both parts.
+/// In order.
 std::vector<Burial::Crossing> Burial::crossings(const glm::dvec3& from, const glm::dvec3& way, double far) const {
-  Query query{};
-  rtcInitIntersectContext(&query.context);
-  query.context.filter = &Burial::keep;
-  auto ray = embreeRay(from, way, far);
-  rtcIntersect1(scene_, &query.context, &ray);
-  auto& met = query.crossings;
-  std::sort(met.begin(), met.end(), [](const auto& a, const auto& b) {
-    return a.triangle != b.triangle ? a.triangle < b.triangle : a.distance < b.distance;
+  std::vector<Crossing> met;
+  scene_.visit(from, way, far, [&](const RayScene::Met& one) {
+    met.push_back({one.distance, one.triangle});
+    return false;  // goes on to the next
   });
-  met.erase(std::unique(met.begin(), met.end(), [](const auto& a, const auto& b) { return a.triangle == b.triangle; }),
-            met.end());
-  std::sort(met.begin(), met.end(), [](const auto& a, const auto& b) { return a.distance < b.distance; });
-  return std::move(met);
+  std::sort(met.begin(), met.end(), [](const auto& a, const auto& b) {
+    return a.distance != b.distance ? a.distance < b.distance : a.triangle < b.triangle;
+  });
+  return met;
 }
 
 std::vector<Burial::Crossing> Burial::solidCrossings(const glm::dvec3& from, const glm::dvec3& direction) const {

@@ -1,14 +1,13 @@
 // Which points of a surface are no surface that light can reach: those inside another solid, and those under a face
-// that lies in the same plane. Asks Embree for all that a ray meets, not only the first. Immutable; any thread.
+// that lies in the same plane. Asks for all that a ray meets, not only the first. Immutable; any thread.
 #pragma once
-
-#include <embree3/rtcore.h>
 
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <span>
 #include <vector>
 
+#include "tests/oracle/ray_scene.h"
 #include "tests/oracle/triangle_scene.h"
 
 namespace radiosity::oracle {
@@ -22,9 +21,8 @@ enum class Where { kOutside, kUndecidedOutside, kUndecidedInside, kInside };
 
 class Burial {
  public:
-  /// Keeps both. `scene`: one geometry that holds `triangles` in their order, in a box of size 2 about the origin, made
-  /// with RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION.
-  Burial(RTCScene scene, std::span<const Triangle> triangles);
+  /// Keeps both. `scene` is made of `triangles`.
+  Burial(const RayScene& scene, std::span<const Triangle> triangles);
 
   /// Whether the point (of the box) on a surface with that unit normal lies inside a solid. Solids are what opaque
   /// single-sided triangles bound: most rays from inside leave more of them than they enter. That does not suffice for
@@ -45,8 +43,6 @@ class Burial {
     double distance = 0.0;
     std::uint32_t triangle = 0;
   };
-  struct Query;
-  static void keep(const RTCFilterFunctionNArguments* arguments);
   [[nodiscard]] std::vector<Crossing> crossings(const glm::dvec3& from, const glm::dvec3& way, double far) const;
   [[nodiscard]] std::vector<Crossing> solidCrossings(const glm::dvec3& from, const glm::dvec3& direction) const;
   [[nodiscard]] bool isSheet(const Crossing& crossing) const;
@@ -55,7 +51,7 @@ class Burial {
   [[nodiscard]] Where vote(const glm::dvec3& point, const glm::dvec3& normal) const;
   [[nodiscard]] Where alongSurface(const glm::dvec3& point, const glm::dvec3& normal) const;
 
-  RTCScene scene_;
+  const RayScene& scene_;
   std::span<const Triangle> triangles_;
 };
 

@@ -1,7 +1,5 @@
 #include "tests/oracle/path_tracer.h"
 
-#include <embree3/rtcore.h>
-
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -14,7 +12,6 @@
 
 #include "tests/oracle/burial.h"
 #include "tests/oracle/directions.h"
-#include "tests/oracle/embree_ray.h"
 #include "tests/oracle/lamps.h"
 #include "tests/oracle/random.h"
 #include "tests/oracle/ray_scene.h"
@@ -76,7 +73,7 @@ class PathTracer::Scene {
   explicit Scene(const TriangleScene& scene)
       : shading_(scene),
         rays_(triangles()),
-        burial_(rays_.handle(), triangles()),
+        burial_(rays_, triangles()),
         twins_(flippedTwins(triangles())),
         lamps_(scene.lamps),
         sky_upper_(scene.sky_upper),
@@ -153,21 +150,18 @@ class PathTracer::Scene {
   }
 
   [[nodiscard]] std::optional<Hit> trace(const Point& from, const glm::dvec3& direction) const {
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    return trace(from, direction, context);
+    return trace(from, direction, [](const RayScene::Met&) { return true; });
   }
 
-  [[nodiscard]] std::optional<Hit> trace(const Point& from, const glm::dvec3& direction,
-                                         RTCIntersectContext& context) const {
-    auto query = embreeRay(lifted(from), direction, std::numeric_limits<double>::infinity());
-    rtcIntersect1(rays_.handle(), &context, &query);
-    if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
+  /// What it meets first of what `stops` it.
+  template <typename Stops>
+  [[nodiscard]] std::optional<Hit> trace(const Point& from, const glm::dvec3& direction, const Stops& stops) const {
+    const auto met = rays_.first(lifted(from), direction, std::numeric_limits<double>::infinity(), stops);
+    if (!met) return std::nullopt;
     Hit hit;
-    hit.triangle = query.hit.primID;
+    hit.triangle = met->triangle;
     const auto& triangle = triangles()[hit.triangle];
-    const double u = query.hit.u;
-    const double v = query.hit.v;
+    const double u = met->u, v = met->v;
     hit.point.position = triangle.corners[0] * (1.0 - u - v) + triangle.corners[1] * u + triangle.corners[2] * v;
     hit.back = glm::dot(direction, triangle.normal) >= 0.0;
     const bool other_side = hit.back && twins_[hit.triangle] != kNoTriangle;  // met by chance: both lie there
@@ -180,36 +174,16 @@ class PathTracer::Scene {
     return hit;
   }
 
-  /// Embree hands the context to the filter.
-  struct Passing {
-    RTCIntersectContext context;
-    const Scene* scene;
-    std::uint64_t seed;
-  };
-
-  /// What it meets lets the ray through with the probability of its transmittance there. Embree may ask for a triangle
-  /// more than once, in any order: the answer is the triangle's own.
-  static void letThrough(const RTCFilterFunctionNArguments* arguments) {
-    const auto& passing = *reinterpret_cast<const Passing*>(arguments->context);
-    for (unsigned i = 0; i < arguments->N; ++i) {
-      if (arguments->valid[i] != -1) continue;
-      const auto t = RTCHitN_primID(arguments->hit, arguments->N, i);
-      const auto& triangle = passing.scene->triangles()[t];
-      if (!triangle.see_through) continue;
-      const auto u = static_cast<double>(RTCHitN_u(arguments->hit, arguments->N, i));
-      const auto v = static_cast<double>(RTCHitN_v(arguments->hit, arguments->N, i));
-      Random random(Random::seedFrom(passing.seed, t, 0));
-      if (random.uniform() >= passing.scene->shading_.opacity(triangle, u, v)) arguments->valid[i] = 0;
-    }
-  }
-
   /// The nearest surface that stops the ray: each that it meets does so with the probability of its opacity there, also
-  /// where several lie in one place.
+  /// where several lie in one place. They may be asked in any order: the answer is the triangle's own.
   [[nodiscard]] std::optional<Hit> traceThrough(const Point& from, const glm::dvec3& direction, Random& random) const {
-    Passing passing{{}, this, random.next()};
-    rtcInitIntersectContext(&passing.context);
-    passing.context.filter = &Scene::letThrough;
-    return trace(from, direction, passing.context);
+    const auto seed = random.next();
+    return trace(from, direction, [&](const RayScene::Met& met) {
+      const auto& triangle = triangles()[met.triangle];
+      if (!triangle.see_through) return true;
+      Random of_triangle(Random::seedFrom(seed, met.triangle, 0));
+      return of_triangle.uniform() < shading_.opacity(triangle, met.u, met.v);
+    });
   }
 
   [[nodiscard]] double opacityAt(const Triangle& triangle, const glm::dvec3& position) const {

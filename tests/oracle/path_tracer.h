@@ -1,4 +1,4 @@
-// The reference: irradiance by path tracing, with its own visibility (Embree) and its own sampling, accumulated in
+// The reference: irradiance by path tracing, with its own visibility and its own sampling, accumulated in
 // double. Unbiased: paths end by Russian roulette only. Light leaves and arrives at the fronts of single-sided
 // triangles; their backs absorb.
 #pragma once

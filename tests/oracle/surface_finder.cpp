@@ -4,7 +4,6 @@
 #include <glm/geometric.hpp>
 #include <vector>
 
-#include "tests/oracle/embree_ray.h"
 #include "tests/oracle/ray_scene.h"
 
 namespace radiosity::oracle {
@@ -24,47 +23,27 @@ class SurfaceFinder::Impl {
   }
 
   [[nodiscard]] std::optional<SurfaceHit> find(const glm::dvec3& point, const glm::dvec3& normal) const {
-    Query query{};
-    query.self = this;
-    query.normal = normal;
-    rtcInitIntersectContext(&query.context);
-    query.context.filter = &Impl::weigh;
-    auto ray = embreeRay(rays_.toUnit(point) + normal * kReach, -normal, 2.0 * kReach);
-    rtcIntersect1(rays_.handle(), &query.context, &ray);
-    return query.best;
+    std::optional<SurfaceHit> best;
+    double best_distance = 0.0;
+    const auto weigh = [&](const RayScene::Met& met) {
+      const SurfaceHit hit{met.triangle, met.u, met.v, glm::dot(normals_[met.triangle], normal) < 0.0};
+      const double distance = std::abs(met.distance - kReach);
+      if (!best || better(hit, distance, *best, best_distance)) {
+        best = hit;
+        best_distance = distance;
+      }
+      return false;  // goes on to the next
+    };
+    rays_.visit(rays_.toUnit(point) + normal * kReach, -normal, 2.0 * kReach, weigh);
+    return best;
   }
 
  private:
-  /// Embree hands the context to the filter; the best until now goes behind it.
-  struct Query {
-    RTCIntersectContext context;
-    const Impl* self;
-    glm::dvec3 normal;
-    std::optional<SurfaceHit> best;
-    double distance;  ///< of the best from the point
-  };
-
-  static void weigh(const RTCFilterFunctionNArguments* arguments) {
-    auto& query = *reinterpret_cast<Query*>(arguments->context);
-    for (unsigned i = 0; i < arguments->N; ++i) {
-      if (arguments->valid[i] != -1) continue;
-      arguments->valid[i] = 0;  // goes on to the next
-      const auto triangle = RTCHitN_primID(arguments->hit, arguments->N, i);
-      const SurfaceHit hit{triangle, static_cast<double>(RTCHitN_u(arguments->hit, arguments->N, i)),
-                           static_cast<double>(RTCHitN_v(arguments->hit, arguments->N, i)),
-                           glm::dot(query.self->normals_[triangle], query.normal) < 0.0};
-      const double distance = std::abs(static_cast<double>(RTCRayN_tfar(arguments->ray, arguments->N, i)) - kReach);
-      if (!better(hit, distance, query)) continue;
-      query.best = hit;
-      query.distance = distance;
-    }
-  }
-
-  [[nodiscard]] static bool better(const SurfaceHit& hit, double distance, const Query& query) {
-    if (!query.best) return true;
-    if (hit.back != query.best->back) return query.best->back;
-    if (std::abs(distance - query.distance) < kSamePlace) return hit.triangle < query.best->triangle;
-    return distance < query.distance;
+  [[nodiscard]] static bool better(const SurfaceHit& hit, double distance, const SurfaceHit& best,
+                                   double best_distance) {
+    if (hit.back != best.back) return best.back;
+    if (std::abs(distance - best_distance) < kSamePlace) return hit.triangle < best.triangle;
+    return distance < best_distance;
   }
 
   RayScene rays_;
