@@ -24,9 +24,11 @@ constexpr std::size_t kFewLights = 256;
 constexpr double kStrong = 1.0 / 32.0;
 /// Colours that differ by no more than rounding are one.
 constexpr float kSameColour = 1e-5F;
-/// From a distance whose square is less than so many times its area, a lamp is looked at by directions that bring the
-/// same light each: points of it would bring more the nearer they are, without bound.
-constexpr double kNear = 4.0;
+/// Lamps that may bring so much of what they emit are asked one by one, by directions that bring the same light each:
+/// the tree knows too little of what is near, and points would bring more the nearer they are, without bound. Where
+/// these are more than so many, only still nearer ones are.
+constexpr float kNear = 0.02F, kNearest = 1.0F;
+constexpr std::size_t kMostNear = 32;
 /// Ways end so far before a lamp (unit box), as those of LightSight.
 constexpr float kSpare = 2e-6F;
 /// A way that is followed by see() is open if it ends no farther than this before the lamp.
@@ -109,81 +111,94 @@ DividedLights divideLights(std::vector<LightPolygon> lights) {
   return divided;
 }
 
-/// A place on a leaf, and what it looks at.
+/// A place on a leaf, and what it looks at: lamps near by, each, and draws of the others.
 class CrowdSample::Receiver {
  public:
-  Receiver(const LeafRays& rays, const LeafRays::Place& place, bool sees_through, std::uint64_t key)
-      : rays_(rays), place_(place), key_(key), from_(rays.startOf(place)), sees_through_(sees_through) {
-    for (auto* axis : {&points_.x, &points_.y, &points_.z}) axis->resize(kDraws);
-    for (std::uint32_t i = 0; i < kDraws; ++i) aim(i, from_ + glm::vec3(place.normal));  // whatever is not looked at
+  Receiver(const LeafRays& rays, const LeafRays::Place& place, const LightTree& lamps, bool sees_through,
+           std::uint64_t key)
+      : rays_(rays), place_(place), lamps_(lamps), key_(key), from_(rays.startOf(place)), sees_through_(sees_through) {
+    auto near = kNear;
+    while (near <= kNearest && !lamps_.findNear(from_, near, kMostNear, near_)) near *= 2.0F;
+    if (near > kNearest) near_.clear();
+    for (const auto light : near_) lookNear(light);
   }
 
-  /// What the `i`-th of the draws brings, if nothing hides it.
-  void look(std::uint32_t i, const LightTree& lamps, const glm::dvec4& draw) {
-    const auto chosen = lamps.draw(from_, glm::vec3(place_.normal), draw.x);
-    if (chosen.light == scene::kNone) return;
-    const auto& lamp = lamps.lights()[chosen.light];
-    const double weight = lamps.strength(chosen.light) / chosen.chance;
+  /// What one of kDraws draws brings, if nothing hides it.
+  void look(const glm::dvec4& draw) {
+    const auto chosen = lamps_.draw(from_, glm::vec3(place_.normal), draw.x);
+    if (chosen.light == scene::kNone || std::ranges::find(near_, chosen.light) != near_.end()) return;
+    const auto& lamp = lamps_.lights()[chosen.light];
     const glm::dvec3 point(lamp.point(draw.y, draw.z));
     const auto way = point - place_.position;
-    const double square = glm::dot(way, way);
-    if (square < kNear * lamp.area && lookNear(i, lamp, weight)) return;
     const double arrives = glm::dot(place_.normal, way), leaves = -glm::dot(glm::dvec3(lamp.normal), way);
     if (!(arrives > 0.0 && leaves > 0.0)) return;
-    brings_[i] = weight * lamp.area * arrives * leaves / (std::numbers::pi * square * square);
-    aim(i, glm::vec3(point) + kSpare * lamp.normal);
+    const double square = glm::dot(way, way);
+    add(glm::vec3(point) + kSpare * lamp.normal, lamps_.strength(chosen.light) / chosen.chance / kDraws * lamp.area *
+                                                     arrives * leaves / (std::numbers::pi * square * square));
   }
 
-  [[nodiscard]] double arriving() const {
-    std::array<std::int32_t, kDraws> hidden{};
-    if (!sees_through_) rays_.hide(from_, points_, hidden.data());
+  [[nodiscard]] double arriving() {
+    if (sees_through_) return arrivingThrough();
+    const auto count = brings_.size();
+    while (points_.x.size() % geometry::kPacket != 0) aim(from_ + glm::vec3(place_.normal));  // and is not looked at
+    std::vector<std::int32_t> hidden(points_.x.size());
+    rays_.hide(from_, points_, hidden.data());
     double sum = 0.0;
-    for (std::uint32_t i = 0; i < kDraws; ++i) {
-      if (brings_[i] > 0.0 && (sees_through_ ? isOpen(i) : hidden[i] == 0)) sum += brings_[i];
-    }
-    return sum / kDraws;
+    for (std::size_t i = 0; i < count; ++i) sum += hidden[i] == 0 ? brings_[i] : 0.0;
+    return sum;
   }
 
  private:
-  void aim(std::uint32_t i, const glm::vec3& point) {
-    points_.x[i] = point.x;
-    points_.y[i] = point.y;
-    points_.z[i] = point.z;
+  void aim(const glm::vec3& point) {
+    points_.x.push_back(point.x);
+    points_.y.push_back(point.y);
+    points_.z.push_back(point.z);
+  }
+  void add(const glm::vec3& point, double brings) {
+    aim(point);
+    brings_.push_back(brings);
   }
 
-  /// By a direction. False: the place's plane cuts the lamp, or it is too small to say.
-  bool lookNear(std::uint32_t i, const LightPolygon& lamp, double weight) {
-    const std::span corners(lamp.corners.data(), lamp.corner_count);
-    const glm::dvec3 normal(lamp.normal), corner(lamp.corners[0]);
-    const auto form_factor = formFactorInFront(place_.position, place_.normal, corners);
-    const double height = glm::dot(place_.position - corner, normal);
-    if (!(height > 0.0) || form_factor.front < 1.0) return false;
+  void lookNear(std::uint32_t light) {
+    const auto& lamp = lamps_.lights()[light];
+    const glm::dvec3 normal(lamp.normal);
+    const double height = glm::dot(place_.position - glm::dvec3(lamp.corners[0]), normal);
+    if (!(height > 0.0)) return;
+    const auto above = cornersAbove(place_.position, place_.normal, std::span(lamp.corners.data(), lamp.corner_count));
+    if (above.count < 3) return;
+    const std::span corners(above.corner.data(), above.count);
     std::uint64_t drawn = 0;
-    const auto uniform = [&] { return uniformFromKey(mixKeys(mixKeys(key_, kNearby + i), drawn++)); };
+    const auto uniform = [&] { return uniformFromKey(mixKeys(mixKeys(key_, kNearby + light), drawn++)); };
     const auto direction = PolygonDirections(place_.position, place_.normal, corners).draw(uniform);
     const double slope = -glm::dot(direction, normal);
-    if (!(slope > 0.0)) return false;
-    brings_[i] = weight * form_factor.value;
-    aim(i, glm::vec3(place_.position + (height / slope) * direction) + kSpare * lamp.normal);
-    return true;
+    if (!(slope > 0.0)) return;
+    add(glm::vec3(place_.position + (height / slope) * direction) + kSpare * lamp.normal,
+        lamps_.strength(light) * polygonFormFactor(place_.position, place_.normal, corners));
   }
 
-  [[nodiscard]] bool isOpen(std::uint32_t i) const {
-    const auto way = glm::dvec3(points_.x[i], points_.y[i], points_.z[i]) - glm::dvec3(from_);
-    const double distance = glm::length(way);
-    auto end = place_;
-    const auto value = rays_.see(place_, way / distance, mixKeys(key_, i), end);
-    return value == LeafRays::kSkyAbove || value == LeafRays::kSkyBelow ||
-           glm::distance(end.position, glm::dvec3(from_)) >= distance - kAtLamp;
+  [[nodiscard]] double arrivingThrough() const {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < brings_.size(); ++i) {
+      const auto way = glm::dvec3(points_.x[i], points_.y[i], points_.z[i]) - glm::dvec3(from_);
+      const double distance = glm::length(way);
+      auto end = place_;
+      const auto value = rays_.see(place_, way / distance, mixKeys(key_, i), end);
+      const bool open = value == LeafRays::kSkyAbove || value == LeafRays::kSkyBelow ||
+                        glm::distance(end.position, glm::dvec3(from_)) >= distance - kAtLamp;
+      sum += open ? brings_[i] : 0.0;
+    }
+    return sum;
   }
 
   const LeafRays& rays_;
   const LeafRays::Place& place_;
+  const LightTree& lamps_;
   std::uint64_t key_;
   glm::vec3 from_;
   bool sees_through_;
+  std::vector<std::uint32_t> near_;
   LeafRays::Points points_;
-  std::array<double, kDraws> brings_{};
+  std::vector<double> brings_;
 };
 
 CrowdSample::CrowdSample(const scene::PatchScene& patches, const std::vector<Side>& sides, const LeafRays& rays,
@@ -206,8 +221,8 @@ float CrowdSample::arriving(std::uint32_t value) const {
   const auto at = sobol4(index_, mixKeys(key, kPlaces));
   const Sobol4 draws(mixKeys(key, kLamps));
   const auto place = rays_.placeOn(value, {at.x, at.y});
-  Receiver receiver(rays_, place, !patches_.opacity.empty(), mixKeys(key, index_));
-  for (std::uint32_t i = 0; i < kDraws; ++i) receiver.look(i, *crowd_.lamps, draws(index_ * kDraws + i));
+  Receiver receiver(rays_, place, *crowd_.lamps, !patches_.opacity.empty(), mixKeys(key, index_));
+  for (std::uint32_t i = 0; i < kDraws; ++i) receiver.look(draws(index_ * kDraws + i));
   return static_cast<float>(receiver.arriving());
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <numbers>
 #include <numeric>
 #include <utility>
 
@@ -87,6 +88,7 @@ LightTree::Bounds LightTree::around(std::span<const std::uint32_t> lights) const
     }
     cone = join(cone, {light.normal, 1.0F});
     flux += light.area * strength(i);
+    bounds.largest = std::max(bounds.largest, static_cast<float>(light.area));
   }
   bounds.axis = cone.axis;
   bounds.cosine = cone.cosine;
@@ -153,6 +155,8 @@ std::uint32_t LightTree::addNode(const std::vector<Half>& halves, std::size_t at
     node.axis_x[k] = half.bounds.axis.x, node.axis_y[k] = half.bounds.axis.y, node.axis_z[k] = half.bounds.axis.z;
     node.cosine[k] = half.bounds.cosine;
     node.sine[k] = sineOf(half.bounds.cosine);
+    node.half_x[k] = 0.5F * size.x, node.half_y[k] = 0.5F * size.y, node.half_z[k] = 0.5F * size.z;
+    node.largest[k] = half.bounds.largest;
     node.flux[k] = half.bounds.flux;
     node.child[k] = child;
   }
@@ -221,6 +225,31 @@ LightTree::Draw LightTree::draw(const glm::vec3& position, const glm::vec3& norm
   }
   draw.light = at & ~kLight;
   return draw;
+}
+
+bool LightTree::findNear(const glm::vec3& position, float form_factor, std::size_t most,
+                         std::vector<std::uint32_t>& lights) const {
+  lights.clear();
+  std::vector<std::uint32_t> waiting;
+  if (!nodes_.empty()) waiting.push_back(0);
+  while (!waiting.empty()) {
+    const Node& node = nodes_[waiting.back()];
+    waiting.pop_back();
+    for (std::size_t k = 0; k < kChildren; ++k) {
+      const float x = std::max(0.0F, std::abs(node.x[k] - position.x) - node.half_x[k]);
+      const float y = std::max(0.0F, std::abs(node.y[k] - position.y) - node.half_y[k]);
+      const float z = std::max(0.0F, std::abs(node.z[k] - position.z) - node.half_z[k]);
+      const float square = x * x + y * y + z * z;
+      if (!(node.largest[k] > form_factor * std::numbers::pi_v<float> * square)) continue;
+      if ((node.child[k] & kLight) == 0) {
+        waiting.push_back(node.child[k]);
+        continue;
+      }
+      if (lights.size() == most) return false;
+      lights.push_back(node.child[k] & ~kLight);
+    }
+  }
+  return true;
 }
 
 std::uint32_t LightTree::byFlux(double& u) const {

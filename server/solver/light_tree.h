@@ -29,6 +29,12 @@ class LightTree {
   /// Cost: O(log n), some tens of nanoseconds a level of eight.
   [[nodiscard]] Draw draw(const glm::vec3& position, const glm::vec3& normal, double u) const;
 
+  /// Those that may bring a receiver at `position` more than `form_factor` each, by their areas and the distance of
+  /// their boxes, whatever way it faces: into `lights`. False: there are more than `most`. Cost: of those found, and
+  /// O(log n).
+  [[nodiscard]] bool findNear(const glm::vec3& position, float form_factor, std::size_t most,
+                              std::vector<std::uint32_t>& lights) const;
+
   [[nodiscard]] std::span<const LightPolygon> lights() const { return lights_; }
   [[nodiscard]] double strength(std::uint32_t light) const { return static_cast<double>(strengths_[light]); }
   /// Of all lights: strengths times areas, unit box squared.
@@ -44,6 +50,7 @@ class LightTree {
     glm::vec3 axis{0.0F};
     float cosine = 1.0F;  ///< of the angle around the axis that holds all normals; -1: they point anywhere
     float flux = 0.0F;
+    float largest = 0.0F;  ///< area of a light
   };
   /// A part of the lights, and the two that it falls into, while the tree is built.
   struct Half;
@@ -53,6 +60,8 @@ class LightTree {
     Lanes x{}, y{}, z{}, radius_square{};  ///< around their boxes
     Lanes axis_x{}, axis_y{}, axis_z{}, cosine{}, sine{};
     Lanes flux{};
+    Lanes half_x{}, half_y{}, half_z{};            ///< of their boxes
+    Lanes largest{};                               ///< area of a light; 0: there is no such child
     std::array<std::uint32_t, kChildren> child{};  ///< a node, or kLight and a light
   };
   static constexpr std::uint32_t kLight = 1U << 31U;

@@ -61,6 +61,15 @@ double areaOf(const Corners& corner, std::size_t count) {
 
 double polygonArea(std::span<const glm::vec3> corners) { return areaOf(corners, corners.size()); }
 
+CornersAbove cornersAbove(const glm::dvec3& point, const glm::dvec3& normal, std::span<const glm::vec3> corners) {
+  RAD_CHECK_LE(corners.size(), std::size_t{8});
+  const auto clipped = clipToHorizon(point, normal, corners, corners.size());
+  CornersAbove above;
+  above.count = clipped.count;
+  for (std::size_t i = 0; i < clipped.count; ++i) above.corner[i] = glm::vec3(point + clipped.corner[i]);
+  return above;
+}
+
 FormFactor formFactorInFront(const glm::dvec3& point, const glm::dvec3& normal, std::span<const glm::vec3> corners) {
   RAD_CHECK_LE(corners.size(), std::size_t{8});
   const auto polygon = clipToHorizon(point, normal, corners, corners.size());

@@ -2,10 +2,21 @@
 // horizon. Pure functions, any thread.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <glm/vec3.hpp>
 #include <span>
 
 namespace radiosity::solver {
+
+/// What of a convex polygon lies above a receiver's plane: `count` corners in a row, less than 3 where nothing does.
+struct CornersAbove {
+  std::array<glm::vec3, 9> corner;
+  std::size_t count = 0;
+};
+/// At most 8 corners.
+[[nodiscard]] CornersAbove cornersAbove(const glm::dvec3& point, const glm::dvec3& normal,
+                                        std::span<const glm::vec3> corners);
 
 struct FormFactor {
   double value = 0.0;

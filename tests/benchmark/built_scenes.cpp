@@ -3,7 +3,9 @@
 #include <malloc.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
+#include <random>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -11,6 +13,7 @@
 #include "server/gpu/gpu_transport.h"
 #include "server/scene/document.h"
 #include "tests/gl/scene_builder.h"
+#include "tests/unit/scene/shapes.h"
 
 namespace radiosity::benchmarks {
 namespace {
@@ -47,6 +50,39 @@ const Patches& patchesOf(std::int64_t which) {
       must(scene::buildPatchScene(importedScene(which), chartOptions(which))));
   made.materials = scene::shadePatches(importedScene(which), *made.patches);
   return all.emplace(which, std::move(made)).first->second;
+}
+
+const Patches& lampsOf(std::int64_t lamps) {
+  static std::map<std::int64_t, Patches> all;
+  const auto found = all.find(lamps);
+  if (found != all.end()) return found->second;
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  const auto point = [&] { return glm::dvec3(uniform(random), uniform(random), uniform(random)); };
+  scene::Primitive sparks;
+  const double size = 0.8 / std::sqrt(static_cast<double>(lamps));
+  for (std::int64_t i = 0; i < lamps; ++i) {
+    const auto centre = 1.3 * point();
+    for (int k = 0; k < 3; ++k) {
+      sparks.indices.push_back(static_cast<std::uint32_t>(sparks.positions.size()));
+      sparks.positions.push_back(centre + size * point());
+    }
+  }
+  scene::Scene room;
+  scene::Material shines;
+  shines.double_sided = true;
+  shines.emission = glm::vec3(20.0F);
+  shines.base_color = glm::vec4(0.5F, 0.5F, 0.5F, 1.0F);
+  scene::Material grey;
+  grey.base_color = glm::vec4(0.6F, 0.6F, 0.6F, 1.0F);
+  scene::test::place(room, scene::test::box(glm::dvec3(-2.0), glm::dvec3(2.0), true), glm::dmat4(1.0), grey);
+  scene::test::place(room, std::move(sparks), glm::dmat4(1.0), shines);
+  scene::ChartOptions options;
+  options.texel_budget = 24'000;
+  Patches made;
+  made.patches = std::make_shared<const scene::PatchScene>(must(scene::buildPatchScene(room, options)));
+  made.materials = scene::shadePatches(room, *made.patches);
+  return all.emplace(lamps, std::move(made)).first->second;
 }
 
 std::shared_ptr<const scene::PatchScene> roomOf(std::int64_t polygons) {

@@ -32,6 +32,10 @@ struct Patches {
 /// for the whole program.
 [[nodiscard]] std::shared_ptr<const scene::PatchScene> roomOf(std::int64_t polygons);
 
+/// A closed room, in which so many triangles that shine on both sides hang at random, of the same area in all whatever
+/// their number, on about 24,000 patches. Kept for the whole program.
+[[nodiscard]] const Patches& lampsOf(std::int64_t lamps);
+
 /// 0 workers: in this process. Null after a failure, with which the state is skipped.
 [[nodiscard]] std::unique_ptr<solver::Transport> makeTransport(std::int64_t workers, benchmark::State& state);
 

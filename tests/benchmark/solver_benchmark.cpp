@@ -61,6 +61,13 @@ void solve(benchmark::State& state) {
   runSolve(state, patchesOf(state.range(0)), state.range(1), settings);
 }
 
+/// Arguments: lamps, all of them together of one power.
+void solveManyLamps(benchmark::State& state) {
+  solver::SolverSettings settings;
+  settings.target_error = 0.02;
+  runSolve(state, lampsOf(state.range(0)), 2, settings);
+}
+
 BENCHMARK(pushPull)
     ->ArgNames({"scene", "dirty"})
     ->ArgsProduct({{kCornell, kSmallRoom, kSeminarRoom}, {kNone, kOne, kAll}})
@@ -69,6 +76,21 @@ BENCHMARK(receive)->ArgNames({"scene"})->DenseRange(kCornell, kSeminarRoom)->Uni
 BENCHMARK(solve)
     ->ArgNames({"scene", "workers"})
     ->ArgsProduct({{kCornell, kSmallRoom, kSeminarRoom}, workerCounts()})
+    ->MeasureProcessCPUTime()
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
+
+BENCHMARK(solveManyLamps)
+    ->ArgNames({"lamps"})
+    ->Arg(64)
+    ->Arg(125)
+    ->Arg(250)
+    ->Arg(500)
+    ->Arg(1000)
+    ->Arg(2000)
+    ->Arg(4000)
+    ->Arg(8000)
+    ->Arg(16'000)
     ->MeasureProcessCPUTime()
     ->UseRealTime()
     ->Unit(benchmark::kMillisecond);

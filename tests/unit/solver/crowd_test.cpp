@@ -173,6 +173,39 @@ TEST_F(CrowdTest, NearLampsBringNoMoreThanTheyEmit) {
   EXPECT_LT(std::ranges::max(light), 1.2);
 }
 
+TEST_F(CrowdTest, LampsThatTheFloorCutsBringWhatIsLeftOfThem) {
+  // A wall of tiles across the floor at x = 0, from a tenth below it to three tenths above, which shines towards +x.
+  std::vector<test::Quad> lamps;
+  constexpr float kLow = kFloor - 0.1F, kSide = 2.0F * kHalf / kTiles;
+  for (std::uint32_t i = 0; i < kTiles * kTiles; ++i) {
+    const glm::vec3 corner(0.0F, kLow + kSide * static_cast<float>(i % kTiles),
+                           -kHalf + kSide * static_cast<float>(i / kTiles));
+    lamps.push_back({corner, {0.0F, kSide, 0.0F}, {0.0F, 0.0F, kSide}});
+    lamps.back().width = lamps.back().height = 1;
+    lamps.back().emission = glm::vec3(1.0F);
+  }
+  make(lamps);
+  const auto light = arriving(divided_.crowds.at(0), 64);
+  constexpr float kHigh = kLow + 2.0F * kHalf;
+  const std::array<glm::vec3, 4> wall{
+      glm::vec3(0.0F, kFloor, -kHalf), {0.0F, kHigh, -kHalf}, {0.0F, kHigh, kHalf}, {0.0F, kFloor, kHalf}};
+  double square = 0.0, error = 0.0, sum = 0.0, all = 0.0;
+  for (std::uint32_t leaf = 0; leaf < light.size(); ++leaf) {
+    double truth = 0.0;
+    for (std::uint32_t i = 0; i < 1024; ++i) {
+      const auto at = sobol4(i, 5);
+      const auto place = rays_->placeOn(leaf, {at.x, at.y});
+      if (place.position.x > 0.0) truth += polygonFormFactor(place.position, place.normal, wall) / 1024.0;
+    }
+    square += truth * truth;
+    error += (light[leaf] - truth) * (light[leaf] - truth);
+    sum += light[leaf];
+    all += truth;
+  }
+  EXPECT_NEAR(sum / all, 1.0, 0.005);
+  EXPECT_LT(std::sqrt(error / square), 0.03);
+}
+
 class CrowdSolve : public testing::Test {
  protected:
   CrowdSolve() : quads_(test::cubeQuads(8, test::kDark, test::kGrey)) {
