@@ -76,6 +76,7 @@ void SolveLoop::threadMain(std::promise<Result<void>> started) {
     const std::scoped_lock lock(mutex_);
     transport_ = std::move(*transport);
   }
+  limits_.renderers = transport_->look().wanted;
   if (auto restored = restoreState(); !restored) {
     {
       const std::scoped_lock lock(mutex_);
