@@ -13,6 +13,8 @@ namespace radiosity::engine {
 namespace {
 
 constexpr std::size_t kMaxQueue = 1024;
+/// Between two looks whether renderers have taken in what a load has made.
+constexpr std::chrono::nanoseconds kSettlingNap = std::chrono::milliseconds(5);
 constexpr auto kProgressInterval = std::chrono::milliseconds(100);
 /// Estimating the error and weighing all light go over every texel: they take no more than one part in so many of the
 /// solve thread's time.
@@ -76,6 +78,7 @@ void SolveLoop::threadMain(std::promise<Result<void>> started) {
     const std::scoped_lock lock(mutex_);
     transport_ = std::move(*transport);
   }
+  limits_.renderers = transport_->look().wanted;
   if (auto restored = restoreState(); !restored) {
     {
       const std::scoped_lock lock(mutex_);
@@ -93,6 +96,7 @@ void SolveLoop::threadMain(std::promise<Result<void>> started) {
   checkpoints_.reset();
   load_.reset();
   former_load_.reset();
+  settling_.reset();
   first_light_.reset();
   texels_.forget();
   former_.reset();
@@ -105,13 +109,13 @@ void SolveLoop::threadMain(std::promise<Result<void>> started) {
 bool SolveLoop::runCommands() {
   std::optional<std::vector<CommandQueue::Command>> due;
   do {
-    waiting_ = hasNothingToDo();
-    due = queue_.take(waiting_, Upkeep::kInterval);
+    waiting_ = settling_ || hasNothingToDo();
+    due = queue_.take(waiting_, settling_ ? kSettlingNap : Upkeep::kInterval);
     beat();
     waiting_ = false;
     if (!due) return false;
     lookAfter();
-  } while (due->empty() && hasNothingToDo());
+  } while (due->empty() && !settling_ && hasNothingToDo());
   for (const auto& command : *due) {
     if (queue_.closed()) return false;
     runCommand(command);
@@ -138,6 +142,7 @@ void SolveLoop::takeTurn() {
   try {
     welcomeWatchers();
     if (load_) loadTurn();
+    if (settling_) return checkpointIfDue();
     if (first_light_)
       firstLightSlice();
     else if (state_ == SolveState::kSolving)

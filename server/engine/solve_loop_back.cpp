@@ -33,11 +33,12 @@ Result<PatchOutcome> SolveLoop::goBack(scene::EditedDocument edited, const Scene
     keeps_layout = former_->keepsLayoutOf(*lit_);
     // Pages are new even if nothing is on them.
     outcome.affected_surfaces = std::max<std::uint64_t>({former_->surfacesTouchedSince(*lit_), relit, 1});
-    if (auto uploaded = former_->upload(); !uploaded) return uploaded;
+    if (!settling_)
+      if (auto uploaded = former_->upload(); !uploaded) return uploaded;
     return keep(outcome);
   });
   if (!ready) {
-    putBack();
+    if (!settling_) putBack();
     return tl::unexpected<Error>(ready.error());
   }
   const bool worth_keeping = isWorthKeeping(*lit_);
@@ -45,7 +46,7 @@ Result<PatchOutcome> SolveLoop::goBack(scene::EditedDocument edited, const Scene
   if (!worth_keeping) former_.reset();
   ++went_back_;
   if (!keeps_layout) publisher_.reset();
-  renderer_lost_ = false;
+  renderer_lost_ = renderer_lost_ && settling_;
   if (state_ == SolveState::kFailed) state_ = SolveState::kSolving;  // that was the other's solve
   const bool taken = takeInLight([&] {
     retired_ = lit_->reshade(std::move(edited.document), std::move(scene), change);

@@ -152,7 +152,9 @@ class SolveLoop final : public Engine {
   void tellStatus();
   void loadTurn();  ///< takes what the load has made, and tells how far it is
   void endKnown(scene::Document document);
-  void endLoad(Result<std::unique_ptr<LitScene>> whole);
+  void settle(Result<std::unique_ptr<LitScene>> whole);
+  enum class Upload { kNow, kBegun, kNever };
+  void endLoad(Result<std::unique_ptr<LitScene>> whole, Upload upload);
   [[nodiscard]] bool awaitsLoad(Needs needs, std::uint64_t session) const;
   /// Runs the command, or has it wait for the load; `refuse` where too many wait.
   void whenLoaded(Needs needs, std::uint64_t session, CommandQueue::Command command,
@@ -165,7 +167,8 @@ class SolveLoop final : public Engine {
   };
   [[nodiscard]] Result<void> showFirstLight(std::unique_ptr<LitScene> few);
   void firstLightSlice();
-  [[nodiscard]] Result<LoadOutcome> settleIn(Result<std::unique_ptr<LitScene>> made, const std::string& by);
+  [[nodiscard]] Result<LoadOutcome> settleIn(Result<std::unique_ptr<LitScene>> made, const std::string& by,
+                                             Upload upload);
   void unload(SolveState state);
   /// Called when nothing but the disk can fail any more: what is about to come is brought there.
   using Keep = std::function<Result<void>(const PatchOutcome&)>;
@@ -175,12 +178,14 @@ class SolveLoop final : public Engine {
   /// already. Returns what an edit touched.
   enum class Relation { kOther, kEdited, kSolvedAnew, kResumed };
   using KeepMade = std::function<Result<void>(const LitScene& made, const LitScene::Affected& at_most)>;
+  /// `upload`: kBegun: renderers take it in already; kNever: they take in another, which is to follow it.
   [[nodiscard]] Result<LitScene::Affected> relight(Result<std::unique_ptr<LitScene>> made, Relation relation,
-                                                   const KeepMade& keep = {});
+                                                   const KeepMade& keep = {}, Upload upload = Upload::kNow);
+  [[nodiscard]] Upload uploadOfEdit() const { return settling_ ? Upload::kNever : Upload::kNow; }
   /// What of it can be undone; what an edit touches, at most. `solve_anew`: the solver, too, which takes nothing over.
   /// `keeps_layout`: whether pages are where those of `former` are.
   [[nodiscard]] Result<LitScene::Affected> tryOut(LitScene& made, LitScene* former, bool solve_anew,
-                                                  const KeepMade& keep, bool& keeps_layout);
+                                                  const KeepMade& keep, Upload upload, bool& keeps_layout);
   /// The edited scene, which is on the disk, takes the place of the present one and its links, where there is memory
   /// for both; else it is solved anew; where there is no memory for that either, no scene is there and the solve has
   /// failed. Returns the shots that are to be taken again.
@@ -253,8 +258,14 @@ class SolveLoop final : public Engine {
   std::unique_ptr<LitScene> former_;       // before the last edit of geometry, solved, for the way back; null: not kept
   std::optional<FirstLight> first_light_;  // then lit_ is made of a few texels, in no history and on no disk
   std::unique_ptr<LoadJob> load_;          // under way; null: none
-  std::unique_ptr<LoadJob> former_load_;   // called off; it may not have ended yet, which the next one waits for
-  double load_told_ = -1.0;                // how far it was when listeners were told
+  /// What it has made, and what renderers take in: meanwhile the scene before is edited, and not solved.
+  struct Settling {
+    std::unique_ptr<LitScene> made;
+    Clock::time_point deadline;  ///< from then on they are waited for
+  };
+  std::optional<Settling> settling_;
+  std::unique_ptr<LoadJob> former_load_;         // called off; it may not have ended yet, which the next one waits for
+  double load_told_ = -1.0;                      // how far it was when listeners were told
   std::vector<CommandQueue::Command> deferred_;  // they wait for its end
   Publisher publisher_;
   TexelReader texels_;

@@ -11,7 +11,7 @@
 namespace radiosity::engine {
 
 Result<LitScene::Affected> SolveLoop::relight(Result<std::unique_ptr<LitScene>> made, Relation relation,
-                                              const KeepMade& keep) {
+                                              const KeepMade& keep, Upload upload) {
   if (!made) return tl::unexpected<Error>(made.error());
   auto* former = relation == Relation::kEdited || relation == Relation::kSolvedAnew ? lit_.get() : nullptr;
   // What a solve that failed has measured may be a part of what it thinks it has.
@@ -20,14 +20,14 @@ Result<LitScene::Affected> SolveLoop::relight(Result<std::unique_ptr<LitScene>> 
   const bool starts = relation != Relation::kResumed;
   bool keeps_layout = false;
   auto affected =
-      withinMemory([&] { return tryOut(**made, former, starts && measured == nullptr, keep, keeps_layout); });
+      withinMemory([&] { return tryOut(**made, former, starts && measured == nullptr, keep, upload, keeps_layout); });
   if (!affected) {
     made->reset();  // before the other takes its place again
-    putBack();
+    if (upload != Upload::kNever) putBack();
     return affected;
   }
   if (!keeps_layout) publisher_.reset();
-  renderer_lost_ = false;  // it took the scene
+  renderer_lost_ = renderer_lost_ && upload == Upload::kNever;  // or else it took the scene
   if (starts && measured != nullptr) return LitScene::Affected{affected->surfaces, takeLinks(std::move(*made))};
   former_.reset();
   lit_ = std::move(*made);
@@ -35,11 +35,11 @@ Result<LitScene::Affected> SolveLoop::relight(Result<std::unique_ptr<LitScene>> 
 }
 
 Result<LitScene::Affected> SolveLoop::tryOut(LitScene& made, LitScene* former, bool solve_anew, const KeepMade& keep,
-                                             bool& keeps_layout) {
+                                             Upload upload, bool& keeps_layout) {
   Result<void> begun;
   LitScene::Affected affected;
   const auto begin = [&](std::size_t part) {  // the transport is this thread's alone
-    if (part == 0) begun = made.beginUpload();
+    if (part == 0 && upload == Upload::kNow) begun = made.beginUpload();
     if (part == 1 && former != nullptr) affected = made.succeed(*former);
   };
   doShares(2, ShareOfWork(begin));
@@ -48,7 +48,8 @@ Result<LitScene::Affected> SolveLoop::tryOut(LitScene& made, LitScene* former, b
     keeps_layout = made.keepsLayoutOf(*former);
     made.fadeFrom(*former, keeps_layout);
   }
-  if (auto uploaded = made.finishUpload(); !uploaded) return tl::unexpected<Error>(uploaded.error());
+  if (upload != Upload::kNever)
+    if (auto uploaded = made.finishUpload(); !uploaded) return tl::unexpected<Error>(uploaded.error());
   if (solve_anew) (void)made.startSolve();
   if (auto kept = keep ? keep(made, affected) : Result<void>(); !kept) return tl::unexpected<Error>(kept.error());
   return affected;
@@ -228,7 +229,7 @@ Result<PatchOutcome> SolveLoop::rebuild(scene::EditedDocument edited, const Keep
     return keep(outcome);
   };
   auto made = LitScene::make(std::move(edited), settings_, *transport_, lit_.get());
-  const auto affected = relight(std::move(made), Relation::kEdited, keep_made);
+  const auto affected = relight(std::move(made), Relation::kEdited, keep_made, uploadOfEdit());
   if (!affected) return tl::unexpected<Error>(affected.error());
   set(*affected);
   if (!fitsMemory([&] { correctAnswer(outcome); }))
@@ -275,7 +276,7 @@ Result<SolveSettings> SolveLoop::applySettings(const SolveSettings& settings) {
     const auto keep = [&](const LitScene&, const LitScene::Affected&) { return keepSettings(settings); };
     auto made = withinMemory([&] { return LitScene::make(lit_->document(), settings, *transport_, limits_); });
     const auto relation = anew ? Relation::kSolvedAnew : Relation::kEdited;
-    if (const auto lit = relight(std::move(made), relation, keep); !lit) {
+    if (const auto lit = relight(std::move(made), relation, keep, uploadOfEdit()); !lit) {
       updateStatus(true);
       return tl::unexpected<Error>(lit.error());
     }

@@ -16,6 +16,8 @@ namespace {
 
 /// That wait for a load.
 constexpr std::size_t kMostDeferred = 1024;
+/// Renderers that take in a scene for longer hang, or are so slow that nobody is to solve meanwhile.
+constexpr auto kSettlingPatience = std::chrono::seconds(20);
 
 }  // namespace
 
@@ -95,6 +97,7 @@ void SolveLoop::callOffLoad(const std::string& why) {
   if (!load_) return;
   former_load_ = std::move(load_);  // the one before it was its own
   former_load_->cancel();
+  if (std::exchange(settling_, std::nullopt)) putBack();
   (void)former_load_->take();  // what it has made may be large
   if (first_light_) unload(SolveState::kEmpty);
   tellStatus();
@@ -117,13 +120,19 @@ void SolveLoop::loadTurn() {
     callOffLoad(called_off_ ? "the server is shutting down" : "its client has gone");
     return runDeferred();
   }
+  if (settling_) {
+    if (!transport_->hasTakenScene() && Clock::now() < settling_->deadline) return;
+    auto made = std::move(settling_->made);
+    settling_.reset();
+    return endLoad(std::move(made), Upload::kBegun);
+  }
   auto ready = load_->take();
   if (ready.first_light && !lit_ && !withinMemory([&] { return showFirstLight(std::move(ready.first_light)); })) {
     first_light_.reset();  // then all at once, or the reason why not
     lit_.reset();
   }
   if (ready.known) return endKnown(std::move(*ready.known));
-  if (ready.whole) return endLoad(std::move(*ready.whole));
+  if (ready.whole) return settle(std::move(*ready.whole));
   const double fraction = load_->task()->fraction();
   if (fraction == load_told_ || Clock::now() < next_progress_) return;
   load_told_ = fraction;
@@ -145,10 +154,23 @@ void SolveLoop::endKnown(scene::Document document) {
   runDeferred();
 }
 
-void SolveLoop::endLoad(Result<std::unique_ptr<LitScene>> whole) {
+/// Renderers take in a large scene for a second, which no edit of the one before is to wait for.
+void SolveLoop::settle(Result<std::unique_ptr<LitScene>> whole) {
+  if (!whole || !lit_ || first_light_) return endLoad(std::move(whole), Upload::kNow);
+  const auto begun = withinMemory([&] { return (*whole)->beginUpload(); });
+  if (begun) {
+    settling_.emplace(Settling{std::move(*whole), Clock::now() + kSettlingPatience});
+    return;
+  }
+  whole->reset();  // before the other takes its place again
+  putBack();
+  endLoad(tl::unexpected<Error>(begun.error()), Upload::kNow);
+}
+
+void SolveLoop::endLoad(Result<std::unique_ptr<LitScene>> whole, Upload upload) {
   const auto job = std::move(load_);
   const auto& request = job->request();
-  const auto outcome = withinMemory([&] { return settleIn(std::move(whole), request.client.name); });
+  const auto outcome = withinMemory([&] { return settleIn(std::move(whole), request.client.name, upload); });
   if (!outcome && first_light_) unload(SolveState::kEmpty);
   if (!outcome) tellStatus();
   request.done(outcome);
@@ -183,7 +205,7 @@ void SolveLoop::runDeferred() {
   }
 }
 
-Result<LoadOutcome> SolveLoop::settleIn(Result<std::unique_ptr<LitScene>> made, const std::string& by) {
+Result<LoadOutcome> SolveLoop::settleIn(Result<std::unique_ptr<LitScene>> made, const std::string& by, Upload upload) {
   if (!made) return tl::unexpected<Error>(made.error());
   const bool announced = lit_ && first_light_;
   const auto revision = announced ? revision_ : revision_ + 1;
@@ -191,7 +213,8 @@ Result<LoadOutcome> SolveLoop::settleIn(Result<std::unique_ptr<LitScene>> made, 
   const auto keep = [&](const LitScene& lit, const LitScene::Affected&) { return keepLoad(next, lit.document()); };
   history_.makeRoom();
   const auto relation = announced ? Relation::kSolvedAnew : Relation::kOther;
-  if (const auto lit = relight(std::move(made), relation, keep); !lit) return tl::unexpected<Error>(lit.error());
+  if (const auto lit = relight(std::move(made), relation, keep, upload); !lit)
+    return tl::unexpected<Error>(lit.error());
   first_light_.reset();
   revision_ = revision;
   lost_told_ = 0;

@@ -101,6 +101,13 @@ class WorkerTransport final : public solver::Transport {
     return {};
   }
 
+  [[nodiscard]] bool hasTakenScene() override {
+    return std::ranges::none_of(slots_, [](const Slot& slot) {
+      pollfd answer{slot.takes_scene ? slot.process->socket() : -1, POLLIN, 0};
+      return slot.takes_scene && poll(&answer, 1, 0) == 0;
+    });
+  }
+
   Result<void> finishScene() override {
     awaitScenes();
     return replaceDead();

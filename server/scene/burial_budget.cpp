@@ -17,7 +17,16 @@ constexpr std::uint64_t kMaxPlaces = 2'000'000, kMaxBeside = 8'000'000;
 /// counted and not measured, so that a scene is the same whoever builds it, and from few leaves, so that it is also the
 /// same after an edit, when most are remembered.
 constexpr double kMaxWork = 400e6;
+/// Of all places, where one of each leaf takes more than that; and of a place, at least.
+constexpr double kMostWorkAtAll = 2.0 * kMaxWork;
+constexpr std::uint64_t kLeastWorkOfPlace = 2'000;
 constexpr std::size_t kLeavesATry = 32, kMostTried = 128;
+
+/// Of the work of all places; a power of two, so that after most edits it is the same.
+std::uint64_t shareOf(std::uint64_t places) {
+  const auto each = static_cast<std::uint64_t>(kMostWorkAtAll) / std::max<std::uint64_t>(1, places);
+  return std::clamp(std::bit_floor(each), kLeastWorkOfPlace, kMostWorkOfPlace);
+}
 
 }  // namespace
 
@@ -41,6 +50,7 @@ BurialPlaces affordablePlaces(std::size_t leaves, std::span<const TriedLeaf> tri
     places.many /= 2;
   }
   places.beside = places.many;
+  if (work(places.many) > kMostWorkAtAll) places.work_each = shareOf(leaves * places.few);
   return places;
 }
 
@@ -59,7 +69,16 @@ std::uint32_t affordableBeside(std::size_t beside, const BurialPlaces& places, s
   return each;
 }
 
-std::string budgetWarning(const BurialPlaces& places) {
+std::uint64_t affordableWork(std::size_t surfaces) { return shareOf(surfaces); }
+
+std::string budgetWarning(const BurialPlaces& places, std::size_t undecided) {
+  if (undecided > 0)
+    return fmt::format(
+        "So many solids lie through each other that {} sides of texels were taken as what the first of their rays "
+        "told, "
+        "or as visible: those that are hidden within a solid may be lit. Fewer solids, or materials with doubleSided "
+        "true, which bound no solid, help",
+        undecided);
   if (places.few == kAll.few && places.many == kAll.many && places.beside == kAll.beside) return {};
   return fmt::format(
       "So much touches that only {} places of each texel beside something else, {} at edges, were asked whether they "

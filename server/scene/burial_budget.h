@@ -8,12 +8,17 @@
 
 namespace radiosity::scene {
 
+/// Of one place, Hits::work or 1.5 ms: a hundred times what one takes in a furnished room.
+inline constexpr std::uint64_t kMostWorkOfPlace = 250'000;
+
 /// Powers of two, by which latticePoint() spreads them.
 struct BurialPlaces {
   std::uint32_t few = 16;     ///< of each leaf that something touches
   std::uint32_t many = 64;    ///< instead, where these do not agree
   std::uint32_t beside = 64;  ///< of those beside leaves where something was buried
   bool finer = true;          ///< edges that cross a leaf are looked at more closely (finer_places.h)
+  /// Of one place, then what its rays have said until then is the answer.
+  std::uint64_t work_each = kMostWorkOfPlace;
 };
 
 /// What a few places of a leaf told.
@@ -35,7 +40,10 @@ struct TriedLeaf {
 [[nodiscard]] std::uint32_t affordableBeside(std::size_t beside, const BurialPlaces& places,
                                              std::span<const TriedLeaf> tried);
 
-/// Empty: nothing was left out.
-[[nodiscard]] std::string budgetWarning(const BurialPlaces& places);
+/// Of a place on each of so many surfaces that nothing comes near.
+[[nodiscard]] std::uint64_t affordableWork(std::size_t surfaces);
+
+/// `undecided`: sides of texels of which a place took more work than it might. Empty: nothing was left out.
+[[nodiscard]] std::string budgetWarning(const BurialPlaces& places, std::size_t undecided);
 
 }  // namespace radiosity::scene

@@ -101,7 +101,7 @@ void markPartsIn(const PatchScene& patches, const Bounds& box, std::vector<bool>
 
 /// Whether leaves are looked at in as many places.
 bool sameOf(BurialRecord::Pass pass, const BurialPlaces& a, const BurialPlaces& b) {
-  return a.many == b.many && a.finer == b.finer &&
+  return a.many == b.many && a.finer == b.finer && a.work_each == b.work_each &&
          (pass == BurialRecord::Pass::kFew ? a.few == b.few : a.beside == b.beside);
 }
 

@@ -85,6 +85,7 @@ class BurialRecord {
     std::vector<RayFan> fans;
     std::optional<BuriedPart> buried;          ///< none: all of it is visible
     std::uint32_t first_leaf, first_triangle;  ///< of the surface, in the numbers of `buried`
+    bool is_undecided = false;                 ///< of a place, which took too much work
   };
   struct Leaf {
     std::uint32_t leaf, side;

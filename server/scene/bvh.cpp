@@ -393,12 +393,19 @@ bool Bvh::holdsOne(const glm::vec3& box_min, const glm::vec3& box_max) const {
 bool Bvh::collectNear(const glm::vec3& box_min, const glm::vec3& box_max, std::size_t most,
                       std::vector<std::uint32_t>& triangles) const {
   const auto room = triangles.size() + most;
-  return !anyTriangle(box_min, box_max, [&](std::uint32_t i) {
+  return !anyNear(box_min, box_max, [&](std::uint32_t triangle) {
+    triangles.push_back(triangle);
+    return triangles.size() > room;
+  });
+}
+
+bool Bvh::anyNear(const glm::vec3& box_min, const glm::vec3& box_max,
+                  const std::function<bool(std::uint32_t triangle)>& is_it) const {
+  return anyTriangle(box_min, box_max, [&](std::uint32_t i) {
     const auto& [a, b, c] = triangles_[i];
     const auto low = glm::min(glm::min(a, b), c), high = glm::max(glm::max(a, b), c);
-    if (glm::all(glm::lessThanEqual(low, box_max)) && glm::all(glm::lessThanEqual(box_min, high)))
-      triangles.push_back(order_[i]);
-    return triangles.size() > room;
+    return glm::all(glm::lessThanEqual(low, box_max)) && glm::all(glm::lessThanEqual(box_min, high)) &&
+           is_it(order_[i]);
   });
 }
 

@@ -80,6 +80,9 @@ class Bvh {
   /// told.
   [[nodiscard]] bool collectNear(const glm::vec3& box_min, const glm::vec3& box_max, std::size_t most,
                                  std::vector<std::uint32_t>& triangles) const;
+  /// Whether `is_it` holds for one of the triangles whose bounds reach into the box; asks of no more from there on.
+  [[nodiscard]] bool anyNear(const glm::vec3& box_min, const glm::vec3& box_max,
+                             const std::function<bool(std::uint32_t triangle)>& is_it) const;
 
   [[nodiscard]] bool empty() const { return triangles_.empty(); }
   [[nodiscard]] std::size_t size() const { return triangles_.size(); }

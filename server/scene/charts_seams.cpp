@@ -84,9 +84,9 @@ void findSeams(const FlatScene& flat, const std::vector<std::uint32_t>& neighbou
   };
   for (std::size_t i = 0; i < edges.size();) {
     interruptionPoint();
+    const auto most = std::min(edges.size(), i + 16);  // a book of pages; the rest of the group is looked at on its own
     std::size_t end = i + 1;
-    while (end < edges.size() && edges[end].low == edges[i].low && edges[end].high == edges[i].high) ++end;
-    end = std::min(end, i + 16);  // a book of pages; the rest of the group is looked at on its own
+    while (end < most && edges[end].low == edges[i].low && edges[end].high == edges[i].high) ++end;
     for (std::size_t a = i; a < end; ++a)
       for (std::size_t b = a + 1; b < end; ++b) {
         const BorderEdge &x = edges[a], &y = edges[b];

@@ -100,7 +100,8 @@ class Burial {
     tryLeaves();
     measureAll(contacts_, places_.few, BurialRecord::Pass::kFew);
     refineBorders();
-    if (auto warning = budgetWarning(places_); !warning.empty()) patches_.warnings.push_back(std::move(warning));
+    if (auto warning = budgetWarning(places_, undecided_); !warning.empty())
+      patches_.warnings.push_back(std::move(warning));
     settleSides();
     return keptRecord();
   }
@@ -109,12 +110,14 @@ class Burial {
   struct Measured {
     std::optional<BuriedPart> buried;                 ///< none: all of it is visible
     std::shared_ptr<const BurialRecord::Found> kept;  ///< null: it is not worth keeping
+    bool is_undecided = false;                        ///< as BurialRecord::Found
   };
 
   /// Of one surface: leaves in contact, and what is buried beside them.
   struct Split {
     std::vector<Contact> contacts;
     std::vector<BuriedPart> buried;
+    std::size_t undecided = 0;  ///< leaves
   };
 
   /// Surfaces side by side, taken in their order.
@@ -122,6 +125,7 @@ class Burial {
     std::vector<Split> splits(patches_.surfaces.size());
     inShares(splits.size() / kFewestSurfaces, [&](std::size_t share, std::size_t shares) {
       Hits hits;
+      hits.most_of_place = affordableWork(splits.size());
       for (auto s = share; s < splits.size(); s += shares) classify(static_cast<std::uint32_t>(s), hits, splits[s]);
     });
     for (std::size_t s = 0; s < splits.size(); ++s) {
@@ -132,6 +136,7 @@ class Burial {
       contacts_.insert(contacts_.end(), split.contacts.begin(), split.contacts.end());
       changes_.insert(changes_.end(), std::make_move_iterator(split.buried.begin()),
                       std::make_move_iterator(split.buried.end()));
+      undecided_ += split.undecided;
     }
   }
 
@@ -182,6 +187,7 @@ class Burial {
         if (point.triangle == kNone) continue;
         if (is_first || hits.work < most) {
           const auto answer = leaves_.ask(point.triangle, glm::dvec2(point.texel), node.side, hits);
+          if (std::exchange(hits.gave_up, false)) ++split.undecided;
           if (std::exchange(is_first, false) && !answer.buried && answer.agreed) return;
           is_buried = answer.buried;
         }
@@ -224,6 +230,7 @@ class Burial {
       for (auto i = first; i < end; ++i) {
         auto& found = measured[i - first];
         const auto& contact = contacts[i];
+        undecided_ += found.is_undecided ? 1 : 0;
         if (found.kept) record(contact, pass, std::move(found.kept));
         if (!found.buried) continue;
         patches_.node_area[leaves_.nodeOf(contact)] = found.buried->visible_area;
@@ -246,18 +253,18 @@ class Burial {
     if (by_rays && former_ != nullptr) {
       const auto leaf = leaves_.leafOf(contact) - patches_.surfaces[contact.surface].first_leaf;
       if (const auto* known = former_->find(contact.surface, leaf, contact.side, pass, places_)) {
-        Measured same{{}, known->found};
+        Measured same{{}, known->found, known->found->is_undecided};
         if (same.kept->buried) same.buried = former_->renumbered(*same.kept, contact.surface);
         return same;
       }
     }
     scratch.notes.clear();
-    Measured found{leaves_.measure(contact, count, places_, scratch), {}};
+    Measured found{leaves_.measure(contact, count, places_, scratch), {}, scratch.hits.gave_up};
     const auto& fans = scratch.notes.fans();
     if (!by_rays || fans.empty() || fans.size() > kMostFans) return found;
     const Surface& surface = patches_.surfaces[contact.surface];
     found.kept = std::make_shared<const BurialRecord::Found>(
-        BurialRecord::Found{fans, found.buried, surface.first_leaf, surface.first_triangle});
+        BurialRecord::Found{fans, found.buried, surface.first_leaf, surface.first_triangle, found.is_undecided});
     return found;
   }
 
@@ -343,7 +350,7 @@ class Burial {
   const FormerBurial* former_;
   const LeafBurial leaves_;
   BurialRecord record_;
-  std::size_t recorded_bytes_ = 0;
+  std::size_t recorded_bytes_ = 0, undecided_ = 0;
   bool is_too_much_ = false;
   std::vector<Contact> contacts_, touched_;
   std::vector<BuriedPart> changes_;

@@ -20,6 +20,8 @@ namespace {
 constexpr std::uint64_t kTotalImages = 4, kLikelyPixelsAByte = 64;
 /// While one is decoded: what the decoder holds, and its result.
 constexpr std::uint64_t kDecodedBytes = 4, kDecoderBytes = 12;
+/// Of a pixel: itself, and its mip levels while materials are shaded, which are kept for all pictures in turn.
+constexpr std::uint64_t kShadedThirds = 28, kDecodedThirds = 3 * kDecodedBytes;
 
 /// Textures that light needs.
 constexpr std::array<std::string_view, 5> kUsed = {"baseColorTexture", "emissiveTexture", "metallicRoughnessTexture",
@@ -101,7 +103,7 @@ Result<ImagePlan> planImages(const Document& document, std::uint64_t claimed, co
   const auto limit = sceneMemoryLimit(limits);
   const auto decoder = kDecoderBytes * plan.largest_pixels;
   const auto room = claimed + decoder < limit ? limit - claimed - decoder : 0;
-  halveLargest(sizes, used, std::min(kMostImageBytes, room), plan);
+  halveLargest(sizes, used, std::min(kMostImageBytes, room / kShadedThirds * kDecodedThirds), plan);
   if (plan.bytes > room)
     return fail(ErrorCode::kTooLarge, sceneMemoryFault(claimed + decoder + plan.bytes, limit, "its decoded images"),
                 place(document.name, "/images"));

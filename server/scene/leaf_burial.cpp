@@ -59,6 +59,8 @@ bool LeafBurial::isOpen(const Contact& contact, const Extent& extent, Scratch& s
 
 std::optional<BuriedPart> LeafBurial::measure(const Contact& contact, std::uint32_t count, const BurialPlaces& all,
                                               Scratch& scratch) const {
+  scratch.hits.most_of_place = all.work_each;
+  scratch.hits.gave_up = false;
   const auto pieces = piecesOf(leafOf(contact));
   const auto extent = extentOf(contact, pieces);
   const auto facing = extent.is_flat ? std::optional(Solids::Facing{extent.normal, extent.height}) : std::nullopt;

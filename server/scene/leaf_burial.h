@@ -70,7 +70,7 @@ class LeafBurial {
                                    Hits& hits) const;
 
   /// Visible area of a leaf, as `count` places of it tell, and BurialPlaces::many where these do not agree; none where
-  /// all of it is visible.
+  /// all of it is visible. Hits::gave_up: places took too much work.
   [[nodiscard]] std::optional<BuriedPart> measure(const Contact& contact, std::uint32_t count, const BurialPlaces& all,
                                                   Scratch& scratch) const;
 

@@ -18,7 +18,13 @@ namespace {
 /// the parser wants it, and what the parser makes of that.
 constexpr std::uint64_t kNodeBytes = 3'000, kMaterialBytes = 9'000, kMeshBytes = 2'000, kAccessorBytes = 1'500;
 /// A placed triangle as it is flattened, charted and held in trees; an instance, with its surface.
-constexpr std::uint64_t kTriangleBytes = 600, kInstanceBytes = 1'000;
+constexpr std::uint64_t kTriangleBytes = 900, kInstanceBytes = 1'000;
+/// The same in each process that draws: of a triangle a fifth is what Embree makes of it, at its peak.
+constexpr std::uint64_t kDrawnTriangleBytes = 850, kDrawnInstanceBytes = 300;
+/// Unless a limit is named a scene may claim so much of its server, and so much for each byte of data: a kilobyte can
+/// place a million triangles in one place, which nobody wants to see, and no model of some size comes near.
+constexpr std::uint64_t kLikelyBytes = std::uint64_t{512} << 20, kLikelyBytesAByte = 128;
+constexpr std::uint64_t kEntryBytes = 16;     ///< of JSON, at least, that places something
 constexpr std::uint64_t kElementBytes = 240;  ///< of EXT_mesh_gpu_instancing: transform and instance
 /// A vertex as it is read, with maps that find doubled triangles; its attributes; a corner of a triangle.
 constexpr std::uint64_t kVertexBytes = 36, kCornerBytes = 40;
@@ -44,6 +50,7 @@ class GeometryClaim {
   GeometryClaim(const Document& document, const tinygltf::Model& model, std::uint64_t claimed,
                 const ImportLimits& limits)
       : document_(document), model_(model), limits_(limits), limit_(sceneMemoryLimit(limits)), bytes_(claimed) {
+    if (limits.max_scene_bytes == 0) likely_ = kLikelyBytes + kLikelyBytesAByte * bytesOfData();
     for (const auto& mesh : model.meshes) {
       MeshClaim claim;
       for (const auto& primitive : mesh.primitives) add(primitive, claim);
@@ -80,6 +87,13 @@ class GeometryClaim {
     claim.vertex_bytes += times(vertices, each) + times(corners, is_list ? kCornerBytes : 3 * kCornerBytes);
     claim.triangles += is_list ? corners / 3 : corners;
     ++claim.primitives;
+  }
+
+  [[nodiscard]] std::uint64_t bytesOfData() const {
+    std::uint64_t bytes = kEntryBytes * (model_.nodes.size() + model_.meshes.size() + model_.accessors.size());
+    for (const auto& buffer : document_.buffers) bytes += buffer ? buffer->size() : 0;
+    for (const auto& mesh : model_.meshes) bytes += kEntryBytes * mesh.primitives.size();
+    return bytes;
   }
 
   [[nodiscard]] std::vector<int> rootNodes() const {
@@ -120,11 +134,18 @@ class GeometryClaim {
                   radiosity::scene::place(document_.name, pointer));
     }
     const auto each = mesh.primitives * kInstanceBytes + times(mesh.triangles, kTriangleBytes);
+    const auto drawn = mesh.primitives * kDrawnInstanceBytes + times(mesh.triangles, kDrawnTriangleBytes);
+    bytes_ += times(times(count, drawn), limits_.renderers);
     return spend(times(count, each), pointer, "its triangles");
   }
 
   Result<void> spend(std::uint64_t bytes, const std::string& pointer, std::string_view what) {
     bytes_ += bytes;
+    of_server_ += bytes;
+    if (of_server_ > likely_) {
+      return fail(ErrorCode::kTooLarge, sceneMemoryFault(of_server_, likely_, what) + " for so few bytes of data",
+                  radiosity::scene::place(document_.name, pointer));
+    }
     if (bytes_ <= limit_) return {};
     return fail(ErrorCode::kTooLarge, sceneMemoryFault(bytes_, limit_, what),
                 radiosity::scene::place(document_.name, pointer));
@@ -134,6 +155,7 @@ class GeometryClaim {
   const tinygltf::Model& model_;
   const ImportLimits& limits_;
   std::uint64_t limit_, bytes_, instances_ = 0;
+  std::uint64_t of_server_ = 0, likely_ = ~std::uint64_t{0};
   std::vector<MeshClaim> meshes_;
   std::set<std::tuple<int, int, std::vector<double>>> poses_;  ///< mesh, skin, weights
 };
@@ -141,7 +163,7 @@ class GeometryClaim {
 }  // namespace
 
 std::uint64_t sceneMemoryLimit(const ImportLimits& limits) {
-  return limits.max_scene_bytes != 0 ? limits.max_scene_bytes : memoryLimitBytes() / 4;
+  return limits.max_scene_bytes != 0 ? limits.max_scene_bytes : memoryLimitBytes() / 2;
 }
 
 std::string sceneMemoryFault(std::uint64_t bytes, std::uint64_t limit, std::string_view what) {

@@ -11,7 +11,7 @@
 
 namespace radiosity::scene {
 
-/// ImportLimits::max_scene_bytes, or what it is where it is 0: a quarter of the memory there is.
+/// ImportLimits::max_scene_bytes, or what it is where it is 0: half of the memory there is.
 [[nodiscard]] std::uint64_t sceneMemoryLimit(const ImportLimits& limits);
 
 /// "the scene would take 8.0 GiB, more than the 5.8 GiB that --max-scene-memory allows (...)". `what`: what brings the
@@ -22,9 +22,10 @@ namespace radiosity::scene {
 [[nodiscard]] Result<std::uint64_t> claimOfJson(const Document& document, const ImportLimits& limits);
 
 /// Bytes that the geometry of the scene to show takes, about: vertices of each primitive in each pose, placed triangles
-/// and instances, elements of EXT_mesh_gpu_instancing. `claimed`: what the rest takes. kTooLarge, naming the primitive
-/// or the node at fault: all is more than the limit, or there are more instances than ImportLimits::max_nodes. Needs a
-/// checked model. O(nodes + primitives, log of the poses).
+/// and instances, in the server and in each renderer, elements of EXT_mesh_gpu_instancing. `claimed`: what the rest
+/// takes. kTooLarge, naming the primitive or the node at fault: all is more than the limit, or than is likely of so few
+/// bytes of data where no limit is named, or there are more instances than ImportLimits::max_nodes. Needs a checked
+/// model. O(nodes + primitives, log of the poses).
 [[nodiscard]] Result<std::uint64_t> claimOfGeometry(const Document& document, const tinygltf::Model& model,
                                                     std::uint64_t claimed, const ImportLimits& limits);
 

@@ -33,12 +33,13 @@ struct Sum {
 
 class MaterialShader {
  public:
-  MaterialShader(const Scene& scene, const PatchScene& patches, std::uint32_t material, PatchMaterials& out)
+  MaterialShader(const Scene& scene, const PatchScene& patches, std::uint32_t material, TexturePyramids& pyramids,
+                 PatchMaterials& out)
       : scene_(scene),
         patches_(patches),
         out_(out),
         name_(materialOf(scene, material).name),
-        layers_(scene, materialOf(scene, material)) {}
+        layers_(scene, materialOf(scene, material), pyramids) {}
 
   void shade(std::uint32_t id) {
     surface_ = patches_.surfaces[id];
@@ -204,8 +205,8 @@ namespace {
 
 /// `surfaces`: those of the material, one at least.
 void shadeSurfaces(const Scene& scene, const PatchScene& patches, std::uint32_t material,
-                   std::span<const std::uint32_t> surfaces, PatchMaterials& materials) {
-  MaterialShader shader(scene, patches, material, materials);
+                   std::span<const std::uint32_t> surfaces, TexturePyramids& pyramids, PatchMaterials& materials) {
+  MaterialShader shader(scene, patches, material, pyramids, materials);
   for (const std::uint32_t s : surfaces) shader.shade(s);
   if (shader.wasClamped())
     materials.warnings.push_back(fmt::format("/materials/{} ({}): reflectance above {} was lowered to it", material,
@@ -219,7 +220,8 @@ std::vector<std::uint32_t> reshadeMaterial(const Scene& scene, const PatchScene&
   std::vector<std::uint32_t> surfaces;
   for (std::uint32_t s = 0; s < patches.surfaces.size(); ++s)
     if (patches.surfaces[s].material == material) surfaces.push_back(s);
-  if (!surfaces.empty()) shadeSurfaces(scene, patches, material, surfaces, materials);
+  TexturePyramids pyramids;
+  if (!surfaces.empty()) shadeSurfaces(scene, patches, material, surfaces, pyramids, materials);
   return surfaces;
 }
 
@@ -230,10 +232,18 @@ PatchMaterials shadePatches(const Scene& scene, const PatchScene& patches) {
   std::iota(order.begin(), order.end(), 0U);
   const auto materialOf = [&](std::uint32_t s) { return patches.surfaces[s].material; };
   std::ranges::stable_sort(order, {}, materialOf);
+  TexturePyramids pyramids;
   for (auto first = order.begin(), end = first; first != order.end(); first = end) {
     const auto material = materialOf(*first);
     end = std::find_if(first, order.end(), [&](std::uint32_t s) { return materialOf(s) != material; });
-    shadeSurfaces(scene, patches, material, {first, end}, materials);
+    shadeSurfaces(scene, patches, material, {first, end}, pyramids, materials);
+  }
+  if (pyramids.coarse() > 0) {
+    materials.warnings.push_back(
+        fmt::format("materials look at large pictures in so many ways ({}) that of {} few pixels were looked at: their "
+                    "colours may be "
+                    "a little off. Fewer materials, or smaller pictures, help",
+                    pyramids.made(), pyramids.coarse()));
   }
   return materials;
 }

@@ -4,9 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
+#include <memory>
 #include <optional>
 
-#include "server/scene/shade_texture.h"
+#include "server/scene/texture_pyramids.h"
 
 namespace radiosity::scene {
 
@@ -22,9 +23,7 @@ class MaterialLayers {
     glm::vec2 uv, footprint;
   };
 
-  MaterialLayers(const Scene& scene, const Material& material);
-  MaterialLayers(const MaterialLayers&) = delete;  // its pyramids refer to it
-  MaterialLayers& operator=(const MaterialLayers&) = delete;
+  MaterialLayers(const Scene& scene, const Material& material, TexturePyramids& pyramids);
 
   /// Without textures it is the same everywhere, but for vertex colours.
   [[nodiscard]] bool hasTextures() const { return surface_ || metallic_ || specular_ || emissive_; }
@@ -34,7 +33,7 @@ class MaterialLayers {
   [[nodiscard]] Value at(const PlaceOf& place, const glm::vec4& vertex) const {
     const auto look = [&](const Layer& layer) {
       const Place found = place(layer.use);
-      return layer.pyramid.look(layer.use, found.uv, found.footprint);
+      return layer.pyramid->look(layer.use, found.uv, found.footprint);
     };
     float metal = metallic_inside_ ? 0.0F : material_.metallic;
     glm::vec3 specular = specular_inside_ ? glm::vec3(0.0F) : material_.specular;
@@ -54,7 +53,7 @@ class MaterialLayers {
  private:
   struct Layer {
     TextureUse use;
-    TexturePyramid pyramid;
+    std::shared_ptr<const TexturePyramid> pyramid;
   };
 
   [[nodiscard]] glm::vec3 diffuseOf(float metal, const glm::vec3& specular) const {
@@ -62,9 +61,9 @@ class MaterialLayers {
   }
   [[nodiscard]] float weightOf(float vertex_alpha) const;
   [[nodiscard]] const Texture* textureOf(const TextureUse& use) const;
-  [[nodiscard]] float coverageOf(float texture_alpha) const;
-  void addSurface();
-  void addEmissive();
+  void setAlpha(const Texture* alpha, PictureStack& stack) const;
+  void addSurface(TexturePyramids& pyramids);
+  void addEmissive(TexturePyramids& pyramids);
 
   const Scene& scene_;
   Material material_;

@@ -123,6 +123,12 @@ TexturePyramid::TexturePyramid(int width, int height, Pixels pixels, bool all_co
   buildLevels();
 }
 
+std::size_t TexturePyramid::bytes() const {
+  std::size_t bytes = 0;
+  for (const auto& level : levels_) bytes += level.pixels.size() * sizeof(glm::vec4);
+  return bytes;
+}
+
 void TexturePyramid::buildLevels() {
   int width = width_, height = height_;
   for (std::size_t level = 0; width > 1 || height > 1; ++level) {

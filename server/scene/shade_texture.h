@@ -35,6 +35,7 @@ class TexturePyramid {
   /// `all_count`: coverage is 1 everywhere.
   TexturePyramid(int width, int height, Pixels pixels, bool all_count);
 
+  [[nodiscard]] std::size_t bytes() const;
   /// RGB around `uv` (after TextureUse's transform and wrapping), averaged over about `footprint` (in UV units), and
   /// the coverage there. Where that is 0, RGB is of the nearest pixels that count, if any.
   [[nodiscard]] Look look(const TextureUse& use, const glm::vec2& uv, const glm::vec2& footprint) const;

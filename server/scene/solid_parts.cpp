@@ -25,7 +25,7 @@ SolidParts::SolidParts(std::span<const Bvh::Triangle> triangles, std::span<const
     parts[part].push_back(triangles[i]);
   }
   add(std::move(others), false);
-  std::vector<Bvh::Triangle> boxes;
+  std::vector<Bvh::Triangle> boxes, closed_boxes;
   for (std::size_t p = 0; p < parts.size(); ++p) {
     interruptionPoint();
     if (parts[p].empty()) continue;
@@ -33,9 +33,14 @@ SolidParts::SolidParts(std::span<const Bvh::Triangle> triangles, std::span<const
     for (const auto& triangle : parts[p])
       for (const auto& corner : triangle) box.add(corner);
     boxes.push_back({box.min - kMargin, box.max + kMargin, box.max + kMargin});
+    if (p % 2 == kClosed) {
+      closed_boxes.push_back(boxes.back());
+      closed_.push_back(static_cast<std::uint32_t>(parts_.size()));
+    }
     add(std::move(parts[p]), p % 2 == kHollow);
   }
   boxes_ = Bvh(std::move(boxes));
+  closed_boxes_ = Bvh(std::move(closed_boxes));
 }
 
 void SolidParts::add(std::vector<Bvh::Triangle> triangles, bool is_hollow) {
@@ -47,7 +52,7 @@ void SolidParts::add(std::vector<Bvh::Triangle> triangles, bool is_hollow) {
 
 bool SolidParts::find(const Bounds& places, const std::optional<Plane>& plane, Around& around) const {
   around.trees.clear();
-  around.in_hollow = false;
+  around.in_hollow = around.is_crowded = false;
   if (parts_.empty()) return true;
   const auto mayMeet = [&](const Part& part) {
     return plane ? part.tree.risesAbove(plane->normal, plane->height) : !part.tree.empty();
@@ -62,6 +67,14 @@ bool SolidParts::find(const Bounds& places, const std::optional<Plane>& plane, A
     around.in_hollow = around.in_hollow || part.is_hollow;
   }
   return true;
+}
+
+std::optional<bool> SolidParts::anyHolds(const glm::vec3& place,
+                                         const std::function<bool(const SolidTree& part)>& holds) const {
+  const auto holdsOne = [&](std::uint32_t k) { return holds(parts_[closed_[k]]->ends); };
+  if (closed_boxes_.anyNear(place, place, holdsOne)) return true;
+  const bool has_others = !parts_.empty() && (!parts_.front()->tree.empty() || closed_.size() + 1 < parts_.size());
+  return has_others ? std::nullopt : std::optional(false);
 }
 
 }  // namespace radiosity::scene

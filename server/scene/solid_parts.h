@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <glm/vec3.hpp>
 #include <memory>
 #include <optional>
@@ -22,7 +23,8 @@ class SolidParts {
   /// What places in a box may lie in.
   struct Around {
     std::vector<const SolidTree*> trees;
-    bool in_hollow = false;  ///< something that is open: not all rays from within tell of it
+    bool in_hollow = false;   ///< something that is open: not all rays from within tell of it
+    bool is_crowded = false;  ///< they are too many to be told of: `trees` are of all there is
   };
 
   SolidParts() = default;
@@ -44,6 +46,11 @@ class SolidParts {
   /// O(kMostAround + log n).
   [[nodiscard]] bool find(const Bounds& places, const std::optional<Plane>& plane, Around& around) const;
 
+  /// Whether `holds` says so of a closed part whose bounds hold the place: of one after the other, until it is true.
+  /// None: it is not, and there are others than these, which are open, or of no part. O(log n + parts asked).
+  [[nodiscard]] std::optional<bool> anyHolds(const glm::vec3& place,
+                                             const std::function<bool(const SolidTree& part)>& holds) const;
+
  private:
   struct Part {
     Bvh tree;
@@ -54,6 +61,8 @@ class SolidParts {
 
   std::vector<std::unique_ptr<Part>> parts_;  ///< that of what counts for all places first, which may be empty
   Bvh boxes_;                                 ///< of the others, in their order: triangles that have these bounds
+  Bvh closed_boxes_;                          ///< likewise, of those that are closed
+  std::vector<std::uint32_t> closed_;         ///< of these: into parts_
 };
 
 }  // namespace radiosity::scene

@@ -17,6 +17,9 @@ namespace {
 /// Of a node with its boxes, or of a block with its triangles: what time it takes, in units of Hits::work.
 constexpr std::uint64_t kNodeWork = 4;
 constexpr std::size_t kMovedAtOnce = 8;  ///< hits that are moved in a unit of work
+/// Hits that would have to make way for one: where they are more, those that wait are kept in a heap, and each takes so
+/// much work.
+constexpr std::size_t kMostMoved = 64, kHeapWork = 8;
 /// By which a ray may seem to miss a triangle that it meets (unit box): twice what rounding makes of it.
 constexpr float kEdge = 1e-6F;
 
@@ -38,18 +41,27 @@ class SolidTree::Walk {
   explicit Walk(std::vector<RayHit>& hits) : hits_(hits) { hits_.clear(); }
 
   /// They come nearly in order. Out of follow() nothing may be thrown: check() says that one was lost.
-  /// Returns how many had to make way.
+  /// Returns the work that it was.
   std::size_t add(const RayHit& hit) noexcept {
-    const auto key = [](const RayHit& of) { return std::tuple(of.t, of.front, of.tree, of.triangle); };
-    const bool in_order = hits_.empty() || key(hits_.back()) < key(hit);
-    const auto at = in_order ? hits_.end() : std::ranges::upper_bound(hits_, key(hit), {}, key);
+    const bool in_order = hits_.empty() || keyOf(hits_.back()) < keyOf(hit);
+    const auto at = in_order ? hits_.end() : std::ranges::upper_bound(hits_, keyOf(hit), {}, keyOf);
     const auto behind = static_cast<std::size_t>(hits_.end() - at);
     try {
-      hits_.insert(at, hit);
+      if (waiting_.empty() && behind <= kMostMoved) {
+        hits_.insert(at, hit);
+        return behind / kMovedAtOnce;
+      }
+      if (waiting_.empty()) {
+        waiting_.assign(hits_.begin() + static_cast<std::ptrdiff_t>(next_), hits_.end());
+        hits_.erase(hits_.begin() + static_cast<std::ptrdiff_t>(next_), hits_.end());
+        std::ranges::make_heap(waiting_, isLater);
+      }
+      waiting_.push_back(hit);
+      std::ranges::push_heap(waiting_, isLater);
     } catch (const std::bad_alloc&) {
       is_short_ = true;
     }
-    return behind;
+    return kHeapWork;
   }
   /// Throws std::bad_alloc.
   void check() const {
@@ -57,8 +69,8 @@ class SolidTree::Walk {
   }
 
   /// Goes on to `end`, before which no more hits will come.
-  [[nodiscard]] std::optional<double> leaveBefore(double end) {
-    for (; next_ < hits_.size() && hits_[next_].t < end; ++next_) {
+  [[nodiscard]] std::optional<double> leaveBefore(double end) noexcept {
+    for (; hasNextBefore(end); ++next_) {
       const RayHit& hit = hits_[next_];
       // The edge between two triangles; two solids may begin in one plane.
       if (last_.front == hit.front && last_.tree == hit.tree && hit.t - last_.t < kSameHit) continue;
@@ -70,7 +82,27 @@ class SolidTree::Walk {
   }
 
  private:
+  static std::tuple<double, bool, std::uint16_t, std::uint32_t> keyOf(const RayHit& of) {
+    return {of.t, of.front, of.tree, of.triangle};
+  }
+  static bool isLater(const RayHit& a, const RayHit& b) { return keyOf(b) < keyOf(a); }
+
+  /// Whether hits_[next_] is there, and before the end.
+  [[nodiscard]] bool hasNextBefore(double end) noexcept {
+    if (waiting_.empty() || next_ < hits_.size()) return next_ < hits_.size() && hits_[next_].t < end;
+    if (!(waiting_.front().t < end)) return false;
+    std::ranges::pop_heap(waiting_, isLater);
+    try {
+      hits_.push_back(waiting_.back());
+    } catch (const std::bad_alloc&) {
+      is_short_ = true;
+    }
+    waiting_.pop_back();
+    return !is_short_;
+  }
+
   std::vector<RayHit>& hits_;
+  std::vector<RayHit> waiting_;  ///< a heap, the nearest first; then all before next_ are in hits_, and no others
   std::size_t next_ = 0;
   int depth_ = 0;
   bool is_short_ = false;
@@ -122,27 +154,28 @@ __attribute__((always_inline)) inline std::uint32_t SolidTree::mayMeet(const Blo
 
 std::optional<double> SolidTree::endOfSolid(std::span<const SolidTree* const> trees, const glm::dvec3& origin,
                                             const glm::dvec3& direction, double t_max, std::vector<RayHit>& hits,
-                                            std::uint64_t& work) {
+                                            std::uint64_t& work, std::uint64_t stop) {
   Walk walk(hits);
   const Ray ray{origin, direction, t_max};
   if (trees.size() <= kTreesAtOnce) {
-    const auto end = follow(trees, 0, ray, true, walk, work);
+    const auto end = follow(trees, 0, ray, true, walk, work, stop);
     walk.check();
     return end;
   }
   for (std::size_t first = 0; first < trees.size(); first += kTreesAtOnce) {
     const auto some = trees.subspan(first, std::min(trees.size() - first, kTreesAtOnce));
-    (void)follow(some, static_cast<std::uint16_t>(first), ray, false, walk, work);
+    (void)follow(some, static_cast<std::uint16_t>(first), ray, false, walk, work, stop);
   }
+  const auto end = work < stop ? walk.leaveBefore(std::numeric_limits<double>::infinity()) : std::nullopt;
   walk.check();
-  return walk.leaveBefore(std::numeric_limits<double>::infinity());
+  return end;
 }
 
 /// Nearer children first; what waits bounds from below what is still to come. `all`: no other trees follow, and where
 /// the ray leaves the solid is the end. `first`: number of the first.
 RADIOSITY_CLONES std::optional<double> SolidTree::follow(std::span<const SolidTree* const> trees, std::uint16_t first,
-                                                         const Ray& from, bool all, Walk& walk,
-                                                         std::uint64_t& work) noexcept {
+                                                         const Ray& from, bool all, Walk& walk, std::uint64_t& work,
+                                                         std::uint64_t stop) noexcept {
   constexpr float kNever = std::numeric_limits<float>::infinity();
   const WideNodes::Ray ray{glm::vec3(from.origin), glm::vec3(from.direction)};
   const auto reach = static_cast<float>(from.t_max) * (1.0F + 1e-6F);
@@ -159,6 +192,7 @@ RADIOSITY_CLONES std::optional<double> SolidTree::follow(std::span<const SolidTr
   }
   alignas(32) float entry[kWidth];
   while (depth > 0) {
+    if (work >= stop) return std::nullopt;
     const auto* tree = stack[--depth].tree;
     const auto number = stack[depth].number;
     const auto child = stack[depth].child;
@@ -185,7 +219,7 @@ RADIOSITY_CLONES std::optional<double> SolidTree::follow(std::span<const SolidTr
       const Bvh& of = *tree->tree_;
       RayHit hit{0.0, of.order_[i], false, number};
       if (meetsTriangle(of.triangles_[i], from.origin, from.direction, hit) && hit.t > 0.0 && hit.t < from.t_max)
-        work += walk.add(hit) / kMovedAtOnce;
+        work += walk.add(hit);
     }
     if (!all) continue;
     const float soonest = depth == 0 ? kNever : stack[depth - 1].soonest;

@@ -23,10 +23,11 @@ class SolidTree {
   /// Of several trees, of which each numbers its own triangles in `hits`: the first back of a triangle that ends more
   /// solids than fronts began. Looks no farther: what lies behind costs nothing. None: the ray starts in no solid, and
   /// `hits` are all with t in (0, t_max), by t. For rays that start in the unit box, or about. `work`: grows by what
-  /// that took, in units of 6 ns or so.
+  /// that took, in units of 6 ns or so; from `stop` on nobody looks farther, and none says nothing.
   [[nodiscard]] static std::optional<double> endOfSolid(std::span<const SolidTree* const> trees,
                                                         const glm::dvec3& origin, const glm::dvec3& direction,
-                                                        double t_max, std::vector<RayHit>& hits, std::uint64_t& work);
+                                                        double t_max, std::vector<RayHit>& hits, std::uint64_t& work,
+                                                        std::uint64_t stop = ~std::uint64_t{0});
 
   [[nodiscard]] const Bvh& triangles() const { return *tree_; }
 
@@ -40,7 +41,7 @@ class SolidTree {
   class Walk;
   struct Ray;
   static std::optional<double> follow(std::span<const SolidTree* const> trees, std::uint16_t first, const Ray& from,
-                                      bool all, Walk& walk, std::uint64_t& work) noexcept;
+                                      bool all, Walk& walk, std::uint64_t& work, std::uint64_t stop) noexcept;
   [[nodiscard]] static std::uint32_t mayMeet(const Block& block, const WideNodes::Ray& ray);
 
   const Bvh* tree_ = nullptr;

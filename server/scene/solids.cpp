@@ -36,6 +36,8 @@ constexpr std::size_t kSurfacesAThread = 64;
 constexpr std::uint64_t kMostWorkAlong = 30'000, kWorkOfFirst = 200;
 /// So many rays that say the same are enough. More where a place would be lost.
 constexpr std::uint32_t kAgreeOutside = 3, kAgreeInside = 6;
+/// Of rays that are held against a single closed solid.
+constexpr std::uint32_t kAgreeInClosed = 3;
 
 /// Of a position in the triangle's plane.
 glm::vec2 texelAt(const TriangleFrame& frame, const glm::vec3& position) {
@@ -189,6 +191,8 @@ bool Solids::near(const Bounds& box, std::uint32_t surface) const {
 Solids::Answer Solids::ask(const glm::vec3& position, const glm::vec3& normal, const SolidParts::Around& around,
                            Hits& hits, RayNotes* notes) const {
   const Start start{glm::dvec3(position) + kBurialLift * glm::dvec3(normal), normal, kNone, &around};
+  hits.stop = hits.work + hits.most_of_place;
+  if (const auto known = liesInClosed(start, hits, notes)) return {*known, true};
   auto answer = vote(start, hits, notes);
   answer.buried = answer.buried && !seesOutAlong(start, hits, notes);
   return answer;
@@ -209,7 +213,7 @@ void Solids::findAround(const Bounds& positions, const std::optional<Facing>& fa
   std::call_once(whole_made_, [&] { whole_ = std::make_unique<const Whole>(corners_, normal_); });
   around.trees.clear();
   for (const auto& tree : whole_->ends) around.trees.push_back(&tree);
-  around.in_hollow = true;
+  around.in_hollow = around.is_crowded = true;
 }
 
 bool Solids::mayBury(const Bounds& positions, const glm::vec3& normal, const SolidParts::Around& around) const {
@@ -221,6 +225,36 @@ bool Solids::mayBury(const Bounds& positions, const glm::vec3& normal, const Sol
          });
 }
 
+/// In a crowd a ray meets very many, and a look at each of those that may hold the place, by itself, soon finds one
+/// that does. None: these do not tell.
+std::optional<bool> Solids::liesInClosed(const Start& start, Hits& hits, RayNotes* notes) const {
+  if (!start.around->is_crowded) return std::nullopt;
+  const BurialWays ways(start.normal);
+  bool on_sheet = false;  // then what the place lies in does not count, or others may
+  double end = 0.0;
+  const auto leaves = [&](const SolidTree& part, std::uint32_t way) {
+    const auto direction = ways.of(way);
+    const auto found =
+        SolidTree::endOfSolid(std::array{&part}, start.origin, direction, kBurialRayLength, hits, hits.work, hits.stop);
+    if (!found) return false;
+    end = std::max(end, *found);
+    const bool ends_on_sheet = !sheets_.empty() && sheets_.meets(start.origin, direction, 0.0, *found);
+    on_sheet = on_sheet || ends_on_sheet;
+    return !ends_on_sheet;
+  };
+  const auto holds = [&](const SolidTree& part) {
+    std::uint32_t way = 0;
+    for (end = 0.0; way < kAgreeInClosed && leaves(part, way); ++way) {
+    }
+    return way == kAgreeInClosed || hits.work >= hits.stop;
+  };
+  const auto found = parts_.anyHolds(glm::vec3(start.origin), holds);
+  if (!found || hits.work >= hits.stop || (on_sheet && !*found)) return std::nullopt;
+  for (std::uint32_t way = 0; notes != nullptr && way < kAgreeInClosed; ++way)
+    notes->add({start.origin, start.normal, start.triangle, way, *found ? end : kBurialRayLength});
+  return found;
+}
+
 /// A first ray that meets no back decides, unless it may have left a hollow by its open end, and so do some that agree.
 /// Otherwise the majority of all.
 Solids::Answer Solids::vote(const Start& start, Hits& hits, RayNotes* notes) const {
@@ -229,6 +263,7 @@ Solids::Answer Solids::vote(const Start& start, Hits& hits, RayNotes* notes) con
   bool agreed = true;
   for (std::uint32_t way = 0; way < kFirstWayAlong; ++way) {
     const auto ray = follow(start, way, ways.of(way), hits, notes);
+    if (ray == Ray::kGivesUp) return {leave > stay, false};
     agreed = agreed && ray != Ray::kEndsOnSheet;
     if (ray == Ray::kLeaves) {
       ++leave;
@@ -247,17 +282,21 @@ Solids::Answer Solids::vote(const Start& start, Hits& hits, RayNotes* notes) con
 /// scene. What it meets first may be a part of the surface, in a hollow, or of another that is buried as well.
 bool Solids::seesOutAlong(const Start& start, Hits& hits, RayNotes* notes) const {
   const BurialWays ways(start.normal);
-  const auto most = hits.work + kMostWorkAlong;
+  const auto most = std::min(hits.work + kMostWorkAlong, hits.stop);
   for (auto way = kFirstWayAlong; way < kBurialWays && hits.work < most; ++way) {
     const auto direction = ways.of(way);
-    if (follow(start, way, direction, hits, notes) == Ray::kLeaves) continue;
+    const auto ray = follow(start, way, direction, hits, notes);
+    if (ray == Ray::kGivesUp) return false;
+    if (ray == Ray::kLeaves) continue;
     auto there = firstMet(start, direction);
     hits.work += kWorkOfFirst;
     if (!there) return true;
     const glm::vec3 origin(there->origin - kBurialLift * glm::dvec3(there->normal));
     findAround({origin, origin}, Facing{there->normal, glm::dot(there->normal, origin)}, hits.beyond);
     there->around = &hits.beyond;
-    if (!vote(*there, hits, notes).buried) return true;
+    const auto lies_in = liesInClosed(*there, hits, notes);
+    if (hits.gave_up) return false;
+    if (!(lies_in ? *lies_in : vote(*there, hits, notes).buried)) return !hits.gave_up;
   }
   return false;
 }
@@ -281,7 +320,11 @@ std::optional<Solids::Start> Solids::firstMet(const Start& start, const glm::dve
 Solids::Ray Solids::follow(const Start& start, std::uint32_t way, const glm::dvec3& direction, Hits& hits,
                            RayNotes* notes) const {
   const auto end =
-      SolidTree::endOfSolid(start.around->trees, start.origin, direction, kBurialRayLength, hits, hits.work);
+      SolidTree::endOfSolid(start.around->trees, start.origin, direction, kBurialRayLength, hits, hits.work, hits.stop);
+  if (!end && hits.work >= hits.stop) {
+    hits.gave_up = true;
+    return Ray::kGivesUp;
+  }
   if (notes != nullptr) notes->add({start.origin, start.normal, start.triangle, way, end.value_or(kBurialRayLength)});
   if (!end) return Ray::kStays;
   return !sheets_.empty() && sheets_.meets(start.origin, direction, 0.0, *end) ? Ray::kEndsOnSheet : Ray::kLeaves;

@@ -29,6 +29,9 @@ namespace radiosity::scene {
 /// Of one thread's rays. `work`: what they took, all together, in units of some 6 ns.
 struct Hits : std::vector<RayHit> {
   std::uint64_t work = 0;
+  /// Of one place: when it has taken so much, at `stop`, what most rays have said until then is the answer.
+  std::uint64_t most_of_place = kMostWorkOfPlace, stop = ~std::uint64_t{0};
+  bool gave_up = false;               ///< of some place, since somebody made it false
   SolidParts::Around around, beyond;  ///< room for where a place lies, and what a ray from there meets
 };
 
@@ -79,9 +82,10 @@ class Solids {
     std::uint32_t triangle;  ///< of the tree, and after those of the sheets; kNone: the place that is asked for
     const SolidParts::Around* around;
   };
+  [[nodiscard]] std::optional<bool> liesInClosed(const Start& start, Hits& hits, RayNotes* notes) const;
   [[nodiscard]] Answer vote(const Start& start, Hits& hits, RayNotes* notes) const;
   [[nodiscard]] bool seesOutAlong(const Start& start, Hits& hits, RayNotes* notes) const;
-  enum class Ray { kStays, kLeaves, kEndsOnSheet };
+  enum class Ray { kStays, kLeaves, kEndsOnSheet, kGivesUp };
   [[nodiscard]] Ray follow(const Start& start, std::uint32_t way, const glm::dvec3& direction, Hits& hits,
                            RayNotes* notes) const;
   [[nodiscard]] std::optional<Start> firstMet(const Start& start, const glm::dvec3& direction) const;

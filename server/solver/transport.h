@@ -243,6 +243,8 @@ class Transport {
     return setScene(std::move(patches));
   }
   [[nodiscard]] virtual Result<void> finishScene() { return {}; }
+  /// Between the two: finishScene() would not wait. Does not wait itself.
+  [[nodiscard]] virtual bool hasTakenScene() { return true; }
 
   /// Carries out the batch and adds what it delivered to `into` (sized by the caller). Blocks. On error `into` is
   /// unchanged.

@@ -134,6 +134,43 @@ TEST_F(Cancel, TheSceneBeforeIsEditedAndSolvedBesideALoad) {
   EXPECT_TRUE(undo());
 }
 
+/// Edits of light, of geometry, and back again, all of which end before the load does.
+TEST_F(Cancel, NoEditWaitsForRenderersToTakeInALoad) {
+  solve(lumpedCube(0.5));
+  const auto move = [](double y) {
+    return R"([{"op":"replace","path":"/nodes/0/translation","value":[0,)" + std::to_string(y) + ",0]}]";
+  };
+  script_->takes_scenes = false;
+  const int before = script_->uploads;
+  auto loaded = beginLoad();
+  ASSERT_TRUE(eventually([&] { return script_->uploads > before; }));
+  ASSERT_TRUE(patch(emissionPatch(0, 5.0)));
+  ASSERT_TRUE(patch(move(0.25)));
+  EXPECT_EQ(undo().value().revision, 4U);
+  EXPECT_EQ(script_->uploads, before + 1) << "renderers are busy";
+  EXPECT_EQ(status().state, SolveState::kLoading);
+  EXPECT_NE(loaded.wait_for(std::chrono::seconds(0)), std::future_status::ready);
+  script_->takes_scenes = true;
+  const auto outcome = loaded.get();
+  ASSERT_TRUE(outcome) << outcome.error().text();
+  EXPECT_EQ(outcome->revision, 5U);
+  EXPECT_TRUE(eventually([&] { return status().shots > 0; })) << "it is solved";
+}
+
+TEST_F(Cancel, ALoadThatRenderersTakeInGivesWayToTheSceneBefore) {
+  solve(lumpedCube(0.5));
+  script_->takes_scenes = false;
+  const int before = script_->uploads;
+  std::stop_source gone;
+  auto loaded = beginLoad({"ann", 1, gone.get_token()});
+  ASSERT_TRUE(eventually([&] { return script_->uploads > before; }));
+  ASSERT_TRUE(patch(emissionPatch(0, 5.0)));
+  gone.request_stop();
+  EXPECT_EQ(codeOf(loaded), ErrorCode::kCancelled);
+  EXPECT_EQ(script_->uploads, before + 2) << "they have the scene before again";
+  EXPECT_TRUE(reaches(State::kConverged));
+}
+
 TEST_F(Cancel, AnEditByTheSessionThatLoadsIsOfItsNewScene) {
   solve(lumpedCube(0.5));
   const auto bytes = std::make_shared<const Bytes>(test_scenes::encodeGlb(slowScene(60)));

@@ -37,6 +37,7 @@ class ScriptedTransport final : public solver::Transport {
     std::this_thread::sleep_for(std::chrono::milliseconds(script_->pause_ms));
     return rays_.run(batch, into);
   }
+  [[nodiscard]] bool hasTakenScene() override { return script_->takes_scenes; }
   [[nodiscard]] Losses losses() const override {
     return {static_cast<std::uint64_t>(script_->losses.load()), "worker 7 hangs"};
   }

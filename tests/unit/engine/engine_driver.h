@@ -31,7 +31,8 @@ struct TransportScript {
   std::atomic<int> uploads_to_fail{0}, uploads_to_run_out{0};
   std::atomic<bool> runs_out_of_memory{false};
   std::atomic<int> uploads{0};
-  std::atomic<int> pause_ms{0};  ///< with each run, as a slow renderer would
+  std::atomic<bool> takes_scenes{true};  ///< false: renderers are still at the last one
+  std::atomic<int> pause_ms{0};          ///< with each run, as a slow renderer would
 };
 
 /// Everything a listener is told, in order.

@@ -25,7 +25,7 @@ TEST(BurialBudget, WhatIsCheapIsAskedOfAllPlaces) {
   expectPlaces(affordablePlaces(10'000, alike(1000, true, false)), 16, 64);
   expectPlaces(affordablePlaces(1000, alike(2500, true, true)), 16, 64);
   EXPECT_TRUE(affordablePlaces(1000, alike(2500, true, true)).finer);
-  EXPECT_TRUE(budgetWarning({}).empty());
+  EXPECT_TRUE(budgetWarning({}, 0).empty());
 }
 
 // (16 + 64) x 4,000 x 1,000 is within the budget, and with 50 more it is not.
@@ -38,7 +38,7 @@ TEST(BurialBudget, FewerPlacesAreAskedWhereEachCostsMore) {
   expectPlaces(affordablePlaces(10'000, alike(5000, true, false)), 8, 32);
   expectPlaces(affordablePlaces(10'000, alike(5000, true, true)), 1, 4);
   expectPlaces(affordablePlaces(16'000, alike(1'000'000'000, true, true)), 1, 1);
-  EXPECT_NE(budgetWarning({8, 32, 32}).find("only 8 places"), std::string::npos);
+  EXPECT_NE(budgetWarning({8, 32, 32}, 0).find("only 8 places"), std::string::npos);
 }
 
 // Only as many as are spread well: five of a leaf once lay in one row.
@@ -47,7 +47,7 @@ TEST(BurialBudget, VeryManyLeavesGetAPowerOfTwo) {
   expectPlaces(affordablePlaces(130'000, {}), 8, 64);
   expectPlaces(affordablePlaces(367'000, {}), 4, 64);
   expectPlaces(affordablePlaces(5'000'000, {}), 1, 64);
-  EXPECT_FALSE(budgetWarning({4, 64, 64}).empty());
+  EXPECT_FALSE(budgetWarning({4, 64, 64}, 0).empty());
 }
 
 // Also where leaves are many: few places miss what lies along an edge.
@@ -57,6 +57,16 @@ TEST(BurialBudget, BesideEdgesMoreIsAskedAsLongAsItCanBePaidFor) {
   EXPECT_EQ(affordableBeside(250'000, {8, 64, 64}, {}), 32U);
   EXPECT_EQ(affordableBeside(1000, {}, alike(100'000, false, true)), 4U);
   EXPECT_EQ(affordableBeside(1000, {}, alike(100'000, true, true)), 64U) << "those beside are not buried";
+}
+
+// However dear a place is, all leaves together take no more than twice what is aimed at.
+TEST(BurialBudget, PlacesThatStillCostTooMuchAreGivenUp) {
+  EXPECT_EQ(affordablePlaces(10'000, alike(5000, true, true)).work_each, kMostWorkOfPlace);
+  EXPECT_EQ(affordablePlaces(60'000, alike(800'000, true, true)).work_each, 8192U);
+  EXPECT_EQ(affordablePlaces(10'000'000, alike(800'000, true, true)).work_each, 2000U);
+  EXPECT_EQ(affordableWork(10), kMostWorkOfPlace);
+  EXPECT_EQ(affordableWork(100'000), 4096U);
+  EXPECT_NE(budgetWarning({1, 1, 1}, 17).find("17 sides of texels"), std::string::npos);
 }
 
 TEST(BurialBudget, FewLeavesAreTried) {

@@ -71,6 +71,51 @@ TEST(BvhWalk, WhatLiesBehindTheEndOfASolidCostsNothing) {
   EXPECT_LT(work / 100, 100U) << "of 4000";
 }
 
+/// Walls that lie through each other in many trees: hits come in no order at all.
+TEST(BvhWalk, HitsThatComeInNoOrderAreSorted) {
+  std::vector<Bvh::Triangle> walls;
+  std::mt19937 random(9);
+  std::uniform_real_distribution<float> uniform(0.0F, 1.0F);
+  for (int i = 0; i < 20'000; ++i) {
+    const glm::vec3 at(uniform(random), uniform(random), uniform(random));
+    walls.push_back({at, at + glm::vec3(0, 0.4F, 0), at + glm::vec3(0.4F, 0, 0.4F)});
+    if (i % 2 == 0) std::swap(walls.back()[1], walls.back()[2]);
+  }
+  const std::array<Bvh, 2> trees{Bvh(walls), Bvh({walls.begin(), walls.begin() + 5000})};
+  const std::array<SolidTree, 2> solids{SolidTree(trees[0]), SolidTree(trees[1])};
+  const std::array<const SolidTree*, 2> both{&solids[0], &solids[1]};
+  std::size_t most = 0;
+  for (int ray = 0; ray < 200; ++ray) {
+    const glm::dvec3 direction(1.0, uniform(random) - 0.5, uniform(random) - 0.5);
+    std::vector<RayHit> hits, of_second;
+    std::uint64_t work = 0;
+    const auto end = SolidTree::endOfSolid(both, {-0.1, 0.5, 0.5}, direction, 2.0, hits, work);
+    auto all = sortedHits(trees[0], {-0.1, 0.5, 0.5}, direction, 2.0);
+    for (auto hit : sortedHits(trees[1], {-0.1, 0.5, 0.5}, direction, 2.0)) {
+      hit.tree = 1;
+      all.push_back(hit);
+    }
+    std::ranges::sort(all, {}, [](const RayHit& hit) { return std::tuple(hit.t, hit.front, hit.tree, hit.triangle); });
+    ASSERT_EQ(end, endOf(all));
+    most = std::max(most, hits.size());
+    if (end) continue;
+    ASSERT_EQ(hits.size(), all.size());
+    for (std::size_t i = 0; i < all.size(); ++i)
+      EXPECT_EQ(std::pair(hits[i].tree, hits[i].triangle), std::pair(all[i].tree, all[i].triangle));
+  }
+  EXPECT_GT(most, 100U);
+}
+
+TEST(BvhWalk, NobodyLooksFartherThanItMayTake) {
+  const Bvh tree(test::triangleSoup(20'000, 3));
+  const SolidTree solids(tree);
+  std::vector<RayHit> hits;
+  std::uint64_t work = 0;
+  EXPECT_FALSE(SolidTree::endOfSolid(std::array{&solids}, {-0.6, 0.0, 0.0}, {1.0, 0.01, 0.02}, 8.0, hits, work, 100));
+  EXPECT_GE(work, 100U);
+  EXPECT_LT(work, 200U);
+}
+
 TEST(BvhWalk, WhatRisesAboveAPlaneIsTold) {
   const auto triangles = test::triangleSoup(40, 5);
   const Bvh tree(triangles);

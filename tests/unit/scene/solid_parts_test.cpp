@@ -132,5 +132,23 @@ TEST_F(Parts, HoweverManyHoldAPlaceAllCount) {
   }
 }
 
+TEST_F(Parts, OfACrowdAreAskedOneByOne) {
+  for (std::uint32_t k = 0; k < 200; ++k) {
+    const glm::vec3 half(0.1F + 0.001F * static_cast<float>(k));
+    add(block(-half, half), 2 * k);
+  }
+  std::size_t asked = 0;
+  const auto count = [&](bool holds) { return [&asked, holds](const SolidTree&) { return ++asked, holds; }; };
+  const SolidParts closed(triangles_, part_of_);
+  EXPECT_EQ(closed.anyHolds(glm::vec3(0.0F), count(true)), true);
+  EXPECT_EQ(asked, 1U) << "no more once one holds it";
+  EXPECT_EQ(closed.anyHolds(glm::vec3(0.0F), count(false)), false);
+  EXPECT_EQ(asked, 201U);
+  EXPECT_EQ(closed.anyHolds(glm::vec3(0.0F, 0.0F, 0.4F), count(true)), false) << "none is there";
+  EXPECT_EQ(asked, 201U);
+  add(block(glm::vec3(0.0F), glm::vec3(0.1F)), 2 * 200 + SolidParts::kHollow);
+  EXPECT_EQ(SolidParts(triangles_, part_of_).anyHolds(glm::vec3(0.0F), count(false)), std::nullopt);
+}
+
 }  // namespace
 }  // namespace radiosity::scene
