@@ -27,8 +27,8 @@ constexpr double kLeastSlope = 0.02;
 constexpr double kPlacesATexel = 16.0, kAround = 1.0 / kPlacesATexel;
 /// Of leaves that lie partly in a dark room, where they are looked for, in texels from its wall: the deeper the better.
 constexpr std::array kDepths{0.3, 0.1, 0.03, 0.01};
-/// What one may stand in is so wide: in metres, and in a scene that is a model of its own, as a part of it.
-constexpr double kLeastRoom = 0.8, kLeastPart = 0.2;
+/// Metres: what one may stand in is so wide.
+constexpr double kLeastRoom = 0.8;
 /// A piece of a wall on a surface: longer ones are as if of fewer texels.
 constexpr double kMostPlaces = 1e6;
 
@@ -275,7 +275,7 @@ SideScene seenSides(const PatchScene& patches, const Scene& scene, const Sky& sk
 }
 
 DarkTexels findIn(const PatchScene& patches, const SideScene& sides, const geometry::RayScene& tree) {
-  DarkAir air(sides, tree, std::min(kLeastRoom / patches.scale, kLeastPart));
+  DarkAir air(sides, tree, kLeastRoom / patches.scale);
   if (!air.find()) return {};
   return DarkTexelFinder(patches, sides, air).run();
 }
