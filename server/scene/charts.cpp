@@ -13,7 +13,6 @@
 #include "server/scene/atlas.h"
 #include "server/scene/burial_record.h"
 #include "server/scene/coverage.h"
-#include "server/scene/dark_texels.h"
 #include "server/scene/emitters.h"
 #include "server/scene/lineage.h"
 #include "server/scene/lit_sides.h"
@@ -100,7 +99,6 @@ class Builder {
     } else {
       placeSpotsInGaps(patches_);
     }
-    darkenTexels(patches_, scene_, scene_.sky.value_or(options_.sky));
     patches_.spots.shrinkToFit();
     measureOpacity(scene_, patches_);
     applyOpacity(patches_);

@@ -12,7 +12,6 @@
 //                  charts_sides.cpp    what that makes of the charts
 //   atlas.h      texel size from the budget, grid of each chart, packing into pages
 //   coverage.h   exact clipped area of every leaf, points on leaves, burial inside other solids
-//   dark_texels.h  which texels would let light into dark rooms, and are dark
 //   charts.cpp   puts it together
 //
 // Then shade.cpp gives emission and reflectance, and pages.cpp brings solved irradiance back onto the pages.

@@ -67,17 +67,14 @@ inline constexpr double kCoarse = 2.25;
 /// Whether a surface that is wider than a texel has one for all of it, since no light reaches its sides.
 [[nodiscard]] bool isLeftCoarse(const Scene& scene, const PatchScene& patches, const Surface& surface);
 
-/// The surfaces of `patches`, by number, under the light of `scene`.
-[[nodiscard]] SideScene sideSceneOf(const PatchScene& patches, const Scene& scene, const Sky& sky);
-
 /// What rays meet of these, or of the triangles of `patches`. O(n log n). Throws std::bad_alloc.
 [[nodiscard]] geometry::RayScene raySceneOf(std::span<const geometry::Triangle> triangles);
 [[nodiscard]] geometry::RayScene raySceneOf(const PatchScene& patches);
 
 /// Whether light of `next`, or of the sky, reaches a side of `patches` that was left without patches because light of
-/// `before` did not, or other texels than PatchScene::dark_texels are to be dark. Both scenes have the geometry of
-/// `patches`. Nothing is traced unless one of them has a lamp or a sky that the other has not. `tree`: of the triangles
-/// of `patches`, asked for where something is to be traced; one is built where there is none.
+/// `before` did not. Both scenes have the geometry of `patches`. Nothing is traced unless `next` has a lamp or a sky
+/// that `before` has not. `tree`: of the triangles of `patches`, asked for where something is to be traced; one is
+/// built where there is none.
 using TreeAtHand = std::function<std::shared_ptr<const geometry::RayScene>()>;
 [[nodiscard]] bool reachesDarkSides(const PatchScene& patches, const Scene& before, const Sky& sky_before,
                                     const Scene& next, const Sky& sky_next, const TreeAtHand& tree = {});

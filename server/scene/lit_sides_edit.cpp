@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "common/log.h"
-#include "server/scene/dark_texels.h"
 #include "server/scene/emitters.h"
 #include "server/scene/lit_sides.h"
 #include "server/scene/material_of.h"
@@ -17,6 +16,24 @@ std::vector<Bvh::Triangle> trianglesOf(const PatchScene& patches) {
   for (std::size_t i = 0; i < patches.indices.size(); ++i)
     triangles[i / 3][i % 3] = patches.vertices[patches.indices[i]].position;
   return triangles;
+}
+
+/// The surfaces of `patches` under the light of `scene`.
+SideScene sideSceneOf(const PatchScene& patches, const Scene& scene, const Sky& sky) {
+  SideScene sides;
+  sides.lights = lightsInUnitBox(scene, patches.centre, patches.scale);
+  sides.sky = sky;
+  sides.triangles = trianglesOf(patches);
+  const Emitters emitters(scene);
+  sides.emits.resize(patches.triangles.size());
+  for (const Surface& surface : patches.surfaces) {
+    sides.groups.push_back({surface.first_triangle, surface.triangle_count, surface.instance,
+                            materialOf(scene, surface).double_sided, surface.see_through,
+                            static_cast<double>(surface.width) * surface.height});
+    for (auto t = surface.first_triangle; t < surface.first_triangle + surface.triangle_count; ++t)
+      sides.emits[t] = emitters.shines(surface.instance, patches.triangle_source[t]);
+  }
+  return sides;
 }
 
 /// Whether `next` has a lamp, a light or a sky where `before` had none.
@@ -36,31 +53,7 @@ bool shinesAnew(const Scene& before, const Sky& sky_before, const Scene& next, c
   });
 }
 
-/// Whether other texels than now would be dark for what they mix in.
-bool darkensOthers(const PatchScene& patches, const Scene& next, const Sky& sky, const geometry::RayScene* tree) {
-  const auto found = tree != nullptr ? findDarkTexels(patches, next, sky, *tree)
-                                     : findDarkTexels(patches, next, sky, raySceneOf(patches));
-  return found.texels != patches.dark_texels;
-}
-
 }  // namespace
-
-SideScene sideSceneOf(const PatchScene& patches, const Scene& scene, const Sky& sky) {
-  SideScene sides;
-  sides.lights = lightsInUnitBox(scene, patches.centre, patches.scale);
-  sides.sky = sky;
-  sides.triangles = trianglesOf(patches);
-  const Emitters emitters(scene);
-  sides.emits.resize(patches.triangles.size());
-  for (const Surface& surface : patches.surfaces) {
-    sides.groups.push_back({surface.first_triangle, surface.triangle_count, surface.instance,
-                            materialOf(scene, surface).double_sided, surface.see_through,
-                            static_cast<double>(surface.width) * surface.height});
-    for (auto t = surface.first_triangle; t < surface.first_triangle + surface.triangle_count; ++t)
-      sides.emits[t] = emitters.shines(surface.instance, patches.triangle_source[t]);
-  }
-  return sides;
-}
 
 geometry::RayScene raySceneOf(std::span<const geometry::Triangle> triangles) {
   auto built = geometry::RayScene::build(triangles);
@@ -90,15 +83,12 @@ bool reachesDarkSides(const PatchScene& patches, const Scene& before, const Sky&
     asked[s][1] = surface.shows_back && surface.first_node[1] == kNone;  // nobody sees what is sealed
     any |= asked[s][0] || asked[s][1];
   }
-  const bool anew = shinesAnew(before, sky_before, next, sky_next);
-  if (!anew && !shinesAnew(next, sky_next, before, sky_before)) return false;
-  const auto at_hand = tree ? tree() : nullptr;
-  if (darkensOthers(patches, next, sky_next, at_hand.get())) return true;
-  if (!any || !anew) return false;
+  if (!any || !shinesAnew(before, sky_before, next, sky_next)) return false;
   const auto sides = sideSceneOf(patches, next, sky_next);
   // Photons find what a lamp lights; only the sky and the sun send none.
   const auto isSun = [](const PunctualLight& light) { return light.kind == LightKind::kDirectional; };
   const bool far = isBright(sky_next.upper) || isBright(sky_next.lower) || std::ranges::any_of(next.lights, isSun);
+  const auto at_hand = tree ? tree() : nullptr;
   const auto light =
       lightOnSides(sides, asked, far ? LookFor::kPhotonsAndPaths : LookFor::kPhotonsAlone, at_hand.get());
   for (std::size_t s = 0; s < asked.size(); ++s)

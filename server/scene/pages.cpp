@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <glm/common.hpp>
-#include <utility>
 
 #include "common/check.h"
 #include "common/parallel.h"
@@ -125,7 +124,6 @@ void fillUnknown(Patchwork& p) {
     if (p.ring[i] == 0) texels.push_back(i);
   if (texels.empty()) {  // wholly buried or empty: black, but somebody's
     std::ranges::fill(p.value, glm::vec3(0.0F));
-    std::ranges::fill(p.ring, std::uint8_t{1});
     return;
   }
   for (std::uint8_t ring = 1; ring < kMaxRing && !texels.empty(); ++ring) {
@@ -140,14 +138,12 @@ void fillUnknown(Patchwork& p) {
 
 class PageMaker {
  public:
-  /// `darkens`: the values are light.
-  PageMaker(const PatchScene& patches, std::span<const glm::vec3> values, bool darkens)
-      : patches_(patches), values_(values), darkens_(darkens) {
+  PageMaker(const PatchScene& patches, std::span<const glm::vec3> values) : patches_(patches), values_(values) {
     for (const Page& page : patches.pages) {
       const std::size_t count = std::size_t{page.width} * page.height;
       pages_.push_back(
           {Image(static_cast<int>(page.width), static_cast<int>(page.height)), std::vector<float>(count, 0.0F)});
-      owners_.push_back({std::vector<std::uint32_t>(count, kNone), std::vector<std::uint8_t>(count, kMaxRing), {}});
+      owners_.push_back({std::vector<std::uint32_t>(count, kNone), std::vector<std::uint8_t>(count, kMaxRing)});
     }
   }
 
@@ -166,12 +162,10 @@ class PageMaker {
       if (std::ranges::none_of(covered, [&](const auto& one) { return one.side == of.side; })) continue;
       Patchwork p = gather(patches_, surfaceOf(of), of.side, values_);
       takeFromCovers(of, covered, p);
-      darken(of, p);
       fillUnknown(p);
       place(of, p);
     }
     placeBlack();
-    if (darkens_) fixDark();
     if (seams == Seams::kStitched) stitchSeams(patches_, owners_, pages_);
     for (std::size_t page = 0; page < pages_.size(); ++page) dilate(pages_[page], owners_[page]);
     return std::move(pages_);
@@ -211,47 +205,10 @@ class PageMaker {
     const auto make = [&](std::size_t i) {
       const SideRef& of = sides_[first + i];
       made[i] = gather(patches_, surfaceOf(of), of.side, values_);
-      darken(of, made[i]);
       fillUnknown(made[i]);
     };
     inTurns(made.size(), make, texels / kTexelsAThread);
     for (auto i = first; i < last; ++i) place(sides_[i], made[i - first]);
-  }
-
-  [[nodiscard]] std::span<const PatchScene::DarkTexel> darkOf(const SideRef& of) const {
-    const auto from = [&](std::uint32_t surface, std::uint32_t side) {
-      const auto place = [](const PatchScene::DarkTexel& texel) { return std::pair(texel.surface, texel.side); };
-      return std::ranges::lower_bound(patches_.dark_texels, std::pair(surface, side), {}, place);
-    };
-    const auto side = static_cast<std::uint32_t>(of.side);
-    return {from(of.surface, side), from(of.surface, side + 1)};
-  }
-
-  /// What lookups in dark rooms mix in.
-  void darken(const SideRef& of, Patchwork& p) const {
-    if (!darkens_) return;
-    const PagePlace& place = surfaceOf(of).place[of.side];
-    for (const auto& texel : darkOf(of)) {
-      const auto x = std::int64_t{place.x} + texel.x - p.x0, y = std::int64_t{place.y} + texel.y - p.y0;
-      if (!p.inside(x, y)) continue;
-      p.value[p.at(x, y)] = glm::vec3(0.0F);
-      p.ring[p.at(x, y)] = 0;
-    }
-  }
-
-  /// Once all charts have their places.
-  void fixDark() {
-    for (const auto& texel : patches_.dark_texels) {
-      const PagePlace& place = patches_.surfaces[texel.surface].place[texel.side];
-      const auto x = std::int64_t{place.x} + texel.x, y = std::int64_t{place.y} + texel.y;
-      auto& owners = owners_[place.page];
-      const auto& image = pages_[place.page].irradiance;
-      if (x < 0 || y < 0 || x >= image.width || y >= image.height) continue;
-      const auto at = image.index(static_cast<int>(x), static_cast<int>(y));
-      if (owners.owner[at] != ownerOf(texel.surface, texel.side)) continue;
-      owners.fixed.resize(owners.owner.size(), false);
-      owners.fixed[at] = true;
-    }
   }
 
   /// The light of leaves that other surfaces cover, whose charts have their places already.
@@ -348,7 +305,6 @@ class PageMaker {
 
   const PatchScene& patches_;
   std::span<const glm::vec3> values_;
-  bool darkens_;
   std::vector<LightmapPage> pages_;
   std::vector<PageOwners> owners_;
   std::vector<SideRef> sides_;  ///< that have texels
@@ -359,7 +315,7 @@ class PageMaker {
 std::vector<LightmapPage> assemblePages(const PatchScene& patches, std::span<const glm::vec3> node_values,
                                         Seams seams) {
   RAD_CHECK_EQ(node_values.size(), patches.nodeCount());
-  return PageMaker(patches, node_values, seams == Seams::kStitched).make(seams);
+  return PageMaker(patches, node_values).make(seams);
 }
 
 LightmapPage coarserMip(const LightmapPage& page) {

@@ -20,7 +20,6 @@ namespace radiosity::scene {
 struct PageOwners {
   std::vector<std::uint32_t> owner;  ///< kNone: nobody's
   std::vector<std::uint8_t> ring;    ///< 0: a value of its own; 1, 2, ...: filled from neighbours, that far away
-  std::vector<bool> fixed;           ///< a dark texel, which gives way to nothing; empty: there is none
 };
 
 /// Changes texels as little as possible so that bilinear lookups on both sides of each seam agree. Least-norm

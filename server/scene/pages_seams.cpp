@@ -48,7 +48,6 @@ class Stitcher {
  private:
   /// Of a texel on one side of a seam; `larger`: the texel's area on the side where they are larger.
   [[nodiscard]] float mobility(const Surface& surface, std::uint32_t page, std::uint32_t texel, float larger) const {
-    if (!owners_[page].fixed.empty() && owners_[page].fixed[texel]) return 0.0F;
     const bool visible = owners_[page].ring[texel] == 0;
     const float coverage = visible ? pages_[page].coverage[texel] : 1.0F, area = surface.texel_area * coverage;
     const float smaller = area > 0.0F ? std::clamp(larger / area, 1.0F, kMostMobile) : 1.0F;

@@ -9,7 +9,6 @@
 #pragma once
 
 #include <array>
-#include <compare>
 #include <cstdint>
 #include <glm/common.hpp>
 #include <glm/vec2.hpp>
@@ -150,16 +149,6 @@ struct PatchScene {
     glm::vec2 texel;
   };
   std::vector<Covered> covered;  ///< leaves ascending, sides of each likewise
-
-  /// A texel of a side that is dark whatever its leaf gets: bilinear lookups in a dark room would mix it in
-  /// (dark_texels.h). One beside the chart is filled from its texels.
-  struct DarkTexel {
-    std::uint32_t surface, side;
-    std::int32_t x, y;  ///< as leaves count; from -1 to the width, or height
-
-    auto operator<=>(const DarkTexel&) const = default;
-  };
-  std::vector<DarkTexel> dark_texels;  ///< sorted by surface, then by side
 
   /// Edge of a texel where nothing asks for another (unit box): as charts were laid out, and as a first guess decided
   /// which facets are charts of their own.

@@ -89,7 +89,6 @@ LeafGather::LeafGather(const scene::PatchScene& patches, const std::vector<Side>
     : sights_(patches, sides, seed, std::move(rays)),
       most_bytes_(most_bytes),
       sides_(sides),
-      has_dark_rooms_(!patches.dark_texels.empty()),
       own_area_(areas.empty() ? leafAreas(patches, sides) : std::vector<float>()),
       area_(areas.empty() ? std::span<const float>(own_area_) : areas) {
   const std::size_t leaves = sights_.leafCount(), first = leaves * kFirstRays * LeafSights::kRayBytes;
@@ -224,9 +223,7 @@ void LeafGather::takeLight(std::size_t h) {
     // A norm over areas bounds the sum over them (Cauchy and Schwarz).
     if (area > 0.0) tolerance[c] = light_.residual * shining[c] / std::sqrt(area);
   }
-  auto even = evenLight(sums);
-  if (has_dark_rooms_) leaveDark(h, even);
-  half.gmres.begin(std::move(even), {area_.begin(), area_.end()}, tolerance, kMaxSweeps, true);
+  half.gmres.begin(evenLight(sums), {area_.begin(), area_.end()}, tolerance, kMaxSweeps, true);
   half.done = false;
 }
 

@@ -178,8 +178,6 @@ class LeafGather {
   void takeLight(std::size_t half);
   void takeSources(std::size_t half, std::span<SourceSum> sums) noexcept;
   [[nodiscard]] RayGmres::Vectors evenLight(const std::vector<SourceSum>& sums) const;
-  void leaveDark(std::size_t half, RayGmres::Vectors& light) const;
-  [[nodiscard]] std::vector<bool> reachedByLight(std::size_t half) const;
   void average(std::size_t half);
   void followSteps(std::size_t half, const std::vector<Light>* source);
   void sweep(std::size_t half, RayGmres::Vectors& x, bool affine);
@@ -244,7 +242,6 @@ class LeafGather {
   std::size_t most_bytes_;
   bool has_gathered_ = false, lacks_memory_ = false;
   const std::vector<Side>& sides_;
-  bool has_dark_rooms_ = false;
   std::vector<float> own_area_;
   std::span<const float> area_;  ///< by leaf value, unit box squared
   [[nodiscard]] double areaOf(std::size_t value) const { return static_cast<double>(area_[value]); }

@@ -263,37 +263,6 @@ Gmres<float>::Vectors LeafGather::evenLight(const std::vector<SourceSum>& sums) 
   return light;
 }
 
-/// A room that no light reaches begins without any: what is left of it when the others are solved would glow, since a
-/// surface that goes on under the wall makes it one part with them.
-void LeafGather::leaveDark(std::size_t h, RayGmres::Vectors& light) const {
-  const auto reached = reachedByLight(h);
-  for (auto& channel : light) {
-    for (std::size_t v = 0; v < channel.size(); ++v)
-      if (!reached[v]) channel[v] = 0.0F;
-  }
-}
-
-/// By end of a ray: whether something shines there, or some ray from there, if over others, ends on what does.
-std::vector<bool> LeafGather::reachedByLight(std::size_t h) const {
-  const auto& source = halves_[h].source;
-  const auto shines = [&](std::size_t end) {
-    return source[end][0] != 0.0 || source[end][1] != 0.0 || source[end][2] != 0.0;
-  };
-  const auto steps = sights_.steps(h);
-  std::vector<bool> reached(sights_.endCount() + steps.size());
-  for (std::size_t end = 0; end < source.size(); ++end) reached[end] = shines(end);
-  for (bool is_new = true; std::exchange(is_new, false);) {
-    for (std::size_t i = 0; i < steps.size(); ++i)
-      reached[sights_.endCount() + i] = reached[steps[i].next] || shines(steps[i].by);
-    for (std::uint32_t v = 0; v < sights_.leafCount(); ++v) {
-      if (reached[v]) continue;
-      for (const auto end : sights_.seen(h, v)) reached[v] = reached[v] || reached[end];
-      is_new = is_new || reached[v];
-    }
-  }
-  return reached;
-}
-
 void LeafGather::LevelSum::add(const LevelSum& other) {
   for (std::size_t c = 0; c < 4; ++c) {
     left[c] += other.left[c];

@@ -7,7 +7,6 @@
 #include <new>
 #include <numbers>
 #include <span>
-#include <tuple>
 #include <utility>
 
 #include "common/log.h"
@@ -105,13 +104,6 @@ std::uint32_t LeafRays::foundStandIn(std::uint32_t value) const {
   return std::ranges::lower_bound(stand_ins_, value, {}, [](const auto& pair) { return pair.first; })->second;
 }
 
-bool LeafRays::isDark(const Side& side, std::uint32_t x, std::uint32_t y) const {
-  using Dark = scene::PatchScene::DarkTexel;
-  const auto place = [](const Dark& texel) { return std::tuple(texel.surface, texel.side, texel.y, texel.x); };
-  const Dark wanted{side.surface, side.side, static_cast<std::int32_t>(x), static_cast<std::int32_t>(y)};
-  return std::ranges::binary_search(patches_.dark_texels, place(wanted), {}, place);
-}
-
 /// Who is lit in the place of a leaf without area: what covers it, or the first of the eight around it that has some.
 std::uint32_t LeafRays::neighbourOf(const Side& side, std::uint32_t leaf) const {
   const auto has_area = [&](const Side& of, std::uint32_t which) {
@@ -129,7 +121,6 @@ std::uint32_t LeafRays::neighbourOf(const Side& side, std::uint32_t leaf) const 
     }
   }
   const auto x = leaf % side.width, y = leaf / side.width;
-  if (isDark(side, x, y)) return kNothing;  // its neighbours may be lit beyond a wall
   for (auto ny = y - std::min(y, 1U); ny < std::min(y + 2, side.height); ++ny) {
     for (auto nx = x - std::min(x, 1U); nx < std::min(x + 2, side.width); ++nx)
       if (has_area(side, ny * side.width + nx)) return side.first_value + ny * side.width + nx;

@@ -95,7 +95,6 @@ class LeafRays {
   void findEven();
   [[nodiscard]] std::uint32_t foundStandIn(std::uint32_t value) const;
   [[nodiscard]] std::uint32_t neighbourOf(const Side& side, std::uint32_t leaf) const;
-  [[nodiscard]] bool isDark(const Side& side, std::uint32_t x, std::uint32_t y) const;
   [[nodiscard]] bool isBeneath(const Side& side, std::uint32_t value) const;
   bool uncover(geometry::Hit& hit, const glm::dvec3& origin, const glm::dvec3& direction,
                std::span<std::uint32_t> passed, std::size_t sheets) const;
