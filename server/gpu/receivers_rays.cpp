@@ -73,7 +73,8 @@ bool Receivers::absorbs(const geometry::Ray& ray, const geometry::Hit& hit) cons
   const auto first = surface.first_node[hit.front ? 0 : 1];
   const auto texel = texelAt(patches_->triangles[hit.triangle], ray.origin + hit.t * ray.direction);
   const auto within = [](float at, std::uint32_t count) {
-    return static_cast<std::uint32_t>(std::clamp(at, 0.0F, static_cast<float>(count - 1)));
+    return at > 0.0F ? static_cast<std::uint32_t>(std::min(at, static_cast<float>(count - 1)))
+                     : 0U;  // also of no number
   };
   const auto x = within(texel.x, surface.width), y = within(texel.y, surface.height);
   const auto areaOf = [&](std::uint32_t leaf) { return patches_->node_area[first + leaf]; };

@@ -46,6 +46,11 @@ double powerOf(const LightPolygon& light) {
   return light.area * static_cast<double>(light.emission.x + light.emission.y + light.emission.z);
 }
 
+/// To 16 bits: lamps that are dimmed alike stay the same crowd, but for those that rounding takes to the next number.
+float rounded(float strength) {
+  return std::bit_cast<float>((std::bit_cast<std::uint32_t>(strength) + 0x80U) & ~0xFFU);
+}
+
 bool isOneColour(std::span<const LightPolygon> lights) {
   const auto unit = [](const glm::vec3& colour) { return colour / strongest(colour); };
   const auto first = unit(lights.front().emission);
@@ -57,7 +62,7 @@ bool isOneColour(std::span<const LightPolygon> lights) {
 
 /// Of the lamps that emit what `emission` says; `colour`: of a strength of one.
 std::optional<Crowd> makeCrowd(std::span<const LightPolygon> lights, float (*emission)(const glm::vec3&),
-                               const glm::vec3& colour) {
+                               const glm::vec3& colour, std::span<const Crowd> known) {
   std::vector<LightPolygon> lamps;
   std::vector<float> strengths;
   for (const auto& light : lights) {
@@ -71,33 +76,37 @@ std::optional<Crowd> makeCrowd(std::span<const LightPolygon> lights, float (*emi
   const float most = *std::ranges::max_element(strengths);
   crowd.emission = most * colour;
   for (std::size_t i = 0; i < lamps.size(); ++i) {
-    strengths[i] /= most;
+    strengths[i] = rounded(strengths[i] / most);
     crowd.key = mixKeys(mixKeys(crowd.key, lamps[i].key), std::bit_cast<std::uint32_t>(strengths[i]));
   }
-  crowd.lamps = std::make_shared<const LightTree>(std::move(lamps), strengths);
+  const auto same = std::ranges::find_if(known, [&](const Crowd& of) { return of.key == crowd.key && of.lamps; });
+  crowd.lamps = same != known.end() ? same->lamps : std::make_shared<const LightTree>(std::move(lamps), strengths);
   crowd.area = crowd.lamps->flux();
   return crowd;
 }
 
-std::vector<Crowd> makeCrowds(std::span<const LightPolygon> lights) {
+std::vector<Crowd> makeCrowds(std::span<const LightPolygon> lights, std::span<const Crowd> known) {
   std::vector<Crowd> crowds;
   const auto add = [&](std::optional<Crowd> crowd) {
     if (crowd) crowds.push_back(std::move(*crowd));
   };
   if (isOneColour(lights)) {
     const auto colour = lights.front().emission / strongest(lights.front().emission);
-    add(makeCrowd(lights, strongest, colour));
+    add(makeCrowd(lights, strongest, colour, known));
     return crowds;
   }
-  add(makeCrowd(lights, [](const glm::vec3& e) { return e.x; }, {1.0F, 0.0F, 0.0F}));
-  add(makeCrowd(lights, [](const glm::vec3& e) { return e.y; }, {0.0F, 1.0F, 0.0F}));
-  add(makeCrowd(lights, [](const glm::vec3& e) { return e.z; }, {0.0F, 0.0F, 1.0F}));
+  add(makeCrowd(
+      lights, [](const glm::vec3& e) { return e.x; }, {1.0F, 0.0F, 0.0F}, known));
+  add(makeCrowd(
+      lights, [](const glm::vec3& e) { return e.y; }, {0.0F, 1.0F, 0.0F}, known));
+  add(makeCrowd(
+      lights, [](const glm::vec3& e) { return e.z; }, {0.0F, 0.0F, 1.0F}, known));
   return crowds;
 }
 
 }  // namespace
 
-DividedLights divideLights(std::vector<LightPolygon> lights) {
+DividedLights divideLights(std::vector<LightPolygon> lights, std::span<const Crowd> known) {
   DividedLights divided;
   if (lights.size() <= kFewLights) {
     divided.shooters = std::move(lights);
@@ -107,7 +116,7 @@ DividedLights divideLights(std::vector<LightPolygon> lights) {
   for (const auto& light : lights) power += powerOf(light);
   std::vector<LightPolygon> many;
   for (auto& light : lights) (powerOf(light) >= kStrong * power ? divided.shooters : many).push_back(light);
-  if (!many.empty()) divided.crowds = makeCrowds(many);
+  if (!many.empty()) divided.crowds = makeCrowds(many, known);
   return divided;
 }
 

@@ -33,12 +33,12 @@ struct Crowd : CrowdLight {
 };
 
 /// Which lamps are worth being shooters, in the order of `lights`, and the crowds of all others. Where there are few,
-/// all are. O(n log n).
+/// all are. O(n log^2 n), and O(n) where the crowds are `known`: their trees are taken from there.
 struct DividedLights {
   std::vector<LightPolygon> shooters;
   std::vector<Crowd> crowds;
 };
-[[nodiscard]] DividedLights divideLights(std::vector<LightPolygon> lights);
+[[nodiscard]] DividedLights divideLights(std::vector<LightPolygon> lights, std::span<const Crowd> known = {});
 
 /// A sample of the links of a crowd, taken in slices: what arrives at every leaf for an emission of 1.
 class CrowdSample {

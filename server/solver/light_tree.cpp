@@ -48,7 +48,7 @@ Cone join(const Cone& a, const Cone& b) {
     const auto [beyond, cosine] = cosineOfSum(between, sineOf(between), cone.cosine, sineOf(cone.cosine));
     return beyond ? -1.0F : cosine;
   };
-  return {axis, std::max(-1.0F, std::min(widest(a), widest(b)) - kSpare)};
+  return {axis, std::min(widest(a), widest(b))};
 }
 
 }  // namespace
@@ -91,7 +91,7 @@ LightTree::Bounds LightTree::around(std::span<const std::uint32_t> lights) const
     bounds.largest = std::max(bounds.largest, static_cast<float>(light.area));
   }
   bounds.axis = cone.axis;
-  bounds.cosine = cone.cosine;
+  bounds.cosine = lights.size() > 1 ? std::max(-1.0F, cone.cosine - kSpare) : cone.cosine;
   bounds.flux = static_cast<float>(flux);
   return bounds;
 }

@@ -17,7 +17,7 @@ namespace radiosity::solver {
 
 class LightTree {
  public:
-  /// `strengths`: exitance by light, positive, any unit. O(n log n).
+  /// `strengths`: exitance by light, positive, any unit. O(n log^2 n).
   LightTree(std::vector<LightPolygon> lights, std::span<const float> strengths);
 
   struct Draw {

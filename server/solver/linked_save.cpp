@@ -153,7 +153,7 @@ bool LinkedSolver::restore(ArchiveReader& from) {
   const auto known = [&](const Shooter& shooter) {
     return (shooter.light == scene::kNone || shooter.light < lights_.size()) &&
            (shooter.source == scene::kNone || shooter.source < sources_.size()) &&
-           (shooter.crowd == scene::kNone || shooter.crowd < crowds_.size());
+           (shooter.crowd == scene::kNone || (shooter.crowd < crowds_.size() && shooter.sample_cost > 0.0));
   };
   const auto exists = [&](const Measurement& want) { return want.shooter < shooters.size() && want.half < 2; };
   if (half_[0].size() != values || half_[1].size() != values || shaded_[0].size() != shading_.size() ||

@@ -175,7 +175,10 @@ bool LinkedSolver::finishEdit() {
     from_links_ = FromLinks::kAfterEdit;
     return false;
   }
-  if (takeKeptEnd()) return true;
+  if (takeKeptEnd()) {
+    wanted_.clear();
+    return true;
+  }
   const bool lacks_lamp = growing_ && wantsLamp();
   if (error_.total <= settings_.target_error && !lacks_lamp) {
     wanted_.clear();

@@ -352,7 +352,7 @@ StepOutcome LinkedSolver::chooseFurther() {
 
 void LinkedSolver::setTargetError(double target) {
   rounds_before_edit_ = rounds_;
-  shown_ = nullptr;
+  const bool was_shown = std::exchange(shown_, nullptr) != nullptr;
   settings_.target_error = target;
   aim_ = std::max(aim_, target);
   planner_.setTarget(aim_);
@@ -364,6 +364,8 @@ void LinkedSolver::setTargetError(double target) {
     settling_ = true;
   }
   if (phase_ != Phase::kDone || from_links_ != FromLinks::kNo) return;
+  // What was told is of an end before; what the links and rays that there are now say is to be solved for.
+  if (was_shown) return (void)(from_links_ = FromLinks::kToConfirm);
   tryNow([this] {
     limit_ = SolveLimit::kNone;
     while (error_.total <= aim_ && aimFurther()) continue;

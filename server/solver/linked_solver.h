@@ -219,7 +219,7 @@ class LinkedSolver final : public Solver {
   void addCrowd(const Crowd& crowd);
   [[nodiscard]] bool restoreCrowds(ArchiveReader& from);
   [[nodiscard]] bool restoreShown(ArchiveReader& from);
-  [[nodiscard]] std::size_t lampCount() const;
+  [[nodiscard]] bool hasTooManyLamps() const;
   void takeSources(const LightSources& sources);
   void addSource(const PunctualLights::Source& source);
   [[nodiscard]] std::array<double, 3> skyFlux() const;

@@ -21,7 +21,7 @@ constexpr double kSourceCost = 60.0;
 /// Every light polygon that ever was is a shooter; its radiosity is what it emits now.
 void LinkedSolver::takeLights() {
   for (auto& light : lights_) light.emission = glm::vec3(0.0F);
-  const auto [lights, crowds] = divideLights(findLightPolygons(*patches_, sides_, system_.emission()));
+  const auto [lights, crowds] = divideLights(findLightPolygons(*patches_, sides_, system_.emission()), crowds_);
   for (const auto& light : lights) {
     const auto known = std::ranges::find(lights_, light.key, &LightPolygon::key);
     if (known != lights_.end()) {
@@ -75,12 +75,6 @@ void LinkedSolver::addCrowd(const Crowd& crowd) {
   shooter.sample_cost = CrowdSample::cost(system_.leafAreas().size()) / shotCost();
   crowds_.push_back(crowd);
   (void)system_.add(shooter);
-}
-
-std::size_t LinkedSolver::lampCount() const {
-  std::size_t count = lights_.size() + sources_.size();
-  for (const auto& crowd : crowds_) count += crowd.lamps ? crowd.lamps->lights().size() : 0;
-  return count;
 }
 
 /// False: there is more to do.

@@ -25,10 +25,16 @@ constexpr double kLeastByLinks = 0.5;
 
 }  // namespace
 
+/// Paths ask each lamp by itself, and those of a crowd are not among them.
+bool LinkedSolver::hasTooManyLamps() const {
+  return lights_.size() + sources_.size() > kMostLights ||
+         std::ranges::any_of(crowds_, [](const Crowd& crowd) { return !crowd.isDark(); });
+}
+
 bool LinkedSolver::wantsVariation() const {
   if (variation_ || growing_ || !settings_.within_leaves || error_.total > std::max(kSoon * aim_, kLittle))
     return false;
-  if (lampCount() > kMostLights) return false;
+  if (hasTooManyLamps()) return false;
   // There rays find most lamps, too, and where something cuts a leaf they know what varies.
   return patches_->opacity.empty();
 }
@@ -46,7 +52,7 @@ void LinkedSolver::assessStep() {
 
 /// For the light that leaves have now.
 void LinkedSolver::updateVariation() {
-  if (lampCount() > kMostLights) {  // an edit lit them
+  if (hasTooManyLamps()) {  // an edit lit them
     variation_.reset();
     return next_variation_.reset();
   }

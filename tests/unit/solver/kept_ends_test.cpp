@@ -109,6 +109,16 @@ TEST_F(KeptEndsOfASolve, ASmallerErrorThanThatEndHadIsWorkedFor) {
   EXPECT_EQ(solver_->irradiance(), finer);
 }
 
+TEST_F(KeptEndsOfASolve, ASmallerErrorThanThatShownIsWorkedForWithWhatCameInBetween) {
+  edit([](auto& quads) { quads[3].emission = glm::vec3(40.0F), quads[1].emission = glm::vec3(0.0F); });
+  edit([](auto&) {});  // shown again; the links and rays that there are know it better
+  const double target = 0.3 * solver_->error().total;
+  solver_->setTargetError(target);
+  test::solve(*solver_);
+  EXPECT_LE(solver_->error().total, target);
+  EXPECT_EQ(solver_->limit(), SolveLimit::kNone);
+}
+
 TEST_F(KeptEndsOfASolve, AShownEndIsStillShownAfterItWasSaved) {
   const auto before = solver_->irradiance();
   edit([](auto& quads) { quads[3].emission = glm::vec3(40.0F), quads[1].emission = glm::vec3(0.0F); });
