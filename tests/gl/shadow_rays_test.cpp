@@ -8,6 +8,19 @@
 namespace radiosity::test {
 namespace {
 
+/// What a round of all lights brings.
+solver::FluxAccumulators deliver(solver::Transport& transport, const scene::PatchScene& scene,
+                                 solver::PunctualLights& lights) {
+  auto flux = accumulators(scene);
+  while (lights.hasSlice(1)) {
+    solver::ShotBatch slice;
+    lights.addSlice(1, slice);
+    slice.flux_scale = kFluxScale;
+    EXPECT_TRUE(transport.run(slice, flux));
+  }
+  return flux;
+}
+
 // A closed house of walls of no thickness, a thousandth as wide as the ground around it: by images, whose pixels are
 // wider than its roof, the sun lights it within.
 TEST(ShadowRays, NoLightGetsIntoAClosedHouseOnWideGround) {
@@ -30,13 +43,7 @@ TEST(ShadowRays, NoLightGetsIntoAClosedHouseOnWideGround) {
          .intensity = glm::vec3(100.0F)}};
     sources.sky = {glm::vec3(1000.0F), glm::vec3(0.0F)};
     solver::PunctualLights lights(*scene, sources, {.seed = seed});
-    auto flux = accumulators(*scene);
-    while (lights.hasSlice(1)) {
-      solver::ShotBatch slice;
-      lights.addSlice(1, slice);
-      slice.flux_scale = kFluxScale;
-      ASSERT_TRUE((*made)->run(slice, flux));
-    }
+    const auto flux = deliver(**made, *scene, lights);
     EXPECT_GT(fluxAt(*scene, flux, ground, kFluxScale), 0.0);
     for (std::uint32_t face = 0; face < 6; ++face)
       EXPECT_EQ(fluxAt(*scene, flux, inside + face, kFluxScale), 0.0) << "face " << face << ", seed " << seed;
@@ -58,13 +65,7 @@ TEST(ShadowRays, WhatShinesWithinASolidIsAbsorbedThere) {
   solver::LightSources sources;
   sources.lights = {{.kind = scene::LightKind::kPoint, .position = {0.0F, 0.1F, 0.0F}, .intensity = glm::vec3(1.0F)}};
   solver::PunctualLights lights(*scene, sources, {.seed = 1});
-  auto flux = accumulators(*scene);
-  while (lights.hasSlice(1)) {
-    solver::ShotBatch slice;
-    lights.addSlice(1, slice);
-    slice.flux_scale = kFluxScale;
-    ASSERT_TRUE((*made)->run(slice, flux));
-  }
+  const auto flux = deliver(**made, *scene, lights);
   EXPECT_EQ(flux.escaped[0], 0);
   EXPECT_NEAR(static_cast<double>(flux.backface[0]) / kFluxScale, lights.flux()[0], 1e-6 * lights.flux()[0]);
 }
