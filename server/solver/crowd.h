@@ -32,13 +32,17 @@ struct Crowd : CrowdLight {
   std::shared_ptr<const LightTree> lamps;  ///< null: it has been dark since before the solver was restored
 };
 
-/// Which lamps are worth being shooters, in the order of `lights`, and the crowds of all others. Where there are few,
-/// all are. O(n log^2 n), and O(n) where the crowds are `known`: their trees are taken from there.
+/// So many lamps are worth being shooters each, whatever they send, as far as memory for their links goes.
+[[nodiscard]] std::size_t fewLights(std::size_t leaves, std::size_t link_memory);
+
+/// Which lamps are worth being shooters, in the order of `lights`, and the crowds of all others. Where there are no
+/// more than `few`, all are. O(n log^2 n), and O(n) where the crowds are `known`: their trees are taken from there.
 struct DividedLights {
   std::vector<LightPolygon> shooters;
   std::vector<Crowd> crowds;
 };
-[[nodiscard]] DividedLights divideLights(std::vector<LightPolygon> lights, std::span<const Crowd> known = {});
+[[nodiscard]] DividedLights divideLights(std::vector<LightPolygon> lights, std::size_t few,
+                                         std::span<const Crowd> known = {});
 
 /// A sample of the links of a crowd, taken in slices: what arrives at every leaf for an emission of 1.
 class CrowdSample {

@@ -21,7 +21,8 @@ constexpr double kSourceCost = 60.0;
 /// Every light polygon that ever was is a shooter; its radiosity is what it emits now.
 void LinkedSolver::takeLights() {
   for (auto& light : lights_) light.emission = glm::vec3(0.0F);
-  const auto [lights, crowds] = divideLights(findLightPolygons(*patches_, sides_, system_.emission()), crowds_);
+  const auto [lights, crowds] = divideLights(findLightPolygons(*patches_, sides_, system_.emission()),
+                                             fewLights(system_.leafAreas().size(), settings_.link_memory), crowds_);
   for (const auto& light : lights) {
     const auto known = std::ranges::find(lights_, light.key, &LightPolygon::key);
     if (known != lights_.end()) {

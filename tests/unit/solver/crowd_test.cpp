@@ -20,15 +20,16 @@ using test::solve;
 
 constexpr float kFloor = -0.4F, kCeiling = 0.4F, kHalf = 0.2F;
 constexpr std::uint32_t kLeaves = 20, kTiles = 18;
+constexpr std::size_t kFew = 256;
 
-/// kTiles by kTiles lamps that make a square of side 2 kHalf, facing down.
-std::vector<test::Quad> tiles(const glm::vec3& emission) {
+/// `count` by `count` lamps that make a square of side 2 kHalf, facing down.
+std::vector<test::Quad> tiles(const glm::vec3& emission, std::uint32_t count = kTiles) {
   std::vector<test::Quad> quads;
-  constexpr float kSide = 2.0F * kHalf / kTiles;
-  for (std::uint32_t i = 0; i < kTiles * kTiles; ++i) {
-    const glm::vec3 corner(-kHalf + kSide * static_cast<float>(i % kTiles), kCeiling,
-                           -kHalf + kSide * static_cast<float>(i / kTiles));
-    test::Quad tile{corner, {kSide, 0.0F, 0.0F}, {0.0F, 0.0F, kSide}};
+  const float side = 2.0F * kHalf / static_cast<float>(count);
+  for (std::uint32_t i = 0; i < count * count; ++i) {
+    const glm::vec3 corner(-kHalf + side * static_cast<float>(i % count), kCeiling,
+                           -kHalf + side * static_cast<float>(i / count));
+    test::Quad tile{corner, {side, 0.0F, 0.0F}, {0.0F, 0.0F, side}};
     tile.width = tile.height = 1;
     tile.emission = emission;
     quads.push_back(tile);
@@ -44,10 +45,11 @@ class CrowdTest : public testing::Test {
     quads[0].width = quads[0].height = kLeaves;
     quads.insert(quads.end(), lamps.begin(), lamps.end());
     if (has_screen) quads.push_back({{0.0F, 0.0F, -0.49F}, {0.0F, 0.0F, 0.98F}, {0.49F, 0.0F, 0.0F}});
+    quads_ = quads;
     scene_ = test::makeQuadScene(quads);
     sides_ = makeSides(*scene_.patches);
     rays_.emplace(*scene_.patches, sides_);
-    divided_ = divideLights(findLightPolygons(*scene_.patches, sides_, scene_.materials.emission));
+    divided_ = divideLights(findLightPolygons(*scene_.patches, sides_, scene_.materials.emission), kFew);
   }
   /// Of the leaves of the floor, from all samples of both halves.
   [[nodiscard]] std::vector<double> arriving(const Crowd& crowd, std::uint32_t samples, LinkSample* last = nullptr) {
@@ -95,6 +97,7 @@ class CrowdTest : public testing::Test {
     EXPECT_LT(std::sqrt(error / square), 0.015);  // one draw errs by 0.3 or so where nothing hides it, in steps of 1/18
   }
 
+  std::vector<test::Quad> quads_;
   test::QuadScene scene_;
   std::vector<Side> sides_;
   std::optional<LeafRays> rays_;
@@ -115,6 +118,14 @@ TEST_F(CrowdTest, FewLampsAreShootersAndSoAreStrongOnes) {
   ASSERT_EQ(divided_.crowds.size(), 1U);
   EXPECT_EQ(divided_.crowds[0].lamps->lights().size(), lamps.size() - 1);
   EXPECT_NEAR(divided_.crowds[0].area, 4.0 * kHalf * kHalf * 323.0 / 324.0, 1e-6);
+}
+
+TEST(FewLights, AreAsManyAsTheirLinksHaveRoom) {
+  constexpr std::size_t kGiB = std::size_t{1} << 30U;
+  EXPECT_EQ(fewLights(24'000, kGiB), 1024U);
+  EXPECT_EQ(fewLights(100'000, kGiB), kGiB / 4 / 400'000);  // two halves of two bytes a leaf, in a quarter
+  EXPECT_EQ(fewLights(4'000'000, kGiB), 256U);
+  EXPECT_EQ(fewLights(0, 0), 256U);
 }
 
 TEST_F(CrowdTest, BringsWhatOneLampInItsPlaceBrings) {
@@ -156,6 +167,26 @@ TEST_F(CrowdTest, ColoursAreThatOfEachLamp) {
   EXPECT_NEAR(divided_.crowds[1].area, 0.5 * divided_.crowds[0].area, 1e-6);
 }
 
+TEST_F(CrowdTest, ThatIsDimmedAsAWholeIsTheSame) {
+  auto lamps = tiles(glm::vec3(1.0F));
+  for (std::size_t i = 0; i < lamps.size(); ++i) lamps[i].emission *= 0.5F + 0.37F * static_cast<float>(i % 11);
+  make(lamps);
+  const auto before = divided_.crowds;
+  ASSERT_EQ(before.size(), 1U);
+  const auto again = [&] {
+    return divideLights(findLightPolygons(*scene_.patches, sides_, test::makeQuadScene(quads_).materials.emission),
+                        kFew, before);
+  };
+  for (auto& quad : quads_) quad.emission *= 0.7F;
+  const auto dimmed = again();
+  ASSERT_EQ(dimmed.crowds.size(), 1U);
+  EXPECT_EQ(dimmed.crowds[0].key, before[0].key);
+  EXPECT_EQ(dimmed.crowds[0].lamps, before[0].lamps);
+  EXPECT_NEAR(dimmed.crowds[0].emission.x, 0.7F * before[0].emission.x, 1e-5F * before[0].emission.x);
+  quads_[5].emission *= 1.01F;
+  EXPECT_NE(again().crowds.at(0).key, before[0].key);
+}
+
 TEST_F(CrowdTest, NearLampsBringNoMoreThanTheyEmit) {
   // Leaves a tenth of a tile below the lamps: points of these would bring up to 100 / pi, directions bring 1 at most.
   auto lamps = tiles(glm::vec3(1.0F));
@@ -167,7 +198,7 @@ TEST_F(CrowdTest, NearLampsBringNoMoreThanTheyEmit) {
   scene_ = test::makeQuadScene(quads);
   sides_ = makeSides(*scene_.patches);
   rays_.emplace(*scene_.patches, sides_);
-  divided_ = divideLights(findLightPolygons(*scene_.patches, sides_, scene_.materials.emission));
+  divided_ = divideLights(findLightPolygons(*scene_.patches, sides_, scene_.materials.emission), kFew);
   const auto light = arriving(divided_.crowds.at(0), 64);
   EXPECT_NEAR(std::reduce(light.begin(), light.end()) / static_cast<double>(light.size()), 0.9997, 0.01);
   EXPECT_LT(std::ranges::max(light), 1.2);
@@ -209,7 +240,7 @@ TEST_F(CrowdTest, LampsThatTheFloorCutsBringWhatIsLeftOfThem) {
 class CrowdSolve : public testing::Test {
  protected:
   CrowdSolve() : quads_(test::cubeQuads(8, test::kDark, test::kGrey)) {
-    for (const auto& tile : tiles(glm::vec3(10.0F))) quads_.push_back(tile);
+    for (const auto& tile : tiles(glm::vec3(10.0F), 33)) quads_.push_back(tile);  // 1,089
     settings_.target_error = 0.02;
     take();
   }
