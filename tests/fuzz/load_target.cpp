@@ -24,7 +24,7 @@ using nlohmann::json;
 
 // A scene has some hundred pieces at most; sanitizers make all of it ten to a hundred times as slow, and twice as
 // large.
-constexpr double kMostSeconds = 120.0, kLitSeconds = 0.1;
+constexpr double kMostSeconds = 20.0, kLitSeconds = 0.1;
 constexpr long kMostKilobytes = 1L << 20U;
 constexpr std::uint32_t kFewTriangles = 64;
 

@@ -177,8 +177,9 @@ void RayTransport::gather(const solver::GatherShot& shot, const solver::ShotBatc
         const float distance = glm::length(to);
         const float cosines = std::max(0.0F, glm::dot(to, frame.normal)) * std::max(0.0F, -glm::dot(to, shot.normal));
         if (cosines <= 0.0F || cast(p, to / distance).distance < distance * 0.999F) continue;
-        factor[2 * k >= shot.point_count ? 1 : 0] +=
-            static_cast<double>(cosines / (distance * distance * distance * distance)) * light_area / std::numbers::pi;
+        const double nearby = static_cast<double>(cosines) / std::pow(static_cast<double>(distance), 4.0);
+        // A form factor is never more than 1, however near the point is.
+        factor[2 * k >= shot.point_count ? 1 : 0] += std::min(1.0, nearby * light_area / std::numbers::pi);
       }
       const auto node = surface.first_node[0] + leaf;
       for (std::size_t c = 0; c < 3; ++c) {
