@@ -11,6 +11,13 @@
 namespace radiosity::test {
 namespace {
 
+/// A point of a lamp that touches a leaf sends it more than 64 bits hold: what is sent in one go stays below a
+/// thousandth of those, so that sums stay within.
+std::int64_t wholeFlux(double flux) {
+  constexpr double kMost = 0x1p53;
+  return std::llround(std::isfinite(flux) ? std::clamp(flux, -kMost, kMost) : kMost);
+}
+
 void addQuad(const Quad& quad, QuadScene& out) {
   auto& patches = *out.patches;
   const auto s = static_cast<std::uint32_t>(patches.surfaces.size());
@@ -177,21 +184,20 @@ void RayTransport::gather(const solver::GatherShot& shot, const solver::ShotBatc
         const float distance = glm::length(to);
         const float cosines = std::max(0.0F, glm::dot(to, frame.normal)) * std::max(0.0F, -glm::dot(to, shot.normal));
         if (cosines <= 0.0F || cast(p, to / distance).distance < distance * 0.999F) continue;
-        const double nearby = static_cast<double>(cosines) / std::pow(static_cast<double>(distance), 4.0);
-        // A form factor is never more than 1, however near the point is.
-        factor[2 * k >= shot.point_count ? 1 : 0] += std::min(1.0, nearby * light_area / std::numbers::pi);
+        factor[2 * k >= shot.point_count ? 1 : 0] +=
+            static_cast<double>(cosines / (distance * distance * distance * distance)) * light_area / std::numbers::pi;
       }
       const auto node = surface.first_node[0] + leaf;
       for (std::size_t c = 0; c < 3; ++c) {
         const double share = static_cast<double>(patches_->node_area[node]) * batch.flux_scale;
         if (shot.half != solver::kBothHalves) {
-          const auto flux = std::llround(shot.radiosity[c] * (factor[0] + factor[1]) / shot.point_count * share);
+          const auto flux = wholeFlux(shot.radiosity[c] * (factor[0] + factor[1]) / shot.point_count * share);
           into.node[shot.half][node][c] += flux;
           into.gathered[c] += flux;
           continue;
         }
         for (std::size_t half = 0; half < 2; ++half) {  // each half of the points carries half of the radiosity
-          const auto flux = std::llround(shot.radiosity[c] * factor[half] / shot.point_count * share);
+          const auto flux = wholeFlux(shot.radiosity[c] * factor[half] / shot.point_count * share);
           into.node[half][node][c] += flux;
           into.gathered[c] += flux;
         }
