@@ -26,13 +26,14 @@ glm::vec2 textureUv(const scene::Primitive& primitive, const scene::TextureUse& 
 
 /// One side of a triangle of the file.
 struct DrawnSide {
+  const scene::Primitive* of;
   std::size_t triangle, side;
   const std::array<glm::vec2, 3>& lightmap_uv;
 };
 
 void addTriangle(const scene::Scene& scene, const scene::Instance& instance, const DrawnSide& drawn,
                  const glm::dvec3& eye, std::vector<ViewVertex>& into) {
-  const auto& primitive = scene.primitives[instance.primitive];
+  const auto& primitive = *drawn.of;
   const auto& material = scene.materials[primitive.material];
   std::array<glm::dvec3, 3> position{};
   for (std::size_t c = 0; c < 3; ++c) {
@@ -64,7 +65,7 @@ std::vector<std::vector<bool>> emittingTriangles(const scene::Scene& scene, cons
   for (const auto& surface : patches.surfaces) {
     if (!surface.emits) continue;
     auto& triangles = emitting[surface.instance];
-    triangles.resize(scene.primitives[scene.instances[surface.instance].primitive].indices.size() / 3, false);
+    triangles.resize(patches.cuts.primitiveOf(scene, surface.instance).indices.size() / 3, false);
     for (auto t = surface.first_triangle; t < surface.first_triangle + surface.triangle_count; ++t)
       triangles[patches.triangle_source[t]] = true;
   }
@@ -86,7 +87,7 @@ ViewGeometry makeViewGeometry(const scene::Scene& scene, const scene::PatchScene
   for (std::size_t i = 0; i < scene.instances.size() && i < patches.instance_uvs.size(); ++i) {
     const auto& instance = scene.instances[i];
     if (!instance.visible) continue;
-    const auto& primitive = scene.primitives[instance.primitive];
+    const auto& primitive = patches.cuts.primitiveOf(scene, static_cast<std::uint32_t>(i));
     for (std::size_t side = 0; side < 2; ++side) {
       const auto& uvs = patches.instance_uvs[i].side[side];
       for (std::size_t triangle = 0; triangle < uvs.page.size(); ++triangle) {
@@ -99,7 +100,7 @@ ViewGeometry makeViewGeometry(const scene::Scene& scene, const scene::PatchScene
           geometry.draws.push_back(
               {primitive.material, page, static_cast<std::uint32_t>(geometry.vertices.size()), 0, emits});
         }
-        addTriangle(scene, instance, {triangle, side, uvs.corners[triangle]}, eye, geometry.vertices);
+        addTriangle(scene, instance, {&primitive, triangle, side, uvs.corners[triangle]}, eye, geometry.vertices);
         geometry.draws.back().count += 3;
       }
     }

@@ -52,6 +52,7 @@ class Builder {
     patches_.warnings = flat_.warnings;
     neighbours_ = edgeNeighbours(flat_);
     checkOwnLayouts();
+    cutWalls();
     makeCharts();
     if (auto chosen = chooseSides(); !chosen) return tl::unexpected(chosen.error());
     patches_.texel = texelSize();
@@ -124,6 +125,14 @@ class Builder {
     }
   }
 
+  void cutWalls() {
+    const auto facets = findFacets(flat_, neighbours_, std::vector<bool>(flat_.triangles.size(), true));
+    patches_.cuts = cutAlongWalls(scene_, flat_, facets, roughTexel(), own_layout_);
+    if (patches_.cuts.empty()) return;
+    flat_ = flatten(scene_, {flat_.centre, flat_.scale}, patches_.cuts);
+    neighbours_ = edgeNeighbours(flat_);
+  }
+
   /// Charts of our own change the size of texels a little, and with it how far lookups reach: until none bleeds.
   void makeCharts() {
     constexpr int kMostRounds = 8;
@@ -173,8 +182,7 @@ class Builder {
     }
     const Facets facets = findFacets(flat_, neighbours_, own);
     patches_.polygons = facets.facets.size() + from_file.size();
-    const double texel = former_ != nullptr ? former_->patches.rough_texel : roughTexelSize();
-    patches_.rough_texel = texel;
+    const double texel = patches_.rough_texel = roughTexel();
     const auto groups = groupFacets(flat_, neighbours_, facets, kPlanarTexels * texel, kSmallTexels * texel * texel,
                                     options_.curve_angle_deg);
     charts_ = fitCharts(flat_, facets, groups);
@@ -185,7 +193,8 @@ class Builder {
   /// Which sides of double-sided charts get patches: those that light can reach, or those that had some in another
   /// process.
   Result<void> chooseSides() {
-    const SidedCharts sided{scene_, scene_.sky.value_or(options_.sky), patches_.rough_texel, flat_, charts_};
+    const SidedCharts sided{scene_, scene_.sky.value_or(options_.sky), patches_.rough_texel, patches_.cuts,
+                            flat_,  charts_};
     if (sides_ != nullptr) {
       if (auto taken = takeSides(sided, *sides_); !taken) return taken;
     } else {
@@ -201,6 +210,10 @@ class Builder {
     double area = 0.0;
     for (const FlatTriangle& triangle : flat_.triangles) area += triangle.area;
     return std::sqrt(area / static_cast<double>(std::max<std::uint64_t>(options_.texel_budget, 1)));
+  }
+
+  [[nodiscard]] double roughTexel() const {
+    return former_ != nullptr ? former_->patches.rough_texel : roughTexelSize();
   }
 
   [[nodiscard]] double texelSize() const {
@@ -368,7 +381,7 @@ class Builder {
     auto& uvs = patches_.instance_uvs[instance].side[side];
     const std::uint32_t primitive = scene_.instances[instance].primitive;
     const std::size_t count =
-        primitive < scene_.primitives.size() ? scene_.primitives[primitive].indices.size() / 3 : 0;
+        primitive < scene_.primitives.size() ? patches_.cuts.primitiveOf(scene_, instance).indices.size() / 3 : 0;
     uvs.corners.resize(count);
     uvs.page.resize(count, kNone);
     return uvs;

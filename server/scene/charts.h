@@ -110,6 +110,7 @@ struct SidedCharts {
   const Scene& scene;
   Sky sky;       ///< black: none
   double texel;  ///< edge, unit box
+  const WallCuts& cuts;
   FlatScene& flat;
   std::vector<Chart>& charts;
 };

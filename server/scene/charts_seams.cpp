@@ -17,7 +17,8 @@ struct BorderEdge {
   std::uint32_t corner_low = 0, corner_high = 0;
 };
 
-/// Edges of patch triangles whose other side is not in the same chart with the same texel coordinates.
+/// Edges of patch triangles whose other side is not in the same chart with the same texel coordinates, where no wall
+/// stands on them.
 std::vector<BorderEdge> borderEdges(const FlatScene& flat, const std::vector<std::uint32_t>& neighbours,
                                     const std::vector<std::uint32_t>& sources, const PatchScene& patches) {
   std::vector<std::uint32_t> patch_of(flat.triangles.size(), kNone);
@@ -42,6 +43,7 @@ std::vector<BorderEdge> borderEdges(const FlatScene& flat, const std::vector<std
           holdsCorner(other, triangle.points[e], texelOf(t, e)) &&
           holdsCorner(other, triangle.points[next], texelOf(t, next)))
         continue;
+      if ((triangle.walled >> e & 1U) != 0U) continue;
       edges.push_back({0, 0, t, e, next});
       ends.push_back(flat.points[triangle.points[e]]);
       ends.push_back(flat.points[triangle.points[next]]);

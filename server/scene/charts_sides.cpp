@@ -21,7 +21,7 @@ SideScene sideSceneOf(const SidedCharts& of) {
   SideScene sides;
   sides.lights = lightsInUnitBox(of.scene, of.flat.centre, of.flat.scale);
   sides.sky = of.sky;
-  const Emitters emitters(of.scene);
+  const Emitters emitters(of.scene, of.cuts);
   for (const Chart& chart : of.charts) {
     const Material& material = materialOf(of.scene, chart);
     const auto first = static_cast<std::uint32_t>(sides.triangles.size());
@@ -42,6 +42,8 @@ void flip(FlatScene& flat, Chart& chart) {
     FlatTriangle& triangle = flat.triangles[t];
     std::swap(triangle.points[1], triangle.points[2]);
     std::swap(triangle.source_corner[1], triangle.source_corner[2]);
+    const unsigned walled = triangle.walled;  // edge 0 becomes edge 2, and that edge 0
+    triangle.walled = static_cast<std::uint8_t>((walled & 2U) | (walled & 1U) << 2U | (walled & 4U) >> 2U);
     triangle.normal = -triangle.normal;
   }
   for (auto& corners : chart.corners) {

@@ -80,7 +80,7 @@ class Emitters::BrightPixels {
   std::vector<std::uint32_t> sums_;
 };
 
-Emitters::Emitters(const Scene& scene) : scene_(scene) {
+Emitters::Emitters(const Scene& scene, const WallCuts& cuts) : scene_(scene), cuts_(cuts) {
   for (const Material& material : scene.materials) {
     const auto index = material.emissive_texture.texture;
     const auto channels = channelsOf(material.emission);
@@ -102,7 +102,7 @@ const Emitters::BrightPixels* Emitters::pixelsOf(const Material& material) const
 }
 
 bool Emitters::shines(std::uint32_t instance, std::uint32_t triangle) const {
-  const Primitive& primitive = scene_.primitives[scene_.instances[instance].primitive];
+  const Primitive& primitive = cuts_.primitiveOf(scene_, instance);
   if (primitive.material >= scene_.materials.size()) return false;
   const Material& material = scene_.materials[primitive.material];
   if (!mayEmit(material)) return false;
@@ -124,14 +124,14 @@ DarkOfEmitters::DarkOfEmitters(const Scene& scene, const PatchScene& patches) {
       continue;
     of_instance_.resize(scene.instances.size());
     auto& triangles = of_instance_[surface.instance];
-    triangles.resize(scene.primitives[scene.instances[surface.instance].primitive].indices.size() / 3, false);
+    triangles.resize(patches.cuts.primitiveOf(scene, surface.instance).indices.size() / 3, false);
     for (auto t = surface.first_triangle; t < surface.first_triangle + surface.triangle_count; ++t)
       triangles[patches.triangle_source[t]] = true;
   }
 }
 
 void findEmitters(const Scene& scene, PatchScene& patches) {
-  const Emitters emitters(scene);
+  const Emitters emitters(scene, patches.cuts);
   for (Surface& surface : patches.surfaces) {
     interruptionPoint();
     surface.emits = false;

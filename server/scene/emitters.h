@@ -25,13 +25,13 @@ namespace radiosity::scene {
 /// texture and set of channels, O(1) a triangle.
 class Emitters {
  public:
-  /// Refers to the scene.
-  explicit Emitters(const Scene& scene);
+  /// Refers to the scene, and to what of it is cut.
+  Emitters(const Scene& scene, const WallCuts& cuts);
   ~Emitters();
   Emitters(const Emitters&) = delete;
   Emitters& operator=(const Emitters&) = delete;
 
-  /// A triangle of the instance's primitive.
+  /// A triangle of the instance's primitive, as cut.
   [[nodiscard]] bool shines(std::uint32_t instance, std::uint32_t triangle) const;
 
  private:
@@ -39,6 +39,7 @@ class Emitters {
   [[nodiscard]] const BrightPixels* pixelsOf(const Material& material) const;
 
   const Scene& scene_;
+  const WallCuts& cuts_;
   /// By texture and channels of the factor (bits).
   std::map<std::pair<std::uint32_t, unsigned>, std::unique_ptr<const BrightPixels>> bright_;
 };

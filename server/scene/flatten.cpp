@@ -120,11 +120,12 @@ std::array<std::uint32_t, 3> canonical(const std::array<std::uint32_t, 3>& p) {
 
 class InstanceFlattener {
  public:
-  InstanceFlattener(const Scene& scene, FlatScene& flat, std::uint32_t instance)
+  InstanceFlattener(const Scene& scene, const WallCuts& cuts, FlatScene& flat, std::uint32_t instance)
       : flat_(flat),
         id_(instance),
         instance_(scene.instances[instance]),
-        primitive_(scene.primitives[instance_.primitive]),
+        primitive_(cuts.primitiveOf(scene, instance)),
+        cut_(cuts.find(instance)),
         mirrored_(glm::determinant(glm::dmat3(instance_.world)) < 0.0) {}
 
   void run() {
@@ -193,9 +194,20 @@ class InstanceFlattener {
       ++flat_.dropped;
       return;
     }
+    if (cut_ != nullptr) markCuts(triangle);
     triangle.normal = cross / twice_area;
     triangle.area = 0.5 * twice_area;
     flat_.triangles.push_back(triangle);
+  }
+
+  void markCuts(FlatTriangle& triangle) const {
+    triangle.region = cut_->region[triangle.source];
+    for (std::uint32_t e = 0; e < 3; ++e) {
+      const auto from = triangle.source_corner[e], to = triangle.source_corner[(e + 1) % 3];
+      const auto of_source = to == (from + 1) % 3 ? from : to;
+      if ((cut_->walled[triangle.source] >> of_source & 1U) != 0U)
+        triangle.walled = static_cast<std::uint8_t>(triangle.walled | 1U << e);
+    }
   }
 
   void dropDuplicates(std::size_t first) {
@@ -221,6 +233,7 @@ class InstanceFlattener {
   std::uint32_t id_;
   const Instance& instance_;
   const Primitive& primitive_;
+  const CutPrimitive* cut_;  ///< null: it is whole
   bool mirrored_;
   double extent_ = 0.0;
   std::vector<std::uint32_t> used_;    ///< vertices that triangles have, ascending; empty: all
@@ -237,8 +250,9 @@ struct HalfEdge {
 /// Pairs one edge's opposite half-edges, flattest pair first.
 void pairHalfEdges(const FlatScene& flat, const HalfEdge* edges, std::size_t count,
                    std::vector<std::uint32_t>& neighbours) {
+  const auto regionAt = [&](std::size_t i) { return flat.triangles[edges[i].slot / 3].region; };
   if (count == 2) {
-    if (edges[0].forward == edges[1].forward) return;
+    if (edges[0].forward == edges[1].forward || regionAt(0) != regionAt(1)) return;
     neighbours[edges[0].slot] = edges[1].slot / 3;
     neighbours[edges[1].slot] = edges[0].slot / 3;
     return;
@@ -251,7 +265,7 @@ void pairHalfEdges(const FlatScene& flat, const HalfEdge* edges, std::size_t cou
   const std::size_t bounded = std::min<std::size_t>(count, 64);  // a fan of thousands would be quadratic
   for (std::size_t i = 0; i < bounded; ++i)
     for (std::size_t j = i + 1; j < bounded; ++j)
-      if (edges[i].forward != edges[j].forward)
+      if (edges[i].forward != edges[j].forward && regionAt(i) == regionAt(j))
         pairs.push_back({glm::dot(flat.triangles[edges[i].slot / 3].normal, flat.triangles[edges[j].slot / 3].normal),
                          edges[i].slot, edges[j].slot});
   std::ranges::stable_sort(pairs, [](const Pair& x, const Pair& y) { return x.flatness > y.flatness; });
@@ -278,7 +292,7 @@ UnitFrame frameFor(const Scene& scene, const UnitFrame* former) {
   return frame;
 }
 
-FlatScene flatten(const Scene& scene, const UnitFrame& frame) {
+FlatScene flatten(const Scene& scene, const UnitFrame& frame, const WallCuts& cuts) {
   FlatScene flat;
   flat.centre = frame.centre;
   flat.scale = frame.scale;
@@ -286,7 +300,7 @@ FlatScene flatten(const Scene& scene, const UnitFrame& frame) {
   for (std::uint32_t i = 0; i < scene.instances.size(); ++i) {
     interruptionPoint();
     flat.first_triangle.push_back(static_cast<std::uint32_t>(flat.triangles.size()));
-    if (usable(scene, scene.instances[i])) InstanceFlattener(scene, flat, i).run();
+    if (usable(scene, scene.instances[i])) InstanceFlattener(scene, cuts, flat, i).run();
   }
   flat.first_triangle.push_back(static_cast<std::uint32_t>(flat.triangles.size()));
   if (flat.dropped > 0)

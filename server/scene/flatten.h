@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "server/scene/scene.h"
+#include "server/scene/wall_cuts.h"
 
 namespace radiosity::scene {
 
@@ -20,6 +21,8 @@ struct FlatTriangle {
   std::uint32_t source;  ///< triangle of the instance's primitive
   glm::dvec3 normal;     ///< unit length
   double area;
+  std::uint32_t region = 0;  ///< CutPrimitive::region
+  std::uint8_t walled = 0;   ///< by edge as a bit (edge e joins corners e and e + 1): no light goes on across it
 };
 
 struct FlatScene {
@@ -44,10 +47,11 @@ struct UnitFrame {
 /// With a former frame, that one as long as it suits.
 [[nodiscard]] UnitFrame frameFor(const Scene& scene, const UnitFrame* former = nullptr);
 
-[[nodiscard]] FlatScene flatten(const Scene& scene, const UnitFrame& frame);
+/// Of the primitives as they are cut.
+[[nodiscard]] FlatScene flatten(const Scene& scene, const UnitFrame& frame, const WallCuts& cuts = {});
 
 /// By 3 x triangle + edge (edge e joins corners e and e + 1): the triangle of the same instance on the other side,
-/// traversing the edge the opposite way; where several share an edge, the one that bends least. kNone: border.
+/// unless it is of another region, traversing the edge the opposite way; where several share an edge, the one that bends least. kNone: border.
 [[nodiscard]] std::vector<std::uint32_t> edgeNeighbours(const FlatScene& flat);
 
 /// For each point a number that points within `tolerance` of each other share. O(n).

@@ -131,6 +131,7 @@ Result<std::optional<MeshImporter::Imported>> MeshImporter::importPrimitive(std:
   if (auto ok = readVertices(source, primitive, pointer); !ok) return tl::unexpected(ok.error());
   const auto skinned = poses_.apply(pose, source, pointer, primitive);
   if (!skinned) return tl::unexpected(skinned.error());
+  primitive.posed = *skinned || !source.targets.empty();
   if (auto ok = readTriangles(source, primitive, pointer); !ok) return tl::unexpected(ok.error());
   if (primitive.indices.empty()) {
     context_.warn(pointer, "has no triangles with area; skipped");

@@ -34,7 +34,7 @@ std::vector<Placement> placements(const Scene& scene, const PatchScene& patches,
   std::set<std::uint32_t> seen;
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     const auto& instance = scene.instances[i];
-    const auto& primitive = scene.primitives[instance.primitive];
+    const auto& primitive = patches.cuts.primitiveOf(scene, static_cast<std::uint32_t>(i));
     if (out.empty() || out.back().node != instance.node || seen.count(primitive.primitive) != 0) {
       out.push_back({instance.node, {}});
       seen.clear();
@@ -42,7 +42,7 @@ std::vector<Placement> placements(const Scene& scene, const PatchScene& patches,
     seen.insert(primitive.primitive);
     const auto& uv = patches.instance_uvs[i];
     if (uv.side[0].page.empty()) continue;  // not charted
-    out.back().lit[primitive.primitive] = {&primitive, &uv, &dark, i};
+    out.back().lit[primitive.primitive] = {&primitive, patches.cuts.find(static_cast<std::uint32_t>(i)), &uv, &dark, i};
   }
   return out;
 }

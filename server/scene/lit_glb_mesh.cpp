@@ -12,6 +12,7 @@
 #include "common/check.h"
 #include "common/task.h"
 #include "server/scene/accessor.h"
+#include "server/scene/lit_glb_made.h"
 
 namespace radiosity::scene {
 namespace {
@@ -116,37 +117,41 @@ tl::unexpected<Error> LitMeshBuilder::tooMuchJson() const {
               document_.name);
 }
 
-Result<std::size_t> LitMeshBuilder::copyAccessor(std::size_t accessor, const std::vector<std::uint32_t>& elements,
-                                                 const Copy& how) {
+Result<std::size_t> LitMeshBuilder::copyAccessor(std::size_t accessor, const Elements& elements, const Copy& how) {
   const auto reader = AccessorReader::open(document_, model_, accessor);
   if (!reader) return tl::unexpected(reader.error());
   const auto size = elementBytes(model_.accessors[accessor]);
   const auto stride = (size + 3) / 4 * 4;  // vertex data must be aligned to 4 bytes
   const auto first = bytes_.size();
-  if (const auto room = checkRoom(stride * elements.size()); !room) return tl::unexpected(room.error());
-  bytes_.reserve(first + stride * elements.size());
-  for (const auto element : elements) {
+  if (const auto room = checkRoom(stride * elements.vertices.size()); !room) return tl::unexpected(room.error());
+  bytes_.reserve(first + stride * elements.vertices.size());
+  const auto of_file = elements.cut != nullptr ? elements.cut->fileVertices() : std::numeric_limits<std::size_t>::max();
+  const auto unscaled = reader->unnormalized();
+  glm::dvec3 low(std::numeric_limits<double>::max());
+  glm::dvec3 high(std::numeric_limits<double>::lowest());
+  for (const auto element : elements.vertices) {
     interruptionPoint();
     const auto next = bytes_.size() + stride;
-    if (const auto* data = reader->bytesAt(element)) append(data, size);
+    std::array<double, 4> stored{};
+    if (element >= of_file) {
+      const auto made =
+          madeElement(*reader, model_.accessors[accessor], elements.cut->made[element - of_file], how.unit_length);
+      append(made.bytes.data(), size);
+      stored = made.stored;
+    } else {
+      if (const auto* data = reader->bytesAt(element)) append(data, size);
+      if (how.with_bounds) stored = unscaled.at(element);
+    }
     bytes_.resize(next, 0);
+    low = glm::min(low, glm::dvec3(stored[0], stored[1], stored[2]));
+    high = glm::max(high, glm::dvec3(stored[0], stored[1], stored[2]));
     if (how.negated) negate(bytes_.data() + next - stride, size, model_.accessors[accessor].componentType);
   }
   auto json = document_.gltf["accessors"][accessor];
   for (const auto* member : {"sparse", "byteOffset", "min", "max", "name", "extras", "extensions"}) json.erase(member);
   json["bufferView"] = addView(first, stride);
-  json["count"] = elements.size();
+  json["count"] = elements.vertices.size();
   if (how.with_bounds) {
-    const auto unscaled = reader->unnormalized();
-    glm::dvec3 low(std::numeric_limits<double>::max());
-    glm::dvec3 high(std::numeric_limits<double>::lowest());
-    for (const auto element : elements) {
-      interruptionPoint();
-      interruptionPoint();
-      const auto v = unscaled.at(element);
-      low = glm::min(low, glm::dvec3(v[0], v[1], v[2]));
-      high = glm::max(high, glm::dvec3(v[0], v[1], v[2]));
-    }
     json["min"] = {low.x, low.y, low.z};
     json["max"] = {high.x, high.y, high.z};
   }
@@ -155,12 +160,12 @@ Result<std::size_t> LitMeshBuilder::copyAccessor(std::size_t accessor, const std
 
 /// `turned`: seen from behind, where glTF turns normals and tangents around (Khronos' sample viewer: both, and the
 /// bitangent).
-Result<Json> LitMeshBuilder::copyAttributes(const Json& attributes, const std::vector<std::uint32_t>& elements,
-                                            bool turned) {
+Result<Json> LitMeshBuilder::copyAttributes(const Json& attributes, const Elements& elements, bool turned) {
   Json out = Json::object();
   for (const auto& [name, accessor] : attributes.items()) {
-    const bool negated = turned && (name == "NORMAL" || name == "TANGENT");
-    const auto copied = copyAccessor(accessor.get<std::size_t>(), elements, {name == "POSITION", negated});
+    const bool is_direction = name == "NORMAL" || name == "TANGENT";
+    const Copy how{name == "POSITION", turned && is_direction, is_direction};
+    const auto copied = copyAccessor(accessor.get<std::size_t>(), elements, how);
     if (!copied) return tl::unexpected(copied.error());
     out[name] = *copied;
   }
@@ -214,13 +219,14 @@ Result<Json> LitMeshBuilder::partPrimitive(const Json& source, const LitPrimitiv
       for (auto& target : targetsOf(primitive)) target.erase(member);
     }
   }
-  auto copied = copyAttributes(attributes, vertices.source, turned);
+  const Elements elements{vertices.source, lit.cut};
+  auto copied = copyAttributes(attributes, elements, turned);
   if (!copied) return copied;
   primitive["attributes"] = std::move(*copied);
   primitive["attributes"]["TEXCOORD_1"] = addUvs(vertices.uv);
   if (primitive.contains("targets")) {
     for (auto& target : primitive["targets"]) {
-      auto morph = copyAttributes(target, vertices.source, turned);
+      auto morph = copyAttributes(target, elements, turned);
       if (!morph) return morph;
       target = std::move(*morph);
     }

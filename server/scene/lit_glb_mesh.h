@@ -15,6 +15,7 @@ namespace radiosity::scene {
 /// A primitive as imported and where both sides of its triangles lie in the lightmap.
 struct LitPrimitive {
   const Primitive* primitive = nullptr;
+  const CutPrimitive* cut = nullptr;  ///< null: it is whole
   const PatchScene::InstanceUv* uv = nullptr;
   const DarkOfEmitters* dark = nullptr;
   std::size_t instance = 0;
@@ -45,7 +46,7 @@ class LitMeshBuilder {
   /// One mesh may stand in a scene a million times.
   static constexpr std::size_t kMaxJsonAgain = std::size_t{64} << 20;
   struct Vertices {
-    std::vector<std::uint32_t> source;   ///< vertex of the file's primitive
+    std::vector<std::uint32_t> source;   ///< vertex of the primitive, as cut
     std::vector<glm::vec2> uv;           ///< lightmap
     std::vector<std::uint32_t> indices;  ///< 3 a triangle
   };
@@ -61,16 +62,20 @@ class LitMeshBuilder {
   struct Copy {
     bool with_bounds = false;  ///< POSITION wants them
     bool negated = false;
+    bool unit_length = false;  ///< what is made between them, too
+  };
+  /// Vertices of the file's primitive, and of its cut copy, if it has one, those that are made.
+  struct Elements {
+    const std::vector<std::uint32_t>& vertices;
+    const CutPrimitive* cut;
   };
 
   static std::vector<Part> partsOf(const LitPrimitive& lit);
   static Vertices collect(const LitPrimitive& lit, const Part& part);
   [[nodiscard]] Result<Json> partPrimitive(const Json& source, const LitPrimitive& lit, const Part& part);
-  [[nodiscard]] Result<std::size_t> copyAccessor(std::size_t accessor, const std::vector<std::uint32_t>& elements,
-                                                 const Copy& how);
+  [[nodiscard]] Result<std::size_t> copyAccessor(std::size_t accessor, const Elements& elements, const Copy& how);
   [[nodiscard]] Result<void> checkRoom(std::size_t more) const;
-  [[nodiscard]] Result<Json> copyAttributes(const Json& attributes, const std::vector<std::uint32_t>& elements,
-                                            bool turned);
+  [[nodiscard]] Result<Json> copyAttributes(const Json& attributes, const Elements& elements, bool turned);
   [[nodiscard]] std::size_t addView(std::size_t first_byte, std::size_t stride);
   [[nodiscard]] std::size_t addAccessor(Json accessor);
   [[nodiscard]] std::size_t addIndices(const std::vector<std::uint32_t>& indices);

@@ -24,7 +24,7 @@ SideScene sideSceneOf(const PatchScene& patches, const Scene& scene, const Sky& 
   sides.lights = lightsInUnitBox(scene, patches.centre, patches.scale);
   sides.sky = sky;
   sides.triangles = trianglesOf(patches);
-  const Emitters emitters(scene);
+  const Emitters emitters(scene, patches.cuts);
   sides.emits.resize(patches.triangles.size());
   for (const Surface& surface : patches.surfaces) {
     sides.groups.push_back({surface.first_triangle, surface.triangle_count, surface.instance,

@@ -53,7 +53,7 @@ class SurfaceOpacity {
         surface_(surface),
         material_(materialOf(scene, surface)),
         instance_(scene.instances[surface.instance]),
-        primitive_(scene.primitives[instance_.primitive]) {
+        primitive_(patches.cuts.primitiveOf(scene, surface.instance)) {
     const auto texture = material_.base_color_texture.texture;
     if (texture < scene.textures.size() && material_.alpha_mode != AlphaMode::kOpaque) {
       texture_.emplace(scene.textures[texture], material_.base_color_texture);

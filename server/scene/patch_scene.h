@@ -22,6 +22,7 @@
 #include "server/scene/leaf_spots.h"
 #include "server/scene/scene.h"
 #include "server/scene/side_colours.h"
+#include "server/scene/wall_cuts.h"
 
 namespace radiosity::scene {
 
@@ -99,6 +100,7 @@ struct PatchScene {
   std::vector<TriangleFrame> triangles;  ///< one for each triangle
   std::vector<std::uint32_t> triangle_surface;
   std::vector<std::uint32_t> triangle_source;  ///< by triangle: which one of its instance's primitive it was
+  WallCuts cuts;                               ///< primitives of which these are numbers, where they are cut
   std::vector<Surface> surfaces;
   ClosedSolids solids;  ///< findClosedSolids(); empty: none is known
   std::vector<LeafPoint> leaves;
@@ -116,7 +118,7 @@ struct PatchScene {
   static constexpr std::uint32_t kBlackSide = 4;  ///< so many by so many, for mips and bilinear lookups
 
   /// Lightmap coordinates of the imported vertices, for each side of the file's triangles: one for each corner of each
-  /// instance's triangles, in page UV [0, 1] (v down, row 0 = v 0), and the page of each triangle (kNone: it is
+  /// instance's triangles (as cut), in page UV [0, 1] (v down, row 0 = v 0), and the page of each triangle (kNone: it is
   /// dropped, or nobody sees that side). For the exporter and the viewer.
   struct SideUv {
     std::vector<std::array<glm::vec2, 3>> corners;  ///< by triangle of the primitive; empty: as if all pages were kNone

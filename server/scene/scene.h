@@ -73,6 +73,7 @@ struct Primitive {
   std::vector<glm::vec2> texcoord0, texcoord1;
   std::vector<glm::vec4> color0;       ///< linear
   std::vector<std::uint32_t> indices;  ///< 3 a triangle, counter-clockwise = front, all < positions.size()
+  bool posed = false;                  ///< joints or morph targets move its vertices, as numbered in the file
 
   bool operator==(const Primitive&) const = default;
 };

@@ -44,7 +44,7 @@ class MaterialShader {
   void shade(std::uint32_t id) {
     surface_ = patches_.surfaces[id];
     instance_ = &scene_.instances[surface_.instance];
-    primitive_ = &scene_.primitives[instance_->primitive];
+    primitive_ = &patches_.cuts.primitiveOf(scene_, surface_.instance);
     if (!layers_.hasTextures() && primitive_->color0.empty()) {
       fill(clamped(layers_.at([](const TextureUse&) { return MaterialLayers::Place{}; }, glm::vec4(1.0F))));
       return;

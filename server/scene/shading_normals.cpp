@@ -68,7 +68,7 @@ ShadingNormals::ShadingNormals(const Scene& scene, const PatchScene& patches) {
   for (const auto& surface : patches.surfaces) {
     interruptionPoint();
     const auto& instance = scene.instances[surface.instance];
-    const auto& primitive = scene.primitives[instance.primitive];
+    const auto& primitive = patches.cuts.primitiveOf(scene, surface.instance);
     if (primitive.normals.size() != primitive.positions.size()) continue;
     const InstanceNormals normals(primitive, instance.world, patches);
     for (auto t = surface.first_triangle; t < surface.first_triangle + surface.triangle_count; ++t) {

@@ -1,0 +1,88 @@
+// One flat face in its plane, cut along segments that walls stand on: convex pieces, and which of them hang together
+// so that one texel grid may hold them. Plain values, any thread; used by wall_cuts.cpp alone.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/vec2.hpp>
+#include <map>
+#include <utility>
+#include <vector>
+
+namespace radiosity::scene {
+
+/// Where a wall meets the face.
+struct WallSegment {
+  glm::dvec2 from{0.0}, to{0.0};
+  glm::dvec2 front{0.0};    ///< across it: where the wall's front looks
+  bool shows_back = false;  ///< one can see its back, too
+  double height = 0.0;      ///< of the wall, above the face
+};
+
+/// Lengths in the plane.
+struct CutScale {
+  double texel = 0.0;    ///< edge
+  double least = 0.0;    ///< what is smaller is not worth a region of its own
+  double rounding = 0.0;  ///< distances below it are none
+};
+
+class FacetCutter {
+ public:
+  using Triangle = std::array<glm::dvec2, 3>;  ///< counter-clockwise
+  struct Piece {
+    std::vector<glm::dvec2> outline;     ///< while it is cut; convex, counter-clockwise
+    std::vector<std::uint32_t> corners;  ///< then: into points(), also those in the middle of an edge
+    std::uint32_t triangle = 0;          ///< that it is a part of
+    std::uint32_t region = 0;
+  };
+
+  FacetCutter(std::vector<Triangle> triangles, std::vector<WallSegment> walls, const CutScale& scale);
+
+  /// Cuts, and finds the regions. False: it is one region, and best left whole.
+  [[nodiscard]] bool cut();
+  /// Points on the border where a neighbour is cut: corners of the pieces there, too. Keeps regions.
+  void insert(const std::vector<glm::dvec2>& points);
+
+  [[nodiscard]] const std::vector<Piece>& pieces() const { return pieces_; }
+  [[nodiscard]] const std::vector<glm::dvec2>& points() const { return points_; }
+  /// Whether a wall stands on the edge between two corners, with another region behind.
+  [[nodiscard]] bool isWalled(std::uint32_t from, std::uint32_t to) const;
+
+ private:
+  struct Edge {
+    std::uint32_t from, to;              ///< points, the lesser first
+    std::array<std::uint32_t, 2> piece;  ///< left and right of it
+    double length;
+    bool blocked = false;
+    bool parts = false;                        ///< by a wall that is long and high
+    std::array<bool, 2> sees_front{false, false};  ///< left, right
+  };
+  struct Part {
+    double area = 0.0, border = 0.0;
+    double blocked = 0.0, sees_front = 0.0;  ///< of the border: where walls stand, and where a front is seen
+    /// Most of what is around it are backs: it lies under a solid. Where another one touches that, its front shows.
+    [[nodiscard]] bool hidden() const { return 2.0 * sees_front < blocked; }
+    [[nodiscard]] double width() const { return border > 0.0 ? 2.0 * area / border : 0.0; }
+  };
+
+  bool cutAlong(const std::vector<WallSegment>& walls);
+  void splitBy(const WallSegment& wall);
+  void numberPoints();
+  void addToEdges();
+  void findEdges();
+  void look(Edge& edge) const;
+  [[nodiscard]] std::vector<Part> openParts(std::vector<std::uint32_t>& part_of) const;
+  void findRegions();
+  [[nodiscard]] std::vector<WallSegment> usefulWalls() const;
+  [[nodiscard]] double areaOf(const Piece& piece) const;
+
+  std::vector<Triangle> triangles_;
+  std::vector<WallSegment> all_walls_, walls_;
+  CutScale scale_;
+  std::vector<Piece> pieces_;
+  std::vector<glm::dvec2> points_;
+  std::vector<Edge> edges_;
+  std::uint32_t regions_ = 0;
+};
+
+}  // namespace radiosity::scene

@@ -1,0 +1,25 @@
+// Attributes of vertices that are made where faces are cut (wall_cuts.h), as their file stores such attributes. Pure
+// functions of values; used by the exporter.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "server/scene/accessor.h"
+#include "server/scene/import_model.h"
+#include "server/scene/wall_cuts.h"
+
+namespace radiosity::scene {
+
+struct MadeElement {
+  std::vector<std::uint8_t> bytes;  ///< elementBytes() long
+  std::array<double, 4> stored{};   ///< what they say, integers as they are
+};
+
+/// Between the elements of the file's vertices, rounded to what the accessor can store; the nearest one's own where
+/// elements are no vectors. `unit_length`: its first three components are a direction.
+[[nodiscard]] MadeElement madeElement(const AccessorReader& reader, const tinygltf::Accessor& accessor,
+                                      const MadeVertex& vertex, bool unit_length);
+
+}  // namespace radiosity::scene
