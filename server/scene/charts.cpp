@@ -93,6 +93,7 @@ class Builder {
       if (record_ == nullptr) return nullptr;
       return std::make_unique<const FormerBurial>(former_->patches, *record_, patches_, surface_before_, hides);
     });
+    emptyHidden();
     interruptionPoint(7, kBuildSteps);
     placeSpots(patches_, pieces);
     if (former_ != nullptr) {
@@ -193,13 +194,14 @@ class Builder {
   /// Which sides of double-sided charts get patches: those that light can reach, or those that had some in another
   /// process.
   Result<void> chooseSides() {
-    const SidedCharts sided{scene_, scene_.sky.value_or(options_.sky), patches_.rough_texel, patches_.cuts,
-                            flat_,  charts_};
+    const SidedCharts sided{scene_, scene_.sky.value_or(options_.sky), patches_.rough_texel, patches_.cuts, flat_,
+                            charts_};
     if (sides_ != nullptr) {
       if (auto taken = takeSides(sided, *sides_); !taken) return taken;
     } else {
       litSides(sided, former_, former_ != nullptr ? formerSurfaces() : std::vector<const Surface*>());
     }
+    for (Chart& chart : charts_) chart.dark = chart.dark || flat_.triangles[chart.triangles.front()].hidden;
     if (std::ranges::any_of(charts_, &Chart::flipped)) neighbours_ = edgeNeighbours(flat_);
     return {};
   }
@@ -345,6 +347,18 @@ class Builder {
     patches_.leaves.resize(leaves);
     patches_.node_area.resize(nodes, 0.0F);
     return {};
+  }
+
+  /// What lies under walls keeps nothing that could be lit: rounding takes places at its rim for such beside it.
+  void emptyHidden() {
+    for (std::uint32_t s = 0; s < patches_.surfaces.size(); ++s) {
+      if (!flat_.triangles[charts_[s].triangles.front()].hidden) continue;
+      const Surface& surface = patches_.surfaces[s];
+      const auto leaves = std::size_t{surface.width} * surface.height;
+      std::fill_n(patches_.leaves.begin() + surface.first_leaf, leaves, LeafPoint{});
+      for (const auto first : surface.first_node)
+        if (first != kNone) std::fill_n(patches_.node_area.begin() + first, leaves, 0.0F);
+    }
   }
 
   /// Mean over the surface: exact where it is planar.

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <map>
 #include <span>
 #include <unordered_map>
 
@@ -77,6 +78,15 @@ struct Parts {
   std::vector<Part> all;          ///< by triangle: used where it is its own
 };
 
+/// Solids of several instances may touch along their edges, all the more where a floor is cut along what stands on it:
+/// each has its own two triangles there.
+bool isPairedByInstance(const PatchScene& patches, std::span<const Edge> edges) {
+  std::map<std::uint32_t, std::array<int, 2>> count;  // of both directions
+  for (const auto& edge : edges)
+    ++count[patches.surfaces[patches.triangle_surface[edge.triangle]].instance][edge.forward ? 1 : 0];
+  return std::ranges::all_of(count, [](const auto& one) { return one.second == std::array{1, 1}; });
+}
+
 Parts connectedParts(const PatchScene& patches) {
   const auto triangles = patches.indices.size() / 3;
   UnionFind joined(triangles);
@@ -87,7 +97,14 @@ Parts connectedParts(const PatchScene& patches) {
     interruptionPoint();
     while (last < edges.size() && edges[last].key == edges[first].key) ++last;
     const bool closed = last - first == 2 && edges[first].forward != edges[first + 1].forward;
+    const bool paired = !closed && isPairedByInstance(patches, std::span(edges).subspan(first, last - first));
+    const auto instanceAt = [&](std::size_t i) {
+      return patches.surfaces[patches.triangle_surface[edges[i].triangle]].instance;
+    };
     for (auto i = first; i < last; ++i) {
+      for (auto k = first; k < i && paired; ++k)
+        if (instanceAt(k) == instanceAt(i)) joined.join(edges[i].triangle, edges[k].triangle);
+      if (paired) continue;
       joined.join(edges[i].triangle, edges[first].triangle);
       if (!closed) open[edges[i].triangle] = true;
     }

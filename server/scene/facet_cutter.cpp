@@ -5,10 +5,8 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
-#include <optional>
 
 #include "common/task.h"
-#include "common/union_find.h"
 #include "server/scene/flatten.h"
 
 namespace radiosity::scene {
@@ -17,12 +15,8 @@ namespace {
 /// A building's floor meets fewer walls, and is cut in fewer pieces: what has more stays whole, since the work grows
 /// with their product.
 constexpr std::size_t kMostWalls = 256, kMostPieces = 4096;
-/// Each region is a chart, with texels of its own around it.
-constexpr std::uint32_t kMostRegions = 64;
 /// Rounding adds up: of corners that are cut twice, and of lines through them.
 constexpr double kNear = 4.0;
-/// Bilinear lookups read texels so far away, in texels.
-constexpr double kReach = 1.5;
 /// Light goes around a wall, and over it, that is not so many texels long and high.
 constexpr double kLongWall = 4.0, kHighWall = 2.0;
 /// Of the least size: a lower wall hides little of the light beyond.
@@ -57,7 +51,7 @@ bool FacetCutter::cut() {
   const auto useful = usefulWalls();
   if (useful.size() == all_walls_.size()) return true;
   const FacetCutter with_all = *this;
-  if (!cutAlong(useful) || regions_ < with_all.regions_) *this = with_all;
+  if (!cutAlong(useful) || regions_ != with_all.regions_) *this = with_all;
   return true;
 }
 
@@ -76,7 +70,14 @@ bool FacetCutter::cutAlong(const std::vector<WallSegment>& walls) {
   numberPoints();
   addToEdges();
   findEdges();
-  findRegions();
+  std::vector<double> areas;
+  for (const auto& piece : pieces_) areas.push_back(areaOf(piece));
+  const auto regions = findRegions(edges_, points_, areas, scale_);
+  for (std::size_t i = 0; i < pieces_.size(); ++i) {
+    pieces_[i].region = regions.of_piece[i];
+    pieces_[i].hidden = regions.hidden[i];
+  }
+  regions_ = *std::ranges::max_element(regions.of_piece) + 1;
   return regions_ > 1;
 }
 
@@ -126,6 +127,10 @@ void FacetCutter::numberPoints() {
   std::vector<glm::dvec3> places;
   for (const auto& piece : pieces_)
     for (const auto& p : piece.outline) places.emplace_back(p, 0.0);
+  for (const auto& wall : walls_) {  // an edge is under a wall, or it is not
+    places.emplace_back(wall.from, 0.0);
+    places.emplace_back(wall.to, 0.0);
+  }
   const auto ids = weldPoints(places, scale_.rounding);
   points_.clear();
   std::size_t next = 0;
@@ -137,6 +142,8 @@ void FacetCutter::numberPoints() {
     }
     while (piece.corners.size() > 1 && piece.corners.back() == piece.corners.front()) piece.corners.pop_back();
   }
+  for (; next < places.size(); ++next)
+    if (ids[next] == points_.size()) points_.emplace_back(places[next]);
   std::erase_if(pieces_, [](const Piece& piece) { return piece.corners.size() < 3; });
 }
 
@@ -189,7 +196,7 @@ void FacetCutter::findEdges() {
   }
 }
 
-void FacetCutter::look(Edge& edge) const {
+void FacetCutter::look(PieceEdge& edge) const {
   const glm::dvec2 &a = points_[edge.from], &b = points_[edge.to], middle = 0.5 * (a + b);
   const glm::dvec2 left(a.y - b.y, b.x - a.x);
   const double margin = kNear * scale_.rounding;
@@ -215,132 +222,6 @@ double FacetCutter::areaOf(const Piece& piece) const {
   return 0.5 * twice;
 }
 
-/// What hangs together without a wall between: by its first piece.
-std::vector<FacetCutter::Part> FacetCutter::openParts(std::vector<std::uint32_t>& part_of) const {
-  UnionFind open(pieces_.size());
-  for (const auto& edge : edges_)
-    if (!edge.blocked && edge.piece[0] != kNone && edge.piece[1] != kNone) open.join(edge.piece[0], edge.piece[1]);
-  std::vector<Part> parts(pieces_.size());
-  part_of.resize(pieces_.size());
-  for (std::uint32_t i = 0; i < pieces_.size(); ++i) {
-    part_of[i] = open.find(i);
-    parts[part_of[i]].area += areaOf(pieces_[i]);
-  }
-  for (const auto& edge : edges_) {
-    for (std::size_t side = 0; side < 2; ++side) {
-      if (edge.piece[side] == kNone || (!edge.blocked && edge.piece[1 - side] != kNone)) continue;
-      auto& part = parts[part_of[edge.piece[side]]];
-      part.border += edge.length;
-      if (edge.blocked) part.blocked += edge.length;
-      if (edge.blocked && edge.sees_front[side]) part.sees_front += edge.length;
-    }
-  }
-  return parts;
-}
-
-/// Pieces joined to regions. Refers to what the cutter knows.
-class RegionFinder {
- public:
-  RegionFinder(std::size_t pieces, std::vector<double> areas) : groups_(pieces), areas_(std::move(areas)) {}
-
-  void join(std::uint32_t a, std::uint32_t b) { groups_.join(a, b); }
-  [[nodiscard]] std::uint32_t of(std::uint32_t piece) { return groups_.find(piece); }
-  void keepApart(std::uint32_t a, std::uint32_t b) { apart_.emplace_back(a, b); }
-  /// Unless they are to be kept apart.
-  void joinIfAllowed(std::uint32_t a, std::uint32_t b) {
-    const auto one = of(a), other = of(b);
-    if (one == other) return;
-    for (const auto& [c, d] : apart_) {
-      const auto p = of(c), q = of(d);
-      if ((p == one && q == other) || (p == other && q == one)) return;
-    }
-    join(one, other);
-  }
-  /// By region: its area; 0 for what is none.
-  [[nodiscard]] std::vector<double> areas() {
-    std::vector<double> sums(areas_.size(), 0.0);
-    for (std::uint32_t i = 0; i < areas_.size(); ++i) sums[of(i)] += areas_[i];
-    return sums;
-  }
-
- private:
-  UnionFind groups_;
-  std::vector<double> areas_;
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> apart_;
-};
-
-void FacetCutter::findRegions() {
-  std::vector<std::uint32_t> part_of;
-  const auto parts = openParts(part_of);
-  std::vector<double> areas;
-  for (const auto& piece : pieces_) areas.push_back(areaOf(piece));
-  RegionFinder regions(pieces_.size(), areas);
-  std::vector<std::uint32_t> by_length(edges_.size());
-  for (std::uint32_t i = 0; i < by_length.size(); ++i) by_length[i] = i;
-  std::ranges::stable_sort(by_length, [&](auto a, auto b) { return edges_[a].length > edges_[b].length; });
-  std::erase_if(by_length, [&](auto i) { return edges_[i].piece[0] == kNone || edges_[i].piece[1] == kNone; });
-  const auto isNarrow = [&](const Part& part) { return part.hidden() && part.width() < kReach * scale_.texel; };
-  const auto isWide = [&](const Part& part) { return part.hidden() && !isNarrow(part); };
-  const auto partAt = [&](const Edge& edge, std::size_t side) -> const Part& {
-    return parts[part_of[edge.piece[side]]];
-  };
-  // What lies under a thin wall goes with one of its sides.
-  for (std::uint32_t i = 0; i < pieces_.size(); ++i)
-    if (parts[part_of[i]].hidden()) regions.join(i, part_of[i]);
-  std::vector<std::uint32_t> across(pieces_.size(), kNone);  // by hidden part: the edge over which it was joined
-  const auto attach = [&](const auto& wanted) {
-    for (const auto i : by_length) {
-      for (std::size_t side = 0; side < 2; ++side) {
-        const auto part = part_of[edges_[i].piece[side]];
-        if (across[part] != kNone || !wanted(parts[part]) || partAt(edges_[i], 1 - side).hidden()) continue;
-        across[part] = i;
-        regions.join(part, edges_[i].piece[1 - side]);
-      }
-    }
-  };
-  attach(isNarrow);
-  // All that lies along that side of the wall is on the same side of it.
-  const auto isJoinedThere = [&](const Edge& edge, std::size_t side) {
-    const auto joined = across[part_of[edge.piece[side]]];
-    if (joined == kNone) return false;
-    const Line line({points_[edges_[joined].from], points_[edges_[joined].to]});
-    const double margin = kNear * scale_.rounding;
-    return std::abs(line.distance(points_[edge.from])) <= margin && std::abs(line.distance(points_[edge.to])) <= margin;
-  };
-  for (const auto& edge : edges_) {
-    if (!edge.parts || edge.piece[0] == kNone || edge.piece[1] == kNone) continue;
-    if (isWide(partAt(edge, 0)) || isWide(partAt(edge, 1))) continue;
-    if (!isJoinedThere(edge, 0) && !isJoinedThere(edge, 1)) regions.keepApart(edge.piece[0], edge.piece[1]);
-  }
-  for (const auto i : by_length)
-    if (!edges_[i].blocked) regions.joinIfAllowed(edges_[i].piece[0], edges_[i].piece[1]);
-  attach(isWide);
-  // What is too small, or one of too many, goes with what it shares its longest edge with.
-  std::uint32_t count = 0;
-  for (double least = scale_.least * scale_.least;; least *= 2.0) {
-    for (bool joined = true; joined;) {
-      joined = false;
-      const auto sums = regions.areas();
-      for (const auto i : by_length) {
-        const auto a = regions.of(edges_[i].piece[0]), b = regions.of(edges_[i].piece[1]);
-        if (a == b || std::min(sums[a], sums[b]) >= least) continue;
-        regions.join(a, b);
-        joined = true;
-        break;
-      }
-    }
-    std::vector<std::uint32_t> number(pieces_.size(), kNone);
-    count = 0;
-    for (std::uint32_t i = 0; i < pieces_.size(); ++i) {
-      auto& region = number[regions.of(i)];
-      if (region == kNone) region = count++;
-      pieces_[i].region = region;
-    }
-    if (count <= kMostRegions) break;
-  }
-  regions_ = count;
-}
-
 /// On whose lines regions meet.
 std::vector<WallSegment> FacetCutter::usefulWalls() const {
   std::vector<WallSegment> useful;
@@ -348,7 +229,7 @@ std::vector<WallSegment> FacetCutter::usefulWalls() const {
   for (const auto& wall : walls_) {
     const Line line(wall);
     const auto isOn = [&](std::uint32_t p) { return std::abs(line.distance(points_[p])) <= margin; };
-    const auto parts = [&](const Edge& edge) {
+    const auto parts = [&](const PieceEdge& edge) {
       return edge.piece[0] != kNone && edge.piece[1] != kNone &&
              pieces_[edge.piece[0]].region != pieces_[edge.piece[1]].region && isOn(edge.from) && isOn(edge.to);
     };
@@ -376,11 +257,12 @@ void FacetCutter::insert(const std::vector<glm::dvec2>& points) {
 
 bool FacetCutter::isWalled(std::uint32_t from, std::uint32_t to) const {
   const auto ends = std::minmax(from, to);
-  const auto key = [](const Edge& edge) { return std::pair(edge.from, edge.to); };
+  const auto key = [](const PieceEdge& edge) { return std::pair(edge.from, edge.to); };
   const auto found = std::ranges::lower_bound(edges_, std::pair<std::uint32_t, std::uint32_t>(ends), {}, key);
   if (found == edges_.end() || key(*found) != std::pair<std::uint32_t, std::uint32_t>(ends)) return false;
   const auto [a, b] = found->piece;
-  return found->blocked && a != kNone && b != kNone && pieces_[a].region != pieces_[b].region;
+  if (a == kNone || b == kNone || pieces_[a].region == pieces_[b].region) return false;
+  return found->blocked || pieces_[a].hidden || pieces_[b].hidden;
 }
 
 }  // namespace radiosity::scene

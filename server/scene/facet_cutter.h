@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "server/scene/facet_regions.h"
+
 namespace radiosity::scene {
 
 /// Where a wall meets the face.
@@ -19,13 +21,6 @@ struct WallSegment {
   double height = 0.0;      ///< of the wall, above the face
 };
 
-/// Lengths in the plane.
-struct CutScale {
-  double texel = 0.0;    ///< edge
-  double least = 0.0;    ///< what is smaller is not worth a region of its own
-  double rounding = 0.0;  ///< distances below it are none
-};
-
 class FacetCutter {
  public:
   using Triangle = std::array<glm::dvec2, 3>;  ///< counter-clockwise
@@ -34,6 +29,7 @@ class FacetCutter {
     std::vector<std::uint32_t> corners;  ///< then: into points(), also those in the middle of an edge
     std::uint32_t triangle = 0;          ///< that it is a part of
     std::uint32_t region = 0;
+    bool hidden = false;  ///< FacetRegions::hidden
   };
 
   FacetCutter(std::vector<Triangle> triangles, std::vector<WallSegment> walls, const CutScale& scale);
@@ -45,34 +41,16 @@ class FacetCutter {
 
   [[nodiscard]] const std::vector<Piece>& pieces() const { return pieces_; }
   [[nodiscard]] const std::vector<glm::dvec2>& points() const { return points_; }
-  /// Whether a wall stands on the edge between two corners, with another region behind.
+  /// Whether a wall stands on the edge between two corners, or a solid, with another region behind.
   [[nodiscard]] bool isWalled(std::uint32_t from, std::uint32_t to) const;
 
  private:
-  struct Edge {
-    std::uint32_t from, to;              ///< points, the lesser first
-    std::array<std::uint32_t, 2> piece;  ///< left and right of it
-    double length;
-    bool blocked = false;
-    bool parts = false;                        ///< by a wall that is long and high
-    std::array<bool, 2> sees_front{false, false};  ///< left, right
-  };
-  struct Part {
-    double area = 0.0, border = 0.0;
-    double blocked = 0.0, sees_front = 0.0;  ///< of the border: where walls stand, and where a front is seen
-    /// Most of what is around it are backs: it lies under a solid. Where another one touches that, its front shows.
-    [[nodiscard]] bool hidden() const { return 2.0 * sees_front < blocked; }
-    [[nodiscard]] double width() const { return border > 0.0 ? 2.0 * area / border : 0.0; }
-  };
-
   bool cutAlong(const std::vector<WallSegment>& walls);
   void splitBy(const WallSegment& wall);
   void numberPoints();
   void addToEdges();
   void findEdges();
-  void look(Edge& edge) const;
-  [[nodiscard]] std::vector<Part> openParts(std::vector<std::uint32_t>& part_of) const;
-  void findRegions();
+  void look(PieceEdge& edge) const;
   [[nodiscard]] std::vector<WallSegment> usefulWalls() const;
   [[nodiscard]] double areaOf(const Piece& piece) const;
 
@@ -81,7 +59,7 @@ class FacetCutter {
   CutScale scale_;
   std::vector<Piece> pieces_;
   std::vector<glm::dvec2> points_;
-  std::vector<Edge> edges_;
+  std::vector<PieceEdge> edges_;  ///< by their ends
   std::uint32_t regions_ = 0;
 };
 

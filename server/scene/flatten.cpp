@@ -202,6 +202,7 @@ class InstanceFlattener {
 
   void markCuts(FlatTriangle& triangle) const {
     triangle.region = cut_->region[triangle.source];
+    triangle.hidden = cut_->hidden[triangle.source];
     for (std::uint32_t e = 0; e < 3; ++e) {
       const auto from = triangle.source_corner[e], to = triangle.source_corner[(e + 1) % 3];
       const auto of_source = to == (from + 1) % 3 ? from : to;

@@ -22,6 +22,7 @@ struct FlatTriangle {
   glm::dvec3 normal;     ///< unit length
   double area;
   std::uint32_t region = 0;  ///< CutPrimitive::region
+  bool hidden = false;       ///< CutPrimitive::hidden
   std::uint8_t walled = 0;   ///< by edge as a bit (edge e joins corners e and e + 1): no light goes on across it
 };
 
@@ -51,7 +52,8 @@ struct UnitFrame {
 [[nodiscard]] FlatScene flatten(const Scene& scene, const UnitFrame& frame, const WallCuts& cuts = {});
 
 /// By 3 x triangle + edge (edge e joins corners e and e + 1): the triangle of the same instance on the other side,
-/// unless it is of another region, traversing the edge the opposite way; where several share an edge, the one that bends least. kNone: border.
+/// unless it is of another region, traversing the edge the opposite way; where several share an edge, the one that
+/// bends least. kNone: border.
 [[nodiscard]] std::vector<std::uint32_t> edgeNeighbours(const FlatScene& flat);
 
 /// For each point a number that points within `tolerance` of each other share. O(n).

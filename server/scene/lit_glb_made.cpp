@@ -56,7 +56,8 @@ MadeElement madeElement(const AccessorReader& reader, const tinygltf::Accessor& 
   made.bytes.resize(elementBytes(accessor), 0);
   const bool is_vector = accessor.type != TINYGLTF_TYPE_MAT2 && components <= made.stored.size();
   if (!is_vector) {
-    if (const auto* bytes = reader.bytesAt(vertex.of[nearest])) std::copy_n(bytes, made.bytes.size(), made.bytes.data());
+    if (const auto* bytes = reader.bytesAt(vertex.of[nearest]))
+      std::copy_n(bytes, made.bytes.size(), made.bytes.data());
     return made;
   }
   std::array<double, 4> sum{};

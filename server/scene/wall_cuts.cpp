@@ -66,11 +66,17 @@ class InstanceCutter {
       addNeighbour(flat_.triangles[t]);
     }
     for (std::uint32_t source = 0; source < done.size(); ++source)  // such as have no area
-      if (!done[source]) addTriangle({vertexOf(source, 0), vertexOf(source, 1), vertexOf(source, 2)}, source, 0, 0);
+      if (!done[source])
+        addTriangle({vertexOf(source, 0), vertexOf(source, 1), vertexOf(source, 2)}, {source, 0, false}, 0);
     return std::move(out_);
   }
 
  private:
+  /// What a triangle is a part of.
+  struct Origin {
+    std::uint32_t source, region;
+    bool hidden;
+  };
   [[nodiscard]] std::uint32_t vertexOf(std::uint32_t source, std::uint32_t corner) const {
     return file_.indices[std::size_t{3} * source + corner];
   }
@@ -195,7 +201,7 @@ class InstanceCutter {
     }
     const auto region = first_region_ + piece.region;
     next_region_ = std::max(next_region_, region + 1);
-    addPolygon(triangle, outline, walled, region);
+    addPolygon(triangle, outline, walled, {triangle.source, region, piece.hidden});
   }
 
   void addNeighbour(const FlatTriangle& triangle) {
@@ -213,12 +219,12 @@ class InstanceCutter {
         outline.push_back(weights);
       }
     }
-    addPolygon(triangle, outline, std::vector<bool>(outline.size(), false), 0);
+    addPolygon(triangle, outline, std::vector<bool>(outline.size(), false), {triangle.source, 0, false});
   }
 
   /// A fan: around the middle where corners lie on a line.
   void addPolygon(const FlatTriangle& triangle, const std::vector<Weights>& outline, const std::vector<bool>& walled,
-                  std::uint32_t region) {
+                  const Origin& origin) {
     std::vector<std::uint32_t> corners;
     for (const auto& weights : outline) corners.push_back(vertexAt(triangle, weights));
     const bool mirrored = triangle.source_corner[1] != (triangle.source_corner[0] + 1) % 3;
@@ -227,8 +233,7 @@ class InstanceCutter {
         std::swap(of[1], of[2]);
         std::swap(walls[0], walls[2]);
       }
-      addTriangle(of, triangle.source, region,
-                  static_cast<std::uint8_t>((walls[0] ? 1 : 0) | (walls[1] ? 2 : 0) | (walls[2] ? 4 : 0)));
+      addTriangle(of, origin, static_cast<std::uint8_t>((walls[0] ? 1 : 0) | (walls[1] ? 2 : 0) | (walls[2] ? 4 : 0)));
     };
     if (corners.size() == 3) {
       add({corners[0], corners[1], corners[2]}, {walled[0], walled[1], walled[2]});
@@ -242,11 +247,11 @@ class InstanceCutter {
       add({centre, corners[k], corners[(k + 1) % corners.size()]}, {false, walled[k], false});
   }
 
-  void addTriangle(const std::array<std::uint32_t, 3>& corners, std::uint32_t source, std::uint32_t region,
-                   std::uint8_t walled) {
+  void addTriangle(const std::array<std::uint32_t, 3>& corners, const Origin& origin, std::uint8_t walled) {
     out_.primitive.indices.insert(out_.primitive.indices.end(), corners.begin(), corners.end());
-    out_.source.push_back(source);
-    out_.region.push_back(region);
+    out_.source.push_back(origin.source);
+    out_.region.push_back(origin.region);
+    out_.hidden.push_back(origin.hidden);
     out_.walled.push_back(walled);
   }
 

@@ -34,6 +34,7 @@ struct CutPrimitive {
   /// wall stands (bit e: from corner e), across which no light goes on.
   std::vector<std::uint32_t> source, region;
   std::vector<std::uint8_t> walled;
+  std::vector<bool> hidden;  ///< by triangle: it lies under what stands between two regions, and nobody sees it
 
   [[nodiscard]] std::size_t fileVertices() const { return primitive.positions.size() - made.size(); }
   bool operator==(const CutPrimitive&) const = default;

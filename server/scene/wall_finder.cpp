@@ -81,7 +81,8 @@ std::vector<WallSegment> WallFinder::wallsOn(std::uint32_t facet, const FacetPla
   return walls;
 }
 
-/// The plane is moved a little, to the side where the wall is looked for.
+/// The plane is moved a little, to the side where the wall is looked for; what is met there is moved back, along the
+/// wall, into the plane.
 void WallFinder::meet(std::uint32_t wall, const FacetPlane& plane, bool behind, Meetings& found) const {
   const auto& triangle = flat_.triangles[wall];
   if (std::abs(glm::dot(triangle.normal, plane.normal)) > kLeaning) return;
@@ -99,7 +100,10 @@ void WallFinder::meet(std::uint32_t wall, const FacetPlane& plane, bool behind, 
   }
   if (ends.size() != 2) return;
   auto& meeting = found[{facets_.of_triangle[wall], behind}];
-  meeting.segments.emplace_back(ends[0], ends[1]);
+  const glm::dvec2 across(glm::dot(triangle.normal, plane.x), glm::dot(triangle.normal, plane.y));
+  const double up = glm::dot(triangle.normal, plane.normal) * (behind ? -touch_ : touch_);
+  const auto back = across * (up / glm::dot(across, across));
+  meeting.segments.emplace_back(ends[0] + back, ends[1] + back);
   meeting.height = std::max(meeting.height, *std::ranges::max_element(height) + touch_);
 }
 

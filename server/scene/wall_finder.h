@@ -53,7 +53,7 @@ class WallFinder {
   const FlatScene& flat_;
   const Facets& facets_;
   CutScale scale_;
-  double touch_;                         ///< what hovers no higher stands on the face
+  double touch_;                          ///< what hovers no higher stands on the face
   std::vector<std::uint32_t> triangles_;  ///< of the tree: into FlatScene::triangles
   Bvh tree_;
   std::size_t looked_at_ = 0;

@@ -223,7 +223,7 @@ void LeafGather::takeLight(std::size_t h) {
     // A norm over areas bounds the sum over them (Cauchy and Schwarz).
     if (area > 0.0) tolerance[c] = light_.residual * shining[c] / std::sqrt(area);
   }
-  half.gmres.begin(evenLight(sums), {area_.begin(), area_.end()}, tolerance, kMaxSweeps, true);
+  half.gmres.begin(evenLight(h, sums), {area_.begin(), area_.end()}, tolerance, kMaxSweeps, true);
   half.done = false;
 }
 

@@ -177,7 +177,9 @@ class LeafGather {
   };
   void takeLight(std::size_t half);
   void takeSources(std::size_t half, std::span<SourceSum> sums) noexcept;
-  [[nodiscard]] RayGmres::Vectors evenLight(const std::vector<SourceSum>& sums) const;
+  [[nodiscard]] std::vector<bool> litSides(std::size_t half) const;
+  [[nodiscard]] bool endsInLight(std::size_t half, std::uint32_t end, const std::vector<bool>& lit) const;
+  [[nodiscard]] RayGmres::Vectors evenLight(std::size_t half, const std::vector<SourceSum>& sums) const;
   void average(std::size_t half);
   void followSteps(std::size_t half, const std::vector<Light>* source);
   void sweep(std::size_t half, RayGmres::Vectors& x, bool affine);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <ranges>
 #include <utility>
 
 #include "common/clones.h"
@@ -247,17 +248,52 @@ RADIOSITY_CLONES void LeafGather::takeSources(std::size_t h, std::span<SourceSum
   }
 }
 
+/// Whether a ray ends where there is light, or may be, or passes such.
+bool LeafGather::endsInLight(std::size_t half, std::uint32_t end, const std::vector<bool>& lit) const {
+  const auto steps = sights_.steps(half);
+  for (; end >= sights_.endCount(); end = steps[end - sights_.endCount()].next)
+    if (lit[sights_.sideOf(steps[end - sights_.endCount()].by)]) return true;
+  if (end < sights_.leafCount()) return lit[sights_.sideOf(end)];
+  return !sights_.isAbsorbed(end) && halves_[half].source[end] != Light{};
+}
+
+/// By side: light may come there, from bounce to bounce. Of sides with light of their own nothing is asked, so that it
+/// costs nothing but in the dark.
+std::vector<bool> LeafGather::litSides(std::size_t half) const {
+  std::vector<bool> lit(sides_.size(), false);
+  const auto leavesOf = [&](std::uint32_t s) {
+    return std::views::iota(sides_[s].first_value, sides_[s].first_value + sides_[s].leaf_count);
+  };
+  for (std::uint32_t s = 0; s < sides_.size(); ++s)
+    lit[s] = std::ranges::any_of(leavesOf(s), [&](auto v) { return halves_[half].source[v] != Light{}; });
+  for (bool spreads = true; spreads;) {
+    spreads = false;
+    for (std::uint32_t s = 0; s < sides_.size(); ++s) {
+      if (lit[s]) continue;
+      lit[s] = std::ranges::any_of(leavesOf(s), [&](auto v) {
+        for (const auto end : sights_.seen(half, v))
+          if (endsInLight(half, end, lit)) return true;
+        return false;
+      });
+      spreads = spreads || lit[s];
+    }
+  }
+  return lit;
+}
+
 /// If all leaves of a part of the scene had the same light: what they take of it, and lose, is what shines there. That
-/// is most of what is solved for, and the sweeps that would find it last.
-Gmres<float>::Vectors LeafGather::evenLight(const std::vector<SourceSum>& sums) const {
+/// is most of what is solved for, and the sweeps that would find it last. Where no light comes there is none to begin
+/// with, and so there stays none.
+Gmres<float>::Vectors LeafGather::evenLight(std::size_t half, const std::vector<SourceSum>& sums) const {
   RayGmres::Vectors light;
+  const auto lit = litSides(half);
   for (std::size_t c = 0; c < 3; ++c) {
     light[c].resize(sights_.leafCount());
     for (std::uint32_t s = 0; s < sides_.size(); ++s) {
       const auto& sum = sums[part_[s]];
       const auto level = sum.takes[c] > 0.0 ? static_cast<float>(sum.arrives[c] / sum.takes[c]) : 0.0F;
       for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v)
-        light[c][v] = area_[v] > 0.0F ? level : 0.0F;
+        light[c][v] = lit[s] && area_[v] > 0.0F ? level : 0.0F;
     }
   }
   return light;

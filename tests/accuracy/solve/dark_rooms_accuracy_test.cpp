@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <functional>
 #include <glm/geometric.hpp>
+#include <iostream>
 #include <string>
 #include <vector>
 
@@ -76,14 +77,17 @@ TestScene divided(const Walls& walls) {
   test_scenes::Object room{"room", {}, {}}, wall{"wall", {}, {}};
   appendBox(room, {-2, 0, -2}, {2, kHigh, 2}, allFaces(grey), test_scenes::kNoFace, true);
   const double reach = 2.0 * std::tan(walls.turn_rad);
+  auto two_sided = test_scenes::Material{"sheet", glm::dvec3(0.7), glm::dvec3(0.0)};
+  two_sided.double_sided = true;
+  const auto skin = walls.thickness == 0.0 ? scene.add(two_sided) : grey;
   const auto side = [&](double x, bool forward) {
     std::vector<glm::dvec3> corners{
         {x + reach, 0, -2}, {x - reach, 0, 2}, {x - reach, kHigh, 2}, {x + reach, kHigh, -2}};
     if (!forward) std::ranges::reverse(corners);
-    wall.polygons.push_back({corners, grey});
+    wall.polygons.push_back({corners, skin});
   };
   side(walls.shift, true);
-  side(walls.shift + walls.thickness, false);
+  if (walls.thickness > 0.0) side(walls.shift + walls.thickness, false);
   scene.objects.push_back(std::move(room));
   scene.objects.push_back(std::move(wall));
   scene.lights.push_back({.position = {-1.2, 2.0, 0.3}, .intensity = glm::dvec3(100.0)});
@@ -94,6 +98,7 @@ TestScene divided(const Walls& walls) {
 double brightest(const LitScene& lit, const std::function<glm::dvec2(double, double)>& place) {
   const oracle::SurfaceFinder finder(lit.scene);
   double most = 0.0;
+  glm::dvec3 where(0.0);
   std::size_t found = 0;
   // Dense beside the walls, where lookups mix in what is beyond.
   const std::array along{1e-3, 4e-3, 0.01, 0.03, 0.1,  0.2,  0.3,   0.42, 0.5,
@@ -109,12 +114,16 @@ double brightest(const LitScene& lit, const std::function<glm::dvec2(double, dou
         const auto& uv = triangle.lightmap_uv;
         const auto here = uv[0] * (1.0 - hit->u - hit->v) + uv[1] * hit->u + uv[2] * hit->v;
         const auto light = lit.pages.at(static_cast<std::size_t>(triangle.lightmap_page)).bilinear(here);
-        most = std::max({most, light.x, light.y, light.z});
+        if (const double here_most = std::max({light.x, light.y, light.z}); here_most > most) {
+          most = here_most;
+          where = {at.x, y, at.y};
+        }
         ++found;
       }
     }
   }
   EXPECT_GT(found, along.size() * along.size());
+  if (most > 0.0) std::cerr << "brightest at " << where.x << ", " << where.y << ", " << where.z << "\n";
   return most;
 }
 
