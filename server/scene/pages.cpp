@@ -124,7 +124,6 @@ void fillUnknown(Patchwork& p) {
     if (p.ring[i] == 0) texels.push_back(i);
   if (texels.empty()) {  // wholly buried or empty: black, but somebody's
     std::ranges::fill(p.value, glm::vec3(0.0F));
-    std::ranges::fill(p.ring, static_cast<std::uint8_t>(kMaxRing - 1));
     return;
   }
   for (std::uint8_t ring = 1; ring < kMaxRing && !texels.empty(); ++ring) {

@@ -59,15 +59,23 @@ std::vector<double> areasOf(const FacetCutter& cutter) {
   return sorted;
 }
 
+std::size_t hiddenPiece(const FacetCutter& cutter) {
+  return static_cast<std::size_t>(std::ranges::find(cutter.pieces(), true, &FacetCutter::Piece::hidden) -
+                                  cutter.pieces().begin());
+}
+
 TEST(FacetCutter, aRoomOnAGroundIsARegion) {
   FacetCutter cutter(kSquare, joined(around({3, 3}, {7, 6}, true), around({2.9, 2.9}, {7.1, 6.1}, false)), kScale);
   ASSERT_TRUE(cutter.cut());
+  // What lies under the walls, the room, and what is outside.
   const auto areas = areasOf(cutter);
-  ASSERT_EQ(areas.size(), 2U) << testing::PrintToString(areas);
-  EXPECT_NEAR(areas[0] + areas[1], 100.0, 1e-9);
-  // What lies under the walls goes with one side or the other.
-  EXPECT_GE(areas[0], 12.0 - 1e-9);
-  EXPECT_LE(areas[0], 4.2 * 3.2 + 1e-9);
+  ASSERT_EQ(areas.size(), 3U) << testing::PrintToString(areas);
+  EXPECT_NEAR(areas[0], 4.2 * 3.2 - 12.0, 1e-9);
+  EXPECT_NEAR(areas[1], 12.0, 1e-9);
+  EXPECT_NEAR(areas[2], 100.0 - 4.2 * 3.2, 1e-9);
+  ASSERT_LT(hiddenPiece(cutter), cutter.pieces().size());
+  const auto under = cutter.pieces()[hiddenPiece(cutter)].region;
+  for (const auto& piece : cutter.pieces()) EXPECT_EQ(piece.hidden, piece.region == under);
 }
 
 TEST(FacetCutter, whatStandsOnAFloorAndHidesItLeavesItWhole) {
