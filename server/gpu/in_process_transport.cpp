@@ -37,7 +37,7 @@ class InProcessTransport final : public solver::Transport {
 
   [[nodiscard]] std::string description() const override {
     const auto hands = crew_->hands() > 1 ? fmt::format(", {} threads", crew_->hands()) : "";
-    return fmt::format("{}, in process{}", crew_->context().renderer(), hands);
+    return fmt::format("{}, in process{}, {}", crew_->context().renderer(), hands, sightText(crew_->sight()));
   }
 
  protected:

@@ -32,7 +32,7 @@ Result<void> ShotCrew::setScene(std::shared_ptr<const scene::PatchScene> patches
   std::vector<std::unique_ptr<Hand>> hands;
   for (std::size_t i = 0; i < count; ++i) {
     hands.push_back(std::make_unique<Hand>(ImageSource(*renderers_, count > 1 ? &desk_ : nullptr), weights_));
-    hands.back()->runner.setScene(receivers, sightFor(sight_, context().software()));
+    hands.back()->runner.setScene(receivers, sight());
     if (count > 1) hands.back()->store = FluxStore(patches->nodeCount());
   }
   hands_ = std::move(hands);

@@ -23,6 +23,8 @@ class ShotCrew {
   [[nodiscard]] std::size_t hands() const { return hands_.size(); }
   /// From the next scene on; kAuto at first.
   void setSight(Sight sight) { sight_ = sight; }
+  /// What is decided on, where kAuto was asked for.
+  [[nodiscard]] Sight sight() const { return sightFor(sight_, context().software()); }
   /// After an error there is no scene.
   [[nodiscard]] Result<void> setScene(std::shared_ptr<const scene::PatchScene> patches);
   /// As ShotRunner's. What a hand, or `take`, throws is thrown here, when all hands have stopped.

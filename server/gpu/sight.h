@@ -17,4 +17,9 @@ enum class Sight : std::uint32_t {
   return software ? Sight::kRays : Sight::kImages;
 }
 
+/// Of what was decided on, for reports.
+[[nodiscard]] inline const char* sightText(Sight decided) {
+  return decided == Sight::kRays ? "lights see by rays" : "lights see by images";
+}
+
 }  // namespace radiosity::gpu

@@ -68,6 +68,7 @@ class WorkerTransport final : public solver::Transport {
         slots_(std::move(slots)),
         renderer_(slots_.front().process->renderer()),
         hands_(options_.hands > 0 ? options_.hands : handsFor(slots_.front().process->software(), slots_.size())),
+        sight_(sightFor(options_.sight, slots_.front().process->software())),
         wake_(std::move(wake)) {}
   ~WorkerTransport() override { killAll(); }
   WorkerTransport(const WorkerTransport&) = delete;
@@ -159,7 +160,7 @@ class WorkerTransport final : public solver::Transport {
   [[nodiscard]] std::string description() const override {
     auto text = fmt::format("{}, {} worker{}", renderer_, slots_.size(), slots_.size() == 1 ? "" : "s");
     if (hands_ > 1) text += fmt::format(" of {} threads", hands_);
-    return text;
+    return text + ", " + sightText(sight_);
   }
 
  protected:
@@ -362,7 +363,7 @@ class WorkerTransport final : public solver::Transport {
     return {};
   }
 
-  [[nodiscard]] SceneBody sceneBody() const { return {nodes_, hands_, static_cast<std::uint64_t>(options_.sight)}; }
+  [[nodiscard]] SceneBody sceneBody() const { return {nodes_, hands_, static_cast<std::uint64_t>(sight_)}; }
 
   Result<WorkerProcess> startOne() {
     auto process = WorkerProcess::start(options_.executable);
@@ -379,6 +380,7 @@ class WorkerTransport final : public solver::Transport {
   std::vector<Slot> slots_;
   std::string renderer_;
   std::size_t hands_;  ///< of each worker
+  Sight sight_;        ///< of all workers, and of those that replace them
   FileDescriptor wake_;
   std::atomic<bool> interrupted_{false};
   std::shared_ptr<const scene::PatchScene> patches_;

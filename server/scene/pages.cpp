@@ -122,10 +122,6 @@ void fillUnknown(Patchwork& p) {
   std::vector<std::size_t> texels;
   for (std::size_t i = 0; i < p.ring.size(); ++i)
     if (p.ring[i] == 0) texels.push_back(i);
-  if (texels.empty()) {  // wholly buried or empty: black, but somebody's
-    std::ranges::fill(p.value, glm::vec3(0.0F));
-    return;
-  }
   for (std::uint8_t ring = 1; ring < kMaxRing && !texels.empty(); ++ring) {
     texels = nextRing(p, texels, ring);
     for (const std::size_t i : texels) {
@@ -167,6 +163,7 @@ class PageMaker {
     }
     placeBlack();
     if (seams == Seams::kStitched) stitchSeams(patches_, owners_, pages_);
+    for (const SideRef& of : hidden_) placeHidden(of);
     for (std::size_t page = 0; page < pages_.size(); ++page) dilate(pages_[page], owners_[page]);
     return std::move(pages_);
   }
@@ -208,7 +205,24 @@ class PageMaker {
       fillUnknown(made[i]);
     };
     inTurns(made.size(), make, texels / kTexelsAThread);
-    for (auto i = first; i < last; ++i) place(sides_[i], made[i - first]);
+    for (auto i = first; i < last; ++i) {
+      place(sides_[i], made[i - first]);
+      if (std::ranges::find(made[i - first].ring, 0) == made[i - first].ring.end()) hidden_.push_back(sides_[i]);
+    }
+  }
+
+  /// Of what is wholly buried, or empty, nothing is known. It is black, and somebody's: gutters are dilated into what
+  /// is nobody's, so that it would have the light of whatever lies beside it on the page. Not stitched: nobody sees the
+  /// seam, and black would darken what is beside it.
+  void placeHidden(const SideRef& of) {
+    const Patchwork p = gather(patches_, surfaceOf(of), of.side, values_);
+    PageOwners& owners = owners_[surfaceOf(of).place[of.side].page];
+    const Image& page = pages_[surfaceOf(of).place[of.side].page].irradiance;
+    for (std::int64_t y = p.y0; y < p.y0 + p.height; ++y)
+      for (std::int64_t x = p.x0; x < p.x0 + p.width; ++x) {
+        auto& owner = owners.owner[page.index(static_cast<int>(x), static_cast<int>(y))];
+        if (owner == kNone) owner = ownerOf(of.surface, of.side);
+      }
   }
 
   /// The light of leaves that other surfaces cover, whose charts have their places already.
@@ -307,7 +321,8 @@ class PageMaker {
   std::span<const glm::vec3> values_;
   std::vector<LightmapPage> pages_;
   std::vector<PageOwners> owners_;
-  std::vector<SideRef> sides_;  ///< that have texels
+  std::vector<SideRef> sides_;   ///< that have texels
+  std::vector<SideRef> hidden_;  ///< of these, no texel has a value
 };
 
 }  // namespace

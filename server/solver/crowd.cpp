@@ -40,9 +40,11 @@ constexpr double kAtLamp = 1e-5;
 constexpr std::uint32_t kLostRays = 4096;
 /// Leaves that a thread takes at a time, and those between two looks at the clock.
 constexpr std::size_t kBlock = 128, kSlice = 16'384;
+/// Who is in a hurry takes one leaf for as many by as many.
+constexpr std::uint32_t kCoarse = 8;
 
 constexpr std::uint64_t kPlaces = 0x43524f31ULL, kLamps = 0x43524f32ULL, kNearby = 0x43524f33ULL,
-                        kStarts = 0x43524f34ULL, kDirections = 0x43524f35ULL;
+                        kStarts = 0x43524f34ULL, kDirections = 0x43524f35ULL, kBlocks = 0x43524f36ULL;
 
 float strongest(const glm::vec3& colour) { return std::max({colour.x, colour.y, colour.z}); }
 double powerOf(const LightPolygon& light) {
@@ -238,6 +240,39 @@ CrowdSample::CrowdSample(const scene::PatchScene& patches, const std::vector<Sid
   std::size_t leaves = 0;
   for (const auto& side : sides_) leaves += side.leaf_count;
   values_.resize(leaves, 0.0F);
+  orderLeaves();
+}
+
+/// Calls visit() with the leaf values of each block that have an area.
+template <typename Visit>
+void CrowdSample::forBlocks(Visit visit) const {
+  std::vector<std::uint32_t> block;
+  for (const auto& side : sides_) {
+    for (std::uint32_t top = 0; top < side.height; top += kCoarse) {
+      for (std::uint32_t left = 0; left < side.width; left += kCoarse) {
+        block.clear();
+        for (auto y = top; y < std::min(top + kCoarse, side.height); ++y) {
+          for (auto x = left; x < std::min(left + kCoarse, side.width); ++x) {
+            const auto value = side.first_value + y * side.width + x;
+            if (rays_.areaOf(value) > 0.0) block.push_back(value);
+          }
+        }
+        if (!block.empty()) visit(std::span<const std::uint32_t>(block));
+      }
+    }
+  }
+}
+
+/// In each half another leaf stands for its block, so that the halves differ by what varies within blocks.
+void CrowdSample::orderLeaves() {
+  std::vector<bool> stands(values_.size(), false);
+  forBlocks([&](std::span<const std::uint32_t> block) {
+    order_.push_back(block[mixKeys(mixKeys(key_, kBlocks), block.front()) % block.size()]);
+    stands[order_.back()] = true;
+  });
+  some_ = order_.size();
+  for (std::uint32_t value = 0; value < values_.size(); ++value)
+    if (!stands[value] && rays_.areaOf(value) > 0.0) order_.push_back(value);
 }
 
 float CrowdSample::arriving(std::uint32_t value) const {
@@ -251,23 +286,36 @@ float CrowdSample::arriving(std::uint32_t value) const {
   return static_cast<float>(receiver.arriving());
 }
 
-bool CrowdSample::advance(double seconds) {
+bool CrowdSample::advance(double seconds, Leaves leaves) {
   const auto start = std::chrono::steady_clock::now();
   const auto has_time = [&] {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() < seconds;
   };
-  do {
-    const auto first = done_, end = std::min(first + kSlice, values_.size());
+  const auto wanted = leaves == Leaves::kAll ? order_.size() : some_;
+  while (done_ < wanted) {
+    const auto first = done_, end = std::min(first + kSlice, wanted);
     const auto take = [&](std::size_t block) {
       const auto from = first + block * kBlock;
-      for (auto value = from; value < std::min(from + kBlock, end); ++value)
-        if (rays_.areaOf(static_cast<std::uint32_t>(value)) > 0.0)
-          values_[value] = arriving(static_cast<std::uint32_t>(value));
+      for (auto i = from; i < std::min(from + kBlock, end); ++i) values_[order_[i]] = arriving(order_[i]);
     };
     inTurns((end - first + kBlock - 1) / kBlock, take);
     done_ = end;
-  } while (done_ < values_.size() && has_time());
-  return done_ == values_.size();
+    if (!has_time()) break;
+  }
+  return done_ >= wanted;
+}
+
+std::vector<float> CrowdSample::filled() const {
+  auto values = values_;
+  std::vector<bool> is_done(values.size(), false);
+  for (std::size_t i = 0; i < done_; ++i) is_done[order_[i]] = true;
+  std::size_t number = 0;
+  forBlocks([&](std::span<const std::uint32_t> block) {
+    const float value = values_[order_[number++]];
+    for (const auto leaf : block)
+      if (!is_done[leaf]) values[leaf] = value;
+  });
+  return values;
 }
 
 /// Where nothing is lost all arrives, to the last digit; else what is due is what the leaves say.
@@ -293,11 +341,13 @@ void CrowdSample::findLost(LinkSample& links) const {
 
 LinkSample CrowdSample::links() const {
   LinkSample links;
+  const auto coarse = isWhole() ? std::vector<float>() : filled();
+  const auto& values = isWhole() ? values_ : coarse;
   for (const auto& side : sides_) {
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
       const auto area = static_cast<double>(patches_.node_area[side.first_node + leaf]);
       if (area <= 0.0) continue;
-      const float value = values_[side.first_value + leaf];
+      const float value = values[side.first_value + leaf];
       links.add(side.first_node + leaf, value);
       links.delivered += area * static_cast<double>(value);
     }

@@ -21,12 +21,6 @@ struct LightPolygon {
   double area = 0.0;         ///< unit box squared
   std::uint32_t key = 0;     ///< 2 (Side::triangle_key + triangle) + side: stable across edits
 
-  glm::dvec3 delivered{0.0};  ///< S of the emission: exitance gathered so far, summed over rounds
-
-  /// What a round still owes, exitance summed over rounds; signed.
-  [[nodiscard]] glm::dvec3 undelivered(std::uint32_t rounds) const {
-    return static_cast<double>(rounds) * glm::dvec3(emission) - delivered;
-  }
   /// Around its corners, about their middle; w: the radius.
   [[nodiscard]] glm::vec4 ball() const;
   /// The point at (u, v) in [0, 1)^2, uniform in area.

@@ -195,6 +195,7 @@ Result<StepOutcome> LinkedSolver::step() {
 }
 
 Result<StepOutcome> LinkedSolver::advance() {
+  if (in_haste_ && !settling_ && measured_ == wanted_.size()) forgetRough();
   if (isRepairing()) {
     if (const auto done = repairSlice(); !done) return tl::unexpected<Error>(done.error());
     // Nothing else asks for the light over links that were the last to be measured.
@@ -247,9 +248,14 @@ Result<StepOutcome> LinkedSolver::advance() {
 /// An edit is taken in whole: its links would not be true otherwise.
 void LinkedSolver::endWave() {
   if (gather_ && from_links_ == FromLinks::kNo) tryNow([this] { gather_->giveUp(); });
-  if (isRepairing() || from_links_ != FromLinks::kNo || settling_ || measured_ == 0) return;
-  wanted_.resize(measured_);
-  settling_ = true;
+  if (isRepairing() || from_links_ != FromLinks::kNo || settling_) return;
+  // Without crowds most of the light may be missing; in haste they take less than one other measurement.
+  const auto left = wanted_.begin() + static_cast<std::ptrdiff_t>(measured_);
+  const auto is_crowd = [this](const Measurement& want) { return isFirstOfCrowd(want); };
+  if (measured_ == 0 && std::ranges::none_of(wanted_, is_crowd)) return;
+  wanted_.erase(std::remove_if(left, wanted_.end(), std::not_fn(is_crowd)), wanted_.end());
+  in_haste_ = true;
+  settling_ = measured_ == wanted_.size();
 }
 
 StepOutcome LinkedSolver::finishRound() {

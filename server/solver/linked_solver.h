@@ -215,6 +215,8 @@ class LinkedSolver final : public Solver {
   [[nodiscard]] Result<void> measureSlice();
   [[nodiscard]] Result<void> measureSource(const Measurement& want);
   [[nodiscard]] bool measureCrowd(const Measurement& want);
+  [[nodiscard]] bool isFirstOfCrowd(const Measurement& want) const;
+  void forgetRough();
   void takeCrowds(const std::vector<Crowd>& crowds);
   void addCrowd(const Crowd& crowd);
   [[nodiscard]] bool restoreCrowds(ArchiveReader& from);
@@ -369,6 +371,8 @@ class LinkedSolver final : public Solver {
   bool settling_ = false;             // a wave is measured, its light is still to be solved for
   std::vector<Measurement> wanted_;   // the wave under way
   std::size_t measured_ = 0;          // of the wave
+  bool in_haste_ = false;             // its time is over
+  std::vector<Measurement> rough_;    // what it measured of crowds in haste
   std::size_t slice_ = 16;            // measurements that take some 50 ms
   std::size_t fewest_a_slice_ = 8;    // so many at least, for the workers
   bool growing_ = true;               // light is still missing: until the first walk found nothing more to add

@@ -84,13 +84,30 @@ bool LinkedSolver::measureCrowd(const Measurement& want) {
   if (!crowd_sample_ || !crowd_sample_->isOf(crowd, want.half, want.index))
     crowd_sample_ =
         std::make_unique<CrowdSample>(*patches_, sides_, *leafRays(), settings_.seed, crowd, want.half, want.index);
-  if (!crowd_sample_->advance(kSliceSeconds)) return false;
+  if (!crowd_sample_->advance(kSliceSeconds, in_haste_ ? CrowdSample::Leaves::kSome : CrowdSample::Leaves::kAll))
+    return false;
+  if (!crowd_sample_->isWhole()) rough_.push_back(want);
   counters_.gather_shots += 1;
   counters_.gather_points += CrowdSample::kDraws;
   const auto links = std::exchange(crowd_sample_, nullptr)->links();
   expander_.expand(links);
   system_.addSample(want.shooter, want.half, expander_, links, want.points);
   return true;
+}
+
+/// Without it there is no light of the crowd in this half.
+bool LinkedSolver::isFirstOfCrowd(const Measurement& want) const {
+  const auto& shooter = system_.shooters()[want.shooter];
+  return shooter.crowd != scene::kNone && shooter.column[want.half].points() == 0.0;
+}
+
+/// There is time again: what was measured in haste is measured anew.
+void LinkedSolver::forgetRough() {
+  in_haste_ = false;
+  for (const auto& want : std::exchange(rough_, {})) {
+    system_.forget(want.shooter, want.half);
+    phase_ = Phase::kLights;
+  }
 }
 
 std::size_t LinkedSolver::lightBytes() const {

@@ -11,6 +11,7 @@
 
 #include "server/solver/node_shots.h"
 #include "server/solver/sampling.h"
+#include "server/solver/shot_cost.h"
 
 namespace radiosity::solver {
 namespace {
@@ -197,8 +198,9 @@ ShotBatch Planner::scatterWave(RadiosityState& state, double remainder) {
     total += sides[s].unshot_power;
     if (sides[s].unshot_power > 0.0) queue.push({sides[s].unshot_power, s, sides[s].level_count - 1, 0, 0});
   }
+  const std::size_t most_points = pointsAWave(state.patches().leaves.size());
   while (!queue.empty() && batch.scatter.size() / 2 + batch.gather.size() < settings_.pairs_a_wave &&
-         total > remainder) {
+         batch.points.size() < most_points && total > remainder) {
     const Node node = queue.top();
     queue.pop();
     Side& side = sides[node.side];
@@ -224,56 +226,6 @@ ShotBatch Planner::scatterWave(RadiosityState& state, double remainder) {
   }
   ++wave_;
   exhausted_ = queue.empty() || total <= remainder;
-  return batch;
-}
-
-void Planner::addGatherShot(const LightPolygon& light, std::uint32_t rounds, std::uint32_t shot_index,
-                            std::uint32_t shots, std::uint32_t points, ShotBatch& batch) {
-  const std::uint64_t key = mixKeys(settings_.seed, 0x4c49474854ULL + light.key);
-  const std::uint32_t index = gather_rounds_ * 2 * shots + shot_index;
-  const glm::dvec4 jitter = sobol4(index, mixKeys(key, 1));
-  const glm::dvec3 radiosity = light.undelivered(rounds) / (2.0 * shots);
-  GatherShot shot;
-  std::copy(light.corners.begin(), light.corners.end(), shot.corners.begin());
-  shot.corner_count = light.corner_count;
-  shot.normal = light.normal;
-  for (int c = 0; c < 3; ++c) shot.radiosity[static_cast<std::size_t>(c)] = radiosity[c];
-  shot.resolution = settings_.light_resolution;
-  shot.half = shot_index < shots ? 0 : 1;
-  shot.receiver_jitter = glm::vec2(jitter.x, jitter.y);
-  shot.spots = scene::SpotDraw::from(jitter.z);
-  shot.first_point = static_cast<std::uint32_t>(batch.points.size());
-  shot.point_count = points;
-  for (std::uint32_t p = 0; p < points; ++p) {
-    const std::uint32_t sequence = index * points + p;
-    const glm::dvec4 sample = sobol4(sequence, key);
-    batch.points.push_back(hemicubeAt(light.point(sample.x, sample.y), light.normal, sample.z, mixKeys(key, sequence)));
-  }
-  batch.gather.push_back(shot);
-}
-
-ShotBatch Planner::gatherRound(const RadiosityState& state, std::vector<LightPolygon>& lights) {
-  // One gather shot holds up to this many points: enough for the ratio of weighted visibilities to have little bias,
-  // few enough to be shared out between workers.
-  constexpr std::uint32_t kPointsAShot = 8;
-  ShotBatch batch;
-  batch.mode = settings_.mode;
-  batch.flux_scale = state.fluxScale();
-  const auto power = [&](const LightPolygon& light) {
-    const glm::dvec3 flux = light.area * glm::abs(light.undelivered(state.rounds()));
-    return flux.x + flux.y + flux.z;
-  };
-  double total = 0.0;
-  for (const auto& light : lights) total += power(light);
-  for (auto& light : lights) {
-    if (power(light) <= 0.0) continue;
-    const auto wanted = static_cast<std::uint32_t>(std::lround(settings_.light_points * power(light) / total));
-    const std::uint32_t shots = std::max(1U, (wanted + kPointsAShot - 1) / kPointsAShot);
-    const std::uint32_t points = std::clamp(wanted, 2U, kPointsAShot);
-    for (std::uint32_t k = 0; k < 2 * shots; ++k) addGatherShot(light, state.rounds(), k, shots, points, batch);
-    light.delivered += light.undelivered(state.rounds());
-  }
-  ++gather_rounds_;
   return batch;
 }
 

@@ -10,7 +10,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "server/solver/lights.h"
 #include "server/solver/outlines.h"
 #include "server/solver/state.h"
 #include "server/solver/transport.h"
@@ -66,10 +65,6 @@ class Planner {
   /// nothing worth shooting.
   [[nodiscard]] ShotBatch scatterWave(RadiosityState& state, double remainder);
 
-  /// Direct light: what every light polygon has not delivered yet, from fresh points. The lights are marked as
-  /// delivered.
-  [[nodiscard]] ShotBatch gatherRound(const RadiosityState& state, std::vector<LightPolygon>& lights);
-
   /// Flux that the shooters so far stood for, per channel, lux unit^2. What was delivered differs by chance (roulette,
   /// one point of a coloured node, visibility from few points); the balance of energy shows by how much.
   [[nodiscard]] const std::array<double, 3>& intended() const { return intended_; }
@@ -84,7 +79,7 @@ class Planner {
   template <typename Archive, typename Self>
   static void visit(Archive& archive, Self& self) {
     archive(self.settings_, self.counters_, self.intended_, self.exhausted_, self.share_, self.wave_,
-            self.shots_planned_, self.gather_rounds_);
+            self.shots_planned_);
   }
 
  private:
@@ -95,8 +90,6 @@ class Planner {
   void shoot(RadiosityState& state, Side& side, const Node& node, ShotBatch& batch);
   void addShot(const RadiosityState& state, const Side& side, const Node& node, double weight, std::uint32_t half,
                std::uint64_t node_key, ShotBatch& batch);
-  void addGatherShot(const LightPolygon& light, std::uint32_t rounds, std::uint32_t shot_index, std::uint32_t shots,
-                     std::uint32_t points, ShotBatch& batch);
   void addNodeGather(const RadiosityState& state, const Side& side, const Node& node, double weight,
                      const std::array<bool, 2>& plays, std::uint64_t node_key, ShotBatch& batch);
   /// Nodes of planar surfaces shoot as polygons of their mean radiosity, gathered; others from one point, scattered.
@@ -122,7 +115,6 @@ class Planner {
   double share_ = 0.0;      // power of one shot in this round
   std::uint32_t wave_ = 0;  // of this round
   std::uint64_t shots_planned_ = 0;
-  std::uint32_t gather_rounds_ = 0;
 };
 
 }  // namespace radiosity::solver

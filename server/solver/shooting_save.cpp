@@ -6,7 +6,7 @@
 namespace radiosity::solver {
 namespace {
 
-constexpr std::uint32_t kKind = 0x544f4853U;  // "SHOT"
+constexpr std::uint32_t kKind = 0x32544853U;  // "SHT2": what there is below
 
 }  // namespace
 
@@ -19,9 +19,10 @@ bool RadiosityState::isWhole() const {
 
 template <typename Archive, typename Self>
 void ShootingSolver::visit(Archive& archive, Self& self) {
-  archive(self.lights_, self.phase_, self.polygons_due_, self.live_, self.wave_is_direct_, self.gather_emitted_,
-          self.irradiance_, self.error_, self.transport_counters_);
+  archive(self.phase_, self.live_, self.wave_is_direct_, self.gather_emitted_, self.irradiance_, self.error_,
+          self.transport_counters_);
   RadiosityState::visit(archive, self.state_);
+  DirectShots::visit(archive, self.direct_);
   PunctualLights::visit(archive, self.punctual_);
   Planner::visit(archive, self.planner_);
 }
@@ -40,7 +41,8 @@ bool ShootingSolver::restore(ArchiveReader& from) {
   if (!from.ok() || kind != kKind || nodes != state_.patches().nodeCount()) return false;
   const auto sides = state_.sides().size();
   visit(from, *this);
-  return from.ok() && state_.isWhole() && state_.sides().size() == sides && irradiance_.size() == nodes;
+  return from.ok() && state_.isWhole() && direct_.isWhole() && state_.sides().size() == sides &&
+         irradiance_.size() == nodes;
 }
 
 }  // namespace radiosity::solver

@@ -42,16 +42,17 @@ ShootingSolver::ShootingSolver(std::shared_ptr<const scene::PatchScene> patches,
       state_(std::move(patches), materials, punctual_.owed(1)),
       transport_(transport),
       settings_(settings),
+      direct_(plannerSettings(settings), state_.patches().leaves.size()),
       planner_(state_.patches(), plannerSettings(settings)) {
-  if (!settings_.paper_mode) lights_ = findLightPolygons(state_.patches(), state_.sides(), state_.emissions());
+  if (!settings_.paper_mode) direct_.take(findLightPolygons(state_.patches(), state_.sides(), state_.emissions()));
   startRound();
   publish();
 }
 
 void ShootingSolver::startRound() {
   state_.pushPullAll();
-  polygons_due_ = !lights_.empty();
-  phase_ = polygons_due_ || punctual_.hasSlice(state_.rounds()) ? Phase::kDirect : Phase::kIndirect;
+  direct_.startRound(state_.rounds());
+  phase_ = direct_.isDue() || punctual_.hasSlice(state_.rounds()) ? Phase::kDirect : Phase::kIndirect;
   if (!settings_.paper_mode) {
     // More rounds can pay for finer links, and finer links leak less: half a level for each doubling.
     const auto rounds = static_cast<float>(state_.rounds());
@@ -90,28 +91,23 @@ std::array<double, 3> ShootingSolver::emittedFlux() const {
 void ShootingSolver::beginWave(ShotBatch batch, const std::array<double, 3>& emitted_before) {
   const auto emitted = emittedFlux();
   for (std::size_t c = 0; c < 3; ++c) wave_flux_[c] = emitted[c] - emitted_before[c];
-  wave_.begin(std::move(batch), state_.patches().nodeCount(), state_.patches().triangles.size());
+  wave_.begin(std::move(batch), state_.patches());
 }
 
 /// The light polygons, then the other lights in slices.
 void ShootingSolver::planDirect() {
   const auto before = emittedFlux();
   ShotBatch batch;
-  batch.flux_scale = state_.fluxScale();
-  if (polygons_due_) {
-    polygons_due_ = false;
-    for (const auto& light : lights_) {
-      const glm::dvec3 owed = light.undelivered(state_.rounds());
-      for (int c = 0; c < 3; ++c) gather_emitted_[static_cast<std::size_t>(c)] += light.area * owed[c];
-    }
-    batch = planner_.gatherRound(state_, lights_);
+  if (direct_.isDue()) {
+    batch = direct_.next(gather_emitted_);
   } else {
     punctual_.addSlice(state_.rounds(), batch);
     addEmitted(batch, gather_emitted_);
   }
+  batch.flux_scale = state_.fluxScale();
   wave_is_direct_ = true;
   // An edit may send it back before the wave has landed.
-  if (!punctual_.hasSlice(state_.rounds())) phase_ = Phase::kIndirect;
+  if (!direct_.isDue() && !punctual_.hasSlice(state_.rounds())) phase_ = Phase::kIndirect;
   beginWave(std::move(batch), before);
 }
 
@@ -148,12 +144,8 @@ void ShootingSolver::land() {
 
 /// Light polygons' light that is still to be shot, and all light that is on its way.
 double ShootingSolver::owedPower() const {
-  double power = punctual_.owed(state_.rounds());
+  double power = punctual_.owed(state_.rounds()) + direct_.owed();
   for (const double flux : wave_flux_) power += std::abs(flux);
-  for (const auto& light : lights_) {
-    const glm::dvec3 owed = glm::abs(light.undelivered(state_.rounds()));
-    power += light.area * (owed.x + owed.y + owed.z);
-  }
   return power;
 }
 
@@ -200,20 +192,7 @@ void ShootingSolver::setTargetError(double target) {
 
 void ShootingSolver::setMaterials(const scene::PatchMaterials& materials) {
   state_.setMaterials(materials);
-  if (!settings_.paper_mode) {
-    const auto before = std::move(lights_);
-    lights_ = findLightPolygons(state_.patches(), state_.sides(), state_.emissions());
-    for (LightPolygon old : before) {
-      const auto same =
-          std::find_if(lights_.begin(), lights_.end(), [&](const auto& light) { return light.key == old.key; });
-      if (same != lights_.end()) {
-        same->delivered = old.delivered;
-      } else {
-        old.emission = glm::vec3(0.0F);  // its light is to be taken back
-        lights_.push_back(old);
-      }
-    }
-  }
+  if (!settings_.paper_mode) direct_.take(findLightPolygons(state_.patches(), state_.sides(), state_.emissions()));
   restartRound();
 }
 

@@ -10,8 +10,8 @@
 
 #include "common/result.h"
 #include "server/scene/patch_scene.h"
+#include "server/solver/direct_shots.h"
 #include "server/solver/estimate.h"
-#include "server/solver/lights.h"
 #include "server/solver/planner.h"
 #include "server/solver/solver.h"
 #include "server/solver/state.h"
@@ -71,13 +71,12 @@ class ShootingSolver final : public Solver {
 
   PunctualLights punctual_;
   RadiosityState state_;
-  std::vector<LightPolygon> lights_;
   solver::Transport& transport_;
   SolverSettings settings_;
+  DirectShots direct_;
   Planner planner_;
   Phase phase_ = Phase::kDirect;
-  bool polygons_due_ = false;  // the round's light polygons are still to be gathered
-  bool live_ = true;           // show every wave: in the first round, and after an edit until the round ends
+  bool live_ = true;  // show every wave: in the first round, and after an edit until the round ends
   Wave wave_;
   bool wave_is_direct_ = false;
   std::array<double, 3> wave_flux_{};  // what the wave under way stands for

@@ -1,6 +1,10 @@
 // About how long shots take, to cut work into pieces of similar length. Pure values.
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+
 #include "server/solver/transport.h"
 
 namespace radiosity::solver {
@@ -28,5 +32,13 @@ struct ShotCost {
     return 3.0 * resolution * resolution + kTrianglePixels * triangles;
   }
 };
+
+/// Looks at gathered light in a wave that forgets its links, at most: half a second of one core or so, since a limit of
+/// time waits for the wave under way. Each leaf looks from each point, and an image of it takes as long as this many.
+inline constexpr std::size_t kLooksAWave = 6'000'000, kLooksOfPoint = 16'000;
+/// Two halves of two points at least.
+[[nodiscard]] inline std::uint32_t pointsAWave(std::size_t leaves) {
+  return static_cast<std::uint32_t>(std::max<std::size_t>(4, kLooksAWave / (leaves + kLooksOfPoint)));
+}
 
 }  // namespace radiosity::solver

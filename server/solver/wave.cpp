@@ -19,11 +19,11 @@ constexpr double kLeastSlice = 1'000'000.0;
 
 }  // namespace
 
-void Wave::begin(ShotBatch batch, std::size_t nodes, std::size_t triangles) {
+void Wave::begin(ShotBatch batch, const scene::PatchScene& patches) {
   RAD_CHECK(!under_way_);
   batch_ = std::move(batch);
-  flux_.reset(nodes);
-  cost_ = {static_cast<double>(triangles)};
+  flux_.reset(patches.nodeCount());
+  cost_ = {static_cast<double>(patches.triangles.size()), static_cast<double>(patches.leaves.size())};
   next_gather_ = next_scatter_ = 0;
   cost_left_ = 0.0;
   for (const auto& shot : batch_.gather) cost_left_ += cost_(shot);

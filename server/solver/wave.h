@@ -6,6 +6,7 @@
 #include <cstddef>
 
 #include "common/result.h"
+#include "server/scene/patch_scene.h"
 #include "server/solver/shot_cost.h"
 #include "server/solver/transport.h"
 
@@ -13,8 +14,8 @@ namespace radiosity::solver {
 
 class Wave {
  public:
-  /// `triangles` of the scene, for the cost of a shot. No wave may be under way.
-  void begin(ShotBatch batch, std::size_t nodes, std::size_t triangles);
+  /// Of the scene, whose triangles and leaves tell the cost of a shot. No wave may be under way.
+  void begin(ShotBatch batch, const scene::PatchScene& patches);
   [[nodiscard]] bool underWay() const { return under_way_; }
 
   /// Has the transport carry out the next slice and adds what was done to `counters`. True: that was the last one, and

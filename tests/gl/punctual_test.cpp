@@ -414,6 +414,7 @@ TEST_P(Punctual, WorkersDeliverTheSameBitsAsOneProcess) {
   auto workers = gpu::makeWorkerTransport({.workers = 3, .executable = RADIOSITY_GL_WORKER, .sight = GetParam()});
   ASSERT_TRUE(workers.has_value()) << workers.error().text();
   transport_ = std::move(*workers);
+  EXPECT_NE(transport_->description().find(gpu::sightText(GetParam())), std::string::npos) << transport_->description();
   const auto shared = runRound(scene, sources);
   EXPECT_EQ(alone.node, shared.node);
   EXPECT_EQ(alone.escaped, shared.escaped);

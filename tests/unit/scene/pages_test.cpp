@@ -114,6 +114,27 @@ TEST(Pages, TexelsUnderABlockAreFilledFromWhatIsVisible) {
                   7.0, 1e-4);
 }
 
+// Whatever lies beside it on the page: that depends on the layout, which edits leave as it is and solves do not.
+TEST(Pages, WhatIsWhollyBuriedIsBlack) {
+  Scene scene;
+  place(scene, box({-1.0, 0.0, -1.0}, {1.0, 2.0, 1.0}));
+  place(scene, box({-0.2, 0.9, -0.2}, {0.2, 1.1, 0.2}));
+  ChartOptions options;
+  options.texel_size_m = 0.1;
+  const PatchScene patches = build(scene, 0, options);
+  const auto pages = assemblePages(patches, leafValues(patches, [](const glm::dvec3&) { return 1000.0F; }));
+  std::size_t buried = 0;
+  for (const Surface& surface : patches.surfaces) {
+    if (surface.instance == 0) continue;
+    const PagePlace& at = surface.place[0];
+    const auto& page = pages[at.page];
+    for (std::uint32_t y = 0; y < surface.height; ++y)
+      for (std::uint32_t x = 0; x < surface.width; ++x, ++buried)
+        EXPECT_EQ(page.irradiance.at(static_cast<int>(at.x + x), static_cast<int>(at.y + y)), glm::vec3(0.0F));
+  }
+  EXPECT_GT(buried, 0U);
+}
+
 TEST(Pages, LookupsOnBothSidesOfASeamAgree) {
   const Scene scene = sceneOf(icoSphere(1.0, 4));
   const PatchScene patches = build(scene, 3000);

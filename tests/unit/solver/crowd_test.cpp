@@ -128,6 +128,39 @@ TEST(FewLights, AreAsManyAsTheirLinksHaveRoom) {
   EXPECT_EQ(fewLights(0, 0), 256U);
 }
 
+// At a limit of time: one leaf of each block is asked, and stands for the others.
+TEST_F(CrowdTest, InHasteItBringsRoughlyTheSameForAFractionOfTheWork) {
+  make(tiles(glm::vec3(3.0F)));
+  constexpr std::uint32_t kSamples = 32;
+  std::vector<double> light(kLeaves * kLeaves, 0.0);
+  for (std::uint32_t k = 0; k < 2 * kSamples; ++k) {
+    CrowdSample sample(*scene_.patches, sides_, *rays_, 1, divided_.crowds[0], k % 2, k / 2);
+    while (!sample.advance(0.0, CrowdSample::Leaves::kSome)) continue;
+    EXPECT_FALSE(sample.isWhole());
+    const auto links = sample.links();
+    for (std::size_t leaf = 0; leaf < light.size(); ++leaf)
+      light[leaf] += static_cast<double>(links.irradiance[leaf]) / (2.0 * kSamples);
+  }
+  std::size_t alike = 0;
+  for (std::uint32_t leaf = 0; leaf < light.size(); ++leaf) {
+    const auto left = leaf / kLeaves * kLeaves + leaf % kLeaves / 8 * 8;
+    alike += light[leaf] == light[left] ? 1 : 0;
+    EXPECT_NEAR(light[leaf] / expected(leaf, false), 1.0, 0.6) << leaf;
+  }
+  EXPECT_EQ(alike, light.size());
+}
+
+TEST_F(CrowdTest, ASampleThatWasInHasteEndsAsOneThatHadTime) {
+  make(tiles(glm::vec3(3.0F)));
+  CrowdSample hasty(*scene_.patches, sides_, *rays_, 1, divided_.crowds[0], 0, 0);
+  CrowdSample calm(*scene_.patches, sides_, *rays_, 1, divided_.crowds[0], 0, 0);
+  while (!hasty.advance(0.0, CrowdSample::Leaves::kSome)) continue;
+  while (!hasty.advance(0.0)) continue;
+  while (!calm.advance(0.0)) continue;
+  EXPECT_TRUE(hasty.isWhole());
+  EXPECT_EQ(hasty.links().irradiance, calm.links().irradiance);
+}
+
 TEST_F(CrowdTest, BringsWhatOneLampInItsPlaceBrings) {
   make(tiles(glm::vec3(3.0F)));
   ASSERT_EQ(divided_.crowds.size(), 1U);

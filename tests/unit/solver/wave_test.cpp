@@ -23,8 +23,12 @@ QuadScene litCube() { return makeQuadScene(cubeQuads(4, {0, 4, 0, 0, 0, 0}, {0.5
 ShotBatch someBatch(const QuadScene& made) {
   RadiosityState state(made.patches, made.materials);
   auto lights = findLightPolygons(*made.patches, state.sides(), state.emissions());
-  Planner planner(*made.patches, {});
-  ShotBatch batch = planner.gatherRound(state, lights);
+  DirectShots shots({}, made.patches->leaves.size());
+  shots.take(lights);
+  shots.startRound(1);
+  std::array<double, 3> flux{};
+  ShotBatch batch = shots.next(flux);
+  batch.flux_scale = state.fluxScale();
   for (std::uint32_t i = 0; i < 60; ++i) {
     ScatterShot shot;
     shot.frame = batch.points.front();
@@ -50,7 +54,7 @@ TEST(Wave, SlicesDeliverTheBitsOfTheWhole) {
   TransportCounters counters;
   for (int again = 0; again < 2; ++again) {  // the second wave is cut by the measured rate
     counters = {};
-    wave.begin(batch, made.patches->nodeCount(), made.patches->triangles.size());
+    wave.begin(batch, *made.patches);
     int slices = 1;
     for (auto last = wave.advance(rays, counters); !last.value(); last = wave.advance(rays, counters)) ++slices;
     EXPECT_GT(again + slices, 1) << "the first wave in one slice";
@@ -71,7 +75,7 @@ TEST(Wave, AnEmptyOneIsDoneInOneSlice) {
   ASSERT_TRUE(rays.setScene(made.patches));
   Wave wave;
   TransportCounters counters;
-  wave.begin({}, made.patches->nodeCount(), made.patches->triangles.size());
+  wave.begin({}, *made.patches);
   EXPECT_TRUE(wave.advance(rays, counters).value());
 }
 
