@@ -66,19 +66,22 @@ bool touchesBox(const Bvh::Triangle& triangle, const glm::vec3& low, const glm::
   const glm::vec3 centre = 0.5F * (low + high);
   const glm::vec3 half = 0.5F * (high - low);
   const std::array<glm::vec3, 3> v{triangle[0] - centre, triangle[1] - centre, triangle[2] - centre};
-  const auto separates = [&](const glm::vec3& axis) {
-    const float a = glm::dot(v[0], axis), b = glm::dot(v[1], axis), c = glm::dot(v[2], axis);
-    const float reach = glm::dot(half, glm::abs(axis));
+  const auto isApart = [](float a, float b, float c, float reach) {
     return std::min({a, b, c}) > reach || std::max({a, b, c}) < -reach;
   };
-  const std::array<glm::vec3, 3> axes{glm::vec3(1, 0, 0), glm::vec3(0, 1, 0), glm::vec3(0, 0, 1)};
-  for (const auto& axis : axes)
-    if (separates(axis)) return false;
+  for (int axis = 0; axis < 3; ++axis)
+    if (isApart(v[0][axis], v[1][axis], v[2][axis], half[axis])) return false;
   const std::array<glm::vec3, 3> edges{v[1] - v[0], v[2] - v[1], v[0] - v[2]};
-  if (separates(glm::cross(edges[0], edges[1]))) return false;
+  const auto normal = glm::cross(edges[0], edges[1]);
+  const float reach = glm::dot(half, glm::abs(normal));
+  if (isApart(glm::dot(v[0], normal), glm::dot(v[1], normal), glm::dot(v[2], normal), reach)) return false;
   for (const auto& edge : edges)
-    for (const auto& axis : axes)
-      if (separates(glm::cross(edge, axis))) return false;
+    for (int axis = 0; axis < 3; ++axis) {  // the product of the edge and the axis has two components
+      const int one = (axis + 1) % 3, other = (axis + 2) % 3;
+      const auto along = [&](const glm::vec3& p) { return p[one] * edge[other] - p[other] * edge[one]; };
+      const float width = half[one] * std::abs(edge[other]) + half[other] * std::abs(edge[one]);
+      if (isApart(along(v[0]), along(v[1]), along(v[2]), width)) return false;
+    }
   return true;
 }
 

@@ -242,7 +242,17 @@ class Gaps {
     }
   }
 
+  /// Whether a leaf of the node may have spots for lying in a gap. Where solids lie through each other hardly any may.
+  [[nodiscard]] bool anyMayHave(const Surface& surface, std::uint32_t level, glm::uvec2 at) const {
+    const glm::uvec2 end = glm::min((at + 1U) << level, glm::uvec2(surface.width, surface.height));
+    for (auto y = at.y << level; y < end.y; ++y)
+      for (auto x = at.x << level; x < end.x; ++x)
+        if (mayHave(patches_.leaves[surface.first_leaf + y * surface.width + x])) return true;
+    return false;
+  }
+
   void descend(std::uint32_t s, float side, std::uint32_t level, glm::uvec2 at, std::vector<Found>& found) const {
+    if (!anyMayHave(patches_.surfaces[s], level, at)) return;
     if (mayDiffer(s, level, at)) {
       ask(s, side, level, at, found);
     } else {
