@@ -245,6 +245,10 @@ bool HttpSession::refuseEarly() {
     return refuse(errorResponse(403, "forbidden", "this Origin may not use the server; see --allow-origin"));
   const bool ours = request_.path == protocol::kWebSocketPath && boost::beast::websocket::is_upgrade(parser_->get());
   if (ours && !no_body) return refuse(errorResponse(400, "badInput", "a request for an upgrade has no body"));
+  if (ours && buffer_.size() > 0) {  // RFC 6455 section 4.1; and what is here already the WebSocket would not see
+    send(errorResponse(400, "badInput", "frames may be sent once the upgrade is answered, and not before"), true);
+    return true;
+  }
   if (ours) {
     upgrade();
     return true;

@@ -21,6 +21,8 @@ constexpr double kMaxWork = 400e6;
 constexpr double kMostWorkAtAll = 2.0 * kMaxWork;
 constexpr std::uint64_t kLeastWorkOfPlace = 2'000;
 constexpr std::size_t kLeavesATry = 32, kMostTried = 128;
+/// Of all leaves, about a second of one core; and of a leaf, at least and at most.
+constexpr std::size_t kMostLooks = std::size_t{1} << 27U, kLeastLooksOfLeaf = 512, kMostLooksOfLeaf = 65'536;
 
 /// Of the work of all places; a power of two, so that after most edits it is the same.
 std::uint64_t shareOf(std::uint64_t places) {
@@ -70,6 +72,11 @@ std::uint32_t affordableBeside(std::size_t beside, const BurialPlaces& places, s
 }
 
 std::uint64_t affordableWork(std::size_t surfaces) { return shareOf(surfaces); }
+
+std::size_t affordableLooks(std::size_t leaves) {
+  const auto each = std::bit_floor(kMostLooks / std::max<std::size_t>(1, leaves));
+  return std::clamp(each, kLeastLooksOfLeaf, kMostLooksOfLeaf);
+}
 
 std::string budgetWarning(const BurialPlaces& places, std::size_t undecided) {
   if (undecided > 0)

@@ -43,6 +43,11 @@ struct TriedLeaf {
 /// Of a place on each of so many surfaces that nothing comes near.
 [[nodiscard]] std::uint64_t affordableWork(std::size_t surfaces);
 
+/// Of the question what comes near a leaf, and of others of its kind, where a scene has so many leaves: at so many
+/// boxes and triangles (Bvh). Those of long triangles that lean every way all lie in each other, and then it is taken
+/// that something is near, which costs more to light and is no less right.
+[[nodiscard]] std::size_t affordableLooks(std::size_t leaves);
+
 /// `undecided`: sides of texels of which a place took more work than it might. Empty: nothing was left out.
 [[nodiscard]] std::string budgetWarning(const BurialPlaces& places, std::size_t undecided);
 

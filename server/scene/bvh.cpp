@@ -61,24 +61,31 @@ struct SlabRay {
   }
 };
 
+/// What lies outside of a turned box by more than this, as seen along the axes of the scene, is outside of it however
+/// its corners are rounded (unit box).
+constexpr float kFarApart = 1e-5F;
+
 /// Separating axes of a triangle and a box (Akenine-Moller 2001): box faces, triangle plane, nine edge products.
 bool touchesBox(const Bvh::Triangle& triangle, const glm::vec3& low, const glm::vec3& high) {
   const glm::vec3 centre = 0.5F * (low + high);
   const glm::vec3 half = 0.5F * (high - low);
   const std::array<glm::vec3, 3> v{triangle[0] - centre, triangle[1] - centre, triangle[2] - centre};
-  const auto separates = [&](const glm::vec3& axis) {
-    const float a = glm::dot(v[0], axis), b = glm::dot(v[1], axis), c = glm::dot(v[2], axis);
-    const float reach = glm::dot(half, glm::abs(axis));
+  const auto isApart = [](float a, float b, float c, float reach) {
     return std::min({a, b, c}) > reach || std::max({a, b, c}) < -reach;
   };
-  const std::array<glm::vec3, 3> axes{glm::vec3(1, 0, 0), glm::vec3(0, 1, 0), glm::vec3(0, 0, 1)};
-  for (const auto& axis : axes)
-    if (separates(axis)) return false;
+  for (int axis = 0; axis < 3; ++axis)
+    if (isApart(v[0][axis], v[1][axis], v[2][axis], half[axis])) return false;
   const std::array<glm::vec3, 3> edges{v[1] - v[0], v[2] - v[1], v[0] - v[2]};
-  if (separates(glm::cross(edges[0], edges[1]))) return false;
+  const auto normal = glm::cross(edges[0], edges[1]);
+  const float reach = glm::dot(half, glm::abs(normal));
+  if (isApart(glm::dot(v[0], normal), glm::dot(v[1], normal), glm::dot(v[2], normal), reach)) return false;
   for (const auto& edge : edges)
-    for (const auto& axis : axes)
-      if (separates(glm::cross(edge, axis))) return false;
+    for (int axis = 0; axis < 3; ++axis) {  // the product of the edge and the axis has two components
+      const int one = (axis + 1) % 3, other = (axis + 2) % 3;
+      const auto along = [&](const glm::vec3& p) { return p[one] * edge[other] - p[other] * edge[one]; };
+      const float width = half[one] * std::abs(edge[other]) + half[other] * std::abs(edge[one]);
+      if (isApart(along(v[0]), along(v[1]), along(v[2]), width)) return false;
+    }
   return true;
 }
 
@@ -327,14 +334,16 @@ bool Bvh::meets(const glm::dvec3& origin, const glm::dvec3& direction, double t_
   return findHit<true>(origin, direction, t_min, t_max).has_value();
 }
 
-/// Whether the test holds for any triangle, as triangles_ has them, of the tree's leaves that reach into the box.
+/// Whether the test holds for any triangle, as triangles_ has them, of the tree's leaves that reach into the box; or
+/// that is not known after so many looks.
 template <typename Test>
-bool Bvh::anyTriangle(const glm::vec3& box_min, const glm::vec3& box_max, Test test) const {
+bool Bvh::anyTriangle(const glm::vec3& box_min, const glm::vec3& box_max, Test test, std::size_t looks) const {
   if (triangles_.empty()) return false;
   std::array<std::uint32_t, kStackDepth> stack;
   std::size_t depth = 0;
   stack[depth++] = 0;
   while (depth > 0) {
+    if (looks-- == 0) return true;
     const Node& node = nodes_[stack[--depth]];
     bool apart = false;
     for (int axis = 0; axis < 3; ++axis)
@@ -345,6 +354,7 @@ bool Bvh::anyTriangle(const glm::vec3& box_min, const glm::vec3& box_max, Test t
       stack[depth++] = node.first + 1;
       continue;
     }
+    looks -= std::min<std::size_t>(looks, node.count);
     for (std::uint32_t i = node.first; i < node.first + node.count; ++i)
       if (test(i)) return true;
   }
@@ -352,10 +362,11 @@ bool Bvh::anyTriangle(const glm::vec3& box_min, const glm::vec3& box_max, Test t
 }
 
 bool Bvh::touches(const glm::vec3& box_min, const glm::vec3& box_max, std::span<const std::uint32_t> tags,
-                  std::uint32_t ignored_tag) const {
-  return anyTriangle(box_min, box_max, [&](std::uint32_t i) {
+                  std::uint32_t ignored_tag, std::size_t looks) const {
+  const auto touchesIt = [&](std::uint32_t i) {
     return tags[order_[i]] != ignored_tag && touchesBox(triangles_[i], box_min, box_max);
-  });
+  };
+  return anyTriangle(box_min, box_max, touchesIt, looks);
 }
 
 bool Bvh::risesAbove(const glm::vec3& normal, float height) const {
@@ -411,27 +422,37 @@ bool Bvh::anyNear(const glm::vec3& box_min, const glm::vec3& box_max,
 
 /// Whether the test holds for any triangle that touches the box; it gets the triangle in the axes of the box.
 template <typename Test>
-bool Bvh::anyTouching(const OrientedBox& box, Test test) const {
+bool Bvh::anyTouching(const OrientedBox& box, Test test, std::size_t looks) const {
   glm::vec3 reach(0.0F);
   for (int axis = 0; axis < 3; ++axis) reach += box.half[axis] * glm::abs(box.axes[static_cast<std::size_t>(axis)]);
-  return anyTriangle(box.centre - reach, box.centre + reach, [&](std::uint32_t i) {
+  const auto low = box.centre - reach - kFarApart, high = box.centre + reach + kFarApart;
+  const auto touchesIt = [&](std::uint32_t i) {
+    const auto& [a, b, c] = triangles_[i];
+    for (int axis = 0; axis < 3; ++axis)
+      if (std::min({a[axis], b[axis], c[axis]}) > high[axis] || std::max({a[axis], b[axis], c[axis]}) < low[axis])
+        return false;
     Triangle local;
     for (std::size_t k = 0; k < 3; ++k) {
       const glm::vec3 p = triangles_[i][k] - box.centre;
       local[k] = {glm::dot(p, box.axes[0]), glm::dot(p, box.axes[1]), glm::dot(p, box.axes[2])};
     }
     return test(order_[i], local) && touchesBox(local, -box.half, box.half);
-  });
+  };
+  return anyTriangle(box.centre - reach, box.centre + reach, touchesIt, looks);
 }
 
-bool Bvh::touches(const OrientedBox& box, std::span<const std::uint32_t> tags, std::uint32_t ignored_tag) const {
-  return anyTouching(box, [&](std::uint32_t triangle, const Triangle&) { return tags[triangle] != ignored_tag; });
+bool Bvh::touches(const OrientedBox& box, std::span<const std::uint32_t> tags, std::uint32_t ignored_tag,
+                  std::size_t looks) const {
+  const auto counts = [&](std::uint32_t triangle, const Triangle&) { return tags[triangle] != ignored_tag; };
+  return anyTouching(box, counts, looks);
 }
 
-bool Bvh::hoversIn(const OrientedBox& box, std::span<const std::uint32_t> tags, std::uint32_t ignored_tag) const {
-  return anyTouching(box, [&](std::uint32_t triangle, const Triangle& local) {
+bool Bvh::hoversIn(const OrientedBox& box, std::span<const std::uint32_t> tags, std::uint32_t ignored_tag,
+                   std::size_t looks) const {
+  const auto hovers = [&](std::uint32_t triangle, const Triangle& local) {
     return tags[triangle] != ignored_tag && std::min({local[0].z, local[1].z, local[2].z}) > -box.half.z;
-  });
+  };
+  return anyTouching(box, hovers, looks);
 }
 
 }  // namespace radiosity::scene

@@ -23,6 +23,7 @@ struct RayHit {
 class Bvh {
  public:
   using Triangle = std::array<glm::vec3, 3>;
+  static constexpr std::size_t kAnyNumber = ~std::size_t{0};
 
   Bvh() = default;
   /// Binned surface area heuristic (Wald 2007, "On fast construction of SAH-based bounding volume hierarchies"),
@@ -55,8 +56,9 @@ class Bvh {
   [[nodiscard]] bool meets(const glm::dvec3& origin, const glm::dvec3& direction, double t_min, double t_max) const;
 
   /// True when a triangle other than those marked with `ignored_tag` touches the box. `tags`: one for each triangle.
+  /// `looks`: at so many nodes and triangles; where these do not tell, one may touch it, and that is the answer.
   [[nodiscard]] bool touches(const glm::vec3& box_min, const glm::vec3& box_max, std::span<const std::uint32_t> tags,
-                             std::uint32_t ignored_tag) const;
+                             std::uint32_t ignored_tag, std::size_t looks = kAnyNumber) const;
 
   struct OrientedBox {
     glm::vec3 centre{0.0F};
@@ -64,11 +66,11 @@ class Bvh {
     glm::vec3 half{0.0F};             ///< extent along each
   };
   /// The same for a box that is turned.
-  [[nodiscard]] bool touches(const OrientedBox& box, std::span<const std::uint32_t> tags,
-                             std::uint32_t ignored_tag) const;
+  [[nodiscard]] bool touches(const OrientedBox& box, std::span<const std::uint32_t> tags, std::uint32_t ignored_tag,
+                             std::size_t looks = kAnyNumber) const;
   /// The same, of triangles alone that lie wholly above the lower face of the box along its third axis.
-  [[nodiscard]] bool hoversIn(const OrientedBox& box, std::span<const std::uint32_t> tags,
-                              std::uint32_t ignored_tag) const;
+  [[nodiscard]] bool hoversIn(const OrientedBox& box, std::span<const std::uint32_t> tags, std::uint32_t ignored_tag,
+                              std::size_t looks = kAnyNumber) const;
 
   /// False: no corner lies above the plane dot(normal, p) = height. True: one does, or that would take long to tell.
   [[nodiscard]] bool risesAbove(const glm::vec3& normal, float height) const;
@@ -89,6 +91,7 @@ class Bvh {
 
  private:
   // Made of the same boxes and triangles:
+  friend class ClosedParts;
   friend class SolidTree;
   friend class WideNodes;
   struct Node {
@@ -100,9 +103,10 @@ class Bvh {
   [[nodiscard]] std::optional<RayHit> findHit(const glm::dvec3& origin, const glm::dvec3& direction, double t_min,
                                               double t_max) const;
   template <typename Test>
-  [[nodiscard]] bool anyTriangle(const glm::vec3& box_min, const glm::vec3& box_max, Test test) const;
+  [[nodiscard]] bool anyTriangle(const glm::vec3& box_min, const glm::vec3& box_max, Test test,
+                                 std::size_t looks = kAnyNumber) const;
   template <typename Test>
-  [[nodiscard]] bool anyTouching(const OrientedBox& box, Test test) const;
+  [[nodiscard]] bool anyTouching(const OrientedBox& box, Test test, std::size_t looks) const;
   void build();
   [[nodiscard]] std::uint32_t split(std::uint32_t first, std::uint32_t count);
 

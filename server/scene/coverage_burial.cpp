@@ -89,6 +89,7 @@ class Burial {
         solids_(solids),
         coincidence_(coincidence),
         former_(former),
+        looks_(affordableLooks(patches.leaves.size())),
         leaves_(patches, pieces, solids_, coincidence) {
     record_.hides = hides;
     record_.covered = coincidence.covered();
@@ -156,7 +157,7 @@ class Burial {
     const Surface& surface = patches_.surfaces[node.surface];
     const Bounds box = boxes.box(level, node.x, node.y);
     if (box.empty()) return;
-    if (!solids_.near(box, node.surface) && !coincidence_.mayCover(node.surface, node.side, box)) {
+    if (!solids_.near(box, node.surface, looks_) && !coincidence_.mayCover(node.surface, node.side, box)) {
       settleUniform(node, level, hits, split);
       return;
     }
@@ -348,6 +349,7 @@ class Burial {
   const Solids& solids_;
   const Coincidence& coincidence_;
   const FormerBurial* former_;
+  const std::size_t looks_;  ///< for what comes near a node
   const LeafBurial leaves_;
   BurialRecord record_;
   std::size_t recorded_bytes_ = 0, undecided_ = 0;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/parallel.h"
+#include "server/scene/burial_budget.h"
 #include "server/scene/bvh.h"
 #include "server/scene/coverage.h"
 
@@ -134,7 +135,10 @@ class Gaps {
  public:
   explicit Gaps(PatchScene& patches, const PatchScene* before = nullptr,
                 std::span<const std::uint32_t> surface_before = {})
-      : patches_(patches), before_(before), surface_before_(surface_before) {
+      : patches_(patches),
+        looks_(affordableLooks(patches.leaves.size())),
+        before_(before),
+        surface_before_(surface_before) {
     std::vector<Bvh::Triangle> triangles(patches.triangles.size());
     for (std::size_t i = 0; i < patches.indices.size(); ++i)
       triangles[i / 3][i % 3] = patches.vertices[patches.indices[i]].position;
@@ -242,7 +246,17 @@ class Gaps {
     }
   }
 
+  /// Whether a leaf of the node may have spots for lying in a gap. Where solids lie through each other hardly any may.
+  [[nodiscard]] bool anyMayHave(const Surface& surface, std::uint32_t level, glm::uvec2 at) const {
+    const glm::uvec2 end = glm::min((at + 1U) << level, glm::uvec2(surface.width, surface.height));
+    for (auto y = at.y << level; y < end.y; ++y)
+      for (auto x = at.x << level; x < end.x; ++x)
+        if (mayHave(patches_.leaves[surface.first_leaf + y * surface.width + x])) return true;
+    return false;
+  }
+
   void descend(std::uint32_t s, float side, std::uint32_t level, glm::uvec2 at, std::vector<Found>& found) const {
+    if (!anyMayHave(patches_.surfaces[s], level, at)) return;
     if (mayDiffer(s, level, at)) {
       ask(s, side, level, at, found);
     } else {
@@ -252,12 +266,14 @@ class Gaps {
 
   void ask(std::uint32_t s, float side, std::uint32_t level, glm::uvec2 at, std::vector<Found>& found) const {
     const Surface& surface = patches_.surfaces[s];
-    if (!tree_.touches(boxBefore(s, side, level, at, kInterior - 1.0F), patches_.triangle_surface, s) &&
-        !tree_.hoversIn(boxBefore(s, side, level, at, 2.0F * kBeside), patches_.triangle_surface, s))
+    const auto touches = [&](const Bvh::OrientedBox& box) {
+      return tree_.touches(box, patches_.triangle_surface, s, looks_);
+    };
+    if (!touches(boxBefore(s, side, level, at, kInterior - 1.0F)) &&
+        !tree_.hoversIn(boxBefore(s, side, level, at, 2.0F * kBeside), patches_.triangle_surface, s, looks_))
       return;
     if (level == 0) {
-      found.push_back(
-          {at, tree_.touches(boxBefore(s, side, 0, at, kInterior - 1.0F, kCut), patches_.triangle_surface, s)});
+      found.push_back({at, touches(boxBefore(s, side, 0, at, kInterior - 1.0F, kCut))});
       return;
     }
     const LevelGrid below = levelGrid(surface.width, surface.height, level - 1);
@@ -275,6 +291,7 @@ class Gaps {
   }
 
   PatchScene& patches_;
+  const std::size_t looks_;
   const PatchScene* before_;  ///< null: no edit
   std::span<const std::uint32_t> surface_before_;
   std::vector<ChangedBox> changed_;

@@ -27,8 +27,15 @@ struct ImageSize {
 /// From the header. kTooLarge: more than `max_pixels`; kUnsupported and kBadInput: it is no PNG or JPEG.
 [[nodiscard]] Result<ImageSize> sizeOfImage(const Bytes& bytes, std::size_t max_pixels, const std::string& where);
 
-/// RGBA, 8 bits a channel. kTooLarge when the header says more than `max_pixels`; nothing is allocated then.
-[[nodiscard]] Result<Texture> decodeImage(const Bytes& bytes, std::size_t max_pixels, const std::string& where);
+/// How a picture is held.
+struct ImageUse {
+  bool srgb = false;
+  std::uint32_t halvings = 0;  ///< as halve()
+};
+/// RGBA, 8 bits a channel. kTooLarge when the header says more than `max_pixels`; nothing is allocated then. While it
+/// works there is 4 bytes for each of the file's pixels, and what the decoder needs for itself.
+[[nodiscard]] Result<Texture> decodeImage(const Bytes& bytes, std::size_t max_pixels, const std::string& where,
+                                          const ImageUse& use = {});
 
 /// Width and height halved so often (ImageSize::halved): each pixel is the mean of those below it, in linear light
 /// where Texture::srgb, and weighted by their alpha, since colour behind what is cut out says nothing. O(pixels).

@@ -20,6 +20,8 @@ namespace {
 constexpr std::uint64_t kTotalImages = 4, kLikelyPixelsAByte = 64;
 /// While one is decoded: what the decoder holds, and its result.
 constexpr std::uint64_t kDecodedBytes = 4, kDecoderBytes = 12;
+/// Of pictures that are larger one decoder works at a time.
+constexpr std::uint64_t kMostOfTwo = std::uint64_t{1} << 24;
 /// Of a pixel: itself, and its mip levels while materials are shaded, which are kept for all pictures in turn.
 constexpr std::uint64_t kShadedThirds = 28, kDecodedThirds = 3 * kDecodedBytes;
 
@@ -104,6 +106,7 @@ Result<ImagePlan> planImages(const Document& document, std::uint64_t claimed, co
   const auto decoder = kDecoderBytes * plan.largest_pixels;
   const auto room = claimed + decoder < limit ? limit - claimed - decoder : 0;
   halveLargest(sizes, used, std::min(kMostImageBytes, room / kShadedThirds * kDecodedThirds), plan);
+  plan.two_at_once = plan.largest_pixels <= kMostOfTwo && plan.bytes + decoder <= room;
   if (plan.bytes > room)
     return fail(ErrorCode::kTooLarge, sceneMemoryFault(claimed + decoder + plan.bytes, limit, "its decoded images"),
                 place(document.name, "/images"));

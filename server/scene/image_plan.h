@@ -17,6 +17,7 @@ struct ImagePlan {
   std::uint64_t bytes = 0;           ///< that all take, so halved
   std::uint64_t largest_pixels = 0;  ///< of the file's
   std::uint32_t halved = 0;          ///< how many are
+  bool two_at_once = false;          ///< of those that are halved: there is room for two decoders
 };
 
 /// The largest first, as long as they take more than this together: 32 pictures of 2048 x 2048, more than a lightmap

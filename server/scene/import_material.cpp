@@ -1,12 +1,15 @@
 #include "server/scene/import_material.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 
+#include "common/parallel.h"
 #include "common/task.h"
 #include "server/scene/image_decode.h"
 #include "server/scene/image_plan.h"
@@ -221,13 +224,35 @@ class MaterialImporter {
   }
 
   /// As large as it is to be held.
-  Result<Texture> decode(std::size_t image, bool srgb) const {
-    auto texture = decodeImage(*context_.document.images[image], context_.limits.max_image_pixels,
-                               place(context_.document.name, "/images/" + std::to_string(image)));
-    if (!texture) return texture;
-    texture->srgb = srgb;
-    halve(*texture, plan_.halvings[image]);
-    return texture;
+  [[nodiscard]] Result<Texture> decodeNow(std::size_t image, bool srgb) const {
+    return decodeImage(*context_.document.images[image], context_.limits.max_image_pixels,
+                       place(context_.document.name, "/images/" + std::to_string(image)),
+                       {srgb, plan_.halvings[image]});
+  }
+
+  /// Of large pictures the next one is decoded at the same time: materials mostly ask for them in their order.
+  Result<Texture> decode(std::size_t image, bool srgb) {
+    auto ahead = std::exchange(ahead_, std::nullopt);
+    if (ahead && ahead->image == image && ahead->srgb == srgb) return std::move(ahead->texture);
+    ahead.reset();  // one more is all there is room for
+    const auto next = nextLarge(image, srgb);
+    if (!next) return decodeNow(image, srgb);
+    std::array<std::optional<Result<Texture>>, 2> textures;
+    const auto decodeOne = [&](std::size_t share) { textures[share] = decodeNow(share == 0 ? image : *next, srgb); };
+    doShares(textures.size(), ShareOfWork(decodeOne));
+    ahead_ = Ahead{*next, srgb, std::move(*textures[1])};
+    return std::move(*textures[0]);
+  }
+
+  /// Of those that are held smaller than they are.
+  [[nodiscard]] std::optional<std::size_t> nextLarge(std::size_t image, bool srgb) const {
+    if (!plan_.two_at_once || plan_.halvings[image] == 0) return std::nullopt;
+    const auto isDone = [&](std::size_t other) {
+      return srgb ? color_textures_.contains(other) : data_textures_.contains(other);
+    };
+    for (auto next = image + 1; next < plan_.halvings.size(); ++next)
+      if (plan_.halvings[next] > 0 && !isDone(next) && known(next) == nullptr) return next;
+    return std::nullopt;
   }
 
   /// What the document before had of the same bytes, if it is as large.
@@ -308,8 +333,14 @@ class MaterialImporter {
   std::string pointer_;
   std::map<std::size_t, std::uint32_t> color_textures_;  ///< by image
   std::map<std::size_t, DataTexture> data_textures_;     ///< by image
-  std::optional<float> uniform_blue_;                    ///< of the last data texture that was asked for
-  std::set<std::string> warned_;                         ///< textures whose references were looked at
+  struct Ahead {
+    std::size_t image;
+    bool srgb;
+    Result<Texture> texture;
+  };
+  std::optional<Ahead> ahead_;         ///< what nobody has asked for yet
+  std::optional<float> uniform_blue_;  ///< of the last data texture that was asked for
+  std::set<std::string> warned_;       ///< textures whose references were looked at
 };
 
 }  // namespace

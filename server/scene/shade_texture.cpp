@@ -6,23 +6,24 @@
 #include <glm/common.hpp>
 #include <utility>
 
-#include "common/task.h"
+#include "common/parallel.h"
 
 namespace radiosity::scene {
 namespace {
 
-const std::array<float, 256>& srgbTable() {
-  static const std::array<float, 256> kTable = [] {
-    std::array<float, 256> table{};
-    for (int i = 0; i < 256; ++i) {
-      const double v = i / 255.0;
-      table[static_cast<std::size_t>(i)] =
-          static_cast<float>(v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4));
-    }
-    return table;
-  }();
-  return kTable;
+ByteValues valuesOfBytes() {
+  ByteValues values{};
+  for (int i = 0; i < 256; ++i) {
+    const double v = i / 255.0;
+    const auto at = static_cast<std::size_t>(i);
+    values.plain[at] = static_cast<float>(i) / 255.0F;
+    values.srgb[at] = static_cast<float>(v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4));
+  }
+  return values;
 }
+
+/// Of a level that is made: fewer are not worth a thread.
+constexpr std::size_t kPixelsAThread = std::size_t{1} << 14;
 
 int wrap(int i, int size, bool repeat, bool mirror) {
   if (i >= 0 && i < size) return i;
@@ -71,18 +72,12 @@ Taps tapsOf(int i, int from, int to) {
 
 }  // namespace
 
+const ByteValues kByteValues = valuesOfBytes();
+
 bool hasPixels(const Texture& texture) {
   const auto pixels =
       static_cast<std::size_t>(std::max(0, texture.width)) * static_cast<std::size_t>(std::max(0, texture.height));
   return pixels > 0 && texture.rgba.size() >= 4 * pixels;
-}
-
-glm::vec4 pixelOf(const Texture& texture, int x, int y) {
-  const auto index =
-      static_cast<std::size_t>(y) * static_cast<std::size_t>(texture.width) + static_cast<std::size_t>(x);
-  const std::uint8_t* p = &texture.rgba[index * 4];
-  if (!texture.srgb) return glm::vec4(p[0], p[1], p[2], p[3]) / 255.0F;
-  return {srgbTable()[p[0]], srgbTable()[p[1]], srgbTable()[p[2]], static_cast<float>(p[3]) / 255.0F};
 }
 
 glm::vec2 transformUv(const TextureUse& use, const glm::vec2& uv) {
@@ -134,20 +129,20 @@ void TexturePyramid::buildLevels() {
   for (std::size_t level = 0; width > 1 || height > 1; ++level) {
     Level next{std::max(1, width / 2), std::max(1, height / 2), {}};
     next.pixels.resize(static_cast<std::size_t>(next.width) * static_cast<std::size_t>(next.height));
-    for (int y = 0; y < next.height; ++y) {
-      interruptionPoint();
-      const Taps rows = tapsOf(y, height, next.height);
-      for (int x = 0; x < next.width; ++x) {
-        const Taps columns = tapsOf(x, width, next.width);
+    std::vector<Taps> columns;
+    for (int x = 0; x < next.width; ++x) columns.push_back(tapsOf(x, width, next.width));
+    const auto fillRow = [&](std::size_t y) {
+      const Taps rows = tapsOf(static_cast<int>(y), height, next.height);
+      for (std::size_t x = 0; x < columns.size(); ++x) {
         glm::vec4 sum(0.0F);
         for (int j = 0; j < rows.count; ++j)
-          for (int i = 0; i < columns.count; ++i)
-            sum += pixel(level, columns.first + i, rows.first + j) * columns.weight[static_cast<std::size_t>(i)] *
+          for (int i = 0; i < columns[x].count; ++i)
+            sum += pixel(level, columns[x].first + i, rows.first + j) * columns[x].weight[static_cast<std::size_t>(i)] *
                    rows.weight[static_cast<std::size_t>(j)];
-        next.pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(next.width) + static_cast<std::size_t>(x)] =
-            sum;
+        next.pixels[y * columns.size() + x] = sum;
       }
-    }
+    };
+    inTurns(static_cast<std::size_t>(next.height), fillRow, next.pixels.size() / kPixelsAThread);
     width = next.width;
     height = next.height;
     levels_.push_back(std::move(next));

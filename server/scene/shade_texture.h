@@ -1,6 +1,7 @@
 // Textures as linear light at any footprint: mean-preserving mip levels. Used while a scene is shaded; plain values.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <glm/mat2x2.hpp>
@@ -16,8 +17,22 @@ namespace radiosity::scene {
 /// Whether there are as many pixels as it says, and at least one.
 [[nodiscard]] bool hasPixels(const Texture& texture);
 
-/// One pixel of a texture, linear; alpha last.
-[[nodiscard]] glm::vec4 pixelOf(const Texture& texture, int x, int y);
+/// What bytes stand for, in [0, 1].
+struct ByteValues {
+  std::array<float, 256> plain, srgb;
+};
+extern const ByteValues kByteValues;
+/// Of four bytes, linear; alpha last.
+[[nodiscard]] inline glm::vec4 linearPixel(const std::uint8_t* rgba, bool srgb) {
+  const auto& values = srgb ? kByteValues.srgb : kByteValues.plain;
+  return {values[rgba[0]], values[rgba[1]], values[rgba[2]], kByteValues.plain[rgba[3]]};
+}
+/// One pixel of a texture, likewise.
+[[nodiscard]] inline glm::vec4 pixelOf(const Texture& texture, int x, int y) {
+  const auto index =
+      static_cast<std::size_t>(y) * static_cast<std::size_t>(texture.width) + static_cast<std::size_t>(x);
+  return linearPixel(&texture.rgba[index * 4], texture.srgb);
+}
 
 /// Mip levels of RGB, of which some pixels may count for less than others, or not at all: RGB behind a cut-out says
 /// nothing of the surface, so lookups and levels mix pixels by their coverage.

@@ -25,7 +25,8 @@ SolidParts::SolidParts(std::span<const Bvh::Triangle> triangles, std::span<const
     parts[part].push_back(triangles[i]);
   }
   add(std::move(others), false);
-  std::vector<Bvh::Triangle> boxes, closed_boxes;
+  std::vector<Bvh::Triangle> boxes;
+  std::vector<ClosedParts::Part> closed;
   for (std::size_t p = 0; p < parts.size(); ++p) {
     interruptionPoint();
     if (parts[p].empty()) continue;
@@ -33,14 +34,11 @@ SolidParts::SolidParts(std::span<const Bvh::Triangle> triangles, std::span<const
     for (const auto& triangle : parts[p])
       for (const auto& corner : triangle) box.add(corner);
     boxes.push_back({box.min - kMargin, box.max + kMargin, box.max + kMargin});
-    if (p % 2 == kClosed) {
-      closed_boxes.push_back(boxes.back());
-      closed_.push_back(static_cast<std::uint32_t>(parts_.size()));
-    }
+    if (p % 2 == kClosed) closed.emplace_back(static_cast<std::uint32_t>(parts_.size()), parts[p]);
     add(std::move(parts[p]), p % 2 == kHollow);
   }
   boxes_ = Bvh(std::move(boxes));
-  closed_boxes_ = Bvh(std::move(closed_boxes));
+  closed_ = ClosedParts(closed);
 }
 
 void SolidParts::add(std::vector<Bvh::Triangle> triangles, bool is_hollow) {
@@ -69,10 +67,12 @@ bool SolidParts::find(const Bounds& places, const std::optional<Plane>& plane, A
   return true;
 }
 
-std::optional<bool> SolidParts::anyHolds(const glm::vec3& place,
+std::optional<bool> SolidParts::anyHolds(const glm::vec3& place, std::uint64_t& work, std::uint64_t stop,
                                          const std::function<bool(const SolidTree& part)>& holds) const {
-  const auto holdsOne = [&](std::uint32_t k) { return holds(parts_[closed_[k]]->ends); };
-  if (closed_boxes_.anyNear(place, place, holdsOne)) return true;
+  ClosedParts::Search search(closed_, place);
+  for (auto some = search.next(work); !some.empty(); some = search.next(work))
+    for (const auto part : some)
+      if (work >= stop || holds(parts_[part]->ends)) return true;
   const bool has_others = !parts_.empty() && (!parts_.front()->tree.empty() || closed_.size() + 1 < parts_.size());
   return has_others ? std::nullopt : std::optional(false);
 }

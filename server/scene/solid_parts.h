@@ -14,6 +14,7 @@
 
 #include "server/scene/bounds.h"
 #include "server/scene/bvh.h"
+#include "server/scene/closed_parts.h"
 #include "server/scene/solid_tree.h"
 
 namespace radiosity::scene {
@@ -46,9 +47,10 @@ class SolidParts {
   /// O(kMostAround + log n).
   [[nodiscard]] bool find(const Bounds& places, const std::optional<Plane>& plane, Around& around) const;
 
-  /// Whether `holds` says so of a closed part whose bounds hold the place: of one after the other, until it is true.
-  /// None: it is not, and there are others than these, which are open, or of no part. O(log n + parts asked).
-  [[nodiscard]] std::optional<bool> anyHolds(const glm::vec3& place,
+  /// Whether `holds` says so of a closed part that may hold the place: of one after the other, until it is true, or
+  /// until `work`, which grows by what that takes, has come to `stop`, and then too. None: it is not, and there are
+  /// others than these, which are open, or of no part. O(log n + parts looked at).
+  [[nodiscard]] std::optional<bool> anyHolds(const glm::vec3& place, std::uint64_t& work, std::uint64_t stop,
                                              const std::function<bool(const SolidTree& part)>& holds) const;
 
  private:
@@ -61,8 +63,7 @@ class SolidParts {
 
   std::vector<std::unique_ptr<Part>> parts_;  ///< that of what counts for all places first, which may be empty
   Bvh boxes_;                                 ///< of the others, in their order: triangles that have these bounds
-  Bvh closed_boxes_;                          ///< likewise, of those that are closed
-  std::vector<std::uint32_t> closed_;         ///< of these: into parts_
+  ClosedParts closed_;                        ///< those that are, numbered as in parts_
 };
 
 }  // namespace radiosity::scene

@@ -183,9 +183,9 @@ Solids::Solids(const PatchScene& patches, const std::vector<Hides>& hides) {
   sheets_ = Bvh(std::move(sheets));
 }
 
-bool Solids::near(const Bounds& box, std::uint32_t surface) const {
+bool Solids::near(const Bounds& box, std::uint32_t surface, std::size_t looks) const {
   const glm::vec3 margin(static_cast<float>(2.0 * kBurialLift));
-  return tree_.touches(box.min - margin, box.max + margin, surface_, surface);
+  return tree_.touches(box.min - margin, box.max + margin, surface_, surface, looks);
 }
 
 Solids::Answer Solids::ask(const glm::vec3& position, const glm::vec3& normal, const SolidParts::Around& around,
@@ -248,7 +248,7 @@ std::optional<bool> Solids::liesInClosed(const Start& start, Hits& hits, RayNote
     }
     return way == kAgreeInClosed || hits.work >= hits.stop;
   };
-  const auto found = parts_.anyHolds(glm::vec3(start.origin), holds);
+  const auto found = parts_.anyHolds(glm::vec3(start.origin), hits.work, hits.stop, holds);
   if (!found || hits.work >= hits.stop || (on_sheet && !*found)) return std::nullopt;
   for (std::uint32_t way = 0; notes != nullptr && way < kAgreeInClosed; ++way)
     notes->add({start.origin, start.normal, start.triangle, way, *found ? end : kBurialRayLength});

@@ -48,8 +48,9 @@ class Solids {
 
   [[nodiscard]] bool empty() const { return tree_.empty(); }
 
-  /// True when a solid's surface, other than `surface` itself, passes through or touches the box.
-  [[nodiscard]] bool near(const Bounds& box, std::uint32_t surface) const;
+  /// True when a solid's surface, other than `surface` itself, passes through or touches the box, or when so many looks
+  /// (Bvh) do not tell.
+  [[nodiscard]] bool near(const Bounds& box, std::uint32_t surface, std::size_t looks) const;
 
   /// Buried when most rays into the hemisphere leave more solids than they enter. One odd face that is turned the
   /// wrong way, or a room whose roof was modelled from outside, does not bury what can be seen from elsewhere. Nor does

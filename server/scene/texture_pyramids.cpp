@@ -7,7 +7,7 @@ namespace radiosity::scene {
 namespace {
 
 /// That are kept beside those in use, and how many at most.
-constexpr std::size_t kMostBytes = std::size_t{384} << 20, kMostKept = 64;
+constexpr std::size_t kMostBytes = std::size_t{256} << 20, kMostKept = 64;
 /// Width and height of a coarse look, at most.
 constexpr int kCoarse = 64;
 
@@ -47,9 +47,21 @@ TexturePyramid::Pixels pixelsOf(const PictureStack& stack, int width, int height
   };
 }
 
+/// The same coverage, told by the least alpha of a byte that counts: there are no others, however many cut-offs
+/// materials name.
+PictureStack withLeastAlpha(PictureStack stack) {
+  if (!stack.is_mask) return stack;
+  const auto counts = [&](float alpha) { return coverageOf(stack, alpha) > 0.0F; };
+  const auto least = std::ranges::find_if(kByteValues.plain, counts);
+  stack.alpha_cutoff = least == kByteValues.plain.end() ? 2.0F : *least;
+  stack.alpha_factor = 1.0F;
+  return stack;
+}
+
 }  // namespace
 
-std::shared_ptr<const TexturePyramid> TexturePyramids::of(const PictureStack& stack) {
+std::shared_ptr<const TexturePyramid> TexturePyramids::of(const PictureStack& asked) {
+  const auto stack = withLeastAlpha(asked);
   const auto found = std::ranges::find(kept_, stack, &Kept::stack);
   if (found != kept_.end()) {
     kept_.splice(kept_.begin(), kept_, found);

@@ -32,7 +32,7 @@ class TexturePyramids {
   /// `most_pixels`: of all pyramids that are made; of what comes after them a look at few of their pixels is taken.
   explicit TexturePyramids(std::uint64_t most_pixels = std::uint64_t{256} << 20) : most_pixels_(most_pixels) {}
 
-  [[nodiscard]] std::shared_ptr<const TexturePyramid> of(const PictureStack& stack);
+  [[nodiscard]] std::shared_ptr<const TexturePyramid> of(const PictureStack& asked);
   [[nodiscard]] std::size_t made() const { return made_; }
   /// Of those made: of few pixels.
   [[nodiscard]] std::size_t coarse() const { return coarse_; }

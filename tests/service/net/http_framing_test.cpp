@@ -110,6 +110,26 @@ TEST(Framing, AnUpgradeWithABodyIsRefused) {
   EXPECT_TRUE(http.closed(Seconds(10)));
 }
 
+TEST(Framing, FramesRightBehindAnUpgradeAreRefusedAndNotLost) {
+  RunningServer server;
+  const std::string upgrade =
+      "GET /ws HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+      "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n"
+      "Sec-WebSocket-Protocol: radiosity.v1\r\n\r\n";
+  const std::string masked_text("\x81\x82\0\0\0\0{}", 8), close("\x88\x80\0\0\0\0", 6);
+  for (const auto& early : {masked_text, close, masked_text.substr(0, 1), std::string(40'000, '\xff'), upgrade}) {
+    RawHttp http(server.port());
+    http.send(upgrade + early);
+    const auto response = http.receive();
+    EXPECT_EQ(response.status, 400);
+    EXPECT_NE(response.body.find("badInput"), std::string::npos) << response.body;
+    EXPECT_TRUE(http.closed(Seconds(10)));
+  }
+  RawHttp http(server.port());
+  http.send(upgrade);
+  EXPECT_EQ(http.receive(true).status, 101);
+}
+
 TEST(Framing, ABareLineFeedIsSeenWhereverItIs) {
   EXPECT_FALSE(net::hasBareLineFeed(""));
   EXPECT_FALSE(net::hasBareLineFeed("0\r\nX: 1\r\n\r"));

@@ -69,6 +69,13 @@ TEST(BurialBudget, PlacesThatStillCostTooMuchAreGivenUp) {
   EXPECT_NE(budgetWarning({1, 1, 1}, 17).find("17 sides of texels"), std::string::npos);
 }
 
+TEST(BurialBudget, LooksOfALeafAreFewerWhereThereAreMoreLeaves) {
+  EXPECT_EQ(affordableLooks(0), 65'536U);
+  EXPECT_EQ(affordableLooks(24'000), 4096U);
+  EXPECT_EQ(affordableLooks(60'000), 2048U);
+  EXPECT_EQ(affordableLooks(100'000'000), 512U);
+}
+
 TEST(BurialBudget, FewLeavesAreTried) {
   EXPECT_EQ(triedLeaves(0), 0U);
   EXPECT_LE(triedLeaves(3200), 100U);

@@ -113,6 +113,23 @@ TEST(Bvh, TouchesIgnoresTheTagAndMissesBoxesBesideADiagonal) {
   EXPECT_FALSE(tree.touches({0.7F, 0.1F, 0.0F}, {0.9F, 0.3F, 0.5F}, tags, kNone));
 }
 
+TEST(Bvh, AfterSoManyLooksSomethingMayTouchABox) {
+  // All have bounds that hold the box, and none comes near it.
+  std::vector<Bvh::Triangle> triangles(1000, {glm::vec3(0, 0, 0), glm::vec3(1, 1, 0), glm::vec3(1, 1, 1)});
+  const std::vector<std::uint32_t> tags(triangles.size(), 7);
+  const Bvh tree(std::move(triangles));
+  const glm::vec3 low(0.7F, 0.1F, 0.0F), high(0.9F, 0.3F, 0.5F);
+  EXPECT_FALSE(tree.touches(low, high, tags, kNone));
+  EXPECT_FALSE(tree.touches(low, high, tags, kNone, 10'000));
+  EXPECT_TRUE(tree.touches(low, high, tags, kNone, 100));
+  const Bvh::OrientedBox box{
+      0.5F * (low + high), {glm::vec3(1, 0, 0), glm::vec3(0, 1, 0), glm::vec3(0, 0, 1)}, 0.5F * (high - low)};
+  EXPECT_FALSE(tree.touches(box, tags, kNone, 10'000));
+  EXPECT_TRUE(tree.touches(box, tags, kNone, 100));
+  EXPECT_FALSE(tree.hoversIn(box, tags, kNone, 10'000));
+  EXPECT_TRUE(tree.hoversIn(box, tags, kNone, 100));
+}
+
 TEST(Bvh, ManyEqualTrianglesDoNotOverflow) {
   std::vector<Bvh::Triangle> triangles(5000, {glm::vec3(0, 0, 0), glm::vec3(1, 0, 0), glm::vec3(0, 1, 0)});
   const Bvh tree(std::move(triangles));

@@ -138,16 +138,58 @@ TEST_F(Parts, OfACrowdAreAskedOneByOne) {
     add(block(-half, half), 2 * k);
   }
   std::size_t asked = 0;
-  const auto count = [&](bool holds) { return [&asked, holds](const SolidTree&) { return ++asked, holds; }; };
+  const auto askAll = [&](const SolidParts& parts, const glm::vec3& place, bool holds, std::uint64_t stop = 1'000'000) {
+    std::uint64_t work = 0;
+    return parts.anyHolds(place, work, stop, [&](const SolidTree&) { return ++asked, holds; });
+  };
   const SolidParts closed(triangles_, part_of_);
-  EXPECT_EQ(closed.anyHolds(glm::vec3(0.0F), count(true)), true);
+  EXPECT_EQ(askAll(closed, glm::vec3(0.0F), true), true);
   EXPECT_EQ(asked, 1U) << "no more once one holds it";
-  EXPECT_EQ(closed.anyHolds(glm::vec3(0.0F), count(false)), false);
+  EXPECT_EQ(askAll(closed, glm::vec3(0.0F), false), false);
   EXPECT_EQ(asked, 201U);
-  EXPECT_EQ(closed.anyHolds(glm::vec3(0.0F, 0.0F, 0.4F), count(true)), false) << "none is there";
+  EXPECT_EQ(askAll(closed, glm::vec3(0.0F, 0.0F, 0.4F), true), false) << "none is there";
   EXPECT_EQ(asked, 201U);
   add(block(glm::vec3(0.0F), glm::vec3(0.1F)), 2 * 200 + SolidParts::kHollow);
-  EXPECT_EQ(SolidParts(triangles_, part_of_).anyHolds(glm::vec3(0.0F), count(false)), std::nullopt);
+  EXPECT_EQ(askAll(SolidParts(triangles_, part_of_), glm::vec3(0.0F), false), std::nullopt);
+  EXPECT_EQ(asked, 401U);
+  EXPECT_EQ(askAll(closed, glm::vec3(0.0F), false, 20), true) << "what took too much work is as if one held it";
+  EXPECT_LT(asked, 430U);
+}
+
+/// Long thin blocks that lean every way: within the bounds of most there is mostly nothing of them.
+TEST_F(Parts, OfThoseThatLeanFewAreAskedAndNoneIsMissed) {
+  const auto uniform = [&] { return Parts::uniform(-0.5F, 0.5F); };
+  std::vector<std::array<glm::vec3, 4>> frames;  // middle and axes
+  for (std::uint32_t k = 0; k < 300; ++k) {
+    const auto one = glm::normalize(glm::vec3(uniform(), uniform(), uniform()));
+    const auto other = glm::normalize(glm::cross(one, glm::vec3(uniform(), uniform(), uniform())));
+    const auto& frame = frames.emplace_back(
+        std::array{0.4F * glm::vec3(uniform(), uniform(), uniform()), one, other, glm::cross(one, other)});
+    auto slab = block({-0.2F, -0.2F, -0.002F}, {0.2F, 0.2F, 0.002F});
+    for (auto& triangle : slab)
+      for (auto& p : triangle) p = frame[0] + p.x * frame[1] + p.y * frame[2] + p.z * frame[3];
+    add(slab, 2 * k);
+  }
+  const SolidParts parts(triangles_, part_of_);
+  std::size_t asked = 0, in_bounds = 0;
+  for (int i = 0; i < 200; ++i) {
+    const auto& near = frames[static_cast<std::size_t>(i)];
+    const auto place = i % 2 == 0 ? near[0] : glm::vec3(uniform(), uniform(), uniform());
+    std::size_t inside = 0, told = 0;
+    for (const auto& frame : frames) {
+      const auto way = place - frame[0];
+      const bool is_in = std::abs(glm::dot(way, frame[1])) <= 0.2F && std::abs(glm::dot(way, frame[2])) <= 0.2F &&
+                         std::abs(glm::dot(way, frame[3])) <= 0.002F;
+      const auto half = 0.2F * glm::abs(frame[1]) + 0.2F * glm::abs(frame[2]);
+      inside += is_in ? 1 : 0;
+      in_bounds += glm::all(glm::lessThanEqual(glm::abs(way), half)) ? 1 : 0;
+    }
+    std::uint64_t work = 0;
+    (void)parts.anyHolds(place, work, ~std::uint64_t{0}, [&](const SolidTree&) { return ++told, false; });
+    EXPECT_GE(told, inside);
+    asked += told;
+  }
+  EXPECT_LT(8 * asked, in_bounds);
 }
 
 }  // namespace

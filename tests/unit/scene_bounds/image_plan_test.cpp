@@ -5,9 +5,11 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
 #include <memory>
 
 #include "server/scene/image_decode.h"
+#include "server/scene/shade_texture.h"
 #include "tests/unit/scene/gltf_builder.h"
 
 namespace radiosity::scene::test {
@@ -103,6 +105,34 @@ TEST(ImageDecode, HalvingTakesNoColourFromWhatIsCutOut) {
   EXPECT_NEAR(texture.rgba[0], 200, 1);
   EXPECT_EQ(texture.rgba[1], 0);
   EXPECT_EQ(texture.rgba[3], 128);
+}
+
+TEST(ImageDecode, HalvedPixelsAreCodedAsTheFormulaOfSrgbSays) {
+  for (const bool srgb : {false, true}) {
+    Texture texture;
+    texture.width = 512;
+    texture.height = 256;
+    texture.srgb = srgb;
+    for (int y = 0; y < 256; ++y)
+      for (int x = 0; x < 256; ++x)
+        for (const int value : {x, y}) {
+          const auto byte = static_cast<std::uint8_t>(value);
+          texture.rgba.insert(texture.rgba.end(), {byte, byte, byte, 255});
+        }
+    const auto whole = texture;
+    halve(texture, 1);
+    for (std::size_t i = 0; i < texture.rgba.size(); i += 4) {
+      const auto x = static_cast<int>(i / 4 % 256), y = static_cast<int>(i / 4 / 256);
+      float mean = 0.0F;
+      for (const int row : {2 * y, 2 * y + 1})
+        for (const int column : {2 * x, 2 * x + 1}) mean += 0.25F * pixelOf(whole, column, row).r;
+      const float coded = !srgb                ? mean
+                          : mean <= 0.0031308F ? 12.92F * mean
+                                               : 1.055F * std::pow(mean, 1.0F / 2.4F) - 0.055F;
+      ASSERT_NEAR(texture.rgba[i], 255.0F * coded, 0.5001F) << x << " " << y;
+      ASSERT_EQ(texture.rgba[i + 3], 255);
+    }
+  }
 }
 
 }  // namespace
