@@ -3,8 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
+#include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
+#include <map>
 #include <optional>
+#include <type_traits>
+#include <utility>
 
 #include "common/check.h"
 #include "server/scene/lineage.h"
@@ -41,16 +45,75 @@ glm::vec3 lookUp(const Image& image, glm::dvec2 uv) {
                   f.y);
 }
 
-/// Carries a point from one triangle of UVs to another; nothing where the first has no area.
-std::optional<glm::dvec2> carryPoint(glm::dvec2 point, const std::array<glm::vec2, 3>& from,
-                                     const std::array<glm::vec2, 3>& to) {
-  const glm::dvec2 a(from[0]), u = glm::dvec2(from[1]) - a, v = glm::dvec2(from[2]) - a, p = point - a;
+/// Weights of the second and third corner; nothing where the triangle has no area.
+std::optional<glm::dvec2> weightsIn(const std::array<glm::vec2, 3>& corners, const glm::dvec2& point) {
+  const glm::dvec2 a(corners[0]), u = glm::dvec2(corners[1]) - a, v = glm::dvec2(corners[2]) - a, p = point - a;
   const double area = u.x * v.y - u.y * v.x;
   if (std::abs(area) < 1e-14) return std::nullopt;
-  const double s = (p.x * v.y - p.y * v.x) / area, t = (u.x * p.y - u.y * p.x) / area;
-  const glm::dvec2 b(to[0]);
-  return b + s * (glm::dvec2(to[1]) - b) + t * (glm::dvec2(to[2]) - b);
+  return glm::dvec2((p.x * v.y - p.y * v.x) / area, (u.x * p.y - u.y * p.x) / area);
 }
+
+template <typename Vector>
+auto between(const std::array<Vector, 3>& corners, const glm::dvec2& weights) {
+  using Place = std::conditional_t<std::is_same_v<Vector, glm::vec2>, glm::dvec2, glm::dvec3>;
+  const Place a(corners[0]);
+  return a + weights.x * (Place(corners[1]) - a) + weights.y * (Place(corners[2]) - a);
+}
+
+/// A primitive, as a scene has it: perhaps cut.
+struct Cut {
+  const scene::Primitive* primitive;
+  const scene::CutPrimitive* cut;  ///< null: it is whole
+
+  [[nodiscard]] std::uint32_t sourceOf(std::uint32_t triangle) const {
+    return cut != nullptr ? cut->source[triangle] : triangle;
+  }
+  [[nodiscard]] std::array<glm::dvec3, 3> corners(std::uint32_t triangle) const {
+    const auto* index = &primitive->indices[std::size_t{3} * triangle];
+    return {primitive->positions[index[0]], primitive->positions[index[1]], primitive->positions[index[2]]};
+  }
+};
+
+/// Where places of a primitive lie in the same one as it was cut before.
+class FormerCut {
+ public:
+  FormerCut(const Cut& before, const Cut& after) : before_(before), after_(after) {
+    const auto count = before.primitive->indices.size() / 3;
+    for (std::uint32_t t = 0; t < count; ++t) triangles_.emplace_back(before.sourceOf(t), t);
+    std::ranges::sort(triangles_);
+  }
+
+  struct Place {
+    std::uint32_t triangle;
+    glm::dvec2 weights;  ///< of its second and third corner
+  };
+  /// The triangle that holds it, or comes nearest to that.
+  [[nodiscard]] std::optional<Place> find(std::uint32_t triangle, const glm::dvec2& weights) const {
+    const auto at = between(after_.corners(triangle), weights);
+    const auto source = after_.sourceOf(triangle);
+    std::optional<Place> best;
+    double least = 0.0;
+    const auto first = std::lower_bound(triangles_.begin(), triangles_.end(), std::pair(source, 0U));
+    for (auto one = first; one != triangles_.end() && one->first == source; ++one) {
+      const auto t = one->second;
+      const auto [a, b, c] = before_.corners(t);
+      const auto u = b - a, v = c - a, normal = glm::cross(u, v);
+      const double area = glm::dot(normal, normal);
+      if (!(area > 0.0)) continue;
+      const glm::dvec2 found(glm::dot(glm::cross(at - a, v), normal) / area,
+                             glm::dot(glm::cross(u, at - a), normal) / area);
+      const double within = std::min({found.x, found.y, 1.0 - found.x - found.y});
+      if (best && within <= least) continue;
+      best = Place{t, found};
+      least = within;
+    }
+    return best;
+  }
+
+ private:
+  Cut before_, after_;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> triangles_;  ///< by the file's triangle
+};
 
 class Carrier {
  public:
@@ -58,7 +121,17 @@ class Carrier {
       : before_(before),
         patches_(patches),
         mean_(meanOf(before.pages)),
-        source_(scene::matchInstances(before.scene, scene)) {}
+        source_(scene::matchInstances(before.scene, scene)) {
+    const auto cutOf = [](const Scene& of, const PatchScene& in, std::uint32_t instance) {
+      return Cut{&in.cuts.primitiveOf(of, instance), in.cuts.find(instance)};
+    };
+    for (std::uint32_t i = 0; i < source_.size(); ++i) {
+      if (source_[i] == kNone) continue;
+      const auto now = cutOf(scene, patches, i), then = cutOf(before.scene, before.patches, source_[i]);
+      const bool same = now.cut == nullptr || then.cut == nullptr ? now.cut == then.cut : *now.cut == *then.cut;
+      if (!same) former_cuts_.emplace(i, FormerCut(then, now));
+    }
+  }
 
   [[nodiscard]] std::vector<LightmapPage> run() const {
     std::vector<glm::vec3> values(patches_.nodeCount(), mean_);
@@ -82,21 +155,26 @@ class Carrier {
     if (place.triangle == kNone || instance == kNone) return std::nullopt;
     const auto triangle = patches_.triangle_source[place.triangle];
     const std::size_t of_file = surface.flipped ? 1 - side : side;
-    const auto& old_uvs = before_.patches.instance_uvs[instance].side[of_file];
-    if (!old_uvs.shows(triangle)) return std::nullopt;
     const auto& at = surface.place[side];
     const auto& page = patches_.pages[at.page];
     const glm::dvec2 uv = (glm::dvec2(place.texel) + glm::dvec2(at.x, at.y)) / glm::dvec2(page.width, page.height);
     const auto& uvs = patches_.instance_uvs[surface.instance].side[of_file];
-    const auto old_uv = carryPoint(uv, uvs.corners[triangle], old_uvs.corners[triangle]);
-    if (!old_uv) return std::nullopt;
-    return lookUp(before_.pages[old_uvs.page[triangle]].irradiance, *old_uv);
+    const auto weights = weightsIn(uvs.corners[triangle], uv);
+    if (!weights) return std::nullopt;
+    std::optional<FormerCut::Place> then{{triangle, *weights}};
+    if (const auto found = former_cuts_.find(surface.instance); found != former_cuts_.end())
+      then = found->second.find(triangle, *weights);
+    const auto& old_uvs = before_.patches.instance_uvs[instance].side[of_file];
+    if (!then || !old_uvs.shows(then->triangle)) return std::nullopt;
+    const auto old_uv = between(old_uvs.corners[then->triangle], then->weights);
+    return lookUp(before_.pages[old_uvs.page[then->triangle]].irradiance, old_uv);
   }
 
   const ShownScene& before_;
   const PatchScene& patches_;
   glm::vec3 mean_;
-  std::vector<std::uint32_t> source_;  ///< by instance of the new scene: the old one, or kNone
+  std::vector<std::uint32_t> source_;               ///< by instance of the new scene: the old one, or kNone
+  std::map<std::uint32_t, FormerCut> former_cuts_;  ///< by instance of the new scene: such as are cut otherwise now
 };
 
 }  // namespace

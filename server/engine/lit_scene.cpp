@@ -142,7 +142,8 @@ bool LitScene::keepsLayoutOf(const LitScene& former) const {
   };
   return former.patches_->centre == patches_->centre && former.patches_->scale == patches_->scale &&
          std::ranges::equal(former.patches_->pages, patches_->pages, samePage) &&
-         former.patches_->instance_uvs == patches_->instance_uvs && onlyNodesMoved(*former.scene_, *scene_) &&
+         former.patches_->instance_uvs == patches_->instance_uvs && former.patches_->cuts == patches_->cuts &&
+         onlyNodesMoved(*former.scene_, *scene_) &&
          scene::DarkOfEmitters(*former.scene_, *former.patches_) == scene::DarkOfEmitters(*scene_, *patches_);
 }
 

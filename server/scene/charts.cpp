@@ -8,6 +8,7 @@
 #include <glm/matrix.hpp>
 #include <optional>
 #include <unordered_map>
+#include <utility>
 
 #include "common/parallel.h"
 #include "server/scene/atlas.h"
@@ -127,9 +128,10 @@ class Builder {
   }
 
   void cutWalls() {
-    const auto facets = findFacets(flat_, neighbours_, std::vector<bool>(flat_.triangles.size(), true));
-    patches_.cuts = cutAlongWalls(scene_, flat_, facets, roughTexel(), own_layout_);
+    facets_ = findFacets(flat_, neighbours_, std::vector<bool>(flat_.triangles.size(), true));
+    patches_.cuts = cutAlongWalls(scene_, flat_, *facets_, roughTexel(), own_layout_);
     if (patches_.cuts.empty()) return;
+    facets_.reset();
     flat_ = flatten(scene_, {flat_.centre, flat_.scale}, patches_.cuts);
     neighbours_ = edgeNeighbours(flat_);
   }
@@ -181,7 +183,8 @@ class Builder {
       std::fill(own.begin() + flat_.first_triangle[i], own.begin() + flat_.first_triangle[i + 1], false);
       for (Chart& chart : uvCharts(scene_, flat_, neighbours_, i)) from_file.push_back(std::move(chart));
     }
-    const Facets facets = findFacets(flat_, neighbours_, own);
+    if (!facets_ || !from_file.empty()) facets_ = findFacets(flat_, neighbours_, own);
+    const Facets facets = *std::exchange(facets_, std::nullopt);
     patches_.polygons = facets.facets.size() + from_file.size();
     const double texel = patches_.rough_texel = roughTexel();
     const auto groups = groupFacets(flat_, neighbours_, facets, kPlanarTexels * texel, kSmallTexels * texel * texel,
@@ -426,6 +429,7 @@ class Builder {
   FlatScene flat_;
   std::vector<std::uint32_t> neighbours_;
   std::vector<bool> own_layout_;  ///< by instance: TEXCOORD_1 is its layout
+  std::optional<Facets> facets_;  ///< of all triangles, until they are charted or cut
   std::vector<Chart> charts_;
   Atlas atlas_;
   std::vector<std::uint32_t> sources_;  ///< flat triangle of each patch triangle

@@ -1,6 +1,10 @@
 // How a scene becomes patches (buildPatchScene, patch_scene.h). Plain values, any thread; used only inside this folder.
 //
 //   flatten.h    instances -> welded triangles in the unit box, degenerate ones dropped and counted
+//   wall_cuts.h  flat faces cut along the walls that stand on them, so that no texel lies in two rooms
+//                  wall_finder.h       where walls meet a face
+//                  facet_cutter.h      the face cut there into convex pieces
+//                  facet_regions.h     which of these hang together
 //   charts.h     triangles -> charts: groups of triangles with a plane map each
 //                  charts_facets.cpp   coplanar connected triangles = facets ("polygons"); large ones are charts
 //                  charts_curved.cpp   small facets grown into curved charts by normal spread

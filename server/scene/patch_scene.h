@@ -118,8 +118,8 @@ struct PatchScene {
   static constexpr std::uint32_t kBlackSide = 4;  ///< so many by so many, for mips and bilinear lookups
 
   /// Lightmap coordinates of the imported vertices, for each side of the file's triangles: one for each corner of each
-  /// instance's triangles (as cut), in page UV [0, 1] (v down, row 0 = v 0), and the page of each triangle (kNone: it is
-  /// dropped, or nobody sees that side). For the exporter and the viewer.
+  /// instance's triangles (as cut), in page UV [0, 1] (v down, row 0 = v 0), and the page of each triangle (kNone: it
+  /// is dropped, or nobody sees that side). For the exporter and the viewer.
   struct SideUv {
     std::vector<std::array<glm::vec2, 3>> corners;  ///< by triangle of the primitive; empty: as if all pages were kNone
     std::vector<std::uint32_t> page;                ///< by triangle of the primitive

@@ -285,6 +285,12 @@ bool mayBeCut(const Scene& scene, std::uint32_t instance) {
 
 }  // namespace
 
+bool WallCuts::operator==(const WallCuts& other) const {
+  return std::ranges::equal(cut_, other.cut_, [](const auto& one, const auto& of_other) {
+    return one.first == of_other.first && (one.second == of_other.second || *one.second == *of_other.second);
+  });
+}
+
 WallCuts cutAlongWalls(const Scene& scene, const FlatScene& flat, const Facets& facets, double texel,
                        const std::vector<bool>& kept) {
   WallCuts cuts;

@@ -54,6 +54,7 @@ class WallCuts {
     return cut != nullptr ? cut->primitive : scene.primitives[scene.instances[instance].primitive];
   }
   [[nodiscard]] bool empty() const { return cut_.empty(); }
+  [[nodiscard]] bool operator==(const WallCuts& other) const;
   void add(std::uint32_t instance, CutPrimitive cut) {
     cut_[instance] = std::make_shared<const CutPrimitive>(std::move(cut));
   }

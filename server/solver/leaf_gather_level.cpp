@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <ranges>
 #include <utility>
 
 #include "common/clones.h"
@@ -261,20 +260,23 @@ bool LeafGather::endsInLight(std::size_t half, std::uint32_t end, const std::vec
 /// costs nothing but in the dark.
 std::vector<bool> LeafGather::litSides(std::size_t half) const {
   std::vector<bool> lit(sides_.size(), false);
-  const auto leavesOf = [&](std::uint32_t s) {
-    return std::views::iota(sides_[s].first_value, sides_[s].first_value + sides_[s].leaf_count);
+  const auto anyLeaf = [&](std::uint32_t s, const auto& is_it) {
+    for (auto v = sides_[s].first_value; v < sides_[s].first_value + sides_[s].leaf_count; ++v)
+      if (is_it(v)) return true;
+    return false;
   };
-  for (std::uint32_t s = 0; s < sides_.size(); ++s)
-    lit[s] = std::ranges::any_of(leavesOf(s), [&](auto v) { return halves_[half].source[v] != Light{}; });
+  const auto hasOwn = [&](std::uint32_t v) { return halves_[half].source[v] != Light{}; };
+  const auto seesLight = [&](std::uint32_t v) {
+    for (const auto end : sights_.seen(half, v))
+      if (endsInLight(half, end, lit)) return true;
+    return false;
+  };
+  for (std::uint32_t s = 0; s < sides_.size(); ++s) lit[s] = anyLeaf(s, hasOwn);
   for (bool spreads = true; spreads;) {
     spreads = false;
     for (std::uint32_t s = 0; s < sides_.size(); ++s) {
       if (lit[s]) continue;
-      lit[s] = std::ranges::any_of(leavesOf(s), [&](auto v) {
-        for (const auto end : sights_.seen(half, v))
-          if (endsInLight(half, end, lit)) return true;
-        return false;
-      });
+      lit[s] = anyLeaf(s, seesLight);
       spreads = spreads || lit[s];
     }
   }
