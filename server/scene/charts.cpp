@@ -129,7 +129,11 @@ class Builder {
 
   void cutWalls() {
     facets_ = findFacets(flat_, neighbours_, std::vector<bool>(flat_.triangles.size(), true));
-    patches_.cuts = cutAlongWalls(scene_, flat_, *facets_, roughTexel(), own_layout_);
+    patches_.cuts = cutAlongWalls(scene_, flat_, neighbours_, *facets_, roughTexel(), own_layout_);
+    if (patches_.cuts.leavesSomeWhole())
+      patches_.warnings.emplace_back(
+          "faces meet more walls than a building has: some are not cut along them, so that light of one side may be "
+          "seen on the other");
     if (patches_.cuts.empty()) return;
     facets_.reset();
     flat_ = flatten(scene_, {flat_.centre, flat_.scale}, patches_.cuts);
@@ -148,6 +152,10 @@ class Builder {
       replaced.insert(replaced.end(), bleeding.begin(), bleeding.end());
     }
     if (replaced.empty()) return;
+    flat_ = flatten(scene_, {flat_.centre, flat_.scale});  // these were left whole
+    neighbours_ = edgeNeighbours(flat_);
+    cutWalls();
+    chartAll();
     const auto others = replaced.size() - 1;
     patches_.warnings.push_back(
         fmt::format("{}{}: islands of TEXCOORD_1 are so close that light would bleed between them at these texels; "
@@ -226,23 +234,28 @@ class Builder {
     return texelSizeFor(charts_, options_.texel_budget);
   }
 
-  /// By chart: the surface that it was before an edit, or null. Charts are known again by their instance and their
-  /// order on it.
+  /// By chart: the surface that it was before an edit, or null.
   [[nodiscard]] std::vector<const Surface*> formerSurfaces() const {
     std::vector<const Surface*> former(charts_.size(), nullptr);
     if (former_ == nullptr) return former;
+    const PatchScene& before = former_->patches;
     std::vector<std::vector<std::uint32_t>> surfaces(former_->scene.instances.size());
-    const auto& old_ones = former_->patches.surfaces;
-    for (std::uint32_t s = 0; s < old_ones.size(); ++s) surfaces[old_ones[s].instance].push_back(s);
+    for (std::uint32_t s = 0; s < before.surfaces.size(); ++s) surfaces[before.surfaces[s].instance].push_back(s);
     const auto source = matchInstances(former_->scene, scene_);
-    std::vector<std::uint32_t> count(scene_.instances.size(), 0);
-    for (const Chart& chart : charts_) ++count[chart.instance];
-    std::uint32_t order = 0;
-    for (std::size_t c = 0; c < charts_.size(); ++c) {
-      const std::uint32_t instance = charts_[c].instance;
-      order = c > 0 && charts_[c - 1].instance == instance ? order + 1 : 0;
-      if (source[instance] == kNone || surfaces[source[instance]].size() != count[instance]) continue;
-      former[c] = &old_ones[surfaces[source[instance]][order]];
+    for (std::size_t first = 0, end = 0; first < charts_.size(); first = end) {
+      const std::uint32_t instance = charts_[first].instance, old_one = source[instance];
+      while (end < charts_.size() && charts_[end].instance == instance) ++end;
+      if (old_one == kNone) continue;
+      InstanceCharts now{{}, patches_.cuts.find(instance) != nullptr}, then{{}, before.cuts.find(old_one) != nullptr};
+      for (auto c = first; c < end; ++c)
+        now.keys.push_back({patches_.cuts.sourceOf(instance, flat_.triangles[charts_[c].triangles.front()].source),
+                            static_cast<std::uint32_t>(charts_[c].triangles.size())});
+      for (const auto s : surfaces[old_one])
+        then.keys.push_back({before.cuts.sourceOf(old_one, before.triangle_source[before.surfaces[s].first_triangle]),
+                             before.surfaces[s].triangle_count});
+      const auto match = matchCharts(then, now);
+      for (auto c = first; c < end; ++c)
+        if (match[c - first] != kNone) former[c] = &before.surfaces[surfaces[old_one][match[c - first]]];
     }
     return former;
   }

@@ -71,6 +71,15 @@ struct Facets {
 [[nodiscard]] Facets findFacets(const FlatScene& flat, const std::vector<std::uint32_t>& neighbours,
                                 const std::vector<bool>& wanted);
 
+/// Cuts flat faces along walls that part them, or stand far into them, wherever a texel (of edge `texel`, unit box)
+/// would have light of both sides. `flat`: of whole primitives; `neighbours`,
+/// `facets`: its own; `kept`: by instance, such as stay
+/// whole. So does what is see-through or posed. O(n log n), and bounded in time and in what it makes: faces that meet
+/// more walls than a building has stay whole.
+[[nodiscard]] WallCuts cutAlongWalls(const Scene& scene, const FlatScene& flat,
+                                     const std::vector<std::uint32_t>& neighbours, const Facets& facets, double texel,
+                                     const std::vector<bool>& kept);
+
 /// Groups facets that are narrower than `planar_side` (unit box) with smooth neighbours; each list is one chart's
 /// facets. Normals within `angle_deg` of the group's mean; up to 45 degrees while the group is smaller than
 /// `small_area`.

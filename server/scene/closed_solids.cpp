@@ -5,8 +5,8 @@
 #include <cstring>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <map>
 #include <span>
+#include <tuple>
 #include <unordered_map>
 
 #include "common/task.h"
@@ -47,7 +47,7 @@ Corners cornersOf(const PatchScene& patches, std::uint32_t triangle) {
 
 struct Edge {
   std::uint64_t key;  ///< its two places, the smaller first
-  std::uint32_t triangle;
+  std::uint32_t instance, triangle;
   bool forward;  ///< from the smaller to the larger
 };
 
@@ -59,10 +59,13 @@ std::vector<Edge> sortedEdges(const PatchScene& patches) {
     const auto triangle = i / 3;
     const std::uint64_t from = place[patches.indices[i]];
     const std::uint64_t to = place[patches.indices[3 * triangle + (i + 1) % 3]];
-    edges.push_back({std::min(from, to) << 32U | std::max(from, to), static_cast<std::uint32_t>(triangle), from < to});
+    edges.push_back({std::min(from, to) << 32U | std::max(from, to),
+                     patches.surfaces[patches.triangle_surface[triangle]].instance,
+                     static_cast<std::uint32_t>(triangle), from < to});
   }
-  std::sort(edges.begin(), edges.end(),
-            [](const Edge& a, const Edge& b) { return a.key != b.key ? a.key < b.key : a.triangle < b.triangle; });
+  std::sort(edges.begin(), edges.end(), [](const Edge& a, const Edge& b) {
+    return std::tie(a.key, a.instance, a.triangle) < std::tie(b.key, b.instance, b.triangle);
+  });
   return edges;
 }
 
@@ -78,13 +81,21 @@ struct Parts {
   std::vector<Part> all;          ///< by triangle: used where it is its own
 };
 
-/// Solids of several instances may touch along their edges, all the more where a floor is cut along what stands on it:
-/// each has its own two triangles there.
-bool isPairedByInstance(const PatchScene& patches, std::span<const Edge> edges) {
-  std::map<std::uint32_t, std::array<int, 2>> count;  // of both directions
-  for (const auto& edge : edges)
-    ++count[patches.surfaces[patches.triangle_surface[edge.triangle]].instance][edge.forward ? 1 : 0];
-  return std::ranges::all_of(count, [](const auto& one) { return one.second == std::array{1, 1}; });
+/// Those of some edges in one place, sorted by instance, that are not an instance's only two, running opposite ways.
+/// Solids may touch along their edges, all the more where a floor is cut along what stands on it: each has its own two
+/// triangles there. Joins these.
+std::vector<Edge> withoutPairs(std::span<const Edge> edges, UnionFind& joined) {
+  std::vector<Edge> others;
+  for (std::size_t first = 0, last = 0; first < edges.size(); first = last) {
+    while (last < edges.size() && edges[last].instance == edges[first].instance) ++last;
+    if (last - first == 2 && edges[first].forward != edges[first + 1].forward) {
+      joined.join(edges[first].triangle, edges[first + 1].triangle);
+    } else {
+      others.insert(others.end(), edges.begin() + static_cast<std::ptrdiff_t>(first),
+                    edges.begin() + static_cast<std::ptrdiff_t>(last));
+    }
+  }
+  return others;
 }
 
 Parts connectedParts(const PatchScene& patches) {
@@ -96,17 +107,11 @@ Parts connectedParts(const PatchScene& patches) {
   for (std::size_t first = 0, last = 0; first < edges.size(); first = last) {
     interruptionPoint();
     while (last < edges.size() && edges[last].key == edges[first].key) ++last;
-    const bool closed = last - first == 2 && edges[first].forward != edges[first + 1].forward;
-    const bool paired = !closed && isPairedByInstance(patches, std::span(edges).subspan(first, last - first));
-    const auto instanceAt = [&](std::size_t i) {
-      return patches.surfaces[patches.triangle_surface[edges[i].triangle]].instance;
-    };
-    for (auto i = first; i < last; ++i) {
-      for (auto k = first; k < i && paired; ++k)
-        if (instanceAt(k) == instanceAt(i)) joined.join(edges[i].triangle, edges[k].triangle);
-      if (paired) continue;
-      joined.join(edges[i].triangle, edges[first].triangle);
-      if (!closed) open[edges[i].triangle] = true;
+    const auto others = withoutPairs(std::span(edges).subspan(first, last - first), joined);
+    const bool closed = others.size() == 2 && others[0].forward != others[1].forward;
+    for (const auto& edge : others) {
+      joined.join(edge.triangle, others.front().triangle);
+      if (!closed) open[edge.triangle] = true;
     }
   }
   for (std::uint32_t i = 0; i < triangles; ++i) {

@@ -48,18 +48,31 @@ FacetCutter::FacetCutter(std::vector<Triangle> triangles, std::vector<WallSegmen
 
 bool FacetCutter::cut() {
   if (all_walls_.empty() || triangles_.size() > kMostPieces || !cutAlong(all_walls_)) return false;
-  const auto useful = usefulWalls();
-  if (useful.size() == all_walls_.size()) return true;
+  const auto parting = findPartingEdges(edges_, points_, areas(), scale_);
+  const auto needed = wallsOn(parting);
+  // Others leave no trace, so that what stands on a face and moves there changes nothing.
+  if (needed.empty() || (needed.size() < walls_.size() && !cutAlong(needed))) return false;
+  findRegions();
+  if (regions_ < 2) return false;
+  std::vector<bool> border;
+  for (const auto& edge : edges_)
+    border.push_back(edge.piece[0] != kNone && edge.piece[1] != kNone &&
+                     pieces_[edge.piece[0]].region != pieces_[edge.piece[1]].region);
+  const auto useful = wallsOn(border);
+  if (useful.size() == walls_.size()) return true;
   const FacetCutter with_all = *this;
-  if (!cutAlong(useful) || regions_ != with_all.regions_) *this = with_all;
+  if (cutAlong(useful)) findRegions();
+  if (regions_ != with_all.regions_) *this = with_all;
   return true;
 }
 
+/// False: they are not cut, or in too many pieces.
 bool FacetCutter::cutAlong(const std::vector<WallSegment>& walls) {
   walls_ = walls;
+  regions_ = 0;
   pieces_.clear();
   for (std::uint32_t t = 0; t < triangles_.size(); ++t)
-    pieces_.push_back({{triangles_[t].begin(), triangles_[t].end()}, {}, t, 0});
+    pieces_.push_back({{triangles_[t].begin(), triangles_[t].end()}, {}, t});
   const auto whole = pieces_.size();
   for (const auto& wall : walls_) {
     interruptionPoint();
@@ -70,15 +83,22 @@ bool FacetCutter::cutAlong(const std::vector<WallSegment>& walls) {
   numberPoints();
   addToEdges();
   findEdges();
+  return !pieces_.empty();
+}
+
+std::vector<double> FacetCutter::areas() const {
   std::vector<double> areas;
   for (const auto& piece : pieces_) areas.push_back(areaOf(piece));
-  const auto regions = findRegions(edges_, points_, areas, scale_);
+  return areas;
+}
+
+void FacetCutter::findRegions() {
+  const auto regions = scene::findRegions(edges_, points_, areas(), scale_);
   for (std::size_t i = 0; i < pieces_.size(); ++i) {
     pieces_[i].region = regions.of_piece[i];
     pieces_[i].hidden = regions.hidden[i];
   }
   regions_ = *std::ranges::max_element(regions.of_piece) + 1;
-  return regions_ > 1;
 }
 
 /// Pieces that the wall stands on, by all of its line.
@@ -222,20 +242,19 @@ double FacetCutter::areaOf(const Piece& piece) const {
   return 0.5 * twice;
 }
 
-/// On whose lines regions meet.
-std::vector<WallSegment> FacetCutter::usefulWalls() const {
-  std::vector<WallSegment> useful;
+/// Of those it is cut along, such as have some of these edges on their lines.
+std::vector<WallSegment> FacetCutter::wallsOn(const std::vector<bool>& edges) const {
+  std::vector<WallSegment> found;
   const double margin = kNear * scale_.rounding;
   for (const auto& wall : walls_) {
     const Line line(wall);
     const auto isOn = [&](std::uint32_t p) { return std::abs(line.distance(points_[p])) <= margin; };
-    const auto parts = [&](const PieceEdge& edge) {
-      return edge.piece[0] != kNone && edge.piece[1] != kNone &&
-             pieces_[edge.piece[0]].region != pieces_[edge.piece[1]].region && isOn(edge.from) && isOn(edge.to);
-    };
-    if (std::ranges::any_of(edges_, parts)) useful.push_back(wall);
+    bool has = false;
+    for (std::size_t i = 0; i < edges_.size() && !has; ++i)
+      has = edges[i] && isOn(edges_[i].from) && isOn(edges_[i].to);
+    if (has) found.push_back(wall);
   }
-  return useful;
+  return found;
 }
 
 void FacetCutter::insert(const std::vector<glm::dvec2>& points) {

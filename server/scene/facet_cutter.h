@@ -51,7 +51,9 @@ class FacetCutter {
   void addToEdges();
   void findEdges();
   void look(PieceEdge& edge) const;
-  [[nodiscard]] std::vector<WallSegment> usefulWalls() const;
+  void findRegions();
+  [[nodiscard]] std::vector<WallSegment> wallsOn(const std::vector<bool>& edges) const;
+  [[nodiscard]] std::vector<double> areas() const;
   [[nodiscard]] double areaOf(const Piece& piece) const;
 
   std::vector<Triangle> triangles_;

@@ -5,14 +5,17 @@
 #include <optional>
 #include <utility>
 
+#include "common/task.h"
 #include "common/union_find.h"
 #include "server/scene/scene.h"
 
 namespace radiosity::scene {
 namespace {
 
-/// Each region is a chart, with texels of its own around it.
-constexpr std::uint32_t kMostRegions = 64;
+/// Each region is a chart, with texels of its own around it; what is hidden has but one.
+constexpr std::uint32_t kMostRegions = 64, kMostHidden = 1024;
+/// Pairs of pieces to be kept apart: each is asked of for each edge.
+constexpr std::size_t kMostApart = 2'000;
 /// Bilinear lookups read texels so far away, in texels.
 constexpr double kReach = 1.5;
 
@@ -28,13 +31,43 @@ class RegionFinder {
     std::ranges::stable_sort(by_length_, [&](auto a, auto b) { return edges[a].length > edges[b].length; });
   }
 
+  [[nodiscard]] std::vector<bool> partingEdges() const {
+    const double least = scale_.least * scale_.least;
+    const auto isSeen = [&](std::uint32_t piece) { return !isHidden(piece) && partOf(piece).area >= least; };
+    std::vector<std::uint32_t> beside(areas_.size(), kNone);  // by hidden part: a part that is seen
+    std::vector<bool> lies_between(areas_.size(), false);
+    const auto eachSide = [&](const auto& visit) {
+      for (const auto i : by_length_)
+        for (std::size_t side = 0; side < 2 && edges_[i].blocked; ++side)
+          visit(i, edges_[i].piece[side], edges_[i].piece[1 - side]);
+    };
+    eachSide([&](std::uint32_t, std::uint32_t under, std::uint32_t other) {
+      if (!isHidden(under) || !isSeen(other)) return;
+      auto& first = beside[part_of_[under]];
+      if (first == kNone) first = part_of_[other];
+      if (first != part_of_[other]) lies_between[part_of_[under]] = true;
+    });
+    std::vector<bool> parting(edges_.size(), false);
+    eachSide([&](std::uint32_t i, std::uint32_t one, std::uint32_t other) {
+      const bool both_seen = isSeen(one) && isSeen(other);
+      if (lies_between[part_of_[one]] || (both_seen && (part_of_[one] != part_of_[other] || edges_[i].parts)) ||
+          (edges_[i].parts && isNarrow(one)))
+        parting[i] = true;
+    });
+    return parting;
+  }
+
+  /// Of more regions than there may be, all are one.
   FacetRegions run() {
     keepWallsSidesApart();
     joinInTheOpen();
-    for (double least = scale_.least * scale_.least;; least *= 2.0) {
+    constexpr int kDoublings = 8;  // of the least area
+    double least = scale_.least * scale_.least;
+    for (int i = 0; i < kDoublings; ++i, least *= 2.0) {
       joinSmall(least);
       if (auto found = number()) return *found;
     }
+    return {std::vector<std::uint32_t>(areas_.size(), 0), std::vector<bool>(areas_.size(), false)};
   }
 
  private:
@@ -88,7 +121,8 @@ class RegionFinder {
     for (const auto i : by_length_) {
       const PieceEdge& edge = edges_[i];
       if (!edge.parts) continue;
-      if (!isHidden(edge.piece[0]) && !isHidden(edge.piece[1])) apart_.emplace_back(edge.piece[0], edge.piece[1]);
+      if (!isHidden(edge.piece[0]) && !isHidden(edge.piece[1]) && apart_.size() < kMostApart)
+        apart_.emplace_back(edge.piece[0], edge.piece[1]);
       for (std::size_t side = 0; side < 2; ++side)
         if (isNarrow(edge.piece[side]) && !isHidden(edge.piece[1 - side]))
           rims[edge.piece[side]].push_back({edge.piece[1 - side], outward(edge, side)});
@@ -97,7 +131,8 @@ class RegionFinder {
     for (const auto& around : rims)
       for (const auto& one : around)
         for (const auto& other : around)
-          if (glm::dot(one.to, other.to) < kOpposite) apart_.emplace_back(one.beside, other.beside);
+          if (one.beside < other.beside && glm::dot(one.to, other.to) < kOpposite && apart_.size() < kMostApart)
+            apart_.emplace_back(one.beside, other.beside);
   }
 
   /// What is hidden hangs together, and so does what is not, unless a wall is to part it.
@@ -112,6 +147,7 @@ class RegionFinder {
   }
 
   void joinIfAllowed(std::uint32_t a, std::uint32_t b) {
+    interruptionPoint();
     const auto one = groups_.find(a), other = groups_.find(b);
     if (one == other) return;
     for (const auto& [c, d] : apart_) {
@@ -123,17 +159,14 @@ class RegionFinder {
 
   /// With what it shares its longest edge with.
   void joinSmall(double least) {
-    for (bool joined = true; joined;) {
-      joined = false;
-      std::vector<double> sums(areas_.size(), 0.0);
-      for (std::uint32_t i = 0; i < areas_.size(); ++i) sums[groups_.find(i)] += areas_[i];
-      for (const auto i : by_length_) {
-        const auto a = groups_.find(edges_[i].piece[0]), b = groups_.find(edges_[i].piece[1]);
-        if (a == b || isHidden(a) || isHidden(b) || std::min(sums[a], sums[b]) >= least) continue;
-        groups_.join(a, b);
-        joined = true;
-        break;
-      }
+    std::vector<double> sums(areas_.size(), 0.0);
+    for (std::uint32_t i = 0; i < areas_.size(); ++i) sums[groups_.find(i)] += areas_[i];
+    for (const auto i : by_length_) {
+      interruptionPoint();
+      const auto a = groups_.find(edges_[i].piece[0]), b = groups_.find(edges_[i].piece[1]);
+      if (a == b || isHidden(a) || isHidden(b) || std::min(sums[a], sums[b]) >= least) continue;
+      groups_.join(a, b);
+      sums[groups_.find(a)] = sums[a] + sums[b];
     }
   }
 
@@ -150,16 +183,19 @@ class RegionFinder {
       }
     std::vector<std::uint32_t> number(areas_.size(), kNone);
     FacetRegions found;
-    std::uint32_t count = 0;
+    std::uint32_t count = 0, hidden = 0;
     for (std::uint32_t i = 0; i < areas_.size(); ++i) {
       const auto group = groups_.find(i);
       const bool of_other = isHidden(group) && !parts[group] && beside[group] != kNone;
       auto& region = number[of_other ? beside[group] : group];
-      if (region == kNone) region = count++;
+      if (region == kNone) {
+        region = count++;
+        hidden += isHidden(group) ? 1 : 0;
+      }
       found.of_piece.push_back(region);
-      found.hidden.push_back(isHidden(group) && !of_other);
+      found.hidden.push_back(isNarrow(group) && !of_other);
     }
-    return count <= kMostRegions ? std::optional(std::move(found)) : std::nullopt;
+    return count - hidden <= kMostRegions && hidden <= kMostHidden ? std::optional(std::move(found)) : std::nullopt;
   }
 
   std::span<const PieceEdge> edges_;
@@ -174,6 +210,11 @@ class RegionFinder {
 };
 
 }  // namespace
+
+std::vector<bool> findPartingEdges(std::span<const PieceEdge> edges, std::span<const glm::dvec2> points,
+                                   const std::vector<double>& areas, const CutScale& scale) {
+  return RegionFinder(edges, points, areas, scale).partingEdges();
+}
 
 FacetRegions findRegions(std::span<const PieceEdge> edges, std::span<const glm::dvec2> points,
                          const std::vector<double>& areas, const CutScale& scale) {

@@ -27,9 +27,14 @@ struct PieceEdge {
   std::array<bool, 2> sees_front{false, false};  ///< left, right: of that wall
 };
 
+/// By edge: a wall on it may part regions. Of what stands on a face most does not, since there is nothing to be seen
+/// beneath it.
+[[nodiscard]] std::vector<bool> findPartingEdges(std::span<const PieceEdge> edges, std::span<const glm::dvec2> points,
+                                                 const std::vector<double>& areas, const CutScale& scale);
+
 struct FacetRegions {
   std::vector<std::uint32_t> of_piece;  ///< from 0
-  std::vector<bool> hidden;             ///< by piece: its region lies under a solid, between others
+  std::vector<bool> hidden;             ///< by piece: its region lies under a thin wall, between others
 };
 
 /// Pieces with a wall between them are of one region only where light goes around that wall, where a

@@ -64,17 +64,29 @@ bool sameGrid(const Surface& a, const Surface& b) {
   return a.width == b.width && a.height == b.height && hasSide(a, 0) == hasSide(b, 0) && hasSide(a, 1) == hasSide(b, 1);
 }
 
-/// By surface: the former one of the same instance, order and grid, or kNone.
+InstanceCharts keysOf(const PatchScene& patches, std::uint32_t instance, const SurfaceRange& range) {
+  InstanceCharts charts{{}, patches.cuts.find(instance) != nullptr};
+  for (auto s = range.first; s < range.first + range.count; ++s) {
+    const Surface& surface = patches.surfaces[s];
+    charts.keys.push_back(
+        {patches.cuts.sourceOf(instance, patches.triangle_source[surface.first_triangle]), surface.triangle_count});
+  }
+  return charts;
+}
+
+/// By surface: the former one of the same instance and grid, or kNone.
 std::vector<std::uint32_t> formerSurfaces(const Scene& scene_before, const PatchScene& before, const Scene& scene_after,
                                           const PatchScene& after) {
   std::vector<std::uint32_t> former(after.surfaces.size(), kNone);
   const auto old_ranges = surfacesOf(scene_before, before), new_ranges = surfacesOf(scene_after, after);
   const auto source = matchInstances(scene_before, scene_after);
   for (std::uint32_t i = 0; i < new_ranges.size(); ++i) {
-    const auto range = new_ranges[i];
-    if (source[i] == kNone || old_ranges[source[i]].count != range.count) continue;
+    if (source[i] == kNone) continue;
+    const auto range = new_ranges[i], old_range = old_ranges[source[i]];
+    const auto match = matchCharts(keysOf(before, source[i], old_range), keysOf(after, i, range));
     for (std::uint32_t k = 0; k < range.count; ++k) {
-      const auto of = old_ranges[source[i]].first + k;
+      if (match[k] == kNone) continue;
+      const auto of = old_range.first + match[k];
       if (sameGrid(before.surfaces[of], after.surfaces[range.first + k])) former[range.first + k] = of;
     }
   }
@@ -213,6 +225,23 @@ std::pair<std::size_t, std::size_t> bestPair(const std::vector<ChangedBox>& boxe
 }
 
 }  // namespace
+
+std::vector<std::uint32_t> matchCharts(const InstanceCharts& before, const InstanceCharts& after) {
+  std::vector<std::uint32_t> match(after.keys.size(), kNone);
+  if (!before.cut && !after.cut) {
+    for (std::uint32_t k = 0; k < match.size() && before.keys.size() == match.size(); ++k) match[k] = k;
+    return match;
+  }
+  std::map<ChartKey, std::vector<std::uint32_t>> known;  // last first
+  for (auto k = static_cast<std::uint32_t>(before.keys.size()); k-- > 0;) known[before.keys[k]].push_back(k);
+  for (std::uint32_t k = 0; k < match.size(); ++k) {
+    const auto found = known.find(after.keys[k]);
+    if (found == known.end() || found->second.empty()) continue;
+    match[k] = found->second.back();
+    found->second.pop_back();
+  }
+  return match;
+}
 
 std::vector<std::uint32_t> matchInstances(const Scene& before, const Scene& after) {
   std::map<InstanceKey, std::uint32_t> known;

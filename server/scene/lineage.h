@@ -12,6 +12,19 @@
 
 namespace radiosity::scene {
 
+/// By which a chart is known again beside others that are cut otherwise: the file's triangle that its first is a part
+/// of, and how many it has.
+struct ChartKey {
+  std::uint32_t source, count;
+  auto operator<=>(const ChartKey&) const = default;
+};
+struct InstanceCharts {
+  std::vector<ChartKey> keys;  ///< in their order
+  bool cut = false;            ///< some of them are, along walls
+};
+/// By chart of an instance: the one before, or kNone. Of what is whole they have the same order, if they are as many.
+[[nodiscard]] std::vector<std::uint32_t> matchCharts(const InstanceCharts& before, const InstanceCharts& after);
+
 /// By instance of `after`: the one of `before` that was placed by the same node with the same mesh and primitive (of
 /// several, in their order), or kNone. O(n log n).
 [[nodiscard]] std::vector<std::uint32_t> matchInstances(const Scene& before, const Scene& after);

@@ -48,13 +48,14 @@ double unitOf(int component_type) {
 }  // namespace
 
 MadeElement madeElement(const AccessorReader& reader, const tinygltf::Accessor& accessor, const MadeVertex& vertex,
-                        bool unit_length) {
+                        MadeHow how) {
   const auto components = componentCount(accessor);
   const auto nearest = static_cast<std::size_t>(std::ranges::max_element(vertex.weight) - vertex.weight.begin());
   const auto plain = reader.unnormalized();
   MadeElement made;
   made.bytes.resize(elementBytes(accessor), 0);
-  const bool is_vector = accessor.type != TINYGLTF_TYPE_MAT2 && components <= made.stored.size();
+  const bool is_vector =
+      accessor.type != TINYGLTF_TYPE_MAT2 && components <= made.stored.size() && how != MadeHow::kNearest;
   if (!is_vector) {
     if (const auto* bytes = reader.bytesAt(vertex.of[nearest]))
       std::copy_n(bytes, made.bytes.size(), made.bytes.data());
@@ -65,7 +66,7 @@ MadeElement madeElement(const AccessorReader& reader, const tinygltf::Accessor& 
     const auto value = plain.at(vertex.of[k]);
     for (std::size_t c = 0; c < components; ++c) sum[c] += vertex.weight[k] * value[c];
   }
-  if (unit_length) {
+  if (how == MadeHow::kUnitLength) {
     const double length = std::hypot(sum[0], sum[1], sum[2]);
     if (length > 0.0)
       for (std::size_t c = 0; c < 3; ++c) sum[c] *= unitOf(accessor.componentType) / length;

@@ -18,8 +18,13 @@ struct MadeElement {
 };
 
 /// Between the elements of the file's vertices, rounded to what the accessor can store; the nearest one's own where
-/// elements are no vectors. `unit_length`: its first three components are a direction.
+/// elements are no vectors.
+enum class MadeHow : std::uint8_t {
+  kBetween,
+  kUnitLength,  ///< its first three components are a direction
+  kNearest,     ///< numbers of something have nothing between them
+};
 [[nodiscard]] MadeElement madeElement(const AccessorReader& reader, const tinygltf::Accessor& accessor,
-                                      const MadeVertex& vertex, bool unit_length);
+                                      const MadeVertex& vertex, MadeHow how);
 
 }  // namespace radiosity::scene

@@ -135,7 +135,7 @@ Result<std::size_t> LitMeshBuilder::copyAccessor(std::size_t accessor, const Ele
     std::array<double, 4> stored{};
     if (element >= of_file) {
       const auto made =
-          madeElement(*reader, model_.accessors[accessor], elements.cut->made[element - of_file], how.unit_length);
+          madeElement(*reader, model_.accessors[accessor], elements.cut->made[element - of_file], how.made);
       append(made.bytes.data(), size);
       stored = made.stored;
     } else {
@@ -164,7 +164,12 @@ Result<Json> LitMeshBuilder::copyAttributes(const Json& attributes, const Elemen
   Json out = Json::object();
   for (const auto& [name, accessor] : attributes.items()) {
     const bool is_direction = name == "NORMAL" || name == "TANGENT";
-    const Copy how{name == "POSITION", turned && is_direction, is_direction};
+    const bool is_number = name.starts_with("_") &&
+                           model_.accessors[accessor.get<std::size_t>()].componentType != TINYGLTF_COMPONENT_TYPE_FLOAT;
+    const Copy how{name == "POSITION", turned && is_direction,
+                   is_direction ? MadeHow::kUnitLength
+                   : is_number  ? MadeHow::kNearest
+                                : MadeHow::kBetween};
     const auto copied = copyAccessor(accessor.get<std::size_t>(), elements, how);
     if (!copied) return tl::unexpected(copied.error());
     out[name] = *copied;

@@ -8,6 +8,7 @@
 #include "server/scene/emitters.h"
 #include "server/scene/import_model.h"
 #include "server/scene/json_text.h"
+#include "server/scene/lit_glb_made.h"
 #include "server/scene/patch_scene.h"
 
 namespace radiosity::scene {
@@ -62,7 +63,7 @@ class LitMeshBuilder {
   struct Copy {
     bool with_bounds = false;  ///< POSITION wants them
     bool negated = false;
-    bool unit_length = false;  ///< what is made between them, too
+    MadeHow made = MadeHow::kBetween;
   };
   /// Vertices of the file's primitive, and of its cut copy, if it has one, those that are made.
   struct Elements {

@@ -79,7 +79,8 @@ bool reachesDarkSides(const PatchScene& patches, const Scene& before, const Sky&
   for (std::size_t s = 0; s < asked.size(); ++s) {
     const Surface& surface = patches.surfaces[s];
     if (!materialOf(next, surface).double_sided) continue;
-    asked[s][0] = isLeftCoarse(next, patches, surface);
+    asked[s][0] = isLeftCoarse(next, patches, surface) &&
+                  !patches.cuts.isHidden(surface.instance, patches.triangle_source[surface.first_triangle]);
     asked[s][1] = surface.shows_back && surface.first_node[1] == kNone;  // nobody sees what is sealed
     any |= asked[s][0] || asked[s][1];
   }

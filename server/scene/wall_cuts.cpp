@@ -26,6 +26,10 @@ constexpr double kRounding = 1e-4, kMostRounding = 2e-2;
 constexpr double kLeastFace = 4.0;
 /// Vertices of whole primitives that are there again, beside some parts of their cut copies.
 constexpr std::size_t kMostCopied = 2'000'000;
+/// Pieces times walls, about, of all faces: a second's.
+constexpr std::size_t kMostWork = 30'000'000;
+/// Of these, beside one for each of the scene's triangles.
+constexpr std::size_t kMostMade = 100'000;
 
 using Weights = std::array<double, 3>;
 
@@ -97,6 +101,10 @@ class InstanceCutter {
       const double area = cross(b - a, p - a);
       weights[k] = std::abs(area) <= 2.0 * rounding_ * glm::distance(a, b) ? 0.0 : std::max(0.0, area / twice);
       sum += weights[k];
+    }
+    if (!(sum > 0.0)) {  // a sliver, all of which is near its edges
+      const auto apart = [&](const glm::dvec2& corner) { return glm::distance(corner, p); };
+      weights[static_cast<std::size_t>(std::ranges::min_element(triangle, {}, apart) - triangle.begin())] = sum = 1.0;
     }
     for (auto& weight : weights) weight /= sum;
     return weights;
@@ -279,8 +287,7 @@ CutScale scaleOn(const FlatScene& flat, std::uint32_t instance, CutScale scale) 
 
 bool mayBeCut(const Scene& scene, std::uint32_t instance) {
   const auto& primitive = scene.primitives[scene.instances[instance].primitive];
-  const auto& material = materialOf(scene, scene.instances[instance]);
-  return !primitive.posed && !isSeeThrough(material) && material.emission == glm::vec3(0.0F);
+  return !primitive.posed && !isSeeThrough(materialOf(scene, scene.instances[instance]));
 }
 
 }  // namespace
@@ -291,11 +298,12 @@ bool WallCuts::operator==(const WallCuts& other) const {
   });
 }
 
-WallCuts cutAlongWalls(const Scene& scene, const FlatScene& flat, const Facets& facets, double texel,
-                       const std::vector<bool>& kept) {
+WallCuts cutAlongWalls(const Scene& scene, const FlatScene& flat, const std::vector<std::uint32_t>& neighbours,
+                       const Facets& facets, double texel, const std::vector<bool>& kept) {
   WallCuts cuts;
   const auto scale = cutScale(flat, texel);
   std::optional<WallFinder> finder;
+  std::size_t work = 0, made = 0;
   std::map<std::uint32_t, std::vector<CutFacet>> cut;  // by instance
   for (std::uint32_t f = 0; f < facets.facets.size(); ++f) {
     interruptionPoint();
@@ -304,7 +312,7 @@ WallCuts cutAlongWalls(const Scene& scene, const FlatScene& flat, const Facets& 
     if (facet.area < kLeastFace * scale.least * scale.least || kept[instance] || !mayBeCut(scene, instance)) continue;
     const auto own = scaleOn(flat, instance, scale);
     if (own.rounding > kMostRounding * scale.least) continue;
-    if (!finder) finder.emplace(scene, flat, facets, scale);
+    if (!finder) finder.emplace(scene, flat, neighbours, facets, scale);
     const FacetPlane plane(flat, facet);
     auto walls = finder->wallsOn(f, plane);
     if (walls.empty()) continue;
@@ -313,15 +321,25 @@ WallCuts cutAlongWalls(const Scene& scene, const FlatScene& flat, const Facets& 
       triangles.emplace_back();
       for (std::size_t k = 0; k < 3; ++k) triangles.back()[k] = plane.project(flat.points[flat.triangles[t].points[k]]);
     }
+    const auto met = walls.size();
+    work += (triangles.size() + met * met) * met;
+    if (work > kMostWork) break;
     FacetCutter cutter(std::move(triangles), std::move(walls), own);
-    if (cutter.cut()) cut[instance].push_back({facet, plane, std::move(cutter)});
+    const bool is_cut = cutter.cut();
+    work += 4 * met * cutter.pieces().size();
+    made += is_cut ? cutter.pieces().size() : 0;
+    if (made > kMostMade + flat.triangles.size()) work = kMostWork + 1;
+    if (work > kMostWork) break;
+    if (is_cut) cut[instance].push_back({facet, plane, std::move(cutter)});
   }
   std::size_t copied = 0;
   for (auto& [instance, parts] : cut) {
     copied += scene.primitives[scene.instances[instance].primitive].positions.size();
+    if (copied > kMostCopied) work = kMostWork + 1;
     if (copied > kMostCopied) break;
     cuts.add(instance, InstanceCutter(scene, flat, instance, scaleOn(flat, instance, scale).rounding).run(parts));
   }
+  if (work > kMostWork || (finder && finder->gaveUp())) cuts.leaveRestWhole();
   return cuts;
 }
 

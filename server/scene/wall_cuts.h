@@ -15,9 +15,6 @@
 
 namespace radiosity::scene {
 
-struct FlatScene;
-struct Facets;
-
 /// A vertex on a triangle of the file, by weights of its vertices, which sum to 1.
 struct MadeVertex {
   std::array<std::uint32_t, 3> of;
@@ -53,6 +50,18 @@ class WallCuts {
     const auto* cut = find(instance);
     return cut != nullptr ? cut->primitive : scene.primitives[scene.instances[instance].primitive];
   }
+  /// Of a triangle of it: that of the file's primitive.
+  [[nodiscard]] std::uint32_t sourceOf(std::uint32_t instance, std::uint32_t triangle) const {
+    const auto* cut = find(instance);
+    return cut != nullptr ? cut->source[triangle] : triangle;
+  }
+  [[nodiscard]] bool isHidden(std::uint32_t instance, std::uint32_t triangle) const {
+    const auto* cut = find(instance);
+    return cut != nullptr && cut->hidden[triangle];
+  }
+  /// Some faces meet too many walls: light of one side may be seen on the other there.
+  [[nodiscard]] bool leavesSomeWhole() const { return leaves_some_whole_; }
+  void leaveRestWhole() { leaves_some_whole_ = true; }
   [[nodiscard]] bool empty() const { return cut_.empty(); }
   [[nodiscard]] bool operator==(const WallCuts& other) const;
   void add(std::uint32_t instance, CutPrimitive cut) {
@@ -61,13 +70,7 @@ class WallCuts {
 
  private:
   std::map<std::uint32_t, std::shared_ptr<const CutPrimitive>> cut_;
+  bool leaves_some_whole_ = false;
 };
-
-/// Cuts flat faces along walls that part them, or stand far into them, wherever a texel (of edge `texel`, unit box)
-/// would have light of both sides. `flat`: of whole primitives; `facets`: its own; `kept`: by instance, such as stay
-/// whole. So does what emits, is see-through, or is posed. O(n log n), and bounded where faces meet more walls than a
-/// building has.
-[[nodiscard]] WallCuts cutAlongWalls(const Scene& scene, const FlatScene& flat, const Facets& facets, double texel,
-                                     const std::vector<bool>& kept);
 
 }  // namespace radiosity::scene

@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 
 #include "common/task.h"
+#include "common/union_find.h"
 #include "server/scene/material_of.h"
 #include "server/scene/opacity.h"
 
@@ -31,7 +32,8 @@ FacetPlane::FacetPlane(const FlatScene& flat, const Facets::Facet& facet)
   y = glm::cross(normal, x);
 }
 
-WallFinder::WallFinder(const Scene& scene, const FlatScene& flat, const Facets& facets, const CutScale& scale)
+WallFinder::WallFinder(const Scene& scene, const FlatScene& flat, const std::vector<std::uint32_t>& neighbours,
+                       const Facets& facets, const CutScale& scale)
     : scene_(scene), flat_(flat), facets_(facets), scale_(scale), touch_(kGap * scale.least) {
   std::vector<bool> hides(scene.instances.size());
   for (std::size_t i = 0; i < hides.size(); ++i) hides[i] = !isSeeThrough(materialOf(scene, scene.instances[i]));
@@ -46,13 +48,32 @@ WallFinder::WallFinder(const Scene& scene, const FlatScene& flat, const Facets& 
     for (std::size_t k = 0; k < 3; ++k) corners.back()[k] = glm::vec3(flat.points[triangle.points[k]]);
   }
   tree_ = Bvh(std::move(corners));
+  findClosedParts(neighbours);
 }
 
-bool WallFinder::showsBack(std::uint32_t triangle) const {
+void WallFinder::findClosedParts(const std::vector<std::uint32_t>& neighbours) {
+  UnionFind parts(flat_.triangles.size());
+  for (std::size_t i = 0; i < neighbours.size(); ++i)
+    if (neighbours[i] != kNone) parts.join(static_cast<std::uint32_t>(i / 3), neighbours[i]);
+  std::vector<bool> open(flat_.triangles.size(), false);
+  for (std::size_t i = 0; i < neighbours.size(); ++i)
+    if (neighbours[i] == kNone) open[parts.find(static_cast<std::uint32_t>(i / 3))] = true;
+  for (std::uint32_t t = 0; t < flat_.triangles.size(); ++t)
+    closed_part_.push_back(open[parts.find(t)] ? kNone : parts.find(t));
+}
+
+/// The backs of what is closed all around are seen from within alone, as of a room that is turned inside out.
+bool WallFinder::showsBack(std::uint32_t wall, std::uint32_t face) const {
+  return isDoubleSided(wall) && (closed_part_[wall] == kNone || closed_part_[wall] == closed_part_[face]);
+}
+
+bool WallFinder::isDoubleSided(std::uint32_t triangle) const {
   return materialOf(scene_, scene_.instances[flat_.triangles[triangle].instance]).double_sided;
 }
 
 std::vector<WallSegment> WallFinder::wallsOn(std::uint32_t facet, const FacetPlane& plane) {
+  gave_up_ = gave_up_ || looked_at_ > kMostLooks;
+  if (looked_at_ > kMostLooks) return {};
   const auto margin = static_cast<float>(2.0 * touch_);
   std::vector<std::uint32_t> near;
   for (const auto t : facets_.facets[facet].triangles) {
@@ -65,11 +86,12 @@ std::vector<WallSegment> WallFinder::wallsOn(std::uint32_t facet, const FacetPla
     const auto before = near.size();
     const bool all = tree_.collectNear(low - margin, high + margin, kMostNear, near);
     looked_at_ += near.size() - before;
+    gave_up_ = gave_up_ || !all || looked_at_ > kMostLooks;
     if (!all || looked_at_ > kMostLooks) return {};
   }
   std::ranges::sort(near);
   near.erase(std::unique(near.begin(), near.end()), near.end());
-  const bool both_sides = showsBack(facets_.facets[facet].triangles.front());
+  const bool both_sides = isDoubleSided(facets_.facets[facet].triangles.front());
   Meetings found;
   for (const auto i : near) {
     if (facets_.of_triangle[triangles_[i]] == facet) continue;
@@ -77,7 +99,7 @@ std::vector<WallSegment> WallFinder::wallsOn(std::uint32_t facet, const FacetPla
     if (both_sides) meet(triangles_[i], plane, true, found);
   }
   std::vector<WallSegment> walls;
-  for (const auto& [of, meeting] : found) addWalls(of.first, meeting, plane, walls);
+  for (const auto& [of, meeting] : found) addWalls(of.first, facet, meeting, plane, walls);
   return walls;
 }
 
@@ -108,7 +130,7 @@ void WallFinder::meet(std::uint32_t wall, const FacetPlane& plane, bool behind, 
 }
 
 /// A facet is flat, so that all its segments lie on one line; those that meet are one.
-void WallFinder::addWalls(std::uint32_t facet, const Meeting& meeting, const FacetPlane& plane,
+void WallFinder::addWalls(std::uint32_t facet, std::uint32_t on, const Meeting& meeting, const FacetPlane& plane,
                           std::vector<WallSegment>& walls) const {
   const auto length = [](const auto& segment) { return glm::distance(segment.first, segment.second); };
   const auto& longest = *std::ranges::max_element(meeting.segments, {}, length);
@@ -121,7 +143,7 @@ void WallFinder::addWalls(std::uint32_t facet, const Meeting& meeting, const Fac
   const glm::dvec3 normal = facets_.facets[facet].normal;
   WallSegment wall;
   wall.front = {glm::dot(normal, plane.x), glm::dot(normal, plane.y)};
-  wall.shows_back = showsBack(facets_.facets[facet].triangles.front());
+  wall.shows_back = showsBack(facets_.facets[facet].triangles.front(), facets_.facets[on].triangles.front());
   wall.height = meeting.height;
   for (std::size_t i = 0; i < ranges.size();) {
     auto [first, last] = ranges[i];

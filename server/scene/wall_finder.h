@@ -30,11 +30,15 @@ struct FacetPlane {
 class WallFinder {
  public:
   /// Facets that are too small to be walls, or that one can see through, are none. Refers to its parts.
-  WallFinder(const Scene& scene, const FlatScene& flat, const Facets& facets, const CutScale& scale);
+  WallFinder(const Scene& scene, const FlatScene& flat, const std::vector<std::uint32_t>& neighbours,
+             const Facets& facets, const CutScale& scale);
 
   /// Where walls meet the facet, from in front, and from behind where one can see its back. Empty also where that would
   /// take too long to tell.
   [[nodiscard]] std::vector<WallSegment> wallsOn(std::uint32_t facet, const FacetPlane& plane);
+
+  /// It would have, of some.
+  [[nodiscard]] bool gaveUp() const { return gave_up_; }
 
  private:
   /// By facet of the wall and side of the face: what its triangles have in common with the plane.
@@ -45,9 +49,11 @@ class WallFinder {
   using Meetings = std::map<std::pair<std::uint32_t, bool>, Meeting>;
 
   void meet(std::uint32_t wall, const FacetPlane& plane, bool behind, Meetings& found) const;
-  void addWalls(std::uint32_t facet, const Meeting& meeting, const FacetPlane& plane,
+  void findClosedParts(const std::vector<std::uint32_t>& neighbours);
+  void addWalls(std::uint32_t facet, std::uint32_t on, const Meeting& meeting, const FacetPlane& plane,
                 std::vector<WallSegment>& walls) const;
-  [[nodiscard]] bool showsBack(std::uint32_t triangle) const;
+  [[nodiscard]] bool isDoubleSided(std::uint32_t triangle) const;
+  [[nodiscard]] bool showsBack(std::uint32_t wall, std::uint32_t face) const;
 
   const Scene& scene_;
   const FlatScene& flat_;
@@ -56,7 +62,9 @@ class WallFinder {
   double touch_;                          ///< what hovers no higher stands on the face
   std::vector<std::uint32_t> triangles_;  ///< of the tree: into FlatScene::triangles
   Bvh tree_;
+  std::vector<std::uint32_t> closed_part_;  ///< by flat triangle: of triangles that have no border; kNone: they have
   std::size_t looked_at_ = 0;
+  bool gave_up_ = false;
 };
 
 }  // namespace radiosity::scene

@@ -272,7 +272,9 @@ std::vector<bool> LeafGather::litSides(std::size_t half) const {
     return false;
   };
   for (std::uint32_t s = 0; s < sides_.size(); ++s) lit[s] = anyLeaf(s, hasOwn);
-  for (bool spreads = true; spreads;) {
+  constexpr int kMostRounds = 16;  // it may be farther to the last of them: all are then
+  bool spreads = true;
+  for (int round = 0; round < kMostRounds && spreads; ++round) {
     spreads = false;
     for (std::uint32_t s = 0; s < sides_.size(); ++s) {
       if (lit[s]) continue;
@@ -280,6 +282,7 @@ std::vector<bool> LeafGather::litSides(std::size_t half) const {
       spreads = spreads || lit[s];
     }
   }
+  if (spreads) lit.assign(sides_.size(), true);
   return lit;
 }
 

@@ -17,8 +17,10 @@ namespace {
 constexpr std::uint32_t kBox = 0, kLidless = 1, kRoom = 2, kLid = 4;
 
 /// The unit cube about the origin, facing out, or without its lid, or only that, or facing in.
+/// Posed, so that no wall cuts it: of a solid that is two instances, the other would lack the corners.
 Primitive cube(std::uint32_t kind) {
   Primitive primitive;
+  primitive.posed = true;
   primitive.mesh = kind;
   primitive.primitive = 0;
   primitive.material = 0;
@@ -50,6 +52,7 @@ Primitive angle(bool is_last_wall) {
   primitive.mesh = 20;
   primitive.primitive = is_last_wall ? 1 : 0;
   primitive.material = is_last_wall ? 1 : 0;
+  primitive.posed = true;
   const auto add = [&](const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
     for (const auto& corner : {a, b, c}) {
       primitive.indices.push_back(static_cast<std::uint32_t>(primitive.positions.size()));

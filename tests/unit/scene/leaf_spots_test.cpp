@@ -83,12 +83,19 @@ std::vector<LeafSpot> spotsOf(const PatchScene& patches, const LeafPoint& leaf) 
   return spots;
 }
 
+/// Which no wall cuts.
+Primitive wholeFloor() {
+  Primitive floor = floorQuad(10.0, -5.0, -5.0);
+  floor.posed = true;
+  return floor;
+}
+
 // A wall 0.03 of a leaf thick: of the places right along it no two are near each other. And what a block leaves of
 // leaves at a rim, 0.0075 of 0.25.
 TEST(LeafSpots, WhatIsHiddenOrLeftMayBeNarrowerThanPlacesAreApart) {
   for (const auto& [low, high] : {std::pair(0.1, 0.1075), std::pair(0.0075, 0.24)}) {
     Scene scene;
-    place(scene, floorQuad(10.0, -5.0, -5.0));
+    place(scene, wholeFloor());
     place(scene, box({low, 0.0, -2.0}, {high, 2.0, 2.0}));
     const PatchScene patches = build(scene, 0.25);
     double area = 0.0, leaves = 0.0;
@@ -111,7 +118,7 @@ TEST(LeafSpots, WhatIsHiddenOrLeftMayBeNarrowerThanPlacesAreApart) {
 // A sheet of light's edge may lie anywhere: the part of the spots on one side of a line is that of what is left.
 TEST(LeafSpots, AThinStripBehindAPostIsAPartLikeAnyOther) {
   Scene scene;
-  place(scene, floorQuad(10.0, -5.0, -5.0));
+  place(scene, wholeFloor());
   place(scene, box({0.023, 0.0, -2.0}, {0.12, 2.0, 2.0}));  // of leaves 0.25 wide: 0.023 before it, 0.13 behind
   const PatchScene patches = build(scene, 0.25);
   std::size_t seen = 0;

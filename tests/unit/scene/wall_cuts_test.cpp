@@ -127,6 +127,13 @@ Material sheet() {
   return material;
 }
 
+/// Walls and a roof: the ground is its floor.
+Primitive house() {
+  Primitive walls = box({-2, 0, -2}, {2, 3, 2});
+  walls.indices.erase(walls.indices.begin(), walls.indices.begin() + 6);
+  return walls;
+}
+
 glm::dmat4 turned(double angle) { return glm::rotate(glm::dmat4(1.0), angle, glm::dvec3(0, 1, 0)); }
 
 /// Spots of the leaves of an instance's upward surfaces: by surface, on which sides of something they lie.
@@ -181,7 +188,7 @@ INSTANTIATE_TEST_SUITE_P(Angles, Partition, testing::Values(0.0, 0.01, 0.2, 0.3,
 TEST(WallCuts, whatIsCutStaysClosed) {
   Scene scene;
   place(scene, box({-10, -1, -10}, {10, 0, 10}));
-  place(scene, box({-2, 0, -2}, {2, 3, 2}), turned(0.4), sheet());
+  place(scene, house(), turned(0.4), sheet());
   const PatchScene patches = build(scene, 6000);
   ASSERT_NE(patches.cuts.find(0), nullptr);
   ASSERT_FALSE(patches.solids.bounds.empty());
@@ -200,7 +207,7 @@ TEST(WallCuts, aCutPrimitiveCoversTheFilesTriangles) {
   }
   place(scene, std::move(ground), glm::scale(glm::dmat4(1.0), glm::dvec3(-1, 1, 1)));  // mirrored
   scene.materials[0].double_sided = true;
-  place(scene, box({-2, 0, -2}, {2, 3, 2}), turned(0.4), sheet());
+  place(scene, house(), turned(0.4), sheet());
   const PatchScene patches = build(scene, 6000);
   const auto* cut = patches.cuts.find(0);
   ASSERT_NE(cut, nullptr);
@@ -231,6 +238,53 @@ TEST(WallCuts, furnitureAndLampsLeaveARoomWhole) {
   for (const double x : {3.0, 3.5}) place(scene, box({x, 0, 1}, {x + 0.05, 0.7, 1.05}));  // legs
   place(scene, box({1, 2.9, 2}, {2, 3, 3}));                                              // a lamp's housing
   EXPECT_TRUE(build(scene, 6000).cuts.empty());
+  for (auto& material : scene.materials) material.double_sided = true;
+  EXPECT_TRUE(build(scene, 6000).cuts.empty()) << "nobody sees the backs of what is closed";
+}
+
+std::size_t surfacesOf(const PatchScene& patches, std::uint32_t instance) {
+  return static_cast<std::size_t>(std::ranges::count(patches.surfaces, instance, &Surface::instance));
+}
+
+// Each house is a region, and what lies under each of its walls another: of more than a face may have it stays whole.
+TEST(WallCuts, anyNumberOfHousesAndWallsIsDoneWith) {
+  for (const int houses : {8, 40, 100}) {
+    Scene scene;
+    place(scene, test::floorQuad(10.0 * houses, 0.0, -5.0 * houses));
+    for (int i = 0; i < houses; ++i) {
+      const double x = 10.0 * i + 3.0;
+      place(scene, box({x, 0, -2}, {x + 0.2, 3, 2}));
+      place(scene, box({x + 4, 0, -2}, {x + 4.2, 3, 2}));
+      place(scene, box({x + 0.2, 0, -2}, {x + 4, 3, -1.8}));
+      place(scene, box({x + 0.2, 0, 1.8}, {x + 4, 3, 2}));
+    }
+    const PatchScene patches = build(scene, 6000);
+    if (houses == 8) {
+      EXPECT_EQ(surfacesOf(patches, 0), 1U + 5U * 8U) << "four walls each";
+    }
+    if (houses == 100) {
+      EXPECT_EQ(surfacesOf(patches, 0), 1U);
+    }
+  }
+}
+
+// Four shells whose fronts look inward, around a court that shows their backs all around, and lies open.
+TEST(WallCuts, aCourtBetweenBacksIsNotHidden) {
+  Scene scene;
+  place(scene, test::floorQuad(40, -20, -20));
+  const auto shell = [&](glm::dvec3 low, glm::dvec3 high) {
+    Primitive room = box(low, high, true);
+    room.indices.erase(room.indices.begin(), room.indices.begin() + 6);
+    place(scene, std::move(room));
+  };
+  shell({-9, 0, -9}, {9, 3, -3});
+  shell({-9, 0, 3}, {9, 3, 9});
+  shell({-9, 0, -3}, {-3, 3, 3});
+  shell({3, 0, -3}, {9, 3, 3});
+  const PatchScene patches = build(scene, 6000);
+  const auto* cut = patches.cuts.find(0);
+  ASSERT_NE(cut, nullptr);
+  EXPECT_EQ(std::ranges::count(cut->hidden, true), 0);
 }
 
 }  // namespace
