@@ -26,6 +26,7 @@ scene::Scene furnished(const glm::dvec3& stool) {
   pane.alpha = 0.5F;
   pane.double_sided = screen.double_sided = true;
   const auto add = [&](scene::Primitive primitive, const glm::dvec3& at, const scene::Material& material) {
+    primitive.posed = true;  // whole: cut by what moves, charts would get other numbers, by which rays are drawn
     scene::test::place(made, std::move(primitive), glm::translate(glm::dmat4(1.0), at), material);
   };
   const auto upright = [](double width, double height) {
