@@ -304,6 +304,7 @@ WallCuts cutAlongWalls(const Scene& scene, const FlatScene& flat, const std::vec
   const auto scale = cutScale(flat, texel);
   std::optional<WallFinder> finder;
   std::size_t work = 0, made = 0;
+  bool is_too_much = false;
   std::map<std::uint32_t, std::vector<CutFacet>> cut;  // by instance
   for (std::uint32_t f = 0; f < facets.facets.size(); ++f) {
     interruptionPoint();
@@ -323,23 +324,24 @@ WallCuts cutAlongWalls(const Scene& scene, const FlatScene& flat, const std::vec
     }
     const auto met = walls.size();
     work += (triangles.size() + met * met) * met;
-    if (work > kMostWork) break;
+    if ((is_too_much = work > kMostWork)) break;
     FacetCutter cutter(std::move(triangles), std::move(walls), own);
     const bool is_cut = cutter.cut();
     work += 4 * met * cutter.pieces().size();
     made += is_cut ? cutter.pieces().size() : 0;
-    if (made > kMostMade + flat.triangles.size()) work = kMostWork + 1;
-    if (work > kMostWork) break;
+    if ((is_too_much = work > kMostWork || made > kMostMade + flat.triangles.size())) break;
     if (is_cut) cut[instance].push_back({facet, plane, std::move(cutter)});
   }
   std::size_t copied = 0;
   for (auto& [instance, parts] : cut) {
     copied += scene.primitives[scene.instances[instance].primitive].positions.size();
-    if (copied > kMostCopied) work = kMostWork + 1;
-    if (copied > kMostCopied) break;
+    if (copied > kMostCopied) {
+      is_too_much = true;
+      break;
+    }
     cuts.add(instance, InstanceCutter(scene, flat, instance, scaleOn(flat, instance, scale).rounding).run(parts));
   }
-  if (work > kMostWork || (finder && finder->gaveUp())) cuts.leaveRestWhole();
+  if (is_too_much || (finder && finder->gaveUp())) cuts.leaveRestWhole();
   return cuts;
 }
 
