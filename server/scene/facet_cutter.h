@@ -39,6 +39,8 @@ class FacetCutter {
   /// Points on the border where a neighbour is cut: corners of the pieces there, too. Keeps regions.
   void insert(const std::vector<glm::dvec2>& points);
 
+  /// The longest, where there are too many.
+  [[nodiscard]] std::size_t wallCount() const { return all_walls_.size(); }
   [[nodiscard]] const std::vector<Piece>& pieces() const { return pieces_; }
   [[nodiscard]] const std::vector<glm::dvec2>& points() const { return points_; }
   /// Whether a wall stands on the edge between two corners, or a solid, with another region behind.

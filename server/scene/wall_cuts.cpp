@@ -322,12 +322,9 @@ WallCuts cutAlongWalls(const Scene& scene, const FlatScene& flat, const std::vec
       triangles.emplace_back();
       for (std::size_t k = 0; k < 3; ++k) triangles.back()[k] = plane.project(flat.points[flat.triangles[t].points[k]]);
     }
-    const auto met = walls.size();
-    work += (triangles.size() + met * met) * met;
-    if ((is_too_much = work > kMostWork)) break;
     FacetCutter cutter(std::move(triangles), std::move(walls), own);
     const bool is_cut = cutter.cut();
-    work += 4 * met * cutter.pieces().size();
+    work += 4 * cutter.wallCount() * cutter.pieces().size();
     made += is_cut ? cutter.pieces().size() : 0;
     if ((is_too_much = work > kMostWork || made > kMostMade + flat.triangles.size())) break;
     if (is_cut) cut[instance].push_back({facet, plane, std::move(cutter)});
