@@ -14,7 +14,7 @@ namespace {
 
 /// A building's floor meets fewer walls, and is cut in fewer pieces: what has more stays whole, since the work grows
 /// with their product.
-constexpr std::size_t kMostWalls = 256, kMostPieces = 4096;
+constexpr std::size_t kMostWalls = 1024, kMostPieces = 4096;
 /// Rounding adds up: of corners that are cut twice, and of lines through them.
 constexpr double kNear = 4.0;
 /// Light goes around a wall, and over it, that is not so many texels long and high.

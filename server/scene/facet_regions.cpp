@@ -13,7 +13,7 @@ namespace radiosity::scene {
 namespace {
 
 /// Each region is a chart, with texels of its own around it; what is hidden has but one.
-constexpr std::uint32_t kMostRegions = 64, kMostHidden = 1024;
+constexpr std::uint32_t kMostRegions = 256, kMostHidden = 1024;
 /// Pairs of pieces to be kept apart: each is asked of for each edge.
 constexpr std::size_t kMostApart = 2'000;
 /// Bilinear lookups read texels so far away, in texels.

@@ -248,7 +248,7 @@ std::size_t surfacesOf(const PatchScene& patches, std::uint32_t instance) {
 
 // Each house is a region, and what lies under each of its walls another: of more than a face may have it stays whole.
 TEST(WallCuts, anyNumberOfHousesAndWallsIsDoneWith) {
-  for (const int houses : {8, 40, 100}) {
+  for (const int houses : {8, 40, 400}) {
     Scene scene;
     place(scene, test::floorQuad(10.0 * houses, 0.0, -5.0 * houses));
     for (int i = 0; i < houses; ++i) {
@@ -259,11 +259,11 @@ TEST(WallCuts, anyNumberOfHousesAndWallsIsDoneWith) {
       place(scene, box({x + 0.2, 0, 1.8}, {x + 4, 3, 2}));
     }
     const PatchScene patches = build(scene, 6000);
-    if (houses == 8) {
-      EXPECT_EQ(surfacesOf(patches, 0), 1U + 5U * 8U) << "four walls each";
-    }
-    if (houses == 100) {
-      EXPECT_EQ(surfacesOf(patches, 0), 1U);
+    const auto regions = surfacesOf(patches, 0);
+    if (houses < 100) {
+      EXPECT_EQ(regions, 1U + 5U * static_cast<unsigned>(houses)) << "four walls each";
+    } else {
+      EXPECT_LE(regions, 256U + 1024U);
     }
   }
 }
