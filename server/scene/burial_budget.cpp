@@ -13,12 +13,11 @@ namespace {
 constexpr BurialPlaces kAll;
 /// Of a scene: places of the first look, so that there is a bound on what is held of them, and of the look beside.
 constexpr std::uint64_t kMaxPlaces = 2'000'000, kMaxBeside = 8'000'000;
-/// Hits::work: 2 or 3 s of one core. Three times what a model of 60,000 triangles takes, all of which touch. It is
-/// counted and not measured, so that a scene is the same whoever builds it, and from few leaves, so that it is also the
-/// same after an edit, when most are remembered.
+/// Hits::work: 2.5 s of one core, or 4 s where trees are larger than its cache. Three times what a model of 60,000
+/// triangles takes, all of which touch. It is counted and not measured, so that a scene is the same whoever builds it,
+/// and from few leaves, so that it is also the same after an edit, when most are remembered.
 constexpr double kMaxWork = 400e6;
-/// Of all places, where one of each leaf takes more than that; and of a place, at least.
-constexpr double kMostWorkAtAll = 2.0 * kMaxWork;
+/// Of a place at least, where one of each leaf takes more than that.
 constexpr std::uint64_t kLeastWorkOfPlace = 2'000;
 constexpr std::size_t kLeavesATry = 32, kMostTried = 128;
 /// Of all leaves, about a second of one core; and of a leaf, at least and at most.
@@ -26,7 +25,7 @@ constexpr std::size_t kMostLooks = std::size_t{1} << 27U, kLeastLooksOfLeaf = 51
 
 /// Of the work of all places; a power of two, so that after most edits it is the same.
 std::uint64_t shareOf(std::uint64_t places) {
-  const auto each = static_cast<std::uint64_t>(kMostWorkAtAll) / std::max<std::uint64_t>(1, places);
+  const auto each = static_cast<std::uint64_t>(kMaxWork) / std::max<std::uint64_t>(1, places);
   return std::clamp(std::bit_floor(each), kLeastWorkOfPlace, kMostWorkOfPlace);
 }
 
@@ -52,7 +51,7 @@ BurialPlaces affordablePlaces(std::size_t leaves, std::span<const TriedLeaf> tri
     places.many /= 2;
   }
   places.beside = places.many;
-  if (work(places.many) > kMostWorkAtAll) places.work_each = shareOf(leaves * places.few);
+  if (work(places.many) > kMaxWork) places.work_each = shareOf(leaves * places.few);
   return places;
 }
 

@@ -201,16 +201,15 @@ RADIOSITY_CLONES std::optional<double> SolidTree::follow(std::span<const SolidTr
       const auto& node = tree->nodes_[child];
       // Nearest first of all trees, or else all that a ray meets in one of them is found before the others are asked.
       const std::size_t base = depth < kSorted ? 0 : depth;
-      std::size_t lowest = depth;
       for (std::uint32_t mask = WideNodes::meet(node, ray, reach, entry); mask != 0; mask &= mask - 1) {
         const auto k = static_cast<std::size_t>(std::countr_zero(mask));
         std::size_t at = depth++;
         for (; at > base && stack[at - 1].entry < entry[k]; --at) stack[at] = stack[at - 1];
-        stack[at] = {tree, number, node.child[k], entry[k], 0.0F};
-        lowest = std::min(lowest, at);
+        stack[at] = {tree, number, node.child[k], entry[k], entry[k]};
       }
-      for (auto at = lowest; at < depth; ++at)
-        stack[at].soonest = std::min(stack[at].entry, at == 0 ? kNever : stack[at - 1].soonest);
+      // All that waits is sorted as long as the base is the ground, and then the uppermost is the soonest.
+      for (auto at = base; base > 0 && at < depth; ++at)
+        stack[at].soonest = std::min(stack[at].entry, stack[at - 1].soonest);
       continue;
     }
     const Block& block = tree->blocks_[child & ~WideNodes::kLeaf];
