@@ -70,12 +70,13 @@ void addSolveOptions(CLI::App& app, Options& o, Raw& raw) {
       ->capture_default_str();
   app.add_option(
          "--visibility", o.sight,
-         "How it is found out what a light sees: by rays, by images, or auto: by rays where the processor draws, "
-         "by images on a GPU")
+         "How it is found out what a light sees: by rays, by images, or measured: both are tried in a small room at "
+         "start-up. auto: by rays where the processor draws, on a GPU as measured")
       ->transform(CLI::CheckedTransformer(std::map<std::string, gpu::Sight>{{"auto", gpu::Sight::kAuto},
                                                                             {"rays", gpu::Sight::kRays},
-                                                                            {"images", gpu::Sight::kImages}})
-                      .description("{auto,rays,images}"))
+                                                                            {"images", gpu::Sight::kImages},
+                                                                            {"measured", gpu::Sight::kMeasured}})
+                      .description("{auto,rays,images,measured}"))
       ->default_str("auto");
   app.add_option("--sky", raw.sky,
                  "Radiance of everything outside the scene, nits: 1000, or R,G,B, or R,G,B/R,G,B (above / below the "

@@ -347,9 +347,10 @@ void addSolve(CLI::App& app, Run& run) {
           ->type_name("N");
   auto* visibility = command
                          .add_option("--visibility", options->visibility,
-                                     "how the private server finds out what a light sees: rays, images or auto "
-                                     "(default: rays where the processor draws, images on a GPU)")
-                         ->check(CLI::IsMember({"rays", "images", "auto"}).description(""))
+                                     "how the private server finds out what a light sees: rays, images, measured (both "
+                                     "are tried at start-up) or auto (default: rays where the processor draws, "
+                                     "measured on a GPU)")
+                         ->check(CLI::IsMember({"rays", "images", "measured", "auto"}).description(""))
                          ->type_name("HOW");
   auto* memory = command
                      .add_option("--link-memory", options->link_memory,

@@ -6,14 +6,20 @@
 namespace radiosity::gpu {
 
 enum class Sight : std::uint32_t {
-  kAuto,    ///< by rays where the processor draws, by images where a card does
-  kRays,    ///< a ray from each receiver to each point of a light
-  kImages,  ///< an image from each point of a light
+  kAuto,      ///< by rays where the processor draws, else as kMeasured
+  kRays,      ///< a ray from each receiver to each point of a light
+  kImages,    ///< an image from each point of a light
+  kMeasured,  ///< the faster of the two, tried at start-up (sight_trial.h)
 };
 
-/// `software`: the processor draws.
+/// Whether both ways have to be tried. `software`: the processor draws, and rays were faster in every scene.
+[[nodiscard]] inline bool wantsTrial(Sight wanted, bool software) {
+  return wanted == Sight::kMeasured || (wanted == Sight::kAuto && !software);
+}
+
+/// Without a trial.
 [[nodiscard]] inline Sight sightFor(Sight wanted, bool software) {
-  if (wanted != Sight::kAuto) return wanted;
+  if (wanted == Sight::kRays || wanted == Sight::kImages) return wanted;
   return software ? Sight::kRays : Sight::kImages;
 }
 

@@ -20,6 +20,7 @@
 #include "server/gpu/batch_chunks.h"
 #include "server/gpu/gpu_transport.h"
 #include "server/gpu/paper_ids.h"
+#include "server/gpu/sight_trial.h"
 #include "server/gpu/worker_process.h"
 
 namespace radiosity::gpu {
@@ -160,13 +161,53 @@ class WorkerTransport final : public solver::Transport {
   [[nodiscard]] std::string description() const override {
     auto text = fmt::format("{}, {} worker{}", renderer_, slots_.size(), slots_.size() == 1 ? "" : "s");
     if (hands_ > 1) text += fmt::format(" of {} threads", hands_);
-    return text + ", " + sightText(sight_);
+    text += std::string(", ") + sightText(sight_);
+    if (times_)
+      text += fmt::format(" (tried: rays {:.1f} ms, images {:.1f} ms)", 1e3 * times_->rays, 1e3 * times_->images);
+    return text;
+  }
+
+  /// Lets lights see in the way that is faster here. Before there is a scene; takes some tenths of a second. Where a
+  /// renderer fails, all stays as it was.
+  void trySights() {
+    const auto kept = sight_;
+    auto times = timeSights();
+    forgetScene();
+    if (times) {
+      times_ = *times;
+      sight_ = fasterSight(*times);
+    } else {
+      sight_ = kept;
+      log::warn("cannot try how lights see faster, so that {}: {}", sightText(sight_), times.error().text());
+    }
   }
 
  protected:
   [[nodiscard]] std::shared_ptr<const scene::PatchScene> scene() const override { return patches_; }
 
  private:
+  Result<SightTimes> timeSights() {
+    const auto trial = makeSightTrial();
+    if (!trial) return tl::unexpected(trial.error());
+    const auto timeOne = [&](Sight sight) -> Result<double> {
+      sight_ = sight;
+      if (auto set = setScene(trial->room); !set) return tl::unexpected(set.error());
+      return timeTrial(*trial, *this);
+    };
+    const auto rays = timeOne(Sight::kRays);
+    if (!rays) return tl::unexpected(rays.error());
+    const auto images = timeOne(Sight::kImages);
+    if (!images) return tl::unexpected(images.error());
+    return SightTimes{*rays, *images};
+  }
+
+  void forgetScene() {
+    has_scene_ = false;
+    patches_.reset();
+    packed_ = {};
+    nodes_ = triangles_ = 0;
+  }
+
   Result<void> carryOut(const solver::ShotBatch& batch) {
     if (!has_scene_) return fail(ErrorCode::kInternal, "setScene must come before run");
     if (std::ranges::any_of(slots_, &Slot::takes_scene))
@@ -379,8 +420,9 @@ class WorkerTransport final : public solver::Transport {
   WorkerOptions options_;
   std::vector<Slot> slots_;
   std::string renderer_;
-  std::size_t hands_;  ///< of each worker
-  Sight sight_;        ///< of all workers, and of those that replace them
+  std::size_t hands_;                ///< of each worker
+  Sight sight_;                      ///< of all workers, and of those that replace them
+  std::optional<SightTimes> times_;  ///< where both were tried
   FileDescriptor wake_;
   std::atomic<bool> interrupted_{false};
   std::shared_ptr<const scene::PatchScene> patches_;
@@ -453,7 +495,10 @@ Result<std::unique_ptr<solver::Transport>> makeWorkerTransport(const WorkerOptio
   if (wake.get() < 0) return fail(ErrorCode::kUnavailable, "cannot make an event descriptor: too many are open");
   auto slots = startWorkers(chosen, static_cast<std::size_t>(count));
   if (!slots) return tl::unexpected(slots.error());
-  return std::make_unique<WorkerTransport>(std::move(chosen), std::move(*slots), std::move(wake));
+  const bool tries = wantsTrial(chosen.sight, slots->front().process->software());
+  auto transport = std::make_unique<WorkerTransport>(std::move(chosen), std::move(*slots), std::move(wake));
+  if (tries) transport->trySights();
+  return transport;
 }
 
 }  // namespace radiosity::gpu

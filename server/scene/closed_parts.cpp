@@ -17,6 +17,11 @@ constexpr float kMargin = 1e-5F;
 /// Of eight boxes or parts, in units of Hits::work.
 constexpr std::uint64_t kLookWork = 4;
 
+/// 1 or 0: bits of a number, so that neither compiler makes a branch of them.
+constexpr std::uint32_t isWithin(float low, float value, float high) {
+  return static_cast<std::uint32_t>(low <= value) & static_cast<std::uint32_t>(value <= high);
+}
+
 }  // namespace
 
 ClosedParts::Part::Part(std::uint32_t of, std::span<const Bvh::Triangle> triangles)
@@ -67,10 +72,10 @@ __attribute__((always_inline)) inline std::uint32_t ClosedParts::holding(const B
   std::uint32_t bits[WideNodes::kWidth];
   for (std::size_t k = 0; k < WideNodes::kWidth; ++k) {
     const float height = block.normal[0][k] * place.x + block.normal[1][k] * place.y + block.normal[2][k] * place.z;
-    const bool may = (block.low[0][k] <= place.x) & (place.x <= block.high[0][k]) & (block.low[1][k] <= place.y) &
-                     (place.y <= block.high[1][k]) & (block.low[2][k] <= place.z) & (place.z <= block.high[2][k]) &
-                     (block.lowest[k] <= height) & (height <= block.highest[k]);
-    bits[k] = may ? 1U << k : 0U;
+    const auto may =
+        isWithin(block.low[0][k], place.x, block.high[0][k]) & isWithin(block.low[1][k], place.y, block.high[1][k]) &
+        isWithin(block.low[2][k], place.z, block.high[2][k]) & isWithin(block.lowest[k], height, block.highest[k]);
+    bits[k] = may << k;
   }
   std::uint32_t mask = 0;
   for (std::size_t k = 0; k < WideNodes::kWidth; ++k) mask |= bits[k];
@@ -81,9 +86,10 @@ __attribute__((always_inline)) inline std::uint32_t ClosedParts::holding(const W
                                                                          const glm::vec3& place) {
   std::uint32_t bits[WideNodes::kWidth];
   for (std::size_t k = 0; k < WideNodes::kWidth; ++k) {
-    const bool may = (node.plane[0][k] <= place.x) & (place.x <= node.plane[3][k]) & (node.plane[1][k] <= place.y) &
-                     (place.y <= node.plane[4][k]) & (node.plane[2][k] <= place.z) & (place.z <= node.plane[5][k]);
-    bits[k] = may ? 1U << k : 0U;
+    const auto may = isWithin(node.plane[0][k], place.x, node.plane[3][k]) &
+                     isWithin(node.plane[1][k], place.y, node.plane[4][k]) &
+                     isWithin(node.plane[2][k], place.z, node.plane[5][k]);
+    bits[k] = may << k;
   }
   std::uint32_t mask = 0;
   for (std::size_t k = 0; k < WideNodes::kWidth; ++k) mask |= bits[k];
