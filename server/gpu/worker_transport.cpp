@@ -10,7 +10,6 @@
 #include <algorithm>
 #include <atomic>
 #include <deque>
-#include <filesystem>
 #include <optional>
 #include <thread>
 #include <utility>
@@ -22,6 +21,7 @@
 #include "server/gpu/paper_ids.h"
 #include "server/gpu/sight_trial.h"
 #include "server/gpu/worker_process.h"
+#include "server/gpu/worker_start.h"
 
 namespace radiosity::gpu {
 namespace {
@@ -30,8 +30,6 @@ namespace {
 constexpr std::size_t kChunksAhead = 2;
 /// Deaths of workers in one call after which it gives up.
 constexpr int kMaxDeaths = 5;
-/// A cold driver compiles its shaders, perhaps on a busy machine.
-constexpr auto kStartPatience = std::chrono::seconds(60);
 /// WorkerOptions::patience, for each pixel.
 constexpr double kSlowPixelSeconds = 2e-6;
 /// Of the time that a late worker is given again it must have used this part: one that is stopped, or waits for ever,
@@ -64,9 +62,9 @@ struct Slot {
 
 class WorkerTransport final : public solver::Transport {
  public:
-  WorkerTransport(WorkerOptions options, std::vector<Slot> slots, FileDescriptor wake)
+  WorkerTransport(WorkerOptions options, std::vector<WorkerProcess> workers, FileDescriptor wake)
       : options_(std::move(options)),
-        slots_(std::move(slots)),
+        slots_(slotsOf(std::move(workers))),
         renderer_(slots_.front().process->renderer()),
         hands_(options_.hands > 0 ? options_.hands : handsFor(slots_.front().process->software(), slots_.size())),
         sight_(sightFor(options_.sight, slots_.front().process->software())),
@@ -186,19 +184,24 @@ class WorkerTransport final : public solver::Transport {
   [[nodiscard]] std::shared_ptr<const scene::PatchScene> scene() const override { return patches_; }
 
  private:
+  static std::vector<Slot> slotsOf(std::vector<WorkerProcess> workers) {
+    std::vector<Slot> slots;
+    for (auto& worker : workers) slots.emplace_back().process = std::move(worker);
+    return slots;
+  }
+
   Result<SightTimes> timeSights() {
     const auto trial = makeSightTrial();
     if (!trial) return tl::unexpected(trial.error());
-    const auto timeOne = [&](Sight sight) -> Result<double> {
+    SightTimes times;
+    for (auto& [sight, seconds] : {std::pair(Sight::kRays, &times.rays), std::pair(Sight::kImages, &times.images)}) {
       sight_ = sight;
       if (auto set = setScene(trial->room); !set) return tl::unexpected(set.error());
-      return timeTrial(*trial, *this);
-    };
-    const auto rays = timeOne(Sight::kRays);
-    if (!rays) return tl::unexpected(rays.error());
-    const auto images = timeOne(Sight::kImages);
-    if (!images) return tl::unexpected(images.error());
-    return SightTimes{*rays, *images};
+      const auto taken = timeTrial(*trial, *this);
+      if (!taken) return tl::unexpected(taken.error());
+      *seconds = *taken;
+    }
+    return times;
   }
 
   void forgetScene() {
@@ -442,44 +445,6 @@ class WorkerTransport final : public solver::Transport {
   std::string last_death_;
 };
 
-/// Whether there may be a card: where it is not found the first worker tells, and all others were started in vain.
-bool mayHaveCard() {
-  std::error_code ignored;
-  for (const auto* device : {"/dev/dri", "/dev/nvidiactl", "/dev/dxg"}) {
-    if (std::filesystem::exists(device, ignored)) return true;
-  }
-  return false;
-}
-
-/// Adds workers until there are `count`; all start at the same time.
-Result<void> addWorkers(const WorkerOptions& options, std::size_t count, std::vector<Slot>& slots) {
-  const auto first = slots.size();
-  while (slots.size() < count) {
-    auto process = WorkerProcess::start(options.executable);
-    if (!process) return tl::unexpected(process.error());
-    slots.emplace_back().process = std::move(*process);
-  }
-  for (auto i = first; i < slots.size(); ++i) {
-    const Patience patience{Clock::now() + kStartPatience, -1};
-    if (auto ready = slots[i].process->awaitReady(patience); !ready) return tl::unexpected(ready.error());
-  }
-  return {};
-}
-
-/// One context keeps a card busy; several only take turns, and a second each to start. So the others wait until the
-/// first one tells what draws.
-Result<std::vector<Slot>> startWorkers(const WorkerOptions& options, std::size_t count) {
-  std::vector<Slot> slots;
-  const bool asks = options.workers == 0 && mayHaveCard();
-  if (auto added = addWorkers(options, asks ? 1 : count, slots); !added) return tl::unexpected(added.error());
-  if (options.workers == 0 && !slots.front().process->software()) {
-    slots.erase(slots.begin() + 1, slots.end());
-  } else if (auto added = addWorkers(options, count, slots); !added) {
-    return tl::unexpected(added.error());
-  }
-  return slots;
-}
-
 }  // namespace
 
 Result<std::unique_ptr<solver::Transport>> makeWorkerTransport(const WorkerOptions& options) {
@@ -493,10 +458,10 @@ Result<std::unique_ptr<solver::Transport>> makeWorkerTransport(const WorkerOptio
   if (chosen.executable.empty()) chosen.executable = "/proc/self/exe";
   FileDescriptor wake(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
   if (wake.get() < 0) return fail(ErrorCode::kUnavailable, "cannot make an event descriptor: too many are open");
-  auto slots = startWorkers(chosen, static_cast<std::size_t>(count));
-  if (!slots) return tl::unexpected(slots.error());
-  const bool tries = wantsTrial(chosen.sight, slots->front().process->software());
-  auto transport = std::make_unique<WorkerTransport>(std::move(chosen), std::move(*slots), std::move(wake));
+  auto workers = startWorkers(chosen.executable, static_cast<std::size_t>(count), options.workers == 0);
+  if (!workers) return tl::unexpected(workers.error());
+  const bool tries = wantsTrial(chosen.sight, workers->front().software());
+  auto transport = std::make_unique<WorkerTransport>(std::move(chosen), std::move(*workers), std::move(wake));
   if (tries) transport->trySights();
   return transport;
 }
