@@ -15,6 +15,7 @@
 #include "server/gpu/gpu_transport.h"
 #include "server/net/server.h"
 #include "server/options.h"
+#include "server/scene/trial_room.h"
 #include "server/service_notify.h"
 #include "server/state/store.h"
 #include "server/state/uploads.h"
@@ -90,7 +91,8 @@ int serve(Options options) {
   engine_options.first_texels = options.first_texels;
   engine_options.max_scene_bytes = options.max_scene_bytes;
   engine_options.make_transport = [workers = options.workers, sight = options.sight] {
-    return gpu::makeWorkerTransport({.workers = workers, .executable = "/proc/self/exe", .sight = sight});
+    return gpu::makeWorkerTransport(
+        {.workers = workers, .executable = "/proc/self/exe", .sight = sight, .make_trial_room = scene::makeTrialRoom});
   };
   const auto engine = engine::makeEngine(std::move(engine_options));
   if (!engine) return report(engine.error());

@@ -1,8 +1,6 @@
-// Which way of finding out what lights see is faster on a machine: both are tried on a furnished room of the program's
-// own, before there is a scene.
+// Which way of finding out what lights see is faster on a machine: both are tried on a furnished room
+// (scene/charts/trial_room.h), before there is a scene.
 #pragma once
-
-#include <memory>
 
 #include "common/result.h"
 #include "server/gpu/sight.h"
@@ -11,18 +9,11 @@
 
 namespace radiosity::gpu {
 
-/// A room of about 3,000 triangles and 8,000 texels, and lamps below its ceiling that look at all of it. The same on
-/// every machine.
-struct SightTrial {
-  std::shared_ptr<const scene::PatchScene> room;
-  solver::ShotBatch batch;
-};
+/// Four lamps below the ceiling of a room, which look at all of it from eight points each.
+[[nodiscard]] solver::ShotBatch trialBatch(const scene::PatchScene& room);
 
-/// Takes some 50 ms.
-[[nodiscard]] Result<SightTrial> makeSightTrial();
-
-/// Seconds that the batch takes, the shortest of a few times. The transport's scene is the trial's room.
-[[nodiscard]] Result<double> timeTrial(const SightTrial& trial, solver::Transport& transport);
+/// Seconds that the batch takes, the shorter of two times. The transport's scene is the room.
+[[nodiscard]] Result<double> timeTrial(const solver::ShotBatch& batch, solver::Transport& transport);
 
 /// What trials of both ways took, seconds.
 struct SightTimes {

@@ -191,13 +191,14 @@ class WorkerTransport final : public solver::Transport {
   }
 
   Result<SightTimes> timeSights() {
-    const auto trial = makeSightTrial();
-    if (!trial) return tl::unexpected(trial.error());
+    const auto room = options_.make_trial_room();
+    if (!room) return tl::unexpected(room.error());
+    const auto batch = trialBatch(**room);
     SightTimes times;
     for (auto& [sight, seconds] : {std::pair(Sight::kRays, &times.rays), std::pair(Sight::kImages, &times.images)}) {
       sight_ = sight;
-      if (auto set = setScene(trial->room); !set) return tl::unexpected(set.error());
-      const auto taken = timeTrial(*trial, *this);
+      if (auto set = setScene(*room); !set) return tl::unexpected(set.error());
+      const auto taken = timeTrial(batch, *this);
       if (!taken) return tl::unexpected(taken.error());
       *seconds = *taken;
     }
@@ -460,7 +461,7 @@ Result<std::unique_ptr<solver::Transport>> makeWorkerTransport(const WorkerOptio
   if (wake.get() < 0) return fail(ErrorCode::kUnavailable, "cannot make an event descriptor: too many are open");
   auto workers = startWorkers(chosen.executable, static_cast<std::size_t>(count), options.workers == 0);
   if (!workers) return tl::unexpected(workers.error());
-  const bool tries = wantsTrial(chosen.sight, workers->front().software());
+  const bool tries = chosen.make_trial_room && wantsTrial(chosen.sight, workers->front().software());
   auto transport = std::make_unique<WorkerTransport>(std::move(chosen), std::move(*workers), std::move(wake));
   if (tries) transport->trySights();
   return transport;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "server/gpu/gpu_transport.h"
+#include "server/scene/trial_room.h"
 #include "tests/gl/mixed_batch.h"
 #include "tests/gl/scene_builder.h"
 
@@ -13,7 +14,8 @@ namespace {
 using gpu::Sight;
 
 Result<std::unique_ptr<solver::Transport>> workersThat(Sight sight) {
-  return gpu::makeWorkerTransport({.workers = 1, .executable = RADIOSITY_GL_WORKER, .sight = sight});
+  return gpu::makeWorkerTransport(
+      {.workers = 1, .executable = RADIOSITY_GL_WORKER, .sight = sight, .make_trial_room = scene::makeTrialRoom});
 }
 
 TEST(SightTrial, ImagesMustBeClearlyFaster) {
@@ -32,26 +34,26 @@ TEST(SightTrial, IsMadeWhereACardDrawsOrItIsAskedFor) {
 
 // Both ways bring the same light to the furnished room, so that what is timed is the same work.
 TEST(SightTrial, BothWaysLightTheRoomAlike) {
-  const auto trial = gpu::makeSightTrial();
-  ASSERT_TRUE(trial) << trial.error().text();
-  EXPECT_GT(trial->room->triangles.size(), 2'500U);
-  EXPECT_GT(trial->room->leaves.size(), 4'000U);
+  const auto room = scene::makeTrialRoom();
+  ASSERT_TRUE(room) << room.error().text();
+  const auto batch = gpu::trialBatch(**room);
+  EXPECT_GT((*room)->triangles.size(), 2'500U);
+  EXPECT_GT((*room)->leaves.size(), 4'000U);
   std::array<double, 2> sum{};
   for (const auto sight : {Sight::kRays, Sight::kImages}) {
     auto transport = gpu::makeInProcessTransport(0, std::nullopt, sight);
     if (!transport) GTEST_SKIP() << transport.error().text();
-    ASSERT_TRUE((*transport)->setScene(trial->room));
-    const auto measured = (*transport)->measure(trial->batch, [&](std::size_t, const solver::LinkSample& links) {
+    ASSERT_TRUE((*transport)->setScene(*room));
+    const auto measured = (*transport)->measure(batch, [&](std::size_t, const solver::LinkSample& links) {
       std::size_t i = 0;
       for (const auto& run : links.runs)
         for (std::uint32_t node = run.first_node; node < run.first_node + run.count; ++node)
-          sum[sight == Sight::kRays ? 0 : 1] +=
-              static_cast<double>(links.irradiance[i++]) * trial->room->node_area[node];
+          sum[sight == Sight::kRays ? 0 : 1] += static_cast<double>(links.irradiance[i++]) * (*room)->node_area[node];
     });
     ASSERT_TRUE(measured) << measured.error().text();
   }
   // Four lamps of radiosity one send their area, of which little falls on backs.
-  const auto box = solver::sceneBox(*trial->room);
+  const auto box = solver::sceneBox(**room);
   const double side = 0.4 / 6.0 * (box[1].x - box[0].x);
   EXPECT_NEAR(sum[0], 4.0 * side * side, 0.03 * 4.0 * side * side);
   EXPECT_NEAR(sum[1], sum[0], 0.01 * sum[0]);
