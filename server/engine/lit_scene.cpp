@@ -8,8 +8,11 @@
 #include "common/give_back.h"
 #include "common/task.h"
 #include "server/engine/carried_light.h"
+#include "server/scene/build.h"
 #include "server/scene/burial_record.h"
 #include "server/scene/emitters.h"
+#include "server/scene/shade.h"
+#include "server/solver/make_solver.h"
 
 namespace radiosity::engine {
 namespace {

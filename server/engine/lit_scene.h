@@ -13,11 +13,13 @@
 #include "server/engine/engine.h"
 #include "server/engine/light_report.h"
 #include "server/engine/scene_change.h"
+#include "server/scene/build.h"
 #include "server/scene/document.h"
 #include "server/scene/lightmap.h"
 #include "server/scene/lineage.h"
 #include "server/scene/lit_sides.h"
 #include "server/scene/patch_scene.h"
+#include "server/solver/make_solver.h"
 #include "server/solver/solver.h"
 
 namespace radiosity::scene {

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "server/engine/memory.h"
+#include "server/scene/build.h"
 
 namespace radiosity::engine {
 namespace {

@@ -15,6 +15,7 @@
 #include "common/check.h"
 #include "common/memory_limit.h"
 #include "common/task.h"
+#include "server/scene/build.h"
 #include "server/scene/lit_sides.h"
 #include "server/scene/page_space.h"
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/result.h"
+#include "server/scene/build.h"
 #include "server/scene/charts.h"
 
 namespace radiosity::scene {

@@ -12,9 +12,7 @@
 #include "server/scene/bounds.h"
 #include "server/scene/burial_budget.h"
 #include "server/scene/coverage.h"
-#include "server/scene/lit_sides.h"
 #include "server/scene/patch_scene.h"
-#include "server/scene/shading_normals.h"
 
 namespace radiosity::scene {
 
@@ -130,19 +128,5 @@ class FormerBurial {
   std::vector<ChangedBox> around_;  ///< one around all of these: most rays miss it
   std::vector<ChangedBox> parts_;   ///< as boxes_, each surface by itself; empty: too many
 };
-
-/// As buildPatchScene(), and how burial was found, for edits. `record`: that of the former scene, if it was kept: what
-/// is built is the same without it, later.
-struct BuiltScene {
-  PatchScene patches;
-  std::shared_ptr<const BurialRecord> burial;  ///< null: not kept
-  std::shared_ptr<const ShadingNormals> normals;
-};
-[[nodiscard]] Result<BuiltScene> buildWithRecord(const Scene& scene, const ChartOptions& options,
-                                                 const FormerScene* former = nullptr,
-                                                 const BurialRecord* record = nullptr);
-/// As the scene was built once, whatever its lamps were then. `sides`: sidesOf() it; kBadInput where it cannot have had
-/// them.
-[[nodiscard]] Result<BuiltScene> buildAgain(const Scene& scene, const ChartOptions& options, const SideBits& sides);
 
 }  // namespace radiosity::scene

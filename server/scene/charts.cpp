@@ -12,6 +12,7 @@
 
 #include "common/parallel.h"
 #include "server/scene/atlas.h"
+#include "server/scene/build.h"
 #include "server/scene/burial_record.h"
 #include "server/scene/coverage.h"
 #include "server/scene/emitters.h"
@@ -19,6 +20,8 @@
 #include "server/scene/lit_sides.h"
 #include "server/scene/material_of.h"
 #include "server/scene/opacity.h"
+#include "server/scene/solid_finder.h"
+#include "server/scene/wall_cutter.h"
 
 namespace radiosity::scene {
 namespace {

@@ -1,7 +1,7 @@
 // How a scene becomes patches (buildPatchScene, patch_scene.h). Plain values, any thread; used only inside this folder.
 //
 //   flatten.h    instances -> welded triangles in the unit box, degenerate ones dropped and counted
-//   wall_cuts.h  flat faces cut along the walls that stand on them, so that no texel lies in two rooms
+//   wall_cutter.h  flat faces cut along the walls that stand on them, so that no texel lies in two rooms
 //                  wall_finder.h       where walls meet a face
 //                  facet_cutter.h      the face cut there into convex pieces
 //                  facet_regions.h     which of these hang together
@@ -32,6 +32,7 @@
 #include <vector>
 
 #include "common/result.h"
+#include "server/scene/build.h"
 #include "server/scene/flatten.h"
 #include "server/scene/lit_sides.h"
 #include "server/scene/patch_scene.h"
@@ -70,15 +71,6 @@ struct Facets {
 /// Triangles for which `wanted` holds; the others get facet kNone.
 [[nodiscard]] Facets findFacets(const FlatScene& flat, const std::vector<std::uint32_t>& neighbours,
                                 const std::vector<bool>& wanted);
-
-/// Cuts flat faces along walls that part them, or stand far into them, wherever a texel (of edge `texel`, unit box)
-/// would have light of both sides. `flat`: of whole primitives; `neighbours`,
-/// `facets`: its own; `kept`: by instance, such as stay
-/// whole. So does what is see-through or posed. O(n log n), and bounded in time and in what it makes: faces that meet
-/// more walls than a building has stay whole.
-[[nodiscard]] WallCuts cutAlongWalls(const Scene& scene, const FlatScene& flat,
-                                     const std::vector<std::uint32_t>& neighbours, const Facets& facets, double texel,
-                                     const std::vector<bool>& kept);
 
 /// Groups facets that are narrower than `planar_side` (unit box) with smooth neighbours; each list is one chart's
 /// facets. Normals within `angle_deg` of the group's mean; up to 45 degrees while the group is smaller than

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "server/scene/build.h"
 #include "server/scene/charts.h"
 #include "server/scene/emitters.h"
 #include "server/scene/lit_sides.h"

@@ -11,6 +11,7 @@
 
 #include "common/task.h"
 #include "server/scene/atlas.h"
+#include "server/scene/build.h"
 #include "server/scene/charts.h"
 #include "server/scene/triangle_rows.h"
 

@@ -1,7 +1,7 @@
-// Finds the closed solids of a scene: connected triangles in which every edge is shared by exactly two, running
+// The closed solids of a scene: connected triangles in which every edge is shared by exactly two, running
 // opposite ways, which nowhere cross each other, and which enclose a positive volume. From outside such a solid its
 // back faces can never be seen, so they need not be drawn, and of the rays that start there all that enter it leave it,
-// so that it buries nothing. Pure functions of values.
+// so that it buries nothing. A plain value.
 #pragma once
 
 #include <cstdint>
@@ -9,8 +9,6 @@
 #include <vector>
 
 namespace radiosity::scene {
-
-struct PatchScene;
 
 struct ClosedSolids {
   struct Bounds {
@@ -23,9 +21,5 @@ struct ClosedSolids {
   std::vector<std::uint32_t> hollow_of;
   std::vector<Bounds> hollows;
 };
-
-/// Of vertices, triangles and what one can see through alone. Corners belong together when their positions are equal,
-/// bit by bit.
-[[nodiscard]] ClosedSolids findClosedSolids(const PatchScene& patches);
 
 }  // namespace radiosity::scene

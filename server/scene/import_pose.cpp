@@ -14,6 +14,7 @@
 #include "common/task.h"
 #include "server/scene/accessor.h"
 #include "server/scene/node_transform.h"
+#include "server/scene/normal_matrix.h"
 
 namespace radiosity::scene {
 namespace {

@@ -1,6 +1,7 @@
 #include <cmath>
 #include <limits>
 
+#include "server/scene/build.h"
 #include "server/scene/flatten.h"
 #include "server/scene/patch_scene.h"
 

@@ -21,8 +21,4 @@ namespace radiosity::scene {
 /// Turns nothing where these have no direction.
 [[nodiscard]] glm::dmat4 cameraPose(const glm::dmat4& parent, const tinygltf::Node& node);
 
-/// Turns normals as `m` turns the planes that they stand on, but for their length: its inverse transpose without a
-/// division by its determinant, so that it holds for what is flat and for any scale. Its largest element is 1.
-[[nodiscard]] glm::dmat3 normalMatrix(const glm::dmat4& m);
-
 }  // namespace radiosity::scene

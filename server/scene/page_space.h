@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "server/scene/build.h"
 #include "server/scene/patch_scene.h"
 
 namespace radiosity::scene {

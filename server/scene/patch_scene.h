@@ -246,47 +246,10 @@ struct PatchMap {
 /// Boxes that are hardly larger together than apart become one, and others until there are 16 at most.
 void joinBoxes(std::vector<ChangedBox>& boxes);
 
-struct ChartOptions {
-  std::uint64_t texel_budget = 24'000;  ///< leaf patches in all, about; used when texel_size_m is 0
-  double texel_size_m = 0.0;
-  std::uint32_t max_page_size = 4096;
-  std::uint32_t gutter = 2;       ///< empty texels between charts
-  Sky sky;                        ///< of a scene that names none
-  double curve_angle_deg = 15.0;  ///< normal spread of a curved chart
-};
-
-/// A scene as it was before an edit. Refers to its parts.
-struct FormerScene {
-  const Scene& scene;
-  const PatchScene& patches;
-};
-
-inline constexpr std::uint64_t kMaxLeaves = std::uint64_t{1} << 28;  ///< some 6 GiB of patches
-
-/// How many leaves a scene will have, about. O(triangles).
-[[nodiscard]] std::uint64_t expectedLeaves(const Scene& scene, const ChartOptions& options);
-
-/// Flattens instances, drops degenerate triangles (counted), makes charts or takes a valid TEXCOORD_1, packs pages,
-/// measures coverage and burial. kTooLarge when a limit of leaves (2^28) or pages (1024) is passed.
-///
-/// With a `former` self, unit box, texel size and the places of charts on pages stay as they were, so that whatever the
-/// edit left alone is the same, bit by bit. Other charts get what is free on the pages, or pages of their own. When the
-/// unit box or the texel size no longer suit the scene (half as large, or half as large again; a quarter too fine or
-/// too coarse), all is made anew; when less than half of the pages is in use, places are.
-[[nodiscard]] Result<PatchScene> buildPatchScene(const Scene& scene, const ChartOptions& options,
-                                                 const FormerScene* former = nullptr);
-
-/// Emission (exitance E = pi L_e, lm/m^2) and reflectance of every node: leaves integrated over textures and vertex
-/// colours (16 samples a leaf), parents area-weighted means. Reflectance is clamped to 0.999.
+/// Emission (exitance E = pi L_e, lm/m^2) and reflectance of every node (shadePatches).
 struct PatchMaterials {
   SideColours emission;
   SideColours reflectance;
   std::vector<std::string> warnings;
 };
-[[nodiscard]] PatchMaterials shadePatches(const Scene& scene, const PatchScene& patches);
-
-/// Recomputes the nodes of the surfaces that use `material`; returns those surfaces.
-std::vector<std::uint32_t> reshadeMaterial(const Scene& scene, const PatchScene& patches, std::uint32_t material,
-                                           PatchMaterials& materials);
-
 }  // namespace radiosity::scene

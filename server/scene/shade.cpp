@@ -14,6 +14,7 @@
 #include "server/scene/chart_corners.h"
 #include "server/scene/material_of.h"
 #include "server/scene/patch_scene.h"
+#include "server/scene/shade.h"
 #include "server/scene/shade_layers.h"
 #include "server/scene/triangle_rows.h"
 

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <utility>
 
+#include "server/scene/build.h"
 #include "server/scene/scene.h"
 
 namespace radiosity::scene {

@@ -12,7 +12,7 @@
 #include "server/scene/patch_scene.h"
 #include "server/scene/shading_normals.h"
 #include "server/solver/error_parts.h"
-#include "server/solver/planner.h"
+#include "server/solver/planner_settings.h"
 #include "server/solver/punctual_lights.h"
 #include "server/solver/transport.h"
 
@@ -165,14 +165,5 @@ struct FormerSolver {
   const scene::PatchMap& map;
   bool keep = false;  ///< it stays what it is; else it gives up what it remembers and is of no use afterwards
 };
-
-/// With a former solver of the same settings: the links that the edit left alone stay, others are measured again with
-/// the next steps. `normals`: that light is told for; it is carried by geometric ones, which error() is about. Where
-/// links are forgotten it is told for these, too.
-[[nodiscard]] std::unique_ptr<Solver> makeSolver(std::shared_ptr<const scene::PatchScene> patches,
-                                                 const scene::PatchMaterials& materials, Transport& transport,
-                                                 const SolverSettings& settings, const LightSources& sources = {},
-                                                 const FormerSolver* former = nullptr,
-                                                 std::shared_ptr<const scene::ShadingNormals> normals = nullptr);
 
 }  // namespace radiosity::solver

@@ -11,7 +11,9 @@
 #include <thread>
 
 #include "server/gpu/gpu_transport.h"
+#include "server/scene/build.h"
 #include "server/scene/document.h"
+#include "server/scene/shade.h"
 #include "tests/gl/scene_builder.h"
 #include "tests/unit/scene/shapes.h"
 

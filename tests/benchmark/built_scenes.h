@@ -8,6 +8,7 @@
 #include <memory>
 #include <vector>
 
+#include "server/scene/build.h"
 #include "server/scene/patch_scene.h"
 #include "server/solver/transport.h"
 

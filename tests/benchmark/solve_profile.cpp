@@ -18,9 +18,12 @@
 
 #include "common/freed_memory.h"
 #include "server/gpu/gpu_transport.h"
+#include "server/scene/build.h"
 #include "server/scene/document.h"
 #include "server/scene/patch_scene.h"
+#include "server/scene/shade.h"
 #include "server/solver/linked_solver.h"
+#include "server/solver/make_solver.h"
 #include "server/solver/outlines.h"
 #include "server/solver/shooting_solver.h"
 #include "server/solver/solver.h"

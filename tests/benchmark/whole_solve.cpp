@@ -2,6 +2,8 @@
 
 #include <chrono>
 
+#include "server/solver/make_solver.h"
+
 namespace radiosity::benchmarks {
 namespace {
 

@@ -1,4 +1,5 @@
 // A scene file: read, checked and imported, or refused; small ones also charted.
+#include "server/scene/build.h"
 #include "server/scene/document.h"
 #include "server/scene/patch_scene.h"
 #include "tests/fuzz/target.h"

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <span>
 
+#include "server/scene/build.h"
 #include "server/scene/coverage.h"
 #include "server/solver/polygon_form_factor.h"
 #include "tests/gl/gather_fixture.h"

@@ -14,8 +14,10 @@
 #include <vector>
 
 #include "server/gpu/gpu_transport.h"
+#include "server/scene/build.h"
 #include "server/scene/document.h"
 #include "server/scene/lineage.h"
+#include "server/scene/shade.h"
 #include "server/solver/linked_solver.h"
 #include "tests/scenes/glb_writer.h"
 #include "tests/scenes/scenes.h"

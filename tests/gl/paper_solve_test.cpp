@@ -5,8 +5,10 @@
 #include <memory>
 
 #include "server/gpu/gpu_transport.h"
+#include "server/scene/build.h"
 #include "server/scene/document.h"
 #include "server/scene/patch_scene.h"
+#include "server/scene/shade.h"
 #include "server/solver/shooting_solver.h"
 
 namespace radiosity {

@@ -10,6 +10,7 @@
 #include <set>
 
 #include "server/scene/closed_solids.h"
+#include "server/scene/solid_finder.h"
 #include "tests/gl/scene_builder.h"
 
 namespace radiosity::test {

@@ -6,6 +6,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/vector_relational.hpp>
 
+#include "server/scene/build.h"
 #include "tests/unit/scene/shapes.h"
 
 namespace radiosity::gpu {

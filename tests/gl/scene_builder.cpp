@@ -6,6 +6,8 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "server/scene/solid_finder.h"
+
 namespace radiosity::test {
 
 std::uint32_t SceneBuilder::add(const Quad& quad) {

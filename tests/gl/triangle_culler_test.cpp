@@ -12,6 +12,7 @@
 
 #include "server/gpu/hemicube_renderer.h"
 #include "server/scene/closed_solids.h"
+#include "server/scene/solid_finder.h"
 #include "tests/gl/scene_builder.h"
 
 namespace radiosity::test {

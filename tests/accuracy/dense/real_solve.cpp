@@ -9,8 +9,11 @@
 #include <tuple>
 
 #include "server/gpu/gpu_transport.h"
+#include "server/scene/build.h"
 #include "server/scene/document.h"
 #include "server/scene/patch_scene.h"
+#include "server/scene/shade.h"
+#include "server/solver/make_solver.h"
 #include "tests/scenes/glb_writer.h"
 
 namespace radiosity::accuracy {

@@ -9,7 +9,10 @@
 #include <string>
 
 #include "server/gpu/gpu_transport.h"
+#include "server/scene/build.h"
 #include "server/scene/document.h"
+#include "server/scene/shade.h"
+#include "server/solver/make_solver.h"
 #include "tests/scenes/glb_writer.h"
 #include "tests/scenes/shapes.h"
 

@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "server/scene/build.h"
 #include "server/scene/patch_scene.h"
 #include "server/scene/scene.h"
 #include "server/solver/solver.h"

@@ -9,7 +9,9 @@
 
 #include "common/parallel.h"
 #include "server/geometry/ray_scene.h"
+#include "server/scene/build.h"
 #include "server/scene/document.h"
+#include "server/scene/shade.h"
 #include "server/solver/sampling.h"
 #include "tests/gl/scene_builder.h"
 

@@ -9,6 +9,7 @@
 #include <glm/gtc/matrix_inverse.hpp>
 
 #include "server/engine/exports.h"
+#include "server/scene/build.h"
 
 namespace radiosity::engine {
 namespace {

@@ -12,9 +12,12 @@
 #include <random>
 
 #include "server/engine/scene_change.h"
+#include "server/scene/build.h"
 #include "server/scene/document.h"
 #include "server/scene/lightmap.h"
 #include "server/scene/patch_scene.h"
+#include "server/scene/shade.h"
+#include "server/solver/make_solver.h"
 #include "server/solver/solver.h"
 #include "tests/scenes/glb_writer.h"
 #include "tests/scenes/scenes.h"

@@ -9,6 +9,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <random>
 
+#include "server/scene/build.h"
 #include "server/scene/lineage.h"
 
 namespace radiosity::scene {

@@ -7,8 +7,10 @@
 #include <fstream>
 #include <iterator>
 
+#include "server/scene/build.h"
 #include "server/scene/document.h"
 #include "server/scene/patch_scene.h"
+#include "server/scene/shade.h"
 
 namespace radiosity::scene {
 namespace {

@@ -5,6 +5,7 @@
 #include <numeric>
 #include <random>
 
+#include "server/scene/build.h"
 #include "server/scene/patch_scene.h"
 #include "tests/unit/scene/shapes.h"
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "server/scene/build.h"
 #include "server/scene/lightmap.h"
 #include "tests/unit/scene/shapes.h"
 

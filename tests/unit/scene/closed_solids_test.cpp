@@ -9,6 +9,7 @@
 
 #include "server/scene/patch_scene.h"
 #include "server/scene/self_crossing.h"
+#include "server/scene/solid_finder.h"
 
 namespace radiosity::test {
 namespace {

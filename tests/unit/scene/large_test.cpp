@@ -5,7 +5,9 @@
 #include <chrono>
 #include <cstdio>
 
+#include "server/scene/build.h"
 #include "server/scene/lightmap.h"
+#include "server/scene/shade.h"
 #include "tests/unit/scene/shapes.h"
 
 namespace radiosity::scene::test {

@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <vector>
 
+#include "server/scene/build.h"
 #include "server/scene/patch_scene.h"
 #include "tests/unit/scene/shapes.h"
 

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "server/scene/build.h"
+
 namespace radiosity::scene {
 namespace {
 

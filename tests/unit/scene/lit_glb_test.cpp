@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "server/scene/build.h"
 #include "server/scene/lightmap.h"
 #include "server/scene/lit_glb_rules.h"
 #include "tests/unit/scene/gltf_builder.h"

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "server/scene/build.h"
 #include "server/scene/burial_record.h"
 #include "server/scene/lightmap.h"
 #include "tests/unit/scene/built_scene.h"

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "server/scene/build.h"
 #include "tests/unit/scene/shapes.h"
 
 namespace radiosity::scene::test {

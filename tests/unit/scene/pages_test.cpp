@@ -3,6 +3,7 @@
 
 #include <functional>
 
+#include "server/scene/build.h"
 #include "server/scene/lightmap.h"
 #include "tests/unit/scene/shapes.h"
 

@@ -5,8 +5,10 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "server/scene/build.h"
 #include "server/scene/document.h"
 #include "server/scene/lightmap.h"
+#include "server/scene/shade.h"
 #include "tests/unit/scene/shapes.h"
 
 namespace radiosity::scene::test {

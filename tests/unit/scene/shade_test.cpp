@@ -5,7 +5,9 @@
 #include <array>
 #include <utility>
 
+#include "server/scene/build.h"
 #include "server/scene/patch_scene.h"
+#include "server/scene/shade.h"
 #include "tests/unit/scene/shapes.h"
 
 namespace radiosity::scene::test {

@@ -7,6 +7,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <limits>
 
+#include "server/scene/build.h"
 #include "server/scene/patch_scene.h"
 #include "tests/unit/scene/shapes.h"
 

@@ -6,8 +6,10 @@
 #include <cmath>
 #include <limits>
 
+#include "server/scene/build.h"
 #include "server/scene/opacity.h"
 #include "server/scene/patch_scene.h"
+#include "server/scene/shade.h"
 #include "server/scene/shade_texture.h"
 #include "tests/unit/scene/shapes.h"
 

@@ -12,9 +12,11 @@
 #include <random>
 #include <string>
 
+#include "server/scene/build.h"
 #include "server/scene/burial_record.h"
 #include "server/scene/document.h"
 #include "server/scene/patch_scene.h"
+#include "server/scene/shade.h"
 #include "server/scene/shading_normals.h"
 #include "tests/unit/scene/gltf_builder.h"
 

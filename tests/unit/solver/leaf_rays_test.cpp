@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <random>
 
+#include "server/scene/build.h"
 #include "tests/unit/scene/shapes.h"
 #include "tests/unit/solver/quad_scene.h"
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "server/scene/build.h"
 #include "server/scene/burial_record.h"
 #include "server/scene/lineage.h"
 #include "server/solver/leaf_sights.h"

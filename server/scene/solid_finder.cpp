@@ -1,4 +1,4 @@
-#include "server/scene/closed_solids.h"
+#include "server/scene/solid_finder.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "server/solver/solver.h"
+#include "server/solver/make_solver.h"
 
 #include "server/solver/linked_solver.h"
 #include "server/solver/shooting_solver.h"
