@@ -9,7 +9,7 @@
 #include "common/log.h"
 #include "common/result.h"
 #include "server/engine/engine.h"
-#include "server/gpu/sight.h"
+#include "server/gpu/run/sight.h"
 #include "server/net/server_options.h"
 
 namespace radiosity {

@@ -1,6 +1,6 @@
 # Writes OUTPUT: the text of CONSTANTS and of each file in SHADERS ("|"-separated) as raw strings, found by file name.
 file(READ ${CONSTANTS} constants)
-set(text "// Generated from server/gpu/shaders by embed_shaders.cmake.\n#include \"server/gpu/shader_source.h\"\n\n")
+set(text "// Generated from server/gpu/shaders by embed_shaders.cmake.\n#include \"server/gpu/gl/shader_source.h\"\n\n")
 string(APPEND text "namespace radiosity::gpu {\n\nconst char* const kShaderConstants = R\"GLSL(${constants})GLSL\";\n\n")
 string(APPEND text "const EmbeddedShader kEmbeddedShaders[] = {\n")
 string(REPLACE "|" ";" files "${SHADERS}")

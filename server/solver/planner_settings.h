@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "server/solver/transport.h"
+#include "server/solver/transport/transport.h"
 
 namespace radiosity::solver {
 

@@ -9,12 +9,12 @@
 
 #include "common/archive.h"
 #include "common/result.h"
-#include "server/scene/patch_scene.h"
-#include "server/scene/shading_normals.h"
-#include "server/solver/error_parts.h"
+#include "server/scene/values/patch_scene.h"
+#include "server/scene/shading/shading_normals.h"
+#include "server/solver/error/error_parts.h"
 #include "server/solver/planner_settings.h"
-#include "server/solver/punctual_lights.h"
-#include "server/solver/transport.h"
+#include "server/solver/lamps/punctual_lights.h"
+#include "server/solver/transport/transport.h"
 
 namespace radiosity::solver {
 

@@ -3,7 +3,7 @@
 
 #include <cstring>
 
-#include "server/gpu/gpu_transport.h"
+#include "server/gpu/workers/gpu_transport.h"
 
 int main(int argc, char** argv) {
   if (argc > 1 && std::strcmp(argv[1], "--worker") == 0) return radiosity::gpu::workerMain(argc - 2, argv + 2);

@@ -10,10 +10,10 @@
 #include <string>
 #include <thread>
 
-#include "server/gpu/gpu_transport.h"
-#include "server/scene/build.h"
-#include "server/scene/document.h"
-#include "server/scene/shade.h"
+#include "server/gpu/workers/gpu_transport.h"
+#include "server/scene/charts/build.h"
+#include "server/scene/document/document.h"
+#include "server/scene/shading/shade.h"
 #include "tests/gl/scene_builder.h"
 #include "tests/unit/scene/shapes.h"
 

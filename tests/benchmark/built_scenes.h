@@ -8,9 +8,9 @@
 #include <memory>
 #include <vector>
 
-#include "server/scene/build.h"
-#include "server/scene/patch_scene.h"
-#include "server/solver/transport.h"
+#include "server/scene/charts/build.h"
+#include "server/scene/values/patch_scene.h"
+#include "server/solver/transport/transport.h"
 
 namespace radiosity::benchmarks {
 

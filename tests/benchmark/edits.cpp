@@ -24,8 +24,8 @@
 
 #include "common/check.h"
 #include "common/freed_memory.h"
-#include "server/engine/solve_loop.h"
-#include "server/gpu/gpu_transport.h"
+#include "server/engine/loop/solve_loop.h"
+#include "server/gpu/workers/gpu_transport.h"
 #include "tests/scenes/glb_writer.h"
 #include "tests/scenes/scenes.h"
 

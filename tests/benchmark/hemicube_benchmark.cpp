@@ -1,8 +1,8 @@
 // The parts of a shot, apart: culling, drawing with its readback, and turning an image into flux.
 #include <benchmark/benchmark.h>
 
-#include "server/gpu/hemicube_renderer.h"
-#include "server/gpu/scatter_accumulator.h"
+#include "server/gpu/draw/hemicube_renderer.h"
+#include "server/gpu/gather/scatter_accumulator.h"
 #include "tests/benchmark/built_scenes.h"
 #include "tests/gl/scene_builder.h"
 

@@ -3,11 +3,11 @@
 
 #include <vector>
 
-#include "server/scene/build.h"
-#include "server/scene/document.h"
-#include "server/scene/lightmap.h"
-#include "server/scene/shade.h"
-#include "server/solver/make_solver.h"
+#include "server/scene/charts/build.h"
+#include "server/scene/document/document.h"
+#include "server/scene/lightmap/lightmap.h"
+#include "server/scene/shading/shade.h"
+#include "server/solver/pipeline/make_solver.h"
 #include "server/solver/solver.h"
 #include "tests/benchmark/built_scenes.h"
 #include "tests/benchmark/whole_solve.h"

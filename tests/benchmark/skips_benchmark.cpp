@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "server/gpu/hemicube_renderer.h"
+#include "server/gpu/draw/hemicube_renderer.h"
 #include "tests/benchmark/built_scenes.h"
 #include "tests/benchmark/whole_solve.h"
 #include "tests/gl/scene_builder.h"

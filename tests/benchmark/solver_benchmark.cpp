@@ -4,7 +4,7 @@
 #include <random>
 #include <string>
 
-#include "server/solver/state.h"
+#include "server/solver/shooting/state.h"
 #include "tests/benchmark/built_scenes.h"
 #include "tests/benchmark/whole_solve.h"
 

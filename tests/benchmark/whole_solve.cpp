@@ -2,7 +2,7 @@
 
 #include <chrono>
 
-#include "server/solver/make_solver.h"
+#include "server/solver/pipeline/make_solver.h"
 
 namespace radiosity::benchmarks {
 namespace {

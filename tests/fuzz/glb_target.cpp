@@ -1,7 +1,7 @@
 // A scene file: read, checked and imported, or refused; small ones also charted.
-#include "server/scene/build.h"
-#include "server/scene/document.h"
-#include "server/scene/patch_scene.h"
+#include "server/scene/charts/build.h"
+#include "server/scene/document/document.h"
+#include "server/scene/values/patch_scene.h"
 #include "tests/fuzz/target.h"
 #include "tests/scenes/glb_writer.h"
 #include "tests/scenes/scenes.h"

@@ -11,11 +11,11 @@
 #include <string>
 #include <string_view>
 
-#include "server/scene/build.h"
-#include "server/scene/document.h"
-#include "server/scene/patch_scene.h"
-#include "server/scene/shade.h"
-#include "server/solver/make_solver.h"
+#include "server/scene/charts/build.h"
+#include "server/scene/document/document.h"
+#include "server/scene/values/patch_scene.h"
+#include "server/scene/shading/shade.h"
+#include "server/solver/pipeline/make_solver.h"
 #include "server/solver/solver.h"
 #include "tests/fuzz/target.h"
 #include "tests/unit/solver/quad_scene.h"

@@ -1,7 +1,7 @@
 // A JSON Patch on a small scene: applied whole or not at all, and what comes out is imported or refused.
 #include <nlohmann/json.hpp>
 
-#include "server/scene/document.h"
+#include "server/scene/document/document.h"
 #include "tests/fuzz/target.h"
 #include "tests/scenes/glb_writer.h"
 #include "tests/scenes/scenes.h"

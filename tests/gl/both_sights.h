@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "server/gpu/sight.h"
+#include "server/gpu/run/sight.h"
 
 namespace radiosity::test {
 

@@ -1,4 +1,4 @@
-#include "server/gpu/egl_context.h"
+#include "server/gpu/gl/egl_context.h"
 
 #include <epoxy/gl.h>
 #include <gtest/gtest.h>

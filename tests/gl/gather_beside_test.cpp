@@ -8,7 +8,7 @@
 #include <optional>
 #include <span>
 
-#include "server/solver/polygon_form_factor.h"
+#include "server/solver/math/polygon_form_factor.h"
 #include "tests/gl/gather_fixture.h"
 
 namespace radiosity::test {

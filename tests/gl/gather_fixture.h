@@ -6,7 +6,7 @@
 #include <memory>
 #include <random>
 
-#include "server/gpu/gpu_transport.h"
+#include "server/gpu/workers/gpu_transport.h"
 #include "tests/gl/both_sights.h"
 #include "tests/gl/scene_builder.h"
 

@@ -8,9 +8,9 @@
 #include <numbers>
 #include <span>
 
-#include "server/scene/build.h"
-#include "server/scene/coverage.h"
-#include "server/solver/polygon_form_factor.h"
+#include "server/scene/charts/build.h"
+#include "server/scene/burial/coverage.h"
+#include "server/solver/math/polygon_form_factor.h"
 #include "tests/gl/gather_fixture.h"
 #include "tests/unit/scene/shapes.h"
 

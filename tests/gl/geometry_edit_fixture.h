@@ -13,12 +13,12 @@
 #include <utility>
 #include <vector>
 
-#include "server/gpu/gpu_transport.h"
-#include "server/scene/build.h"
-#include "server/scene/document.h"
-#include "server/scene/lineage.h"
-#include "server/scene/shade.h"
-#include "server/solver/linked_solver.h"
+#include "server/gpu/workers/gpu_transport.h"
+#include "server/scene/charts/build.h"
+#include "server/scene/document/document.h"
+#include "server/scene/values/lineage.h"
+#include "server/scene/shading/shade.h"
+#include "server/solver/pipeline/linked_solver.h"
 #include "tests/scenes/glb_writer.h"
 #include "tests/scenes/scenes.h"
 

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <vector>
 
-#include "server/gpu/gpu_transport.h"
-#include "server/solver/node_shots.h"
-#include "server/solver/polygon_form_factor.h"
+#include "server/gpu/workers/gpu_transport.h"
+#include "server/solver/transport/node_shots.h"
+#include "server/solver/math/polygon_form_factor.h"
 #include "tests/gl/scene_builder.h"
 
 namespace radiosity::test {

@@ -1,4 +1,4 @@
-#include "server/gpu/hemicube_weights.h"
+#include "server/gpu/cull/hemicube_weights.h"
 
 #include <gtest/gtest.h>
 

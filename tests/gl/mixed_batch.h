@@ -1,8 +1,8 @@
 // Shots of several kinds for the tests of whoever carries them out.
 #pragma once
 
-#include "server/scene/patch_scene.h"
-#include "server/solver/transport.h"
+#include "server/scene/values/patch_scene.h"
+#include "server/solver/transport/transport.h"
 
 namespace radiosity::test {
 

@@ -4,12 +4,12 @@
 
 #include <memory>
 
-#include "server/gpu/gpu_transport.h"
-#include "server/scene/build.h"
-#include "server/scene/document.h"
-#include "server/scene/patch_scene.h"
-#include "server/scene/shade.h"
-#include "server/solver/shooting_solver.h"
+#include "server/gpu/workers/gpu_transport.h"
+#include "server/scene/charts/build.h"
+#include "server/scene/document/document.h"
+#include "server/scene/values/patch_scene.h"
+#include "server/scene/shading/shade.h"
+#include "server/solver/shooting/shooting_solver.h"
 
 namespace radiosity {
 namespace {

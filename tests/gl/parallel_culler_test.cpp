@@ -1,5 +1,5 @@
 // What an image in parallel projection leaves out could not have been seen.
-#include "server/gpu/parallel_culler.h"
+#include "server/gpu/cull/parallel_culler.h"
 
 #include <gtest/gtest.h>
 
@@ -9,8 +9,8 @@
 #include <glm/geometric.hpp>
 #include <set>
 
-#include "server/scene/closed_solids.h"
-#include "server/scene/solid_finder.h"
+#include "server/scene/values/closed_solids.h"
+#include "server/scene/burial/solid_finder.h"
 #include "tests/gl/scene_builder.h"
 
 namespace radiosity::test {

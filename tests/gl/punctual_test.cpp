@@ -7,9 +7,9 @@
 #include <numbers>
 #include <random>
 
-#include "server/gpu/gpu_transport.h"
-#include "server/scene/coverage.h"
-#include "server/solver/punctual_lights.h"
+#include "server/gpu/workers/gpu_transport.h"
+#include "server/scene/burial/coverage.h"
+#include "server/solver/lamps/punctual_lights.h"
 #include "tests/gl/both_sights.h"
 #include "tests/gl/scene_builder.h"
 

@@ -1,12 +1,12 @@
 // Bounds of blocks of receivers, by which whole blocks are left out: no place may lie outside of them.
-#include "server/gpu/receivers.h"
+#include "server/gpu/gather/receivers.h"
 
 #include <gtest/gtest.h>
 
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/vector_relational.hpp>
 
-#include "server/scene/build.h"
+#include "server/scene/charts/build.h"
 #include "tests/unit/scene/shapes.h"
 
 namespace radiosity::gpu {

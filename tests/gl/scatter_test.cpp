@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/gpu/gpu_transport.h"
+#include "server/gpu/workers/gpu_transport.h"
 #include "tests/gl/scene_builder.h"
 
 namespace radiosity::test {

@@ -6,7 +6,7 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
-#include "server/scene/solid_finder.h"
+#include "server/scene/burial/solid_finder.h"
 
 namespace radiosity::test {
 

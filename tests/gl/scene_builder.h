@@ -6,8 +6,8 @@
 #include <memory>
 #include <random>
 
-#include "server/scene/patch_scene.h"
-#include "server/solver/transport.h"
+#include "server/scene/values/patch_scene.h"
+#include "server/solver/transport/transport.h"
 
 namespace radiosity::test {
 

@@ -1,8 +1,8 @@
 // What rays see where pixels cannot.
 #include <gtest/gtest.h>
 
-#include "server/gpu/gpu_transport.h"
-#include "server/solver/punctual_lights.h"
+#include "server/gpu/workers/gpu_transport.h"
+#include "server/solver/lamps/punctual_lights.h"
 #include "tests/gl/scene_builder.h"
 
 namespace radiosity::test {

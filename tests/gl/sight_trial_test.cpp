@@ -1,10 +1,10 @@
 // The way in which lights see is chosen by trying both.
-#include "server/gpu/sight_trial.h"
+#include "server/gpu/run/sight_trial.h"
 
 #include <gtest/gtest.h>
 
-#include "server/gpu/gpu_transport.h"
-#include "server/scene/trial_room.h"
+#include "server/gpu/workers/gpu_transport.h"
+#include "server/scene/charts/trial_room.h"
 #include "tests/gl/mixed_batch.h"
 #include "tests/gl/scene_builder.h"
 

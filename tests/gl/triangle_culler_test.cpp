@@ -1,5 +1,5 @@
 // What is not drawn could not have been seen.
-#include "server/gpu/triangle_culler.h"
+#include "server/gpu/cull/triangle_culler.h"
 
 #include <gtest/gtest.h>
 
@@ -10,9 +10,9 @@
 #include <optional>
 #include <set>
 
-#include "server/gpu/hemicube_renderer.h"
-#include "server/scene/closed_solids.h"
-#include "server/scene/solid_finder.h"
+#include "server/gpu/draw/hemicube_renderer.h"
+#include "server/scene/values/closed_solids.h"
+#include "server/scene/burial/solid_finder.h"
 #include "tests/gl/scene_builder.h"
 
 namespace radiosity::test {

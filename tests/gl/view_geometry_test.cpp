@@ -1,5 +1,5 @@
 // In which order a picture draws faces that lie on each other. No graphics context is needed.
-#include "server/gpu/view_geometry.h"
+#include "server/gpu/picture/view_geometry.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Pictures: radiance of a textured, emitting, lit square, half-texel exact lightmap look-ups, back faces, the sky.
-#include "server/gpu/view_renderer.h"
+#include "server/gpu/picture/view_renderer.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <numbers>
 
 #include "common/task.h"
-#include "server/gpu/view_sky.h"
+#include "server/gpu/picture/view_sky.h"
 
 namespace radiosity::gpu {
 namespace {

@@ -12,9 +12,9 @@
 #include <fstream>
 #include <thread>
 
-#include "server/gpu/batch_chunks.h"
-#include "server/gpu/gpu_transport.h"
-#include "server/solver/shot_cost.h"
+#include "server/gpu/workers/batch_chunks.h"
+#include "server/gpu/workers/gpu_transport.h"
+#include "server/solver/transport/shot_cost.h"
 #include "tests/gl/mixed_batch.h"
 #include "tests/gl/scene_builder.h"
 

@@ -15,15 +15,71 @@ TOP_LEVEL = {
 }
 
 # What a file may include of ours: the first row whose pattern matches its path decides. Patterns match from the start.
+# A folder of the server may use those of its own part that stand here, which form no circle (folders_form_no_circle),
+# and its own files.
+GEOMETRY = ["common/", "server/geometry/"]
+VALUES = GEOMETRY + ["server/scene/values/"]
+SOLVER = VALUES + [r"server/scene/shading/shading_normals\.h"]
+GPU = VALUES + ["server/solver/math/", "server/solver/patches/", "server/solver/rays/", "server/solver/transport/"]
+ENGINE = GEOMETRY + [r"server/engine/engine\.h", "server/scene/", "server/solver/", "server/gpu/", "server/state/"]
+
+
+def among(part, folders, outside):
+    """Rows of the folders of a part: each with those folders of it that it may use, and what it may use outside."""
+    return [
+        (f"server/{part}/{folder}/", outside + [f"server/{part}/{other}/" for other in [folder, *others.split()]])
+        for folder, others in folders.items()
+    ]
+
+
 OWN_INCLUDES = [
     ("tests/", ["common/", "protocol/", "server/", "client/", "tests/"]),
     ("common/", ["common/"]),
     ("protocol/", ["common/", "protocol/"]),
-    ("server/geometry/", ["common/", "server/geometry/"]),
-    ("server/scene/", ["common/", "server/geometry/", "server/scene/"]),
-    ("server/solver/", ["common/", "server/geometry/", "server/solver/", r"server/scene/(scene|patch_scene|bounds|bvh|shading_normals)\.h"]),
-    ("server/gpu/", ["common/", "server/geometry/", "server/gpu/", "server/solver/", r"server/scene/(scene|patch_scene|bvh)\.h"]),
-    ("server/engine/", ["common/", "server/engine/", "server/scene/", "server/solver/", "server/gpu/", "server/state/"]),
+    ("server/geometry/", GEOMETRY),
+    *among("scene", {
+        "values": "",
+        "document": "values",
+        "import": "document values",
+        "shading": "values",
+        "burial": "values",
+        "charts": "burial shading values",
+        "lightmap": "import document shading values",
+    }, GEOMETRY),
+    *among("solver", {
+        "math": "",
+        "patches": "",
+        "transport": "math patches",
+        "rays": "math patches",
+        "error": "patches",
+        "lamps": "math patches rays transport",
+        "edits": "math patches transport",
+        "reflected": "edits math patches rays",
+        "variation": "edits lamps math patches rays reflected",
+    }, SOLVER),
+    *among("solver", {
+        "shooting": "error math patches transport",
+        "links": "math patches shooting transport",
+        "pipeline": "edits error lamps links math patches rays reflected shooting transport variation",
+    }, SOLVER + [r"server/solver/\w+\.h"]),
+    (r"server/solver/\w+\.h", SOLVER + ["server/solver/error/", "server/solver/lamps/", "server/solver/transport/",
+                                        r"server/solver/\w+\.h"]),
+    *among("gpu", {
+        "gl": "",
+        "cull": "gl",
+        "draw": "cull gl",
+        "gather": "cull draw gl",
+        "run": "draw gather gl",
+        "workers": "draw gather gl run",
+        "picture": "gl",
+    }, GPU),
+    *among("engine", {
+        "lit": "",
+        "persist": "lit",
+        "publish": "lit",
+        "loop": "lit persist publish",
+    }, ENGINE),
+    ("server/engine/", ["common/"]),
     ("server/state/", ["common/", "server/state/"]),
     ("server/net/", ["common/", "protocol/", "server/net/", r"server/engine/engine\.h", r"server/state/uploads\.h"]),
     (r"server/(main|options|service_notify)[^/]*$", ["common/", "protocol/", "server/"]),
@@ -120,6 +176,33 @@ def own_includes_follow_the_arrows(tree):
             yield f"{file}:{number}: includes {header}, but may include of ours only {', '.join(allowed)}"
 
 
+def folders_form_no_circle(tree):
+    """Folders of the program that include each other, however far around."""
+    uses = {}
+    for file, number, header, _ in tree.includes():
+        one, other = file.rpartition("/")[0], header.rpartition("/")[0]
+        if file.startswith("tests/") or one == other or not (tree.root / header).exists():
+            continue
+        uses.setdefault(one, {}).setdefault(other, f"{file}:{number}: includes {header}")
+
+    def way(start, end, seen):
+        if start == end:
+            return []
+        for folder, why in uses.get(start, {}).items():
+            if folder not in seen:
+                seen.add(folder)
+                rest = way(folder, end, seen)
+                if rest is not None:
+                    return [why, *rest]
+        return None
+
+    for one, others in uses.items():
+        for other, why in others.items():
+            back = way(other, one, {other})
+            if back is not None:
+                yield f"{why}, though {other} uses {one}: {'; '.join(back)}"
+
+
 def libraries_stay_at_home(tree):
     for file, number, header, _ in tree.includes():
         for pattern, name, homes in LIBRARY_HOMES:
@@ -190,7 +273,7 @@ def readme_explains_every_package(tree):
 
 
 RULES = [
-    own_includes_follow_the_arrows, libraries_stay_at_home, top_level_is_fixed, files_are_short,
+    own_includes_follow_the_arrows, folders_form_no_circle, libraries_stay_at_home, top_level_is_fixed, files_are_short,
     nothing_is_left_over, clones_are_made_in_one_way, clang_14_can_compile_it, no_machine_is_named,
     readme_explains_every_package,
 ]

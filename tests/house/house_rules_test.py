@@ -45,31 +45,58 @@ class EachRule(unittest.TestCase):
             return self.including(house_rules.own_includes_follow_the_arrows, file, f'"{header}"')
 
         for file, header in [
-            ("common/a.h", "server/scene/scene.h"), ("protocol/a.cpp", "server/engine/engine.h"),
-            ("server/scene/a.cpp", "server/solver/transport.h"), ("server/scene/a.cpp", "protocol/codec.h"),
-            ("server/solver/a.cpp", "server/scene/document.h"), ("server/solver/a.cpp", "server/gpu/view_renderer.h"),
-            ("server/gpu/a.cpp", "server/engine/engine.h"), ("server/engine/a.cpp", "protocol/messages.h"),
-            ("server/engine/a.cpp", "server/net/listener.h"), ("server/net/a.cpp", "server/engine/solve_loop.h"),
-            ("server/net/a.cpp", "server/scene/scene.h"), ("client/lib/a.cpp", "server/scene/scene.h"),
-            ("client/lib/a.cpp", "client/cli/solve.h"), ("server/engine/a.cpp", "tests/oracle/oracle.h"),
+            ("common/a.h", "server/scene/values/scene.h"), ("protocol/a.cpp", "server/engine/engine.h"),
+            ("server/scene/charts/a.cpp", "server/solver/transport/wave.h"),
+            ("server/scene/values/a.cpp", "protocol/codec.h"),
+            ("server/scene/values/a.h", "server/scene/charts/charts.h"),
+            ("server/scene/charts/a.h", "server/scene/import/a.h"),
+            ("server/scene/a.cpp", "server/scene/values/scene.h"),
+            ("server/geometry/a.cpp", "server/scene/values/scene.h"),
+            ("server/solver/lamps/a.cpp", "server/scene/document/document.h"),
+            ("server/solver/math/a.cpp", "server/gpu/picture/view_renderer.h"),
+            ("server/solver/reflected/a.cpp", "server/solver/variation/leaf_variation.h"),
+            ("server/gpu/draw/a.cpp", "server/gpu/gather/receivers.h"),
+            ("server/gpu/gl/a.cpp", "server/scene/charts/build.h"),
+            ("server/gpu/run/a.cpp", "server/engine/engine.h"), ("server/engine/loop/a.cpp", "protocol/messages.h"),
+            ("server/engine/lit/a.cpp", "server/engine/loop/solve_loop.h"),
+            ("server/engine/engine.h", "server/engine/lit/a.h"),
+            ("server/engine/loop/a.cpp", "server/net/listener.h"),
+            ("server/net/a.cpp", "server/engine/loop/solve_loop.h"),
+            ("server/net/a.cpp", "server/scene/values/scene.h"), ("client/lib/a.cpp", "server/scene/values/scene.h"),
+            ("client/lib/a.cpp", "client/cli/solve.h"), ("server/engine/loop/a.cpp", "tests/oracle/oracle.h"),
             ("server/main.cpp", "tests/oracle/oracle.h"), ("server/unruly/a.cpp", "common/result.h"),
-            ("server/solver/a.cpp", "../scene/scene.h"), ("server/state/a.cpp", "server/scene/document.h"),
+            ("server/solver/math/a.cpp", "../scene/scene.h"), ("server/state/a.cpp", "server/scene/document/document.h"),
             ("server/state/a.cpp", "server/engine/engine.h"), ("server/net/a.cpp", "server/state/store.h"),
         ]:
             self.assertEqual(count(file, header), 1, f"{file} -> {header} must be refused")
         for file, header in [
-            ("common/a.h", "common/result.h"), ("server/engine/a.cpp", "server/state/store.h"),
-            ("server/net/a.cpp", "server/state/uploads.h"), ("server/solver/a.cpp", "server/scene/patch_scene.h"),
+            ("common/a.h", "common/result.h"), ("server/engine/persist/a.cpp", "server/state/store.h"),
+            ("server/net/a.cpp", "server/state/uploads.h"),
+            ("server/solver/math/a.cpp", "server/scene/values/patch_scene.h"),
+            ("server/solver/pipeline/a.cpp", "server/solver/reflected/leaf_gather.h"),
+            ("server/solver/shooting/a.h", "server/solver/solver.h"),
+            ("server/scene/charts/a.cpp", "server/geometry/bvh.h"),
+            ("server/gpu/gather/a.cpp", "server/solver/rays/leaf_rays.h"),
             ("server/net/a.cpp", "server/engine/engine.h"), ("server/main.cpp", "server/net/listener.h"),
             ("server/options.cpp", "server/engine/engine.h"), ("client/cli/a.cpp", "client/lib/connection.h"),
-            ("tests/unit/solver/a_test.cpp", "server/solver/state.h"), ("tests/oracle/a.cpp", "tests/scenes/room.h"),
+            ("tests/unit/solver/a_test.cpp", "server/solver/shooting/state.h"), ("tests/oracle/a.cpp", "tests/scenes/room.h"),
         ]:
             self.assertEqual(count(file, header), 0, f"{file} -> {header} must be accepted")
 
+    def test_circles_of_folders(self):
+        rule = house_rules.folders_form_no_circle
+        self.write("server/a/a.h", '#include "server/b/b.h"\n#include "server/a/own.h"\n')
+        self.write("server/a/own.h", "")
+        self.write("server/b/b.h", '#include "server/c/c.h"\n')
+        self.write("server/c/c.h", "")
+        self.assertEqual(self.complaints(rule), [])
+        self.write("server/c/c.h", '#include "server/a/own.h"\n')
+        self.assertEqual(len(self.complaints(rule)), 3, "each step of the circle is told")
+
     def test_an_include_is_seen_however_it_is_written(self):
         rule = house_rules.own_includes_follow_the_arrows
-        self.assertEqual(self.including(rule, "common/a.h", "<server/scene/scene.h>"), 1)
-        self.write("common/b.h", '  #  include "server/scene/scene.h" // why\n')
+        self.assertEqual(self.including(rule, "common/a.h", "<server/scene/values/scene.h>"), 1)
+        self.write("common/b.h", '  #  include "server/scene/values/scene.h" // why\n')
         self.assertEqual(len(self.complaints(rule)), 1)
         self.write("common/b.h", '#include "c.h"\n')
         self.write("common/c.h", "")

@@ -8,12 +8,12 @@
 #include <stdexcept>
 #include <tuple>
 
-#include "server/gpu/gpu_transport.h"
-#include "server/scene/build.h"
-#include "server/scene/document.h"
-#include "server/scene/patch_scene.h"
-#include "server/scene/shade.h"
-#include "server/solver/make_solver.h"
+#include "server/gpu/workers/gpu_transport.h"
+#include "server/scene/charts/build.h"
+#include "server/scene/document/document.h"
+#include "server/scene/values/patch_scene.h"
+#include "server/scene/shading/shade.h"
+#include "server/solver/pipeline/make_solver.h"
 #include "tests/scenes/glb_writer.h"
 
 namespace radiosity::accuracy {

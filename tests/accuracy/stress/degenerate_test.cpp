@@ -8,7 +8,7 @@
 #include <numbers>
 #include <random>
 
-#include "server/scene/build.h"
+#include "server/scene/charts/build.h"
 #include "tests/accuracy/stress/stress_solve.h"
 #include "tests/scenes/scenes.h"
 #include "tests/scenes/shapes.h"

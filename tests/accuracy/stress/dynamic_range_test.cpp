@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "server/solver/linked_solver.h"
+#include "server/solver/pipeline/linked_solver.h"
 #include "tests/accuracy/stress/stress_solve.h"
 #include "tests/scenes/scenes.h"
 #include "tests/scenes/shapes.h"

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <string>
 
-#include "server/solver/linked_solver.h"
+#include "server/solver/pipeline/linked_solver.h"
 #include "tests/accuracy/stress/stress_solve.h"
 #include "tests/scenes/scenes.h"
 

@@ -9,7 +9,7 @@
 #include <cstdio>
 
 #include "common/memory_limit.h"
-#include "server/scene/build.h"
+#include "server/scene/charts/build.h"
 #include "tests/accuracy/stress/stress_solve.h"
 #include "tests/scenes/glb_writer.h"
 #include "tests/scenes/shapes.h"

@@ -8,11 +8,11 @@
 #include <stdexcept>
 #include <string>
 
-#include "server/gpu/gpu_transport.h"
-#include "server/scene/build.h"
-#include "server/scene/document.h"
-#include "server/scene/shade.h"
-#include "server/solver/make_solver.h"
+#include "server/gpu/workers/gpu_transport.h"
+#include "server/scene/charts/build.h"
+#include "server/scene/document/document.h"
+#include "server/scene/shading/shade.h"
+#include "server/solver/pipeline/make_solver.h"
 #include "tests/scenes/glb_writer.h"
 #include "tests/scenes/shapes.h"
 

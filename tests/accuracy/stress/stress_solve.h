@@ -6,9 +6,9 @@
 #include <memory>
 #include <vector>
 
-#include "server/scene/build.h"
-#include "server/scene/patch_scene.h"
-#include "server/scene/scene.h"
+#include "server/scene/charts/build.h"
+#include "server/scene/values/patch_scene.h"
+#include "server/scene/values/scene.h"
 #include "server/solver/solver.h"
 #include "tests/scenes/scene.h"
 

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "server/gpu/egl_context.h"
+#include "server/gpu/gl/egl_context.h"
 #include "tests/benchmark/gpu_rays/ray_caster.h"
 #include "tests/benchmark/gpu_rays/ray_sets.h"
 #include "tests/benchmark/gpu_rays/sweep.h"

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "common/result.h"
-#include "server/gpu/egl_context.h"
-#include "server/gpu/gl_objects.h"
+#include "server/gpu/gl/egl_context.h"
+#include "server/gpu/gl/gl_objects.h"
 #include "tests/benchmark/gpu_rays/ray_sets.h"
 #include "tests/benchmark/gpu_rays/wide_tree.h"
 

@@ -9,10 +9,10 @@
 
 #include "common/parallel.h"
 #include "server/geometry/ray_scene.h"
-#include "server/scene/build.h"
-#include "server/scene/document.h"
-#include "server/scene/shade.h"
-#include "server/solver/sampling.h"
+#include "server/scene/charts/build.h"
+#include "server/scene/document/document.h"
+#include "server/scene/shading/shade.h"
+#include "server/solver/math/sampling.h"
 #include "tests/gl/scene_builder.h"
 
 namespace radiosity::benchmarks {

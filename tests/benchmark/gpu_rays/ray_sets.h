@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "common/result.h"
-#include "server/scene/bvh.h"
-#include "server/scene/patch_scene.h"
-#include "server/solver/leaf_rays.h"
-#include "server/solver/side.h"
+#include "server/geometry/bvh.h"
+#include "server/scene/values/patch_scene.h"
+#include "server/solver/rays/leaf_rays.h"
+#include "server/solver/patches/side.h"
 
 namespace radiosity::benchmarks {
 

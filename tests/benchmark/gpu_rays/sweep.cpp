@@ -7,8 +7,8 @@
 #include <span>
 
 #include "common/log.h"
-#include "server/gpu/gl_objects.h"
-#include "server/solver/sampling.h"
+#include "server/gpu/gl/gl_objects.h"
+#include "server/solver/math/sampling.h"
 #include "tests/benchmark/gpu_rays/ray_caster.h"
 
 namespace radiosity::benchmarks {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "common/result.h"
-#include "server/gpu/egl_context.h"
+#include "server/gpu/gl/egl_context.h"
 
 namespace radiosity::benchmarks {
 

@@ -8,9 +8,9 @@
 #include <span>
 #include <vector>
 
-#include "server/scene/bounds.h"
-#include "server/scene/bvh.h"
-#include "server/scene/scene.h"
+#include "server/geometry/bounds.h"
+#include "server/geometry/bvh.h"
+#include "server/scene/values/scene.h"
 
 namespace radiosity::benchmarks {
 

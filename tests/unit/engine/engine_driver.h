@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-#include "server/engine/solve_loop.h"
+#include "server/engine/loop/solve_loop.h"
 #include "tests/scenes/scene.h"
 
 namespace radiosity::test {

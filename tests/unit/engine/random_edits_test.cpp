@@ -11,13 +11,13 @@
 #include <optional>
 #include <random>
 
-#include "server/engine/scene_change.h"
-#include "server/scene/build.h"
-#include "server/scene/document.h"
-#include "server/scene/lightmap.h"
-#include "server/scene/patch_scene.h"
-#include "server/scene/shade.h"
-#include "server/solver/make_solver.h"
+#include "server/engine/lit/scene_change.h"
+#include "server/scene/charts/build.h"
+#include "server/scene/document/document.h"
+#include "server/scene/lightmap/lightmap.h"
+#include "server/scene/values/patch_scene.h"
+#include "server/scene/shading/shade.h"
+#include "server/solver/pipeline/make_solver.h"
 #include "server/solver/solver.h"
 #include "tests/scenes/glb_writer.h"
 #include "tests/scenes/scenes.h"

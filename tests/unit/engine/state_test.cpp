@@ -4,7 +4,7 @@
 #include <filesystem>
 
 #include "common/archive.h"
-#include "server/engine/checkpoint_head.h"
+#include "server/engine/persist/checkpoint_head.h"
 #include "server/state/checkpoint.h"
 #include "tests/scenes/glb_writer.h"
 #include "tests/scenes/scenes.h"

@@ -7,8 +7,8 @@
 #include <optional>
 #include <utility>
 
-#include "server/scene/build.h"
-#include "server/scene/patch_scene.h"
+#include "server/scene/charts/build.h"
+#include "server/scene/values/patch_scene.h"
 
 namespace radiosity::scene::test {
 

@@ -1,4 +1,4 @@
-#include "server/scene/bvh.h"
+#include "server/geometry/bvh.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <glm/geometric.hpp>
 #include <random>
 
-#include "server/scene/scene.h"
+#include "server/scene/values/scene.h"
 #include "tests/unit/scene/triangle_soup.h"
 
 namespace radiosity::scene {

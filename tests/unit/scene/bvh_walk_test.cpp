@@ -8,7 +8,7 @@
 #include <random>
 #include <tuple>
 
-#include "server/scene/solid_tree.h"
+#include "server/geometry/solid_tree.h"
 #include "tests/unit/scene/triangle_soup.h"
 
 namespace radiosity::scene {

@@ -7,10 +7,10 @@
 #include <fstream>
 #include <iterator>
 
-#include "server/scene/build.h"
-#include "server/scene/document.h"
-#include "server/scene/patch_scene.h"
-#include "server/scene/shade.h"
+#include "server/scene/charts/build.h"
+#include "server/scene/document/document.h"
+#include "server/scene/values/patch_scene.h"
+#include "server/scene/shading/shade.h"
 
 namespace radiosity::scene {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "server/scene/bvh.h"
+#include "server/geometry/bvh.h"
 
 namespace radiosity::scene {
 namespace {

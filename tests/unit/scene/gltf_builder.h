@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "server/scene/document.h"
-#include "server/scene/glb.h"
+#include "server/scene/document/document.h"
+#include "server/scene/document/glb.h"
 
 namespace radiosity::scene::test {
 

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <iostream>
 
-#include "server/scene/document.h"
+#include "server/scene/document/document.h"
 
 namespace radiosity::scene {
 namespace {

@@ -5,9 +5,9 @@
 #include <chrono>
 #include <cstdio>
 
-#include "server/scene/build.h"
-#include "server/scene/lightmap.h"
-#include "server/scene/shade.h"
+#include "server/scene/charts/build.h"
+#include "server/scene/lightmap/lightmap.h"
+#include "server/scene/shading/shade.h"
 #include "tests/unit/scene/shapes.h"
 
 namespace radiosity::scene::test {

@@ -5,10 +5,10 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "server/scene/build.h"
-#include "server/scene/document.h"
-#include "server/scene/lightmap.h"
-#include "server/scene/shade.h"
+#include "server/scene/charts/build.h"
+#include "server/scene/document/document.h"
+#include "server/scene/lightmap/lightmap.h"
+#include "server/scene/shading/shade.h"
 #include "tests/unit/scene/shapes.h"
 
 namespace radiosity::scene::test {

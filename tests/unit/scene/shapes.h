@@ -7,8 +7,8 @@
 #include <map>
 #include <utility>
 
-#include "server/scene/patch_scene.h"
-#include "server/scene/scene.h"
+#include "server/scene/values/patch_scene.h"
+#include "server/scene/values/scene.h"
 
 namespace radiosity::scene::test {
 

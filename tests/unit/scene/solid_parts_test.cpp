@@ -1,12 +1,12 @@
 // Rays that are held against a part of a scene's solids: they tell of a place what they tell when held against all.
-#include "server/scene/solid_parts.h"
+#include "server/geometry/solid_parts.h"
 
 #include <gtest/gtest.h>
 
 #include <array>
 #include <random>
 
-#include "server/scene/patch_scene.h"
+#include "server/scene/values/patch_scene.h"
 
 namespace radiosity::scene {
 namespace {

@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "server/scene/bvh.h"
+#include "server/geometry/bvh.h"
 
 namespace radiosity::test {
 

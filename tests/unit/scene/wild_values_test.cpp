@@ -6,11 +6,11 @@
 #include <cmath>
 #include <limits>
 
-#include "server/scene/build.h"
-#include "server/scene/opacity.h"
-#include "server/scene/patch_scene.h"
-#include "server/scene/shade.h"
-#include "server/scene/shade_texture.h"
+#include "server/scene/charts/build.h"
+#include "server/scene/shading/opacity.h"
+#include "server/scene/values/patch_scene.h"
+#include "server/scene/shading/shade.h"
+#include "server/scene/values/shade_texture.h"
 #include "tests/unit/scene/shapes.h"
 
 namespace radiosity::scene::test {

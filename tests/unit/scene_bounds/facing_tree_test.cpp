@@ -1,14 +1,14 @@
 // Searches by place and direction find what looking at all finds.
-#include "server/scene/facing_tree.h"
+#include "server/geometry/facing_tree.h"
 
 #include <gtest/gtest.h>
 
 #include <glm/geometric.hpp>
 #include <random>
 
-#include "server/scene/covering_faces.h"
-#include "server/scene/flat_sides.h"
-#include "server/scene/triangle_hit.h"
+#include "server/geometry/covering_faces.h"
+#include "server/geometry/flat_sides.h"
+#include "server/geometry/triangle_hit.h"
 
 namespace radiosity::scene::test {
 namespace {

@@ -1,5 +1,5 @@
 // Pictures are held as large as they may be, which is decided before any is decoded.
-#include "server/scene/image_plan.h"
+#include "server/scene/import/image_plan.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,8 +8,8 @@
 #include <cmath>
 #include <memory>
 
-#include "server/scene/image_decode.h"
-#include "server/scene/shade_texture.h"
+#include "server/scene/document/image_decode.h"
+#include "server/scene/values/shade_texture.h"
 #include "tests/unit/scene/gltf_builder.h"
 
 namespace radiosity::scene::test {

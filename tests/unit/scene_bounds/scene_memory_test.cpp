@@ -1,5 +1,5 @@
 // What a file claims is summed up before any of it is made.
-#include "server/scene/scene_memory.h"
+#include "server/scene/import/scene_memory.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

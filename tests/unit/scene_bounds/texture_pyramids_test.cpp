@@ -1,5 +1,5 @@
 // Mip levels are made once for all materials that look at the same pictures alike, and of so many pixels at most.
-#include "server/scene/texture_pyramids.h"
+#include "server/scene/shading/texture_pyramids.h"
 
 #include <gtest/gtest.h>
 

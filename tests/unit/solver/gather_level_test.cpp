@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "server/solver/leaf_gather.h"
+#include "server/solver/reflected/leaf_gather.h"
 #include "tests/unit/solver/quad_scene.h"
 
 namespace radiosity::solver {

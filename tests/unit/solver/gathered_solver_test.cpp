@@ -7,7 +7,7 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
-#include "server/solver/linked_solver.h"
+#include "server/solver/pipeline/linked_solver.h"
 #include "tests/unit/engine/failing_memory.h"
 #include "tests/unit/solver/quad_scene.h"
 #include "tests/unit/solver/solve.h"

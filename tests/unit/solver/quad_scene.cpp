@@ -6,7 +6,7 @@
 #include <numbers>
 #include <thread>
 
-#include "server/solver/sampling.h"
+#include "server/solver/math/sampling.h"
 
 namespace radiosity::test {
 namespace {

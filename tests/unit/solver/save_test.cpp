@@ -1,8 +1,8 @@
 // A solve that is saved and goes on elsewhere is the solve that was never interrupted, to the last bit.
 #include <gtest/gtest.h>
 
-#include "server/solver/linked_solver.h"
-#include "server/solver/shooting_solver.h"
+#include "server/solver/pipeline/linked_solver.h"
+#include "server/solver/shooting/shooting_solver.h"
 #include "tests/unit/solver/quad_scene.h"
 #include "tests/unit/solver/solve.h"
 

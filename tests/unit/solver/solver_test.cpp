@@ -5,8 +5,8 @@
 #include <cmath>
 #include <type_traits>
 
-#include "server/solver/linked_solver.h"
-#include "server/solver/shooting_solver.h"
+#include "server/solver/pipeline/linked_solver.h"
+#include "server/solver/shooting/shooting_solver.h"
 #include "tests/unit/solver/quad_scene.h"
 #include "tests/unit/solver/solve.h"
 

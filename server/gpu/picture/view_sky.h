@@ -1,0 +1,12 @@
+// The sky behind a picture. Pure functions of values.
+#pragma once
+
+#include "server/gpu/picture/view_renderer.h"
+#include "server/scene/values/scene.h"
+
+namespace radiosity::gpu {
+
+/// Adds the sky's radiance to each pixel, as far as no surface covers the pixel. `camera`: the picture's own.
+void addSky(ViewPicture& picture, const scene::Camera& camera, const scene::Sky& sky);
+
+}  // namespace radiosity::gpu

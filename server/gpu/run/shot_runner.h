@@ -1,0 +1,69 @@
+// Carries out shots, one after the other, with images from wherever its source has them. One thread.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "server/gpu/gather/flux_sink.h"
+#include "server/gpu/draw/image_source.h"
+#include "server/gpu/gather/light_gatherer.h"
+#include "server/gpu/gather/punctual_gatherer.h"
+#include "server/gpu/gather/scatter_accumulator.h"
+#include "server/gpu/run/sight.h"
+
+namespace radiosity::gpu {
+
+/// Part of a batch (or all of it). Gather shots index `points`, parallel shots `views`.
+struct ShotSpan {
+  solver::LinkMode mode = solver::LinkMode::kFormula;
+  double flux_scale = 1.0;
+  std::span<const solver::ScatterShot> scatter;
+  std::span<const solver::GatherShot> gather;
+  std::span<const solver::HemicubeFrame> points;
+  std::span<const solver::PointShot> point_lights;
+  std::span<const solver::ParallelShot> parallel;
+  std::span<const solver::ParallelView> views;
+  std::span<const solver::NodeRun> receivers;  ///< of gather shots that want not all
+  std::span<const scene::ChangedBox> boxes;
+};
+[[nodiscard]] ShotSpan spanOf(const solver::ShotBatch& batch);
+
+class ShotRunner {
+ public:
+  /// `weights` outlive it; others may use them at the same time.
+  ShotRunner(ImageSource images, WeightCache& weights) : images_(std::move(images)), weights_(&weights) {}
+
+  /// After the scene of the renderers.
+  void setScene(const std::shared_ptr<const Receivers>& receivers, Sight sight);
+  [[nodiscard]] Result<solver::TransportCounters> run(const ShotSpan& shots, const FluxSink& sink);
+  /// Links of every gather shot, then of every scatter shot, each by itself (Transport::measure).
+  [[nodiscard]] Result<solver::TransportCounters> measure(const ShotSpan& shots,
+                                                          const solver::Transport::TakeLinks& take);
+
+ private:
+  void scatter(const ShotSpan& shots, const FluxSink& sink, solver::TransportCounters& counters);
+  void measureGather(const ShotSpan& shots, const solver::Transport::TakeLinks& take,
+                     solver::TransportCounters& counters);
+  void measureScatter(const ShotSpan& shots, const solver::Transport::TakeLinks& take,
+                      solver::TransportCounters& counters);
+
+  void measureByRays(const ShotSpan& shots, const solver::Transport::TakeLinks& take,
+                     solver::TransportCounters& counters);
+  void gatherByRays(const ShotSpan& shots, const FluxSink& sink, solver::TransportCounters& counters);
+
+  ImageSource images_;
+  WeightCache* weights_;
+  Sight sight_ = Sight::kImages;
+  ScatterAccumulator accumulator_;
+  LightGatherer gatherer_;
+  std::shared_ptr<const Receivers> receivers_;
+  std::optional<FluxStore> link_store_;
+  PunctualGatherer punctual_;
+};
+
+/// kInternal, naming the shot, if the batch breaks the contract of transport.h (a peer process sent it).
+[[nodiscard]] Result<void> checkShots(const ShotSpan& shots);
+
+}  // namespace radiosity::gpu

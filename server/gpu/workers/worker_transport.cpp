@@ -1,0 +1,470 @@
+// A transport that hands chunks of a batch to worker processes.
+//
+// A worker adds up whatever it does for a batch in its own accumulators in shared memory; they are merged once, when
+// the whole batch is done. If a worker dies, or is killed because it hangs, its accumulators are thrown away and every
+// chunk it had for this batch, done or not, goes back into the queue: nothing is lost and nothing counted twice.
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <deque>
+#include <optional>
+#include <thread>
+#include <utility>
+
+#include "common/check.h"
+#include "common/log.h"
+#include "server/gpu/workers/batch_chunks.h"
+#include "server/gpu/workers/gpu_transport.h"
+#include "server/gpu/draw/paper_ids.h"
+#include "server/gpu/run/sight_trial.h"
+#include "server/gpu/workers/worker_process.h"
+#include "server/gpu/workers/worker_start.h"
+
+namespace radiosity::gpu {
+namespace {
+
+/// Chunks a worker holds at a time: one to work on, one so that it need not wait for the next.
+constexpr std::size_t kChunksAhead = 2;
+/// Deaths of workers in one call after which it gives up.
+constexpr int kMaxDeaths = 5;
+/// WorkerOptions::patience, for each pixel.
+constexpr double kSlowPixelSeconds = 2e-6;
+/// Of the time that a late worker is given again it must have used this part: one that is stopped, or waits for ever,
+/// uses nothing.
+constexpr int kLeastUse = 5000;
+/// And it is given time so often at most: what waits for a card that hangs may look now and then whether it still does.
+constexpr int kMostExtensions = 30;
+/// A worker takes in a scene at ten times this rate at least.
+constexpr double kSlowSceneBytesPerSecond = 5e6;
+
+using Clock = std::chrono::steady_clock;
+
+Clock::duration seconds(double value) {
+  return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(value));
+}
+
+/// A process and what it has of the current batch.
+struct Slot {
+  std::optional<WorkerProcess> process;  ///< none: died, to be replaced
+  bool takes_scene = false;              ///< it was sent one, and has not said that it has it
+  std::deque<std::size_t> held;          ///< chunks sent, not yet reported
+  std::vector<std::size_t> done;         ///< chunks reported, still only in its accumulators
+  Clock::time_point deadline;            ///< of the chunk it has held longest
+  Clock::duration patience{};            ///< that the chunk may take
+  Clock::duration used_before{};         ///< processor time of the worker when it started on that chunk, ...
+  Clock::duration used_lately{};         ///< ... and when it was last given time
+  int extensions = 0;                    ///< how often it was
+  solver::TransportCounters counters;
+};
+
+class WorkerTransport final : public solver::Transport {
+ public:
+  WorkerTransport(WorkerOptions options, std::vector<WorkerProcess> workers, FileDescriptor wake)
+      : options_(std::move(options)),
+        slots_(slotsOf(std::move(workers))),
+        renderer_(slots_.front().process->renderer()),
+        hands_(options_.hands > 0 ? options_.hands : handsFor(slots_.front().process->software(), slots_.size())),
+        sight_(sightFor(options_.sight, slots_.front().process->software())),
+        wake_(std::move(wake)) {}
+  ~WorkerTransport() override { killAll(); }
+  WorkerTransport(const WorkerTransport&) = delete;
+  WorkerTransport& operator=(const WorkerTransport&) = delete;
+
+  Result<void> setScene(std::shared_ptr<const scene::PatchScene> patches) override {
+    if (auto begun = beginScene(std::move(patches)); !begun) return begun;
+    return finishScene();
+  }
+
+  /// All upload at the same time.
+  Result<void> beginScene(std::shared_ptr<const scene::PatchScene> patches) override {
+    awaitScenes();  // of one that was not finished
+    auto packed = packScene(*patches);
+    if (!packed) return tl::unexpected(packed.error());
+    packed_ = std::move(*packed);
+    nodes_ = patches->nodeCount();
+    triangles_ = patches->triangles.size();
+    patches_ = patches;
+    const auto paper = PaperIds::fits(*patches);
+    paper_fits_ = paper.has_value();
+    if (!paper) paper_error_ = paper.error();
+    has_scene_ = true;
+    deaths_ = 0;
+    for (auto& slot : slots_) {
+      if (!slot.process) continue;
+      auto sent = slot.process->sendScene(packed_, sceneBody(), scenePatience());
+      slot.takes_scene = sent.has_value();
+      if (!sent) lose(slot, sent.error());
+    }
+    return {};
+  }
+
+  [[nodiscard]] bool hasTakenScene() override {
+    return std::ranges::none_of(slots_, [](const Slot& slot) {
+      pollfd answer{slot.takes_scene ? slot.process->socket() : -1, POLLIN, 0};
+      return slot.takes_scene && poll(&answer, 1, 0) == 0;
+    });
+  }
+
+  Result<void> finishScene() override {
+    awaitScenes();
+    return replaceDead();
+  }
+
+  Result<solver::TransportCounters> run(const solver::ShotBatch& batch, solver::FluxAccumulators& into) override {
+    if (auto done = carryOut(batch); !done) return tl::unexpected(done.error());
+    solver::TransportCounters counters;
+    for (auto& slot : slots_) {
+      if (!slot.process) continue;
+      slot.process->sink().drainInto(into);
+      counters += slot.counters;
+    }
+    return counters;
+  }
+
+  Result<solver::TransportCounters> measure(const solver::ShotBatch& batch, const TakeLinks& take) override {
+    links_.assign(batch.gather.size() + batch.scatter.size(), std::nullopt);
+    next_taken_ = 0;
+    take_ = &take;
+    const auto done = carryOut(batch);
+    take_ = nullptr;
+    if (!done) return tl::unexpected(done.error());
+    solver::TransportCounters counters;
+    for (const auto& slot : slots_) counters += slot.counters;
+    return counters;
+  }
+
+  void interrupt() override {
+    interrupted_ = true;
+    (void)eventfd_write(wake_.get(), 1);  // never read: whoever waits now or later is woken
+  }
+
+  [[nodiscard]] Losses losses() const override { return {losses_, last_death_}; }
+
+  [[nodiscard]] Renderers look() override {
+    for (auto& slot : slots_) {
+      if (const auto ended = slot.process ? slot.process->ending() : std::nullopt) bury(slot, *ended);
+    }
+    const auto missing = std::count_if(slots_.begin(), slots_.end(), [](const Slot& slot) { return !slot.process; });
+    return {slots_.size(), static_cast<std::size_t>(missing), missing > 0 ? last_death_ : std::string()};
+  }
+
+  [[nodiscard]] Result<void> replaceMissing() override {
+    deaths_ = 0;
+    return replaceDead();
+  }
+
+  [[nodiscard]] std::string description() const override {
+    auto text = fmt::format("{}, {} worker{}", renderer_, slots_.size(), slots_.size() == 1 ? "" : "s");
+    if (hands_ > 1) text += fmt::format(" of {} threads", hands_);
+    text += std::string(", ") + sightText(sight_);
+    if (times_)
+      text += fmt::format(" (tried: rays {:.1f} ms, images {:.1f} ms)", 1e3 * times_->rays, 1e3 * times_->images);
+    return text;
+  }
+
+  /// Lets lights see in the way that is faster here. Before there is a scene; takes some tenths of a second. Where a
+  /// renderer fails, all stays as it was.
+  void trySights() {
+    const auto kept = sight_;
+    auto times = timeSights();
+    forgetScene();
+    if (times) {
+      times_ = *times;
+      sight_ = fasterSight(*times);
+    } else {
+      sight_ = kept;
+      log::warn("cannot try how lights see faster, so that {}: {}", sightText(sight_), times.error().text());
+    }
+  }
+
+ protected:
+  [[nodiscard]] std::shared_ptr<const scene::PatchScene> scene() const override { return patches_; }
+
+ private:
+  static std::vector<Slot> slotsOf(std::vector<WorkerProcess> workers) {
+    std::vector<Slot> slots;
+    for (auto& worker : workers) slots.emplace_back().process = std::move(worker);
+    return slots;
+  }
+
+  Result<SightTimes> timeSights() {
+    const auto room = options_.make_trial_room();
+    if (!room) return tl::unexpected(room.error());
+    const auto batch = trialBatch(**room);
+    SightTimes times;
+    for (auto& [sight, seconds] : {std::pair(Sight::kRays, &times.rays), std::pair(Sight::kImages, &times.images)}) {
+      sight_ = sight;
+      if (auto set = setScene(*room); !set) return tl::unexpected(set.error());
+      const auto taken = timeTrial(batch, *this);
+      if (!taken) return tl::unexpected(taken.error());
+      *seconds = *taken;
+    }
+    return times;
+  }
+
+  void forgetScene() {
+    has_scene_ = false;
+    patches_.reset();
+    packed_ = {};
+    nodes_ = triangles_ = 0;
+  }
+
+  Result<void> carryOut(const solver::ShotBatch& batch) {
+    if (!has_scene_) return fail(ErrorCode::kInternal, "setScene must come before run");
+    if (std::ranges::any_of(slots_, &Slot::takes_scene))
+      return fail(ErrorCode::kInternal, "finishScene must come after beginScene");
+    const ShotSpan shots = spanOf(batch);
+    if (auto good = checkShots(shots); !good) return good;
+    if (batch.mode == solver::LinkMode::kPaperMipmap && !paper_fits_) return tl::unexpected(paper_error_);
+    deaths_ = 0;
+    gather_shots_ = batch.gather.size();
+    chunks_ = cutBatch(batch, {triangles_, nodes_}, {slots_.size(), hands_});
+    queue_.clear();
+    for (std::size_t i = 0; i < chunks_.size(); ++i) queue_.push_back(i);
+    for (auto& slot : slots_) {
+      slot.held.clear();
+      slot.done.clear();
+      slot.counters = {};
+    }
+    auto done = work(batch);
+    if (!done) killAll();                         // what the workers have of this batch is void; so are they
+    for (auto& slot : slots_) slot.done.clear();  // who dies from here on takes nothing of it into the grave
+    return done;
+  }
+
+  void awaitScenes() {
+    for (auto& slot : slots_) {
+      if (!std::exchange(slot.takes_scene, false)) continue;
+      if (auto taken = slot.process->awaitScene(scenePatience()); !taken) lose(slot, taken.error());
+    }
+  }
+
+  /// A worker that did not take a scene in.
+  void lose(Slot& slot, const Error& why) {
+    slot.takes_scene = false;
+    if (!interrupted_) bury(slot, why);
+  }
+
+  [[nodiscard]] bool finished() const {
+    return queue_.empty() && std::all_of(slots_.begin(), slots_.end(), [](const Slot& s) { return s.held.empty(); });
+  }
+
+  [[nodiscard]] Patience patienceUntil(Clock::time_point deadline) const { return {deadline, wake_.get()}; }
+  [[nodiscard]] Patience startPatience() const { return patienceUntil(Clock::now() + kStartPatience); }
+  [[nodiscard]] Patience scenePatience() const {
+    const auto bytes = static_cast<double>(packed_.bytes().size() + fluxRegionBytes(nodes_));
+    return patienceUntil(Clock::now() + kStartPatience + seconds(bytes / kSlowSceneBytesPerSecond));
+  }
+
+  /// All at the same time: a dying worker needs some milliseconds to give its memory back.
+  void killAll() {
+    for (const auto& slot : slots_) {
+      if (slot.process) slot.process->kill();
+    }
+    for (auto& slot : slots_) slot.process.reset();
+  }
+
+  Result<void> work(const solver::ShotBatch& batch) {
+    while (!finished()) {
+      if (interrupted_) return fail(ErrorCode::kUnavailable, "interrupted");
+      if (auto replaced = replaceDead(); !replaced) return replaced;
+      for (auto& slot : slots_) feed(slot, batch);
+      listen();
+    }
+    return {};
+  }
+
+  void feed(Slot& slot, const solver::ShotBatch& batch) {
+    while (slot.process && slot.held.size() < kChunksAhead && !queue_.empty()) {
+      // Towards the end nobody takes a second chunk that another could start on.
+      if (!slot.held.empty() && queue_.size() < slots_.size()) break;
+      const auto chunk = queue_.front();
+      queue_.pop_front();
+      slot.held.push_back(chunk);
+      if (slot.held.size() == 1) startClock(slot);
+      const auto sent = slot.process->send(
+          MessageKind::kChunk, packChunk(batch, chunks_[chunk], chunk, take_ != nullptr), patienceUntil(slot.deadline));
+      if (!sent && !interrupted_) bury(slot, sent.error());
+      if (!sent) return;
+    }
+  }
+
+  /// The worker starts on the chunk it has held longest.
+  void startClock(Slot& slot) const {
+    slot.patience = options_.patience + seconds(kSlowPixelSeconds * chunks_[slot.held.front()].cost);
+    slot.deadline = Clock::now() + slot.patience;
+    slot.used_before = slot.used_lately = slot.process->processorTime();
+    slot.extensions = 0;
+  }
+
+  /// On a busy machine a worker may be late because it was hardly let run. It is given as long again, as long as it
+  /// uses what it gets, and until it has had in processor time what a chunk may take.
+  [[nodiscard]] bool givenMoreTime(Slot& slot) const {
+    const Clock::duration used = slot.process->processorTime();
+    const bool runs = used - slot.used_lately >= slot.patience / kLeastUse;
+    const auto most = slot.patience * static_cast<int>(hands_);  // that all its threads together may use
+    if (!runs || used - slot.used_before >= most) return false;
+    if (!slot.process->software() && ++slot.extensions > kMostExtensions) return false;
+    slot.used_lately = used;
+    slot.deadline = Clock::now() + slot.patience;
+    return true;
+  }
+
+  /// Waits until some worker has something to say and hears it, or until one is late and buries it, or for a wake-up.
+  void listen() {
+    std::vector<pollfd> polls;
+    auto deadline = Clock::time_point::max();
+    for (const auto& slot : slots_) {
+      const bool owes = slot.process && !slot.held.empty();
+      polls.push_back({owes ? slot.process->socket() : -1, POLLIN, 0});
+      if (owes) deadline = std::min(deadline, slot.deadline);
+    }
+    if (deadline == Clock::time_point::max()) return;  // a death emptied the hands of all; go on
+    polls.push_back({wake_.get(), POLLIN, 0});
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now()).count();
+    constexpr std::int64_t kLongestMs = 60'000;  // then it looks again
+    if (poll(polls.data(), polls.size(), static_cast<int>(std::clamp<std::int64_t>(left, 0, kLongestMs))) < 0) return;
+    if (polls.back().revents != 0) return;
+    const auto now = Clock::now();
+    for (std::size_t i = 0; i < slots_.size(); ++i) {
+      if (polls[i].fd < 0) continue;
+      if (polls[i].revents != 0) {
+        hear(slots_[i]);
+      } else if (now >= slots_[i].deadline && !givenMoreTime(slots_[i])) {
+        bury(slots_[i],
+             Error{ErrorCode::kUnavailable, fmt::format("worker process {} hangs", slots_[i].process->pid())});
+      }
+    }
+  }
+
+  void hear(Slot& slot) {
+    const auto message = slot.process->receive(MessageKind::kChunkDone, patienceUntil(slot.deadline));
+    if (!message) {
+      if (!interrupted_) bury(slot, message.error());
+      return;
+    }
+    BodyReader from(message->body);
+    const auto report = from.value<ChunkDoneBody>();
+    if (!from.good() || slot.held.empty() || slot.held.front() != report.chunk) {
+      bury(slot, Error{ErrorCode::kInternal, "a worker process reports work it was not given"});
+      return;
+    }
+    if (take_ != nullptr && !takeLinks(from, chunks_[report.chunk])) {
+      bury(slot, Error{ErrorCode::kInternal, "a worker process reports links that make no sense"});
+      return;
+    }
+    slot.held.pop_front();
+    slot.done.push_back(report.chunk);
+    if (!slot.held.empty()) startClock(slot);
+    slot.counters += report.counters;
+  }
+
+  /// Links are handed on in the order of the shots; what was handed on before its worker died and was measured again is
+  /// the same, and dropped.
+  [[nodiscard]] bool takeLinks(BodyReader& from, const Chunk& chunk) {
+    const auto first = chunk.first + (chunk.kind == ShotKind::kGather ? 0 : gather_shots_);
+    for (auto i = first; i < first + chunk.count; ++i) {
+      solver::LinkSample links;
+      if (!unpackLinks(from, nodes_, links)) return false;
+      if (i >= next_taken_) links_[i] = std::move(links);
+    }
+    for (; next_taken_ < links_.size() && links_[next_taken_]; ++next_taken_) {
+      (*take_)(next_taken_, std::move(*links_[next_taken_]));
+      links_[next_taken_].reset();
+    }
+    return true;
+  }
+
+  /// A worker is gone: its chunks go back into the queue, its accumulators with it into the grave.
+  void bury(Slot& slot, const Error& why) {
+    log::warn("{}; replacing it, {} chunks to be done again", why.text(), slot.held.size() + slot.done.size());
+    last_death_ = why.text();
+    ++deaths_;
+    ++losses_;
+    queue_.insert(queue_.end(), slot.held.begin(), slot.held.end());
+    queue_.insert(queue_.end(), slot.done.begin(), slot.done.end());
+    slot = Slot{};
+  }
+
+  Result<void> replaceDead() {
+    for (auto& slot : slots_) {
+      while (!slot.process) {
+        if (interrupted_) return fail(ErrorCode::kUnavailable, "interrupted");
+        if (deaths_ >= kMaxDeaths) {
+          return fail(ErrorCode::kUnavailable,
+                      fmt::format("gave up after {} worker processes died; the last: {}", deaths_, last_death_));
+        }
+        if (auto started = startOne(); started) {
+          slot.process = std::move(*started);
+        } else {
+          ++deaths_;
+          last_death_ = started.error().text();
+        }
+      }
+    }
+    return {};
+  }
+
+  [[nodiscard]] SceneBody sceneBody() const { return {nodes_, hands_, static_cast<std::uint64_t>(sight_)}; }
+
+  Result<WorkerProcess> startOne() {
+    auto process = WorkerProcess::start(options_.executable);
+    if (!process) return process;
+    if (auto ready = process->awaitReady(startPatience()); !ready) return tl::unexpected(ready.error());
+    if (!has_scene_) return process;
+    if (auto sent = process->sendScene(packed_, sceneBody(), scenePatience()); !sent)
+      return tl::unexpected(sent.error());
+    if (auto taken = process->awaitScene(scenePatience()); !taken) return tl::unexpected(taken.error());
+    return process;
+  }
+
+  WorkerOptions options_;
+  std::vector<Slot> slots_;
+  std::string renderer_;
+  std::size_t hands_;                ///< of each worker
+  Sight sight_;                      ///< of all workers, and of those that replace them
+  std::optional<SightTimes> times_;  ///< where both were tried
+  FileDescriptor wake_;
+  std::atomic<bool> interrupted_{false};
+  std::shared_ptr<const scene::PatchScene> patches_;
+  SharedMemory packed_;
+  std::size_t nodes_ = 0, triangles_ = 0;
+  bool has_scene_ = false;
+  bool paper_fits_ = true;  ///< whether the scene can be lit in paper mode, and why not
+  Error paper_error_;
+  std::vector<Chunk> chunks_;
+  std::size_t gather_shots_ = 0;                          ///< of the batch
+  const TakeLinks* take_ = nullptr;                       ///< where links are wanted
+  std::vector<std::optional<solver::LinkSample>> links_;  ///< by shot, of those that others must go before
+  std::size_t next_taken_ = 0;
+  std::deque<std::size_t> queue_;
+  int deaths_ = 0;            ///< in the present call
+  std::uint64_t losses_ = 0;  ///< in all
+  std::string last_death_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<solver::Transport>> makeWorkerTransport(const WorkerOptions& options) {
+  if (options.workers < 0 || options.workers > 256) {
+    return fail(ErrorCode::kBadUsage,
+                fmt::format("{} workers make no sense; use 0 (automatic) to 256", options.workers));
+  }
+  const auto cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  const auto count = options.workers == 0 ? cores : options.workers;
+  auto chosen = options;
+  if (chosen.executable.empty()) chosen.executable = "/proc/self/exe";
+  FileDescriptor wake(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
+  if (wake.get() < 0) return fail(ErrorCode::kUnavailable, "cannot make an event descriptor: too many are open");
+  auto workers = startWorkers(chosen.executable, static_cast<std::size_t>(count), options.workers == 0);
+  if (!workers) return tl::unexpected(workers.error());
+  const bool tries = chosen.make_trial_room && wantsTrial(chosen.sight, workers->front().software());
+  auto transport = std::make_unique<WorkerTransport>(std::move(chosen), std::move(*workers), std::move(wake));
+  if (tries) transport->trySights();
+  return transport;
+}
+
+}  // namespace radiosity::gpu

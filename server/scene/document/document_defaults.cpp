@@ -1,0 +1,175 @@
+#include "server/scene/document/document_defaults.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>
+#include <numbers>
+#include <vector>
+
+#include "common/task.h"
+
+namespace radiosity::scene {
+namespace {
+
+constexpr const char* kLights = "KHR_lights_punctual";
+constexpr const char* kVisibility = "KHR_node_visibility";
+constexpr const char* kSpecularGlossiness = "KHR_materials_pbrSpecularGlossiness";
+constexpr const char* kEmissiveStrength = "KHR_materials_emissive_strength";
+
+void setDefault(Json& object, const char* member, Json value) {
+  if (!object.contains(member)) object[member] = std::move(value);
+}
+
+Json toJson(const glm::dvec3& v) { return Json::array({v.x, v.y, v.z}); }
+
+bool readMatrix(const Json& matrix, double (&m)[16]) {
+  if (!matrix.is_array() || matrix.size() != 16) return false;
+  for (std::size_t i = 0; i < 16; ++i) {
+    if (!matrix[i].is_number()) return false;
+    m[i] = matrix[i].get<double>();
+  }
+  return true;
+}
+
+/// Column-major M = T R S when there is such a thing: the columns must be at right angles and none zero.
+bool decompose(const double (&m)[16], Json& node) {
+  if (m[3] != 0 || m[7] != 0 || m[11] != 0 || m[15] != 1) return false;
+  glm::dmat3 rotation(m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]);
+  glm::dvec3 scale(glm::length(rotation[0]), glm::length(rotation[1]), glm::length(rotation[2]));
+  if (!(scale.x > 0 && scale.y > 0 && scale.z > 0)) return false;
+  if (glm::determinant(rotation) < 0) scale.x = -scale.x;
+  for (int c = 0; c < 3; ++c) rotation[c] /= scale[c];
+  constexpr double kTolerance = 1e-5;  // matrices written in 32-bit float are orthogonal to about 1e-6
+  const auto error = glm::transpose(rotation) * rotation - glm::dmat3(1.0);
+  for (int c = 0; c < 3; ++c) {
+    for (int r = 0; r < 3; ++r) {
+      if (!(std::abs(error[c][r]) < kTolerance)) return false;
+    }
+  }
+  const auto q = glm::normalize(glm::quat_cast(rotation));
+  node["translation"] = toJson({m[12], m[13], m[14]});
+  node["rotation"] = Json::array({q.x, q.y, q.z, q.w});
+  node["scale"] = toJson(scale);
+  return true;
+}
+
+bool materialiseVisibility(Json& node) {
+  setDefault(node, "extensions", Json::object());
+  auto& extensions = node["extensions"];
+  if (!extensions.is_object()) return false;
+  setDefault(extensions, kVisibility, Json::object());
+  if (extensions[kVisibility].is_object()) setDefault(extensions[kVisibility], "visible", true);
+  return true;
+}
+
+void materialiseTransform(Json& node) {
+  const bool has_trs = node.contains("translation") || node.contains("rotation") || node.contains("scale");
+  if (node.contains("matrix")) {
+    double m[16];
+    if (has_trs || !readMatrix(node["matrix"], m) || !decompose(m, node)) return;
+    node.erase("matrix");
+    return;
+  }
+  setDefault(node, "translation", toJson(glm::dvec3(0.0)));
+  setDefault(node, "rotation", Json::array({0.0, 0.0, 0.0, 1.0}));
+  setDefault(node, "scale", toJson(glm::dvec3(1.0)));
+}
+
+/// A file without scenes shows every node that has no parent; written out, so that a node can be detached from it.
+void materialiseScenes(Json& gltf) {
+  const auto nodes = gltf.find("nodes");
+  if (nodes == gltf.end() || !nodes->is_array() || nodes->empty()) return;
+  if (const auto scenes = gltf.find("scenes"); scenes != gltf.end() && !(scenes->is_array() && scenes->empty())) {
+    setDefault(gltf, "scene", 0);
+    return;
+  }
+  std::vector<bool> has_parent(nodes->size(), false);
+  for (const auto& node : *nodes) {
+    if (!node.is_object() || !node.contains("children") || !node["children"].is_array()) continue;
+    for (const auto& child : node["children"]) {
+      if (child.is_number_unsigned() && child.get<std::size_t>() < has_parent.size())
+        has_parent[child.get<std::size_t>()] = true;
+    }
+  }
+  Json roots = Json::array();
+  for (std::size_t n = 0; n < has_parent.size(); ++n) {
+    if (!has_parent[n]) roots.push_back(n);
+  }
+  if (roots.empty()) return;  // a cycle, which importScene refuses
+  gltf["scenes"] = Json::array({{{"nodes", std::move(roots)}}});
+  gltf["scene"] = 0;
+}
+
+bool materialiseMaterial(Json& material) {
+  if (!material.is_object()) return false;
+  setDefault(material, "pbrMetallicRoughness", Json::object());
+  if (auto& pbr = material["pbrMetallicRoughness"]; pbr.is_object()) {
+    setDefault(pbr, "baseColorFactor", Json::array({1.0, 1.0, 1.0, 1.0}));
+    setDefault(pbr, "metallicFactor", 1.0);
+    setDefault(pbr, "roughnessFactor", 1.0);
+  }
+  setDefault(material, "emissiveFactor", toJson(glm::dvec3(0.0)));
+  setDefault(material, "alphaMode", "OPAQUE");
+  setDefault(material, "alphaCutoff", 0.5);
+  setDefault(material, "doubleSided", false);
+  setDefault(material, "extensions", Json::object());
+  auto& extensions = material["extensions"];
+  if (!extensions.is_object()) return false;
+  setDefault(extensions, kEmissiveStrength, Json::object());
+  auto& strength = extensions[kEmissiveStrength];
+  if (strength.is_object()) setDefault(strength, "emissiveStrength", 1.0);
+  if (const auto found = extensions.find(kSpecularGlossiness); found != extensions.end() && found->is_object()) {
+    setDefault(*found, "diffuseFactor", Json::array({1.0, 1.0, 1.0, 1.0}));
+    setDefault(*found, "specularFactor", Json::array({1.0, 1.0, 1.0}));
+    setDefault(*found, "glossinessFactor", 1.0);
+  }
+  return true;
+}
+
+void materialiseLights(Json& gltf) {
+  const auto extensions = gltf.find("extensions");
+  if (extensions == gltf.end() || !extensions->is_object() || !extensions->contains(kLights)) return;
+  auto& extension = (*extensions)[kLights];
+  if (!extension.is_object() || !extension.contains("lights") || !extension["lights"].is_array()) return;
+  for (auto& light : extension["lights"]) {
+    if (!light.is_object()) continue;
+    setDefault(light, "color", Json::array({1.0, 1.0, 1.0}));
+    setDefault(light, "intensity", 1.0);
+    if (!light.contains("spot") || !light["spot"].is_object()) continue;
+    setDefault(light["spot"], "innerConeAngle", 0.0);
+    setDefault(light["spot"], "outerConeAngle", std::numbers::pi / 4.0);
+  }
+}
+
+void markUsed(Json& gltf, const char* extension) {
+  setDefault(gltf, "extensionsUsed", Json::array());
+  auto& used = gltf["extensionsUsed"];
+  if (used.is_array() && std::find(used.begin(), used.end(), extension) == used.end()) used.push_back(extension);
+}
+
+}  // namespace
+
+void materialiseDefaults(Json& gltf) {
+  if (!gltf.is_object()) return;
+  if (const auto nodes = gltf.find("nodes"); nodes != gltf.end() && nodes->is_array()) {
+    bool visibility = false;
+    for (auto& node : *nodes) {
+      interruptionPoint();
+      if (!node.is_object()) continue;
+      materialiseTransform(node);
+      visibility |= materialiseVisibility(node);
+    }
+    if (visibility) markUsed(gltf, kVisibility);
+  }
+  materialiseScenes(gltf);
+  bool strength = false;
+  if (const auto materials = gltf.find("materials"); materials != gltf.end() && materials->is_array()) {
+    for (auto& material : *materials) strength |= materialiseMaterial(material);
+  }
+  materialiseLights(gltf);
+  if (strength) markUsed(gltf, kEmissiveStrength);
+}
+
+}  // namespace radiosity::scene

@@ -1,0 +1,200 @@
+#include "server/scene/document/image_decode.h"
+
+#include <stb_image.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <glm/vec2.hpp>
+#include <limits>
+#include <memory>
+
+#include "common/parallel.h"
+#include "server/scene/values/shade_texture.h"
+
+namespace radiosity::scene {
+namespace {
+
+/// Of a picture that is made smaller: fewer are not worth a thread.
+constexpr std::size_t kBytesAThread = std::size_t{1} << 18;
+
+std::string decoderReason() {
+  const char* reason = stbi_failure_reason();
+  return reason == nullptr ? "unknown reason" : reason;
+}
+
+std::uint8_t coded(float value, bool srgb) {
+  const float of = !srgb                 ? value
+                   : value <= 0.0031308F ? 12.92F * value
+                                         : 1.055F * std::pow(value, 1.0F / 2.4F) - 0.055F;
+  return static_cast<std::uint8_t>(std::lround(255.0F * std::clamp(of, 0.0F, 1.0F)));
+}
+
+/// Linear values as bytes. A power for each of millions of pixels would take longer than to decode them.
+class ByteCoder {
+ public:
+  explicit ByteCoder(bool srgb) {
+    for (std::size_t byte = 1; byte < least_.size(); ++byte)
+      least_[byte] = leastOf(static_cast<std::uint8_t>(byte), srgb);
+    for (std::size_t i = 0, byte = 0; i < first_.size(); ++i) {
+      while (byte + 1 < least_.size() && least_[byte + 1] <= static_cast<float>(i) / kSteps) ++byte;
+      first_[i] = static_cast<std::uint8_t>(byte);
+    }
+  }
+
+  /// As coded().
+  [[nodiscard]] std::uint8_t operator()(float value) const {
+    value = std::clamp(value, 0.0F, 1.0F);
+    std::size_t byte = first_[static_cast<std::size_t>(value * kSteps)];
+    while (byte < 255 && value >= least_[byte + 1]) ++byte;
+    return static_cast<std::uint8_t>(byte);
+  }
+
+ private:
+  static constexpr float kSteps = 4096.0F;
+
+  /// The least value that is coded so. Positive floats are in the order of their bits.
+  static float leastOf(std::uint8_t byte, bool srgb) {
+    std::uint32_t low = 0, high = std::bit_cast<std::uint32_t>(1.0F);
+    while (low < high) {
+      const auto middle = low + (high - low) / 2;
+      if (coded(std::bit_cast<float>(middle), srgb) >= byte) {
+        high = middle;
+      } else {
+        low = middle + 1;
+      }
+    }
+    return std::bit_cast<float>(low);
+  }
+
+  std::array<float, 256> least_{};          ///< by byte
+  std::array<std::uint8_t, 4097> first_{};  ///< by value, in steps: the byte of the step's beginning
+};
+
+const ByteCoder& coderOf(bool srgb) {
+  static const ByteCoder kPlain(false), kSrgb(true);
+  return srgb ? kSrgb : kPlain;
+}
+
+/// Pixels that are somebody else's.
+struct Pixels {
+  const std::uint8_t* rgba;
+  int width, height;
+  bool srgb;
+};
+
+/// Of colours, and of alpha.
+struct Coders {
+  const ByteCoder &colour, &alpha;
+};
+
+/// The mean of a block of pixels.
+void average(const Pixels& from, const glm::ivec2& low, const glm::ivec2& end, const Coders& coders,
+             std::uint8_t* out) {
+  glm::vec3 plain(0.0F), covered(0.0F);
+  float alpha = 0.0F;
+  for (int y = low.y; y < end.y; ++y)
+    for (int x = low.x; x < end.x; ++x) {
+      const auto index = static_cast<std::size_t>(y) * static_cast<std::size_t>(from.width);
+      const auto pixel = linearPixel(from.rgba + 4 * (index + static_cast<std::size_t>(x)), from.srgb);
+      plain += glm::vec3(pixel);
+      covered += glm::vec3(pixel) * pixel.a;
+      alpha += pixel.a;
+    }
+  const auto count = static_cast<float>((end.x - low.x) * (end.y - low.y));
+  const auto rgb = from.srgb && alpha > 0.0F ? covered / alpha : plain / count;
+  for (int c = 0; c < 3; ++c) out[c] = coders.colour(rgb[c]);
+  out[3] = coders.alpha(alpha / count);
+}
+
+Texture halved(const Pixels& from) {
+  Texture to;
+  to.width = std::max(1, from.width / 2);
+  to.height = std::max(1, from.height / 2);
+  to.srgb = from.srgb;
+  const auto row = std::size_t{4} * static_cast<std::size_t>(to.width);
+  to.rgba.resize(row * static_cast<std::size_t>(to.height));
+  // Of odd sizes the last pixel takes in one more.
+  const auto endOf = [](int i, int size, int all) { return i + 1 == size ? all : 2 * (i + 1); };
+  const Coders coders{coderOf(from.srgb), coderOf(false)};
+  inTurns(
+      static_cast<std::size_t>(to.height),
+      [&](std::size_t turn) {
+        const auto y = static_cast<int>(turn);
+        auto* out = to.rgba.data() + row * turn;
+        for (int x = 0; x < to.width; ++x, out += 4)
+          average(from, {2 * x, 2 * y}, {endOf(x, to.width, from.width), endOf(y, to.height, from.height)}, coders,
+                  out);
+      },
+      to.rgba.size() / kBytesAThread);
+  return to;
+}
+
+Pixels pixelsOf(const Texture& texture) { return {texture.rgba.data(), texture.width, texture.height, texture.srgb}; }
+
+}  // namespace
+
+std::string sniffImageType(const Bytes& bytes) {
+  constexpr std::array<std::uint8_t, 8> kPng = {0x89, 'P', 'N', 'G', 0x0D, 0x0A, 0x1A, 0x0A};
+  constexpr std::array<std::uint8_t, 3> kJpeg = {0xFF, 0xD8, 0xFF};
+  const auto starts = [&](const auto& magic) {
+    return bytes.size() >= magic.size() && std::equal(magic.begin(), magic.end(), bytes.begin());
+  };
+  if (starts(kPng)) return "image/png";
+  if (starts(kJpeg)) return "image/jpeg";
+  return "";
+}
+
+Result<ImageSize> sizeOfImage(const Bytes& bytes, std::size_t max_pixels, const std::string& where) {
+  // stb_image knows more formats, but glTF does not, and they are the less tested ones.
+  if (sniffImageType(bytes).empty()) return fail(ErrorCode::kUnsupported, "is neither PNG nor JPEG", where);
+  if (bytes.size() > static_cast<std::size_t>(std::numeric_limits<int>::max())) {
+    return fail(ErrorCode::kTooLarge, "image file has more than 2 GiB", where);
+  }
+  int width = 0, height = 0, channels = 0;
+  if (stbi_info_from_memory(bytes.data(), static_cast<int>(bytes.size()), &width, &height, &channels) == 0 ||
+      width <= 0 || height <= 0) {
+    return fail(ErrorCode::kBadInput, "image header cannot be read: " + decoderReason(), where);
+  }
+  const ImageSize size{static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height)};
+  if (size.pixels() > max_pixels) {
+    return fail(ErrorCode::kTooLarge,
+                "image is " + std::to_string(width) + " x " + std::to_string(height) + "; the limit is " +
+                    std::to_string(max_pixels) + " pixels",
+                where);
+  }
+  return size;
+}
+
+Result<Texture> decodeImage(const Bytes& bytes, std::size_t max_pixels, const std::string& where, const ImageUse& use) {
+  const auto size = sizeOfImage(bytes, max_pixels, where);
+  if (!size) return tl::unexpected(size.error());
+  int width = 0, height = 0, channels = 0;
+  std::unique_ptr<stbi_uc, void (*)(void*)> rgba(
+      stbi_load_from_memory(bytes.data(), static_cast<int>(bytes.size()), &width, &height, &channels, 4),
+      stbi_image_free);
+  const auto pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  // The size is checked again: the header scan and the decoder are two readers of one file.
+  if (!rgba || pixels != size->pixels()) {
+    return fail(ErrorCode::kBadInput, "image cannot be decoded: " + decoderReason(), where);
+  }
+  if (use.halvings > 0) {  // what is held is never copied at the size of the file
+    auto texture = halved({rgba.get(), width, height, use.srgb});
+    rgba.reset();
+    halve(texture, use.halvings - 1);
+    return texture;
+  }
+  Texture texture;
+  texture.width = width;
+  texture.height = height;
+  texture.srgb = use.srgb;
+  texture.rgba.assign(rgba.get(), rgba.get() + pixels * 4);
+  return texture;
+}
+
+void halve(Texture& texture, std::uint32_t times) {
+  for (std::uint32_t i = 0; i < times; ++i) texture = halved(pixelsOf(texture));
+}
+
+}  // namespace radiosity::scene

@@ -1,0 +1,45 @@
+// What the parts of the importer share while one document is read. Lives for one importScene call, on its thread.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/scene/document/document.h"
+#include "server/scene/import/import_model.h"
+#include "server/scene/import/import_record.h"
+#include "server/scene/document/json_text.h"
+#include "server/scene/values/scene.h"
+
+namespace radiosity::scene {
+
+struct ImportContext {
+  const Document& document;
+  const ImportLimits& limits;
+  const tinygltf::Model& model;  ///< but for its materials
+  const std::vector<tinygltf::Material>& materials;
+  const ImportRecord* before;  ///< of the document before an edit; null: none, or not known
+  DecodedImages& images;       ///< gets those that are used
+  Scene& scene;
+  std::uint64_t claimed_bytes = 0;  ///< of memory, by all but images (scene_memory.h)
+
+  void warn(std::string_view pointer, std::string_view what) {
+    scene.warnings.push_back(place(document.name, pointer) + ": " + std::string(what));
+  }
+  [[nodiscard]] tl::unexpected<Error> bad(std::string_view pointer, std::string what) const {
+    return fail(ErrorCode::kInvalidScene, std::move(what), place(document.name, pointer));
+  }
+  [[nodiscard]] tl::unexpected<Error> tooLarge(std::string_view pointer, std::string what) const {
+    return fail(ErrorCode::kTooLarge, std::move(what), place(document.name, pointer));
+  }
+};
+
+/// An extension object of a checked JSON object, or null.
+[[nodiscard]] inline const Json* extensionOf(const Json& object, const char* name) {
+  const auto extensions = object.find("extensions");
+  if (extensions == object.end()) return nullptr;
+  const auto found = extensions->find(name);
+  return found == extensions->end() ? nullptr : &*found;
+}
+
+}  // namespace radiosity::scene

@@ -1,0 +1,362 @@
+#include "server/scene/import/import_material.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+
+#include "common/parallel.h"
+#include "common/task.h"
+#include "server/scene/document/image_decode.h"
+#include "server/scene/import/image_plan.h"
+#include "server/scene/import/texture_references.h"
+
+namespace radiosity::scene {
+namespace {
+
+constexpr int kRepeat = 10497;
+constexpr int kClamp = 33071;
+constexpr int kMirror = 33648;
+constexpr int kNearest = 9728;
+constexpr const char* kSpecularGlossiness = "KHR_materials_pbrSpecularGlossiness";
+
+float unit(double value) { return static_cast<float>(std::clamp(value, 0.0, 1.0)); }
+
+class MaterialImporter {
+ public:
+  MaterialImporter(ImportContext& context, const ImagePlan& plan) : context_(context), plan_(plan) {}
+
+  Result<void> add(std::size_t index) {
+    pointer_ = "/materials/" + std::to_string(index);
+    const auto& source = context_.materials[index];
+    const auto& json = context_.document.gltf["materials"][index];
+    forEachTextureInfo(json, pointer_, [&](const Json& owner, const std::string& key, const std::string& where) {
+      warnDanglingReference(owner[key], "index", "textures", where, "the texture is left out");
+    });
+    Material out;
+    out.name = source.name;
+    out.double_sided = source.doubleSided;
+    out.alpha_cutoff = static_cast<float>(source.alphaCutoff);
+    if (auto ok = readAlphaMode(source, out); !ok) return ok;
+    if (auto ok = readEmission(source, json, out); !ok) return ok;
+    const auto* specular = extensionOf(json, kSpecularGlossiness);
+    if (auto ok = specular != nullptr ? readSpecular(*specular, json, out) : readMetallic(source, json, out); !ok)
+      return ok;
+    readOthers(json, out);
+    context_.scene.materials.push_back(std::move(out));
+    return {};
+  }
+
+ private:
+  Result<void> readAlphaMode(const tinygltf::Material& source, Material& out) {
+    if (source.alphaMode == "MASK") {
+      out.alpha_mode = AlphaMode::kMask;
+    } else if (source.alphaMode == "BLEND") {
+      out.alpha_mode = AlphaMode::kBlend;
+    } else if (source.alphaMode != "OPAQUE") {
+      return context_.bad(pointer_ + "/alphaMode", "must be OPAQUE, MASK or BLEND");
+    }
+    return {};
+  }
+
+  Result<void> readEmission(const tinygltf::Material& source, const Json& json, Material& out) {
+    double strength = 1.0;
+    if (const auto* extension = extensionOf(json, "KHR_materials_emissive_strength")) {
+      strength = extension->value("emissiveStrength", 1.0);
+    }
+    for (int c = 0; c < 3; ++c) {
+      const auto factor = source.emissiveFactor[static_cast<std::size_t>(c)];
+      out.emission[c] = static_cast<float>(factor * strength);
+      // Beyond this, sums of squares in the error estimate would leave single precision.
+      if (!(out.emission[c] <= 1e15F)) return context_.bad(pointer_ + "/emissiveFactor", "is too bright to hold");
+    }
+    if (*std::max_element(source.emissiveFactor.begin(), source.emissiveFactor.end()) > 1.0) {
+      context_.warn(pointer_ + "/emissiveFactor",
+                    "is above 1, which glTF leaves to KHR_materials_emissive_strength; taken as it is");
+    }
+    if (out.emission == glm::vec3(0.0F)) return {};  // its texture changes nothing
+    return readTexture(json, "/emissiveTexture", Coding::kSrgb, out.emissive_texture);
+  }
+
+  Result<void> readMetallic(const tinygltf::Material& source, const Json& json, Material& out) {
+    const auto& color = source.pbrMetallicRoughness.baseColorFactor;
+    out.base_color = {unit(color[0]), unit(color[1]), unit(color[2])};
+    out.alpha = unit(color[3]);
+    const auto* base = "/pbrMetallicRoughness/baseColorTexture";
+    if (auto ok = readTexture(json, base, Coding::kSrgb, out.base_color_texture); !ok) return ok;
+    out.metallic = unit(source.pbrMetallicRoughness.metallicFactor);
+    if (out.metallic == 0.0F) return {};
+    const auto* member = "/pbrMetallicRoughness/metallicRoughnessTexture";
+    if (auto ok = readTexture(json, member, Coding::kLinear, out.metallic_texture); !ok) return ok;
+    foldMetallic(out);
+    if (out.metallic >= 0.999F && out.metallic_texture.texture == kNone) {
+      context_.warn(pointer_, "'" + source.name + "' is wholly metallic and so reflects nothing diffusely");
+    }
+    return {};
+  }
+
+  /// Most textures say the same of all the surface, and need not be kept.
+  void foldMetallic(Material& out) {
+    if (!uniform_blue_) return;
+    out.metallic *= *uniform_blue_;
+    out.metallic_texture = {};
+  }
+
+  /// KHR_materials_pbrSpecularGlossiness, which comes before pbrMetallicRoughness where a material has both.
+  Result<void> readSpecular(const Json& extension, const Json& material, Material& out) {
+    const auto factor = [&](const char* member, std::size_t c) {
+      return extension.contains(member) ? unit(extension[member][c].get<double>()) : 1.0F;
+    };
+    for (std::size_t c = 0; c < 3; ++c) {
+      out.base_color[static_cast<int>(c)] = factor("diffuseFactor", c);
+      out.specular[static_cast<int>(c)] = factor("specularFactor", c);
+    }
+    out.alpha = factor("diffuseFactor", 3);
+    const std::string prefix = std::string("/extensions/") + kSpecularGlossiness;
+    if (auto ok = readTexture(material, prefix + "/diffuseTexture", Coding::kSrgb, out.base_color_texture); !ok)
+      return ok;
+    if (out.specular == glm::vec3(0.0F)) return {};
+    const auto texture = prefix + "/specularGlossinessTexture";
+    if (auto ok = readTexture(material, texture, Coding::kSrgb, out.specular_texture); !ok) return ok;
+    const bool mirror = std::max({out.specular.r, out.specular.g, out.specular.b}) >= 0.999F;
+    if (mirror && out.specular_texture.texture == kNone) {
+      context_.warn(pointer_, "'" + out.name + "' is wholly specular and so reflects nothing diffusely");
+    }
+    return {};
+  }
+
+  void readOthers(const Json& json, Material& out) {
+    if (const auto* transmission = extensionOf(json, "KHR_materials_transmission")) {
+      out.transmission = unit(transmission->value("transmissionFactor", 0.0));
+      if (transmission->contains("transmissionTexture")) {
+        context_.warn(pointer_, "transmissionTexture is ignored; the factor is used all over");
+      }
+    }
+    if (extensionOf(json, "KHR_materials_unlit") != nullptr) {
+      context_.warn(pointer_, "KHR_materials_unlit: lit like any other surface");
+    }
+  }
+
+  /// A reference that the schema lets pass although nothing is there.
+  void warnDanglingReference(const Json& object, const char* member, const char* list, const std::string& where,
+                             const char* what) {
+    const auto count = countOf(context_.document.gltf, list);
+    if (!object.contains(member) || referenceOf(object, member, count)) return;
+    context_.warn(where + "/" + member, "is " + object[member].dump() + ", but /" + list + " has " +
+                                            std::to_string(count) + " entries; " + what);
+  }
+
+  enum class Coding { kSrgb, kLinear };
+
+  /// `member`: a JSON pointer into the material. Without such a texture, or with one that cannot be had, `use` stays as
+  /// it is.
+  Result<void> readTexture(const Json& material, const std::string& member, Coding coding, TextureUse& use) {
+    uniform_blue_.reset();
+    const Json::json_pointer pointer(member);
+    if (!material.contains(pointer)) return {};
+    const auto& info = material.at(pointer);
+    const auto index = referenceOf(info, "index", countOf(context_.document.gltf, "textures"));
+    if (!index) return {};
+    const auto& texture = context_.document.gltf["textures"][*index];
+    const auto image = imageOf(texture, "/textures/" + std::to_string(*index));
+    if (!image) return {};
+    TextureUse read;
+    read.texcoord = static_cast<int>(info.value("texCoord", 0));
+    readTransform(info, read);
+    if (read.texcoord > 1) {
+      context_.warn(pointer_ + member + "/texCoord", "only TEXCOORD_0 and TEXCOORD_1 are read; 0 is used");
+      read.texcoord = 0;
+    }
+    // Where a file names no filter the choice is ours. Charts of an atlas lie side by side, and metal is a matter of
+    // yes or no: a texel of it does not shade off into the next.
+    read.nearest = coding == Coding::kLinear;
+    if (auto ok = readSampler(texture, read); !ok) return ok;
+    const auto loaded = coding == Coding::kSrgb ? colorTexture(*image) : dataTexture(*image);
+    if (!loaded) return tl::unexpected(loaded.error());
+    read.texture = *loaded;
+    use = read;
+    return {};
+  }
+
+  /// The image of a texture that is used; without one there is no texture, with a warning.
+  std::optional<std::size_t> imageOf(const Json& texture, const std::string& where) {
+    const auto image = referenceOf(texture, "source", context_.document.images.size());
+    if (!warned_.insert(where).second) return image;
+    if (!texture.contains("source")) context_.warn(where, "has no source that we can read; white is used");
+    warnDanglingReference(texture, "source", "images", where, "the texture is left out");
+    warnDanglingReference(texture, "sampler", "samplers", where, "the texture repeats and is filtered linearly");
+    return image;
+  }
+
+  static void readTransform(const Json& info, TextureUse& use) {
+    const auto* transform = extensionOf(info, "KHR_texture_transform");
+    if (transform == nullptr) return;
+    const auto pair = [&](const char* member, glm::vec2 otherwise) {
+      if (!transform->contains(member)) return otherwise;
+      const auto& v = (*transform)[member];
+      return glm::vec2(v[0].get<float>(), v[1].get<float>());
+    };
+    use.offset = pair("offset", use.offset);
+    use.scale = pair("scale", use.scale);
+    use.rotation = static_cast<float>(transform->value("rotation", 0.0));
+    use.texcoord = transform->value("texCoord", use.texcoord);
+  }
+
+  Result<void> readSampler(const Json& texture, TextureUse& use) {
+    const auto index = referenceOf(texture, "sampler", countOf(context_.document.gltf, "samplers"));
+    if (!index) return {};
+    const auto& sampler = context_.document.gltf["samplers"][*index];
+    const int wrap_s = sampler.value("wrapS", kRepeat), wrap_t = sampler.value("wrapT", kRepeat);
+    for (const auto wrap : {wrap_s, wrap_t}) {
+      if (wrap != kRepeat && wrap != kClamp && wrap != kMirror)
+        return context_.bad("/samplers/" + std::to_string(*index), "unknown wrap mode " + std::to_string(wrap));
+    }
+    use.repeat_u = wrap_s != kClamp;
+    use.repeat_v = wrap_t != kClamp;
+    use.mirror_u = wrap_s == kMirror;
+    use.mirror_v = wrap_t == kMirror;
+    if (sampler.contains("magFilter")) use.nearest = sampler["magFilter"] == kNearest;
+    return {};
+  }
+
+  /// As large as it is to be held.
+  [[nodiscard]] Result<Texture> decodeNow(std::size_t image, bool srgb) const {
+    return decodeImage(*context_.document.images[image], context_.limits.max_image_pixels,
+                       place(context_.document.name, "/images/" + std::to_string(image)),
+                       {srgb, plan_.halvings[image]});
+  }
+
+  /// Of large pictures the next one is decoded at the same time: materials mostly ask for them in their order.
+  Result<Texture> decode(std::size_t image, bool srgb) {
+    auto ahead = std::exchange(ahead_, std::nullopt);
+    if (ahead && ahead->image == image && ahead->srgb == srgb) return std::move(ahead->texture);
+    ahead.reset();  // one more is all there is room for
+    const auto next = nextLarge(image, srgb);
+    if (!next) return decodeNow(image, srgb);
+    std::array<std::optional<Result<Texture>>, 2> textures;
+    const auto decodeOne = [&](std::size_t share) { textures[share] = decodeNow(share == 0 ? image : *next, srgb); };
+    doShares(textures.size(), ShareOfWork(decodeOne));
+    ahead_ = Ahead{*next, srgb, std::move(*textures[1])};
+    return std::move(*textures[0]);
+  }
+
+  /// Of those that are held smaller than they are.
+  [[nodiscard]] std::optional<std::size_t> nextLarge(std::size_t image, bool srgb) const {
+    if (!plan_.two_at_once || plan_.halvings[image] == 0) return std::nullopt;
+    const auto isDone = [&](std::size_t other) {
+      return srgb ? color_textures_.contains(other) : data_textures_.contains(other);
+    };
+    for (auto next = image + 1; next < plan_.halvings.size(); ++next)
+      if (plan_.halvings[next] > 0 && !isDone(next) && known(next) == nullptr) return next;
+    return std::nullopt;
+  }
+
+  /// What the document before had of the same bytes, if it is as large.
+  [[nodiscard]] const DecodedImage* known(std::size_t image) const {
+    if (context_.before == nullptr) return nullptr;
+    const auto found = context_.before->images.find(context_.document.images[image]);
+    if (found == context_.before->images.end() || found->second.halvings != plan_.halvings[image]) return nullptr;
+    return &found->second;
+  }
+
+  /// Where it is kept for the next edit.
+  DecodedImage& keep(std::size_t image) {
+    auto& kept = context_.images[context_.document.images[image]];
+    kept.halvings = plan_.halvings[image];
+    return kept;
+  }
+
+  Result<std::uint32_t> colorTexture(std::size_t image) {
+    if (const auto found = color_textures_.find(image); found != color_textures_.end()) return found->second;
+    const auto* before = known(image);
+    auto color = before != nullptr ? before->color : nullptr;
+    if (!color) {
+      auto texture = decode(image, true);
+      if (!texture) return tl::unexpected(texture.error());
+      color = std::make_shared<const Texture>(std::move(*texture));
+    }
+    keep(image).color = color;
+    const auto index = static_cast<std::uint32_t>(context_.scene.textures.size());
+    context_.scene.textures.push_back(std::move(color));
+    color_textures_[image] = index;
+    return index;
+  }
+
+  /// kNone where blue is the same all over: `uniform_blue_` then is that.
+  Result<std::uint32_t> dataTexture(std::size_t image) {
+    auto found = data_textures_.find(image);
+    if (found == data_textures_.end()) {
+      const auto loaded = loadData(image);
+      if (!loaded) return tl::unexpected(loaded.error());
+      found = data_textures_.emplace(image, *loaded).first;
+    }
+    uniform_blue_ = found->second.blue;
+    return found->second.texture;
+  }
+
+  struct DataTexture {
+    std::uint32_t texture = kNone;
+    std::optional<float> blue;
+  };
+
+  Result<DataTexture> loadData(std::size_t image) {
+    const auto* before = known(image);
+    auto data = before != nullptr ? before->data : nullptr;
+    auto blue = before != nullptr ? before->blue : std::nullopt;
+    if (!data && !blue) {
+      auto texture = decode(image, false);
+      if (!texture) return tl::unexpected(texture.error());
+      blue = sameBlue(*texture);
+      if (!blue) data = std::make_shared<const Texture>(std::move(*texture));
+    }
+    auto& kept = keep(image);
+    kept.data = data;
+    kept.blue = blue;
+    if (blue) return DataTexture{kNone, blue};
+    context_.scene.textures.push_back(std::move(data));
+    return DataTexture{static_cast<std::uint32_t>(context_.scene.textures.size() - 1), std::nullopt};
+  }
+
+  static std::optional<float> sameBlue(const Texture& texture) {
+    for (std::size_t i = 2; i < texture.rgba.size(); i += 4) {
+      if (texture.rgba[i] != texture.rgba[2]) return std::nullopt;
+    }
+    return texture.rgba.size() > 2 ? static_cast<float>(texture.rgba[2]) / 255.0F : 1.0F;
+  }
+
+  ImportContext& context_;
+  const ImagePlan& plan_;
+  std::string pointer_;
+  std::map<std::size_t, std::uint32_t> color_textures_;  ///< by image
+  std::map<std::size_t, DataTexture> data_textures_;     ///< by image
+  struct Ahead {
+    std::size_t image;
+    bool srgb;
+    Result<Texture> texture;
+  };
+  std::optional<Ahead> ahead_;         ///< what nobody has asked for yet
+  std::optional<float> uniform_blue_;  ///< of the last data texture that was asked for
+  std::set<std::string> warned_;       ///< textures whose references were looked at
+};
+
+}  // namespace
+
+Result<void> importMaterials(ImportContext& context) {
+  const auto plan = planImages(context.document, context.claimed_bytes, context.limits);
+  if (!plan) return tl::unexpected(plan.error());
+  if (plan->halved > 0)
+    context.warn("/images", std::to_string(plan->halved) + " images are so large together that they are read at half " +
+                                "their width and height, or less");
+  MaterialImporter importer(context, *plan);
+  for (std::size_t i = 0; i < context.materials.size(); ++i) {
+    interruptionPoint();
+    if (auto ok = importer.add(i); !ok) return ok;
+  }
+  return {};
+}
+
+}  // namespace radiosity::scene

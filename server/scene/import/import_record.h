@@ -1,0 +1,39 @@
+// What importing a document leaves for importing it after an edit. Immutable once there; any thread.
+#pragma once
+
+#include <tiny_gltf.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "common/bytes.h"
+#include "server/scene/values/scene.h"
+
+namespace radiosity::scene {
+
+struct DecodedImage {
+  SharedList<Texture>::Element color;  ///< sRGB; null: not asked for
+  SharedList<Texture>::Element data;   ///< linear; null: not asked for, or blue is the same all over
+  std::optional<float> blue;           ///< 0 to 1: that which is the same all over
+  std::uint8_t halvings = 0;           ///< of width and height (ImagePlan)
+};
+/// By the bytes that they are decoded from, which so stay those of that image.
+using DecodedImages = std::map<SharedBytes, DecodedImage>;
+
+struct ImportRecord {
+  std::shared_ptr<const tinygltf::Model> model;  ///< but for its materials, which change most often
+  std::vector<tinygltf::Material> materials;
+  DecodedImages images;             ///< that the materials use
+  std::uint64_t claimed_bytes = 0;  ///< of memory, by all but images
+  Scene scene;                      ///< shares what is large with the one that was imported
+  /// Of its warnings, how many there were after each step.
+  struct Warnings {
+    std::size_t checks = 0, materials = 0, nodes = 0;
+  } warnings;
+};
+
+}  // namespace radiosity::scene

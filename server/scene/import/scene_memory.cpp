@@ -1,0 +1,197 @@
+#include "server/scene/import/scene_memory.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "common/memory_limit.h"
+#include "server/scene/import/import_context.h"
+
+namespace radiosity::scene {
+namespace {
+
+/// Bytes, measured at the peak of loading scenes of 10,000 to 160,000 of each: JSON with its defaults, a copy of it as
+/// the parser wants it, and what the parser makes of that.
+constexpr std::uint64_t kNodeBytes = 3'000, kMaterialBytes = 9'000, kMeshBytes = 2'000, kAccessorBytes = 1'500;
+/// A placed triangle as it is flattened, charted and held in trees; an instance, with its surface.
+constexpr std::uint64_t kTriangleBytes = 900, kInstanceBytes = 1'000;
+/// The same in each process that draws: of a triangle a fifth is what Embree makes of it, at its peak.
+constexpr std::uint64_t kDrawnTriangleBytes = 850, kDrawnInstanceBytes = 300;
+/// Unless a limit is named a scene may claim so much of its server, and so much for each byte of data: a kilobyte can
+/// place a million triangles in one place, which nobody wants to see, and no model of some size comes near.
+constexpr std::uint64_t kLikelyBytes = std::uint64_t{512} << 20, kLikelyBytesAByte = 128;
+constexpr std::uint64_t kEntryBytes = 16;     ///< of JSON, at least, that places something
+constexpr std::uint64_t kElementBytes = 240;  ///< of EXT_mesh_gpu_instancing: transform and instance
+/// A vertex as it is read, with maps that find doubled triangles; its attributes; a corner of a triangle.
+constexpr std::uint64_t kVertexBytes = 36, kCornerBytes = 40;
+
+std::string inUnits(std::uint64_t bytes) {
+  constexpr double kMib = 1048576.0, kGib = 1024.0 * kMib;
+  const auto size = static_cast<double>(bytes);
+  return size >= kGib ? fmt::format("{:.1f} GiB", size / kGib) : fmt::format("{:.1f} MiB", size / kMib);
+}
+
+/// Never wraps round: claims are products of what a file says.
+std::uint64_t times(std::uint64_t a, std::uint64_t b) {
+  constexpr auto kMost = ~std::uint64_t{0} / 4;
+  return b != 0 && a > kMost / b ? kMost : std::min(a * b, kMost);
+}
+
+struct MeshClaim {
+  std::uint64_t vertex_bytes = 0, triangles = 0, primitives = 0;
+};
+
+class GeometryClaim {
+ public:
+  GeometryClaim(const Document& document, const tinygltf::Model& model, std::uint64_t claimed,
+                const ImportLimits& limits)
+      : document_(document), model_(model), limits_(limits), limit_(sceneMemoryLimit(limits)), bytes_(claimed) {
+    if (limits.max_scene_bytes == 0) likely_ = kLikelyBytes + kLikelyBytesAByte * bytesOfData();
+    for (const auto& mesh : model.meshes) {
+      MeshClaim claim;
+      for (const auto& primitive : mesh.primitives) add(primitive, claim);
+      meshes_.push_back(claim);
+    }
+  }
+
+  Result<std::uint64_t> run() {
+    std::vector<int> waiting = rootNodes();
+    std::ranges::reverse(waiting);
+    while (!waiting.empty()) {
+      const auto node = static_cast<std::size_t>(waiting.back());
+      waiting.pop_back();
+      if (auto ok = addNode(node); !ok) return tl::unexpected(ok.error());
+      const auto& children = model_.nodes[node].children;
+      waiting.insert(waiting.end(), children.rbegin(), children.rend());
+    }
+    return bytes_;
+  }
+
+ private:
+  void add(const tinygltf::Primitive& primitive, MeshClaim& claim) const {
+    const auto position = primitive.attributes.find("POSITION");
+    if (primitive.mode < TINYGLTF_MODE_TRIANGLES || position == primitive.attributes.end()) return;
+    const std::uint64_t vertices = model_.accessors[static_cast<std::size_t>(position->second)].count;
+    const std::uint64_t corners =
+        primitive.indices < 0 ? vertices : model_.accessors[static_cast<std::size_t>(primitive.indices)].count;
+    std::uint64_t each = kVertexBytes;
+    for (const auto& [name, accessor] : primitive.attributes) {
+      if (name.starts_with("TEXCOORD_")) each += sizeof(glm::vec2);
+      if (name == "COLOR_0") each += sizeof(glm::vec4);
+    }
+    const bool is_list = primitive.mode == TINYGLTF_MODE_TRIANGLES;
+    claim.vertex_bytes += times(vertices, each) + times(corners, is_list ? kCornerBytes : 3 * kCornerBytes);
+    claim.triangles += is_list ? corners / 3 : corners;
+    ++claim.primitives;
+  }
+
+  [[nodiscard]] std::uint64_t bytesOfData() const {
+    std::uint64_t bytes = kEntryBytes * (model_.nodes.size() + model_.meshes.size() + model_.accessors.size());
+    for (const auto& buffer : document_.buffers) bytes += buffer ? buffer->size() : 0;
+    for (const auto& mesh : model_.meshes) bytes += kEntryBytes * mesh.primitives.size();
+    return bytes;
+  }
+
+  [[nodiscard]] std::vector<int> rootNodes() const {
+    if (!model_.scenes.empty()) return model_.scenes[static_cast<std::size_t>(std::max(model_.defaultScene, 0))].nodes;
+    std::vector<bool> has_parent(model_.nodes.size(), false);
+    for (const auto& node : model_.nodes)
+      for (const auto child : node.children) has_parent[static_cast<std::size_t>(child)] = true;
+    std::vector<int> roots;
+    for (std::size_t n = 0; n < has_parent.size(); ++n)
+      if (!has_parent[n]) roots.push_back(static_cast<int>(n));
+    return roots;
+  }
+
+  Result<void> addNode(std::size_t index) {
+    const auto& node = model_.nodes[index];
+    if (node.mesh < 0) return {};
+    const auto& mesh = meshes_[static_cast<std::size_t>(node.mesh)];
+    const auto pointer = "/nodes/" + std::to_string(index);
+    if (poses_.emplace(node.mesh, node.skin, node.weights).second)
+      if (auto ok = spend(mesh.vertex_bytes, "/meshes/" + std::to_string(node.mesh), "its vertices"); !ok) return ok;
+    const auto* instancing = extensionOf(document_.gltf["nodes"][index], "EXT_mesh_gpu_instancing");
+    if (instancing == nullptr) return place(1, mesh, pointer);
+    for (const auto& [name, accessor] : (*instancing)["attributes"].items()) {
+      if (name != "TRANSLATION" && name != "ROTATION" && name != "SCALE") continue;
+      const std::uint64_t count = model_.accessors[accessor.get<std::size_t>()].count;
+      const auto where = pointer + "/extensions/EXT_mesh_gpu_instancing/attributes/" + name;
+      return place(count, mesh, where);
+    }
+    return {};
+  }
+
+  /// So many elements of a mesh.
+  Result<void> place(std::uint64_t count, const MeshClaim& mesh, const std::string& pointer) {
+    if (auto ok = spend(times(count, kElementBytes), pointer, "its instances"); !ok) return ok;
+    instances_ += times(count, mesh.primitives);
+    if (instances_ > limits_.max_nodes) {
+      return fail(ErrorCode::kTooLarge, "more than " + std::to_string(limits_.max_nodes) + " instances",
+                  radiosity::scene::place(document_.name, pointer));
+    }
+    const auto each = mesh.primitives * kInstanceBytes + times(mesh.triangles, kTriangleBytes);
+    const auto drawn = mesh.primitives * kDrawnInstanceBytes + times(mesh.triangles, kDrawnTriangleBytes);
+    bytes_ += times(times(count, drawn), limits_.renderers);
+    return spend(times(count, each), pointer, "its triangles");
+  }
+
+  Result<void> spend(std::uint64_t bytes, const std::string& pointer, std::string_view what) {
+    bytes_ += bytes;
+    of_server_ += bytes;
+    if (of_server_ > likely_) {
+      return fail(ErrorCode::kTooLarge, sceneMemoryFault(of_server_, likely_, what) + " for so few bytes of data",
+                  radiosity::scene::place(document_.name, pointer));
+    }
+    if (bytes_ <= limit_) return {};
+    return fail(ErrorCode::kTooLarge, sceneMemoryFault(bytes_, limit_, what),
+                radiosity::scene::place(document_.name, pointer));
+  }
+
+  const Document& document_;
+  const tinygltf::Model& model_;
+  const ImportLimits& limits_;
+  std::uint64_t limit_, bytes_, instances_ = 0;
+  std::uint64_t of_server_ = 0, likely_ = ~std::uint64_t{0};
+  std::vector<MeshClaim> meshes_;
+  std::set<std::tuple<int, int, std::vector<double>>> poses_;  ///< mesh, skin, weights
+};
+
+}  // namespace
+
+std::uint64_t sceneMemoryLimit(const ImportLimits& limits) {
+  return limits.max_scene_bytes != 0 ? limits.max_scene_bytes : memoryLimitBytes() / 2;
+}
+
+std::string sceneMemoryFault(std::uint64_t bytes, std::uint64_t limit, std::string_view what) {
+  return fmt::format("with {} the scene would take {} or more; --max-scene-memory allows {}", what, inUnits(bytes),
+                     inUnits(limit));
+}
+
+Result<std::uint64_t> claimOfJson(const Document& document, const ImportLimits& limits) {
+  const auto& gltf = document.gltf;
+  const auto count = [&](const char* list) -> std::uint64_t { return gltf.contains(list) ? gltf[list].size() : 0; };
+  const auto limit = sceneMemoryLimit(limits);
+  std::uint64_t bytes = 0, primitives = 0;
+  if (gltf.contains("meshes"))
+    for (const auto& mesh : gltf["meshes"]) primitives += mesh["primitives"].size();
+  for (const auto& [pointer, entries, each] :
+       {std::tuple("/nodes", count("nodes"), kNodeBytes), std::tuple("/materials", count("materials"), kMaterialBytes),
+        std::tuple("/meshes", count("meshes") + primitives, kMeshBytes),
+        std::tuple("/accessors", count("accessors"), kAccessorBytes)}) {
+    bytes += times(entries, each);
+    if (bytes <= limit) continue;
+    return fail(ErrorCode::kTooLarge, sceneMemoryFault(bytes, limit, "its entries"), place(document.name, pointer));
+  }
+  return bytes;
+}
+
+Result<std::uint64_t> claimOfGeometry(const Document& document, const tinygltf::Model& model, std::uint64_t claimed,
+                                      const ImportLimits& limits) {
+  return GeometryClaim(document, model, claimed, limits).run();
+}
+
+}  // namespace radiosity::scene

@@ -1,0 +1,20 @@
+// Where one can see through surfaces: alphaMode MASK and BLEND, and KHR_materials_transmission, sampled on a grid in
+// each surface's chart, finer than its leaves where the alpha texture is. A step of buildPatchScene (charts.h).
+#pragma once
+
+#include "server/scene/values/patch_scene.h"
+
+namespace radiosity::scene {
+
+/// Whether a material lets any light through.
+[[nodiscard]] bool isSeeThrough(const Material& material);
+
+/// Fills the opacity grids of surfaces one can see through (Surface::see_through): MASK gives the part of a cell above
+/// the cutoff, BLEND alpha, transmission 1 - factor; all of them multiplied. Grids together have at most 2^26 cells:
+/// beyond that they are coarser, with a warning. Needs vertices and triangle_source, too.
+void measureOpacity(const Scene& scene, PatchScene& patches);
+
+/// Multiplies the leaf areas of those surfaces by the opacity of the leaf; what is wholly cut out becomes empty.
+void applyOpacity(PatchScene& patches);
+
+}  // namespace radiosity::scene

@@ -1,0 +1,77 @@
+// A material at one place: its factors times its textures there. Used while a scene is shaded.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <memory>
+#include <optional>
+
+#include "server/scene/shading/texture_pyramids.h"
+
+namespace radiosity::scene {
+
+/// Refers to the scene's textures, which must outlive it.
+class MaterialLayers {
+ public:
+  struct Value {
+    glm::vec3 emission{0.0F}, reflectance{0.0F};
+    float weight = 1.0F;  ///< how much of the surface is there: 0 where it is cut out, alpha where it is blended
+  };
+  /// Where a texture is looked up.
+  struct Place {
+    glm::vec2 uv, footprint;
+  };
+
+  MaterialLayers(const Scene& scene, const Material& material, TexturePyramids& pyramids);
+
+  /// Without textures it is the same everywhere, but for vertex colours.
+  [[nodiscard]] bool hasTextures() const { return surface_ || metallic_ || specular_ || emissive_; }
+
+  /// `place(use)` gives the Place of a texture; `vertex` is COLOR_0 there.
+  template <typename PlaceOf>
+  [[nodiscard]] Value at(const PlaceOf& place, const glm::vec4& vertex) const {
+    const auto look = [&](const Layer& layer) {
+      const Place found = place(layer.use);
+      return layer.pyramid->look(layer.use, found.uv, found.footprint);
+    };
+    float metal = metallic_inside_ ? 0.0F : material_.metallic;
+    glm::vec3 specular = specular_inside_ ? glm::vec3(0.0F) : material_.specular;
+    if (metallic_) metal *= look(*metallic_).rgb.b;
+    if (specular_) specular *= look(*specular_).rgb;
+    Value value{material_.emission * static_cast<float>(M_PI), diffuseOf(metal, specular) * glm::vec3(vertex),
+                weightOf(vertex.a)};
+    if (surface_) {
+      const auto found = look(*surface_);
+      value.reflectance *= found.rgb;
+      value.weight *= found.coverage;
+    }
+    if (emissive_) value.emission *= look(*emissive_).rgb;
+    return value;
+  }
+
+ private:
+  struct Layer {
+    TextureUse use;
+    std::shared_ptr<const TexturePyramid> pyramid;
+  };
+
+  [[nodiscard]] glm::vec3 diffuseOf(float metal, const glm::vec3& specular) const {
+    return material_.base_color * (1.0F - metal) * (1.0F - std::max({specular.r, specular.g, specular.b}));
+  }
+  [[nodiscard]] float weightOf(float vertex_alpha) const;
+  [[nodiscard]] const Texture* textureOf(const TextureUse& use) const;
+  void setAlpha(const Texture* alpha, PictureStack& stack) const;
+  void addSurface(TexturePyramids& pyramids);
+  void addEmissive(TexturePyramids& pyramids);
+
+  const Scene& scene_;
+  Material material_;
+  /// Base colour, and what is laid over the surface in the same way: light is lost where a texel is both bright and
+  /// metallic, which the means of two textures do not tell.
+  std::optional<Layer> surface_;
+  bool metallic_inside_ = false, specular_inside_ = false;  ///< of `surface_`
+  std::optional<Layer> metallic_, specular_, emissive_;     ///< by themselves
+};
+
+}  // namespace radiosity::scene

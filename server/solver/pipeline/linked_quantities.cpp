@@ -1,0 +1,117 @@
+// What LinkedSolver shows of itself, leaf by leaf.
+#include <algorithm>
+#include <glm/common.hpp>
+#include <iterator>
+#include <vector>
+
+#include "server/solver/pipeline/linked_solver.h"
+
+namespace radiosity::solver {
+namespace {
+
+/// Of what light that varies inside shooters causes, the part that falls where their links say; the rest goes on to
+/// bounce and ends up everywhere. Calibrated on the Cornell box against the path tracer.
+constexpr double kStaysNear = 0.5;
+
+}  // namespace
+
+/// All light there is, with what leaves lack.
+std::vector<glm::vec3> LinkedSolver::irradiance() const {
+  std::vector<glm::vec3> values(patches_->nodeCount(), glm::vec3(0.0F));
+  for (const auto& side : sides_) {
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
+      values[side.first_node + leaf] = lightOf(side.first_value + leaf);
+  }
+  addShaded(shaded_, kBothHalves, values);
+  for (const auto& [value, lacks] : corrections()) {
+    auto& light = values[nodeOf(value)];
+    const auto more = shadedCorrection(value, 0.5F * (lacks[0] + lacks[1]));
+    light = glm::max(light + more, glm::vec3(0.0F));  // by noise it might be less
+  }
+  return values;
+}
+
+std::uint32_t LinkedSolver::nodeOf(std::uint32_t value) const {
+  const auto after = std::ranges::upper_bound(sides_, value, {}, &Side::first_value);
+  const Side& side = *std::prev(after);
+  return side.first_node + (value - side.first_value);
+}
+
+std::vector<glm::vec3> LinkedSolver::halfIrradiance(std::uint32_t half) const {
+  std::vector<glm::vec3> values(patches_->nodeCount(), glm::vec3(0.0F));
+  for (const auto& side : sides_)
+    std::copy_n(half_[half].begin() + side.first_value, side.leaf_count, values.begin() + side.first_node);
+  addShaded(shaded_, half, values);
+  for (const auto& correction : corrections())
+    values[nodeOf(correction.value)] += shadedCorrection(correction.value, correction.lacks[half]);
+  return values;
+}
+
+std::vector<glm::vec3> LinkedSolver::unshot() const {
+  std::vector<glm::vec3> values(patches_->nodeCount(), glm::vec3(0.0F)), leaves;
+  for (std::uint32_t s = 0; s < sides_.size(); ++s) {
+    leafUnshot(s, leaves);
+    std::copy(leaves.begin(), leaves.end(), values.begin() + sides_[s].first_node);
+  }
+  return values;
+}
+
+std::vector<std::uint8_t> LinkedSolver::shotLevels() const {
+  std::vector<std::uint8_t> levels(patches_->nodeCount(), kNeverShot);
+  for (const auto& shooter : system_.shooters()) {
+    if (shooter.isLight()) continue;
+    const Side& side = sides_[shooter.place.side];
+    const auto level = static_cast<std::uint8_t>(shooter.place.level);
+    const auto rect = leafRect(side, shooter.place);
+    for (auto y = rect.y0; y < rect.y1; ++y) {
+      for (auto x = rect.x0; x < rect.x1; ++x) {
+        auto& known = levels[side.first_node + y * side.width + x];
+        known = std::min(known, level);
+      }
+    }
+  }
+  for (const auto& side : sides_) {  // rays see single leaves
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count && gathers(); ++leaf)
+      if (patches_->node_area[side.first_node + leaf] > 0.0F) levels[side.first_node + leaf] = 0;
+  }
+  return levels;
+}
+
+std::vector<float> LinkedSolver::residualShape() const {
+  const auto varying = planner_.variationOfLeaves(system_, unshot_, *patches_);
+  double sum = 0.0, area = 0.0;
+  for (const auto& side : sides_) {
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+      const auto a = static_cast<double>(patches_->node_area[side.first_node + leaf]);
+      sum += a * static_cast<double>(varying[side.first_value + leaf]);
+      area += a;
+    }
+  }
+  if (sum <= 0.0) return {};
+  std::vector<float> shape(patches_->nodeCount(), 0.0F);
+  const double near = kStaysNear * varying_share_;
+  const auto scale = static_cast<float>(near * area / sum), even = static_cast<float>(1.0 - near);
+  for (const auto& side : sides_) {
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
+      shape[side.first_node + leaf] = even + scale * varying[side.first_value + leaf];
+  }
+  return shape;
+}
+
+/// Of all channels together: each has of it as it has of the leaf's light.
+std::vector<glm::vec3> LinkedSolver::commonErrorSquared() const {
+  if (!gathers()) return {};
+  std::vector<glm::vec3> squares(patches_->nodeCount(), glm::vec3(0.0F));
+  const auto bias = gather_->biasOfLeaves();
+  for (const auto& side : sides_) {
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+      const glm::vec3 irradiance = lightOf(side.first_value + leaf), square = irradiance * irradiance;
+      const float all = square.x + square.y + square.z;
+      const glm::vec3 parts = all > 0.0F ? square / all : glm::vec3(1.0F / 3.0F);
+      squares[side.first_node + leaf] = bias[side.first_value + leaf] * parts;
+    }
+  }
+  return squares;
+}
+
+}  // namespace radiosity::solver

@@ -1,0 +1,169 @@
+// LinkedSolver and normals that are not the surfaces' own: what it tells of light is for these.
+#include <algorithm>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <utility>
+
+#include "common/parallel.h"
+#include "server/solver/pipeline/linked_solver.h"
+
+namespace radiosity::solver {
+namespace {
+
+/// A node shines from so many of its leaves.
+constexpr std::uint32_t kNodeLeaves = 16;
+/// A crowd from so many of its lamps.
+constexpr std::uint32_t kCrowdLamps = 64;
+/// What leaves lack is known so badly that a larger factor would be one of noise.
+constexpr float kMostFactor = 4.0F;
+
+ShadingEmitter emitterOf(const LightPolygon& light) {
+  ShadingEmitter emitter;
+  emitter.corners = std::span(light.corners).first(light.corner_count);
+  for (const auto& corner : emitter.corners) emitter.at += glm::dvec3(corner);
+  emitter.at /= static_cast<double>(light.corner_count);
+  return emitter;
+}
+
+ShadingEmitter emitterOf(const PunctualLights::Source& source) {
+  using Kind = PunctualLights::Source::Kind;
+  ShadingEmitter emitter;
+  const bool is_point = source.kind == Kind::kPoint || source.kind == Kind::kSpot;
+  emitter.kind = is_point                    ? ShadingEmitter::Kind::kPoint
+                 : source.kind == Kind::kSky ? ShadingEmitter::Kind::kSky
+                                             : ShadingEmitter::Kind::kDirection;
+  emitter.at = glm::dvec3(is_point ? source.position : source.direction);
+  return emitter;
+}
+
+/// Some of its lamps, evenly by what they send. Of one without lamps, which is dark, nothing is asked.
+ShadingEmitter emitterOf(const Crowd& crowd) {
+  ShadingEmitter emitter;
+  emitter.kind = ShadingEmitter::Kind::kPatches;
+  for (std::uint32_t k = 0; crowd.lamps && k < kCrowdLamps; ++k) {
+    double u = (k + 0.5) / kCrowdLamps;
+    const auto& lamp = crowd.lamps->lights()[crowd.lamps->byFlux(u)];
+    emitter.patches.push_back({glm::dvec3(lamp.ball()), glm::dvec3(lamp.normal), crowd.area / kCrowdLamps});
+  }
+  return emitter;
+}
+
+}  // namespace
+
+void LinkedSolver::shadeFor(std::shared_ptr<const scene::ShadingNormals> normals) {
+  shading_ = LeafShading(*patches_, sides_, std::move(normals));
+  for (auto& half : shaded_) half.assign(shading_.size(), glm::vec3(0.0F));
+  if (gather_) gather_->shadeFor(&shading_);
+}
+
+/// Of the leaves that it has area on, some, evenly.
+ShadingEmitter LinkedSolver::emitterOf(const NodePlace& node) const {
+  ShadingEmitter emitter;
+  emitter.kind = ShadingEmitter::Kind::kPatches;
+  const Side& side = sides_[node.side];
+  const auto rect = leafRect(side, node);
+  const auto& surface = patches_->surfaces[side.surface];
+  const auto width = rect.x1 - rect.x0, all = width * (rect.y1 - rect.y0), count = std::min(all, kNodeLeaves);
+  for (std::uint32_t k = 0; k < count; ++k) {
+    const auto at = static_cast<std::uint32_t>((2 * std::uint64_t{k} + 1) * all / (2 * std::uint64_t{count}));
+    const auto leaf = (rect.y0 + at / width) * side.width + rect.x0 + at % width;
+    const auto& point = patches_->leaves[surface.first_leaf + leaf];
+    const auto area = static_cast<double>(patches_->node_area[side.first_node + leaf]);
+    if (point.triangle == scene::kNone || area <= 0.0) continue;
+    const auto place = shading_.place(side, {point.texel, point.triangle});
+    emitter.patches.push_back({place.position, place.geometric, area});
+  }
+  return emitter;
+}
+
+ShadingEmitter LinkedSolver::emitterOf(const Shooter& shooter) const {
+  if (shooter.light != scene::kNone) return solver::emitterOf(lights_[shooter.light]);
+  if (shooter.source != scene::kNone) return solver::emitterOf(sources_[shooter.source]);
+  if (shooter.crowd != scene::kNone) return solver::emitterOf(crowds_[shooter.crowd]);
+  return emitterOf(shooter.place);
+}
+
+/// Adds what light over links, as it was last solved for, is more for the shading normals. By side, so that the sums do
+/// not depend on who makes them.
+void LinkedSolver::addShadedLinks(LinkSystem::From from, ShadedLight& light) const {
+  struct Sender {
+    const Shooter* shooter;
+    ShadingEmitter emitter;
+    std::array<glm::vec3, 2> sent;
+  };
+  std::vector<Sender> senders;
+  for (const auto& shooter : system_.shooters()) {
+    if (from == LinkSystem::From::kLights && !shooter.isLight()) continue;
+    const auto sentBy = [&](std::size_t half) {
+      return static_cast<float>(shooter.carried(half)) * shooter.sent[half];
+    };
+    const std::array<glm::vec3, 2> sent{sentBy(0), sentBy(1)};
+    if (sent[0] != glm::vec3(0.0F) || sent[1] != glm::vec3(0.0F))
+      senders.push_back({&shooter, emitterOf(shooter), sent});
+  }
+  const auto shadeSide = [&](std::size_t part) {
+    const auto& shaded = shading_.sides()[part];
+    const Side& side = sides_[shaded.side];
+    std::array<std::vector<float>, 2> link{std::vector<float>(side.leaf_count), std::vector<float>(side.leaf_count)};
+    for (const auto& [shooter, emitter, sent] : senders) {
+      std::array<bool, 2> has{};
+      for (std::size_t half = 0; half < 2; ++half) {
+        has[half] = sent[half] != glm::vec3(0.0F) && shooter->column[half].decode(side.first_value, link[half]);
+        if (!has[half]) std::ranges::fill(link[half], 0.0F);
+      }
+      for (std::uint32_t leaf = 0; leaf < side.leaf_count && (has[0] || has[1]); ++leaf) {
+        const auto number = shaded.first + leaf;
+        if (shading_.normal(number) == glm::vec3(0.0F) || (link[0][leaf] <= 0.0F && link[1][leaf] <= 0.0F)) continue;
+        std::array<ShadedPlace, LeafShading::kMostPlaces> places;
+        const auto count = shading_.places(side, leaf, places);
+        const auto more = static_cast<float>(shadedPart(emitter, std::span(places).first(count)) - 1.0);
+        for (std::size_t half = 0; half < 2; ++half) light[half][number] += more * link[half][leaf] * sent[half];
+      }
+    }
+  };
+  inTurns(shading_.sides().size(), shadeSide);
+}
+
+/// Before what rays brought is forgotten.
+void LinkedSolver::shadeLeaves() {
+  if (shading_.empty()) return;
+  for (auto& half : shaded_) half.assign(shading_.size(), glm::vec3(0.0F));
+  addShadedLinks(LinkSystem::From::kAll, shaded_);
+  if (!gather_) return;
+  for (const auto& shaded : shading_.sides()) {
+    const Side& side = sides_[shaded.side];
+    for (std::size_t half = 0; half < 2; ++half) {
+      const auto gathered = gather_->irradiance(half), parts = gather_->shadedParts(half);
+      for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
+        shaded_[half][shaded.first + leaf] += (parts[shaded.first + leaf] - 1.0F) * gathered[side.first_value + leaf];
+    }
+  }
+}
+
+/// What a leaf lacks of its light is for the shading normal in proportion.
+glm::vec3 LinkedSolver::shadedCorrection(std::uint32_t value, const glm::vec3& lacks) const {
+  const auto number = shading_.empty() ? scene::kNone : shading_.numberOf(value);
+  if (number == scene::kNone) return lacks;
+  const glm::vec3 light = lightOf(value), more = 0.5F * (shaded_[0][number] + shaded_[1][number]);
+  glm::vec3 factor(1.0F);
+  for (int c = 0; c < 3; ++c) {
+    if (light[c] > 0.0F) factor[c] = std::clamp(1.0F + more[c] / light[c], 0.0F, kMostFactor);
+  }
+  return factor * lacks;
+}
+
+/// To values by node: of this half, or the mean of both (kBothHalves).
+void LinkedSolver::addShaded(const ShadedLight& light, std::uint32_t half, std::vector<glm::vec3>& nodes) const {
+  for (const auto& shaded : shading_.sides()) {
+    const Side& side = sides_[shaded.side];
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+      const auto number = shaded.first + leaf;
+      if (shading_.normal(number) == glm::vec3(0.0F)) continue;
+      auto& node = nodes[side.first_node + leaf];
+      node = glm::max(node + (half == kBothHalves ? 0.5F * (light[0][number] + light[1][number]) : light[half][number]),
+                      0.0F);
+    }
+  }
+}
+
+}  // namespace radiosity::solver

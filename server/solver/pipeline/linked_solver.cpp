@@ -1,0 +1,394 @@
+#include "server/solver/pipeline/linked_solver.h"
+#include "common/parallel.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <new>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include "server/solver/error/field_error.h"
+
+namespace radiosity::solver {
+namespace {
+
+/// A refinement divides the share of power of a shooter by this.
+constexpr double kRefinement = 2.0;
+/// More refinements than this find nothing: everything is split to its leaves.
+constexpr double kMinShare = 1e-9;
+/// Shares are refined when what roulette and weakness cause is this part of the error: a wave of growth lowers it by
+/// more than a wave of samples, long before it is the larger part.
+constexpr double kByShare = 0.35;
+/// Where nothing can be split any more, samples stop when their error is this part of the rest.
+constexpr double kIdleSampling = 0.1;
+/// Before the first was timed: as many measurements, of some images each, as draw so many triangles.
+constexpr std::size_t kFirstTriangles = 1'600'000;
+constexpr std::size_t kFewestMeasurements = 8;
+
+/// A small error is worked towards by way of larger ones, from the first of these on, each so many times the next. That
+/// takes no longer, and whoever looks before the end, or sets a limit of time, sees as much light as somebody who asked
+/// for less.
+constexpr double kFirstAim = 0.02, kAimStep = 2.0;
+
+/// What solves ended with for other light takes so much at most, or a sixteenth of what links may.
+constexpr std::size_t kMostEndBytes = std::size_t{64} << 20U;
+
+PunctualSettings punctualSettings(const SolverSettings& settings) {
+  PunctualSettings punctual;
+  punctual.seed = settings.seed;
+  return punctual;
+}
+
+}  // namespace
+
+LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, Transport& transport,
+                           const SolverSettings& settings)
+    : patches_(std::move(patches)),
+      transport_(transport),
+      settings_(settings),
+      sides_(makeSides(*patches_)),
+      punctual_(*patches_, {}, punctualSettings(settings)),
+      shots_(*patches_, sides_, settings.seed),
+      system_(*patches_, sides_),
+      expander_(*patches_, sides_),
+      memory_(*patches_, sides_, settings.link_memory),
+      unshot_(*patches_),
+      planner_(*patches_, sides_, shots_, settings_.planner, settings_.seed),
+      ends_(std::min(kMostEndBytes, settings_.link_memory / 16)) {
+  slice_ = std::clamp<std::size_t>(kFirstTriangles / std::max<std::size_t>(1, patches_->triangles.size()), 2, 16);
+  fewest_a_slice_ = std::min(slice_, kFewestMeasurements);
+  aim_ = std::max(settings_.target_error, kFirstAim);
+  planner_.setTarget(aim_);
+}
+
+LinkedSolver::LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
+                           Transport& transport, const SolverSettings& settings, const LightSources& sources)
+    : LinkedSolver(std::move(patches), transport, settings) {
+  key_end_ = static_cast<std::uint32_t>(patches_->nodeCount());
+  triangle_key_end_ = static_cast<std::uint32_t>(patches_->triangles.size());
+  takeMaterials(materials);
+  by_rays_ = raysPay();
+  takeSources(sources);
+  share_part_ = 1.0 / settings_.planner.first_shooters;
+  limitLinks();
+  for (auto& half : half_) half.assign(system_.leafAreas().size(), glm::vec3(0.0F));
+  findUnshot();
+}
+
+void LinkedSolver::takeMaterials(const scene::PatchMaterials& materials) {
+  system_.setMaterials(materials.emission, materials.reflectance);
+  takeLights();
+  double area = 0.0;
+  glm::dvec3 reflectance(0.0);
+  for (const auto& side : sides_) {
+    const auto of_side = system_.reflectance().side(side.number);
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+      const auto a = static_cast<double>(patches_->node_area[side.first_node + leaf]);
+      reflectance += a * glm::dvec3(of_side[leaf]);
+      area += a;
+    }
+  }
+  planner_.setReflectance(area > 0.0 ? std::max({reflectance.x, reflectance.y, reflectance.z}) / area : 0.0);
+}
+
+/// Measures the next part of the wave: short, so that an edit, a pause or the end of the server need not wait for all.
+/// Where the cuts lie, which depends on time, changes no bit.
+Result<void> LinkedSolver::measureSlice() {
+  const auto isSource = [&](const Measurement& want) { return system_.shooters()[want.shooter].sample_cost > 0.0; };
+  if (isSource(wanted_[measured_])) {
+    const auto& want = wanted_[measured_];
+    if (system_.shooters()[want.shooter].crowd != scene::kNone) {
+      if (measureCrowd(want)) ++measured_;
+      return {};
+    }
+    ++measured_;
+    return measureSource(want);
+  }
+  const auto start = std::chrono::steady_clock::now();
+  auto slice = std::span(wanted_).subspan(measured_, std::min(slice_, wanted_.size() - measured_));
+  slice = slice.first(static_cast<std::size_t>(std::find_if(slice.begin(), slice.end(), isSource) - slice.begin()));
+  ShotBatch batch;
+  std::vector<const Measurement*> gathered, scattered;
+  for (const auto& want : slice) {
+    const auto& shooter = system_.shooters()[want.shooter];
+    if (shooter.isLight()) {
+      shots_.add(lights_[shooter.light], want.half, want.index, want.points,
+                 settings_.planner.lightResolution(want.index), batch);
+    } else {
+      shots_.add(shooter.place, want.half, want.index, shooter.resolution, batch);
+    }
+    (batch.gather.size() > gathered.size() ? gathered : scattered).push_back(&want);
+  }
+  gathered.insert(gathered.end(), scattered.begin(), scattered.end());
+  const auto take = [&](std::size_t i, LinkSample&& links) {
+    const auto& want = *gathered[i];
+    const bool scattered = i >= batch.gather.size();
+    if (scattered) links.scale(system_.shooters()[want.shooter].area);  // it carried a flux of one
+    expander_.expand(links, scattered);
+    system_.addSample(want.shooter, want.half, expander_, links, want.points);
+  };
+  const auto done = transport_.measure(batch, take);
+  if (!done) return tl::unexpected<Error>(done.error());
+  counters_ += *done;
+  measured_ += slice.size();
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  slice_ =
+      static_cast<std::size_t>(std::clamp(static_cast<double>(slice.size()) * kSliceSeconds / std::max(seconds, 1e-6),
+                                          static_cast<double>(fewest_a_slice_), 4096.0));
+  return {};
+}
+
+void LinkedSolver::startGrowth() {
+  const AllUnshot all(*this);
+  double power = 0.0;
+  std::vector<double> least;
+  const auto find = [&](std::size_t part) {
+    if (part == 0) power = powerToShoot();
+    if (part == 1 && by_rays_) least = leastRadiosity();
+  };
+  doShares(2, ShareOfWork(find));
+  planner_.setShare(power * share_part_);
+  planner_.setLeastRadiosity(std::move(least));
+  phase_ = Phase::kGrow;
+}
+
+/// No memory for more shooters, or nothing left to split.
+bool LinkedSolver::isFull() const { return memory_.isFull() || share_part_ < kMinShare; }
+
+std::vector<Measurement> LinkedSolver::plan() {
+  memory_.begin(system_);
+  if (phase_ == Phase::kLights) return planLights();
+  if (phase_ == Phase::kImprove && gather_) {
+    if (sample_goal_ <= 0.0) return {};
+    return planner_.improve(system_, unshot_, *patches_, false, LinkPlanner::Wave::kDoubling, memory_,
+                            {std::sqrt(noise().links), 0.0, 0.0, sample_goal_});
+  }
+  if (phase_ == Phase::kImprove) {
+    const double varying = varying_share_ * error_.residual;
+    const ErrorGoal goal{by_links_, varying, error_.residual - varying, targetOfLinks()};
+    return planner_.improve(system_, unshot_, *patches_, !isFull(), LinkPlanner::Wave::kShort, memory_, goal);
+  }
+  if (planner_.share() <= 0.0) return {};
+  // Also where there is no room: the walk finds out how much light goes without.
+  const std::size_t limit = std::max<std::size_t>(settings_.planner.pairs_a_wave, system_.shooters().size() / 2);
+  // What rays bring is left to them, but for what after an edit is bright and small.
+  const AllUnshot all(*this);
+  return planner_.grow(system_, unshot_, *patches_, limit, memory_);
+}
+
+Result<StepOutcome> LinkedSolver::step() {
+  try {
+    return advance();
+  } catch (const std::bad_alloc&) {
+    pass_ = Pass::kNone;  // what was half done is begun anew
+    return fail(ErrorCode::kTooLarge, "out of memory with " + std::to_string(system_.shooters().size()) +
+                                          " shooters and " + std::to_string(system_.bytes() >> 20U) +
+                                          " MiB of links; fewer texels, or a larger error, need less");
+  } catch (const std::system_error& error) {
+    pass_ = Pass::kNone;
+    return fail(ErrorCode::kUnavailable, std::string("no thread to solve with: ") + error.what());
+  }
+}
+
+Result<StepOutcome> LinkedSolver::advance() {
+  if (in_haste_ && !settling_ && measured_ == wanted_.size()) forgetRough();
+  if (isRepairing()) {
+    if (const auto done = repairSlice(); !done) return tl::unexpected<Error>(done.error());
+    // Nothing else asks for the light over links that were the last to be measured.
+    if (!lacksLinks() && phase_ == Phase::kDone && from_links_ == FromLinks::kNo) from_links_ = FromLinks::kToConfirm;
+    return StepOutcome::kSlice;
+  }
+  if (from_links_ == FromLinks::kAfterEdit) {
+    if (lightsAreTooRough()) return StepOutcome::kSlice;
+    if (!edit_lights_planned_) {  // what was switched on, or moved: all that follows depends on its light
+      memory_.begin(system_);
+      wanted_ = planLights();
+      edit_lights_planned_ = true;
+    }
+    if (measured_ < wanted_.size()) {
+      if (const auto done = measureSlice(); !done) return tl::unexpected<Error>(done.error());
+      return StepOutcome::kSlice;
+    }
+    if (!settleFromLinks() || findsMoreDue()) return StepOutcome::kSlice;
+    if (!finishEdit()) return StepOutcome::kSlice;
+    return phase_ == Phase::kDone ? ended() : StepOutcome::kShot;
+  }
+  if (from_links_ == FromLinks::kToConfirm) return confirm();
+  if (std::exchange(refined_, false)) return chooseNext();
+  if (phase_ == Phase::kDone) return lacksLinks() ? catchUp() : ended();
+  if (!settling_ && measured_ == wanted_.size()) {
+    if (findsMoreDue()) return StepOutcome::kSlice;
+    wanted_ = plan();
+    measured_ = 0;
+    const bool dark = phase_ == Phase::kLights && net_unshot_ + varying_ <= 0.0;
+    if (wanted_.empty() && phase_ == Phase::kImprove &&
+        !(gather_ && gather_->isBehind()))  // no sample that there is room for can lower the error
+      return exhausted(memory_.lacksSamples() || memory_.isFull() ? SolveLimit::kLinkMemory : SolveLimit::kPatches);
+    if (wanted_.empty() && (dark || phase_ == Phase::kGrow)) return finishRound();
+  }
+  if (!settling_ && !wanted_.empty()) {
+    if (const auto done = measureSlice(); !done) return tl::unexpected<Error>(done.error());
+    if (measured_ < wanted_.size()) return StepOutcome::kSlice;
+  }
+  settling_ = true;  // also where memory runs out
+  // Over the few links that there are beside rays nothing is gained by going on from the light before.
+  const bool from_nothing = gather_ && phase_ == Phase::kImprove;
+  settling_ = !(from_nothing ? settleFromLinks() : settle());
+  if (settling_) return StepOutcome::kSlice;
+  is_confirmed_ = from_nothing;
+  if (phase_ == Phase::kImprove) return finishRound();
+  if (phase_ == Phase::kLights) startGrowth();
+  return StepOutcome::kShot;
+}
+
+/// An edit is taken in whole: its links would not be true otherwise.
+void LinkedSolver::endWave() {
+  if (gather_ && from_links_ == FromLinks::kNo) tryNow([this] { gather_->giveUp(); });
+  if (isRepairing() || from_links_ != FromLinks::kNo || settling_) return;
+  // Without crowds most of the light may be missing; in haste they take less than one other measurement.
+  const auto left = wanted_.begin() + static_cast<std::ptrdiff_t>(measured_);
+  const auto is_crowd = [this](const Measurement& want) { return isFirstOfCrowd(want); };
+  if (measured_ == 0 && std::ranges::none_of(wanted_, is_crowd)) return;
+  wanted_.erase(std::remove_if(left, wanted_.end(), std::not_fn(is_crowd)), wanted_.end());
+  in_haste_ = true;
+  settling_ = measured_ == wanted_.size();
+}
+
+StepOutcome LinkedSolver::finishRound() {
+  growing_ = false;
+  ++rounds_;
+  refined_ = true;
+  assessStep();
+  refined_ = false;
+  return chooseNext();
+}
+
+/// What waits may be what is missing.
+StepOutcome LinkedSolver::exhausted(SolveLimit limit) {
+  if (lacksLinks() && !isRepairing()) {
+    beExact();
+    from_links_ = FromLinks::kToConfirm;
+    return StepOutcome::kSlice;
+  }
+  if (aimFurther()) return chooseNext();
+  limit_ = limit;
+  phase_ = Phase::kDone;
+  return StepOutcome::kExhausted;
+}
+
+/// What a solver in kDone says: it may have got there because nothing more can be done.
+StepOutcome LinkedSolver::ended() const {
+  return error_.total <= settings_.target_error ? StepOutcome::kConverged : StepOutcome::kExhausted;
+}
+
+StepOutcome LinkedSolver::chooseNext() {
+  const bool is_confirmed = std::exchange(is_confirmed_, false);
+  limit_ = SolveLimit::kNone;
+  refined_ = true;  // should memory run out, it is chosen anew
+  while (error_.total <= aim_ && aimFurther()) continue;
+  const bool blotched = error_.total <= settings_.target_error && refineBlotches();
+  refined_ = false;
+  if (error_.total > settings_.target_error) return chooseFurther();
+  if (blotched) return StepOutcome::kRoundDone;
+  if (is_confirmed) {
+    endHere();
+    return StepOutcome::kConverged;
+  }
+  from_links_ = FromLinks::kToConfirm;
+  return confirm();
+}
+
+/// False: the target itself is aimed at already.
+bool LinkedSolver::aimFurther() {
+  if (aim_ <= settings_.target_error) return false;
+  aim_ = std::max(aim_ / kAimStep, settings_.target_error);
+  planner_.setTarget(aim_);
+  if (!variation_) return true;
+  updateVariation();
+  assess();
+  return true;
+}
+
+/// A solve that is done depends on its links and rays alone, not on the way to them.
+StepOutcome LinkedSolver::confirm() {
+  if (!settleFromLinks()) return StepOutcome::kSlice;
+  from_links_ = FromLinks::kNo;
+  assessStep();
+  if (error_.total > settings_.target_error) return chooseFurther();
+  endHere();
+  return StepOutcome::kConverged;
+}
+
+StepOutcome LinkedSolver::chooseFurther() {
+  const auto& shooters = system_.shooters();
+  const auto owes = [](const Shooter& shooter) { return shooter.owes(); };
+  if (lights_fit_ && std::any_of(shooters.begin(), shooters.end(), owes)) {
+    phase_ = Phase::kLights;
+    return StepOutcome::kRoundDone;
+  }
+  if (refineVariation()) return StepOutcome::kRoundDone;
+  if (by_rays_) {
+    refined_ = true;  // should memory run out, it is chosen anew
+    const auto next = chooseRays();
+    refined_ = false;
+    return next;
+  }
+  // Roulette's part of the sampling error, and what was too weak to play, fall with the share alone.
+  const double total = std::hypot(by_links_, error_.residual);
+  if (total <= targetOfLinks()) return exhausted(SolveLimit::kWithin);
+  const double roulette = by_links_ * std::sqrt(LinkPlanner::rouletteShare(system_));
+  const bool by_share = std::hypot(roulette, left_out_) > kByShare * total;
+  const double by_samples = std::sqrt(std::max(0.0, by_links_ * by_links_ - roulette * roulette));
+  if (!hasRounds()) return exhausted(SolveLimit::kRounds);
+  if (isFull() && (by_share || by_samples < kIdleSampling * error_.residual))
+    return exhausted(memory_.isFull() ? SolveLimit::kLinkMemory : SolveLimit::kPatches);
+  if (by_share) {
+    share_part_ /= kRefinement;
+    planner_.setShare(planner_.share() / kRefinement);
+    phase_ = Phase::kGrow;
+  } else {
+    phase_ = Phase::kImprove;
+  }
+  return StepOutcome::kRoundDone;
+}
+
+void LinkedSolver::setTargetError(double target) {
+  rounds_before_edit_ = rounds_;
+  const bool was_shown = std::exchange(shown_, nullptr) != nullptr;
+  settings_.target_error = target;
+  aim_ = std::max(aim_, target);
+  planner_.setTarget(aim_);
+  if (variation_) tryNow([this] { updateVariation(); });
+  if (phase_ == Phase::kImprove && gather_ && from_links_ == FromLinks::kNo && !isRepairing() &&
+      error_.total <= target) {  // what the wave still brings is not needed, and may take as long as all before it
+    tryNow([this] { gather_->giveUp(); });
+    wanted_.resize(measured_);
+    settling_ = true;
+  }
+  if (phase_ != Phase::kDone || from_links_ != FromLinks::kNo) return;
+  // What was told is of an end before; what the links and rays that there are now say is to be solved for.
+  if (was_shown) return (void)(from_links_ = FromLinks::kToConfirm);
+  tryNow([this] {
+    limit_ = SolveLimit::kNone;
+    while (error_.total <= aim_ && aimFurther()) continue;
+    if (error_.total > settings_.target_error) (void)chooseFurther();
+    if (error_.total <= settings_.target_error) from_links_ = FromLinks::kToConfirm;
+    while (from_links_ == FromLinks::kToConfirm && !(gather_ && gather_->isBehind())) (void)confirm();
+  });
+}
+
+void LinkedSolver::setMaterials(const scene::PatchMaterials& materials) {
+  takeMaterials(materials);
+  solveAnew();
+}
+
+void LinkedSolver::setLights(const LightSources& sources) {
+  takeSources(sources);
+  solveAnew();
+}
+
+}  // namespace radiosity::solver

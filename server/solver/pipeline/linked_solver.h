@@ -1,0 +1,402 @@
+// Progressive radiosity that remembers its links: a hemicube is rendered once for each sample of a shooter, and every
+// bounce, edit of light or colour and repeated shot runs over the links it left.
+//
+// Lights: direct light, from many points. Grow: the strongest unshot nodes become shooters, wave by wave, until what is
+// left is stood for by others. Improve, until the stated error is reached: whatever lowers it most for its cost, be it
+// further samples of a shooter whose two halves differ, or shooters for the children of a node inside which light
+// varies.
+#pragma once
+
+#include <cmath>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "common/result.h"
+#include "server/solver/edits/change_reach.h"
+#include "server/solver/lamps/crowd.h"
+#include "server/solver/error/field_error.h"
+#include "server/solver/pipeline/kept_ends.h"
+#include "server/solver/reflected/leaf_gather.h"
+#include "server/solver/reflected/leaf_shading.h"
+#include "server/solver/variation/leaf_variation.h"
+#include "server/solver/patches/lights.h"
+#include "server/solver/links/link_memory.h"
+#include "server/solver/links/link_planner.h"
+#include "server/solver/links/link_system.h"
+#include "server/solver/transport/node_shots.h"
+#include "server/solver/edits/shadows.h"
+#include "server/solver/solver.h"
+#include "server/solver/patches/unshot_pyramid.h"
+
+namespace radiosity::solver {
+
+class LinkedSolver final : public Solver {
+ public:
+  LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
+               Transport& transport, const SolverSettings& settings, const LightSources& sources = {});
+  /// After an edit of geometry: takes over the links of `former`, the solver of the scene before, that the edit left
+  /// alone, and measures the others again with its first steps: same shooters, same points, so that links are those
+  /// that a fresh measurement of all would find (and what lamps lose what it would, or a little more). Of shooters that
+  /// see the change, only links to leaves whose ways to them pass it are measured (Shadows). `keep_former`: it stays
+  /// what it was; else its links go as they are taken over, so that memory never holds them twice, and it is of no use
+  /// afterwards.
+  LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, const scene::PatchMaterials& materials,
+               Transport& transport, const SolverSettings& settings, const LightSources& sources, LinkedSolver& former,
+               const scene::PatchMap& map, bool keep_former = false);
+
+  /// Light is told for these normals; all else, and error(), is for geometric ones. Before the first step.
+  void shadeFor(std::shared_ptr<const scene::ShadingNormals> normals);
+
+  [[nodiscard]] Result<StepOutcome> step() override;
+  void setMaterials(const scene::PatchMaterials& materials) override;
+  void setLights(const LightSources& sources) override;
+  void setTargetError(double target) override;
+  void endWave() override;
+  void assess() override;
+
+  [[nodiscard]] std::vector<glm::vec3> irradiance() const override;
+  [[nodiscard]] std::vector<glm::vec3> halfIrradiance(std::uint32_t half) const override;
+  [[nodiscard]] std::vector<glm::vec3> directIrradiance() const override;
+  [[nodiscard]] bool isRepairing() const override { return repaired_ < due_; }
+  [[nodiscard]] bool isUnsettled() const override { return from_links_ == FromLinks::kAfterEdit; }
+  /// When all links are there, the light over them is still to be solved for.
+  [[nodiscard]] bool isBehind() const override {
+    return lacksLinks() || (phase_ == Phase::kDone && from_links_ == FromLinks::kToConfirm);
+  }
+  [[nodiscard]] std::vector<glm::vec3> unshot() const override;
+  [[nodiscard]] std::vector<std::uint8_t> shotLevels() const override;
+  [[nodiscard]] std::vector<float> residualShape() const override;
+  [[nodiscard]] std::vector<glm::vec3> commonErrorSquared() const override;
+  [[nodiscard]] const ErrorParts& error() const override { return error_; }
+  [[nodiscard]] EnergyParts energy() const override;
+  [[nodiscard]] std::shared_ptr<const LeafRays> rays() override { return leafRays(); }
+  [[nodiscard]] const TransportCounters& transportCounters() const override { return counters_; }
+  [[nodiscard]] const PlannerCounters& plannerCounters() const override { return planner_.counters(); }
+  [[nodiscard]] std::uint32_t rounds() const override { return rounds_; }
+  [[nodiscard]] SolveLimit limit() const override { return limit_; }
+  [[nodiscard]] LinkCounters linkCounters() const override;
+  [[nodiscard]] std::uint64_t affectedSamples() const override { return affected_; }
+  [[nodiscard]] bool hasFluxScale() const override { return false; }
+  [[nodiscard]] bool save(ArchiveWriter& to) const override;
+  [[nodiscard]] bool restore(ArchiveReader& from) override;
+
+  /// Whether rays could bring reflected light to so many leaf values, as far as settings and memory go.
+  [[nodiscard]] static bool mayGather(std::size_t leaves, const SolverSettings& settings);
+  /// After an edit of geometry: no light before all links are true.
+  void beExact();
+  /// What the links of all lights can come to take.
+  [[nodiscard]] std::size_t lightBytes() const;
+  /// What is remembered.
+  [[nodiscard]] const LinkSystem& system() const { return system_; }
+  /// The rays that reflected light comes by; null: it comes over links, or is not there yet.
+  [[nodiscard]] const LeafGather* gathered() const { return gather_.get(); }
+
+ private:
+  /// Short enough that nobody notices the wait, long enough that the workers' waiting for the last of them does not
+  /// count.
+  static constexpr double kSliceSeconds = 0.06;
+  enum class Phase { kLights, kGrow, kImprove, kDone };
+  /// Solving over links goes in slices too: which of its passes is under way.
+  enum class Pass { kNone, kFirst, kSecond, kRays };
+  /// What a solution over nothing but the links is for.
+  enum class FromLinks { kNo, kAfterEdit, kToConfirm };
+
+  template <typename Archive, typename Self>
+  static void visit(Archive& archive, Self& self);
+  /// Samples of a column that are to be taken again.
+  struct LeafLink {
+    std::uint32_t value;
+    float link;
+  };
+  struct Repair {
+    std::uint32_t shooter = 0, old_shooter = 0;
+    std::size_t half = 0;
+    std::uint32_t samples = 0;  ///< of a light polygon: points
+    bool whole = false;         ///< all their links; the column is empty
+    bool overtaken = false;     ///< nor were they taken again after the edit before
+    double reach = HUGE_VAL;    ///< what the old links are wrong by (ChangeReach); infinite: cannot wait
+    // Of a light, of which some points look first and stand for all of them:
+    std::uint32_t first_shots = 0;  ///< those that shall have looked next; 0: as many as look first
+    std::uint32_t looked = 0;       ///< points that have
+    LinkColumn::Totals found = {};  ///< by them, times points
+    double noise = 0.0;             ///< square of the error of irradiance times area, where both halves have as many;
+                                    ///< what all points would leave of it counts by what share of them has looked
+    std::vector<LeafLink> by_points = {};  ///< ascending: of leaves that looked at it for themselves, by points alone
+    bool past_losses = false;              ///< its looks see where the change is alone, whatever is lost elsewhere
+
+    /// As if none had looked.
+    void lookAnew() {
+      looked = 0;
+      found = {};
+      past_losses = false;
+      by_points.clear();
+    }
+  };
+  /// Where the sides of the scene before are now.
+  struct Renumbering {
+    const LinkedSolver& former;
+    const scene::PatchMap& map;
+    bool keep_former;
+    std::vector<std::uint32_t> side_after;          ///< by old side; kNone: gone
+    std::vector<std::uint32_t> unmoved_after;       ///< the same; kNone also where it moved
+    std::vector<std::array<Repair, 2>> unfinished;  ///< by old shooter and half: what was still to be taken again
+    std::vector<std::uint32_t> shooter_before;      ///< by shooter; it may be shorter
+  };
+  struct RepairBatch;
+  /// A leaf that looks at a light for itself.
+  struct LeafLook {
+    std::uint32_t value;
+    std::array<std::optional<float>, 2> link;  ///< by half, where it can
+  };
+
+  /// All but its light.
+  LinkedSolver(std::shared_ptr<const scene::PatchScene> patches, Transport& transport, const SolverSettings& settings);
+  [[nodiscard]] Renumbering renumber(const LinkedSolver& former, const scene::PatchMap& map, bool keep_former);
+  [[nodiscard]] GeometryChange changeOf(const Renumbering& numbers) const;
+  void addEarlier(const Renumbering& numbers, GeometryChange& change) const;
+  [[nodiscard]] bool isAltered(const NodePlace& place, const GeometryChange& change) const;
+  void inheritLights(LinkedSolver& former, Renumbering& numbers);
+  void inheritNodes(LinkedSolver& former, Renumbering& numbers);
+  void inheritEntries(const LinkedSolver& former, const Renumbering& numbers);
+  void inheritVariation(const LinkedSolver& former, const Renumbering& numbers);
+  void planRepairsOf(const Shooter& from, std::uint32_t old_index, std::uint32_t index, bool whole,
+                     Renumbering& numbers);
+  void inheritColumns(LinkedSolver& former, std::size_t first_repair, const Renumbering& numbers);
+  void planRepairs(double norm, const ChangeReach& change);
+  [[nodiscard]] const Shadows& shadowsOf(const Repair& repair) const {
+    return repair.overtaken ? *earlier_shadows_ : *shadows_;
+  }
+  [[nodiscard]] double reachOf(const Repair& repair, const ChangeReach& change) const;
+  [[nodiscard]] double missing(const Repair& repair) const;
+  [[nodiscard]] double missing() const;
+  /// After an edit of geometry, some are still those of before.
+  [[nodiscard]] bool lacksLinks() const { return repaired_ < repairs_.size(); }
+  [[nodiscard]] double errorBesideMissing() const;
+  [[nodiscard]] double fieldNorm() const;
+  void planDue(double norm);
+  void setPostponed(double error);
+  [[nodiscard]] bool findsMoreDue();
+  [[nodiscard]] bool isDueForTarget();
+  struct ShotRange {
+    std::uint32_t first, end;
+  };
+  [[nodiscard]] ShotRange shotsOfLight(const Repair& repair) const;
+  [[nodiscard]] std::vector<float> noiseOfLeaves(std::uint32_t shooter,
+                                                 std::span<const LinkColumn::ValueRun> leaves) const;
+  void weighRough(RepairBatch& batch);
+  [[nodiscard]] bool mayLookFromLeaves() const;
+  void lookFromLeaves(std::array<Repair*, 2> halves, std::span<const LinkColumn::ValueRun> leaves,
+                      std::span<float> room);
+  [[nodiscard]] std::vector<LeafLook> chooseUnsure(std::span<const LinkColumn::ValueRun> leaves,
+                                                   std::span<const float> noise, double wanted,
+                                                   std::span<float> room) const;
+  void takeLeafLooks(Repair& repair, std::span<const LinkColumn::ValueRun> leaves, std::span<const LeafLook> looks,
+                     std::span<float> room);
+  [[nodiscard]] double mostRoughness() const;
+  [[nodiscard]] bool lightsAreTooRough();
+  [[nodiscard]] Result<StepOutcome> catchUp();
+  [[nodiscard]] std::uint32_t shotsOf(const Repair& repair) const;
+  [[nodiscard]] bool isNeeded(Repair& repair);
+  void addSamples(const Repair& repair, ShotBatch& batch) const;
+  [[nodiscard]] bool losesLittle(const Repair& repair) const;
+  void findCutLinks(RepairBatch& repairs) const;
+  void takePart(RepairBatch& repairs, std::size_t shot, LinkSample& links);
+  void replacePart(RepairBatch& repairs, std::uint32_t index);
+  [[nodiscard]] Result<void> repairSlice();
+  void takeRepairs(RepairBatch& batch);
+  void addShots(RepairBatch& batch);
+  [[nodiscard]] bool isFull() const;
+  /// Rounds are counted on from edit to edit, and no number of edits takes them away from those that follow.
+  [[nodiscard]] bool hasRounds() const { return rounds_ - rounds_before_edit_ < settings_.max_rounds; }
+  [[nodiscard]] std::vector<Measurement> plan();
+  [[nodiscard]] std::vector<Measurement> planLights();
+  [[nodiscard]] bool forgetWeakest();
+  [[nodiscard]] Result<void> measureSlice();
+  [[nodiscard]] Result<void> measureSource(const Measurement& want);
+  [[nodiscard]] bool measureCrowd(const Measurement& want);
+  [[nodiscard]] bool isFirstOfCrowd(const Measurement& want) const;
+  void forgetRough();
+  void takeCrowds(const std::vector<Crowd>& crowds);
+  void addCrowd(const Crowd& crowd);
+  [[nodiscard]] bool restoreCrowds(ArchiveReader& from);
+  [[nodiscard]] bool restoreShown(ArchiveReader& from);
+  [[nodiscard]] bool hasTooManyLamps() const;
+  void takeSources(const LightSources& sources);
+  void addSource(const PunctualLights::Source& source);
+  [[nodiscard]] std::array<double, 3> skyFlux() const;
+  [[nodiscard]] double powerToShoot() const;
+  [[nodiscard]] double lostPart() const;
+  void solveAnew();
+  void dropNodes();
+  [[nodiscard]] bool advanceSolution();
+  [[nodiscard]] bool settleFromLinks();
+  [[nodiscard]] bool finishEdit();
+  [[nodiscard]] bool mayGoWithout();
+  [[nodiscard]] bool lightLeaves();
+  void shadeLeaves();
+  /// By half and number of LeafShading: what counts for the shading normal less what does for the geometric one.
+  using ShadedLight = std::array<std::vector<glm::vec3>, 2>;
+  void addShadedLinks(LinkSystem::From from, ShadedLight& light) const;
+  [[nodiscard]] ShadingEmitter emitterOf(const Shooter& shooter) const;
+  [[nodiscard]] ShadingEmitter emitterOf(const NodePlace& node) const;
+  [[nodiscard]] glm::vec3 shadedCorrection(std::uint32_t value, const glm::vec3& lacks) const;
+  void addShaded(const ShadedLight& light, std::uint32_t half, std::vector<glm::vec3>& nodes) const;
+  void takeMaterials(const scene::PatchMaterials& materials);
+  void takeLights();
+  [[nodiscard]] bool settle();
+  enum class Unshot { kNotByRays, kByRaysToo };
+  void findUnshot(Unshot which = Unshot::kNotByRays);
+  /// Shooters stand for what they sent, and rays for all that is left.
+  [[nodiscard]] bool isAllSent(Unshot which) const { return gathers() && which == Unshot::kNotByRays; }
+  [[nodiscard]] std::uint32_t nodeOf(std::uint32_t value) const;
+  /// Of a leaf value, without what varies within leaves.
+  [[nodiscard]] glm::vec3 lightOf(std::size_t value) const { return 0.5F * (half_[0][value] + half_[1][value]); }
+  /// While it lives unshot light is what no shooter stands for, whether rays bring it or not. Within another of its
+  /// kind it does nothing.
+  class AllUnshot {
+   public:
+    explicit AllUnshot(LinkedSolver& solver) : solver_(solver), is_outer_(solver.gathers() && !solver.all_unshot_) {
+      if (!is_outer_) return;
+      solver_.findUnshot(Unshot::kByRaysToo);
+      solver_.all_unshot_ = true;
+    }
+    ~AllUnshot() {
+      if (!is_outer_) return;
+      solver_.all_unshot_ = false;
+      solver_.tryNow([this] { solver_.findUnshot(); });
+    }
+    AllUnshot(const AllUnshot&) = delete;
+    AllUnshot& operator=(const AllUnshot&) = delete;
+
+   private:
+    LinkedSolver& solver_;
+    bool is_outer_;
+  };
+  [[nodiscard]] bool wantsLamp() const;
+  [[nodiscard]] bool sideShines(std::uint32_t side) const;
+  void assessStep();
+  /// What the halves' light says, of all leaves; received and reflected flux.
+  struct FieldSums {
+    FieldError field;
+    double received = 0.0, reflected = 0.0;
+  };
+  [[nodiscard]] FieldSums assessField() const;
+  void updateVariation();
+  [[nodiscard]] bool wantsVariation() const;
+  [[nodiscard]] bool refineVariation();
+  [[nodiscard]] double targetOfLinks() const;
+  [[nodiscard]] bool aimFurther();
+  /// Rays have brought light, and nothing is left to shoot.
+  [[nodiscard]] bool gathers() const { return gather_ && gather_->hasGathered(); }
+  [[nodiscard]] bool raysPay() const;
+  void limitLinks();
+  [[nodiscard]] double shotCost() const;
+  [[nodiscard]] double rayCost() const;
+  [[nodiscard]] double samplesCost() const;
+  [[nodiscard]] double usualRadiosity() const;
+  [[nodiscard]] std::vector<double> leastRadiosity() const;
+  struct Noise {
+    double rays = 0.0, links = 0.0;  ///< squares of relative errors; what smoothing took is shared out between them
+  };
+  [[nodiscard]] Noise noise() const;
+  /// By leaf value.
+  [[nodiscard]] std::vector<glm::vec3> ofLeaves(const scene::SideColours& colours) const;
+  [[nodiscard]] std::vector<glm::vec3> shiningOfLeaves() const;
+  [[nodiscard]] LeftLight leftLight() const;
+  [[nodiscard]] std::vector<bool> lightOverLinks() const;
+  void startRays();
+  [[nodiscard]] std::shared_ptr<const LeafRays> leafRays();
+  void inheritRays(const LinkedSolver& former, const Renumbering& numbers);
+  [[nodiscard]] StepOutcome chooseRays();
+  [[nodiscard]] bool refineBlotches();
+  [[nodiscard]] double blotch() const;
+  void leafUnshot(std::uint32_t side, std::vector<glm::vec3>& leaves, Unshot which = Unshot::kNotByRays) const;
+  void startGrowth();
+  [[nodiscard]] Result<StepOutcome> advance();
+  [[nodiscard]] StepOutcome finishRound();
+  [[nodiscard]] StepOutcome chooseNext();
+  [[nodiscard]] StepOutcome exhausted(SolveLimit limit);
+  [[nodiscard]] StepOutcome ended() const;
+  [[nodiscard]] std::uint64_t lightKey() const;
+  [[nodiscard]] bool takeKeptEnd();
+  void endHere();
+  [[nodiscard]] std::span<const LeafVariation::Correction> corrections() const;
+  [[nodiscard]] StepOutcome confirm();
+  [[nodiscard]] StepOutcome chooseFurther();
+  void tryNow(const std::function<void()>& work);
+
+  std::shared_ptr<const scene::PatchScene> patches_;
+  Transport& transport_;
+  SolverSettings settings_;
+  std::vector<Side> sides_;
+  std::vector<LightPolygon> lights_;           // those switched off stay, dark: their links are still good
+  std::vector<Crowd> crowds_;                  // likewise
+  std::unique_ptr<CrowdSample> crowd_sample_;  // of the measurement under way; null: it has not begun
+  PunctualLights punctual_;
+  std::vector<PunctualLights::Source> sources_;  // those switched off stay, dark
+  std::vector<PunctualLights::Source> sky_;      // its hemispheres, where rays bring their light
+  NodeShots shots_;
+  LinkSystem system_;
+  LinkExpander expander_;
+  LinkMemory memory_;
+  UnshotPyramid unshot_;
+  LinkPlanner planner_;
+  std::shared_ptr<const LeafRays> leaf_rays_;  // of rays and paths; null: not asked for yet
+  bool by_rays_ = false;                       // reflected light, but for what is bright and small
+  std::unique_ptr<LeafGather> gather_;         // then: once lights, and that, are measured
+  double sampled_alone_ = 0.0;        // error before the last round that brought samples and no rays; 0: none did
+  double sample_goal_ = 0.0;          // sampling error that further samples of links shall reach; 0: none
+  std::vector<Repair> repairs_;       // after an edit of geometry
+  std::size_t repaired_ = 0;          // of these
+  std::size_t due_ = 0;               // of these, before anything else is done
+  double repair_shot_seconds_ = 0.0;  // as the last of them took; 0: not known
+  double postponed_ = 0.0;            // part of the target error that the others may cause
+  double roughness_ = 0.0;            // likewise: lights that look again with some points only
+  bool lights_may_be_rough_ = true;   // that they may
+  bool may_look_past_ = true;         // of what is lost, little that is lost elsewhere need not be seen again
+  double norm_before_ = 0.0;          // of irradiance before the edit; 0: not known
+  std::unique_ptr<Shadows> shadows_;  // of the edit
+  std::unique_ptr<Shadows> earlier_shadows_;          // and of those before it, for links that no edit saw taken again
+  std::uint32_t key_end_ = 0, triangle_key_end_ = 0;  // keys of sides that never were
+  std::uint64_t affected_ = 0;
+  LinkCounters edits_;  // what repairs add to linkCounters()
+  Phase phase_ = Phase::kLights;
+  SolveLimit limit_ = SolveLimit::kNone;
+  bool lights_fit_ = true;  // no light goes without links for want of memory
+  Pass pass_ = Pass::kNone;
+  FromLinks from_links_ = FromLinks::kNo;
+  bool edit_lights_planned_ = false;  // of the edit being taken in
+  bool is_confirmed_ = false;         // the light that there is was solved for from links and rays alone, just now
+  bool settling_ = false;             // a wave is measured, its light is still to be solved for
+  std::vector<Measurement> wanted_;   // the wave under way
+  std::size_t measured_ = 0;          // of the wave
+  bool in_haste_ = false;             // its time is over
+  std::vector<Measurement> rough_;    // what it measured of crowds in haste
+  std::size_t slice_ = 16;            // measurements that take some 50 ms
+  std::size_t fewest_a_slice_ = 8;    // so many at least, for the workers
+  bool growing_ = true;               // light is still missing: until the first walk found nothing more to add
+  double aim_ = 0.0;                  // error that is worked towards, step by step down to the target
+  double share_part_ = 0.0;           // of all power, that one shooter should have
+  double left_out_ = 0.0;             // relative error by nodes too weak to play roulette
+  std::uint32_t rounds_ = 0, rounds_before_edit_ = 0;
+  std::uint64_t solutions_ = 0, sweeps_ = 0, replayed_ = 0;
+  double varying_ = 0.0, net_unshot_ = 0.0;     // flux, all channels
+  bool all_unshot_ = false;                     // an AllUnshot lives
+  double varying_share_ = 0.0;                  // of the residual, what light that varies inside shooters causes
+  std::array<std::vector<glm::vec3>, 2> half_;  // irradiance by leaf value
+  LeafShading shading_;
+  ShadedLight shaded_;                                // to be added to half_ where it is told
+  std::array<std::vector<glm::vec3>, 2> over_links_;  // of a new solution, while what rays bring is solved for
+  std::unique_ptr<LeafVariation> variation_;          // once little else is in error
+  std::unique_ptr<LeafVariation> next_variation_;     // after an edit of geometry, until then
+  bool refined_ = false;                              // more paths were traced: what is next is to be chosen anew
+  double square_ = 0.0;                               // of the light that it was brought up to date with, times area
+  double by_links_ = 0.0;                             // sampling error without the noise of that
+  ErrorParts error_;
+  KeptEnds ends_;
+  std::shared_ptr<const KeptEnd> shown_;  // what is told is that; null: it is what was solved for last
+  TransportCounters counters_;
+};
+
+}  // namespace radiosity::solver

@@ -1,0 +1,254 @@
+// LinkedSolver: its lights. They come, change and go by edits; those switched off keep their links.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <span>
+#include <utility>
+
+#include "server/solver/math/halves.h"
+#include "server/solver/pipeline/linked_solver.h"
+
+namespace radiosity::solver {
+namespace {
+
+/// So many lights that were moved away or switched off keep their links.
+constexpr std::ptrdiff_t kDarkSources = 8;
+/// So many times that of a node are the images of a light without extent (a sky has most).
+constexpr double kSourceCost = 60.0;
+
+}  // namespace
+
+/// Every light polygon that ever was is a shooter; its radiosity is what it emits now.
+void LinkedSolver::takeLights() {
+  for (auto& light : lights_) light.emission = glm::vec3(0.0F);
+  const auto [lights, crowds] = divideLights(findLightPolygons(*patches_, sides_, system_.emission()),
+                                             fewLights(system_.leafAreas().size(), settings_.link_memory), crowds_);
+  for (const auto& light : lights) {
+    const auto known = std::ranges::find(lights_, light.key, &LightPolygon::key);
+    if (known != lights_.end()) {
+      known->emission = light.emission;
+      continue;
+    }
+    Shooter shooter;
+    shooter.light = static_cast<std::uint32_t>(lights_.size());
+    shooter.area = light.area;
+    shooter.most_bytes = memory_.mostBytes(light);
+    lights_.push_back(light);
+    (void)system_.add(shooter);
+  }
+  takeCrowds(crowds);
+  for (auto& shooter : system_.shooters()) {
+    if (shooter.light != scene::kNone) shooter.sent.fill(lights_[shooter.light].emission);
+    if (shooter.crowd != scene::kNone) shooter.sent.fill(crowds_[shooter.crowd].emission);
+  }
+}
+
+/// Those that were there before keep their links, whatever their emission is now.
+void LinkedSolver::takeCrowds(const std::vector<Crowd>& crowds) {
+  for (auto& crowd : crowds_) crowd.emission = glm::vec3(0.0F);
+  for (const auto& crowd : crowds) {
+    const auto known =
+        std::ranges::find_if(crowds_, [&](const Crowd& old) { return old.key == crowd.key && old.isDark(); });
+    if (known == crowds_.end()) {
+      addCrowd(crowd);
+    } else {
+      *known = crowd;
+    }
+  }
+}
+
+/// In the place of one that is dark, once there are some.
+void LinkedSolver::addCrowd(const Crowd& crowd) {
+  auto& shooters = system_.shooters();
+  if (std::ranges::count_if(crowds_, &Crowd::isDark) >= kDarkSources) {
+    const auto old = std::ranges::find_if(crowds_, &Crowd::isDark);
+    const auto index = static_cast<std::uint32_t>(old - crowds_.begin());
+    const auto shooter = std::ranges::find(shooters, index, &Shooter::crowd);
+    system_.forget(static_cast<std::uint32_t>(shooter - shooters.begin()));
+    shooter->area = crowd.area;
+    *old = crowd;
+    return;
+  }
+  Shooter shooter;
+  shooter.crowd = static_cast<std::uint32_t>(crowds_.size());
+  shooter.area = crowd.area;
+  shooter.most_bytes = memory_.mostBytes();
+  shooter.sample_cost = CrowdSample::cost(system_.leafAreas().size()) / shotCost();
+  crowds_.push_back(crowd);
+  (void)system_.add(shooter);
+}
+
+/// False: there is more to do.
+bool LinkedSolver::measureCrowd(const Measurement& want) {
+  const auto& crowd = crowds_[system_.shooters()[want.shooter].crowd];
+  if (!crowd_sample_ || !crowd_sample_->isOf(crowd, want.half, want.index))
+    crowd_sample_ =
+        std::make_unique<CrowdSample>(*patches_, sides_, *leafRays(), settings_.seed, crowd, want.half, want.index);
+  if (!crowd_sample_->advance(kSliceSeconds, in_haste_ ? CrowdSample::Leaves::kSome : CrowdSample::Leaves::kAll))
+    return false;
+  if (!crowd_sample_->isWhole()) rough_.push_back(want);
+  counters_.gather_shots += 1;
+  counters_.gather_points += CrowdSample::kDraws;
+  const auto links = std::exchange(crowd_sample_, nullptr)->links();
+  expander_.expand(links);
+  system_.addSample(want.shooter, want.half, expander_, links, want.points);
+  return true;
+}
+
+/// Without it there is no light of the crowd in this half.
+bool LinkedSolver::isFirstOfCrowd(const Measurement& want) const {
+  const auto& shooter = system_.shooters()[want.shooter];
+  return shooter.crowd != scene::kNone && shooter.column[want.half].points() == 0.0;
+}
+
+/// There is time again: what was measured in haste is measured anew.
+void LinkedSolver::forgetRough() {
+  in_haste_ = false;
+  for (const auto& want : std::exchange(rough_, {})) {
+    system_.forget(want.shooter, want.half);
+    phase_ = Phase::kLights;
+  }
+}
+
+std::size_t LinkedSolver::lightBytes() const {
+  std::size_t bytes = 0;
+  for (const auto& shooter : system_.shooters()) bytes += shooter.isLight() ? 2 * shooter.most_bytes : 0;
+  return bytes;
+}
+
+/// So is every light without extent, but for a sky that rays see.
+void LinkedSolver::takeSources(const LightSources& sources) {
+  for (auto& source : sources_) source.intensity = glm::dvec3(0.0);
+  sky_.clear();
+  for (const auto& source : punctual_.makeSources(*patches_, sources)) {
+    if (by_rays_ && source.kind == PunctualLights::Source::Kind::kSky) {
+      sky_.push_back(source);
+      continue;
+    }
+    const auto known =
+        std::find_if(sources_.begin(), sources_.end(), [&](const auto& old) { return old.sameShape(source); });
+    if (known != sources_.end()) {
+      known->intensity = source.intensity;
+      continue;
+    }
+    addSource(source);
+  }
+  for (auto& shooter : system_.shooters()) {
+    if (shooter.source != scene::kNone) shooter.sent.fill(glm::vec3(sources_[shooter.source].intensity));
+  }
+}
+
+/// What enters the scene's box from it, whether it meets anything or not.
+std::array<double, 3> LinkedSolver::skyFlux() const {
+  std::array<double, 3> flux{};
+  for (const auto& source : sky_) {
+    for (std::size_t c = 0; c < 3; ++c) flux[c] += source.flux_per_intensity * source.intensity[static_cast<int>(c)];
+  }
+  return flux;
+}
+
+/// In the place of one that is dark, once there are some: a lamp that is dragged about leaves no trail.
+void LinkedSolver::addSource(const PunctualLights::Source& source) {
+  const auto dark = [&](const PunctualLights::Source& s) { return s.intensity == glm::dvec3(0.0); };
+  if (std::count_if(sources_.begin(), sources_.end(), dark) >= kDarkSources) {
+    const auto old = std::find_if(sources_.begin(), sources_.end(), dark);
+    for (std::uint32_t n = 0; n < system_.shooters().size(); ++n) {
+      auto& shooter = system_.shooters()[n];
+      if (shooter.source != static_cast<std::uint32_t>(old - sources_.begin())) continue;
+      system_.forget(n);
+      shooter.area = source.flux_per_intensity;
+    }
+    *old = source;
+    return;
+  }
+  Shooter shooter;
+  shooter.source = static_cast<std::uint32_t>(sources_.size());
+  shooter.area = source.flux_per_intensity;
+  shooter.sample_cost = kSourceCost;
+  shooter.most_bytes = memory_.mostBytes();
+  sources_.push_back(source);
+  (void)system_.add(shooter);
+}
+
+/// Unknown while links of a light are still to be measured, or measured again.
+std::vector<glm::vec3> LinkedSolver::directIrradiance() const {
+  const auto& shooters = system_.shooters();
+  const auto isOld = [&](const Repair& repair) { return shooters[repair.shooter].isLight() && repair.looked == 0; };
+  if (std::ranges::any_of(std::span(repairs_).subspan(repaired_), isOld)) return {};
+  if (std::ranges::any_of(shooters, [](const Shooter& shooter) { return shooter.owes(); })) return {};
+  std::array<std::vector<glm::vec3>, 2> halves;
+  inBothHalves([&](std::size_t half) { system_.irradiance(half, halves[half], LinkSystem::From::kLights); });
+  std::vector<glm::vec3> irradiance(patches_->nodeCount(), glm::vec3(0.0F));
+  for (const auto& side : sides_) {
+    for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) {
+      const auto v = side.first_value + leaf;
+      irradiance[side.first_node + leaf] = 0.5F * (halves[0][v] + halves[1][v]);
+    }
+  }
+  if (shading_.empty()) return irradiance;
+  ShadedLight shaded;
+  for (auto& half : shaded) half.assign(shading_.size(), glm::vec3(0.0F));
+  addShadedLinks(LinkSystem::From::kLights, shaded);
+  addShaded(shaded, kBothHalves, irradiance);
+  return irradiance;
+}
+
+/// One sequence of shots of a light without extent.
+Result<void> LinkedSolver::measureSource(const Measurement& want) {
+  const auto& source = sources_[system_.shooters()[want.shooter].source];
+  ShotBatch batch;
+  batch.flux_scale = kMeasureScale * std::exp2(-std::ceil(std::log2(std::max(1.0, source.flux_per_intensity))));
+  punctual_.addSample(source, want.index, static_cast<std::uint32_t>(want.half), batch);
+  FluxAccumulators flux;
+  flux.reset(patches_->nodeCount());
+  const auto done = transport_.run(batch, flux);
+  if (!done) return tl::unexpected<Error>(done.error());
+  counters_ += *done;
+  LinkSample links;
+  for (std::uint32_t node = 0; node < patches_->nodeCount(); ++node)
+    links.addFlux(node, flux.node[want.half][node][0], *patches_);
+  links.escaped += static_cast<double>(flux.escaped[0]) / kMeasureScale;
+  links.absorbed += static_cast<double>(flux.backface[0]) / kMeasureScale;
+  // The shots of a half carry half of an intensity of one.
+  links.scale(2.0 * kMeasureScale / batch.flux_scale);
+  expander_.expand(links);
+  system_.addSample(want.shooter, want.half, expander_, links, want.points);
+  return {};
+}
+
+/// Nobody can do without light: where there is no room for its links, the weakest shooters lose theirs.
+std::vector<Measurement> LinkedSolver::planLights() {
+  auto wanted = planner_.firstLight(system_);
+  lights_fit_ = true;
+  std::array<std::uint32_t, 2> last{scene::kNone, scene::kNone};  // by half; all samples of a light come together
+  std::array<bool, 2> fits{};
+  std::erase_if(wanted, [&](const Measurement& want) {
+    if (last[want.half] != want.shooter) {
+      last[want.half] = want.shooter;
+      const auto take = [&] { return memory_.takeSample(system_.shooters()[want.shooter], want.half); };
+      while (!(fits[want.half] = take()) && forgetWeakest()) continue;
+    }
+    lights_fit_ = lights_fit_ && fits[want.half];
+    return !fits[want.half];
+  });
+  return wanted;
+}
+
+/// Those that only correct a shooter above them go first: it still stands for them. False: none has links.
+bool LinkedSolver::forgetWeakest() {
+  std::uint32_t weakest = scene::kNone;
+  const auto& shooters = system_.shooters();
+  const auto worth = [&](std::uint32_t n) {
+    return std::pair(shooters[n].parent == scene::kNone, shooters[n].power());
+  };
+  for (std::uint32_t n = 0; n < shooters.size(); ++n) {
+    if (shooters[n].isLight() || shooters[n].column[0].bytes() + shooters[n].column[1].bytes() == 0) continue;
+    if (weakest == scene::kNone || worth(n) < worth(weakest)) weakest = n;
+  }
+  if (weakest == scene::kNone) return false;
+  memory_.giveBack(shooters[weakest].column[0].bytes() + shooters[weakest].column[1].bytes());
+  system_.forget(weakest);
+  return true;
+}
+
+}  // namespace radiosity::solver

@@ -1,0 +1,119 @@
+// What single places of leaves see, by rays: for light that varies within a leaf, of which links know nothing, and for
+// light that is gathered from wherever it comes. Plain values; any thread.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "server/geometry/ray_scene.h"
+#include "server/geometry/bounds.h"
+#include "server/scene/values/patch_scene.h"
+#include "server/solver/patches/side.h"
+
+namespace radiosity::solver {
+
+class LeafRays {
+ public:
+  /// Instead of leaf values: nothing that sends light, or the sky.
+  static constexpr std::uint32_t kNothing = scene::kNone, kSkyAbove = scene::kNone - 1, kSkyBelow = scene::kNone - 2;
+
+  /// A place on the lit side of a leaf; unit box.
+  struct Place {
+    glm::dvec3 position{0.0};
+    glm::dvec3 normal{0.0};
+    std::uint32_t value = kNothing;         ///< leaf value
+    std::uint32_t triangle = scene::kNone;  ///< no ray of see() from there meets it: on which it lies, if known, or
+                                            ///< one in the same plane and frame
+  };
+
+  /// O(n log n) in triangles, on all cores. Both are to outlive it. Throws std::bad_alloc.
+  LeafRays(const scene::PatchScene& patches, const std::vector<Side>& sides);
+
+  [[nodiscard]] std::uint32_t indexOfSide(std::uint32_t value) const { return side_of_value_[value]; }
+  [[nodiscard]] const Side& sideOf(std::uint32_t value) const { return sides_[side_of_value_[value]]; }
+  /// Unit box squared: what is covered and not buried.
+  [[nodiscard]] double areaOf(std::uint32_t value) const;
+  /// Its surface is flat, and all of its normals are the same to the bit.
+  [[nodiscard]] bool isEven(std::uint32_t value) const { return is_even_[sideOf(value).surface]; }
+  /// Edge of a leaf, unit box: of the whole texel.
+  [[nodiscard]] double widthOf(std::uint32_t value) const;
+  [[nodiscard]] double greatestWidth() const { return greatest_width_; }
+
+  /// The place at (u, v) in [0, 1)^2, uniform over what is left of a leaf that has area.
+  [[nodiscard]] Place placeOn(std::uint32_t value, const glm::dvec2& at) const;
+  /// What lies that way within `reach` (unit box), in single precision; `value` is kNothing where nothing does, and
+  /// where it is no leaf.
+  struct Sight {
+    Place end;
+    double distance = 0.0;
+  };
+  [[nodiscard]] Sight look(const Place& from, const glm::dvec3& direction, double reach) const;
+  /// look() without bounds; `value` may be one of the sky's.
+  [[nodiscard]] Sight look(const Place& from, const glm::dvec3& direction) const;
+  /// The leaf value that is seen that way, kNothing or one of the sky's. Where a leaf has no area of its own (buried
+  /// right behind another, or so little of it that its neighbours took it) it is theirs. What one can see through stops
+  /// the ray or not, by chance from `key`.
+  /// `end`: where the ray ends, and on which leaf, be it that another's value is told; kNothing: on an unlit side, of
+  /// `end.triangle`. As it was where it ends in the sky.
+  /// `first`: what the ray meets, of meetFirst(); null: that is looked for.
+  [[nodiscard]] std::uint32_t see(const Place& from, const glm::dvec3& direction, std::uint64_t key, Place& end,
+                                  const geometry::Hit* first = nullptr) const;
+  /// What rays of see() meet first, geometry::kPacket of them at most: asked together they cost half.
+  void meetFirst(std::span<const Place> from, std::span<const glm::dvec3> directions,
+                 std::span<geometry::Hit> hits) const;
+  /// Light may change within the leaf from one place to the next: something passes through it or right before it.
+  [[nodiscard]] bool isCut(std::uint32_t value) const { return is_cut_[value]; }
+  /// Who is seen where a leaf lies: itself, unless it has no area.
+  [[nodiscard]] std::uint32_t standInOf(std::uint32_t value) const {
+    return has_stand_in_[value] ? foundStandIn(value) : value;
+  }
+  /// Whether nothing lies between, but for what is nearer than a hundred-thousandth to `to`. `normal`: of the face on
+  /// which that lies, which a way that grazes it must not meet before; zero: it lies on none.
+  [[nodiscard]] bool isOpen(const Place& from, const glm::dvec3& to, const glm::dvec3& normal = glm::dvec3(0.0)) const;
+  /// Where ways from a place begin: a little before it.
+  [[nodiscard]] static glm::vec3 startOf(const Place& place);
+  /// Points of a light, structure of arrays: geometry::kPacket after geometry::kPacket of them.
+  struct Points {
+    std::vector<float> x, y, z;
+  };
+  /// By point, whether something hides it from where ways from a place begin: 1, or 0.
+  void hide(const glm::vec3& from, const Points& points, std::int32_t* hidden) const;
+  /// Where a ray of look() that ends on a leaf ends, without looking what lies before, to a few millionths. Nothing:
+  /// the triangles of its surface have not all the same normal, or it is met at too flat an angle.
+  [[nodiscard]] std::optional<Place> endOn(std::uint32_t value, const Place& from, const glm::dvec3& direction) const;
+
+ private:
+  const scene::PatchScene& patches_;
+  const std::vector<Side>& sides_;
+  void findStandIns();
+  void findEven();
+  [[nodiscard]] std::uint32_t foundStandIn(std::uint32_t value) const;
+  [[nodiscard]] std::uint32_t neighbourOf(const Side& side, std::uint32_t leaf) const;
+  [[nodiscard]] bool isBeneath(const Side& side, std::uint32_t value) const;
+  bool uncover(geometry::Hit& hit, const glm::dvec3& origin, const glm::dvec3& direction,
+               std::span<std::uint32_t> passed, std::size_t sheets) const;
+  [[nodiscard]] bool passes(const geometry::Hit& hit, const glm::dvec3& at, std::uint64_t key) const;
+  /// The leaf of a side that a texel lies on, or the nearest, by value.
+  [[nodiscard]] static std::uint32_t leafAt(const Side& side, const glm::dvec2& texel);
+
+  geometry::RayScene rays_;
+  std::vector<std::array<std::uint32_t, 2>> side_of_;  ///< by surface
+  std::vector<std::uint32_t> side_of_value_;
+  std::vector<bool> has_stand_in_;  ///< by leaf value: it has no area
+  /// Who stands for a leaf value that has no area: another, or kNothing. Ascending.
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> stand_ins_;
+  std::vector<bool> is_cut_;   ///< by leaf value
+  std::vector<bool> is_even_;  ///< by surface: flat, and all normals are the same to the bit
+  double greatest_width_ = 0.0;
+};
+
+/// Directions before a surface with probability proportional to the cosine, from (u, v) in [0, 1)^2.
+[[nodiscard]] glm::dvec3 cosineDirection(const glm::dvec3& normal, double u, double v);
+
+}  // namespace radiosity::solver

@@ -1,0 +1,67 @@
+#include "server/scene/document/png.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <vector>
+
+#include "common/task.h"
+#include "server/scene/document/image_decode.h"
+
+namespace radiosity::scene {
+namespace {
+
+/// Smooth in one part, noise in another: every filter is of use somewhere.
+std::vector<std::uint8_t> pixelsOf(int width, int height, int channels) {
+  std::vector<std::uint8_t> pixels;
+  std::uint32_t state = 1;
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x)
+      for (int c = 0; c < channels; ++c) {
+        state = state * 1664525U + 1013904223U;
+        const bool is_smooth = (x / 16 + y / 16) % 2 == 0;
+        pixels.push_back(static_cast<std::uint8_t>(is_smooth ? x * (c + 1) + 2 * y : state >> 24U));
+      }
+  return pixels;
+}
+
+void expectRoundTrip(int width, int height, int channels) {
+  const auto pixels = pixelsOf(width, height, channels);
+  const auto png = encodePng(width, height, channels, pixels);
+  EXPECT_EQ(sniffImageType(png), "image/png");
+  const auto read = decodeImage(png, std::size_t{1} << 26U, "test");
+  ASSERT_TRUE(read) << read.error().text();
+  ASSERT_EQ(read->width, width);
+  ASSERT_EQ(read->height, height);
+  for (std::size_t i = 0; i < pixels.size() / static_cast<std::size_t>(channels); ++i)
+    for (std::size_t c = 0; c < 4; ++c) {
+      const auto depth = static_cast<std::size_t>(channels);
+      ASSERT_EQ(read->rgba[4 * i + c], c < depth ? pixels[depth * i + c] : 255) << "pixel " << i << " channel " << c;
+    }
+}
+
+TEST(Png, IsReadBackAsItWas) {
+  for (const int channels : {3, 4}) {
+    expectRoundTrip(1, 1, channels);
+    expectRoundTrip(63, 47, channels);
+  }
+}
+
+TEST(Png, OfManyBandsIsOnePicture) { expectRoundTrip(1500, 700, 3); }
+
+TEST(Png, OfOneRowThatIsLongerThanABandIsOnePicture) { expectRoundTrip(100'000, 3, 3); }
+
+TEST(Png, CompressesWhatIsSmooth) {
+  const std::vector<std::uint8_t> grey(std::size_t{3} * 512 * 512, 128);
+  EXPECT_LT(encodePng(512, 512, 3, grey).size(), grey.size() / 100);
+}
+
+TEST(Png, IsGivenUpOnceItIsCalledOff) {
+  Task task;
+  const TaskScope scope(&task);
+  task.cancel();
+  EXPECT_THROW((void)encodePng(63, 47, 3, pixelsOf(63, 47, 3)), Interrupted);
+}
+
+}  // namespace
+}  // namespace radiosity::scene

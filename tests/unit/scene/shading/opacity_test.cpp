@@ -1,0 +1,117 @@
+#include "server/scene/shading/opacity.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "server/scene/charts/build.h"
+#include "tests/unit/scene/shapes.h"
+
+namespace radiosity::scene::test {
+namespace {
+
+PatchScene build(const Scene& scene, std::uint64_t budget = 64) {
+  ChartOptions options;
+  options.texel_budget = budget;
+  return buildPatchScene(scene, options).value();
+}
+
+/// A floor of side 1 whose texture, `width` x `height` alphas, spans it once.
+Scene veiledFloor(AlphaMode mode, int width, int height, const std::vector<std::uint8_t>& alphas) {
+  Scene scene;
+  Texture texture;
+  texture.width = width;
+  texture.height = height;
+  for (const auto alpha : alphas) texture.rgba.insert(texture.rgba.end(), {255, 255, 255, alpha});
+  scene.textures.push_back(std::move(texture));
+  Primitive p = floorQuad(1.0);
+  p.texcoord0 = {{0, 0}, {0, 1}, {1, 1}, {1, 0}};
+  Material material;
+  material.alpha_mode = mode;
+  material.base_color_texture.texture = 0;
+  place(scene, p, glm::dmat4(1.0), material);
+  return scene;
+}
+
+/// Areas of all leaves of the first side.
+double leafArea(const PatchScene& patches) {
+  double sum = 0.0;
+  for (const auto& s : patches.surfaces) {
+    for (std::uint32_t i = 0; i < s.width * s.height; ++i)
+      sum += static_cast<double>(patches.node_area[s.first_node[0] + i]);
+  }
+  return sum * patches.scale * patches.scale;
+}
+
+TEST(Opacity, OpaqueScenesHaveNoneAndKeepTheirArea) {
+  Scene scene;
+  place(scene, floorQuad(1.0), glm::dmat4(1.0), Material{});
+  const auto patches = build(scene);
+  EXPECT_TRUE(patches.opacity.empty());
+  EXPECT_NEAR(leafArea(patches), 1.0, 1e-5);
+}
+
+TEST(Opacity, AlphaOfAnOpaqueMaterialMeansNothing) {
+  const auto patches = build(veiledFloor(AlphaMode::kOpaque, 1, 1, {0}));
+  EXPECT_TRUE(patches.opacity.empty());
+  EXPECT_NEAR(leafArea(patches), 1.0, 1e-5);
+}
+
+TEST(Opacity, AMaskCutsOutWhatIsBelowTheCutoff) {
+  // left half cut out; the bilinear step in the middle is cut at one half, where the border is
+  const auto patches = build(veiledFloor(AlphaMode::kMask, 2, 1, {0, 255}));
+  ASSERT_EQ(patches.surfaces.size(), 1U);
+  EXPECT_TRUE(patches.surfaces[0].see_through);
+  // The texture repeats: a quarter of a pixel's blend at both outer borders is symmetrical, so half is left.
+  EXPECT_NEAR(leafArea(patches), 0.5, 0.03);
+  std::uint32_t empty = 0;
+  for (const auto& leaf : patches.leaves) empty += leaf.triangle == kNone ? 1 : 0;
+  EXPECT_GT(empty, patches.leaves.size() / 4) << "what is wholly cut out has no patches";
+}
+
+TEST(Opacity, AMaskThatCutsEverythingLeavesNoArea) {
+  const auto patches = build(veiledFloor(AlphaMode::kMask, 1, 1, {100}));
+  EXPECT_EQ(leafArea(patches), 0.0);
+}
+
+TEST(Opacity, BlendedAreaIsAlphaTimesTheWhole) {
+  const auto patches = build(veiledFloor(AlphaMode::kBlend, 1, 1, {51}));
+  EXPECT_NEAR(leafArea(patches), 0.2, 1e-3);
+}
+
+TEST(Opacity, TransmissionLetsItsFactorThroughWhateverTheMode) {
+  Scene scene;
+  Material glass;
+  glass.transmission = 0.75F;
+  place(scene, floorQuad(1.0), glm::dmat4(1.0), glass);
+  EXPECT_NEAR(leafArea(build(scene)), 0.25, 2e-3);  // opacity is kept in steps of 1/255
+}
+
+TEST(Opacity, AFineTextureGetsAFineGrid) {
+  std::vector<std::uint8_t> stripes;
+  for (int i = 0; i < 64; ++i) stripes.push_back(i % 4 < 2 ? 255 : 0);
+  const auto patches = build(veiledFloor(AlphaMode::kMask, 64, 1, stripes), 16);
+  EXPECT_GE(patches.surfaces[0].opacity_scale, 8U);
+  EXPECT_NEAR(leafArea(patches), 0.5, 0.03);
+}
+
+TEST(Opacity, AGlassBoxBuriesNothing) {
+  Scene scene;
+  place(scene, floorQuad(1.0, 0.0, 0.0), glm::dmat4(1.0), Material{});
+  Material glass;
+  glass.transmission = 0.9F;
+  place(scene, box({0.25, 0.0, 0.25}, {0.75, 0.5, 0.75}), glm::dmat4(1.0), glass);
+  const auto patches = build(scene, 400);
+  double floor_area = 0.0;
+  for (const auto& s : patches.surfaces) {
+    if (s.see_through) continue;
+    floor_area += static_cast<double>(
+        patches.node_area[s.first_node[0] + levelGrid(s.width, s.height, s.level_count - 1).offset]);
+  }
+  EXPECT_NEAR(floor_area * patches.scale * patches.scale, 1.0, 1e-4);
+  // Nor is it a closed solid, whose backs would not be drawn: light crosses two panes of it.
+  EXPECT_EQ(std::ranges::count(patches.solids.solid_of, kNone), static_cast<std::ptrdiff_t>(patches.triangles.size()));
+}
+
+}  // namespace
+}  // namespace radiosity::scene::test
