@@ -58,6 +58,7 @@ json params(const SolveConfigureCall& c) {
   if (c.sky) out["sky"] = toJson(*c.sky);
   if (c.no_sky) out["sky"] = nullptr;
   if (c.double_sided) out["doubleSided"] = *c.double_sided;
+  if (c.method) out["method"] = nameOf(*c.method);
   return out;
 }
 json params(const SolveWaitCall& c) {
@@ -157,6 +158,10 @@ void read(Reader& r, SolveConfigureCall& c) {
   if (bool given = false; r.find("doubleSided") != nullptr) {
     r.boolean("doubleSided", given, Need::kOptional);
     c.double_sided = given;
+  }
+  if (Method given{}; r.find("method") != nullptr) {
+    r.choice("method", given, Need::kOptional, methodFrom, kMethodNamesText);
+    c.method = given;
   }
 }
 void read(Reader& r, SolveWaitCall& c) {

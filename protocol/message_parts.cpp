@@ -14,7 +14,8 @@ json toJson(const Settings& s) {
           {"texelSize", s.texel_size_m},
           {"seed", s.seed},
           {"sky", s.sky ? toJson(*s.sky) : json(nullptr)},
-          {"doubleSided", s.double_sided}};
+          {"doubleSided", s.double_sided},
+          {"method", nameOf(s.method)}};
 }
 
 json toJson(const Sky& sky) { return {{"upper", sky.upper}, {"lower", sky.lower}}; }
@@ -60,6 +61,7 @@ void read(Reader& r, Settings& s) {
   r.integer("seed", s.seed, Need::kOptional, 0, std::numeric_limits<std::uint64_t>::max());
   readSky(r, s.sky);
   r.boolean("doubleSided", s.double_sided, Need::kOptional);
+  r.choice("method", s.method, Need::kOptional, methodFrom, kMethodNamesText);
 }
 
 json toJson(const Progress& p) {

@@ -13,6 +13,7 @@
 #include <variant>
 #include <vector>
 
+#include "common/method.h"
 #include "protocol/limits.h"
 #include "protocol/sky.h"
 
@@ -62,6 +63,7 @@ struct Settings {
   std::uint64_t seed = 1;
   std::optional<Sky> sky;  ///< none: JSON null
   bool double_sided = false;
+  Method method = Method::kGather;
 };
 
 struct PageInfo {
@@ -248,6 +250,7 @@ struct SolveConfigureCall {
   std::optional<Sky> sky = {};
   bool no_sky = false;  ///< "sky": null
   std::optional<bool> double_sided = {};
+  std::optional<Method> method = {};
 };
 struct SolvePauseCall {
   static constexpr std::string_view kMethod = "solve.pause";

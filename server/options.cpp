@@ -98,7 +98,14 @@ void addSolveOptions(CLI::App& app, Options& o, Raw& raw) {
       ->transform(CLI::AsSizeValue(false))
       ->type_name("SIZE")
       ->capture_default_str();
-  app.add_flag("--paper-mode", o.solve.paper_mode, "Lum, Ma and Max 2002 to the letter, for comparisons");
+  app.add_option("--method", o.solve.method,
+                 "gather: texels gather reflected light along rays; shooting: progressive shooting, which remembers no "
+                 "links; paper: Lum, Ma and Max 2002, for comparisons")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, Method>{{"gather", Method::kGather},
+                                                                        {"shooting", Method::kShooting},
+                                                                        {"paper", Method::kPaper}})
+                      .description("{gather,shooting,paper}"))
+      ->default_str("gather");
 }
 
 void addStateOptions(CLI::App& app, Options& o) {
@@ -129,6 +136,7 @@ std::set<std::string> namedSettings(const CLI::App& app) {
   note("--seed", "seed");
   note("--sky", "sky");
   note("--double-sided", "doubleSided");
+  note("--method", "method");
   return named;
 }
 

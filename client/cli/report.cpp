@@ -24,7 +24,8 @@ json settingsJson(const protocol::Settings& settings) {
           {"texel_size_m", settings.texel_size_m},
           {"seed", settings.seed},
           {"sky", settings.sky ? json{{"upper", settings.sky->upper}, {"lower", settings.sky->lower}} : json(nullptr)},
-          {"double_sided", settings.double_sided}};
+          {"double_sided", settings.double_sided},
+          {"method", nameOf(settings.method)}};
 }
 
 std::string stateWord(const std::string& state) { return state == "timeLimit" ? "time limit" : state; }
@@ -97,6 +98,7 @@ std::string statusText(const protocol::StatusReply& status) {
   row("texels", s.texel_size_m > 0.0 ? fmt::format("{:g} m each", s.texel_size_m) : "about " + countText(s.texels));
   row("seed", std::to_string(s.seed));
   if (s.double_sided) row("sides", "both of all surfaces");
+  if (s.method != Method::kGather) row("method", std::string(nameOf(s.method)));
   row("OpenGL", status.gl_renderer);
   row("warnings", countText(status.warning_count));
   for (const auto& warning : status.warnings) out += "  " + oneLine(warning) + "\n";

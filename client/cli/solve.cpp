@@ -41,6 +41,7 @@ struct SolveOptions {
   std::string link_memory;       ///< as radiosityd takes it; empty: the server's choice
   std::string max_scene_memory;  ///< likewise
   bool double_sided = false;
+  Method method = Method::kGather;
   bool unlit = false, error_map = false, quiet = false;
 };
 
@@ -145,7 +146,8 @@ class Solve {
                                       .seed = options_.seed,
                                       .sky = sky_,
                                       .no_sky = !sky_,
-                                      .double_sided = options_.double_sided};
+                                      .double_sided = options_.double_sided,
+                                      .method = options_.method};
     constexpr double kMillisecondsPerSecond = 1000.0;
     if (!call.no_time_limit)
       call.time_limit_ms = static_cast<std::uint64_t>(std::llround(options_.time_limit_s * kMillisecondsPerSecond));
@@ -336,6 +338,16 @@ void addSolve(CLI::App& app, Run& run) {
   command.add_flag("--double-sided", options->double_sided,
                    "light both sides of all surfaces, whatever their materials say: for rooms whose faces are turned "
                    "outward");
+  command
+      .add_option(
+          "--method", options->method,
+          "gather: texels gather reflected light along rays; shooting: progressive shooting, which remembers no "
+          "links; paper: Lum, Ma and Max 2002, whose sampling error is what it is (default: gather)")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, Method>{{"gather", Method::kGather},
+                                                                        {"shooting", Method::kShooting},
+                                                                        {"paper", Method::kPaper}})
+                      .description(""))
+      ->type_name("METHOD");
   command
       .add_option("--sky", options->sky,
                   "light from outside, in nits: 1000, or R,G,B, or R,G,B/R,G,B (above / below the horizon); for scenes "

@@ -18,6 +18,7 @@
 
 #include "common/bytes.h"
 #include "common/image.h"
+#include "common/method.h"
 #include "common/result.h"
 
 namespace radiosity::engine {
@@ -82,7 +83,7 @@ struct SolveSettings {
   std::uint64_t seed = 1;
   std::optional<SkySetting> sky;  ///< for scenes that have none of their own
   bool double_sided = false;      ///< all materials are, whatever the scene says
-  bool paper_mode = false;        ///< Lum, Ma and Max 2002 to the letter (server option, comparisons)
+  Method method = Method::kGather;
   std::uint64_t link_memory_bytes = std::uint64_t{1} << 30;  ///< that remembered links never exceed (server option)
 
   bool operator==(const SolveSettings&) const = default;

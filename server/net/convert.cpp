@@ -87,6 +87,7 @@ protocol::Settings toSettings(const engine::SolveSettings& s) {
     out.sky = {color(s.sky->upper), color(s.sky->lower)};
   }
   out.double_sided = s.double_sided;
+  out.method = s.method;
   return out;
 }
 
@@ -103,6 +104,7 @@ engine::SolveSettings merged(engine::SolveSettings s, const protocol::SolveConfi
   if (call.no_sky) s.sky.reset();
   if (call.sky) s.sky = toSetting(*call.sky);
   if (call.double_sided) s.double_sided = *call.double_sided;
+  if (call.method) s.method = *call.method;
   return s;
 }
 

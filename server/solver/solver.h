@@ -8,12 +8,13 @@
 #include <vector>
 
 #include "common/archive.h"
+#include "common/method.h"
 #include "common/result.h"
-#include "server/scene/values/patch_scene.h"
 #include "server/scene/shading/shading_normals.h"
+#include "server/scene/values/patch_scene.h"
 #include "server/solver/error/error_parts.h"
-#include "server/solver/planner_settings.h"
 #include "server/solver/lamps/punctual_lights.h"
+#include "server/solver/planner_settings.h"
 #include "server/solver/transport/transport.h"
 
 namespace radiosity::solver {
@@ -23,10 +24,7 @@ class LeafRays;
 struct SolverSettings {
   double target_error = 0.02;
   std::uint64_t seed = 1;
-  /// Lum, Ma and Max 2002 to the letter: one round, direct light scattered, links chosen by the hardware's mipmapping,
-  /// Gaussian over the unpushed irradiance. It stops when the residual reaches the target; its sampling error is what
-  /// it is.
-  bool paper_mode = false;
+  Method method = Method::kGather;
   /// Whether light that varies within leaves is looked for, stated, and corrected. Without, leaves are lumped: each
   /// shoots its mean, and that alone is what the error is about.
   bool within_leaves = true;

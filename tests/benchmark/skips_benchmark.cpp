@@ -89,7 +89,7 @@ const std::vector<Variant>& variants() {
        [](auto& s) { s.link_memory = 0, s.planner.gather_nodes = false; }},
       {"links forgotten, nodes hardly ever shot whole",
        [](auto& s) { s.link_memory = 0, s.planner.variation_share /= 16; }},
-      {"the paper to the letter", [](auto& s) { s.paper_mode = true; }},
+      {"the paper to the letter", [](auto& s) { s.method = Method::kPaper; }},
   };
   return kAll;
 }

@@ -20,11 +20,11 @@
 #include "server/gpu/workers/gpu_transport.h"
 #include "server/scene/charts/build.h"
 #include "server/scene/document/document.h"
-#include "server/scene/values/patch_scene.h"
 #include "server/scene/shading/shade.h"
+#include "server/scene/values/patch_scene.h"
+#include "server/solver/patches/outlines.h"
 #include "server/solver/pipeline/linked_solver.h"
 #include "server/solver/pipeline/make_solver.h"
-#include "server/solver/patches/outlines.h"
 #include "server/solver/shooting/shooting_solver.h"
 #include "server/solver/solver.h"
 #include "tests/oracle/path_tracer.h"
@@ -296,7 +296,7 @@ int profile(const std::string& file, std::map<std::string, std::string> options)
   solver::SolverSettings settings;
   settings.target_error = number("--error", 0.002);
   settings.seed = static_cast<std::uint64_t>(number("--seed", 1));
-  settings.paper_mode = options.count("--paper") != 0;
+  settings.method = options.count("--paper") != 0 ? Method::kPaper : Method::kGather;
   if (options["--reflected"] == "links") settings.reflected = solver::SolverSettings::Reflected::kByLinks;
   if (options["--reflected"] == "rays") settings.reflected = solver::SolverSettings::Reflected::kByRays;
   settings.planner.gather_nodes = number("--gather", 1) != 0.0;  // 0: reflected light is scattered instead

@@ -13,8 +13,8 @@
 
 #include "server/scene/charts/build.h"
 #include "server/scene/document/document.h"
-#include "server/scene/values/patch_scene.h"
 #include "server/scene/shading/shade.h"
+#include "server/scene/values/patch_scene.h"
 #include "server/solver/pipeline/make_solver.h"
 #include "server/solver/solver.h"
 #include "tests/fuzz/target.h"

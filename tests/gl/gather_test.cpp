@@ -8,8 +8,8 @@
 #include <numbers>
 #include <span>
 
-#include "server/scene/charts/build.h"
 #include "server/scene/burial/coverage.h"
+#include "server/scene/charts/build.h"
 #include "server/solver/math/polygon_form_factor.h"
 #include "tests/gl/gather_fixture.h"
 #include "tests/unit/scene/shapes.h"

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "server/gpu/workers/gpu_transport.h"
-#include "server/solver/transport/node_shots.h"
 #include "server/solver/math/polygon_form_factor.h"
+#include "server/solver/transport/node_shots.h"
 #include "tests/gl/scene_builder.h"
 
 namespace radiosity::test {

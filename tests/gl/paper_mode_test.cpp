@@ -5,9 +5,9 @@
 #include <cmath>
 #include <cstdio>
 
-#include "server/gpu/workers/gpu_transport.h"
 #include "server/gpu/draw/hemicube_renderer.h"
 #include "server/gpu/draw/paper_ids.h"
+#include "server/gpu/workers/gpu_transport.h"
 #include "tests/gl/scene_builder.h"
 
 namespace radiosity::test {

@@ -7,8 +7,8 @@
 #include "server/gpu/workers/gpu_transport.h"
 #include "server/scene/charts/build.h"
 #include "server/scene/document/document.h"
-#include "server/scene/values/patch_scene.h"
 #include "server/scene/shading/shade.h"
+#include "server/scene/values/patch_scene.h"
 #include "server/solver/shooting/shooting_solver.h"
 
 namespace radiosity {
@@ -32,7 +32,7 @@ Solved solveCornell(bool paper) {
   EXPECT_TRUE(transport.has_value()) << transport.error().text();
   EXPECT_TRUE((*transport)->setScene(patches));
   solver::SolverSettings settings;
-  settings.paper_mode = paper;
+  settings.method = paper ? Method::kPaper : Method::kShooting;
   solver::ShootingSolver solver(patches, scene::shadePatches(*imported, *patches), **transport, settings);
   for (int i = 0; i < 2000; ++i) {
     const auto outcome = solver.step();

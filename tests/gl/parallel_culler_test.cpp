@@ -9,8 +9,8 @@
 #include <glm/geometric.hpp>
 #include <set>
 
-#include "server/scene/values/closed_solids.h"
 #include "server/scene/burial/solid_finder.h"
+#include "server/scene/values/closed_solids.h"
 #include "tests/gl/scene_builder.h"
 
 namespace radiosity::test {

@@ -10,10 +10,10 @@
 #include <stdexcept>
 #include <thread>
 
-#include "server/gpu/workers/gpu_transport.h"
 #include "server/gpu/draw/hemicube_renderer.h"
 #include "server/gpu/draw/parallel_renderer.h"
 #include "server/gpu/draw/render_desk.h"
+#include "server/gpu/workers/gpu_transport.h"
 #include "tests/gl/mixed_batch.h"
 #include "tests/gl/scene_builder.h"
 

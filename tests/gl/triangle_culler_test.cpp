@@ -11,8 +11,8 @@
 #include <set>
 
 #include "server/gpu/draw/hemicube_renderer.h"
-#include "server/scene/values/closed_solids.h"
 #include "server/scene/burial/solid_finder.h"
+#include "server/scene/values/closed_solids.h"
 #include "tests/gl/scene_builder.h"
 
 namespace radiosity::test {

@@ -59,8 +59,9 @@ OWN_INCLUDES = [
     }, SOLVER),
     *among("solver", {
         "shooting": "error math patches transport",
+        "paper": "lamps math patches transport",
         "links": "math patches shooting transport",
-        "pipeline": "edits error lamps links math patches rays reflected shooting transport variation",
+        "pipeline": "edits error lamps links math paper patches rays reflected shooting transport variation",
     }, SOLVER + [r"server/solver/\w+\.h"]),
     (r"server/solver/\w+\.h", SOLVER + ["server/solver/error/", "server/solver/lamps/", "server/solver/transport/",
                                         r"server/solver/\w+\.h"]),

@@ -8,8 +8,8 @@
 #include "common/give_back.h"
 #include "common/task.h"
 #include "server/engine/lit/carried_light.h"
-#include "server/scene/charts/build.h"
 #include "server/scene/burial/burial_record.h"
+#include "server/scene/charts/build.h"
 #include "server/scene/shading/emitters.h"
 #include "server/scene/shading/shade.h"
 #include "server/solver/pipeline/make_solver.h"
@@ -206,7 +206,7 @@ void LitScene::makeSolver(const solver::FormerSolver* former) {
   solver::SolverSettings settings;
   settings.target_error = settings_.target_error;
   settings.seed = settings_.seed;
-  settings.paper_mode = settings_.paper_mode;
+  settings.method = settings_.method;
   settings.link_memory = settings_.link_memory_bytes;
   sources_ = lightSources(*scene_);
   light_report_.forgetLost();

@@ -5,9 +5,9 @@
 #include <algorithm>
 
 #include "common/log.h"
+#include "server/engine/lit/thread_time.h"
 #include "server/engine/loop/solve_loop_class.h"
 #include "server/engine/publish/status_report.h"
-#include "server/engine/lit/thread_time.h"
 
 namespace radiosity::engine {
 namespace {

@@ -5,11 +5,11 @@
 #include <optional>
 #include <utility>
 
+#include "server/engine/loop/solve_loop_class.h"
 #include "server/engine/publish/exports.h"
 #include "server/engine/publish/framing.h"
 #include "server/engine/publish/picture.h"
 #include "server/engine/publish/quantity_pages.h"
-#include "server/engine/loop/solve_loop_class.h"
 #include "server/scene/lightmap/lightmap.h"
 
 namespace radiosity::engine {

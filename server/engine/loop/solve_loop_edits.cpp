@@ -270,7 +270,7 @@ Result<SolveSettings> SolveLoop::applySettings(const SolveSettings& settings) {
   const bool reshaped = before.texels != settings.texels || before.texel_size_m != settings.texel_size_m ||
                         before.double_sided != settings.double_sided ||
                         (lit_ && before.sky != settings.sky && lit_->outgrows(settings));
-  const bool anew = before.seed != settings.seed || before.paper_mode != settings.paper_mode ||
+  const bool anew = before.seed != settings.seed || before.method != settings.method ||
                     before.link_memory_bytes != settings.link_memory_bytes;
   if (lit_ && reshaped) {  // which may fail: only what can be lit is kept
     const auto keep = [&](const LitScene&, const LitScene::Affected&) { return keepSettings(settings); };

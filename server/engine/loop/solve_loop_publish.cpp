@@ -4,9 +4,9 @@
 #include <chrono>
 #include <utility>
 
-#include "server/engine/publish/quantity_pages.h"
-#include "server/engine/loop/solve_loop_class.h"
 #include "server/engine/lit/thread_time.h"
+#include "server/engine/loop/solve_loop_class.h"
+#include "server/engine/publish/quantity_pages.h"
 
 namespace radiosity::engine {
 namespace {

@@ -6,9 +6,9 @@
 
 #include "common/archive.h"
 #include "common/log.h"
+#include "server/engine/loop/solve_loop_class.h"
 #include "server/engine/persist/checkpoint_head.h"
 #include "server/engine/persist/kept_settings.h"
-#include "server/engine/loop/solve_loop_class.h"
 
 namespace radiosity::engine {
 namespace {

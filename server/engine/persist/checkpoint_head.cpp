@@ -19,7 +19,7 @@ CheckpointHead headOf(const SolveSettings& settings) {
   head.link_memory = settings.link_memory_bytes;
   head.texel_size_m = settings.texel_size_m;
   head.target_error = settings.target_error;
-  head.paper_mode = settings.paper_mode;
+  head.method = settings.method;
   head.double_sided = settings.double_sided;
   head.has_sky = settings.sky.has_value();
   head.sky = settings.sky.value_or(SkySetting{});
@@ -28,8 +28,8 @@ CheckpointHead headOf(const SolveSettings& settings) {
 
 bool sameSolve(const CheckpointHead& a, const CheckpointHead& b) {
   const auto key = [](const CheckpointHead& h) {
-    return std::tuple(h.texel_size_m, h.texel_size_m > 0.0 ? 0 : h.texels, h.seed, h.link_memory, h.paper_mode,
-                      h.has_sky, h.double_sided);
+    return std::tuple(h.texel_size_m, h.texel_size_m > 0.0 ? 0 : h.texels, h.seed, h.link_memory, h.method, h.has_sky,
+                      h.double_sided);
   };
   return key(a) == key(b) && a.sky == b.sky;
 }

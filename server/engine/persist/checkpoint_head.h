@@ -20,7 +20,8 @@ struct CheckpointHead {
   std::uint64_t revision = 0;
   std::uint64_t texels = 0, seed = 0, link_memory = 0;
   double texel_size_m = 0.0, target_error = 0.0, seconds = 0.0;
-  bool paper_mode = false, has_sky = false, double_sided = false;
+  Method method = Method::kGather;
+  bool has_sky = false, double_sided = false;
   SkySetting sky;
   std::string gltf, assets;  ///< JSON, and a digest of buffers and images
   scene::SideBits sides;     ///< LitScene::sides()
@@ -28,8 +29,7 @@ struct CheckpointHead {
   template <typename Archive, typename Self>
   static void visit(Archive& archive, Self& self) {
     archive(self.epoch, self.revision, self.texels, self.seed, self.link_memory, self.texel_size_m, self.target_error,
-            self.seconds, self.paper_mode, self.has_sky, self.sky, self.double_sided, self.gltf, self.assets,
-            self.sides);
+            self.seconds, self.method, self.has_sky, self.sky, self.double_sided, self.gltf, self.assets, self.sides);
   }
 };
 

@@ -40,7 +40,8 @@ std::map<std::string, std::string> keptSettings(const SolveSettings& settings) {
                                              {"texelSize", fmt::format("{}", settings.texel_size_m)},
                                              {"seed", fmt::format("{}", settings.seed)},
                                              {"sky", ""},
-                                             {"doubleSided", settings.double_sided ? "1" : "0"}};
+                                             {"doubleSided", settings.double_sided ? "1" : "0"},
+                                             {"method", std::string(nameOf(settings.method))}};
   if (settings.sky) {
     const auto& [u, l] = *settings.sky;
     kept["sky"] = fmt::format("{} {} {} {} {} {}", u.x, u.y, u.z, l.x, l.y, l.z);
@@ -67,6 +68,8 @@ SolveSettings withKept(SolveSettings settings, const std::map<std::string, std::
   if (!named.contains("seed")) settings.seed = whole("seed").value_or(settings.seed);
   if (const auto sky = kept.find("sky"); sky != kept.end() && !named.contains("sky")) settings.sky = skyIn(sky->second);
   if (!named.contains("doubleSided")) settings.double_sided = whole("doubleSided").value_or(0) == 1;
+  if (const auto method = kept.find("method"); method != kept.end() && !named.contains("method"))
+    settings.method = methodFrom(method->second).value_or(settings.method);
   return settings;
 }
 

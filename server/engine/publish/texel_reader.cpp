@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "server/engine/publish/quantity_pages.h"
 #include "server/engine/lit/thread_time.h"
+#include "server/engine/publish/quantity_pages.h"
 
 namespace radiosity::engine {
 namespace {

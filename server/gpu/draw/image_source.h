@@ -6,10 +6,10 @@
 #include <span>
 #include <vector>
 
-#include "server/gpu/gl/egl_context.h"
 #include "server/gpu/draw/hemicube_renderer.h"
 #include "server/gpu/draw/parallel_renderer.h"
 #include "server/gpu/draw/render_desk.h"
+#include "server/gpu/gl/egl_context.h"
 
 namespace radiosity::gpu {
 

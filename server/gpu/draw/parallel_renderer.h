@@ -9,12 +9,12 @@
 #include <utility>
 #include <vector>
 
+#include "server/gpu/cull/hemicube_views.h"
+#include "server/gpu/cull/parallel_culler.h"
 #include "server/gpu/gl/drawing.h"
 #include "server/gpu/gl/gl_objects.h"
 #include "server/gpu/gl/gpu_scene.h"
-#include "server/gpu/cull/hemicube_views.h"
 #include "server/gpu/gl/image_readback.h"
-#include "server/gpu/cull/parallel_culler.h"
 #include "server/solver/transport/transport.h"
 
 namespace radiosity::gpu {

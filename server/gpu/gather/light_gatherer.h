@@ -13,12 +13,12 @@
 #include <span>
 #include <vector>
 
+#include "server/gpu/cull/hemicube_weights.h"
+#include "server/gpu/cull/view_window.h"
+#include "server/gpu/draw/image_source.h"
 #include "server/gpu/gather/flux_sink.h"
 #include "server/gpu/gather/form_factor_kernel.h"
-#include "server/gpu/cull/hemicube_weights.h"
-#include "server/gpu/draw/image_source.h"
 #include "server/gpu/gather/receivers.h"
-#include "server/gpu/cull/view_window.h"
 
 namespace radiosity::gpu {
 

@@ -5,8 +5,8 @@
 #include "common/clones.h"
 #include "server/geometry/way_queue.h"
 #include "server/gpu/gather/light_gatherer.h"
-#include "server/solver/rays/leaf_rays.h"
 #include "server/solver/math/sampling.h"
+#include "server/solver/rays/leaf_rays.h"
 
 namespace radiosity::gpu {
 namespace {

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "server/gpu/gather/flux_sink.h"
 #include "server/gpu/draw/image_source.h"
+#include "server/gpu/gather/flux_sink.h"
 #include "server/gpu/gather/receivers.h"
 
 namespace radiosity::gpu {

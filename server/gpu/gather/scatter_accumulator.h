@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "server/gpu/gather/flux_sink.h"
 #include "server/gpu/cull/hemicube_weights.h"
+#include "server/gpu/gather/flux_sink.h"
 #include "server/solver/transport/transport.h"
 
 namespace radiosity::gpu {

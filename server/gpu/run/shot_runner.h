@@ -6,8 +6,8 @@
 #include <span>
 #include <string>
 
-#include "server/gpu/gather/flux_sink.h"
 #include "server/gpu/draw/image_source.h"
+#include "server/gpu/gather/flux_sink.h"
 #include "server/gpu/gather/light_gatherer.h"
 #include "server/gpu/gather/punctual_gatherer.h"
 #include "server/gpu/gather/scatter_accumulator.h"

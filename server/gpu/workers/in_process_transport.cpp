@@ -4,8 +4,8 @@
 #include <thread>
 
 #include "common/check.h"
-#include "server/gpu/workers/gpu_transport.h"
 #include "server/gpu/run/shot_crew.h"
+#include "server/gpu/workers/gpu_transport.h"
 
 namespace radiosity::gpu {
 namespace {

@@ -9,8 +9,8 @@
 #include <optional>
 
 #include "common/log.h"
-#include "server/gpu/workers/gpu_transport.h"
 #include "server/gpu/run/shot_crew.h"
+#include "server/gpu/workers/gpu_transport.h"
 #include "server/gpu/workers/worker_protocol.h"
 
 namespace radiosity::gpu {

@@ -11,8 +11,8 @@
 
 #include "common/result.h"
 #include "server/gpu/gather/flux_sink.h"
-#include "server/gpu/workers/shared_memory.h"
 #include "server/gpu/run/shot_runner.h"
+#include "server/gpu/workers/shared_memory.h"
 
 namespace radiosity::gpu {
 

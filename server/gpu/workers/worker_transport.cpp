@@ -16,10 +16,10 @@
 
 #include "common/check.h"
 #include "common/log.h"
-#include "server/gpu/workers/batch_chunks.h"
-#include "server/gpu/workers/gpu_transport.h"
 #include "server/gpu/draw/paper_ids.h"
 #include "server/gpu/run/sight_trial.h"
+#include "server/gpu/workers/batch_chunks.h"
+#include "server/gpu/workers/gpu_transport.h"
 #include "server/gpu/workers/worker_process.h"
 #include "server/gpu/workers/worker_start.h"
 

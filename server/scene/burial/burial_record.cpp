@@ -8,8 +8,8 @@
 #include <numbers>
 #include <tuple>
 
-#include "server/scene/values/lineage.h"
 #include "server/geometry/solid_parts.h"
+#include "server/scene/values/lineage.h"
 
 namespace radiosity::scene {
 namespace {

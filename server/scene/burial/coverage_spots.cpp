@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "common/parallel.h"
-#include "server/scene/burial/burial_budget.h"
 #include "server/geometry/bvh.h"
+#include "server/scene/burial/burial_budget.h"
 #include "server/scene/burial/coverage.h"
 
 namespace radiosity::scene {

@@ -11,8 +11,8 @@
 
 #include "common/task.h"
 #include "common/union_find.h"
-#include "server/scene/values/patch_scene.h"
 #include "server/geometry/self_crossing.h"
+#include "server/scene/values/patch_scene.h"
 
 namespace radiosity::scene {
 namespace {

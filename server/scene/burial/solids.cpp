@@ -14,9 +14,9 @@
 #include <utility>
 
 #include "common/parallel.h"
-#include "server/scene/burial/coverage.h"
 #include "server/geometry/flat_sides.h"
 #include "server/geometry/triangle_rows.h"
+#include "server/scene/burial/coverage.h"
 
 namespace radiosity::scene {
 namespace {

@@ -14,11 +14,11 @@
 #include <vector>
 
 #include "server/geometry/bounds.h"
-#include "server/scene/burial/burial_record.h"
 #include "server/geometry/bvh.h"
 #include "server/geometry/covering_faces.h"
-#include "server/scene/values/patch_scene.h"
 #include "server/geometry/solid_parts.h"
+#include "server/scene/burial/burial_record.h"
+#include "server/scene/values/patch_scene.h"
 
 namespace radiosity::scene {
 

@@ -16,8 +16,8 @@
 #include "common/memory_limit.h"
 #include "common/task.h"
 #include "server/scene/charts/build.h"
-#include "server/scene/shading/lit_sides.h"
 #include "server/scene/charts/page_space.h"
+#include "server/scene/shading/lit_sides.h"
 
 namespace radiosity::scene {
 namespace {

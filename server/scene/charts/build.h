@@ -8,9 +8,9 @@
 #include "common/result.h"
 #include "server/scene/burial/burial_record.h"
 #include "server/scene/shading/lit_sides.h"
+#include "server/scene/shading/shading_normals.h"
 #include "server/scene/values/patch_scene.h"
 #include "server/scene/values/scene.h"
-#include "server/scene/shading/shading_normals.h"
 
 namespace radiosity::scene {
 

@@ -11,17 +11,17 @@
 #include <utility>
 
 #include "common/parallel.h"
-#include "server/scene/charts/atlas.h"
-#include "server/scene/charts/build.h"
 #include "server/scene/burial/burial_record.h"
 #include "server/scene/burial/coverage.h"
-#include "server/scene/shading/emitters.h"
-#include "server/scene/values/lineage.h"
-#include "server/scene/shading/lit_sides.h"
-#include "server/scene/values/material_of.h"
-#include "server/scene/shading/opacity.h"
 #include "server/scene/burial/solid_finder.h"
+#include "server/scene/charts/atlas.h"
+#include "server/scene/charts/build.h"
 #include "server/scene/charts/wall_cutter.h"
+#include "server/scene/shading/emitters.h"
+#include "server/scene/shading/lit_sides.h"
+#include "server/scene/shading/opacity.h"
+#include "server/scene/values/lineage.h"
+#include "server/scene/values/material_of.h"
 
 namespace radiosity::scene {
 namespace {

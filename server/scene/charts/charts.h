@@ -35,8 +35,8 @@
 #include "server/scene/charts/build.h"
 #include "server/scene/charts/flatten.h"
 #include "server/scene/shading/lit_sides.h"
-#include "server/scene/values/patch_scene.h"
 #include "server/scene/shading/shading_normals.h"
+#include "server/scene/values/patch_scene.h"
 
 namespace radiosity::scene {
 

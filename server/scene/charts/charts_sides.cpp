@@ -8,8 +8,8 @@
 #include "server/scene/charts/charts.h"
 #include "server/scene/shading/emitters.h"
 #include "server/scene/shading/lit_sides.h"
-#include "server/scene/values/material_of.h"
 #include "server/scene/shading/opacity.h"
+#include "server/scene/values/material_of.h"
 
 namespace radiosity::scene {
 namespace {

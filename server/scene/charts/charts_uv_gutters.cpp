@@ -10,10 +10,10 @@
 #include <vector>
 
 #include "common/task.h"
+#include "server/geometry/triangle_rows.h"
 #include "server/scene/charts/atlas.h"
 #include "server/scene/charts/build.h"
 #include "server/scene/charts/charts.h"
-#include "server/geometry/triangle_rows.h"
 
 namespace radiosity::scene {
 namespace {

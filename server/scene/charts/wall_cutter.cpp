@@ -11,9 +11,9 @@
 #include "common/task.h"
 #include "server/scene/charts/facet_cutter.h"
 #include "server/scene/charts/flatten.h"
-#include "server/scene/values/material_of.h"
-#include "server/scene/shading/opacity.h"
 #include "server/scene/charts/wall_finder.h"
+#include "server/scene/shading/opacity.h"
+#include "server/scene/values/material_of.h"
 
 namespace radiosity::scene {
 namespace {

@@ -8,8 +8,8 @@
 
 #include "common/task.h"
 #include "common/union_find.h"
-#include "server/scene/values/material_of.h"
 #include "server/scene/shading/opacity.h"
+#include "server/scene/values/material_of.h"
 
 namespace radiosity::scene {
 namespace {

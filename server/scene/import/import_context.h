@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "server/scene/document/document.h"
+#include "server/scene/document/json_text.h"
 #include "server/scene/import/import_model.h"
 #include "server/scene/import/import_record.h"
-#include "server/scene/document/json_text.h"
 #include "server/scene/values/scene.h"
 
 namespace radiosity::scene {

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "server/scene/document/document.h"
-#include "server/scene/import/import_model.h"
 #include "server/scene/document/json_text.h"
+#include "server/scene/import/import_model.h"
 
 namespace radiosity::scene {
 

@@ -12,9 +12,9 @@
 #include <utility>
 
 #include "common/task.h"
+#include "server/geometry/normal_matrix.h"
 #include "server/scene/import/accessor.h"
 #include "server/scene/import/node_transform.h"
-#include "server/geometry/normal_matrix.h"
 
 namespace radiosity::scene {
 namespace {

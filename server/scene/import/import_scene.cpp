@@ -3,6 +3,7 @@
 #include <memory>
 #include <utility>
 
+#include "server/scene/document/import_schema.h"
 #include "server/scene/import/import_check.h"
 #include "server/scene/import/import_context.h"
 #include "server/scene/import/import_lint.h"
@@ -10,7 +11,6 @@
 #include "server/scene/import/import_model.h"
 #include "server/scene/import/import_nodes.h"
 #include "server/scene/import/import_record.h"
-#include "server/scene/document/import_schema.h"
 #include "server/scene/import/scene_memory.h"
 
 namespace radiosity::scene {

@@ -6,7 +6,6 @@
 
 #include "common/check.h"
 #include "common/task.h"
-#include "server/scene/shading/emitters.h"
 #include "server/scene/import/import_context.h"
 #include "server/scene/import/import_instancing.h"
 #include "server/scene/lightmap/lightmap.h"
@@ -14,6 +13,7 @@
 #include "server/scene/lightmap/lit_glb_dangling.h"
 #include "server/scene/lightmap/lit_glb_mesh.h"
 #include "server/scene/lightmap/lit_glb_rules.h"
+#include "server/scene/shading/emitters.h"
 
 namespace radiosity::scene {
 namespace {

@@ -5,10 +5,10 @@
 #include <map>
 #include <vector>
 
-#include "server/scene/shading/emitters.h"
-#include "server/scene/import/import_model.h"
 #include "server/scene/document/json_text.h"
+#include "server/scene/import/import_model.h"
 #include "server/scene/lightmap/lit_glb_made.h"
+#include "server/scene/shading/emitters.h"
 #include "server/scene/values/patch_scene.h"
 
 namespace radiosity::scene {

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "common/task.h"
-#include "server/scene/document/png.h"
 #include "server/geometry/triangle_rows.h"
+#include "server/scene/document/png.h"
 
 namespace radiosity::scene {
 namespace {

@@ -10,8 +10,8 @@
 #include <span>
 #include <vector>
 
-#include "server/geometry/ray_scene.h"
 #include "server/geometry/bvh.h"
+#include "server/geometry/ray_scene.h"
 #include "server/scene/values/patch_scene.h"
 
 namespace radiosity::scene {

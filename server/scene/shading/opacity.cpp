@@ -10,10 +10,10 @@
 
 #include "common/give_back.h"
 #include "common/parallel.h"
+#include "server/geometry/triangle_rows.h"
 #include "server/scene/values/chart_corners.h"
 #include "server/scene/values/material_of.h"
 #include "server/scene/values/shade_texture.h"
-#include "server/geometry/triangle_rows.h"
 
 namespace radiosity::scene {
 namespace {

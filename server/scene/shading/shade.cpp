@@ -11,12 +11,12 @@
 #include <string>
 
 #include "common/task.h"
+#include "server/geometry/triangle_rows.h"
+#include "server/scene/shading/shade.h"
+#include "server/scene/shading/shade_layers.h"
 #include "server/scene/values/chart_corners.h"
 #include "server/scene/values/material_of.h"
 #include "server/scene/values/patch_scene.h"
-#include "server/scene/shading/shade.h"
-#include "server/scene/shading/shade_layers.h"
-#include "server/geometry/triangle_rows.h"
 
 namespace radiosity::scene {
 namespace {

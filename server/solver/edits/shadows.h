@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "server/scene/values/patch_scene.h"
-#include "server/solver/transport/link_column.h"
 #include "server/solver/math/near_edge.h"
 #include "server/solver/patches/side.h"
+#include "server/solver/transport/link_column.h"
 
 namespace radiosity::solver {
 

@@ -10,10 +10,10 @@
 #include <utility>
 
 #include "common/parallel.h"
-#include "server/solver/transport/link_column.h"
 #include "server/solver/math/polygon_directions.h"
 #include "server/solver/math/polygon_form_factor.h"
 #include "server/solver/math/sampling.h"
+#include "server/solver/transport/link_column.h"
 
 namespace radiosity::solver {
 namespace {

@@ -10,10 +10,10 @@
 #include <span>
 #include <vector>
 
-#include "server/solver/rays/leaf_rays.h"
 #include "server/solver/lamps/light_tree.h"
 #include "server/solver/patches/lights.h"
 #include "server/solver/patches/side.h"
+#include "server/solver/rays/leaf_rays.h"
 #include "server/solver/transport/transport.h"
 
 namespace radiosity::solver {

@@ -8,8 +8,8 @@
 #include <memory>
 #include <optional>
 
-#include "server/solver/rays/leaf_rays.h"
 #include "server/solver/patches/lights.h"
+#include "server/solver/rays/leaf_rays.h"
 
 namespace radiosity::solver {
 

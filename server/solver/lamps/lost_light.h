@@ -9,9 +9,9 @@
 
 #include "server/scene/values/patch_scene.h"
 #include "server/scene/values/scene.h"
-#include "server/solver/rays/leaf_rays.h"
 #include "server/solver/lamps/punctual_lights.h"
 #include "server/solver/patches/side.h"
+#include "server/solver/rays/leaf_rays.h"
 
 namespace radiosity::solver {
 

@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "common/clones.h"
-#include "server/solver/math/halves.h"
 #include "server/solver/links/link_system.h"
+#include "server/solver/math/halves.h"
 
 namespace radiosity::solver {
 namespace {

@@ -4,8 +4,8 @@
 
 #include "common/check.h"
 #include "common/clones.h"
-#include "server/solver/math/halves.h"
 #include "server/solver/links/link_system.h"
+#include "server/solver/math/halves.h"
 
 namespace radiosity::solver {
 namespace {

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "common/archive.h"
-#include "server/solver/patches/lights.h"
 #include "server/solver/links/link_system.h"
+#include "server/solver/patches/lights.h"
 #include "server/solver/patches/side.h"
 
 namespace radiosity::solver {

@@ -8,10 +8,10 @@
 
 #include "server/solver/links/link_memory.h"
 #include "server/solver/links/link_system.h"
-#include "server/solver/transport/node_shots.h"
-#include "server/solver/shooting/planner.h"
 #include "server/solver/links/roulette.h"
 #include "server/solver/patches/unshot_pyramid.h"
+#include "server/solver/shooting/planner.h"
+#include "server/solver/transport/node_shots.h"
 
 namespace radiosity::solver {
 

@@ -29,8 +29,8 @@
 #include <vector>
 
 #include "server/solver/math/gmres.h"
-#include "server/solver/transport/link_column.h"
 #include "server/solver/patches/side.h"
+#include "server/solver/transport/link_column.h"
 
 namespace radiosity::solver {
 

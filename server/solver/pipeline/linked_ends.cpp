@@ -3,8 +3,8 @@
 #include <memory>
 #include <utility>
 
-#include "server/solver/pipeline/linked_solver.h"
 #include "server/solver/math/sampling.h"
+#include "server/solver/pipeline/linked_solver.h"
 
 namespace radiosity::solver {
 namespace {

@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "server/solver/math/halves.h"
-#include "server/solver/pipeline/linked_solver.h"
 #include "server/solver/math/near_edge.h"
+#include "server/solver/pipeline/linked_solver.h"
 
 namespace radiosity::solver {
 namespace {

@@ -1,6 +1,7 @@
 #include "server/solver/pipeline/make_solver.h"
 
 #include "server/solver/pipeline/linked_solver.h"
+#include "server/solver/paper/paper_solver.h"
 #include "server/solver/shooting/shooting_solver.h"
 
 namespace radiosity::solver {
@@ -20,7 +21,10 @@ std::unique_ptr<Solver> makeSolver(std::shared_ptr<const scene::PatchScene> patc
   // Coverage by chance, pixel by pixel, makes links to what one can see through too uncertain to solve over: light
   // between sheets that all but touch would grow from bounce to bounce. Rays bring no more than there is.
   const bool see_through = !patches->opacity.empty();
-  if (settings.paper_mode || (see_through && !LinkedSolver::mayGather(2 * patches->leaves.size(), settings)) ||
+  if (settings.method == Method::kPaper)
+    return std::make_unique<PaperSolver>(std::move(patches), materials, transport, settings, sources);
+  if (settings.method != Method::kGather ||
+      (see_through && !LinkedSolver::mayGather(2 * patches->leaves.size(), settings)) ||
       patches->leaves.size() * kLeafBytes * kMinShooters > settings.link_memory) {
     return std::make_unique<ShootingSolver>(std::move(patches), materials, transport, settings, sources);
   }

@@ -3,8 +3,8 @@
 
 #include <memory>
 
-#include "server/scene/values/patch_scene.h"
 #include "server/scene/shading/shading_normals.h"
+#include "server/scene/values/patch_scene.h"
 #include "server/solver/solver.h"
 
 namespace radiosity::solver {

@@ -11,8 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include "server/geometry/ray_scene.h"
 #include "server/geometry/bounds.h"
+#include "server/geometry/ray_scene.h"
 #include "server/scene/values/patch_scene.h"
 #include "server/solver/patches/side.h"
 

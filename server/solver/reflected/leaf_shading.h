@@ -10,8 +10,8 @@
 #include <span>
 #include <vector>
 
-#include "server/scene/values/patch_scene.h"
 #include "server/scene/shading/shading_normals.h"
+#include "server/scene/values/patch_scene.h"
 #include "server/solver/patches/side.h"
 
 namespace radiosity::solver {

@@ -15,9 +15,9 @@
 #include <vector>
 
 #include "common/packed_numbers.h"
-#include "server/solver/rays/leaf_rays.h"
-#include "server/solver/math/sampling.h"
 #include "server/solver/edits/shadows.h"
+#include "server/solver/math/sampling.h"
+#include "server/solver/rays/leaf_rays.h"
 
 namespace radiosity::solver {
 

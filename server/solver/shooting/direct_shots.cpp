@@ -7,8 +7,8 @@
 #include <unordered_map>
 #include <utility>
 
-#include "server/solver/transport/node_shots.h"
 #include "server/solver/math/sampling.h"
+#include "server/solver/transport/node_shots.h"
 #include "server/solver/transport/shot_cost.h"
 
 namespace radiosity::solver {

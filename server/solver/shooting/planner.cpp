@@ -9,8 +9,8 @@
 #include <queue>
 #include <tuple>
 
-#include "server/solver/transport/node_shots.h"
 #include "server/solver/math/sampling.h"
+#include "server/solver/transport/node_shots.h"
 #include "server/solver/transport/shot_cost.h"
 
 namespace radiosity::solver {

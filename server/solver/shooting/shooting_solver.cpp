@@ -13,11 +13,6 @@ constexpr double kResidualShare = 0.3;
 PlannerSettings plannerSettings(const SolverSettings& settings) {
   PlannerSettings planner = settings.planner;
   planner.seed = settings.seed;
-  if (settings.paper_mode) {
-    planner.mode = LinkMode::kPaperMipmap;
-    planner.gather_nodes = false;
-    planner.level_bias = 1.0F;  // "a LOD bias of one, with filtering by a 3 by 3 Gaussian filter"
-  }
   return planner;
 }
 
@@ -44,7 +39,7 @@ ShootingSolver::ShootingSolver(std::shared_ptr<const scene::PatchScene> patches,
       settings_(settings),
       direct_(plannerSettings(settings), state_.patches().leaves.size()),
       planner_(state_.patches(), plannerSettings(settings)) {
-  if (!settings_.paper_mode) direct_.take(findLightPolygons(state_.patches(), state_.sides(), state_.emissions()));
+  direct_.take(findLightPolygons(state_.patches(), state_.sides(), state_.emissions()));
   startRound();
   publish();
 }
@@ -53,11 +48,9 @@ void ShootingSolver::startRound() {
   state_.pushPullAll();
   direct_.startRound(state_.rounds());
   phase_ = direct_.isDue() || punctual_.hasSlice(state_.rounds()) ? Phase::kDirect : Phase::kIndirect;
-  if (!settings_.paper_mode) {
-    // More rounds can pay for finer links, and finer links leak less: half a level for each doubling.
-    const auto rounds = static_cast<float>(state_.rounds());
-    planner_.settings().level_bias = settings_.planner.level_bias - std::min(2.0F, 0.5F * std::log2(rounds));
-  }
+  // More rounds can pay for finer links, and finer links leak less: half a level for each doubling.
+  const auto rounds = static_cast<float>(state_.rounds());
+  planner_.settings().level_bias = settings_.planner.level_bias - std::min(2.0F, 0.5F * std::log2(rounds));
   planner_.startRound(roundPower());
 }
 
@@ -71,8 +64,7 @@ double ShootingSolver::roundPower() const {
 Result<StepOutcome> ShootingSolver::step() {
   if (wave_.underWay()) return advanceWave();
   if (phase_ == Phase::kDone) {
-    const bool exhausted = !settings_.paper_mode && error_.total > settings_.target_error;
-    return exhausted ? StepOutcome::kExhausted : StepOutcome::kConverged;
+    return error_.total > settings_.target_error ? StepOutcome::kExhausted : StepOutcome::kConverged;
   }
   if (phase_ == Phase::kDirect) {
     planDirect();
@@ -131,9 +123,6 @@ Result<StepOutcome> ShootingSolver::advanceWave() {
 
 void ShootingSolver::land() {
   wave_flux_ = {};
-  if (settings_.paper_mode) {
-    for (const auto& side : state_.sides()) state_.smoothUnpushed(wave_.flux(), side);
-  }
   state_.receive(wave_.flux());
   if (wave_is_direct_) {
     state_.pushPullAll();
@@ -161,11 +150,10 @@ StepOutcome ShootingSolver::finishRound() {
   publish();
   live_ = false;
   error_ = estimateError(state_, owedPower());
-  const double reached = settings_.paper_mode ? error_.residual : error_.total;
-  const bool exhausted = state_.rounds() >= kMaxRounds;
-  if (reached <= settings_.target_error || settings_.paper_mode || exhausted) {
+  const bool reached = error_.total <= settings_.target_error;
+  if (reached || state_.rounds() >= kMaxRounds) {
     phase_ = Phase::kDone;
-    return reached > settings_.target_error && exhausted ? StepOutcome::kExhausted : StepOutcome::kConverged;
+    return reached ? StepOutcome::kConverged : StepOutcome::kExhausted;
   }
   state_.startRound();
   startRound();
@@ -185,14 +173,14 @@ void ShootingSolver::publish() {
 
 void ShootingSolver::setTargetError(double target) {
   settings_.target_error = target;
-  if (phase_ != Phase::kDone || settings_.paper_mode || error_.total <= target || state_.rounds() >= kMaxRounds) return;
+  if (phase_ != Phase::kDone || error_.total <= target || state_.rounds() >= kMaxRounds) return;
   state_.startRound();
   startRound();
 }
 
 void ShootingSolver::setMaterials(const scene::PatchMaterials& materials) {
   state_.setMaterials(materials);
-  if (!settings_.paper_mode) direct_.take(findLightPolygons(state_.patches(), state_.sides(), state_.emissions()));
+  direct_.take(findLightPolygons(state_.patches(), state_.sides(), state_.emissions()));
   restartRound();
 }
 

@@ -13,8 +13,8 @@
 #include "server/solver/shooting/direct_shots.h"
 #include "server/solver/shooting/estimate.h"
 #include "server/solver/shooting/planner.h"
-#include "server/solver/solver.h"
 #include "server/solver/shooting/state.h"
+#include "server/solver/solver.h"
 #include "server/solver/transport/transport.h"
 #include "server/solver/transport/wave.h"
 

@@ -253,49 +253,4 @@ void RadiosityState::halfIrradiance(const Side& side, std::uint32_t half, std::s
   for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf) out[leaf] = glm::vec3(density[leaf] * unit);
 }
 
-void RadiosityState::smoothUnpushed(FluxAccumulators& batch, const Side& side) const {
-  // Weights 1 2 1 in each direction, over neighbours that exist and have area; what a node gives away is split by
-  // integer division and the rest stays, so the sum is exactly kept.
-  std::vector<Flux3> smoothed;
-  for (std::uint32_t level = 0; level < side.level_count; ++level) {
-    const auto grid = scene::levelGrid(side.width, side.height, level);
-    const std::uint32_t first = side.first_node + grid.offset;
-    for (auto& half : batch.node) {
-      smoothed.assign(std::size_t{grid.width} * grid.height, Flux3{});
-      for (std::uint32_t i = 0; i < grid.width * grid.height; ++i) spreadFlux(half, grid, first, i, smoothed);
-      std::copy(smoothed.begin(), smoothed.end(), half.begin() + first);
-    }
-  }
-}
-
-void RadiosityState::spreadFlux(const std::vector<Flux3>& from, const scene::LevelGrid& grid, std::uint32_t first,
-                                std::uint32_t i, std::vector<Flux3>& to) const {
-  const Flux3& flux = from[first + i];
-  if (flux[0] == 0 && flux[1] == 0 && flux[2] == 0) return;
-  const auto width = static_cast<int>(grid.width), height = static_cast<int>(grid.height);
-  const int x = static_cast<int>(i) % width, y = static_cast<int>(i) / width;
-  std::array<double, 9> weight{};
-  double sum = 0.0;
-  for (int k = 0; k < 9; ++k) {
-    const int nx = x + k % 3 - 1, ny = y + k / 3 - 1;
-    if (nx < 0 || ny < 0 || nx >= width || ny >= height) continue;
-    const auto node = first + static_cast<std::uint32_t>(ny * width + nx);
-    const double tent = (k % 3 == 1 ? 2.0 : 1.0) * (k / 3 == 1 ? 2.0 : 1.0);
-    weight[static_cast<std::size_t>(k)] = tent * static_cast<double>(patches_->node_area[node]);
-    sum += weight[static_cast<std::size_t>(k)];
-  }
-  Flux3 rest = flux;
-  for (int k = 0; k < 9 && sum > 0.0; ++k) {
-    const double w = weight[static_cast<std::size_t>(k)] / sum;
-    if (k == 4 || w == 0.0) continue;
-    const auto target = static_cast<std::size_t>((y + k / 3 - 1) * width + x + k % 3 - 1);
-    for (std::size_t c = 0; c < 3; ++c) {
-      const auto part = static_cast<std::int64_t>(static_cast<double>(flux[c]) * w);
-      to[target][c] += part;
-      rest[c] -= part;
-    }
-  }
-  addTo(to[i], rest);
-}
-
 }  // namespace radiosity::solver

@@ -52,10 +52,6 @@ class RadiosityState {
   void pushPull(Side& side);
   void pushPullAll();
 
-  /// A 3 x 3 Gaussian over the unpushed flux of `side` at each level, weighted by area (paper, section 5). Conserves
-  /// flux up to rounding, which is given to the centre. Used by the paper-faithful mode on what a batch delivered.
-  void smoothUnpushed(FluxAccumulators& batch, const Side& side) const;
-
   /// Sum of |unshot| area over the leaves of the subtree, all channels. Valid after pushPull of the side.
   [[nodiscard]] float nodeRough(std::uint32_t node) const { return node_rough_[node]; }
   /// Unshot flux of the subtree per channel, signed: what the node would shoot as one.
@@ -120,8 +116,6 @@ class RadiosityState {
   void pull(Side& side);
   void pullNode(const Side& side, std::uint32_t level, std::uint32_t x, std::uint32_t y);
   void pullAround(Side& side, std::uint32_t level, std::uint32_t x, std::uint32_t y);
-  void spreadFlux(const std::vector<Flux3>& from, const scene::LevelGrid& grid, std::uint32_t first, std::uint32_t i,
-                  std::vector<Flux3>& to) const;
   [[nodiscard]] glm::vec3 scatterRadiosity(const Side& side, std::uint32_t leaf) const;
   void pushHalf(const Side& side, std::uint32_t half, std::vector<glm::dvec3>& density) const;
 

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "common/archive.h"
-#include "server/solver/transport/link_expander.h"
 #include "server/solver/patches/side.h"
+#include "server/solver/transport/link_expander.h"
 #include "server/solver/transport/transport.h"
 
 namespace radiosity::solver {

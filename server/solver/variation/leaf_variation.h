@@ -17,11 +17,11 @@
 #include <span>
 #include <vector>
 
+#include "server/solver/edits/shadows.h"
+#include "server/solver/lamps/punctual_lights.h"
+#include "server/solver/patches/lights.h"
 #include "server/solver/rays/leaf_rays.h"
 #include "server/solver/reflected/leaf_sights.h"
-#include "server/solver/patches/lights.h"
-#include "server/solver/lamps/punctual_lights.h"
-#include "server/solver/edits/shadows.h"
 
 namespace radiosity::solver {
 

@@ -7,10 +7,10 @@
 #include <utility>
 
 #include "common/parallel.h"
-#include "server/solver/variation/leaf_variation.h"
 #include "server/solver/math/polygon_form_factor.h"
 #include "server/solver/math/sampling.h"
 #include "server/solver/patches/unshot_pyramid.h"
+#include "server/solver/variation/leaf_variation.h"
 
 namespace radiosity::solver {
 namespace {

@@ -11,8 +11,8 @@
 #include "server/gpu/workers/gpu_transport.h"
 #include "server/scene/charts/build.h"
 #include "server/scene/document/document.h"
-#include "server/scene/values/patch_scene.h"
 #include "server/scene/shading/shade.h"
+#include "server/scene/values/patch_scene.h"
 #include "server/solver/pipeline/make_solver.h"
 #include "tests/scenes/glb_writer.h"
 
@@ -81,7 +81,7 @@ RealSolve solveReally(const test_scenes::TestScene& scene, const SolveOptions& o
   solver::SolverSettings settings;
   settings.target_error = options.target_error;
   settings.seed = options.seed;
-  settings.paper_mode = options.paper_mode;
+  settings.method = options.paper_mode ? Method::kPaper : Method::kGather;
   using Reflected = solver::SolverSettings::Reflected;
   settings.reflected = options.over_links ? Reflected::kByLinks : Reflected::kByRays;
   settings.within_leaves = false;  // the dense solution is one of lumped patches

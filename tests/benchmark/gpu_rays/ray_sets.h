@@ -10,8 +10,8 @@
 #include "common/result.h"
 #include "server/geometry/bvh.h"
 #include "server/scene/values/patch_scene.h"
-#include "server/solver/rays/leaf_rays.h"
 #include "server/solver/patches/side.h"
+#include "server/solver/rays/leaf_rays.h"
 
 namespace radiosity::benchmarks {
 

@@ -62,9 +62,9 @@ TEST_F(Quantities, OnlyWhatIsWatchedIsPublished) {
 
 /// Who holds tiles of a version may come back to it, and encoded tiles are kept by it.
 TEST_F(Quantities, OneVersionIsOfOneMomentHoweverOftenItIsLookedAt) {
-  for (const bool paper_mode : {false, true}) {
+  for (const auto method : {Method::kGather, Method::kShooting, Method::kPaper}) {
     ASSERT_TRUE(configure([&](auto& settings) {
-      settings.paper_mode = paper_mode;
+      settings.method = method;
       settings.texels = 60'000;
       settings.target_error = kNever;
     }));
@@ -76,7 +76,7 @@ TEST_F(Quantities, OneVersionIsOfOneMomentHoweverOftenItIsLookedAt) {
       ASSERT_NE(unshot, nullptr);
       const auto& before = *seen.try_emplace(unshot->tile_version, unshot).first->second;
       ASSERT_TRUE(before.pages[0]->mips[0].pixels == unshot->pages[0]->mips[0].pixels)
-          << "version " << unshot->tile_version << (paper_mode ? " of the paper's" : "");
+          << "version " << unshot->tile_version << " of " << nameOf(method);
       (void)shown(Quantity::kNormal);  // somebody comes for something else: what nobody looks at is forgotten
     }
   }
@@ -130,7 +130,7 @@ TEST_F(Quantities, PatchIdsAreAllDifferentAndNormalsPointAlongTheAxes) {
 
 TEST_F(Quantities, WhatIsUnshotIsWhatTheEnergyBalanceSays) {
   // The paper's algorithm, which stops with a tenth of the light unshot; the other one lets shooters stand for all.
-  ASSERT_TRUE(configure([](auto& settings) { settings.paper_mode = true; }));
+  ASSERT_TRUE(configure([](auto& settings) { settings.method = Method::kPaper; }));
   solve(lumpedCube(0.5));
   const auto ids = shown(Quantity::kPatchId);
   double sum = 0.0;

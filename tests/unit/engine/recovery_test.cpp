@@ -83,7 +83,7 @@ TEST_F(Recovery, WhatMemoryDoesNotSufficeForIsRefusedAndTheSceneStays) {
 
 TEST_F(Recovery, ASolveThatRunsOutOfMemoryFailsAndCanBeStartedAgain) {
   script_->runs_out_of_memory = true;
-  ASSERT_TRUE(configure([](auto& settings) { settings.paper_mode = true; }));
+  ASSERT_TRUE(configure([](auto& settings) { settings.method = Method::kPaper; }));
   ASSERT_TRUE(load(lumpedCube(0.5)));
   ASSERT_TRUE(reaches(SolveState::kFailed));
   EXPECT_THAT(status().failure, testing::HasSubstr("memory"));

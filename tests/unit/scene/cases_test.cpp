@@ -9,8 +9,8 @@
 
 #include "server/scene/charts/build.h"
 #include "server/scene/document/document.h"
-#include "server/scene/values/patch_scene.h"
 #include "server/scene/shading/shade.h"
+#include "server/scene/values/patch_scene.h"
 
 namespace radiosity::scene {
 namespace {

@@ -8,8 +8,8 @@
 
 #include "server/scene/charts/build.h"
 #include "server/scene/shading/opacity.h"
-#include "server/scene/values/patch_scene.h"
 #include "server/scene/shading/shade.h"
+#include "server/scene/values/patch_scene.h"
 #include "server/scene/values/shade_texture.h"
 #include "tests/unit/scene/shapes.h"
 

@@ -12,12 +12,12 @@
 #include <random>
 #include <string>
 
-#include "server/scene/charts/build.h"
 #include "server/scene/burial/burial_record.h"
+#include "server/scene/charts/build.h"
 #include "server/scene/document/document.h"
-#include "server/scene/values/patch_scene.h"
 #include "server/scene/shading/shade.h"
 #include "server/scene/shading/shading_normals.h"
+#include "server/scene/values/patch_scene.h"
 #include "tests/unit/scene/gltf_builder.h"
 
 namespace radiosity::scene::test {

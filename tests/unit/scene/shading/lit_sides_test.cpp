@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "server/scene/charts/build.h"
 #include "server/scene/burial/burial_record.h"
+#include "server/scene/charts/build.h"
 #include "server/scene/lightmap/lightmap.h"
 #include "tests/unit/scene/built_scene.h"
 #include "tests/unit/scene/gltf_builder.h"

@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "server/scene/charts/build.h"
-#include "server/scene/values/patch_scene.h"
 #include "server/scene/shading/shade.h"
+#include "server/scene/values/patch_scene.h"
 #include "tests/unit/scene/shapes.h"
 
 namespace radiosity::scene::test {

@@ -7,9 +7,9 @@
 #include <glm/vec2.hpp>
 #include <numbers>
 
-#include "server/scene/values/patch_scene.h"
 #include "server/geometry/self_crossing.h"
 #include "server/scene/burial/solid_finder.h"
+#include "server/scene/values/patch_scene.h"
 
 namespace radiosity::test {
 namespace {

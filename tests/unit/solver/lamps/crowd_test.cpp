@@ -7,9 +7,9 @@
 #include <cmath>
 #include <numeric>
 
-#include "server/solver/pipeline/linked_solver.h"
 #include "server/solver/math/polygon_form_factor.h"
 #include "server/solver/math/sampling.h"
+#include "server/solver/pipeline/linked_solver.h"
 #include "tests/unit/solver/quad_scene.h"
 #include "tests/unit/solver/solve.h"
 

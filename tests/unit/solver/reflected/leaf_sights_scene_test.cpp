@@ -6,8 +6,8 @@
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "server/scene/charts/build.h"
 #include "server/scene/burial/burial_record.h"
+#include "server/scene/charts/build.h"
 #include "server/scene/values/lineage.h"
 #include "server/solver/reflected/leaf_sights.h"
 #include "tests/unit/scene/shapes.h"

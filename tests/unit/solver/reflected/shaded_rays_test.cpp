@@ -6,8 +6,8 @@
 #include <glm/geometric.hpp>
 #include <vector>
 
-#include "server/solver/rays/leaf_rays.h"
 #include "server/solver/math/sampling.h"
+#include "server/solver/rays/leaf_rays.h"
 
 namespace radiosity::solver {
 namespace {

@@ -99,23 +99,5 @@ TEST(Rounds, AnotherRoundMakesTheWholeRadiosityUnshotAgain) {
   EXPECT_NEAR(side.unshot_power, 3.0, 1e-5);
 }
 
-TEST(Gaussian, KeepsFluxToTheLastQuantumAndSpreadsIt) {
-  const auto made = makeQuadScene({unitQuad(6, 5)});
-  RadiosityState state(made.patches, made.materials);
-  const auto& side = state.sides()[0];
-  FluxAccumulators batch;
-  batch.reset(made.patches->nodeCount());
-  batch.node[1][2 * 6 + 3] = {1000003, -77, 5};
-  state.smoothUnpushed(batch, side);
-  Flux3 sum{};
-  for (const auto& flux : batch.node[1]) {
-    for (std::size_t c = 0; c < 3; ++c) sum[c] += flux[c];
-  }
-  EXPECT_EQ(sum, (Flux3{1000003, -77, 5}));
-  EXPECT_NEAR(static_cast<double>(batch.node[1][2 * 6 + 3][0]), 1000003 / 4.0, 10.0);
-  EXPECT_NEAR(static_cast<double>(batch.node[1][1 * 6 + 3][0]), 1000003 / 8.0, 10.0);
-  EXPECT_NEAR(static_cast<double>(batch.node[1][1 * 6 + 2][0]), 1000003 / 16.0, 10.0);
-}
-
 }  // namespace
 }  // namespace radiosity::solver
