@@ -6,6 +6,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <exception>
 #include <functional>
 #include <utility>
@@ -25,12 +26,17 @@ class Task {
   /// `told` is called whenever there is more progress than anyone has seen, at most ten times a second, by whichever
   /// thread is at work.
   explicit Task(std::function<void()> told) : told_(std::move(told)) {}
+  /// Called off from elsewhere, another process maybe, as soon as `mark` is `number` or more.
+  Task(const std::atomic<std::uint64_t>& mark, std::uint64_t number) : mark_(&mark), number_(number) {}
   Task(const Task&) = delete;
   Task& operator=(const Task&) = delete;
   ~Task() = default;
 
   void cancel() { cancelled_.store(true, std::memory_order_relaxed); }
-  [[nodiscard]] bool isCancelled() const { return cancelled_.load(std::memory_order_relaxed); }
+  [[nodiscard]] bool isCancelled() const {
+    return cancelled_.load(std::memory_order_relaxed) ||
+           (mark_ != nullptr && mark_->load(std::memory_order_relaxed) >= number_);
+  }
   /// How much of the work is done, in [0, 1]; never falls.
   [[nodiscard]] double fraction() const { return fraction_.load(std::memory_order_relaxed); }
 
@@ -46,6 +52,8 @@ class Task {
   std::atomic<double> stage_begin_{0.0}, stage_end_{0.0}, fraction_{0.0};
   std::atomic<Clock::rep> next_told_{0};
   std::function<void()> told_;
+  const std::atomic<std::uint64_t>* mark_ = nullptr;
+  std::uint64_t number_ = 0;
 };
 
 namespace detail {

@@ -86,6 +86,10 @@ void LitScene::take(scene::BuiltScene built) {
   light_report_.findDark(litParts());
 }
 
+void LitScene::prepareUpload() {
+  if (auto prepared = transport_.prepareScene(*patches_)) prepared_ = std::move(*prepared);
+}
+
 void configureScene(scene::Scene& scene, const SolveSettings& settings) {
   if (!settings.double_sided) return;
   for (auto& material : scene.materials) material.double_sided = true;

@@ -62,7 +62,11 @@ class LitScene {
   /// Gives the geometry to the transport; must come before the solver's first step.
   [[nodiscard]] Result<void> upload() const { return transport_.setScene(patches_); }
   /// The same in two steps, between which renderers take it in by themselves.
-  [[nodiscard]] Result<void> beginUpload() const { return transport_.beginScene(patches_); }
+  [[nodiscard]] Result<void> beginUpload() {
+    return transport_.beginScene(patches_, std::exchange(prepared_, nullptr));
+  }
+  /// Makes beforehand, on any thread, most of what beginUpload() does. Where that fails beginUpload() will, too.
+  void prepareUpload();
   [[nodiscard]] Result<void> finishUpload() const { return transport_.finishScene(); }
 
   /// `next`: after configureScene(). What switches a lamp that lies on another face, or under one, changes geometry:
@@ -215,6 +219,7 @@ class LitScene {
   solver::Transport& transport_;
   std::shared_ptr<const scene::Scene> scene_;
   std::shared_ptr<const scene::PatchScene> patches_;
+  std::unique_ptr<solver::Transport::Prepared> prepared_;  // of these; null: that is not done, or is used
   std::shared_ptr<const scene::ShadingNormals> normals_;
   std::shared_ptr<const scene::BurialRecord> burial_;  // of these, for edits; null: not kept
   /// Of these, once an edit of light asked for it: the next ones do.

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <glm/common.hpp>
 #include <glm/vector_relational.hpp>
-#include <map>
 #include <span>
 #include <utility>
 
@@ -66,6 +65,21 @@ std::vector<bool> usedMaterials(const Scene& scene) {
   return used;
 }
 
+/// An instance's node and primitive.
+using Placed = std::pair<std::uint32_t, std::uint32_t>;
+
+/// Whether one of these is placed more than once. Of several instances of one node, each has a place of its own beside
+/// the node's.
+bool haveFellows(std::vector<Placed> some, const Scene& scene) {
+  if (some.empty()) return false;
+  std::ranges::sort(some);
+  some.erase(std::unique(some.begin(), some.end()), some.end());
+  const auto all = std::ranges::count_if(scene.instances, [&](const scene::Instance& instance) {
+    return std::ranges::binary_search(some, Placed(instance.node, instance.primitive));
+  });
+  return static_cast<std::size_t>(all) > some.size();
+}
+
 }  // namespace
 
 SceneChange changeBetween(const Scene& before, const Scene& after) {
@@ -123,15 +137,14 @@ bool mayUncover(const scene::PatchScene& patches, const std::vector<std::uint32_
 
 bool onlyNodesMoved(const Scene& before, const Scene& after) {
   if (before.primitives != after.primitives || before.instances.size() != after.instances.size()) return false;
-  std::map<std::pair<std::uint32_t, std::uint32_t>, int> placed;
-  for (const auto& instance : before.instances) ++placed[{instance.node, instance.primitive}];
+  std::vector<Placed> moved;
   for (std::size_t i = 0; i < before.instances.size(); ++i) {
     auto instance = before.instances[i];
-    const bool moved = instance.world != after.instances[i].world;
+    if (instance.world != after.instances[i].world) moved.emplace_back(instance.node, instance.primitive);
     instance.world = after.instances[i].world;
-    // Of several instances of one node, each has a place of its own beside the node's.
-    if (instance != after.instances[i] || (moved && placed[{instance.node, instance.primitive}] > 1)) return false;
+    if (instance != after.instances[i]) return false;
   }
+  if (haveFellows(std::move(moved), before)) return false;
   const auto used = usedMaterials(before);
   const auto both = std::min(before.materials.size(), after.materials.size());
   for (std::size_t m = 0; m < both; ++m) {

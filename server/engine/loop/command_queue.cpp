@@ -42,6 +42,11 @@ bool CommandQueue::closed() const {
   return closed_;
 }
 
+bool CommandQueue::isPressing() const {
+  const std::scoped_lock lock(mutex_);
+  return closed_ || !prompt_.empty();
+}
+
 void CommandQueue::close() {
   {
     const std::scoped_lock lock(mutex_);

@@ -34,6 +34,8 @@ class CommandQueue {
                                                          std::optional<std::chrono::nanoseconds> longest = {});
 
   [[nodiscard]] bool closed() const;
+  /// Whether take() has prompt ones to give, or the end to tell of. Any thread.
+  [[nodiscard]] bool isPressing() const;
 
   /// Wakes the solve thread for the last time. Commands that still wait are dropped unanswered.
   void close();

@@ -91,7 +91,9 @@ Result<std::unique_ptr<LitScene>> LoadJob::makeWhole(scene::Document document) {
   }
   beginStage(1.0);
   auto whole = LitScene::make(std::move(*edited), options_.settings, transport_);
-  if (whole) (void)(*whole)->startSolve();  // all that the solve thread need not do
+  if (!whole) return whole;
+  (void)(*whole)->startSolve();  // all that the solve thread need not do
+  (*whole)->prepareUpload();
   return whole;
 }
 

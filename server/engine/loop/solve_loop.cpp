@@ -22,6 +22,9 @@ constexpr int kProgressShare = 10;
 /// A solve that took longer is worth a checkpoint at its end.
 constexpr double kLongSolveSeconds = 2.0;
 
+/// A solve that has come to its time limit takes in what is measured; where that takes longer it stays as it is.
+constexpr double kLimitGrace = 3.0;
+
 std::string limitText(solver::SolveLimit limit, std::uint64_t link_memory_bytes) {
   constexpr double kMebi = 1048576.0;
   switch (limit) {
@@ -79,6 +82,7 @@ void SolveLoop::threadMain(std::promise<Result<void>> started) {
     transport_ = std::move(*transport);
   }
   limits_.renderers = transport_->look().wanted;
+  transport_->setImpatience([this] { return isWantedElsewhere(); });
   if (auto restored = restoreState(); !restored) {
     {
       const std::scoped_lock lock(mutex_);
@@ -188,6 +192,10 @@ void SolveLoop::solveSlice() {
   }
   const bool out_of_time = settings_.time_limit_s && seconds_ >= *settings_.time_limit_s;
   if (*outcome == solver::StepOutcome::kSlice) {
+    if (out_of_time && seconds_ >= *settings_.time_limit_s + kLimitGrace) {
+      unpublished_ = true;
+      return endSolve(SolveState::kTimeLimit);
+    }
     if (out_of_time) lit_->solver().endWave();
     if (Clock::now() >= next_publish_ && lit_->showDirectLight()) {
       unpublished_ = true;
@@ -195,7 +203,7 @@ void SolveLoop::solveSlice() {
     } else if (owes_pages_ && Clock::now() >= *owes_pages_) {
       publishLightmaps(false);
     }
-    retired_.reset();
+    disposer_.dispose(std::exchange(retired_, nullptr));
     return tellProgress(false);
   }
   unpublished_ = true;
@@ -216,7 +224,15 @@ void SolveLoop::solveSlice() {
 Result<solver::StepOutcome> SolveLoop::stepSolver() {
   stepped_ = true;
   ++steps_;
+  step_began_ = Clock::now();
   return lit_->solver().step();
+}
+
+bool SolveLoop::isWantedElsewhere() const {
+  if (queue_.isPressing()) return true;
+  if (!settings_.time_limit_s || state_ != SolveState::kSolving || first_light_) return false;
+  const double seconds = seconds_ + std::chrono::duration<double>(Clock::now() - step_began_).count();
+  return seconds >= *settings_.time_limit_s + kLimitGrace;
 }
 
 bool SolveLoop::isBehind() const {
@@ -265,7 +281,7 @@ void SolveLoop::endSolve(SolveState state) {
   }
   const bool reported = publishLightmaps(true);
   updateStatus(true, reported);
-  retired_.reset();
+  disposer_.dispose(std::exchange(retired_, nullptr));
   // Of the short solves of a drag the next periodic one will do: thirty a second would stand in the way of the edits.
   if (seconds_ > kLongSolveSeconds) next_checkpoint_ = Clock::now();
 }

@@ -22,6 +22,7 @@
 #include "common/log.h"
 #include "common/task.h"
 #include "server/engine/engine.h"
+#include "server/engine/lit/disposer.h"
 #include "server/engine/lit/lit_scene.h"
 #include "server/engine/lit/memory.h"
 #include "server/engine/loop/command_queue.h"
@@ -119,6 +120,8 @@ class SolveLoop final : public Engine {
   [[nodiscard]] Result<solver::StepOutcome> stepSolver();
   /// Solved and told; what was left for later since it matters little is done between commands.
   [[nodiscard]] bool isBehind() const;
+  /// While a step is under way: the solve thread has something to do that does not wait for its end.
+  [[nodiscard]] bool isWantedElsewhere() const;
   void catchUp();
   void tellProgress(bool assess);  ///< not oftener than anyone can see; `assess`: with a new error
   /// The clock starts over: another scene, another seed, an edit. A paused solve stays paused.
@@ -275,11 +278,13 @@ class SolveLoop final : public Engine {
   };
   std::vector<AwaitedTexel> awaited_texels_;  ///< of which pages are to be made
   History history_;
+  Disposer disposer_;
   std::shared_ptr<const scene::Document> retired_;  ///< by the last edit of light: it goes when that is done
   SolveState state_ = SolveState::kEmpty;
   std::string failure_;
   std::uint64_t revision_ = 0;
   double seconds_ = 0.0;
+  Clock::time_point step_began_{};
   bool unpublished_ = false;
   bool shown_is_own_ = true;     // what was published last is of this solver, not of one that it took turns with
   bool stepped_ = false;         // the solver, since the present version began

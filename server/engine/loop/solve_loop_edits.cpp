@@ -29,8 +29,8 @@ Result<LitScene::Affected> SolveLoop::relight(Result<std::unique_ptr<LitScene>> 
   if (!keeps_layout) publisher_.reset();
   renderer_lost_ = renderer_lost_ && upload == Upload::kNever;  // or else it took the scene
   if (starts && measured != nullptr) return LitScene::Affected{affected->surfaces, takeLinks(std::move(*made))};
-  former_.reset();
-  lit_ = std::move(*made);
+  disposer_.dispose(std::exchange(former_, nullptr));
+  disposer_.dispose(std::exchange(lit_, std::move(*made)));
   return affected;
 }
 
@@ -63,7 +63,7 @@ std::uint64_t SolveLoop::takeLinks(std::unique_ptr<LitScene> made) {
     return shots;
   }
   if (fitsMemory([&] { shots = made->startSolve(lit_.get()); })) {
-    lit_ = std::move(made);
+    disposer_.dispose(std::exchange(lit_, std::move(made)));
     return shots;
   }
   log::warn("no memory for the links of the solve before: all is measured anew");
@@ -253,7 +253,7 @@ void SolveLoop::announceEdit(const PatchOutcome& outcome, const std::string& pat
     }
     showEdit();
   });
-  if (state_ != SolveState::kSolving) retired_.reset();  // no slice follows
+  if (state_ != SolveState::kSolving) disposer_.dispose(std::exchange(retired_, nullptr));  // no slice follows
   if (shown) return;
   unpublished_ = true;
   log::warn("out of memory: an edit will be shown later");

@@ -9,6 +9,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "common/task.h"
 #include "server/gpu/gather/light_gatherer.h"
 #include "server/solver/math/near_edge.h"
 #include "server/solver/math/polygon_directions.h"
@@ -93,6 +94,7 @@ void LightGatherer::beginEdges() {
 void LightGatherer::lookFromEdges(const solver::GatherShot& shot, const solver::HemicubeFrame& point,
                                   std::size_t half) {
   for (auto& edge : edges_) {
+    interruptionPoint();
     const auto i = edge.lit;
     const glm::vec3 at(lit_.x[i], lit_.y[i], lit_.z[i]), normal(lit_.nx[i], lit_.ny[i], lit_.nz[i]);
     Draw draw(point.origin, at);

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "common/clones.h"
+#include "common/task.h"
 #include "server/geometry/way_queue.h"
 #include "server/gpu/gather/light_gatherer.h"
 #include "server/solver/math/sampling.h"
@@ -52,6 +53,7 @@ void LightGatherer::askRays(const solver::GatherShot& shot, const solver::Hemicu
   const auto tell = [&](std::uint32_t i) { visible_weight[i] += lit_.point_weight[i]; };
   for (std::uint32_t i = 0; i < lit_count_; ++i) {
     if (lit_.point_weight[i] <= 0.0F) continue;
+    interruptionPoint();
     weight[i] += lit_.point_weight[i];
     const glm::vec3 at(lit_.x[i], lit_.y[i], lit_.z[i]), normal(lit_.nx[i], lit_.ny[i], lit_.nz[i]);
     const auto from = at + Receivers::kLift * normal;
@@ -69,6 +71,7 @@ void LightGatherer::loseByRays(const solver::HemicubeFrame& point, Lost& lost) c
   std::uint64_t escaped = 0, absorbed = 0;
   std::uint32_t cast = 0;
   while (cast < kFirstRays || (cast < kAllRays && escaped + absorbed > 0)) {
+    interruptionPoint();
     std::array<geometry::Ray, geometry::kPacket> rays;
     std::array<geometry::Hit, geometry::kPacket> hits;
     for (std::uint32_t i = 0; i < geometry::kPacket; ++i) {

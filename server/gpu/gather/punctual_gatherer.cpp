@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "common/task.h"
 #include "server/geometry/way_queue.h"
 #include "server/gpu/cull/hemicube_views.h"
 #include "server/solver/math/sampling.h"
@@ -389,6 +390,7 @@ void PunctualGatherer::askRays(std::uint64_t look, const Each& each) {
   geometry::WayQueue<Asked> ways(receivers_->rays());
   const auto tell = [this](const Asked& asked) { sum_[asked.receiver] += asked.value; };
   each([&](const Arrival& arrival) {
+    interruptionPoint();
     const auto& ray = arrival.ray;
     const auto from = ray.at + Receivers::kLift * ray.normal;
     const auto way = ray.at + ray.reach * ray.way - from;
@@ -436,6 +438,7 @@ PunctualGatherer::Lost PunctualGatherer::loseByRays(const solver::PointShot& sho
   const float reach = glm::distance(o, 0.5F * (box_[0] + box_[1])) + glm::distance(box_[0], box_[1]);
   Lost lost;
   for (std::uint32_t first = 0; first < kLostRays; first += geometry::kPacket) {
+    interruptionPoint();
     std::array<geometry::Ray, geometry::kPacket> rays;
     std::array<double, geometry::kPacket> weights;
     std::array<geometry::Hit, geometry::kPacket> hits;
@@ -468,6 +471,7 @@ PunctualGatherer::Lost PunctualGatherer::loseByRays(const solver::ParallelView& 
   const solver::Sobol4 draws(key);
   std::size_t hit = 0, absorbed = 0;
   for (std::uint32_t first = 0; first < count; first += geometry::kPacket) {
+    interruptionPoint();
     std::array<geometry::Ray, geometry::kPacket> rays;
     std::array<geometry::Hit, geometry::kPacket> hits;
     for (std::uint32_t i = 0; i < geometry::kPacket; ++i) {

@@ -5,6 +5,8 @@
 #include <exception>
 #include <future>
 
+#include "common/task.h"
+
 namespace radiosity::gpu {
 namespace {
 
@@ -27,6 +29,8 @@ Result<void> ShotCrew::setScene(std::shared_ptr<const scene::PatchScene> patches
   hands_.clear();  // before others take their memory; and what they know is of no use to other images
   if (auto set = renderers_->setScene(patches); !set) return set;
   const auto receivers = std::make_shared<const Receivers>(patches);
+  // Else the first light would wait for them, and whoever waits for that.
+  if (sight() == Sight::kRays) (void)receivers->rays();
   const std::size_t fit = kHandsBytes / (kImageBytes + kNodeBytes * patches->nodeCount());
   const std::size_t count = std::clamp<std::size_t>(fit, 1, wanted_);
   std::vector<std::unique_ptr<Hand>> hands;
@@ -111,7 +115,8 @@ std::vector<ShotCrew::Part> ShotCrew::partsOf(const ShotSpan& shots) const {
 Result<solver::TransportCounters> ShotCrew::share(const std::vector<Part>& parts, const Work& work) {
   std::atomic<std::size_t> next{0};
   std::vector<Result<solver::TransportCounters>> done(parts.size());
-  const auto workThrough = [&](Hand& hand) {
+  const auto workThrough = [&, task = currentTask()](Hand& hand) {
+    const TaskScope scope(task);
     struct Leave {
       RenderDesk& desk;
       std::atomic<std::size_t>& next;

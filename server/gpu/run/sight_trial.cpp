@@ -7,6 +7,7 @@
 #include <glm/common.hpp>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 namespace radiosity::gpu {
 namespace {
@@ -33,6 +34,19 @@ solver::GatherShot lampShot(const glm::vec3& middle, float side) {
   return shot;
 }
 
+/// Seconds that the batch takes, the shorter of two times.
+Result<double> timeTrial(const solver::ShotBatch& batch, solver::Transport& transport) {
+  using Clock = std::chrono::steady_clock;
+  double least = std::numeric_limits<double>::infinity();
+  for (int i = 0; i <= kTimes; ++i) {  // the first one, in which drivers compile shaders, does not count
+    const auto start = Clock::now();
+    const auto done = transport.measure(batch, [](std::size_t, solver::LinkSample&&) {});
+    if (!done) return tl::unexpected(done.error());
+    if (i > 0) least = std::min(least, std::chrono::duration<double>(Clock::now() - start).count());
+  }
+  return least;
+}
+
 }  // namespace
 
 solver::ShotBatch trialBatch(const scene::PatchScene& room) {
@@ -55,16 +69,19 @@ solver::ShotBatch trialBatch(const scene::PatchScene& room) {
   return batch;
 }
 
-Result<double> timeTrial(const solver::ShotBatch& batch, solver::Transport& transport) {
-  using Clock = std::chrono::steady_clock;
-  double least = std::numeric_limits<double>::infinity();
-  for (int i = 0; i <= kTimes; ++i) {  // the first one, in which drivers compile shaders, does not count
-    const auto start = Clock::now();
-    const auto done = transport.measure(batch, [](std::size_t, solver::LinkSample&&) {});
-    if (!done) return tl::unexpected(done.error());
-    if (i > 0) least = std::min(least, std::chrono::duration<double>(Clock::now() - start).count());
+Result<SightTimes> timeBoth(const std::shared_ptr<const scene::PatchScene>& room, solver::Transport& transport,
+                            const std::function<void(Sight)>& see) {
+  const auto batch = trialBatch(*room);
+  SightTimes times;
+  for (const auto& [sight, seconds] :
+       {std::pair(Sight::kRays, &times.rays), std::pair(Sight::kImages, &times.images)}) {
+    see(sight);
+    if (auto set = transport.setScene(room); !set) return tl::unexpected(set.error());
+    const auto taken = timeTrial(batch, transport);
+    if (!taken) return tl::unexpected(taken.error());
+    *seconds = *taken;
   }
-  return least;
+  return times;
 }
 
 Sight fasterSight(const SightTimes& times) {

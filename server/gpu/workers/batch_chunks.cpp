@@ -129,7 +129,7 @@ std::vector<Chunk> cutBatch(const solver::ShotBatch& batch, const SceneSize& sce
   return std::move(cutter.chunks);
 }
 
-std::vector<std::byte> packChunk(const solver::ShotBatch& batch, const Chunk& chunk, std::uint64_t id, bool measure) {
+std::vector<std::byte> packChunk(const solver::ShotBatch& batch, const Chunk& chunk, const ChunkId& id, bool measure) {
   Packed packed;
   std::span<const solver::ScatterShot> scatter;
   std::span<const solver::PointShot> point_lights;
@@ -138,7 +138,8 @@ std::vector<std::byte> packChunk(const solver::ShotBatch& batch, const Chunk& ch
   if (chunk.kind == ShotKind::kGather) packGather(batch, chunk, packed);
   if (chunk.kind == ShotKind::kParallel) packParallel(batch, chunk, packed);
   ChunkBody head;
-  head.chunk = id;
+  head.chunk = id.chunk;
+  head.batch = id.batch;
   head.flux_scale = batch.flux_scale;
   head.mode = static_cast<std::uint32_t>(batch.mode);
   head.measure = measure ? 1 : 0;

@@ -33,8 +33,11 @@ struct Workforce {
 [[nodiscard]] std::vector<Chunk> cutBatch(const solver::ShotBatch& batch, const SceneSize& scene,
                                           const Workforce& force);
 
+struct ChunkId {
+  std::uint64_t batch = 0, chunk = 0;
+};
 /// The chunk as the body of a message; `measure`: links are wanted, shot by shot.
-[[nodiscard]] std::vector<std::byte> packChunk(const solver::ShotBatch& batch, const Chunk& chunk, std::uint64_t id,
+[[nodiscard]] std::vector<std::byte> packChunk(const solver::ShotBatch& batch, const Chunk& chunk, const ChunkId& id,
                                                bool measure);
 
 }  // namespace radiosity::gpu

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "common/log.h"
+#include "common/task.h"
 #include "server/gpu/run/shot_crew.h"
 #include "server/gpu/workers/gpu_transport.h"
 #include "server/gpu/workers/worker_protocol.h"
@@ -78,12 +79,28 @@ class Worker {
     const ShotSpan shots{mode,         head.flux_scale, scatter, gather,    points,
                          point_lights, parallel,        views,   receivers, boxes};
     std::vector<std::byte> links;
-    const auto pack = [&](std::size_t, const solver::LinkSample& sample) { packLinks(links, sample); };
-    const auto counters = head.measure != 0 ? crew_->measure(shots, pack) : crew_->run(shots, *sink_);
+    std::uint64_t taken = 0;
+    const auto pack = [&](std::size_t, const solver::LinkSample& sample) {
+      packLinks(links, sample);
+      ++taken;
+    };
+    Task task(putOffMark(flux_.bytes()), head.batch);
+    Result<solver::TransportCounters> counters;
+    try {
+      const TaskScope scope(&task);
+      interruptionPoint();
+      counters = head.measure != 0 ? crew_->measure(shots, pack) : crew_->run(shots, *sink_);
+    } catch (const Interrupted&) {
+      return replyDone({head.chunk, 1, taken, {}}, links);
+    }
     if (!counters) return tl::unexpected(counters.error());
+    return replyDone({head.chunk, 0, taken, *counters}, links);
+  }
+
+  Result<void> replyDone(const ChunkDoneBody& body, std::span<const std::byte> links) const {
     std::vector<std::byte> report;
-    appendValue(report, ChunkDoneBody{head.chunk, *counters});
-    appendSpan(report, std::span<const std::byte>(links));
+    appendValue(report, body);
+    appendSpan(report, links);
     return reply(MessageKind::kChunkDone, report);
   }
 

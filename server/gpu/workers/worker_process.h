@@ -48,6 +48,8 @@ class WorkerProcess {
   [[nodiscard]] bool software() const { return software_; }
   /// That it has used so far, of all its threads; zero where the system does not tell.
   [[nodiscard]] std::chrono::nanoseconds processorTime() const;
+  /// After sendScene(): it is to leave what it has of batches up to this one, and says so soon.
+  void putOff(std::uint64_t batch) { putOffMark(flux_.bytes()).store(batch, std::memory_order_relaxed); }
   [[nodiscard]] FluxSink sink() { return fluxRegionSink(flux_.bytes(), nodes_); }
 
  private:

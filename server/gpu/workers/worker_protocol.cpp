@@ -44,6 +44,13 @@ void visitScene(Scene& scene, Visit visit) {
   visit(scene.opacity);
 }
 
+/// At the beginning of a region of accumulators.
+struct RegionHead {
+  FluxTotals totals;
+  std::atomic<std::uint64_t> put_off;
+};
+static_assert(std::atomic<std::uint64_t>::is_always_lock_free, "shared between processes");
+
 using Done = tl::expected<void, Lapse>;
 
 /// poll()'s timeout, rounded up so that the deadline has passed when it returns; -1: none.
@@ -231,18 +238,23 @@ bool unpackLinks(BodyReader& from, std::size_t nodes, solver::LinkSample& links)
 }
 
 std::size_t fluxRegionBytes(std::size_t nodes) {
-  return sizeof(FluxTotals) + 2 * (nodes * sizeof(solver::Flux3) + markCount(nodes));
+  return sizeof(RegionHead) + 2 * (nodes * sizeof(solver::Flux3) + markCount(nodes));
 }
 
 FluxSink fluxRegionSink(std::span<std::byte> region, std::size_t nodes) {
   RAD_CHECK_LE(fluxRegionBytes(nodes), region.size());
-  auto* totals = reinterpret_cast<FluxTotals*>(region.data());
-  auto* node = reinterpret_cast<solver::Flux3*>(region.data() + sizeof(FluxTotals));
+  auto* totals = &reinterpret_cast<RegionHead*>(region.data())->totals;
+  auto* node = reinterpret_cast<solver::Flux3*>(region.data() + sizeof(RegionHead));
   auto* mark = reinterpret_cast<std::uint8_t*>(node + 2 * nodes);
   const auto marks = markCount(nodes);
   return {{std::span(node, nodes), std::span(node + nodes, nodes)},
           {std::span(mark, marks), std::span(mark + marks, marks)},
           totals};
+}
+
+std::atomic<std::uint64_t>& putOffMark(std::span<std::byte> region) {
+  RAD_CHECK_LE(sizeof(RegionHead), region.size());
+  return reinterpret_cast<RegionHead*>(region.data())->put_off;
 }
 
 }  // namespace radiosity::gpu

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <optional>
@@ -40,6 +41,7 @@ struct SceneBody {
 };
 struct ChunkBody {
   std::uint64_t chunk = 0;
+  std::uint64_t batch = 0;  ///< counted from 1; see putOffMark()
   double flux_scale = 1.0;
   std::uint32_t mode = 0;
   std::uint32_t measure = 0;  ///< 1: links are wanted, shot by shot, with the report
@@ -48,6 +50,8 @@ struct ChunkBody {
 };
 struct ChunkDoneBody {
   std::uint64_t chunk = 0;
+  std::uint64_t put_off = 0;  ///< 1: links are those of its first `shots` alone, and of a run nothing came
+  std::uint64_t shots = 0;
   solver::TransportCounters counters;
 };
 
@@ -130,5 +134,7 @@ void packLinks(std::vector<std::byte>& to, const solver::LinkSample& links);
 /// Accumulators in shared memory.
 [[nodiscard]] std::size_t fluxRegionBytes(std::size_t nodes);
 [[nodiscard]] FluxSink fluxRegionSink(std::span<std::byte> region, std::size_t nodes);
+/// Beside them: batches up to this number are of no use any more, whatever the worker is at.
+[[nodiscard]] std::atomic<std::uint64_t>& putOffMark(std::span<std::byte> region);
 
 }  // namespace radiosity::gpu

@@ -14,12 +14,12 @@
 #include <thread>
 #include <utility>
 
-#include "common/check.h"
 #include "common/log.h"
 #include "server/gpu/draw/paper_ids.h"
 #include "server/gpu/run/sight_trial.h"
 #include "server/gpu/workers/batch_chunks.h"
 #include "server/gpu/workers/gpu_transport.h"
+#include "server/gpu/workers/prepared_scene.h"
 #include "server/gpu/workers/worker_process.h"
 #include "server/gpu/workers/worker_start.h"
 
@@ -37,6 +37,8 @@ constexpr double kSlowPixelSeconds = 2e-6;
 constexpr int kLeastUse = 5000;
 /// And it is given time so often at most: what waits for a card that hangs may look now and then whether it still does.
 constexpr int kMostExtensions = 30;
+/// A batch that may be put off has so long, and is then asked about every so often.
+constexpr std::chrono::milliseconds kUndisturbed{100}, kBetweenLooks{10};
 /// A worker takes in a scene at ten times this rate at least.
 constexpr double kSlowSceneBytesPerSecond = 5e6;
 
@@ -74,22 +76,29 @@ class WorkerTransport final : public solver::Transport {
   WorkerTransport& operator=(const WorkerTransport&) = delete;
 
   Result<void> setScene(std::shared_ptr<const scene::PatchScene> patches) override {
-    if (auto begun = beginScene(std::move(patches)); !begun) return begun;
+    if (auto begun = beginScene(std::move(patches), nullptr); !begun) return begun;
     return finishScene();
   }
 
+  [[nodiscard]] Result<std::unique_ptr<Prepared>> prepareScene(const scene::PatchScene& patches) const override {
+    return PreparedScene::make(patches);
+  }
+
   /// All upload at the same time.
-  Result<void> beginScene(std::shared_ptr<const scene::PatchScene> patches) override {
+  Result<void> beginScene(std::shared_ptr<const scene::PatchScene> patches,
+                          std::unique_ptr<Prepared> prepared) override {
     awaitScenes();  // of one that was not finished
-    auto packed = packScene(*patches);
-    if (!packed) return tl::unexpected(packed.error());
-    packed_ = std::move(*packed);
+    if (!prepared) {
+      auto made = prepareScene(*patches);
+      if (!made) return tl::unexpected(made.error());
+      prepared = std::move(*made);
+    }
+    auto& scene = static_cast<PreparedScene&>(*prepared);
+    packed_ = std::move(scene.packed);
+    paper_fits_ = std::move(scene.paper_fits);
     nodes_ = patches->nodeCount();
     triangles_ = patches->triangles.size();
     patches_ = patches;
-    const auto paper = PaperIds::fits(*patches);
-    paper_fits_ = paper.has_value();
-    if (!paper) paper_error_ = paper.error();
     has_scene_ = true;
     deaths_ = 0;
     for (auto& slot : slots_) {
@@ -135,6 +144,8 @@ class WorkerTransport final : public solver::Transport {
     for (const auto& slot : slots_) counters += slot.counters;
     return counters;
   }
+
+  void setImpatience(std::function<bool()> is_wanted) override { is_wanted_ = std::move(is_wanted); }
 
   void interrupt() override {
     interrupted_ = true;
@@ -193,16 +204,7 @@ class WorkerTransport final : public solver::Transport {
   Result<SightTimes> timeSights() {
     const auto room = options_.make_trial_room();
     if (!room) return tl::unexpected(room.error());
-    const auto batch = trialBatch(**room);
-    SightTimes times;
-    for (auto& [sight, seconds] : {std::pair(Sight::kRays, &times.rays), std::pair(Sight::kImages, &times.images)}) {
-      sight_ = sight;
-      if (auto set = setScene(*room); !set) return tl::unexpected(set.error());
-      const auto taken = timeTrial(batch, *this);
-      if (!taken) return tl::unexpected(taken.error());
-      *seconds = *taken;
-    }
-    return times;
+    return timeBoth(*room, *this, [this](Sight sight) { sight_ = sight; });
   }
 
   void forgetScene() {
@@ -218,8 +220,10 @@ class WorkerTransport final : public solver::Transport {
       return fail(ErrorCode::kInternal, "finishScene must come after beginScene");
     const ShotSpan shots = spanOf(batch);
     if (auto good = checkShots(shots); !good) return good;
-    if (batch.mode == solver::LinkMode::kPaperMipmap && !paper_fits_) return tl::unexpected(paper_error_);
+    if (batch.mode == solver::LinkMode::kPaperMipmap && !paper_fits_) return tl::unexpected(paper_fits_.error());
     deaths_ = 0;
+    ++batch_;
+    put_off_ = lacks_ = false;
     gather_shots_ = batch.gather.size();
     chunks_ = cutBatch(batch, {triangles_, nodes_}, {slots_.size(), hands_});
     queue_.clear();
@@ -232,7 +236,11 @@ class WorkerTransport final : public solver::Transport {
     auto done = work(batch);
     if (!done) killAll();                         // what the workers have of this batch is void; so are they
     for (auto& slot : slots_) slot.done.clear();  // who dies from here on takes nothing of it into the grave
-    return done;
+    if (!done || !lacks_) return done;
+    for (auto& slot : slots_) {
+      if (slot.process) slot.process->sink().clear();
+    }
+    return fail(ErrorCode::kCancelled, "put off");
   }
 
   void awaitScenes() {
@@ -253,7 +261,6 @@ class WorkerTransport final : public solver::Transport {
   }
 
   [[nodiscard]] Patience patienceUntil(Clock::time_point deadline) const { return {deadline, wake_.get()}; }
-  [[nodiscard]] Patience startPatience() const { return patienceUntil(Clock::now() + kStartPatience); }
   [[nodiscard]] Patience scenePatience() const {
     const auto bytes = static_cast<double>(packed_.bytes().size() + fluxRegionBytes(nodes_));
     return patienceUntil(Clock::now() + kStartPatience + seconds(bytes / kSlowSceneBytesPerSecond));
@@ -268,13 +275,29 @@ class WorkerTransport final : public solver::Transport {
   }
 
   Result<void> work(const solver::ShotBatch& batch) {
-    while (!finished()) {
+    for (const auto undisturbed = Clock::now() + kUndisturbed; !finished();) {
       if (interrupted_) return fail(ErrorCode::kUnavailable, "interrupted");
       if (auto replaced = replaceDead(); !replaced) return replaced;
       for (auto& slot : slots_) feed(slot, batch);
-      listen();
+      const bool looks = batch.may_be_put_off && is_wanted_ && !put_off_;
+      listen(looks ? std::optional(std::max(undisturbed, Clock::now() + kBetweenLooks)) : std::nullopt);
+      if (looks && Clock::now() >= undisturbed && is_wanted_()) putOff();
     }
     return {};
+  }
+
+  /// What no worker has yet is dropped, and those that have something leave it where they are.
+  void putOff() {
+    put_off_ = true;
+    dropQueue();
+    for (auto& slot : slots_) {
+      if (slot.process) slot.process->putOff(batch_);
+    }
+  }
+
+  void dropQueue() {
+    lacks_ |= !queue_.empty();
+    queue_.clear();
   }
 
   void feed(Slot& slot, const solver::ShotBatch& batch) {
@@ -285,8 +308,9 @@ class WorkerTransport final : public solver::Transport {
       queue_.pop_front();
       slot.held.push_back(chunk);
       if (slot.held.size() == 1) startClock(slot);
-      const auto sent = slot.process->send(
-          MessageKind::kChunk, packChunk(batch, chunks_[chunk], chunk, take_ != nullptr), patienceUntil(slot.deadline));
+      const auto sent =
+          slot.process->send(MessageKind::kChunk, packChunk(batch, chunks_[chunk], {batch_, chunk}, take_ != nullptr),
+                             patienceUntil(slot.deadline));
       if (!sent && !interrupted_) bury(slot, sent.error());
       if (!sent) return;
     }
@@ -313,8 +337,9 @@ class WorkerTransport final : public solver::Transport {
     return true;
   }
 
-  /// Waits until some worker has something to say and hears it, or until one is late and buries it, or for a wake-up.
-  void listen() {
+  /// Waits until some worker has something to say and hears it, or until one is late and buries it, or for a wake-up,
+  /// or until `longest`.
+  void listen(std::optional<Clock::time_point> longest) {
     std::vector<pollfd> polls;
     auto deadline = Clock::time_point::max();
     for (const auto& slot : slots_) {
@@ -324,7 +349,8 @@ class WorkerTransport final : public solver::Transport {
     }
     if (deadline == Clock::time_point::max()) return;  // a death emptied the hands of all; go on
     polls.push_back({wake_.get(), POLLIN, 0});
-    const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now()).count();
+    const auto until = longest ? std::min(*longest, deadline) : deadline;
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - Clock::now()).count();
     constexpr std::int64_t kLongestMs = 60'000;  // then it looks again
     if (poll(polls.data(), polls.size(), static_cast<int>(std::clamp<std::int64_t>(left, 0, kLongestMs))) < 0) return;
     if (polls.back().revents != 0) return;
@@ -352,7 +378,10 @@ class WorkerTransport final : public solver::Transport {
       bury(slot, Error{ErrorCode::kInternal, "a worker process reports work it was not given"});
       return;
     }
-    if (take_ != nullptr && !takeLinks(from, chunks_[report.chunk])) {
+    const bool is_put_off = put_off_ && report.put_off != 0;
+    lacks_ |= is_put_off;
+    const auto& chunk = chunks_[report.chunk];
+    if (take_ != nullptr && !takeLinks(from, chunk, is_put_off ? std::min(report.shots, chunk.count) : chunk.count)) {
       bury(slot, Error{ErrorCode::kInternal, "a worker process reports links that make no sense"});
       return;
     }
@@ -364,9 +393,9 @@ class WorkerTransport final : public solver::Transport {
 
   /// Links are handed on in the order of the shots; what was handed on before its worker died and was measured again is
   /// the same, and dropped.
-  [[nodiscard]] bool takeLinks(BodyReader& from, const Chunk& chunk) {
+  [[nodiscard]] bool takeLinks(BodyReader& from, const Chunk& chunk, std::size_t count) {
     const auto first = chunk.first + (chunk.kind == ShotKind::kGather ? 0 : gather_shots_);
-    for (auto i = first; i < first + chunk.count; ++i) {
+    for (auto i = first; i < first + count; ++i) {
       solver::LinkSample links;
       if (!unpackLinks(from, nodes_, links)) return false;
       if (i >= next_taken_) links_[i] = std::move(links);
@@ -387,6 +416,7 @@ class WorkerTransport final : public solver::Transport {
     queue_.insert(queue_.end(), slot.held.begin(), slot.held.end());
     queue_.insert(queue_.end(), slot.done.begin(), slot.done.end());
     slot = Slot{};
+    if (put_off_) dropQueue();
   }
 
   Result<void> replaceDead() {
@@ -413,7 +443,8 @@ class WorkerTransport final : public solver::Transport {
   Result<WorkerProcess> startOne() {
     auto process = WorkerProcess::start(options_.executable);
     if (!process) return process;
-    if (auto ready = process->awaitReady(startPatience()); !ready) return tl::unexpected(ready.error());
+    if (auto ready = process->awaitReady(patienceUntil(Clock::now() + kStartPatience)); !ready)
+      return tl::unexpected(ready.error());
     if (!has_scene_) return process;
     if (auto sent = process->sendScene(packed_, sceneBody(), scenePatience()); !sent)
       return tl::unexpected(sent.error());
@@ -433,10 +464,12 @@ class WorkerTransport final : public solver::Transport {
   SharedMemory packed_;
   std::size_t nodes_ = 0, triangles_ = 0;
   bool has_scene_ = false;
-  bool paper_fits_ = true;  ///< whether the scene can be lit in paper mode, and why not
-  Error paper_error_;
+  Result<void> paper_fits_;
   std::vector<Chunk> chunks_;
-  std::size_t gather_shots_ = 0;                          ///< of the batch
+  std::size_t gather_shots_ = 0;  ///< of the batch
+  std::function<bool()> is_wanted_;
+  std::uint64_t batch_ = 0;
+  bool put_off_ = false, lacks_ = false;                  ///< this batch; and some of it was not done
   const TakeLinks* take_ = nullptr;                       ///< where links are wanted
   std::vector<std::optional<solver::LinkSample>> links_;  ///< by shot, of those that others must go before
   std::size_t next_taken_ = 0;

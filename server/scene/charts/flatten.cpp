@@ -8,7 +8,8 @@
 #include <glm/matrix.hpp>
 #include <glm/vec4.hpp>
 #include <glm/vector_relational.hpp>
-#include <unordered_map>
+#include <utility>
+#include <vector>
 
 #include "common/task.h"
 
@@ -64,6 +65,44 @@ Box worldBounds(const Scene& scene) {
   return box;
 }
 
+/// By the key of a cell: the last point that was put into it. One flat table, since a node of its own for each cell,
+/// and giving them all back, takes longer than welding.
+class CellHeads {
+ public:
+  /// kNone: the cell is empty.
+  [[nodiscard]] std::uint32_t at(std::uint64_t key) const { return slots_[slotOf(key)].point; }
+  /// Returns the former one.
+  std::uint32_t replace(std::uint64_t key, std::uint32_t point) {
+    if (2 * (used_ + 1) > slots_.size()) grow();
+    auto& slot = slots_[slotOf(key)];
+    if (slot.point == kNone) ++used_;
+    slot.key = key;
+    return std::exchange(slot.point, point);
+  }
+
+ private:
+  struct Slot {
+    std::uint64_t key = 0;
+    std::uint32_t point = kNone;
+  };
+
+  /// Its own, or the empty one that it would get.
+  [[nodiscard]] std::size_t slotOf(std::uint64_t key) const {
+    const auto mask = slots_.size() - 1;
+    auto at = static_cast<std::size_t>(key) & mask;
+    while (slots_[at].point != kNone && slots_[at].key != key) at = (at + 1) & mask;
+    return at;
+  }
+  void grow() {
+    const auto all = std::exchange(slots_, std::vector<Slot>(2 * slots_.size()));
+    for (const auto& slot : all)
+      if (slot.point != kNone) slots_[slotOf(slot.key)] = slot;
+  }
+
+  std::vector<Slot> slots_ = std::vector<Slot>(16);  ///< a power of two, half of them empty
+  std::size_t used_ = 0;
+};
+
 /// Points closer than the tolerance become one (the first). A hash grid of cells much larger than the tolerance, so
 /// that most points look into one cell only.
 class Welder {
@@ -77,9 +116,7 @@ class Welder {
     for (auto x = floorOf(low.x); x <= floorOf(high.x); ++x)
       for (auto y = floorOf(low.y); y <= floorOf(high.y); ++y)
         for (auto z = floorOf(low.z); z <= floorOf(high.z); ++z) {
-          const auto found = heads_.find(key(x, y, z));
-          if (found == heads_.end()) continue;
-          for (std::uint32_t i = found->second; i != kNone; i = next_[i - base_])
+          for (std::uint32_t i = heads_.at(key(x, y, z)); i != kNone; i = next_[i - base_])
             if (glm::distance(points_[i], p) <= tolerance_) return i;
         }
     return insert(p);
@@ -98,16 +135,14 @@ class Welder {
   std::uint32_t insert(const glm::dvec3& p) {
     const auto id = static_cast<std::uint32_t>(points_.size());
     points_.push_back(p);
-    auto [slot, fresh] = heads_.try_emplace(key(floorOf(p.x / cell_), floorOf(p.y / cell_), floorOf(p.z / cell_)), id);
-    next_.push_back(fresh ? kNone : slot->second);
-    slot->second = id;
+    next_.push_back(heads_.replace(key(floorOf(p.x / cell_), floorOf(p.y / cell_), floorOf(p.z / cell_)), id));
     return id;
   }
 
   std::vector<glm::dvec3>& points_;
   std::uint32_t base_ = static_cast<std::uint32_t>(points_.size());
   double tolerance_, cell_;
-  std::unordered_map<std::uint64_t, std::uint32_t> heads_;
+  CellHeads heads_;
   std::vector<std::uint32_t> next_;
 };
 

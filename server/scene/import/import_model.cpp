@@ -2,14 +2,19 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <limits>
 #include <span>
+#include <string>
 #include <vector>
 
+#include "common/task.h"
 #include "server/scene/import/import_record.h"
 
 namespace radiosity::scene {
 namespace {
+
+constexpr const char* kNodes = "nodes";
 
 /// Members of a document that are parsed together, or not at all, and what they become.
 struct Part {
@@ -24,10 +29,10 @@ const std::array kParts = {
            to.bufferViews = from.model->bufferViews;
            to.meshes = from.model->meshes;
          }},
-    Part{{"nodes"}, [](const ImportRecord& from, tinygltf::Model& to) { to.nodes = from.model->nodes; }},
+    Part{{kNodes}, [](const ImportRecord& from, tinygltf::Model& to) { to.nodes = from.model->nodes; }},
     Part{{"materials"}, [](const ImportRecord& from, tinygltf::Model& to) { to.materials = from.materials; }},
 };
-constexpr std::size_t kMaterials = 2;
+constexpr std::size_t kGeometry = 0, kNodesPart = 1, kMaterials = 2;
 /// These are small.
 constexpr std::array kAlways = {"asset", "cameras", "extensionsUsed", "samplers", "scene", "scenes", "textures"};
 
@@ -51,14 +56,14 @@ void addMember(const Json& gltf, const char* member, Json& out) {
   }
 }
 
-/// The part of the JSON that tinygltf is to see: `parts`, and what is always parsed. It copies extras and extensions
-/// into values of its own; ours are read from Document::gltf, so they need not go there, except lights.
+/// The part of the JSON that tinygltf is to see: `parts` without nodes, and what is always parsed. It copies extras and
+/// extensions into values of its own; ours are read from Document::gltf, so they need not go there, except lights.
 Json reduced(const Json& gltf, std::span<const Part* const> parts) {
   Json out = Json::object();
   for (const auto* member : kAlways) addMember(gltf, member, out);
   for (const auto* part : parts) {
     for (const auto* member : part->members)
-      if (member != nullptr) addMember(gltf, member, out);
+      if (member != nullptr && member != kNodes) addMember(gltf, member, out);
   }
   const auto extensions = gltf.value("extensions", Json::object());
   if (extensions.contains("KHR_lights_punctual")) {
@@ -124,9 +129,56 @@ bool refuseImage(tinygltf::Image*, int, std::string*, std::string*, int, int, co
   return false;
 }
 
+/// All of these are what the schema says, or are not there.
+int indexAt(const Json& node, const char* member) {
+  const auto found = node.find(member);
+  return found == node.end() ? -1 : static_cast<int>(found->get<std::int64_t>());
+}
+
+template <typename Number>
+std::vector<Number> numbersAt(const Json& node, const char* member) {
+  std::vector<Number> numbers;
+  const auto found = node.find(member);
+  if (found == node.end()) return numbers;
+  numbers.reserve(found->size());
+  for (const auto& number : *found) numbers.push_back(number.get<Number>());
+  return numbers;
+}
+
+tinygltf::Node nodeOf(const Json& json) {
+  tinygltf::Node node;
+  if (const auto name = json.find("name"); name != json.end()) node.name = name->get_ref<const std::string&>();
+  node.skin = indexAt(json, "skin");
+  node.camera = indexAt(json, "camera");
+  node.mesh = indexAt(json, "mesh");
+  node.matrix = numbersAt<double>(json, "matrix");
+  if (node.matrix.empty()) {
+    node.rotation = numbersAt<double>(json, "rotation");
+    node.scale = numbersAt<double>(json, "scale");
+    node.translation = numbersAt<double>(json, "translation");
+  }
+  node.children = numbersAt<int>(json, "children");
+  node.weights = numbersAt<double>(json, "weights");
+  return node;
+}
+
+/// As tinygltf would read them. There may be hundreds of thousands: to write them as text for it, and to have that
+/// parsed, takes ten times as long.
+std::vector<tinygltf::Node> nodesOf(const Json& gltf) {
+  std::vector<tinygltf::Node> nodes;
+  const auto found = gltf.find(kNodes);
+  if (found == gltf.end()) return nodes;
+  nodes.reserve(found->size());
+  for (const auto& node : *found) {
+    interruptionPoint();
+    nodes.push_back(nodeOf(node));
+  }
+  return nodes;
+}
+
 Result<tinygltf::Model> parse(const Document& document, std::span<const Part* const> parsed) {
   auto json = reduced(document.gltf, parsed);
-  if (std::ranges::find(parsed, &kParts[0]) != parsed.end()) addZeroView(json);
+  if (std::ranges::find(parsed, &kParts[kGeometry]) != parsed.end()) addZeroView(json);
   const auto shape = shapeOf(json);
   const auto text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
   if (text.size() > std::numeric_limits<unsigned>::max()) {
@@ -155,6 +207,7 @@ Result<tinygltf::Model> parseModel(const Document& document, const Json* former,
     (before != nullptr && isSame(part, document.gltf, *former) ? taken : parsed).push_back(&part);
   auto model = parse(document, parsed);
   if (!model) return model;
+  if (std::ranges::find(parsed, &kParts[kNodesPart]) != parsed.end()) model->nodes = nodesOf(document.gltf);
   for (const auto* part : taken) part->take(*before, *model);
   return model;
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <glm/common.hpp>
 #include <limits>
 #include <map>
@@ -15,18 +16,27 @@
 namespace radiosity::scene {
 namespace {
 
-/// By which an instance is known again: its node, mesh and primitive, and which of the node's instances it is.
-using InstanceKey = std::tuple<std::uint32_t, std::uint32_t, std::uint32_t, std::uint32_t>;
+/// By which an instance is known again: its node, mesh and primitive, and which of the node's instances it is. Of those
+/// that have these in common the one of lower index comes first.
+struct InstanceKey {
+  std::uint32_t node, mesh, primitive;
+  std::uint32_t index;  ///< in Scene::instances
 
+  [[nodiscard]] auto what() const { return std::tie(node, mesh, primitive); }
+  bool operator<(const InstanceKey& other) const {
+    return std::tie(node, mesh, primitive, index) < std::tie(other.node, other.mesh, other.primitive, other.index);
+  }
+};
+
+/// In ascending order; most scenes have them in it as they are.
 std::vector<InstanceKey> keysOf(const Scene& scene) {
-  std::map<InstanceKey, std::uint32_t> seen;
   std::vector<InstanceKey> keys;
+  keys.reserve(scene.instances.size());
   for (const auto& instance : scene.instances) {
     const auto& primitive = scene.primitives[instance.primitive];
-    InstanceKey key{instance.node, primitive.mesh, primitive.primitive, 0};
-    std::get<3>(key) = seen[key]++;
-    keys.push_back(key);
+    keys.push_back({instance.node, primitive.mesh, primitive.primitive, static_cast<std::uint32_t>(keys.size())});
   }
+  if (!std::ranges::is_sorted(keys, std::less<>())) std::ranges::sort(keys, std::less<>());
   return keys;
 }
 
@@ -244,13 +254,13 @@ std::vector<std::uint32_t> matchCharts(const InstanceCharts& before, const Insta
 }
 
 std::vector<std::uint32_t> matchInstances(const Scene& before, const Scene& after) {
-  std::map<InstanceKey, std::uint32_t> known;
-  const auto old_keys = keysOf(before);
-  for (std::uint32_t i = 0; i < old_keys.size(); ++i) known[old_keys[i]] = i;
-  std::vector<std::uint32_t> source;
-  for (const auto& key : keysOf(after)) {
-    const auto found = known.find(key);
-    source.push_back(found == known.end() ? kNone : found->second);
+  const auto old_keys = keysOf(before), new_keys = keysOf(after);
+  std::vector<std::uint32_t> source(after.instances.size(), kNone);
+  auto of = old_keys.begin();
+  for (const auto& key : new_keys) {
+    while (of != old_keys.end() && of->what() < key.what()) ++of;
+    if (of == old_keys.end()) break;
+    if (of->what() == key.what()) source[key.index] = (of++)->index;
   }
   return source;
 }

@@ -52,8 +52,8 @@ void PaperSolver::startAnew() {
   emitted_ = glm::dvec3(0.0);
   for (const auto& side : trees_.sides())
     for (std::uint32_t leaf = 0; leaf < side.leaf_count; ++leaf)
-      emitted_ += static_cast<double>(patches_->node_area[side.first_node + leaf]) *
-                  glm::dvec3(trees_.emission(side, leaf));
+      emitted_ +=
+          static_cast<double>(patches_->node_area[side.first_node + leaf]) * glm::dvec3(trees_.emission(side, leaf));
   received_ = reflected_ = 0.0;
   share_ = (channels(emitted_) + punctual_.owed(1)) / static_cast<double>(settings_.planner.shooters_a_round);
   shot_level_.assign(patches_->nodeCount(), kNeverShot);

@@ -116,7 +116,8 @@ void PatchTrees::smooth(const Side& side) {
     const auto weight = [&](int x, int y, int dx, int dy) {
       const int nx = x + dx - 1, ny = y + dy - 1;
       if (nx < 0 || ny < 0 || nx >= width || ny >= height) return 0.0;
-      return tent(dx, dy) * static_cast<double>(patches_->node_area[first + static_cast<std::uint32_t>(ny * width + nx)]);
+      return tent(dx, dy) *
+             static_cast<double>(patches_->node_area[first + static_cast<std::uint32_t>(ny * width + nx)]);
     };
     for (int y = 0; y < height; ++y)
       for (int x = 0; x < width; ++x) {

@@ -1,6 +1,6 @@
-// The patch hierarchies of Lum, Ma and Max (2002), section 4.1: a quadtree for each polygon. A shot adds to the unpushed
-// light of the nodes that it reached and to the polygon's unshot power; push and pull are put off until the polygon
-// shoots or is shown. One thread.
+// The patch hierarchies of Lum, Ma and Max (2002), section 4.1: a quadtree for each polygon. A shot adds to the
+// unpushed light of the nodes that it reached and to the polygon's unshot power; push and pull are put off until the
+// polygon shoots or is shown. One thread.
 #pragma once
 
 #include <array>
@@ -76,9 +76,9 @@ class PatchTrees {
   std::shared_ptr<const scene::PatchScene> patches_;
   scene::PatchMaterials materials_;
   std::vector<Side> sides_;
-  std::vector<glm::dvec3> unpushed_;               ///< by node: I, as flux, lux unit^2
-  std::vector<glm::dvec3> irradiance_, unshot_;    ///< by node, of leaves alone
-  std::vector<double> power_;                      ///< by node
+  std::vector<glm::dvec3> unpushed_;             ///< by node: I, as flux, lux unit^2
+  std::vector<glm::dvec3> irradiance_, unshot_;  ///< by node, of leaves alone
+  std::vector<double> power_;                    ///< by node
   Flux3 escaped_{}, backface_{};
   double flux_scale_ = 1.0;
 };

@@ -155,6 +155,12 @@ void LinkedSolver::inheritLights(LinkedSolver& former, Renumbering& numbers) {
 void LinkedSolver::inheritNodes(LinkedSolver& former, Renumbering& numbers) {
   auto& shooters = former.system_.shooters();
   const auto first_repair = repairs_.size();
+  std::vector<std::uint32_t> staying;
+  for (const auto& shooter : shooters) {
+    if (shooter.isLight() || numbers.side_after[shooter.place.side] == scene::kNone) continue;
+    staying.push_back(numbers.side_after[shooter.place.side]);
+  }
+  memory_.learn(std::move(staying));
   for (std::uint32_t n = 0; n < shooters.size(); ++n) {
     if (shooters[n].isLight() || numbers.side_after[shooters[n].place.side] == scene::kNone) continue;
     Shooter shooter;

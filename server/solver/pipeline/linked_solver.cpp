@@ -105,13 +105,16 @@ Result<void> LinkedSolver::measureSlice() {
       if (measureCrowd(want)) ++measured_;
       return {};
     }
+    const auto done = measureSource(want);
+    if (!done && done.error().code == ErrorCode::kCancelled) return {};
     ++measured_;
-    return measureSource(want);
+    return done;
   }
   const auto start = std::chrono::steady_clock::now();
   auto slice = std::span(wanted_).subspan(measured_, std::min(slice_, wanted_.size() - measured_));
   slice = slice.first(static_cast<std::size_t>(std::find_if(slice.begin(), slice.end(), isSource) - slice.begin()));
   ShotBatch batch;
+  batch.may_be_put_off = true;
   std::vector<const Measurement*> gathered, scattered;
   for (const auto& want : slice) {
     const auto& shooter = system_.shooters()[want.shooter];
@@ -124,7 +127,9 @@ Result<void> LinkedSolver::measureSlice() {
     (batch.gather.size() > gathered.size() ? gathered : scattered).push_back(&want);
   }
   gathered.insert(gathered.end(), scattered.begin(), scattered.end());
+  std::size_t taken = 0;
   const auto take = [&](std::size_t i, LinkSample&& links) {
+    taken = i + 1;
     const auto& want = *gathered[i];
     const bool scattered = i >= batch.gather.size();
     if (scattered) links.scale(system_.shooters()[want.shooter].area);  // it carried a flux of one
@@ -132,6 +137,14 @@ Result<void> LinkedSolver::measureSlice() {
     system_.addSample(want.shooter, want.half, expander_, links, want.points);
   };
   const auto done = transport_.measure(batch, take);
+  if (!done && done.error().code == ErrorCode::kCancelled) {
+    std::vector<Measurement> order;
+    for (const auto* want : gathered) order.push_back(*want);
+    std::ranges::copy(order, slice.begin());
+    measured_ += taken;
+    slice_ = std::max<std::size_t>(taken, 1);
+    return {};
+  }
   if (!done) return tl::unexpected<Error>(done.error());
   counters_ += *done;
   measured_ += slice.size();

@@ -197,6 +197,7 @@ std::vector<glm::vec3> LinkedSolver::directIrradiance() const {
 Result<void> LinkedSolver::measureSource(const Measurement& want) {
   const auto& source = sources_[system_.shooters()[want.shooter].source];
   ShotBatch batch;
+  batch.may_be_put_off = true;
   batch.flux_scale = kMeasureScale * std::exp2(-std::ceil(std::log2(std::max(1.0, source.flux_per_intensity))));
   punctual_.addSample(source, want.index, static_cast<std::uint32_t>(want.half), batch);
   FluxAccumulators flux;

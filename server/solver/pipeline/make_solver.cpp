@@ -1,7 +1,7 @@
 #include "server/solver/pipeline/make_solver.h"
 
-#include "server/solver/pipeline/linked_solver.h"
 #include "server/solver/paper/paper_solver.h"
+#include "server/solver/pipeline/linked_solver.h"
 #include "server/solver/shooting/shooting_solver.h"
 
 namespace radiosity::solver {

@@ -154,7 +154,8 @@ enum class LinkMode : std::uint32_t {
 /// Work that may be done in any order and by anyone.
 struct ShotBatch {
   LinkMode mode = LinkMode::kFormula;
-  double flux_scale = 1.0;  ///< integers = round(flux x flux_scale); a power of two
+  bool may_be_put_off = false;  ///< see Transport::setImpatience()
+  double flux_scale = 1.0;      ///< integers = round(flux x flux_scale); a power of two
   std::vector<ScatterShot> scatter;
   std::vector<GatherShot> gather;
   std::vector<HemicubeFrame> points;  ///< light points of the gather shots
@@ -237,9 +238,21 @@ class Transport {
 
   /// Uploads geometry; must come before run(). Blocks.
   [[nodiscard]] virtual Result<void> setScene(std::shared_ptr<const scene::PatchScene> patches) = 0;
-  /// The same in two steps, the second of which is to come before anything else but another setScene() or
-  /// beginScene(): between them renderers may take the scene in by themselves.
-  [[nodiscard]] virtual Result<void> beginScene(std::shared_ptr<const scene::PatchScene> patches) {
+  /// What renderers take of a scene. Each transport knows its own.
+  class Prepared {
+   public:
+    virtual ~Prepared() = default;
+  };
+  /// Makes it for beginScene(), which has less to do then. From any thread, beside whatever else the transport does.
+  /// Null: there is nothing to prepare.
+  [[nodiscard]] virtual Result<std::unique_ptr<Prepared>> prepareScene(const scene::PatchScene& /*patches*/) const {
+    return nullptr;
+  }
+  /// The same as setScene() in two steps, the second of which is to come before anything else but another setScene() or
+  /// beginScene(): between them renderers may take the scene in by themselves. `prepared`: of this scene; null: that is
+  /// done here.
+  [[nodiscard]] virtual Result<void> beginScene(std::shared_ptr<const scene::PatchScene> patches,
+                                                std::unique_ptr<Prepared> /*prepared*/ = nullptr) {
     return setScene(std::move(patches));
   }
   [[nodiscard]] virtual Result<void> finishScene() { return {}; }
@@ -257,6 +270,12 @@ class Transport {
   /// under way. Blocks. After an error some shots may have been taken. The default carries out one shot after the other
   /// with run().
   [[nodiscard]] virtual Result<TransportCounters> measure(const ShotBatch& batch, const TakeLinks& take);
+
+  /// `is_wanted` is called now and then, in the thread that uses the transport, by run() and measure(): whether that
+  /// thread is wanted for something else. If so, a batch that may be put off, and has taken a tenth of a second, ends
+  /// with kCancelled: of measure() those shots are done that were taken. A transport whose calls are short need not do
+  /// anything.
+  virtual void setImpatience(std::function<bool()> /*is_wanted*/) {}
 
   /// What runs in setScene(), run() or measure() fails soon, and everything after it at once: the solve thread is
   /// wanted for its end. From any thread. A transport whose calls are short need not do anything.

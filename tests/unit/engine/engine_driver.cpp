@@ -15,6 +15,11 @@ std::chrono::seconds patience() {
   return std::chrono::seconds(60) * std::max(1, factor != nullptr ? std::atoi(factor) : 1);
 }
 
+struct PreparedOf final : solver::Transport::Prepared {
+  explicit PreparedOf(const scene::PatchScene* of) : patches(of) {}
+  const scene::PatchScene* patches;
+};
+
 class ScriptedTransport final : public solver::Transport {
  public:
   explicit ScriptedTransport(std::shared_ptr<TransportScript> script) : script_(std::move(script)) {}
@@ -35,7 +40,20 @@ class ScriptedTransport final : public solver::Transport {
       return fail(ErrorCode::kUnavailable, "the driver reset the card");
     if (script_->runs_out_of_memory) throw std::bad_alloc();
     std::this_thread::sleep_for(std::chrono::milliseconds(script_->pause_ms));
+    if (script_->puts_off) return fail(ErrorCode::kCancelled, "put off");
     return rays_.run(batch, into);
+  }
+  [[nodiscard]] Result<std::unique_ptr<Prepared>> prepareScene(const scene::PatchScene& patches) const override {
+    ++script_->prepared;
+    if (std::this_thread::get_id() == maker_) ++script_->prepared_here;
+    return std::make_unique<PreparedOf>(&patches);
+  }
+  Result<void> beginScene(std::shared_ptr<const scene::PatchScene> patches,
+                          std::unique_ptr<Prepared> prepared) override {
+    if (prepared) {
+      EXPECT_EQ(static_cast<PreparedOf&>(*prepared).patches, patches.get());
+    }
+    return setScene(std::move(patches));
   }
   [[nodiscard]] bool hasTakenScene() override { return script_->takes_scenes; }
   [[nodiscard]] Losses losses() const override {
@@ -60,6 +78,7 @@ class ScriptedTransport final : public solver::Transport {
  private:
   std::shared_ptr<const scene::PatchScene> patches_;
   std::shared_ptr<TransportScript> script_;
+  std::thread::id maker_ = std::this_thread::get_id();
   RayTransport rays_{16};
 };
 

@@ -31,8 +31,10 @@ struct TransportScript {
   std::atomic<int> uploads_to_fail{0}, uploads_to_run_out{0};
   std::atomic<bool> runs_out_of_memory{false};
   std::atomic<int> uploads{0};
-  std::atomic<bool> takes_scenes{true};  ///< false: renderers are still at the last one
-  std::atomic<int> pause_ms{0};          ///< with each run, as a slow renderer would
+  std::atomic<bool> takes_scenes{true};            ///< false: renderers are still at the last one
+  std::atomic<int> pause_ms{0};                    ///< with each run, as a slow renderer would
+  std::atomic<bool> puts_off{false};               ///< every run, as those do that never come to an end
+  std::atomic<int> prepared{0}, prepared_here{0};  ///< scenes, and by the thread that runs
 };
 
 /// Everything a listener is told, in order.

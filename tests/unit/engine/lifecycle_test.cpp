@@ -81,6 +81,14 @@ TEST_F(Lifecycle, EveryLoadRaisesRevisionAndLayout) {
   EXPECT_EQ(engine().lightmaps()->revision, 2U);
 }
 
+TEST_F(Lifecycle, WhatRenderersTakeOfASceneIsPreparedByTheLoadAlone) {
+  solve(lumpedCube(0.5));
+  ASSERT_TRUE(load(lumpedCube(0.2)));
+  ASSERT_TRUE(reaches(SolveState::kConverged));
+  EXPECT_EQ(script_->prepared, 2);
+  EXPECT_EQ(script_->prepared_here, 0);
+}
+
 TEST_F(Lifecycle, BytesThatAreNoSceneLeaveTheOldOneAsItWas) {
   solve(lumpedCube(0.5));
   const auto before = status();

@@ -68,6 +68,14 @@ TEST_F(Settings, TheTimeLimitStopsTheSolveShortOfItsTarget) {
   EXPECT_FALSE(engine().lightmaps()->final);
 }
 
+TEST_F(Settings, TheTimeLimitEndsAlsoASolveOfWhichNoMeasurementComesToAnEnd) {
+  script_->puts_off = true;
+  script_->pause_ms = 50;
+  runOutOfTime();
+  EXPECT_GT(status().seconds, 0.0);
+  EXPECT_TRUE(engine().lightmaps());
+}
+
 TEST_F(Settings, MemoryForLinksThatIsUsedUpEndsTheSolveAboveItsTargetAndAnEditGoesOn) {
   ASSERT_TRUE(configure([](SolveSettings& settings) {
     settings.link_memory_bytes = 200'000;

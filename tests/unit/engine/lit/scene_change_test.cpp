@@ -59,6 +59,22 @@ TEST(SceneChange, aFilterOfACutOutMovesItsEdgeAndSoChangesTheShape) {
   EXPECT_TRUE(changeBetween(before, after).geometry);
 }
 
+TEST(SceneChange, aNodeOfSeveralInstancesDoesNotOnlyMove) {
+  Scene before = textured();
+  before.instances.push_back({1, 0});
+  const auto movedBy = [&](std::initializer_list<std::size_t> instances) {
+    Scene after = before;
+    for (const auto i : instances) after.instances[i].world[3].x += 1.0;
+    return onlyNodesMoved(before, after);
+  };
+  EXPECT_TRUE(movedBy({0})) << "each of these has a node of its own";
+  EXPECT_TRUE(movedBy({0, 1}));
+  before.instances[0].node = before.instances[1].node = 1;
+  EXPECT_TRUE(movedBy({}));
+  EXPECT_FALSE(movedBy({0})) << "it has a place of its own beside the node's";
+  EXPECT_FALSE(movedBy({0, 1})) << "so have both";
+}
+
 TEST(SceneChange, posesAndNormalsAreGeometry) {
   const Scene before = textured();
   Scene after = textured();

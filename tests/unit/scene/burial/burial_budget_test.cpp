@@ -62,10 +62,10 @@ TEST(BurialBudget, BesideEdgesMoreIsAskedAsLongAsItCanBePaidFor) {
 // However dear a place is, all leaves together take no more than twice what is aimed at.
 TEST(BurialBudget, PlacesThatStillCostTooMuchAreGivenUp) {
   EXPECT_EQ(affordablePlaces(10'000, alike(5000, true, true)).work_each, kMostWorkOfPlace);
-  EXPECT_EQ(affordablePlaces(60'000, alike(800'000, true, true)).work_each, 8192U);
+  EXPECT_EQ(affordablePlaces(60'000, alike(800'000, true, true)).work_each, 4096U);
   EXPECT_EQ(affordablePlaces(10'000'000, alike(800'000, true, true)).work_each, 2000U);
   EXPECT_EQ(affordableWork(10), kMostWorkOfPlace);
-  EXPECT_EQ(affordableWork(100'000), 4096U);
+  EXPECT_EQ(affordableWork(100'000), 2048U);
   EXPECT_NE(budgetWarning({1, 1, 1}, 17).find("17 sides of texels"), std::string::npos);
 }
 

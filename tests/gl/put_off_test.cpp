@@ -1,0 +1,98 @@
+// A batch that whoever asked for it has no time for any more: what is done stays, what is not leaves nothing behind.
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <vector>
+
+#include "server/gpu/workers/gpu_transport.h"
+#include "tests/gl/mixed_batch.h"
+#include "tests/gl/scene_builder.h"
+
+namespace radiosity::test {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+class PutOff : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    auto made = gpu::makeWorkerTransport({.workers = 2, .executable = RADIOSITY_GL_WORKER, .sight = gpu::Sight::kRays});
+    if (!made) GTEST_SKIP() << made.error().text();
+    transport_ = std::move(*made);
+    ASSERT_TRUE(transport_->setScene(scene_));
+  }
+  /// Its lights are looked at from so many points that each takes half a minute.
+  [[nodiscard]] solver::ShotBatch endless() const {
+    auto batch = mixedBatch(*scene_, 4);
+    batch.may_be_put_off = true;
+    const std::vector<solver::HemicubeFrame> few = batch.points;
+    for (auto& shot : batch.gather) {
+      const auto frame = few[shot.first_point];
+      shot.first_point = static_cast<std::uint32_t>(batch.points.size());
+      shot.point_count = 2'000;
+      batch.points.insert(batch.points.end(), shot.point_count, frame);
+    }
+    return batch;
+  }
+  void expectWorkersAsEver() {
+    const auto batch = mixedBatch(*scene_, 20);
+    auto expected = accumulators(*scene_), flux = accumulators(*scene_);
+    auto fresh =
+        gpu::makeWorkerTransport({.workers = 2, .executable = RADIOSITY_GL_WORKER, .sight = gpu::Sight::kRays});
+    ASSERT_TRUE(fresh);
+    ASSERT_TRUE((*fresh)->setScene(scene_));
+    ASSERT_TRUE((*fresh)->run(batch, expected));
+    ASSERT_TRUE(transport_->run(batch, flux));
+    expectSame(flux, expected);
+    EXPECT_EQ(transport_->losses().count, 0U);
+  }
+
+  std::shared_ptr<const scene::PatchScene> scene_ = randomRoom(402, 13742, 2);
+  std::unique_ptr<solver::Transport> transport_;
+};
+
+TEST_F(PutOff, aMeasurementInTheMiddleOfAShotEndsSoon) {
+  transport_->setImpatience([] { return true; });
+  const auto begun = Clock::now();
+  const auto done = transport_->measure(endless(), [](std::size_t, auto&&) { ADD_FAILURE() << "a shot is done"; });
+  EXPECT_LT(Clock::now() - begun, std::chrono::seconds(10));
+  ASSERT_FALSE(done);
+  EXPECT_EQ(done.error().code, ErrorCode::kCancelled);
+  expectWorkersAsEver();
+}
+
+TEST_F(PutOff, ofARunNothingStays) {
+  transport_->setImpatience([] { return true; });
+  auto flux = accumulators(*scene_);
+  const auto done = transport_->run(endless(), flux);
+  ASSERT_FALSE(done);
+  EXPECT_EQ(done.error().code, ErrorCode::kCancelled);
+  expectSame(flux, accumulators(*scene_));
+  expectWorkersAsEver();
+}
+
+TEST_F(PutOff, theShotsThatWereTakenAreTheFirstAndWhole) {
+  auto batch = mixedBatch(*scene_, 3000);
+  std::vector<solver::LinkSample> all, taken;
+  ASSERT_TRUE(transport_->measure(batch, [&](std::size_t, auto&& links) { all.push_back(links); }));
+  batch.may_be_put_off = true;
+  transport_->setImpatience([] { return true; });
+  const auto done = transport_->measure(batch, [&](std::size_t shot, auto&& links) {
+    EXPECT_EQ(shot, taken.size());
+    taken.push_back(links);
+  });
+  EXPECT_EQ(done.has_value(), taken.size() == all.size());
+  ASSERT_LE(taken.size(), all.size());
+  for (std::size_t i = 0; i < taken.size(); ++i) EXPECT_EQ(taken[i].irradiance, all[i].irradiance) << i;
+  expectWorkersAsEver();
+}
+
+TEST_F(PutOff, onlyWhatMayBeIs) {
+  transport_->setImpatience([] { return true; });
+  std::size_t taken = 0;
+  EXPECT_TRUE(transport_->measure(mixedBatch(*scene_, 600), [&](std::size_t, auto&&) { ++taken; }));
+  EXPECT_EQ(taken, 603U);
+}
+
+}  // namespace
+}  // namespace radiosity::test
