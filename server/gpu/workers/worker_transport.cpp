@@ -66,11 +66,13 @@ class WorkerTransport final : public solver::Transport {
  public:
   WorkerTransport(WorkerOptions options, std::vector<WorkerProcess> workers, FileDescriptor wake)
       : options_(std::move(options)),
-        slots_(slotsOf(std::move(workers))),
-        renderer_(slots_.front().process->renderer()),
-        hands_(options_.hands > 0 ? options_.hands : handsFor(slots_.front().process->software(), slots_.size())),
-        sight_(sightFor(options_.sight, slots_.front().process->software())),
-        wake_(std::move(wake)) {}
+        slots_(workers.size()),
+        renderer_(workers.front().renderer()),
+        hands_(options_.hands > 0 ? options_.hands : handsFor(workers.front().software(), workers.size())),
+        sight_(sightFor(options_.sight, workers.front().software())),
+        wake_(std::move(wake)) {
+    for (std::size_t i = 0; i < workers.size(); ++i) slots_[i].process = std::move(workers[i]);
+  }
   ~WorkerTransport() override { killAll(); }
   WorkerTransport(const WorkerTransport&) = delete;
   WorkerTransport& operator=(const WorkerTransport&) = delete;
@@ -195,12 +197,6 @@ class WorkerTransport final : public solver::Transport {
   [[nodiscard]] std::shared_ptr<const scene::PatchScene> scene() const override { return patches_; }
 
  private:
-  static std::vector<Slot> slotsOf(std::vector<WorkerProcess> workers) {
-    std::vector<Slot> slots;
-    for (auto& worker : workers) slots.emplace_back().process = std::move(worker);
-    return slots;
-  }
-
   Result<SightTimes> timeSights() {
     const auto room = options_.make_trial_room();
     if (!room) return tl::unexpected(room.error());
