@@ -1,6 +1,6 @@
 // Frames from the socket go to the decoding worker, and come back as tiles for the set they were sent for.
 
-import type { LightmapSet } from '../view/lightmap_set';
+import type { LightmapSet } from '../view/light/lightmap_set';
 import { KINDS } from '../protocol/tile_frame';
 import type { DecodeReply, DecodeRequest } from './tile_worker';
 

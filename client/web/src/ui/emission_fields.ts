@@ -2,7 +2,8 @@
 // stays as exact as it is in the document. Pure functions.
 
 import type { GltfMaterial, Vec3 } from '../document/gltf';
-import { fromHex, parseNumber, toHex } from './dom';
+import { fromHex, toHex } from '../page/colours';
+import { parseNumber } from '../page/numbers';
 
 export interface EmissionFields {
   colour: string;

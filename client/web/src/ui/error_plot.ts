@@ -1,7 +1,7 @@
 // Error against time, both logarithmic, as the solve goes on.
 
 import type { Progress } from '../protocol/messages';
-import { h } from './dom';
+import { h } from '../page/dom';
 
 export interface Sample {
   seconds: number;

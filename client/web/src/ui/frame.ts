@@ -1,10 +1,10 @@
 // The page: the picture, and around it a bar above, tools below and a panel beside (on narrow screens: below).
 
-import { button, h, icon, iconButton, pressed } from './dom';
+import { button, h, icon, iconButton, pressed } from '../page/dom';
 import { makeHelp } from './help';
 import { Legend, MeterCard } from './legend';
-import { Spaced } from './spaced';
-import { store, stored } from './stored';
+import { Spaced } from '../page/spaced';
+import { store, stored } from '../page/stored';
 import { Toasts } from './toast';
 
 export interface FrameActions {

@@ -1,6 +1,6 @@
 // The list of keys.
 
-import { button, h } from './dom';
+import { button, h } from '../page/dom';
 
 const KEYS: [string, string][] = [
   ['Drag, wheel, right drag', 'orbit, zoom, pan; by touch: one finger, pinch, two fingers'],

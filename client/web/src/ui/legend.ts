@@ -1,7 +1,8 @@
 // The scale of a false-colour picture: what colour means how many lux, or which mip.
 
-import { MIP_STOPS, NOTHING, paletteCss } from '../view/palette';
-import { h, measured, readable, withError } from './dom';
+import { MIP_STOPS, NOTHING, paletteCss } from '../view/looks/palette';
+import { h } from '../page/dom';
+import { measured, readable, withError } from '../page/numbers';
 
 const LABELS = 5;
 /** Of those that are written as multiples of powers of ten. */

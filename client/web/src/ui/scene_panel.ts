@@ -14,7 +14,9 @@ import {
   type Vec4,
 } from '../document/gltf';
 import type { Placement } from '../document/edits';
-import { button, checkbox, field, fromHex, h, parseNumber, row, section, toHex } from './dom';
+import { fromHex, toHex } from '../page/colours';
+import { button, checkbox, field, h, row, section } from '../page/dom';
+import { parseNumber } from '../page/numbers';
 import { emissionFields, emissionWritten } from './emission_fields';
 
 export interface Selection {

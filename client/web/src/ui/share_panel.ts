@@ -1,7 +1,7 @@
 // The panel "Share": a link that carries the camera, the last edit as a command, and files to take away.
 
 import { LONGEST_NAME } from '../protocol/page_name';
-import { button, checkbox, field, h, section } from './dom';
+import { button, checkbox, field, h, section } from '../page/dom';
 
 export interface SharePanelActions {
   /** What the user is called, and how the page is called where that is not said. */

@@ -1,9 +1,10 @@
 // The panel "Solve": how far the light is, and how far it shall go.
 
 import type { ErrorSample, Progress, Settings } from '../protocol/messages';
-import { button, checkbox, field, h, inField, parseNumber, percent, readable, section } from './dom';
+import { button, checkbox, field, h, section } from '../page/dom';
+import { inField, parseNumber, percent, readable } from '../page/numbers';
 import { ErrorPlot } from './error_plot';
-import { Spaced } from './spaced';
+import { Spaced } from '../page/spaced';
 
 export interface SolvePanelActions {
   pauseOrResume(): void;

@@ -2,7 +2,7 @@
 // however much others do meanwhile.
 
 import { plainText } from '../protocol/page_name';
-import { button, h } from './dom';
+import { button, h } from '../page/dom';
 
 export type Tone = 'info' | 'good' | 'bad';
 

@@ -1,7 +1,8 @@
 // The panel "View": what is shown and how bright, from where.
 
-import { TONE_CURVES, VIEW_MODES, type ViewMode } from '../view/view_modes';
-import { button, checkbox, field, h, inField, parseNumber, pressed, readable, section, select } from './dom';
+import { TONE_CURVES, VIEW_MODES, type ViewMode } from '../view/looks/view_modes';
+import { button, checkbox, field, h, pressed, section, select } from '../page/dom';
+import { inField, parseNumber, readable } from '../page/numbers';
 
 export const BACKGROUNDS = [
   { id: 'theme', label: 'Same as page' },
