@@ -1,13 +1,14 @@
-// What can be undone and redone: what was done in this page first, a whole drag at once; then what the server remembers,
-// whoever did it. Part of the App.
+// What can be undone and redone. Edits of this page come first, each drag as one step; then follow the edits that the
+// server remembers, whoever made them.
 
-import type { App } from '../app/app';
 import type { SceneDocument } from '../document/scene_document';
+import type { Server } from '../protocol/connection';
 import type { SceneHistory } from '../protocol/messages';
+import type { Notes } from '../ui/toast';
 
-/** Between two questions: while somebody drags there are thirty revisions a second. */
+/** Between two questions: a drag makes thirty revisions a second. */
 const ASK_EVERY_MS = 500;
-/** The newest edit that is not taken back is among so many revisions, or undo is offered without knowing it. */
+/** So many revisions are searched for the newest edit that is not taken back; where it is older, undo is offered unseen. */
 const REVISIONS = 32;
 
 interface Offer {
@@ -17,11 +18,23 @@ interface Offer {
 
 const NOTHING: Offer = { undo: false, redo: false };
 
-/** What the server would do, given the revisions that took back what this page had done: undoing one would do it again. */
+/**
+ * What the server would do. `takenBack`: revisions by which this page took back its own edits. To undo such a revision
+ * would make the edit again.
+ */
 export function offerOf(history: SceneHistory, takenBack: ReadonlySet<number>): Offer {
   const newest = history.revisions.filter(({ kind, undone }) => kind === 'patch' && !undone).at(-1);
   const isOwnUndo = newest !== undefined && takenBack.has(newest.revision);
   return { undo: history.undoable > 0 && !isOwnUndo, redo: history.redoable > 0 };
+}
+
+export interface EditHistoryHost {
+  document: Pick<SceneDocument, 'undoStack' | 'redoStack' | 'takenBack' | 'undo' | 'redo' | 'settled'>;
+  server: Pick<Server, 'isOpen' | 'has' | 'call'>;
+  /** A refusal is shown to the user. */
+  ask(method: string): Promise<unknown>;
+  show(undo: boolean, redo: boolean): void;
+  notes: Pick<Notes, 'show'>;
 }
 
 export class EditHistory {
@@ -30,18 +43,15 @@ export class EditHistory {
   private lastAsked = -Infinity;
   private questions = 0;
 
-  constructor(
-    private readonly app: App,
-    private readonly document: SceneDocument,
-  ) {}
+  constructor(private readonly host: EditHistoryHost) {}
 
-  /** The connection is new, or the scene has another revision. */
+  /** The connection is new, or the scene has a new revision. */
   askSoon(): void {
     const wait = Math.max(0, this.lastAsked + ASK_EVERY_MS - performance.now());
     this.timer ??= setTimeout(() => void this.ask(), wait);
   }
 
-  /** What an earlier connection said of its server holds no more. */
+  /** The connection is gone, and with it what its server had offered. */
   forget(): void {
     ++this.questions;
     this.server = NOTHING;
@@ -49,43 +59,43 @@ export class EditHistory {
   }
 
   show(): void {
-    const { undoStack, redoStack } = this.document;
-    this.app.frame?.setHistory(this.server.undo || undoStack.length > 0, this.server.redo || redoStack.length > 0);
+    const { undoStack, redoStack } = this.host.document;
+    this.host.show(this.server.undo || undoStack.length > 0, this.server.redo || redoStack.length > 0);
   }
 
   async undo(): Promise<void> {
-    if (this.document.undoStack.length > 0) return this.document.undo();
+    if (this.host.document.undoStack.length > 0) return this.host.document.undo();
     await this.onServer('undo');
   }
 
   async redo(): Promise<void> {
-    if (this.document.redoStack.length > 0) return this.document.redo();
+    if (this.host.document.redoStack.length > 0) return this.host.document.redo();
     await this.onServer('redo');
   }
 
   /**
-   * Asks anew once all that this page has sent is answered: what is known is of before, and its newest edit may be one
-   * that has just been taken back here.
+   * Asks the server anew, once it has answered everything that this page has sent: the last answer is older than that,
+   * and the newest edit may be one that this page has just taken back.
    */
   private async onServer(step: keyof Offer): Promise<void> {
-    await this.document.settled();
+    await this.host.document.settled();
     const offer = await this.ask();
-    if (offer[step]) await this.app.ask(`scene.${step}`);
-    else if (this.app.connection.isOpen) this.app.frame.toasts.show(`Nothing to ${step}`);
+    if (offer[step]) await this.host.ask(`scene.${step}`);
+    else if (this.host.server.isOpen) this.host.notes.show(`Nothing to ${step}`);
   }
 
   private async ask(): Promise<Offer> {
     clearTimeout(this.timer);
     this.timer = undefined;
-    const { connection } = this.app;
-    if (!connection.has('scene.history')) {
+    const { server, document } = this.host;
+    if (!server.has('scene.history')) {
       this.forget();
       return NOTHING;
     }
     const question = ++this.questions;
     this.lastAsked = performance.now();
-    const answer = await connection.call<SceneHistory>('scene.history', { limit: REVISIONS }).catch(() => undefined);
-    const offer = answer ? offerOf(answer, this.document.takenBack) : NOTHING;
+    const answer = await server.call<SceneHistory>('scene.history', { limit: REVISIONS }).catch(() => undefined);
+    const offer = answer ? offerOf(answer, document.takenBack) : NOTHING;
     if (question === this.questions) {
       this.server = offer;
       this.show();

@@ -1,52 +1,55 @@
-// Selecting and changing: the scene's document, the gizmo, undo, files dropped on the page. Part of the App.
+// Selecting and changing objects: the scene's document, its panel, and the gizmo.
 
-import { Vector3, type Object3D } from 'three';
-import type { App } from '../app/app';
-import { EditHistory } from './edit_history';
+import type { Object3D } from 'three';
 import * as edits from '../document/edits';
-import {
-  type Gltf,
-  handlesOf,
-  hangingNodes,
-  isSameScene,
-  lightOf,
-  nodeName,
-  type Vec3,
-  type Vec4,
-} from '../document/gltf';
+import { type Gltf, handlesOf, hangingNodes, isSameScene, lightOf, nodeName } from '../document/gltf';
 import { SceneDocument, type SendEdit } from '../document/scene_document';
 import type { Patch, ScenePatchedNote } from '../protocol/messages';
 import { type PageName, shownName } from '../protocol/page_name';
+import type { Frame } from '../ui/frame';
 import { ScenePanel, type Selection } from '../ui/scene_panel';
 import type { GizmoMode } from '../view/controls/gizmo';
+import type { Viewer } from '../view/viewer';
+import { lampAhead, placementOf, written } from './placement';
 
 const HANDLES: readonly GizmoMode[] = ['translate', 'rotate', 'scale'];
 const GIZMO_LABELS = { translate: 'Move', rotate: 'Rotate', scale: 'Scale' } as const;
 
+export interface EditHost {
+  name: Pick<PageName, 'isMine'>;
+  picture: Pick<Viewer, 'shown' | 'gizmo' | 'rig' | 'exposure' | 'applyDocument' | 'select' | 'invalidate'>;
+  frame: Pick<Frame, 'toasts' | 'setGizmo' | 'showTab' | 'panelOpen'>;
+  send: SendEdit;
+  /** The steps of undo are others, or `document.lastEdit` is another. */
+  historyChanged(): void;
+  frameSelection(): void;
+  loadFile(file: File): void;
+  notAccepted(text: string, wanted: string): void;
+}
+
 export class EditSession {
   readonly panel: ScenePanel;
   readonly document: SceneDocument;
-  readonly history: EditHistory;
   selection: Selection | undefined;
   /** The handles that the user has chosen. */
   private wanted: GizmoMode = 'translate';
   /** The document as it came last. */
   private known: Gltf | undefined;
-  /** What is held by its handles, as it was before. */
+  /** The object that is being dragged, and where it was before. */
   private dragged: { node: number; before: edits.Placement } | undefined;
 
-  constructor(
-    private readonly app: App,
-    private readonly name: PageName,
-    send: SendEdit,
-  ) {
-    this.document = new SceneDocument((by) => name.isMine(by), send, {
+  constructor(private readonly host: EditHost) {
+    this.document = new SceneDocument((by) => host.name.isMine(by), host.send, {
       changed: (pointers) => this.onChanged(pointers),
-      refused: (label, reason) => app.frame.toasts.show(`${label}: ${reason}`, 'bad'),
-      historyChanged: () => this.onHistory(),
+      refused: (label, reason) => host.frame.toasts.show(`${label}: ${reason}`, 'bad'),
+      historyChanged: () => host.historyChanged(),
     });
-    this.history = new EditHistory(app, this.document);
-    this.panel = new ScenePanel({
+    this.panel = this.makePanel();
+  }
+
+  private makePanel(): ScenePanel {
+    const { host } = this;
+    return new ScenePanel({
       select: (selection) => this.select(selection),
       setColour: (material, rgb) =>
         this.make('Colour', edits.setColour(material, this.document.gltf, rgb), `colour ${material}`),
@@ -59,10 +62,10 @@ export class EditSession {
         this.make(visible ? 'Show' : 'Hide', edits.setVisible(this.document.gltf, node, visible)),
       remove: (node) => this.remove(node),
       addLamp: () => void this.addLamp(),
-      frameSelection: () => app.view.frameSelection(),
+      frameSelection: () => host.frameSelection(),
       endGesture: () => this.document.endGesture(),
-      loadFile: (file) => void app.scene.loadFile(file),
-      notAccepted: (text, wanted) => app.notAccepted(text, wanted),
+      loadFile: (file) => host.loadFile(file),
+      notAccepted: (text, wanted) => host.notAccepted(text, wanted),
     });
   }
 
@@ -72,46 +75,47 @@ export class EditSession {
 
   onPatched(note: ScenePatchedNote, fetchAnew: () => void): void {
     if (!this.document.patched(note.revision, note.patch, note.by)) fetchAnew();
-    if (!this.name.isMine(note.by))
-      this.app.frame.toasts.showOnce(
+    if (!this.host.name.isMine(note.by))
+      this.host.frame.toasts.showOnce(
         `${shownName(note.by) || 'Someone'} ${edits.describePatch(this.document.gltf, note.patch)}`,
       );
   }
 
-  /** The objects are new; what was selected may still be there. */
+  /** The picture has new objects. The one that was selected may be among them. */
   onSceneShown(): void {
-    this.app.viewer.applyDocument(this.document.gltf, []);
+    this.host.picture.applyDocument(this.document.gltf, []);
     this.panel.setDocument(this.document.gltf, (node) => this.materialsOf(node));
-    this.app.viewer.select(this.selection?.node);
+    this.host.picture.select(this.selection?.node);
   }
 
   // ---- selection ----
 
   select(selection: Selection | undefined): void {
     this.selection = selection;
-    this.app.viewer.select(this.isPictureOld ? undefined : selection?.node);
+    this.host.picture.select(this.isPictureOld ? undefined : selection?.node);
     this.offerHandles();
     this.panel.setSelection(selection);
-    if (selection && this.app.frame.panelOpen) this.app.frame.showTab('Scene');
+    if (selection && this.host.frame.panelOpen) this.host.frame.showTab('Scene');
   }
 
-  /** Its scene was replaced, and numbers of its objects are those of others: the next picture follows. */
+  /** The document is of another scene than the picture, so the numbers of nodes mean different objects in the two. */
   private get isPictureOld(): boolean {
-    const { shown } = this.app.viewer;
+    const { shown } = this.host.picture;
     return shown !== undefined && this.known?.nodes !== undefined && !isSameScene(shown.source, this.known);
   }
 
   selectHit(object: Object3D | undefined): void {
-    const scene = this.app.viewer.shown;
+    const scene = this.host.picture.shown;
     const node = object && !this.isPictureOld ? scene?.nodeOf(object) : undefined;
     this.select(node === undefined ? undefined : { node, material: object && scene?.materialIndexOf(object) });
   }
 
-  /** For those who have no pointer. */
+  /** For users without a pointer. */
   selectNext(step: number): void {
-    const nodes = hangingNodes(this.document.gltf)
+    const { gltf } = this.document;
+    const nodes = hangingNodes(gltf)
       .map(({ node }) => node)
-      .filter((node) => this.document.gltf.nodes?.[node]?.mesh !== undefined || lightOf(this.document.gltf, node));
+      .filter((node) => gltf.nodes?.[node]?.mesh !== undefined || lightOf(gltf, node));
     if (nodes.length === 0) return;
     const at = this.selection ? nodes.indexOf(this.selection.node) : -1;
     const node = nodes[at < 0 ? (step > 0 ? 0 : nodes.length - 1) : (at + step + nodes.length) % nodes.length]!;
@@ -131,20 +135,21 @@ export class EditSession {
   }
 
   setGizmo(mode: GizmoMode): void {
-    if (this.app.viewer.gizmo.dragging) return; // what is held by one kind of handles is let go first
+    const { picture } = this.host;
+    if (picture.gizmo.dragging) return; // the user has to let go of one kind of handle before taking another
     this.wanted = mode;
     this.offerHandles();
-    this.app.viewer.invalidate();
+    picture.invalidate();
   }
 
-  /** Of the handles, those by which something changes; the user's choice where it is among them. */
+  /** Offers the handles that change something about the selected object, and takes the user's choice if it is one. */
   private offerHandles(): void {
-    const { gizmo } = this.app.viewer;
+    const { gizmo } = this.host.picture;
     const node = this.selection?.node;
     const offered = node === undefined ? HANDLES : handlesOf(this.document.gltf, node);
     const mode = offered.includes(this.wanted) ? this.wanted : offered[0]!;
     if (mode !== gizmo.mode && !gizmo.dragging) gizmo.setMode(mode);
-    this.app.frame.setGizmo(mode, offered);
+    this.host.frame.setGizmo(mode, offered);
   }
 
   onGizmoDragging(active: boolean): void {
@@ -154,44 +159,33 @@ export class EditSession {
     if (!active) this.document.endGesture();
   }
 
-  /** What is held by its handles goes back to where it was, here and on the server. False: nothing is held. */
+  /** Puts the dragged object back to where it was, here and on the server. False: no object is being dragged. */
   cancelDrag(): boolean {
-    const { gizmo } = this.app.viewer;
+    const { gizmo } = this.host.picture;
     if (!gizmo.cancel()) return false;
     if (!this.dragged) return true;
     const { node, before } = this.dragged;
     const patch = edits.setPlacement(node, written(gizmo.mode, before));
-    const label = `${GIZMO_LABELS[gizmo.mode]} ${nodeName(this.document.gltf, node)}`;
-    this.document.cancelGesture(label, `${gizmo.mode} ${node}`, patch).catch(() => undefined); // the refusal was shown
+    const { label, key } = this.dragOf(node, gizmo.mode);
+    this.document.cancelGesture(label, key, patch).catch(() => undefined); // the refusal was shown
     return true;
   }
 
   onGizmoChanged(object: Object3D, mode: GizmoMode): void {
     const node = this.selection?.node;
     if (node === undefined) return;
-    const rounded = (values: number[]) => values.map((v) => Number(v.toPrecision(7)));
-    const placement = written(mode, {
-      translation: rounded(object.position.toArray()) as Vec3,
-      rotation: unit(object.quaternion.toArray() as Vec4),
-      scale: rounded(object.scale.toArray()) as Vec3,
-    });
-    const label = `${GIZMO_LABELS[mode]} ${nodeName(this.document.gltf, node)}`;
-    this.make(label, edits.setPlacement(node, placement), `${mode} ${node}`);
+    const { label, key } = this.dragOf(node, mode);
+    this.make(label, edits.setPlacement(node, written(mode, placementOf(object))), key);
   }
 
-  /** In front of the camera, a third of the way to what it looks at, as bright as the scene is exposed for. */
+  private dragOf(node: number, mode: GizmoMode): { label: string; key: string } {
+    return { label: `${GIZMO_LABELS[mode]} ${nodeName(this.document.gltf, node)}`, key: `${mode} ${node}` };
+  }
+
   async addLamp(): Promise<void> {
-    const { rig, exposure, shown } = this.app.viewer;
+    const { rig, exposure, shown } = this.host.picture;
     if (!shown) return;
-    const eye = rig.camera.position;
-    const ahead = rig.camera.getWorldDirection(new Vector3());
-    const distance = eye.distanceTo(rig.target);
-    const at = eye.clone().addScaledVector(ahead, 0.75 * distance);
-    shown.bounds.clampPoint(at, at);
-    // A grey wall at a quarter of the scene's size away would be a middle grey.
-    const reach = shown.bounds.getSize(new Vector3()).length() / 4;
-    const candela = Number(((0.5 * Math.PI * reach * reach) / exposure.ofLeaving).toPrecision(2));
-    const place = at.toArray().map((v) => Number(v.toPrecision(4))) as Vec3;
+    const { place, candela } = lampAhead(rig.camera, rig.target, shown.bounds, exposure.ofLeaving);
     const { patch, node } = edits.addLamp(this.document.gltf, place, candela);
     try {
       await this.document.edit('Add lamp', patch);
@@ -213,40 +207,20 @@ export class EditSession {
   }
 
   private onChanged(pointers: string[]): void {
-    this.app.viewer.applyDocument(this.document.gltf, pointers);
+    const { gltf } = this.document;
+    this.host.picture.applyDocument(gltf, pointers);
     if (pointers.length === 0) {
-      const { gltf } = this.document;
-      // The document may come after the picture: what was clicked meanwhile stays selected. Numbers of another scene, which
-      // a server has that comes back, mean other objects.
+      // The document may come after the picture: an object that was clicked meanwhile stays selected, unless the server
+      // has come back with another scene, in which its number means another object.
       const isKept = this.known?.nodes === undefined || isSameScene(this.known, gltf);
       this.known = gltf;
       this.select(isKept && this.selection && gltf.nodes?.[this.selection.node] ? this.selection : undefined);
-      this.panel.setDocument(this.document.gltf, (node) => this.materialsOf(node));
+      this.panel.setDocument(gltf, (node) => this.materialsOf(node));
     } else {
-      const hangs = hangingNodes(this.document.gltf).some(({ node }) => node === this.selection?.node);
-      if (this.selection && !hangs) this.select(undefined); // somebody has removed it
-      this.offerHandles(); // a lamp may be of another kind now
+      const hangs = hangingNodes(gltf).some(({ node }) => node === this.selection?.node);
+      if (this.selection && !hangs) this.select(undefined); // somebody has removed the object
+      this.offerHandles(); // the edit may have changed the kind of a lamp
       this.panel.refresh();
     }
   }
-
-  private onHistory(): void {
-    this.history?.show();
-    if (this.document.lastEdit) this.app.share?.onEdit(this.document.lastEdit);
-  }
-}
-
-/** Of a placement, what handles of a mode write: turning and scaling go about the object's middle, and move its origin. */
-function written(mode: GizmoMode, { translation, rotation, scale }: edits.Placement): edits.Placement {
-  return {
-    translation: translation ?? [0, 0, 0],
-    ...(mode === 'rotate' ? { rotation: rotation ?? [0, 0, 0, 1] } : {}),
-    ...(mode === 'scale' ? { scale: scale ?? [1, 1, 1] } : {}),
-  };
-}
-
-/** Rounded, and still of unit length to the last digit that counts. */
-function unit(q: Vec4): Vec4 {
-  const length = Math.hypot(...q) || 1;
-  return q.map((v) => Number((v / length).toPrecision(9))) as Vec4;
 }

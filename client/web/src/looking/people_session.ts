@@ -1,14 +1,17 @@
-// Shares where this page looks from, and shows where the others do. Part of the App.
+// Shares where this page looks from, and shows where the others look from.
 
 import type { Vector3 } from 'three';
-import type { App } from '../app/app';
+import { store, stored } from '../page/stored';
+import type { Server } from '../protocol/connection';
 import type { SharedCamera } from '../protocol/messages';
 import { RpcError } from '../protocol/rpc';
-import { store, stored } from '../page/stored';
 import { People } from '../view/controls/people';
+import type { CameraRig } from '../view/controls/camera_rig';
 
-/** Between two places told to the server. */
+/** Between two places that the page tells the server. */
 const TELL_EVERY_MS = 200;
+/** The server refuses a camera while many others are shared; that lasts for a while. */
+const REFUSED_MS = 5000;
 const STORED = 'share-camera';
 
 export class PeopleSession {
@@ -23,8 +26,13 @@ export class PeopleSession {
   private timer: ReturnType<typeof setTimeout> | undefined;
   private asking = false;
 
-  constructor(private readonly app: App) {
-    this.people = new People((eye, target) => this.visit(eye, target));
+  /** `changed`: other cameras are to be drawn. */
+  constructor(
+    private readonly server: Pick<Server, 'has' | 'call'>,
+    private readonly rig: Pick<CameraRig, 'place' | 'lookFrom'>,
+    private readonly changed: () => void,
+  ) {
+    this.people = new People((eye: Vector3, target: Vector3) => rig.lookFrom(eye, target));
   }
 
   setSharing(on: boolean): void {
@@ -32,10 +40,10 @@ export class PeopleSession {
     store(STORED, on ? 'on' : 'off');
     if (on) return this.tellSoon();
     this.forget();
-    if (this.app.connection.has('cameras')) this.app.connection.call('camera').catch(() => undefined);
+    if (this.server.has('cameras')) this.server.call('camera').catch(() => undefined);
   }
 
-  /** A new session: the server knows nothing of this page's camera. */
+  /** The session is new, and its server does not know this page's camera. */
   onReady(): void {
     this.forget();
     this.tellSoon();
@@ -47,15 +55,15 @@ export class PeopleSession {
   }
 
   onCameras(cameras: readonly SharedCamera[]): void {
-    if (!this.sharing) return; // was on its way when sharing ended
+    if (!this.sharing) return; // the message was on its way when sharing ended
     this.cameras = cameras;
     this.show();
   }
 
-  /** After each picture; the first of a move tells at once, and the last place is never left out. */
+  /** After each picture. The first place of a move is told at once, and the last is never left out. */
   tellSoon(): void {
     if (!this.sharing || this.others < 1 || this.timer !== undefined || this.asking) return;
-    if (!this.app.connection.has('cameras') || this.place() === this.told) return;
+    if (!this.server.has('cameras') || this.place() === this.told) return;
     const wait = Math.max(0, this.lastTold + TELL_EVERY_MS - performance.now());
     this.timer = setTimeout(() => {
       this.timer = undefined;
@@ -68,27 +76,22 @@ export class PeopleSession {
     this.lastTold = performance.now();
     this.asking = true;
     try {
-      const params = JSON.parse(place) as object;
-      const { viewer } = await this.app.connection.call<{ viewer?: number }>('camera', params);
+      const { viewer } = await this.server.call<{ viewer?: number }>('camera', JSON.parse(place) as object);
       this.told = place;
       this.me = viewer;
       this.show();
     } catch (error) {
-      // A full board stays full for a while; anything else is over with the connection.
-      if (error instanceof RpcError) this.lastTold = performance.now() + 5000;
+      // Any other error means that the connection is gone.
+      if (error instanceof RpcError) this.lastTold = performance.now() + REFUSED_MS;
     } finally {
       this.asking = false;
     }
     if (this.sharing) this.tellSoon();
-    else this.setSharing(false); // ended while this was on its way
+    else this.setSharing(false); // sharing ended during the call
   }
 
   private place(): string {
-    return JSON.stringify(this.app.viewer.rig.place);
-  }
-
-  private visit(eye: Vector3, target: Vector3): void {
-    this.app.viewer.rig.lookFrom(eye, target);
+    return JSON.stringify(this.rig.place);
   }
 
   private forget(): void {
@@ -98,9 +101,9 @@ export class PeopleSession {
     this.show();
   }
 
-  /** Cameras may come before the answer that says which is this page's. */
+  /** The cameras may come before the answer that tells which of them is this page's. */
   private show(): void {
     this.people.show(this.me === undefined ? [] : this.cameras.filter((camera) => camera.viewer !== this.me));
-    this.app.viewer.invalidate();
+    this.changed();
   }
 }

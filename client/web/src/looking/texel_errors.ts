@@ -1,12 +1,12 @@
-// The standard error of single texels, asked of the server one at a time: of the one that the light meter reads.
+// The standard error of the texel that the light meter reads. The server is asked for one texel at a time.
 
 import { NOT_FOUND, type TexelReply } from '../protocol/messages';
 import { RpcError } from '../protocol/rpc';
 import { luminance } from '../page/colours';
 
-/** From one call to the next, at least: the pointer wanders, and while a solve goes on every answer is soon old. */
+/** Least time between two calls: the pointer moves on, and during a solve each answer is soon out of date. */
 const APART_MS = 200;
-/** And after a call that was refused. */
+/** Least time after a call that the server refused. */
 const REFUSED_MS = 1000;
 
 export interface TexelPlace {
@@ -15,23 +15,23 @@ export interface TexelPlace {
   y: number;
 }
 
-/** What the newest light is of, as far as the server has told. */
+/** The newest light that the server has told of. */
 export interface LightVersion {
   revision: number;
   tileVersion: number;
 }
 
 export interface TexelSource {
-  /** Rejects with what the server refuses, or where the connection was lost. */
+  /** Rejects with the server's refusal, or when the connection is lost. */
   ask(place: TexelPlace): Promise<TexelReply>;
-  /** Undefined where nobody can be asked. */
+  /** Undefined: there is no server to ask. */
   version(): LightVersion | undefined;
-  /** There may be more to read now than before. */
+  /** An error may have become known. */
   changed(): void;
 }
 
 export class TexelErrors {
-  /** Without an error: there is no such texel. */
+  /** `error` is undefined where the server has no such texel. */
   private answer: (TexelPlace & LightVersion & { error: number | undefined }) | undefined;
   private isAsking = false;
   private lastMs = -Infinity;
@@ -41,16 +41,16 @@ export class TexelErrors {
 
   constructor(private readonly source: TexelSource) {}
 
-  /** There is another session: its server may count revisions anew. */
+  /** The session is another, and its server may count revisions from the start. */
   forget(): void {
     this.answer = undefined;
     ++this.session;
   }
 
   /**
-   * Standard error of the texel's irradiance, lux, luminance; undefined: not known, or not yet. What is not known, or is
-   * older than the newest light, is asked for: one call at a time, five a second at most. An answer is of its own texel
-   * and its own revision of the scene, and within these it stands until the next is here.
+   * Standard error of the texel's irradiance (lux, luminance); undefined: not known yet, or there is none. Asks the
+   * server when the error is unknown or older than the newest light: one call at a time, five a second at most. An answer
+   * counts only for its own texel and its own revision of the scene, until the next answer is here.
    */
   errorAt(place: TexelPlace): number | undefined {
     const version = this.source.version();
@@ -61,7 +61,7 @@ export class TexelErrors {
     return known?.error;
   }
 
-  /** Too soon after the last call it is read once more when it is time: the pointer may be elsewhere by then. */
+  /** Too soon after the last call, the meter reads again later, as the pointer may be elsewhere by then. */
   private askSoon(place: TexelPlace, version: LightVersion): void {
     if (this.isAsking || this.timer !== undefined) return;
     const wait = this.lastMs + this.apartMs - performance.now();
@@ -83,7 +83,7 @@ export class TexelErrors {
     } catch (refusal) {
       const isNone = refusal instanceof RpcError && refusal.code === NOT_FOUND;
       if (session === this.session) this.answer = isNone ? { page, x, y, ...version, error: undefined } : undefined;
-      if (!isNone) this.apartMs = REFUSED_MS; // it is busy, or on its way out
+      if (!isNone) this.apartMs = REFUSED_MS; // the server is busy or shutting down
     }
     this.isAsking = false;
     this.source.changed();

@@ -1,5 +1,5 @@
-// The connection to the server: opens, says hello, subscribes, and when it is lost comes back with growing pauses and
-// takes up where it was. Owned by the App; main thread.
+// The connection to the server. It opens, says hello and subscribes; a lost connection opens again after growing pauses
+// and resumes where it was. One for a page; main thread.
 
 import { CreditWindow, FIRST_WINDOW } from './credit';
 import {
@@ -48,7 +48,17 @@ export function pauseMs(attempt: number, random: number): number {
   return Math.round(base * (0.75 + 0.5 * random));
 }
 
-export class Connection {
+/** What the parts of the viewer ask of the connection. */
+export interface Server {
+  /** Undefined while there is no connection. */
+  readonly info: ServerInfo | undefined;
+  readonly isOpen: boolean;
+  has(capability: string): boolean;
+  /** Rejects with RpcError (the server's refusal) or ConnectionLost. */
+  call<T>(method: string, params?: object): Promise<T>;
+}
+
+export class Connection implements Server {
   info: ServerInfo | undefined;
   credit = new CreditWindow();
   private socket: WebSocket | undefined;
@@ -113,7 +123,6 @@ export class Connection {
     return this.info?.capabilities.includes(capability) ?? false;
   }
 
-  /** Rejects with RpcError (the server's refusal) or ConnectionLost. */
   call<T>(method: string, params: object = {}): Promise<T> {
     return this.rpc && this.info ? this.rpc.call<T>(method, params) : Promise.reject(new Error('not connected'));
   }

@@ -1,45 +1,51 @@
-// Fetches the geometry of layouts. Part of the App.
+// Fetches the geometry of layouts.
 
-import type { App } from '../app/app';
+import { pause } from '../page/pause';
 import { pauseMs } from '../protocol/connection';
 import type { LightmapsNote } from '../protocol/messages';
+import type { Notes } from '../ui/toast';
 import type { LightmapSet } from '../view/light/lightmap_set';
+import type { Viewer } from '../view/viewer';
 
 const NO_CONTENT = 204;
 
-export class GeometrySession {
+export class GeometryFetch {
   private running: AbortController | undefined;
 
-  constructor(private readonly app: App) {}
+  constructor(
+    private readonly fetch: (path: string, init: RequestInit) => Promise<Response>,
+    private readonly picture: Pick<Viewer, 'set' | 'load'>,
+    private readonly notes: Pick<Notes, 'show'>,
+  ) {}
 
   /**
-   * Of a layout that has just come; what is on its way for another is given up. The light of a layout may be here before
-   * its geometry, and is not sent twice: so a line that breaks in between is tried again, for as long as it is the layout.
+   * Loads the geometry of a new layout and gives up that of the last. The light of a layout may arrive before its geometry
+   * and is not sent twice: therefore the fetch is repeated after a broken connection, as long as the layout is the newest.
    */
   async load(note: LightmapsNote, set: LightmapSet): Promise<void> {
     this.running?.abort();
     const { signal } = (this.running = new AbortController());
-    const { viewer, frame } = this.app;
+    const isWanted = () => this.picture.set === set;
     try {
-      const glb = await this.fetch(note.uvs, () => viewer.set === set, signal);
-      if (glb && viewer.set === set) await viewer.load(glb, set);
+      const glb = await this.fetchGlb(note.uvs, isWanted, signal);
+      if (glb && isWanted()) await this.picture.load(glb, set);
     } catch (error) {
-      if (viewer.set === set && !signal.aborted)
-        frame.toasts.show(`The geometry could not be fetched: ${(error as Error).message}`, 'bad');
+      if (isWanted() && !signal.aborted)
+        this.notes.show(`The geometry could not be fetched: ${(error as Error).message}`, 'bad');
     }
   }
 
-  /** Undefined: another layout has come, or none is shown any more. Rejects with what the server says against it. */
-  private async fetch(path: string, wanted: () => boolean, signal: AbortSignal): Promise<ArrayBuffer | undefined> {
-    for (let attempt = 0; !signal.aborted && wanted(); ++attempt) {
+  /** Undefined: the layout is no longer the newest. Rejects with the reason that the server gives. */
+  private async fetchGlb(path: string, isWanted: () => boolean, signal: AbortSignal): Promise<ArrayBuffer | undefined> {
+    for (let attempt = 0; !signal.aborted && isWanted(); ++attempt) {
       try {
-        const response = await this.app.fetch(path, { signal });
-        // Pages have another layout by now: the server tells of it, and this one is not waited for.
+        const response = await this.fetch(path, { signal });
+        // The server has a newer layout, and a message about it is on the way.
         return response.status === NO_CONTENT ? undefined : await response.arrayBuffer();
       } catch (error) {
         if (signal.aborted) return undefined;
-        if (!(error instanceof TypeError)) throw error; // fetch() has no other sign of a line that broke
-        await new Promise((resolve) => setTimeout(resolve, pauseMs(attempt, Math.random())));
+        if (!(error instanceof TypeError)) throw error; // fetch() has no other sign of a broken connection
+        await pause(pauseMs(attempt, Math.random()));
       }
     }
     return undefined;

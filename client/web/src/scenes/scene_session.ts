@@ -1,150 +1,113 @@
-// Which scene there is: its document from the server, files that this page sends, and who has loaded another. Part of the
-// App.
+// Which scene there is: the server's document of it, files that this page sends, and who has loaded another.
 
-import type { App } from '../app/app';
-import type { Placed } from '../looking/view_session';
 import { DocumentFetch } from '../document/document_fetch';
 import type { Gltf } from '../document/gltf';
-import { NOT_FOUND, type PastRevision, type SceneHistory } from '../protocol/messages';
-import { shownName } from '../protocol/page_name';
+import type { SceneDocument } from '../document/scene_document';
+import type { Server } from '../protocol/connection';
+import { NOT_FOUND, type PastRevision, type Resume, type SceneHistory } from '../protocol/messages';
 import { ConnectionLost, RpcError } from '../protocol/rpc';
+import type { Notes } from '../ui/toast';
+import { loadNote, wasReplaced } from './load_note';
 
-/** The scene that a server begins with, where nobody is known to have loaded it: nobody's work is replaced by it. */
-const FIRST = 1;
-
-/** What the server calls a scene that was sent to it without a name. */
-const UNNAMED = 'unnamed scene';
-
-/** What people are told of another scene, given the newest revisions; undefined: this revision is no load by anyone. */
-export function loadNote(revisions: readonly PastRevision[], revision: number): string | undefined {
-  const load = revisions.find((past) => past.revision === revision && past.kind === 'load');
-  if (!load || (!load.by && revision === FIRST)) return undefined;
-  return `${shownName(load.by ?? '') || 'Someone'} loaded ${sceneName(load.summary)}`;
-}
-
-/** Whether the scene of a revision was replaced; it counts as such where too much was done since for the history to tell. */
-export function wasReplaced({ revisions }: SceneHistory, revision: number): boolean {
-  const load = revisions.filter(({ kind }) => kind === 'load').at(-1);
-  return load ? load.revision > revision : (revisions[0]?.revision ?? 0) > revision + 1;
-}
-
-function sceneName(summary: string | undefined): string {
-  if (!summary) return 'another scene';
-  return summary === UNNAMED ? 'a scene without a name' : summary;
-}
-
-/** A file that is on its way, where one looked from before it, and whether the server was asked to load it. */
-interface Upload {
+/** A file that is on its way, the place that the user looked from before it, and whether the server was asked to load it. */
+interface Upload<Placed> {
   abort: AbortController;
   placed: Placed;
   asked: boolean;
 }
 
-export class SceneSession {
+/** `Placed`: the place that the user looks from, as the camera keeps it. */
+export interface SceneHost<Placed> {
+  server: Pick<Server, 'info' | 'has' | 'call'>;
+  fetch(path: string, init?: RequestInit): Promise<Response>;
+  notes: Pick<Notes, 'show'>;
+  document: Pick<SceneDocument, 'revision' | 'leave' | 'reset'>;
+  told: { resume: Resume | undefined };
+  camera: { sceneComes(): void; forgetCamera(): Placed; keepCamera(before: Placed): void };
+  picture: { readonly set: unknown; readonly shown: unknown; clear(): void };
+  isMine(by: string): boolean;
+  deselect(): void;
+  /** Another scene is there: what was known of the solve and of the history is out of date. */
+  loaded(): void;
+}
+
+export class SceneSession<Placed> {
   readonly document = new DocumentFetch({
     ask: (signal) => this.ask(signal),
     failed: (error) => this.onNone(error),
   });
-  private upload: Upload | undefined;
-  /** Revision of the newest scene that was told to be there: its first light may come before it, and all of it again. */
+  private upload: Upload<Placed> | undefined;
+  /** Revision of the newest scene. The server tells of a scene twice: with its first light, and when all of it is there. */
   private newest = 0;
-  /** Revision of the newest load that was told of, or was this page's own. */
+  /** Revision of the newest load that the user was told of, or that this page asked for. */
   private told = 0;
-  /** Of a load that came while this page's own was asked for, and may be that; 0: none. */
+  /** Revision of a load that came while this page waited for its own, and that may be its own; 0: none. */
   private untold = 0;
 
-  constructor(private readonly app: App) {}
+  constructor(private readonly host: SceneHost<Placed>) {}
 
-  /** Files that are dropped on the page. */
-  takeDrops(): void {
-    const setDropping = (on: boolean) => document.body.classList.toggle('dropping', on);
-    window.addEventListener('dragover', (event) => {
-      if (!event.dataTransfer?.types.includes('Files')) return; // a text or a picture of the page is no scene
-      event.preventDefault();
-      setDropping(true);
-    });
-    // Whatever is dragged leaves each part of the page for the next; of the page itself there is no next.
-    window.addEventListener('dragleave', (event) => {
-      if (!event.relatedTarget) setDropping(false);
-    });
-    window.addEventListener('drop', (event) => {
-      setDropping(false);
-      const file = event.dataTransfer?.files[0];
-      if (!file) return;
-      event.preventDefault();
-      void this.loadFile(file);
-    });
-  }
-
-  /** Its revisions count anew. */
+  /** The server has restarted and counts revisions from the start. */
   onServerAnew(): void {
     this.told = this.newest = 0;
-    this.app.edit.document.leave('the server has restarted and no longer has this scene');
+    this.host.document.leave('the server has restarted and no longer has this scene');
   }
 
-  /** Over a connection that knows nothing of what was there before it. */
+  /** The new connection could not resume, so another scene may have been loaded meanwhile. */
   async onUnresumed(): Promise<void> {
-    const { document } = this.app.edit;
+    const { document, server } = this.host;
     const { revision } = document;
-    const history = await this.app.connection.call<SceneHistory>('scene.history').catch(() => undefined);
+    const history = await server.call<SceneHistory>('scene.history').catch(() => undefined);
     if (!history || !wasReplaced(history, revision)) return;
-    this.app.edit.select(undefined);
+    this.host.deselect();
     document.leave('another scene was loaded meanwhile');
   }
 
-  /** Another one is there. Who has sent it from here is told by what sends it. */
+  /** Another scene is there. When this page has sent it, loadFile() tells the user. */
   onLoaded(revision: number): void {
-    const { app } = this;
-    app.resume = undefined;
-    if (revision !== this.newest && revision !== app.edit.document.revision) {
-      app.edit.select(undefined); // numbers of nodes mean others now
-      app.edit.document.leave('another scene was loaded');
+    const { host } = this;
+    host.told.resume = undefined;
+    if (revision !== this.newest && revision !== host.document.revision) {
+      host.deselect(); // the number of the selected node means another object now
+      host.document.leave('another scene was loaded');
     }
     this.newest = revision;
-    app.view.sceneComes();
-    app.edit.history.askSoon();
+    host.camera.sceneComes();
     this.document.want();
-    void app.fetchStatus();
+    host.loaded();
     if (this.upload?.asked) this.untold = revision;
     else void this.tellOfLoad(revision);
   }
 
-  /** The server has none: it was started again without, could not have the one whose first light it showed, or lost it. */
-  forget(): void {
-    const { app } = this;
-    if (!app.viewer.set) return;
-    app.resume = undefined;
-    app.viewer.clear();
-    app.edit.document.reset({ asset: { version: '2.0' } }, app.progress!.revision);
-    app.frame.sceneShown = false;
+  /** The server has no scene: it has restarted without one, or has lost the one that it had. */
+  forget(revision: number): void {
+    const { host } = this;
+    if (!host.picture.set) return;
+    host.told.resume = undefined;
+    host.picture.clear();
+    host.document.reset({ asset: { version: '2.0' } }, revision);
   }
 
   async loadFile(file: File): Promise<void> {
-    const { toasts } = this.app.frame;
-    const limit = this.app.connection.info?.limits['uploadBytes'] ?? Infinity;
-    if (file.size > limit) return toasts.show(`${file.name} is larger than the server accepts`, 'bad');
-    toasts.show(`Loading ${file.name}…`);
-    this.upload?.abort.abort(); // the last one is meant, however long an earlier one takes
-    const placed = this.upload?.placed ?? this.app.view.forgetCamera();
-    const upload: Upload = (this.upload = { abort: new AbortController(), placed, asked: false });
+    const { notes, server, camera, picture } = this.host;
+    const limit = server.info?.limits['uploadBytes'] ?? Infinity;
+    if (file.size > limit) return notes.show(`${file.name} is larger than the server accepts`, 'bad');
+    notes.show(`Loading ${file.name}…`);
+    this.upload?.abort.abort(); // the user means the last file, however long an earlier one takes
+    const placed = this.upload?.placed ?? camera.forgetCamera();
+    const upload: Upload<Placed> = (this.upload = { abort: new AbortController(), placed, asked: false });
     try {
       const url = await this.send(file, upload.abort.signal);
-      // On the one connection: what is asked for later is loaded later, even if an upload that was given up arrives.
+      // The calls go over one connection, so scenes are loaded in the order in which the user chose them.
       if (upload !== this.upload) return;
       upload.asked = true;
-      const loaded = await this.app.connection.call<{ revision: number; warnings: string[] }>('scene.load', { url });
+      const loaded = await server.call<{ revision: number; warnings: string[] }>('scene.load', { url });
       this.told = Math.max(this.told, loaded.revision);
-      if (upload !== this.upload) return;
-      const count = loaded.warnings.length;
-      toasts.show(
-        count ? `${file.name} loaded; ${count} warning${count > 1 ? 's' : ''}, see Solve` : `${file.name} loaded`,
-        'good',
-      );
+      if (upload === this.upload) notes.show(loadedText(file.name, loaded.warnings.length), 'good');
     } catch (error) {
       if (upload !== this.upload) return;
-      if (this.app.viewer.shown) this.app.view.keepCamera(placed);
-      toasts.show(`${file.name}: ${(error as Error).message}`, 'bad');
-      if (this.untold > 0) void this.tellOfLoad(this.untold); // it was somebody else's
+      if (picture.shown) camera.keepCamera(placed);
+      notes.show(`${file.name}: ${(error as Error).message}`, 'bad');
+      if (this.untold > 0) void this.tellOfLoad(this.untold); // somebody else has loaded that scene
     } finally {
       if (upload === this.upload) {
         this.upload = undefined;
@@ -153,9 +116,9 @@ export class SceneSession {
     }
   }
 
-  /** Keeps the file on the server. Returns its URL there; rejects with what the server says against it. */
+  /** Keeps the file on the server and returns its URL there. Rejects with the reason that the server gives. */
   private async send(file: File, signal: AbortSignal): Promise<string> {
-    const response = await this.app.fetch(`/uploads?name=${encodeURIComponent(file.name)}`, {
+    const response = await this.host.fetch(`/uploads?name=${encodeURIComponent(file.name)}`, {
       method: 'PUT',
       body: file,
       headers: { 'Content-Type': 'application/octet-stream' },
@@ -165,37 +128,41 @@ export class SceneSession {
   }
 
   private async tellOfLoad(revision: number): Promise<void> {
-    const { connection, frame } = this.app;
-    if (revision <= this.told || !connection.has('scene.history')) return;
-    const history = await connection.call<SceneHistory>('scene.history').catch(() => undefined);
+    const { server, notes } = this.host;
+    if (revision <= this.told || !server.has('scene.history')) return;
+    const history = await server.call<SceneHistory>('scene.history').catch(() => undefined);
     const note = loadNote(history?.revisions ?? [], revision);
-    // The same scene may come twice: with its first light, which is not in the history yet, and whole.
+    // The first message of a scene comes before the history knows of it: then the second one tells.
     if (!note || revision <= this.told || this.isMine(history!.revisions, revision)) return;
     this.told = revision;
-    frame.toasts.show(note);
+    notes.show(note);
   }
 
-  /** Of a file that another one has followed since. */
+  /** Also true of a file of this page that another of its files has followed since. */
   private isMine(revisions: readonly PastRevision[], revision: number): boolean {
-    return revisions.some((past) => past.revision === revision && this.app.isMine(past.by ?? ''));
+    return revisions.some((past) => past.revision === revision && this.host.isMine(past.by ?? ''));
   }
 
   private async ask(signal: AbortSignal): Promise<{ revision: number; take: () => void }> {
-    const { app } = this;
-    const reply = await app.connection.call<{ revision: number; gltf?: Gltf; url?: string }>('scene.get');
+    const { server, fetch, document } = this.host;
+    const reply = await server.call<{ revision: number; gltf?: Gltf; url?: string }>('scene.get');
     let { gltf, revision } = reply;
     if (!gltf) {
-      const file = await app.fetch(reply.url!, { signal });
-      revision = Number(file.headers.get('X-Revision') ?? revision); // it may be newer than the answer
+      const file = await fetch(reply.url!, { signal });
+      revision = Number(file.headers.get('X-Revision') ?? revision); // the file may be newer than the reply
       gltf = (await file.json()) as Gltf;
     }
     const whole = gltf;
-    return { revision, take: () => app.edit.document.reset(whole, revision) };
+    return { revision, take: () => document.reset(whole, revision) };
   }
 
   private onNone(error: Error): void {
-    if (error instanceof RpcError && error.code === NOT_FOUND) return; // there is none: the server's state says so
+    if (error instanceof RpcError && error.code === NOT_FOUND) return; // the state of the server says so, too
     if (!(error instanceof ConnectionLost))
-      this.app.frame.toasts.show(`The scene could not be fetched: ${error.message}`, 'bad');
+      this.host.notes.show(`The scene could not be fetched: ${error.message}`, 'bad');
   }
+}
+
+function loadedText(name: string, warnings: number): string {
+  return warnings > 0 ? `${name} loaded; ${warnings} warning${warnings > 1 ? 's' : ''}, see Solve` : `${name} loaded`;
 }

@@ -1,43 +1,60 @@
-// Links, commands and files to take away. Part of the App.
+// Links, commands and files to take away.
 
-import type { App } from '../app/app';
 import { fetchLightmaps, fetchLitScene, type Layouts } from '../document/one_layout';
-import type { Patch, ServerInfo } from '../protocol/messages';
 import { copyText, download } from '../page/dom';
-import type { SharePanel } from '../ui/share_panel';
+import { pause } from '../page/pause';
+import type { LightmapsNote, Patch, ServerInfo } from '../protocol/messages';
+import { SharePanel, type Download, type PeopleActions } from '../ui/share_panel';
+import type { Notes } from '../ui/toast';
 
-export type Download = 'glb' | 'unlit' | 'exr' | 'png' | 'snapshot';
-
-/** One operation a line: to be read, and to be edited. */
+/** One operation a line, to be read and to be edited. */
 export function formatPatch(patch: Patch): string {
   return `[\n${patch.map((operation) => `  ${JSON.stringify(operation)}`).join(',\n')}\n]`;
 }
 
-/** What makes the same edit from a shell, of which some take what echo is given apart at its backslashes. `token`: the server wants one, which stays out of what is copied. */
+/**
+ * A shell command that makes the same edit. It uses printf because the echo of some shells interprets backslashes.
+ * `token`: the server requires a token, which the command reads from a file and does not contain.
+ */
 export function editCommand(patch: Patch, server: string, token = false): string {
   const json = JSON.stringify(patch).replaceAll("'", `'\\''`);
   return `printf %s '${json}' | radiosity edit ${server} -${token ? ' --token-file token' : ''}`;
 }
 
-/** Of files that a page saves faster, browsers keep ten and drop the rest without a word. */
+/** Browsers keep ten of the files that a page saves faster than this, and drop the others without a word. */
 const SAVE_EVERY_MS = 250;
+/** Time for a message of the server to arrive. */
+const MESSAGE_MS = 100;
 
-function pause(ms: number): Promise<void> {
-  return new Promise((resolve) => setTimeout(resolve, ms));
+export interface ShareHost {
+  fetch(path: string, init?: RequestInit): Promise<Response>;
+  /** The newest layout; undefined: none. */
+  layout(): LightmapsNote | undefined;
+  /** PNG of the picture. */
+  picture(): Promise<Blob>;
+  /** The hash of a link to the present view. */
+  linkHash(): string;
+  notes: Pick<Notes, 'show'>;
 }
 
 export class Share {
+  readonly panel: SharePanel;
   private lastEdit: Patch | undefined;
-  private readonly layouts: Layouts = {
-    now: () => this.app.viewer.set?.note,
-    fetch: (path, init) => this.app.fetch(path, init),
-    pause: () => pause(100),
-  };
+  private tokenRequired = false;
+  private readonly layouts: Layouts;
 
   constructor(
-    private readonly app: App,
-    private readonly panel: SharePanel,
-  ) {}
+    private readonly host: ShareHost,
+    people: PeopleActions,
+  ) {
+    this.layouts = { now: () => host.layout(), fetch: host.fetch, pause: () => pause(MESSAGE_MS) };
+    this.panel = new SharePanel({
+      ...people,
+      copyLink: () => void this.copyLink(),
+      copyEdit: (form) => void this.copyEdit(form),
+      download: (what) => void this.download(what),
+    });
+  }
 
   onEdit(patch: Patch): void {
     this.lastEdit = patch;
@@ -45,6 +62,7 @@ export class Share {
   }
 
   onServer(info: ServerInfo): void {
+    this.tokenRequired = info.authRequired;
     this.panel.setAbout([
       ['Program', info.server],
       ['Renderer', info.glRenderer],
@@ -52,23 +70,22 @@ export class Share {
     ]);
   }
 
-  async copyLink(): Promise<void> {
-    const link = `${location.origin}/#${this.app.view.linkHash()}`;
+  private async copyLink(): Promise<void> {
+    const link = `${location.origin}/#${this.host.linkHash()}`;
     history.replaceState(null, '', link);
     await this.copy(link, 'Link copied');
   }
 
-  async copyEdit(form: 'command' | 'json'): Promise<void> {
+  private async copyEdit(form: 'command' | 'json'): Promise<void> {
     if (!this.lastEdit) return;
     const server = location.protocol === 'https:' ? location.origin : location.host;
-    const command = editCommand(this.lastEdit, server, this.app.connection.info?.authRequired);
-    const text = form === 'json' ? formatPatch(this.lastEdit) : command;
-    await this.copy(text, form === 'json' ? 'JSON copied' : 'Command copied');
+    if (form === 'json') await this.copy(formatPatch(this.lastEdit), 'JSON copied');
+    else await this.copy(editCommand(this.lastEdit, server, this.tokenRequired), 'Command copied');
   }
 
   async download(what: Download): Promise<void> {
     try {
-      if (what === 'png') return download(await this.app.viewer.picture(), 'view.png');
+      if (what === 'png') return download(await this.host.picture(), 'view.png');
       if (what === 'glb') return download(await fetchLitScene(this.layouts), 'scene-lit.glb');
       if (what === 'unlit') return await this.save('/scene-unlit.glb', 'scene-unlit.glb');
       if (what === 'snapshot') return await this.save('/snapshot.png?width=1920&height=1080', 'snapshot.png');
@@ -78,16 +95,16 @@ export class Share {
         download(blob, `lightmap.${page}.exr`);
       }
     } catch (error) {
-      this.app.frame.toasts.show(`Download failed: ${(error as Error).message}`, 'bad');
+      this.host.notes.show(`Download failed: ${(error as Error).message}`, 'bad');
     }
   }
 
   private async save(path: string, name: string): Promise<void> {
-    download(await (await this.app.fetch(path)).blob(), name);
+    download(await (await this.host.fetch(path)).blob(), name);
   }
 
   private async copy(text: string, done: string): Promise<void> {
     const copied = await copyText(text);
-    this.app.frame.toasts.show(copied ? done : 'The browser blocked copying', copied ? 'good' : 'bad');
+    this.host.notes.show(copied ? done : 'The browser blocked copying', copied ? 'good' : 'bad');
   }
 }

@@ -5,7 +5,7 @@ import { makeHelp } from './help';
 import { Legend, MeterCard } from './legend';
 import { Spaced } from '../page/spaced';
 import { store, stored } from '../page/stored';
-import { Toasts } from './toast';
+import type { Toasts } from './toast';
 
 export interface FrameActions {
   toggleWalk(): void;
@@ -30,7 +30,6 @@ export class Frame {
     role: 'application',
     'aria-label': 'The scene. Press ? for keys.',
   });
-  readonly toasts = new Toasts();
   readonly legend = new Legend();
   readonly meter = new MeterCard(this.legend.element);
   readonly help = makeHelp();
@@ -47,15 +46,16 @@ export class Frame {
   private readonly loadBar = h('progress', { max: 1, value: 0, 'aria-label': 'How much of the scene is loaded' });
   /** There is a picture, which no message shall cover. */
   sceneShown = false;
-  private readonly panelButton: HTMLButtonElement;
-  private readonly panel: HTMLElement;
+  private readonly panelButton = iconButton('panel', 'Panel', 'P', () => this.togglePanel());
+  private readonly panel = h('aside', { class: 'panel', 'aria-label': 'Panel' });
   private readonly tools: Record<string, HTMLButtonElement>;
   private readonly tabs = new Map<string, { tab: HTMLButtonElement; body: HTMLElement }>();
 
-  constructor(actions: FrameActions, panels: Record<string, HTMLElement>) {
+  constructor(
+    readonly toasts: Toasts,
+    actions: FrameActions,
+  ) {
     this.tools = this.makeTools(actions);
-    this.panelButton = iconButton('panel', 'Panel', 'P', () => this.togglePanel());
-    this.panel = this.makePanel(panels);
     const bar = h(
       'header',
       { class: 'bar' },
@@ -233,10 +233,11 @@ export class Frame {
     };
   }
 
-  private makePanel(panels: Record<string, HTMLElement>): HTMLElement {
+  /** By the names of their tabs; the first is shown. */
+  setPanels(panels: Record<string, HTMLElement>): void {
     const names = Object.keys(panels);
     const bar = h('div', { class: 'tabs', role: 'tablist' });
-    const element = h('aside', { class: 'panel', 'aria-label': 'Panel' }, bar);
+    this.panel.append(bar);
     for (const name of names) {
       const body = h('div', { class: 'tab-body', role: 'tabpanel', id: `tab-${name}` }, panels[name]);
       const tab = button(name, () => this.showTab(name), { role: 'tab', 'aria-controls': body.id });
@@ -248,11 +249,10 @@ export class Frame {
         this.tabs.get(next)?.tab.focus();
       };
       bar.append(tab);
-      element.append(body);
+      this.panel.append(body);
       this.tabs.set(name, { tab, body });
     }
     this.showTab(names[0]!);
-    return element;
   }
 
   private themeButton(): HTMLButtonElement {

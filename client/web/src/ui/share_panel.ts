@@ -3,16 +3,21 @@
 import { LONGEST_NAME } from '../protocol/page_name';
 import { button, checkbox, field, h, section } from '../page/dom';
 
-export interface SharePanelActions {
-  /** What the user is called, and how the page is called where that is not said. */
+export type Download = 'glb' | 'unlit' | 'exr' | 'png' | 'snapshot';
+
+export interface PeopleActions {
+  /** What the user is called, and how others see the page of a user who has not said so. */
   name: { person: string; unnamed: string };
   setName(person: string): void;
-  /** What the box says at first. */
+  /** Whether the user shares the camera when the page opens. */
   sharing: boolean;
   setSharing(on: boolean): void;
+}
+
+export interface SharePanelActions extends PeopleActions {
   copyLink(): void;
   copyEdit(form: 'command' | 'json'): void;
-  download(what: 'glb' | 'unlit' | 'exr' | 'png' | 'snapshot'): void;
+  download(what: Download): void;
 }
 
 export class SharePanel {

@@ -6,11 +6,17 @@ import { button, h } from '../page/dom';
 
 export type Tone = 'info' | 'good' | 'bad';
 
+/** What the parts of the viewer tell the user. */
+export interface Notes {
+  show(text: string, tone?: Tone): void;
+  showOnce(text: string): void;
+}
+
 const SHOWN_MS: Record<Tone, number> = { info: 4000, good: 3000, bad: 9000 };
 const MOST = 4;
 const MOST_LETTERS = 400;
 
-export class Toasts {
+export class Toasts implements Notes {
   readonly element = h('div', { class: 'toasts', role: 'status', 'aria-live': 'polite' });
   private readonly timers = new WeakMap<Element, ReturnType<typeof setTimeout>>();
 
